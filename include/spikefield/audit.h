@@ -1,0 +1,128 @@
+/* Events to energy. Integer femtojoules, so energies are compared for equality, never with a tolerance. */
+#ifndef SPIKEFIELD_AUDIT_H
+#define SPIKEFIELD_AUDIT_H
+#include "spikefield/fx.h"
+#include "spikefield/image.h"
+#include "spikefield/scene.h"
+#include <cjson/cJSON.h>
+#include <stdio.h>
+
+enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply-add, fp32 add, 45 nm (Horowitz 2014) */
+
+/* Paper ledger: MAC * 4600 + SOP * 900, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
+uint64_t sf_energy_fj(const fx_counts *counts);
+/* The ReLU twin of the same layer sizes on the same samples: every synapse a MAC, once. UINT64_MAX as above. */
+uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
+
+/* Recount of mac, sop, spikes, updates, weight bytes, state bytes, special functions of one sample from its spike
+ * bitmaps alone, added to *counts; samples and rays too. Shares no code with src/fx. All 128 bits of a bitmap count:
+ * a spike in a lane that the layer does not have is a difference to be seen, not one to be masked away. */
+void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
+                       fx_counts *counts);
+
+/* Equality of two counts over the layers' events (not grid/march/saturation). On a difference names event, layer, step and both values. */
+sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_counts *b, const char *b_name);
+cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts);
+extern const char *const sf_layer_names[SF_LAYERS]; /* "D1", "D2", "C1", "C2", "C3" */
+
+/* The eight events of fx_layer_counts, in its order. */
+typedef enum {
+  SF_EVENT_MAC, SF_EVENT_SOP, SF_EVENT_SPIKES, SF_EVENT_UPDATES, SF_EVENT_WEIGHT, SF_EVENT_STATE_R, SF_EVENT_STATE_W,
+  SF_EVENT_SPECIAL, SF_EVENTS
+} sf_event_id;
+typedef struct sf_event {
+  const char *name, *title; /* "state_r", "state read, bytes" */
+  size_t offset;            /* of its uint64_t[SF_T_MAX] in fx_layer_counts */
+} sf_event;
+extern const sf_event sf_events[SF_EVENTS];
+uint64_t sf_event_count(const fx_layer_counts *layer, int event, int step);
+uint64_t sf_event_total(const fx_counts *counts, int event); /* over layers and steps */
+
+/* One price list, several readings of what is a MAC. All in fJ. */
+typedef struct sf_ledger {
+  uint64_t mac_fj, sop_fj, spiking_fj; /* paper ledger: every counted MAC, the product of h(t) at every step included */
+  uint64_t h_once_fj;   /* reading R = D1 + C1: the product of h counted once per sample, as if h were constant */
+  uint64_t h_spikes_fj; /* reading R = D1: each product of h is a SOP that happens at the net's mean firing rate */
+  uint64_t ann_fj;      /* twin: every synapse a MAC once per sample, the direction's too */
+  uint64_t ann_hoisted_fj; /* twin with the direction's products once per ray, as the spiking net has them */
+} sf_ledger;
+/* Fails with SF_E_RANGE when a total does not fit in 64 bits. */
+sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *ledger);
+/* 100 * (1 - spiking / ann); NaN when ann is 0. */
+double sf_saving_percent(uint64_t spiking_fj, uint64_t ann_fj);
+cJSON *sf_ledger_json(const sf_ledger *ledger);
+
+/* Integers of JSON keep all their digits: cJSON numbers are doubles. */
+void sf_json_add_u64(cJSON *object, const char *key, uint64_t value);
+
+/* Tables for a person. */
+void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts);
+/* views: how many views the counts cover (a fraction for a sample of rays), for the figures per view. */
+void sf_ledger_print(FILE *out, const sf_ledger *ledger, double views);
+extern const char *const sf_not_modelled[]; /* NULL-terminated; every report lists them */
+extern const char *const sf_criticism[];    /* NULL-terminated; what the metric is criticised for */
+void sf_limits_print(FILE *out);
+void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
+
+/* The paper's published energies, recomputed: E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, samples from the ANN row,
+ * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). */
+typedef struct sf_published_row {
+  const char *backbone, *data, *beta; /* beta NULL: the ANN */
+  const char *reading;                /* how R is read */
+  double macs, real_macs;             /* F and R per sample at this row's T */
+  double steps, published_mj;         /* steps 0: the ANN */
+  double samples;                     /* per view */
+  double rate, mean_rate;             /* implied by this row; of the group */
+  double recomputed_mj, residual_percent;
+  double saving_percent, published_saving_percent; /* NaN where the paper prints none */
+} sf_published_row;
+enum { SF_PUBLISHED_MAX = 40 };
+int sf_published_rows(sf_published_row rows[SF_PUBLISHED_MAX]);
+void sf_published_print(FILE *out);
+cJSON *sf_published_json(void);
+
+/* One ray through the core under observation; see sf_probe_net. Zero it, then set net. */
+typedef struct sf_probe {
+  const fx_net *net;
+  fx_trace *trace;      /* where not NULL, every sample is recounted from its spike bitmaps and compared */
+  fx_counts core;       /* (a) */
+  fx_counts recount;    /* (c), from trace */
+  uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one saturation in the layer */
+  uint64_t sample;      /* of this ray, from 0; sf_probe_begin resets it */
+  int32_t base[SF_LANES];
+} sf_probe;
+void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
+/* fx_net_fn; user is the sf_probe. Pass &probe->core to fx_render_ray too: it counts grid and march there. */
+sf_status sf_probe_net(void *probe, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
+
+/* The ray through the centre of a pixel. */
+sf_status sf_pixel_ray(const fx_scene *scene, const sf_camera *camera, int x, int y, fx_ray *ray);
+
+/* Rays 0..count-1 through the core on all threads; the sums do not depend on the threads. */
+typedef struct sf_measure_job {
+  const fx_scene *scene;
+  uint64_t rays;
+  sf_status (*ray)(void *user, uint64_t index, fx_ray *ray); /* called from many threads */
+  bool (*tick)(void *user, uint64_t done); /* from one thread at a time, now and then; false stops. May be NULL */
+  void *user;
+} sf_measure_job;
+typedef struct sf_measure {
+  fx_counts core, recount;
+  uint64_t rays;        /* all, with or without samples */
+  uint64_t saturated_samples[SF_LAYERS];
+  uint8_t *hit;         /* bit i: ray i has samples; owned, sf_measure_free */
+} sf_measure;
+/* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */
+sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure);
+void sf_measure_free(sf_measure *measure);
+
+/* Saturation that the number formats rule out: membranes and colour in the modes whose state is a convex combination.
+ * Density may saturate: alpha is 1 long before. Writes "none" or a comma-separated list of layers. */
+bool sf_saturation_unexpected(const fx_net *net, const uint64_t saturated[SF_LAYERS], char *list, size_t size);
+/* "none", or "D2 12 samples, 3 features": samples with a saturation per layer, grid features that were clipped. */
+void sf_saturation_census(const uint64_t samples[SF_LAYERS], uint64_t features, char *text, size_t size);
+
+/* SHA-256 of a file, as sha256sum prints it. */
+sf_status sf_sha256_file(const char *path, char hex[65]);
+void sf_sha256(const void *data, size_t size, char hex[65]);
+#endif

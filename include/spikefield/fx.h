@@ -1,0 +1,172 @@
+/* The fixed-point core: the specification that rtl/ mirrors. Integers only, the same bits on
+ * every machine. Formats are those of arch.def; rounding is fx_rshift_round everywhere.
+ *
+ * Layers (n_in -> n_out; sizes are run-time state up to arch.def):
+ *   D1  f[32]   -> 128   MAC, spiking      constant current, computed once per sample
+ *   D2  spikes  -> 16    AC, integrating   i(t)[0] drives the density, i(t)[1..15] >> 3 = h(t)
+ *   C1  d | h   -> 128   MAC, spiking      the d part once per ray, the h part at every step
+ *   C2  spikes  -> 128   AC, spiking
+ *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour
+ */
+#ifndef SPIKEFIELD_FX_H
+#define SPIKEFIELD_FX_H
+#include "spikefield/arch.h"
+#include "spikefield/status.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum { FX_D1, FX_D2, FX_C1, FX_C2, FX_C3 } fx_layer_id;
+typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY } fx_input_mode;
+
+/* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
+ * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
+ * >= n_out are zero. C1's rows are the n_dir direction rows first, then the n_h rows of h.
+ * `theta` is in membrane LSB (so it carries the membrane's fraction bits) and must be >= 1 for
+ * the spiking layers D1, C1, C2; for D2 and C3, `k` is the leak of the density and colour integrator. */
+typedef struct fx_layer {
+  int32_t n_in, n_out;
+  int32_t k;     /* U1.12, 0..4096 */
+  int32_t theta; /* 1..2^23-1; 0 in D2 and C3 */
+  int8_t *w;     /* [n_in][SF_LANES] */
+} fx_layer;
+
+/* y = sat(rshift_round(current * mul, shift) + bias): a current to the argument of a table.
+ * mul 0..65535, shift 0..31, bias in the result's LSB. */
+typedef struct fx_scale {
+  int32_t mul, shift, bias;
+} fx_scale;
+
+typedef struct fx_net {
+  fx_layer layer[SF_LAYERS];
+  int32_t mode; /* fx_input_mode */
+  int32_t steps; /* t_r: time steps to unroll, 1..SF_T_MAX */
+  fx_scale exp_in;     /* D2 current 0 -> log2 of density per box edge, Q.LOG_FRAC */
+  fx_scale sigmoid_in; /* C3 current   -> sigmoid argument, Q.LOG_FRAC */
+} fx_net;
+
+/* Multiresolution hash grid (Mueller et al. 2022), 2 features per entry.
+ * Position in level l: pos = (x * (res[l] - 1) rounded down to Q.8) + 1/2, as torch-ngp: see fx/grid.c. */
+enum { FX_LEVELS_MAX = 16, FX_GRID_FEATURES = 2 };
+typedef struct fx_grid {
+  int32_t levels;
+  int32_t scale_q16[FX_LEVELS_MAX]; /* (res - 1) in Q16.16: pos = x * scale + 0.5 */
+  int32_t stride[FX_LEVELS_MAX];    /* points per axis of a dense level; 0 = hashed */
+  int32_t log2_size[FX_LEVELS_MAX]; /* hashed: log2 of entries */
+  int64_t offset[FX_LEVELS_MAX];    /* first entry of the level */
+  int64_t entries;                  /* of all levels */
+  int32_t shift[FX_LEVELS_MAX];     /* f = sat12(rshift_round(sum entry * w_Q16, shift)); 0..31 */
+  int8_t *table;                    /* [entries][2] */
+} fx_grid;
+
+/* Scene box [0,1)^3, marched in equal steps. occupancy: bit (z*res + y)*res + x, LSB first. */
+typedef struct fx_scene {
+  fx_net net;
+  fx_grid grid;
+  int32_t occ_res;    /* cells per axis, power of two, <= 256 */
+  uint8_t *occupancy; /* occ_res^3 / 8 bytes */
+  int32_t step_q24;   /* distance between samples in box edges, Q0.24 */
+  int32_t max_samples; /* per ray, 1..1024 */
+  int32_t trans_stop; /* stop once transmittance <= this, Q.TRANS_FRAC */
+  int32_t background[3]; /* Q0.16, 65536 = 1.0 */
+  /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
+  double to_box_scale, to_box_offset[3];
+  double dir_scale;   /* value of one LSB of the direction features */
+  double feature_scale;            /* value of one LSB of the grid features; with current_scale for reports and tests */
+  double current_scale[SF_LAYERS]; /* value of one LSB of each layer's current */
+  void *owner;        /* backing storage of w, table, occupancy; fx_scene_free releases it */
+} fx_scene;
+
+/* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count;
+ * sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
+typedef struct fx_ray {
+  int64_t origin[3], step[3]; /* Q24.40 */
+  int32_t count;              /* lattice points in the box, 0 = misses */
+  int32_t first_q16;          /* distance from the camera to sample 0 in lattice steps, Q16.16 */
+  int16_t dir[SF_DIR_MAX];    /* spherical harmonics of the direction, Q1.10 */
+} fx_ray;
+
+/* Events, counted per layer and time step. What is one event, exactly:
+ *   mac     D1: n_in*n_out per sample, at step 0. C1: n_dir*n_out per ray that has a sample (step 0 of its first
+ *           sample) + n_h*n_out per step.  (zero inputs count too)
+ *   sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out
+ *   spikes  D1, C1, C2: neurons that fired at step t
+ *   updates D1, C1, C2: n_out per step; D2: 1 per step (density integrator); C3: 3 per step
+ *   weight  bytes read, 1 per weight: D1 n_in*n_out at step 0; C1 as its MACs; C2 as its SOPs; D2, C3: n_out for
+ *           each presynaptic neuron active at ANY step, at the first step at which it fired
+ *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); no read at step 0
+ *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations */
+typedef struct fx_layer_counts {
+  uint64_t mac[SF_T_MAX], sop[SF_T_MAX], spikes[SF_T_MAX], updates[SF_T_MAX], weight[SF_T_MAX], state_r[SF_T_MAX],
+      state_w[SF_T_MAX], special[SF_T_MAX];
+} fx_layer_counts;
+
+typedef struct fx_counts {
+  fx_layer_counts layer[SF_LAYERS];
+  uint64_t samples, rays;  /* through the net; rays with at least one sample */
+  uint64_t grid_bytes;     /* hash-grid bytes read */
+  uint64_t march_steps;    /* lattice points tested against the occupancy grid */
+  uint64_t saturated[SF_LAYERS]; /* saturation events: membranes, or exp/sigmoid accumulators for D2/C3 */
+  uint64_t saturated_features;
+} fx_counts;
+
+void fx_counts_add(fx_counts *sum, const fx_counts *more);
+
+/* Everything a lockstep comparison needs of one sample. */
+typedef struct fx_trace {
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
+  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: the accumulator after the step */
+  int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* the exact sum, without C2's fraction bits */
+} fx_trace;
+
+typedef struct fx_out {
+  uint32_t sigma;     /* U16.12 per box edge */
+  uint32_t colour[3]; /* U4.16 */
+} fx_out;
+
+/* The direction's current into C1, computed once per ray. base[SF_LANES]. Counts C1's d MACs and the ray. */
+void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_counts *counts);
+
+/* One sample through both nets. f[n_feature] int12; base from fx_net_direction. trace and counts may be NULL. */
+void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_trace *trace,
+                   fx_counts *counts);
+
+/* Grid features of one position. pos[3] Q0.24, f[2*levels]. counts may be NULL. */
+void fx_grid_features(const fx_grid *grid, const uint32_t *pos, int16_t *f, fx_counts *counts);
+
+/* Next lattice point >= n whose cell is occupied, or -1. Writes its position. */
+int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint32_t *pos, fx_counts *counts);
+
+/* Compositing of one ray, front to back. Conservation: weight_sum + transmittance == 1 << TRANS_FRAC, always. */
+typedef struct fx_pixel {
+  uint64_t colour[3];    /* Q8.36: sum of w (Q.20) * c (Q4.16) */
+  uint64_t depth;        /* sum of w * (distance in lattice steps, Q16.16) */
+  uint32_t weight_sum, transmittance; /* Q.20 */
+  uint32_t samples;
+} fx_pixel;
+void fx_composite_begin(fx_pixel *pixel);
+void fx_composite_add(fx_pixel *pixel, const fx_out *sample, int32_t delta_q24, uint64_t distance_q16);
+void fx_composite_end(fx_pixel *pixel, const int32_t *background_q16);
+
+/* Pixel to raw integers of the golden image: RGB Q0.16 clamped to 0..65535, alpha Q0.16. */
+void fx_pixel_rgba(const fx_pixel *pixel, uint32_t rgba[4]);
+
+/* Called for every sample of fx_render_ray in place of fx_net_sample, when not NULL. `first` is true for the
+ * first sample of the ray. The RTL backend and co-simulation plug in here; a non-OK status ends the ray. */
+typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
+
+/* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */
+sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
+                        fx_counts *counts);
+
+/* Refuses a scene that breaks a rule above, naming the field (`path` is only for the message). */
+sf_status fx_scene_check(const fx_scene *scene, const char *path);
+
+/* Zeroed weights, table and occupancy for the sizes already set (which it checks); owner is set. */
+sf_status fx_scene_allocate(fx_scene *scene, const char *path);
+
+/* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). */
+sf_status fx_scene_load(fx_scene *scene, const char *path);
+sf_status fx_scene_save(const fx_scene *scene, const char *path);
+void fx_scene_free(fx_scene *scene);
+#endif

@@ -1,0 +1,40 @@
+/* The golden image: what a view looks like and what it cost, per pixel. One set of planes for the float field, the
+ * fixed-point core and the accelerator; the last two must fill them with the same bits. */
+#ifndef SPIKEFIELD_GOLDEN_H
+#define SPIKEFIELD_GOLDEN_H
+#include "spikefield/audit.h"
+#include "spikefield/image.h"
+
+/* R G B: composited over the scene's background, 1.0 = white; fixed: fx.* / 65535. A: what the ray hit.
+ * Z: mean distance from the camera of what the ray hit, world units of the data set; 0 where it hit nothing.
+ * samples: through the nets. spikes, sops, macs: events; energy_fJ: paper ledger, 4600 * macs + 900 * sops.
+ * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC. */
+typedef enum {
+  SF_PLANE_R, SF_PLANE_G, SF_PLANE_B, SF_PLANE_A, SF_PLANE_Z, SF_PLANE_SAMPLES,
+  SF_FLOAT_PLANES, /* the float field has no events and no raw integers */
+  SF_PLANE_SPIKES = SF_FLOAT_PLANES, SF_PLANE_SOPS, SF_PLANE_MACS, SF_PLANE_ENERGY,
+  SF_PLANE_FX_R, SF_PLANE_FX_G, SF_PLANE_FX_B, SF_PLANE_FX_A, SF_PLANE_FX_T,
+  SF_PLANES
+} sf_plane;
+
+typedef struct sf_golden {
+  int width, height, planes; /* planes: SF_FLOAT_PLANES or SF_PLANES */
+  void *plane[SF_PLANES];    /* [height][width] float or uint32_t, owned */
+} sf_golden;
+
+sf_status sf_golden_create(sf_golden *golden, int width, int height, int planes);
+void sf_golden_free(sf_golden *golden);
+static inline float *sf_golden_real(const sf_golden *g, sf_plane plane) { return g->plane[plane]; }
+static inline uint32_t *sf_golden_int(const sf_golden *g, sf_plane plane) { return g->plane[plane]; }
+
+/* Pixel i of a fixed-point image. step_length: distance between samples in world units. */
+void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_counts *counts, double step_length);
+
+/* EXR with every plane as a channel; attributes as sf_exr_save. PNG: R G B, opaque. */
+sf_status sf_golden_save(const sf_golden *golden, const char *path, const char *const *attributes);
+sf_status sf_golden_save_png(const sf_golden *golden, const char *path);
+
+/* Against the window at (x, y) of a picture composited over background[3]. SSIM is NaN when a side is below 11. */
+sf_status sf_golden_quality(const sf_golden *golden, const sf_image *picture, int x, int y, const float background[3],
+                            double *psnr, double *ssim);
+#endif

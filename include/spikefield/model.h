@@ -1,0 +1,97 @@
+/* The float model: hash grid, spiking density and colour nets (or their ReLU twin), time budget t*.
+ * One flat vector holds every trained number; `param` names its parts. */
+#ifndef SPIKEFIELD_MODEL_H
+#define SPIKEFIELD_MODEL_H
+#include "spikefield/arch.h"
+#include "spikefield/status.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum { SF_HYBRID, SF_DECAY, SF_NODECAY } sf_input_mode; /* equal to fx_input_mode */
+typedef enum { SF_NET_SNN, SF_NET_ANN } sf_net_kind;
+
+typedef struct sf_config {
+  int32_t net;       /* sf_net_kind */
+  int32_t mode;      /* sf_input_mode */
+  int32_t steps;     /* T, 1..SF_T_MAX; 1 for the ANN */
+  int32_t levels, log2_hash, base_res, finest_res; /* hash grid, 2 features per entry */
+  int32_t hidden;    /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
+  float theta[3];    /* thresholds of D1, C1, C2 */
+  float scale;       /* model units = world units * scale; the scene box is [-1,1]^3 model units */
+  int32_t lattice;   /* samples across the box diagonal: step = 2 sqrt(3) / lattice model units */
+  int32_t occ_res;   /* occupancy cells per axis */
+} sf_config;
+
+/* Parts of the parameter vector, in this order. Matrices are [out][in] as in torch.
+ *   grid.table [entries][2]; density.w1 [hidden][2*levels]; density.w2 [16][hidden];
+ *   colour.w3 [hidden][16 + 15] (16 spherical harmonics, then h); colour.w4 [hidden][hidden]; colour.w5 [3][hidden];
+ *   leak [5]: logits w of k = sigmoid(w): D1, density integrator, C1, C2, colour integrator */
+typedef enum { SF_P_GRID, SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5, SF_P_LEAK, SF_P_COUNT } sf_param_id;
+typedef struct sf_param {
+  const char *name;
+  size_t offset, size; /* in floats; offsets are multiples of 16 */
+  int64_t shape[2];
+  int dims;
+} sf_param;
+
+enum { SF_DIR_FEATURES = 16, SF_DENSITY_OUT = 16, SF_GEO_FEATURES = 15 };
+
+typedef struct sf_grid_level {
+  float scale;      /* pos = x * scale + 0.5, x in [0,1] */
+  uint32_t stride;  /* points per axis of a dense level, 0 = hashed */
+  uint32_t entries; /* of this level */
+  size_t offset;    /* first entry */
+} sf_grid_level;
+
+typedef struct sf_model {
+  sf_config config;
+  sf_param param[SF_P_COUNT];
+  size_t size;       /* floats in value */
+  float *value;      /* [size], 64-byte aligned, owned */
+  sf_grid_level level[16];
+  float t_star;      /* 1..T; T where no budget was learned */
+  int32_t t_r;       /* round(t_star): steps at inference */
+  uint8_t *occupancy;/* occ_res^3 / 8 bytes, bit (z*res + y)*res + x, owned */
+} sf_model;
+
+sf_config sf_config_default(void);
+sf_status sf_config_check(const sf_config *config);
+/* Allocates, lays out and zeroes; occupancy all ones. */
+sf_status sf_model_create(sf_model *model, const sf_config *config);
+void sf_model_free(sf_model *model);
+static inline float *sf_model_param(const sf_model *m, sf_param_id id) { return m->value + m->param[id].offset; }
+
+/* model.safetensors: the tensors above by name, "occupancy", metadata config + t_star + t_r. Every load check names
+ * file and tensor. A checkpoint holds further tensors (optimiser) that this ignores. */
+sf_status sf_model_load(sf_model *model, const char *path);
+
+/* The same for every consumer: lattice of a ray in the box [-1,1]^3 with near plane 0.2.
+ * Sample n of `count` is at distance first + n * step. count = 0: the ray misses. */
+typedef struct sf_lattice {
+  float first, step;
+  int32_t count;
+} sf_lattice;
+sf_lattice sf_ray_lattice(const sf_config *config, const float origin[3], const float direction[3]);
+
+/* Hash-grid features at x in [0,1]^3, scalar and obvious: the oracle of the vector kernels. f[2*levels]. */
+void sf_grid_features(const sf_model *model, const float x[3], float *f);
+/* Real spherical harmonics of degree 4 (16 values) of a unit vector, torch-ngp's order and signs. */
+void sf_sh4(const float direction[3], float out[16]);
+
+/* Float nets, one sample, scalar and obvious: the oracle. Outputs for every prefix 1..steps; currents optional.
+ * sigma[steps] per model unit, colour[steps][3]. trace: per-layer currents and spikes for calibration, or NULL. */
+typedef struct sf_net_trace {
+  float current[SF_LAYERS][SF_T_MAX][SF_LANES]; /* what enters each neuron, layers D1 D2 C1 C2 C3 */
+  float membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; integrators: after */
+  uint8_t spike[SF_LAYERS][SF_T_MAX][SF_LANES];
+} sf_net_trace;
+void sf_net_sample(const sf_model *model, const float *f, const float *sh, int steps, float *sigma, float *colour,
+                   sf_net_trace *trace);
+
+/* Renders `count` rays on all threads through the vector kernels, the first `steps` steps (0 = t_r).
+ * origin, direction [count][3]; rgb [count][3], depth, alpha, samples [count] (each may be NULL but rgb).
+ * background: 3 floats. Empty space is skipped; rays stop at transmittance < 1e-4. */
+sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                         const float background[3], float *rgb, float *depth, float *alpha, float *samples);
+#endif

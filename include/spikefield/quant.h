@@ -1,0 +1,41 @@
+/* Float to fixed: the only bridge between the float model and src/fx. */
+#ifndef SPIKEFIELD_QUANT_H
+#define SPIKEFIELD_QUANT_H
+#include "spikefield/fx.h"
+#include "spikefield/model.h"
+#include "spikefield/scene.h"
+
+typedef struct sf_quant_options {
+  int steps;            /* 0 = the model's t_r; else 1..T */
+  float background[3];  /* 0..1 */
+  uint64_t seed;
+} sf_quant_options;
+
+/* Quantises field and nets. Scales are chosen by the error of each layer's currents on calibration positions
+ * drawn from occupied cells. Refuses what the hardware cannot represent (NaN, Inf, layer sizes, theta or scale that rounds
+ * out of range), naming file and tensor. The result passes fx_scene_check. Spiking nets only. */
+sf_status sf_quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options);
+
+/* What quantisation cost, measured on calibration samples that took no part in the fit. */
+typedef struct sf_quant_layer {
+  double unit;      /* value of one LSB of the layer's current */
+  double error;     /* RMS error of the currents / RMS of the currents; 0 when the layer is silent */
+  int32_t clipped;  /* weights beyond +-127 units */
+} sf_quant_layer;
+typedef struct sf_quant_report {
+  sf_quant_layer layer[SF_LAYERS];
+  double feature_scale, feature_error; /* as above, for the grid features */
+  int64_t grid_clipped;                /* grid entries beyond +-127 of their level's scale */
+  int32_t samples;                     /* calibration samples */
+} sf_quant_report;
+sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
+                             sf_quant_report *report);
+
+/* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
+ * is refused. */
+sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray);
+
+/* Fixed values back to units for comparison: per model unit, 0..1. */
+double sf_fx_sigma_value(uint32_t sigma);
+double sf_fx_colour_value(uint32_t colour);
+#endif

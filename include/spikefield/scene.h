@@ -1,0 +1,52 @@
+/* Cameras, posed images, procedural scenes. */
+#ifndef SPIKEFIELD_SCENE_H
+#define SPIKEFIELD_SCENE_H
+#include "spikefield/image.h"
+#include "spikefield/status.h"
+
+typedef struct sf_camera {
+  int width, height;
+  float fx, fy, cx, cy;  /* pixels */
+  float to_world[12];    /* row-major 3x4, OpenGL axes (x right, y up, looks along -z), model units */
+} sf_camera;
+
+/* Model units: the scene box is [-1, 1]^3. Blender data: position * 0.8 as torch-ngp. */
+typedef struct sf_view {
+  char name[256];
+  sf_camera camera;
+  sf_image image; /* rgba NULL when the split has no picture for it */
+} sf_view;
+
+typedef struct sf_dataset {
+  char path[4096];
+  sf_view *view;
+  int count;
+  float scale; /* model = world * scale */
+} sf_dataset;
+
+typedef struct sf_dataset_options {
+  int downscale; /* >= 1 */
+  float scale;   /* 0 = default of the layout (0.8) */
+  int limit;     /* load at most this many views, 0 = all */
+} sf_dataset_options;
+
+/* Blender layout: dir/transforms_SPLIT.json. split: "train", "test". Where transforms_test.json is missing, every
+ * 8th view of transforms_train.json (or transforms.json) is the test split. Every fault names file and frame. */
+sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
+void sf_dataset_free(sf_dataset *data);
+
+/* Ray through pixel position (px, py), (0.5, 0.5) = centre of the first pixel. Unit direction. */
+void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3], float direction[3]);
+
+/* Procedural scenes: exact rendering of analytic shapes. names: NULL-terminated list. */
+typedef struct sf_procedural_options {
+  int width, height, train_views, test_views;
+  uint64_t seed; /* camera positions */
+} sf_procedural_options;
+extern const char *const sf_procedural_names[];
+/* Writes the Blender layout below dir. progress may be NULL. */
+sf_status sf_procedural_write(const char *name, const char *dir, const sf_procedural_options *options,
+                              void (*progress)(void *user, int done, int total), void *user);
+/* Exact colour along one ray (world units), straight alpha RGBA in 0..1. */
+sf_status sf_procedural_trace(const char *name, const float origin[3], const float direction[3], float rgba[4]);
+#endif

@@ -1,0 +1,22 @@
+// One neuron, one step: leak, compare, soft reset. Mirror: src/fx/plif.c (fx_plif_step)
+// Included inside a module after sf_round.svh. A function and not an instance per lane: see docs/rtl.md, "Lanes".
+// Returns {spike, v after reset}. No-decay mode alone needs the saturation; 0 <= k <= 2^12 and theta >= 1 are
+// enforced by sf_csr.
+function automatic [24:0] sf_plif_step(input signed [23:0] v, input signed [23:0] current, input [12:0] k,
+                                       input signed [23:0] theta, input [1:0] mode, input first);
+  reg signed [47:0] old;
+  reg signed [47:0] leak;
+  reg signed [47:0] membrane;
+  reg spike;
+  begin
+    old = first ? 48'sd0 : 48'(v);
+    leak = mode == sf_op_pkg::HYBRID && first ? 48'sd4096 : $signed({35'd0, k});
+    if (mode == sf_op_pkg::NODECAY)
+      membrane = sf_sat(old - sf_rshift_round(old * leak, 5'd12) + 48'(current), 6'd24);
+    else
+      membrane = old + sf_rshift_round((48'(current) - old) * leak, 5'd12);
+    spike = membrane >= 48'(theta);
+    if (spike) membrane = membrane - 48'(theta);
+    sf_plif_step = {spike, membrane[23:0]};
+  end
+endfunction

@@ -1,0 +1,63 @@
+/* The third, independent count: what the events of one sample must have been, from its spike bitmaps and the sizes of
+ * the net alone. It mirrors the definitions in fx.h, not the code of src/fx. */
+#include "spikefield/audit.h"
+
+enum { SPIKING_STATE_BYTES = 3, INTEGRATOR_STATE_BYTES = 4 };
+
+static uint64_t fired(const uint64_t bitmap[2])
+{
+  return (uint64_t)__builtin_popcountll(bitmap[0]) + (uint64_t)__builtin_popcountll(bitmap[1]);
+}
+
+static void count_state(fx_layer_counts *c, int t, uint64_t neurons, uint64_t bytes)
+{
+  c->updates[t] += neurons;
+  c->state_w[t] += neurons * bytes;
+  if (t > 0) c->state_r[t] += neurons * bytes;
+}
+
+static void count_mac(fx_layer_counts *c, int t, int n_in, int n_out)
+{
+  uint64_t products = (uint64_t)n_in * (uint64_t)n_out;
+  c->mac[t] += products;
+  c->weight[t] += products;
+}
+
+/* D2, C3 keep what a row added for the later steps: a weight row is read when its neuron fires for the first time. */
+static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[2], uint64_t seen[2], uint64_t n_out,
+                               uint64_t integrators)
+{
+  uint64_t new_rows[2] = {in[0] & ~seen[0], in[1] & ~seen[1]};
+  seen[0] |= in[0], seen[1] |= in[1];
+  c->sop[t] += fired(in) * n_out;
+  c->weight[t] += fired(new_rows) * n_out;
+  c->special[t] += integrators;
+  count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
+}
+
+void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
+                       fx_counts *counts)
+{
+  const fx_layer *size = net->layer;
+  fx_layer_counts *c = counts->layer;
+  uint64_t seen_d1[2] = {0, 0}, seen_c2[2] = {0, 0};
+  int n_h = size[FX_D2].n_out - 1, n_dir = size[FX_C1].n_in - n_h;
+
+  counts->samples++;
+  counts->rays += first_of_ray;
+  count_mac(&c[FX_D1], 0, size[FX_D1].n_in, size[FX_D1].n_out);
+  if (first_of_ray) count_mac(&c[FX_C1], 0, n_dir, size[FX_C1].n_out);
+  for (int t = 0; t < net->steps; t++) {
+    for (int l = FX_D1; l <= FX_C2; l++) {
+      if (l == FX_D2) continue;
+      c[l].spikes[t] += fired(spikes[l][t]);
+      count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
+    }
+    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, 1);
+    count_mac(&c[FX_C1], t, n_h, size[FX_C1].n_out);
+    uint64_t c2_sop = fired(spikes[FX_C1][t]) * (uint64_t)size[FX_C2].n_out;
+    c[FX_C2].sop[t] += c2_sop;
+    c[FX_C2].weight[t] += c2_sop;
+    count_output_layer(&c[FX_C3], t, spikes[FX_C2][t], seen_c2, (uint64_t)size[FX_C3].n_out, 3);
+  }
+}

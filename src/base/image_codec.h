@@ -1,0 +1,12 @@
+/* Decoders behind sf_image_load. `bytes` holds the whole file `path`. On failure the image is empty. */
+#ifndef SPIKEFIELD_BASE_IMAGE_CODEC_H
+#define SPIKEFIELD_BASE_IMAGE_CODEC_H
+#include "spikefield/image.h"
+
+sf_status sf_png_load(sf_image *image, const char *path, const unsigned char *bytes, size_t size);
+sf_status sf_jpeg_load(sf_image *image, const char *path, const unsigned char *bytes, size_t size);
+
+/* Refuses absurd sizes before any memory is asked for, then allocates the pixels. */
+sf_status sf_image_alloc(sf_image *image, const char *path, uint64_t width, uint64_t height);
+
+#endif

@@ -1,0 +1,129 @@
+#include "src/fx/scene.h"
+#include "src/fx/unit.h"
+#include "src/fx/nofloat.h"
+
+const char *const fx_layer_tensor[SF_LAYERS] = {"density.w1", "density.w2", "colour.w3", "colour.w4", "colour.w5"};
+static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
+
+enum { ENTRIES_MAX = 1 << 28, HASH_BITS_MAX = 27, OCCUPANCY_MAX = 256, SAMPLES_MAX = 1024 };
+
+static sf_status in_range(const char *path, const char *owner, const char *field, int64_t value, int64_t low,
+                          int64_t high)
+{
+  if (value >= low && value <= high) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: %s.%s is %lld, expected %lld..%lld", path, owner, field, (long long)value,
+                 (long long)low, (long long)high);
+}
+
+static sf_status check_chain(const fx_net *net, const char *path)
+{
+  const fx_layer *l = net->layer;
+  const int n_h = l[FX_D2].n_out - 1;
+  SF_TRY(in_range(path, "D1", "n_in", l[FX_D1].n_in, 2, SF_FEATURE_MAX));
+  SF_TRY(in_range(path, "D1", "n_out", l[FX_D1].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, "D2", "n_in", l[FX_D2].n_in, l[FX_D1].n_out, l[FX_D1].n_out));
+  SF_TRY(in_range(path, "D2", "n_out", l[FX_D2].n_out, 1, SF_OUT_MAX));
+  SF_TRY(in_range(path, "C1", "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + SF_DIR_MAX));
+  SF_TRY(in_range(path, "C1", "n_out", l[FX_C1].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, "C2", "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
+  SF_TRY(in_range(path, "C2", "n_out", l[FX_C2].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, "C3", "n_in", l[FX_C3].n_in, l[FX_C2].n_out, l[FX_C2].n_out));
+  return in_range(path, "C3", "n_out", l[FX_C3].n_out, 3, 3);
+}
+
+/* The farthest cell corner of a dense level must lie inside it; a level must end before the next one begins. */
+static sf_status check_level(const fx_grid *grid, int i, const char *path)
+{
+  char owner[32] = "grid.level";
+  const int64_t end = i + 1 < grid->levels ? grid->offset[i + 1] : grid->entries;
+  owner[10] = (char)('0' + i / 10), owner[11] = (char)('0' + i % 10);
+  SF_TRY(in_range(path, owner, "scale_q16", grid->scale_q16[i], 1, INT32_MAX));
+  SF_TRY(in_range(path, owner, "shift", grid->shift[i], 0, 31));
+  SF_TRY(in_range(path, owner, "stride", grid->stride[i], 0, 600));
+  SF_TRY(in_range(path, owner, "offset", grid->offset[i], 0, grid->entries));
+  if (!grid->stride[i]) {
+    SF_TRY(in_range(path, owner, "log2_size", grid->log2_size[i], 0, HASH_BITS_MAX));
+    return in_range(path, owner, "entries", end - grid->offset[i], (int64_t)1 << grid->log2_size[i], ENTRIES_MAX);
+  }
+  const int64_t stride = grid->stride[i];
+  const int64_t far = (((((int64_t)1 << SF_POS_FRAC) - 1) * grid->scale_q16[i] >> 32) + 128) >> 8;
+  SF_TRY(in_range(path, owner, "stride", stride, far + 2, 600));
+  return in_range(path, owner, "entries", end - grid->offset[i], stride * stride * stride, ENTRIES_MAX);
+}
+
+static sf_status check_grid(const fx_grid *grid, int n_feature, const char *path)
+{
+  SF_TRY(in_range(path, "grid", "levels", grid->levels, 1, FX_LEVELS_MAX));
+  SF_TRY(in_range(path, "D1", "n_in", n_feature, grid->levels * FX_GRID_FEATURES, grid->levels * FX_GRID_FEATURES));
+  SF_TRY(in_range(path, "grid", "entries", grid->entries, 1, ENTRIES_MAX));
+  SF_TRY(in_range(path, "grid.level00", "offset", grid->offset[0], 0, 0));
+  for (int i = 0; i < grid->levels; i++) SF_TRY(check_level(grid, i, path));
+  return sf_ok();
+}
+
+sf_status fx_check_sizes(const fx_scene *scene, const char *path)
+{
+  SF_TRY(check_chain(&scene->net, path));
+  SF_TRY(check_grid(&scene->grid, scene->net.layer[FX_D1].n_in, path));
+  SF_TRY(in_range(path, "scene", "occ_res", scene->occ_res, 2, OCCUPANCY_MAX));
+  if (scene->occ_res & (scene->occ_res - 1))
+    return sf_fail(SF_E_RANGE, "%s: scene.occ_res is %d, expected a power of two", path, scene->occ_res);
+  return sf_ok();
+}
+
+static sf_status check_weights(const fx_layer *layer, const char *tensor, const char *path)
+{
+  if (!layer->w) return sf_fail(SF_E_FORMAT, "%s: tensor '%s' is missing", path, tensor);
+  for (int i = 0; i < layer->n_in; i++)
+    for (int o = 0; o < SF_LANES; o++) {
+      const int8_t w = layer->w[(size_t)i * SF_LANES + o];
+      if (w == INT8_MIN)
+        return sf_fail(SF_E_RANGE, "%s: tensor '%s'[%d][%d] is -128, expected -127..127", path, tensor, i, o);
+      if (o >= layer->n_out && w)
+        return sf_fail(SF_E_RANGE, "%s: tensor '%s'[%d][%d] is %d, expected 0: the layer has %d outputs", path,
+                       tensor, i, o, w, layer->n_out);
+    }
+  return sf_ok();
+}
+
+static sf_status check_layer(const fx_layer *layer, int id, const char *path)
+{
+  const bool spiking = id != FX_D2 && id != FX_C3;
+  SF_TRY(in_range(path, layer_name[id], "k", layer->k, 0, FX_LEAK_ONE));
+  SF_TRY(in_range(path, layer_name[id], "theta", layer->theta, spiking, spiking ? FX_MEMBRANE_MAX : 0));
+  return check_weights(layer, fx_layer_tensor[id], path);
+}
+
+static sf_status check_scale(const fx_scale *scale, const char *name, int bias_low, int bias_high, const char *path)
+{
+  SF_TRY(in_range(path, name, "mul", scale->mul, 0, 65535));
+  SF_TRY(in_range(path, name, "shift", scale->shift, 0, 31));
+  return in_range(path, name, "bias", scale->bias, bias_low, bias_high);
+}
+
+static sf_status check_net(const fx_net *net, const char *path)
+{
+  const int bias = 1 << (FX_EXP2_BITS - 1);
+  SF_TRY(in_range(path, "net", "mode", net->mode, FX_HYBRID, FX_NODECAY));
+  SF_TRY(in_range(path, "net", "t_r", net->steps, 1, SF_T_MAX));
+  SF_TRY(check_scale(&net->exp_in, "exp_in", -bias, bias - 1, path));
+  SF_TRY(check_scale(&net->sigmoid_in, "sigmoid_in", 0, 0, path));
+  for (int id = 0; id < SF_LAYERS; id++) SF_TRY(check_layer(&net->layer[id], id, path));
+  return sf_ok();
+}
+
+sf_status fx_scene_check(const fx_scene *scene, const char *path)
+{
+  SF_TRY(fx_check_sizes(scene, path));
+  SF_TRY(check_net(&scene->net, path));
+  if (!scene->grid.table) return sf_fail(SF_E_FORMAT, "%s: tensor 'grid.table' is missing", path);
+  if (!scene->occupancy) return sf_fail(SF_E_FORMAT, "%s: tensor 'occupancy' is missing", path);
+  SF_TRY(in_range(path, "scene", "step_q24", scene->step_q24, 1, 1 << SF_DELTA_FRAC));
+  SF_TRY(in_range(path, "scene", "max_samples", scene->max_samples, 1, SAMPLES_MAX));
+  SF_TRY(in_range(path, "scene", "trans_stop", scene->trans_stop, 0, FX_TRANS_ONE - 1));
+  for (int o = 0; o < 3; o++) {
+    const char *const field[] = {"background[0]", "background[1]", "background[2]"};
+    SF_TRY(in_range(path, "scene", field[o], scene->background[o], 0, 1 << 16));
+  }
+  return fx_reals_check(scene, path);
+}

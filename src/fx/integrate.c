@@ -1,0 +1,42 @@
+/* Leaky integrators of the output layers: no threshold, no reset.
+ * Mirror: rtl/sf_integrate.sv
+ *
+ *   hybrid, first step    a = in
+ *   hybrid, decay         a = a + rshift_round((in - a) * k, 12)     between a and in: exact
+ *   no-decay              a = usat(a - rshift_round(a * k, 12) + in) */
+#include "src/fx/unit.h"
+#include "src/fx/round.h"
+#include "src/fx/nofloat.h"
+
+int32_t fx_exp2_argument(int32_t current, const fx_scale *scale)
+{
+  const int64_t y = fx_rshift_round((int64_t)current * scale->mul, scale->shift) + scale->bias;
+  return (int32_t)fx_sat(y, FX_EXP2_BITS);
+}
+
+int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale)
+{
+  const int64_t x = fx_rshift_round((int64_t)current * scale->mul, scale->shift) + scale->bias;
+  return (int32_t)fx_sat(x, FX_SIGMOID_BITS);
+}
+
+static uint32_t integrate(uint32_t acc, uint32_t in, int32_t k, int32_t mode, bool first, int bits,
+                          uint64_t *saturated)
+{
+  const int64_t a = first ? 0 : acc, x = in;
+  if (mode == FX_HYBRID && first) return in;
+  if (mode != FX_NODECAY) return (uint32_t)(a + fx_rshift_round((x - a) * k, SF_LEAK_FRAC));
+  const int64_t exact = a - fx_rshift_round(a * k, SF_LEAK_FRAC) + x, kept = fx_usat(exact, bits);
+  *saturated += kept != exact;
+  return (uint32_t)kept;
+}
+
+uint32_t fx_integrate_density(uint32_t acc, uint32_t e, int32_t k, int32_t mode, bool first, uint64_t *saturated)
+{
+  return integrate(acc, e, k, mode, first, SF_SIGMA_BITS, saturated);
+}
+
+uint32_t fx_integrate_colour(uint32_t acc, uint32_t s, int32_t k, int32_t mode, bool first, uint64_t *saturated)
+{
+  return integrate(acc, s, k, mode, first, SF_COLOUR_BITS, saturated);
+}

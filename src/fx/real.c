@@ -1,0 +1,59 @@
+/* The one file of src/fx that may handle floating-point: a scene carries a few real numbers (units and the placement
+ * of the box) for quant/ and for reports. They pass through here as text; no arithmetic of the core sees them. */
+#include "src/fx/scene.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { REALS = 6 + SF_LAYERS };
+
+typedef struct real_field {
+  const char *key;
+  size_t offset;
+  bool positive;
+} real_field;
+
+#define REAL(field, positive) {#field, offsetof(fx_scene, field), positive}
+static const real_field reals[REALS] = {
+    REAL(to_box_scale, true),       REAL(to_box_offset[0], false),  REAL(to_box_offset[1], false),
+    REAL(to_box_offset[2], false),  REAL(dir_scale, true),          REAL(feature_scale, true),
+    REAL(current_scale[0], true),   REAL(current_scale[1], true),   REAL(current_scale[2], true),
+    REAL(current_scale[3], true),   REAL(current_scale[4], true)};
+
+static double *field_of(const fx_scene *scene, const real_field *field)
+{
+  return (double *)((char *)scene + field->offset);
+}
+
+void fx_reals_write(cJSON *metadata, const fx_scene *scene)
+{
+  for (int i = 0; i < REALS; i++) {
+    char text[64];
+    snprintf(text, sizeof text, "%a", *field_of(scene, &reals[i]));
+    cJSON_AddStringToObject(metadata, reals[i].key, text);
+  }
+}
+
+sf_status fx_reals_read(const cJSON *metadata, fx_scene *scene, const char *path)
+{
+  for (int i = 0; i < REALS; i++) {
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(metadata, reals[i].key));
+    char *end = NULL;
+    if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is missing", path, reals[i].key);
+    *field_of(scene, &reals[i]) = strtod(text, &end);
+    if (end == text || *end)
+      return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is '%.40s', expected a number", path, reals[i].key, text);
+  }
+  return fx_reals_check(scene, path);
+}
+
+sf_status fx_reals_check(const fx_scene *scene, const char *path)
+{
+  for (int i = 0; i < REALS; i++) {
+    const double value = *field_of(scene, &reals[i]);
+    if (!isfinite(value) || (reals[i].positive && value <= 0))
+      return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, reals[i].key, value,
+                     reals[i].positive ? " positive" : "");
+  }
+  return sf_ok();
+}

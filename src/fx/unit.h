@@ -1,0 +1,38 @@
+/* The arithmetic units of the accelerator as pure functions. Each has a combinational RTL module of the same
+ * name (fx_plif_step <-> sf_plif, fx_exp2 <-> sf_exp2, fx_sigmoid <-> sf_sigmoid, fx_integrate_* <-> sf_integrate). */
+#ifndef SPIKEFIELD_FX_UNIT_H
+#define SPIKEFIELD_FX_UNIT_H
+#include "spikefield/fx.h"
+
+enum { FX_MEMBRANE_MAX = (1 << (SF_MEMBRANE_BITS - 1)) - 1, FX_LEAK_ONE = 1 << SF_LEAK_FRAC };
+enum { FX_INPUT_MAX = (1 << (SF_INPUT_BITS - 1)) - 1, FX_TRANS_ONE = 1 << SF_TRANS_FRAC };
+enum { FX_EXP2_BITS = SF_LOG_FRAC + 6, FX_SIGMOID_BITS = SF_LOG_FRAC + 4 }; /* arguments: [-32, 32) and [-8, 8) */
+
+/* One neuron, one step. v: s24 after the last reset (ignored when `first`); current: s24 in membrane LSB.
+ * membrane: before fire and reset; v: after. Only no-decay mode can saturate. */
+typedef struct fx_plif {
+  int32_t v, membrane;
+  bool spike, saturated;
+} fx_plif;
+fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first);
+
+/* fx_plif_step over lanes 0..n-1, one leak and threshold. spikes: bitmap, rewritten whole. membrane[n] (before
+ * reset) may be NULL. Returns the number of saturations. */
+int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *layer, int32_t mode, bool first,
+                  uint64_t spikes[2], int32_t *membrane);
+
+/* 2^y, y in Q.LOG_FRAC (s18) -> U16.12, saturating at 2^28 - 1 from y = 16.0 on. */
+uint32_t fx_exp2(int32_t y);
+/* exp(-tau), tau Q.TRANS_FRAC unsigned -> Q.TRANS_FRAC, 1 << TRANS_FRAC at 0. */
+uint32_t fx_exp_neg(uint64_t tau);
+/* 1 / (1 + exp(-x)), x in Q4.12 (s16) -> Q0.16, 0..65535. */
+uint32_t fx_sigmoid(int32_t x);
+
+/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16256, so the product is s32. */
+int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
+int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
+
+/* Leaky integrators without reset; acc is ignored when `first`. saturated (never NULL) counts up. */
+uint32_t fx_integrate_density(uint32_t acc, uint32_t e, int32_t k, int32_t mode, bool first, uint64_t *saturated);
+uint32_t fx_integrate_colour(uint32_t acc, uint32_t s, int32_t k, int32_t mode, bool first, uint64_t *saturated);
+#endif

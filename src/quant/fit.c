@@ -1,0 +1,193 @@
+/* Weights of one layer to int8 by the error of its currents. With integer inputs x and float currents c,
+ *
+ *   E(u, q) = mean (c - u q.x)^2 = mean c^2 - 2 u q.B + u^2 q.A q      A = mean x x^T,  B = mean x c
+ *
+ * so one pass over the calibration rows serves every candidate. First the unit u: rounding of the float weights for
+ * each candidate. Then coordinate descent on q, which lets the rounding errors of correlated inputs cancel and takes
+ * up the bias of inputs that are rounded down (h = current >> 3). A ridge towards the float weights keeps directions
+ * that the samples hardly show where training left them. */
+#include "src/quant/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { CANDIDATES = 40, SWEEPS = 6, WEIGHT_MAX = 127 };
+static const double SMALLEST_FACTOR = 0.4, RIDGE = 1e-3;
+
+typedef struct moments {
+  int n_in, n_out;
+  double *a;     /* [n_in][n_in] */
+  double *b;     /* [n_out][n_in] */
+  double energy; /* mean of sum c^2 */
+} moments;
+
+static void moments_free(moments *m)
+{
+  free(m->a), free(m->b);
+  memset(m, 0, sizeof *m);
+}
+
+static void add_row(moments *m, const int16_t *x, const float *target)
+{
+  int active[SF_LANES], count = 0;
+  for (int i = 0; i < m->n_in; i++)
+    if (x[i]) active[count++] = i;
+  for (int p = 0; p < count; p++) {
+    const int i = active[p];
+    for (int r = 0; r < count; r++) m->a[i * m->n_in + active[r]] += (double)x[i] * x[active[r]];
+    for (int o = 0; o < m->n_out; o++) m->b[(size_t)i * (size_t)m->n_out + (size_t)o] += (double)x[i] * target[o];
+  }
+  for (int o = 0; o < m->n_out; o++) m->energy += (double)target[o] * target[o];
+}
+
+/* b is gathered input-major above (contiguous in o) and turned here. */
+static bool finish(moments *m, int rows)
+{
+  double *turned = malloc((size_t)m->n_in * (size_t)m->n_out * sizeof *turned);
+  if (!turned) return false;
+  for (int i = 0; i < m->n_in; i++)
+    for (int o = 0; o < m->n_out; o++) turned[o * m->n_in + i] = m->b[i * m->n_out + o] / rows;
+  for (int i = 0; i < m->n_in * m->n_in; i++) m->a[i] /= rows;
+  m->energy /= rows;
+  free(m->b);
+  m->b = turned;
+  return true;
+}
+
+/* Rows begin..end-1: the last quarter of the samples is held out of the fit, for the report. */
+static sf_status gather(moments *m, const sf_fit_data *data, int begin, int end)
+{
+  const size_t n_in = (size_t)data->n_in, n_out = (size_t)data->n_out;
+  *m = (moments){.n_in = data->n_in, .n_out = data->n_out, .a = calloc(n_in * n_in, sizeof(double)),
+                 .b = calloc(n_in * n_out, sizeof(double))};
+  bool ok = m->a && m->b;
+  if (ok)
+    for (int row = begin; row < end; row++) add_row(m, data->x + (size_t)row * n_in, data->target + (size_t)row * n_out);
+  ok = ok && finish(m, end - begin);
+  if (ok) return sf_ok();
+  moments_free(m);
+  return sf_fail(SF_E_MEMORY, "quantiser: no memory for a layer of %d x %d weights", data->n_in, data->n_out);
+}
+
+static double ideal(const sf_fit_weights *weights, int i, int o, double unit)
+{
+  return weights->w[(size_t)o * (size_t)weights->stride + (size_t)i] * weights->lsb[i] / unit;
+}
+
+static double clip(double q)
+{
+  return q > WEIGHT_MAX ? WEIGHT_MAX : q < -WEIGHT_MAX ? -WEIGHT_MAX : q;
+}
+
+static void round_column(const sf_fit_weights *weights, int n_in, int o, double unit, double *q)
+{
+  for (int i = 0; i < n_in; i++) q[i] = clip(nearbyint(ideal(weights, i, o, unit)));
+}
+
+static double column_error(const moments *m, int o, double unit, const double *q)
+{
+  double linear = 0, square = 0;
+  for (int i = 0; i < m->n_in; i++) {
+    double row = 0;
+    if (q[i] == 0) continue;
+    for (int r = 0; r < m->n_in; r++) row += m->a[i * m->n_in + r] * q[r];
+    square += q[i] * row;
+    linear += q[i] * m->b[o * m->n_in + i];
+  }
+  return unit * (unit * square - 2 * linear);
+}
+
+static double rounding_error(const moments *m, const sf_fit_weights *weights, double unit)
+{
+  double q[SF_LANES], error = m->energy;
+  for (int o = 0; o < m->n_out; o++) {
+    round_column(weights, m->n_in, o, unit, q);
+    error += column_error(m, o, unit, q);
+  }
+  return error;
+}
+
+static double largest_product(const sf_fit_weights *weights, int n_in, int n_out)
+{
+  double largest = 0;
+  for (int o = 0; o < n_out; o++)
+    for (int i = 0; i < n_in; i++) largest = fmax(largest, fabs(ideal(weights, i, o, 1)));
+  return largest;
+}
+
+static double choose_unit(const moments *m, const sf_fit_weights *weights)
+{
+  const double widest = largest_product(weights, m->n_in, m->n_out) / WEIGHT_MAX;
+  if (widest <= weights->unit_min) return weights->unit_min;
+  double best = widest, best_error = INFINITY;
+  for (int c = 0; c < CANDIDATES; c++) {
+    const double factor = 1 - (1 - SMALLEST_FACTOR) * c / (CANDIDATES - 1);
+    const double unit = fmax(widest * factor, weights->unit_min), error = rounding_error(m, weights, unit);
+    if (error < best_error) best = unit, best_error = error;
+  }
+  return best;
+}
+
+static void descend_column(const moments *m, const sf_fit_weights *weights, int o, double unit, double ridge, double *q)
+{
+  double gradient[SF_LANES];
+  for (int i = 0; i < m->n_in; i++) {
+    gradient[i] = ridge * (q[i] - ideal(weights, i, o, unit)) - m->b[o * m->n_in + i] / unit;
+    for (int r = 0; r < m->n_in; r++) gradient[i] += m->a[i * m->n_in + r] * q[r];
+  }
+  for (int sweep = 0, changed = 1; sweep < SWEEPS && changed; sweep++) {
+    changed = 0;
+    for (int i = 0; i < m->n_in; i++) {
+      const double curvature = m->a[i * m->n_in + i] + ridge;
+      if (curvature <= 0) continue;
+      const double step = clip(nearbyint(q[i] - gradient[i] / curvature)) - q[i];
+      if (step == 0) continue;
+      for (int r = 0; r < m->n_in; r++) gradient[r] += m->a[i * m->n_in + r] * step;
+      gradient[i] += ridge * step;
+      q[i] += step;
+      changed = 1;
+    }
+  }
+}
+
+static double mean_diagonal(const moments *m)
+{
+  double sum = 0;
+  for (int i = 0; i < m->n_in; i++) sum += m->a[i * m->n_in + i];
+  return sum / m->n_in;
+}
+
+static double quantise_columns(const moments *m, const moments *held_out, const sf_fit_weights *weights, bool refine,
+                               int8_t *w, sf_quant_layer *result)
+{
+  const double ridge = RIDGE * mean_diagonal(m);
+  double error = held_out->energy, q[SF_LANES];
+  for (int o = 0; o < m->n_out; o++) {
+    round_column(weights, m->n_in, o, result->unit, q);
+    if (refine) descend_column(m, weights, o, result->unit, ridge, q);
+    error += column_error(held_out, o, result->unit, q);
+    for (int i = 0; i < m->n_in; i++) {
+      w[i * SF_LANES + o] = (int8_t)q[i];
+      result->clipped += fabs(ideal(weights, i, o, result->unit)) > WEIGHT_MAX + 0.5;
+    }
+  }
+  return error;
+}
+
+sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,
+                       sf_quant_layer *result)
+{
+  const int fit_rows = data->rows - data->rows / 4;
+  moments fit, held_out;
+  *result = (sf_quant_layer){0};
+  SF_TRY(gather(&fit, data, 0, fit_rows));
+  sf_status status = gather(&held_out, data, fit_rows, data->rows);
+  if (status.code == SF_OK) {
+    result->unit = choose_unit(&fit, weights);
+    const double error = quantise_columns(&fit, &held_out, weights, refine, q, result);
+    result->error = held_out.energy > 0 ? sqrt(fmax(error, 0) / held_out.energy) : 0;
+    moments_free(&held_out);
+  }
+  moments_free(&fit);
+  return status;
+}

@@ -1,0 +1,46 @@
+/* Inside src/quant. */
+#ifndef SPIKEFIELD_QUANT_INTERNAL_H
+#define SPIKEFIELD_QUANT_INTERNAL_H
+#include "spikefield/quant.h"
+
+/* Calibration samples: positions in occupied cells with random directions, and what the float nets do there.
+ * Rows of a layer's data are samples x steps (D1: samples alone, its current is constant). */
+typedef struct sf_calibration {
+  int samples, steps, hidden, features;
+  uint32_t *pos;              /* [samples][3] Q0.24 */
+  float *f, *direction;       /* [samples][features], [samples][SF_DIR_FEATURES] */
+  float *target[SF_LAYERS];   /* [rows][n_out] currents of the float nets */
+  uint8_t *spikes[SF_LAYERS]; /* [rows][hidden] of D1, C1, C2 */
+} sf_calibration;
+sf_status sf_calibrate(sf_calibration *calibration, const sf_model *model, int steps, uint64_t seed);
+void sf_calibration_free(sf_calibration *calibration);
+
+/* Integer inputs of a layer against the currents they should cause. */
+typedef struct sf_fit_data {
+  int rows, n_in, n_out;
+  const int16_t *x;    /* [rows][n_in] */
+  const float *target; /* [rows][n_out] */
+} sf_fit_data;
+
+/* Float weights of one layer: w[o * stride + i]; lsb[i] is the value of one LSB of input i. */
+typedef struct sf_fit_weights {
+  const float *w;
+  int stride;
+  const double *lsb;
+  double unit_min; /* the unit may not be smaller (theta must fit the membrane) */
+} sf_fit_weights;
+
+/* Chooses the unit and the int8 weights q[n_in][SF_LANES] that minimise the squared error of the currents.
+ * `refine` false stops after the search for the unit. */
+sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,
+                       sf_quant_layer *result);
+
+/* Grid tables and the features' LSB. Writes scene->grid (allocated) and scene->feature_scale. */
+void sf_quantise_levels(fx_grid *grid, const sf_model *model);
+sf_status sf_quantise_grid(fx_scene *scene, const sf_model *model, const char *name, const sf_calibration *calibration,
+                           sf_quant_report *report);
+
+/* Layers in order; scene->feature_scale and the grid are ready. */
+sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
+                             const sf_calibration *calibration, sf_quant_report *report);
+#endif

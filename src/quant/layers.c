@@ -1,0 +1,181 @@
+/* The five layers in the order of the data flow: each unit follows from the one before. */
+#include "src/quant/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1, MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1 };
+enum { DIR_FRAC = 10, DIR_TRIALS = 7, C1_INPUTS = SF_DIR_FEATURES + SF_GEO_FEATURES };
+
+typedef struct context {
+  fx_scene *scene;
+  const sf_model *model;
+  const char *name;
+  const sf_calibration *calibration;
+  sf_quant_report *report;
+} context;
+
+static const sf_param_id param_of[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
+
+static int frac_of(int layer)
+{
+  return layer == FX_C2 ? SF_AC_FRAC : 0;
+}
+
+static double theta_of(const sf_model *model, int layer)
+{
+  return layer == FX_D1 ? model->config.theta[0] : layer == FX_C1 ? model->config.theta[1]
+         : layer == FX_C2 ? model->config.theta[2] : 0;
+}
+
+/* With a smaller unit theta would not fit the membrane. Integrating layers have no threshold; their unit only has to
+ * stay positive. */
+static double smallest_unit(const sf_model *model, int layer)
+{
+  const double theta = theta_of(model, layer);
+  return theta > 0 ? ldexp(theta, frac_of(layer)) / MEMBRANE_LIMIT : 1e-12;
+}
+
+static int rows_of(const sf_calibration *c)
+{
+  return c->samples * c->steps;
+}
+
+static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, bool refine,
+                     sf_quant_layer *result)
+{
+  const fx_layer *to = &c->scene->net.layer[layer];
+  const sf_fit_data data = {.rows = rows_of(c->calibration), .n_in = to->n_in, .n_out = to->n_out, .x = x,
+                            .target = c->calibration->target[layer]};
+  const sf_fit_weights weights = {.w = sf_model_param(c->model, param_of[layer]), .stride = to->n_in, .lsb = lsb,
+                                  .unit_min = smallest_unit(c->model, layer)};
+  return sf_fit_layer(&data, &weights, refine, to->w, result);
+}
+
+static sf_status set_theta(const context *c, int layer, double unit)
+{
+  const double exact = ldexp(theta_of(c->model, layer) / unit, frac_of(layer)), rounded = nearbyint(exact);
+  if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d", c->name,
+                   c->model->param[param_of[layer]].name, theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
+  c->scene->net.layer[layer].theta = (int32_t)rounded;
+  return sf_ok();
+}
+
+/* Everything of a layer once its inputs are known. */
+static sf_status finish_layer(const context *c, int layer, const int16_t *x, const double *lsb)
+{
+  sf_quant_layer *result = &c->report->layer[layer];
+  SF_TRY(fit(c, layer, x, lsb, true, result));
+  c->scene->current_scale[layer] = result->unit;
+  return layer == FX_D2 || layer == FX_C3 ? sf_ok() : set_theta(c, layer, result->unit);
+}
+
+/* The same features at every step: the fit counts each sample once per step, which changes nothing. */
+static void density_inputs(const context *c, int16_t *x)
+{
+  const sf_calibration *cal = c->calibration;
+  const size_t n = (size_t)cal->features;
+  for (int sample = 0; sample < cal->samples; sample++) {
+    int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
+    fx_grid_features(&c->scene->grid, cal->pos + sample * 3, f, NULL);
+    for (int t = 0; t < cal->steps; t++)
+      memcpy(x + ((size_t)sample * (size_t)cal->steps + (size_t)t) * n, f, n * sizeof *x);
+  }
+}
+
+static void spike_inputs(const sf_calibration *cal, int from, int16_t *x)
+{
+  const size_t n = (size_t)rows_of(cal) * (size_t)cal->hidden;
+  for (size_t i = 0; i < n; i++) x[i] = cal->spikes[from][i];
+}
+
+static int16_t to_input(double value)
+{
+  return (int16_t)(value > INPUT_LIMIT ? INPUT_LIMIT : value < -INPUT_LIMIT ? -INPUT_LIMIT : value);
+}
+
+/* d rounded to its LSB, h rounded down to its own as the accelerator does. */
+static void colour_inputs(const sf_calibration *cal, double d_lsb, double h_lsb, int16_t *x)
+{
+  for (int row = 0; row < rows_of(cal); row++) {
+    const float *d = cal->direction + (size_t)(row / cal->steps) * SF_DIR_FEATURES;
+    const float *current = cal->target[FX_D2] + (size_t)row * SF_DENSITY_OUT;
+    int16_t *to = x + (size_t)row * C1_INPUTS;
+    for (int i = 0; i < SF_DIR_FEATURES; i++) to[i] = to_input(nearbyint(d[i] / d_lsb));
+    for (int j = 0; j < SF_GEO_FEATURES; j++)
+      to[SF_DIR_FEATURES + j] = to_input(floor(nearbyint(8 * current[1 + j] / h_lsb) / (1 << SF_H_SHIFT)));
+  }
+}
+
+static void colour_lsb(double *lsb, double d_lsb, double h_lsb)
+{
+  for (int i = 0; i < C1_INPUTS; i++) lsb[i] = i < SF_DIR_FEATURES ? d_lsb : h_lsb;
+}
+
+/* C1 has one unit for rows of d and of h, whose LSBs differ: a coarser d makes its int8 weights finer. */
+static sf_status colour_layer(const context *c, int16_t *x)
+{
+  const double h_lsb = ldexp(c->scene->current_scale[FX_D2], SF_H_SHIFT);
+  double lsb[C1_INPUTS], best = ldexp(1, -DIR_FRAC), best_error = INFINITY;
+  for (int trial = 0; trial < DIR_TRIALS; trial++) {
+    const double d_lsb = ldexp(1, trial - DIR_FRAC);
+    sf_quant_layer result;
+    colour_lsb(lsb, d_lsb, h_lsb);
+    colour_inputs(c->calibration, d_lsb, h_lsb, x);
+    SF_TRY(fit(c, FX_C1, x, lsb, false, &result));
+    if (result.error < best_error) best = d_lsb, best_error = result.error;
+  }
+  c->scene->dir_scale = best;
+  colour_lsb(lsb, best, h_lsb);
+  colour_inputs(c->calibration, best, h_lsb, x);
+  return finish_layer(c, FX_C1, x, lsb);
+}
+
+/* factor = mul / 2^shift with 16 significant bits where the shifter allows. */
+static sf_status set_scale(const context *c, int layer, double factor, int bias, fx_scale *scale)
+{
+  int exponent;
+  frexp(factor, &exponent);
+  int shift = 16 - exponent;
+  if (shift > 31) shift = 31;
+  double mul = nearbyint(ldexp(factor, shift));
+  if (mul > 65535) mul = nearbyint(ldexp(factor, --shift));
+  if (shift < 0)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
+                   c->name, c->model->param[param_of[layer]].name, c->scene->current_scale[layer] * 127);
+  *scale = (fx_scale){.mul = (int32_t)mul, .shift = shift, .bias = bias};
+  return sf_ok();
+}
+
+static sf_status all_layers(const context *c, int16_t *x)
+{
+  const double log2e = 1.4426950408889634, one = 1 << SF_LOG_FRAC;
+  double features[SF_FEATURE_MAX], spikes[SF_LANES];
+  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->feature_scale;
+  for (int i = 0; i < SF_LANES; i++) spikes[i] = 1;
+  density_inputs(c, x);
+  SF_TRY(finish_layer(c, FX_D1, x, features));
+  spike_inputs(c->calibration, FX_D1, x);
+  SF_TRY(finish_layer(c, FX_D2, x, spikes));
+  SF_TRY(colour_layer(c, x));
+  spike_inputs(c->calibration, FX_C1, x);
+  SF_TRY(finish_layer(c, FX_C2, x, spikes));
+  spike_inputs(c->calibration, FX_C2, x);
+  SF_TRY(finish_layer(c, FX_C3, x, spikes));
+  /* Density per box edge = 2 * density per model unit (the box is 2 model units wide): + log2(2). */
+  SF_TRY(set_scale(c, FX_D2, c->scene->current_scale[FX_D2] * log2e * one, 1 << SF_LOG_FRAC, &c->scene->net.exp_in));
+  return set_scale(c, FX_C3, c->scene->current_scale[FX_C3] * one, 0, &c->scene->net.sigmoid_in);
+}
+
+sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
+                             const sf_calibration *calibration, sf_quant_report *report)
+{
+  const context c = {scene, model, name, calibration, report};
+  int16_t *x = malloc((size_t)rows_of(calibration) * SF_LANES * sizeof *x);
+  if (!x) return sf_fail(SF_E_MEMORY, "%s: no memory for %d calibration rows", name, rows_of(calibration));
+  const sf_status status = all_layers(&c, x);
+  free(x);
+  return status;
+}

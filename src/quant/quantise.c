@@ -1,0 +1,116 @@
+#include "src/quant/internal.h"
+#include <math.h>
+#include <string.h>
+
+enum { MAX_SAMPLES = 1024 };
+static const double TRANS_STOP = 1e-4; /* as sf_render_rays */
+
+double sf_fx_sigma_value(uint32_t sigma)
+{
+  return ldexp(sigma, -SF_SIGMA_FRAC) / 2; /* the box is 2 model units wide */
+}
+
+double sf_fx_colour_value(uint32_t colour)
+{
+  return ldexp(colour, -SF_COLOUR_FRAC);
+}
+
+static sf_status check_finite(const sf_model *model, const char *name)
+{
+  for (int id = 0; id < SF_P_COUNT; id++) {
+    const float *value = sf_model_param(model, id);
+    for (size_t i = 0; i < model->param[id].size; i++)
+      if (!isfinite(value[i]))
+        return sf_fail(SF_E_RANGE, "%s: tensor '%s': element %zu is %g, expected a finite number", name,
+                       model->param[id].name, i, (double)value[i]);
+  }
+  return sf_ok();
+}
+
+static sf_status check_model(const sf_model *model, const char *name, const sf_quant_options *options)
+{
+  const sf_config *config = &model->config;
+  if (config->net != SF_NET_SNN)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'net': an ANN has no spikes; the accelerator runs spiking nets only",
+                   name);
+  if (config->hidden < 1 || config->hidden > SF_LANES)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d neurons, the accelerator has %d", name,
+                   model->param[SF_P_W1].name, config->hidden, SF_LANES);
+  if (config->levels < 1 || config->levels > FX_LEVELS_MAX)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d levels, the accelerator has %d", name,
+                   model->param[SF_P_GRID].name, config->levels, FX_LEVELS_MAX);
+  for (int i = 0; i < 3; i++)
+    if (!isfinite(config->theta[i]) || config->theta[i] <= 0)
+      return sf_fail(SF_E_RANGE, "%s: metadata 'theta' [%d] is %g, expected a positive number", name, i,
+                     (double)config->theta[i]);
+  if (options->steps < 0 || options->steps > config->steps)
+    return sf_fail(SF_E_RANGE, "%s: %d steps asked for, the model was trained for T = %d", name, options->steps,
+                   config->steps);
+  if (options->steps == 0 && (model->t_r < 1 || model->t_r > config->steps))
+    return sf_fail(SF_E_RANGE, "%s: metadata 't_r' is %d, expected 1..%d", name, model->t_r, config->steps);
+  for (int o = 0; o < 3; o++)
+    if (!(options->background[o] >= 0 && options->background[o] <= 1))
+      return sf_fail(SF_E_RANGE, "%s: background[%d] is %g, expected 0..1", name, o, (double)options->background[o]);
+  return check_finite(model, name);
+}
+
+static void set_sizes(fx_scene *scene, const sf_model *model)
+{
+  const int32_t hidden = model->config.hidden;
+  const int32_t n_in[SF_LAYERS] = {2 * model->config.levels, hidden, SF_DIR_FEATURES + SF_GEO_FEATURES, hidden, hidden};
+  const int32_t n_out[SF_LAYERS] = {hidden, SF_DENSITY_OUT, hidden, hidden, 3};
+  for (int l = 0; l < SF_LAYERS; l++) scene->net.layer[l].n_in = n_in[l], scene->net.layer[l].n_out = n_out[l];
+  sf_quantise_levels(&scene->grid, model);
+  scene->occ_res = model->config.occ_res;
+}
+
+static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options)
+{
+  const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
+  for (int l = 0; l < SF_LAYERS; l++)
+    scene->net.layer[l].k = (int32_t)nearbyint(ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC));
+  scene->net.mode = model->config.mode;
+  scene->net.steps = options->steps ? options->steps : model->t_r;
+  scene->step_q24 = (int32_t)nearbyint(ldexp(sqrt(3.0) / model->config.lattice, SF_DELTA_FRAC));
+  scene->max_samples = MAX_SAMPLES;
+  scene->trans_stop = (int32_t)floor(ldexp(TRANS_STOP, SF_TRANS_FRAC));
+  for (int o = 0; o < 3; o++) {
+    scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
+    scene->to_box_offset[o] = 0.5;
+  }
+  scene->to_box_scale = 0.5;
+}
+
+static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
+                          sf_calibration *calibration, sf_quant_report *report)
+{
+  const size_t cells = (size_t)model->config.occ_res * (size_t)model->config.occ_res * (size_t)model->config.occ_res;
+  set_sizes(scene, model);
+  set_scalars(scene, model, options);
+  SF_TRY(fx_scene_allocate(scene, name));
+  memcpy(scene->occupancy, model->occupancy, cells / 8);
+  SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
+  report->samples = calibration->samples;
+  SF_TRY(sf_quantise_grid(scene, model, name, calibration, report));
+  SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
+  return fx_scene_check(scene, name);
+}
+
+sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
+                             sf_quant_report *report)
+{
+  sf_calibration calibration = {0};
+  memset(scene, 0, sizeof *scene);
+  memset(report, 0, sizeof *report);
+  SF_TRY(check_model(model, name, options));
+  const sf_status status = quantise(scene, model, name, options, &calibration, report);
+  sf_calibration_free(&calibration);
+  if (status.code != SF_OK) fx_scene_free(scene);
+  return status;
+}
+
+sf_status sf_quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options)
+{
+  sf_quant_report report;
+  return sf_quantise_report(scene, model, name, options, &report);
+}

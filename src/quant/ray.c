@@ -1,0 +1,94 @@
+/* A ray in model units to the integer lattice of the box: the same lattice as sf_ray_lattice, in double precision. */
+#include "spikefield/quant.h"
+#include <math.h>
+#include <string.h>
+
+enum { RAY_FRAC = 40, INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1 };
+static const double NEAR = 0.2;             /* model units */
+static const double COUNT_MAX = 1 << 20;    /* a step of one LSB would need 2^24: no scene has that */
+
+typedef struct interval {
+  double enter, leave; /* model units */
+} interval;
+
+/* The box is [0,1)^3 in box units: origin o, direction d per model unit of distance. */
+static interval clip_to_box(const double o[3], const double d[3])
+{
+  interval hit = {NEAR, INFINITY};
+  for (int axis = 0; axis < 3; axis++) {
+    if (d[axis] == 0) {
+      if (o[axis] <= 0 || o[axis] >= 1) return (interval){0, -1};
+      continue;
+    }
+    const double a = -o[axis] / d[axis], b = (1 - o[axis]) / d[axis];
+    hit.enter = fmax(hit.enter, fmin(a, b));
+    hit.leave = fmin(hit.leave, fmax(a, b));
+  }
+  return hit;
+}
+
+static bool inside(const fx_ray *ray, int32_t n)
+{
+  for (int axis = 0; axis < 3; axis++) {
+    const int64_t p = ray->origin[axis] + n * ray->step[axis];
+    if (p < 0 || p >= (int64_t)1 << RAY_FRAC) return false;
+  }
+  return true;
+}
+
+/* Rounding may leave an end of the lattice just outside; the box is convex, so only ends can be. */
+static void trim(fx_ray *ray)
+{
+  while (ray->count > 0 && !inside(ray, 0)) {
+    for (int axis = 0; axis < 3; axis++) ray->origin[axis] += ray->step[axis];
+    ray->count--;
+    if (ray->first_q16 <= INT32_MAX - 65536) ray->first_q16 += 65536;
+  }
+  while (ray->count > 0 && !inside(ray, ray->count - 1)) ray->count--;
+}
+
+static void set_lattice(fx_ray *ray, const double o[3], const double d[3], double step, interval hit)
+{
+  const double first = hit.enter + step / 2, count = floor((hit.leave - hit.enter) / step);
+  if (!(count >= 1)) return;
+  for (int axis = 0; axis < 3; axis++) {
+    const double p = o[axis] + d[axis] * first;
+    if (!(p > -1 && p < 2)) return; /* so far away that the distance has no precision left */
+    ray->origin[axis] = llrint(ldexp(p, RAY_FRAC));
+    ray->step[axis] = llrint(ldexp(d[axis] * step, RAY_FRAC));
+  }
+  ray->count = (int32_t)fmin(count, COUNT_MAX);
+  ray->first_q16 = (int32_t)fmin(nearbyint(first / step * 65536), INT32_MAX);
+  trim(ray);
+}
+
+static void set_direction(fx_ray *ray, const double unit[3], double scale)
+{
+  float sh[SF_DIR_FEATURES];
+  const float direction[3] = {(float)unit[0], (float)unit[1], (float)unit[2]};
+  sf_sh4(direction, sh);
+  for (int i = 0; i < SF_DIR_FEATURES; i++) {
+    const double q = nearbyint(sh[i] / scale);
+    ray->dir[i] = (int16_t)fmax(-INPUT_LIMIT, fmin(INPUT_LIMIT, q));
+  }
+}
+
+sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray)
+{
+  const double length = sqrt((double)direction[0] * direction[0] + (double)direction[1] * direction[1] +
+                             (double)direction[2] * direction[2]);
+  double unit[3], o[3], d[3];
+  memset(ray, 0, sizeof *ray);
+  for (int axis = 0; axis < 3; axis++) {
+    if (!isfinite(origin[axis]) || !isfinite(direction[axis]) || length == 0)
+      return sf_fail(SF_E_RANGE, "ray: origin (%g, %g, %g), direction (%g, %g, %g): expected finite numbers and a nonzero direction",
+                     (double)origin[0], (double)origin[1], (double)origin[2], (double)direction[0],
+                     (double)direction[1], (double)direction[2]);
+    unit[axis] = direction[axis] / length;
+    o[axis] = origin[axis] * scene->to_box_scale + scene->to_box_offset[axis];
+    d[axis] = unit[axis] * scene->to_box_scale;
+  }
+  set_direction(ray, unit, scene->dir_scale);
+  set_lattice(ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
+  return sf_ok();
+}

@@ -1,0 +1,136 @@
+/* Rendering of the float model: rays in packets, each round packs the next samples of the rays that are still
+ * alive into blocks, so that empty space, dead rays and saturated rays cost nothing. */
+#include "render/composite.h"
+#include "render/march.h"
+#include "render/view.h"
+#include <math.h>
+#include <stdlib.h>
+
+enum { PACKET = 256, BURST = 8 }; /* rays of a packet; samples of one ray per round */
+
+static const float opaque = 1e-4f; /* transmittance at which a ray stops */
+
+typedef struct ray_state {
+  sf_march march;
+  float sh[SF_DIR_FEATURES];
+  int next;
+  float transmittance, rgb[3], depth, samples;
+} ray_state;
+
+typedef struct worker {
+  const sf_model *model;
+  const sf_kernels *kernels;
+  sf_net_view net;
+  int steps;
+  sf_block *block;
+  sf_net_scratch *scratch;
+  float x[3 * SF_BLOCK];
+  ray_state ray[PACKET];
+  int owner[SF_BLOCK], lattice[SF_BLOCK], fill;
+} worker;
+
+/* Evaluates the block that was filled and composites its samples, in ray order. */
+static void flush(worker *w)
+{
+  if (!w->fill) return;
+  for (int l = w->fill; l < SF_BLOCK; l++)
+    for (int a = 0; a < 3; a++) w->x[a * SF_BLOCK + l] = w->x[a * SF_BLOCK];
+  const float *table = sf_model_param(w->model, SF_P_GRID);
+  for (int level = 0; level < w->model->config.levels; level++)
+    w->kernels->grid_forward(&w->model->level[level], table, w->x, w->block->f + 2 * level * SF_BLOCK);
+  w->kernels->forward(&w->net, w->block, w->steps, 0, w->scratch);
+  const float *sigma = w->block->sigma[w->steps - 1], *colour = w->block->colour[w->steps - 1];
+  for (int l = 0; l < w->fill; l++) {
+    ray_state *r = &w->ray[w->owner[l]];
+    if (r->transmittance < opaque) continue;
+    float behind = r->transmittance * expf(-sigma[l] * r->march.lattice.step), weight = r->transmittance - behind;
+    for (int a = 0; a < 3; a++) r->rgb[a] += weight * colour[a * SF_BLOCK + l];
+    r->depth += weight * sf_march_distance(&r->march, w->lattice[l]);
+    r->samples += 1;
+    r->transmittance = behind;
+  }
+  w->fill = 0;
+}
+
+static void add_sample(worker *w, int ray, int n, const float x[3])
+{
+  const int l = w->fill++;
+  for (int a = 0; a < 3; a++) w->x[a * SF_BLOCK + l] = x[a];
+  for (int i = 0; i < SF_DIR_FEATURES; i++) w->block->sh[i * SF_BLOCK + l] = w->ray[ray].sh[i];
+  w->owner[l] = ray;
+  w->lattice[l] = n;
+  if (w->fill == SF_BLOCK) flush(w);
+}
+
+static void render_packet(worker *w, int count)
+{
+  for (int alive = 1; alive;) {
+    alive = 0;
+    for (int i = 0; i < count; i++) {
+      ray_state *r = &w->ray[i];
+      for (int burst = 0; burst < BURST && r->next >= 0 && r->transmittance >= opaque; burst++) {
+        float x[3];
+        int n = sf_march_next(&r->march, r->next, x);
+        r->next = n < 0 ? -1 : n + 1;
+        if (n >= 0) add_sample(w, i, n, x);
+      }
+      alive |= r->next >= 0 && r->transmittance >= opaque;
+    }
+    flush(w);
+  }
+}
+
+static worker *worker_create(const sf_model *model, int steps)
+{
+  worker *w = sf_aligned_alloc(sizeof *w);
+  if (!w) return NULL;
+  w->model = model;
+  w->kernels = sf_kernels_select(NULL);
+  w->net = sf_net_view_of(model);
+  w->steps = steps;
+  w->block = sf_aligned_alloc(sizeof *w->block);
+  w->scratch = sf_aligned_alloc(sizeof *w->scratch);
+  return w;
+}
+
+static void worker_free(worker *w)
+{
+  if (!w) return;
+  free(w->block);
+  free(w->scratch);
+  free(w);
+}
+
+sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                         const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+{
+  if (steps < 0 || steps > model->config.steps)
+    return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
+  if (!steps) steps = model->t_r;
+  int failed = 0;
+#pragma omp parallel reduction(| : failed)
+  {
+    worker *w = worker_create(model, steps);
+    failed = !w || !w->block || !w->scratch;
+#pragma omp for schedule(dynamic, 1)
+    for (size_t first = 0; first < count; first += PACKET) {
+      if (failed) continue;
+      const int n = (int)(count - first < PACKET ? count - first : PACKET);
+      for (int i = 0; i < n; i++) {
+        const float *o = origin + 3 * (first + i), *d = direction + 3 * (first + i);
+        w->ray[i] = (ray_state){.march = sf_march_begin(model, o, d, 1, 0.5f), .transmittance = 1};
+        sf_sh4(d, w->ray[i].sh);
+      }
+      render_packet(w, n);
+      for (int i = 0; i < n; i++) {
+        const ray_state *r = &w->ray[i];
+        for (int a = 0; a < 3; a++) rgb[3 * (first + i) + a] = r->rgb[a] + r->transmittance * background[a];
+        if (depth) depth[first + i] = r->depth;
+        if (alpha) alpha[first + i] = 1 - r->transmittance;
+        if (samples) samples[first + i] = r->samples;
+      }
+    }
+    worker_free(w);
+  }
+  return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
+}

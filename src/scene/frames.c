@@ -1,0 +1,117 @@
+#include "src/scene/frames.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static sf_status number(const cJSON *json, const char *key, const char *where, double low, double high, double *value,
+                        bool *given)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  if (given) *given = *given || item;
+  if (!item) return sf_ok();
+  if (!cJSON_IsNumber(item)) return sf_fail(SF_E_FORMAT, "%s: %s is not a number", where, key);
+  if (!isfinite(item->valuedouble)) return sf_fail(SF_E_RANGE, "%s: %s is not finite", where, key);
+  if (!(item->valuedouble > low && item->valuedouble < high))
+    return sf_fail(SF_E_RANGE, "%s: %s is %g: expected more than %g and less than %g", where, key, item->valuedouble,
+                   low, high);
+  *value = item->valuedouble;
+  return sf_ok();
+}
+
+/* Pinhole cameras only: a lens that bends rays would be rendered wrongly in silence. */
+static sf_status refuse_distortion(const cJSON *json, const char *where)
+{
+  static const char *const keys[] = {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"};
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+    double value = 0;
+    SF_TRY(number(json, keys[i], where, -HUGE_VAL, HUGE_VAL, &value, NULL));
+    if (value != 0)
+      return sf_fail(SF_E_UNSUPPORTED, "%s: lens distortion %s = %g: undistort the pictures first", where, keys[i], value);
+  }
+  if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "is_fisheye")))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: is_fisheye: only pinhole cameras are modelled", where);
+  const char *model = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "camera_model"));
+  /* OPENCV is a pinhole where its distortion is zero, which is checked above. */
+  if (model && strcmp(model, "PINHOLE") && strcmp(model, "SIMPLE_PINHOLE") && strcmp(model, "OPENCV"))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: camera_model %.40s: only pinhole cameras are modelled", where, model);
+  return sf_ok();
+}
+
+sf_status sf_lens_parse(sf_lens *lens, const cJSON *json, const char *where)
+{
+  const double pixels = 1e7;
+  SF_TRY(refuse_distortion(json, where));
+  SF_TRY(number(json, "fl_x", where, 0, pixels, &lens->fl_x, NULL));
+  SF_TRY(number(json, "fl_y", where, 0, pixels, &lens->fl_y, NULL));
+  SF_TRY(number(json, "w", where, 0, pixels, &lens->width, NULL));
+  SF_TRY(number(json, "h", where, 0, pixels, &lens->height, NULL));
+  SF_TRY(number(json, "cx", where, -pixels, pixels, &lens->cx, &lens->has_cx));
+  SF_TRY(number(json, "cy", where, -pixels, pixels, &lens->cy, &lens->has_cy));
+  SF_TRY(number(json, "camera_angle_x", where, 0, M_PI, &lens->angle_x, NULL));
+  return number(json, "camera_angle_y", where, 0, M_PI, &lens->angle_y, NULL);
+}
+
+/* Lengths of the columns are taken out: some exporters leave a scale in them. */
+static sf_status normalise_rotation(float m[12], const char *where)
+{
+  double c[3][3];
+  for (int k = 0; k < 3; k++) {
+    double length = hypot(hypot(m[k], m[4 + k]), m[8 + k]);
+    if (!(length > 1e-12) || !isfinite(length))
+      return sf_fail(SF_E_RANGE, "%s: transform_matrix column %d has length %g", where, k, length);
+    for (int i = 0; i < 3; i++) c[k][i] = m[4 * i + k] / length;
+  }
+  double det = c[0][0] * (c[1][1] * c[2][2] - c[1][2] * c[2][1]) - c[0][1] * (c[1][0] * c[2][2] - c[1][2] * c[2][0]) +
+               c[0][2] * (c[1][0] * c[2][1] - c[1][1] * c[2][0]);
+  if (!(fabs(det) > 0.01))
+    return sf_fail(SF_E_RANGE, "%s: transform_matrix is degenerate: its axes lie in one plane (determinant %.3g)", where,
+                   det);
+  for (int k = 0; k < 3; k++)
+    for (int i = 0; i < 3; i++) m[4 * i + k] = (float)c[k][i];
+  return sf_ok();
+}
+
+static sf_status parse_matrix(float m[12], const cJSON *json, const char *where)
+{
+  const cJSON *rows = cJSON_GetObjectItemCaseSensitive(json, "transform_matrix");
+  if (!cJSON_IsArray(rows) || cJSON_GetArraySize(rows) != 4)
+    return sf_fail(SF_E_FORMAT, "%s: transform_matrix is not an array of 4 rows", where);
+  for (int i = 0; i < 4; i++) {
+    const cJSON *row = cJSON_GetArrayItem(rows, i);
+    if (!cJSON_IsArray(row) || cJSON_GetArraySize(row) != 4)
+      return sf_fail(SF_E_FORMAT, "%s: transform_matrix[%d] is not a row of 4 numbers", where, i);
+    for (int k = 0; k < 4; k++) {
+      const cJSON *item = cJSON_GetArrayItem(row, k);
+      if (!cJSON_IsNumber(item))
+        return sf_fail(SF_E_FORMAT, "%s: transform_matrix[%d][%d] is not a number", where, i, k);
+      float value = (float)item->valuedouble;
+      if (!isfinite(value)) return sf_fail(SF_E_RANGE, "%s: transform_matrix[%d][%d] is not finite", where, i, k);
+      if (i < 3) m[4 * i + k] = value;
+      else if (fabsf(value - (k == 3)) > 1e-5f)
+        return sf_fail(SF_E_RANGE, "%s: transform_matrix[3][%d] is %g: the last row must be 0 0 0 1", where, k, value);
+    }
+  }
+  return normalise_rotation(m, where);
+}
+
+sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shared, const char *path, int index)
+{
+  char where[4096 + 340];
+  snprintf(where, sizeof where, "%s: frame %d", path, index);
+  if (!cJSON_IsObject(json)) return sf_fail(SF_E_FORMAT, "%s is not an object", where);
+  const char *file = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "file_path"));
+  if (!file) return sf_fail(SF_E_FORMAT, "%s: file_path is missing or not a string", where);
+  if (!strncmp(file, "./", 2)) file += 2;
+  size_t length = strlen(file);
+  if (!length || length >= sizeof frame->file_path)
+    return sf_fail(SF_E_RANGE, "%s: file_path has %zu bytes: expected 1 to %zu", where, length,
+                   sizeof frame->file_path - 1);
+  strcpy(frame->file_path, file);
+  snprintf(where, sizeof where, "%s: frame %d (%s)", path, index, file);
+  frame->lens = *shared;
+  frame->own_size = cJSON_HasObjectItem(json, "w") && cJSON_HasObjectItem(json, "h");
+  SF_TRY(sf_lens_parse(&frame->lens, json, where));
+  if (!frame->lens.fl_x && !frame->lens.angle_x)
+    return sf_fail(SF_E_FORMAT, "%s: no field of view: neither fl_x nor camera_angle_x is given", where);
+  return parse_matrix(frame->to_world, json, where);
+}

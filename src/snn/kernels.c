@@ -1,0 +1,26 @@
+/* Choice of the instruction set at run time. */
+#include "snn/kernels.h"
+#include <string.h>
+
+extern const sf_kernels sf_kernels_portable;
+#if defined(__x86_64__)
+extern const sf_kernels sf_kernels_avx2, sf_kernels_avx512;
+#endif
+
+const sf_kernels *sf_kernels_select(const char *name)
+{
+  const sf_kernels *candidate[3];
+  int n = 0;
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma"))
+    candidate[n++] = &sf_kernels_avx512;
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) candidate[n++] = &sf_kernels_avx2;
+#endif
+  candidate[n++] = &sf_kernels_portable;
+  if (!name) return candidate[0];
+  for (int i = 0; i < n; i++)
+    if (!strcmp(candidate[i]->name, name)) return candidate[i];
+  return NULL;
+}

@@ -1,0 +1,62 @@
+/* Vector kernels of the nets: forward and backward of one block of samples through all steps.
+ *
+ * A block is SF_BLOCK samples side by side: every array is [row][SF_BLOCK], one row per neuron or
+ * feature, so that one vector holds the same neuron of neighbouring samples. What a block keeps for its
+ * backward pass stays in the L2/L3 cache. kernels_isa.c is compiled once per instruction set; the
+ * portable build is the oracle of the others (they contract multiply-adds, so last bits differ). */
+#ifndef SF_SNN_KERNELS_H
+#define SF_SNN_KERNELS_H
+#include "spikefield/model.h"
+
+enum { SF_BLOCK = 64 };
+
+/* Weights as the kernels read them. Matrices are [out][in] like the parameters. */
+typedef struct sf_net_view {
+  const float *w1, *w2, *w3, *w4, *w5;
+  float k[SF_LAYERS]; /* D1, density integrator, C1, C2, colour integrator */
+  float theta[3];
+  int hidden, features, mode, relu;
+} sf_net_view;
+
+/* Gradients, laid out like the parameters but padded: w1 has rows of features rounded up to 16; w3 has rows of 32, the
+ * 16 directions, one scratch column, then h. `leak` is the gradient of the logits w of k = sigmoid(w). */
+typedef struct sf_net_grad {
+  float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES],
+      w5[3 * SF_LANES];
+  float leak[SF_LAYERS];
+} sf_net_grad;
+
+/* What the forward pass of one block leaves: prefix outputs, and the membranes before fire for backward. */
+typedef struct sf_block {
+  float f[2 * 16 * SF_BLOCK], sh[SF_DIR_FEATURES * SF_BLOCK];
+  float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][3 * SF_BLOCK];
+  float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */
+  float m1[SF_T_MAX][SF_LANES * SF_BLOCK], m3[SF_T_MAX][SF_LANES * SF_BLOCK], m4[SF_T_MAX][SF_LANES * SF_BLOCK];
+} sf_block;
+
+/* Working memory of one thread. */
+typedef struct sf_net_scratch {
+  float a[SF_LANES * SF_BLOCK], b[SF_LANES * SF_BLOCK], c[SF_LANES * SF_BLOCK], d[SF_LANES * SF_BLOCK];
+  float t[SF_LANES * SF_BLOCK];                              /* transposed: [SF_BLOCK][rows] */
+  float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
+  float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK];
+  float leak[SF_LAYERS][SF_BLOCK];
+} sf_net_scratch;
+
+typedef struct sf_kernels {
+  const char *name;
+  /* Forward through `steps` steps of block->f and block->sh. keep: 0 reuses one membrane slot (no backward after). */
+  void (*forward)(const sf_net_view *net, sf_block *block, int steps, int keep, sf_net_scratch *scratch);
+  /* Density prefix `steps` only: block->sigma[steps-1]. */
+  void (*density)(const sf_net_view *net, sf_block *block, int steps, sf_net_scratch *scratch);
+  /* Adds to grad; df[features][SF_BLOCK]. dsigma[T][SF_BLOCK] and dcolour[T][3*SF_BLOCK]: gradients of the prefixes. */
+  void (*backward)(const sf_net_view *net, const sf_block *block, int steps, const float *dsigma,
+                   const float *dcolour, float *df, sf_net_grad *grad, sf_net_scratch *scratch);
+  /* Hash grid, one level, one block: x[3][SF_BLOCK] in [0,1] -> out[2][SF_BLOCK]; backward adds to the table's gradient. */
+  void (*grid_forward)(const sf_grid_level *level, const float *table, const float *x, float *out);
+  void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
+} sf_kernels;
+
+/* "portable", "avx2", "avx512", or NULL for the best of this CPU; NULL when this CPU or build lacks it. */
+const sf_kernels *sf_kernels_select(const char *name);
+#endif

@@ -1,0 +1,214 @@
+/* Configuration, layout and loading of the float model. */
+#include "spikefield/model.h"
+#include "spikefield/io.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+sf_config sf_config_default(void)
+{
+  return (sf_config){.net = SF_NET_SNN,
+                     .mode = SF_HYBRID,
+                     .steps = SF_T_MAX,
+                     .levels = 16,
+                     .log2_hash = 19,
+                     .base_res = 16,
+                     .finest_res = 2048,
+                     .hidden = 128,
+                     .theta = {1, 1, 1},
+                     .scale = 0.8f,
+                     .lattice = 1024,
+                     .occ_res = 128};
+}
+
+static sf_status check_range(const char *name, double value, double low, double high)
+{
+  if (!(value >= low && value <= high))
+    return sf_fail(SF_E_RANGE, "model config: %s = %g is outside %g..%g", name, value, low, high);
+  return sf_ok();
+}
+
+sf_status sf_config_check(const sf_config *c)
+{
+  SF_TRY(check_range("net", c->net, SF_NET_SNN, SF_NET_ANN));
+  SF_TRY(check_range("mode", c->mode, SF_HYBRID, SF_NODECAY));
+  SF_TRY(check_range("steps", c->steps, 1, c->net == SF_NET_ANN ? 1 : SF_T_MAX));
+  SF_TRY(check_range("levels", c->levels, 1, 16));
+  SF_TRY(check_range("log2_hash", c->log2_hash, 4, 24));
+  SF_TRY(check_range("base_res", c->base_res, 2, 4096));
+  SF_TRY(check_range("finest_res", c->finest_res, c->base_res, 32768));
+  SF_TRY(check_range("hidden", c->hidden, 16, SF_LANES));
+  if (c->hidden % 16) return sf_fail(SF_E_RANGE, "model config: hidden = %d is not a multiple of 16", c->hidden);
+  for (int i = 0; i < 3; i++) SF_TRY(check_range("theta", c->theta[i], 1e-6, 1e6));
+  SF_TRY(check_range("scale", c->scale, 1e-6, 1e6));
+  SF_TRY(check_range("lattice", c->lattice, 16, 1024));
+  SF_TRY(check_range("occ_res", c->occ_res, 8, 256));
+  if (c->occ_res & (c->occ_res - 1))
+    return sf_fail(SF_E_RANGE, "model config: occ_res = %d is not a power of two", c->occ_res);
+  return sf_ok();
+}
+
+/* torch-ngp's table: resolution ceil(base * s^l), one more point per axis, rounded up to 8 entries. */
+static size_t layout_levels(sf_model *m)
+{
+  const sf_config *c = &m->config;
+  double growth = c->levels > 1 ? pow((double)c->finest_res / c->base_res, 1.0 / (c->levels - 1)) : 1.0;
+  size_t total = 0;
+  for (int l = 0; l < c->levels; l++) {
+    double resolution = c->base_res * pow(growth, l);
+    uint64_t stride = (uint64_t)ceil(resolution - 1e-9) + 1, dense = (stride * stride * stride + 7) / 8 * 8;
+    uint64_t hashed = 1ull << c->log2_hash;
+    sf_grid_level *level = &m->level[l];
+    level->scale = (float)(resolution - 1);
+    level->stride = dense <= hashed ? (uint32_t)stride : 0;
+    level->entries = (uint32_t)(dense <= hashed ? dense : hashed);
+    level->offset = total;
+    total += level->entries;
+  }
+  return total;
+}
+
+static void layout_params(sf_model *m, size_t entries)
+{
+  const int64_t hidden = m->config.hidden, features = 2 * m->config.levels;
+  const sf_param param[SF_P_COUNT] = {
+      [SF_P_GRID] = {.name = "grid.table", .shape = {(int64_t)entries, 2}, .dims = 2},
+      [SF_P_W1] = {.name = "density.w1", .shape = {hidden, features}, .dims = 2},
+      [SF_P_W2] = {.name = "density.w2", .shape = {SF_DENSITY_OUT, hidden}, .dims = 2},
+      [SF_P_W3] = {.name = "colour.w3", .shape = {hidden, SF_DIR_FEATURES + SF_GEO_FEATURES}, .dims = 2},
+      [SF_P_W4] = {.name = "colour.w4", .shape = {hidden, hidden}, .dims = 2},
+      [SF_P_W5] = {.name = "colour.w5", .shape = {3, hidden}, .dims = 2},
+      [SF_P_LEAK] = {.name = "leak", .shape = {SF_LAYERS, 1}, .dims = 1},
+  };
+  size_t offset = 0;
+  for (int i = 0; i < SF_P_COUNT; i++) {
+    m->param[i] = param[i];
+    m->param[i].offset = offset;
+    m->param[i].size = (size_t)(param[i].shape[0] * (param[i].dims > 1 ? param[i].shape[1] : 1));
+    offset += (m->param[i].size + 15) / 16 * 16;
+  }
+  m->size = offset;
+}
+
+sf_status sf_model_create(sf_model *m, const sf_config *config)
+{
+  memset(m, 0, sizeof *m);
+  SF_TRY(sf_config_check(config));
+  m->config = *config;
+  layout_params(m, layout_levels(m));
+  size_t bytes = m->size * sizeof(float), cells = (size_t)config->occ_res * config->occ_res * config->occ_res;
+  m->value = aligned_alloc(64, bytes);
+  m->occupancy = malloc(cells / 8);
+  if (!m->value || !m->occupancy) {
+    sf_model_free(m);
+    return sf_fail(SF_E_MEMORY, "model: no memory for %zu parameters", bytes / sizeof(float));
+  }
+  memset(m->value, 0, bytes);
+  memset(m->occupancy, 0xff, cells / 8);
+  m->t_star = (float)config->steps;
+  m->t_r = config->steps;
+  return sf_ok();
+}
+
+void sf_model_free(sf_model *m)
+{
+  free(m->value);
+  free(m->occupancy);
+  memset(m, 0, sizeof *m);
+}
+
+static sf_status meta_number(const sf_tensors *set, const char *key, double *value)
+{
+  const char *text = sf_tensors_meta(set, key);
+  if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' is missing", set->path, key);
+  char *end;
+  *value = strtod(text, &end);
+  if (end == text || *end || !isfinite(*value))
+    return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' is not a number: '%.40s'", set->path, key, text);
+  return sf_ok();
+}
+
+static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value)
+{
+  double number = 0;
+  SF_TRY(meta_number(set, key, &number));
+  if (number != floor(number) || fabs(number) > 1e9)
+    return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' = %g is not a small integer", set->path, key, number);
+  *value = (int32_t)number;
+  return sf_ok();
+}
+
+static sf_status load_config(const sf_tensors *set, sf_config *c)
+{
+  const char *format = sf_tensors_meta(set, "format"), *version = sf_tensors_meta(set, "version");
+  if (!format || strcmp(format, "spikefield-model"))
+    return sf_fail(SF_E_FORMAT, "%s: not a spikefield model (metadata format is '%.40s')", set->path,
+                   format ? format : "absent");
+  if (!version || strcmp(version, "1"))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads version 1", set->path,
+                   version ? version : "absent");
+  struct {
+    const char *key;
+    int32_t *value;
+  } ints[] = {{"net", &c->net},
+              {"mode", &c->mode},
+              {"steps", &c->steps},
+              {"levels", &c->levels},
+              {"log2_hash", &c->log2_hash},
+              {"base_res", &c->base_res},
+              {"finest_res", &c->finest_res},
+              {"hidden", &c->hidden},
+              {"lattice", &c->lattice},
+              {"occ_res", &c->occ_res}};
+  for (size_t i = 0; i < sizeof ints / sizeof *ints; i++) SF_TRY(meta_int(set, ints[i].key, ints[i].value));
+  static const char *const theta[3] = {"theta_d1", "theta_c1", "theta_c2"};
+  double number;
+  for (int i = 0; i < 3; i++) {
+    SF_TRY(meta_number(set, theta[i], &number));
+    c->theta[i] = (float)number;
+  }
+  SF_TRY(meta_number(set, "scale", &number));
+  c->scale = (float)number;
+  sf_status status = sf_config_check(c);
+  return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
+}
+
+static sf_status load_values(sf_model *m, const sf_tensors *set)
+{
+  for (int i = 0; i < SF_P_COUNT; i++) {
+    const sf_param *p = &m->param[i];
+    const sf_tensor *t;
+    SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &t));
+    SF_TRY(sf_tensor_finite(set->path, t));
+    memcpy(m->value + p->offset, t->data, p->size * sizeof(float));
+  }
+  int64_t cells = (int64_t)m->config.occ_res * m->config.occ_res * m->config.occ_res / 8;
+  const sf_tensor *t;
+  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &cells, &t));
+  memcpy(m->occupancy, t->data, (size_t)cells);
+  double t_star;
+  SF_TRY(meta_number(set, "t_star", &t_star));
+  SF_TRY(meta_int(set, "t_r", &m->t_r));
+  if (m->t_r < 1 || m->t_r > m->config.steps || t_star < 1 || t_star > m->config.steps)
+    return sf_fail(SF_E_RANGE, "%s: t_r = %d, t_star = %g outside 1..T = %d", set->path, m->t_r, t_star,
+                   m->config.steps);
+  m->t_star = (float)t_star;
+  return sf_ok();
+}
+
+sf_status sf_model_load(sf_model *m, const char *path)
+{
+  memset(m, 0, sizeof *m);
+  sf_tensors set;
+  sf_config config = {0};
+  SF_TRY(sf_tensors_load(&set, path));
+  sf_status status = load_config(&set, &config);
+  if (!status.code) status = sf_model_create(m, &config);
+  if (!status.code) {
+    status = load_values(m, &set);
+    if (status.code) sf_model_free(m);
+  }
+  sf_tensors_free(&set);
+  return status;
+}

@@ -1,0 +1,20 @@
+/* One PLIF step (SpikingJelly's parametric leaky integrate-and-fire; design equations in docs/model.md).
+ * The scalar form, used by the oracle; src/snn/kernels_isa.c holds the block form. */
+#ifndef SF_SNN_PLIF_H
+#define SF_SNN_PLIF_H
+#include "spikefield/model.h"
+#include <math.h>
+
+enum { SF_SURROGATE_ALPHA = 4 };
+
+/* Membrane after charging, before fire: previous membrane v, current i, leak k = 1/tau, step t. */
+static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, float i)
+{
+  if (mode == SF_NODECAY) return v - v * k + i;
+  if (mode == SF_HYBRID && t == 0) return i;
+  return v + (i - v) * k;
+}
+
+static inline float sf_sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
+
+#endif

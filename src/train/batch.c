@@ -1,0 +1,137 @@
+/* Draws the rays of one iteration, marches them and packs their samples into blocks. */
+#include "train/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static sf_status reserve(sf_batch *b, int blocks, int features)
+{
+  if (blocks <= b->block_capacity) return sf_ok();
+  const int capacity = blocks + blocks / 4;
+  free(b->x);
+  free(b->f);
+  free(b->df);
+  const size_t n = (size_t)capacity * SF_BLOCK * sizeof(float);
+  b->x = sf_aligned_alloc(3 * n);
+  b->f = sf_aligned_alloc((size_t)features * n);
+  b->df = sf_aligned_alloc((size_t)features * n);
+  b->block_capacity = b->x && b->f && b->df ? capacity : 0;
+  return b->block_capacity ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d blocks of samples", capacity);
+}
+
+sf_status sf_batch_create(sf_batch *b, int samples, int features)
+{
+  memset(b, 0, sizeof *b);
+  b->ray = calloc(RAYS_MAX, sizeof *b->ray);
+  b->bundle = calloc(RAYS_MAX, sizeof *b->bundle);
+  if (!b->ray || !b->bundle) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  return reserve(b, samples / SF_BLOCK, features);
+}
+
+void sf_batch_free(sf_batch *b)
+{
+  free(b->ray);
+  free(b->bundle);
+  free(b->x);
+  free(b->f);
+  free(b->df);
+}
+
+/* A random pixel of a random view, composited with its alpha on this ray's background. */
+static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
+{
+  const uint64_t seed = t->options.seed;
+  const sf_view *view = &t->data->view[sf_random_below(seed, RNG_PIXEL, 3 * index, (uint64_t)t->data->count)];
+  const sf_image *image = &view->image;
+  const int x = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 1, (uint64_t)image->width);
+  const int y = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 2, (uint64_t)image->height);
+  sf_camera_ray(&view->camera, (float)x + 0.5f, (float)y + 0.5f, ray->origin, ray->direction);
+  const uint16_t *rgba = image->rgba + 4 * ((size_t)y * image->width + x);
+  const float alpha = rgba[3] / 65535.0f;
+  for (int c = 0; c < 3; c++) {
+    ray->background[c] = t->options.background == 0   ? sf_random_float(seed, RNG_BACKGROUND, 3 * index + c)
+                         : t->options.background == 1 ? 1.0f
+                                                      : 0.0f;
+    ray->target[c] = rgba[c] / 65535.0f * alpha + ray->background[c] * (1 - alpha);
+  }
+}
+
+static void pack(sf_batch *b)
+{
+  sf_bundle current = {0};
+  int lanes = 0; /* samples of the current bundle */
+  b->bundles = 0;
+  b->blocks = 0;
+  for (int r = 0; r < b->rays; r++) {
+    if (lanes + b->ray[r].count > BUNDLE_BLOCKS * SF_BLOCK) {
+      current.blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
+      b->blocks += current.blocks;
+      b->bundle[b->bundles++] = current;
+      current = (sf_bundle){.ray = r, .block = b->blocks};
+      lanes = 0;
+    }
+    b->ray[r].first = lanes;
+    lanes += b->ray[r].count;
+    current.rays++;
+  }
+  current.blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
+  b->blocks += current.blocks;
+  b->bundle[b->bundles++] = current;
+}
+
+static void place(sf_batch *b, const sf_march *march, int block, const sf_ray *ray)
+{
+  float x[3];
+  int n = 0;
+  for (int s = 0; s < ray->count; s++, n++) {
+    n = sf_march_next(march, n, x);
+    const int lane = ray->first + s;
+    float *at = b->x + ((size_t)(block + lane / SF_BLOCK) * 3) * SF_BLOCK + lane % SF_BLOCK;
+    for (int a = 0; a < 3; a++) at[a * SF_BLOCK] = x[a];
+  }
+}
+
+/* Rays of the next iteration for the wanted samples; a coarser lattice while nothing is known to be empty. */
+static void adapt(sf_trainer *t)
+{
+  sf_batch *b = &t->batch;
+  double ratio = t->options.samples / fmax(b->samples, 1);
+  t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
+  if (t->rays < 512 && t->stride < 8) t->stride++, t->rays *= 2;
+  if (t->rays > 1536 && t->stride > 1) t->stride--, t->rays /= 2;
+  t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > RAYS_MAX ? RAYS_MAX : t->rays;
+}
+
+sf_status sf_batch_draw(sf_trainer *t)
+{
+  sf_batch *b = &t->batch;
+  const uint64_t base = (uint64_t)t->iteration * RAYS_MAX;
+  sf_march *march = malloc((size_t)t->rays * sizeof *march);
+  if (!march) return sf_fail(SF_E_MEMORY, "train: no memory for %d rays", t->rays);
+  b->rays = t->rays;
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int r = 0; r < b->rays; r++) {
+    sf_ray *ray = &b->ray[r];
+    draw_ray(t, base + r, ray);
+    march[r] = sf_march_begin(&t->model, ray->origin, ray->direction, t->stride,
+                              sf_random_float(t->options.seed, RNG_JITTER, base + r));
+    float x[3];
+    ray->count = 0;
+    for (int n = 0; (n = sf_march_next(&march[r], n, x)) >= 0; n++) ray->count++;
+  }
+  pack(b);
+  sf_status status = reserve(b, b->blocks, 2 * t->model.config.levels);
+  if (!status.code) {
+    b->samples = 0;
+    for (int r = 0; r < b->rays; r++) b->samples += b->ray[r].count;
+    b->delta = 2 * 1.7320508f / (float)t->model.config.lattice * (float)t->stride;
+    memset(b->x, 0, (size_t)b->blocks * 3 * SF_BLOCK * sizeof(float));
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int i = 0; i < b->bundles; i++)
+      for (int r = b->bundle[i].ray; r < b->bundle[i].ray + b->bundle[i].rays; r++)
+        place(b, &march[r], b->bundle[i].block, &b->ray[r]);
+    adapt(t);
+  }
+  free(march);
+  return status;
+}

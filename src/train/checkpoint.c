@@ -1,0 +1,156 @@
+/* Checkpoints: the model's tensors, and with the optimiser everything that a bit-identical continuation needs.
+ * Random numbers are counter-based, so the iteration number is their whole state. */
+#include "spikefield/io.h"
+#include "train/internal.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { TENSORS_MAX = 3 * SF_P_COUNT + 2 };
+
+static void put(cJSON *meta, const char *key, double value)
+{
+  char text[40];
+  snprintf(text, sizeof text, "%.17g", value);
+  cJSON_AddStringToObject(meta, key, text);
+}
+
+static void put_config(cJSON *meta, const sf_model *m)
+{
+  const sf_config *c = &m->config;
+  cJSON_AddStringToObject(meta, "format", "spikefield-model");
+  cJSON_AddStringToObject(meta, "version", "1");
+  put(meta, "net", c->net);
+  put(meta, "mode", c->mode);
+  put(meta, "steps", c->steps);
+  put(meta, "levels", c->levels);
+  put(meta, "log2_hash", c->log2_hash);
+  put(meta, "base_res", c->base_res);
+  put(meta, "finest_res", c->finest_res);
+  put(meta, "hidden", c->hidden);
+  put(meta, "lattice", c->lattice);
+  put(meta, "occ_res", c->occ_res);
+  put(meta, "theta_d1", c->theta[0]);
+  put(meta, "theta_c1", c->theta[1]);
+  put(meta, "theta_c2", c->theta[2]);
+  put(meta, "scale", c->scale);
+  put(meta, "t_star", m->t_star);
+  put(meta, "t_r", m->t_r);
+}
+
+/* The trainer's own numbers, one table for both directions. */
+typedef struct state_field {
+  const char *key;
+  double *number;
+  int64_t *integer;
+  int *small;
+} state_field;
+
+enum { STATE_FIELDS = 12 };
+static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
+{
+  const state_field table[STATE_FIELDS] = {
+      {"train.iteration", .integer = &t->iteration},
+      {"train.stage", .small = &t->stage},
+      {"train.rays", .small = &t->rays},
+      {"train.stride", .small = &t->stride},
+      {"train.last_samples", .small = &t->batch.samples},
+      {"train.seconds", .number = &t->seconds},
+      {"train.progress", .number = &t->progress},
+      {"train.stage_progress", .number = &t->stage_progress},
+      {"train.t_moment1", .number = &t->t_moment1},
+      {"train.t_moment2", .number = &t->t_moment2},
+      {"train.occupied", .number = &t->occupied},
+      {"train.epoch", .number = &t->epoch},
+  };
+  memcpy(f, table, sizeof table);
+}
+
+static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *list)
+{
+  const sf_model *m = &t->model;
+  const int64_t res = m->config.occ_res;
+  int n = 0;
+  const struct {
+    const char *prefix;
+    float *data;
+  } sets[3] = {{"", m->value}, {"adam.m.", t->moment1}, {"adam.v.", t->moment2}};
+  for (int s = 0; s < (with_optimiser ? 3 : 1); s++)
+    for (int i = 0; i < SF_P_COUNT; i++) {
+      sf_tensor *x = &list[n++];
+      *x = (sf_tensor){.type = SF_F32, .dims = m->param[i].dims, .data = sets[s].data + m->param[i].offset};
+      snprintf(x->name, sizeof x->name, "%s%s", sets[s].prefix, m->param[i].name);
+      memcpy(x->shape, m->param[i].shape, sizeof m->param[i].shape);
+    }
+  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {res * res * res / 8}, m->occupancy};
+  if (with_optimiser) list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {res, res, res}, t->density};
+  return n;
+}
+
+sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optimiser)
+{
+  sf_tensor list[TENSORS_MAX];
+  const int n = list_tensors(t, with_optimiser, list);
+  cJSON *meta = cJSON_CreateObject();
+  if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
+  put_config(meta, &t->model);
+  put(meta, "beta", t->options.beta);
+  put(meta, "seed", (double)t->options.seed);
+  if (with_optimiser) {
+    state_field field[STATE_FIELDS];
+    state_table((sf_trainer *)t, field);
+    for (int i = 0; i < STATE_FIELDS; i++)
+      put(meta, field[i].key,
+          field[i].number    ? *field[i].number
+          : field[i].integer ? (double)*field[i].integer
+                             : *field[i].small);
+  }
+  sf_status status = sf_tensors_save(list, n, meta, path);
+  cJSON_Delete(meta);
+  return status;
+}
+
+static sf_status load_state(sf_trainer *t, const sf_tensors *set)
+{
+  state_field field[STATE_FIELDS];
+  state_table(t, field);
+  for (int i = 0; i < STATE_FIELDS; i++) {
+    const char *text = sf_tensors_meta(set, field[i].key);
+    char *end = NULL;
+    const double value = text ? strtod(text, &end) : 0;
+    if (!text || end == text || *end || !isfinite(value) || value < 0 || value > 1e15)
+      if (!text || strcmp(field[i].key, "train.t_moment1"))
+        return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path,
+                       field[i].key);
+    if (field[i].number)
+      *field[i].number = value;
+    else if (field[i].integer)
+      *field[i].integer = (int64_t)value;
+    else
+      *field[i].small = (int)value;
+  }
+  if (t->stage < 1 || t->stage > 3 || t->rays < RAYS_MIN || t->rays > RAYS_MAX || t->stride < 1 || t->stride > 8)
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.stage, train.rays or train.stride is out of range", set->path);
+  return sf_ok();
+}
+
+sf_status sf_checkpoint_load(sf_trainer *t, const char *path)
+{
+  sf_tensors set;
+  SF_TRY(sf_tensors_load(&set, path));
+  sf_tensor list[TENSORS_MAX];
+  const int n = list_tensors(t, true, list);
+  sf_status status = load_state(t, &set);
+  for (int i = 0; i < n && !status.code; i++) {
+    const sf_tensor *from;
+    status = sf_tensors_get(&set, list[i].name, list[i].type, list[i].dims, list[i].shape, &from);
+    if (!status.code && from->type == SF_F32) status = sf_tensor_finite(path, from);
+    if (status.code) break;
+    size_t bytes = sf_dtype_size(from->type);
+    for (int d = 0; d < from->dims; d++) bytes *= (size_t)from->shape[d];
+    memcpy(list[i].data, from->data, bytes);
+  }
+  sf_tensors_free(&set);
+  return status;
+}

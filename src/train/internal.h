@@ -1,0 +1,105 @@
+/* What the files of the trainer share. */
+#ifndef SF_TRAIN_INTERNAL_H
+#define SF_TRAIN_INTERNAL_H
+#include "render/march.h"
+#include "render/view.h"
+#include "spikefield/rng.h"
+#include "spikefield/train.h"
+
+/* Work is cut into GROUPS parts that do not depend on the number of threads; each part adds up its own gradient in
+ * sample order and the parts are added in order: same seed, same bits, any thread count. */
+enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64 };
+
+/* Streams of the counter-based generator. */
+enum { RNG_INIT = 1, RNG_PIXEL, RNG_JITTER, RNG_BACKGROUND, RNG_OCCUPANCY, RNG_OCCUPANCY_JITTER };
+
+typedef struct sf_ray {
+  float origin[3], direction[3], target[3], background[3]; /* target: composited on background */
+  int first, count;                                        /* its samples: lanes first .. first + count - 1 */
+} sf_ray;
+
+/* Whole rays whose samples fill at most BUNDLE_BLOCKS blocks. */
+typedef struct sf_bundle {
+  int ray, rays;     /* range of rays */
+  int block, blocks; /* range of blocks */
+} sf_bundle;
+
+typedef struct sf_batch {
+  int rays, samples, bundles, blocks, block_capacity;
+  float delta;       /* interval of a sample, model units */
+  sf_ray *ray;       /* [RAYS_MAX] */
+  sf_bundle *bundle; /* [RAYS_MAX] */
+  float *x;          /* [blocks][3][SF_BLOCK] positions in [0,1] */
+  float *f, *df;     /* [blocks][features][SF_BLOCK] */
+} sf_batch;
+
+/* Loss of one iteration's steps, weights of its terms, and sums over its rays. */
+typedef struct sf_loss_plan {
+  int stage, steps, t_f, t_c, t_r;
+  double d;             /* t^ - t_f */
+  float inverse_rays;
+  float extra;          /* weight of L_extra, 0 = off */
+  float distill;        /* 1 or 0 */
+  float k_sigma, k_colour;
+} sf_loss_plan;
+
+typedef struct sf_loss_sums {
+  double mse_full, mse_floor, mse_ceil, regular, extra_floor, extra_ceil, distill;
+  double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
+} sf_loss_sums;
+
+/* Work arrays of one ray: prefix outputs and their gradients, [T][n] and [T][n][3]; `spare` for the loss. */
+typedef struct sf_ray_work {
+  float *sigma[SF_T_MAX], *colour[SF_T_MAX], *dsigma[SF_T_MAX], *dcolour[SF_T_MAX], *spare[6];
+  float *memory;
+} sf_ray_work;
+sf_status sf_ray_work_create(sf_ray_work *work, int samples);
+void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, float delta, sf_ray_work *work, sf_loss_sums *sums);
+
+typedef struct sf_group {
+  sf_net_grad *grad;
+  sf_loss_sums sums;
+  double spikes[3], neurons;
+} sf_group;
+
+typedef struct sf_worker {
+  sf_block *block; /* [BUNDLE_BLOCKS] */
+  sf_net_scratch *scratch;
+  sf_ray_work ray;
+  float *dsigma, *dcolour; /* [BUNDLE_BLOCKS][T][SF_BLOCK], [..][3*SF_BLOCK] */
+} sf_worker;
+
+struct sf_trainer {
+  sf_train_options options;
+  const sf_dataset *data;
+  const sf_kernels *kernels;
+  sf_model model;
+  float *grad, *moment1, *moment2; /* [model.size] */
+  float *density;                  /* occupancy's running density, [occ_res^3] */
+  sf_batch batch;
+  sf_group group[GROUPS];
+  sf_worker *worker;
+  int workers;
+  int64_t iteration, stage_start;
+  int stage, rays, stride;
+  double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
+  double t_moment1, t_moment2;
+  double occupied, epoch; /* epoch: passes over the training pixels in this stage */
+};
+
+sf_status sf_batch_create(sf_batch *batch, int samples, int features);
+void sf_batch_free(sf_batch *batch);
+/* Draws and marches `trainer->rays` rays; packs them into bundles. */
+sf_status sf_batch_draw(sf_trainer *trainer);
+
+sf_status sf_init_parameters(sf_trainer *trainer);
+sf_status sf_occupancy_update(sf_trainer *trainer, int steps);
+
+typedef struct sf_adam {
+  double lr, beta1, beta2, epsilon;
+  int64_t step; /* 1, 2, ... */
+} sf_adam;
+/* value[n] -= ...; clears grad. */
+void sf_adam_update(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
+sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);
+#endif

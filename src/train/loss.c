@@ -1,0 +1,205 @@
+/* PATA's losses of one ray and their gradients with respect to every prefix's density and colour.
+ * Batch norms of the paper are means over rays here, so that rays stay independent (docs/model.md). */
+#include "render/composite.h"
+#include "train/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const float g0 = 5e-5f, g1 = 5e-2f, g2 = 1e-6f;
+
+sf_status sf_ray_work_create(sf_ray_work *w, int samples)
+{
+  size_t n = (size_t)samples, total = n * (SF_T_MAX * 8 + 6 * 3);
+  float *at = w->memory = sf_aligned_alloc(total * sizeof(float));
+  if (!at) return sf_fail(SF_E_MEMORY, "train: no memory for a ray of %d samples", samples);
+  for (int t = 0; t < SF_T_MAX; t++) {
+    w->sigma[t] = at, at += n;
+    w->dsigma[t] = at, at += n;
+    w->colour[t] = at, at += 3 * n;
+    w->dcolour[t] = at, at += 3 * n;
+  }
+  for (int i = 0; i < 6; i++) w->spare[i] = at, at += 3 * n;
+  return sf_ok();
+}
+
+/* A prefix of the ray as composited. */
+typedef struct image {
+  float rgb[3], behind;
+  float *weight;
+} image;
+
+static image composite(const sf_ray *ray, int prefix, float delta, sf_ray_work *w, float *weight)
+{
+  image im = {.weight = weight};
+  im.behind = sf_composite_weights(ray->count, w->sigma[prefix - 1], delta, weight);
+  sf_composite_colour(ray->count, weight, w->colour[prefix - 1], im.behind, ray->background, im.rgb);
+  return im;
+}
+
+static float dot3(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static double squared_error(const float *a, const float *b)
+{
+  double sum = 0;
+  for (int c = 0; c < 3; c++) sum += (double)(a[c] - b[c]) * (a[c] - b[c]);
+  return sum / 3;
+}
+
+/* Spreads the gradient of a prefix's rgb to its samples. */
+static void push(const sf_ray *ray, int prefix, float delta, const image *im, const float grgb[3], sf_ray_work *w)
+{
+  const int n = ray->count;
+  float *g = w->spare[5], *dcolour = w->dcolour[prefix - 1];
+  const float *colour = w->colour[prefix - 1];
+  for (int s = 0; s < n; s++) {
+    g[s] = dot3(grgb, colour + 3 * s);
+    for (int c = 0; c < 3; c++) dcolour[3 * s + c] += im->weight[s] * grgb[c];
+  }
+  sf_composite_backward(n, im->weight, im->behind, delta, g, dot3(grgb, ray->background), w->dsigma[prefix - 1]);
+}
+
+static void add_mse(const sf_ray *ray, const image *im, float weight, float grgb[3])
+{
+  for (int c = 0; c < 3; c++) grgb[c] += weight * 2 / 3 * (im->rgb[c] - ray->target[c]);
+}
+
+/* g0 ||C - gt||_2 + g1 (1 - cos(C, gt)); returns the value. */
+static double add_regular(const sf_ray *ray, const image *im, float inverse_rays, float grgb[3])
+{
+  const float *rgb = im->rgb, *gt = ray->target;
+  float norm = sqrtf((float)(3 * squared_error(rgb, gt)));
+  double value = g0 * norm;
+  if (norm > 1e-6f)
+    for (int c = 0; c < 3; c++) grgb[c] += inverse_rays * g0 * (rgb[c] - gt[c]) / norm;
+  float a = sqrtf(dot3(rgb, rgb)), b = sqrtf(dot3(gt, gt));
+  if (a < 1e-3f || b < 1e-3f) return value; /* the angle of black is undefined */
+  float cosine = dot3(rgb, gt) / (a * b);
+  for (int c = 0; c < 3; c++) grgb[c] -= inverse_rays * g1 * (gt[c] / (a * b) - cosine * rgb[c] / (a * a));
+  return value + g1 * (1 - cosine);
+}
+
+/* g2 sum log(1 + 2 sigma). */
+static double add_sparsity(int n, const float *sigma, float inverse_rays, float *dsigma)
+{
+  double value = 0;
+  for (int s = 0; s < n; s++) {
+    value += log1pf(2 * sigma[s]);
+    dsigma[s] += inverse_rays * g2 * 2 / (1 + 2 * sigma[s]);
+  }
+  return g2 * value;
+}
+
+static float norm(int n, const float *x)
+{
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += (double)x[i] * x[i];
+  return (float)sqrt(sum);
+}
+
+/* ||w tail|| / ||W|| + ||c tail|| / ||C_T|| of prefix t, whose gradient is scaled by `weight`. */
+static double add_extra(const sf_loss_plan *plan, const sf_ray *ray, float delta, int t, const image *full,
+                        float weight, sf_ray_work *w, sf_loss_sums *sums)
+{
+  const int n = ray->count, T = plan->steps, left = T - t;
+  const float keep_s = powf(1 - plan->k_sigma, (float)left), keep_c = powf(1 - plan->k_colour, (float)left);
+  float *tail = w->spare[1], *wt = w->spare[2], *g = w->spare[3], *gs = w->spare[4];
+  if (left == 0) return 0;
+  const float *full_s = w->sigma[T - 1], *part_s = w->sigma[t - 1];
+  const float *full_c = w->colour[T - 1], *part_c = w->colour[t - 1];
+  double value = 0;
+  for (int s = 0; s < n; s++) tail[s] = fmaxf(full_s[s] - keep_s * part_s[s], 0);
+  float behind = sf_composite_weights(n, tail, delta, wt);
+  const float a = norm(n, wt), b = norm(n, full->weight);
+  if (a > 1e-8f && b > 1e-4f) {
+    value += a / b;
+    memset(gs, 0, n * sizeof *gs);
+    for (int s = 0; s < n; s++) g[s] = weight * wt[s] / (a * b);
+    sf_composite_backward(n, wt, behind, delta, g, 0, gs);
+    for (int s = 0; s < n; s++) {
+      if (tail[s] == 0) continue;
+      w->dsigma[T - 1][s] += gs[s];
+      w->dsigma[t - 1][s] -= keep_s * gs[s];
+      sums->g_sigma_leak += (double)gs[s] * part_s[s] * left * powf(1 - plan->k_sigma, (float)(left - 1));
+    }
+    for (int s = 0; s < n; s++) g[s] = -weight * a * full->weight[s] / (b * b * b);
+    sf_composite_backward(n, full->weight, full->behind, delta, g, 0, w->dsigma[T - 1]);
+  }
+  float ct[3] = {0}, part[3] = {0};
+  for (int s = 0; s < n; s++)
+    for (int c = 0; c < 3; c++) {
+      ct[c] += full->weight[s] * (full_c[3 * s + c] - keep_c * part_c[3 * s + c]);
+      part[c] += full->weight[s] * part_c[3 * s + c];
+    }
+  const float na = norm(3, ct), nb = norm(3, full->rgb);
+  if (na < 1e-8f || nb < 1e-3f) return value;
+  float gt[3], gfull[3];
+  for (int c = 0; c < 3; c++) {
+    gt[c] = weight * ct[c] / (na * nb);
+    gfull[c] = -weight * na * full->rgb[c] / (nb * nb * nb);
+  }
+  for (int s = 0; s < n; s++) {
+    g[s] = 0;
+    for (int c = 0; c < 3; c++) {
+      g[s] += gt[c] * (full_c[3 * s + c] - keep_c * part_c[3 * s + c]);
+      w->dcolour[T - 1][3 * s + c] += full->weight[s] * gt[c];
+      w->dcolour[t - 1][3 * s + c] -= keep_c * full->weight[s] * gt[c];
+    }
+  }
+  sums->g_colour_leak += dot3(gt, part) * left * powf(1 - plan->k_colour, (float)(left - 1));
+  sf_composite_backward(n, full->weight, full->behind, delta, g, 0, w->dsigma[T - 1]);
+  push(ray, T, delta, full, gfull, w);
+  return value + na / nb;
+}
+
+static void stage_one(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_ray_work *w, sf_loss_sums *sums)
+{
+  image full = composite(ray, p->steps, delta, w, w->spare[0]);
+  float grgb[3] = {0};
+  double mse = squared_error(full.rgb, ray->target);
+  sums->mse_full += mse;
+  sums->mse_floor += mse;
+  sums->mse_ceil += mse;
+  add_mse(ray, &full, p->inverse_rays, grgb);
+  sums->regular += add_regular(ray, &full, p->inverse_rays, grgb);
+  push(ray, p->steps, delta, &full, grgb, w);
+  sums->regular += add_sparsity(ray->count, w->sigma[p->steps - 1], p->inverse_rays, w->dsigma[p->steps - 1]);
+}
+
+/* The terms that hang on one of the two prefixes around t^. `share` = 1-d or d. */
+static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, float delta, int t, float share, const image *full,
+                        sf_ray_work *w, sf_loss_sums *sums)
+{
+  const float inverse = p->inverse_rays;
+  image im = composite(ray, t, delta, w, w->spare[1]);
+  double mse = squared_error(im.rgb, ray->target);
+  float grgb[3] = {0};
+  *(t == p->t_f ? &sums->mse_floor : &sums->mse_ceil) += mse;
+  add_mse(ray, &im, inverse * share, grgb);
+  if (t == p->t_r) {
+    sums->regular += add_regular(ray, &im, inverse, grgb);
+    sums->distill += squared_error(im.rgb, full->rgb);
+    for (int c = 0; c < 3; c++) grgb[c] += p->distill * inverse * 2 / 3 * (im.rgb[c] - full->rgb[c]);
+    sums->regular += add_sparsity(ray->count, w->sigma[t - 1], inverse, w->dsigma[t - 1]);
+  }
+  push(ray, t, delta, &im, grgb, w);
+  if (p->extra > 0)
+    *(t == p->t_f ? &sums->extra_floor : &sums->extra_ceil) +=
+        add_extra(p, ray, delta, t, full, p->extra * inverse * share, w, sums);
+}
+
+void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_ray_work *w, sf_loss_sums *sums)
+{
+  for (int t = 0; t < p->steps; t++) {
+    memset(w->dsigma[t], 0, ray->count * sizeof(float));
+    memset(w->dcolour[t], 0, 3 * ray->count * sizeof(float));
+  }
+  if (p->stage == 1) {
+    stage_one(p, ray, delta, w, sums);
+    return;
+  }
+  image full = composite(ray, p->steps, delta, w, w->spare[0]);
+  sums->mse_full += squared_error(full.rgb, ray->target);
+  near_prefix(p, ray, delta, p->t_f, (float)(1 - p->d), &full, w, sums);
+  if (p->t_c != p->t_f) near_prefix(p, ray, delta, p->t_c, (float)p->d, &full, w, sums);
+}

@@ -1,0 +1,301 @@
+/* For the tests of src/fx: random scenes, and the nets once more, naively: dense sums in 64 bits, one neuron after the
+ * other, every event counted where it happens. Shares only the two table functions with the core. */
+#ifndef SPIKEFIELD_TESTS_FX_FIXTURE_H
+#define SPIKEFIELD_TESTS_FX_FIXTURE_H
+#include "spikefield/rng.h"
+#include "src/fx/unit.h"
+#include <check.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct fixture_sizes {
+  int levels, d_hidden, d_out, n_dir, c1, c2, steps, mode;
+} fixture_sizes;
+
+static const fixture_sizes fixture_ingp = {16, 128, 16, 16, 128, 128, 4, FX_HYBRID};
+
+static inline int64_t fixture_pick(uint64_t seed, uint64_t stream, uint64_t index, int64_t low, int64_t high)
+{
+  return low + (int64_t)sf_random_below(seed, stream, index, (uint64_t)(high - low + 1));
+}
+
+static inline fixture_sizes fixture_random_sizes(uint64_t seed)
+{
+  fixture_sizes s;
+  s.levels = (int)fixture_pick(seed, 1, 0, 1, 16);
+  s.d_hidden = (int)fixture_pick(seed, 1, 1, 1, 128);
+  s.d_out = (int)fixture_pick(seed, 1, 2, 1, 16);
+  s.n_dir = (int)fixture_pick(seed, 1, 3, s.d_out == 1, 16);
+  s.c1 = (int)fixture_pick(seed, 1, 4, 1, 128);
+  s.c2 = (int)fixture_pick(seed, 1, 5, 1, 128);
+  s.steps = (int)fixture_pick(seed, 1, 6, 1, SF_T_MAX);
+  s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_NODECAY);
+  return s;
+}
+
+static inline void fixture_grid(fx_grid *grid, int levels)
+{
+  grid->levels = levels;
+  grid->entries = 0;
+  for (int l = 0; l < levels; l++) {
+    const int res = 3 + 2 * l;
+    grid->scale_q16[l] = ((res - 1) << 16) + l * 4321;
+    grid->stride[l] = l < 4 ? res + 2 : 0;
+    grid->log2_size[l] = l < 4 ? 0 : 9;
+    grid->offset[l] = grid->entries;
+    grid->shift[l] = 12 + l % 5;
+    grid->entries += l < 4 ? (res + 2) * (res + 2) * (res + 2) : 512;
+  }
+}
+
+static inline void fixture_set_sizes(fx_scene *scene, const fixture_sizes *s)
+{
+  fx_layer *l = scene->net.layer;
+  l[FX_D1].n_in = 2 * s->levels, l[FX_D1].n_out = l[FX_D2].n_in = s->d_hidden, l[FX_D2].n_out = s->d_out;
+  l[FX_C1].n_in = s->n_dir + s->d_out - 1, l[FX_C1].n_out = l[FX_C2].n_in = s->c1;
+  l[FX_C2].n_out = l[FX_C3].n_in = s->c2, l[FX_C3].n_out = 3;
+  fixture_grid(&scene->grid, s->levels);
+  scene->occ_res = 8;
+}
+
+/* Random weights; thresholds of the size of one standard deviation of the currents, so that a part fires. */
+static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_t seed)
+{
+  static const int theta[SF_LAYERS] = {60000, 0, 60000, 60000, 0};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    fx_layer *layer = &scene->net.layer[l];
+    layer->k = (int32_t)fixture_pick(seed, 10, (uint64_t)l, 0, 4096);
+    layer->theta = theta[l];
+    for (int i = 0; i < layer->n_in; i++)
+      for (int o = 0; o < layer->n_out; o++)
+        layer->w[i * SF_LANES + o] = (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), -127, 127);
+  }
+  for (int64_t i = 0; i < scene->grid.entries * 2; i++)
+    scene->grid.table[i] = (int8_t)fixture_pick(seed, 30, (uint64_t)i, -127, 127);
+  for (int i = 0; i < 64; i++) scene->occupancy[i] = (uint8_t)fixture_pick(seed, 31, (uint64_t)i, 0, 255);
+  scene->net.mode = s->mode, scene->net.steps = s->steps;
+  scene->net.exp_in = (fx_scale){50000, 15, 4096};
+  scene->net.sigmoid_in = (fx_scale){50000, 13, 0};
+  scene->step_q24 = 30000, scene->max_samples = 1024, scene->trans_stop = 104;
+  for (int o = 0; o < 3; o++) scene->background[o] = 65536, scene->to_box_offset[o] = 0.5;
+  scene->to_box_scale = 0.5, scene->dir_scale = 0x1p-10, scene->feature_scale = 0x1p-10;
+  for (int l = 0; l < SF_LAYERS; l++) scene->current_scale[l] = 0x1p-12;
+}
+
+static inline fx_scene fixture_scene(const fixture_sizes *sizes, uint64_t seed)
+{
+  fx_scene scene = {0};
+  fixture_set_sizes(&scene, sizes);
+  sf_status status = fx_scene_allocate(&scene, "fixture");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  fixture_fill(&scene, sizes, seed);
+  status = fx_scene_check(&scene, "fixture");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return scene;
+}
+
+static inline void fixture_inputs(uint64_t seed, uint64_t index, int16_t *f, int n, int limit)
+{
+  for (int i = 0; i < n; i++)
+    f[i] = (int16_t)fixture_pick(seed, 40, index * 64 + (uint64_t)i, -limit, limit);
+}
+
+/* ---- the naive nets ---- */
+
+static inline int64_t naive_round(int64_t x, int n) /* floor(x / 2^n + 1/2) */
+{
+  if (n == 0) return x;
+  const int64_t half = (int64_t)1 << (n - 1), whole = (int64_t)1 << n;
+  const int64_t sum = x + half;
+  return sum >= 0 ? sum / whole : -((-sum + whole - 1) / whole);
+}
+
+static inline int64_t naive_clamp(int64_t x, int64_t low, int64_t high)
+{
+  return x < low ? low : x > high ? high : x;
+}
+
+typedef struct naive_net {
+  const fx_net *net;
+  fx_counts *counts;
+  fx_trace *trace;
+  int64_t v[SF_LAYERS][SF_LANES];
+  bool ever[SF_LAYERS][SF_LANES];
+  int64_t sigma, colour[3];
+} naive_net;
+
+static inline int64_t naive_charge(const naive_net *n, int64_t v, int64_t current, int64_t k, int t)
+{
+  if (t == 0 && n->net->mode == FX_HYBRID) return current;
+  const int64_t old = t == 0 ? 0 : v;
+  if (n->net->mode == FX_NODECAY) return old - naive_round(old * k, 12) + current;
+  return old + naive_round((current - old) * k, 12);
+}
+
+static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current, int frac, bool *spike)
+{
+  const fx_layer *layer = &n->net->layer[l];
+  fx_layer_counts *c = &n->counts->layer[l];
+  for (int o = 0; o < layer->n_out; o++) {
+    const int64_t exact = naive_charge(n, n->v[l][o], current[o] * (1 << frac), layer->k, t);
+    const int64_t u = naive_clamp(exact, -8388608, 8388607);
+    spike[o] = u >= layer->theta;
+    n->v[l][o] = spike[o] ? u - layer->theta : u;
+    n->counts->saturated[l] += u != exact;
+    n->trace->current[l][t][o] = (int32_t)current[o];
+    n->trace->membrane[l][t][o] = (int32_t)u;
+    if (spike[o]) n->trace->spikes[l][t][o / 64] |= (uint64_t)1 << o % 64;
+    c->spikes[t] += spike[o];
+    c->updates[t]++;
+    c->state_w[t] += 3;
+    if (t > 0) c->state_r[t] += 3;
+  }
+}
+
+static inline void naive_synapses(naive_net *n, int l, int t, const bool *spike, int64_t *current)
+{
+  const fx_layer *layer = &n->net->layer[l];
+  for (int o = 0; o < layer->n_out; o++) current[o] = 0;
+  for (int i = 0; i < layer->n_in; i++) {
+    const bool read = spike[i] && (l == FX_C2 || !n->ever[l][i]);
+    for (int o = 0; o < layer->n_out; o++) {
+      if (spike[i]) current[o] += layer->w[i * SF_LANES + o], n->counts->layer[l].sop[t]++;
+      n->counts->layer[l].weight[t] += read;
+    }
+    n->ever[l][i] = n->ever[l][i] || spike[i];
+  }
+}
+
+static inline void naive_products(naive_net *n, int l, int t, int row, const int64_t *x, int count, int64_t *current)
+{
+  const fx_layer *layer = &n->net->layer[l];
+  for (int i = 0; i < count; i++)
+    for (int o = 0; o < layer->n_out; o++) {
+      current[o] += x[i] * layer->w[(row + i) * SF_LANES + o];
+      n->counts->layer[l].mac[t]++;
+      n->counts->layer[l].weight[t]++;
+    }
+}
+
+static inline int64_t naive_scale(int64_t current, const fx_scale *s, int64_t limit)
+{
+  return naive_clamp(naive_round(current * s->mul, s->shift) + s->bias, -limit, limit - 1);
+}
+
+static inline int64_t naive_integrate(naive_net *n, int l, int t, int64_t acc, int64_t in, int64_t high)
+{
+  const int64_t exact = naive_charge(n, acc, in, n->net->layer[l].k, t), kept = naive_clamp(exact, 0, high);
+  fx_layer_counts *c = &n->counts->layer[l];
+  n->counts->saturated[l] += kept != exact;
+  c->special[t]++, c->updates[t]++, c->state_w[t] += 4;
+  if (t > 0) c->state_r[t] += 4;
+  return kept;
+}
+
+static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t *h)
+{
+  const fx_layer *d2 = &n->net->layer[FX_D2];
+  bool spike[SF_LANES];
+  int64_t current[SF_LANES];
+  naive_fire(n, FX_D1, t, d1, 0, spike);
+  naive_synapses(n, FX_D2, t, spike, current);
+  for (int o = 0; o < d2->n_out; o++) n->trace->current[FX_D2][t][o] = (int32_t)current[o];
+  const int64_t y = naive_scale(current[0], &n->net->exp_in, 131072), e = fx_exp2((int32_t)y);
+  n->counts->saturated[FX_D2] += y >= 65536;
+  n->sigma = naive_integrate(n, FX_D2, t, n->sigma, e, ((int64_t)1 << 28) - 1);
+  n->trace->membrane[FX_D2][t][0] = (int32_t)n->sigma;
+  for (int j = 0; j + 1 < d2->n_out; j++) h[j] = naive_round(current[1 + j] * 2 - 7, 4); /* floor(i / 8) */
+}
+
+static inline void naive_colour(naive_net *n, int t, const int64_t *base, const int64_t *h)
+{
+  const fx_net *net = n->net;
+  const int n_h = net->layer[FX_D2].n_out - 1;
+  bool spike[SF_LANES], spike2[SF_LANES];
+  int64_t current[SF_LANES];
+  memcpy(current, base, sizeof current);
+  naive_products(n, FX_C1, t, net->layer[FX_C1].n_in - n_h, h, n_h, current);
+  naive_fire(n, FX_C1, t, current, 0, spike);
+  naive_synapses(n, FX_C2, t, spike, current);
+  naive_fire(n, FX_C2, t, current, 8, spike2);
+  naive_synapses(n, FX_C3, t, spike2, current);
+  for (int o = 0; o < 3; o++) {
+    const int64_t s = fx_sigmoid((int32_t)naive_scale(current[o], &net->sigmoid_in, 32768));
+    n->colour[o] = naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
+    n->trace->current[FX_C3][t][o] = (int32_t)current[o];
+    n->trace->membrane[FX_C3][t][o] = (int32_t)n->colour[o];
+  }
+}
+
+static inline void naive_sample(const fx_net *net, const int16_t *f, const int16_t *dir, bool first, fx_out *out,
+                                fx_trace *trace, fx_counts *counts)
+{
+  const int n_h = net->layer[FX_D2].n_out - 1, n_dir = net->layer[FX_C1].n_in - n_h;
+  naive_net n = {.net = net, .counts = counts, .trace = trace};
+  fx_counts ignored = {0};
+  int64_t x[SF_LANES], d[SF_LANES], d1[SF_LANES] = {0}, base[SF_LANES] = {0}, h[SF_OUT_MAX] = {0};
+  for (int i = 0; i < net->layer[FX_D1].n_in; i++) x[i] = f[i];
+  for (int i = 0; i < n_dir; i++) d[i] = dir[i];
+  memset(trace, 0, sizeof *trace);
+  counts->samples++;
+  counts->rays += first;
+  naive_products(&n, FX_D1, 0, 0, x, net->layer[FX_D1].n_in, d1);
+  n.counts = first ? counts : &ignored;
+  naive_products(&n, FX_C1, 0, 0, d, n_dir, base);
+  n.counts = counts;
+  for (int t = 0; t < net->steps; t++) {
+    naive_density(&n, t, d1, h);
+    naive_colour(&n, t, base, h);
+  }
+  *out = (fx_out){(uint32_t)n.sigma, {(uint32_t)n.colour[0], (uint32_t)n.colour[1], (uint32_t)n.colour[2]}};
+}
+
+/* ---- comparison ---- */
+
+static inline void assert_same_lanes(const fx_trace *a, const fx_trace *b, const fx_net *net, int l, int t)
+{
+  for (int o = 0; o < net->layer[l].n_out; o++) {
+    ck_assert_msg(a->current[l][t][o] == b->current[l][t][o], "layer %d step %d neuron %d: current %d, naive %d", l, t,
+                  o, a->current[l][t][o], b->current[l][t][o]);
+    ck_assert_msg(a->membrane[l][t][o] == b->membrane[l][t][o], "layer %d step %d neuron %d: membrane %d, naive %d", l,
+                  t, o, a->membrane[l][t][o], b->membrane[l][t][o]);
+  }
+}
+
+static inline void assert_same_counts(const fx_counts *a, const fx_counts *b)
+{
+  const uint64_t *x = (const uint64_t *)a, *y = (const uint64_t *)b;
+  for (size_t i = 0; i < sizeof *a / sizeof *x; i++)
+    ck_assert_msg(x[i] == y[i], "counter %zu: %llu, naive %llu", i, (unsigned long long)x[i], (unsigned long long)y[i]);
+}
+
+/* One sample through both, everything compared; returns the core's result. */
+static inline fx_out assert_sample(const fx_net *net, const int16_t *f, const int16_t *dir, fx_trace *trace)
+{
+  fx_out fast, slow, quiet;
+  fx_trace *naive = malloc(sizeof *naive);
+  fx_counts a = {0}, b = {0};
+  int32_t base[SF_LANES];
+  fx_net_direction(net, dir, base, &a);
+  fx_net_sample(net, f, base, &fast, trace, &a);
+  fx_net_sample(net, f, base, &quiet, NULL, NULL);
+  naive_sample(net, f, dir, true, &slow, naive, &b);
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < net->steps; t++) assert_same_lanes(trace, naive, net, l, t);
+  ck_assert_mem_eq(trace->spikes, naive->spikes, sizeof naive->spikes);
+  ck_assert_mem_eq(&fast, &slow, sizeof fast);
+  ck_assert_mem_eq(&fast, &quiet, sizeof fast);
+  assert_same_counts(&a, &b);
+  free(naive);
+  return fast;
+}
+
+static inline int fixture_run(Suite *suite)
+{
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
+#endif

@@ -1,0 +1,323 @@
+/* The units of the fixed-point core, each against an independent form. */
+#include "src/fx/round.h"
+#include "tests/fx_fixture.h"
+#include <math.h>
+#include <stdio.h>
+
+START_TEST(rounding_is_half_up)
+{
+  ck_assert_int_eq(fx_rshift_round(5, 0), 5);
+  ck_assert_int_eq(fx_rshift_round(5, 1), 3);
+  ck_assert_int_eq(fx_rshift_round(-5, 1), -2);
+  ck_assert_int_eq(fx_rshift_round(-6, 2), -1);
+  ck_assert_int_eq(fx_rshift_round(-7, 2), -2);
+  for (int64_t x = -5000; x <= 5000; x++)
+    for (int n = 0; n < 8; n++) ck_assert_int_eq(fx_rshift_round(x, n), naive_round(x, n));
+  ck_assert_int_eq(fx_sat(8388608, 24), 8388607);
+  ck_assert_int_eq(fx_sat(-8388609, 24), -8388608);
+  ck_assert_int_eq(fx_usat(-1, 28), 0);
+  ck_assert_int_eq(fx_usat((int64_t)1 << 28, 28), ((int64_t)1 << 28) - 1);
+}
+END_TEST
+
+/* Interpolation between entries 1/256 apart: (ln 2 / 256)^2 / 8 = 9.2e-7 of the value, plus half an LSB twice. */
+START_TEST(exp2_every_input)
+{
+  double worst = 0, relative = 0;
+  uint32_t before = 0;
+  for (int32_t y = -131072; y <= 131071; y++) {
+    const uint32_t e = fx_exp2(y);
+    ck_assert_msg(e >= before, "2^(%d / 4096) falls", y);
+    before = e;
+    if (y >= 16 * 4096) {
+      ck_assert_uint_eq(e, (1u << 28) - 1);
+      continue;
+    }
+    const double exact = exp2(y / 4096.0) * 4096, error = fabs(e - exact);
+    ck_assert_msg(error <= 0.501 + 1.0e-6 * exact, "2^(%d / 4096): %u, exact %.3f", y, e, exact);
+    worst = fmax(worst, error);
+    if (exact >= 1 << 20) relative = fmax(relative, error / exact);
+  }
+  ck_assert_uint_eq(fx_exp2(0), 4096);
+  ck_assert_uint_eq(fx_exp2(-131072), 0);
+  printf("exp2: max error %.2f LSB of U16.12 over 262144 inputs, %.2g of the value above 2^8\n", worst, relative);
+}
+END_TEST
+
+START_TEST(exp_neg_every_input)
+{
+  double worst = 0;
+  for (uint32_t tau = 0; tau <= 32u << 20; tau++) {
+    const double error = fabs(fx_exp_neg(tau) - exp(-(double)tau / 1048576) * 1048576);
+    if (error > worst) worst = error;
+  }
+  ck_assert_uint_eq(fx_exp_neg(0), 1 << 20);
+  ck_assert_uint_eq(fx_exp_neg((32u << 20) + 1), 0);
+  ck_assert_uint_eq(fx_exp_neg(UINT64_MAX), 0);
+  printf("exp(-tau): max error %.3f LSB of Q.20 over 33554433 inputs\n", worst);
+  /* Half an LSB of rounding, of the argument's rounding (2^-21 * ln 2 * 2^20) and 9.2e-7 * 2^20 of interpolation. */
+  ck_assert_msg(worst <= 0.5 + 0.35 + 0.97, "max error %.3f LSB", worst);
+}
+END_TEST
+
+START_TEST(sigmoid_every_input)
+{
+  double worst = 0;
+  for (int32_t x = -32768; x <= 32767; x++) {
+    const uint32_t s = fx_sigmoid(x);
+    const double error = fabs(s - 65536 / (1 + exp(-x / 4096.0)));
+    worst = fmax(worst, error);
+    if (x > -32768) ck_assert_uint_eq(s + fx_sigmoid(-x), 65536);
+    if (x > -32768) ck_assert_uint_ge(s, fx_sigmoid(x - 1));
+  }
+  printf("sigmoid: max error %.3f LSB of Q0.16 over 65536 inputs\n", worst);
+  /* h^2 / 8 * max |s''| * 65536 = 0.77 of interpolation, half an LSB of the table and of the product each. */
+  ck_assert_msg(worst <= 0.77 + 0.5 + 0.5, "max error %.3f LSB", worst);
+}
+END_TEST
+
+/* Corners of every argument and a random part: the step equals the equation in 64 bits, the vector form equals
+ * the step, and in hybrid and decay mode the membrane stays between v and I. */
+static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int32_t mode, bool first)
+{
+  fx_net net = {.mode = mode};
+  const naive_net naive = {.net = &net};
+  const int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
+  const int64_t u = naive_clamp(exact, -8388608, 8388607);
+  const fx_plif step = fx_plif_step(v, current, layer->k, layer->theta, mode, first);
+  ck_assert_msg(step.membrane == u, "v %d I %d k %d mode %d first %d: %d, exact %lld", v, current, layer->k, mode, first,
+                step.membrane, (long long)u);
+  ck_assert_int_eq(step.saturated, u != exact);
+  ck_assert_int_eq(step.spike, u >= layer->theta);
+  ck_assert_int_eq(step.v, u - (step.spike ? layer->theta : 0));
+  if (step.spike) ck_assert_int_ge(step.v, 0);
+  if (mode != FX_NODECAY) {
+    const int32_t old = first ? 0 : v, low = old < current ? old : current, high = old < current ? current : old;
+    ck_assert_msg(step.membrane >= low && step.membrane <= high, "v %d I %d k %d leaves its range", v, current, layer->k);
+    ck_assert(!step.saturated);
+  }
+  int32_t lane[SF_LANES], in[SF_LANES], membrane[SF_LANES];
+  uint64_t spikes[2];
+  for (int o = 0; o < SF_LANES; o++) lane[o] = v, in[o] = current;
+  const int saturated = fx_plif_layer(lane, in, SF_LANES, layer, mode, first, spikes, membrane);
+  ck_assert_int_eq(saturated, step.saturated * SF_LANES);
+  ck_assert_uint_eq(spikes[0], step.spike ? UINT64_MAX : 0);
+  ck_assert_uint_eq(spikes[1], spikes[0]);
+  for (int o = 0; o < SF_LANES; o += 37) ck_assert(lane[o] == step.v && membrane[o] == step.membrane);
+}
+
+START_TEST(plif_corners)
+{
+  static const int32_t value[] = {-8388608, -8388607, -4097, -4096, -2049, -2048, -2047, -1, 0,
+                                  1,        2047,     2048,  2049,  4095,  4096,  4097,  8388606, 8388607};
+  static const int32_t leak[] = {0, 1, 2, 2047, 2048, 2049, 4094, 4095, 4096}, theta[] = {1, 2, 4096, 8388607};
+  enum { VALUES = sizeof value / sizeof *value, LEAKS = sizeof leak / sizeof *leak };
+  for (int i = 0; i < VALUES * VALUES * LEAKS * 4 * 6; i++) {
+    const fx_layer layer = {.k = leak[i / VALUES / VALUES % LEAKS], .theta = theta[i / VALUES / VALUES / LEAKS % 4]};
+    const int rest = i / VALUES / VALUES / LEAKS / 4;
+    check_neuron(value[i % VALUES], value[i / VALUES % VALUES], &layer, rest % 3, rest / 3);
+  }
+}
+END_TEST
+
+START_TEST(plif_random)
+{
+  for (uint64_t i = 0; i < 100000; i++) {
+    const int bits = (int)fixture_pick(7, 5, i, 1, 23);
+    const int64_t limit = ((int64_t)1 << bits) - 1;
+    const fx_layer layer = {.k = (int32_t)fixture_pick(7, 0, i, 0, 4096), .theta = (int32_t)fixture_pick(7, 1, i, 1, limit)};
+    check_neuron((int32_t)fixture_pick(7, 2, i, -limit - 1, limit), (int32_t)fixture_pick(7, 3, i, -limit - 1, limit),
+                 &layer, (int32_t)fixture_pick(7, 4, i, 0, 2), i % 3 == 0);
+  }
+}
+END_TEST
+
+START_TEST(plif_lanes_are_independent)
+{
+  int32_t v[SF_LANES], in[SF_LANES], v_all[SF_LANES];
+  const fx_layer layer = {.k = 1234, .theta = 5000};
+  for (uint64_t round = 0; round < 200; round++) {
+    uint64_t spikes[2];
+    const int mode = (int)round % 3;
+    for (uint64_t o = 0; o < SF_LANES; o++) {
+      v_all[o] = v[o] = (int32_t)fixture_pick(3, round, o, -20000, 20000);
+      in[o] = (int32_t)fixture_pick(4, round, o, -20000, 20000);
+    }
+    fx_plif_layer(v_all, in, SF_LANES, &layer, mode, false, spikes, NULL);
+    for (int o = 0; o < SF_LANES; o++) {
+      const fx_plif step = fx_plif_step(v[o], in[o], layer.k, layer.theta, mode, false);
+      ck_assert_int_eq(v_all[o], step.v);
+      ck_assert_int_eq(spikes[o / 64] >> o % 64 & 1, step.spike);
+    }
+  }
+}
+END_TEST
+
+START_TEST(integrators)
+{
+  for (uint64_t i = 0; i < 200000; i++) {
+    fx_net net = {.mode = (int32_t)(i % 3)};
+    const naive_net naive = {.net = &net};
+    const int32_t k = (int32_t)(i % 7 == 0 ? 4096 * (int64_t)(i % 2) : fixture_pick(1, 0, i, 0, 4096));
+    const int64_t limit[2] = {(1 << 28) - 1, (1 << 20) - 1}, in_limit[2] = {(1 << 28) - 1, 65535};
+    for (int colour = 0; colour < 2; colour++) {
+      const uint32_t acc = (uint32_t)fixture_pick(1, 1, i, 0, limit[colour]);
+      const uint32_t in = (uint32_t)fixture_pick(1, 2, i, 0, in_limit[colour]);
+      const bool first = i % 5 == 0;
+      uint64_t saturated = 0;
+      const int64_t exact = naive_charge(&naive, acc, in, k, first ? 0 : 1);
+      const uint32_t got = (colour ? fx_integrate_colour : fx_integrate_density)(acc, in, k, net.mode, first, &saturated);
+      ck_assert_int_eq(got, naive_clamp(exact, 0, limit[colour]));
+      ck_assert_int_eq((int64_t)saturated, exact > limit[colour]);
+    }
+  }
+}
+END_TEST
+
+START_TEST(compositing_conserves)
+{
+  double worst = 0;
+  for (uint64_t ray = 0; ray < 2000; ray++) {
+    fx_pixel pixel;
+    double trans = 1;
+    const int samples = (int)fixture_pick(2, 0, ray, 1, 200), bits = (int)fixture_pick(2, 1, ray, 1, 28);
+    fx_composite_begin(&pixel);
+    for (int i = 0; i < samples; i++) {
+      const uint64_t at = ray * 256 + (uint64_t)i;
+      const fx_out out = {(uint32_t)fixture_pick(2, 2, at, 0, (1 << bits) - 1),
+                          {65536, (uint32_t)fixture_pick(2, 3, at, 0, (1 << 20) - 1), 0}};
+      const int32_t delta = (int32_t)fixture_pick(2, 4, ray, 1, 1 << 20);
+      fx_composite_add(&pixel, &out, delta, (uint64_t)i << 16);
+      trans *= exp(-ldexp(out.sigma, -12) * ldexp(delta, -24));
+      ck_assert_uint_eq(pixel.weight_sum + pixel.transmittance, 1 << 20);
+    }
+    ck_assert_uint_eq(pixel.colour[0], (uint64_t)pixel.weight_sum << 16);
+    ck_assert_uint_eq(pixel.colour[2], 0);
+    worst = fmax(worst, fabs(pixel.transmittance - ldexp(trans, 20)) / samples);
+    const int32_t white[3] = {65536, 65536, 65536};
+    fx_composite_end(&pixel, white);
+    ck_assert_uint_eq(pixel.colour[0], (uint64_t)1 << 36); /* a white surface before white stays white, exactly */
+    uint32_t rgba[4];
+    fx_pixel_rgba(&pixel, rgba);
+    ck_assert_uint_eq(rgba[0], 65535);
+  }
+  printf("compositing: max error of transmittance %.3f LSB of Q.20 per sample\n", worst);
+  ck_assert(worst <= 1.82 + 0.5 + 0.5); /* exp(-tau), the product's rounding, tau's rounding */
+}
+END_TEST
+
+/* Trilinear interpolation in real numbers; the integer form floors the position to 1/256 of a cell (moves each corner
+ * by at most 1/256 per axis, hence the sum by at most 3/256 of the entries' range of 254) and rounds the weights. */
+static double real_feature(const fx_grid *g, int level, const uint32_t *pos, int which)
+{
+  double sum = 0;
+  uint32_t base[3];
+  double frac[3];
+  for (int a = 0; a < 3; a++) {
+    const double p = ldexp(pos[a], -24) * ldexp(g->scale_q16[level], -16) + 0.5;
+    base[a] = (uint32_t)floor(p), frac[a] = p - base[a];
+  }
+  for (uint32_t corner = 0; corner < 8; corner++) {
+    const uint32_t x = base[0] + (corner & 1), y = base[1] + (corner >> 1 & 1), z = base[2] + (corner >> 2 & 1);
+    const uint64_t s = (uint64_t)g->stride[level], hash = x ^ y * 2654435761u ^ z * 805459861u;
+    const uint64_t index = s ? x + s * y + s * s * z : hash % (1u << g->log2_size[level]);
+    const double w = (corner & 1 ? frac[0] : 1 - frac[0]) * (corner & 2 ? frac[1] : 1 - frac[1]) *
+                     (corner & 4 ? frac[2] : 1 - frac[2]);
+    sum += w * g->table[(g->offset[level] + (int64_t)index) * 2 + which];
+  }
+  return sum;
+}
+
+START_TEST(grid_against_real_interpolation)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  fx_counts counts = {0};
+  for (uint64_t i = 0; i < 3000; i++) {
+    int16_t f[32];
+    uint32_t pos[3];
+    for (uint64_t a = 0; a < 3; a++) {
+      pos[a] = (uint32_t)fixture_pick(8, a, i, 0, (1 << 24) - 1);
+      if (i % 11 == a) pos[a] = i % 2 ? 0 : (1 << 24) - 1;
+    }
+    fx_grid_features(&scene.grid, pos, f, &counts);
+    for (int n = 0; n < 32; n++) {
+      const double lsb = ldexp(1, scene.grid.shift[n / 2] - 16);
+      double exact = real_feature(&scene.grid, n / 2, pos, n % 2);
+      exact = fmax(-2047 * lsb, fmin(2047 * lsb, exact));
+      ck_assert_msg(fabs(f[n] * lsb - exact) <= lsb / 2 + 254 * 3 / 256.0 + 0.02, "feature %d: %g, real %g", n, f[n] * lsb, exact);
+    }
+  }
+  ck_assert_uint_eq(counts.grid_bytes, 3000 * 16 * 8 * 2);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(grid_reproduces_constants)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  for (int value = -127; value <= 127; value += 2) {
+    int16_t f[32];
+    memset(scene.grid.table, value, (size_t)scene.grid.entries * 2);
+    for (uint64_t i = 0; i < 40; i++) {
+      uint32_t pos[3];
+      for (uint64_t a = 0; a < 3; a++) pos[a] = (uint32_t)fixture_pick(9, a, i, 0, (1 << 24) - 1);
+      fx_grid_features(&scene.grid, pos, f, NULL);
+      for (int n = 0; n < 32; n++)
+        ck_assert_int_eq(f[n], naive_clamp(naive_round(value * 65536, scene.grid.shift[n / 2]), -2047, 2047));
+    }
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(march_tests_every_point)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 6);
+  for (uint64_t i = 0; i < 300; i++) {
+    fx_ray ray = {.count = (int32_t)fixture_pick(1, 9, i, 0, 300)};
+    fx_counts counts = {0};
+    uint64_t tested = 0;
+    for (int a = 0; a < 3; a++) {
+      const int64_t from = fixture_pick(1, (uint64_t)a, i, 0, ((int64_t)1 << 31) - 1) << 9;
+      const int64_t to = fixture_pick(2, (uint64_t)a, i, 0, ((int64_t)1 << 31) - 1) << 9;
+      ray.origin[a] = from, ray.step[a] = (to - from) / 300;
+    }
+    int32_t found = fx_march_next(&scene, &ray, 0, (uint32_t[3]){0}, &counts);
+    for (int32_t n = 0; n < ray.count; n++) {
+      uint32_t p[3], at[3];
+      for (int a = 0; a < 3; a++) p[a] = (uint32_t)((ray.origin[a] + n * ray.step[a]) >> 16);
+      const uint32_t cell = ((p[2] >> 21) * 8 + (p[1] >> 21)) * 8 + (p[0] >> 21);
+      tested++;
+      if (!(scene.occupancy[cell / 8] >> cell % 8 & 1)) continue;
+      ck_assert_int_eq(found, n);
+      ck_assert_int_eq(fx_march_next(&scene, &ray, n, at, NULL), n);
+      ck_assert_mem_eq(p, at, sizeof p);
+      found = fx_march_next(&scene, &ray, n + 1, at, &counts);
+    }
+    ck_assert_int_eq(found, -1);
+    ck_assert_uint_eq(counts.march_steps, tested);
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("fx");
+  TCase *units = tcase_create("units");
+  tcase_set_timeout(units, 60);
+  tcase_add_test(units, rounding_is_half_up);
+  tcase_add_test(units, exp2_every_input);
+  tcase_add_test(units, exp_neg_every_input);
+  tcase_add_test(units, sigmoid_every_input);
+  tcase_add_test(units, plif_corners);
+  tcase_add_test(units, plif_random);
+  tcase_add_test(units, plif_lanes_are_independent);
+  tcase_add_test(units, integrators);
+  tcase_add_test(units, compositing_conserves);
+  tcase_add_test(units, grid_against_real_interpolation);
+  tcase_add_test(units, grid_reproduces_constants);
+  tcase_add_test(units, march_tests_every_point);
+  suite_add_tcase(suite, units);
+  return fixture_run(suite);
+}

@@ -1,0 +1,298 @@
+/* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
+#include "spikefield/io.h"
+#include "tests/fx_fixture.h"
+#include <dirent.h>
+#include <stdio.h>
+#include <unistd.h>
+
+static char folder[256], path[300];
+
+static void setup(void)
+{
+  const char *base = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%s/spikefield-fx-XXXXXX", base && *base ? base : "/tmp");
+  ck_assert_ptr_nonnull(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/scene.snn", folder);
+}
+
+static int files_in_folder(bool remove_them)
+{
+  int count = 0;
+  DIR *dir = opendir(folder);
+  for (struct dirent *entry; (entry = readdir(dir));) {
+    char name[600];
+    if (entry->d_name[0] == '.' && (!entry->d_name[1] || !strcmp(entry->d_name, ".."))) continue;
+    count++;
+    snprintf(name, sizeof name, "%s/%s", folder, entry->d_name);
+    if (remove_them) unlink(name);
+  }
+  closedir(dir);
+  return count;
+}
+
+static void teardown(void)
+{
+  files_in_folder(true);
+  rmdir(folder);
+}
+
+static fx_scene small_scene(uint64_t seed)
+{
+  const fixture_sizes sizes = {2, 16, 5, 9, 24, 40, 3, FX_NODECAY};
+  return fixture_scene(&sizes, seed);
+}
+
+static void save(const fx_scene *scene)
+{
+  const sf_status status = fx_scene_save(scene, path);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+}
+
+/* Fails to load, the message names the file and `place`, and nothing is left behind. */
+static void assert_refused(const char *place)
+{
+  fx_scene scene;
+  const sf_status status = fx_scene_load(&scene, path);
+  ck_assert_msg(status.code != SF_OK, "loaded in spite of: %s", place);
+  ck_assert_msg(strstr(status.message, path) && strstr(status.message, place), "'%s' does not name '%s'",
+                status.message, place);
+  ck_assert_ptr_null(scene.owner);
+}
+
+static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    const fx_layer *x = &a->net.layer[l], *y = &b->net.layer[l];
+    ck_assert(x->n_in == y->n_in && x->n_out == y->n_out && x->k == y->k && x->theta == y->theta);
+    ck_assert_mem_eq(x->w, y->w, (size_t)x->n_in * SF_LANES);
+    ck_assert(a->current_scale[l] == b->current_scale[l]);
+  }
+  ck_assert(a->net.mode == b->net.mode && a->net.steps == b->net.steps);
+  ck_assert_mem_eq(&a->net.exp_in, &b->net.exp_in, sizeof a->net.exp_in);
+  ck_assert_mem_eq(&a->net.sigmoid_in, &b->net.sigmoid_in, sizeof a->net.sigmoid_in);
+  ck_assert_mem_eq(&a->grid, &b->grid, offsetof(fx_grid, table));
+  ck_assert_mem_eq(a->grid.table, b->grid.table, (size_t)a->grid.entries * 2);
+  ck_assert_int_eq(a->occ_res, b->occ_res);
+  ck_assert_mem_eq(a->occupancy, b->occupancy, 64);
+  ck_assert(a->step_q24 == b->step_q24 && a->max_samples == b->max_samples && a->trans_stop == b->trans_stop);
+  ck_assert_mem_eq(a->background, b->background, sizeof a->background);
+  ck_assert(a->to_box_scale == b->to_box_scale && a->dir_scale == b->dir_scale && a->feature_scale == b->feature_scale);
+  for (int o = 0; o < 3; o++) ck_assert(a->to_box_offset[o] == b->to_box_offset[o]);
+}
+
+START_TEST(round_trip)
+{
+  for (uint64_t seed = 0; seed < 20; seed++) {
+    const fixture_sizes sizes = fixture_random_sizes(seed);
+    fx_scene scene = fixture_scene(&sizes, seed), again;
+    scene.to_box_scale = 1.0 / 3, scene.dir_scale = 1e-300, scene.to_box_offset[1] = -1e6 / 7;
+    scene.background[2] = 12345;
+    save(&scene);
+    const sf_status status = fx_scene_load(&again, path);
+    ck_assert_msg(status.code == SF_OK, "%s", status.message);
+    assert_equal_scenes(&scene, &again);
+    ck_assert_int_eq(files_in_folder(false), 1);
+    fx_scene_free(&scene);
+    fx_scene_free(&again);
+  }
+}
+END_TEST
+
+START_TEST(same_scene_same_bytes)
+{
+  char *first, *second;
+  size_t a, b;
+  fx_scene scene = small_scene(1);
+  save(&scene);
+  ck_assert_int_eq(sf_read_file(path, 1 << 24, &first, &a).code, SF_OK);
+  save(&scene);
+  ck_assert_int_eq(sf_read_file(path, 1 << 24, &second, &b).code, SF_OK);
+  ck_assert_uint_eq(a, b);
+  ck_assert_mem_eq(first, second, a);
+  free(first), free(second);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(cut_short_anywhere)
+{
+  char *data;
+  size_t size;
+  fx_scene scene = small_scene(2), again;
+  save(&scene);
+  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  for (size_t keep = 0; keep < size; keep += keep < 4000 ? 13 : 997) {
+    ck_assert_int_eq(sf_write_file(path, data, keep).code, SF_OK);
+    const sf_status status = fx_scene_load(&again, path);
+    ck_assert_msg(status.code != SF_OK && strstr(status.message, path), "%zu of %zu bytes load", keep, size);
+  }
+  free(data);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* Any changed byte of the data, and any changed byte of the header, is refused. */
+START_TEST(edited_anywhere)
+{
+  char *data;
+  size_t size;
+  fx_scene scene = small_scene(3), again;
+  save(&scene);
+  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  for (uint64_t i = 0; i < 1500; i++) {
+    const size_t at = i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
+    const char kept = data[at];
+    data[at] = (char)(kept ^ (1 << fixture_pick(1, 2, i, 0, 7)));
+    ck_assert_int_eq(sf_write_file(path, data, size).code, SF_OK);
+    const sf_status status = fx_scene_load(&again, path);
+    if (status.code == SF_OK) { /* only white space of the header's JSON may differ */
+      assert_equal_scenes(&scene, &again);
+      ck_assert_msg(at >= 8 && (kept == ' ' || data[at] == ' '), "byte %zu: %02x for %02x loads", at, data[at], kept);
+      fx_scene_free(&again);
+    }
+    data[at] = kept;
+  }
+  free(data);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* Rewrites one metadata string and keeps every tensor. */
+static void edit(const char *key, const char *value)
+{
+  sf_tensors set;
+  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+  cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
+  if (value) cJSON_AddStringToObject(set.metadata, key, value);
+  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
+  sf_tensors_free(&set);
+}
+
+START_TEST(metadata_is_checked)
+{
+  static const char *const wrong[][3] = {
+      {"format", "spikefield-model", "format"}, {"format", NULL, "format"},        {"version", "2", "version"},
+      {"version", NULL, "version"},             {"t_r", "0", "t_r"},               {"t_r", "9", "t_r"},
+      {"t_r", "-1", "t_r"},                     {"t_r", "3x", "t_r"},              {"t_r", "", "t_r"},
+      {"t_r", NULL, "t_r"},                     {"t_r", "99999999999999999999", "t_r"},
+      {"t_r", "2", "checksum"},                 {"checksum", NULL, "checksum"},    {"checksum", "0x0", "checksum"},
+      {"mode", "soft", "mode"},                 {"D1.k", "4097", "D1.k"},          {"C1.k", "-1", "C1.k"},
+      {"D1.theta", "0", "D1.theta"},            {"C2.theta", "8388608", "C2.theta"}, {"D2.theta", "1", "D2.theta"},
+      {"D1.n_out", "129", "D1.n_out"},          {"D1.n_out", "15", "D2.n_in"},     {"C3.n_out", "4", "C3.n_out"},
+      {"C1.n_in", "33", "C1.n_in"},             {"grid.levels", "17", "grid.levels"},
+      {"grid.levels", "1", "grid.scale_q16"},   {"exp_in.mul", "65536", "exp_in.mul"},
+      {"exp_in.shift", "32", "exp_in.shift"},   {"exp_in.bias", "131072", "exp_in.bias"},
+      {"sigmoid_in.bias", "1", "sigmoid_in.bias"}, {"occ_res", "12", "occ_res"},   {"occ_res", "512", "occ_res"},
+      {"step_q24", "0", "step_q24"},            {"max_samples", "1025", "max_samples"},
+      {"trans_stop", "1048576", "trans_stop"},  {"background[1]", "65537", "background[1]"},
+      {"dir_scale", "nan", "dir_scale"},        {"dir_scale", "0", "dir_scale"},   {"to_box_offset[2]", "inf", "to_box_offset[2]"},
+      {"to_box_scale", "one", "to_box_scale"},
+  };
+  fx_scene scene = small_scene(4);
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    save(&scene);
+    edit(wrong[i][0], wrong[i][1]);
+    assert_refused(wrong[i][2]);
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* Rewrites with one tensor's first element changed. */
+static void edit_tensor(const char *name, int64_t value)
+{
+  sf_tensors set;
+  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+  for (int i = 0; i < set.count; i++) {
+    if (strcmp(set.tensor[i].name, name)) continue;
+    memcpy(set.tensor[i].data, &value, sf_dtype_size(set.tensor[i].type));
+  }
+  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
+  sf_tensors_free(&set);
+}
+
+START_TEST(tensors_are_checked)
+{
+  static const struct {
+    const char *tensor;
+    int64_t value;
+    const char *place;
+  } wrong[] = {{"density.w1", -128, "density.w1"},    {"grid.stride", 3, "stride"},      {"grid.stride", -1, "stride"},
+               {"grid.stride", 601, "stride"},        {"grid.offset", 1, "offset"},      {"grid.shift", 32, "shift"},
+               {"grid.scale_q16", 0, "scale_q16"},    {"grid.scale_q16", 1 << 30, "stride"},
+               {"colour.w5", 1, "checksum"},          {"occupancy", 77, "checksum"},     {"grid.table", 1, "checksum"}};
+  fx_scene scene = small_scene(5);
+  scene.grid.table[0] = 0, scene.occupancy[0] = 0, scene.net.layer[FX_C3].w[0] = 0;
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    save(&scene);
+    edit_tensor(wrong[i].tensor, wrong[i].value);
+    assert_refused(wrong[i].place);
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(missing_tensor_is_named)
+{
+  static const char *const names[] = {"grid.table", "occupancy", "density.w1", "density.w2", "colour.w3", "colour.w4",
+                                      "colour.w5", "grid.offset", "grid.shift"};
+  fx_scene scene = small_scene(6);
+  for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
+    sf_tensors set;
+    save(&scene);
+    ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+    int kept = 0;
+    for (int i = 0; i < set.count; i++)
+      if (strcmp(set.tensor[i].name, names[n])) set.tensor[kept++] = set.tensor[i];
+    ck_assert_int_eq(kept, set.count - 1);
+    ck_assert_int_eq(sf_tensors_save(set.tensor, kept, set.metadata, path).code, SF_OK);
+    sf_tensors_free(&set);
+    assert_refused(names[n]);
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(lanes_beyond_the_layer_are_zero)
+{
+  fx_scene scene = small_scene(7);
+  scene.net.layer[FX_C1].w[24] = 1;
+  const sf_status status = fx_scene_check(&scene, "memory");
+  ck_assert_int_eq(status.code, SF_E_RANGE);
+  ck_assert_ptr_nonnull(strstr(status.message, "colour.w3"));
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(unwritable_and_missing)
+{
+  fx_scene scene = small_scene(8);
+  snprintf(path, sizeof path, "%s/absent/scene.snn", folder);
+  ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_IO);
+  assert_refused("absent");
+  scene.net.steps = 0;
+  snprintf(path, sizeof path, "%s/scene.snn", folder);
+  ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_RANGE);
+  ck_assert_int_eq(files_in_folder(false), 0);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("fx_file");
+  TCase *files = tcase_create("files");
+  tcase_set_timeout(files, 60);
+  tcase_add_checked_fixture(files, setup, teardown);
+  tcase_add_test(files, round_trip);
+  tcase_add_test(files, same_scene_same_bytes);
+  tcase_add_test(files, cut_short_anywhere);
+  tcase_add_test(files, edited_anywhere);
+  tcase_add_test(files, metadata_is_checked);
+  tcase_add_test(files, tensors_are_checked);
+  tcase_add_test(files, missing_tensor_is_named);
+  tcase_add_test(files, lanes_beyond_the_layer_are_zero);
+  tcase_add_test(files, unwritable_and_missing);
+  suite_add_tcase(suite, files);
+  return fixture_run(suite);
+}

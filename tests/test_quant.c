@@ -1,0 +1,482 @@
+/* Quantiser: fixed against float per block, refusals, determinism; rays against the float lattice. */
+#include "spikefield/quant.h"
+#include "spikefield/rng.h"
+#include "src/quant/internal.h"
+#include <check.h>
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static float normal(uint64_t stream, uint64_t i)
+{
+  float sum = 0;
+  for (uint64_t n = 0; n < 12; n++) sum += sf_random_float(4, stream, i * 12 + n);
+  return sum - 6;
+}
+
+static void fill(sf_model *m, sf_param_id id, float scale)
+{
+  float *value = sf_model_param(m, id);
+  for (size_t i = 0; i < m->param[id].size; i++) value[i] = scale * normal((uint64_t)id, i);
+}
+
+/* Currents of the size of theta, finer levels with smaller entries, as training leaves them. */
+static sf_model make_model(int hidden, int levels, int mode)
+{
+  sf_config config = sf_config_default();
+  sf_model m;
+  config.hidden = hidden, config.levels = levels, config.mode = mode;
+  config.steps = 4, config.log2_hash = 12, config.finest_res = 256, config.occ_res = 16, config.lattice = 256;
+  const sf_status status = sf_model_create(&m, &config);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  fill(&m, SF_P_GRID, 1);
+  for (int l = 0; l < levels; l++)
+    for (size_t i = 2 * m.level[l].offset; i < 2 * (m.level[l].offset + m.level[l].entries); i++)
+      sf_model_param(&m, SF_P_GRID)[i] *= 0.8f / (float)(1 + l);
+  fill(&m, SF_P_W1, 0.6f);
+  fill(&m, SF_P_W2, 0.25f);
+  fill(&m, SF_P_W3, 0.25f);
+  fill(&m, SF_P_W4, 0.15f);
+  fill(&m, SF_P_W5, 0.3f);
+  fill(&m, SF_P_LEAK, 0.5f);
+  m.t_r = 3;
+  m.t_star = 3.2f;
+  for (size_t i = 0; i < 512; i++) m.occupancy[i] = (uint8_t)sf_random_u64(1, 2, i);
+  return m;
+}
+
+static const sf_quant_options plain = {.background = {1, 1, 1}, .seed = 1};
+
+static void quantise(const sf_model *m, fx_scene *scene, sf_quant_report *report)
+{
+  const sf_status status = sf_quantise_report(scene, m, "model", &plain, report);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+}
+
+static void assert_refused(const sf_model *m, const sf_quant_options *options, sf_code code, const char *place)
+{
+  fx_scene scene;
+  const sf_status status = sf_quantise(&scene, m, "dir/model.safetensors", options);
+  ck_assert_msg(status.code == code, "code %d: '%s' where '%s' should be refused", status.code, status.message, place);
+  ck_assert_msg(strstr(status.message, "dir/model.safetensors") && strstr(status.message, place),
+                "'%s' does not name '%s'", status.message, place);
+  ck_assert_ptr_null(scene.owner);
+}
+
+static void draw(uint64_t sample, uint32_t pos[3], float x[3], float sh[16])
+{
+  float d[3], length = 0;
+  for (uint64_t a = 0; a < 3; a++) {
+    pos[a] = (uint32_t)sf_random_below(99, a, sample, 1 << 24);
+    x[a] = (float)pos[a] * 0x1p-24f;
+    d[a] = normal(50 + a, sample);
+    length += d[a] * d[a];
+  }
+  for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
+  sf_sh4(d, sh);
+}
+
+/* A position rounded down to 1/256 of a cell moves the value by at most 3/256 of the largest difference of two entries;
+ * then half an LSB of an entry and of the feature. */
+START_TEST(features_against_float)
+{
+  sf_model m = make_model(128, 16, SF_HYBRID);
+  fx_scene scene;
+  sf_quant_report report;
+  quantise(&m, &scene, &report);
+  for (uint64_t sample = 0; sample < 2000; sample++) {
+    uint32_t pos[3];
+    float x[3], sh[16], f[32];
+    int16_t q[32];
+    draw(sample, pos, x, sh);
+    sf_grid_features(&m, x, f);
+    fx_grid_features(&scene.grid, pos, q, NULL);
+    for (int i = 0; i < 32; i++) {
+      const double entry_lsb = scene.feature_scale * ldexp(1, 16 - scene.grid.shift[i / 2]);
+      const double range = 2 * 6 * 0.8 / (1 + i / 2), bound = range * 3 / 256 + (entry_lsb + scene.feature_scale) * 0.51;
+      ck_assert_msg(fabs(f[i] - q[i] * scene.feature_scale) <= bound + 1e-4, "feature %d: %g, float %g, bound %g", i,
+                    q[i] * scene.feature_scale, (double)f[i], bound);
+    }
+  }
+  printf("features: relative RMS error %.3f %%, LSB %g\n", 100 * report.feature_error, report.feature_scale);
+  ck_assert(report.feature_error < 0.02);
+  fx_scene_free(&scene);
+  sf_model_free(&m);
+}
+END_TEST
+
+typedef struct tally {
+  double current_error[SF_LAYERS], current_energy[SF_LAYERS], colour_error, log_sigma_error;
+  int n;
+} tally;
+
+static void add_currents(tally *sum, const fx_scene *scene, const fx_trace *fixed, const sf_net_trace *real, int t)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int o = 0; o < scene->net.layer[l].n_out; o++) {
+      const double exact = real->current[l][t][o], d = fixed->current[l][t][o] * scene->current_scale[l] - exact;
+      sum->current_error[l] += d * d, sum->current_energy[l] += exact * exact;
+    }
+}
+
+static void add_sample(tally *sum, const fx_scene *scene, const sf_model *m, uint64_t sample, fx_trace *fixed,
+                       sf_net_trace *real)
+{
+  uint32_t pos[3];
+  float x[3], sh[16], f[32], sigma[SF_T_MAX], colour[SF_T_MAX * 3];
+  int16_t q[32], dir[16];
+  int32_t base[SF_LANES];
+  fx_out out;
+  draw(sample, pos, x, sh);
+  sf_grid_features(m, x, f);
+  sf_net_sample(m, f, sh, scene->net.steps, sigma, colour, real);
+  fx_grid_features(&scene->grid, pos, q, NULL);
+  for (int i = 0; i < 16; i++) dir[i] = (int16_t)nearbyint(sh[i] / scene->dir_scale);
+  fx_net_direction(&scene->net, dir, base, NULL);
+  fx_net_sample(&scene->net, q, base, &out, fixed, NULL);
+  const int last = scene->net.steps - 1;
+  for (int t = 0; t <= last; t++) add_currents(sum, scene, fixed, real, t);
+  for (int o = 0; o < 3; o++) sum->colour_error += pow(sf_fx_colour_value(out.colour[o]) - colour[last * 3 + o], 2);
+  sum->log_sigma_error += pow(log(fmax(sf_fx_sigma_value(out.sigma), 1e-6) / sigma[last]), 2);
+  sum->n++;
+}
+
+/* Errors that spike flips add on the way are part of what is measured: each bound is about twice the value
+ * printed, which is that of untrained weights; the report's own errors exclude flips. */
+static void check_model(int hidden, int levels, int mode)
+{
+  static const double bound[SF_LAYERS] = {0.03, 0.15, 0.15, 0.4, 0.4};
+  sf_model m = make_model(hidden, levels, mode);
+  fx_scene scene;
+  sf_quant_report report;
+  tally sum = {0};
+  fx_trace *fixed = malloc(sizeof *fixed);
+  sf_net_trace *real = malloc(sizeof *real);
+  quantise(&m, &scene, &report);
+  for (uint64_t sample = 0; sample < 300; sample++) add_sample(&sum, &scene, &m, sample, fixed, real);
+  printf("hidden %d levels %d mode %d: current error (its report)", hidden, levels, mode);
+  for (int l = 0; l < SF_LAYERS; l++)
+    printf(" %.2f %% (%.2f)", 100 * sqrt(sum.current_error[l] / sum.current_energy[l]), 100 * report.layer[l].error);
+  printf("; colour RMS %.4f, log sigma RMS %.3f\n", sqrt(sum.colour_error / 3 / sum.n), sqrt(sum.log_sigma_error / sum.n));
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert(sqrt(sum.current_error[l] / sum.current_energy[l]) < bound[l]);
+    ck_assert(report.layer[l].error < 0.03);
+  }
+  ck_assert(sqrt(sum.colour_error / 3 / sum.n) < 0.1);
+  ck_assert(sqrt(sum.log_sigma_error / sum.n) < 0.4);
+  free(fixed), free(real);
+  fx_scene_free(&scene);
+  sf_model_free(&m);
+}
+
+START_TEST(nets_against_float)
+{
+  check_model(128, 16, SF_HYBRID);
+  check_model(128, 16, SF_NODECAY);
+  check_model(64, 8, SF_DECAY);
+  check_model(16, 1, SF_HYBRID);
+}
+END_TEST
+
+/* The fit keeps what it knows to be true of a solvable case: weights that are multiples of a unit come back. */
+START_TEST(fit_recovers_exact_weights)
+{
+  enum { ROWS = 2000, IN = 12, OUT = 5 };
+  int16_t *x = malloc(ROWS * IN * sizeof *x);
+  float *target = calloc(ROWS * OUT, sizeof *target), w[OUT * IN];
+  double lsb[IN];
+  int8_t q[IN * SF_LANES] = {0};
+  for (int i = 0; i < IN; i++) lsb[i] = i < 6 ? 0.25 : 0.5;
+  for (int i = 0; i < OUT * IN; i++) w[i] = (float)(0.125 * (int)(sf_random_below(1, 1, (uint64_t)i, 255) - 127) / lsb[i % IN]);
+  w[0] = (float)(0.125 * 127 / lsb[0]);
+  for (int r = 0; r < ROWS; r++)
+    for (int i = 0; i < IN; i++) {
+      x[r * IN + i] = (int16_t)(sf_random_below(1, 2, (uint64_t)(r * IN + i), 2001) - 1000);
+      for (int o = 0; o < OUT; o++) target[r * OUT + o] += w[o * IN + i] * (float)(x[r * IN + i] * lsb[i]);
+    }
+  const sf_fit_data data = {ROWS, IN, OUT, x, target};
+  const sf_fit_weights weights = {w, IN, lsb, 1e-9};
+  sf_quant_layer result;
+  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &result).code, SF_OK);
+  ck_assert_double_eq_tol(result.unit, 0.125, 1e-9);
+  ck_assert(result.error < 1e-6 && result.clipped == 0);
+  for (int i = 0; i < IN; i++)
+    for (int o = 0; o < OUT; o++) ck_assert_int_eq(q[i * SF_LANES + o], (int)lround(w[o * IN + i] * lsb[i] / 0.125));
+  free(x), free(target);
+}
+END_TEST
+
+/* Spikes of a real layer are correlated; letting rounding errors cancel must pay on samples outside the fit. */
+START_TEST(refinement_lowers_the_held_out_error)
+{
+  sf_model m = make_model(128, 16, SF_HYBRID);
+  sf_calibration c;
+  ck_assert_int_eq(sf_calibrate(&c, &m, 3, 5).code, SF_OK);
+  const int rows = c.samples * 3;
+  int16_t *x = malloc((size_t)rows * 128 * sizeof *x);
+  int8_t q[128 * SF_LANES];
+  double ones[SF_LANES];
+  for (int i = 0; i < SF_LANES; i++) ones[i] = 1;
+  for (int i = 0; i < rows * 128; i++) x[i] = c.spikes[FX_C1][i];
+  const sf_fit_data data = {rows, 128, 128, x, c.target[FX_C2]};
+  const sf_fit_weights weights = {sf_model_param(&m, SF_P_W4), 128, ones, 1e-9};
+  sf_quant_layer rounded, refined;
+  ck_assert_int_eq(sf_fit_layer(&data, &weights, false, q, &rounded).code, SF_OK);
+  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &refined).code, SF_OK);
+  printf("C2 held-out error: rounded %.3f %%, refined %.3f %%\n", 100 * rounded.error, 100 * refined.error);
+  ck_assert(refined.error < rounded.error);
+  free(x);
+  sf_calibration_free(&c);
+  sf_model_free(&m);
+}
+END_TEST
+
+START_TEST(same_seed_same_bits_any_threads)
+{
+  sf_model m = make_model(64, 8, SF_HYBRID);
+  fx_scene a, b;
+  sf_quant_report report;
+  omp_set_num_threads(1);
+  quantise(&m, &a, &report);
+  omp_set_num_threads(3);
+  quantise(&m, &b, &report);
+  ck_assert_mem_eq(a.grid.table, b.grid.table, (size_t)a.grid.entries * 2);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
+    ck_assert(a.current_scale[l] == b.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
+  }
+  fx_scene_free(&a), fx_scene_free(&b);
+  sf_model_free(&m);
+}
+END_TEST
+
+START_TEST(refuses_what_it_cannot_represent)
+{
+  static const float bad[] = {NAN, INFINITY, -INFINITY};
+  sf_model m = make_model(32, 4, SF_HYBRID);
+  for (int id = 0; id < SF_P_COUNT; id++)
+    for (int i = 0; i < 3; i++) {
+      float *value = sf_model_param(&m, id) + m.param[id].size - 1, kept = *value;
+      *value = bad[i];
+      assert_refused(&m, &plain, SF_E_RANGE, m.param[id].name);
+      *value = kept;
+    }
+  m.config.net = SF_NET_ANN;
+  assert_refused(&m, &plain, SF_E_UNSUPPORTED, "ANN");
+  m.config.net = SF_NET_SNN;
+  m.config.hidden = 144;
+  assert_refused(&m, &plain, SF_E_UNSUPPORTED, "density.w1");
+  m.config.hidden = 32;
+  for (int i = 0; i < 3; i++) {
+    static const char *const tensor[] = {"density.w1", "colour.w3", "colour.w4"};
+    m.config.theta[i] = 1e-6f;
+    assert_refused(&m, &plain, SF_E_UNSUPPORTED, tensor[i]);
+    m.config.theta[i] = NAN;
+    assert_refused(&m, &plain, SF_E_RANGE, "theta");
+    m.config.theta[i] = 1;
+  }
+  m.t_r = 0;
+  assert_refused(&m, &plain, SF_E_RANGE, "t_r");
+  m.t_r = 5;
+  assert_refused(&m, &plain, SF_E_RANGE, "t_r");
+  m.t_r = 3;
+  assert_refused(&m, &(sf_quant_options){.steps = 5}, SF_E_RANGE, "5 steps");
+  assert_refused(&m, &(sf_quant_options){.background = {0, NAN, 0}}, SF_E_RANGE, "background[1]");
+  sf_model_free(&m);
+}
+END_TEST
+
+START_TEST(steps_and_leaks)
+{
+  sf_model m = make_model(32, 4, SF_DECAY);
+  fx_scene scene;
+  float *leak = sf_model_param(&m, SF_P_LEAK);
+  leak[0] = 0, leak[1] = 100, leak[2] = -100, leak[3] = 1, leak[4] = -1;
+  for (int steps = 0; steps <= 4; steps++) {
+    ck_assert_int_eq(sf_quantise(&scene, &m, "model", &(sf_quant_options){.steps = steps}).code, SF_OK);
+    ck_assert_int_eq(scene.net.steps, steps ? steps : 3);
+    ck_assert_int_eq(scene.net.mode, FX_DECAY);
+    static const int32_t k[SF_LAYERS] = {2048, 4096, 0, 2994, 1102};
+    for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(scene.net.layer[l].k, k[l]);
+    ck_assert_int_eq(scene.step_q24, lround(sqrt(3.0) / 256 * 16777216));
+    fx_scene_free(&scene);
+  }
+  sf_model_free(&m);
+}
+END_TEST
+
+/* Models at the edge of sense still give a scene that passes its check. */
+START_TEST(extreme_models)
+{
+  static const float scales[] = {0, 1e-42f, 1e-20f, 1e-4f, 1};
+  for (int i = 0; i < 5; i++)
+    for (int part = 0; part < SF_P_LEAK; part++) {
+      sf_model m = make_model(16, 3, SF_HYBRID);
+      fx_scene scene;
+      float *value = sf_model_param(&m, part);
+      if (scales[i] != 1)
+        for (size_t n = 0; n < m.param[part].size; n++) value[n] *= scales[i];
+      if (scales[i] == 1) m.config.theta[part % 3] = 1e6f, memset(m.occupancy, 0, 512);
+      m.config.scale = i % 2 ? 1e-6f : 1e6f;
+      const sf_status status = sf_quantise(&scene, &m, "model", &plain);
+      ck_assert_msg(status.code == SF_OK, "part %d scale %g: %s", part, (double)scales[i], status.message);
+      fx_scene_free(&scene);
+      sf_model_free(&m);
+    }
+}
+END_TEST
+
+/* ---- rays ---- */
+
+static fx_scene box_scene(int lattice)
+{
+  fx_scene s = {.to_box_scale = 0.5, .to_box_offset = {0.5, 0.5, 0.5}, .dir_scale = 0x1p-10};
+  s.step_q24 = (int32_t)lround(sqrt(3.0) / lattice * 16777216);
+  return s;
+}
+
+static fx_ray make_ray(const fx_scene *scene, const float o[3], const float d[3])
+{
+  fx_ray ray;
+  const sf_status status = sf_fx_ray_make(scene, o, d, &ray);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  for (int32_t n = 0; n < ray.count; n++)
+    for (int a = 0; a < 3; a++) {
+      const int64_t p = (ray.origin[a] + n * ray.step[a]) >> 16;
+      ck_assert_msg(p >= 0 && p < 1 << 24, "point %d of %d: axis %d at %lld", n, ray.count, a, (long long)p);
+    }
+  return ray;
+}
+
+/* Same count (but for a box face within float rounding) and the same points as the float lattice. The step's
+ * rounding to Q0.24 drifts by up to 2^-25 per step; float itself is good to some 1e-6 here. */
+START_TEST(rays_follow_the_float_lattice)
+{
+  int hits = 0, differ = 0;
+  for (uint64_t i = 0; i < 20000; i++) {
+    static const int lattices[] = {16, 100, 256, 1024};
+    sf_config config = sf_config_default();
+    config.lattice = lattices[i % 4];
+    const fx_scene scene = box_scene(config.lattice);
+    float o[3], d[3], length = 0;
+    for (uint64_t a = 0; a < 3; a++) o[a] = normal(60 + a, i) * (i % 3 ? 1.5f : 0.4f), d[a] = normal(70 + a, i) - (i % 2 ? o[a] : 0);
+    for (int a = 0; a < 3; a++) length += d[a] * d[a];
+    for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
+    const fx_ray ray = make_ray(&scene, o, d);
+    const sf_lattice real = sf_ray_lattice(&config, o, d);
+    differ += ray.count != real.count;
+    ck_assert_int_le(abs(ray.count - real.count), 1);
+    hits += real.count > 0;
+    if (ray.count == 0 || real.count == 0) continue;
+    ck_assert_double_eq_tol(ray.first_q16 / 65536.0, real.first / real.step, 2e-5 * (1 + real.first / real.step));
+    for (int32_t n = 0; n < ray.count; n += 7)
+      for (int a = 0; a < 3; a++) {
+        const double p = ldexp((double)(ray.origin[a] + n * ray.step[a]), -40);
+        const double exact = (o[a] + (double)d[a] * (real.first + (double)n * real.step)) / 2 + 0.5;
+        ck_assert_double_eq_tol(p, exact, 0x1p-25 * n + 4e-6);
+      }
+  }
+  ck_assert_int_gt(hits, 5000);
+  ck_assert_int_le(differ, 20);
+}
+END_TEST
+
+START_TEST(rays_parallel_to_an_axis)
+{
+  const fx_scene scene = box_scene(256);
+  for (int axis = 0; axis < 3; axis++)
+    for (int sign = -1; sign <= 1; sign += 2) {
+      float o[3] = {0.25f, -0.5f, 0.125f}, d[3] = {0};
+      o[axis] = (float)(-3 * sign), d[axis] = (float)sign;
+      const fx_ray ray = make_ray(&scene, o, d);
+      ck_assert_int_eq(ray.count, 147); /* floor(2 / (2 sqrt(3) / 256)) */
+      for (int a = 0; a < 3; a++)
+        if (a != axis) ck_assert(ray.step[a] == 0 && ray.origin[a] == llrint(ldexp(o[a] / 2 + 0.5, 40)));
+      o[(axis + 1) % 3] = 1; /* in the plane of a face */
+      ck_assert_int_eq(make_ray(&scene, o, d).count, 0);
+      o[(axis + 1) % 3] = 1.5f;
+      ck_assert_int_eq(make_ray(&scene, o, d).count, 0);
+    }
+}
+END_TEST
+
+START_TEST(rays_through_edges_and_corners)
+{
+  const fx_scene scene = box_scene(1024);
+  for (int corner = 0; corner < 8; corner++) {
+    const float c[3] = {corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1};
+    const float out[3] = {3 * c[0], 3 * c[1], 3 * c[2]}, in[3] = {-c[0], -c[1], -c[2]};
+    ck_assert_int_ge(make_ray(&scene, out, in).count, 1023); /* the whole diagonal */
+    const float edge[3] = {3 * c[0], 3 * c[1], 0}, along[3] = {-c[0], -c[1], 0};
+    ck_assert_int_gt(make_ray(&scene, edge, along).count, 800);
+    const float beside[3] = {2 * c[0], 0, 0}, touch[3] = {-c[0], c[1], 0}; /* touches one edge only */
+    ck_assert_int_le(make_ray(&scene, beside, touch).count, 1);
+    ck_assert_int_eq(make_ray(&scene, out, c).count, 0); /* looks away */
+  }
+}
+END_TEST
+
+START_TEST(rays_from_inside_start_at_the_near_plane)
+{
+  const fx_scene scene = box_scene(1024);
+  const float o[3] = {0}, d[3] = {0, 0, 1};
+  const fx_ray ray = make_ray(&scene, o, d);
+  const double step = 2 * sqrt(3.0) / 1024;
+  ck_assert_int_eq(ray.count, (int)(0.8 / step));
+  ck_assert_double_eq_tol(ldexp((double)ray.origin[2], -40), 0.5 + (0.2 + step / 2) / 2, 1e-6);
+  const float near_face[3] = {0, 0, 0.9f};
+  ck_assert_int_eq(make_ray(&scene, near_face, d).count, 0);
+}
+END_TEST
+
+START_TEST(rays_far_away_and_refused)
+{
+  const fx_scene scene = box_scene(1024);
+  fx_ray ray;
+  for (int e = 0; e < 38; e++) {
+    const float o[3] = {powf(10, (float)e), 0, 0}, d[3] = {-1, 0, 0};
+    const fx_ray far = make_ray(&scene, o, d);
+    if (e < 5) ck_assert_int_ge(far.count, 500);
+    ck_assert_int_ge(far.first_q16, 0);
+  }
+  const float bad[] = {NAN, INFINITY, -INFINITY};
+  for (int i = 0; i < 3; i++)
+    for (int a = 0; a < 3; a++) {
+      float o[3] = {0, 0, 3}, d[3] = {0, 0, -1};
+      o[a] = bad[i];
+      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_E_RANGE);
+      o[a] = 0, d[a] = bad[i];
+      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_E_RANGE);
+    }
+  const float o[3] = {0}, zero[3] = {0};
+  ck_assert_int_eq(sf_fx_ray_make(&scene, o, zero, &ray).code, SF_E_RANGE);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("quant");
+  TCase *cases = tcase_create("quant");
+  tcase_set_timeout(cases, 120);
+  tcase_add_test(cases, features_against_float);
+  tcase_add_test(cases, nets_against_float);
+  tcase_add_test(cases, fit_recovers_exact_weights);
+  tcase_add_test(cases, refinement_lowers_the_held_out_error);
+  tcase_add_test(cases, same_seed_same_bits_any_threads);
+  tcase_add_test(cases, refuses_what_it_cannot_represent);
+  tcase_add_test(cases, steps_and_leaks);
+  tcase_add_test(cases, extreme_models);
+  tcase_add_test(cases, rays_follow_the_float_lattice);
+  tcase_add_test(cases, rays_parallel_to_an_axis);
+  tcase_add_test(cases, rays_through_edges_and_corners);
+  tcase_add_test(cases, rays_from_inside_start_at_the_near_plane);
+  tcase_add_test(cases, rays_far_away_and_refused);
+  suite_add_tcase(suite, cases);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
