@@ -4,6 +4,8 @@ ifeq ($(filter -j%,$(MAKEFLAGS)),)
 MAKEFLAGS += -j$(shell nproc)
 endif
 .DEFAULT_GOAL := all
+.SECONDARY:
+.DELETE_ON_ERROR:
 SHELL := /bin/bash
 
 B ?= build
@@ -11,51 +13,113 @@ CC ?= gcc
 CXX ?= g++
 OPT ?= -O3
 SAN ?=
+SCENES ?= ../shared/data
 PKGS := OpenEXR libcjson libpng libjpeg
+PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
+LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
 CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
-PKG_CFLAGS = $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
-LIBS = $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 Q := $(if $(V),,@)
+say = $(if $V,,@echo "  $1")
 
-LIB_SRC := $(wildcard src/*/*.c)
-LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o)
 TOOLS := $(patsubst tools/%.c,%,$(wildcard tools/*.c))
-# Programs that drive the Verilated accelerator; the others link the library alone.
-DUT_TOOLS := sf_cosim sim_render energy_audit
 TESTS := $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
+DUT_TOOLS := sf_cosim sim_render energy_audit
+DUT_TESTS := test_rtl
 
-all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin
+all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
-$B/obj/%.o: %.c
-	@mkdir -p $(@D)
-	$(if $Q,@echo "  CC    $<")
-	$Q$(CC) $(CFLAGS_ALL) $(EXTRA_CFLAGS) -MMD -MP -c $< -o $@
-
-# The kernels are compiled once per instruction set and chosen at run time; the portable one is the oracle.
+# Library. Files named *_isa.c are compiled once per instruction set and chosen at run time; the portable
+# build is the oracle of the others.
+LIB_SRC := $(filter-out %_isa.c,$(wildcard src/*/*.c))
 ISA_SRC := $(wildcard src/*/*_isa.c)
-LIB_OBJ := $(filter-out $(ISA_SRC:%.c=$B/obj/%.o),$(LIB_OBJ))
 ISAS := portable $(if $(filter x86_64,$(shell uname -m)),avx2 avx512)
 isa_portable :=
 isa_avx2 := -mavx2 -mfma -ffp-contract=fast
 isa_avx512 := -march=x86-64-v4 -mprefer-vector-width=512 -ffp-contract=fast
-LIB_OBJ += $(foreach i,$(ISAS),$(ISA_SRC:%.c=$B/obj/%.$i.o))
+LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS),$(ISA_SRC:%.c=$B/obj/%.$i.o))
+
+$B/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(call say,CC    $<)
+	$Q$(CC) $(CFLAGS_ALL) -MMD -MP -c $< -o $@
+
 define isa_rule
 $B/obj/%_isa.$1.o: %_isa.c
 	@mkdir -p $$(@D)
-	$$(if $$Q,@echo "  CC    $$< ($1)")
+	$$(call say,CC    $$< ($1))
 	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
 endef
 $(foreach i,$(ISAS),$(eval $(call isa_rule,$i)))
 
 $B/libspikefield.a: $(LIB_OBJ)
-	$(if $Q,@echo "  AR    $@")
+	$(call say,AR    $@)
 	$Qrm -f $@ && $(AR) rcs $@ $^
+
+# Generated RTL, the Verilated accelerator ($(DUT_LIBS)), lint and firmware.
+include sim/sim.mk
+
+# Programs. Those of DUT_TOOLS drive the Verilated accelerator; the others link the library alone.
+$(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 
 $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	@mkdir -p $(@D)
-	$(if $Q,@echo "  LD    $@")
-	$Q$(CC) $(OPT) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
 
-.SECONDARY:
+# Tests
+CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
+$(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
+
+$B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)
+
+test: $(TESTS:%=$B/tests/%) all ## the C tests alone
+	@tests/run.sh $B $(TESTS)
+
+check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults ## every test, lint, co-simulation, planted faults, generated files
+	@tests/run.sh $B $(TESTS) cli chain cosim_faults safetensors
+
+asan: ## the C tests under address and undefined-behaviour sanitizers
+	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
+
+ASAN_TESTS := $(filter-out $(DUT_TESTS),$(TESTS))
+asan-run: $(ASAN_TESTS:%=$B/tests/%)
+	@ASAN_OPTIONS=detect_leaks=0 tests/run.sh $B $(ASAN_TESTS)
+
+cppcheck: ## static analysis of the C code
+	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
+	  --suppress=missingInclude -Iinclude -Isrc src tools firmware
+
+# Runs of the whole chain
+demo: all ## make a scene, train, export, render, co-simulate, audit: build/demo (under 4 minutes)
+	@tools/demo.sh $B
+
+lego: all ## the same chain on SCENES/lego with a training budget of 10 minutes: build/lego
+	@tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 10 --rays 400
+
+bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
+	@$B/tests/bench $B/bench.json
+
+deps: ## install what is missing with apt (Debian, Ubuntu); prints what it does
+	@tools/deps.sh
+
+format: ## clang-format every C file
+	clang-format -i $$(git ls-files '*.c' '*.h')
+
+clean: ## remove build/
+	rm -rf $B
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
+
+.PHONY: all test check asan asan-run cppcheck demo lego bench deps format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)

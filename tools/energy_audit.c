@@ -5,14 +5,13 @@
 #include "spikefield/io.h"
 #include "spikefield/rng.h"
 #include <inttypes.h>
-#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
-#include <string.h>
 
 typedef struct options {
   int view, views, downscale, threads, rtl_rays, stall;
   uint64_t rays, seed;
+  double scale;
   const char *split, *csv, *plusarg, *scene, *data;
   bool json, published, quiet;
 } options;
@@ -25,28 +24,16 @@ typedef struct place {
   int view, x, y;
 } place;
 
-/* The same rays, counted by the core (a), the accelerator (b) and from the spike bitmaps (c). */
-typedef struct subset {
-  uint64_t *ray; /* indices, ascending */
-  int rays;
-  fx_counts core, rtl, recount;
-  uint64_t cycles, busy, stalls;
-  sf_status agreement;
-} subset;
-
 typedef struct audit {
   options opt;
   fx_scene scene;
   sf_dataset data;
   uint64_t pixels; /* of one view */
-  uint64_t rays;
   char hash[65];
-  sf_measure measure;
-  sf_status recount; /* of all rays */
-  subset subset;
-  sf_ledger ledger;
+  uint64_t *subset; /* indices of the rays for the accelerator */
+  sf_audit_report report;
   sf_progress progress;
-  double start, seconds;
+  double start;
 } audit;
 
 /* ---- rays ---- */
@@ -78,8 +65,8 @@ static bool tick(void *user, uint64_t done)
   audit *a = user;
   double elapsed = sf_seconds() - a->start;
   if (sf_progress_due(&a->progress) && done > 0)
-    sf_progress_show(&a->progress, "core: %" PRIu64 " of %" PRIu64 " rays, ETA %.0f s", done, a->rays,
-                     elapsed * (double)(a->rays - done) / (double)done);
+    sf_progress_show(&a->progress, "core: %" PRIu64 " of %" PRIu64 " rays, ETA %.0f s", done, a->report.rays,
+                     elapsed * (double)(a->report.rays - done) / (double)done);
   return !sf_cli_interrupted();
 }
 
@@ -90,7 +77,7 @@ static sf_status load(audit *a)
   SF_TRY(sf_sha256_file(o->scene, a->hash));
   /* Random rays come from every view unless one is named; whole views are many rays, so one is the default. */
   if (o->views == 0 && o->view < 0 && o->rays == 0) o->views = 1;
-  sf_dataset_options how = {.downscale = o->downscale, .limit = o->view >= 0 ? o->view + 1 : o->views};
+  sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .limit = o->view >= 0 ? o->view + 1 : o->views};
   SF_TRY(sf_dataset_load(&a->data, o->data, o->split, &how));
   if (o->view >= a->data.count || o->views > a->data.count)
     return sf_fail(SF_E_USAGE, "%s %d is out of range: %s has %d %s views", o->view >= 0 ? "--view" : "--views",
@@ -101,27 +88,28 @@ static sf_status load(audit *a)
       return sf_fail(SF_E_FORMAT, "%s: view %s differs in size from view %s", o->data, a->data.view[i].name,
                      a->data.view[0].name);
   a->pixels = (uint64_t)first->width * (uint64_t)first->height;
-  a->rays = o->rays ? o->rays : a->pixels * (uint64_t)(o->view >= 0 ? 1 : a->data.count);
+  a->report.rays = o->rays ? o->rays : a->pixels * (uint64_t)(o->view >= 0 ? 1 : a->data.count);
+  sf_audit_report *r = &a->report;
+  r->scene = o->scene, r->data = o->data, r->split = o->split, r->sha256 = a->hash, r->net = &a->scene.net;
+  r->seed = o->seed, r->random_rays = o->rays > 0, r->three.wanted = o->rtl_rays;
+  r->views = (double)r->rays / (double)a->pixels;
   return sf_ok();
 }
-
-/* How many whole views the rays amount to. */
-static double view_count(const audit *a) { return (double)a->rays / (double)a->pixels; }
 
 /* ---- the subset for the accelerator ---- */
 
 /* The rays with samples whose random keys are smallest: seeded, without repetition, whatever the threads. */
 static sf_status choose_subset(audit *a)
 {
-  int limit = a->opt.rtl_rays, n = 0;
+  int limit = a->report.three.wanted, n = 0;
   uint64_t *key = calloc((size_t)limit + 1, sizeof *key), *ray = calloc((size_t)limit + 1, sizeof *ray);
-  a->subset.ray = ray;
+  a->subset = ray;
   if (!key || !ray) {
     free(key);
     return sf_fail(SF_E_MEMORY, "no memory for %d rays", limit);
   }
-  for (uint64_t i = 0; i < a->rays && limit > 0; i++) {
-    if (!(a->measure.hit[i / 8] >> i % 8 & 1)) continue;
+  for (uint64_t i = 0; i < a->report.rays && limit > 0; i++) {
+    if (!(a->report.measure.hit[i / 8] >> i % 8 & 1)) continue;
     uint64_t k = sf_random_u64(a->opt.seed, STREAM_SUBSET, i);
     if (n == limit && k >= key[n - 1]) continue;
     int at = n < limit ? n++ : n - 1;
@@ -129,7 +117,7 @@ static sf_status choose_subset(audit *a)
     key[at] = k, ray[at] = i;
   }
   free(key);
-  a->subset.rays = n;
+  a->report.three.rays = n;
   return sf_ok();
 }
 
@@ -217,19 +205,19 @@ static sf_status find_counter_sample(audit *a, rtl_eval *e, uint64_t index, sf_s
 
 static sf_status rtl_all(audit *a, rtl_eval *e)
 {
-  subset *s = &a->subset;
+  sf_three_counts *s = &a->report.three;
   SF_TRY(sf_dut_clear_counts(e->dut));
   a->start = sf_seconds();
   for (int i = 0; i < s->rays; i++) {
     if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "stopped after %d of %d rays in the accelerator", i, s->rays);
-    sf_status status = rtl_ray(a, e, s->ray[i]);
-    if (status.code == SF_E_DIFFERENCE) return name_ray(a, s->ray[i], status);
+    sf_status status = rtl_ray(a, e, a->subset[i]);
+    if (status.code == SF_E_DIFFERENCE) return name_ray(a, a->subset[i], status);
     SF_TRY(status);
     fx_counts_add(&s->core, &e->core.core);
     fx_counts_add(&s->recount, &e->core.recount);
     SF_TRY(sf_dut_counts(e->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls));
     status = sf_counts_compare(&s->core, "core", &s->rtl, "accelerator");
-    if (status.code == SF_E_DIFFERENCE) return find_counter_sample(a, e, s->ray[i], status);
+    if (status.code == SF_E_DIFFERENCE) return find_counter_sample(a, e, a->subset[i], status);
     if (sf_progress_due(&a->progress))
       sf_progress_show(&a->progress, "accelerator: %d of %d rays, ETA %.0f s", i + 1, s->rays,
                        (sf_seconds() - a->start) * (s->rays - i - 1) / (i + 1));
@@ -240,9 +228,9 @@ static sf_status rtl_all(audit *a, rtl_eval *e)
 
 static sf_status run_rtl(audit *a)
 {
-  a->subset.agreement = sf_ok();
+  a->report.three.agreement = sf_ok();
   SF_TRY(choose_subset(a));
-  if (a->subset.rays == 0) return sf_ok();
+  if (a->report.three.rays == 0) return sf_ok();
   rtl_eval *e = calloc(1, sizeof *e);
   fx_trace *trace = calloc(1, sizeof *trace);
   sf_dut_options how = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg};
@@ -254,118 +242,24 @@ static sf_status run_rtl(audit *a)
   }
   free(e), free(trace);
   if (status.code != SF_E_DIFFERENCE) return status;
-  a->subset.agreement = status; /* reported with the rest; the exit status tells */
+  a->report.three.agreement = status; /* reported with the rest; the exit status tells */
   return sf_ok();
 }
 
 /* ---- reports ---- */
 
-static void print_subset(const audit *a)
+static sf_status write_csv(const audit *a)
 {
-  const subset *s = &a->subset;
-  if (a->opt.rtl_rays == 0) {
-    printf("accelerator: left out (--rtl-rays 0)\n");
-    return;
-  }
-  printf("three counts of %" PRIu64 " samples of %d rays (seed %" PRIu64 "), layers and steps added up here:\n",
-         s->core.samples, s->rays, a->opt.seed);
-  printf("  %-22s %16s %16s %16s\n", "event", "core", "accelerator", "recount");
-  for (int e = 0; e < SF_EVENTS; e++) {
-    uint64_t x = sf_event_total(&s->core, e), y = sf_event_total(&s->rtl, e), z = sf_event_total(&s->recount, e);
-    printf("  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "%s\n", sf_events[e].title, x, y, z,
-           x == y && y == z ? "" : "  DIFFERENT");
-  }
-  printf("  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "\n", "paper ledger, fJ", sf_energy_fj(&s->core),
-         sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount));
-  printf("  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy, s->stalls);
-  if (s->agreement.code == SF_OK)
-    printf("  core = accelerator = recount, for every event, layer and step\n");
-  else
-    printf("  DIFFERENCE: %s\n", s->agreement.message);
+  sf_writer writer;
+  if (!a->opt.csv) return sf_ok();
+  SF_TRY(sf_writer_open(&writer, a->opt.csv));
+  sf_report_csv(writer.file, &a->scene.net, &a->report.measure.core);
+  return sf_writer_commit(&writer);
 }
 
-static void print_text(const audit *a)
+static sf_status print_json(cJSON *json)
 {
-  const fx_counts *c = &a->measure.core;
-  char census[256], unexpected[64];
-  printf("%s, %s views of %s: %" PRIu64 " %s rays (%.4g views), %" PRIu64 " hit, %" PRIu64
-         " samples, %.2f per ray, t_r = %d, %.1f s\n\n",
-         a->opt.scene, a->opt.split, a->opt.data, a->rays, a->opt.rays ? "random" : "pixel", view_count(a), c->rays,
-         c->samples, (double)c->samples / (double)a->rays, a->scene.net.steps, a->seconds);
-  sf_counts_print(stdout, &a->scene.net, c);
-  sf_saturation_census(a->measure.saturated_samples, c->saturated_features, census, sizeof census);
-  printf("saturation: %s\n", census);
-  if (sf_saturation_unexpected(&a->scene.net, a->measure.saturated_samples, unexpected, sizeof unexpected))
-    printf("UNEXPECTED saturation in %s\n", unexpected);
-  printf("core = recount from the spike bitmaps, over all %" PRIu64 " samples\n\n", c->samples);
-  print_subset(a);
-  printf("\n");
-  sf_ledger_print(stdout, &a->ledger, view_count(a));
-  printf("\n");
-  sf_limits_print(stdout);
-}
-
-static cJSON *subset_json(const audit *a)
-{
-  const subset *s = &a->subset;
-  cJSON *json = cJSON_CreateObject();
-  cJSON_AddNumberToObject(json, "rays", s->rays);
-  sf_json_add_u64(json, "samples", s->core.samples);
-  sf_json_add_u64(json, "cycles", s->cycles);
-  sf_json_add_u64(json, "busy", s->busy);
-  sf_json_add_u64(json, "stalls", s->stalls);
-  sf_json_add_u64(json, "core_fj", sf_energy_fj(&s->core));
-  sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
-  sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
-  cJSON_AddItemToObject(json, "core", sf_counts_json(&a->scene.net, &s->core));
-  cJSON_AddItemToObject(json, "rtl", sf_counts_json(&a->scene.net, &s->rtl));
-  cJSON_AddItemToObject(json, "recount", sf_counts_json(&a->scene.net, &s->recount));
-  return json;
-}
-
-static void json_head(const audit *a, cJSON *json)
-{
-  const uint64_t samples = a->measure.core.samples;
-  cJSON_AddStringToObject(json, "scene", a->opt.scene);
-  cJSON_AddStringToObject(json, "scene_sha256", a->hash);
-  cJSON_AddStringToObject(json, "data", a->opt.data);
-  cJSON_AddStringToObject(json, "split", a->opt.split);
-  cJSON_AddNumberToObject(json, "t_r", a->scene.net.steps);
-  sf_json_add_u64(json, "seed", a->opt.seed);
-  sf_json_add_u64(json, "rays", a->rays);
-  cJSON_AddNumberToObject(json, "views", view_count(a));
-  sf_json_add_u64(json, "samples", samples);
-  cJSON_AddNumberToObject(json, "samples_per_ray", (double)samples / (double)a->rays);
-  sf_json_add_u64(json, "energy_spiking_fj", a->ledger.spiking_fj);
-  sf_json_add_u64(json, "energy_ann_fj", a->ledger.ann_fj);
-  double saving = sf_saving_percent(a->ledger.spiking_fj, a->ledger.ann_fj);
-  if (isnan(saving)) cJSON_AddNullToObject(json, "energy_saving_percent");
-  else cJSON_AddNumberToObject(json, "energy_saving_percent", saving);
-  cJSON_AddNumberToObject(json, "energy_spiking_mj_per_view", (double)a->ledger.spiking_fj * 1e-12 / view_count(a));
-  cJSON_AddNumberToObject(json, "energy_ann_mj_per_view", (double)a->ledger.ann_fj * 1e-12 / view_count(a));
-}
-
-static sf_status print_json(const audit *a)
-{
-  cJSON *json = cJSON_CreateObject();
-  char unexpected[64];
-  json_head(a, json);
-  cJSON_AddItemToObject(json, "ledger", sf_ledger_json(&a->ledger));
-  cJSON_AddItemToObject(json, "counts", sf_counts_json(&a->scene.net, &a->measure.core));
-  cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
-  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(saturated, sf_layer_names[l], a->measure.saturated_samples[l]);
-  sf_saturation_unexpected(&a->scene.net, a->measure.saturated_samples, unexpected, sizeof unexpected);
-  cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
-  cJSON_AddTrueToObject(json, "core_equals_recount"); /* a difference there ends the program before any report */
-  bool equal = a->subset.agreement.code == SF_OK;
-  if (a->subset.rays > 0) cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", equal);
-  else cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");
-  if (!equal) cJSON_AddStringToObject(json, "difference", a->subset.agreement.message);
-  cJSON_AddItemToObject(json, "rtl_subset", subset_json(a));
-  sf_limits_json(json);
-  if (a->opt.published) cJSON_AddItemToObject(json, "published", sf_published_json());
-  cJSON_AddNumberToObject(json, "seconds", a->seconds);
-  char *text = cJSON_Print(json);
+  char *text = json ? cJSON_Print(json) : NULL;
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
   puts(text);
@@ -373,59 +267,37 @@ static sf_status print_json(const audit *a)
   return sf_ok();
 }
 
-static void csv_rows(FILE *out, const fx_net *net, const fx_counts *counts)
+static sf_status print_report(const audit *a)
 {
-  fprintf(out, "layer,step,n_in,n_out");
-  for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%s", sf_events[e].name);
-  fprintf(out, ",energy_fj\n");
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < net->steps; t++) {
-      const fx_layer_counts *c = &counts->layer[l];
-      fprintf(out, "%s,%d,%d,%d", sf_layer_names[l], t, net->layer[l].n_in, net->layer[l].n_out);
-      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(c, e, t));
-      fprintf(out, ",%" PRIu64 "\n", c->mac[t] * SF_MAC_FJ + c->sop[t] * SF_SOP_FJ);
-    }
-}
-
-static sf_status write_csv(const audit *a)
-{
-  sf_writer writer;
-  if (!a->opt.csv) return sf_ok();
-  SF_TRY(sf_writer_open(&writer, a->opt.csv));
-  csv_rows(writer.file, &a->scene.net, &a->measure.core);
-  return sf_writer_commit(&writer);
+  if (a->opt.json) {
+    cJSON *json = sf_report_json(&a->report);
+    if (a->opt.published) cJSON_AddItemToObject(json, "published", sf_published_json());
+    return print_json(json);
+  }
+  sf_report_print(stdout, &a->report);
+  if (a->opt.published) printf("\n"), sf_published_print(stdout);
+  return sf_ok();
 }
 
 /* ---- program ---- */
 
-static sf_status print_published(bool json)
-{
-  if (!json) {
-    sf_published_print(stdout);
-    return sf_ok();
-  }
-  cJSON *list = sf_published_json();
-  char *text = list ? cJSON_Print(list) : NULL;
-  cJSON_Delete(list);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
-}
-
 static sf_status count(audit *a)
 {
-  sf_measure_job job = {&a->scene, a->rays, make_ray, tick, a};
-  sf_status status = sf_measure_rays(&job, &a->measure);
+  sf_measure_job job = {&a->scene, a->report.rays, make_ray, tick, a};
+  sf_status status = sf_measure_rays(&job, &a->report.measure);
   if (status.code == SF_E_DIFFERENCE) return sf_fail(status.code, "%s: %s", a->opt.scene, status.message);
   SF_TRY(status);
-  SF_TRY(sf_ledger_make(&a->scene.net, &a->measure.core, &a->ledger));
+  SF_TRY(sf_ledger_make(&a->scene.net, &a->report.measure.core, &a->report.ledger));
   return run_rtl(a);
 }
 
 static sf_status work(audit *a)
 {
-  if (!a->opt.scene) return print_published(a->opt.json);
+  if (!a->opt.scene) {
+    if (a->opt.json) return print_json(sf_published_json());
+    sf_published_print(stdout);
+    return sf_ok();
+  }
   double begin = sf_seconds();
   SF_TRY(load(a));
   sf_progress_begin(&a->progress, a->opt.quiet);
@@ -433,16 +305,11 @@ static sf_status work(audit *a)
   sf_status status = count(a);
   sf_progress_end(&a->progress);
   SF_TRY(status);
-  a->seconds = sf_seconds() - begin;
+  a->report.seconds = sf_seconds() - begin;
   SF_TRY(write_csv(a));
-  if (a->opt.json) {
-    SF_TRY(print_json(a));
-  } else {
-    print_text(a);
-    if (a->opt.published) printf("\n"), sf_published_print(stdout);
-  }
-  if (a->subset.agreement.code == SF_OK) return sf_ok();
-  return sf_fail(SF_E_DIFFERENCE, "%s: %s", a->opt.scene, a->subset.agreement.message);
+  SF_TRY(print_report(a));
+  if (a->report.three.agreement.code == SF_OK) return sf_ok();
+  return sf_fail(SF_E_DIFFERENCE, "%s: %s", a->opt.scene, a->report.three.agreement.message);
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -456,6 +323,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--stall", 0, SF_ARG_INT, &o->stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S", "model units per world unit, 0 = the layout's (default 0)"},
       {"--csv", 0, SF_ARG_STRING, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       {"--plusarg", 0, SF_ARG_STRING, &o->plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
@@ -494,8 +362,8 @@ int main(int argc, char **argv)
     sf_cli_catch_signals();
     status = work(a);
   }
-  sf_measure_free(&a->measure);
-  free(a->subset.ray);
+  sf_measure_free(&a->report.measure);
+  free(a->subset);
   sf_dataset_free(&a->data);
   fx_scene_free(&a->scene);
   free(a);

@@ -28,7 +28,7 @@ static void print_text(const fx_scene *scene, const sf_quant_report *report, con
 {
   printf("%s: %lld bytes, t_r = %d, %lld grid entries, %d x %d x %d occupancy cells\n", path, bytes, scene->net.steps,
          (long long)scene->grid.entries, scene->occ_res, scene->occ_res, scene->occ_res);
-  printf("features  LSB %-12.6g error %6.3f %%  %lld grid entries clipped\n", report->feature_scale,
+  printf("features of %d levels     error %6.3f %%  %lld grid entries clipped\n", scene->grid.levels,
          100 * report->feature_error, (long long)report->grid_clipped);
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &scene->net.layer[l];
@@ -62,7 +62,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "t_r", scene->net.steps);
   cJSON_AddNumberToObject(json, "grid_entries", (double)scene->grid.entries);
   cJSON_AddNumberToObject(json, "grid_clipped", (double)report->grid_clipped);
-  cJSON_AddNumberToObject(json, "feature_lsb", report->feature_scale);
+  cJSON_AddItemToObject(json, "feature_lsb", cJSON_CreateDoubleArray(scene->feature_scale, scene->grid.levels));
   cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
   cJSON_AddNumberToObject(json, "direction_lsb", scene->dir_scale);
   cJSON_AddNumberToObject(json, "calibration_samples", report->samples);

@@ -31,7 +31,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE", "charging of the neurons (default hybrid)"},
       {"--seed", 's', SF_ARG_U64, &t->seed, 0, 9e15, NULL, "S", "same seed, same bits, any thread count (default 1)"},
       {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
-      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N", "samples per iteration, about (default 65536)"},
+      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N", "samples per iteration, about (default 16384)"},
       {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R", "Adam's rate for the hash grid (default 1e-2)"},
       {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks (default 5e-3)"},
       {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid (default 16)"},

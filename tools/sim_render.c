@@ -17,6 +17,7 @@ enum { RTL_CROP = 16 };
 typedef struct options {
   int view, backend, downscale, steps, threads;
   uint64_t seed;
+  double scale;
   const char *scene, *data, *exr, *png, *model, *split, *crop;
   bool json, quiet;
 } options;
@@ -95,7 +96,7 @@ static sf_status load(job *j)
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
   SF_TRY(sf_sha256_file(j->opt.scene, j->hash));
   if (j->opt.steps) j->scene.net.steps = j->opt.steps;
-  sf_dataset_options how = {.downscale = j->opt.downscale, .limit = j->opt.view + 1};
+  sf_dataset_options how = {.downscale = j->opt.downscale, .scale = (float)j->opt.scale, .limit = j->opt.view + 1};
   SF_TRY(sf_dataset_load(&j->data, j->opt.data, j->opt.split, &how));
   if (j->opt.view >= j->data.count)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", j->opt.view, j->opt.data, j->data.count,
@@ -149,6 +150,9 @@ static sf_status float_rows(job *j, const sf_model *model, int y, int rows, floa
 static sf_status float_batches(job *j, const sf_model *model)
 {
   enum { BATCH = 4096, FLOATS_PER_RAY = 12 };
+  if (model->config.scale != j->data.scale)
+    return sf_fail(SF_E_RANGE, "%s: trained at scale %g, %s is read at %g; give --scale %.9g", j->opt.model,
+                   (double)model->config.scale, j->opt.data, (double)j->data.scale, (double)model->config.scale);
   if (j->scene.net.steps > model->config.steps)
     return sf_fail(SF_E_RANGE, "%s: the model has %d time steps, %d are asked for", j->opt.model, model->config.steps,
                    j->scene.net.steps);
@@ -432,6 +436,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE", "for float (default model.safetensors beside the scene)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S", "model units per world unit, 0 = the layout's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "rtl: random reset values (default 1)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},

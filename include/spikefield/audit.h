@@ -64,6 +64,14 @@ extern const char *const sf_criticism[];    /* NULL-terminated; what the metric 
 void sf_limits_print(FILE *out);
 void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 
+/* The same rays counted by the core (a), the accelerator's own counters (b) and from the spike bitmaps (c). */
+typedef struct sf_three_counts {
+  int wanted, rays; /* rays asked for; rays run */
+  fx_counts core, rtl, recount;
+  uint64_t cycles, busy, stalls;
+  sf_status agreement; /* SF_E_DIFFERENCE names the first difference */
+} sf_three_counts;
+
 /* The paper's published energies, recomputed: E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, samples from the ANN row,
  * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). */
 typedef struct sf_published_row {
@@ -115,6 +123,21 @@ typedef struct sf_measure {
 /* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */
 sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure);
 void sf_measure_free(sf_measure *measure);
+
+/* Everything one audit found. views: how many whole views the rays amount to. */
+typedef struct sf_audit_report {
+  const char *scene, *data, *split, *sha256;
+  const fx_net *net;
+  uint64_t rays, seed;
+  double views, seconds;
+  bool random_rays;
+  sf_measure measure;
+  sf_three_counts three;
+  sf_ledger ledger;
+} sf_audit_report;
+void sf_report_print(FILE *out, const sf_audit_report *report);
+cJSON *sf_report_json(const sf_audit_report *report);
+void sf_report_csv(FILE *out, const fx_net *net, const fx_counts *counts); /* one row per layer and step */
 
 /* Saturation that the number formats rule out: membranes and colour in the modes whose state is a convex combination.
  * Density may saturate: alpha is 1 long before. Writes "none" or a comma-separated list of layers. */

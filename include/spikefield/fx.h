@@ -46,7 +46,7 @@ typedef struct fx_net {
 } fx_net;
 
 /* Multiresolution hash grid (Mueller et al. 2022), 2 features per entry.
- * Position in level l: pos = (x * (res[l] - 1) rounded down to Q.8) + 1/2, as torch-ngp: see fx/grid.c. */
+ * Position in level l: pos = (x * (res[l] - 1) rounded to Q.8) + 1/2, as torch-ngp: see fx/grid.c. */
 enum { FX_LEVELS_MAX = 16, FX_GRID_FEATURES = 2 };
 typedef struct fx_grid {
   int32_t levels;
@@ -72,8 +72,8 @@ typedef struct fx_scene {
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
   double dir_scale;   /* value of one LSB of the direction features */
-  double feature_scale;            /* value of one LSB of the grid features; with current_scale for reports and tests */
-  double current_scale[SF_LAYERS]; /* value of one LSB of each layer's current */
+  double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features; with current_scale for reports, tests */
+  double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current */
   void *owner;        /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
 

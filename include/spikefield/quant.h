@@ -24,7 +24,7 @@ typedef struct sf_quant_layer {
 } sf_quant_layer;
 typedef struct sf_quant_report {
   sf_quant_layer layer[SF_LAYERS];
-  double feature_scale, feature_error; /* as above, for the grid features */
+  double feature_error; /* as above, for the grid features */
   int64_t grid_clipped;                /* grid entries beyond +-127 of their level's scale */
   int32_t samples;                     /* calibration samples */
 } sf_quant_report;

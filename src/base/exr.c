@@ -191,7 +191,7 @@ void sf_exr_free(sf_exr_channel *channels, int n)
   free(channels);
 }
 
-static sf_status check_layout(exr_context_t context, const char *path, int *width, int *height)
+static sf_status check_layout(exr_context_t context, const char *path, size_t size, int *width, int *height)
 {
   int parts = 0;
   exr_storage_t storage;
@@ -204,6 +204,11 @@ static sf_status check_layout(exr_context_t context, const char *path, int *widt
   int64_t w = (int64_t)box.max.x - box.min.x + 1, h = (int64_t)box.max.y - box.min.y + 1;
   if (w < 1 || h < 1 || w > INT32_MAX / 8 || h > INT32_MAX || w * h > MAX_PIXELS)
     return sf_fail(SF_E_RANGE, "%s: EXR: an image of %jd x %jd pixels", path, (intmax_t)w, (intmax_t)h);
+  /* Deflate packs at most 1032 : 1; a damaged size must not cost gigabytes before it is noticed. */
+  exr_compression_t packing;
+  bool deflate = !exr_get_compression(context, 0, &packing) && packing <= EXR_COMPRESSION_ZIP;
+  if (deflate && w * h / 1100 > (int64_t)size)
+    return sf_fail(SF_E_FORMAT, "%s: EXR: %zu bytes cannot hold %jd x %jd pixels", path, size, (intmax_t)w, (intmax_t)h);
   *width = (int)w, *height = (int)h;
   return sf_ok();
 }
@@ -267,7 +272,7 @@ static sf_status read_stream(const char *path, exr_stream *stream, int *width, i
     if (context) exr_finish(&context);
     return sf_fail(SF_E_FORMAT, "%s: EXR: %s", path, describe(stream, r));
   }
-  sf_status status = check_layout(context, path, width, height);
+  sf_status status = check_layout(context, path, stream->size, width, height);
   if (status.code == SF_OK) status = make_channels(context, path, *width, *height, channels, n);
   if (status.code == SF_OK && (r = read_rows(context, *width, *height, *channels, *n)))
     status = sf_fail(SF_E_FORMAT, "%s: EXR: %s", path, describe(stream, r));

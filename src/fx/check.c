@@ -1,3 +1,4 @@
+#include "src/fx/round.h"
 #include "src/fx/scene.h"
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
@@ -46,8 +47,8 @@ static sf_status check_level(const fx_grid *grid, int i, const char *path)
     return in_range(path, owner, "entries", end - grid->offset[i], (int64_t)1 << grid->log2_size[i], ENTRIES_MAX);
   }
   const int64_t stride = grid->stride[i];
-  const int64_t far = (((((int64_t)1 << SF_POS_FRAC) - 1) * grid->scale_q16[i] >> 32) + 128) >> 8;
-  SF_TRY(in_range(path, owner, "stride", stride, far + 2, 600));
+  const int64_t far_q8 = fx_rshift_round((((int64_t)1 << SF_POS_FRAC) - 1) * grid->scale_q16[i], 32) + 128;
+  SF_TRY(in_range(path, owner, "stride", stride, (far_q8 >> 8) + 2, 600));
   return in_range(path, owner, "entries", end - grid->offset[i], stride * stride * stride, ENTRIES_MAX);
 }
 

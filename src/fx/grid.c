@@ -1,6 +1,6 @@
 /* Multiresolution hash grid (Mueller et al. 2022) with torch-ngp's cell rule, in integers.
  *
- *   pos  = floor((x * scale) to Q.8) + 1/2 per axis; cell = its integer part, g = its 8 fraction bits
+ *   pos  = (x * scale rounded to Q.8, half up) + 1/2 per axis; cell = its integer part, g = its 8 fraction bits
  *   w    = product over the axes of (256 - g or g) / 256. The x-y products are exact in Q0.16; along z each splits
  *          into upper = rshift_round(wxy * gz, 8) and lower = wxy - upper. So every corner weight is the exact
  *          product within half an LSB of Q0.16 and the eight always sum to exactly 65536: a constant field is
@@ -33,8 +33,8 @@ static cell find_cell(const uint32_t *pos, int32_t scale_q16)
   cell c;
   int32_t g[3];
   for (int axis = 0; axis < 3; axis++) {
-    const uint64_t product = (uint64_t)pos[axis] * (uint64_t)scale_q16; /* Q.40 */
-    const uint64_t p = (product >> (SF_POS_FRAC + SCALE_FRAC - CELL_FRAC)) + (1 << (CELL_FRAC - 1));
+    const int64_t product = (int64_t)pos[axis] * scale_q16; /* Q.40, below 2^55 */
+    const int64_t p = fx_rshift_round(product, SF_POS_FRAC + SCALE_FRAC - CELL_FRAC) + (1 << (CELL_FRAC - 1));
     c.base[axis] = (uint32_t)(p >> CELL_FRAC);
     g[axis] = (int32_t)(p & ((1 << CELL_FRAC) - 1));
   }

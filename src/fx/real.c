@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { REALS = 6 + SF_LAYERS };
+enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS };
 
 typedef struct real_field {
   const char *key;
@@ -15,10 +15,33 @@ typedef struct real_field {
 
 #define REAL(field, positive) {#field, offsetof(fx_scene, field), positive}
 static const real_field reals[REALS] = {
-    REAL(to_box_scale, true),       REAL(to_box_offset[0], false),  REAL(to_box_offset[1], false),
-    REAL(to_box_offset[2], false),  REAL(dir_scale, true),          REAL(feature_scale, true),
-    REAL(current_scale[0], true),   REAL(current_scale[1], true),   REAL(current_scale[2], true),
-    REAL(current_scale[3], true),   REAL(current_scale[4], true)};
+    REAL(to_box_scale, true),
+    REAL(to_box_offset[0], false),
+    REAL(to_box_offset[1], false),
+    REAL(to_box_offset[2], false),
+    REAL(dir_scale, true),
+    REAL(feature_scale[0], true),
+    REAL(feature_scale[1], true),
+    REAL(feature_scale[2], true),
+    REAL(feature_scale[3], true),
+    REAL(feature_scale[4], true),
+    REAL(feature_scale[5], true),
+    REAL(feature_scale[6], true),
+    REAL(feature_scale[7], true),
+    REAL(feature_scale[8], true),
+    REAL(feature_scale[9], true),
+    REAL(feature_scale[10], true),
+    REAL(feature_scale[11], true),
+    REAL(feature_scale[12], true),
+    REAL(feature_scale[13], true),
+    REAL(feature_scale[14], true),
+    REAL(feature_scale[15], true),
+    REAL(current_scale[0], true),
+    REAL(current_scale[1], true),
+    REAL(current_scale[2], true),
+    REAL(current_scale[3], true),
+    REAL(current_scale[4], true),
+};
 
 static double *field_of(const fx_scene *scene, const real_field *field)
 {

@@ -153,7 +153,7 @@ static sf_status all_layers(const context *c, int16_t *x)
 {
   const double log2e = 1.4426950408889634, one = 1 << SF_LOG_FRAC;
   double features[SF_FEATURE_MAX], spikes[SF_LANES];
-  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->feature_scale;
+  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->feature_scale[i / FX_GRID_FEATURES];
   for (int i = 0; i < SF_LANES; i++) spikes[i] = 1;
   density_inputs(c, x);
   SF_TRY(finish_layer(c, FX_D1, x, features));

@@ -91,7 +91,7 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   memcpy(scene->occupancy, model->occupancy, cells / 8);
   SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
   report->samples = calibration->samples;
-  SF_TRY(sf_quantise_grid(scene, model, name, calibration, report));
+  sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
   return fx_scene_check(scene, name);
 }

@@ -47,7 +47,7 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 12 };
+enum { STATE_FIELDS = 11 };
 static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
 {
   const state_field table[STATE_FIELDS] = {
@@ -59,8 +59,7 @@ static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
       {"train.seconds", .number = &t->seconds},
       {"train.progress", .number = &t->progress},
       {"train.stage_progress", .number = &t->stage_progress},
-      {"train.t_moment1", .number = &t->t_moment1},
-      {"train.t_moment2", .number = &t->t_moment2},
+      {"train.t_momentum", .number = &t->t_momentum},
       {"train.occupied", .number = &t->occupied},
       {"train.epoch", .number = &t->epoch},
   };
@@ -119,10 +118,9 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
     const char *text = sf_tensors_meta(set, field[i].key);
     char *end = NULL;
     const double value = text ? strtod(text, &end) : 0;
-    if (!text || end == text || *end || !isfinite(value) || value < 0 || value > 1e15)
-      if (!text || strcmp(field[i].key, "train.t_moment1"))
-        return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path,
-                       field[i].key);
+    if (!text || end == text || *end || !(fabs(value) < 1e15))
+      return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path,
+                     field[i].key);
     if (field[i].number)
       *field[i].number = value;
     else if (field[i].integer)
@@ -130,8 +128,9 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
     else
       *field[i].small = (int)value;
   }
-  if (t->stage < 1 || t->stage > 3 || t->rays < RAYS_MIN || t->rays > RAYS_MAX || t->stride < 1 || t->stride > 8)
-    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.stage, train.rays or train.stride is out of range", set->path);
+  if (t->stage < 1 || t->stage > 3 || t->rays < RAYS_MIN || t->rays > RAYS_MAX || t->stride < 1 || t->stride > 8 ||
+      t->iteration < 0)
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.iteration, stage, rays or stride is out of range", set->path);
   return sf_ok();
 }
 

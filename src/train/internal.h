@@ -83,7 +83,7 @@ struct sf_trainer {
   int64_t iteration, stage_start;
   int stage, rays, stride;
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
-  double t_moment1, t_moment2;
+  double t_momentum; /* smoothed gradient of t* */
   double occupied, epoch; /* epoch: passes over the training pixels in this stage */
 };
 

@@ -8,6 +8,10 @@
 
 static const float g0 = 5e-5f, g1 = 5e-2f, g2 = 1e-6f;
 
+/* Both prefixes around t^ are trained with at least this share of M_smooth: their difference drives t*, and
+ * a prefix that is not trained would always look worse and lock t* where it is. */
+static const float least_share = 0.25f;
+
 sf_status sf_ray_work_create(sf_ray_work *w, int samples)
 {
   size_t n = (size_t)samples, total = n * (SF_T_MAX * 8 + 6 * 3);
@@ -178,8 +182,10 @@ static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, float delta, i
   add_mse(ray, &im, inverse * share, grgb);
   if (t == p->t_r) {
     sums->regular += add_regular(ray, &im, inverse, grgb);
-    sums->distill += squared_error(im.rgb, full->rgb);
-    for (int c = 0; c < 3; c++) grgb[c] += p->distill * inverse * 2 / 3 * (im.rgb[c] - full->rgb[c]);
+    if (p->distill > 0 && squared_error(full->rgb, ray->target) < mse) { /* a worse teacher teaches nothing */
+      sums->distill += squared_error(im.rgb, full->rgb);
+      for (int c = 0; c < 3; c++) grgb[c] += p->distill * inverse * 2 / 3 * (im.rgb[c] - full->rgb[c]);
+    }
     sums->regular += add_sparsity(ray->count, w->sigma[t - 1], inverse, w->dsigma[t - 1]);
   }
   push(ray, t, delta, &im, grgb, w);
@@ -200,6 +206,7 @@ void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_ray_w
   }
   image full = composite(ray, p->steps, delta, w, w->spare[0]);
   sums->mse_full += squared_error(full.rgb, ray->target);
-  near_prefix(p, ray, delta, p->t_f, (float)(1 - p->d), &full, w, sums);
-  if (p->t_c != p->t_f) near_prefix(p, ray, delta, p->t_c, (float)p->d, &full, w, sums);
+  const float share = p->t_c == p->t_f ? 0 : fminf(fmaxf((float)p->d, least_share), 1 - least_share);
+  near_prefix(p, ray, delta, p->t_f, 1 - share, &full, w, sums);
+  if (p->t_c != p->t_f) near_prefix(p, ray, delta, p->t_c, share, &full, w, sums);
 }

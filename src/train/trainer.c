@@ -9,6 +9,8 @@
 
 enum { OCCUPANCY_EVERY = 16, EPOCH_RAYS_PER_VIEW = 4096 };
 
+static const double budget_rate = 1e5; /* of t*, per stage II */
+
 sf_train_options sf_train_defaults(void)
 {
   return (sf_train_options){.config = sf_config_default(),
@@ -17,7 +19,7 @@ sf_train_options sf_train_defaults(void)
                             .stage1 = 2500,
                             .stage2 = 7500,
                             .seed = 1,
-                            .samples = 1 << 16,
+                            .samples = 1 << 14,
                             .lr_grid = 1e-2,
                             .lr_net = 5e-3};
 }
@@ -216,8 +218,10 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
     ray_out(p, &batch->ray[r], w);
   }
   if (bundle->blocks) count_spikes(t, p, &w->block[0], g);
+  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
+  const int steps = p->stage == 1 ? p->steps : p->t_c;
   for (int b = 0; b < bundle->blocks; b++)
-    t->kernels->backward(net, &w->block[b], p->steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
+    t->kernels->backward(net, &w->block[b], steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
                          w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
                          batch->df + (size_t)(bundle->block + b) * plane, g->grad, w->scratch);
 }
@@ -348,17 +352,18 @@ static void update_parameters(sf_trainer *t)
                  t->moment2 + nets);
 }
 
-/* Adam on the one scalar t*, its rate such that T can be crossed in a fraction of stage II. */
+/* Gradient descent on the one scalar t*, not Adam: Adam's normalisation would discard the very magnitudes that beta
+ * weighs, the error that one more step saves against b e^t. Without the error's signal t* follows
+ * e^-t = e^-t0 + budget_rate * beta * progress, at most T per stage. */
 static void update_budget(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double penalty_ratio)
 {
   if (p->stage == 1 || p->steps < t->model.config.steps || t->model.config.steps == 1) return;
-  const double t_hat = t->model.t_star, rate = 2.5 * t->model.config.steps * stage_share(t);
+  const double t_hat = t->model.t_star, share = stage_share(t), limit = t->model.config.steps * share;
   double g = mean->mse_ceil - mean->mse_floor + p->extra * (mean->extra_ceil - mean->extra_floor);
   if (!t->options.no_penalty) g += t->options.beta * penalty_ratio * exp(t_hat);
-  t->t_moment1 = 0.9 * t->t_moment1 + 0.1 * g;
-  t->t_moment2 = 0.99 * t->t_moment2 + 0.01 * g * g;
-  const double moved = t_hat - rate * t->t_moment1 / (sqrt(t->t_moment2) + 1e-15);
-  t->model.t_star = (float)fmin(fmax(moved, 1), t->model.config.steps);
+  t->t_momentum = 0.9 * t->t_momentum + 0.1 * g;
+  const double move = fmin(fmax(budget_rate * share * t->t_momentum, -limit), limit);
+  t->model.t_star = (float)fmin(fmax(t_hat - move, 1), t->model.config.steps);
   t->model.t_r = (int)lroundf(t->model.t_star);
 }
 

@@ -1,0 +1,136 @@
+/* One audit as text, JSON and CSV. */
+#include "spikefield/audit.h"
+#include <inttypes.h>
+#include <math.h>
+
+static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
+{
+  if (s->rays == 0) {
+    fprintf(out, "accelerator: %s\n", s->wanted ? "no ray has samples, nothing to run" : "left out");
+    return;
+  }
+  fprintf(out, "three counts of %" PRIu64 " samples of %d rays (seed %" PRIu64 "), layers and steps added up here:\n",
+          s->core.samples, s->rays, seed);
+  fprintf(out, "  %-22s %16s %16s %16s\n", "event", "core", "accelerator", "recount");
+  for (int e = 0; e < SF_EVENTS; e++) {
+    uint64_t x = sf_event_total(&s->core, e), y = sf_event_total(&s->rtl, e), z = sf_event_total(&s->recount, e);
+    fprintf(out, "  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "%s\n", sf_events[e].title, x, y, z,
+            x == y && y == z ? "" : "  DIFFERENT");
+  }
+  fprintf(out, "  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "\n", "paper ledger, fJ", sf_energy_fj(&s->core),
+          sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount));
+  fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy, s->stalls);
+  if (s->agreement.code == SF_OK) fprintf(out, "  core = accelerator = recount, for every event, layer and step\n");
+  else fprintf(out, "  DIFFERENCE: %s\n", s->agreement.message);
+}
+
+void sf_report_print(FILE *out, const sf_audit_report *r)
+{
+  const fx_counts *c = &r->measure.core;
+  char census[256], unexpected[64];
+  fprintf(out, "%s, %s views of %s: %" PRIu64 " %s rays (%.4g views), %" PRIu64 " with samples\n", r->scene, r->split,
+          r->data, r->rays, r->random_rays ? "random" : "pixel", r->views, c->rays);
+  fprintf(out, "%" PRIu64 " samples, %.2f per ray, t_r = %d, %.1f s\n\n", c->samples,
+          (double)c->samples / (double)r->rays, r->net->steps, r->seconds);
+  sf_counts_print(out, r->net, c);
+  sf_saturation_census(r->measure.saturated_samples, c->saturated_features, census, sizeof census);
+  fprintf(out, "saturation: %s\n", census);
+  if (sf_saturation_unexpected(r->net, r->measure.saturated_samples, unexpected, sizeof unexpected))
+    fprintf(out, "UNEXPECTED saturation in %s\n", unexpected);
+  fprintf(out, "core = recount from the spike bitmaps, for all %" PRIu64 " samples\n\n", c->samples);
+  print_three(out, &r->three, r->seed);
+  fprintf(out, "\n");
+  sf_ledger_print(out, &r->ledger, r->views);
+  fprintf(out, "\n");
+  sf_limits_print(out);
+}
+
+static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
+{
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddNumberToObject(json, "rays", s->rays);
+  sf_json_add_u64(json, "samples", s->core.samples);
+  sf_json_add_u64(json, "cycles", s->cycles);
+  sf_json_add_u64(json, "busy", s->busy);
+  sf_json_add_u64(json, "stalls", s->stalls);
+  sf_json_add_u64(json, "core_fj", sf_energy_fj(&s->core));
+  sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
+  sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
+  cJSON_AddItemToObject(json, "core", sf_counts_json(net, &s->core));
+  cJSON_AddItemToObject(json, "rtl", sf_counts_json(net, &s->rtl));
+  cJSON_AddItemToObject(json, "recount", sf_counts_json(net, &s->recount));
+  return json;
+}
+
+static void add_origin(cJSON *json, const sf_audit_report *r)
+{
+  cJSON_AddStringToObject(json, "scene", r->scene);
+  cJSON_AddStringToObject(json, "scene_sha256", r->sha256);
+  cJSON_AddStringToObject(json, "data", r->data);
+  cJSON_AddStringToObject(json, "split", r->split);
+  cJSON_AddNumberToObject(json, "t_r", r->net->steps);
+  sf_json_add_u64(json, "seed", r->seed);
+  sf_json_add_u64(json, "rays", r->rays);
+  cJSON_AddNumberToObject(json, "views", r->views);
+  sf_json_add_u64(json, "samples", r->measure.core.samples);
+  cJSON_AddNumberToObject(json, "samples_per_ray", (double)r->measure.core.samples / (double)r->rays);
+}
+
+static void add_energy(cJSON *json, const sf_audit_report *r)
+{
+  double saving = sf_saving_percent(r->ledger.spiking_fj, r->ledger.ann_fj);
+  sf_json_add_u64(json, "energy_spiking_fj", r->ledger.spiking_fj);
+  sf_json_add_u64(json, "energy_ann_fj", r->ledger.ann_fj);
+  if (isnan(saving)) cJSON_AddNullToObject(json, "energy_saving_percent");
+  else cJSON_AddNumberToObject(json, "energy_saving_percent", saving);
+  cJSON_AddNumberToObject(json, "energy_spiking_mj_per_view", (double)r->ledger.spiking_fj * 1e-12 / r->views);
+  cJSON_AddNumberToObject(json, "energy_ann_mj_per_view", (double)r->ledger.ann_fj * 1e-12 / r->views);
+  cJSON_AddItemToObject(json, "ledger", sf_ledger_json(&r->ledger));
+}
+
+static void add_saturation(cJSON *json, const sf_audit_report *r)
+{
+  char unexpected[64];
+  cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
+  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(saturated, sf_layer_names[l], r->measure.saturated_samples[l]);
+  sf_saturation_unexpected(r->net, r->measure.saturated_samples, unexpected, sizeof unexpected);
+  cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
+}
+
+static void add_agreement(cJSON *json, const sf_audit_report *r)
+{
+  bool all = sf_counts_compare(&r->measure.core, "core", &r->measure.recount, "recount").code == SF_OK;
+  bool three = r->three.agreement.code == SF_OK;
+  cJSON_AddBoolToObject(json, "core_equals_recount", all);
+  if (r->three.rays > 0) cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
+  else cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");
+  if (!three) cJSON_AddStringToObject(json, "difference", r->three.agreement.message);
+}
+
+cJSON *sf_report_json(const sf_audit_report *r)
+{
+  cJSON *json = cJSON_CreateObject();
+  add_origin(json, r);
+  add_energy(json, r);
+  cJSON_AddItemToObject(json, "counts", sf_counts_json(r->net, &r->measure.core));
+  add_saturation(json, r);
+  add_agreement(json, r);
+  cJSON_AddItemToObject(json, "rtl_subset", three_json(&r->three, r->net));
+  sf_limits_json(json);
+  cJSON_AddNumberToObject(json, "seconds", r->seconds);
+  return json;
+}
+
+void sf_report_csv(FILE *out, const fx_net *net, const fx_counts *counts)
+{
+  fprintf(out, "layer,step,n_in,n_out");
+  for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%s", sf_events[e].name);
+  fprintf(out, ",energy_fj\n");
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < net->steps; t++) {
+      const fx_layer_counts *c = &counts->layer[l];
+      fprintf(out, "%s,%d,%d,%d", sf_layer_names[l], t, net->layer[l].n_in, net->layer[l].n_out);
+      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(c, e, t));
+      fprintf(out, ",%" PRIu64 "\n", c->mac[t] * SF_MAC_FJ + c->sop[t] * SF_SOP_FJ);
+    }
+}

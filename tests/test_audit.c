@@ -1,0 +1,642 @@
+/* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
+#include "spikefield/golden.h"
+#include "tests/fx_fixture.h"
+#include <math.h>
+#include <omp.h>
+#include <unistd.h>
+
+/* ---- a net small enough to count by hand: 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3 ---- */
+
+static fx_net small_net(void)
+{
+  fx_net net = {.steps = 2, .mode = FX_HYBRID};
+  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
+  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
+  return net;
+}
+
+typedef uint64_t bitmaps[SF_LAYERS][SF_T_MAX][2];
+static const bitmaps small_spikes = {
+    [FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
+
+static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64_t t1)
+{
+  const uint64_t wanted[2] = {t0, t1};
+  for (int t = 0; t < SF_T_MAX; t++) {
+    uint64_t value = sf_event_count(&c->layer[layer], event, t);
+    ck_assert_msg(value == (t < 2 ? wanted[t] : 0), "%s %s step %d: %llu", sf_layer_names[layer], sf_events[event].name, t,
+                  (unsigned long long)value);
+  }
+}
+
+static void expect_layer(const fx_counts *c, int layer, const uint64_t table[SF_EVENTS][2])
+{
+  for (int e = 0; e < SF_EVENTS; e++) expect(c, layer, e, table[e][0], table[e][1]);
+}
+
+START_TEST(recount_equals_counting_by_hand)
+{
+  fx_net net = small_net();
+  fx_counts c = {0};
+  /* mac, sop, spikes, updates, weight, state_r, state_w, special at steps 0 and 1 */
+  static const uint64_t d1[SF_EVENTS][2] = {{12, 0}, {0, 0}, {2, 2}, {3, 3}, {12, 0}, {0, 9}, {9, 9}, {0, 0}};
+  static const uint64_t d2[SF_EVENTS][2] = {{0, 0}, {6, 6}, {0, 0}, {1, 1}, {6, 3}, {0, 4}, {4, 4}, {1, 1}};
+  static const uint64_t c1[SF_EVENTS][2] = {{20, 8}, {0, 0}, {0, 2}, {4, 4}, {20, 8}, {0, 12}, {12, 12}, {0, 0}};
+  static const uint64_t c2[SF_EVENTS][2] = {{0, 0}, {0, 10}, {5, 1}, {5, 5}, {0, 10}, {0, 15}, {15, 15}, {0, 0}};
+  static const uint64_t c3[SF_EVENTS][2] = {{0, 0}, {15, 3}, {0, 0}, {3, 3}, {15, 0}, {0, 12}, {12, 12}, {3, 3}};
+  sf_recount_sample(&net, small_spikes, true, &c);
+  expect_layer(&c, FX_D1, d1), expect_layer(&c, FX_D2, d2), expect_layer(&c, FX_C1, c1);
+  expect_layer(&c, FX_C2, c2), expect_layer(&c, FX_C3, c3);
+  ck_assert_uint_eq(c.samples, 1);
+  ck_assert_uint_eq(c.rays, 1);
+  sf_recount_sample(&net, small_spikes, false, &c);
+  expect(&c, FX_C1, SF_EVENT_MAC, 28, 16); /* the direction's 12 only once */
+  expect(&c, FX_D2, SF_EVENT_WEIGHT, 12, 6); /* what was read for another sample is read again */
+  ck_assert_uint_eq(c.samples, 2);
+  ck_assert_uint_eq(c.rays, 1);
+}
+END_TEST
+
+START_TEST(recount_sees_every_bit)
+{
+  fx_net net = small_net();
+  net.layer[FX_D1].n_out = net.layer[FX_D2].n_in = 128;
+  for (int bit = 0; bit < 128; bit++) {
+    bitmaps one = {0};
+    fx_counts c = {0};
+    one[FX_D1][1][bit / 64] = (uint64_t)1 << bit % 64;
+    one[FX_C2][0][bit / 64] = (uint64_t)1 << bit % 64; /* beyond C2's 5 lanes too: a fault must not vanish */
+    sf_recount_sample(&net, (const uint64_t(*)[SF_T_MAX][2])one, false, &c);
+    expect(&c, FX_D1, SF_EVENT_SPIKES, 0, 1);
+    expect(&c, FX_D2, SF_EVENT_SOP, 0, 3);
+    expect(&c, FX_D2, SF_EVENT_WEIGHT, 0, 3);
+    expect(&c, FX_C2, SF_EVENT_SPIKES, 1, 0);
+    expect(&c, FX_C3, SF_EVENT_SOP, 3, 0);
+  }
+}
+END_TEST
+
+START_TEST(ledger_equals_pricing_by_hand)
+{
+  fx_net net = small_net();
+  fx_counts c = {0};
+  sf_ledger l;
+  sf_recount_sample(&net, small_spikes, true, &c);
+  ck_assert_uint_eq(sf_energy_fj(&c), 40 * 4600 + 40 * 900);
+  ck_assert_uint_eq(sf_energy_ann_fj(&net, 1), 76 * 4600);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_assert_uint_eq(l.mac_fj, 184000);
+  ck_assert_uint_eq(l.sop_fj, 36000);
+  ck_assert_uint_eq(l.spiking_fj, 220000);
+  ck_assert_uint_eq(l.h_once_fj, 32 * 4600 + 36000); /* of h's 16 products only one step's 8 */
+  ck_assert_uint_eq(l.h_spikes_fj, 24 * 4600 + (40 + 8) * 900); /* 12 spikes in 24 updates: half of 16 */
+  ck_assert_uint_eq(l.ann_fj, 349600);
+  ck_assert_uint_eq(l.ann_hoisted_fj, 349600);
+  ck_assert_double_eq_tol(sf_saving_percent(l.spiking_fj, l.ann_fj), 37.0709, 1e-4); /* 1 - 220 / 349.6 */
+  c.layer[FX_D1].spikes[0]++; /* 13 in 24: 8.67 of 16, rounded */
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_assert_uint_eq(l.h_spikes_fj, 24 * 4600 + (40 + 9) * 900);
+  sf_recount_sample(&net, small_spikes, false, &c);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_assert_uint_eq(l.ann_fj, 2 * 349600);
+  ck_assert_uint_eq(l.ann_hoisted_fj, 2 * 349600 - 12 * 4600);
+}
+END_TEST
+
+START_TEST(nothing_counted_costs_nothing)
+{
+  fx_net net = small_net();
+  fx_counts c = {0};
+  sf_ledger l;
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_assert_uint_eq(l.spiking_fj, 0);
+  ck_assert_uint_eq(l.h_spikes_fj, 0);
+  ck_assert_uint_eq(l.ann_fj, 0);
+  ck_assert(isnan(sf_saving_percent(0, 0)));
+}
+END_TEST
+
+/* 800 x 800 rays of 1024 samples, 8 steps, every neuron fires: the largest frame. */
+START_TEST(largest_frame_does_not_wrap)
+{
+  __extension__ typedef unsigned __int128 u128;
+  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  bitmaps all;
+  fx_counts one = {0}, frame = {0};
+  sf_ledger l;
+  memset(all, 0xff, sizeof all);
+  scene.net.steps = 8;
+  sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])all, true, &one);
+  const uint64_t samples = (uint64_t)800 * 800 * 1024;
+  for (int i = 0; i < SF_LAYERS; i++)
+    for (int e = 0; e < SF_EVENTS; e++)
+      for (int t = 0; t < SF_T_MAX; t++)
+        ((uint64_t *)((char *)&frame.layer[i] + sf_events[e].offset))[t] = sf_event_count(&one.layer[i], e, t) * samples;
+  frame.samples = frame.rays = samples;
+  u128 exact = (u128)samples * (4096 + 2048 + 8 * 1920) * 4600 + (u128)samples * 8 * 128 * (16 + 128 + 3) * 900;
+  ck_assert(exact < UINT64_MAX);
+  ck_assert_uint_eq(sf_energy_fj(&frame), (uint64_t)exact);
+  ck_assert_uint_eq(sf_energy_ann_fj(&scene.net, samples), samples * 26880 * 4600);
+  ck_assert_int_eq(sf_ledger_make(&scene.net, &frame, &l).code, SF_OK);
+  ck_assert_uint_eq(l.h_spikes_fj, samples * ((4096 + 2048) * 4600 + (8 * 128 * 147 + 8 * 1920) * 900));
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(too_large_a_total_is_refused)
+{
+  fx_net net = small_net();
+  fx_counts c = {.samples = 1, .rays = 0};
+  sf_ledger l;
+  c.layer[FX_D1].mac[0] = UINT64_MAX / 4600;
+  ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX / 4600 * 4600);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  c.layer[FX_D1].mac[0]++;
+  ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
+  c.layer[FX_D1].mac[0] = UINT64_MAX - 5, c.layer[FX_D1].mac[1] = 10;
+  ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
+  ck_assert_uint_eq(sf_energy_ann_fj(&net, UINT64_MAX / 2), UINT64_MAX);
+}
+END_TEST
+
+/* ---- recount against the core ---- */
+
+START_TEST(recount_equals_core_on_random_nets)
+{
+  fx_trace *trace = malloc(sizeof *trace);
+  uint64_t spikes = 0;
+  for (uint64_t seed = 0; seed < 120; seed++) {
+    fixture_sizes sizes = fixture_random_sizes(seed);
+    fx_scene scene = fixture_scene(&sizes, seed);
+    fx_counts core = {0}, recount = {0};
+    int16_t f[32], dir[SF_DIR_MAX];
+    int32_t base[SF_LANES];
+    fixture_inputs(seed + 1, 0, dir, SF_DIR_MAX, 1024);
+    fx_net_direction(&scene.net, dir, base, &core);
+    for (uint64_t n = 0; n < 5; n++) {
+      fx_out out;
+      fixture_inputs(seed, n, f, 32, 1500);
+      fx_net_sample(&scene.net, f, base, &out, trace, &core);
+      sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])trace->spikes, n == 0, &recount);
+      sf_status status = sf_counts_compare(&core, "core", &recount, "recount");
+      ck_assert_msg(status.code == SF_OK, "seed %llu: %s", (unsigned long long)seed, status.message);
+    }
+    ck_assert_uint_eq(core.samples, recount.samples);
+    ck_assert_uint_eq(core.rays, recount.rays);
+    ck_assert_uint_eq(sf_energy_fj(&core), sf_energy_fj(&recount));
+    spikes += sf_event_total(&core, SF_EVENT_SPIKES);
+    fx_scene_free(&scene);
+  }
+  ck_assert_uint_gt(spikes, 1000); /* the nets were not silent */
+  free(trace);
+}
+END_TEST
+
+START_TEST(comparison_names_each_planted_difference)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < SF_T_MAX; t++)
+      for (int e = 0; e < SF_EVENTS; e++) {
+        fx_counts a = {0}, b = {0};
+        char expected[200];
+        ((uint64_t *)((char *)&a.layer[l] + sf_events[e].offset))[t] = UINT64_MAX - 1;
+        ((uint64_t *)((char *)&b.layer[l] + sf_events[e].offset))[t] = UINT64_MAX;
+        sf_status status = sf_counts_compare(&a, "left", &b, "right");
+        snprintf(expected, sizeof expected, "%s of layer %s at step %d: left %llu, right %llu", sf_events[e].title,
+                 sf_layer_names[l], t, (unsigned long long)UINT64_MAX - 1, (unsigned long long)UINT64_MAX);
+        ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+        ck_assert_str_eq(status.message, expected);
+      }
+}
+END_TEST
+
+START_TEST(comparison_names_the_first_and_ignores_the_rest)
+{
+  fx_counts a = {0}, b = {0};
+  a.grid_bytes = 1, a.march_steps = 2, a.saturated[3] = 3, a.saturated_features = 4;
+  ck_assert_int_eq(sf_counts_compare(&a, "a", &b, "b").code, SF_OK);
+  b.layer[FX_C2].sop[1] = 7, b.layer[FX_C1].spikes[5] = 8, b.layer[FX_C1].updates[5] = 9;
+  ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "spikes of layer C1 at step 5: a 0, b 8");
+}
+END_TEST
+
+/* ---- the measuring loop ---- */
+
+typedef struct rays {
+  uint64_t fail_from, stop_after;
+} rays;
+
+static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
+{
+  const rays *r = user;
+  if (index > r->fail_from) usleep(2000); /* later failures come last */
+  if (index >= r->fail_from) return sf_fail(SF_E_RANGE, "no ray %llu", (unsigned long long)index);
+  memset(ray, 0, sizeof *ray);
+  if (index % 7 == 3) return sf_ok(); /* misses the box */
+  for (int axis = 1; axis < 3; axis++)
+    ray->origin[axis] = (int64_t)sf_random_below(9, (uint64_t)axis, index, 1 << 24) << 16;
+  ray->step[0] = (int64_t)800000 << 16;
+  ray->count = 20;
+  fixture_inputs(8, index, ray->dir, SF_DIR_MAX, 1024);
+  return sf_ok();
+}
+
+static bool tick(void *user, uint64_t done) { return done < ((rays *)user)->stop_after; }
+
+START_TEST(measure_does_not_depend_on_threads)
+{
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  rays user = {UINT64_MAX, UINT64_MAX};
+  sf_measure_job job = {&scene, 1000, make_ray, tick, &user};
+  sf_measure one, four;
+  uint64_t hits = 0;
+  omp_set_num_threads(1);
+  ck_assert_int_eq(sf_measure_rays(&job, &one).code, SF_OK);
+  omp_set_num_threads(4);
+  ck_assert_int_eq(sf_measure_rays(&job, &four).code, SF_OK);
+  assert_same_counts(&one.core, &four.core);
+  ck_assert_mem_eq(one.hit, four.hit, 1000 / 8);
+  ck_assert_mem_eq(one.saturated_samples, four.saturated_samples, sizeof one.saturated_samples);
+  ck_assert_int_eq(sf_counts_compare(&one.core, "core", &one.recount, "recount").code, SF_OK);
+  for (uint64_t i = 0; i < 1000; i++) {
+    bool hit = one.hit[i / 8] >> i % 8 & 1;
+    ck_assert(!(hit && i % 7 == 3));
+    hits += hit;
+  }
+  ck_assert_uint_eq(hits, one.core.rays);
+  ck_assert_uint_gt(one.core.samples, 1000);
+  ck_assert_uint_eq(one.core.samples, one.recount.samples);
+  sf_measure_free(&one), sf_measure_free(&four);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(measure_reports_the_lowest_failing_ray)
+{
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  rays user = {777, UINT64_MAX};
+  sf_measure_job job = {&scene, 5000, make_ray, tick, &user};
+  sf_measure measure;
+  omp_set_num_threads(4);
+  for (int repeat = 0; repeat < 5; repeat++) {
+    sf_status status = sf_measure_rays(&job, &measure);
+    ck_assert_int_eq(status.code, SF_E_RANGE);
+    ck_assert_str_eq(status.message, "no ray 777");
+  }
+  user = (rays){UINT64_MAX, 100};
+  ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_E_STOPPED);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(probe_names_the_sample_of_a_difference)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 3);
+  fx_trace *trace = malloc(sizeof *trace);
+  sf_probe *probe = calloc(1, sizeof *probe);
+  rays user = {UINT64_MAX, UINT64_MAX};
+  fx_ray ray;
+  int16_t f[32];
+  fx_out out;
+  probe->net = &scene.net, probe->trace = trace;
+  sf_probe_begin(probe);
+  ck_assert_ptr_eq(probe->trace, trace);
+  make_ray(&user, 0, &ray);
+  fixture_inputs(4, 0, f, 32, 900);
+  ck_assert_int_eq(sf_probe_net(probe, &ray, true, f, &out).code, SF_OK);
+  ck_assert_int_eq(sf_probe_net(probe, &ray, false, f, &out).code, SF_OK);
+  probe->core.layer[FX_C1].spikes[2]++; /* the fault */
+  sf_status status = sf_probe_net(probe, &ray, false, f, &out);
+  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+  ck_assert_msg(strstr(status.message, "sample 2: spikes of layer C1 at step 2: core ") == status.message, "%s",
+                status.message);
+  free(trace), free(probe);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* ---- the paper ---- */
+
+static const sf_published_row *find_row(const sf_published_row *rows, int n, const char *backbone, const char *data,
+                                        const char *reading, const char *beta)
+{
+  for (int i = 0; i < n; i++)
+    if (!strcmp(rows[i].backbone, backbone) && !strcmp(rows[i].data, data) && rows[i].beta && !strcmp(rows[i].beta, beta) &&
+        !strncmp(rows[i].reading, reading, strlen(reading)))
+      return &rows[i];
+  ck_abort_msg("no row %s %s %s %s", backbone, data, reading, beta);
+  return NULL;
+}
+
+/* Rates worked out by hand from the table's printed digits, to 3 places. */
+START_TEST(published_rates)
+{
+  static const struct {
+    const char *backbone, *data, *reading, *beta;
+    double rate;
+  } wanted[] = {
+      {"TensoRF", "Synthetic", "R = 19200", "5e-9", 0.328}, {"TensoRF", "Synthetic", "R = 19200", "5e-8", 0.319},
+      {"TensoRF", "Synthetic", "R = 19200", "5e-7", 0.327}, {"TensoRF", "LLFF", "R = 3840", "5e-9", 0.386},
+      {"TensoRF", "LLFF", "R = 3840", "5e-8", 0.396},       {"TensoRF", "LLFF", "R = 3840", "5e-7", 0.418},
+      {"INGP", "Synthetic", "R = 4096", "1e-7", 0.613},     {"INGP", "Synthetic", "R = 4096", "1e-6", 0.570},
+      {"INGP", "Synthetic", "R = 8064", "1e-7", 0.532},     {"INGP", "Synthetic", "R = 8064", "1e-6", 0.316},
+  };
+  sf_published_row rows[SF_PUBLISHED_MAX];
+  int n = sf_published_rows(rows);
+  ck_assert_int_le(n, SF_PUBLISHED_MAX);
+  for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+    const sf_published_row *row =
+        find_row(rows, n, wanted[i].backbone, wanted[i].data, wanted[i].reading, wanted[i].beta);
+    ck_assert_msg(fabs(row->rate - wanted[i].rate) <= 0.0006, "%s %s %s: %f", row->backbone, row->data, row->beta, row->rate);
+  }
+  /* A net that prices h at every step cannot cost as little as the paper's third INGP row. */
+  ck_assert(find_row(rows, n, "INGP", "Synthetic", "R = 6144", "1e-6")->rate < 0);
+}
+END_TEST
+
+START_TEST(published_residuals)
+{
+  sf_published_row rows[SF_PUBLISHED_MAX];
+  int n = sf_published_rows(rows), printed = 0;
+  ck_assert_int_eq(n, 4 * (3 + 3 + 1 + 1)); /* an ANN row and three betas per group and reading */
+  for (int i = 0; i < n; i++) {
+    const sf_published_row *r = &rows[i];
+    double residual = 100 * (r->recomputed_mj / r->published_mj - 1);
+    ck_assert_double_eq_tol(r->residual_percent, residual, 1e-9);
+    if (!r->beta) {
+      ck_assert_double_eq_tol(r->residual_percent, 0, 1e-9); /* it defines the samples */
+      continue;
+    }
+    double again = (4.6 * r->real_macs + 0.9 * r->rate * r->steps * (r->macs - (r->reading[4] == '6' ? 8064 : r->real_macs))) *
+                   r->samples * 1e-9;
+    ck_assert_double_eq_tol(again, r->published_mj, 1e-9 * r->published_mj); /* the implied rate gives the row back */
+    if (!strcmp(r->backbone, "TensoRF"))
+      ck_assert_double_le(fabs(r->residual_percent), strcmp(r->data, "LLFF") ? 0.5 : 2.5);
+    if (isnan(r->published_saving_percent)) continue;
+    ck_assert_double_le(fabs(r->saving_percent - r->published_saving_percent), 0.006); /* two printed digits */
+    printed++;
+  }
+  ck_assert_int_eq(printed, 9);
+  ck_assert_double_eq_tol(find_row(rows, n, "TensoRF", "Synthetic", "R", "5e-9")->samples, 7.6e6, 0.05e6);
+  ck_assert_double_eq_tol(find_row(rows, n, "TensoRF", "LLFF", "R", "5e-9")->samples, 126e6, 0.5e6);
+  ck_assert_double_eq_tol(find_row(rows, n, "INGP", "Synthetic", "R", "1e-7")->samples, 7.7e6, 0.05e6);
+}
+END_TEST
+
+/* ---- reports ---- */
+
+static const cJSON *at(const cJSON *json, const char *key)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  ck_assert_msg(item != NULL, "JSON has no '%s'", key);
+  return item;
+}
+
+START_TEST(json_keeps_every_digit)
+{
+  fx_net net = small_net();
+  fx_counts c = {0};
+  c.layer[FX_C2].sop[1] = 9007199254740993u; /* 2^53 + 1: a double cannot hold it */
+  cJSON *json = sf_counts_json(&net, &c);
+  char *text = cJSON_PrintUnformatted(json);
+  ck_assert_msg(strstr(text, "\"sop\":[0,9007199254740993]") != NULL, "%s", text);
+  cJSON *again = cJSON_Parse(text);
+  ck_assert_ptr_nonnull(again);
+  ck_assert_int_eq(cJSON_GetArraySize(at(again, "layers")), SF_LAYERS);
+  free(text);
+  cJSON_Delete(json), cJSON_Delete(again);
+}
+END_TEST
+
+START_TEST(report_json_holds_what_was_counted)
+{
+  fx_net net = small_net();
+  sf_audit_report *r = calloc(1, sizeof *r);
+  *r = (sf_audit_report){.scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  sf_recount_sample(&net, small_spikes, true, &r->measure.core);
+  r->measure.recount = r->measure.core;
+  ck_assert_int_eq(sf_ledger_make(&net, &r->measure.core, &r->ledger).code, SF_OK);
+  cJSON *json = sf_report_json(r);
+  char *text = cJSON_PrintUnformatted(json);
+  cJSON_Delete(json);
+  json = cJSON_Parse(text);
+  ck_assert_double_eq(at(json, "energy_spiking_fj")->valuedouble, 220000);
+  ck_assert_double_eq(at(json, "energy_ann_fj")->valuedouble, 349600);
+  ck_assert_double_eq_tol(at(json, "energy_saving_percent")->valuedouble, 37.0709, 1e-4);
+  ck_assert_double_eq_tol(at(json, "energy_spiking_mj_per_view")->valuedouble, 4.4e-7, 1e-18);
+  ck_assert_double_eq(at(json, "samples_per_ray")->valuedouble, 0.25);
+  ck_assert(cJSON_IsTrue(at(json, "core_equals_recount")));
+  ck_assert(cJSON_IsNull(at(json, "core_equals_rtl_equals_recount"))); /* no ray was run there */
+  ck_assert_int_ge(cJSON_GetArraySize(at(json, "not_modelled")), 5);
+  ck_assert_int_ge(cJSON_GetArraySize(at(json, "criticism")), 4);
+  const cJSON *c1 = cJSON_GetArrayItem(at(at(json, "counts"), "layers"), FX_C1);
+  ck_assert_double_eq(cJSON_GetArrayItem(at(c1, "firing_rate"), 1)->valuedouble, 0.5);
+  free(text), free(r);
+  cJSON_Delete(json);
+}
+END_TEST
+
+START_TEST(report_says_that_counts_differ)
+{
+  fx_net net = small_net();
+  sf_audit_report *r = calloc(1, sizeof *r);
+  *r = (sf_audit_report){.scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  r->three.rays = 1, r->three.wanted = 1;
+  r->three.core.layer[FX_C3].sop[0] = 5;
+  r->three.agreement = sf_counts_compare(&r->three.core, "core", &r->three.rtl, "accelerator");
+  cJSON *json = sf_report_json(r);
+  ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
+  ck_assert_str_eq(at(json, "difference")->valuestring, "SOP of layer C3 at step 0: core 5, accelerator 0");
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  sf_report_print(out, r);
+  fclose(out);
+  ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: SOP of layer C3 at step 0"));
+  ck_assert_ptr_nonnull(strstr(text, "not modelled:"));
+  free(text), free(r);
+  cJSON_Delete(json);
+}
+END_TEST
+
+START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
+{
+  fx_net net = small_net();
+  char list[64];
+  const uint64_t none[SF_LAYERS] = {0}, density[SF_LAYERS] = {0, 9, 0, 0, 0}, more[SF_LAYERS] = {1, 0, 0, 2, 3};
+  ck_assert(!sf_saturation_unexpected(&net, none, list, sizeof list));
+  ck_assert_str_eq(list, "none");
+  ck_assert(!sf_saturation_unexpected(&net, density, list, sizeof list));
+  ck_assert(sf_saturation_unexpected(&net, more, list, sizeof list));
+  ck_assert_str_eq(list, "D1,C2,C3");
+  net.mode = FX_NODECAY;
+  ck_assert(!sf_saturation_unexpected(&net, more, list, sizeof list));
+  sf_saturation_census(more, 4, list, sizeof list);
+  ck_assert_str_eq(list, "D1 1 samples, C2 2 samples, C3 3 samples, 4 features");
+  sf_saturation_census(none, 0, list, sizeof list);
+  ck_assert_str_eq(list, "none");
+  sf_saturation_census(more, 4, list, 12); /* too short a text is cut between entries */
+  ck_assert_uint_lt(strlen(list), 12);
+}
+END_TEST
+
+START_TEST(sha256_of_known_texts)
+{
+  char hex[65], long_text[1000];
+  sf_sha256("", 0, hex);
+  ck_assert_str_eq(hex, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  sf_sha256("abc", 3, hex);
+  ck_assert_str_eq(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  sf_sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq", 56, hex);
+  ck_assert_str_eq(hex, "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  memset(long_text, 'a', sizeof long_text);
+  sf_sha256(long_text, 1000, hex);
+  ck_assert_str_eq(hex, "41edece42d63e8d9bf515a9ba6932e1c20cbc9f5a5d134645adb5db1b9737ea3");
+}
+END_TEST
+
+/* ---- golden planes ---- */
+
+static fx_pixel some_pixel(uint32_t grey, uint32_t transmittance)
+{
+  fx_pixel p = {.transmittance = transmittance, .weight_sum = (1u << SF_TRANS_FRAC) - transmittance, .samples = 3};
+  for (int c = 0; c < 3; c++) p.colour[c] = (uint64_t)grey << 20;
+  p.depth = (uint64_t)p.weight_sum * (5 << 16);
+  return p;
+}
+
+START_TEST(golden_planes_hold_the_pixel)
+{
+  sf_golden g;
+  fx_net net = small_net();
+  fx_counts c = {0};
+  sf_recount_sample(&net, small_spikes, true, &c);
+  fx_pixel pixel = some_pixel(32768, 1 << 18), empty = some_pixel(0, 1 << 20);
+  ck_assert_int_eq(sf_golden_create(&g, 2, 1, SF_PLANES).code, SF_OK);
+  sf_golden_set(&g, 1, &pixel, &c, 0.25);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_R)[1], 32768);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_A)[1], 49152);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_T)[1], 1 << 18);
+  ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_R)[1], 32768.0f / 65535);
+  ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[1], 1.25f); /* 5 steps of 0.25, whatever the alpha */
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_SAMPLES)[1], 3);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_SPIKES)[1], 12);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_SOPS)[1], 40);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_MACS)[1], 40);
+  ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_ENERGY)[1], 220000);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_MACS)[0], 0); /* the neighbour is untouched */
+  sf_golden_set(&g, 0, &empty, &c, 0.25);
+  ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[0], 0);
+  sf_golden_free(&g);
+}
+END_TEST
+
+static void remove_in(const char *dir, const char *name)
+{
+  char path[300];
+  snprintf(path, sizeof path, "%s/%s", dir, name);
+  ck_assert_int_eq(unlink(path), 0);
+}
+
+START_TEST(golden_file_reads_back)
+{
+  const char *tmp = getenv("TMPDIR");
+  char dir[200], path[300];
+  snprintf(dir, sizeof dir, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
+  ck_assert_ptr_nonnull(mkdtemp(dir));
+  snprintf(path, sizeof path, "%s/g.exr", dir);
+  sf_golden g;
+  fx_counts c = {0};
+  fx_pixel pixel = some_pixel(12345, 77);
+  const char *const attributes[] = {"t_r", "2", NULL};
+  ck_assert_int_eq(sf_golden_create(&g, 3, 2, SF_PLANES).code, SF_OK);
+  for (size_t i = 0; i < 6; i++) sf_golden_set(&g, i, &pixel, &c, 1);
+  sf_status status = sf_golden_save(&g, path, attributes);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  sf_exr_channel *channel;
+  int width, height, n;
+  ck_assert_int_eq(sf_exr_load(path, &width, &height, &channel, &n).code, SF_OK);
+  ck_assert_int_eq(width, 3);
+  ck_assert_int_eq(height, 2);
+  ck_assert_int_eq(n, SF_PLANES);
+  int found = 0;
+  for (int i = 0; i < n; i++) {
+    if (strcmp(channel[i].name, "fx.T") && strcmp(channel[i].name, "fx.G")) continue;
+    ck_assert_int_eq(channel[i].type, SF_EXR_UINT);
+    ck_assert_uint_eq(((uint32_t *)channel[i].data)[5], channel[i].name[3] == 'T' ? 77 : 12345);
+    found++;
+  }
+  ck_assert_int_eq(found, 2);
+  sf_exr_free(channel, n);
+  remove_in(dir, "g.exr");
+  ck_assert_int_eq(rmdir(dir), 0);
+  sf_golden_free(&g);
+}
+END_TEST
+
+START_TEST(quality_composites_the_window_over_the_background)
+{
+  enum { W = 20, H = 16 };
+  static uint16_t rgba[W * H * 4];
+  sf_image picture = {W, H, rgba};
+  const float white[3] = {1, 1, 1}, black[3] = {0, 0, 0};
+  double psnr, ssim;
+  sf_golden g;
+  for (int i = 0; i < W * H; i++) { /* a grey ramp, half transparent: 0.5 * grey + 0.5 over white */
+    rgba[4 * i] = rgba[4 * i + 1] = rgba[4 * i + 2] = (uint16_t)(200 * i), rgba[4 * i + 3] = 32768;
+  }
+  ck_assert_int_eq(sf_golden_create(&g, 12, 11, SF_FLOAT_PLANES).code, SF_OK);
+  for (int y = 0; y < 11; y++)
+    for (int x = 0; x < 12; x++)
+      for (int c = 0; c < 3; c++) {
+        float alpha = 32768.0f / 65535, grey = (float)(200 * ((y + 5) * W + x + 8)) / 65535;
+        sf_golden_real(&g, SF_PLANE_R + c)[y * 12 + x] = grey * alpha + (1 - alpha) + 0.01f;
+      }
+  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim).code, SF_OK);
+  ck_assert_double_eq_tol(psnr, 40, 0.01); /* a constant error of 0.01: 20 log10 100 */
+  ck_assert_double_gt(ssim, 0.95);
+  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, black, &psnr, &ssim).code, SF_OK);
+  ck_assert_double_lt(psnr, 10);
+  ck_assert_int_eq(sf_golden_quality(&g, &picture, 9, 5, white, &psnr, &ssim).code, SF_E_RANGE);
+  g.height = 10;
+  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim).code, SF_OK);
+  ck_assert(isnan(ssim));
+  sf_golden_free(&g);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("audit");
+  TCase *counts = tcase_create("counts"), *measure = tcase_create("measure"), *report = tcase_create("report");
+  tcase_add_test(counts, recount_equals_counting_by_hand);
+  tcase_add_test(counts, recount_sees_every_bit);
+  tcase_add_test(counts, ledger_equals_pricing_by_hand);
+  tcase_add_test(counts, nothing_counted_costs_nothing);
+  tcase_add_test(counts, largest_frame_does_not_wrap);
+  tcase_add_test(counts, too_large_a_total_is_refused);
+  tcase_add_test(counts, recount_equals_core_on_random_nets);
+  tcase_add_test(counts, comparison_names_each_planted_difference);
+  tcase_add_test(counts, comparison_names_the_first_and_ignores_the_rest);
+  tcase_add_test(measure, measure_does_not_depend_on_threads);
+  tcase_add_test(measure, measure_reports_the_lowest_failing_ray);
+  tcase_add_test(measure, probe_names_the_sample_of_a_difference);
+  tcase_add_test(report, published_rates);
+  tcase_add_test(report, published_residuals);
+  tcase_add_test(report, json_keeps_every_digit);
+  tcase_add_test(report, report_json_holds_what_was_counted);
+  tcase_add_test(report, report_says_that_counts_differ);
+  tcase_add_test(report, saturation_is_expected_only_where_the_formats_allow_it);
+  tcase_add_test(report, sha256_of_known_texts);
+  tcase_add_test(report, golden_planes_hold_the_pixel);
+  tcase_add_test(report, golden_file_reads_back);
+  tcase_add_test(report, quality_composites_the_window_over_the_background);
+  suite_add_tcase(suite, counts);
+  suite_add_tcase(suite, measure);
+  suite_add_tcase(suite, report);
+  return fixture_run(suite);
+}

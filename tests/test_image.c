@@ -1,0 +1,602 @@
+/* PNG, JPEG, EXR, downscaling, PSNR and SSIM. */
+#include "spikefield/image.h"
+#include "spikefield/io.h"
+#include "spikefield/rng.h"
+#include <check.h>
+#include <dirent.h>
+#include <math.h>
+#include <png.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <jpeglib.h>
+
+static char folder[200];
+
+static void make_folder(void)
+{
+  const char *base = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%s/sf-image-XXXXXX", base && *base ? base : "/tmp");
+  ck_assert_ptr_nonnull(mkdtemp(folder));
+}
+
+static void remove_folder(void)
+{
+  char command[300];
+  snprintf(command, sizeof command, "rm -rf '%s'", folder);
+  ck_assert_int_eq(system(command), 0);
+}
+
+static int entries(void)
+{
+  DIR *dir = opendir(folder);
+  int n = 0;
+  for (struct dirent *e; (e = readdir(dir));) n += strcmp(e->d_name, ".") && strcmp(e->d_name, "..");
+  closedir(dir);
+  return n;
+}
+
+static const char *in(const char *name)
+{
+  static char path[4][300];
+  static int turn;
+  char *p = path[turn++ % 4];
+  snprintf(p, sizeof path[0], "%s/%s", folder, name);
+  return p;
+}
+
+#define ck_good(call)                                                                                                  \
+  do {                                                                                                                 \
+    sf_status s_ = (call);                                                                                             \
+    ck_assert_msg(s_.code == SF_OK, "unexpected failure: %s", s_.message);                                             \
+  } while (0)
+
+static void ck_bad(sf_status s, sf_code code, const char *word, const char *other)
+{
+  ck_assert_msg(s.code == code, "code %d instead of %d: '%s'", s.code, code, s.message);
+  ck_assert_msg(strstr(s.message, word), "'%s' does not name '%s'", s.message, word);
+  ck_assert_msg(strstr(s.message, other), "'%s' does not name '%s'", s.message, other);
+  ck_assert_ptr_null(strchr(s.message, '\n'));
+}
+
+/* ---- PNG ---- */
+
+enum { W = 13, H = 9 };
+
+/* One kind of PNG: how it is stored, and how a stored sample becomes RGBA. */
+typedef struct kind {
+  int depth, colour, interlace, transparent;
+} kind;
+static const kind kinds[] = {
+    {1, PNG_COLOR_TYPE_GRAY, 0, 0},        {2, PNG_COLOR_TYPE_GRAY, 1, 0},   {4, PNG_COLOR_TYPE_GRAY, 0, 1},
+    {8, PNG_COLOR_TYPE_GRAY, 0, 0},        {8, PNG_COLOR_TYPE_GRAY, 1, 1},   {16, PNG_COLOR_TYPE_GRAY, 0, 0},
+    {16, PNG_COLOR_TYPE_GRAY, 1, 1},       {8, PNG_COLOR_TYPE_GRAY_ALPHA, 0, 0}, {16, PNG_COLOR_TYPE_GRAY_ALPHA, 1, 0},
+    {8, PNG_COLOR_TYPE_RGB, 0, 0},         {8, PNG_COLOR_TYPE_RGB, 1, 1},    {16, PNG_COLOR_TYPE_RGB, 0, 0},
+    {16, PNG_COLOR_TYPE_RGB, 1, 1},        {8, PNG_COLOR_TYPE_RGB_ALPHA, 0, 0}, {8, PNG_COLOR_TYPE_RGB_ALPHA, 1, 0},
+    {16, PNG_COLOR_TYPE_RGB_ALPHA, 0, 0},  {16, PNG_COLOR_TYPE_RGB_ALPHA, 1, 0}, {1, PNG_COLOR_TYPE_PALETTE, 0, 0},
+    {4, PNG_COLOR_TYPE_PALETTE, 1, 1},     {8, PNG_COLOR_TYPE_PALETTE, 0, 1},
+};
+
+static int channels_of(int colour)
+{
+  if (colour == PNG_COLOR_TYPE_GRAY || colour == PNG_COLOR_TYPE_PALETTE) return 1;
+  return colour == PNG_COLOR_TYPE_GRAY_ALPHA ? 2 : colour == PNG_COLOR_TYPE_RGB ? 3 : 4;
+}
+
+static unsigned sample(const kind *k, int x, int y, int c)
+{
+  return (unsigned)(sf_random_u64(5, (uint64_t)c, (uint64_t)(y * W + x)) >> 40) & ((1u << k->depth) - 1);
+}
+
+/* Palette entry i, alpha last. */
+static unsigned palette(int i, int c) { return (unsigned)(i * 53 + c * 97 + 11) & 255; }
+
+static void put_png(const char *path, const kind *k)
+{
+  FILE *f = fopen(path, "wb");
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+  png_infop info = png_create_info_struct(png);
+  ck_assert(!setjmp(png_jmpbuf(png)));
+  png_init_io(png, f);
+  png_set_IHDR(png, info, W, H, k->depth, k->colour, k->interlace ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, 0, 0);
+  if (k->colour == PNG_COLOR_TYPE_PALETTE) {
+    png_color colours[256];
+    png_byte alpha[256];
+    int n = 1 << k->depth;
+    for (int i = 0; i < n; i++) {
+      colours[i].red = (png_byte)palette(i, 0), colours[i].green = (png_byte)palette(i, 1);
+      colours[i].blue = (png_byte)palette(i, 2), alpha[i] = (png_byte)palette(i, 3);
+    }
+    png_set_PLTE(png, info, colours, n);
+    if (k->transparent) png_set_tRNS(png, info, alpha, n, NULL);
+  } else if (k->transparent) {
+    png_color_16 key = {0};
+    key.gray = key.red = (png_uint_16)sample(k, 3, 2, 0);
+    key.green = (png_uint_16)sample(k, 3, 2, 1), key.blue = (png_uint_16)sample(k, 3, 2, 2);
+    png_set_tRNS(png, info, NULL, 0, &key);
+  }
+  png_write_info(png, info);
+  if (k->depth < 8) png_set_packing(png);
+  int channels = channels_of(k->colour), bytes = k->depth == 16 ? 2 : 1;
+  png_byte data[H][W * 8], *rows[H];
+  for (int y = 0; y < H; y++) {
+    rows[y] = data[y];
+    for (int x = 0; x < W; x++) {
+      for (int c = 0; c < channels; c++) {
+        unsigned v = sample(k, x, y, c);
+        png_byte *p = data[y] + (x * channels + c) * bytes;
+        if (bytes == 2) *p++ = (png_byte)(v >> 8);
+        *p = (png_byte)v;
+      }
+    }
+  }
+  png_write_image(png, rows);
+  png_write_end(png, NULL);
+  png_destroy_write_struct(&png, &info);
+  fclose(f);
+}
+
+static void expected_rgba(const kind *k, int x, int y, unsigned out[4])
+{
+  unsigned full = 65535 / ((1u << k->depth) - 1), v[4];
+  int channels = channels_of(k->colour);
+  for (int c = 0; c < channels; c++) v[c] = sample(k, x, y, c);
+  if (k->colour == PNG_COLOR_TYPE_PALETTE) {
+    for (int c = 0; c < 4; c++) out[c] = palette((int)v[0], c) * 257;
+    if (!k->transparent) out[3] = 65535;
+    return;
+  }
+  bool grey = channels < 3, key = k->transparent;
+  for (int c = 0; c < 3; c++) out[c] = v[grey ? 0 : c] * full;
+  out[3] = channels == 2 ? v[1] * full : channels == 4 ? v[3] * full : 65535;
+  for (int c = 0; c < channels && key; c++) key = v[c] == sample(k, 3, 2, c);
+  if (key) out[3] = 0;
+}
+
+START_TEST(png_kinds)
+{
+  sf_image image;
+  const kind *k = &kinds[_i];
+  put_png(in("a.png"), k);
+  ck_good(sf_image_load(&image, in("a.png")));
+  ck_assert_int_eq(image.width, W);
+  ck_assert_int_eq(image.height, H);
+  for (int y = 0; y < H; y++) {
+    for (int x = 0; x < W; x++) {
+      unsigned e[4];
+      expected_rgba(k, x, y, e);
+      for (int c = 0; c < 4; c++) ck_assert_uint_eq(image.rgba[(y * W + x) * 4 + c], e[c]);
+    }
+  }
+  sf_image_free(&image);
+}
+END_TEST
+
+static sf_image noise_image(int width, int height)
+{
+  sf_image image = {width, height, malloc((size_t)width * (size_t)height * 8)};
+  for (int i = 0; i < width * height * 4; i++) image.rgba[i] = (uint16_t)(sf_random_u64(1, 0, (uint64_t)i) >> 48);
+  return image;
+}
+
+START_TEST(png_round_trip_rounds_to_nearest)
+{
+  sf_image a = noise_image(31, 17), b;
+  a.rgba[0] = 65535, a.rgba[1] = 128, a.rgba[2] = 129, a.rgba[3] = 0;
+  ck_good(sf_image_save_png(&a, in("a.png")));
+  ck_good(sf_image_load(&b, in("a.png")));
+  ck_assert_int_eq(b.width, 31);
+  ck_assert_int_eq(b.height, 17);
+  for (int i = 0; i < 31 * 17 * 4; i++) ck_assert_uint_eq(b.rgba[i], (unsigned)lrint(a.rgba[i] / 257.0) * 257);
+  ck_assert_uint_eq(b.rgba[1], 0);
+  ck_assert_uint_eq(b.rgba[2], 257);
+  sf_image_free(&a);
+  sf_image_free(&b);
+}
+END_TEST
+
+/* Without the syncing of sf_write_file, which would dominate the loops below. */
+static void put(const char *path, const void *data, size_t n)
+{
+  unlink(path); /* some file systems sync a file that is cut and written again */
+  FILE *f = fopen(path, "wb");
+  ck_assert_ptr_nonnull(f);
+  ck_assert_uint_eq(fwrite(data, 1, n, f), n);
+  ck_assert_int_eq(fclose(f), 0);
+}
+
+/* Cut at every length, and one byte wrong at every place: never a crash, and a cut file is always refused. */
+static void damage(const char *path, sf_code code, sf_status (*load)(const char *), bool refuse_flips)
+{
+  char *data;
+  size_t n;
+  ck_good(sf_read_file(path, 1 << 20, &data, &n));
+  for (size_t i = 0; i < n; i++) {
+    put(in("bad"), data, i);
+    sf_status s = load(in("bad"));
+    ck_assert_msg(s.code == code, "cut to %zu of %zu bytes: code %d %s", i, n, s.code, s.message);
+    ck_assert_msg(strstr(s.message, "/bad"), "'%s' does not name the file", s.message);
+  }
+  for (size_t i = 0; i < n; i++) {
+    char right = data[i];
+    data[i] ^= (char)(1 + sf_random_below(4, 0, i, 255));
+    put(in("bad"), data, n);
+    data[i] = right;
+    sf_status s = load(in("bad"));
+    ck_assert_msg(!refuse_flips || s.code != SF_OK, "byte %zu wrong: accepted", i);
+  }
+  free(data);
+}
+
+static sf_status load_image(const char *path)
+{
+  sf_image image;
+  sf_status s = sf_image_load(&image, path);
+  if (s.code == SF_OK) sf_image_free(&image);
+  else ck_assert_ptr_null(image.rgba);
+  return s;
+}
+
+START_TEST(png_damage)
+{
+  sf_image a = noise_image(7, 5);
+  ck_good(sf_image_save_png(&a, in("a.png")));
+  sf_image_free(&a);
+  damage(in("a.png"), SF_E_FORMAT, load_image, true);
+}
+END_TEST
+
+static void put_be(unsigned char *p, uint32_t v)
+{
+  for (int i = 0; i < 4; i++) p[i] = (unsigned char)(v >> (24 - 8 * i));
+}
+
+START_TEST(image_faults)
+{
+  sf_image image;
+  ck_bad(sf_image_load(&image, in("none.png")), SF_E_IO, "none.png", "No such file");
+  ck_good(sf_write_file(in("text.png"), "hello", 5));
+  ck_bad(sf_image_load(&image, in("text.png")), SF_E_FORMAT, "text.png", "neither");
+  ck_good(sf_write_file(in("empty.png"), "", 0));
+  ck_bad(sf_image_load(&image, in("empty.png")), SF_E_FORMAT, "empty.png", "empty");
+  ck_bad(sf_image_load(&image, folder), SF_E_IO, folder, "folder");
+  image = (sf_image){0, 3, NULL};
+  ck_bad(sf_image_save_png(&image, in("x.png")), SF_E_RANGE, "x.png", "0 x 3");
+}
+END_TEST
+
+/* A header that promises 40000 x 40000 pixels is refused before memory is asked for. */
+START_TEST(absurd_size_is_refused)
+{
+  unsigned char f[33] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
+  sf_image image;
+  put_be(f + 16, 40000);
+  put_be(f + 20, 40000);
+  f[24] = 8, f[25] = 6;
+  uint32_t crc = 0xffffffffu;
+  for (int i = 12; i < 29; i++) {
+    crc ^= f[i];
+    for (int b = 0; b < 8; b++) crc = crc & 1 ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
+  }
+  put_be(f + 29, ~crc);
+  char file[60] = {0};
+  memcpy(file, f, 33);
+  memcpy(file + 33, "\0\0\0\0IDAT\x35\xaf\x06\x1e", 12);
+  ck_good(sf_write_file(in("big.png"), file, 45));
+  ck_bad(sf_image_load(&image, in("big.png")), SF_E_RANGE, "big.png", "40000 x 40000");
+}
+END_TEST
+
+START_TEST(full_disk_leaves_nothing)
+{
+  sf_image a = noise_image(100, 100);
+  struct rlimit limit = {10000, 10000};
+  float *depth = calloc(200 * 200, sizeof *depth);
+  for (int i = 0; i < 200 * 200; i++) depth[i] = sf_random_float(1, 1, (uint64_t)i);
+  sf_exr_channel c = {"Z", SF_EXR_FLOAT, depth};
+  signal(SIGXFSZ, SIG_IGN);
+  ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &limit), 0);
+  ck_assert_int_eq(sf_image_save_png(&a, in("a.png")).code, SF_E_IO);
+  ck_bad(sf_exr_save(in("a.exr"), 200, 200, &c, 1, NULL), SF_E_IO, "a.exr", "large");
+  ck_assert_int_eq(entries(), 0);
+  ck_bad(sf_image_save_png(&a, in("no/a.png")), SF_E_IO, "no/a.png", "No such file");
+  ck_bad(sf_exr_save(in("no/a.exr"), 200, 200, &c, 1, NULL), SF_E_IO, "no/a.exr", "No such file");
+  free(depth);
+  sf_image_free(&a);
+}
+END_TEST
+
+/* ---- JPEG ---- */
+
+static void put_jpeg(const char *path, int width, int height, bool grey, bool progressive)
+{
+  struct jpeg_compress_struct c;
+  struct jpeg_error_mgr e;
+  FILE *f = fopen(path, "wb");
+  c.err = jpeg_std_error(&e);
+  jpeg_create_compress(&c);
+  jpeg_stdio_dest(&c, f);
+  c.image_width = (JDIMENSION)width, c.image_height = (JDIMENSION)height;
+  c.input_components = grey ? 1 : 3, c.in_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&c);
+  jpeg_set_quality(&c, 100, TRUE);
+  for (int i = 0; i < c.num_components; i++) c.comp_info[i].h_samp_factor = c.comp_info[i].v_samp_factor = 1;
+  if (progressive) jpeg_simple_progression(&c);
+  jpeg_start_compress(&c, TRUE);
+  JSAMPLE line[3 * 64], *row = line;
+  for (int y = 0; y < height; y++) {
+    for (int x = 0; x < width; x++)
+      for (int k = 0; k < c.input_components; k++)
+        line[x * c.input_components + k] = (JSAMPLE)(k == 0 ? 4 * x : k == 1 ? 5 * y : 200 - 2 * x);
+    jpeg_write_scanlines(&c, &row, 1);
+  }
+  jpeg_finish_compress(&c);
+  jpeg_destroy_compress(&c);
+  fclose(f);
+}
+
+/* Quality 100 without chroma subsampling: rounding of the transform and the colour change stays within 3 of 255. */
+START_TEST(jpeg_values)
+{
+  sf_image image;
+  bool grey = _i & 1;
+  put_jpeg(in("a.jpg"), 40, 24, grey, _i & 2);
+  ck_good(sf_image_load(&image, in("a.jpg")));
+  ck_assert_int_eq(image.width, 40);
+  ck_assert_int_eq(image.height, 24);
+  for (int y = 0; y < 24; y++) {
+    for (int x = 0; x < 40; x++) {
+      const uint16_t *p = image.rgba + (y * 40 + x) * 4;
+      const int e[3] = {4 * x, grey ? 4 * x : 5 * y, grey ? 4 * x : 200 - 2 * x};
+      for (int c = 0; c < 3; c++) ck_assert_int_le(abs(p[c] - e[c] * 257), 3 * 257);
+      ck_assert_uint_eq(p[3], 65535);
+    }
+  }
+  sf_image_free(&image);
+}
+END_TEST
+
+START_TEST(jpeg_damage)
+{
+  put_jpeg(in("a.jpg"), 24, 16, false, _i);
+  damage(in("a.jpg"), SF_E_FORMAT, load_image, false);
+}
+END_TEST
+
+/* ---- downscaling ---- */
+
+START_TEST(downscale_weighs_by_alpha)
+{
+  uint16_t pixels[2][4][4] = {{{100, 0, 0, 65535}, {900, 0, 0, 0}, {7, 8, 9, 0}, {9, 8, 7, 0}},
+                              {{400, 0, 0, 32768}, {500, 0, 0, 0}, {7, 8, 9, 0}, {9, 8, 8, 0}}};
+  sf_image image = {4, 2, malloc(sizeof pixels)};
+  memcpy(image.rgba, pixels, sizeof pixels);
+  ck_bad(sf_image_downscale(&image, 3, "name.png"), SF_E_RANGE, "name.png", "4 x 2");
+  ck_bad(sf_image_downscale(&image, 0, "name.png"), SF_E_RANGE, "name.png", "below 1");
+  ck_good(sf_image_downscale(&image, 1, ""));
+  ck_assert_int_eq(image.width, 4);
+  ck_good(sf_image_downscale(&image, 2, ""));
+  ck_assert_int_eq(image.width, 2);
+  ck_assert_int_eq(image.height, 1);
+  /* (100 * 65535 + 400 * 32768) / (65535 + 32768) = 200.0005; alpha 98303 / 4 = 24575.75 */
+  ck_assert_uint_eq(image.rgba[0], 200);
+  ck_assert_uint_eq(image.rgba[3], 24576);
+  /* nothing opaque: the plain mean, 31 / 4 = 7.75 in blue */
+  ck_assert_uint_eq(image.rgba[4], 8);
+  ck_assert_uint_eq(image.rgba[6], 8);
+  ck_assert_uint_eq(image.rgba[7], 0);
+  sf_image_free(&image);
+}
+END_TEST
+
+/* ---- EXR ---- */
+
+enum { EW = 37, EH = 41 }; /* three blocks of 16 lines, the last one short */
+
+static void exr_channels(sf_exr_channel c[4])
+{
+  static const char *const names[4] = {"raw.R", "Z", "B", "spikes"};
+  static const sf_exr_type types[4] = {SF_EXR_UINT, SF_EXR_FLOAT, SF_EXR_HALF, SF_EXR_UINT};
+  for (int k = 0; k < 4; k++) {
+    strcpy(c[k].name, names[k]);
+    c[k].type = types[k];
+    uint32_t *u = c[k].data = malloc(EW * EH * 4);
+    float *f = c[k].data;
+    for (uint64_t i = 0; i < EW * EH; i++) {
+      u[i] = (uint32_t)(sf_random_u64(9, (uint64_t)k, i) >> 32);
+      if (types[k] == SF_EXR_HALF) f[i] = (float)sf_random_below(9, 7, i, 4096) / 2048 - 1; /* exact in half */
+    }
+  }
+}
+
+START_TEST(exr_round_trip_is_exact)
+{
+  sf_exr_channel c[4], *back;
+  const char *const attributes[] = {"scene", "a \"quoted\" text", "steps", "5", NULL};
+  static const int order[4] = {2, 1, 0, 3}; /* sorted by name: B, Z, raw.R, spikes */
+  int width, height, n;
+  exr_channels(c);
+  ck_good(sf_exr_save(in("a.exr"), EW, EH, c, 4, attributes));
+  ck_good(sf_exr_load(in("a.exr"), &width, &height, &back, &n));
+  ck_assert_int_eq(width, EW);
+  ck_assert_int_eq(height, EH);
+  ck_assert_int_eq(n, 4);
+  for (int i = 0; i < 4; i++) {
+    const sf_exr_channel *e = &c[order[i]];
+    ck_assert_str_eq(back[i].name, e->name);
+    ck_assert_int_eq(back[i].type, e->type);
+    ck_assert_mem_eq(back[i].data, e->data, EW * EH * 4);
+  }
+  char *bytes;
+  size_t size;
+  ck_good(sf_read_file(in("a.exr"), 1 << 20, &bytes, &size));
+  ck_assert_ptr_nonnull(memmem(bytes, size, "scene\0string\0\x0f\0\0\0a \"quoted\" text", 32));
+  ck_assert_ptr_nonnull(memmem(bytes, size, "steps\0string\0\x01\0\0\0" "5", 18));
+  ck_assert_ptr_nonnull(memmem(bytes, size, "compression\0compression\0\x01\0\0\0\x03", 29)); /* 3 = ZIP */
+  free(bytes);
+  sf_exr_free(back, n);
+  for (int i = 0; i < 4; i++) free(c[i].data);
+}
+END_TEST
+
+START_TEST(exr_half_rounds)
+{
+  float v[4] = {1.0f + 1.0f / 4096, -70000.0f, 1e-9f, 0.1f};
+  sf_exr_channel c = {"H", SF_EXR_HALF, v}, *back;
+  int width, height, n;
+  ck_good(sf_exr_save(in("h.exr"), 2, 2, &c, 1, NULL));
+  ck_good(sf_exr_load(in("h.exr"), &width, &height, &back, &n));
+  const float *f = back[0].data;
+  ck_assert(f[0] == 1.0f);                 /* half has 10 fraction bits */
+  ck_assert(isinf(f[1]) && f[1] < 0);      /* the largest half is 65504 */
+  ck_assert(f[2] == 0.0f);                 /* below half of the smallest denormal, 2^-25 */
+  ck_assert(fabsf(f[3] - 0.1f) <= 0.1f / 2048); /* relative rounding error 2^-11 */
+  sf_exr_free(back, n);
+}
+END_TEST
+
+static sf_status load_exr(const char *path)
+{
+  int width, height, n;
+  sf_exr_channel *c;
+  sf_status s = sf_exr_load(path, &width, &height, &c, &n);
+  if (s.code == SF_OK) sf_exr_free(c, n);
+  else ck_assert_ptr_null(c);
+  return s;
+}
+
+START_TEST(exr_damage)
+{
+  uint32_t u[20 * 19];
+  float f[20 * 19];
+  for (int i = 0; i < 20 * 19; i++) u[i] = (uint32_t)(i / 7), f[i] = sf_random_float(1, 3, (uint64_t)i);
+  sf_exr_channel c[2] = {{"A", SF_EXR_UINT, u}, {"Z", SF_EXR_FLOAT, f}};
+  ck_good(sf_exr_save(in("a.exr"), 20, 19, c, 2, NULL));
+  damage(in("a.exr"), SF_E_FORMAT, load_exr, false);
+}
+END_TEST
+
+START_TEST(exr_refused)
+{
+  float f[4] = {0};
+  sf_exr_channel twice[2] = {{"A", SF_EXR_FLOAT, f}, {"A", SF_EXR_HALF, f}}, none = {"A", SF_EXR_FLOAT, NULL};
+  const char *const reserved[] = {"channels", "text", NULL};
+  ck_bad(sf_exr_save(in("a.exr"), 2, 2, twice, 2, NULL), SF_E_RANGE, "a.exr", "two EXR channels are named 'A'");
+  ck_bad(sf_exr_save(in("a.exr"), 2, 2, &none, 1, NULL), SF_E_RANGE, "a.exr", "no data");
+  ck_bad(sf_exr_save(in("a.exr"), 0, 2, twice, 1, NULL), SF_E_RANGE, "a.exr", "0 x 2");
+  ck_bad(sf_exr_save(in("a.exr"), 2, 2, twice, 0, NULL), SF_E_RANGE, "a.exr", "0 channels");
+  ck_assert_int_ne(sf_exr_save(in("a.exr"), 2, 2, twice, 1, reserved).code, SF_OK);
+  ck_assert_int_eq(entries(), 0);
+  ck_bad(load_exr(in("none.exr")), SF_E_IO, "none.exr", "No such file");
+}
+END_TEST
+
+/* ---- PSNR and SSIM ---- */
+
+START_TEST(psnr_known)
+{
+  float a[4] = {0, 0.5f, 1, 0.25f}, b[4] = {0.5f, 0.5f, 1, 0.25f};
+  ck_assert(isinf(sf_psnr(a, a, 4)));
+  /* mse = 0.25 / 4 = 1/16, exactly: 10 log10 16, to the rounding of log10 */
+  ck_assert_double_eq_tol(sf_psnr(a, b, 4), 12.041199826559248, 1e-12);
+  ck_assert_double_eq_tol(sf_psnr(a, b, 1), 6.020599913279624, 1e-12);
+}
+END_TEST
+
+/* Straight from the definition: a two-dimensional window, two passes, moments about the mean. */
+static double naive_ssim(const float *a, const float *b, int width, int height, int channels)
+{
+  double weight[11][11], total = 0, sum = 0;
+  for (int i = 0; i < 11; i++)
+    for (int k = 0; k < 11; k++) total += weight[i][k] = exp(-((i - 5) * (i - 5) + (k - 5) * (k - 5)) / 4.5);
+  long n = 0;
+  for (int c = 0; c < channels; c++) {
+    for (int y = 5; y < height - 5; y++) {
+      for (int x = 5; x < width - 5; x++, n++) {
+        double ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
+        for (int pass = 0; pass < 2; pass++) {
+          for (int i = 0; i < 11; i++) {
+            for (int k = 0; k < 11; k++) {
+              int at = ((y + i - 5) * width + x + k - 5) * channels + c;
+              double w = weight[i][k] / total;
+              if (!pass) ma += w * a[at], mb += w * b[at];
+              else va += w * (a[at] - ma) * (a[at] - ma), vb += w * (b[at] - mb) * (b[at] - mb),
+                   cov += w * (a[at] - ma) * (b[at] - mb);
+            }
+          }
+        }
+        sum += (2 * ma * mb + 1e-4) * (2 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
+      }
+    }
+  }
+  return sum / (double)n;
+}
+
+START_TEST(ssim_equals_the_definition)
+{
+  static const int sizes[][3] = {{11, 11, 1}, {12, 20, 3}, {33, 17, 3}, {40, 11, 4}};
+  int w = sizes[_i][0], h = sizes[_i][1], c = sizes[_i][2], n = w * h * c;
+  float *a = malloc((size_t)n * sizeof *a), *b = malloc((size_t)n * sizeof *b);
+  for (int i = 0; i < n; i++) {
+    a[i] = 0.5f + 0.5f * sinf((float)i * 0.37f);
+    b[i] = 0.7f * a[i] + 0.3f * sf_random_float(2, 0, (uint64_t)i);
+  }
+  /* Sums of 121 doubles near 1: cancellation in E[x^2] - E[x]^2 costs about 1e-15, divided by at least 9e-4. */
+  ck_assert_double_eq_tol(sf_ssim(a, b, w, h, c), naive_ssim(a, b, w, h, c), 1e-11);
+  ck_assert_double_eq_tol(sf_ssim(a, a, w, h, c), 1, 1e-12);
+  free(a);
+  free(b);
+}
+END_TEST
+
+START_TEST(ssim_of_constants)
+{
+  enum { N = 15 * 14 };
+  float a[N], b[N];
+  for (int i = 0; i < N; i++) a[i] = 0.25f, b[i] = 0.75f;
+  /* (2 * 0.25 * 0.75 + c1) / (0.25^2 + 0.75^2 + c1), c1 = 1e-4 */
+  ck_assert_double_eq_tol(sf_ssim(a, b, 15, 14, 1), 0.3751 / 0.6251, 1e-12);
+  ck_assert(isnan(sf_ssim(a, b, 10, 14, 1)));
+}
+END_TEST
+
+#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
+
+static Suite *suite(void)
+{
+  Suite *s = suite_create("image");
+  TCase *t = tcase_create("all");
+  tcase_add_checked_fixture(t, make_folder, remove_folder);
+  tcase_set_timeout(t, 60);
+  tcase_add_loop_test(t, png_kinds, 0, COUNT(kinds));
+  tcase_add_test(t, png_round_trip_rounds_to_nearest);
+  tcase_add_test(t, png_damage);
+  tcase_add_test(t, image_faults);
+  tcase_add_test(t, absurd_size_is_refused);
+  tcase_add_test(t, full_disk_leaves_nothing);
+  tcase_add_loop_test(t, jpeg_values, 0, 4);
+  tcase_add_loop_test(t, jpeg_damage, 0, 2);
+  tcase_add_test(t, downscale_weighs_by_alpha);
+  tcase_add_test(t, exr_round_trip_is_exact);
+  tcase_add_test(t, exr_half_rounds);
+  tcase_add_test(t, exr_damage);
+  tcase_add_test(t, exr_refused);
+  tcase_add_test(t, psnr_known);
+  tcase_add_loop_test(t, ssim_equals_the_definition, 0, 4);
+  tcase_add_test(t, ssim_of_constants);
+  suite_add_tcase(s, t);
+  return s;
+}
+
+int main(void)
+{
+  SRunner *runner = srunner_create(suite());
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed ? 1 : 0;
+}
