@@ -1,7 +1,9 @@
 // Layer engine: sequencer, weight memories, lanes and spike store. Mirror: src/fx/net.c
 `default_nettype none
 
-module sf_core (
+module sf_core #(
+    parameter TAP = 1
+) (
     input  wire          clk_i,
     input  wire          rst_ni,
     input  wire          clear_i,
@@ -67,7 +69,7 @@ module sf_core (
 
   reg [2:0] op_q, layer_q, step_q;
   reg base_q, tapped_q, spikes_valid_q;
-  reg [2:0] tap_layer_q, tap_step_q;
+  reg [2:0] spikes_layer_q, spikes_step_q;
   reg [11:0] value_q;
   reg [7:0] fired_q;
   reg [127:0] spike_mask_q, issued_q, lanes_q;
@@ -167,21 +169,23 @@ module sf_core (
     value_q <= value_select == 2'd0 ? feature_i : value_select == 2'd1 ? dir_i : h;
     fired_q <= fired_d;
     spike_mask_q <= spike_mask;
-    tap_layer_q <= layer_q;
-    tap_step_q <= step_q;
+    spikes_layer_q <= layer_q;
+    spikes_step_q <= step_q;
     lanes_q <= ~(~128'd0 << n_out_q);  // lanes that the layer has; a FIRE's own by the time its spikes are seen
     if (op_q == sf_op_pkg::LOAD) issued_q <= 128'd0;
     else if (op_q == sf_op_pkg::ADD || op_q == sf_op_pkg::SPLIT) issued_q <= issued_q | spike_mask_q;
-    if (spikes_valid_q && tap_layer_q != sf_op_pkg::C1) begin
-      any_q <= tap_step_q == 3'd0 ? spikes : any_q | spikes;
+    if (spikes_valid_q && spikes_layer_q != sf_op_pkg::C1) begin
+      any_q <= spikes_step_q == 3'd0 ? spikes : any_q | spikes;
       for (int t = 0; t < 8; t++) begin
-        if (tap_step_q == t[2:0]) store_q[t] <= spikes;
-        else if (tap_step_q == 3'd0) store_q[t] <= 128'd0;
+        if (spikes_step_q == t[2:0]) store_q[t] <= spikes;
+        else if (spikes_step_q == 3'd0) store_q[t] <= 128'd0;
       end
     end
   end
 
-  sf_layer u_layer (
+  sf_layer #(
+      .TAP(TAP)
+  ) u_layer (
       .clk_i         (clk_i),
       .op_i          (op_q),
       .base_i        (base_q),
@@ -195,6 +199,8 @@ module sf_core (
       .row_i         (row),
       .narrow_i      (narrow),
       .spikes_o      (spikes_all),
+      .tap_i         (spikes_valid_q),
+      .tap_spikes_in_i(spikes_layer_q == sf_op_pkg::C2),
       .membrane_o    (tap_membrane_o),
       .h_lane_i      ({step_d, 4'd0} + {2'd0, value_index[4:0]} + 7'd1),
       .h_o           (h),
@@ -210,14 +216,36 @@ module sf_core (
   assign n_out_o = n_out_q;
   assign fired_o = fired_q;
   assign spikes_valid_o = spikes_valid_q;
-  assign spikes_layer_o = tap_layer_q;
-  assign spikes_step_o = tap_step_q;
+  assign spikes_layer_o = spikes_layer_q;
+  assign spikes_step_o = spikes_step_q;
   assign spikes_count_o = 8'($countones(spikes));
-  assign tap_valid_o = tapped_q;
-  assign tap_layer_o = tap_layer_q;
-  assign tap_step_o = tap_step_q;
-  assign tap_spikes_o = spikes;
-  assign tap_rows_o = issued_q;
+
+  // Tap: one beat per spiking layer and step, one per TAKE of an integrating layer. Two cycles behind.
+  if (TAP != 0) begin : g_tap
+    reg valid_q;
+    reg [2:0] layer2_q, step2_q;
+    reg [127:0] spikes_q, rows_q;
+    always_ff @(posedge clk_i or negedge rst_ni) begin
+      if (!rst_ni) valid_q <= 1'b0;
+      else valid_q <= tapped_q && !clear_i;
+    end
+    always_ff @(posedge clk_i) begin
+      if (tapped_q) begin
+        layer2_q <= spikes_layer_q;
+        step2_q <= spikes_step_q;
+        spikes_q <= spikes;
+        rows_q <= issued_q;
+      end
+    end
+    assign tap_valid_o = valid_q;
+    assign tap_layer_o = layer2_q;
+    assign tap_step_o = step2_q;
+    assign tap_spikes_o = spikes_q;
+    assign tap_rows_o = rows_q;
+  end else begin : g_no_tap
+    assign {tap_valid_o, tap_layer_o, tap_step_o, tap_spikes_o, tap_rows_o} = 263'd0;
+    wire unused_tap_ok = &{1'b0, tapped_q, issued_q};
+  end
   wire unused_index_ok = &{1'b0, spike_index};
 endmodule
 

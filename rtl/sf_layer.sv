@@ -4,7 +4,9 @@
 // Datapath registers have no reset: LOAD and step 0 define them before use.
 `default_nettype none
 
-module sf_layer (
+module sf_layer #(
+    parameter TAP = 1
+) (
     input  wire                 clk_i,
     input  wire          [ 2:0] op_i,
     input  wire                 base_i,     // LOAD: start from the direction's current
@@ -18,7 +20,9 @@ module sf_layer (
     input  wire        [1023:0] row_i,
     input  wire         [127:0] narrow_i,
     output reg          [127:0] spikes_o,   // of the last FIRE, all lanes
-    output reg         [3071:0] membrane_o, // of the last FIRE, after reset, 24 bits a lane: for the tap only
+    input  wire                 tap_i,      // the cycle after a FIRE
+    input  wire                 tap_spikes_in_i,
+    output reg         [3071:0] membrane_o, // after reset, 24 bits a lane: for the tap only
     input  wire          [ 6:0] h_lane_i,
     output wire signed   [11:0] h_o,
     input  wire          [ 6:0] current_lane_i,
@@ -65,16 +69,33 @@ module sf_layer (
     end
   end
 
+  reg [24:0] fire;  // one lane's result; a name, not a register
   always_ff @(posedge clk_i) begin
     if (op_i == sf_op_pkg::FIRE && !spikes_in_i) begin
-      for (int l = 0; l < 128; l++)
-        {spikes_o[l], v_value_q[l]} <= sf_plif_step(v_value_q[l], acc_q[l], k_i, theta_i, mode_i, first_i);
+      for (int l = 0; l < 128; l++) begin
+        fire = sf_plif_step(v_value_q[l], acc_q[l], k_i, theta_i, mode_i, first_i);
+        v_value_q[l] <= fire[23:0];
+        spikes_o[l] <= fire[24];
+      end
     end
     if (op_i == sf_op_pkg::FIRE && spikes_in_i) begin
-      for (int l = 0; l < 128; l++)
-        {spikes_o[l], v_spike_q[l]} <= sf_plif_step(v_spike_q[l], {acc_q[l][15:0], 8'd0}, k_i, theta_i, mode_i,
-                                                    first_i);
+      for (int l = 0; l < 128; l++) begin
+        fire = sf_plif_step(v_spike_q[l], {acc_q[l][15:0], 8'd0}, k_i, theta_i, mode_i, first_i);
+        v_spike_q[l] <= fire[23:0];
+        spikes_o[l] <= fire[24];
+      end
     end
+  end
+
+  if (TAP != 0) begin : g_tap
+    always_ff @(posedge clk_i) begin
+      if (tap_i) begin
+        for (int l = 0; l < 128; l++) membrane_o[24*l+:24] <= tap_spikes_in_i ? v_spike_q[l] : v_value_q[l];
+      end
+    end
+  end else begin : g_no_tap
+    assign membrane_o = 3072'd0;
+    wire unused_tap_ok = &{1'b0, tap_i, tap_spikes_in_i};
   end
 endmodule
 

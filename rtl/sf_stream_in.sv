@@ -1,6 +1,6 @@
 // Samples in over AXI4-Stream, double-buffered. Two's complement values, 16 bits each, four per beat, value 0 in bits 15:0.
 // A packet is one sample: with tuser on its first beat, the direction of a new ray (n_dir values, padded to whole
-// beats), then the features (n_feature values, padded likewise); tlast on its last beat.
+// beats), then the features (n_feature values, padded likewise); tlast on its last beat. Padding is 0.
 // A bad packet raises error_packet_o or error_value_o; from then on everything is discarded until a soft reset,
 // because later samples of the ray would use the wrong direction.
 `default_nettype none
@@ -45,7 +45,7 @@ module sf_stream_in (
   assign tready_o = drop_q || (enable_i && !full_q[write_q]);
   wire beat = tvalid_i && tready_o && !drop_q;
 
-  // Values beyond the padded end are not looked at.
+  // Padding counts as values: it has to be in range too.
   reg wide_value;
   always_comb begin
     wide_value = 1'b0;
@@ -59,9 +59,11 @@ module sf_stream_in (
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {full_q, write_q, read_q, beat_q, begun_q, have_dir_q, drop_q} <= 10'd0;
+      full_q <= 2'd0;
+      {write_q, read_q, beat_q, begun_q, have_dir_q, drop_q} <= 8'd0;
     end else if (clear_i) begin
-      {full_q, write_q, read_q, beat_q, begun_q, have_dir_q, drop_q} <= 10'd0;
+      full_q <= 2'd0;
+      {write_q, read_q, beat_q, begun_q, have_dir_q, drop_q} <= 8'd0;
     end else begin
       if (bad) drop_q <= 1'b1;
       if (beat) begin

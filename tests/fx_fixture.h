@@ -68,7 +68,8 @@ static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_
     layer->theta = theta[l];
     for (int i = 0; i < layer->n_in; i++)
       for (int o = 0; o < layer->n_out; o++)
-        layer->w[i * SF_LANES + o] = (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), -127, 127);
+        layer->w[i * SF_LANES + o] =
+            (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), -127, 127);
   }
   for (int64_t i = 0; i < scene->grid.entries * 2; i++)
     scene->grid.table[i] = (int8_t)fixture_pick(seed, 30, (uint64_t)i, -127, 127);
@@ -97,8 +98,7 @@ static inline fx_scene fixture_scene(const fixture_sizes *sizes, uint64_t seed)
 
 static inline void fixture_inputs(uint64_t seed, uint64_t index, int16_t *f, int n, int limit)
 {
-  for (int i = 0; i < n; i++)
-    f[i] = (int16_t)fixture_pick(seed, 40, index * 64 + (uint64_t)i, -limit, limit);
+  for (int i = 0; i < n; i++) f[i] = (int16_t)fixture_pick(seed, 40, index * 64 + (uint64_t)i, -limit, limit);
 }
 
 /* ---- the naive nets ---- */

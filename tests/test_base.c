@@ -231,9 +231,12 @@ END_TEST
 static const struct {
   const char *text, *place, *problem;
 } bad_json[] = {
-    {"", "bad.json:1:1", "empty"},         {" \n ", "bad.json:2:2", "empty"},
-    {"{\"a\": 1", "bad.json:1:8", "early"}, {"{\"a\": 1}\n x", "bad.json:2:2", "after the end"},
-    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed"}, {"[1,\n 2,,]", "bad.json:2:4", "malformed"},
+    {"", "bad.json:1:1", "empty"},
+    {" \n ", "bad.json:2:2", "empty"},
+    {"{\"a\": 1", "bad.json:1:8", "early"},
+    {"{\"a\": 1}\n x", "bad.json:2:2", "after the end"},
+    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed"},
+    {"[1,\n 2,,]", "bad.json:2:4", "malformed"},
     {"nul", "bad.json:1:1", "malformed"},
 };
 
@@ -263,8 +266,10 @@ START_TEST(tensors_round_trip)
   int64_t q[2] = {INT64_MIN, INT64_MAX};
   int16_t s[1] = {-7};
   uint8_t nothing[1];
-  sf_tensor t[] = {{"bytes", SF_I8, 1, {3}, b},       {"m", SF_F32, 2, {2, 3}, f},
-                   {"long", SF_I64, 1, {2}, q},        {"scalar", SF_I16, 0, {0}, s},
+  sf_tensor t[] = {{"bytes", SF_I8, 1, {3}, b},
+                   {"m", SF_F32, 2, {2, 3}, f},
+                   {"long", SF_I64, 1, {2}, q},
+                   {"scalar", SF_I16, 0, {0}, s},
                    {"empty", SF_U8, 3, {4, 0, 2}, nothing}};
   cJSON *meta = cJSON_CreateObject();
   cJSON_AddStringToObject(meta, "version", "1 \"x\"\n");
@@ -334,7 +339,8 @@ static void put_tensors(const char *header, size_t data_bytes)
 
 #define W(shape, offsets) "{\"w\":{\"dtype\":\"F32\",\"shape\":" shape ",\"data_offsets\":" offsets "}}"
 #define PAIR(a, b)                                                                                                     \
-  "{\"w\":{\"dtype\":\"U8\",\"shape\":[4],\"data_offsets\":" a "},\"v\":{\"dtype\":\"U8\",\"shape\":[4],\"data_offsets\":" b "}}"
+  "{\"w\":{\"dtype\":\"U8\",\"shape\":[4],\"data_offsets\":" a                                                         \
+  "},\"v\":{\"dtype\":\"U8\",\"shape\":[4],\"data_offsets\":" b "}}"
 static const struct {
   const char *header;
   size_t data;
@@ -357,7 +363,8 @@ static const struct {
     {PAIR("[0,4]", "[2,6]"), 6, SF_E_FORMAT, "overlaps", "'v'"},
     {PAIR("[0,4]", "[5,9]"), 9, SF_E_FORMAT, "hole of 1 bytes", "'v'"},
     {PAIR("[1,5]", "[5,9]"), 9, SF_E_FORMAT, "hole of 1 bytes", "'w'"},
-    {"{\"w\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[0,1]},\"w\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[1,2]}}",
+    {"{\"w\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[0,1]},\"w\":{\"dtype\":\"U8\",\"shape\":[1],\"data_"
+     "offsets\":[1,2]}}",
      2, SF_E_FORMAT, "appears twice", "'w'"},
     {"{\"w\":{\"dtype\":\"F33\",\"shape\":[1],\"data_offsets\":[0,1]}}", 1, SF_E_FORMAT, "unknown dtype 'F33'", "'w'"},
     {"{\"w\":{\"dtype\":\"BF16\",\"shape\":[1],\"data_offsets\":[0,2]}}", 2, SF_E_UNSUPPORTED, "BF16", "'w'"},
@@ -542,19 +549,19 @@ END_TEST
 static const struct {
   const char *line, *name, *problem;
 } bad_lines[] = {
-    {"in --nope", "--nope", "unknown option"},    {"in -x", "-x", "unknown option"},
-    {"in --numbe 3", "--numbe", "unknown"},       {"in --number", "--number", "needs a value"},
+    {"in --nope", "--nope", "unknown option"},     {"in -x", "-x", "unknown option"},
+    {"in --numbe 3", "--numbe", "unknown"},        {"in --number", "--number", "needs a value"},
     {"in -n --flag", "--number", "needs a value"}, {"in --number 11", "--number", "out of range"},
-    {"in -n -6", "--number", "-5 to 10"},         {"in -n 3x", "--number", "not a whole number"},
-    {"in -n 1.5", "--number", "not a whole"},     {"in -n 99999999999999999999", "--number", "out of range"},
-    {"in --any 2147483648", "--any", "32 bits"},  {"in --number ''", "--number", "not a whole number"},
-    {"in --seed -1", "--seed", "not a whole"},    {"in --seed 18446744073709551616", "--seed", "64 bits"},
-    {"in --seed 0x", "--seed", "not a whole"},    {"in --beta nan", "--beta", "not a finite number"},
-    {"in --beta inf", "--beta", "not a finite"},  {"in --beta 1e999", "--beta", "not a finite"},
-    {"in --beta 1.01", "--beta", "out of range"}, {"in --beta one", "--beta", "not a number"},
-    {"in --mode sum", "--mode", "hybrid|decay"},  {"in --mode hyb", "--mode", "unknown"},
-    {"in --flag=1", "--flag", "takes no value"},  {"in --out=", "--out", "empty"},
-    {"a b c", "'c'", "unexpected argument"},      {"-f", "missing argument", "prog IN"},
+    {"in -n -6", "--number", "-5 to 10"},          {"in -n 3x", "--number", "not a whole number"},
+    {"in -n 1.5", "--number", "not a whole"},      {"in -n 99999999999999999999", "--number", "out of range"},
+    {"in --any 2147483648", "--any", "32 bits"},   {"in --number ''", "--number", "not a whole number"},
+    {"in --seed -1", "--seed", "not a whole"},     {"in --seed 18446744073709551616", "--seed", "64 bits"},
+    {"in --seed 0x", "--seed", "not a whole"},     {"in --beta nan", "--beta", "not a finite number"},
+    {"in --beta inf", "--beta", "not a finite"},   {"in --beta 1e999", "--beta", "not a finite"},
+    {"in --beta 1.01", "--beta", "out of range"},  {"in --beta one", "--beta", "not a number"},
+    {"in --mode sum", "--mode", "hybrid|decay"},   {"in --mode hyb", "--mode", "unknown"},
+    {"in --flag=1", "--flag", "takes no value"},   {"in --out=", "--out", "empty"},
+    {"a b c", "'c'", "unexpected argument"},       {"-f", "missing argument", "prog IN"},
 };
 
 START_TEST(cli_refused)

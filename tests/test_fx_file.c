@@ -7,12 +7,12 @@
 
 static char folder[256], path[300];
 
-static void setup(void)
+/* Once, outside the test processes, so that the folder goes even when a test fails. */
+static void make_folder(void)
 {
   const char *base = getenv("TMPDIR");
   snprintf(folder, sizeof folder, "%s/spikefield-fx-XXXXXX", base && *base ? base : "/tmp");
   ck_assert_ptr_nonnull(mkdtemp(folder));
-  snprintf(path, sizeof path, "%s/scene.snn", folder);
 }
 
 static int files_in_folder(bool remove_them)
@@ -30,10 +30,16 @@ static int files_in_folder(bool remove_them)
   return count;
 }
 
-static void teardown(void)
+static void remove_folder(void)
 {
   files_in_folder(true);
   rmdir(folder);
+}
+
+static void setup(void)
+{
+  files_in_folder(true);
+  snprintf(path, sizeof path, "%s/scene.snn", folder);
 }
 
 static fx_scene small_scene(uint64_t seed)
@@ -150,7 +156,8 @@ START_TEST(edited_anywhere)
   save(&scene);
   ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
   for (uint64_t i = 0; i < 1500; i++) {
-    const size_t at = i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
+    const size_t at =
+        i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
     const char kept = data[at];
     data[at] = (char)(kept ^ (1 << fixture_pick(1, 2, i, 0, 7)));
     put(data, size);
@@ -181,21 +188,45 @@ static void edit(const char *key, const char *value)
 START_TEST(metadata_is_checked)
 {
   static const char *const wrong[][3] = {
-      {"format", "spikefield-model", "format"}, {"format", NULL, "format"},        {"version", "2", "version"},
-      {"version", NULL, "version"},             {"t_r", "0", "t_r"},               {"t_r", "9", "t_r"},
-      {"t_r", "-1", "t_r"},                     {"t_r", "3x", "t_r"},              {"t_r", "", "t_r"},
-      {"t_r", NULL, "t_r"},                     {"t_r", "99999999999999999999", "t_r"},
-      {"t_r", "2", "checksum"},                 {"checksum", NULL, "checksum"},    {"checksum", "0x0", "checksum"},
-      {"mode", "soft", "mode"},                 {"D1.k", "4097", "D1.k"},          {"C1.k", "-1", "C1.k"},
-      {"D1.theta", "0", "D1.theta"},            {"C2.theta", "8388608", "C2.theta"}, {"D2.theta", "1", "D2.theta"},
-      {"D1.n_out", "129", "D1.n_out"},          {"D1.n_out", "15", "D2.n_in"},     {"C3.n_out", "4", "C3.n_out"},
-      {"C1.n_in", "33", "C1.n_in"},             {"grid.levels", "17", "grid.levels"},
-      {"grid.levels", "1", "grid.scale_q16"},   {"exp_in.mul", "65536", "exp_in.mul"},
-      {"exp_in.shift", "32", "exp_in.shift"},   {"exp_in.bias", "131072", "exp_in.bias"},
-      {"sigmoid_in.bias", "1", "sigmoid_in.bias"}, {"occ_res", "12", "occ_res"},   {"occ_res", "512", "occ_res"},
-      {"step_q24", "0", "step_q24"},            {"max_samples", "1025", "max_samples"},
-      {"trans_stop", "1048576", "trans_stop"},  {"background[1]", "65537", "background[1]"},
-      {"dir_scale", "nan", "dir_scale"},        {"dir_scale", "0", "dir_scale"},   {"to_box_offset[2]", "inf", "to_box_offset[2]"},
+      {"format", "spikefield-model", "format"},
+      {"format", NULL, "format"},
+      {"version", "2", "version"},
+      {"version", NULL, "version"},
+      {"t_r", "0", "t_r"},
+      {"t_r", "9", "t_r"},
+      {"t_r", "-1", "t_r"},
+      {"t_r", "3x", "t_r"},
+      {"t_r", "", "t_r"},
+      {"t_r", NULL, "t_r"},
+      {"t_r", "99999999999999999999", "t_r"},
+      {"t_r", "2", "checksum"},
+      {"checksum", NULL, "checksum"},
+      {"checksum", "0x0", "checksum"},
+      {"mode", "soft", "mode"},
+      {"D1.k", "4097", "D1.k"},
+      {"C1.k", "-1", "C1.k"},
+      {"D1.theta", "0", "D1.theta"},
+      {"C2.theta", "8388608", "C2.theta"},
+      {"D2.theta", "1", "D2.theta"},
+      {"D1.n_out", "129", "D1.n_out"},
+      {"D1.n_out", "15", "D2.n_in"},
+      {"C3.n_out", "4", "C3.n_out"},
+      {"C1.n_in", "33", "C1.n_in"},
+      {"grid.levels", "17", "grid.levels"},
+      {"grid.levels", "1", "grid.scale_q16"},
+      {"exp_in.mul", "65536", "exp_in.mul"},
+      {"exp_in.shift", "32", "exp_in.shift"},
+      {"exp_in.bias", "131072", "exp_in.bias"},
+      {"sigmoid_in.bias", "1", "sigmoid_in.bias"},
+      {"occ_res", "12", "occ_res"},
+      {"occ_res", "512", "occ_res"},
+      {"step_q24", "0", "step_q24"},
+      {"max_samples", "1025", "max_samples"},
+      {"trans_stop", "1048576", "trans_stop"},
+      {"background[1]", "65537", "background[1]"},
+      {"dir_scale", "nan", "dir_scale"},
+      {"dir_scale", "0", "dir_scale"},
+      {"to_box_offset[2]", "inf", "to_box_offset[2]"},
       {"to_box_scale", "one", "to_box_scale"},
   };
   fx_scene scene = small_scene(4);
@@ -227,10 +258,10 @@ START_TEST(tensors_are_checked)
     const char *tensor;
     int64_t value;
     const char *place;
-  } wrong[] = {{"density.w1", -128, "density.w1"},    {"grid.stride", 3, "stride"},      {"grid.stride", -1, "stride"},
-               {"grid.stride", 601, "stride"},        {"grid.offset", 1, "offset"},      {"grid.shift", 32, "shift"},
-               {"grid.scale_q16", 0, "scale_q16"},    {"grid.scale_q16", 1 << 30, "stride"},
-               {"colour.w5", 1, "checksum"},          {"occupancy", 77, "checksum"},     {"grid.table", 1, "checksum"}};
+  } wrong[] = {{"density.w1", -128, "density.w1"}, {"grid.stride", 3, "stride"},          {"grid.stride", -1, "stride"},
+               {"grid.stride", 601, "stride"},     {"grid.offset", 1, "offset"},          {"grid.shift", 32, "shift"},
+               {"grid.scale_q16", 0, "scale_q16"}, {"grid.scale_q16", 1 << 30, "stride"}, {"colour.w5", 1, "checksum"},
+               {"occupancy", 77, "checksum"},      {"grid.table", 1, "checksum"}};
   fx_scene scene = small_scene(5);
   scene.grid.table[0] = 0, scene.occupancy[0] = 0, scene.net.layer[FX_C3].w[0] = 0;
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
@@ -244,8 +275,8 @@ END_TEST
 
 START_TEST(missing_tensor_is_named)
 {
-  static const char *const names[] = {"grid.table", "occupancy", "density.w1", "density.w2", "colour.w3", "colour.w4",
-                                      "colour.w5", "grid.offset", "grid.shift"};
+  static const char *const names[] = {"grid.table", "occupancy", "density.w1",  "density.w2", "colour.w3",
+                                      "colour.w4",  "colour.w5", "grid.offset", "grid.shift"};
   fx_scene scene = small_scene(6);
   for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
     sf_tensors set;
@@ -292,8 +323,9 @@ int main(void)
 {
   Suite *suite = suite_create("fx_file");
   TCase *files = tcase_create("files");
-  tcase_set_timeout(files, 60);
-  tcase_add_checked_fixture(files, setup, teardown);
+  tcase_set_timeout(files, 300);
+  tcase_add_unchecked_fixture(files, make_folder, remove_folder);
+  tcase_add_checked_fixture(files, setup, NULL);
   tcase_add_test(files, round_trip);
   tcase_add_test(files, same_scene_same_bytes);
   tcase_add_test(files, cut_short_anywhere);

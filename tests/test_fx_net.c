@@ -154,7 +154,7 @@ int main(void)
 {
   Suite *suite = suite_create("fx_net");
   TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 60);
+  tcase_set_timeout(nets, 300);
   tcase_add_test(nets, net_equals_naive_at_full_size);
   tcase_add_test(nets, net_equals_naive_at_random_sizes);
   tcase_add_test(nets, fixture_fires_in_part);

@@ -63,8 +63,8 @@ static void put_text(const char *path, const char *text)
 
 START_TEST(rays_follow_opengl_axes)
 {
-  sf_camera c = {.width = 4, .height = 2, .fx = 2, .fy = 4, .cx = 2, .cy = 1,
-                 .to_world = {1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7}};
+  sf_camera c = {
+      .width = 4, .height = 2, .fx = 2, .fy = 4, .cx = 2, .cy = 1, .to_world = {1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7}};
   float o[3], d[3];
   sf_camera_ray(&c, 2, 1, o, d);
   ck_assert(o[0] == 5 && o[1] == 6 && o[2] == 7);
@@ -108,7 +108,9 @@ START_TEST(loads_camera_angle)
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
-  ck_good(load(&d, "{" ANGLE "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
+  ck_good(load(&d,
+               "{" ANGLE
+               "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
                "train", (sf_dataset_options){1, 0, 0}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[0].name, "a");
@@ -132,8 +134,9 @@ START_TEST(options_and_stated_intrinsics)
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
   /* stated for 16 x 8, the pictures are half of that; frame b overrides the focal length */
-  ck_good(load(&d, "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME("a", UNIT)
-                   ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
+  ck_good(load(&d,
+               "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
+                   "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
                "test", (sf_dataset_options){2, 2.0f, 0}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
@@ -192,7 +195,8 @@ static const struct {
     {"{\"camera_angle_x\":\"1\",\"frames\":[" FRAME("a", UNIT) "]}", SF_E_FORMAT, ".json", "not a number"},
     {"{\"fl_x\":-3,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, ".json", "fl_x is -3"},
     {"{\"fl_x\":3,\"k2\":0.01,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json", "k2 = 0.01"},
-    {"{\"fl_x\":3,\"camera_model\":\"FISHEYE\",\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json", "FISHEYE"},
+    {"{\"fl_x\":3,\"camera_model\":\"FISHEYE\",\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json",
+     "FISHEYE"},
     {"{\"fl_x\":3,\"w\":8,\"h\":8,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_FORMAT, "frame 0 (a)", "says 8 x 8"},
     {"{" ANGLE "\"frames\":[" FRAME("a", UNIT) ",3]}", SF_E_FORMAT, "frame 1", "not an object"},
     {"{" ANGLE "\"frames\":[{\"transform_matrix\":" UNIT "}]}", SF_E_FORMAT, "frame 0", "file_path"},
@@ -205,7 +209,8 @@ static const struct {
     {ONE("[[1,0,0,1],[0,1,0,2],[0,0,1,3]]"), SF_E_FORMAT, "frame 1 (a)", "4 rows"},
     {ONE("[[1,0,0,1],[0,1,0],[0,0,1,3],[0,0,0,1]]"), SF_E_FORMAT, "frame 1 (a)", "transform_matrix[1]"},
     {ONE("[[1,0,0,1],[0,1,0,null],[0,0,1,3],[0,0,0,1]]"), SF_E_FORMAT, "frame 1 (a)", "transform_matrix[1][3]"},
-    {ONE("[[1,0,0,1],[0,1,0,1e40],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "transform_matrix[1][3] is not finite"},
+    {ONE("[[1,0,0,1],[0,1,0,1e40],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)",
+     "transform_matrix[1][3] is not finite"},
     {ONE("[[1,0,0,1],[0,1,0,NaN],[0,0,1,3],[0,0,0,1]]"), SF_E_FORMAT, "transforms_train.json:1:", "malformed"},
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,0,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "column 2"},
     {ONE("[[1,1,0,1],[0,0,0,1],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "degenerate"},
@@ -236,8 +241,9 @@ START_TEST(own_sizes_may_differ)
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 6, 7);
-  ck_good(load(&d, "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
-                   "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
+  ck_good(load(&d,
+               "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
+               "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
                "train", (sf_dataset_options){1, 0, 0}));
   ck_assert_int_eq(d.view[1].camera.height, 6);
   sf_dataset_free(&d);
@@ -267,10 +273,14 @@ static double inside(const sf_shape *s, const double p[3])
 {
   double r = hypot(p[0], p[1]);
   switch (s->kind) {
-  case SF_SPHERE: return sqrt(r * r + p[2] * p[2]) - s->size[0];
-  case SF_BOX: return fmax(fmax(fabs(p[0]) - s->size[0], fabs(p[1]) - s->size[1]), fabs(p[2]) - s->size[2]);
-  case SF_CYLINDER: return fmax(r - s->size[0], fabs(p[2]) - s->size[1]);
-  case SF_TORUS: return hypot(r - s->size[0], p[2]) - s->size[1];
+  case SF_SPHERE:
+    return sqrt(r * r + p[2] * p[2]) - s->size[0];
+  case SF_BOX:
+    return fmax(fmax(fabs(p[0]) - s->size[0], fabs(p[1]) - s->size[1]), fabs(p[2]) - s->size[2]);
+  case SF_CYLINDER:
+    return fmax(r - s->size[0], fabs(p[2]) - s->size[1]);
+  case SF_TORUS:
+    return hypot(r - s->size[0], p[2]) - s->size[1];
   }
   return NAN;
 }
@@ -421,8 +431,10 @@ START_TEST(shine_depends_on_the_view)
       ck_assert(c[3] == 1);
       least = fminf(least, c[2]), most = fmaxf(most, c[2]);
     }
-    if (shiny) ck_assert_float_gt(most - least, 0.2f);
-    else ck_assert_float_lt(most - least, 1e-3f); /* the point itself moves by float rounding */
+    if (shiny)
+      ck_assert_float_gt(most - least, 0.2f);
+    else
+      ck_assert_float_lt(most - least, 1e-3f); /* the point itself moves by float rounding */
   }
 }
 END_TEST

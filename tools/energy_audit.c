@@ -77,7 +77,8 @@ static sf_status load(audit *a)
   SF_TRY(sf_sha256_file(o->scene, a->hash));
   /* Random rays come from every view unless one is named; whole views are many rays, so one is the default. */
   if (o->views == 0 && o->view < 0 && o->rays == 0) o->views = 1;
-  sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .limit = o->view >= 0 ? o->view + 1 : o->views};
+  sf_dataset_options how = {
+      .downscale = o->downscale, .scale = (float)o->scale, .limit = o->view >= 0 ? o->view + 1 : o->views};
   SF_TRY(sf_dataset_load(&a->data, o->data, o->split, &how));
   if (o->view >= a->data.count || o->views > a->data.count)
     return sf_fail(SF_E_USAGE, "%s %d is out of range: %s has %d %s views", o->view >= 0 ? "--view" : "--views",
@@ -148,7 +149,8 @@ static sf_status compare_bitmaps(const fx_net *net, const uint64_t core[SF_LAYER
         if (!difference) continue;
         int bit = __builtin_ctzll(difference);
         return sf_fail(SF_E_DIFFERENCE, "spike of layer %s at step %d, neuron %d: core %d, accelerator %d",
-                       sf_layer_names[l], t, 64 * w + bit, (int)(core[l][t][w] >> bit & 1), (int)(rtl[l][t][w] >> bit & 1));
+                       sf_layer_names[l], t, 64 * w + bit, (int)(core[l][t][w] >> bit & 1),
+                       (int)(rtl[l][t][w] >> bit & 1));
       }
   return sf_ok();
 }
@@ -209,7 +211,8 @@ static sf_status rtl_all(audit *a, rtl_eval *e)
   SF_TRY(sf_dut_clear_counts(e->dut));
   a->start = sf_seconds();
   for (int i = 0; i < s->rays; i++) {
-    if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "stopped after %d of %d rays in the accelerator", i, s->rays);
+    if (sf_cli_interrupted())
+      return sf_fail(SF_E_STOPPED, "stopped after %d of %d rays in the accelerator", i, s->rays);
     sf_status status = rtl_ray(a, e, a->subset[i]);
     if (status.code == SF_E_DIFFERENCE) return name_ray(a, a->subset[i], status);
     SF_TRY(status);
@@ -323,7 +326,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--stall", 0, SF_ARG_INT, &o->stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S", "model units per world unit, 0 = the layout's (default 0)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
+       "model units per world unit, 0 = the layout's (default 0)"},
       {"--csv", 0, SF_ARG_STRING, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       {"--plusarg", 0, SF_ARG_STRING, &o->plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
@@ -347,8 +351,9 @@ int main(int argc, char **argv)
 {
   sf_cli cli = {.program = "energy_audit",
                 .usage = "energy_audit scene.snn DATA [options]",
-                .summary = "Counts every operation of a scene in the fixed-point core, in the accelerator and again from the\n"
-                           "spike bitmaps; prices the counts and the scene's ANN twin. Exit status 1 if any count differs.",
+                .summary =
+                    "Counts every operation of a scene in the fixed-point core, in the accelerator and again from the\n"
+                    "spike bitmaps; prices the counts and the scene's ANN twin. Exit status 1 if any count differs.",
                 .examples = "  energy_audit scene.snn data --views 2 --json\n"
                             "  energy_audit --published\n",
                 .min_positional = 0,

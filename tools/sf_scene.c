@@ -13,7 +13,8 @@ typedef struct scene_args {
 static void show_progress(void *user, int done, int total)
 {
   sf_progress *progress = user;
-  if (done == total || sf_progress_due(progress)) sf_progress_show(progress, "rendering: %d of %d pictures", done, total);
+  if (done == total || sf_progress_due(progress))
+    sf_progress_show(progress, "rendering: %d of %d pictures", done, total);
 }
 
 static void print_names(void)
@@ -33,8 +34,8 @@ static sf_status make_scene(const scene_args *args, const char *name)
   sf_status status = sf_procedural_write(name, args->output, &options, show_progress, &progress);
   sf_progress_end(&progress);
   if (status.code == SF_OK && !args->quiet)
-    printf("%s: %d train and %d test views of %d x %d pixels in %s (%.1f s)\n", name, args->train, args->test, args->size,
-           args->size, args->output, sf_seconds() - start);
+    printf("%s: %d train and %d test views of %d x %d pixels in %s (%.1f s)\n", name, args->train, args->test,
+           args->size, args->size, args->output, sf_seconds() - start);
   return status;
 }
 
@@ -66,7 +67,9 @@ int main(int argc, char **argv)
   };
   const char *name;
   sf_status status = sf_cli_parse(&cli, argc, argv, &name);
-  if (status.code == SF_OK && args.list) print_names();
-  else if (status.code == SF_OK) status = make_scene(&args, name);
+  if (status.code == SF_OK && args.list)
+    print_names();
+  else if (status.code == SF_OK)
+    status = make_scene(&args, name);
   return sf_cli_finish(&cli, status);
 }

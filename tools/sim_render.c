@@ -4,7 +4,6 @@
 #include "spikefield/golden.h"
 #include "spikefield/io.h"
 #include "spikefield/model.h"
-#include <inttypes.h>
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -32,14 +31,11 @@ typedef struct job {
   sf_dataset data;
   const sf_view *view;
   window crop;
-  bool crop_chosen; /* by the program, not by the user */
   char hash[65], beside[4096]; /* SHA-256 of the scene; the default model */
-  double step_length; /* between samples, world units */
+  double step_length;          /* between samples, world units */
   float background[3];
   sf_golden golden;
-  fx_counts counts;
-  uint64_t saturated_samples[SF_LAYERS];
-  double psnr, ssim, seconds;
+  sf_render_report report;
   sf_progress progress;
   double start;
 } job;
@@ -63,9 +59,10 @@ static sf_status choose_crop(job *j)
   j->crop = (window){0, 0, camera->width, camera->height};
   if (!j->opt.crop) {
     if (j->opt.backend != BACKEND_RTL) return sf_ok();
-    int w = camera->width < RTL_CROP ? camera->width : RTL_CROP, h = camera->height < RTL_CROP ? camera->height : RTL_CROP;
+    int w = camera->width < RTL_CROP ? camera->width : RTL_CROP,
+        h = camera->height < RTL_CROP ? camera->height : RTL_CROP;
     j->crop = (window){(camera->width - w) / 2, (camera->height - h) / 2, w, h};
-    j->crop_chosen = true;
+    j->report.crop_chosen = true;
     return sf_ok();
   }
   const char *text = j->opt.crop;
@@ -107,6 +104,11 @@ static sf_status load(job *j)
   SF_TRY(choose_crop(j));
   SF_TRY(check_writable(j->opt.exr));
   SF_TRY(check_writable(j->opt.png));
+  j->report.scene = j->opt.scene, j->report.sha256 = j->hash, j->report.view = j->view->name;
+  j->report.backend = backend_name[j->opt.backend], j->report.exr = j->opt.exr, j->report.png = j->opt.png;
+  j->report.net = &j->scene.net, j->report.events = j->opt.backend != BACKEND_FLOAT;
+  memcpy(j->report.crop, (const int[4]){j->crop.x, j->crop.y, j->crop.width, j->crop.height}, sizeof j->report.crop);
+  j->report.psnr = j->report.ssim = NAN;
   int planes = j->opt.backend == BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
   return sf_golden_create(&j->golden, j->crop.width, j->crop.height, planes);
 }
@@ -122,7 +124,10 @@ static void show_progress(job *j, size_t done)
                    all, (double)done / elapsed, elapsed * (double)(all - done) / (double)done);
 }
 
-static sf_status stopped(void) { return sf_fail(SF_E_STOPPED, "stopped; nothing was written"); }
+static sf_status stopped(void)
+{
+  return sf_fail(SF_E_STOPPED, "stopped; nothing was written");
+}
 
 /* ---- float ---- */
 
@@ -141,8 +146,8 @@ static sf_status float_rows(job *j, const sf_model *model, int y, int rows, floa
     sf_golden_real(&j->golden, SF_PLANE_A)[first + i] = alpha[i];
     sf_golden_real(&j->golden, SF_PLANE_Z)[first + i] = alpha[i] > 0 ? depth[i] / alpha[i] / j->data.scale : 0;
     sf_golden_int(&j->golden, SF_PLANE_SAMPLES)[first + i] = (uint32_t)samples[i];
-    j->counts.samples += (uint64_t)samples[i];
-    j->counts.rays += samples[i] > 0;
+    j->report.counts.samples += (uint64_t)samples[i];
+    j->report.counts.rays += samples[i] > 0;
   }
   return sf_ok();
 }
@@ -201,8 +206,8 @@ static sf_status fixed_pixel(job *j, sf_probe *probe, int x, int y)
 /* Not thread-safe: callers hold the lock. */
 static void add_counts(job *j, const fx_counts *counts, const uint64_t saturated_samples[SF_LAYERS])
 {
-  fx_counts_add(&j->counts, counts);
-  for (int l = 0; l < SF_LAYERS; l++) j->saturated_samples[l] += saturated_samples[l];
+  fx_counts_add(&j->report.counts, counts);
+  for (int l = 0; l < SF_LAYERS; l++) j->report.saturated_samples[l] += saturated_samples[l];
 }
 
 static sf_status fixed_row(job *j, int y)
@@ -320,88 +325,47 @@ static sf_status save(const job *j)
   snprintf(steps, sizeof steps, "%d", j->scene.net.steps);
   snprintf(crop, sizeof crop, "%d,%d,%d,%d", j->crop.x, j->crop.y, j->crop.width, j->crop.height);
   snprintf(downscale, sizeof downscale, "%d", j->opt.downscale);
-  sf_saturation_census(j->saturated_samples, j->counts.saturated_features, saturation, sizeof saturation);
-  sf_saturation_unexpected(&j->scene.net, j->saturated_samples, unexpected, sizeof unexpected);
+  sf_saturation_census(j->report.saturated_samples, j->report.counts.saturated_features, saturation, sizeof saturation);
+  sf_saturation_unexpected(&j->scene.net, j->report.saturated_samples, unexpected, sizeof unexpected);
   bool is_float = j->opt.backend == BACKEND_FLOAT;
-  const char *const attributes[] = {"t_r", steps,
-                                    "scene_sha256", j->hash,
-                                    "view", j->view->name,
-                                    "split", j->opt.split,
-                                    "crop", crop,
-                                    "downscale", downscale,
-                                    "arithmetic", is_float ? "float" : "fixed",
-                                    "Z_units", "world units of the data set, 0 = nothing hit",
-                                    is_float ? NULL : "saturation", saturation,
-                                    "unexpected_saturation", unexpected,
+  const char *const attributes[] = {"t_r",
+                                    steps,
+                                    "scene_sha256",
+                                    j->hash,
+                                    "view",
+                                    j->view->name,
+                                    "split",
+                                    j->opt.split,
+                                    "crop",
+                                    crop,
+                                    "downscale",
+                                    downscale,
+                                    "arithmetic",
+                                    is_float ? "float" : "fixed",
+                                    "Z_units",
+                                    "world units of the data set, 0 = nothing hit",
+                                    is_float ? NULL : "saturation",
+                                    saturation,
+                                    "unexpected_saturation",
+                                    unexpected,
                                     NULL};
   if (j->opt.png) SF_TRY(sf_golden_save_png(&j->golden, j->opt.png));
   return sf_golden_save(&j->golden, j->opt.exr, attributes);
 }
 
-static void add_number(cJSON *object, const char *key, double value)
+static sf_status print_report(const job *j)
 {
-  if (isfinite(value)) cJSON_AddNumberToObject(object, key, value);
-  else cJSON_AddNullToObject(object, key);
-}
-
-static void json_events(const job *j, cJSON *json)
-{
-  char unexpected[64];
-  cJSON_AddItemToObject(json, "counts", sf_counts_json(&j->scene.net, &j->counts));
-  sf_json_add_u64(json, "energy_fj", sf_energy_fj(&j->counts));
-  cJSON *samples = cJSON_AddObjectToObject(json, "saturated_samples");
-  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(samples, sf_layer_names[l], j->saturated_samples[l]);
-  sf_saturation_unexpected(&j->scene.net, j->saturated_samples, unexpected, sizeof unexpected);
-  cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
-}
-
-static sf_status print_json(const job *j)
-{
-  cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "backend", backend_name[j->opt.backend]);
-  cJSON_AddStringToObject(json, "scene", j->opt.scene);
-  cJSON_AddStringToObject(json, "scene_sha256", j->hash);
-  cJSON_AddStringToObject(json, "view", j->view->name);
-  cJSON_AddNumberToObject(json, "t_r", j->scene.net.steps);
-  const int crop[4] = {j->crop.x, j->crop.y, j->crop.width, j->crop.height};
-  cJSON_AddItemToObject(json, "crop", cJSON_CreateIntArray(crop, 4));
-  add_number(json, "psnr", j->psnr);
-  add_number(json, "ssim", j->ssim);
-  sf_json_add_u64(json, "samples", j->counts.samples);
-  sf_json_add_u64(json, "rays", j->counts.rays);
-  if (j->opt.backend != BACKEND_FLOAT) json_events(j, json);
-  add_number(json, "seconds", j->seconds);
-  cJSON_AddStringToObject(json, "exr", j->opt.exr);
-  if (j->opt.png) cJSON_AddStringToObject(json, "png", j->opt.png);
-  char *text = cJSON_Print(json);
+  if (!j->opt.json) {
+    sf_render_report_print(stdout, &j->report);
+    return sf_ok();
+  }
+  cJSON *json = sf_render_report_json(&j->report);
+  char *text = json ? cJSON_Print(json) : NULL;
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
   puts(text);
   free(text);
   return sf_ok();
-}
-
-static void print_text(const job *j)
-{
-  double pixels = (double)j->crop.width * j->crop.height;
-  printf("view %s, %d x %d at (%d, %d)%s, t_r = %d, %s\n", j->view->name, j->crop.width, j->crop.height, j->crop.x,
-         j->crop.y, j->crop_chosen ? " (the centre: --crop was not given)" : "", j->scene.net.steps,
-         backend_name[j->opt.backend]);
-  if (isnan(j->psnr)) printf("no picture to compare with\n");
-  else if (isnan(j->ssim)) printf("PSNR %.2f dB, SSIM needs 11 x 11 pixels\n", j->psnr);
-  else printf("PSNR %.2f dB, SSIM %.4f\n", j->psnr, j->ssim);
-  printf("%" PRIu64 " samples, %.2f per pixel; %.2f s\n", j->counts.samples, (double)j->counts.samples / pixels, j->seconds);
-  if (j->opt.backend != BACKEND_FLOAT) {
-    char text[256], unexpected[64];
-    printf("%" PRIu64 " MAC, %" PRIu64 " SOP, %" PRIu64 " spikes, %" PRIu64 " fJ\n", sf_event_total(&j->counts, SF_EVENT_MAC),
-           sf_event_total(&j->counts, SF_EVENT_SOP), sf_event_total(&j->counts, SF_EVENT_SPIKES), sf_energy_fj(&j->counts));
-    sf_saturation_census(j->saturated_samples, j->counts.saturated_features, text, sizeof text);
-    printf("saturation: %s\n", text);
-    if (sf_saturation_unexpected(&j->scene.net, j->saturated_samples, unexpected, sizeof unexpected))
-      printf("UNEXPECTED saturation in %s: this mode's state cannot leave its range; do not use the image as golden\n",
-             unexpected);
-  }
-  printf("wrote %s%s%s\n", j->opt.exr, j->opt.png ? " and " : "", j->opt.png ? j->opt.png : "");
 }
 
 static sf_status work(job *j)
@@ -413,15 +377,13 @@ static sf_status work(job *j)
                      : j->opt.backend == BACKEND_FIXED ? render_fixed(j)
                                                        : render_rtl(j);
   sf_progress_end(&j->progress);
-  j->seconds = sf_seconds() - j->start;
+  j->report.seconds = sf_seconds() - j->start;
   SF_TRY(status);
-  j->psnr = j->ssim = NAN;
   if (j->view->image.rgba)
-    SF_TRY(sf_golden_quality(&j->golden, &j->view->image, j->crop.x, j->crop.y, j->background, &j->psnr, &j->ssim));
+    SF_TRY(sf_golden_quality(&j->golden, &j->view->image, j->crop.x, j->crop.y, j->background, &j->report.psnr,
+                             &j->report.ssim));
   SF_TRY(save(j));
-  if (j->opt.json) return print_json(j);
-  print_text(j);
-  return sf_ok();
+  return print_report(j);
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -431,12 +393,15 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
       {"--output", 'o', SF_ARG_STRING, &o->exr, 0, 0, NULL, "FILE", "EXR to write"},
       {"--png", 0, SF_ARG_STRING, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
-      {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H", "only this window (rtl default: 16x16 in the centre)"},
+      {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
+       "only this window (rtl default: 16x16 in the centre)"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
-      {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE", "for float (default model.safetensors beside the scene)"},
+      {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
+       "for float (default model.safetensors beside the scene)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S", "model units per world unit, 0 = the layout's (default 0)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
+       "model units per world unit, 0 = the layout's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "rtl: random reset values (default 1)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
@@ -456,9 +421,10 @@ int main(int argc, char **argv)
 {
   sf_cli cli = {.program = "sim_render",
                 .usage = "sim_render scene.snn DATA --view K -o golden.exr [options]",
-                .summary = "Renders one view through the float field, the fixed-point core or the Verilog accelerator.\n"
-                           "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
-                           "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T.",
+                .summary =
+                    "Renders one view through the float field, the fixed-point core or the Verilog accelerator.\n"
+                    "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
+                    "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T.",
                 .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
                             "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n",
                 .min_positional = 2,

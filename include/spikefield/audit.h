@@ -20,15 +20,23 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
                        fx_counts *counts);
 
-/* Equality of two counts over the layers' events (not grid/march/saturation). On a difference names event, layer, step and both values. */
+/* Equality of two counts over the layers' events (not grid/march/saturation). On a difference names event, layer, step
+ * and both values. */
 sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_counts *b, const char *b_name);
 cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts);
 extern const char *const sf_layer_names[SF_LAYERS]; /* "D1", "D2", "C1", "C2", "C3" */
 
 /* The eight events of fx_layer_counts, in its order. */
 typedef enum {
-  SF_EVENT_MAC, SF_EVENT_SOP, SF_EVENT_SPIKES, SF_EVENT_UPDATES, SF_EVENT_WEIGHT, SF_EVENT_STATE_R, SF_EVENT_STATE_W,
-  SF_EVENT_SPECIAL, SF_EVENTS
+  SF_EVENT_MAC,
+  SF_EVENT_SOP,
+  SF_EVENT_SPIKES,
+  SF_EVENT_UPDATES,
+  SF_EVENT_WEIGHT,
+  SF_EVENT_STATE_R,
+  SF_EVENT_STATE_W,
+  SF_EVENT_SPECIAL,
+  SF_EVENTS
 } sf_event_id;
 typedef struct sf_event {
   const char *name, *title; /* "state_r", "state read, bytes" */
@@ -41,9 +49,9 @@ uint64_t sf_event_total(const fx_counts *counts, int event); /* over layers and 
 /* One price list, several readings of what is a MAC. All in fJ. */
 typedef struct sf_ledger {
   uint64_t mac_fj, sop_fj, spiking_fj; /* paper ledger: every counted MAC, the product of h(t) at every step included */
-  uint64_t h_once_fj;   /* reading R = D1 + C1: the product of h counted once per sample, as if h were constant */
-  uint64_t h_spikes_fj; /* reading R = D1: each product of h is a SOP that happens at the net's mean firing rate */
-  uint64_t ann_fj;      /* twin: every synapse a MAC once per sample, the direction's too */
+  uint64_t h_once_fj;      /* reading R = D1 + C1: the product of h counted once per sample, as if h were constant */
+  uint64_t h_spikes_fj;    /* reading R = D1: each product of h is a SOP that happens at the net's mean firing rate */
+  uint64_t ann_fj;         /* twin: every synapse a MAC once per sample, the direction's too */
   uint64_t ann_hoisted_fj; /* twin with the direction's products once per ray, as the spiking net has them */
 } sf_ledger;
 /* Fails with SF_E_RANGE when a total does not fit in 64 bits. */
@@ -92,11 +100,11 @@ cJSON *sf_published_json(void);
 /* One ray through the core under observation; see sf_probe_net. Zero it, then set net. */
 typedef struct sf_probe {
   const fx_net *net;
-  fx_trace *trace;      /* where not NULL, every sample is recounted from its spike bitmaps and compared */
-  fx_counts core;       /* (a) */
-  fx_counts recount;    /* (c), from trace */
+  fx_trace *trace;   /* where not NULL, every sample is recounted from its spike bitmaps and compared */
+  fx_counts core;    /* (a) */
+  fx_counts recount; /* (c), from trace */
   uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one saturation in the layer */
-  uint64_t sample;      /* of this ray, from 0; sf_probe_begin resets it */
+  uint64_t sample;                       /* of this ray, from 0; sf_probe_begin resets it */
   int32_t base[SF_LANES];
 } sf_probe;
 void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
@@ -116,9 +124,9 @@ typedef struct sf_measure_job {
 } sf_measure_job;
 typedef struct sf_measure {
   fx_counts core, recount;
-  uint64_t rays;        /* all, with or without samples */
+  uint64_t rays; /* all, with or without samples */
   uint64_t saturated_samples[SF_LAYERS];
-  uint8_t *hit;         /* bit i: ray i has samples; owned, sf_measure_free */
+  uint8_t *hit; /* bit i: ray i has samples; owned, sf_measure_free */
 } sf_measure;
 /* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */
 sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure);

@@ -21,7 +21,8 @@ typedef struct sf_cli {
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
- * exit 0. SF_E_USAGE names the offending option. Options may follow positionals; --name=value works. */
+ * exit 0. SF_E_USAGE names the offending option. Options may follow positionals; --name=value works. Ignores SIGXFSZ,
+ * so that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
 /* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */
@@ -31,7 +32,7 @@ int sf_cli_finish(const sf_cli *cli, sf_status status);
 void sf_cli_catch_signals(void);
 bool sf_cli_interrupted(void);
 
-/* One self-overwriting line on a terminal; plain lines, at most one per 5 s, elsewhere. Quiet when the stream is NULL. */
+/* One self-overwriting line on a terminal's stderr; elsewhere plain lines, at most one per 5 s; nothing when quiet. */
 typedef struct sf_progress {
   bool terminal, quiet;
   double last;

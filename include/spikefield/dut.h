@@ -8,7 +8,7 @@ typedef struct sf_dut sf_dut;
 typedef struct sf_dut_options {
   uint64_t seed;       /* of stalls and random reset values */
   int stall_percent;   /* chance per cycle of a bubble on input and of back-pressure on output, 0..90 */
-  const char *wave;    /* FST file to write, or NULL */
+  const char *wave;    /* FST file to write from the first sample on, or NULL */
   const char *plusarg; /* passed to the simulation, or NULL */
 } sf_dut_options;
 
@@ -29,6 +29,13 @@ typedef struct sf_dut_result {
 sf_status sf_dut_open(sf_dut **dut, const fx_scene *scene, const sf_dut_options *options);
 /* Streams n samples in and n results out, overlapping as the hardware allows. A hang is an error that names the cycle. */
 sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result);
+/* More of the same samples, for a comparison that names the cause: membranes after reset (D1, C1, C2) and the
+ * presynaptic rows that were added up (C2 per step; D2 and C3 of all steps together, at step 0). */
+typedef struct sf_dut_trace {
+  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES];
+  uint64_t rows[SF_LAYERS][SF_T_MAX][2];
+} sf_dut_trace;
+sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result, sf_dut_trace *trace);
 /* fx_net_fn for fx_render_ray; user is the sf_dut. */
 sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 /* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the hardware has them). */

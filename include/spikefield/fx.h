@@ -72,8 +72,8 @@ typedef struct fx_scene {
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
   double dir_scale;   /* value of one LSB of the direction features */
-  double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features; with current_scale for reports, tests */
-  double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current */
+  double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
+  double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
   void *owner;        /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
 
@@ -115,7 +115,7 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more);
 /* Everything a lockstep comparison needs of one sample. */
 typedef struct fx_trace {
   uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
-  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: the accumulator after the step */
+  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after */
   int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* the exact sum, without C2's fraction bits */
 } fx_trace;
 

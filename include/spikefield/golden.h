@@ -10,10 +10,22 @@
  * samples: through the nets. spikes, sops, macs: events; energy_fJ: paper ledger, 4600 * macs + 900 * sops.
  * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC. */
 typedef enum {
-  SF_PLANE_R, SF_PLANE_G, SF_PLANE_B, SF_PLANE_A, SF_PLANE_Z, SF_PLANE_SAMPLES,
+  SF_PLANE_R,
+  SF_PLANE_G,
+  SF_PLANE_B,
+  SF_PLANE_A,
+  SF_PLANE_Z,
+  SF_PLANE_SAMPLES,
   SF_FLOAT_PLANES, /* the float field has no events and no raw integers */
-  SF_PLANE_SPIKES = SF_FLOAT_PLANES, SF_PLANE_SOPS, SF_PLANE_MACS, SF_PLANE_ENERGY,
-  SF_PLANE_FX_R, SF_PLANE_FX_G, SF_PLANE_FX_B, SF_PLANE_FX_A, SF_PLANE_FX_T,
+  SF_PLANE_SPIKES = SF_FLOAT_PLANES,
+  SF_PLANE_SOPS,
+  SF_PLANE_MACS,
+  SF_PLANE_ENERGY,
+  SF_PLANE_FX_R,
+  SF_PLANE_FX_G,
+  SF_PLANE_FX_B,
+  SF_PLANE_FX_A,
+  SF_PLANE_FX_T,
   SF_PLANES
 } sf_plane;
 
@@ -24,8 +36,14 @@ typedef struct sf_golden {
 
 sf_status sf_golden_create(sf_golden *golden, int width, int height, int planes);
 void sf_golden_free(sf_golden *golden);
-static inline float *sf_golden_real(const sf_golden *g, sf_plane plane) { return g->plane[plane]; }
-static inline uint32_t *sf_golden_int(const sf_golden *g, sf_plane plane) { return g->plane[plane]; }
+static inline float *sf_golden_real(const sf_golden *g, sf_plane plane)
+{
+  return g->plane[plane];
+}
+static inline uint32_t *sf_golden_int(const sf_golden *g, sf_plane plane)
+{
+  return g->plane[plane];
+}
 
 /* Pixel i of a fixed-point image. step_length: distance between samples in world units. */
 void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_counts *counts, double step_length);
@@ -37,4 +55,18 @@ sf_status sf_golden_save_png(const sf_golden *golden, const char *path);
 /* Against the window at (x, y) of a picture composited over background[3]. SSIM is NaN when a side is below 11. */
 sf_status sf_golden_quality(const sf_golden *golden, const sf_image *picture, int x, int y, const float background[3],
                             double *psnr, double *ssim);
+
+/* What a rendering reports beside its files. */
+typedef struct sf_render_report {
+  const char *scene, *sha256, *view, *backend, *exr, *png; /* png may be NULL */
+  const fx_net *net;
+  int crop[4];                /* x, y, width, height */
+  bool crop_chosen;           /* by the program, not by the user */
+  bool events;                /* counts hold events, not only samples and rays: all but float */
+  double psnr, ssim, seconds; /* NaN: not measured */
+  fx_counts counts;
+  uint64_t saturated_samples[SF_LAYERS];
+} sf_render_report;
+void sf_render_report_print(FILE *out, const sf_render_report *report);
+cJSON *sf_render_report_json(const sf_render_report *report);
 #endif

@@ -92,19 +92,19 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
   uint64_t c1_mac = layer_total(&counts->layer[FX_C1], SF_EVENT_MAC);
   uint64_t d_mac = multiply(direction_synapses(net), counts->rays);
   if (d_mac > c1_mac || net->steps < 1)
-    return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu", (unsigned long long)c1_mac,
-                   (unsigned long long)d_mac);
+    return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
+                   (unsigned long long)c1_mac, (unsigned long long)d_mac);
   uint64_t h_mac = c1_mac - d_mac; /* at every step */
-  uint64_t h_sop = scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
+  uint64_t h_sop =
+      scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
 
   *ledger = (sf_ledger){.mac_fj = multiply(mac, SF_MAC_FJ), .sop_fj = multiply(sop, SF_SOP_FJ)};
   ledger->spiking_fj = sf_energy_fj(counts);
   ledger->h_once_fj = add(multiply(mac - h_mac + h_mac / (uint64_t)net->steps, SF_MAC_FJ), ledger->sop_fj);
   ledger->h_spikes_fj = add(multiply(mac - h_mac, SF_MAC_FJ), multiply(add(sop, h_sop), SF_SOP_FJ));
   ledger->ann_fj = sf_energy_ann_fj(net, counts->samples);
-  ledger->ann_hoisted_fj =
-      add(multiply(multiply(synapses(net) - direction_synapses(net), counts->samples), SF_MAC_FJ),
-          multiply(d_mac, SF_MAC_FJ));
+  ledger->ann_hoisted_fj = add(multiply(multiply(synapses(net) - direction_synapses(net), counts->samples), SF_MAC_FJ),
+                               multiply(d_mac, SF_MAC_FJ));
   if (mac == UINT64_MAX || ledger->spiking_fj == UINT64_MAX || ledger->ann_fj == UINT64_MAX ||
       ledger->h_spikes_fj == UINT64_MAX || ledger->ann_hoisted_fj == UINT64_MAX)
     return sf_fail(SF_E_RANGE, "audit: the energy of %llu samples does not fit in 64 bits of fJ; audit fewer views",

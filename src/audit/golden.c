@@ -7,13 +7,13 @@ static const struct {
   const char *name;
   sf_exr_type type;
 } planes[SF_PLANES] = {
-    [SF_PLANE_R] = {"R", SF_EXR_FLOAT},           [SF_PLANE_G] = {"G", SF_EXR_FLOAT},
-    [SF_PLANE_B] = {"B", SF_EXR_FLOAT},           [SF_PLANE_A] = {"A", SF_EXR_FLOAT},
-    [SF_PLANE_Z] = {"Z", SF_EXR_FLOAT},           [SF_PLANE_SAMPLES] = {"samples", SF_EXR_UINT},
-    [SF_PLANE_SPIKES] = {"spikes", SF_EXR_UINT},  [SF_PLANE_SOPS] = {"sops", SF_EXR_UINT},
-    [SF_PLANE_MACS] = {"macs", SF_EXR_UINT},      [SF_PLANE_ENERGY] = {"energy_fJ", SF_EXR_FLOAT},
-    [SF_PLANE_FX_R] = {"fx.R", SF_EXR_UINT},      [SF_PLANE_FX_G] = {"fx.G", SF_EXR_UINT},
-    [SF_PLANE_FX_B] = {"fx.B", SF_EXR_UINT},      [SF_PLANE_FX_A] = {"fx.A", SF_EXR_UINT},
+    [SF_PLANE_R] = {"R", SF_EXR_FLOAT},          [SF_PLANE_G] = {"G", SF_EXR_FLOAT},
+    [SF_PLANE_B] = {"B", SF_EXR_FLOAT},          [SF_PLANE_A] = {"A", SF_EXR_FLOAT},
+    [SF_PLANE_Z] = {"Z", SF_EXR_FLOAT},          [SF_PLANE_SAMPLES] = {"samples", SF_EXR_UINT},
+    [SF_PLANE_SPIKES] = {"spikes", SF_EXR_UINT}, [SF_PLANE_SOPS] = {"sops", SF_EXR_UINT},
+    [SF_PLANE_MACS] = {"macs", SF_EXR_UINT},     [SF_PLANE_ENERGY] = {"energy_fJ", SF_EXR_FLOAT},
+    [SF_PLANE_FX_R] = {"fx.R", SF_EXR_UINT},     [SF_PLANE_FX_G] = {"fx.G", SF_EXR_UINT},
+    [SF_PLANE_FX_B] = {"fx.B", SF_EXR_UINT},     [SF_PLANE_FX_A] = {"fx.A", SF_EXR_UINT},
     [SF_PLANE_FX_T] = {"fx.T", SF_EXR_UINT},
 };
 
@@ -35,7 +35,10 @@ void sf_golden_free(sf_golden *golden)
   *golden = (sf_golden){0};
 }
 
-static uint32_t to_u32(uint64_t value) { return value > UINT32_MAX ? UINT32_MAX : (uint32_t)value; }
+static uint32_t to_u32(uint64_t value)
+{
+  return value > UINT32_MAX ? UINT32_MAX : (uint32_t)value;
+}
 
 void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_counts *counts, double step_length)
 {

@@ -155,7 +155,8 @@ static void run_all(shared *s)
 sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure)
 {
   *measure = (sf_measure){.rays = job->rays};
-  if (job->rays > (uint64_t)1 << 36) return sf_fail(SF_E_RANGE, "audit: %llu rays are too many", (unsigned long long)job->rays);
+  if (job->rays > (uint64_t)1 << 36)
+    return sf_fail(SF_E_RANGE, "audit: %llu rays are too many", (unsigned long long)job->rays);
   measure->hit = calloc(job->rays / 8 + 1, 1);
   if (!measure->hit) return sf_fail(SF_E_MEMORY, "audit: out of memory for %llu rays", (unsigned long long)job->rays);
   shared s = {.job = job, .sum = measure, .failed = {UINT64_MAX, sf_ok()}};

@@ -11,7 +11,7 @@ static const double mac_pj = 4.6, sop_pj = 0.9;
 
 typedef struct group {
   const char *backbone, *data;
-  double macs;       /* F */
+  double macs; /* F */
   double ann_mj;
   const char *beta[SPIKING_ROWS];
   double steps[SPIKING_ROWS], mj[SPIKING_ROWS], saving[SPIKING_ROWS]; /* saving NAN: not printed */
@@ -26,12 +26,30 @@ typedef struct reading {
 
 /* INGP decoder: f[32] -> 128 -> 16, [d16 | h15] -> 128 -> 128 -> 3. TensoRF decoder: 150 or 30 -> 128 -> 128 -> 3. */
 static const group groups[] = {
-    {"INGP", "Synthetic", 26880, 955.27, {"1e-7", "5e-7", "1e-6"}, {5.125, 3.625, 2.875}, {643.39, 492.25, 405.33},
+    {"INGP",
+     "Synthetic",
+     26880,
+     955.27,
+     {"1e-7", "5e-7", "1e-6"},
+     {5.125, 3.625, 2.875},
+     {643.39, 492.25, 405.33},
      {32.65, 48.47, 57.57}},
     {"INGP", "Mip-360", 26880, 18980, {"1e-7", "5e-7", "1e-6"}, {6, 4.857, 4}, {15600, 13660, 11870}, {NAN, NAN, NAN}},
-    {"TensoRF", "Synthetic", 35968, 1261, {"5e-9", "5e-8", "5e-7"}, {5.625, 3.875, 2}, {885.2, 815.2, 748.4},
+    {"TensoRF",
+     "Synthetic",
+     35968,
+     1261,
+     {"5e-9", "5e-8", "5e-7"},
+     {5.625, 3.875, 2},
+     {885.2, 815.2, 748.4},
      {NAN, NAN, NAN}},
-    {"TensoRF", "LLFF", 20608, 11910, {"5e-9", "5e-8", "5e-7"}, {5.625, 4.125, 1.875}, {6341, 5314, 3704},
+    {"TensoRF",
+     "LLFF",
+     20608,
+     11910,
+     {"5e-9", "5e-8", "5e-7"},
+     {5.625, 4.125, 1.875},
+     {6341, 5314, 3704},
      {NAN, NAN, NAN}},
 };
 static const reading readings[] = {
@@ -51,16 +69,25 @@ static bool same(const char *a, const char *b)
 static void fill_group(const group *g, const reading *r, sf_published_row *row)
 {
   double samples = g->ann_mj * 1e9 / (mac_pj * g->macs), mean = 0;
-  row[0] = (sf_published_row){.backbone = g->backbone, .data = g->data, .reading = r->name, .macs = g->macs,
-                              .real_macs = g->macs, .published_mj = g->ann_mj, .samples = samples, .rate = NAN,
-                              .mean_rate = NAN, .saving_percent = NAN, .published_saving_percent = NAN};
+  row[0] = (sf_published_row){.backbone = g->backbone,
+                              .data = g->data,
+                              .reading = r->name,
+                              .macs = g->macs,
+                              .real_macs = g->macs,
+                              .published_mj = g->ann_mj,
+                              .samples = samples,
+                              .rate = NAN,
+                              .mean_rate = NAN,
+                              .saving_percent = NAN,
+                              .published_saving_percent = NAN};
   row[0].recomputed_mj = mac_pj * g->macs * samples * 1e-9;
   for (int i = 0; i < SPIKING_ROWS; i++) {
     sf_published_row *p = &row[i + 1];
     *p = row[0];
     p->beta = g->beta[i], p->steps = g->steps[i], p->published_mj = g->mj[i];
     p->real_macs = r->once + r->per_step * p->steps;
-    p->rate = (p->published_mj * 1e9 / samples - mac_pj * p->real_macs) / (sop_pj * p->steps * (g->macs - r->once - r->per_step));
+    p->rate = (p->published_mj * 1e9 / samples - mac_pj * p->real_macs) /
+              (sop_pj * p->steps * (g->macs - r->once - r->per_step));
     p->saving_percent = 100 * (1 - p->published_mj / g->ann_mj);
     p->published_saving_percent = g->saving[i];
     mean += p->rate / SPIKING_ROWS;
@@ -91,8 +118,9 @@ void sf_published_print(FILE *out)
 {
   sf_published_row rows[SF_PUBLISHED_MAX];
   int n = sf_published_rows(rows);
-  fprintf(out, "Published energies, recomputed as E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, one rate fr per group.\n"
-               "The ANN row gives the samples of a view; a group whose rates agree is a reading that fits the paper.\n");
+  fprintf(out,
+          "Published energies, recomputed as E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, one rate fr per group.\n"
+          "The ANN row gives the samples of a view; a group whose rates agree is a reading that fits the paper.\n");
   for (int i = 0; i < n; i++) {
     const sf_published_row *p = &rows[i];
     if (!p->beta) {
@@ -102,8 +130,8 @@ void sf_published_print(FILE *out)
               "here mJ", "residual", "saving");
       continue;
     }
-    fprintf(out, "  %-6s %6.3f %10.0f %8.3f %8.3f %10.2f %10.2f %+8.2f%% %7.2f%%", p->beta, p->steps, p->real_macs, p->rate,
-            p->mean_rate, p->published_mj, p->recomputed_mj, p->residual_percent, p->saving_percent);
+    fprintf(out, "  %-6s %6.3f %10.0f %8.3f %8.3f %10.2f %10.2f %+8.2f%% %7.2f%%", p->beta, p->steps, p->real_macs,
+            p->rate, p->mean_rate, p->published_mj, p->recomputed_mj, p->residual_percent, p->saving_percent);
     if (!isnan(p->published_saving_percent)) fprintf(out, " (paper %.2f%%)", p->published_saving_percent);
     fprintf(out, "%s\n", p->rate < 0 ? "  impossible: negative rate" : "");
   }
@@ -111,8 +139,10 @@ void sf_published_print(FILE *out)
 
 static void add_number(cJSON *object, const char *key, double value)
 {
-  if (isnan(value)) cJSON_AddNullToObject(object, key);
-  else cJSON_AddNumberToObject(object, key, value);
+  if (isnan(value))
+    cJSON_AddNullToObject(object, key);
+  else
+    cJSON_AddNumberToObject(object, key, value);
 }
 
 cJSON *sf_published_json(void)

@@ -11,11 +11,13 @@ const char *const sf_not_modelled[] = {
     NULL};
 
 const char *const sf_criticism[] = {
-    "4.6 pJ is an fp32 multiply and add, 0.9 pJ an fp32 add (45 nm); a fixed-point add of these widths costs 0.03-0.1 pJ",
+    "4.6 pJ is an fp32 multiply and add, 0.9 pJ an fp32 add (45 nm); a fixed-point add of these widths costs 0.03-0.1 "
+    "pJ",
     "memory traffic is left out, and on real hardware it dominates",
     "neuron updates are left out, although every neuron is updated at every step whether it fires or not",
     "the first, real-valued layers are priced as MACs here; a reading that leaves them out flatters the spiking net",
-    "the twin spends the direction's products once per sample, the spiking net once per ray; the hoisted twin undoes that",
+    "the twin spends the direction's products once per sample, the spiking net once per ray; the hoisted twin undoes "
+    "that",
     NULL};
 
 void sf_json_add_u64(cJSON *object, const char *key, uint64_t value)
@@ -41,7 +43,10 @@ static double firing_rate(const fx_layer_counts *layer, int t)
   return layer->updates[t] ? (double)layer->spikes[t] / (double)layer->updates[t] : 0;
 }
 
-static bool is_spiking(int layer) { return layer == FX_D1 || layer == FX_C1 || layer == FX_C2; }
+static bool is_spiking(int layer)
+{
+  return layer == FX_D1 || layer == FX_C1 || layer == FX_C2;
+}
 
 static cJSON *layer_json(const fx_net *net, const fx_counts *counts, int l)
 {
@@ -84,8 +89,10 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
     for (int t = 0; t < net->steps; t++) {
       fprintf(out, "%-5s %4d %16" PRIu64 " %16" PRIu64 " %16" PRIu64, sf_layer_names[l], t, c->mac[t], c->sop[t],
               c->updates[t]);
-      if (is_spiking(l)) fprintf(out, " %16" PRIu64 " %7.2f%%\n", c->spikes[t], 100 * firing_rate(c, t));
-      else fprintf(out, " %16s %8s\n", "-", "-");
+      if (is_spiking(l))
+        fprintf(out, " %16" PRIu64 " %7.2f%%\n", c->spikes[t], 100 * firing_rate(c, t));
+      else
+        fprintf(out, " %16s %8s\n", "-", "-");
     }
   }
   fprintf(out, "%-10s", "all");
@@ -101,8 +108,10 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
 static void ledger_row(FILE *out, const char *name, uint64_t fj, double views, uint64_t ann_fj)
 {
   fprintf(out, "%-52s %22" PRIu64 " %12.6g", name, fj, views > 0 ? (double)fj * 1e-12 / views : 0);
-  if (ann_fj == 0) fprintf(out, " %9s\n", "-");
-  else fprintf(out, " %8.2f%%\n", sf_saving_percent(fj, ann_fj));
+  if (ann_fj == 0)
+    fprintf(out, " %9s\n", "-");
+  else
+    fprintf(out, " %8.2f%%\n", sf_saving_percent(fj, ann_fj));
 }
 
 void sf_ledger_print(FILE *out, const sf_ledger *l, double views)
@@ -123,8 +132,10 @@ void sf_ledger_print(FILE *out, const sf_ledger *l, double views)
 static void add_saving(cJSON *json, const char *key, uint64_t spiking_fj, uint64_t ann_fj)
 {
   double saving = sf_saving_percent(spiking_fj, ann_fj);
-  if (isnan(saving)) cJSON_AddNullToObject(json, key);
-  else cJSON_AddNumberToObject(json, key, saving);
+  if (isnan(saving))
+    cJSON_AddNullToObject(json, key);
+  else
+    cJSON_AddNumberToObject(json, key, saving);
 }
 
 cJSON *sf_ledger_json(const sf_ledger *l)

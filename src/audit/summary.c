@@ -19,9 +19,12 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
   }
   fprintf(out, "  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "\n", "paper ledger, fJ", sf_energy_fj(&s->core),
           sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount));
-  fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy, s->stalls);
-  if (s->agreement.code == SF_OK) fprintf(out, "  core = accelerator = recount, for every event, layer and step\n");
-  else fprintf(out, "  DIFFERENCE: %s\n", s->agreement.message);
+  fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
+          s->stalls);
+  if (s->agreement.code == SF_OK)
+    fprintf(out, "  core = accelerator = recount, for every event, layer and step\n");
+  else
+    fprintf(out, "  DIFFERENCE: %s\n", s->agreement.message);
 }
 
 void sf_report_print(FILE *out, const sf_audit_report *r)
@@ -81,8 +84,10 @@ static void add_energy(cJSON *json, const sf_audit_report *r)
   double saving = sf_saving_percent(r->ledger.spiking_fj, r->ledger.ann_fj);
   sf_json_add_u64(json, "energy_spiking_fj", r->ledger.spiking_fj);
   sf_json_add_u64(json, "energy_ann_fj", r->ledger.ann_fj);
-  if (isnan(saving)) cJSON_AddNullToObject(json, "energy_saving_percent");
-  else cJSON_AddNumberToObject(json, "energy_saving_percent", saving);
+  if (isnan(saving))
+    cJSON_AddNullToObject(json, "energy_saving_percent");
+  else
+    cJSON_AddNumberToObject(json, "energy_saving_percent", saving);
   cJSON_AddNumberToObject(json, "energy_spiking_mj_per_view", (double)r->ledger.spiking_fj * 1e-12 / r->views);
   cJSON_AddNumberToObject(json, "energy_ann_mj_per_view", (double)r->ledger.ann_fj * 1e-12 / r->views);
   cJSON_AddItemToObject(json, "ledger", sf_ledger_json(&r->ledger));
@@ -102,8 +107,10 @@ static void add_agreement(cJSON *json, const sf_audit_report *r)
   bool all = sf_counts_compare(&r->measure.core, "core", &r->measure.recount, "recount").code == SF_OK;
   bool three = r->three.agreement.code == SF_OK;
   cJSON_AddBoolToObject(json, "core_equals_recount", all);
-  if (r->three.rays > 0) cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
-  else cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");
+  if (r->three.rays > 0)
+    cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
+  else
+    cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");
   if (!three) cJSON_AddStringToObject(json, "difference", r->three.agreement.message);
 }
 

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,10 +16,13 @@
 static void print_option(char letter, const char *name, const char *argument, const char *help)
 {
   char left[80];
-  int n = letter ? snprintf(left, sizeof left, "  -%c, %s", letter, name) : snprintf(left, sizeof left, "      %s", name);
+  int n =
+      letter ? snprintf(left, sizeof left, "  -%c, %s", letter, name) : snprintf(left, sizeof left, "      %s", name);
   if (argument && n < (int)sizeof left) n += snprintf(left + n, sizeof left - (size_t)n, " %s", argument);
-  if (n <= 27) printf("%-28s%s\n", left, help);
-  else printf("%s\n%28s%s\n", left, "", help);
+  if (n <= 27)
+    printf("%-28s%s\n", left, help);
+  else
+    printf("%s\n%28s%s\n", left, "", help);
 }
 
 static void print_help(const sf_cli *cli)
@@ -27,19 +31,26 @@ static void print_help(const sf_cli *cli)
   if (cli->summary) printf("\n%s\n", cli->summary);
   printf("\nOptions:\n");
   for (const sf_option *o = cli->options; o && o->name; o++) {
-    const char *argument = o->type == SF_ARG_FLAG ? NULL : o->argument ? o->argument : o->choices ? o->choices : "VALUE";
+    const char *argument = o->type == SF_ARG_FLAG ? NULL
+                           : o->argument          ? o->argument
+                           : o->choices           ? o->choices
+                                                  : "VALUE";
     print_option(o->letter, o->name, argument, o->help ? o->help : "");
     if (o->type == SF_ARG_CHOICE && o->argument && o->choices) printf("%28s%s\n", "", o->choices);
   }
   print_option('h', "--help", NULL, "show this text");
   print_option(0, "--version", NULL, "show the version");
-  if (cli->examples) printf("\nExamples:\n%s%s", cli->examples, cli->examples[strlen(cli->examples) - 1] == '\n' ? "" : "\n");
+  if (cli->examples)
+    printf("\nExamples:\n%s%s", cli->examples, cli->examples[strlen(cli->examples) - 1] == '\n' ? "" : "\n");
 }
 
 /* ---- values ---- */
 
 /* The whole text must be one number: strto* alone would take leading blanks and trailing text. */
-static bool whole_number_text(const char *text) { return *text && !isspace((unsigned char)*text); }
+static bool whole_number_text(const char *text)
+{
+  return *text && !isspace((unsigned char)*text);
+}
 
 static sf_status out_of_range(const sf_option *o, const char *text)
 {
@@ -112,15 +123,20 @@ static sf_status set_choice(const sf_option *o, const char *text)
 static sf_status set_value(const sf_option *o, const char *text)
 {
   switch (o->type) {
-  case SF_ARG_INT: return set_int(o, text);
-  case SF_ARG_U64: return set_u64(o, text);
-  case SF_ARG_DOUBLE: return set_double(o, text);
-  case SF_ARG_CHOICE: return set_choice(o, text);
+  case SF_ARG_INT:
+    return set_int(o, text);
+  case SF_ARG_U64:
+    return set_u64(o, text);
+  case SF_ARG_DOUBLE:
+    return set_double(o, text);
+  case SF_ARG_CHOICE:
+    return set_choice(o, text);
   case SF_ARG_STRING:
     if (!*text) return sf_fail(SF_E_USAGE, "%s needs a value that is not empty", o->name);
     *(const char **)o->value = text;
     return sf_ok();
-  case SF_ARG_FLAG: break;
+  case SF_ARG_FLAG:
+    break;
   }
   *(bool *)o->value = true;
   return sf_ok();
@@ -148,8 +164,10 @@ static bool names_option(const sf_cli *cli, const char *word)
 
 static void answer_and_exit(const sf_cli *cli, bool version)
 {
-  if (version) printf("%s (spikefield) %s\n", cli->program, SF_VERSION);
-  else print_help(cli);
+  if (version)
+    printf("%s (spikefield) %s\n", cli->program, SF_VERSION);
+  else
+    print_help(cli);
   exit(fflush(stdout) ? 1 : 0);
 }
 
@@ -175,6 +193,7 @@ static sf_status take_option(const sf_cli *cli, int argc, char **argv, int *at)
 
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional)
 {
+  signal(SIGXFSZ, SIG_IGN); /* a limit on file sizes becomes a write error that can be reported and cleaned up */
   int count = 0;
   bool options = true;
   for (int i = 0; i < cli->max_positional; i++) positional[i] = NULL;

@@ -20,13 +20,19 @@ typedef struct exr_stream {
   char message[200];
 } exr_stream;
 
-static void on_error(exr_const_context_t context, exr_result_t code, const char *message)
+static void on_read_error(exr_const_context_t context, exr_result_t code, const char *message)
 {
   void *user = NULL;
   (void)code;
   if (!context || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || !user) return;
   exr_stream *stream = user;
   if (!stream->message[0]) snprintf(stream->message, sizeof stream->message, "%s", message);
+}
+
+/* A writing context holds its lock while it reports, and asking it for the user data would wait for that lock. */
+static void on_write_error(exr_const_context_t context, exr_result_t code, const char *message)
+{
+  (void)context, (void)code, (void)message;
 }
 
 static int64_t stream_size(exr_const_context_t context, void *user)
@@ -49,13 +55,14 @@ static int64_t stream_read(exr_const_context_t context, void *user, void *buffer
 static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer, uint64_t n, uint64_t offset,
                             exr_stream_error_func_ptr_t error)
 {
-  const exr_stream *stream = user;
+  exr_stream *stream = user;
   const char *bytes = buffer;
+  (void)context, (void)error;
   for (uint64_t done = 0; done < n;) {
     ssize_t w = pwrite(stream->fd, bytes + done, n - done, (off_t)(offset + done));
     if (w < 0 && errno == EINTR) continue;
     if (w <= 0) {
-      error(context, EXR_ERR_WRITE_IO, "%s", strerror(w ? errno : ENOSPC));
+      snprintf(stream->message, sizeof stream->message, "%s", strerror(w ? errno : ENOSPC));
       return -1;
     }
     done += (uint64_t)w;
@@ -63,7 +70,7 @@ static int64_t stream_write(exr_const_context_t context, void *user, const void 
   return (int64_t)n;
 }
 
-static exr_context_initializer_t stream_setup(exr_stream *stream)
+static exr_context_initializer_t stream_setup(exr_stream *stream, exr_error_handler_cb_t on_error)
 {
   exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
   setup.error_handler_fn = on_error;
@@ -124,7 +131,8 @@ static exr_result_t write_rows(exr_context_t context, int width, int height, con
   for (int y = 0; y < height && !r; y += lines) {
     exr_chunk_info_t chunk;
     if ((r = exr_write_scanline_chunk_info(context, 0, y, &chunk))) break;
-    r = ready ? exr_encoding_update(context, 0, &chunk, &pipeline) : exr_encoding_initialize(context, 0, &chunk, &pipeline);
+    r = ready ? exr_encoding_update(context, 0, &chunk, &pipeline)
+              : exr_encoding_initialize(context, 0, &chunk, &pipeline);
     if (r) break;
     for (int i = 0; i < pipeline.channel_count; i++) point_channel(&pipeline.channels[i], &channels[i], width, y);
     if (!ready) r = exr_encoding_choose_default_routines(context, 0, &pipeline);
@@ -155,7 +163,7 @@ static sf_status write_stream(const char *path, int width, int height, const sf_
   sf_writer writer;
   SF_TRY(sf_writer_open(&writer, path));
   exr_stream stream = {.fd = fileno(writer.file)};
-  exr_context_initializer_t setup = stream_setup(&stream);
+  exr_context_initializer_t setup = stream_setup(&stream, on_write_error);
   exr_context_t context = NULL;
   exr_result_t r = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &setup);
   if (!r) r = write_header(context, width, height, sorted, n, attributes);
@@ -208,7 +216,8 @@ static sf_status check_layout(exr_context_t context, const char *path, size_t si
   exr_compression_t packing;
   bool deflate = !exr_get_compression(context, 0, &packing) && packing <= EXR_COMPRESSION_ZIP;
   if (deflate && w * h / 1100 > (int64_t)size)
-    return sf_fail(SF_E_FORMAT, "%s: EXR: %zu bytes cannot hold %jd x %jd pixels", path, size, (intmax_t)w, (intmax_t)h);
+    return sf_fail(SF_E_FORMAT, "%s: EXR: %zu bytes cannot hold %jd x %jd pixels", path, size, (intmax_t)w,
+                   (intmax_t)h);
   *width = (int)w, *height = (int)h;
   return sf_ok();
 }
@@ -265,7 +274,7 @@ static exr_result_t read_rows(exr_context_t context, int width, int height, cons
 static sf_status read_stream(const char *path, exr_stream *stream, int *width, int *height, sf_exr_channel **channels,
                              int *n)
 {
-  exr_context_initializer_t setup = stream_setup(stream);
+  exr_context_initializer_t setup = stream_setup(stream, on_read_error);
   exr_context_t context = NULL;
   exr_result_t r = exr_start_read(&context, path, &setup);
   if (r) {

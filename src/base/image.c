@@ -14,8 +14,8 @@ sf_status sf_image_alloc(sf_image *image, const char *path, uint64_t width, uint
                    (uintmax_t)height, (uintmax_t)MAX_PIXELS);
   image->width = (int)width, image->height = (int)height;
   image->rgba = malloc((size_t)(width * height) * 4 * sizeof *image->rgba);
-  if (!image->rgba) return sf_fail(SF_E_MEMORY, "%s: no memory for %ju x %ju pixels", path, (uintmax_t)width,
-                                   (uintmax_t)height);
+  if (!image->rgba)
+    return sf_fail(SF_E_MEMORY, "%s: no memory for %ju x %ju pixels", path, (uintmax_t)width, (uintmax_t)height);
   return sf_ok();
 }
 
@@ -33,12 +33,14 @@ sf_status sf_image_load(sf_image *image, const char *path)
   size_t size;
   SF_TRY(sf_read_file(path, FILE_LIMIT, &bytes, &size));
   sf_status status;
-  if (!size) status = sf_fail(SF_E_FORMAT, "%s: the file is empty", path);
+  if (!size)
+    status = sf_fail(SF_E_FORMAT, "%s: the file is empty", path);
   else if (size >= sizeof png && !memcmp(bytes, png, sizeof png))
     status = sf_png_load(image, path, (unsigned char *)bytes, size);
   else if (size >= sizeof jpeg && !memcmp(bytes, jpeg, sizeof jpeg))
     status = sf_jpeg_load(image, path, (unsigned char *)bytes, size);
-  else status = sf_fail(SF_E_FORMAT, "%s: neither a PNG nor a JPEG image", path);
+  else
+    status = sf_fail(SF_E_FORMAT, "%s: neither a PNG nor a JPEG image", path);
   free(bytes);
   return status;
 }
@@ -54,8 +56,7 @@ static void average_block(const uint16_t *from, size_t row, int factor, uint16_t
       alpha += p[3];
     }
   }
-  for (int c = 0; c < 3; c++)
-    out[c] = (uint16_t)(alpha ? (weighted[c] + alpha / 2) / alpha : (plain[c] + n / 2) / n);
+  for (int c = 0; c < 3; c++) out[c] = (uint16_t)(alpha ? (weighted[c] + alpha / 2) / alpha : (plain[c] + n / 2) / n);
   out[3] = (uint16_t)((alpha + n / 2) / n);
 }
 

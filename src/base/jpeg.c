@@ -78,8 +78,10 @@ sf_status sf_jpeg_load(sf_image *image, const char *path, const unsigned char *b
   job.codec.err = jpeg_std_error(&job.base);
   job.base.error_exit = on_error;
   job.base.emit_message = on_message;
-  if (setjmp(job.escape)) job.status = sf_fail(SF_E_FORMAT, "%s: JPEG: %s", path, job.message);
-  else decode(&job, bytes, size);
+  if (setjmp(job.escape))
+    job.status = sf_fail(SF_E_FORMAT, "%s: JPEG: %s", path, job.message);
+  else
+    decode(&job, bytes, size);
   jpeg_destroy_decompress(&job.codec);
   free(job.line);
   if (job.status.code != SF_OK) sf_image_free(image);

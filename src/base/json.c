@@ -9,8 +9,10 @@ static void locate(const char *text, const char *at, int *line, int *column)
 {
   *line = 1, *column = 1;
   for (; text < at; text++) {
-    if (*text == '\n') ++*line, *column = 1;
-    else ++*column;
+    if (*text == '\n')
+      ++*line, *column = 1;
+    else
+      ++*column;
   }
 }
 

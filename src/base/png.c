@@ -1,5 +1,6 @@
 #include "src/base/image_codec.h"
 #include "spikefield/io.h"
+#include <errno.h>
 #include <png.h>
 #include <setjmp.h>
 #include <stdio.h>
@@ -79,8 +80,10 @@ sf_status sf_png_load(sf_image *image, const char *path, const unsigned char *by
     png_destroy_read_struct(&job.png, NULL, NULL);
     return sf_fail(SF_E_MEMORY, "%s: no memory", path);
   }
-  if (setjmp(png_jmpbuf(job.png))) job.status = sf_fail(SF_E_FORMAT, "%s: PNG: %s", path, job.message);
-  else decode(&job);
+  if (setjmp(png_jmpbuf(job.png)))
+    job.status = sf_fail(SF_E_FORMAT, "%s: PNG: %s", path, job.message);
+  else
+    decode(&job);
   png_destroy_read_struct(&job.png, &job.info, NULL);
   free(job.rows);
   if (job.status.code != SF_OK) sf_image_free(image);
@@ -115,9 +118,12 @@ sf_status sf_image_save_png(const sf_image *image, const char *path)
   png_job job = {.image = &shown, .path = path, .status = sf_ok()};
   job.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning);
   job.info = job.png ? png_create_info_struct(job.png) : NULL;
-  if (!job.info) job.status = sf_fail(SF_E_MEMORY, "%s: no memory", path);
-  else if (setjmp(png_jmpbuf(job.png))) job.status = sf_fail(SF_E_IO, "cannot write %s: %s", path, job.message);
-  else encode(&job, writer.file);
+  if (!job.info)
+    job.status = sf_fail(SF_E_MEMORY, "%s: no memory", path);
+  else if (setjmp(png_jmpbuf(job.png)))
+    job.status = sf_fail(SF_E_IO, "cannot write %s: %s", path, ferror(writer.file) ? strerror(errno) : job.message);
+  else
+    encode(&job, writer.file);
   png_destroy_write_struct(&job.png, &job.info);
   free(job.line);
   if (job.status.code == SF_OK) return sf_writer_commit(&writer);

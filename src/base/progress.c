@@ -28,7 +28,10 @@ void sf_cli_catch_signals(void)
   sigaction(SIGTERM, &action, NULL);
 }
 
-bool sf_cli_interrupted(void) { return stop_requested != 0; }
+bool sf_cli_interrupted(void)
+{
+  return stop_requested != 0;
+}
 
 double sf_seconds(void)
 {

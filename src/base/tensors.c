@@ -18,8 +18,14 @@ static const struct {
               [SF_I32] = {"I32", 4}, [SF_I64] = {"I64", 8}, [SF_U64] = {"U64", 8}};
 enum { DTYPES = sizeof dtypes / sizeof dtypes[0] };
 
-size_t sf_dtype_size(sf_dtype type) { return (unsigned)type < DTYPES ? dtypes[type].size : 0; }
-const char *sf_dtype_name(sf_dtype type) { return (unsigned)type < DTYPES ? dtypes[type].name : "?"; }
+size_t sf_dtype_size(sf_dtype type)
+{
+  return (unsigned)type < DTYPES ? dtypes[type].size : 0;
+}
+const char *sf_dtype_name(sf_dtype type)
+{
+  return (unsigned)type < DTYPES ? dtypes[type].name : "?";
+}
 
 /* ---- reading ---- */
 
@@ -82,8 +88,8 @@ static sf_status parse_offsets(const char *path, const cJSON *item, const sf_ten
       !json_count(cJSON_GetArrayItem(offsets, 1), &place->end))
     return sf_fail(SF_E_FORMAT, "%s: tensor '%s': data_offsets is not a pair of byte offsets", path, tensor->name);
   if (place->begin > place->end || place->end > data_size)
-    return sf_fail(SF_E_FORMAT, "%s: tensor '%s': bytes %ju..%ju are outside the data of %ju bytes", path,
-                   tensor->name, (uintmax_t)place->begin, (uintmax_t)place->end, (uintmax_t)data_size);
+    return sf_fail(SF_E_FORMAT, "%s: tensor '%s': bytes %ju..%ju are outside the data of %ju bytes", path, tensor->name,
+                   (uintmax_t)place->begin, (uintmax_t)place->end, (uintmax_t)data_size);
   if (place->end - place->begin != bytes)
     return sf_fail(SF_E_FORMAT, "%s: tensor '%s': %ju bytes of data, its shape needs %ju", path, tensor->name,
                    (uintmax_t)(place->end - place->begin), (uintmax_t)bytes);
@@ -92,7 +98,8 @@ static sf_status parse_offsets(const char *path, const cJSON *item, const sf_ten
 
 static sf_status parse_tensor(const char *path, const cJSON *item, uint64_t data_size, sf_tensor *tensor, span *place)
 {
-  if (!cJSON_IsObject(item)) return sf_fail(SF_E_FORMAT, "%s: header entry '%.64s' is not an object", path, item->string);
+  if (!cJSON_IsObject(item))
+    return sf_fail(SF_E_FORMAT, "%s: header entry '%.64s' is not an object", path, item->string);
   if (strlen(item->string) >= sizeof tensor->name)
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor name '%.40s...' is longer than 63 bytes", path, item->string);
   strcpy(tensor->name, item->string);
@@ -197,7 +204,8 @@ static sf_status read_entries(sf_tensors *set, const char *path, cJSON *header, 
   for (cJSON *item = header->child, *next; item && status.code == SF_OK; item = next) {
     next = item->next;
     if (!strcmp(item->string, "__metadata__")) {
-      status = set->metadata ? sf_fail(SF_E_FORMAT, "%s: __metadata__ appears twice", path) : check_metadata(path, item);
+      status =
+          set->metadata ? sf_fail(SF_E_FORMAT, "%s: __metadata__ appears twice", path) : check_metadata(path, item);
       if (status.code == SF_OK) set->metadata = cJSON_DetachItemViaPointer(header, item);
       continue;
     }
@@ -220,7 +228,8 @@ static sf_status read_header(sf_tensors *set, const char *path, size_t size)
   if (length > HEADER_LIMIT)
     return sf_fail(SF_E_FORMAT, "%s: header of %ju bytes, the limit is %u", path, (uintmax_t)length, HEADER_LIMIT);
   if (length > size - 8)
-    return sf_fail(SF_E_FORMAT, "%s: cut short: header of %ju bytes, %zu in the file", path, (uintmax_t)length, size - 8);
+    return sf_fail(SF_E_FORMAT, "%s: cut short: header of %ju bytes, %zu in the file", path, (uintmax_t)length,
+                   size - 8);
   const char *text = set->buffer + 8, *end = NULL;
   if (!length || *text != '{') return sf_fail(SF_E_FORMAT, "%s: byte 8: the header is not a JSON object", path);
   if (memchr(text, 0, length)) return sf_fail(SF_E_FORMAT, "%s: the header holds a NUL byte", path);
@@ -264,8 +273,10 @@ static void describe(char *text, size_t room, sf_dtype type, int dims, const int
 {
   size_t n = (size_t)snprintf(text, room, "%s[", sf_dtype_name(type));
   for (int i = 0; i < dims && n < room; i++) {
-    if (shape[i] < 0) n += (size_t)snprintf(text + n, room - n, "%s*", i ? "," : "");
-    else n += (size_t)snprintf(text + n, room - n, "%s%lld", i ? "," : "", (long long)shape[i]);
+    if (shape[i] < 0)
+      n += (size_t)snprintf(text + n, room - n, "%s*", i ? "," : "");
+    else
+      n += (size_t)snprintf(text + n, room - n, "%s%lld", i ? "," : "", (long long)shape[i]);
   }
   if (n < room) snprintf(text + n, room - n, "]");
 }

@@ -16,8 +16,7 @@ static sf_status tensor_bytes(const char *path, const sf_tensor *tensor, size_t 
   if (!*bytes || tensor->dims < 0 || tensor->dims > 4)
     return sf_fail(SF_E_RANGE, "%s: tensor '%s': unknown type or more than 4 dimensions", path, tensor->name);
   for (int k = 0; k < tensor->dims; k++)
-    if (tensor->shape[k] < 0 || __builtin_mul_overflow(*bytes, (size_t)tensor->shape[k], bytes) ||
-        *bytes > FILE_LIMIT)
+    if (tensor->shape[k] < 0 || __builtin_mul_overflow(*bytes, (size_t)tensor->shape[k], bytes) || *bytes > FILE_LIMIT)
       return sf_fail(SF_E_RANGE, "%s: tensor '%s': shape[%d] is out of range", path, tensor->name, k);
   if (*bytes && !tensor->data) return sf_fail(SF_E_RANGE, "%s: tensor '%s': it has no data", path, tensor->name);
   return sf_ok();
@@ -47,8 +46,7 @@ static sf_status check_metadata(const char *path, const cJSON *metadata)
   if (!cJSON_IsObject(metadata)) return sf_fail(SF_E_RANGE, "%s: the metadata is not a JSON object", path);
   cJSON_ArrayForEach(item, metadata)
   {
-    if (!cJSON_IsString(item))
-      return sf_fail(SF_E_RANGE, "%s: metadata '%.64s' is not a string", path, item->string);
+    if (!cJSON_IsString(item)) return sf_fail(SF_E_RANGE, "%s: metadata '%.64s' is not a string", path, item->string);
   }
   return sf_ok();
 }
@@ -88,7 +86,8 @@ static char *header_text(const sf_tensor **order, const size_t *bytes, int count
   return text;
 }
 
-static sf_status write_all(const char *path, const char *header, const sf_tensor **order, const size_t *bytes, int count)
+static sf_status write_all(const char *path, const char *header, const sf_tensor **order, const size_t *bytes,
+                           int count)
 {
   sf_writer writer;
   SF_TRY(sf_writer_open(&writer, path));

@@ -81,8 +81,8 @@ static sf_status check_weights(const fx_layer *layer, const char *tensor, const 
       if (w == INT8_MIN)
         return sf_fail(SF_E_RANGE, "%s: tensor '%s'[%d][%d] is -128, expected -127..127", path, tensor, i, o);
       if (o >= layer->n_out && w)
-        return sf_fail(SF_E_RANGE, "%s: tensor '%s'[%d][%d] is %d, expected 0: the layer has %d outputs", path,
-                       tensor, i, o, w, layer->n_out);
+        return sf_fail(SF_E_RANGE, "%s: tensor '%s'[%d][%d] is %d, expected 0: the layer has %d outputs", path, tensor,
+                       i, o, w, layer->n_out);
     }
   return sf_ok();
 }

@@ -2,7 +2,6 @@
 #include "spikefield/io.h"
 #include "src/fx/scene.h"
 #include <inttypes.h>
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include "src/fx/nofloat.h"
@@ -18,10 +17,16 @@ typedef struct int_field {
   size_t offset;
 } int_field;
 
-#define LAYER(name, id)                                                                                               \
-  {name ".n_in", offsetof(fx_scene, net.layer[id].n_in)}, {name ".n_out", offsetof(fx_scene, net.layer[id].n_out)},  \
-      {name ".k", offsetof(fx_scene, net.layer[id].k)}, {name ".theta", offsetof(fx_scene, net.layer[id].theta)}
-#define FIELD(field) {#field, offsetof(fx_scene, field)}
+#define LAYER(name, id)                                                                                                \
+  {name ".n_in", offsetof(fx_scene, net.layer[id].n_in)}, {name ".n_out", offsetof(fx_scene, net.layer[id].n_out)},    \
+      {name ".k", offsetof(fx_scene, net.layer[id].k)},                                                                \
+  {                                                                                                                    \
+    name ".theta", offsetof(fx_scene, net.layer[id].theta)                                                             \
+  }
+#define FIELD(field)                                                                                                   \
+  {                                                                                                                    \
+#field, offsetof(fx_scene, field)                                                                                  \
+  }
 static const int_field ints[] = {
     LAYER("D1", FX_D1),
     LAYER("D2", FX_D2),

@@ -1,5 +1,5 @@
 /* Leaky integrators of the output layers: no threshold, no reset.
- * Mirror: rtl/sf_integrate.sv
+ * Mirror: rtl/sf_integrate.sv (fx_integrate_*), rtl/sf_scale.sv (fx_*_argument)
  *
  *   hybrid, first step    a = in
  *   hybrid, decay         a = a + rshift_round((in - a) * k, 12)     between a and in: exact
@@ -20,8 +20,7 @@ int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale)
   return (int32_t)fx_sat(x, FX_SIGMOID_BITS);
 }
 
-static uint32_t integrate(uint32_t acc, uint32_t in, int32_t k, int32_t mode, bool first, int bits,
-                          uint64_t *saturated)
+static uint32_t integrate(uint32_t acc, uint32_t in, int32_t k, int32_t mode, bool first, int bits, uint64_t *saturated)
 {
   const int64_t a = first ? 0 : acc, x = in;
   if (mode == FX_HYBRID && first) return in;

@@ -72,8 +72,7 @@ static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
   keep_current(trace, FX_C3, t, s->current, c3->n_out);
   for (int o = 0; o < COLOURS; o++) {
     const uint32_t value = fx_sigmoid(fx_sigmoid_argument(s->current[o], &net->sigmoid_in));
-    s->acc.colour[o] =
-        fx_integrate_colour(s->acc.colour[o], value, c3->k, net->mode, t == 0, &s->saturated[FX_C3]);
+    s->acc.colour[o] = fx_integrate_colour(s->acc.colour[o], value, c3->k, net->mode, t == 0, &s->saturated[FX_C3]);
     if (trace) trace->membrane[FX_C3][t][o] = (int32_t)s->acc.colour[o];
   }
 }

@@ -40,12 +40,12 @@ static inline int32_t clamp_membrane(int32_t u)
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first)
 {
   const int32_t old = first ? 0 : v;
-  const int32_t exact = mode == FX_NODECAY ? charge_nodecay(old, current, k)
-                                           : charge_leaky(old, current, effective_leak(k, mode, first));
+  const int32_t exact =
+      mode == FX_NODECAY ? charge_nodecay(old, current, k) : charge_leaky(old, current, effective_leak(k, mode, first));
   const int32_t membrane = clamp_membrane(exact);
   const bool spike = membrane >= theta;
-  return (fx_plif){.v = membrane - (spike ? theta : 0), .membrane = membrane, .spike = spike,
-                   .saturated = membrane != exact};
+  return (fx_plif){
+      .v = membrane - (spike ? theta : 0), .membrane = membrane, .spike = spike, .saturated = membrane != exact};
 }
 
 static void charge_layer(int32_t *restrict v, const int32_t *restrict current, int n, int32_t k)

@@ -13,34 +13,20 @@ typedef struct real_field {
   bool positive;
 } real_field;
 
+/* clang-format off */
 #define REAL(field, positive) {#field, offsetof(fx_scene, field), positive}
+/* clang-format on */
+/* The scales of currents and features serve reports only: 0 where unknown. */
 static const real_field reals[REALS] = {
-    REAL(to_box_scale, true),
-    REAL(to_box_offset[0], false),
-    REAL(to_box_offset[1], false),
-    REAL(to_box_offset[2], false),
-    REAL(dir_scale, true),
-    REAL(feature_scale[0], true),
-    REAL(feature_scale[1], true),
-    REAL(feature_scale[2], true),
-    REAL(feature_scale[3], true),
-    REAL(feature_scale[4], true),
-    REAL(feature_scale[5], true),
-    REAL(feature_scale[6], true),
-    REAL(feature_scale[7], true),
-    REAL(feature_scale[8], true),
-    REAL(feature_scale[9], true),
-    REAL(feature_scale[10], true),
-    REAL(feature_scale[11], true),
-    REAL(feature_scale[12], true),
-    REAL(feature_scale[13], true),
-    REAL(feature_scale[14], true),
-    REAL(feature_scale[15], true),
-    REAL(current_scale[0], true),
-    REAL(current_scale[1], true),
-    REAL(current_scale[2], true),
-    REAL(current_scale[3], true),
-    REAL(current_scale[4], true),
+    REAL(to_box_scale, true),       REAL(to_box_offset[0], false),  REAL(to_box_offset[1], false),
+    REAL(to_box_offset[2], false),  REAL(dir_scale, true),          REAL(feature_scale[0], false),
+    REAL(feature_scale[1], false),  REAL(feature_scale[2], false),  REAL(feature_scale[3], false),
+    REAL(feature_scale[4], false),  REAL(feature_scale[5], false),  REAL(feature_scale[6], false),
+    REAL(feature_scale[7], false),  REAL(feature_scale[8], false),  REAL(feature_scale[9], false),
+    REAL(feature_scale[10], false), REAL(feature_scale[11], false), REAL(feature_scale[12], false),
+    REAL(feature_scale[13], false), REAL(feature_scale[14], false), REAL(feature_scale[15], false),
+    REAL(current_scale[0], false),  REAL(current_scale[1], false),  REAL(current_scale[2], false),
+    REAL(current_scale[3], false),  REAL(current_scale[4], false),
 };
 
 static double *field_of(const fx_scene *scene, const real_field *field)

@@ -20,7 +20,8 @@ static size_t aligned(size_t size)
 sf_status fx_scene_allocate(fx_scene *scene, const char *path)
 {
   SF_TRY(fx_check_sizes(scene, path));
-  const size_t table = aligned((size_t)scene->grid.entries * FX_GRID_FEATURES), bits = aligned(fx_occupancy_bytes(scene));
+  const size_t table = aligned((size_t)scene->grid.entries * FX_GRID_FEATURES),
+               bits = aligned(fx_occupancy_bytes(scene));
   size_t size = table + bits;
   for (int id = 0; id < SF_LAYERS; id++) size += (size_t)scene->net.layer[id].n_in * SF_LANES;
   int8_t *block = aligned_alloc(ALIGN, aligned(size));

@@ -15,7 +15,8 @@ static int layer_width(const sf_calibration *c, int layer)
 static sf_status allocate(sf_calibration *c)
 {
   const size_t samples = (size_t)c->samples, rows = samples * (size_t)c->steps;
-  bool ok = (c->pos = calloc(samples * 3, sizeof *c->pos)) && (c->f = calloc(samples, (size_t)c->features * sizeof *c->f)) &&
+  bool ok = (c->pos = calloc(samples * 3, sizeof *c->pos)) &&
+            (c->f = calloc(samples, (size_t)c->features * sizeof *c->f)) &&
             (c->direction = calloc(samples * SF_DIR_FEATURES, sizeof *c->direction));
   for (int l = 0; l < SF_LAYERS && ok; l++) {
     ok = (c->target[l] = calloc(rows, (size_t)layer_width(c, l) * sizeof(float))) != NULL;
@@ -106,8 +107,8 @@ static sf_status run_samples(sf_calibration *c, const sf_model *model, uint64_t 
 
 sf_status sf_calibrate(sf_calibration *c, const sf_model *model, int steps, uint64_t seed)
 {
-  *c = (sf_calibration){.samples = SAMPLES, .steps = steps, .hidden = model->config.hidden,
-                        .features = 2 * model->config.levels};
+  *c = (sf_calibration){
+      .samples = SAMPLES, .steps = steps, .hidden = model->config.hidden, .features = 2 * model->config.levels};
   uint32_t *cell = NULL;
   uint64_t cells = 0;
   SF_TRY(allocate(c));

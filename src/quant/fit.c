@@ -58,11 +58,14 @@ static bool finish(moments *m, int rows)
 static sf_status gather(moments *m, const sf_fit_data *data, int begin, int end)
 {
   const size_t n_in = (size_t)data->n_in, n_out = (size_t)data->n_out;
-  *m = (moments){.n_in = data->n_in, .n_out = data->n_out, .a = calloc(n_in * n_in, sizeof(double)),
+  *m = (moments){.n_in = data->n_in,
+                 .n_out = data->n_out,
+                 .a = calloc(n_in * n_in, sizeof(double)),
                  .b = calloc(n_in * n_out, sizeof(double))};
   bool ok = m->a && m->b;
   if (ok)
-    for (int row = begin; row < end; row++) add_row(m, data->x + (size_t)row * n_in, data->target + (size_t)row * n_out);
+    for (int row = begin; row < end; row++)
+      add_row(m, data->x + (size_t)row * n_in, data->target + (size_t)row * n_out);
   ok = ok && finish(m, end - begin);
   if (ok) return sf_ok();
   moments_free(m);

@@ -24,8 +24,10 @@ static int frac_of(int layer)
 
 static double theta_of(const sf_model *model, int layer)
 {
-  return layer == FX_D1 ? model->config.theta[0] : layer == FX_C1 ? model->config.theta[1]
-         : layer == FX_C2 ? model->config.theta[2] : 0;
+  return layer == FX_D1   ? model->config.theta[0]
+         : layer == FX_C1 ? model->config.theta[1]
+         : layer == FX_C2 ? model->config.theta[2]
+                          : 0;
 }
 
 /* With a smaller unit theta would not fit the membrane. Integrating layers have no threshold; their unit only has to
@@ -45,9 +47,14 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
                      sf_quant_layer *result)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
-  const sf_fit_data data = {.rows = rows_of(c->calibration), .n_in = to->n_in, .n_out = to->n_out, .x = x,
+  const sf_fit_data data = {.rows = rows_of(c->calibration),
+                            .n_in = to->n_in,
+                            .n_out = to->n_out,
+                            .x = x,
                             .target = c->calibration->target[layer]};
-  const sf_fit_weights weights = {.w = sf_model_param(c->model, param_of[layer]), .stride = to->n_in, .lsb = lsb,
+  const sf_fit_weights weights = {.w = sf_model_param(c->model, param_of[layer]),
+                                  .stride = to->n_in,
+                                  .lsb = lsb,
                                   .unit_min = smallest_unit(c->model, layer)};
   return sf_fit_layer(&data, &weights, refine, to->w, result);
 }
@@ -56,9 +63,8 @@ static sf_status set_theta(const context *c, int layer, double unit)
 {
   const double exact = ldexp(theta_of(c->model, layer) / unit, frac_of(layer)), rounded = nearbyint(exact);
   if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
-    return sf_fail(SF_E_UNSUPPORTED,
-                   "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d", c->name,
-                   c->model->param[param_of[layer]].name, theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d",
+                   c->name, c->model->param[param_of[layer]].name, theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
   c->scene->net.layer[layer].theta = (int32_t)rounded;
   return sf_ok();
 }

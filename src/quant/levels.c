@@ -1,13 +1,13 @@
-/* Hash grid to int8, one scale per level. The core only shifts the interpolated sum, so the scale need not be a power of
- * two: what is left of it after the shift is the LSB of the level's features, and goes into their rows of D1. */
+/* Hash grid to int8, one scale per level. The core only shifts the interpolated sum, so the scale need not be a power
+ * of two: what is left of it after the shift is the LSB of the level's features, and goes into their rows of D1. */
 #include "src/quant/internal.h"
 #include <math.h>
 #include <string.h>
 
 enum { ENTRY_MAX = 127, FEATURE_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1, PRODUCT_FRAC = 16, SHIFT_MAX = 31 };
 enum { TRIALS = 4, SCALE_TRIALS = 8 };
-static const double NARROWER = 0.86;        /* 0.86^7 = 0.35 of the widest scale is the narrowest tried */
-static const double SCALE_MIN = 0x1p-140;   /* below every difference of two floats */
+static const double NARROWER = 0.86;      /* 0.86^7 = 0.35 of the widest scale is the narrowest tried */
+static const double SCALE_MIN = 0x1p-140; /* below every difference of two floats */
 
 /* Geometry alone: what fx_scene_allocate needs. */
 void sf_quantise_levels(fx_grid *grid, const sf_model *model)

@@ -4,8 +4,8 @@
 #include <string.h>
 
 enum { RAY_FRAC = 40, INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1 };
-static const double NEAR = 0.2;             /* model units */
-static const double COUNT_MAX = 1 << 20;    /* a step of one LSB would need 2^24: no scene has that */
+static const double NEAR = 0.2;          /* model units */
+static const double COUNT_MAX = 1 << 20; /* a step of one LSB would need 2^24: no scene has that */
 
 typedef struct interval {
   double enter, leave; /* model units */
@@ -81,9 +81,11 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
   memset(ray, 0, sizeof *ray);
   for (int axis = 0; axis < 3; axis++) {
     if (!isfinite(origin[axis]) || !isfinite(direction[axis]) || length == 0)
-      return sf_fail(SF_E_RANGE, "ray: origin (%g, %g, %g), direction (%g, %g, %g): expected finite numbers and a nonzero direction",
-                     (double)origin[0], (double)origin[1], (double)origin[2], (double)direction[0],
-                     (double)direction[1], (double)direction[2]);
+      return sf_fail(
+          SF_E_RANGE,
+          "ray: origin (%g, %g, %g), direction (%g, %g, %g): expected finite numbers and a nonzero direction",
+          (double)origin[0], (double)origin[1], (double)origin[2], (double)direction[0], (double)direction[1],
+          (double)direction[2]);
     unit[axis] = direction[axis] / length;
     o[axis] = origin[axis] * scene->to_box_scale + scene->to_box_offset[axis];
     d[axis] = unit[axis] * scene->to_box_scale;

@@ -108,9 +108,12 @@ static sf_status set_lens(sf_camera *camera, const sf_lens *lens, const sf_image
                    lens->height);
   double fx = lens->fl_x > 0 ? lens->fl_x * sx : 0.5 * w / tan(0.5 * lens->angle_x);
   double fy = fx;
-  if (lens->fl_y > 0) fy = lens->fl_y * sy;
-  else if (lens->fl_x > 0) fy = lens->fl_x * sy;
-  else if (lens->angle_y > 0) fy = 0.5 * h / tan(0.5 * lens->angle_y);
+  if (lens->fl_y > 0)
+    fy = lens->fl_y * sy;
+  else if (lens->fl_x > 0)
+    fy = lens->fl_x * sy;
+  else if (lens->angle_y > 0)
+    fy = 0.5 * h / tan(0.5 * lens->angle_y);
   camera->width = image->width, camera->height = image->height;
   camera->fx = (float)fx, camera->fy = (float)fy;
   camera->cx = (float)(lens->has_cx ? lens->cx * sx : 0.5 * w);
@@ -152,16 +155,17 @@ static sf_status load_view(sf_view *view, const sf_frame *frame, int number, con
 }
 
 /* First fault in the order of the views, whatever the order of the threads. */
-static sf_status first_fault(const sf_dataset *data, const sf_frame *frames, const int *numbers, const sf_status *status,
-                             const char *list)
+static sf_status first_fault(const sf_dataset *data, const sf_frame *frames, const int *numbers,
+                             const sf_status *status, const char *list)
 {
   for (int i = 0; i < data->count; i++) {
     if (status[i].code != SF_OK) return status[i];
     const sf_image *one = &data->view[0].image, *other = &data->view[i].image;
     bool same = one->width == other->width && one->height == other->height;
     if (!same && !(frames[0].own_size && frames[i].own_size))
-      return sf_fail(SF_E_FORMAT, "%s: pictures of different sizes: frame %d (%s) has %d x %d, frame %d (%s) has %d x %d",
-                     list, numbers[0], data->view[0].name, one->width, one->height, numbers[i], data->view[i].name,
+      return sf_fail(SF_E_FORMAT,
+                     "%s: pictures of different sizes: frame %d (%s) has %d x %d, frame %d (%s) has %d x %d", list,
+                     numbers[0], data->view[0].name, one->width, one->height, numbers[i], data->view[i].name,
                      other->width, other->height);
   }
   return sf_ok();

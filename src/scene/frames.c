@@ -26,7 +26,8 @@ static sf_status refuse_distortion(const cJSON *json, const char *where)
     double value = 0;
     SF_TRY(number(json, keys[i], where, -HUGE_VAL, HUGE_VAL, &value, NULL));
     if (value != 0)
-      return sf_fail(SF_E_UNSUPPORTED, "%s: lens distortion %s = %g: undistort the pictures first", where, keys[i], value);
+      return sf_fail(SF_E_UNSUPPORTED, "%s: lens distortion %s = %g: undistort the pictures first", where, keys[i],
+                     value);
   }
   if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "is_fisheye")))
     return sf_fail(SF_E_UNSUPPORTED, "%s: is_fisheye: only pinhole cameras are modelled", where);
@@ -64,8 +65,8 @@ static sf_status normalise_rotation(float m[12], const char *where)
   double det = c[0][0] * (c[1][1] * c[2][2] - c[1][2] * c[2][1]) - c[0][1] * (c[1][0] * c[2][2] - c[1][2] * c[2][0]) +
                c[0][2] * (c[1][0] * c[2][1] - c[1][1] * c[2][0]);
   if (!(fabs(det) > 0.01))
-    return sf_fail(SF_E_RANGE, "%s: transform_matrix is degenerate: its axes lie in one plane (determinant %.3g)", where,
-                   det);
+    return sf_fail(SF_E_RANGE, "%s: transform_matrix is degenerate: its axes lie in one plane (determinant %.3g)",
+                   where, det);
   for (int k = 0; k < 3; k++)
     for (int i = 0; i < 3; i++) m[4 * i + k] = (float)c[k][i];
   return sf_ok();
@@ -86,7 +87,8 @@ static sf_status parse_matrix(float m[12], const cJSON *json, const char *where)
         return sf_fail(SF_E_FORMAT, "%s: transform_matrix[%d][%d] is not a number", where, i, k);
       float value = (float)item->valuedouble;
       if (!isfinite(value)) return sf_fail(SF_E_RANGE, "%s: transform_matrix[%d][%d] is not finite", where, i, k);
-      if (i < 3) m[4 * i + k] = value;
+      if (i < 3)
+        m[4 * i + k] = value;
       else if (fabsf(value - (k == 3)) > 1e-5f)
         return sf_fail(SF_E_RANGE, "%s: transform_matrix[3][%d] is %g: the last row must be 0 0 0 1", where, k, value);
     }

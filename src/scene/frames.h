@@ -12,10 +12,10 @@ typedef struct sf_lens {
 } sf_lens;
 
 typedef struct sf_frame {
-  char file_path[256];  /* as in the file, without a leading "./" */
-  float to_world[12];   /* columns of the rotation have length 1; translation in world units */
-  sf_lens lens;         /* the file's values overridden by the frame's own */
-  bool own_size;        /* the frame itself states w and h */
+  char file_path[256]; /* as in the file, without a leading "./" */
+  float to_world[12];  /* columns of the rotation have length 1; translation in world units */
+  sf_lens lens;        /* the file's values overridden by the frame's own */
+  bool own_size;       /* the frame itself states w and h */
 } sf_frame;
 
 /* `frame` is one element of "frames", `index` its place; `path` is the JSON file, for messages. */

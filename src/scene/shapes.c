@@ -2,7 +2,10 @@
 #include "src/scene/stage.h"
 #include <math.h>
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static double dot(const double a[3], const double b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3], const double size[3], double yaw,
                     double tilt)
@@ -13,10 +16,18 @@ void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3],
   for (int i = 0; i < 3; i++) shape->centre[i] = centre[i], shape->size[i] = size[i];
   for (int i = 0; i < 9; i++) shape->axes[i] = axes[i];
   switch (kind) {
-  case SF_SPHERE: shape->bound = size[0]; break;
-  case SF_BOX: shape->bound = sqrt(dot(size, size)); break;
-  case SF_CYLINDER: shape->bound = hypot(size[0], size[1]); break;
-  case SF_TORUS: shape->bound = size[0] + size[1]; break;
+  case SF_SPHERE:
+    shape->bound = size[0];
+    break;
+  case SF_BOX:
+    shape->bound = sqrt(dot(size, size));
+    break;
+  case SF_CYLINDER:
+    shape->bound = hypot(size[0], size[1]);
+    break;
+  case SF_TORUS:
+    shape->bound = size[0] + size[1];
+    break;
   }
 }
 
@@ -36,7 +47,10 @@ typedef struct local_ray {
   double near, far; /* accepted: near < t < far */
 } local_ray;
 
-static bool accepts(const local_ray *ray, double t) { return t > ray->near && t < ray->far; }
+static bool accepts(const local_ray *ray, double t)
+{
+  return t > ray->near && t < ray->far;
+}
 
 static double point(const local_ray *ray, double t, double p[3])
 {
@@ -148,11 +162,15 @@ static double bracketed_root(const double *c, const double *derivative, int degr
   for (int i = 0; i < 100 && b - a > 1e-13; i++) {
     double y = evaluate(c, degree, x);
     if (y == 0) return x;
-    if ((y < 0) == rising) a = x;
-    else b = x;
+    if ((y < 0) == rising)
+      a = x;
+    else
+      b = x;
     double next = x - y / evaluate(derivative, degree - 1, x);
-    if (!(next > a && next < b)) next = (a + b) / 2;
-    else if (fabs(next - x) < 1e-14) return next;
+    if (!(next > a && next < b))
+      next = (a + b) / 2;
+    else if (fabs(next - x) < 1e-14)
+      return next;
     x = next;
   }
   return x;
@@ -236,10 +254,18 @@ bool sf_shape_hit(const sf_shape *shape, const sf_ray *ray, double near, sf_hit 
   bool found = false;
   to_local(shape, ray, &local);
   switch (shape->kind) {
-  case SF_SPHERE: found = hit_sphere(&local, shape->size, &t, normal); break;
-  case SF_BOX: found = hit_box(&local, shape->size, &t, normal); break;
-  case SF_CYLINDER: found = hit_cylinder(&local, shape->size, &t, normal); break;
-  case SF_TORUS: found = hit_torus(&local, shape->size, &t, normal); break;
+  case SF_SPHERE:
+    found = hit_sphere(&local, shape->size, &t, normal);
+    break;
+  case SF_BOX:
+    found = hit_box(&local, shape->size, &t, normal);
+    break;
+  case SF_CYLINDER:
+    found = hit_cylinder(&local, shape->size, &t, normal);
+    break;
+  case SF_TORUS:
+    found = hit_torus(&local, shape->size, &t, normal);
+    break;
   }
   if (!found) return false;
   hit->t = point(&local, t, hit->local);

@@ -8,7 +8,8 @@
 const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", NULL};
 
 /* Display colours; the shading squares them to linear light. */
-static const sf_material plinth = {SF_CHECKER, 0.28, {{0.93, 0.90, 0.82}, {0.36, 0.47, 0.56}, {0.52, 0.36, 0.25}}, 0, 0};
+static const sf_material plinth = {
+    SF_CHECKER, 0.28, {{0.93, 0.90, 0.82}, {0.36, 0.47, 0.56}, {0.52, 0.36, 0.25}}, 0, 0};
 static const sf_material brass = {SF_PLAIN, 0, {{0.80, 0.62, 0.28}}, 0.35, 5};
 static const sf_material gold = {SF_PLAIN, 0, {{0.95, 0.72, 0.25}}, 0.60, 5};
 static const sf_material ball = {SF_SECTORS, 0, {{0.88, 0.24, 0.20}, {0.18, 0.45, 0.80}, {0.97, 0.78, 0.20}}, 0.40, 5};
@@ -52,7 +53,8 @@ static void add_brick(sf_stage *stage, vec centre, vec half, double yaw, vec stu
   add(stage, SF_BOX, centre, half, yaw, 0, material);
   for (int i = 0; i < 4; i++) {
     double x = i & 1 ? stud.x : -stud.x, y = i & 2 ? stud.y : -stud.y;
-    vec at = {centre.x + x * cos(yaw) - y * sin(yaw), centre.y + x * sin(yaw) + y * cos(yaw), centre.z + half.z + 0.025};
+    vec at = {centre.x + x * cos(yaw) - y * sin(yaw), centre.y + x * sin(yaw) + y * cos(yaw),
+              centre.z + half.z + 0.025};
     add(stage, SF_CYLINDER, at, (vec){0.06, 0.025, 0}, 0, 0, material);
   }
 }

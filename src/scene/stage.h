@@ -16,10 +16,10 @@ typedef enum {
 } sf_shape_kind;
 
 typedef enum {
-  SF_PLAIN,    /* colour[0] */
-  SF_CHECKER,  /* colour[0], colour[1] on the faces that look along local +z, elsewhere colour[2]; period = tile side */
-  SF_STRIPES,  /* colour[0], colour[1] along local x; period = width of one stripe */
-  SF_SECTORS   /* six sectors around local z: colour[0..2], each followed by white; white caps */
+  SF_PLAIN,   /* colour[0] */
+  SF_CHECKER, /* colour[0], colour[1] on the faces that look along local +z, elsewhere colour[2]; period = tile side */
+  SF_STRIPES, /* colour[0], colour[1] along local x; period = width of one stripe */
+  SF_SECTORS  /* six sectors around local z: colour[0..2], each followed by white; white caps */
 } sf_pattern;
 
 typedef struct sf_material {
@@ -33,8 +33,8 @@ typedef struct sf_material {
 typedef struct sf_shape {
   sf_shape_kind kind;
   double centre[3], size[3];
-  double axes[9];  /* rows: the local axes in world coordinates */
-  double bound;    /* radius of the bounding sphere */
+  double axes[9]; /* rows: the local axes in world coordinates */
+  double bound;   /* radius of the bounding sphere */
   const sf_material *material;
 } sf_shape;
 

@@ -9,7 +9,10 @@ static const double light[3] = {0.48, -0.36, 0.80}; /* towards the key light, ex
 #define GROUND 0.20
 #define SURFACE_GAP 1e-6 /* a shadow ray starts off its own surface */
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static double dot(const double a[3], const double b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
 {
@@ -20,13 +23,15 @@ static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
   case SF_CHECKER:
     if (dot(hit->normal, shape->axes + 6) < 0.5) return m->colour[2];
     return m->colour[((long)floor(p[0] / m->period) + (long)floor(p[1] / m->period)) & 1];
-  case SF_STRIPES: return m->colour[(long)floor(p[0] / m->period) & 1];
+  case SF_STRIPES:
+    return m->colour[(long)floor(p[0] / m->period) & 1];
   case SF_SECTORS: {
     if (fabs(p[2]) > 0.94 * shape->size[0]) return white;
     int sector = (int)floor((atan2(p[1], p[0]) + M_PI) * (3 / M_PI));
     return sector & 1 || sector > 5 ? white : m->colour[sector / 2];
   }
-  case SF_PLAIN: break;
+  case SF_PLAIN:
+    break;
   }
   return m->colour[0];
 }

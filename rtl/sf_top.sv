@@ -1,0 +1,278 @@
+// The accelerator: AXI4-Lite registers, AXI4-Stream samples in and results out, one clock, one interrupt.
+// Tap ports are for observation only; TAP = 0 removes them. A tap beat shows, for a spiking layer and step, its spikes,
+// the presynaptic rows it added up and its membranes after reset; for D2 and C3 (step 0) the rows alone.
+`default_nettype none
+
+module sf_top #(
+    parameter TAP = 1
+) (
+    input  wire          clk_i,
+    input  wire          rst_ni,
+    // AXI4-Lite, 8 KiB
+    input  wire          s_axil_awvalid_i,
+    output wire          s_axil_awready_o,
+    input  wire [  12:0] s_axil_awaddr_i,
+    input  wire          s_axil_wvalid_i,
+    output wire          s_axil_wready_o,
+    input  wire [  31:0] s_axil_wdata_i,
+    input  wire [   3:0] s_axil_wstrb_i,
+    output wire          s_axil_bvalid_o,
+    input  wire          s_axil_bready_i,
+    output wire [   1:0] s_axil_bresp_o,
+    input  wire          s_axil_arvalid_i,
+    output wire          s_axil_arready_o,
+    input  wire [  12:0] s_axil_araddr_i,
+    output wire          s_axil_rvalid_o,
+    input  wire          s_axil_rready_i,
+    output wire [  31:0] s_axil_rdata_o,
+    output wire [   1:0] s_axil_rresp_o,
+    // samples
+    input  wire          s_axis_tvalid_i,
+    output wire          s_axis_tready_o,
+    input  wire [  63:0] s_axis_tdata_i,
+    input  wire          s_axis_tuser_i,
+    input  wire          s_axis_tlast_i,
+    // results
+    output wire          m_axis_tvalid_o,
+    input  wire          m_axis_tready_i,
+    output wire [  63:0] m_axis_tdata_o,
+    output wire          m_axis_tlast_o,
+    output wire          irq_o,
+    // tap
+    output wire          tap_valid_o,
+    output wire [   2:0] tap_layer_o,
+    output wire [   2:0] tap_step_o,
+    output wire [ 127:0] tap_spikes_o,
+    output wire [ 127:0] tap_rows_o,
+    output wire [3071:0] tap_membrane_o
+);
+  wire [1:0] mode;
+  wire [3:0] steps;
+  wire [15:0] exp_mul, sigmoid_mul;
+  wire [4:0] exp_shift, sigmoid_shift;
+  wire [31:0] exp_bias, sigmoid_bias;
+  wire [39:0] n_in, n_out;
+  wire [64:0] k;
+  wire [119:0] theta;
+  wire we;
+  wire [2:0] wlayer;
+  wire [6:0] wrow;
+  wire [4:0] wword;
+  wire [31:0] wweights;
+  wire running, soft_reset, clear_counters, snapshot, counters_busy, error_packet, error_value;
+  wire [8:0] counter_index;
+  wire [63:0] counter;
+
+  wire sample_valid, sample_first, sample_done, input_empty;
+  wire [4:0] feature_index;
+  wire [3:0] dir_index;
+  wire [11:0] feature, dir;
+  wire hold, core_idle, stall_out;
+  wire readout_ready, take, take_colour;
+  wire [6:0] current_lane;
+  wire [15:0] current;
+  wire [2:0] op, layer, step, spikes_layer, spikes_step, update_step;
+  wire [7:0] layer_n_out, fired, spikes_count;
+  wire spikes_valid, update, update_colour;
+  wire result_valid, result_ready;
+  wire [27:0] sigma;
+  wire [59:0] colour;
+  wire active = !(core_idle && readout_ready && input_empty && !m_axis_tvalid_o);
+  wire [7:0] n_dir = n_in[23:16] - (n_out[15:8] - 8'd1);
+
+  sf_csr u_csr (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .awvalid_i      (s_axil_awvalid_i),
+      .awready_o      (s_axil_awready_o),
+      .awaddr_i       (s_axil_awaddr_i),
+      .wvalid_i       (s_axil_wvalid_i),
+      .wready_o       (s_axil_wready_o),
+      .wdata_i        (s_axil_wdata_i),
+      .wstrb_i        (s_axil_wstrb_i),
+      .bvalid_o       (s_axil_bvalid_o),
+      .bready_i       (s_axil_bready_i),
+      .bresp_o        (s_axil_bresp_o),
+      .arvalid_i      (s_axil_arvalid_i),
+      .arready_o      (s_axil_arready_o),
+      .araddr_i       (s_axil_araddr_i),
+      .rvalid_o       (s_axil_rvalid_o),
+      .rready_i       (s_axil_rready_i),
+      .rdata_o        (s_axil_rdata_o),
+      .rresp_o        (s_axil_rresp_o),
+      .irq_o          (irq_o),
+      .mode_o         (mode),
+      .steps_o        (steps),
+      .exp_mul_o      (exp_mul),
+      .exp_shift_o    (exp_shift),
+      .exp_bias_o     (exp_bias),
+      .sigmoid_mul_o  (sigmoid_mul),
+      .sigmoid_shift_o(sigmoid_shift),
+      .sigmoid_bias_o (sigmoid_bias),
+      .n_in_o         (n_in),
+      .n_out_o        (n_out),
+      .k_o            (k),
+      .theta_o        (theta),
+      .we_o           (we),
+      .wlayer_o       (wlayer),
+      .wrow_o         (wrow),
+      .wword_o        (wword),
+      .wweights_o     (wweights),
+      .running_o      (running),
+      .soft_reset_o   (soft_reset),
+      .clear_o        (clear_counters),
+      .snapshot_o     (snapshot),
+      .active_i       (active),
+      .counters_busy_i(counters_busy),
+      .error_packet_i (error_packet),
+      .error_value_i  (error_value),
+      .counter_index_o(counter_index),
+      .counter_i      (counter)
+  );
+
+  sf_stream_in u_stream_in (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .enable_i       (running),
+      .n_feature_i    (n_in[5:0]),
+      .n_dir_i        (n_dir[4:0]),
+      .tvalid_i       (s_axis_tvalid_i),
+      .tready_o       (s_axis_tready_o),
+      .tdata_i        (s_axis_tdata_i),
+      .tuser_i        (s_axis_tuser_i),
+      .tlast_i        (s_axis_tlast_i),
+      .valid_o        (sample_valid),
+      .first_o        (sample_first),
+      .done_i         (sample_done),
+      .feature_index_i(feature_index),
+      .feature_o      (feature),
+      .dir_index_i    (dir_index),
+      .dir_o          (dir),
+      .empty_o        (input_empty),
+      .error_packet_o (error_packet),
+      .error_value_o  (error_value)
+  );
+
+  sf_core #(
+      .TAP(TAP)
+  ) u_core (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .hold_i         (hold),
+      .idle_o         (core_idle),
+      .we_i           (we),
+      .wlayer_i       (wlayer),
+      .wrow_i         (wrow),
+      .wword_i        (wword),
+      .wdata_i        (wweights),
+      .n_in_i         (n_in),
+      .n_out_i        (n_out),
+      .k_i            (k),
+      .theta_i        (theta),
+      .mode_i         (mode),
+      .steps_i        (steps),
+      .sample_valid_i (sample_valid),
+      .sample_first_i (sample_first),
+      .sample_done_o  (sample_done),
+      .feature_index_o(feature_index),
+      .feature_i      (feature),
+      .dir_index_o    (dir_index),
+      .dir_i          (dir),
+      .readout_ready_i(readout_ready),
+      .take_o         (take),
+      .take_colour_o  (take_colour),
+      .current_lane_i (current_lane),
+      .current_o      (current),
+      .op_o           (op),
+      .layer_o        (layer),
+      .step_o         (step),
+      .n_out_o        (layer_n_out),
+      .fired_o        (fired),
+      .spikes_valid_o (spikes_valid),
+      .spikes_layer_o (spikes_layer),
+      .spikes_step_o  (spikes_step),
+      .spikes_count_o (spikes_count),
+      .stall_o        (stall_out),
+      .tap_valid_o    (tap_valid_o),
+      .tap_layer_o    (tap_layer_o),
+      .tap_step_o     (tap_step_o),
+      .tap_spikes_o   (tap_spikes_o),
+      .tap_rows_o     (tap_rows_o),
+      .tap_membrane_o (tap_membrane_o)
+  );
+
+  sf_readout u_readout (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .take_i         (take),
+      .take_colour_i  (take_colour),
+      .ready_o        (readout_ready),
+      .current_lane_o (current_lane),
+      .current_i      (current),
+      .mode_i         (mode),
+      .steps_i        (steps),
+      .k_density_i    (k[25:13]),
+      .k_colour_i     (k[64:52]),
+      .exp_mul_i      (exp_mul),
+      .exp_shift_i    (exp_shift),
+      .exp_bias_i     (exp_bias),
+      .sigmoid_mul_i  (sigmoid_mul),
+      .sigmoid_shift_i(sigmoid_shift),
+      .sigmoid_bias_i (sigmoid_bias),
+      .update_o       (update),
+      .update_colour_o(update_colour),
+      .update_step_o  (update_step),
+      .valid_o        (result_valid),
+      .ready_i        (result_ready),
+      .sigma_o        (sigma),
+      .colour_o       (colour)
+  );
+
+  sf_stream_out u_stream_out (
+      .clk_i   (clk_i),
+      .rst_ni  (rst_ni),
+      .clear_i (soft_reset),
+      .valid_i (result_valid),
+      .ready_o (result_ready),
+      .sigma_i (sigma),
+      .colour_i(colour),
+      .tvalid_o(m_axis_tvalid_o),
+      .tready_i(m_axis_tready_i),
+      .tdata_o (m_axis_tdata_o),
+      .tlast_o (m_axis_tlast_o)
+  );
+
+  sf_counters u_counters (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .op_i           (op),
+      .layer_i        (layer),
+      .step_i         (step),
+      .n_out_i        (layer_n_out),
+      .fired_i        (fired),
+      .spikes_valid_i (spikes_valid),
+      .spikes_layer_i (spikes_layer),
+      .spikes_step_i  (spikes_step),
+      .spikes_count_i (spikes_count),
+      .update_i       (update),
+      .update_colour_i(update_colour),
+      .update_step_i  (update_step),
+      .sample_i       (result_valid && result_ready),
+      .active_i       (active),
+      .stall_in_i     (active && core_idle && !sample_valid && !hold),
+      .stall_out_i    (stall_out),
+      .clear_i        (clear_counters),
+      .snapshot_i     (snapshot),
+      .quiet_i        (core_idle && readout_ready),
+      .hold_o         (hold),
+      .busy_o         (counters_busy),
+      .index_i        (counter_index),
+      .counter_o      (counter)
+  );
+  wire unused_ok = &{1'b0, n_dir[7:5]};
+endmodule
+
+`default_nettype wire

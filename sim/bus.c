@@ -1,0 +1,68 @@
+/* AXI4-Lite master: one access at a time, each channel with its own random delay. */
+#include "sim/sim.h"
+#include "spikefield/rng.h"
+
+enum { BUS_PATIENCE = 4096, STREAM_AW = 1, STREAM_W, STREAM_B, STREAM_AR, STREAM_R };
+
+void sf_dut_tick(sf_dut *dut)
+{
+  sf_pins_cycle(dut->pins, &dut->in, &dut->out);
+  dut->cycle++;
+}
+
+bool sf_dut_stalls(const sf_dut *dut, uint64_t which)
+{
+  return dut->stall_percent && sf_random_below(dut->seed, which, dut->cycle, 100) < dut->stall_percent;
+}
+
+static uint32_t bus_read(void *context, uint32_t offset)
+{
+  sf_dut *dut = context;
+  bool asked = false;
+  for (int i = 0; i < BUS_PATIENCE; i++) {
+    dut->in.araddr = offset;
+    dut->in.arvalid = !asked && (dut->in.arvalid || !sf_dut_stalls(dut, STREAM_AR));
+    dut->in.rready = !sf_dut_stalls(dut, STREAM_R);
+    sf_dut_tick(dut);
+    if (dut->in.arvalid && dut->out.arready) {
+      asked = true;
+      dut->in.arvalid = false;
+    }
+    if (dut->in.rready && dut->out.rvalid) {
+      dut->in.rready = false;
+      return dut->out.rdata;
+    }
+  }
+  dut->in.arvalid = dut->in.rready = false;
+  dut->bus_hung = true;
+  return 0xffffffff;
+}
+
+static void bus_write(void *context, uint32_t offset, uint32_t value)
+{
+  sf_dut *dut = context;
+  bool addressed = false, given = false;
+  dut->in.wstrb = 0xf;
+  for (int i = 0; i < BUS_PATIENCE; i++) {
+    dut->in.awaddr = offset;
+    dut->in.wdata = value;
+    dut->in.awvalid = !addressed && (dut->in.awvalid || !sf_dut_stalls(dut, STREAM_AW));
+    dut->in.wvalid = !given && (dut->in.wvalid || !sf_dut_stalls(dut, STREAM_W));
+    dut->in.bready = !sf_dut_stalls(dut, STREAM_B);
+    sf_dut_tick(dut);
+    if (dut->in.awvalid && dut->out.awready) addressed = true, dut->in.awvalid = false;
+    if (dut->in.wvalid && dut->out.wready) given = true, dut->in.wvalid = false;
+    if (dut->in.bready && dut->out.bvalid) {
+      dut->in.bready = false;
+      dut->bus_response = dut->out.bresp;
+      return;
+    }
+  }
+  dut->in.awvalid = dut->in.wvalid = dut->in.bready = false;
+  dut->bus_hung = true;
+}
+
+sf_bus sf_dut_bus(sf_dut *dut)
+{
+  return (sf_bus){.read = bus_read, .write = bus_write, .context = dut};
+}

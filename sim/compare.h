@@ -1,0 +1,20 @@
+/* One sample: the fixed-point core against what the accelerator showed. */
+#ifndef SPIKEFIELD_SIM_COMPARE_H
+#define SPIKEFIELD_SIM_COMPARE_H
+#include "spikefield/dut.h"
+
+/* layer, step, neuron are -1 where they do not apply. */
+typedef struct sf_difference {
+  int layer, step, neuron;
+  const char *wire; /* "spike", "row", "membrane", "sigma", "colour" or a counter's name */
+  int64_t expected, actual;
+  uint64_t cycle;
+} sf_difference;
+
+/* In the order in which the hardware works; false and the first difference when there is one.
+ * "row": presynaptic neuron `neuron` was or was not added up in this layer. trace may be NULL: no rows and membranes. */
+bool sf_compare_sample(const fx_net *net, const fx_trace *core, const fx_out *core_out, const sf_dut_result *result,
+                       const sf_dut_trace *trace, sf_difference *difference);
+/* Events per layer and step, samples, rays. */
+bool sf_compare_counts(const fx_counts *core, const fx_counts *dut, uint64_t cycle, sf_difference *difference);
+#endif

@@ -1,0 +1,113 @@
+/* Open, program, count: everything but the streams. */
+#include "sim/sim.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RESET_CYCLES = 4 };
+
+sf_net_blob sf_dut_blob(const fx_net *net)
+{
+  sf_net_blob blob = {.mode = net->mode, .steps = net->steps,
+                      .exp_in = {net->exp_in.mul, net->exp_in.shift, net->exp_in.bias},
+                      .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    const fx_layer *layer = &net->layer[l];
+    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->w};
+  }
+  return blob;
+}
+
+static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
+{
+  if (dut->bus_hung)
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what, dut->cycle);
+  if (code == SF_DRIVER_OK) return sf_ok();
+  if (code != SF_DRIVER_REFUSED)
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s at cycle %" PRIu64, what, sf_driver_text(code), dut->cycle);
+  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
+  return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s: %s", what, sf_driver_text(code), sf_driver_error_text(error));
+}
+
+sf_status sf_dut_open_bare(sf_dut **dut_out, const sf_dut_options *options)
+{
+  *dut_out = NULL;
+  if (options->stall_percent < 0 || options->stall_percent > 90)
+    return sf_fail(SF_E_RANGE, "accelerator: stall percentage is %d, expected 0..90", options->stall_percent);
+  sf_dut *dut = calloc(1, sizeof *dut);
+  if (!dut) return sf_fail(SF_E_MEMORY, "accelerator: out of memory");
+  dut->pins = sf_pins_open(options->seed, options->wave, options->plusarg);
+  if (!dut->pins) {
+    free(dut);
+    return options->wave ? sf_fail(SF_E_IO, "%s: cannot write the waveform", options->wave)
+                         : sf_fail(SF_E_MEMORY, "accelerator: out of memory");
+  }
+  dut->seed = options->seed;
+  dut->stall_percent = (uint32_t)options->stall_percent;
+  dut->bus = sf_dut_bus(dut);
+  for (int i = 0; i < RESET_CYCLES; i++) sf_dut_tick(dut);
+  dut->in.rst_n = true;
+  sf_dut_tick(dut);
+  const sf_status status = driver_status(dut, sf_driver_probe(&dut->bus), "probe");
+  if (status.code != SF_OK) {
+    sf_dut_close(dut);
+    return status;
+  }
+  *dut_out = dut;
+  return status;
+}
+
+sf_status sf_dut_load(sf_dut *dut, const fx_net *net)
+{
+  const sf_net_blob blob = sf_dut_blob(net);
+  SF_TRY(driver_status(dut, sf_driver_load(&dut->bus, &blob), "load"));
+  dut->bus.write(dut->bus.context, SF_CSR_IRQ_ENABLE, SF_CSR_IRQ_ENABLE_ERROR);
+  dut->net = *net;
+  return sf_dut_clear_counts(dut);
+}
+
+sf_status sf_dut_open(sf_dut **dut_out, const fx_scene *scene, const sf_dut_options *options)
+{
+  sf_dut *dut;
+  *dut_out = NULL;
+  SF_TRY(sf_dut_open_bare(&dut, options));
+  const sf_status status = sf_dut_load(dut, &scene->net);
+  if (status.code == SF_OK)
+    *dut_out = dut;
+  else
+    sf_dut_close(dut);
+  return status;
+}
+
+sf_status sf_dut_clear_counts(sf_dut *dut)
+{
+  return driver_status(dut, sf_driver_clear(&dut->bus), "clear counters");
+}
+
+sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls)
+{
+  sf_driver_counters read;
+  SF_TRY(driver_status(dut, sf_driver_read_counters(&dut->bus, &read), "read counters"));
+  memset(counts, 0, sizeof *counts);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    fx_layer_counts *c = &counts->layer[l];
+    uint64_t *const to[SF_DRIVER_EVENTS] = {c->mac,    c->sop,     c->spikes,  c->updates,
+                                            c->weight, c->state_r, c->state_w, c->special};
+    for (int e = 0; e < SF_DRIVER_EVENTS; e++) memcpy(to[e], read.event[e][l], sizeof c->mac);
+  }
+  counts->samples = read.samples;
+  counts->rays = read.rays;
+  if (cycles) *cycles = read.cycles;
+  if (busy) *busy = read.busy;
+  if (stalls) *stalls = read.stall_in + read.stall_out;
+  return sf_ok();
+}
+
+uint64_t sf_dut_cycle(const sf_dut *dut) { return dut->cycle; }
+
+void sf_dut_close(sf_dut *dut)
+{
+  if (!dut) return;
+  sf_pins_close(dut->pins);
+  free(dut);
+}

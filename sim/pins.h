@@ -1,0 +1,45 @@
+/* The Verilated model, one clock cycle per call, behind a C interface. */
+#ifndef SPIKEFIELD_SIM_PINS_H
+#define SPIKEFIELD_SIM_PINS_H
+#include <stdbool.h>
+#include <stdint.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct sf_pins_in {
+  bool rst_n;
+  bool awvalid, wvalid, bready, arvalid, rready;
+  uint32_t awaddr, wdata, araddr;
+  uint8_t wstrb;
+  bool s_valid, s_user, s_last;
+  uint64_t s_data;
+  bool m_ready;
+} sf_pins_in;
+
+/* As sampled just before the rising edge, with the inputs of the same cycle applied. */
+typedef struct sf_pins_out {
+  bool awready, wready, bvalid, arready, rvalid;
+  uint8_t bresp, rresp;
+  uint32_t rdata;
+  bool s_ready;
+  bool m_valid, m_last;
+  uint64_t m_data;
+  bool irq, tap_valid;
+  uint8_t tap_layer, tap_step;
+  uint64_t tap_spikes[2], tap_rows[2];
+  uint32_t tap_membrane[96]; /* 128 x 24 bits, packed */
+} sf_pins_out;
+
+typedef struct sf_pins sf_pins;
+/* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
+sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
+/* The waveform begins here. */
+void sf_pins_dump(sf_pins *pins);
+void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out);
+void sf_pins_close(sf_pins *pins);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

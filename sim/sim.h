@@ -1,0 +1,34 @@
+/* Inside of the harness, for its own files and for tests that go below spikefield/dut.h. */
+#ifndef SPIKEFIELD_SIM_SIM_H
+#define SPIKEFIELD_SIM_SIM_H
+#include "firmware/sf_driver.h"
+#include "sim/pins.h"
+#include "spikefield/dut.h"
+
+struct sf_dut {
+  sf_pins *pins;
+  sf_pins_in in;
+  sf_pins_out out;
+  uint64_t cycle, seed;
+  uint32_t stall_percent;
+  sf_bus bus;          /* the driver's way in: AXI4-Lite */
+  bool bus_hung;       /* a register access was never answered */
+  uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
+  fx_net net;          /* sizes of the loaded net */
+  int64_t tap_sample;  /* sample of the current run that the next tap beat belongs to */
+};
+
+/* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */
+void sf_dut_tick(sf_dut *dut);
+/* True with the stall probability; streams of decisions are told apart by `which`. */
+bool sf_dut_stalls(const sf_dut *dut, uint64_t which);
+sf_bus sf_dut_bus(sf_dut *dut);
+/* Power on, probed, nothing programmed. */
+sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options);
+sf_status sf_dut_load(sf_dut *dut, const fx_net *net);
+sf_net_blob sf_dut_blob(const fx_net *net);
+
+/* Packet of a sample: beats of 4 values. words[SF_PACKET_MAX]; returns the number of beats. */
+enum { SF_PACKET_MAX = (SF_DIR_MAX + SF_FEATURE_MAX) / 4 };
+int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words);
+#endif

@@ -1,0 +1,1 @@
+lint gen gen-check firmware faults:

@@ -1,0 +1,162 @@
+/* Samples in, results and tap beats out, with random bubbles and back-pressure. */
+#include "sim/sim.h"
+#include <inttypes.h>
+#include <string.h>
+
+/* The longest sample takes about 10^3 cycles; stalls of up to 90 % slow the streams only. */
+enum { PATIENCE = 100000, STREAM_INPUT = 16, STREAM_OUTPUT, VALUES = 4, RESULT_BEATS = 2 };
+
+typedef struct run {
+  sf_dut *dut;
+  const sf_dut_sample *sample;
+  sf_dut_result *result;
+  sf_dut_trace *trace;
+  int n, sent, received;
+  int beat, beats, out_beat;
+  uint64_t packet[SF_PACKET_MAX];
+  uint64_t progress; /* cycle of the last beat */
+} run;
+
+static uint64_t pack(const int16_t *value, int n)
+{
+  uint64_t word = 0;
+  for (int i = 0; i < n; i++) word |= (uint64_t)(uint16_t)value[i] << (16 * i);
+  return word;
+}
+
+static int pack_all(uint64_t *words, const int16_t *value, int n)
+{
+  int beats = 0;
+  for (int i = 0; i < n; i += VALUES) words[beats++] = pack(value + i, n - i < VALUES ? n - i : VALUES);
+  return beats;
+}
+
+int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
+{
+  const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
+  const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
+  return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
+}
+
+/* A beat that was offered stays until it is taken, as AXI4-Stream demands. */
+static void offer(run *r)
+{
+  sf_pins_in *in = &r->dut->in;
+  if (in->s_valid || r->sent == r->n || sf_dut_stalls(r->dut, STREAM_INPUT)) return;
+  if (r->beat == 0) r->beats = sf_dut_packet(&r->dut->net, &r->sample[r->sent], r->packet);
+  in->s_valid = true;
+  in->s_data = r->packet[r->beat];
+  in->s_user = r->beat == 0 && r->sample[r->sent].first;
+  in->s_last = r->beat == r->beats - 1;
+}
+
+static void accept_input(run *r)
+{
+  if (!r->dut->in.s_valid || !r->dut->out.s_ready) return;
+  r->dut->in.s_valid = false;
+  r->progress = r->dut->cycle;
+  if (++r->beat < r->beats) return;
+  r->beat = 0;
+  r->sent++;
+}
+
+static sf_status accept_output(run *r)
+{
+  const sf_pins_out *out = &r->dut->out;
+  if (!r->dut->in.m_ready || !out->m_valid) return sf_ok();
+  if (out->m_last != (r->out_beat == RESULT_BEATS - 1) || r->received == r->sent + (r->beat > 0))
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: result stream out of step at cycle %" PRIu64, r->dut->cycle);
+  fx_out *value = &r->result[r->received].out;
+  const uint32_t low = (uint32_t)out->m_data, high = (uint32_t)(out->m_data >> 32);
+  if (r->out_beat == 0)
+    value->sigma = low, value->colour[0] = high;
+  else
+    value->colour[1] = low, value->colour[2] = high;
+  r->progress = r->dut->cycle;
+  if (++r->out_beat < RESULT_BEATS) return sf_ok();
+  r->out_beat = 0;
+  r->result[r->received++].cycle = r->dut->cycle;
+  return sf_ok();
+}
+
+static int32_t membrane_lane(const uint32_t *packed, int lane)
+{
+  const int bit = lane * SF_MEMBRANE_BITS, word = bit / 32, shift = bit % 32;
+  const uint64_t pair = packed[word] | (shift + SF_MEMBRANE_BITS > 32 ? (uint64_t)packed[word + 1] << 32 : 0);
+  return (int32_t)((uint32_t)(pair >> shift) << (32 - SF_MEMBRANE_BITS)) >> (32 - SF_MEMBRANE_BITS);
+}
+
+static sf_status observe(run *r)
+{
+  const sf_pins_out *out = &r->dut->out;
+  if (!out->tap_valid) return sf_ok();
+  const int64_t at = r->dut->tap_sample;
+  const int l = out->tap_layer, t = out->tap_step;
+  if (at >= r->n || l >= SF_LAYERS)
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: tap beat without a sample at cycle %" PRIu64, r->dut->cycle);
+  const bool spiking = l != FX_D2 && l != FX_C3;
+  if (spiking) {
+    memcpy(r->result[at].spikes[l][t], out->tap_spikes, sizeof out->tap_spikes);
+    r->result[at].spike_cycle[l][t] = r->dut->cycle;
+  }
+  if (r->trace) {
+    memcpy(r->trace[at].rows[l][t], out->tap_rows, sizeof out->tap_rows);
+    for (int lane = 0; spiking && lane < SF_LANES; lane++)
+      r->trace[at].membrane[l][t][lane] = membrane_lane(out->tap_membrane, lane);
+  }
+  if (l == FX_C3) r->dut->tap_sample++;
+  return sf_ok();
+}
+
+static sf_status trouble(run *r, const char *what)
+{
+  sf_dut *dut = r->dut;
+  const uint64_t cycle = dut->cycle;
+  dut->in.s_valid = dut->in.m_ready = false;
+  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
+  return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d samples in, %d results out: %s", what,
+                 cycle, r->sent, r->n, r->received, sf_driver_error_text(error));
+}
+
+static sf_status step(run *r)
+{
+  sf_dut *dut = r->dut;
+  offer(r);
+  dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT);
+  sf_dut_tick(dut);
+  accept_input(r);
+  SF_TRY(accept_output(r));
+  SF_TRY(observe(r));
+  if (dut->out.irq) return trouble(r, "interrupt");
+  return dut->cycle - r->progress > PATIENCE ? trouble(r, "hang") : sf_ok();
+}
+
+sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result, sf_dut_trace *trace)
+{
+  run r = {.dut = dut, .sample = sample, .result = result, .trace = trace, .n = n, .progress = dut->cycle};
+  memset(result, 0, (size_t)n * sizeof *result);
+  if (trace) memset(trace, 0, (size_t)n * sizeof *trace);
+  dut->tap_sample = 0;
+  sf_pins_dump(dut->pins);
+  sf_status status = sf_ok();
+  while (r.received < n && status.code == SF_OK) status = step(&r);
+  dut->in.s_valid = dut->in.m_ready = false;
+  if (status.code == SF_OK && dut->tap_sample != n)
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: %d results but tap beats of %" PRId64 " samples at cycle %" PRIu64, n,
+                   dut->tap_sample, dut->cycle);
+  return status;
+}
+
+sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result)
+{
+  return sf_dut_run_traced(dut, sample, n, result, NULL);
+}
+
+sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+{
+  const sf_dut_sample sample = {.ray = ray, .first = first, .f = f};
+  sf_dut_result result;
+  SF_TRY(sf_dut_run(dut, &sample, 1, &result));
+  *out = result.out;
+  return sf_ok();
+}

@@ -1,0 +1,324 @@
+#!/bin/bash
+# Bad input to every program: exit status 2 for usage and 1 for data, exactly one line on stderr that names the option
+# or the file, no partial output, never a crash.   usage: test_cli.sh BIN_DIR
+set -u
+BIN=$(cd "${1:?usage: test_cli.sh BIN_DIR}" && pwd) || exit 2
+export LC_ALL=C OMP_NUM_THREADS=2
+WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-cli-XXXXXX") || exit 2
+trap 'rm -rf "$WORK"' EXIT
+trap 'exit 130' INT TERM
+cd "$WORK" || exit 2
+passed=0 failed=0
+
+fail() {
+  failed=$((failed + 1))
+  echo "FAILED $1: $2"
+  sed 's/^/    stderr: /' err 2>/dev/null | head -3
+}
+
+# run PROGRAM ARGS...: leaves $status, files stdout.txt and err.
+run() {
+  timeout -k 5 60 "$BIN/$1" "${@:2}" >stdout.txt 2>err </dev/null
+  status=$?
+}
+
+# judge LABEL PROGRAM STATUS PATTERN: one line on stderr, from the program, with PATTERN; nothing left aside.
+judge() {
+  local label=$1 program=$2 wanted=$3 pattern=$4 lines left
+  lines=$(wc -l <err)
+  left=$(find . -name '*.sf-*' -print -quit)
+  if [ "$status" -ne "$wanted" ]; then fail "$label" "exit status $status, expected $wanted"
+  elif [ "$lines" -ne 1 ]; then fail "$label" "$lines lines on stderr, expected 1"
+  elif ! grep -q "^$program: " err; then fail "$label" "the line does not name the program"
+  elif ! grep -qF -e "$pattern" err; then fail "$label" "the line does not name '$pattern'"
+  elif [ -n "$left" ]; then fail "$label" "left $left behind"; rm -f "$left"
+  else passed=$((passed + 1)); return; fi
+}
+
+usage() { # PATTERN PROGRAM ARGS...
+  run "${@:2}"
+  judge "usage: ${*:2}" "$2" 2 "$1"
+}
+
+data() { # PATTERN PROGRAM ARGS...
+  run "${@:2}"
+  judge "data: ${*:2}" "$2" 1 "$1"
+}
+
+good() { # PROGRAM ARGS...
+  run "$@"
+  if [ "$status" -ne 0 ]; then fail "good: $*" "exit status $status"
+  elif [ -s err ]; then fail "good: $*" "a good run wrote on stderr"
+  else passed=$((passed + 1)); fi
+}
+
+absent() { # FILE LABEL
+  if [ -e "$1" ]; then fail "$2" "left $1 behind"; rm -rf "$1"; else passed=$((passed + 1)); fi
+}
+
+# poke FILE OFFSET OCTAL: one byte.
+poke() { printf "\\$3" | dd of="$1" bs=1 seek="$2" conv=notrunc status=none; }
+size_of() { wc -c <"$1"; }
+
+# ---- something good to spoil ----
+
+good sf_scene simple -o d --size 16 --train 3 --test 2
+good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_export model.safetensors -o s.snn
+good sim_render s.snn d -o g.exr --png g.png
+good sim_render s.snn d -o f.exr --backend float
+good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
+good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
+good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
+good energy_audit --published
+good sf_cosim s.snn d --rays 1 --seed 1
+if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.exr and x.exr differ"; fi
+for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
+  if [ -s $f ]; then passed=$((passed + 1)); else fail "good runs" "$f is missing"; fi
+done
+[ "$failed" -eq 0 ] || echo "note: good runs failed, the rest builds on them"
+
+# ---- usage ----
+
+# The shortest right command line of each program.
+declare -A right=(
+  [sf_scene]="simple -o out" [sf_train]="d -o out" [sf_export]="model.safetensors -o out"
+  [sf_cosim]="s.snn d" [sim_render]="s.snn d -o out" [energy_audit]="s.snn d")
+for p in sf_scene sf_train sf_export sf_cosim sim_render energy_audit; do
+  usage --no-such-option $p ${right[$p]} --no-such-option
+  usage --no-such-option $p ${right[$p]} --no-such-option=3
+  usage -Z $p ${right[$p]} -Z
+  usage --json $p ${right[$p]} --json=
+  usage --seed $p ${right[$p]} --seed
+  usage --seed $p ${right[$p]} --seed nan
+  usage --seed $p ${right[$p]} --seed -1
+  usage --seed $p ${right[$p]} --seed 99999999999999999999999
+  usage --seed $p ${right[$p]} --seed 12abc
+  usage --seed $p ${right[$p]} --seed=
+  usage surplus $p ${right[$p]} surplus
+  usage missing $p
+  run $p --help
+  if [ "$status" -eq 0 ] && [ -s stdout.txt ] && [ ! -s err ]; then passed=$((passed + 1)); else fail "$p --help" "status $status"; fi
+done
+number() { # PROGRAM OPTION BAD...
+  for value in "${@:3}"; do usage "$2" "$1" ${right[$1]} "$2" "$value"; done
+}
+number sf_scene --size 0 -1 nan 1e400 99999999999 '' 3.5
+number sf_scene --train 0 nan
+number sf_scene --test -1 inf
+number sf_train --beta -1 2 nan NaN inf -inf 1e999 x ''
+number sf_train --steps 0 9 nan
+number sf_train --stage1 -1 nan 3000000000
+number sf_train --minutes -1 nan
+number sf_train --threads -1 nan
+number sf_train --hidden 0 129
+usage hidden sf_train d -o out --hidden 17
+number sf_train --input-mode sometimes nan ''
+number sf_train --net cnn
+number sf_export --steps 0 9 -1 nan
+number sf_cosim --rays -1 nan inf x
+number sim_render --view -1 nan 2 99999999999
+number sim_render --backend gpu nan ''
+number sim_render --downscale 0 -1 nan
+number sim_render --steps 0 9 nan
+number sim_render --threads 0 nan
+number sim_render --crop '' 1 1,2,3 1,2,3,4,5 0,0,0,1 0,0,1,0 0,0,17,1 16,0,1,1 -1,0,1,1 nan,0,1,1 0,0,1,1x 99999999999,0,1,1
+number energy_audit --rays 0 -1 nan
+number energy_audit --views 0 3 nan
+number energy_audit --view -1 2 nan
+number energy_audit --rtl-rays -1 nan
+number energy_audit --stall -1 91 nan
+usage nosuch sf_scene nosuch -o out
+usage -o sim_render s.snn d
+usage --output sf_export model.safetensors
+usage --views energy_audit s.snn d --view 0 --views 1
+absent out "usage errors"
+
+# ---- data ----
+
+readers() { # PATTERN DIR: every program that reads a data set
+  data "$1" sf_train "$2" -o out --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+  data "$1" sim_render s.snn "$2" --view 1 -o out
+  data "$1" energy_audit s.snn "$2" --views 2 --rtl-rays 1
+  data "$1" sf_cosim s.snn "$2" --rays 1
+  absent out "bad data $2"
+}
+spoil() { rm -rf bad; cp -r d bad; } # then change bad/
+both() { # SED PROGRAM: on both JSON files
+  sed -i "$1" bad/transforms_train.json bad/transforms_test.json
+}
+first_pictures() { for f in bad/train/r_0.png bad/test/r_0.png; do "$@" $f; done; }
+cut_picture() { truncate -s $(($(size_of "$1") * 6 / 10)) "$1"; }
+flip_picture() { poke "$1" $(($(size_of "$1") / 2)) 123; }
+empty_picture() { : >"$1"; }
+
+readers nodir nodir
+spoil; rm bad/*.json; readers bad bad
+spoil; rm bad/*/*.png; readers r_ bad
+spoil; rm bad/train/r_0.png bad/test/r_0.png; readers r_0 bad
+spoil; first_pictures cut_picture; readers r_0 bad
+spoil; first_pictures empty_picture; readers r_0 bad
+spoil; first_pictures flip_picture; readers r_0 bad
+spoil; for s in train test; do cp s.snn bad/$s/r_0.png; done; readers r_0 bad
+sf_small() { run sf_scene simple -o small --size 8 --train 1 --test 1; }
+sf_small
+spoil; for s in train test; do cp small/$s/r_0.png bad/$s/r_1.png; done; readers r_1 bad
+spoil; for s in train test; do sed -i '3s/frames/fra\x01mes" "/' bad/transforms_$s.json; done; readers json:3: bad
+spoil; for s in train test; do truncate -s 200 bad/transforms_$s.json; done; readers .json: bad
+spoil; for s in train test; do : >bad/transforms_$s.json; done; readers .json: bad
+spoil; for s in train test; do echo trailing >>bad/transforms_$s.json; done; readers .json: bad
+spoil; for s in train test; do echo '[]' >bad/transforms_$s.json; done; readers .json bad
+spoil; for s in train test; do echo '{"camera_angle_x":0.7,"frames":[]}' >bad/transforms_$s.json; done; readers .json bad
+spoil; both 's/"frames"/"fromes"/'; readers .json bad
+spoil; both '5,6s/\[\[-*[0-9.e-]*,/[[NaN,/'; readers .json: bad
+spoil; both 's/\[\[-*[0-9.e-]*,/[[1e999,/'; readers .json bad
+spoil; both 's/\[\[-*[0-9.e-]*,/[["1",/'; readers .json bad
+spoil; both 's/, *\[0, 0, 0, 1\]//;s/\[\[[^]]*\],/[/'; readers .json bad
+spoil; both 's/"transform_matrix"/"transform"/'; readers .json bad
+spoil; both 's/"file_path"/"path"/'; readers .json bad
+spoil; both 's/"camera_angle_x":.*,/"camera_angle_x": 0,/'; readers .json bad
+spoil; both 's/"camera_angle_x":.*,/"camera_angle_x": -1e999,/'; readers .json bad
+spoil; both '/camera_angle_x/d'; readers .json bad
+
+# ---- models and scenes ----
+
+models() { # PATTERN FILE
+  data "$1" sf_export "$2" -o out
+  data "$1" sim_render s.snn d --backend float --model "$2" -o out
+  absent out "bad model $2"
+}
+scenes() { # PATTERN FILE
+  data "$1" sim_render "$2" d -o out
+  data "$1" energy_audit "$2" d --rays 1 --rtl-rays 1
+  data "$1" sf_cosim "$2" d --rays 1
+  absent out "bad scene $2"
+}
+each_file() { # FUNCTION GOOD
+  $1 none.file none.file
+  $1 d d
+  for n in 0 1 7 8 9 100 $(($(size_of "$2") / 2)) $(($(size_of "$2") - 1)); do
+    head -c "$n" "$2" >cut.file; $1 cut.file cut.file
+  done
+  { cat "$2"; echo; } >long.file; $1 long.file long.file
+  cp "$2" edited.file; poke edited.file 0 377; $1 edited.file edited.file    # header length
+  cp "$2" edited.file; poke edited.file 7 177; $1 edited.file edited.file    # header length beyond any file
+  cp "$2" edited.file; poke edited.file 8 170; $1 edited.file edited.file    # not JSON
+  cp "$2" edited.file; poke edited.file 40 0; $1 edited.file edited.file     # a NUL in the header
+  sed 's/"version":"1"/"version":"9"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"t_r":"[0-9]"/"t_r":"9"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"t_r":"[0-9]"/"t_r":"0"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"format":"spikefield/"format":"spokefield/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"dtype":"U8"/"dtype":"I8"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"colour.w4"/"colour.w9"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"shape":\[512,2\]/"shape":[256,4]/' "$2" >edited.file; $1 edited.file edited.file
+  printf 'PK\003\004 something else entirely' >other.file; $1 other.file other.file
+}
+each_file models model.safetensors
+each_file scenes s.snn
+
+# Floats that are not numbers: -NaN in the first weight of the file.
+header=$(od -An -tu8 -N8 model.safetensors | tr -d ' ')
+cp model.safetensors nan.file
+for i in 0 1 2 3; do poke nan.file $((8 + header + i)) 377; done
+models nan.file nan.file
+# A scene's checksum covers every byte behind its header; the weights of a model may be anything finite.
+header=$(od -An -tu8 -N8 s.snn | tr -d ' ')
+for part in 1 3 5 7 9; do
+  cp s.snn edited.file
+  at=$((8 + header + ($(size_of s.snn) - 8 - header) * part / 10))
+  poke edited.file $at "$(if [ "$(od -An -tu1 -j$at -N1 edited.file | tr -d ' ')" = 1 ]; then echo 2; else echo 1; fi)"
+  scenes edited.file edited.file
+done
+sed 's/"D1.theta":"[0-9]/"D1.theta":"-/' s.snn >edited.file; scenes edited.file edited.file
+sed 's/"max_samples":"1024"/"max_samples":"1023"/' s.snn >edited.file; scenes edited.file edited.file
+scenes model.safetensors model.safetensors
+models s.snn s.snn
+usage --steps sim_render s.snn d --steps 9 -o out
+
+# One wrong byte anywhere in a scene's header is refused; in a model's it may be another good number, but never a crash.
+header=$(od -An -tu8 -N8 s.snn | tr -d ' ')
+for at in $(seq 8 $((header / 30)) $((header + 7))); do
+  cp s.snn edited.file
+  poke edited.file $at "$(if [ "$(od -An -tc -j$at -N1 edited.file | tr -d ' ')" = 9 ]; then echo 70; else echo 71; fi)"
+  data edited.file sim_render edited.file d -o out
+done
+header=$(od -An -tu8 -N8 model.safetensors | tr -d ' ')
+for at in $(seq 9 $((header / 30)) $((header + 7))); do
+  cp model.safetensors edited.file
+  poke edited.file $at 71
+  run sf_export edited.file -o out
+  if [ "$status" -eq 0 ]; then passed=$((passed + 1)); rm -f out
+  else judge "model with byte $at edited" sf_export 1 edited.file; absent out "model with byte $at edited"; fi
+done
+
+# ---- outputs that cannot be written ----
+
+: >plain
+train=(d --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1 -q)
+writers() { # PATTERN PATH
+  data "$1" sf_export model.safetensors -o "$2"
+  data "$1" sim_render s.snn d -o "$2"
+  data "$1" sim_render s.snn d -o out --png "$2"
+  data "$1" sim_render s.snn d -o "$2" --backend float
+  data "$1" energy_audit s.snn d --rays 1 --rtl-rays 0 --csv "$2"
+  data "$1" sf_train "${train[@]}" -o "$2"
+  absent out "unwritable $2"
+}
+writers nodir/ nodir/x.out
+writers plain plain/x.out
+writers /proc /proc/spikefield.out
+writers /dev/full /dev/full
+mkdir -p folder.out
+writers folder.out folder.out
+data plain sf_scene simple -o plain --size 4 --train 1 --test 1
+data plain sf_scene simple -o plain/deep/er --size 4 --train 1 --test 1
+data /proc sf_scene simple -o /proc/spikefield --size 4 --train 1 --test 1
+if [ "$(id -u)" -ne 0 ]; then
+  mkdir locked && chmod 500 locked
+  writers locked locked/x.out
+  data locked sf_scene simple -o locked/x --size 4 --train 1 --test 1
+fi
+
+# A full disk: files of at most 1 KiB. An output that was there before stays as it was.
+full() { # OUTPUT PROGRAM ARGS...
+  rm -rf "$1"
+  echo old >"$1"
+  (ulimit -f 1; exec timeout -k 5 60 "$BIN/$2" "${@:3}" >stdout.txt 2>err </dev/null)
+  status=$?
+  judge "full disk: ${*:2}" "$2" 1 "$1"
+  if [ "$(cat "$1")" = old ]; then passed=$((passed + 1)); else fail "full disk: ${*:2}" "$1 was changed"; fi
+  rm -f "$1"
+}
+full full.out sf_export model.safetensors -o full.out
+full full.out sim_render s.snn d -o full.out
+full full.out sim_render s.snn d -o full.out --backend float
+full full.out energy_audit s.snn d --rays 20 --rtl-rays 0 --json --csv full.out
+full full.out sf_train "${train[@]}" -o full.out --log log.out
+(ulimit -f 1; exec timeout -k 5 60 "$BIN/sf_scene" simple -o fullscene --size 64 --train 1 --test 1 >stdout.txt 2>err </dev/null)
+status=$?
+judge "full disk: sf_scene" sf_scene 1 fullscene
+absent fullscene/transforms_test.json "full disk: sf_scene"
+for p in sf_export sim_render energy_audit sf_cosim; do
+  rm -rf out
+  case $p in sf_cosim) more="--rays 1 --json" ;; energy_audit) more="--rays 1 --rtl-rays 1 --json" ;; *) more=--json ;; esac
+  timeout -k 5 60 "$BIN/$p" ${right[$p]} $more >/dev/full 2>err </dev/null
+  status=$?
+  judge "standard output on a full disk: $p" $p 1 output
+done
+rm -rf out
+
+# ---- interruption ----
+
+run sf_scene simple -o wide --size 128 --train 1 --test 1
+stop() { # OUTPUT PROGRAM ARGS...
+  timeout -k 20 --preserve-status -s INT 1 "$BIN/$2" "${@:3}" >stdout.txt 2>err </dev/null
+  status=$?
+  judge "interrupted: ${*:2}" "$2" 130 ""
+  absent "$1" "interrupted: ${*:2}"
+}
+stop stop.exr sim_render s.snn wide --backend rtl --crop 0,0,128,128 -o stop.exr --png stop.exr.png
+stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
+absent stop.exr.png "interrupted: sim_render"
+
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]

@@ -1,0 +1,280 @@
+/* Spiking nets: equations by hand, oracle against kernels, gradients against finite differences. */
+#include "float_fixture.h"
+#include "render/view.h"
+#include "snn/plif.h"
+#include <check.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its fixed point). */
+START_TEST(plif_by_hand)
+{
+  ck_assert_float_eq(sf_plif_charge(SF_HYBRID, 0, 0.5f, 0, 0.8f), 0.8f);
+  ck_assert_float_eq_tol(sf_plif_charge(SF_HYBRID, 1, 0.5f, 0.8f, 0.8f), 0.8f, 1e-7f);
+  ck_assert_float_eq_tol(sf_plif_charge(SF_DECAY, 0, 0.5f, 0, 0.8f), 0.4f, 1e-7f);
+  ck_assert_float_eq_tol(sf_plif_charge(SF_DECAY, 1, 0.25f, 0.4f, 0.8f), 0.5f, 1e-7f);
+  ck_assert_float_eq_tol(sf_plif_charge(SF_NODECAY, 1, 0.25f, 0.4f, 0.8f), 1.1f, 1e-7f);
+}
+END_TEST
+
+/* The weights that a hybrid prefix gives its steps sum to 1 for every tau > 1: integrating ones gives one. */
+START_TEST(hybrid_prefix_weights_sum_to_one)
+{
+  for (int i = 0; i < 1000; i++) {
+    float k = 1e-4f + 0.9998f * sf_random_float(1, 2, i), o = 0;
+    for (int t = 0; t < 8; t++) {
+      o = sf_plif_charge(SF_HYBRID, t, k, o, 1.0f);
+      ck_assert_float_eq_tol(o, 1.0f, 1e-6f); /* a few roundings of 2^-24 */
+    }
+  }
+}
+END_TEST
+
+typedef struct rig {
+  sf_model model;
+  sf_net_view net;
+  sf_block *block;
+  sf_net_scratch *scratch;
+  sf_net_grad *grad;
+} rig;
+
+static rig rig_make(sf_net_kind kind, sf_input_mode mode, int hidden, int steps)
+{
+  rig r = {.model = test_model(kind, mode, hidden, steps, 0.5f)};
+  r.net = sf_net_view_of(&r.model);
+  r.block = sf_aligned_alloc(sizeof *r.block);
+  r.scratch = sf_aligned_alloc(sizeof *r.scratch);
+  r.grad = sf_aligned_alloc(sizeof *r.grad);
+  for (int i = 0; i < 2 * 4 * SF_BLOCK; i++) r.block->f[i] = test_random(1u << 22 | i);
+  for (int i = 0; i < SF_DIR_FEATURES * SF_BLOCK; i++) r.block->sh[i] = test_random(1u << 23 | i);
+  return r;
+}
+
+static void rig_free(rig *r)
+{
+  sf_model_free(&r->model);
+  free(r->block);
+  free(r->scratch);
+  free(r->grad);
+}
+
+/* Kernels against the oracle. A current within rounding of the threshold may fire in one and not in the other, so a few
+ * samples may differ altogether: at most 2 of 64 may, the others agree within 1e-4 relative (sums of 128 floats). */
+static void compare_forward(const char *isa, sf_net_kind kind, sf_input_mode mode)
+{
+  const sf_kernels *kernels = sf_kernels_select(isa);
+  if (!kernels) return;
+  rig r = rig_make(kind, mode, 48, 8);
+  const int steps = r.model.config.steps;
+  for (int keep = 0; keep < 2; keep++) {
+    kernels->forward(&r.net, r.block, steps, keep, r.scratch);
+    int wrong = 0;
+    for (int l = 0; l < SF_BLOCK; l++) {
+      float f[8], sh[16], sigma[8], colour[24];
+      for (int i = 0; i < 8; i++) f[i] = r.block->f[i * SF_BLOCK + l];
+      for (int i = 0; i < 16; i++) sh[i] = r.block->sh[i * SF_BLOCK + l];
+      sf_net_sample(&r.model, f, sh, steps, sigma, colour, NULL);
+      int bad = 0;
+      for (int t = 0; t < steps; t++) {
+        bad |= fabsf(r.block->sigma[t][l] - sigma[t]) > 1e-4f * (1 + fabsf(sigma[t]));
+        for (int c = 0; c < 3; c++) bad |= fabsf(r.block->colour[t][c * SF_BLOCK + l] - colour[3 * t + c]) > 1e-4f;
+      }
+      wrong += bad;
+    }
+    ck_assert_msg(wrong <= 2, "%s: %d of 64 samples differ", kernels->name, wrong);
+  }
+  rig_free(&r);
+}
+
+START_TEST(kernels_equal_oracle)
+{
+  static const char *const isa[] = {"portable", "avx2", "avx512"};
+  for (int i = 0; i < 3; i++) {
+    for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) compare_forward(isa[i], SF_NET_SNN, mode);
+    compare_forward(isa[i], SF_NET_ANN, SF_HYBRID);
+  }
+}
+END_TEST
+
+START_TEST(density_equals_forward)
+{
+  const sf_kernels *kernels = sf_kernels_select(NULL);
+  rig r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 5);
+  float sigma[SF_BLOCK];
+  kernels->forward(&r.net, r.block, 5, 1, r.scratch);
+  memcpy(sigma, r.block->sigma[4], sizeof sigma);
+  kernels->density(&r.net, r.block, 5, r.scratch);
+  ck_assert_mem_eq(sigma, r.block->sigma[4], sizeof sigma);
+  rig_free(&r);
+}
+END_TEST
+
+static void random_output_gradient(float *dsigma, float *dcolour)
+{
+  for (int i = 0; i < SF_T_MAX * SF_BLOCK; i++) dsigma[i] = test_random(1u << 24 | i);
+  for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dcolour[i] = test_random(1u << 25 | i);
+}
+
+static double objective(const rig *r, const float *dsigma, const float *dcolour, int steps)
+{
+  double sum = 0;
+  for (int t = 0; t < steps; t++)
+    for (int l = 0; l < SF_BLOCK; l++) {
+      sum += dsigma[t * SF_BLOCK + l] * (double)r->block->sigma[t][l];
+      for (int c = 0; c < 3; c++)
+        sum += dcolour[(t * 3 + c) * SF_BLOCK + l] * (double)r->block->colour[t][c * SF_BLOCK + l];
+    }
+  return sum;
+}
+
+static float grad_at(const rig *r, sf_param_id id, size_t i)
+{
+  const int hidden = r->model.config.hidden;
+  switch (id) {
+  case SF_P_W1: return r->grad->w1[i / 8 * 16 + i % 8];
+  case SF_P_W2: return r->grad->w2[i];
+  case SF_P_W3: return r->grad->w3[i / 31 * 32 + i % 31 + (i % 31 >= 16)];
+  case SF_P_W4: return r->grad->w4[i];
+  case SF_P_W5: return r->grad->w5[i];
+  default: return hidden ? r->grad->leak[i] : 0;
+  }
+}
+
+static double slope(rig *r, sf_param_id id, size_t i, float h, const float *ds, const float *dc)
+{
+  const sf_kernels *kernels = sf_kernels_select("portable");
+  float *at = sf_model_param(&r->model, id) + i, old = *at;
+  double value[2];
+  for (int side = 0; side < 2; side++) {
+    *at = old + (side ? h : -h);
+    r->net = sf_net_view_of(&r->model);
+    kernels->forward(&r->net, r->block, r->model.config.steps, 1, r->scratch);
+    value[side] = objective(r, ds, dc, r->model.config.steps);
+  }
+  *at = old;
+  r->net = sf_net_view_of(&r->model);
+  return (value[1] - value[0]) / (2 * h);
+}
+
+/* The ReLU twin is smooth but for its kinks: every weight's gradient against central differences. Bound: float
+ * cancellation in the difference, 2 % + 0.05 of a sum over 64 samples of size ~100. */
+START_TEST(ann_gradient_is_the_slope)
+{
+  const sf_kernels *kernels = sf_kernels_select(NULL);
+  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
+  rig r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
+  random_output_gradient(ds, dc);
+  kernels->forward(&r.net, r.block, 1, 1, r.scratch);
+  kernels->backward(&r.net, r.block, 1, ds, dc, df, r.grad, r.scratch);
+  for (int id = SF_P_W1; id <= SF_P_W5; id++)
+    for (size_t i = 0; i < r.model.param[id].size; i += 3) {
+      double expected = slope(&r, id, i, 2e-3f, ds, dc), actual = grad_at(&r, id, i);
+      ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.3, "%s[%zu]: slope %g, gradient %g",
+                    r.model.param[id].name, i, expected, actual);
+    }
+  rig_free(&r);
+}
+END_TEST
+
+/* The integrators' leaks and the last layers are smooth in a spiking net too: no spike depends on them. */
+START_TEST(snn_smooth_parts_match_the_slope)
+{
+  const sf_kernels *kernels = sf_kernels_select(NULL);
+  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
+  for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
+    rig r = rig_make(SF_NET_SNN, mode, 32, 6);
+    random_output_gradient(ds, dc);
+    kernels->forward(&r.net, r.block, 6, 1, r.scratch);
+    kernels->backward(&r.net, r.block, 6, ds, dc, df, r.grad, r.scratch);
+    for (size_t i = 0; i < r.model.param[SF_P_W5].size; i += 5) {
+      double expected = slope(&r, SF_P_W5, i, 1e-2f, ds, dc);
+      ck_assert_double_eq_tol(grad_at(&r, SF_P_W5, i), expected, 0.01 * fabs(expected) + 0.05);
+    }
+    for (int leak = 1; leak <= 4; leak += 3) {
+      double expected = slope(&r, SF_P_LEAK, leak, 1e-2f, ds, dc);
+      ck_assert_double_eq_tol(grad_at(&r, SF_P_LEAK, leak), expected, 0.01 * fabs(expected) + 0.1);
+    }
+    rig_free(&r);
+  }
+}
+END_TEST
+
+/* One neuron chain by the equations of the surrogate, written out independently for C3 <- C2 <- constant drive:
+ * g_h = (g_s - theta g_v) sd + g_v, g_x = k g_h, g_v(t-1) = (1-k) g_h, g_w = (1-k) sum g_h (h - v). Checks dW4 and the leak
+ * of C2 with W5 as read-out, in double. */
+START_TEST(plif_backward_by_the_equations)
+{
+  const sf_kernels *kernels = sf_kernels_select(NULL);
+  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
+  enum { T = 6, H = 16 };
+  rig r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
+  random_output_gradient(ds, dc);
+  kernels->forward(&r.net, r.block, T, 1, r.scratch);
+  kernels->backward(&r.net, r.block, T, ds, dc, df, r.grad, r.scratch);
+  const float *w5 = sf_model_param(&r.model, SF_P_W5);
+  double dw4[H][H] = {{0}}, dleak = 0;
+  const double k = r.net.k[3], kc = r.net.k[4];
+  for (int l = 0; l < SF_BLOCK; l++)
+    for (int n = 0; n < H; n++) {
+      double gv = 0, go[3] = {0};
+      for (int t = T - 1; t >= 0; t--) {
+        double gs = 0;
+        for (int c = 0; c < 3; c++) {
+          const double j = r.block->j[t][c * SF_BLOCK + l], s = 1 / (1 + exp(-j));
+          go[c] += dc[(t * 3 + c) * SF_BLOCK + l];
+          gs += w5[c * H + n] * go[c] * (t ? kc : 1) * s * (1 - s);
+          go[c] *= 1 - kc;
+        }
+        const double h = r.block->m4[t][n * SF_BLOCK + l], sg = 1 / (1 + exp(-4 * (h - 1)));
+        const double gh = (gs - gv) * 4 * sg * (1 - sg) + gv;
+        const double before = t ? r.block->m4[t - 1][n * SF_BLOCK + l] : 0, v = before - (before >= 1);
+        if (t) dleak += (1 - k) * gh * (h - v);
+        for (int m = 0; m < H; m++) dw4[n][m] += (t ? k : 1) * gh * (r.block->m3[t][m * SF_BLOCK + l] >= 1);
+        gv = (1 - k) * gh;
+      }
+    }
+  for (int n = 0; n < H; n++)
+    for (int m = 0; m < H; m++)
+      ck_assert_double_eq_tol(r.grad->w4[n * H + m], dw4[n][m], 1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
+  ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
+  rig_free(&r);
+}
+END_TEST
+
+START_TEST(backward_of_every_isa_agrees)
+{
+  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[2][32 * SF_BLOCK];
+  rig a = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8), b = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8);
+  const sf_kernels *portable = sf_kernels_select("portable"), *best = sf_kernels_select(NULL);
+  random_output_gradient(ds, dc);
+  portable->forward(&a.net, a.block, 8, 1, a.scratch);
+  memcpy(b.block, a.block, sizeof *a.block); /* the same spikes: only the backward pass is compared */
+  portable->backward(&a.net, a.block, 8, ds, dc, df[0], a.grad, a.scratch);
+  best->backward(&b.net, b.block, 8, ds, dc, df[1], b.grad, b.scratch);
+  for (int i = 0; i < 48 * 48; i++) ck_assert_float_eq_tol(a.grad->w4[i], b.grad->w4[i], 2e-3f);
+  for (int i = 0; i < 8 * SF_BLOCK; i++) ck_assert_float_eq_tol(df[0][i], df[1][i], 1e-2f + 1e-3f * fabsf(df[0][i]));
+  rig_free(&a);
+  rig_free(&b);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("snn");
+  TCase *tc = tcase_create("snn");
+  tcase_set_timeout(tc, 60);
+  tcase_add_test(tc, plif_by_hand);
+  tcase_add_test(tc, hybrid_prefix_weights_sum_to_one);
+  tcase_add_test(tc, kernels_equal_oracle);
+  tcase_add_test(tc, density_equals_forward);
+  tcase_add_test(tc, ann_gradient_is_the_slope);
+  tcase_add_test(tc, snn_smooth_parts_match_the_slope);
+  tcase_add_test(tc, plif_backward_by_the_equations);
+  tcase_add_test(tc, backward_of_every_isa_agrees);
+  suite_add_tcase(suite, tc);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}

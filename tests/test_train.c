@@ -1,0 +1,306 @@
+/* Losses, determinism, resume, stability of the trainer. */
+#include "float_fixture.h"
+#include "train/internal.h"
+#include "spikefield/io.h"
+#include <check.h>
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { N = 12, T = 6 };
+
+static char folder[] = "/tmp/spikefield-train-XXXXXX";
+static char scene_path[64], model_path[64], other_path[64];
+
+static void set_up(void)
+{
+  ck_assert_ptr_nonnull(mkdtemp(folder));
+  snprintf(scene_path, sizeof scene_path, "%s/scene", folder);
+  snprintf(model_path, sizeof model_path, "%s/a.safetensors", folder);
+  snprintf(other_path, sizeof other_path, "%s/b.safetensors", folder);
+  sf_procedural_options o = {.width = 24, .height = 24, .train_views = 6, .test_views = 1, .seed = 1};
+  ck_assert_int_eq(sf_procedural_write("simple", scene_path, &o, NULL, NULL).code, SF_OK);
+}
+
+static void tear_down(void)
+{
+  char command[96];
+  snprintf(command, sizeof command, "rm -rf %s", folder);
+  ck_assert_int_eq(system(command), 0);
+}
+
+static sf_train_options small_run(void)
+{
+  sf_train_options o = sf_train_defaults();
+  o.config.levels = 4;
+  o.config.log2_hash = 10;
+  o.config.finest_res = 64;
+  o.config.hidden = 32;
+  o.config.steps = T;
+  o.config.lattice = 128;
+  o.config.occ_res = 16;
+  o.samples = 1024;
+  o.stage1 = 12;
+  o.stage2 = 28;
+  return o;
+}
+
+static void steps(sf_trainer *t, int n)
+{
+  sf_train_stats stats;
+  for (int i = 0; i < n; i++) {
+    sf_status status = sf_trainer_step(t, &stats);
+    ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  }
+}
+
+static void same_file(const char *a, const char *b)
+{
+  char *x, *y;
+  size_t nx, ny;
+  ck_assert_int_eq(sf_read_file(a, 1u << 30, &x, &nx).code, SF_OK);
+  ck_assert_int_eq(sf_read_file(b, 1u << 30, &y, &ny).code, SF_OK);
+  ck_assert_uint_eq(nx, ny);
+  ck_assert_int_eq(memcmp(x, y, nx), 0);
+  free(x);
+  free(y);
+}
+
+static sf_trainer *start(const sf_dataset *data, const sf_train_options *o, const char *resume)
+{
+  sf_trainer *t;
+  sf_status status = sf_trainer_create(&t, data, o, resume);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return t;
+}
+
+static sf_dataset load(void)
+{
+  sf_dataset data;
+  sf_dataset_options o = {.downscale = 1};
+  ck_assert_int_eq(sf_dataset_load(&data, scene_path, "train", &o).code, SF_OK);
+  return data;
+}
+
+/* Seconds are in a checkpoint, so two runs' values are compared, not their files. */
+static void same_model(const sf_trainer *a, const sf_trainer *b)
+{
+  ck_assert_int_eq(memcmp(a->model.value, b->model.value, a->model.size * sizeof(float)), 0);
+  ck_assert_int_eq(memcmp(a->moment2, b->moment2, a->model.size * sizeof(float)), 0);
+  ck_assert_float_eq(a->model.t_star, b->model.t_star);
+}
+
+START_TEST(same_seed_same_bits_any_threads)
+{
+  sf_dataset data = load();
+  sf_train_options o = small_run();
+  omp_set_num_threads(1);
+  sf_trainer *a = start(&data, &o, NULL);
+  steps(a, 40);
+  omp_set_num_threads(3);
+  sf_trainer *b = start(&data, &o, NULL);
+  steps(b, 40);
+  same_model(a, b);
+  ck_assert_int_eq(a->stage, 3);
+  o.seed = 2;
+  sf_trainer *c = start(&data, &o, NULL);
+  steps(c, 40);
+  ck_assert_int_ne(memcmp(a->model.value, c->model.value, a->model.size * sizeof(float)), 0);
+  sf_trainer_free(a);
+  sf_trainer_free(b);
+  sf_trainer_free(c);
+  sf_dataset_free(&data);
+}
+END_TEST
+
+START_TEST(resume_continues_bit_identically)
+{
+  sf_dataset data = load();
+  sf_train_options o = small_run();
+  sf_trainer *whole = start(&data, &o, NULL), *part = start(&data, &o, NULL);
+  steps(whole, 33);
+  steps(part, 17);
+  ck_assert_int_eq(sf_trainer_save(part, model_path, true).code, SF_OK);
+  sf_trainer_free(part);
+  part = start(&data, &o, model_path);
+  steps(part, 16);
+  same_model(whole, part);
+  sf_trainer_free(whole);
+  sf_trainer_free(part);
+  sf_dataset_free(&data);
+}
+END_TEST
+
+START_TEST(saved_model_loads_and_saves_equal)
+{
+  sf_dataset data = load();
+  sf_train_options o = small_run();
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, 20);
+  ck_assert_int_eq(sf_trainer_save(t, model_path, false).code, SF_OK);
+  ck_assert_int_eq(sf_trainer_save(t, other_path, false).code, SF_OK);
+  same_file(model_path, other_path);
+  sf_model m;
+  sf_status status = sf_model_load(&m, model_path);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  for (int i = 0; i < SF_P_COUNT; i++) /* alignment gaps between parameters are not saved */
+    ck_assert_int_eq(memcmp(sf_model_param(&m, i), sf_model_param(&t->model, i), m.param[i].size * sizeof(float)), 0);
+  ck_assert_int_eq(m.t_r, t->model.t_r);
+  sf_model_free(&m);
+  sf_trainer *resumed;
+  ck_assert_int_eq(sf_trainer_create(&resumed, &data, &o, model_path).code, SF_E_FORMAT); /* no optimiser inside */
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
+START_TEST(nan_stops_the_run_and_names_the_tensor)
+{
+  sf_dataset data = load();
+  sf_train_options o = small_run();
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, 3);
+  sf_model_param(&t->model, SF_P_W5)[5] = NAN;
+  sf_train_stats stats;
+  sf_status status = sf_trainer_step(t, &stats);
+  ck_assert_int_eq(status.code, SF_E_RANGE);
+  ck_assert_ptr_nonnull(strstr(status.message, "iteration 3"));
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
+START_TEST(loss_falls_and_both_twins_learn)
+{
+  sf_dataset data = load();
+  for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
+    sf_train_options o = small_run();
+    o.config.net = net;
+    if (net == SF_NET_ANN) o.config.steps = 1;
+    o.stage1 = 150;
+    o.stage2 = 150;
+    sf_trainer *t = start(&data, &o, NULL);
+    sf_train_stats stats;
+    double first = 0, last = 0;
+    for (int i = 0; i < 300; i++) {
+      ck_assert_int_eq(sf_trainer_step(t, &stats).code, SF_OK);
+      if (i < 10) first += stats.mse;
+      if (i >= 290) last += stats.mse;
+    }
+    ck_assert_double_lt(last, 0.5 * first);
+    ck_assert_double_ge(stats.t_star, 1);
+    ck_assert_double_le(stats.t_star, o.config.steps);
+    sf_trainer_free(t);
+  }
+  sf_dataset_free(&data);
+}
+END_TEST
+
+/* Gradient of one ray's whole loss against central differences of the plan's sums. */
+static double ray_loss(const sf_loss_plan *p, const sf_ray *ray, sf_ray_work *w)
+{
+  sf_loss_sums s = {0};
+  sf_loss_ray(p, ray, 0.05f, w, &s);
+  double share = fmin(fmax(p->d, 0.25), 0.75);
+  if (p->stage == 1) return s.mse_full + s.regular;
+  return (1 - share) * s.mse_floor + share * s.mse_ceil + s.regular +
+         p->extra * ((1 - share) * s.extra_floor + share * s.extra_ceil);
+}
+
+static void check_plan(sf_loss_plan p)
+{
+  sf_ray_work w;
+  ck_assert_int_eq(sf_ray_work_create(&w, N).code, SF_OK);
+  sf_ray ray = {.target = {0.9f, 0.3f, 0.5f}, .background = {0.2f, 0.7f, 0.4f}, .count = N};
+  for (int t = 0; t < T; t++)
+    for (int s = 0; s < N; s++) {
+      w.sigma[t][s] = (t + 2) * sf_random_float(11, t, s);
+      for (int c = 0; c < 3; c++) w.colour[t][3 * s + c] = sf_random_float(12, t, 3 * s + c);
+    }
+  sf_loss_sums sums = {0};
+  sf_loss_ray(&p, &ray, 0.05f, &w, &sums);
+  static float dsigma[T][N], dcolour[T][3 * N];
+  for (int t = 0; t < T; t++) {
+    memcpy(dsigma[t], w.dsigma[t], sizeof dsigma[t]);
+    memcpy(dcolour[t], w.dcolour[t], sizeof dcolour[t]);
+  }
+  int moved = 0;
+  for (int t = 0; t < T; t++)
+    for (int i = 0; i < 4 * N; i++) {
+      float *at = i < N ? &w.sigma[t][i] : &w.colour[t][i - N], old = *at;
+      const double expected = i < N ? dsigma[t][i] : dcolour[t][i - N];
+      *at = old + 0.01f;
+      double high = ray_loss(&p, &ray, &w);
+      *at = old - 0.01f;
+      double low = ray_loss(&p, &ray, &w), found = (high - low) / 0.02;
+      *at = old;
+      moved += fabs(expected) > 1e-4;
+      ck_assert_msg(fabs(found - expected) <= 1e-4 + 0.02 * fabs(found), "step %d value %d: slope %g, gradient %g", t, i,
+                    found, expected); /* float sums of ~1 over a step of 0.02, curvature of the norms */
+    }
+  ck_assert_int_gt(moved, N);
+  free(w.memory);
+}
+
+START_TEST(loss_gradients_are_the_slopes)
+{
+  sf_loss_plan one = {.stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
+  check_plan(one);
+  /* distillation off: its teacher carries no gradient by decision, so it is not the slope of a function */
+  sf_loss_plan two = one;
+  two.stage = 2;
+  two.t_f = 2;
+  two.t_c = 3;
+  two.d = 0.4;
+  two.t_r = 2;
+  check_plan(two);
+  two.extra = 0.3f;
+  check_plan(two);
+  two.t_f = T - 1;
+  two.t_c = T;
+  two.d = 0.7;
+  two.t_r = T;
+  check_plan(two);
+}
+END_TEST
+
+START_TEST(adam_by_hand)
+{
+  float value = 1, grad = 0.5f, m = 0, v = 0;
+  sf_adam adam = {0.1, 0.9, 0.99, 1e-15, 1};
+  sf_adam_update(&adam, 1, &value, &grad, &m, &v);
+  ck_assert_float_eq_tol(value, 0.9f, 1e-6f); /* the first bias-corrected step is lr * sign(g) */
+  ck_assert_float_eq_tol(m, 0.05f, 1e-7f);
+  ck_assert_float_eq_tol(v, 0.0025f, 1e-8f);
+  ck_assert_float_eq(grad, 0);
+  grad = -0.5f;
+  adam.step = 2;
+  sf_adam_update(&adam, 1, &value, &grad, &m, &v);
+  /* m = 0.045 - 0.05 = -0.005, / 0.19; v = 0.002475 + 0.0025 = 0.004975, / 0.0199: + 0.1 * 0.0263158 / 0.5 */
+  ck_assert_float_eq_tol(value, 0.9f + 0.1f * 0.0263158f / 0.5f, 1e-6f);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("train");
+  TCase *tc = tcase_create("train");
+  tcase_set_timeout(tc, 180);
+  tcase_add_unchecked_fixture(tc, set_up, tear_down);
+  tcase_add_test(tc, same_seed_same_bits_any_threads);
+  tcase_add_test(tc, resume_continues_bit_identically);
+  tcase_add_test(tc, saved_model_loads_and_saves_equal);
+  tcase_add_test(tc, nan_stops_the_run_and_names_the_tensor);
+  tcase_add_test(tc, loss_falls_and_both_twins_learn);
+  tcase_add_test(tc, loss_gradients_are_the_slopes);
+  tcase_add_test(tc, adam_by_hand);
+  suite_add_tcase(suite, tc);
+  SRunner *runner = srunner_create(suite);
+  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
