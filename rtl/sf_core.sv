@@ -33,6 +33,7 @@ module sf_core #(
     input  wire          readout_ready_i,
     output wire          take_o,
     output wire          take_colour_o,
+    input  wire          current_colour_i,
     input  wire   [ 6:0] current_lane_i,
     output wire   [15:0] current_o,
     // events, in the cycle in which they happen
@@ -128,13 +129,14 @@ module sf_core #(
       .row_o  (row)
   );
   sf_wmem #(
-      .WORDS(4),
-      .ROWS (256)
+      .WORDS    (4),
+      .ROWS     (256),
+      .WORD_BITS(2)
   ) u_narrow (
       .clk_i  (clk_i),
       .we_i   (we_i && wlayer_narrow),
       .wrow_i ({wlayer_i == sf_op_pkg::C3, wrow_i}),
-      .wword_i(wword_i),
+      .wword_i(wword_i[1:0]),
       .wdata_i(wdata_i),
       .re_i   (op_d == sf_op_pkg::SPLIT),
       .rrow_i (narrow_row),
@@ -204,6 +206,8 @@ module sf_core #(
       .membrane_o    (tap_membrane_o),
       .h_lane_i      ({step_d, 4'd0} + {2'd0, value_index[4:0]} + 7'd1),
       .h_o           (h),
+      .take_colour_i (take_colour_o),
+      .current_colour_i(current_colour_i),
       .current_lane_i(current_lane_i),
       .current_o     (current_o)
   );

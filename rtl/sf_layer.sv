@@ -25,6 +25,8 @@ module sf_layer #(
     output reg         [3071:0] membrane_o, // after reset, 24 bits a lane: for the tap only
     input  wire          [ 6:0] h_lane_i,
     output wire signed   [11:0] h_o,
+    input  wire                 take_colour_i,
+    input  wire                 current_colour_i,
     input  wire          [ 6:0] current_lane_i,
     output wire signed   [15:0] current_o
 );
@@ -32,66 +34,62 @@ module sf_layer #(
   `include "sf_plif.svh"
 
   reg signed [23:0] acc_q[0:127];
-  reg signed [23:0] base_q[0:127];
-  reg signed [23:0] v_value_q[0:127];  // membranes of D1, then C1
-  reg signed [23:0] v_spike_q[0:127];  // membranes of C2
-  reg signed [15:0] current_q[0:127];
+  // Rows of 128 x 24 bits, one access per operation: membranes of the layer fed by values (D1, then C1), membranes of
+  // the layer fed by spikes (C2), the direction's current.
+  reg [3071:0] state;    // names for a whole row within one operation, not registers
+  reg [2047:0] current;
+  reg [127:0] fired;
+  reg [24:0] neuron;
+  localparam [1:0] BASE_ROW = 2'd2;
+  reg [3071:0] state_q[0:2];
+  reg [2047:0] current_q[0:1];  // of D2, of C3
+  wire [1:0] membrane_row = {1'b0, spikes_in_i};
 
   // h = current >>> H_SHIFT: 16384 >> 3 fits 12 bits. AC_FRAC = 8 and H_SHIFT = 3 are wired here.
-  wire signed [15:0] h_current = current_q[h_lane_i];
-  assign h_o = h_current[14:3];
-  assign current_o = current_q[current_lane_i];
-  wire unused_ok = &{1'b0, h_current[15], h_current[2:0]};
+  assign h_o = current_q[0][16*h_lane_i+3+:12];
+  assign current_o = current_q[current_colour_i][16*current_lane_i+:16];
 
   always_ff @(posedge clk_i) begin
     if (op_i == sf_op_pkg::LOAD) begin
-      for (int l = 0; l < 128; l++) acc_q[l] <= base_i ? base_q[l] : 24'sd0;
+      for (int l = 0; l < 128; l++) acc_q[l] = base_i ? state_q[BASE_ROW][24*l+:24] : 24'd0;
     end
     if (op_i == sf_op_pkg::MAC) begin
-      for (int l = 0; l < 128; l++) acc_q[l] <= acc_q[l] + $signed(row_i[8*l+:8]) * value_i;
+      for (int l = 0; l < 128; l++) acc_q[l] = acc_q[l] + $signed(row_i[8*l+:8]) * value_i;
     end
     if (op_i == sf_op_pkg::ADD) begin
-      for (int l = 0; l < 128; l++) acc_q[l] <= acc_q[l] + 24'($signed(row_i[8*l+:8]));
+      for (int l = 0; l < 128; l++) acc_q[l] = acc_q[l] + 24'($signed(row_i[8*l+:8]));
     end
     if (op_i == sf_op_pkg::SPLIT) begin
       for (int t = 0; t < 8; t++) begin
         if (fired_i[t]) begin
-          for (int o = 0; o < 16; o++)
-            acc_q[16*t+o] <= acc_q[16*t+o] + 24'($signed(narrow_i[8*o+:8]));
+          for (int o = 0; o < 16; o++) acc_q[16*t+o] = acc_q[16*t+o] + 24'($signed(narrow_i[8*o+:8]));
         end
       end
     end
     if (op_i == sf_op_pkg::KEEP) begin
-      for (int l = 0; l < 128; l++) base_q[l] <= acc_q[l];
+      for (int l = 0; l < 128; l++) state[24*l+:24] = acc_q[l];
+      state_q[BASE_ROW] <= state;
     end
     if (op_i == sf_op_pkg::TAKE) begin
-      for (int l = 0; l < 128; l++) current_q[l] <= acc_q[l][15:0];
+      for (int l = 0; l < 128; l++) current[16*l+:16] = acc_q[l][15:0];
+      current_q[take_colour_i] <= current;
     end
-  end
-
-  reg [24:0] fire;  // one lane's result; a name, not a register
-  always_ff @(posedge clk_i) begin
-    if (op_i == sf_op_pkg::FIRE && !spikes_in_i) begin
+    if (op_i == sf_op_pkg::FIRE) begin
+      state = state_q[membrane_row];
       for (int l = 0; l < 128; l++) begin
-        fire = sf_plif_step(v_value_q[l], acc_q[l], k_i, theta_i, mode_i, first_i);
-        v_value_q[l] <= fire[23:0];
-        spikes_o[l] <= fire[24];
+        neuron = sf_plif_step(state[24*l+:24], spikes_in_i ? {acc_q[l][15:0], 8'd0} : acc_q[l], k_i, theta_i, mode_i,
+                              first_i);
+        fired[l] = neuron[24];
+        state[24*l+:24] = neuron[23:0];
       end
-    end
-    if (op_i == sf_op_pkg::FIRE && spikes_in_i) begin
-      for (int l = 0; l < 128; l++) begin
-        fire = sf_plif_step(v_spike_q[l], {acc_q[l][15:0], 8'd0}, k_i, theta_i, mode_i, first_i);
-        v_spike_q[l] <= fire[23:0];
-        spikes_o[l] <= fire[24];
-      end
+      state_q[membrane_row] <= state;
+      spikes_o <= fired;
     end
   end
 
   if (TAP != 0) begin : g_tap
     always_ff @(posedge clk_i) begin
-      if (tap_i) begin
-        for (int l = 0; l < 128; l++) membrane_o[24*l+:24] <= tap_spikes_in_i ? v_spike_q[l] : v_value_q[l];
-      end
+      if (tap_i) membrane_o <= state_q[{1'b0, tap_spikes_in_i}];
     end
   end else begin : g_no_tap
     assign membrane_o = 3072'd0;

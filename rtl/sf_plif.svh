@@ -6,15 +6,15 @@ function automatic [24:0] sf_plif_step(input signed [23:0] v, input signed [23:0
                                        input signed [23:0] theta, input [1:0] mode, input first);
   reg signed [47:0] old;
   reg signed [47:0] leak;
+  reg signed [47:0] product;  // 25 x 13 bits
   reg signed [47:0] membrane;
   reg spike;
   begin
     old = first ? 48'sd0 : 48'(v);
     leak = mode == sf_op_pkg::HYBRID && first ? 48'sd4096 : $signed({35'd0, k});
-    if (mode == sf_op_pkg::NODECAY)
-      membrane = sf_sat(old - sf_rshift_round(old * leak, 5'd12) + 48'(current), 6'd24);
-    else
-      membrane = old + sf_rshift_round((48'(current) - old) * leak, 5'd12);
+    product = sf_rshift_round((mode == sf_op_pkg::NODECAY ? old : 48'(current) - old) * leak, 5'd12);
+    if (mode == sf_op_pkg::NODECAY) membrane = sf_sat(old - product + 48'(current), 6'd24);
+    else membrane = old + product;
     spike = membrane >= 48'(theta);
     if (spike) membrane = membrane - 48'(theta);
     sf_plif_step = {spike, membrane[23:0]};

@@ -9,6 +9,7 @@ module sf_readout (
     input  wire        take_i,         // currents are ready from the next cycle on
     input  wire        take_colour_i,
     output wire        ready_o,        // a TAKE may be issued
+    output wire        current_colour_o,
     output wire [ 6:0] current_lane_o,
     input  wire [15:0] current_i,
     input  wire [ 1:0] mode_i,
@@ -50,6 +51,7 @@ module sf_readout (
   wire [15:0] s;
   wire [27:0] acc;
 
+  assign current_colour_o = colour_q;
   assign current_lane_o = {step_q, 2'd0, out_q};
   sf_scale u_scale (
       .current_i(current_i),

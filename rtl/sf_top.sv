@@ -69,6 +69,7 @@ module sf_top #(
   wire [11:0] feature, dir;
   wire hold, core_idle, stall_out;
   wire readout_ready, take, take_colour;
+  wire current_colour;
   wire [6:0] current_lane;
   wire [15:0] current;
   wire [2:0] op, layer, step, spikes_layer, spikes_step, update_step;
@@ -183,6 +184,7 @@ module sf_top #(
       .readout_ready_i(readout_ready),
       .take_o         (take),
       .take_colour_o  (take_colour),
+      .current_colour_i(current_colour),
       .current_lane_i (current_lane),
       .current_o      (current),
       .op_o           (op),
@@ -210,6 +212,7 @@ module sf_top #(
       .take_i         (take),
       .take_colour_i  (take_colour),
       .ready_o        (readout_ready),
+      .current_colour_o(current_colour),
       .current_lane_o (current_lane),
       .current_i      (current),
       .mode_i         (mode),

@@ -1,0 +1,255 @@
+/* Speed of the trainer's parts, each beside its ceiling and its naive version. usage: bench OUT.json
+ * Ceilings are measured on the spot: fp32 multiply-adds per second of all threads over the operations of one sample,
+ * or memory bandwidth over the bytes. */
+#include "float_fixture.h"
+#include "spikefield/cli.h"
+#include "spikefield/io.h"
+#include "train/internal.h"
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+typedef float lanes __attribute__((vector_size(64)));
+
+/* Multiply-adds per second of all threads: 12 independent chains of 16 lanes each. */
+__attribute__((target("avx512f,fma"))) static double fma_chain_avx512(long rounds)
+{
+  lanes acc[12];
+  for (int i = 0; i < 12; i++) acc[i] = (lanes){0} + (float)i;
+  const lanes x = (lanes){0} + 0.999f, y = (lanes){0} + 0.001f;
+  for (long r = 0; r < rounds; r++)
+#pragma GCC unroll 12
+    for (int i = 0; i < 12; i++) {
+      lanes z = acc[i];
+      __asm__ volatile("vfmadd213ps %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));
+      acc[i] = z;
+    }
+  double sum = 0;
+  for (int i = 0; i < 12; i++) sum += acc[i][0];
+  return sum;
+}
+
+static double peak_fma(void)
+{
+  if (!sf_kernels_select("avx512")) return NAN;
+  const long rounds = 20000000;
+  double start = sf_seconds(), sink = 0;
+#pragma omp parallel reduction(+ : sink)
+  sink += fma_chain_avx512(rounds);
+  double seconds = sf_seconds() - start;
+  return sink > -1 ? (double)rounds * 12 * 16 * omp_get_max_threads() / seconds : 0;
+}
+
+static double bandwidth(void)
+{
+  const size_t n = 1u << 26;
+  float *a = malloc(n * sizeof *a);
+  double sum = 0, best = 0;
+  for (size_t i = 0; i < n; i++) a[i] = 1;
+  for (int trial = 0; trial < 3; trial++) {
+    double start = sf_seconds();
+#pragma omp parallel for simd reduction(+ : sum)
+    for (size_t i = 0; i < n; i++) sum += (double)a[i];
+    best = fmax(best, (double)n * sizeof *a / (sf_seconds() - start));
+  }
+  free(a);
+  return sum > 0 ? best : 0;
+}
+
+static void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive)
+{
+  cJSON *entry = cJSON_AddObjectToObject(json, name);
+  cJSON_AddNumberToObject(entry, "value", value);
+  cJSON_AddStringToObject(entry, "unit", unit);
+  if (isfinite(ceiling)) cJSON_AddNumberToObject(entry, "ceiling", ceiling);
+  else cJSON_AddNullToObject(entry, "ceiling");
+  if (isfinite(naive)) cJSON_AddNumberToObject(entry, "naive", naive);
+  else cJSON_AddNullToObject(entry, "naive");
+  printf("%-28s %12.4g %-10s", name, value, unit);
+  if (isfinite(ceiling)) printf("  ceiling %10.4g (%4.1f %%)", ceiling, 100 * value / ceiling);
+  if (isfinite(naive)) printf("  naive %10.4g (x %.1f)", naive, value / naive);
+  printf("\n");
+}
+
+static sf_model full_model(sf_net_kind net, int steps)
+{
+  sf_config c = sf_config_default();
+  c.net = net;
+  c.steps = steps;
+  sf_model m;
+  if (sf_model_create(&m, &c).code) exit(1);
+  for (size_t i = 0; i < m.size; i++) m.value[i] = 0.1f * test_random(i);
+  for (int i = 0; i < 128 * 32; i++) sf_model_param(&m, SF_P_W1)[i] *= 5;
+  for (int i = 0; i < 128 * 31; i++) sf_model_param(&m, SF_P_W3)[i] *= 10;
+  for (int i = 0; i < 128 * 128; i++) sf_model_param(&m, SF_P_W4)[i] *= 3.5f;
+  return m;
+}
+
+/* Samples per second of all threads over `seconds`. */
+static double nets(const sf_kernels *k, const sf_model *m, bool with_backward, double seconds)
+{
+  double total = 0;
+  const sf_net_view net = sf_net_view_of(m);
+  const int steps = m->config.steps;
+#pragma omp parallel reduction(+ : total)
+  {
+    sf_block *b = sf_aligned_alloc(sizeof *b);
+    sf_net_scratch *w = sf_aligned_alloc(sizeof *w);
+    sf_net_grad *g = sf_aligned_alloc(sizeof *g);
+    float *ds = sf_aligned_alloc(SF_T_MAX * SF_BLOCK * 4), *dc = sf_aligned_alloc(SF_T_MAX * 3 * SF_BLOCK * 4),
+          *df = sf_aligned_alloc(32 * SF_BLOCK * 4);
+    for (int i = 0; i < 32 * SF_BLOCK; i++) b->f[i] = test_random(i);
+    for (int i = 0; i < 16 * SF_BLOCK; i++) b->sh[i] = test_random(99999 + i);
+    for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dc[i] = 1e-3f * test_random(5000 + i);
+    double start = sf_seconds(), now = start;
+    long blocks = 0;
+    for (; now - start < seconds; now = sf_seconds(), blocks += 8)
+      for (int i = 0; i < 8; i++) {
+        k->forward(&net, b, steps, with_backward, w);
+        if (with_backward) k->backward(&net, b, steps, ds, dc, df, g, w);
+      }
+    total += (double)blocks * SF_BLOCK / (now - start);
+    free(b), free(w), free(g), free(ds), free(dc), free(df);
+  }
+  return total;
+}
+
+static double naive_forward(const sf_model *m)
+{
+  double total = 0;
+#pragma omp parallel reduction(+ : total)
+  {
+    float f[32], sh[16], sigma[8], colour[24];
+    for (int i = 0; i < 32; i++) f[i] = test_random(i);
+    for (int i = 0; i < 16; i++) sh[i] = test_random(99 + i);
+    double start = sf_seconds();
+    long n = 0;
+    for (; sf_seconds() - start < 0.5; n++) sf_net_sample(m, f, sh, m->config.steps, sigma, colour, NULL);
+    total += (double)n / (sf_seconds() - start);
+  }
+  return total;
+}
+
+static void bench_nets(cJSON *json, double fma)
+{
+  const sf_kernels *best = sf_kernels_select(NULL), *portable = sf_kernels_select("portable");
+  static const struct {
+    const char *name;
+    sf_net_kind net;
+    int steps;
+  } cases[] = {{"t8", SF_NET_SNN, 8}, {"t3", SF_NET_SNN, 3}, {"t1", SF_NET_SNN, 1}, {"ann", SF_NET_ANN, 1}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    sf_model m = full_model(cases[i].net, cases[i].steps);
+    const double once = 32 * 128 + 16 * 128, step = 128 * 16 + 15 * 128 + 128 * 128 + 128 * 3;
+    const double ops = once + cases[i].steps * step;
+    char name[64];
+    snprintf(name, sizeof name, "train.nets.fwd.%s", cases[i].name);
+    put(json, name, nets(best, &m, false, 1), "samples/s", fma / ops, naive_forward(&m));
+    snprintf(name, sizeof name, "train.nets.fwdbwd.%s", cases[i].name);
+    put(json, name, nets(best, &m, true, 1), "samples/s", fma / (3 * ops), nets(portable, &m, true, 1));
+    sf_model_free(&m);
+  }
+}
+
+static void bench_grid(cJSON *json)
+{
+  enum { BLOCKS = 1024 };
+  sf_model m = full_model(SF_NET_SNN, 8);
+  const sf_kernels *k = sf_kernels_select(NULL);
+  float *x = sf_aligned_alloc(BLOCKS * 3 * SF_BLOCK * 4), *f = sf_aligned_alloc(BLOCKS * 32 * SF_BLOCK * 4);
+  float *grad = sf_aligned_alloc(m.size * 4);
+  for (int i = 0; i < BLOCKS * 3 * SF_BLOCK; i++) x[i] = sf_random_float(1, 2, i);
+  double start = sf_seconds();
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int l = 0; l < 16; l++)
+    for (int b = 0; b < BLOCKS; b++)
+      k->grid_forward(&m.level[l], m.value, x + b * 3 * SF_BLOCK, f + (b * 16 + l) * 2 * SF_BLOCK);
+  double forward = BLOCKS * SF_BLOCK / (sf_seconds() - start);
+  start = sf_seconds();
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int l = 0; l < 16; l++)
+    for (int b = 0; b < BLOCKS; b++)
+      k->grid_backward(&m.level[l], x + b * 3 * SF_BLOCK, f + (b * 16 + l) * 2 * SF_BLOCK, grad);
+  double backward = BLOCKS * SF_BLOCK / (sf_seconds() - start);
+  start = sf_seconds();
+#pragma omp parallel for
+  for (int s = 0; s < 65536; s++) {
+    float at[3] = {x[s], x[s + 1], x[s + 2]}, out[32];
+    sf_grid_features(&m, at, out);
+    f[s] = out[0];
+  }
+  double naive = 65536 / (sf_seconds() - start);
+  put(json, "train.grid.fwd", forward, "samples/s", NAN, naive);
+  put(json, "train.grid.bwd", backward, "samples/s", NAN, NAN);
+  free(x), free(f), free(grad);
+  sf_model_free(&m);
+}
+
+static void bench_adam(cJSON *json, double bytes_per_second)
+{
+  sf_model m = full_model(SF_NET_SNN, 8);
+  float *g = sf_aligned_alloc(m.size * 4), *a = sf_aligned_alloc(m.size * 4), *v = sf_aligned_alloc(m.size * 4);
+  sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1};
+  double best = 1e9;
+  for (int i = 0; i < 5; i++) {
+    double start = sf_seconds();
+    sf_adam_update(&adam, m.size, m.value, g, a, v);
+    best = fmin(best, sf_seconds() - start);
+  }
+  /* 4 floats read, 4 written per parameter */
+  put(json, "train.adam", m.size / best, "params/s", bytes_per_second / 32, NAN);
+  free(g), free(a), free(v);
+  sf_model_free(&m);
+}
+
+static sf_status bench_iteration(cJSON *json)
+{
+  char folder[] = "/tmp/spikefield-bench-XXXXXX", command[64];
+  if (!mkdtemp(folder)) return sf_fail(SF_E_IO, "%s: cannot create", folder);
+  const sf_procedural_options o = {.width = 128, .height = 128, .train_views = 20, .test_views = 1, .seed = 1};
+  sf_dataset data = {0};
+  sf_status status = sf_procedural_write("textured", folder, &o, NULL, NULL);
+  if (!status.code) status = sf_dataset_load(&data, folder, "train", &(sf_dataset_options){.downscale = 1});
+  sf_train_options options = sf_train_defaults();
+  options.stage1 = 400;
+  options.stage2 = 0;
+  options.no_scaling = true;
+  options.samples = 1 << 16;
+  sf_trainer *t = NULL;
+  if (!status.code) status = sf_trainer_create(&t, &data, &options, NULL);
+  double samples = 0, seconds = 0;
+  sf_train_stats s = {0};
+  for (int i = 0; i < 48 && !status.code; i++) {
+    const double before = s.seconds;
+    status = sf_trainer_step(t, &s);
+    if (i >= 16) samples += s.samples, seconds += s.seconds - before;
+  }
+  if (!status.code) put(json, "train.iteration.t8", samples / seconds, "samples/s", NAN, NAN);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  snprintf(command, sizeof command, "rm -rf %s", folder);
+  if (system(command) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot remove", folder);
+  struct rusage usage;
+  getrusage(RUSAGE_SELF, &usage);
+  put(json, "train.memory", (double)usage.ru_maxrss / 1024, "MiB", NAN, NAN);
+  return status;
+}
+
+int main(int argc, char **argv)
+{
+  cJSON *json = cJSON_CreateObject();
+  const double fma = peak_fma(), bytes = bandwidth();
+  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read\n", omp_get_max_threads(),
+         sf_kernels_select(NULL)->name, fma * 1e-9, bytes * 1e-9);
+  bench_nets(json, fma);
+  bench_grid(json);
+  bench_adam(json, bytes);
+  sf_status status = bench_iteration(json);
+  if (!status.code && argc > 1) status = sf_json_save(json, argv[1]);
+  cJSON_Delete(json);
+  if (status.code) fprintf(stderr, "bench: %s\n", status.message);
+  return status.code != SF_OK;
+}

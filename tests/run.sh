@@ -1,0 +1,33 @@
+#!/bin/bash
+# Runs the named tests one after another and ends with one closing line. usage: run.sh BUILD NAME...
+# A name is a Check program in BUILD/tests, or one of the scripts below.
+build=$1
+shift
+here=$(dirname "$0")
+passed=0 failed=0 skipped=0
+logs=$build/tests/logs
+mkdir -p "$logs"
+for name in "$@"; do
+  start=$(date +%s)
+  case $name in
+    cli) command=("$here/test_cli.sh" "$build/bin") ;;
+    chain) command=("$here/chain.sh" "$build") ;;
+    cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
+    safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
+    *) command=("$build/tests/$name") ;;
+  esac
+  "${command[@]}" >"$logs/$name.log" 2>&1
+  status=$?
+  seconds=$(($(date +%s) - start))
+  if [ $status -eq 0 ]; then
+    passed=$((passed + 1)) verdict=ok
+  elif [ $status -eq 77 ] || { [ "$name" = safetensors ] && ! command -v python3 >/dev/null; }; then
+    skipped=$((skipped + 1)) verdict="skipped: $(tail -n 1 "$logs/$name.log")"
+  else
+    failed=$((failed + 1)) verdict="FAILED ($status), see $logs/$name.log"
+  fi
+  printf '  %-16s %4d s  %s\n' "$name" "$seconds" "$verdict"
+  [ $status -eq 0 ] || [ $status -eq 77 ] || tail -n 20 "$logs/$name.log"
+done
+echo "$passed passed, $failed failed, $skipped skipped"
+[ $failed -eq 0 ] && [ $passed -gt 0 ]

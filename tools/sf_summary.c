@@ -1,0 +1,85 @@
+/* sf_summary: the reports of one run of the chain in one table and one summary.json. */
+#include "spikefield/cli.h"
+#include "spikefield/io.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static sf_status number(const char *dir, const char *file, const char *key, double *value)
+{
+  char path[4096];
+  cJSON *json;
+  snprintf(path, sizeof path, "%s/%s", dir, file);
+  SF_TRY(sf_json_load(path, &json));
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  const bool found = cJSON_IsNumber(item);
+  if (found) *value = item->valuedouble;
+  cJSON_Delete(json);
+  return found ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no number '%s'", path, key);
+}
+
+typedef struct field {
+  const char *name, *file, *key;
+  double value;
+} field;
+
+enum { FLOAT, FIXED, SSIM, T, T_R, SAMPLES, DIFFERENCES, SNN, ANN, SAVING, HELD_OUT, SECONDS, FIELDS };
+
+static void explain(const field *f, const char *dir)
+{
+  printf("\nFrom photographs to silicon in %.0f s\n", f[SECONDS].value);
+  printf("  learned       t_r = %.0f of T = %.0f time steps; held-out PSNR %.2f dB (float, all test views)\n",
+         f[T_R].value, f[T].value, f[HELD_OUT].value);
+  printf("  golden view   PSNR %.2f dB float, %.2f dB fixed point, SSIM %.4f\n", f[FLOAT].value, f[FIXED].value,
+         f[SSIM].value);
+  printf("  RTL           %.0f samples through the Verilog accelerator, %.0f differences from the fixed-point core\n",
+         f[SAMPLES].value, f[DIFFERENCES].value);
+  printf("  energy        %.4f mJ spiking, %.4f mJ for its ReLU twin: %.1f %% saved (0.9 pJ per SOP, 4.6 pJ per MAC)\n",
+         f[SNN].value * 1e-12, f[ANN].value * 1e-12, f[SAVING].value);
+  printf("Look at %s/preview.png; %s/golden.exr holds depth, spikes and energy per pixel; %s/audit.json every count.\n", dir,
+         dir, dir);
+}
+
+static sf_status run(const char *dir, const char *seconds)
+{
+  field f[FIELDS] = {{"psnr_float", "float.json", "psnr", 0},
+                     {"psnr_fixed", "fixed.json", "psnr", 0},
+                     {"ssim_fixed", "fixed.json", "ssim", 0},
+                     {"T", "train.json", "T", 0},
+                     {"t_r", "train.json", "t_r", 0},
+                     {"cosim_samples", "cosim.json", "samples", 0},
+                     {"cosim_differences", "cosim.json", "differences", 0},
+                     {"energy_spiking_fj", "audit.json", "energy_spiking_fj", 0},
+                     {"energy_ann_fj", "audit.json", "energy_ann_fj", 0},
+                     {"energy_saving_percent", "audit.json", "energy_saving_percent", 0},
+                     {"psnr_held_out", "train.json", "psnr", 0},
+                     {"seconds", NULL, NULL, atof(seconds)}};
+  cJSON *json = cJSON_CreateObject();
+  sf_status status = json ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: no memory", dir);
+  for (int i = 0; i < FIELDS && !status.code; i++) {
+    if (f[i].file) status = number(dir, f[i].file, f[i].key, &f[i].value);
+    cJSON_AddNumberToObject(json, f[i].name, f[i].value);
+  }
+  char path[4096];
+  snprintf(path, sizeof path, "%s/summary.json", dir);
+  if (!status.code) status = sf_json_save(json, path);
+  cJSON_Delete(json);
+  if (!status.code) explain(f, dir);
+  return status;
+}
+
+int main(int argc, char **argv)
+{
+  const sf_option options[] = {{0}};
+  const sf_cli cli = {.program = "sf_summary",
+                      .usage = "sf_summary DIR SECONDS",
+                      .summary = "Gathers DIR/{train,float,fixed,cosim,audit}.json into DIR/summary.json and prints it.",
+                      .examples = "  sf_summary build/demo 200\n",
+                      .options = options,
+                      .min_positional = 2,
+                      .max_positional = 2};
+  const char *argument[2] = {NULL, NULL};
+  sf_status status = sf_cli_parse(&cli, argc, argv, argument);
+  if (!status.code) status = run(argument[0], argument[1]);
+  return sf_cli_finish(&cli, status);
+}
