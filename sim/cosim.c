@@ -1,0 +1,229 @@
+#include "sim/cosim.h"
+#include "spikefield/audit.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { CHUNK = 128 };
+
+typedef struct entry {
+  fx_ray ray;
+  uint64_t number, sample; /* ray, sample of the ray */
+  bool first;
+  int16_t f[SF_FEATURE_MAX];
+  fx_out out;
+  fx_trace trace;
+} entry;
+
+struct sf_cosim {
+  const fx_scene *scene;
+  sf_cosim_options options;
+  sf_dut *dut;
+  int n;
+  uint64_t number, sample; /* of the ray at work */
+  int32_t base[SF_LANES];
+  fx_counts expected;      /* of the chunk */
+  sf_cosim_totals sum;
+  sf_cosim_place place;
+  entry chunk[CHUNK];
+  sf_dut_sample input[CHUNK];
+  sf_dut_result result[CHUNK];
+  sf_dut_trace trace[CHUNK];
+};
+
+static sf_dut_options quiet_options(const sf_cosim *c)
+{
+  sf_dut_options options = c->options.dut;
+  options.wave = NULL;
+  return options;
+}
+
+sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_cosim_options *options)
+{
+  *cosim = NULL;
+  sf_cosim *c = calloc(1, sizeof *c);
+  if (!c) return sf_fail(SF_E_MEMORY, "co-simulation: out of memory");
+  c->scene = scene;
+  c->options = *options;
+  const sf_dut_options quiet = quiet_options(c);
+  const sf_status status = sf_dut_open(&c->dut, scene, &quiet);
+  if (status.code == SF_OK)
+    *cosim = c;
+  else
+    sf_cosim_close(c);
+  return status;
+}
+
+/* ---- where a counter departs ---- */
+
+/* The chunk again on a fresh accelerator, counters read after every sample. */
+static sf_status locate_count(const sf_cosim *c, sf_dut *dut, sf_cosim_place *place)
+{
+  fx_counts expected = {0};
+  fx_trace trace;
+  fx_out out;
+  int32_t base[SF_LANES];
+  for (int i = 0; i < c->n; i++) {
+    const entry *e = &c->chunk[i];
+    const sf_dut_sample sample = {.ray = &e->ray, .first = e->first || i == 0, .f = e->f};
+    sf_dut_result result;
+    fx_counts actual;
+    if (sample.first) fx_net_direction(&c->scene->net, e->ray.dir, base, &expected);
+    fx_net_sample(&c->scene->net, e->f, base, &out, &trace, &expected);
+    SF_TRY(sf_dut_run(dut, &sample, 1, &result));
+    SF_TRY(sf_dut_counts(dut, &actual, NULL, NULL, NULL));
+    if (sf_compare_counts(&expected, &actual, result.cycle, &place->what)) continue;
+    place->ray = e->number;
+    place->sample = e->sample;
+    place->exact = true;
+    return sf_ok();
+  }
+  return sf_ok();
+}
+
+static sf_status count_difference(sf_cosim *c, const sf_difference *difference)
+{
+  const sf_dut_options quiet = quiet_options(c);
+  c->place = (sf_cosim_place){true, c->chunk[0].number, c->chunk[0].sample, false, *difference};
+  sf_dut *dut;
+  SF_TRY(sf_dut_open(&dut, c->scene, &quiet));
+  const sf_status status = locate_count(c, dut, &c->place);
+  sf_dut_close(dut);
+  return status;
+}
+
+/* ---- waveform of the difference ---- */
+
+static sf_status dump_wave(const sf_cosim *c)
+{
+  int at = 0;
+  while (at < c->n && (c->chunk[at].number != c->place.ray || c->chunk[at].sample != c->place.sample)) at++;
+  if (!c->options.dut.wave || at == c->n) return sf_ok();
+  const int from = at > 0 ? at - 1 : 0, count = at - from + 1;
+  sf_dut_sample sample[2];
+  sf_dut_result result[2];
+  for (int i = 0; i < count; i++) {
+    sample[i] = c->input[from + i];
+    sample[i].first |= i == 0;
+  }
+  sf_dut *dut;
+  SF_TRY(sf_dut_open(&dut, c->scene, &c->options.dut));
+  const sf_status status = sf_dut_run(dut, sample, count, result);
+  sf_dut_close(dut);
+  return status;
+}
+
+static sf_status differ(const sf_cosim *c)
+{
+  SF_TRY(dump_wave(c));
+  return sf_fail(SF_E_DIFFERENCE, "%s differs from the fixed-point core", c->place.what.wire);
+}
+
+/* ---- chunks ---- */
+
+static void add_spikes(sf_cosim *c, const entry *e)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < SF_T_MAX; t++)
+      for (int word = 0; word < 2; word++)
+        c->sum.spikes += (uint64_t)__builtin_popcountll(e->trace.spikes[l][t][word]);
+}
+
+static sf_status compare_samples(sf_cosim *c)
+{
+  for (int i = 0; i < c->n; i++) {
+    const entry *e = &c->chunk[i];
+    c->sum.samples++;
+    add_spikes(c, e);
+    if (sf_compare_sample(&c->scene->net, &e->trace, &e->out, &c->result[i], &c->trace[i], &c->place.what)) continue;
+    c->place.found = c->place.exact = true;
+    c->place.ray = e->number;
+    c->place.sample = e->sample;
+    return differ(c);
+  }
+  return sf_ok();
+}
+
+static sf_status compare_counts(sf_cosim *c)
+{
+  fx_counts actual;
+  sf_difference difference;
+  uint64_t cycles, busy, stalls;
+  SF_TRY(sf_dut_counts(c->dut, &actual, &cycles, &busy, &stalls));
+  fx_counts_add(&c->sum.core, &c->expected);
+  fx_counts_add(&c->sum.rtl, &actual);
+  c->sum.cycles += cycles;
+  c->sum.busy += busy;
+  c->sum.stalls += stalls;
+  if (!sf_compare_counts(&c->expected, &actual, sf_dut_cycle(c->dut), &difference)) {
+    SF_TRY(count_difference(c, &difference));
+    return differ(c);
+  }
+  return sf_dut_clear_counts(c->dut);
+}
+
+static sf_status flush(sf_cosim *c)
+{
+  for (int i = 0; i < c->n; i++)
+    c->input[i] = (sf_dut_sample){.ray = &c->chunk[i].ray, .first = c->chunk[i].first, .f = c->chunk[i].f};
+  if (c->n == 0) return sf_ok();
+  SF_TRY(sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace));
+  SF_TRY(compare_samples(c));
+  SF_TRY(compare_counts(c));
+  memset(&c->expected, 0, sizeof c->expected);
+  c->n = 0;
+  return sf_ok();
+}
+
+bool sf_cosim_limit_reached(const sf_cosim *c)
+{
+  return c->options.limit && c->sum.samples + (uint64_t)c->n >= c->options.limit;
+}
+
+/* fx_net_fn: the core's answer at once, the accelerator's with the rest of the chunk. */
+static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+{
+  sf_cosim *c = user;
+  if (sf_cosim_limit_reached(c)) return sf_fail(SF_E_STOPPED, "limit of samples reached");
+  entry *e = &c->chunk[c->n++];
+  e->ray = *ray;
+  e->number = c->number;
+  e->sample = c->sample++;
+  e->first = first;
+  memset(e->f, 0, sizeof e->f);
+  memcpy(e->f, f, (size_t)c->scene->net.layer[FX_D1].n_in * sizeof *f);
+  if (first) fx_net_direction(&c->scene->net, ray->dir, c->base, &c->expected);
+  fx_net_sample(&c->scene->net, e->f, c->base, &e->out, &e->trace, &c->expected);
+  *out = e->out;
+  return c->n == CHUNK ? flush(c) : sf_ok();
+}
+
+sf_status sf_cosim_ray(sf_cosim *c, uint64_t number, const fx_ray *ray)
+{
+  fx_pixel pixel;
+  fx_counts march = {0}; /* the accelerator neither marches nor reads the grid */
+  c->number = number;
+  c->sample = 0;
+  const sf_status status = fx_render_ray(c->scene, ray, evaluate, c, &pixel, &march);
+  return status.code == SF_E_STOPPED ? sf_ok() : status;
+}
+
+sf_status sf_cosim_finish(sf_cosim *c)
+{
+  SF_TRY(flush(c));
+  c->sum.energy_core_fj = sf_energy_fj(&c->sum.core);
+  c->sum.energy_rtl_fj = sf_energy_fj(&c->sum.rtl);
+  if (c->sum.energy_core_fj == c->sum.energy_rtl_fj) return sf_ok();
+  c->place = (sf_cosim_place){.found = true, .what = {-1, -1, -1, "energy_fj", (int64_t)c->sum.energy_core_fj,
+                                                      (int64_t)c->sum.energy_rtl_fj, sf_dut_cycle(c->dut)}};
+  return differ(c);
+}
+
+const sf_cosim_totals *sf_cosim_sum(const sf_cosim *c) { return &c->sum; }
+const sf_cosim_place *sf_cosim_where(const sf_cosim *c) { return &c->place; }
+
+void sf_cosim_close(sf_cosim *c)
+{
+  if (!c) return;
+  sf_dut_close(c->dut);
+  free(c);
+}

@@ -1,0 +1,39 @@
+/* Lockstep of the fixed-point core and the accelerator on the samples of real rays, in chunks: outputs, spike bitmaps,
+ * membranes, rows and every counter, for equality. */
+#ifndef SPIKEFIELD_SIM_COSIM_H
+#define SPIKEFIELD_SIM_COSIM_H
+#include "sim/compare.h"
+
+typedef struct sf_cosim sf_cosim;
+
+typedef struct sf_cosim_options {
+  sf_dut_options dut; /* dut.wave: written only for a difference, of the sample and the one before it */
+  uint64_t limit;     /* stop after this many samples, 0 = none */
+} sf_cosim_options;
+
+typedef struct sf_cosim_totals {
+  fx_counts core, rtl;
+  uint64_t samples, spikes; /* compared; spikes = bits set in the bitmaps */
+  uint64_t cycles, busy, stalls;
+  uint64_t energy_core_fj, energy_rtl_fj;
+} sf_cosim_totals;
+
+/* Where the first difference is. `ray` is the number given to sf_cosim_ray, `sample` counts from 0 along the ray. */
+typedef struct sf_cosim_place {
+  bool found;
+  uint64_t ray;
+  uint64_t sample;
+  bool exact; /* false: somewhere in a chunk of samples that begins here; it does not come back sample by sample */
+  sf_difference what;
+} sf_cosim_place;
+
+sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_cosim_options *options);
+/* SF_E_DIFFERENCE when core and accelerator disagree; then sf_cosim_where says where. */
+sf_status sf_cosim_ray(sf_cosim *cosim, uint64_t number, const fx_ray *ray);
+/* The samples still waiting, then the energies. */
+sf_status sf_cosim_finish(sf_cosim *cosim);
+bool sf_cosim_limit_reached(const sf_cosim *cosim);
+const sf_cosim_totals *sf_cosim_sum(const sf_cosim *cosim);
+const sf_cosim_place *sf_cosim_where(const sf_cosim *cosim);
+void sf_cosim_close(sf_cosim *cosim);
+#endif
