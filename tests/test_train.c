@@ -115,21 +115,29 @@ START_TEST(same_seed_same_bits_any_threads)
 }
 END_TEST
 
-START_TEST(resume_continues_bit_identically)
+static void check_resume(const sf_train_options *o, int before, int after)
 {
   sf_dataset data = load();
-  sf_train_options o = small_run();
-  sf_trainer *whole = start(&data, &o, NULL), *part = start(&data, &o, NULL);
-  steps(whole, 33);
-  steps(part, 17);
+  sf_trainer *whole = start(&data, o, NULL), *part = start(&data, o, NULL);
+  steps(whole, before + after);
+  steps(part, before);
   ck_assert_int_eq(sf_trainer_save(part, model_path, true).code, SF_OK);
   sf_trainer_free(part);
-  part = start(&data, &o, model_path);
-  steps(part, 16);
+  part = start(&data, o, model_path);
+  steps(part, after);
   same_model(whole, part);
   sf_trainer_free(whole);
   sf_trainer_free(part);
   sf_dataset_free(&data);
+}
+
+START_TEST(resume_continues_bit_identically)
+{
+  sf_train_options o = small_run();
+  check_resume(&o, 17, 16);
+  o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume */
+  o.samples = 8192;
+  check_resume(&o, 6, 30);
 }
 END_TEST
 
@@ -266,6 +274,23 @@ START_TEST(loss_gradients_are_the_slopes)
 }
 END_TEST
 
+/* Colour, background and target equal: every term but g2 sum log(1 + 2 sigma) is flat. */
+START_TEST(sparsity_by_hand)
+{
+  sf_ray_work w;
+  ck_assert_int_eq(sf_ray_work_create(&w, N).code, SF_OK);
+  const sf_ray ray = {.target = {0.5f, 0.5f, 0.5f}, .background = {0.5f, 0.5f, 0.5f}, .count = 1};
+  w.sigma[T - 1][0] = 3;
+  for (int c = 0; c < 3; c++) w.colour[T - 1][c] = 0.5f;
+  const sf_loss_plan plan = {.stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 0.25f};
+  sf_loss_sums sums = {0};
+  sf_loss_ray(&plan, &ray, 0.05f, &w, &sums);
+  ck_assert_double_eq_tol(w.dsigma[T - 1][0], 0.25 * 1e-6 * 2 / 7, 1e-9);
+  ck_assert_double_eq_tol(sums.regular, 1e-6 * log(7), 1e-8);
+  free(w.memory);
+}
+END_TEST
+
 START_TEST(adam_by_hand)
 {
   float value = 1, grad = 0.5f, m = 0, v = 0;
@@ -295,6 +320,7 @@ int main(void)
   tcase_add_test(tc, nan_stops_the_run_and_names_the_tensor);
   tcase_add_test(tc, loss_falls_and_both_twins_learn);
   tcase_add_test(tc, loss_gradients_are_the_slopes);
+  tcase_add_test(tc, sparsity_by_hand);
   tcase_add_test(tc, adam_by_hand);
   suite_add_tcase(suite, tc);
   SRunner *runner = srunner_create(suite);
