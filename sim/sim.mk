@@ -72,7 +72,7 @@ lint: ## Verilator, Icarus and Yosys (where installed) accept the RTL, without w
 	@$(VERILATOR) --lint-only --top-module sf_top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
 	@$(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt rtl/sf_op_pkg.sv rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then mkdir -p $B && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -o $B/sf_top.vvp $(RTL) && rm $B/sf_top.vvp; fi
-	@if command -v yosys >/dev/null; then yosys -q -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
+	@if command -v yosys >/dev/null; then yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
 
 # Firmware: freestanding, RV32IM.
 RISCV ?= riscv64-unknown-elf-

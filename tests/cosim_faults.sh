@@ -1,0 +1,43 @@
+#!/bin/bash
+# Plants one fault after another in a copy of the RTL and sees sf_cosim catch and locate each. usage: cosim_faults.sh BUILD
+set -u
+build=$1
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_faults.XXXXXX") || exit 1
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+"$build/faults/make_scene" "$work/scene.snn" || exit 1
+"$build/bin/sf_scene" "${SF_FAULT_SCENE:-simple}" -o "$work/data" --size 32 --train 1 --test 2 >/dev/null || exit 1
+
+# expect FAULT STATUS TEXT...: exit status, and each text in the first difference
+expect() {
+  local fault=$1 want=$2 got
+  shift 2
+  "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --json \
+    --plusarg "+fault=$fault" >"$work/$fault.json" 2>"$work/$fault.err"
+  got=$?
+  [ $got -eq "$want" ] || fail "fault $fault: exit status $got, expected $want: $(cat "$work/$fault.err")"
+  tr -d '\n\t ' <"$work/$fault.json" | sed -E 's/.*"first_difference":(null|\{[^}]*\}).*/\1/' >"$work/$fault.first"
+  for text in "$@"; do
+    grep -qF "$text" "$work/$fault.first" || fail "fault $fault: '$text' is not in $(cat "$work/$fault.first")"
+  done
+  echo "fault $fault: $(cat "$work/$fault.err" "$work/$fault.first")"
+}
+
+field() { sed -E "s/.*\"$2\":([0-9-]+).*/\1/" "$work/$1.first"; }
+
+expect 0 0 null
+expect 1 1 '"layer":"C2"' '"neuron":37,' '"wire":"membrane"'
+[ "$(field 1 step)" -ge 1 ] || fail "fault 1: step 0 rounds nothing in hybrid mode"
+expect 2 1 '"layer":"C2"' '"step":1,' '"neuron":64,' '"wire":"row"' '"expected":1,' '"actual":0,'
+expect 3 1 '"layer":"C1"' '"step":2,' '"wire":"spikes"' '"sample_exact":true'
+[ "$(field 3 actual)" -eq $(($(field 3 expected) + 1)) ] || fail "fault 3: the counter is not one too high"
+# A rounding that truncates is one LSB too low.
+[ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
+[ $failures -eq 0 ] && echo "3 planted faults caught and located, none without a fault"
+exit $((failures > 0))
