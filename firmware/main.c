@@ -27,8 +27,14 @@ static void mmio_write(void *context, uint32_t offset, uint32_t value)
 static const sf_bus accelerator = {mmio_read, mmio_write, (void *)ACCELERATOR};
 static const sf_bus stream = {mmio_read, mmio_write, (void *)STREAM};
 
-static uint32_t get(const sf_bus *bus, uint32_t offset) { return bus->read(bus->context, offset); }
-static void put(const sf_bus *bus, uint32_t offset, uint32_t value) { bus->write(bus->context, offset, value); }
+static uint32_t get(const sf_bus *bus, uint32_t offset)
+{
+  return bus->read(bus->context, offset);
+}
+static void put(const sf_bus *bus, uint32_t offset, uint32_t value)
+{
+  bus->write(bus->context, offset, value);
+}
 
 static void print(const char *text)
 {
@@ -38,7 +44,8 @@ static void print(const char *text)
 static void print_hex(const char *label, uint64_t value)
 {
   print(label);
-  for (int shift = 60; shift >= 0; shift -= 4) mmio_write((void *)UART, 0, (uint32_t)"0123456789abcdef"[value >> shift & 15]);
+  for (int shift = 60; shift >= 0; shift -= 4)
+    mmio_write((void *)UART, 0, (uint32_t) "0123456789abcdef"[value >> shift & 15]);
   print("\n");
 }
 

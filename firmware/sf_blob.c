@@ -6,7 +6,10 @@ static int32_t word(const uint8_t *block, uint32_t index)
   return (int32_t)((uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24);
 }
 
-static int in_memory(int32_t n) { return n >= 1 && n <= SF_LANES; }
+static int in_memory(int32_t n)
+{
+  return n >= 1 && n <= SF_LANES;
+}
 
 int sf_blob_open(const uint8_t *block, uint32_t size, sf_net_blob *net)
 {

@@ -3,18 +3,30 @@
 enum { POLLS_MAX = 1000000, LAYER_STRIDE = SF_CSR_D2_N_IN - SF_CSR_D1_N_IN, GLOBAL_LAYER = 7 };
 enum { WEIGHTS_PER_WORD = 4 };
 
-static uint32_t get(const sf_bus *bus, uint32_t offset) { return bus->read(bus->context, offset); }
-static void put(const sf_bus *bus, uint32_t offset, uint32_t value) { bus->write(bus->context, offset, value); }
+static uint32_t get(const sf_bus *bus, uint32_t offset)
+{
+  return bus->read(bus->context, offset);
+}
+static void put(const sf_bus *bus, uint32_t offset, uint32_t value)
+{
+  bus->write(bus->context, offset, value);
+}
 
 const char *sf_driver_text(sf_driver_code code)
 {
   switch (code) {
-  case SF_DRIVER_OK: return "ok";
-  case SF_DRIVER_NO_DEVICE: return "no accelerator at this address";
-  case SF_DRIVER_VERSION: return "interface version differs from the driver's";
-  case SF_DRIVER_CONFIG: return "built with other sizes than the driver";
-  case SF_DRIVER_REFUSED: return "programming refused";
-  case SF_DRIVER_TIMEOUT: return "no answer";
+  case SF_DRIVER_OK:
+    return "ok";
+  case SF_DRIVER_NO_DEVICE:
+    return "no accelerator at this address";
+  case SF_DRIVER_VERSION:
+    return "interface version differs from the driver's";
+  case SF_DRIVER_CONFIG:
+    return "built with other sizes than the driver";
+  case SF_DRIVER_REFUSED:
+    return "programming refused";
+  case SF_DRIVER_TIMEOUT:
+    return "no answer";
   }
   return "unknown code";
 }
@@ -22,7 +34,7 @@ const char *sf_driver_text(sf_driver_code code)
 const char *sf_driver_error_text(uint32_t error)
 {
 #define SF_CSR(name, offset, access, reset, meaning)
-#define SF_CSR_FIELD(owner, name, lsb, width, meaning) \
+#define SF_CSR_FIELD(owner, name, lsb, width, meaning)                                                                 \
   if (SF_CSR_##owner == SF_CSR_ERROR && (error & SF_CSR_##owner##_##name)) return #name ": " meaning;
 #include "spikefield/csr.def"
 #undef SF_CSR
@@ -59,7 +71,8 @@ static void program_weights(const sf_bus *bus, uint32_t id, const sf_layer_blob 
 {
   const int32_t words = (layer->n_out + WEIGHTS_PER_WORD - 1) / WEIGHTS_PER_WORD;
   for (int32_t row = 0; row < layer->n_in; row++) {
-    put(bus, SF_CSR_WEIGHT_ADDRESS, id << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB | (uint32_t)row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB);
+    put(bus, SF_CSR_WEIGHT_ADDRESS,
+        id << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB | (uint32_t)row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB);
     for (int32_t word = 0; word < words; word++)
       put(bus, SF_CSR_WEIGHT_DATA, pack(layer->w + row * SF_LANES + word * WEIGHTS_PER_WORD));
   }
@@ -131,8 +144,8 @@ sf_driver_code sf_driver_read_counters(const sf_bus *bus, sf_driver_counters *co
     for (uint32_t layer = 0; layer < SF_LAYERS; layer++)
       for (uint32_t step = 0; step < SF_T_MAX; step++)
         counters->event[event][layer][step] = counter(bus, event, layer, step);
-  uint64_t *const global[] = {&counters->samples, &counters->rays, &counters->cycles,
-                              &counters->busy, &counters->stall_in, &counters->stall_out};
+  uint64_t *const global[] = {&counters->samples, &counters->rays,     &counters->cycles,
+                              &counters->busy,    &counters->stall_in, &counters->stall_out};
   for (uint32_t i = 0; i < sizeof global / sizeof *global; i++) *global[i] = counter(bus, 0, GLOBAL_LAYER, i);
   return SF_DRIVER_OK;
 }

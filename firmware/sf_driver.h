@@ -8,7 +8,7 @@
 /* Byte offsets SF_CSR_<name>, expected contents SF_CSR_<name>_RESET, masks SF_CSR_<register>_<field>. */
 enum {
 #define SF_CSR(name, offset, access, reset, meaning) SF_CSR_##name = (offset), SF_CSR_##name##_RESET = (reset),
-#define SF_CSR_FIELD(owner, name, lsb, width, meaning) \
+#define SF_CSR_FIELD(owner, name, lsb, width, meaning)                                                                 \
   SF_CSR_##owner##_##name##_LSB = (lsb), SF_CSR_##owner##_##name = ((1 << (width)) - 1) << (lsb),
 #include "spikefield/csr.def"
 #undef SF_CSR

@@ -108,7 +108,8 @@ module sf_csr (
   wire [4:0] wword = weight_address_q[4:0];
   wire wnarrow = wlayer == sf_op_pkg::D2 || wlayer == sf_op_pkg::C3;
   wire wshort = wlayer == sf_op_pkg::D1 || wlayer == sf_op_pkg::C1;
-  wire minus_128 = wdata_i[7:0] == 8'h80 || wdata_i[15:8] == 8'h80 || wdata_i[23:16] == 8'h80 || wdata_i[31:24] == 8'h80;
+  wire minus_128 = wdata_i[7:0] == 8'h80 || wdata_i[15:8] == 8'h80 || wdata_i[23:16] == 8'h80
+      || wdata_i[31:24] == 8'h80;
   wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (wshort && wrow > 7'd31) || minus_128;
   assign we_o = config_write && to_weight && !weight_bad;
   assign wlayer_o = wlayer;

@@ -1,4 +1,5 @@
-// Samples in over AXI4-Stream, double-buffered. Two's complement values, 16 bits each, four per beat, value 0 in bits 15:0.
+// Samples in over AXI4-Stream, double-buffered. Two's complement values, 16 bits each, four per beat, the first in
+// bits 15:0.
 // A packet is one sample: with tuser on its first beat, the direction of a new ray (n_dir values, padded to whole
 // beats), then the features (n_feature values, padded likewise); tlast on its last beat. Padding is 0.
 // A bad packet raises error_packet_o or error_value_o; from then on everything is discarded until a soft reset,

@@ -21,7 +21,7 @@ struct sf_cosim {
   int n;
   uint64_t number, sample; /* of the ray at work */
   int32_t base[SF_LANES];
-  fx_counts expected;      /* of the chunk */
+  fx_counts expected; /* of the chunk */
   sf_cosim_totals sum;
   sf_cosim_place place;
   entry chunk[CHUNK];
@@ -124,8 +124,7 @@ static void add_spikes(sf_cosim *c, const entry *e)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < SF_T_MAX; t++)
-      for (int word = 0; word < 2; word++)
-        c->sum.spikes += (uint64_t)__builtin_popcountll(e->trace.spikes[l][t][word]);
+      for (int word = 0; word < 2; word++) c->sum.spikes += (uint64_t)__builtin_popcountll(e->trace.spikes[l][t][word]);
 }
 
 static sf_status compare_samples(sf_cosim *c)
@@ -213,13 +212,20 @@ sf_status sf_cosim_finish(sf_cosim *c)
   c->sum.energy_core_fj = sf_energy_fj(&c->sum.core);
   c->sum.energy_rtl_fj = sf_energy_fj(&c->sum.rtl);
   if (c->sum.energy_core_fj == c->sum.energy_rtl_fj) return sf_ok();
-  c->place = (sf_cosim_place){.found = true, .what = {-1, -1, -1, "energy_fj", (int64_t)c->sum.energy_core_fj,
-                                                      (int64_t)c->sum.energy_rtl_fj, sf_dut_cycle(c->dut)}};
+  c->place = (sf_cosim_place){.found = true,
+                              .what = {-1, -1, -1, "energy_fj", (int64_t)c->sum.energy_core_fj,
+                                       (int64_t)c->sum.energy_rtl_fj, sf_dut_cycle(c->dut)}};
   return differ(c);
 }
 
-const sf_cosim_totals *sf_cosim_sum(const sf_cosim *c) { return &c->sum; }
-const sf_cosim_place *sf_cosim_where(const sf_cosim *c) { return &c->place; }
+const sf_cosim_totals *sf_cosim_sum(const sf_cosim *c)
+{
+  return &c->sum;
+}
+const sf_cosim_place *sf_cosim_where(const sf_cosim *c)
+{
+  return &c->place;
+}
 
 void sf_cosim_close(sf_cosim *c)
 {

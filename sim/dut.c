@@ -8,7 +8,8 @@ enum { RESET_CYCLES = 4 };
 
 sf_net_blob sf_dut_blob(const fx_net *net)
 {
-  sf_net_blob blob = {.mode = net->mode, .steps = net->steps,
+  sf_net_blob blob = {.mode = net->mode,
+                      .steps = net->steps,
                       .exp_in = {net->exp_in.mul, net->exp_in.shift, net->exp_in.bias},
                       .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -21,7 +22,8 @@ sf_net_blob sf_dut_blob(const fx_net *net)
 static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
 {
   if (dut->bus_hung)
-    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what, dut->cycle);
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what,
+                   dut->cycle);
   if (code == SF_DRIVER_OK) return sf_ok();
   if (code != SF_DRIVER_REFUSED)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s at cycle %" PRIu64, what, sf_driver_text(code), dut->cycle);
@@ -103,7 +105,10 @@ sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64
   return sf_ok();
 }
 
-uint64_t sf_dut_cycle(const sf_dut *dut) { return dut->cycle; }
+uint64_t sf_dut_cycle(const sf_dut *dut)
+{
+  return dut->cycle;
+}
 
 void sf_dut_close(sf_dut *dut)
 {

@@ -86,7 +86,10 @@ static void edge(sf_pins *pins, bool clk)
   pins->context.timeInc(1);
 }
 
-extern "C" void sf_pins_dump(sf_pins *pins) { pins->dumping = pins->wave != nullptr; }
+extern "C" void sf_pins_dump(sf_pins *pins)
+{
+  pins->dumping = pins->wave != nullptr;
+}
 
 extern "C" void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out)
 {

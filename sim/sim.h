@@ -11,11 +11,11 @@ struct sf_dut {
   sf_pins_out out;
   uint64_t cycle, seed;
   uint32_t stall_percent;
-  sf_bus bus;          /* the driver's way in: AXI4-Lite */
-  bool bus_hung;       /* a register access was never answered */
+  sf_bus bus;           /* the driver's way in: AXI4-Lite */
+  bool bus_hung;        /* a register access was never answered */
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
-  fx_net net;          /* sizes of the loaded net */
-  int64_t tap_sample;  /* sample of the current run that the next tap beat belongs to */
+  fx_net net;           /* sizes of the loaded net */
+  int64_t tap_sample;   /* sample of the current run that the next tap beat belongs to */
 };
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */

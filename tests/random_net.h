@@ -20,13 +20,20 @@ static inline int64_t draw(random_source *r, int64_t low, int64_t high)
 static inline int8_t draw_weight(random_source *r, int kind, int i, int o)
 {
   switch (kind) {
-  case 1: return 127;
-  case 2: return -127;
-  case 3: return (i + o) & 1 ? -127 : 127;
-  case 4: return 0;
-  case 5: return draw(r, 0, 7) ? 0 : (int8_t)draw(r, -127, 127);
-  case 6: return (int8_t)draw(r, -9, 9);
-  default: return (int8_t)draw(r, -127, 127);
+  case 1:
+    return 127;
+  case 2:
+    return -127;
+  case 3:
+    return (i + o) & 1 ? -127 : 127;
+  case 4:
+    return 0;
+  case 5:
+    return draw(r, 0, 7) ? 0 : (int8_t)draw(r, -127, 127);
+  case 6:
+    return (int8_t)draw(r, -9, 9);
+  default:
+    return (int8_t)draw(r, -127, 127);
   }
 }
 
@@ -79,7 +86,8 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
   const bool full = draw(r, 0, 2) == 0 || !extreme;
   const int n_h = full ? 15 : (int)draw(r, 0, 15);
   net_sizes(net, full ? 32 : 2 * (int)draw(r, 1, 16), full ? 128 : (int)draw(r, 1, 128), n_h,
-            full ? 16 : (int)draw(r, n_h ? 0 : 1, 16), full ? 128 : (int)draw(r, 1, 128), full ? 128 : (int)draw(r, 1, 128));
+            full ? 16 : (int)draw(r, n_h ? 0 : 1, 16), full ? 128 : (int)draw(r, 1, 128),
+            full ? 128 : (int)draw(r, 1, 128));
   const int64_t typical[SF_LAYERS] = {300000, 0, 200000, 100000, 0};
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer *layer = &net->layer[l];
@@ -89,7 +97,8 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
   }
   net->mode = extreme ? (int32_t)draw(r, 0, 2) : FX_HYBRID;
   net->steps = extreme ? (int32_t)draw(r, 1, SF_T_MAX) : 3;
-  net->exp_in = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, extreme ? 0 : 8, 16), (int32_t)draw(r, -20000, 20000)};
+  net->exp_in =
+      (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, extreme ? 0 : 8, 16), (int32_t)draw(r, -20000, 20000)};
   net->sigmoid_in = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, extreme ? 0 : 8, 16), 0};
 }
 

@@ -51,8 +51,8 @@ static void show(session *s, sf_progress *progress)
 {
   const double seconds = sf_seconds() - s->begun;
   const uint64_t samples = sf_cosim_sum(s->cosim)->samples;
-  sf_progress_show(progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s", s->rays, s->opt.rays, samples,
-                   seconds > 0 ? (double)samples / seconds : 0);
+  sf_progress_show(progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s", s->rays, s->opt.rays,
+                   samples, seconds > 0 ? (double)samples / seconds : 0);
 }
 
 static sf_status run_rays(session *s, sf_progress *progress)
@@ -77,9 +77,11 @@ static sf_status difference_status(const session *s, const sf_status *status)
   const pixel_place p = pick(s, where->ray);
   if (d->layer >= 0) snprintf(layer, sizeof layer, "layer %s step %d ", sf_layer_names[d->layer], d->step);
   if (d->neuron >= 0) snprintf(neuron, sizeof neuron, "neuron %d ", d->neuron);
-  return sf_fail(SF_E_DIFFERENCE, "ray %" PRIu64 " (view %s, pixel %d,%d) sample %s%" PRIu64 ": %s%s%s: expected %" PRId64
-                 ", actual %" PRId64 ", cycle %" PRIu64, where->ray, s->data.view[p.view].name, p.x, p.y,
-                 where->exact ? "" : ">= ", where->sample, layer, neuron, d->wire, d->expected, d->actual, d->cycle);
+  return sf_fail(SF_E_DIFFERENCE,
+                 "ray %" PRIu64 " (view %s, pixel %d,%d) sample %s%" PRIu64 ": %s%s%s: expected %" PRId64
+                 ", actual %" PRId64 ", cycle %" PRIu64,
+                 where->ray, s->data.view[p.view].name, p.x, p.y, where->exact ? "" : ">= ", where->sample, layer,
+                 neuron, d->wire, d->expected, d->actual, d->cycle);
 }
 
 static cJSON *difference_json(const session *s, const sf_status *status)
@@ -107,7 +109,10 @@ static cJSON *difference_json(const session *s, const sf_status *status)
   return json;
 }
 
-static double ratio(uint64_t part, uint64_t whole) { return whole ? (double)part / (double)whole : 0; }
+static double ratio(uint64_t part, uint64_t whole)
+{
+  return whole ? (double)part / (double)whole : 0;
+}
 
 static sf_status print_json(const session *s, const sf_status *status)
 {
@@ -140,21 +145,22 @@ static sf_status print_json(const session *s, const sf_status *status)
 static sf_status print_text(const session *s)
 {
   const sf_cosim_totals *sum = sf_cosim_sum(s->cosim);
-  printf("%" PRIu64 " rays (%" PRIu64 " with samples), %" PRIu64 " samples, %" PRIu64 " spikes: 0 differences\n", s->rays,
-         sum->core.rays, sum->samples, sum->spikes);
+  printf("%" PRIu64 " rays (%" PRIu64 " with samples), %" PRIu64 " samples, %" PRIu64 " spikes: 0 differences\n",
+         s->rays, sum->core.rays, sum->samples, sum->spikes);
   printf("compared: outputs, spikes, membranes and rows per layer and step, every counter, energy\n");
   printf("%" PRIu64 " cycles, %.1f per sample, utilisation %.1f %%, stalled %.1f %%\n", sum->cycles,
          ratio(sum->cycles, sum->samples), 100 * ratio(sum->busy, sum->cycles), 100 * ratio(sum->stalls, sum->cycles));
-  printf("energy %" PRIu64 " fJ by the core, %" PRIu64 " fJ by the accelerator\n", sum->energy_core_fj, sum->energy_rtl_fj);
+  printf("energy %" PRIu64 " fJ by the core, %" PRIu64 " fJ by the accelerator\n", sum->energy_core_fj,
+         sum->energy_rtl_fj);
   printf("%.1f s, seed %" PRIu64 ", stalls %d %%\n", s->seconds, s->opt.seed, s->opt.stalls);
   return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
 }
 
 static sf_status simulate(session *s)
 {
-  const sf_cosim_options how = {.dut = {.seed = s->opt.seed, .stall_percent = s->opt.stalls, .wave = s->opt.wave,
-                                        .plusarg = s->opt.plusarg},
-                                .limit = s->opt.limit};
+  const sf_cosim_options how = {
+      .dut = {.seed = s->opt.seed, .stall_percent = s->opt.stalls, .wave = s->opt.wave, .plusarg = s->opt.plusarg},
+      .limit = s->opt.limit};
   sf_progress progress;
   SF_TRY(sf_cosim_open(&s->cosim, &s->scene, &how));
   s->begun = sf_seconds();
@@ -185,28 +191,60 @@ int main(int argc, char **argv)
   options *o = &s.opt;
   const char *positional[2];
   const sf_option table[] = {
-      {.name = "--rays", .type = SF_ARG_INT, .value = &o->rays, .min = 1, .max = 1e9, .argument = "N",
+      {.name = "--rays",
+       .type = SF_ARG_INT,
+       .value = &o->rays,
+       .min = 1,
+       .max = 1e9,
+       .argument = "N",
        .help = "random rays over the views (default 200)"},
-      {.name = "--seed", .type = SF_ARG_U64, .value = &o->seed, .min = 0, .max = 0x1p53, .argument = "S",
+      {.name = "--seed",
+       .type = SF_ARG_U64,
+       .value = &o->seed,
+       .min = 0,
+       .max = 0x1p53,
+       .argument = "S",
        .help = "of rays, stalls and register contents at power-on (default 1)"},
-      {.name = "--split", .type = SF_ARG_CHOICE, .value = &o->split, .choices = "test|train",
+      {.name = "--split",
+       .type = SF_ARG_CHOICE,
+       .value = &o->split,
+       .choices = "test|train",
        .help = "views to take (default test)"},
-      {.name = "--stalls", .type = SF_ARG_INT, .value = &o->stalls, .min = 0, .max = 90, .argument = "P",
+      {.name = "--stalls",
+       .type = SF_ARG_INT,
+       .value = &o->stalls,
+       .min = 0,
+       .max = 90,
+       .argument = "P",
        .help = "percent of cycles with a bubble or back-pressure (default 20)"},
-      {.name = "--limit-samples", .type = SF_ARG_U64, .value = &o->limit, .min = 0, .max = 0x1p53, .argument = "N",
+      {.name = "--limit-samples",
+       .type = SF_ARG_U64,
+       .value = &o->limit,
+       .min = 0,
+       .max = 0x1p53,
+       .argument = "N",
        .help = "stop after N samples"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o->json, .help = "print one JSON object"},
       {.name = "--quiet", .type = SF_ARG_FLAG, .value = &o->quiet, .help = "no progress line"},
-      {.name = "--wave", .type = SF_ARG_STRING, .value = &o->wave, .argument = "FILE",
+      {.name = "--wave",
+       .type = SF_ARG_STRING,
+       .value = &o->wave,
+       .argument = "FILE",
        .help = "FST waveform of the first difference, where there is one"},
-      {.name = "--plusarg", .type = SF_ARG_STRING, .value = &o->plusarg, .argument = "ARG",
+      {.name = "--plusarg",
+       .type = SF_ARG_STRING,
+       .value = &o->plusarg,
+       .argument = "ARG",
        .help = "passed to the simulation, for a fault build: +fault=1"},
       {0}};
-  const sf_cli cli = {.program = "sf_cosim", .usage = "sf_cosim SCENE.snn DATA [options]",
+  const sf_cli cli = {.program = "sf_cosim",
+                      .usage = "sf_cosim SCENE.snn DATA [options]",
                       .summary = "Run the Verilog accelerator and the fixed-point core on the same samples and compare "
                                  "everything for equality.\nExit status 1 at the first difference.",
-                      .examples = "  sf_cosim scene.snn data --rays 200 --seed 1\n", .options = table,
-                      .min_positional = 2, .max_positional = 2};
+                      .examples = "  sf_cosim scene.snn data --rays 200 --seed 1\n",
+                      .options = table,
+                      .min_positional = 2,
+                      .max_positional = 2};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
   sf_cli_catch_signals();
   if (status.code == SF_OK) status = run(&s, positional[0], positional[1]);

@@ -14,20 +14,21 @@ typedef struct sf_dut_options {
 
 typedef struct sf_dut_sample {
   const fx_ray *ray;
-  bool first;           /* first sample of its ray: the direction is sent with it */
-  const int16_t *f;     /* [n_feature] */
+  bool first;       /* first sample of its ray: the direction is sent with it */
+  const int16_t *f; /* [n_feature] */
 } sf_dut_sample;
 
 /* What the accelerator showed of one sample. */
 typedef struct sf_dut_result {
   fx_out out;
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* as fx_trace; from the tap port */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];   /* as fx_trace; from the tap port */
   uint64_t spike_cycle[SF_LAYERS][SF_T_MAX]; /* clock cycle of each bitmap */
-  uint64_t cycle;       /* clock cycle at which the result left */
+  uint64_t cycle;                            /* clock cycle at which the result left */
 } sf_dut_result;
 
 sf_status sf_dut_open(sf_dut **dut, const fx_scene *scene, const sf_dut_options *options);
-/* Streams n samples in and n results out, overlapping as the hardware allows. A hang is an error that names the cycle. */
+/* Streams n samples in and n results out, overlapping as the hardware allows. A hang is an error that names the cycle.
+ */
 sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result);
 /* More of the same samples, for a comparison that names the cause: membranes after reset (D1, C1, C2) and the
  * presynaptic rows that were added up (C2 per step; D2 and C3 of all steps together, at step 0). */
@@ -35,10 +36,12 @@ typedef struct sf_dut_trace {
   int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES];
   uint64_t rows[SF_LAYERS][SF_T_MAX][2];
 } sf_dut_trace;
-sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result, sf_dut_trace *trace);
+sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result,
+                            sf_dut_trace *trace);
 /* fx_net_fn for fx_render_ray; user is the sf_dut. */
 sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
-/* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the hardware has them). */
+/* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the
+ * hardware has them). */
 sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls);
 sf_status sf_dut_clear_counts(sf_dut *dut);
 uint64_t sf_dut_cycle(const sf_dut *dut);
