@@ -311,7 +311,7 @@ rm -rf out
 
 run sf_scene simple -o wide --size 128 --train 1 --test 1
 stop() { # OUTPUT PROGRAM ARGS...
-  timeout -k 20 --preserve-status -s INT 1 "$BIN/$2" "${@:3}" >stdout.txt 2>err </dev/null
+  timeout --foreground -k 20 --preserve-status -s INT 1 "$BIN/$2" "${@:3}" >stdout.txt 2>err </dev/null
   status=$?
   judge "interrupted: ${*:2}" "$2" 130 ""
   absent "$1" "interrupted: ${*:2}"
