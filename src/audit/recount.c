@@ -13,6 +13,7 @@ static void count_state(fx_layer_counts *c, int t, uint64_t neurons, uint64_t by
 {
   c->updates[t] += neurons;
   c->state_w[t] += neurons * bytes;
+  /* cppcheck-suppress arrayIndexOutOfBoundsCond ; t < steps <= SF_T_MAX, checked by fx_scene_check */
   if (t > 0) c->state_r[t] += neurons * bytes;
 }
 

@@ -31,6 +31,7 @@ static const real_field reals[REALS] = {
 
 static double *field_of(const fx_scene *scene, const real_field *field)
 {
+  /* cppcheck-suppress invalidPointerCast ; offsetof a double of the same struct */
   return (double *)((char *)scene + field->offset);
 }
 

@@ -72,7 +72,7 @@ static void gemm(gemm_a a, int m, int k, const float *b, int ldb, int n, const f
 
 static inline vf interleave(vf a, vf b, int high)
 {
-  vi mask;
+  vi mask = {0};
   for (int i = 0; i < VL; i++) mask[i] = (i & 1 ? VL : 0) + i / 2 + (high ? VL / 2 : 0);
   return __builtin_shuffle(a, b, mask);
 }

@@ -27,9 +27,9 @@ static inline float fast_exp(float x)
   p = p * r * r + r + 1.0f;
   union {
     float f;
-    int32_t i;
+    uint32_t i;
   } bits = {.f = shifted}, scale;
-  scale.i = (bits.i - 0x4B400000 + 127) << 23;
+  scale.i = (bits.i - 0x4B400000u + 127u) << 23;
   return p * scale.f;
 }
 

@@ -61,9 +61,10 @@ sf_status sf_init_parameters(sf_trainer *t)
   for (int id = SF_P_W1; id <= SF_P_W5; id++) fill_uniform(t, id, 1 / sqrtf((float)m->param[id].shape[1]));
   if (ann) return sf_ok();
   const int features = 2 * m->config.levels;
-  float *f = malloc(PROBES * (features + SF_DIR_FEATURES) * sizeof *f), *sh = f + PROBES * features;
+  float *f = malloc((size_t)PROBES * features * sizeof *f), *sh = malloc(PROBES * SF_DIR_FEATURES * sizeof *sh);
   sf_net_trace *trace = calloc(1, sizeof *trace);
-  if (f && trace) {
+  const bool ok = f && sh && trace;
+  if (ok) {
     for (int p = 0; p < PROBES; p++) {
       float x[3], d[3], length = 0;
       for (int a = 0; a < 3; a++) {
@@ -77,8 +78,8 @@ sf_status sf_init_parameters(sf_trainer *t)
     }
     calibrate(t, f, sh, trace);
   }
-  const bool ok = f && trace;
   free(f);
+  free(sh);
   free(trace);
   return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for the initial probes");
 }

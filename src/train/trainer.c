@@ -270,8 +270,22 @@ static void add_matrix(float *to, const float *from, int rows, int columns, int 
     for (int c = 0; c < columns; c++) to[r * columns + c] += from[r * ld + c];
 }
 
+/* The losses as means over rays; the leaks' gradients carry that factor already. */
+static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
+{
+  to->mse_full += mean * x->mse_full;
+  to->mse_floor += mean * x->mse_floor;
+  to->mse_ceil += mean * x->mse_ceil;
+  to->regular += mean * x->regular;
+  to->extra_floor += mean * x->extra_floor;
+  to->extra_ceil += mean * x->extra_ceil;
+  to->distill += mean * x->distill;
+  to->g_sigma_leak += x->g_sigma_leak;
+  to->g_colour_leak += x->g_colour_leak;
+}
+
 /* Sums the groups in order into the flat gradient. */
-static void reduce(sf_trainer *t, sf_loss_sums *sums, double firing[3])
+static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing[3])
 {
   const sf_model *m = &t->model;
   const int hidden = m->config.hidden, features = 2 * m->config.levels;
@@ -290,8 +304,7 @@ static void reduce(sf_trainer *t, sf_loss_sums *sums, double firing[3])
     add_matrix(at[SF_P_W4], g->grad->w4, hidden, hidden, hidden);
     add_matrix(at[SF_P_W5], g->grad->w5, 3, hidden, hidden);
     add_matrix(at[SF_P_LEAK], g->grad->leak, 1, SF_LAYERS, SF_LAYERS);
-    const double *from = &g->sums.mse_full;
-    for (size_t i = 0; i < sizeof *sums / sizeof(double); i++) (&sums->mse_full)[i] += from[i];
+    add_sums(sums, &g->sums, mean);
     for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
     neurons += g->neurons;
   }
@@ -418,8 +431,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   double firing[3];
   encode(t);
   run_bundles(t, &plan);
-  reduce(t, &mean, firing);
-  for (size_t i = 0; i < sizeof mean / sizeof(double) - 2; i++) (&mean.mse_full)[i] *= plan.inverse_rays;
+  reduce(t, plan.inverse_rays, &mean, firing);
   const double e_tau = leak_terms(t, &plan, &mean);
   const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
   const double ratio = mean.mse_full / fmax(mse, 1e-12);
