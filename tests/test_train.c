@@ -175,6 +175,11 @@ START_TEST(nan_stops_the_run_and_names_the_tensor)
   sf_status status = sf_trainer_step(t, &stats);
   ck_assert_int_eq(status.code, SF_E_RANGE);
   ck_assert_ptr_nonnull(strstr(status.message, "iteration 3"));
+  unlink(model_path);
+  status = sf_trainer_save(t, model_path, true);
+  ck_assert_int_ne(status.code, SF_OK);
+  ck_assert_ptr_nonnull(strstr(status.message, "colour.w5"));
+  ck_assert_int_ne(access(model_path, F_OK), 0);
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }

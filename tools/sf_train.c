@@ -118,7 +118,7 @@ static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_tra
     sf_status status = sf_trainer_step(trainer, s);
     if (status.code) {
       sf_progress_end(&progress);
-      if (s->iteration > 0) SF_TRY(sf_trainer_save(trainer, a->output, true));
+      if (s->iteration > 0) sf_trainer_save(trainer, a->output, true); /* the failure above is the news */
       return status;
     }
     smooth(&r, s, s->seconds - before);

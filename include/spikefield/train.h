@@ -43,7 +43,8 @@ sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const 
                             const char *resume);
 /* One iteration. NaN or Inf anywhere fails and names the tensor; the model then is the one before the iteration's update. */
 sf_status sf_trainer_step(sf_trainer *trainer, sf_train_stats *stats);
-/* Atomic. with_optimiser: everything that --resume needs; without: the model alone. */
+/* Atomic. with_optimiser: everything that --resume needs; without: the model alone. Refuses NaN and Inf, naming the
+ * tensor, so that a run that went wrong cannot replace its last good checkpoint. */
 sf_status sf_trainer_save(const sf_trainer *trainer, const char *path, bool with_optimiser);
 const sf_model *sf_trainer_model(const sf_trainer *trainer);
 void sf_trainer_free(sf_trainer *trainer);

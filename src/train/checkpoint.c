@@ -91,6 +91,8 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
 {
   sf_tensor list[TENSORS_MAX];
   const int n = list_tensors(t, with_optimiser, list);
+  for (int i = 0; i < n; i++) /* the last good checkpoint must survive a run that went wrong */
+    if (list[i].type == SF_F32) SF_TRY(sf_tensor_finite(path, &list[i]));
   cJSON *meta = cJSON_CreateObject();
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
   put_config(meta, &t->model);

@@ -420,11 +420,18 @@ static void report(const sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
   if (t->stage == 3) s->stage = 3;
 }
 
+/* The prefix whose density decides what is empty: the one that is trained, which inference will use. */
+static int occupancy_steps(const sf_trainer *t)
+{
+  const int trained = t->stage == 1 ? t->model.config.steps : t->model.t_r;
+  return scaled(t) && trained > 2 ? 2 : trained;
+}
+
 sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
 {
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
-  if (t->iteration % OCCUPANCY_EVERY == 0) SF_TRY(sf_occupancy_update(t, scaled(t) ? 2 : t->model.config.steps));
+  if (t->iteration % OCCUPANCY_EVERY == 0) SF_TRY(sf_occupancy_update(t, occupancy_steps(t)));
   SF_TRY(sf_batch_draw(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
