@@ -8,8 +8,22 @@ endif
 .DELETE_ON_ERROR:
 SHELL := /bin/bash
 
+ifneq ($(filter deps,$(MAKECMDGOALS)),)
+# Nothing else may start, or even be looked up, before the packages are there: the other goals run afterwards.
+REST := $(filter-out deps,$(MAKECMDGOALS))
+.NOTPARALLEL:
+.PHONY: deps $(REST)
+deps: ## install what is missing with apt (Debian, Ubuntu); prints what it does
+	@tools/deps.sh
+$(REST): deps
+	@$(MAKE) $@
+else
+
+STARTED := $(shell date +%s)
 B ?= build
-CC ?= gcc
+ifeq ($(origin CC),default)
+CC := gcc
+endif
 CXX ?= g++
 OPT ?= -O3
 SAN ?=
@@ -101,16 +115,13 @@ cppcheck: ## static analysis of the C code
 
 # Runs of the whole chain
 demo: all ## make a scene, train, export, render, co-simulate, audit: build/demo (under 4 minutes)
-	@tools/demo.sh $B
+	@STARTED=$(STARTED) tools/demo.sh $B
 
 lego: all ## the same chain on SCENES/lego with a training budget of 10 minutes: build/lego
-	@tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 10 --rays 400
+	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 10 --rays 400
 
 bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
 	@$B/tests/bench $B/bench.json
-
-deps: ## install what is missing with apt (Debian, Ubuntu); prints what it does
-	@tools/deps.sh
 
 format: ## clang-format every C file
 	clang-format -i $$(git ls-files '*.c' '*.h')
@@ -121,5 +132,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego bench deps format clean help lint gen gen-check firmware faults
+.PHONY: all test check asan asan-run cppcheck demo lego bench format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
+endif
