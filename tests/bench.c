@@ -64,10 +64,14 @@ static void put(cJSON *json, const char *name, double value, const char *unit, d
   cJSON *entry = cJSON_AddObjectToObject(json, name);
   cJSON_AddNumberToObject(entry, "value", value);
   cJSON_AddStringToObject(entry, "unit", unit);
-  if (isfinite(ceiling)) cJSON_AddNumberToObject(entry, "ceiling", ceiling);
-  else cJSON_AddNullToObject(entry, "ceiling");
-  if (isfinite(naive)) cJSON_AddNumberToObject(entry, "naive", naive);
-  else cJSON_AddNullToObject(entry, "naive");
+  if (isfinite(ceiling))
+    cJSON_AddNumberToObject(entry, "ceiling", ceiling);
+  else
+    cJSON_AddNullToObject(entry, "ceiling");
+  if (isfinite(naive))
+    cJSON_AddNumberToObject(entry, "naive", naive);
+  else
+    cJSON_AddNullToObject(entry, "naive");
   printf("%-28s %12.4g %-10s", name, value, unit);
   if (isfinite(ceiling)) printf("  ceiling %10.4g (%4.1f %%)", ceiling, 100 * value / ceiling);
   if (isfinite(naive)) printf("  naive %10.4g (x %.1f)", naive, value / naive);

@@ -4,7 +4,10 @@
 #include "spikefield/model.h"
 #include "spikefield/rng.h"
 
-static inline float test_random(uint64_t index) { return 2 * sf_random_float(7, 1, index) - 1; }
+static inline float test_random(uint64_t index)
+{
+  return 2 * sf_random_float(7, 1, index) - 1;
+}
 
 /* gain spreads the weights so that neurons fire. */
 static inline sf_model test_model(sf_net_kind net, sf_input_mode mode, int hidden, int steps, float gain)

@@ -116,7 +116,7 @@ START_TEST(packets_equal_the_oracle)
   enum { RAYS = 40 };
   float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
   const float background[3] = {1, 1, 1};
-  for (int i = 0; i < 512; i++) m.occupancy[i / 8] &= (uint8_t)~(sf_random_below(5, 1, i, 2) << (i % 8));
+  for (int i = 0; i < 512; i++) m.occupancy[i / 8] &= (uint8_t) ~(sf_random_below(5, 1, i, 2) << (i % 8));
   for (int r = 0; r < RAYS; r++) {
     float length = 0;
     for (int a = 0; a < 3; a++) {

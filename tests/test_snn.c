@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its fixed point). */
+/* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its
+ * fixed point). */
 START_TEST(plif_by_hand)
 {
   ck_assert_float_eq(sf_plif_charge(SF_HYBRID, 0, 0.5f, 0, 0.8f), 0.8f);
@@ -131,12 +132,18 @@ static float grad_at(const rig *r, sf_param_id id, size_t i)
 {
   const int hidden = r->model.config.hidden;
   switch (id) {
-  case SF_P_W1: return r->grad->w1[i / 8 * 16 + i % 8];
-  case SF_P_W2: return r->grad->w2[i];
-  case SF_P_W3: return r->grad->w3[i / 31 * 32 + i % 31 + (i % 31 >= 16)];
-  case SF_P_W4: return r->grad->w4[i];
-  case SF_P_W5: return r->grad->w5[i];
-  default: return hidden ? r->grad->leak[i] : 0;
+  case SF_P_W1:
+    return r->grad->w1[i / 8 * 16 + i % 8];
+  case SF_P_W2:
+    return r->grad->w2[i];
+  case SF_P_W3:
+    return r->grad->w3[i / 31 * 32 + i % 31 + (i % 31 >= 16)];
+  case SF_P_W4:
+    return r->grad->w4[i];
+  case SF_P_W5:
+    return r->grad->w5[i];
+  default:
+    return hidden ? r->grad->leak[i] : 0;
   }
 }
 
@@ -200,8 +207,8 @@ START_TEST(snn_smooth_parts_match_the_slope)
 END_TEST
 
 /* One neuron chain by the equations of the surrogate, written out independently for C3 <- C2 <- constant drive:
- * g_h = (g_s - theta g_v) sd + g_v, g_x = k g_h, g_v(t-1) = (1-k) g_h, g_w = (1-k) sum g_h (h - v). Checks dW4 and the leak
- * of C2 with W5 as read-out, in double. */
+ * g_h = (g_s - theta g_v) sd + g_v, g_x = k g_h, g_v(t-1) = (1-k) g_h, g_w = (1-k) sum g_h (h - v). Checks dW4 and the
+ * leak of C2 with W5 as read-out, in double. */
 START_TEST(plif_backward_by_the_equations)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
@@ -235,7 +242,8 @@ START_TEST(plif_backward_by_the_equations)
     }
   for (int n = 0; n < H; n++)
     for (int m = 0; m < H; m++)
-      ck_assert_double_eq_tol(r.grad->w4[n * H + m], dw4[n][m], 1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
+      ck_assert_double_eq_tol(r.grad->w4[n * H + m], dw4[n][m],
+                              1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
   ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
   rig_free(&r);
 }

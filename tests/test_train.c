@@ -250,8 +250,8 @@ static void check_plan(sf_loss_plan p)
       double low = ray_loss(&p, &ray, &w), found = (high - low) / 0.02;
       *at = old;
       moved += fabs(expected) > 1e-4;
-      ck_assert_msg(fabs(found - expected) <= 1e-4 + 0.02 * fabs(found), "step %d value %d: slope %g, gradient %g", t, i,
-                    found, expected); /* float sums of ~1 over a step of 0.02, curvature of the norms */
+      ck_assert_msg(fabs(found - expected) <= 1e-4 + 0.02 * fabs(found), "step %d value %d: slope %g, gradient %g", t,
+                    i, found, expected); /* float sums of ~1 over a step of 0.02, curvature of the norms */
     }
   ck_assert_int_gt(moved, N);
   free(w.memory);
@@ -259,7 +259,8 @@ static void check_plan(sf_loss_plan p)
 
 START_TEST(loss_gradients_are_the_slopes)
 {
-  sf_loss_plan one = {.stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
+  sf_loss_plan one = {
+      .stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
   check_plan(one);
   /* distillation off: its teacher carries no gradient by decision, so it is not the slope of a function */
   sf_loss_plan two = one;

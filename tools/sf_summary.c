@@ -36,8 +36,8 @@ static void explain(const field *f, const char *dir)
          f[SAMPLES].value, f[DIFFERENCES].value);
   printf("  energy        %.4f mJ spiking, %.4f mJ for its ReLU twin: %.1f %% saved (0.9 pJ per SOP, 4.6 pJ per MAC)\n",
          f[SNN].value * 1e-12, f[ANN].value * 1e-12, f[SAVING].value);
-  printf("Look at %s/preview.png; %s/golden.exr holds depth, spikes and energy per pixel; %s/audit.json every count.\n", dir,
-         dir, dir);
+  printf("Look at %s/preview.png; %s/golden.exr holds depth, spikes and energy per pixel; %s/audit.json every count.\n",
+         dir, dir, dir);
 }
 
 static sf_status run(const char *dir, const char *seconds)
@@ -73,7 +73,8 @@ int main(int argc, char **argv)
   const sf_option options[] = {{0}};
   const sf_cli cli = {.program = "sf_summary",
                       .usage = "sf_summary DIR SECONDS",
-                      .summary = "Gathers DIR/{train,float,fixed,cosim,audit}.json into DIR/summary.json and prints it.",
+                      .summary =
+                          "Gathers DIR/{train,float,fixed,cosim,audit}.json into DIR/summary.json and prints it.",
                       .examples = "  sf_summary build/demo 200\n",
                       .options = options,
                       .min_positional = 2,

@@ -22,48 +22,61 @@ static sf_cli make_cli(arguments *a, sf_option *o)
   sf_train_options *t = &a->train;
   const sf_option options[] = {
       {"--output", 'o', SF_ARG_STRING, &a->output, 0, 0, NULL, "FILE", "model to write (default model.safetensors)"},
-      {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M", "time budget, a quarter for stage I (default: iterations)"},
+      {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M",
+       "time budget, a quarter for stage I (default: iterations)"},
       {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
       {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II (default 7500)"},
-      {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B", "quality (small) against energy (large) (default 5e-7)"},
+      {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B",
+       "quality (small) against energy (large) (default 5e-7)"},
       {"--steps", 'T', SF_ARG_INT, &c->steps, 1, SF_T_MAX, NULL, "T", "time steps unrolled in training (default 8)"},
       {"--net", 0, SF_ARG_CHOICE, &c->net, 0, 0, "snn|ann", "KIND", "spiking nets or their ReLU twin (default snn)"},
-      {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE", "charging of the neurons (default hybrid)"},
+      {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE",
+       "charging of the neurons (default hybrid)"},
       {"--seed", 's', SF_ARG_U64, &t->seed, 0, 9e15, NULL, "S", "same seed, same bits, any thread count (default 1)"},
       {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
-      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N", "samples per iteration, about (default 16384)"},
+      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N",
+       "samples per iteration, about (default 16384)"},
       {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R", "Adam's rate for the hash grid (default 1e-2)"},
       {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks (default 5e-3)"},
       {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid (default 16)"},
       {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries (default 19)"},
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level (default 16)"},
-      {"--finest-res", 0, SF_ARG_INT, &c->finest_res, 2, 32768, NULL, "N", "resolution of the finest level (default 2048)"},
-      {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N", "neurons of a spiking layer, multiple of 16 (default 128)"},
+      {"--finest-res", 0, SF_ARG_INT, &c->finest_res, 2, 32768, NULL, "N",
+       "resolution of the finest level (default 2048)"},
+      {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
+       "neurons of a spiking layer, multiple of 16 (default 128)"},
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 1)"},
       {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N", "samples across the box diagonal (default 1024)"},
-      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N", "occupancy cells per axis, power of two (default 128)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &a->scale, 0, 1e6, NULL, "S", "model units per world unit, 0 = the layout's (default 0)"},
+      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N",
+       "occupancy cells per axis, power of two (default 128)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &a->scale, 0, 1e6, NULL, "S",
+       "model units per world unit, 0 = the layout's (default 0)"},
       {"--downscale", 'd', SF_ARG_INT, &a->downscale, 1, 64, NULL, "F", "box-filter the images by F (default 1)"},
       {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
-      {"--background", 0, SF_ARG_CHOICE, &t->background, 0, 0, "random|white|black", "KIND", "behind transparent pixels (default random)"},
+      {"--background", 0, SF_ARG_CHOICE, &t->background, 0, 0, "random|white|black", "KIND",
+       "behind transparent pixels (default random)"},
       {"--no-stage1", 0, SF_ARG_FLAG, &a->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
       {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "ablation: without L_penalty"},
       {"--no-budget", 0, SF_ARG_FLAG, &a->no_budget, 0, 0, NULL, NULL, "ablation: without both (L_budg)"},
       {"--no-distill", 0, SF_ARG_FLAG, &t->no_distill, 0, 0, NULL, NULL, "ablation: without L_distill"},
       {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "ablation: without max time-step scaling"},
-      {"--eval-views", 0, SF_ARG_INT, &a->eval_views, 0, 1e6, NULL, "N", "test views rendered at the end, 0 = all (default 0)"},
-      {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M", "time between checkpoints (default 2)"},
+      {"--eval-views", 0, SF_ARG_INT, &a->eval_views, 0, 1e6, NULL, "N",
+       "test views rendered at the end, 0 = all (default 0)"},
+      {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M",
+       "time between checkpoints (default 2)"},
       {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL, "continue from the checkpoint at --output"},
-      {"--log", 0, SF_ARG_STRING, &a->log, 0, 0, NULL, "FILE", "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
+      {"--log", 0, SF_ARG_STRING, &a->log, 0, 0, NULL, "FILE",
+       "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
       {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   memcpy(o, options, sizeof options);
   return (sf_cli){.program = "sf_train",
                   .usage = "sf_train DATA [-o model.safetensors] [options]",
-                  .summary = "Learns a spiking radiance field and, with it, how many time steps the scene needs (PATA).\n"
-                             "DATA is a folder in the Blender layout (transforms_train.json and PNG images).",
+                  .summary =
+                      "Learns a spiking radiance field and, with it, how many time steps the scene needs (PATA).\n"
+                      "DATA is a folder in the Blender layout (transforms_train.json and PNG images).",
                   .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
                               "  sf_train lego -o lego.safetensors --stage1 10000 --stage2 30000 --resume\n"
@@ -73,7 +86,10 @@ static sf_cli make_cli(arguments *a, sf_option *o)
                   .max_positional = 1};
 }
 
-static double psnr_of(double mse) { return mse > 0 ? -10 * log10(mse) : 99; }
+static double psnr_of(double mse)
+{
+  return mse > 0 ? -10 * log10(mse) : 99;
+}
 
 static void log_line(FILE *log, const sf_train_stats *s)
 {
@@ -102,9 +118,12 @@ static void smooth(recent *r, const sf_train_stats *s, double step)
 static void show(sf_progress *p, const sf_train_stats *s, const recent *r)
 {
   const double left = s->progress > 1e-6 ? s->seconds * (1 - s->progress) / s->progress : 0;
-  sf_progress_show(p, "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f  firing %.2f %.2f %.2f  ETA %d:%02d",
+  sf_progress_show(p,
+                   "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f  firing %.2f "
+                   "%.2f %.2f  ETA %d:%02d",
                    s->stage == 1 ? "I " : "II", 100 * s->progress, (long long)s->iteration, r->rate / 1e3, r->loss,
-                   psnr_of(r->mse), s->t_star, s->firing[0], s->firing[1], s->firing[2], (int)left / 60, (int)left % 60);
+                   psnr_of(r->mse), s->t_star, s->firing[0], s->firing[1], s->firing[2], (int)left / 60,
+                   (int)left % 60);
 }
 
 static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_train_stats *s)
@@ -140,6 +159,26 @@ static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_tra
   return ferror(log) ? sf_fail(SF_E_IO, "%s: cannot write the log", a->log) : sf_ok();
 }
 
+static sf_status print_json(const char *model, int steps, const sf_train_stats *s, double psnr, double ssim, int views)
+{
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "model", model);
+  cJSON_AddNumberToObject(json, "iterations", (double)s->iteration);
+  cJSON_AddNumberToObject(json, "seconds", s->seconds);
+  cJSON_AddNumberToObject(json, "T", steps);
+  cJSON_AddNumberToObject(json, "t_r", s->t_r);
+  cJSON_AddNumberToObject(json, "t_star", s->t_star);
+  cJSON_AddNumberToObject(json, "psnr", psnr);
+  cJSON_AddNumberToObject(json, "ssim", ssim);
+  cJSON_AddNumberToObject(json, "views", views);
+  char *text = cJSON_PrintUnformatted(json);
+  cJSON_Delete(json);
+  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the summary", model);
+  puts(text);
+  free(text);
+  return sf_ok();
+}
+
 static sf_status finish(const sf_trainer *trainer, const char *data_path, const sf_dataset_options *how,
                         const arguments *a, const sf_train_stats *s)
 {
@@ -152,13 +191,10 @@ static sf_status finish(const sf_trainer *trainer, const char *data_path, const 
   const int views = test.count;
   sf_dataset_free(&test);
   SF_TRY(status);
-  if (a->json)
-    printf("{\"model\":\"%s\",\"iterations\":%lld,\"seconds\":%.2f,\"T\":%d,\"t_r\":%d,\"t_star\":%.4f,\"psnr\":%.4f,"
-           "\"ssim\":%.5f,\"views\":%d}\n",
-           a->output, (long long)s->iteration, s->seconds, a->train.config.steps, s->t_r, s->t_star, psnr, ssim, views);
-  else
-    printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
-           a->output, (long long)s->iteration, s->seconds, s->t_r, a->train.config.steps, s->t_star, psnr, ssim, views);
+  const int steps = sf_trainer_model(trainer)->config.steps;
+  if (a->json) return print_json(a->output, steps, s, psnr, ssim, views);
+  printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
+         a->output, (long long)s->iteration, s->seconds, s->t_r, steps, s->t_star, psnr, ssim, views);
   return sf_ok();
 }
 
@@ -194,7 +230,8 @@ static sf_status run(arguments *a, const char *path)
 
 int main(int argc, char **argv)
 {
-  arguments a = {.output = "model.safetensors", .train = sf_train_defaults(), .theta = 1, .downscale = 1, .checkpoint_minutes = 2};
+  arguments a = {
+      .output = "model.safetensors", .train = sf_train_defaults(), .theta = 1, .downscale = 1, .checkpoint_minutes = 2};
   sf_option options[64];
   const sf_cli cli = make_cli(&a, options);
   const char *path[1] = {NULL};

@@ -12,15 +12,15 @@ typedef enum { SF_HYBRID, SF_DECAY, SF_NODECAY } sf_input_mode; /* equal to fx_i
 typedef enum { SF_NET_SNN, SF_NET_ANN } sf_net_kind;
 
 typedef struct sf_config {
-  int32_t net;       /* sf_net_kind */
-  int32_t mode;      /* sf_input_mode */
-  int32_t steps;     /* T, 1..SF_T_MAX; 1 for the ANN */
+  int32_t net;                                     /* sf_net_kind */
+  int32_t mode;                                    /* sf_input_mode */
+  int32_t steps;                                   /* T, 1..SF_T_MAX; 1 for the ANN */
   int32_t levels, log2_hash, base_res, finest_res; /* hash grid, 2 features per entry */
-  int32_t hidden;    /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
-  float theta[3];    /* thresholds of D1, C1, C2 */
-  float scale;       /* model units = world units * scale; the scene box is [-1,1]^3 model units */
-  int32_t lattice;   /* samples across the box diagonal: step = 2 sqrt(3) / lattice model units */
-  int32_t occ_res;   /* occupancy cells per axis */
+  int32_t hidden;                                  /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
+  float theta[3];                                  /* thresholds of D1, C1, C2 */
+  float scale;     /* model units = world units * scale; the scene box is [-1,1]^3 model units */
+  int32_t lattice; /* samples across the box diagonal: step = 2 sqrt(3) / lattice model units */
+  int32_t occ_res; /* occupancy cells per axis */
 } sf_config;
 
 /* Parts of the parameter vector, in this order. Matrices are [out][in] as in torch.
@@ -47,12 +47,12 @@ typedef struct sf_grid_level {
 typedef struct sf_model {
   sf_config config;
   sf_param param[SF_P_COUNT];
-  size_t size;       /* floats in value */
-  float *value;      /* [size], 64-byte aligned, owned */
+  size_t size;  /* floats in value */
+  float *value; /* [size], 64-byte aligned, owned */
   sf_grid_level level[16];
-  float t_star;      /* 1..T; T where no budget was learned */
-  int32_t t_r;       /* round(t_star): steps at inference */
-  uint8_t *occupancy;/* occ_res^3 / 8 bytes, bit (z*res + y)*res + x, owned */
+  float t_star;       /* 1..T; T where no budget was learned */
+  int32_t t_r;        /* round(t_star): steps at inference */
+  uint8_t *occupancy; /* occ_res^3 / 8 bytes, bit (z*res + y)*res + x, owned */
 } sf_model;
 
 sf_config sf_config_default(void);
@@ -60,7 +60,10 @@ sf_status sf_config_check(const sf_config *config);
 /* Allocates, lays out and zeroes; occupancy all ones. */
 sf_status sf_model_create(sf_model *model, const sf_config *config);
 void sf_model_free(sf_model *model);
-static inline float *sf_model_param(const sf_model *m, sf_param_id id) { return m->value + m->param[id].offset; }
+static inline float *sf_model_param(const sf_model *m, sf_param_id id)
+{
+  return m->value + m->param[id].offset;
+}
 
 /* model.safetensors: the tensors above by name, "occupancy", metadata config + t_star + t_r. Every load check names
  * file and tensor. A checkpoint holds further tensors (optimiser) that this ignores. */
@@ -82,7 +85,7 @@ void sf_sh4(const float direction[3], float out[16]);
 /* Float nets, one sample, scalar and obvious: the oracle. Outputs for every prefix 1..steps; currents optional.
  * sigma[steps] per model unit, colour[steps][3]. trace: per-layer currents and spikes for calibration, or NULL. */
 typedef struct sf_net_trace {
-  float current[SF_LAYERS][SF_T_MAX][SF_LANES]; /* what enters each neuron, layers D1 D2 C1 C2 C3 */
+  float current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* what enters each neuron, layers D1 D2 C1 C2 C3 */
   float membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; integrators: after */
   uint8_t spike[SF_LAYERS][SF_T_MAX][SF_LANES];
 } sf_net_trace;

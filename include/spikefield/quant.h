@@ -6,27 +6,27 @@
 #include "spikefield/scene.h"
 
 typedef struct sf_quant_options {
-  int steps;            /* 0 = the model's t_r; else 1..T */
-  float background[3];  /* 0..1 */
+  int steps;           /* 0 = the model's t_r; else 1..T */
+  float background[3]; /* 0..1 */
   uint64_t seed;
 } sf_quant_options;
 
 /* Quantises field and nets. Scales are chosen by the error of each layer's currents on calibration positions
- * drawn from occupied cells. Refuses what the hardware cannot represent (NaN, Inf, layer sizes, theta or scale that rounds
- * out of range), naming file and tensor. The result passes fx_scene_check. Spiking nets only. */
+ * drawn from occupied cells. Refuses what the hardware cannot represent (NaN, Inf, layer sizes, theta or scale that
+ * rounds out of range), naming file and tensor. The result passes fx_scene_check. Spiking nets only. */
 sf_status sf_quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options);
 
 /* What quantisation cost, measured on calibration samples that took no part in the fit. */
 typedef struct sf_quant_layer {
-  double unit;      /* value of one LSB of the layer's current */
-  double error;     /* RMS error of the currents / RMS of the currents; 0 when the layer is silent */
-  int32_t clipped;  /* weights beyond +-127 units */
+  double unit;     /* value of one LSB of the layer's current */
+  double error;    /* RMS error of the currents / RMS of the currents; 0 when the layer is silent */
+  int32_t clipped; /* weights beyond +-127 units */
 } sf_quant_layer;
 typedef struct sf_quant_report {
   sf_quant_layer layer[SF_LAYERS];
   double feature_error; /* as above, for the grid features */
-  int64_t grid_clipped;                /* grid entries beyond +-127 of their level's scale */
-  int32_t samples;                     /* calibration samples */
+  int64_t grid_clipped; /* grid entries beyond +-127 of their level's scale */
+  int32_t samples;      /* calibration samples */
 } sf_quant_report;
 sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                              sf_quant_report *report);

@@ -6,8 +6,8 @@
 
 typedef struct sf_camera {
   int width, height;
-  float fx, fy, cx, cy;  /* pixels */
-  float to_world[12];    /* row-major 3x4, OpenGL axes (x right, y up, looks along -z), model units */
+  float fx, fy, cx, cy; /* pixels */
+  float to_world[12];   /* row-major 3x4, OpenGL axes (x right, y up, looks along -z), model units */
 } sf_camera;
 
 /* Model units: the scene box is [-1, 1]^3. Blender data: position * 0.8 as torch-ngp. */

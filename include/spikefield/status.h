@@ -26,10 +26,10 @@ sf_status sf_ok(void);
 sf_status sf_fail(sf_code code, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Returns from the calling function when `call` failed. */
-#define SF_TRY(call)                                                                               \
-  do {                                                                                             \
-    sf_status sf_try_status_ = (call);                                                             \
-    if (sf_try_status_.code != SF_OK) return sf_try_status_;                                       \
+#define SF_TRY(call)                                                                                                   \
+  do {                                                                                                                 \
+    sf_status sf_try_status_ = (call);                                                                                 \
+    if (sf_try_status_.code != SF_OK) return sf_try_status_;                                                           \
   } while (0)
 
 #endif

@@ -6,42 +6,44 @@
 
 typedef struct sf_train_options {
   sf_config config;
-  double beta;            /* weight of L_penalty: quality (small) against energy (large) */
-  double alpha;           /* weight of L_extra */
-  int stage1, stage2;     /* iterations; ignored when minutes > 0 */
-  double minutes;         /* time budget of both stages, a quarter for stage I; 0 = iterations */
+  double beta;        /* weight of L_penalty: quality (small) against energy (large) */
+  double alpha;       /* weight of L_extra */
+  int stage1, stage2; /* iterations; ignored when minutes > 0 */
+  double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;
   int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to a tenth over the run */
   bool no_extra, no_penalty, no_distill;
-  bool no_scaling;        /* no max time-step scaling in the first epoch of each stage */
-  int background;         /* 0 random per ray, 1 white, 2 black */
+  bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
+  int background;  /* 0 random per ray, 1 white, 2 black */
 } sf_train_options;
 
 sf_train_options sf_train_defaults(void);
 
 /* Of the last iteration. */
 typedef struct sf_train_stats {
-  int stage;             /* 1, 2; 3 = finished */
+  int stage; /* 1, 2; 3 = finished */
   int64_t iteration;
-  double progress;       /* 0..1 of the whole run */
-  double seconds;        /* training time, over resumes */
-  double loss, mse;      /* total loss; M_T in stage I, M_smooth in stage II */
+  double progress;                      /* 0..1 of the whole run */
+  double seconds;                       /* training time, over resumes */
+  double loss, mse;                     /* total loss; M_T in stage I, M_smooth in stage II */
   double mse_full, mse_floor, mse_ceil; /* M_T, M_{t_f}, M_{t_c} */
   double t_star;
   int t_r;
   double tau[SF_LAYERS];
-  double firing[3];      /* spikes per neuron and step of D1, C1, C2 */
-  int rays, samples;     /* of the iteration */
-  double occupied;       /* share of occupied cells */
+  double firing[3];  /* spikes per neuron and step of D1, C1, C2 */
+  int rays, samples; /* of the iteration */
+  double occupied;   /* share of occupied cells */
 } sf_train_stats;
 
 typedef struct sf_trainer sf_trainer;
 
-/* data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config. */
+/* data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config.
+ */
 sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const sf_train_options *options,
                             const char *resume);
-/* One iteration. NaN or Inf anywhere fails and names the tensor; the model then is the one before the iteration's update. */
+/* One iteration. NaN or Inf anywhere fails and names the tensor; the model then is the one before the iteration's
+ * update. */
 sf_status sf_trainer_step(sf_trainer *trainer, sf_train_stats *stats);
 /* Atomic. with_optimiser: everything that --resume needs; without: the model alone. Refuses NaN and Inf, naming the
  * tensor, so that a run that went wrong cannot replace its last good checkpoint. */

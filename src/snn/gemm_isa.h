@@ -21,7 +21,7 @@ typedef struct gemm_a {
 
 /* c[M][V*VL] = init + sum_k a[m][k] * b[k][V*VL]; init NULL = zero. Constant M and V unroll into registers. */
 static inline __attribute__((always_inline)) void gemm_tile(int M, int V, gemm_a a, int k, const float *b, int ldb,
-                                                             const float *init, int ldi, float *c, int ldc)
+                                                            const float *init, int ldi, float *c, int ldc)
 {
   vf acc[6][4];
 #pragma GCC unroll 6
@@ -46,18 +46,18 @@ static inline __attribute__((always_inline)) void gemm_tile(int M, int V, gemm_a
 }
 
 static inline __attribute__((always_inline)) void gemm_rows(int V, gemm_a a, int m, int k, const float *b, int ldb,
-                                                             const float *init, int ldi, float *c, int ldc)
+                                                            const float *init, int ldi, float *c, int ldc)
 {
   int i = 0;
   for (; i + TILE_M <= m; i += TILE_M)
     gemm_tile(TILE_M, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi,
               c + i * ldc, ldc);
   for (; i + 4 <= m; i += 4)
-    gemm_tile(4, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi,
-              c + i * ldc, ldc);
+    gemm_tile(4, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi, c + i * ldc,
+              ldc);
   for (; i < m; i++)
-    gemm_tile(1, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi,
-              c + i * ldc, ldc);
+    gemm_tile(1, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi, c + i * ldc,
+              ldc);
 }
 
 /* c[m][n] = init + a[m][k] b[k][n]; n a multiple of 16. c may be init. */

@@ -21,8 +21,7 @@ typedef struct sf_net_view {
 /* Gradients, laid out like the parameters but padded: w1 has rows of features rounded up to 16; w3 has rows of 32, the
  * 16 directions, one scratch column, then h. `leak` is the gradient of the logits w of k = sigmoid(w). */
 typedef struct sf_net_grad {
-  float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES],
-      w5[3 * SF_LANES];
+  float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES], w5[3 * SF_LANES];
   float leak[SF_LAYERS];
 } sf_net_grad;
 
@@ -37,7 +36,7 @@ typedef struct sf_block {
 /* Working memory of one thread. */
 typedef struct sf_net_scratch {
   float a[SF_LANES * SF_BLOCK], b[SF_LANES * SF_BLOCK], c[SF_LANES * SF_BLOCK], d[SF_LANES * SF_BLOCK];
-  float t[SF_LANES * SF_BLOCK];                              /* transposed: [SF_BLOCK][rows] */
+  float t[SF_LANES * SF_BLOCK];                                                    /* transposed: [SF_BLOCK][rows] */
   float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK];
   float leak[SF_LAYERS][SF_BLOCK];
@@ -50,9 +49,10 @@ typedef struct sf_kernels {
   /* Density prefix `steps` only: block->sigma[steps-1]. */
   void (*density)(const sf_net_view *net, sf_block *block, int steps, sf_net_scratch *scratch);
   /* Adds to grad; df[features][SF_BLOCK]. dsigma[T][SF_BLOCK] and dcolour[T][3*SF_BLOCK]: gradients of the prefixes. */
-  void (*backward)(const sf_net_view *net, const sf_block *block, int steps, const float *dsigma,
-                   const float *dcolour, float *df, sf_net_grad *grad, sf_net_scratch *scratch);
-  /* Hash grid, one level, one block: x[3][SF_BLOCK] in [0,1] -> out[2][SF_BLOCK]; backward adds to the table's gradient. */
+  void (*backward)(const sf_net_view *net, const sf_block *block, int steps, const float *dsigma, const float *dcolour,
+                   float *df, sf_net_grad *grad, sf_net_scratch *scratch);
+  /* Hash grid, one level, one block: x[3][SF_BLOCK] in [0,1] -> out[2][SF_BLOCK]; backward adds to the table's
+   * gradient. */
   void (*grid_forward)(const sf_grid_level *level, const float *table, const float *x, float *out);
   void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
 } sf_kernels;

@@ -97,8 +97,8 @@ static void sigmoid(int n, const float *restrict x, float *restrict s)
   for (int i = 0; i < n; i++) s[i] = 1.0f / (1.0f + fast_exp(-x[i]));
 }
 
-static void density_step(const sf_net_view *net, sf_block *x, int t, int slot, const float *current,
-                         sf_net_scratch *w, float *i, float *sigma, const float *sigma_before)
+static void density_step(const sf_net_view *net, sf_block *x, int t, int slot, const float *current, sf_net_scratch *w,
+                         float *i, float *sigma, const float *sigma_before)
 {
   float e[B];
   fire(net, 0, net->k[0], t, net->hidden, current, t ? x->m1[slot ? t - 1 : 0] : NULL, x->m1[slot ? t : 0], w->b);
@@ -115,8 +115,7 @@ static void constant_current(const sf_net_view *net, const sf_block *x, float *c
 static void density(const sf_net_view *net, sf_block *x, int steps, sf_net_scratch *w)
 {
   constant_current(net, x, w->a);
-  for (int t = 0; t < steps; t++)
-    density_step(net, x, t, 0, w->a, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+  for (int t = 0; t < steps; t++) density_step(net, x, t, 0, w->a, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
 }
 
 static void forward(const sf_net_view *net, sf_block *x, int steps, int keep, sf_net_scratch *w)
@@ -205,8 +204,8 @@ static void colour_backward(const sf_net_view *net, const sf_block *x, int t, fl
   float c[3 * B], gj[3 * B];
   sigmoid(3 * B, x->j[t], c);
   for (int a = 0; a < 3; a++)
-    integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B,
-                       gj + a * B, w->leak[4]);
+    integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
+                       w->leak[4]);
   for (int i = 0; i < 3 * B; i++) gj[i] *= c[i] * (1.0f - c[i]);
   activation(net, 2, hidden, x->m4[t], w->a);
   transpose(w->a, hidden, w->t, hidden);

@@ -15,6 +15,9 @@ static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, 
   return v + (i - v) * k;
 }
 
-static inline float sf_sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
+static inline float sf_sigmoid(float x)
+{
+  return 1.0f / (1.0f + expf(-x));
+}
 
 #endif

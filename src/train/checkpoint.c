@@ -121,8 +121,7 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
     char *end = NULL;
     const double value = text ? strtod(text, &end) : 0;
     if (!text || end == text || *end || !(fabs(value) < 1e15))
-      return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path,
-                     field[i].key);
+      return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path, field[i].key);
     if (field[i].number)
       *field[i].number = value;
     else if (field[i].integer)

@@ -17,7 +17,8 @@ static void fill_uniform(const sf_trainer *t, sf_param_id id, float bound)
 }
 
 /* Root mean square of layer currents over the probes at their first step. */
-static double current_rms(const sf_model *m, const float *f, const float *sh, int layer, int outputs, sf_net_trace *trace)
+static double current_rms(const sf_model *m, const float *f, const float *sh, int layer, int outputs,
+                          sf_net_trace *trace)
 {
   double sum = 0;
   for (int p = 0; p < PROBES; p++) {

@@ -36,10 +36,10 @@ typedef struct sf_batch {
 /* Loss of one iteration's steps, weights of its terms, and sums over its rays. */
 typedef struct sf_loss_plan {
   int stage, steps, t_f, t_c, t_r;
-  double d;             /* t^ - t_f */
+  double d; /* t^ - t_f */
   float inverse_rays;
-  float extra;          /* weight of L_extra, 0 = off */
-  float distill;        /* 1 or 0 */
+  float extra;   /* weight of L_extra, 0 = off */
+  float distill; /* 1 or 0 */
   float k_sigma, k_colour;
 } sf_loss_plan;
 
@@ -83,8 +83,8 @@ struct sf_trainer {
   int64_t iteration, stage_start;
   int stage, rays, stride;
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
-  double t_momentum; /* smoothed gradient of t* */
-  double occupied, epoch; /* epoch: passes over the training pixels in this stage */
+  double t_momentum;                                   /* smoothed gradient of t* */
+  double occupied, epoch;                              /* epoch: passes over the training pixels in this stage */
 };
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);

@@ -41,7 +41,10 @@ static image composite(const sf_ray *ray, int prefix, float delta, sf_ray_work *
   return im;
 }
 
-static float dot3(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static float dot3(const float *a, const float *b)
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 static double squared_error(const float *a, const float *b)
 {

@@ -15,7 +15,8 @@ typedef struct visit {
 
 static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
 {
-  size_t pick = i * v->stride + sf_random_below(t->options.seed, v->stream, (uint64_t)t->iteration << 24 | i, v->stride);
+  size_t pick =
+      i * v->stride + sf_random_below(t->options.seed, v->stream, (uint64_t)t->iteration << 24 | i, v->stride);
   return v->cell ? v->cell[pick] : pick;
 }
 

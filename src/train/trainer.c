@@ -24,7 +24,10 @@ sf_train_options sf_train_defaults(void)
                             .lr_net = 5e-3};
 }
 
-const sf_model *sf_trainer_model(const sf_trainer *t) { return &t->model; }
+const sf_model *sf_trainer_model(const sf_trainer *t)
+{
+  return &t->model;
+}
 
 void sf_trainer_free(sf_trainer *t)
 {
@@ -330,7 +333,8 @@ static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
 
 static sf_status check_finite(const sf_trainer *t, double loss)
 {
-  if (!isfinite(loss)) return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
+  if (!isfinite(loss))
+    return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
   for (int i = SF_P_W1; i < SF_P_COUNT; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++)
       if (!isfinite(t->grad[t->model.param[i].offset + j]))
@@ -385,7 +389,8 @@ static void advance(sf_trainer *t, double share)
   t->stage_progress += share;
   t->epoch += t->batch.rays;
   t->iteration++;
-  const double n1 = t->options.minutes > 0 ? 0.25 : t->options.stage1, n2 = t->options.minutes > 0 ? 0.75 : t->options.stage2;
+  const double n1 = t->options.minutes > 0 ? 0.25 : t->options.stage1,
+               n2 = t->options.minutes > 0 ? 0.75 : t->options.stage2;
   const double whole = n1 + n2 > 0 ? n1 + n2 : 1;
   t->progress = ((t->stage == 1 ? 0 : n1) + (t->stage == 1 ? n1 : n2) * fmin(t->stage_progress, 1)) / whole;
   if (t->stage_progress < 1 - 1e-9) return;
