@@ -12,6 +12,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#if defined(__x86_64__)
 typedef float lanes __attribute__((vector_size(64)));
 
 /* Multiply-adds per second of all threads: 12 independent chains of 16 lanes each. */
@@ -42,6 +43,12 @@ static double peak_fma(void)
   double seconds = sf_seconds() - start;
   return sink > -1 ? (double)rounds * 12 * 16 * omp_get_max_threads() / seconds : 0;
 }
+#else
+static double peak_fma(void)
+{
+  return NAN;
+}
+#endif
 
 static double bandwidth(void)
 {

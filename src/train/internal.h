@@ -92,6 +92,12 @@ void sf_batch_free(sf_batch *batch);
 /* Draws and marches `trainer->rays` rays; packs them into bundles. */
 sf_status sf_batch_draw(sf_trainer *trainer);
 
+/* Features, nets and losses of the batch, forward and backward: adds the nets' gradient to trainer->grad and leaves the
+ * features' gradient in batch.df. mean: losses per ray. */
+void sf_gradient_nets(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
+/* The features' gradient to the hash grid's, in trainer->grad. */
+void sf_gradient_grid(sf_trainer *trainer);
+
 sf_status sf_init_parameters(sf_trainer *trainer);
 sf_status sf_occupancy_update(sf_trainer *trainer, int steps);
 

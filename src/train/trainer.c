@@ -143,177 +143,6 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   return p;
 }
 
-static bool needed(const sf_loss_plan *p, int prefix)
-{
-  return prefix == p->steps || prefix == p->t_f || prefix == p->t_c;
-}
-
-static void ray_in(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
-{
-  for (int t = 0; t < p->steps; t++) {
-    if (!needed(p, t + 1)) continue;
-    for (int s = 0; s < ray->count; s++) {
-      const sf_block *b = &w->block[(ray->first + s) / SF_BLOCK];
-      const int lane = (ray->first + s) % SF_BLOCK;
-      w->ray.sigma[t][s] = b->sigma[t][lane];
-      for (int c = 0; c < 3; c++) w->ray.colour[t][3 * s + c] = b->colour[t][c * SF_BLOCK + lane];
-    }
-  }
-}
-
-static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
-{
-  for (int t = 0; t < p->steps; t++) {
-    if (!needed(p, t + 1)) continue;
-    for (int s = 0; s < ray->count; s++) {
-      const int block = (ray->first + s) / SF_BLOCK, lane = (ray->first + s) % SF_BLOCK;
-      w->dsigma[(block * SF_T_MAX + t) * SF_BLOCK + lane] = w->ray.dsigma[t][s];
-      for (int c = 0; c < 3; c++)
-        w->dcolour[((block * SF_T_MAX + t) * 3 + c) * SF_BLOCK + lane] = w->ray.dcolour[t][3 * s + c];
-    }
-  }
-}
-
-static void count_spikes(const sf_trainer *t, const sf_loss_plan *p, const sf_block *b, sf_group *g)
-{
-  const sf_config *c = &t->model.config;
-  for (int s = 0; s < p->steps; s++)
-    for (int i = 0; i < c->hidden * SF_BLOCK; i++) {
-      g->spikes[0] += b->m1[s][i] >= c->theta[0];
-      g->spikes[1] += b->m3[s][i] >= c->theta[1];
-      g->spikes[2] += b->m4[s][i] >= c->theta[2];
-    }
-  g->neurons += (double)p->steps * c->hidden * SF_BLOCK;
-}
-
-static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, sf_block *b)
-{
-  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
-  memcpy(b->f, t->batch.f + (size_t)(bundle->block + index) * plane, plane * sizeof(float));
-}
-
-static void load_directions(const sf_batch *batch, const sf_bundle *bundle, sf_worker *w)
-{
-  for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
-    const sf_ray *ray = &batch->ray[r];
-    float sh[SF_DIR_FEATURES];
-    sf_sh4(ray->direction, sh);
-    for (int s = ray->first; s < ray->first + ray->count; s++)
-      for (int i = 0; i < SF_DIR_FEATURES; i++) w->block[s / SF_BLOCK].sh[i * SF_BLOCK + s % SF_BLOCK] = sh[i];
-  }
-}
-
-static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_view *net, const sf_bundle *bundle,
-                       sf_worker *w, sf_group *g)
-{
-  const sf_batch *batch = &t->batch;
-  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
-  load_directions(batch, bundle, w);
-  for (int b = 0; b < bundle->blocks; b++) {
-    load_block(t, bundle, b, &w->block[b]);
-    t->kernels->forward(net, &w->block[b], p->steps, 1, w->scratch);
-  }
-  memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));
-  memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
-  for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
-    ray_in(p, &batch->ray[r], w);
-    sf_loss_ray(p, &batch->ray[r], batch->delta, &w->ray, &g->sums);
-    ray_out(p, &batch->ray[r], w);
-  }
-  if (bundle->blocks) count_spikes(t, p, &w->block[0], g);
-  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
-  const int steps = p->stage == 1 ? p->steps : p->t_c;
-  for (int b = 0; b < bundle->blocks; b++)
-    t->kernels->backward(net, &w->block[b], steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
-                         w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
-                         batch->df + (size_t)(bundle->block + b) * plane, g->grad, w->scratch);
-}
-
-static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
-{
-  const sf_net_view net = sf_net_view_of(&t->model);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int part = 0; part < GROUPS; part++) {
-    sf_group *g = &t->group[part];
-    sf_net_grad *grad = g->grad;
-    *g = (sf_group){.grad = grad};
-    memset(grad, 0, sizeof *grad);
-    for (int b = t->batch.bundles * part / GROUPS; b < t->batch.bundles * (part + 1) / GROUPS; b++)
-      run_bundle(t, p, &net, &t->batch.bundle[b], &t->worker[omp_get_thread_num()], g);
-  }
-}
-
-static void encode(sf_trainer *t)
-{
-  const int levels = t->model.config.levels, parts = 8;
-  const float *table = sf_model_param(&t->model, SF_P_GRID);
-#pragma omp parallel for schedule(dynamic, 1) collapse(2)
-  for (int level = 0; level < levels; level++)
-    for (int part = 0; part < parts; part++)
-      for (int b = t->batch.blocks * part / parts; b < t->batch.blocks * (part + 1) / parts; b++)
-        t->kernels->grid_forward(&t->model.level[level], table, t->batch.x + (size_t)b * 3 * SF_BLOCK,
-                                 t->batch.f + ((size_t)b * levels + level) * 2 * SF_BLOCK);
-}
-
-/* One thread per level, samples in order: no atomics, and the sum does not depend on the threads. */
-static void encode_backward(sf_trainer *t)
-{
-  const int levels = t->model.config.levels;
-  float *grad = t->grad + t->model.param[SF_P_GRID].offset;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (int level = levels - 1; level >= 0; level--)
-    for (int b = 0; b < t->batch.blocks; b++)
-      t->kernels->grid_backward(&t->model.level[level], t->batch.x + (size_t)b * 3 * SF_BLOCK,
-                                t->batch.df + ((size_t)b * levels + level) * 2 * SF_BLOCK, grad);
-}
-
-static void add_matrix(float *to, const float *from, int rows, int columns, int ld)
-{
-  for (int r = 0; r < rows; r++)
-    for (int c = 0; c < columns; c++) to[r * columns + c] += from[r * ld + c];
-}
-
-/* The losses as means over rays; the leaks' gradients carry that factor already. */
-static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
-{
-  to->mse_full += mean * x->mse_full;
-  to->mse_floor += mean * x->mse_floor;
-  to->mse_ceil += mean * x->mse_ceil;
-  to->regular += mean * x->regular;
-  to->extra_floor += mean * x->extra_floor;
-  to->extra_ceil += mean * x->extra_ceil;
-  to->distill += mean * x->distill;
-  to->g_sigma_leak += x->g_sigma_leak;
-  to->g_colour_leak += x->g_colour_leak;
-}
-
-/* Sums the groups in order into the flat gradient. */
-static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing[3])
-{
-  const sf_model *m = &t->model;
-  const int hidden = m->config.hidden, features = 2 * m->config.levels;
-  double spikes[3] = {0}, neurons = 0;
-  float *at[SF_P_COUNT];
-  for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
-  for (int n = 0; n < GROUPS; n++) {
-    const sf_group *g = &t->group[n];
-    add_matrix(at[SF_P_W1], g->grad->w1, hidden, features, (features + 15) / 16 * 16);
-    add_matrix(at[SF_P_W2], g->grad->w2, SF_DENSITY_OUT, hidden, hidden);
-    for (int r = 0; r < hidden; r++) {
-      float *row = at[SF_P_W3] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
-      add_matrix(row, g->grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
-      add_matrix(row + SF_DIR_FEATURES, g->grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
-    }
-    add_matrix(at[SF_P_W4], g->grad->w4, hidden, hidden, hidden);
-    add_matrix(at[SF_P_W5], g->grad->w5, 3, hidden, hidden);
-    add_matrix(at[SF_P_LEAK], g->grad->leak, 1, SF_LAYERS, SF_LAYERS);
-    add_sums(sums, &g->sums, mean);
-    for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
-    neurons += g->neurons;
-  }
-  for (int l = 0; l < 3; l++) firing[l] = neurons > 0 ? spikes[l] / neurons : 0;
-}
-
 /* L_extra's part in the integrators' leaks: the decay factors and e^tau. */
 static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *sums)
 {
@@ -441,9 +270,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
   double firing[3];
-  encode(t);
-  run_bundles(t, &plan);
-  reduce(t, plan.inverse_rays, &mean, firing);
+  sf_gradient_nets(t, &plan, &mean, firing);
   const double e_tau = leak_terms(t, &plan, &mean);
   const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
   const double ratio = mean.mse_full / fmax(mse, 1e-12);
@@ -453,7 +280,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
             plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau) +
             (t->options.no_penalty ? 0 : t->options.beta * ratio * exp(t->model.t_star));
   SF_TRY(check_finite(t, loss));
-  encode_backward(t);
+  sf_gradient_grid(t);
   update_parameters(t);
   update_budget(t, &plan, &mean, ratio);
   t->last_step = sf_seconds() - start;
