@@ -1,6 +1,7 @@
 /* Status, files, JSON, safetensors, command lines. */
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
+#include "folder_fixture.h"
 #include "spikefield/rng.h"
 #include <check.h>
 #include <dirent.h>
@@ -12,42 +13,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* ---- a folder of one's own ---- */
-
-static char folder[200];
-
-static void make_folder(void)
-{
-  const char *base = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/sf-base-XXXXXX", base && *base ? base : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-}
-
-static int entries(void)
-{
-  DIR *dir = opendir(folder);
-  int n = 0;
-  for (struct dirent *e; (e = readdir(dir));) n += strcmp(e->d_name, ".") && strcmp(e->d_name, "..");
-  closedir(dir);
-  return n;
-}
-
-static void remove_folder(void)
-{
-  char command[300];
-  snprintf(command, sizeof command, "rm -rf '%s'", folder);
-  ck_assert_int_eq(system(command), 0);
-}
-
-static const char *in(const char *name)
-{
-  static char path[8][300];
-  static int turn;
-  char *p = path[turn++ % 8];
-  snprintf(p, sizeof path[0], "%s/%s", folder, name);
-  return p;
-}
-
 static void put(const char *path, const void *data, size_t n)
 {
   unlink(path); /* some file systems sync a file that is cut and written again */
@@ -55,21 +20,6 @@ static void put(const char *path, const void *data, size_t n)
   ck_assert_ptr_nonnull(f);
   ck_assert_uint_eq(fwrite(data, 1, n, f), n);
   ck_assert_int_eq(fclose(f), 0);
-}
-
-#define ck_good(call)                                                                                                  \
-  do {                                                                                                                 \
-    sf_status s_ = (call);                                                                                             \
-    ck_assert_msg(s_.code == SF_OK, "unexpected failure: %s", s_.message);                                             \
-  } while (0)
-
-/* Fails with this code, and the message holds both words and stays on one line. */
-static void ck_bad(sf_status s, sf_code code, const char *word, const char *other)
-{
-  ck_assert_msg(s.code == code, "code %d instead of %d: '%s'", s.code, code, s.message);
-  ck_assert_msg(strstr(s.message, word), "'%s' does not name '%s'", s.message, word);
-  ck_assert_msg(strstr(s.message, other), "'%s' does not name '%s'", s.message, other);
-  ck_assert_ptr_null(strchr(s.message, '\n'));
 }
 
 /* ---- status ---- */

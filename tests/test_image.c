@@ -1,6 +1,7 @@
 /* PNG, JPEG, EXR, downscaling, PSNR and SSIM. */
 #include "spikefield/image.h"
 #include "spikefield/io.h"
+#include "folder_fixture.h"
 #include "spikefield/rng.h"
 #include <check.h>
 #include <dirent.h>
@@ -14,54 +15,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 #include <jpeglib.h>
-
-static char folder[200];
-
-static void make_folder(void)
-{
-  const char *base = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/sf-image-XXXXXX", base && *base ? base : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-}
-
-static void remove_folder(void)
-{
-  char command[300];
-  snprintf(command, sizeof command, "rm -rf '%s'", folder);
-  ck_assert_int_eq(system(command), 0);
-}
-
-static int entries(void)
-{
-  DIR *dir = opendir(folder);
-  int n = 0;
-  for (struct dirent *e; (e = readdir(dir));) n += strcmp(e->d_name, ".") && strcmp(e->d_name, "..");
-  closedir(dir);
-  return n;
-}
-
-static const char *in(const char *name)
-{
-  static char path[4][300];
-  static int turn;
-  char *p = path[turn++ % 4];
-  snprintf(p, sizeof path[0], "%s/%s", folder, name);
-  return p;
-}
-
-#define ck_good(call)                                                                                                  \
-  do {                                                                                                                 \
-    sf_status s_ = (call);                                                                                             \
-    ck_assert_msg(s_.code == SF_OK, "unexpected failure: %s", s_.message);                                             \
-  } while (0)
-
-static void ck_bad(sf_status s, sf_code code, const char *word, const char *other)
-{
-  ck_assert_msg(s.code == code, "code %d instead of %d: '%s'", s.code, code, s.message);
-  ck_assert_msg(strstr(s.message, word), "'%s' does not name '%s'", s.message, word);
-  ck_assert_msg(strstr(s.message, other), "'%s' does not name '%s'", s.message, other);
-  ck_assert_ptr_null(strchr(s.message, '\n'));
-}
 
 /* ---- PNG ---- */
 
