@@ -47,10 +47,11 @@ all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 # build is the oracle of the others.
 LIB_SRC := $(filter-out %_isa.c,$(wildcard src/*/*.c))
 ISA_SRC := $(wildcard src/*/*_isa.c)
-ISAS := portable $(if $(filter x86_64,$(shell uname -m)),avx2 avx512)
+ISAS := portable $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512bf16)
 isa_portable :=
 isa_avx2 := -mavx2 -mfma -ffp-contract=fast
 isa_avx512 := -march=x86-64-v4 -mprefer-vector-width=512 -ffp-contract=fast
+isa_avx512bf16 := $(isa_avx512) -mavx512bf16 -mavx512vbmi2
 LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS),$(ISA_SRC:%.c=$B/obj/%.$i.o))
 
 $B/obj/%.o: %.c
@@ -100,7 +101,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli chain cosim_faults safetensors
+	@tests/run.sh $B $(TESTS) cli chain reproduce cosim_faults safetensors
 
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
@@ -120,6 +121,13 @@ demo: all ## make a scene, train, export, render, co-simulate, audit: build/demo
 lego: all ## the same chain on SCENES/lego with a training budget of 10 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 10 --rays 400
 
+PROFILE ?= quick
+reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots in build/reproduce/PROFILE (quick, full, smoke)
+	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(REPRODUCE)
+
+reproduce-report: all ## table and plots of the runs that are there
+	@tools/reproduce.sh $B --profile $(PROFILE) --report
+
 bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
 	@$B/tests/bench $B/bench.json
 
@@ -132,6 +140,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego bench format clean help lint gen gen-check firmware faults
+.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

@@ -103,7 +103,9 @@ static sf_model full_model(sf_net_kind net, int steps)
 static double nets(const sf_kernels *k, const sf_model *m, bool with_backward, double seconds)
 {
   double total = 0;
-  const sf_net_view net = sf_net_view_of(m);
+  const sf_net_view view = sf_net_view_of(m);
+  sf_net_words *net = sf_aligned_alloc(sizeof *net);
+  k->prepare(&view, net);
   const int steps = m->config.steps;
 #pragma omp parallel reduction(+ : total)
   {
@@ -119,12 +121,13 @@ static double nets(const sf_kernels *k, const sf_model *m, bool with_backward, d
     long blocks = 0;
     for (; now - start < seconds; now = sf_seconds(), blocks += 8)
       for (int i = 0; i < 8; i++) {
-        k->forward(&net, b, steps, with_backward, w);
-        if (with_backward) k->backward(&net, b, steps, ds, dc, df, g, w);
+        k->forward(net, b, steps, with_backward ? steps : 0, w);
+        if (with_backward) k->backward(net, b, steps, ds, dc, df, g, w);
       }
     total += (double)blocks * SF_BLOCK / (now - start);
     free(b), free(w), free(g), free(ds), free(dc), free(df);
   }
+  free(net);
   return total;
 }
 
@@ -146,7 +149,7 @@ static double naive_forward(const sf_model *m)
 
 static void bench_nets(cJSON *json, double fma)
 {
-  const sf_kernels *best = sf_kernels_select(NULL), *portable = sf_kernels_select("portable");
+  const sf_kernels *best = sf_kernels_training(), *portable = sf_kernels_select("portable");
   static const struct {
     const char *name;
     sf_net_kind net;

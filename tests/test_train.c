@@ -1,59 +1,13 @@
-/* Losses, determinism, resume, stability of the trainer. */
-#include "float_fixture.h"
-#include "train/internal.h"
+/* Losses, determinism, resume, time budget of the trainer. */
 #include "spikefield/io.h"
-#include <check.h>
-#include <math.h>
+#include "train_fixture.h"
 #include <omp.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
-enum { N = 12, T = 6 };
-
-static char folder[] = "/tmp/spikefield-train-XXXXXX";
-static char scene_path[64], model_path[64], other_path[64];
+enum { N = 12 };
 
 static void set_up(void)
 {
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-  snprintf(scene_path, sizeof scene_path, "%s/scene", folder);
-  snprintf(model_path, sizeof model_path, "%s/a.safetensors", folder);
-  snprintf(other_path, sizeof other_path, "%s/b.safetensors", folder);
-  sf_procedural_options o = {.width = 24, .height = 24, .train_views = 6, .test_views = 1, .seed = 1};
-  ck_assert_int_eq(sf_procedural_write("simple", scene_path, &o, NULL, NULL).code, SF_OK);
-}
-
-static void tear_down(void)
-{
-  char command[96];
-  snprintf(command, sizeof command, "rm -rf %s", folder);
-  ck_assert_int_eq(system(command), 0);
-}
-
-static sf_train_options small_run(void)
-{
-  sf_train_options o = sf_train_defaults();
-  o.config.levels = 4;
-  o.config.log2_hash = 10;
-  o.config.finest_res = 64;
-  o.config.hidden = 32;
-  o.config.steps = T;
-  o.config.lattice = 128;
-  o.config.occ_res = 16;
-  o.samples = 1024;
-  o.stage1 = 12;
-  o.stage2 = 28;
-  return o;
-}
-
-static void steps(sf_trainer *t, int n)
-{
-  sf_train_stats stats;
-  for (int i = 0; i < n; i++) {
-    sf_status status = sf_trainer_step(t, &stats);
-    ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  }
+  make_scene(6);
 }
 
 static void same_file(const char *a, const char *b)
@@ -68,33 +22,9 @@ static void same_file(const char *a, const char *b)
   free(y);
 }
 
-static sf_trainer *start(const sf_dataset *data, const sf_train_options *o, const char *resume)
-{
-  sf_trainer *t;
-  sf_status status = sf_trainer_create(&t, data, o, resume);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  return t;
-}
-
-static sf_dataset load(void)
-{
-  sf_dataset data;
-  sf_dataset_options o = {.downscale = 1};
-  ck_assert_int_eq(sf_dataset_load(&data, scene_path, "train", &o).code, SF_OK);
-  return data;
-}
-
-/* Seconds are in a checkpoint, so two runs' values are compared, not their files. */
-static void same_model(const sf_trainer *a, const sf_trainer *b)
-{
-  ck_assert_int_eq(memcmp(a->model.value, b->model.value, a->model.size * sizeof(float)), 0);
-  ck_assert_int_eq(memcmp(a->moment2, b->moment2, a->model.size * sizeof(float)), 0);
-  ck_assert_float_eq(a->model.t_star, b->model.t_star);
-}
-
 START_TEST(same_seed_same_bits_any_threads)
 {
-  sf_dataset data = load();
+  sf_dataset data = load("train");
   sf_train_options o = small_run();
   omp_set_num_threads(1);
   sf_trainer *a = start(&data, &o, NULL);
@@ -117,13 +47,13 @@ END_TEST
 
 static void check_resume(const sf_train_options *o, int before, int after)
 {
-  sf_dataset data = load();
+  sf_dataset data = load("train");
   sf_trainer *whole = start(&data, o, NULL), *part = start(&data, o, NULL);
   steps(whole, before + after);
   steps(part, before);
-  ck_assert_int_eq(sf_trainer_save(part, model_path, true).code, SF_OK);
+  ck_assert_int_eq(sf_trainer_save(part, in("a.safetensors"), true).code, SF_OK);
   sf_trainer_free(part);
-  part = start(&data, o, model_path);
+  part = start(&data, o, in("a.safetensors"));
   steps(part, after);
   same_model(whole, part);
   sf_trainer_free(whole);
@@ -143,51 +73,122 @@ END_TEST
 
 START_TEST(saved_model_loads_and_saves_equal)
 {
-  sf_dataset data = load();
+  sf_dataset data = load("train");
   sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 20);
-  ck_assert_int_eq(sf_trainer_save(t, model_path, false).code, SF_OK);
-  ck_assert_int_eq(sf_trainer_save(t, other_path, false).code, SF_OK);
-  same_file(model_path, other_path);
+  ck_assert_int_eq(sf_trainer_save(t, in("a.safetensors"), false).code, SF_OK);
+  ck_assert_int_eq(sf_trainer_save(t, in("b.safetensors"), false).code, SF_OK);
+  same_file(in("a.safetensors"), in("b.safetensors"));
   sf_model m;
-  sf_status status = sf_model_load(&m, model_path);
+  sf_status status = sf_model_load(&m, in("a.safetensors"));
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
   for (int i = 0; i < SF_P_COUNT; i++) /* alignment gaps between parameters are not saved */
     ck_assert_int_eq(memcmp(sf_model_param(&m, i), sf_model_param(&t->model, i), m.param[i].size * sizeof(float)), 0);
   ck_assert_int_eq(m.t_r, t->model.t_r);
   sf_model_free(&m);
   sf_trainer *resumed;
-  ck_assert_int_eq(sf_trainer_create(&resumed, &data, &o, model_path).code, SF_E_FORMAT); /* no optimiser inside */
+  ck_assert_int_eq(sf_trainer_create(&resumed, &data, &o, in("a.safetensors")).code, SF_E_FORMAT); /* no Adam inside */
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
 END_TEST
 
-START_TEST(nan_stops_the_run_and_names_the_tensor)
+/* One prefix is trained at a t* that no loss moves: beta and alpha are without effect. */
+START_TEST(fixed_steps_freeze_the_budget)
 {
-  sf_dataset data = load();
+  sf_dataset data = load("train");
   sf_train_options o = small_run();
+  o.fixed_steps = 3;
+  o.beta = 0;
+  sf_trainer *a = start(&data, &o, NULL);
+  o.beta = 1;
+  o.alpha = 1;
+  sf_trainer *b = start(&data, &o, NULL);
+  int64_t samples = 0;
+  for (int i = 0; i < o.stage1 + o.stage2; i++) {
+    const sf_train_stats s = steps(a, 1);
+    ck_assert_double_eq(s.loss, steps(b, 1).loss);
+    samples += s.samples;
+    ck_assert_int_eq(s.t_r, i + 1 < o.stage1 ? T : 3);
+    ck_assert_double_eq(s.t_star, s.t_r);
+    ck_assert_double_eq(s.mse, s.mse_floor);
+    ck_assert_double_eq(s.mse_ceil, s.mse_floor);
+    ck_assert_double_eq_tol(s.samples_per_second * s.seconds, (double)samples, 1e-6 * (double)samples);
+  }
+  same_model(a, b);
+  sf_trainer_free(a);
+  sf_trainer_free(b);
+  check_resume(&o, 20, 10);
+  for (o.fixed_steps = -1; o.fixed_steps <= T + 1; o.fixed_steps += T + 2)
+    ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
+  sf_dataset_free(&data);
+}
+END_TEST
+
+START_TEST(every_prefix_is_evaluated)
+{
+  sf_dataset data = load("train"), test = load("test");
+  const sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
-  steps(t, 3);
-  sf_model_param(&t->model, SF_P_W5)[5] = NAN;
-  sf_train_stats stats;
-  sf_status status = sf_trainer_step(t, &stats);
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "iteration 3"));
-  unlink(model_path);
-  status = sf_trainer_save(t, model_path, true);
-  ck_assert_int_ne(status.code, SF_OK);
-  ck_assert_ptr_nonnull(strstr(status.message, "colour.w5"));
-  ck_assert_int_ne(access(model_path, F_OK), 0);
+  steps(t, 40);
+  double prefix[T], psnr, ssim;
+  ck_good(sf_evaluate_prefixes(&t->model, &test, 1, prefix));
+  for (int i = 0; i < T; i++) {
+    ck_good(sf_evaluate(&t->model, &test, 1, i + 1, &psnr, &ssim));
+    ck_assert_double_eq(prefix[i], psnr);
+    if (i) ck_assert_double_ne(prefix[i], prefix[i - 1]);
+  }
+  ck_good(sf_evaluate(&t->model, &test, 0, 0, &psnr, &ssim));
+  ck_assert_double_eq(prefix[t->model.t_r - 1], psnr);
   sf_trainer_free(t);
+  sf_dataset_free(&data);
+  sf_dataset_free(&test);
+}
+END_TEST
+
+/* The model at the end is the mean over the last twentieth of the run: here each of the last 10 of 200 iterations. */
+START_TEST(the_last_iterations_are_averaged)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = small_run();
+  o.stage1 = 50;
+  o.stage2 = 150;
+  o.samples = 256;
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, 190);
+  ck_assert_int_eq(t->averaged, 0);
+  double *sum = calloc(t->model.size, sizeof *sum);
+  for (int i = 0; i < 9; i++) {
+    steps(t, 1);
+    ck_assert_int_eq(t->averaged, i + 1);
+    for (size_t p = 0; p < t->model.size; p++) sum[p] += t->model.value[p] / 10.0;
+  }
+  ck_good(sf_trainer_save(t, in("before.safetensors"), true));
+  float *before = calloc(t->model.size, sizeof *before);
+  memcpy(before, t->model.value, t->model.size * sizeof *before);
+  ck_assert_int_eq(steps(t, 1).stage, 3);
+  int moved = 0;
+  for (size_t p = 0; p < t->model.size; p++) {
+    const double last = t->model.value[p] * 10.0 - sum[p] * 10; /* the value that was averaged last */
+    ck_assert_double_eq_tol(last, before[p], 0.05); /* one step of Adam, a few times 3e-3, and 10 roundings */
+    moved += fabs(t->model.value[p] - before[p]) > 1e-5;
+  }
+  ck_assert_int_gt(moved, 1000);
+  sf_trainer *resumed = start(&data, &o, in("before.safetensors"));
+  steps(resumed, 1);
+  same_model(t, resumed);
+  free(sum);
+  free(before);
+  sf_trainer_free(t);
+  sf_trainer_free(resumed);
   sf_dataset_free(&data);
 }
 END_TEST
 
 START_TEST(loss_falls_and_both_twins_learn)
 {
-  sf_dataset data = load();
+  sf_dataset data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_run();
     o.config.net = net;
@@ -319,11 +320,13 @@ int main(void)
   Suite *suite = suite_create("train");
   TCase *tc = tcase_create("train");
   tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
+  tcase_add_unchecked_fixture(tc, set_up, remove_folder);
   tcase_add_test(tc, same_seed_same_bits_any_threads);
   tcase_add_test(tc, resume_continues_bit_identically);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
-  tcase_add_test(tc, nan_stops_the_run_and_names_the_tensor);
+  tcase_add_test(tc, fixed_steps_freeze_the_budget);
+  tcase_add_test(tc, every_prefix_is_evaluated);
+  tcase_add_test(tc, the_last_iterations_are_averaged);
   tcase_add_test(tc, loss_falls_and_both_twins_learn);
   tcase_add_test(tc, loss_gradients_are_the_slopes);
   tcase_add_test(tc, sparsity_by_hand);

@@ -9,10 +9,10 @@
 #include <unistd.h>
 
 typedef struct arguments {
-  const char *output, *log;
+  const char *output, *log, *summary;
   sf_train_options train;
   double scale, theta, checkpoint_minutes;
-  int downscale, threads, eval_views, limit;
+  int downscale, threads, eval_views, prefix_views, limit;
   bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
 } arguments;
 
@@ -61,13 +61,18 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--no-budget", 0, SF_ARG_FLAG, &a->no_budget, 0, 0, NULL, NULL, "ablation: without both (L_budg)"},
       {"--no-distill", 0, SF_ARG_FLAG, &t->no_distill, 0, 0, NULL, NULL, "ablation: without L_distill"},
       {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "ablation: without max time-step scaling"},
+      {"--fixed-steps", 0, SF_ARG_INT, &t->fixed_steps, 0, SF_T_MAX, NULL, "N",
+       "stage II trains the prefix of N steps alone, t* = N, without L_budg; 0 = t* is learned (default 0)"},
       {"--eval-views", 0, SF_ARG_INT, &a->eval_views, 0, 1e6, NULL, "N",
        "test views rendered at the end, 0 = all (default 0)"},
+      {"--psnr-prefixes", 0, SF_ARG_INT, &a->prefix_views, 0, 1e6, NULL, "N",
+       "PSNR at every prefix 1..T over N test views, 0 = off (default 0)"},
       {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M",
        "time between checkpoints (default 2)"},
       {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL, "continue from the checkpoint at --output"},
       {"--log", 0, SF_ARG_STRING, &a->log, 0, 0, NULL, "FILE",
        "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
+      {"--summary", 0, SF_ARG_STRING, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"},
       {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
@@ -96,10 +101,12 @@ static void log_line(FILE *log, const sf_train_stats *s)
   fprintf(log,
           "{\"iteration\":%lld,\"stage\":%d,\"seconds\":%.3f,\"loss\":%.9g,\"mse\":%.9g,\"mse_full\":%.9g,"
           "\"mse_floor\":%.9g,\"mse_ceil\":%.9g,\"psnr\":%.4f,\"t_star\":%.6f,\"t_r\":%d,\"rays\":%d,\"samples\":%d,"
-          "\"occupied\":%.6f,\"tau\":[%.5f,%.5f,%.5f,%.5f,%.5f],\"firing\":[%.5f,%.5f,%.5f]}\n",
+          "\"occupied\":%.6f,\"tau\":[%.5f,%.5f,%.5f,%.5f,%.5f],\"firing\":[%.5f,%.5f,%.5f],\"quiet\":[%d,%d,%d],"
+          "\"revived\":[%d,%d,%d]}\n",
           (long long)s->iteration, s->stage, s->seconds, s->loss, s->mse, s->mse_full, s->mse_floor, s->mse_ceil,
           psnr_of(s->mse), s->t_star, s->t_r, s->rays, s->samples, s->occupied, s->tau[0], s->tau[1], s->tau[2],
-          s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2]);
+          s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2], s->quiet[0], s->quiet[1], s->quiet[2],
+          s->revived[0], s->revived[1], s->revived[2]);
 }
 
 /* Averages for the eye; the log has the raw values. */
@@ -126,21 +133,35 @@ static void show(sf_progress *p, const sf_train_stats *s, const recent *r)
                    (int)left % 60);
 }
 
+static void warn(sf_progress *progress, const sf_train_stats *s)
+{
+  static const char *const layer[] = {"density.w1", "colour.w3", "colour.w4"};
+  for (int l = 0; l < 3; l++)
+    if (s->event[l]) {
+      sf_progress_end(progress);
+      fprintf(stderr, "sf_train: warning: iteration %lld: the neurons behind '%s' %s: brought back to the threshold\n",
+              (long long)s->iteration, layer[l], s->event[l] < 0 ? "were silent" : "fired all the time");
+    }
+}
+
 static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_train_stats *s)
 {
   sf_progress progress;
   recent r = {0};
-  double saved = sf_seconds();
+  const double start = sf_seconds();
+  double saved = start;
   sf_progress_begin(&progress, a->quiet);
   do {
     const double before = s->seconds;
     sf_status status = sf_trainer_step(trainer, s);
     if (status.code) {
       sf_progress_end(&progress);
-      if (s->iteration > 0) sf_trainer_save(trainer, a->output, true); /* the failure above is the news */
-      return status;
+      return a->resume || saved > start
+                 ? sf_fail(status.code, "%s (last good checkpoint: %s)", status.message, a->output)
+                 : status;
     }
     smooth(&r, s, s->seconds - before);
+    warn(&progress, s);
     if (s->iteration % 16 == 0 || s->stage == 3) log_line(log, s);
     if (sf_progress_due(&progress)) show(&progress, s, &r);
     const bool stop = sf_cli_interrupted() && s->stage != 3;
@@ -159,43 +180,89 @@ static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_tra
   return ferror(log) ? sf_fail(SF_E_IO, "%s: cannot write the log", a->log) : sf_ok();
 }
 
-static sf_status print_json(const char *model, int steps, const sf_train_stats *s, double psnr, double ssim, int views)
+/* Held-out quality at the end. */
+typedef struct quality {
+  double psnr, ssim, prefix[SF_T_MAX];
+  int views, prefixes;
+} quality;
+
+static cJSON *make_summary(const arguments *a, const sf_config *c, const sf_train_stats *s, const quality *q)
 {
+  static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
   cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "model", model);
+  cJSON_AddStringToObject(json, "model", a->output);
+  cJSON_AddStringToObject(json, "net", net[c->net]);
+  cJSON_AddStringToObject(json, "mode", mode[c->mode]);
+  cJSON_AddNumberToObject(json, "beta", a->train.beta);
+  cJSON_AddNumberToObject(json, "seed", (double)a->train.seed);
   cJSON_AddNumberToObject(json, "iterations", (double)s->iteration);
   cJSON_AddNumberToObject(json, "seconds", s->seconds);
-  cJSON_AddNumberToObject(json, "T", steps);
+  cJSON_AddNumberToObject(json, "samples_per_second", s->samples_per_second);
+  cJSON_AddNumberToObject(json, "T", c->steps);
   cJSON_AddNumberToObject(json, "t_r", s->t_r);
   cJSON_AddNumberToObject(json, "t_star", s->t_star);
-  cJSON_AddNumberToObject(json, "psnr", psnr);
-  cJSON_AddNumberToObject(json, "ssim", ssim);
-  cJSON_AddNumberToObject(json, "views", views);
+  cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
+  cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
+  cJSON_AddItemToObject(json, "quiet", cJSON_CreateIntArray(s->quiet, 3));
+  cJSON_AddItemToObject(json, "revived", cJSON_CreateIntArray(s->revived, 3));
+  cJSON_AddNumberToObject(json, "psnr", q->psnr);
+  cJSON_AddNumberToObject(json, "ssim", q->ssim);
+  cJSON_AddNumberToObject(json, "views", q->views);
+  if (q->prefixes) cJSON_AddItemToObject(json, "prefix_psnr", cJSON_CreateDoubleArray(q->prefix, q->prefixes));
+  return json;
+}
+
+static sf_status print_json(const cJSON *json, const char *model)
+{
   char *text = cJSON_PrintUnformatted(json);
-  cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the summary", model);
   puts(text);
   free(text);
   return sf_ok();
 }
 
-static sf_status finish(const sf_trainer *trainer, const char *data_path, const sf_dataset_options *how,
-                        const arguments *a, const sf_train_stats *s)
+static void print_text(const arguments *a, const sf_config *c, const sf_train_stats *s, const quality *q)
+{
+  printf(
+      "%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
+      a->output, (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr, q->ssim, q->views);
+  if (!q->prefixes) return;
+  printf("%s: PSNR at 1..%d steps:", a->output, q->prefixes);
+  for (int i = 0; i < q->prefixes; i++) printf(" %.2f", q->prefix[i]);
+  printf(" dB\n");
+}
+
+static sf_status evaluate(const sf_model *model, const char *data_path, const sf_dataset_options *how,
+                          const arguments *a, quality *q)
 {
   sf_dataset test;
   sf_dataset_options options = *how;
-  options.limit = a->eval_views;
+  options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
   SF_TRY(sf_dataset_load(&test, data_path, "test", &options));
-  double psnr = 0, ssim = 0;
-  sf_status status = sf_evaluate(sf_trainer_model(trainer), &test, a->eval_views, 0, &psnr, &ssim);
-  const int views = test.count;
+  q->views = a->eval_views && a->eval_views < test.count ? a->eval_views : test.count;
+  sf_status status = sf_evaluate(model, &test, a->eval_views, 0, &q->psnr, &q->ssim);
+  if (!status.code && a->prefix_views) {
+    q->prefixes = model->config.steps;
+    status = sf_evaluate_prefixes(model, &test, a->prefix_views, q->prefix);
+  }
   sf_dataset_free(&test);
-  SF_TRY(status);
-  const int steps = sf_trainer_model(trainer)->config.steps;
-  if (a->json) return print_json(a->output, steps, s, psnr, ssim, views);
-  printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
-         a->output, (long long)s->iteration, s->seconds, s->t_r, steps, s->t_star, psnr, ssim, views);
-  return sf_ok();
+  return status;
+}
+
+static sf_status finish(const sf_trainer *trainer, const char *data_path, const sf_dataset_options *how,
+                        const arguments *a, const sf_train_stats *s)
+{
+  const sf_model *model = sf_trainer_model(trainer);
+  quality q = {0};
+  SF_TRY(evaluate(model, data_path, how, a, &q));
+  cJSON *json = make_summary(a, &model->config, s, &q);
+  sf_status status = a->summary ? sf_json_save(json, a->summary) : sf_ok();
+  if (!status.code && a->json)
+    status = print_json(json, a->output);
+  else if (!status.code)
+    print_text(a, &model->config, s, &q);
+  cJSON_Delete(json);
+  return status;
 }
 
 static sf_status train_and_report(const char *path, const sf_dataset *data, const sf_dataset_options *how,
@@ -242,6 +309,9 @@ int main(int argc, char **argv)
   for (int i = 0; i < 3; i++) a.train.config.theta[i] = (float)a.theta;
   if (a.no_budget) a.train.no_extra = a.train.no_penalty = true;
   if (a.no_stage1) a.train.stage2 += a.train.stage1, a.train.stage1 = 0;
+  if (a.train.fixed_steps > a.train.config.steps)
+    return sf_cli_finish(
+        &cli, sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a.train.fixed_steps, a.train.config.steps));
   sf_cli_catch_signals();
   status = sf_config_check(&a.train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;

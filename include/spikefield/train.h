@@ -15,6 +15,7 @@ typedef struct sf_train_options {
   double lr_grid, lr_net; /* Adam, decayed to a tenth over the run */
   bool no_extra, no_penalty, no_distill;
   bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
+  int fixed_steps; /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
   int background;  /* 0 random per ray, 1 white, 2 black */
 } sf_train_options;
 
@@ -34,6 +35,10 @@ typedef struct sf_train_stats {
   double firing[3];  /* spikes per neuron and step of D1, C1, C2 */
   int rays, samples; /* of the iteration */
   double occupied;   /* share of occupied cells */
+  int quiet[3];      /* neurons of D1, C1, C2 without a spike in 64 samples of the scene, counted every 64 iterations */
+  int revived[3];    /* times that the layer was brought back to the threshold */
+  int event[3];      /* in this iteration: revived because it was silent (-1) or saturated (1), or nothing (0) */
+  double samples_per_second; /* through the nets, mean over the run and its resumes */
 } sf_train_stats;
 
 typedef struct sf_trainer sf_trainer;
@@ -42,15 +47,17 @@ typedef struct sf_trainer sf_trainer;
  */
 sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const sf_train_options *options,
                             const char *resume);
-/* One iteration. NaN or Inf anywhere fails and names the tensor; the model then is the one before the iteration's
- * update. */
+/* One iteration. NaN, Inf or divergence anywhere fails and names the tensor. The run is over then: the weights that
+ * led there are not worth a checkpoint, the last one that was saved is. */
 sf_status sf_trainer_step(sf_trainer *trainer, sf_train_stats *stats);
-/* Atomic. with_optimiser: everything that --resume needs; without: the model alone. Refuses NaN and Inf, naming the
- * tensor, so that a run that went wrong cannot replace its last good checkpoint. */
+/* Atomic. with_optimiser: everything that --resume needs; without: the model alone. Refuses NaN, Inf and diverged
+ * weights, naming the tensor, so that a run that went wrong cannot replace its last good checkpoint. */
 sf_status sf_trainer_save(const sf_trainer *trainer, const char *path, bool with_optimiser);
 const sf_model *sf_trainer_model(const sf_trainer *trainer);
 void sf_trainer_free(sf_trainer *trainer);
 
 /* PSNR and SSIM of the first `views` views (0 = all) at `steps` steps (0 = t_r), composited on white. */
 sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr, double *ssim);
+/* PSNR of the same at every prefix: psnr[0 .. T-1] for 1 .. T steps. */
+sf_status sf_evaluate_prefixes(const sf_model *model, const sf_dataset *data, int views, double *psnr);
 #endif

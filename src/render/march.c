@@ -38,25 +38,32 @@ sf_march sf_march_begin(const sf_model *model, const float origin[3], const floa
   return m;
 }
 
+void sf_march_at(const sf_march *m, int n, float x[3])
+{
+  const float t = sf_march_distance(m, n);
+  for (int a = 0; a < 3; a++) {
+    const float at = (m->origin[a] + t * m->direction[a]) * 0.5f + 0.5f; /* fminf would be a call */
+    x[a] = !(at > 0) ? 0 : at > 0x1.fffffep-1f ? 0x1.fffffep-1f : at;
+  }
+}
+
 int sf_march_next(const sf_march *m, int n, float x[3])
 {
   const float res = (float)m->res;
   while (n < m->lattice.count) {
-    const float t = sf_march_distance(m, n);
     int cell[3];
-    for (int a = 0; a < 3; a++) {
-      x[a] = fminf(fmaxf((m->origin[a] + t * m->direction[a]) * 0.5f + 0.5f, 0), 0x1.fffffep-1f);
-      cell[a] = (int)(x[a] * res);
-    }
+    sf_march_at(m, n, x);
+    for (int a = 0; a < 3; a++) cell[a] = (int)(x[a] * res);
     const size_t bit = ((size_t)cell[2] * m->res + cell[1]) * m->res + cell[0];
     if (m->occupancy[bit / 8] >> (bit % 8) & 1) return n;
     float ahead = INFINITY; /* distance to the cell's exit */
     for (int a = 0; a < 3; a++) {
       if (m->direction[a] == 0) continue;
       float face = (float)(cell[a] + (m->direction[a] > 0)) / res;
-      ahead = fminf(ahead, (face - x[a]) * 2 / m->direction[a]);
+      const float exit = (face - x[a]) * 2 / m->direction[a];
+      ahead = exit < ahead ? exit : ahead;
     }
-    int skip = (int)ceilf(fminf(ahead, 4) / m->lattice.step - 1e-3f);
+    int skip = (int)ceilf((ahead < 4 ? ahead : 4) / m->lattice.step - 1e-3f);
     n += skip > 1 ? skip : 1;
   }
   return -1;

@@ -14,6 +14,9 @@ typedef struct sf_march {
 sf_march sf_march_begin(const sf_model *model, const float origin[3], const float direction[3], int stride,
                         float jitter);
 
+/* Position of lattice point n in [0,1]^3. */
+void sf_march_at(const sf_march *march, int n, float x[3]);
+
 /* Next lattice point >= n in an occupied cell, or -1. x: its position in [0,1]^3. */
 int sf_march_next(const sf_march *march, int n, float x[3]);
 

@@ -2,6 +2,7 @@
  * alive into blocks, so that empty space, dead rays and saturated rays cost nothing. */
 #include "render/composite.h"
 #include "render/march.h"
+#include "base/memory.h"
 #include "render/view.h"
 #include <math.h>
 #include <stdlib.h>
@@ -20,7 +21,7 @@ typedef struct ray_state {
 typedef struct worker {
   const sf_model *model;
   const sf_kernels *kernels;
-  sf_net_view net;
+  sf_net_words *net;
   int steps;
   sf_block *block;
   sf_net_scratch *scratch;
@@ -38,7 +39,7 @@ static void flush(worker *w)
   const float *table = sf_model_param(w->model, SF_P_GRID);
   for (int level = 0; level < w->model->config.levels; level++)
     w->kernels->grid_forward(&w->model->level[level], table, w->x, w->block->f + 2 * level * SF_BLOCK);
-  w->kernels->forward(&w->net, w->block, w->steps, 0, w->scratch);
+  w->kernels->forward(w->net, w->block, w->steps, 0, w->scratch);
   const float *sigma = w->block->sigma[w->steps - 1], *colour = w->block->colour[w->steps - 1];
   for (int l = 0; l < w->fill; l++) {
     ray_state *r = &w->ray[w->owner[l]];
@@ -86,7 +87,9 @@ static worker *worker_create(const sf_model *model, int steps)
   if (!w) return NULL;
   w->model = model;
   w->kernels = sf_kernels_select(NULL);
-  w->net = sf_net_view_of(model);
+  const sf_net_view net = sf_net_view_of(model);
+  w->net = sf_aligned_alloc(sizeof *w->net);
+  if (w->net) w->kernels->prepare(&net, w->net);
   w->steps = steps;
   w->block = sf_aligned_alloc(sizeof *w->block);
   w->scratch = sf_aligned_alloc(sizeof *w->scratch);
@@ -96,6 +99,7 @@ static worker *worker_create(const sf_model *model, int steps)
 static void worker_free(worker *w)
 {
   if (!w) return;
+  free(w->net);
   free(w->block);
   free(w->scratch);
   free(w);
@@ -111,7 +115,7 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
 #pragma omp parallel reduction(| : failed)
   {
     worker *w = worker_create(model, steps);
-    failed = !w || !w->block || !w->scratch;
+    failed = !w || !w->net || !w->block || !w->scratch;
 #pragma omp for schedule(dynamic, 1)
     for (size_t first = 0; first < count; first += PACKET) {
       if (failed) continue;

@@ -1,6 +1,5 @@
 #include "render/view.h"
 #include "snn/plif.h"
-#include <stdlib.h>
 #include <string.h>
 
 sf_net_view sf_net_view_of(const sf_model *m)
@@ -17,11 +16,4 @@ sf_net_view sf_net_view_of(const sf_model *m)
   for (int i = 0; i < SF_LAYERS; i++) v.k[i] = sf_sigmoid(sf_model_param(m, SF_P_LEAK)[i]);
   memcpy(v.theta, m->config.theta, sizeof v.theta);
   return v;
-}
-
-void *sf_aligned_alloc(size_t bytes)
-{
-  void *memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  if (memory) memset(memory, 0, (bytes + 63) / 64 * 64);
-  return memory;
 }

@@ -1,5 +1,8 @@
-/* The one matrix kernel of the trainer and its transpose, for the vector width of this build.
- * Included by kernels_isa.c only. */
+/* The one matrix kernel of the trainer, its operands and their transpose, for the vector width of this build.
+ * Included by kernels_isa.c only.
+ *
+ * Operands are words along the summed dimension: a float each, or, where the CPU multiplies bfloat16 pairs
+ * (VDPBF16PS: products and sums in fp32), two bfloat16 numbers. PAIR says how many numbers a word holds. */
 #ifndef SF_SNN_GEMM_ISA_H
 #define SF_SNN_GEMM_ISA_H
 #include <string.h>
@@ -14,14 +17,68 @@ enum { VL = 4, TILE_M = 4, TILE_V = 2 };
 typedef float vf __attribute__((vector_size(4 * VL), aligned(4), may_alias));
 typedef int vi __attribute__((vector_size(4 * VL)));
 
-typedef struct gemm_a {
-  const float *at;
-  int row, col; /* strides in floats */
-} gemm_a;
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+#if defined(__AVX512BF16__)
+enum { PAIR = 2 };
+typedef uint32_t word;
+typedef uint32_t vw __attribute__((vector_size(4 * VL), aligned(4), may_alias));
+static inline __attribute__((always_inline)) vf dot(vf sum, word a, vw b)
+{
+  return (vf)_mm512_dpbf16_ps((__m512)sum, (__m512bh)_mm512_set1_epi32((int)a), (__m512bh)b);
+}
+#else
+enum { PAIR = 1 };
+typedef float word;
+typedef vf vw;
+static inline __attribute__((always_inline)) vf dot(vf sum, word a, vw b)
+{
+  return sum + a * b;
+}
+#endif
 
-/* c[M][V*VL] = init + sum_k a[m][k] * b[k][V*VL]; init NULL = zero. Constant M and V unroll into registers. */
-static inline __attribute__((always_inline)) void gemm_tile(int M, int V, gemm_a a, int k, const float *b, int ldb,
-                                                            const float *init, int ldi, float *c, int ldc)
+/* The word of a (low half) and b; bfloat16 rounds to nearest, halves away from zero. One number per word: a. */
+static inline word pair(float a, float b)
+{
+#if defined(__AVX512BF16__)
+  union {
+    float f;
+    uint32_t i;
+  } x = {a}, y = {b};
+  return (x.i + 0x8000u) >> 16 | ((y.i + 0x8000u) & 0xFFFF0000u);
+#else
+  return (void)b, a;
+#endif
+}
+
+/* The value of a number as an operand holds it. */
+static inline float operand(float a)
+{
+#if defined(__AVX512BF16__)
+  union {
+    uint32_t i;
+    float f;
+  } x = {pair(0, a)};
+  return x.f;
+#else
+  return a;
+#endif
+}
+
+/* Two spikes of a word. */
+static inline word spike_pair(float a, float b, float theta)
+{
+#if defined(__AVX512BF16__)
+  return (a >= theta ? 0x3F80u : 0u) | (b >= theta ? 0x3F800000u : 0u);
+#else
+  return (void)b, a >= theta ? 1.0f : 0.0f;
+#endif
+}
+
+/* c[M][V*VL] = init + sum_p a[m][p] . b[p][V*VL]; init NULL = zero. Constant M and V unroll into registers. */
+static inline __attribute__((always_inline)) void gemm_tile(int M, int V, const word *a, int lda, int k, const word *b,
+                                                            int ldb, const float *init, int ldi, float *c, int ldc)
 {
   vf acc[6][4];
 #pragma GCC unroll 6
@@ -29,14 +86,14 @@ static inline __attribute__((always_inline)) void gemm_tile(int M, int V, gemm_a
 #pragma GCC unroll 4
     for (int v = 0; v < V; v++) acc[m][v] = init ? *(const vf *)(init + m * ldi + v * VL) : (vf){0};
   for (int p = 0; p < k; p++) {
-    vf row[4];
+    vw row[4];
 #pragma GCC unroll 4
-    for (int v = 0; v < V; v++) row[v] = *(const vf *)(b + (size_t)p * ldb + v * VL);
+    for (int v = 0; v < V; v++) row[v] = *(const vw *)(b + (size_t)p * ldb + v * VL);
 #pragma GCC unroll 6
     for (int m = 0; m < M; m++) {
-      float s = a.at[m * a.row + p * a.col];
+      word s = a[m * lda + p];
 #pragma GCC unroll 4
-      for (int v = 0; v < V; v++) acc[m][v] += s * row[v];
+      for (int v = 0; v < V; v++) acc[m][v] = dot(acc[m][v], s, row[v]);
     }
   }
 #pragma GCC unroll 6
@@ -45,29 +102,39 @@ static inline __attribute__((always_inline)) void gemm_tile(int M, int V, gemm_a
     for (int v = 0; v < V; v++) *(vf *)(c + m * ldc + v * VL) = acc[m][v];
 }
 
-static inline __attribute__((always_inline)) void gemm_rows(int V, gemm_a a, int m, int k, const float *b, int ldb,
-                                                            const float *init, int ldi, float *c, int ldc)
+/* Rows of the next tile: 6 or 4 for every multiple of 16 rows, so that pairs of rows stay together. */
+static inline int tile_rows(int left)
 {
-  int i = 0;
-  for (; i + TILE_M <= m; i += TILE_M)
-    gemm_tile(TILE_M, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi,
-              c + i * ldc, ldc);
-  for (; i + 4 <= m; i += 4)
-    gemm_tile(4, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi, c + i * ldc,
-              ldc);
-  for (; i < m; i++)
-    gemm_tile(1, V, (gemm_a){a.at + i * a.row, a.row, a.col}, k, b, ldb, init ? init + i * ldi : NULL, ldi, c + i * ldc,
-              ldc);
+  if (TILE_M == 6 && (left > 8 || left % 6 == 0)) return 6;
+  return left >= 4 ? 4 : 1;
 }
 
-/* c[m][n] = init + a[m][k] b[k][n]; n a multiple of 16. c may be init. */
-static void gemm(gemm_a a, int m, int k, const float *b, int ldb, int n, const float *init, int ldi, float *c, int ldc)
+static inline __attribute__((always_inline)) void gemm_columns(int V, int m, const word *a, int lda, int k,
+                                                               const word *b, int ldb, const float *init, int ldi,
+                                                               float *c, int ldc)
+{
+  for (int i = 0, n; i < m; i += n) {
+    n = tile_rows(m - i);
+    const float *from = init ? init + i * ldi : NULL;
+    if (n == 6)
+      gemm_tile(6, V, a + i * lda, lda, k, b, ldb, from, ldi, c + i * ldc, ldc);
+    else if (n == 4)
+      gemm_tile(4, V, a + i * lda, lda, k, b, ldb, from, ldi, c + i * ldc, ldc);
+    else
+      gemm_tile(1, V, a + i * lda, lda, k, b, ldb, from, ldi, c + i * ldc, ldc);
+  }
+}
+
+/* c[m][n] = init + a[m][k] b[k][n], k in words; n a multiple of 16. c may be init. */
+static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, int n, const float *init, int ldi,
+                 float *c, int ldc)
 {
   int j = 0;
   for (; j + TILE_V * VL <= n; j += TILE_V * VL)
-    gemm_rows(TILE_V, a, m, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
-  for (; j + 2 * VL <= n; j += 2 * VL) gemm_rows(2, a, m, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
-  for (; j < n; j += VL) gemm_rows(1, a, m, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
+    gemm_columns(TILE_V, m, a, lda, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
+  for (; j + 2 * VL <= n; j += 2 * VL)
+    gemm_columns(2, m, a, lda, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
+  for (; j < n; j += VL) gemm_columns(1, m, a, lda, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
 }
 
 static inline vf interleave(vf a, vf b, int high)
@@ -78,7 +145,7 @@ static inline vf interleave(vf a, vf b, int high)
 }
 
 /* VL x VL transpose: log2(VL) perfect shuffles of rows i and i + VL/2. */
-static inline void transpose_tile(const vf *in, float *out, int ldo)
+static inline void transpose_tile(const vf *in, word *out, int ldo)
 {
   vf x[VL], y[VL];
   memcpy(x, in, sizeof x);
@@ -93,13 +160,58 @@ static inline void transpose_tile(const vf *in, float *out, int ldo)
   for (int i = 0; i < VL; i++) *(vf *)(out + (size_t)i * ldo) = x[i];
 }
 
-/* out[SF_BLOCK][ldo] = transpose of in[rows][SF_BLOCK]; rows a multiple of VL. */
-static void transpose(const float *in, int rows, float *out, int ldo)
+/* Bit l: x[l] >= theta. */
+static inline uint64_t spike_bits(const float *x, float theta)
+{
+  uint64_t bits = 0;
+#if defined(__AVX512F__)
+  for (int i = 0; i < 4; i++)
+    bits |= (uint64_t)_mm512_cmp_ps_mask(_mm512_loadu_ps(x + 16 * i), _mm512_set1_ps(theta), _CMP_GE_OQ) << 16 * i;
+#elif defined(__AVX2__)
+  for (int i = 0; i < 8; i++)
+    bits |= (uint64_t)_mm256_movemask_ps(_mm256_cmp_ps(_mm256_loadu_ps(x + 8 * i), _mm256_set1_ps(theta), _CMP_GE_OQ))
+            << 8 * i;
+#else
+  for (int i = 0; i < 64; i++) bits |= (uint64_t)(x[i] >= theta) << i;
+#endif
+  return bits;
+}
+
+/* 64 x 64 bits, in place (Warren, Hacker's Delight, 7-3). */
+static void transpose_bits(uint64_t a[64])
+{
+  uint64_t low = 0x00000000FFFFFFFFu;
+  for (int j = 32; j; j >>= 1, low ^= low << j)
+    for (int k = 0; k < 64; k += 2 * j)
+      for (int i = k; i < k + j; i++) {
+        const uint64_t t = (a[i] >> j ^ a[i + j]) & low;
+        a[i] ^= t << j;
+        a[i + j] ^= t;
+      }
+}
+
+/* Indices of the set bits of 64 rows, offset added, to list (64 bytes writable); how many. */
+static inline int list_bits(uint64_t bits, uint8_t offset, uint8_t *list)
+{
+#if defined(__AVX512VBMI2__)
+  uint8_t iota[64];
+  for (int i = 0; i < 64; i++) iota[i] = (uint8_t)i;
+  const __m512i index = _mm512_add_epi8(_mm512_loadu_si512(iota), _mm512_set1_epi8((char)offset));
+  _mm512_storeu_si512(list, _mm512_maskz_compress_epi8(bits, index));
+#else
+  int n = 0;
+  for (uint64_t b = bits; b; b &= b - 1) list[n++] = (uint8_t)(offset + __builtin_ctzll(b));
+#endif
+  return __builtin_popcountll(bits);
+}
+
+/* out[columns][ldo] = transpose of in[rows][columns], words; both multiples of VL. */
+static void transpose(const word *in, int rows, int columns, word *out, int ldo)
 {
   for (int r = 0; r < rows; r += VL)
-    for (int s = 0; s < SF_BLOCK; s += VL) {
+    for (int s = 0; s < columns; s += VL) {
       vf tile[VL];
-      for (int i = 0; i < VL; i++) tile[i] = *(const vf *)(in + (size_t)(r + i) * SF_BLOCK + s);
+      for (int i = 0; i < VL; i++) tile[i] = *(const vf *)(in + (size_t)(r + i) * columns + s);
       transpose_tile(tile, out + (size_t)s * ldo + r, ldo);
     }
 }

@@ -4,18 +4,27 @@
 
 extern const sf_kernels sf_kernels_portable;
 #if defined(__x86_64__)
-extern const sf_kernels sf_kernels_avx2, sf_kernels_avx512;
+extern const sf_kernels sf_kernels_avx2, sf_kernels_avx512, sf_kernels_avx512bf16;
 #endif
+
+const sf_kernels *sf_kernels_training(void)
+{
+  const sf_kernels *fast = sf_kernels_select("avx512bf16");
+  return fast ? fast : sf_kernels_select(NULL);
+}
 
 const sf_kernels *sf_kernels_select(const char *name)
 {
-  const sf_kernels *candidate[3];
+  const sf_kernels *candidate[4];
   int n = 0;
 #if defined(__x86_64__)
   __builtin_cpu_init();
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma"))
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma")) {
     candidate[n++] = &sf_kernels_avx512;
+    if (__builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512vbmi2"))
+      candidate[n++] = &sf_kernels_avx512bf16; /* rounds: only by name */
+  }
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) candidate[n++] = &sf_kernels_avx2;
 #endif
   candidate[n++] = &sf_kernels_portable;

@@ -10,7 +10,7 @@
 
 enum { SF_BLOCK = 64 };
 
-/* Weights as the kernels read them. Matrices are [out][in] like the parameters. */
+/* The nets of a model. Matrices are [out][in] like the parameters. */
 typedef struct sf_net_view {
   const float *w1, *w2, *w3, *w4, *w5;
   float k[SF_LAYERS]; /* D1, density integrator, C1, C2, colour integrator */
@@ -18,38 +18,54 @@ typedef struct sf_net_view {
   int hidden, features, mode, relu;
 } sf_net_view;
 
+/* The nets as one instruction set's kernels read them: weights in operand words (gemm_isa.h), each matrix also
+ * transposed for the backward pass; h has 16 columns here, the first (the density current) with zero weight. */
+typedef struct sf_net_words {
+  uint32_t w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3d[SF_LANES * 16], w3h[SF_LANES * 16],
+      w4[SF_LANES * SF_LANES], w5[4 * SF_LANES];
+  uint32_t w1t[32 * SF_LANES], w2t[SF_LANES * SF_DENSITY_OUT], w3ht[16 * SF_LANES], w4t[SF_LANES * SF_LANES],
+      w5t[SF_LANES * 4];
+  float w4_slice[SF_LANES / 64][(SF_LANES + 1) * 64]; /* w4t as the operands' values, for events: 64 outputs a slice, a
+                                                         row of zeros after the last */
+  sf_net_view view;                                   /* last: it would push the arrays off their alignment */
+} sf_net_words;
+
 /* Gradients, laid out like the parameters but padded: w1 has rows of features rounded up to 16; w3 has rows of 32, the
  * 16 directions, one scratch column, then h. `leak` is the gradient of the logits w of k = sigmoid(w). */
 typedef struct sf_net_grad {
-  float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES], w5[3 * SF_LANES];
+  float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES], w5[4 * SF_LANES];
+  float w4t[SF_LANES * SF_LANES]; /* more of w4, transposed: [in][out] */
   float leak[SF_LAYERS];
 } sf_net_grad;
 
 /* What the forward pass of one block leaves: prefix outputs, and the membranes before fire for backward. */
 typedef struct sf_block {
   float f[2 * 16 * SF_BLOCK], sh[SF_DIR_FEATURES * SF_BLOCK];
-  float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][3 * SF_BLOCK];
+  float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][4 * SF_BLOCK];
   float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */
   float m1[SF_T_MAX][SF_LANES * SF_BLOCK], m3[SF_T_MAX][SF_LANES * SF_BLOCK], m4[SF_T_MAX][SF_LANES * SF_BLOCK];
+  uint64_t s3[SF_T_MAX][SF_LANES]; /* spikes of C1, a bit per lane */
 } sf_block;
 
-/* Working memory of one thread. */
+/* Working memory of one thread. Words: operands of the next product, paired over rows or over lanes. */
 typedef struct sf_net_scratch {
-  float a[SF_LANES * SF_BLOCK], b[SF_LANES * SF_BLOCK], c[SF_LANES * SF_BLOCK], d[SF_LANES * SF_BLOCK];
-  float t[SF_LANES * SF_BLOCK];                                                    /* transposed: [SF_BLOCK][rows] */
+  uint32_t rows[SF_LANES * SF_BLOCK], lanes[SF_LANES * SF_BLOCK], spikes[SF_LANES * SF_BLOCK];
+  uint32_t t[SF_BLOCK * SF_LANES];                                                 /* transposed: [SF_BLOCK][rows] */
   float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
-  float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK];
+  float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
 } sf_net_scratch;
 
 typedef struct sf_kernels {
   const char *name;
-  /* Forward through `steps` steps of block->f and block->sh. keep: 0 reuses one membrane slot (no backward after). */
-  void (*forward)(const sf_net_view *net, sf_block *block, int steps, int keep, sf_net_scratch *scratch);
+  /* Once per change of the parameters. */
+  void (*prepare)(const sf_net_view *view, sf_net_words *net);
+  /* Forward through `steps` steps of block->f and block->sh. keep: for how many of them backward will be called. */
+  void (*forward)(const sf_net_words *net, sf_block *block, int steps, int keep, sf_net_scratch *scratch);
   /* Density prefix `steps` only: block->sigma[steps-1]. */
-  void (*density)(const sf_net_view *net, sf_block *block, int steps, sf_net_scratch *scratch);
+  void (*density)(const sf_net_words *net, sf_block *block, int steps, sf_net_scratch *scratch);
   /* Adds to grad; df[features][SF_BLOCK]. dsigma[T][SF_BLOCK] and dcolour[T][3*SF_BLOCK]: gradients of the prefixes. */
-  void (*backward)(const sf_net_view *net, const sf_block *block, int steps, const float *dsigma, const float *dcolour,
+  void (*backward)(const sf_net_words *net, const sf_block *block, int steps, const float *dsigma, const float *dcolour,
                    float *df, sf_net_grad *grad, sf_net_scratch *scratch);
   /* Hash grid, one level, one block: x[3][SF_BLOCK] in [0,1] -> out[2][SF_BLOCK]; backward adds to the table's
    * gradient. */
@@ -57,6 +73,9 @@ typedef struct sf_kernels {
   void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
 } sf_kernels;
 
-/* "portable", "avx2", "avx512", or NULL for the best of this CPU; NULL when this CPU or build lacks it. */
+/* "portable", "avx2", "avx512", "avx512bf16" (weights and gradients rounded to bfloat16, membranes and sums fp32), or
+ * NULL for the best of this CPU that does not round; NULL when this CPU or build lacks it. */
 const sf_kernels *sf_kernels_select(const char *name);
+/* The fastest for training on this CPU. */
+const sf_kernels *sf_kernels_training(void);
 #endif

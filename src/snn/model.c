@@ -1,4 +1,5 @@
 /* Configuration, layout and loading of the float model. */
+#include "base/memory.h"
 #include "spikefield/model.h"
 #include "spikefield/io.h"
 
@@ -98,13 +99,12 @@ sf_status sf_model_create(sf_model *m, const sf_config *config)
   m->config = *config;
   layout_params(m, layout_levels(m));
   size_t bytes = m->size * sizeof(float), cells = (size_t)config->occ_res * config->occ_res * config->occ_res;
-  m->value = aligned_alloc(64, bytes);
+  m->value = sf_aligned_alloc(bytes);
   m->occupancy = malloc(cells / 8);
   if (!m->value || !m->occupancy) {
     sf_model_free(m);
     return sf_fail(SF_E_MEMORY, "model: no memory for %zu parameters", bytes / sizeof(float));
   }
-  memset(m->value, 0, bytes);
   memset(m->occupancy, 0xff, cells / 8);
   m->t_star = (float)config->steps;
   m->t_r = config->steps;

@@ -9,13 +9,15 @@ static sf_status reserve(sf_batch *b, int blocks, int features)
   if (blocks <= b->block_capacity) return sf_ok();
   const int capacity = blocks + blocks / 4;
   free(b->x);
+  free(b->spare_x);
   free(b->f);
   free(b->df);
   const size_t n = (size_t)capacity * SF_BLOCK * sizeof(float);
   b->x = sf_aligned_alloc(3 * n);
+  b->spare_x = sf_aligned_alloc(3 * n);
   b->f = sf_aligned_alloc((size_t)features * n);
   b->df = sf_aligned_alloc((size_t)features * n);
-  b->block_capacity = b->x && b->f && b->df ? capacity : 0;
+  b->block_capacity = b->x && b->spare_x && b->f && b->df ? capacity : 0;
   return b->block_capacity ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d blocks of samples", capacity);
 }
 
@@ -24,7 +26,8 @@ sf_status sf_batch_create(sf_batch *b, int samples, int features)
   memset(b, 0, sizeof *b);
   b->ray = calloc(RAYS_MAX, sizeof *b->ray);
   b->bundle = calloc(RAYS_MAX, sizeof *b->bundle);
-  if (!b->ray || !b->bundle) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  b->hit = calloc(RAYS_MAX, sizeof *b->hit);
+  if (!b->ray || !b->bundle || !b->hit) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
   return reserve(b, samples / SF_BLOCK, features);
 }
 
@@ -32,7 +35,9 @@ void sf_batch_free(sf_batch *b)
 {
   free(b->ray);
   free(b->bundle);
+  free(b->hit);
   free(b->x);
+  free(b->spare_x);
   free(b->f);
   free(b->df);
 }
@@ -56,14 +61,14 @@ static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
   }
 }
 
-static void pack(sf_batch *b)
+void sf_batch_pack(sf_batch *b)
 {
   sf_bundle current = {0};
   int lanes = 0; /* samples of the current bundle */
   b->bundles = 0;
   b->blocks = 0;
   for (int r = 0; r < b->rays; r++) {
-    if (lanes + b->ray[r].count > BUNDLE_BLOCKS * SF_BLOCK) {
+    if (lanes > 0 && lanes + b->ray[r].count > BUNDLE_FILL) {
       current.blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
       b->blocks += current.blocks;
       b->bundle[b->bundles++] = current;
@@ -71,6 +76,7 @@ static void pack(sf_batch *b)
       lanes = 0;
     }
     b->ray[r].first = lanes;
+    b->ray[r].lane = b->blocks * SF_BLOCK + lanes;
     lanes += b->ray[r].count;
     current.rays++;
   }
@@ -79,20 +85,20 @@ static void pack(sf_batch *b)
   b->bundle[b->bundles++] = current;
 }
 
-static void place(sf_batch *b, const sf_march *march, int block, const sf_ray *ray)
+static void place(sf_batch *b, const sf_march *march, int r)
 {
-  float x[3];
-  int n = 0;
-  for (int s = 0; s < ray->count; s++, n++) {
-    n = sf_march_next(march, n, x);
-    const int lane = ray->first + s;
-    float *at = b->x + ((size_t)(block + lane / SF_BLOCK) * 3) * SF_BLOCK + lane % SF_BLOCK;
-    for (int a = 0; a < 3; a++) at[a * SF_BLOCK] = x[a];
-  }
+  const sf_ray *ray = &b->ray[r];
+  int lane = ray->lane;
+  for (int word = 0; word < LATTICE_MAX / 64; word++)
+    for (uint64_t bits = b->hit[r][word]; bits; bits &= bits - 1, lane++) {
+      float x[3], *at = b->x + (size_t)(lane / SF_BLOCK) * 3 * SF_BLOCK + lane % SF_BLOCK;
+      sf_march_at(march, 64 * word + __builtin_ctzll(bits), x);
+      for (int a = 0; a < 3; a++) at[a * SF_BLOCK] = x[a];
+    }
 }
 
 /* Rays of the next iteration for the wanted samples; a coarser lattice while nothing is known to be empty. */
-static void adapt(sf_trainer *t)
+void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
   double ratio = t->options.samples / fmax(b->samples, 1);
@@ -117,20 +123,22 @@ sf_status sf_batch_draw(sf_trainer *t)
                               sf_random_float(t->options.seed, RNG_JITTER, base + r));
     float x[3];
     ray->count = 0;
-    for (int n = 0; (n = sf_march_next(&march[r], n, x)) >= 0; n++) ray->count++;
+    memset(b->hit[r], 0, sizeof b->hit[r]);
+    for (int n = 0; (n = sf_march_next(&march[r], n, x)) >= 0; n++) {
+      b->hit[r][n / 64] |= (uint64_t)1 << n % 64;
+      ray->count++;
+    }
   }
-  pack(b);
+  sf_batch_pack(b);
   sf_status status = reserve(b, b->blocks, 2 * t->model.config.levels);
   if (!status.code) {
-    b->samples = 0;
-    for (int r = 0; r < b->rays; r++) b->samples += b->ray[r].count;
+    b->marched = 0;
+    for (int r = 0; r < b->rays; r++) b->marched += b->ray[r].count;
+    b->samples = b->marched;
     b->delta = 2 * 1.7320508f / (float)t->model.config.lattice * (float)t->stride;
     memset(b->x, 0, (size_t)b->blocks * 3 * SF_BLOCK * sizeof(float));
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int i = 0; i < b->bundles; i++)
-      for (int r = b->bundle[i].ray; r < b->bundle[i].ray + b->bundle[i].rays; r++)
-        place(b, &march[r], b->bundle[i].block, &b->ray[r]);
-    adapt(t);
+#pragma omp parallel for schedule(dynamic, 64)
+    for (int r = 0; r < b->rays; r++) place(b, &march[r], r);
   }
   free(march);
   return status;

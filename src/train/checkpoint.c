@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TENSORS_MAX = 3 * SF_P_COUNT + 2 };
+enum { TENSORS_MAX = 4 * SF_P_COUNT + 2 };
 
 static void put(cJSON *meta, const char *key, double value)
 {
@@ -47,11 +47,13 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 11 };
+enum { STATE_FIELDS = 22 };
 static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
 {
   const state_field table[STATE_FIELDS] = {
       {"train.iteration", .integer = &t->iteration},
+      {"train.samples", .integer = &t->samples},
+      {"train.averaged", .small = &t->averaged},
       {"train.stage", .small = &t->stage},
       {"train.rays", .small = &t->rays},
       {"train.stride", .small = &t->stride},
@@ -62,6 +64,15 @@ static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
       {"train.t_momentum", .number = &t->t_momentum},
       {"train.occupied", .number = &t->occupied},
       {"train.epoch", .number = &t->epoch},
+      {"train.run_d1", .small = &t->health.run[0]},
+      {"train.run_c1", .small = &t->health.run[1]},
+      {"train.run_c2", .small = &t->health.run[2]},
+      {"train.revived_d1", .small = &t->health.revived[0]},
+      {"train.revived_c1", .small = &t->health.revived[1]},
+      {"train.revived_c2", .small = &t->health.revived[2]},
+      {"train.quiet_d1", .small = &t->health.quiet[0]},
+      {"train.quiet_c1", .small = &t->health.quiet[1]},
+      {"train.quiet_c2", .small = &t->health.quiet[2]},
   };
   memcpy(f, table, sizeof table);
 }
@@ -74,8 +85,8 @@ static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *lis
   const struct {
     const char *prefix;
     float *data;
-  } sets[3] = {{"", m->value}, {"adam.m.", t->moment1}, {"adam.v.", t->moment2}};
-  for (int s = 0; s < (with_optimiser ? 3 : 1); s++)
+  } sets[4] = {{"", m->value}, {"adam.m.", t->moment1}, {"adam.v.", t->moment2}, {"average.", t->average}};
+  for (int s = 0; s < (with_optimiser ? t->averaged ? 4 : 3 : 1); s++)
     for (int i = 0; i < SF_P_COUNT; i++) {
       sf_tensor *x = &list[n++];
       *x = (sf_tensor){.type = SF_F32, .dims = m->param[i].dims, .data = sets[s].data + m->param[i].offset};
@@ -93,6 +104,7 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   const int n = list_tensors(t, with_optimiser, list);
   for (int i = 0; i < n; i++) /* the last good checkpoint must survive a run that went wrong */
     if (list[i].type == SF_F32) SF_TRY(sf_tensor_finite(path, &list[i]));
+  SF_TRY(sf_parameters_check(t));
   cJSON *meta = cJSON_CreateObject();
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
   put_config(meta, &t->model);
@@ -120,7 +132,7 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
     const char *text = sf_tensors_meta(set, field[i].key);
     char *end = NULL;
     const double value = text ? strtod(text, &end) : 0;
-    if (!text || end == text || *end || !(fabs(value) < 1e15))
+    if (!text || end == text || *end || !(fabs(value) < (field[i].small ? 1e9 : 1e15)))
       return sf_fail(SF_E_FORMAT, "%s: cannot resume: metadata key '%s' is missing or broken", set->path, field[i].key);
     if (field[i].number)
       *field[i].number = value;
@@ -130,8 +142,13 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
       *field[i].small = (int)value;
   }
   if (t->stage < 1 || t->stage > 3 || t->rays < RAYS_MIN || t->rays > RAYS_MAX || t->stride < 1 || t->stride > 8 ||
-      t->iteration < 0)
-    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.iteration, stage, rays or stride is out of range", set->path);
+      t->iteration < 0 || t->samples < 0 || t->averaged < 0)
+    return sf_fail(SF_E_FORMAT,
+                   "%s: cannot resume: train.iteration, samples, averaged, stage, rays or stride is out of range",
+                   set->path);
+  for (int l = 0; l < 3; l++)
+    if (t->health.revived[l] < 0 || t->health.revived[l] > 1000000)
+      return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.revived is out of range", set->path);
   return sf_ok();
 }
 
@@ -139,9 +156,10 @@ sf_status sf_checkpoint_load(sf_trainer *t, const char *path)
 {
   sf_tensors set;
   SF_TRY(sf_tensors_load(&set, path));
+  sf_status status = load_state(t, &set);
+  if (!status.code && t->averaged) status = sf_average_reserve(t);
   sf_tensor list[TENSORS_MAX];
   const int n = list_tensors(t, true, list);
-  sf_status status = load_state(t, &set);
   for (int i = 0; i < n && !status.code; i++) {
     const sf_tensor *from;
     status = sf_tensors_get(&set, list[i].name, list[i].type, list[i].dims, list[i].shape, &from);

@@ -43,3 +43,11 @@ sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, 
   *ssim /= used;
   return sf_ok();
 }
+
+sf_status sf_evaluate_prefixes(const sf_model *model, const sf_dataset *data, int views, double *psnr)
+{
+  double ssim;
+  for (int steps = 1; steps <= model->config.steps; steps++)
+    SF_TRY(sf_evaluate(model, data, views, steps, &psnr[steps - 1], &ssim));
+  return sf_ok();
+}

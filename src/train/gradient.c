@@ -3,15 +3,10 @@
 #include <omp.h>
 #include <string.h>
 
-static bool needed(const sf_loss_plan *p, int prefix)
-{
-  return prefix == p->steps || prefix == p->t_f || prefix == p->t_c;
-}
-
 static void ray_in(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
 {
   for (int t = 0; t < p->steps; t++) {
-    if (!needed(p, t + 1)) continue;
+    if (!sf_loss_needs(p, t + 1)) continue;
     for (int s = 0; s < ray->count; s++) {
       const sf_block *b = &w->block[(ray->first + s) / SF_BLOCK];
       const int lane = (ray->first + s) % SF_BLOCK;
@@ -24,7 +19,7 @@ static void ray_in(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
 static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
 {
   for (int t = 0; t < p->steps; t++) {
-    if (!needed(p, t + 1)) continue;
+    if (!sf_loss_needs(p, t + 1)) continue;
     for (int s = 0; s < ray->count; s++) {
       const int block = (ray->first + s) / SF_BLOCK, lane = (ray->first + s) % SF_BLOCK;
       w->dsigma[(block * SF_T_MAX + t) * SF_BLOCK + lane] = w->ray.dsigma[t][s];
@@ -34,16 +29,23 @@ static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
   }
 }
 
-static void count_spikes(const sf_trainer *t, const sf_loss_plan *p, const sf_block *b, sf_group *g)
+static int spikes(const float *membrane, int n, float theta)
+{
+  int count = 0;
+  for (int i = 0; i < n; i++) count += membrane[i] >= theta;
+  return count;
+}
+
+static void count_spikes(const sf_trainer *t, int steps, const sf_block *b, sf_group *g)
 {
   const sf_config *c = &t->model.config;
-  for (int s = 0; s < p->steps; s++)
-    for (int i = 0; i < c->hidden * SF_BLOCK; i++) {
-      g->spikes[0] += b->m1[s][i] >= c->theta[0];
-      g->spikes[1] += b->m3[s][i] >= c->theta[1];
-      g->spikes[2] += b->m4[s][i] >= c->theta[2];
-    }
-  g->neurons += (double)p->steps * c->hidden * SF_BLOCK;
+  const int n = c->hidden * SF_BLOCK;
+  for (int s = 0; s < steps; s++) {
+    g->spikes[0] += spikes(b->m1[s], n, c->theta[0]);
+    g->spikes[1] += spikes(b->m3[s], n, c->theta[1]);
+    g->spikes[2] += spikes(b->m4[s], n, c->theta[2]);
+  }
+  g->neurons += (double)steps * n;
 }
 
 static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, sf_block *b)
@@ -63,15 +65,17 @@ static void load_directions(const sf_batch *batch, const sf_bundle *bundle, sf_w
   }
 }
 
-static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_view *net, const sf_bundle *bundle,
+static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_words *net, const sf_bundle *bundle,
                        sf_worker *w, sf_group *g)
 {
   const sf_batch *batch = &t->batch;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
+  const int steps = p->stage == 1 ? p->steps : p->t_c;
   load_directions(batch, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &w->block[b]);
-    t->kernels->forward(net, &w->block[b], p->steps, 1, w->scratch);
+    t->kernels->forward(net, &w->block[b], p->steps, steps, w->scratch);
   }
   memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
@@ -80,9 +84,7 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
     sf_loss_ray(p, &batch->ray[r], batch->delta, &w->ray, &g->sums);
     ray_out(p, &batch->ray[r], w);
   }
-  if (bundle->blocks) count_spikes(t, p, &w->block[0], g);
-  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
-  const int steps = p->stage == 1 ? p->steps : p->t_c;
+  if (bundle->blocks) count_spikes(t, steps, &w->block[0], g);
   for (int b = 0; b < bundle->blocks; b++)
     t->kernels->backward(net, &w->block[b], steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
                          w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
@@ -91,7 +93,6 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
 
 static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
 {
-  const sf_net_view net = sf_net_view_of(&t->model);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
   for (int part = 0; part < GROUPS; part++) {
     sf_group *g = &t->group[part];
@@ -99,7 +100,7 @@ static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
     *g = (sf_group){.grad = grad};
     memset(grad, 0, sizeof *grad);
     for (int b = t->batch.bundles * part / GROUPS; b < t->batch.bundles * (part + 1) / GROUPS; b++)
-      run_bundle(t, p, &net, &t->batch.bundle[b], &t->worker[omp_get_thread_num()], g);
+      run_bundle(t, p, t->net, &t->batch.bundle[b], &t->worker[omp_get_thread_num()], g);
   }
 }
 
@@ -165,6 +166,8 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
       add_matrix(row + SF_DIR_FEATURES, g->grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
     }
     add_matrix(at[SF_P_W4], g->grad->w4, hidden, hidden, hidden);
+    for (int r = 0; r < hidden; r++)
+      for (int c = 0; c < hidden; c++) at[SF_P_W4][r * hidden + c] += g->grad->w4t[c * hidden + r];
     add_matrix(at[SF_P_W5], g->grad->w5, 3, hidden, hidden);
     add_matrix(at[SF_P_LEAK], g->grad->leak, 1, SF_LAYERS, SF_LAYERS);
     add_sums(sums, &g->sums, mean);
@@ -177,6 +180,10 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
 void sf_gradient_nets(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
 {
   encode(t);
+  const sf_net_view view = sf_net_view_of(&t->model);
+  t->kernels->prepare(&view, t->net);
+  sf_batch_compact(t, plan);
+  sf_batch_adapt(t);
   run_bundles(t, plan);
   reduce(t, plan->inverse_rays, mean, firing);
 }

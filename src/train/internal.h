@@ -1,6 +1,7 @@
 /* What the files of the trainer share. */
 #ifndef SF_TRAIN_INTERNAL_H
 #define SF_TRAIN_INTERNAL_H
+#include "base/memory.h"
 #include "render/march.h"
 #include "render/view.h"
 #include "spikefield/rng.h"
@@ -8,14 +9,28 @@
 
 /* Work is cut into GROUPS parts that do not depend on the number of threads; each part adds up its own gradient in
  * sample order and the parts are added in order: same seed, same bits, any thread count. */
-enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64 };
+enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64, LATTICE_MAX = 1024 };
+
+/* A bundle is closed before it has more samples than this: what two threads keep for their backward passes (12 kB a
+ * sample) then fits the last-level cache. A single ray may have more, up to BUNDLE_BLOCKS. */
+enum { BUNDLE_FILL = 512 };
 
 /* Streams of the counter-based generator. */
-enum { RNG_INIT = 1, RNG_PIXEL, RNG_JITTER, RNG_BACKGROUND, RNG_OCCUPANCY, RNG_OCCUPANCY_JITTER };
+enum {
+  RNG_INIT = 1,
+  RNG_PIXEL,
+  RNG_JITTER,
+  RNG_BACKGROUND,
+  RNG_OCCUPANCY,
+  RNG_OCCUPANCY_JITTER,
+  RNG_PROBE,
+  RNG_REVIVE
+};
 
 typedef struct sf_ray {
   float origin[3], direction[3], target[3], background[3]; /* target: composited on background */
   int first, count;                                        /* its samples: lanes first .. first + count - 1 */
+  int lane, from; /* the first one, counted from the start of the batch; and where it was before compaction */
 } sf_ray;
 
 /* Whole rays whose samples fill at most BUNDLE_BLOCKS blocks. */
@@ -25,12 +40,15 @@ typedef struct sf_bundle {
 } sf_bundle;
 
 typedef struct sf_batch {
-  int rays, samples, bundles, blocks, block_capacity;
-  float delta;       /* interval of a sample, model units */
-  sf_ray *ray;       /* [RAYS_MAX] */
-  sf_bundle *bundle; /* [RAYS_MAX] */
-  float *x;          /* [blocks][3][SF_BLOCK] positions in [0,1] */
-  float *f, *df;     /* [blocks][features][SF_BLOCK] */
+  int rays, marched, samples; /* samples in occupied space, and those of them that light reaches */
+  int bundles, blocks, block_capacity;
+  float delta;                       /* interval of a sample, model units */
+  sf_ray *ray;                       /* [RAYS_MAX] */
+  sf_bundle *bundle;                 /* [RAYS_MAX] */
+  uint64_t (*hit)[LATTICE_MAX / 64]; /* [RAYS_MAX] lattice points of a ray in occupied cells, a bit each */
+  float *x;                          /* [blocks][3][SF_BLOCK] positions in [0,1] */
+  float *f, *df;                     /* [blocks][features][SF_BLOCK] */
+  float *spare_x;                    /* for compaction; df serves f */
 } sf_batch;
 
 /* Loss of one iteration's steps, weights of its terms, and sums over its rays. */
@@ -42,6 +60,12 @@ typedef struct sf_loss_plan {
   float distill; /* 1 or 0 */
   float k_sigma, k_colour;
 } sf_loss_plan;
+
+/* Is the prefix composited? */
+static inline bool sf_loss_needs(const sf_loss_plan *p, int prefix)
+{
+  return prefix == p->steps || prefix == p->t_f || prefix == p->t_c;
+}
 
 typedef struct sf_loss_sums {
   double mse_full, mse_floor, mse_ceil, regular, extra_floor, extra_ceil, distill;
@@ -69,13 +93,23 @@ typedef struct sf_worker {
   float *dsigma, *dcolour; /* [BUNDLE_BLOCKS][T][SF_BLOCK], [..][3*SF_BLOCK] */
 } sf_worker;
 
+/* Of the spiking layers D1, C1, C2. */
+typedef struct sf_health {
+  int run[3];     /* counts in a row: of silence (negative) or of saturation (positive) */
+  int revived[3]; /* times */
+  int quiet[3];   /* neurons without a spike, at the last count */
+} sf_health;
+
 struct sf_trainer {
   sf_train_options options;
   const sf_dataset *data;
   const sf_kernels *kernels;
   sf_model model;
+  sf_net_words *net;               /* of the current parameters, for the kernels */
   float *grad, *moment1, *moment2; /* [model.size] */
-  float *density;                  /* occupancy's running density, [occ_res^3] */
+  float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
+  int averaged;
+  float *density; /* occupancy's running density, [occ_res^3] */
   sf_batch batch;
   sf_group group[GROUPS];
   sf_worker *worker;
@@ -85,12 +119,21 @@ struct sf_trainer {
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
   double t_momentum;                                   /* smoothed gradient of t* */
   double occupied, epoch;                              /* epoch: passes over the training pixels in this stage */
+  sf_health health;
+  int64_t samples; /* through the nets, over the run */
 };
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);
 /* Draws and marches `trainer->rays` rays; packs them into bundles. */
 sf_status sf_batch_draw(sf_trainer *trainer);
+/* Number of rays of the next iteration, from the samples of this one. */
+void sf_batch_adapt(sf_trainer *trainer);
+/* Bundles of the rays' samples as they are counted now. */
+void sf_batch_pack(sf_batch *batch);
+/* Drops the samples behind which less than 1e-4 of the light is left in every prefix that the plan trains, as rendering
+ * does: nothing of them would be seen or learned. Needs the features; moves samples and features together. */
+void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
 
 /* Features, nets and losses of the batch, forward and backward: adds the nets' gradient to trainer->grad and leaves the
  * features' gradient in batch.df. mean: losses per ray. */
@@ -99,6 +142,29 @@ void sf_gradient_nets(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sum
 void sf_gradient_grid(sf_trainer *trainer);
 
 sf_status sf_init_parameters(sf_trainer *trainer);
+
+/* Samples in occupied cells, seen from the training cameras, for the scalar nets. */
+enum { PROBES = 256 };
+typedef struct sf_probes {
+  int features;
+  float *f, *sh; /* [PROBES][features], [PROBES][16] */
+  sf_net_trace *trace;
+} sf_probes;
+sf_status sf_probes_create(sf_probes *probes, const sf_config *config);
+void sf_probes_free(sf_probes *probes);
+/* The first `count`; a function of seed, stream and iteration. */
+void sf_probes_draw(const sf_trainer *trainer, uint64_t stream, int count, sf_probes *probes);
+/* Runs probe `index`, leaving probes->trace. */
+void sf_probe(const sf_model *model, const sf_probes *probes, int index, int steps);
+/* New random weights; weights scaled until the currents of all PROBES have the threshold as root mean square. */
+void sf_layer_redraw(sf_trainer *trainer, sf_param_id id, uint64_t stream);
+void sf_layer_scale(sf_trainer *trainer, sf_param_id id, const sf_probes *probes);
+
+/* After the update: leaks back into range. */
+void sf_health_leaks(sf_trainer *trainer);
+/* Every 64 iterations: revives a layer that was silent or saturated for long; event: -1 it was silent, 1 saturated, 0
+ * nothing. */
+sf_status sf_health_check(sf_trainer *trainer, int event[3]);
 sf_status sf_occupancy_update(sf_trainer *trainer, int steps);
 
 typedef struct sf_adam {
@@ -107,5 +173,10 @@ typedef struct sf_adam {
 } sf_adam;
 /* value[n] -= ...; clears grad. */
 void sf_adam_update(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
+/* The nets' weights and leaks are finite and of a size that a net can have. */
+sf_status sf_parameters_check(const sf_trainer *trainer);
+/* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */
+sf_status sf_average_update(sf_trainer *trainer, double progress_before);
+sf_status sf_average_reserve(sf_trainer *trainer);
 sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);
 #endif

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SHARE = 32 }; /* an update visits 1/SHARE of all cells and as many of the occupied ones */
+enum { SHARE = 64 }; /* an update visits 1/SHARE of all cells and as many of the occupied ones */
 
 static const float decay = 0.95f, density_threshold = 10.0f;
 
@@ -20,7 +20,7 @@ static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
   return v->cell ? v->cell[pick] : pick;
 }
 
-static void visit_block(sf_trainer *t, const visit *v, const sf_net_view *net, int steps, size_t first, sf_worker *w)
+static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, sf_worker *w)
 {
   const size_t res = (size_t)t->model.config.occ_res;
   float x[3 * SF_BLOCK];
@@ -38,19 +38,20 @@ static void visit_block(sf_trainer *t, const visit *v, const sf_net_view *net, i
   const float *table = sf_model_param(&t->model, SF_P_GRID);
   for (int level = 0; level < t->model.config.levels; level++)
     t->kernels->grid_forward(&t->model.level[level], table, x, w->block->f + 2 * level * SF_BLOCK);
-  t->kernels->density(net, w->block, steps, w->scratch);
+  t->kernels->density(t->net, w->block, steps, w->scratch);
   const float *sigma = w->block->sigma[steps - 1];
   for (size_t l = 0; l < n; l++) t->density[cell[l]] = fmaxf(t->density[cell[l]] * decay, sigma[l]);
 }
 
 static void visit_cells(sf_trainer *t, const visit *v, int steps)
 {
-  const sf_net_view net = sf_net_view_of(&t->model);
+  const sf_net_view view = sf_net_view_of(&t->model);
+  t->kernels->prepare(&view, t->net);
 #pragma omp parallel for schedule(static) num_threads(t->workers)
   for (int part = 0; part < t->workers; part++) {
     const size_t blocks = (v->count + SF_BLOCK - 1) / SF_BLOCK;
     for (size_t b = blocks * part / t->workers; b < blocks * (part + 1) / t->workers; b++)
-      visit_block(t, v, &net, steps, b * SF_BLOCK, &t->worker[part]);
+      visit_block(t, v, steps, b * SF_BLOCK, &t->worker[part]);
   }
 }
 

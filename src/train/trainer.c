@@ -41,9 +41,11 @@ void sf_trainer_free(sf_trainer *t)
   }
   for (int g = 0; g < GROUPS; g++) free(t->group[g].grad);
   free(t->worker);
+  free(t->net);
   free(t->grad);
   free(t->moment1);
   free(t->moment2);
+  free(t->average);
   free(t->density);
   sf_batch_free(&t->batch);
   sf_model_free(&t->model);
@@ -56,7 +58,7 @@ static sf_status create_workers(sf_trainer *t)
   t->worker = calloc((size_t)t->workers, sizeof *t->worker);
   if (!t->worker) return sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
   const size_t plane = (size_t)BUNDLE_BLOCKS * SF_T_MAX * SF_BLOCK * sizeof(float);
-  bool ok = true;
+  bool ok = (t->net = sf_aligned_alloc(sizeof *t->net)) != NULL;
   for (int i = 0; i < t->workers; i++) {
     sf_worker *w = &t->worker[i];
     w->block = sf_aligned_alloc(BUNDLE_BLOCKS * sizeof *w->block);
@@ -68,6 +70,14 @@ static sf_status create_workers(sf_trainer *t)
   }
   for (int g = 0; g < GROUPS; g++) ok = (t->group[g].grad = sf_aligned_alloc(sizeof(sf_net_grad))) && ok;
   return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
+}
+
+/* t* at the start of the current stage. */
+static void start_budget(sf_trainer *t)
+{
+  const int T = t->model.config.steps;
+  t->model.t_r = t->stage == 1 ? T : t->options.fixed_steps ? t->options.fixed_steps : T > 1 ? T - 1 : 1;
+  t->model.t_star = (float)t->model.t_r;
 }
 
 static sf_status create(sf_trainer *t, const char *resume)
@@ -90,10 +100,14 @@ static sf_status create(sf_trainer *t, const char *resume)
   t->rays = 1024;
   t->stride = 4;
   t->occupied = 1;
-  if (resume) return sf_checkpoint_load(t, resume);
-  t->model.t_star = (float)(c->steps > 1 ? c->steps - 1 : 1);
-  if (t->stage == 1) t->model.t_star = (float)c->steps;
-  t->model.t_r = (int)lroundf(t->model.t_star);
+  if (t->options.fixed_steps < 0 || t->options.fixed_steps > c->steps)
+    return sf_fail(SF_E_RANGE, "train: %d fixed steps, the model has %d", t->options.fixed_steps, c->steps);
+  if (resume) {
+    SF_TRY(sf_checkpoint_load(t, resume));
+    if (t->options.fixed_steps && t->stage == 2) start_budget(t);
+    return sf_ok();
+  }
+  start_budget(t);
   return sf_init_parameters(t);
 }
 
@@ -108,7 +122,7 @@ sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const 
   if (!t) return sf_fail(SF_E_MEMORY, "train: no memory");
   t->options = *options;
   t->data = data;
-  t->kernels = sf_kernels_select(NULL);
+  t->kernels = sf_kernels_training();
   sf_status status = create(t, resume);
   if (status.code)
     sf_trainer_free(t);
@@ -131,14 +145,15 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   sf_loss_plan p = {.stage = t->stage,
                     .steps = scaled(t) ? 2 : c->steps,
                     .inverse_rays = 1.0f / (float)t->batch.rays,
-                    .extra = t->options.no_extra ? 0 : (float)t->options.alpha,
+                    .extra = t->options.no_extra || t->options.fixed_steps ? 0 : (float)t->options.alpha,
                     .distill = !t->options.no_distill,
                     .k_sigma = sf_sigmoid(leak[1]),
                     .k_colour = sf_sigmoid(leak[4])};
   const double t_hat = fmin(fmax(t->model.t_star, 1), p.steps);
-  p.t_f = t->stage == 1 ? p.steps : (int)fmin(floor(t_hat), p.steps > 1 ? p.steps - 1 : 1);
-  p.t_c = t->stage == 1 || p.steps == 1 ? p.t_f : p.t_f + 1;
-  p.d = t->stage == 1 || p.steps == 1 ? 0 : t_hat - p.t_f;
+  const bool one = t->stage == 1 || t->options.fixed_steps || p.steps == 1; /* one prefix is trained, not two */
+  p.t_f = t->stage == 1 ? p.steps : one ? (int)t_hat : (int)fmin(floor(t_hat), p.steps - 1);
+  p.t_c = one ? p.t_f : p.t_f + 1;
+  p.d = one ? 0 : t_hat - p.t_f;
   p.t_r = p.d >= 0.5 ? p.t_c : p.t_f;
   return p;
 }
@@ -160,22 +175,38 @@ static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
   return value;
 }
 
-static sf_status check_finite(const sf_trainer *t, double loss)
+/* With bounded gradients Adam's squares stay finite, and with them every step: |update| is a few times the rate. */
+static sf_status check_gradient(const sf_trainer *t, double loss)
 {
   if (!isfinite(loss))
     return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
   for (int i = SF_P_W1; i < SF_P_COUNT; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++)
-      if (!isfinite(t->grad[t->model.param[i].offset + j]))
-        return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is not finite at index %zu",
-                       (long long)t->iteration, t->model.param[i].name, j);
+      if (!(fabsf(t->grad[t->model.param[i].offset + j]) < 1e18f))
+        return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is %g at index %zu",
+                       (long long)t->iteration, t->model.param[i].name, t->grad[t->model.param[i].offset + j], j);
   const size_t n = (size_t)t->batch.blocks * 2 * t->model.config.levels * SF_BLOCK;
-  int bad = 0;
-#pragma omp parallel for simd reduction(| : bad)
-  for (size_t i = 0; i < n; i++) bad |= !(fabsf(t->batch.df[i]) < 1e30f);
-  if (bad)
-    return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is not finite", (long long)t->iteration,
-                   t->model.param[SF_P_GRID].name);
+  int bad = 0, far = 0;
+#pragma omp parallel for simd reduction(| : bad, far)
+  for (size_t i = 0; i < n; i++) {
+    bad |= !(fabsf(t->batch.df[i]) < 1e12f);
+    far |= !(fabsf(t->batch.f[i]) < 1e6f);
+  }
+  if (bad || far)
+    return sf_fail(SF_E_RANGE, "train: iteration %lld: %s '%s' not finite or far too large", (long long)t->iteration,
+                   far ? "values of" : "gradient of", t->model.param[SF_P_GRID].name);
+  return sf_ok();
+}
+
+sf_status sf_parameters_check(const sf_trainer *t)
+{
+  for (int i = SF_P_W1; i < SF_P_COUNT; i++)
+    for (size_t j = 0; j < t->model.param[i].size; j++) {
+      const float value = t->model.value[t->model.param[i].offset + j];
+      if (!(fabsf(value) < 1e6f))
+        return sf_fail(SF_E_RANGE, "train: iteration %lld: '%s' has diverged: %g at index %zu", (long long)t->iteration,
+                       t->model.param[i].name, value, j);
+    }
   return sf_ok();
 }
 
@@ -189,7 +220,7 @@ static double stage_share(const sf_trainer *t)
 
 static void update_parameters(sf_trainer *t)
 {
-  const double fade = pow(0.1, t->progress);
+  const double fade = pow(0.3, t->progress);
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1};
   const size_t nets = t->model.param[SF_P_W1].offset;
   sf_adam_update(&adam, nets, t->model.value, t->grad, t->moment1, t->moment2);
@@ -203,7 +234,7 @@ static void update_parameters(sf_trainer *t)
  * e^-t = e^-t0 + budget_rate * beta * progress, at most T per stage. */
 static void update_budget(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double penalty_ratio)
 {
-  if (p->stage == 1 || p->steps < t->model.config.steps || t->model.config.steps == 1) return;
+  if (p->t_c == p->t_f || p->steps < t->model.config.steps) return;
   const double t_hat = t->model.t_star, share = stage_share(t), limit = t->model.config.steps * share;
   double g = mean->mse_ceil - mean->mse_floor + p->extra * (mean->extra_ceil - mean->extra_floor);
   if (!t->options.no_penalty) g += t->options.beta * penalty_ratio * exp(t_hat);
@@ -226,8 +257,7 @@ static void advance(sf_trainer *t, double share)
   if (t->stage == 1 && n2 > 0) {
     t->stage = 2;
     t->stage_progress = t->epoch = 0;
-    if (t->model.config.steps > 1) t->model.t_star = (float)(t->model.config.steps - 1);
-    t->model.t_r = (int)lroundf(t->model.t_star);
+    start_budget(t);
   } else
     t->stage = 3;
 }
@@ -249,8 +279,11 @@ static void report(const sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
                         .firing = {firing[0], firing[1], firing[2]},
                         .rays = t->batch.rays,
                         .samples = t->batch.samples,
-                        .occupied = t->occupied};
+                        .occupied = t->occupied,
+                        .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
   for (int l = 0; l < SF_LAYERS; l++) s->tau[l] = 1 / sf_sigmoid(sf_model_param(&t->model, SF_P_LEAK)[l]);
+  memcpy(s->quiet, t->health.quiet, sizeof s->quiet);
+  memcpy(s->revived, t->health.revived, sizeof s->revived);
   if (t->stage == 3) s->stage = 3;
 }
 
@@ -271,6 +304,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   sf_loss_sums mean = {0};
   double firing[3];
   sf_gradient_nets(t, &plan, &mean, firing);
+  if (plan.t_c == plan.t_f) mean.mse_ceil = mean.mse_floor;
   const double e_tau = leak_terms(t, &plan, &mean);
   const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
   const double ratio = mean.mse_full / fmax(mse, 1e-12);
@@ -278,14 +312,22 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   if (plan.stage == 2)
     loss += plan.distill * mean.distill +
             plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau) +
-            (t->options.no_penalty ? 0 : t->options.beta * ratio * exp(t->model.t_star));
-  SF_TRY(check_finite(t, loss));
+            (t->options.no_penalty || t->options.fixed_steps ? 0 : t->options.beta * ratio * exp(t->model.t_star));
+  SF_TRY(check_gradient(t, loss));
   sf_gradient_grid(t);
   update_parameters(t);
+  sf_health_leaks(t);
+  SF_TRY(sf_parameters_check(t));
   update_budget(t, &plan, &mean, ratio);
+  int event[3];
+  SF_TRY(sf_health_check(t, event));
   t->last_step = sf_seconds() - start;
   t->seconds += t->last_step;
+  t->samples += t->batch.samples;
+  const double before = t->progress;
   advance(t, stage_share(t));
+  SF_TRY(sf_average_update(t, before));
   report(t, &plan, &mean, firing, loss, mse, stats);
+  memcpy(stats->event, event, sizeof event);
   return sf_ok();
 }

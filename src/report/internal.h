@@ -1,0 +1,17 @@
+/* What the report's files share. */
+#ifndef SPIKEFIELD_REPORT_INTERNAL_H
+#define SPIKEFIELD_REPORT_INTERNAL_H
+#include "spikefield/report.h"
+
+/* Adds one line to r->problem. */
+sf_status sf_report_problem(sf_reproduction *r, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* *json is NULL where the file is missing (no problem) or malformed (a problem). */
+sf_status sf_report_read_json(sf_reproduction *r, const char *path, cJSON **json);
+double sf_report_number(const cJSON *object, const char *key); /* NaN where it is no number */
+
+/* The audits and renderings of a run: audit-K.json, fixed-K.json, float-K.json, prefix-T-K.json of views K.
+ * `reference`: the folder whose audits give the sizes of the nets; the ANN has no audits of its own. */
+sf_status sf_report_load_frames(sf_reproduction *r, const char *dir, const char *reference, bool ann, sf_run *run);
+/* t* over the iterations from the trainer's log; a line cut by a kill and lines repeated after a resume are dropped. */
+sf_status sf_report_load_log(const char *path, sf_run *run);
+#endif

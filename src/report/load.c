@@ -1,0 +1,188 @@
+/* Folders of runs to numbers. */
+#include "report/internal.h"
+#include "spikefield/io.h"
+#include <dirent.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { TEXT_LIMIT = 1 << 20, SCENES_LIMIT = 4096 };
+
+static sf_status no_memory(const sf_reproduction *r)
+{
+  return sf_fail(SF_E_MEMORY, "%s: no memory for the report", r->dir);
+}
+
+sf_status sf_report_problem(sf_reproduction *r, const char *format, ...)
+{
+  char text[1024];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  char **list = realloc(r->problem, (size_t)(r->problems + 1) * sizeof *list);
+  if (!list) return no_memory(r);
+  r->problem = list;
+  list[r->problems] = strdup(text);
+  if (!list[r->problems]) return no_memory(r);
+  r->problems++;
+  return sf_ok();
+}
+
+sf_status sf_report_read_json(sf_reproduction *r, const char *path, cJSON **json)
+{
+  *json = NULL;
+  if (access(path, F_OK)) return sf_ok();
+  sf_status status = sf_json_load(path, json);
+  if (!status.code && !cJSON_IsObject(*json)) {
+    cJSON_Delete(*json);
+    *json = NULL;
+    status = sf_fail(SF_E_FORMAT, "%s: not a JSON object", path);
+  }
+  if (!status.code || status.code == SF_E_MEMORY) return status;
+  return sf_report_problem(r, "%s", status.message);
+}
+
+double sf_report_number(const cJSON *object, const char *key)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+  return cJSON_IsNumber(item) && isfinite(item->valuedouble) ? item->valuedouble : NAN;
+}
+
+/* ---- one run ---- */
+
+static void trim(char *text)
+{
+  size_t n = strlen(text);
+  while (n && (text[n - 1] == '\n' || text[n - 1] == ' ')) text[--n] = 0;
+}
+
+/* NULL where the file is missing. */
+static sf_status read_text(sf_reproduction *r, const char *dir, const char *name, char **text)
+{
+  char path[4096 + 512];
+  size_t size;
+  snprintf(path, sizeof path, "%s/%s", dir, name);
+  *text = NULL;
+  if (access(path, F_OK)) return sf_ok();
+  sf_status status = sf_read_file(path, TEXT_LIMIT, text, &size);
+  if (status.code == SF_E_MEMORY) return status;
+  if (status.code) return sf_report_problem(r, "%s", status.message);
+  trim(*text);
+  return sf_ok();
+}
+
+static sf_status read_prefixes(sf_reproduction *r, const char *path, sf_run *run)
+{
+  const cJSON *list = cJSON_GetObjectItemCaseSensitive(run->summary, "prefix_psnr");
+  const int n = cJSON_GetArraySize(list);
+  if (n > SF_T_MAX) return sf_report_problem(r, "%s: prefix_psnr has %d numbers, at most %d", path, n, SF_T_MAX);
+  for (const cJSON *item = list ? list->child : NULL; item; item = item->next)
+    run->prefix_psnr[run->prefixes++] = cJSON_IsNumber(item) ? item->valuedouble : NAN;
+  return sf_ok();
+}
+
+static sf_status read_summary(sf_reproduction *r, const char *dir, bool ann, sf_run *run)
+{
+  char path[4096 + 512];
+  snprintf(path, sizeof path, "%s/train.json", dir);
+  SF_TRY(sf_report_read_json(r, path, &run->summary));
+  if (!run->summary) return sf_ok();
+  cJSON_DeleteItemFromObjectCaseSensitive(run->summary, "model"); /* a path of this machine */
+  static const struct {
+    const char *key;
+    sf_metric metric;
+  } field[] = {
+      {"psnr", SF_METRIC_PSNR}, {"ssim", SF_METRIC_SSIM}, {"t_r", SF_METRIC_STEPS}, {"seconds", SF_METRIC_SECONDS}};
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
+    run->value[field[i].metric] = sf_report_number(run->summary, field[i].key);
+    if (isnan(run->value[field[i].metric]))
+      SF_TRY(sf_report_problem(r, "%s: no finite number '%s'", path, field[i].key));
+  }
+  run->t_star = sf_report_number(run->summary, "t_star");
+  if (ann) run->value[SF_METRIC_STEPS] = run->t_star = NAN;
+  return read_prefixes(r, path, run);
+}
+
+static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
+{
+  char dir[4096 + 320], reference[4096 + 320], log[4096 + 384];
+  for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
+  for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;
+  run->t_star = NAN;
+  snprintf(dir, sizeof dir, "%s/%s", scene_dir, sf_run_kinds[id].name);
+  snprintf(reference, sizeof reference, "%s/%s", scene_dir, sf_run_kinds[SF_RUN_BETA_5E7].name);
+  snprintf(log, sizeof log, "%s/train.jsonl", dir);
+  SF_TRY(read_text(r, dir, "status", &run->status));
+  SF_TRY(read_text(r, dir, "train.cmd", &run->train_command));
+  SF_TRY(read_text(r, dir, "eval.cmd", &run->eval_command));
+  SF_TRY(read_text(r, dir, "version", &run->version));
+  SF_TRY(read_summary(r, dir, id == SF_RUN_ANN, run));
+  SF_TRY(sf_report_load_log(log, run));
+  return sf_report_load_frames(r, dir, reference, id == SF_RUN_ANN, run);
+}
+
+static void free_run(sf_run *run)
+{
+  free(run->iteration), free(run->t_star_at);
+  free(run->status), free(run->train_command), free(run->eval_command), free(run->version);
+  cJSON_Delete(run->summary);
+}
+
+/* ---- scenes ---- */
+
+static bool is_scene(const char *dir)
+{
+  char path[4096 + 384];
+  for (int i = 0; i < SF_RUNS; i++) {
+    snprintf(path, sizeof path, "%s/%s", dir, sf_run_kinds[i].name);
+    if (access(path, F_OK) == 0) return true;
+  }
+  return false;
+}
+
+static sf_status load_scene(sf_reproduction *r, const char *name)
+{
+  char dir[4096 + 260];
+  snprintf(dir, sizeof dir, "%s/%s", r->dir, name);
+  if (name[0] == '.' || !is_scene(dir)) return sf_ok();
+  sf_report_scene *list = realloc(r->scene, (size_t)(r->count + 1) * sizeof *list);
+  if (!list) return no_memory(r);
+  r->scene = list;
+  sf_report_scene *scene = &list[r->count++];
+  memset(scene, 0, sizeof *scene);
+  snprintf(scene->name, sizeof scene->name, "%s", name);
+  for (int i = 0; i < SF_RUNS; i++) SF_TRY(load_run(r, dir, i, &scene->run[i]));
+  return sf_ok();
+}
+
+sf_status sf_reproduction_load(sf_reproduction *r, const char *dir)
+{
+  *r = (sf_reproduction){0};
+  snprintf(r->dir, sizeof r->dir, "%s", dir);
+  for (size_t n = strlen(r->dir); n > 1 && r->dir[n - 1] == '/'; n--) r->dir[n - 1] = 0;
+  const char *slash = strrchr(r->dir, '/');
+  r->profile = slash && slash[1] ? slash + 1 : r->dir;
+  struct dirent **entry;
+  const int n = scandir(r->dir, &entry, NULL, alphasort);
+  if (n < 0) return sf_fail(SF_E_IO, "%s: cannot list the folder", r->dir);
+  sf_status status = n > SCENES_LIMIT ? sf_fail(SF_E_RANGE, "%s: more than %d entries", r->dir, SCENES_LIMIT) : sf_ok();
+  for (int i = 0; i < n; i++) {
+    if (!status.code) status = load_scene(r, entry[i]->d_name);
+    free(entry[i]);
+  }
+  free(entry);
+  if (status.code) sf_reproduction_free(r);
+  return status;
+}
+
+void sf_reproduction_free(sf_reproduction *r)
+{
+  for (int s = 0; s < r->count; s++)
+    for (int i = 0; i < SF_RUNS; i++) free_run(&r->scene[s].run[i]);
+  for (int i = 0; i < r->problems; i++) free(r->problem[i]);
+  free(r->scene), free(r->problem);
+  *r = (sf_reproduction){0};
+}

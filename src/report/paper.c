@@ -1,0 +1,23 @@
+/* The runs and what the paper reports for them: "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance
+ * Fields", INGP backbone, averages over the eight Synthetic scenes at 800 x 800. */
+#include "spikefield/report.h"
+#include <math.h>
+
+#define ROW(psnr, ssim, steps, energy, saving) {psnr, ssim, steps, energy, NAN, NAN, NAN, NAN, NAN}, saving
+
+const sf_run_kind sf_run_kinds[SF_RUNS] = {
+    [SF_RUN_ANN] = {"ann", "ANN (ReLU twin)", ROW(32.14, 0.959, NAN, 955.27, NAN)},
+    [SF_RUN_BETA_1E7] = {"beta-1e-7", "beta = 1e-7", ROW(32.45, 0.959, 5.125, 643.39, 32.65)},
+    [SF_RUN_BETA_5E7] = {"beta-5e-7", "beta = 5e-7 (full)", ROW(32.21, 0.957, 3.625, 492.25, 48.47)},
+    [SF_RUN_BETA_1E6] = {"beta-1e-6", "beta = 1e-6", ROW(32.04, 0.956, 2.875, 405.33, 57.57)},
+    [SF_RUN_HYBRID] = {"mode-hybrid", "input hybrid, T = 8", ROW(32.12, NAN, 8, NAN, NAN)},
+    [SF_RUN_NO_DECAY] = {"mode-no-decay", "input no-decay, T = 8", ROW(32.09, NAN, 8, NAN, NAN)},
+    [SF_RUN_DECAY] = {"mode-decay", "input decay, T = 8", ROW(31.82, NAN, 8, NAN, NAN)},
+    [SF_RUN_NO_STAGE1] = {"no-stage1", "without stage I", ROW(31.59, NAN, 3.625, NAN, NAN)},
+    [SF_RUN_NO_EXTRA] = {"no-extra", "without L_extra", ROW(31.69, NAN, 1.625, NAN, NAN)},
+    [SF_RUN_NO_PENALTY] = {"no-penalty", "without L_penalty", ROW(32.61, NAN, 6.625, NAN, NAN)},
+    [SF_RUN_NO_BUDGET] = {"no-budget", "without L_budg", ROW(32.02, NAN, 5.875, NAN, NAN)},
+    [SF_RUN_T_MINUS_1] = {"fixed-t-minus-1", "fixed t_r - 1", ROW(31.69, NAN, NAN, 398.37, NAN)},
+    [SF_RUN_T] = {"fixed-t", "fixed t_r", ROW(32.11, NAN, NAN, 491.70, NAN)},
+    [SF_RUN_T_PLUS_1] = {"fixed-t-plus-1", "fixed t_r + 1", ROW(32.29, NAN, NAN, 623.01, NAN)},
+};

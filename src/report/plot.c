@@ -1,0 +1,237 @@
+/* Gnuplot scripts with their data inside. */
+#include "spikefield/io.h"
+#include "spikefield/report.h"
+#include <math.h>
+#include <string.h>
+
+enum { POINTS_MAX = 600 }; /* of a curve over iterations: more than the picture has pixels for */
+
+static const int betas[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_RUN_BETA_1E6};
+enum { BETAS = 3 };
+static const int learned[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7,   SF_RUN_BETA_1E6, SF_RUN_NO_STAGE1,
+                              SF_RUN_NO_EXTRA, SF_RUN_NO_PENALTY, SF_RUN_NO_BUDGET};
+enum { LEARNED = 7 };
+/* Okabe and Ito's colours: told apart by all eyes. */
+static const char *const colour[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"};
+
+/* A gnuplot string; what could end it is replaced. */
+static void quote(char *to, size_t size, const char *from)
+{
+  snprintf(to, size, "%s", from);
+  for (char *c = to; *c; c++)
+    if (*c == '\'' || *c == '\n' || *c == '\\') *c = '_';
+}
+
+static void head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key)
+{
+  fprintf(out,
+          "# gnuplot %s.gp writes %s.svg\n"
+          "set terminal svg size 1060,600 noenhanced background '#ffffff' font 'DejaVu Sans,15' linewidth 1.5\n"
+          "set output '%s.svg'\n"
+          "set encoding utf8\n"
+          "set title '%s'\nset xlabel '%s'\nset ylabel '%s'\n"
+          "set key %s\nset grid linecolor '#dddddd' linetype 1\nset border 3\nset tics nomirror\n",
+          name, name, name, title, x, y, key);
+}
+
+static const char *title_of(const sf_reproduction *r, int scene, const char *what, char *text, size_t size)
+{
+  char name[256];
+  if (scene < 0)
+    snprintf(text, size, "%s: average of %d %s, profile %s", what, r->count, r->count == 1 ? "scene" : "scenes",
+             r->profile);
+  else
+    snprintf(text, size, "%s: %s, profile %s", what, r->scene[scene].name, r->profile);
+  quote(name, sizeof name, text);
+  snprintf(text, size, "%s", name);
+  return text;
+}
+
+/* The ANN on the views of the prefixes where it was rendered there, else over all. */
+static double ann_psnr(const sf_reproduction *r, int scene)
+{
+  const double same = sf_reproduction_prefix(r, scene, SF_RUN_ANN, 0);
+  return isnan(same) ? sf_reproduction_mean(r, scene, SF_RUN_ANN, SF_METRIC_PSNR, NULL) : same;
+}
+
+/* ---- PSNR against steps ---- */
+
+static void plot_steps(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  char title[512];
+  const double ann = ann_psnr(r, scene);
+  bool shown[BETAS] = {false};
+  title_of(r, scene, "PSNR after every time step", title, sizeof title);
+  head(out, name, title, "time steps", "PSNR, dB (float, held-out views)", "outside right top");
+  fprintf(out, "set xrange [0.7:%d.3]\nset xtics 1\n", SF_T_MAX);
+  for (int i = 0; i < BETAS; i++) {
+    fprintf(out, "$steps%d << EOD\n", i);
+    for (int t = 0; t < SF_T_MAX; t++) {
+      const double psnr = sf_reproduction_prefix(r, scene, betas[i], t);
+      if (!isnan(psnr)) fprintf(out, "%d %.6g\n", t + 1, psnr), shown[i] = true;
+    }
+    fprintf(out, "EOD\n");
+  }
+  fprintf(out, "plot ");
+  for (int i = 0; i < BETAS; i++)
+    if (shown[i])
+      fprintf(out,
+              "$steps%d using 1:2 with linespoints linecolor '%s' linewidth 2 pointtype %d pointsize 1 title '%s', ", i,
+              colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
+  for (int i = 0; i < BETAS; i++) {
+    const double t_r = sf_reproduction_mean(r, scene, betas[i], SF_METRIC_STEPS, NULL);
+    if (scene < 0 || !shown[i] || isnan(t_r)) continue;
+    fprintf(out,
+            "$steps%d using ($1 == %.0f ? $1 : NaN):2 with points linecolor '%s' pointtype 6 pointsize 2.4 notitle, ",
+            i, t_r, colour[i]);
+  }
+  if (scene >= 0)
+    fprintf(out, "NaN with points linecolor '#555555' pointtype 6 pointsize 2.4 title 't_r, as learned', ");
+  if (!isnan(ann))
+    fprintf(out, "%.6g with lines linecolor '#555555' dashtype 2 linewidth 2 title 'ANN (ReLU twin)', ", ann);
+  fprintf(out, "NaN notitle\n");
+}
+
+static bool has_steps(const sf_reproduction *r, int scene)
+{
+  for (int i = 0; i < BETAS; i++)
+    for (int t = 0; t < SF_T_MAX; t++)
+      if (!isnan(sf_reproduction_prefix(r, scene, betas[i], t))) return true;
+  return false;
+}
+
+/* ---- PSNR against energy ---- */
+
+static void point(FILE *out, const char *block, double x, double y)
+{
+  fprintf(out, "$%s << EOD\n", block);
+  if (!isnan(x) && !isnan(y)) fprintf(out, "%.6g %.6g\n", x, y);
+  fprintf(out, "EOD\n");
+}
+
+/* PSNR of a learned run on the views of the prefixes: what its scenes show at their own t_r. */
+static double psnr_at_t_r(const sf_reproduction *r, int scene, int run)
+{
+  double sum = 0;
+  int n = 0;
+  for (int s = scene < 0 ? 0 : scene; s < (scene < 0 ? r->count : scene + 1); s++) {
+    const sf_run *one = &r->scene[s].run[run];
+    const double t_r = one->value[SF_METRIC_STEPS];
+    if (!(t_r >= 1 && t_r <= one->prefixes)) continue;
+    sum += one->prefix_psnr[(int)t_r - 1], n++;
+  }
+  return n ? sum / n : sf_reproduction_mean(r, scene, run, SF_METRIC_PSNR, NULL);
+}
+
+static void plot_energy(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  char title[512], block[16];
+  title_of(r, scene, "PSNR against energy", title, sizeof title);
+  head(out, name, title, "energy, mJ per frame (counted by the audit, paper ledger)",
+       "PSNR, dB (float, held-out views)", "outside right top");
+  fprintf(out, "set xrange [0:*]\nset offsets graph 0, graph 0.05, graph 0.08, graph 0.05\n$prefix << EOD\n");
+  bool any = false;
+  for (int t = 0; t < SF_T_MAX; t++) {
+    const double x = sf_reproduction_prefix_energy(r, scene, SF_RUN_BETA_5E7, t),
+                 y = sf_reproduction_prefix(r, scene, SF_RUN_BETA_5E7, t);
+    if (!isnan(x) && !isnan(y)) fprintf(out, "%.6g %.6g %d\n", x, y, t + 1), any = true;
+  }
+  fprintf(out, "EOD\n");
+  for (int i = 0; i < BETAS; i++) {
+    snprintf(block, sizeof block, "beta%d", i);
+    point(out, block, sf_reproduction_mean(r, scene, betas[i], SF_METRIC_ENERGY, NULL),
+          psnr_at_t_r(r, scene, betas[i]));
+  }
+  point(out, "ann", sf_reproduction_mean(r, scene, SF_RUN_ANN, SF_METRIC_ENERGY, NULL), ann_psnr(r, scene));
+  fprintf(out, "plot ");
+  if (any)
+    fprintf(out, "$prefix using 1:2 with linespoints linecolor '#999999' pointtype 7 pointsize 0.6 title 'beta = 5e-7, "
+                 "t = 1, 2, ...', $prefix using 1:2:3 with labels offset 0,-1 notitle, ");
+  for (int i = 0; i < BETAS; i++)
+    fprintf(out, "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.8 title '%s', ", i, colour[i],
+            5 + 2 * i, sf_run_kinds[betas[i]].title);
+  fprintf(out, "$ann using 1:2 with points linecolor '#000000' pointtype 2 pointsize 1.8 title 'ANN (ReLU twin)'\n");
+}
+
+static bool has_energy(const sf_reproduction *r, int scene)
+{
+  static const int shown[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_RUN_ANN};
+  for (int i = 0; i < 4; i++)
+    if (!isnan(sf_reproduction_mean(r, scene, shown[i], SF_METRIC_ENERGY, NULL)) &&
+        !isnan(sf_reproduction_mean(r, scene, shown[i], SF_METRIC_PSNR, NULL)))
+      return true;
+  return false;
+}
+
+/* ---- t* over iterations ---- */
+
+static void plot_t_star(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  char title[512];
+  title_of(r, scene, "t* over the iterations", title, sizeof title);
+  head(out, name, title, "iteration", "t*, time steps", "outside right top");
+  fprintf(out, "set yrange [0.8:%d.2]\nset ytics 1\nset xrange [0:*]\n", SF_T_MAX);
+  for (int i = 0; i < LEARNED; i++) {
+    const sf_run *run = &r->scene[scene].run[learned[i]];
+    const int stride = run->points / POINTS_MAX + 1;
+    fprintf(out, "$t%d << EOD\n", i);
+    for (int p = 0; p < run->points; p++)
+      if (p % stride == 0 || p == run->points - 1) fprintf(out, "%.0f %.5f\n", run->iteration[p], run->t_star_at[p]);
+    fprintf(out, "EOD\n");
+  }
+  fprintf(out, "plot ");
+  for (int i = 0; i < LEARNED; i++)
+    if (r->scene[scene].run[learned[i]].points > 0)
+      fprintf(out, "$t%d using 1:2 with lines linecolor '%s' linewidth 2 dashtype %d title '%s', ", i, colour[i],
+              i < BETAS ? 1 : i - BETAS + 2, sf_run_kinds[learned[i]].title);
+  fprintf(out, "NaN notitle\n");
+}
+
+static bool has_t_star(const sf_reproduction *r, int scene)
+{
+  for (int i = 0; i < LEARNED; i++)
+    if (r->scene[scene].run[learned[i]].points > 1) return true;
+  return false;
+}
+
+/* ---- files ---- */
+
+typedef struct plot {
+  const char *name;
+  bool (*has_data)(const sf_reproduction *r, int scene); /* gnuplot refuses an empty picture */
+  void (*write)(FILE *out, const sf_reproduction *r, int scene, const char *name);
+  bool averaged; /* also over all scenes */
+} plot;
+
+static const plot plots[] = {{"psnr-steps", has_steps, plot_steps, true},
+                             {"psnr-energy", has_energy, plot_energy, true},
+                             {"t-star", has_t_star, plot_t_star, false}};
+
+static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, int *count)
+{
+  char name[300], quoted[300], path[4096 + 320];
+  sf_writer writer;
+  if (scene < 0)
+    snprintf(name, sizeof name, "%s", p->name);
+  else
+    snprintf(name, sizeof name, "%s-%s", p->name, r->scene[scene].name);
+  snprintf(path, sizeof path, "%s/plots/%s.gp", r->dir, name);
+  quote(quoted, sizeof quoted, name);
+  SF_TRY(sf_writer_open(&writer, path));
+  p->write(writer.file, r, scene, quoted);
+  ++*count;
+  return sf_writer_commit(&writer);
+}
+
+sf_status sf_reproduction_plots(const sf_reproduction *r, int *count)
+{
+  char dir[4096 + 16];
+  *count = 0;
+  snprintf(dir, sizeof dir, "%s/plots", r->dir);
+  SF_TRY(sf_make_dir(dir));
+  for (int scene = -1; scene < r->count; scene++)
+    for (size_t i = 0; i < sizeof plots / sizeof *plots; i++)
+      if ((scene >= 0 || plots[i].averaged) && plots[i].has_data(r, scene))
+        SF_TRY(write_plot(r, &plots[i], scene, count));
+  return sf_ok();
+}

@@ -1,0 +1,111 @@
+/* Keeps the neurons in the range where they can learn: leaks stay apart from 0 and 1, a layer that does not
+ * fire, or always fires, is brought back to the threshold as at the start of the run. */
+#include "train/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { WINDOW = 64, CENSUS = 64 }; /* iterations between two counts; probes of a count */
+
+static const double dead = 1e-4, saturated = 0.95; /* spikes per neuron and step */
+
+static const struct {
+  sf_param_id weights;
+  int layer; /* of the leaks and of sf_net_trace */
+} part[3] = {{SF_P_W1, 0}, {SF_P_W3, 2}, {SF_P_W4, 3}};
+
+/* tau within 1.001 .. 1000: at both ends k is still 4 units of the hardware's 12 bits away from 0 and 1, where a
+ * neuron would forget or ignore its input, and where the logit's gradient k (1-k) no longer brings it back. */
+static const float logit_limit = 6.9067548f; /* ln 999 */
+
+void sf_health_leaks(sf_trainer *t)
+{
+  float *leak = sf_model_param(&t->model, SF_P_LEAK);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    if (leak[l] > logit_limit) leak[l] = logit_limit; /* not fminf: a NaN must stay one, to be found */
+    if (leak[l] < -logit_limit) leak[l] = -logit_limit;
+  }
+}
+
+typedef struct census {
+  double firing; /* spikes per neuron and step */
+  int quiet;     /* neurons without a spike */
+} census;
+
+/* Of the first CENSUS probes; a function of the parameters alone, as the decisions that hang on it must be. */
+static void count(const sf_trainer *t, const sf_probes *probes, census c[3])
+{
+  const int steps = t->model.config.steps, hidden = t->model.config.hidden;
+  int spikes[3][SF_LANES] = {{0}};
+  for (int i = 0; i < CENSUS; i++) {
+    sf_probe(&t->model, probes, i, steps);
+    for (int l = 0; l < 3; l++)
+      for (int s = 0; s < steps; s++)
+        for (int n = 0; n < hidden; n++) spikes[l][n] += probes->trace->spike[part[l].layer][s][n];
+  }
+  for (int l = 0; l < 3; l++) {
+    c[l] = (census){0};
+    for (int n = 0; n < hidden; n++) {
+      c[l].firing += spikes[l][n] / ((double)CENSUS * steps * hidden);
+      c[l].quiet += spikes[l][n] == 0;
+    }
+  }
+}
+
+static void forget(sf_trainer *t, size_t first, size_t count)
+{
+  memset(t->moment1 + first, 0, count * sizeof(float));
+  memset(t->moment2 + first, 0, count * sizeof(float));
+}
+
+/* What the layer learned is kept if its scale was all that was wrong. */
+static void revive(sf_trainer *t, int l, const sf_probes *probes)
+{
+  const sf_param *w = &t->model.param[part[l].weights];
+  const size_t leak = t->model.param[SF_P_LEAK].offset + part[l].layer;
+  census now[3];
+  t->model.value[leak] = 0;
+  sf_layer_scale(t, part[l].weights, probes);
+  count(t, probes, now);
+  if (!(now[l].firing > 100 * dead && now[l].firing < saturated)) {
+    sf_layer_redraw(t, part[l].weights, RNG_REVIVE);
+    sf_layer_scale(t, part[l].weights, probes);
+  }
+  forget(t, w->offset, w->size);
+  forget(t, leak, 1);
+}
+
+/* Counts in a row: of silence (negative) or of saturation (positive). */
+static int next_run(int run, double firing)
+{
+  if (firing < dead) return run < 0 ? run - 1 : -1;
+  if (firing > saturated) return run > 0 ? run + 1 : 1;
+  return 0;
+}
+
+sf_status sf_health_check(sf_trainer *t, int event[3])
+{
+  sf_health *h = &t->health;
+  memset(event, 0, 3 * sizeof *event);
+  if (t->model.config.net == SF_NET_ANN || (t->iteration + 1) % WINDOW) return sf_ok();
+  sf_probes probes;
+  census now[3];
+  SF_TRY(sf_probes_create(&probes, &t->model.config));
+  sf_probes_draw(t, RNG_PROBE, CENSUS, &probes);
+  count(t, &probes, now);
+  for (int l = 0; l < 3; l++) {
+    h->quiet[l] = now[l].quiet;
+    h->run[l] = next_run(h->run[l], now[l].firing);
+  }
+  for (int l = 0; l < 3; l++) {
+    if (abs(h->run[l]) < 2 + h->revived[l]) continue; /* a scene may want a quiet layer: ever more patience */
+    event[l] = h->run[l] < 0 ? -1 : 1;
+    sf_probes_draw(t, RNG_PROBE, PROBES, &probes);
+    revive(t, l, &probes);
+    h->revived[l]++;
+    memset(h->run, 0, sizeof h->run); /* the layers behind see new spikes */
+    break;
+  }
+  sf_probes_free(&probes);
+  return sf_ok();
+}

@@ -1,0 +1,307 @@
+/* The report of `make reproduce` from folders made by hand: averages, energies, the paper's order, what is missing. */
+#include "folder_fixture.h"
+#include "spikefield/io.h"
+#include "spikefield/report.h"
+#include <math.h>
+
+static sf_reproduction report;
+
+static void write_text(const char *path, const char *text)
+{
+  char full[600], dir[600];
+  snprintf(full, sizeof full, "%s/%s", folder, path);
+  snprintf(dir, sizeof dir, "%s", full);
+  *strrchr(dir, '/') = 0;
+  ck_good(sf_make_dir(dir));
+  ck_good(sf_write_file(full, text, strlen(text)));
+}
+
+static void write_run(const char *scene, const char *run, double psnr, int t_r)
+{
+  char path[128], text[400];
+  snprintf(path, sizeof path, "%s/%s/train.json", scene, run);
+  snprintf(text, sizeof text,
+           "{\"model\":\"/home/somebody/m\",\"psnr\":%.17g,\"ssim\":0.5,\"t_r\":%d,\"t_star\":%d.25,\"seconds\":3600,"
+           "\"iterations\":90,\"seed\":7,\"views\":2}",
+           psnr, t_r, t_r);
+  write_text(path, text);
+  snprintf(path, sizeof path, "%s/%s/status", scene, run);
+  write_text(path, "done\n");
+}
+
+/* Energies in mJ. */
+static void write_audit(const char *scene, const char *run, const char *file, double spiking, double twin, int samples)
+{
+  char path[128], text[300];
+  snprintf(path, sizeof path, "%s/%s/%s", scene, run, file);
+  snprintf(text, sizeof text, "{\"energy_spiking_fj\":%.0f,\"energy_ann_fj\":%.0f,\"samples\":%d}", spiking * 1e12,
+           twin * 1e12, samples);
+  write_text(path, text);
+}
+
+static void load(void)
+{
+  sf_reproduction_free(&report);
+  ck_good(sf_reproduction_load(&report, folder));
+}
+
+static void setup(void)
+{
+  make_folder();
+  report = (sf_reproduction){0};
+}
+
+static void teardown(void)
+{
+  sf_reproduction_free(&report);
+  remove_folder();
+}
+
+static double mean(int scene, int run, int metric)
+{
+  return sf_reproduction_mean(&report, scene, run, metric, NULL);
+}
+
+static sf_order_verdict verdict(int a, int b, int metric)
+{
+  sf_order order[SF_ORDERS_MAX];
+  const int n = sf_reproduction_order(&report, order);
+  for (int i = 0; i < n; i++)
+    if (order[i].a == a && order[i].b == b && order[i].metric == metric) return order[i].verdict;
+  ck_abort_msg("no such pair");
+  return SF_ORDER_MISSING;
+}
+
+static void contains(const char *file, const char *text, bool wanted)
+{
+  char *data;
+  size_t size;
+  ck_good(sf_read_file(in(file), 1 << 24, &data, &size));
+  ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%s", text, wanted ? "not " : "", file, data);
+  free(data);
+}
+
+static void print(void)
+{
+  FILE *out = fopen(in("table.md"), "w");
+  ck_assert_ptr_nonnull(out);
+  sf_reproduction_print(out, &report);
+  ck_assert_int_eq(fclose(out), 0);
+}
+
+/* Sums of these numbers are exact in binary: equality, no bound. */
+START_TEST(averages)
+{
+  int count;
+  write_run("b", "beta-5e-7", 30.5, 4);
+  write_run("a", "beta-5e-7", 28.25, 3);
+  write_run("a", "beta-1e-7", 29, 5);
+  load();
+  ck_assert_int_eq(report.count, 2);
+  ck_assert_str_eq(report.scene[0].name, "a");
+  ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 29.375);
+  ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_STEPS) == 3.5);
+  ck_assert(mean(1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 30.5);
+  ck_assert(sf_reproduction_mean(&report, -1, SF_RUN_BETA_1E7, SF_METRIC_PSNR, &count) == 29);
+  ck_assert_int_eq(count, 1);
+  ck_assert(isnan(sf_reproduction_mean(&report, -1, SF_RUN_ANN, SF_METRIC_PSNR, &count)));
+  ck_assert_int_eq(count, 0);
+  /* Only scene a has both: +0.75, although the averages differ by -0.375. */
+  ck_assert_int_eq(verdict(SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_METRIC_PSNR), SF_ORDER_YES);
+  ck_assert_int_eq(verdict(SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_METRIC_PSNR), SF_ORDER_MISSING);
+  ck_assert_int_eq(report.problems, 0);
+}
+END_TEST
+
+START_TEST(energies)
+{
+  write_run("a", "beta-5e-7", 30, 3);
+  write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000); /* 0.04 mJ per sample */
+  write_audit("a", "beta-5e-7", "audit-5.json", 20, 60, 1500);
+  write_audit("a", "beta-5e-7", "prefix-2-0.json", 6, 40, 1000);
+  write_audit("a", "beta-5e-7", "prefix-2-5.json", 8, 60, 1500);
+  write_text("a/beta-5e-7/fixed-0.json", "{\"psnr\":29.5,\"energy_fj\":10000000000000,\"crop\":[0,0,64,48]}");
+  write_text("a/beta-5e-7/fixed-5.json", "{\"psnr\":30.5,\"energy_fj\":20000000000000,\"crop\":[0,0,64,48]}");
+  write_text("a/beta-5e-7/float-0.json", "{\"psnr\":29.75,\"samples\":1000}");
+  write_text("a/beta-5e-7/float-5.json", "{\"psnr\":31,\"samples\":1500}");
+  write_run("a", "ann", 31, 1);
+  write_text("a/ann/float-0.json", "{\"psnr\":31,\"samples\":500}");
+  write_text("a/ann/float-5.json", "{\"psnr\":32,\"samples\":2500}");
+  load();
+  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_ENERGY) == 15);
+  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_TWIN) == 50);
+  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_LOSS) == -0.375);
+  ck_assert(isnan(mean(0, SF_RUN_ANN, SF_METRIC_STEPS)));
+  /* 1e-9: products with 1e-12 round. */
+  ck_assert_double_eq_tol(mean(0, SF_RUN_ANN, SF_METRIC_ENERGY), (500 + 2500) * 0.04 / 2, 1e-9);
+  ck_assert_double_eq_tol(sf_reproduction_saving(&report, 0, SF_RUN_BETA_5E7, SF_SAVING_TWIN), 70, 1e-9);
+  ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_5E7, SF_RUN_ANN), 75, 1e-9);
+  ck_assert_double_eq_tol(sf_reproduction_prefix_energy(&report, 0, SF_RUN_BETA_5E7, 1), 7, 1e-9);
+  ck_assert(isnan(sf_reproduction_prefix_energy(&report, 0, SF_RUN_BETA_5E7, 0)));
+  ck_assert_int_eq(report.scene[0].run[SF_RUN_BETA_5E7].audits, 2);
+  ck_assert_int_eq(report.scene[0].run[SF_RUN_BETA_5E7].width, 64);
+  ck_assert_int_eq(report.problems, 0);
+  print();
+  contains("table.md", "mean of 2 held-out frames of 64 x 48 pixels", true);
+}
+END_TEST
+
+/* Planted: the rendering's count is one fJ off, an audit that disagrees with itself, a file that is no JSON. */
+START_TEST(faults)
+{
+  write_run("a", "beta-5e-7", 30, 3);
+  write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000);
+  write_text("a/beta-5e-7/fixed-0.json", "{\"psnr\":29.5,\"energy_fj\":10000000000001}");
+  load();
+  ck_assert_int_eq(report.problems, 1);
+  ck_assert_ptr_nonnull(strstr(report.problem[0], "10000000000001 fJ in the rendering"));
+  write_text("a/beta-5e-7/audit-1.json",
+             "{\"energy_spiking_fj\":1,\"energy_ann_fj\":2,\"core_equals_recount\":false,\"samples\":1}");
+  write_text("a/no-extra/train.json", "{\"psnr\":");
+  write_text("a/no-stage1/train.json", "{\"psnr\":null,\"ssim\":0.5,\"t_r\":3,\"seconds\":1}");
+  load();
+  ck_assert_int_eq(report.problems, 4);
+  ck_assert_ptr_nonnull(strstr(report.problem[2], "no-stage1/train.json: no finite number 'psnr'"));
+  ck_assert_ptr_nonnull(strstr(report.problem[3], "no-extra/train.json"));
+  ck_assert(isnan(mean(-1, SF_RUN_NO_EXTRA, SF_METRIC_PSNR)));
+  ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 30);
+  print();
+  contains("table.md", "## Problems", true);
+}
+END_TEST
+
+START_TEST(judgement)
+{
+  static const struct {
+    double paper, ours;
+    sf_order_verdict verdict;
+  } row[] = {{0.3, 0.2, SF_ORDER_YES},     {0.3, 0.05, SF_ORDER_TIE},  {0.3, -0.05, SF_ORDER_TIE},
+             {0.3, -0.06, SF_ORDER_NO},    {0.3, 0.051, SF_ORDER_YES}, {-0.3, -1, SF_ORDER_YES},
+             {-0.3, 0.1, SF_ORDER_NO},     {0.03, 0.01, SF_ORDER_YES}, {0.03, -0.04, SF_ORDER_YES},
+             {0.03, -0.2, SF_ORDER_NO},    {0.03, 0.9, SF_ORDER_YES},  {NAN, 1, SF_ORDER_MISSING},
+             {0.3, NAN, SF_ORDER_MISSING}, {0.3, 0, SF_ORDER_TIE}};
+  for (size_t i = 0; i < sizeof row / sizeof *row; i++)
+    ck_assert_msg(sf_order_judge(row[i].paper, row[i].ours, 0.05, 0.05) == row[i].verdict, "row %zu", i);
+}
+END_TEST
+
+/* Every run in the paper's own numbers: every pair must agree; then one number is moved, and just its pairs turn. */
+START_TEST(order)
+{
+  sf_order order[SF_ORDERS_MAX];
+  for (int i = 0; i < SF_RUNS; i++) {
+    const sf_run_kind *k = &sf_run_kinds[i];
+    const double mj = k->paper[SF_METRIC_ENERGY];
+    write_run("s", k->name, k->paper[SF_METRIC_PSNR], 1);
+    if (!isnan(mj) && i != SF_RUN_ANN) write_audit("s", k->name, "audit-0.json", mj, 955.27, 1000);
+  }
+  write_text("s/ann/float-0.json", "{\"psnr\":31,\"samples\":1000}");
+  load();
+  for (int i = 0; i < SF_RUNS; i++)
+    report.scene[0].run[i].value[SF_METRIC_STEPS] = sf_run_kinds[i].paper[SF_METRIC_STEPS];
+  const int n = sf_reproduction_order(&report, order);
+  for (int i = 0; i < n; i++) {
+    ck_assert_msg(order[i].verdict == SF_ORDER_YES, "%s: pair %d is '%s'", order[i].group, i,
+                  sf_order_names[order[i].verdict]);
+    ck_assert_double_eq_tol(order[i].ours, order[i].paper, 1e-9);
+  }
+  ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_1E7, SF_RUN_ANN), 32.65, 0.005); /* printed */
+  ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_1E6, SF_RUN_ANN), 57.57, 0.005);
+  report.scene[0].run[SF_RUN_DECAY].value[SF_METRIC_PSNR] = 32.5;
+  sf_reproduction_order(&report, order);
+  int turned = 0;
+  for (int i = 0; i < n; i++)
+    if (order[i].verdict == SF_ORDER_NO) {
+      ck_assert_str_eq(order[i].group, "input modes");
+      turned++;
+    }
+  ck_assert_int_eq(turned, 2);
+  report.scene[0].run[SF_RUN_NO_EXTRA].value[SF_METRIC_STEPS] = 3.625;
+  ck_assert_int_eq(verdict(SF_RUN_BETA_5E7, SF_RUN_NO_EXTRA, SF_METRIC_STEPS), SF_ORDER_TIE);
+  print();
+  contains("table.md", "22 yes, 1 tie, 2 no, 0 not run.", true);
+  contains("table.md",
+           "No pair missing or reversed: beta, ANN, stage I, L_extra, L_penalty, L_budg, fixed steps, learned", true);
+}
+END_TEST
+
+/* A killed training: a line is cut, and after the resume iterations are there again. */
+START_TEST(log_of_a_resumed_run)
+{
+  write_run("s", "no-budget", 30, 3);
+  write_text("s/no-budget/train.jsonl", "{\"iteration\":16,\"t_star\":7}\n{\"iteration\":32,\"t_star\":6}\n"
+                                        "{\"iteration\":48,\"t_s{\"iteration\":32,\"t_star\":5}\n"
+                                        "{\"iteration\":32,\"t_star\":5.5}\n{\"iteration\":48,\"t_star\":4}\n");
+  load();
+  const sf_run *run = &report.scene[0].run[SF_RUN_NO_BUDGET];
+  const double at[] = {16, 32, 48}, t_star[] = {7, 5.5, 4};
+  ck_assert_int_eq(run->points, 3);
+  for (int i = 0; i < 3; i++) ck_assert(run->iteration[i] == at[i] && run->t_star_at[i] == t_star[i]);
+}
+END_TEST
+
+START_TEST(plots_and_json)
+{
+  int count;
+  load(); /* nothing at all */
+  ck_assert_int_eq(report.count, 0);
+  print();
+  ck_good(sf_reproduction_plots(&report, &count));
+  ck_assert_int_eq(count, 0);
+  write_run("it's", "beta-5e-7", 30, 2);
+  write_text("it's/beta-5e-7/train.json",
+             "{\"model\":\"/home/somebody/m\",\"psnr\":30,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,"
+             "\"prefix_psnr\":[25,30,30.5]}");
+  write_text("it's/fixed-t-minus-1/status", "skipped: 0 steps are outside 1..8\n");
+  write_text("notes/readme", "no scene\n");
+  load();
+  ck_assert_int_eq(report.count, 1);
+  ck_assert(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 1) == 30);
+  ck_assert(isnan(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 3)));
+  ck_good(sf_reproduction_plots(&report, &count));
+  ck_assert_int_eq(count, 2);
+  contains("plots/psnr-steps.gp", "\n2 30\n", true);
+  contains("plots/psnr-steps-it's.gp", "set title 'PSNR after every time step: it_s", true);
+  print();
+  contains("table.md", "- it's, fixed-t-minus-1: skipped: 0 steps", true);
+  contains("table.md", "- it's, ann: not run", true);
+  cJSON *json = sf_reproduction_json(&report);
+  ck_assert_ptr_nonnull(json);
+  ck_good(sf_json_save(json, in("results.json")));
+  cJSON_Delete(json);
+  contains("results.json", "somebody", false);
+  contains("results.json", "\"prefix_psnr\":\t[25, 30, 30.5]", true);
+}
+END_TEST
+
+START_TEST(too_many_prefixes)
+{
+  write_text("s/ann/train.json",
+             "{\"psnr\":30,\"ssim\":0.5,\"t_r\":2,\"seconds\":1,\"prefix_psnr\":[1,2,3,4,5,6,7,8,9]}");
+  load();
+  ck_assert_int_eq(report.problems, 1);
+  sf_reproduction other;
+  ck_bad(sf_reproduction_load(&other, in("nowhere")), SF_E_IO, "nowhere", "folder");
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("report");
+  TCase *tc = tcase_create("report");
+  tcase_add_checked_fixture(tc, setup, teardown);
+  tcase_add_test(tc, averages);
+  tcase_add_test(tc, energies);
+  tcase_add_test(tc, faults);
+  tcase_add_test(tc, judgement);
+  tcase_add_test(tc, order);
+  tcase_add_test(tc, log_of_a_resumed_run);
+  tcase_add_test(tc, plots_and_json);
+  tcase_add_test(tc, too_many_prefixes);
+  suite_add_tcase(suite, tc);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed ? 1 : 0;
+}

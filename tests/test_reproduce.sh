@@ -1,0 +1,132 @@
+#!/bin/bash
+# make reproduce on a tiny scene of its own: all runs; interrupted in the middle and continued equals uninterrupted; a
+# run that fails; what is run again and what is not.   usage: test_reproduce.sh BUILD
+set -u
+export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
+programs=$(cd "${1:?usage: test_reproduce.sh BUILD}/bin" && pwd) || exit 2
+script=$(cd "$(dirname "$0")/../tools" && pwd)/reproduce.sh
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_reproduce.XXXXXX") || exit 1
+pid=
+trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+fail() {
+  echo "FAILED: $1"
+  [ -e "$work/out" ] && tail -n 12 "$work/out" | cut -c -200
+  exit 1
+}
+
+build() { mkdir -p "$work/$1/bin" && ln -s "$programs"/* "$work/$1/bin/"; }
+# trainer LINE: a stand-in in build `part` that runs LINE, notes its arguments and goes on as sf_train.
+trainer() {
+  rm "$work/part/bin/sf_train"
+  printf '%s\n' '#!/bin/bash' "$1" "echo \"\$*\" >>'$work/calls'" "exec '$programs/sf_train' \"\$@\"" >"$work/part/bin/sf_train"
+  chmod +x "$work/part/bin/sf_train"
+}
+# reproduce NAME STATUS OPTIONS...: output in $work/out
+reproduce() {
+  local name=$1 wanted=$2 got
+  shift 2
+  "$script" "$work/$name" --profile smoke "$@" >"$work/out" 2>&1
+  got=$?
+  [ $got -eq "$wanted" ] || fail "$name: exit status $got, expected $wanted"
+}
+runs() { echo "$work/$1/reproduce/smoke/textured"; }
+count() { grep -c "$1" "$work/out"; }
+times() { (cd "$(runs "$1")" && stat -c '%n %y' ./*/train.json ./*/fixed-0.json 2>/dev/null | sort); }
+# What a run found, less its times.
+facts() { grep -v '"seconds"\|"samples_per_second"' "$work/$1/reproduce/smoke/results.json"; }
+
+build whole
+reproduce whole 0
+[ "$(count '^\[.* dB, ')" -eq 14 ] || fail "not 14 runs"
+[ -s "$work/whole/reproduce/smoke/table.md" ] || fail "no table.md"
+grep -q 'Problems\|without a result' "$work/whole/reproduce/smoke/table.md" && fail "a run is missing or broken"
+if command -v gnuplot >/dev/null; then
+  for plot in psnr-steps psnr-energy psnr-steps-textured psnr-energy-textured t-star-textured; do
+    grep -q '</svg>' "$work/whole/reproduce/smoke/plots/$plot.svg" || fail "$plot.svg is not whole"
+  done
+else
+  [ "$(count 'gnuplot-nox')" -eq 1 ] || fail "the missing gnuplot is not named"
+fi
+echo "whole: 14 runs"
+
+# Stopped in the middle of a training; SIGTERM once, SIGKILL of script and trainer once.
+interrupt() { # SIGNAL RUN
+  local signal=$1 log children
+  log=$(runs part)/$2/train.jsonl
+  setsid "$script" "$work/part" --profile smoke >"$work/out" 2>&1 &
+  pid=$!
+  for ((i = 0; i < 4000; i++)); do
+    [ -s "$log" ] && break
+    kill -0 "$pid" 2>/dev/null || fail "over before $2 began"
+    sleep 0.005
+  done
+  children=
+  [ "$signal" = TERM ] || children=$(pgrep -P "$pid")
+  # shellcheck disable=SC2086
+  kill "-$signal" "$pid" $children
+  wait "$pid" 2>/dev/null
+  status=$?
+  flock -w 20 "$work/part/reproduce/smoke/lock" true || fail "something is still at work"
+  pid=
+  [ ! -e "$(runs part)/fixed-t/train.json" ] || fail "nothing was left to do"
+}
+build part
+trainer :
+for run in mode-hybrid mode-decay mode-no-decay; do # until the signal meets a training
+  interrupt TERM $run
+  [ $status -eq 130 ] || fail "SIGTERM: exit status $status, expected 130"
+  [ "$(count 'nothing is lost')" -eq 1 ] || fail "no word about going on"
+  [ ! -e "$(runs part)/$run/train.json" ] && break
+done
+[ -s "$(runs part)/$run/model.safetensors" ] || fail "no checkpoint of $run"
+[ ! -e "$(runs part)/$run/train.json" ] || fail "no training was met"
+grep -q -- --resume "$work/calls" && fail "--resume without a checkpoint"
+times part >"$work/before"
+[ -s "$work/before" ] || fail "no run was finished before the interrupt"
+interrupt KILL no-stage1
+reproduce part 0
+[ "$(grep -c -- --resume "$work/calls")" -eq 1 ] || fail "not one training was resumed"
+[ "$(count 'finished before')" -ge 4 ] || fail "finished runs were repeated"
+times part >"$work/after"
+[ -z "$(comm -23 "$work/before" "$work/after")" ] || fail "results of finished runs were written again"
+for model in "$(runs whole)"/*/model.safetensors; do
+  run=${model%/*}
+  cmp "$model" "$(runs part)/${run##*/}/model.safetensors" || fail "${run##*/}: interrupted and continued differs"
+done
+diff <(facts whole) <(facts part) >"$work/difference" || { cat "$work/difference"; fail "results.json differs"; }
+echo "interrupted: the same 14 models and results"
+
+# A run that fails: the rest goes on, the report shows it, the next call repeats it alone. Its parameters were changed.
+echo "sf_train DATA --seed 2" >"$(runs part)/no-extra/train.cmd"
+# shellcheck disable=SC2016
+trainer 'case " $* " in *" --no-extra "*) echo "sf_train: planted failure" >&2; exit 1 ;; esac'
+reproduce part 1
+[ "$(count 'finished before')" -eq 13 ] || fail "changed parameters of one run: not 13 others kept"
+[ "$(count 'no-extra .*FAILED (1): sf_train: planted failure')" -eq 1 ] || fail "the failure is not reported"
+grep -q '^- textured, no-extra: failed: sf_train: planted failure$' "$work/part/reproduce/smoke/table.md" || fail "not in the table"
+grep -Eq '^\| without L_extra +\| +- ' "$work/part/reproduce/smoke/table.md" || fail "a failed run has figures"
+reproduce part 0 --report
+ln -sf "$programs/sf_train" "$work/part/bin/sf_train"
+reproduce part 0
+[ "$(count 'finished before')" -eq 13 ] || fail "the failed run was not repeated alone"
+diff <(facts whole) <(facts part) >/dev/null || fail "results.json differs after the failure"
+echo "failure: reported, repeated alone"
+
+# Other frames: audited again, not trained again.
+times part | grep train.json >"$work/before"
+reproduce part 0 --audit-views 2
+[ "$(count 'finished before')" -eq 0 ] || fail "new frames were not audited"
+times part | grep train.json | cmp - "$work/before" || fail "trained again for other frames"
+[ -s "$(runs part)/fixed-t/audit-1.json" ] || fail "the second frame was not audited"
+flock "$work/part/reproduce/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
+[ "$(count 'another run')" -eq 1 ] || fail "the other run is not named"
+
+for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some"; do
+  # shellcheck disable=SC2086
+  reproduce part 2 $bad
+  [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"
+done
+"$script" "$work/part" --scenes "$work/nowhere" >"$work/out" 2>&1 && fail "scenes from nowhere"
+[ "$(count nowhere)" -eq 1 ] || fail "the missing folder is not named"
+echo "parameters: ok"

@@ -1,0 +1,64 @@
+/* A small scene and small training runs. */
+#ifndef SF_TESTS_TRAIN_FIXTURE_H
+#define SF_TESTS_TRAIN_FIXTURE_H
+#include "folder_fixture.h"
+#include "train/internal.h"
+#include <math.h>
+
+enum { T = 6 };
+
+static inline void make_scene(int views)
+{
+  make_folder();
+  const sf_procedural_options o = {.width = 24, .height = 24, .train_views = views, .test_views = 1, .seed = 1};
+  ck_good(sf_procedural_write("simple", in("scene"), &o, NULL, NULL));
+}
+
+static inline sf_dataset load(const char *split)
+{
+  sf_dataset data;
+  ck_good(sf_dataset_load(&data, in("scene"), split, &(sf_dataset_options){.downscale = 1}));
+  return data;
+}
+
+static inline sf_train_options small_run(void)
+{
+  sf_train_options o = sf_train_defaults();
+  o.config.levels = 4;
+  o.config.log2_hash = 10;
+  o.config.finest_res = 64;
+  o.config.hidden = 32;
+  o.config.steps = T;
+  o.config.lattice = 128;
+  o.config.occ_res = 16;
+  o.samples = 1024;
+  o.stage1 = 12;
+  o.stage2 = 28;
+  return o;
+}
+
+static inline sf_trainer *start(const sf_dataset *data, const sf_train_options *o, const char *resume)
+{
+  sf_trainer *t;
+  ck_good(sf_trainer_create(&t, data, o, resume));
+  return t;
+}
+
+/* The statistics of the last of n iterations. */
+static inline sf_train_stats steps(sf_trainer *t, int n)
+{
+  sf_train_stats stats = {0};
+  for (int i = 0; i < n; i++) ck_good(sf_trainer_step(t, &stats));
+  return stats;
+}
+
+/* Seconds are in a checkpoint, so two runs' values are compared, not their files. */
+static inline void same_model(const sf_trainer *a, const sf_trainer *b)
+{
+  ck_assert_int_eq(memcmp(a->model.value, b->model.value, a->model.size * sizeof(float)), 0);
+  ck_assert_int_eq(memcmp(a->moment2, b->moment2, a->model.size * sizeof(float)), 0);
+  ck_assert_float_eq(a->model.t_star, b->model.t_star);
+  ck_assert_int_eq(memcmp(&a->health, &b->health, sizeof a->health), 0);
+  ck_assert_int_eq(a->samples, b->samples);
+}
+#endif

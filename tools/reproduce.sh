@@ -1,0 +1,204 @@
+#!/bin/bash
+# make reproduce: for every scene the runs of the paper's tables, their audits, and one report beside the paper.
+# Finished runs are kept, an interrupted training goes on from its checkpoint, changed parameters start a run again.
+set -u
+export LC_ALL=C
+usage="usage: reproduce.sh BUILD [options]
+  --profile NAME       quick (default), full, smoke (a procedural scene of its own, seconds)
+  --scenes FOLDER      a scene in the Blender layout, or a folder of scenes
+  --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full: all)
+  --report             no runs: tables and plots of what is there
+  --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
+  --train 'OPTIONS'    further options of sf_train, every run
+  --eval-views N       held-out views for PSNR and SSIM (0 = all)
+  --prefix-views N     held-out views for the PSNR after every step (0 = none)
+  --prefix-runs WHICH  learned (the three betas and the ANN) or all
+  --audit-views N      held-out frames for the fixed-point core and the energy audit, spread over the split
+  --audit-downscale F  shrink these frames by F
+  --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
+Results: BUILD/reproduce/PROFILE/{table.md,results.json,plots/}; runs in SCENE/RUN/ beside them."
+
+die() { echo "reproduce: $1" >&2; exit "${2:-2}"; }
+[ $# -ge 1 ] || die "missing argument BUILD (see reproduce.sh --help)"
+if [ "$1" = --help ] || [ "$1" = -h ]; then echo "$usage"; exit 0; fi
+build=$1
+shift
+bin=$build/bin
+
+# ---- parameters ----
+
+profile=quick
+for ((i = 1; i <= $#; i++)); do
+  if [ "${!i}" = --profile ]; then j=$((i + 1)); profile=${!j:-}; fi
+done
+declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=1 [train]="" [rtl-rays]=4)
+case $profile in
+  quick)
+    set+=([stage1]=600 [stage2]=1800 [eval-views]=8 [prefix-views]=2 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
+    ;;
+  full)
+    set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=1)
+    ;;
+  smoke)
+    set+=([stage1]=30 [stage2]=60 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=1)
+    set+=([samples]=512 [rtl-rays]=0)
+    set+=([train]="--levels 4 --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32")
+    ;;
+  *) die "--profile '$profile' is unknown: expected quick, full or smoke" ;;
+esac
+scenes="" only="" report_only=""
+while [ $# -gt 0 ]; do
+  name=${1#--}
+  case $1 in
+    --report) report_only=1; shift; continue ;;
+    --help | -h) echo "$usage"; exit 0 ;;
+  esac
+  [ $# -ge 2 ] || die "$1 needs a value (see reproduce.sh --help)"
+  case $1 in
+    --profile) ;;
+    --scenes) scenes=$2 ;;
+    --only) only=$2 ;;
+    --train) set[train]="${set[train]}${set[train]:+ }$2" ;;
+    --prefix-runs)
+      [[ $2 =~ ^(learned|all)$ ]] || die "--prefix-runs '$2' is unknown: expected learned or all"
+      set[$name]=$2 ;;
+    --stage1 | --stage2 | --samples | --steps | --seed | --downscale | --eval-views | --prefix-views | --audit-views | \
+      --audit-downscale | --rtl-rays)
+      [[ $2 =~ ^[0-9]{1,9}$ ]] || die "$1 '$2' is not a whole number"
+      set[$name]=$((10#$2)) ;;
+    *) die "unknown option $1 (see reproduce.sh --help)" ;;
+  esac
+  shift 2
+done
+for name in audit-views audit-downscale steps downscale; do [ "${set[$name]}" -ge 1 ] || die "--$name starts at 1"; done
+[ "${set[steps]}" -le 8 ] || die "--steps ${set[steps]} is out of range: 1..8"
+out=$build/reproduce/$profile
+for program in sf_train sf_export sim_render energy_audit sf_report sf_scene; do
+  [ -x "$bin/$program" ] || die "$bin/$program is missing: run make first" 1
+done
+
+# ---- the report ----
+
+plots() {
+  local script failed=0
+  if ! command -v gnuplot >/dev/null; then
+    echo "reproduce: no plots: gnuplot is missing (Debian package gnuplot-nox); the scripts are in $out/plots"
+    return 0
+  fi
+  for script in "$out"/plots/*.gp; do
+    [ -e "$script" ] || continue
+    (cd "$out/plots" && gnuplot "${script##*/}") >"$out/plots/gnuplot.log" 2>&1 && continue
+    echo "reproduce: $script: $(tail -n 1 "$out/plots/gnuplot.log")" >&2
+    failed=1
+  done
+  rm -f "$out/plots/gnuplot.log"
+  [ $failed -eq 0 ] && echo "plots: $out/plots/*.svg"
+  return $failed
+}
+
+report() {
+  [ -d "$out" ] || die "$out: no runs yet (make reproduce PROFILE=$profile SCENES=folder)" 1
+  rm -f "$out"/plots/*.gp "$out"/plots/*.svg
+  "$bin/sf_report" "$out"
+  local status=$?
+  [ -e "$out/table.md" ] && { plots || status=1; }
+  return $status
+}
+
+if [ -n "$report_only" ]; then
+  report
+  exit
+fi
+
+# ---- scenes ----
+
+is_scene() { [ -e "$1/transforms_train.json" ] || [ -e "$1/transforms.json" ]; }
+is_blender() { [ -e "$1/transforms_train.json" ] && [ -e "$1/transforms_test.json" ]; }
+paths=()
+mkdir -p "$out" || exit 1
+exec 9>"$out/lock"
+flock -n 9 || die "another run of profile $profile is at work in $out" 1
+if [ "$profile" = smoke ]; then
+  data=$build/reproduce/smoke-data/textured
+  if [ ! -e "$data/complete" ]; then
+    rm -rf "$data"
+    "$bin/sf_scene" textured -o "$data" --size 32 --train 10 --test 2 >/dev/null && touch "$data/complete" || exit 1
+  fi
+  paths=("$data")
+else
+  [ -n "$scenes" ] || die "--scenes FOLDER is missing (make reproduce SCENES=folder)"
+  [ -d "$scenes" ] || die "$scenes: no such folder (make reproduce SCENES=folder)" 1
+  scenes=$(cd "$scenes" && pwd -P) || exit 1
+  if is_scene "$scenes"; then
+    paths=("$scenes")
+  else
+    for folder in "$scenes"/*/; do is_blender "${folder%/}" && paths+=("${folder%/}"); done
+    if [ -z "$only" ] && [ "$profile" = quick ] && [ ${#paths[@]} -gt 2 ]; then
+      if is_blender "$scenes/lego" && is_blender "$scenes/mic"; then only="lego mic"; else paths=("${paths[@]:0:2}"); fi
+    fi
+    if [ -n "$only" ]; then
+      paths=()
+      for name in $only; do
+        is_scene "$scenes/$name" || die "$scenes/$name: no scene in the Blender layout there" 1
+        paths+=("$scenes/$name")
+      done
+    fi
+  fi
+  [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene with transforms_train.json and transforms_test.json there" 1
+fi
+
+child="" stop=""
+trap on_signal INT TERM HUP
+# shellcheck source=tools/reproduce_runs.sh
+. "${BASH_SOURCE[0]%/*}/reproduce_runs.sh"
+
+# ---- all runs of a scene ----
+
+# Which held-out views are audited: spread evenly over the split.
+choose_views() {
+  local frames n i
+  frames=$(grep -o '"file_path"' "$data/transforms_test.json" 2>/dev/null | wc -l)
+  n=${set[audit-views]} views=
+  [ "$frames" -ge 1 ] || frames=1
+  [ "$n" -le "$frames" ] || n=$frames
+  for ((i = 0; i < n; i++)); do views="$views${views:+ }$((i * frames / n))"; done
+}
+
+one_scene() {
+  scene=${data##*/}
+  data_id="$(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)"
+  choose_views
+  common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} --steps ${set[steps]} --seed ${set[seed]} --samples ${set[samples]}"
+  common="$common --downscale ${set[downscale]} --eval-views ${set[eval-views]}${set[train]:+ ${set[train]}}"
+  local prefixes="--psnr-prefixes ${set[prefix-views]}"
+  prefixes_rest=
+  [ "${set[prefix-runs]}" = learned ] || prefixes_rest=$prefixes
+  # shellcheck disable=SC2086
+  {
+    one_run beta-5e-7 --beta 5e-7 $prefixes
+    t_r=$(number "$out/$scene/beta-5e-7/train.json" t_r)
+    one_run ann --net ann $prefixes
+    one_run beta-1e-7 --beta 1e-7 $prefixes
+    one_run beta-1e-6 --beta 1e-6 $prefixes
+    for mode in hybrid decay no-decay; do
+      one_run "mode-$mode" --beta 5e-7 --input-mode $mode --fixed-steps "${set[steps]}" $prefixes_rest
+    done
+    for part in stage1 extra penalty budget; do one_run "no-$part" --beta 5e-7 "--no-$part" $prefixes_rest; done
+    fixed_run fixed-t-minus-1 $((${t_r:-0} - 1))
+    fixed_run fixed-t "${t_r:-0}"
+    fixed_run fixed-t-plus-1 $((${t_r:-0} + 1))
+  }
+}
+
+started=$SECONDS done_seconds=0 done_runs=0 index=0 failures=0 ticker_pid=""
+total=$((14 * ${#paths[@]}))
+version=$("$bin/sf_train" --version)
+for data in "${paths[@]}"; do
+  [ -n "$stop" ] || one_scene
+done
+if [ -n "$stop" ]; then
+  echo "reproduce: stopped; nothing is lost: the same command goes on (make reproduce-report shows what is there)" >&2
+  exit 130
+fi
+report || failures=$((failures + 1))
+[ $failures -eq 0 ] || die "$failures of the steps above failed; the same command tries them again" 1

@@ -1,0 +1,241 @@
+# shellcheck shell=bash disable=SC2154
+# One run of `make reproduce`: training, export, renderings, audits, and what is printed about it. Sourced by
+# reproduce.sh, whose variables it reads: set[], bin, out, data, data_id, scene, views, common, version, total.
+
+# ---- one program at a time, stopped by SIGINT, SIGTERM or SIGHUP ----
+
+on_signal() {
+  stop=1
+  [ -n "$child" ] && kill -TERM "$child" 2>/dev/null
+}
+
+# run COMMAND...: in a session of its own, so that a Ctrl-C reaches it once, through us. Inherits the lock.
+run() {
+  local code
+  [ -z "$stop" ] || return 130
+  setsid "$@" </dev/null &
+  child=$!
+  [ -z "$stop" ] || kill -TERM "$child" 2>/dev/null # a signal before the assignment
+  wait "$child"
+  code=$?
+  while kill -0 "$child" 2>/dev/null; do # a signal interrupted wait, not the child
+    wait "$child"
+    code=$?
+  done
+  child=
+  [ -z "$stop" ] || return 130
+  return $code
+}
+
+# ---- progress ----
+
+clock() { printf '%d:%02d:%02d' $(($1 / 3600)) $(($1 / 60 % 60)) $(($1 % 60)); }
+
+# ETA from the mean wall time of the runs that are finished, in this call or before; in the very first run from its
+# iterations ($1).
+eta() {
+  local left run_seconds
+  if [ "$done_runs" -gt 0 ]; then
+    run_seconds=$((done_seconds / done_runs))
+  elif [ "${1:-0}" -gt 0 ]; then
+    run_seconds=$(((SECONDS - run_started) * (set[stage1] + set[stage2]) / $1))
+  else
+    echo "ETA -"
+    return
+  fi
+  left=$((run_seconds * (total - index + 1) - (SECONDS - run_started)))
+  echo "ETA $(clock $((left > 0 ? left : 0)))"
+}
+say() { printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$1" "$(clock $((SECONDS - started)))" "$(eta "${2:-}")"; }
+
+# On a terminal the line of a run moves.
+ticker() {
+  local iteration what
+  trap - INT TERM HUP
+  while sleep 1; do
+    iteration=$(tail -n 1 "$dir/train.jsonl" 2>/dev/null | sed -nE 's/^\{"iteration":([0-9]+).*/\1/p')
+    what="iteration ${iteration:-0} of $((set[stage1] + set[stage2]))"
+    [ -e "$dir/train.json" ] && what="rendering and counting"
+    printf '\r\033[K%s' "$(say "$what" "$iteration")" >&2
+  done
+}
+start_ticker() {
+  ticker_pid=
+  [ -t 2 ] || return 0
+  ticker 9>&- &
+  ticker_pid=$!
+}
+stop_ticker() {
+  [ -n "$ticker_pid" ] || return 0
+  kill "$ticker_pid" 2>/dev/null
+  wait "$ticker_pid" 2>/dev/null
+  printf '\r\033[K' >&2
+  ticker_pid=
+}
+# ---- one run ----
+
+last_line() { grep -v '^[[:space:]]*$' "$1" 2>/dev/null | tail -n 1 | cut -c -300; }
+
+# output FILE COMMAND...: standard output to FILE unless it is there already; FILE is whole or absent.
+output() {
+  local file=$1 code
+  shift
+  [ -s "$file" ] && return 0
+  run "$@" >"$file.part" 2>>"$dir/log"
+  code=$?
+  if [ $code -eq 0 ]; then mv "$file.part" "$file"; else rm -f "$file.part"; fi
+  return $code
+}
+
+train() {
+  local code resume=()
+  [ -s "$dir/train.json" ] && return 0
+  [ -s "$dir/model.safetensors" ] && resume=(--resume)
+  # shellcheck disable=SC2086
+  run "$bin/sf_train" "$data" $train_options --quiet -o "$dir/model.safetensors" --log "$dir/train.jsonl" \
+    --summary "$dir/train.json" "${resume[@]}" >>"$dir/log" 2>&1
+  code=$?
+  if [ $code -eq 1 ] && [ ${#resume[@]} -gt 0 ] && last_line "$dir/log" | grep -q 'cannot resume'; then
+    # Killed between the last checkpoint and the summary: there is only the finished model, without optimiser.
+    rm -f "$dir/model.safetensors" "$dir/train.jsonl"
+    # shellcheck disable=SC2086
+    run "$bin/sf_train" "$data" $train_options --quiet -o "$dir/model.safetensors" --log "$dir/train.jsonl" \
+      --summary "$dir/train.json" >>"$dir/log" 2>&1
+    code=$?
+  fi
+  return $code
+}
+
+render() { # FILE SCENE VIEW ARGUMENTS...
+  local file=$1 snn=$2 view=$3
+  shift 3
+  output "$file" "$bin/sim_render" "$snn" "$data" --view "$view" --downscale "${set[audit-downscale]}" --json --quiet \
+    -o "$dir/frame.exr" "$@"
+  local code=$?
+  rm -f "$dir/frame.exr"
+  return $code
+}
+
+audit() { # FILE SCENE VIEW
+  output "$1" "$bin/energy_audit" "$2" "$data" --view "$3" --downscale "${set[audit-downscale]}" --seed "${set[seed]}" \
+    --rtl-rays "${set[rtl-rays]}" --json --quiet
+}
+
+evaluate_ann() {
+  local view reference=$out/$scene/beta-5e-7/scene.snn
+  if [ ! -s "$reference" ]; then
+    echo "its energy needs the fixed-point scene of $scene/beta-5e-7, which failed" >>"$dir/log"
+    return 1
+  fi
+  for view in $views; do
+    render "$dir/float-$view.json" "$reference" "$view" --backend float --model "$dir/model.safetensors" --steps 1 || return
+  done
+}
+
+evaluate_snn() {
+  local view t steps
+  output "$dir/export.json" "$bin/sf_export" "$dir/model.safetensors" -o "$dir/scene.snn" --json || return
+  for view in $views; do
+    render "$dir/fixed-$view.json" "$dir/scene.snn" "$view" --backend fixed --png "$dir/frame-$view.png" || return
+    render "$dir/float-$view.json" "$dir/scene.snn" "$view" --backend float --model "$dir/model.safetensors" || return
+    audit "$dir/audit-$view.json" "$dir/scene.snn" "$view" || return
+  done
+  [ "$name" = beta-5e-7 ] || return 0
+  for ((t = 1; t <= set[steps]; t++)); do
+    for view in $views; do
+      [ -s "$dir/prefix-$t-$view.json" ] && continue
+      output "$dir/prefix-$t.part" "$bin/sf_export" "$dir/model.safetensors" -o "$dir/prefix.snn" --steps "$t" --json || return
+      audit "$dir/prefix-$t-$view.json" "$dir/prefix.snn" "$view" || return
+      rm -f "$dir/prefix-$t.part"
+    done
+  done
+  rm -f "$dir/prefix.snn"
+}
+
+# keep FILE TEXT: true if FILE holds TEXT already, else writes it.
+keep() {
+  [ "$(cat "$1" 2>/dev/null)" = "$2" ] && return 0
+  printf '%s\n' "$2" >"$1"
+  return 1
+}
+
+# Writes the parameters beside the results and drops the results of others.
+prepare() {
+  local evaluation
+  mkdir -p "$dir" || return 1
+  if [ "$(cat "$dir/train.cmd" 2>/dev/null)" != "sf_train DATA $train_options" ] ||
+    [ "$(cat "$dir/data" 2>/dev/null)" != "$data_id" ]; then
+    rm -rf "$dir"
+    mkdir -p "$dir" || return 1
+    keep "$dir/data" "$data_id"
+    keep "$dir/train.cmd" "sf_train DATA $train_options"
+    keep "$dir/version" "$version"
+  fi
+  evaluation="sim_render, energy_audit: views $views, --downscale ${set[audit-downscale]} --rtl-rays ${set[rtl-rays]} --seed ${set[seed]}"
+  if ! keep "$dir/eval.cmd" "$evaluation"; then
+    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir"/frame-*.png
+    [ "$(cat "$dir/status" 2>/dev/null)" != "done" ] || rm -f "$dir/status"
+  fi
+}
+
+one_run() { # NAME OPTIONS OF SF_TRAIN...
+  name=$1
+  shift
+  dir=$out/$scene/$name
+  train_options="$common${*:+ $*}"
+  index=$((index + 1)) run_started=$SECONDS
+  local code before
+  [ -z "$stop" ] || return
+  prepare || { failures=$((failures + 1)); return; }
+  if [ "$(cat "$dir/status" 2>/dev/null)" = "done" ]; then
+    done_runs=$((done_runs + 1)) done_seconds=$((done_seconds + $(cat "$dir/wall" 2>/dev/null || echo 0)))
+    say "finished before"
+    return
+  fi
+  echo "not finished" >"$dir/status"
+  start_ticker
+  train && if [ "$name" = ann ]; then evaluate_ann; else evaluate_snn; fi
+  code=$?
+  stop_ticker
+  before=$(cat "$dir/wall" 2>/dev/null || echo 0)
+  echo $((before + SECONDS - run_started)) >"$dir/wall"
+  if [ -n "$stop" ]; then
+    say "stopped, will go on from here"
+  elif [ $code -eq 0 ]; then
+    echo "done" >"$dir/status"
+    done_runs=$((done_runs + 1)) done_seconds=$((done_seconds + $(cat "$dir/wall")))
+    run_started=$SECONDS index=$((index + 1))
+    local remaining
+    remaining=$(eta)
+    index=$((index - 1))
+    printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$(figures)" \
+      "$(clock $((SECONDS - started)))" "$remaining"
+  else
+    echo "failed: $(last_line "$dir/log")" >"$dir/status"
+    failures=$((failures + 1))
+    say "FAILED ($code): $(last_line "$dir/log")"
+  fi
+}
+
+number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" 2>/dev/null | head -n 1; }
+figures() { printf 'PSNR %.2f dB, %s steps, %d s' "$(number "$dir/train.json" psnr)" "$(number "$dir/train.json" t_r)" "$(cat "$dir/wall")"; }
+
+skip_run() { # NAME WHY
+  name=$1 dir=$out/$scene/$1 index=$((index + 1)) run_started=$SECONDS
+  [ -z "$stop" ] || return
+  rm -rf "$dir"
+  mkdir -p "$dir"
+  echo "skipped: $2" >"$dir/status"
+  say "skipped: $2"
+}
+
+fixed_run() { # NAME STEPS
+  if [ -z "$t_r" ]; then
+    skip_run "$1" "beta-5e-7 failed, its t_r is not known"
+  elif [ "$2" -lt 1 ] || [ "$2" -gt "${set[steps]}" ]; then
+    skip_run "$1" "$2 steps are outside 1..${set[steps]}"
+  else
+    # shellcheck disable=SC2086
+    one_run "$1" --beta 5e-7 --fixed-steps "$2" $prefixes_rest
+  fi
+}
