@@ -148,28 +148,43 @@ static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
   to->g_colour_leak += x->g_colour_leak;
 }
 
-/* Sums the groups in order into the flat gradient. */
+/* Adds the groups up in order, in the first one. */
+static void add_groups(sf_trainer *t)
+{
+  const size_t n = sizeof(sf_net_grad) / sizeof(float), part = 4096;
+#pragma omp parallel for schedule(static)
+  for (size_t first = 0; first < n; first += part)
+    for (int g = 1; g < GROUPS; g++) {
+      float *to = (float *)t->group[0].grad;
+      const float *from = (const float *)t->group[g].grad;
+      for (size_t i = first; i < n && i < first + part; i++) to[i] += from[i];
+    }
+}
+
+/* The groups' sum into the flat gradient. */
 static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing[3])
 {
   const sf_model *m = &t->model;
   const int hidden = m->config.hidden, features = 2 * m->config.levels;
   double spikes[3] = {0}, neurons = 0;
   float *at[SF_P_COUNT];
+  add_groups(t);
+  const sf_net_grad *grad = t->group[0].grad;
   for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
+  add_matrix(at[SF_P_W1], grad->w1, hidden, features, (features + 15) / 16 * 16);
+  add_matrix(at[SF_P_W2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
+  for (int r = 0; r < hidden; r++) {
+    float *row = at[SF_P_W3] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
+    add_matrix(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
+    add_matrix(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
+  }
+  add_matrix(at[SF_P_W4], grad->w4, hidden, hidden, hidden);
+  for (int r = 0; r < hidden; r++)
+    for (int c = 0; c < hidden; c++) at[SF_P_W4][r * hidden + c] += grad->w4t[c * hidden + r];
+  add_matrix(at[SF_P_W5], grad->w5, 3, hidden, hidden);
+  add_matrix(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
   for (int n = 0; n < GROUPS; n++) {
     const sf_group *g = &t->group[n];
-    add_matrix(at[SF_P_W1], g->grad->w1, hidden, features, (features + 15) / 16 * 16);
-    add_matrix(at[SF_P_W2], g->grad->w2, SF_DENSITY_OUT, hidden, hidden);
-    for (int r = 0; r < hidden; r++) {
-      float *row = at[SF_P_W3] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
-      add_matrix(row, g->grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
-      add_matrix(row + SF_DIR_FEATURES, g->grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
-    }
-    add_matrix(at[SF_P_W4], g->grad->w4, hidden, hidden, hidden);
-    for (int r = 0; r < hidden; r++)
-      for (int c = 0; c < hidden; c++) at[SF_P_W4][r * hidden + c] += g->grad->w4t[c * hidden + r];
-    add_matrix(at[SF_P_W5], g->grad->w5, 3, hidden, hidden);
-    add_matrix(at[SF_P_LEAK], g->grad->leak, 1, SF_LAYERS, SF_LAYERS);
     add_sums(sums, &g->sums, mean);
     for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
     neurons += g->neurons;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { SHARE = 64 }; /* an update visits 1/SHARE of all cells and as many of the occupied ones */
+enum { SHARE = 32 }; /* an update visits 1/SHARE of all cells and as many of the occupied ones */
 
 static const float decay = 0.95f, density_threshold = 10.0f;
 
