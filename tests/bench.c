@@ -1,6 +1,6 @@
 /* Speed of the trainer's parts, each beside its ceiling and its naive version. usage: bench OUT.json
- * Ceilings are measured on the spot: fp32 multiply-adds per second of all threads over the operations of one sample,
- * or memory bandwidth over the bytes. */
+ * Ceilings are measured on the spot: multiply-adds per second of all threads (of bfloat16 pairs where the kernels use
+ * them) over the operations of one sample with every product dense, or memory bandwidth over the bytes. */
 #include "float_fixture.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
@@ -33,20 +33,40 @@ __attribute__((target("avx512f,fma"))) static double fma_chain_avx512(long round
   return sum;
 }
 
-static double peak_fma(void)
+/* The same for dot products of bfloat16 pairs: two multiply-adds a lane. */
+__attribute__((target("avx512f,avx512bf16"))) static double dot_chain_avx512bf16(long rounds)
 {
-  if (!sf_kernels_select("avx512")) return NAN;
+  lanes acc[12];
+  for (int i = 0; i < 12; i++) acc[i] = (lanes){0} + (float)i;
+  const lanes x = (lanes){0}, y = (lanes){0};
+  for (long r = 0; r < rounds; r++)
+#pragma GCC unroll 12
+    for (int i = 0; i < 12; i++) {
+      lanes z = acc[i];
+      __asm__ volatile("vdpbf16ps %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));
+      acc[i] = z;
+    }
+  double sum = 0;
+  for (int i = 0; i < 12; i++) sum += acc[i][0];
+  return sum;
+}
+
+/* Multiply-adds per second of all threads in the arithmetic of the named kernels. */
+static double peak(const char *kernels)
+{
+  const bool pairs = !strcmp(kernels, "avx512bf16");
+  if (!pairs && strcmp(kernels, "avx512")) return NAN;
   const long rounds = 20000000;
   double start = sf_seconds(), sink = 0;
 #pragma omp parallel reduction(+ : sink)
-  sink += fma_chain_avx512(rounds);
+  sink += pairs ? dot_chain_avx512bf16(rounds) : fma_chain_avx512(rounds);
   double seconds = sf_seconds() - start;
-  return sink > -1 ? (double)rounds * 12 * 16 * omp_get_max_threads() / seconds : 0;
+  return sink > -1 ? (double)rounds * 12 * 16 * (1 + pairs) * omp_get_max_threads() / seconds : 0;
 }
 #else
-static double peak_fma(void)
+static double peak(const char *kernels)
 {
-  return NAN;
+  return kernels ? NAN : 0;
 }
 #endif
 
@@ -258,9 +278,10 @@ static sf_status bench_iteration(cJSON *json)
 int main(int argc, char **argv)
 {
   cJSON *json = cJSON_CreateObject();
-  const double fma = peak_fma(), bytes = bandwidth();
-  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read\n", omp_get_max_threads(),
-         sf_kernels_select(NULL)->name, fma * 1e-9, bytes * 1e-9);
+  const char *kernels = sf_kernels_training()->name;
+  const double fma = peak(kernels), bytes = bandwidth();
+  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read\n", omp_get_max_threads(), kernels, fma * 1e-9,
+         bytes * 1e-9);
   bench_nets(json, fma);
   bench_grid(json);
   bench_adam(json, bytes);
