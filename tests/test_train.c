@@ -147,16 +147,16 @@ START_TEST(every_prefix_is_evaluated)
 }
 END_TEST
 
-/* The model at the end is the mean over the last twentieth of the run: here each of the last 10 of 200 iterations. */
+/* The model at the end is the mean over the last fortieth of the run: here each of the last 10 of 400 iterations. */
 START_TEST(the_last_iterations_are_averaged)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
-  o.stage1 = 50;
-  o.stage2 = 150;
+  o.stage1 = 100;
+  o.stage2 = 300;
   o.samples = 256;
   sf_trainer *t = start(&data, &o, NULL);
-  steps(t, 190);
+  steps(t, 390);
   ck_assert_int_eq(t->averaged, 0);
   double *sum = calloc(t->model.size, sizeof *sum);
   for (int i = 0; i < 9; i++) {

@@ -34,7 +34,7 @@ done
 declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=1 [train]="" [rtl-rays]=4)
 case $profile in
   quick)
-    set+=([stage1]=600 [stage2]=1800 [eval-views]=8 [prefix-views]=2 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
+    set+=([stage1]=400 [stage2]=1200 [eval-views]=8 [prefix-views]=1 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
     ;;
   full)
     set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=1)

@@ -232,6 +232,43 @@ static void print_text(const arguments *a, const sf_config *c, const sf_train_st
   printf(" dB\n");
 }
 
+/* View by view, so that it shows where it is and stops when asked to. */
+static sf_status evaluate_views(const sf_model *model, const sf_dataset *test, const arguments *a, quality *q)
+{
+  sf_progress progress;
+  sf_status status = sf_ok();
+  sf_progress_begin(&progress, a->quiet);
+  for (int v = 0, used = 0, prefixed = 0; v < test->count && !status.code; v++) {
+    const bool whole = !a->eval_views || used < a->eval_views, prefixes = prefixed < a->prefix_views;
+    if (!test->view[v].image.rgba || (!whole && !prefixes)) continue;
+    if (sf_cli_interrupted()) {
+      status =
+          sf_fail(SF_E_STOPPED, "interrupted in the evaluation; continue with --resume (checkpoint: %s)", a->output);
+      break;
+    }
+    if (sf_progress_due(&progress)) sf_progress_show(&progress, "evaluation: view %d of %d", v + 1, test->count);
+    sf_dataset one = *test;
+    one.view = &test->view[v];
+    one.count = 1;
+    double psnr = 0, ssim = 0, prefix[SF_T_MAX];
+    if (whole) {
+      status = sf_evaluate(model, &one, 1, 0, &psnr, &ssim);
+      used = ++q->views;
+      q->psnr += (psnr - q->psnr) / used;
+      q->ssim += (ssim - q->ssim) / used;
+    }
+    if (prefixes && !status.code) {
+      q->prefixes = model->config.steps;
+      status = sf_evaluate_prefixes(model, &one, 1, prefix);
+      prefixed++;
+      for (int i = 0; i < q->prefixes && !status.code; i++) q->prefix[i] += (prefix[i] - q->prefix[i]) / prefixed;
+    }
+  }
+  sf_progress_end(&progress);
+  if (!status.code && !q->views) status = sf_fail(SF_E_FORMAT, "%s: no view with a picture to evaluate on", test->path);
+  return status;
+}
+
 static sf_status evaluate(const sf_model *model, const char *data_path, const sf_dataset_options *how,
                           const arguments *a, quality *q)
 {
@@ -239,12 +276,7 @@ static sf_status evaluate(const sf_model *model, const char *data_path, const sf
   sf_dataset_options options = *how;
   options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
   SF_TRY(sf_dataset_load(&test, data_path, "test", &options));
-  q->views = a->eval_views && a->eval_views < test.count ? a->eval_views : test.count;
-  sf_status status = sf_evaluate(model, &test, a->eval_views, 0, &q->psnr, &q->ssim);
-  if (!status.code && a->prefix_views) {
-    q->prefixes = model->config.steps;
-    status = sf_evaluate_prefixes(model, &test, a->prefix_views, q->prefix);
-  }
+  sf_status status = evaluate_views(model, &test, a, q);
   sf_dataset_free(&test);
   return status;
 }
@@ -269,11 +301,15 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
                                   const arguments *a, FILE *log)
 {
   sf_trainer *trainer;
-  sf_train_stats stats = {0};
   SF_TRY(sf_trainer_create(&trainer, data, &a->train, a->resume ? a->output : NULL));
-  sf_status status = loop(trainer, a, log, &stats);
-  if (!status.code) status = sf_trainer_save(trainer, a->output, false);
+  sf_train_stats stats = sf_trainer_stats(trainer);
+  sf_status status = sf_ok();
+  if (stats.stage != 3) {
+    status = loop(trainer, a, log, &stats);
+    if (!status.code) status = sf_trainer_save(trainer, a->output, true); /* the evaluation can be interrupted, too */
+  }
   if (!status.code) status = finish(trainer, path, how, a, &stats);
+  if (!status.code) status = sf_trainer_save(trainer, a->output, false);
   sf_trainer_free(trainer);
   return status;
 }

@@ -12,7 +12,7 @@ typedef struct sf_train_options {
   double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;
   int samples;            /* samples per iteration, about */
-  double lr_grid, lr_net; /* Adam, decayed to a tenth over the run */
+  double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
   bool no_extra, no_penalty, no_distill;
   bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
   int fixed_steps; /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
@@ -53,6 +53,8 @@ sf_status sf_trainer_step(sf_trainer *trainer, sf_train_stats *stats);
 /* Atomic. with_optimiser: everything that --resume needs; without: the model alone. Refuses NaN, Inf and diverged
  * weights, naming the tensor, so that a run that went wrong cannot replace its last good checkpoint. */
 sf_status sf_trainer_save(const sf_trainer *trainer, const char *path, bool with_optimiser);
+/* As after the last iteration, without its losses (0); stage 3: nothing is left to train. */
+sf_train_stats sf_trainer_stats(const sf_trainer *trainer);
 const sf_model *sf_trainer_model(const sf_trainer *trainer);
 void sf_trainer_free(sf_trainer *trainer);
 

@@ -6,7 +6,7 @@
 
 enum { SNAPSHOTS = 32 };
 
-static const double tail = 0.05; /* of the run */
+static const double tail = 0.025; /* of the run */
 
 static int snapshots_due(double progress)
 {

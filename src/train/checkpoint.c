@@ -47,7 +47,7 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 22 };
+enum { STATE_FIELDS = 25 };
 static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
 {
   const state_field table[STATE_FIELDS] = {
@@ -64,6 +64,9 @@ static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
       {"train.t_momentum", .number = &t->t_momentum},
       {"train.occupied", .number = &t->occupied},
       {"train.epoch", .number = &t->epoch},
+      {"train.firing_d1", .number = &t->firing[0]},
+      {"train.firing_c1", .number = &t->firing[1]},
+      {"train.firing_c2", .number = &t->firing[2]},
       {"train.run_d1", .small = &t->health.run[0]},
       {"train.run_c1", .small = &t->health.run[1]},
       {"train.run_c2", .small = &t->health.run[2]},

@@ -118,6 +118,7 @@ struct sf_trainer {
   int stage, rays, stride;
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
   double t_momentum;                                   /* smoothed gradient of t* */
+  double firing[3];                                    /* spikes per neuron and step of D1, C1, C2, last iteration */
   double occupied, epoch;                              /* epoch: passes over the training pixels in this stage */
   sf_health health;
   int64_t samples; /* through the nets, over the run */

@@ -262,29 +262,35 @@ static void advance(sf_trainer *t, double share)
     t->stage = 3;
 }
 
-static void report(const sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double firing[3], double loss,
-                   double mse, sf_train_stats *s)
+sf_train_stats sf_trainer_stats(const sf_trainer *t)
 {
-  *s = (sf_train_stats){.stage = p->stage,
-                        .iteration = t->iteration,
-                        .progress = t->progress,
-                        .seconds = t->seconds,
-                        .loss = loss,
-                        .mse = mse,
-                        .mse_full = mean->mse_full,
-                        .mse_floor = mean->mse_floor,
-                        .mse_ceil = mean->mse_ceil,
-                        .t_star = t->model.t_star,
-                        .t_r = t->model.t_r,
-                        .firing = {firing[0], firing[1], firing[2]},
-                        .rays = t->batch.rays,
-                        .samples = t->batch.samples,
-                        .occupied = t->occupied,
-                        .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
-  for (int l = 0; l < SF_LAYERS; l++) s->tau[l] = 1 / sf_sigmoid(sf_model_param(&t->model, SF_P_LEAK)[l]);
-  memcpy(s->quiet, t->health.quiet, sizeof s->quiet);
-  memcpy(s->revived, t->health.revived, sizeof s->revived);
-  if (t->stage == 3) s->stage = 3;
+  sf_train_stats s = {.stage = t->stage,
+                      .iteration = t->iteration,
+                      .progress = t->progress,
+                      .seconds = t->seconds,
+                      .t_star = t->model.t_star,
+                      .t_r = t->model.t_r,
+                      .firing = {t->firing[0], t->firing[1], t->firing[2]},
+                      .rays = t->batch.rays,
+                      .samples = t->batch.samples,
+                      .occupied = t->occupied,
+                      .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
+  for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_param(&t->model, SF_P_LEAK)[l]);
+  memcpy(s.quiet, t->health.quiet, sizeof s.quiet);
+  memcpy(s.revived, t->health.revived, sizeof s.revived);
+  return s;
+}
+
+static void report(const sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double loss, double mse,
+                   sf_train_stats *s)
+{
+  *s = sf_trainer_stats(t);
+  if (t->stage != 3) s->stage = p->stage;
+  s->loss = loss;
+  s->mse = mse;
+  s->mse_full = mean->mse_full;
+  s->mse_floor = mean->mse_floor;
+  s->mse_ceil = mean->mse_ceil;
 }
 
 /* The prefix whose density decides what is empty: the one that is trained, which inference will use. */
@@ -302,8 +308,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   SF_TRY(sf_batch_draw(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
-  double firing[3];
-  sf_gradient_nets(t, &plan, &mean, firing);
+  sf_gradient_nets(t, &plan, &mean, t->firing);
   if (plan.t_c == plan.t_f) mean.mse_ceil = mean.mse_floor;
   const double e_tau = leak_terms(t, &plan, &mean);
   const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
@@ -327,7 +332,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   const double before = t->progress;
   advance(t, stage_share(t));
   SF_TRY(sf_average_update(t, before));
-  report(t, &plan, &mean, firing, loss, mse, stats);
+  report(t, &plan, &mean, loss, mse, stats);
   memcpy(stats->event, event, sizeof event);
   return sf_ok();
 }
