@@ -61,28 +61,34 @@ static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
   }
 }
 
+/* The end of the bundle that starts at ray `first`: of the ray boundaries in its second half the one that leaves
+ * fewest lanes empty. */
+static int bundle_end(const sf_batch *b, int first)
+{
+  int lanes = 0, end = 0, fewest = SF_BLOCK, r = first;
+  for (; r < b->rays && (r == first || lanes + b->ray[r].count <= BUNDLE_FILL); r++) {
+    lanes += b->ray[r].count;
+    const int empty = (SF_BLOCK - lanes % SF_BLOCK) % SF_BLOCK;
+    if (lanes > BUNDLE_FILL / 2 && empty <= fewest) end = r + 1, fewest = empty;
+  }
+  return r < b->rays && end ? end : r;
+}
+
 void sf_batch_pack(sf_batch *b)
 {
-  sf_bundle current = {0};
-  int lanes = 0; /* samples of the current bundle */
-  b->bundles = 0;
-  b->blocks = 0;
-  for (int r = 0; r < b->rays; r++) {
-    if (lanes > 0 && lanes + b->ray[r].count > BUNDLE_FILL) {
-      current.blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
-      b->blocks += current.blocks;
-      b->bundle[b->bundles++] = current;
-      current = (sf_bundle){.ray = r, .block = b->blocks};
-      lanes = 0;
+  b->bundles = b->blocks = 0;
+  for (int first = 0, end; first < b->rays; first = end) {
+    int lanes = 0;
+    end = bundle_end(b, first);
+    for (int r = first; r < end; r++) {
+      b->ray[r].first = lanes;
+      b->ray[r].lane = b->blocks * SF_BLOCK + lanes;
+      lanes += b->ray[r].count;
     }
-    b->ray[r].first = lanes;
-    b->ray[r].lane = b->blocks * SF_BLOCK + lanes;
-    lanes += b->ray[r].count;
-    current.rays++;
+    const int blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
+    b->bundle[b->bundles++] = (sf_bundle){.ray = first, .rays = end - first, .block = b->blocks, .blocks = blocks};
+    b->blocks += blocks;
   }
-  current.blocks = (lanes + SF_BLOCK - 1) / SF_BLOCK;
-  b->blocks += current.blocks;
-  b->bundle[b->bundles++] = current;
 }
 
 static void place(sf_batch *b, const sf_march *march, int r)

@@ -29,23 +29,24 @@ static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
   }
 }
 
-static int spikes(const float *membrane, int n, float theta)
+static int spikes(const float *membrane, int rows, int lanes, float theta)
 {
   int count = 0;
-  for (int i = 0; i < n; i++) count += membrane[i] >= theta;
+  for (int r = 0; r < rows; r++)
+    for (int l = 0; l < lanes; l++) count += membrane[r * SF_BLOCK + l] >= theta;
   return count;
 }
 
-static void count_spikes(const sf_trainer *t, int steps, const sf_block *b, sf_group *g)
+/* Of the first block of a bundle, whose first `lanes` lanes hold samples. */
+static void count_spikes(const sf_trainer *t, int steps, const sf_block *b, int lanes, sf_group *g)
 {
   const sf_config *c = &t->model.config;
-  const int n = c->hidden * SF_BLOCK;
   for (int s = 0; s < steps; s++) {
-    g->spikes[0] += spikes(b->m1[s], n, c->theta[0]);
-    g->spikes[1] += spikes(b->m3[s], n, c->theta[1]);
-    g->spikes[2] += spikes(b->m4[s], n, c->theta[2]);
+    g->spikes[0] += spikes(b->m1[s], c->hidden, lanes, c->theta[0]);
+    g->spikes[1] += spikes(b->m3[s], c->hidden, lanes, c->theta[1]);
+    g->spikes[2] += spikes(b->m4[s], c->hidden, lanes, c->theta[2]);
   }
-  g->neurons += (double)steps * n;
+  g->neurons += (double)steps * c->hidden * lanes;
 }
 
 static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, sf_block *b)
@@ -54,15 +55,20 @@ static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, 
   memcpy(b->f, t->batch.f + (size_t)(bundle->block + index) * plane, plane * sizeof(float));
 }
 
-static void load_directions(const sf_batch *batch, const sf_bundle *bundle, sf_worker *w)
+/* Spherical harmonics of every lane, zeros in those after the last sample; how many lanes hold samples. */
+static int load_directions(const sf_batch *batch, const sf_bundle *bundle, sf_worker *w)
 {
+  int lane = 0;
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     const sf_ray *ray = &batch->ray[r];
     float sh[SF_DIR_FEATURES];
     sf_sh4(ray->direction, sh);
-    for (int s = ray->first; s < ray->first + ray->count; s++)
-      for (int i = 0; i < SF_DIR_FEATURES; i++) w->block[s / SF_BLOCK].sh[i * SF_BLOCK + s % SF_BLOCK] = sh[i];
+    for (lane = ray->first; lane < ray->first + ray->count; lane++)
+      for (int i = 0; i < SF_DIR_FEATURES; i++) w->block[lane / SF_BLOCK].sh[i * SF_BLOCK + lane % SF_BLOCK] = sh[i];
   }
+  for (int l = lane; l < bundle->blocks * SF_BLOCK; l++)
+    for (int i = 0; i < SF_DIR_FEATURES; i++) w->block[l / SF_BLOCK].sh[i * SF_BLOCK + l % SF_BLOCK] = 0;
+  return lane;
 }
 
 static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_words *net, const sf_bundle *bundle,
@@ -72,7 +78,7 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
   const int steps = p->stage == 1 ? p->steps : p->t_c;
-  load_directions(batch, bundle, w);
+  const int lanes = load_directions(batch, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &w->block[b]);
     t->kernels->forward(net, &w->block[b], p->steps, steps, w->scratch);
@@ -84,7 +90,7 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
     sf_loss_ray(p, &batch->ray[r], batch->delta, &w->ray, &g->sums);
     ray_out(p, &batch->ray[r], w);
   }
-  if (bundle->blocks) count_spikes(t, steps, &w->block[0], g);
+  count_spikes(t, steps, &w->block[0], lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
   for (int b = 0; b < bundle->blocks; b++)
     t->kernels->backward(net, &w->block[b], steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
                          w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,

@@ -1,0 +1,132 @@
+/* Packing of rays into bundles of blocks, and compaction against the naive transmittance. */
+#include "render/composite.h"
+#include "train_fixture.h"
+
+static void check_layout(const sf_batch *b)
+{
+  int rays = 0, blocks = 0;
+  for (int i = 0; i < b->bundles; i++) {
+    const sf_bundle *bundle = &b->bundle[i];
+    int lanes = 0;
+    ck_assert_int_eq(bundle->ray, rays);
+    ck_assert_int_eq(bundle->block, blocks);
+    ck_assert_int_gt(bundle->rays, 0);
+    for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
+      ck_assert_int_eq(b->ray[r].first, lanes);
+      ck_assert_int_eq(b->ray[r].lane, blocks * SF_BLOCK + lanes);
+      lanes += b->ray[r].count;
+    }
+    ck_assert(bundle->rays == 1 || lanes <= BUNDLE_FILL);
+    ck_assert_int_eq(bundle->blocks, (lanes + SF_BLOCK - 1) / SF_BLOCK);
+    ck_assert_int_le(bundle->blocks, BUNDLE_BLOCKS);
+    rays += bundle->rays;
+    blocks += bundle->blocks;
+  }
+  ck_assert_int_eq(rays, b->rays);
+  ck_assert_int_eq(blocks, b->blocks);
+}
+
+static double empty_lanes(const sf_batch *b)
+{
+  double used = 0;
+  for (int r = 0; r < b->rays; r++) used += b->ray[r].count;
+  return 1 - used / ((double)b->blocks * SF_BLOCK);
+}
+
+START_TEST(every_ray_is_in_one_bundle)
+{
+  sf_batch b;
+  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  for (uint64_t seed = 0; seed < 200; seed++) {
+    const uint64_t longest = seed % 4 == 0 ? 1025 : seed % 4 == 1 ? 2 : 40; /* long, nearly empty, usual rays */
+    b.rays = 1 + (int)sf_random_below(seed, 1, 0, 2000);
+    for (int r = 0; r < b.rays; r++) b.ray[r].count = (int)sf_random_below(seed, 2, r, longest);
+    sf_batch_pack(&b);
+    check_layout(&b);
+    /* Of a dozen ray boundaries one is near the end of a block: a few empty lanes, not 32 of 512. */
+    if (longest == 40 && b.rays > 500) ck_assert_double_lt(empty_lanes(&b), 0.02);
+  }
+  for (int r = 0; r < b.rays; r++) b.ray[r].count = 0;
+  sf_batch_pack(&b);
+  check_layout(&b);
+  sf_batch_free(&b);
+}
+END_TEST
+
+/* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
+ * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. */
+START_TEST(compaction_keeps_what_light_reaches)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = small_run();
+  o.stage1 = 60;
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, 50);
+  for (int i = 0; i < t->model.config.hidden; i++) sf_model_param(&t->model, SF_P_W2)[i] *= 6; /* opaque objects */
+  ck_good(sf_batch_draw(t));
+  sf_batch *b = &t->batch;
+  const int rays = b->rays;
+  int *expected = calloc((size_t)rays, sizeof *expected), dropped = 0;
+  float *first_x = calloc((size_t)rays, sizeof *first_x);
+  const sf_loss_plan plan = {.stage = 2, .steps = T, .t_f = 2, .t_c = 3, .t_r = 2};
+  for (int r = 0; r < rays; r++) {
+    double depth[3] = {0};
+    const int prefix[3] = {2, 3, T};
+    for (int s = 0; s < b->ray[r].count; s++) {
+      const int lane = b->ray[r].lane + s;
+      float x[3], f[32], sh[16] = {0}, sigma[T], colour[3 * T];
+      for (int a = 0; a < 3; a++) x[a] = b->x[((size_t)(lane / SF_BLOCK) * 3 + a) * SF_BLOCK + lane % SF_BLOCK];
+      if (s == 0) first_x[r] = x[0];
+      bool seen = false;
+      for (int p = 0; p < 3; p++) seen |= depth[p] < 9.2103404;
+      if (!seen) break;
+      expected[r]++;
+      sf_grid_features(&t->model, x, f);
+      sf_net_sample(&t->model, f, sh, T, sigma, colour, NULL);
+      for (int p = 0; p < 3; p++) depth[p] += (double)sigma[prefix[p] - 1] * b->delta;
+    }
+    dropped += b->ray[r].count - expected[r];
+  }
+  ck_assert_int_gt(dropped, 50);
+  sf_loss_sums mean = {0};
+  double firing[3];
+  sf_gradient_nets(t, &plan, &mean, firing);
+  check_layout(b);
+  int differ = 0, samples = 0;
+  for (int r = 0; r < rays; r++) {
+    differ += b->ray[r].count != expected[r];
+    samples += b->ray[r].count;
+    if (b->ray[r].count)
+      ck_assert_float_eq(b->x[(size_t)(b->ray[r].lane / SF_BLOCK) * 3 * SF_BLOCK + b->ray[r].lane % SF_BLOCK],
+                         first_x[r]);
+  }
+  ck_assert_int_eq(samples, b->samples);
+  ck_assert_int_le(differ, rays / 50); /* bfloat16 weights move a few densities past the limit */
+  free(expected);
+  free(first_x);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
+static void set_up(void)
+{
+  make_scene(4);
+}
+
+int main(void)
+{
+  Suite *s = suite_create("batch");
+  TCase *c = tcase_create("batch");
+  tcase_set_timeout(c, 60);
+  tcase_add_unchecked_fixture(c, set_up, remove_folder);
+  tcase_add_test(c, every_ray_is_in_one_bundle);
+  tcase_add_test(c, compaction_keeps_what_light_reaches);
+  suite_add_tcase(s, c);
+  SRunner *runner = srunner_create(s);
+  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
