@@ -62,6 +62,7 @@ START_TEST(compaction_keeps_what_light_reaches)
   o.stage1 = 60;
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 50);
+  t->kernels = sf_kernels_select(NULL); /* those that do not round */
   for (int i = 0; i < t->model.config.hidden; i++) sf_model_param(&t->model, SF_P_W2)[i] *= 6; /* opaque objects */
   ck_good(sf_batch_draw(t));
   sf_batch *b = &t->batch;
@@ -101,7 +102,7 @@ START_TEST(compaction_keeps_what_light_reaches)
                          first_x[r]);
   }
   ck_assert_int_eq(samples, b->samples);
-  ck_assert_int_le(differ, rays / 50); /* bfloat16 weights move a few densities past the limit */
+  ck_assert_int_le(differ, 1); /* float sums of another order at the limit */
   free(expected);
   free(first_x);
   sf_trainer_free(t);
