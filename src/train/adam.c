@@ -20,7 +20,6 @@ void sf_adam_update(const sf_adam *a, size_t n, float *value, float *grad, float
   const float b1 = (float)a->beta1, b2 = (float)a->beta2, eps = (float)a->epsilon;
   const double c1 = 1 - pow(a->beta1, (double)a->step), c2 = 1 - pow(a->beta2, (double)a->step);
   const float rate = (float)(a->lr / c1), root = (float)(1 / sqrt(c2));
-#pragma omp parallel for schedule(static)
   for (size_t i = 0; i < n; i += CHUNK) {
     const size_t end = i + CHUNK < n ? i + CHUNK : n;
     if (end - i == CHUNK && !any(grad + i)) continue;

@@ -122,16 +122,22 @@ static void encode(sf_trainer *t)
                                  t->batch.f + ((size_t)b * levels + level) * 2 * SF_BLOCK);
 }
 
-/* One thread per level, samples in order: no atomics, and the sum does not depend on the threads. */
-void sf_gradient_grid(sf_trainer *t)
+/* One thread per level, samples in order: no atomics, and the sum does not depend on the threads. Adam follows while
+ * the level's gradient is in the cache. */
+void sf_gradient_grid(sf_trainer *t, const sf_adam *adam)
 {
   const int levels = t->model.config.levels;
-  float *grad = t->grad + t->model.param[SF_P_GRID].offset;
+  const size_t table = t->model.param[SF_P_GRID].offset;
 #pragma omp parallel for schedule(dynamic, 1)
-  for (int level = levels - 1; level >= 0; level--)
+  for (int level = levels - 1; level >= 0; level--) {
+    const sf_grid_level *l = &t->model.level[level];
+    const size_t first = table + 2 * l->offset;
     for (int b = 0; b < t->batch.blocks; b++)
-      t->kernels->grid_backward(&t->model.level[level], t->batch.x + (size_t)b * 3 * SF_BLOCK,
-                                t->batch.df + ((size_t)b * levels + level) * 2 * SF_BLOCK, grad);
+      t->kernels->grid_backward(l, t->batch.x + (size_t)b * 3 * SF_BLOCK,
+                                t->batch.df + ((size_t)b * levels + level) * 2 * SF_BLOCK, t->grad + table);
+    sf_adam_update(adam, (size_t)2 * l->entries, t->model.value + first, t->grad + first, t->moment1 + first,
+                   t->moment2 + first);
+  }
 }
 
 static void add_matrix(float *to, const float *from, int rows, int columns, int ld)

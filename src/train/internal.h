@@ -139,9 +139,6 @@ void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
 /* Features, nets and losses of the batch, forward and backward: adds the nets' gradient to trainer->grad and leaves the
  * features' gradient in batch.df. mean: losses per ray. */
 void sf_gradient_nets(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
-/* The features' gradient to the hash grid's, in trainer->grad. */
-void sf_gradient_grid(sf_trainer *trainer);
-
 sf_status sf_init_parameters(sf_trainer *trainer);
 
 /* Samples in occupied cells, seen from the training cameras, for the scalar nets. */
@@ -179,5 +176,7 @@ sf_status sf_parameters_check(const sf_trainer *trainer);
 /* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */
 sf_status sf_average_update(sf_trainer *trainer, double progress_before);
 sf_status sf_average_reserve(sf_trainer *trainer);
+/* The features' gradient to the hash grid's, and Adam on the grid. */
+void sf_gradient_grid(sf_trainer *trainer, const sf_adam *adam);
 sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);
 #endif

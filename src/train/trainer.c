@@ -222,9 +222,9 @@ static void update_parameters(sf_trainer *t)
 {
   const double fade = pow(0.3, t->progress);
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1};
-  const size_t nets = t->model.param[SF_P_W1].offset;
-  sf_adam_update(&adam, nets, t->model.value, t->grad, t->moment1, t->moment2);
+  sf_gradient_grid(t, &adam);
   adam.lr = t->options.lr_net * fade;
+  const size_t nets = t->model.param[SF_P_W1].offset;
   sf_adam_update(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
                  t->moment2 + nets);
 }
@@ -319,7 +319,6 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
             plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau) +
             (t->options.no_penalty || t->options.fixed_steps ? 0 : t->options.beta * ratio * exp(t->model.t_star));
   SF_TRY(check_gradient(t, loss));
-  sf_gradient_grid(t);
   update_parameters(t);
   sf_health_leaks(t);
   SF_TRY(sf_parameters_check(t));
