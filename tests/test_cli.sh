@@ -115,6 +115,9 @@ number sf_train --hidden 0 129
 usage hidden sf_train d -o out --hidden 17
 number sf_train --input-mode sometimes nan ''
 number sf_train --net cnn
+number sf_train --fixed-steps -1 9 nan
+number sf_train --psnr-prefixes -1 nan
+usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
 number sf_cosim --rays -1 nan inf x
 number sim_render --view -1 nan 2 99999999999
@@ -319,6 +322,18 @@ stop() { # OUTPUT PROGRAM ARGS...
 stop stop.exr sim_render s.snn wide --backend rtl --crop 0,0,128,128 -o stop.exr --png stop.exr.png
 stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
 absent stop.exr.png "interrupted: sim_render"
+
+# The evaluation after a training can be interrupted, too: its checkpoint is resumed to the evaluation alone.
+good sf_scene simple -o views --size 64 --train 2 --test 30
+brief=(views -o stop.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8)
+timeout --foreground -k 20 --preserve-status -s INT 2 "$BIN/sf_train" "${brief[@]}" --psnr-prefixes 30 >stdout.txt 2>err </dev/null
+status=$?
+sed -i '/evaluation: view/d' err # progress lines
+judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
+good sf_train "${brief[@]}" --resume --quiet --eval-views 1 --json
+if grep -q '"iterations":2,.*"views":1' stdout.txt; then passed=$((passed + 1)); else fail "resumed evaluation" "no summary"; fi
+run sf_train "${brief[@]}" --resume --quiet
+judge "finished: sf_train --resume" sf_train 1 "cannot resume"
 
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]
