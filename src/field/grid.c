@@ -1,4 +1,4 @@
-/* Hash-grid features, sample by sample: the oracle of the grid kernels in src/snn/kernels_isa.c. Mueller et al. 2022,
+/* Hash-grid features, sample by sample: the oracle of the grid kernels in src/snn/grid_isa.h. Mueller et al. 2022,
  * in torch-ngp's form: pos = x * scale + 1/2, dense levels x fastest, hashed levels xor of coordinate * prime. */
 #include "spikefield/model.h"
 #include <math.h>

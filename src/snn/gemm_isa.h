@@ -5,6 +5,7 @@
  * (VDPBF16PS: products and sums in fp32), two bfloat16 numbers. PAIR says how many numbers a word holds. */
 #ifndef SF_SNN_GEMM_ISA_H
 #define SF_SNN_GEMM_ISA_H
+#include <stdint.h>
 #include <string.h>
 
 #if defined(__AVX512F__)
@@ -158,51 +159,6 @@ static inline void transpose_tile(const vf *in, word *out, int ldo)
     memcpy(x, y, sizeof x);
   }
   for (int i = 0; i < VL; i++) *(vf *)(out + (size_t)i * ldo) = x[i];
-}
-
-/* Bit l: x[l] >= theta. */
-static inline uint64_t spike_bits(const float *x, float theta)
-{
-  uint64_t bits = 0;
-#if defined(__AVX512F__)
-  for (int i = 0; i < 4; i++)
-    bits |= (uint64_t)_mm512_cmp_ps_mask(_mm512_loadu_ps(x + 16 * i), _mm512_set1_ps(theta), _CMP_GE_OQ) << 16 * i;
-#elif defined(__AVX2__)
-  for (int i = 0; i < 8; i++)
-    bits |= (uint64_t)_mm256_movemask_ps(_mm256_cmp_ps(_mm256_loadu_ps(x + 8 * i), _mm256_set1_ps(theta), _CMP_GE_OQ))
-            << 8 * i;
-#else
-  for (int i = 0; i < 64; i++) bits |= (uint64_t)(x[i] >= theta) << i;
-#endif
-  return bits;
-}
-
-/* 64 x 64 bits, in place (Warren, Hacker's Delight, 7-3). */
-static void transpose_bits(uint64_t a[64])
-{
-  uint64_t low = 0x00000000FFFFFFFFu;
-  for (int j = 32; j; j >>= 1, low ^= low << j)
-    for (int k = 0; k < 64; k += 2 * j)
-      for (int i = k; i < k + j; i++) {
-        const uint64_t t = (a[i] >> j ^ a[i + j]) & low;
-        a[i] ^= t << j;
-        a[i + j] ^= t;
-      }
-}
-
-/* Indices of the set bits of 64 rows, offset added, to list (64 bytes writable); how many. */
-static inline int list_bits(uint64_t bits, uint8_t offset, uint8_t *list)
-{
-#if defined(__AVX512VBMI2__)
-  uint8_t iota[64];
-  for (int i = 0; i < 64; i++) iota[i] = (uint8_t)i;
-  const __m512i index = _mm512_add_epi8(_mm512_loadu_si512(iota), _mm512_set1_epi8((char)offset));
-  _mm512_storeu_si512(list, _mm512_maskz_compress_epi8(bits, index));
-#else
-  int n = 0;
-  for (uint64_t b = bits; b; b &= b - 1) list[n++] = (uint8_t)(offset + __builtin_ctzll(b));
-#endif
-  return __builtin_popcountll(bits);
 }
 
 /* out[columns][ldo] = transpose of in[rows][columns], words; both multiples of VL. */

@@ -1,4 +1,4 @@
-/* The nets of one sample, step by step, as the equations read: the oracle of kernels_isa.c. */
+/* The nets of one sample, step by step, as the equations read: the oracle of the kernels. */
 #include "snn/plif.h"
 #include <string.h>
 

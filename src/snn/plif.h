@@ -1,5 +1,5 @@
 /* One PLIF step (SpikingJelly's parametric leaky integrate-and-fire; design equations in docs/model.md).
- * The scalar form, used by the oracle; src/snn/kernels_isa.c holds the block form. */
+ * The scalar form, used by the oracle; src/snn/forward_isa.h holds the block form. */
 #ifndef SF_SNN_PLIF_H
 #define SF_SNN_PLIF_H
 #include "spikefield/model.h"

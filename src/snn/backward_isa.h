@@ -1,0 +1,222 @@
+/* Backward through the steps. Follows SpikingJelly's sigmoid surrogate with the reset path differentiated.
+ * Included by kernels_isa.c only. */
+#ifndef SF_SNN_BACKWARD_ISA_H
+#define SF_SNN_BACKWARD_ISA_H
+#include "snn/forward_isa.h"
+#include "snn/plif.h"
+
+/* 1 / x for x > 0: the instruction's 2^-14 where there is one, else by subtracting the bits and two Newton steps
+ * (8e-7). */
+static inline vf reciprocal(vf x)
+{
+#if defined(__AVX512F__)
+  return (vf)_mm512_rcp14_ps((__m512)x);
+#else
+  vf y = (vf)(0x7EF00000 - (vi)x);
+  y *= 2.03212865f - 1.03116935f * (x * y);
+  return y * (2.00000070f - x * y);
+#endif
+}
+
+/* The surrogate's slope alpha s (1 - s), s = sigmoid(alpha x), alpha = 4, which is 1 / cosh^2(2 x), its maximum 1:
+ * within 7e-5 of it for every x. cosh^2 as a polynomial in x^2, fitted so that its inverse has the least largest error
+ * (6.2e-6). */
+static inline vf surrogate(vf x)
+{
+  const vf far = (vf){0} + 64.0f;
+  vf w = x * x;
+  const vi near = w < far;
+  w = (vf)(((vi)w & near) | ((vi)far & ~near));
+  vf p = w * 4.04860913e-2f + 6.45573130e-2f;
+  p = p * w + 9.19493240e-1f;
+  p = p * w + 2.78582631f;
+  p = p * w + 5.34561520f;
+  p = p * w + 3.99923221f;
+  p = p * w + 1.00000616f;
+  return reciprocal(p);
+}
+_Static_assert(SF_SURROGATE_ALPHA == 4, "surrogate() is a fit for alpha = 4");
+
+/* Backward of fire at step t. g: gradient of the activation in, of the current out; carry: gradient of the membrane
+ * after reset, in and out; leak[B]: sum of g_h * dh/dw per lane. dh/dw = k(1-k)(x - v) = (1-k)(h - v) where the input
+ * decays, -k(1-k) v where it does not; the part of v, which this step leaves to the next, is added here, where h is at
+ * hand: carry = (1-k) g_h(t+1). */
+static inline void fire_backward(const sf_net_view *net, int layer, float k, int t, int rows, const float *restrict h,
+                                 float *restrict g, float *restrict carry, float *restrict leak)
+{
+  if (net->relu) {
+    for (int i = 0; i < rows * B; i++) g[i] = h[i] > 0 ? g[i] : 0;
+    return;
+  }
+  const int hybrid_first = t == 0 && net->mode == SF_HYBRID;
+  const float keep = 1.0f - k, gain = net->mode == SF_NODECAY || hybrid_first ? 1.0f : k;
+  const float with_h = net->mode == SF_NODECAY || hybrid_first ? 0.0f : keep;
+  const float with_v = net->mode == SF_NODECAY ? -k : -1.0f;
+  const vf theta = (vf){0} + net->theta[layer];
+  for (int l = 0; l < B; l += VL) {
+    vf sum_h = {0}, sum_v = {0};
+    for (int r = 0; r < rows; r++) {
+      const int i = r * B + l;
+      const vf x = *(const vf *)(h + i), gv = *(const vf *)(carry + i);
+      const vf v = x - (vf)((x >= theta) & (vi)theta);
+      const vf gh = (*(const vf *)(g + i) - theta * gv) * surrogate(x - theta) + gv;
+      *(vf *)(carry + i) = keep * gh;
+      *(vf *)(g + i) = gain * gh;
+      sum_h += gh * x;
+      sum_v += gv * v;
+    }
+    *(vf *)(leak + l) += with_h * sum_h + with_v * sum_v;
+  }
+}
+
+/* Backward of integrate at step t: g is the gradient of o(t) (its carry included), returns the gradient of e in de and
+ * of o(t-1) in g. */
+static void integrate_backward(const sf_net_view *net, float k, int t, const float *e, const float *prev,
+                               float *restrict g, float *restrict de, float *restrict leak)
+{
+  if (net->relu || (t == 0 && net->mode == SF_HYBRID)) {
+    for (int i = 0; i < B; i++) de[i] = g[i];
+    return;
+  }
+  const float keep = 1.0f - k, slope = k * keep, gain = net->mode == SF_NODECAY ? 1.0f : k;
+  const float with_e = net->mode == SF_NODECAY ? 0.0f : 1.0f;
+  for (int i = 0; i < B; i++) {
+    float before = t ? prev[i] : 0.0f;
+    leak[i] += g[i] * slope * (with_e * e[i] - before);
+    de[i] = gain * g[i];
+    g[i] *= keep;
+  }
+}
+
+static void add_to(float *restrict sum, const float *restrict x, int n)
+{
+  for (int i = 0; i < n; i++) sum[i] += x[i];
+}
+
+/* What layer_backward leaves behind; NULL = not wanted. */
+typedef struct backward_out {
+  float *carry, *leak, *sum; /* sum: currents' gradient added up over the steps */
+  float *all;                /* currents' gradient [hidden][B] */
+  word *rows, *lanes;        /* currents' gradient as operands */
+} backward_out;
+
+/* Backward of a spiking layer at step t from the gradient dy (words of rows) of the layer above, through its transposed
+ * weights wt[hidden][pairs]; a few rows at a time. */
+static void layer_backward(const sf_net_view *net, int index, float k, int t, const uint32_t *wt, int pairs,
+                           const word *dy, const float *h, backward_out out)
+{
+  float tile[TILE * B];
+  for (int m = 0, n; m < net->hidden; m += n) {
+    n = tile_rows(net->hidden - m);
+    gemm((const word *)wt + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
+    fire_backward(net, index, k, t, n, h + m * B, tile, out.carry + m * B, out.leak);
+    if (out.sum) add_to(out.sum + m * B, tile, n * B);
+    if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
+    if (out.rows) pack_rows(tile, n, out.rows + m / PAIR * B);
+    if (out.lanes) pack_lanes(tile, n, out.lanes + m * BW);
+  }
+}
+
+/* grad[rows][ld] += sum over lanes of dy (words of lanes) and x (words of lanes, transposed: [BW][columns]). */
+static void add_outer(float *grad, int ld, const word *dy, int rows, const word *xt, int columns)
+{
+  gemm(dy, BW, rows, BW, xt, columns, columns, grad, ld, grad, ld);
+}
+
+/* The activations of a spiking layer at one step, transposed for add_outer. */
+static const word *activations(const sf_net_view *net, int layer, const float *h, sf_net_scratch *w)
+{
+  activation_lanes(net, layer, net->hidden, h, (word *)w->spikes);
+  transpose((word *)w->spikes, net->hidden, BW, (word *)w->t, net->hidden);
+  return (const word *)w->t;
+}
+
+/* Colour integrator and layers C3, C2, C1 at step t; leaves the gradient of i in gi[16][B], row 0 zero. */
+static void colour_backward(const sf_net_words *n, const sf_block *x, int t, float *gcolour, float *gi,
+                            sf_net_grad *grad, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  float c[3 * B], gj[4 * B] = {0};
+  word *rows = (word *)w->rows, *lanes = (word *)w->lanes, small[4 * B];
+  sigmoid(3 * B, x->j[t], c);
+  for (int a = 0; a < 3; a++)
+    integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
+                       w->leak[4]);
+  for (int i = 0; i < 3 * B; i++) gj[i] *= c[i] * (1.0f - c[i]);
+  pack_lanes(gj, 4, small);
+  add_outer(grad->w5, hidden, small, 4, activations(net, 2, x->m4[t], w), hidden);
+  pack_rows(gj, 4, small);
+  const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
+  layer_backward(
+      net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
+      (backward_out){w->g4, w->leak[3], NULL, events ? (float *)w->lanes : NULL, rows, events ? NULL : lanes});
+  if (events) {
+    transpose(lanes, hidden, B, (word *)w->t, hidden);
+    event_outer(grad->w4t, hidden, x->s3[t], (float *)w->t);
+  } else
+    add_outer(grad->w4, hidden, lanes, hidden, activations(net, 1, x->m3[t], w), hidden);
+  word *rows3 = (word *)w->spikes;
+  layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, rows, x->m3[t],
+                 (backward_out){w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
+  gemm((const word *)n->w3ht, hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);
+  pack_lanes(x->i[t], SF_DENSITY_OUT, rows);
+  transpose(rows, SF_DENSITY_OUT, BW, (word *)w->t, SF_DENSITY_OUT);
+  /* Column 16 of the padded gradient meets i[0], which is no input of C1: scratch. h starts at column 17. */
+  add_outer(grad->w3 + SF_DIR_FEATURES, 32, lanes, hidden, (word *)w->t, SF_DENSITY_OUT);
+}
+
+/* Gradients of what was constant over the steps: w1, the directions' part of w3, and the features. */
+static void constant_backward(const sf_net_words *n, const sf_block *x, float *df, sf_net_grad *grad, sf_net_scratch *w)
+{
+  const int hidden = n->view.hidden, features = n->view.features, padded = (features + 15) / 16 * 16;
+  word *rows = (word *)w->rows, *lanes = (word *)w->lanes, *spikes = (word *)w->spikes, *t = (word *)w->t;
+  pack_lanes(x->sh, SF_DIR_FEATURES, spikes);
+  transpose(spikes, SF_DIR_FEATURES, BW, t, SF_DIR_FEATURES);
+  pack_lanes(w->sum3, hidden, lanes);
+  add_outer(grad->w3, 32, lanes, hidden, t, SF_DIR_FEATURES);
+  memset(spikes, 0, (size_t)padded * BW * sizeof *spikes);
+  pack_lanes(x->f, features, spikes);
+  transpose(spikes, padded, BW, t, padded);
+  pack_lanes(w->sum1, hidden, lanes);
+  add_outer(grad->w1, padded, lanes, hidden, t, padded);
+  pack_rows(w->sum1, hidden, rows);
+  gemm((const word *)n->w1t, hidden / PAIR, features, hidden / PAIR, rows, B, B, NULL, 0, df, B);
+}
+
+static void backward(const sf_net_words *n, const sf_block *x, int steps, const float *dsigma, const float *dcolour,
+                     float *df, sf_net_grad *grad, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  const size_t plane = (size_t)hidden * B * sizeof(float);
+  float gsigma[B] = {0}, gcolour[3 * B] = {0};
+  memset(w->g1, 0, plane);
+  memset(w->g3, 0, plane);
+  memset(w->g4, 0, plane);
+  memset(w->sum1, 0, plane);
+  memset(w->sum3, 0, plane);
+  memset(w->leak, 0, sizeof w->leak);
+  for (int t = steps - 1; t >= 0; t--) {
+    float gi[SF_DENSITY_OUT * B], ge[B], e[B];
+    word small[SF_DENSITY_OUT * B];
+    add_to(gsigma, dsigma + t * B, B);
+    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
+    exponential(B, x->i[t], e);
+    integrate_backward(net, net->k[1], t, e, t ? x->sigma[t - 1] : NULL, gsigma, ge, w->leak[1]);
+    colour_backward(n, x, t, gcolour, gi, grad, w);
+    for (int l = 0; l < B; l++) {
+      float clamped = x->i[t][l] > 15.0f ? 15.0f : x->i[t][l] < -15.0f ? -15.0f : x->i[t][l];
+      gi[l] = ge[l] * fast_exp(clamped); /* torch-ngp's trunc_exp */
+    }
+    pack_lanes(gi, SF_DENSITY_OUT, small);
+    add_outer(grad->w2, hidden, small, SF_DENSITY_OUT, activations(net, 0, x->m1[t], w), hidden);
+    pack_rows(gi, SF_DENSITY_OUT, small);
+    layer_backward(net, 0, net->k[0], t, n->w2t, SF_DENSITY_OUT / PAIR, small, x->m1[t],
+                   (backward_out){w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
+  }
+  constant_backward(n, x, df, grad, w);
+  for (int i = 0; i < SF_LAYERS; i++)
+    for (int l = 0; l < B; l++) grad->leak[i] += w->leak[i][l];
+}
+#endif

@@ -1,0 +1,162 @@
+/* Forward through the steps, a block of samples at a time. Oracle: net.c.
+ * Included by kernels_isa.c only. */
+#ifndef SF_SNN_FORWARD_ISA_H
+#define SF_SNN_FORWARD_ISA_H
+#include "snn/event_isa.h"
+
+/* e^x within 2 ulp for x in [-87, 87], clamped outside; Cephes' polynomial, vectorises. */
+static inline float fast_exp(float x)
+{
+  x = x < -87.0f ? -87.0f : x;
+  x = x > 87.0f ? 87.0f : x;
+  float shifted = x * 1.44269504f + 12582912.0f, n = shifted - 12582912.0f;
+  float r = x - n * 0.693359375f + n * 2.12194440e-4f;
+  float p = 1.9875691500e-4f;
+  p = p * r + 1.3981999507e-3f;
+  p = p * r + 8.3334519073e-3f;
+  p = p * r + 4.1665795894e-2f;
+  p = p * r + 1.6666665459e-1f;
+  p = p * r + 5.0000001201e-1f;
+  p = p * r * r + r + 1.0f;
+  union {
+    float f;
+    uint32_t i;
+  } bits = {.f = shifted}, scale;
+  scale.i = (bits.i - 0x4B400000u + 127u) << 23;
+  return p * scale.f;
+}
+
+/* Charges rows of neurons. prev: membrane before fire of the step before, NULL at t = 0; h may equal prev. */
+static inline void charge(const sf_net_view *net, int layer, float k, int t, int rows, const float *restrict current,
+                          const float *prev, float *h)
+{
+  const float theta = net->theta[layer];
+  const int n = rows * B;
+  if (net->relu || (t == 0 && net->mode != SF_DECAY))
+    memcpy(h, current, (size_t)n * sizeof *h);
+  else if (t == 0)
+    for (int i = 0; i < n; i++) h[i] = current[i] * k;
+  else {
+    const float keep = 1.0f - k, gain = net->mode == SF_NODECAY ? 1.0f : k;
+#pragma GCC ivdep /* h may be prev: element by element */
+    for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? theta : 0.0f)) + gain * current[i];
+  }
+}
+
+/* A spiking layer at step t, a few rows at a time in the first-level cache: current = init + w in, charge, fire.
+ * w NULL: the current is init. s: activations as words of rows. */
+static void layer(const sf_net_view *net, int index, float k, int t, const word *w, int pairs, const word *in,
+                  const float *init, const float *prev, float *h, word *s)
+{
+  float tile[TILE * B];
+  for (int m = 0, n; m < net->hidden; m += n, s += n / PAIR * B) {
+    n = tile_rows(net->hidden - m);
+    const float *current = init ? init + m * B : NULL;
+    if (w) {
+      gemm(w + m * pairs, pairs, n, pairs, in, B, B, current, B, tile, B);
+      current = tile;
+    }
+    charge(net, index, k, t, n, current, prev ? prev + m * B : NULL, h + m * B);
+    activation_rows(net, index, n, h + m * B, s);
+  }
+}
+
+/* One step of an integrating output: o = charge(prev, e). */
+static void integrate(const sf_net_view *net, float k, int t, int n, const float *restrict e, const float *prev,
+                      float *restrict o)
+{
+  if (net->relu || (t == 0 && net->mode != SF_DECAY))
+    for (int i = 0; i < n; i++) o[i] = e[i];
+  else if (t == 0)
+    for (int i = 0; i < n; i++) o[i] = k * e[i];
+  else {
+    const float gain = net->mode == SF_NODECAY ? 1.0f : k, keep = 1.0f - k;
+    for (int i = 0; i < n; i++) o[i] = keep * prev[i] + gain * e[i];
+  }
+}
+
+static void exponential(int n, const float *restrict x, float *restrict e)
+{
+  for (int i = 0; i < n; i++) e[i] = fast_exp(x[i]);
+}
+
+static void sigmoid(int n, const float *restrict x, float *restrict s)
+{
+  for (int i = 0; i < n; i++) s[i] = 1.0f / (1.0f + fast_exp(-x[i]));
+}
+
+/* Where the membranes of step t are kept: what backward does not ask for shares the last place. */
+static inline int slot(int t, int keep)
+{
+  return t < keep ? t : SF_T_MAX - 1;
+}
+
+/* Density net at step t. */
+static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, const float *current, sf_net_scratch *w,
+                         float *i, float *sigma, const float *sigma_before)
+{
+  const sf_net_view *net = &n->view;
+  word *spikes = (word *)w->spikes;
+  float e[B];
+  layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, x->m1[slot(t, keep)],
+        spikes);
+  gemm((const word *)n->w2, net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
+  exponential(B, i, e);
+  integrate(net, net->k[1], t, B, e, sigma_before, sigma);
+}
+
+/* in[inputs][B] times words of weights: what is constant over the steps. */
+static void constant_current(const sf_net_words *n, const uint32_t *weights, int inputs, const float *in, word *words,
+                             float *current)
+{
+  const int pairs = inputs / PAIR;
+  pack_rows(in, inputs, words);
+  gemm((const word *)weights, pairs, n->view.hidden, pairs, words, B, B, NULL, 0, current, B);
+}
+
+static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
+{
+  constant_current(n, n->w1, n->view.features, x->f, (word *)w->rows, w->sum1);
+  for (int t = 0; t < steps; t++)
+    density_step(n, x, t, 0, w->sum1, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+}
+
+/* C2 at step t from the spikes of C1 in w->spikes; activations to w->rows. */
+static void colour_layer_2(const sf_net_words *n, sf_block *x, int t, int at, int before, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  const word *weights = (const word *)n->w4;
+  float *current = NULL;
+  for (int r = 0; r < hidden; r++) x->s3[at][r] = spike_bits(x->m3[at] + r * B, net->theta[1]);
+  if (!net->relu && few_spikes(x->s3[at], hidden, dense_forward)) {
+    weights = NULL;
+    current = (float *)w->lanes;
+    event_current(n->w4_slice, hidden, x->s3[at], (float *)w->t);
+    transpose((word *)w->t, B, hidden, (word *)w->lanes, B);
+  }
+  layer(net, 2, net->k[3], t, weights, hidden / PAIR, (word *)w->spikes, current, t ? x->m4[before] : NULL, x->m4[at],
+        (word *)w->rows);
+}
+
+static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int pairs = net->hidden / PAIR;
+  word *spikes = (word *)w->spikes, *rows = (word *)w->rows;
+  constant_current(n, n->w1, net->features, x->f, rows, w->sum1);
+  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, rows, w->sum3);
+  for (int t = 0; t < steps; t++) {
+    const int at = slot(t, keep), before = slot(t - 1, keep);
+    float c[3 * B];
+    density_step(n, x, t, keep, w->sum1, w, x->i[t], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+    pack_rows(x->i[t], SF_DENSITY_OUT, rows);
+    layer(net, 1, net->k[2], t, (const word *)n->w3h, SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
+          x->m3[at], spikes);
+    colour_layer_2(n, x, t, at, before, w);
+    gemm((const word *)n->w5, pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
+    sigmoid(3 * B, x->j[t], c);
+    integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
+  }
+}
+#endif
