@@ -118,8 +118,8 @@ cppcheck: ## static analysis of the C code
 demo: all ## make a scene, train, export, render, co-simulate, audit: build/demo (under 4 minutes)
 	@STARTED=$(STARTED) tools/demo.sh $B
 
-lego: all ## the same chain on SCENES/lego with a training budget of 10 minutes: build/lego
-	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 10 --rays 400
+lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
+	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 15 --rays 400
 
 PROFILE ?= quick
 reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots in build/reproduce/PROFILE (quick, full, smoke)
