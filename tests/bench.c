@@ -1,6 +1,8 @@
 /* Speed of the trainer's parts, each beside its ceiling and its naive version. usage: bench OUT.json
  * Ceilings are measured on the spot: multiply-adds per second of all threads (of bfloat16 pairs where the kernels use
- * them) over the operations of one sample with every product dense, or memory bandwidth over the bytes. */
+ * them) over the operations of one sample with every product dense, memory bandwidth over the bytes, or random reads of
+ * a table as large as one level over the 128 corners of one sample. Naive: the oracle where there is one, else the
+ * portable build of the kernels; for Adam the textbook's loop over every parameter. */
 #include "float_fixture.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
@@ -86,6 +88,45 @@ static double bandwidth(void)
   return sum > 0 ? best : 0;
 }
 
+/* Reads of 8 bytes at random places of a hash-grid level (2^19 entries) per second, all threads. */
+static double random_reads(void)
+{
+  enum { ENTRIES = 1 << 19, READS = 1 << 25 };
+  const size_t bytes = ENTRIES * sizeof(uint64_t);
+  uint64_t *table = sf_aligned_alloc(bytes), sum = 0;
+  double start = sf_seconds();
+#pragma omp parallel reduction(+ : sum)
+  {
+    uint32_t at[8];
+    for (int i = 0; i < 8; i++) at[i] = (uint32_t)(i + 8 * omp_get_thread_num()) * 2654435761u;
+    for (int r = 0; r < READS / 8; r++)
+      for (int i = 0; i < 8; i++) {
+        at[i] = at[i] * 1664525u + 1013904223u;
+        sum += table[at[i] >> 13];
+      }
+  }
+  const double seconds = sf_seconds() - start;
+  free(table);
+  return sum ? 0 : (double)READS * omp_get_max_threads() / seconds;
+}
+
+typedef struct ceilings {
+  double fma, bytes, reads; /* per second: multiply-adds, bytes of memory, random table reads */
+} ceilings;
+
+/* Multiply-adds of one sample's forward pass. */
+static double operations(int steps)
+{
+  return 32 * 128 + 16 * 128 + steps * (128.0 * 16 + 15 * 128 + 128 * 128 + 128 * 3);
+}
+
+/* Bytes of Adam per parameter where a share of the cache lines has gradients: every gradient is read; of what is
+ * touched, 3 more floats are read and 4 written. */
+static double adam_bytes(double touched)
+{
+  return 4 + touched * 28;
+}
+
 static void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive)
 {
   cJSON *entry = cJSON_AddObjectToObject(json, name);
@@ -167,7 +208,7 @@ static double naive_forward(const sf_model *m)
   return total;
 }
 
-static void bench_nets(cJSON *json, double fma)
+static void bench_nets(cJSON *json, const ceilings *c)
 {
   const sf_kernels *best = sf_kernels_training(), *portable = sf_kernels_select("portable");
   static const struct {
@@ -177,57 +218,85 @@ static void bench_nets(cJSON *json, double fma)
   } cases[] = {{"t8", SF_NET_SNN, 8}, {"t3", SF_NET_SNN, 3}, {"t1", SF_NET_SNN, 1}, {"ann", SF_NET_ANN, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     sf_model m = full_model(cases[i].net, cases[i].steps);
-    const double once = 32 * 128 + 16 * 128, step = 128 * 16 + 15 * 128 + 128 * 128 + 128 * 3;
-    const double ops = once + cases[i].steps * step;
+    const double most = c->fma / operations(cases[i].steps);
     char name[64];
     snprintf(name, sizeof name, "train.nets.fwd.%s", cases[i].name);
-    put(json, name, nets(best, &m, false, 1), "samples/s", fma / ops, naive_forward(&m));
+    put(json, name, nets(best, &m, false, 1), "samples/s", most, naive_forward(&m));
     snprintf(name, sizeof name, "train.nets.fwdbwd.%s", cases[i].name);
-    put(json, name, nets(best, &m, true, 1), "samples/s", fma / (3 * ops), nets(portable, &m, true, 1));
+    put(json, name, nets(best, &m, true, 1), "samples/s", most / 3, nets(portable, &m, true, 1));
     sf_model_free(&m);
   }
 }
 
-static void bench_grid(cJSON *json)
+enum { GRID_BLOCKS = 1024 };
+
+typedef struct grid_rig {
+  sf_model model;
+  float *x, *f, *grad;
+} grid_rig;
+
+/* Samples per second of all threads, forward or backward. */
+static double grid(const grid_rig *r, const sf_kernels *k, bool backward)
 {
-  enum { BLOCKS = 1024 };
-  sf_model m = full_model(SF_NET_SNN, 8);
-  const sf_kernels *k = sf_kernels_select(NULL);
-  float *x = sf_aligned_alloc(BLOCKS * 3 * SF_BLOCK * 4), *f = sf_aligned_alloc(BLOCKS * 32 * SF_BLOCK * 4);
-  float *grad = sf_aligned_alloc(m.size * 4);
-  for (int i = 0; i < BLOCKS * 3 * SF_BLOCK; i++) x[i] = sf_random_float(1, 2, i);
-  double start = sf_seconds();
+  const double start = sf_seconds();
 #pragma omp parallel for schedule(dynamic, 1)
   for (int l = 0; l < 16; l++)
-    for (int b = 0; b < BLOCKS; b++)
-      k->grid_forward(&m.level[l], m.value, x + b * 3 * SF_BLOCK, f + (b * 16 + l) * 2 * SF_BLOCK);
-  double forward = BLOCKS * SF_BLOCK / (sf_seconds() - start);
-  start = sf_seconds();
-#pragma omp parallel for schedule(dynamic, 1)
-  for (int l = 0; l < 16; l++)
-    for (int b = 0; b < BLOCKS; b++)
-      k->grid_backward(&m.level[l], x + b * 3 * SF_BLOCK, f + (b * 16 + l) * 2 * SF_BLOCK, grad);
-  double backward = BLOCKS * SF_BLOCK / (sf_seconds() - start);
-  start = sf_seconds();
-#pragma omp parallel for
-  for (int s = 0; s < 65536; s++) {
-    float at[3] = {x[s], x[s + 1], x[s + 2]}, out[32];
-    sf_grid_features(&m, at, out);
-    f[s] = out[0];
-  }
-  double naive = 65536 / (sf_seconds() - start);
-  put(json, "train.grid.fwd", forward, "samples/s", NAN, naive);
-  put(json, "train.grid.bwd", backward, "samples/s", NAN, NAN);
-  free(x), free(f), free(grad);
-  sf_model_free(&m);
+    for (int b = 0; b < GRID_BLOCKS; b++) {
+      float *f = r->f + (b * 16 + l) * 2 * SF_BLOCK;
+      const float *x = r->x + b * 3 * SF_BLOCK;
+      if (backward)
+        k->grid_backward(&r->model.level[l], x, f, r->grad);
+      else
+        k->grid_forward(&r->model.level[l], r->model.value, x, f);
+    }
+  return GRID_BLOCKS * SF_BLOCK / (sf_seconds() - start);
 }
 
-static void bench_adam(cJSON *json, double bytes_per_second)
+static double naive_grid(const grid_rig *r)
+{
+  const double start = sf_seconds();
+#pragma omp parallel for
+  for (int s = 0; s < GRID_BLOCKS * SF_BLOCK; s++) {
+    float at[3] = {r->x[s], r->x[s + 1], r->x[s + 2]}, out[32];
+    sf_grid_features(&r->model, at, out);
+    r->f[s] = out[0];
+  }
+  return GRID_BLOCKS * SF_BLOCK / (sf_seconds() - start);
+}
+
+static void bench_grid(cJSON *json, const ceilings *c)
+{
+  const sf_kernels *k = sf_kernels_training(), *portable = sf_kernels_select("portable");
+  grid_rig r = {.model = full_model(SF_NET_SNN, 8),
+                .x = sf_aligned_alloc(GRID_BLOCKS * 3 * SF_BLOCK * sizeof(float)),
+                .f = sf_aligned_alloc(GRID_BLOCKS * 32 * SF_BLOCK * sizeof(float))};
+  r.grad = sf_aligned_alloc(r.model.size * sizeof(float));
+  for (int i = 0; i < GRID_BLOCKS * 3 * SF_BLOCK; i++) r.x[i] = sf_random_float(1, 2, i);
+  const double most = c->reads / 128, forward = grid(&r, k, false), backward = grid(&r, k, true);
+  const double naive_backward = grid(&r, portable, true);
+  put(json, "train.grid.fwd", forward, "samples/s", most, naive_grid(&r));
+  put(json, "train.grid.bwd", backward, "samples/s", most / 2, naive_backward); /* read and written */
+  free(r.x), free(r.f), free(r.grad);
+  sf_model_free(&r.model);
+}
+
+/* Kingma and Ba's loop over every parameter. */
+static void naive_adam(size_t n, float *value, const float *g, float *m, float *v)
+{
+#pragma omp parallel for
+  for (size_t i = 0; i < n; i++) {
+    m[i] = 0.9f * m[i] + 0.1f * g[i];
+    v[i] = 0.99f * v[i] + 0.01f * g[i] * g[i];
+    value[i] -= 1e-2f * (m[i] / 0.1f) / (sqrtf(v[i] / 0.01f) + 1e-15f);
+  }
+}
+
+static void bench_adam(cJSON *json, const ceilings *c)
 {
   sf_model m = full_model(SF_NET_SNN, 8);
   float *g = sf_aligned_alloc(m.size * 4), *a = sf_aligned_alloc(m.size * 4), *v = sf_aligned_alloc(m.size * 4);
   sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1};
-  double best = 1e9;
+  double best = 1e9, naive = 1e9;
   const double touched = 0.4; /* of the cache lines, as in an iteration of 16384 samples on lego */
   for (int i = 0; i < 5; i++) {
     for (size_t j = 0; j + 16 <= m.size; j += 16)
@@ -239,37 +308,57 @@ static void bench_adam(cJSON *json, double bytes_per_second)
       sf_adam_update(&adam, (size_t)2 * m.level[l].entries, m.value + at, g + at, a + at, v + at);
     }
     best = fmin(best, sf_seconds() - start);
+    start = sf_seconds();
+    naive_adam(m.size, m.value, g, a, v);
+    naive = fmin(naive, sf_seconds() - start);
   }
-  /* Every gradient is read; of what is touched, 3 more floats are read and 4 written. */
-  put(json, "train.adam", m.size / best, "params/s", bytes_per_second / (4 + touched * 28), NAN);
+  put(json, "train.adam", m.size / best, "params/s", c->bytes / adam_bytes(touched), m.size / naive);
   free(g), free(a), free(v);
   sf_model_free(&m);
 }
 
-static sf_status bench_iteration(cJSON *json)
+/* Samples per second of the iterations after the first 16. */
+static sf_status iterations(const sf_dataset *data, const sf_kernels *kernels, int count, double *rate)
 {
-  char folder[] = "/tmp/spikefield-bench-XXXXXX", command[64];
-  if (!mkdtemp(folder)) return sf_fail(SF_E_IO, "%s: cannot create", folder);
-  const sf_procedural_options o = {.width = 128, .height = 128, .train_views = 20, .test_views = 1, .seed = 1};
-  sf_dataset data = {0};
-  sf_status status = sf_procedural_write("textured", folder, &o, NULL, NULL);
-  if (!status.code) status = sf_dataset_load(&data, folder, "train", &(sf_dataset_options){.downscale = 1});
   sf_train_options options = sf_train_defaults();
   options.stage1 = 400;
   options.stage2 = 0;
   options.no_scaling = true;
   options.samples = 1 << 16;
   sf_trainer *t = NULL;
-  if (!status.code) status = sf_trainer_create(&t, &data, &options, NULL);
+  sf_status status = sf_trainer_create(&t, data, &options, NULL);
   double samples = 0, seconds = 0;
   sf_train_stats s = {0};
-  for (int i = 0; i < 48 && !status.code; i++) {
+  for (int i = 0; i < count && !status.code; i++) {
     const double before = s.seconds;
+    t->kernels = i < 16 ? sf_kernels_training() : kernels;
     status = sf_trainer_step(t, &s);
     if (i >= 16) samples += s.samples, seconds += s.seconds - before;
   }
-  if (!status.code) put(json, "train.iteration.t8", samples / seconds, "samples/s", NAN, NAN);
   sf_trainer_free(t);
+  *rate = samples / seconds;
+  return status;
+}
+
+/* The parts' ceilings one after another: nets, grid, and Adam over a table of which an iteration touches everything. */
+static double iteration_ceiling(const ceilings *c)
+{
+  const double parameters = 12.2e6, samples = 1 << 16;
+  return 1 / (3 * operations(8) / c->fma + 3 * 128 / c->reads + parameters * adam_bytes(1) / c->bytes / samples);
+}
+
+static sf_status bench_iteration(cJSON *json, const ceilings *c)
+{
+  char folder[] = "/tmp/spikefield-bench-XXXXXX", command[64];
+  if (!mkdtemp(folder)) return sf_fail(SF_E_IO, "%s: cannot create", folder);
+  const sf_procedural_options o = {.width = 128, .height = 128, .train_views = 20, .test_views = 1, .seed = 1};
+  sf_dataset data = {0};
+  double rate = 0, naive = 0;
+  sf_status status = sf_procedural_write("textured", folder, &o, NULL, NULL);
+  if (!status.code) status = sf_dataset_load(&data, folder, "train", &(sf_dataset_options){.downscale = 1});
+  if (!status.code) status = iterations(&data, sf_kernels_training(), 64, &rate);
+  if (!status.code) status = iterations(&data, sf_kernels_select("portable"), 20, &naive);
+  if (!status.code) put(json, "train.iteration.t8", rate, "samples/s", iteration_ceiling(c), naive);
   sf_dataset_free(&data);
   snprintf(command, sizeof command, "rm -rf %s", folder);
   if (system(command) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot remove", folder);
@@ -283,13 +372,13 @@ int main(int argc, char **argv)
 {
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
-  const double fma = peak(kernels), bytes = bandwidth();
-  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read\n", omp_get_max_threads(), kernels, fma * 1e-9,
-         bytes * 1e-9);
-  bench_nets(json, fma);
-  bench_grid(json);
-  bench_adam(json, bytes);
-  sf_status status = bench_iteration(json);
+  const ceilings c = {peak(kernels), bandwidth(), random_reads()};
+  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",
+         omp_get_max_threads(), kernels, c.fma * 1e-9, c.bytes * 1e-9, c.reads * 1e-9);
+  bench_nets(json, &c);
+  bench_grid(json, &c);
+  bench_adam(json, &c);
+  sf_status status = bench_iteration(json, &c);
   if (!status.code && argc > 1) status = sf_json_save(json, argv[1]);
   cJSON_Delete(json);
   if (status.code) fprintf(stderr, "bench: %s\n", status.message);
