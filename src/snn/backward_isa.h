@@ -108,7 +108,7 @@ static void layer_backward(const sf_net_view *net, int index, float k, int t, co
   float tile[TILE * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = tile_rows(net->hidden - m);
-    gemm((const word *)wt + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
+    gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     fire_backward(net, index, k, t, n, h + m * B, tile, out.carry + m * B, out.leak);
     if (out.sum) add_to(out.sum + m * B, tile, n * B);
     if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
@@ -126,9 +126,9 @@ static void add_outer(float *grad, int ld, const word *dy, int rows, const word 
 /* The activations of a spiking layer at one step, transposed for add_outer. */
 static const word *activations(const sf_net_view *net, int layer, const float *h, sf_net_scratch *w)
 {
-  activation_lanes(net, layer, net->hidden, h, (word *)w->spikes);
-  transpose((word *)w->spikes, net->hidden, BW, (word *)w->t, net->hidden);
-  return (const word *)w->t;
+  activation_lanes(net, layer, net->hidden, h, words(w->spikes));
+  transpose(words(w->spikes), net->hidden, BW, words(w->t), net->hidden);
+  return operands(w->t);
 }
 
 /* Colour integrator and layers C3, C2, C1 at step t; leaves the gradient of i in gi[16][B], row 0 zero. */
@@ -138,7 +138,7 @@ static void colour_backward(const sf_net_words *n, const sf_block *x, int t, flo
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
   float c[3 * B], gj[4 * B] = {0};
-  word *rows = (word *)w->rows, *lanes = (word *)w->lanes, small[4 * B];
+  word *rows = words(w->rows), *lanes = words(w->lanes), small[4 * B];
   sigmoid(3 * B, x->j[t], c);
   for (int a = 0; a < 3; a++)
     integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
@@ -150,27 +150,27 @@ static void colour_backward(const sf_net_words *n, const sf_block *x, int t, flo
   const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
   layer_backward(
       net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
-      (backward_out){w->g4, w->leak[3], NULL, events ? (float *)w->lanes : NULL, rows, events ? NULL : lanes});
+      (backward_out){w->g4, w->leak[3], NULL, events ? floats(w->lanes) : NULL, rows, events ? NULL : lanes});
   if (events) {
-    transpose(lanes, hidden, B, (word *)w->t, hidden);
-    event_outer(grad->w4t, hidden, x->s3[t], (float *)w->t);
+    transpose(lanes, hidden, B, words(w->t), hidden);
+    event_outer(grad->w4t, hidden, x->s3[t], floats(w->t));
   } else
     add_outer(grad->w4, hidden, lanes, hidden, activations(net, 1, x->m3[t], w), hidden);
-  word *rows3 = (word *)w->spikes;
+  word *rows3 = words(w->spikes);
   layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, rows, x->m3[t],
                  (backward_out){w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
-  gemm((const word *)n->w3ht, hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);
+  gemm(operands(n->w3ht), hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);
   pack_lanes(x->i[t], SF_DENSITY_OUT, rows);
-  transpose(rows, SF_DENSITY_OUT, BW, (word *)w->t, SF_DENSITY_OUT);
+  transpose(rows, SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
   /* Column 16 of the padded gradient meets i[0], which is no input of C1: scratch. h starts at column 17. */
-  add_outer(grad->w3 + SF_DIR_FEATURES, 32, lanes, hidden, (word *)w->t, SF_DENSITY_OUT);
+  add_outer(grad->w3 + SF_DIR_FEATURES, 32, lanes, hidden, words(w->t), SF_DENSITY_OUT);
 }
 
 /* Gradients of what was constant over the steps: w1, the directions' part of w3, and the features. */
 static void constant_backward(const sf_net_words *n, const sf_block *x, float *df, sf_net_grad *grad, sf_net_scratch *w)
 {
   const int hidden = n->view.hidden, features = n->view.features, padded = (features + 15) / 16 * 16;
-  word *rows = (word *)w->rows, *lanes = (word *)w->lanes, *spikes = (word *)w->spikes, *t = (word *)w->t;
+  word *rows = words(w->rows), *lanes = words(w->lanes), *spikes = words(w->spikes), *t = words(w->t);
   pack_lanes(x->sh, SF_DIR_FEATURES, spikes);
   transpose(spikes, SF_DIR_FEATURES, BW, t, SF_DIR_FEATURES);
   pack_lanes(w->sum3, hidden, lanes);
@@ -181,7 +181,7 @@ static void constant_backward(const sf_net_words *n, const sf_block *x, float *d
   pack_lanes(w->sum1, hidden, lanes);
   add_outer(grad->w1, padded, lanes, hidden, t, padded);
   pack_rows(w->sum1, hidden, rows);
-  gemm((const word *)n->w1t, hidden / PAIR, features, hidden / PAIR, rows, B, B, NULL, 0, df, B);
+  gemm(operands(n->w1t), hidden / PAIR, features, hidden / PAIR, rows, B, B, NULL, 0, df, B);
 }
 
 static void backward(const sf_net_words *n, const sf_block *x, int steps, const float *dsigma, const float *dcolour,

@@ -96,27 +96,27 @@ static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, co
                          float *i, float *sigma, const float *sigma_before)
 {
   const sf_net_view *net = &n->view;
-  word *spikes = (word *)w->spikes;
+  word *spikes = words(w->spikes);
   float e[B];
   layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, x->m1[slot(t, keep)],
         spikes);
-  gemm((const word *)n->w2, net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
+  gemm(operands(n->w2), net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
   exponential(B, i, e);
   integrate(net, net->k[1], t, B, e, sigma_before, sigma);
 }
 
 /* in[inputs][B] times words of weights: what is constant over the steps. */
-static void constant_current(const sf_net_words *n, const uint32_t *weights, int inputs, const float *in, word *words,
+static void constant_current(const sf_net_words *n, const uint32_t *weights, int inputs, const float *in, word *packed,
                              float *current)
 {
   const int pairs = inputs / PAIR;
-  pack_rows(in, inputs, words);
-  gemm((const word *)weights, pairs, n->view.hidden, pairs, words, B, B, NULL, 0, current, B);
+  pack_rows(in, inputs, packed);
+  gemm(operands(weights), pairs, n->view.hidden, pairs, packed, B, B, NULL, 0, current, B);
 }
 
 static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
 {
-  constant_current(n, n->w1, n->view.features, x->f, (word *)w->rows, w->sum1);
+  constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
   for (int t = 0; t < steps; t++)
     density_step(n, x, t, 0, w->sum1, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
 }
@@ -126,24 +126,24 @@ static void colour_layer_2(const sf_net_words *n, sf_block *x, int t, int at, in
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
-  const word *weights = (const word *)n->w4;
+  const word *weights = operands(n->w4);
   float *current = NULL;
   for (int r = 0; r < hidden; r++) x->s3[at][r] = spike_bits(x->m3[at] + r * B, net->theta[1]);
   if (!net->relu && few_spikes(x->s3[at], hidden, dense_forward)) {
     weights = NULL;
-    current = (float *)w->lanes;
-    event_current(n->w4_slice, hidden, x->s3[at], (float *)w->t);
-    transpose((word *)w->t, B, hidden, (word *)w->lanes, B);
+    current = floats(w->lanes);
+    event_current(n->w4_slice, hidden, x->s3[at], floats(w->t));
+    transpose(words(w->t), B, hidden, words(w->lanes), B);
   }
-  layer(net, 2, net->k[3], t, weights, hidden / PAIR, (word *)w->spikes, current, t ? x->m4[before] : NULL, x->m4[at],
-        (word *)w->rows);
+  layer(net, 2, net->k[3], t, weights, hidden / PAIR, words(w->spikes), current, t ? x->m4[before] : NULL, x->m4[at],
+        words(w->rows));
 }
 
 static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
   const int pairs = net->hidden / PAIR;
-  word *spikes = (word *)w->spikes, *rows = (word *)w->rows;
+  word *spikes = words(w->spikes), *rows = words(w->rows);
   constant_current(n, n->w1, net->features, x->f, rows, w->sum1);
   constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, rows, w->sum3);
   for (int t = 0; t < steps; t++) {
@@ -151,10 +151,10 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
     float c[3 * B];
     density_step(n, x, t, keep, w->sum1, w, x->i[t], x->sigma[t], t ? x->sigma[t - 1] : NULL);
     pack_rows(x->i[t], SF_DENSITY_OUT, rows);
-    layer(net, 1, net->k[2], t, (const word *)n->w3h, SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
+    layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
           x->m3[at], spikes);
     colour_layer_2(n, x, t, at, before, w);
-    gemm((const word *)n->w5, pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
+    gemm(operands(n->w5), pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
     sigmoid(3 * B, x->j[t], c);
     integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
   }

@@ -39,6 +39,32 @@ static inline __attribute__((always_inline)) vf dot(vf sum, word a, vw b)
 }
 #endif
 
+/* Working memory as what it holds now. */
+static inline word *words(void *memory)
+{
+  return memory;
+}
+
+static inline const word *operands(const void *memory)
+{
+  return memory;
+}
+
+static inline float *floats(void *memory)
+{
+  return memory;
+}
+
+static inline vf load(const void *from)
+{
+  return *(const vf *)from;
+}
+
+static inline void store(void *to, vf x)
+{
+  *(vf *)to = x;
+}
+
 /* The word of a (low half) and b; bfloat16 rounds to nearest, halves away from zero. One number per word: a. */
 static inline word pair(float a, float b)
 {
@@ -158,7 +184,7 @@ static inline void transpose_tile(const vf *in, word *out, int ldo)
     }
     memcpy(x, y, sizeof x);
   }
-  for (int i = 0; i < VL; i++) *(vf *)(out + (size_t)i * ldo) = x[i];
+  for (int i = 0; i < VL; i++) store(out + (size_t)i * ldo, x[i]);
 }
 
 /* out[columns][ldo] = transpose of in[rows][columns], words; both multiples of VL. */
@@ -167,7 +193,7 @@ static void transpose(const word *in, int rows, int columns, word *out, int ldo)
   for (int r = 0; r < rows; r += VL)
     for (int s = 0; s < columns; s += VL) {
       vf tile[VL];
-      for (int i = 0; i < VL; i++) tile[i] = *(const vf *)(in + (size_t)(r + i) * columns + s);
+      for (int i = 0; i < VL; i++) tile[i] = load(in + (size_t)(r + i) * columns + s);
       transpose_tile(tile, out + (size_t)s * ldo + r, ldo);
     }
 }

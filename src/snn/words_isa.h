@@ -10,7 +10,7 @@ enum { B = SF_BLOCK, IN3 = SF_DIR_FEATURES + SF_GEO_FEATURES, BW = B / PAIR, TIL
 /* Weights [rows][columns] (row stride ld) as words [rows][padded / PAIR], zero beyond `columns`. */
 static void pack_matrix(const float *w, int row, int column, int rows, int columns, int padded, uint32_t *out)
 {
-  word *to = (word *)out;
+  word *to = words(out);
   for (int r = 0; r < rows; r++)
     for (int c = 0; c < padded; c += PAIR) {
       const int d = c + PAIR - 1;
