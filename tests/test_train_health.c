@@ -176,7 +176,20 @@ static void paint(sf_dataset *data, uint16_t rgb, uint16_t alpha)
       for (int c = 0; c < 4; c++) data->view[v].image.rgba[4 * i + c] = c < 3 ? rgb : alpha;
 }
 
-enum { WHITE, TRANSPARENT, ONE_VIEW, SCENES, BETA = SCENES, ONE_STEP, ALL_STEPS, SMALL, COARSE, NO_DECAY, DECAY, CASES };
+enum {
+  WHITE,
+  TRANSPARENT,
+  ONE_VIEW,
+  SCENES,
+  BETA = SCENES,
+  ONE_STEP,
+  ALL_STEPS,
+  SMALL,
+  COARSE,
+  NO_DECAY,
+  DECAY,
+  CASES
+};
 
 static void harden(int which, sf_dataset *data, sf_train_options *o)
 {
