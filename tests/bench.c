@@ -17,41 +17,25 @@
 #if defined(__x86_64__)
 typedef float lanes __attribute__((vector_size(64)));
 
-/* Multiply-adds per second of all threads: 24 independent chains of 16 lanes each. */
-__attribute__((target("avx512f,fma"))) static double fma_chain_avx512(long rounds)
-{
-  lanes acc[24];
-  for (int i = 0; i < 24; i++) acc[i] = (lanes){0} + (float)i;
-  const lanes x = (lanes){0} + 0.999f, y = (lanes){0} + 0.001f;
-  for (long r = 0; r < rounds; r++)
-#pragma GCC unroll 24
-    for (int i = 0; i < 24; i++) {
-      lanes z = acc[i];
-      __asm__ volatile("vfmadd213ps %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));
-      acc[i] = z;
-    }
-  double sum = 0;
-  for (int i = 0; i < 24; i++) sum += acc[i][0];
-  return sum;
-}
-
-/* The same for dot products of bfloat16 pairs: two multiply-adds a lane. */
-__attribute__((target("avx512f,avx512bf16"))) static double dot_chain_avx512bf16(long rounds)
-{
-  lanes acc[24];
-  for (int i = 0; i < 24; i++) acc[i] = (lanes){0} + (float)i;
-  const lanes x = (lanes){0}, y = (lanes){0};
-  for (long r = 0; r < rounds; r++)
-#pragma GCC unroll 24
-    for (int i = 0; i < 24; i++) {
-      lanes z = acc[i];
-      __asm__ volatile("vdpbf16ps %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));
-      acc[i] = z;
-    }
-  double sum = 0;
-  for (int i = 0; i < 24; i++) sum += acc[i][0];
-  return sum;
-}
+/* 24 independent chains of 16 lanes: as many as hide the latency of either instruction. */
+#define CHAINS(name, isa, instruction)                                                                                 \
+  __attribute__((target(isa))) static double name(long rounds)                                                         \
+  {                                                                                                                    \
+    lanes acc[24];                                                                                                     \
+    for (int i = 0; i < 24; i++) acc[i] = (lanes){0} + (float)i;                                                       \
+    const lanes x = (lanes){0} + 0.999f, y = (lanes){0} + 0.001f;                                                      \
+    for (long r = 0; r < rounds; r++) _Pragma("GCC unroll 24") for (int i = 0; i < 24; i++)                            \
+      {                                                                                                                \
+        lanes z = acc[i];                                                                                              \
+        __asm__ volatile(instruction " %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));                                        \
+        acc[i] = z;                                                                                                    \
+      }                                                                                                                \
+    double sum = 0;                                                                                                    \
+    for (int i = 0; i < 24; i++) sum += acc[i][0];                                                                     \
+    return sum;                                                                                                        \
+  }
+CHAINS(fma_chain_avx512, "avx512f,fma", "vfmadd213ps")
+CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-adds a lane */
 
 /* Multiply-adds per second of all threads in the arithmetic of the named kernels. */
 static double peak(const char *kernels)

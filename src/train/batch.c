@@ -61,7 +61,7 @@ static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
   }
 }
 
-/* The end of the bundle that starts at ray `first`: of the ray boundaries in its second half the one that leaves
+/* The end of the bundle that starts at ray `first`: of the ray boundaries in its second half the one that leaves the
  * fewest lanes empty. */
 static int bundle_end(const sf_batch *b, int first)
 {
