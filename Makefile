@@ -46,13 +46,16 @@ all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 # Library. Files named *_isa.c are compiled once per instruction set and chosen at run time; the portable
 # build is the oracle of the others.
 LIB_SRC := $(filter-out %_isa.c,$(wildcard src/*/*.c))
-ISA_SRC := $(wildcard src/*/*_isa.c)
-ISAS := portable $(if $(filter x86_64,$(shell uname -m)),avx2 avx512 avx512bf16)
+X86 := $(filter x86_64,$(shell uname -m))
+ISAS_snn := portable $(if $(X86),avx2 avx512 avx512bf16)
+ISAS_fx := $(if $(X86),avx2 avx512vnni)
 isa_portable :=
 isa_avx2 := -mavx2 -mfma -ffp-contract=fast
 isa_avx512 := -march=x86-64-v4 -mprefer-vector-width=512 -ffp-contract=fast
 isa_avx512bf16 := $(isa_avx512) -mavx512bf16 -mavx512vbmi2
-LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS),$(ISA_SRC:%.c=$B/obj/%.$i.o))
+isa_avx512vnni := $(isa_avx512) -mavx512vnni -mavx512vbmi2
+LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS_snn),$B/obj/src/snn/kernels_isa.$i.o) \
+  $(foreach i,$(ISAS_fx),$B/obj/src/fx/kernels_isa.$i.o)
 
 $B/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -65,7 +68,7 @@ $B/obj/%_isa.$1.o: %_isa.c
 	$$(call say,CC    $$< ($1))
 	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
 endef
-$(foreach i,$(ISAS),$(eval $(call isa_rule,$i)))
+$(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
 
 $B/libspikefield.a: $(LIB_OBJ)
 	$(call say,AR    $@)

@@ -237,6 +237,8 @@ static inline void naive_sample(const fx_net *net, const int16_t *f, const int16
   int64_t x[SF_LANES], d[SF_LANES], d1[SF_LANES] = {0}, base[SF_LANES] = {0}, h[SF_OUT_MAX] = {0};
   for (int i = 0; i < net->layer[FX_D1].n_in; i++) x[i] = f[i];
   for (int i = 0; i < n_dir; i++) d[i] = dir[i];
+  uint64_t before[SF_LAYERS];
+  memcpy(before, counts->saturated, sizeof before);
   memset(trace, 0, sizeof *trace);
   counts->samples++;
   counts->rays += first;
@@ -248,6 +250,7 @@ static inline void naive_sample(const fx_net *net, const int16_t *f, const int16
     naive_density(&n, t, d1, h);
     naive_colour(&n, t, base, h);
   }
+  for (int l = 0; l < SF_LAYERS; l++) counts->saturated_samples[l] += counts->saturated[l] != before[l];
   *out = (fx_out){(uint32_t)n.sigma, {(uint32_t)n.colour[0], (uint32_t)n.colour[1], (uint32_t)n.colour[2]}};
 }
 

@@ -107,6 +107,7 @@ typedef struct fx_counts {
   uint64_t grid_bytes;     /* hash-grid bytes read */
   uint64_t march_steps;    /* lattice points tested against the occupancy grid */
   uint64_t saturated[SF_LAYERS]; /* saturation events: membranes, or exp/sigmoid accumulators for D2/C3 */
+  uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one of them */
   uint64_t saturated_features;
 } fx_counts;
 
@@ -158,6 +159,25 @@ typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const 
 /* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */
 sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
                         fx_counts *counts);
+
+/* ---- many rays at once ---- */
+
+/* A checked scene made ready for the vector kernels, which give the same bits as the functions above on every machine. The
+ * scene must outlive it and stay as it is; one core serves any number of threads. kernels: "portable", "avx2",
+ * "avx512vnni", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it lacks the named one. */
+typedef struct fx_core fx_core;
+sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernels);
+void fx_core_close(fx_core *core); /* NULL is fine */
+const char *fx_core_kernels(const fx_core *core);
+
+/* What one ray cost: events summed over layers and steps. */
+typedef struct fx_cost {
+  uint64_t macs, sops, spikes;
+} fx_cost;
+
+/* fx_render_ray for rays[n]: pixels[n]; costs[n] and counts (which it adds to) may be NULL. SF_E_MEMORY. */
+sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
+                         fx_counts *counts);
 
 /* Refuses a scene that breaks a rule above, naming the field (`path` is only for the message). */
 sf_status fx_scene_check(const fx_scene *scene, const char *path);

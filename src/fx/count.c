@@ -13,18 +13,43 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more)
   for (size_t i = 0; i < sizeof *sum / sizeof *to; i++) to[i] += from[i];
 }
 
-static uint64_t popcount(const uint64_t bits[2])
-{
-  return (uint64_t)(__builtin_popcountll(bits[0]) + __builtin_popcountll(bits[1]));
-}
-
-void fx_count_direction(fx_counts *counts, const fx_net *net)
+static uint64_t direction_macs(const fx_net *net)
 {
   const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
-  const uint64_t macs = (uint64_t)n_dir * (uint64_t)net->layer[FX_C1].n_out;
-  counts->rays++;
-  counts->layer[FX_C1].mac[0] += macs;
-  counts->layer[FX_C1].weight[0] += macs;
+  return (uint64_t)n_dir * (uint64_t)net->layer[FX_C1].n_out;
+}
+
+static uint64_t feature_macs(const fx_net *net)
+{
+  return (uint64_t)net->layer[FX_D1].n_in * (uint64_t)net->layer[FX_D1].n_out;
+}
+
+static uint64_t h_macs(const fx_net *net)
+{
+  return (uint64_t)(net->layer[FX_D2].n_out - 1) * (uint64_t)net->layer[FX_C1].n_out;
+}
+
+uint64_t fx_macs_of_ray(const fx_net *net)
+{
+  return direction_macs(net);
+}
+
+uint64_t fx_macs_of_sample(const fx_net *net)
+{
+  return feature_macs(net) + (uint64_t)net->steps * h_macs(net);
+}
+
+void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays)
+{
+  counts->rays += rays;
+  counts->layer[FX_C1].mac[0] += rays * direction_macs(net);
+  counts->layer[FX_C1].weight[0] += rays * direction_macs(net);
+}
+
+static void count_products(fx_layer_counts *c, int t, uint64_t macs)
+{
+  c->mac[t] += macs;
+  c->weight[t] += macs;
 }
 
 static void count_updates(fx_layer_counts *c, int t, uint64_t updates, uint64_t bytes)
@@ -35,44 +60,34 @@ static void count_updates(fx_layer_counts *c, int t, uint64_t updates, uint64_t 
 }
 
 /* A layer fed by spikes. C2 reads a row for every spike; D2 and C3 keep a row's currents: one read per sample. */
-static void count_synapses(fx_layer_counts *c, const fx_layer *layer, int t, const uint64_t now[2], uint64_t rows_read)
+static void count_synapses(fx_layer_counts *c, const fx_layer *layer, int t, uint64_t spikes, uint64_t rows_read)
 {
-  const uint64_t fan_out = (uint64_t)layer->n_out;
-  c->sop[t] += popcount(now) * fan_out;
-  c->weight[t] += rows_read * fan_out;
+  c->sop[t] += spikes * (uint64_t)layer->n_out;
+  c->weight[t] += rows_read * (uint64_t)layer->n_out;
 }
 
-static uint64_t first_time(uint64_t seen[2], const uint64_t now[2])
+void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firing)
 {
-  const uint64_t fresh[2] = {now[0] & ~seen[0], now[1] & ~seen[1]};
-  seen[0] |= now[0], seen[1] |= now[1];
-  return popcount(fresh);
-}
-
-void fx_count_sample(fx_counts *counts, const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2])
-{
+  enum { D1, C1, C2 };
   const fx_layer *layer = net->layer;
+  const uint64_t n = firing->samples;
   fx_layer_counts *c = counts->layer;
-  const uint64_t d1_macs = (uint64_t)layer[FX_D1].n_in * (uint64_t)layer[FX_D1].n_out;
-  const uint64_t h_macs = (uint64_t)(layer[FX_D2].n_out - 1) * (uint64_t)layer[FX_C1].n_out;
-  uint64_t seen_d1[2] = {0}, seen_c2[2] = {0};
-  counts->samples++;
-  c[FX_D1].mac[0] += d1_macs;
-  c[FX_D1].weight[0] += d1_macs;
+  counts->samples += n;
+  count_products(&c[FX_D1], 0, n * feature_macs(net));
   for (int t = 0; t < net->steps; t++) {
-    const uint64_t *d1 = spikes[FX_D1][t], *c1 = spikes[FX_C1][t], *c2 = spikes[FX_C2][t];
-    for (int l = 0; l < SF_LAYERS; l++) c[l].spikes[t] += l == FX_D2 || l == FX_C3 ? 0 : popcount(spikes[l][t]);
-    c[FX_C1].mac[t] += h_macs;
-    c[FX_C1].weight[t] += h_macs;
-    count_synapses(&c[FX_D2], &layer[FX_D2], t, d1, first_time(seen_d1, d1));
-    count_synapses(&c[FX_C2], &layer[FX_C2], t, c1, popcount(c1));
-    count_synapses(&c[FX_C3], &layer[FX_C3], t, c2, first_time(seen_c2, c2));
-    count_updates(&c[FX_D1], t, (uint64_t)layer[FX_D1].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_C1], t, (uint64_t)layer[FX_C1].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_C2], t, (uint64_t)layer[FX_C2].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_D2], t, 1, INTEGRATOR_BYTES);
-    count_updates(&c[FX_C3], t, (uint64_t)layer[FX_C3].n_out, INTEGRATOR_BYTES);
-    c[FX_D2].special[t]++;
-    c[FX_C3].special[t] += (uint64_t)layer[FX_C3].n_out;
+    c[FX_D1].spikes[t] += firing->spikes[D1][t];
+    c[FX_C1].spikes[t] += firing->spikes[C1][t];
+    c[FX_C2].spikes[t] += firing->spikes[C2][t];
+    count_products(&c[FX_C1], t, n * h_macs(net));
+    count_synapses(&c[FX_D2], &layer[FX_D2], t, firing->spikes[D1][t], firing->fresh[D1][t]);
+    count_synapses(&c[FX_C2], &layer[FX_C2], t, firing->spikes[C1][t], firing->spikes[C1][t]);
+    count_synapses(&c[FX_C3], &layer[FX_C3], t, firing->spikes[C2][t], firing->fresh[C2][t]);
+    count_updates(&c[FX_D1], t, n * (uint64_t)layer[FX_D1].n_out, MEMBRANE_BYTES);
+    count_updates(&c[FX_C1], t, n * (uint64_t)layer[FX_C1].n_out, MEMBRANE_BYTES);
+    count_updates(&c[FX_C2], t, n * (uint64_t)layer[FX_C2].n_out, MEMBRANE_BYTES);
+    count_updates(&c[FX_D2], t, n, INTEGRATOR_BYTES);
+    count_updates(&c[FX_C3], t, n * (uint64_t)layer[FX_C3].n_out, INTEGRATOR_BYTES);
+    c[FX_D2].special[t] += n;
+    c[FX_C3].special[t] += n * (uint64_t)layer[FX_C3].n_out;
   }
 }

@@ -3,7 +3,29 @@
 #define SPIKEFIELD_FX_COUNT_H
 #include "spikefield/fx.h"
 
-void fx_count_direction(fx_counts *counts, const fx_net *net);
-/* spikes[layer][step]: bitmaps of one sample. */
-void fx_count_sample(fx_counts *counts, const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2]);
+enum { FX_SPIKING = 3 }; /* D1, C1, C2 in this order */
+
+/* All that the counters of any number of samples follow from. */
+typedef struct fx_firing {
+  uint64_t samples;
+  uint64_t spikes[FX_SPIKING][SF_T_MAX];
+  uint64_t fresh[FX_SPIKING][SF_T_MAX]; /* neurons that fired for the first time in their sample */
+} fx_firing;
+
+/* Adds one step of one neuron layer (0..FX_SPIKING-1) of one sample; seen starts at 0. Returns the number of spikes. */
+static inline uint64_t fx_firing_add(fx_firing *sum, int layer, int t, const uint64_t now[2], uint64_t seen[2])
+{
+  const uint64_t spikes = (uint64_t)(__builtin_popcountll(now[0]) + __builtin_popcountll(now[1]));
+  sum->spikes[layer][t] += spikes;
+  sum->fresh[layer][t] += (uint64_t)(__builtin_popcountll(now[0] & ~seen[0]) + __builtin_popcountll(now[1] & ~seen[1]));
+  seen[0] |= now[0], seen[1] |= now[1];
+  return spikes;
+}
+
+void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays);
+void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firing);
+
+/* MACs of one ray that has a sample, and of one sample. */
+uint64_t fx_macs_of_ray(const fx_net *net);
+uint64_t fx_macs_of_sample(const fx_net *net);
 #endif

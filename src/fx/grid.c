@@ -7,6 +7,7 @@
  *          reproduced exactly.
  *   f    = sat12(rshift_round(sum of entry * w, shift)), |sum| <= 128 * 2^16 */
 #include "src/fx/unit.h"
+#include "src/fx/scene.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
 
@@ -74,5 +75,10 @@ void fx_grid_features(const fx_grid *grid, const uint32_t *pos, int16_t *f, fx_c
   }
   if (!counts) return;
   counts->saturated_features += saturated;
-  counts->grid_bytes += (uint64_t)grid->levels * CORNERS * FX_GRID_FEATURES;
+  counts->grid_bytes += fx_grid_bytes(grid);
+}
+
+uint64_t fx_grid_bytes(const fx_grid *grid)
+{
+  return (uint64_t)grid->levels * CORNERS * FX_GRID_FEATURES;
 }

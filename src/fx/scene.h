@@ -9,6 +9,7 @@ extern const char *const fx_layer_tensor[SF_LAYERS]; /* tensor names, also used 
 
 /* Sizes alone: everything that memory is allocated and indexed by. */
 sf_status fx_check_sizes(const fx_scene *scene, const char *path);
+uint64_t fx_grid_bytes(const fx_grid *grid); /* read for one sample */
 size_t fx_occupancy_bytes(const fx_scene *scene);
 
 /* Real-valued metadata as text (C hexadecimal notation: exact). */

@@ -1,0 +1,52 @@
+#include "src/fx/core.h"
+#include "base/memory.h"
+#include <stdlib.h>
+#include <string.h>
+#include "src/fx/nofloat.h"
+
+static void pair_rows(int16_t (*to)[SF_LANES][2], int first, const int8_t *w, int rows)
+{
+  for (int i = 0; i < rows; i++)
+    for (int o = 0; o < SF_LANES; o++) to[(first + i) / 2][o][(first + i) % 2] = w[(size_t)i * SF_LANES + o];
+}
+
+static void arrange(fx_words *words, const fx_net *net)
+{
+  const fx_layer *layer = net->layer;
+  const int n_h = layer[FX_D2].n_out - 1, n_dir = layer[FX_C1].n_in - n_h;
+  pair_rows(words->d1, 0, layer[FX_D1].w, layer[FX_D1].n_in);
+  pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_dir * SF_LANES, n_h);
+  for (int i = 0; i < SF_LANES; i++)
+    for (int o = 0; o < SF_LANES; o++) {
+      const size_t at = (size_t)i * SF_LANES + (size_t)o;
+      if (i < layer[FX_C2].n_in) words->c2[i][o] = words->c2_quads[i / 4][o][i % 4] = layer[FX_C2].w[at];
+      if (o >= SF_OUT_MAX) continue;
+      if (i < layer[FX_D2].n_in) words->d2[i][o] = layer[FX_D2].w[at];
+      if (i < layer[FX_C3].n_in) words->c3[i][o] = layer[FX_C3].w[at];
+    }
+}
+
+sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernels)
+{
+  const fx_kernels *chosen = fx_kernels_select(kernels);
+  *core = NULL;
+  if (!chosen)
+    return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2 or avx512vnni", kernels);
+  fx_core *c = sf_aligned_alloc(sizeof *c);
+  if (!c) return sf_fail(SF_E_MEMORY, "no memory for the core's tables");
+  c->scene = scene;
+  c->kernels = chosen;
+  arrange(&c->words, &scene->net);
+  *core = c;
+  return sf_ok();
+}
+
+void fx_core_close(fx_core *core)
+{
+  free(core);
+}
+
+const char *fx_core_kernels(const fx_core *core)
+{
+  return core->kernels->name;
+}

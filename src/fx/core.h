@@ -1,0 +1,60 @@
+/* Many samples at once: the scene's weights as the vector kernels read them, and the kernels' interface.
+ * kernels_isa.c is compiled once per instruction set; the portable build calls the oracle (net.c, grid.c, march.c) sample
+ * by sample, and every other build gives the same bits. */
+#ifndef SPIKEFIELD_FX_CORE_H
+#define SPIKEFIELD_FX_CORE_H
+#include "src/fx/count.h"
+
+enum { FX_BLOCK = 32 }; /* samples */
+
+/* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole groups.
+ * Pairs and quads: neighbouring rows interleaved, as one 32-bit lane multiplies them. */
+typedef struct fx_words {
+  int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
+  int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2]; /* by D2 current: row 0, the density's, is zero */
+  int16_t d2[SF_LANES + 1][SF_OUT_MAX];
+  int16_t c2[SF_LANES + 1][SF_LANES];
+  int16_t c3[SF_LANES + 1][SF_OUT_MAX];
+  int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
+} fx_words;
+
+/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base. Slots from n on may hold anything. */
+typedef struct fx_block {
+  int n;
+  uint32_t pos[3][FX_BLOCK]; /* Q0.24 */
+  int16_t f[FX_BLOCK][SF_FEATURE_MAX];
+  const int32_t *base[FX_BLOCK]; /* [SF_LANES] each, from fx_net_direction */
+  fx_out out[FX_BLOCK];
+  uint64_t spikes[FX_SPIKING][SF_T_MAX][FX_BLOCK][2]; /* bitmaps of D1, C1, C2 */
+  uint32_t saturated[SF_LAYERS][FX_BLOCK];            /* events */
+} fx_block;
+
+/* Working memory of one thread: currents and membranes of a block. */
+typedef struct fx_scratch {
+  int32_t d1_current[FX_BLOCK][SF_LANES];
+  int32_t v[FX_SPIKING][FX_BLOCK][SF_LANES];
+  int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
+  int16_t c2_current[FX_BLOCK][SF_LANES];
+  int32_t argument[4][FX_BLOCK];
+  uint32_t acc[4][FX_BLOCK]; /* density, red, green, blue */
+} fx_scratch;
+
+typedef struct fx_kernels {
+  const char *name;
+  /* Both nets through all steps: out, spikes and saturated of samples 0..n-1. */
+  void (*nets)(const fx_core *core, fx_block *block, fx_scratch *scratch);
+  /* f of pos, samples 0..n-1; returns the number of saturations. */
+  uint64_t (*features)(const fx_grid *grid, fx_block *block);
+  /* The first lattice point >= n whose cell is occupied, or ray->count. */
+  int32_t (*march)(const fx_scene *scene, const fx_ray *ray, int32_t n);
+} fx_kernels;
+
+struct fx_core {
+  fx_words words; /* first: aligned to a cache line */
+  const fx_scene *scene;
+  const fx_kernels *kernels;
+};
+
+/* "portable", "avx2", "avx512vnni", or NULL for the best of this CPU; NULL when CPU or build lacks it. */
+const fx_kernels *fx_kernels_select(const char *name);
+#endif

@@ -1,0 +1,60 @@
+/* Choice of the instruction set at run time, and the portable kernels: the oracle, sample by sample. */
+#include "src/fx/core.h"
+#include "src/fx/net.h"
+#include <string.h>
+#include "src/fx/nofloat.h"
+
+#if defined(__x86_64__)
+extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni;
+#endif
+
+static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
+{
+  static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
+  (void)scratch;
+  for (int i = 0; i < b->n; i++) {
+    fx_events events;
+    fx_net_events(&core->scene->net, b->f[i], b->base[i], &b->out[i], &events, NULL);
+    for (int s = 0; s < FX_SPIKING; s++)
+      for (int t = 0; t < core->scene->net.steps; t++)
+        memcpy(b->spikes[s][t][i], events.spikes[spiking[s]][t], sizeof b->spikes[s][t][i]);
+    for (int l = 0; l < SF_LAYERS; l++) b->saturated[l][i] = (uint32_t)events.saturated[l];
+  }
+}
+
+static uint64_t features(const fx_grid *grid, fx_block *b)
+{
+  fx_counts counts = {0};
+  for (int i = 0; i < b->n; i++) {
+    const uint32_t pos[3] = {b->pos[0][i], b->pos[1][i], b->pos[2][i]};
+    fx_grid_features(grid, pos, b->f[i], &counts);
+  }
+  return counts.saturated_features;
+}
+
+static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
+{
+  uint32_t pos[3];
+  const int32_t found = fx_march_next(scene, ray, n, pos, NULL);
+  return found < 0 ? ray->count : found;
+}
+
+static const fx_kernels portable = {"portable", nets, features, march};
+
+const fx_kernels *fx_kernels_select(const char *name)
+{
+  const fx_kernels *candidate[3];
+  int n = 0;
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2"))
+    candidate[n++] = &fx_kernels_avx512vnni;
+  if (__builtin_cpu_supports("avx2")) candidate[n++] = &fx_kernels_avx2;
+#endif
+  candidate[n++] = &portable;
+  if (!name) return candidate[0];
+  for (int i = 0; i < n; i++)
+    if (!strcmp(candidate[i]->name, name)) return candidate[i];
+  return NULL;
+}

@@ -1,0 +1,146 @@
+/* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that has
+ * ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
+#include "src/fx/core.h"
+#include "src/fx/scene.h"
+#include "base/memory.h"
+#include <stdlib.h>
+#include <string.h>
+#include "src/fx/nofloat.h"
+
+typedef struct slot {
+  size_t ray;
+  int32_t at;    /* lattice point of its sample */
+  int32_t *base; /* one of wave.base */
+} slot;
+
+typedef struct wave {
+  fx_block block;
+  fx_scratch scratch;
+  int32_t base[FX_BLOCK][SF_LANES];
+  slot slot[FX_BLOCK]; /* 0..block.n-1 in use; the others own the free bases */
+  const fx_core *core;
+  const fx_ray *rays;
+  fx_pixel *pixels;
+  fx_cost *costs;
+  fx_firing firing;
+  fx_counts counts; /* but for the nets' events, which follow from firing and rays */
+} wave;
+
+enum { RAY_FRAC = 40 };
+
+/* Moves slot i to the next occupied point from n on; false at the end of the ray. */
+static bool advance(wave *w, int i, int32_t n)
+{
+  slot *s = &w->slot[i];
+  const fx_ray *ray = &w->rays[s->ray];
+  const int32_t found = w->core->kernels->march(w->core->scene, ray, n);
+  if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
+  s->at = found;
+  for (int axis = 0; axis < 3 && found < ray->count; axis++)
+    w->block.pos[axis][i] = (uint32_t)((ray->origin[axis] + found * ray->step[axis]) >> (RAY_FRAC - SF_POS_FRAC));
+  return found < ray->count;
+}
+
+static void begin_ray(wave *w, size_t index)
+{
+  const int i = w->block.n;
+  slot *s = &w->slot[i];
+  fx_composite_begin(&w->pixels[index]);
+  s->ray = index;
+  if (!advance(w, i, 0)) {
+    fx_composite_end(&w->pixels[index], w->core->scene->background);
+    return;
+  }
+  fx_net_direction(&w->core->scene->net, w->rays[index].dir, s->base, NULL);
+  w->counts.rays++;
+  if (w->costs) w->costs[index].macs = fx_macs_of_ray(&w->core->scene->net);
+  w->block.n++;
+}
+
+/* The last slot takes the place of slot i. */
+static void end_ray(wave *w, int i)
+{
+  const int last = --w->block.n;
+  const slot ended = w->slot[i];
+  fx_composite_end(&w->pixels[ended.ray], w->core->scene->background);
+  w->slot[i] = w->slot[last];
+  w->slot[last] = ended;
+  for (int axis = 0; axis < 3; axis++) w->block.pos[axis][i] = w->block.pos[axis][last];
+}
+
+static void account(wave *w, int i)
+{
+  const fx_net *net = &w->core->scene->net;
+  static const int fed[FX_SPIKING] = {FX_D2, FX_C2, FX_C3};
+  fx_cost cost = {.macs = fx_macs_of_sample(net)};
+  for (int l = 0; l < FX_SPIKING; l++) {
+    uint64_t seen[2] = {0}, spikes = 0;
+    for (int t = 0; t < net->steps; t++)
+      spikes += fx_firing_add(&w->firing, l, t, w->block.spikes[l][t][i], seen);
+    cost.spikes += spikes;
+    cost.sops += spikes * (uint64_t)net->layer[fed[l]].n_out;
+  }
+  w->firing.samples++;
+  for (int l = 0; l < SF_LAYERS; l++) {
+    w->counts.saturated[l] += w->block.saturated[l][i];
+    w->counts.saturated_samples[l] += w->block.saturated[l][i] != 0;
+  }
+  if (!w->costs) return;
+  fx_cost *sum = &w->costs[w->slot[i].ray];
+  sum->macs += cost.macs, sum->sops += cost.sops, sum->spikes += cost.spikes;
+}
+
+/* Adds the sample to its ray; true when the ray goes on. */
+static bool composite(wave *w, int i)
+{
+  const fx_scene *scene = w->core->scene;
+  const slot *s = &w->slot[i];
+  const fx_ray *ray = &w->rays[s->ray];
+  fx_pixel *pixel = &w->pixels[s->ray];
+  fx_composite_add(pixel, &w->block.out[i], scene->step_q24, ((uint64_t)s->at << 16) + (uint32_t)ray->first_q16);
+  return pixel->transmittance > (uint32_t)scene->trans_stop && pixel->samples < (uint32_t)scene->max_samples;
+}
+
+static void round_of_samples(wave *w)
+{
+  const fx_core *core = w->core;
+  fx_block *b = &w->block;
+  bool ended[FX_BLOCK];
+  for (int i = 0; i < b->n; i++) b->base[i] = w->slot[i].base;
+  w->counts.saturated_features += core->kernels->features(&core->scene->grid, b);
+  core->kernels->nets(core, b, &w->scratch);
+  for (int i = 0; i < b->n; i++) {
+    account(w, i);
+    ended[i] = !composite(w, i) || !advance(w, i, w->slot[i].at + 1);
+  }
+  for (int i = b->n - 1; i >= 0; i--)
+    if (ended[i]) end_ray(w, i);
+}
+
+static void add_counts(const wave *w, fx_counts *counts)
+{
+  const fx_scene *scene = w->core->scene;
+  fx_counts sum = w->counts;
+  sum.rays = 0;
+  fx_count_rays(&sum, &scene->net, w->counts.rays);
+  fx_count_firing(&sum, &scene->net, &w->firing);
+  sum.grid_bytes = w->firing.samples * fx_grid_bytes(&scene->grid);
+  fx_counts_add(counts, &sum);
+}
+
+sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
+                         fx_counts *counts)
+{
+  wave *w = sf_aligned_alloc(sizeof *w);
+  if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
+  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
+  for (int i = 0; i < FX_BLOCK; i++) w->slot[i].base = w->base[i];
+  if (costs) memset(costs, 0, n * sizeof *costs);
+  for (size_t next = 0; next < n || w->block.n > 0;) {
+    while (next < n && w->block.n < FX_BLOCK) begin_ray(w, next++);
+    if (w->block.n > 0) round_of_samples(w);
+  }
+  if (counts) add_counts(w, counts);
+  free(w);
+  return sf_ok();
+}

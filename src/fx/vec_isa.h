@@ -1,0 +1,129 @@
+/* Vectors of 32-bit lanes for AVX-512 VNNI and AVX2. Signed unless the name says u. */
+#ifndef SPIKEFIELD_FX_VEC_ISA_H
+#define SPIKEFIELD_FX_VEC_ISA_H
+#include <immintrin.h>
+#include <stdint.h>
+#include <string.h>
+
+#define INLINE inline __attribute__((always_inline))
+
+#if defined(__AVX512VNNI__)
+typedef __m512i vec;
+enum { WIDTH = 16, TILE = 8 }; /* lanes of a vector; vectors of one sample that a tile keeps in registers */
+#define V(op) _mm512_##op
+#define V_BITS(op) _mm512_##op##_si512
+static INLINE vec v_dot(vec acc, vec a, vec b) /* += of both 16-bit products */
+{
+  return _mm512_dpwssd_epi32(acc, a, b);
+}
+static INLINE vec v_dot4(vec acc, vec u8, vec s8) /* += of four products; u8 is 0 or 1 */
+{
+  return _mm512_dpbusd_epi32(acc, u8, s8);
+}
+static INLINE vec v_mulhrs_low(vec x, vec d, vec k) /* low halves: (d * k + 2^14) >> 15; high halves: x */
+{
+  return _mm512_mask_mulhrs_epi16(x, 0x55555555, d, k);
+}
+static INLINE uint32_t v_fire(vec *v, vec theta) /* lanes >= theta lose it */
+{
+  const __mmask16 fired = _mm512_cmpge_epi32_mask(*v, theta);
+  *v = _mm512_mask_sub_epi32(*v, fired, *v, theta);
+  return fired;
+}
+static INLINE uint32_t v_differ(vec a, vec b)
+{
+  return _mm512_cmpneq_epi32_mask(a, b);
+}
+static INLINE vec v_select_negative(vec x, vec negative, vec otherwise) /* by the sign of x */
+{
+  return _mm512_mask_blend_epi32(_mm512_movepi32_mask(x), otherwise, negative);
+}
+static INLINE vec v_gather(const int32_t *table, vec index)
+{
+  return _mm512_i32gather_epi32(index, table, 4);
+}
+static INLINE vec v_set64(int64_t x)
+{
+  return _mm512_set1_epi64(x);
+}
+static INLINE vec v_widen(const int16_t *p)
+{
+  return _mm512_cvtepi16_epi32(_mm256_loadu_si256((const __m256i *)p));
+}
+#else
+typedef __m256i vec;
+enum { WIDTH = 8, TILE = 4 };
+#define V(op) _mm256_##op
+#define V_BITS(op) _mm256_##op##_si256
+static INLINE vec v_dot(vec acc, vec a, vec b)
+{
+  return _mm256_add_epi32(acc, _mm256_madd_epi16(a, b));
+}
+static INLINE vec v_dot4(vec acc, vec u8, vec s8)
+{
+  return _mm256_add_epi32(acc, _mm256_madd_epi16(_mm256_maddubs_epi16(u8, s8), _mm256_set1_epi16(1)));
+}
+static INLINE vec v_mulhrs_low(vec x, vec d, vec k)
+{
+  return _mm256_blend_epi16(x, _mm256_mulhrs_epi16(d, k), 0x55);
+}
+static INLINE uint32_t v_bits(vec lanes)
+{
+  return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(lanes));
+}
+static INLINE uint32_t v_fire(vec *v, vec theta)
+{
+  const vec silent = _mm256_cmpgt_epi32(theta, *v);
+  *v = _mm256_sub_epi32(*v, _mm256_andnot_si256(silent, theta));
+  return ~v_bits(silent) & 0xff;
+}
+static INLINE uint32_t v_differ(vec a, vec b)
+{
+  return ~v_bits(_mm256_cmpeq_epi32(a, b)) & 0xff;
+}
+static INLINE vec v_select_negative(vec x, vec negative, vec otherwise)
+{
+  return _mm256_blendv_epi8(otherwise, negative, _mm256_srai_epi32(x, 31));
+}
+static INLINE vec v_gather(const int32_t *table, vec index)
+{
+  return _mm256_i32gather_epi32(table, index, 4);
+}
+static INLINE vec v_set64(int64_t x)
+{
+  return _mm256_set1_epi64x(x);
+}
+static INLINE vec v_widen(const int16_t *p)
+{
+  return _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p));
+}
+#endif
+
+static INLINE vec v_load(const void *p)
+{
+  return V_BITS(loadu)((const vec *)p);
+}
+static INLINE void v_store(void *p, vec x)
+{
+  V_BITS(storeu)((vec *)p, x);
+}
+static INLINE vec v_set(int32_t x)
+{
+  return V(set1_epi32)(x);
+}
+static INLINE vec v_word(const void *p) /* the 32 bits at p in every lane */
+{
+  int32_t word;
+  memcpy(&word, p, sizeof word);
+  return v_set(word);
+}
+static INLINE vec v_clamp(vec x, int32_t low, int32_t high)
+{
+  return V(max_epi32)(V(min_epi32)(x, v_set(high)), v_set(low));
+}
+/* fx_rshift_round, arithmetic; x + 2^(n-1) must fit 32 bits. */
+static INLINE vec v_shift_round(vec x, int n)
+{
+  return V(sra_epi32)(V(add_epi32)(x, v_set((int32_t)((1u << n) >> 1))), _mm_cvtsi32_si128(n));
+}
+#endif

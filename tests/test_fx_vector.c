@@ -1,0 +1,236 @@
+/* Vector kernels against the portable core, bit for bit: nets, grid, marching, whole rays with their counts, on random
+ * scenes of every size and mode. SF_FX_SAMPLES: samples through the nets for each instruction set (default 40 000). */
+#include "base/memory.h"
+#include "fx_fixture.h"
+#include "src/fx/core.h"
+#include "src/fx/net.h"
+#include <stdio.h>
+
+static const char *const instruction_sets[] = {"avx2", "avx512vnni"};
+
+static long samples_wanted(void)
+{
+  const char *text = getenv("SF_FX_SAMPLES");
+  return text ? atol(text) : 40000;
+}
+
+static int64_t pick(uint64_t seed, uint64_t what, int64_t low, int64_t high)
+{
+  return fixture_pick(seed, 100, what, low, high);
+}
+
+/* Thresholds from 'always fires' over typical to 'never', so that C2 meets events and dense rows; every third scene has its
+ * weights at the rails. */
+static fx_scene random_scene(uint64_t seed)
+{
+  fixture_sizes sizes = seed % 2 ? fixture_random_sizes(seed) : fixture_ingp;
+  sizes.mode = (int)(seed / 2 % 3), sizes.steps = (int)pick(seed, 0, 1, SF_T_MAX);
+  fx_scene s = fixture_scene(&sizes, seed);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    fx_layer *layer = &s.net.layer[l];
+    if (layer->theta)
+      layer->theta = (int32_t)pick(seed, 1 + (uint64_t)l, 0, 3) * 25000 * (l == FX_C2 ? 4 : 1) +
+                     (int32_t)pick(seed, 6 + (uint64_t)l, 1, 30000);
+    if (seed % 16 == 5 && layer->theta) layer->theta = FX_MEMBRANE_MAX;
+    for (int i = 0; seed % 3 == 0 && i < layer->n_in * SF_LANES; i++)
+      layer->w[i] = (int8_t)(layer->w[i] > 0 ? 127 : layer->w[i] < 0 ? -127 : 0);
+    if (seed % 5 == 0) layer->k = (int32_t[]){0, 1, 4095, 4096}[pick(seed, 12 + (uint64_t)l, 0, 3)];
+  }
+  s.net.exp_in = (fx_scale){(int32_t)pick(seed, 20, 0, 65535), (int32_t)pick(seed, 21, 0, 31),
+                            (int32_t)pick(seed, 22, -131072, 131071)};
+  if (seed % 4) s.net.exp_in.shift = (int32_t)pick(seed, 23, 12, 18);
+  s.net.sigmoid_in = (fx_scale){(int32_t)pick(seed, 24, 0, 65535), (int32_t)pick(seed, 25, 0, 31), 0};
+  for (int l = 0; l < s.grid.levels; l++) s.grid.shift[l] = (int32_t)pick(seed, 30 + (uint64_t)l, 0, 24);
+  s.trans_stop = (int32_t)pick(seed, 50, 0, 1 << 19);
+  s.max_samples = (int32_t)pick(seed, 51, 1, 80);
+  const fx_scene *check = &s;
+  const sf_status status = fx_scene_check(check, "random scene");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return s;
+}
+
+static fx_core *open_core(const fx_scene *scene, const char *name)
+{
+  fx_core *core;
+  const sf_status status = fx_core_open(&core, scene, name);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_assert_str_eq(fx_core_kernels(core), name);
+  return core;
+}
+
+static void compare_sample(const fx_net *net, const fx_block *b, int i, const char *name, uint64_t seed)
+{
+  static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
+  fx_events events;
+  fx_out out;
+  fx_net_events(net, b->f[i], b->base[i], &out, &events, NULL);
+  for (int t = 0; t < net->steps; t++)
+    for (int l = 0; l < FX_SPIKING; l++)
+      ck_assert_msg(!memcmp(events.spikes[spiking[l]][t], b->spikes[l][t][i], 16),
+                    "%s, scene %llu, sample %d of %d: spikes of layer %d at step %d", name, (unsigned long long)seed, i,
+                    b->n, spiking[l], t);
+  ck_assert_msg(!memcmp(&out, &b->out[i], sizeof out), "%s, scene %llu, sample %d of %d: output", name,
+                (unsigned long long)seed, i, b->n);
+  for (int l = 0; l < SF_LAYERS; l++)
+    ck_assert_msg(events.saturated[l] == b->saturated[l][i], "%s, scene %llu, sample %d: layer %d saturated %u, not %llu",
+                  name, (unsigned long long)seed, i, l, b->saturated[l][i], (unsigned long long)events.saturated[l]);
+}
+
+/* Blocks of every length; inputs over the whole range in half of them. */
+static long compare_nets(const char *name, uint64_t seed)
+{
+  fx_scene scene = random_scene(seed);
+  fx_core *core = open_core(&scene, name);
+  fx_block *b = sf_aligned_alloc(sizeof *b);
+  fx_scratch *scratch = sf_aligned_alloc(sizeof *scratch);
+  int32_t base[FX_BLOCK][SF_LANES];
+  b->n = (int)(seed % FX_BLOCK) + 1;
+  for (int i = 0; i < b->n; i++) {
+    int16_t dir[SF_DIR_MAX];
+    fixture_inputs(seed, (uint64_t)i, b->f[i], scene.net.layer[FX_D1].n_in, seed / 3 % 2 ? 2047 : 700);
+    fixture_inputs(seed + 1, (uint64_t)i, dir, SF_DIR_MAX, 2047);
+    fx_net_direction(&scene.net, dir, base[i], NULL);
+    b->base[i] = base[i];
+  }
+  core->kernels->nets(core, b, scratch);
+  for (int i = 0; i < b->n; i++) compare_sample(&scene.net, b, i, name, seed);
+  const int n = b->n;
+  free(b), free(scratch);
+  fx_core_close(core);
+  fx_scene_free(&scene);
+  return n;
+}
+
+static long compare_grid(const char *name, uint64_t seed)
+{
+  fx_scene scene = random_scene(seed);
+  fx_core *core = open_core(&scene, name);
+  fx_block *b = sf_aligned_alloc(sizeof *b);
+  b->n = (int)(seed % FX_BLOCK) + 1;
+  for (int i = 0; i < b->n; i++)
+    for (int axis = 0; axis < 3; axis++) {
+      const int64_t rail = pick(seed, 60 + (uint64_t)(3 * i + axis), 0, 9);
+      b->pos[axis][i] = rail == 0   ? 0
+                        : rail == 1 ? (1 << 24) - 1
+                                    : (uint32_t)pick(seed, 200 + (uint64_t)(3 * i + axis), 0, (1 << 24) - 1);
+    }
+  const uint64_t saturated = core->kernels->features(&scene.grid, b);
+  fx_counts counts = {0};
+  for (int i = 0; i < b->n; i++) {
+    int16_t f[SF_FEATURE_MAX] = {0};
+    fx_grid_features(&scene.grid, (uint32_t[3]){b->pos[0][i], b->pos[1][i], b->pos[2][i]}, f, &counts);
+    for (int l = 0; l < 2 * scene.grid.levels; l++)
+      ck_assert_msg(f[l] == b->f[i][l], "%s, scene %llu, sample %d: feature %d is %d, not %d", name,
+                    (unsigned long long)seed, i, l, b->f[i][l], f[l]);
+  }
+  ck_assert_uint_eq(saturated, counts.saturated_features);
+  const int n = b->n;
+  free(b);
+  fx_core_close(core);
+  fx_scene_free(&scene);
+  return n;
+}
+
+static fx_ray random_ray(uint64_t seed, uint64_t index)
+{
+  fx_ray ray = {.count = (int32_t)fixture_pick(seed, 8, index, 0, 300), .first_q16 = 12345};
+  for (uint64_t a = 0; a < 3; a++) {
+    const int64_t from = fixture_pick(seed, 5, index * 3 + a, 0, ((int64_t)1 << 31) - 1) << 9;
+    const int64_t to = fixture_pick(seed, 6, index * 3 + a, 0, ((int64_t)1 << 31) - 1) << 9;
+    ray.origin[a] = from, ray.step[a] = (to - from) / 300;
+  }
+  fixture_inputs(seed, 1000 + index, ray.dir, SF_DIR_MAX, 1024);
+  return ray;
+}
+
+/* More rays than a block has slots, so that they are replaced as they end. */
+static long compare_rays(const char *name, uint64_t seed)
+{
+  enum { RAYS = 50 };
+  fx_scene scene = random_scene(seed);
+  for (int i = 0; i < 64; i++) scene.occupancy[i] &= (uint8_t)pick(seed, 400 + (uint64_t)i, 0, 255);
+  fx_core *core = open_core(&scene, name);
+  fx_ray ray[RAYS];
+  fx_pixel pixel[RAYS];
+  fx_cost cost[RAYS];
+  fx_counts all = {0}, sum = {0};
+  for (uint64_t i = 0; i < RAYS; i++) ray[i] = random_ray(seed, i);
+  ck_assert_int_eq(fx_render_rays(core, ray, RAYS, pixel, cost, &all).code, SF_OK);
+  for (int i = 0; i < RAYS; i++) {
+    fx_pixel one;
+    fx_counts counts = {0};
+    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &counts).code, SF_OK);
+    fx_counts_add(&sum, &counts);
+    ck_assert_msg(!memcmp(&one, &pixel[i], sizeof one), "%s, scene %llu: pixel of ray %d", name, (unsigned long long)seed, i);
+    uint64_t macs = 0, sops = 0, spikes = 0;
+    for (int l = 0; l < SF_LAYERS; l++)
+      for (int t = 0; t < SF_T_MAX; t++)
+        macs += counts.layer[l].mac[t], sops += counts.layer[l].sop[t], spikes += counts.layer[l].spikes[t];
+    ck_assert_uint_eq(cost[i].macs, macs);
+    ck_assert_uint_eq(cost[i].sops, sops);
+    ck_assert_uint_eq(cost[i].spikes, spikes);
+  }
+  assert_same_counts(&all, &sum);
+  fx_core_close(core);
+  fx_scene_free(&scene);
+  return (long)sum.samples;
+}
+
+static void campaign(const char *name, long (*compare)(const char *name, uint64_t seed), long wanted)
+{
+  if (!fx_kernels_select(name)) {
+    printf("%s: not on this machine\n", name);
+    return;
+  }
+  for (uint64_t seed = 1; wanted > 0; seed++) wanted -= compare(name, seed);
+}
+
+START_TEST(nets_equal_portable)
+{
+  campaign(instruction_sets[_i], compare_nets, samples_wanted());
+}
+END_TEST
+
+START_TEST(grid_equals_portable)
+{
+  campaign(instruction_sets[_i], compare_grid, samples_wanted());
+}
+END_TEST
+
+START_TEST(rays_equal_portable)
+{
+  campaign(instruction_sets[_i], compare_rays, samples_wanted());
+}
+END_TEST
+
+START_TEST(portable_waves_equal_single_rays)
+{
+  campaign("portable", compare_rays, samples_wanted() / 2);
+}
+END_TEST
+
+START_TEST(unknown_kernels_are_refused)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 1);
+  fx_core *core;
+  const sf_status status = fx_core_open(&core, &scene, "mmx");
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_nonnull(strstr(status.message, "mmx"));
+  ck_assert_ptr_null(core);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("fx_vector");
+  TCase *equal = tcase_create("equal");
+  tcase_set_timeout(equal, 0);
+  tcase_add_loop_test(equal, nets_equal_portable, 0, 2);
+  tcase_add_loop_test(equal, grid_equals_portable, 0, 2);
+  tcase_add_loop_test(equal, rays_equal_portable, 0, 2);
+  tcase_add_test(equal, portable_waves_equal_single_rays);
+  tcase_add_test(equal, unknown_kernels_are_refused);
+  suite_add_tcase(suite, equal);
+  return fixture_run(suite);
+}
