@@ -98,7 +98,7 @@ $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikef
 $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(CHECK_LIBS) $(LIBS)
 
 test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
@@ -131,8 +131,10 @@ reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots i
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report
 
-bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
-	@$B/tests/bench $B/bench.json
+bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
+	@models=$$(tests/bench_models.sh $B $(SCENES)) && $B/tests/bench $B/bench.json $$models
+
+$B/tests/bench: $B/obj/tests/bench_fixed.o
 
 format: ## clang-format every C file
 	clang-format -i $$(git ls-files '*.c' '*.h')

@@ -1,11 +1,13 @@
-/* Speed of the trainer's parts, each beside its ceiling and its naive version. usage: bench OUT.json
- * Ceilings are measured on the spot: multiply-adds per second of all threads (of bfloat16 pairs where the kernels use
- * them) over the operations of one sample with every product dense, memory bandwidth over the bytes, or random reads of
- * a table as large as one level over the 128 corners of one sample. Naive: the oracle where there is one, else the
- * portable build of the kernels; for Adam the textbook's loop over every parameter. */
+/* Speed of the trainer's parts, each beside its ceiling and its naive version. usage: bench OUT.json [SCENE.snn
+ * TWIN.safetensors DATA] Ceilings are measured on the spot: multiply-adds per second of all threads (of bfloat16 pairs
+ * where the kernels use them) over the operations of one sample with every product dense, memory bandwidth over the
+ * bytes, or random reads of a table as large as one level over the 128 corners of one sample. Naive: the oracle where
+ * there is one, else the portable build of the kernels; for Adam the textbook's loop over every parameter. */
+#include "bench.h"
 #include "float_fixture.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
+#include "src/fx/core.h"
 #include "train/internal.h"
 #include <math.h>
 #include <omp.h>
@@ -35,19 +37,29 @@ typedef float lanes __attribute__((vector_size(64)));
     return sum;                                                                                                        \
   }
 CHAINS(fma_chain_avx512, "avx512f,fma", "vfmadd213ps")
+CHAINS(dot_chain_avx512vnni, "avx512f,avx512vnni", "vpdpbusd")  /* four 8-bit multiply-adds a lane */
 CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-adds a lane */
 
 /* Multiply-adds per second of all threads in the arithmetic of the named kernels. */
 static double peak(const char *kernels)
 {
-  const bool pairs = !strcmp(kernels, "avx512bf16");
-  if (!pairs && strcmp(kernels, "avx512")) return NAN;
+  static const struct {
+    const char *name;
+    double (*chain)(long rounds);
+    int per_lane;
+  } known[] = {{"avx512", fma_chain_avx512, 1},
+               {"avx512bf16", dot_chain_avx512bf16, 2},
+               {"avx512vnni", dot_chain_avx512vnni, 4}};
   const long rounds = 10000000;
-  double start = sf_seconds(), sink = 0;
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+    if (strcmp(kernels, known[i].name)) continue;
+    double start = sf_seconds(), sink = 0;
 #pragma omp parallel reduction(+ : sink)
-  sink += pairs ? dot_chain_avx512bf16(rounds) : fma_chain_avx512(rounds);
-  double seconds = sf_seconds() - start;
-  return sink > -1 ? (double)rounds * 24 * 16 * (1 + pairs) * omp_get_max_threads() / seconds : 0;
+    sink += known[i].chain(rounds);
+    const double seconds = sf_seconds() - start;
+    return sink == 0.123 ? 0 : (double)rounds * 24 * 16 * known[i].per_lane * omp_get_max_threads() / seconds;
+  }
+  return NAN;
 }
 #else
 static double peak(const char *kernels)
@@ -94,10 +106,6 @@ static double random_reads(void)
   return sum ? 0 : (double)READS * omp_get_max_threads() / seconds;
 }
 
-typedef struct ceilings {
-  double fma, bytes, reads; /* per second: multiply-adds, bytes of memory, random table reads */
-} ceilings;
-
 /* Multiply-adds of one sample's forward pass. */
 static double operations(int steps)
 {
@@ -111,7 +119,7 @@ static double adam_bytes(double touched)
   return 4 + touched * 28;
 }
 
-static void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive)
+void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive)
 {
   cJSON *entry = cJSON_AddObjectToObject(json, name);
   cJSON_AddNumberToObject(entry, "value", value);
@@ -124,9 +132,11 @@ static void put(cJSON *json, const char *name, double value, const char *unit, d
     cJSON_AddNumberToObject(entry, "naive", naive);
   else
     cJSON_AddNullToObject(entry, "naive");
+  const bool less = !strcmp(unit, "s");
   printf("%-28s %12.4g %-10s", name, value, unit);
-  if (isfinite(ceiling)) printf("  ceiling %10.4g (%4.1f %%)", ceiling, 100 * value / ceiling);
-  if (isfinite(naive)) printf("  naive %10.4g (x %.1f)", naive, value / naive);
+  if (isfinite(ceiling))
+    printf("  ceiling %10.4g (%4.1f %%)", ceiling, 100 * (less ? ceiling / value : value / ceiling));
+  if (isfinite(naive)) printf("  naive %10.4g (x %.1f)", naive, less ? naive / value : value / naive);
   printf("\n");
 }
 
@@ -356,13 +366,16 @@ int main(int argc, char **argv)
 {
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
-  const ceilings c = {peak(kernels), bandwidth(), random_reads()};
+  const ceilings c = {peak(kernels), fx_kernels_select("avx512vnni") ? peak("avx512vnni") : NAN, bandwidth(),
+                      random_reads()};
   printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",
          omp_get_max_threads(), kernels, c.fma * 1e-9, c.bytes * 1e-9, c.reads * 1e-9);
   bench_nets(json, &c);
   bench_grid(json, &c);
   bench_adam(json, &c);
   sf_status status = bench_iteration(json, &c);
+  if (!status.code)
+    status = bench_fixed(json, &c, argc > 4 ? argv[2] : NULL, argc > 4 ? argv[3] : NULL, argc > 4 ? argv[4] : NULL);
   if (!status.code && argc > 1) status = sf_json_save(json, argv[1]);
   cJSON_Delete(json);
   if (status.code) fprintf(stderr, "bench: %s\n", status.message);

@@ -19,8 +19,8 @@ static int64_t pick(uint64_t seed, uint64_t what, int64_t low, int64_t high)
   return fixture_pick(seed, 100, what, low, high);
 }
 
-/* Thresholds from 'always fires' over typical to 'never', so that C2 meets events and dense rows; every third scene has its
- * weights at the rails. */
+/* Thresholds from 'always fires' over typical to 'never', so that C2 meets events and dense rows; every third scene has
+ * its weights at the rails. */
 static fx_scene random_scene(uint64_t seed)
 {
   fixture_sizes sizes = seed % 2 ? fixture_random_sizes(seed) : fixture_ingp;
@@ -72,8 +72,9 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
   ck_assert_msg(!memcmp(&out, &b->out[i], sizeof out), "%s, scene %llu, sample %d of %d: output", name,
                 (unsigned long long)seed, i, b->n);
   for (int l = 0; l < SF_LAYERS; l++)
-    ck_assert_msg(events.saturated[l] == b->saturated[l][i], "%s, scene %llu, sample %d: layer %d saturated %u, not %llu",
-                  name, (unsigned long long)seed, i, l, b->saturated[l][i], (unsigned long long)events.saturated[l]);
+    ck_assert_msg(events.saturated[l] == b->saturated[l][i],
+                  "%s, scene %llu, sample %d: layer %d saturated %u, not %llu", name, (unsigned long long)seed, i, l,
+                  b->saturated[l][i], (unsigned long long)events.saturated[l]);
 }
 
 /* Blocks of every length; inputs over the whole range in half of them. */
@@ -161,7 +162,8 @@ static long compare_rays(const char *name, uint64_t seed)
     fx_counts counts = {0};
     ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &counts).code, SF_OK);
     fx_counts_add(&sum, &counts);
-    ck_assert_msg(!memcmp(&one, &pixel[i], sizeof one), "%s, scene %llu: pixel of ray %d", name, (unsigned long long)seed, i);
+    ck_assert_msg(!memcmp(&one, &pixel[i], sizeof one), "%s, scene %llu: pixel of ray %d", name,
+                  (unsigned long long)seed, i);
     uint64_t macs = 0, sops = 0, spikes = 0;
     for (int l = 0; l < SF_LAYERS; l++)
       for (int t = 0; t < SF_T_MAX; t++)

@@ -31,7 +31,8 @@ sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernel
   const fx_kernels *chosen = fx_kernels_select(kernels);
   *core = NULL;
   if (!chosen)
-    return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2 or avx512vnni", kernels);
+    return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2 or avx512vnni",
+                   kernels);
   fx_core *c = sf_aligned_alloc(sizeof *c);
   if (!c) return sf_fail(SF_E_MEMORY, "no memory for the core's tables");
   c->scene = scene;

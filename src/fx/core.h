@@ -1,24 +1,26 @@
 /* Many samples at once: the scene's weights as the vector kernels read them, and the kernels' interface.
- * kernels_isa.c is compiled once per instruction set; the portable build calls the oracle (net.c, grid.c, march.c) sample
- * by sample, and every other build gives the same bits. */
+ * kernels_isa.c is compiled once per instruction set; the portable build calls the oracle (net.c, grid.c, march.c)
+ * sample by sample, and every other build gives the same bits. */
 #ifndef SPIKEFIELD_FX_CORE_H
 #define SPIKEFIELD_FX_CORE_H
 #include "src/fx/count.h"
 
 enum { FX_BLOCK = 32 }; /* samples */
 
-/* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole groups.
- * Pairs and quads: neighbouring rows interleaved, as one 32-bit lane multiplies them. */
+/* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
+ * groups. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane multiplies them. Aligned: a row that
+ * crosses a cache line costs two loads. */
 typedef struct fx_words {
-  int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
-  int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2]; /* by D2 current: row 0, the density's, is zero */
-  int16_t d2[SF_LANES + 1][SF_OUT_MAX];
-  int16_t c2[SF_LANES + 1][SF_LANES];
-  int16_t c3[SF_LANES + 1][SF_OUT_MAX];
-  int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
+  _Alignas(64) int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
+  _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2]; /* by D2 current: row 0, the density's, is zero */
+  _Alignas(64) int16_t d2[SF_LANES + 1][SF_OUT_MAX];
+  _Alignas(64) int16_t c2[SF_LANES + 1][SF_LANES];
+  _Alignas(64) int16_t c3[SF_LANES + 1][SF_OUT_MAX];
+  _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
 } fx_words;
 
-/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base. Slots from n on may hold anything. */
+/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base. Slots from n on may hold
+ * anything. */
 typedef struct fx_block {
   int n;
   uint32_t pos[3][FX_BLOCK]; /* Q0.24 */
@@ -31,11 +33,11 @@ typedef struct fx_block {
 
 /* Working memory of one thread: currents and membranes of a block. */
 typedef struct fx_scratch {
-  int32_t d1_current[FX_BLOCK][SF_LANES];
+  _Alignas(64) int32_t d1_current[FX_BLOCK][SF_LANES];
   int32_t v[FX_SPIKING][FX_BLOCK][SF_LANES];
   int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
-  int16_t c2_current[FX_BLOCK][SF_LANES];
-  int32_t argument[4][FX_BLOCK];
+  _Alignas(64) int16_t c2_current[FX_BLOCK][SF_LANES];
+  _Alignas(64) int32_t argument[4][FX_BLOCK];
   uint32_t acc[4][FX_BLOCK]; /* density, red, green, blue */
 } fx_scratch;
 

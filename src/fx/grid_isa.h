@@ -1,7 +1,7 @@
 /* Hash grid for a block of samples, level by level; one sample to a lane. The arithmetic is that of grid.c.
  *
- * A corner and its neighbour in x are often in one 32-bit word: in a dense level always, in a hashed one when x is even, as
- * the hash of x is x itself. */
+ * A corner and its neighbour in x are often in one 32-bit word: in a dense level always, in a hashed one when x is
+ * even, as the hash of x is x itself. */
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
@@ -39,8 +39,7 @@ typedef struct pair_sum {
 /* Adds weight * the entry in the low half of word. */
 static INLINE void add_entry(pair_sum *sum, vec weight, vec word)
 {
-  const vec first = V(srai_epi32)(V(slli_epi32)(word, 24), 24),
-            second = V(srai_epi32)(V(slli_epi32)(word, 16), 24);
+  const vec first = V(srai_epi32)(V(slli_epi32)(word, 24), 24), second = V(srai_epi32)(V(slli_epi32)(word, 16), 24);
   sum->f[0] = V(add_epi32)(sum->f[0], V(mullo_epi32)(weight, first));
   sum->f[1] = V(add_epi32)(sum->f[1], V(mullo_epi32)(weight, second));
 }
@@ -69,8 +68,7 @@ static INLINE void find_cells(const fx_block *b, int i, int32_t scale, vec base[
 {
   vec g[3];
   for (int axis = 0; axis < 3; axis++) {
-    const vec p =
-        V(add_epi32)(high_rounded(v_load(&b->pos[axis][i]), v_set(scale)), v_set(1 << (CELL_FRAC - 1)));
+    const vec p = V(add_epi32)(high_rounded(v_load(&b->pos[axis][i]), v_set(scale)), v_set(1 << (CELL_FRAC - 1)));
     base[axis] = V(srli_epi32)(p, CELL_FRAC);
     g[axis] = V_BITS(and)(p, v_set(CELL_ONE - 1));
   }
@@ -100,9 +98,10 @@ static INLINE pair_sum level_sums(const fx_grid *grid, int level, const fx_block
     const vec mask = v_set((int32_t)((1u << grid->log2_size[level]) - 1));
     const vec y = V(mullo_epi32)(base[1], v_set(HASH_Y)), z = V(mullo_epi32)(base[2], v_set(HASH_Z));
     for (int row = 0; row < 4; row++)
-      add_hashed(&sum, table, base[0],
-                 V_BITS(xor)(row & 1 ? V(add_epi32)(y, v_set(HASH_Y)) : y, row & 2 ? V(add_epi32)(z, v_set(HASH_Z)) : z),
-                 mask, weight + 2 * row);
+      add_hashed(
+          &sum, table, base[0],
+          V_BITS(xor)(row & 1 ? V(add_epi32)(y, v_set(HASH_Y)) : y, row & 2 ? V(add_epi32)(z, v_set(HASH_Z)) : z), mask,
+          weight + 2 * row);
   }
   return sum;
 }

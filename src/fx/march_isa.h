@@ -1,4 +1,5 @@
-/* Marching, one lattice point to a 64-bit lane. The first point is tested alone: within matter it is the next sample. */
+/* Marching, one lattice point to a 64-bit lane. The first point is tested alone: within matter it is the next sample.
+ */
 #include "src/fx/core.h"
 #include "src/fx/vec_isa.h"
 
@@ -16,8 +17,10 @@ static INLINE uint32_t occupied_points(const uint8_t *occupancy, const vec p[3],
   const __m256i bit = _mm256_and_si256(_mm512_cvtepi64_epi32(cell), _mm256_set1_epi32(31));
   return _mm256_movepi32_mask(_mm256_sllv_epi32(word, _mm256_sub_epi32(_mm256_set1_epi32(31), bit)));
 #else
-  const vec lanes = _mm256_cmpgt_epi64(_mm256_and_si256(_mm256_set1_epi64x(on), _mm256_set_epi64x(8, 4, 2, 1)), v_set(0));
-  const vec word = _mm256_mask_i64gather_epi64(v_set(0), (const long long *)occupancy, _mm256_srli_epi64(cell, 6), lanes, 8);
+  const vec lanes =
+      _mm256_cmpgt_epi64(_mm256_and_si256(_mm256_set1_epi64x(on), _mm256_set_epi64x(8, 4, 2, 1)), v_set(0));
+  const vec word =
+      _mm256_mask_i64gather_epi64(v_set(0), (const long long *)occupancy, _mm256_srli_epi64(cell, 6), lanes, 8);
   const vec bit = _mm256_and_si256(cell, v_set64(63));
   return (uint32_t)_mm256_movemask_pd(_mm256_castsi256_pd(_mm256_sllv_epi64(word, _mm256_sub_epi64(v_set64(63), bit))));
 #endif

@@ -29,7 +29,7 @@ static void fire(state *s, const fx_net *net, int l, int t, const int32_t *curre
   const fx_layer *layer = &net->layer[l];
   int32_t *membrane = trace ? trace->membrane[l][t] : NULL;
   s->events.saturated[l] += (uint64_t)fx_plif_layer(s->v[l], current, strips(layer->n_out), layer, net->mode, t == 0,
-                                             s->events.spikes[l][t], membrane);
+                                                    s->events.spikes[l][t], membrane);
 }
 
 static void keep_current(fx_trace *trace, int l, int t, const int32_t *current, int n)
@@ -72,7 +72,8 @@ static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
   keep_current(trace, FX_C3, t, s->current, c3->n_out);
   for (int o = 0; o < COLOURS; o++) {
     const uint32_t value = fx_sigmoid(fx_sigmoid_argument(s->current[o], &net->sigmoid_in));
-    s->acc.colour[o] = fx_integrate_colour(s->acc.colour[o], value, c3->k, net->mode, t == 0, &s->events.saturated[FX_C3]);
+    s->acc.colour[o] =
+        fx_integrate_colour(s->acc.colour[o], value, c3->k, net->mode, t == 0, &s->events.saturated[FX_C3]);
     if (trace) trace->membrane[FX_C3][t][o] = (int32_t)s->acc.colour[o];
   }
 }

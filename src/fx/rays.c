@@ -1,5 +1,5 @@
-/* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that has
- * ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
+/* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that
+ * has ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
 #include "src/fx/core.h"
 #include "src/fx/scene.h"
 #include "base/memory.h"
@@ -75,8 +75,7 @@ static void account(wave *w, int i)
   fx_cost cost = {.macs = fx_macs_of_sample(net)};
   for (int l = 0; l < FX_SPIKING; l++) {
     uint64_t seen[2] = {0}, spikes = 0;
-    for (int t = 0; t < net->steps; t++)
-      spikes += fx_firing_add(&w->firing, l, t, w->block.spikes[l][t][i], seen);
+    for (int t = 0; t < net->steps; t++) spikes += fx_firing_add(&w->firing, l, t, w->block.spikes[l][t][i], seen);
     cost.spikes += spikes;
     cost.sops += spikes * (uint64_t)net->layer[fed[l]].n_out;
   }

@@ -12,13 +12,16 @@ typedef __m512i vec;
 enum { WIDTH = 16, TILE = 8 }; /* lanes of a vector; vectors of one sample that a tile keeps in registers */
 #define V(op) _mm512_##op
 #define V_BITS(op) _mm512_##op##_si512
+/* Written as instructions: of the intrinsics GCC 12 makes two copies of the accumulator and a load per product. */
 static INLINE vec v_dot(vec acc, vec a, vec b) /* += of both 16-bit products */
 {
-  return _mm512_dpwssd_epi32(acc, a, b);
+  __asm__("vpdpwssd %2, %1, %0" : "+v"(acc) : "v"(a), "v"(b));
+  return acc;
 }
 static INLINE vec v_dot4(vec acc, vec u8, vec s8) /* += of four products; u8 is 0 or 1 */
 {
-  return _mm512_dpbusd_epi32(acc, u8, s8);
+  __asm__("vpdpbusd %2, %1, %0" : "+v"(acc) : "v"(u8), "v"(s8));
+  return acc;
 }
 static INLINE vec v_mulhrs_low(vec x, vec d, vec k) /* low halves: (d * k + 2^14) >> 15; high halves: x */
 {

@@ -1,0 +1,20 @@
+/* Shared by the files of the benchmark. */
+#ifndef SPIKEFIELD_TESTS_BENCH_H
+#define SPIKEFIELD_TESTS_BENCH_H
+#include "spikefield/status.h"
+#include <cjson/cJSON.h>
+
+/* Measured on the spot, all threads, per second. */
+typedef struct ceilings {
+  double fma;   /* multiply-adds of the training kernels */
+  double dot8;  /* 8-bit multiply-adds */
+  double bytes; /* of memory, read */
+  double reads; /* of a random place of a table of 4 MiB */
+} ceilings;
+
+/* One line and one entry of the JSON. ceiling, naive: NAN = none. Where the unit is seconds, less is better. */
+void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive);
+
+/* scene, twin, data: a fixed-point scene, the float ReLU twin and their data set; scene NULL: no frame. */
+sf_status bench_fixed(cJSON *json, const ceilings *c, const char *scene, const char *twin, const char *data);
+#endif

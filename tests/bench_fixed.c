@@ -1,0 +1,276 @@
+/* The fixed-point core: nets at a firing rate, nets with the grid, and a whole frame beside the float ReLU twin's. */
+#include "bench.h"
+#include "base/memory.h"
+#include "spikefield/cli.h"
+#include "spikefield/quant.h"
+#include "spikefield/rng.h"
+#include "src/fx/core.h"
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RIG_STEPS = 3, RIG_BLOCKS = 64, FRAME = 800, CHUNK = 1600 };
+static const double RIG_RATE = 0.1;
+
+/* A scene of the full size with random weights; every layer fires at RIG_RATE. */
+typedef struct rig {
+  fx_scene scene;
+  fx_core *core;
+  fx_block *block;
+  fx_scratch *scratch;
+  int32_t base[FX_BLOCK][SF_LANES];
+} rig;
+
+static int32_t pick(uint64_t stream, uint64_t index, int32_t limit)
+{
+  return (int32_t)sf_random_below(1, stream, index, 2 * (uint64_t)limit + 1) - limit;
+}
+
+static void set_sizes(fx_scene *s)
+{
+  static const int in[SF_LAYERS] = {32, 128, 31, 128, 128}, out[SF_LAYERS] = {128, 16, 128, 128, 3};
+  const double growth = exp(log(2048.0 / 16) / 15);
+  for (int l = 0; l < SF_LAYERS; l++) s->net.layer[l].n_in = in[l], s->net.layer[l].n_out = out[l];
+  s->grid.levels = 16;
+  for (int l = 0; l < 16; l++) {
+    const double scale = 16 * pow(growth, l) - 1;
+    const int64_t points = (int64_t)ceil(scale) + 2, dense = points * points * points;
+    const bool hashed = dense > 1 << 19;
+    s->grid.scale_q16[l] = (int32_t)(scale * 65536);
+    s->grid.stride[l] = hashed ? 0 : (int32_t)points;
+    s->grid.log2_size[l] = hashed ? 19 : 0;
+    s->grid.offset[l] = s->grid.entries;
+    s->grid.entries += hashed ? 1 << 19 : (dense + 7) / 8 * 8;
+    s->grid.shift[l] = 13;
+  }
+  s->occ_res = 8;
+}
+
+static void fill(fx_scene *s)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    fx_layer *layer = &s->net.layer[l];
+    layer->k = 2000;
+    layer->theta = l == FX_D2 || l == FX_C3 ? 0 : 60000;
+    for (int i = 0; i < layer->n_in; i++)
+      for (int o = 0; o < layer->n_out; o++)
+        layer->w[i * SF_LANES + o] = (int8_t)pick(10 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), 127);
+  }
+  for (int64_t i = 0; i < 2 * s->grid.entries; i++) s->grid.table[i] = (int8_t)pick(20, (uint64_t)i, 127);
+  s->net.steps = RIG_STEPS;
+  s->net.exp_in = (fx_scale){50000, 15, 4096}, s->net.sigmoid_in = (fx_scale){50000, 13, 0};
+}
+
+static double rate_of(const fx_block *b, int layer)
+{
+  long spikes = 0;
+  for (int t = 0; t < RIG_STEPS; t++)
+    for (int i = 0; i < b->n; i++)
+      spikes += __builtin_popcountll(b->spikes[layer][t][i][0]) + __builtin_popcountll(b->spikes[layer][t][i][1]);
+  return (double)spikes / (RIG_STEPS * b->n * SF_LANES);
+}
+
+static void choose_thresholds(rig *r)
+{
+  static const int spiking[] = {FX_D1, FX_C1, FX_C2};
+  for (int l = 0; l < FX_SPIKING; l++) {
+    int32_t low = 1, high = (1 << 23) - 1, *theta = &r->scene.net.layer[spiking[l]].theta;
+    while (high - low > 1) {
+      *theta = low + (high - low) / 2;
+      r->core->kernels->nets(r->core, r->block, r->scratch);
+      if (rate_of(r->block, l) > RIG_RATE)
+        low = *theta;
+      else
+        high = *theta;
+    }
+  }
+}
+
+static void random_positions(fx_block *b, uint64_t stream)
+{
+  for (int axis = 0; axis < 3; axis++)
+    for (int i = 0; i < b->n; i++)
+      b->pos[axis][i] = (uint32_t)sf_random_below(2 + stream, (uint64_t)axis, (uint64_t)i, 1 << 24);
+}
+
+static sf_status open_rig(rig *r, const char *kernels)
+{
+  *r = (rig){.block = sf_aligned_alloc(sizeof *r->block), .scratch = sf_aligned_alloc(sizeof *r->scratch)};
+  set_sizes(&r->scene);
+  SF_TRY(fx_scene_allocate(&r->scene, "bench"));
+  fill(&r->scene);
+  SF_TRY(fx_core_open(&r->core, &r->scene, kernels));
+  r->block->n = FX_BLOCK;
+  random_positions(r->block, 0);
+  r->core->kernels->features(&r->scene.grid, r->block);
+  for (int i = 0; i < FX_BLOCK; i++) {
+    int16_t dir[SF_DIR_MAX];
+    for (int d = 0; d < SF_DIR_MAX; d++) dir[d] = (int16_t)pick(30, (uint64_t)(i * SF_DIR_MAX + d), 1024);
+    fx_net_direction(&r->scene.net, dir, r->base[i], NULL);
+    r->block->base[i] = r->base[i];
+  }
+  choose_thresholds(r);
+  return sf_ok();
+}
+
+static void close_rig(rig *r)
+{
+  fx_core_close(r->core);
+  fx_scene_free(&r->scene);
+  free(r->block), free(r->scratch);
+}
+
+/* Samples per second of all threads. with_grid: each block at random positions of its own. */
+static double nets(const rig *r, bool with_grid, double seconds)
+{
+  double total = 0;
+#pragma omp parallel reduction(+ : total)
+  {
+    fx_block *blocks = sf_aligned_alloc(RIG_BLOCKS * sizeof *blocks);
+    fx_scratch *scratch = sf_aligned_alloc(sizeof *scratch);
+    for (int i = 0; i < RIG_BLOCKS; i++) {
+      memcpy(&blocks[i], r->block, sizeof blocks[i]);
+      random_positions(&blocks[i], (uint64_t)(omp_get_thread_num() * RIG_BLOCKS + i));
+    }
+    double start = sf_seconds(), now = start;
+    long done = 0;
+    for (; now - start < seconds; now = sf_seconds())
+      for (int i = 0; i < RIG_BLOCKS; i++, done++) {
+        if (with_grid) r->core->kernels->features(&r->scene.grid, &blocks[i]);
+        r->core->kernels->nets(r->core, with_grid ? &blocks[i] : &blocks[0], scratch);
+      }
+    total += (double)done * FX_BLOCK / (now - start);
+    free(blocks), free(scratch);
+  }
+  return total;
+}
+
+/* Operations of one sample in units of one 8-bit multiply-add, every product dense: D1 and C1 multiply 16-bit values.
+ */
+static double operations(int steps)
+{
+  return 2 * (32 * 128 + steps * 16.0 * 128) + steps * (128.0 * 16 + 128 * 128 + 128 * 3);
+}
+
+static sf_status bench_parts(cJSON *json, const ceilings *c)
+{
+  rig fast, slow;
+  SF_TRY(open_rig(&fast, NULL));
+  SF_TRY(open_rig(&slow, "portable"));
+  const double most = c->dot8 / operations(RIG_STEPS), grid = 1 / (1 / most + 128 / c->reads);
+  put(json, "fixed.nets.t3.f10", nets(&fast, false, 1), "samples/s", most, nets(&slow, false, 1));
+  put(json, "fixed.nets_grid.t3", nets(&fast, true, 1), "samples/s", grid, nets(&slow, true, 1));
+  close_rig(&fast);
+  close_rig(&slow);
+  return sf_ok();
+}
+
+/* ---- a frame ---- */
+
+typedef struct frame {
+  fx_scene scene;
+  fx_core *core;
+  sf_dataset data;
+  sf_camera camera;
+  sf_model twin;
+} frame;
+
+static sf_status chunk_rays(const frame *f, size_t first, fx_ray rays[CHUNK])
+{
+  for (size_t i = 0; i < CHUNK; i++) {
+    float origin[3], direction[3];
+    sf_camera_ray(&f->camera, (float)((first + i) % FRAME) + 0.5f, (float)((first + i) / FRAME) + 0.5f, origin,
+                  direction);
+    SF_TRY(sf_fx_ray_make(&f->scene, origin, direction, &rays[i]));
+  }
+  return sf_ok();
+}
+
+/* Seconds for every `stride`-th chunk of the frame, rays included; batch: through the vector core. */
+static double render_fixed(const frame *f, size_t stride, bool batch, fx_counts *counts)
+{
+  const double start = sf_seconds();
+#pragma omp parallel for schedule(dynamic)
+  for (size_t first = 0; first < FRAME * FRAME; first += CHUNK * stride) {
+    fx_ray rays[CHUNK];
+    fx_pixel pixel[CHUNK];
+    fx_counts sum = {0};
+    if (chunk_rays(f, first, rays).code) continue;
+    if (batch)
+      fx_render_rays(f->core, rays, CHUNK, pixel, NULL, &sum);
+    else
+      for (int i = 0; i < CHUNK; i++) fx_render_ray(&f->scene, &rays[i], NULL, NULL, &pixel[i], &sum);
+#pragma omp critical(bench_counts)
+    fx_counts_add(counts, &sum);
+  }
+  return sf_seconds() - start;
+}
+
+static double render_twin(const frame *f, uint64_t *taken)
+{
+  enum { ROWS = 8, N = ROWS * FRAME };
+  static const float white[3] = {1, 1, 1};
+  float *space = malloc(12 * N * sizeof *space);
+  double sum = 0;
+  const double start = sf_seconds();
+  for (int y = 0; space && y < FRAME; y += ROWS) {
+    float *origin = space, *direction = space + 3 * N, *samples = space + 11 * N;
+    for (int i = 0; i < N; i++)
+      sf_camera_ray(&f->camera, (float)(i % FRAME) + 0.5f, (float)(y + i / FRAME) + 0.5f, origin + 3 * i,
+                    direction + 3 * i);
+    if (sf_render_rays(&f->twin, origin, direction, N, 1, white, space + 6 * N, space + 9 * N, space + 10 * N, samples)
+            .code)
+      break;
+    for (int i = 0; i < N; i++) sum += (double)samples[i];
+  }
+  free(space);
+  *taken = (uint64_t)sum;
+  return sf_seconds() - start;
+}
+
+static sf_status load_frame(frame *f, const char *scene, const char *twin, const char *data)
+{
+  SF_TRY(fx_scene_load(&f->scene, scene));
+  SF_TRY(fx_core_open(&f->core, &f->scene, NULL));
+  SF_TRY(sf_model_load(&f->twin, twin));
+  SF_TRY(sf_dataset_load(&f->data, data, "test", &(sf_dataset_options){.downscale = 1, .limit = 1}));
+  f->camera = f->data.view[0].camera;
+  const float zoom = (float)FRAME / (float)f->camera.width;
+  f->camera.fx *= zoom, f->camera.fy *= zoom, f->camera.cx *= zoom, f->camera.cy *= zoom;
+  f->camera.width = f->camera.height = FRAME;
+  return sf_ok();
+}
+
+static sf_status bench_frame(cJSON *json, const ceilings *c, frame *f)
+{
+  enum { NAIVE_STRIDE = 20 };
+  fx_counts counts = {0}, ignored = {0};
+  uint64_t taken;
+  const double seconds = render_fixed(f, 1, true, &counts);
+  const double naive = NAIVE_STRIDE * render_fixed(f, NAIVE_STRIDE, false, &ignored);
+  const double twin = render_twin(f, &taken);
+  const double least = (double)counts.samples * (operations(f->scene.net.steps) / c->dot8 + 128 / c->reads);
+  put(json, "fixed.frame800", seconds, "s", least, naive);
+  put(json, "fixed.frame800.twin", twin, "s", NAN, NAN);
+  printf("  frame of 800 x 800: t_r = %d, %llu samples, %llu lattice points; float ReLU twin: %llu samples, %.2f times "
+         "the time\n",
+         f->scene.net.steps, (unsigned long long)counts.samples, (unsigned long long)counts.march_steps,
+         (unsigned long long)taken, twin / seconds);
+  return sf_ok();
+}
+
+sf_status bench_fixed(cJSON *json, const ceilings *c, const char *scene, const char *twin, const char *data)
+{
+  SF_TRY(bench_parts(json, c));
+  if (!scene) return sf_ok();
+  frame f = {0};
+  sf_status status = load_frame(&f, scene, twin, data);
+  if (!status.code) status = bench_frame(json, c, &f);
+  fx_core_close(f.core);
+  fx_scene_free(&f.scene);
+  sf_dataset_free(&f.data);
+  sf_model_free(&f.twin);
+  return status;
+}
