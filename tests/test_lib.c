@@ -1,0 +1,512 @@
+/* The C library against the core behind it: same integers, same counts, whatever the threads; every refusal is a value
+ * that names what is wrong. */
+#include "spikefield/audit.h"
+#include "spikefield/io.h"
+#include "spikefield/quant.h"
+#include "spikefield/spikefield.h"
+#include "tests/folder_fixture.h"
+#include "tests/fx_fixture.h"
+#include <locale.h>
+#include <math.h>
+#include <omp.h>
+
+/* The fixture's scene as file, as core and as opened by the library. */
+static fx_scene core;
+static spikefield_scene *scene;
+static spikefield_scene_info info;
+
+static void lib_good(spikefield_status status)
+{
+  ck_assert_msg(status.code == SPIKEFIELD_OK, "unexpected failure: %s", status.message);
+}
+
+static void lib_bad(spikefield_status status, spikefield_code code, const char *word)
+{
+  ck_assert_msg(status.code == code, "code %d instead of %d: '%s'", status.code, code, status.message);
+  ck_assert_msg(strstr(status.message, word), "'%s' does not name '%s'", status.message, word);
+}
+
+static void open_fixture(void)
+{
+  make_folder();
+  core = fixture_scene(&fixture_ingp, 11);
+  core.step_q24 = 300000, core.background[1] = 30000;
+  ck_good(fx_scene_save(&core, in("s.snn")));
+  lib_good(spikefield_scene_open(&scene, in("s.snn")));
+  lib_good(spikefield_scene_describe(scene, &info));
+}
+
+static void close_fixture(void)
+{
+  spikefield_scene_close(scene);
+  fx_scene_free(&core);
+  remove_folder();
+}
+
+/* ---- scenes ---- */
+
+START_TEST(info_says_what_the_scene_is)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert_int_eq(info.inputs[l], core.net.layer[l].n_in);
+    ck_assert_int_eq(info.outputs[l], core.net.layer[l].n_out);
+    ck_assert_int_eq(info.theta[l], core.net.layer[l].theta);
+    ck_assert_int_eq(info.leak_q12[l], core.net.layer[l].k);
+  }
+  ck_assert_int_eq(info.mode, SPIKEFIELD_HYBRID);
+  ck_assert_int_eq(info.steps, 4);
+  ck_assert_int_eq(info.features, 32);
+  ck_assert_int_eq(info.directions, 16);
+  ck_assert_int_eq(info.grid_levels, 16);
+  ck_assert_int_eq(info.grid_entries, core.grid.entries);
+  ck_assert_int_eq(info.grid_bytes, 2 * core.grid.entries);
+  ck_assert_int_eq(info.weight_bytes, 32 * 128 + 128 * 16 + 31 * 128 + 128 * 128 + 128 * 3);
+  ck_assert_int_eq(info.occupancy_bytes, 64);
+  ck_assert_int_eq(info.background_q16[1], 30000);
+  ck_assert(info.to_box_scale == 0.5 && info.to_box_offset[2] == 0.5 && info.direction_lsb == 0x1p-10);
+  ck_assert(info.step == 2 * 300000 / 16777216.0);
+  ck_assert_str_eq(spikefield_version(), SPIKEFIELD_VERSION);
+  char parts[32];
+  snprintf(parts, sizeof parts, "%d.%d.%d", SPIKEFIELD_VERSION_MAJOR, SPIKEFIELD_VERSION_MINOR,
+           SPIKEFIELD_VERSION_PATCH);
+  ck_assert_str_eq(parts, SPIKEFIELD_VERSION);
+}
+END_TEST
+
+START_TEST(memory_and_file_give_the_same_scene)
+{
+  char *data;
+  size_t size;
+  spikefield_scene *copy;
+  spikefield_scene_info other;
+  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  lib_good(spikefield_scene_open_memory(&copy, data, size, "copy"));
+  memset(data, 0, size); /* nothing of the caller is kept */
+  lib_good(spikefield_scene_describe(copy, &other));
+  ck_assert_int_eq(other.grid_entries, info.grid_entries);
+  spikefield_pixel a, b;
+  const float origin[3] = {0.3f, -3, 0.2f}, direction[3] = {0, 1, 0};
+  lib_good(spikefield_rays(scene, NULL, origin, direction, 1, &a, NULL));
+  lib_good(spikefield_rays(copy, NULL, origin, direction, 1, &b, NULL));
+  ck_assert_uint_gt(a.samples, 0);
+  ck_assert_mem_eq(a.colour, b.colour, sizeof a.colour);
+  spikefield_scene_close(copy);
+  free(data);
+}
+END_TEST
+
+START_TEST(damaged_scenes_are_refused)
+{
+  char *data;
+  size_t size;
+  spikefield_scene *none = scene;
+  lib_bad(spikefield_scene_open(&none, in("absent")), SPIKEFIELD_E_IO, "absent");
+  ck_assert_ptr_null(none);
+  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  static const double part[] = {0, 0.01, 0.5, 0.9999};
+  for (int i = 0; i < 4; i++) {
+    none = scene;
+    lib_bad(spikefield_scene_open_memory(&none, data, (size_t)((double)size * part[i]), "cut"), SPIKEFIELD_E_FORMAT,
+            "cut: ");
+    ck_assert_ptr_null(none);
+  }
+  data[size - 1] ^= 1;
+  lib_bad(spikefield_scene_open_memory(&none, data, size, NULL), SPIKEFIELD_E_FORMAT, "memory: ");
+  free(data);
+}
+END_TEST
+
+/* A locale whose numbers have a comma: the machine's, else one made for the occasion where localedef can. */
+static bool comma_locale(void)
+{
+  static const char *const names[] = {"de_DE.UTF-8", "fr_FR.UTF-8", "de_DE", "fr_FR"};
+  char command[400];
+  for (int i = 0; i < 4; i++)
+    if (setlocale(LC_ALL, names[i])) return true;
+  snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 '%s' >/dev/null 2>&1", in("de_DE.UTF-8"));
+  const int status = system(command);
+  setenv("LOCPATH", folder, 1);
+  return status == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
+}
+
+START_TEST(the_locale_of_the_host_does_not_matter)
+{
+  spikefield_scene *again;
+  spikefield_scene_info other;
+  char number[8];
+  if (!comma_locale()) return;
+  snprintf(number, sizeof number, "%.1f", 0.5);
+  ck_assert_str_eq(number, "0,5");
+  lib_good(spikefield_scene_open(&again, in("s.snn")));
+  lib_good(spikefield_scene_describe(again, &other));
+  ck_assert(other.to_box_scale == info.to_box_scale && other.step == info.step);
+  snprintf(number, sizeof number, "%.1f", 0.5);
+  ck_assert_str_eq(number, "0,5"); /* the host's locale is as it was */
+  spikefield_scene_close(again);
+}
+END_TEST
+
+/* ---- samples ---- */
+
+enum { SAMPLES = 20 };
+
+static void random_positions(uint32_t *position, uint64_t seed)
+{
+  for (uint64_t i = 0; i < 3 * SAMPLES; i++) position[i] = (uint32_t)sf_random_below(seed, 7, i, 1 << 24);
+}
+
+START_TEST(samples_are_those_of_the_core)
+{
+  static spikefield_trace traces[SAMPLES];
+  static fx_trace trace;
+  uint32_t position[3 * SAMPLES];
+  int16_t feature[SAMPLES * 32], expected[32], harmonics[SPIKEFIELD_DIRECTIONS];
+  int32_t base[SF_LANES];
+  spikefield_sample a[SAMPLES], b[SAMPLES];
+  spikefield_counts counts = {0}, at = {0};
+  fx_counts wanted = {0};
+  const float direction[3] = {0.3f, -2, 1};
+  random_positions(position, 1);
+  for (int steps = 0; steps <= SF_T_MAX; steps += 4) {
+    const spikefield_options options = {.steps = steps};
+    fx_net net = core.net;
+    if (steps) net.steps = steps;
+    lib_good(spikefield_direction(scene, direction, harmonics));
+    lib_good(spikefield_features(scene, position, SAMPLES, feature, &counts));
+    lib_good(spikefield_samples(scene, &options, harmonics, feature, SAMPLES, a, traces, &counts));
+    lib_good(spikefield_samples_at(scene, &options, harmonics, position, SAMPLES, b, NULL, &at));
+    fx_net_direction(&net, harmonics, base, &wanted);
+    for (int i = 0; i < SAMPLES; i++) {
+      fx_out out;
+      fx_grid_features(&core.grid, position + 3 * i, expected, &wanted);
+      ck_assert_mem_eq(feature + 32 * i, expected, sizeof expected);
+      fx_net_sample(&net, expected, base, &out, &trace, &wanted);
+      ck_assert(a[i].density == out.sigma && b[i].density == out.sigma);
+      ck_assert_mem_eq(a[i].colour, out.colour, sizeof out.colour);
+      ck_assert_mem_eq(b[i].colour, out.colour, sizeof out.colour);
+      ck_assert_mem_eq(&traces[i], &trace, sizeof trace);
+    }
+    ck_assert_mem_eq(&counts, &wanted, sizeof wanted);
+    ck_assert_mem_eq(&at, &wanted, sizeof wanted);
+  }
+  ck_assert_uint_gt(wanted.layer[FX_C2].sop[7], 0);
+  ck_assert_uint_eq(spikefield_energy_fj(&counts), sf_energy_fj(&wanted));
+  ck_assert_uint_gt(spikefield_energy_fj(&counts), 0);
+  ck_assert_uint_eq(spikefield_relu_energy_fj(scene, 7), 7 * UINT64_C(4600) * (uint64_t)info.weight_bytes);
+}
+END_TEST
+
+START_TEST(positions_and_directions_are_rounded_once)
+{
+  const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};
+  const float outside[][3] = {{1, 0, 0}, {0, -1.0001f, 0}, {0, 0, NAN}, {INFINITY, 0, 0}};
+  uint32_t box[3];
+  lib_good(spikefield_position(scene, middle, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], 1u << 23);
+  lib_good(spikefield_position(scene, corner, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], 0);
+  lib_good(spikefield_position(scene, inside, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], (uint32_t)floor(((double)inside[a] / 2 + 0.5) * 16777216));
+  for (int i = 0; i < 4; i++) lib_bad(spikefield_position(scene, outside[i], box), SPIKEFIELD_E_RANGE, "position");
+  int16_t one[SPIKEFIELD_DIRECTIONS], two[SPIKEFIELD_DIRECTIONS];
+  const float d[3] = {0.5f, -0.25f, 0.125f}, longer[3] = {4, -2, 1}, zero[3] = {0};
+  fx_ray ray;
+  ck_good(sf_fx_ray_make(&core, middle, d, &ray));
+  lib_good(spikefield_direction(scene, d, one));
+  lib_good(spikefield_direction(scene, longer, two));
+  ck_assert_mem_eq(one, ray.dir, sizeof one);
+  ck_assert_mem_eq(two, ray.dir, sizeof two);
+  lib_bad(spikefield_direction(scene, zero, one), SPIKEFIELD_E_RANGE, "nonzero direction");
+}
+END_TEST
+
+/* ---- rays and frames ---- */
+
+enum { WIDTH = 37, HEIGHT = 19 }; /* several blocks, the last one not full */
+
+static spikefield_camera make_camera(void)
+{
+  return (spikefield_camera){WIDTH, HEIGHT, 30, 31, 18.25f, 9, {1, 0, 0, 0.1f, 0, 0, -1, -3, 0, 1, 0, -0.2f}};
+}
+
+static bool same_pixel(const spikefield_pixel *a, const spikefield_pixel *b)
+{
+  return !memcmp(a->colour, b->colour, sizeof a->colour) && a->depth == b->depth &&
+         !memcmp(a->rgba, b->rgba, sizeof a->rgba) && a->weight_sum == b->weight_sum &&
+         a->transmittance == b->transmittance && a->samples == b->samples;
+}
+
+static void assert_core_pixel(const spikefield_pixel *pixel, const fx_pixel *expected)
+{
+  uint32_t rgba[4];
+  fx_pixel_rgba(expected, rgba);
+  ck_assert_mem_eq(pixel->colour, expected->colour, sizeof expected->colour);
+  ck_assert_mem_eq(pixel->rgba, rgba, sizeof rgba);
+  ck_assert_uint_eq(pixel->depth, expected->depth);
+  ck_assert_uint_eq(pixel->weight_sum, expected->weight_sum);
+  ck_assert_uint_eq(pixel->transmittance, expected->transmittance);
+  ck_assert_uint_eq(pixel->samples, expected->samples);
+  ck_assert_uint_eq(pixel->weight_sum + pixel->transmittance, 1u << 20);
+}
+
+START_TEST(frames_are_those_of_the_core)
+{
+  static spikefield_pixel frame[HEIGHT * WIDTH], ray[HEIGHT * WIDTH];
+  static float origin[HEIGHT * WIDTH][3], direction[HEIGHT * WIDTH][3];
+  const spikefield_camera camera = make_camera();
+  sf_camera twin = {WIDTH, HEIGHT, 30, 31, 18.25f, 9, {0}};
+  spikefield_counts counts = {0}, of_rays = {0};
+  fx_counts wanted = {0};
+  int hit = 0;
+  memcpy(twin.to_world, camera.to_model, sizeof twin.to_world);
+  lib_good(spikefield_frame(scene, NULL, &camera, frame, &counts));
+  for (int i = 0; i < HEIGHT * WIDTH; i++) {
+    fx_ray r;
+    fx_pixel expected;
+    ck_good(sf_pixel_ray(&core, &twin, i % WIDTH, i / WIDTH, &r));
+    ck_good(fx_render_ray(&core, &r, NULL, NULL, &expected, &wanted));
+    assert_core_pixel(&frame[i], &expected);
+    hit += expected.samples > 0;
+    sf_camera_ray(&twin, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, origin[i], direction[i]);
+  }
+  ck_assert_int_gt(hit, HEIGHT * WIDTH / 4);
+  ck_assert_int_lt(hit, HEIGHT * WIDTH);
+  ck_assert_mem_eq(&counts, &wanted, sizeof wanted);
+  lib_good(spikefield_rays(scene, NULL, origin[0], direction[0], HEIGHT * WIDTH, ray, &of_rays));
+  ck_assert_mem_eq(&of_rays, &wanted, sizeof wanted);
+  for (int i = 0; i < HEIGHT * WIDTH; i++) ck_assert(same_pixel(&ray[i], &frame[i]));
+}
+END_TEST
+
+START_TEST(threads_change_no_bit)
+{
+  static spikefield_pixel one[HEIGHT * WIDTH], more[HEIGHT * WIDTH];
+  const spikefield_camera camera = make_camera();
+  spikefield_counts first = {0}, counts, twice;
+  lib_good(spikefield_frame(scene, &(spikefield_options){.threads = 1, .steps = 2}, &camera, one, &first));
+  for (int threads = 2; threads <= 5; threads++) {
+    memset(&counts, 0, sizeof counts);
+    lib_good(spikefield_frame(scene, &(spikefield_options){.threads = threads, .steps = 2}, &camera, more, &counts));
+    ck_assert_mem_eq(&counts, &first, sizeof first);
+    for (int i = 0; i < HEIGHT * WIDTH; i++) ck_assert(same_pixel(&one[i], &more[i]));
+  }
+  ck_assert_uint_eq(counts.layer[SPIKEFIELD_D1].updates[2], 0); /* two time steps */
+  twice = first;
+  spikefield_counts_add(&twice, &counts);
+  ck_assert_uint_eq(twice.samples, 2 * first.samples);
+  ck_assert_uint_eq(twice.layer[SPIKEFIELD_C2].sop[1], 2 * first.layer[SPIKEFIELD_C2].sop[1]);
+}
+END_TEST
+
+/* One scene, several callers at once, each with a team of its own. */
+START_TEST(one_scene_serves_many_threads)
+{
+  static spikefield_pixel frame[4][HEIGHT * WIDTH];
+  spikefield_counts counts[4] = {0};
+  spikefield_status status[4];
+  const spikefield_camera camera = make_camera();
+  omp_set_max_active_levels(2);
+#pragma omp parallel for num_threads(4)
+  for (int i = 0; i < 4; i++)
+    status[i] = spikefield_frame(scene, &(spikefield_options){.threads = 2}, &camera, frame[i], &counts[i]);
+  for (int i = 0; i < 4; i++) {
+    lib_good(status[i]);
+    ck_assert_mem_eq(&counts[i], &counts[0], sizeof counts[0]);
+    for (int p = 0; p < HEIGHT * WIDTH; p++) ck_assert(same_pixel(&frame[i][p], &frame[0][p]));
+  }
+}
+END_TEST
+
+typedef struct watcher {
+  uint64_t calls, last, stop_at;
+} watcher;
+
+static bool watch(void *user, uint64_t done, uint64_t total)
+{
+  watcher *w = user;
+  ck_assert_uint_eq(total, HEIGHT * WIDTH);
+  ck_assert_uint_gt(done, w->last);
+  w->last = done, w->calls++;
+  return done < w->stop_at;
+}
+
+START_TEST(progress_is_told_and_can_stop)
+{
+  static spikefield_pixel frame[HEIGHT * WIDTH];
+  const spikefield_camera camera = make_camera();
+  spikefield_counts counts = {0};
+  watcher w = {.stop_at = UINT64_MAX};
+  spikefield_options options = {.threads = 3, .progress = watch, .user = &w};
+  lib_good(spikefield_frame(scene, &options, &camera, frame, &counts));
+  ck_assert_uint_eq(w.last, HEIGHT * WIDTH);
+  ck_assert_uint_gt(w.calls, 1);
+  const spikefield_counts before = counts;
+  options.threads = 1;
+  w = (watcher){.stop_at = 1};
+  lib_bad(spikefield_frame(scene, &options, &camera, frame, &counts), SPIKEFIELD_E_STOPPED, "of 703 rays");
+  ck_assert_uint_eq(w.calls, 1);
+  ck_assert_mem_eq(&counts, &before, sizeof counts);
+}
+END_TEST
+
+START_TEST(distance_is_that_of_the_golden_image)
+{
+  spikefield_pixel pixel;
+  const float origin[3] = {0.3f, -3, 0.2f}, ahead[3] = {0, 1, 0}, away[3] = {0, -1, 0};
+  lib_good(spikefield_rays(scene, NULL, origin, ahead, 1, &pixel, NULL));
+  const double distance = spikefield_pixel_distance(scene, &pixel);
+  ck_assert(distance > 2 && distance < 4); /* the box is 2 to 4 units ahead */
+  lib_good(spikefield_rays(scene, NULL, origin, away, 1, &pixel, NULL));
+  ck_assert_uint_eq(pixel.samples, 0);
+  ck_assert(spikefield_pixel_distance(scene, &pixel) == 0);
+  ck_assert_uint_eq(pixel.rgba[1], 30000);
+}
+END_TEST
+
+/* ---- taps ---- */
+
+typedef struct tapper {
+  uint32_t next, stop_at;
+  spikefield_counts counts;
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS];
+} tapper;
+
+/* Every tap is what its features give when they are run again. */
+static bool tap_sample(void *user, const spikefield_tap *tap)
+{
+  static spikefield_trace trace;
+  tapper *t = user;
+  spikefield_sample again;
+  ck_assert_uint_eq(tap->index, t->next++);
+  lib_good(spikefield_samples(scene, NULL, t->harmonics, tap->features, 1, &again, &trace, &t->counts));
+  ck_assert_mem_eq(&again, tap->sample, sizeof again);
+  ck_assert_mem_eq(&trace, tap->trace, sizeof trace);
+  return tap->index < t->stop_at;
+}
+
+START_TEST(taps_show_every_sample_of_a_ray)
+{
+  const float origin[3] = {0.3f, -3, 0.2f}, direction[3] = {0, 1, 0.1f};
+  spikefield_pixel pixel, plain;
+  spikefield_counts counts = {0}, expected = {0};
+  tapper t = {.stop_at = UINT32_MAX};
+  lib_good(spikefield_direction(scene, direction, t.harmonics));
+  lib_good(spikefield_rays(scene, NULL, origin, direction, 1, &plain, &expected));
+  lib_good(spikefield_ray_taps(scene, NULL, origin, direction, tap_sample, &t, &pixel, &counts));
+  ck_assert(same_pixel(&pixel, &plain));
+  ck_assert_uint_eq(t.next, pixel.samples);
+  ck_assert_uint_gt(pixel.samples, 2);
+  ck_assert_mem_eq(&counts, &expected, sizeof counts);
+  ck_assert_uint_eq(t.counts.layer[SPIKEFIELD_C2].sop[3], counts.layer[SPIKEFIELD_C2].sop[3]);
+  t.next = 0, t.stop_at = 1;
+  lib_bad(spikefield_ray_taps(scene, NULL, origin, direction, tap_sample, &t, &pixel, &counts), SPIKEFIELD_E_STOPPED,
+          "sample 1");
+  ck_assert_uint_eq(t.next, 2);
+  ck_assert_mem_eq(&counts, &expected, sizeof counts);
+}
+END_TEST
+
+/* ---- refusals ---- */
+
+START_TEST(null_is_refused_by_name)
+{
+  const spikefield_camera camera = make_camera();
+  const float v[3] = {0, 0, 1};
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[32] = {0};
+  uint32_t position[3] = {0};
+  spikefield_sample sample;
+  spikefield_pixel pixel;
+  spikefield_scene *none;
+  lib_bad(spikefield_scene_open(NULL, "x"), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_scene_open(&none, NULL), SPIKEFIELD_E_USAGE, "path is NULL");
+  lib_bad(spikefield_scene_open_memory(&none, NULL, 3, "x"), SPIKEFIELD_E_USAGE, "data is NULL");
+  lib_bad(spikefield_scene_describe(NULL, &info), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_scene_describe(scene, NULL), SPIKEFIELD_E_USAGE, "info is NULL");
+  lib_bad(spikefield_position(scene, NULL, position), SPIKEFIELD_E_USAGE, "model is NULL");
+  lib_bad(spikefield_direction(NULL, v, harmonics), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_features(scene, NULL, 1, feature, NULL), SPIKEFIELD_E_USAGE, "positions is NULL");
+  lib_bad(spikefield_features(scene, position, 1, NULL, NULL), SPIKEFIELD_E_USAGE, "features is NULL");
+  lib_bad(spikefield_samples(scene, NULL, NULL, feature, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "harmonics is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "features is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 1, NULL, NULL, NULL), SPIKEFIELD_E_USAGE, "samples is NULL");
+  lib_bad(spikefield_samples_at(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "positions is NULL");
+  lib_bad(spikefield_rays(NULL, NULL, v, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_rays(scene, NULL, NULL, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "origins is NULL");
+  lib_bad(spikefield_rays(scene, NULL, v, NULL, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "directions is NULL");
+  lib_bad(spikefield_rays(scene, NULL, v, v, 1, NULL, NULL), SPIKEFIELD_E_USAGE, "pixels is NULL");
+  lib_bad(spikefield_frame(scene, NULL, NULL, &pixel, NULL), SPIKEFIELD_E_USAGE, "camera is NULL");
+  lib_bad(spikefield_frame(scene, NULL, &camera, NULL, NULL), SPIKEFIELD_E_USAGE, "pixels is NULL");
+  lib_bad(spikefield_ray_taps(scene, NULL, v, v, NULL, NULL, &pixel, NULL), SPIKEFIELD_E_USAGE, "tap is NULL");
+  spikefield_scene_close(NULL);
+  lib_good(spikefield_rays(scene, NULL, NULL, NULL, 0, NULL, NULL));
+  lib_good(spikefield_samples(scene, NULL, NULL, NULL, 0, NULL, NULL, NULL));
+}
+END_TEST
+
+START_TEST(numbers_out_of_range_are_refused_by_name)
+{
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[64] = {0};
+  uint32_t position[6] = {0};
+  spikefield_sample sample[2];
+  static spikefield_pixel pixel[300];
+  static float far[300][3];
+  feature[35] = 2048;
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "feature 3 of sample 1 is 2048");
+  feature[35] = 0, harmonics[15] = -2048;
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "harmonic 15");
+  position[5] = 1 << 24, harmonics[15] = 0;
+  lib_bad(spikefield_samples_at(scene, NULL, harmonics, position, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "position 1, axis 2");
+  lib_bad(spikefield_features(scene, position, 2, feature, NULL), SPIKEFIELD_E_RANGE, "position 1, axis 2");
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.steps = 9}, far[0], far[0], 1, pixel, NULL), SPIKEFIELD_E_RANGE,
+          "steps is 9");
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far[0], far[0], 1, pixel, NULL),
+          SPIKEFIELD_E_RANGE, "threads is -1");
+  for (int i = 0; i < 300; i++) far[i][0] = i == 290 || i == 299 ? NAN : 1;
+  lib_bad(spikefield_rays(scene, NULL, far[0], far[0], 300, pixel, NULL), SPIKEFIELD_E_RANGE, "ray 290: ");
+}
+END_TEST
+
+START_TEST(cameras_out_of_range_are_refused_by_name)
+{
+  spikefield_pixel pixel;
+  static const char *const word[] = {"width is 0", "height is 65537", "fx is 0", "fy is", "cx is", "to_model[7]"};
+  for (int i = 0; i < 6; i++) {
+    spikefield_camera camera = make_camera();
+    if (i == 0) camera.width = 0;
+    if (i == 1) camera.height = 65537;
+    if (i == 2) camera.fx = 0;
+    if (i == 3) camera.fy = INFINITY;
+    if (i == 4) camera.cx = NAN;
+    if (i == 5) camera.to_model[7] = NAN;
+    lib_bad(spikefield_frame(scene, NULL, &camera, &pixel, NULL), SPIKEFIELD_E_RANGE, word[i]);
+  }
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("lib");
+  TCase *cases = tcase_create("lib");
+  tcase_set_timeout(cases, 300);
+  tcase_add_checked_fixture(cases, open_fixture, close_fixture);
+  tcase_add_test(cases, info_says_what_the_scene_is);
+  tcase_add_test(cases, memory_and_file_give_the_same_scene);
+  tcase_add_test(cases, damaged_scenes_are_refused);
+  tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
+  tcase_add_test(cases, samples_are_those_of_the_core);
+  tcase_add_test(cases, positions_and_directions_are_rounded_once);
+  tcase_add_test(cases, frames_are_those_of_the_core);
+  tcase_add_test(cases, threads_change_no_bit);
+  tcase_add_test(cases, one_scene_serves_many_threads);
+  tcase_add_test(cases, progress_is_told_and_can_stop);
+  tcase_add_test(cases, distance_is_that_of_the_golden_image);
+  tcase_add_test(cases, taps_show_every_sample_of_a_ray);
+  tcase_add_test(cases, null_is_refused_by_name);
+  tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
+  tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
+  suite_add_tcase(suite, cases);
+  return fixture_run(suite);
+}
