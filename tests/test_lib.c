@@ -1,47 +1,8 @@
-/* The C library against the core behind it: same integers, same counts, whatever the threads; every refusal is a value
- * that names what is wrong. */
+/* Scenes and samples of the C library against the core behind it; every refusal is a value that names what is wrong. */
 #include "spikefield/audit.h"
 #include "spikefield/io.h"
-#include "spikefield/quant.h"
-#include "spikefield/spikefield.h"
-#include "tests/folder_fixture.h"
-#include "tests/fx_fixture.h"
+#include "tests/lib_fixture.h"
 #include <locale.h>
-#include <math.h>
-#include <omp.h>
-
-/* The fixture's scene as file, as core and as opened by the library. */
-static fx_scene core;
-static spikefield_scene *scene;
-static spikefield_scene_info info;
-
-static void lib_good(spikefield_status status)
-{
-  ck_assert_msg(status.code == SPIKEFIELD_OK, "unexpected failure: %s", status.message);
-}
-
-static void lib_bad(spikefield_status status, spikefield_code code, const char *word)
-{
-  ck_assert_msg(status.code == code, "code %d instead of %d: '%s'", status.code, code, status.message);
-  ck_assert_msg(strstr(status.message, word), "'%s' does not name '%s'", status.message, word);
-}
-
-static void open_fixture(void)
-{
-  make_folder();
-  core = fixture_scene(&fixture_ingp, 11);
-  core.step_q24 = 300000, core.background[1] = 30000;
-  ck_good(fx_scene_save(&core, in("s.snn")));
-  lib_good(spikefield_scene_open(&scene, in("s.snn")));
-  lib_good(spikefield_scene_describe(scene, &info));
-}
-
-static void close_fixture(void)
-{
-  spikefield_scene_close(scene);
-  fx_scene_free(&core);
-  remove_folder();
-}
 
 /* ---- scenes ---- */
 
@@ -220,192 +181,6 @@ START_TEST(positions_and_directions_are_rounded_once)
 }
 END_TEST
 
-/* ---- rays and frames ---- */
-
-enum { WIDTH = 37, HEIGHT = 19 }; /* several blocks, the last one not full */
-
-static spikefield_camera make_camera(void)
-{
-  return (spikefield_camera){WIDTH, HEIGHT, 30, 31, 18.25f, 9, {1, 0, 0, 0.1f, 0, 0, -1, -3, 0, 1, 0, -0.2f}};
-}
-
-static bool same_pixel(const spikefield_pixel *a, const spikefield_pixel *b)
-{
-  return !memcmp(a->colour, b->colour, sizeof a->colour) && a->depth == b->depth &&
-         !memcmp(a->rgba, b->rgba, sizeof a->rgba) && a->weight_sum == b->weight_sum &&
-         a->transmittance == b->transmittance && a->samples == b->samples;
-}
-
-static void assert_core_pixel(const spikefield_pixel *pixel, const fx_pixel *expected)
-{
-  uint32_t rgba[4];
-  fx_pixel_rgba(expected, rgba);
-  ck_assert_mem_eq(pixel->colour, expected->colour, sizeof expected->colour);
-  ck_assert_mem_eq(pixel->rgba, rgba, sizeof rgba);
-  ck_assert_uint_eq(pixel->depth, expected->depth);
-  ck_assert_uint_eq(pixel->weight_sum, expected->weight_sum);
-  ck_assert_uint_eq(pixel->transmittance, expected->transmittance);
-  ck_assert_uint_eq(pixel->samples, expected->samples);
-  ck_assert_uint_eq(pixel->weight_sum + pixel->transmittance, 1u << 20);
-}
-
-START_TEST(frames_are_those_of_the_core)
-{
-  static spikefield_pixel frame[HEIGHT * WIDTH], ray[HEIGHT * WIDTH];
-  static float origin[HEIGHT * WIDTH][3], direction[HEIGHT * WIDTH][3];
-  const spikefield_camera camera = make_camera();
-  sf_camera twin = {WIDTH, HEIGHT, 30, 31, 18.25f, 9, {0}};
-  spikefield_counts counts = {0}, of_rays = {0};
-  fx_counts wanted = {0};
-  int hit = 0;
-  memcpy(twin.to_world, camera.to_model, sizeof twin.to_world);
-  lib_good(spikefield_frame(scene, NULL, &camera, frame, &counts));
-  for (int i = 0; i < HEIGHT * WIDTH; i++) {
-    fx_ray r;
-    fx_pixel expected;
-    ck_good(sf_pixel_ray(&core, &twin, i % WIDTH, i / WIDTH, &r));
-    ck_good(fx_render_ray(&core, &r, NULL, NULL, &expected, &wanted));
-    assert_core_pixel(&frame[i], &expected);
-    hit += expected.samples > 0;
-    sf_camera_ray(&twin, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, origin[i], direction[i]);
-  }
-  ck_assert_int_gt(hit, HEIGHT * WIDTH / 4);
-  ck_assert_int_lt(hit, HEIGHT * WIDTH);
-  ck_assert_mem_eq(&counts, &wanted, sizeof wanted);
-  lib_good(spikefield_rays(scene, NULL, origin[0], direction[0], HEIGHT * WIDTH, ray, &of_rays));
-  ck_assert_mem_eq(&of_rays, &wanted, sizeof wanted);
-  for (int i = 0; i < HEIGHT * WIDTH; i++) ck_assert(same_pixel(&ray[i], &frame[i]));
-}
-END_TEST
-
-START_TEST(threads_change_no_bit)
-{
-  static spikefield_pixel one[HEIGHT * WIDTH], more[HEIGHT * WIDTH];
-  const spikefield_camera camera = make_camera();
-  spikefield_counts first = {0}, counts, twice;
-  lib_good(spikefield_frame(scene, &(spikefield_options){.threads = 1, .steps = 2}, &camera, one, &first));
-  for (int threads = 2; threads <= 5; threads++) {
-    memset(&counts, 0, sizeof counts);
-    lib_good(spikefield_frame(scene, &(spikefield_options){.threads = threads, .steps = 2}, &camera, more, &counts));
-    ck_assert_mem_eq(&counts, &first, sizeof first);
-    for (int i = 0; i < HEIGHT * WIDTH; i++) ck_assert(same_pixel(&one[i], &more[i]));
-  }
-  ck_assert_uint_eq(counts.layer[SPIKEFIELD_D1].updates[2], 0); /* two time steps */
-  twice = first;
-  spikefield_counts_add(&twice, &counts);
-  ck_assert_uint_eq(twice.samples, 2 * first.samples);
-  ck_assert_uint_eq(twice.layer[SPIKEFIELD_C2].sop[1], 2 * first.layer[SPIKEFIELD_C2].sop[1]);
-}
-END_TEST
-
-/* One scene, several callers at once, each with a team of its own. */
-START_TEST(one_scene_serves_many_threads)
-{
-  static spikefield_pixel frame[4][HEIGHT * WIDTH];
-  spikefield_counts counts[4] = {0};
-  spikefield_status status[4];
-  const spikefield_camera camera = make_camera();
-  omp_set_max_active_levels(2);
-#pragma omp parallel for num_threads(4)
-  for (int i = 0; i < 4; i++)
-    status[i] = spikefield_frame(scene, &(spikefield_options){.threads = 2}, &camera, frame[i], &counts[i]);
-  for (int i = 0; i < 4; i++) {
-    lib_good(status[i]);
-    ck_assert_mem_eq(&counts[i], &counts[0], sizeof counts[0]);
-    for (int p = 0; p < HEIGHT * WIDTH; p++) ck_assert(same_pixel(&frame[i][p], &frame[0][p]));
-  }
-}
-END_TEST
-
-typedef struct watcher {
-  uint64_t calls, last, stop_at;
-} watcher;
-
-static bool watch(void *user, uint64_t done, uint64_t total)
-{
-  watcher *w = user;
-  ck_assert_uint_eq(total, HEIGHT * WIDTH);
-  ck_assert_uint_gt(done, w->last);
-  w->last = done, w->calls++;
-  return done < w->stop_at;
-}
-
-START_TEST(progress_is_told_and_can_stop)
-{
-  static spikefield_pixel frame[HEIGHT * WIDTH];
-  const spikefield_camera camera = make_camera();
-  spikefield_counts counts = {0};
-  watcher w = {.stop_at = UINT64_MAX};
-  spikefield_options options = {.threads = 3, .progress = watch, .user = &w};
-  lib_good(spikefield_frame(scene, &options, &camera, frame, &counts));
-  ck_assert_uint_eq(w.last, HEIGHT * WIDTH);
-  ck_assert_uint_gt(w.calls, 1);
-  const spikefield_counts before = counts;
-  options.threads = 1;
-  w = (watcher){.stop_at = 1};
-  lib_bad(spikefield_frame(scene, &options, &camera, frame, &counts), SPIKEFIELD_E_STOPPED, "of 703 rays");
-  ck_assert_uint_eq(w.calls, 1);
-  ck_assert_mem_eq(&counts, &before, sizeof counts);
-}
-END_TEST
-
-START_TEST(distance_is_that_of_the_golden_image)
-{
-  spikefield_pixel pixel;
-  const float origin[3] = {0.3f, -3, 0.2f}, ahead[3] = {0, 1, 0}, away[3] = {0, -1, 0};
-  lib_good(spikefield_rays(scene, NULL, origin, ahead, 1, &pixel, NULL));
-  const double distance = spikefield_pixel_distance(scene, &pixel);
-  ck_assert(distance > 2 && distance < 4); /* the box is 2 to 4 units ahead */
-  lib_good(spikefield_rays(scene, NULL, origin, away, 1, &pixel, NULL));
-  ck_assert_uint_eq(pixel.samples, 0);
-  ck_assert(spikefield_pixel_distance(scene, &pixel) == 0);
-  ck_assert_uint_eq(pixel.rgba[1], 30000);
-}
-END_TEST
-
-/* ---- taps ---- */
-
-typedef struct tapper {
-  uint32_t next, stop_at;
-  spikefield_counts counts;
-  int16_t harmonics[SPIKEFIELD_DIRECTIONS];
-} tapper;
-
-/* Every tap is what its features give when they are run again. */
-static bool tap_sample(void *user, const spikefield_tap *tap)
-{
-  static spikefield_trace trace;
-  tapper *t = user;
-  spikefield_sample again;
-  ck_assert_uint_eq(tap->index, t->next++);
-  lib_good(spikefield_samples(scene, NULL, t->harmonics, tap->features, 1, &again, &trace, &t->counts));
-  ck_assert_mem_eq(&again, tap->sample, sizeof again);
-  ck_assert_mem_eq(&trace, tap->trace, sizeof trace);
-  return tap->index < t->stop_at;
-}
-
-START_TEST(taps_show_every_sample_of_a_ray)
-{
-  const float origin[3] = {0.3f, -3, 0.2f}, direction[3] = {0, 1, 0.1f};
-  spikefield_pixel pixel, plain;
-  spikefield_counts counts = {0}, expected = {0};
-  tapper t = {.stop_at = UINT32_MAX};
-  lib_good(spikefield_direction(scene, direction, t.harmonics));
-  lib_good(spikefield_rays(scene, NULL, origin, direction, 1, &plain, &expected));
-  lib_good(spikefield_ray_taps(scene, NULL, origin, direction, tap_sample, &t, &pixel, &counts));
-  ck_assert(same_pixel(&pixel, &plain));
-  ck_assert_uint_eq(t.next, pixel.samples);
-  ck_assert_uint_gt(pixel.samples, 2);
-  ck_assert_mem_eq(&counts, &expected, sizeof counts);
-  ck_assert_uint_eq(t.counts.layer[SPIKEFIELD_C2].sop[3], counts.layer[SPIKEFIELD_C2].sop[3]);
-  t.next = 0, t.stop_at = 1;
-  lib_bad(spikefield_ray_taps(scene, NULL, origin, direction, tap_sample, &t, &pixel, &counts), SPIKEFIELD_E_STOPPED,
-          "sample 1");
-  ck_assert_uint_eq(t.next, 2);
-  ck_assert_mem_eq(&counts, &expected, sizeof counts);
-}
-END_TEST
-
 /* ---- refusals ---- */
 
 START_TEST(null_is_refused_by_name)
@@ -426,10 +201,14 @@ START_TEST(null_is_refused_by_name)
   lib_bad(spikefield_direction(NULL, v, harmonics), SPIKEFIELD_E_USAGE, "scene is NULL");
   lib_bad(spikefield_features(scene, NULL, 1, feature, NULL), SPIKEFIELD_E_USAGE, "positions is NULL");
   lib_bad(spikefield_features(scene, position, 1, NULL, NULL), SPIKEFIELD_E_USAGE, "features is NULL");
-  lib_bad(spikefield_samples(scene, NULL, NULL, feature, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "harmonics is NULL");
-  lib_bad(spikefield_samples(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "features is NULL");
-  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 1, NULL, NULL, NULL), SPIKEFIELD_E_USAGE, "samples is NULL");
-  lib_bad(spikefield_samples_at(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE, "positions is NULL");
+  lib_bad(spikefield_samples(scene, NULL, NULL, feature, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "harmonics is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "features is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 1, NULL, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "samples is NULL");
+  lib_bad(spikefield_samples_at(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "positions is NULL");
   lib_bad(spikefield_rays(NULL, NULL, v, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "scene is NULL");
   lib_bad(spikefield_rays(scene, NULL, NULL, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "origins is NULL");
   lib_bad(spikefield_rays(scene, NULL, v, NULL, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "directions is NULL");
@@ -498,12 +277,6 @@ int main(void)
   tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
   tcase_add_test(cases, samples_are_those_of_the_core);
   tcase_add_test(cases, positions_and_directions_are_rounded_once);
-  tcase_add_test(cases, frames_are_those_of_the_core);
-  tcase_add_test(cases, threads_change_no_bit);
-  tcase_add_test(cases, one_scene_serves_many_threads);
-  tcase_add_test(cases, progress_is_told_and_can_stop);
-  tcase_add_test(cases, distance_is_that_of_the_golden_image);
-  tcase_add_test(cases, taps_show_every_sample_of_a_ray);
   tcase_add_test(cases, null_is_refused_by_name);
   tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
   tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
