@@ -191,10 +191,13 @@ START_TEST(null_is_refused_by_name)
   uint32_t position[3] = {0};
   spikefield_sample sample;
   spikefield_pixel pixel;
-  spikefield_scene *none;
+  spikefield_scene *none = scene;
   lib_bad(spikefield_scene_open(NULL, "x"), SPIKEFIELD_E_USAGE, "scene is NULL");
   lib_bad(spikefield_scene_open(&none, NULL), SPIKEFIELD_E_USAGE, "path is NULL");
+  ck_assert_ptr_null(none);
+  none = scene;
   lib_bad(spikefield_scene_open_memory(&none, NULL, 3, "x"), SPIKEFIELD_E_USAGE, "data is NULL");
+  ck_assert_ptr_null(none);
   lib_bad(spikefield_scene_describe(NULL, &info), SPIKEFIELD_E_USAGE, "scene is NULL");
   lib_bad(spikefield_scene_describe(scene, NULL), SPIKEFIELD_E_USAGE, "info is NULL");
   lib_bad(spikefield_position(scene, NULL, position), SPIKEFIELD_E_USAGE, "model is NULL");
@@ -227,8 +230,8 @@ START_TEST(numbers_out_of_range_are_refused_by_name)
   int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[64] = {0};
   uint32_t position[6] = {0};
   spikefield_sample sample[2];
-  static spikefield_pixel pixel[300];
-  static float far[300][3];
+  spikefield_pixel pixel[1];
+  const float far[3] = {1, 0, 0};
   feature[35] = 2048;
   lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
           "feature 3 of sample 1 is 2048");
@@ -239,12 +242,10 @@ START_TEST(numbers_out_of_range_are_refused_by_name)
   lib_bad(spikefield_samples_at(scene, NULL, harmonics, position, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
           "position 1, axis 2");
   lib_bad(spikefield_features(scene, position, 2, feature, NULL), SPIKEFIELD_E_RANGE, "position 1, axis 2");
-  lib_bad(spikefield_rays(scene, &(spikefield_options){.steps = 9}, far[0], far[0], 1, pixel, NULL), SPIKEFIELD_E_RANGE,
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.steps = 9}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
           "steps is 9");
-  lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far[0], far[0], 1, pixel, NULL),
-          SPIKEFIELD_E_RANGE, "threads is -1");
-  for (int i = 0; i < 300; i++) far[i][0] = i == 290 || i == 299 ? NAN : 1;
-  lib_bad(spikefield_rays(scene, NULL, far[0], far[0], 300, pixel, NULL), SPIKEFIELD_E_RANGE, "ray 290: ");
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
+          "threads is -1");
 }
 END_TEST
 

@@ -123,6 +123,20 @@ START_TEST(progress_is_told_and_can_stop)
 }
 END_TEST
 
+/* Rays are bad at the end of every block of 256: whoever is first, the first one is reported. */
+START_TEST(the_first_bad_ray_is_named)
+{
+  enum { RAYS = 1024 };
+  static spikefield_pixel pixel[RAYS];
+  static float vector[RAYS][3];
+  for (int i = 0; i < RAYS; i++) vector[i][0] = i % 256 == 255 ? NAN : 1;
+  for (int i = 0; i < 200; i++) {
+    const spikefield_options options = {.threads = 1 + i % 4};
+    lib_bad(spikefield_rays(scene, &options, vector[0], vector[0], RAYS, pixel, NULL), SPIKEFIELD_E_RANGE, "ray 255: ");
+  }
+}
+END_TEST
+
 START_TEST(distance_is_that_of_the_golden_image)
 {
   spikefield_pixel pixel;
@@ -190,6 +204,7 @@ int main(void)
   tcase_add_test(cases, threads_change_no_bit);
   tcase_add_test(cases, one_scene_serves_many_threads);
   tcase_add_test(cases, progress_is_told_and_can_stop);
+  tcase_add_test(cases, the_first_bad_ray_is_named);
   tcase_add_test(cases, distance_is_that_of_the_golden_image);
   tcase_add_test(cases, taps_show_every_sample_of_a_ray);
   suite_add_tcase(suite, cases);
