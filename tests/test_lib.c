@@ -104,6 +104,7 @@ START_TEST(the_locale_of_the_host_does_not_matter)
   snprintf(number, sizeof number, "%.1f", 0.5);
   ck_assert_str_eq(number, "0,5"); /* the host's locale is as it was */
   spikefield_scene_close(again);
+  setlocale(LC_ALL, "C");
 }
 END_TEST
 
