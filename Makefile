@@ -32,7 +32,7 @@ PKGS := OpenEXR libcjson libpng libjpeg
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 
@@ -77,6 +77,9 @@ $B/libspikefield.a: $(LIB_OBJ)
 # Generated RTL, the Verilated accelerator ($(DUT_LIBS)), lint and firmware.
 include sim/sim.mk
 
+# The installable library.
+include src/lib/lib.mk
+
 # Programs. Those of DUT_TOOLS drive the Verilated accelerator; the others link the library alone.
 $(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)
@@ -103,8 +106,8 @@ $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
-check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli chain reproduce cosim_faults safetensors
+check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
+	@tests/run.sh $B $(TESTS) cli chain reproduce cosim_faults install safetensors
 
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run

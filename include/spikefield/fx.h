@@ -187,6 +187,7 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 
 /* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). */
 sf_status fx_scene_load(fx_scene *scene, const char *path);
+sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size, const char *name); /* a file's contents */
 sf_status fx_scene_save(const fx_scene *scene, const char *path);
 void fx_scene_free(fx_scene *scene);
 #endif

@@ -34,6 +34,8 @@ sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char 
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
  * is refused. */
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray);
+/* A point in model units to the box, Q0.24. SF_E_RANGE when it is outside or not finite. */
+sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3]);
 
 /* Fixed values back to units for comparison: per model unit, 0..1. */
 double sf_fx_sigma_value(uint32_t sigma);

@@ -1,4 +1,5 @@
 #include "spikefield/cli.h"
+#include "spikefield/spikefield.h"
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -8,8 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define SF_VERSION "0.1.0"
 
 /* ---- help ---- */
 
@@ -165,7 +164,7 @@ static bool names_option(const sf_cli *cli, const char *word)
 static void answer_and_exit(const sf_cli *cli, bool version)
 {
   if (version)
-    printf("%s (spikefield) %s\n", cli->program, SF_VERSION);
+    printf("%s (spikefield) %s\n", cli->program, SPIKEFIELD_VERSION);
   else
     print_help(cli);
   exit(fflush(stdout) ? 1 : 0);

@@ -247,16 +247,35 @@ static sf_status read_header(sf_tensors *set, const char *path, size_t size)
   return status;
 }
 
+/* Takes over set->buffer. */
+static sf_status parse_buffer(sf_tensors *set, size_t size)
+{
+  sf_status status = read_header(set, set->path, size);
+  if (status.code == SF_OK) status = align_data(set, set->path);
+  if (status.code != SF_OK) sf_tensors_free(set);
+  return status;
+}
+
 sf_status sf_tensors_load(sf_tensors *set, const char *path)
 {
   memset(set, 0, sizeof *set);
   snprintf(set->path, sizeof set->path, "%s", path);
   size_t size;
   SF_TRY(sf_read_file(path, FILE_LIMIT, &set->buffer, &size));
-  sf_status status = read_header(set, path, size);
-  if (status.code == SF_OK) status = align_data(set, path);
-  if (status.code != SF_OK) sf_tensors_free(set);
-  return status;
+  return parse_buffer(set, size);
+}
+
+sf_status sf_tensors_load_memory(sf_tensors *set, const void *data, size_t size, const char *name)
+{
+  memset(set, 0, sizeof *set);
+  snprintf(set->path, sizeof set->path, "%s", name);
+  if (size > FILE_LIMIT)
+    return sf_fail(SF_E_FORMAT, "%s: %zu bytes, larger than the limit of %zu", name, size, FILE_LIMIT);
+  set->buffer = malloc(size + 1);
+  if (!set->buffer) return sf_fail(SF_E_MEMORY, "%s: no memory for %zu bytes", name, size);
+  if (size) memcpy(set->buffer, data, size);
+  set->buffer[size] = 0;
+  return parse_buffer(set, size);
 }
 
 void sf_tensors_free(sf_tensors *set)

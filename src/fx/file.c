@@ -249,13 +249,27 @@ static sf_status read_scene(const sf_tensors *set, fx_scene *scene)
   return check_sum(set);
 }
 
+/* Frees the tensors. */
+static sf_status load_set(fx_scene *scene, sf_tensors *set)
+{
+  const sf_status status = read_scene(set, scene);
+  sf_tensors_free(set);
+  if (status.code != SF_OK) fx_scene_free(scene);
+  return status;
+}
+
 sf_status fx_scene_load(fx_scene *scene, const char *path)
 {
   sf_tensors set;
   memset(scene, 0, sizeof *scene);
   SF_TRY(sf_tensors_load(&set, path));
-  const sf_status status = read_scene(&set, scene);
-  sf_tensors_free(&set);
-  if (status.code != SF_OK) fx_scene_free(scene);
-  return status;
+  return load_set(scene, &set);
+}
+
+sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size, const char *name)
+{
+  sf_tensors set;
+  memset(scene, 0, sizeof *scene);
+  SF_TRY(sf_tensors_load_memory(&set, data, size, name));
+  return load_set(scene, &set);
 }

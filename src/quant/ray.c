@@ -94,3 +94,17 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
   set_lattice(ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
   return sf_ok();
 }
+
+/* As the points of a ray: the nearest Q40, cut to Q24. */
+sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3])
+{
+  for (int axis = 0; axis < 3; axis++) {
+    const double p = position[axis] * scene->to_box_scale + scene->to_box_offset[axis];
+    const int64_t fixed = p >= 0 && p < 1 ? llrint(ldexp(p, RAY_FRAC)) : -1;
+    if (fixed < 0 || fixed >= (int64_t)1 << RAY_FRAC)
+      return sf_fail(SF_E_RANGE, "position (%g, %g, %g): axis %d is at %.9g of the scene box, expected 0 <= x < 1",
+                     (double)position[0], (double)position[1], (double)position[2], axis, p);
+    box[axis] = (uint32_t)(fixed >> (RAY_FRAC - SF_POS_FRAC));
+  }
+  return sf_ok();
+}

@@ -1,0 +1,48 @@
+# The installable C library. Included by the Makefile, which defines B, Q, say, CC, SAN and LIB_OBJ.
+# What spikefield.h's functions need is linked into one object in which only their names stay visible; both the static
+# and the shared library are that object.
+
+PREFIX ?= /usr/local
+override PREFIX := $(abspath $(PREFIX))
+LIBDIR ?= $(PREFIX)/lib
+INCLUDEDIR ?= $(PREFIX)/include
+OBJCOPY ?= objcopy
+PUBLIC_HEADER := include/spikefield/spikefield.h
+LIB_VERSION := $(shell sed -n 's/^.define SPIKEFIELD_VERSION "\(.*\)"/\1/p' $(PUBLIC_HEADER))
+SONAME := libspikefield.so.$(firstword $(subst ., ,$(LIB_VERSION)))
+SHARED := libspikefield.so.$(LIB_VERSION)
+
+$B/lib/spikefield.o: $(filter $B/obj/src/lib/%,$(LIB_OBJ)) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -r -nostdlib -o $@ $^
+	$Q$(OBJCOPY) --wildcard --keep-global-symbol='spikefield_*' $@
+
+$B/lib/libspikefield.a: $B/lib/spikefield.o
+	$(call say,AR    $@)
+	$Qrm -f $@ && $(AR) rcs $@ $^
+
+$B/lib/$(SHARED): $B/lib/spikefield.o
+	$(call say,LD    $@)
+	$Q$(CC) -shared -fopenmp $(SAN) -Wl,-soname,$(SONAME) -Wl,-z,defs -o $@ $^ $(shell pkg-config --libs libcjson) -lm
+
+lib: $B/lib/libspikefield.a $B/lib/$(SHARED) ## the C library, static and shared: build/lib
+
+INSTALLED := $(INCLUDEDIR)/spikefield/spikefield.h $(LIBDIR)/libspikefield.a $(LIBDIR)/$(SHARED) $(LIBDIR)/$(SONAME) \
+  $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc
+
+install: lib ## the C library, its header and its pkg-config file below PREFIX (/usr/local), staged in DESTDIR
+	$(call say,INST  $(DESTDIR)$(PREFIX))
+	$Qinstall -D -m 644 $(PUBLIC_HEADER) $(DESTDIR)$(INCLUDEDIR)/spikefield/spikefield.h
+	$Qinstall -D -m 644 $B/lib/libspikefield.a $(DESTDIR)$(LIBDIR)/libspikefield.a
+	$Qinstall -D -m 755 $B/lib/$(SHARED) $(DESTDIR)$(LIBDIR)/$(SHARED)
+	$Qln -sf $(SHARED) $(DESTDIR)$(LIBDIR)/$(SONAME) && ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libspikefield.so
+	$Qmkdir -p $(DESTDIR)$(LIBDIR)/pkgconfig && sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|' \
+	  -e 's|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(LIB_VERSION)|' src/lib/spikefield.pc.in \
+	  >$(DESTDIR)$(LIBDIR)/pkgconfig/spikefield.pc
+
+uninstall: ## remove what install put below PREFIX
+	$Qrm -f $(addprefix $(DESTDIR),$(INSTALLED))
+	$Qrmdir $(DESTDIR)$(INCLUDEDIR)/spikefield 2>/dev/null || true
+
+.PHONY: lib install uninstall

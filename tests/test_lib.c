@@ -1,0 +1,287 @@
+/* Scenes and samples of the C library against the core behind it; every refusal is a value that names what is wrong. */
+#include "spikefield/audit.h"
+#include "spikefield/io.h"
+#include "tests/lib_fixture.h"
+#include <locale.h>
+
+/* ---- scenes ---- */
+
+START_TEST(info_says_what_the_scene_is)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert_int_eq(info.inputs[l], core.net.layer[l].n_in);
+    ck_assert_int_eq(info.outputs[l], core.net.layer[l].n_out);
+    ck_assert_int_eq(info.theta[l], core.net.layer[l].theta);
+    ck_assert_int_eq(info.leak_q12[l], core.net.layer[l].k);
+  }
+  ck_assert_int_eq(info.mode, SPIKEFIELD_HYBRID);
+  ck_assert_int_eq(info.steps, 4);
+  ck_assert_int_eq(info.features, 32);
+  ck_assert_int_eq(info.directions, 16);
+  ck_assert_int_eq(info.grid_levels, 16);
+  ck_assert_int_eq(info.grid_entries, core.grid.entries);
+  ck_assert_int_eq(info.grid_bytes, 2 * core.grid.entries);
+  ck_assert_int_eq(info.weight_bytes, 32 * 128 + 128 * 16 + 31 * 128 + 128 * 128 + 128 * 3);
+  ck_assert_int_eq(info.occupancy_bytes, 64);
+  ck_assert_int_eq(info.background_q16[1], 30000);
+  ck_assert(info.to_box_scale == 0.5 && info.to_box_offset[2] == 0.5 && info.direction_lsb == 0x1p-10);
+  ck_assert(info.step == 2 * 300000 / 16777216.0);
+  ck_assert_str_eq(spikefield_version(), SPIKEFIELD_VERSION);
+  char parts[32];
+  snprintf(parts, sizeof parts, "%d.%d.%d", SPIKEFIELD_VERSION_MAJOR, SPIKEFIELD_VERSION_MINOR,
+           SPIKEFIELD_VERSION_PATCH);
+  ck_assert_str_eq(parts, SPIKEFIELD_VERSION);
+}
+END_TEST
+
+START_TEST(memory_and_file_give_the_same_scene)
+{
+  char *data;
+  size_t size;
+  spikefield_scene *copy;
+  spikefield_scene_info other;
+  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  lib_good(spikefield_scene_open_memory(&copy, data, size, "copy"));
+  memset(data, 0, size); /* nothing of the caller is kept */
+  lib_good(spikefield_scene_describe(copy, &other));
+  ck_assert_int_eq(other.grid_entries, info.grid_entries);
+  spikefield_pixel a, b;
+  const float origin[3] = {0.3f, -3, 0.2f}, direction[3] = {0, 1, 0};
+  lib_good(spikefield_rays(scene, NULL, origin, direction, 1, &a, NULL));
+  lib_good(spikefield_rays(copy, NULL, origin, direction, 1, &b, NULL));
+  ck_assert_uint_gt(a.samples, 0);
+  ck_assert_mem_eq(a.colour, b.colour, sizeof a.colour);
+  spikefield_scene_close(copy);
+  free(data);
+}
+END_TEST
+
+START_TEST(damaged_scenes_are_refused)
+{
+  char *data;
+  size_t size;
+  spikefield_scene *none = scene;
+  lib_bad(spikefield_scene_open(&none, in("absent")), SPIKEFIELD_E_IO, "absent");
+  ck_assert_ptr_null(none);
+  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  static const double part[] = {0, 0.01, 0.5, 0.9999};
+  for (int i = 0; i < 4; i++) {
+    none = scene;
+    lib_bad(spikefield_scene_open_memory(&none, data, (size_t)((double)size * part[i]), "cut"), SPIKEFIELD_E_FORMAT,
+            "cut: ");
+    ck_assert_ptr_null(none);
+  }
+  data[size - 1] ^= 1;
+  lib_bad(spikefield_scene_open_memory(&none, data, size, NULL), SPIKEFIELD_E_FORMAT, "memory: ");
+  free(data);
+}
+END_TEST
+
+/* A locale whose numbers have a comma: the machine's, else one made for the occasion where localedef can. */
+static bool comma_locale(void)
+{
+  static const char *const names[] = {"de_DE.UTF-8", "fr_FR.UTF-8", "de_DE", "fr_FR"};
+  char command[400];
+  for (int i = 0; i < 4; i++)
+    if (setlocale(LC_ALL, names[i])) return true;
+  snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 '%s' >/dev/null 2>&1", in("de_DE.UTF-8"));
+  const int status = system(command);
+  setenv("LOCPATH", folder, 1);
+  return status == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
+}
+
+START_TEST(the_locale_of_the_host_does_not_matter)
+{
+  spikefield_scene *again;
+  spikefield_scene_info other;
+  char number[8];
+  if (!comma_locale()) return;
+  snprintf(number, sizeof number, "%.1f", 0.5);
+  ck_assert_str_eq(number, "0,5");
+  lib_good(spikefield_scene_open(&again, in("s.snn")));
+  lib_good(spikefield_scene_describe(again, &other));
+  ck_assert(other.to_box_scale == info.to_box_scale && other.step == info.step);
+  snprintf(number, sizeof number, "%.1f", 0.5);
+  ck_assert_str_eq(number, "0,5"); /* the host's locale is as it was */
+  spikefield_scene_close(again);
+  setlocale(LC_ALL, "C");
+}
+END_TEST
+
+/* ---- samples ---- */
+
+enum { SAMPLES = 20 };
+
+static void random_positions(uint32_t *position, uint64_t seed)
+{
+  for (uint64_t i = 0; i < 3 * SAMPLES; i++) position[i] = (uint32_t)sf_random_below(seed, 7, i, 1 << 24);
+}
+
+START_TEST(samples_are_those_of_the_core)
+{
+  static spikefield_trace traces[SAMPLES];
+  static fx_trace trace;
+  uint32_t position[3 * SAMPLES];
+  int16_t feature[SAMPLES * 32], expected[32], harmonics[SPIKEFIELD_DIRECTIONS];
+  int32_t base[SF_LANES];
+  spikefield_sample a[SAMPLES], b[SAMPLES];
+  spikefield_counts counts = {0}, at = {0};
+  fx_counts wanted = {0};
+  const float direction[3] = {0.3f, -2, 1};
+  random_positions(position, 1);
+  for (int steps = 0; steps <= SF_T_MAX; steps += 4) {
+    const spikefield_options options = {.steps = steps};
+    fx_net net = core.net;
+    if (steps) net.steps = steps;
+    lib_good(spikefield_direction(scene, direction, harmonics));
+    lib_good(spikefield_features(scene, position, SAMPLES, feature, &counts));
+    lib_good(spikefield_samples(scene, &options, harmonics, feature, SAMPLES, a, traces, &counts));
+    lib_good(spikefield_samples_at(scene, &options, harmonics, position, SAMPLES, b, NULL, &at));
+    fx_net_direction(&net, harmonics, base, &wanted);
+    for (int i = 0; i < SAMPLES; i++) {
+      fx_out out;
+      fx_grid_features(&core.grid, position + 3 * i, expected, &wanted);
+      ck_assert_mem_eq(feature + 32 * i, expected, sizeof expected);
+      fx_net_sample(&net, expected, base, &out, &trace, &wanted);
+      ck_assert(a[i].density == out.sigma && b[i].density == out.sigma);
+      ck_assert_mem_eq(a[i].colour, out.colour, sizeof out.colour);
+      ck_assert_mem_eq(b[i].colour, out.colour, sizeof out.colour);
+      ck_assert_mem_eq(&traces[i], &trace, sizeof trace);
+    }
+    ck_assert_mem_eq(&counts, &wanted, sizeof wanted);
+    ck_assert_mem_eq(&at, &wanted, sizeof wanted);
+  }
+  ck_assert_uint_gt(wanted.layer[FX_C2].sop[7], 0);
+  ck_assert_uint_eq(spikefield_energy_fj(&counts), sf_energy_fj(&wanted));
+  ck_assert_uint_gt(spikefield_energy_fj(&counts), 0);
+  ck_assert_uint_eq(spikefield_relu_energy_fj(scene, 7), 7 * UINT64_C(4600) * (uint64_t)info.weight_bytes);
+}
+END_TEST
+
+START_TEST(positions_and_directions_are_rounded_once)
+{
+  const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};
+  const float outside[][3] = {{1, 0, 0}, {0, -1.0001f, 0}, {0, 0, NAN}, {INFINITY, 0, 0}};
+  uint32_t box[3];
+  lib_good(spikefield_position(scene, middle, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], 1u << 23);
+  lib_good(spikefield_position(scene, corner, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], 0);
+  lib_good(spikefield_position(scene, inside, box));
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(box[a], (uint32_t)floor(((double)inside[a] / 2 + 0.5) * 16777216));
+  for (int i = 0; i < 4; i++) lib_bad(spikefield_position(scene, outside[i], box), SPIKEFIELD_E_RANGE, "position");
+  int16_t one[SPIKEFIELD_DIRECTIONS], two[SPIKEFIELD_DIRECTIONS];
+  const float d[3] = {0.5f, -0.25f, 0.125f}, longer[3] = {4, -2, 1}, zero[3] = {0};
+  fx_ray ray;
+  ck_good(sf_fx_ray_make(&core, middle, d, &ray));
+  lib_good(spikefield_direction(scene, d, one));
+  lib_good(spikefield_direction(scene, longer, two));
+  ck_assert_mem_eq(one, ray.dir, sizeof one);
+  ck_assert_mem_eq(two, ray.dir, sizeof two);
+  lib_bad(spikefield_direction(scene, zero, one), SPIKEFIELD_E_RANGE, "nonzero direction");
+}
+END_TEST
+
+/* ---- refusals ---- */
+
+START_TEST(null_is_refused_by_name)
+{
+  const spikefield_camera camera = make_camera();
+  const float v[3] = {0, 0, 1};
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[32] = {0};
+  uint32_t position[3] = {0};
+  spikefield_sample sample;
+  spikefield_pixel pixel;
+  spikefield_scene *none = scene;
+  lib_bad(spikefield_scene_open(NULL, "x"), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_scene_open(&none, NULL), SPIKEFIELD_E_USAGE, "path is NULL");
+  ck_assert_ptr_null(none);
+  none = scene;
+  lib_bad(spikefield_scene_open_memory(&none, NULL, 3, "x"), SPIKEFIELD_E_USAGE, "data is NULL");
+  ck_assert_ptr_null(none);
+  lib_bad(spikefield_scene_describe(NULL, &info), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_scene_describe(scene, NULL), SPIKEFIELD_E_USAGE, "info is NULL");
+  lib_bad(spikefield_position(scene, NULL, position), SPIKEFIELD_E_USAGE, "model is NULL");
+  lib_bad(spikefield_direction(NULL, v, harmonics), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_features(scene, NULL, 1, feature, NULL), SPIKEFIELD_E_USAGE, "positions is NULL");
+  lib_bad(spikefield_features(scene, position, 1, NULL, NULL), SPIKEFIELD_E_USAGE, "features is NULL");
+  lib_bad(spikefield_samples(scene, NULL, NULL, feature, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "harmonics is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "features is NULL");
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 1, NULL, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "samples is NULL");
+  lib_bad(spikefield_samples_at(scene, NULL, harmonics, NULL, 1, &sample, NULL, NULL), SPIKEFIELD_E_USAGE,
+          "positions is NULL");
+  lib_bad(spikefield_rays(NULL, NULL, v, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "scene is NULL");
+  lib_bad(spikefield_rays(scene, NULL, NULL, v, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "origins is NULL");
+  lib_bad(spikefield_rays(scene, NULL, v, NULL, 1, &pixel, NULL), SPIKEFIELD_E_USAGE, "directions is NULL");
+  lib_bad(spikefield_rays(scene, NULL, v, v, 1, NULL, NULL), SPIKEFIELD_E_USAGE, "pixels is NULL");
+  lib_bad(spikefield_frame(scene, NULL, NULL, &pixel, NULL), SPIKEFIELD_E_USAGE, "camera is NULL");
+  lib_bad(spikefield_frame(scene, NULL, &camera, NULL, NULL), SPIKEFIELD_E_USAGE, "pixels is NULL");
+  lib_bad(spikefield_ray_taps(scene, NULL, v, v, NULL, NULL, &pixel, NULL), SPIKEFIELD_E_USAGE, "tap is NULL");
+  spikefield_scene_close(NULL);
+  lib_good(spikefield_rays(scene, NULL, NULL, NULL, 0, NULL, NULL));
+  lib_good(spikefield_samples(scene, NULL, NULL, NULL, 0, NULL, NULL, NULL));
+}
+END_TEST
+
+START_TEST(numbers_out_of_range_are_refused_by_name)
+{
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[64] = {0};
+  uint32_t position[6] = {0};
+  spikefield_sample sample[2];
+  spikefield_pixel pixel[1];
+  const float far[3] = {1, 0, 0};
+  feature[35] = 2048;
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "feature 3 of sample 1 is 2048");
+  feature[35] = 0, harmonics[15] = -2048;
+  lib_bad(spikefield_samples(scene, NULL, harmonics, feature, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "harmonic 15");
+  position[5] = 1 << 24, harmonics[15] = 0;
+  lib_bad(spikefield_samples_at(scene, NULL, harmonics, position, 2, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "position 1, axis 2");
+  lib_bad(spikefield_features(scene, position, 2, feature, NULL), SPIKEFIELD_E_RANGE, "position 1, axis 2");
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.steps = 9}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
+          "steps is 9");
+  lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
+          "threads is -1");
+}
+END_TEST
+
+START_TEST(cameras_out_of_range_are_refused_by_name)
+{
+  spikefield_pixel pixel;
+  static const char *const word[] = {"width is 0", "height is 65537", "fx is 0", "fy is", "cx is", "to_model[7]"};
+  for (int i = 0; i < 6; i++) {
+    spikefield_camera camera = make_camera();
+    if (i == 0) camera.width = 0;
+    if (i == 1) camera.height = 65537;
+    if (i == 2) camera.fx = 0;
+    if (i == 3) camera.fy = INFINITY;
+    if (i == 4) camera.cx = NAN;
+    if (i == 5) camera.to_model[7] = NAN;
+    lib_bad(spikefield_frame(scene, NULL, &camera, &pixel, NULL), SPIKEFIELD_E_RANGE, word[i]);
+  }
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("lib");
+  TCase *cases = tcase_create("lib");
+  tcase_set_timeout(cases, 300);
+  tcase_add_checked_fixture(cases, open_fixture, close_fixture);
+  tcase_add_test(cases, info_says_what_the_scene_is);
+  tcase_add_test(cases, memory_and_file_give_the_same_scene);
+  tcase_add_test(cases, damaged_scenes_are_refused);
+  tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
+  tcase_add_test(cases, samples_are_those_of_the_core);
+  tcase_add_test(cases, positions_and_directions_are_rounded_once);
+  tcase_add_test(cases, null_is_refused_by_name);
+  tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
+  tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
+  suite_add_tcase(suite, cases);
+  return fixture_run(suite);
+}
