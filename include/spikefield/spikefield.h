@@ -134,7 +134,9 @@ typedef struct spikefield_counts {
   uint64_t samples, rays;                                    /* through the nets; rays with at least one sample */
   uint64_t grid_bytes;                                       /* of the hash grid read */
   uint64_t march_steps;                                      /* points tested against the occupancy grid */
-  uint64_t saturated[SPIKEFIELD_LAYERS], saturated_features; /* saturation events */
+  uint64_t saturated[SPIKEFIELD_LAYERS];                     /* saturation events */
+  uint64_t saturated_samples[SPIKEFIELD_LAYERS];             /* samples with at least one of them */
+  uint64_t saturated_features;
 } spikefield_counts;
 SPIKEFIELD_API void spikefield_counts_add(spikefield_counts *sum, const spikefield_counts *more);
 

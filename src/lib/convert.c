@@ -32,6 +32,7 @@ SAME(spikefield_counts, fx_counts, rays);
 SAME(spikefield_counts, fx_counts, grid_bytes);
 SAME(spikefield_counts, fx_counts, march_steps);
 SAME(spikefield_counts, fx_counts, saturated);
+SAME(spikefield_counts, fx_counts, saturated_samples);
 SAME(spikefield_counts, fx_counts, saturated_features);
 _Static_assert(sizeof(spikefield_counts) == sizeof(fx_counts), "spikefield_counts differs from the core's");
 SAME(spikefield_trace, fx_trace, spikes);

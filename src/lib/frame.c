@@ -5,10 +5,11 @@
 #include <math.h>
 #include <omp.h>
 
-enum { BLOCK = 256, THREADS_MAX = 1024, SIDE_MAX = 65536 };
+enum { BLOCK = 256, FEW = 32, THREADS_MAX = 1024, SIDE_MAX = 65536 };
 
 typedef struct job {
   fx_scene view;
+  fx_core *core; /* NULL for a few rays: arranging its tables would take longer */
   const float *origins, *directions; /* NULL: the camera's */
   sf_camera camera;
   uint64_t rays, blocks;
@@ -33,9 +34,10 @@ static sf_status make_ray(const job *j, uint64_t i, fx_ray *ray)
 }
 
 /* The one place where rays become pixels. */
-static sf_status render(const fx_scene *scene, const fx_ray *ray, int n, fx_pixel *pixel, fx_counts *events)
+static sf_status render(const job *j, const fx_ray *ray, int n, fx_pixel *pixel, fx_counts *events)
 {
-  for (int i = 0; i < n; i++) SF_TRY(fx_render_ray(scene, &ray[i], NULL, NULL, &pixel[i], events));
+  if (j->core) return fx_render_rays(j->core, ray, (size_t)n, pixel, NULL, events);
+  for (int i = 0; i < n; i++) SF_TRY(fx_render_ray(&j->view, &ray[i], NULL, NULL, &pixel[i], events));
   return sf_ok();
 }
 
@@ -48,7 +50,7 @@ static sf_status render_block(const job *j, uint64_t first, int n, fx_counts *ev
     if (status.code != SF_OK)
       return sf_fail(status.code, "ray %llu: %s", (unsigned long long)first + (unsigned)i, status.message);
   }
-  SF_TRY(render(&j->view, ray, n, pixel, events));
+  SF_TRY(render(j, ray, n, pixel, events));
   for (int i = 0; i < n; i++) lib_pixel(&j->pixels[first + (uint64_t)i], &pixel[i]);
   return sf_ok();
 }
@@ -88,10 +90,12 @@ static sf_status run(job *j, spikefield_counts *counts)
 {
   j->blocks = j->rays / BLOCK + (j->rays % BLOCK > 0);
   j->failed_block = UINT64_MAX, j->failed = sf_ok();
+  if (j->rays >= FEW) SF_TRY(fx_core_open(&j->core, &j->view, NULL));
   omp_init_lock(&j->lock);
 #pragma omp parallel for schedule(dynamic) num_threads(j->threads)
   for (uint64_t block = 0; block < j->blocks; block++) run_block(j, block);
   omp_destroy_lock(&j->lock);
+  fx_core_close(j->core);
   if (j->failed.code != SF_OK) return j->failed;
   if (j->stopped)
     return sf_fail(SF_E_STOPPED, "stopped after %llu of %llu rays", (unsigned long long)j->done,
