@@ -1,16 +1,10 @@
 /* sim_render: one view of a scene through the float field, the fixed-point core or the accelerator. */
+#include "sim/studio.h"
 #include "spikefield/cli.h"
-#include "spikefield/dut.h"
-#include "spikefield/golden.h"
 #include "spikefield/io.h"
-#include "spikefield/model.h"
-#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
-#include <string.h>
 
-enum { BACKEND_FLOAT, BACKEND_FIXED, BACKEND_RTL };
-static const char *const backend_name[] = {"float", "fixed", "rtl"};
 enum { RTL_CROP = 16 };
 
 typedef struct options {
@@ -21,22 +15,13 @@ typedef struct options {
   bool json, quiet;
 } options;
 
-typedef struct window {
-  int x, y, width, height;
-} window;
-
 typedef struct job {
   options opt;
-  fx_scene scene;
-  sf_dataset data;
-  const sf_view *view;
-  window crop;
-  char hash[65], beside[4096]; /* SHA-256 of the scene; the default model */
-  double step_length;          /* between samples, world units */
-  float background[3];
-  sf_golden golden;
+  sf_studio studio;
+  sf_shot shot;
   sf_render_report report;
   sf_progress progress;
+  size_t done; /* pixels */
   double start;
 } job;
 
@@ -55,18 +40,17 @@ static sf_status read_number(const char **text, char stop, int *value)
 
 static sf_status choose_crop(job *j)
 {
-  const sf_camera *camera = &j->view->camera;
-  j->crop = (window){0, 0, camera->width, camera->height};
+  const sf_camera *camera = &j->shot.view->camera;
   if (!j->opt.crop) {
-    if (j->opt.backend != BACKEND_RTL) return sf_ok();
+    if (j->opt.backend != SF_BACKEND_RTL) return sf_ok();
     int w = camera->width < RTL_CROP ? camera->width : RTL_CROP,
         h = camera->height < RTL_CROP ? camera->height : RTL_CROP;
-    j->crop = (window){(camera->width - w) / 2, (camera->height - h) / 2, w, h};
+    j->shot.window = (sf_window){(camera->width - w) / 2, (camera->height - h) / 2, w, h};
     j->report.crop_chosen = true;
     return sf_ok();
   }
   const char *text = j->opt.crop;
-  window c;
+  sf_window c;
   SF_TRY(read_number(&text, ',', &c.x));
   SF_TRY(read_number(&text, ',', &c.y));
   SF_TRY(read_number(&text, ',', &c.width));
@@ -74,7 +58,7 @@ static sf_status choose_crop(job *j)
   if (c.width < 1 || c.height < 1 || c.x + c.width > camera->width || c.y + c.height > camera->height)
     return sf_fail(SF_E_USAGE, "--crop %.60s is out of range: the view has %d x %d pixels", j->opt.crop, camera->width,
                    camera->height);
-  j->crop = c;
+  j->shot.window = c;
   return sf_ok();
 }
 
@@ -90,268 +74,41 @@ static sf_status check_writable(const char *path)
 
 static sf_status load(job *j)
 {
-  SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
-  SF_TRY(sf_sha256_file(j->opt.scene, j->hash));
-  if (j->opt.steps) j->scene.net.steps = j->opt.steps;
-  sf_dataset_options how = {.downscale = j->opt.downscale, .scale = (float)j->opt.scale, .limit = j->opt.view + 1};
-  SF_TRY(sf_dataset_load(&j->data, j->opt.data, j->opt.split, &how));
-  if (j->opt.view >= j->data.count)
-    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", j->opt.view, j->opt.data, j->data.count,
-                   j->opt.split);
-  j->view = &j->data.view[j->opt.view];
-  j->step_length = j->scene.step_q24 / 16777216.0 / j->scene.to_box_scale / (double)j->data.scale;
-  for (int c = 0; c < 3; c++) j->background[c] = (float)j->scene.background[c] / 65536;
+  const options *o = &j->opt;
+  SF_TRY(sf_studio_open(&j->studio, &(sf_studio_options){.backend = (sf_backend)o->backend,
+                                                         .scene = o->scene,
+                                                         .data = o->data,
+                                                         .split = o->split,
+                                                         .model = o->model,
+                                                         .steps = o->steps,
+                                                         .downscale = o->downscale,
+                                                         .scale = (float)o->scale,
+                                                         .seed = o->seed}));
+  SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
+  if (!j->shot.view)
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,
+                   o->split);
   SF_TRY(choose_crop(j));
-  SF_TRY(check_writable(j->opt.exr));
-  SF_TRY(check_writable(j->opt.png));
-  j->report.scene = j->opt.scene, j->report.sha256 = j->hash, j->report.view = j->view->name;
-  j->report.backend = backend_name[j->opt.backend], j->report.exr = j->opt.exr, j->report.png = j->opt.png;
-  j->report.net = &j->scene.net, j->report.events = j->opt.backend != BACKEND_FLOAT;
-  memcpy(j->report.crop, (const int[4]){j->crop.x, j->crop.y, j->crop.width, j->crop.height}, sizeof j->report.crop);
-  j->report.psnr = j->report.ssim = NAN;
-  int planes = j->opt.backend == BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
-  return sf_golden_create(&j->golden, j->crop.width, j->crop.height, planes);
+  SF_TRY(check_writable(o->exr));
+  return check_writable(o->png);
 }
 
 /* ---- progress ---- */
 
-static void show_progress(job *j, size_t done)
+static bool tick(void *user, size_t pixels)
 {
-  size_t all = (size_t)j->crop.width * (size_t)j->crop.height;
-  double elapsed = sf_seconds() - j->start;
-  if (done == 0 || !sf_progress_due(&j->progress)) return;
-  sf_progress_show(&j->progress, "%s: %zu of %zu pixels, %.0f pixels/s, ETA %.0f s", backend_name[j->opt.backend], done,
-                   all, (double)done / elapsed, elapsed * (double)(all - done) / (double)done);
-}
-
-static sf_status stopped(void)
-{
-  return sf_fail(SF_E_STOPPED, "stopped; nothing was written");
-}
-
-/* ---- float ---- */
-
-static sf_status float_rows(job *j, const sf_model *model, int y, int rows, float *space)
-{
-  size_t width = (size_t)j->crop.width, n = width * (size_t)rows, first = width * (size_t)y;
-  float *origin = space, *direction = origin + 3 * n, *rgb = direction + 3 * n, *depth = rgb + 3 * n,
-        *alpha = depth + n, *samples = alpha + n;
-  for (size_t i = 0; i < n; i++) {
-    float px = (float)(j->crop.x + (int)(i % width)) + 0.5f, py = (float)(j->crop.y + y + (int)(i / width)) + 0.5f;
-    sf_camera_ray(&j->view->camera, px, py, origin + 3 * i, direction + 3 * i);
+  job *j = user;
+  j->done += pixels;
+  if (sf_progress_due(&j->progress)) {
+    double all = (double)j->shot.window.width * j->shot.window.height, done = (double)j->done;
+    double elapsed = sf_seconds() - j->start;
+    sf_progress_show(&j->progress, "%s: %.0f of %.0f pixels, %.0f pixels/s, ETA %.0f s",
+                     sf_backend_names[j->opt.backend], done, all, done / elapsed, elapsed * (all - done) / done);
   }
-  SF_TRY(sf_render_rays(model, origin, direction, n, j->scene.net.steps, j->background, rgb, depth, alpha, samples));
-  for (size_t i = 0; i < n; i++) {
-    for (int c = 0; c < 3; c++) sf_golden_real(&j->golden, SF_PLANE_R + c)[first + i] = rgb[3 * i + (size_t)c];
-    sf_golden_real(&j->golden, SF_PLANE_A)[first + i] = alpha[i];
-    sf_golden_real(&j->golden, SF_PLANE_Z)[first + i] = alpha[i] > 0 ? depth[i] / alpha[i] / j->data.scale : 0;
-    sf_golden_int(&j->golden, SF_PLANE_SAMPLES)[first + i] = (uint32_t)samples[i];
-    j->report.counts.samples += (uint64_t)samples[i];
-    j->report.counts.rays += samples[i] > 0;
-  }
-  return sf_ok();
-}
-
-static sf_status float_batches(job *j, const sf_model *model)
-{
-  enum { BATCH = 4096, FLOATS_PER_RAY = 12 };
-  if (model->config.scale != j->data.scale)
-    return sf_fail(SF_E_RANGE, "%s: trained at scale %g, %s is read at %g; give --scale %.9g", j->opt.model,
-                   (double)model->config.scale, j->opt.data, (double)j->data.scale, (double)model->config.scale);
-  if (j->scene.net.steps > model->config.steps)
-    return sf_fail(SF_E_RANGE, "%s: the model has %d time steps, %d are asked for", j->opt.model, model->config.steps,
-                   j->scene.net.steps);
-  int rows = j->crop.width >= BATCH ? 1 : BATCH / j->crop.width;
-  if (rows > j->crop.height) rows = j->crop.height;
-  float *space = malloc((size_t)rows * (size_t)j->crop.width * FLOATS_PER_RAY * sizeof *space);
-  if (!space) return sf_fail(SF_E_MEMORY, "no memory for a batch of %d rows", rows);
-  sf_status status = sf_ok();
-  for (int y = 0; y < j->crop.height && status.code == SF_OK; y += rows) {
-    int n = j->crop.height - y < rows ? j->crop.height - y : rows;
-    status = sf_cli_interrupted() ? stopped() : float_rows(j, model, y, n, space);
-    show_progress(j, (size_t)(y + n) * (size_t)j->crop.width);
-  }
-  free(space);
-  return status;
-}
-
-static sf_status render_float(job *j)
-{
-  if (!j->opt.model) {
-    const char *slash = strrchr(j->opt.scene, '/');
-    int folder = slash ? (int)(slash - j->opt.scene) + 1 : 0;
-    snprintf(j->beside, sizeof j->beside, "%.*smodel.safetensors", folder, j->opt.scene);
-    j->opt.model = j->beside;
-  }
-  sf_model model;
-  SF_TRY(sf_model_load(&model, j->opt.model));
-  sf_status status = float_batches(j, &model);
-  sf_model_free(&model);
-  return status;
-}
-
-/* ---- fixed ---- */
-
-static sf_status fixed_pixel(job *j, sf_probe *probe, int x, int y)
-{
-  fx_ray ray;
-  fx_pixel pixel;
-  SF_TRY(sf_pixel_ray(&j->scene, &j->view->camera, j->crop.x + x, j->crop.y + y, &ray));
-  sf_probe_begin(probe);
-  SF_TRY(fx_render_ray(&j->scene, &ray, sf_probe_net, probe, &pixel, &probe->core));
-  sf_golden_set(&j->golden, (size_t)y * (size_t)j->crop.width + (size_t)x, &pixel, &probe->core, j->step_length);
-  return sf_ok();
-}
-
-/* Not thread-safe: callers hold the lock. */
-static void add_counts(job *j, const fx_counts *counts, const uint64_t saturated_samples[SF_LAYERS])
-{
-  fx_counts_add(&j->report.counts, counts);
-  for (int l = 0; l < SF_LAYERS; l++) j->report.saturated_samples[l] += saturated_samples[l];
-}
-
-static sf_status fixed_row(job *j, int y)
-{
-  sf_probe probe = {.net = &j->scene.net};
-  fx_counts sum = {0};
-  uint64_t saturated[SF_LAYERS] = {0};
-  if (sf_cli_interrupted()) return stopped();
-  for (int x = 0; x < j->crop.width; x++) {
-    SF_TRY(fixed_pixel(j, &probe, x, y));
-    fx_counts_add(&sum, &probe.core);
-    for (int l = 0; l < SF_LAYERS; l++) saturated[l] += probe.saturated_samples[l];
-  }
-#pragma omp critical(sim_render)
-  add_counts(j, &sum, saturated);
-  return sf_ok();
-}
-
-static sf_status render_fixed(job *j)
-{
-  sf_status failed = sf_ok();
-  int failed_row = j->crop.height;
-  size_t done = 0;
-#pragma omp parallel for schedule(dynamic)
-  for (int y = 0; y < j->crop.height; y++) {
-    sf_status status = fixed_row(j, y);
-#pragma omp critical(sim_render)
-    {
-      if (status.code != SF_OK && y < failed_row) failed = status, failed_row = y;
-      done += (size_t)j->crop.width;
-      show_progress(j, done);
-    }
-  }
-  return failed;
-}
-
-/* ---- rtl ---- */
-
-/* The accelerator makes the picture; the core walks along so that a difference is reported at its first sample, and for
- * the saturation census, which the accelerator does not keep. */
-typedef struct rtl_eval {
-  sf_dut *dut;
-  sf_probe core;
-} rtl_eval;
-
-static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
-{
-  rtl_eval *e = user;
-  fx_out core;
-  unsigned long long sample = e->core.sample;
-  SF_TRY(sf_probe_net(&e->core, ray, first, f, &core));
-  SF_TRY(sf_dut_net(e->dut, ray, first, f, out));
-  const uint32_t expected[4] = {core.sigma, core.colour[0], core.colour[1], core.colour[2]};
-  const uint32_t actual[4] = {out->sigma, out->colour[0], out->colour[1], out->colour[2]};
-  static const char *const name[4] = {"density", "red", "green", "blue"};
-  for (int i = 0; i < 4; i++)
-    if (expected[i] != actual[i])
-      return sf_fail(SF_E_DIFFERENCE, "sample %llu: %s is %u in the core, %u in the accelerator, cycle %llu", sample,
-                     name[i], expected[i], actual[i], (unsigned long long)sf_dut_cycle(e->dut));
-  return sf_ok();
-}
-
-static sf_status rtl_pixel(job *j, rtl_eval *e, int x, int y)
-{
-  fx_ray ray;
-  fx_pixel pixel;
-  fx_counts rtl = {0};
-  uint64_t cycles, busy, stalls;
-  SF_TRY(sf_pixel_ray(&j->scene, &j->view->camera, j->crop.x + x, j->crop.y + y, &ray));
-  sf_probe_begin(&e->core);
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  SF_TRY(fx_render_ray(&j->scene, &ray, rtl_net, e, &pixel, &e->core.core));
-  if (pixel.samples > 0) SF_TRY(sf_dut_counts(e->dut, &rtl, &cycles, &busy, &stalls));
-  SF_TRY(sf_counts_compare(&e->core.core, "core", &rtl, "accelerator"));
-  sf_golden_set(&j->golden, (size_t)y * (size_t)j->crop.width + (size_t)x, &pixel, &rtl, j->step_length);
-  for (int l = 0; l < SF_LAYERS; l++) rtl.saturated[l] = e->core.core.saturated[l];
-  rtl.samples = pixel.samples, rtl.rays = pixel.samples > 0;
-  rtl.saturated_features = e->core.core.saturated_features;
-  add_counts(j, &rtl, e->core.saturated_samples);
-  return sf_ok();
-}
-
-static sf_status rtl_pixels(job *j, rtl_eval *e)
-{
-  size_t done = 0;
-  for (int y = 0; y < j->crop.height; y++)
-    for (int x = 0; x < j->crop.width; x++) {
-      if (sf_cli_interrupted()) return stopped();
-      sf_status status = rtl_pixel(j, e, x, y);
-      if (status.code == SF_E_DIFFERENCE)
-        return sf_fail(status.code, "%s: pixel (%d, %d) of view %s, %s", j->opt.scene, j->crop.x + x, j->crop.y + y,
-                       j->view->name, status.message);
-      if (status.code != SF_OK) return status;
-      show_progress(j, ++done);
-    }
-  return sf_ok();
-}
-
-static sf_status render_rtl(job *j)
-{
-  rtl_eval e = {.core = {.net = &j->scene.net}};
-  sf_dut_options how = {.seed = j->opt.seed};
-  SF_TRY(sf_dut_open(&e.dut, &j->scene, &how));
-  sf_status status = rtl_pixels(j, &e);
-  sf_dut_close(e.dut);
-  return status;
+  return !sf_cli_interrupted();
 }
 
 /* ---- results ---- */
-
-/* Nothing here tells `fixed` from `rtl`, nor when or where it ran: equal pictures are equal files. */
-static sf_status save(const job *j)
-{
-  char steps[16], crop[64], downscale[16], saturation[256], unexpected[64];
-  snprintf(steps, sizeof steps, "%d", j->scene.net.steps);
-  snprintf(crop, sizeof crop, "%d,%d,%d,%d", j->crop.x, j->crop.y, j->crop.width, j->crop.height);
-  snprintf(downscale, sizeof downscale, "%d", j->opt.downscale);
-  sf_saturation_census(j->report.saturated_samples, j->report.counts.saturated_features, saturation, sizeof saturation);
-  sf_saturation_unexpected(&j->scene.net, j->report.saturated_samples, unexpected, sizeof unexpected);
-  bool is_float = j->opt.backend == BACKEND_FLOAT;
-  const char *const attributes[] = {"t_r",
-                                    steps,
-                                    "scene_sha256",
-                                    j->hash,
-                                    "view",
-                                    j->view->name,
-                                    "split",
-                                    j->opt.split,
-                                    "crop",
-                                    crop,
-                                    "downscale",
-                                    downscale,
-                                    "arithmetic",
-                                    is_float ? "float" : "fixed",
-                                    "Z_units",
-                                    "world units of the data set, 0 = nothing hit",
-                                    is_float ? NULL : "saturation",
-                                    saturation,
-                                    "unexpected_saturation",
-                                    unexpected,
-                                    NULL};
-  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->golden, j->opt.png));
-  return sf_golden_save(&j->golden, j->opt.exr, attributes);
-}
 
 static sf_status print_report(const job *j)
 {
@@ -368,21 +125,28 @@ static sf_status print_report(const job *j)
   return sf_ok();
 }
 
+static void fill_report(job *j, double seconds)
+{
+  j->report.scene = j->opt.scene, j->report.sha256 = j->studio.scene_sha256, j->report.view = j->shot.view->name;
+  j->report.backend = sf_backend_names[j->opt.backend], j->report.exr = j->opt.exr, j->report.png = j->opt.png;
+  j->report.net = &j->studio.scene.net, j->report.events = j->opt.backend != SF_BACKEND_FLOAT;
+  j->report.crop = j->shot.window, j->report.psnr = j->shot.psnr, j->report.ssim = j->shot.ssim;
+  j->report.golden = &j->shot.golden, j->report.seconds = seconds;
+}
+
 static sf_status work(job *j)
 {
   SF_TRY(load(j));
   sf_progress_begin(&j->progress, j->opt.quiet);
   j->start = sf_seconds();
-  sf_status status = j->opt.backend == BACKEND_FLOAT   ? render_float(j)
-                     : j->opt.backend == BACKEND_FIXED ? render_fixed(j)
-                                                       : render_rtl(j);
+  j->studio.tick = tick, j->studio.user = j;
+  sf_status status = sf_shot_render(&j->studio, &j->shot);
   sf_progress_end(&j->progress);
-  j->report.seconds = sf_seconds() - j->start;
+  if (status.code == SF_E_STOPPED) return sf_fail(status.code, "stopped; nothing was written");
   SF_TRY(status);
-  if (j->view->image.rgba)
-    SF_TRY(sf_golden_quality(&j->golden, &j->view->image, j->crop.x, j->crop.y, j->background, &j->report.psnr,
-                             &j->report.ssim));
-  SF_TRY(save(j));
+  fill_report(j, sf_seconds() - j->start);
+  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
+  SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.exr));
   return print_report(j);
 }
 
@@ -431,16 +195,15 @@ int main(int argc, char **argv)
                 .max_positional = 2};
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.backend = BACKEND_FIXED, .downscale = 1, .split = "test", .seed = 1};
+  j->opt = (options){.backend = SF_BACKEND_FIXED, .downscale = 1, .split = "test", .seed = 1};
   sf_status status = parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK) {
     if (j->opt.threads) omp_set_num_threads(j->opt.threads);
     sf_cli_catch_signals();
     status = work(j);
   }
-  sf_golden_free(&j->golden);
-  sf_dataset_free(&j->data);
-  fx_scene_free(&j->scene);
+  sf_shot_free(&j->shot);
+  sf_studio_close(&j->studio);
   free(j);
   return sf_cli_finish(&cli, status);
 }

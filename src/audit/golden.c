@@ -35,6 +35,16 @@ void sf_golden_free(sf_golden *golden)
   *golden = (sf_golden){0};
 }
 
+double sf_golden_step_length(const sf_golden_job *job)
+{
+  return job->scene->step_q24 / 16777216.0 / job->scene->to_box_scale / (double)job->scale;
+}
+
+sf_status sf_golden_stopped(const sf_golden_job *job)
+{
+  return sf_fail(SF_E_STOPPED, "stopped in view %s", job->view);
+}
+
 static uint32_t to_u32(uint64_t value)
 {
   return value > UINT32_MAX ? UINT32_MAX : (uint32_t)value;
