@@ -27,7 +27,8 @@ sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options)
   if (options->steps) studio->scene.net.steps = options->steps;
   if (options->backend == SF_BACKEND_FLOAT) return open_model(studio);
   if (options->backend == SF_BACKEND_FIXED) return sf_ok();
-  return sf_dut_open(&studio->dut, &studio->scene, &(sf_dut_options){.seed = options->seed});
+  const sf_dut_options how = {.seed = options->seed};
+  return sf_dut_open(&studio->dut, &studio->scene, &how);
 }
 
 void sf_studio_close(sf_studio *studio)

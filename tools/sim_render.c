@@ -1,9 +1,10 @@
-/* sim_render: one view of a scene through the float field, the fixed-point core or the accelerator. */
-#include "sim/studio.h"
+/* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
+#include "sim/view_set.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
 #include <omp.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { RTL_CROP = 16 };
 
@@ -11,18 +12,24 @@ typedef struct options {
   int view, backend, downscale, steps, threads;
   uint64_t seed;
   double scale;
-  const char *scene, *data, *exr, *png, *model, *split, *crop;
-  bool json, quiet;
+  const char *scene, *data, *output, *png, *model, *split, *crop, *verify;
+  bool all, json, quiet;
 } options;
 
 typedef struct job {
   options opt;
+  sf_window crop; /* width 0: not given */
   sf_studio studio;
+  sf_progress progress;
+  size_t done, all; /* pixels of this run; all is an estimate while views are ahead */
+  double start;
+  /* one view */
   sf_shot shot;
   sf_render_report report;
-  sf_progress progress;
-  size_t done; /* pixels */
-  double start;
+  /* many views */
+  sf_view_set set;
+  cJSON *verdicts;
+  char first[400]; /* difference */
 } job;
 
 /* ---- what to render ---- */
@@ -38,10 +45,21 @@ static sf_status read_number(const char **text, char stop, int *value)
   return sf_ok();
 }
 
+static sf_status read_crop(const char *text, sf_window *crop)
+{
+  SF_TRY(read_number(&text, ',', &crop->x));
+  SF_TRY(read_number(&text, ',', &crop->y));
+  SF_TRY(read_number(&text, ',', &crop->width));
+  SF_TRY(read_number(&text, 0, &crop->height));
+  if (crop->width < 1 || crop->height < 1) return sf_fail(SF_E_USAGE, "--crop is out of range: it has no pixels");
+  return sf_ok();
+}
+
 static sf_status choose_crop(job *j)
 {
   const sf_camera *camera = &j->shot.view->camera;
-  if (!j->opt.crop) {
+  const sf_window *c = &j->crop;
+  if (c->width == 0) {
     if (j->opt.backend != SF_BACKEND_RTL) return sf_ok();
     int w = camera->width < RTL_CROP ? camera->width : RTL_CROP,
         h = camera->height < RTL_CROP ? camera->height : RTL_CROP;
@@ -49,16 +67,10 @@ static sf_status choose_crop(job *j)
     j->report.crop_chosen = true;
     return sf_ok();
   }
-  const char *text = j->opt.crop;
-  sf_window c;
-  SF_TRY(read_number(&text, ',', &c.x));
-  SF_TRY(read_number(&text, ',', &c.y));
-  SF_TRY(read_number(&text, ',', &c.width));
-  SF_TRY(read_number(&text, 0, &c.height));
-  if (c.width < 1 || c.height < 1 || c.x + c.width > camera->width || c.y + c.height > camera->height)
+  if (c->x + c->width > camera->width || c->y + c->height > camera->height)
     return sf_fail(SF_E_USAGE, "--crop %.60s is out of range: the view has %d x %d pixels", j->opt.crop, camera->width,
                    camera->height);
-  j->shot.window = c;
+  j->shot.window = *c;
   return sf_ok();
 }
 
@@ -72,24 +84,31 @@ static sf_status check_writable(const char *path)
   return sf_ok();
 }
 
-static sf_status load(job *j)
+static sf_status open_studio(job *j)
 {
   const options *o = &j->opt;
-  SF_TRY(sf_studio_open(&j->studio, &(sf_studio_options){.backend = (sf_backend)o->backend,
-                                                         .scene = o->scene,
-                                                         .data = o->data,
-                                                         .split = o->split,
-                                                         .model = o->model,
-                                                         .steps = o->steps,
-                                                         .downscale = o->downscale,
-                                                         .scale = (float)o->scale,
-                                                         .seed = o->seed}));
+  const sf_studio_options how = {.backend = (sf_backend)o->backend,
+                                 .scene = o->scene,
+                                 .data = o->data,
+                                 .split = o->split,
+                                 .model = o->model,
+                                 .steps = o->steps,
+                                 .downscale = o->downscale,
+                                 .scale = (float)o->scale,
+                                 .seed = o->seed};
+  return sf_studio_open(&j->studio, &how);
+}
+
+static sf_status load_view(job *j)
+{
+  const options *o = &j->opt;
+  SF_TRY(open_studio(j));
   SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
   if (!j->shot.view)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,
                    o->split);
   SF_TRY(choose_crop(j));
-  SF_TRY(check_writable(o->exr));
+  SF_TRY(check_writable(o->output));
   return check_writable(o->png);
 }
 
@@ -100,23 +119,34 @@ static bool tick(void *user, size_t pixels)
   job *j = user;
   j->done += pixels;
   if (sf_progress_due(&j->progress)) {
-    double all = (double)j->shot.window.width * j->shot.window.height, done = (double)j->done;
-    double elapsed = sf_seconds() - j->start;
-    sf_progress_show(&j->progress, "%s: %.0f of %.0f pixels, %.0f pixels/s, ETA %.0f s",
-                     sf_backend_names[j->opt.backend], done, all, done / elapsed, elapsed * (all - done) / done);
+    double all = (double)j->all, done = (double)j->done, elapsed = sf_seconds() - j->start;
+    char views[48] = "";
+    if (j->set.todo > 0) snprintf(views, sizeof views, "%d of %d views, ", j->set.rendered, j->set.todo);
+    sf_progress_show(&j->progress, "%s: %s%.0f of %.0f pixels, %.0f pixels/s, ETA %.0f s",
+                     sf_backend_names[j->opt.backend], views, done, all, done / elapsed, elapsed * (all - done) / done);
   }
   return !sf_cli_interrupted();
 }
 
-/* ---- results ---- */
-
-static sf_status print_report(const job *j)
+/* Views ahead are taken to be of this view's size. */
+static void begin_view(void *user, const sf_shot *shot)
 {
-  if (!j->opt.json) {
-    sf_render_report_print(stdout, &j->report);
-    return sf_ok();
-  }
-  cJSON *json = sf_render_report_json(&j->report);
+  job *j = user;
+  size_t pixels = (size_t)shot->window.width * (size_t)shot->window.height;
+  j->all = j->done + pixels * (size_t)(j->set.todo - j->set.rendered);
+}
+
+static void begin_run(job *j)
+{
+  sf_progress_begin(&j->progress, j->opt.quiet);
+  j->start = sf_seconds();
+  j->studio.tick = tick, j->studio.user = j;
+}
+
+/* ---- one view ---- */
+
+static sf_status print_json(cJSON *json)
+{
   char *text = json ? cJSON_Print(json) : NULL;
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
@@ -128,34 +158,167 @@ static sf_status print_report(const job *j)
 static void fill_report(job *j, double seconds)
 {
   j->report.scene = j->opt.scene, j->report.sha256 = j->studio.scene_sha256, j->report.view = j->shot.view->name;
-  j->report.backend = sf_backend_names[j->opt.backend], j->report.exr = j->opt.exr, j->report.png = j->opt.png;
+  j->report.backend = sf_backend_names[j->opt.backend], j->report.exr = j->opt.output, j->report.png = j->opt.png;
   j->report.net = &j->studio.scene.net, j->report.events = j->opt.backend != SF_BACKEND_FLOAT;
   j->report.crop = j->shot.window, j->report.psnr = j->shot.psnr, j->report.ssim = j->shot.ssim;
   j->report.golden = &j->shot.golden, j->report.seconds = seconds;
 }
 
-static sf_status work(job *j)
+static sf_status render_one(job *j)
 {
-  SF_TRY(load(j));
-  sf_progress_begin(&j->progress, j->opt.quiet);
-  j->start = sf_seconds();
-  j->studio.tick = tick, j->studio.user = j;
+  SF_TRY(load_view(j));
+  begin_run(j);
+  j->all = (size_t)j->shot.window.width * (size_t)j->shot.window.height;
   sf_status status = sf_shot_render(&j->studio, &j->shot);
   sf_progress_end(&j->progress);
   if (status.code == SF_E_STOPPED) return sf_fail(status.code, "stopped; nothing was written");
   SF_TRY(status);
   fill_report(j, sf_seconds() - j->start);
   if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
-  SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.exr));
-  return print_report(j);
+  SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.output));
+  if (j->opt.json) return print_json(sf_render_report_json(&j->report));
+  sf_render_report_print(stdout, &j->report);
+  return sf_ok();
+}
+
+/* ---- all views ---- */
+
+static void begin_set(job *j)
+{
+  j->set.studio = &j->studio, j->set.begin = begin_view, j->set.user = j;
+  begin_run(j);
+}
+
+static sf_status render_all(job *j)
+{
+  SF_TRY(open_studio(j));
+  snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
+  begin_set(j);
+  sf_status status = sf_view_set_render(&j->set, &j->crop);
+  sf_progress_end(&j->progress);
+  SF_TRY(status);
+  if (j->opt.json) {
+    cJSON *json = sf_manifest_report_json(&j->set.manifest);
+    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    return print_json(json);
+  }
+  sf_manifest_report_print(stdout, &j->set.manifest);
+  sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
+  printf("wrote %s\n", j->set.manifest_path);
+  return sf_ok();
+}
+
+/* ---- verification ---- */
+
+static void report_verdict(void *user, const sf_verdict *v)
+{
+  job *j = user;
+  const sf_status *bad = v->picture.code != SF_OK ? &v->picture : v->file.code != SF_OK ? &v->file : NULL;
+  if (bad && !j->first[0]) snprintf(j->first, sizeof j->first, "view %.60s: %.320s", v->view->name, bad->message);
+  if (j->opt.json)
+    cJSON_AddItemToArray(j->verdicts, sf_verdict_json(v));
+  else
+    sf_verdict_print(stdout, v);
+}
+
+/* Everything that decides a picture comes from the manifest. */
+static sf_status load_manifest(job *j)
+{
+  options *o = &j->opt;
+  const sf_manifest_origin *origin = &j->set.manifest.origin;
+  const char *slash = strrchr(o->verify, '/');
+  SF_TRY(sf_manifest_load(&j->set.manifest, o->verify));
+  if (origin->model_sha256[0])
+    return sf_fail(SF_E_UNSUPPORTED, "%s: float pictures may differ between machines, only fixed ones can be verified",
+                   o->verify);
+  if (o->view >= 0 && !sf_manifest_find(&j->set.manifest, o->view))
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s lists %d of %d views", o->view, o->verify,
+                   j->set.manifest.count, j->set.manifest.total);
+  if (j->set.manifest.count == 0) return sf_fail(SF_E_RANGE, "%s: lists no view", o->verify);
+  o->split = origin->split, o->steps = origin->steps, o->downscale = origin->downscale, o->scale = origin->scale;
+  snprintf(j->set.manifest_path, sizeof j->set.manifest_path, "%s", o->verify);
+  int length = slash ? (int)(slash - o->verify) : 1;
+  snprintf(j->set.folder, sizeof j->set.folder, "%.*s", length, slash ? o->verify : ".");
+  return sf_ok();
+}
+
+static sf_status verify(job *j)
+{
+  int differences = 0;
+  SF_TRY(load_manifest(j));
+  SF_TRY(open_studio(j));
+  j->verdicts = cJSON_CreateArray();
+  begin_set(j);
+  sf_status status = sf_view_set_verify(&j->set, j->opt.view, report_verdict, &differences);
+  sf_progress_end(&j->progress);
+  SF_TRY(status);
+  if (j->opt.json) {
+    cJSON *json = cJSON_CreateObject();
+    cJSON_AddBoolToObject(json, "ok", differences == 0);
+    cJSON_AddNumberToObject(json, "differences", differences);
+    cJSON_AddItemToObject(json, "view", j->verdicts);
+    j->verdicts = NULL;
+    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    SF_TRY(print_json(json));
+  } else {
+    sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
+  }
+  if (differences > 0)
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ; %s", j->opt.verify, differences, j->set.todo, j->first);
+  if (!j->opt.json) printf("OK: %d of %d views are as %s says\n", j->set.todo, j->set.manifest.total, j->opt.verify);
+  return sf_ok();
+}
+
+/* ---- program ---- */
+
+static sf_status work(job *j)
+{
+  return j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
+}
+
+static sf_status refuse(bool given, const char *option, const char *reason)
+{
+  return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
+}
+
+static sf_status check_modes(options *o)
+{
+  if (o->verify) {
+    static const char *const reason = "does not go with --verify: the manifest decides";
+    SF_TRY(refuse(o->all, "--all", reason));
+    SF_TRY(refuse(o->output, "--output", reason));
+    SF_TRY(refuse(o->png, "--png", reason));
+    SF_TRY(refuse(o->crop, "--crop", reason));
+    SF_TRY(refuse(o->steps, "--steps", reason));
+    SF_TRY(refuse(o->split, "--split", reason));
+    SF_TRY(refuse(o->downscale, "--downscale", reason));
+    SF_TRY(refuse(o->scale != 0, "--scale", reason));
+    return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
+  }
+  if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
+  if (o->all) {
+    SF_TRY(refuse(o->view >= 0, "--view", "does not go with --all"));
+    SF_TRY(refuse(o->png, "--png", "does not go with --all"));
+    SF_TRY(
+        refuse(o->backend == SF_BACKEND_RTL && !o->crop, "--all --backend rtl", "needs --crop: whole views take days"));
+  }
+  if (!o->split) o->split = "test";
+  if (!o->downscale) o->downscale = 1;
+  if (o->view < 0) o->view = 0;
+  return sf_ok();
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 {
   const sf_option table[] = {
-      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
+      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
+       "which view of the split, from 0 (default 0; --verify: all)"},
+      {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
+       "every view of the split, into the folder -o, with a manifest"},
+      {"--verify", 0, SF_ARG_STRING, &o->verify, 0, 0, NULL, "MANIFEST",
+       "render again what the manifest lists and compare"},
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
-      {"--output", 'o', SF_ARG_STRING, &o->exr, 0, 0, NULL, "FILE", "EXR to write"},
+      {"--output", 'o', SF_ARG_STRING, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
       {"--png", 0, SF_ARG_STRING, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
@@ -176,32 +339,41 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
   cli->options = NULL;
   SF_TRY(status);
-  if (!o->exr) return sf_fail(SF_E_USAGE, "-o FILE is missing");
   o->scene = positional[0], o->data = positional[1];
-  return sf_ok();
+  return check_modes(o);
 }
 
 int main(int argc, char **argv)
 {
-  sf_cli cli = {.program = "sim_render",
-                .usage = "sim_render scene.snn DATA --view K -o golden.exr [options]",
-                .summary =
-                    "Renders one view through the float field, the fixed-point core or the Verilog accelerator.\n"
-                    "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
-                    "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T.",
-                .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
-                            "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n",
-                .min_positional = 2,
-                .max_positional = 2};
+  sf_cli cli = {
+      .program = "sim_render",
+      .usage = "sim_render scene.snn DATA [--view K] -o golden.exr | --all -o DIR | --verify MANIFEST [options]",
+      .summary =
+          "Renders views through the float field, the fixed-point core or the Verilog accelerator.\n"
+          "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
+          "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi fx.Zlo.\n"
+          "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
+          "equal on any machine (include/spikefield/manifest.h). --verify names the first difference, exit status 1.",
+      .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
+                  "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
+                  "  sim_render scene.snn data --all -o golden\n"
+                  "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
+                  "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
+                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
+      .min_positional = 2,
+      .max_positional = 2};
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.backend = SF_BACKEND_FIXED, .downscale = 1, .split = "test", .seed = 1};
+  j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = 1};
   sf_status status = parse(argc, argv, &j->opt, &cli);
+  if (status.code == SF_OK && j->opt.crop) status = read_crop(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
     if (j->opt.threads) omp_set_num_threads(j->opt.threads);
     sf_cli_catch_signals();
     status = work(j);
   }
+  cJSON_Delete(j->verdicts);
+  sf_view_set_free(&j->set);
   sf_shot_free(&j->shot);
   sf_studio_close(&j->studio);
   free(j);

@@ -9,7 +9,8 @@
 /* R G B: composited over the scene's background, 1.0 = white; fixed: fx.* / 65535. A: what the ray hit.
  * Z: mean distance from the camera of what the ray hit, world units of the data set; 0 where it hit nothing.
  * samples: through the nets. spikes, sops, macs: events; energy_fJ: paper ledger, 4600 * macs + 900 * sops.
- * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC. */
+ * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC; fx.Zhi, fx.Zlo: the two halves of
+ * fx_pixel.depth. */
 typedef enum {
   SF_PLANE_R,
   SF_PLANE_G,
@@ -27,8 +28,13 @@ typedef enum {
   SF_PLANE_FX_B,
   SF_PLANE_FX_A,
   SF_PLANE_FX_T,
+  SF_PLANE_FX_ZHI,
+  SF_PLANE_FX_ZLO,
   SF_PLANES
 } sf_plane;
+
+extern const char *const sf_plane_names[SF_PLANES]; /* the EXR channels */
+bool sf_plane_is_integer(sf_plane plane);           /* uint32_t, else float */
 
 typedef struct sf_golden {
   int width, height, planes; /* planes: SF_FLOAT_PLANES or SF_PLANES */
