@@ -39,7 +39,6 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
   sf_golden_set(golden, (size_t)y * (size_t)job->window.width + (size_t)x, &pixel, &counts, sf_golden_step_length(job));
   fx_counts_add(&golden->counts, &counts);
-  for (int l = 0; l < SF_LAYERS; l++) golden->saturated_samples[l] += e->core.saturated_samples[l];
   return sf_ok();
 }
 

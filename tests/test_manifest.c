@@ -26,7 +26,7 @@ static sf_golden some_golden(void)
     for (int e = 0; e < SF_EVENTS; e++)
       for (int t = 0; t < 2; t++)
         ((uint64_t *)((char *)&g.counts.layer[l] + sf_events[e].offset))[t] = (uint64_t)(1000 * l + 100 * e + t + 1);
-    g.counts.saturated[l] = (uint64_t)(21 + l);
+    g.counts.saturated[l] = (uint64_t)(21 + l), g.counts.saturated_samples[l] = (uint64_t)(41 + l);
   }
   g.counts.samples = 7, g.counts.rays = 5, g.counts.grid_bytes = ((uint64_t)1 << 40) + 3, g.counts.march_steps = 11;
   g.counts.saturated_features = 31;
@@ -50,7 +50,7 @@ START_TEST(hashes_are_those_of_another_program)
     ck_assert_str_eq(v.plane_sha256[p], sf_plane_is_integer((sf_plane)p)
                                             ? "8acbaafe384b75873a6e9036a31820b0071dfaa45ae97930a34a79388745b527"
                                             : "");
-  ck_assert_str_eq(v.counts_sha256, "b73a0c383b3064483d55348e1636fe3a3eabfd55c7810ba49289a9babc661c2b");
+  ck_assert_str_eq(v.counts_sha256, "7be01555eb8de460773a5b3f6780889323c7305df64330ad7840c1190ea34ac4");
   ck_assert_str_eq(v.camera_sha256, "f0db282df32c0f4879ef6f766b54c9de68228e766fa445b06fc2b09136ca5ff2");
   ck_assert_int_eq(v.width, 3);
   ck_assert_int_eq(v.height, 1);

@@ -40,7 +40,6 @@ typedef struct sf_golden {
   int width, height, planes; /* planes: SF_FLOAT_PLANES or SF_PLANES */
   void *plane[SF_PLANES];    /* [height][width] float or uint32_t, owned */
   fx_counts counts;          /* of all pixels */
-  uint64_t saturated_samples[SF_LAYERS];
 } sf_golden;
 
 sf_status sf_golden_create(sf_golden *golden, int width, int height, int planes);
@@ -74,7 +73,7 @@ typedef struct sf_golden_job {
 } sf_golden_job;
 double sf_golden_step_length(const sf_golden_job *job); /* between samples, world units */
 sf_status sf_golden_stopped(const sf_golden_job *job);  /* SF_E_STOPPED, naming the view */
-/* Planes, counts and saturated_samples, the same for any number of threads. SF_E_STOPPED when tick says so. */
+/* Planes and counts, the same for any number of threads. SF_E_STOPPED when tick says so. */
 sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden);
 /* counts: samples and rays alone. */
 sf_status sf_golden_float(const sf_golden_job *job, const sf_model *model, sf_golden *golden);

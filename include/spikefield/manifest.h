@@ -1,15 +1,22 @@
 /* The manifest of a set of golden images: enough to render it again on any machine and to name what differs.
  *
  * What is hashed (SHA-256, lower-case hex) is never a file's bytes where a picture is meant: libOpenEXR and zlib may
- * pack the same pixels differently. It is planes.NAME    the integer plane NAME: width * height values, row by row from
- * the top left pixel, 4 bytes each, least significant byte first. NAME is the EXR channel, which holds the same values
- * as UINT. counts_sha256  the event counts, 8 bytes each, least significant byte first: for layer D1 D2 C1 C2 C3, for
- * event mac sop spikes updates weight state_r state_w special, for step 0 .. t_r-1; then samples, rays, grid_bytes,
- * march_steps; then saturated of the five layers; then saturated_features. camera_sha256  width, height as 4-byte
- * integers; fx fy cx cy and to_world[12] as IEEE single precision, 4 bytes each, least significant byte first: pictures
- * can only be equal where the rays are. exr_sha256     the file beside the manifest, byte by byte: tells whether it was
- * changed, not what it shows. Nothing depends on threads, on time, or on whether core or accelerator rendered. A float
- * picture may differ between machines in its last bits: it has a file hash alone. */
+ * pack the same pixels differently. Every number is written least significant byte first.
+ *
+ * planes.NAME: the integer plane NAME, width * height values of 4 bytes, row by row from the top left pixel. NAME is
+ * the EXR channel, which holds the same values as UINT.
+ *
+ * counts_sha256: the event counts, 8 bytes each. For layer D1 D2 C1 C2 C3, for event mac sop spikes updates weight
+ * state_r state_w special, for step 0 .. t_r-1; then samples, rays, grid_bytes, march_steps; then saturated of the five
+ * layers; then saturated_samples of the five layers; then saturated_features.
+ *
+ * camera_sha256: width, height as 4-byte integers; fx fy cx cy and to_world[12] as IEEE single precision. Pictures can
+ * only be equal where the rays are.
+ *
+ * exr_sha256: the file beside the manifest, byte by byte. Tells whether it was changed, not what it shows.
+ *
+ * Nothing depends on threads, on time, or on whether core or accelerator rendered. A float picture may differ between
+ * machines in its last bits: it has a file hash alone. */
 #ifndef SPIKEFIELD_MANIFEST_H
 #define SPIKEFIELD_MANIFEST_H
 #include "spikefield/golden.h"

@@ -19,27 +19,15 @@ static sf_status render_pixel(const picture *p, sf_probe *probe, int x, int y)
   return sf_ok();
 }
 
-typedef struct sums {
-  fx_counts counts;
-  uint64_t saturated_samples[SF_LAYERS];
-} sums;
-
 /* A block is one row of the window. */
-static sf_status render_block(const picture *p, int y, sums *sum)
+static sf_status render_block(const picture *p, int y, fx_counts *sum)
 {
   sf_probe probe = {.net = &p->job->scene->net};
   for (int x = 0; x < p->job->window.width; x++) {
     SF_TRY(render_pixel(p, &probe, x, y));
-    fx_counts_add(&sum->counts, &probe.core);
-    for (int l = 0; l < SF_LAYERS; l++) sum->saturated_samples[l] += probe.saturated_samples[l];
+    fx_counts_add(sum, &probe.core);
   }
   return sf_ok();
-}
-
-static void add_sums(sf_golden *golden, const sums *sum)
-{
-  fx_counts_add(&golden->counts, &sum->counts);
-  for (int l = 0; l < SF_LAYERS; l++) golden->saturated_samples[l] += sum->saturated_samples[l];
 }
 
 sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden)
@@ -50,7 +38,7 @@ sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden)
   bool stop = false;
 #pragma omp parallel for schedule(dynamic)
   for (int y = 0; y < job->window.height; y++) {
-    sums sum = {0};
+    fx_counts sum = {0};
     bool skip;
 #pragma omp atomic read
     skip = stop;
@@ -59,7 +47,7 @@ sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden)
 #pragma omp critical(sf_golden_fixed)
     {
       if (status.code != SF_OK && y < failed_row) failed = status, failed_row = y;
-      add_sums(golden, &sum);
+      fx_counts_add(&golden->counts, &sum);
       if (job->tick && !stop && !job->tick(job->user, (size_t)job->window.width)) {
 #pragma omp atomic write
         stop = true;

@@ -7,8 +7,9 @@ sf_status sf_golden_save_labelled(const sf_golden *golden, const char *path, con
   snprintf(steps, sizeof steps, "%d", label->net->steps);
   snprintf(crop, sizeof crop, "%d,%d,%d,%d", w->x, w->y, w->width, w->height);
   snprintf(downscale, sizeof downscale, "%d", label->downscale);
-  sf_saturation_census(golden->saturated_samples, golden->counts.saturated_features, saturation, sizeof saturation);
-  sf_saturation_unexpected(label->net, golden->saturated_samples, unexpected, sizeof unexpected);
+  sf_saturation_census(golden->counts.saturated_samples, golden->counts.saturated_features, saturation,
+                       sizeof saturation);
+  sf_saturation_unexpected(label->net, golden->counts.saturated_samples, unexpected, sizeof unexpected);
   bool is_float = golden->planes == SF_FLOAT_PLANES;
   const char *const attributes[] = {"t_r",
                                     steps,

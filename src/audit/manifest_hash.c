@@ -21,13 +21,14 @@ static sf_status hash_plane(const uint32_t *plane, size_t n, char hex[65])
 
 static void hash_counts(const fx_net *net, const fx_counts *c, char hex[65])
 {
-  uint8_t bytes[8 * (SF_LAYERS * SF_EVENTS * SF_T_MAX + 4 + SF_LAYERS + 1)], *to = bytes;
+  uint8_t bytes[8 * (SF_LAYERS * SF_EVENTS * SF_T_MAX + 4 + 2 * SF_LAYERS + 1)], *to = bytes;
   for (int l = 0; l < SF_LAYERS; l++)
     for (int e = 0; e < SF_EVENTS; e++)
       for (int t = 0; t < net->steps; t++) to = put(to, sf_event_count(&c->layer[l], e, t), 8);
   to = put(to, c->samples, 8), to = put(to, c->rays, 8);
   to = put(to, c->grid_bytes, 8), to = put(to, c->march_steps, 8);
   for (int l = 0; l < SF_LAYERS; l++) to = put(to, c->saturated[l], 8);
+  for (int l = 0; l < SF_LAYERS; l++) to = put(to, c->saturated_samples[l], 8);
   to = put(to, c->saturated_features, 8);
   sf_sha256(bytes, (size_t)(to - bytes), hex);
 }
@@ -61,7 +62,7 @@ sf_status sf_manifest_describe(sf_manifest_view *view, const fx_net *net, const 
       SF_TRY(hash_plane(golden->plane[p], (size_t)golden->width * (size_t)golden->height, view->plane_sha256[p]));
   for (int e = 0; e < SF_EVENTS; e++) view->event[e] = sf_event_total(&golden->counts, e);
   hash_counts(net, &golden->counts, view->counts_sha256);
-  sf_saturation_unexpected(net, golden->saturated_samples, view->unexpected_saturation,
+  sf_saturation_unexpected(net, golden->counts.saturated_samples, view->unexpected_saturation,
                            sizeof view->unexpected_saturation);
   return sf_ok();
 }

@@ -16,8 +16,9 @@ static void add_events(cJSON *json, const sf_render_report *r)
   cJSON_AddItemToObject(json, "counts", sf_counts_json(r->net, &r->golden->counts));
   sf_json_add_u64(json, "energy_fj", sf_energy_fj(&r->golden->counts));
   cJSON *samples = cJSON_AddObjectToObject(json, "saturated_samples");
-  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(samples, sf_layer_names[l], r->golden->saturated_samples[l]);
-  sf_saturation_unexpected(r->net, r->golden->saturated_samples, unexpected, sizeof unexpected);
+  for (int l = 0; l < SF_LAYERS; l++)
+    sf_json_add_u64(samples, sf_layer_names[l], r->golden->counts.saturated_samples[l]);
+  sf_saturation_unexpected(r->net, r->golden->counts.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
 }
 
@@ -48,9 +49,9 @@ static void print_events(FILE *out, const sf_render_report *r)
   fprintf(out, "%" PRIu64 " MAC, %" PRIu64 " SOP, %" PRIu64 " spikes, %" PRIu64 " fJ\n",
           sf_event_total(&r->golden->counts, SF_EVENT_MAC), sf_event_total(&r->golden->counts, SF_EVENT_SOP),
           sf_event_total(&r->golden->counts, SF_EVENT_SPIKES), sf_energy_fj(&r->golden->counts));
-  sf_saturation_census(r->golden->saturated_samples, r->golden->counts.saturated_features, text, sizeof text);
+  sf_saturation_census(r->golden->counts.saturated_samples, r->golden->counts.saturated_features, text, sizeof text);
   fprintf(out, "saturation: %s\n", text);
-  if (sf_saturation_unexpected(r->net, r->golden->saturated_samples, unexpected, sizeof unexpected))
+  if (sf_saturation_unexpected(r->net, r->golden->counts.saturated_samples, unexpected, sizeof unexpected))
     fprintf(out,
             "UNEXPECTED saturation in %s: this mode's state cannot leave its range; do not use the image as golden\n",
             unexpected);
