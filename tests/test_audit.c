@@ -529,6 +529,8 @@ START_TEST(golden_planes_hold_the_pixel)
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_R)[1], 32768);
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_A)[1], 49152);
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_T)[1], 1 << 18);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_ZHI)[1], pixel.depth >> 32);
+  ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_ZLO)[1], pixel.depth & UINT32_MAX);
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_R)[1], 32768.0f / 65535);
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[1], 1.25f); /* 5 steps of 0.25, whatever the alpha */
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_SAMPLES)[1], 3);

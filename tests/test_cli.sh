@@ -139,11 +139,16 @@ absent out "usage errors"
 
 # ---- data ----
 
-readers() { # PATTERN DIR: every program that reads a data set
+whole_readers() { # PATTERN DIR: every program that reads all views
   data "$1" sf_train "$2" -o out --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
-  data "$1" sim_render s.snn "$2" --view 1 -o out
   data "$1" energy_audit s.snn "$2" --views 2 --rtl-rays 1
   data "$1" sf_cosim s.snn "$2" --rays 1
+  absent out "bad data $2"
+}
+readers() { # PATTERN DIR: and those that read one after the other
+  whole_readers "$1" "$2"
+  data "$1" sim_render s.snn "$2" -o out
+  data "$1" sim_render s.snn "$2" --all -o out
   absent out "bad data $2"
 }
 spoil() { rm -rf bad; cp -r d bad; } # then change bad/
@@ -165,7 +170,7 @@ spoil; first_pictures flip_picture; readers r_0 bad
 spoil; for s in train test; do cp s.snn bad/$s/r_0.png; done; readers r_0 bad
 sf_small() { run sf_scene simple -o small --size 8 --train 1 --test 1; }
 sf_small
-spoil; for s in train test; do cp small/$s/r_0.png bad/$s/r_1.png; done; readers r_1 bad
+spoil; for s in train test; do cp small/$s/r_0.png bad/$s/r_1.png; done; whole_readers r_1 bad
 spoil; for s in train test; do sed -i '3s/frames/fra\x01mes" "/' bad/transforms_$s.json; done; readers json:3: bad
 spoil; for s in train test; do truncate -s 200 bad/transforms_$s.json; done; readers .json: bad
 spoil; for s in train test; do : >bad/transforms_$s.json; done; readers .json: bad

@@ -73,7 +73,7 @@ START_TEST(loads_camera_angle)
   ck_good(load(&d,
                "{" ANGLE
                "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
-               "train", (sf_dataset_options){1, 0, 0}));
+               "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[0].name, "a");
   ck_assert_str_eq(d.view[1].name, "b.png");
@@ -99,14 +99,14 @@ START_TEST(options_and_stated_intrinsics)
   ck_good(load(&d,
                "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
                    "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
-               "test", (sf_dataset_options){2, 2.0f, 0}));
+               "test", (sf_dataset_options){.downscale = 2, .scale = 2.0f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
   ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
   ck_assert(d.view[0].camera.to_world[3] == 2 && d.view[0].camera.to_world[11] == 6);
   sf_dataset_free(&d);
-  ck_good(load(&d, NULL, "test", (sf_dataset_options){1, 0, 1}));
+  ck_good(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
   sf_dataset_free(&d);
 }
@@ -179,6 +179,31 @@ static const struct {
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,1,3],[0,0,1,1]]"), SF_E_RANGE, "frame 1 (a)", "[3][2]"},
 };
 
+START_TEST(a_split_is_walked_view_by_view)
+{
+  sf_dataset d;
+  put_picture("a.png", 4, 4, 7);
+  const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("./a", UNIT) "," FRAME("a.png", UNIT) "]}";
+  static const char *const name[] = {"a", "a", "a.png"};
+  for (int i = 0; i < 3; i++) {
+    ck_good(load(&d, json, "test", (sf_dataset_options){.first = i, .limit = 1}));
+    ck_assert_int_eq(d.count, 1);
+    ck_assert_int_eq(d.total, 3);
+    ck_assert_str_eq(d.view[0].name, name[i]);
+    sf_dataset_free(&d);
+  }
+  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 1}));
+  ck_assert_int_eq(d.count, 2);
+  ck_assert_str_eq(d.view[1].name, "a.png");
+  sf_dataset_free(&d);
+  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
+  ck_assert_int_eq(d.count, 0);
+  ck_assert_int_eq(d.total, 3);
+  sf_dataset_free(&d);
+  ck_bad(load(&d, json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
+}
+END_TEST
+
 START_TEST(faults_name_file_and_frame)
 {
   sf_dataset d;
@@ -192,7 +217,7 @@ START_TEST(faults_name_file_and_frame)
   fwrite(data, 1, n - 20, f);
   fclose(f);
   free(data);
-  ck_bad(load(&d, bad_scenes[_i].json, "train", (sf_dataset_options){1, 0, 0}), bad_scenes[_i].code,
+  ck_bad(load(&d, bad_scenes[_i].json, "train", (sf_dataset_options){.downscale = 1}), bad_scenes[_i].code,
          bad_scenes[_i].where, bad_scenes[_i].problem);
   ck_assert_ptr_null(d.view);
 }
@@ -206,7 +231,7 @@ START_TEST(own_sizes_may_differ)
   ck_good(load(&d,
                "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
                "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
-               "train", (sf_dataset_options){1, 0, 0}));
+               "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[1].camera.height, 6);
   sf_dataset_free(&d);
 }
@@ -220,11 +245,12 @@ START_TEST(folder_and_option_faults)
   ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "transforms_val.json", "no such file");
   put_picture("a.png", 8, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "]}";
-  ck_bad(load(&d, json, "train", (sf_dataset_options){3, 0, 0}), SF_E_RANGE, "a.png", "8 x 4");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){1, NAN, 0}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){1, -1, 0}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){1, 3e38f, 0}), SF_E_RANGE, "frame 0 (a)", "not finite");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){-1, 0, 0}), SF_E_RANGE, "downscale", "");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 3}), SF_E_RANGE, "a.png", "8 x 4");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",
+         "not finite");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
 }
 END_TEST
 
@@ -428,7 +454,7 @@ START_TEST(written_scene_is_what_the_rays_see)
   sf_dataset d;
   ck_good(sf_procedural_write(name, in("scene"), &small, count_progress, &last));
   ck_assert_int_eq(last, 5);
-  ck_good(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){1, 1.0f, 0}));
+  ck_good(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_int_eq(d.count, 3);
   for (int v = 0; v < d.count; v++) {
     const sf_camera *camera = &d.view[v].camera;
@@ -525,6 +551,7 @@ static Suite *suite(void)
   tcase_add_test(t, options_and_stated_intrinsics);
   tcase_add_test(t, every_eighth_view_is_held_out);
   tcase_add_loop_test(t, faults_name_file_and_frame, 0, COUNT(bad_scenes));
+  tcase_add_test(t, a_split_is_walked_view_by_view);
   tcase_add_test(t, own_sizes_may_differ);
   tcase_add_test(t, folder_and_option_faults);
   tcase_add_loop_test(t, hits_equal_marching, 0, 4);

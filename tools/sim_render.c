@@ -1,43 +1,35 @@
-/* sim_render: one view of a scene through the float field, the fixed-point core or the accelerator. */
+/* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
+#include "sim/view_set.h"
 #include "spikefield/cli.h"
-#include "spikefield/dut.h"
-#include "spikefield/golden.h"
 #include "spikefield/io.h"
-#include "spikefield/model.h"
-#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { BACKEND_FLOAT, BACKEND_FIXED, BACKEND_RTL };
-static const char *const backend_name[] = {"float", "fixed", "rtl"};
 enum { RTL_CROP = 16 };
 
 typedef struct options {
   int view, backend, downscale, steps, threads;
   uint64_t seed;
   double scale;
-  const char *scene, *data, *exr, *png, *model, *split, *crop;
-  bool json, quiet;
+  const char *scene, *data, *output, *png, *model, *split, *crop, *verify;
+  bool all, json, quiet;
 } options;
-
-typedef struct window {
-  int x, y, width, height;
-} window;
 
 typedef struct job {
   options opt;
-  fx_scene scene;
-  sf_dataset data;
-  const sf_view *view;
-  window crop;
-  char hash[65], beside[4096]; /* SHA-256 of the scene; the default model */
-  double step_length;          /* between samples, world units */
-  float background[3];
-  sf_golden golden;
-  sf_render_report report;
+  sf_window crop; /* width 0: not given */
+  sf_studio studio;
   sf_progress progress;
+  size_t done, all; /* pixels of this run; all is an estimate while views are ahead */
   double start;
+  /* one view */
+  sf_shot shot;
+  sf_render_report report;
+  /* many views */
+  sf_view_set set;
+  cJSON *verdicts;
+  char first[400]; /* difference */
 } job;
 
 /* ---- what to render ---- */
@@ -53,28 +45,32 @@ static sf_status read_number(const char **text, char stop, int *value)
   return sf_ok();
 }
 
+static sf_status read_crop(const char *text, sf_window *crop)
+{
+  SF_TRY(read_number(&text, ',', &crop->x));
+  SF_TRY(read_number(&text, ',', &crop->y));
+  SF_TRY(read_number(&text, ',', &crop->width));
+  SF_TRY(read_number(&text, 0, &crop->height));
+  if (crop->width < 1 || crop->height < 1) return sf_fail(SF_E_USAGE, "--crop is out of range: it has no pixels");
+  return sf_ok();
+}
+
 static sf_status choose_crop(job *j)
 {
-  const sf_camera *camera = &j->view->camera;
-  j->crop = (window){0, 0, camera->width, camera->height};
-  if (!j->opt.crop) {
-    if (j->opt.backend != BACKEND_RTL) return sf_ok();
+  const sf_camera *camera = &j->shot.view->camera;
+  const sf_window *c = &j->crop;
+  if (c->width == 0) {
+    if (j->opt.backend != SF_BACKEND_RTL) return sf_ok();
     int w = camera->width < RTL_CROP ? camera->width : RTL_CROP,
         h = camera->height < RTL_CROP ? camera->height : RTL_CROP;
-    j->crop = (window){(camera->width - w) / 2, (camera->height - h) / 2, w, h};
+    j->shot.window = (sf_window){(camera->width - w) / 2, (camera->height - h) / 2, w, h};
     j->report.crop_chosen = true;
     return sf_ok();
   }
-  const char *text = j->opt.crop;
-  window c;
-  SF_TRY(read_number(&text, ',', &c.x));
-  SF_TRY(read_number(&text, ',', &c.y));
-  SF_TRY(read_number(&text, ',', &c.width));
-  SF_TRY(read_number(&text, 0, &c.height));
-  if (c.width < 1 || c.height < 1 || c.x + c.width > camera->width || c.y + c.height > camera->height)
+  if (c->x + c->width > camera->width || c->y + c->height > camera->height)
     return sf_fail(SF_E_USAGE, "--crop %.60s is out of range: the view has %d x %d pixels", j->opt.crop, camera->width,
                    camera->height);
-  j->crop = c;
+  j->shot.window = *c;
   return sf_ok();
 }
 
@@ -88,278 +84,69 @@ static sf_status check_writable(const char *path)
   return sf_ok();
 }
 
-static sf_status load(job *j)
+static sf_status open_studio(job *j)
 {
-  SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
-  SF_TRY(sf_sha256_file(j->opt.scene, j->hash));
-  if (j->opt.steps) j->scene.net.steps = j->opt.steps;
-  sf_dataset_options how = {.downscale = j->opt.downscale, .scale = (float)j->opt.scale, .limit = j->opt.view + 1};
-  SF_TRY(sf_dataset_load(&j->data, j->opt.data, j->opt.split, &how));
-  if (j->opt.view >= j->data.count)
-    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", j->opt.view, j->opt.data, j->data.count,
-                   j->opt.split);
-  j->view = &j->data.view[j->opt.view];
-  j->step_length = j->scene.step_q24 / 16777216.0 / j->scene.to_box_scale / (double)j->data.scale;
-  for (int c = 0; c < 3; c++) j->background[c] = (float)j->scene.background[c] / 65536;
+  const options *o = &j->opt;
+  const sf_studio_options how = {.backend = (sf_backend)o->backend,
+                                 .scene = o->scene,
+                                 .data = o->data,
+                                 .split = o->split,
+                                 .model = o->model,
+                                 .steps = o->steps,
+                                 .downscale = o->downscale,
+                                 .scale = (float)o->scale,
+                                 .seed = o->seed};
+  return sf_studio_open(&j->studio, &how);
+}
+
+static sf_status load_view(job *j)
+{
+  const options *o = &j->opt;
+  SF_TRY(open_studio(j));
+  SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
+  if (!j->shot.view)
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,
+                   o->split);
   SF_TRY(choose_crop(j));
-  SF_TRY(check_writable(j->opt.exr));
-  SF_TRY(check_writable(j->opt.png));
-  j->report.scene = j->opt.scene, j->report.sha256 = j->hash, j->report.view = j->view->name;
-  j->report.backend = backend_name[j->opt.backend], j->report.exr = j->opt.exr, j->report.png = j->opt.png;
-  j->report.net = &j->scene.net, j->report.events = j->opt.backend != BACKEND_FLOAT;
-  memcpy(j->report.crop, (const int[4]){j->crop.x, j->crop.y, j->crop.width, j->crop.height}, sizeof j->report.crop);
-  j->report.psnr = j->report.ssim = NAN;
-  int planes = j->opt.backend == BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
-  return sf_golden_create(&j->golden, j->crop.width, j->crop.height, planes);
+  SF_TRY(check_writable(o->output));
+  return check_writable(o->png);
 }
 
 /* ---- progress ---- */
 
-static void show_progress(job *j, size_t done)
+static bool tick(void *user, size_t pixels)
 {
-  size_t all = (size_t)j->crop.width * (size_t)j->crop.height;
-  double elapsed = sf_seconds() - j->start;
-  if (done == 0 || !sf_progress_due(&j->progress)) return;
-  sf_progress_show(&j->progress, "%s: %zu of %zu pixels, %.0f pixels/s, ETA %.0f s", backend_name[j->opt.backend], done,
-                   all, (double)done / elapsed, elapsed * (double)(all - done) / (double)done);
-}
-
-static sf_status stopped(void)
-{
-  return sf_fail(SF_E_STOPPED, "stopped; nothing was written");
-}
-
-/* ---- float ---- */
-
-static sf_status float_rows(job *j, const sf_model *model, int y, int rows, float *space)
-{
-  size_t width = (size_t)j->crop.width, n = width * (size_t)rows, first = width * (size_t)y;
-  float *origin = space, *direction = origin + 3 * n, *rgb = direction + 3 * n, *depth = rgb + 3 * n,
-        *alpha = depth + n, *samples = alpha + n;
-  for (size_t i = 0; i < n; i++) {
-    float px = (float)(j->crop.x + (int)(i % width)) + 0.5f, py = (float)(j->crop.y + y + (int)(i / width)) + 0.5f;
-    sf_camera_ray(&j->view->camera, px, py, origin + 3 * i, direction + 3 * i);
+  job *j = user;
+  j->done += pixels;
+  if (sf_progress_due(&j->progress)) {
+    double all = (double)j->all, done = (double)j->done, elapsed = sf_seconds() - j->start;
+    char views[48] = "";
+    if (j->set.todo > 0) snprintf(views, sizeof views, "%d of %d views, ", j->set.rendered, j->set.todo);
+    sf_progress_show(&j->progress, "%s: %s%.0f of %.0f pixels, %.0f pixels/s, ETA %.0f s",
+                     sf_backend_names[j->opt.backend], views, done, all, done / elapsed, elapsed * (all - done) / done);
   }
-  SF_TRY(sf_render_rays(model, origin, direction, n, j->scene.net.steps, j->background, rgb, depth, alpha, samples));
-  for (size_t i = 0; i < n; i++) {
-    for (int c = 0; c < 3; c++) sf_golden_real(&j->golden, SF_PLANE_R + c)[first + i] = rgb[3 * i + (size_t)c];
-    sf_golden_real(&j->golden, SF_PLANE_A)[first + i] = alpha[i];
-    sf_golden_real(&j->golden, SF_PLANE_Z)[first + i] = alpha[i] > 0 ? depth[i] / alpha[i] / j->data.scale : 0;
-    sf_golden_int(&j->golden, SF_PLANE_SAMPLES)[first + i] = (uint32_t)samples[i];
-    j->report.counts.samples += (uint64_t)samples[i];
-    j->report.counts.rays += samples[i] > 0;
-  }
-  return sf_ok();
+  return !sf_cli_interrupted();
 }
 
-static sf_status float_batches(job *j, const sf_model *model)
+/* Views ahead are taken to be of this view's size. */
+static void begin_view(void *user, const sf_shot *shot)
 {
-  enum { BATCH = 4096, FLOATS_PER_RAY = 12 };
-  if (model->config.scale != j->data.scale)
-    return sf_fail(SF_E_RANGE, "%s: trained at scale %g, %s is read at %g; give --scale %.9g", j->opt.model,
-                   (double)model->config.scale, j->opt.data, (double)j->data.scale, (double)model->config.scale);
-  if (j->scene.net.steps > model->config.steps)
-    return sf_fail(SF_E_RANGE, "%s: the model has %d time steps, %d are asked for", j->opt.model, model->config.steps,
-                   j->scene.net.steps);
-  int rows = j->crop.width >= BATCH ? 1 : BATCH / j->crop.width;
-  if (rows > j->crop.height) rows = j->crop.height;
-  float *space = malloc((size_t)rows * (size_t)j->crop.width * FLOATS_PER_RAY * sizeof *space);
-  if (!space) return sf_fail(SF_E_MEMORY, "no memory for a batch of %d rows", rows);
-  sf_status status = sf_ok();
-  for (int y = 0; y < j->crop.height && status.code == SF_OK; y += rows) {
-    int n = j->crop.height - y < rows ? j->crop.height - y : rows;
-    status = sf_cli_interrupted() ? stopped() : float_rows(j, model, y, n, space);
-    show_progress(j, (size_t)(y + n) * (size_t)j->crop.width);
-  }
-  free(space);
-  return status;
+  job *j = user;
+  size_t pixels = (size_t)shot->window.width * (size_t)shot->window.height;
+  j->all = j->done + pixels * (size_t)(j->set.todo - j->set.rendered);
 }
 
-static sf_status render_float(job *j)
+static void begin_run(job *j)
 {
-  if (!j->opt.model) {
-    const char *slash = strrchr(j->opt.scene, '/');
-    int folder = slash ? (int)(slash - j->opt.scene) + 1 : 0;
-    snprintf(j->beside, sizeof j->beside, "%.*smodel.safetensors", folder, j->opt.scene);
-    j->opt.model = j->beside;
-  }
-  sf_model model;
-  SF_TRY(sf_model_load(&model, j->opt.model));
-  sf_status status = float_batches(j, &model);
-  sf_model_free(&model);
-  return status;
+  sf_progress_begin(&j->progress, j->opt.quiet);
+  j->start = sf_seconds();
+  j->studio.tick = tick, j->studio.user = j;
 }
 
-/* ---- fixed ---- */
+/* ---- one view ---- */
 
-static sf_status fixed_pixel(job *j, sf_probe *probe, int x, int y)
+static sf_status print_json(cJSON *json)
 {
-  fx_ray ray;
-  fx_pixel pixel;
-  SF_TRY(sf_pixel_ray(&j->scene, &j->view->camera, j->crop.x + x, j->crop.y + y, &ray));
-  sf_probe_begin(probe);
-  SF_TRY(fx_render_ray(&j->scene, &ray, sf_probe_net, probe, &pixel, &probe->core));
-  sf_golden_set(&j->golden, (size_t)y * (size_t)j->crop.width + (size_t)x, &pixel, &probe->core, j->step_length);
-  return sf_ok();
-}
-
-/* Not thread-safe: callers hold the lock. */
-static void add_counts(job *j, const fx_counts *counts, const uint64_t saturated_samples[SF_LAYERS])
-{
-  fx_counts_add(&j->report.counts, counts);
-  for (int l = 0; l < SF_LAYERS; l++) j->report.saturated_samples[l] += saturated_samples[l];
-}
-
-static sf_status fixed_row(job *j, int y)
-{
-  sf_probe probe = {.net = &j->scene.net};
-  fx_counts sum = {0};
-  uint64_t saturated[SF_LAYERS] = {0};
-  if (sf_cli_interrupted()) return stopped();
-  for (int x = 0; x < j->crop.width; x++) {
-    SF_TRY(fixed_pixel(j, &probe, x, y));
-    fx_counts_add(&sum, &probe.core);
-    for (int l = 0; l < SF_LAYERS; l++) saturated[l] += probe.saturated_samples[l];
-  }
-#pragma omp critical(sim_render)
-  add_counts(j, &sum, saturated);
-  return sf_ok();
-}
-
-static sf_status render_fixed(job *j)
-{
-  sf_status failed = sf_ok();
-  int failed_row = j->crop.height;
-  size_t done = 0;
-#pragma omp parallel for schedule(dynamic)
-  for (int y = 0; y < j->crop.height; y++) {
-    sf_status status = fixed_row(j, y);
-#pragma omp critical(sim_render)
-    {
-      if (status.code != SF_OK && y < failed_row) failed = status, failed_row = y;
-      done += (size_t)j->crop.width;
-      show_progress(j, done);
-    }
-  }
-  return failed;
-}
-
-/* ---- rtl ---- */
-
-/* The accelerator makes the picture; the core walks along so that a difference is reported at its first sample, and for
- * the saturation census, which the accelerator does not keep. */
-typedef struct rtl_eval {
-  sf_dut *dut;
-  sf_probe core;
-} rtl_eval;
-
-static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
-{
-  rtl_eval *e = user;
-  fx_out core;
-  unsigned long long sample = e->core.sample;
-  SF_TRY(sf_probe_net(&e->core, ray, first, f, &core));
-  SF_TRY(sf_dut_net(e->dut, ray, first, f, out));
-  const uint32_t expected[4] = {core.sigma, core.colour[0], core.colour[1], core.colour[2]};
-  const uint32_t actual[4] = {out->sigma, out->colour[0], out->colour[1], out->colour[2]};
-  static const char *const name[4] = {"density", "red", "green", "blue"};
-  for (int i = 0; i < 4; i++)
-    if (expected[i] != actual[i])
-      return sf_fail(SF_E_DIFFERENCE, "sample %llu: %s is %u in the core, %u in the accelerator, cycle %llu", sample,
-                     name[i], expected[i], actual[i], (unsigned long long)sf_dut_cycle(e->dut));
-  return sf_ok();
-}
-
-static sf_status rtl_pixel(job *j, rtl_eval *e, int x, int y)
-{
-  fx_ray ray;
-  fx_pixel pixel;
-  fx_counts rtl = {0};
-  uint64_t cycles, busy, stalls;
-  SF_TRY(sf_pixel_ray(&j->scene, &j->view->camera, j->crop.x + x, j->crop.y + y, &ray));
-  sf_probe_begin(&e->core);
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  SF_TRY(fx_render_ray(&j->scene, &ray, rtl_net, e, &pixel, &e->core.core));
-  if (pixel.samples > 0) SF_TRY(sf_dut_counts(e->dut, &rtl, &cycles, &busy, &stalls));
-  SF_TRY(sf_counts_compare(&e->core.core, "core", &rtl, "accelerator"));
-  sf_golden_set(&j->golden, (size_t)y * (size_t)j->crop.width + (size_t)x, &pixel, &rtl, j->step_length);
-  for (int l = 0; l < SF_LAYERS; l++) rtl.saturated[l] = e->core.core.saturated[l];
-  rtl.samples = pixel.samples, rtl.rays = pixel.samples > 0;
-  rtl.saturated_features = e->core.core.saturated_features;
-  add_counts(j, &rtl, e->core.saturated_samples);
-  return sf_ok();
-}
-
-static sf_status rtl_pixels(job *j, rtl_eval *e)
-{
-  size_t done = 0;
-  for (int y = 0; y < j->crop.height; y++)
-    for (int x = 0; x < j->crop.width; x++) {
-      if (sf_cli_interrupted()) return stopped();
-      sf_status status = rtl_pixel(j, e, x, y);
-      if (status.code == SF_E_DIFFERENCE)
-        return sf_fail(status.code, "%s: pixel (%d, %d) of view %s, %s", j->opt.scene, j->crop.x + x, j->crop.y + y,
-                       j->view->name, status.message);
-      if (status.code != SF_OK) return status;
-      show_progress(j, ++done);
-    }
-  return sf_ok();
-}
-
-static sf_status render_rtl(job *j)
-{
-  rtl_eval e = {.core = {.net = &j->scene.net}};
-  sf_dut_options how = {.seed = j->opt.seed};
-  SF_TRY(sf_dut_open(&e.dut, &j->scene, &how));
-  sf_status status = rtl_pixels(j, &e);
-  sf_dut_close(e.dut);
-  return status;
-}
-
-/* ---- results ---- */
-
-/* Nothing here tells `fixed` from `rtl`, nor when or where it ran: equal pictures are equal files. */
-static sf_status save(const job *j)
-{
-  char steps[16], crop[64], downscale[16], saturation[256], unexpected[64];
-  snprintf(steps, sizeof steps, "%d", j->scene.net.steps);
-  snprintf(crop, sizeof crop, "%d,%d,%d,%d", j->crop.x, j->crop.y, j->crop.width, j->crop.height);
-  snprintf(downscale, sizeof downscale, "%d", j->opt.downscale);
-  sf_saturation_census(j->report.saturated_samples, j->report.counts.saturated_features, saturation, sizeof saturation);
-  sf_saturation_unexpected(&j->scene.net, j->report.saturated_samples, unexpected, sizeof unexpected);
-  bool is_float = j->opt.backend == BACKEND_FLOAT;
-  const char *const attributes[] = {"t_r",
-                                    steps,
-                                    "scene_sha256",
-                                    j->hash,
-                                    "view",
-                                    j->view->name,
-                                    "split",
-                                    j->opt.split,
-                                    "crop",
-                                    crop,
-                                    "downscale",
-                                    downscale,
-                                    "arithmetic",
-                                    is_float ? "float" : "fixed",
-                                    "Z_units",
-                                    "world units of the data set, 0 = nothing hit",
-                                    is_float ? NULL : "saturation",
-                                    saturation,
-                                    "unexpected_saturation",
-                                    unexpected,
-                                    NULL};
-  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->golden, j->opt.png));
-  return sf_golden_save(&j->golden, j->opt.exr, attributes);
-}
-
-static sf_status print_report(const job *j)
-{
-  if (!j->opt.json) {
-    sf_render_report_print(stdout, &j->report);
-    return sf_ok();
-  }
-  cJSON *json = sf_render_report_json(&j->report);
   char *text = json ? cJSON_Print(json) : NULL;
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
@@ -368,30 +155,170 @@ static sf_status print_report(const job *j)
   return sf_ok();
 }
 
+static void fill_report(job *j, double seconds)
+{
+  j->report.scene = j->opt.scene, j->report.sha256 = j->studio.scene_sha256, j->report.view = j->shot.view->name;
+  j->report.backend = sf_backend_names[j->opt.backend], j->report.exr = j->opt.output, j->report.png = j->opt.png;
+  j->report.net = &j->studio.scene.net, j->report.events = j->opt.backend != SF_BACKEND_FLOAT;
+  j->report.crop = j->shot.window, j->report.psnr = j->shot.psnr, j->report.ssim = j->shot.ssim;
+  j->report.golden = &j->shot.golden, j->report.seconds = seconds;
+}
+
+static sf_status render_one(job *j)
+{
+  SF_TRY(load_view(j));
+  begin_run(j);
+  j->all = (size_t)j->shot.window.width * (size_t)j->shot.window.height;
+  sf_status status = sf_shot_render(&j->studio, &j->shot);
+  sf_progress_end(&j->progress);
+  if (status.code == SF_E_STOPPED) return sf_fail(status.code, "stopped; nothing was written");
+  SF_TRY(status);
+  fill_report(j, sf_seconds() - j->start);
+  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
+  SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.output));
+  if (j->opt.json) return print_json(sf_render_report_json(&j->report));
+  sf_render_report_print(stdout, &j->report);
+  return sf_ok();
+}
+
+/* ---- all views ---- */
+
+static void begin_set(job *j)
+{
+  j->set.studio = &j->studio, j->set.begin = begin_view, j->set.user = j;
+  begin_run(j);
+}
+
+static sf_status render_all(job *j)
+{
+  SF_TRY(open_studio(j));
+  snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
+  begin_set(j);
+  sf_status status = sf_view_set_render(&j->set, &j->crop);
+  sf_progress_end(&j->progress);
+  SF_TRY(status);
+  if (j->opt.json) {
+    cJSON *json = sf_manifest_report_json(&j->set.manifest);
+    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    return print_json(json);
+  }
+  sf_manifest_report_print(stdout, &j->set.manifest);
+  sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
+  printf("wrote %s\n", j->set.manifest_path);
+  return sf_ok();
+}
+
+/* ---- verification ---- */
+
+static void report_verdict(void *user, const sf_verdict *v)
+{
+  job *j = user;
+  const sf_status *bad = v->picture.code != SF_OK ? &v->picture : v->file.code != SF_OK ? &v->file : NULL;
+  if (bad && !j->first[0]) snprintf(j->first, sizeof j->first, "view %.60s: %.320s", v->view->name, bad->message);
+  if (j->opt.json)
+    cJSON_AddItemToArray(j->verdicts, sf_verdict_json(v));
+  else
+    sf_verdict_print(stdout, v);
+}
+
+/* Everything that decides a picture comes from the manifest. */
+static sf_status load_manifest(job *j)
+{
+  options *o = &j->opt;
+  const sf_manifest_origin *origin = &j->set.manifest.origin;
+  const char *slash = strrchr(o->verify, '/');
+  SF_TRY(sf_manifest_load(&j->set.manifest, o->verify));
+  if (origin->model_sha256[0])
+    return sf_fail(SF_E_UNSUPPORTED, "%s: float pictures may differ between machines, only fixed ones can be verified",
+                   o->verify);
+  if (o->view >= 0 && !sf_manifest_find(&j->set.manifest, o->view))
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s lists %d of %d views", o->view, o->verify,
+                   j->set.manifest.count, j->set.manifest.total);
+  if (j->set.manifest.count == 0) return sf_fail(SF_E_RANGE, "%s: lists no view", o->verify);
+  o->split = origin->split, o->steps = origin->steps, o->downscale = origin->downscale, o->scale = origin->scale;
+  snprintf(j->set.manifest_path, sizeof j->set.manifest_path, "%s", o->verify);
+  int length = slash ? (int)(slash - o->verify) : 1;
+  snprintf(j->set.folder, sizeof j->set.folder, "%.*s", length, slash ? o->verify : ".");
+  return sf_ok();
+}
+
+static sf_status verify(job *j)
+{
+  int differences = 0;
+  SF_TRY(load_manifest(j));
+  SF_TRY(open_studio(j));
+  j->verdicts = cJSON_CreateArray();
+  begin_set(j);
+  sf_status status = sf_view_set_verify(&j->set, j->opt.view, report_verdict, &differences);
+  sf_progress_end(&j->progress);
+  SF_TRY(status);
+  if (j->opt.json) {
+    cJSON *json = cJSON_CreateObject();
+    cJSON_AddBoolToObject(json, "ok", differences == 0);
+    cJSON_AddNumberToObject(json, "differences", differences);
+    cJSON_AddItemToObject(json, "view", j->verdicts);
+    j->verdicts = NULL;
+    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    SF_TRY(print_json(json));
+  } else {
+    sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
+  }
+  if (differences > 0)
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ; %s", j->opt.verify, differences, j->set.todo, j->first);
+  if (!j->opt.json) printf("OK: %d of %d views are as %s says\n", j->set.todo, j->set.manifest.total, j->opt.verify);
+  return sf_ok();
+}
+
+/* ---- program ---- */
+
 static sf_status work(job *j)
 {
-  SF_TRY(load(j));
-  sf_progress_begin(&j->progress, j->opt.quiet);
-  j->start = sf_seconds();
-  sf_status status = j->opt.backend == BACKEND_FLOAT   ? render_float(j)
-                     : j->opt.backend == BACKEND_FIXED ? render_fixed(j)
-                                                       : render_rtl(j);
-  sf_progress_end(&j->progress);
-  j->report.seconds = sf_seconds() - j->start;
-  SF_TRY(status);
-  if (j->view->image.rgba)
-    SF_TRY(sf_golden_quality(&j->golden, &j->view->image, j->crop.x, j->crop.y, j->background, &j->report.psnr,
-                             &j->report.ssim));
-  SF_TRY(save(j));
-  return print_report(j);
+  return j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
+}
+
+static sf_status refuse(bool given, const char *option, const char *reason)
+{
+  return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
+}
+
+static sf_status check_modes(options *o)
+{
+  if (o->verify) {
+    static const char *const reason = "does not go with --verify: the manifest decides";
+    SF_TRY(refuse(o->all, "--all", reason));
+    SF_TRY(refuse(o->output, "--output", reason));
+    SF_TRY(refuse(o->png, "--png", reason));
+    SF_TRY(refuse(o->crop, "--crop", reason));
+    SF_TRY(refuse(o->steps, "--steps", reason));
+    SF_TRY(refuse(o->split, "--split", reason));
+    SF_TRY(refuse(o->downscale, "--downscale", reason));
+    SF_TRY(refuse(o->scale != 0, "--scale", reason));
+    return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
+  }
+  if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
+  if (o->all) {
+    SF_TRY(refuse(o->view >= 0, "--view", "does not go with --all"));
+    SF_TRY(refuse(o->png, "--png", "does not go with --all"));
+    SF_TRY(
+        refuse(o->backend == SF_BACKEND_RTL && !o->crop, "--all --backend rtl", "needs --crop: whole views take days"));
+  }
+  if (!o->split) o->split = "test";
+  if (!o->downscale) o->downscale = 1;
+  if (o->view < 0) o->view = 0;
+  return sf_ok();
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 {
   const sf_option table[] = {
-      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
+      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
+       "which view of the split, from 0 (default 0; --verify: all)"},
+      {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
+       "every view of the split, into the folder -o, with a manifest"},
+      {"--verify", 0, SF_ARG_STRING, &o->verify, 0, 0, NULL, "MANIFEST",
+       "render again what the manifest lists and compare"},
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
-      {"--output", 'o', SF_ARG_STRING, &o->exr, 0, 0, NULL, "FILE", "EXR to write"},
+      {"--output", 'o', SF_ARG_STRING, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
       {"--png", 0, SF_ARG_STRING, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
@@ -412,35 +339,43 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
   cli->options = NULL;
   SF_TRY(status);
-  if (!o->exr) return sf_fail(SF_E_USAGE, "-o FILE is missing");
   o->scene = positional[0], o->data = positional[1];
-  return sf_ok();
+  return check_modes(o);
 }
 
 int main(int argc, char **argv)
 {
-  sf_cli cli = {.program = "sim_render",
-                .usage = "sim_render scene.snn DATA --view K -o golden.exr [options]",
-                .summary =
-                    "Renders one view through the float field, the fixed-point core or the Verilog accelerator.\n"
-                    "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
-                    "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T.",
-                .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
-                            "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n",
-                .min_positional = 2,
-                .max_positional = 2};
+  sf_cli cli = {
+      .program = "sim_render",
+      .usage = "sim_render scene.snn DATA [--view K] -o golden.exr | --all -o DIR | --verify MANIFEST [options]",
+      .summary =
+          "Renders views through the float field, the fixed-point core or the Verilog accelerator.\n"
+          "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
+          "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi fx.Zlo.\n"
+          "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
+          "equal on any machine (include/spikefield/manifest.h). --verify names the first difference, exit status 1.",
+      .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
+                  "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
+                  "  sim_render scene.snn data --all -o golden\n"
+                  "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
+                  "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
+                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
+      .min_positional = 2,
+      .max_positional = 2};
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.backend = BACKEND_FIXED, .downscale = 1, .split = "test", .seed = 1};
+  j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = 1};
   sf_status status = parse(argc, argv, &j->opt, &cli);
+  if (status.code == SF_OK && j->opt.crop) status = read_crop(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
     if (j->opt.threads) omp_set_num_threads(j->opt.threads);
     sf_cli_catch_signals();
     status = work(j);
   }
-  sf_golden_free(&j->golden);
-  sf_dataset_free(&j->data);
-  fx_scene_free(&j->scene);
+  cJSON_Delete(j->verdicts);
+  sf_view_set_free(&j->set);
+  sf_shot_free(&j->shot);
+  sf_studio_close(&j->studio);
   free(j);
   return sf_cli_finish(&cli, status);
 }

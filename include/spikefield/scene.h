@@ -20,7 +20,8 @@ typedef struct sf_view {
 typedef struct sf_dataset {
   char path[4096];
   sf_view *view;
-  int count;
+  int count;   /* loaded */
+  int total;   /* in the split, loaded or not */
   float scale; /* model = world * scale */
 } sf_dataset;
 
@@ -28,10 +29,12 @@ typedef struct sf_dataset_options {
   int downscale; /* >= 1 */
   float scale;   /* 0 = default of the layout (0.8) */
   int limit;     /* load at most this many views, 0 = all */
+  int first;     /* leave out this many views before; with limit 1, a large set is walked without holding it all */
 } sf_dataset_options;
 
 /* Blender layout: dir/transforms_SPLIT.json. split: "train", "test". Where transforms_test.json is missing, every
- * 8th view of transforms_train.json (or transforms.json) is the test split. Every fault names file and frame. */
+ * 8th view of transforms_train.json (or transforms.json) is the test split. Every fault names file and frame.
+ * count is 0 where first is beyond the last view. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
 

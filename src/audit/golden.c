@@ -3,19 +3,30 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct {
-  const char *name;
-  sf_exr_type type;
-} planes[SF_PLANES] = {
-    [SF_PLANE_R] = {"R", SF_EXR_FLOAT},          [SF_PLANE_G] = {"G", SF_EXR_FLOAT},
-    [SF_PLANE_B] = {"B", SF_EXR_FLOAT},          [SF_PLANE_A] = {"A", SF_EXR_FLOAT},
-    [SF_PLANE_Z] = {"Z", SF_EXR_FLOAT},          [SF_PLANE_SAMPLES] = {"samples", SF_EXR_UINT},
-    [SF_PLANE_SPIKES] = {"spikes", SF_EXR_UINT}, [SF_PLANE_SOPS] = {"sops", SF_EXR_UINT},
-    [SF_PLANE_MACS] = {"macs", SF_EXR_UINT},     [SF_PLANE_ENERGY] = {"energy_fJ", SF_EXR_FLOAT},
-    [SF_PLANE_FX_R] = {"fx.R", SF_EXR_UINT},     [SF_PLANE_FX_G] = {"fx.G", SF_EXR_UINT},
-    [SF_PLANE_FX_B] = {"fx.B", SF_EXR_UINT},     [SF_PLANE_FX_A] = {"fx.A", SF_EXR_UINT},
-    [SF_PLANE_FX_T] = {"fx.T", SF_EXR_UINT},
+const char *const sf_plane_names[SF_PLANES] = {
+    [SF_PLANE_R] = "R",
+    [SF_PLANE_G] = "G",
+    [SF_PLANE_B] = "B",
+    [SF_PLANE_A] = "A",
+    [SF_PLANE_Z] = "Z",
+    [SF_PLANE_SAMPLES] = "samples",
+    [SF_PLANE_SPIKES] = "spikes",
+    [SF_PLANE_SOPS] = "sops",
+    [SF_PLANE_MACS] = "macs",
+    [SF_PLANE_FX_R] = "fx.R",
+    [SF_PLANE_FX_G] = "fx.G",
+    [SF_PLANE_FX_B] = "fx.B",
+    [SF_PLANE_FX_A] = "fx.A",
+    [SF_PLANE_FX_T] = "fx.T",
+    [SF_PLANE_FX_ZHI] = "fx.Zhi",
+    [SF_PLANE_FX_ZLO] = "fx.Zlo",
+    [SF_PLANE_ENERGY] = "energy_fJ",
 };
+
+bool sf_plane_is_integer(sf_plane plane)
+{
+  return plane >= SF_PLANE_SAMPLES && plane != SF_PLANE_ENERGY;
+}
 
 sf_status sf_golden_create(sf_golden *golden, int width, int height, int count)
 {
@@ -35,6 +46,16 @@ void sf_golden_free(sf_golden *golden)
   *golden = (sf_golden){0};
 }
 
+double sf_golden_step_length(const sf_golden_job *job)
+{
+  return job->scene->step_q24 / 16777216.0 / job->scene->to_box_scale / (double)job->scale;
+}
+
+sf_status sf_golden_stopped(const sf_golden_job *job)
+{
+  return sf_fail(SF_E_STOPPED, "stopped in view %s", job->view);
+}
+
 static uint32_t to_u32(uint64_t value)
 {
   return value > UINT32_MAX ? UINT32_MAX : (uint32_t)value;
@@ -49,6 +70,8 @@ void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_
     sf_golden_int(golden, SF_PLANE_FX_R + c)[i] = rgba[c];
   }
   sf_golden_int(golden, SF_PLANE_FX_T)[i] = pixel->transmittance;
+  sf_golden_int(golden, SF_PLANE_FX_ZHI)[i] = (uint32_t)(pixel->depth >> 32);
+  sf_golden_int(golden, SF_PLANE_FX_ZLO)[i] = (uint32_t)pixel->depth;
   double steps = pixel->weight_sum ? (double)pixel->depth / (double)pixel->weight_sum / 65536 : 0;
   sf_golden_real(golden, SF_PLANE_Z)[i] = (float)(steps * step_length);
   sf_golden_int(golden, SF_PLANE_SAMPLES)[i] = pixel->samples;
@@ -62,8 +85,8 @@ sf_status sf_golden_save(const sf_golden *golden, const char *path, const char *
 {
   sf_exr_channel channel[SF_PLANES] = {0};
   for (int p = 0; p < golden->planes; p++) {
-    snprintf(channel[p].name, sizeof channel[p].name, "%s", planes[p].name);
-    channel[p].type = planes[p].type;
+    snprintf(channel[p].name, sizeof channel[p].name, "%s", sf_plane_names[p]);
+    channel[p].type = sf_plane_is_integer((sf_plane)p) ? SF_EXR_UINT : SF_EXR_FLOAT;
     channel[p].data = golden->plane[p];
   }
   return sf_exr_save(path, golden->width, golden->height, channel, golden->planes, attributes);

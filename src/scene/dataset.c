@@ -60,8 +60,8 @@ static bool wanted(const listing *list, int index)
   return list->part == ALL_VIEWS || held_out == (list->part == ONLY_HELD_OUT);
 }
 
-static sf_status parse_listing(const listing *list, const cJSON *json, int limit, sf_frame **frames, int **numbers,
-                               int *count)
+static sf_status parse_listing(const listing *list, const cJSON *json, const sf_dataset_options *options,
+                               sf_frame **frames, int **numbers, int *count, int *total)
 {
   const cJSON *array = cJSON_GetObjectItemCaseSensitive(json, "frames"), *item;
   sf_lens shared = {0};
@@ -75,13 +75,13 @@ static sf_status parse_listing(const listing *list, const cJSON *json, int limit
   if (!*frames || !*numbers) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", list->path, n);
   cJSON_ArrayForEach(item, array)
   {
-    if (wanted(list, index) && (!limit || *count < limit)) {
+    if (wanted(list, index) && (*total)++ >= options->first && (!options->limit || *count < options->limit)) {
       SF_TRY(sf_frame_parse(&(*frames)[*count], item, &shared, list->path, index));
       (*numbers)[(*count)++] = index;
     }
     index++;
   }
-  if (!*count)
+  if (!*total)
     return sf_fail(SF_E_RANGE, "%s: zero views: all %d are held out for testing (every %dth)", list->path, n, HOLD_OUT);
   return sf_ok();
 }
@@ -174,6 +174,7 @@ static sf_status first_fault(const sf_dataset *data, const sf_frame *frames, con
 static sf_status load_views(sf_dataset *data, const sf_frame *frames, const int *numbers, int count,
                             const listing *list, const sf_dataset_options *options)
 {
+  if (count == 0) return sf_ok();
   sf_status *status = calloc((size_t)count, sizeof *status);
   data->view = calloc((size_t)count, sizeof *data->view);
   if (!status || !data->view) {
@@ -193,7 +194,8 @@ static sf_status check_options(const char *dir, const sf_dataset_options *option
 {
   if (strlen(dir) >= sizeof((sf_dataset *)0)->path) return sf_fail(SF_E_IO, "%.80s...: name too long", dir);
   if (options->downscale < 0) return sf_fail(SF_E_RANGE, "%s: downscale factor %d is below 1", dir, options->downscale);
-  if (options->limit < 0) return sf_fail(SF_E_RANGE, "%s: a limit of %d views", dir, options->limit);
+  if (options->limit < 0 || options->first < 0)
+    return sf_fail(SF_E_RANGE, "%s: %d views from view %d on", dir, options->limit, options->first);
   if (!(options->scale >= 0) || isinf(options->scale))
     return sf_fail(SF_E_RANGE, "%s: scale %g is not a positive number", dir, options->scale);
   return sf_ok();
@@ -201,7 +203,7 @@ static sf_status check_options(const char *dir, const sf_dataset_options *option
 
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options)
 {
-  static const sf_dataset_options defaults = {1, 0, 0};
+  static const sf_dataset_options defaults = {.downscale = 1};
   if (!options) options = &defaults;
   memset(data, 0, sizeof *data);
   SF_TRY(check_options(dir, options));
@@ -213,7 +215,7 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
   SF_TRY(sf_json_load(list.path, &json));
   sf_frame *frames = NULL;
   int *numbers = NULL, count = 0;
-  sf_status status = parse_listing(&list, json, options->limit, &frames, &numbers, &count);
+  sf_status status = parse_listing(&list, json, options, &frames, &numbers, &count, &data->total);
   cJSON_Delete(json);
   if (status.code == SF_OK) status = load_views(data, frames, numbers, count, &list, options);
   free(frames);

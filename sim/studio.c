@@ -1,0 +1,103 @@
+#include "sim/studio.h"
+#include <math.h>
+#include <string.h>
+
+const char *const sf_backend_names[] = {"float", "fixed", "rtl"};
+
+static sf_status open_model(sf_studio *studio)
+{
+  const char *scene = studio->options.scene, *slash = strrchr(scene, '/');
+  if (studio->options.model)
+    snprintf(studio->model_path, sizeof studio->model_path, "%s", studio->options.model);
+  else
+    snprintf(studio->model_path, sizeof studio->model_path, "%.*smodel.safetensors",
+             slash ? (int)(slash - scene) + 1 : 0, scene);
+  SF_TRY(sf_model_load(&studio->model, studio->model_path));
+  if (studio->scene.net.steps > studio->model.config.steps)
+    return sf_fail(SF_E_RANGE, "%s: the model has %d time steps, %d are asked for", studio->model_path,
+                   studio->model.config.steps, studio->scene.net.steps);
+  return sf_ok();
+}
+
+sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options)
+{
+  *studio = (sf_studio){.options = *options};
+  SF_TRY(fx_scene_load(&studio->scene, options->scene));
+  SF_TRY(sf_sha256_file(options->scene, studio->scene_sha256));
+  if (options->steps) studio->scene.net.steps = options->steps;
+  if (options->backend == SF_BACKEND_FLOAT) return open_model(studio);
+  if (options->backend == SF_BACKEND_FIXED) return sf_ok();
+  const sf_dut_options how = {.seed = options->seed};
+  return sf_dut_open(&studio->dut, &studio->scene, &how);
+}
+
+void sf_studio_close(sf_studio *studio)
+{
+  if (studio->dut) sf_dut_close(studio->dut);
+  sf_model_free(&studio->model);
+  fx_scene_free(&studio->scene);
+  *studio = (sf_studio){0};
+}
+
+sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot)
+{
+  const sf_studio_options *o = &studio->options;
+  *shot = (sf_shot){.index = index, .psnr = NAN, .ssim = NAN};
+  sf_dataset_options how = {.downscale = o->downscale, .scale = o->scale, .first = index, .limit = 1};
+  SF_TRY(sf_dataset_load(&shot->data, o->data, o->split, &how));
+  if (shot->data.count == 0) return sf_ok();
+  shot->view = &shot->data.view[0];
+  shot->window = (sf_window){0, 0, shot->view->camera.width, shot->view->camera.height};
+  if (o->backend == SF_BACKEND_FLOAT && studio->model.config.scale != shot->data.scale)
+    return sf_fail(SF_E_RANGE, "%s: trained at scale %g, %s is read at %g; give --scale %.9g", studio->model_path,
+                   (double)studio->model.config.scale, o->data, (double)shot->data.scale,
+                   (double)studio->model.config.scale);
+  return sf_ok();
+}
+
+static sf_status render(const sf_studio *studio, sf_shot *shot)
+{
+  const sf_golden_job job = {.scene = &studio->scene,
+                             .camera = &shot->view->camera,
+                             .view = shot->view->name,
+                             .window = shot->window,
+                             .scale = shot->data.scale,
+                             .tick = studio->tick,
+                             .user = studio->user};
+  if (studio->options.backend == SF_BACKEND_FLOAT) return sf_golden_float(&job, &studio->model, &shot->golden);
+  if (studio->options.backend == SF_BACKEND_FIXED) return sf_golden_fixed(&job, &shot->golden);
+  sf_status status = sf_golden_rtl(&job, studio->dut, &shot->golden);
+  if (status.code != SF_E_DIFFERENCE) return status;
+  return sf_fail(status.code, "%s: %s", studio->options.scene, status.message);
+}
+
+sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot)
+{
+  int planes = studio->options.backend == SF_BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
+  float background[3];
+  for (int c = 0; c < 3; c++) background[c] = (float)studio->scene.background[c] / 65536;
+  sf_golden_free(&shot->golden);
+  SF_TRY(sf_golden_create(&shot->golden, shot->window.width, shot->window.height, planes));
+  SF_TRY(render(studio, shot));
+  if (!shot->view->image.rgba) return sf_ok();
+  return sf_golden_quality(&shot->golden, &shot->view->image, shot->window.x, shot->window.y, background, &shot->psnr,
+                           &shot->ssim);
+}
+
+sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path)
+{
+  const sf_golden_label label = {.net = &studio->scene.net,
+                                 .scene_sha256 = studio->scene_sha256,
+                                 .view = shot->view->name,
+                                 .split = studio->options.split,
+                                 .window = shot->window,
+                                 .downscale = studio->options.downscale};
+  return sf_golden_save_labelled(&shot->golden, path, &label);
+}
+
+void sf_shot_free(sf_shot *shot)
+{
+  sf_golden_free(&shot->golden);
+  sf_dataset_free(&shot->data);
+  shot->view = NULL;
+}

@@ -1,0 +1,52 @@
+/* Where pictures are made: one scene, one data set, one of three backends. Views are loaded one at a time. */
+#ifndef SPIKEFIELD_SIM_STUDIO_H
+#define SPIKEFIELD_SIM_STUDIO_H
+#include "spikefield/dut.h"
+#include "spikefield/golden.h"
+
+typedef enum { SF_BACKEND_FLOAT, SF_BACKEND_FIXED, SF_BACKEND_RTL } sf_backend;
+extern const char *const sf_backend_names[]; /* "float", "fixed", "rtl" */
+
+typedef struct sf_studio_options {
+  sf_backend backend;
+  const char *scene, *data, *split;
+  const char *model; /* float: NULL = model.safetensors beside the scene */
+  int steps;         /* 0 = the scene's t_r */
+  int downscale;     /* >= 1 */
+  float scale;       /* model units per world unit, 0 = the layout's */
+  uint64_t seed;     /* rtl: of the random reset values */
+} sf_studio_options;
+
+typedef struct sf_studio {
+  sf_studio_options options;
+  fx_scene scene;
+  char scene_sha256[65];
+  char model_path[4096];                   /* float */
+  sf_model model;                          /* float */
+  sf_dut *dut;                             /* rtl */
+  bool (*tick)(void *user, size_t pixels); /* as sf_golden_job; set by the caller, or NULL */
+  void *user;
+} sf_studio;
+/* The strings of the options are kept, not copied. Close it even after a failure. */
+sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options);
+void sf_studio_close(sf_studio *studio);
+
+/* One view and, once rendered, its picture. */
+typedef struct sf_shot {
+  sf_dataset data; /* of this view alone; data.total views in the split */
+  const sf_view *view;
+  int index;
+  sf_window window; /* the whole view, until the caller chooses another */
+  sf_golden golden;
+  double psnr, ssim; /* NaN: not measured */
+} sf_shot;
+/* index: of the split, from 0. view is NULL where index is beyond the last one. */
+sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot);
+sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
+sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
+void sf_shot_free(sf_shot *shot);
+
+/* The accelerator makes the picture; the core walks along so that a difference is reported at its first sample, and for
+ * what the accelerator does not do or count: marching, grid, saturation. */
+sf_status sf_golden_rtl(const sf_golden_job *job, sf_dut *dut, sf_golden *golden);
+#endif

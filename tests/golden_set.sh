@@ -1,0 +1,149 @@
+#!/bin/bash
+# Whole sets of golden images: sim_render --all and --verify. Same manifest and pictures for any number of threads, core
+# or accelerator, interrupted or not; every kind of difference is found and named.   usage: golden_set.sh BUILD
+set -u
+BIN=$(cd "${1:?usage: golden_set.sh BUILD}/bin" && pwd) || exit 2
+export LC_ALL=C OMP_NUM_THREADS=2
+WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-set-XXXXXX") || exit 2
+trap 'rm -rf "$WORK"' EXIT
+trap 'exit 130' INT TERM
+cd "$WORK" || exit 2
+passed=0 failed=0
+
+check() { # LABEL COMMAND...
+  if "${@:2}"; then passed=$((passed + 1)); return; fi
+  failed=$((failed + 1))
+  echo "FAILED: $1"
+  sed 's/^/    /' err out 2>/dev/null | head -8
+}
+# expect STATUS PATTERN SIM_RENDER_ARGS...: exit status, and the pattern in what it prints; one line on stderr on failure.
+expect() {
+  timeout -k 5 120 "$BIN/sim_render" "${@:3}" --quiet >out 2>err </dev/null
+  local status=$?
+  check "sim_render ${*:3}: exit status $status, expected $1" [ $status -eq "$1" ]
+  check "sim_render ${*:3}: does not say '$2'" grep -qF -e "$2" out err
+  check "sim_render ${*:3}: lines on stderr" [ "$(wc -l <err)" -eq $(($1 > 0)) ]
+}
+
+"$BIN/sf_scene" simple -o d --size 12 --train 3 --test 4 >/dev/null &&
+  for seed in 1 2; do
+    "$BIN/sf_train" d -o m$seed.safetensors --seed $seed --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null &&
+      "$BIN/sf_export" m$seed.safetensors -o s$seed.snn >/dev/null
+  done || { echo "no scene to test with"; exit 1; }
+cp m1.safetensors model.safetensors
+
+# ---- the same everywhere ----
+
+OMP_NUM_THREADS=1 expect 0 "4 views rendered by fixed" s1.snn d --all -o one
+OMP_NUM_THREADS=2 expect 0 "4 views rendered by fixed" s1.snn d --all -o two
+check "threads change the set" diff -r one two
+check "manifest lists all views" grep -q '"complete":.*true' one/manifest.json
+check "five files" [ "$(ls one | wc -l)" -eq 5 ]
+"$BIN/sim_render" s1.snn d --view 2 -o alone.exr >/dev/null
+check "a view alone is the view of the set" cmp -s alone.exr one/view_0002.exr
+expect 0 "OK: 4 of 4 views" s1.snn d --verify one/manifest.json
+check "each view is named" [ "$(grep -c '^view . test/r_.: OK$' out)" -eq 4 ]
+OMP_NUM_THREADS=1 expect 0 "OK: 1 of 4 views" s1.snn d --verify one/manifest.json --view 3
+expect 0 '"ok":	true' s1.snn d --verify one/manifest.json --view 0 --json
+mkdir bare && cp one/manifest.json bare
+expect 0 "OK: 1 of 4 views" s1.snn d --verify bare/manifest.json --view 1
+(cd one && "$BIN/sim_render" ../s1.snn ../d --verify manifest.json --view 0 >../out 2>../err)
+check "the manifest of this folder" grep -q "OK: 1 of 4 views are as manifest.json says" out
+
+expect 0 "4 views rendered by fixed" s1.snn d --all --crop 5,6,2,1 -o core
+expect 0 "4 views rendered by rtl" s1.snn d --all --crop 5,6,2,1 -o rtl --backend rtl
+check "core and accelerator give one set" diff -r core rtl
+expect 0 "OK: 4 of 4 views" s1.snn d --verify core/manifest.json --backend rtl
+expect 0 "OK: 4 of 4 views" s1.snn d --verify rtl/manifest.json
+expect 0 "4 views rendered by float" s1.snn d --all --backend float -o float
+expect 1 "float pictures may differ" s1.snn d --verify float/manifest.json
+
+# ---- again, and interrupted ----
+
+cp one/manifest.json before.json
+expect 0 "0 views rendered" s1.snn d --all -o one
+cp one/view_0001.exr one/view_0003.exr
+expect 0 "1 views rendered" s1.snn d --all -o one
+rm one/view_0000.exr
+expect 0 "1 views rendered" s1.snn d --all -o one
+check "what was mended is what it was" diff -r one two
+expect 1 "one/manifest.json belongs to another set: scene_sha256 is" s2.snn d --all -o one
+expect 1 "one/manifest.json belongs to another set: t_r is" s1.snn d --all -o one --steps 1
+expect 1 "one/manifest.json belongs to another set: crop is" s1.snn d --all -o one --crop 0,0,4,4
+expect 1 "one/manifest.json belongs to another set: downscale is" s1.snn d --all -o one --downscale 2
+check "a refusal changes nothing" diff -r one two
+
+# The third picture is a pipe that waits: the signal comes when two views are finished, whatever the speed.
+cp -r d slow && rm slow/test/r_2.png && mkfifo slow/test/r_2.png
+"$BIN/sim_render" s1.snn slow --all -o cut -q >out 2>err &
+pid=$!
+for _ in $(seq 600); do grep -qs '"name":.*test/r_1"' cut/manifest.json && break; sleep 0.1; done
+kill -INT $pid
+timeout 60 dd if=d/test/r_2.png of=slow/test/r_2.png conv=notrunc status=none
+wait $pid
+check "interrupted: exit status 130" [ $? -eq 130 ]
+check "interrupted: says how to go on" grep -q "cut holds 2 of 4 views, the same command goes on" err
+check "interrupted: two views listed, not complete" grep -q '"complete":.*false' cut/manifest.json
+check "interrupted: nothing left aside" [ -z "$(find cut -name '*.sf-*')" ]
+expect 0 "OK: 2 of 4 views" s1.snn d --verify cut/manifest.json
+expect 2 "--view 2 is out of range" s1.snn d --verify cut/manifest.json --view 2
+expect 1 "belongs to another set" s2.snn d --all -o cut
+expect 0 "2 views rendered" s1.snn d --all -o cut
+check "resumed = never interrupted" diff -r cut two
+
+# ---- differences ----
+
+cp s1.snn flipped.snn # one weight: the scene's own checksum sees it
+at=$(($(wc -c <s1.snn) - 700))
+printf "\\$([ "$(od -An -tu1 -j$at -N1 s1.snn | tr -d ' ')" = 1 ] && echo 2 || echo 1)" |
+  dd of=flipped.snn bs=1 seek=$at conv=notrunc status=none
+expect 1 "flipped.snn" flipped.snn d --verify two/manifest.json
+expect 1 "made from the scene with SHA-256" s2.snn d --verify two/manifest.json
+cp -r two forged # the manifest claims the other scene: the pictures tell, to the pixel
+sed -i "s/$(sha256sum <s1.snn | cut -c1-64)/$(sha256sum <s2.snn | cut -c1-64)/" forged/manifest.json
+expect 1 "4 of 4 views differ; view test/r_0: forged/view_0000.exr: plane " s2.snn d --verify forged/manifest.json
+check "the pixel is named" grep -qE 'pixel \([0-9]+, [0-9]+\) is [0-9]+, here it is [0-9]+' err
+rm forged/*.exr
+expect 1 "1 of 1 views differ; view test/r_1: plane " s2.snn d --verify forged/manifest.json --view 1
+check "without pictures, the hash is named" grep -qE 'plane [a-zA-Z.]+: SHA-256 is [0-9a-f]{64}, here it is' err
+
+cp -r two spoilt # a picture with other pixels, a picture cut short, a picture packed otherwise
+"$BIN/sim_render" s1.snn d --view 1 --steps 1 -o spoilt/view_0001.exr >/dev/null
+truncate -s 900 spoilt/view_0002.exr
+mkdir e && cp -r d/test e && cp d/transforms_test.json e/transforms_train.json
+cp d/transforms_test.json e && "$BIN/sim_render" s1.snn e --split train --view 3 -o spoilt/view_0003.exr >/dev/null
+expect 1 "2 of 4 views differ; view test/r_1: spoilt/view_0001.exr: plane " s1.snn d --verify spoilt/manifest.json
+check "the renderings are right" [ "$(grep -c '^view . test/r_.: OK$' out)" -eq 4 ]
+check "the pixel of the file is named" grep -q 'its file DIFFERS: spoilt/view_0001.exr: plane .*pixel (' out
+check "the cut file is named" grep -q 'its file DIFFERS: spoilt/view_0002.exr' out
+check "other bytes, same planes" grep -q 'note: view_0003.exr is not the file of the manifest' out
+expect 0 "OK: 1 of 4 views" s1.snn d --verify spoilt/manifest.json --view 3
+
+cp -r d turned && sed -i '0,/\[\[\(-*[0-9]\)\(\.[0-9]*\)/s//[[\1.25/' turned/transforms_test.json
+expect 1 "1 of 4 views differ; view test/r_0: camera_sha256 is" s1.snn turned --verify bare/manifest.json
+cp -r d grey && cp d/test/r_0.png grey/test/r_1.png
+expect 0 "note: PSNR" s1.snn grey --verify bare/manifest.json --view 1
+"$BIN/sf_scene" simple -o fewer --size 12 --train 3 --test 3 >/dev/null
+expect 1 "views is 4, fewer has 3 test views" s1.snn fewer --verify bare/manifest.json
+sed 's/"mac":\t\([0-9]*\)/"mac":\t1\1/' two/manifest.json >bare/edited.json
+expect 1 "energy_fj contradicts the counts" s1.snn d --verify bare/edited.json
+
+# ---- usage ----
+
+expect 2 "-o DIR is missing" s1.snn d --all
+expect 2 "--view does not go with --all" s1.snn d --all -o x --view 1
+expect 2 "--png does not go with --all" s1.snn d --all -o x --png x.png
+expect 2 "needs --crop" s1.snn d --all -o x --backend rtl
+for option in "--all" "-o x" "--png x" "--crop 0,0,1,1" "--steps 1" "--split test" "--downscale 1" "--scale 1"; do
+  expect 2 "does not go with --verify" s1.snn d --verify two/manifest.json $option
+done
+expect 2 "cannot verify" s1.snn d --verify two/manifest.json --backend float
+expect 2 "--view 4 is out of range" s1.snn d --verify two/manifest.json --view 4
+expect 1 "is not inside" s1.snn d --all -o x --crop 8,8,8,8
+expect 1 "none.json" s1.snn d --verify none.json
+: >plain
+expect 1 "plain" s1.snn d --all -o plain
+rm -rf x
+
+echo "$passed passed, $failed failed"
+[ $failed -eq 0 ] && [ $passed -gt 0 ]
