@@ -37,7 +37,8 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   SF_TRY(sf_counts_compare(&e->core.core, "core", &rtl, "accelerator"));
   counts = e->core.core;
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
-  sf_golden_set(golden, (size_t)y * (size_t)job->window.width + (size_t)x, &pixel, &counts, sf_golden_step_length(job));
+  const fx_cost cost = sf_cost_of(&counts);
+  sf_golden_set(golden, (size_t)y * (size_t)job->window.width + (size_t)x, &pixel, &cost, sf_golden_step_length(job));
   fx_counts_add(&golden->counts, &counts);
   return sf_ok();
 }

@@ -11,6 +11,8 @@ enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply
 
 /* Paper ledger: MAC * 4600 + SOP * 900, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
 uint64_t sf_energy_fj(const fx_counts *counts);
+uint64_t sf_cost_fj(const fx_cost *cost); /* the same of one ray */
+fx_cost sf_cost_of(const fx_counts *counts);
 /* The ReLU twin of the same layer sizes on the same samples: every synapse a MAC, once. UINT64_MAX as above. */
 uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
 
@@ -103,7 +105,6 @@ typedef struct sf_probe {
   fx_trace *trace;   /* where not NULL, every sample is recounted from its spike bitmaps and compared */
   fx_counts core;    /* (a) */
   fx_counts recount; /* (c), from trace */
-  uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one saturation in the layer */
   uint64_t sample;                       /* of this ray, from 0; sf_probe_begin resets it */
   int32_t base[SF_LANES];
 } sf_probe;
@@ -125,7 +126,6 @@ typedef struct sf_measure_job {
 typedef struct sf_measure {
   fx_counts core, recount;
   uint64_t rays; /* all, with or without samples */
-  uint64_t saturated_samples[SF_LAYERS];
   uint8_t *hit; /* bit i: ray i has samples; owned, sf_measure_free */
 } sf_measure;
 /* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */

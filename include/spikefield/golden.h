@@ -54,7 +54,7 @@ static inline uint32_t *sf_golden_int(const sf_golden *g, sf_plane plane)
 }
 
 /* Pixel i of a fixed-point image. step_length: distance between samples in world units. */
-void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_counts *counts, double step_length);
+void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_cost *cost, double step_length);
 
 /* A window of a view, pixels from its top left corner. */
 typedef struct sf_window {

@@ -47,10 +47,21 @@ uint64_t sf_event_total(const fx_counts *counts, int event)
   return sum;
 }
 
+uint64_t sf_cost_fj(const fx_cost *cost)
+{
+  return add(multiply(cost->macs, SF_MAC_FJ), multiply(cost->sops, SF_SOP_FJ));
+}
+
+fx_cost sf_cost_of(const fx_counts *counts)
+{
+  return (fx_cost){sf_event_total(counts, SF_EVENT_MAC), sf_event_total(counts, SF_EVENT_SOP),
+                   sf_event_total(counts, SF_EVENT_SPIKES)};
+}
+
 uint64_t sf_energy_fj(const fx_counts *counts)
 {
-  return add(multiply(sf_event_total(counts, SF_EVENT_MAC), SF_MAC_FJ),
-             multiply(sf_event_total(counts, SF_EVENT_SOP), SF_SOP_FJ));
+  const fx_cost cost = sf_cost_of(counts);
+  return sf_cost_fj(&cost);
 }
 
 static uint64_t synapses(const fx_net *net)

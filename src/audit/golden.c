@@ -61,7 +61,7 @@ static uint32_t to_u32(uint64_t value)
   return value > UINT32_MAX ? UINT32_MAX : (uint32_t)value;
 }
 
-void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_counts *counts, double step_length)
+void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_cost *cost, double step_length)
 {
   uint32_t rgba[4];
   fx_pixel_rgba(pixel, rgba);
@@ -75,10 +75,10 @@ void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_
   double steps = pixel->weight_sum ? (double)pixel->depth / (double)pixel->weight_sum / 65536 : 0;
   sf_golden_real(golden, SF_PLANE_Z)[i] = (float)(steps * step_length);
   sf_golden_int(golden, SF_PLANE_SAMPLES)[i] = pixel->samples;
-  sf_golden_int(golden, SF_PLANE_MACS)[i] = to_u32(sf_event_total(counts, SF_EVENT_MAC));
-  sf_golden_int(golden, SF_PLANE_SOPS)[i] = to_u32(sf_event_total(counts, SF_EVENT_SOP));
-  sf_golden_int(golden, SF_PLANE_SPIKES)[i] = to_u32(sf_event_total(counts, SF_EVENT_SPIKES));
-  sf_golden_real(golden, SF_PLANE_ENERGY)[i] = (float)sf_energy_fj(counts);
+  sf_golden_int(golden, SF_PLANE_MACS)[i] = to_u32(cost->macs);
+  sf_golden_int(golden, SF_PLANE_SOPS)[i] = to_u32(cost->sops);
+  sf_golden_int(golden, SF_PLANE_SPIKES)[i] = to_u32(cost->spikes);
+  sf_golden_real(golden, SF_PLANE_ENERGY)[i] = (float)sf_cost_fj(cost);
 }
 
 sf_status sf_golden_save(const sf_golden *golden, const char *path, const char *const *attributes)

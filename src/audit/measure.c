@@ -22,11 +22,8 @@ static sf_status recount_and_compare(sf_probe *probe, bool first)
 sf_status sf_probe_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   sf_probe *probe = user;
-  uint64_t before[SF_LAYERS];
-  memcpy(before, probe->core.saturated, sizeof before);
   if (first) fx_net_direction(probe->net, ray->dir, probe->base, &probe->core);
   fx_net_sample(probe->net, f, probe->base, out, probe->trace, &probe->core);
-  for (int l = 0; l < SF_LAYERS; l++) probe->saturated_samples[l] += probe->core.saturated[l] != before[l];
   if (probe->trace) SF_TRY(recount_and_compare(probe, first));
   probe->sample++;
   return sf_ok();
@@ -60,7 +57,6 @@ static void add_ray(sf_measure *sum, const sf_probe *probe, uint64_t index)
 {
   fx_counts_add(&sum->core, &probe->core);
   fx_counts_add(&sum->recount, &probe->recount);
-  for (int l = 0; l < SF_LAYERS; l++) sum->saturated_samples[l] += probe->saturated_samples[l];
   if (probe->core.samples == 0) return;
 #pragma omp atomic
   sum->hit[index / 8] |= (uint8_t)(1u << index % 8);
@@ -70,7 +66,6 @@ static void merge(sf_measure *sum, const sf_measure *part)
 {
   fx_counts_add(&sum->core, &part->core);
   fx_counts_add(&sum->recount, &part->recount);
-  for (int l = 0; l < SF_LAYERS; l++) sum->saturated_samples[l] += part->saturated_samples[l];
 }
 
 /* Blocks of rays keep the shared counter and the tick cheap. */

@@ -36,9 +36,9 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   fprintf(out, "%" PRIu64 " samples, %.2f per ray, t_r = %d, %.1f s\n\n", c->samples,
           (double)c->samples / (double)r->rays, r->net->steps, r->seconds);
   sf_counts_print(out, r->net, c);
-  sf_saturation_census(r->measure.saturated_samples, c->saturated_features, census, sizeof census);
+  sf_saturation_census(r->measure.core.saturated_samples, c->saturated_features, census, sizeof census);
   fprintf(out, "saturation: %s\n", census);
-  if (sf_saturation_unexpected(r->net, r->measure.saturated_samples, unexpected, sizeof unexpected))
+  if (sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected))
     fprintf(out, "UNEXPECTED saturation in %s\n", unexpected);
   fprintf(out, "core = recount from the spike bitmaps, for all %" PRIu64 " samples\n\n", c->samples);
   print_three(out, &r->three, r->seed);
@@ -97,8 +97,8 @@ static void add_saturation(cJSON *json, const sf_audit_report *r)
 {
   char unexpected[64];
   cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
-  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(saturated, sf_layer_names[l], r->measure.saturated_samples[l]);
-  sf_saturation_unexpected(r->net, r->measure.saturated_samples, unexpected, sizeof unexpected);
+  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(saturated, sf_layer_names[l], r->measure.core.saturated_samples[l]);
+  sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
 }
 
