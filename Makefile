@@ -131,6 +131,10 @@ reproduce-report: all ## table and plots of the runs that are there
 bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
 	@$B/tests/bench $B/bench.json
 
+BUDGET ?= $(if $(wildcard $B/demo/scene.snn),$B/demo/model.safetensors $B/demo/scene.snn $B/demo/scene)
+error-budget: $B/bin/error_budget ## error of each fixed-point block and its bound; its cost in dB after make demo or BUDGET="MODEL SCENE DATA"
+	@$B/bin/error_budget $(BUDGET)
+
 format: ## clang-format every C file
 	clang-format -i $$(git ls-files '*.c' '*.h')
 
@@ -140,6 +144,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench format clean help lint gen gen-check firmware faults
+.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif
