@@ -137,7 +137,7 @@ static uint32_t grid_position(const fx_grid *g, uint64_t i, uint64_t axis)
 
 static void grid(sf_budget_row *row, uint64_t samples)
 {
-  small_grid g;
+  small_grid g = {0};
   const double bound = 254 * 3 / 512.0 + 4 * 0.5 * 254 / 65536 + ldexp(0.5, GRID_SHIFT - 16);
   make_grid(&g);
   for (uint64_t i = 0; row->inputs < samples; i++) {
@@ -154,7 +154,7 @@ static void grid(sf_budget_row *row, uint64_t samples)
 static void feature(sf_budget_row *row, uint64_t samples)
 {
   (void)samples;
-  small_grid g;
+  small_grid g = {0};
   make_grid(&g);
   for (int value = -127; value <= 127; value++)
     for (int shift = 5; shift < 32; shift++) {
