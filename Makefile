@@ -139,6 +139,10 @@ bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilin
 
 $B/tests/bench: $B/obj/tests/bench_fixed.o
 
+BUDGET ?= $(if $(wildcard $B/demo/scene.snn),$B/demo/model.safetensors $B/demo/scene.snn $B/demo/scene)
+error-budget: $B/bin/error_budget ## error of each fixed-point block and its bound; its cost in dB after make demo or BUDGET="MODEL SCENE DATA"
+	@$B/bin/error_budget $(BUDGET)
+
 format: ## clang-format every C file
 	clang-format -i $$(git ls-files '*.c' '*.h')
 
@@ -148,6 +152,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench format clean help lint gen gen-check firmware faults
+.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

@@ -71,6 +71,7 @@ good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
 good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
+good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1
 if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.exr and x.exr differ"; fi
 for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
@@ -83,8 +84,9 @@ done
 # The shortest right command line of each program.
 declare -A right=(
   [sf_scene]="simple -o out" [sf_train]="d -o out" [sf_export]="model.safetensors -o out"
-  [sf_cosim]="s.snn d" [sim_render]="s.snn d -o out" [energy_audit]="s.snn d")
-for p in sf_scene sf_train sf_export sf_cosim sim_render energy_audit; do
+  [sf_cosim]="s.snn d" [sim_render]="s.snn d -o out" [energy_audit]="s.snn d"
+  [error_budget]="model.safetensors s.snn d")
+for p in sf_scene sf_train sf_export sf_cosim sim_render energy_audit error_budget; do
   usage --no-such-option $p ${right[$p]} --no-such-option
   usage --no-such-option $p ${right[$p]} --no-such-option=3
   usage -Z $p ${right[$p]} -Z
@@ -96,7 +98,7 @@ for p in sf_scene sf_train sf_export sf_cosim sim_render energy_audit; do
   usage --seed $p ${right[$p]} --seed 12abc
   usage --seed $p ${right[$p]} --seed=
   usage surplus $p ${right[$p]} surplus
-  usage missing $p
+  [ $p = error_budget ] || usage missing $p
   run $p --help
   if [ "$status" -eq 0 ] && [ -s stdout.txt ] && [ ! -s err ]; then passed=$((passed + 1)); else fail "$p --help" "status $status"; fi
 done
@@ -131,6 +133,8 @@ number energy_audit --views 0 3 nan
 number energy_audit --view -1 2 nan
 number energy_audit --rtl-rays -1 nan
 number energy_audit --stall -1 91 nan
+number error_budget --rays 0 -1 nan
+usage DATA error_budget model.safetensors s.snn
 usage nosuch sf_scene nosuch -o out
 usage -o sim_render s.snn d
 usage --output sf_export model.safetensors

@@ -1,0 +1,639 @@
+/* The hard cases of the fixed-point contract as one list, for every backend: the core, the naive nets, the Verilated
+ * accelerator, vector kernels. A case makes its input and states what must come out of it, whoever computes it; the
+ * table in docs/fixed-point.md is this list.
+ *
+ *   HARD_NET      h->f and h->ray.dir through both nets of h->scene, in each of the three input modes
+ *   HARD_RAY      h->ray through fx_render_ray
+ *   HARD_REFUSED  `make` itself checks that the input is refused; nothing is run
+ *
+ * A runner calls hard_begin, then its backend, then `expect` with what that backend gave, then hard_end. */
+#ifndef SPIKEFIELD_TESTS_FX_HARD_CASES_H
+#define SPIKEFIELD_TESTS_FX_HARD_CASES_H
+#include "spikefield/quant.h"
+#include "tests/float_fixture.h"
+#include "tests/fx_fixture.h"
+#include <math.h>
+
+typedef struct hard {
+  fx_scene scene;
+  int16_t f[SF_FEATURE_MAX];
+  fx_ray ray; /* ray.dir are the direction features of a HARD_NET case */
+} hard;
+
+typedef struct hard_seen {
+  const fx_trace *trace; /* HARD_NET */
+  fx_out out;            /* HARD_NET */
+  fx_pixel pixel;        /* HARD_RAY */
+  fx_counts counts;
+} hard_seen;
+
+typedef enum { HARD_NET, HARD_RAY, HARD_REFUSED } hard_kind;
+typedef struct hard_case {
+  const char *name;
+  hard_kind kind;
+  int variants;
+  void (*make)(hard *h, int variant);
+  void (*expect)(const hard *h, const hard_seen *seen, int variant);
+} hard_case;
+
+enum { HARD_STEP_Q24 = 1 << 20, HARD_ALL = 8 * SF_LANES }; /* 16 samples per box edge; spikes of 8 full steps */
+
+/* A net like a trained one, eight steps. A ray case instead sees uniform fog, one per box edge, in a full box. */
+static inline void hard_begin(hard *h, const hard_case *c, int variant)
+{
+  fixture_sizes sizes = fixture_ingp;
+  sizes.steps = c->kind == HARD_RAY ? 1 : SF_T_MAX;
+  memset(h, 0, sizeof *h);
+  h->scene = fixture_scene(&sizes, 11);
+  fixture_inputs(12, 0, h->f, SF_FEATURE_MAX, 700);
+  fixture_inputs(13, 0, h->ray.dir, SF_DIR_MAX, 1024);
+  if (c->kind == HARD_RAY) {
+    memset(h->scene.occupancy, 0xff, 64);
+    h->scene.net.exp_in = (fx_scale){0, 0, 0};
+    h->scene.step_q24 = HARD_STEP_Q24;
+  }
+  c->make(h, variant);
+  if (c->kind == HARD_REFUSED) return;
+  const sf_status status = fx_scene_check(&h->scene, c->name);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+}
+
+static inline void hard_end(hard *h)
+{
+  fx_scene_free(&h->scene);
+}
+
+static inline int hard_spikes(const hard_seen *seen, int layer)
+{
+  int sum = 0;
+  for (int t = 0; t < SF_T_MAX; t++)
+    sum +=
+        __builtin_popcountll(seen->trace->spikes[layer][t][0]) + __builtin_popcountll(seen->trace->spikes[layer][t][1]);
+  return sum;
+}
+
+static inline bool hard_fired(const hard_seen *seen, int layer, int t, int neuron)
+{
+  return seen->trace->spikes[layer][t][neuron / 64] >> neuron % 64 & 1;
+}
+
+static inline void hard_weights(fx_net *net, int8_t even, int8_t odd)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int i = 0; i < net->layer[l].n_in; i++)
+      for (int o = 0; o < net->layer[l].n_out; o++) net->layer[l].w[i * SF_LANES + o] = (i + o) % 2 ? odd : even;
+}
+
+static inline void hard_theta(fx_net *net, int32_t theta)
+{
+  net->layer[FX_D1].theta = net->layer[FX_C1].theta = net->layer[FX_C2].theta = theta;
+}
+
+static inline void hard_inputs(hard *h, int16_t f, int16_t dir)
+{
+  for (int i = 0; i < SF_FEATURE_MAX; i++) h->f[i] = f;
+  for (int i = 0; i < SF_DIR_MAX; i++) h->ray.dir[i] = dir;
+}
+
+/* ---- leak ---- */
+
+static const int32_t hard_leak[] = {4096, 4095, 1, 0};
+
+static inline void make_leak(hard *h, int variant)
+{
+  for (int l = 0; l < SF_LAYERS; l++) h->scene.net.layer[l].k = hard_leak[variant];
+}
+
+/* D1's current I is constant. Leaky membranes lie between 0 and I; without leak the charge of step 0 is spent in whole
+ * thresholds (hybrid) or never arrives (decay); with k = 1 every step is the first one. */
+static inline void expect_leak(const hard *h, const hard_seen *seen, int variant)
+{
+  const int32_t mode = h->scene.net.mode, k = hard_leak[variant], theta = h->scene.net.layer[FX_D1].theta;
+  for (int o = 0; o < SF_LANES; o++) {
+    const int32_t current = seen->trace->current[FX_D1][0][o];
+    int fired = 0;
+    for (int t = 0; t < SF_T_MAX; t++) {
+      const int32_t v = seen->trace->membrane[FX_D1][t][o];
+      fired += hard_fired(seen, FX_D1, t, o);
+      if (mode != FX_NODECAY) ck_assert(current < 0 ? v <= 0 && v >= current : v >= 0 && v <= current);
+    }
+    const int whole = current < 0 ? 0 : current / theta;
+    if (k == 0 && mode == FX_HYBRID) ck_assert_int_eq(fired, whole < SF_T_MAX ? whole : SF_T_MAX);
+    if (k == 0 && mode == FX_DECAY) ck_assert_int_eq(fired, 0);
+    if (k == 4096 && mode == FX_NODECAY) ck_assert_int_eq(fired, current >= theta ? SF_T_MAX : 0);
+  }
+}
+
+/* ---- threshold ---- */
+
+static inline void make_theta_one(hard *h, int variant)
+{
+  (void)variant;
+  hard_theta(&h->scene.net, 1);
+}
+
+static inline void expect_theta_one(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  if (h->scene.net.mode != FX_HYBRID) return;
+  for (int o = 0; o < SF_LANES; o++)
+    ck_assert_int_eq(hard_fired(seen, FX_D1, 0, o), seen->trace->current[FX_D1][0][o] > 0);
+}
+
+static inline void make_silent(hard *h, int variant)
+{
+  (void)variant;
+  hard_theta(&h->scene.net, FX_MEMBRANE_MAX);
+  h->scene.net.exp_in.bias = 0;
+}
+
+/* Outputs are those of zero currents, and no synaptic operation is counted. (No-decay may add up to the threshold.) */
+static inline void expect_silent(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  if (h->scene.net.mode == FX_NODECAY) return;
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert_int_eq(hard_spikes(seen, l), 0);
+    for (int t = 0; t < SF_T_MAX; t++) ck_assert_uint_eq(seen->counts.layer[l].sop[t], 0);
+  }
+  if (h->scene.net.mode != FX_HYBRID) return;
+  ck_assert_uint_eq(seen->out.sigma, 4096);
+  for (int o = 0; o < 3; o++) ck_assert_uint_eq(seen->out.colour[o], 32768);
+}
+
+static inline void make_all_fire(hard *h, int variant)
+{
+  (void)variant;
+  hard_weights(&h->scene.net, 127, 127);
+  hard_theta(&h->scene.net, 1);
+  hard_inputs(h, 2047, 2047);
+}
+
+static inline void expect_all_fire(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h, (void)variant;
+  for (int l = FX_D1; l <= FX_C2; l++)
+    if (l != FX_D2) ck_assert_int_eq(hard_spikes(seen, l), HARD_ALL);
+  for (int t = 0; t < SF_T_MAX; t++) {
+    ck_assert_int_eq(seen->trace->current[FX_D2][t][15], 128 * 127);
+    ck_assert_uint_eq(seen->counts.layer[FX_C2].sop[t], 128 * 128);
+  }
+}
+
+/* variant = layer * 3 + (off + 1): the current of one neuron is 1000 (768 in C2) and theta `off` less. */
+static const int hard_spiking[] = {FX_D1, FX_C1, FX_C2};
+
+static inline void make_at_threshold(hard *h, int variant)
+{
+  fx_layer *l = h->scene.net.layer;
+  hard_weights(&h->scene.net, 0, 0);
+  hard_inputs(h, 0, 0);
+  h->scene.net.steps = 1;
+  l[FX_D1].w[0] = l[FX_C1].w[0] = 1, l[FX_C2].w[0] = 3;
+  h->f[0] = h->ray.dir[0] = 1000;
+  l[FX_D1].theta = l[FX_C1].theta = 1000, l[FX_C2].theta = 3 << SF_AC_FRAC;
+  l[hard_spiking[variant / 3]].theta -= variant % 3 - 1;
+}
+
+static inline void expect_at_threshold(const hard *h, const hard_seen *seen, int variant)
+{
+  const int layer = hard_spiking[variant / 3], off = variant % 3 - 1;
+  if (h->scene.net.mode != FX_HYBRID) return;
+  ck_assert_int_eq(seen->trace->membrane[layer][0][0] - h->scene.net.layer[layer].theta, off);
+  ck_assert_uint_eq(seen->trace->spikes[layer][0][0], off >= 0);
+  ck_assert_uint_eq(seen->trace->spikes[layer][0][1], 0);
+}
+
+/* ---- weights and inputs ---- */
+
+static const int8_t hard_even[] = {127, -127, 127, -127, 0}, hard_odd[] = {127, -127, -127, 127, 0};
+
+static inline void make_rails(hard *h, int variant)
+{
+  const int sign = variant % 2 ? -1 : 1;
+  hard_weights(&h->scene.net, hard_even[variant / 2], hard_odd[variant / 2]);
+  hard_inputs(h, (int16_t)(2047 * sign), (int16_t)(-2047 * sign));
+}
+
+/* The widest sums are exact; alternating weights cancel, so that D1 fires as one or not at all. */
+static inline void expect_rails(const hard *h, const hard_seen *seen, int variant)
+{
+  const int sign = variant % 2 ? -1 : 1, pair = hard_even[variant / 2] + hard_odd[variant / 2];
+  const bool fires = sign * pair > 0;
+  for (int o = 0; o < SF_LANES; o++) ck_assert_int_eq(seen->trace->current[FX_D1][0][o], sign * 16 * 2047 * pair);
+  if (h->scene.net.mode == FX_HYBRID) ck_assert_uint_eq(seen->trace->spikes[FX_D1][0][1], fires ? UINT64_MAX : 0);
+  if (!fires) ck_assert_int_eq(hard_spikes(seen, FX_D1), 0);
+  if (pair == 0 && hard_even[variant / 2] == 0) ck_assert_int_eq(hard_spikes(seen, FX_C2), 0);
+}
+
+static inline void make_alternating(hard *h, int variant)
+{
+  (void)variant;
+  hard_weights(&h->scene.net, 127, -127);
+  for (int i = 0; i < SF_FEATURE_MAX; i++) h->f[i] = (int16_t)(i % 2 ? 2047 : -2047);
+}
+
+static inline void expect_alternating(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  for (int o = 0; o < SF_LANES; o++)
+    ck_assert_int_eq(seen->trace->current[FX_D1][0][o], (o % 2 ? 1 : -1) * 32 * 2047 * 127);
+  if (h->scene.net.mode == FX_HYBRID) ck_assert_uint_eq(seen->trace->spikes[FX_D1][0][0], 0xaaaaaaaaaaaaaaaau);
+}
+
+/* ---- steps ---- */
+
+static inline void make_steps(hard *h, int variant)
+{
+  h->scene.net.steps = variant ? SF_T_MAX : 1;
+}
+
+static inline void expect_steps(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  for (int t = 0; t < SF_T_MAX; t++)
+    for (int l = 0; l < SF_LAYERS; l++) {
+      const uint64_t units = l == FX_D2 ? 1 : (uint64_t)h->scene.net.layer[l].n_out;
+      if (t >= h->scene.net.steps) ck_assert_uint_eq(seen->trace->spikes[l][t][0] | seen->trace->spikes[l][t][1], 0);
+      ck_assert_uint_eq(seen->counts.layer[l].updates[t], t < h->scene.net.steps ? units : 0);
+    }
+}
+
+/* ---- density ---- */
+
+static inline void make_exp_ends(hard *h, int variant)
+{
+  hard_theta(&h->scene.net, 1);
+  hard_weights(&h->scene.net, 127, 127);
+  hard_inputs(h, 100, 100);
+  h->scene.net.layer[FX_D1].k = 4096;
+  for (int i = 0; i < SF_LANES; i++) h->scene.net.layer[FX_D2].w[i * SF_LANES] = variant ? 127 : -127;
+  h->scene.net.exp_in = (fx_scale){65535, 0, 0};
+}
+
+static inline void expect_exp_ends(const hard *h, const hard_seen *seen, int variant)
+{
+  ck_assert_int_eq(seen->trace->current[FX_D2][0][0], (variant ? 1 : -1) * 128 * 127);
+  if (h->scene.net.mode == FX_HYBRID) ck_assert_uint_eq(seen->out.sigma, variant ? (1u << SF_SIGMA_BITS) - 1 : 0);
+}
+
+/* Upwards and downwards. */
+static inline void make_nodecay(hard *h, int variant)
+{
+  make_all_fire(h, 0);
+  if (variant) hard_weights(&h->scene.net, -127, -127);
+  for (int l = 0; l < SF_LAYERS; l++) h->scene.net.layer[l].k = 0;
+  h->scene.net.exp_in = (fx_scale){65535, 0, 0};
+}
+
+/* D1's membranes saturate at all steps but the first. Where they fire so does 2^y at every step, and its sum at all but
+ * the first; where they do not, eight times 2^0 is added up. */
+static inline void expect_nodecay(const hard *h, const hard_seen *seen, int variant)
+{
+  if (h->scene.net.mode != FX_NODECAY) return;
+  ck_assert_uint_eq(seen->out.sigma, variant ? 8 << SF_SIGMA_FRAC : (1u << SF_SIGMA_BITS) - 1);
+  ck_assert_uint_eq(seen->counts.saturated[FX_D2], variant ? 0 : SF_T_MAX + SF_T_MAX - 1);
+  ck_assert_uint_eq(seen->counts.saturated[FX_D1], (SF_T_MAX - 1) * 128);
+}
+
+/* ---- checkpoints ---- */
+
+static inline void make_denormals(hard *h, int variant)
+{
+  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 1);
+  const float denormal = variant ? -1e-45f : 1e-42f;
+  for (int id = SF_P_GRID; id < SF_P_LEAK; id++)
+    for (size_t i = 0; i < m.param[id].size; i++) sf_model_param(&m, (sf_param_id)id)[i] = denormal;
+  m.t_r = 4;
+  fx_scene_free(&h->scene);
+  const sf_status status = sf_quantise(&h->scene, &m, "denormal", &(sf_quant_options){.seed = 1});
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  sf_model_free(&m);
+}
+
+/* Nothing fires: density e^0 per model unit (2 per box edge), grey. */
+static inline void expect_denormals(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(hard_spikes(seen, l), 0);
+  if (h->scene.net.mode != FX_HYBRID) return;
+  ck_assert_uint_eq(seen->out.sigma, 2 << SF_SIGMA_FRAC);
+  for (int o = 0; o < 3; o++) ck_assert_uint_eq(seen->out.colour[o], 32768);
+}
+
+static inline void make_not_finite(hard *h, int variant)
+{
+  static const float bad[] = {NAN, INFINITY, -INFINITY};
+  const sf_param_id id = (sf_param_id)(variant / 3);
+  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 1);
+  m.t_r = 4;
+  sf_model_param(&m, id)[m.param[id].size / 2] = bad[variant % 3];
+  fx_scene_free(&h->scene);
+  const sf_status status = sf_quantise(&h->scene, &m, "model.safetensors", &(sf_quant_options){.seed = 1});
+  ck_assert_int_eq(status.code, SF_E_RANGE);
+  ck_assert_msg(strstr(status.message, m.param[id].name), "'%s' does not name the tensor", status.message);
+  ck_assert_ptr_null(h->scene.owner);
+  sf_model_free(&m);
+}
+
+/* ---- rays: what lies on them ---- */
+
+static inline fx_ray hard_straight(int count, int axis)
+{
+  fx_ray ray = {.count = count};
+  for (int a = 0; a < 3; a++) ray.origin[a] = (int64_t)1 << 39;
+  ray.origin[axis] = 0;
+  ray.step[axis] = (((int64_t)1 << 40) - 1) / (count > 1 ? count - 1 : 1);
+  return ray;
+}
+
+static inline void hard_conserved(const hard_seen *seen)
+{
+  ck_assert_uint_eq(seen->pixel.weight_sum + seen->pixel.transmittance, FX_TRANS_ONE);
+}
+
+static inline void make_depth(hard *h, int variant)
+{
+  static const int32_t bias[] = {-131072, 131071, 131071, -49152}, delta[] = {1 << 24, 1, 1 << 24, 1};
+  h->scene.net.exp_in.bias = bias[variant]; /* density 0, largest, largest, one LSB */
+  h->scene.step_q24 = delta[variant];
+  h->scene.trans_stop = 0;
+  h->ray = hard_straight(8, variant % 3);
+}
+
+/* sigma * delta of 0, of 2^16 / 2^24, at saturation, and far below half an LSB of transmittance. */
+static inline void expect_depth(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h;
+  const double after[] = {1, exp(-8.0 / 256), 0, 1};
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.samples, variant == 2 ? 1 : 8);
+  ck_assert_double_le(fabs(seen->pixel.transmittance - ldexp(after[variant], 20)), variant == 1 ? 8 * 2.85 : 0);
+}
+
+static inline void make_underflow(hard *h, int variant)
+{
+  (void)variant;
+  h->scene.net.exp_in.bias = 6492; /* 3 per edge */
+  h->scene.step_q24 = 1 << 22;
+  h->scene.trans_stop = 0;
+  h->ray = hard_straight(1024, 0);
+}
+
+/* 0.75 per sample: half an LSB of 2^20 is left after 14.56 / 0.75 = 19.4 samples. */
+static inline void expect_underflow(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h, (void)variant;
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.transmittance, 0);
+  ck_assert(seen->pixel.samples >= 19 && seen->pixel.samples <= 21);
+}
+
+static inline void make_empty(hard *h, int variant)
+{
+  memset(h->scene.occupancy, 0, 64);
+  h->ray = hard_straight(500, variant);
+}
+
+static inline void expect_empty(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h, (void)variant;
+  uint32_t rgba[4];
+  hard_conserved(seen);
+  fx_pixel_rgba(&seen->pixel, rgba);
+  ck_assert_uint_eq(seen->pixel.samples, 0);
+  ck_assert(rgba[0] == 65535 && rgba[1] == 65535 && rgba[2] == 65535 && rgba[3] == 0);
+  ck_assert_uint_eq(seen->counts.rays, 0);
+  ck_assert_uint_eq(seen->counts.march_steps, 500);
+}
+
+static inline void make_opaque(hard *h, int variant)
+{
+  h->scene.net.exp_in.bias = 131071;
+  h->ray = hard_straight(500, variant);
+}
+
+static inline void expect_opaque(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h, (void)variant;
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.samples, 1);
+  ck_assert_uint_eq(seen->pixel.transmittance, 0);
+}
+
+/* Fog of 1 per edge along `chord` edges: the samples cover it but for one step, and leave exp(-samples * delta) within
+ * the bound of the error budget. */
+static inline void expect_chord(const hard *h, const hard_seen *seen, double chord)
+{
+  const double delta = ldexp(h->scene.step_q24, -SF_DELTA_FRAC), depth = seen->pixel.samples * delta;
+  hard_conserved(seen);
+  ck_assert_msg(fabs(depth - chord) < 1.001 * delta, "%u samples cover %g, chord %g", seen->pixel.samples, depth,
+                chord);
+  ck_assert_double_le(fabs(seen->pixel.transmittance - ldexp(exp(-depth), 20)), 2.85 * seen->pixel.samples);
+}
+
+static inline void make_fog(hard *h, int variant)
+{
+  h->ray = hard_straight(40, variant);
+  h->scene.step_q24 = (1 << 24) / 40;
+}
+
+static inline void expect_fog(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  ck_assert_uint_eq(seen->pixel.samples, 40);
+  expect_chord(h, seen, 1);
+}
+
+static inline void make_count(hard *h, int variant)
+{
+  static const int limit[] = {1024, 1024, 1, 1024}, count[] = {0, 1, 1500, 1500};
+  h->scene.net.exp_in.bias = -131072;
+  h->scene.max_samples = limit[variant];
+  h->ray = hard_straight(count[variant], variant % 3);
+}
+
+static inline void expect_count(const hard *h, const hard_seen *seen, int variant)
+{
+  static const uint32_t samples[] = {0, 1, 1, 1024};
+  (void)h;
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.samples, samples[variant]);
+  ck_assert_uint_eq(seen->counts.rays, samples[variant] > 0);
+  ck_assert_uint_eq(seen->pixel.transmittance, FX_TRANS_ONE);
+}
+
+/* variant = axis * 9 + face: at 0, on every face between two cells, at the last position; only that cell is occupied.
+ */
+static inline void make_face(hard *h, int variant)
+{
+  uint32_t pos[3] = {1 << 23, 1 << 23, 1 << 23};
+  pos[variant / 9] = variant % 9 == 8 ? (1 << 24) - 1 : (uint32_t)(variant % 9) << 21;
+  const uint32_t cell = ((pos[2] >> 21) * 8 + (pos[1] >> 21)) * 8 + (pos[0] >> 21);
+  memset(h->scene.occupancy, 0, 64);
+  h->scene.occupancy[cell / 8] = (uint8_t)(1 << cell % 8);
+  h->ray = (fx_ray){.count = 1};
+  for (int a = 0; a < 3; a++) h->ray.origin[a] = (int64_t)pos[a] << 16;
+}
+
+static inline void expect_face(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  uint32_t at[3];
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.samples, 1);
+  ck_assert_int_eq(fx_march_next(&h->scene, &h->ray, 0, at, NULL), 0);
+  for (int a = 0; a < 3; a++) ck_assert_uint_eq(at[a], (uint32_t)(h->ray.origin[a] >> 16));
+}
+
+/* ---- rays: how they meet the box, [-1,1]^3 in model units ---- */
+
+static inline void hard_aim(hard *h, const float origin[3], const float direction[3])
+{
+  const sf_status status = sf_fx_ray_make(&h->scene, origin, direction, &h->ray);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+}
+
+static inline void make_parallel(hard *h, int variant)
+{
+  float o[3] = {0.25f, -0.5f, 0.125f}, d[3] = {0};
+  d[variant / 2] = variant % 2 ? 1 : -1;
+  o[variant / 2] = -3 * d[variant / 2];
+  hard_aim(h, o, d);
+}
+
+static inline void expect_parallel(const hard *h, const hard_seen *seen, int variant)
+{
+  expect_chord(h, seen, 1);
+  for (int a = 0; a < 3; a++) ck_assert(a == variant / 2 || h->ray.step[a] == 0);
+}
+
+/* variant = axis * 4 + signs: through two opposite edges parallel to the axis. */
+static inline void make_edges(hard *h, int variant)
+{
+  float o[3] = {0}, d[3] = {0};
+  d[(variant / 4 + 1) % 3] = variant & 1 ? 1 : -1, d[(variant / 4 + 2) % 3] = variant & 2 ? 1 : -1;
+  for (int a = 0; a < 3; a++) o[a] = -3 * d[a];
+  hard_aim(h, o, d);
+}
+
+static inline void expect_edges(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  expect_chord(h, seen, sqrt(2));
+}
+
+static inline void make_corners(hard *h, int variant)
+{
+  float o[3], d[3];
+  for (int a = 0; a < 3; a++) d[a] = variant >> a & 1 ? 1 : -1, o[a] = -3 * d[a];
+  hard_aim(h, o, d);
+}
+
+static inline void expect_corners(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  expect_chord(h, seen, sqrt(3));
+}
+
+static inline void make_inside(hard *h, int variant)
+{
+  float o[3] = {0}, d[3] = {0};
+  d[variant / 2] = variant % 2 ? 1 : -1;
+  hard_aim(h, o, d);
+}
+
+/* From the near plane at 0.2 to the face at 1. */
+static inline void expect_inside(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)variant;
+  expect_chord(h, seen, 0.4);
+}
+
+/* In the plane of a face; beside the box; looking away; touching one edge; from inside with the face nearer than the
+ * near plane. */
+static inline void make_missing(hard *h, int variant)
+{
+  static const float o[][3] = {{1, 0, 3}, {1.5f, 0, 3}, {0, 0, 3}, {2, 0, 0}, {0, 0, 0.9f}};
+  static const float d[][3] = {{0, 0, -1}, {0, 0, -1}, {0, 0, 1}, {-1, 1, 0}, {0, 0, 1}};
+  hard_aim(h, o[variant], d[variant]);
+}
+
+static inline void expect_missing(const hard *h, const hard_seen *seen, int variant)
+{
+  (void)h, (void)variant;
+  hard_conserved(seen);
+  ck_assert_uint_eq(seen->pixel.samples, 0);
+  ck_assert_uint_eq(seen->counts.march_steps, 0);
+  for (int o = 0; o < 3; o++) ck_assert_uint_eq(seen->pixel.colour[o], (uint64_t)1 << 36); /* the background */
+}
+
+/* A camera in world units, times the scene's scale in float as the loader does. */
+static const float hard_scale[] = {1e-6f, 1e6f}, hard_model_origin[3] = {0.3f, -0.2f, 3};
+
+static inline void make_scale(hard *h, int variant)
+{
+  const float d[3] = {0, 0, -1}, scale = hard_scale[variant];
+  float o[3];
+  for (int a = 0; a < 3; a++) {
+    const float world = hard_model_origin[a] / scale;
+    o[a] = world * scale;
+  }
+  hard_aim(h, o, d);
+}
+
+/* The ray of scale 1 but for the rounding of two float operations: 2 * 2^-24 of 3 units, half of it in box units. */
+static inline void expect_scale(const hard *h, const hard_seen *seen, int variant)
+{
+  const float d[3] = {0, 0, -1};
+  fx_ray plain;
+  (void)variant;
+  expect_chord(h, seen, 1);
+  ck_assert_int_eq(sf_fx_ray_make(&h->scene, hard_model_origin, d, &plain).code, SF_OK);
+  ck_assert_int_eq(h->ray.count, plain.count);
+  for (int a = 0; a < 3; a++) {
+    ck_assert_int_le(llabs(h->ray.origin[a] - plain.origin[a]), 3 << 16);
+    ck_assert_int_eq(h->ray.step[a], plain.step[a]);
+  }
+}
+
+static const hard_case hard_cases[] = {
+    {"tau_at_one_and_very_large", HARD_NET, 4, make_leak, expect_leak},
+    {"theta_one_lsb", HARD_NET, 1, make_theta_one, expect_theta_one},
+    {"silent_net", HARD_NET, 1, make_silent, expect_silent},
+    {"every_neuron_fires", HARD_NET, 1, make_all_fire, expect_all_fire},
+    {"current_at_threshold_and_one_off", HARD_NET, 9, make_at_threshold, expect_at_threshold},
+    {"weights_and_features_at_the_rails", HARD_NET, 10, make_rails, expect_rails},
+    {"alternating_features", HARD_NET, 1, make_alternating, expect_alternating},
+    {"one_step_and_all_steps", HARD_NET, 2, make_steps, expect_steps},
+    {"density_at_both_ends_of_exp", HARD_NET, 2, make_exp_ends, expect_exp_ends},
+    {"nodecay_saturates_and_counts", HARD_NET, 2, make_nodecay, expect_nodecay},
+    {"denormals_in_a_checkpoint", HARD_NET, 2, make_denormals, expect_denormals},
+    {"nan_and_inf_in_a_checkpoint", HARD_REFUSED, 3 * SF_P_COUNT, make_not_finite, NULL},
+    {"optical_depth_zero_and_saturated", HARD_RAY, 4, make_depth, expect_depth},
+    {"transmittance_underflow", HARD_RAY, 1, make_underflow, expect_underflow},
+    {"empty_scene", HARD_RAY, 3, make_empty, expect_empty},
+    {"opaque_scene", HARD_RAY, 3, make_opaque, expect_opaque},
+    {"fog_is_the_product_of_its_parts", HARD_RAY, 3, make_fog, expect_fog},
+    {"one_sample_and_sample_limit", HARD_RAY, 4, make_count, expect_count},
+    {"positions_on_faces_and_ends", HARD_RAY, 27, make_face, expect_face},
+    {"ray_parallel_to_an_axis", HARD_RAY, 6, make_parallel, expect_parallel},
+    {"ray_through_edges", HARD_RAY, 12, make_edges, expect_edges},
+    {"ray_through_corners", HARD_RAY, 8, make_corners, expect_corners},
+    {"ray_from_inside", HARD_RAY, 6, make_inside, expect_inside},
+    {"ray_missing_the_box", HARD_RAY, 5, make_missing, expect_missing},
+    {"scene_scales_1e-6_and_1e6", HARD_RAY, 2, make_scale, expect_scale},
+};
+enum { HARD_CASES = sizeof hard_cases / sizeof hard_cases[0] };
+
+/* One Check case per hard case, so that a failure shows its name; `run` gets the index into hard_cases as _i. */
+static inline void hard_add(Suite *suite, const TTest *run)
+{
+  for (int i = 0; i < HARD_CASES; i++) {
+    TCase *tcase = tcase_create(hard_cases[i].name);
+    tcase_set_timeout(tcase, 60);
+    tcase_add_loop_test(tcase, run, i, i + 1);
+    suite_add_tcase(suite, tcase);
+  }
+}
+#endif
