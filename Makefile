@@ -109,6 +109,10 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
 	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce cosim_faults install safetensors
 
+SAMPLES ?= 10000000
+vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
+	SF_FX_SAMPLES=$(SAMPLES) $B/tests/test_fx_vector
+
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
@@ -152,6 +156,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign asan asan-run cppcheck demo lego reproduce reproduce-report bench error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

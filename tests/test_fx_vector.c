@@ -1,7 +1,7 @@
 /* Vector kernels against the portable core, bit for bit: nets, grid, marching, whole rays with their counts, on random
  * scenes of every size and mode. SF_FX_SAMPLES: samples through the nets for each instruction set (default 40 000). */
 #include "base/memory.h"
-#include "fx_fixture.h"
+#include "fx_hard_cases.h"
 #include "src/fx/core.h"
 #include "src/fx/net.h"
 #include <stdio.h>
@@ -77,29 +77,40 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
                   b->saturated[l][i], (unsigned long long)events.saturated[l]);
 }
 
-/* Blocks of every length; inputs over the whole range in half of them. */
+/* Inputs over the whole range in half of the scenes. */
+static long compare_block(const fx_core *core, fx_block *b, fx_scratch *scratch, int n, const char *name, uint64_t seed,
+                          uint64_t block)
+{
+  const fx_net *net = &core->scene->net;
+  int32_t base[FX_BLOCK][SF_LANES];
+  b->n = n;
+  for (int i = 0; i < n; i++) {
+    int16_t dir[SF_DIR_MAX];
+    fixture_inputs(seed, block * FX_BLOCK + (uint64_t)i, b->f[i], net->layer[FX_D1].n_in, seed / 3 % 2 ? 2047 : 700);
+    fixture_inputs(seed + 1, block * FX_BLOCK + (uint64_t)i, dir, SF_DIR_MAX, 2047);
+    fx_net_direction(net, dir, base[i], NULL);
+    b->base[i] = base[i];
+  }
+  core->kernels->nets(core, b, scratch);
+  for (int i = 0; i < n; i++) compare_sample(net, b, i, name, seed);
+  return n;
+}
+
+/* Blocks of every length. */
 static long compare_nets(const char *name, uint64_t seed)
 {
+  enum { BLOCKS = 4 };
   fx_scene scene = random_scene(seed);
   fx_core *core = open_core(&scene, name);
   fx_block *b = sf_aligned_alloc(sizeof *b);
   fx_scratch *scratch = sf_aligned_alloc(sizeof *scratch);
-  int32_t base[FX_BLOCK][SF_LANES];
-  b->n = (int)(seed % FX_BLOCK) + 1;
-  for (int i = 0; i < b->n; i++) {
-    int16_t dir[SF_DIR_MAX];
-    fixture_inputs(seed, (uint64_t)i, b->f[i], scene.net.layer[FX_D1].n_in, seed / 3 % 2 ? 2047 : 700);
-    fixture_inputs(seed + 1, (uint64_t)i, dir, SF_DIR_MAX, 2047);
-    fx_net_direction(&scene.net, dir, base[i], NULL);
-    b->base[i] = base[i];
-  }
-  core->kernels->nets(core, b, scratch);
-  for (int i = 0; i < b->n; i++) compare_sample(&scene.net, b, i, name, seed);
-  const int n = b->n;
+  long samples = 0;
+  for (uint64_t i = 0; i < BLOCKS; i++)
+    samples += compare_block(core, b, scratch, (int)((seed + i * 7) % FX_BLOCK) + 1, name, seed, i);
   free(b), free(scratch);
   fx_core_close(core);
   fx_scene_free(&scene);
-  return n;
+  return samples;
 }
 
 static long compare_grid(const char *name, uint64_t seed)
@@ -205,6 +216,54 @@ START_TEST(rays_equal_portable)
 }
 END_TEST
 
+/* ---- the hard cases ---- */
+
+static void hard_net(hard *h, const char *name, int variant)
+{
+  fx_block *b = sf_aligned_alloc(sizeof *b);
+  fx_scratch *scratch = sf_aligned_alloc(sizeof *scratch);
+  int32_t base[SF_LANES];
+  b->n = 1;
+  b->base[0] = base;
+  memcpy(b->f[0], h->f, (size_t)h->scene.net.layer[FX_D1].n_in * sizeof *h->f);
+  fx_net_direction(&h->scene.net, h->ray.dir, base, NULL);
+  for (int32_t mode = FX_HYBRID; mode <= FX_NODECAY; mode++) {
+    h->scene.net.mode = mode;
+    fx_core *core = open_core(&h->scene, name);
+    core->kernels->nets(core, b, scratch);
+    compare_sample(&h->scene.net, b, 0, name, (uint64_t)variant);
+    fx_core_close(core);
+  }
+  free(b), free(scratch);
+}
+
+static void hard_ray(hard *h, const char *name)
+{
+  fx_core *core = open_core(&h->scene, name);
+  fx_pixel one, wave;
+  fx_counts a = {0}, b = {0};
+  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &one, &a).code, SF_OK);
+  ck_assert_int_eq(fx_render_rays(core, &h->ray, 1, &wave, NULL, &b).code, SF_OK);
+  ck_assert_mem_eq(&one, &wave, sizeof one);
+  assert_same_counts(&a, &b);
+  fx_core_close(core);
+}
+
+START_TEST(hard_cases_equal_portable)
+{
+  const hard_case *c = &hard_cases[_i];
+  for (int variant = 0; variant < c->variants; variant++)
+    for (int set = 0; set < 2; set++) {
+      hard h;
+      if (!fx_kernels_select(instruction_sets[set])) continue;
+      hard_begin(&h, c, variant);
+      if (c->kind == HARD_NET) hard_net(&h, instruction_sets[set], variant);
+      if (c->kind == HARD_RAY) hard_ray(&h, instruction_sets[set]);
+      hard_end(&h);
+    }
+}
+END_TEST
+
 START_TEST(portable_waves_equal_single_rays)
 {
   campaign("portable", compare_rays, samples_wanted() / 2);
@@ -234,5 +293,6 @@ int main(void)
   tcase_add_test(equal, portable_waves_equal_single_rays);
   tcase_add_test(equal, unknown_kernels_are_refused);
   suite_add_tcase(suite, equal);
+  hard_add(suite, hard_cases_equal_portable);
   return fixture_run(suite);
 }
