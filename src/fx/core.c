@@ -10,7 +10,14 @@ static void pair_rows(int16_t (*to)[SF_LANES][2], int first, const int8_t *w, in
     for (int o = 0; o < SF_LANES; o++) to[(first + i) / 2][o][(first + i) % 2] = w[(size_t)i * SF_LANES + o];
 }
 
-static void arrange(fx_words *words, const fx_net *net)
+/* Where output o of a row of c2 is kept. */
+static int unpacked(int o, int bytes)
+{
+  const int block = o / bytes * bytes, half = o % bytes / (bytes / 2), at = o % (bytes / 2);
+  return block + at / 8 * 16 + half * 8 + at % 8;
+}
+
+static void arrange(fx_words *words, const fx_net *net, int bytes)
 {
   const fx_layer *layer = net->layer;
   const int n_h = layer[FX_D2].n_out - 1, n_dir = layer[FX_C1].n_in - n_h;
@@ -19,7 +26,8 @@ static void arrange(fx_words *words, const fx_net *net)
   for (int i = 0; i < SF_LANES; i++)
     for (int o = 0; o < SF_LANES; o++) {
       const size_t at = (size_t)i * SF_LANES + (size_t)o;
-      if (i < layer[FX_C2].n_in) words->c2[i][o] = words->c2_quads[i / 4][o][i % 4] = layer[FX_C2].w[at];
+      if (i < layer[FX_C2].n_in)
+        words->c2[i][unpacked(o, bytes)] = words->c2_quads[i / 4][o][i % 4] = layer[FX_C2].w[at];
       if (o >= SF_OUT_MAX) continue;
       if (i < layer[FX_D2].n_in) words->d2[i][o] = layer[FX_D2].w[at];
       if (i < layer[FX_C3].n_in) words->c3[i][o] = layer[FX_C3].w[at];
@@ -37,7 +45,7 @@ sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernel
   if (!c) return sf_fail(SF_E_MEMORY, "no memory for the core's tables");
   c->scene = scene;
   c->kernels = chosen;
-  arrange(&c->words, &scene->net);
+  arrange(&c->words, &scene->net, chosen->unpack_bytes);
   *core = c;
   return sf_ok();
 }

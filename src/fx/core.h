@@ -5,7 +5,7 @@
 #define SPIKEFIELD_FX_CORE_H
 #include "src/fx/count.h"
 
-enum { FX_BLOCK = 32 }; /* samples */
+enum { FX_BLOCK = 48 }; /* samples */
 
 /* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
  * groups. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane multiplies them. Aligned: a row that
@@ -14,13 +14,13 @@ typedef struct fx_words {
   _Alignas(64) int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
   _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2]; /* by D2 current: row 0, the density's, is zero */
   _Alignas(64) int16_t d2[SF_LANES + 1][SF_OUT_MAX];
-  _Alignas(64) int16_t c2[SF_LANES + 1][SF_LANES];
+  _Alignas(64) int8_t c2[SF_LANES + 1][SF_LANES]; /* outputs permuted, see fx_kernels.unpack_bytes */
   _Alignas(64) int16_t c3[SF_LANES + 1][SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
 } fx_words;
 
-/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base. Slots from n on may hold
- * anything. */
+/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base; the rest is output. Slots from n
+ * on may hold anything. */
 typedef struct fx_block {
   int n;
   uint32_t pos[3][FX_BLOCK]; /* Q0.24 */
@@ -29,11 +29,26 @@ typedef struct fx_block {
   fx_out out[FX_BLOCK];
   uint64_t spikes[FX_SPIKING][SF_T_MAX][FX_BLOCK][2]; /* bitmaps of D1, C1, C2 */
   uint32_t saturated[SF_LAYERS][FX_BLOCK];            /* events */
+  uint32_t fired[FX_SPIKING][FX_BLOCK];               /* spikes of all steps */
+  fx_firing firing;                                   /* of the block */
 } fx_block;
+
+/* Fills fired and firing from spikes; here, so that every instruction set counts bits with its own instruction. */
+static inline void fx_block_count(fx_block *b, int steps)
+{
+  b->firing = (fx_firing){.samples = (uint64_t)b->n};
+  for (int l = 0; l < FX_SPIKING; l++)
+    for (int i = 0; i < b->n; i++) {
+      uint64_t seen[2] = {0}, sum = 0;
+      for (int t = 0; t < steps; t++) sum += fx_firing_add(&b->firing, l, t, b->spikes[l][t][i], seen);
+      b->fired[l][i] = (uint32_t)sum;
+    }
+}
 
 /* Working memory of one thread: currents and membranes of a block. */
 typedef struct fx_scratch {
   _Alignas(64) int32_t d1_current[FX_BLOCK][SF_LANES];
+  int32_t current[FX_BLOCK][SF_LANES]; /* of C1, and of C2 where its products are dense */
   int32_t v[FX_SPIKING][FX_BLOCK][SF_LANES];
   int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
   _Alignas(64) int16_t c2_current[FX_BLOCK][SF_LANES];
@@ -43,7 +58,10 @@ typedef struct fx_scratch {
 
 typedef struct fx_kernels {
   const char *name;
-  /* Both nets through all steps: out, spikes and saturated of samples 0..n-1. */
+  /* Bytes of a vector. c2 is read in vectors of 8-bit lanes, and the low, then the high eight of each 16 are widened:
+   * the outputs of one vector are stored so that the widened halves are in order. */
+  int unpack_bytes;
+  /* Both nets through all steps: all outputs of samples 0..n-1. */
   void (*nets)(const fx_core *core, fx_block *block, fx_scratch *scratch);
   /* f of pos, samples 0..n-1; returns the number of saturations. */
   uint64_t (*features)(const fx_grid *grid, fx_block *block);

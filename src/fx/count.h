@@ -22,6 +22,13 @@ static inline uint64_t fx_firing_add(fx_firing *sum, int layer, int t, const uin
   return spikes;
 }
 
+static inline void fx_firing_sum(fx_firing *sum, const fx_firing *more)
+{
+  uint64_t *to = (uint64_t *)sum;
+  const uint64_t *from = (const uint64_t *)more;
+  for (size_t i = 0; i < sizeof *sum / sizeof *to; i++) to[i] += from[i];
+}
+
 void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays);
 void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firing);
 

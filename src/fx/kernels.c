@@ -20,6 +20,7 @@ static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
         memcpy(b->spikes[s][t][i], events.spikes[spiking[s]][t], sizeof b->spikes[s][t][i]);
     for (int l = 0; l < SF_LAYERS; l++) b->saturated[l][i] = (uint32_t)events.saturated[l];
   }
+  fx_block_count(b, core->scene->net.steps);
 }
 
 static uint64_t features(const fx_grid *grid, fx_block *b)
@@ -39,7 +40,7 @@ static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
   return found < 0 ? ray->count : found;
 }
 
-static const fx_kernels portable = {"portable", nets, features, march};
+static const fx_kernels portable = {"portable", 16, nets, features, march};
 
 const fx_kernels *fx_kernels_select(const char *name)
 {

@@ -9,4 +9,4 @@
 #define FX_TEXT_(a) #a
 #define FX_TEXT(a) FX_TEXT_(a)
 
-const fx_kernels FX_JOIN(fx_kernels_, SF_ISA) = {FX_TEXT(SF_ISA), nets, features, march};
+const fx_kernels FX_JOIN(fx_kernels_, SF_ISA) = {FX_TEXT(SF_ISA), 4 * WIDTH, nets, features, march};

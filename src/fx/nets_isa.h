@@ -8,9 +8,10 @@
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
 
-enum { VECTORS = SF_LANES / WIDTH, COLOURS = 3 };
+enum { VECTORS = SF_LANES / WIDTH, COLOURS = 3, GANG = 3 };
+_Static_assert(FX_BLOCK % GANG == 0 && FX_BLOCK % WIDTH == 0, "a block is whole gangs and whole vectors");
 enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample */
-enum { C2_DENSE_PERCENT = 42 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
+enum { C2_DENSE_PERCENT = 40 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
 
 typedef struct leak {
   vec low, pair; /* k in 16-bit lanes; 2k and 1 to a 32-bit lane */
@@ -67,33 +68,93 @@ static INLINE void put_spikes(uint64_t bits[2], int vector, uint32_t spikes)
   bits[vector * WIDTH / 64] |= (uint64_t)spikes << vector * WIDTH % 64;
 }
 
-/* acc[sample][vector] += pairs of rows times pairs of inputs, for two samples and the TILE vectors from w on. */
-static INLINE void dot_tile(vec acc[2][TILE], const int16_t *w, const int16_t *x0, const int16_t *x1, int pairs)
+/* ---- dense products: GANG samples at once, in a function of their own, where the compiler keeps all sums in
+ * registers. A gang of three loads 11 vectors for 24 products; CPUs load fewer than they multiply. ---- */
+
+#define EACH(k, j)                                                                                                     \
+  _Pragma("GCC unroll 3") for (int k = 0; k < GANG; k++) _Pragma("GCC unroll 8") for (int j = 0; j < TILE; j++)
+
+/* out[k][o] = from[k][o] + sum of w[p][o] . x[k][p], pairs of 16-bit values, for TILE vectors of outputs, rows of
+ * SF_LANES; from NULL: 0. */
+static __attribute__((noinline)) void pair_products(const int16_t *w, int pairs, const int16_t *const x[GANG],
+                                                    const int32_t *const *from, int32_t *out)
 {
+  vec acc[GANG][TILE];
+  EACH(k, j) acc[k][j] = from ? v_load(from[k] + j * WIDTH) : v_set(0);
   for (int p = 0; p < pairs; p++) {
-    const vec a = v_word(x0 + 2 * p), b = v_word(x1 + 2 * p);
+    vec in[GANG];
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 2 * p);
 #pragma GCC unroll 8
-    for (int i = 0; i < TILE; i++) {
-      const vec row = v_load(w + 2 * (p * SF_LANES + i * WIDTH));
-      acc[0][i] = v_dot(acc[0][i], a, row);
-      acc[1][i] = v_dot(acc[1][i], b, row);
+    for (int j = 0; j < TILE; j++) {
+      const vec row = v_load(w + 2 * (p * SF_LANES + j * WIDTH));
+#pragma GCC unroll 3
+      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot(acc[k][j], in[k], row);
     }
   }
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+/* out[k][o] = sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
+static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], int32_t *out)
+{
+  vec acc[GANG][TILE];
+  EACH(k, j) acc[k][j] = v_set(0);
+  for (int q = 0; q < SF_LANES / 4; q++) {
+    vec in[GANG];
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 4 * q);
+#pragma GCC unroll 8
+    for (int j = 0; j < TILE; j++) {
+      const vec row = v_load(w + 4 * (q * SF_LANES + j * WIDTH));
+#pragma GCC unroll 3
+      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
+    }
+  }
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
 }
 
 static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
 {
-  for (int i = 0; i < b->n; i += 2)
+  for (int i = 0; i < b->n; i += GANG)
+    for (int first = 0; first < VECTORS; first += TILE)
+      pair_products(words->d1[0][first * WIDTH], SF_FEATURE_MAX / 2,
+                    (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]}, NULL,
+                    &s->d1_current[i][first * WIDTH]);
+}
+
+static void c1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
+{
+  for (int i = 0; i < b->n; i += GANG)
     for (int first = 0; first < VECTORS; first += TILE) {
-      vec acc[2][TILE];
-      for (int j = 0; j < TILE; j++) acc[0][j] = acc[1][j] = v_set(0);
-      dot_tile(acc, words->d1[0][first * WIDTH], b->f[i], b->f[i + 1], SF_FEATURE_MAX / 2);
-      for (int j = 0; j < TILE; j++) {
-        v_store(&s->d1_current[i][(first + j) * WIDTH], acc[0][j]);
-        v_store(&s->d1_current[i + 1][(first + j) * WIDTH], acc[1][j]);
-      }
+      const int at = first * WIDTH;
+      pair_products(words->c1_h[0][at], SF_OUT_MAX / 2,
+                    (const int16_t *const[]){s->d2_current[i], s->d2_current[i + 1], s->d2_current[i + 2]},
+                    (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
+                    &s->current[i][at]);
     }
 }
+
+static INLINE void spike_bytes(const uint64_t bits[2], uint8_t bytes[SF_LANES])
+{
+#if defined(__AVX512VNNI__)
+  for (int word = 0; word < 2; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
+#else
+  for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
+#endif
+}
+
+static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+{
+  for (int i = 0; i < n; i += GANG) {
+    uint8_t x[GANG][SF_LANES];
+    for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
+    for (int first = 0; first < VECTORS; first += TILE)
+      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, &s->current[i][first * WIDTH]);
+  }
+}
+
+/* ---- products with spikes: rows for events ---- */
 
 /* The spikes of one layer of a block at one step, sample after sample, in groups of GROUP rows: a loop over all groups
  * has no branch per sample. A sample's last group is filled up with SF_LANES, the row of zeros; a silent sample has one
@@ -101,8 +162,7 @@ static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
 typedef struct events {
   int groups;
   uint8_t row[FX_BLOCK * (SF_LANES + GROUP) + 64];
-  uint8_t sample[FX_BLOCK * GROUPS + 64],
-      go_on[FX_BLOCK * GROUPS + 64]; /* go_on: 255 = the sample of the group before */
+  uint8_t sample[FX_BLOCK * GROUPS + 64];
 } events;
 
 static INLINE void list_spikes(uint8_t *row, const uint64_t bits[2], int low)
@@ -127,49 +187,103 @@ static INLINE void list_events(events *e, const uint64_t (*spikes)[2], int n)
     uint8_t *row = e->row + e->groups * GROUP;
     list_spikes(row, spikes[i], low);
     memset(row + count, SF_LANES, GROUP);
-    for (int at = 0; at < GROUPS; at += 4 * WIDTH) { /* what is written too far, the next sample overwrites */
+    for (int at = 0; at < GROUPS; at += 4 * WIDTH) /* what is written too far, the next sample overwrites */
       v_store(e->sample + e->groups + at, V(set1_epi8)((char)i));
-      v_store(e->go_on + e->groups + at, V(set1_epi8)(-1));
-    }
-    e->go_on[e->groups] = 0;
     e->groups += count ? (count + GROUP - 1) / GROUP : 1;
   }
+}
+
+/* Group g: its rows, read with one load, and its sample. Returns -1 when it goes on with the sample of the group
+ * before, or 0 when it starts a new one. */
+static INLINE int32_t read_group(const events *e, int g, uint32_t row[GROUP], int *sample)
+{
+  uint32_t rows;
+  const int before = *sample;
+  memcpy(&rows, e->row + g * GROUP, sizeof rows);
+  for (int i = 0; i < GROUP; i++) row[i] = rows >> 8 * i & 255;
+  *sample = e->sample[g];
+  return -(*sample == before);
+}
+
+static INLINE __m256i row16(const int16_t (*w)[SF_OUT_MAX], uint32_t i)
+{
+  return _mm256_load_si256((const __m256i *)w[i]);
 }
 
 /* sum[sample] = sum of its rows of 16. */
 static INLINE void add_rows16(const events *e, const int16_t (*w)[SF_OUT_MAX], int16_t (*sum)[SF_OUT_MAX])
 {
   __m256i acc = _mm256_setzero_si256();
+  int sample = -1;
   for (int g = 0; g < e->groups; g++) {
-    const uint8_t *row = e->row + g * GROUP;
-    const __m256i a =
-        _mm256_add_epi16(_mm256_load_si256((const __m256i *)w[row[0]]), _mm256_load_si256((const __m256i *)w[row[1]]));
-    const __m256i b =
-        _mm256_add_epi16(_mm256_load_si256((const __m256i *)w[row[2]]), _mm256_load_si256((const __m256i *)w[row[3]]));
-    acc = _mm256_add_epi16(_mm256_and_si256(acc, _mm256_set1_epi8((char)e->go_on[g])), _mm256_add_epi16(a, b));
-    _mm256_storeu_si256((__m256i *)sum[e->sample[g]], acc);
+    uint32_t row[GROUP];
+    const __m256i go_on = _mm256_set1_epi32(read_group(e, g, row, &sample));
+    const __m256i four = _mm256_add_epi16(_mm256_add_epi16(row16(w, row[0]), row16(w, row[1])),
+                                          _mm256_add_epi16(row16(w, row[2]), row16(w, row[3])));
+    acc = _mm256_add_epi16(_mm256_and_si256(acc, go_on), four);
+    _mm256_storeu_si256((__m256i *)sum[sample], acc);
   }
 }
 
-/* sum[sample] = sum of its rows of SF_LANES; exact in 16 bits. */
-static INLINE void add_rows(const events *e, const int16_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES])
+/* a + b of 8-bit lanes as 16-bit lanes: low and high halves of each 128 bits; fx_words.c2 is ordered so that they are
+ * neighbouring outputs. */
+static INLINE void add_bytes(vec a, vec b, vec sum[2])
 {
-  enum { HALVES = SF_LANES / (2 * WIDTH) };
-  vec acc[HALVES];
-#pragma GCC unroll 8
-  for (int j = 0; j < HALVES; j++) acc[j] = v_set(0);
+  const vec one = V(set1_epi8)(1);
+  sum[0] = V(maddubs_epi16)(one, V(unpacklo_epi8)(a, b));
+  sum[1] = V(maddubs_epi16)(one, V(unpackhi_epi8)(a, b));
+}
+
+/* sum[sample] = sum of its rows of SF_LANES; exact in 16 bits. */
+static INLINE void add_rows(const events *e, const int8_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES])
+{
+  enum { BYTES = 4 * WIDTH, PARTS = SF_LANES / BYTES };
+  vec acc[PARTS][2];
+  int sample = -1;
+#pragma GCC unroll 4
+  for (int j = 0; j < PARTS; j++) acc[j][0] = acc[j][1] = v_set(0);
   for (int g = 0; g < e->groups; g++) {
-    const uint8_t *row = e->row + g * GROUP;
-    const vec go_on = V(set1_epi8)((char)e->go_on[g]);
-    int16_t *to = sum[e->sample[g]];
-#pragma GCC unroll 8
-    for (int j = 0; j < HALVES; j++) {
-      const int at = j * 2 * WIDTH;
-      const vec a = V(add_epi16)(v_load(w[row[0]] + at), v_load(w[row[1]] + at)),
-                b = V(add_epi16)(v_load(w[row[2]] + at), v_load(w[row[3]] + at));
-      acc[j] = V(add_epi16)(V_BITS(and)(acc[j], go_on), V(add_epi16)(a, b));
-      v_store(to + at, acc[j]);
+    uint32_t row[GROUP];
+    const vec go_on = v_set(read_group(e, g, row, &sample));
+#pragma GCC unroll 4
+    for (int j = 0; j < PARTS; j++) {
+      vec a[2], b[2];
+      add_bytes(v_load(w[row[0]] + j * BYTES), v_load(w[row[1]] + j * BYTES), a);
+      add_bytes(v_load(w[row[2]] + j * BYTES), v_load(w[row[3]] + j * BYTES), b);
+#pragma GCC unroll 2
+      for (int half = 0; half < 2; half++) {
+        acc[j][half] = V(add_epi16)(V_BITS(and)(acc[j][half], go_on), V(add_epi16)(a[half], b[half]));
+        v_store(sum[sample] + j * BYTES + half * BYTES / 2, acc[j][half]);
+      }
     }
+  }
+}
+
+static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+{
+  events e;
+  list_events(&e, spikes, n);
+  add_rows(&e, words->c2, s->c2_current);
+}
+
+/* ---- the steps ---- */
+
+/* Every neuron of a spiking layer (0..FX_SPIKING-1) for all samples. halves: currents of C2 in 16 bits, else in 32. */
+static INLINE void fire_layer(const neurons *n, int spiking, bool halves, int shift, const void *current, fx_block *b,
+                              fx_scratch *s, int t)
+{
+  static const int layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
+  for (int i = 0; i < b->n; i++) {
+    uint64_t bits[2] = {0};
+    const int16_t *half = (const int16_t *)current + i * SF_LANES;
+    const int32_t *whole = (const int32_t *)current + i * SF_LANES;
+#pragma GCC unroll 16
+    for (int j = 0; j < VECTORS; j++) {
+      const vec in = halves ? v_widen(half + j * WIDTH) : v_load(whole + j * WIDTH);
+      put_spikes(bits, j,
+                 fire(n, &s->v[spiking][i][j * WIDTH], V(slli_epi32)(in, shift), &b->saturated[layer[spiking]][i]));
+    }
+    memcpy(b->spikes[spiking][t][i], bits, sizeof bits);
   }
 }
 
@@ -177,14 +291,7 @@ static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s,
 {
   const neurons n = neurons_of(&core->scene->net, FX_D1, mode, first, t);
   events e;
-  for (int i = 0; i < b->n; i++) {
-    uint64_t bits[2] = {0};
-#pragma GCC unroll 16
-    for (int j = 0; j < VECTORS; j++)
-      put_spikes(bits, j,
-                 fire(&n, &s->v[0][i][j * WIDTH], v_load(&s->d1_current[i][j * WIDTH]), &b->saturated[FX_D1][i]));
-    memcpy(b->spikes[0][t][i], bits, sizeof bits);
-  }
+  fire_layer(&n, 0, false, 0, s->d1_current, b, s, t);
   list_events(&e, (const uint64_t(*)[2])b->spikes[0][t], b->n);
   add_rows16(&e, core->words.d2, s->d2_current);
   for (int i = 0; i < b->n; i++) {
@@ -194,84 +301,11 @@ static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s,
   }
 }
 
-static INLINE void c1_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first_step, int t)
+static INLINE void c1_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
-  const neurons n = neurons_of(&core->scene->net, FX_C1, mode, first_step, t);
-  for (int i = 0; i < b->n; i += 2) {
-    uint64_t bits[2][2] = {{0}};
-    for (int first = 0; first < VECTORS; first += TILE) {
-      vec acc[2][TILE];
-      for (int j = 0; j < TILE; j++) {
-        acc[0][j] = v_load(b->base[i] + (first + j) * WIDTH);
-        acc[1][j] = v_load(b->base[i + 1] + (first + j) * WIDTH);
-      }
-      dot_tile(acc, core->words.c1_h[0][first * WIDTH], s->d2_current[i], s->d2_current[i + 1], SF_OUT_MAX / 2);
-#pragma GCC unroll 2
-      for (int k = 0; k < 2; k++)
-#pragma GCC unroll 8
-        for (int j = 0; j < TILE; j++)
-          put_spikes(bits[k], first + j,
-                     fire(&n, &s->v[1][i + k][(first + j) * WIDTH], acc[k][j], &b->saturated[FX_C1][i + k]));
-    }
-    memcpy(b->spikes[1][t][i], bits, sizeof bits);
-  }
-}
-
-static INLINE void spike_bytes(const uint64_t bits[2], uint8_t bytes[SF_LANES])
-{
-#if defined(__AVX512VNNI__)
-  for (int word = 0; word < 2; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
-#else
-  for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
-#endif
-}
-
-static INLINE void fire_c2(const neurons *n, fx_block *b, fx_scratch *s, int i, int vector, uint64_t bits[2],
-                           vec current)
-{
-  put_spikes(bits, vector,
-             fire(n, &s->v[2][i][vector * WIDTH], V(slli_epi32)(current, SF_AC_FRAC), &b->saturated[FX_C2][i]));
-}
-
-static INLINE void c2_step_events(const fx_core *core, fx_block *b, fx_scratch *s, const neurons *n, int t)
-{
-  events e;
-  list_events(&e, (const uint64_t(*)[2])b->spikes[1][t], b->n);
-  add_rows(&e, core->words.c2, s->c2_current);
-  for (int i = 0; i < b->n; i++) {
-    uint64_t bits[2] = {0};
-#pragma GCC unroll 16
-    for (int j = 0; j < VECTORS; j++) fire_c2(n, b, s, i, j, bits, v_widen(&s->c2_current[i][j * WIDTH]));
-    memcpy(b->spikes[2][t][i], bits, sizeof bits);
-  }
-}
-
-static INLINE void c2_step_dense(const fx_core *core, fx_block *b, fx_scratch *s, const neurons *n, int t)
-{
-  for (int i = 0; i < b->n; i += 2) {
-    uint64_t bits[2][2] = {{0}};
-    uint8_t x[2][SF_LANES];
-    for (int k = 0; k < 2; k++) spike_bytes(b->spikes[1][t][i + k], x[k]);
-    for (int first = 0; first < VECTORS; first += TILE) {
-      vec acc[2][TILE];
-#pragma GCC unroll 8
-      for (int j = 0; j < TILE; j++) acc[0][j] = acc[1][j] = v_set(0);
-      for (int q = 0; q < SF_LANES / 4; q++) {
-        const vec a = v_word(x[0] + 4 * q), c = v_word(x[1] + 4 * q);
-#pragma GCC unroll 8
-        for (int j = 0; j < TILE; j++) {
-          const vec rows = v_load(core->words.c2_quads[q][(first + j) * WIDTH]);
-          acc[0][j] = v_dot4(acc[0][j], a, rows);
-          acc[1][j] = v_dot4(acc[1][j], c, rows);
-        }
-      }
-#pragma GCC unroll 2
-      for (int k = 0; k < 2; k++)
-#pragma GCC unroll 8
-        for (int j = 0; j < TILE; j++) fire_c2(n, b, s, i + k, first + j, bits[k], acc[k][j]);
-    }
-    memcpy(b->spikes[2][t][i], bits, sizeof bits);
-  }
+  const neurons n = neurons_of(&core->scene->net, FX_C1, mode, first, t);
+  c1_currents(&core->words, b, s);
+  fire_layer(&n, 1, false, 0, s->current, b, s, t);
 }
 
 static INLINE int spikes_of_block(const fx_block *b, int layer, int t)
@@ -285,11 +319,14 @@ static INLINE int spikes_of_block(const fx_block *b, int layer, int t)
 static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   const neurons n = neurons_of(&core->scene->net, FX_C2, mode, first, t);
-  const bool dense = spikes_of_block(b, 1, t) * 100 > b->n * SF_LANES * C2_DENSE_PERCENT;
-  if (dense)
-    c2_step_dense(core, b, s, &n, t);
-  else
-    c2_step_events(core, b, s, &n, t);
+  const uint64_t(*spikes)[2] = (const uint64_t(*)[2])b->spikes[1][t];
+  if (spikes_of_block(b, 1, t) * 100 > b->n * SF_LANES * C2_DENSE_PERCENT) {
+    c2_currents_dense(&core->words, spikes, b->n, s);
+    fire_layer(&n, 2, false, SF_AC_FRAC, s->current, b, s, t);
+  } else {
+    c2_currents_events(&core->words, spikes, b->n, s);
+    fire_layer(&n, 2, true, SF_AC_FRAC, s->c2_current, b, s, t);
+  }
 }
 
 static INLINE void c3_step(const fx_core *core, fx_block *b, fx_scratch *s, int t)
@@ -394,10 +431,11 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
 {
   const fx_net *net = &core->scene->net;
   memset(b->saturated, 0, sizeof b->saturated);
-  if (b->n % 2) b->base[b->n] = b->base[b->n - 1]; /* pairs of samples: the last may have a partner that is not read */
+  for (int i = b->n; i % GANG; i++) b->base[i] = b->base[0]; /* the last gang may have members that nobody reads */
   d1_currents(&core->words, b, s);
   step(core, b, s, mode, true, 0);
   for (int t = 1; t < net->steps; t++) step(core, b, s, mode, false, t);
+  fx_block_count(b, net->steps);
   for (int i = 0; i < b->n; i++) b->out[i] = (fx_out){s->acc[0][i], {s->acc[1][i], s->acc[2][i], s->acc[3][i]}};
 }
 

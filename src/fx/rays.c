@@ -22,6 +22,7 @@ typedef struct wave {
   const fx_ray *rays;
   fx_pixel *pixels;
   fx_cost *costs;
+  uint64_t macs_of_sample;
   fx_firing firing;
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
 } wave;
@@ -70,23 +71,19 @@ static void end_ray(wave *w, int i)
 
 static void account(wave *w, int i)
 {
-  const fx_net *net = &w->core->scene->net;
-  static const int fed[FX_SPIKING] = {FX_D2, FX_C2, FX_C3};
-  fx_cost cost = {.macs = fx_macs_of_sample(net)};
-  for (int l = 0; l < FX_SPIKING; l++) {
-    uint64_t seen[2] = {0}, spikes = 0;
-    for (int t = 0; t < net->steps; t++) spikes += fx_firing_add(&w->firing, l, t, w->block.spikes[l][t][i], seen);
-    cost.spikes += spikes;
-    cost.sops += spikes * (uint64_t)net->layer[fed[l]].n_out;
-  }
-  w->firing.samples++;
+  const fx_layer *layer = w->core->scene->net.layer;
+  const fx_block *b = &w->block;
   for (int l = 0; l < SF_LAYERS; l++) {
-    w->counts.saturated[l] += w->block.saturated[l][i];
-    w->counts.saturated_samples[l] += w->block.saturated[l][i] != 0;
+    w->counts.saturated[l] += b->saturated[l][i];
+    w->counts.saturated_samples[l] += b->saturated[l][i] != 0;
   }
   if (!w->costs) return;
   fx_cost *sum = &w->costs[w->slot[i].ray];
-  sum->macs += cost.macs, sum->sops += cost.sops, sum->spikes += cost.spikes;
+  const uint64_t d1 = b->fired[0][i], c1 = b->fired[1][i], c2 = b->fired[2][i];
+  sum->macs += w->macs_of_sample;
+  sum->spikes += d1 + c1 + c2;
+  sum->sops +=
+      d1 * (uint64_t)layer[FX_D2].n_out + c1 * (uint64_t)layer[FX_C2].n_out + c2 * (uint64_t)layer[FX_C3].n_out;
 }
 
 /* Adds the sample to its ray; true when the ray goes on. */
@@ -108,6 +105,7 @@ static void round_of_samples(wave *w)
   for (int i = 0; i < b->n; i++) b->base[i] = w->slot[i].base;
   w->counts.saturated_features += core->kernels->features(&core->scene->grid, b);
   core->kernels->nets(core, b, &w->scratch);
+  fx_firing_sum(&w->firing, &b->firing);
   for (int i = 0; i < b->n; i++) {
     account(w, i);
     ended[i] = !composite(w, i) || !advance(w, i, w->slot[i].at + 1);
@@ -133,6 +131,7 @@ sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_p
   wave *w = sf_aligned_alloc(sizeof *w);
   if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
   w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
+  w->macs_of_sample = fx_macs_of_sample(&core->scene->net);
   for (int i = 0; i < FX_BLOCK; i++) w->slot[i].base = w->base[i];
   if (costs) memset(costs, 0, n * sizeof *costs);
   for (size_t next = 0; next < n || w->block.n > 0;) {
