@@ -31,8 +31,18 @@ SCENES ?= ../shared/data
 PKGS := OpenEXR libcjson libpng libjpeg
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
+# Other widths, in a build folder of their own that remembers them: make B=build/ac4 ARCH="AC_FRAC=4 LEAK_FRAC=8"
+ARCH ?= $(shell cat $B/arch 2>/dev/null)
+ARCH_DEF := include/spikefield/arch.def
+ifneq ($(strip $(ARCH)),)
+ifneq ($(shell tools/arch.sh $B $(ARCH) && echo ok),ok)
+$(error no build with ARCH="$(ARCH)")
+endif
+ARCH_DEF := $B/$(ARCH_DEF)
+ARCH_INCLUDE := -I$B/include
+endif
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp $(ARCH_INCLUDE) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 

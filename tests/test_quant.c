@@ -463,13 +463,25 @@ START_TEST(widths)
 }
 END_TEST
 
-/* 128 rows of the largest weight: h = 128 * 127 / 8 = 2032 needs 12 bits and may have but fewer. */
-START_TEST(h_fits_narrow_inputs)
+/* A model whose calibration does not show how wide its inputs get: 128 equal weights, so that h could be 128 * 127 / 8
+ * = 2032; a field that is 20 times larger outside the only occupied cell; directions that matter to no neuron, so that
+ * no search avoids a fine LSB. */
+START_TEST(narrow_inputs_never_clip)
 {
   sf_model m = make_model(128, 2, SF_HYBRID);
   fx_scene scene;
   sf_quant_report report;
+  float *w3 = sf_model_param(&m, SF_P_W3), *grid = sf_model_param(&m, SF_P_GRID);
+  memset(m.occupancy, 0, 512);
+  m.occupancy[0] = 1; /* the first of 16^3 cells: the first 4 points of level 0 along every axis hold it */
+  for (uint32_t i = 0; i < 2 * m.level[0].entries; i++) grid[i] *= 20;
+  for (uint32_t i = 0; i < 64; i++) {
+    const uint32_t entry = (i % 4 ^ i / 4 % 4 * 2654435761u ^ i / 16 * 805459861u) % m.level[0].entries;
+    grid[2 * entry] = grid[2 * entry + 1] = 0.5f;
+  }
   for (size_t i = 0; i < m.param[SF_P_W2].size; i++) sf_model_param(&m, SF_P_W2)[i] = 0.5f;
+  for (size_t i = 0; i < m.param[SF_P_W3].size; i++)
+    if (i % (SF_DIR_FEATURES + SF_GEO_FEATURES) < SF_DIR_FEATURES) w3[i] = 0;
   quantise(&m, &scene, &report);
   ck_assert_int_gt(worst_h(&scene.net.layer[FX_D2]), 1023);
   fx_scene_free(&scene);
@@ -519,7 +531,7 @@ int main(void)
   tcase_add_test(cases, refuses_what_it_cannot_represent);
   tcase_add_test(cases, steps_and_leaks);
   tcase_add_test(cases, widths);
-  tcase_add_test(cases, h_fits_narrow_inputs);
+  tcase_add_test(cases, narrow_inputs_never_clip);
   tcase_add_test(cases, extreme_models);
   suite_add_tcase(suite, cases);
   SRunner *runner = srunner_create(suite);
