@@ -111,7 +111,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli chain reproduce cosim_faults safetensors
+	@tests/run.sh $B $(TESTS) cli chain reproduce pareto cosim_faults safetensors
 
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
@@ -138,6 +138,9 @@ reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots i
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report
 
+pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
+	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(DATA),--data "$(DATA)") $(PARETO)
+
 bench: $B/tests/bench ## samples/s of the trainer's parts beside the naive versions, text and build/bench.json
 	@$B/tests/bench $B/bench.json
 
@@ -150,6 +153,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report bench format clean help lint gen gen-check firmware faults
+.PHONY: all test check asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

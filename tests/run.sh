@@ -12,6 +12,7 @@ for name in "$@"; do
   case $name in
     cli) command=("$here/test_cli.sh" "$build/bin") ;;
     reproduce) command=("$here/test_reproduce.sh" "$build") ;;
+    pareto) command=("$here/test_pareto.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
