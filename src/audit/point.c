@@ -104,8 +104,9 @@ static void read_truth(bench *b)
 
 static sf_status render_float(bench *b)
 {
-  float *origin = malloc(b->pixels * 6 * sizeof *origin), *direction = origin + 3 * b->pixels;
+  float *origin = malloc(b->pixels * 6 * sizeof *origin);
   if (!origin) return sf_fail(SF_E_MEMORY, "%s: no memory for %zu rays", b->options->data, b->pixels);
+  float *direction = origin + 3 * b->pixels;
   for (size_t i = 0; i < b->pixels; i++) {
     int x, y;
     place(b, i, &x, &y);
