@@ -32,7 +32,9 @@ PKGS := OpenEXR libcjson libpng libjpeg
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 # Other widths, in a build folder of their own that remembers them: make B=build/ac4 ARCH="AC_FRAC=4 LEAK_FRAC=8"
-ARCH ?= $(shell cat $B/arch 2>/dev/null)
+ifneq ($(origin ARCH),command line)
+ARCH := $(shell cat $B/arch 2>/dev/null)
+endif
 ARCH_DEF := include/spikefield/arch.def
 ifneq ($(strip $(ARCH)),)
 ifneq ($(shell tools/arch.sh $B $(ARCH) && echo ok),ok)

@@ -193,12 +193,15 @@ for bits in $weights; do add "$first||--weight-bits $bits"; done
 for bits in $features; do add "$first||--feature-bits $bits"; done
 for bits in $grids; do add "$first||--grid-bits $bits"; done
 for bits in $leaks; do add "$first||--leak-bits $bits"; done
+# What rounds a state at every step is tried over the longest unrolling, too.
+for bits in $leaks; do add "$first||--leak-bits $bits --steps $steps_max"; done
 for ((t = 1; t <= steps_max; t++)); do [ $t -eq "$t_r" ] || add "$first||--steps $t"; done
 for file in "${models[@]:1}"; do add "$file||--steps $t_r"; done
 add_grid
 if [ "$with_variants" = all ]; then
   for variant in $variants; do
     add "$first|$variant|"
+    [[ $variant != AC_FRAC=* ]] || add "$first|$variant|--steps $steps_max"
     [ "$variant" != H_SHIFT=1 ] || for bits in $low_weights; do add "$first|$variant|--weight-bits $bits"; done
   done
 fi

@@ -204,19 +204,28 @@ static int by_quality(const void *a, const void *b)
   return p != q ? (p < q) - (p > q) : by_axis(a, b);
 }
 
+/* Differs from the centre in `axis`, and perhaps in the number of steps; or is the centre. */
+static bool in_table(const sf_sweep *sweep, const sf_point *point, int axis)
+{
+  sf_point same_steps = *point;
+  if (sf_point_on_axis(sweep, point, axis)) return true;
+  same_steps.axis[SF_AXIS_STEPS] = sweep->centre->axis[SF_AXIS_STEPS];
+  return point->axis[axis] != sweep->centre->axis[axis] && sf_point_on_axis(sweep, &same_steps, axis);
+}
+
 static void print_axis(FILE *out, const sf_sweep *sweep, int axis, const sf_point **list)
 {
   int n = 0;
   for (int i = 0; i < sweep->count; i++)
-    if (sf_point_on_axis(sweep, &sweep->point[i], axis)) list[n++] = &sweep->point[i];
+    if (in_table(sweep, &sweep->point[i], axis)) list[n++] = &sweep->point[i];
   if (n < 2) return;
   qsort(list, (size_t)n, sizeof *list, by_axis);
   fprintf(out, "\n## %s\n\n", sf_axes[axis].title);
-  print_head(out, sf_axes[axis].letter);
+  print_head(out, "point");
   for (int i = 0; i < n; i++) {
-    char value[64];
-    snprintf(value, sizeof value, "%d%s", list[i]->axis[axis], list[i] == sweep->centre ? " (centre)" : "");
-    print_row(out, value, list[i]);
+    char name[128];
+    sf_point_short_name(sweep, list[i], name, sizeof name);
+    print_row(out, name, list[i]);
   }
 }
 
@@ -229,7 +238,7 @@ static void print_front(FILE *out, const sf_sweep *sweep, const sf_point **list)
   fprintf(
       out,
       "\n## Pareto front\n\n%d of %d points; no other is as good in PSNR against the picture, energy, bytes and bits "
-      "moved, all at once (as printed).\nNamed by what tells them from the centre.\n\n",
+      "moved, all at once (as printed).\n\n",
       n, sweep->count);
   print_head(out, "point");
   for (int i = 0; i < n; i++) {
@@ -243,15 +252,15 @@ void sf_sweep_print(FILE *out, const sf_sweep *sweep)
 {
   const sf_point **list = calloc((size_t)sweep->count + 1, sizeof *list);
   if (!list) return;
-  fprintf(out, "# Widths: one parameter at a time, then the front\n\nModel %s, centre %s:\n\n", sweep->centre->model,
+  fprintf(out, "# Widths: one parameter at a time, then the front\n\nModel %s, centre %s.\n", sweep->centre->model,
           sweep->centre->name);
+  fprintf(out, "Points are named by what tells them from the centre:\n\n");
   for (int i = 0; i < SF_AXES; i++)
     fprintf(out, "- %s: %s, %d\n", sf_axes[i].letter, sf_axes[i].title, sweep->centre->axis[i]);
-  fprintf(out,
-          "\npicture, float: PSNR against the picture and against the float field at the same steps; lost: what float "
-          "has more "
-          "against the\npicture; error: the largest in a channel. Energy (paper ledger) and bits moved (weights, grid "
-          "entries, states) are per frame.\nRTL cells and cycles per width: not available.\n");
+  fprintf(out, "\npicture, float: PSNR against the picture and against the float field at the same steps.\n");
+  fprintf(out, "lost: what float has more against the picture; error: the largest in a channel.\n");
+  fprintf(out, "Energy (paper ledger) and bits moved (weights, grid entries, states) are per frame.\n");
+  fprintf(out, "RTL cells and cycles per width: not available.\n");
   for (int axis = 0; axis < SF_AXES; axis++) print_axis(out, sweep, axis, list);
   print_front(out, sweep, list);
   free(list);

@@ -58,19 +58,33 @@ static void write_points(FILE *out, const sf_sweep *sweep, const char *block, in
   fprintf(out, "EOD\n");
 }
 
+/* The window of the front and the centre: points far behind them would flatten it. */
+static void frame_front(FILE *out, const sf_sweep *sweep, int cost)
+{
+  const double *centre = sweep->centre->figure;
+  double low = centre[SF_POINT_PSNR_TRUTH], high = low, most = centre[cost];
+  for (int i = 0; i < sweep->count; i++) {
+    const double *figure = sweep->point[i].figure;
+    if (isnan(figure[SF_POINT_PSNR_TRUTH]) || beaten(sweep, &sweep->point[i], cost)) continue;
+    low = fmin(low, figure[SF_POINT_PSNR_TRUTH]), high = fmax(high, figure[SF_POINT_PSNR_TRUTH]);
+    most = fmax(most, figure[cost]);
+  }
+  fprintf(out, "set xrange [0:%.6g]\nset yrange [%.6g:%.6g]\nset format x '%%.1s%%c'\n", 1.1 * most, low - 0.3,
+          high + 0.5 + 0.2 * (high - low));
+}
+
 static void plot_cost(FILE *out, const sf_sweep *sweep, const char *name, int cost)
 {
   sf_plot_head(out, name, "Picture quality and cost", sf_point_figures[cost].title,
                sf_point_figures[SF_POINT_PSNR_TRUTH].title, "right bottom");
-  fprintf(out, "set offsets graph 0.05, graph 0.1, graph 0.08, graph 0.05\n");
+  frame_front(out, sweep, cost);
   write_points(out, sweep, "others", cost, false);
   write_points(out, sweep, "front", cost, true);
   fprintf(out,
           "$centre << EOD\n%.6g %.6g\nEOD\n"
           "plot $others using 1:2 with points linecolor '#bbbbbb' pointtype 7 pointsize 0.5 title 'beaten', "
           "$front using 1:2 smooth unique with linespoints linecolor '%s' linewidth 2 pointtype 7 pointsize 0.9 title "
-          "'front', "
-          "$front using 1:2:3 with labels offset 0,1 font ',10' notitle, "
+          "'front', $front using 1:2:3 with labels rotate by 60 left offset 0.3,0.4 font ',10' notitle, "
           "$centre using 1:2 with points linecolor '%s' pointtype 6 pointsize 2 title 'centre'\n",
           sweep->centre->figure[cost], sweep->centre->figure[SF_POINT_PSNR_TRUTH], sf_plot_colour[0],
           sf_plot_colour[1]);
