@@ -58,8 +58,8 @@ for options in "" "--weight-bits 4 --grid-bits 5 --leak-bits 6 --feature-bits 9"
     "$programs/sf_point" "$data/tiny.safetensors" "$data" --view 1 --json $options >"$work/point.json"
   }
   "$programs/sim_render" "$work/s.snn" "$data" --view 1 -o "$work/s.exr" --json >"$work/fixed.json" 2>/dev/null
-  [ "$(printf '%.9f' "$(number "$work/point.json" psnr_truth_db)")" = "$(printf '%.9f' "$(number "$work/fixed.json" psnr)")" ] ||
-    fail "'$options': PSNR $(number "$work/point.json" psnr_truth_db), sim_render $(number "$work/fixed.json" psnr)"
+  ours=$(printf '%.9f' "$(number "$work/point.json" psnr_truth_db)") theirs=$(printf '%.9f' "$(number "$work/fixed.json" psnr)")
+  [ "$ours" = "$theirs" ] || fail "'$options': PSNR $ours, sim_render $theirs"
   awk -v mj="$(number "$work/point.json" energy_mj)" -v fj="$(number "$work/fixed.json" energy_fj)" \
     'BEGIN { d = mj * 1e12 / fj - 1; exit !(d < 1e-12 && d > -1e-12) }' || fail "'$options': energy differs from sim_render"
 done

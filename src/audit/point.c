@@ -1,11 +1,11 @@
 /* One point of a sweep: a model at some widths against its float field and against the picture. */
 #include "spikefield/audit.h"
+#include "spikefield/cli.h"
 #include "spikefield/golden.h"
 #include "spikefield/pareto.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 const sf_axis sf_axes[SF_AXES] = {
     [SF_AXIS_WEIGHT] = {"weight_bits", "weights, bits", "w"},
@@ -135,17 +135,10 @@ static sf_status fixed_row(bench *b, int row, fx_counts *sum)
   return sf_ok();
 }
 
-static double now(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static sf_status render_fixed(bench *b)
 {
   sf_status failed = sf_ok();
-  const double start = now();
+  const double start = sf_seconds();
 #pragma omp parallel for schedule(dynamic)
   for (int row = 0; row < b->fixed.height; row++) {
     fx_counts sum = {0};
@@ -156,7 +149,7 @@ static sf_status render_fixed(bench *b)
       if (status.code != SF_OK) failed = status;
     }
   }
-  b->seconds = now() - start;
+  b->seconds = sf_seconds() - start;
   return failed;
 }
 
