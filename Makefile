@@ -31,8 +31,20 @@ SCENES ?= ../shared/data
 PKGS := OpenEXR libcjson libpng libjpeg
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
 LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
+# Other widths, in a build folder of their own that remembers them: make B=build/ac4 ARCH="AC_FRAC=4 LEAK_FRAC=8"
+ifneq ($(origin ARCH),command line)
+ARCH := $(shell cat $B/arch 2>/dev/null)
+endif
+ARCH_DEF := include/spikefield/arch.def
+ifneq ($(strip $(ARCH)),)
+ifneq ($(shell tools/arch.sh $B $(ARCH) && echo ok),ok)
+$(error no build with ARCH="$(ARCH)")
+endif
+ARCH_DEF := $B/$(ARCH_DEF)
+ARCH_INCLUDE := -I$B/include
+endif
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden $(ARCH_INCLUDE) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 
@@ -107,7 +119,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce cosim_faults install safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -138,6 +150,9 @@ reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots i
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report
 
+pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
+	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(DATA),--data "$(DATA)") $(PARETO)
+
 bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
 	@models=$$(tests/bench_models.sh $B $(SCENES)) && $B/tests/bench $B/bench.json $$models
 
@@ -156,6 +171,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign asan asan-run cppcheck demo lego reproduce reproduce-report bench error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

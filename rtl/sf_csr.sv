@@ -134,8 +134,9 @@ module sf_csr (
       || c1_out == 8'd0 || c1_out > 8'd128 || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'd128
       || c3_in != c2_out || c3_out != 8'd3;
   wire bad_steps = steps_q == 4'd0 || steps_q > 4'd8;
-  wire bad_leak = k_q[12:0] > 13'd4096 || k_q[25:13] > 13'd4096 || k_q[38:26] > 13'd4096 || k_q[51:39] > 13'd4096
-      || k_q[64:52] > 13'd4096;
+  localparam [12:0] LEAK_ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
+  wire bad_leak = k_q[12:0] > LEAK_ONE || k_q[25:13] > LEAK_ONE || k_q[38:26] > LEAK_ONE || k_q[51:39] > LEAK_ONE
+      || k_q[64:52] > LEAK_ONE;
   wire bad_theta = theta_q[23:0] == 24'd0 || theta_q[71:48] == 24'd0 || theta_q[95:72] == 24'd0;
   wire bad_mode = mode_q == 2'd3;
   wire bad_scale = exp_mul_q[16] || sigmoid_mul_q[16] || exp_shift_q[5] || sigmoid_shift_q[5];

@@ -16,8 +16,9 @@ module sf_integrate (
   wire signed [47:0] a = first_i ? 48'sd0 : $signed({20'd0, acc_i});
   wire signed [47:0] x = $signed({20'd0, in_i});
   wire signed [47:0] k = $signed({35'd0, k_i});
-  wire signed [47:0] leaky = a + sf_rshift_round((x - a) * k, 5'd12);
-  wire signed [47:0] nodecay = sf_usat(a - sf_rshift_round(a * k, 5'd12) + x, colour_i ? 6'd20 : 6'd28);
+  localparam [4:0] FRAC = 5'(sf_arch_pkg::LEAK_FRAC);
+  wire signed [47:0] leaky = a + sf_rshift_round((x - a) * k, FRAC);
+  wire signed [47:0] nodecay = sf_usat(a - sf_rshift_round(a * k, FRAC) + x, colour_i ? 6'd20 : 6'd28);
   assign acc_o = mode_i == sf_op_pkg::NODECAY ? nodecay[27:0]
                : mode_i == sf_op_pkg::HYBRID && first_i ? in_i : leaky[27:0];
   wire unused_ok = &{1'b0, leaky[47:28], nodecay[47:28]};

@@ -45,8 +45,8 @@ module sf_layer #(
   reg [2047:0] current_q[0:1];  // of D2, of C3
   wire [1:0] membrane_row = {1'b0, spikes_in_i};
 
-  // h = current >>> H_SHIFT: 16384 >> 3 fits 12 bits. AC_FRAC = 8 and H_SHIFT = 3 are wired here.
-  assign h_o = current_q[0][16*h_lane_i+3+:12];
+  // h = current >>> H_SHIFT: 16384 >> 3 fits 12 bits; with a smaller H_SHIFT the scene's weights see to it.
+  assign h_o = current_q[0][16*h_lane_i+sf_arch_pkg::H_SHIFT+:12];
   assign current_o = current_q[current_colour_i][16*current_lane_i+:16];
 
   always_ff @(posedge clk_i) begin
@@ -77,8 +77,8 @@ module sf_layer #(
     if (op_i == sf_op_pkg::FIRE) begin
       state = state_q[membrane_row];
       for (int l = 0; l < 128; l++) begin
-        neuron = sf_plif_step(state[24*l+:24], spikes_in_i ? {acc_q[l][15:0], 8'd0} : acc_q[l], k_i, theta_i, mode_i,
-                              first_i);
+        neuron = sf_plif_step(state[24*l+:24], spikes_in_i ? acc_q[l] <<< sf_arch_pkg::AC_FRAC : acc_q[l], k_i,
+                              theta_i, mode_i, first_i);
         fired[l] = neuron[24];
         state[24*l+:24] = neuron[23:0];
       end

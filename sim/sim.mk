@@ -7,6 +7,9 @@ RTL_PKG := rtl/gen/sf_arch_pkg.sv rtl/gen/sf_csr_pkg.sv rtl/sf_op_pkg.sv
 RTL_MODULES := $(filter-out $(RTL_PKG),$(wildcard rtl/gen/*.sv rtl/*.sv))
 RTL := $(RTL_PKG) $(RTL_MODULES)
 RTL_ALL := $(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt
+# A build with ARCH has a copy of rtl/ with packages of its own widths.
+RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
+RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 # Loops over lanes are written for unrolling; see docs/rtl.md.
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
@@ -43,13 +46,18 @@ $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	$(call say,CXX   $<)
 	$Q$(CXX) -std=c++17 -O2 -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
 
-$(eval $(call verilated_rule,$B/verilated,.,$(RTL_ALL)))
+$B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
+	$(call say,GEN   $(@D)/rtl)
+	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r rtl $(@D)/rtl && $B/bin/sf_gen --root $(@D)
+	@touch $@
+
+$(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
 
 # Planted faults: a patched copy of rtl/; +fault=N chooses one at run time, +fault=0 none.
 FAULTS := $(sort $(wildcard tests/faults/*.patch))
-$B/faults/.patched: $(RTL_ALL) $(FAULTS)
+$B/faults/.patched: $(RTL_READY) $(FAULTS)
 	$(call say,PATCH $(@D)/rtl)
-	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r rtl $(@D)/rtl
+	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r $(RTL_ROOT)/rtl $(@D)/rtl
 	$Qfor p in $(FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
 	@touch $@
 $(eval $(call verilated_rule,$B/faults/verilated,$B/faults,$B/faults/.patched))
@@ -63,25 +71,25 @@ $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
 faults: $B/faults/sf_cosim $B/faults/make_scene ## the co-simulation with planted faults, for its own test
 
 gen: $B/bin/sf_gen ## rewrite rtl/gen and docs/registers.md from arch.def, csr.def and the tables
-	@$B/bin/sf_gen --root .
+	@$B/bin/sf_gen --root $(RTL_ROOT)
 
 gen-check: $B/bin/sf_gen ## generated files are those that the sources give
 	@rm -rf $B/gen-check && $B/bin/sf_gen --root $B/gen-check
 	@diff -r $B/gen-check/rtl/gen rtl/gen && diff $B/gen-check/docs/registers.md docs/registers.md && tools/check_mirror.sh
 
-lint: ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
-	@$(VERILATOR) --lint-only --top-module sf_top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
-	@$(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt rtl/sf_op_pkg.sv rtl/sf_plif.sv
-	@if command -v iverilog >/dev/null; then mkdir -p $B && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -o $B/sf_top.vvp $(RTL) && rm $B/sf_top.vvp; fi
-	@if command -v yosys >/dev/null; then yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
+lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
+	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
+	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
+	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
+	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
 
 # Firmware: freestanding, RV32IM.
 RISCV ?= riscv64-unknown-elf-
 RISCV_FLAGS := -std=c11 -Os -Wall -Wextra -Wpedantic -Werror -march=rv32im_zicsr -mabi=ilp32 -mcmodel=medany -ffreestanding \
-  -ffunction-sections -fdata-sections -Iinclude -I.
+  -ffunction-sections -fdata-sections $(ARCH_INCLUDE) -Iinclude -I.
 FIRMWARE_SRC := firmware/crt0.S firmware/images.S firmware/main.c firmware/sf_driver.c firmware/sf_blob.c
 FIRMWARE_OBJ := $(patsubst %,$B/%.rv32.o,$(basename $(FIRMWARE_SRC)))
-$B/firmware/%.rv32.o: firmware/%.c $(wildcard firmware/*.h) include/spikefield/arch.def include/spikefield/csr.def
+$B/firmware/%.rv32.o: firmware/%.c $(wildcard firmware/*.h) $(ARCH_DEF) include/spikefield/csr.def
 	@mkdir -p $(@D)
 	$(call say,RV32  $<)
 	$Q$(RISCV)gcc $(RISCV_FLAGS) -c $< -o $@

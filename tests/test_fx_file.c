@@ -192,6 +192,8 @@ START_TEST(metadata_is_checked)
       {"format", NULL, "format"},
       {"version", "2", "version"},
       {"version", NULL, "version"},
+      {"arch", "AC_FRAC=4 LEAK_FRAC=12 H_SHIFT=3 INPUT_BITS=12 LOG_FRAC=12 TRANS_FRAC=20 DELTA_FRAC=24", "arch"},
+      {"arch", NULL, "arch"},
       {"t_r", "0", "t_r"},
       {"t_r", "9", "t_r"},
       {"t_r", "-1", "t_r"},

@@ -77,24 +77,10 @@ for program in sf_train sf_export sim_render energy_audit sf_report sf_scene; do
   [ -x "$bin/$program" ] || die "$bin/$program is missing: run make first" 1
 done
 
-# ---- the report ----
+# shellcheck source=tools/reproduce_runs.sh
+. "${BASH_SOURCE[0]%/*}/reproduce_runs.sh"
 
-plots() {
-  local script failed=0
-  if ! command -v gnuplot >/dev/null; then
-    echo "reproduce: no plots: gnuplot is missing (Debian package gnuplot-nox); the scripts are in $out/plots"
-    return 0
-  fi
-  for script in "$out"/plots/*.gp; do
-    [ -e "$script" ] || continue
-    (cd "$out/plots" && gnuplot "${script##*/}") >"$out/plots/gnuplot.log" 2>&1 && continue
-    echo "reproduce: $script: $(tail -n 1 "$out/plots/gnuplot.log")" >&2
-    failed=1
-  done
-  rm -f "$out/plots/gnuplot.log"
-  [ $failed -eq 0 ] && echo "plots: $out/plots/*.svg"
-  return $failed
-}
+# ---- the report ----
 
 report() {
   [ -d "$out" ] || die "$out: no runs yet (make reproduce PROFILE=$profile SCENES=folder)" 1
@@ -149,8 +135,6 @@ fi
 
 child="" stop=""
 trap on_signal INT TERM HUP
-# shellcheck source=tools/reproduce_runs.sh
-. "${BASH_SOURCE[0]%/*}/reproduce_runs.sh"
 
 # ---- all runs of a scene ----
 

@@ -1,6 +1,7 @@
 # shellcheck shell=bash disable=SC2154
 # One run of `make reproduce`: training, export, renderings, audits, and what is printed about it. Sourced by
-# reproduce.sh, whose variables it reads: set[], bin, out, data, data_id, scene, views, common, version, total.
+# reproduce.sh, whose variables it reads: set[], bin, out, data, data_id, scene, views, common, version, total; and by
+# pareto.sh for run, output, keep, number, clock and plots.
 
 # ---- one program at a time, stopped by SIGINT, SIGTERM or SIGHUP ----
 
@@ -25,6 +26,24 @@ run() {
   child=
   [ -z "$stop" ] || return 130
   return $code
+}
+
+# Draws the scripts of $out/plots.
+plots() {
+  local script failed=0
+  if ! command -v gnuplot >/dev/null; then
+    echo "no plots: gnuplot is missing (Debian package gnuplot-nox); the scripts are in $out/plots"
+    return 0
+  fi
+  for script in "$out"/plots/*.gp; do
+    [ -e "$script" ] || continue
+    (cd "$out/plots" && gnuplot "${script##*/}") >"$out/plots/gnuplot.log" 2>&1 && continue
+    echo "$script: $(tail -n 1 "$out/plots/gnuplot.log")" >&2
+    failed=1
+  done
+  rm -f "$out/plots/gnuplot.log"
+  [ $failed -eq 0 ] && echo "plots: $out/plots/*.svg"
+  return $failed
 }
 
 # ---- progress ----

@@ -11,6 +11,7 @@ typedef struct options {
   const char *output;
   int steps, background;
   uint64_t seed;
+  sf_quant_widths widths;
   bool json;
 } options;
 
@@ -32,11 +33,15 @@ static void print_text(const fx_scene *scene, const sf_quant_report *report, con
          100 * report->feature_error, (long long)report->grid_clipped);
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &scene->net.layer[l];
-    printf("%s %3d x %-3d LSB %-11.6g error %6.3f %%  %d weights clipped, k = %d/4096", layer_name[l], layer->n_in,
-           layer->n_out, report->layer[l].unit, 100 * report->layer[l].error, report->layer[l].clipped, layer->k);
+    printf("%s %3d x %-3d LSB %-11.6g error %6.3f %%  %d weights clipped, k = %d/%d", layer_name[l], layer->n_in,
+           layer->n_out, report->layer[l].unit, 100 * report->layer[l].error, report->layer[l].clipped, layer->k,
+           1 << SF_LEAK_FRAC);
     if (layer->theta) printf(", theta = %d", layer->theta);
     putchar('\n');
   }
+  printf("packed: %lld bytes at %d-bit weights, %d-bit features, %d-bit leaks, %d-bit grid entries\n",
+         (long long)report->packed_bytes, report->widths.weight_bits, report->widths.feature_bits,
+         report->widths.leak_bits, report->widths.grid_bits);
   printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
 }
 
@@ -66,6 +71,11 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
   cJSON_AddNumberToObject(json, "direction_lsb", scene->dir_scale);
   cJSON_AddNumberToObject(json, "calibration_samples", report->samples);
+  cJSON_AddNumberToObject(json, "packed_bytes", (double)report->packed_bytes);
+  cJSON_AddNumberToObject(json, "weight_bits", report->widths.weight_bits);
+  cJSON_AddNumberToObject(json, "feature_bits", report->widths.feature_bits);
+  cJSON_AddNumberToObject(json, "leak_bits", report->widths.leak_bits);
+  cJSON_AddNumberToObject(json, "grid_bits", report->widths.grid_bits);
   for (int l = 0; l < SF_LAYERS; l++)
     cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
   char *text = cJSON_Print(json);
@@ -79,7 +89,8 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
 static sf_status export_scene(const char *model_path, const options *o)
 {
   const float grey = o->background == 0 ? 1 : 0;
-  const sf_quant_options how = {.steps = o->steps, .background = {grey, grey, grey}, .seed = o->seed};
+  const sf_quant_options how = {
+      .steps = o->steps, .background = {grey, grey, grey}, .seed = o->seed, .widths = o->widths};
   sf_quant_report report;
   sf_model model;
   fx_scene scene;
@@ -127,6 +138,11 @@ int main(int argc, char **argv)
        .max = 18446744073709551615.0,
        .argument = "S",
        .help = "seed of the calibration samples (default 0)"},
+      {"--weight-bits", 0, SF_ARG_INT, &o.widths.weight_bits, 2, SF_WEIGHT_BITS, NULL, "B", "bits of a weight"},
+      {"--feature-bits", 0, SF_ARG_INT, &o.widths.feature_bits, 8, SF_INPUT_BITS, NULL, "B",
+       "bits of the inputs of D1 and C1"},
+      {"--leak-bits", 0, SF_ARG_INT, &o.widths.leak_bits, 4, SF_LEAK_FRAC, NULL, "B", "fraction bits of a leak"},
+      {"--grid-bits", 0, SF_ARG_INT, &o.widths.grid_bits, 2, SF_GRID_BITS, NULL, "B", "bits of a grid entry"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o.json, .help = "print the report as JSON"},
       {0}};
   const sf_cli cli = {.program = "sf_export",
@@ -134,7 +150,8 @@ int main(int argc, char **argv)
                       .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
                                  "the accelerator and the firmware.",
                       .examples = "  sf_export model.safetensors -o scene.snn\n"
-                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n",
+                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
+                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n",
                       .options = table,
                       .min_positional = 1,
                       .max_positional = 1};

@@ -40,7 +40,7 @@ uint32_t fx_exp2(int32_t y)
 uint32_t fx_exp_neg(uint64_t tau)
 {
   const int64_t clamped = tau > TAU_MAX ? TAU_MAX : (int64_t)tau;
-  const int64_t y = -fx_rshift_round(clamped * LOG2E_Q24, 24); /* Q.20, 0 .. -46.2 */
+  const int64_t y = -fx_rshift_round(clamped * LOG2E_Q24, 24 + SF_TRANS_FRAC - ARGUMENT_FRAC); /* Q.20, 0 .. -46.2 */
   const int32_t n = (int32_t)(y >> ARGUMENT_FRAC), fraction = (int32_t)(y & ((1 << ARGUMENT_FRAC) - 1));
   return (uint32_t)fx_rshift_round(exp2_fraction(fraction), TABLE_FRAC - SF_TRANS_FRAC - n);
 }

@@ -133,12 +133,23 @@ static void add_u64(cJSON *metadata, const char *key, uint64_t value)
   cJSON_AddStringToObject(metadata, key, text);
 }
 
+/* The widths that give the integers of a scene their meaning: a build of others must not run it. */
+enum { ARCH_TEXT = 160 };
+static void describe_arch(char text[ARCH_TEXT])
+{
+  snprintf(text, ARCH_TEXT, "AC_FRAC=%d LEAK_FRAC=%d H_SHIFT=%d INPUT_BITS=%d LOG_FRAC=%d TRANS_FRAC=%d DELTA_FRAC=%d",
+           SF_AC_FRAC, SF_LEAK_FRAC, SF_H_SHIFT, SF_INPUT_BITS, SF_LOG_FRAC, SF_TRANS_FRAC, SF_DELTA_FRAC);
+}
+
 static cJSON *make_metadata(const fx_scene *scene)
 {
+  char arch[ARCH_TEXT];
   cJSON *metadata = cJSON_CreateObject();
   if (!metadata) return NULL;
   cJSON_AddStringToObject(metadata, "format", FORMAT);
   cJSON_AddStringToObject(metadata, "version", VERSION);
+  describe_arch(arch);
+  cJSON_AddStringToObject(metadata, "arch", arch);
   cJSON_AddStringToObject(metadata, "mode", mode_name[scene->net.mode]);
   for (int i = 0; i < INTS; i++) {
     char text[16];
@@ -194,13 +205,16 @@ static sf_status expect_meta(const sf_tensors *set, const char *key, const char 
 {
   const char *text = sf_tensors_meta(set, key);
   if (text && !strcmp(text, expected)) return sf_ok();
-  return sf_fail(code, "%s: metadata '%s' is '%.40s', expected '%s'", set->path, key, text ? text : "", expected);
+  return sf_fail(code, "%s: metadata '%s' is '%.100s', expected '%s'", set->path, key, text ? text : "", expected);
 }
 
 static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
 {
   SF_TRY(expect_meta(set, "format", FORMAT, SF_E_FORMAT));
+  char arch[ARCH_TEXT];
+  describe_arch(arch);
   SF_TRY(expect_meta(set, "version", VERSION, SF_E_UNSUPPORTED));
+  SF_TRY(expect_meta(set, "arch", arch, SF_E_UNSUPPORTED));
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
   SF_TRY(read_mode(set, scene));
   if (scene->net.steps < 1 || scene->net.steps > SF_T_MAX)

@@ -1,9 +1,9 @@
 /* Both nets for a block of samples, layer by layer and step by step; 16 or 8 neurons to a vector.
  *
- * The leak product in 32-bit lanes: with d = h * 2^13 + l, -2^12 <= l < 2^12,
- *   rshift_round(d * k, 12) = h * 2k + rshift_round(l * k, 12)
- * and rshift_round(l * k, 12) is what one rounding 16-bit multiplication gives of 8 l and k. So d << 3 split at bit 16
- * holds h and 8 l, and one 16-bit dot product adds h * 2k + l' * 1 to the membrane. |d| < 2^25: d << 3 fits. */
+ * The leak product in 32-bit lanes, L = LEAK_FRAC: with d = h * 2^(L+1) + l, -2^L <= l < 2^L,
+ *   rshift_round(d * k, L) = h * 2k + rshift_round(l * k, L)
+ * and rshift_round(l * k, L) is what one rounding 16-bit multiplication gives of l << (15 - L) and k. So d << (15 - L),
+ * split at bit 16, holds both parts, and one 16-bit dot product adds h * 2k + l' * 1 to the membrane. |d| < 2^25. */
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
@@ -12,6 +12,8 @@ enum { VECTORS = SF_LANES / WIDTH, COLOURS = 3, GANG = 3 };
 _Static_assert(FX_BLOCK % GANG == 0 && FX_BLOCK % WIDTH == 0, "a block is whole gangs and whole vectors");
 enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample */
 enum { C2_DENSE_PERCENT = 40 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
+
+_Static_assert(25 + 15 - SF_LEAK_FRAC <= 32 && SF_LEAK_FRAC <= 13, "d << (15 - L) fits 32 bits, 2k fits 16");
 
 typedef struct leak {
   vec low, pair; /* k in 16-bit lanes; 2k and 1 to a 32-bit lane */
@@ -25,7 +27,7 @@ static INLINE leak leak_of(int32_t k)
 /* base + rshift_round(d * k, LEAK_FRAC) */
 static INLINE vec add_leak(vec base, vec d, leak k)
 {
-  const vec shifted = V(slli_epi32)(d, 3), split = V(add_epi32)(shifted, v_set(0x8000));
+  const vec shifted = V(slli_epi32)(d, 15 - SF_LEAK_FRAC), split = V(add_epi32)(shifted, v_set(0x8000));
   return v_dot(base, v_mulhrs_low(split, shifted, k.low), k.pair);
 }
 
@@ -364,8 +366,10 @@ static INLINE vec interpolate(const int32_t *table, vec i, vec low, int n)
  * a shift by 0, both are. */
 static INLINE vec exp2_of(vec y)
 {
+  enum { LOW = SF_LOG_FRAC - 8 }; /* below the table's index */
   const vec fraction = V_BITS(and)(y, v_set((1 << SF_LOG_FRAC) - 1));
-  const vec t = interpolate(exp2_table, V(srli_epi32)(fraction, 4), V_BITS(and)(fraction, v_set(15)), 4);
+  const vec t =
+      interpolate(exp2_table, V(srli_epi32)(fraction, LOW), V_BITS(and)(fraction, v_set((1 << LOW) - 1)), LOW);
   const vec right = V(sub_epi32)(v_set(24 - SF_SIGMA_FRAC), V(srai_epi32)(y, SF_LOG_FRAC)),
             left = V(sub_epi32)(v_set(0), right);
   const vec half = V(srli_epi32)(V(sllv_epi32)(v_set(1), right), 1);

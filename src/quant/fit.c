@@ -1,4 +1,4 @@
-/* Weights of one layer to int8 by the error of its currents. With integer inputs x and float currents c,
+/* Weights of one layer to integers by the error of its currents. With integer inputs x and float currents c,
  *
  *   E(u, q) = mean (c - u q.x)^2 = mean c^2 - 2 u q.B + u^2 q.A q      A = mean x x^T,  B = mean x c
  *
@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CANDIDATES = 40, SWEEPS = 6, WEIGHT_MAX = 127 };
-static const double SMALLEST_FACTOR = 0.4, RIDGE = 1e-3;
+enum { CANDIDATES = 40, PATIENCE = 8, SWEEPS = 6 };
+static const double STEP = 0.6 / (CANDIDATES - 1), SMALLEST_FACTOR = 0.05, RIDGE = 1e-3;
 
 typedef struct moments {
   int n_in, n_out;
@@ -77,14 +77,14 @@ static double ideal(const sf_fit_weights *weights, int i, int o, double unit)
   return weights->w[(size_t)o * (size_t)weights->stride + (size_t)i] * weights->lsb[i] / unit;
 }
 
-static double clip(double q)
+static double clip(double q, int limit)
 {
-  return q > WEIGHT_MAX ? WEIGHT_MAX : q < -WEIGHT_MAX ? -WEIGHT_MAX : q;
+  return q > limit ? limit : q < -limit ? -limit : q;
 }
 
 static void round_column(const sf_fit_weights *weights, int n_in, int o, double unit, double *q)
 {
-  for (int i = 0; i < n_in; i++) q[i] = clip(nearbyint(ideal(weights, i, o, unit)));
+  for (int i = 0; i < n_in; i++) q[i] = clip(nearbyint(ideal(weights, i, o, unit)), weights->weight_max);
 }
 
 static double column_error(const moments *m, int o, double unit, const double *q)
@@ -118,15 +118,19 @@ static double largest_product(const sf_fit_weights *weights, int n_in, int n_out
   return largest;
 }
 
+/* From the unit that clips nothing down: CANDIDATES of them, and on as long as one of the last few was the best (few
+ * bits gain from clipping more). */
 static double choose_unit(const moments *m, const sf_fit_weights *weights)
 {
-  const double widest = largest_product(weights, m->n_in, m->n_out) / WEIGHT_MAX;
+  const double widest = largest_product(weights, m->n_in, m->n_out) / weights->weight_max;
   if (widest <= weights->unit_min) return weights->unit_min;
   double best = widest, best_error = INFINITY;
-  for (int c = 0; c < CANDIDATES; c++) {
-    const double factor = 1 - (1 - SMALLEST_FACTOR) * c / (CANDIDATES - 1);
+  for (int c = 0, last = CANDIDATES - 1; c <= last && 1 - STEP * c >= SMALLEST_FACTOR; c++) {
+    const double factor = 1 - STEP * c;
     const double unit = fmax(widest * factor, weights->unit_min), error = rounding_error(m, weights, unit);
-    if (error < best_error) best = unit, best_error = error;
+    if (error >= best_error) continue;
+    best = unit, best_error = error;
+    if (last < c + PATIENCE) last = c + PATIENCE;
   }
   return best;
 }
@@ -143,7 +147,7 @@ static void descend_column(const moments *m, const sf_fit_weights *weights, int 
     for (int i = 0; i < m->n_in; i++) {
       const double curvature = m->a[i * m->n_in + i] + ridge;
       if (curvature <= 0) continue;
-      const double step = clip(nearbyint(q[i] - gradient[i] / curvature)) - q[i];
+      const double step = clip(nearbyint(q[i] - gradient[i] / curvature), weights->weight_max) - q[i];
       if (step == 0) continue;
       for (int r = 0; r < m->n_in; r++) gradient[r] += m->a[i * m->n_in + r] * step;
       gradient[i] += ridge * step;
@@ -171,7 +175,7 @@ static double quantise_columns(const moments *m, const moments *held_out, const 
     error += column_error(held_out, o, result->unit, q);
     for (int i = 0; i < m->n_in; i++) {
       w[i * SF_LANES + o] = (int8_t)q[i];
-      result->clipped += fabs(ideal(weights, i, o, result->unit)) > WEIGHT_MAX + 0.5;
+      result->clipped += fabs(ideal(weights, i, o, result->unit)) > weights->weight_max + 0.5;
     }
   }
   return error;

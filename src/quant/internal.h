@@ -27,15 +27,23 @@ typedef struct sf_fit_weights {
   const float *w;
   int stride;
   const double *lsb;
-  double unit_min; /* the unit may not be smaller (theta must fit the membrane) */
+  double unit_min; /* the unit may not be smaller (theta must fit the membrane, h its input) */
+  int weight_max;  /* |q| may not be larger */
 } sf_fit_weights;
+
+/* The largest value of a symmetric signed number of `bits` bits. */
+static inline int sf_symmetric_max(int bits)
+{
+  return (1 << (bits - 1)) - 1;
+}
 
 /* Chooses the unit and the int8 weights q[n_in][SF_LANES] that minimise the squared error of the currents.
  * `refine` false stops after the search for the unit. */
 sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,
                        sf_quant_layer *result);
 
-/* Grid tables and the LSB of each level's features. Writes scene->grid (allocated) and scene->feature_scale. */
+/* Grid tables and the LSB of each level's features. Writes scene->grid (allocated) and scene->feature_scale. Here and
+ * below report->widths are the widths to keep to. */
 void sf_quantise_levels(fx_grid *grid, const sf_model *model);
 void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibration *calibration,
                       sf_quant_report *report);

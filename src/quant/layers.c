@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1, MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1 };
-enum { DIR_FRAC = 10, DIR_TRIALS = 7, C1_INPUTS = SF_DIR_FEATURES + SF_GEO_FEATURES };
+enum { MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1 };
+enum { DIR_FRAC = 10, DIR_TRIALS = 7, DIR_PATIENCE = 2, C1_INPUTS = SF_DIR_FEATURES + SF_GEO_FEATURES };
 
 typedef struct context {
   fx_scene *scene;
@@ -43,7 +43,7 @@ static int rows_of(const sf_calibration *c)
   return c->samples * c->steps;
 }
 
-static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, bool refine,
+static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, double unit_min, bool refine,
                      sf_quant_layer *result)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
@@ -55,7 +55,8 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
   const sf_fit_weights weights = {.w = sf_model_param(c->model, param_of[layer]),
                                   .stride = to->n_in,
                                   .lsb = lsb,
-                                  .unit_min = smallest_unit(c->model, layer)};
+                                  .unit_min = unit_min,
+                                  .weight_max = sf_symmetric_max(c->report->widths.weight_bits)};
   return sf_fit_layer(&data, &weights, refine, to->w, result);
 }
 
@@ -69,11 +70,43 @@ static sf_status set_theta(const context *c, int layer, double unit)
   return sf_ok();
 }
 
+/* The largest |h| that D2's weights allow, whatever fires. */
+static int largest_h(const fx_layer *d2)
+{
+  int largest = 0;
+  for (int o = 1; o < d2->n_out; o++) {
+    int positive = 0, negative = 0;
+    for (int i = 0; i < d2->n_in; i++) {
+      const int w = d2->w[(size_t)i * SF_LANES + (size_t)o];
+      *(w > 0 ? &positive : &negative) += w;
+    }
+    if (largest < positive >> SF_H_SHIFT) largest = positive >> SF_H_SHIFT;
+    if (largest < -(negative >> SF_H_SHIFT)) largest = -(negative >> SF_H_SHIFT);
+  }
+  return largest;
+}
+
+/* A unit so coarse that h fits C1's inputs. At the widths of the core the first one is. */
+static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf_quant_layer *result)
+{
+  const int limit = sf_symmetric_max(c->report->widths.feature_bits);
+  double unit_min = smallest_unit(c->model, FX_D2);
+  for (;;) {
+    SF_TRY(fit(c, FX_D2, x, lsb, unit_min, true, result));
+    const int largest = largest_h(&c->scene->net.layer[FX_D2]);
+    if (largest <= limit) return sf_ok();
+    unit_min = result->unit * fmax(1.01, (double)largest / limit);
+  }
+}
+
 /* Everything of a layer once its inputs are known. */
 static sf_status finish_layer(const context *c, int layer, const int16_t *x, const double *lsb)
 {
   sf_quant_layer *result = &c->report->layer[layer];
-  SF_TRY(fit(c, layer, x, lsb, true, result));
+  if (layer == FX_D2)
+    SF_TRY(fit_h(c, x, lsb, result));
+  else
+    SF_TRY(fit(c, layer, x, lsb, smallest_unit(c->model, layer), true, result));
   c->scene->current_scale[layer] = result->unit;
   return layer == FX_D2 || layer == FX_C3 ? sf_ok() : set_theta(c, layer, result->unit);
 }
@@ -97,21 +130,23 @@ static void spike_inputs(const sf_calibration *cal, int from, int16_t *x)
   for (size_t i = 0; i < n; i++) x[i] = cal->spikes[from][i];
 }
 
-static int16_t to_input(double value)
+static int16_t to_input(double value, int limit)
 {
-  return (int16_t)(value > INPUT_LIMIT ? INPUT_LIMIT : value < -INPUT_LIMIT ? -INPUT_LIMIT : value);
+  return (int16_t)(value > limit ? limit : value < -limit ? -limit : value);
 }
 
 /* d rounded to its LSB, h rounded down to its own as the accelerator does. */
-static void colour_inputs(const sf_calibration *cal, double d_lsb, double h_lsb, int16_t *x)
+static void colour_inputs(const context *c, double d_lsb, double h_lsb, int16_t *x)
 {
+  const sf_calibration *cal = c->calibration;
+  const int limit = sf_symmetric_max(c->report->widths.feature_bits), one = 1 << SF_H_SHIFT;
   for (int row = 0; row < rows_of(cal); row++) {
     const float *d = cal->direction + (size_t)(row / cal->steps) * SF_DIR_FEATURES;
     const float *current = cal->target[FX_D2] + (size_t)row * SF_DENSITY_OUT;
     int16_t *to = x + (size_t)row * C1_INPUTS;
-    for (int i = 0; i < SF_DIR_FEATURES; i++) to[i] = to_input(nearbyint(d[i] / d_lsb));
+    for (int i = 0; i < SF_DIR_FEATURES; i++) to[i] = to_input(nearbyint(d[i] / d_lsb), limit);
     for (int j = 0; j < SF_GEO_FEATURES; j++)
-      to[SF_DIR_FEATURES + j] = to_input(floor(nearbyint(8 * current[1 + j] / h_lsb) / (1 << SF_H_SHIFT)));
+      to[SF_DIR_FEATURES + j] = to_input(floor(nearbyint(one * current[1 + j] / h_lsb) / one), limit);
   }
 }
 
@@ -120,22 +155,26 @@ static void colour_lsb(double *lsb, double d_lsb, double h_lsb)
   for (int i = 0; i < C1_INPUTS; i++) lsb[i] = i < SF_DIR_FEATURES ? d_lsb : h_lsb;
 }
 
-/* C1 has one unit for rows of d and of h, whose LSBs differ: a coarser d makes its int8 weights finer. */
+/* C1 has one unit for rows of d and of h, whose LSBs differ: a coarser d makes its weights finer. Harmonics are below
+ * 3/4 and fill `feature_bits` at 2^-(feature_bits-1). Ends DIR_PATIENCE trials after the best one. */
 static sf_status colour_layer(const context *c, int16_t *x)
 {
   const double h_lsb = ldexp(c->scene->current_scale[FX_D2], SF_H_SHIFT);
-  double lsb[C1_INPUTS], best = ldexp(1, -DIR_FRAC), best_error = INFINITY;
-  for (int trial = 0; trial < DIR_TRIALS; trial++) {
-    const double d_lsb = ldexp(1, trial - DIR_FRAC);
+  const int bits = c->report->widths.feature_bits - 1, finest = bits < DIR_FRAC ? bits : DIR_FRAC;
+  double lsb[C1_INPUTS], best = ldexp(1, -finest), best_error = INFINITY;
+  for (int frac = finest, last = DIR_FRAC - DIR_TRIALS + 1; frac >= last && frac > 0; frac--) {
+    const double d_lsb = ldexp(1, -frac);
     sf_quant_layer result;
     colour_lsb(lsb, d_lsb, h_lsb);
-    colour_inputs(c->calibration, d_lsb, h_lsb, x);
-    SF_TRY(fit(c, FX_C1, x, lsb, false, &result));
-    if (result.error < best_error) best = d_lsb, best_error = result.error;
+    colour_inputs(c, d_lsb, h_lsb, x);
+    SF_TRY(fit(c, FX_C1, x, lsb, smallest_unit(c->model, FX_C1), false, &result));
+    if (result.error >= best_error) continue;
+    best = d_lsb, best_error = result.error;
+    if (last > frac - DIR_PATIENCE) last = frac - DIR_PATIENCE;
   }
   c->scene->dir_scale = best;
   colour_lsb(lsb, best, h_lsb);
-  colour_inputs(c->calibration, best, h_lsb, x);
+  colour_inputs(c, best, h_lsb, x);
   return finish_layer(c, FX_C1, x, lsb);
 }
 
@@ -150,7 +189,8 @@ static sf_status set_scale(const context *c, int layer, double factor, int bias,
   if (mul > 65535) mul = nearbyint(ldexp(factor, --shift));
   if (shift < 0)
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
-                   c->name, c->model->param[param_of[layer]].name, c->scene->current_scale[layer] * 127);
+                   c->name, c->model->param[param_of[layer]].name,
+                   c->scene->current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
   *scale = (fx_scale){.mul = (int32_t)mul, .shift = shift, .bias = bias};
   return sf_ok();
 }

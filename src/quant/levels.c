@@ -1,12 +1,12 @@
-/* Hash grid to int8, one scale per level. The core only shifts the interpolated sum, so the scale need not be a power
- * of two: what is left of it after the shift is the LSB of the level's features, and goes into their rows of D1. */
+/* Hash grid to integers, one scale per level. The core only shifts the interpolated sum, so the scale need not be a
+ * power of two: what is left of it after the shift is the LSB of the level's features, and goes into their rows of D1.
+ */
 #include "src/quant/internal.h"
 #include <math.h>
 #include <string.h>
 
-enum { ENTRY_MAX = 127, FEATURE_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1, PRODUCT_FRAC = 16, SHIFT_MAX = 31 };
-enum { TRIALS = 4, SCALE_TRIALS = 8 };
-static const double NARROWER = 0.86;      /* 0.86^7 = 0.35 of the widest scale is the narrowest tried */
+enum { PRODUCT_FRAC = 16, SHIFT_MAX = 31, TRIALS = 4, SCALE_TRIALS = 8, SCALE_TRIALS_MAX = 20 };
+static const double NARROWER = 0.86;      /* 0.86^7 = 0.35 of the widest scale is tried, and less where that pays */
 static const double SCALE_MIN = 0x1p-140; /* below every difference of two floats */
 
 /* Geometry alone: what fx_scene_allocate needs. */
@@ -35,19 +35,19 @@ static double clipped_to(double value, double limit)
 }
 
 /* exponent e of the features' LSB 2^e: least squared error with clipping, starting from the largest feature. */
-static int feature_exponent(const sf_calibration *c)
+static int feature_exponent(const sf_calibration *c, int feature_max)
 {
   const size_t n = (size_t)c->samples * (size_t)c->features;
   double largest = 0, best_error = INFINITY;
   for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(c->f[i]));
   if (largest == 0) return -10;
-  const int widest = (int)ceil(log2(largest / FEATURE_LIMIT));
+  const int widest = (int)ceil(log2(largest / feature_max));
   int best = widest;
   for (int trial = 0; trial < TRIALS; trial++) {
     const double lsb = ldexp(1, widest - trial);
     double error = 0;
     for (size_t i = 0; i < n; i++) {
-      const double d = c->f[i] - lsb * clipped_to(nearbyint(c->f[i] / lsb), FEATURE_LIMIT);
+      const double d = c->f[i] - lsb * clipped_to(nearbyint(c->f[i] / lsb), feature_max);
       error += d * d;
     }
     if (error < best_error) best = widest - trial, best_error = error;
@@ -55,46 +55,69 @@ static int feature_exponent(const sf_calibration *c)
   return best;
 }
 
+typedef struct format {
+  int entry_max, shift_min;
+  double common; /* no level's features have a smaller LSB */
+} format;
+
+/* A feature lies between the entries around it, so a shift that makes the largest possible entry fit makes every
+ * feature fit. The core's own width needs none: it saturates there. */
+static int smallest_shift(const sf_quant_widths *widths, int entry_max)
+{
+  int shift = 0;
+  if (widths->feature_bits == SF_INPUT_BITS) return 0;
+  while (nearbyint(ldexp(entry_max, PRODUCT_FRAC - shift)) > sf_symmetric_max(widths->feature_bits)) shift++;
+  return shift;
+}
+
+static format choose_format(const sf_calibration *c, const sf_quant_widths *widths)
+{
+  const int entry_max = sf_symmetric_max(widths->grid_bits);
+  return (format){.entry_max = entry_max,
+                  .shift_min = smallest_shift(widths, entry_max),
+                  .common = ldexp(1, feature_exponent(c, sf_symmetric_max(widths->feature_bits)))};
+}
+
 /* A level's scale (value of one LSB of its entries) sets its shift and the LSB of its features: the smallest one not
  * below `common`. Levels may differ because D1's weights take the difference up, row by row. */
-static void set_level(fx_scene *scene, int level, double scale, double common)
+static void set_level(fx_scene *scene, int level, double scale, const format *format)
 {
-  int shift = PRODUCT_FRAC + (int)ceil(log2(common / scale));
-  if (shift < 0) shift = 0;
+  int shift = PRODUCT_FRAC + (int)ceil(log2(format->common / scale));
+  if (shift < format->shift_min) shift = format->shift_min;
   if (shift > SHIFT_MAX) shift = SHIFT_MAX;
   scene->grid.shift[level] = shift;
   scene->feature_scale[level] = ldexp(scale, shift - PRODUCT_FRAC);
 }
 
-static int64_t fill_level(fx_grid *grid, const float *value, int level, double scale)
+static int64_t fill_level(fx_grid *grid, const float *value, int level, double scale, int entry_max)
 {
   const int64_t begin = grid->offset[level] * FX_GRID_FEATURES, end = level_end(grid, level) * FX_GRID_FEATURES;
   int64_t clipped = 0;
   for (int64_t i = begin; i < end; i++) {
     const double q = nearbyint(value[i] / scale);
-    grid->table[i] = (int8_t)clipped_to(q, ENTRY_MAX);
-    clipped += fabs(q) > ENTRY_MAX;
+    grid->table[i] = (int8_t)clipped_to(q, entry_max);
+    clipped += fabs(q) > entry_max;
   }
   return clipped;
 }
 
-static int64_t fill_all(fx_scene *scene, const float *value, const double *scale, double common)
+static int64_t fill_all(fx_scene *scene, const float *value, const double *scale, const format *format)
 {
   int64_t clipped = 0;
   for (int l = 0; l < scene->grid.levels; l++) {
-    set_level(scene, l, scale[l], common);
-    clipped += fill_level(&scene->grid, value, l, scale[l]);
+    set_level(scene, l, scale[l], format);
+    clipped += fill_level(&scene->grid, value, l, scale[l], format->entry_max);
   }
   return clipped;
 }
 
 /* The scale that just holds the level's largest entry; a level without entries of its own gets any. */
-static double widest_scale(const fx_grid *grid, const float *value, int level)
+static double widest_scale(const fx_grid *grid, const float *value, int level, int entry_max)
 {
   double largest = 0;
   const int64_t end = level_end(grid, level) * FX_GRID_FEATURES;
   for (int64_t i = grid->offset[level] * FX_GRID_FEATURES; i < end; i++) largest = fmax(largest, fabs(value[i]));
-  return fmax(largest / ENTRY_MAX, SCALE_MIN);
+  return fmax(largest / entry_max, SCALE_MIN);
 }
 
 /* Squared error of each level's features on the calibration positions with the table as it stands. */
@@ -112,19 +135,23 @@ static void level_errors(const fx_scene *scene, const sf_calibration *c, double 
   }
 }
 
-/* Each trial narrows the scale of every level at once; each level keeps its own best one. */
-static void choose_scales(fx_scene *scene, const float *value, const sf_calibration *c, double common, double *best)
+/* Each trial narrows the scale of every level at once; each level keeps its own best one. The last trial is one that
+ * helped no level (few bits gain from clipping more). */
+static void choose_scales(fx_scene *scene, const float *value, const sf_calibration *c, const format *format,
+                          double *best)
 {
   double widest[FX_LEVELS_MAX], best_error[FX_LEVELS_MAX];
   for (int l = 0; l < scene->grid.levels; l++)
-    widest[l] = widest_scale(&scene->grid, value, l), best_error[l] = INFINITY;
-  for (int trial = 0; trial < SCALE_TRIALS; trial++) {
+    widest[l] = widest_scale(&scene->grid, value, l, format->entry_max), best_error[l] = INFINITY;
+  bool better = true;
+  for (int trial = 0; trial < SCALE_TRIALS || (better && trial < SCALE_TRIALS_MAX); trial++) {
     double scale[FX_LEVELS_MAX], error[FX_LEVELS_MAX];
+    better = false;
     for (int l = 0; l < scene->grid.levels; l++) scale[l] = widest[l] * pow(NARROWER, trial);
-    fill_all(scene, value, scale, common);
+    fill_all(scene, value, scale, format);
     level_errors(scene, c, error);
     for (int l = 0; l < scene->grid.levels; l++)
-      if (error[l] < best_error[l]) best[l] = scale[l], best_error[l] = error[l];
+      if (error[l] < best_error[l]) best[l] = scale[l], best_error[l] = error[l], better = true;
   }
 }
 
@@ -141,10 +168,10 @@ void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibrati
                       sf_quant_report *report)
 {
   const float *value = sf_model_param(model, SF_P_GRID);
-  const double common = ldexp(1, feature_exponent(calibration));
+  const format format = choose_format(calibration, &report->widths);
   double scale[FX_LEVELS_MAX];
-  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->feature_scale[l] = common;
-  choose_scales(scene, value, calibration, common, scale);
-  report->grid_clipped = fill_all(scene, value, scale, common);
+  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->feature_scale[l] = format.common;
+  choose_scales(scene, value, calibration, &format, scale);
+  report->grid_clipped = fill_all(scene, value, scale, &format);
   report->feature_error = relative_error(scene, calibration);
 }

@@ -54,6 +54,31 @@ static sf_status check_model(const sf_model *model, const char *name, const sf_q
   return check_finite(model, name);
 }
 
+/* *bits 0 becomes `high`. */
+static sf_status resolve_width(int *bits, int low, int high, const char *what, const char *name)
+{
+  if (*bits == 0) *bits = high;
+  if (*bits >= low && *bits <= high) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: %d bits asked for %s, expected %d..%d", name, *bits, what, low, high);
+}
+
+static sf_status resolve_widths(sf_quant_widths *widths, const char *name)
+{
+  SF_TRY(resolve_width(&widths->weight_bits, 2, SF_WEIGHT_BITS, "weights", name));
+  SF_TRY(resolve_width(&widths->feature_bits, 8, SF_INPUT_BITS, "features", name));
+  SF_TRY(resolve_width(&widths->leak_bits, 4, SF_LEAK_FRAC, "leaks", name));
+  return resolve_width(&widths->grid_bits, 2, SF_GRID_BITS, "grid entries", name);
+}
+
+static int64_t packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
+{
+  const int64_t res = scene->occ_res;
+  int64_t bits = res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
+  for (int l = 0; l < SF_LAYERS; l++)
+    bits += (int64_t)scene->net.layer[l].n_in * scene->net.layer[l].n_out * widths->weight_bits;
+  return (bits + 7) / 8;
+}
+
 static void set_sizes(fx_scene *scene, const sf_model *model)
 {
   const int32_t hidden = model->config.hidden;
@@ -64,11 +89,16 @@ static void set_sizes(fx_scene *scene, const sf_model *model)
   scene->occ_res = model->config.occ_res;
 }
 
-static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options)
+/* k with `bits` fraction bits, as U1.LEAK_FRAC. */
+static int32_t leak_value(float logit, int bits)
+{
+  return (int32_t)nearbyint(ldexp(1 / (1 + exp(-(double)logit)), bits)) << (SF_LEAK_FRAC - bits);
+}
+
+static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options, int leak_bits)
 {
   const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
-  for (int l = 0; l < SF_LAYERS; l++)
-    scene->net.layer[l].k = (int32_t)nearbyint(ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC));
+  for (int l = 0; l < SF_LAYERS; l++) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
   scene->net.mode = model->config.mode;
   scene->net.steps = options->steps ? options->steps : model->t_r;
   scene->step_q24 = (int32_t)nearbyint(ldexp(sqrt(3.0) / model->config.lattice, SF_DELTA_FRAC));
@@ -86,11 +116,12 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
 {
   const size_t cells = (size_t)model->config.occ_res * (size_t)model->config.occ_res * (size_t)model->config.occ_res;
   set_sizes(scene, model);
-  set_scalars(scene, model, options);
+  set_scalars(scene, model, options, report->widths.leak_bits);
   SF_TRY(fx_scene_allocate(scene, name));
   memcpy(scene->occupancy, model->occupancy, cells / 8);
   SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
   report->samples = calibration->samples;
+  report->packed_bytes = packed_bytes(scene, &report->widths);
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
   return fx_scene_check(scene, name);
@@ -102,7 +133,9 @@ sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char 
   sf_calibration calibration = {0};
   memset(scene, 0, sizeof *scene);
   memset(report, 0, sizeof *report);
+  report->widths = options->widths;
   SF_TRY(check_model(model, name, options));
+  SF_TRY(resolve_widths(&report->widths, name));
   const sf_status status = quantise(scene, model, name, options, &calibration, report);
   sf_calibration_free(&calibration);
   if (status.code != SF_OK) fx_scene_free(scene);

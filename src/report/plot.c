@@ -1,6 +1,6 @@
 /* Gnuplot scripts with their data inside. */
+#include "report/internal.h"
 #include "spikefield/io.h"
-#include "spikefield/report.h"
 #include <math.h>
 #include <string.h>
 
@@ -11,18 +11,18 @@ enum { BETAS = 3 };
 static const int learned[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7,   SF_RUN_BETA_1E6, SF_RUN_NO_STAGE1,
                               SF_RUN_NO_EXTRA, SF_RUN_NO_PENALTY, SF_RUN_NO_BUDGET};
 enum { LEARNED = 7 };
-/* Okabe and Ito's colours: told apart by all eyes. */
-static const char *const colour[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000"};
+const char *const sf_plot_colour[SF_PLOT_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                     "#56b4e9", "#e69f00", "#000000"};
 
 /* A gnuplot string; what could end it is replaced. */
-static void quote(char *to, size_t size, const char *from)
+void sf_plot_quote(char *to, size_t size, const char *from)
 {
   snprintf(to, size, "%s", from);
   for (char *c = to; *c; c++)
     if (*c == '\'' || *c == '\n' || *c == '\\') *c = '_';
 }
 
-static void head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key)
+void sf_plot_head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key)
 {
   fprintf(out,
           "# gnuplot %s.gp writes %s.svg\n"
@@ -42,7 +42,7 @@ static const char *title_of(const sf_reproduction *r, int scene, const char *wha
              r->profile);
   else
     snprintf(text, size, "%s: %s, profile %s", what, r->scene[scene].name, r->profile);
-  quote(name, sizeof name, text);
+  sf_plot_quote(name, sizeof name, text);
   snprintf(text, size, "%s", name);
   return text;
 }
@@ -62,7 +62,7 @@ static void plot_steps(FILE *out, const sf_reproduction *r, int scene, const cha
   const double ann = ann_psnr(r, scene);
   bool shown[BETAS] = {false};
   title_of(r, scene, "PSNR after every time step", title, sizeof title);
-  head(out, name, title, "time steps", "PSNR, dB (float, held-out views)", "outside right top");
+  sf_plot_head(out, name, title, "time steps", "PSNR, dB (float, held-out views)", "outside right top");
   fprintf(out, "set xrange [0.7:%d.3]\nset xtics 1\n", SF_T_MAX);
   for (int i = 0; i < BETAS; i++) {
     fprintf(out, "$steps%d << EOD\n", i);
@@ -77,13 +77,13 @@ static void plot_steps(FILE *out, const sf_reproduction *r, int scene, const cha
     if (shown[i])
       fprintf(out,
               "$steps%d using 1:2 with linespoints linecolor '%s' linewidth 2 pointtype %d pointsize 1 title '%s', ", i,
-              colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
+              sf_plot_colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
   for (int i = 0; i < BETAS; i++) {
     const double t_r = sf_reproduction_mean(r, scene, betas[i], SF_METRIC_STEPS, NULL);
     if (scene < 0 || !shown[i] || isnan(t_r)) continue;
     fprintf(out,
             "$steps%d using ($1 == %.0f ? $1 : NaN):2 with points linecolor '%s' pointtype 6 pointsize 2.4 notitle, ",
-            i, t_r, colour[i]);
+            i, t_r, sf_plot_colour[i]);
   }
   if (scene >= 0)
     fprintf(out, "NaN with points linecolor '#555555' pointtype 6 pointsize 2.4 title 't_r, as learned', ");
@@ -127,8 +127,8 @@ static void plot_energy(FILE *out, const sf_reproduction *r, int scene, const ch
 {
   char title[512], block[16];
   title_of(r, scene, "PSNR against energy", title, sizeof title);
-  head(out, name, title, "energy, mJ per frame (counted by the audit, paper ledger)",
-       "PSNR, dB (float, held-out views)", "outside right top");
+  sf_plot_head(out, name, title, "energy, mJ per frame (counted by the audit, paper ledger)",
+               "PSNR, dB (float, held-out views)", "outside right top");
   fprintf(out, "set xrange [0:*]\nset offsets graph 0, graph 0.05, graph 0.08, graph 0.05\n$prefix << EOD\n");
   bool any = false;
   for (int t = 0; t < SF_T_MAX; t++) {
@@ -148,8 +148,8 @@ static void plot_energy(FILE *out, const sf_reproduction *r, int scene, const ch
     fprintf(out, "$prefix using 1:2 with linespoints linecolor '#999999' pointtype 7 pointsize 0.6 title 'beta = 5e-7, "
                  "t = 1, 2, ...', $prefix using 1:2:3 with labels offset 0,-1 notitle, ");
   for (int i = 0; i < BETAS; i++)
-    fprintf(out, "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.8 title '%s', ", i, colour[i],
-            5 + 2 * i, sf_run_kinds[betas[i]].title);
+    fprintf(out, "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.8 title '%s', ", i,
+            sf_plot_colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
   fprintf(out, "$ann using 1:2 with points linecolor '#000000' pointtype 2 pointsize 1.8 title 'ANN (ReLU twin)'\n");
 }
 
@@ -169,7 +169,7 @@ static void plot_t_star(FILE *out, const sf_reproduction *r, int scene, const ch
 {
   char title[512];
   title_of(r, scene, "t* over the iterations", title, sizeof title);
-  head(out, name, title, "iteration", "t*, time steps", "outside right top");
+  sf_plot_head(out, name, title, "iteration", "t*, time steps", "outside right top");
   fprintf(out, "set yrange [0.8:%d.2]\nset ytics 1\nset xrange [0:*]\n", SF_T_MAX);
   for (int i = 0; i < LEARNED; i++) {
     const sf_run *run = &r->scene[scene].run[learned[i]];
@@ -182,8 +182,8 @@ static void plot_t_star(FILE *out, const sf_reproduction *r, int scene, const ch
   fprintf(out, "plot ");
   for (int i = 0; i < LEARNED; i++)
     if (r->scene[scene].run[learned[i]].points > 0)
-      fprintf(out, "$t%d using 1:2 with lines linecolor '%s' linewidth 2 dashtype %d title '%s', ", i, colour[i],
-              i < BETAS ? 1 : i - BETAS + 2, sf_run_kinds[learned[i]].title);
+      fprintf(out, "$t%d using 1:2 with lines linecolor '%s' linewidth 2 dashtype %d title '%s', ", i,
+              sf_plot_colour[i], i < BETAS ? 1 : i - BETAS + 2, sf_run_kinds[learned[i]].title);
   fprintf(out, "NaN notitle\n");
 }
 
@@ -216,7 +216,7 @@ static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, 
   else
     snprintf(name, sizeof name, "%s-%s", p->name, r->scene[scene].name);
   snprintf(path, sizeof path, "%s/plots/%s.gp", r->dir, name);
-  quote(quoted, sizeof quoted, name);
+  sf_plot_quote(quoted, sizeof quoted, name);
   SF_TRY(sf_writer_open(&writer, path));
   p->write(writer.file, r, scene, quoted);
   ++*count;

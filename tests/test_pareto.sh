@@ -1,0 +1,117 @@
+#!/bin/bash
+# make pareto on a tiny model of its own: points against sim_render; a variant build; interrupted and continued equals
+# uninterrupted; a point that fails; other parameters start again.   usage: test_pareto.sh BUILD
+set -u
+export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} OPT=-O0 CFLAGS=-g0
+programs=$(cd "${1:?usage: test_pareto.sh BUILD}/bin" && pwd) || exit 2
+script=$(cd "$(dirname "$0")/../tools" && pwd)/pareto.sh
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_pareto.XXXXXX") || exit 1
+pid=
+trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+fail() {
+  echo "FAILED: $1"
+  [ -e "$work/out" ] && tail -n 12 "$work/out" | cut -c -200
+  exit 1
+}
+build() { mkdir -p "$work/$1/bin" && ln -s "$programs"/* "$work/$1/bin/"; }
+# point LINE: a stand-in in build `part` that runs LINE and goes on as sf_point.
+point() {
+  rm "$work/part/bin/sf_point"
+  printf '%s\n' '#!/bin/bash' "$1" "exec '$programs/sf_point' \"\$@\"" >"$work/part/bin/sf_point"
+  chmod +x "$work/part/bin/sf_point"
+}
+pareto() { # NAME STATUS OPTIONS...: output in $work/out
+  local name=$1 wanted=$2 got
+  shift 2
+  "$script" "$work/$name" --profile smoke "$@" >"$work/out" 2>&1
+  got=$?
+  [ $got -eq "$wanted" ] || fail "$name $*: exit status $got, expected $wanted"
+}
+points() { echo "$work/$1/pareto/smoke/points"; }
+count() { grep -c "$1" "$work/out"; }
+number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" | head -n 1; }
+facts() { (cd "$(points "$1")" && grep -v '"samples_per_second"' ./*.json); }
+
+build whole
+pareto whole 0
+[ "$(count '^\[.* dB, elapsed')" -eq 11 ] || fail "not 11 points"
+sweep=$work/whole/pareto/smoke
+[ "$(wc -l <"$sweep/points.csv")" -eq 12 ] || fail "points.csv has not 11 rows"
+grep -q '^## Pareto front' "$sweep/table.md" || fail "no front in table.md"
+grep -q 'not available' "$sweep/points.csv" || fail "the missing RTL cost is not named"
+[ "$(number "$(points whole)/tiny-AC_FRAC=4.json" ac_frac)" = 4 ] || fail "the variant has no 4 fraction bits"
+[ "$(number "$(points whole)/tiny.json" ac_frac)" = 8 ] || fail "the centre has no 8 fraction bits"
+if command -v gnuplot >/dev/null; then
+  for plot in widths front-energy front-bytes front-traffic; do
+    grep -q '</svg>' "$sweep/plots/$plot.svg" || fail "$plot.svg is not whole"
+  done
+fi
+echo "whole: 11 points"
+
+# The same picture as sim_render makes of the exported scene.
+data=$work/whole/pareto/smoke-data
+for options in "" "--weight-bits 4 --grid-bits 5 --leak-bits 6 --feature-bits 9"; do
+  # shellcheck disable=SC2086
+  {
+    "$programs/sf_export" "$data/tiny.safetensors" -o "$work/s.snn" $options >/dev/null
+    "$programs/sf_point" "$data/tiny.safetensors" "$data" --view 1 --json $options >"$work/point.json"
+  }
+  "$programs/sim_render" "$work/s.snn" "$data" --view 1 -o "$work/s.exr" --json >"$work/fixed.json" 2>/dev/null
+  ours=$(printf '%.9f' "$(number "$work/point.json" psnr_truth_db)") theirs=$(printf '%.9f' "$(number "$work/fixed.json" psnr)")
+  [ "$ours" = "$theirs" ] || fail "'$options': PSNR $ours, sim_render $theirs"
+  awk -v mj="$(number "$work/point.json" energy_mj)" -v fj="$(number "$work/fixed.json" energy_fj)" \
+    'BEGIN { d = mj * 1e12 / fj - 1; exit !(d < 1e-12 && d > -1e-12) }' || fail "'$options': energy differs from sim_render"
+done
+echo "points: as sim_render"
+
+build part
+point 'sleep 0.1'
+setsid "$script" "$work/part" --profile smoke --variants none >"$work/out" 2>&1 &
+pid=$!
+for ((i = 0; i < 4000; i++)); do
+  [ "$(find "$work/part/pareto/smoke/points" -name '*.json' 2>/dev/null | wc -l)" -ge 3 ] && break
+  kill -0 "$pid" 2>/dev/null || fail "over before it was interrupted"
+  sleep 0.01
+done
+kill -TERM "$pid"
+wait "$pid"
+[ $? -eq 130 ] || fail "SIGTERM: not exit status 130"
+pid=
+done_before=$(find "$(points part)" -name '*.json' | wc -l)
+[ "$done_before" -lt 9 ] || fail "nothing was left to do"
+[ -z "$(find "$(points part)" -name '*.part')" ] || fail "a part of a point was left"
+pareto part 0 --variants none
+[ "$(count 'finished before')" -eq "$done_before" ] || fail "finished points were repeated"
+rm "$(points whole)"/tiny-AC_FRAC=4*.json
+diff <(facts whole) <(facts part) >"$work/difference" || { cat "$work/difference"; fail "an interrupted sweep differs"; }
+echo "interrupted: the same points"
+
+# shellcheck disable=SC2016
+point 'case " $* " in *" --leak-bits 6 "*) echo "sf_point: planted failure" >&2; exit 1 ;; esac'
+rm "$(points part)/tiny-leak-bits=6.json"
+pareto part 1 --variants none
+[ "$(count 'leak-bits=6 *FAILED: sf_point: planted failure')" -eq 1 ] || fail "the failure is not reported"
+[ "$(count '^wrote ')" -ge 1 ] || fail "no report beside the failure"
+point :
+pareto part 0 --variants none
+[ "$(count 'finished before')" -eq 8 ] || fail "the failed point was not repeated alone"
+pareto part 0 --variants none --every 3
+[ "$(count 'finished before')" -eq 0 ] || fail "points of other pixels were kept"
+pareto part 0 --report
+[ "$(count '^## ')" -ge 5 ] || fail "--report prints no tables"
+echo '{"name": "x"' >"$(points part)/tiny-steps=1.json"
+pareto part 1 --report
+[ "$(count 'tiny-steps=1.json')" -eq 1 ] || fail "the broken point is not named"
+echo "failure: reported, repeated alone"
+
+flock "$work/part/pareto/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
+[ "$(count 'another run')" -eq 1 ] || fail "the other run is not named"
+for bad in "--profile fast" "--every x" "--every 0" "--variants some" "--nosuch 1" "--view" "--model m"; do
+  # shellcheck disable=SC2086
+  pareto part 2 $bad
+  [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"
+done
+pareto part 1 --model "$work/nowhere" --data "$work"
+[ "$(count nowhere)" -eq 1 ] || fail "the missing model is not named"
+echo "parameters: ok"
