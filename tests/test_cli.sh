@@ -64,6 +64,9 @@ size_of() { wc -c <"$1"; }
 
 good sf_scene simple -o d --size 16 --train 3 --test 2
 good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits 4 --stage2 2 --threads 1
+good sf_export tuned.safetensors -o tuned.snn
+if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
 good sf_export model.safetensors -o s.snn
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
@@ -119,6 +122,9 @@ number sf_train --input-mode sometimes nan ''
 number sf_train --net cnn
 number sf_train --fixed-steps -1 9 nan
 number sf_train --psnr-prefixes -1 nan
+number sf_train --weight-bits 1 9 nan
+usage --fine-tune sf_train d -o out --weight-bits 4
+data scale sf_train d -o out --fine-tune model.safetensors --scale 0.3
 usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
 number sf_cosim --rays -1 nan inf x

@@ -250,7 +250,7 @@ START_TEST(fit_recovers_exact_weights)
       for (int o = 0; o < OUT; o++) target[r * OUT + o] += w[o * IN + i] * (float)(x[r * IN + i] * lsb[i]);
     }
   const sf_fit_data data = {ROWS, IN, OUT, x, target};
-  const sf_fit_weights weights = {w, IN, lsb, 1e-9, 127};
+  const sf_fit_weights weights = {w, IN, lsb, 1e-9, 127, 0};
   sf_quant_layer result;
   ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &result).code, SF_OK);
   ck_assert_double_eq_tol(result.unit, 0.125, 1e-9);
@@ -274,7 +274,7 @@ START_TEST(refinement_lowers_the_held_out_error)
   for (int i = 0; i < SF_LANES; i++) ones[i] = 1;
   for (int i = 0; i < rows * 128; i++) x[i] = c.spikes[FX_C1][i];
   const sf_fit_data data = {rows, 128, 128, x, c.target[FX_C2]};
-  const sf_fit_weights weights = {sf_model_param(&m, SF_P_W4), 128, ones, 1e-9, 127};
+  const sf_fit_weights weights = {sf_model_param(&m, SF_P_W4), 128, ones, 1e-9, 127, 0};
   sf_quant_layer rounded, refined;
   ck_assert_int_eq(sf_fit_layer(&data, &weights, false, q, &rounded).code, SF_OK);
   ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &refined).code, SF_OK);

@@ -1,6 +1,7 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
+#include "spikefield/quant.h"
 #include "spikefield/train.h"
 #include <math.h>
 #include <omp.h>
@@ -9,10 +10,10 @@
 #include <unistd.h>
 
 typedef struct arguments {
-  const char *output, *log, *summary;
+  const char *output, *log, *summary, *fine_tune;
   sf_train_options train;
   double scale, theta, checkpoint_minutes;
-  int downscale, threads, eval_views, prefix_views, limit;
+  int downscale, threads, eval_views, prefix_views, limit, weight_bits;
   bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
 } arguments;
 
@@ -63,6 +64,10 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "ablation: without max time-step scaling"},
       {"--fixed-steps", 0, SF_ARG_INT, &t->fixed_steps, 0, SF_T_MAX, NULL, "N",
        "stage II trains the prefix of N steps alone, t* = N, without L_budg; 0 = t* is learned (default 0)"},
+      {"--fine-tune", 0, SF_ARG_STRING, &a->fine_tune, 0, 0, NULL, "MODEL",
+       "start from this trained model, at its t_r, with weights rounded as sf_export does; stage II alone"},
+      {"--weight-bits", 0, SF_ARG_INT, &a->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B",
+       "of --fine-tune: bits of a weight (default 8)"},
       {"--eval-views", 0, SF_ARG_INT, &a->eval_views, 0, 1e6, NULL, "N",
        "test views rendered at the end, 0 = all (default 0)"},
       {"--psnr-prefixes", 0, SF_ARG_INT, &a->prefix_views, 0, 1e6, NULL, "N",
@@ -85,7 +90,8 @@ static sf_cli make_cli(arguments *a, sf_option *o)
                   .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
                               "  sf_train lego -o lego.safetensors --stage1 10000 --stage2 30000 --resume\n"
-                              "  sf_train lego -o twin.safetensors --net ann --minutes 10\n",
+                              "  sf_train lego -o twin.safetensors --net ann --minutes 10\n"
+                              "  sf_train lego -o four.safetensors --fine-tune lego.safetensors --weight-bits 4\n",
                   .options = o,
                   .min_positional = 1,
                   .max_positional = 1};
@@ -314,6 +320,25 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
   return status;
 }
 
+/* The model to fine-tune, with the scales that sf_export would choose for it. */
+static sf_status load_start(const arguments *a, float scale, sf_model *model)
+{
+  const sf_quant_options how = {.widths.weight_bits = a->weight_bits ? a->weight_bits : SF_WEIGHT_BITS};
+  sf_quant_report report;
+  fx_scene scene;
+  SF_TRY(sf_model_load(model, a->fine_tune));
+  sf_status status = sf_quantise_report(&scene, model, a->fine_tune, &how, &report);
+  if (!status.code) {
+    fx_scene_free(&scene);
+    model->scales = report.scales;
+    if (fabsf(model->config.scale - scale) > 1e-6f * scale)
+      status = sf_fail(SF_E_RANGE, "%s: metadata 'scale' is %g, the data has %g (see --scale)", a->fine_tune,
+                       (double)model->config.scale, (double)scale);
+  }
+  if (status.code) sf_model_free(model);
+  return status;
+}
+
 static sf_status run(arguments *a, const char *path)
 {
   char log_path[4096];
@@ -322,11 +347,18 @@ static sf_status run(arguments *a, const char *path)
   const sf_dataset_options how = {.downscale = a->downscale, .scale = (float)a->scale, .limit = a->limit};
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
   a->train.config.scale = data.scale;
-  FILE *log = fopen(a->log, a->resume ? "a" : "w");
-  sf_status status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing", a->log);
+  sf_model start = {0};
+  sf_status status = sf_ok();
+  if (a->fine_tune && !a->resume) {
+    status = load_start(a, data.scale, &start);
+    a->train.start = &start;
+  }
+  FILE *log = status.code ? NULL : fopen(a->log, a->resume ? "a" : "w");
+  if (!status.code) status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing", a->log);
   if (log) setvbuf(log, NULL, _IOLBF, 0);
   if (!status.code) status = train_and_report(path, &data, &how, a, log);
   if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
+  sf_model_free(&start);
   sf_dataset_free(&data);
   return status;
 }
@@ -348,6 +380,8 @@ int main(int argc, char **argv)
   if (a.train.fixed_steps > a.train.config.steps)
     return sf_cli_finish(
         &cli, sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a.train.fixed_steps, a.train.config.steps));
+  if (a.weight_bits && !a.fine_tune)
+    return sf_cli_finish(&cli, sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL"));
   sf_cli_catch_signals();
   status = sf_config_check(&a.train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;

@@ -44,6 +44,17 @@ typedef struct sf_grid_level {
   size_t offset;    /* first entry */
 } sf_grid_level;
 
+/* What the exporter rounds to, once it is settled; fine-tuning learns weights for it. */
+typedef struct sf_scales {
+  int32_t weight_bits; /* weights within +-(2^(weight_bits-1) - 1), 2..SF_WEIGHT_BITS; 0: not settled */
+  struct sf_lsb {      /* values of one LSB, > 0 */
+    float entry[16], feature[16]; /* grid entries and features of a level */
+    float direction;              /* spherical harmonics */
+    float current[SF_LAYERS];     /* currents: weight = integer * current / LSB of its input */
+  } lsb;
+} sf_scales;
+enum { SF_SCALES = sizeof(struct sf_lsb) / sizeof(float) };
+
 typedef struct sf_model {
   sf_config config;
   sf_param param[SF_P_COUNT];
@@ -53,6 +64,7 @@ typedef struct sf_model {
   float t_star;       /* 1..T; T where no budget was learned */
   int32_t t_r;        /* round(t_star): steps at inference */
   uint8_t *occupancy; /* occ_res^3 / 8 bytes, bit (z*res + y)*res + x, owned */
+  sf_scales scales;
 } sf_model;
 
 sf_config sf_config_default(void);
@@ -68,6 +80,15 @@ static inline float *sf_model_param(const sf_model *m, sf_param_id id)
 /* model.safetensors: the tensors above by name, "occupancy", metadata config + t_star + t_r. Every load check names
  * file and tensor. A checkpoint holds further tensors (optimiser) that this ignores. */
 sf_status sf_model_load(sf_model *model, const char *path);
+
+/* Value of one LSB of input `input` of layer D1 D2 C1 C2 C3 (1 for spikes). */
+double sf_scales_input(const sf_scales *scales, int layer, int input);
+/* The five weight matrices of model->value rounded to its settled scales, into value (laid out alike, may be the same). */
+void sf_scales_round(const sf_model *model, float *value);
+/* Spherical harmonics to multiples of their LSB, as the accelerator gets them; as they are while nothing is settled. */
+void sf_scales_round_direction(const sf_scales *scales, float sh[SF_DIR_FEATURES]);
+/* Step to whose multiples h is rounded down once the scales are settled, as the accelerator does; 0: h is not. */
+float sf_scales_h_step(const sf_scales *scales);
 
 /* The same for every consumer: lattice of a ray in the box [-1,1]^3 with near plane 0.2.
  * Sample n of `count` is at distance first + n * step. count = 0: the ray misses. */

@@ -11,7 +11,7 @@
  * 3/4). */
 enum { SF_GRID_BITS = 8 };
 typedef struct sf_quant_widths {
-  int weight_bits;  /* 2..SF_WEIGHT_BITS: |w| < 2^(bits-1) */
+  int weight_bits;  /* 2..SF_WEIGHT_BITS: |w| < 2^(bits-1); 0 = those that the model was fine-tuned for, if it was */
   int feature_bits; /* 8..SF_INPUT_BITS: inputs of D1 and C1 (f, d, h), |x| < 2^(bits-1) */
   int leak_bits;    /* 4..SF_LEAK_FRAC: fraction bits of k; the others are 0 */
   int grid_bits;    /* 2..SF_GRID_BITS: grid entries, |e| < 2^(bits-1) */
@@ -42,6 +42,7 @@ typedef struct sf_quant_report {
   int64_t grid_clipped;   /* grid entries beyond the largest that grid_bits hold */
   int32_t samples;        /* calibration samples */
   sf_quant_widths widths; /* as used: no zeros */
+  sf_scales scales;       /* as chosen, or the model's own if it was fine-tuned for these widths */
   int64_t packed_bytes;   /* weights, grid and occupancy at these widths without padding; a few scalars are left out */
 } sf_quant_report;
 sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,

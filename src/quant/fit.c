@@ -190,8 +190,8 @@ sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, b
   SF_TRY(gather(&fit, data, 0, fit_rows));
   sf_status status = gather(&held_out, data, fit_rows, data->rows);
   if (status.code == SF_OK) {
-    result->unit = choose_unit(&fit, weights);
-    const double error = quantise_columns(&fit, &held_out, weights, refine, q, result);
+    result->unit = weights->unit > 0 ? weights->unit : choose_unit(&fit, weights);
+    const double error = quantise_columns(&fit, &held_out, weights, refine && !(weights->unit > 0), q, result);
     result->error = held_out.energy > 0 ? sqrt(fmax(error, 0) / held_out.energy) : 0;
     moments_free(&held_out);
   }

@@ -29,7 +29,16 @@ typedef struct sf_fit_weights {
   const double *lsb;
   double unit_min; /* the unit may not be smaller (theta must fit the membrane, h its input) */
   int weight_max;  /* |q| may not be larger */
+  double unit;     /* settled: float weights are rounded to it and no more; 0: to be found */
 } sf_fit_weights;
+
+/* The scales that the model was fine-tuned for, if these widths are the ones; else NULL. */
+static inline const sf_scales *sf_settled_scales(const sf_model *model, const sf_quant_widths *widths)
+{
+  const bool same = model->scales.weight_bits && model->scales.weight_bits == widths->weight_bits &&
+                    widths->feature_bits == SF_INPUT_BITS && widths->grid_bits == SF_GRID_BITS;
+  return same ? &model->scales : NULL;
+}
 
 /* The largest value of a symmetric signed number of `bits` bits. */
 static inline int sf_symmetric_max(int bits)

@@ -47,6 +47,7 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
                      sf_quant_layer *result)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
+  const sf_scales *settled = sf_settled_scales(c->model, &c->report->widths);
   const sf_fit_data data = {.rows = rows_of(c->calibration),
                             .n_in = to->n_in,
                             .n_out = to->n_out,
@@ -56,6 +57,7 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
                                   .stride = to->n_in,
                                   .lsb = lsb,
                                   .unit_min = unit_min,
+                                  .unit = settled ? settled->lsb.current[layer] : 0,
                                   .weight_max = sf_symmetric_max(c->report->widths.weight_bits)};
   return sf_fit_layer(&data, &weights, refine, to->w, result);
 }
@@ -94,7 +96,7 @@ static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf
   for (;;) {
     SF_TRY(fit(c, FX_D2, x, lsb, unit_min, true, result));
     const int largest = largest_h(&c->scene->net.layer[FX_D2]);
-    if (largest <= limit) return sf_ok();
+    if (largest <= limit || sf_settled_scales(c->model, &c->report->widths)) return sf_ok();
     unit_min = result->unit * fmax(1.01, (double)largest / limit);
   }
 }
@@ -161,8 +163,9 @@ static sf_status colour_layer(const context *c, int16_t *x)
 {
   const double h_lsb = ldexp(c->scene->current_scale[FX_D2], SF_H_SHIFT);
   const int bits = c->report->widths.feature_bits - 1, finest = bits < DIR_FRAC ? bits : DIR_FRAC;
-  double lsb[C1_INPUTS], best = ldexp(1, -finest), best_error = INFINITY;
-  for (int frac = finest, last = DIR_FRAC - DIR_TRIALS + 1; frac >= last && frac > 0; frac--) {
+  const sf_scales *settled = sf_settled_scales(c->model, &c->report->widths);
+  double lsb[C1_INPUTS], best = settled ? settled->lsb.direction : ldexp(1, -finest), best_error = INFINITY;
+  for (int frac = settled ? 0 : finest, last = DIR_FRAC - DIR_TRIALS + 1; frac >= last && frac > 0; frac--) {
     const double d_lsb = ldexp(1, -frac);
     sf_quant_layer result;
     colour_lsb(lsb, d_lsb, h_lsb);

@@ -111,6 +111,19 @@ static int64_t fill_all(fx_scene *scene, const float *value, const double *scale
   return clipped;
 }
 
+static int64_t fill_settled(fx_scene *scene, const float *value, const sf_scales *settled, int entry_max)
+{
+  int64_t clipped = 0;
+  for (int l = 0; l < scene->grid.levels; l++) {
+    const double ratio = (double)settled->lsb.feature[l] / settled->lsb.entry[l];
+    const int shift = PRODUCT_FRAC + (int)nearbyint(log2(ratio));
+    scene->grid.shift[l] = shift < 0 ? 0 : shift > SHIFT_MAX ? SHIFT_MAX : shift;
+    scene->feature_scale[l] = settled->lsb.feature[l];
+    clipped += fill_level(&scene->grid, value, l, settled->lsb.entry[l], entry_max);
+  }
+  return clipped;
+}
+
 /* The scale that just holds the level's largest entry; a level without entries of its own gets any. */
 static double widest_scale(const fx_grid *grid, const float *value, int level, int entry_max)
 {
@@ -171,7 +184,12 @@ void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibrati
   const format format = choose_format(calibration, &report->widths);
   double scale[FX_LEVELS_MAX];
   for (int l = 0; l < FX_LEVELS_MAX; l++) scene->feature_scale[l] = format.common;
-  choose_scales(scene, value, calibration, &format, scale);
-  report->grid_clipped = fill_all(scene, value, scale, &format);
+  const sf_scales *settled = sf_settled_scales(model, &report->widths);
+  if (settled)
+    report->grid_clipped = fill_settled(scene, value, settled, format.entry_max);
+  else {
+    choose_scales(scene, value, calibration, &format, scale);
+    report->grid_clipped = fill_all(scene, value, scale, &format);
+  }
   report->feature_error = relative_error(scene, calibration);
 }

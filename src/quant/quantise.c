@@ -111,6 +111,18 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->to_box_scale = 0.5;
 }
 
+static sf_scales scales_of(const fx_scene *scene, int weight_bits)
+{
+  sf_scales s = {.weight_bits = weight_bits, .lsb.direction = (float)scene->dir_scale};
+  for (int l = 0; l < FX_LEVELS_MAX; l++) s.lsb.entry[l] = s.lsb.feature[l] = 1;
+  for (int l = 0; l < scene->grid.levels; l++) {
+    s.lsb.feature[l] = (float)scene->feature_scale[l];
+    s.lsb.entry[l] = ldexpf(s.lsb.feature[l], 16 - scene->grid.shift[l]);
+  }
+  for (int l = 0; l < SF_LAYERS; l++) s.lsb.current[l] = (float)scene->current_scale[l];
+  return s;
+}
+
 static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                           sf_calibration *calibration, sf_quant_report *report)
 {
@@ -124,6 +136,7 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   report->packed_bytes = packed_bytes(scene, &report->widths);
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
+  report->scales = scales_of(scene, report->widths.weight_bits);
   return fx_scene_check(scene, name);
 }
 
@@ -134,6 +147,7 @@ sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char 
   memset(scene, 0, sizeof *scene);
   memset(report, 0, sizeof *report);
   report->widths = options->widths;
+  if (report->widths.weight_bits == 0) report->widths.weight_bits = model->scales.weight_bits;
   SF_TRY(check_model(model, name, options));
   SF_TRY(resolve_widths(&report->widths, name));
   const sf_status status = quantise(scene, model, name, options, &calibration, report);

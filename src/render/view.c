@@ -9,6 +9,7 @@ sf_net_view sf_net_view_of(const sf_model *m)
                    .w3 = sf_model_param(m, SF_P_W3),
                    .w4 = sf_model_param(m, SF_P_W4),
                    .w5 = sf_model_param(m, SF_P_W5),
+                   .h_step = sf_scales_h_step(&m->scales),
                    .hidden = m->config.hidden,
                    .features = 2 * m->config.levels,
                    .mode = m->config.mode,

@@ -3,7 +3,6 @@
 #ifndef SF_SNN_BACKWARD_ISA_H
 #define SF_SNN_BACKWARD_ISA_H
 #include "snn/forward_isa.h"
-#include "snn/plif.h"
 
 /* 1 / x for x > 0: the instruction's 2^-14 where there is one, else by subtracting the bits and two Newton steps
  * (8e-7). */

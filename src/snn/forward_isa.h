@@ -3,6 +3,7 @@
 #ifndef SF_SNN_FORWARD_ISA_H
 #define SF_SNN_FORWARD_ISA_H
 #include "snn/event_isa.h"
+#include "snn/plif.h"
 
 /* e^x within 2 ulp for x in [-87, 87], clamped outside; Cephes' polynomial, vectorises. */
 static inline float fast_exp(float x)
@@ -150,6 +151,8 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
     const int at = slot(t, keep), before = slot(t - 1, keep);
     float c[3 * B];
     density_step(n, x, t, keep, w->sum1, w, x->i[t], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+    if (net->h_step > 0)
+      for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step);
     pack_rows(x->i[t], SF_DENSITY_OUT, rows);
     layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
           x->m3[at], spikes);

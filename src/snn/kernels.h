@@ -15,6 +15,7 @@ typedef struct sf_net_view {
   const float *w1, *w2, *w3, *w4, *w5;
   float k[SF_LAYERS]; /* D1, density integrator, C1, C2, colour integrator */
   float theta[3];
+  float h_step; /* h is rounded down to its multiples; 0: it is not */
   int hidden, features, mode, relu;
 } sf_net_view;
 

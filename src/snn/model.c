@@ -174,6 +174,28 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
 }
 
+/* Only a fine-tuned model has any. */
+static sf_status load_scales(sf_scales *s, const sf_tensors *set)
+{
+  const int64_t shape[1] = {SF_SCALES};
+  const sf_tensor *t;
+  if (!sf_tensors_meta(set, "weight_bits")) return sf_ok();
+  SF_TRY(meta_int(set, "weight_bits", &s->weight_bits));
+  if (s->weight_bits == 0) return sf_ok();
+  if (s->weight_bits < 2 || s->weight_bits > SF_WEIGHT_BITS)
+    return sf_fail(SF_E_RANGE, "%s: metadata key 'weight_bits' is %d, expected 2..%d", set->path, s->weight_bits,
+                   SF_WEIGHT_BITS);
+  SF_TRY(sf_tensors_get(set, "scales", SF_F32, 1, shape, &t));
+  memcpy(&s->lsb, t->data, sizeof s->lsb);
+  for (int i = 0; i < SF_SCALES; i++) {
+    const float lsb = ((const float *)t->data)[i];
+    if (!(lsb > 1e-30f && lsb < 1e30f))
+      return sf_fail(SF_E_RANGE, "%s: tensor 'scales': element %d is %g, expected a positive number", set->path, i,
+                     (double)lsb);
+  }
+  return sf_ok();
+}
+
 static sf_status load_values(sf_model *m, const sf_tensors *set)
 {
   for (int i = 0; i < SF_P_COUNT; i++) {
@@ -194,7 +216,7 @@ static sf_status load_values(sf_model *m, const sf_tensors *set)
     return sf_fail(SF_E_RANGE, "%s: t_r = %d, t_star = %g outside 1..T = %d", set->path, m->t_r, t_star,
                    m->config.steps);
   m->t_star = (float)t_star;
-  return sf_ok();
+  return load_scales(&m->scales, set);
 }
 
 sf_status sf_model_load(sf_model *m, const char *path)

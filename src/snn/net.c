@@ -52,16 +52,18 @@ void sf_net_sample(const sf_model *model, const float *f, const float *sh, int s
   for (int l = 0; l < 3; l++)
     n[l] = (neurons){c->mode, c->net == SF_NET_ANN, sf_sigmoid(leak[leak_of[l]]), c->theta[l], {0}};
   const float k_sigma = sf_sigmoid(leak[1]), k_colour = sf_sigmoid(leak[4]);
+  const float h_step = sf_scales_h_step(&model->scales);
 
   float current1[SF_LANES] = {0}, base3[SF_LANES] = {0}, o_sigma = 0, o_colour[3] = {0};
   accumulate(&w1, f, current1);
   accumulate(&w3d, sh, base3);
   for (int t = 0; t < steps; t++) {
-    float s[SF_LANES], i[SF_DENSITY_OUT] = {0}, current[SF_LANES], j[3] = {0};
+    float s[SF_LANES], i[SF_DENSITY_OUT] = {0}, h[SF_GEO_FEATURES], current[SF_LANES], j[3] = {0};
     fire(&n[0], hidden, t, current1, s, trace, 0);
     accumulate(&w2, s, i);
     memcpy(current, base3, sizeof current);
-    accumulate(&w3h, i + 1, current);
+    for (int a = 0; a < SF_GEO_FEATURES; a++) h[a] = h_step > 0 ? sf_round_h(i[1 + a], h_step) : i[1 + a];
+    accumulate(&w3h, h, current);
     fire(&n[1], hidden, t, current, s, trace, 2);
     memset(current, 0, sizeof current);
     accumulate(&w4, s, current);

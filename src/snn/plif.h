@@ -15,6 +15,13 @@ static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, 
   return v + (i - v) * k;
 }
 
+/* h as the accelerator sees it: current >> SF_H_SHIFT. Currents are multiples of step >> SF_H_SHIFT but for their
+ * rounding, which half of that keeps from deciding. */
+static inline float sf_round_h(float h, float step)
+{
+  return step * floorf(h / step + 0.5f / (1 << SF_H_SHIFT));
+}
+
 static inline float sf_sigmoid(float x)
 {
   return 1.0f / (1.0f + expf(-x));

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TENSORS_MAX = 4 * SF_P_COUNT + 2 };
+enum { TENSORS_MAX = 4 * SF_P_COUNT + 3 };
 
 static void put(cJSON *meta, const char *key, double value)
 {
@@ -37,6 +37,7 @@ static void put_config(cJSON *meta, const sf_model *m)
   put(meta, "scale", c->scale);
   put(meta, "t_star", m->t_star);
   put(meta, "t_r", m->t_r);
+  put(meta, "weight_bits", m->scales.weight_bits);
 }
 
 /* The trainer's own numbers, one table for both directions. */
@@ -97,6 +98,7 @@ static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *lis
       memcpy(x->shape, m->param[i].shape, sizeof m->param[i].shape);
     }
   list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {res * res * res / 8}, m->occupancy};
+  if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
   if (with_optimiser) list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {res, res, res}, t->density};
   return n;
 }

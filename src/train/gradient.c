@@ -56,13 +56,15 @@ static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, 
 }
 
 /* Spherical harmonics of every lane, zeros in those after the last sample; how many lanes hold samples. */
-static int load_directions(const sf_batch *batch, const sf_bundle *bundle, sf_worker *w)
+static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
 {
+  const sf_batch *batch = &t->batch;
   int lane = 0;
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     const sf_ray *ray = &batch->ray[r];
     float sh[SF_DIR_FEATURES];
     sf_sh4(ray->direction, sh);
+    sf_scales_round_direction(&t->model.scales, sh);
     for (lane = ray->first; lane < ray->first + ray->count; lane++)
       for (int i = 0; i < SF_DIR_FEATURES; i++) w->block[lane / SF_BLOCK].sh[i * SF_BLOCK + lane % SF_BLOCK] = sh[i];
   }
@@ -78,7 +80,7 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
   const int steps = p->stage == 1 ? p->steps : p->t_c;
-  const int lanes = load_directions(batch, bundle, w);
+  const int lanes = load_directions(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &w->block[b]);
     t->kernels->forward(net, &w->block[b], p->steps, steps, w->scratch);
@@ -207,8 +209,7 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
 void sf_gradient_nets(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
 {
   encode(t);
-  const sf_net_view view = sf_net_view_of(&t->model);
-  t->kernels->prepare(&view, t->net);
+  sf_train_prepare(t);
   sf_batch_compact(t, plan);
   sf_batch_adapt(t);
   run_bundles(t, plan);

@@ -87,7 +87,7 @@ sf_status sf_health_check(sf_trainer *t, int event[3])
 {
   sf_health *h = &t->health;
   memset(event, 0, 3 * sizeof *event);
-  if (t->model.config.net == SF_NET_ANN || (t->iteration + 1) % WINDOW) return sf_ok();
+  if (t->model.config.net == SF_NET_ANN || sf_tuning(t) || (t->iteration + 1) % WINDOW) return sf_ok();
   sf_probes probes;
   census now[3];
   SF_TRY(sf_probes_create(&probes, &t->model.config));

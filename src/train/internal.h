@@ -107,6 +107,7 @@ struct sf_trainer {
   sf_model model;
   sf_net_words *net;               /* of the current parameters, for the kernels */
   float *grad, *moment1, *moment2; /* [model.size] */
+  float *rounded;                  /* in fine-tuning: parameters with rounded weights, [model.size], else NULL */
   float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
   int averaged;
   float *density; /* occupancy's running density, [occ_res^3] */
@@ -140,6 +141,16 @@ void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
  * features' gradient in batch.df. mean: losses per ray. */
 void sf_gradient_nets(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
 sf_status sf_init_parameters(sf_trainer *trainer);
+
+/* Fine-tuning: the model's scales are settled. */
+static inline bool sf_tuning(const sf_trainer *t)
+{
+  return t->model.scales.weight_bits > 0;
+}
+/* Settles what fine-tuning does not learn. */
+sf_status sf_tuning_start(sf_trainer *trainer);
+/* Brings trainer->net up to the parameters. */
+void sf_train_prepare(sf_trainer *trainer);
 
 /* Samples in occupied cells, seen from the training cameras, for the scalar nets. */
 enum { PROBES = 256 };

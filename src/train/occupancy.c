@@ -45,8 +45,7 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
 
 static void visit_cells(sf_trainer *t, const visit *v, int steps)
 {
-  const sf_net_view view = sf_net_view_of(&t->model);
-  t->kernels->prepare(&view, t->net);
+  sf_train_prepare(t);
 #pragma omp parallel for schedule(static) num_threads(t->workers)
   for (int part = 0; part < t->workers; part++) {
     const size_t blocks = (v->count + SF_BLOCK - 1) / SF_BLOCK;

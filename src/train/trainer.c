@@ -10,6 +10,7 @@
 enum { OCCUPANCY_EVERY = 16, EPOCH_RAYS_PER_VIEW = 4096 };
 
 static const double budget_rate = 1e5; /* of t*, per stage II */
+static const double tuning_rate = 0.1; /* of the learning rates */
 
 sf_train_options sf_train_defaults(void)
 {
@@ -46,6 +47,7 @@ void sf_trainer_free(sf_trainer *t)
   free(t->moment1);
   free(t->moment2);
   free(t->average);
+  free(t->rounded);
   free(t->density);
   sf_batch_free(&t->batch);
   sf_model_free(&t->model);
@@ -80,12 +82,31 @@ static void start_budget(sf_trainer *t)
   t->model.t_star = (float)t->model.t_r;
 }
 
+/* Length of stage I in iterations, or as a share of the time budget. */
+static double stage1_weight(const sf_trainer *t)
+{
+  return sf_tuning(t) ? 0 : t->options.minutes > 0 ? 0.25 : t->options.stage1;
+}
+
+static sf_status copy_model(sf_model *to, const sf_model *from)
+{
+  SF_TRY(sf_model_create(to, &from->config));
+  const size_t res = (size_t)from->config.occ_res;
+  memcpy(to->value, from->value, from->size * sizeof *to->value);
+  memcpy(to->occupancy, from->occupancy, res * res * res / 8);
+  to->t_star = from->t_star;
+  to->t_r = from->t_r;
+  to->scales = from->scales;
+  return sf_ok();
+}
+
 static sf_status create(sf_trainer *t, const char *resume)
 {
   if (resume)
     SF_TRY(sf_model_load(&t->model, resume));
   else
-    SF_TRY(sf_model_create(&t->model, &t->options.config));
+    SF_TRY(t->options.start ? copy_model(&t->model, t->options.start) : sf_model_create(&t->model, &t->options.config));
+  if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);
   t->grad = sf_aligned_alloc(bytes);
@@ -96,9 +117,9 @@ static sf_status create(sf_trainer *t, const char *resume)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
   SF_TRY(create_workers(t));
   SF_TRY(sf_batch_create(&t->batch, t->options.samples, 2 * c->levels));
-  t->stage = t->options.minutes > 0 || t->options.stage1 > 0 ? 1 : 2;
+  t->stage = stage1_weight(t) > 0 ? 1 : 2;
   t->rays = 1024;
-  t->stride = 4;
+  t->stride = sf_tuning(t) ? 1 : 4;
   t->occupied = 1;
   if (t->options.fixed_steps < 0 || t->options.fixed_steps > c->steps)
     return sf_fail(SF_E_RANGE, "train: %d fixed steps, the model has %d", t->options.fixed_steps, c->steps);
@@ -108,7 +129,7 @@ static sf_status create(sf_trainer *t, const char *resume)
     return sf_ok();
   }
   start_budget(t);
-  return sf_init_parameters(t);
+  return t->options.start ? sf_ok() : sf_init_parameters(t);
 }
 
 sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const sf_train_options *options,
@@ -143,10 +164,12 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   const sf_config *c = &t->model.config;
   const float *leak = sf_model_param(&t->model, SF_P_LEAK);
   sf_loss_plan p = {.stage = t->stage,
-                    .steps = scaled(t) ? 2 : c->steps,
+                    .steps = sf_tuning(t) ? t->model.t_r
+                             : scaled(t)  ? 2
+                                          : c->steps,
                     .inverse_rays = 1.0f / (float)t->batch.rays,
                     .extra = t->options.no_extra || t->options.fixed_steps ? 0 : (float)t->options.alpha,
-                    .distill = !t->options.no_distill,
+                    .distill = !t->options.no_distill && !sf_tuning(t),
                     .k_sigma = sf_sigmoid(leak[1]),
                     .k_colour = sf_sigmoid(leak[4])};
   const double t_hat = fmin(fmax(t->model.t_star, 1), p.steps);
@@ -213,14 +236,15 @@ sf_status sf_parameters_check(const sf_trainer *t)
 /* The iteration's part of its stage: 1 / iterations, or the last iteration's share of the time budget. */
 static double stage_share(const sf_trainer *t)
 {
-  if (t->options.minutes > 0) return t->last_step / (t->options.minutes * 60 * (t->stage == 1 ? 0.25 : 0.75));
+  if (t->options.minutes > 0)
+    return t->last_step / (t->options.minutes * 60 * (t->stage == 1 ? stage1_weight(t) : 1 - stage1_weight(t)));
   const int n = t->stage == 1 ? t->options.stage1 : t->options.stage2;
   return 1.0 / (n > 0 ? n : 1);
 }
 
 static void update_parameters(sf_trainer *t)
 {
-  const double fade = pow(0.3, t->progress);
+  const double fade = (sf_tuning(t) ? tuning_rate : 1) * pow(0.3, t->progress);
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1};
   sf_gradient_grid(t, &adam);
   adam.lr = t->options.lr_net * fade;
@@ -249,8 +273,7 @@ static void advance(sf_trainer *t, double share)
   t->stage_progress += share;
   t->epoch += t->batch.rays;
   t->iteration++;
-  const double n1 = t->options.minutes > 0 ? 0.25 : t->options.stage1,
-               n2 = t->options.minutes > 0 ? 0.75 : t->options.stage2;
+  const double n1 = stage1_weight(t), n2 = t->options.minutes > 0 ? 1 - n1 : t->options.stage2;
   const double whole = n1 + n2 > 0 ? n1 + n2 : 1;
   t->progress = ((t->stage == 1 ? 0 : n1) + (t->stage == 1 ? n1 : n2) * fmin(t->stage_progress, 1)) / whole;
   if (t->stage_progress < 1 - 1e-9) return;
@@ -304,7 +327,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
 {
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
-  if (t->iteration % OCCUPANCY_EVERY == 0) SF_TRY(sf_occupancy_update(t, occupancy_steps(t)));
+  if (t->iteration % OCCUPANCY_EVERY == 0 && !sf_tuning(t)) SF_TRY(sf_occupancy_update(t, occupancy_steps(t)));
   SF_TRY(sf_batch_draw(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
@@ -331,6 +354,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   const double before = t->progress;
   advance(t, stage_share(t));
   SF_TRY(sf_average_update(t, before));
+  if (t->stage == 3 && sf_tuning(t)) sf_scales_round(&t->model, t->model.value);
   report(t, &plan, &mean, loss, mse, stats);
   memcpy(stats->event, event, sizeof event);
   return sf_ok();

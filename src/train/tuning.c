@@ -1,0 +1,36 @@
+/* Fine-tuning for few bits: the nets run with weights on the grid that the exporter will round to, and the gradient of
+ * a rounded weight moves the weight behind it (straight-through; Bengio et al. 2013, Jacob et al. 2018). */
+#include "train/internal.h"
+#include <math.h>
+#include <string.h>
+
+/* Thresholds are integers of the membrane: C2's has SF_AC_FRAC more bits than its current. */
+static void round_thresholds(sf_model *m)
+{
+  static const int layer[3] = {0, 2, 3}, frac[3] = {0, 0, SF_AC_FRAC};
+  for (int i = 0; i < 3; i++) {
+    const float lsb = ldexpf(m->scales.lsb.current[layer[i]], -frac[i]);
+    m->config.theta[i] = lsb * fmaxf(1, nearbyintf(m->config.theta[i] / lsb));
+  }
+}
+
+sf_status sf_tuning_start(sf_trainer *t)
+{
+  round_thresholds(&t->model);
+  t->options.fixed_steps = t->model.t_r;
+  t->rounded = sf_aligned_alloc(t->model.size * sizeof *t->rounded);
+  if (t->rounded) return sf_ok();
+  return sf_fail(SF_E_MEMORY, "train: no memory for %zu rounded parameters", t->model.size);
+}
+
+void sf_train_prepare(sf_trainer *t)
+{
+  const float *const value = t->model.value;
+  sf_net_view view = sf_net_view_of(&t->model);
+  if (sf_tuning(t)) {
+    const float **const weights[] = {&view.w1, &view.w2, &view.w3, &view.w4, &view.w5};
+    sf_scales_round(&t->model, t->rounded);
+    for (int i = 0; i < 5; i++) *weights[i] = t->rounded + (*weights[i] - value);
+  }
+  t->kernels->prepare(&view, t->net);
+}
