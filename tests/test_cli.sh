@@ -65,6 +65,8 @@ size_of() { wc -c <"$1"; }
 good sf_scene simple -o d --size 16 --train 3 --test 2
 good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_export model.safetensors -o s.snn
+good sf_export model.safetensors -o fit.snn --fit --data d --fit-rays 512 -q --json
+good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
 good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
@@ -119,6 +121,9 @@ number sf_train --fixed-steps -1 9 nan
 number sf_train --psnr-prefixes -1 nan
 usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
+number sf_export --fit-loss -1 nan inf 101 ''
+number sf_export --fit-rays 0 511 -1 nan
+usage --data sf_export model.safetensors -o out --fit
 number sf_cosim --rays -1 nan inf x
 number sim_render --view -1 nan 2 99999999999
 number sim_render --backend gpu nan ''
@@ -143,6 +148,7 @@ readers() { # PATTERN DIR: every program that reads a data set
   data "$1" sf_train "$2" -o out --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
   data "$1" sim_render s.snn "$2" --view 1 -o out
   data "$1" energy_audit s.snn "$2" --views 2 --rtl-rays 1
+  data "$1" sf_export model.safetensors -o out --fit --fit-rays 512 -q --data "$2"
   data "$1" sf_cosim s.snn "$2" --rays 1
   absent out "bad data $2"
 }
@@ -320,6 +326,7 @@ stop() { # OUTPUT PROGRAM ARGS...
   absent "$1" "interrupted: ${*:2}"
 }
 stop stop.exr sim_render s.snn wide --backend rtl --crop 0,0,128,128 -o stop.exr --png stop.exr.png
+stop stop.snn sf_export model.safetensors -o stop.snn --fit --data wide --fit-rays 2000000 -q
 stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
 absent stop.exr.png "interrupted: sim_render"
 
