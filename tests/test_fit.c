@@ -392,6 +392,7 @@ END_TEST
 
 int main(void)
 {
+  omp_set_num_threads(1); /* many small parallel regions: threads would wait for each other on a busy machine */
   Suite *suite = suite_create("fit");
   TCase *tc = tcase_create("fit");
   tcase_set_timeout(tc, 120);
