@@ -109,7 +109,6 @@ static sf_status fit_to_rays(fx_scene *scene, const sf_fit_rays *rays, const opt
                           .tick = fit_tick,
                           .user = &progress};
   fx_scene fitted;
-  sf_cli_catch_signals();
   sf_progress_begin(&progress.progress, o->quiet);
   const sf_status status = sf_fit(&fitted, &job, report);
   sf_progress_end(&progress.progress);
@@ -167,6 +166,7 @@ static sf_status export_scene(const char *model_path, const options *o)
   sf_fit_report fit;
   fx_scene scene;
   float scale;
+  if (o->fit) sf_cli_catch_signals();
   SF_TRY(quantise(model_path, o, &scene, &scale, &report));
   sf_status status = o->fit ? fit_scene(&scene, scale, o, &fit) : sf_ok();
   if (status.code == SF_OK) status = save_and_report(&scene, o, &report, o->fit ? &fit : NULL);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STREAM_VIEW = 201, STREAM_X, STREAM_Y, BLOCK = 16, OPAQUE = 65535 };
+enum { STREAM_VIEW = 201, STREAM_X, STREAM_Y, BLOCK = 16, FEW = 512, OPAQUE = 65535 };
 
 /* ---- rays ---- */
 
@@ -89,7 +89,7 @@ sf_status sf_fit_measure(const fx_scene *scene, const sf_fit_rays *rays, uint64_
 {
   sf_status all = sf_ok();
   memset(sum, 0, sizeof *sum);
-#pragma omp parallel
+#pragma omp parallel if (end - begin > FEW) /* few rays are done before the threads have met */
   {
     sf_fit_sum part = {0};
 #pragma omp for schedule(dynamic, BLOCK)
