@@ -65,7 +65,7 @@ size_of() { wc -c <"$1"; }
 good sf_scene simple -o d --size 16 --train 3 --test 2
 good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_export model.safetensors -o s.snn
-good sf_export model.safetensors -o fit.snn --fit --data d --fit-rays 512 -q --json
+good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 -q --json
 good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
@@ -122,7 +122,7 @@ number sf_train --psnr-prefixes -1 nan
 usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
 number sf_export --fit-loss -1 nan inf 101 ''
-number sf_export --fit-rays 0 511 -1 nan
+number sf_export --fit-rays 0 255 -1 nan
 usage --data sf_export model.safetensors -o out --fit
 number sf_cosim --rays -1 nan inf x
 number sim_render --view -1 nan 2 99999999999
@@ -148,7 +148,7 @@ readers() { # PATTERN DIR: every program that reads a data set
   data "$1" sf_train "$2" -o out --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
   data "$1" sim_render s.snn "$2" --view 1 -o out
   data "$1" energy_audit s.snn "$2" --views 2 --rtl-rays 1
-  data "$1" sf_export model.safetensors -o out --fit --fit-rays 512 -q --data "$2"
+  data "$1" sf_export model.safetensors -o out --fit --fit-rays 256 -q --data "$2"
   data "$1" sf_cosim s.snn "$2" --rays 1
   absent out "bad data $2"
 }

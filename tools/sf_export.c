@@ -91,7 +91,7 @@ typedef struct fitting {
 static bool fit_tick(void *user, const char *what, int done, int total)
 {
   fitting *f = user;
-  if (sf_progress_due(&f->progress))
+  if (what && sf_progress_due(&f->progress))
     sf_progress_show(&f->progress, "fit: %s, %d of %d, %.0f s", what, done, total, sf_seconds() - f->begun);
   return !sf_cli_interrupted();
 }
@@ -225,7 +225,7 @@ int main(int argc, char **argv)
       {.name = "--fit-rays",
        .type = SF_ARG_U64,
        .value = &o.fit_rays,
-       .min = 512,
+       .min = 256,
        .max = 1e8,
        .argument = "N",
        .help = "rays that --fit looks at (default 262144)"},

@@ -40,7 +40,8 @@ typedef struct sf_fit_job {
   const sf_fit_rays *rays;
   double loss_db; /* >= 0; 0: only what changes no bit on the rays */
   const char *name;
-  bool (*tick)(void *user, const char *what, int done, int total); /* false stops; may be NULL */
+  bool (*tick)(void *user, const char *what, int done,
+               int total); /* false stops; what is NULL between reports; may be NULL */
   void *user;
 } sf_fit_job;
 

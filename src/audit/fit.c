@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RANK_SHARE = 256, RANK_MIN = 256, CHECK_SHARE = 16, CHECK_MIN = 2048, STOP_MAX = 1 << (SF_TRANS_FRAC - 5) };
-enum { CHECKS_MAX = 32 /* per round */, CHUNK = 8192 };
+enum { RANK_SHARE = 256, RANK_MIN = 128, CHECK_SHARE = 16, CHECK_MIN = 2048, STOP_MAX = 1 << (SF_TRANS_FRAC - 5) };
+enum { CHECKS_MAX = 32 /* per round */, CHUNK = 1024 };
 enum { CUTS_MAX = SF_LAYERS * SF_LANES + 2 * FX_LEVELS_MAX + SF_CELL_CLASSES + 3 };
 /* Parts of the bound that may be spent by the end of each round: tables and stops shrink by one octave a round. */
 static const double allowance[] = {0.5, 0.8, 1};
@@ -139,13 +139,35 @@ static void list_cuts(search *s)
 
 /* ---- measuring ---- */
 
+static sf_status tick(const search *s, const char *what, int done, int total)
+{
+  if (!s->job->tick || s->job->tick(s->job->user, what, done, total)) return sf_ok();
+  return sf_fail(SF_E_STOPPED, "%s: stopped while fitting", s->job->name);
+}
+
+/* sf_fit_measure in pieces, so that an interruption is heard. */
+static sf_status measure(const search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin, uint64_t end,
+                         uint32_t *picture, sf_fit_sum *sum)
+{
+  memset(sum, 0, sizeof *sum);
+  for (uint64_t at = begin, next; at < end; at = next) {
+    sf_fit_sum part;
+    next = at + CHUNK < end ? at + CHUNK : end;
+    SF_TRY(tick(s, NULL, 0, 0));
+    SF_TRY(sf_fit_measure(scene, rays, at, next, picture ? picture + 3 * (at - begin) : NULL, &part));
+    sum->error += part.error;
+    fx_counts_add(&sum->counts, &part.counts);
+  }
+  return sf_ok();
+}
+
 static sf_status measure_trim(const search *s, const sf_trim *trim, const sf_fit_rays *rays, uint64_t begin,
                               uint64_t end, uint32_t *picture, measured *m)
 {
   fx_scene trial;
   sf_fit_sum sum;
   SF_TRY(sf_trim_apply(s->scene, trim, &s->use, s->job->name, &trial));
-  const sf_status status = sf_fit_measure(&trial, rays, begin, end, picture, &sum);
+  const sf_status status = measure(s, &trial, rays, begin, end, picture, &sum);
   *m = (measured){sum.error, sf_energy_fj(&sum.counts), bytes_of(&trial)};
   fx_scene_free(&trial);
   return status;
@@ -154,12 +176,6 @@ static sf_status measure_trim(const search *s, const sf_trim *trim, const sf_fit
 static sf_status check_trim(const search *s, const sf_trim *trim, measured *m)
 {
   return measure_trim(s, trim, s->job->rays, s->rank_end, s->check_end, NULL, m);
-}
-
-static sf_status tick(const search *s, const char *what, int done, int total)
-{
-  if (!s->job->tick || s->job->tick(s->job->user, what, done, total)) return sf_ok();
-  return sf_fail(SF_E_STOPPED, "%s: stopped while fitting", s->job->name);
 }
 
 /* The error of the reference, scaled to the ranking rays: those are too few to say it themselves. */
@@ -309,11 +325,11 @@ static sf_status choose_candidate(search *s, int *chosen)
   const sf_fit_job *job = s->job;
   *chosen = 0;
   s->scene = job->candidate[0];
-  SF_TRY(sf_fit_measure(s->scene, job->rays, s->rank_end, s->check_end, NULL, &s->reference));
+  SF_TRY(measure(s, s->scene, job->rays, s->rank_end, s->check_end, NULL, &s->reference));
   for (int i = 1; i < job->candidates && job->loss_db > 0; i++) {
     sf_fit_sum sum;
     SF_TRY(tick(s, "widths", i, job->candidates));
-    SF_TRY(sf_fit_measure(job->candidate[i], job->rays, s->rank_end, s->check_end, NULL, &sum));
+    SF_TRY(measure(s, job->candidate[i], job->rays, s->rank_end, s->check_end, NULL, &sum));
     if ((double)sum.error > error_allowed(s, 0.5)) break;
     s->scene = job->candidate[i], *chosen = i;
   }
@@ -328,7 +344,7 @@ static sf_status finish(search *s, const sf_trim *exact, fx_scene *fitted, sf_fi
   sf_status status = sf_grid_zero_unread(fitted) < 0
                          ? sf_fail(SF_E_MEMORY, "%s: no memory to look for unread entries", s->job->name)
                          : fx_scene_check(fitted, s->job->name);
-  if (status.code == SF_OK) status = sf_fit_measure(fitted, s->job->rays, s->rank_end, s->check_end, NULL, &sum);
+  if (status.code == SF_OK) status = measure(s, fitted, s->job->rays, s->rank_end, s->check_end, NULL, &sum);
   if (status.code != SF_OK) {
     fx_scene_free(fitted);
     return status;
