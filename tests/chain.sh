@@ -23,6 +23,10 @@ check_scene() { # name, train options
   cmp "$dir/fixed.exr" "$dir/rtl.exr" || fail "${dir##*/}: the RTL's image differs from the fixed-point core's"
   "$bin/sf_cosim" "$dir/s.snn" "$dir" --rays 30 --seed 7 --stalls 20 --json >"$dir/cosim.json" || fail "${dir##*/}: co-simulation"
   grep -Eq '"differences":[[:space:]]*0,' "$dir/cosim.json" || fail "${dir##*/}: differences"
+  "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet --json >"$dir/fit.json"
+  "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 20 --seed 8 --stalls 20 --json >"$dir/fit-cosim.json" ||
+    fail "${dir##*/}: co-simulation of the fitted scene"
+  grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "${dir##*/}: the fitted scene differs in the RTL"
   "$bin/energy_audit" "$dir/s.snn" "$dir" --rays 100 --json >"$dir/audit.json" || fail "${dir##*/}: audit"
   echo "${dir##*/}: ok"
 }

@@ -68,6 +68,8 @@ good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
 good sf_export model.safetensors -o s.snn
+good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 -q --json
+good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
 good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
@@ -127,6 +129,9 @@ usage --fine-tune sf_train d -o out --weight-bits 4
 data scale sf_train d -o out --fine-tune model.safetensors --scale 0.3
 usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
+number sf_export --fit-loss -1 nan inf 101 ''
+number sf_export --fit-rays 0 255 -1 nan
+usage --data sf_export model.safetensors -o out --fit
 number sf_cosim --rays -1 nan inf x
 number sim_render --view -1 nan 2 99999999999
 number sim_render --backend gpu nan ''
@@ -152,6 +157,7 @@ absent out "usage errors"
 whole_readers() { # PATTERN DIR: every program that reads all views
   data "$1" sf_train "$2" -o out --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
   data "$1" energy_audit s.snn "$2" --views 2 --rtl-rays 1
+  data "$1" sf_export model.safetensors -o out --fit --fit-rays 256 -q --data "$2"
   data "$1" sf_cosim s.snn "$2" --rays 1
   absent out "bad data $2"
 }
@@ -335,6 +341,7 @@ stop() { # OUTPUT PROGRAM ARGS...
   absent "$1" "interrupted: ${*:2}"
 }
 stop stop.exr sim_render s.snn wide --backend rtl --crop 0,0,128,128 -o stop.exr --png stop.exr.png
+stop stop.snn sf_export model.safetensors -o stop.snn --fit --data wide --fit-rays 2000000 -q
 stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
 absent stop.exr.png "interrupted: sim_render"
 

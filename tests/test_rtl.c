@@ -1,5 +1,6 @@
 /* The accelerator against the fixed-point core, bit for bit: outputs, spikes, membranes, rows, counters. Random nets,
  * tables, streams; the hard cases are in test_rtl_hard.c. */
+#include "spikefield/fit.h"
 #include "tests/rtl_fixture.h"
 
 START_TEST(trained_size_nets)
@@ -17,6 +18,24 @@ START_TEST(trained_size_nets)
   ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0);
   ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
   sf_dut_close(dut);
+}
+END_TEST
+
+/* Without stalls the cycles follow from the counters: sf_cycles is exact. */
+START_TEST(cycles_follow_from_the_counts)
+{
+  for (uint64_t i = 0; i < 4; i++) {
+    random_source r = {5000 + (uint64_t)_i * 4 + i, 0};
+    random_net_make(&net_of_test, &r, _i > 0);
+    fx_counts counts = {0}, actual;
+    uint64_t cycles, busy, stalls;
+    sf_dut *dut = open_dut(&net_of_test.net, r.seed, 20);
+    draw_batch(&shared, &r, 24, _i > 0);
+    run_batch(dut, &net_of_test.net, 24, &counts, r.seed);
+    ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
+    ck_assert_uint_eq(cycles - stalls, sf_cycles(&net_of_test.net, &counts));
+    sf_dut_close(dut);
+  }
 }
 END_TEST
 
@@ -155,6 +174,7 @@ static Suite *suite(void)
   TCase *nets = tcase_create("nets");
   tcase_set_timeout(nets, 60);
   tcase_add_loop_test(nets, trained_size_nets, 0, 3);
+  tcase_add_loop_test(nets, cycles_follow_from_the_counts, 0, 2);
   tcase_add_loop_test(nets, extreme_nets, 0, 25);
   tcase_add_loop_test(nets, modes_and_steps, 0, 3);
   tcase_add_test(nets, tables);

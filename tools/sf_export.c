@@ -1,5 +1,6 @@
 /* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware. */
 #include "spikefield/cli.h"
+#include "spikefield/fit.h"
 #include "spikefield/quant.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -8,13 +9,15 @@
 #include <sys/stat.h>
 
 typedef struct options {
-  const char *output;
+  const char *output, *data;
   int steps, background;
-  uint64_t seed;
+  uint64_t seed, fit_rays;
+  double fit_loss;
   sf_quant_widths widths;
-  bool json;
+  bool json, fit, quiet;
 } options;
 
+enum { FIT_RAYS = 262144 };
 static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
 
 static sf_status file_size(const char *path, long long *size)
@@ -59,7 +62,8 @@ static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, co
   return item;
 }
 
-static sf_status print_json(const fx_scene *scene, const sf_quant_report *report, const char *path, long long bytes)
+static sf_status print_json(const fx_scene *scene, const sf_quant_report *report, const sf_fit_report *fit,
+                            const char *path, long long bytes)
 {
   cJSON *json = cJSON_CreateObject(), *layers = cJSON_AddArrayToObject(json, "layers");
   cJSON_AddStringToObject(json, "scene", path);
@@ -78,6 +82,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "grid_bits", report->widths.grid_bits);
   for (int l = 0; l < SF_LAYERS; l++)
     cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
+  if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
   char *text = cJSON_Print(json);
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the report", path);
@@ -86,31 +91,140 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   return sf_ok();
 }
 
-static sf_status export_scene(const char *model_path, const options *o)
+/* ---- --fit ---- */
+
+typedef struct fitting {
+  sf_progress progress;
+  double begun;
+} fitting;
+
+static bool fit_tick(void *user, const char *what, int done, int total)
+{
+  fitting *f = user;
+  if (what && sf_progress_due(&f->progress))
+    sf_progress_show(&f->progress, "fit: %s, %d of %d, %.0f s", what, done, total, sf_seconds() - f->begun);
+  return !sf_cli_interrupted();
+}
+
+/* What --fit tries after the default, each about a bit narrower than the one before. */
+static const sf_quant_widths narrower[] = {{8, 11, 8, 7}, {8, 10, 7, 6}, {7, 10, 7, 6}, {6, 10, 7, 5}, {5, 9, 6, 5}};
+enum { CANDIDATES = 1 + sizeof narrower / sizeof narrower[0] };
+
+typedef struct candidates {
+  fx_scene scene[CANDIDATES];
+  sf_quant_report report[CANDIDATES];
+  int count;
+} candidates;
+
+static sf_status quantise(const sf_model *model, const char *path, const options *o, const sf_quant_widths *widths,
+                          candidates *c)
 {
   const float grey = o->background == 0 ? 1 : 0;
   const sf_quant_options how = {
-      .steps = o->steps, .background = {grey, grey, grey}, .seed = o->seed, .widths = o->widths};
-  sf_quant_report report;
-  sf_model model;
-  fx_scene scene;
-  long long bytes = 0;
-  SF_TRY(sf_model_load(&model, model_path));
-  sf_status status = sf_quantise_report(&scene, &model, model_path, &how, &report);
-  sf_model_free(&model);
+      .steps = o->steps, .background = {grey, grey, grey}, .seed = o->seed, .widths = *widths};
+  SF_TRY(sf_quantise_report(&c->scene[c->count], model, path, &how, &c->report[c->count]));
+  c->count++;
+  return sf_ok();
+}
+
+/* The widths that were asked for; when none were and the scene is to be fitted, narrower ones too. */
+static sf_status quantise_all(const sf_model *model, const char *path, const options *o, candidates *c)
+{
+  const sf_quant_widths *w = &o->widths;
+  SF_TRY(quantise(model, path, o, w, c));
+  const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits;
+  for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++)
+    SF_TRY(quantise(model, path, o, &narrower[i - 1], c));
+  return sf_ok();
+}
+
+/* The fitted scene and what its quantisation cost take the first place. */
+static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const options *o, sf_fit_report *report)
+{
+  fitting progress = {.begun = sf_seconds()};
+  const fx_scene *candidate[CANDIDATES];
+  sf_quant_widths widths[CANDIDATES];
+  for (int i = 0; i < c->count; i++) candidate[i] = &c->scene[i], widths[i] = c->report[i].widths;
+  const sf_fit_job job = {.candidate = candidate,
+                          .widths = widths,
+                          .candidates = c->count,
+                          .rays = rays,
+                          .loss_db = o->fit_loss,
+                          .name = o->output,
+                          .tick = fit_tick,
+                          .user = &progress};
+  fx_scene fitted;
+  sf_progress_begin(&progress.progress, o->quiet);
+  const sf_status status = sf_fit(&fitted, &job, report);
+  sf_progress_end(&progress.progress);
   if (status.code != SF_OK) return status;
-  status = fx_scene_save(&scene, o->output);
-  if (status.code == SF_OK) status = file_size(o->output, &bytes);
-  if (status.code == SF_OK && o->json) status = print_json(&scene, &report, o->output, bytes);
-  if (status.code == SF_OK && !o->json) print_text(&scene, &report, o->output, bytes);
-  fx_scene_free(&scene);
-  if (status.code == SF_OK && fflush(stdout)) return sf_fail(SF_E_IO, "standard output: the report was not written");
+  fx_scene_free(&c->scene[0]);
+  c->scene[0] = fitted;
+  c->report[0] = c->report[report->chosen];
+  c->report[0].packed_bytes = (int64_t)report->after.bytes;
+  return sf_ok();
+}
+
+/* scale: the model's, which the poses must be in. */
+static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_report *report)
+{
+  const sf_dataset_options how = {.downscale = 1, .scale = scale};
+  sf_dataset data;
+  sf_fit_rays rays;
+  SF_TRY(sf_dataset_load(&data, o->data, "train", &how));
+  sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->seed);
+  sf_dataset_free(&data);
+  if (status.code != SF_OK) return status;
+  status = fit_to_rays(c, &rays, o, report);
+  sf_fit_rays_free(&rays);
   return status;
+}
+
+/* ---- program ---- */
+
+static sf_status save_and_report(const fx_scene *scene, const options *o, const sf_quant_report *report,
+                                 const sf_fit_report *fit)
+{
+  long long bytes = 0;
+  SF_TRY(fx_scene_save(scene, o->output));
+  SF_TRY(file_size(o->output, &bytes));
+  if (o->json) SF_TRY(print_json(scene, report, fit, o->output, bytes));
+  if (!o->json) print_text(scene, report, o->output, bytes);
+  if (!o->json && fit) sf_fit_print(stdout, fit);
+  return fflush(stdout) ? sf_fail(SF_E_IO, "standard output: the report was not written") : sf_ok();
+}
+
+static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
+{
+  sf_fit_report fit;
+  SF_TRY(quantise_all(model, path, o, c));
+  if (o->fit) SF_TRY(fit_scene(c, model->config.scale, o, &fit));
+  return save_and_report(&c->scene[0], o, &c->report[0], o->fit ? &fit : NULL);
+}
+
+static sf_status export_scene(const char *path, const options *o)
+{
+  sf_model model;
+  if (o->fit) sf_cli_catch_signals();
+  SF_TRY(sf_model_load(&model, path));
+  candidates *c = calloc(1, sizeof *c);
+  const sf_status status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
+  for (int i = 0; c && i < CANDIDATES; i++) fx_scene_free(&c->scene[i]);
+  free(c);
+  sf_model_free(&model);
+  return status;
+}
+
+static sf_status check_options(const options *o)
+{
+  if (!o->output) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
+  if (o->fit && !o->data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
+  return sf_ok();
 }
 
 int main(int argc, char **argv)
 {
-  options o = {0};
+  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05};
   const sf_option table[] = {
       {.name = "--output",
        .letter = 'o',
@@ -143,6 +257,26 @@ int main(int argc, char **argv)
        "bits of the inputs of D1 and C1"},
       {"--leak-bits", 0, SF_ARG_INT, &o.widths.leak_bits, 4, SF_LEAK_FRAC, NULL, "B", "fraction bits of a leak"},
       {"--grid-bits", 0, SF_ARG_INT, &o.widths.grid_bits, 2, SF_GRID_BITS, NULL, "B", "bits of a grid entry"},
+      {.name = "--fit",
+       .type = SF_ARG_FLAG,
+       .value = &o.fit,
+       .help = "leave out what the training views of --data do not need"},
+      {.name = "--fit-loss",
+       .type = SF_ARG_DOUBLE,
+       .value = &o.fit_loss,
+       .min = 0,
+       .max = 100,
+       .argument = "DB",
+       .help = "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
+      {.name = "--fit-rays",
+       .type = SF_ARG_U64,
+       .value = &o.fit_rays,
+       .min = 256,
+       .max = 1e8,
+       .argument = "N",
+       .help = "rays that --fit looks at (default 262144)"},
+      {.name = "--data", .type = SF_ARG_STRING, .value = &o.data, .argument = "DATA", .help = "data set for --fit"},
+      {.name = "--quiet", .letter = 'q', .type = SF_ARG_FLAG, .value = &o.quiet, .help = "no progress line"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o.json, .help = "print the report as JSON"},
       {0}};
   const sf_cli cli = {.program = "sf_export",
@@ -151,13 +285,14 @@ int main(int argc, char **argv)
                                  "the accelerator and the firmware.",
                       .examples = "  sf_export model.safetensors -o scene.snn\n"
                                   "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
-                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n",
+                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
+                                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n",
                       .options = table,
                       .min_positional = 1,
                       .max_positional = 1};
   const char *model_path = NULL;
   sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
-  if (status.code == SF_OK && !o.output) status = sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
+  if (status.code == SF_OK) status = check_options(&o);
   if (status.code == SF_OK) status = export_scene(model_path, &o);
   return sf_cli_finish(&cli, status);
 }

@@ -43,10 +43,63 @@ typedef struct sf_quant_report {
   int32_t samples;        /* calibration samples */
   sf_quant_widths widths; /* as used: no zeros */
   sf_scales scales;       /* as chosen, or the model's own if it was fine-tuned for these widths */
-  int64_t packed_bytes;   /* weights, grid and occupancy at these widths without padding; a few scalars are left out */
+  int64_t packed_bytes;   /* sf_packed_bytes */
 } sf_quant_report;
 sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                              sf_quant_report *report);
+
+/* Weights, grid and occupancy at these widths (no zeros) without padding. */
+int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths);
+
+/* ---- trimming: a scene without the parts that it does not need ---- */
+
+enum { SF_CELL_CLASSES = 16 };
+
+/* Which parts of a scene stay. All steps, thresholds and weights keep their meaning, so the result is an ordinary scene. */
+typedef struct sf_trim {
+  bool neuron[SF_LAYERS][SF_LANES];  /* D1, C1, C2; of D2 the outputs: [0] is the density and always stays */
+  bool level[FX_LEVELS_MAX];         /* of the grid, with their two features */
+  int32_t log2_size[FX_LEVELS_MAX];  /* -1: the level's table as it is; else hashed into this many entries */
+  int32_t directions;                /* leading spherical harmonics, >= 1 unless the scene has none */
+  int32_t steps, trans_stop;         /* as in fx_net, fx_scene */
+  bool cells[SF_CELL_CLASSES];       /* occupancy cells by class (sf_cell_class): all of a class stay or go */
+} sf_trim;
+
+/* What the samples of a set of rays used. Counts of samples x steps but `entry`, `visits`, `weight2`. */
+typedef struct sf_trim_use {
+  uint64_t fired[SF_LAYERS][SF_LANES];     /* spikes; of D2: outputs h that were not 0 */
+  uint64_t feature[SF_FEATURE_MAX];        /* samples in which the feature was not 0 */
+  uint64_t *entry;                         /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
+  uint64_t *visits, *weight2;              /* [cells] samples; sum of their squared compositing weights, Q.40 */
+} sf_trim_use;
+sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene);
+void sf_trim_use_free(sf_trim_use *use);
+/* One sample, from many threads at once; weight: what it contributed to its ray, Q.TRANS_FRAC. */
+void sf_trim_use_net(sf_trim_use *use, const fx_net *net, const int16_t *f, const fx_trace *trace);
+void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], uint32_t weight);
+
+/* Mean squared weight of a cell's samples by octave, as if one more had been seen whole (Laplace's rule of
+ * succession): few samples are no proof that a cell is empty. 0: 1.0 or no samples. */
+int sf_cell_class(const sf_trim_use *use, int64_t cell);
+
+/* Everything stays. */
+void sf_trim_all(const fx_scene *scene, sf_trim *trim);
+/* Then without what changes nothing on the rays of `use`: neurons that never fired or have no weights to what stays,
+ * harmonics and levels likewise. At least one neuron of a layer and one level stay. */
+void sf_trim_exact(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim);
+/* A scene of its own (fx_scene_free). Entries that meet in a smaller table are averaged by their use. */
+sf_status sf_trim_apply(const fx_scene *scene, const sf_trim *trim, const sf_trim_use *use, const char *name,
+                        fx_scene *result);
+
+/* Outputs that must stay in a layer: one, and one h where C1 has no other input. */
+int sf_trim_least(const sf_trim *trim, int layer);
+/* log2 of the next smaller table of a level under this trim; -1 at one entry. */
+int sf_trim_smaller(const fx_scene *scene, const sf_trim *trim, int level);
+int64_t sf_grid_level_entries(const fx_grid *grid, int level);
+
+/* Zeroes the entries that no position in an occupied cell reads: no ray sees a difference. Returns how many entries
+ * are zero then, or -1 without memory. */
+int64_t sf_grid_zero_unread(fx_scene *scene);
 
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
  * is refused. */

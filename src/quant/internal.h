@@ -60,4 +60,14 @@ void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibrati
 /* Layers in order; scene->feature_scale and the grid are ready. */
 sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
                              const sf_calibration *calibration, sf_quant_report *report);
+
+/* Entries that a position in [low, high] reads of a level: corners base[0..2] to last[0..2], inclusive. The same cell
+ * rule as src/fx/grid.c. */
+typedef struct sf_corners {
+  uint32_t base[3], last[3];
+} sf_corners;
+sf_corners sf_grid_corners(const fx_grid *grid, int level, const uint32_t low[3], const uint32_t high[3]);
+int64_t sf_grid_entry(const fx_grid *grid, int level, uint32_t x, uint32_t y, uint32_t z);
+/* Copies a level into table `to` of 2^log2_size hashed entries (log2_size < 0: as it is). */
+void sf_grid_copy_level(const fx_grid *grid, int level, int log2_size, const uint64_t *use, int8_t *to, double *sum);
 #endif

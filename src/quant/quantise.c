@@ -70,7 +70,7 @@ static sf_status resolve_widths(sf_quant_widths *widths, const char *name)
   return resolve_width(&widths->grid_bits, 2, SF_GRID_BITS, "grid entries", name);
 }
 
-static int64_t packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
+int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
 {
   const int64_t res = scene->occ_res;
   int64_t bits = res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
@@ -133,7 +133,7 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   memcpy(scene->occupancy, model->occupancy, cells / 8);
   SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
   report->samples = calibration->samples;
-  report->packed_bytes = packed_bytes(scene, &report->widths);
+  report->packed_bytes = sf_packed_bytes(scene, &report->widths);
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
   report->scales = scales_of(scene, report->widths.weight_bits);

@@ -1,0 +1,425 @@
+/* Trimming and fitting: what is left out without effect changes no bit, the rest stays within the bound. */
+#include "spikefield/fit.h"
+#include "src/quant/internal.h"
+#include "tests/folder_fixture.h"
+#include "tests/fx_fixture.h"
+#include <math.h>
+#include <omp.h>
+
+static const sf_quant_widths widest[] = {{SF_WEIGHT_BITS, SF_INPUT_BITS, SF_LEAK_FRAC, 8},
+                                         {SF_WEIGHT_BITS, SF_INPUT_BITS, SF_LEAK_FRAC, 8},
+                                         {SF_WEIGHT_BITS, SF_INPUT_BITS, SF_LEAK_FRAC, 8}};
+
+enum { RAYS = 600 };
+
+static const fixture_sizes small = {6, 20, 6, 9, 24, 20, 3, FX_HYBRID};
+
+static fx_scene small_scene(uint64_t seed, int mode)
+{
+  fixture_sizes sizes = small;
+  sizes.mode = mode;
+  fx_scene scene = fixture_scene(&sizes, seed);
+  scene.step_q24 = 700000; /* about 40 samples along the diagonal */
+  scene.net.exp_in = (fx_scale){20000, 15, 8192};
+  for (int l = 0; l < SF_LAYERS; l++) scene.net.layer[l].theta = scene.net.layer[l].theta ? 20000 : 0;
+  return scene;
+}
+
+/* From a sphere around the box to points in it; the targets are what `scene` shows, and a little noise. */
+static sf_fit_rays make_rays(const fx_scene *scene, uint64_t count, uint32_t noise)
+{
+  sf_fit_rays rays = {.count = count, .pixels = 100};
+  rays.origin = calloc(count, 3 * sizeof(float));
+  rays.direction = calloc(count, 3 * sizeof(float));
+  rays.target = calloc(count, 3 * sizeof(uint32_t));
+  for (uint64_t i = 0; i < count; i++) {
+    float *o = rays.origin + 3 * i, *d = rays.direction + 3 * i, length = 0;
+    for (uint64_t a = 0; a < 3; a++) o[a] = sf_random_float(1, a, i) - 0.5f, length += o[a] * o[a];
+    for (uint64_t a = 0; a < 3; a++) o[a] *= 2.5f / sqrtf(length), d[a] = sf_random_float(2, a, i) - 0.5f - o[a];
+    length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int a = 0; a < 3; a++) d[a] /= length;
+  }
+  uint32_t *picture = calloc(count, 3 * sizeof *picture);
+  sf_fit_sum sum;
+  ck_good(sf_fit_measure(scene, &rays, 0, count, picture, &sum));
+  for (uint64_t i = 0; i < 3 * count; i++)
+    rays.target[i] = (picture[i] + (uint32_t)sf_random_below(3, 0, i, noise + 1)) % 65536;
+  free(picture);
+  return rays;
+}
+
+static void assert_same_pixels(const fx_scene *a, const fx_scene *b, const sf_fit_rays *rays)
+{
+  uint64_t samples = 0;
+  for (uint64_t i = 0; i < rays->count; i++) {
+    fx_ray x, y;
+    fx_pixel p, q;
+    ck_good(sf_fx_ray_make(a, rays->origin + 3 * i, rays->direction + 3 * i, &x));
+    ck_good(sf_fx_ray_make(b, rays->origin + 3 * i, rays->direction + 3 * i, &y));
+    ck_good(fx_render_ray(a, &x, NULL, NULL, &p, NULL));
+    ck_good(fx_render_ray(b, &y, NULL, NULL, &q, NULL));
+    ck_assert_msg(!memcmp(&p, &q, sizeof p), "ray %llu differs", (unsigned long long)i);
+    samples += p.samples;
+  }
+  ck_assert_uint_gt(samples, rays->count); /* the comparison is not of empty rays */
+}
+
+static void clear_column(fx_layer *layer, int o)
+{
+  for (int i = 0; i < layer->n_in; i++) layer->w[i * SF_LANES + o] = 0;
+}
+
+static void clear_row(fx_layer *layer, int i)
+{
+  memset(layer->w + (size_t)i * SF_LANES, 0, SF_LANES);
+}
+
+/* Silent neurons, neurons without fan-out, a chain of two, an unused output h, harmonics and a level without effect. */
+static void spoil(fx_scene *scene)
+{
+  fx_layer *l = scene->net.layer;
+  const int n_dir = l[FX_C1].n_in - (l[FX_D2].n_out - 1);
+  clear_column(&l[FX_D1], 0), clear_column(&l[FX_C1], 5), clear_column(&l[FX_C2], 19); /* silent */
+  clear_row(&l[FX_D2], 7), clear_row(&l[FX_C3], 3);                                    /* without fan-out */
+  clear_row(&l[FX_C2], 9);
+  l[FX_C2].w[9 * SF_LANES + 3] = 100;                               /* feeds only C2's 3 */
+  clear_row(&l[FX_C1], n_dir + 1), clear_row(&l[FX_C1], n_dir - 1); /* h 2, the last harmonic */
+  memset(scene->grid.table + 2 * scene->grid.offset[4], 0, 2 * (size_t)sf_grid_level_entries(&scene->grid, 4));
+}
+
+static void expect_dropped(const fx_scene *scene, const fx_scene *trimmed)
+{
+  static const int gone[SF_LAYERS] = {[FX_D1] = 2, [FX_D2] = 1, [FX_C1] = 2, [FX_C2] = 2};
+  for (int l = FX_D1; l <= FX_C2; l++)
+    ck_assert_int_le(trimmed->net.layer[l].n_out, scene->net.layer[l].n_out - gone[l]);
+  ck_assert_int_lt(trimmed->grid.levels, scene->grid.levels);
+  ck_assert_int_lt(trimmed->net.layer[FX_C1].n_in, scene->net.layer[FX_C1].n_in - 1);
+}
+
+START_TEST(without_effect_changes_no_bit)
+{
+  fx_scene scene = small_scene(11, _i), trimmed;
+  spoil(&scene);
+  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  sf_trim_use use;
+  sf_trim trim;
+  ck_good(sf_trim_use_create(&use, &scene));
+  ck_good(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
+  sf_trim_all(&scene, &trim);
+  ck_good(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
+  ck_assert_int_eq(trimmed.grid.entries, scene.grid.entries);
+  ck_assert_mem_eq(trimmed.grid.table, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  fx_scene_free(&trimmed);
+  sf_trim_exact(&scene, &use, &trim);
+  ck_good(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
+  ck_good(fx_scene_check(&trimmed, "exact"));
+  expect_dropped(&scene, &trimmed);
+  assert_same_pixels(&scene, &trimmed, &rays);
+  sf_trim_use_free(&use), sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
+}
+END_TEST
+
+/* A net that never fires keeps one neuron a layer. */
+START_TEST(something_is_left_of_a_silent_net)
+{
+  fx_scene scene = small_scene(12, FX_HYBRID), trimmed;
+  for (int l = 0; l < SF_LAYERS; l++) memset(scene.net.layer[l].w, 0, (size_t)scene.net.layer[l].n_in * SF_LANES);
+  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  const fx_scene *candidate[] = {&scene};
+  const sf_fit_job job = {.candidate = candidate, .widths = widest, .candidates = 1, .rays = &rays, .name = "silent"};
+  sf_fit_report report;
+  ck_good(sf_fit(&trimmed, &job, &report));
+  for (int l = FX_D1; l <= FX_C2; l++) ck_assert_int_eq(trimmed.net.layer[l].n_out, 1);
+  ck_assert_int_eq(trimmed.grid.levels, 1);
+  assert_same_pixels(&scene, &trimmed, &rays);
+  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
+}
+END_TEST
+
+/* ---- tables ---- */
+
+static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
+{
+  const uint32_t side = (1u << SF_POS_FRAC) / (uint32_t)scene->occ_res, res = (uint32_t)scene->occ_res;
+  uint32_t cell = (uint32_t)sf_random_below(8, 0, i, (uint64_t)res * res * res);
+  while (!(scene->occupancy[cell >> 3] >> (cell & 7) & 1)) cell = (cell + 1) % (res * res * res);
+  const uint32_t corner[3] = {cell % res, cell / res % res, cell / res / res};
+  for (uint64_t a = 0; a < 3; a++) { /* the faces of the cell, too */
+    const uint64_t inside = sf_random_below(9, a, i, side + side / 4);
+    pos[a] = corner[a] * side + (uint32_t)(inside < side ? inside : i & 1 ? side - 1 : 0);
+  }
+}
+
+START_TEST(corners_are_all_that_a_position_reads)
+{
+  fx_scene scene = small_scene(13, FX_HYBRID);
+  int8_t *all = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  for (uint64_t i = 0; i < 200; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    random_position(&scene, i, pos);
+    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    memset(scene.grid.table, 0, 2 * (size_t)scene.grid.entries);
+    for (int l = 0; l < scene.grid.levels; l++) {
+      const sf_corners c = sf_grid_corners(&scene.grid, l, pos, pos);
+      for (int n = 0; n < 8; n++) {
+        ck_assert_uint_eq(c.last[n % 3], c.base[n % 3] + 1);
+        const int64_t e =
+            sf_grid_entry(&scene.grid, l, c.base[0] + (n & 1), c.base[1] + (n >> 1 & 1), c.base[2] + (n >> 2));
+        memcpy(scene.grid.table + 2 * e, all + 2 * e, 2);
+      }
+    }
+    fx_grid_features(&scene.grid, pos, g, NULL);
+    ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
+  }
+  free(all), fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(unread_entries_are_not_read)
+{
+  fx_scene scene = small_scene(14, FX_HYBRID);
+  memset(scene.occupancy, 0, 64);
+  scene.occupancy[9] = 0x21, scene.occupancy[40] = 0x80;
+  int8_t *all = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  const int64_t zero = sf_grid_zero_unread(&scene);
+  ck_assert_int_gt(zero, scene.grid.entries / 4);
+  ck_assert_int_lt(zero, scene.grid.entries);
+  int8_t *cleared = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(cleared, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  for (uint64_t i = 0; i < 2000; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    random_position(&scene, i, pos);
+    memcpy(scene.grid.table, cleared, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, g, NULL);
+    ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
+  }
+  free(all), free(cleared), fx_scene_free(&scene);
+}
+END_TEST
+
+static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
+{
+  const sf_corners c = sf_grid_corners(grid, level, pos, pos);
+  int64_t entry[8];
+  for (int n = 0; n < 8; n++) {
+    entry[n] = sf_grid_entry(grid, level, c.base[0] + (n & 1), c.base[1] + (n >> 1 & 1), c.base[2] + (n >> 2));
+    for (int m = 0; m < n; m++)
+      if (entry[m] == entry[n]) return false;
+  }
+  return true;
+}
+
+/* What is used keeps its value in a smaller table, dense levels and hashed ones, unless it meets something used. */
+START_TEST(smaller_tables_keep_what_is_used)
+{
+  fx_scene scene = small_scene(15, FX_HYBRID), small_one;
+  int compared = 0;
+  for (uint64_t i = 0; i < 60; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    sf_trim_use use;
+    sf_trim trim;
+    random_position(&scene, i, pos);
+    ck_good(sf_trim_use_create(&use, &scene));
+    sf_trim_use_place(&use, &scene, pos, 1000);
+    sf_trim_all(&scene, &trim);
+    for (int l = 0; l < scene.grid.levels; l++) trim.log2_size[l] = sf_trim_smaller(&scene, &trim, l);
+    ck_good(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
+    ck_good(fx_scene_check(&small_one, "smaller"));
+    ck_assert_int_lt(small_one.grid.entries, scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    fx_grid_features(&small_one.grid, pos, g, NULL);
+    for (int l = 0; l < scene.grid.levels; l++) {
+      if (!corners_apart(&small_one.grid, l, pos)) continue;
+      compared++;
+      ck_assert_mem_eq(f + 2 * l, g + 2 * l, 2 * sizeof *f);
+    }
+    sf_trim_use_free(&use), fx_scene_free(&small_one);
+  }
+  ck_assert_int_gt(compared, 200);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* ---- the search ---- */
+
+static sf_status fit(const fx_scene *const *candidate, int candidates, const sf_fit_rays *rays, double loss,
+                     fx_scene *fitted, sf_fit_report *report)
+{
+  const sf_fit_job job = {.candidate = candidate,
+                          .widths = widest,
+                          .candidates = candidates,
+                          .rays = rays,
+                          .loss_db = loss,
+                          .name = "out.snn"};
+  return sf_fit(fitted, &job, report);
+}
+
+START_TEST(no_loss_is_no_difference)
+{
+  fx_scene scene = small_scene(16, _i), fitted;
+  spoil(&scene);
+  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  const fx_scene *candidate[] = {&scene};
+  sf_fit_report r;
+  ck_good(fit(candidate, 1, &rays, 0, &fitted, &r));
+  expect_dropped(&scene, &fitted);
+  assert_same_pixels(&scene, &fitted, &rays);
+  ck_assert_uint_eq(r.before.sum.error, r.after.sum.error);
+  ck_assert_uint_lt(r.after.energy_fj, r.before.energy_fj);
+  ck_assert_uint_lt(r.after.bytes, r.before.bytes);
+  for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(r.dropped[l], 0);
+  ck_assert_int_eq(r.dropped_levels + r.smaller_tables, 0);
+  ck_assert_int_eq(r.idle_levels, 1);
+  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted);
+}
+END_TEST
+
+/* Measured here once more, through the file. */
+START_TEST(the_bound_is_kept)
+{
+  fx_scene scene = small_scene(17, FX_HYBRID), fitted, loaded;
+  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  const fx_scene *candidate[] = {&scene};
+  const double bound = 0.5;
+  sf_fit_report r;
+  sf_fit_sum before, after;
+  ck_good(fit(candidate, 1, &rays, bound, &fitted, &r));
+  make_folder();
+  ck_good(fx_scene_save(&fitted, in("fitted.snn")));
+  ck_good(fx_scene_load(&loaded, in("fitted.snn")));
+  remove_folder();
+  const uint64_t first = r.first_checked, end = first + r.checked;
+  ck_good(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
+  ck_good(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
+  ck_assert_uint_eq(before.error, r.before.sum.error);
+  ck_assert_uint_eq(after.error, r.after.sum.error);
+  ck_assert_mem_eq(&after.counts, &r.after.sum.counts, sizeof after.counts);
+  ck_assert_double_le((double)after.error, (double)before.error * pow(10, bound / 10));
+  ck_assert_double_le(r.loss_db, bound);
+  ck_assert_uint_lt(r.after.energy_fj, r.before.energy_fj); /* the bound was used for something */
+  ck_assert_uint_lt(r.after.bytes, r.before.bytes);
+  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted), fx_scene_free(&loaded);
+}
+END_TEST
+
+START_TEST(threads_do_not_matter)
+{
+  fx_scene scene = small_scene(18, FX_HYBRID), a, b;
+  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  const fx_scene *candidate[] = {&scene};
+  sf_fit_report r, q;
+  omp_set_num_threads(1);
+  ck_good(fit(candidate, 1, &rays, 0.3, &a, &r));
+  omp_set_num_threads(3);
+  ck_good(fit(candidate, 1, &rays, 0.3, &b, &q));
+  ck_assert_mem_eq(&r.after.sum, &q.after.sum, sizeof r.after.sum);
+  ck_assert_int_eq(a.grid.entries, b.grid.entries);
+  ck_assert_mem_eq(a.grid.table, b.grid.table, 2 * (size_t)a.grid.entries);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    ck_assert_int_eq(a.net.layer[l].n_in, b.net.layer[l].n_in);
+    ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
+  }
+  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&a), fx_scene_free(&b);
+}
+END_TEST
+
+/* Of the candidates the last one that is good enough; all is measured against the first. */
+START_TEST(candidates)
+{
+  fx_scene scene = small_scene(19, FX_HYBRID), same = small_scene(19, FX_HYBRID), worse = small_scene(20, FX_HYBRID);
+  fx_scene fitted;
+  sf_fit_rays rays = make_rays(&scene, RAYS, 3000);
+  const fx_scene *candidate[] = {&scene, &same, &worse};
+  sf_fit_report r;
+  ck_good(fit(candidate, 3, &rays, 0.1, &fitted, &r));
+  ck_assert_int_eq(r.chosen, 1);
+  ck_assert_double_le(r.loss_db, 0.1);
+  fx_scene_free(&fitted);
+  ck_good(fit(candidate, 3, &rays, 0, &fitted, &r));
+  ck_assert_int_eq(r.chosen, 0);
+  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&same), fx_scene_free(&worse), fx_scene_free(&fitted);
+}
+END_TEST
+
+static bool stop_at_once(void *user, const char *what, int done, int total)
+{
+  (void)user, (void)what, (void)done, (void)total;
+  return false;
+}
+
+START_TEST(refusals)
+{
+  fx_scene scene = small_scene(21, FX_HYBRID), fitted;
+  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  const fx_scene *candidate[] = {&scene};
+  sf_fit_report r;
+  ck_bad(fit(candidate, 1, &rays, -1, &fitted, &r), SF_E_RANGE, "out.snn", "-1 dB");
+  ck_bad(fit(candidate, 1, &rays, NAN, &fitted, &r), SF_E_RANGE, "out.snn", "nan dB");
+  rays.count = 100;
+  ck_bad(fit(candidate, 1, &rays, 0.1, &fitted, &r), SF_E_RANGE, "out.snn", "100 rays");
+  ck_assert_ptr_null(fitted.owner);
+  rays.count = RAYS;
+  sf_fit_job job = {.candidate = candidate,
+                    .widths = widest,
+                    .candidates = 1,
+                    .rays = &rays,
+                    .name = "out.snn",
+                    .tick = stop_at_once};
+  ck_bad(sf_fit(&fitted, &job, &r), SF_E_STOPPED, "out.snn", "stopped");
+  ck_assert_ptr_null(fitted.owner);
+  sf_view view = {.name = "r_7", .camera = {.width = 4, .height = 4}};
+  const sf_dataset data = {.path = "dir", .view = &view, .count = 1};
+  sf_fit_rays none;
+  ck_bad(sf_fit_rays_draw(&none, &data, scene.background, 10, 0), SF_E_FORMAT, "dir", "r_7");
+  sf_fit_rays_free(&rays), fx_scene_free(&scene);
+}
+END_TEST
+
+/* Straight alpha over the background: half of red over white. */
+START_TEST(targets)
+{
+  uint16_t rgba[4] = {65535, 0, 0, 32768};
+  sf_view view = {.name = "r_0", .camera = {.width = 1, .height = 1, .fx = 1, .fy = 1}, .image = {1, 1, rgba}};
+  const sf_dataset data = {.path = "dir", .view = &view, .count = 1};
+  const int32_t white[3] = {65536, 65536, 65536}, black[3] = {0};
+  sf_fit_rays rays;
+  ck_good(sf_fit_rays_draw(&rays, &data, white, 5, 0));
+  ck_assert_uint_eq(rays.target[12], 65535);
+  ck_assert_uint_eq(rays.target[13], 32767);
+  ck_assert_double_eq(rays.pixels, 1);
+  sf_fit_rays_free(&rays);
+  ck_good(sf_fit_rays_draw(&rays, &data, black, 5, 0));
+  ck_assert_uint_eq(rays.target[12], 32768);
+  ck_assert_uint_eq(rays.target[13], 0);
+  sf_fit_rays_free(&rays);
+}
+END_TEST
+
+int main(void)
+{
+  omp_set_num_threads(1); /* many small parallel regions: threads would wait for each other on a busy machine */
+  Suite *suite = suite_create("fit");
+  TCase *tc = tcase_create("fit");
+  tcase_set_timeout(tc, 120);
+  tcase_add_loop_test(tc, without_effect_changes_no_bit, 0, 3);
+  tcase_add_test(tc, something_is_left_of_a_silent_net);
+  tcase_add_test(tc, corners_are_all_that_a_position_reads);
+  tcase_add_test(tc, unread_entries_are_not_read);
+  tcase_add_test(tc, smaller_tables_keep_what_is_used);
+  tcase_add_loop_test(tc, no_loss_is_no_difference, 0, 3);
+  tcase_add_test(tc, the_bound_is_kept);
+  tcase_add_test(tc, threads_do_not_matter);
+  tcase_add_test(tc, candidates);
+  tcase_add_test(tc, refusals);
+  tcase_add_test(tc, targets);
+  suite_add_tcase(suite, tc);
+  return fixture_run(suite);
+}
