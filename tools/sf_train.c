@@ -46,7 +46,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
        "resolution of the finest level (default 2048)"},
       {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
        "neurons of a spiking layer, multiple of 16 (default 128)"},
-      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 1)"},
+      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25)"},
       {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N", "samples across the box diagonal (default 1024)"},
       {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N",
        "occupancy cells per axis, power of two (default 128)"},
@@ -365,8 +365,8 @@ static sf_status run(arguments *a, const char *path)
 
 int main(int argc, char **argv)
 {
-  arguments a = {
-      .output = "model.safetensors", .train = sf_train_defaults(), .theta = 1, .downscale = 1, .checkpoint_minutes = 2};
+  arguments a = {.output = "model.safetensors", .train = sf_train_defaults(), .downscale = 1, .checkpoint_minutes = 2};
+  a.theta = (double)a.train.config.theta[0];
   sf_option options[64];
   const sf_cli cli = make_cli(&a, options);
   const char *path[1] = {NULL};

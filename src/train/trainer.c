@@ -14,15 +14,17 @@ static const double tuning_rate = 0.1; /* of the learning rates */
 
 sf_train_options sf_train_defaults(void)
 {
-  return (sf_train_options){.config = sf_config_default(),
-                            .beta = 5e-7,
-                            .alpha = 1e-6,
-                            .stage1 = 2500,
-                            .stage2 = 7500,
-                            .seed = 1,
-                            .samples = 1 << 14,
-                            .lr_grid = 1e-2,
-                            .lr_net = 5e-3};
+  sf_train_options options = {.config = sf_config_default(),
+                              .beta = 5e-7,
+                              .alpha = 1e-6,
+                              .stage1 = 2500,
+                              .stage2 = 7500,
+                              .seed = 1,
+                              .samples = 1 << 14,
+                              .lr_grid = 1e-2,
+                              .lr_net = 5e-3};
+  for (int i = 0; i < 3; i++) options.config.theta[i] = 0.25f;
+  return options;
 }
 
 const sf_model *sf_trainer_model(const sf_trainer *t)
