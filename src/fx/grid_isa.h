@@ -2,6 +2,8 @@
  *
  * A corner and its neighbour in x are often in one 32-bit word: in a dense level always, in a hashed one when x is
  * even, as the hash of x is x itself. */
+#ifndef SPIKEFIELD_FX_GRID_ISA_H
+#define SPIKEFIELD_FX_GRID_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
@@ -133,3 +135,4 @@ static uint64_t features(const fx_grid *grid, fx_block *b)
     for (int level = 0; level < grid->levels; level++) memcpy(&b->f[i][2 * level], &pairs[level][i], 4);
   return saturated;
 }
+#endif

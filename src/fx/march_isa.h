@@ -1,5 +1,7 @@
 /* Marching, one lattice point to a 64-bit lane. The first point is tested alone: within matter it is the next sample.
  */
+#ifndef SPIKEFIELD_FX_MARCH_ISA_H
+#define SPIKEFIELD_FX_MARCH_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/vec_isa.h"
 
@@ -57,3 +59,4 @@ static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
   }
   return ray->count;
 }
+#endif

@@ -1,6 +1,7 @@
 /* Vectors of 32-bit lanes for AVX-512 VNNI and AVX2. Signed unless the name says u. */
 #ifndef SPIKEFIELD_FX_VEC_ISA_H
 #define SPIKEFIELD_FX_VEC_ISA_H
+#include "spikefield/arch.h"
 #include <immintrin.h>
 #include <stdint.h>
 #include <string.h>
@@ -101,6 +102,8 @@ static INLINE vec v_widen(const int16_t *p)
   return _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p));
 }
 #endif
+
+enum { VECTORS = SF_LANES / WIDTH }; /* of a layer */
 
 static INLINE vec v_load(const void *p)
 {

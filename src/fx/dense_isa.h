@@ -1,0 +1,93 @@
+/* Dense products: GANG samples at once, in functions of their own, where the compiler keeps all sums in registers. A
+ * gang of three loads 11 vectors for 24 products; CPUs load fewer than they multiply. */
+#ifndef SPIKEFIELD_FX_DENSE_ISA_H
+#define SPIKEFIELD_FX_DENSE_ISA_H
+#include "src/fx/core.h"
+#include "src/fx/vec_isa.h"
+
+enum { GANG = 3 };
+_Static_assert(FX_BLOCK % GANG == 0, "a block is whole gangs");
+
+#define EACH(k, j)                                                                                                     \
+  _Pragma("GCC unroll 3") for (int k = 0; k < GANG; k++) _Pragma("GCC unroll 8") for (int j = 0; j < TILE; j++)
+
+/* out[k][o] = from[k][o] + sum of w[p][o] . x[k][p], pairs of 16-bit values, for TILE vectors of outputs, rows of
+ * SF_LANES; from NULL: 0. */
+static __attribute__((noinline)) void pair_products(const int16_t *w, int pairs, const int16_t *const x[GANG],
+                                                    const int32_t *const *from, int32_t *out)
+{
+  vec acc[GANG][TILE];
+  EACH(k, j) acc[k][j] = from ? v_load(from[k] + j * WIDTH) : v_set(0);
+  for (int p = 0; p < pairs; p++) {
+    vec in[GANG];
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 2 * p);
+#pragma GCC unroll 8
+    for (int j = 0; j < TILE; j++) {
+      const vec row = v_load(w + 2 * (p * SF_LANES + j * WIDTH));
+#pragma GCC unroll 3
+      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot(acc[k][j], in[k], row);
+    }
+  }
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+/* out[k][o] = sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
+static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], int32_t *out)
+{
+  vec acc[GANG][TILE];
+  EACH(k, j) acc[k][j] = v_set(0);
+  for (int q = 0; q < SF_LANES / 4; q++) {
+    vec in[GANG];
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 4 * q);
+#pragma GCC unroll 8
+    for (int j = 0; j < TILE; j++) {
+      const vec row = v_load(w + 4 * (q * SF_LANES + j * WIDTH));
+#pragma GCC unroll 3
+      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
+    }
+  }
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
+{
+  for (int i = 0; i < b->n; i += GANG)
+    for (int first = 0; first < VECTORS; first += TILE)
+      pair_products(words->d1[0][first * WIDTH], SF_FEATURE_MAX / 2,
+                    (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]}, NULL,
+                    &s->d1_current[i][first * WIDTH]);
+}
+
+static void c1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
+{
+  for (int i = 0; i < b->n; i += GANG)
+    for (int first = 0; first < VECTORS; first += TILE) {
+      const int at = first * WIDTH;
+      pair_products(words->c1_h[0][at], SF_OUT_MAX / 2,
+                    (const int16_t *const[]){s->d2_current[i], s->d2_current[i + 1], s->d2_current[i + 2]},
+                    (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
+                    &s->current[i][at]);
+    }
+}
+
+static INLINE void spike_bytes(const uint64_t bits[2], uint8_t bytes[SF_LANES])
+{
+#if defined(__AVX512VNNI__)
+  for (int word = 0; word < 2; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
+#else
+  for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
+#endif
+}
+
+static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+{
+  for (int i = 0; i < n; i += GANG) {
+    uint8_t x[GANG][SF_LANES];
+    for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
+    for (int first = 0; first < VECTORS; first += TILE)
+      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, &s->current[i][first * WIDTH]);
+  }
+}
+#endif

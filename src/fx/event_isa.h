@@ -1,0 +1,118 @@
+/* Products with spikes: a row of weights for every neuron that fired. */
+#ifndef SPIKEFIELD_FX_EVENT_ISA_H
+#define SPIKEFIELD_FX_EVENT_ISA_H
+#include "src/fx/core.h"
+#include "src/fx/vec_isa.h"
+
+enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample */
+
+/* The spikes of one layer of a block at one step, sample after sample, in groups of GROUP rows: a loop over all groups
+ * has no branch per sample. A sample's last group is filled up with SF_LANES, the row of zeros; a silent sample has one
+ * such. */
+typedef struct events {
+  int groups;
+  uint8_t row[FX_BLOCK * (SF_LANES + GROUP) + 64];
+  uint8_t sample[FX_BLOCK * GROUPS + 64];
+} events;
+
+static INLINE void list_spikes(uint8_t *row, const uint64_t bits[2], int low)
+{
+#if defined(__AVX512VBMI2__)
+  const vec iota = _mm512_set_epi64(0x3f3e3d3c3b3a3938, 0x3736353433323130, 0x2f2e2d2c2b2a2928, 0x2726252423222120,
+                                    0x1f1e1d1c1b1a1918, 0x1716151413121110, 0x0f0e0d0c0b0a0908, 0x0706050403020100);
+  v_store(row, _mm512_maskz_compress_epi8(bits[0], iota));
+  v_store(row + low, _mm512_maskz_compress_epi8(bits[1], _mm512_or_si512(iota, _mm512_set1_epi8(64))));
+#else
+  (void)low;
+  for (int word = 0; word < 2; word++)
+    for (uint64_t rest = bits[word]; rest; rest &= rest - 1) *row++ = (uint8_t)(word * 64 + __builtin_ctzll(rest));
+#endif
+}
+
+static INLINE void list_events(events *e, const uint64_t (*spikes)[2], int n)
+{
+  e->groups = 0;
+  for (int i = 0; i < n; i++) {
+    const int low = __builtin_popcountll(spikes[i][0]), count = low + __builtin_popcountll(spikes[i][1]);
+    uint8_t *row = e->row + e->groups * GROUP;
+    list_spikes(row, spikes[i], low);
+    memset(row + count, SF_LANES, GROUP);
+    for (int at = 0; at < GROUPS; at += 4 * WIDTH) /* what is written too far, the next sample overwrites */
+      v_store(e->sample + e->groups + at, V(set1_epi8)((char)i));
+    e->groups += count ? (count + GROUP - 1) / GROUP : 1;
+  }
+}
+
+/* Group g: its rows, read with one load, and its sample. Returns -1 when it goes on with the sample of the group
+ * before, or 0 when it starts a new one. */
+static INLINE int32_t read_group(const events *e, int g, uint32_t row[GROUP], int *sample)
+{
+  uint32_t rows;
+  const int before = *sample;
+  memcpy(&rows, e->row + g * GROUP, sizeof rows);
+  for (int i = 0; i < GROUP; i++) row[i] = rows >> 8 * i & 255;
+  *sample = e->sample[g];
+  return -(*sample == before);
+}
+
+static INLINE __m256i row16(const int16_t (*w)[SF_OUT_MAX], uint32_t i)
+{
+  return _mm256_load_si256((const __m256i *)w[i]);
+}
+
+/* sum[sample] = sum of its rows of 16. */
+static INLINE void add_rows16(const events *e, const int16_t (*w)[SF_OUT_MAX], int16_t (*sum)[SF_OUT_MAX])
+{
+  __m256i acc = _mm256_setzero_si256();
+  int sample = -1;
+  for (int g = 0; g < e->groups; g++) {
+    uint32_t row[GROUP];
+    const __m256i go_on = _mm256_set1_epi32(read_group(e, g, row, &sample));
+    const __m256i four = _mm256_add_epi16(_mm256_add_epi16(row16(w, row[0]), row16(w, row[1])),
+                                          _mm256_add_epi16(row16(w, row[2]), row16(w, row[3])));
+    acc = _mm256_add_epi16(_mm256_and_si256(acc, go_on), four);
+    _mm256_storeu_si256((__m256i *)sum[sample], acc);
+  }
+}
+
+/* a + b of 8-bit lanes as 16-bit lanes: low and high halves of each 128 bits; fx_words.c2 is ordered so that they are
+ * neighbouring outputs. */
+static INLINE void add_bytes(vec a, vec b, vec sum[2])
+{
+  const vec one = V(set1_epi8)(1);
+  sum[0] = V(maddubs_epi16)(one, V(unpacklo_epi8)(a, b));
+  sum[1] = V(maddubs_epi16)(one, V(unpackhi_epi8)(a, b));
+}
+
+/* sum[sample] = sum of its rows of SF_LANES; exact in 16 bits. */
+static INLINE void add_rows(const events *e, const int8_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES])
+{
+  enum { BYTES = 4 * WIDTH, PARTS = SF_LANES / BYTES };
+  vec acc[PARTS][2];
+  int sample = -1;
+#pragma GCC unroll 4
+  for (int j = 0; j < PARTS; j++) acc[j][0] = acc[j][1] = v_set(0);
+  for (int g = 0; g < e->groups; g++) {
+    uint32_t row[GROUP];
+    const vec go_on = v_set(read_group(e, g, row, &sample));
+#pragma GCC unroll 4
+    for (int j = 0; j < PARTS; j++) {
+      vec a[2], b[2];
+      add_bytes(v_load(w[row[0]] + j * BYTES), v_load(w[row[1]] + j * BYTES), a);
+      add_bytes(v_load(w[row[2]] + j * BYTES), v_load(w[row[3]] + j * BYTES), b);
+#pragma GCC unroll 2
+      for (int half = 0; half < 2; half++) {
+        acc[j][half] = V(add_epi16)(V_BITS(and)(acc[j][half], go_on), V(add_epi16)(a[half], b[half]));
+        v_store(sum[sample] + j * BYTES + half * BYTES / 2, acc[j][half]);
+      }
+    }
+  }
+}
+
+static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+{
+  events e;
+  list_events(&e, spikes, n);
+  add_rows(&e, words->c2, s->c2_current);
+}
+#endif
