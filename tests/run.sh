@@ -12,6 +12,7 @@ for name in "$@"; do
   case $name in
     cli) command=("$here/test_cli.sh" "$build/bin") ;;
     reproduce) command=("$here/test_reproduce.sh" "$build") ;;
+    fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
