@@ -118,8 +118,8 @@ $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
-check: all lint gen-check $(TESTS:%=$B/tests/%) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install safetensors
+check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -129,8 +129,10 @@ asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
 ASAN_TESTS := $(filter-out $(DUT_TESTS),$(TESTS))
-asan-run: $(ASAN_TESTS:%=$B/tests/%)
-	@ASAN_OPTIONS=detect_leaks=0 tests/run.sh $B $(ASAN_TESTS)
+asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
+	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 tests/run.sh $B $(ASAN_TESTS) fuzz
+
+include tests/fuzz/fuzz.mk
 
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

@@ -13,6 +13,7 @@ for name in "$@"; do
     cli) command=("$here/test_cli.sh" "$build/bin") ;;
     reproduce) command=("$here/test_reproduce.sh" "$build") ;;
     pareto) command=("$here/test_pareto.sh" "$build") ;;
+    fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;

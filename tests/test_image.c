@@ -227,7 +227,7 @@ START_TEST(image_faults)
 }
 END_TEST
 
-/* A header that promises 40000 x 40000 pixels is refused before memory is asked for. */
+/* A header that promises 40000 x 40000 pixels is refused before memory is asked for, also in a file large enough. */
 START_TEST(absurd_size_is_refused)
 {
   unsigned char f[33] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
@@ -241,11 +241,15 @@ START_TEST(absurd_size_is_refused)
     for (int b = 0; b < 8; b++) crc = crc & 1 ? (crc >> 1) ^ 0xedb88320u : crc >> 1;
   }
   put_be(f + 29, ~crc);
-  char file[60] = {0};
+  const size_t enough = (size_t)6 << 20;
+  char *file = calloc(1, enough);
   memcpy(file, f, 33);
   memcpy(file + 33, "\0\0\0\0IDAT\x35\xaf\x06\x1e", 12);
   ck_good(sf_write_file(in("big.png"), file, 45));
+  ck_bad(sf_image_load(&image, in("big.png")), SF_E_FORMAT, "big.png", "45 bytes cannot hold 40000 x 40000");
+  ck_good(sf_write_file(in("big.png"), file, enough));
   ck_bad(sf_image_load(&image, in("big.png")), SF_E_RANGE, "big.png", "40000 x 40000");
+  free(file);
 }
 END_TEST
 
@@ -297,6 +301,25 @@ static void put_jpeg(const char *path, int width, int height, bool grey, bool pr
   fclose(f);
 }
 
+static void put_scans(const char *path, int width, int height, const jpeg_scan_info *scan, int scans)
+{
+  struct jpeg_error_mgr e;
+  struct jpeg_compress_struct c = {.err = jpeg_std_error(&e)};
+  FILE *f = fopen(path, "wb");
+  JSAMPLE line[64] = {0, 255, 7, 200}, *row = line;
+  jpeg_create_compress(&c);
+  jpeg_stdio_dest(&c, f);
+  c.image_width = (JDIMENSION)width, c.image_height = (JDIMENSION)height;
+  c.input_components = 1, c.in_color_space = JCS_GRAYSCALE;
+  jpeg_set_defaults(&c);
+  c.scan_info = scan, c.num_scans = scans;
+  jpeg_start_compress(&c, TRUE);
+  for (int y = 0; y < height; y++) jpeg_write_scanlines(&c, &row, 1);
+  jpeg_finish_compress(&c);
+  jpeg_destroy_compress(&c);
+  fclose(f);
+}
+
 /* Quality 100 without chroma subsampling: rounding of the transform and the colour change stays within 3 of 255. */
 START_TEST(jpeg_values)
 {
@@ -325,6 +348,24 @@ START_TEST(jpeg_damage)
 {
   put_jpeg(in("a.jpg"), 24, 16, false, _i);
   damage(in("a.jpg"), SF_E_FORMAT, load_image, false);
+}
+END_TEST
+
+/* Every coefficient in a scan of its own, each bit of it in another one: every scan goes through the whole picture. */
+START_TEST(jpeg_of_many_scans_is_refused)
+{
+  enum { SCANS = 1 + 63 * 4 };
+  jpeg_scan_info scan[SCANS] = {{.comps_in_scan = 1}};
+  sf_image image;
+  for (int i = 1; i < SCANS; i++) {
+    const int pass = (i - 1) / 63, k = 1 + (i - 1) % 63;
+    scan[i] = (jpeg_scan_info){.comps_in_scan = 1, .Ss = k, .Se = k, .Ah = pass ? 4 - pass : 0, .Al = 3 - pass};
+  }
+  put_scans(in("a.jpg"), 8, 8, scan, 1 + 63 * 2);
+  ck_good(sf_image_load(&image, in("a.jpg")));
+  sf_image_free(&image);
+  put_scans(in("a.jpg"), 8, 8, scan, SCANS);
+  ck_bad(sf_image_load(&image, in("a.jpg")), SF_E_FORMAT, "a.jpg", "more than 200 scans");
 }
 END_TEST
 
@@ -552,6 +593,7 @@ static Suite *suite(void)
   tcase_add_test(t, full_disk_leaves_nothing);
   tcase_add_loop_test(t, jpeg_values, 0, 4);
   tcase_add_loop_test(t, jpeg_damage, 0, 2);
+  tcase_add_test(t, jpeg_of_many_scans_is_refused);
   tcase_add_test(t, downscale_weighs_by_alpha);
   tcase_add_test(t, exr_round_trip_is_exact);
   tcase_add_test(t, exr_half_rounds);

@@ -90,6 +90,26 @@ START_TEST(march_equals_testing_every_point)
 }
 END_TEST
 
+/* Far away a distance has no precision left, and the box seems longer than its diagonal: bit maps of lattice points
+ * have room for no more than the lattice. */
+START_TEST(far_cameras_stay_in_the_lattice)
+{
+  static const float o[3][3] = {{-0x1.0f159p+22f, -0x1.4ef0eap+22f, 0x1.1755ccp+22f},
+                                {0x1.2e2e1ap+22f, -0x1.47fb46p+22f, -0x1.fd98cap+21f},
+                                {0, 0, 3}},
+                     d[3][3] = {{0x1.0e487ap-1f, 0x1.4df384p-1f, -0x1.168278p-1f},
+                                {-0x1.2d39e6p-1f, 0x1.46f238p-1f, 0x1.fbfcf8p-2f},
+                                {0, 0, -1}};
+  sf_config config = sf_config_default();
+  config.lattice = 1024;
+  for (int i = 0; i < 3; i++) {
+    const sf_lattice lattice = sf_ray_lattice(&config, o[i], d[i]);
+    ck_assert_int_gt(lattice.count, 500);
+    ck_assert_int_le(lattice.count, config.lattice);
+  }
+}
+END_TEST
+
 START_TEST(empty_and_missing_rays_show_the_background)
 {
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
@@ -157,6 +177,7 @@ int main(void)
   tcase_add_test(tc, weights_and_transmittance_sum_to_one);
   tcase_add_test(tc, backward_is_the_slope);
   tcase_add_test(tc, march_equals_testing_every_point);
+  tcase_add_test(tc, far_cameras_stay_in_the_lattice);
   tcase_add_test(tc, empty_and_missing_rays_show_the_background);
   tcase_add_test(tc, packets_equal_the_oracle);
   suite_add_tcase(suite, tc);

@@ -1,8 +1,9 @@
 #!/bin/sh
 # Finds which packages are missing and installs them with apt (Debian 12 and Ubuntu names). Needs root only then.
+# DEPS: other packages instead, as `make deps-fuzz` names them.
 set -eu
-packages="gcc g++ make pkg-config patch libopenexr-dev libpng-dev libjpeg-dev libcjson-dev zlib1g-dev check libsubunit-dev
-verilator iverilog yosys gcc-riscv64-unknown-elf cppcheck gnuplot-nox procps util-linux"
+packages="${DEPS:-gcc g++ make pkg-config patch libopenexr-dev libpng-dev libjpeg-dev libcjson-dev zlib1g-dev check libsubunit-dev
+verilator iverilog yosys gcc-riscv64-unknown-elf cppcheck gnuplot-nox procps util-linux}"
 missing=
 for package in $packages; do
   state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)

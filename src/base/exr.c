@@ -1,5 +1,5 @@
 /* EXR through the OpenEXR Core C API; all file access goes through this library's own reader and writer. */
-#include "spikefield/image.h"
+#include "src/base/image_codec.h"
 #include "spikefield/io.h"
 #include <openexr.h>
 #include <errno.h>
@@ -199,6 +199,16 @@ void sf_exr_free(sf_exr_channel *channels, int n)
   free(channels);
 }
 
+/* Bytes of a pixel on file; 0 without channels. */
+static uint64_t pixel_bytes(exr_const_context_t context)
+{
+  const exr_attr_chlist_t *list;
+  uint64_t bytes = 0;
+  if (exr_get_channels(context, 0, &list)) return 0;
+  for (int i = 0; i < list->num_channels; i++) bytes += list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
+  return bytes;
+}
+
 static sf_status check_layout(exr_context_t context, const char *path, size_t size, int *width, int *height)
 {
   int parts = 0;
@@ -212,12 +222,13 @@ static sf_status check_layout(exr_context_t context, const char *path, size_t si
   int64_t w = (int64_t)box.max.x - box.min.x + 1, h = (int64_t)box.max.y - box.min.y + 1;
   if (w < 1 || h < 1 || w > INT32_MAX / 8 || h > INT32_MAX || w * h > MAX_PIXELS)
     return sf_fail(SF_E_RANGE, "%s: EXR: an image of %jd x %jd pixels", path, (intmax_t)w, (intmax_t)h);
-  /* Deflate packs at most 1032 : 1; a damaged size must not cost gigabytes before it is noticed. */
   exr_compression_t packing;
-  bool deflate = !exr_get_compression(context, 0, &packing) && packing <= EXR_COMPRESSION_ZIP;
-  if (deflate && w * h / 1100 > (int64_t)size)
-    return sf_fail(SF_E_FORMAT, "%s: EXR: %zu bytes cannot hold %jd x %jd pixels", path, size, (intmax_t)w,
-                   (intmax_t)h);
+  if (exr_get_compression(context, 0, &packing) || packing > EXR_COMPRESSION_ZIP)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: EXR: only files without compression, with RLE and with ZIP are read", path);
+  const uint64_t bytes = pixel_bytes(context); /* a channel takes bytes of the header: the product fits 64 bits */
+  if (!sf_deflate_holds(size, (uint64_t)(w * h) * bytes))
+    return sf_fail(SF_E_FORMAT, "%s: EXR: %zu bytes cannot hold %jd x %jd pixels of %ju bytes", path, size, (intmax_t)w,
+                   (intmax_t)h, (uintmax_t)bytes);
   *width = (int)w, *height = (int)h;
   return sf_ok();
 }

@@ -7,11 +7,15 @@
 #include <jpeglib.h>
 #include <jerror.h>
 
+/* A progressive picture takes some ten; each goes through all of it, however few bytes the scan has. */
+enum { SCANS_MAX = 200 };
+
 /* Everything that lives across the longjmp sits here, in memory. `base` first: libjpeg hands back its address. */
 typedef struct jpeg_job {
   struct jpeg_error_mgr base;
   jmp_buf escape;
   struct jpeg_decompress_struct codec;
+  struct jpeg_progress_mgr progress;
   JSAMPLE *line;
   sf_image *image;
   const char *path;
@@ -34,6 +38,27 @@ static void on_message(j_common_ptr codec, int level)
   if (level < 0 && !harmless) on_error(codec);
 }
 
+static void on_progress(j_common_ptr codec)
+{
+  jpeg_job *job = (jpeg_job *)codec->err;
+  if (job->codec.input_scan_number <= SCANS_MAX) return;
+  snprintf(job->message, sizeof job->message, "more than %d scans", SCANS_MAX);
+  longjmp(job->escape, 1);
+}
+
+/* What would cost memory or time out of all proportion to the file, or is not read at all. */
+static sf_status check_kind(const struct jpeg_decompress_struct *codec, const char *path, size_t size)
+{
+  if (codec->jpeg_color_space == JCS_CMYK || codec->jpeg_color_space == JCS_YCCK)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: JPEG: CMYK colours", path);
+  if (codec->arith_code) return sf_fail(SF_E_UNSUPPORTED, "%s: JPEG: arithmetic coding", path);
+  /* Huffman codes spend at least one bit on each block of 8 x 8 pixels. */
+  if ((uint64_t)codec->image_width * codec->image_height / 512 > size)
+    return sf_fail(SF_E_FORMAT, "%s: JPEG: %zu bytes cannot hold %u x %u pixels", path, size, codec->image_width,
+                   codec->image_height);
+  return sf_ok();
+}
+
 static void widen_line(const JSAMPLE *from, uint16_t *to, int width)
 {
   for (int x = 0; x < width; x++) {
@@ -48,10 +73,9 @@ static void decode(jpeg_job *job, const unsigned char *bytes, size_t size)
   jpeg_create_decompress(codec);
   jpeg_mem_src(codec, bytes, size);
   jpeg_read_header(codec, TRUE);
-  if (codec->jpeg_color_space == JCS_CMYK || codec->jpeg_color_space == JCS_YCCK) {
-    job->status = sf_fail(SF_E_UNSUPPORTED, "%s: JPEG: CMYK colours", job->path);
-    return;
-  }
+  job->status = check_kind(codec, job->path, size);
+  if (job->status.code != SF_OK) return;
+  codec->progress = &job->progress;
   codec->out_color_space = JCS_RGB;
   job->status = sf_image_alloc(job->image, job->path, codec->image_width, codec->image_height);
   if (job->status.code != SF_OK) return;
@@ -78,6 +102,7 @@ sf_status sf_jpeg_load(sf_image *image, const char *path, const unsigned char *b
   job.codec.err = jpeg_std_error(&job.base);
   job.base.error_exit = on_error;
   job.base.emit_message = on_message;
+  job.progress.progress_monitor = on_progress;
   if (setjmp(job.escape))
     job.status = sf_fail(SF_E_FORMAT, "%s: JPEG: %s", path, job.message);
   else

@@ -58,8 +58,15 @@ static void decode(png_job *job)
 {
   png_set_read_fn(job->png, job, read_bytes);
   png_set_user_limits(job->png, 1 << 28, 1 << 28);
+  /* Texts, profiles and the like are skipped: libpng would believe any length that they state. */
+  png_set_keep_unknown_chunks(job->png, PNG_HANDLE_CHUNK_NEVER, NULL, -1);
   png_read_info(job->png, job->info);
   uint32_t width = png_get_image_width(job->png, job->info), height = png_get_image_height(job->png, job->info);
+  if (!sf_deflate_holds(job->size, (uint64_t)png_get_rowbytes(job->png, job->info) * height)) {
+    job->status =
+        sf_fail(SF_E_FORMAT, "%s: PNG: %zu bytes cannot hold %u x %u pixels", job->path, job->size, width, height);
+    return;
+  }
   ask_for_rgba16(job->png, job->info);
   if (png_get_rowbytes(job->png, job->info) != (size_t)width * 8) png_error(job->png, "unexpected row size");
   job->status = sf_image_alloc(job->image, job->path, width, height);

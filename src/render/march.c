@@ -18,7 +18,8 @@ sf_lattice sf_ray_lattice(const sf_config *config, const float origin[3], const 
   sf_lattice lattice = {.step = 2 * 1.7320508f / (float)config->lattice};
   if (!(leave > enter)) return lattice;
   lattice.first = enter + lattice.step / 2;
-  lattice.count = (int32_t)floorf((leave - enter) / lattice.step);
+  /* The box holds no more, but far from it the distances have no precision left. */
+  lattice.count = (int32_t)fminf(floorf((leave - enter) / lattice.step), (float)config->lattice);
   return lattice;
 }
 

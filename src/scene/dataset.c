@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 
 #define DEFAULT_SCALE 0.8f
+/* Of a focal length and of an optical centre: beyond them rays lose all precision, and then their direction. */
+static const float FOCAL_MIN = 1e-3f, PIXELS_MAX = 1e9f;
 enum { HOLD_OUT = 8 }; /* every 8th view where the data names no test views */
 
 static bool is_file(const char *path)
@@ -118,8 +120,10 @@ static sf_status set_lens(sf_camera *camera, const sf_lens *lens, const sf_image
   camera->fx = (float)fx, camera->fy = (float)fy;
   camera->cx = (float)(lens->has_cx ? lens->cx * sx : 0.5 * w);
   camera->cy = (float)(lens->has_cy ? lens->cy * sy : 0.5 * h);
-  if (!(camera->fx > 0 && camera->fy > 0 && isfinite(camera->fx) && isfinite(camera->fy)))
+  if (!(camera->fx > FOCAL_MIN && camera->fy > FOCAL_MIN && camera->fx < PIXELS_MAX && camera->fy < PIXELS_MAX))
     return sf_fail(SF_E_RANGE, "%s: focal length of %g x %g pixels", where, fx, fy);
+  if (!(fabsf(camera->cx) < PIXELS_MAX && fabsf(camera->cy) < PIXELS_MAX))
+    return sf_fail(SF_E_RANGE, "%s: optical centre at pixel %g, %g", where, (double)camera->cx, (double)camera->cy);
   return sf_ok();
 }
 
@@ -128,6 +132,15 @@ static sf_status in_frame(sf_status status, const char *list, int number)
 {
   if (status.code == SF_OK) return status;
   return sf_fail(status.code, "%s (frame %d of %s)", status.message, number, list);
+}
+
+/* A picture may lie anywhere, also outside the folder. But a device or a pipe that a data set names may never end. */
+static sf_status refuse_device(const char *path)
+{
+  struct stat info;
+  if (!stat(path, &info) && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
+    return sf_fail(SF_E_IO, "cannot read %s: it is not a regular file", path);
+  return sf_ok();
 }
 
 static sf_status load_view(sf_view *view, const sf_frame *frame, int number, const listing *list, const char *dir,
@@ -143,6 +156,7 @@ static sf_status load_view(sf_view *view, const sf_frame *frame, int number, con
       return sf_fail(SF_E_RANGE, "%s: position times scale %g is not finite", where, scale);
   }
   SF_TRY(picture_path(path, sizeof path, dir, frame->file_path));
+  SF_TRY(in_frame(refuse_device(path), list->path, number));
   SF_TRY(in_frame(sf_image_load(&view->image, path), list->path, number));
   SF_TRY(set_lens(&view->camera, &frame->lens, &view->image, where));
   if (options->downscale <= 1) return sf_ok();

@@ -166,9 +166,15 @@ static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, i
 
 static inline vf interleave(vf a, vf b, int high)
 {
+#ifdef __clang__ /* which has no shuffle by a vector of indices */
+  vf mixed = {0};
+  for (int i = 0; i < VL; i++) mixed[i] = (i & 1 ? b : a)[i / 2 + (high ? VL / 2 : 0)];
+  return mixed;
+#else
   vi mask = {0};
   for (int i = 0; i < VL; i++) mask[i] = (i & 1 ? VL : 0) + i / 2 + (high ? VL / 2 : 0);
   return __builtin_shuffle(a, b, mask);
+#endif
 }
 
 /* VL x VL transpose: log2(VL) perfect shuffles of rows i and i + VL/2. */

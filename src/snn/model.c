@@ -92,12 +92,18 @@ static void layout_params(sf_model *m, size_t entries)
   m->size = offset;
 }
 
-sf_status sf_model_create(sf_model *m, const sf_config *config)
+static sf_status lay_out(sf_model *m, const sf_config *config)
 {
   memset(m, 0, sizeof *m);
   SF_TRY(sf_config_check(config));
   m->config = *config;
   layout_params(m, layout_levels(m));
+  return sf_ok();
+}
+
+static sf_status allocate(sf_model *m)
+{
+  const sf_config *config = &m->config;
   size_t bytes = m->size * sizeof(float), cells = (size_t)config->occ_res * config->occ_res * config->occ_res;
   m->value = sf_aligned_alloc(bytes);
   m->occupancy = malloc(cells / 8);
@@ -109,6 +115,12 @@ sf_status sf_model_create(sf_model *m, const sf_config *config)
   m->t_star = (float)config->steps;
   m->t_r = config->steps;
   return sf_ok();
+}
+
+sf_status sf_model_create(sf_model *m, const sf_config *config)
+{
+  SF_TRY(lay_out(m, config));
+  return allocate(m);
 }
 
 void sf_model_free(sf_model *m)
@@ -196,19 +208,26 @@ static sf_status load_scales(sf_scales *s, const sf_tensors *set)
   return sf_ok();
 }
 
-static sf_status load_values(sf_model *m, const sf_tensors *set)
+/* All tensors are found before memory is asked for: a few words of metadata can name a grid of gigabytes. */
+static sf_status load_tensors(sf_model *m, const sf_tensors *set)
 {
+  const int64_t cells = (int64_t)m->config.occ_res * m->config.occ_res * m->config.occ_res / 8;
+  const sf_tensor *part[SF_P_COUNT], *occupancy;
   for (int i = 0; i < SF_P_COUNT; i++) {
     const sf_param *p = &m->param[i];
-    const sf_tensor *t;
-    SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &t));
-    SF_TRY(sf_tensor_finite(set->path, t));
-    memcpy(m->value + p->offset, t->data, p->size * sizeof(float));
+    SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &part[i]));
+    SF_TRY(sf_tensor_finite(set->path, part[i]));
   }
-  int64_t cells = (int64_t)m->config.occ_res * m->config.occ_res * m->config.occ_res / 8;
-  const sf_tensor *t;
-  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &cells, &t));
-  memcpy(m->occupancy, t->data, (size_t)cells);
+  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &cells, &occupancy));
+  SF_TRY(allocate(m));
+  for (int i = 0; i < SF_P_COUNT; i++)
+    memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
+  memcpy(m->occupancy, occupancy->data, (size_t)cells);
+  return sf_ok();
+}
+
+static sf_status load_budget(sf_model *m, const sf_tensors *set)
+{
   double t_star;
   SF_TRY(meta_number(set, "t_star", &t_star));
   SF_TRY(meta_int(set, "t_r", &m->t_r));
@@ -226,11 +245,10 @@ sf_status sf_model_load(sf_model *m, const char *path)
   sf_config config = {0};
   SF_TRY(sf_tensors_load(&set, path));
   sf_status status = load_config(&set, &config);
-  if (!status.code) status = sf_model_create(m, &config);
-  if (!status.code) {
-    status = load_values(m, &set);
-    if (status.code) sf_model_free(m);
-  }
+  if (!status.code) status = lay_out(m, &config);
+  if (!status.code) status = load_tensors(m, &set);
+  if (!status.code) status = load_budget(m, &set);
+  if (status.code) sf_model_free(m);
   sf_tensors_free(&set);
   return status;
 }

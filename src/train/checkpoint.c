@@ -151,6 +151,9 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
     return sf_fail(SF_E_FORMAT,
                    "%s: cannot resume: train.iteration, samples, averaged, stage, rays or stride is out of range",
                    set->path);
+  if (!(t->progress >= 0 && t->progress <= 1 && t->stage_progress >= 0 && t->epoch >= 0))
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.progress, stage_progress or epoch is out of range",
+                   set->path);
   for (int l = 0; l < 3; l++)
     if (t->health.revived[l] < 0 || t->health.revived[l] > 1000000)
       return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.revived is out of range", set->path);

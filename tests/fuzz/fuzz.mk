@@ -1,0 +1,37 @@
+# Fuzzing: targets tests/fuzz/fuzz_NAME.c, built with clang for `make fuzz` and with any compiler for their replay in
+# `make check`. Included by the Makefile. See docs/fuzzing.md.
+
+FUZZ_TIME ?= 60
+CLANG ?= clang
+FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ ?= $(FUZZ_TARGETS)
+FUZZ_SAN := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
+# Beside the target: the firmware is in no library.
+FUZZ_WITH := $(patsubst %,$B/obj/%.o,firmware/sf_blob firmware/sf_driver)
+FUZZ_REPLAYS := $(FUZZ_TARGETS:%=$B/tests/fuzz/%) $B/tests/fuzz/seeds
+
+$B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)
+$(FUZZ_TARGETS:%=$B/tests/fuzz/%): $B/tests/fuzz/%: $B/obj/tests/fuzz/fuzz_%.o $B/obj/tests/fuzz/replay.o $(FUZZ_WITH) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+
+# In build/fuzz, by clang, on one thread.
+$(FUZZ_TARGETS:%=$B/bin/fuzz_%): $B/bin/fuzz_%: $B/obj/tests/fuzz/fuzz_%.o $(FUZZ_WITH) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) $(SAN) -fsanitize=fuzzer -o $@ $^ $(LIBS)
+
+fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each; FUZZ=NAME chooses targets
+	@tests/fuzz/run.sh --installed $(CLANG)
+	@$(MAKE) $B/tests/fuzz/seeds
+	@$(MAKE) B=$B/fuzz CC=$(CLANG) OPT=-O1 SAN="$(FUZZ_SAN)" \
+	  CFLAGS="-fsanitize=fuzzer-no-link -fno-openmp -Itests/fuzz/single -Wno-unknown-pragmas" $(FUZZ:%=$B/fuzz/bin/fuzz_%)
+	@tests/fuzz/run.sh $B $(FUZZ_TIME) $(FUZZ)
+
+deps-fuzz: ## install what `make fuzz` needs besides (clang)
+	@DEPS="clang libclang-rt-dev" tools/deps.sh
+.PHONY: fuzz deps-fuzz

@@ -1,0 +1,266 @@
+/* Writes the first inputs of every fuzzing target: small valid files, made by the writers that the programs use.
+ * usage: seeds FOLDER */
+#include "firmware/sf_blob.h"
+#include "fuzz.h"
+#include "tests/fx_fixture.h"
+#include "spikefield/io.h"
+#include "spikefield/manifest.h"
+#include "spikefield/quant.h"
+#include "spikefield/train.h"
+#include <png.h>
+#include <jpeglib.h>
+
+static const char *root;
+
+/* ROOT/TARGET/NAME, the folder made. */
+static const char *seed_path(const char *target, const char *name)
+{
+  static char path[2][4200];
+  static int turn;
+  char *p = path[turn++ % 2];
+  snprintf(p, sizeof path[0], "%s/%s", root, target);
+  FUZZ_EXPECT(fuzz_good(sf_make_dir(p)));
+  snprintf(p, sizeof path[0], "%s/%s/%s", root, target, name);
+  return p;
+}
+
+static void put(const char *target, const char *name, const void *data, size_t size)
+{
+  FUZZ_EXPECT(fuzz_good(sf_write_file(seed_path(target, name), data, size)));
+}
+
+static void put_text(const char *target, const char *name, const char *text)
+{
+  put(target, name, text, strlen(text));
+}
+
+/* ---- pictures ---- */
+
+static void put_png(const char *name, int depth, int colour, int interlace)
+{
+  FILE *file = fopen(seed_path("image", name), "wb");
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+  png_infop info = png_create_info_struct(png);
+  png_color palette[4] = {{0, 0, 0}, {255, 0, 0}, {0, 255, 0}, {9, 8, 7}};
+  png_byte alpha[2] = {0, 128}, row[6 * 8], *rows[5];
+  for (size_t i = 0; i < sizeof row; i++) row[i] = (png_byte)(i * 53);
+  for (int y = 0; y < 5; y++) rows[y] = row;
+  FUZZ_EXPECT(file && info && !setjmp(png_jmpbuf(png)));
+  png_init_io(png, file);
+  png_set_IHDR(png, info, 6, 5, depth, colour, interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (colour == PNG_COLOR_TYPE_PALETTE) {
+    png_set_PLTE(png, info, palette, 4);
+    png_set_tRNS(png, info, alpha, 2, NULL);
+  }
+  png_write_info(png, info);
+  png_write_image(png, rows);
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+  FUZZ_EXPECT(!fclose(file));
+}
+
+static void put_jpeg(const char *name, int components, bool progressive)
+{
+  struct jpeg_error_mgr errors;
+  struct jpeg_compress_struct codec = {.err = jpeg_std_error(&errors)};
+  FILE *file = fopen(seed_path("image", name), "wb");
+  JSAMPLE line[18 * 3], *rows[1] = {line};
+  FUZZ_EXPECT(file);
+  jpeg_create_compress(&codec);
+  jpeg_stdio_dest(&codec, file);
+  codec.image_width = 18, codec.image_height = 17, codec.input_components = components;
+  codec.in_color_space = components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&codec);
+  if (progressive) jpeg_simple_progression(&codec);
+  codec.restart_interval = progressive ? 0 : 2;
+  jpeg_start_compress(&codec, TRUE);
+  for (int y = 0; y < 17; y++) {
+    for (size_t i = 0; i < sizeof line; i++) line[i] = (JSAMPLE)(i * 31 + (size_t)y * 17);
+    jpeg_write_scanlines(&codec, rows, 1);
+  }
+  jpeg_finish_compress(&codec);
+  jpeg_destroy_compress(&codec);
+  FUZZ_EXPECT(!fclose(file));
+}
+
+static void put_pictures(void)
+{
+  put_png("palette.png", 2, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE);
+  put_png("grey16.png", 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7);
+  put_png("rgba.png", 8, PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE);
+  put_jpeg("grey.jpg", 1, false);
+  put_jpeg("colour.jpg", 3, false);
+  put_jpeg("progressive.jpg", 3, true);
+}
+
+static void put_exr(void)
+{
+  float real[20];
+  uint32_t whole[20];
+  for (int i = 0; i < 20; i++) real[i] = (float)i / 7, whole[i] = (uint32_t)i * 99991;
+  const sf_exr_channel channel[] = {
+      {"R", SF_EXR_HALF, real}, {"Z", SF_EXR_FLOAT, real}, {"samples", SF_EXR_UINT, whole}};
+  const char *const attributes[] = {"scene", "a.snn", NULL};
+  FUZZ_EXPECT(fuzz_good(sf_exr_save(seed_path("exr", "three.exr"), 5, 4, channel, 3, attributes)));
+  FUZZ_EXPECT(fuzz_good(sf_exr_save(seed_path("exr", "one.exr"), 1, 20, channel + 1, 1, NULL)));
+}
+
+/* ---- texts ---- */
+
+static const char one_frame[] =
+    "{\"camera_angle_x\": 0.69, \"frames\": [{\"file_path\": \"./a\", \"transform_matrix\":\n"
+    "[[1,0,0,0.5],[0,1,0,-1],[0,0,1,4.0],[0,0,0,1]]}, {\"file_path\": \"a.png\", \"rotation\": 0.01,\n"
+    "\"transform_matrix\": [[0,-2,0,0],[2,0,0,0],[0,0,2,4],[0,0,0,1]]}]}\n";
+static const char many_fields[] =
+    "{\"fl_x\": 5, \"fl_y\": 5.5, \"cx\": 2, \"cy\": 1.5, \"w\": 4, \"h\": 3, \"k1\": 0, \"p2\": 0,\n"
+    "\"camera_model\": \"OPENCV\", \"is_fisheye\": false, \"frames\": [{\"file_path\": \"../c.png\", \"w\": 4, \"h\": "
+    "3,\n"
+    "\"camera_angle_y\": 0.5, \"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,1,1e3],[0,0,0,1.0]]},\n"
+    "{\"file_path\": \"b.png\", \"w\": 8, \"h\": 6, \"transform_matrix\": "
+    "[[1,0,0,0],[0,0,1,0],[0,-1,0,0],[0,0,0,1]]}]}\n";
+static const char report_text[] =
+    "{\"psnr\": 31.9, \"ssim\": 0.95, \"T\": 8, \"t_r\": 2, \"t_star\": 1.8, \"seconds\": 900, \"samples\": 1000,\n"
+    "\"prefix_psnr\": [20, 30, 31], \"crop\": [0, 0, 800, 800], \"energy_fj\": 72.5, \"energy_spiking_fj\": 72.5,\n"
+    "\"energy_ann_fj\": 189.5, \"core_equals_recount\": true, \"core_equals_rtl_equals_recount\": false,\n"
+    "\"iteration\": 7, \"model\": \"m.safetensors\"}\n";
+static const char report_lines[] = "{\"iteration\": 1, \"t_star\": 8}\n{\"iteration\": 3, \"t_star\": 7.5}\n"
+                                   "{\"iteration\": 2, \"t_star\": 7}\n{\"iteration\": 4, \"t_st";
+
+static void put_texts(void)
+{
+  put_text("dataset", "frames.json", one_frame);
+  put_text("dataset", "fields.json", many_fields);
+  put_text("report", "run.json", report_text);
+  put_text("report", "log.jsonl", report_lines);
+  put_text("json", "report.json", report_text);
+  put_text("json", "frames.json", one_frame);
+  put_text("json", "escapes.json", "[\"\\u00e9\\ud83d\\ude00\\n\", -1.5e-3, null, {\"\": {}}]");
+  put_text("cli", "all", "scene.snn\n--json\n-v\n3\n--seed=0xff\n--beta\n5e-7\n-oout.exr\n--mode=two\n--\n-x");
+}
+
+/* ---- models ---- */
+
+static sf_train_options small_run(void)
+{
+  sf_train_options options = sf_train_defaults();
+  sf_config *config = &options.config;
+  config->levels = 1, config->log2_hash = 4, config->base_res = 2, config->finest_res = 2;
+  config->hidden = 16, config->steps = 3, config->lattice = 16, config->occ_res = 8;
+  options.samples = 256;
+  return options;
+}
+
+static void put_models(void)
+{
+  static uint16_t pixel[2 * 2 * 4];
+  sf_view view = {
+      .name = "view", .camera = {2, 2, 3, 3, 1, 1, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.5f}}, .image = {2, 2, pixel}};
+  const sf_dataset data = {.path = "data", .view = &view, .count = 1, .scale = 0.8f};
+  const sf_train_options options = small_run();
+  sf_train_stats stats;
+  sf_trainer *trainer;
+  fx_scene scene;
+  FUZZ_EXPECT(fuzz_good(sf_trainer_create(&trainer, &data, &options, NULL)));
+  FUZZ_EXPECT(fuzz_good(sf_trainer_step(trainer, &stats)));
+  FUZZ_EXPECT(fuzz_good(sf_trainer_save(trainer, seed_path("model", "model.safetensors"), false)));
+  FUZZ_EXPECT(fuzz_good(sf_trainer_save(trainer, seed_path("checkpoint", "run.safetensors"), true)));
+  FUZZ_EXPECT(fuzz_good(sf_quantise(&scene, sf_trainer_model(trainer), "seed", &(sf_quant_options){0})));
+  FUZZ_EXPECT(fuzz_good(fx_scene_save(&scene, seed_path("snn", "exported.snn"))));
+  fx_scene_free(&scene);
+  sf_trainer_free(trainer);
+}
+
+static void put_word(uint8_t *block, uint32_t index, int32_t value)
+{
+  for (int i = 0; i < 4; i++) block[index * 4 + (uint32_t)i] = (uint8_t)((uint32_t)value >> (8 * i));
+}
+
+/* The layout of sf_blob.h, with as few inputs as the net has. */
+static void put_blob(const fx_net *net)
+{
+  uint8_t block[SF_BLOB_WORDS * 4 + SF_LAYERS * SF_LANES * SF_LANES] = {0};
+  uint32_t at = SF_BLOB_WORDS * 4;
+  for (uint32_t l = 0; l < SF_LAYERS; l++) {
+    const fx_layer *layer = &net->layer[l];
+    const int32_t field[] = {layer->n_in, layer->n_out, layer->k, layer->theta};
+    for (uint32_t i = 0; i < 4; i++) put_word(block, SF_BLOB_HEADER_WORDS + 4 * l + i, field[i]);
+    memcpy(block + at, layer->w, (size_t)layer->n_in * SF_LANES);
+    at += (uint32_t)layer->n_in * SF_LANES;
+  }
+  const int32_t head[] = {SF_BLOB_MAGIC, SF_BLOB_VERSION, (int32_t)at, net->mode, net->steps, 1, 2, 3, 4, 5, 6};
+  for (uint32_t i = 0; i < SF_BLOB_HEADER_WORDS; i++) put_word(block, i, head[i]);
+  put("blob", "small", block, at);
+}
+
+static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t seed)
+{
+  fx_scene scene = {0};
+  fixture_set_sizes(&scene, sizes);
+  FUZZ_EXPECT(fuzz_good(fx_scene_allocate(&scene, name)));
+  fixture_fill(&scene, sizes, seed);
+  FUZZ_EXPECT(fuzz_good(fx_scene_save(&scene, seed_path("snn", name))));
+  if (seed == 1) put_blob(&scene.net);
+  fx_scene_free(&scene);
+}
+
+static void put_scenes(void)
+{
+  put_scene("small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID}, 1);
+  put_scene("hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY}, 2);
+}
+
+static void put_manifest(bool is_float)
+{
+  sf_manifest manifest = {.total = 2};
+  sf_manifest_view view = {
+      .name = "test/r_0", .width = 3, .height = 2, .samples = 9, .rays = 6, .psnr = 31.5, .ssim = 0.9};
+  manifest.origin =
+      (sf_manifest_origin){.split = "test", .steps = 2, .downscale = 1, .scale = 0.8f, .crop = {1, 2, 3, 2}};
+  memset(manifest.origin.scene_sha256, 'a', 64);
+  memset(view.camera_sha256, 'b', 64);
+  memset(view.exr_sha256, 'c', 64);
+  strcpy(view.exr, "view_0000.exr");
+  if (is_float) {
+    memset(manifest.origin.model_sha256, 'd', 64);
+  } else {
+    for (int p = 0; p < SF_PLANES; p++)
+      if (sf_plane_is_integer((sf_plane)p)) memset(view.plane_sha256[p], 'e', 64);
+    for (int e = 0; e < SF_EVENTS; e++) view.event[e] = (uint64_t)e * 10;
+    memset(view.counts_sha256, 'f', 64);
+    strcpy(view.unexpected_saturation, "none");
+  }
+  FUZZ_EXPECT(fuzz_good(sf_manifest_put(&manifest, &view)));
+  FUZZ_EXPECT(fuzz_good(sf_manifest_save(&manifest, seed_path("manifest", is_float ? "float.json" : "fixed.json"))));
+  sf_manifest_free(&manifest);
+}
+
+static void put_tensors(void)
+{
+  float real[6] = {0, 1, -2, 3.5f, 1e30f, -0.0f};
+  int8_t byte[3] = {1, -2, 3};
+  int64_t wide[1] = {-5};
+  const sf_tensor tensor[] = {{"real", SF_F32, 2, {2, 3}, real},
+                              {"byte", SF_I8, 1, {3}, byte},
+                              {"wide", SF_I64, 0, {0}, wide},
+                              {"none", SF_U8, 2, {0, 7}, byte}};
+  cJSON *metadata = cJSON_CreateObject();
+  FUZZ_EXPECT(cJSON_AddStringToObject(metadata, "format", "seed"));
+  FUZZ_EXPECT(fuzz_good(sf_tensors_save(tensor, 4, metadata, seed_path("tensors", "four.safetensors"))));
+  FUZZ_EXPECT(fuzz_good(sf_tensors_save(tensor, 0, NULL, seed_path("tensors", "empty.safetensors"))));
+  cJSON_Delete(metadata);
+}
+
+int main(int argc, char **argv)
+{
+  if (argc != 2) return fprintf(stderr, "usage: seeds FOLDER\n"), 2;
+  root = argv[1];
+  put_pictures();
+  put_exr();
+  put_texts();
+  put_manifest(false);
+  put_manifest(true);
+  put_tensors();
+  put_models();
+  put_scenes();
+  return 0;
+}
