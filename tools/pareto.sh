@@ -132,12 +132,12 @@ variant_program() {
   return 1
 }
 
-line() { # WHAT
-  local left=0
+line() ( # WHAT
+  left=0
   [ $fresh -eq 0 ] || left=$(((SECONDS - started) * (total - index) / fresh))
   printf '[%*d/%d] %-44s %s, elapsed %s, ETA %s\n' ${#total} $index "$total" "$name" "$1" "$(clock $((SECONDS - started)))" \
     "$(clock $left)"
-}
+)
 
 point() { # FILE VARIANT OPTIONS...
   local file=$1 variant=$2 program
@@ -159,9 +159,11 @@ point() { # FILE VARIANT OPTIONS...
   fi
 }
 
-settings="models: $(cksum "${models[@]}"); data: $(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)
+settings() (
+  echo "models: $(cksum "${models[@]}"); data: $(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)
 view $view, every $every, $("$bin/sf_point" --version)"
-keep "$out/settings" "$settings" || rm -f "$out"/points/* "$out/log"
+)
+keep "$out/settings" "$(settings)" || rm -f "$out"/points/* "$out/log"
 started=$SECONDS index=0 fresh=0 failures=0 total=1
 first=${models[0]}
 point "$first" ""

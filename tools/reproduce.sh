@@ -150,7 +150,7 @@ choose_views() {
 
 one_scene() {
   scene=${data##*/}
-  data_id="$(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)"
+  data_id=$(cd "$data" && pwd -P && cat "$data"/transforms*.json | cksum)
   choose_views
   common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} --steps ${set[steps]} --seed ${set[seed]} --samples ${set[samples]}"
   common="$common --downscale ${set[downscale]} --eval-views ${set[eval-views]}${set[train]:+ ${set[train]}}"

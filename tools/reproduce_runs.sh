@@ -4,6 +4,8 @@
 # pareto.sh for run, output, keep, number, clock and plots.
 
 # ---- one program at a time, stopped by SIGINT, SIGTERM or SIGHUP ----
+# A trap that is pending when bash expands a command substitution breaks its parser. So this shell expands at most one in
+# a command (the trap runs between commands); functions that need more have a body in parentheses.
 
 on_signal() {
   stop=1
@@ -65,7 +67,10 @@ eta() {
   left=$((run_seconds * (total - index + 1) - (SECONDS - run_started)))
   echo "ETA $(clock $((left > 0 ? left : 0)))"
 }
-say() { printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$1" "$(clock $((SECONDS - started)))" "$(eta "${2:-}")"; }
+# WHAT [ITERATION]
+say() (
+  printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$1" "$(clock $((SECONDS - started)))" "$(eta "${2:-}")"
+)
 
 # On a terminal the line of a run moves.
 ticker() {
@@ -223,12 +228,7 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   elif [ $code -eq 0 ]; then
     echo "done" >"$dir/status"
     done_runs=$((done_runs + 1)) done_seconds=$((done_seconds + $(cat "$dir/wall")))
-    run_started=$SECONDS index=$((index + 1))
-    local remaining
-    remaining=$(eta)
-    index=$((index - 1))
-    printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$(figures)" \
-      "$(clock $((SECONDS - started)))" "$remaining"
+    say_done
   else
     echo "failed: $(last_line "$dir/log")" >"$dir/status"
     failures=$((failures + 1))
@@ -237,6 +237,13 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
 }
 
 number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" 2>/dev/null | head -n 1; }
+# The next run takes as long as the others.
+say_done() (
+  run_started=$SECONDS index=$((index + 1))
+  remaining=$(eta)
+  printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} $((index - 1)) "$total" "$scene $name" "$(figures)" \
+    "$(clock $((SECONDS - started)))" "$remaining"
+)
 figures() { printf 'PSNR %.2f dB, %s steps, %d s' "$(number "$dir/train.json" psnr)" "$(number "$dir/train.json" t_r)" "$(cat "$dir/wall")"; }
 
 skip_run() { # NAME WHY
