@@ -92,6 +92,9 @@ include sim/sim.mk
 # The installable library.
 include src/lib/lib.mk
 
+# File readers under fuzzing.
+include tests/fuzz/fuzz.mk
+
 # Programs. Those of DUT_TOOLS drive the Verilated accelerator; the others link the library alone.
 $(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)
@@ -131,8 +134,6 @@ asan: ## the C tests under address and undefined-behaviour sanitizers
 ASAN_TESTS := $(filter-out $(DUT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 tests/run.sh $B $(ASAN_TESTS) fuzz
-
-include tests/fuzz/fuzz.mk
 
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

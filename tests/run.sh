@@ -7,6 +7,7 @@ here=$(dirname "$0")
 passed=0 failed=0 skipped=0
 logs=$build/tests/logs
 mkdir -p "$logs"
+export OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive} # threads that spin slow each other down on a busy machine
 for name in "$@"; do
   start=$(date +%s)
   case $name in
