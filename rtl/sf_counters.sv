@@ -6,14 +6,17 @@
 module sf_counters (
     input  wire        clk_i,
     input  wire        rst_ni,
-    // lanes
-    input  wire [ 2:0] op_i,
-    input  wire [ 2:0] layer_i,
-    input  wire [ 2:0] step_i,
-    input  wire [ 7:0] n_out_i,
-    input  wire [ 7:0] fired_i,
-    input  wire        spikes_valid_i,
-    input  wire [ 2:0] spikes_layer_i,
+    // engine (sf_core)
+    input  wire [39:0] n_out_i,
+    input  wire        d1_row_i,
+    input  wire        c1_row_i,
+    input  wire [ 2:0] c1_step_i,
+    input  wire [ 1:0] c2_rows_i,
+    input  wire [ 2:0] c2_step_i,
+    input  wire [15:0] d2_fired_i,
+    input  wire [15:0] c3_fired_i,
+    input  wire        ray_i,
+    input  wire [ 2:0] spikes_valid_i,
     input  wire [ 2:0] spikes_step_i,
     input  wire [ 7:0] spikes_count_i,
     // readout
@@ -37,17 +40,19 @@ module sf_counters (
   localparam [63:0] NEURON_BYTES = 64'd3;
   localparam [63:0] INTEGRATOR_BYTES = 64'd4;
 
-  // By {layer, step}.
-  reg [63:0] mac_q[0:63];
-  reg [63:0] add_q[0:63];      // sop of C2
-  reg [63:0] spikes_q[0:63];
-  reg [63:0] weight_q[0:63];   // D1, C1, C2
-  reg [63:0] neuron_q[0:63];   // updates of D1, C1, C2; their state bytes are 3 each
-  // By {C3 else D2, step}.
-  reg [63:0] split_q[0:15];    // sop
+  // By step, each layer where its events happen. A row of weights is read for each of its events.
+  reg [63:0] d1_mac_q;
+  reg [63:0] c1_mac_q[0:7];
+  reg [63:0] c2_sop_q[0:7];
+  // By {C3 else D2, step}; a row that serves several steps was read at the first of them.
+  reg [63:0] split_sop_q[0:15];
   reg [63:0] split_weight_q[0:15];
   reg [63:0] integrate_q[0:15];
+  // By {layer of {C2, C1, D1}, step}; the state bytes of an update are 3 each.
+  reg [63:0] spikes_q[0:31];
+  reg [63:0] neuron_q[0:31];
   reg [63:0] sample_q, ray_q, cycle_q, busy_q, stall_in_q, stall_out_q;
+  reg [63:0] layer_busy_q[0:4];
   reg [63:0] window_q[0:511];
 
   // ---- walk
@@ -55,14 +60,17 @@ module sf_counters (
   reg [8:0] place_q;
   wire walk_last = &place_q;
   wire [2:0] event_w = place_q[8:6];
-  wire [5:0] at = place_q[5:0];
   wire [2:0] at_layer = place_q[5:3];
   wire [2:0] at_step = place_q[2:0];
   wire integrating = at_layer == sf_op_pkg::D2 || at_layer == sf_op_pkg::C3;
   wire neurons = at_layer == sf_op_pkg::D1 || at_layer == sf_op_pkg::C1 || at_layer == sf_op_pkg::C2;
   wire [3:0] at_narrow = {at_layer == sf_op_pkg::C3, at_step};
-  wire [63:0] updates = neurons ? neuron_q[at] : integrate_q[at_narrow];
+  wire [4:0] at_neurons = {at_layer == sf_op_pkg::C2 ? 2'd2 : at_layer == sf_op_pkg::C1 ? 2'd1 : 2'd0, at_step};
+  wire [63:0] updates = neurons ? neuron_q[at_neurons] : integrate_q[at_narrow];
   wire [63:0] state_bytes = updates * (neurons ? NEURON_BYTES : INTEGRATOR_BYTES);
+  wire [63:0] mac = at_layer == sf_op_pkg::C1 ? c1_mac_q[at_step]
+                  : at_layer == sf_op_pkg::D1 && at_step == 3'd0 ? d1_mac_q : 64'd0;
+  wire [63:0] add = at_layer == sf_op_pkg::C2 ? c2_sop_q[at_step] : 64'd0;
   reg [63:0] global_value, place_value;
   always_comb begin
     case (at_step)
@@ -75,16 +83,20 @@ module sf_counters (
       default: global_value = 64'd0;
     endcase
     case (event_w)
-      3'd0: place_value = mac_q[at];
-      3'd1: place_value = integrating ? split_q[at_narrow] : add_q[at];
-      3'd2: place_value = spikes_q[at];
+      3'd0: place_value = mac;
+      3'd1: place_value = integrating ? split_sop_q[at_narrow] : add;
+      3'd2: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
       3'd3: place_value = updates;
-      3'd4: place_value = integrating ? split_weight_q[at_narrow] : weight_q[at];
+      3'd4: place_value = integrating ? split_weight_q[at_narrow] : mac + add;
       3'd5: place_value = at_step == 3'd0 ? 64'd0 : state_bytes;
       3'd6: place_value = state_bytes;
       default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
     endcase
-    if (!integrating && !neurons) place_value = at_layer == 3'd7 && event_w == 3'd0 ? global_value : 64'd0;
+    if (!integrating && !neurons) begin
+      place_value = 64'd0;
+      if (at_layer == 3'd7 && event_w == 3'd0) place_value = global_value;
+      if (at_layer == 3'd7 && event_w == 3'd1 && at_step <= sf_op_pkg::C3) place_value = layer_busy_q[at_step];
+    end
   end
 
   assign hold_o = clear_wanted_q || snapshot_wanted_q || walk_q;
@@ -116,38 +128,52 @@ module sf_counters (
   end
 
   // ---- events
-  wire [63:0] n_out = {56'd0, n_out_i};
-  wire is_mac = op_i == sf_op_pkg::MAC;
-  wire is_add = op_i == sf_op_pkg::ADD;
-  wire is_split = op_i == sf_op_pkg::SPLIT;
-  wire [5:0] here = {layer_i, step_i};
-  wire [5:0] spikes_here = {spikes_layer_i, spikes_step_i};
+  wire [63:0] n_d1 = {56'd0, n_out_i[7:0]};
+  wire [63:0] n_d2 = {56'd0, n_out_i[15:8]};
+  wire [63:0] n_c1 = {56'd0, n_out_i[23:16]};
+  wire [63:0] n_c2 = {56'd0, n_out_i[31:24]};
+  wire [63:0] n_c3 = {56'd0, n_out_i[39:32]};
+  wire [4:0] neurons_here = {spikes_valid_i[2] ? 2'd2 : spikes_valid_i[1] ? 2'd1 : 2'd0, spikes_step_i};
+  wire [63:0] n_neurons = spikes_valid_i[2] ? n_c2 : spikes_valid_i[1] ? n_c1 : n_d1;
   wire [3:0] update_here = {update_colour_i, update_step_i};
-  wire [7:0] first_fired = fired_i & (~fired_i + 8'd1);
+  wire [15:0] d2_first = {d2_fired_i[15:8] & (~d2_fired_i[15:8] + 8'd1), d2_fired_i[7:0] & (~d2_fired_i[7:0] + 8'd1)};
+  wire [15:0] c3_first = {c3_fired_i[15:8] & (~c3_fired_i[15:8] + 8'd1), c3_fired_i[7:0] & (~c3_fired_i[7:0] + 8'd1)};
+  wire [4:0] busy = {|c3_fired_i, |c2_rows_i, c1_row_i, |d2_fired_i, d1_row_i};
 
   always_ff @(posedge clk_i) begin
-    if (wipe) mac_q[at] <= 64'd0;
-    else if (is_mac) mac_q[here] <= mac_q[here] + n_out;
-    if (wipe) add_q[at] <= 64'd0;
-    else if (is_add) add_q[here] <= add_q[here] + n_out;
-    if (wipe) weight_q[at] <= 64'd0;
-    else if (is_mac || is_add) weight_q[here] <= weight_q[here] + n_out;
-    if (wipe) spikes_q[at] <= 64'd0;
-    else if (spikes_valid_i) spikes_q[spikes_here] <= spikes_q[spikes_here] + {56'd0, spikes_count_i};
-    if (wipe) neuron_q[at] <= 64'd0;
-    else if (op_i == sf_op_pkg::FIRE) neuron_q[here] <= neuron_q[here] + n_out;
+    if (wipe && at_layer == sf_op_pkg::D1) d1_mac_q <= 64'd0;
+    else if (d1_row_i) d1_mac_q <= d1_mac_q + n_d1;
+    if (wipe) c1_mac_q[at_step] <= 64'd0;
+    else if (c1_row_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
+    if (wipe) c2_sop_q[at_step] <= 64'd0;
+    else if (c2_rows_i != 2'd0)
+      c2_sop_q[c2_step_i] <= c2_sop_q[c2_step_i] + (c2_rows_i[1] ? n_c2 << 1 : n_c2);
+    if (wipe) begin
+      if (neurons) begin
+        spikes_q[at_neurons] <= 64'd0;
+        neuron_q[at_neurons] <= 64'd0;
+      end
+    end else if (spikes_valid_i != 3'd0) begin
+      spikes_q[neurons_here] <= spikes_q[neurons_here] + {56'd0, spikes_count_i};
+      neuron_q[neurons_here] <= neuron_q[neurons_here] + n_neurons;
+    end
     if (wipe && integrating) integrate_q[at_narrow] <= 64'd0;
     else if (update_i) integrate_q[update_here] <= integrate_q[update_here] + 64'd1;
-    for (int t = 0; t < 8; t++) begin
-      if (wipe && integrating && at_step == t[2:0]) begin
-        split_q[{at_layer == sf_op_pkg::C3, t[2:0]}] <= 64'd0;
-        split_weight_q[{at_layer == sf_op_pkg::C3, t[2:0]}] <= 64'd0;
-      end else if (is_split) begin
-        if (fired_i[t])
-          split_q[{layer_i == sf_op_pkg::C3, t[2:0]}] <= split_q[{layer_i == sf_op_pkg::C3, t[2:0]}] + n_out;
-        if (first_fired[t])
-          split_weight_q[{layer_i == sf_op_pkg::C3, t[2:0]}] <=
-              split_weight_q[{layer_i == sf_op_pkg::C3, t[2:0]}] + n_out;
+    if (wipe) begin
+      if (integrating) begin
+        split_sop_q[at_narrow] <= 64'd0;
+        split_weight_q[at_narrow] <= 64'd0;
+      end
+    end else begin
+      for (int t = 0; t < 8; t++) begin
+        if (d2_fired_i[t] || d2_fired_i[8+t])
+          split_sop_q[t] <= split_sop_q[t] + (d2_fired_i[t] && d2_fired_i[8+t] ? n_d2 << 1 : n_d2);
+        if (d2_first[t] || d2_first[8+t])
+          split_weight_q[t] <= split_weight_q[t] + (d2_first[t] && d2_first[8+t] ? n_d2 << 1 : n_d2);
+        if (c3_fired_i[t] || c3_fired_i[8+t])
+          split_sop_q[8+t] <= split_sop_q[8+t] + (c3_fired_i[t] && c3_fired_i[8+t] ? n_c3 << 1 : n_c3);
+        if (c3_first[t] || c3_first[8+t])
+          split_weight_q[8+t] <= split_weight_q[8+t] + (c3_first[t] && c3_first[8+t] ? n_c3 << 1 : n_c3);
       end
     end
   end
@@ -155,11 +181,13 @@ module sf_counters (
   always_ff @(posedge clk_i) begin
     if (wipe && walk_last) begin
       {sample_q, ray_q, cycle_q, busy_q, stall_in_q, stall_out_q} <= 384'd0;
+      for (int l = 0; l < 5; l++) layer_busy_q[l] <= 64'd0;
     end else begin
       if (sample_i) sample_q <= sample_q + 64'd1;
-      if (op_i == sf_op_pkg::KEEP) ray_q <= ray_q + 64'd1;
+      if (ray_i) ray_q <= ray_q + 64'd1;
       if (active_i && !walk_q) cycle_q <= cycle_q + 64'd1;
-      if (is_mac || is_add || is_split) busy_q <= busy_q + 64'd1;
+      if (busy != 5'd0) busy_q <= busy_q + 64'd1;
+      for (int l = 0; l < 5; l++) if (busy[l]) layer_busy_q[l] <= layer_busy_q[l] + 64'd1;
       if (stall_in_i && !walk_q) stall_in_q <= stall_in_q + 64'd1;
       if (stall_out_i) stall_out_q <= stall_out_q + 64'd1;
     end

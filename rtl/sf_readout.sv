@@ -1,17 +1,19 @@
-// Output layers: currents of D2 and C3 through the tables into the integrators, one value per cycle, while the lanes go
-// on. Mirror: src/fx/net.c (density_step, colour_step)
+// Output layers: currents of D2 and C3 through the tables into the integrators, one value per cycle. A sample's density
+// waits in a queue for its colours. Mirror: src/fx/net.c (density_step, colour_step)
 `default_nettype none
 
 module sf_readout (
     input  wire        clk_i,
     input  wire        rst_ni,
     input  wire        clear_i,
-    input  wire        take_i,         // currents are ready from the next cycle on
-    input  wire        take_colour_i,
-    output wire        ready_o,        // a TAKE may be issued
-    output wire        current_colour_o,
-    output wire [ 6:0] current_lane_o,
-    input  wire [15:0] current_i,
+    // currents of a sample: {step, output}, 16 bits each
+    output wire        density_ready_o,  // they may come in the next cycle
+    input  wire        density_valid_i,
+    input  wire [2047:0] density_i,
+    output wire        colour_ready_o,
+    input  wire        colour_valid_i,
+    input  wire [2047:0] colour_i,
+    output wire        idle_o,
     input  wire [ 1:0] mode_i,
     input  wire [ 3:0] steps_i,
     input  wire [12:0] k_density_i,
@@ -30,7 +32,12 @@ module sf_readout (
     output wire [27:0] sigma_o,
     output wire [59:0] colour_o
 );
+  localparam QUEUE = 8;  // densities whose colours are still in the engine
+
   // Stage 0 reads a current and scales it; 1 looks up; 2 integrates.
+  reg [15:0] density_q[0:7];
+  reg [15:0] current_q[0:31];  // {step, colour}
+  reg density_full_q, colour_full_q;
   reg run_q, colour_q;
   reg [2:0] step_q;
   reg [1:0] out_q;
@@ -42,19 +49,30 @@ module sf_readout (
   reg [1:0] out1_q, out2_q;
   reg [17:0] argument_q;
   reg [27:0] in_q;
-  reg done_q;
+  reg done_q;  // colours are complete
   reg [27:0] sigma_q;
   reg [19:0] colour_acc_q[0:2];
+  reg [27:0] queue_q[0:QUEUE-1];
+  reg [3:0] queue_room_q;   // places that are not promised
+  reg [3:0] queue_count_q;
+  reg [2:0] queue_write_q, queue_read_q;
+
+  // Colours go first; they use the accumulators until their result is gone.
+  wire free = !run_q || last;
+  wire colour_waits = colour_full_q && !(run_q && colour_q);
+  wire start_colour = free && colour_waits && !done_q && !(valid1_q && colour1_q) && !(valid2_q && colour2_q);
+  wire start_density = free && !start_colour && density_full_q && !(run_q && !colour_q);
+  wire out = valid_o && ready_i;
+  wire push = valid2_q && last2_q && !colour2_q;
 
   wire [17:0] argument;
   wire [27:0] e;
   wire [15:0] s;
   wire [27:0] acc;
 
-  assign current_colour_o = colour_q;
-  assign current_lane_o = {step_q, 2'd0, out_q};
+  wire [15:0] current = colour_q ? current_q[{step_q, out_q}] : density_q[step_q];
   sf_scale u_scale (
-      .current_i(current_i),
+      .current_i(current),
       .mul_i    (colour_q ? sigmoid_mul_i : exp_mul_i),
       .shift_i  (colour_q ? sigmoid_shift_i : exp_shift_i),
       .bias_i   (colour_q ? sigmoid_bias_i : exp_bias_i),
@@ -81,27 +99,39 @@ module sf_readout (
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      run_q <= 1'b0;
-      valid1_q <= 1'b0;
-      valid2_q <= 1'b0;
-      done_q <= 1'b0;
+      {density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 6'd0;
+      {queue_room_q, queue_count_q, queue_write_q, queue_read_q} <= {4'(QUEUE), 10'd0};
     end else if (clear_i) begin
-      run_q <= 1'b0;
-      valid1_q <= 1'b0;
-      valid2_q <= 1'b0;
-      done_q <= 1'b0;
+      {density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 6'd0;
+      {queue_room_q, queue_count_q, queue_write_q, queue_read_q} <= {4'(QUEUE), 10'd0};
     end else begin
-      run_q <= take_i || (run_q && !last);
+      if (density_valid_i) density_full_q <= 1'b1;
+      else if (run_q && last && !colour_q) density_full_q <= 1'b0;
+      if (colour_valid_i) colour_full_q <= 1'b1;
+      else if (run_q && last && colour_q) colour_full_q <= 1'b0;
+      run_q <= start_colour || start_density || (run_q && !last);
       valid1_q <= run_q;
       valid2_q <= valid1_q;
       if (valid2_q && last2_q && colour2_q) done_q <= 1'b1;
-      else if (ready_i) done_q <= 1'b0;
+      else if (out) done_q <= 1'b0;
+      queue_room_q <= queue_room_q + {3'd0, out} - {3'd0, density_valid_i};
+      queue_count_q <= queue_count_q + {3'd0, push} - {3'd0, out};
+      if (push) queue_write_q <= queue_write_q + 3'd1;
+      if (out) queue_read_q <= queue_read_q + 3'd1;
     end
   end
 
   always_ff @(posedge clk_i) begin
-    if (take_i) begin
-      colour_q <= take_colour_i;
+    if (density_valid_i) begin
+      for (int t = 0; t < 8; t++) density_q[t] <= density_i[256*t+:16];
+    end
+    if (colour_valid_i) begin
+      for (int t = 0; t < 8; t++) begin
+        for (int o = 0; o < 3; o++) current_q[4*t+o] <= colour_i[256*t+16*o+:16];
+      end
+    end
+    if (start_colour || start_density) begin
+      colour_q <= start_colour;
       step_q <= 3'd0;
       out_q <= 2'd0;
     end else if (run_q) begin
@@ -120,14 +150,18 @@ module sf_readout (
     in_q <= colour1_q ? {12'd0, s} : e;
     if (valid2_q && colour2_q) colour_acc_q[out2_q] <= acc[19:0];
     if (valid2_q && !colour2_q) sigma_q <= acc;
+    if (push) queue_q[queue_write_q] <= acc;
   end
 
-  assign ready_o = !run_q && !valid1_q && !valid2_q && !done_q && !take_i;
+  assign density_ready_o = !density_full_q && !density_valid_i && queue_room_q != 4'd0;
+  assign colour_ready_o = !colour_full_q && !colour_valid_i;
+  assign idle_o = !density_full_q && !colour_full_q && !run_q && !valid1_q && !valid2_q && !done_q
+      && queue_count_q == 4'd0;
   assign update_o = valid2_q;
   assign update_colour_o = colour2_q;
   assign update_step_o = step2_q;
-  assign valid_o = done_q;
-  assign sigma_o = sigma_q;
+  assign valid_o = done_q && queue_count_q != 4'd0;
+  assign sigma_o = queue_q[queue_read_q];
   assign colour_o = {colour_acc_q[2], colour_acc_q[1], colour_acc_q[0]};
 endmodule
 

@@ -67,18 +67,19 @@ module sf_top #(
   wire [4:0] feature_index;
   wire [3:0] dir_index;
   wire [11:0] feature, dir;
-  wire hold, core_idle, stall_out;
-  wire readout_ready, take, take_colour;
-  wire current_colour;
-  wire [6:0] current_lane;
-  wire [15:0] current;
-  wire [2:0] op, layer, step, spikes_layer, spikes_step, update_step;
-  wire [7:0] layer_n_out, fired, spikes_count;
-  wire spikes_valid, update, update_colour;
+  wire hold, core_idle, readout_idle, stall_out;
+  wire density_ready, density_valid, colour_ready, colour_valid;
+  wire [2047:0] density_current, colour_current;
+  wire d1_row, c1_row, ray;
+  wire [1:0] c2_rows;
+  wire [2:0] c1_step, c2_step, spikes_valid, spikes_step, update_step;
+  wire [15:0] d2_fired, c3_fired;
+  wire [7:0] spikes_count;
+  wire update, update_colour;
   wire result_valid, result_ready;
   wire [27:0] sigma;
   wire [59:0] colour;
-  wire active = !(core_idle && readout_ready && input_empty && !m_axis_tvalid_o);
+  wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
   wire [7:0] n_dir = n_in[23:16] - (n_out[15:8] - 8'd1);
 
   sf_csr u_csr (
@@ -181,19 +182,21 @@ module sf_top #(
       .feature_i      (feature),
       .dir_index_o    (dir_index),
       .dir_i          (dir),
-      .readout_ready_i(readout_ready),
-      .take_o         (take),
-      .take_colour_o  (take_colour),
-      .current_colour_i(current_colour),
-      .current_lane_i (current_lane),
-      .current_o      (current),
-      .op_o           (op),
-      .layer_o        (layer),
-      .step_o         (step),
-      .n_out_o        (layer_n_out),
-      .fired_o        (fired),
+      .density_ready_i(density_ready),
+      .density_valid_o(density_valid),
+      .density_o      (density_current),
+      .colour_ready_i (colour_ready),
+      .colour_valid_o (colour_valid),
+      .colour_o       (colour_current),
+      .d1_row_o       (d1_row),
+      .c1_row_o       (c1_row),
+      .c1_step_o      (c1_step),
+      .c2_rows_o      (c2_rows),
+      .c2_step_o      (c2_step),
+      .d2_fired_o     (d2_fired),
+      .c3_fired_o     (c3_fired),
+      .ray_o          (ray),
       .spikes_valid_o (spikes_valid),
-      .spikes_layer_o (spikes_layer),
       .spikes_step_o  (spikes_step),
       .spikes_count_o (spikes_count),
       .stall_o        (stall_out),
@@ -209,12 +212,13 @@ module sf_top #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
-      .take_i         (take),
-      .take_colour_i  (take_colour),
-      .ready_o        (readout_ready),
-      .current_colour_o(current_colour),
-      .current_lane_o (current_lane),
-      .current_i      (current),
+      .density_ready_o(density_ready),
+      .density_valid_i(density_valid),
+      .density_i      (density_current),
+      .colour_ready_o (colour_ready),
+      .colour_valid_i (colour_valid),
+      .colour_i       (colour_current),
+      .idle_o         (readout_idle),
       .mode_i         (mode),
       .steps_i        (steps),
       .k_density_i    (k[25:13]),
@@ -251,13 +255,16 @@ module sf_top #(
   sf_counters u_counters (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
-      .op_i           (op),
-      .layer_i        (layer),
-      .step_i         (step),
-      .n_out_i        (layer_n_out),
-      .fired_i        (fired),
+      .n_out_i        (n_out),
+      .d1_row_i       (d1_row),
+      .c1_row_i       (c1_row),
+      .c1_step_i      (c1_step),
+      .c2_rows_i      (c2_rows),
+      .c2_step_i      (c2_step),
+      .d2_fired_i     (d2_fired),
+      .c3_fired_i     (c3_fired),
+      .ray_i          (ray),
       .spikes_valid_i (spikes_valid),
-      .spikes_layer_i (spikes_layer),
       .spikes_step_i  (spikes_step),
       .spikes_count_i (spikes_count),
       .update_i       (update),
@@ -265,11 +272,11 @@ module sf_top #(
       .update_step_i  (update_step),
       .sample_i       (result_valid && result_ready),
       .active_i       (active),
-      .stall_in_i     (active && core_idle && !sample_valid && !hold),
+      .stall_in_i     (active && !sample_valid && !hold),
       .stall_out_i    (stall_out),
       .clear_i        (clear_counters),
       .snapshot_i     (snapshot),
-      .quiet_i        (core_idle && readout_ready),
+      .quiet_i        (core_idle && readout_idle),
       .hold_o         (hold),
       .busy_o         (counters_busy),
       .index_i        (counter_index),
