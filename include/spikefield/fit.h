@@ -30,10 +30,6 @@ sf_status sf_fit_measure(const fx_scene *scene, const sf_fit_rays *rays, uint64_
 sf_status sf_fit_observe(const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin, uint64_t end, bool places,
                          sf_trim_use *use);
 
-/* Clock cycles of the accelerator for these samples when the streams never make it wait. The rows that are added up
- * follow from the weights read; the rest is the sequencer's order of work (rtl/sf_sequencer.sv). */
-uint64_t sf_cycles(const fx_net *net, const fx_counts *counts);
-
 typedef struct sf_fit_job {
   const fx_scene *const *candidate; /* quantisations of one model; [0] is the reference, then narrower and narrower */
   const sf_quant_widths *widths;    /* [candidates], no zeros */

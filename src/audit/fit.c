@@ -4,6 +4,7 @@
  * tables, steps), the error against the photographs on the checking rays. The cuts that lose least for what they save
  * are then taken together on the checking rays, halving the group where it exceeds the bound. What the cuts did to each
  * other shows in the next round, which measures again. */
+#include "spikefield/cycles.h"
 #include "spikefield/fit.h"
 #include <math.h>
 #include <stdlib.h>
@@ -42,14 +43,6 @@ typedef struct search {
   cut cuts[CUTS_MAX];
   int count, checks;
 } search;
-
-uint64_t sf_cycles(const fx_net *net, const fx_counts *counts)
-{
-  uint64_t rows = 0;
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < net->steps; t++) rows += counts->layer[l].weight[t] / (uint64_t)net->layer[l].n_out;
-  return rows + counts->samples * (uint64_t)(5 * net->steps + 7) + counts->rays * 2;
-}
 
 static double ratio(uint64_t a, uint64_t b)
 {
@@ -294,7 +287,7 @@ static void describe(const fx_scene *scene, const sf_quant_widths *widths, const
   for (int64_t i = 0; i < bytes; i++) state->cells += __builtin_popcount(scene->occupancy[i]);
   state->widths = *widths;
   state->bytes = (uint64_t)sf_packed_bytes(scene, widths);
-  state->cycles = sf_cycles(&scene->net, &sum->counts);
+  state->cycles = sf_cycles_least(&scene->net, &sum->counts);
   state->energy_fj = sf_energy_fj(&sum->counts);
   state->sum = *sum;
   state->psnr = psnr(sum->error, rays);

@@ -57,7 +57,7 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
        (double)sf_event_total(&a->sum.counts, SF_EVENT_MAC) / frames);
   line(out, "SOPs per frame", (double)sf_event_total(&b->sum.counts, SF_EVENT_SOP) / frames,
        (double)sf_event_total(&a->sum.counts, SF_EVENT_SOP) / frames);
-  line(out, "cycles per frame", (double)b->cycles / frames, (double)a->cycles / frames);
+  line(out, "cycles per frame, at least", (double)b->cycles / frames, (double)a->cycles / frames);
   line(out, "energy per frame, mJ", (double)b->energy_fj * 1e-12 / frames, (double)a->energy_fj * 1e-12 / frames);
   fprintf(out, "  transmittance to stop at     %15.3g %15.3g\n", ldexp(b->trans_stop, -SF_TRANS_FRAC),
           ldexp(a->trans_stop, -SF_TRANS_FRAC));

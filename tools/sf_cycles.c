@@ -1,0 +1,226 @@
+/* sf_cycles: how long the accelerator takes for a frame, from the cycle model. */
+#include "spikefield/audit.h"
+#include "spikefield/cli.h"
+#include "spikefield/cycles.h"
+#include "spikefield/quant.h"
+#include "spikefield/scene.h"
+#include <inttypes.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BAND = 16 }; /* rows of pixels between two looks at the model */
+
+typedef struct options {
+  const char *scene, *data, *split;
+  int view, downscale, threads;
+  double clock;
+  bool json, quiet;
+} options;
+
+typedef struct shapes {
+  sf_cycle_sample *at;
+  size_t count, room;
+} shapes;
+
+typedef struct job {
+  options opt;
+  fx_scene scene;
+  sf_dataset data;
+  sf_cycle_model *model;
+  uint64_t rays, latency; /* latency: of one sample in an empty engine, the first of the frame */
+  sf_progress progress;
+} job;
+
+/* ---- samples of a row of pixels ---- */
+
+typedef struct tap {
+  const fx_net *net;
+  shapes *to;
+  int32_t base[SF_LANES];
+  fx_trace trace;
+} tap;
+
+static sf_status take(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+{
+  tap *t = user;
+  if (first) fx_net_direction(t->net, ray->dir, t->base, NULL);
+  fx_net_sample(t->net, f, t->base, out, &t->trace, NULL);
+  if (t->to->count == t->to->room) {
+    const size_t room = t->to->room ? 2 * t->to->room : 4096;
+    sf_cycle_sample *larger = realloc(t->to->at, room * sizeof *larger);
+    if (!larger) return sf_fail(SF_E_MEMORY, "no memory for the samples of a row");
+    t->to->at = larger, t->to->room = room;
+  }
+  t->to->at[t->to->count++] = sf_cycle_sample_make(t->net, &t->trace, first);
+  return sf_ok();
+}
+
+static sf_status trace_row(const job *j, int y, shapes *row)
+{
+  const sf_camera *camera = &j->data.view[0].camera;
+  tap *t = malloc(sizeof *t);
+  if (!t) return sf_fail(SF_E_MEMORY, "no memory for a row");
+  t->net = &j->scene.net, t->to = row;
+  sf_status status = sf_ok();
+  for (int x = 0; x < camera->width && status.code == SF_OK; x++) {
+    float origin[3], direction[3];
+    fx_ray ray;
+    fx_pixel pixel;
+    fx_counts counts = {0};
+    sf_camera_ray(camera, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
+    status = sf_fx_ray_make(&j->scene, origin, direction, &ray);
+    if (status.code == SF_OK) status = fx_render_ray(&j->scene, &ray, take, t, &pixel, &counts);
+  }
+  free(t);
+  return status;
+}
+
+static sf_status run_frame(job *j)
+{
+  const int height = j->data.view[0].camera.height;
+  shapes row[BAND] = {0};
+  sf_status status = sf_ok();
+  for (int y = 0; y < height && status.code == SF_OK; y += BAND) {
+    const int n = height - y < BAND ? height - y : BAND;
+    sf_status each[BAND];
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < n; i++) row[i].count = 0, each[i] = trace_row(j, y + i, &row[i]);
+    for (int i = 0; i < n && status.code == SF_OK; i++) {
+      status = each[i];
+      for (size_t s = 0; s < row[i].count; s++) {
+        sf_cycle_model_add(j->model, &row[i].at[s]);
+        if (j->latency) continue;
+        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net);
+        if (!alone) return sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+        sf_cycle_model_add(alone, &row[i].at[s]);
+        sf_cycle_model_drain(alone);
+        j->latency = sf_cycle_model_totals(alone)->cycles;
+        sf_cycle_model_free(alone);
+      }
+    }
+    j->rays += (uint64_t)n * (uint64_t)j->data.view[0].camera.width;
+    if (sf_progress_due(&j->progress))
+      sf_progress_show(&j->progress, "row %d of %d, %" PRIu64 " samples", y + n, height,
+                       sf_cycle_model_totals(j->model)->samples);
+  }
+  sf_cycle_model_drain(j->model);
+  for (int i = 0; i < BAND; i++) free(row[i].at);
+  return status;
+}
+
+/* ---- report ---- */
+
+static double ratio(uint64_t a, uint64_t b)
+{
+  return b ? (double)a / (double)b : 0;
+}
+
+static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
+
+static int busiest(const sf_cycle_totals *t)
+{
+  int most = 0;
+  for (int l = 1; l < SF_LAYERS; l++)
+    if (t->busy[l] > t->busy[most]) most = l;
+  return most;
+}
+
+static void print_text(const job *j)
+{
+  static const int cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
+  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  const int most = busiest(t);
+  printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, T = %d\n", j->opt.data, j->opt.view, j->rays, t->samples,
+         j->scene.net.steps);
+  printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: 210)\n", t->cycles,
+         ratio(t->cycles, t->samples));
+  printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
+  for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", layer_name[l], 100 * ratio(t->busy[l], t->cycles));
+  printf("; the busiest is %s\n\nframes/s      ", layer_name[most]);
+  for (size_t c = 0; c < sizeof cores / sizeof *cores; c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
+  for (size_t m = 0; m < sizeof clocks / sizeof *clocks; m++) {
+    printf("\n  %4d MHz    ", clocks[m]);
+    for (size_t c = 0; c < sizeof cores / sizeof *cores; c++)
+      printf("%12.2f", t->cycles ? 1e6 * clocks[m] * cores[c] / (double)t->cycles : 0);
+  }
+  printf("\n%.2f ms per frame at %.0f MHz in one core\n", ratio(t->cycles, 1) / j->opt.clock / 1e3, j->opt.clock);
+}
+
+static sf_status print_json(const job *j)
+{
+  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  cJSON *json = cJSON_CreateObject();
+  sf_json_add_u64(json, "rays", j->rays);
+  sf_json_add_u64(json, "samples", t->samples);
+  sf_json_add_u64(json, "cycles", t->cycles);
+  cJSON_AddNumberToObject(json, "cycles_per_sample", ratio(t->cycles, t->samples));
+  sf_json_add_u64(json, "latency", j->latency);
+  sf_json_add_u64(json, "waits", t->waits);
+  cJSON *busy = cJSON_AddObjectToObject(json, "utilisation");
+  for (int l = 0; l < SF_LAYERS; l++) cJSON_AddNumberToObject(busy, layer_name[l], ratio(t->busy[l], t->cycles));
+  cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
+  cJSON_AddNumberToObject(json, "frames_per_second", t->cycles ? 1e6 * j->opt.clock / (double)t->cycles : 0);
+  char *text = cJSON_Print(json);
+  cJSON_Delete(json);
+  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
+  puts(text);
+  free(text);
+  return sf_ok();
+}
+
+static sf_status run(job *j)
+{
+  SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
+  const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
+  SF_TRY(sf_dataset_load(&j->data, j->opt.data, j->opt.split, &how));
+  if (j->data.count == 0)
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has fewer %s views", j->opt.view, j->opt.data,
+                   j->opt.split);
+  j->model = sf_cycle_model_create(&j->scene.net);
+  if (!j->model) return sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+  sf_progress_begin(&j->progress, j->opt.quiet);
+  const sf_status status = run_frame(j);
+  sf_progress_end(&j->progress);
+  SF_TRY(status);
+  if (j->opt.json) return print_json(j);
+  print_text(j);
+  return sf_ok();
+}
+
+int main(int argc, char **argv)
+{
+  job j = {.opt = {.split = "test", .downscale = 1, .clock = 200}};
+  options *o = &j.opt;
+  const sf_option table[] = {
+      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
+      {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the view by N (default 1)"},
+      {"--clock", 0, SF_ARG_DOUBLE, &o->clock, 1, 1e5, NULL, "MHZ", "for the last line and --json (default 200)"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
+      {0}};
+  const sf_cli cli = {
+      .program = "sf_cycles",
+      .usage = "sf_cycles SCENE.snn DATA [options]",
+      .summary =
+          "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the cycle model: its\n"
+          "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
+      .examples = "  sf_cycles scene.snn data --view 3\n"
+                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n",
+      .options = table,
+      .min_positional = 2,
+      .max_positional = 2};
+  const char *positional[2] = {NULL, NULL};
+  sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  o->scene = positional[0], o->data = positional[1];
+  if (status.code == SF_OK && o->threads) omp_set_num_threads(o->threads);
+  if (status.code == SF_OK) status = run(&j);
+  sf_cycle_model_free(j.model);
+  sf_dataset_free(&j.data);
+  fx_scene_free(&j.scene);
+  if (status.code == SF_OK && fflush(stdout)) status = sf_fail(SF_E_IO, "standard output: the report was not written");
+  return sf_cli_finish(&cli, status);
+}
