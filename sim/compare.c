@@ -33,7 +33,7 @@ static bool same_bits(const comparison *c, int layer, int step, const char *wire
 static bool same_neurons(const comparison *c, int layer, int step)
 {
   const fx_layer *l = &c->net->layer[layer];
-  const uint64_t cycle = c->result->spike_cycle[layer][step], *spikes = c->core->spikes[layer][step];
+  const uint64_t cycle = c->result->tap_cycle[layer][step], *spikes = c->core->spikes[layer][step];
   if (!same_bits(c, layer, step, "spike", spikes, c->result->spikes[layer][step], cycle)) return false;
   for (int n = 0; c->trace && n < l->n_out; n++) {
     const bool fired = spikes[n / 64] >> (n % 64) & 1;
@@ -58,7 +58,7 @@ static bool same_hidden_step(const comparison *c, int t)
 {
   if (!same_neurons(c, FX_C1, t)) return false;
   if (c->trace && !same_bits(c, FX_C2, t, "row", c->core->spikes[FX_C1][t], c->trace->rows[FX_C2][t],
-                             c->result->spike_cycle[FX_C2][t]))
+                             c->result->tap_cycle[FX_C2][t]))
     return false;
   return same_neurons(c, FX_C2, t);
 }
@@ -70,10 +70,10 @@ bool sf_compare_sample(const fx_net *net, const fx_trace *core, const fx_out *co
   const int last = net->steps - 1;
   for (int t = 0; t < net->steps; t++)
     if (!same_neurons(&c, FX_D1, t)) return false;
-  if (!same_rows_any(&c, FX_D2, FX_D1, result->spike_cycle[FX_D1][last])) return false;
+  if (!same_rows_any(&c, FX_D2, FX_D1, result->tap_cycle[FX_D2][0])) return false;
   for (int t = 0; t < net->steps; t++)
     if (!same_hidden_step(&c, t)) return false;
-  if (!same_rows_any(&c, FX_C3, FX_C2, result->spike_cycle[FX_C2][last])) return false;
+  if (!same_rows_any(&c, FX_C3, FX_C2, result->tap_cycle[FX_C3][0])) return false;
   if (core_out->sigma != result->out.sigma)
     return differs(&c, FX_D2, last, 0, "sigma", core_out->sigma, result->out.sigma, result->cycle);
   for (int o = 0; o < 3; o++)

@@ -11,8 +11,9 @@ typedef struct sf_difference {
   uint64_t cycle;
 } sf_difference;
 
-/* In the order in which the hardware works; false and the first difference when there is one.
- * "row": presynaptic neuron `neuron` was or was not added up in this layer. trace may be NULL: no rows and membranes.
+/* In the order in which a sample passes through the layers, whenever the hardware showed each; false and the first
+ * difference when there is one. "row": presynaptic neuron `neuron` was or was not added up in this layer. trace may be
+ * NULL: no rows and membranes.
  */
 bool sf_compare_sample(const fx_net *net, const fx_trace *core, const fx_out *core_out, const sf_dut_result *result,
                        const sf_dut_trace *trace, sf_difference *difference);

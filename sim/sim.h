@@ -15,7 +15,6 @@ struct sf_dut {
   bool bus_hung;        /* a register access was never answered */
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   fx_net net;           /* sizes of the loaded net */
-  int64_t tap_sample;   /* sample of the current run that the next tap beat belongs to */
 };
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */

@@ -21,9 +21,9 @@ typedef struct sf_dut_sample {
 /* What the accelerator showed of one sample. */
 typedef struct sf_dut_result {
   fx_out out;
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];   /* as fx_trace; from the tap port */
-  uint64_t spike_cycle[SF_LAYERS][SF_T_MAX]; /* clock cycle of each bitmap */
-  uint64_t cycle;                            /* clock cycle at which the result left */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* as fx_trace; from the tap port */
+  uint64_t tap_cycle[SF_LAYERS][SF_T_MAX]; /* clock cycle of each tap beat; D2 and C3 have one, at step 0 */
+  uint64_t cycle;                          /* clock cycle at which the result left */
 } sf_dut_result;
 
 sf_status sf_dut_open(sf_dut **dut, const fx_scene *scene, const sf_dut_options *options);
