@@ -17,6 +17,7 @@ for name in "$@"; do
     chain) command=("$here/chain.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
+    cosim_split) command=("$here/cosim_split.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
     *) command=("$build/tests/$name") ;;
