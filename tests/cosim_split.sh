@@ -1,6 +1,7 @@
 #!/bin/bash
 # sf_cosim over several processes, interrupted, continued, replayed: always the same result. usage: cosim_split.sh BUILD
 set -u
+here=$(cd "$(dirname "$0")" && pwd)
 build=$(cd "$1" && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_split.XXXXXX") || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -103,6 +104,15 @@ children=$(ps -o pid= --ppid $parent)
 { kill -KILL $parent && wait $parent; } 2>/dev/null
 sleep 0.5
 for child in $children; do alive "$child" && fail "killed: process $child is still there"; done
+
+# ---- the campaign: every seed its share, totals, JUnit; what is finished is not run again ----
+campaign() { JOBS=2 "$here/../tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
+mkdir -p b/bin && ln -s "$build/faults/sf_cosim" b/bin/sf_cosim
+campaign || fail "campaign: $(cat campaign.out)"
+total=$(sed -nE 's/^([0-9]+) samples over 2 seeds, stalls 20 %, 0 differences.*/\1/p' campaign.out)
+[ "${total:-0}" -ge 400 ] || fail "campaign: $(cat campaign.out)"
+[ "$(grep -c '<testcase.*/testcase>' b/cosim/campaign.xml)" -eq 2 ] || fail "campaign: JUnit"
+campaign && [ "$(grep -c 'done before' campaign.out)" -eq 2 ] || fail "campaign: finished seeds are run again"
 
 [ $failures -eq 0 ] && echo "1, 2, 3 processes, interrupted, continued and replayed: the same result"
 exit $((failures > 0))
