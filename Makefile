@@ -122,7 +122,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults cosim_split install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -142,6 +142,13 @@ cppcheck: ## static analysis of the C code
 # Runs of the whole chain
 demo: all ## make a scene, train, export, render, co-simulate, audit: build/demo (under 4 minutes)
 	@STARTED=$(STARTED) tools/demo.sh $B
+
+# The default of SAMPLES above is vector-campaign's.
+SCENE ?= $B/demo/scene.snn
+DATA ?= $B/demo/scene
+SEEDS ?= 1 2 3
+cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS ("1 2 3") after make demo, or SCENE= DATA=: build/cosim
+	@tools/cosim_campaign.sh $B "$(SCENE)" "$(DATA)" $(if $(filter file,$(origin SAMPLES)),1000000,$(SAMPLES)) "$(SEEDS)"
 
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 15 --rays 400
@@ -174,6 +181,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

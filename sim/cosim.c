@@ -1,9 +1,9 @@
 #include "sim/cosim.h"
-#include "spikefield/audit.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { CHUNK = 128 };
+enum { CHUNK = SF_REPLAY_MAX };
 
 typedef struct entry {
   fx_ray ray;
@@ -16,7 +16,7 @@ typedef struct entry {
 
 struct sf_cosim {
   const fx_scene *scene;
-  sf_cosim_options options;
+  sf_dut_options options;
   sf_dut *dut;
   int n;
   uint64_t number, sample; /* of the ray at work */
@@ -30,22 +30,14 @@ struct sf_cosim {
   sf_dut_trace trace[CHUNK];
 };
 
-static sf_dut_options quiet_options(const sf_cosim *c)
-{
-  sf_dut_options options = c->options.dut;
-  options.wave = NULL;
-  return options;
-}
-
-sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_cosim_options *options)
+sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_dut_options *options)
 {
   *cosim = NULL;
   sf_cosim *c = calloc(1, sizeof *c);
   if (!c) return sf_fail(SF_E_MEMORY, "co-simulation: out of memory");
   c->scene = scene;
   c->options = *options;
-  const sf_dut_options quiet = quiet_options(c);
-  const sf_status status = sf_dut_open(&c->dut, scene, &quiet);
+  const sf_status status = sf_dut_open(&c->dut, scene, options);
   if (status.code == SF_OK)
     *cosim = c;
   else
@@ -82,39 +74,16 @@ static sf_status locate_count(const sf_cosim *c, sf_dut *dut, sf_cosim_place *pl
 
 static sf_status count_difference(sf_cosim *c, const sf_difference *difference)
 {
-  const sf_dut_options quiet = quiet_options(c);
   c->place = (sf_cosim_place){true, c->chunk[0].number, c->chunk[0].sample, false, *difference};
   sf_dut *dut;
-  SF_TRY(sf_dut_open(&dut, c->scene, &quiet));
+  SF_TRY(sf_dut_open(&dut, c->scene, &c->options));
   const sf_status status = locate_count(c, dut, &c->place);
-  sf_dut_close(dut);
-  return status;
-}
-
-/* ---- waveform of the difference ---- */
-
-static sf_status dump_wave(const sf_cosim *c)
-{
-  int at = 0;
-  while (at < c->n && (c->chunk[at].number != c->place.ray || c->chunk[at].sample != c->place.sample)) at++;
-  if (!c->options.dut.wave || at == c->n) return sf_ok();
-  const int from = at > 0 ? at - 1 : 0, count = at - from + 1;
-  sf_dut_sample sample[2];
-  sf_dut_result result[2];
-  for (int i = 0; i < count; i++) {
-    sample[i] = c->input[from + i];
-    sample[i].first |= i == 0;
-  }
-  sf_dut *dut;
-  SF_TRY(sf_dut_open(&dut, c->scene, &c->options.dut));
-  const sf_status status = sf_dut_run(dut, sample, count, result);
   sf_dut_close(dut);
   return status;
 }
 
 static sf_status differ(const sf_cosim *c)
 {
-  SF_TRY(dump_wave(c));
   return sf_fail(SF_E_DIFFERENCE, "%s differs from the fixed-point core", c->place.what.wire);
 }
 
@@ -160,12 +129,26 @@ static sf_status compare_counts(sf_cosim *c)
   return sf_dut_clear_counts(c->dut);
 }
 
+/* What came before the sample without a result is compared first: the difference may be there. */
+static sf_status stuck(sf_cosim *c, const sf_status *ran)
+{
+  const int received = sf_dut_received(c->dut), n = c->n;
+  c->n = received < n ? received : n;
+  const sf_status earlier = compare_samples(c);
+  c->n = n;
+  SF_TRY(earlier);
+  const entry *e = &c->chunk[received < n ? received : n - 1];
+  c->place = (sf_cosim_place){true, e->number, e->sample, received < n, {-1, -1, -1, NULL, 0, 0, sf_dut_cycle(c->dut)}};
+  return *ran;
+}
+
 static sf_status flush(sf_cosim *c)
 {
   for (int i = 0; i < c->n; i++)
     c->input[i] = (sf_dut_sample){.ray = &c->chunk[i].ray, .first = c->chunk[i].first, .f = c->chunk[i].f};
   if (c->n == 0) return sf_ok();
-  SF_TRY(sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace));
+  const sf_status ran = sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace);
+  if (ran.code != SF_OK) return stuck(c, &ran);
   SF_TRY(compare_samples(c));
   SF_TRY(compare_counts(c));
   memset(&c->expected, 0, sizeof c->expected);
@@ -173,16 +156,10 @@ static sf_status flush(sf_cosim *c)
   return sf_ok();
 }
 
-bool sf_cosim_limit_reached(const sf_cosim *c)
-{
-  return c->options.limit && c->sum.samples + (uint64_t)c->n >= c->options.limit;
-}
-
 /* fx_net_fn: the core's answer at once, the accelerator's with the rest of the chunk. */
 static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   sf_cosim *c = user;
-  if (sf_cosim_limit_reached(c)) return sf_fail(SF_E_STOPPED, "limit of samples reached");
   entry *e = &c->chunk[c->n++];
   e->ray = *ray;
   e->number = c->number;
@@ -202,20 +179,12 @@ sf_status sf_cosim_ray(sf_cosim *c, uint64_t number, const fx_ray *ray)
   fx_counts march = {0}; /* the accelerator neither marches nor reads the grid */
   c->number = number;
   c->sample = 0;
-  const sf_status status = fx_render_ray(c->scene, ray, evaluate, c, &pixel, &march);
-  return status.code == SF_E_STOPPED ? sf_ok() : status;
+  return fx_render_ray(c->scene, ray, evaluate, c, &pixel, &march);
 }
 
 sf_status sf_cosim_finish(sf_cosim *c)
 {
-  SF_TRY(flush(c));
-  c->sum.energy_core_fj = sf_energy_fj(&c->sum.core);
-  c->sum.energy_rtl_fj = sf_energy_fj(&c->sum.rtl);
-  if (c->sum.energy_core_fj == c->sum.energy_rtl_fj) return sf_ok();
-  c->place = (sf_cosim_place){.found = true,
-                              .what = {-1, -1, -1, "energy_fj", (int64_t)c->sum.energy_core_fj,
-                                       (int64_t)c->sum.energy_rtl_fj, sf_dut_cycle(c->dut)}};
-  return differ(c);
+  return flush(c);
 }
 
 const sf_cosim_totals *sf_cosim_sum(const sf_cosim *c)
@@ -225,6 +194,31 @@ const sf_cosim_totals *sf_cosim_sum(const sf_cosim *c)
 const sf_cosim_place *sf_cosim_where(const sf_cosim *c)
 {
   return &c->place;
+}
+
+void sf_cosim_totals_add(sf_cosim_totals *sum, const sf_cosim_totals *more)
+{
+  fx_counts_add(&sum->core, &more->core);
+  fx_counts_add(&sum->rtl, &more->rtl);
+  sum->samples += more->samples;
+  sum->spikes += more->spikes;
+  sum->cycles += more->cycles;
+  sum->busy += more->busy;
+  sum->stalls += more->stalls;
+}
+
+void sf_cosim_replay(const sf_cosim *c, sf_replay *replay)
+{
+  *replay = (sf_replay){.seed = c->options.seed, .stall_percent = c->options.stall_percent};
+  snprintf(replay->plusarg, sizeof replay->plusarg, "%s", c->options.plusarg ? c->options.plusarg : "");
+  for (int i = 0; i < c->n; i++) {
+    const entry *e = &c->chunk[i];
+    sf_replay_sample *s = &replay->sample[replay->count++];
+    *s = (sf_replay_sample){.ray = e->number, .sample = e->sample, .first = e->first};
+    memcpy(s->dir, e->ray.dir, sizeof s->dir);
+    memcpy(s->f, e->f, sizeof s->f);
+    if (c->place.exact && e->number == c->place.ray && e->sample == c->place.sample) return;
+  }
 }
 
 void sf_cosim_close(sf_cosim *c)

@@ -2,23 +2,20 @@
  * membranes, rows and every counter, for equality. */
 #ifndef SPIKEFIELD_SIM_COSIM_H
 #define SPIKEFIELD_SIM_COSIM_H
-#include "sim/compare.h"
+#include "sim/replay.h"
 
 typedef struct sf_cosim sf_cosim;
-
-typedef struct sf_cosim_options {
-  sf_dut_options dut; /* dut.wave: written only for a difference, of the sample and the one before it */
-  uint64_t limit;     /* stop after this many samples, 0 = none */
-} sf_cosim_options;
 
 typedef struct sf_cosim_totals {
   fx_counts core, rtl;
   uint64_t samples, spikes; /* compared; spikes = bits set in the bitmaps */
   uint64_t cycles, busy, stalls;
-  uint64_t energy_core_fj, energy_rtl_fj;
 } sf_cosim_totals;
 
-/* Where the first difference is. `ray` is the number given to sf_cosim_ray, `sample` counts from 0 along the ray. */
+void sf_cosim_totals_add(sf_cosim_totals *sum, const sf_cosim_totals *more);
+
+/* Where the first difference is. `ray` is the number given to sf_cosim_ray, `sample` counts from 0 along the ray.
+ * what.wire NULL: the accelerator gave no result, the status says how. */
 typedef struct sf_cosim_place {
   bool found;
   uint64_t ray;
@@ -27,13 +24,14 @@ typedef struct sf_cosim_place {
   sf_difference what;
 } sf_cosim_place;
 
-sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_cosim_options *options);
+sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_dut_options *options);
 /* SF_E_DIFFERENCE when core and accelerator disagree; then sf_cosim_where says where. */
 sf_status sf_cosim_ray(sf_cosim *cosim, uint64_t number, const fx_ray *ray);
-/* The samples still waiting, then the energies. */
+/* The samples still waiting. */
 sf_status sf_cosim_finish(sf_cosim *cosim);
-bool sf_cosim_limit_reached(const sf_cosim *cosim);
 const sf_cosim_totals *sf_cosim_sum(const sf_cosim *cosim);
 const sf_cosim_place *sf_cosim_where(const sf_cosim *cosim);
+/* After a difference: the samples of its chunk up to it. Not shrunk. */
+void sf_cosim_replay(const sf_cosim *cosim, sf_replay *replay);
 void sf_cosim_close(sf_cosim *cosim);
 #endif

@@ -46,6 +46,7 @@ sf_status sf_dut_open_bare(sf_dut **dut_out, const sf_dut_options *options)
   }
   dut->seed = options->seed;
   dut->stall_percent = (uint32_t)options->stall_percent;
+  dut->wave_from = options->wave_from;
   dut->bus = sf_dut_bus(dut);
   for (int i = 0; i < RESET_CYCLES; i++) sf_dut_tick(dut);
   dut->in.rst_n = true;

@@ -12,7 +12,7 @@ typedef struct run {
   const sf_dut_sample *sample;
   sf_dut_result *result;
   sf_dut_trace *trace;
-  int n, sent, received;
+  int n, sent;
   int beat, beats, out_beat;
   int taps[SF_LAYERS]; /* beats seen */
   uint64_t packet[SF_PACKET_MAX];
@@ -66,9 +66,9 @@ static sf_status accept_output(run *r)
 {
   const sf_pins_out *out = &r->dut->out;
   if (!r->dut->in.m_ready || !out->m_valid) return sf_ok();
-  if (out->m_last != (r->out_beat == RESULT_BEATS - 1) || r->received == r->sent + (r->beat > 0))
+  if (out->m_last != (r->out_beat == RESULT_BEATS - 1) || r->dut->received == r->sent + (r->beat > 0))
     return sf_fail(SF_E_DIFFERENCE, "accelerator: result stream out of step at cycle %" PRIu64, r->dut->cycle);
-  fx_out *value = &r->result[r->received].out;
+  fx_out *value = &r->result[r->dut->received].out;
   const uint32_t low = (uint32_t)out->m_data, high = (uint32_t)(out->m_data >> 32);
   if (r->out_beat == 0)
     value->sigma = low, value->colour[0] = high;
@@ -77,7 +77,7 @@ static sf_status accept_output(run *r)
   r->progress = r->dut->cycle;
   if (++r->out_beat < RESULT_BEATS) return sf_ok();
   r->out_beat = 0;
-  r->result[r->received++].cycle = r->dut->cycle;
+  r->result[r->dut->received++].cycle = r->dut->cycle;
   return sf_ok();
 }
 
@@ -126,12 +126,13 @@ static sf_status trouble(run *r, const char *what)
   dut->in.s_valid = dut->in.m_ready = false;
   const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
   return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d samples in, %d results out: %s", what,
-                 cycle, r->sent, r->n, r->received, sf_driver_error_text(error));
+                 cycle, r->sent, r->n, r->dut->received, sf_driver_error_text(error));
 }
 
 static sf_status step(run *r)
 {
   sf_dut *dut = r->dut;
+  if (r->sent == dut->wave_from) sf_pins_dump(dut->pins);
   offer(r);
   dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT);
   sf_dut_tick(dut);
@@ -166,9 +167,9 @@ sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_
   run r = {.dut = dut, .sample = sample, .result = result, .trace = trace, .n = n, .progress = dut->cycle};
   memset(result, 0, (size_t)n * sizeof *result);
   if (trace) memset(trace, 0, (size_t)n * sizeof *trace);
-  sf_pins_dump(dut->pins);
+  dut->received = 0;
   sf_status status = sf_ok();
-  while (r.received < n && status.code == SF_OK) status = step(&r);
+  while (dut->received < n && status.code == SF_OK) status = step(&r);
   if (status.code == SF_OK) status = wait_for_taps(&r);
   dut->in.s_valid = dut->in.m_ready = false;
   return status;
@@ -177,6 +178,11 @@ sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_
 sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result)
 {
   return sf_dut_run_traced(dut, sample, n, result, NULL);
+}
+
+int sf_dut_received(const sf_dut *dut)
+{
+  return dut->received;
 }
 
 sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)

@@ -19,7 +19,7 @@ expect() {
   local fault=$1 want=$2 got
   shift 2
   "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --json \
-    --plusarg "+fault=$fault" >"$work/$fault.json" 2>"$work/$fault.err"
+    --evidence "$work/evidence" --plusarg "+fault=$fault" >"$work/$fault.json" 2>"$work/$fault.err"
   got=$?
   [ $got -eq "$want" ] || fail "fault $fault: exit status $got, expected $want: $(cat "$work/$fault.err")"
   tr -d '\n\t ' <"$work/$fault.json" | sed -E 's/.*"first_difference":(null|\{[^}]*\}).*/\1/' >"$work/$fault.first"

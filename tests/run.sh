@@ -1,5 +1,5 @@
 #!/bin/bash
-# Runs the named tests one after another and ends with one closing line. usage: run.sh BUILD NAME...
+# Runs the named tests one after another and ends with one closing line; BUILD/tests/junit.xml. usage: run.sh BUILD NAME...
 # A name is a Check program in BUILD/tests, or one of the scripts below.
 build=$1
 shift
@@ -8,6 +8,8 @@ passed=0 failed=0 skipped=0
 logs=$build/tests/logs
 mkdir -p "$logs"
 export OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive} # threads that spin slow each other down on a busy machine
+cases=$logs/junit
+: >"$cases"
 for name in "$@"; do
   start=$(date +%s)
   case $name in
@@ -18,6 +20,7 @@ for name in "$@"; do
     chain) command=("$here/chain.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
+    cosim_split) command=("$here/cosim_split.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
     *) command=("$build/tests/$name") ;;
@@ -32,8 +35,17 @@ for name in "$@"; do
   else
     failed=$((failed + 1)) verdict="FAILED ($status), see $logs/$name.log"
   fi
+  case $verdict in ok) inside= ;; skipped*) inside='<skipped/>' ;; *) inside='<failure message="see the log"/>' ;; esac
+  echo "  <testcase classname=\"tests\" name=\"$name\" time=\"$seconds\">$inside</testcase>" >>"$cases"
   printf '  %-16s %4d s  %s\n' "$name" "$seconds" "$verdict"
   [ $status -eq 0 ] || [ $status -eq 77 ] || tail -n 20 "$logs/$name.log"
 done
+{
+  echo "<?xml version=\"1.0\" encoding=\"UTF-8\"?>"
+  echo "<testsuite name=\"spikefield\" tests=\"$#\" failures=\"$failed\" skipped=\"$skipped\">"
+  cat "$cases"
+  echo "</testsuite>"
+} >"$build/tests/junit.xml"
+rm -f "$cases"
 echo "$passed passed, $failed failed, $skipped skipped"
 [ $failed -eq 0 ] && [ $passed -gt 0 ]

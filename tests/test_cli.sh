@@ -133,6 +133,8 @@ number sf_export --fit-loss -1 nan inf 101 ''
 number sf_export --fit-rays 0 255 -1 nan
 usage --data sf_export model.safetensors -o out --fit
 number sf_cosim --rays -1 nan inf x
+number sf_cosim --jobs -1 0 257 x
+number sf_cosim --block 0 x
 number sim_render --view -1 nan 2 99999999999
 number sim_render --backend gpu nan ''
 number sim_render --downscale 0 -1 nan

@@ -8,7 +8,8 @@ typedef struct sf_dut sf_dut;
 typedef struct sf_dut_options {
   uint64_t seed;       /* of stalls and random reset values */
   int stall_percent;   /* chance per cycle of a bubble on input and of back-pressure on output, 0..90 */
-  const char *wave;    /* FST file to write from the first sample on, or NULL */
+  const char *wave;    /* FST file to write, or NULL */
+  int wave_from;       /* it begins when sample wave_from of a run is due at the input */
   const char *plusarg; /* passed to the simulation, or NULL */
 } sf_dut_options;
 
@@ -30,6 +31,7 @@ sf_status sf_dut_open(sf_dut **dut, const fx_scene *scene, const sf_dut_options 
 /* Streams n samples in and n results out, overlapping as the hardware allows. A hang is an error that names the cycle.
  */
 sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result);
+int sf_dut_received(const sf_dut *dut); /* results of the last run, the one that failed included */
 /* More of the same samples, for a comparison that names the cause: membranes after reset (D1, C1, C2) and the
  * presynaptic rows that were added up (C2 per step; D2 and C3 of all steps together, at step 0). */
 typedef struct sf_dut_trace {

@@ -1,0 +1,241 @@
+#include "sim/lockstep.h"
+#include "sim/jobs.h"
+#include "spikefield/audit.h"
+#include "spikefield/cli.h"
+#include "spikefield/io.h"
+#include "spikefield/rng.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y, STREAM_BLOCK, SAVE_SECONDS = 5 };
+
+typedef struct block {
+  uint64_t rays; /* finished */
+  sf_cosim_totals sum;
+  sf_status status;
+  sf_cosim_place place;
+  sf_replay replay;
+} block;
+
+typedef struct checkpoint {
+  char identity[65];
+  uint64_t blocks, rays;
+  sf_cosim_totals sum;
+} checkpoint;
+
+sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *l, uint64_t ray)
+{
+  const uint64_t seed = l->options.seed;
+  sf_lockstep_pixel p = {.view = (int)sf_random_below(seed, STREAM_VIEW, ray, (uint64_t)l->data.count)};
+  const sf_camera *camera = &l->data.view[p.view].camera;
+  p.x = (int)sf_random_below(seed, STREAM_X, ray, (uint64_t)camera->width);
+  p.y = (int)sf_random_below(seed, STREAM_Y, ray, (uint64_t)camera->height);
+  return p;
+}
+
+/* ---- one block, in a process of its own ---- */
+
+static sf_status run_ray(const sf_lockstep *l, sf_cosim *cosim, uint64_t number)
+{
+  const sf_lockstep_pixel p = sf_lockstep_pick(l, number);
+  fx_ray ray;
+  SF_TRY(sf_pixel_ray(&l->fx, &l->data.view[p.view].camera, p.x, p.y, &ray));
+  return sf_cosim_ray(cosim, number, &ray);
+}
+
+static sf_status run_rays(const sf_lockstep *l, sf_cosim *cosim, uint64_t unit, block *b)
+{
+  const uint64_t from = unit * (uint64_t)l->options.block, all = (uint64_t)l->options.rays;
+  const uint64_t end = from + (uint64_t)l->options.block < all ? from + (uint64_t)l->options.block : all;
+  bool stopped = false;
+  for (uint64_t ray = from; ray < end && !stopped; ray++) {
+    SF_TRY(run_ray(l, cosim, ray));
+    b->rays++;
+    stopped = sf_cli_interrupted();
+  }
+  SF_TRY(sf_cosim_finish(cosim));
+  return stopped ? sf_fail(SF_E_STOPPED, "stopped") : sf_ok();
+}
+
+static void run_block(void *user, uint64_t unit, void *result)
+{
+  const sf_lockstep *l = user;
+  block *b = result;
+  const sf_dut_options options = {.seed = sf_random_u64(l->options.seed, STREAM_BLOCK, unit),
+                                  .stall_percent = l->options.stall_percent,
+                                  .plusarg = l->options.plusarg};
+  sf_cosim *cosim;
+  b->status = sf_cosim_open(&cosim, &l->fx, &options);
+  if (b->status.code != SF_OK) return;
+  b->status = run_rays(l, cosim, unit, b);
+  b->sum = *sf_cosim_sum(cosim);
+  b->place = *sf_cosim_where(cosim);
+  if (b->place.found) sf_cosim_replay(cosim, &b->replay);
+  sf_cosim_close(cosim);
+}
+
+/* ---- checkpoints ---- */
+
+/* A checkpoint is what this very program holds in memory, so the program is part of the identity. */
+static sf_status identify(sf_lockstep *l)
+{
+  const sf_lockstep_options *o = &l->options;
+  char text[2048], program[65], scene[65];
+  SF_TRY(sf_sha256_file("/proc/self/exe", program));
+  SF_TRY(sf_sha256_file(o->scene, scene));
+  int n = snprintf(text, sizeof text, "%s %s %s %" PRIu64 " %d %d %d %s", program, scene, o->split, o->seed, o->rays,
+                   o->block, o->stall_percent, o->plusarg ? o->plusarg : "");
+  char cameras[65];
+  sf_camera *camera = calloc((size_t)l->data.count, sizeof *camera);
+  if (!camera) return sf_fail(SF_E_MEMORY, "%s: out of memory", o->data);
+  for (int i = 0; i < l->data.count; i++) camera[i] = l->data.view[i].camera;
+  sf_sha256(camera, (size_t)l->data.count * sizeof *camera, cameras);
+  free(camera);
+  n += snprintf(text + n, sizeof text - (size_t)n, " %s", cameras);
+  sf_sha256(text, (size_t)n, l->identity);
+  return sf_ok();
+}
+
+static sf_status save(sf_lockstep *l)
+{
+  if (!l->options.checkpoint) return sf_ok();
+  checkpoint c;
+  memset(&c, 0, sizeof c);
+  memcpy(c.identity, l->identity, sizeof c.identity);
+  c.blocks = l->blocks, c.rays = l->rays, c.sum = l->sum;
+  l->saved = sf_seconds();
+  return sf_write_file(l->options.checkpoint, &c, sizeof c);
+}
+
+static sf_status resume(sf_lockstep *l)
+{
+  const char *path = l->options.checkpoint;
+  checkpoint c;
+  char *data;
+  size_t size;
+  if (!path || access(path, F_OK)) return sf_ok();
+  SF_TRY(sf_read_file(path, sizeof c, &data, &size));
+  const bool ours = size == sizeof c && !memcmp(data, l->identity, sizeof l->identity);
+  if (ours) memcpy(&c, data, sizeof c);
+  free(data);
+  if (!ours) return sf_fail(SF_E_FORMAT, "%s: checkpoint of another program, scene, data set or other options", path);
+  l->blocks = c.blocks, l->rays = c.rays, l->sum = c.sum;
+  l->resumed = c.sum.samples;
+  return sf_ok();
+}
+
+/* ---- all blocks ---- */
+
+static bool enough(const sf_lockstep *l)
+{
+  return l->options.limit && l->sum.samples >= l->options.limit;
+}
+
+static bool take_block(void *user, uint64_t unit, const void *result)
+{
+  sf_lockstep *l = user;
+  const block *b = result;
+  (void)unit;
+  if (b->status.code == SF_E_STOPPED && !l->partial) {
+    l->trouble = save(l);
+    l->partial = true;
+  }
+  l->rays += b->rays;
+  sf_cosim_totals_add(&l->sum, &b->sum);
+  if (b->status.code == SF_E_STOPPED) return true;
+  if (b->status.code != SF_OK) l->trouble = b->status;
+  l->place = b->place;
+  l->replay = b->replay;
+  if (b->status.code != SF_OK) return false;
+  l->blocks++;
+  if (sf_seconds() - l->saved > SAVE_SECONDS && !l->partial && l->trouble.code == SF_OK) l->trouble = save(l);
+  return l->trouble.code == SF_OK && !enough(l);
+}
+
+static void tick(void *user)
+{
+  const sf_lockstep *l = user;
+  if (l->tick) l->tick(l->user, l);
+}
+
+static sf_status run_blocks(sf_lockstep *l)
+{
+  const uint64_t per = (uint64_t)l->options.block;
+  const sf_jobs jobs = {.processes = l->options.jobs,
+                        .first = l->blocks,
+                        .end = ((uint64_t)l->options.rays + per - 1) / per,
+                        .result_size = sizeof(block),
+                        .work = run_block,
+                        .take = take_block,
+                        .tick = tick,
+                        .user = l};
+  l->saved = sf_seconds();
+  if (l->blocks >= jobs.end || enough(l)) return sf_ok();
+  const sf_status status = sf_jobs_run(&jobs);
+  SF_TRY(l->trouble);
+  if (!l->partial) SF_TRY(save(l));
+  return status;
+}
+
+static sf_status compare_energy(sf_lockstep *l)
+{
+  l->energy_core_fj = sf_energy_fj(&l->sum.core);
+  l->energy_rtl_fj = sf_energy_fj(&l->sum.rtl);
+  if (l->energy_core_fj == l->energy_rtl_fj) return sf_ok();
+  return sf_fail(SF_E_DIFFERENCE, "energy of equal counts: expected %" PRIu64 " fJ, actual %" PRIu64 " fJ",
+                 l->energy_core_fj, l->energy_rtl_fj);
+}
+
+/* ---- evidence ---- */
+
+static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
+{
+  char path[4096];
+  sf_replayed replayed;
+  SF_TRY(sf_replay_shrink(&l->replay, &l->fx.net, &l->replays));
+  snprintf(path, sizeof path, "%s.fst", l->options.evidence);
+  SF_TRY(sf_replay_run(&l->replay, &l->fx.net, path, &replayed));
+  cJSON *json = cJSON_CreateObject();
+  char text[200] = "";
+  if (replayed.what.wire) sf_difference_text(&replayed.what, text);
+  cJSON_AddStringToObject(json, "in_the_run", status->message);
+  cJSON_AddStringToObject(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
+  cJSON_AddStringToObject(json, "wave", path);
+  snprintf(path, sizeof path, "%s.json", l->options.evidence);
+  return sf_replay_save(&l->replay, l->options.scene, json, path);
+}
+
+sf_status sf_lockstep_run(sf_lockstep *l)
+{
+  SF_TRY(resume(l));
+  sf_status status = run_blocks(l);
+  l->complete = status.code == SF_OK;
+  const sf_status energy = compare_energy(l);
+  if (status.code == SF_E_STOPPED)
+    return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d rays, %" PRIu64 " samples equal%s%s", l->rays,
+                   l->options.rays, l->sum.samples, l->options.checkpoint ? "; the same command goes on from " : "",
+                   l->options.checkpoint ? l->options.checkpoint : "");
+  if (status.code == SF_OK) return energy;
+  if (!l->place.found) return status;
+  status = sf_lockstep_difference(l, &status);
+  SF_TRY(write_evidence(l, &status));
+  return status;
+}
+
+sf_status sf_lockstep_load(sf_lockstep *l, const sf_lockstep_options *options)
+{
+  memset(l, 0, sizeof *l);
+  l->options = *options;
+  SF_TRY(fx_scene_load(&l->fx, options->scene));
+  SF_TRY(sf_dataset_load(&l->data, options->data, options->split, &(sf_dataset_options){.downscale = 1}));
+  if (l->data.count < 1) return sf_fail(SF_E_FORMAT, "%s: no views", options->data);
+  return identify(l);
+}
+
+void sf_lockstep_free(sf_lockstep *l)
+{
+  sf_dataset_free(&l->data);
+  fx_scene_free(&l->fx);
+}

@@ -1,0 +1,63 @@
+/* A whole co-simulation: random rays of a data set, cut into blocks that are worked on by several processes. Everything
+ * depends on the block alone, which is a fresh accelerator with a seed of its own: totals and the first difference
+ * do not depend on the number of processes. */
+#ifndef SPIKEFIELD_SIM_LOCKSTEP_H
+#define SPIKEFIELD_SIM_LOCKSTEP_H
+#include "sim/cosim.h"
+#include "spikefield/scene.h"
+#include <stdio.h>
+
+typedef struct sf_lockstep_options {
+  const char *scene, *data;
+  const char *split;                    /* "test", "train" */
+  uint64_t seed, limit;                 /* limit: no block begins after this many samples; 0 = none */
+  int rays, block, stall_percent, jobs; /* block: rays per block */
+  const char *plusarg;                  /* NULL or text */
+  const char *checkpoint; /* file of the finished blocks: begun anew where it is missing, continued where it is there;
+                             or NULL */
+  const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst */
+} sf_lockstep_options;
+
+typedef struct sf_lockstep {
+  sf_lockstep_options options;
+  fx_scene fx;
+  sf_dataset data;
+  uint64_t blocks; /* finished */
+  uint64_t rays;
+  sf_cosim_totals sum;
+  uint64_t energy_core_fj, energy_rtl_fj;
+  sf_cosim_place place; /* found: the first difference */
+  sf_replay replay;     /* of it */
+  bool replays;         /* the samples of the replay file show it */
+  bool partial;         /* the last blocks were interrupted; no checkpoint is written of them */
+  bool complete;        /* every ray, or the limit */
+  uint64_t resumed;     /* samples that the checkpoint brought along */
+  void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
+  void *user;
+  double saved;      /* time of the last checkpoint */
+  char identity[65]; /* of program, scene, data and options: a checkpoint is continued by nothing else */
+  sf_status trouble; /* what ended it */
+} sf_lockstep;
+
+sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);
+/* SF_E_DIFFERENCE: `place` says where and the evidence is written. SF_E_STOPPED: interrupted, the totals are of what
+ * was compared until then. */
+sf_status sf_lockstep_run(sf_lockstep *lockstep);
+/* View and pixel of a ray. */
+typedef struct sf_lockstep_pixel {
+  int view, x, y;
+} sf_lockstep_pixel;
+sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *lockstep, uint64_t ray);
+void sf_lockstep_free(sf_lockstep *lockstep);
+
+/* ---- reports ---- */
+
+/* "ray 3 (view r_1, pixel 2,7) sample 5: layer C2 ...: expected 1, actual 0, cycle 21676" */
+sf_status sf_lockstep_difference(const sf_lockstep *lockstep, const sf_status *status);
+cJSON *sf_lockstep_json(const sf_lockstep *lockstep, const sf_status *status, double seconds);
+void sf_lockstep_print(FILE *out, const sf_lockstep *lockstep, double seconds);
+/* One test suite: outputs, spikes, membranes, rows, counters, energy of this run. */
+sf_status sf_lockstep_junit(const sf_lockstep *lockstep, const sf_status *status, double seconds, const char *path);
+/* ", layer C2 step 1 neuron 64 row: expected 1, actual 0, cycle 20517" without the comma; text[200]. */
+void sf_difference_text(const sf_difference *difference, char text[200]);
+#endif

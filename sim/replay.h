@@ -1,0 +1,42 @@
+/* The few samples that show a difference, as a file that needs nothing but the scene. */
+#ifndef SPIKEFIELD_SIM_REPLAY_H
+#define SPIKEFIELD_SIM_REPLAY_H
+#include "sim/compare.h"
+#include <cjson/cJSON.h>
+
+enum { SF_REPLAY_MAX = 128 };
+
+typedef struct sf_replay_sample {
+  uint64_t ray, sample; /* for the reader: `sample` counts from 0 along the ray */
+  bool first;           /* the direction is sent with it */
+  int16_t dir[SF_DIR_MAX], f[SF_FEATURE_MAX];
+} sf_replay_sample;
+
+typedef struct sf_replay {
+  uint64_t seed; /* of stalls and register contents at power-on */
+  int stall_percent;
+  char plusarg[64]; /* "" for none */
+  int count;
+  sf_replay_sample sample[SF_REPLAY_MAX];
+} sf_replay;
+
+/* What came of it. */
+typedef struct sf_replayed {
+  bool differs;
+  int at;             /* index of the sample that differs; the last one for a counter */
+  sf_difference what; /* wire NULL: the accelerator gave no result, and `message` says how */
+  char message[400];
+} sf_replayed;
+
+/* On a fresh accelerator: samples, then counters. wave: FST file of the last two samples alone, or NULL. */
+sf_status sf_replay_run(const sf_replay *replay, const fx_net *net, const char *wave, sf_replayed *replayed);
+/* Leaves the fewest samples, ending with the last one, that still differ: 2, 4, 8... of them. False when not even all
+ * of them do. */
+sf_status sf_replay_shrink(sf_replay *replay, const fx_net *net, bool *differs);
+
+/* JSON: scene path and SHA-256, seed, stalls, samples. `difference`, which may be NULL, is for the reader and is freed.
+ */
+sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path);
+/* Checks every field; the scene must have the same contents still. *scene: malloc'ed path. */
+sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path);
+#endif

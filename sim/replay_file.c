@@ -1,0 +1,164 @@
+/* Replay files. */
+#include "sim/replay.h"
+#include "spikefield/audit.h"
+#include "spikefield/io.h"
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FORMAT "spikefield replay 1"
+enum { INPUT_MAX = (1 << (SF_INPUT_BITS - 1)) - 1 };
+
+static cJSON *values_json(const int16_t *value, int n)
+{
+  cJSON *array = cJSON_CreateArray();
+  for (int i = 0; i < n; i++) cJSON_AddItemToArray(array, cJSON_CreateNumber(value[i]));
+  return array;
+}
+
+static cJSON *sample_json(const sf_replay_sample *s)
+{
+  cJSON *json = cJSON_CreateObject();
+  sf_json_add_u64(json, "ray", s->ray);
+  sf_json_add_u64(json, "sample", s->sample);
+  cJSON_AddBoolToObject(json, "first", s->first);
+  cJSON_AddItemToObject(json, "direction", values_json(s->dir, SF_DIR_MAX));
+  cJSON_AddItemToObject(json, "features", values_json(s->f, SF_FEATURE_MAX));
+  return json;
+}
+
+/* The seed is text: a JSON number would lose its last bits. */
+static cJSON *replay_json(const sf_replay *replay, const char *scene, const char *hash)
+{
+  char seed[32];
+  cJSON *json = cJSON_CreateObject();
+  snprintf(seed, sizeof seed, "%" PRIu64, replay->seed);
+  cJSON_AddStringToObject(json, "format", FORMAT);
+  cJSON_AddStringToObject(json, "scene", scene);
+  cJSON_AddStringToObject(json, "scene_sha256", hash);
+  cJSON_AddStringToObject(json, "seed", seed);
+  cJSON_AddNumberToObject(json, "stall_percent", replay->stall_percent);
+  cJSON_AddStringToObject(json, "plusarg", replay->plusarg);
+  cJSON *samples = cJSON_AddArrayToObject(json, "samples");
+  for (int i = 0; i < replay->count; i++) cJSON_AddItemToArray(samples, sample_json(&replay->sample[i]));
+  return json;
+}
+
+sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path)
+{
+  char hash[65], *whole = realpath(scene, NULL);
+  sf_status status = sf_sha256_file(scene, hash);
+  if (!whole && status.code == SF_OK) status = sf_fail(SF_E_IO, "%s: %s", scene, strerror(errno));
+  if (status.code != SF_OK) {
+    cJSON_Delete(difference);
+    free(whole);
+    return status;
+  }
+  cJSON *json = replay_json(replay, whole, hash);
+  if (difference) cJSON_AddItemToObject(json, "difference", difference);
+  status = sf_json_save(json, path);
+  cJSON_Delete(json);
+  free(whole);
+  return status;
+}
+
+/* ---- loading ---- */
+
+static sf_status text_field(const cJSON *json, const char *path, const char *key, const char **text)
+{
+  *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, key));
+  return *text ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: %s is missing or no text", path, key);
+}
+
+static sf_status int_field(const cJSON *json, const char *path, const char *key, double max, double *value)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  *value = item ? item->valuedouble : -1;
+  if (cJSON_IsNumber(item) && *value >= 0 && *value <= max && *value == (double)(uint64_t)*value) return sf_ok();
+  return sf_fail(SF_E_FORMAT, "%s: %s is missing or no integer of 0..%.0f", path, key, max);
+}
+
+static sf_status load_values(const cJSON *json, const char *path, const char *key, int n, int16_t *value)
+{
+  const cJSON *array = cJSON_GetObjectItemCaseSensitive(json, key), *item;
+  int i = 0;
+  if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) != n)
+    return sf_fail(SF_E_FORMAT, "%s: %s of a sample is no array of %d values", path, key, n);
+  cJSON_ArrayForEach(item, array)
+  {
+    if (!cJSON_IsNumber(item) || item->valuedouble != item->valueint || abs(item->valueint) > INPUT_MAX)
+      return sf_fail(SF_E_FORMAT, "%s: %s of a sample: value %d is no integer of -%d..%d", path, key, i, INPUT_MAX,
+                     INPUT_MAX);
+    value[i++] = (int16_t)item->valueint;
+  }
+  return sf_ok();
+}
+
+static sf_status load_sample(const cJSON *json, const char *path, sf_replay_sample *s)
+{
+  double ray, sample;
+  SF_TRY(int_field(json, path, "ray", 0x1p53, &ray));
+  SF_TRY(int_field(json, path, "sample", 0x1p53, &sample));
+  s->ray = (uint64_t)ray;
+  s->sample = (uint64_t)sample;
+  s->first = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "first"));
+  SF_TRY(load_values(json, path, "direction", SF_DIR_MAX, s->dir));
+  return load_values(json, path, "features", SF_FEATURE_MAX, s->f);
+}
+
+static sf_status load_samples(const cJSON *json, const char *path, sf_replay *replay)
+{
+  const cJSON *samples = cJSON_GetObjectItemCaseSensitive(json, "samples"), *item;
+  const int n = cJSON_IsArray(samples) ? cJSON_GetArraySize(samples) : 0;
+  if (n < 1 || n > SF_REPLAY_MAX) return sf_fail(SF_E_FORMAT, "%s: samples is no array of 1..%d", path, SF_REPLAY_MAX);
+  cJSON_ArrayForEach(item, samples) SF_TRY(load_sample(item, path, &replay->sample[replay->count++]));
+  return sf_ok();
+}
+
+static sf_status load_run(const cJSON *json, const char *path, sf_replay *replay)
+{
+  const char *format, *seed, *plusarg;
+  double stalls;
+  char *end;
+  SF_TRY(text_field(json, path, "format", &format));
+  if (strcmp(format, FORMAT) != 0)
+    return sf_fail(SF_E_FORMAT, "%s: format is '%.40s', expected '" FORMAT "'", path, format);
+  SF_TRY(text_field(json, path, "seed", &seed));
+  errno = 0;
+  replay->seed = strtoull(seed, &end, 10);
+  if (*seed < '0' || *seed > '9' || *end || errno)
+    return sf_fail(SF_E_FORMAT, "%s: seed is '%.40s', no integer", path, seed);
+  SF_TRY(int_field(json, path, "stall_percent", 90, &stalls));
+  replay->stall_percent = (int)stalls;
+  SF_TRY(text_field(json, path, "plusarg", &plusarg));
+  if (strlen(plusarg) >= sizeof replay->plusarg) return sf_fail(SF_E_FORMAT, "%s: plusarg is too long", path);
+  strcpy(replay->plusarg, plusarg);
+  return load_samples(json, path, replay);
+}
+
+static sf_status same_scene(const cJSON *json, const char *path, char **scene)
+{
+  const char *name, *expected;
+  char hash[65];
+  SF_TRY(text_field(json, path, "scene", &name));
+  SF_TRY(text_field(json, path, "scene_sha256", &expected));
+  SF_TRY(sf_sha256_file(name, hash));
+  if (strcmp(hash, expected) != 0)
+    return sf_fail(SF_E_FORMAT, "%s: the scene has changed: %s has SHA-256 %.12s..., the replay is of %.12s...", path,
+                   name, hash, expected);
+  *scene = strdup(name);
+  return *scene ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: out of memory", path);
+}
+
+sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path)
+{
+  cJSON *json;
+  memset(replay, 0, sizeof *replay);
+  *scene = NULL;
+  SF_TRY(sf_json_load(path, &json));
+  sf_status status = load_run(json, path, replay);
+  if (status.code == SF_OK) status = same_scene(json, path, scene);
+  cJSON_Delete(json);
+  return status;
+}

@@ -1,0 +1,118 @@
+#!/bin/bash
+# sf_cosim over several processes, interrupted, continued, replayed: always the same result. usage: cosim_split.sh BUILD
+set -u
+here=$(cd "$(dirname "$0")" && pwd)
+build=$(cd "$1" && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_split.XXXXXX") || exit 1
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+# alive PID: a zombie that nobody has waited for has ended
+alive() { ps -o stat= -p "$1" | grep -qv Z; }
+
+"$build/faults/make_scene" scene.snn || exit 1
+"$build/bin/sf_scene" simple -o data --size 32 --train 1 --test 2 >/dev/null || exit 1
+
+# cosim NAME STATUS ARGS...: JSON without what may differ in NAME.json, message in NAME.err
+cosim() {
+  local name=$1 want=$2 got
+  "$build/faults/sf_cosim" scene.snn data --quiet --json --evidence evidence "${@:3}" 2>"$name.err" >"$name.all"
+  got=$?
+  grep -Ev '"(seconds|jobs)":' "$name.all" >"$name.json"
+  [ $got -eq "$want" ] || fail "$*: exit status $got, expected $want: $(cat "$name.err")"
+}
+
+# ---- any number of processes: totals, and the first difference, which is of the fourth block ----
+for jobs in 1 2 3; do
+  cosim equal$jobs 0 --rays 60 --block 7 --jobs $jobs
+  cosim limit$jobs 0 --rays 1000 --block 7 --jobs $jobs --limit-samples 500
+  cosim fault$jobs 1 --rays 200 --block 2 --seed 11 --jobs $jobs --plusarg +fault=3
+  cp evidence.json fault$jobs.replay
+  cp evidence.fst fault$jobs.fst
+  for case in equal limit fault; do
+    cmp -s $case$jobs.json ${case}1.json || fail "$case: $jobs processes give another result"
+  done
+  cmp -s fault$jobs.replay fault1.replay || fail "$jobs processes give another replay file"
+done
+grep -q '"samples":[[:space:]]*[1-9]' equal1.json || fail "nothing was compared"
+[ "$(sed -nE 's/.*"ray":[[:space:]]*([0-9]+).*/\1/p' fault1.json)" -ge 2 ] || fail "the difference is in the first block"
+grep -q '"replay_shows_it":[[:space:]]*true' fault1.json || fail "the replay file does not show the difference"
+
+# ---- replay: the same difference from the file alone, from another folder, on a fault build without options ----
+mkdir elsewhere
+(cd elsewhere && "$build/faults/sf_cosim" --replay ../fault1.replay) 2>replay.err
+[ $? -eq 1 ] || fail "replay: no difference"
+what() { sed -E 's/.*(ray [0-9]+).*(sample [0-9]+: .*), cycle.*/\1 \2/' "$1"; }
+[ "$(what replay.err | sed -E 's/expected.*//')" = "$(what fault1.err | sed -E 's/expected.*//')" ] ||
+  fail "replay: '$(cat replay.err)' is not '$(cat fault1.err)'"
+[ -s elsewhere/sf_cosim-difference.fst ] || fail "replay: no waveform"
+# Without the fault there is nothing to be seen.
+sed 's/+fault=3/+fault=0/' fault1.replay >repaired.replay
+"$build/faults/sf_cosim" --replay repaired.replay >replay.out 2>&1 || fail "repaired: $(cat replay.out)"
+# The waveform is of the last two samples: that of 41 samples is not much larger than that of one or two.
+cosim near 1 --rays 60 --seed 7 --plusarg +fault=2
+[ "$(stat -c %s fault1.fst)" -lt $((6 * $(stat -c %s evidence.fst))) ] || fail "the waveform is of more than the last samples"
+
+# refused STATUS TEXT ARGS...
+refused() {
+  "$build/faults/sf_cosim" "${@:3}" >refused.out 2>&1
+  [ $? -eq "$1" ] || fail "${*:3}: exit status is not $1"
+  grep -qF -- "$2" refused.out || fail "${*:3}: '$2' is not in $(cat refused.out)"
+}
+refused 2 "--replay" scene.snn --replay fault1.replay
+refused 1 "nowhere.json" --replay nowhere.json
+sed 's/"seed":.*/"seed": "12x",/' fault1.replay >bad.replay && refused 1 "seed" --replay bad.replay
+sed 's/"stall_percent":.*/"stall_percent": 91,/' fault1.replay >bad.replay && refused 1 "stall_percent" --replay bad.replay
+sed -E 's/("features":[[:space:]]*\[)-?[0-9]+/\14000/' fault1.replay >bad.replay && refused 1 "features" --replay bad.replay
+head -c 700 fault1.replay >bad.replay && refused 1 "bad.replay" --replay bad.replay
+cp scene.snn kept.snn && printf x >>scene.snn
+refused 1 "the scene has changed" --replay fault1.replay
+mv kept.snn scene.snn
+
+# ---- interrupted: no process stays, what was compared is told; continued: as if it had not been ----
+"$build/faults/sf_cosim" scene.snn data --rays 100000 --block 2 --jobs 3 --quiet --json --checkpoint part >stopped.json 2>stopped.err &
+parent=$!
+for ((i = 0; i < 100; i++)); do [ "$(ps -o pid= --ppid $parent | wc -l)" -eq 3 ] && break; sleep 0.1; done
+children=$(ps -o pid= --ppid $parent)
+sleep 0.7
+kill -INT $parent
+wait $parent
+[ $? -eq 130 ] || fail "interrupted: exit status is not 130"
+for child in $children; do alive "$child" && fail "interrupted: process $child is still there"; done
+grep -q '"complete":[[:space:]]*false' stopped.json || fail "interrupted: no partial totals"
+grep -q 'samples equal; the same command goes on from part' stopped.err || fail "interrupted: $(cat stopped.err)"
+done=$(sed -nE 's/.*stopped after ([0-9]+) of.*/\1/p' stopped.err)
+[ "${done:-0}" -gt 0 ] || fail "interrupted: nothing was done"
+limit=$((20 * done + 300))
+cosim part 0 --rays 100000 --block 2 --jobs 2 --limit-samples $limit --checkpoint part
+cosim whole 0 --rays 100000 --block 2 --jobs 3 --limit-samples $limit
+cmp -s part.json whole.json || fail "an interrupted run that was continued differs"
+cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
+grep -q "part: checkpoint of another" other.err || fail "another run's checkpoint: $(cat other.err)"
+
+# ---- killed outright: the processes end, too ----
+"$build/faults/sf_cosim" scene.snn data --rays 100000 --jobs 2 --quiet >/dev/null 2>&1 &
+parent=$!
+for ((i = 0; i < 100; i++)); do [ "$(ps -o pid= --ppid $parent | wc -l)" -eq 2 ] && break; sleep 0.1; done
+children=$(ps -o pid= --ppid $parent)
+{ kill -KILL $parent && wait $parent; } 2>/dev/null
+sleep 0.5
+for child in $children; do alive "$child" && fail "killed: process $child is still there"; done
+
+# ---- the campaign: every seed its share, totals, JUnit; what is finished is not run again ----
+campaign() { JOBS=2 "$here/../tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
+mkdir -p b/bin && ln -s "$build/faults/sf_cosim" b/bin/sf_cosim
+campaign || fail "campaign: $(cat campaign.out)"
+total=$(sed -nE 's/^([0-9]+) samples over 2 seeds, stalls 20 %, 0 differences.*/\1/p' campaign.out)
+[ "${total:-0}" -ge 400 ] || fail "campaign: $(cat campaign.out)"
+[ "$(grep -c '<testcase.*/testcase>' b/cosim/campaign.xml)" -eq 2 ] || fail "campaign: JUnit"
+campaign && [ "$(grep -c 'done before' campaign.out)" -eq 2 ] || fail "campaign: finished seeds are run again"
+
+[ $failures -eq 0 ] && echo "1, 2, 3 processes, interrupted, continued and replayed: the same result"
+exit $((failures > 0))

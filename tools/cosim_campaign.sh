@@ -1,0 +1,55 @@
+#!/bin/bash
+# Co-simulates SAMPLES samples, shared by the SEEDS, with stalls; JSON and JUnit XML in BUILD/cosim.
+# usage: cosim_campaign.sh BUILD SCENE DATA SAMPLES "SEEDS" [STALLS]
+# Interrupted, the same command goes on. A seed that is finished is not run again while program, scene and options are the same.
+set -u
+build=$1 scene=$2 data=$3 samples=$4 seeds=$5 stalls=${6:-20}
+out=$build/cosim
+jobs=${JOBS:-$(nproc)}
+program=$build/bin/sf_cosim
+read -ra seed <<<"$seeds"
+[ ${#seed[@]} -gt 0 ] && [ "$samples" -gt 0 ] || { echo "cosim_campaign: SAMPLES or SEEDS is empty" >&2; exit 2; }
+each=$(((samples + ${#seed[@]} - 1) / ${#seed[@]}))
+mkdir -p "$out" || exit 1
+field() { sed -nE "s/^\t\"$2\":\t([^,]*).*/\1/p" "$1"; }
+
+failed=0
+for s in "${seed[@]}"; do
+  key=$(sha256sum "$program" "$scene" | cut -c1-64 | tr '\n' ' ')"$data $s $each $stalls"
+  if [ "$(cat "$out/seed-$s.key" 2>/dev/null)" != "$key" ]; then
+    rm -f "$out/seed-$s".*
+    printf '%s' "$key" >"$out/seed-$s.key"
+  fi
+  [ -e "$out/seed-$s.done" ] && { echo "seed $s: done before"; continue; }
+  "$program" "$scene" "$data" --rays 1000000000 --limit-samples "$each" --seed "$s" --stalls "$stalls" --jobs "$jobs" \
+    --checkpoint "$out/seed-$s.part" --evidence "$out/seed-$s-difference" --junit "$out/seed-$s.xml" --json >"$out/seed-$s.json"
+  status=$?
+  [ $status -eq 130 ] && { echo "stopped; the same command goes on"; exit 130; }
+  if [ $status -ne 0 ]; then
+    failed=$((failed + 1))
+    [ -s "$out/seed-$s.json" ] || exit $status
+    continue
+  fi
+  touch "$out/seed-$s.done"
+done
+
+total=0 differences=0
+{
+  echo '<?xml version="1.0" encoding="UTF-8"?>'
+  echo '<testsuites>'
+  for s in "${seed[@]}"; do sed 1d "$out/seed-$s.xml"; done
+  echo '</testsuites>'
+} >"$out/campaign.xml"
+for s in "${seed[@]}"; do
+  n=$(field "$out/seed-$s.json" samples) d=$(field "$out/seed-$s.json" differences)
+  echo "seed $s: $n samples, $d differences, $(field "$out/seed-$s.json" cycles) cycles"
+  total=$((total + n)) differences=$((differences + d))
+done
+{
+  printf '{"samples": %d, "differences": %d, "stall_percent": %d, "seeds": [\n' $total $differences "$stalls"
+  comma=
+  for s in "${seed[@]}"; do printf '%s' "$comma"; cat "$out/seed-$s.json"; comma=,; done
+  echo ']}'
+} >"$out/campaign.json"
+echo "$total samples over ${#seed[@]} seeds, stalls $stalls %, $differences differences: $out/campaign.json, $out/campaign.xml"
+[ $failed -eq 0 ]
