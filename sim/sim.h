@@ -15,6 +15,8 @@ struct sf_dut {
   bool bus_hung;        /* a register access was never answered */
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   fx_net net;           /* sizes of the loaded net */
+  void (*each_cycle)(void *context); /* a system around the accelerator moves its streams here; or NULL */
+  void *each_cycle_context;
 };
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */
