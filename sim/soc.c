@@ -2,6 +2,8 @@
 #include "firmware/sf_soc.h"
 #include "sim/soc_stream.h"
 #include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <unicorn/unicorn.h>
@@ -16,23 +18,28 @@ struct sf_soc {
   uint8_t *ram;
   sf_soc_stream stream;
   sf_soc_totals total;
-  uint64_t next_tick;
+  uint64_t next_tick, block; /* where the block that runs begins */
   uint32_t entry, exit_status;
   bool off;
   sf_status trouble; /* the first */
 };
 
-static uint32_t pc(const sf_soc *soc)
-{
-  uint32_t value = 0;
-  uc_reg_read(soc->uc, UC_RISCV_REG_PC, &value);
-  return value;
-}
-
+/* The first reason counts. */
 static void stop(sf_soc *soc, sf_status why)
 {
   if (soc->trouble.code == SF_OK) soc->trouble = why;
   uc_emu_stop(soc->uc);
+}
+
+/* The program's fault, and where: Unicorn knows its place exactly only from one block of code to the next. */
+static void __attribute__((format(printf, 2, 3))) blame(sf_soc *soc, const char *format, ...)
+{
+  char what[200];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(what, sizeof what, format, args);
+  va_end(args);
+  stop(soc, sf_fail(SF_E_UNSUPPORTED, "firmware: %s, in the block of code at 0x%08" PRIx64, what, soc->block));
 }
 
 /* ---- devices ---- */
@@ -40,8 +47,7 @@ static void stop(sf_soc *soc, sf_status why)
 static bool whole_word(sf_soc *soc, const char *device, uint64_t offset, unsigned size)
 {
   if (size == ACCESS_BYTES && offset % ACCESS_BYTES == 0) return true;
-  stop(soc, sf_fail(SF_E_UNSUPPORTED, "firmware: %s: access of %u bytes at offset 0x%" PRIx64 ", only whole words",
-                    device, size, offset));
+  blame(soc, "%s: access of %u bytes at offset 0x%" PRIx64 ", only whole words", device, size, offset);
   return false;
 }
 
@@ -75,9 +81,7 @@ static void accelerator_write(uc_engine *uc, uint64_t offset, unsigned size, uin
 
 static void check_stream(sf_soc *soc, uint64_t offset)
 {
-  if (soc->stream.fault)
-    stop(soc,
-         sf_fail(SF_E_UNSUPPORTED, "firmware: stream FIFOs, offset 0x%02" PRIx64 ": %s", offset, soc->stream.fault));
+  if (soc->stream.fault) blame(soc, "stream FIFOs, offset 0x%02" PRIx64 ": %s", offset, soc->stream.fault);
 }
 
 static uint64_t stream_read(uc_engine *uc, uint64_t offset, unsigned size, void *user)
@@ -112,8 +116,7 @@ static void uart_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t v
   (void)uc;
   sf_soc *soc = user;
   if (!whole_word(soc, "UART", offset, size) || !soc->options.uart) return;
-  if (!soc->options.uart(soc->options.user, (char)value))
-    stop(soc, sf_fail(SF_E_UNSUPPORTED, "firmware: endless output"));
+  if (!soc->options.uart(soc->options.user, (char)value)) blame(soc, "endless output");
 }
 
 static void power_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user)
@@ -130,13 +133,13 @@ static void power_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t 
 /* Counts instructions block by block: a block that an access ends early counts whole. */
 static void on_block(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
-  (void)uc, (void)address;
+  (void)uc;
   sf_soc *soc = user;
   const sf_soc_options *o = &soc->options;
+  soc->block = address;
   soc->total.instructions += size / INSTRUCTION_BYTES;
   if (o->instructions && soc->total.instructions > o->instructions)
-    stop(soc, sf_fail(SF_E_UNSUPPORTED, "firmware: no end after %" PRIu64 " instructions, at 0x%08" PRIx64,
-                      soc->total.instructions, address));
+    blame(soc, "no end after %" PRIu64 " instructions", soc->total.instructions);
   if (soc->total.instructions < soc->next_tick) return;
   soc->next_tick = soc->total.instructions + TICK_INSTRUCTIONS;
   if (o->tick && !o->tick(o->user, soc->total.instructions))
@@ -150,7 +153,7 @@ static void on_trap(uc_engine *uc, uint32_t cause, void *user)
   static const char *const name[] = {"misaligned fetch", "fetch fault", "illegal instruction", "breakpoint",
                                      "misaligned load",  "load fault",  "misaligned store",    "store fault"};
   const char *text = cause < sizeof name / sizeof *name ? name[cause] : cause <= 11 ? "environment call" : "interrupt";
-  stop(soc, sf_fail(SF_E_UNSUPPORTED, "firmware: trap: %s (cause %" PRIu32 ") at 0x%08" PRIx32, text, cause, pc(soc)));
+  blame(soc, "trap: %s (cause %" PRIu32 ")", text, cause);
 }
 
 static bool on_bad_access(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
@@ -160,9 +163,7 @@ static bool on_bad_access(uc_engine *uc, uc_mem_type type, uint64_t address, int
   const char *what = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT   ? "fetch"
                      : type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT ? "store"
                                                                                   : "load";
-  stop(soc,
-       sf_fail(SF_E_UNSUPPORTED, "firmware: %s of %d bytes at 0x%08" PRIx64 ", where there is nothing, by 0x%08" PRIx32,
-               what, size, address, pc(soc)));
+  blame(soc, "%s of %d bytes at 0x%08" PRIx64 ", where there is nothing", what, size, address);
   return false;
 }
 
@@ -260,11 +261,12 @@ uint8_t *sf_soc_memory(sf_soc *soc, uint32_t address, uint64_t size)
 sf_status sf_soc_run(sf_soc *soc, uint32_t *exit_status)
 {
   const uc_err err = uc_emu_start(soc->uc, soc->entry, nowhere, 0, 0);
-  if (soc->trouble.code != SF_OK) return soc->trouble;
-  if (err != UC_ERR_OK) return sf_fail(SF_E_UNSUPPORTED, "firmware: %s at 0x%08" PRIx32, uc_strerror(err), pc(soc));
-  if (!soc->off) return sf_fail(SF_E_UNSUPPORTED, "firmware: sleeps for ever at 0x%08" PRIx32, pc(soc));
+  if (err != UC_ERR_OK)
+    blame(soc, "%s", uc_strerror(err));
+  else if (!soc->off)
+    blame(soc, "sleeps for ever");
   *exit_status = soc->exit_status;
-  return sf_ok();
+  return soc->trouble;
 }
 
 sf_soc_totals sf_soc_total(const sf_soc *soc)
