@@ -48,9 +48,15 @@ CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 
-TOOLS := $(patsubst tools/%.c,%,$(wildcard tools/*.c))
-TESTS := $(patsubst tests/%.c,%,$(wildcard tests/test_*.c))
-DUT_TOOLS := sf_cosim sim_render energy_audit
+# Without Unicorn (libunicorn-dev) there is no emulated system to run the firmware on, without the cross compiler no
+# firmware; the rest is whole. SOC_MISSING says what is not there.
+RISCV ?= riscv64-unknown-elf-
+UNICORN_LIBS := $(shell pkg-config --libs unicorn 2>/dev/null)
+SOC_MISSING := $(strip $(if $(UNICORN_LIBS),,libunicorn-dev) $(if $(shell command -v $(RISCV)gcc),,$(RISCV)gcc))
+NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc)
+TOOLS := $(filter-out $(NO_SOC),$(patsubst tools/%.c,%,$(wildcard tools/*.c)))
+TESTS := $(filter-out $(NO_SOC),$(patsubst tests/%.c,%,$(wildcard tests/test_*.c)))
+DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
 DUT_TESTS := test_rtl
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
@@ -95,6 +101,9 @@ include src/lib/lib.mk
 # File readers under fuzzing.
 include tests/fuzz/fuzz.mk
 
+# The driver's program for RV32IM, and the emulated system that runs it.
+include firmware/firmware.mk
+
 # Programs. Those of DUT_TOOLS drive the Verilated accelerator; the others link the library alone.
 $(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)
@@ -122,7 +131,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults cosim_split install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults cosim_split firmware install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays

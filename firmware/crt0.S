@@ -1,4 +1,5 @@
-# Stack, zeroed .bss, main, then sleep for good.
+# Stack, zeroed .bss, main; its result to the power register, then sleep for good.
+#include "firmware/sf_soc.h"
   .section .text.start
   .globl _start
 _start:
@@ -12,6 +13,8 @@ _start:
   j 1b
 2:
   call main
+  li t0, SF_SOC_POWER
+  sw a0, 0(t0)
 3:
   wfi
   j 3b

@@ -1,18 +1,18 @@
-/* Bare-metal program for RV32IM: programs the accelerator from a net in memory, pushes samples through it by a
- * memory-mapped stream window, prints results and the audit's counters over a UART register.
- * The addresses are those of the reference system-on-chip; link.ld places the memory. */
-#include "firmware/sf_blob.h"
+/* Renders a tile: takes scene and rays from the image in memory, programs the accelerator, walks every ray with the
+ * fixed-point core's own marching, grid and compositing (src/fx) while the accelerator computes the nets, leaves the
+ * pixels behind the image and prints the audit: the accelerator's counters, their energy, a checksum of the picture.
+ * Whatever goes wrong is one line that begins with "error: ", and exit status 1. */
+#include "firmware/sf_soc.h"
+#include "firmware/sf_stream.h"
+#include "firmware/sf_tile.h"
+#include "firmware/sf_uart.h"
 
-enum { ACCELERATOR = 0x40000000, STREAM = 0x40010000, UART = 0x40020000 };
-/* Stream window, 32-bit registers: writes of LOW, HIGH prepare a beat, CONTROL sends it (bit 0 tuser, bit 1 tlast);
- * STATUS bit 0: ready for a beat, bit 1: a result beat waits in RESULT_LOW, RESULT_HIGH; reading HIGH takes it. */
-enum { LOW = 0x0, HIGH = 0x4, CONTROL = 0x8, STATUS = 0xc, RESULT_LOW = 0x10, RESULT_HIGH = 0x14 };
-enum { CAN_SEND = 1, HAS_RESULT = 2, FIRST = 1, LAST = 2, PACKET_BEATS_MAX = (SF_DIR_MAX + SF_FEATURE_MAX) / 4 };
+enum { MAC_FJ = 4600, SOP_FJ = 900 }; /* as spikefield/audit.h */
 
-/* Placed by the loader: the net, then packets: word 0 beats (0 ends the list), word 1 tuser, then 2 words per beat. */
-extern const uint8_t sf_net_image[];
-extern const uint32_t sf_net_image_size;
-extern const uint32_t sf_packets[];
+typedef struct eval {
+  sf_stream stream;
+  sf_driver_code code;
+} eval;
 
 static uint32_t mmio_read(void *context, uint32_t offset)
 {
@@ -24,93 +24,105 @@ static void mmio_write(void *context, uint32_t offset, uint32_t value)
   *(volatile uint32_t *)((uintptr_t)context + offset) = value;
 }
 
-static const sf_bus accelerator = {mmio_read, mmio_write, (void *)ACCELERATOR};
-static const sf_bus stream = {mmio_read, mmio_write, (void *)STREAM};
+static const sf_bus accelerator = {mmio_read, mmio_write, (void *)SF_SOC_ACCELERATOR};
+static const sf_bus stream = {mmio_read, mmio_write, (void *)SF_SOC_STREAM};
 
-static uint32_t get(const sf_bus *bus, uint32_t offset)
+static int fail(const char *what, const char *why, const char *detail)
 {
-  return bus->read(bus->context, offset);
-}
-static void put(const sf_bus *bus, uint32_t offset, uint32_t value)
-{
-  bus->write(bus->context, offset, value);
-}
-
-static void print(const char *text)
-{
-  while (*text) mmio_write((void *)UART, 0, (uint32_t)*text++);
+  sf_uart_text("error: ");
+  sf_uart_text(what);
+  sf_uart_text(": ");
+  sf_uart_text(why);
+  if (detail) sf_uart_text(": "), sf_uart_text(detail);
+  sf_uart_text("\n");
+  return 1;
 }
 
-static void print_hex(const char *label, uint64_t value)
+/* A device that was found has an ERROR register to say more. */
+static int fail_driver(const char *what, sf_driver_code code)
 {
-  print(label);
-  for (int shift = 60; shift >= 0; shift -= 4)
-    mmio_write((void *)UART, 0, (uint32_t) "0123456789abcdef"[value >> shift & 15]);
-  print("\n");
+  const bool found = code == SF_DRIVER_REFUSED || code == SF_DRIVER_TIMEOUT;
+  const uint32_t error = found ? accelerator.read(accelerator.context, SF_CSR_ERROR) : 0;
+  return fail(what, sf_driver_text(code), error ? sf_driver_error_text(error) : NULL);
 }
 
-static void send(const uint32_t *packet)
+/* fx_net_fn: the accelerator in the place of fx_net_sample. */
+static sf_status accelerate(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
-  const uint32_t beats = packet[0] < PACKET_BEATS_MAX ? packet[0] : PACKET_BEATS_MAX;
-  for (uint32_t i = 0; i < beats; i++) {
-    while (!(get(&stream, STATUS) & CAN_SEND)) continue;
-    put(&stream, LOW, packet[2 + 2 * i]);
-    put(&stream, HIGH, packet[3 + 2 * i]);
-    put(&stream, CONTROL, (i == 0 && packet[1] ? FIRST : 0) | (i == beats - 1 ? LAST : 0));
-  }
+  eval *e = user;
+  uint32_t result[4];
+  sf_status status = sf_ok();
+  e->code = sf_stream_sample(&e->stream, first ? ray->dir : NULL, f, result);
+  if (e->code != SF_DRIVER_OK) status.code = SF_E_IO;
+  *out = (fx_out){result[0], {result[1], result[2], result[3]}};
+  return status;
 }
 
-static uint64_t receive_beat(void)
+static sf_driver_code render(const sf_tile *tile)
 {
-  while (!(get(&stream, STATUS) & HAS_RESULT)) continue;
-  const uint32_t low = get(&stream, RESULT_LOW);
-  return (uint64_t)get(&stream, RESULT_HIGH) << 32 | low;
+  eval e = {.stream = sf_stream_for(&stream, &tile->net)};
+  for (uint32_t i = 0; i < tile->width * tile->height; i++)
+    if (fx_render_ray(&tile->scene, &tile->rays[i], accelerate, &e, &tile->pixels[i], NULL).code != SF_OK) break;
+  return e.code;
 }
 
-static void run_samples(void)
-{
-  for (const uint32_t *packet = sf_packets; packet[0]; packet += 2 + 2 * packet[0]) {
-    send(packet);
-    print_hex("colour0.density ", receive_beat());
-    print_hex("colour2.colour1 ", receive_beat());
-  }
-}
-
-static uint64_t total(const sf_driver_counters *counters, int event)
+static uint64_t total(const sf_driver_counters *counters, int event, int layer)
 {
   uint64_t sum = 0;
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < SF_T_MAX; t++) sum += counters->event[event][l][t];
+  for (int t = 0; t < SF_T_MAX; t++) sum += counters->event[event][layer][t];
   return sum;
 }
 
-static void print_audit(const sf_driver_counters *counters)
+static void print_audit(const sf_driver_counters *counters, uint32_t rgba_crc)
 {
-  static const char *const name[SF_DRIVER_EVENTS] = {"mac     ", "sop     ", "spikes  ", "updates ",
-                                                     "weight  ", "state_r ", "state_w ", "special "};
-  for (int e = 0; e < SF_DRIVER_EVENTS; e++) print_hex(name[e], total(counters, e));
-  print_hex("samples ", counters->samples);
-  print_hex("cycles  ", counters->cycles);
+  static const char *const layer[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
+  static const char *const event[SF_DRIVER_EVENTS] = {" mac ",    " sop ",     " spikes ",  " updates ",
+                                                      " weight ", " state_r ", " state_w ", " special "};
+  uint64_t energy = 0;
+  for (int l = 0; l < SF_LAYERS; l++) {
+    sf_uart_text("audit ");
+    sf_uart_text(layer[l]);
+    for (int e = 0; e < SF_DRIVER_EVENTS; e++) sf_uart_number(event[e], total(counters, e, l));
+    sf_uart_text("\n");
+    energy += total(counters, 0, l) * MAC_FJ + total(counters, 1, l) * SOP_FJ;
+  }
+  sf_uart_number("audit samples ", counters->samples);
+  sf_uart_number(" rays ", counters->rays);
+  sf_uart_number("\naudit energy_fj ", energy);
+  sf_uart_hex("\naudit rgba_crc ", rgba_crc);
+  sf_uart_number("\ncycles ", counters->cycles);
+  sf_uart_number(" busy ", counters->busy);
+  sf_uart_text("\n");
+}
+
+static void print_tile(const sf_tile *tile)
+{
+  sf_uart_number("tile ", tile->width);
+  sf_uart_number(" x ", tile->height);
+  sf_uart_number(" pixels, ", (uint64_t)tile->net.steps);
+  sf_uart_number(" time steps, ", (uint64_t)tile->net.layer[0].n_in);
+  sf_uart_text(" features\n");
 }
 
 int main(void)
 {
   static sf_driver_counters counters;
-  sf_net_blob net;
-  if (sf_blob_open(sf_net_image, sf_net_image_size, &net)) {
-    print("no net in memory\n");
-    return 1;
-  }
+  static sf_tile tile;
+  sf_uart_text("spikefield firmware\n");
+  const char *why = sf_tile_open((uint8_t *)SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE, &tile);
+  if (why) return fail("image", why, NULL);
+  print_tile(&tile);
   sf_driver_code code = sf_driver_probe(&accelerator);
-  if (code == SF_DRIVER_OK) code = sf_driver_load(&accelerator, &net);
-  if (code == SF_DRIVER_OK) code = sf_driver_clear(&accelerator);
-  if (code == SF_DRIVER_OK) {
-    run_samples();
-    code = sf_driver_read_counters(&accelerator, &counters);
-  }
-  if (code == SF_DRIVER_OK)
-    print_audit(&counters);
-  else
-    print(sf_driver_text(code)), print("\n");
-  return code != SF_DRIVER_OK;
+  if (code != SF_DRIVER_OK) return fail_driver("probe", code);
+  code = sf_driver_load(&accelerator, &tile.net);
+  if (code != SF_DRIVER_OK) return fail_driver("load", code);
+  code = sf_driver_clear(&accelerator);
+  if (code != SF_DRIVER_OK) return fail_driver("clear counters", code);
+  code = render(&tile);
+  if (code != SF_DRIVER_OK) return fail_driver("render", code);
+  code = sf_driver_read_counters(&accelerator, &counters);
+  if (code != SF_DRIVER_OK) return fail_driver("read counters", code);
+  print_audit(&counters, sf_rgba_crc(tile.pixels, tile.width * tile.height));
+  sf_uart_text("done\n");
+  return 0;
 }

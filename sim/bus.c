@@ -8,6 +8,7 @@ void sf_dut_tick(sf_dut *dut)
 {
   sf_pins_cycle(dut->pins, &dut->in, &dut->out);
   dut->cycle++;
+  if (dut->each_cycle) dut->each_cycle(dut->each_cycle_context);
 }
 
 bool sf_dut_stalls(const sf_dut *dut, uint64_t which)

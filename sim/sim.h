@@ -16,6 +16,8 @@ struct sf_dut {
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   fx_net net;           /* sizes of the loaded net */
   int wave_from, received;
+  void (*each_cycle)(void *context); /* a system around the accelerator moves its streams here; or NULL */
+  void *each_cycle_context;
 };
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */

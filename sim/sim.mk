@@ -16,7 +16,8 @@ VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assig
   $(VERILATOR_UNROLL)
 VERILATED_OPT := OPT_FAST=-O2 OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(wildcard sim/*.c) firmware/sf_driver.c firmware/sf_blob.c)
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
+DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o)
 
 # $1 folder of the library, $2 folder that holds rtl/, $3 prerequisites
@@ -37,7 +38,7 @@ $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
 endef
 
-DUT_TESTS += test_rtl_ports test_rtl_hard
+DUT_TESTS += test_rtl_ports test_rtl_hard test_soc
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 
@@ -82,28 +83,3 @@ lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the R
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
-
-# Firmware: freestanding, RV32IM.
-RISCV ?= riscv64-unknown-elf-
-RISCV_FLAGS := -std=c11 -Os -Wall -Wextra -Wpedantic -Werror -march=rv32im_zicsr -mabi=ilp32 -mcmodel=medany -ffreestanding \
-  -ffunction-sections -fdata-sections $(ARCH_INCLUDE) -Iinclude -I.
-FIRMWARE_SRC := firmware/crt0.S firmware/images.S firmware/main.c firmware/sf_driver.c firmware/sf_blob.c
-FIRMWARE_OBJ := $(patsubst %,$B/%.rv32.o,$(basename $(FIRMWARE_SRC)))
-$B/firmware/%.rv32.o: firmware/%.c $(wildcard firmware/*.h) $(ARCH_DEF) include/spikefield/csr.def
-	@mkdir -p $(@D)
-	$(call say,RV32  $<)
-	$Q$(RISCV)gcc $(RISCV_FLAGS) -c $< -o $@
-$B/firmware/%.rv32.o: firmware/%.S
-	@mkdir -p $(@D)
-	$(call say,RV32  $<)
-	$Q$(RISCV)gcc $(RISCV_FLAGS) -c $< -o $@
-$B/firmware/sf_firmware.elf: $(FIRMWARE_OBJ) firmware/link.ld
-	$(call say,RV32  $@)
-	$Q$(RISCV)gcc -march=rv32im -mabi=ilp32 -nostdlib -static -Wl,--gc-sections -Wl,--no-warn-rwx-segments -T firmware/link.ld \
-	  -o $@ $(FIRMWARE_OBJ) -lgcc
-ifneq ($(shell command -v $(RISCV)gcc 2>/dev/null),)
-firmware: $B/firmware/sf_firmware.elf ## the driver and its bare-metal program for RV32IM
-else
-firmware:
-	@echo "  firmware: $(RISCV)gcc is not installed, skipped"
-endif

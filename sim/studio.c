@@ -1,5 +1,6 @@
 #include "sim/studio.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 const char *const sf_backend_names[] = {"float", "fixed", "rtl"};
@@ -100,4 +101,25 @@ void sf_shot_free(sf_shot *shot)
   sf_golden_free(&shot->golden);
   sf_dataset_free(&shot->data);
   shot->view = NULL;
+}
+
+static sf_status read_number(const char **text, char stop, int *value)
+{
+  char *end;
+  long n = strtol(*text, &end, 10);
+  if (end == *text || **text < '0' || **text > '9' || *end != stop || n > 1 << 24)
+    return sf_fail(SF_E_USAGE, "--crop expects X,Y,WIDTH,HEIGHT in whole pixels");
+  *value = (int)n;
+  *text = end + (stop != 0);
+  return sf_ok();
+}
+
+sf_status sf_window_parse(const char *text, sf_window *crop)
+{
+  SF_TRY(read_number(&text, ',', &crop->x));
+  SF_TRY(read_number(&text, ',', &crop->y));
+  SF_TRY(read_number(&text, ',', &crop->width));
+  SF_TRY(read_number(&text, 0, &crop->height));
+  if (crop->width < 1 || crop->height < 1) return sf_fail(SF_E_USAGE, "--crop is out of range: it has no pixels");
+  return sf_ok();
 }

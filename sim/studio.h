@@ -46,6 +46,9 @@ sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
 void sf_shot_free(sf_shot *shot);
 
+/* The argument of --crop: "X,Y,WIDTH,HEIGHT" with at least one pixel. SF_E_USAGE. */
+sf_status sf_window_parse(const char *text, sf_window *window);
+
 /* The accelerator makes the picture; the core walks along so that a difference is reported at its first sample, and for
  * what the accelerator does not do or count: marching, grid, saturation. */
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_dut *dut, sf_golden *golden);

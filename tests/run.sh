@@ -18,6 +18,7 @@ for name in "$@"; do
     pareto) command=("$here/test_pareto.sh" "$build") ;;
     fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
+    firmware) command=("$here/test_firmware.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
     cosim_split) command=("$here/cosim_split.sh" "$build") ;;

@@ -34,27 +34,6 @@ typedef struct job {
 
 /* ---- what to render ---- */
 
-static sf_status read_number(const char **text, char stop, int *value)
-{
-  char *end;
-  long n = strtol(*text, &end, 10);
-  if (end == *text || **text < '0' || **text > '9' || *end != stop || n > 1 << 24)
-    return sf_fail(SF_E_USAGE, "--crop expects X,Y,WIDTH,HEIGHT in whole pixels");
-  *value = (int)n;
-  *text = end + (stop != 0);
-  return sf_ok();
-}
-
-static sf_status read_crop(const char *text, sf_window *crop)
-{
-  SF_TRY(read_number(&text, ',', &crop->x));
-  SF_TRY(read_number(&text, ',', &crop->y));
-  SF_TRY(read_number(&text, ',', &crop->width));
-  SF_TRY(read_number(&text, 0, &crop->height));
-  if (crop->width < 1 || crop->height < 1) return sf_fail(SF_E_USAGE, "--crop is out of range: it has no pixels");
-  return sf_ok();
-}
-
 static sf_status choose_crop(job *j)
 {
   const sf_camera *camera = &j->shot.view->camera;
@@ -366,7 +345,7 @@ int main(int argc, char **argv)
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
   j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = 1};
   sf_status status = parse(argc, argv, &j->opt, &cli);
-  if (status.code == SF_OK && j->opt.crop) status = read_crop(j->opt.crop, &j->crop);
+  if (status.code == SF_OK && j->opt.crop) status = sf_window_parse(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
     if (j->opt.threads) omp_set_num_threads(j->opt.threads);
     sf_cli_catch_signals();

@@ -1,0 +1,48 @@
+/* The image: a scene and a tile of rays as one block of memory, all that the firmware needs to make pixels.
+ * Little-endian; the header, then in any order, each 8-byte aligned: the net (sf_blob.h), the grid's table, the
+ * occupancy bitmap, one fx_ray per pixel, row by row. */
+#ifndef SPIKEFIELD_FIRMWARE_TILE_H
+#define SPIKEFIELD_FIRMWARE_TILE_H
+#include "firmware/sf_blob.h"
+#include "spikefield/fx.h"
+
+enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 1, SF_TILE_SIDE_MAX = 4096 };
+
+typedef struct sf_tile_header {
+  uint32_t magic, version;
+  uint32_t bytes;                                  /* of the whole image */
+  uint32_t crc;                                    /* sf_crc32 from 0 of all that follows this word */
+  uint32_t width, height;                          /* of the tile */
+  uint32_t net, net_bytes, table, occupancy, rays; /* where each part begins, from the image's first byte */
+  uint32_t levels, entries, occ_res;               /* from here on: as in fx_scene and fx_grid */
+  int32_t step_q24, max_samples, trans_stop, background[3];
+  int32_t scale_q16[FX_LEVELS_MAX], stride[FX_LEVELS_MAX], log2_size[FX_LEVELS_MAX], shift[FX_LEVELS_MAX];
+  uint32_t offset[FX_LEVELS_MAX];
+} sf_tile_header;
+
+/* The same bytes for the host that writes them and the processor that reads them. */
+_Static_assert(sizeof(sf_tile_header) % 8 == 0, "the first part begins aligned");
+_Static_assert(sizeof(fx_ray) == 88 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
+
+/* An image, opened. */
+typedef struct sf_tile {
+  sf_net_blob net;
+  fx_scene scene; /* its net has no weights: they are in `net` */
+  const fx_ray *rays;
+  uint32_t width, height;
+  fx_pixel *pixels; /* [height][width], in the memory behind the image */
+} sf_tile;
+
+/* NULL and points *tile into the block, or says what is wrong with it. space: bytes of memory from block on, which is
+ * 8-byte aligned. Sizes and places are checked here; that values make a good scene is the writer's care, and the
+ * checksum says that they are still the writer's. */
+const char *sf_tile_open(uint8_t *block, uint32_t space, sf_tile *tile);
+
+/* Where the pixels of an image of so many bytes are. */
+uint32_t sf_tile_pixels_at(uint32_t bytes);
+
+/* CRC-32 of IEEE 802.3 as zlib's, continued from crc; 0 to begin. */
+uint32_t sf_crc32(uint32_t crc, const void *data, uint32_t size);
+/* Of fx_pixel_rgba of every pixel: four little-endian words each. */
+uint32_t sf_rgba_crc(const fx_pixel *pixels, uint32_t n);
+#endif

@@ -1,0 +1,503 @@
+/* The emulated system: programs by hand that misbehave, the firmware against the core, and the firmware with an
+ * accelerator, a bus or an image that is not as it should be. */
+#include "sim/soc.h"
+#include "firmware/sf_soc.h"
+#include "firmware/sf_tile.h"
+#include "sim/soc_job.h"
+#include "spikefield/audit.h"
+#include "tests/fx_fixture.h"
+#include <libgen.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#define ck_ok(call)                                                                                                    \
+  do {                                                                                                                 \
+    const sf_status status_ = (call);                                                                                  \
+    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
+  } while (0)
+
+enum { OUTPUT_MAX = 1 << 14, WIDTH = 3, HEIGHT = 2, PIXELS = WIDTH * HEIGHT, INSTRUCTIONS = 300000000 };
+static char output[OUTPUT_MAX]; /* each test runs in a process of its own */
+static size_t output_size;
+
+static bool keep_output(void *user, char c)
+{
+  (void)user;
+  if (output_size + 1 >= OUTPUT_MAX) return false;
+  output[output_size++] = c;
+  return true;
+}
+
+/* ---- programs by hand ---- */
+
+enum { T0 = 5, T1 = 6, LOAD = 0x03, STORE = 0x23, WORD = 2, BYTE = 0 };
+
+static uint32_t lui(int rd, uint32_t value)
+{
+  return (value & 0xfffff000) | (uint32_t)rd << 7 | 0x37;
+}
+static uint32_t addi(int rd, int rs, int value)
+{
+  return (uint32_t)value << 20 | (uint32_t)rs << 15 | (uint32_t)rd << 7 | 0x13;
+}
+static uint32_t load(int rd, int rs, int offset)
+{
+  return (uint32_t)offset << 20 | (uint32_t)rs << 15 | WORD << 12 | (uint32_t)rd << 7 | LOAD;
+}
+static uint32_t store(int width, int rs2, int rs1, int offset)
+{
+  return (uint32_t)(offset >> 5) << 25 | (uint32_t)rs2 << 20 | (uint32_t)rs1 << 15 | (uint32_t)width << 12 |
+         (uint32_t)(offset & 31) << 7 | STORE;
+}
+enum {
+  JUMP_HERE = 0x6f,
+  JUMP_BACK = (int)0xffdff06f,
+  JUMP_T0 = 0x28067,
+  ECALL = 0x73,
+  EBREAK = 0x100073,
+  WFI = 0x10500073
+};
+
+static bool stop_at_once(void *user, uint64_t done)
+{
+  (void)user, (void)done;
+  return false;
+}
+
+static sf_status run_words(const uint32_t *word, int n, bool stopped, uint32_t *exit_status)
+{
+  sf_dut *dut;
+  sf_soc *soc;
+  const sf_soc_options options = {.instructions = 4000000, .uart = keep_output, .tick = stopped ? stop_at_once : NULL};
+  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open(&soc, dut, &options));
+  memcpy(sf_soc_memory(soc, SF_SOC_RAM, (uint64_t)n * 4), word, (size_t)n * 4);
+  sf_soc_begin_at(soc, SF_SOC_RAM);
+  const sf_status status = sf_soc_run(soc, exit_status);
+  sf_soc_close(soc);
+  sf_dut_close(dut);
+  return status;
+}
+
+START_TEST(bad_programs_end_with_a_reason)
+{
+  const struct {
+    uint32_t word[4];
+    const char *reason;
+  } bad[] = {
+      {{JUMP_HERE}, "no end after 400"},
+      {{addi(T0, T0, 1), 0xffffffff}, "trap: illegal instruction (cause 2), in the block of code at 0x80000000"},
+      {{ECALL}, "environment call"},
+      {{EBREAK}, "Invalid instruction"},
+      {{WFI}, "sleeps for ever"},
+      {{load(T1, 0, 16)}, "load of 4 bytes at 0x00000010, where there is nothing"},
+      {{lui(T0, 0x90000000), store(WORD, T1, T0, 8)}, "store of 4 bytes at 0x90000008"},
+      {{lui(T0, 0x20000000), JUMP_T0}, "fetch"},
+      {{lui(T0, SF_SOC_IMAGE), JUMP_T0}, "fetch"},
+      {{lui(T0, SF_SOC_ACCELERATOR), store(BYTE, T1, T0, 12)}, "accelerator: access of 1 bytes at offset 0xc"},
+      {{lui(T0, SF_SOC_STREAM), load(T1, T0, SF_STREAM_RESULT_HIGH)}, "a result was taken that is not there"},
+      {{lui(T0, SF_SOC_STREAM), load(T1, T0, 0x40)}, "offset 0x40: read of a register that is not there"},
+      {{lui(T0, SF_SOC_STREAM), store(WORD, T1, T0, 0x40)}, "offset 0x40: write to a register that is not there"},
+      {{lui(T0, SF_SOC_STREAM), store(WORD, T1, T0, SF_STREAM_CONTROL), JUMP_BACK}, "sent into a full FIFO"},
+      {{lui(T0, SF_SOC_UART), store(WORD, T0, T0, 0), JUMP_BACK}, "endless output"},
+  };
+  uint32_t exit_status;
+  const sf_status status = run_words(bad[_i].word, 4, false, &exit_status);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_msg(strstr(status.message, bad[_i].reason), "program %d: '%s' is not in '%s'", _i, bad[_i].reason,
+                status.message);
+}
+END_TEST
+enum { BAD_PROGRAMS = 15 };
+
+START_TEST(a_program_ends_with_its_status)
+{
+  const uint32_t word[] = {lui(T0, SF_SOC_POWER), addi(T1, 0, 7), store(WORD, T1, T0, 0), JUMP_HERE};
+  const uint32_t endless[] = {JUMP_HERE};
+  uint32_t exit_status = 0;
+  ck_ok(run_words(word, 4, false, &exit_status));
+  ck_assert_uint_eq(exit_status, 7);
+  ck_assert_int_eq(run_words(endless, 1, true, &exit_status).code, SF_E_STOPPED);
+}
+END_TEST
+
+/* ---- the firmware ---- */
+
+typedef struct scenario {
+  fx_scene scene;
+  fx_ray ray[PIXELS];
+  fx_pixel core[PIXELS], firmware[PIXELS];
+  fx_counts counts;
+  uint8_t *image;
+  size_t image_size;
+  sf_dut *dut;
+  sf_bus real; /* the accelerator's own bus, behind the one that a test puts before it */
+  uint32_t offset, from, to;
+  int stall;
+} scenario;
+
+/* Short rays from in front of the box through it; the last one misses. */
+static void make_rays(scenario *s)
+{
+  for (int i = 0; i < PIXELS; i++) {
+    fx_ray *ray = &s->ray[i];
+    const int64_t one = (int64_t)1 << 40;
+    for (int axis = 0; axis < 3; axis++) {
+      ray->origin[axis] = one / 100 * fixture_pick(7, 50, (uint64_t)(3 * i + axis), 10, 60);
+      ray->step[axis] = one / 1000 * fixture_pick(7, 51, (uint64_t)(3 * i + axis), 2, 20);
+    }
+    fixture_inputs(7, (uint64_t)i, ray->dir, SF_DIR_MAX, 700);
+    ray->count = i == PIXELS - 1 ? 0 : 6 + i;
+    ray->first_q16 = 1000 * i;
+  }
+}
+
+static scenario *make_scenario(const fixture_sizes *sizes)
+{
+  scenario *s = calloc(1, sizeof *s);
+  s->scene = fixture_scene(sizes, 5);
+  memset(s->scene.occupancy, 0xf7, 64);
+  make_rays(s);
+  for (int i = 0; i < PIXELS; i++) ck_ok(fx_render_ray(&s->scene, &s->ray[i], NULL, NULL, &s->core[i], &s->counts));
+  ck_assert_uint_gt(s->counts.samples, 20);
+  ck_ok(sf_soc_image_make(&s->scene, s->ray, WIDTH, HEIGHT, &s->image, &s->image_size));
+  return s;
+}
+
+static void free_scenario(scenario *s)
+{
+  fx_scene_free(&s->scene);
+  free(s->image);
+  free(s);
+}
+
+/* BUILD/tests/test_soc -> BUILD/firmware/sf_firmware.elf */
+static void firmware_path(char path[4096])
+{
+  char self[4000] = "";
+  ck_assert_int_gt(readlink("/proc/self/exe", self, sizeof self - 1), 0);
+  snprintf(path, 4096, "%s/../firmware/sf_firmware.elf", dirname(self));
+}
+
+static uint32_t bus_read(void *context, uint32_t offset);
+static void bus_write(void *context, uint32_t offset, uint32_t value);
+
+/* The firmware on the system; bus_read and bus_write below stand between. */
+static sf_status run_firmware(scenario *s, uint32_t *exit_status)
+{
+  char path[4096];
+  sf_soc *soc;
+  firmware_path(path);
+  ck_ok(sf_dut_open_bare(&s->dut, &(sf_dut_options){.seed = 9, .stall_percent = s->stall}));
+  s->real = s->dut->bus;
+  s->dut->bus = (sf_bus){bus_read, bus_write, s};
+  ck_ok(sf_soc_open(&soc, s->dut, &(sf_soc_options){.instructions = INSTRUCTIONS, .uart = keep_output}));
+  ck_ok(sf_soc_load_elf(soc, path));
+  memcpy(sf_soc_memory(soc, SF_SOC_IMAGE, s->image_size), s->image, s->image_size);
+  const sf_status status = sf_soc_run(soc, exit_status);
+  memcpy(s->firmware, sf_soc_image_pixels(sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE), s->image_size),
+         sizeof s->firmware);
+  sf_soc_close(soc);
+  sf_dut_close(s->dut);
+  return status;
+}
+
+/* What a test does to one register: reads of `offset` give `to`; writes go to `to` instead (REDIRECT), or write `to`
+ * instead of their value (REPLACE), or are lost (LOSE), once or always. */
+typedef enum { HONEST, READ_AS, REDIRECT, REPLACE, LOSE_ONE, LOSE, DEAF } bus_fault;
+static bus_fault fault;
+static int lost;
+
+static uint32_t bus_read(void *context, uint32_t offset)
+{
+  scenario *s = context;
+  if (fault == READ_AS && offset == s->offset) return s->to;
+  if (fault == DEAF && offset == s->offset) s->dut->bus_hung = true;
+  return s->real.read(s->real.context, offset);
+}
+
+static void bus_write(void *context, uint32_t offset, uint32_t value)
+{
+  scenario *s = context;
+  if (offset == s->offset) {
+    if (fault == REDIRECT) offset = s->to;
+    if (fault == REPLACE) value = s->to;
+    if (fault == LOSE || (fault == LOSE_ONE && lost++ == 100)) return;
+  }
+  s->real.write(s->real.context, offset, value);
+}
+
+static void same_as_core(const fixture_sizes *sizes, int stall)
+{
+  scenario *s = make_scenario(sizes);
+  uint32_t exit_status = 99;
+  s->stall = stall;
+  const sf_status status = run_firmware(s, &exit_status);
+  ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
+  ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
+  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
+  free_scenario(s);
+}
+
+START_TEST(the_firmware_renders_what_the_core_renders)
+{
+  same_as_core(&fixture_ingp, 30 * _i);
+}
+END_TEST
+
+START_TEST(so_it_does_for_other_nets)
+{
+  static const fixture_sizes sizes[] = {
+      {5, 77, 16, 3, 33, 128, 1, FX_DECAY}, {1, 1, 2, 0, 5, 1, 8, FX_NODECAY}, {3, 128, 1, 16, 128, 40, 3, FX_HYBRID}};
+  same_as_core(&sizes[_i], 20);
+}
+END_TEST
+
+/* Each ends with exit status 1 and the line, or is seen by the comparison. */
+START_TEST(a_wrong_device_is_reported)
+{
+  static const struct {
+    bus_fault fault;
+    uint32_t offset, to;
+    const char *line;
+  } bad[] = {
+      {READ_AS, SF_CSR_ID, 0, "error: probe: no accelerator at this address\n"},
+      {READ_AS, SF_CSR_VERSION, 2 << 16, "error: probe: interface version differs from the driver's\n"},
+      {READ_AS, SF_CSR_CONFIG, 0x08410840, "error: probe: built with other sizes than the driver\n"},
+      {READ_AS, SF_CSR_STATUS, SF_CSR_STATUS_COUNTERS, "error: clear counters: no answer\n"},
+      {REPLACE, SF_CSR_STEPS, 9, "error: load: programming refused: STEPS: "},
+      {REPLACE, SF_CSR_WEIGHT_DATA, 0x80, "error: load: programming refused: WEIGHT: "},
+      {REDIRECT, SF_CSR_MODE, SF_CSR_STATUS, "error: load: programming refused: ADDRESS: "},
+      {LOSE, SF_CSR_CTRL, 0, "error: render: no answer\n"},
+      {REPLACE, SF_CSR_D1_N_IN, 4, "error: render: no answer: PACKET: "},
+  };
+  scenario *s = make_scenario(&fixture_ingp);
+  uint32_t exit_status = 99;
+  fault = bad[_i].fault, s->offset = bad[_i].offset, s->to = bad[_i].to;
+  const sf_status status = run_firmware(s, &exit_status);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_assert_uint_eq(exit_status, 1);
+  ck_assert_msg(strstr(output, bad[_i].line), "'%s' is not in '%s'", bad[_i].line, output);
+  free_scenario(s);
+}
+END_TEST
+enum { WRONG_DEVICES = 9 };
+
+START_TEST(a_driver_that_writes_wrongly_is_seen)
+{
+  static const struct {
+    bus_fault fault;
+    uint32_t offset, to;
+  } bad[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
+             {REPLACE, SF_CSR_C2_THETA, 30000},
+             {REPLACE, SF_CSR_STEPS, 3},
+             {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
+             {LOSE, SF_CSR_EXP_BIAS, 0}};
+  scenario *s = make_scenario(&fixture_ingp);
+  uint32_t exit_status = 99;
+  fault = bad[_i].fault, s->offset = bad[_i].offset, s->to = bad[_i].to;
+  const sf_status status = run_firmware(s, &exit_status);
+  ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
+  ck_assert_int_eq(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH).code, SF_E_DIFFERENCE);
+  ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+  free_scenario(s);
+}
+END_TEST
+enum { WRONG_WRITES = 5 };
+
+START_TEST(a_bus_without_an_answer_ends_the_run)
+{
+  scenario *s = make_scenario(&fixture_ingp);
+  uint32_t exit_status;
+  fault = DEAF, s->offset = SF_CSR_CONFIG;
+  const sf_status status = run_firmware(s, &exit_status);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_msg(strstr(status.message, "read of register 0x008 not answered"), "%s", status.message);
+  free_scenario(s);
+}
+END_TEST
+
+/* ---- images ---- */
+
+START_TEST(a_damaged_image_is_refused)
+{
+  scenario *s = make_scenario(&fixture_ingp);
+  uint32_t exit_status = 99;
+  s->image[s->image_size - 1] ^= 1;
+  ck_ok(run_firmware(s, &exit_status));
+  ck_assert_uint_eq(exit_status, 1);
+  ck_assert_str_eq(output, "spikefield firmware\nerror: image: damaged: wrong checksum\n");
+  free_scenario(s);
+}
+END_TEST
+
+static const char *open_edited(const scenario *s, uint8_t *block, size_t space, int word, uint32_t value)
+{
+  sf_tile tile;
+  sf_tile_header *h = (sf_tile_header *)block;
+  memcpy(block, s->image, s->image_size);
+  if (word >= 0) memcpy(block + 4 * word, &value, 4);
+  h->crc = sf_crc32(0, &h->width, (uint32_t)(s->image_size - offsetof(sf_tile_header, width)));
+  return sf_tile_open(block, (uint32_t)space, &tile);
+}
+
+/* Every word of the header takes extreme values, with a right checksum: the parts stay inside or the image is refused.
+ * The block ends where memory ends, so that the sanitizer sees every step beyond. */
+START_TEST(an_image_stays_inside_its_memory)
+{
+  static const uint32_t extreme[] = {0, 1, 7, 8, 255, 256, 257, 0x7fffffff, 0x80000000, 0xfffffff8, 0xffffffff};
+  scenario *s = make_scenario(&fixture_ingp);
+  const size_t space = sf_tile_pixels_at((uint32_t)s->image_size) + sizeof s->core;
+  uint8_t *block = malloc(space);
+  ck_assert_ptr_null(open_edited(s, block, space, -1, 0));
+  ck_assert_str_eq(open_edited(s, block, space - 1, -1, 0), "the tile does not fit");
+  ck_assert_str_eq(open_edited(s, block, space, 0, 1), "none in memory");
+  ck_assert_str_eq(open_edited(s, block, space, 1, 2), "of another version than this firmware's");
+  for (int word = 4; word < 14; word++) /* width .. occ_res */
+    for (size_t i = 0; i < sizeof extreme / sizeof *extreme; i++) {
+      uint32_t now;
+      memcpy(&now, s->image + 4 * word, 4);
+      if (extreme[i] == now || (word == 7 && extreme[i] > now && extreme[i] < s->image_size)) continue;
+      const bool less = word <= 5 && extreme[i] == 1; /* a smaller tile is one, too */
+      const char *why = open_edited(s, block, space, word, extreme[i]);
+      ck_assert_msg((why == NULL) == less, "word %d = %u: %s", word, extreme[i], why ? why : "taken");
+    }
+  free(block);
+  free_scenario(s);
+}
+END_TEST
+
+START_TEST(checksums_are_zlibs)
+{
+  ck_assert_uint_eq(sf_crc32(0, "123456789", 9), 0xcbf43926);
+  ck_assert_uint_eq(sf_crc32(sf_crc32(0, "1234", 4), "56789", 5), 0xcbf43926);
+}
+END_TEST
+
+START_TEST(a_tile_that_is_too_large_is_refused)
+{
+  scenario *s = make_scenario(&fixture_ingp);
+  uint8_t *image = NULL;
+  size_t size;
+  ck_assert_int_eq(sf_soc_image_make(&s->scene, s->ray, 4096, 4096, &image, &size).code, SF_E_RANGE);
+  ck_assert_ptr_null(image);
+  free_scenario(s);
+}
+END_TEST
+
+/* ---- comparison ---- */
+
+static void expect_audit(const scenario *s, const char *text, const char *reason)
+{
+  const sf_status status = sf_soc_compare_audit(&s->counts, s->core, PIXELS, text);
+  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+  ck_assert_msg(strstr(status.message, reason), "'%s' is not in '%s'", reason, status.message);
+}
+
+START_TEST(the_comparison_sees_every_change)
+{
+  scenario *s = make_scenario(&fixture_ingp);
+  uint32_t exit_status;
+  char text[OUTPUT_MAX];
+  ck_ok(run_firmware(s, &exit_status));
+  for (char *at = strstr(output, "audit "); at; at = strstr(at + 1, "audit "))
+    for (char *c = at; *c != '\n'; c++) {
+      const char was = *c;
+      *c = was == '1' ? '2' : '1';
+      ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+      *c = was;
+    }
+  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
+  expect_audit(s, "", "firmware \"nothing\"");
+  snprintf(text, sizeof text, "%.16000saudit more\n", output);
+  expect_audit(s, text, "one line too many: \"audit more\"");
+  for (size_t i = 0; i < sizeof s->core[0].colour + 20; i += 4) {
+    uint8_t *byte = (uint8_t *)&s->firmware[4] + i;
+    *byte ^= 1;
+    const sf_status status = sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH);
+    ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+    ck_assert_msg(strstr(status.message, "pixel 1,1 of the tile"), "%s", status.message);
+    *byte ^= 1;
+  }
+  ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
+  free_scenario(s);
+}
+END_TEST
+
+/* ---- programs from files ---- */
+
+START_TEST(a_bad_program_file_is_refused)
+{
+  char folder[] = "/tmp/sf_test_soc.XXXXXX", path[64], firmware[4096], whole[1 << 16];
+  ck_assert_ptr_nonnull(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/a.elf", folder);
+  firmware_path(firmware);
+  FILE *in = fopen(firmware, "rb");
+  ck_assert_ptr_nonnull(in);
+  const size_t size = fread(whole, 1, sizeof whole, in);
+  fclose(in);
+  const struct {
+    size_t keep;
+    int at;
+    char value;
+    const char *reason;
+  } bad[] = {{0, 0, 0x7f, "not an ELF file"},
+             {40, 0, 0x7f, "not an ELF file"},
+             {size, 4, 2, "not a 32-bit RISC-V"},
+             {size, 18, 3, "not a 32-bit RISC-V"},
+             {size, 31, 0x7f, "segments is cut short"},
+             {60, 0, 0x7f, "segments is cut short"},
+             {5000, 0, 0x7f, "is cut short"}};
+  sf_dut *dut;
+  sf_soc *soc;
+  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    const char was = whole[bad[i].at];
+    whole[bad[i].at] = bad[i].value;
+    FILE *out = fopen(path, "wb");
+    ck_assert_uint_eq(fwrite(whole, 1, bad[i].keep, out), bad[i].keep);
+    fclose(out);
+    whole[bad[i].at] = was;
+    const sf_status status = sf_soc_load_elf(soc, path);
+    ck_assert_msg(status.code != SF_OK && strstr(status.message, bad[i].reason) && strstr(status.message, path),
+                  "file %zu: '%s' is not in '%s'", i, bad[i].reason, status.message);
+  }
+  ck_assert_int_eq(sf_soc_load_elf(soc, "/nowhere/a.elf").code, SF_E_IO);
+  sf_soc_close(soc);
+  sf_dut_close(dut);
+  unlink(path);
+  rmdir(folder);
+}
+END_TEST
+
+static Suite *suite(void)
+{
+  Suite *s = suite_create("soc");
+  TCase *t = tcase_create("system");
+  tcase_set_timeout(t, 60);
+  tcase_add_loop_test(t, bad_programs_end_with_a_reason, 0, BAD_PROGRAMS);
+  tcase_add_test(t, a_program_ends_with_its_status);
+  tcase_add_loop_test(t, the_firmware_renders_what_the_core_renders, 0, 3);
+  tcase_add_loop_test(t, so_it_does_for_other_nets, 0, 3);
+  tcase_add_loop_test(t, a_wrong_device_is_reported, 0, WRONG_DEVICES);
+  tcase_add_loop_test(t, a_driver_that_writes_wrongly_is_seen, 0, WRONG_WRITES);
+  tcase_add_test(t, a_bus_without_an_answer_ends_the_run);
+  tcase_add_test(t, a_damaged_image_is_refused);
+  tcase_add_test(t, an_image_stays_inside_its_memory);
+  tcase_add_test(t, checksums_are_zlibs);
+  tcase_add_test(t, a_tile_that_is_too_large_is_refused);
+  tcase_add_test(t, the_comparison_sees_every_change);
+  tcase_add_test(t, a_bad_program_file_is_refused);
+  suite_add_tcase(s, t);
+  return s;
+}
+
+int main(void)
+{
+  SRunner *runner = srunner_create(suite());
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
