@@ -107,3 +107,17 @@ else
 firmware:
 	@echo "  firmware: $(RISCV)gcc is not installed, skipped"
 endif
+
+# The vector kit: writer, and the files that go with every kit.
+KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \
+  $B/obj/firmware/sf_driver.o $B/kit/files.o
+KIT_FILES := sf_kit_tb.sv Makefile README.md
+$B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh
+	@mkdir -p $(@D)
+	$(call say,EMBED $@)
+	$Qtools/embed.sh sf_kit_files sim/kit/kit.h $(foreach f,$(KIT_FILES),$f=sim/kit/$f) \
+	  $(foreach f,$(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt,$f=$(RTL_ROOT)/$f) >$@
+$B/kit/files.o: $B/kit/files.c sim/kit/kit.h
+	$(call say,CC    $@)
+	$Q$(CC) $(CFLAGS_ALL) -c $< -o $@
+$B/bin/sf_export: $(KIT_OBJ)
