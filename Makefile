@@ -113,7 +113,7 @@ $(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield
 $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
 # Tests
 CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
@@ -131,7 +131,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults cosim_split firmware install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults cosim_split firmware kit install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -177,6 +177,11 @@ bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilin
 
 $B/tests/bench: $B/obj/tests/bench_fixed.o
 
+vectors: $B/bin/sf_export ## vector kit of the demo's scene after make demo (or SCENE=, DATA=), run in Icarus and Verilator: build/vectors
+	@$B/bin/sf_export $(or $(SCENE),$B/demo/scene.snn) --data $(or $(DATA),$B/demo/scene) --vectors $B/vectors --seed 1
+	@if command -v iverilog >/dev/null; then $(MAKE) -s -C $B/vectors icarus; else echo "  vectors: iverilog is not installed, skipped"; fi
+	@$(MAKE) -s -C $B/vectors verilator
+
 BUDGET ?= $(if $(wildcard $B/demo/scene.snn),$B/demo/model.safetensors $B/demo/scene.snn $B/demo/scene)
 error-budget: $B/bin/error_budget ## error of each fixed-point block and its bound; its cost in dB after make demo or BUDGET="MODEL SCENE DATA"
 	@$B/bin/error_budget $(BUDGET)
@@ -190,6 +195,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

@@ -6,19 +6,6 @@
 
 enum { RESET_CYCLES = 4 };
 
-sf_net_blob sf_dut_blob(const fx_net *net)
-{
-  sf_net_blob blob = {.mode = net->mode,
-                      .steps = net->steps,
-                      .exp_in = {net->exp_in.mul, net->exp_in.shift, net->exp_in.bias},
-                      .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
-  for (int l = 0; l < SF_LAYERS; l++) {
-    const fx_layer *layer = &net->layer[l];
-    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->w};
-  }
-  return blob;
-}
-
 static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
 {
   if (dut->bus_hung)

@@ -83,3 +83,17 @@ lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the R
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
+
+# The vector kit: writer, and the files that go with every kit.
+KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \
+  $B/obj/firmware/sf_driver.o $B/kit/files.o
+KIT_FILES := sf_kit_tb.sv Makefile README.md
+$B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh
+	@mkdir -p $(@D)
+	$(call say,EMBED $@)
+	$Qtools/embed.sh sf_kit_files sim/kit/kit.h $(foreach f,$(KIT_FILES),$f=sim/kit/$f) \
+	  $(foreach f,$(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt,$f=$(RTL_ROOT)/$f) >$@
+$B/kit/files.o: $B/kit/files.c sim/kit/kit.h
+	$(call say,CC    $@)
+	$Q$(CC) $(CFLAGS_ALL) -c $< -o $@
+$B/bin/sf_export: $(KIT_OBJ)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* The longest sample takes about 10^3 cycles; stalls of up to 90 % slow the streams only. */
-enum { PATIENCE = 100000, TAP_PATIENCE = 1000, STREAM_INPUT = 16, STREAM_OUTPUT, VALUES = 4, RESULT_BEATS = 2 };
+enum { PATIENCE = 100000, TAP_PATIENCE = 1000, STREAM_INPUT = 16, STREAM_OUTPUT, RESULT_BEATS = 2 };
 
 typedef struct run {
   sf_dut *dut;
@@ -18,27 +18,6 @@ typedef struct run {
   uint64_t packet[SF_PACKET_MAX];
   uint64_t progress; /* cycle of the last beat */
 } run;
-
-static uint64_t pack(const int16_t *value, int n)
-{
-  uint64_t word = 0;
-  for (int i = 0; i < n; i++) word |= (uint64_t)(uint16_t)value[i] << (16 * i);
-  return word;
-}
-
-static int pack_all(uint64_t *words, const int16_t *value, int n)
-{
-  int beats = 0;
-  for (int i = 0; i < n; i += VALUES) words[beats++] = pack(value + i, n - i < VALUES ? n - i : VALUES);
-  return beats;
-}
-
-int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
-{
-  const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
-  const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
-  return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
-}
 
 /* A beat that was offered stays until it is taken, as AXI4-Stream demands. */
 static void offer(run *r)

@@ -132,6 +132,9 @@ number sf_export --steps 0 9 -1 nan
 number sf_export --fit-loss -1 nan inf 101 ''
 number sf_export --fit-rays 0 255 -1 nan
 usage --data sf_export model.safetensors -o out --fit
+usage --data sf_export s.snn --vectors out
+usage --vectors sf_export s.snn --vectors out --data d -o scene
+number sf_export --samples 0 4097 nan
 number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x
 number sf_cosim --block 0 x
@@ -239,6 +242,9 @@ each_file() { # FUNCTION GOOD
   sed 's/"shape":\[512,2\]/"shape":[256,4]/' "$2" >edited.file; $1 edited.file edited.file
   printf 'PK\003\004 something else entirely' >other.file; $1 other.file other.file
 }
+data model.safetensors sf_export model.safetensors --vectors out --data d
+data nodir sf_export s.snn --vectors out --data nodir
+absent out "vectors of nothing"
 each_file models model.safetensors
 each_file scenes s.snn
 
@@ -296,6 +302,7 @@ writers /proc /proc/spikefield.out
 writers /dev/full /dev/full
 mkdir -p folder.out
 writers folder.out folder.out
+data plain sf_export s.snn --vectors plain/kit --data d
 data plain sf_scene simple -o plain --size 4 --train 1 --test 1
 data plain sf_scene simple -o plain/deep/er --size 4 --train 1 --test 1
 data /proc sf_scene simple -o /proc/spikefield --size 4 --train 1 --test 1

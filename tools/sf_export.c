@@ -1,4 +1,6 @@
-/* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware. */
+/* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware; writes vectors
+ * of a scene for any simulator. */
+#include "sim/kit/kit.h"
 #include "spikefield/cli.h"
 #include "spikefield/fit.h"
 #include "spikefield/quant.h"
@@ -9,8 +11,8 @@
 #include <sys/stat.h>
 
 typedef struct options {
-  const char *output, *data;
-  int steps, background;
+  const char *output, *data, *vectors;
+  int steps, background, rays, samples;
   uint64_t seed, fit_rays;
   double fit_loss;
   sf_quant_widths widths;
@@ -180,6 +182,42 @@ static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_
   return status;
 }
 
+/* ---- --vectors ---- */
+
+static sf_status print_vectors(const sf_kit_report *kit, const options *o)
+{
+  if (!o->json) {
+    printf("%s: %d samples of %d rays, %d input beats, %d register writes; %d files, %.1f MB\n", o->vectors,
+           kit->samples, kit->rays, kit->beats, kit->writes, kit->files, 1e-6 * (double)kit->bytes);
+    printf("make -C %s icarus verilator\n", o->vectors);
+  } else
+    printf("{\"vectors\": {\"samples\": %d, \"rays\": %d, \"input_beats\": %d, \"register_writes\": %d, \"files\": %d, "
+           "\"bytes\": %llu}}\n",
+           kit->samples, kit->rays, kit->beats, kit->writes, kit->files, (unsigned long long)kit->bytes);
+  return fflush(stdout) ? sf_fail(SF_E_IO, "standard output: the report was not written") : sf_ok();
+}
+
+static sf_status vectors_of_data(const fx_scene *scene, const char *path, const options *o)
+{
+  const sf_kit_options how = {.scene_path = path, .seed = o->seed, .rays = o->rays, .samples = o->samples};
+  sf_kit_report kit;
+  sf_dataset data;
+  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
+  sf_status status = data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
+  if (status.code == SF_OK) status = sf_kit_write(o->vectors, scene, &data, &how, &kit);
+  sf_dataset_free(&data);
+  return status.code == SF_OK ? print_vectors(&kit, o) : status;
+}
+
+static sf_status export_vectors(const char *path, const options *o)
+{
+  fx_scene scene;
+  SF_TRY(fx_scene_load(&scene, path));
+  const sf_status status = vectors_of_data(&scene, path, o);
+  fx_scene_free(&scene);
+  return status;
+}
+
 /* ---- program ---- */
 
 static sf_status save_and_report(const fx_scene *scene, const options *o, const sf_quant_report *report,
@@ -217,6 +255,9 @@ static sf_status export_scene(const char *path, const options *o)
 
 static sf_status check_options(const options *o)
 {
+  if (o->vectors && o->output) return sf_fail(SF_E_USAGE, "--vectors takes a scene, -o a model: one after the other");
+  if (o->vectors && !o->data) return sf_fail(SF_E_USAGE, "--vectors needs --data DATA: the views to draw rays from");
+  if (o->vectors) return sf_ok();
   if (!o->output) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
   if (o->fit && !o->data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
   return sf_ok();
@@ -224,14 +265,14 @@ static sf_status check_options(const options *o)
 
 int main(int argc, char **argv)
 {
-  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05};
+  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05, .rays = 1000, .samples = 48};
   const sf_option table[] = {
       {.name = "--output",
        .letter = 'o',
        .type = SF_ARG_STRING,
        .value = &o.output,
        .argument = "SCENE",
-       .help = "scene file to write (.snn), required"},
+       .help = "scene file to write (.snn)"},
       {.name = "--steps",
        .type = SF_ARG_INT,
        .value = &o.steps,
@@ -251,7 +292,7 @@ int main(int argc, char **argv)
        .min = 0,
        .max = 18446744073709551615.0,
        .argument = "S",
-       .help = "seed of the calibration samples (default 0)"},
+       .help = "seed of the calibration samples, or of the rays and stalls of --vectors (default 0)"},
       {"--weight-bits", 0, SF_ARG_INT, &o.widths.weight_bits, 2, SF_WEIGHT_BITS, NULL, "B", "bits of a weight"},
       {"--feature-bits", 0, SF_ARG_INT, &o.widths.feature_bits, 8, SF_INPUT_BITS, NULL, "B",
        "bits of the inputs of D1 and C1"},
@@ -275,24 +316,49 @@ int main(int argc, char **argv)
        .max = 1e8,
        .argument = "N",
        .help = "rays that --fit looks at (default 262144)"},
-      {.name = "--data", .type = SF_ARG_STRING, .value = &o.data, .argument = "DATA", .help = "data set for --fit"},
+      {.name = "--data",
+       .type = SF_ARG_STRING,
+       .value = &o.data,
+       .argument = "DATA",
+       .help = "data set for --fit and --vectors"},
+      {.name = "--vectors",
+       .type = SF_ARG_STRING,
+       .value = &o.vectors,
+       .argument = "DIR",
+       .help = "write programming, stimulus, everything expected, RTL and bench of SCENE.snn into DIR (docs/kit.md)"},
+      {.name = "--samples",
+       .type = SF_ARG_INT,
+       .value = &o.samples,
+       .min = 1,
+       .max = SF_KIT_SAMPLES_MAX,
+       .argument = "N",
+       .help = "samples of --vectors (default 48)"},
+      {.name = "--rays",
+       .type = SF_ARG_INT,
+       .value = &o.rays,
+       .min = 1,
+       .max = 1e9,
+       .argument = "N",
+       .help = "rays that --vectors draws from the test views at most (default 1000)"},
       {.name = "--quiet", .letter = 'q', .type = SF_ARG_FLAG, .value = &o.quiet, .help = "no progress line"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o.json, .help = "print the report as JSON"},
       {0}};
-  const sf_cli cli = {.program = "sf_export",
-                      .usage = "sf_export MODEL -o SCENE [options]",
-                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
-                                 "the accelerator and the firmware.",
-                      .examples = "  sf_export model.safetensors -o scene.snn\n"
-                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
-                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
-                                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n",
-                      .options = table,
-                      .min_positional = 1,
-                      .max_positional = 1};
+  const sf_cli cli = {
+      .program = "sf_export",
+      .usage = "sf_export MODEL -o SCENE [options]\n       sf_export SCENE --vectors DIR --data DATA [options]",
+      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
+                 "the accelerator and the firmware; writes vectors of a scene for any simulator.",
+      .examples = "  sf_export model.safetensors -o scene.snn\n"
+                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
+                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
+                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
+                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n",
+      .options = table,
+      .min_positional = 1,
+      .max_positional = 1};
   const char *model_path = NULL;
   sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
   if (status.code == SF_OK) status = check_options(&o);
-  if (status.code == SF_OK) status = export_scene(model_path, &o);
+  if (status.code == SF_OK) status = o.vectors ? export_vectors(model_path, &o) : export_scene(model_path, &o);
   return sf_cli_finish(&cli, status);
 }

@@ -1,0 +1,83 @@
+/* The vector kit: a folder with which any simulator checks the accelerator, or another block with its ports, against
+ * the fixed-point core: programming, stimulus, everything expected, RTL, a bench in plain SystemVerilog. docs/kit.md */
+#ifndef SPIKEFIELD_SIM_KIT_H
+#define SPIKEFIELD_SIM_KIT_H
+#include "spikefield/fx.h"
+#include "spikefield/io.h"
+#include "spikefield/scene.h"
+
+enum { SF_KIT_VERSION = 1, SF_KIT_SAMPLES_MAX = 4096 };
+
+typedef struct sf_kit_options {
+  const char *scene_path; /* of the scene file: named and hashed in the manifest */
+  uint64_t seed;          /* of rays and of the bench's stalls */
+  int rays, samples;      /* at most this many; samples 1..SF_KIT_SAMPLES_MAX */
+} sf_kit_options;
+
+typedef struct sf_kit_report {
+  int rays, samples, beats, writes, files;
+  uint64_t bytes;
+} sf_kit_report;
+
+/* The same seed draws the rays that sf_cosim draws; of each, the first 12 samples at most. SF_E_FORMAT when none of
+ * them has a sample. */
+sf_status sf_kit_write(const char *folder, const fx_scene *scene, const sf_dataset *data, const sf_kit_options *options,
+                       sf_kit_report *report);
+
+/* ---- inside of the kit ---- */
+
+/* A ray that has samples in the kit. */
+typedef struct sf_kit_ray {
+  uint64_t number; /* of the drawing */
+  int view, x, y, samples;
+  fx_ray ray;
+} sf_kit_ray;
+
+typedef struct sf_kit_sample {
+  int ray;
+  bool first;
+  int16_t f[SF_FEATURE_MAX];
+  fx_out out;
+  fx_trace trace;
+} sf_kit_sample;
+
+typedef struct sf_kit_draw {
+  sf_kit_ray *ray;
+  sf_kit_sample *sample;
+  int rays, samples, limit;
+  int32_t base[SF_LANES];
+  fx_counts counts;
+  const fx_scene *scene;
+} sf_kit_draw;
+
+sf_status sf_kit_draw_samples(sf_kit_draw *draw, const fx_scene *scene, const sf_dataset *data,
+                              const sf_kit_options *options);
+void sf_kit_draw_free(sf_kit_draw *draw);
+
+/* Files of the source tree that go with every kit (tools/embed.sh): bench, Makefile, README, and rtl/ in the order in
+ * which it compiles. */
+typedef struct sf_kit_file {
+  const char *name; /* in the kit */
+  const unsigned char *data;
+  size_t size;
+} sf_kit_file;
+extern const sf_kit_file sf_kit_files[]; /* ends with name == NULL */
+
+/* Files as they are written, each hashed into `list`. */
+typedef struct sf_kit_output {
+  const char *folder;
+  cJSON *list;
+  int files;
+  uint64_t bytes;
+} sf_kit_output;
+typedef struct sf_kit_writer {
+  sf_writer writer;
+  const char *name;
+} sf_kit_writer;
+sf_status sf_kit_begin(const sf_kit_output *output, sf_kit_writer *file, const char *name);
+sf_status sf_kit_end(sf_kit_output *output, sf_kit_writer *file);
+
+/* Programming, stimulus, outputs, taps, counters as $readmemh images, and the sizes of all of them. */
+sf_status sf_kit_images(sf_kit_output *output, const sf_kit_draw *draw, const sf_kit_options *options,
+                        sf_kit_report *report);
+#endif

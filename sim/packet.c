@@ -1,0 +1,38 @@
+/* A net and its samples in the accelerator's words. Needs no model of the accelerator. */
+#include "sim/sim.h"
+
+enum { VALUES = 4 };
+
+sf_net_blob sf_dut_blob(const fx_net *net)
+{
+  sf_net_blob blob = {.mode = net->mode,
+                      .steps = net->steps,
+                      .exp_in = {net->exp_in.mul, net->exp_in.shift, net->exp_in.bias},
+                      .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    const fx_layer *layer = &net->layer[l];
+    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->w};
+  }
+  return blob;
+}
+
+static uint64_t pack(const int16_t *value, int n)
+{
+  uint64_t word = 0;
+  for (int i = 0; i < n; i++) word |= (uint64_t)(uint16_t)value[i] << (16 * i);
+  return word;
+}
+
+static int pack_all(uint64_t *words, const int16_t *value, int n)
+{
+  int beats = 0;
+  for (int i = 0; i < n; i += VALUES) words[beats++] = pack(value + i, n - i < VALUES ? n - i : VALUES);
+  return beats;
+}
+
+int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
+{
+  const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
+  const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
+  return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
+}
