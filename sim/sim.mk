@@ -49,7 +49,7 @@ $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 
 $B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
 	$(call say,GEN   $(@D)/rtl)
-	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r rtl $(@D)/rtl && $B/bin/sf_gen --root $(@D)
+	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r rtl $(@D)/rtl && $B/bin/sf_gen --root $(@D) $(RTL_ALL)
 	@touch $@
 
 $(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
@@ -71,12 +71,15 @@ $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
 	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(shell pkg-config --libs check 2>/dev/null) $(LIBS)
 faults: $B/faults/sf_cosim $B/faults/make_scene ## the co-simulation with planted faults, for its own test
 
-gen: $B/bin/sf_gen ## rewrite rtl/gen and docs/registers.md from arch.def, csr.def and the tables
-	@$B/bin/sf_gen --root $(RTL_ROOT)
+$B/bin/sf_gen: $(patsubst %.c,$B/obj/%.o,$(wildcard tools/gen/*.c))
+
+gen: $B/bin/sf_gen ## rewrite rtl/gen, spikefield.core and docs/registers.md from arch.def, csr.def, the tables and the list of RTL files
+	@$B/bin/sf_gen --root $(RTL_ROOT) $(RTL_ALL)
 
 gen-check: $B/bin/sf_gen ## generated files are those that the sources give
-	@rm -rf $B/gen-check && $B/bin/sf_gen --root $B/gen-check
-	@diff -r $B/gen-check/rtl/gen rtl/gen && diff $B/gen-check/docs/registers.md docs/registers.md && tools/check_mirror.sh
+	@rm -rf $B/gen-check && $B/bin/sf_gen --root $B/gen-check $(RTL_ALL)
+	@diff -r $B/gen-check/rtl/gen rtl/gen && diff $B/gen-check/docs/registers.md docs/registers.md && \
+	  diff $B/gen-check/spikefield.core spikefield.core && tools/check_mirror.sh
 
 lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)

