@@ -147,5 +147,6 @@ sf_driver_code sf_driver_read_counters(const sf_bus *bus, sf_driver_counters *co
   uint64_t *const global[] = {&counters->samples, &counters->rays,     &counters->cycles,
                               &counters->busy,    &counters->stall_in, &counters->stall_out};
   for (uint32_t i = 0; i < sizeof global / sizeof *global; i++) *global[i] = counter(bus, 0, GLOBAL_LAYER, i);
+  for (uint32_t l = 0; l < SF_LAYERS; l++) counters->layer_busy[l] = counter(bus, 1, GLOBAL_LAYER, l);
   return SF_DRIVER_OK;
 }

@@ -39,6 +39,7 @@ enum { SF_DRIVER_EVENTS = 8 }; /* mac sop spikes updates weight state_r state_w 
 typedef struct sf_driver_counters {
   uint64_t event[SF_DRIVER_EVENTS][SF_LAYERS][SF_T_MAX];
   uint64_t samples, rays, cycles, busy, stall_in, stall_out;
+  uint64_t layer_busy[SF_LAYERS]; /* cycles in which the layer added up rows */
 } sf_driver_counters;
 
 typedef enum {

@@ -121,6 +121,7 @@ static sf_status compare_counts(sf_cosim *c)
   fx_counts_add(&c->sum.rtl, &actual);
   c->sum.cycles += cycles;
   c->sum.busy += busy;
+  for (int l = 0; l < SF_LAYERS; l++) c->sum.layer_busy[l] += sf_dut_layer_busy(c->dut)[l];
   c->sum.stalls += stalls;
   if (!sf_compare_counts(&c->expected, &actual, sf_dut_cycle(c->dut), &difference)) {
     SF_TRY(count_difference(c, &difference));
@@ -204,6 +205,7 @@ void sf_cosim_totals_add(sf_cosim_totals *sum, const sf_cosim_totals *more)
   sum->spikes += more->spikes;
   sum->cycles += more->cycles;
   sum->busy += more->busy;
+  for (int l = 0; l < SF_LAYERS; l++) sum->layer_busy[l] += more->layer_busy[l];
   sum->stalls += more->stalls;
 }
 

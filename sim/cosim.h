@@ -9,7 +9,7 @@ typedef struct sf_cosim sf_cosim;
 typedef struct sf_cosim_totals {
   fx_counts core, rtl;
   uint64_t samples, spikes; /* compared; spikes = bits set in the bitmaps */
-  uint64_t cycles, busy, stalls;
+  uint64_t cycles, busy, stalls, layer_busy[SF_LAYERS];
 } sf_cosim_totals;
 
 void sf_cosim_totals_add(sf_cosim_totals *sum, const sf_cosim_totals *more);

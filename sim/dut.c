@@ -90,7 +90,13 @@ sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64
   if (cycles) *cycles = read.cycles;
   if (busy) *busy = read.busy;
   if (stalls) *stalls = read.stall_in + read.stall_out;
+  memcpy(dut->layer_busy, read.layer_busy, sizeof dut->layer_busy);
   return sf_ok();
+}
+
+const uint64_t *sf_dut_layer_busy(const sf_dut *dut)
+{
+  return dut->layer_busy;
 }
 
 uint64_t sf_dut_cycle(const sf_dut *dut)

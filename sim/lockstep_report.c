@@ -66,6 +66,15 @@ static double ratio(uint64_t part, uint64_t whole)
   return whole ? (double)part / (double)whole : 0;
 }
 
+/* Cycles in which the layer that limits the engine added up rows. */
+static uint64_t busiest(const sf_cosim_totals *sum)
+{
+  uint64_t most = 0;
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (sum->layer_busy[l] > most) most = sum->layer_busy[l];
+  return most;
+}
+
 cJSON *sf_lockstep_json(const sf_lockstep *l, const sf_status *status, double seconds)
 {
   const sf_cosim_totals *sum = &l->sum;
@@ -83,7 +92,7 @@ cJSON *sf_lockstep_json(const sf_lockstep *l, const sf_status *status, double se
   sf_json_add_u64(json, "cycles", sum->cycles);
   sf_json_add_u64(json, "stall_cycles", sum->stalls);
   cJSON_AddNumberToObject(json, "cycles_per_sample", ratio(sum->cycles, sum->samples));
-  cJSON_AddNumberToObject(json, "utilisation", ratio(sum->busy, sum->cycles));
+  cJSON_AddNumberToObject(json, "utilisation", ratio(busiest(sum), sum->cycles));
   cJSON_AddItemToObject(json, "counts", sf_counts_json(&l->fx.net, &sum->rtl));
   sf_json_add_u64(json, "energy_fj", l->energy_rtl_fj);
   sf_json_add_u64(json, "energy_core_fj", l->energy_core_fj);
@@ -99,8 +108,9 @@ void sf_lockstep_print(FILE *out, const sf_lockstep *l, double seconds)
   fprintf(out, "%" PRIu64 " rays (%" PRIu64 " with samples), %" PRIu64 " samples, %" PRIu64 " spikes: 0 differences\n",
           l->rays, sum->core.rays, sum->samples, sum->spikes);
   fprintf(out, "compared: outputs, spikes, membranes and rows per layer and step, every counter, energy\n");
-  fprintf(out, "%" PRIu64 " cycles, %.1f per sample, utilisation %.1f %%, stalled %.1f %%\n", sum->cycles,
-          ratio(sum->cycles, sum->samples), 100 * ratio(sum->busy, sum->cycles), 100 * ratio(sum->stalls, sum->cycles));
+  fprintf(out, "%" PRIu64 " cycles, %.1f per sample, utilisation of the busiest layer %.1f %%, stalled %.1f %%\n",
+          sum->cycles, ratio(sum->cycles, sum->samples), 100 * ratio(busiest(sum), sum->cycles),
+          100 * ratio(sum->stalls, sum->cycles));
   fprintf(out, "energy %" PRIu64 " fJ by the core, %" PRIu64 " fJ by the accelerator\n", l->energy_core_fj,
           l->energy_rtl_fj);
   fprintf(out, "%.1f s, %.0f samples/s by %d processes, seed %" PRIu64 ", stalls %d %%\n", seconds, speed,

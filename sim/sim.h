@@ -15,6 +15,7 @@ struct sf_dut {
   bool bus_hung;        /* a register access was never answered */
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   fx_net net;           /* sizes of the loaded net */
+  uint64_t layer_busy[SF_LAYERS];
   int wave_from, received;
   void (*each_cycle)(void *context); /* a system around the accelerator moves its streams here; or NULL */
   void *each_cycle_context;

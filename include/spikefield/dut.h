@@ -45,6 +45,8 @@ sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f,
 /* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the
  * hardware has them). */
 sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls);
+/* [SF_LAYERS], as of the last sf_dut_counts: cycles in which each layer added up rows. */
+const uint64_t *sf_dut_layer_busy(const sf_dut *dut);
 sf_status sf_dut_clear_counts(sf_dut *dut);
 uint64_t sf_dut_cycle(const sf_dut *dut);
 void sf_dut_close(sf_dut *dut);

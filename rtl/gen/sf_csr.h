@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00010000
+#define SF_REG_VERSION_RESET 0x00010001
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
@@ -187,7 +187,7 @@
 #define SF_REG_WEIGHTS_WORDS 20480
 #define SF_REG_WEIGHTS_BITS 32
 
-/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 */
+/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
 #define SF_REG_COUNTERS_WORDS 512
 #define SF_REG_COUNTERS_BITS 64
 #endif
