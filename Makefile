@@ -57,7 +57,7 @@ NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc)
 TOOLS := $(filter-out $(NO_SOC),$(patsubst tools/%.c,%,$(wildcard tools/*.c)))
 TESTS := $(filter-out $(NO_SOC),$(patsubst tests/%.c,%,$(wildcard tests/test_*.c)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
-DUT_TESTS := test_rtl
+DUT_TESTS := test_rtl bench
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
@@ -120,7 +120,7 @@ CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
 $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
+	$Q$(CXX) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
 
 $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 	@mkdir -p $(@D)
@@ -175,7 +175,7 @@ pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CS
 bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
 	@models=$$(tests/bench_models.sh $B $(SCENES)) && $B/tests/bench $B/bench.json $$models
 
-$B/tests/bench: $B/obj/tests/bench_fixed.o
+$B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig)
 
 vectors: $B/bin/sf_export ## vector kit of the demo's scene after make demo (or SCENE=, DATA=), run in Icarus and Verilator: build/vectors
 	@$B/bin/sf_export $(or $(SCENE),$B/demo/scene.snn) --data $(or $(DATA),$B/demo/scene) --vectors $B/vectors --seed 1

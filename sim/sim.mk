@@ -14,7 +14,11 @@ RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
   $(VERILATOR_UNROLL)
-VERILATED_OPT := OPT_FAST=-O2 OPT_SLOW=-O1 OPT_GLOBAL=-O2
+# Lanes are statements of the same shape: the compiler makes vectors of them, if it is told not to count the cost (11 to 17
+# thousand samples/s; -O3 instead gains nothing).
+VERILATED_SIMD := -march=native -ftree-slp-vectorize -fvect-cost-model=unlimited
+VERILATED_SIMD := $(shell $(CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
+VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
 SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_blob.c sf_tile.c sf_stream.c))

@@ -376,6 +376,7 @@ int main(int argc, char **argv)
   sf_status status = bench_iteration(json, &c);
   if (!status.code)
     status = bench_fixed(json, &c, argc > 4 ? argv[2] : NULL, argc > 4 ? argv[3] : NULL, argc > 4 ? argv[4] : NULL);
+  if (!status.code) status = bench_rtl(json);
   if (!status.code && argc > 1) status = sf_json_save(json, argv[1]);
   cJSON_Delete(json);
   if (status.code) fprintf(stderr, "bench: %s\n", status.message);

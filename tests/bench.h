@@ -17,4 +17,5 @@ void put(cJSON *json, const char *name, double value, const char *unit, double c
 
 /* scene, twin, data: a fixed-point scene, the float ReLU twin and their data set; scene NULL: no frame. */
 sf_status bench_fixed(cJSON *json, const ceilings *c, const char *scene, const char *twin, const char *data);
+sf_status bench_rtl(cJSON *json);
 #endif
