@@ -1,8 +1,7 @@
 /* Writes the image that firmware/sf_tile.c reads. */
-#include "firmware/sf_tile.h"
-#include "firmware/sf_soc.h"
-#include "sim/sim.h"
 #include "sim/soc_job.h"
+#include "firmware/sf_soc.h"
+#include "firmware/sf_tile.h"
 #include <stdlib.h>
 #include <string.h>
 
