@@ -289,7 +289,7 @@ START_TEST(a_driver_that_writes_wrongly_is_seen)
     bus_fault fault;
     uint32_t offset, to;
   } bad[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
-             {REPLACE, SF_CSR_C2_THETA, 30000},
+             {REPLACE, SF_CSR_D1_THETA, 30000},
              {REPLACE, SF_CSR_STEPS, 3},
              {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
              {LOSE, SF_CSR_EXP_BIAS, 0}};
