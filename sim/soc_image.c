@@ -1,8 +1,7 @@
 /* Writes the image that firmware/sf_tile.c reads. */
-#include "firmware/sf_tile.h"
-#include "firmware/sf_soc.h"
-#include "sim/sim.h"
 #include "sim/soc_job.h"
+#include "firmware/sf_soc.h"
+#include "firmware/sf_tile.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -114,7 +113,7 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
   return sf_ok();
 }
 
-const fx_pixel *sf_soc_image_pixels(const uint8_t *block, size_t size)
+size_t sf_soc_image_pixels_at(const uint8_t *image)
 {
-  return (const fx_pixel *)(block + sf_tile_pixels_at((uint32_t)size));
+  return sf_tile_pixels_at(((const sf_tile_header *)image)->bytes);
 }

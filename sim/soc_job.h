@@ -8,8 +8,8 @@
 sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width, int height, uint8_t **image,
                             size_t *size);
 
-/* The firmware's pixels of an image of so many bytes in its memory block. */
-const fx_pixel *sf_soc_image_pixels(const uint8_t *block, size_t size);
+/* Where the firmware leaves the pixels of an image, in bytes from the image's beginning. */
+size_t sf_soc_image_pixels_at(const uint8_t *image);
 
 /* SF_E_DIFFERENCE names the first pixel and field that differs. width: pixels per row, for the message. */
 sf_status sf_soc_compare_pixels(const fx_pixel *core, const fx_pixel *firmware, size_t n, int width);

@@ -66,6 +66,7 @@ run 1 'error: image: ' scene.snn data --image bad.img
 run 1 'error: image: none in memory' scene.snn data --image bad.img
 head -c $((size / 2)) tile.img >bad.img
 run 1 'error: image: damaged' scene.snn data --image bad.img
+run 1 'core' scene.snn data --view 1 --crop 0,0,32,32 --image tile.img # of a smaller tile
 run 1 'core' scene.snn data --view 0 --crop 14,15,4,3 --image tile.img # the image of another view
 
 # Programs that are none, or do not end in time.

@@ -195,7 +195,7 @@ static sf_status run_firmware(scenario *s, uint32_t *exit_status)
   ck_ok(sf_soc_load_elf(soc, path));
   memcpy(sf_soc_memory(soc, SF_SOC_IMAGE, s->image_size), s->image, s->image_size);
   const sf_status status = sf_soc_run(soc, exit_status);
-  memcpy(s->firmware, sf_soc_image_pixels(sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE), s->image_size),
+  memcpy(s->firmware, sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE) + sf_soc_image_pixels_at(s->image),
          sizeof s->firmware);
   sf_soc_close(soc);
   sf_dut_close(s->dut);
@@ -289,7 +289,7 @@ START_TEST(a_driver_that_writes_wrongly_is_seen)
     bus_fault fault;
     uint32_t offset, to;
   } bad[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
-             {REPLACE, SF_CSR_C2_THETA, 30000},
+             {REPLACE, SF_CSR_D1_THETA, 30000},
              {REPLACE, SF_CSR_STEPS, 3},
              {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
              {LOSE, SF_CSR_EXP_BIAS, 0}};

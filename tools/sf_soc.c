@@ -7,8 +7,10 @@
 #include "spikefield/io.h"
 #include "sim/studio.h"
 #include <inttypes.h>
+#include <libgen.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { TILE = 8, OUTPUT_MAX = 1 << 20, IMAGE_FILE_MAX = SF_SOC_IMAGE_SPACE };
 
@@ -37,7 +39,8 @@ typedef struct job {
   size_t image_size;
   sf_dut *dut;
   sf_soc *soc;
-  char *output; /* of the UART, NUL-terminated */
+  const fx_pixel *made; /* by the firmware, in its memory */
+  char *output;         /* of the UART, NUL-terminated */
   size_t output_size, shown;
   double begun, seconds;
   sf_progress progress;
@@ -142,9 +145,15 @@ static sf_status build(job *j)
   return sf_ok();
 }
 
-static const fx_pixel *firmware_pixels(const job *j)
+/* Behind the image as it is in memory now: it may be another one than this tile's. */
+static sf_status find_pixels(job *j)
 {
-  return sf_soc_image_pixels(sf_soc_memory(j->soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE), j->image_size);
+  const size_t at = sf_soc_image_pixels_at(sf_soc_memory(j->soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE));
+  const size_t bytes = pixels_of(j) * sizeof *j->pixels;
+  if (at > SF_SOC_IMAGE_SPACE || bytes > SF_SOC_IMAGE_SPACE - at)
+    return sf_fail(SF_E_DIFFERENCE, "firmware: no room for %zu pixels behind the image", pixels_of(j));
+  j->made = (const fx_pixel *)sf_soc_memory(j->soc, (uint32_t)(SF_SOC_IMAGE + at), bytes);
+  return sf_ok();
 }
 
 /* The firmware's own word on what went wrong is its last line. */
@@ -169,9 +178,10 @@ static sf_status run_firmware(job *j)
   return exit_status ? exit_failure(j, exit_status) : sf_ok();
 }
 
-static sf_status compare(const job *j)
+static sf_status compare(job *j)
 {
-  SF_TRY(sf_soc_compare_pixels(j->pixels, firmware_pixels(j), pixels_of(j), j->tile.width));
+  SF_TRY(find_pixels(j));
+  SF_TRY(sf_soc_compare_pixels(j->pixels, j->made, pixels_of(j), j->tile.width));
   return sf_soc_compare_audit(&j->counts, j->pixels, pixels_of(j), j->output);
 }
 
@@ -183,9 +193,8 @@ static sf_status save_png(const job *j)
   sf_golden golden = {0};
   const sf_golden_job job = {.scene = &j->scene, .scale = j->data.scale};
   SF_TRY(sf_golden_create(&golden, j->tile.width, j->tile.height, SF_PLANES));
-  const fx_pixel *pixels = firmware_pixels(j);
   for (size_t i = 0; i < pixels_of(j); i++)
-    sf_golden_set(&golden, i, &pixels[i], &j->costs[i], sf_golden_step_length(&job));
+    sf_golden_set(&golden, i, &j->made[i], &j->costs[i], sf_golden_step_length(&job));
   const sf_status status = sf_golden_save_png(&golden, j->opt.png);
   sf_golden_free(&golden);
   return status;
@@ -261,14 +270,14 @@ static sf_status work(job *j)
 }
 
 /* The firmware is built beside the programs: BUILD/bin/sf_soc, BUILD/firmware/sf_firmware.elf. */
-static void find_firmware(job *j, const char *program)
+static void find_firmware(job *j)
 {
-  const char *slash = strrchr(program, '/');
-  if (j->opt.firmware)
-    snprintf(j->firmware, sizeof j->firmware, "%s", j->opt.firmware);
+  char program[4000] = "";
+  const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
+  if (j->opt.firmware || length < 0)
+    snprintf(j->firmware, sizeof j->firmware, "%s", j->opt.firmware ? j->opt.firmware : "sf_firmware.elf");
   else
-    snprintf(j->firmware, sizeof j->firmware, "%.*s../firmware/sf_firmware.elf", slash ? (int)(slash - program) + 1 : 0,
-             program);
+    snprintf(j->firmware, sizeof j->firmware, "%s/../firmware/sf_firmware.elf", dirname(program));
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -332,7 +341,7 @@ int main(int argc, char **argv)
   j->opt = (options){.downscale = 1, .seed = 1, .instructions = 10000000000};
   sf_status status = parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK) {
-    find_firmware(j, argv[0]);
+    find_firmware(j);
     sf_cli_catch_signals();
     status = work(j);
   }

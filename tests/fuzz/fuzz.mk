@@ -7,10 +7,10 @@ FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)
 FUZZ ?= $(FUZZ_TARGETS)
 FUZZ_SAN := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all -fno-omit-frame-pointer
 # Beside the target: the firmware is in no library.
-FUZZ_WITH := $(patsubst %,$B/obj/%.o,firmware/sf_blob firmware/sf_driver)
+FUZZ_WITH := $(patsubst %,$B/obj/%.o,firmware/sf_blob firmware/sf_driver firmware/sf_tile)
 FUZZ_REPLAYS := $(FUZZ_TARGETS:%=$B/tests/fuzz/%) $B/tests/fuzz/seeds
 
-$B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/libspikefield.a
+$B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/obj/sim/soc_image.o $(FUZZ_WITH) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)

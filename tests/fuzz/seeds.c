@@ -2,6 +2,7 @@
  * usage: seeds FOLDER */
 #include "firmware/sf_blob.h"
 #include "fuzz.h"
+#include "sim/soc_job.h"
 #include "tests/fx_fixture.h"
 #include "spikefield/io.h"
 #include "spikefield/manifest.h"
@@ -192,6 +193,16 @@ static void put_blob(const fx_net *net)
   put("blob", "small", block, at);
 }
 
+static void put_tile(const fx_scene *scene)
+{
+  const fx_ray rays[2] = {{.count = 3, .step = {1 << 20, 1 << 21, 1 << 22}}};
+  uint8_t *image;
+  size_t size;
+  FUZZ_EXPECT(fuzz_good(sf_soc_image_make(scene, rays, 2, 1, &image, &size)));
+  put("tile", "small", image, size);
+  free(image);
+}
+
 static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t seed)
 {
   fx_scene scene = {0};
@@ -199,7 +210,7 @@ static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t see
   FUZZ_EXPECT(fuzz_good(fx_scene_allocate(&scene, name)));
   fixture_fill(&scene, sizes, seed);
   FUZZ_EXPECT(fuzz_good(fx_scene_save(&scene, seed_path("snn", name))));
-  if (seed == 1) put_blob(&scene.net);
+  if (seed == 1) put_blob(&scene.net), put_tile(&scene);
   fx_scene_free(&scene);
 }
 
