@@ -1,0 +1,138 @@
+/* Units of work over processes: order, early end, lost processes, interruption; no process stays behind. */
+#include "sim/jobs.h"
+#include "spikefield/cli.h"
+#include "spikefield/rng.h"
+#include <check.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { UNITS = 40, NEVER = 1000 };
+
+typedef struct answer {
+  uint64_t unit, value;
+  char bulk[20000]; /* more than a socket takes at once */
+  bool cut;
+} answer;
+
+typedef struct task {
+  uint64_t stop_at, die_at, interrupt_at; /* units */
+  uint64_t next, sum, cut;                /* seen by take */
+} task;
+
+static uint64_t value_of(uint64_t unit)
+{
+  return sf_random_u64(3, 0, unit) >> 32;
+}
+
+static void nap(uint64_t microseconds)
+{
+  const struct timespec t = {.tv_nsec = (long)microseconds * 1000};
+  nanosleep(&t, NULL);
+}
+
+static void work(void *user, uint64_t unit, void *result)
+{
+  const task *t = user;
+  answer *a = result;
+  if (unit == t->die_at) raise(SIGKILL);
+  nap(sf_random_below(1, 0, unit, 3000)); /* so they finish out of order */
+  for (int i = 0; unit >= t->interrupt_at && i < 1000 && !a->cut; i++) nap(5000), a->cut = sf_cli_interrupted();
+  a->unit = unit;
+  a->value = value_of(unit);
+  memset(a->bulk, (int)unit, sizeof a->bulk);
+}
+
+static bool take(void *user, uint64_t unit, const void *result)
+{
+  task *t = user;
+  const answer *a = result;
+  ck_assert_uint_eq(unit, t->next++);
+  ck_assert_uint_eq(a->unit, unit);
+  ck_assert_int_eq(a->bulk[sizeof a->bulk - 1], (char)unit);
+  t->sum += a->value;
+  t->cut += a->cut;
+  if (unit + 1 == t->interrupt_at) kill(getpid(), SIGINT);
+  return unit != t->stop_at;
+}
+
+static sf_status run(task *t, int processes, uint64_t first)
+{
+  const sf_jobs jobs = {.processes = processes,
+                        .first = first,
+                        .end = UNITS,
+                        .result_size = sizeof(answer),
+                        .work = work,
+                        .take = take,
+                        .user = t};
+  t->next = first;
+  const sf_status status = sf_jobs_run(&jobs);
+  ck_assert_int_eq(waitpid(-1, NULL, WNOHANG), -1); /* no child is left, not even a dead one */
+  ck_assert_int_eq(errno, ECHILD);
+  return status;
+}
+
+static uint64_t sum_of(uint64_t first, uint64_t end)
+{
+  uint64_t sum = 0;
+  for (uint64_t u = first; u < end; u++) sum += value_of(u);
+  return sum;
+}
+
+START_TEST(same_for_any_number_of_processes)
+{
+  static const int processes[] = {1, 2, 3, 7, 50};
+  for (int i = 0; i < 5; i++) {
+    task whole = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = NEVER}, early = whole;
+    early.stop_at = 17;
+    ck_assert_int_eq(run(&whole, processes[i], 5).code, SF_OK);
+    ck_assert_uint_eq(whole.sum, sum_of(5, UNITS));
+    ck_assert_int_eq(run(&early, processes[i], 0).code, SF_OK);
+    ck_assert_uint_eq(early.sum, sum_of(0, 18));
+  }
+}
+END_TEST
+
+START_TEST(a_process_dies)
+{
+  for (int processes = 1; processes <= 3; processes++) {
+    task t = {.stop_at = NEVER, .die_at = 11, .interrupt_at = NEVER};
+    const sf_status status = run(&t, processes, 0);
+    ck_assert_int_eq(status.code, SF_E_IO);
+    ck_assert_msg(strstr(status.message, "unit 11 was ended by signal 9") != NULL, "%s", status.message);
+  }
+}
+END_TEST
+
+/* Units begun end early and are taken; none is begun after. */
+START_TEST(interrupted)
+{
+  sf_cli_catch_signals();
+  task t = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = 9};
+  ck_assert_int_eq(run(&t, 3, 0).code, SF_E_STOPPED);
+  ck_assert_uint_ge(t.next, 9);
+  ck_assert_uint_le(t.next, 9 + 3);
+  ck_assert_uint_eq(t.cut, t.next - 9);
+  ck_assert_uint_eq(t.sum, sum_of(0, t.next));
+}
+END_TEST
+
+int main(void)
+{
+  Suite *s = suite_create("jobs");
+  TCase *c = tcase_create("jobs");
+  tcase_set_timeout(c, 30);
+  tcase_add_test(c, same_for_any_number_of_processes);
+  tcase_add_test(c, a_process_dies);
+  tcase_add_test(c, interrupted);
+  suite_add_tcase(s, c);
+  SRunner *runner = srunner_create(s);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}

@@ -1,0 +1,230 @@
+/* The harness's own end of the streams, on an accelerator made up here: tap beats of different layers in any order, and
+ * every way of getting them wrong. The functions of sim/pins.h defined here take the place of the Verilated ones. */
+#include "sim/sim.h"
+#include "spikefield/rng.h"
+#include <check.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SAMPLES = 9, STEPS = 3, BEATS_MAX = SAMPLES * SF_LAYERS * STEPS + 1, RESULTS = 2 * SAMPLES };
+
+typedef struct beat {
+  int layer, step, sample;
+} beat;
+
+/* Takes all input, then shows the beats, some of them only after the results. */
+struct sf_pins {
+  beat tap[BEATS_MAX];
+  int taps, shown, late; /* late: beats after the results */
+  int input, result, results;
+  bool bad_last;
+};
+
+sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg)
+{
+  (void)seed, (void)wave, (void)plusarg;
+  return NULL;
+}
+void sf_pins_dump(sf_pins *pins)
+{
+  (void)pins;
+}
+void sf_pins_close(sf_pins *pins)
+{
+  (void)pins;
+}
+
+static uint64_t mark(const beat *b, int what)
+{
+  return sf_random_u64((uint64_t)what, (uint64_t)(b->layer * 8 + b->step), (uint64_t)b->sample);
+}
+
+static void show_tap(sf_pins *p, sf_pins_out *out)
+{
+  const beat *b = &p->tap[p->shown++];
+  out->tap_valid = true;
+  out->tap_layer = (uint8_t)b->layer;
+  out->tap_step = (uint8_t)b->step;
+  for (int i = 0; i < 2; i++) out->tap_spikes[i] = mark(b, i), out->tap_rows[i] = mark(b, 2 + i);
+  for (int i = 0; i < 96; i++) out->tap_membrane[i] = (uint32_t)mark(b, 4);
+}
+
+void sf_pins_cycle(sf_pins *p, const sf_pins_in *in, sf_pins_out *out)
+{
+  memset(out, 0, sizeof *out);
+  out->s_ready = true;
+  out->arready = out->rvalid = in->arvalid;
+  p->input += in->s_valid && in->s_last;
+  if (p->input < SAMPLES) return;
+  if (p->shown < p->taps - p->late || (p->shown < p->taps && p->result == p->results)) {
+    show_tap(p, out);
+  } else if (p->result < p->results) {
+    out->m_valid = true;
+    out->m_last = (p->result & 1) != p->bad_last;
+    out->m_data = (uint64_t)p->result;
+    p->result += in->m_ready;
+  }
+}
+
+static int steps_of(int layer)
+{
+  return layer == FX_D2 || layer == FX_C3 ? 1 : STEPS;
+}
+
+/* Every layer's beats by sample and step, the layers mixed at random: a layer may be samples ahead of another. */
+static void mix(sf_pins *p, uint64_t seed)
+{
+  int next[SF_LAYERS] = {0};
+  memset(p, 0, sizeof *p);
+  p->results = RESULTS;
+  for (int left = SF_LAYERS, i = 0; left > 0; i++) {
+    const int l = (int)sf_random_below(seed, 0, (uint64_t)i, SF_LAYERS), steps = steps_of(l);
+    if (next[l] == SAMPLES * steps) continue;
+    p->tap[p->taps++] = (beat){l, next[l] % steps, next[l] / steps};
+    left -= ++next[l] == SAMPLES * steps;
+  }
+}
+
+typedef struct bench {
+  sf_pins pins;
+  sf_dut dut;
+  fx_ray ray;
+  int16_t f[SF_FEATURE_MAX];
+  sf_dut_sample sample[SAMPLES];
+  sf_dut_result result[SAMPLES];
+  sf_dut_trace trace[SAMPLES];
+} bench;
+static bench b; /* each test runs in a process of its own */
+
+static void begin(uint64_t seed)
+{
+  const int in[SF_LAYERS] = {32, 128, 31, 128, 128}, out[SF_LAYERS] = {128, 16, 128, 128, 3};
+  memset(&b, 0, sizeof b);
+  mix(&b.pins, seed);
+  b.dut.pins = &b.pins;
+  b.dut.bus = sf_dut_bus(&b.dut);
+  b.dut.net.steps = STEPS;
+  b.dut.seed = seed;
+  b.dut.stall_percent = 30;
+  for (int l = 0; l < SF_LAYERS; l++) b.dut.net.layer[l].n_in = in[l], b.dut.net.layer[l].n_out = out[l];
+  for (int i = 0; i < SAMPLES; i++) b.sample[i] = (sf_dut_sample){&b.ray, i % 4 == 0, b.f};
+}
+
+static sf_status run(void)
+{
+  return sf_dut_run_traced(&b.dut, b.sample, SAMPLES, b.result, b.trace);
+}
+
+static void beat_is_in_place(const beat *at)
+{
+  const int l = at->layer, t = at->step, s = at->sample;
+  for (int i = 0; i < 2; i++) {
+    ck_assert_uint_eq(b.result[s].spikes[l][t][i], steps_of(l) > 1 ? mark(at, i) : 0);
+    ck_assert_uint_eq(b.trace[s].rows[l][t][i], mark(at, 2 + i));
+  }
+  ck_assert_uint_gt(b.result[s].tap_cycle[l][t], 0);
+  if (steps_of(l) > 1) ck_assert_int_eq(b.trace[s].membrane[l][t][0], (int32_t)((uint32_t)mark(at, 4) << 8) >> 8);
+}
+
+START_TEST(layers_in_any_order)
+{
+  for (uint64_t seed = 0; seed < 50; seed++) {
+    begin(seed);
+    b.pins.late = seed % 3 ? (int)seed : 0;
+    const sf_status status = run();
+    ck_assert_msg(status.code == SF_OK, "seed %d: %s", (int)seed, status.message);
+    for (int i = 0; i < b.pins.taps; i++) beat_is_in_place(&b.pins.tap[i]);
+    for (int i = 0; i < SAMPLES; i++) ck_assert_uint_eq(b.result[i].out.sigma, (uint32_t)(2 * i));
+    ck_assert_int_eq(sf_dut_received(&b.dut), SAMPLES);
+  }
+}
+END_TEST
+
+static void expect(const char *text)
+{
+  const sf_status status = run();
+  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+  ck_assert_msg(strstr(status.message, text) != NULL, "'%s' is not in '%s'", text, status.message);
+}
+
+static int find(int layer, int step, int sample)
+{
+  int i = 0;
+  while (b.pins.tap[i].layer != layer || b.pins.tap[i].step != step || b.pins.tap[i].sample != sample) i++;
+  return i;
+}
+
+static void drop(int index)
+{
+  memmove(&b.pins.tap[index], &b.pins.tap[index + 1], (size_t)(--b.pins.taps - index) * sizeof *b.pins.tap);
+}
+
+START_TEST(a_step_out_of_turn)
+{
+  begin(1);
+  b.pins.tap[find(FX_C1, 1, 4)].step = 2;
+  expect("tap beat of layer 2 has step 2, expected 1");
+  begin(1);
+  b.pins.tap[find(FX_D2, 0, 3)].step = 1;
+  expect("tap beat of layer 1 has step 1, expected 0");
+}
+END_TEST
+
+START_TEST(a_beat_is_missing)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    begin(2);
+    drop(find(l, steps_of(l) - 1, SAMPLES - 1));
+    expect("9 results but");
+  }
+}
+END_TEST
+
+START_TEST(a_beat_too_many)
+{
+  begin(3);
+  b.pins.tap[b.pins.taps++] = (beat){FX_C3, 0, 0};
+  expect("tap beat without a sample");
+  begin(3);
+  b.pins.tap[5].layer = 6;
+  expect("tap beat without a sample");
+}
+END_TEST
+
+START_TEST(results_out_of_step)
+{
+  begin(4);
+  b.pins.bad_last = true;
+  expect("result stream out of step");
+  begin(4);
+  b.pins.results = RESULTS + 2, b.pins.late = 1; /* and one more while the tap is waited for */
+  expect("result stream out of step");
+}
+END_TEST
+
+START_TEST(a_result_is_missing)
+{
+  begin(5);
+  b.pins.results = 2 * 4 + 1;
+  expect("hang");
+  ck_assert_int_eq(sf_dut_received(&b.dut), 4);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *s = suite_create("rtl_stream");
+  TCase *c = tcase_create("stream");
+  tcase_add_test(c, layers_in_any_order);
+  tcase_add_test(c, a_step_out_of_turn);
+  tcase_add_test(c, a_beat_is_missing);
+  tcase_add_test(c, a_beat_too_many);
+  tcase_add_test(c, results_out_of_step);
+  tcase_add_test(c, a_result_is_missing);
+  suite_add_tcase(s, c);
+  SRunner *runner = srunner_create(s);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
