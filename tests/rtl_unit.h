@@ -19,6 +19,18 @@ struct random_draw {
   bool percent(int p) { return (*this)(0, 99) < p; }
 };
 
+/* A sink that stalls in `percent` of the cycles and, if at all, now and then for long enough to fill every queue. */
+struct sink_stalls {
+  int percent = 0;
+  uint64_t until = 0;
+  bool operator()(random_draw &draw, uint64_t cycle)
+  {
+    if (cycle < until) return true;
+    if (percent > 0 && draw(0, 1999) == 0) until = cycle + (uint64_t)draw(1, 600);
+    return draw.percent(percent);
+  }
+};
+
 /* A cycle: set inputs, settle(), look at outputs, edge(). */
 template <class module> struct unit {
   VerilatedContext context;

@@ -27,6 +27,7 @@ struct encoder_bench {
   std::deque<beat> expected, next; /* of accepted samples; of the one on offer */
   int accepted = 0, done = 0;
   bool in_ray = false;
+  sink_stalls sink;
   held output, request;
 
   explicit encoder_bench(uint64_t seed) : u(seed), draw(seed)
@@ -44,7 +45,8 @@ struct encoder_bench {
   }
   void timing(int latency, int spread, int stalls, int first)
   {
-    memory.latency = latency, memory.spread = spread, memory.stall = stall = stalls, first_percent = first;
+    memory.latency = latency, memory.spread = spread, memory.stall = stall = sink.percent = stalls, sink.until = 0,
+    first_percent = first;
   }
   void clear(bool hard)
   {
@@ -60,7 +62,7 @@ struct encoder_bench {
   void cycle(int more)
   {
     if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) offer();
-    u.top.m_axis_tready_i = !draw.percent(stall);
+    u.top.m_axis_tready_i = !sink(draw, u.cycle);
     memory.drive(u.top, draw, u.cycle);
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;

@@ -124,6 +124,7 @@ struct grid_bench {
   std::deque<uint32_t> entries; /* that must be asked for */
   sample next;
   int level = 0, accepted = 0, done = 0;
+  sink_stalls sink;
   held output, request;
 
   explicit grid_bench(uint64_t seed) : u(seed), draw(seed)
@@ -133,7 +134,7 @@ struct grid_bench {
   }
   void load(const grid_fixture *fixture, int latency, int spread, int stalls)
   {
-    table = fixture, stall = stalls;
+    table = fixture, stall = sink.percent = stalls, sink.until = 0;
     memory = {fixture, latency, spread, stalls, {}};
     configure_levels(u, table->grid);
     u.top.last_level_i = (uint8_t)(table->grid.levels - 1);
@@ -157,7 +158,7 @@ struct grid_bench {
       set_position(u.top.s_pos_i, next.pos);
       u.top.s_valid_i = 1;
     }
-    u.top.m_ready_i = !draw.percent(stall);
+    u.top.m_ready_i = !sink(draw, u.cycle);
     memory.drive(u.top, draw, u.cycle);
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
