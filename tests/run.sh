@@ -15,6 +15,7 @@ for name in "$@"; do
     pareto) command=("$here/test_pareto.sh" "$build") ;;
     fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
+    golden_bench) command=("$here/golden_bench.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
