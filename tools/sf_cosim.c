@@ -1,5 +1,6 @@
 /* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
 #include "sim/cosim.h"
+#include "sim/other_dut.h"
 #include "spikefield/audit.h"
 #include "spikefield/cli.h"
 #include "spikefield/rng.h"
@@ -13,7 +14,7 @@ typedef struct options {
   int rays, stalls, split;
   uint64_t seed, limit;
   bool json, quiet;
-  const char *wave, *plusarg;
+  const char *wave, *plusarg, *dut, *dut_top;
 } options;
 static const char *const split_name[] = {"test", "train"};
 
@@ -187,7 +188,7 @@ static sf_status run(session *s, const char *scene, const char *data)
 
 int main(int argc, char **argv)
 {
-  session s = {.opt = {.rays = 200, .seed = 1, .stalls = 20}};
+  session s = {.opt = {.rays = 200, .seed = 1, .stalls = 20, .dut_top = "sf_top"}};
   options *o = &s.opt;
   const char *positional[2];
   const sf_option table[] = {
@@ -236,16 +237,30 @@ int main(int argc, char **argv)
        .value = &o->plusarg,
        .argument = "ARG",
        .help = "passed to the simulation, for a fault build: +fault=1"},
+      {.name = "--dut",
+       .type = SF_ARG_STRING,
+       .value = &o->dut,
+       .argument = "FILES",
+       .help =
+           "Verilog sources of another block with the ports of rtl/sf_top.sv, and options of Verilator (docs/kit.md)"},
+      {.name = "--dut-top",
+       .type = SF_ARG_STRING,
+       .value = &o->dut_top,
+       .argument = "NAME",
+       .help = "its module (default sf_top)"},
       {0}};
   const sf_cli cli = {.program = "sf_cosim",
                       .usage = "sf_cosim SCENE.snn DATA [options]",
                       .summary = "Run the Verilog accelerator and the fixed-point core on the same samples and compare "
                                  "everything for equality.\nExit status 1 at the first difference.",
-                      .examples = "  sf_cosim scene.snn data --rays 200 --seed 1\n",
+                      .examples =
+                          "  sf_cosim scene.snn data --rays 200 --seed 1\n"
+                          "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n",
                       .options = table,
                       .min_positional = 2,
                       .max_positional = 2};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  if (status.code == SF_OK && o->dut) status = sf_other_dut_run(o->dut, o->dut_top, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) status = run(&s, positional[0], positional[1]);
   sf_cosim_close(s.cosim);
