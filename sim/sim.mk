@@ -111,3 +111,9 @@ $B/kit/files.o: $B/kit/files.c sim/kit/kit.h
 	$(call say,CC    $@)
 	$Q$(CC) $(CFLAGS_ALL) -c $< -o $@
 $B/bin/sf_export: $(KIT_OBJ)
+
+# sf_cosim --dut builds itself around another accelerator.
+$B/obj/sim/other_dut.o: CFLAGS += -DSF_SOURCE_ROOT='"$(CURDIR)"' -DSF_BUILD='"$(abspath $B)"'
+ifneq ($(DUT_OUT),)
+include sim/dut.mk
+endif

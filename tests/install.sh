@@ -51,6 +51,17 @@ soname=$(readelf -d "$shared" | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p')
 [ -e "$prefix/lib/$soname" ] || fail "$soname is not installed"
 if readelf -d "$shared" | grep -q TEXTREL; then fail "the shared library is not position-independent"; fi
 
+# The golden model of benches: its own names alone, under the same rules, and each of them imported by the package.
+golden=$prefix/lib/libsf_golden_dpi.so
+sed -n 's/^SF_GOLDEN_API.*[ *]\(sf_golden_[a-z_]*\)(.*/\1/p' "$prefix/include/spikefield/sf_golden_dpi.h" | sort >"$work/golden"
+[ "$(wc -l <"$work/golden")" -ge 10 ] || fail "no names found in sf_golden_dpi.h"
+nm -D --defined-only "$golden" | awk '{ print $3 }' | sort | diff "$work/golden" - || fail "libsf_golden_dpi.so exports other names than its header declares"
+sed -n 's/.*import "DPI-C" function.* \(sf_golden_[a-z_]*\)(.*/\1/p' "$prefix/share/spikefield/sf_golden_dpi.sv" | sort | diff "$work/golden" - ||
+  fail "sf_golden_dpi.sv imports other functions than the header declares"
+nm -D --undefined-only "$golden" | awk '{ sub("@.*", "", $2); print $2 }' >"$work/used"
+if grep -xE '_?_?exit|_Exit|abort|printf|vprintf|puts|putchar|perror|stdout|stderr|system|signal|sigaction|setlocale' "$work/used"
+then fail "the golden model prints, exits or changes the process"; fi
+
 # The example, as its own comment compiles it, and against the static library.
 static=$(pkg-config --static --libs spikefield)
 # shellcheck disable=SC2046,SC2086

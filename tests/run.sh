@@ -19,6 +19,8 @@ for name in "$@"; do
     fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
     firmware) command=("$here/test_firmware.sh" "$build") ;;
+    golden_bench) command=("$here/golden_bench.sh" "$build") ;;
+    other_dut) command=("$here/other_dut.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;

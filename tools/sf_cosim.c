@@ -1,6 +1,7 @@
 /* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
 #include "sim/jobs.h"
 #include "sim/lockstep.h"
+#include "sim/other_dut.h"
 #include "spikefield/audit.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
@@ -13,7 +14,7 @@ typedef struct options {
   sf_lockstep_options run;
   int split;
   bool json, quiet;
-  const char *replay, *junit;
+  const char *replay, *junit, *dut, *dut_top;
 } options;
 static const char *const split_name[] = {"test", "train"};
 
@@ -122,7 +123,8 @@ static sf_status run(options *o, const char *scene, const char *data)
 int main(int argc, char **argv)
 {
   options o = {
-      .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = "sf_cosim-difference"}};
+      .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = "sf_cosim-difference"},
+      .dut_top = "sf_top"};
   sf_lockstep_options *r = &o.run;
   const char *positional[2];
   const sf_option table[] = {
@@ -200,6 +202,17 @@ int main(int argc, char **argv)
        .value = &r->plusarg,
        .argument = "ARG",
        .help = "passed to the simulation, for a fault build: +fault=1"},
+      {.name = "--dut",
+       .type = SF_ARG_STRING,
+       .value = &o.dut,
+       .argument = "FILES",
+       .help =
+           "Verilog sources of another block with the ports of rtl/sf_top.sv, and options of Verilator (docs/kit.md)"},
+      {.name = "--dut-top",
+       .type = SF_ARG_STRING,
+       .value = &o.dut_top,
+       .argument = "NAME",
+       .help = "its module (default sf_top)"},
       {0}};
   const sf_cli cli = {.program = "sf_cosim",
                       .usage = "sf_cosim SCENE.snn DATA [options]\n       sf_cosim --replay FILE",
@@ -207,11 +220,13 @@ int main(int argc, char **argv)
                                  "everything for equality.\nExit status 1 at the first difference.",
                       .examples = "  sf_cosim scene.snn data --rays 200 --seed 1\n"
                                   "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
-                                  "  sf_cosim --replay sf_cosim-difference.json\n",
+                                  "  sf_cosim --replay sf_cosim-difference.json\n"
+                                  "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n",
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) status = run(&o, positional[0], positional[1]);
   return sf_cli_finish(&cli, status);

@@ -6,6 +6,7 @@ PREFIX ?= /usr/local
 override PREFIX := $(abspath $(PREFIX))
 LIBDIR ?= $(PREFIX)/lib
 INCLUDEDIR ?= $(PREFIX)/include
+DATADIR ?= $(PREFIX)/share
 OBJCOPY ?= objcopy
 PUBLIC_HEADER := include/spikefield/spikefield.h
 LIB_VERSION := $(shell sed -n 's/^.define SPIKEFIELD_VERSION "\(.*\)"/\1/p' $(PUBLIC_HEADER))
@@ -26,16 +27,32 @@ $B/lib/$(SHARED): $B/lib/spikefield.o
 	$(call say,LD    $@)
 	$Q$(CC) -shared -fopenmp $(SAN) -Wl,-soname,$(SONAME) -Wl,-z,defs -o $@ $^ $(shell pkg-config --libs libcjson) -lm
 
-lib: $B/lib/libspikefield.a $B/lib/$(SHARED) ## the C library, static and shared: build/lib
+# The golden model for SystemVerilog benches: one shared object, which needs no other of these.
+DPI := libsf_golden_dpi.so
+$B/lib/sf_golden_dpi.o: $(filter $B/obj/src/lib/%,$(LIB_OBJ)) $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -r -nostdlib -o $@ $^
+	$Q$(OBJCOPY) --wildcard --keep-global-symbol='sf_golden_*' $@
+
+$B/lib/$(DPI): $B/lib/sf_golden_dpi.o
+	$(call say,LD    $@)
+	$Q$(CC) -shared -fopenmp $(SAN) -Wl,-soname,$(DPI) -Wl,-z,defs -o $@ $^ $(shell pkg-config --libs libcjson) -lm
+
+lib: $B/lib/libspikefield.a $B/lib/$(SHARED) $B/lib/$(DPI) ## the C library, static and shared: build/lib
 
 INSTALLED := $(INCLUDEDIR)/spikefield/spikefield.h $(LIBDIR)/libspikefield.a $(LIBDIR)/$(SHARED) $(LIBDIR)/$(SONAME) \
-  $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc
+  $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc \
+  $(INCLUDEDIR)/spikefield/sf_golden_dpi.h $(LIBDIR)/$(DPI) $(DATADIR)/spikefield/sf_golden_dpi.sv
 
 install: lib ## the C library, its header and its pkg-config file below PREFIX (/usr/local), staged in DESTDIR
 	$(call say,INST  $(DESTDIR)$(PREFIX))
 	$Qinstall -D -m 644 $(PUBLIC_HEADER) $(DESTDIR)$(INCLUDEDIR)/spikefield/spikefield.h
 	$Qinstall -D -m 644 $B/lib/libspikefield.a $(DESTDIR)$(LIBDIR)/libspikefield.a
 	$Qinstall -D -m 755 $B/lib/$(SHARED) $(DESTDIR)$(LIBDIR)/$(SHARED)
+	$Qinstall -D -m 644 include/spikefield/sf_golden_dpi.h $(DESTDIR)$(INCLUDEDIR)/spikefield/sf_golden_dpi.h
+	$Qinstall -D -m 755 $B/lib/$(DPI) $(DESTDIR)$(LIBDIR)/$(DPI)
+	$Qinstall -D -m 644 src/lib/sf_golden_dpi.sv $(DESTDIR)$(DATADIR)/spikefield/sf_golden_dpi.sv
 	$Qln -sf $(SHARED) $(DESTDIR)$(LIBDIR)/$(SONAME) && ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libspikefield.so
 	$Qmkdir -p $(DESTDIR)$(LIBDIR)/pkgconfig && sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|' \
 	  -e 's|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(LIB_VERSION)|' src/lib/spikefield.pc.in \
@@ -43,6 +60,6 @@ install: lib ## the C library, its header and its pkg-config file below PREFIX (
 
 uninstall: ## remove what install put below PREFIX
 	$Qrm -f $(addprefix $(DESTDIR),$(INSTALLED))
-	$Qrmdir $(DESTDIR)$(INCLUDEDIR)/spikefield 2>/dev/null || true
+	$Qrmdir $(DESTDIR)$(INCLUDEDIR)/spikefield $(DESTDIR)$(DATADIR)/spikefield 2>/dev/null || true
 
 .PHONY: lib install uninstall

@@ -1,0 +1,170 @@
+#include "sim/other_dut.h"
+#include "spikefield/audit.h"
+#include "spikefield/io.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+/* SF_SOURCE_ROOT, SF_BUILD: absolute folders of the source tree and of this build (sim/sim.mk). */
+enum { WORDS_MAX = 65536, HASH_LENGTH = 16, PATH_LENGTH = 4096 };
+
+/* One text that names what is built: every word with its absolute path, then the contents' hash of every source. */
+typedef struct request {
+  char words[WORDS_MAX], key[2 * WORDS_MAX];
+  size_t words_used, key_used;
+  char folder[PATH_LENGTH];
+} request;
+
+static sf_status append(char *text, size_t *used, size_t size, const char *more)
+{
+  const size_t length = strlen(more);
+  if (*used + length + 2 > size) return sf_fail(SF_E_RANGE, "--dut: more than %d letters of files", WORDS_MAX);
+  memcpy(text + *used, more, length);
+  text[*used + length] = ' ';
+  text[*used + length + 1] = '\0';
+  *used += length + 1;
+  return sf_ok();
+}
+
+static sf_status absolute(const char *prefix, const char *path, char to[PATH_LENGTH])
+{
+  char full[PATH_MAX];
+  if (!realpath(path, full)) return sf_fail(SF_E_IO, "--dut: %s: %s", path, strerror(errno));
+  if (strpbrk(full, " \t'\"$#:\\")) return sf_fail(SF_E_USAGE, "--dut: %s: make takes no such letter in a path", full);
+  if (snprintf(to, PATH_LENGTH, "%s%s", prefix, full) < PATH_LENGTH) return sf_ok();
+  return sf_fail(SF_E_RANGE, "--dut: %s: the path is too long", path);
+}
+
+static sf_status add_word(request *r, const char *word)
+{
+  char full[PATH_LENGTH], hash[65];
+  const bool plus = strncmp(word, "+incdir+", 8) == 0, letter = strncmp(word, "-I", 2) == 0 && word[2];
+  if (plus || letter) {
+    SF_TRY(absolute(plus ? "+incdir+" : "-I", word + (plus ? 8 : 2), full));
+    SF_TRY(append(r->key, &r->key_used, sizeof r->key, full));
+    return append(r->words, &r->words_used, sizeof r->words, full);
+  }
+  if (word[0] == '-' || word[0] == '+') {
+    if (strpbrk(word, "'\"$#\\;&|<>`()")) return sf_fail(SF_E_USAGE, "--dut: %s: make takes no such letter", word);
+    SF_TRY(append(r->key, &r->key_used, sizeof r->key, word));
+    return append(r->words, &r->words_used, sizeof r->words, word);
+  }
+  SF_TRY(absolute("", word, full));
+  SF_TRY(sf_sha256_file(full, hash));
+  SF_TRY(append(r->key, &r->key_used, sizeof r->key, hash));
+  SF_TRY(append(r->key, &r->key_used, sizeof r->key, full));
+  return append(r->words, &r->words_used, sizeof r->words, full);
+}
+
+static sf_status read_request(request *r, const char *files, const char *top)
+{
+  char hash[65];
+  char *list = strdup(files), *rest = NULL;
+  if (!list) return sf_fail(SF_E_MEMORY, "--dut: no memory");
+  sf_status status = append(r->key, &r->key_used, sizeof r->key, top);
+  for (char *word = strtok_r(list, " \t\n", &rest); word && status.code == SF_OK; word = strtok_r(NULL, " \t\n", &rest))
+    status = add_word(r, word);
+  free(list);
+  SF_TRY(status);
+  if (!r->words_used) return sf_fail(SF_E_USAGE, "--dut names no file");
+  sf_sha256(r->key, r->key_used, hash);
+  if (snprintf(r->folder, sizeof r->folder, SF_BUILD "/dut/%.*s", HASH_LENGTH, hash) < PATH_LENGTH) return sf_ok();
+  return sf_fail(SF_E_RANGE, "--dut: " SF_BUILD ": the path is too long");
+}
+
+/* ---- building ---- */
+
+/* In the child. What make and Verilator say goes to standard error: standard output is the report's. */
+static void become_make(const request *r, const char *top)
+{
+  char files[WORDS_MAX + 8], module[256 + 16], out[PATH_LENGTH + 16];
+  snprintf(files, sizeof files, "DUT=%s", r->words);
+  snprintf(module, sizeof module, "DUT_TOP=%s", top);
+  snprintf(out, sizeof out, "DUT_OUT=%s", r->folder);
+  unsetenv("MAKEFLAGS");
+  unsetenv("MAKELEVEL");
+  dup2(STDERR_FILENO, STDOUT_FILENO);
+  execlp("make", "make", "-s", "-C", SF_SOURCE_ROOT, "B=" SF_BUILD, files, module, out, "dut", (char *)NULL);
+  _exit(127);
+}
+
+static sf_status run_make(const request *r, const char *top)
+{
+  int state = 0;
+  const pid_t child = fork();
+  if (child < 0) return sf_fail(SF_E_IO, "--dut: cannot start make: %s", strerror(errno));
+  if (child == 0) become_make(r, top);
+  while (waitpid(child, &state, 0) < 0)
+    if (errno != EINTR) return sf_fail(SF_E_IO, "--dut: %s", strerror(errno));
+  if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return sf_ok();
+  if (WIFSIGNALED(state)) return sf_fail(SF_E_STOPPED, "--dut: the build was stopped by signal %d", WTERMSIG(state));
+  if (WEXITSTATUS(state) == 127) return sf_fail(SF_E_IO, "--dut: make is not installed");
+  return sf_fail(SF_E_FORMAT, "--dut: module %s does not build; Verilator's messages are above", top);
+}
+
+/* Two runs of the same sources wait for each other. */
+static sf_status build(const request *r, const char *top)
+{
+  char path[PATH_LENGTH + 16];
+  SF_TRY(sf_make_dir(r->folder));
+  snprintf(path, sizeof path, "%s/lock", r->folder);
+  const int lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock < 0 || flock(lock, LOCK_EX)) return sf_fail(SF_E_IO, "%s: %s", path, strerror(errno));
+  const sf_status status = run_make(r, top);
+  close(lock);
+  return status;
+}
+
+/* ---- running ---- */
+
+static bool is_option(const char *argument, const char *name, bool *with_value)
+{
+  const size_t length = strlen(name);
+  *with_value = false;
+  if (strncmp(argument, name, length) != 0) return false;
+  *with_value = argument[length] == '=';
+  return *with_value || argument[length] == '\0';
+}
+
+static void leave_out(char **argv)
+{
+  char **to = argv;
+  bool joined;
+  while (*argv) {
+    if (is_option(*argv, "--dut", &joined) || is_option(*argv, "--dut-top", &joined))
+      argv += joined || !argv[1] ? 1 : 2;
+    else
+      *to++ = *argv++;
+  }
+  *to = NULL;
+}
+
+static sf_status check_name(const char *top)
+{
+  static const char *const letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_";
+  if (top[0] && strlen(top) < 256 && strspn(top, letters) == strlen(top)) return sf_ok();
+  return sf_fail(SF_E_USAGE, "--dut-top: '%s' is not the name of a module", top);
+}
+
+sf_status sf_other_dut_run(const char *files, const char *top, char **argv)
+{
+  char program[PATH_LENGTH + 16];
+  SF_TRY(check_name(top));
+  request *r = calloc(1, sizeof *r);
+  if (!r) return sf_fail(SF_E_MEMORY, "--dut: no memory");
+  sf_status status = read_request(r, files, top);
+  if (status.code == SF_OK) status = build(r, top);
+  snprintf(program, sizeof program, "%s/sf_cosim", r->folder);
+  free(r);
+  SF_TRY(status);
+  leave_out(argv);
+  execv(program, argv);
+  return sf_fail(SF_E_IO, "%s: %s", program, strerror(errno));
+}

@@ -1,0 +1,63 @@
+#!/bin/bash
+# sf_cosim --dut: a top level of another name around another neuron co-simulates with 0 differences; when an included
+# file changes, it is built again and its mistake located; what does not build says where. usage: other_dut.sh BUILD
+set -u
+build=$(cd "$1" && pwd)
+root=$(cd "$(dirname "$0")/.." && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_other.XXXXXX") || exit 1
+built=()
+trap 'rm -rf "$work" "${built[@]}"' EXIT
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+"$build/faults/make_scene" "$work/scene.snn" || exit 1
+"$build/bin/sf_scene" simple -o "$work/data" --size 32 --train 1 --test 2 >/dev/null || exit 1
+# The RTL of this build (which may be a variant), in the order of the kit.
+"$build/bin/sf_export" "$work/scene.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
+rtl=$work/kit/rtl
+mkdir "$work/overlay"
+cp "$root/tests/dut/serial/sf_plif.svh" "$work/overlay"
+sed 's/^module sf_top/module my_block/' "$rtl/sf_top.sv" >"$work/my_block.sv"
+sources=$(grep -v '^sf_top.sv' "$work/kit/rtl.f" | sed "s|^|$rtl/|" | tr '\n' ' ')
+
+# run NAME STATUS OPTION...: the report in NAME.json, standard error in NAME.err
+run() {
+  local name=$1 want=$2 got
+  shift 2
+  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 200 --limit-samples 3000 --seed 7 --quiet --json "$@" \
+    >"$work/$name.json" 2>"$work/$name.err"
+  got=$?
+  while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/$name.err")
+  [ $got -eq "$want" ] || fail "$name: exit status $got, expected $want: $(tail -n 3 "$work/$name.err")"
+}
+field() { sed -nE "s/^.*\"$2\":[[:space:]]*\"?([^\",]*)\"?,?$/\1/p" "$work/$1.json" | head -n 1; }
+has() { grep -qF -- "$2" "$work/$1" || fail "'$2' is not in $1: $(head -n 5 "$work/$1")"; }
+
+my_block=(--dut "+incdir+$work/overlay +incdir+$rtl $sources $work/my_block.sv" --dut-top my_block)
+run serial 0 "${my_block[@]}"
+[ "$(field serial samples)" = 3000 ] && [ "$(field serial differences)" = 0 ] || fail "the other neuron: $(head -n 12 "$work/serial.json")"
+run again 0 "${my_block[@]}"
+[ ! -s "$work/again.err" ] || fail "built again without a change: $(head -n 1 "$work/again.err")"
+
+cp "$root/tests/dut/wrong/sf_plif.svh" "$work/overlay"
+run wrong 1 "${my_block[@]}"
+[ "$(field wrong wire)" = membrane ] || fail "the wrong neuron: $(cat "$work/wrong.err")"
+[ "$(field wrong actual)" = $(($(field wrong expected) - 1)) ] || fail "the wrong neuron is not one too low"
+tail -n 1 "$work/wrong.err"
+
+sed '30s/^/this is no Verilog;/' "$work/my_block.sv" >"$work/broken.sv"
+run broken 1 --dut "+incdir+$rtl $sources $work/broken.sv" --dut-top my_block
+has broken.err "broken.sv:30:"
+has broken.err "module my_block does not build"
+run absent 1 --dut "$work/absent.sv"
+has absent.err "absent.sv"
+run name 2 --dut "$work/my_block.sv" --dut-top 'a b'
+has name.err "--dut-top"
+run nothing 2 --dut " "
+has nothing.err "--dut"
+[ $failures -eq 0 ] && echo "another block co-simulates, its mistake is located, what does not build says where"
+exit $((failures > 0))
