@@ -22,7 +22,7 @@ typedef struct sf_tile_header {
 
 /* The same bytes for the host that writes them and the processor that reads them. */
 _Static_assert(sizeof(sf_tile_header) % 8 == 0, "the first part begins aligned");
-_Static_assert(sizeof(fx_ray) == 88 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
+_Static_assert(sizeof(fx_ray) == 96 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
 
 /* An image, opened. */
 typedef struct sf_tile {
