@@ -1,5 +1,5 @@
 // One neuron, one step: leak, compare, soft reset. Mirror: src/fx/plif.c (fx_plif_step)
-// Included inside a module after sf_round.svh. A function and not an instance per lane: see docs/rtl.md, "Lanes".
+// Included inside a module after sf_round.svh. A function and not an instance per lane: see rtl/README.md, "Lanes".
 // Returns {spike, v after reset}. No-decay mode alone needs the saturation; 0 <= k <= 1.0 and theta >= 1 are
 // enforced by sf_csr.
 function automatic [24:0] sf_plif_step(input signed [23:0] v, input signed [23:0] current, input [12:0] k,

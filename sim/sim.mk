@@ -10,7 +10,7 @@ RTL_ALL := $(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt
 # A build with ARCH has a copy of rtl/ with packages of its own widths.
 RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
 RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
-# Loops over lanes are written for unrolling; see docs/rtl.md.
+# Loops over lanes are written for unrolling; see rtl/README.md.
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
   $(VERILATOR_UNROLL)
