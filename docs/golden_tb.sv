@@ -1,6 +1,6 @@
 // A bench of one's own beside the golden model: random samples into the accelerator, every accepted beat into the
-// model, results and tap beats compared with what it says. The block is programmed from the program.hex of a vector kit of
-// the same scene. How it is built and run: docs/kit.md.
+// model, results and tap beats compared with what it says. The block is programmed from the program.hex of a vector kit
+// of the same scene. How it is built and run: docs/kit.md.
 // Plusargs: +scene=FILE +program=FILE +samples=N
 `timescale 1ns / 1ps
 
@@ -30,8 +30,10 @@ module golden_tb;
           membranes[at(modelled, layer, step)][24*n+:24] =
               24'(sf_golden_dpi::sf_golden_membrane(golden, layer, step, n));
       end
-    result[2*(modelled%DEPTH)] = {sf_golden_dpi::sf_golden_colour(golden, 0), sf_golden_dpi::sf_golden_density(golden)};
-    result[2*(modelled%DEPTH)+1] = {sf_golden_dpi::sf_golden_colour(golden, 2), sf_golden_dpi::sf_golden_colour(golden, 1)};
+    result[2*(modelled%DEPTH)] =
+        {sf_golden_dpi::sf_golden_colour(golden, 0), sf_golden_dpi::sf_golden_density(golden)};
+    result[2*(modelled%DEPTH)+1] =
+        {sf_golden_dpi::sf_golden_colour(golden, 2), sf_golden_dpi::sf_golden_colour(golden, 1)};
     modelled++;
   endtask
 
@@ -77,7 +79,7 @@ module golden_tb;
   endtask
 
   // ---- random samples; a new ray now and then
-  int samples = 100, sent = 0, beat = 0, direction_beats, feature_beats;
+  int samples = 100, sent = 0, beat = 0, features, directions;  // of a sample, of a ray
   bit first = 1;
   function automatic bit [15:0] draw;
     return 16'(int'($urandom_range(4094)) - 2047);
@@ -90,16 +92,16 @@ module golden_tb;
   endfunction
   task automatic offer;
     int of_direction;
-    of_direction = first ? direction_beats : 0;
+    int of_sample;
+    of_direction = first ? (directions + 3) / 4 : 0;
+    of_sample = of_direction + (features + 3) / 4;
     s_valid <= sent < samples;
     if (sent < samples) begin
-      s_data <= beat < of_direction
-          ? draw_beat(4 * beat, sf_golden_dpi::sf_golden_inputs(golden, C1) - sf_golden_dpi::sf_golden_outputs(golden, D2) + 1)
-          : draw_beat(4 * (beat - of_direction), sf_golden_dpi::sf_golden_inputs(golden, D1));
+      s_data <= beat < of_direction ? draw_beat(4 * beat, directions) : draw_beat(4 * (beat - of_direction), features);
       s_user <= first && beat == 0;
-      s_last <= beat == of_direction + feature_beats - 1;
+      s_last <= beat == of_sample - 1;
       beat++;
-      if (beat == of_direction + feature_beats) begin
+      if (beat == of_sample) begin
         beat = 0;
         sent++;
         first = $urandom_range(5) == 0;
@@ -165,9 +167,8 @@ module golden_tb;
     golden = sf_golden_dpi::sf_golden_open(scene, 0);
     if (sf_golden_dpi::sf_golden_error(golden) != "") $fatal(1, "%s", sf_golden_dpi::sf_golden_error(golden));
     steps = sf_golden_dpi::sf_golden_steps(golden);
-    feature_beats = (sf_golden_dpi::sf_golden_inputs(golden, D1) + 3) / 4;
-    direction_beats =
-        (sf_golden_dpi::sf_golden_inputs(golden, C1) - sf_golden_dpi::sf_golden_outputs(golden, D2) + 1 + 3) / 4;
+    features = sf_golden_dpi::sf_golden_inputs(golden, D1);
+    directions = sf_golden_dpi::sf_golden_inputs(golden, C1) - (sf_golden_dpi::sf_golden_outputs(golden, D2) - 1);
     for (int i = 0; i < 5; i++) tapped[i] = 0;
     for (int i = 0; i < WRITES_MAX; i++) image[i] = 48'hffff_0000_0000;  // no register: the end
     $readmemh(program_file, image);

@@ -1,6 +1,6 @@
 #!/bin/bash
-# The vector kit as its user has it, in a folder elsewhere: PASS in Icarus and in Verilator with the same line; one wrong bit
-# in any file, and every planted fault of the RTL, caught and located. usage: kit.sh BUILD
+# The vector kit as its user has it, in a folder elsewhere: PASS in Icarus and in Verilator with the same line; one wrong
+# bit in any file, and every planted fault of the RTL, caught and located. usage: kit.sh BUILD
 set -u
 build=$(cd "$1" && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_kit.XXXXXX") || exit 1

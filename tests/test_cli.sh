@@ -133,7 +133,8 @@ number sf_export --fit-loss -1 nan inf 101 ''
 number sf_export --fit-rays 0 255 -1 nan
 usage --data sf_export model.safetensors -o out --fit
 usage --data sf_export s.snn --vectors out
-usage --vectors sf_export s.snn --vectors out --data d -o scene
+usage --data sf_export model.safetensors -o out --vectors kit
+usage --fit sf_export s.snn --vectors out --data d --fit
 number sf_export --samples 0 4097 nan
 number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x

@@ -30,6 +30,51 @@ static sf_status file_size(const char *path, long long *size)
   return sf_ok();
 }
 
+/* ---- --vectors ---- */
+
+static sf_status write_vectors(const fx_scene *scene, const char *path, const options *o, sf_kit_report *kit)
+{
+  const sf_kit_options how = {.scene_path = path, .seed = o->seed, .rays = o->rays, .samples = o->samples};
+  sf_dataset data;
+  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
+  sf_status status = data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
+  if (status.code == SF_OK) status = sf_kit_write(o->vectors, scene, &data, &how, kit);
+  sf_dataset_free(&data);
+  return status;
+}
+
+static void print_vectors(const sf_kit_report *kit, const char *folder)
+{
+  printf("%s: %d samples of %d rays, %d input beats, %d register writes; %d files, %.1f MB\n", folder, kit->samples,
+         kit->rays, kit->beats, kit->writes, kit->files, 1e-6 * (double)kit->bytes);
+  printf("make -C %s icarus verilator\n", folder);
+}
+
+static cJSON *vectors_json(const sf_kit_report *kit, const char *folder)
+{
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "folder", folder);
+  cJSON_AddNumberToObject(json, "samples", kit->samples);
+  cJSON_AddNumberToObject(json, "rays", kit->rays);
+  cJSON_AddNumberToObject(json, "input_beats", kit->beats);
+  cJSON_AddNumberToObject(json, "register_writes", kit->writes);
+  cJSON_AddNumberToObject(json, "files", kit->files);
+  cJSON_AddNumberToObject(json, "bytes", (double)kit->bytes);
+  return json;
+}
+
+static sf_status put_json(cJSON *json, const char *path)
+{
+  char *text = cJSON_Print(json);
+  cJSON_Delete(json);
+  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the report", path);
+  puts(text);
+  free(text);
+  return sf_ok();
+}
+
+/* ---- report ---- */
+
 static void print_text(const fx_scene *scene, const sf_quant_report *report, const char *path, long long bytes)
 {
   printf("%s: %lld bytes, t_r = %d, %lld grid entries, %d x %d x %d occupancy cells\n", path, bytes, scene->net.steps,
@@ -65,10 +110,10 @@ static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, co
 }
 
 static sf_status print_json(const fx_scene *scene, const sf_quant_report *report, const sf_fit_report *fit,
-                            const char *path, long long bytes)
+                            const sf_kit_report *kit, const options *o, long long bytes)
 {
   cJSON *json = cJSON_CreateObject(), *layers = cJSON_AddArrayToObject(json, "layers");
-  cJSON_AddStringToObject(json, "scene", path);
+  cJSON_AddStringToObject(json, "scene", o->output);
   cJSON_AddNumberToObject(json, "bytes", (double)bytes);
   cJSON_AddNumberToObject(json, "t_r", scene->net.steps);
   cJSON_AddNumberToObject(json, "grid_entries", (double)scene->grid.entries);
@@ -85,12 +130,8 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   for (int l = 0; l < SF_LAYERS; l++)
     cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
   if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the report", path);
-  puts(text);
-  free(text);
-  return sf_ok();
+  if (o->vectors) cJSON_AddItemToObject(json, "vectors", vectors_json(kit, o->vectors));
+  return put_json(json, o->output);
 }
 
 /* ---- --fit ---- */
@@ -182,54 +223,44 @@ static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_
   return status;
 }
 
-/* ---- --vectors ---- */
+/* ---- program ---- */
 
-static sf_status print_vectors(const sf_kit_report *kit, const options *o)
+static sf_status flushed(void)
 {
-  if (!o->json) {
-    printf("%s: %d samples of %d rays, %d input beats, %d register writes; %d files, %.1f MB\n", o->vectors,
-           kit->samples, kit->rays, kit->beats, kit->writes, kit->files, 1e-6 * (double)kit->bytes);
-    printf("make -C %s icarus verilator\n", o->vectors);
-  } else
-    printf("{\"vectors\": {\"samples\": %d, \"rays\": %d, \"input_beats\": %d, \"register_writes\": %d, \"files\": %d, "
-           "\"bytes\": %llu}}\n",
-           kit->samples, kit->rays, kit->beats, kit->writes, kit->files, (unsigned long long)kit->bytes);
   return fflush(stdout) ? sf_fail(SF_E_IO, "standard output: the report was not written") : sf_ok();
 }
-
-static sf_status vectors_of_data(const fx_scene *scene, const char *path, const options *o)
-{
-  const sf_kit_options how = {.scene_path = path, .seed = o->seed, .rays = o->rays, .samples = o->samples};
-  sf_kit_report kit;
-  sf_dataset data;
-  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
-  sf_status status = data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
-  if (status.code == SF_OK) status = sf_kit_write(o->vectors, scene, &data, &how, &kit);
-  sf_dataset_free(&data);
-  return status.code == SF_OK ? print_vectors(&kit, o) : status;
-}
-
-static sf_status export_vectors(const char *path, const options *o)
-{
-  fx_scene scene;
-  SF_TRY(fx_scene_load(&scene, path));
-  const sf_status status = vectors_of_data(&scene, path, o);
-  fx_scene_free(&scene);
-  return status;
-}
-
-/* ---- program ---- */
 
 static sf_status save_and_report(const fx_scene *scene, const options *o, const sf_quant_report *report,
                                  const sf_fit_report *fit)
 {
   long long bytes = 0;
+  sf_kit_report kit;
   SF_TRY(fx_scene_save(scene, o->output));
   SF_TRY(file_size(o->output, &bytes));
-  if (o->json) SF_TRY(print_json(scene, report, fit, o->output, bytes));
+  if (o->vectors) SF_TRY(write_vectors(scene, o->output, o, &kit));
+  if (o->json) SF_TRY(print_json(scene, report, fit, &kit, o, bytes));
   if (!o->json) print_text(scene, report, o->output, bytes);
   if (!o->json && fit) sf_fit_print(stdout, fit);
-  return fflush(stdout) ? sf_fail(SF_E_IO, "standard output: the report was not written") : sf_ok();
+  if (!o->json && o->vectors) print_vectors(&kit, o->vectors);
+  return flushed();
+}
+
+/* A scene that is there: its vectors alone. */
+static sf_status export_vectors(const char *path, const options *o)
+{
+  fx_scene scene;
+  sf_kit_report kit;
+  SF_TRY(fx_scene_load(&scene, path));
+  const sf_status status = write_vectors(&scene, path, o, &kit);
+  fx_scene_free(&scene);
+  SF_TRY(status);
+  if (o->json) {
+    cJSON *json = cJSON_CreateObject();
+    cJSON_AddItemToObject(json, "vectors", vectors_json(&kit, o->vectors));
+    SF_TRY(put_json(json, path));
+  } else
+    print_vectors(&kit, o->vectors);
+  return flushed();
 }
 
 static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
@@ -255,10 +286,10 @@ static sf_status export_scene(const char *path, const options *o)
 
 static sf_status check_options(const options *o)
 {
-  if (o->vectors && o->output) return sf_fail(SF_E_USAGE, "--vectors takes a scene, -o a model: one after the other");
   if (o->vectors && !o->data) return sf_fail(SF_E_USAGE, "--vectors needs --data DATA: the views to draw rays from");
-  if (o->vectors) return sf_ok();
-  if (!o->output) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
+  if (!o->output && o->fit)
+    return sf_fail(SF_E_USAGE, "--fit needs --output (-o) SCENE: the vectors alone fit nothing");
+  if (!o->output && !o->vectors) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
   if (o->fit && !o->data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
   return sf_ok();
 }
@@ -325,7 +356,7 @@ int main(int argc, char **argv)
        .type = SF_ARG_STRING,
        .value = &o.vectors,
        .argument = "DIR",
-       .help = "write programming, stimulus, everything expected, RTL and bench of SCENE.snn into DIR (docs/kit.md)"},
+       .help = "write programming, stimulus, everything expected, RTL and bench of the scene into DIR (docs/kit.md)"},
       {.name = "--samples",
        .type = SF_ARG_INT,
        .value = &o.samples,
@@ -343,22 +374,22 @@ int main(int argc, char **argv)
       {.name = "--quiet", .letter = 'q', .type = SF_ARG_FLAG, .value = &o.quiet, .help = "no progress line"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o.json, .help = "print the report as JSON"},
       {0}};
-  const sf_cli cli = {
-      .program = "sf_export",
-      .usage = "sf_export MODEL -o SCENE [options]\n       sf_export SCENE --vectors DIR --data DATA [options]",
-      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
-                 "the accelerator and the firmware; writes vectors of a scene for any simulator.",
-      .examples = "  sf_export model.safetensors -o scene.snn\n"
-                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
-                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
-                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
-                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n",
-      .options = table,
-      .min_positional = 1,
-      .max_positional = 1};
+  const sf_cli cli = {.program = "sf_export",
+                      .usage = "sf_export MODEL -o SCENE [--vectors DIR] [options]\n       sf_export SCENE --vectors "
+                               "DIR --data DATA [options]",
+                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
+                                 "the accelerator and the firmware; writes vectors of a scene for any simulator.",
+                      .examples = "  sf_export model.safetensors -o scene.snn\n"
+                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
+                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
+                                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
+                                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n",
+                      .options = table,
+                      .min_positional = 1,
+                      .max_positional = 1};
   const char *model_path = NULL;
   sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
   if (status.code == SF_OK) status = check_options(&o);
-  if (status.code == SF_OK) status = o.vectors ? export_vectors(model_path, &o) : export_scene(model_path, &o);
+  if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_vectors(model_path, &o);
   return sf_cli_finish(&cli, status);
 }

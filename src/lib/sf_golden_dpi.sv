@@ -15,8 +15,8 @@ package sf_golden_dpi;
   import "DPI-C" function int sf_golden_inputs(input chandle golden, input int layer);
   import "DPI-C" function int sf_golden_outputs(input chandle golden, input int layer);
 
-  // For a monitor: every beat that the block accepts on its input stream. 1: that was a sample, its results are there; 0: it
-  // goes on; -1: a packet that the block has to refuse.
+  // For a monitor: every beat that the block accepts on its input stream. 1: that was a sample, its results are there;
+  // 0: it goes on; -1: a packet that the block has to refuse.
   import "DPI-C" function int sf_golden_beat(input chandle golden, input longint unsigned data, input int user,
                                              input int last);
   // The same at once: 16 harmonics and 32 features of 16 bits, the first in bits 15:0. first: begins a ray. 1, or -1.
@@ -38,8 +38,8 @@ package sf_golden_dpi;
   import "DPI-C" function int sf_golden_current(input chandle golden, input int layer, input int step,
                                                 input int neuron);
 
-  // The register window, by 64-bit place 0..511: (event * 8 + layer) * 8 + step; samples at 56, rays at 57. Places that count
-  // clock cycles are 0.
+  // The register window, by 64-bit place 0..511: (event * 8 + layer) * 8 + step; samples at 56, rays at 57. Places that
+  // count clock cycles are 0.
   import "DPI-C" function longint unsigned sf_golden_counter(input chandle golden, input int at);
   import "DPI-C" function void sf_golden_clear_counters(input chandle golden);
 endpackage

@@ -1,5 +1,5 @@
-// Another neuron with the behaviour of rtl/sf_plif.svh: sign and magnitude, the product built bit by bit of the leak, the
-// rounding carried in as its lowest term. No multiplication, no sf_rshift_round, no sf_sat.
+// Another neuron with the behaviour of rtl/sf_plif.svh: sign and magnitude, the product built bit by bit of the leak,
+// the rounding carried in as its lowest term. No multiplication, no sf_rshift_round, no sf_sat.
 function automatic [24:0] sf_plif_step(input signed [23:0] v, input signed [23:0] current, input [12:0] k,
                                        input signed [23:0] theta, input [1:0] mode, input first);
   reg signed [24:0] from;
