@@ -9,7 +9,7 @@
 
 module sf_core #(
     parameter TAP = 1,
-    parameter LANES = sf_arch_pkg::LANES
+    parameter LANES = 128
 ) (
     input  wire                clk_i,
     input  wire                rst_ni,
@@ -70,7 +70,7 @@ module sf_core #(
   // Sizes; sf_csr has checked that they are consistent.
   wire [7:0] n_h = n_out_i[15:8] - 8'd1;
   wire [7:0] n_dir = n_in_i[23:16] - n_h;
-  wire unused_ok = &{1'b0, n_out_i[39:32], n_in_i[39:24], n_in_i[15:6], n_h[7:5], n_dir[7:5], theta_i[119:96], theta_i[47:24],
+  wire unused_ok = &{1'b0, wrow_i, n_out_i[39:32], n_in_i[39:24], n_in_i[15:6], n_h[7:5], n_dir[7:5], theta_i[119:96], theta_i[47:24],
                      k_i[64:52], k_i[25:13]};
 
   // ---- neurons: what waits for its turn. The layer nearest to the output goes first.

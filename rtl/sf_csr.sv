@@ -1,7 +1,9 @@
 // Registers over AXI4-Lite. Offsets and fields: include/spikefield/csr.def. One write and one read at a time.
 `default_nettype none
 
-module sf_csr (
+module sf_csr #(
+    parameter LANES = sf_arch_pkg::LANES
+) (
     input  wire         clk_i,
     input  wire         rst_ni,
     // AXI4-Lite
@@ -110,7 +112,8 @@ module sf_csr (
   wire wshort = wlayer == sf_op_pkg::D1 || wlayer == sf_op_pkg::C1;
   wire minus_128 = wdata_i[7:0] == 8'h80 || wdata_i[15:8] == 8'h80 || wdata_i[23:16] == 8'h80
       || wdata_i[31:24] == 8'h80;
-  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (wshort && wrow > 7'd31) || minus_128;
+  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (wshort && wrow > 7'd31)
+      || (!wnarrow && {1'b0, wword} >= 6'(LANES / 4)) || (!wshort && {1'b0, wrow} >= 8'(LANES)) || minus_128;
   assign we_o = config_write && to_weight && !weight_bad;
   assign wlayer_o = wlayer;
   assign wrow_o = wrow;
@@ -129,9 +132,9 @@ module sf_csr (
   wire [7:0] c3_in = n_in_q[39:32];
   wire [7:0] c3_out = n_out_q[39:32];
   wire [8:0] n_h = {1'b0, d2_out} - 9'd1;
-  wire bad_size = d1_in == 8'd0 || d1_in > 8'd32 || d1_out == 8'd0 || d1_out > 8'd128 || d2_in != d1_out
+  wire bad_size = d1_in == 8'd0 || d1_in > 8'd32 || d1_out == 8'd0 || d1_out > 8'(LANES) || d2_in != d1_out
       || d2_out == 8'd0 || d2_out > 8'd16 || c1_in == 8'd0 || {1'b0, c1_in} < n_h || {1'b0, c1_in} > n_h + 9'd16
-      || c1_out == 8'd0 || c1_out > 8'd128 || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'd128
+      || c1_out == 8'd0 || c1_out > 8'(LANES) || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'(LANES)
       || c3_in != c2_out || c3_out != 8'd3;
   wire bad_steps = steps_q == 4'd0 || steps_q > 4'd8;
   localparam [12:0] LEAK_ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
@@ -232,7 +235,7 @@ module sf_csr (
     case (ra)
       sf_csr_pkg::ID: rdata_d = sf_csr_pkg::ID_RESET;
       sf_csr_pkg::VERSION: rdata_d = sf_csr_pkg::VERSION_RESET;
-      sf_csr_pkg::CONFIG: rdata_d = sf_csr_pkg::CONFIG_RESET;
+      sf_csr_pkg::CONFIG: rdata_d = {sf_csr_pkg::CONFIG_RESET[31:8], 8'(LANES)};
       sf_csr_pkg::STATUS: rdata_d = {28'd0, |error_q, counters_busy_i, active_i, running_q};
       sf_csr_pkg::ERROR: rdata_d = {21'd0, error_q};
       sf_csr_pkg::IRQ_ENABLE: rdata_d = {30'd0, irq_enable_q};

@@ -1,5 +1,5 @@
-// Accumulators of a layer fed by values (D1, C1): one row of weights times one value per cycle. Mirror:
-// src/fx/current.c. Width: |sum| <= 32 * 2048 * 127 < 2^23.
+// Accumulators of a layer fed by values (D1, C1): one row of weights times one value per cycle.
+// Mirror: src/fx/current.c. Width: |sum| <= 32 * 2048 * 127 < 2^23.
 // Datapath registers have no reset: the first row of a sum defines them.
 `default_nettype none
 

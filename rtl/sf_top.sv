@@ -4,7 +4,8 @@
 `default_nettype none
 
 module sf_top #(
-    parameter TAP = 1
+    parameter TAP = 1,
+    parameter LANES = sf_arch_pkg::LANES  // neurons of the widest layer: 32, 64 or 128; CONFIG says it
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -82,7 +83,16 @@ module sf_top #(
   wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
   wire [7:0] n_dir = n_in[23:16] - (n_out[15:8] - 8'd1);
 
-  sf_csr u_csr (
+  // The tap's ports are as wide as the widest build's.
+  wire [LANES-1:0] tap_spikes, tap_rows;
+  wire [24*LANES-1:0] tap_membrane;
+  assign tap_spikes_o = 128'(tap_spikes);
+  assign tap_rows_o = 128'(tap_rows);
+  assign tap_membrane_o = 3072'(tap_membrane);
+
+  sf_csr #(
+      .LANES(LANES)
+  ) u_csr (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .awvalid_i      (s_axil_awvalid_i),
@@ -157,7 +167,8 @@ module sf_top #(
   );
 
   sf_core #(
-      .TAP(TAP)
+      .TAP  (TAP),
+      .LANES(LANES)
   ) u_core (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
@@ -203,9 +214,9 @@ module sf_top #(
       .tap_valid_o    (tap_valid_o),
       .tap_layer_o    (tap_layer_o),
       .tap_step_o     (tap_step_o),
-      .tap_spikes_o   (tap_spikes_o),
-      .tap_rows_o     (tap_rows_o),
-      .tap_membrane_o (tap_membrane_o)
+      .tap_spikes_o   (tap_spikes),
+      .tap_rows_o     (tap_rows),
+      .tap_membrane_o (tap_membrane)
   );
 
   sf_readout u_readout (
@@ -286,7 +297,7 @@ module sf_top #(
 
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
   initial begin
-    if (sf_arch_pkg::LANES != 128 || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
+    if ((LANES != 32 && LANES != 64 && LANES != 128) || sf_arch_pkg::LANES != 128 || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
         || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 16 || sf_arch_pkg::LAYERS != 5
         || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
         || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24

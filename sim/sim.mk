@@ -88,7 +88,8 @@ gen-check: $B/bin/sf_gen ## generated files are those that the sources give
 	  diff $B/gen-check/spikefield.core spikefield.core && tools/check_mirror.sh
 
 lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
-	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
+	@cd $(RTL_ROOT) && for lanes in 32 64 128; do \
+	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi

@@ -22,6 +22,7 @@ for name in "$@"; do
     golden_bench) command=("$here/golden_bench.sh" "$build") ;;
     other_dut) command=("$here/other_dut.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
+    lanes) command=("$here/lanes.sh" "$build") ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
     cosim_split) command=("$here/cosim_split.sh" "$build") ;;
