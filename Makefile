@@ -134,6 +134,8 @@ asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 
 include tests/fuzz/fuzz.mk
 
+include sim/coverage.mk
+
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
 	  --suppress=missingInclude -Iinclude -Isrc src tools firmware

@@ -14,10 +14,17 @@ RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
   $(VERILATOR_UNROLL)
+# COVERAGE: folder in which every accelerator that is closed leaves its coverage; see sim/coverage.mk.
+ifneq ($(COVERAGE),)
+VERILATOR_FLAGS += --coverage-line --coverage-toggle
+COVERAGE_FLAGS := -DSF_COVERAGE='"$(abspath $(COVERAGE))"' -DVM_COVERAGE=1
+COVERAGE_OBJ := verilated_cov.o
+$B/obj/sim/cover.o: CFLAGS += $(COVERAGE_FLAGS)
+endif
 VERILATED_OPT := OPT_FAST=-O2 OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(wildcard sim/*.c) firmware/sf_driver.c firmware/sf_blob.c)
-VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o)
+VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
 # $1 folder of the library, $2 folder that holds rtl/, $3 prerequisites
 define verilated_rule
@@ -31,20 +38,20 @@ $1/Vsf_top__ALL.a: $1/Vsf_top.mk
 	@touch $$@
 $1/pins.o: sim/pins.cpp sim/pins.h $1/Vsf_top.mk
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
+	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
 $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$(call say,AR    $$@)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
 endef
 
-DUT_TESTS += test_rtl_ports test_rtl_hard test_rtl_stream test_jobs
+DUT_TESTS += test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 
 $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX   $<)
-	$Q$(CXX) -std=c++17 -O2 -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
+	$Q$(CXX) -std=c++17 -O2 $(COVERAGE_FLAGS) -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
 
 $B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
 	$(call say,GEN   $(@D)/rtl)
