@@ -144,6 +144,8 @@ ASAN_TESTS := $(filter-out $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 tests/run.sh $B $(ASAN_TESTS) fuzz
 
+include sim/coverage.mk
+
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
 	  --suppress=missingInclude -Iinclude -Isrc src tools firmware

@@ -7,6 +7,7 @@ enum { BUS_PATIENCE = 4096, STREAM_AW = 1, STREAM_W, STREAM_B, STREAM_AR, STREAM
 void sf_dut_tick(sf_dut *dut)
 {
   sf_pins_cycle(dut->pins, &dut->in, &dut->out);
+  sf_phase_follow(&dut->phase, &dut->in, &dut->out);
   dut->cycle++;
   if (dut->each_cycle) dut->each_cycle(dut->each_cycle_context);
 }
@@ -31,6 +32,7 @@ static uint32_t bus_read(void *context, uint32_t offset)
     }
     if (dut->in.rready && dut->out.rvalid) {
       dut->in.rready = false;
+      sf_cover_read(dut->cover, offset, dut->out.rdata);
       return dut->out.rdata;
     }
   }
@@ -43,6 +45,7 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
 {
   sf_dut *dut = context;
   bool addressed = false, given = false;
+  sf_cover_write(dut->cover, offset, value, dut->phase);
   dut->in.wstrb = 0xf;
   for (int i = 0; i < BUS_PATIENCE; i++) {
     dut->in.awaddr = offset;
@@ -55,6 +58,7 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
     if (dut->in.wvalid && dut->out.wready) given = true, dut->in.wvalid = false;
     if (dut->in.bready && dut->out.bvalid) {
       dut->in.bready = false;
+      if (offset == SF_CSR_CTRL && value & SF_CSR_CTRL_SOFT_RESET) dut->phase = SF_PHASE_IDLE;
       dut->bus_response = dut->out.bresp;
       return;
     }

@@ -1,4 +1,5 @@
 #include "sim/compare.h"
+#include "sim/cover.h"
 #include "spikefield/audit.h"
 
 typedef struct comparison {
@@ -79,6 +80,7 @@ bool sf_compare_sample(const fx_net *net, const fx_trace *core, const fx_out *co
   for (int o = 0; o < 3; o++)
     if (core_out->colour[o] != result->out.colour[o])
       return differs(&c, FX_C3, last, o, "colour", core_out->colour[o], result->out.colour[o], result->cycle);
+  sf_cover_sample(net, core, result);
   return true;
 }
 

@@ -35,6 +35,7 @@ sf_status sf_dut_open_bare(sf_dut **dut_out, const sf_dut_options *options)
   dut->stall_percent = (uint32_t)options->stall_percent;
   dut->wave_from = options->wave_from;
   dut->bus = sf_dut_bus(dut);
+  dut->cover = sf_cover_open();
   for (int i = 0; i < RESET_CYCLES; i++) sf_dut_tick(dut);
   dut->in.rst_n = true;
   sf_dut_tick(dut);
@@ -108,5 +109,6 @@ void sf_dut_close(sf_dut *dut)
 {
   if (!dut) return;
   sf_pins_close(dut->pins);
+  sf_cover_close(dut->cover);
   free(dut);
 }

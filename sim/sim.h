@@ -2,7 +2,7 @@
 #ifndef SPIKEFIELD_SIM_SIM_H
 #define SPIKEFIELD_SIM_SIM_H
 #include "firmware/sf_driver.h"
-#include "sim/pins.h"
+#include "sim/cover.h"
 #include "spikefield/dut.h"
 
 struct sf_dut {
@@ -19,6 +19,9 @@ struct sf_dut {
   int wave_from, received;
   void (*each_cycle)(void *context); /* a system around the accelerator moves its streams here; or NULL */
   void *each_cycle_context;
+  uint64_t stall_cycle; /* of the last bubble or back-pressure */
+  sf_cover *cover;      /* NULL but in a build for coverage */
+  sf_phase phase;
 };
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */

@@ -14,6 +14,13 @@ RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
   $(VERILATOR_UNROLL)
+# COVERAGE: folder in which every accelerator that is closed leaves its coverage; see sim/coverage.mk.
+ifneq ($(COVERAGE),)
+VERILATOR_FLAGS += --coverage-line --coverage-toggle
+COVERAGE_FLAGS := -DSF_COVERAGE='"$(abspath $(COVERAGE))"' -DVM_COVERAGE=1
+COVERAGE_OBJ := verilated_cov.o
+$B/obj/sim/cover.o: CFLAGS += $(COVERAGE_FLAGS)
+endif
 # Lanes are statements of the same shape: the compiler makes vectors of them, if it is told not to count the cost (11 to 17
 # thousand samples/s; -O3 instead gains nothing).
 VERILATED_SIMD := -march=native -ftree-slp-vectorize -fvect-cost-model=unlimited
@@ -22,7 +29,7 @@ VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
 SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_blob.c sf_tile.c sf_stream.c))
-VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o)
+VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
 # $1 folder of the library, $2 folder that holds rtl/, $3 prerequisites
 define verilated_rule
@@ -36,20 +43,20 @@ $1/Vsf_top__ALL.a: $1/Vsf_top.mk
 	@touch $$@
 $1/pins.o: sim/pins.cpp sim/pins.h $1/Vsf_top.mk
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
+	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
 $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$(call say,AR    $$@)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
 endef
 
-DUT_TESTS += test_rtl_ports test_rtl_hard test_rtl_stream test_jobs test_soc
+DUT_TESTS += test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs test_soc
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 
 $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX   $<)
-	$Q$(CXX) -std=c++17 -O2 -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
+	$Q$(CXX) -std=c++17 -O2 $(COVERAGE_FLAGS) -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
 
 $B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
 	$(call say,GEN   $(@D)/rtl)

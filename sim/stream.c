@@ -14,7 +14,8 @@ typedef struct run {
   sf_dut_trace *trace;
   int n, sent;
   int beat, beats, out_beat;
-  int taps[SF_LAYERS]; /* beats seen */
+  int taps[SF_LAYERS];           /* beats seen */
+  uint64_t tap_cycle[SF_LAYERS]; /* of the last one */
   uint64_t packet[SF_PACKET_MAX];
   uint64_t progress; /* cycle of the last beat */
 } run;
@@ -90,6 +91,8 @@ static sf_status observe(run *r)
                    t, step, r->dut->cycle);
   r->taps[l]++;
   r->result[at].tap_cycle[l][t] = r->dut->cycle;
+  r->result[at].stalled[l][t] = r->dut->stall_cycle > r->tap_cycle[l];
+  r->tap_cycle[l] = r->dut->cycle;
   if (is_spiking(l)) memcpy(r->result[at].spikes[l][t], out->tap_spikes, sizeof out->tap_spikes);
   if (!r->trace) return sf_ok();
   memcpy(r->trace[at].rows[l][t], out->tap_rows, sizeof out->tap_rows);
@@ -115,6 +118,8 @@ static sf_status step(run *r)
   offer(r);
   dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT);
   sf_dut_tick(dut);
+  if ((dut->out.s_ready && !dut->in.s_valid && r->sent < r->n) || (dut->out.m_valid && !dut->in.m_ready))
+    dut->stall_cycle = dut->cycle;
   accept_input(r);
   SF_TRY(accept_output(r));
   SF_TRY(observe(r));
@@ -144,6 +149,7 @@ static sf_status wait_for_taps(run *r)
 sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result, sf_dut_trace *trace)
 {
   run r = {.dut = dut, .sample = sample, .result = result, .trace = trace, .n = n, .progress = dut->cycle};
+  for (int l = 0; l < SF_LAYERS; l++) r.tap_cycle[l] = dut->cycle;
   memset(result, 0, (size_t)n * sizeof *result);
   if (trace) memset(trace, 0, (size_t)n * sizeof *trace);
   dut->received = 0;

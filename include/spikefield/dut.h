@@ -24,6 +24,7 @@ typedef struct sf_dut_result {
   fx_out out;
   uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* as fx_trace; from the tap port */
   uint64_t tap_cycle[SF_LAYERS][SF_T_MAX]; /* clock cycle of each tap beat; D2 and C3 have one, at step 0 */
+  bool stalled[SF_LAYERS][SF_T_MAX];       /* a bubble or back-pressure since the layer\'s last beat */
   uint64_t cycle;                          /* clock cycle at which the result left */
 } sf_dut_result;
 

@@ -1,0 +1,14 @@
+# Line, toggle and functional coverage of the RTL, in a build of its own. Included by the Makefile.
+COVER := $B/coverage
+COVER_TESTS := test_rtl test_rtl_ports test_rtl_hard test_rtl_disturbed
+coverage: ## line, toggle and functional coverage of the RTL: table, holes, build/coverage/lcov.info (about 15 minutes)
+	@mkdir -p $(COVER)/points
+	@$(MAKE) B=$(COVER) COVERAGE=$(COVER)/points coverage-run
+
+coverage-run: $(COVER_TESTS:%=$B/tests/%) $B/bin/sf_cosim $B/bin/sf_scene $B/coverage_report $B/faults/make_scene
+	@tests/coverage.sh $B $(COVER_TESTS)
+
+$B/coverage_report: $B/obj/tests/coverage/report.o $(DUT_LIBS) $B/libspikefield.a
+	$(call say,LD    $@)
+	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
+.PHONY: coverage coverage-run

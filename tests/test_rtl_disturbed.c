@@ -1,0 +1,308 @@
+/* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, register accesses
+ * that overlap. Afterwards it works as if nothing had been. */
+#include "tests/rtl_fixture.h"
+
+enum { PATIENCE = 4000 };
+
+static uint32_t get(sf_dut *dut, uint32_t offset)
+{
+  return dut->bus.read(dut->bus.context, offset);
+}
+static void put(sf_dut *dut, uint32_t offset, uint32_t value)
+{
+  dut->bus.write(dut->bus.context, offset, value);
+}
+
+/* Everything is programmed anew; results and counters are right from the first sample on. */
+static void works(sf_dut *dut)
+{
+  fx_counts counts = {0};
+  typical(61);
+  dut->in.s_valid = dut->in.m_ready = false;
+  ck_ok(sf_dut_load(dut, &net_of_test.net));
+  ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
+  run_batch(dut, &net_of_test.net, 3, &counts, 61);
+  same_counts(dut, &counts, 61);
+}
+
+/* Samples in with bubbles; results are taken now and then. One cycle. */
+typedef struct feed {
+  uint64_t words[SF_PACKET_MAX];
+  int beat, beats, sample;
+  uint32_t m_percent; /* chance that a result beat is taken */
+} feed;
+
+static void feed_cycle(sf_dut *dut, feed *f, random_source *r)
+{
+  if (f->beat == f->beats) {
+    f->beats = sf_dut_packet(&net_of_test.net, &shared.sample[f->sample++ % 3], f->words);
+    f->beat = 0;
+  }
+  if (!dut->in.s_valid) dut->in.s_valid = draw(r, 0, 3) > 0;
+  dut->in.s_data = f->words[f->beat];
+  dut->in.s_user = f->beat == 0 && shared.sample[(f->sample - 1) % 3].first;
+  dut->in.s_last = f->beat == f->beats - 1;
+  dut->in.m_ready = draw(r, 0, 99) < (int64_t)f->m_percent;
+  sf_dut_tick(dut);
+  if (!dut->in.s_valid || !dut->out.s_ready) return;
+  f->beat++;
+  dut->in.s_valid = false;
+}
+
+static sf_dut *begin(uint64_t seed)
+{
+  typical(60);
+  return open_dut(&net_of_test.net, seed, 20);
+}
+
+static void hard_reset(sf_dut *dut, int cycles)
+{
+  dut->in.rst_n = false;
+  dut->in.s_valid = dut->in.m_ready = false;
+  for (int i = 0; i < cycles; i++) {
+    sf_dut_tick(dut);
+    if (i > 0) ck_assert(!dut->out.m_valid && !dut->out.bvalid && !dut->out.rvalid && !dut->out.tap_valid);
+  }
+  dut->in.rst_n = true;
+  dut->phase = SF_PHASE_IDLE;
+  sf_dut_tick(dut);
+  ck_assert(!dut->out.s_ready && !dut->out.irq);
+  ck_assert_uint_eq(get(dut, SF_CSR_STATUS) & (SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE | SF_CSR_STATUS_ERROR), 0);
+}
+
+START_TEST(hard_reset_at_any_time)
+{
+  random_source r = {62, 0};
+  sf_dut *dut = begin(62);
+  for (int trial = 0; trial < 12; trial++) {
+    feed f = {.m_percent = (uint32_t)draw(&r, 0, 1) * 60};
+    typical(60);
+    ck_ok(sf_dut_load(dut, &net_of_test.net));
+    for (int64_t cycle = draw(&r, 1, 700); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
+    hard_reset(dut, 1 + trial % 3);
+    works(dut);
+  }
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* Waits for the phase at the pins, then strikes at once. */
+START_TEST(soft_reset_in_every_phase)
+{
+  random_source r = {63, (uint64_t)_i << 32};
+  sf_dut *dut = begin(63);
+  for (int trial = 0; trial < 3; trial++) {
+    feed f = {.m_percent = 30};
+    int cycle = 0;
+    typical(60);
+    ck_ok(sf_dut_load(dut, &net_of_test.net));
+    for (; cycle < PATIENCE && (cycle < trial * 200 || dut->phase != (sf_phase)_i); cycle++) feed_cycle(dut, &f, &r);
+    ck_assert_int_lt(cycle, PATIENCE);
+    dut->in.s_valid = dut->in.m_ready = false;
+    sf_driver_reset(&dut->bus);
+    ck_assert_uint_eq(get(dut, SF_CSR_STATUS) & (SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE), 0);
+    for (int i = 0; i < 300; i++) { /* nothing that was inside comes out */
+      dut->in.m_ready = true;
+      sf_dut_tick(dut);
+      ck_assert(!dut->out.m_valid && !dut->out.tap_valid);
+    }
+    works(dut);
+  }
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* What the core counts of the samples from..to-1 that feed_cycle sends. */
+static fx_counts counts_of(uint64_t from, uint64_t to)
+{
+  fx_counts counts = {0}, unwanted = {0};
+  int32_t base[SF_LANES];
+  fx_out out;
+  for (uint64_t i = 0; i < to; i++) {
+    const sf_dut_sample *s = &shared.sample[i % 3];
+    fx_counts *at = i >= from ? &counts : &unwanted;
+    if (s->first) fx_net_direction(&net_of_test.net, s->ray->dir, base, at);
+    fx_net_sample(&net_of_test.net, s->f, base, &out, NULL, at);
+  }
+  return counts;
+}
+
+static uint64_t window(sf_dut *dut, int event, int layer, int step)
+{
+  const uint32_t at = SF_CSR_COUNTERS + 8u * (uint32_t)(64 * event + 8 * layer + step);
+  const uint32_t low = get(dut, at);
+  return low | (uint64_t)get(dut, at + 4) << 32;
+}
+
+static fx_counts read_window(sf_dut *dut)
+{
+  fx_counts counts = {.samples = window(dut, 0, 7, 0), .rays = window(dut, 0, 7, 1)};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    fx_layer_counts *c = &counts.layer[l];
+    uint64_t *const to[SF_DRIVER_EVENTS] = {c->mac,    c->sop,     c->spikes,  c->updates,
+                                            c->weight, c->state_r, c->state_w, c->special};
+    for (int e = 0; e < SF_DRIVER_EVENTS; e++)
+      for (int t = 0; t < SF_T_MAX; t++) to[e][t] = window(dut, e, l, t);
+  }
+  return counts;
+}
+
+static void same_events(const fx_counts *expected, const fx_counts *actual)
+{
+  sf_difference d;
+  ck_assert_msg(sf_compare_counts(expected, actual, 0, &d), "layer %d step %d %s: expected %lld, actual %lld", d.layer,
+                d.step, d.wire, (long long)d.expected, (long long)d.actual);
+}
+
+static void wait_for_walk(sf_dut *dut)
+{
+  dut->in.m_ready = true; /* or the sample at work could not end */
+  for (int i = 0; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS; i++) ck_assert_int_lt(i, PATIENCE);
+}
+
+static void send_rest(sf_dut *dut, feed *f, random_source *r)
+{
+  while (f->beat != f->beats || dut->in.s_valid) feed_cycle(dut, f, r);
+  dut->in.m_ready = true;
+  for (int i = 0; i < PATIENCE; i++) sf_dut_tick(dut);
+}
+
+/* Asked for at any moment, a snapshot is of whole samples and a clear falls between two. */
+START_TEST(snapshot_and_clear_at_work)
+{
+  random_source r = {64, (uint64_t)_i << 32};
+  sf_dut *dut = begin(64);
+  feed f = {.m_percent = 80};
+  const bool clear = _i & 1;
+  for (int64_t cycle = draw(&r, 400, 1500); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
+  while (dut->in.s_valid) feed_cycle(dut, &f, &r); /* a beat that was offered may not be taken back */
+  put(dut, SF_CSR_CTRL, clear ? SF_CSR_CTRL_CLEAR : SF_CSR_CTRL_SNAPSHOT);
+  wait_for_walk(dut);
+  if (!clear) {
+    const fx_counts actual = read_window(dut), expected = counts_of(0, actual.samples);
+    ck_assert_uint_gt(actual.samples, 0);
+    same_events(&expected, &actual);
+  }
+  send_rest(dut, &f, &r);
+  fx_counts after;
+  ck_ok(sf_dut_counts(dut, &after, NULL, NULL, NULL));
+  if (clear) ck_assert_uint_lt(after.samples, (uint64_t)f.sample);
+  const fx_counts rest = counts_of(clear ? (uint64_t)f.sample - after.samples : 0, (uint64_t)f.sample);
+  same_events(&rest, &after);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* ---- AXI4-Lite, reads and writes at once ---- */
+
+enum { REGISTERS = 4 };
+static const uint32_t registers[REGISTERS] = {SF_CSR_D1_K, SF_CSR_C2_THETA, SF_CSR_EXP_BIAS, SF_CSR_STEPS};
+
+static void hold_response(const sf_pins_in *in, const sf_pins_out *out, sf_pins_out *before, bool *waiting)
+{
+  if (waiting[0]) ck_assert(out->bvalid && out->bresp == before->bresp);
+  if (waiting[1]) ck_assert(out->rvalid && out->rdata == before->rdata && out->rresp == before->rresp);
+  waiting[0] = out->bvalid && !in->bready;
+  waiting[1] = out->rvalid && !in->rready;
+  *before = *out;
+}
+
+START_TEST(register_accesses_overlap)
+{
+  random_source r = {65, (uint64_t)_i << 32};
+  sf_dut *dut = begin(65);
+  sf_driver_reset(&dut->bus);
+  uint32_t value[REGISTERS];
+  for (int i = 0; i < REGISTERS; i++) value[i] = get(dut, registers[i]);
+  bool addressed = false, given = false, asked = false, waiting[2] = {false, false};
+  int w = 0, q = 0, writes = 0, reads = 0, answered = 0;
+  uint32_t old = 0; /* of the register that is being written: a read meanwhile may see either */
+  sf_pins_out before = dut->out;
+  sf_pins_in *in = &dut->in;
+  in->wstrb = 0xf;
+  old = value[0], in->awaddr = registers[0], in->wdata = (uint32_t)draw(&r, 0, 4);
+  for (int cycle = 0; cycle < 3000; cycle++) {
+    in->awvalid = !addressed && (in->awvalid || draw(&r, 0, 2) == 0);
+    in->wvalid = !given && (in->wvalid || draw(&r, 0, 2) == 0);
+    in->bready = draw(&r, 0, 1);
+    if (!in->arvalid && !asked && draw(&r, 0, 1)) q = (int)draw(&r, 0, REGISTERS - 1), in->arvalid = true;
+    in->araddr = registers[q];
+    in->rready = draw(&r, 0, 1);
+    sf_dut_tick(dut);
+    hold_response(in, &dut->out, &before, waiting);
+    ck_assert(!dut->out.bvalid || (addressed && given));
+    if (in->awvalid && dut->out.awready) addressed = true, in->awvalid = false;
+    if (in->wvalid && dut->out.wready) given = true, in->wvalid = false;
+    if (in->arvalid && dut->out.arready) asked = true, in->arvalid = false, reads++;
+    if (dut->out.rvalid && in->rready) {
+      ck_assert(asked);
+      ck_assert_msg(dut->out.rdata == value[q] || (q == w && dut->out.rdata == in->wdata) ||
+                        (q == w && dut->out.rdata == old),
+                    "register %x reads %u, expected %u", registers[q], dut->out.rdata, value[q]);
+      asked = false;
+      answered++;
+    }
+    if (!dut->out.bvalid || !in->bready) continue;
+    ck_assert_uint_eq(dut->out.bresp, 0);
+    value[w] = in->wdata;
+    addressed = given = false;
+    writes++;
+    if (asked || in->arvalid) continue; /* the next write is of the same register, until no read is on its way */
+    w = (int)draw(&r, 0, REGISTERS - 1);
+    old = value[w];
+    in->awaddr = registers[w];
+    in->wdata = (uint32_t)draw(&r, 0, 4095);
+    if (w == 3) in->wdata &= 7;
+  }
+  ck_assert_int_gt(writes, 200);
+  ck_assert_int_ge(reads, answered);
+  ck_assert_int_gt(answered, 200);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* A write of less than a word is refused and changes nothing. */
+START_TEST(part_of_a_word)
+{
+  sf_dut *dut = begin(66);
+  sf_driver_reset(&dut->bus);
+  const uint32_t before = get(dut, SF_CSR_D1_K);
+  for (uint8_t strobe = 0; strobe < 15; strobe++) {
+    put(dut, SF_CSR_ERROR, ~0u);
+    dut->in.awaddr = SF_CSR_D1_K, dut->in.wdata = ~before & 0xfff, dut->in.wstrb = strobe;
+    dut->in.awvalid = dut->in.wvalid = dut->in.bready = true;
+    bool answered = false;
+    for (int i = 0; i < 20 && !answered; i++) {
+      sf_dut_tick(dut);
+      if (dut->out.awready) dut->in.awvalid = false;
+      if (dut->out.wready) dut->in.wvalid = false;
+      answered = dut->out.bvalid;
+    }
+    dut->in.bready = false;
+    ck_assert(answered);
+    ck_assert_uint_eq(dut->out.bresp, 2); /* SLVERR */
+    ck_assert_uint_eq(get(dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
+    ck_assert_uint_eq(get(dut, SF_CSR_D1_K), before);
+  }
+  works(dut);
+  sf_dut_close(dut);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *s = suite_create("rtl_disturbed");
+  TCase *c = tcase_create("disturbed");
+  tcase_set_timeout(c, 60);
+  tcase_add_test(c, hard_reset_at_any_time);
+  tcase_add_loop_test(c, soft_reset_in_every_phase, 0, SF_PHASES);
+  tcase_add_loop_test(c, snapshot_and_clear_at_work, 0, 8);
+  tcase_add_loop_test(c, register_accesses_overlap, 0, 4);
+  tcase_add_test(c, part_of_a_word);
+  suite_add_tcase(s, c);
+  SRunner *runner = srunner_create(s);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
