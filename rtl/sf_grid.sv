@@ -33,11 +33,11 @@ module sf_grid #(
   localparam integer COUNT = LOG2_DEPTH + 1;
 
   // Cells, one level at a time.
-  wire cell_valid, cell_ready, dense, cell_last;
-  wire [15:0] x;
-  wire [31:0] y0, y1, z0, z1, mask, offset;
-  wire [23:0] place;
-  wire [4:0] shift;
+  wire cell_valid, cell_ready, cell_dense, cell_last;
+  wire [15:0] cell_x;
+  wire [31:0] cell_y0, cell_y1, cell_z0, cell_z1, cell_mask, cell_offset;
+  wire [23:0] cell_place;
+  wire [4:0] cell_shift;
   sf_grid_cell u_cell (
       .clk_i       (clk_i),
       .rst_ni      (rst_ni),
@@ -51,16 +51,16 @@ module sf_grid #(
       .s_pos_i     (s_pos_i),
       .valid_o     (cell_valid),
       .ready_i     (cell_ready),
-      .dense_o     (dense),
-      .x_o         (x),
-      .y0_o        (y0),
-      .y1_o        (y1),
-      .z0_o        (z0),
-      .z1_o        (z1),
-      .mask_o      (mask),
-      .offset_o    (offset),
-      .place_o     (place),
-      .shift_o     (shift),
+      .dense_o     (cell_dense),
+      .x_o         (cell_x),
+      .y0_o        (cell_y0),
+      .y1_o        (cell_y1),
+      .z0_o        (cell_z0),
+      .z1_o        (cell_z1),
+      .mask_o      (cell_mask),
+      .offset_o    (cell_offset),
+      .place_o     (cell_place),
+      .shift_o     (cell_shift),
       .last_o      (cell_last)
   );
 
@@ -100,11 +100,11 @@ module sf_grid #(
   always_ff @(posedge clk_i) begin
     if (load) begin
       corner_q <= 3'd0;
-      dense_q <= dense;
-      x_q <= x;
-      {y0_q, y1_q} <= {y0, y1};
-      {z0_q, z1_q} <= {z0, z1};
-      {mask_q, offset_q} <= {mask, offset};
+      dense_q <= cell_dense;
+      x_q <= cell_x;
+      {y0_q, y1_q} <= {cell_y0, cell_y1};
+      {z0_q, z1_q} <= {cell_z0, cell_z1};
+      {mask_q, offset_q} <= {cell_mask, cell_offset};
     end else if (work_q && index_ready) begin
       corner_q <= corner_q + 3'd1;
     end
@@ -147,7 +147,7 @@ module sf_grid #(
       .rst_ni (rst_ni),
       .clear_i(clear_i),
       .push_i (load),
-      .data_i ({place, shift, cell_last}),
+      .data_i ({cell_place, cell_shift, cell_last}),
       .valid_o(waiting_valid),
       .pop_i  (pop),
       .data_o ({waiting_place, waiting_shift, waiting_last})

@@ -1,8 +1,10 @@
 # Unit benches: one Verilated module each, against its C mirror. Included by sim/sim.mk.
-# UNITS_<test> are the modules that tests/<test>.cpp drives.
+# UNITS_<test> are the modules that tests/<test>.cpp drives; UNIT_TOP_<unit> and UNIT_PARAMETERS_<unit> name variants.
 UNITS_test_rtl_sh := sf_sh
 UNITS_test_rtl_grid := sf_grid sf_grid_weight sf_trilinear
-UNITS_test_rtl_encoder := sf_encoder
+UNITS_test_rtl_encoder := sf_encoder sf_encoder_4
+UNIT_TOP_sf_encoder_4 := sf_encoder
+UNIT_PARAMETERS_sf_encoder_4 := -GLOG2_PORTS=2
 UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder
 TESTS += $(UNIT_TESTS)
 
@@ -15,7 +17,8 @@ define unit_rule
 $B/units/$1/V$1.mk: $(RTL_READY)
 	@mkdir -p $B/units/$1
 	$$(call say,VERI  $1)
-	$$Qcd $(RTL_ROOT) && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $1 -Irtl --Mdir $$(abspath $B/units/$1) rtl/lint.vlt $$(RTL)
+	$$Qcd $(RTL_ROOT) && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $(or $(UNIT_TOP_$1),$1) \
+	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $B/units/$1) rtl/lint.vlt $$(RTL)
 $B/units/$1/V$1__ALL.a: $B/units/$1/V$1.mk
 	$$Q$$(MAKE) -s -C $B/units/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(CXX) V$1__ALL.a >/dev/null
 	@touch $$@

@@ -86,18 +86,21 @@ struct table_memory {
   };
   std::deque<request> queue;
 
-  template <class module> void drive(module &top, random_draw &draw, uint64_t cycle)
+  bool ready = false, answers = false; /* in this cycle */
+  uint16_t word = 0;
+
+  void drive(random_draw &draw, uint64_t cycle)
   {
-    top.mem_req_ready_i = !draw.percent(stall);
-    top.mem_rsp_valid_i = !queue.empty() && queue.front().due <= cycle;
-    top.mem_rsp_data_i = top.mem_rsp_valid_i ? table->word(queue.front().entry) : (uint16_t)draw(0, 65535);
+    ready = !draw.percent(stall);
+    answers = !queue.empty() && queue.front().due <= cycle;
+    word = answers ? table->word(queue.front().entry) : (uint16_t)draw(0, 65535);
   }
   /* After settling: what the clock edge will do. True when a request was taken. */
-  template <class module> bool sample(module &top, random_draw &draw, uint64_t cycle)
+  bool sample(random_draw &draw, uint64_t cycle, bool valid, uint32_t entry)
   {
-    if (top.mem_rsp_valid_i) queue.pop_front();
-    if (!top.mem_req_valid_o || !top.mem_req_ready_i) return false;
-    queue.push_back({top.mem_req_addr_o, cycle + (uint64_t)(latency + draw(0, spread))});
+    if (answers) queue.pop_front();
+    if (!valid || !ready) return false;
+    queue.push_back({entry, cycle + (uint64_t)(latency + draw(0, spread))});
     return true;
   }
 };

@@ -1,5 +1,6 @@
 /* sf_encoder against fx_grid_features and fx_sh, as the packets that the engine takes. */
 #include "Vsf_encoder.h"
+#include "Vsf_encoder_4.h"
 #include "tests/rtl_unit_grid.h"
 
 enum { VALUES = 4 }; /* of a beat */
@@ -18,17 +19,27 @@ static void add_beats(std::deque<beat> &beats, const int16_t *value, int n, bool
   }
 }
 
-struct encoder_bench {
-  unit<Vsf_encoder> u;
+/* Slices of the memory ports: one of a number, or of a wide one. */
+static uint32_t slice(const uint32_t &all, int)
+{
+  return all;
+}
+template <class words> static uint32_t slice(const words &all, int port)
+{
+  return all[port];
+}
+
+template <class module, int ports> struct encoder_bench {
+  unit<module> u;
   random_draw draw;
   const grid_fixture *table = nullptr;
-  table_memory memory = {};
+  table_memory memory[ports] = {};
   int stall = 0, n_dir = 0, frac = 0, first_percent = 0;
   std::deque<beat> expected, next; /* of accepted samples; of the one on offer */
   int accepted = 0, done = 0;
   bool in_ray = false;
   sink_stalls sink;
-  held output, request;
+  held output, request[ports];
 
   explicit encoder_bench(uint64_t seed) : u(seed), draw(seed)
   {
@@ -37,7 +48,8 @@ struct encoder_bench {
   }
   void load(const grid_fixture *fixture, int directions, int lsb)
   {
-    table = memory.table = fixture, n_dir = directions, frac = lsb, in_ray = false;
+    for (table_memory &m : memory) m.table = fixture;
+    table = fixture, n_dir = directions, frac = lsb, in_ray = false;
     configure_levels(u, fixture->grid);
     configure(u, 0x80, fixture->grid.levels);
     configure(u, 0x81, n_dir);
@@ -45,29 +57,35 @@ struct encoder_bench {
   }
   void timing(int latency, int spread, int stalls, int first)
   {
-    memory.latency = latency, memory.spread = spread, memory.stall = stall = sink.percent = stalls, sink.until = 0,
-    first_percent = first;
+    for (table_memory &m : memory) m.latency = latency, m.spread = spread, m.stall = stalls;
+    stall = sink.percent = stalls, sink.until = 0, first_percent = first;
   }
   void clear(bool hard)
   {
-    request = output = held(); /* reset withdraws at once */
+    forget_offers(); /* reset withdraws at once */
     u.top.rst_ni = !hard, u.top.clear_i = !hard;
     cycle(0);
     u.top.rst_ni = 1, u.top.clear_i = 0, u.top.s_valid_i = 0;
     expected.clear(), in_ray = false;
-    output = request = held(), accepted = done;
-    if (hard) memory.queue.clear();
-    for (table_memory::request &r : memory.queue) r.entry = 0; /* answers to nobody, perhaps from a larger table */
+    forget_offers();
+    accepted = done;
+    for (table_memory &m : memory) {
+      if (hard) m.queue.clear();
+      for (table_memory::request &r : m.queue) r.entry = 0; /* answers to nobody, perhaps from a larger table */
+    }
   }
   void cycle(int more)
   {
     if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) offer();
     u.top.m_axis_tready_i = !sink(draw, u.cycle);
-    memory.drive(u.top, draw, u.cycle);
+    drive_memory();
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
-    request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
-    memory.sample(u.top, draw, u.cycle);
+    for (int p = 0; p < ports; p++) {
+      const bool valid = u.top.mem_req_valid_o >> p & 1;
+      request[p].check(valid, memory[p].ready, slice(u.top.mem_req_addr_o, p));
+      memory[p].sample(draw, u.cycle, valid, slice(u.top.mem_req_addr_o, p));
+    }
     output.check(u.top.m_axis_tvalid_o, u.top.m_axis_tready_i, u.top.m_axis_tdata_o);
     if (taken && !quiet) {
       expected.insert(expected.end(), next.begin(), next.end());
@@ -88,7 +106,29 @@ struct encoder_bench {
     return u.cycle - begin;
   }
 
+  bool idle() const
+  {
+    bool none = expected.empty();
+    for (const table_memory &m : memory) none = none && m.queue.empty();
+    return none;
+  }
+
 private:
+  void forget_offers()
+  {
+    output = held();
+    for (held &r : request) r = held();
+  }
+  void drive_memory()
+  {
+    uint64_t ready = 0, answers = 0, words = 0;
+    for (int p = 0; p < ports; p++) {
+      memory[p].drive(draw, u.cycle);
+      ready |= (uint64_t)memory[p].ready << p, answers |= (uint64_t)memory[p].answers << p;
+      words |= (uint64_t)memory[p].word << 16 * p;
+    }
+    u.top.mem_req_ready_i = (uint8_t)ready, u.top.mem_rsp_valid_i = (uint8_t)answers, u.top.mem_rsp_data_i = words;
+  }
   void offer()
   {
     uint32_t pos[3];
@@ -118,43 +158,62 @@ private:
   }
 };
 
-START_TEST(random_scenes)
+typedef encoder_bench<Vsf_encoder, 1> one_port;
+typedef encoder_bench<Vsf_encoder_4, 4> four_ports;
+
+template <class bench> static void random_scenes(uint64_t seed)
 {
-  encoder_bench b((uint64_t)_i + 60);
+  bench b(seed);
   for (int n = 0; n < 15 * unit_length(); n++) {
     const grid_fixture fixture(b.draw, n % 4 ? (int)b.draw(1, 16) : n % 8 ? 1 : 16, n % 5 == 4);
     b.load(&fixture, n % 3 ? (int)b.draw(0, 16) : 16, (int)b.draw(0, 11));
     b.timing((int)b.draw(1, 60), (int)b.draw(0, 3) * 40, n % 3 == 0 ? 0 : n % 3 == 1 ? 20 : 70, (int)b.draw(0, 4) * 25);
     b.run(100);
     for (int i = 0; i < 20; i++) b.cycle(0); /* and no beat more */
-    ck_assert(b.expected.empty() && b.memory.queue.empty());
+    ck_assert(b.idle());
   }
 }
+
+START_TEST(random_scenes_through_one_port)
+{
+  random_scenes<one_port>((uint64_t)_i + 60);
+}
 END_TEST
+
+START_TEST(random_scenes_through_four_ports)
+{
+  random_scenes<four_ports>((uint64_t)_i + 65);
+}
+END_TEST
+
+/* `requests`: of a sample at the busiest port. */
+template <class bench> static void full_speed(int levels, int latency, int first, int requests)
+{
+  const int samples = 60;
+  bench b(70);
+  const grid_fixture fixture(b.draw, levels, 0);
+  b.load(&fixture, 16, 6);
+  b.timing(latency, 0, 0, first);
+  const int cycles = (int)b.run(samples);
+  ck_assert_msg(cycles <= samples * requests + latency + 80,
+                "%d levels, latency %d, %d %% first: %d cycles for %d requests", levels, latency, first, cycles,
+                samples * requests);
+}
 
 /* Samples cost their requests alone, even at one sample per ray, for which three rays on their way hide less. */
 START_TEST(a_request_in_every_cycle)
 {
-  static const int latency[] = {1, 60, 90};
-  for (int i = 0; i < 3; i++)
-    for (int levels = 8; levels <= 16; levels += 4)
-      for (int first = 10; first <= (latency[i] <= 60 ? 100 : 10); first += 90) {
-        encoder_bench b(70);
-        const grid_fixture fixture(b.draw, levels, 0);
-        b.load(&fixture, 16, 6);
-        b.timing(latency[i], 0, 0, first);
-        const uint64_t samples = 60, requests = samples * (uint64_t)levels * FX_GRID_CORNERS,
-                       cycles = b.run((int)samples);
-        ck_assert_msg(cycles <= requests + (uint64_t)latency[i] + 80,
-                      "%d levels, latency %d, %d %% first: %d cycles for %d requests", levels, latency[i], first,
-                      (int)cycles, (int)requests);
-      }
+  for (int levels = 8; levels <= 16; levels += 4) {
+    for (int latency = 1; latency <= 91; latency += 30) full_speed<one_port>(levels, latency, 10, 8 * levels);
+    for (int latency = 1; latency <= 61; latency += 30) full_speed<one_port>(levels, latency, 100, 8 * levels);
+  }
+  for (int latency = 1; latency <= 91; latency += 30) full_speed<four_ports>(16, latency, 10, 32);
 }
 END_TEST
 
-START_TEST(reset_on_the_way)
+template <class bench> static void reset_on_the_way()
 {
-  encoder_bench b(80);
+  bench b(80);
   for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
     const grid_fixture fixture(b.draw, (int)b.draw(1, 16), 0);
     b.load(&fixture, (int)b.draw(0, 16), (int)b.draw(0, 11));
@@ -166,6 +225,17 @@ START_TEST(reset_on_the_way)
     for (int i = 0; i < delay; i++) b.cycle(1);
     b.clear(delay % 2);
   }
+}
+
+START_TEST(reset_on_the_way_through_one_port)
+{
+  reset_on_the_way<one_port>();
+}
+END_TEST
+
+START_TEST(reset_on_the_way_through_four_ports)
+{
+  reset_on_the_way<four_ports>();
 }
 END_TEST
 
@@ -189,7 +259,7 @@ START_TEST(sizes_of_a_real_scene)
   fixture.table.resize((size_t)grid.entries * 2);
   for (size_t i = 0; i < fixture.table.size(); i++) fixture.table[i] = (int8_t)(i * 2654435761u >> 24);
   grid.table = fixture.table.data();
-  encoder_bench b(90);
+  four_ports b(90);
   b.load(&fixture, 16, 6);
   b.timing(40, 10, 5, 10);
   b.run(1000 * unit_length());
@@ -201,9 +271,11 @@ int main(void)
   Suite *suite = suite_create("rtl_encoder");
   TCase *cases = tcase_create("encoder");
   tcase_set_timeout(cases, 3600);
-  tcase_add_loop_test(cases, random_scenes, 0, 4);
+  tcase_add_loop_test(cases, random_scenes_through_one_port, 0, 3);
+  tcase_add_loop_test(cases, random_scenes_through_four_ports, 0, 3);
   tcase_add_test(cases, a_request_in_every_cycle);
-  tcase_add_test(cases, reset_on_the_way);
+  tcase_add_test(cases, reset_on_the_way_through_one_port);
+  tcase_add_test(cases, reset_on_the_way_through_four_ports);
   tcase_add_test(cases, sizes_of_a_real_scene);
   suite_add_tcase(suite, cases);
   return unit_run(suite);

@@ -135,7 +135,7 @@ struct grid_bench {
   void load(const grid_fixture *fixture, int latency, int spread, int stalls)
   {
     table = fixture, stall = sink.percent = stalls, sink.until = 0;
-    memory = {fixture, latency, spread, stalls, {}};
+    memory.table = fixture, memory.latency = latency, memory.spread = spread, memory.stall = stalls;
     configure_levels(u, table->grid);
     u.top.last_level_i = (uint8_t)(table->grid.levels - 1);
   }
@@ -159,12 +159,13 @@ struct grid_bench {
       u.top.s_valid_i = 1;
     }
     u.top.m_ready_i = !sink(draw, u.cycle);
-    memory.drive(u.top, draw, u.cycle);
+    memory.drive(draw, u.cycle);
+    u.top.mem_req_ready_i = memory.ready, u.top.mem_rsp_valid_i = memory.answers, u.top.mem_rsp_data_i = memory.word;
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
     request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
     const uint32_t entry = u.top.mem_req_addr_o;
-    if (memory.sample(u.top, draw, u.cycle) && u.top.rst_ni) ask(entry);
+    if (memory.sample(draw, u.cycle, u.top.mem_req_valid_o, entry) && u.top.rst_ni) ask(entry);
     output.check(u.top.m_valid_o, u.top.m_ready_i, u.top.m_features_o << 1 | u.top.m_last_o);
     if (u.top.m_valid_o && u.top.m_ready_i && !quiet) take();
     if (taken && !quiet) accept();
@@ -252,11 +253,8 @@ START_TEST(reset_on_the_way)
   grid_bench b(50);
   for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
     const grid_fixture fixture(b.draw, (int)b.draw(1, 16), 0);
-    b.memory.table = &fixture;
     for (table_memory::request &r : b.memory.queue) r.entry = 0;
-    const std::deque<table_memory::request> waiting = b.memory.queue;
     b.load(&fixture, (int)b.draw(1, 90), 20, (int)b.draw(0, 1) * 30);
-    b.memory.queue = waiting;
     for (int i = 0; i < delay; i++) b.cycle(1);
     b.clear(delay % 3 == 0);
     if (delay % 3 == 1) b.clear(false);
