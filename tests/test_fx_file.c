@@ -101,7 +101,7 @@ START_TEST(round_trip)
   for (uint64_t seed = 0; seed < 20; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
     fx_scene scene = fixture_scene(&sizes, seed), again;
-    scene.to_box_scale = 1.0 / 3, scene.dir_scale = 1e-300, scene.to_box_offset[1] = -1e6 / 7;
+    scene.to_box_scale = 1.0 / 3, scene.dir_scale = 0x1p-11, scene.to_box_offset[1] = -1e6 / 7;
     scene.background[2] = 12345;
     save(&scene);
     const sf_status status = fx_scene_load(&again, path);
@@ -228,6 +228,9 @@ START_TEST(metadata_is_checked)
       {"background[1]", "65537", "background[1]"},
       {"dir_scale", "nan", "dir_scale"},
       {"dir_scale", "0", "dir_scale"},
+      {"dir_scale", "0x1p-12", "dir_scale"},
+      {"dir_scale", "2", "dir_scale"},
+      {"dir_scale", "0x1.8p-7", "dir_scale"},
       {"to_box_offset[2]", "inf", "to_box_offset[2]"},
       {"to_box_scale", "one", "to_box_scale"},
   };

@@ -138,6 +138,55 @@ START_TEST(rays_far_away_and_refused)
 }
 END_TEST
 
+/* Integer harmonics against the float ones, at every LSB. */
+START_TEST(direction_features_within_one_lsb)
+{
+  const float o[3] = {0, 0, 3};
+  double worst = 0;
+  for (uint64_t i = 0; i < 20000; i++) {
+    fx_scene scene = box_scene(256);
+    const int frac = (int)(i % (FX_DIR_FRAC_MAX + 1));
+    scene.dir_scale = ldexp(1, -frac);
+    ck_assert_int_eq(sf_fx_dir_frac(&scene), frac);
+    float d[3], sh[SF_DIR_FEATURES], length = 0;
+    for (uint64_t a = 0; a < 3; a++) d[a] = normal(80 + a, i) * (i % 3 == a ? 1 : i % 5 ? 1 : 0.001f);
+    if (i < 162) d[0] = (float)(i % 3) - 1, d[1] = (float)(i / 3 % 3) - 1, d[2] = (float)(i / 9 % 3) - 1;
+    for (int a = 0; a < 3; a++) length += d[a] * d[a];
+    if (length == 0) continue;
+    const fx_ray ray = make_ray(&scene, o, d);
+    for (int a = 0; a < 3; a++) {
+      d[a] /= sqrtf(length);
+      ck_assert_double_eq_tol(ray.unit[a], d[a] * 16384.0, 0.5 + 0.01);
+    }
+    sf_sh4(d, sh);
+    for (int n = 0; n < SF_DIR_FEATURES; n++) {
+      const double error = fabs(ray.dir[n] - ldexp((double)sh[n], frac));
+      ck_assert_msg(error <= 1, "frac %d, (%g, %g, %g): harmonic %d is off by %g LSB", frac, (double)d[0], (double)d[1],
+                    (double)d[2], n, error);
+      worst = fmax(worst, error);
+    }
+  }
+  ck_assert_double_gt(worst, 0.5);
+}
+END_TEST
+
+/* No input leaves the rails: not even three axes at full scale. */
+START_TEST(directions_that_are_none)
+{
+  static const int16_t full[3] = {INT16_MIN, INT16_MAX, INT16_MAX}, one[3] = {-FX_UNIT_ONE, FX_UNIT_ONE, FX_UNIT_ONE};
+  int16_t a[SF_DIR_MAX], b[SF_DIR_MAX];
+  fx_sh(full, FX_DIR_FRAC_MAX, a);
+  fx_sh(one, FX_DIR_FRAC_MAX, b);
+  ck_assert_mem_eq(a, b, sizeof a); /* clamped to one */
+  ck_assert_int_eq(a[10], -2047);
+  ck_assert_int_eq(a[13], 2047);
+  ck_assert_int_eq(a[0], 578);
+  const int16_t zero[3] = {0};
+  fx_sh(zero, 0, a);
+  for (int n = 0; n < SF_DIR_MAX; n++) ck_assert_int_eq(a[n], 0); /* 0.28 and -0.32 round to none */
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("ray");
@@ -148,6 +197,8 @@ int main(void)
   tcase_add_test(cases, rays_through_edges_and_corners);
   tcase_add_test(cases, rays_from_inside_start_at_the_near_plane);
   tcase_add_test(cases, rays_far_away_and_refused);
+  tcase_add_test(cases, direction_features_within_one_lsb);
+  tcase_add_test(cases, directions_that_are_none);
   suite_add_tcase(suite, cases);
   SRunner *runner = srunner_create(suite);
   srunner_run_all(runner, CK_ENV);

@@ -71,11 +71,14 @@ typedef struct fx_scene {
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
-  double dir_scale;   /* value of one LSB of the direction features */
+  double dir_scale;   /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
   double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
   double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
   void *owner;        /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
+
+/* Direction of a ray: each axis Q1.14. LSB of the direction features: 2^-frac. */
+enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11 };
 
 /* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count;
  * sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
@@ -83,7 +86,8 @@ typedef struct fx_ray {
   int64_t origin[3], step[3]; /* Q24.40 */
   int32_t count;              /* lattice points in the box, 0 = misses */
   int32_t first_q16;          /* distance from the camera to sample 0 in lattice steps, Q16.16 */
-  int16_t dir[SF_DIR_MAX];    /* spherical harmonics of the direction, Q1.10 */
+  int16_t unit[3];            /* direction, unit length but for rounding, Q1.14 */
+  int16_t dir[SF_DIR_MAX];    /* its spherical harmonics (fx_sh), LSB dir_scale */
 } fx_ray;
 
 /* Events, counted per layer and time step. What is one event, exactly:
@@ -124,6 +128,10 @@ typedef struct fx_out {
   uint32_t sigma;     /* U16.12 per box edge */
   uint32_t colour[3]; /* U4.16 */
 } fx_out;
+
+/* The first 16 real spherical harmonics of a direction, LSB 2^-frac (0 <= frac <= FX_DIR_FRAC_MAX): within 1 LSB of
+ * the real ones of the unrounded unit vector at any frac. Defined for every input: see fx/sh.c. */
+void fx_sh(const int16_t unit[3], int frac, int16_t dir[SF_DIR_MAX]);
 
 /* The direction's current into C1, computed once per ray. base[SF_LANES]. Counts C1's d MACs and the ray. */
 void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_counts *counts);

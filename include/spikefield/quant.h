@@ -104,6 +104,8 @@ int64_t sf_grid_zero_unread(fx_scene *scene);
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
  * is refused. */
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray);
+/* dir_scale as the shift that fx_sh takes: 2^-frac. */
+int sf_fx_dir_frac(const fx_scene *scene);
 /* A point in model units to the box, Q0.24. SF_E_RANGE when it is outside or not finite. */
 sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3]);
 

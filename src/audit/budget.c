@@ -169,6 +169,75 @@ static void feature(sf_budget_row *row, uint64_t samples)
     }
 }
 
+/* ---- direction ---- */
+
+/* coefficient * u * q with q = one + the sum of products of two axes, as fx/sh.c has it. */
+typedef struct harmonic {
+  double coefficient;
+  int u; /* axis; 3: none */
+  double one, xx, yy, zz, xy, yz, xz;
+} harmonic;
+
+static const harmonic harmonics[SF_DIR_MAX] = {
+    {.coefficient = 0.28209479177387814, .u = 3, .one = 1},
+    {.coefficient = 0.48860251190291987, .u = 1, .one = 1},
+    {.coefficient = 0.48860251190291987, .u = 2, .one = 1},
+    {.coefficient = 0.48860251190291987, .u = 0, .one = 1},
+    {.coefficient = 1.0925484305920792, .u = 3, .xy = 1},
+    {.coefficient = 1.0925484305920792, .u = 3, .yz = 1},
+    {.coefficient = 0.31539156525251999, .u = 3, .one = -1, .zz = 3},
+    {.coefficient = 1.0925484305920792, .u = 3, .xz = 1},
+    {.coefficient = 0.54627421529603959, .u = 3, .xx = 1, .yy = -1},
+    {.coefficient = 0.59004358992664352, .u = 1, .yy = 1, .xx = -3},
+    {.coefficient = 1.4453057213202769, .u = 2, .xy = 2},
+    {.coefficient = 0.45704579946446572, .u = 1, .one = 1, .zz = -5},
+    {.coefficient = 0.3731763325901154, .u = 2, .one = -3, .zz = 5},
+    {.coefficient = 0.45704579946446572, .u = 0, .one = 1, .zz = -5},
+    {.coefficient = 1.4453057213202769, .u = 2, .xx = 1, .yy = -1},
+    {.coefficient = 0.59004358992664352, .u = 0, .xx = 1, .yy = -3},
+};
+
+/* In real units, without the last rounding: axes off by 2^-15, products by 2^-16, coefficient and a by 2^-17. */
+static double direction_bound(const harmonic *h, const double v[3])
+{
+  const double x = v[0], y = v[1], z = v[2], u = h->u < 3 ? v[h->u] : 1;
+  const double q =
+      h->one + h->xx * x * x + h->yy * y * y + h->zz * z * z + h->xy * x * y + h->yz * y * z + h->xz * x * z;
+  double slope[3] = {u * (2 * h->xx * x + h->xy * y + h->xz * z), u * (2 * h->yy * y + h->xy * x + h->yz * z),
+                     u * (2 * h->zz * z + h->yz * y + h->xz * x)};
+  if (h->u < 3) slope[h->u] += q;
+  const double products = fabs(h->xx) + fabs(h->yy) + fabs(h->zz) + fabs(h->xy) + fabs(h->yz) + fabs(h->xz),
+               second_order = 0x1p-26;
+  return h->coefficient *
+             ((fabs(slope[0]) + fabs(slope[1]) + fabs(slope[2])) * 0x1p-15 + fabs(u) * products * 0x1p-16) +
+         fabs(q) * (fabs(u) + 1) * 0x1p-17 + second_order;
+}
+
+/* At the finest LSB; towards the poles and the diagonals too, where harmonics are steepest. */
+static void direction(sf_budget_row *row, uint64_t samples)
+{
+  const double float_error = 0x1p-10; /* of sf_sh4, in LSB */
+  for (uint64_t i = 0; row->inputs < samples; i++) {
+    double v[3], length = 0;
+    for (uint64_t a = 0; a < 3; a++) {
+      v[a] = uniform(60 + a, i) * (i % 4 == 1 + a ? 1 : i % 4 ? 0.01 : 1) + (i % 16 == 4);
+      length += v[a] * v[a];
+    }
+    if (length < 1e-6) continue;
+    int16_t unit[3], fixed[SF_DIR_MAX];
+    float real[SF_DIR_MAX];
+    for (int a = 0; a < 3; a++) {
+      v[a] /= sqrt(length);
+      unit[a] = (int16_t)lrint(ldexp(v[a], FX_UNIT_FRAC));
+    }
+    sf_sh4((const float[]){(float)v[0], (float)v[1], (float)v[2]}, real);
+    fx_sh(unit, FX_DIR_FRAC_MAX, fixed);
+    for (int n = 0; n < SF_DIR_MAX; n++)
+      add(row, fixed[n] - ldexp((double)real[n], FX_DIR_FRAC_MAX),
+          0.5 + ldexp(direction_bound(&harmonics[n], v), FX_DIR_FRAC_MAX) + float_error);
+  }
+}
+
 /* ---- nets ---- */
 
 typedef struct small_net {
@@ -478,6 +547,7 @@ static const struct block {
     [SF_BUDGET_STEP] = {"ray: with its step rounded", "LSB of Q0.24", "end of long rays: DELTA_FRAC", false, rays_ideal},
     [SF_BUDGET_GRID] = {"grid: interpolation", "LSB of an entry", "edges between cells of fine levels", false, grid},
     [SF_BUDGET_FEATURE] = {"grid: feature f", "LSB of int12", "spikes of D1: INPUT_BITS", true, feature},
+    [SF_BUDGET_DIRECTION] = {"direction features", "LSB of 2^-11", "spikes of C1, once per ray", false, direction},
     [SF_BUDGET_CURRENT] = {"currents, all layers: sums", "LSB of a current", "exact", false, currents},
     [SF_BUDGET_H] = {"h = i >> 3", "LSB of h", "spikes of C1: H_SHIFT", true, h_floor},
     [SF_BUDGET_CHARGE] = {"membrane: one leak product", "LSB of s24", "spikes at the threshold", true, charge},

@@ -58,6 +58,13 @@ sf_status fx_reals_read(const cJSON *metadata, fx_scene *scene, const char *path
   return fx_reals_check(scene, path);
 }
 
+/* The direction features are shifted into place: sh.c. */
+static bool is_direction_lsb(double value)
+{
+  int exponent;
+  return frexp(value, &exponent) == 0.5 && exponent <= 1 && exponent > -FX_DIR_FRAC_MAX;
+}
+
 sf_status fx_reals_check(const fx_scene *scene, const char *path)
 {
   for (int i = 0; i < REALS; i++) {
@@ -66,5 +73,8 @@ sf_status fx_reals_check(const fx_scene *scene, const char *path)
       return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, reals[i].key, value,
                      reals[i].positive ? " positive" : "");
   }
+  if (!is_direction_lsb(scene->dir_scale))
+    return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,
+                   scene->dir_scale, FX_DIR_FRAC_MAX);
   return sf_ok();
 }

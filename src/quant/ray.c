@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { RAY_FRAC = 40, INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1 };
+enum { RAY_FRAC = 40 };
 static const double NEAR = 0.2;          /* model units */
 static const double COUNT_MAX = 1 << 20; /* a step of one LSB would need 2^24: no scene has that */
 
@@ -62,15 +62,15 @@ static void set_lattice(fx_ray *ray, const double o[3], const double d[3], doubl
   trim(ray);
 }
 
-static void set_direction(fx_ray *ray, const double unit[3], double scale)
+int sf_fx_dir_frac(const fx_scene *scene)
 {
-  float sh[SF_DIR_FEATURES];
-  const float direction[3] = {(float)unit[0], (float)unit[1], (float)unit[2]};
-  sf_sh4(direction, sh);
-  for (int i = 0; i < SF_DIR_FEATURES; i++) {
-    const double q = nearbyint(sh[i] / scale);
-    ray->dir[i] = (int16_t)fmax(-INPUT_LIMIT, fmin(INPUT_LIMIT, q));
-  }
+  return -ilogb(scene->dir_scale);
+}
+
+static void set_direction(fx_ray *ray, const double unit[3], int frac)
+{
+  for (int axis = 0; axis < 3; axis++) ray->unit[axis] = (int16_t)lrint(ldexp(unit[axis], FX_UNIT_FRAC));
+  fx_sh(ray->unit, frac, ray->dir);
 }
 
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray)
@@ -90,7 +90,7 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
     o[axis] = origin[axis] * scene->to_box_scale + scene->to_box_offset[axis];
     d[axis] = unit[axis] * scene->to_box_scale;
   }
-  set_direction(ray, unit, scene->dir_scale);
+  set_direction(ray, unit, sf_fx_dir_frac(scene));
   set_lattice(ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
   return sf_ok();
 }
