@@ -140,7 +140,7 @@ vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAM
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
-ASAN_TESTS := $(filter-out $(DUT_TESTS),$(TESTS))
+ASAN_TESTS := $(filter-out $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 tests/run.sh $B $(ASAN_TESTS) fuzz
 

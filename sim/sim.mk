@@ -54,6 +54,8 @@ $B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
 
 $(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
 
+include sim/unit.mk
+
 # Planted faults: a patched copy of rtl/; +fault=N chooses one at run time, +fault=0 none.
 FAULTS := $(sort $(wildcard tests/faults/*.patch))
 $B/faults/.patched: $(RTL_READY) $(FAULTS)
@@ -86,6 +88,11 @@ lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the R
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
+	@cd $(RTL_ROOT) && for top in $(LINT_TOPS); do \
+	  $(VERILATOR) --lint-only --top-module $$top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; \
+	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -Irtl -s $$top -t null $(RTL) || exit 1; \
+	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
+	done
 
 # The vector kit: writer, and the files that go with every kit.
 KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \

@@ -1,4 +1,5 @@
 /* Real spherical harmonics up to degree 3 (16 values), torch-ngp's order and signs: sf_sh4 in integers.
+ * Mirror: rtl/sf_sh.sv
  *
  *   u, v     in {1, x, y, z}, Q1.14; axes beyond +-1 are clamped, so no width below can be exceeded by any input
  *   uv     = rshift_round(u * v, 13)                        Q.15

@@ -1,0 +1,34 @@
+# Unit benches: one Verilated module each, against its C mirror. Included by sim/sim.mk.
+# UNITS_<test> are the modules that tests/<test>.cpp drives.
+UNITS_test_rtl_sh := sf_sh
+UNIT_TESTS := test_rtl_sh
+TESTS += $(UNIT_TESTS)
+
+LINT_TOPS := sf_sh
+UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
+UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
+UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)
+
+define unit_rule
+$B/units/$1/V$1.mk: $(RTL_READY)
+	@mkdir -p $B/units/$1
+	$$(call say,VERI  $1)
+	$$Qcd $(RTL_ROOT) && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $1 -Irtl --Mdir $$(abspath $B/units/$1) rtl/lint.vlt $$(RTL)
+$B/units/$1/V$1__ALL.a: $B/units/$1/V$1.mk
+	$$Q$$(MAKE) -s -C $B/units/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(CXX) V$1__ALL.a >/dev/null
+	@touch $$@
+endef
+$(foreach u,$(UNIT_TOPS),$(eval $(call unit_rule,$u)))
+
+define unit_test_rule
+$B/obj/tests/$1.o: tests/$1.cpp $(foreach u,$(UNITS_$1),$B/units/$u/V$u.mk)
+	@mkdir -p $$(@D)
+	$$(call say,CXX   $$<)
+	$$Q$$(CXX) -std=c++17 -O2 -g -Wall -Wextra $(if $(CI),-Werror) $$(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
+	  $(foreach u,$(UNITS_$1),-isystem $B/units/$u) -MMD -MP -c $$< -o $$@
+$B/tests/$1: $B/obj/tests/$1.o $(foreach u,$(UNITS_$1),$B/units/$u/V$u__ALL.a) $(UNIT_RUNTIME) $B/libspikefield.a
+	@mkdir -p $$(@D)
+	$$(call say,LD    $$@)
+	$$Q$$(CXX) -fopenmp $$(SAN) -o $$@ $$^ $$(DUT_LDLIBS) $$(CHECK_LIBS) $$(LIBS)
+endef
+$(foreach t,$(UNIT_TESTS),$(eval $(call unit_test_rule,$t)))
