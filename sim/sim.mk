@@ -91,7 +91,7 @@ lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the R
 	@cd $(RTL_ROOT) && for top in $(LINT_TOPS); do \
 	  $(VERILATOR) --lint-only --top-module $$top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; \
 	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -Irtl -s $$top -t null $(RTL) || exit 1; \
-	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
+	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
 	done
 
 # The vector kit: writer, and the files that go with every kit.

@@ -1,10 +1,11 @@
 # Unit benches: one Verilated module each, against its C mirror. Included by sim/sim.mk.
 # UNITS_<test> are the modules that tests/<test>.cpp drives.
 UNITS_test_rtl_sh := sf_sh
-UNIT_TESTS := test_rtl_sh
+UNITS_test_rtl_grid := sf_grid sf_grid_weight sf_trilinear
+UNIT_TESTS := test_rtl_sh test_rtl_grid
 TESTS += $(UNIT_TESTS)
 
-LINT_TOPS := sf_sh
+LINT_TOPS := sf_sh sf_grid
 UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
 UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
 UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)

@@ -1,4 +1,6 @@
 /* Multiresolution hash grid (Mueller et al. 2022) with torch-ngp's cell rule, in integers.
+ * Mirror: rtl/sf_grid.sv (find_cell, entry_index: rtl/sf_grid_cell.sv, fx_grid_weights: rtl/sf_grid_weight.sv,
+ * sums and feature: rtl/sf_trilinear.sv)
  *
  *   pos  = (x * scale rounded to Q.8, half up) + 1/2 per axis; cell = its integer part, g = its 8 fraction bits
  *   w    = product over the axes of (256 - g or g) / 256. The x-y products are exact in Q0.16; along z each splits
@@ -11,14 +13,14 @@
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
 
-enum { CELL_FRAC = 8, SCALE_FRAC = 16, CORNERS = 8 };
+enum { CELL_FRAC = 8, SCALE_FRAC = 16, CORNERS = FX_GRID_CORNERS };
 
 typedef struct cell {
   uint32_t base[3];
   int32_t weight[CORNERS]; /* Q0.16; bit 0 of the index = x + 1, bit 1 = y + 1, bit 2 = z + 1 */
 } cell;
 
-static void corner_weights(int32_t *weight, const int32_t g[3])
+void fx_grid_weights(const int32_t g[3], int32_t weight[CORNERS])
 {
   const int32_t one = 1 << CELL_FRAC;
   for (int corner = 0; corner < 4; corner++) {
@@ -39,7 +41,7 @@ static cell find_cell(const uint32_t *pos, int32_t scale_q16)
     c.base[axis] = (uint32_t)(p >> CELL_FRAC);
     g[axis] = (int32_t)(p & ((1 << CELL_FRAC) - 1));
   }
-  corner_weights(c.weight, g);
+  fx_grid_weights(g, c.weight);
   return c;
 }
 

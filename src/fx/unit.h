@@ -1,5 +1,6 @@
 /* The arithmetic units of the accelerator as pure functions. Each has a combinational RTL module of the same
- * name (fx_plif_step <-> sf_plif, fx_exp2 <-> sf_exp2, fx_sigmoid <-> sf_sigmoid, fx_integrate_* <-> sf_integrate). */
+ * name (fx_plif_step <-> sf_plif, fx_exp2 <-> sf_exp2, fx_sigmoid <-> sf_sigmoid, fx_integrate_* <-> sf_integrate,
+ * fx_grid_weights <-> sf_grid_weight). */
 #ifndef SPIKEFIELD_FX_UNIT_H
 #define SPIKEFIELD_FX_UNIT_H
 #include "spikefield/fx.h"
@@ -31,6 +32,11 @@ uint32_t fx_sigmoid(int32_t x);
 /* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16256, so the product is s32. */
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
+
+/* Trilinear weights, Q0.16, of the corners of a cell; g[3]: place in the cell, 0..255. Bit 0 of the index = x + 1, bit 1 =
+ * y + 1, bit 2 = z + 1. They sum to 65536. */
+enum { FX_GRID_CORNERS = 8 };
+void fx_grid_weights(const int32_t g[3], int32_t weight[FX_GRID_CORNERS]);
 
 /* Leaky integrators without reset; acc is ignored when `first`. saturated (never NULL) counts up. */
 uint32_t fx_integrate_density(uint32_t acc, uint32_t e, int32_t k, int32_t mode, bool first, uint64_t *saturated);

@@ -1,0 +1,185 @@
+// Grid features of positions, two per level, from a table in an external memory. Mirror: src/fx/grid.c (fx_grid_features)
+//
+// One request per cycle: 8 corners per level, levels in order. Answers come in the order of the requests after any time; up
+// to 2^LOG2_DEPTH levels (8 requests each) are on their way or wait at the output, which hides a latency of that many
+// requests. Room for the answers is reserved before the first request of a level, so they need no back-pressure.
+// After a clear the memory still answers what it has accepted: those answers are discarded, and nothing is asked before the
+// last of them has come.
+`default_nettype none
+
+module sf_grid #(
+    parameter integer LOG2_DEPTH = 4
+) (
+    input  wire        clk_i,
+    input  wire        rst_ni,
+    input  wire        clear_i,
+    input  wire        cfg_we_i,
+    input  wire [ 6:0] cfg_addr_i,       // {level, parameter}, as sf_grid_cell
+    input  wire [31:0] cfg_data_i,
+    input  wire [ 3:0] last_level_i,
+    input  wire        s_valid_i,
+    output wire        s_ready_o,
+    input  wire [71:0] s_pos_i,          // {z, y, x}, Q0.24
+    output wire        mem_req_valid_o,
+    input  wire        mem_req_ready_i,
+    output wire [31:0] mem_req_addr_o,   // entry
+    input  wire        mem_rsp_valid_i,
+    input  wire [15:0] mem_rsp_data_i,   // {feature 1, feature 0}
+    output wire        m_valid_o,
+    input  wire        m_ready_i,
+    output wire [23:0] m_features_o,     // {feature 1, feature 0}, 12 bits each
+    output wire        m_last_o          // of the sample
+);
+  localparam integer COUNT = LOG2_DEPTH + 1;
+
+  // Cells, one level at a time.
+  wire cell_valid, cell_ready, dense, cell_last;
+  wire [15:0] x;
+  wire [31:0] y0, y1, z0, z1, mask, offset;
+  wire [23:0] place;
+  wire [4:0] shift;
+  sf_grid_cell u_cell (
+      .clk_i       (clk_i),
+      .rst_ni      (rst_ni),
+      .clear_i     (clear_i),
+      .cfg_we_i    (cfg_we_i),
+      .cfg_addr_i  (cfg_addr_i),
+      .cfg_data_i  (cfg_data_i),
+      .last_level_i(last_level_i),
+      .s_valid_i   (s_valid_i),
+      .s_ready_o   (s_ready_o),
+      .s_pos_i     (s_pos_i),
+      .valid_o     (cell_valid),
+      .ready_i     (cell_ready),
+      .dense_o     (dense),
+      .x_o         (x),
+      .y0_o        (y0),
+      .y1_o        (y1),
+      .z0_o        (z0),
+      .z1_o        (z1),
+      .mask_o      (mask),
+      .offset_o    (offset),
+      .place_o     (place),
+      .shift_o     (shift),
+      .last_o      (cell_last)
+  );
+
+  // A level at work, corner by corner: index, then address.
+  reg [COUNT-1:0] reserved_q;  // levels between their first request and the output
+  reg work_q, index_valid_q, request_q;
+  reg [2:0] corner_q;
+  reg dense_q;
+  reg [15:0] x_q;
+  reg [31:0] y0_q, y1_q, z0_q, z1_q, mask_q, offset_q, index_q, index_offset_q, addr_q;
+  wire request_ready = !request_q || (mem_req_valid_o && mem_req_ready_i);
+  wire index_ready = !index_valid_q || request_ready;
+  wire work_end = work_q && index_ready && corner_q == 3'd7;
+  wire load = cell_valid && cell_ready;
+  assign cell_ready = (!work_q || work_end) && !reserved_q[LOG2_DEPTH];
+
+  wire [31:0] corner_x = {16'd0, x_q} + {31'd0, corner_q[0]};
+  wire [31:0] corner_y = corner_q[1] ? y1_q : y0_q;
+  wire [31:0] corner_z = corner_q[2] ? z1_q : z0_q;
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      {work_q, index_valid_q, request_q} <= 3'd0;
+      reserved_q <= '0;
+    end else if (clear_i) begin
+      {work_q, index_valid_q, request_q} <= 3'd0;
+      reserved_q <= '0;
+    end else begin
+      if (load) work_q <= 1'b1;
+      else if (work_end) work_q <= 1'b0;
+      if (index_ready) index_valid_q <= work_q;
+      if (request_ready) request_q <= index_valid_q;
+      if (load != (m_valid_o && m_ready_i)) reserved_q <= load ? reserved_q + 1'b1 : reserved_q - 1'b1;
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (load) begin
+      corner_q <= 3'd0;
+      dense_q <= dense;
+      x_q <= x;
+      {y0_q, y1_q} <= {y0, y1};
+      {z0_q, z1_q} <= {z0, z1};
+      {mask_q, offset_q} <= {mask, offset};
+    end else if (work_q && index_ready) begin
+      corner_q <= corner_q + 3'd1;
+    end
+    if (index_ready) begin
+      index_q <= dense_q ? corner_x + corner_y + corner_z : (corner_x ^ corner_y ^ corner_z) & mask_q;
+      index_offset_q <= offset_q;
+    end
+    if (request_ready) addr_q <= index_q + index_offset_q;
+  end
+
+  // Requests that the memory has accepted and not answered; those of before a clear are stale.
+  reg [LOG2_DEPTH+3:0] outstanding_q, stale_q;
+  wire accepted = mem_req_valid_o && mem_req_ready_i;
+  wire [LOG2_DEPTH+3:0] outstanding =
+      outstanding_q + {{LOG2_DEPTH + 3{1'b0}}, accepted} - {{LOG2_DEPTH + 3{1'b0}}, mem_rsp_valid_i};
+  wire draining = stale_q != '0;
+  wire answer = mem_rsp_valid_i && !draining;
+  assign mem_req_valid_o = request_q && !draining;
+  assign mem_req_addr_o = addr_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      outstanding_q <= '0;
+      stale_q <= '0;
+    end else begin
+      outstanding_q <= outstanding;
+      if (clear_i) stale_q <= outstanding;
+      else if (draining && mem_rsp_valid_i) stale_q <= stale_q - 1'b1;
+    end
+  end
+
+  // Answers to features.
+  wire [23:0] waiting_place, pair;
+  wire [4:0] waiting_shift;
+  wire waiting_last, waiting_valid, pop, pair_valid, pair_last;
+  sf_fifo #(
+      .WIDTH     (30),
+      .LOG2_DEPTH(LOG2_DEPTH)
+  ) u_waiting (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (load),
+      .data_i ({place, shift, cell_last}),
+      .valid_o(waiting_valid),
+      .pop_i  (pop),
+      .data_o ({waiting_place, waiting_shift, waiting_last})
+  );
+  sf_trilinear u_trilinear (
+      .clk_i     (clk_i),
+      .rst_ni    (rst_ni),
+      .clear_i   (clear_i),
+      .valid_i   (answer),
+      .entry_i   (mem_rsp_data_i),
+      .place_i   (waiting_place),
+      .shift_i   (waiting_shift),
+      .last_i    (waiting_last),
+      .pop_o     (pop),
+      .valid_o   (pair_valid),
+      .features_o(pair),
+      .last_o    (pair_last)
+  );
+  sf_fifo #(
+      .WIDTH     (25),
+      .LOG2_DEPTH(LOG2_DEPTH)
+  ) u_features (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (pair_valid),
+      .data_i ({pair, pair_last}),
+      .valid_o(m_valid_o),
+      .pop_i  (m_valid_o && m_ready_i),
+      .data_o ({m_features_o, m_last_o})
+  );
+  wire unused_ok = &{1'b0, waiting_valid};
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,279 @@
+/* sf_grid_weight, sf_trilinear, sf_grid against src/fx/grid.c. */
+#include "Vsf_grid.h"
+#include "Vsf_grid_weight.h"
+#include "Vsf_trilinear.h"
+#include "tests/rtl_unit_grid.h"
+extern "C" {
+#include "src/fx/round.h"
+}
+
+enum { CORNERS = FX_GRID_CORNERS };
+
+/* Every place in a cell in long runs; every x-y with 16 values of z in short ones. */
+START_TEST(weights_of_every_place)
+{
+  VerilatedContext context;
+  Vsf_grid_weight top(&context);
+  for (int z = _i; z<256; z += unit_length()> 1 ? 1 : 17)
+    for (int y = 0; y < 256; y++)
+      for (int x = 0; x < 256; x++) {
+        const int32_t g[3] = {x, y, z};
+        int32_t weight[CORNERS];
+        uint32_t sum = 0;
+        fx_grid_weights(g, weight);
+        top.x_i = (uint8_t)x, top.y_i = (uint8_t)y, top.z_i = (uint8_t)z;
+        for (int corner = 0; corner < CORNERS; corner++) {
+          top.corner_i = (uint8_t)corner;
+          top.eval();
+          if (top.weight_o != (uint32_t)weight[corner])
+            ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %d", x, y, z, corner, top.weight_o,
+                         weight[corner]);
+          sum += top.weight_o;
+        }
+        if (sum != 65536) ck_abort_msg("place (%d, %d, %d): weights sum to %u", x, y, z, sum);
+      }
+  top.final();
+}
+END_TEST
+
+/* ---- sf_trilinear ---- */
+
+static int expected_feature(int64_t sum, int shift)
+{
+  const int64_t exact = fx_rshift_round(sum, shift), limit = FX_INPUT_MAX;
+  return (int)(exact > limit ? limit : exact < -limit ? -limit : exact);
+}
+
+struct cell_of_test {
+  int32_t g[3];
+  int8_t entry[CORNERS][2];
+  int shift;
+  bool last;
+  int feature[2];
+};
+
+static cell_of_test draw_cell(random_draw &draw)
+{
+  cell_of_test c = {};
+  int32_t weight[CORNERS];
+  const int kind = (int)draw(0, 3);
+  int64_t sum[2] = {0, 0};
+  for (int a = 0; a < 3; a++) c.g[a] = (int32_t)(kind == 1 ? (draw(0, 1) ? 255 : 0) : draw(0, 255));
+  fx_grid_weights(c.g, weight);
+  c.shift = (int)draw(0, 31), c.last = draw(0, 1);
+  const int8_t rail = draw(0, 1) ? 127 : -128;
+  for (int corner = 0; corner < CORNERS; corner++)
+    for (int i = 0; i < 2; i++) {
+      c.entry[corner][i] = kind == 2 ? rail : kind == 3 ? (draw(0, 1) ? 127 : -128) : (int8_t)draw(-128, 127);
+      sum[i] += weight[corner] * c.entry[corner][i];
+    }
+  for (int i = 0; i < 2; i++) c.feature[i] = expected_feature(sum[i], c.shift);
+  return c;
+}
+
+/* The cell's data stand at the inputs until its eighth entry, as the queue before it keeps them. */
+START_TEST(sums_of_random_cells)
+{
+  unit<Vsf_trilinear> u((uint64_t)_i + 20);
+  random_draw draw((uint64_t)_i + 20);
+  std::deque<cell_of_test> sent;
+  u.top.valid_i = 0;
+  u.reset();
+  cell_of_test c = draw_cell(draw);
+  for (int corner = 0, cells = 0; cells < 20000 * unit_length();) {
+    u.top.valid_i = !draw.percent(40 * _i);
+    u.top.place_i = (uint32_t)(c.g[0] | c.g[1] << 8 | c.g[2] << 16);
+    u.top.entry_i = (uint16_t)((uint8_t)c.entry[corner][0] | (uint8_t)c.entry[corner][1] << 8);
+    u.top.shift_i = (uint8_t)c.shift, u.top.last_i = c.last;
+    u.settle();
+    ck_assert_int_eq(u.top.pop_o, u.top.valid_i && corner == CORNERS - 1);
+    if (u.top.valid_o) {
+      ck_assert(!sent.empty());
+      for (int i = 0; i < 2; i++) {
+        const int got = (int)(u.top.features_o << (20 - 12 * i)) >> 20;
+        ck_assert_msg(got == sent.front().feature[i], "cell %d feature %d, shift %d: %d, expected %d", cells, i,
+                      sent.front().shift, got, sent.front().feature[i]);
+      }
+      ck_assert_int_eq(u.top.last_o, sent.front().last);
+      sent.pop_front();
+      cells++;
+    }
+    const bool end = u.top.pop_o;
+    corner = (corner + u.top.valid_i) % CORNERS;
+    u.edge();
+    if (!end) continue;
+    sent.push_back(c);
+    c = draw_cell(draw);
+  }
+}
+END_TEST
+
+/* ---- sf_grid ---- */
+
+struct grid_bench {
+  unit<Vsf_grid> u;
+  random_draw draw;
+  const grid_fixture *table = nullptr;
+  table_memory memory = {};
+  int stall = 0;
+  struct sample {
+    uint32_t pos[3];
+    int16_t f[2 * FX_LEVELS_MAX];
+  };
+  std::deque<sample> flying;    /* accepted; not all of its features have come */
+  std::deque<uint32_t> entries; /* that must be asked for */
+  sample next;
+  int level = 0, accepted = 0, done = 0;
+  held output, request;
+
+  explicit grid_bench(uint64_t seed) : u(seed), draw(seed)
+  {
+    u.top.s_valid_i = u.top.m_ready_i = u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = u.top.cfg_we_i = 0;
+    u.reset();
+  }
+  void load(const grid_fixture *fixture, int latency, int spread, int stalls)
+  {
+    table = fixture, stall = stalls;
+    memory = {fixture, latency, spread, stalls, {}};
+    configure_levels(u, table->grid);
+    u.top.last_level_i = (uint8_t)(table->grid.levels - 1);
+  }
+  void clear(bool hard)
+  {
+    request = output = held(); /* reset withdraws at once */
+    u.top.rst_ni = !hard, u.top.clear_i = !hard;
+    cycle(0);
+    u.top.rst_ni = 1, u.top.clear_i = 0, u.top.s_valid_i = 0;
+    flying.clear(), entries.clear();
+    output = request = held(), level = 0, accepted = done;
+    if (hard) memory.queue.clear();
+  }
+  /* Offers samples while `more`. */
+  void cycle(int more)
+  {
+    if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) {
+      for (int a = 0; a < 3; a++) next.pos[a] = table->coordinate(draw);
+      fx_grid_features(&table->grid, next.pos, next.f, nullptr);
+      set_position(u.top.s_pos_i, next.pos);
+      u.top.s_valid_i = 1;
+    }
+    u.top.m_ready_i = !draw.percent(stall);
+    memory.drive(u.top, draw, u.cycle);
+    u.settle();
+    const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
+    request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
+    const uint32_t entry = u.top.mem_req_addr_o;
+    if (memory.sample(u.top, draw, u.cycle) && u.top.rst_ni) ask(entry);
+    output.check(u.top.m_valid_o, u.top.m_ready_i, u.top.m_features_o << 1 | u.top.m_last_o);
+    if (u.top.m_valid_o && u.top.m_ready_i && !quiet) take();
+    if (taken && !quiet) accept();
+    u.edge();
+    if (taken) u.top.s_valid_i = 0;
+  }
+  uint64_t run(int samples)
+  {
+    const int end = done + samples;
+    const uint64_t begin = u.cycle;
+    while (done < end) {
+      cycle(end - accepted);
+      ck_assert_uint_lt(u.cycle - begin, (uint64_t)samples * 20000);
+    }
+    return u.cycle - begin;
+  }
+
+private:
+  void accept()
+  {
+    flying.push_back(next);
+    accepted++;
+    for (int l = 0; l < table->grid.levels; l++)
+      for (int corner = 0; corner < CORNERS; corner++) entries.push_back(table->entry(next.pos, l, corner));
+  }
+  void ask(uint32_t entry)
+  {
+    ck_assert(!entries.empty());
+    ck_assert_msg(entry == entries.front(), "entry %u asked for, expected %u (%zu before the end)", entry,
+                  entries.front(), entries.size());
+    entries.pop_front();
+  }
+  void take()
+  {
+    ck_assert(!flying.empty());
+    const sample &s = flying.front();
+    for (int i = 0; i < 2; i++) {
+      const int got = (int)(u.top.m_features_o << (20 - 12 * i)) >> 20, expected = s.f[2 * level + i];
+      ck_assert_msg(got == expected, "sample %d at (%u, %u, %u), level %d feature %d: %d, expected %d", done, s.pos[0],
+                    s.pos[1], s.pos[2], level, i, got, expected);
+    }
+    const bool last = level == table->grid.levels - 1;
+    ck_assert_int_eq(u.top.m_last_o, last);
+    level = last ? 0 : level + 1;
+    if (!last) return;
+    flying.pop_front();
+    done++;
+  }
+};
+
+/* Grids of all sizes, entries over their range and at the rails, any latency and stalls. */
+START_TEST(random_grids)
+{
+  grid_bench b((uint64_t)_i + 30);
+  for (int n = 0; n < 12 * unit_length(); n++) {
+    const int levels = n % 3 ? (int)b.draw(1, 16) : n % 2 ? 1 : 16;
+    const grid_fixture fixture(b.draw, levels, n % 4 == 3);
+    const int stall = n % 3 == 0 ? 0 : n % 3 == 1 ? 20 : 70;
+    b.load(&fixture, (int)b.draw(1, 60), (int)b.draw(0, 3) * 40, stall);
+    b.run(120);
+    ck_assert(b.flying.empty() && b.entries.empty() && b.memory.queue.empty());
+  }
+}
+END_TEST
+
+/* One request per cycle up to a latency of the requests that may be on their way. */
+START_TEST(a_request_in_every_cycle)
+{
+  static const int latency[] = {1, 10, 60, 100};
+  for (int i = 0; i < 4; i++)
+    for (int levels = 1; levels <= 16; levels += 5) {
+      grid_bench b(40);
+      const grid_fixture fixture(b.draw, levels, 0);
+      b.load(&fixture, latency[i], 0, 0);
+      const uint64_t samples = 50, requests = samples * (uint64_t)levels * CORNERS, cycles = b.run((int)samples);
+      ck_assert_msg(cycles <= requests + (uint64_t)latency[i] + 20, "%d levels, latency %d: %d cycles for %d requests",
+                    levels, latency[i], (int)cycles, (int)requests);
+    }
+}
+END_TEST
+
+/* Clear at any moment; the memory goes on answering what it had accepted. */
+START_TEST(reset_on_the_way)
+{
+  grid_bench b(50);
+  for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
+    const grid_fixture fixture(b.draw, (int)b.draw(1, 16), 0);
+    b.memory.table = &fixture;
+    for (table_memory::request &r : b.memory.queue) r.entry = 0;
+    const std::deque<table_memory::request> waiting = b.memory.queue;
+    b.load(&fixture, (int)b.draw(1, 90), 20, (int)b.draw(0, 1) * 30);
+    b.memory.queue = waiting;
+    for (int i = 0; i < delay; i++) b.cycle(1);
+    b.clear(delay % 3 == 0);
+    if (delay % 3 == 1) b.clear(false);
+    b.run(3);
+  }
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("rtl_grid");
+  TCase *cases = tcase_create("grid");
+  tcase_set_timeout(cases, 3600);
+  tcase_add_loop_test(cases, weights_of_every_place, 0, 1);
+  tcase_add_loop_test(cases, sums_of_random_cells, 0, 3);
+  tcase_add_loop_test(cases, random_grids, 0, 4);
+  tcase_add_test(cases, a_request_in_every_cycle);
+  tcase_add_test(cases, reset_on_the_way);
+  suite_add_tcase(suite, cases);
+  return unit_run(suite);
+}
