@@ -2,10 +2,11 @@
 # UNITS_<test> are the modules that tests/<test>.cpp drives.
 UNITS_test_rtl_sh := sf_sh
 UNITS_test_rtl_grid := sf_grid sf_grid_weight sf_trilinear
-UNIT_TESTS := test_rtl_sh test_rtl_grid
+UNITS_test_rtl_encoder := sf_encoder
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder
 TESTS += $(UNIT_TESTS)
 
-LINT_TOPS := sf_sh sf_grid
+LINT_TOPS := sf_encoder
 UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
 UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
 UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)

@@ -102,10 +102,11 @@ struct table_memory {
   }
 };
 
-/* One cycle of the write port. */
+/* One cycle of the write port; the memory port rests. */
 template <class module> static void configure(unit<module> &u, int address, int64_t value)
 {
   u.top.cfg_we_i = 1, u.top.cfg_addr_i = (uint8_t)address, u.top.cfg_data_i = (uint32_t)value;
+  u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = 0;
   u.edge();
   u.top.cfg_we_i = 0;
 }

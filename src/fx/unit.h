@@ -33,8 +33,8 @@ uint32_t fx_sigmoid(int32_t x);
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
 
-/* Trilinear weights, Q0.16, of the corners of a cell; g[3]: place in the cell, 0..255. Bit 0 of the index = x + 1, bit 1 =
- * y + 1, bit 2 = z + 1. They sum to 65536. */
+/* Trilinear weights, Q0.16, of the corners of a cell; g[3]: place in the cell, 0..255. Bit 0 of the index = x + 1, bit
+ * 1 = y + 1, bit 2 = z + 1. They sum to 65536. */
 enum { FX_GRID_CORNERS = 8 };
 void fx_grid_weights(const int32_t g[3], int32_t weight[FX_GRID_CORNERS]);
 

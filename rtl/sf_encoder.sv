@@ -1,0 +1,177 @@
+// Sample positions and directions to the packets that sf_stream_in takes: grid features of every sample, and before
+// those of a ray's first sample the spherical harmonics of its direction. Mirror: sim/stream.c (sf_dut_packet) over
+// src/fx/grid.c and src/fx/sh.c.
+//
+// Programming, while nothing is on its way; kept by reset and clear:
+//   cfg_addr_i   cfg_data_i                                                           in fx_scene
+//   8 l + 0      scale of level l = 0..15, Q16.16                          [30:0]    grid.scale_q16[l]
+//   8 l + 1      points per axis of a dense level; 0: hashed               [ 9:0]    grid.stride[l]
+//   8 l + 2      log2 of the entries of a hashed level                     [ 4:0]    grid.log2_size[l]
+//   8 l + 3      first entry                                               [31:0]    grid.offset[l]
+//   8 l + 4      shift of its features, 0..31                              [ 4:0]    grid.shift[l]
+//   0x80         number of levels, 1..16                                              grid.levels
+//   0x81         number of direction features, 0..16                                  C1.n_in - (D2.n_out - 1)
+//   0x82         frac, 0..11: their LSB is 2^-frac                                    -log2(dir_scale)
+//
+// Memory port: an address is an entry, two signed bytes (feature 0 in bits 7:0); see sf_grid. Three rays can be on their
+// way when the samples are the first of theirs: one at the output, one in sf_sh, one waiting.
+`default_nettype none
+
+module sf_encoder #(
+    parameter integer LOG2_DEPTH = 4  // of the levels on their way to or from the memory
+) (
+    input  wire        clk_i,
+    input  wire        rst_ni,
+    input  wire        clear_i,
+    input  wire        cfg_we_i,
+    input  wire [ 7:0] cfg_addr_i,
+    input  wire [31:0] cfg_data_i,
+    input  wire        s_valid_i,
+    output wire        s_ready_o,
+    input  wire        s_first_i,         // of a new ray: s_dir_i is its direction
+    input  wire [71:0] s_pos_i,           // {z, y, x}, Q0.24
+    input  wire [47:0] s_dir_i,           // {z, y, x}, signed Q1.14
+    output wire        mem_req_valid_o,
+    input  wire        mem_req_ready_i,
+    output wire [31:0] mem_req_addr_o,
+    input  wire        mem_rsp_valid_i,
+    input  wire [15:0] mem_rsp_data_i,
+    output wire        m_axis_tvalid_o,
+    input  wire        m_axis_tready_i,
+    output wire [63:0] m_axis_tdata_o,
+    output wire        m_axis_tuser_o,
+    output wire        m_axis_tlast_o
+);
+  reg [3:0] last_level_q, frac_q;
+  reg [4:0] n_dir_q;
+  always_ff @(posedge clk_i) begin
+    if (cfg_we_i && cfg_addr_i == 8'h80) last_level_q <= cfg_data_i[3:0] - 4'd1;
+    if (cfg_we_i && cfg_addr_i == 8'h81) n_dir_q <= cfg_data_i[4] ? 5'd16 : cfg_data_i[4:0];
+    if (cfg_we_i && cfg_addr_i == 8'h82) frac_q <= cfg_data_i[3:0];
+  end
+
+  // A sample goes to the grid, its direction to the register before sf_sh.
+  wire grid_ready, sh_ready, tag_valid, tag_first, packet_end;
+  reg dir_valid_q;
+  reg [47:0] dir_q;
+  wire directed = s_first_i && n_dir_q != 5'd0;
+  wire dir_ready = !dir_valid_q || sh_ready;
+  wire grid_valid = s_valid_i && (!directed || dir_ready);
+  assign s_ready_o = grid_ready && (!directed || dir_ready);
+  wire accept = s_valid_i && s_ready_o;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) dir_valid_q <= 1'b0;
+    else if (clear_i) dir_valid_q <= 1'b0;
+    else if (dir_ready) dir_valid_q <= accept && directed;
+  end
+  always_ff @(posedge clk_i) if (dir_ready) dir_q <= s_dir_i;
+
+  // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way, one more is
+  // in sf_grid_cell and one in the packet.
+  sf_fifo #(
+      .WIDTH     (1),
+      .LOG2_DEPTH(LOG2_DEPTH + 1)
+  ) u_tags (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (accept),
+      .data_i (s_first_i),
+      .valid_o(tag_valid),
+      .pop_i  (packet_end),
+      .data_o (tag_first)
+  );
+
+  wire pair_valid, pair_ready, pair_last;
+  wire [23:0] pair;
+  sf_grid #(
+      .LOG2_DEPTH(LOG2_DEPTH)
+  ) u_grid (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (clear_i),
+      .cfg_we_i       (cfg_we_i && !cfg_addr_i[7]),
+      .cfg_addr_i     (cfg_addr_i[6:0]),
+      .cfg_data_i     (cfg_data_i),
+      .last_level_i   (last_level_q),
+      .s_valid_i      (grid_valid),
+      .s_ready_o      (grid_ready),
+      .s_pos_i        (s_pos_i),
+      .mem_req_valid_o(mem_req_valid_o),
+      .mem_req_ready_i(mem_req_ready_i),
+      .mem_req_addr_o (mem_req_addr_o),
+      .mem_rsp_valid_i(mem_rsp_valid_i),
+      .mem_rsp_data_i (mem_rsp_data_i),
+      .m_valid_o      (pair_valid),
+      .m_ready_i      (pair_ready),
+      .m_features_o   (pair),
+      .m_last_o       (pair_last)
+  );
+
+  wire value_valid, value_ready, value_last;
+  wire signed [11:0] value;
+  sf_sh u_sh (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .n_i    (n_dir_q),
+      .frac_i (frac_q),
+      .valid_i(dir_valid_q),
+      .ready_o(sh_ready),
+      .unit_i (dir_q),
+      .valid_o(value_valid),
+      .ready_i(value_ready),
+      .dir_o  (value),
+      .last_o (value_last)
+  );
+
+  // Beats of four values: harmonics come one by one, features in pairs; unused places are 0.
+  reg full_q, user_q, last_q, begun_q, dir_done_q;
+  reg [1:0] at_q;  // place of the next value
+  reg [63:0] beat_q;
+  wire room = !full_q || m_axis_tready_i;
+  wire in_dir = tag_first && n_dir_q != 5'd0 && !dir_done_q;
+  assign value_ready = tag_valid && in_dir && room;
+  assign pair_ready = tag_valid && !in_dir && room;
+  wire take_value = value_ready && value_valid;
+  wire take_pair = pair_ready && pair_valid;
+  wire dir_end = take_value && value_last;
+  assign packet_end = take_pair && pair_last;
+  wire beat_end = dir_end || packet_end || (take_value && at_q == 2'd3) || (take_pair && at_q[1]);
+
+  wire [31:0] pair_values = {{4{pair[23]}}, pair[23:12], {4{pair[11]}}, pair[11:0]};
+  wire [63:0] kept = at_q == 2'd0 ? 64'd0 : beat_q;
+  wire [63:0] added = take_value ? {48'd0, {4{value[11]}}, value} << {at_q, 4'd0} : {32'd0, pair_values} << {at_q, 4'd0};
+
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      {full_q, begun_q, dir_done_q} <= 3'd0;
+      at_q <= 2'd0;
+    end else if (clear_i) begin
+      {full_q, begun_q, dir_done_q} <= 3'd0;
+      at_q <= 2'd0;
+    end else begin
+      if (room) full_q <= beat_end;
+      if (beat_end) at_q <= 2'd0;
+      else if (take_value) at_q <= at_q + 2'd1;
+      else if (take_pair) at_q <= at_q + 2'd2;
+      if (packet_end) {begun_q, dir_done_q} <= 2'b00;
+      else if (beat_end) {begun_q, dir_done_q} <= {1'b1, dir_done_q || dir_end};
+    end
+  end
+
+  always_ff @(posedge clk_i) begin
+    if (take_value || take_pair) begin
+      beat_q <= kept | added;
+      user_q <= tag_first && !begun_q;
+      last_q <= packet_end;
+    end
+  end
+
+  assign m_axis_tvalid_o = full_q;
+  assign m_axis_tdata_o = beat_q;
+  assign m_axis_tuser_o = user_q;
+  assign m_axis_tlast_o = last_q;
+endmodule
+
+`default_nettype wire

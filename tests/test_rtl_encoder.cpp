@@ -1,0 +1,208 @@
+/* sf_encoder against fx_grid_features and fx_sh, as the packets that the engine takes. */
+#include "Vsf_encoder.h"
+#include "tests/rtl_unit_grid.h"
+
+enum { VALUES = 4 }; /* of a beat */
+
+struct beat {
+  uint64_t data;
+  bool user, last;
+};
+
+static void add_beats(std::deque<beat> &beats, const int16_t *value, int n, bool user, bool last)
+{
+  for (int i = 0; i < n; i += VALUES) {
+    beat b = {0, user && i == 0, last && i + VALUES >= n};
+    for (int j = 0; j < VALUES && i + j < n; j++) b.data |= (uint64_t)(uint16_t)value[i + j] << 16 * j;
+    beats.push_back(b);
+  }
+}
+
+struct encoder_bench {
+  unit<Vsf_encoder> u;
+  random_draw draw;
+  const grid_fixture *table = nullptr;
+  table_memory memory = {};
+  int stall = 0, n_dir = 0, frac = 0, first_percent = 0;
+  std::deque<beat> expected, next; /* of accepted samples; of the one on offer */
+  int accepted = 0, done = 0;
+  bool in_ray = false;
+  held output, request;
+
+  explicit encoder_bench(uint64_t seed) : u(seed), draw(seed)
+  {
+    u.top.s_valid_i = u.top.m_axis_tready_i = u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = u.top.cfg_we_i = 0;
+    u.reset();
+  }
+  void load(const grid_fixture *fixture, int directions, int lsb)
+  {
+    table = memory.table = fixture, n_dir = directions, frac = lsb, in_ray = false;
+    configure_levels(u, fixture->grid);
+    configure(u, 0x80, fixture->grid.levels);
+    configure(u, 0x81, n_dir);
+    configure(u, 0x82, frac);
+  }
+  void timing(int latency, int spread, int stalls, int first)
+  {
+    memory.latency = latency, memory.spread = spread, memory.stall = stall = stalls, first_percent = first;
+  }
+  void clear(bool hard)
+  {
+    request = output = held(); /* reset withdraws at once */
+    u.top.rst_ni = !hard, u.top.clear_i = !hard;
+    cycle(0);
+    u.top.rst_ni = 1, u.top.clear_i = 0, u.top.s_valid_i = 0;
+    expected.clear(), in_ray = false;
+    output = request = held(), accepted = done;
+    if (hard) memory.queue.clear();
+    for (table_memory::request &r : memory.queue) r.entry = 0; /* answers to nobody, perhaps from a larger table */
+  }
+  void cycle(int more)
+  {
+    if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) offer();
+    u.top.m_axis_tready_i = !draw.percent(stall);
+    memory.drive(u.top, draw, u.cycle);
+    u.settle();
+    const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
+    request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
+    memory.sample(u.top, draw, u.cycle);
+    output.check(u.top.m_axis_tvalid_o, u.top.m_axis_tready_i, u.top.m_axis_tdata_o);
+    if (taken && !quiet) {
+      expected.insert(expected.end(), next.begin(), next.end());
+      accepted++;
+    }
+    if (u.top.m_axis_tvalid_o && u.top.m_axis_tready_i && !quiet) take();
+    u.edge();
+    if (taken) u.top.s_valid_i = 0;
+  }
+  uint64_t run(int samples)
+  {
+    const int end = done + samples;
+    const uint64_t begin = u.cycle;
+    while (done < end) {
+      cycle(end - accepted);
+      ck_assert_uint_lt(u.cycle - begin, (uint64_t)samples * 20000);
+    }
+    return u.cycle - begin;
+  }
+
+private:
+  void offer()
+  {
+    uint32_t pos[3];
+    int16_t f[2 * FX_LEVELS_MAX], v[3], dir[SF_DIR_MAX];
+    const bool first = !in_ray || draw.percent(first_percent);
+    for (int a = 0; a < 3; a++) pos[a] = table->coordinate(draw), v[a] = (int16_t)draw(-17000, 17000);
+    fx_grid_features(&table->grid, pos, f, nullptr);
+    fx_sh(v, frac, dir);
+    next.clear();
+    if (first) add_beats(next, dir, n_dir, true, false);
+    add_beats(next, f, 2 * table->grid.levels, first && n_dir == 0, true);
+    set_position(u.top.s_pos_i, pos);
+    u.top.s_dir_i = (uint64_t)(uint16_t)v[2] << 32 | (uint64_t)(uint16_t)v[1] << 16 | (uint16_t)v[0];
+    u.top.s_first_i = first, u.top.s_valid_i = 1, in_ray = true;
+  }
+  void take()
+  {
+    ck_assert_msg(!expected.empty(), "a beat that belongs to no sample");
+    const beat b = expected.front();
+    ck_assert_msg(u.top.m_axis_tdata_o == b.data, "sample %d (%d levels, %d harmonics): beat %016llx, expected %016llx",
+                  done, table->grid.levels, n_dir, (unsigned long long)u.top.m_axis_tdata_o,
+                  (unsigned long long)b.data);
+    ck_assert_int_eq(u.top.m_axis_tuser_o, b.user);
+    ck_assert_int_eq(u.top.m_axis_tlast_o, b.last);
+    expected.pop_front();
+    done += b.last;
+  }
+};
+
+START_TEST(random_scenes)
+{
+  encoder_bench b((uint64_t)_i + 60);
+  for (int n = 0; n < 15 * unit_length(); n++) {
+    const grid_fixture fixture(b.draw, n % 4 ? (int)b.draw(1, 16) : n % 8 ? 1 : 16, n % 5 == 4);
+    b.load(&fixture, n % 3 ? (int)b.draw(0, 16) : 16, (int)b.draw(0, 11));
+    b.timing((int)b.draw(1, 60), (int)b.draw(0, 3) * 40, n % 3 == 0 ? 0 : n % 3 == 1 ? 20 : 70, (int)b.draw(0, 4) * 25);
+    b.run(100);
+    for (int i = 0; i < 20; i++) b.cycle(0); /* and no beat more */
+    ck_assert(b.expected.empty() && b.memory.queue.empty());
+  }
+}
+END_TEST
+
+/* Samples cost their requests alone, even at one sample per ray, for which three rays on their way hide less. */
+START_TEST(a_request_in_every_cycle)
+{
+  static const int latency[] = {1, 60, 90};
+  for (int i = 0; i < 3; i++)
+    for (int levels = 8; levels <= 16; levels += 4)
+      for (int first = 10; first <= (latency[i] <= 60 ? 100 : 10); first += 90) {
+        encoder_bench b(70);
+        const grid_fixture fixture(b.draw, levels, 0);
+        b.load(&fixture, 16, 6);
+        b.timing(latency[i], 0, 0, first);
+        const uint64_t samples = 60, requests = samples * (uint64_t)levels * FX_GRID_CORNERS,
+                       cycles = b.run((int)samples);
+        ck_assert_msg(cycles <= requests + (uint64_t)latency[i] + 80,
+                      "%d levels, latency %d, %d %% first: %d cycles for %d requests", levels, latency[i], first,
+                      (int)cycles, (int)requests);
+      }
+}
+END_TEST
+
+START_TEST(reset_on_the_way)
+{
+  encoder_bench b(80);
+  for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
+    const grid_fixture fixture(b.draw, (int)b.draw(1, 16), 0);
+    b.load(&fixture, (int)b.draw(0, 16), (int)b.draw(0, 11));
+    b.timing((int)b.draw(1, 90), 20, (int)b.draw(0, 1) * 30, 50);
+    for (int i = 0; i < delay; i++) b.cycle(1);
+    b.clear(delay % 3 == 0);
+    if (delay % 3 == 1) b.clear(false);
+    b.run(3); /* programming is kept */
+    for (int i = 0; i < delay; i++) b.cycle(1);
+    b.clear(delay % 2);
+  }
+}
+END_TEST
+
+/* The levels of a real scene: 16, dense and hashed tables of up to 2^19 entries. */
+START_TEST(sizes_of_a_real_scene)
+{
+  random_draw draw(90);
+  grid_fixture fixture(draw, 16, 0);
+  fx_grid &grid = fixture.grid;
+  grid.entries = 0;
+  for (int l = 0; l < 16; l++) {
+    double res = 16;
+    for (int i = 0; i < l; i++) res *= 1.3819;
+    const int64_t stride = (int64_t)res + 3;
+    const bool dense = stride * stride * stride <= 1 << 19;
+    grid.scale_q16[l] = (int32_t)((res - 1) * 65536);
+    grid.stride[l] = dense ? (int32_t)stride : 0, grid.log2_size[l] = 19;
+    grid.offset[l] = grid.entries, grid.shift[l] = 12;
+    grid.entries += dense ? stride * stride * stride : 1 << 19;
+  }
+  fixture.table.resize((size_t)grid.entries * 2);
+  for (size_t i = 0; i < fixture.table.size(); i++) fixture.table[i] = (int8_t)(i * 2654435761u >> 24);
+  grid.table = fixture.table.data();
+  encoder_bench b(90);
+  b.load(&fixture, 16, 6);
+  b.timing(40, 10, 5, 10);
+  b.run(1000 * unit_length());
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("rtl_encoder");
+  TCase *cases = tcase_create("encoder");
+  tcase_set_timeout(cases, 3600);
+  tcase_add_loop_test(cases, random_scenes, 0, 4);
+  tcase_add_test(cases, a_request_in_every_cycle);
+  tcase_add_test(cases, reset_on_the_way);
+  tcase_add_test(cases, sizes_of_a_real_scene);
+  suite_add_tcase(suite, cases);
+  return unit_run(suite);
+}
