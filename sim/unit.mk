@@ -7,7 +7,7 @@ UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder test_rtl_composite
 TESTS += $(UNIT_TESTS)
 
-LINT_TOPS := sf_encoder sf_composite
+LINT_TOPS := sf_ray_top
 UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
 UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
 UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)
