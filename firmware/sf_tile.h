@@ -6,7 +6,7 @@
 #include "firmware/sf_blob.h"
 #include "spikefield/fx.h"
 
-enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 1, SF_TILE_SIDE_MAX = 4096 };
+enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 2, SF_TILE_SIDE_MAX = 4096 };
 
 typedef struct sf_tile_header {
   uint32_t magic, version;
@@ -22,7 +22,7 @@ typedef struct sf_tile_header {
 
 /* The same bytes for the host that writes them and the processor that reads them. */
 _Static_assert(sizeof(sf_tile_header) % 8 == 0, "the first part begins aligned");
-_Static_assert(sizeof(fx_ray) == 88 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
+_Static_assert(sizeof(fx_ray) == 96 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
 
 /* An image, opened. */
 typedef struct sf_tile {
