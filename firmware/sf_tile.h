@@ -6,7 +6,7 @@
 #include "firmware/sf_blob.h"
 #include "spikefield/fx.h"
 
-enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 1, SF_TILE_SIDE_MAX = 4096 };
+enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 2, SF_TILE_SIDE_MAX = 4096 };
 
 typedef struct sf_tile_header {
   uint32_t magic, version;

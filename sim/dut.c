@@ -18,14 +18,14 @@ static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *wha
   return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s: %s", what, sf_driver_text(code), sf_driver_error_text(error));
 }
 
-sf_status sf_dut_open_bare(sf_dut **dut_out, const sf_dut_options *options)
+sf_status sf_dut_open_pins(sf_dut **dut_out, const sf_dut_options *options, sf_pins_opener open)
 {
   *dut_out = NULL;
   if (options->stall_percent < 0 || options->stall_percent > 90)
     return sf_fail(SF_E_RANGE, "accelerator: stall percentage is %d, expected 0..90", options->stall_percent);
   sf_dut *dut = calloc(1, sizeof *dut);
   if (!dut) return sf_fail(SF_E_MEMORY, "accelerator: out of memory");
-  dut->pins = sf_pins_open(options->seed, options->wave, options->plusarg);
+  dut->pins = open(options->seed, options->wave, options->plusarg);
   if (!dut->pins) {
     free(dut);
     return options->wave ? sf_fail(SF_E_IO, "%s: cannot write the waveform", options->wave)
@@ -46,6 +46,11 @@ sf_status sf_dut_open_bare(sf_dut **dut_out, const sf_dut_options *options)
   }
   *dut_out = dut;
   return status;
+}
+
+sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options)
+{
+  return sf_dut_open_pins(dut, options, sf_pins_open);
 }
 
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net)

@@ -1,4 +1,4 @@
-/* The Verilated model, one clock cycle per call, behind a C interface. */
+/* The Verilated model, sf_top or sf_ray_top, one clock cycle per call, behind a C interface. */
 #ifndef SPIKEFIELD_SIM_PINS_H
 #define SPIKEFIELD_SIM_PINS_H
 #include <stdbool.h>
@@ -15,6 +15,12 @@ typedef struct sf_pins_in {
   bool s_valid, s_user, s_last;
   uint64_t s_data;
   bool m_ready;
+  /* sf_ray_top alone, in place of s and m: rays, pixels, the grid's memory */
+  bool ray_valid, ray_user, ray_last;
+  uint64_t ray_data[4];
+  bool pixel_ready;
+  bool mem_ready, mem_answer;
+  uint16_t mem_data;
 } sf_pins_in;
 
 /* As sampled just before the rising edge, with the inputs of the same cycle applied. */
@@ -29,11 +35,15 @@ typedef struct sf_pins_out {
   uint8_t tap_layer, tap_step;
   uint64_t tap_spikes[2], tap_rows[2];
   uint32_t tap_membrane[96]; /* 128 x 24 bits, packed */
+  bool ray_ready, pixel_valid, mem_request;
+  uint64_t pixel_data[6];
+  uint32_t mem_address;
 } sf_pins_out;
 
 typedef struct sf_pins sf_pins;
 /* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
+sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg); /* sf_ray_top */
 /* The waveform begins here. */
 void sf_pins_dump(sf_pins *pins);
 void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out);

@@ -31,6 +31,9 @@ bool sf_dut_stalls(const sf_dut *dut, uint64_t which);
 sf_bus sf_dut_bus(sf_dut *dut);
 /* Power on, probed, nothing programmed. */
 sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options);
+/* The same for either top: sf_pins_open or sf_pins_open_rays. */
+typedef sf_pins *(*sf_pins_opener)(uint64_t seed, const char *wave, const char *plusarg);
+sf_status sf_dut_open_pins(sf_dut **dut, const sf_dut_options *options, sf_pins_opener open);
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net);
 sf_net_blob sf_dut_blob(const fx_net *net);
 

@@ -12,7 +12,7 @@ RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
 RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 # Loops over lanes are written for unrolling; see rtl/README.md.
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
-VERILATOR_FLAGS := --cc --prefix Vsf_top --top-module sf_top -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
+VERILATOR_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
   $(VERILATOR_UNROLL)
 # COVERAGE: folder in which every accelerator that is closed leaves its coverage; see sim/coverage.mk.
 ifneq ($(COVERAGE),)
@@ -28,22 +28,26 @@ VERILATED_SIMD := $(shell $(CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
 SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
-DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_blob.c sf_tile.c sf_stream.c))
+DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
-# $1 folder of the library, $2 folder that holds rtl/, $3 prerequisites
-define verilated_rule
-$1/Vsf_top.mk: $3
+# $1 folder, $2 folder that holds rtl/, $3 prerequisites, $4 top, $5 its pins in sim/
+define verilated_top_rule
+$1/V$4.mk: $3
 	@mkdir -p $1
 	$$(call say,VERI  $1)
-	$$Qcd $2 && $$(VERILATOR) $$(VERILATOR_FLAGS) -Irtl --Mdir $$(abspath $1) rtl/lint.vlt $$(RTL)
-$1/Vsf_top__ALL.a: $1/Vsf_top.mk
+	$$Qcd $2 && $$(VERILATOR) $$(VERILATOR_FLAGS) --prefix V$4 --top-module $4 -Irtl --Mdir $$(abspath $1) rtl/lint.vlt $$(RTL)
+$1/V$4__ALL.a: $1/V$4.mk
 	$$(call say,CXX   $$@)
-	$$Q$$(MAKE) -s -C $1 -f Vsf_top.mk $$(VERILATED_OPT) CXX=$$(CXX) Vsf_top__ALL.a >/dev/null
+	$$Q$$(MAKE) -s -C $1 -f V$4.mk $$(VERILATED_OPT) CXX=$$(CXX) V$4__ALL.a >/dev/null
 	@touch $$@
-$1/pins.o: sim/pins.cpp sim/pins.h $1/Vsf_top.mk
+$1/$5.o: sim/$5.cpp sim/pins.h sim/pins_model.h $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
 	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
+endef
+# $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
+define verilated_rule
+$(call verilated_top_rule,$1,$2,$3,sf_top,pins)
 $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$(call say,AR    $$@)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
@@ -52,6 +56,11 @@ endef
 DUT_TESTS += test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs test_soc
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
+# Programs that drive sf_ray_top.
+RAY_PROGRAMS := bin/sim_render bin/sf_soc tests/test_rtl_ray
+RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
+$(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
+DUT_TESTS += test_rtl_ray
 
 $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	@mkdir -p $(@D)
@@ -64,6 +73,7 @@ $B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
 	@touch $@
 
 $(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
+$(eval $(call verilated_top_rule,$B/verilated/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray))
 
 include sim/unit.mk
 

@@ -1,7 +1,7 @@
 /* Where pictures are made: one scene, one data set, one of three backends. Views are loaded one at a time. */
 #ifndef SPIKEFIELD_SIM_STUDIO_H
 #define SPIKEFIELD_SIM_STUDIO_H
-#include "spikefield/dut.h"
+#include "sim/ray.h"
 #include "spikefield/golden.h"
 
 typedef enum { SF_BACKEND_FLOAT, SF_BACKEND_FIXED, SF_BACKEND_RTL } sf_backend;
@@ -23,7 +23,7 @@ typedef struct sf_studio {
   char scene_sha256[65];
   char model_path[4096];                   /* float */
   sf_model model;                          /* float */
-  sf_dut *dut;                             /* rtl */
+  sf_ray_dut *rays;                        /* rtl */
   bool (*tick)(void *user, size_t pixels); /* as sf_golden_job; set by the caller, or NULL */
   void *user;
 } sf_studio;
@@ -49,7 +49,7 @@ void sf_shot_free(sf_shot *shot);
 /* The argument of --crop: "X,Y,WIDTH,HEIGHT" with at least one pixel. SF_E_USAGE. */
 sf_status sf_window_parse(const char *text, sf_window *window);
 
-/* The accelerator makes the picture; the core walks along so that a difference is reported at its first sample, and for
- * what the accelerator does not do or count: marching, grid, saturation. */
-sf_status sf_golden_rtl(const sf_golden_job *job, sf_dut *dut, sf_golden *golden);
+/* The accelerator makes the pixels from the positions of their samples; the core walks along so that a difference is
+ * reported at its first pixel, and for what the accelerator does not do or count: marching, saturation, grid bytes. */
+sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden);
 #endif

@@ -1,26 +1,48 @@
 #include "sim/studio.h"
 #include <string.h>
 
+enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */
+
 typedef struct rtl_eval {
-  sf_dut *dut;
+  sf_ray_dut *rays;
   sf_probe core;
+  sf_ray_sample sample[SAMPLES_MAX];
 } rtl_eval;
 
-static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+static sf_status same_pixel(const fx_pixel *core, const fx_pixel *rtl, uint64_t cycle)
 {
-  rtl_eval *e = user;
-  fx_out core;
-  unsigned long long sample = e->core.sample;
-  SF_TRY(sf_probe_net(&e->core, ray, first, f, &core));
-  SF_TRY(sf_dut_net(e->dut, ray, first, f, out));
-  const uint32_t expected[4] = {core.sigma, core.colour[0], core.colour[1], core.colour[2]};
-  const uint32_t actual[4] = {out->sigma, out->colour[0], out->colour[1], out->colour[2]};
-  static const char *const name[4] = {"density", "red", "green", "blue"};
-  for (int i = 0; i < 4; i++)
-    if (expected[i] != actual[i])
-      return sf_fail(SF_E_DIFFERENCE, "sample %llu: %s is %u in the core, %u in the accelerator, cycle %llu", sample,
-                     name[i], expected[i], actual[i], (unsigned long long)sf_dut_cycle(e->dut));
+  const struct {
+    const char *name;
+    uint64_t core, rtl;
+  } field[] = {{"number of samples", core->samples, rtl->samples},
+               {"transmittance", core->transmittance, rtl->transmittance},
+               {"weight", core->weight_sum, rtl->weight_sum},
+               {"red", core->colour[0], rtl->colour[0]},
+               {"green", core->colour[1], rtl->colour[1]},
+               {"blue", core->colour[2], rtl->colour[2]},
+               {"depth", core->depth, rtl->depth}};
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++)
+    if (field[i].core != field[i].rtl)
+      return sf_fail(SF_E_DIFFERENCE, "%s is %llu in the core, %llu in the accelerator, cycle %llu", field[i].name,
+                     (unsigned long long)field[i].core, (unsigned long long)field[i].rtl, (unsigned long long)cycle);
   return sf_ok();
+}
+
+/* The core says how many samples the ray takes; the accelerator gets them and has to end it there too. */
+static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, fx_pixel *pixel, fx_counts *rtl)
+{
+  sf_dut *dut = e->rays->dut;
+  fx_pixel core;
+  uint64_t cycles, busy, stalls;
+  sf_probe_begin(&e->core);
+  SF_TRY(fx_render_ray(scene, ray, sf_probe_net, &e->core, &core, &e->core.core));
+  const sf_ray_request request = {ray, e->sample, (int)core.samples};
+  sf_ray_samples(scene, ray, e->sample, request.n);
+  SF_TRY(sf_dut_clear_counts(dut));
+  SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
+  SF_TRY(same_pixel(&core, pixel, sf_dut_cycle(dut)));
+  if (request.n > 0) SF_TRY(sf_dut_counts(dut, rtl, &cycles, &busy, &stalls));
+  return sf_counts_compare(&e->core.core, "core", rtl, "accelerator");
 }
 
 static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, sf_golden *golden)
@@ -28,13 +50,8 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   fx_ray ray;
   fx_pixel pixel;
   fx_counts rtl = {0}, counts;
-  uint64_t cycles, busy, stalls;
   SF_TRY(sf_pixel_ray(job->scene, job->camera, job->window.x + x, job->window.y + y, &ray));
-  sf_probe_begin(&e->core);
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  SF_TRY(fx_render_ray(job->scene, &ray, rtl_net, e, &pixel, &e->core.core));
-  if (pixel.samples > 0) SF_TRY(sf_dut_counts(e->dut, &rtl, &cycles, &busy, &stalls));
-  SF_TRY(sf_counts_compare(&e->core.core, "core", &rtl, "accelerator"));
+  SF_TRY(run_ray(job->scene, &ray, e, &pixel, &rtl));
   counts = e->core.core;
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
   const fx_cost cost = sf_cost_of(&counts);
@@ -43,9 +60,9 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   return sf_ok();
 }
 
-sf_status sf_golden_rtl(const sf_golden_job *job, sf_dut *dut, sf_golden *golden)
+sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden)
 {
-  rtl_eval e = {.dut = dut, .core = {.net = &job->scene->net}};
+  rtl_eval e = {.rays = rays, .core = {.net = &job->scene->net}};
   for (int y = 0; y < job->window.height; y++)
     for (int x = 0; x < job->window.width; x++) {
       sf_status status = rtl_pixel(job, &e, x, y, golden);

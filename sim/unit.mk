@@ -5,10 +5,11 @@ UNITS_test_rtl_grid := sf_grid sf_grid_weight sf_trilinear
 UNITS_test_rtl_encoder := sf_encoder sf_encoder_4
 UNIT_TOP_sf_encoder_4 := sf_encoder
 UNIT_PARAMETERS_sf_encoder_4 := -GLOG2_PORTS=2
-UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder
+UNITS_test_rtl_composite := sf_exp_neg sf_composite
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder test_rtl_composite
 TESTS += $(UNIT_TESTS)
 
-LINT_TOPS := sf_encoder
+LINT_TOPS := sf_ray_top
 UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
 UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
 UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)

@@ -180,12 +180,65 @@
 /* 4 signed weights, the lowest output neuron in bits 7:0, WO */
 #define SF_REG_WEIGHT_DATA 0x0094
 
+/* commands of the ray stream, WO */
+#define SF_REG_RAY_CTRL 0x0400
+#define SF_REG_RAY_CTRL_START_MASK 0x00000001 /* check the compositor's programming and accept rays */
+#define SF_REG_RAY_CTRL_START_SHIFT 0
+
+/* state of the ray stream, RO */
+#define SF_REG_RAY_STATUS 0x0404
+#define SF_REG_RAY_STATUS_RUNNING_MASK 0x00000001 /* started; CTRL.SOFT_RESET ends it */
+#define SF_REG_RAY_STATUS_RUNNING_SHIFT 0
+#define SF_REG_RAY_STATUS_ACTIVE_MASK 0x00000002 /* a ray or a pixel is inside */
+#define SF_REG_RAY_STATUS_ACTIVE_SHIFT 1
+#define SF_REG_RAY_STATUS_ERROR_MASK 0x00000004 /* RAY_ERROR is not 0 */
+#define SF_REG_RAY_STATUS_ERROR_SHIFT 2
+
+/* what was refused; a soft reset clears it, W1C */
+#define SF_REG_RAY_ERROR 0x0408
+#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES or a background out of range */
+#define SF_REG_RAY_ERROR_VALUE_SHIFT 0
+#define SF_REG_RAY_ERROR_BUSY_MASK 0x00000002 /* start or a write to the programming while running */
+#define SF_REG_RAY_ERROR_BUSY_SHIFT 1
+#define SF_REG_RAY_ERROR_ADDRESS_MASK 0x00000004 /* write to a register that is not there or is read-only */
+#define SF_REG_RAY_ERROR_ADDRESS_SHIFT 2
+#define SF_REG_RAY_ERROR_ORDER_MASK 0x00000008 /* tuser on a sample inside a ray, or none on its first one; input is discarded until soft reset */
+#define SF_REG_RAY_ERROR_ORDER_SHIFT 3
+
+/* the interrupt is also any bit of RAY_ERROR that is enabled here, RW */
+#define SF_REG_RAY_IRQ_ENABLE 0x040c
+
+/* a ray stops once its transmittance, Q.20, is at most this: 0..2^20-1, RW */
+#define SF_REG_RAY_TRANS_STOP 0x0410
+
+/* or once it has so many samples: 1..1024, RW */
+#define SF_REG_RAY_MAX_SAMPLES 0x0414
+
+/* red behind the scene, U1.16, 0..65536, RW */
+#define SF_REG_RAY_BACKGROUND_R 0x0418
+
+/* green, RW */
+#define SF_REG_RAY_BACKGROUND_G 0x041c
+
+/* blue, RW */
+#define SF_REG_RAY_BACKGROUND_B 0x0420
+
+/* where ENCODER_DATA goes, 0..255; counts up by one word at each write of it, RW */
+#define SF_REG_ENCODER_ADDRESS 0x0424
+
+/* a word of the encoder's programming, WO */
+#define SF_REG_ENCODER_DATA 0x0428
+
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000
 
 /* WEIGHTS: 4 weights a word, word = layer << 12 | row << 5 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 and C1 rows 0..31 */
 #define SF_REG_WEIGHTS_WORDS 20480
 #define SF_REG_WEIGHTS_BITS 32
+
+/* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this */
+#define SF_REG_ENCODER_WORDS 256
+#define SF_REG_ENCODER_BITS 32
 
 /* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
 #define SF_REG_COUNTERS_WORDS 512

@@ -1,5 +1,6 @@
 /* Volume rendering in integers. The weights telescope: w_i = Tr_i - Tr_(i+1), so their sum and the remaining
- * transmittance are 1 exactly, for every ray and every rounding. */
+ * transmittance are 1 exactly, for every ray and every rounding.
+ * Mirror: rtl/sf_composite.sv */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"

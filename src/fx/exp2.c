@@ -1,5 +1,6 @@
 /* Powers of two from one table.
  * Mirror: rtl/sf_exp2.sv (fx_exp2)
+ * Mirror: rtl/sf_exp_neg.sv (fx_exp_neg)
  * Table: include/spikefield/tables/exp2.inc, 257 decimal integers, one per line with a comma:
  * T[i] = round(2^(i/256) * 2^24), i = 0..256; 26 bits unsigned (only T[256] = 2^25 needs the 26th). */
 #include "src/fx/unit.h"

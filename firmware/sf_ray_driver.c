@@ -1,0 +1,50 @@
+#include "firmware/sf_ray_driver.h"
+
+enum { LEVEL_WORDS = 8 }; /* of the encoder's programming; five are used */
+
+static void put(const sf_bus *bus, uint32_t offset, uint32_t value)
+{
+  bus->write(bus->context, offset, value);
+}
+
+const char *sf_ray_driver_error_text(uint32_t error)
+{
+#define SF_CSR(name, offset, access, reset, meaning)
+#define SF_CSR_FIELD(owner, name, lsb, width, meaning)                                                                 \
+  if (SF_CSR_##owner == SF_CSR_RAY_ERROR && (error & SF_CSR_##owner##_##name)) return #name ": " meaning;
+#include "spikefield/csr.def"
+#undef SF_CSR
+#undef SF_CSR_FIELD
+  return "no error";
+}
+
+static void program_level(const sf_bus *bus, uint32_t index, const sf_ray_level_blob *level)
+{
+  put(bus, SF_CSR_ENCODER_ADDRESS, index * LEVEL_WORDS);
+  put(bus, SF_CSR_ENCODER_DATA, level->scale_q16);
+  put(bus, SF_CSR_ENCODER_DATA, level->stride);
+  put(bus, SF_CSR_ENCODER_DATA, level->log2_size);
+  put(bus, SF_CSR_ENCODER_DATA, level->offset);
+  put(bus, SF_CSR_ENCODER_DATA, level->shift);
+}
+
+static void program_encoder(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  for (uint32_t l = 0; l < rays->levels && l < SF_RAY_LEVELS_MAX; l++) program_level(bus, l, &rays->level[l]);
+  put(bus, SF_CSR_ENCODER_ADDRESS, SF_RAY_LEVELS_MAX * LEVEL_WORDS);
+  put(bus, SF_CSR_ENCODER_DATA, rays->levels);
+  put(bus, SF_CSR_ENCODER_DATA, rays->n_dir);
+  put(bus, SF_CSR_ENCODER_DATA, rays->dir_frac);
+}
+
+sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  program_encoder(bus, rays);
+  put(bus, SF_CSR_RAY_TRANS_STOP, rays->trans_stop);
+  put(bus, SF_CSR_RAY_MAX_SAMPLES, rays->max_samples);
+  put(bus, SF_CSR_RAY_BACKGROUND_R, rays->background[0]);
+  put(bus, SF_CSR_RAY_BACKGROUND_G, rays->background[1]);
+  put(bus, SF_CSR_RAY_BACKGROUND_B, rays->background[2]);
+  put(bus, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
+  return bus->read(bus->context, SF_CSR_RAY_ERROR) ? SF_DRIVER_REFUSED : SF_DRIVER_OK;
+}

@@ -1,0 +1,275 @@
+// Rays in, pixels out: sf_encoder, sf_top and sf_composite in a row. The registers are those of sf_top and, in a window
+// that it leaves free, those of the rays (csr.def). The hash grid lies in an external memory.
+//
+// s_axis: one beat per sample of a ray, in the order of the ray; tuser on its first, tlast on its last.
+//   31:0 x, 63:32 y, 95:64 z    Q0.24
+//   127:96 delta                Q1.24 box edges
+//   191:128 distance            lattice steps from the camera, U28.16
+//   239:192 direction x, y, z   signed Q1.14, read on the first sample
+//   240 empty                   with tuser and tlast: a ray without a sample; its pixel is the background
+// m_axis: one beat per ray, in the order of the rays: fx_pixel as it lies in memory (little-endian).
+// mem: an entry of the grid is two signed bytes. Answers in the order of the requests, any number of cycles later, and
+// without back-pressure. A soft reset may withdraw a request, and the answers that the memory owes then are discarded;
+// rst_ni must reset the memory's port too.
+`default_nettype none
+
+module sf_ray_top #(
+    parameter TAP = 1
+) (
+    input  wire          clk_i,
+    input  wire          rst_ni,
+    // AXI4-Lite, 8 KiB
+    input  wire          s_axil_awvalid_i,
+    output wire          s_axil_awready_o,
+    input  wire [  12:0] s_axil_awaddr_i,
+    input  wire          s_axil_wvalid_i,
+    output wire          s_axil_wready_o,
+    input  wire [  31:0] s_axil_wdata_i,
+    input  wire [   3:0] s_axil_wstrb_i,
+    output wire          s_axil_bvalid_o,
+    input  wire          s_axil_bready_i,
+    output wire [   1:0] s_axil_bresp_o,
+    input  wire          s_axil_arvalid_i,
+    output wire          s_axil_arready_o,
+    input  wire [  12:0] s_axil_araddr_i,
+    output wire          s_axil_rvalid_o,
+    input  wire          s_axil_rready_i,
+    output wire [  31:0] s_axil_rdata_o,
+    output wire [   1:0] s_axil_rresp_o,
+    // samples of rays
+    input  wire          s_axis_tvalid_i,
+    output wire          s_axis_tready_o,
+    input  wire [ 255:0] s_axis_tdata_i,
+    input  wire          s_axis_tuser_i,
+    input  wire          s_axis_tlast_i,
+    // pixels
+    output wire          m_axis_tvalid_o,
+    input  wire          m_axis_tready_i,
+    output wire [ 383:0] m_axis_tdata_o,
+    // grid entries
+    output wire          mem_req_valid_o,
+    input  wire          mem_req_ready_i,
+    output wire [  31:0] mem_req_addr_o,
+    input  wire          mem_rsp_valid_i,
+    input  wire [  15:0] mem_rsp_data_i,
+    output wire          irq_o,
+    // tap of sf_top
+    output wire          tap_valid_o,
+    output wire [   2:0] tap_layer_o,
+    output wire [   2:0] tap_step_o,
+    output wire [ 127:0] tap_spikes_o,
+    output wire [ 127:0] tap_rows_o,
+    output wire [3071:0] tap_membrane_o
+);
+  // ---- registers: 0x400..0x7ff are the rays'
+  wire net_awready, net_wready, net_bvalid, net_arready, net_rvalid, net_irq;
+  wire [1:0] net_bresp, net_rresp;
+  wire [31:0] net_rdata;
+  wire ray_wready, ray_bvalid, ray_arready, ray_rvalid, ray_irq;
+  wire [1:0] ray_bresp;
+  wire [31:0] ray_rdata;
+  wire write_ray = s_axil_awaddr_i[12:10] == 3'd1;
+  wire read_ray = s_axil_araddr_i[12:10] == 3'd1;
+  wire write_now = s_axil_awvalid_i && s_axil_wvalid_i && !net_bvalid && !ray_bvalid;
+  wire read_now = s_axil_arvalid_i && !net_rvalid && !ray_rvalid;
+  assign s_axil_awready_o = write_ray ? ray_wready : net_awready;
+  assign s_axil_wready_o = write_ray ? ray_wready : net_wready;
+  assign s_axil_bvalid_o = net_bvalid || ray_bvalid;
+  assign s_axil_bresp_o = ray_bvalid ? ray_bresp : net_bresp;
+  assign s_axil_arready_o = read_ray ? ray_arready : net_arready;
+  assign s_axil_rvalid_o = net_rvalid || ray_rvalid;
+  assign s_axil_rdata_o = ray_rvalid ? ray_rdata : net_rdata;
+  assign s_axil_rresp_o = ray_rvalid ? 2'd0 : net_rresp;
+  assign irq_o = net_irq || ray_irq;
+  wire soft_reset = write_now && net_awready && {s_axil_awaddr_i[12:2], 2'b00} == sf_csr_pkg::CTRL
+      && s_axil_wstrb_i == 4'hf && s_axil_wdata_i[sf_csr_pkg::CTRL_SOFT_RESET];
+
+  wire cfg_we, running, error_order, active;
+  wire [7:0] cfg_addr;
+  wire [31:0] cfg_data;
+  wire [19:0] trans_stop;
+  wire [10:0] max_samples;
+  wire [50:0] background;
+  sf_ray_csr u_csr (
+      .clk_i        (clk_i),
+      .rst_ni       (rst_ni),
+      .wvalid_i     (write_now && write_ray),
+      .wready_o     (ray_wready),
+      .waddr_i      (s_axil_awaddr_i),
+      .wdata_i      (s_axil_wdata_i),
+      .wstrb_i      (s_axil_wstrb_i),
+      .bvalid_o     (ray_bvalid),
+      .bready_i     (s_axil_bready_i),
+      .bresp_o      (ray_bresp),
+      .arvalid_i    (read_now && read_ray),
+      .arready_o    (ray_arready),
+      .araddr_i     (s_axil_araddr_i),
+      .rvalid_o     (ray_rvalid),
+      .rready_i     (s_axil_rready_i),
+      .rdata_o      (ray_rdata),
+      .irq_o        (ray_irq),
+      .cfg_we_o     (cfg_we),
+      .cfg_addr_o   (cfg_addr),
+      .cfg_data_o   (cfg_data),
+      .trans_stop_o (trans_stop),
+      .max_samples_o(max_samples),
+      .background_o (background),
+      .running_o    (running),
+      .soft_reset_i (soft_reset),
+      .active_i     (active),
+      .error_order_i(error_order)
+  );
+
+  // ---- samples
+  wire encode_valid, encode_ready, encode_first;
+  wire [71:0] encode_pos;
+  wire [47:0] encode_dir;
+  wire sample_valid, sample_take, sample_first, sample_last, sample_empty, stop, track_idle, composite_idle;
+  wire [24:0] delta;
+  wire [43:0] distance;
+  sf_ray_track u_track (
+      .clk_i         (clk_i),
+      .rst_ni        (rst_ni),
+      .clear_i       (soft_reset),
+      .enable_i      (running),
+      .valid_i       (s_axis_tvalid_i),
+      .ready_o       (s_axis_tready_o),
+      .first_i       (s_axis_tuser_i),
+      .last_i        (s_axis_tlast_i),
+      .empty_i       (s_axis_tdata_i[240]),
+      .pos_i         ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
+      .dir_i         (s_axis_tdata_i[239:192]),
+      .delta_i       (s_axis_tdata_i[120:96]),
+      .distance_i    (s_axis_tdata_i[171:128]),
+      .error_order_o (error_order),
+      .encode_valid_o(encode_valid),
+      .encode_ready_i(encode_ready),
+      .encode_first_o(encode_first),
+      .encode_pos_o  (encode_pos),
+      .encode_dir_o  (encode_dir),
+      .valid_o       (sample_valid),
+      .take_i        (sample_take),
+      .first_o       (sample_first),
+      .last_o        (sample_last),
+      .empty_o       (sample_empty),
+      .delta_o       (delta),
+      .distance_o    (distance),
+      .stop_i        (stop),
+      .idle_o        (track_idle)
+  );
+
+  wire feature_valid, feature_ready, feature_user, feature_last;
+  wire [63:0] feature_data;
+  sf_encoder u_encoder (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .cfg_we_i       (cfg_we),
+      .cfg_addr_i     (cfg_addr),
+      .cfg_data_i     (cfg_data),
+      .s_valid_i      (encode_valid),
+      .s_ready_o      (encode_ready),
+      .s_first_i      (encode_first),
+      .s_pos_i        (encode_pos),
+      .s_dir_i        (encode_dir),
+      .mem_req_valid_o(mem_req_valid_o),
+      .mem_req_ready_i(mem_req_ready_i),
+      .mem_req_addr_o (mem_req_addr_o),
+      .mem_rsp_valid_i(mem_rsp_valid_i),
+      .mem_rsp_data_i (mem_rsp_data_i),
+      .m_axis_tvalid_o(feature_valid),
+      .m_axis_tready_i(feature_ready),
+      .m_axis_tdata_o (feature_data),
+      .m_axis_tuser_o (feature_user),
+      .m_axis_tlast_o (feature_last)
+  );
+
+  wire result_valid, result_ready, result_last;
+  wire [63:0] result;
+  sf_top #(
+      .TAP(TAP)
+  ) u_nets (
+      .clk_i           (clk_i),
+      .rst_ni          (rst_ni),
+      .s_axil_awvalid_i(write_now && !write_ray),
+      .s_axil_awready_o(net_awready),
+      .s_axil_awaddr_i (s_axil_awaddr_i),
+      .s_axil_wvalid_i (write_now && !write_ray),
+      .s_axil_wready_o (net_wready),
+      .s_axil_wdata_i  (s_axil_wdata_i),
+      .s_axil_wstrb_i  (s_axil_wstrb_i),
+      .s_axil_bvalid_o (net_bvalid),
+      .s_axil_bready_i (s_axil_bready_i),
+      .s_axil_bresp_o  (net_bresp),
+      .s_axil_arvalid_i(read_now && !read_ray),
+      .s_axil_arready_o(net_arready),
+      .s_axil_araddr_i (s_axil_araddr_i),
+      .s_axil_rvalid_o (net_rvalid),
+      .s_axil_rready_i (s_axil_rready_i),
+      .s_axil_rdata_o  (net_rdata),
+      .s_axil_rresp_o  (net_rresp),
+      .s_axis_tvalid_i (feature_valid),
+      .s_axis_tready_o (feature_ready),
+      .s_axis_tdata_i  (feature_data),
+      .s_axis_tuser_i  (feature_user),
+      .s_axis_tlast_i  (feature_last),
+      .m_axis_tvalid_o (result_valid),
+      .m_axis_tready_i (result_ready),
+      .m_axis_tdata_o  (result),
+      .m_axis_tlast_o  (result_last),
+      .irq_o           (net_irq),
+      .tap_valid_o     (tap_valid_o),
+      .tap_layer_o     (tap_layer_o),
+      .tap_step_o      (tap_step_o),
+      .tap_spikes_o    (tap_spikes_o),
+      .tap_rows_o      (tap_rows_o),
+      .tap_membrane_o  (tap_membrane_o)
+  );
+
+  // ---- results: the first beat waits here for the second
+  reg [63:0] first_beat_q;
+  wire composite_ready;
+  wire composite_valid = sample_valid && (sample_empty || (result_valid && result_last));
+  assign sample_take = composite_valid && composite_ready;
+  assign result_ready = !result_last || (sample_take && !sample_empty);
+  always_ff @(posedge clk_i) if (result_valid && !result_last) first_beat_q <= result;
+
+  wire [119:0] colour;
+  wire [63:0] depth;
+  wire [20:0] weight_sum, transmittance;
+  wire [10:0] samples;
+  sf_composite u_composite (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .trans_stop_i   (trans_stop),
+      .max_samples_i  (max_samples),
+      .background_i   (background),
+      .valid_i        (composite_valid),
+      .ready_o        (composite_ready),
+      .first_i        (sample_first),
+      .last_i         (sample_last),
+      .empty_i        (sample_empty),
+      .sigma_i        (first_beat_q[27:0]),
+      .colour_i       ({result[51:32], result[19:0], first_beat_q[51:32]}),
+      .delta_i        (delta),
+      .distance_i     (distance),
+      .stop_o         (stop),
+      .idle_o         (composite_idle),
+      .valid_o        (m_axis_tvalid_o),
+      .ready_i        (m_axis_tready_i),
+      .colour_o       (colour),
+      .depth_o        (depth),
+      .weight_sum_o   (weight_sum),
+      .transmittance_o(transmittance),
+      .samples_o      (samples)
+  );
+  assign m_axis_tdata_o = {53'd0, samples, 11'd0, transmittance, 11'd0, weight_sum, depth, 24'd0, colour[119:80], 24'd0,
+                           colour[79:40], 24'd0, colour[39:0]};
+  assign active = !track_idle || !composite_idle;
+  wire unused_ok = &{1'b0, s_axis_tdata_i[255:241], s_axis_tdata_i[191:172], s_axis_tdata_i[127:121],
+                     s_axis_tdata_i[95:88], s_axis_tdata_i[63:56], s_axis_tdata_i[31:24], first_beat_q[63:52],
+                     first_beat_q[31:28]};
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,171 @@
+#include "sim/ray.h"
+#include "firmware/sf_ray_driver.h"
+#include "spikefield/quant.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATIENCE = 200000, STREAM_RAYS = 40, STREAM_PIXELS };
+
+static sf_ray_blob blob_of(const fx_scene *scene)
+{
+  const fx_grid *grid = &scene->grid;
+  const fx_layer *layer = scene->net.layer;
+  sf_ray_blob blob = {.levels = (uint32_t)grid->levels,
+                      .n_dir = (uint32_t)(layer[FX_C1].n_in - (layer[FX_D2].n_out - 1)),
+                      .dir_frac = (uint32_t)sf_fx_dir_frac(scene),
+                      .trans_stop = (uint32_t)scene->trans_stop,
+                      .max_samples = (uint32_t)scene->max_samples};
+  for (int l = 0; l < grid->levels; l++)
+    blob.level[l] =
+        (sf_ray_level_blob){(uint32_t)grid->scale_q16[l], (uint32_t)grid->stride[l], (uint32_t)grid->log2_size[l],
+                            (uint32_t)grid->offset[l], (uint32_t)grid->shift[l]};
+  for (int o = 0; o < 3; o++) blob.background[o] = (uint32_t)scene->background[o];
+  return blob;
+}
+
+sf_status sf_ray_dut_load(sf_ray_dut *rays)
+{
+  sf_dut *dut = rays->dut;
+  const sf_ray_blob blob = blob_of(rays->scene);
+  SF_TRY(sf_dut_load(dut, &rays->scene->net));
+  if (sf_ray_driver_load(&dut->bus, &blob) != SF_DRIVER_OK)
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: rays refused: %s",
+                   sf_ray_driver_error_text(dut->bus.read(dut->bus.context, SF_CSR_RAY_ERROR)));
+  dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);
+  return sf_ok();
+}
+
+sf_status sf_ray_dut_open(sf_ray_dut **out, const fx_scene *scene, const sf_dut_options *options)
+{
+  *out = NULL;
+  sf_ray_dut *rays = calloc(1, sizeof *rays);
+  if (!rays) return sf_fail(SF_E_MEMORY, "accelerator: out of memory");
+  rays->scene = scene;
+  sf_status status = sf_dut_open_pins(&rays->dut, options, sf_pins_open_rays);
+  if (status.code == SF_OK) {
+    rays->memory = (sf_memory){.dut = rays->dut, .grid = &scene->grid};
+    rays->dut->each_cycle = sf_memory_cycle, rays->dut->each_cycle_context = &rays->memory;
+    status = sf_ray_dut_load(rays);
+  }
+  if (status.code == SF_OK)
+    *out = rays;
+  else
+    sf_ray_dut_close(rays);
+  return status;
+}
+
+void sf_ray_dut_close(sf_ray_dut *rays)
+{
+  if (!rays) return;
+  sf_dut_close(rays->dut);
+  free(rays);
+}
+
+void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n)
+{
+  int32_t at = -1;
+  for (int i = 0; i < n; i++) {
+    at = fx_march_next(scene, ray, at + 1, sample[i].pos, NULL);
+    sample[i].delta_q24 = scene->step_q24;
+    sample[i].distance_q16 = ((uint64_t)at << 16) + (uint32_t)ray->first_q16;
+  }
+}
+
+typedef struct run {
+  sf_dut *dut;
+  const sf_memory *memory;
+  const sf_ray_request *request;
+  fx_pixel *pixel;
+  int n, sent, at, received;
+  uint64_t progress; /* cycle of the last beat */
+} run;
+
+static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
+{
+  const int16_t *d = request->ray->unit;
+  memset(in->ray_data, 0, sizeof in->ray_data);
+  in->ray_user = at == 0, in->ray_last = at >= request->n - 1;
+  if (request->n == 0) {
+    in->ray_data[3] = (uint64_t)1 << 48;
+    return;
+  }
+  const sf_ray_sample *s = &request->sample[at];
+  in->ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
+  in->ray_data[1] = (uint64_t)(uint32_t)s->delta_q24 << 32 | s->pos[2];
+  in->ray_data[2] = s->distance_q16;
+  if (at == 0) in->ray_data[3] = (uint64_t)(uint16_t)d[2] << 32 | (uint64_t)(uint16_t)d[1] << 16 | (uint16_t)d[0];
+}
+
+static void offer(run *r)
+{
+  sf_pins_in *in = &r->dut->in;
+  if (in->ray_valid || r->sent == r->n || sf_dut_stalls(r->dut, STREAM_RAYS)) return;
+  in->ray_valid = true;
+  set_beat(in, &r->request[r->sent], r->at);
+}
+
+static void accept_input(run *r)
+{
+  if (!r->dut->in.ray_valid || !r->dut->out.ray_ready) return;
+  r->dut->in.ray_valid = false;
+  r->progress = r->dut->cycle;
+  if (!r->dut->in.ray_last) {
+    r->at++;
+    return;
+  }
+  r->at = 0;
+  r->sent++;
+}
+
+static sf_status accept_pixel(run *r)
+{
+  const sf_pins_out *out = &r->dut->out;
+  if (!r->dut->in.pixel_ready || !out->pixel_valid) return sf_ok();
+  if (r->received == r->sent + (r->at > 0))
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: pixel without a ray at cycle %" PRIu64, r->dut->cycle);
+  const uint64_t *w = out->pixel_data;
+  r->pixel[r->received++] = (fx_pixel){.colour = {w[0], w[1], w[2]},
+                                       .depth = w[3],
+                                       .weight_sum = (uint32_t)w[4],
+                                       .transmittance = (uint32_t)(w[4] >> 32),
+                                       .samples = (uint32_t)w[5]};
+  r->progress = r->dut->cycle;
+  return sf_ok();
+}
+
+static sf_status trouble(run *r, const char *what)
+{
+  sf_dut *dut = r->dut;
+  const uint64_t cycle = dut->cycle;
+  dut->in.ray_valid = dut->in.pixel_ready = false;
+  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
+  const uint32_t ray_error = dut->bus.read(dut->bus.context, SF_CSR_RAY_ERROR);
+  return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d rays in, %d pixels out: %s; rays: %s",
+                 what, cycle, r->sent, r->n, r->received, sf_driver_error_text(error),
+                 sf_ray_driver_error_text(ray_error));
+}
+
+static sf_status step(run *r)
+{
+  sf_dut *dut = r->dut;
+  offer(r);
+  dut->in.pixel_ready = !sf_dut_stalls(dut, STREAM_PIXELS);
+  sf_dut_tick(dut);
+  accept_input(r);
+  SF_TRY(accept_pixel(r));
+  if (dut->out.irq) return trouble(r, "interrupt");
+  if (r->memory->outside) return trouble(r, "grid entry beyond the table");
+  return dut->cycle - r->progress > PATIENCE ? trouble(r, "hang") : sf_ok();
+}
+
+sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel)
+{
+  sf_dut *dut = rays->dut;
+  run r = {.dut = dut, .memory = &rays->memory, .request = request, .pixel = pixel, .n = n, .progress = dut->cycle};
+  sf_pins_dump(dut->pins);
+  sf_status status = sf_ok();
+  while ((r.received < n || r.sent < n) && status.code == SF_OK) status = step(&r);
+  dut->in.ray_valid = dut->in.pixel_ready = false;
+  return status;
+}

@@ -1,0 +1,329 @@
+/* sf_ray_top against the fixed-point core, bit for bit: sample positions in, pixels and counters out. Random scenes and
+ * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
+#include "sim/ray.h"
+#include "spikefield/audit.h"
+#include "spikefield/quant.h"
+#include "tests/fx_hard_cases.h"
+
+#define ck_ok(call)                                                                                                    \
+  do {                                                                                                                 \
+    const sf_status status_ = (call);                                                                                  \
+    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
+  } while (0)
+
+enum { RAYS = 12, SAMPLES_MAX = 1024 };
+
+typedef struct batch {
+  fx_ray ray[RAYS];
+  sf_ray_sample sample[RAYS][SAMPLES_MAX];
+  sf_ray_request request[RAYS];
+  fx_pixel expected[RAYS], actual[RAYS];
+  fx_counts counts;
+} batch;
+static batch shared; /* each test runs in a process of its own */
+
+static sf_ray_dut *open_rays(const fx_scene *scene, uint64_t seed, int stalls)
+{
+  sf_ray_dut *rays;
+  ck_ok(sf_ray_dut_open(&rays, scene, &(sf_dut_options){.seed = seed, .stall_percent = stalls}));
+  return rays;
+}
+
+static void draw_rays(const fx_scene *scene, uint64_t seed)
+{
+  for (uint64_t i = 0; i < RAYS; i++) {
+    float origin[3], direction[3];
+    for (uint64_t a = 0; a < 3; a++) {
+      origin[a] = 6 * sf_random_float(seed, 1, 3 * i + a) - 3;
+      direction[a] = 1.6f * sf_random_float(seed, 2, 3 * i + a) - 0.8f - origin[a];
+    }
+    ck_ok(sf_fx_ray_make(scene, origin, direction, &shared.ray[i]));
+  }
+}
+
+static int whole_march(const fx_scene *scene, const fx_ray *ray)
+{
+  int n = 0;
+  uint32_t pos[3];
+  for (int32_t at = -1; n < SAMPLES_MAX && (at = fx_march_next(scene, ray, at + 1, pos, NULL)) >= 0;) n++;
+  return n;
+}
+
+/* What the core makes of each ray. whole: the hardware gets every sample of the march and has to find the end. */
+static void expect_core(const fx_scene *scene, int n, bool whole)
+{
+  memset(&shared.counts, 0, sizeof shared.counts);
+  for (int i = 0; i < n; i++) {
+    const fx_ray *ray = &shared.ray[i];
+    ck_ok(fx_render_ray(scene, ray, NULL, NULL, &shared.expected[i], &shared.counts));
+    const int samples = whole ? whole_march(scene, ray) : (int)shared.expected[i].samples;
+    sf_ray_samples(scene, ray, shared.sample[i], samples);
+    shared.request[i] = (sf_ray_request){ray, shared.sample[i], samples};
+  }
+}
+
+static void same_pixels(int n)
+{
+  for (int i = 0; i < n; i++) {
+    const fx_pixel *e = &shared.expected[i], *a = &shared.actual[i];
+    ck_assert_uint_eq(a->weight_sum + a->transmittance, FX_TRANS_ONE);
+    ck_assert_uint_eq(a->samples, e->samples);
+    ck_assert_uint_eq(a->transmittance, e->transmittance);
+    for (int o = 0; o < 3; o++) ck_assert_uint_eq(a->colour[o], e->colour[o]);
+    ck_assert_uint_eq(a->depth, e->depth);
+  }
+}
+
+static void run(sf_ray_dut *rays, int n)
+{
+  ck_ok(sf_ray_dut_run(rays, shared.request, n, shared.actual));
+  same_pixels(n);
+}
+
+static void same_counts(sf_ray_dut *rays)
+{
+  fx_counts actual;
+  ck_ok(sf_dut_counts(rays->dut, &actual, NULL, NULL, NULL));
+  ck_ok(sf_counts_compare(&shared.counts, "core", &actual, "accelerator"));
+}
+
+START_TEST(random_scenes)
+{
+  const uint64_t seed = 700 + (uint64_t)_i;
+  fixture_sizes sizes = _i ? fixture_random_sizes(seed) : fixture_ingp;
+  fx_scene scene = fixture_scene(&sizes, seed);
+  scene.step_q24 = 1 << 20;
+  scene.net.exp_in.bias = _i % 3 * 8192 - 4096;
+  scene.trans_stop = _i % 2 ? 1048 : 400000;
+  scene.max_samples = _i % 4 == 3 ? 3 : 1024;
+  for (int o = 0; o < 3; o++) scene.background[o] = 20000 * o;
+  sf_ray_dut *rays = open_rays(&scene, seed, _i % 4 * 25);
+  draw_rays(&scene, seed);
+  expect_core(&scene, RAYS, false);
+  ck_assert_uint_gt(shared.counts.samples, 0);
+  run(rays, RAYS);
+  same_counts(rays);
+  expect_core(&scene, RAYS, true);
+  run(rays, RAYS);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* Rays that stop at once, each followed by all that lies behind: whole rays of matter are dropped or swallowed. */
+START_TEST(rays_go_on_after_their_end)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  fx_counts counts;
+  int sent = 0, needed = 0;
+  scene.step_q24 = 1 << 19;
+  scene.trans_stop = (1 << 20) - 1; /* any density at all ends a ray */
+  scene.net.exp_in.bias = 40000;
+  memset(scene.occupancy, 0xff, 64);
+  sf_ray_dut *rays = open_rays(&scene, 6, 30);
+  draw_rays(&scene, 7);
+  expect_core(&scene, RAYS, true);
+  run(rays, RAYS);
+  for (int i = 0; i < RAYS; i++) sent += shared.request[i].n, needed += (int)shared.expected[i].samples;
+  ck_ok(sf_dut_counts(rays->dut, &counts, NULL, NULL, NULL));
+  ck_assert_int_gt(sent, 10 * needed);
+  ck_assert_uint_ge(counts.samples, (uint64_t)needed);
+  ck_assert_uint_lt(counts.samples, (uint64_t)sent / 2); /* most of the rest never reached the nets */
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(hard_rays)
+{
+  const hard_case *c = &hard_cases[_i];
+  for (int variant = 0; c->kind == HARD_RAY && variant < c->variants; variant++) {
+    hard h;
+    hard_begin(&h, c, variant);
+    fx_sh(h.ray.unit, sf_fx_dir_frac(&h.scene), h.ray.dir); /* the hardware makes them of the direction */
+    sf_ray_dut *rays = open_rays(&h.scene, (uint64_t)variant, variant * 7 % 50);
+    shared.ray[0] = h.ray;
+    expect_core(&h.scene, 1, false);
+    run(rays, 1);
+    same_counts(rays);
+    const hard_seen seen = {.pixel = shared.actual[0], .counts = shared.counts};
+    c->expect(&h, &seen, variant);
+    sf_ray_dut_close(rays);
+    hard_end(&h);
+  }
+}
+END_TEST
+
+/* ---- registers and resets ---- */
+
+static uint32_t get(sf_ray_dut *rays, uint32_t offset)
+{
+  return rays->dut->bus.read(rays->dut->bus.context, offset);
+}
+static void put(sf_ray_dut *rays, uint32_t offset, uint32_t value)
+{
+  rays->dut->bus.write(rays->dut->bus.context, offset, value);
+}
+
+static fx_scene small_scene(void)
+{
+  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID};
+  fx_scene scene = fixture_scene(&sizes, 21);
+  scene.step_q24 = 1 << 20;
+  return scene;
+}
+
+static void works(sf_ray_dut *rays, uint64_t seed)
+{
+  rays->dut->in.ray_valid = rays->dut->in.pixel_ready = false;
+  ck_ok(sf_ray_dut_load(rays));
+  draw_rays(rays->scene, seed);
+  expect_core(rays->scene, RAYS, false);
+  run(rays, RAYS);
+  same_counts(rays);
+  ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
+}
+
+START_TEST(illegal_programming_is_refused)
+{
+  static const struct {
+    uint32_t offset, value;
+  } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},      {SF_CSR_RAY_MAX_SAMPLES, 0},
+             {SF_CSR_RAY_MAX_SAMPLES, 1025},      {SF_CSR_RAY_MAX_SAMPLES, 2048},    {SF_CSR_RAY_BACKGROUND_R, 65537},
+             {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17}};
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 1, 20);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    ck_ok(sf_ray_dut_load(rays));
+    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays, bad[i].offset, bad[i].value);
+    put(rays, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
+    ck_assert_uint_eq(rays->dut->bus_response, 2); /* SLVERR */
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
+    ck_assert(rays->dut->out.irq);
+    rays->dut->in.ray_valid = true; /* nothing is accepted */
+    for (int cycle = 0; cycle < 20; cycle++) {
+      sf_dut_tick(rays->dut);
+      ck_assert(!rays->dut->out.ray_ready);
+    }
+    rays->dut->in.ray_valid = false;
+    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), 0);
+  }
+  works(rays, 1);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(registers)
+{
+  static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
+                                         SF_CSR_ENCODER_DATA, SF_CSR_RAY_CTRL};
+  static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, 0x42c, 0x7fc};
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 2, 40);
+  ck_assert_uint_eq(get(rays, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
+  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
+  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
+  for (size_t i = 0; i < sizeof programming / sizeof *programming; i++) {
+    put(rays, programming[i], 1);
+    ck_assert_uint_eq(rays->dut->bus_response, 2);
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
+    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
+  }
+  for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
+    put(rays, nowhere[i], 1);
+    ck_assert_uint_eq(rays->dut->bus_response, 2);
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
+    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
+  }
+  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), 0);
+  put(rays, 0x800, 1); /* of nobody: sf_top answers */
+  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
+  ck_assert(!rays->dut->bus_hung);
+  works(rays, 2);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* Offers beats of the batch for so many cycles and takes every pixel; then gives up. */
+static void cut_off(sf_ray_dut *rays, int cycles)
+{
+  sf_dut *dut = rays->dut;
+  const sf_ray_request *q = &shared.request[0];
+  for (int at = 0; cycles-- > 0;) {
+    const sf_ray_sample *s = &q->sample[at % q->n];
+    dut->in.ray_valid = true, dut->in.pixel_ready = true;
+    dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
+    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
+    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
+    sf_dut_tick(dut);
+    at += dut->out.ray_ready;
+  }
+  dut->in.ray_valid = dut->in.pixel_ready = false;
+}
+
+/* At any moment, with the memory owing answers: the next rays are whole. */
+START_TEST(soft_reset_in_mid_ray)
+{
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 3, 10);
+  uint64_t owing = 0;
+  for (int cycles = 1; cycles < 1200; cycles = cycles * 5 / 4 + 1) {
+    works(rays, 3);
+    cut_off(rays, cycles);
+    owing += rays->memory.asked != rays->memory.answered;
+  }
+  works(rays, 4);
+  ck_assert_uint_gt(owing, 3);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(beats_out_of_order_are_refused)
+{
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 4, 0);
+  for (int user = 0; user < 2; user++) {
+    works(rays, 5);
+    sf_pins_in *in = &rays->dut->in;
+    for (int beat = 0; beat <= user; beat++) { /* no first sample; then two of them */
+      in->ray_valid = true, in->ray_user = user, in->ray_last = false;
+      do sf_dut_tick(rays->dut);
+      while (!rays->dut->out.ray_ready);
+    }
+    for (int i = 0; i < 50; i++) { /* the rest is discarded, nothing waits for it */
+      sf_dut_tick(rays->dut);
+      ck_assert(rays->dut->out.ray_ready);
+    }
+    in->ray_valid = false;
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
+    ck_assert(rays->dut->out.irq);
+  }
+  works(rays, 6);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("rtl_ray");
+  TCase *cases = tcase_create("rays");
+  tcase_set_timeout(cases, 60);
+  tcase_add_loop_test(cases, random_scenes, 0, 12);
+  tcase_add_test(cases, rays_go_on_after_their_end);
+  tcase_add_test(cases, illegal_programming_is_refused);
+  tcase_add_test(cases, registers);
+  tcase_add_test(cases, soft_reset_in_mid_ray);
+  tcase_add_test(cases, beats_out_of_order_are_refused);
+  suite_add_tcase(suite, cases);
+  hard_add(suite, hard_rays);
+  return fixture_run(suite);
+}
