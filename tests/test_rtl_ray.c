@@ -134,6 +134,28 @@ START_TEST(rays_go_on_after_their_end)
 }
 END_TEST
 
+/* Ends and beginnings meet in every way: rays of up to 14 samples, each ended by its second. */
+START_TEST(short_rays_in_a_row)
+{
+  static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID};
+  fx_scene scene = fixture_scene(&sizes, 8);
+  scene.step_q24 = 1 << 19, scene.max_samples = 2;
+  memset(scene.occupancy, 0xff, 64);
+  sf_ray_dut *rays = open_rays(&scene, 9, 40);
+  for (uint64_t round = 0; round < 150; round++) {
+    draw_rays(&scene, round);
+    expect_core(&scene, RAYS, true);
+    for (uint64_t i = 0; i < RAYS; i++) {
+      const int most = (int)sf_random_below(round, 3, i, 13) + 2;
+      if (shared.request[i].n > most) shared.request[i].n = most;
+    }
+    run(rays, RAYS);
+  }
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(hard_rays)
 {
   const hard_case *c = &hard_cases[_i];
@@ -319,6 +341,7 @@ int main(void)
   tcase_set_timeout(cases, 60);
   tcase_add_loop_test(cases, random_scenes, 0, 12);
   tcase_add_test(cases, rays_go_on_after_their_end);
+  tcase_add_test(cases, short_rays_in_a_row);
   tcase_add_test(cases, illegal_programming_is_refused);
   tcase_add_test(cases, registers);
   tcase_add_test(cases, soft_reset_in_mid_ray);

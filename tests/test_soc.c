@@ -352,7 +352,7 @@ START_TEST(an_image_stays_inside_its_memory)
   ck_assert_ptr_null(open_edited(s, block, space, -1, 0));
   ck_assert_str_eq(open_edited(s, block, space - 1, -1, 0), "the tile does not fit");
   ck_assert_str_eq(open_edited(s, block, space, 0, 1), "none in memory");
-  ck_assert_str_eq(open_edited(s, block, space, 1, 2), "of another version than this firmware's");
+  ck_assert_str_eq(open_edited(s, block, space, 1, SF_TILE_VERSION + 1), "of another version than this firmware's");
   for (int word = 4; word < 14; word++) /* width .. occ_res */
     for (size_t i = 0; i < sizeof extreme / sizeof *extreme; i++) {
       uint32_t now;
