@@ -54,7 +54,7 @@ module sf_encoder #(
 
   // A sample goes to the grids of all ports that have a level, its direction to the register before sf_sh.
   localparam integer PORTS = 1 << LOG2_PORTS;
-  wire [PORTS-1:0] grid_ready;  // or without a level
+  wire [PORTS-1:0] grid_ready;  // one without a level always is
   wire sh_ready, tag_valid, tag_first, packet_end;
   reg dir_valid_q;
   reg [47:0] dir_q;
@@ -97,8 +97,7 @@ module sf_encoder #(
       wire used = {1'b0, last_level_q} + 5'd1 > {1'b0, PORT};
       wire [3:0] last_level = (last_level_q - PORT) >> LOG2_PORTS;
       wire [3:0] cfg_level = cfg_addr_i[6:3] >> LOG2_PORTS;
-      wire ready, unused_last;
-      assign grid_ready[p] = ready || !used;
+      wire unused_last;
       sf_grid #(
           .LOG2_DEPTH(LOG2_DEPTH)
       ) u_grid (
@@ -110,7 +109,7 @@ module sf_encoder #(
           .cfg_data_i     (cfg_data_i),
           .last_level_i   (last_level),
           .s_valid_i      (accept && used),
-          .s_ready_o      (ready),
+          .s_ready_o      (grid_ready[p]),
           .s_pos_i        (s_pos_i),
           .mem_req_valid_o(mem_req_valid_o[p]),
           .mem_req_ready_i(mem_req_ready_i[p]),
