@@ -116,6 +116,10 @@ lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the R
 	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
 	done
 
+synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="32 64", MODULES=, SYNTH=--top): build/synth
+	@tools/synth.sh $B --rtl $(RTL_ROOT) $(if $(LANES),--lanes "$(LANES)") $(if $(MODULES),--modules "$(MODULES)") $(SYNTH)
+.PHONY: synth
+
 # The vector kit: writer, and the files that go with every kit.
 KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \
   $B/obj/firmware/sf_driver.o $B/kit/files.o

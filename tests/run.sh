@@ -27,6 +27,7 @@ for name in "$@"; do
     golden_set) command=("$here/golden_set.sh" "$build") ;;
     cosim_split) command=("$here/cosim_split.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
+    synth) command=("$here/test_synth.sh") ;;
     package) command=("$here/test_package.sh") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
     *) command=("$build/tests/$name") ;;
