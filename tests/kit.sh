@@ -93,5 +93,8 @@ faulty 0 0 PASS
 faulty 1 1 'layer C2' 'neuron 37 membrane'
 faulty 2 1 'layer C2 step 1 neuron 64 row: expected 1, actual 0'
 faulty 3 1 'DIFFERENCE layer C1 step 2 spikes: expected'
+# Another neuron of the same behaviour, and a wrong one.
+run icarus 0 PASS -- OVERLAY="$PWD/tests/dut/serial" BUILD=serial
+run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong" BUILD=wrong
 [ $failures -eq 0 ] && echo "the kit passes in both simulators; wrong bits and planted faults are caught and located"
 exit $((failures > 0))

@@ -158,6 +158,10 @@ START_TEST(what_it_refuses)
   ck_assert_ptr_nonnull(strstr(sf_golden_error(golden), "direction"));
   ck_assert_int_eq(sf_golden_beat(golden, 0, 1, 1), -1);
   ck_assert_ptr_nonnull(strstr(sf_golden_error(golden), "too short"));
+  ck_assert_int_eq(send(golden, direction, core.net.layer[FX_C1].n_in - core.net.layer[FX_D2].n_out + 1, true, false),
+                   0);
+  ck_assert_int_eq(send(golden, features, core.net.layer[FX_D1].n_in, false, false), -1);
+  ck_assert_ptr_nonnull(strstr(sf_golden_error(golden), "too long"));
   ck_assert_int_eq(sf_golden_beat(golden, 0x0800, 1, 0), -1);
   ck_assert_ptr_nonnull(strstr(sf_golden_error(golden), "2048"));
   ck_assert_int_eq(send_sample(golden, true), 1);
