@@ -273,11 +273,13 @@ module sf_csr (
       rdata_q <= rdata_d;
       counter_q <= araddr_i[12];
       high_q <= araddr_i[2];
+    end else begin
+      // A response that waits must not follow the snapshot memory, which a walk may write meanwhile.
+      rdata_q <= rdata_o;
+      counter_q <= 1'b0;
     end
   end
-  reg [8:0] counter_index_q;
-  always_ff @(posedge clk_i) if (read) counter_index_q <= araddr_i[11:3];
-  assign counter_index_o = read ? araddr_i[11:3] : counter_index_q;
+  assign counter_index_o = araddr_i[11:3];
   assign arready_o = read;
   assign rvalid_o = rvalid_q;
   assign rdata_o = !counter_q ? rdata_q : high_q ? counter_i[63:32] : counter_i[31:0];
