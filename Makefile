@@ -119,7 +119,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install formal fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults install formal mutate fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -134,6 +134,7 @@ asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 
 include tests/fuzz/fuzz.mk
 include tests/formal/formal.mk
+include tests/mutate/mutate.mk
 
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

@@ -15,6 +15,7 @@ for name in "$@"; do
     pareto) command=("$here/test_pareto.sh" "$build") ;;
     fuzz) command=("$here/test_fuzz.sh" "$build") ;;
     chain) command=("$here/chain.sh" "$build") ;;
+    mutate) command=("$here/mutate/mutate.sh" "$build" --sample) ;;
     formal) command=("$here/formal/run.sh" "$build" --quick) ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
