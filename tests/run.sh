@@ -23,6 +23,8 @@ for name in "$@"; do
     other_dut) command=("$here/other_dut.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
     lanes) command=("$here/lanes.sh" "$build") ;;
+    mutate) command=("$here/mutate/mutate.sh" "$build" --sample) ;;
+    formal) command=("$here/formal/run.sh" "$build" --quick) ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
     cosim_split) command=("$here/cosim_split.sh" "$build") ;;

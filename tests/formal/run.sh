@@ -1,0 +1,114 @@
+#!/bin/bash
+# Proves the properties of tests/formal/properties and sees the faults of tests/formal/faults fail.
+# usage: run.sh BUILD [--quick] [NAME...]     table on standard output; exit 0 all as expected, 1 not, 77 no solver
+set -u
+cd "$(dirname "$0")/../.." || exit 1
+case ${1:-} in '' | -*) sed -n '2,3s/^# //p' "$0"; exit 2 ;; esac
+build=$1/formal
+shift
+quick=
+[ "${1:-}" = --quick ] && quick=1 && shift
+for program in yosys yosys-smtbmc z3; do
+  command -v $program >/dev/null || { echo "formal: $program is not installed (apt-get install yosys z3)"; exit 77; }
+done
+limit=${FORMAL_LIMIT:-900} # seconds per proof
+mkdir -p "$build"
+trap 'kill $(jobs -p) 2>/dev/null; exit 130' INT TERM
+
+sources() {
+  [ "$1" = - ] || echo "rtl/$1.sv"
+  echo "tests/formal/$2.sv"
+}
+
+# verdict NAME TOP SOURCES METHOD PARAMETERS INCLUDE: proved, refuted or unknown (time limit, or Yosys refuses)
+verdict() {
+  local name=$1 top=$2 files=$3 method=$4 parameters=$5 include=$6 set= peek= depth=${4#*:} wire
+  for p in $parameters; do set+=" -set ${p%=*} ${p#*=}"; done
+  for wire in $(grep -oE 'peek_[a-z_]+' "tests/formal/$top.sv" | sort -u); do
+    [ "$wire" = peek_ ] || peek+="connect -set $wire u_dut.${wire#peek_}; "
+  done
+  # One multiplier at most is left of the unit's and the specification's, and is cut: any product that mul_bounds allows.
+  local script="read_verilog -sv -formal -I$include -Irtl rtl/gen/sf_arch_pkg.sv rtl/gen/sf_csr_pkg.sv rtl/sf_op_pkg.sv
+    $files; ${set:+chparam$set $top;} "
+  script=${script//$'\n'/ }
+  if [ "$method" = prove ]; then
+    local narrow="wreduce; opt -full -fine;"
+    [ "$top" = integrate_spec ] && narrow= # its product loses unlike many bits at the top on the two sides
+    timeout "$limit" yosys -Q -T -p "$script prep -flatten -top $top; opt -full; $narrow opt_merge; opt_clean; select -assert-max 1 t:\$mul; cutpoint t:\$mul
+      sat -prove-asserts -set-assumes -show-inputs" >"$build/$name.log" 2>&1
+    grep -q 'no model found: SUCCESS' "$build/$name.log" && { echo proved; return; }
+    grep -q 'model found: FAIL' "$build/$name.log" && { echo refuted; return; }
+    echo unknown
+    return
+  fi
+  script+=" hierarchy -check -top $top; proc; flatten; $peek opt; memory; async2sync; opt -full; dffunmap"
+  if [ "${method%:*}" = induct ]; then
+    local cut=
+    [ "$top" = composite_step ] && cut="select -assert-count 1 t:\$mul; cutpoint t:\$mul;"
+    # -seq 1: nothing is asserted in the cycle of the reset
+    timeout "$limit" yosys -Q -T -p "$script; $cut sat -tempinduct -seq 1 -maxsteps $depth -prove-asserts -set-assumes -show-inputs" \
+      >"$build/$name.log" 2>&1
+    grep -q 'Induction step proven: SUCCESS' "$build/$name.log" && { echo proved; return; }
+    grep -q 'model found for base case: FAIL' "$build/$name.log" && { echo refuted; return; }
+    echo unknown
+    return
+  fi
+  yosys -Q -T -p "$script; write_smt2 -wires $build/$name.smt2" >"$build/$name.log" 2>&1 || { echo unknown; return; }
+  [ "$method" = z3 ] && depth=1
+  for step in -t $([ "$method" = z3 ] || echo -it); do
+    timeout "$limit" yosys-smtbmc -s z3 --noprogress ${step/-it/-i -t} "$depth" --dump-vcd "$build/$name.vcd" "$build/$name.smt2" \
+      >>"$build/$name.log" 2>&1
+    case $(tail -n 1 "$build/$name.log") in *PASSED*) ;; *FAILED*) echo refuted; return ;; *) echo unknown; return ;; esac
+  done
+  echo proved
+}
+
+failures=0
+row() { # name, method, parameters, seconds, verdict, expected
+  local result=$5
+  [ "$5" = "$6" ] || { result="$5, expected $6: $build/$1.log"; failures=$((failures + 1)); }
+  printf '%-28s %-10s %-20s %7.1f  %s\n' "$1" "$2" "$3" "$4" "$result"
+}
+
+chosen() { # name, when
+  [ -z "$quick" ] || [ "$2" = quick ] || return 1
+  [ $# -eq 2 ] && return
+  local name=$1
+  shift 2
+  for want; do [ "$want" = "${name%%+*}" ] && return; done
+  return 1
+}
+
+printf '%-28s %-10s %-20s %7s  %s\n' property method parameters seconds verdict
+while read -r name top module method when parameters; do
+  case $name in '' | '#'*) continue ;; esac
+  chosen "$name" "$when" "$@" || continue
+  start=$EPOCHREALTIME
+  result=$(verdict "$name" "$top" "$(echo $(sources "$module" "$top"))" "$method" "$parameters" "$build")
+  row "$name" "$method" "$parameters" "$(bc <<<"$EPOCHREALTIME - $start")" "$result" proved
+done <tests/formal/properties
+
+# Planted faults: the property must fail on the changed copy of its file.
+while read -r name number when file change; do
+  case $name in '' | '#'*) continue ;; esac
+  chosen "$name" "$when" "$@" || continue
+  read -r _ top module method _ parameters < <(grep -E "^$name " tests/formal/properties)
+  rm -rf "$build/$name+$number" && mkdir -p "$build/$name+$number"
+  copy=$build/$name+$number/$(basename "$file")
+  sed -E "$change" "$file" >"$copy"
+  if cmp -s "$file" "$copy"; then
+    echo "tests/formal/faults: $name $number changes nothing in $file" >&2
+    failures=$((failures + 1))
+    continue
+  fi
+  files=
+  for source in $(sources "$module" "$top"); do # beside the copy: an include looks there first
+    [ -f "$build/$name+$number/${source##*/}" ] || cp "$source" "$build/$name+$number/"
+    files+=" $build/$name+$number/${source##*/}"
+  done
+  start=$EPOCHREALTIME
+  result=$(verdict "$name+$number" "$top" "$files" "$method" "$parameters" "$build/$name+$number")
+  row "$name+$number" "$method" "${change:0:20}" "$(bc <<<"$EPOCHREALTIME - $start")" "$result" refuted
+done <tests/formal/faults
+[ $failures -eq 0 ] || echo "formal: $failures not as expected"
+[ $failures -eq 0 ]

@@ -1,0 +1,134 @@
+/* One combinational unit against its C mirror: small inputs exhausted, large ones at their corners and at random.
+ * Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
+extern "C" {
+#include "spikefield/rng.h"
+#include "src/fx/unit.h"
+}
+#include <cstdio>
+#define HEADER_OF(name) HEADER_TEXT(V##name.h)
+#define HEADER_TEXT(text) #text
+#define HEADER(name) HEADER_OF(name)
+#define MODEL_OF(name) V##name
+#define MODEL(name) MODEL_OF(name)
+#include HEADER(UNIT)
+
+static MODEL(UNIT) top;
+static uint64_t drawn;
+enum { TRIALS = 400000 };
+
+static int64_t draw(int64_t low, int64_t high)
+{
+  return low + (int64_t)sf_random_below(1, 0, drawn++, (uint64_t)(high - low + 1));
+}
+
+/* Mostly anything, often near an end, near 0 or of few bits. */
+static int64_t corner(int64_t low, int64_t high)
+{
+  const int64_t kind = draw(0, 5), near = draw(0, 2);
+  if (kind == 0) return low + near;
+  if (kind == 1) return high - near;
+  int64_t value = draw(low, high);
+  if (kind == 2) value = value % ((int64_t)1 << draw(1, 24));
+  if (kind == 3) value = near - 1;
+  return value < low ? low : value > high ? high : value;
+}
+
+static bool differs(int64_t actual, int64_t expected)
+{
+  return actual != expected;
+}
+
+#if defined UNIT_sf_plif
+static bool trial(int)
+{
+  const int64_t max = FX_MEMBRANE_MAX;
+  const int32_t v = corner(-max - 1, max), k = corner(0, FX_LEAK_ONE), mode = draw(0, 2);
+  int32_t current = corner(-max - 1, max), theta = corner(1, max);
+  const bool first = draw(0, 3) == 0;
+  if (draw(0, 3) == 0) current = v; /* nothing leaks: the threshold alone decides */
+  fx_plif want = fx_plif_step(v, current, k, theta, mode, first);
+  if (draw(0, 1) && want.membrane > 1) { /* at the threshold, and one beside it */
+    theta = want.membrane + draw(-1, 1);
+    theta = theta > max ? max : theta;
+    want = fx_plif_step(v, current, k, theta, mode, first);
+  }
+  top.v_i = v & 0xffffff, top.current_i = current & 0xffffff, top.k_i = k, top.theta_i = theta;
+  top.mode_i = mode, top.first_i = first;
+  top.eval();
+  return differs(top.v_o, want.v & 0xffffff) || differs(top.spike_o, want.spike);
+}
+enum { ALL = TRIALS };
+#elif defined UNIT_sf_integrate
+static bool trial(int)
+{
+  const bool colour = draw(0, 1), first = draw(0, 3) == 0;
+  const int64_t max = ((int64_t)1 << (colour ? SF_COLOUR_BITS : SF_SIGMA_BITS)) - 1;
+  const uint32_t acc = corner(0, max), in = corner(0, max);
+  const int32_t k = corner(0, FX_LEAK_ONE), mode = draw(0, 2);
+  uint64_t saturated = 0;
+  top.acc_i = acc, top.in_i = in, top.k_i = k, top.mode_i = mode, top.first_i = first, top.colour_i = colour;
+  top.eval();
+  return differs(top.acc_o, (colour ? fx_integrate_colour : fx_integrate_density)(acc, in, k, mode, first, &saturated));
+}
+enum { ALL = TRIALS };
+#elif defined UNIT_sf_scale
+static bool trial(int)
+{
+  const int32_t current = corner(-32768, 32767), reach = draw(0, 1) ? 140000 : 35000;
+  const fx_scale scale = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
+                          (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
+  const bool colour = draw(0, 1);
+  top.current_i = current & 0xffff, top.mul_i = scale.mul, top.shift_i = scale.shift, top.bias_i = scale.bias;
+  top.colour_i = colour;
+  top.eval();
+  const int32_t want = colour ? fx_sigmoid_argument(current, &scale) : fx_exp2_argument(current, &scale);
+  return differs(top.y_o, want & 0x3ffff);
+}
+enum { ALL = TRIALS };
+#elif defined UNIT_sf_exp2
+static bool trial(int i)
+{
+  const int32_t y = i - (1 << 17);
+  top.y_i = y & 0x3ffff;
+  top.eval();
+  return differs(top.e_o, fx_exp2(y));
+}
+enum { ALL = 1 << 18 };
+#elif defined UNIT_sf_sigmoid
+static bool trial(int i)
+{
+  const int32_t x = i - (1 << 15);
+  top.x_i = x & 0xffff;
+  top.eval();
+  return differs(top.s_o, fx_sigmoid(x));
+}
+enum { ALL = 1 << 16 };
+#elif defined UNIT_sf_first
+/* Every pair of a lowest bit and one above it, alone and with noise above. */
+static bool trial(int i)
+{
+  const int low = i & 127, other = i >> 7 & 127, kind = i >> 14;
+  uint32_t bits[4] = {0}, mask[4] = {0};
+  for (int b = low; b < 128; b++)
+    if (b == low || b == other || (kind && draw(0, 1))) bits[b / 32] |= 1u << b % 32;
+  if (kind == 2 && other == 0) bits[0] = bits[1] = bits[2] = bits[3] = 0;
+  const bool any = bits[0] | bits[1] | bits[2] | bits[3];
+  if (any) mask[low / 32] = 1u << low % 32;
+  bool wrong = false;
+  for (int w = 0; w < 4; w++) top.bits_i[w] = bits[w];
+  top.eval();
+  for (int w = 0; w < 4; w++) wrong |= differs(top.mask_o[w], mask[w]);
+  return wrong || differs(top.any_o, any) || differs(top.index_o, any ? low : 0);
+}
+enum { ALL = 3 << 14 };
+#endif
+
+int main(void)
+{
+  for (int i = 0; i < ALL; i++)
+    if (trial(i)) {
+      printf("differs at trial %d\n", i);
+      return 1;
+    }
+  return 0;
+}
