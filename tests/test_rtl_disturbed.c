@@ -193,6 +193,36 @@ START_TEST(snapshot_and_clear_at_work)
 }
 END_TEST
 
+/* Streams that trickle, so that every step of every layer has a bubble or back-pressure, with and without membranes at
+ * their rails. */
+START_TEST(all_steps_under_stalls)
+{
+  random_source r = {67, (uint64_t)_i << 32};
+  for (int saturating = 0; saturating < 2; saturating++) {
+    random_net_make(&net_of_test, &r, false);
+    fx_net *net = &net_of_test.net;
+    net->mode = _i;
+    net->steps = SF_T_MAX;
+    for (int l = 0; saturating && l < SF_LAYERS; l++) {
+      draw_weights(&r, &net->layer[l], 1);
+      net->layer[l].k = 0;
+      if (net->layer[l].theta) net->layer[l].theta = l == FX_C2 ? (1 << 23) - 1 : 1;
+    }
+    draw_batch(&shared, &r, BATCH, false);
+    for (int i = 0; saturating && i < BATCH; i++) {
+      for (int k = 0; k < SF_DIR_MAX; k++) shared.ray[i].dir[k] = 2047;
+      for (int k = 0; k < SF_FEATURE_MAX; k++) shared.f[i][k] = 2047;
+    }
+    fx_counts counts = {0};
+    sf_dut *dut = open_dut(net, r.seed, 90);
+    run_batch(dut, net, BATCH, &counts, r.seed);
+    same_counts(dut, &counts, r.seed);
+    ck_assert(!saturating || _i != FX_NODECAY || (counts.saturated[FX_C1] && counts.saturated[FX_C2]));
+    sf_dut_close(dut);
+  }
+}
+END_TEST
+
 /* ---- AXI4-Lite, reads and writes at once ---- */
 
 enum { REGISTERS = 4 };
@@ -297,6 +327,7 @@ int main(void)
   tcase_add_test(c, hard_reset_at_any_time);
   tcase_add_loop_test(c, soft_reset_in_every_phase, 0, SF_PHASES);
   tcase_add_loop_test(c, snapshot_and_clear_at_work, 0, 8);
+  tcase_add_loop_test(c, all_steps_under_stalls, 0, 3);
   tcase_add_loop_test(c, register_accesses_overlap, 0, 4);
   tcase_add_test(c, part_of_a_word);
   suite_add_tcase(s, c);
