@@ -121,7 +121,7 @@ module sf_counters (
       if (walk_q) place_q <= place_q + 9'd1;
     end
   end
-  wire wipe = walk_q && walk_clear_q;
+  wire wipe = walk_q && walk_clear_q && event_w == 3'd7;  // the last of the walk, so a snapshot has read every event
   always_ff @(posedge clk_i) begin
     if (walk_q && walk_snapshot_q) window_q[place_q] <= place_value;
     counter_o <= window_q[index_i];
