@@ -22,8 +22,8 @@ $(DUT_OUT)/pins.o: sim/pins.cpp sim/pins.h $(DUT_OUT)/Vsf_top.mk
 	$(call say,CXX   $< -> $@)
 	$Q$(CXX) -std=c++17 -O2 -I. -isystem $(VERILATOR_ROOT)/include -isystem $(DUT_OUT) -c $< -o $@
 
-$(DUT_OUT)/sf_cosim: $B/obj/tools/sf_cosim.o $(DUT_OUT)/pins.o $(DUT_OUT)/Vsf_top__ALL.a $(filter-out $B/obj/sim/soc%,$(DUT_OBJ)) $(VERILATED_OBJ) \
-  $B/libspikefield.a
+# The harness comes from our library; the block and its pins stand before it.
+$(DUT_OUT)/sf_cosim: $B/obj/tools/sf_cosim.o $(DUT_OUT)/pins.o $(DUT_OUT)/Vsf_top__ALL.a $(DUT_LIBS) $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(DUT_LDLIBS) $(LIBS)
 

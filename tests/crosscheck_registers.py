@@ -75,7 +75,7 @@ def read_source():
             memories[a[0]] = {"words": value(a[1]), "bits": int(a[2]), "base": registers[a[0]]["offset"]}
         elif macro == "SF_CSR_MEMORY":
             memories[a[0]] = {"words": value(a[3]), "bits": int(a[4]), "base": 0, "address": a[1], "data": a[2]}
-    assert len(registers) > 30 and len(memories) == 2, "csr.def was not understood"
+    assert len(registers) > 30 and len(memories) == 3, "csr.def was not understood"
     return registers, memories
 
 

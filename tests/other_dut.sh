@@ -39,7 +39,7 @@ has() { grep -qF -- "$2" "$work/$1" || fail "'$2' is not in $1: $(head -n 5 "$wo
 
 my_block=(--dut "+incdir+$work/overlay +incdir+$rtl $sources $work/my_block.sv" --dut-top my_block)
 run serial 0 "${my_block[@]}"
-[ "$(field serial samples) $(field serial differences)" = "3000 0" ] || fail "the other neuron: $(cat "$work/serial.json")"
+[ "$(field serial samples)" -ge 3000 ] && [ "$(field serial differences)" = 0 ] || fail "the other neuron: $(cat "$work/serial.json")"
 run again 0 "${my_block[@]}"
 [ ! -s "$work/again.err" ] || fail "built again without a change: $(head -n 1 "$work/again.err")"
 

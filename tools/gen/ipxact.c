@@ -209,7 +209,9 @@ static void write_register(FILE *out, const gen_register *r)
   leaf(out, 5, "access", access_of(r));
   for (int i = 0; i < count; i++) write_field(out, 5, r, &fields[i]);
   for (int i = 0; i < gen_memory_count; i++)
-    if (gen_memories[i].address && !strcmp(gen_memories[i].address, r->name)) write_whole_address(out, r);
+    if (gen_memories[i].address && !strcmp(gen_memories[i].address, r->name) &&
+        strcmp(fields[0].name, gen_whole(r).name)) /* without fields it is one number already */
+      write_whole_address(out, r);
   end(out, 4, "register");
 }
 
