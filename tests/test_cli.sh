@@ -78,6 +78,7 @@ good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1
+good sf_cycles s.snn d --view 1 --clock 100 --json
 if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.exr and x.exr differ"; fi
 for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
   if [ -s $f ]; then passed=$((passed + 1)); else fail "good runs" "$f is missing"; fi
@@ -90,7 +91,7 @@ done
 declare -A right=(
   [sf_scene]="simple -o out" [sf_train]="d -o out" [sf_export]="model.safetensors -o out"
   [sf_cosim]="s.snn d" [sim_render]="s.snn d -o out" [energy_audit]="s.snn d"
-  [error_budget]="model.safetensors s.snn d")
+  [error_budget]="model.safetensors s.snn d" [sf_cycles]="s.snn d")
 for p in sf_scene sf_train sf_export sf_cosim sim_render energy_audit error_budget; do
   usage --no-such-option $p ${right[$p]} --no-such-option
   usage --no-such-option $p ${right[$p]} --no-such-option=3
@@ -139,6 +140,9 @@ number sf_export --samples 0 4097 nan
 number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x
 number sf_cosim --block 0 x
+number sf_cycles --view -1 nan 2 99999999999
+number sf_cycles --downscale 0 -1 nan
+number sf_cycles --clock 0 nan inf
 number sim_render --view -1 nan 2 99999999999
 number sim_render --backend gpu nan ''
 number sim_render --downscale 0 -1 nan
@@ -171,6 +175,7 @@ readers() { # PATTERN DIR: and those that read one after the other
   whole_readers "$1" "$2"
   data "$1" sim_render s.snn "$2" -o out
   data "$1" sim_render s.snn "$2" --all -o out
+  data "$1" sf_cycles s.snn "$2"
   absent out "bad data $2"
 }
 spoil() { rm -rf bad; cp -r d bad; } # then change bad/
@@ -221,6 +226,7 @@ scenes() { # PATTERN FILE
   data "$1" sim_render "$2" d -o out
   data "$1" energy_audit "$2" d --rays 1 --rtl-rays 1
   data "$1" sf_cosim "$2" d --rays 1
+  data "$1" sf_cycles "$2" d
   absent out "bad scene $2"
 }
 each_file() { # FUNCTION GOOD
@@ -332,7 +338,7 @@ full full.out sf_train "${train[@]}" -o full.out --log log.out
 status=$?
 judge "full disk: sf_scene" sf_scene 1 fullscene
 absent fullscene/transforms_test.json "full disk: sf_scene"
-for p in sf_export sim_render energy_audit sf_cosim; do
+for p in sf_export sim_render energy_audit sf_cosim sf_cycles; do
   rm -rf out
   case $p in sf_cosim) more="--rays 1 --json" ;; energy_audit) more="--rays 1 --rtl-rays 1 --json" ;; *) more=--json ;; esac
   timeout -k 5 60 "$BIN/$p" ${right[$p]} $more >/dev/full 2>err </dev/null
