@@ -17,8 +17,8 @@ module sf_mac #(
     input  wire                       move_i,      // current = sum; a new sum may begin in the same cycle
     output reg         [24*LANES-1:0] current_o
 );
-  reg [23:0] acc_q[0:LANES-1];
-  wire [23:0] value = 24'(value_i);  // the sum is exact, so unsigned products modulo 2^24 give the same bits
+  reg signed [23:0] acc_q[0:LANES-1];
+  reg signed [19:0] product;  // names a product, not a register
   reg [24*LANES-1:0] base_q;
   reg [24*LANES-1:0] sums;  // names a whole row within one operation, not a register
 
@@ -30,13 +30,22 @@ module sf_mac #(
     end
     if (row_valid_i) begin
       if (zero_i) begin
-        for (int l = 0; l < LANES; l++) acc_q[l] = base_i ? base_q[24*l+:24] : 24'd0;
+        for (int l = 0; l < LANES; l++) acc_q[l] = base_i ? $signed(base_q[24*l+:24]) : 24'sd0;
       end else if (first_i && base_i) begin
-        for (int l = 0; l < LANES; l++) acc_q[l] = base_q[24*l+:24] + 24'($signed(row_i[8*l+:8])) * value;
+        for (int l = 0; l < LANES; l++) begin
+          product = $signed(row_i[8*l+:8]) * value_i;
+          acc_q[l] = $signed(base_q[24*l+:24]) + 24'(product);
+        end
       end else if (first_i) begin
-        for (int l = 0; l < LANES; l++) acc_q[l] = 24'($signed(row_i[8*l+:8])) * value;
+        for (int l = 0; l < LANES; l++) begin
+          product = $signed(row_i[8*l+:8]) * value_i;
+          acc_q[l] = 24'(product);
+        end
       end else begin
-        for (int l = 0; l < LANES; l++) acc_q[l] = acc_q[l] + 24'($signed(row_i[8*l+:8])) * value;
+        for (int l = 0; l < LANES; l++) begin
+          product = $signed(row_i[8*l+:8]) * value_i;
+          acc_q[l] = acc_q[l] + 24'(product);
+        end
       end
     end
   end
