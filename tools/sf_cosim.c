@@ -67,6 +67,7 @@ static sf_status simulate(const options *o, sf_lockstep *l)
   sf_progress_begin(&d.progress, o->quiet);
   sf_status status = sf_lockstep_run(l);
   sf_progress_end(&d.progress);
+  l->user = NULL;
   if (status.code == SF_OK && l->sum.samples == 0)
     status = sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: nothing was compared", l->data.path, o->run.rays);
   const sf_status reported = report(o, l, &status, sf_seconds() - d.begun);

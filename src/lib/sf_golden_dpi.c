@@ -23,10 +23,11 @@ typedef struct golden {
 void *sf_golden_open(const char *scene, int steps)
 {
   golden *g = calloc(1, sizeof *g);
+  const spikefield_options options = {.steps = steps};
   if (!g) return NULL;
   g->status = spikefield_scene_open(&g->owner, scene);
   if (g->status.code == SPIKEFIELD_OK)
-    g->status = lib_status(lib_view(g->owner, &(spikefield_options){.steps = steps}, &g->scene));
+    g->status = lib_status(lib_view(g->owner, &options, &g->scene));
   g->open = g->status.code == SPIKEFIELD_OK;
   return g;
 }
