@@ -1,0 +1,22 @@
+# Counters of 4 bits: they only add, so the low bits of 64 behave alike. And a second look at the counters, by the same
+# text, at a place the property chooses (watched_i) instead of the walk's. Of the window's memory only that place is left.
+s/^(  reg )\[63:0\] window_q\[0:511\];/\1[3:0] window_q;/
+s/window_q\[place_q\] <= /if (place_q == watched_i) window_q <= /
+s/counter_o <= window_q\[index_i\]/counter_o <= window_q/
+s/\[63:0\]/[3:0]/g
+s/64'd/4'd/g
+s/384'd0/24'd0/
+s/\{56'd0, (n_out_i\[[0-9:]*\]|spikes_count_i)\}/4'(\1)/
+s/^    output reg  (.*counter_o)/    input  wire [ 8:0] watched_i,\n    output wire [ 3:0] value_o,\n    output wire [ 3:0] window_o,\n    output reg  \1/
+/wire \[2:0\] event_w = /,/^  assign hold_o/ {
+  /^  assign hold_o/! H
+  /^  assign hold_o/ {
+    x
+    s/place_q/watched_i/g
+    s/(event_w|at_layer|at_step|at_narrow|at_neurons|integrating|neurons|updates|state_bytes|mac|add|global_value|place_value)\b/w_\1/g
+    s/(d1_|c1_)w_(mac_q)/\1\2/g
+    s/$/\n  assign value_o = w_place_value;\n  assign window_o = window_q;\n/
+    p
+    x
+  }
+}
