@@ -133,19 +133,19 @@ START_TEST(weights_and_addresses_are_checked)
 }
 END_TEST
 
-/* Registers read back what was written, from the table that both sides are made of. */
+/* Registers of sf_top read back what was written, from the table that both sides are made of. */
 START_TEST(registers_read_back)
 {
   typical(48);
   sf_dut *dut = open_dut(&net_of_test.net, 14, 50);
   sf_driver_reset(&dut->bus);
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \
-  if (#access[0] == 'R' && #access[1] == 'W') {                                                                        \
+  if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && #access[1] == 'W') {                                     \
     const uint32_t value = SF_CSR_##name == SF_CSR_MODE || SF_CSR_##name == SF_CSR_IRQ_ENABLE ? 1 : 7;                 \
     put(dut, SF_CSR_##name, value);                                                                                    \
     ck_assert_msg(get(dut, SF_CSR_##name) == value, "%s reads %u", #name, get(dut, SF_CSR_##name));                    \
   }                                                                                                                    \
-  if (reset) ck_assert_uint_eq(get(dut, SF_CSR_##name), (uint32_t)(reset));
+  if (SF_CSR_##name < SF_CSR_RAY_CTRL && reset) ck_assert_uint_eq(get(dut, SF_CSR_##name), (uint32_t)(reset));
 #include "spikefield/csr.def"
 #undef SF_CSR
 #undef SF_CSR_FIELD
