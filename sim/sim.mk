@@ -43,7 +43,7 @@ $1/V$4__ALL.a: $1/V$4.mk
 	@touch $$@
 $1/$5.o: sim/$5.cpp sim/pins.h sim/pins_model.h $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $1 -c $$< -o $$@
+	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
 define verilated_rule

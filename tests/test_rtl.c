@@ -53,7 +53,7 @@ START_TEST(stalls_hide_behind_the_engine)
 }
 END_TEST
 
-/* While the streams never make it wait the model is exact, and each layer's busy cycles are, too. */
+/* While the streams never make it wait the model is exact, and so are each layer's busy cycles and the stalls. */
 START_TEST(cycles_are_those_of_the_model)
 {
   for (uint64_t i = 0; i < 4; i++) {
@@ -67,6 +67,7 @@ START_TEST(cycles_are_those_of_the_model)
     ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
     const sf_cycle_totals model = modelled_cycles(&net_of_test.net, BATCH);
     ck_assert_uint_eq(cycles, model.cycles);
+    ck_assert_uint_eq(stalls, model.waits + model.stalls);
     for (int l = 0; l < SF_LAYERS; l++) ck_assert_uint_eq(sf_dut_layer_busy(dut)[l], model.busy[l]);
     sf_dut_close(dut);
   }

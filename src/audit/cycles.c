@@ -296,8 +296,10 @@ static void tick(sf_cycle_model *m)
   tick_c2(m, &was);
   tick_split(&m->d2, &was.d2, sample(&was, was.d2.sample)->d2, &m->totals.busy[FX_D2]);
   tick_split(&m->c3, &was.c3, sample(&was, was.c3.sample)->c3, &m->totals.busy[FX_C3]);
-  tick_neurons(m, &was, !was.read.density_full && !was.d2.taking && was.read.room,
-               !was.read.colour_full && !was.c3.taking);
+  const bool density_ready = !was.read.density_full && !was.d2.taking && was.read.room;
+  const bool colour_ready = !was.read.colour_full && !was.c3.taking;
+  m->totals.stalls += (was.c3.ready && !colour_ready) || (was.d2.ready && !density_ready);
+  tick_neurons(m, &was, density_ready, colour_ready);
   tick_stores(m, &was);
   tick_readout(m, &was);
 }
