@@ -158,6 +158,21 @@ START_TEST(registers_read_back)
 }
 END_TEST
 
+/* Registers start with random values; a hard reset gives them those of the table. */
+START_TEST(registers_after_reset)
+{
+  sf_dut *dut;
+  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
+#define SF_CSR(name, offset, access, reset, meaning)                                                                   \
+  if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && SF_CSR_##name != SF_CSR_STATUS)                          \
+    ck_assert_msg(get(dut, SF_CSR_##name) == (uint32_t)(reset), "%s reads %u", #name, get(dut, SF_CSR_##name));
+#include "spikefield/csr.def"
+#undef SF_CSR
+#undef SF_CSR_FIELD
+  sf_dut_close(dut);
+}
+END_TEST
+
 START_TEST(counters_clear_and_add_up)
 {
   typical(49);
@@ -344,6 +359,7 @@ static Suite *suite(void)
   tcase_add_test(ports, programming_while_running_is_refused);
   tcase_add_test(ports, weights_and_addresses_are_checked);
   tcase_add_test(ports, registers_read_back);
+  tcase_add_test(ports, registers_after_reset);
   tcase_add_test(ports, counters_clear_and_add_up);
   tcase_add_loop_test(ports, bad_packets_are_refused, 0, BAD_PACKETS);
   tcase_add_test(ports, soft_reset_at_any_time);

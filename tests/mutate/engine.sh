@@ -20,18 +20,20 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-limit=${MUTANT_LIMIT:-60} # seconds per checker: twice what the slowest needs without a mutant
+limit=${MUTANT_LIMIT:-200} # seconds per checker; a loaded machine must not make a hang of a slow one
 jobs=${MUTANT_JOBS:-2}
 list=$folder/rtl/mutants known=tests/mutate/equivalent-engine
 export folder limit checkers_of_mutant="${checkers[*]}"
 export CK_FORK=no
 trap 'exit 130' INT TERM
 
-# judge MUTANT: "MUTANT killed CHECKER" or "MUTANT survived"
+# judge MUTANT: "MUTANT killed CHECKER STATUS" (124: it hung) or "MUTANT survived"
 judge() {
-  local checker
+  local checker status
   for checker in $checkers_of_mutant; do
-    SF_MUTANT=$1 timeout "$limit" "$folder/$checker" >/dev/null 2>&1 || { echo "$1 killed $checker"; return; }
+    SF_MUTANT=$1 timeout "$limit" "$folder/$checker" >/dev/null 2>&1
+    status=$?
+    [ $status -eq 0 ] || { echo "$1 killed $checker $status"; return; }
   done
   echo "$1 survived"
 }
