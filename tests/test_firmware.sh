@@ -91,10 +91,11 @@ check "--help has examples" grep -q 'sf_soc scene.snn data --view 3' help
 "$build/bin/sf_soc" scene.snn data --quiet >/dev/full 2>err
 check "standard output on a full disk" [ $? -eq 1 ]
 
-# An interrupt ends it at once, in the middle of the tile.
+# An interrupt ends it at once, in the middle of the tile. --foreground: timeout would send the signal
+# to its whole group as well, and a second one kills at once.
 "$build/bin/sf_scene" simple -o large --size 400 --train 1 --test 1 >/dev/null
 : >out # what stands there is of an earlier run
-timeout -k 5 60 "$build/bin/sf_soc" scene.snn large --crop 0,0,400,400 --stall 90 --quiet >out 2>err &
+timeout --foreground -k 5 60 "$build/bin/sf_soc" scene.snn large --crop 0,0,400,400 --stall 90 --quiet >out 2>err &
 for _ in $(seq 300); do grep -q tile out && break; sleep 0.1; done
 kill -TERM $!
 wait $!
