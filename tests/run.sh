@@ -1,16 +1,18 @@
 #!/bin/bash
-# Runs the named tests one after another and ends with one closing line; BUILD/tests/junit.xml. usage: run.sh BUILD NAME...
-# A name is a Check program in BUILD/tests, or one of the scripts below.
+# Runs the named tests, JOBS at a time (default: one per processor), and ends with one closing line; BUILD/tests/junit.xml.
+# usage: run.sh BUILD NAME...     A name is a Check program in BUILD/tests, or one of the scripts below.
 build=$1
 shift
 here=$(dirname "$0")
-passed=0 failed=0 skipped=0
 logs=$build/tests/logs
 mkdir -p "$logs"
 export OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive} # threads that spin slow each other down on a busy machine
-cases=$logs/junit
-: >"$cases"
-for name in "$@"; do
+set -m # a group for each test, so that an interrupt ends all of it, and tests that interrupt programs can
+trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/null; wait; exit 130' INT TERM
+
+# run NAME: its verdict goes to the terminal, and with its seconds into logs/NAME.result.
+run() {
+  local name=$1 start command status verdict
   start=$(date +%s)
   case $name in
     cli) command=("$here/test_cli.sh" "$build/bin") ;;
@@ -34,27 +36,45 @@ for name in "$@"; do
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
     *) command=("$build/tests/$name") ;;
   esac
-  "${command[@]}" >"$logs/$name.log" 2>&1
+  "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null
   status=$?
-  seconds=$(($(date +%s) - start))
   if [ $status -eq 0 ]; then
-    passed=$((passed + 1)) verdict=ok
+    verdict=ok
   elif [ $status -eq 77 ] || { [ "$name" = safetensors ] && ! command -v python3 >/dev/null; }; then
-    skipped=$((skipped + 1)) verdict="skipped: $(tail -n 1 "$logs/$name.log")"
+    verdict="skipped: $(tail -n 1 "$logs/$name.log")"
   else
-    failed=$((failed + 1)) verdict="FAILED ($status), see $logs/$name.log"
+    verdict="FAILED ($status), see $logs/$name.log"
   fi
-  case $verdict in ok) inside= ;; skipped*) inside='<skipped/>' ;; *) inside='<failure message="see the log"/>' ;; esac
-  echo "  <testcase classname=\"tests\" name=\"$name\" time=\"$seconds\">$inside</testcase>" >>"$cases"
-  printf '  %-16s %4d s  %s\n' "$name" "$seconds" "$verdict"
-  [ $status -eq 0 ] || [ $status -eq 77 ] || tail -n 20 "$logs/$name.log"
+  set -- $(($(date +%s) - start)) "$verdict"
+  echo "$*" >"$logs/$name.result"
+  echo "$(
+    printf '  %-16s %4d s  %s' "$name" "$@"
+    [ "${verdict%% *}" != FAILED ] || { echo && tail -n 20 "$logs/$name.log"; }
+  )" # in one piece
+}
+
+rm -f "$logs"/*.result
+for name in "$@"; do
+  while [ "$(jobs -rp | wc -l)" -ge "${JOBS:-$(nproc)}" ]; do wait -n; done
+  run "$name" &
 done
+wait
+
+passed=0 failed=0 skipped=0
+for name in "$@"; do
+  read -r seconds verdict <"$logs/$name.result" || verdict=FAILED
+  case $verdict in
+    ok) passed=$((passed + 1)) inside= ;;
+    skipped*) skipped=$((skipped + 1)) inside='<skipped/>' ;;
+    *) failed=$((failed + 1)) inside='<failure message="see the log"/>' ;;
+  esac
+  echo "  <testcase classname=\"tests\" name=\"$name\" time=\"$seconds\">$inside</testcase>"
+done >"$logs/junit"
 {
   echo "<?xml version=\"1.0\" encoding=\"UTF-8\"?>"
   echo "<testsuite name=\"spikefield\" tests=\"$#\" failures=\"$failed\" skipped=\"$skipped\">"
-  cat "$cases"
+  cat "$logs/junit"
   echo "</testsuite>"
 } >"$build/tests/junit.xml"
-rm -f "$cases"
 echo "$passed passed, $failed failed, $skipped skipped"
 [ $failed -eq 0 ] && [ $passed -gt 0 ]
