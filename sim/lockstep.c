@@ -41,7 +41,7 @@ static sf_status run_ray(const sf_lockstep *l, sf_cosim *cosim, uint64_t number)
 {
   const sf_lockstep_pixel p = sf_lockstep_pick(l, number);
   fx_ray ray;
-  SF_TRY(sf_pixel_ray(&l->fx, &l->data.view[p.view].camera, p.x, p.y, &ray));
+  SF_TRY(sf_pixel_ray(&l->fx, &l->data, &l->data.view[p.view], p.x, p.y, &ray));
   return sf_cosim_ray(cosim, number, &ray);
 }
 

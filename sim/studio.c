@@ -59,10 +59,9 @@ sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot)
 static sf_status render(const sf_studio *studio, sf_shot *shot)
 {
   const sf_golden_job job = {.scene = &studio->scene,
-                             .camera = &shot->view->camera,
-                             .view = shot->view->name,
+                             .data = &shot->data,
+                             .view = shot->view,
                              .window = shot->window,
-                             .scale = shot->data.scale,
                              .tick = studio->tick,
                              .user = studio->user};
   if (studio->options.backend == SF_BACKEND_FLOAT) return sf_golden_float(&job, &studio->model, &shot->golden);

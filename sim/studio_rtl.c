@@ -50,7 +50,7 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   fx_ray ray;
   fx_pixel pixel;
   fx_counts rtl = {0}, counts;
-  SF_TRY(sf_pixel_ray(job->scene, job->camera, job->window.x + x, job->window.y + y, &ray));
+  SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, job->window.x + x, job->window.y + y, &ray));
   SF_TRY(run_ray(job->scene, &ray, e, &pixel, &rtl));
   counts = e->core.core;
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
@@ -67,8 +67,8 @@ sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *g
     for (int x = 0; x < job->window.width; x++) {
       sf_status status = rtl_pixel(job, &e, x, y, golden);
       if (status.code == SF_E_DIFFERENCE)
-        return sf_fail(status.code, "pixel (%d, %d) of view %s, %s", job->window.x + x, job->window.y + y, job->view,
-                       status.message);
+        return sf_fail(status.code, "pixel (%d, %d) of view %s, %s", job->window.x + x, job->window.y + y,
+                       job->view->name, status.message);
       SF_TRY(status);
       if (job->tick && !job->tick(job->user, 1)) return sf_golden_stopped(job);
     }

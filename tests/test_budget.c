@@ -36,10 +36,15 @@ static sf_view make_view(const sf_model *m, uint16_t *rgba)
 {
   static float origin[SIZE * SIZE][3], direction[SIZE * SIZE][3], rgb[SIZE * SIZE][3];
   const float white[3] = {1, 1, 1};
-  const sf_view view = {
-      .name = "view",
-      .camera = {SIZE, SIZE, 50, 50, SIZE / 2.0f, SIZE / 2.0f, {1, 0, 0, 0.1f, 0, 1, 0, 0, 0, 0, 1, 3}},
-      .image = {SIZE, SIZE, rgba}};
+  const sf_view view = {.name = "view",
+                        .camera = {.width = SIZE,
+                                   .height = SIZE,
+                                   .fx = 50,
+                                   .fy = 50,
+                                   .cx = SIZE / 2.0f,
+                                   .cy = SIZE / 2.0f,
+                                   .to_world = {1, 0, 0, 0.1f, 0, 1, 0, 0, 0, 0, 1, 3}},
+                        .image = {SIZE, SIZE, rgba}};
   for (int i = 0; i < SIZE * SIZE; i++)
     sf_camera_ray(&view.camera, (float)(i % SIZE) + 0.5f, (float)(i / SIZE) + 0.5f, origin[i], direction[i]);
   const sf_status status = sf_render_rays(m, origin[0], direction[0], SIZE * SIZE, 3, white, rgb[0], NULL, NULL, NULL);
@@ -56,10 +61,11 @@ static sf_picture_budget make_picture(sf_model *m)
   static uint16_t rgba[SIZE * SIZE * 4];
   fx_scene scene;
   sf_picture_budget budget;
+  const sf_dataset data = {.scale = 1};
   const sf_view view = make_view(m, rgba);
   const sf_quant_options options = {.background = {1, 1, 1}, .seed = 1};
   ck_assert_int_eq(sf_quantise(&scene, m, "model", &options).code, SF_OK);
-  const sf_picture_job job = {m, &scene, &view, "scene", 60, 3, NULL, NULL};
+  const sf_picture_job job = {m, &scene, &data, &view, "scene", 60, 3, NULL, NULL};
   const sf_status status = sf_picture_budget_make(&job, &budget);
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
   scene.net.layer[FX_C2].n_out--;

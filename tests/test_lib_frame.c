@@ -28,20 +28,21 @@ START_TEST(frames_are_those_of_the_core)
   static spikefield_pixel frame[HEIGHT * WIDTH], ray[HEIGHT * WIDTH];
   static float origin[HEIGHT * WIDTH][3], direction[HEIGHT * WIDTH][3];
   const spikefield_camera camera = make_camera();
-  sf_camera twin = {WIDTH, HEIGHT, 30, 31, 18.25f, 9, {0}};
+  const sf_dataset data = {.scale = 1};
+  sf_view twin = {.camera = {.width = WIDTH, .height = HEIGHT, .fx = 30, .fy = 31, .cx = 18.25f, .cy = 9}};
   spikefield_counts counts = {0}, of_rays = {0};
   fx_counts wanted = {0};
   int hit = 0;
-  memcpy(twin.to_world, camera.to_model, sizeof twin.to_world);
+  memcpy(twin.camera.to_world, camera.to_model, sizeof twin.camera.to_world);
   lib_good(spikefield_frame(scene, NULL, &camera, frame, &counts));
   for (int i = 0; i < HEIGHT * WIDTH; i++) {
     fx_ray r;
     fx_pixel expected;
-    ck_good(sf_pixel_ray(&core, &twin, i % WIDTH, i / WIDTH, &r));
+    ck_good(sf_pixel_ray(&core, &data, &twin, i % WIDTH, i / WIDTH, &r));
     ck_good(fx_render_ray(&core, &r, NULL, NULL, &expected, &wanted));
     assert_core_pixel(&frame[i], &expected);
     hit += expected.samples > 0;
-    sf_camera_ray(&twin, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, origin[i], direction[i]);
+    sf_camera_ray(&twin.camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, origin[i], direction[i]);
   }
   ck_assert_int_gt(hit, HEIGHT * WIDTH / 4);
   ck_assert_int_lt(hit, HEIGHT * WIDTH);

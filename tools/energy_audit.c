@@ -57,7 +57,7 @@ static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
 {
   const audit *a = user;
   place p = ray_place(a, index);
-  return sf_pixel_ray(&a->scene, &a->data.view[p.view].camera, p.x, p.y, ray);
+  return sf_pixel_ray(&a->scene, &a->data, &a->data.view[p.view], p.x, p.y, ray);
 }
 
 static bool tick(void *user, uint64_t done)

@@ -55,6 +55,7 @@ static sf_status measure_picture(budget *b)
                    o->split);
   const sf_picture_job job = {.model = &b->model,
                               .scene = &b->scene,
+                              .data = &b->data,
                               .view = &b->data.view[o->view],
                               .name = o->scene,
                               .rays = o->rays,

@@ -69,7 +69,7 @@ static sf_status trace_row(const job *j, int y, shapes *row)
     fx_ray ray;
     fx_pixel pixel;
     fx_counts counts = {0};
-    sf_camera_ray(camera, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
+    sf_dataset_ray(&j->data, &j->data.view[0], (float)x + 0.5f, (float)y + 0.5f, origin, direction);
     status = sf_fx_ray_make(&j->scene, origin, direction, &ray);
     if (status.code == SF_OK) status = fx_render_ray(&j->scene, &ray, take, t, &pixel, &counts);
   }

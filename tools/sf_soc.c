@@ -87,7 +87,7 @@ static sf_status run_core(job *j)
   if (!j->rays || !j->pixels || !j->costs) return sf_fail(SF_E_MEMORY, "no memory for %zu pixels", n);
   for (size_t i = 0; i < n; i++) {
     const int x = j->tile.x + (int)(i % (size_t)j->tile.width), y = j->tile.y + (int)(i / (size_t)j->tile.width);
-    SF_TRY(sf_pixel_ray(&j->scene, &j->data.view[0].camera, x, y, &j->rays[i]));
+    SF_TRY(sf_pixel_ray(&j->scene, &j->data, &j->data.view[0], x, y, &j->rays[i]));
   }
   fx_core *core;
   SF_TRY(fx_core_open(&core, &j->scene, NULL));
@@ -191,7 +191,7 @@ static sf_status save_png(const job *j)
 {
   if (!j->opt.png) return sf_ok();
   sf_golden golden = {0};
-  const sf_golden_job job = {.scene = &j->scene, .scale = j->data.scale};
+  const sf_golden_job job = {.scene = &j->scene, .data = &j->data};
   SF_TRY(sf_golden_create(&golden, j->tile.width, j->tile.height, SF_PLANES));
   for (size_t i = 0; i < pixels_of(j); i++)
     sf_golden_set(&golden, i, &j->made[i], &j->costs[i], sf_golden_step_length(&job));

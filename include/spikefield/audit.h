@@ -105,7 +105,7 @@ typedef struct sf_probe {
   fx_trace *trace;   /* where not NULL, every sample is recounted from its spike bitmaps and compared */
   fx_counts core;    /* (a) */
   fx_counts recount; /* (c), from trace */
-  uint64_t sample;                       /* of this ray, from 0; sf_probe_begin resets it */
+  uint64_t sample;   /* of this ray, from 0; sf_probe_begin resets it */
   int32_t base[SF_LANES];
 } sf_probe;
 void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
@@ -113,7 +113,7 @@ void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
 sf_status sf_probe_net(void *probe, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
 /* The ray through the centre of a pixel. */
-sf_status sf_pixel_ray(const fx_scene *scene, const sf_camera *camera, int x, int y, fx_ray *ray);
+sf_status sf_pixel_ray(const fx_scene *scene, const sf_dataset *data, const sf_view *view, int x, int y, fx_ray *ray);
 
 /* Rays 0..count-1 through the core on all threads; the sums do not depend on the threads. */
 typedef struct sf_measure_job {
@@ -126,7 +126,7 @@ typedef struct sf_measure_job {
 typedef struct sf_measure {
   fx_counts core, recount;
   uint64_t rays; /* all, with or without samples */
-  uint8_t *hit; /* bit i: ray i has samples; owned, sf_measure_free */
+  uint8_t *hit;  /* bit i: ray i has samples; owned, sf_measure_free */
 } sf_measure;
 /* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */
 sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure);

@@ -96,8 +96,9 @@ typedef struct sf_picture_budget {
 typedef struct sf_picture_job {
   const sf_model *model;
   const fx_scene *scene;
-  const sf_view *view;
-  const char *name; /* of the scene, for messages */
+  const sf_dataset *data;
+  const sf_view *view; /* of data */
+  const char *name;    /* of the scene, for messages */
   uint64_t rays, seed;
   bool (*tick)(void *user, int row);
   void *user;

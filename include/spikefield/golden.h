@@ -64,10 +64,9 @@ typedef struct sf_window {
 /* One window of one view, to be rendered into a golden image of the window's size. */
 typedef struct sf_golden_job {
   const fx_scene *scene; /* net.steps: the time steps that run */
-  const sf_camera *camera;
-  const char *view; /* its name, for messages */
+  const sf_dataset *data;
+  const sf_view *view; /* of data */
   sf_window window;
-  float scale;                             /* model units per world unit */
   bool (*tick)(void *user, size_t pixels); /* so many more are done; from one thread at a time; false stops. Or NULL */
   void *user;
 } sf_golden_job;

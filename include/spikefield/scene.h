@@ -3,26 +3,40 @@
 #define SPIKEFIELD_SCENE_H
 #include "spikefield/image.h"
 #include "spikefield/status.h"
+#include <stdbool.h>
 
 typedef struct sf_camera {
   int width, height;
   float fx, fy, cx, cy; /* pixels */
   float to_world[12];   /* row-major 3x4, OpenGL axes (x right, y up, looks along -z), model units */
+  float k1, k2, p1, p2; /* of the lens, as OpenCV; all 0: a pinhole */
 } sf_camera;
 
-/* Model units: the scene box is [-1, 1]^3. Blender data: position * 0.8 as torch-ngp. */
+/* Model units: the scene box is [-bound, bound]^3. Blender data: position * 0.8 as torch-ngp. */
 typedef struct sf_view {
   char name[256];
   sf_camera camera;
   sf_image image; /* rgba NULL when the split has no picture for it */
 } sf_view;
 
+typedef enum { SF_LAYOUT_BLENDER, SF_LAYOUT_LLFF, SF_LAYOUT_COLMAP, SF_LAYOUT_INGP } sf_layout;
+extern const char *const sf_layout_names[]; /* "blender", "llff", "colmap", "ingp" */
+
+/* What lies in a folder, and one split of its views. docs/data.md says how each layout is understood. */
 typedef struct sf_dataset {
   char path[4096];
+  sf_layout layout;
   sf_view *view;
-  int count;   /* loaded */
-  int total;   /* in the split, loaded or not */
-  float scale; /* model = world * scale */
+  int count;       /* loaded */
+  int total;       /* in the split, loaded or not */
+  float scale;     /* model = world * scale + offset, world as the layout's reader turns it */
+  float offset[3]; /* of the origin */
+  int32_t bound;   /* proposed half edge of the scene box for INGP, model units: 1, 2, 4, ... 64 */
+  /* Forward-facing: model space is NDC (Mildenhall et al. 2020, appendix C) times `scale`; to_world stays in units
+   * where the near plane is at distance ndc_near. */
+  bool ndc;
+  float ndc_near;
+  float ndc_focal[2]; /* focal length over half the picture, along x and y */
 } sf_dataset;
 
 typedef struct sf_dataset_options {
@@ -40,6 +54,10 @@ void sf_dataset_free(sf_dataset *data);
 
 /* Ray through pixel position (px, py), (0.5, 0.5) = centre of the first pixel. Unit direction. */
 void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3], float direction[3]);
+/* The same of a view of `data`, in the space that models live in: what a trainer or a renderer is to ask. With NDC the
+ * origin lies on the near plane (z = -scale) and infinity at z = scale. */
+void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
+                    float direction[3]);
 
 /* Procedural scenes: exact rendering of analytic shapes. names: NULL-terminated list. */
 typedef struct sf_procedural_options {

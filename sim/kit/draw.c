@@ -36,7 +36,7 @@ static sf_status draw_ray(sf_kit_draw *d, const sf_dataset *data, uint64_t seed,
   const sf_camera *camera = &data->view[r->view].camera;
   r->x = (int)sf_random_below(seed, STREAM_X, number, (uint64_t)camera->width);
   r->y = (int)sf_random_below(seed, STREAM_Y, number, (uint64_t)camera->height);
-  SF_TRY(sf_pixel_ray(d->scene, camera, r->x, r->y, &r->ray));
+  SF_TRY(sf_pixel_ray(d->scene, data, &data->view[r->view], r->x, r->y, &r->ray));
   fx_counts march = {0}; /* the accelerator neither marches nor reads the grid */
   const sf_status status = fx_render_ray(d->scene, &r->ray, evaluate, d, &pixel, &march);
   d->rays += r->samples > 0;

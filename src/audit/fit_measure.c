@@ -29,7 +29,7 @@ static void draw_ray(sf_fit_rays *rays, const sf_dataset *data, const int32_t ba
   const sf_view *view = &data->view[sf_random_below(seed, STREAM_VIEW, i, (uint64_t)data->count)];
   const int x = (int)sf_random_below(seed, STREAM_X, i, (uint64_t)view->camera.width);
   const int y = (int)sf_random_below(seed, STREAM_Y, i, (uint64_t)view->camera.height);
-  sf_camera_ray(&view->camera, (float)x + 0.5f, (float)y + 0.5f, rays->origin + 3 * i, rays->direction + 3 * i);
+  sf_dataset_ray(data, view, (float)x + 0.5f, (float)y + 0.5f, rays->origin + 3 * i, rays->direction + 3 * i);
   set_target(view, x, y, background, rays->target + 3 * i);
 }
 

@@ -48,12 +48,12 @@ void sf_golden_free(sf_golden *golden)
 
 double sf_golden_step_length(const sf_golden_job *job)
 {
-  return job->scene->step_q24 / 16777216.0 / job->scene->to_box_scale / (double)job->scale;
+  return job->scene->step_q24 / 16777216.0 / job->scene->to_box_scale / (double)job->data->scale;
 }
 
 sf_status sf_golden_stopped(const sf_golden_job *job)
 {
-  return sf_fail(SF_E_STOPPED, "stopped in view %s", job->view);
+  return sf_fail(SF_E_STOPPED, "stopped in view %s", job->view->name);
 }
 
 static uint32_t to_u32(uint64_t value)

@@ -22,8 +22,8 @@ static sf_status render_rows(const picture *p, int y, int rows, const block *b, 
   const sf_golden_job *job = p->job;
   const size_t width = (size_t)job->window.width, n = width * (size_t)rows, first = width * (size_t)y;
   for (size_t i = 0; i < n; i++)
-    SF_TRY(sf_pixel_ray(job->scene, job->camera, job->window.x + (int)(i % width), job->window.y + y + (int)(i / width),
-                        &b->ray[i]));
+    SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, job->window.x + (int)(i % width),
+                        job->window.y + y + (int)(i / width), &b->ray[i]));
   SF_TRY(fx_render_rays(p->core, b->ray, n, b->pixel, b->cost, sum));
   for (size_t i = 0; i < n; i++) sf_golden_set(p->golden, first + i, &b->pixel[i], &b->cost[i], p->step_length);
   return sf_ok();

@@ -17,13 +17,13 @@ static sf_status render_rows(const sf_golden_job *job, const sf_model *model, in
   for (size_t i = 0; i < n; i++) {
     float px = (float)(job->window.x + (int)(i % width)) + 0.5f;
     float py = (float)(job->window.y + y + (int)(i / width)) + 0.5f;
-    sf_camera_ray(job->camera, px, py, origin + 3 * i, direction + 3 * i);
+    sf_dataset_ray(job->data, job->view, px, py, origin + 3 * i, direction + 3 * i);
   }
   SF_TRY(sf_render_rays(model, origin, direction, n, job->scene->net.steps, background, rgb, depth, alpha, samples));
   for (size_t i = 0; i < n; i++) {
     for (int c = 0; c < 3; c++) sf_golden_real(golden, SF_PLANE_R + c)[first + i] = rgb[3 * i + (size_t)c];
     sf_golden_real(golden, SF_PLANE_A)[first + i] = alpha[i];
-    sf_golden_real(golden, SF_PLANE_Z)[first + i] = alpha[i] > 0 ? depth[i] / alpha[i] / job->scale : 0;
+    sf_golden_real(golden, SF_PLANE_Z)[first + i] = alpha[i] > 0 ? depth[i] / alpha[i] / job->data->scale : 0;
     sf_golden_int(golden, SF_PLANE_SAMPLES)[first + i] = (uint32_t)samples[i];
     golden->counts.samples += (uint64_t)samples[i];
     golden->counts.rays += samples[i] > 0;

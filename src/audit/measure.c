@@ -29,10 +29,10 @@ sf_status sf_probe_net(void *user, const fx_ray *ray, bool first, const int16_t 
   return sf_ok();
 }
 
-sf_status sf_pixel_ray(const fx_scene *scene, const sf_camera *camera, int x, int y, fx_ray *ray)
+sf_status sf_pixel_ray(const fx_scene *scene, const sf_dataset *data, const sf_view *view, int x, int y, fx_ray *ray)
 {
   float origin[3], direction[3];
-  sf_camera_ray(camera, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
+  sf_dataset_ray(data, view, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
   return sf_fx_ray_make(scene, origin, direction, ray);
 }
 

@@ -58,8 +58,8 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
   float origin[3], direction[3], sh[SF_DIR_FEATURES];
   double dir[SF_DIR_MAX];
   ray_pixel(job, i, &x, &y);
-  sf_camera_ray(&job->view->camera, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
-  SF_TRY(sf_pixel_ray(job->scene, &job->view->camera, x, y, &t->ray));
+  sf_dataset_ray(job->data, job->view, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
+  SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, x, y, &t->ray));
   sf_sh4(direction, sh);
   for (int a = 0; a < 3; a++) t->unit[a] = direction[a];
   for (int j = 0; j < SF_DIR_FEATURES; j++) {

@@ -113,7 +113,7 @@ static sf_status render_float(bench *b)
   for (size_t i = 0; i < b->pixels; i++) {
     int x, y;
     place(b, i, &x, &y);
-    sf_camera_ray(&b->view->camera, (float)x + 0.5f, (float)y + 0.5f, origin + 3 * i, direction + 3 * i);
+    sf_dataset_ray(&b->data, b->view, (float)x + 0.5f, (float)y + 0.5f, origin + 3 * i, direction + 3 * i);
   }
   const sf_status status = sf_render_rays(&b->model, origin, direction, b->pixels, b->scene.net.steps,
                                           b->options->quant.background, b->real, NULL, NULL, NULL);
@@ -133,7 +133,7 @@ static sf_status fill_row(bench *b, int row, const row_space *space, fx_counts *
   for (size_t i = 0; i < n; i++) {
     int x, y;
     place(b, first + i, &x, &y);
-    SF_TRY(sf_pixel_ray(&b->scene, &b->view->camera, x, y, &space->ray[i]));
+    SF_TRY(sf_pixel_ray(&b->scene, &b->data, b->view, x, y, &space->ray[i]));
   }
   SF_TRY(fx_render_rays(b->core, space->ray, n, space->pixel, space->cost, sum));
   for (size_t i = 0; i < n; i++) sf_golden_set(&b->fixed, first + i, &space->pixel[i], &space->cost[i], 1);

@@ -9,7 +9,7 @@ enum { BLOCK = 256, FEW = 32, THREADS_MAX = 1024, SIDE_MAX = 65536 };
 
 typedef struct job {
   fx_scene view;
-  fx_core *core; /* NULL for a few rays: arranging its tables would take longer */
+  fx_core *core;                     /* NULL for a few rays: arranging its tables would take longer */
   const float *origins, *directions; /* NULL: the camera's */
   sf_camera camera;
   uint64_t rays, blocks;
@@ -162,7 +162,12 @@ static sf_status run_frame(const spikefield_scene *scene, const spikefield_optio
   LIB_REQUIRE(camera);
   LIB_REQUIRE(pixels);
   SF_TRY(check_camera(camera));
-  j.camera = (sf_camera){camera->width, camera->height, camera->fx, camera->fy, camera->cx, camera->cy, {0}};
+  j.camera = (sf_camera){.width = camera->width,
+                         .height = camera->height,
+                         .fx = camera->fx,
+                         .fy = camera->fy,
+                         .cx = camera->cx,
+                         .cy = camera->cy};
   for (int i = 0; i < 12; i++) j.camera.to_world[i] = camera->to_model[i];
   j.rays = (uint64_t)camera->width * (uint64_t)camera->height;
   return run(&j, counts);

@@ -1,3 +1,4 @@
+/* Rays of cameras and of views. */
 #include "spikefield/scene.h"
 #include <math.h>
 
@@ -12,4 +13,28 @@ void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3],
   }
   length = sqrtf(length);
   for (int i = 0; i < 3; i++) direction[i] = d[i] / length, origin[i] = m[4 * i + 3];
+}
+
+/* Mildenhall et al. 2020, appendix C: straight lines stay straight, the near plane goes to z = -1, infinity to z = 1. A
+ * ray that does not look ahead has no such image: it is taken to leave sideways. */
+static void to_ndc(const sf_dataset *data, float origin[3], float direction[3])
+{
+  const float ahead = fminf(direction[2], -1e-6f), t = -(data->ndc_near + origin[2]) / ahead;
+  float d[3] = {0, 0, 2}, length = 0;
+  for (int i = 0; i < 2; i++) {
+    const float at = (origin[i] + t * direction[i]) / data->ndc_near; /* over the distance of the near plane */
+    origin[i] = data->ndc_focal[i] * at * data->scale;
+    d[i] = data->ndc_focal[i] * (-direction[i] / ahead - at);
+  }
+  origin[2] = -data->scale;
+  for (int i = 0; i < 3; i++) length += d[i] * d[i];
+  length = sqrtf(length);
+  for (int i = 0; i < 3; i++) direction[i] = d[i] / length;
+}
+
+void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
+                    float direction[3])
+{
+  sf_camera_ray(&view->camera, px, py, origin, direction);
+  if (data->ndc) to_ndc(data, origin, direction);
 }

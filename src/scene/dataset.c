@@ -12,6 +12,7 @@
 #define DEFAULT_SCALE 0.8f
 /* Of a focal length and of an optical centre: beyond them rays lose all precision, and then their direction. */
 static const float FOCAL_MIN = 1e-3f, PIXELS_MAX = 1e9f;
+const char *const sf_layout_names[] = {"blender", "llff", "colmap", "ingp"};
 enum { HOLD_OUT = 8 }; /* every 8th view where the data names no test views */
 
 static bool is_file(const char *path)
@@ -222,7 +223,7 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
   memset(data, 0, sizeof *data);
   SF_TRY(check_options(dir, options));
   strcpy(data->path, dir);
-  data->scale = options->scale > 0 ? options->scale : DEFAULT_SCALE;
+  data->scale = options->scale > 0 ? options->scale : DEFAULT_SCALE, data->bound = 1;
   listing list;
   SF_TRY(find_listing(&list, dir, split));
   cJSON *json;

@@ -50,7 +50,7 @@ static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
   const sf_image *image = &view->image;
   const int x = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 1, (uint64_t)image->width);
   const int y = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 2, (uint64_t)image->height);
-  sf_camera_ray(&view->camera, (float)x + 0.5f, (float)y + 0.5f, ray->origin, ray->direction);
+  sf_dataset_ray(t->data, view, (float)x + 0.5f, (float)y + 0.5f, ray->origin, ray->direction);
   const uint16_t *rgba = image->rgba + 4 * ((size_t)y * image->width + x);
   const float alpha = rgba[3] / 65535.0f;
   for (int c = 0; c < 3; c++) {

@@ -2,7 +2,8 @@
 #include "spikefield/train.h"
 #include <stdlib.h>
 
-static sf_status evaluate_view(const sf_model *model, const sf_view *view, int steps, double *psnr, double *ssim)
+static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, const sf_view *view, int steps,
+                               double *psnr, double *ssim)
 {
   const sf_image *im = &view->image;
   const size_t n = (size_t)im->width * im->height;
@@ -11,8 +12,8 @@ static sf_status evaluate_view(const sf_model *model, const sf_view *view, int s
   float *origin = memory, *direction = memory + 3 * n, *rgb = memory + 6 * n, *truth = memory + 9 * n;
   const float white[3] = {1, 1, 1};
   for (size_t i = 0; i < n; i++) {
-    sf_camera_ray(&view->camera, (float)(i % im->width) + 0.5f, (float)(i / im->width) + 0.5f, origin + 3 * i,
-                  direction + 3 * i);
+    sf_dataset_ray(data, view, (float)(i % im->width) + 0.5f, (float)(i / im->width) + 0.5f, origin + 3 * i,
+                   direction + 3 * i);
     const float alpha = im->rgba[4 * i + 3] / 65535.0f;
     for (int c = 0; c < 3; c++) truth[3 * i + c] = im->rgba[4 * i + c] / 65535.0f * alpha + 1 - alpha;
   }
@@ -33,7 +34,7 @@ sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, 
   for (int v = 0; v < data->count && (views == 0 || used < views); v++) {
     if (!data->view[v].image.rgba) continue;
     double p = 0, s = 0;
-    SF_TRY(evaluate_view(model, &data->view[v], steps, &p, &s));
+    SF_TRY(evaluate_view(model, data, &data->view[v], steps, &p, &s));
     *psnr += p;
     *ssim += s;
     used++;
