@@ -115,6 +115,14 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
+# Prices of technologies, found beside the program.
+TECHS := $(wildcard share/tech/*.tech)
+$B/share/spikefield/tech/%.tech: share/tech/%.tech
+	@mkdir -p $(@D)
+	$Qcp $< $@
+$B/bin/energy_audit: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
+all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
+
 # Tests
 CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
 $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikefield.a

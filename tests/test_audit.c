@@ -254,7 +254,7 @@ START_TEST(measure_does_not_depend_on_threads)
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
   fx_scene scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
-  sf_measure_job job = {&scene, 1000, make_ray, tick, &user};
+  sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, UINT64_MAX};
   sf_measure one, four;
   uint64_t hits = 0;
   omp_set_num_threads(1);
@@ -263,6 +263,9 @@ START_TEST(measure_does_not_depend_on_threads)
   ck_assert_int_eq(sf_measure_rays(&job, &four).code, SF_OK);
   assert_same_counts(&one.core, &four.core);
   ck_assert_mem_eq(one.hit, four.hit, 1000 / 8);
+  assert_same_counts(&one.checked_core, &one.core); /* all rays are checked */
+  assert_same_counts(&one.checked_core, &four.checked_core);
+  ck_assert_uint_eq(one.checked, one.core.rays);
   ck_assert_int_eq(sf_counts_compare(&one.core, "core", &one.recount, "recount").code, SF_OK);
   for (uint64_t i = 0; i < 1000; i++) {
     bool hit = one.hit[i / 8] >> i % 8 & 1;
@@ -277,12 +280,49 @@ START_TEST(measure_does_not_depend_on_threads)
 }
 END_TEST
 
+START_TEST(checked_rays_are_a_seeded_choice)
+{
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  rays user = {UINT64_MAX, UINT64_MAX};
+  sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, 50};
+  sf_measure measure;
+  uint64_t index[50], again[50], other[50], all[1000], n, differs = 0;
+  ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_OK);
+  ck_assert_uint_eq(measure.checked, 50);
+  ck_assert_uint_eq(measure.recount.rays, 50);
+  ck_assert_uint_lt(measure.recount.samples, measure.core.samples);
+  ck_assert_int_eq(sf_counts_compare(&measure.checked_core, "a", &measure.recount, "b").code, SF_OK);
+  ck_assert_int_eq(sf_measure_choose(&measure, 1, 2, 50, index, &n).code, SF_OK);
+  ck_assert_uint_eq(n, 50);
+  sf_measure_choose(&measure, 1, 2, 50, again, &n);
+  sf_measure_choose(&measure, 2, 2, 50, other, &n);
+  for (int i = 0; i < 50; i++) {
+    ck_assert_uint_eq(index[i], again[i]);
+    differs += index[i] != other[i];
+    ck_assert(measure.hit[index[i] / 8] >> index[i] % 8 & 1);
+    if (i > 0) ck_assert_uint_gt(index[i], index[i - 1]); /* none twice */
+  }
+  ck_assert_uint_gt(differs, 25);
+  sf_measure_choose(&measure, 1, 2, 1000, all, &n);
+  ck_assert_uint_eq(n, measure.core.rays);
+  /* The chosen ones have the smallest keys of all. */
+  uint64_t largest = 0, below = 0;
+  for (int i = 0; i < 50; i++)
+    largest = index[i] && sf_random_u64(1, 2, index[i]) > largest ? sf_random_u64(1, 2, index[i]) : largest;
+  for (uint64_t i = 0; i < n; i++) below += sf_random_u64(1, 2, all[i]) <= largest;
+  ck_assert_uint_eq(below, 50);
+  sf_measure_free(&measure);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(measure_reports_the_lowest_failing_ray)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
   fx_scene scene = fixture_scene(&sizes, 3);
   rays user = {10, UINT64_MAX};
-  sf_measure_job job = {&scene, 5000, make_ray, tick, &user};
+  sf_measure_job job = {&scene, 5000, make_ray, tick, &user, 7, 10};
   sf_measure measure;
   omp_set_num_threads(4);
   for (int repeat = 0; repeat < 5; repeat++) {
@@ -424,7 +464,7 @@ START_TEST(report_json_holds_what_was_counted)
   *r = (sf_audit_report){
       .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
   sf_recount_sample(&net, small_spikes, true, &r->measure.core);
-  r->measure.recount = r->measure.core;
+  r->measure.recount = r->measure.checked_core = r->measure.core;
   ck_assert_int_eq(sf_ledger_make(&net, &r->measure.core, &r->ledger).code, SF_OK);
   cJSON *json = sf_report_json(r);
   char *text = cJSON_PrintUnformatted(json);
@@ -464,7 +504,7 @@ START_TEST(report_says_that_counts_differ)
   sf_report_print(out, r);
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: SOP of layer C3 at step 0"));
-  ck_assert_ptr_nonnull(strstr(text, "not modelled:"));
+  ck_assert_ptr_nonnull(strstr(text, "not modelled, by any ledger:"));
   free(text), free(r);
   cJSON_Delete(json);
 }
@@ -633,6 +673,7 @@ int main(void)
   tcase_add_test(counts, comparison_names_each_planted_difference);
   tcase_add_test(counts, comparison_names_the_first_and_ignores_the_rest);
   tcase_add_test(measure, measure_does_not_depend_on_threads);
+  tcase_add_test(measure, checked_rays_are_a_seeded_choice);
   tcase_add_test(measure, measure_reports_the_lowest_failing_ray);
   tcase_add_test(measure, probe_names_the_sample_of_a_difference);
   tcase_add_test(report, published_rates);

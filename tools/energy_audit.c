@@ -1,22 +1,24 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
 #include "spikefield/audit.h"
 #include "spikefield/cli.h"
-#include "spikefield/dut.h"
 #include "spikefield/io.h"
 #include "spikefield/rng.h"
+#include "sim/three_counts.h"
 #include <inttypes.h>
 #include <omp.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 typedef struct options {
-  int view, views, downscale, threads, rtl_rays, stall;
-  uint64_t rays, seed;
+  int view, views, downscale, threads, rtl_rays, stall, steps;
+  uint64_t rays, seed, recount_rays;
   double scale;
-  const char *split, *csv, *plusarg, *scene, *data;
+  const char *split, *csv, *plusarg, *scene, *data, *tech;
   bool json, published, quiet;
 } options;
 
-enum { RTL_RAYS = 32 };
+enum { RTL_RAYS = 32, RECOUNT_RAYS = 1000 };
 /* Streams of the random numbers of one seed. */
 enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y, STREAM_SUBSET };
 
@@ -30,7 +32,7 @@ typedef struct audit {
   sf_dataset data;
   uint64_t pixels; /* of one view */
   char hash[65];
-  uint64_t *subset; /* indices of the rays for the accelerator */
+  sf_technology technology;
   sf_audit_report report;
   sf_progress progress;
   double start;
@@ -75,6 +77,7 @@ static sf_status load(audit *a)
   options *o = &a->opt;
   SF_TRY(fx_scene_load(&a->scene, o->scene));
   SF_TRY(sf_sha256_file(o->scene, a->hash));
+  if (o->steps) a->scene.net.steps = o->steps;
   /* Random rays come from every view unless one is named; whole views are many rays, so one is the default. */
   if (o->views == 0 && o->view < 0 && o->rays == 0) o->views = 1;
   sf_dataset_options how = {
@@ -97,156 +100,61 @@ static sf_status load(audit *a)
   return sf_ok();
 }
 
-/* ---- the subset for the accelerator ---- */
+/* ---- technology ---- */
 
-/* The rays with samples whose random keys are smallest: seeded, without repetition, whatever the threads. */
-static sf_status choose_subset(audit *a)
+/* A file, or the name of one of those that stand beside the program: ../share/spikefield/tech/NAME.tech. */
+static sf_status load_technology(audit *a)
 {
-  int limit = a->report.three.wanted, n = 0;
-  uint64_t *key = calloc((size_t)limit + 1, sizeof *key), *ray = calloc((size_t)limit + 1, sizeof *ray);
-  a->subset = ray;
-  if (!key || !ray) {
-    free(key);
-    return sf_fail(SF_E_MEMORY, "no memory for %d rays", limit);
-  }
-  for (uint64_t i = 0; i < a->report.rays && limit > 0; i++) {
-    if (!(a->report.measure.hit[i / 8] >> i % 8 & 1)) continue;
-    uint64_t k = sf_random_u64(a->opt.seed, STREAM_SUBSET, i);
-    if (n == limit && k >= key[n - 1]) continue;
-    int at = n < limit ? n++ : n - 1;
-    for (; at > 0 && key[at - 1] > k; at--) key[at] = key[at - 1], ray[at] = ray[at - 1];
-    key[at] = k, ray[at] = i;
-  }
-  free(key);
-  a->report.three.rays = n;
-  return sf_ok();
+  char path[4096 + 64];
+  const char *name = a->opt.tech;
+  if (strchr(name, '/') || access(name, F_OK) == 0) return sf_technology_load(&a->technology, name);
+  const ssize_t n = readlink("/proc/self/exe", path, 4096);
+  if (n <= 0) return sf_fail(SF_E_IO, "--tech %s: /proc/self/exe: cannot find the program's folder", name);
+  path[n] = 0;
+  for (int up = 0; up < 2 && strrchr(path, '/'); up++) *strrchr(path, '/') = 0;
+  const size_t folder = strlen(path);
+  snprintf(path + folder, sizeof path - folder, "/share/spikefield/tech/%.60s.tech", name);
+  return sf_technology_load(&a->technology, path);
 }
 
-typedef struct rtl_eval {
-  sf_dut *dut;
-  sf_probe core;
-  sf_dut_result result;
-  bool check_counters; /* after every sample: only to find the sample of a difference, it is slow */
-} rtl_eval;
+/* ---- the rays for the accelerator ---- */
 
-static sf_status compare_outputs(const fx_out *core, const fx_out *rtl)
+static void name_ray(void *user, uint64_t index, char *text, size_t size)
 {
-  static const char *const name[4] = {"density", "red", "green", "blue"};
-  const uint32_t x[4] = {core->sigma, core->colour[0], core->colour[1], core->colour[2]};
-  const uint32_t y[4] = {rtl->sigma, rtl->colour[0], rtl->colour[1], rtl->colour[2]};
-  for (int i = 0; i < 4; i++)
-    if (x[i] != y[i]) return sf_fail(SF_E_DIFFERENCE, "%s: core %u, accelerator %u", name[i], x[i], y[i]);
-  return sf_ok();
+  const audit *a = user;
+  const place p = ray_place(a, index);
+  snprintf(text, size, "ray %" PRIu64 " (view %s, pixel %d,%d)", index, a->data.view[p.view].name, p.x, p.y);
 }
 
-static sf_status compare_bitmaps(const fx_net *net, const uint64_t core[SF_LAYERS][SF_T_MAX][2],
-                                 const uint64_t rtl[SF_LAYERS][SF_T_MAX][2])
+static bool rtl_tick(void *user, int done)
 {
-  for (int t = 0; t < net->steps; t++)
-    for (int l = FX_D1; l <= FX_C2; l++)
-      for (int w = 0; w < 2 && l != FX_D2; w++) {
-        uint64_t difference = core[l][t][w] ^ rtl[l][t][w];
-        if (!difference) continue;
-        int bit = __builtin_ctzll(difference);
-        return sf_fail(SF_E_DIFFERENCE, "spike of layer %s at step %d, neuron %d: core %d, accelerator %d",
-                       sf_layer_names[l], t, 64 * w + bit, (int)(core[l][t][w] >> bit & 1),
-                       (int)(rtl[l][t][w] >> bit & 1));
-      }
-  return sf_ok();
-}
-
-static sf_status compare_counters(rtl_eval *e)
-{
-  fx_counts rtl;
-  uint64_t cycles, busy, stalls;
-  SF_TRY(sf_dut_counts(e->dut, &rtl, &cycles, &busy, &stalls));
-  return sf_counts_compare(&e->core.core, "core", &rtl, "accelerator");
-}
-
-static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
-{
-  rtl_eval *e = user;
-  sf_dut_sample sample = {.ray = ray, .first = first, .f = f};
-  unsigned long long index = e->core.sample;
-  fx_out core;
-  SF_TRY(sf_probe_net(&e->core, ray, first, f, &core));
-  SF_TRY(sf_dut_run(e->dut, &sample, 1, &e->result));
-  sf_status status = compare_bitmaps(e->core.net, (const uint64_t(*)[SF_T_MAX][2])e->core.trace->spikes,
-                                     (const uint64_t(*)[SF_T_MAX][2])e->result.spikes);
-  if (status.code == SF_OK) status = compare_outputs(&core, &e->result.out);
-  if (status.code == SF_OK && e->check_counters) status = compare_counters(e);
-  *out = e->result.out;
-  if (status.code != SF_E_DIFFERENCE) return status;
-  return sf_fail(status.code, "sample %llu: %s", index, status.message);
-}
-
-static sf_status rtl_ray(audit *a, rtl_eval *e, uint64_t index)
-{
-  fx_ray ray;
-  fx_pixel pixel;
-  SF_TRY(make_ray(a, index, &ray));
-  sf_probe_begin(&e->core);
-  return fx_render_ray(&a->scene, &ray, rtl_net, e, &pixel, &e->core.core);
-}
-
-static sf_status name_ray(const audit *a, uint64_t index, sf_status status)
-{
-  place p = ray_place(a, index);
-  return sf_fail(status.code, "ray %" PRIu64 " (view %s, pixel %d,%d): %s", index, a->data.view[p.view].name, p.x, p.y,
-                 status.message);
-}
-
-/* The counters of a ray differ although outputs and spikes agree: again, with the counters read at every sample. */
-static sf_status find_counter_sample(audit *a, rtl_eval *e, uint64_t index, sf_status difference)
-{
-  e->check_counters = true;
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  sf_status status = rtl_ray(a, e, index);
-  return name_ray(a, index, status.code == SF_E_DIFFERENCE ? status : difference);
-}
-
-static sf_status rtl_all(audit *a, rtl_eval *e)
-{
-  sf_three_counts *s = &a->report.three;
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  a->start = sf_seconds();
-  for (int i = 0; i < s->rays; i++) {
-    if (sf_cli_interrupted())
-      return sf_fail(SF_E_STOPPED, "stopped after %d of %d rays in the accelerator", i, s->rays);
-    sf_status status = rtl_ray(a, e, a->subset[i]);
-    if (status.code == SF_E_DIFFERENCE) return name_ray(a, a->subset[i], status);
-    SF_TRY(status);
-    fx_counts_add(&s->core, &e->core.core);
-    fx_counts_add(&s->recount, &e->core.recount);
-    SF_TRY(sf_dut_counts(e->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls));
-    status = sf_counts_compare(&s->core, "core", &s->rtl, "accelerator");
-    if (status.code == SF_E_DIFFERENCE) return find_counter_sample(a, e, a->subset[i], status);
-    if (sf_progress_due(&a->progress))
-      sf_progress_show(&a->progress, "accelerator: %d of %d rays, ETA %.0f s", i + 1, s->rays,
-                       (sf_seconds() - a->start) * (s->rays - i - 1) / (i + 1));
-  }
-  SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
-  return sf_counts_compare(&s->rtl, "accelerator", &s->recount, "recount");
+  audit *a = user;
+  const int rays = a->report.three.wanted;
+  if (sf_progress_due(&a->progress))
+    sf_progress_show(&a->progress, "accelerator: %d of %d rays, ETA %.0f s", done, rays,
+                     (sf_seconds() - a->start) * (rays - done) / done);
+  return !sf_cli_interrupted();
 }
 
 static sf_status run_rtl(audit *a)
 {
-  a->report.three.agreement = sf_ok();
-  SF_TRY(choose_subset(a));
-  if (a->report.three.rays == 0) return sf_ok();
-  rtl_eval *e = calloc(1, sizeof *e);
-  fx_trace *trace = calloc(1, sizeof *trace);
-  sf_dut_options how = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg};
-  sf_status status = e && trace ? sf_dut_open(&e->dut, &a->scene, &how) : sf_fail(SF_E_MEMORY, "no memory");
-  if (status.code == SF_OK) {
-    e->core.net = &a->scene.net, e->core.trace = trace;
-    status = rtl_all(a, e);
-    sf_dut_close(e->dut);
-  }
-  free(e), free(trace);
-  if (status.code != SF_E_DIFFERENCE) return status;
-  a->report.three.agreement = status; /* reported with the rest; the exit status tells */
-  return sf_ok();
+  sf_three_counts *three = &a->report.three;
+  uint64_t count = 0, *index = calloc((size_t)three->wanted + 1, sizeof *index);
+  if (!index) return sf_fail(SF_E_MEMORY, "no memory for %d rays", three->wanted);
+  sf_status status =
+      sf_measure_choose(&a->report.measure, a->opt.seed, STREAM_SUBSET, (uint64_t)three->wanted, index, &count);
+  const sf_three_job job = {.scene = &a->scene,
+                            .index = index,
+                            .rays = (int)count,
+                            .ray = make_ray,
+                            .name = name_ray,
+                            .tick = rtl_tick,
+                            .user = a,
+                            .dut = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg}};
+  a->start = sf_seconds();
+  if (status.code == SF_OK) status = sf_three_counts_run(&job, three);
+  free(index);
+  return status;
 }
 
 /* ---- reports ---- */
@@ -256,7 +164,7 @@ static sf_status write_csv(const audit *a)
   sf_writer writer;
   if (!a->opt.csv) return sf_ok();
   SF_TRY(sf_writer_open(&writer, a->opt.csv));
-  sf_report_csv(writer.file, &a->scene.net, &a->report.measure.core);
+  sf_report_csv(writer.file, &a->report);
   return sf_writer_commit(&writer);
 }
 
@@ -286,11 +194,15 @@ static sf_status print_report(const audit *a)
 
 static sf_status count(audit *a)
 {
-  sf_measure_job job = {&a->scene, a->report.rays, make_ray, tick, a};
-  sf_status status = sf_measure_rays(&job, &a->report.measure);
+  sf_audit_report *r = &a->report;
+  const sf_measure_job job = {&a->scene, r->rays, make_ray, tick, a, a->opt.seed, a->opt.recount_rays};
+  const sf_status status = sf_measure_rays(&job, &r->measure);
   if (status.code == SF_E_DIFFERENCE) return sf_fail(status.code, "%s: %s", a->opt.scene, status.message);
   SF_TRY(status);
-  SF_TRY(sf_ledger_make(&a->scene.net, &a->report.measure.core, &a->report.ledger));
+  const fx_counts *counts = &r->measure.core;
+  SF_TRY(sf_ledger_make(&a->scene.net, counts, &r->ledger));
+  r->traffic = sf_traffic_of(counts, r->rays);
+  SF_TRY(sf_ledgers_make(&a->technology, &a->scene.net, counts, &r->traffic, sf_table_size(&a->scene), &r->ledgers));
   return run_rtl(a);
 }
 
@@ -302,6 +214,7 @@ static sf_status work(audit *a)
     return sf_ok();
   }
   double begin = sf_seconds();
+  SF_TRY(load_technology(a));
   SF_TRY(load(a));
   sf_progress_begin(&a->progress, a->opt.quiet);
   a->start = sf_seconds();
@@ -322,6 +235,10 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "all pixels of view K alone"},
       {"--rays", 0, SF_ARG_U64, &o->rays, 1, 1e9, NULL, "N", "N random rays instead of all pixels"},
       {"--rtl-rays", 0, SF_ARG_INT, &o->rtl_rays, 0, 1 << 20, NULL, "N", "rays for the accelerator too (default 32)"},
+      {"--recount-rays", 0, SF_ARG_U64, &o->recount_rays, 0, 1e9, NULL, "N",
+       "rays recounted from their spike bitmaps (default 1000)"},
+      {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps in place of the scene's t_r"},
+      {"--tech", 0, SF_ARG_STRING, &o->tech, 0, 0, NULL, "FILE", "prices: a file or a name (default 45nm)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
       {"--stall", 0, SF_ARG_INT, &o->stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
@@ -360,7 +277,13 @@ int main(int argc, char **argv)
                 .max_positional = 2};
   audit *a = calloc(1, sizeof *a);
   if (!a) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  a->opt = (options){.view = -1, .downscale = 1, .rtl_rays = RTL_RAYS, .split = "test", .seed = 1};
+  a->opt = (options){.view = -1,
+                     .downscale = 1,
+                     .rtl_rays = RTL_RAYS,
+                     .recount_rays = RECOUNT_RAYS,
+                     .tech = "45nm",
+                     .split = "test",
+                     .seed = 1};
   sf_status status = parse(argc, argv, &a->opt, &cli);
   if (status.code == SF_OK) {
     if (a->opt.threads) omp_set_num_threads(a->opt.threads);
@@ -368,7 +291,6 @@ int main(int argc, char **argv)
     status = work(a);
   }
   sf_measure_free(&a->report.measure);
-  free(a->subset);
   sf_dataset_free(&a->data);
   fx_scene_free(&a->scene);
   free(a);

@@ -3,6 +3,7 @@
 #define SPIKEFIELD_AUDIT_H
 #include "spikefield/fx.h"
 #include "spikefield/image.h"
+#include "spikefield/ledger.h"
 #include "spikefield/scene.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -74,13 +75,27 @@ extern const char *const sf_criticism[];    /* NULL-terminated; what the metric 
 void sf_limits_print(FILE *out);
 void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 
-/* The same rays counted by the core (a), the accelerator's own counters (b) and from the spike bitmaps (c). */
+/* The same rays counted by the core (a), the accelerator's own counters (b) and from the spike bitmaps (c). What lies
+ * outside the nets is counted by (a) as it happens, by (b) at the ports of the accelerator that marches no more than the
+ * core did (requests of its grid's memory, pixels that left it, the samples that it composited), by (c) from the
+ * samples alone. */
 typedef struct sf_three_counts {
   int wanted, rays; /* rays asked for; rays run */
   fx_counts core, rtl, recount;
+  sf_traffic core_traffic, rtl_traffic, recount_traffic;
   uint64_t cycles, busy, stalls;
+  bool no_rtl_traffic; /* the accelerator has no encoder for this scene's field */
   sf_status agreement; /* SF_E_DIFFERENCE names the first difference */
 } sf_three_counts;
+
+/* Traffic of these counts and so many pixels, as the core counted it. */
+sf_traffic sf_traffic_of(const fx_counts *counts, uint64_t pixels);
+/* The same from the number of recounted samples and the shape of the field alone. */
+sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t pixels);
+/* SF_E_DIFFERENCE names the first event that differs. */
+sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name);
+/* Bytes of the field's tables: what chooses the price of a read. */
+uint64_t sf_table_size(const fx_scene *scene);
 
 /* The paper's published energies, recomputed: E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, samples from the ANN row,
  * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). */
@@ -115,22 +130,32 @@ sf_status sf_probe_net(void *probe, const fx_ray *ray, bool first, const int16_t
 /* The ray through the centre of a pixel. */
 sf_status sf_pixel_ray(const fx_scene *scene, const sf_dataset *data, const sf_view *view, int x, int y, fx_ray *ray);
 
-/* Rays 0..count-1 through the core on all threads; the sums do not depend on the threads. */
+/* Rays 0..rays-1 through the vector core on all threads; the sums do not depend on the threads. */
 typedef struct sf_measure_job {
   const fx_scene *scene;
   uint64_t rays;
   sf_status (*ray)(void *user, uint64_t index, fx_ray *ray); /* called from many threads */
   bool (*tick)(void *user, uint64_t done); /* from one thread at a time, now and then; false stops. May be NULL */
   void *user;
+  uint64_t seed;
+  uint64_t check; /* at most so many rays, seeded, of those with samples are also counted by the portable core and
+                     recounted from its spike bitmaps; UINT64_MAX: all */
 } sf_measure_job;
 typedef struct sf_measure {
-  fx_counts core, recount;
-  uint64_t rays; /* all, with or without samples */
-  uint8_t *hit;  /* bit i: ray i has samples; owned, sf_measure_free */
+  fx_counts core; /* all rays, vector core */
+  uint64_t rays;  /* all, with or without samples */
+  uint8_t *hit;   /* bit i: ray i has samples; owned, sf_measure_free */
+  uint64_t checked;
+  fx_counts checked_core, recount; /* of the checked rays: portable core = vector core, recount */
 } sf_measure;
-/* Core and recount are compared sample by sample; a difference names ray, sample, layer, step and event. */
+/* Of the checked rays, portable core and recount are compared sample by sample: a difference names ray, sample, layer,
+ * step and event; the sums of the vector core are compared with theirs: a difference names ray, layer, step, event. */
 sf_status sf_measure_rays(const sf_measure_job *job, sf_measure *measure);
 void sf_measure_free(sf_measure *measure);
+/* At most `limit` of the rays with samples, drawn by seed and stream, in index[limit], ascending.
+ * *count says how many. Does not depend on the threads. */
+sf_status sf_measure_choose(const sf_measure *measure, uint64_t seed, uint64_t stream, uint64_t limit, uint64_t *index,
+                            uint64_t *count);
 
 /* Everything one audit found. views: how many whole views the rays amount to. */
 typedef struct sf_audit_report {
@@ -141,11 +166,14 @@ typedef struct sf_audit_report {
   bool random_rays;
   sf_measure measure;
   sf_three_counts three;
-  sf_ledger ledger;
+  sf_ledger ledger;  /* the paper's metric and its readings, at 4.6 and 0.9 pJ */
+  sf_traffic traffic;
+  sf_ledgers ledgers; /* all, at the prices of a technology */
 } sf_audit_report;
 void sf_report_print(FILE *out, const sf_audit_report *report);
 cJSON *sf_report_json(const sf_audit_report *report);
-void sf_report_csv(FILE *out, const fx_net *net, const fx_counts *counts); /* one row per layer and step */
+/* One row per layer and step, then field and ray: events, fJ of every spiking ledger. */
+void sf_report_csv(FILE *out, const sf_audit_report *report);
 
 /* Saturation that the number formats rule out: membranes and colour in the modes whose state is a convex combination.
  * Density may saturate: alpha is 1 long before. Writes "none" or a comma-separated list of layers. */

@@ -2,14 +2,16 @@
  * femtojoules; UINT64_MAX never stands in a ledger (sf_ledgers_make refuses what does not fit in 64 bits). */
 #ifndef SPIKEFIELD_LEDGER_H
 #define SPIKEFIELD_LEDGER_H
-#include "spikefield/audit.h"
+#include "spikefield/fx.h"
+#include <cjson/cJSON.h>
+#include <stdio.h>
 
 /* ---- prices ---- */
 
 /* One price of a technology file. `at` is what the price holds for: the width in bits of int_add, the square root of
  * the product of the operands' widths of int_multiply, the bytes of the memory of sram; 0 of the others. */
 typedef struct sf_price {
-  char key[40];     /* as in the file: "int_add.8" */
+  char key[40]; /* as in the file: "int_add.8" */
   uint32_t at;
   uint64_t fj;      /* per operation; of memories per access of 64 bits */
   char text[40];    /* as in the file: "0.03 pJ" */
@@ -38,10 +40,11 @@ typedef struct sf_technology {
 
 /* Reads a technology file: docs/energy.md says how to write one. Errors name file, line and key. */
 sf_status sf_technology_load(sf_technology *technology, const char *path);
-/* In fJ, rounded to the nearest; *interpolated (may be NULL) tells whether no price of the file is for exactly this. */
+/* In fJ, rounded to the nearest; of a byte an eighth of an access. *interpolated (may be NULL) becomes true where no
+ * price of the file is for exactly this; it never becomes false. */
 uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);
 uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bits, bool *interpolated);
-uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated); /* 1/8 access */
+uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
 
 /* ---- events of the ledgers ---- */
 
@@ -90,7 +93,7 @@ typedef enum {
   SF_PART_SPECIAL, /* exp, sigmoid, exp(-x) */
   SF_PARTS
 } sf_part_id;
-extern const char *const sf_part_names[SF_PARTS]; /* "mac", "sop", "weight", ... */
+extern const char *const sf_part_names[SF_PARTS];  /* "mac", "sop", "weight", ... */
 extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight bytes", ... */
 
 /* fJ of one event of a row, the same at all steps, and how it comes about. */
@@ -108,7 +111,7 @@ enum { SF_BREAK_EVENS = SF_SPIKING_LEDGERS + 1 }; /* each against its own baseli
 
 /* One price halved and raised by half: the savings that come out, percent. */
 typedef struct sf_sensitivity {
-  int price; /* index in technology->price */
+  int price;                                                 /* index in technology->price */
   double less[SF_SPIKING_LEDGERS], more[SF_SPIKING_LEDGERS]; /* saving at 0.5 and 1.5 times the price */
   double swing; /* largest |change| of the saving of any ledger, percentage points; the list is sorted by it */
   int ledger;   /* where the largest is */
@@ -123,7 +126,7 @@ typedef struct sf_ledgers {
   double saving[SF_LEDGERS];                    /* percent against the baseline; NAN of twins and where that is 0 */
   sf_unit_price unit[SF_LEDGERS][SF_ROWS][SF_PARTS]; /* 0 where the ledger does not price the part */
   bool interpolated[SF_LEDGERS];
-  double rate; /* measured firing rate of the spiking layers, all steps */
+  double rate; /* measured firing rate of the spiking layers, all steps; 0 without any */
   sf_break_even break_even[SF_BREAK_EVENS];
   int sensitivities;
   sf_sensitivity sensitivity[SF_PRICES_MAX]; /* largest swing first */
@@ -134,7 +137,8 @@ typedef struct sf_ledgers {
 sf_status sf_ledgers_make(const sf_technology *technology, const fx_net *net, const fx_counts *counts,
                           const sf_traffic *traffic, uint64_t table_size, sf_ledgers *ledgers);
 
-/* Terminal: the ledgers as a table, savings, break-even rates, sensitivity. views: as sf_ledger_print. */
+/* Terminal: the ledgers as a table, savings, break-even rates, sensitivity. views: whole views that the counts cover.
+ */
 void sf_ledgers_print(FILE *out, const sf_ledgers *ledgers, double views);
 cJSON *sf_ledgers_json(const sf_ledgers *ledgers, double views);
 

@@ -1,4 +1,5 @@
 #include "spikefield/audit.h"
+#include "src/audit/saturate.h"
 #include <math.h>
 
 const char *const sf_layer_names[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
@@ -19,37 +20,23 @@ uint64_t sf_event_count(const fx_layer_counts *layer, int event, int step)
   return ((const uint64_t *)((const char *)layer + sf_events[event].offset))[step];
 }
 
-/* UINT64_MAX absorbs: a total that overflowed once stays "too large". */
-static uint64_t add(uint64_t a, uint64_t b)
-{
-  uint64_t sum;
-  return __builtin_add_overflow(a, b, &sum) ? UINT64_MAX : sum;
-}
-
-static uint64_t multiply(uint64_t a, uint64_t b)
-{
-  uint64_t product;
-  if ((a == UINT64_MAX && b > 0) || (b == UINT64_MAX && a > 0)) return UINT64_MAX;
-  return __builtin_mul_overflow(a, b, &product) ? UINT64_MAX : product;
-}
-
 static uint64_t layer_total(const fx_layer_counts *layer, int event)
 {
   uint64_t sum = 0;
-  for (int t = 0; t < SF_T_MAX; t++) sum = add(sum, sf_event_count(layer, event, t));
+  for (int t = 0; t < SF_T_MAX; t++) sum = sf_add_u64(sum, sf_event_count(layer, event, t));
   return sum;
 }
 
 uint64_t sf_event_total(const fx_counts *counts, int event)
 {
   uint64_t sum = 0;
-  for (int l = 0; l < SF_LAYERS; l++) sum = add(sum, layer_total(&counts->layer[l], event));
+  for (int l = 0; l < SF_LAYERS; l++) sum = sf_add_u64(sum, layer_total(&counts->layer[l], event));
   return sum;
 }
 
 uint64_t sf_cost_fj(const fx_cost *cost)
 {
-  return add(multiply(cost->macs, SF_MAC_FJ), multiply(cost->sops, SF_SOP_FJ));
+  return sf_add_u64(sf_multiply_u64(cost->macs, SF_MAC_FJ), sf_multiply_u64(cost->sops, SF_SOP_FJ));
 }
 
 fx_cost sf_cost_of(const fx_counts *counts)
@@ -73,7 +60,7 @@ static uint64_t synapses(const fx_net *net)
 
 uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples)
 {
-  return multiply(multiply(synapses(net), samples), SF_MAC_FJ);
+  return sf_multiply_u64(sf_multiply_u64(synapses(net), samples), SF_MAC_FJ);
 }
 
 /* C1 reads [d | h]; h is what the density net puts out beside the density current. */
@@ -93,15 +80,15 @@ static uint64_t scale_round(uint64_t a, uint64_t b, uint64_t c)
 
 static uint64_t spiking_neurons(const fx_counts *counts, int event)
 {
-  return add(add(layer_total(&counts->layer[FX_D1], event), layer_total(&counts->layer[FX_C1], event)),
-             layer_total(&counts->layer[FX_C2], event));
+  return sf_add_u64(sf_add_u64(layer_total(&counts->layer[FX_D1], event), layer_total(&counts->layer[FX_C1], event)),
+                    layer_total(&counts->layer[FX_C2], event));
 }
 
 sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *ledger)
 {
   uint64_t mac = sf_event_total(counts, SF_EVENT_MAC), sop = sf_event_total(counts, SF_EVENT_SOP);
   uint64_t c1_mac = layer_total(&counts->layer[FX_C1], SF_EVENT_MAC);
-  uint64_t d_mac = multiply(direction_synapses(net), counts->rays);
+  uint64_t d_mac = sf_multiply_u64(direction_synapses(net), counts->rays);
   if (d_mac > c1_mac || net->steps < 1)
     return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
                    (unsigned long long)c1_mac, (unsigned long long)d_mac);
@@ -109,13 +96,16 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
   uint64_t h_sop =
       scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
 
-  *ledger = (sf_ledger){.mac_fj = multiply(mac, SF_MAC_FJ), .sop_fj = multiply(sop, SF_SOP_FJ)};
+  *ledger = (sf_ledger){.mac_fj = sf_multiply_u64(mac, SF_MAC_FJ), .sop_fj = sf_multiply_u64(sop, SF_SOP_FJ)};
   ledger->spiking_fj = sf_energy_fj(counts);
-  ledger->h_once_fj = add(multiply(mac - h_mac + h_mac / (uint64_t)net->steps, SF_MAC_FJ), ledger->sop_fj);
-  ledger->h_spikes_fj = add(multiply(mac - h_mac, SF_MAC_FJ), multiply(add(sop, h_sop), SF_SOP_FJ));
+  ledger->h_once_fj =
+      sf_add_u64(sf_multiply_u64(mac - h_mac + h_mac / (uint64_t)net->steps, SF_MAC_FJ), ledger->sop_fj);
+  ledger->h_spikes_fj =
+      sf_add_u64(sf_multiply_u64(mac - h_mac, SF_MAC_FJ), sf_multiply_u64(sf_add_u64(sop, h_sop), SF_SOP_FJ));
   ledger->ann_fj = sf_energy_ann_fj(net, counts->samples);
-  ledger->ann_hoisted_fj = add(multiply(multiply(synapses(net) - direction_synapses(net), counts->samples), SF_MAC_FJ),
-                               multiply(d_mac, SF_MAC_FJ));
+  ledger->ann_hoisted_fj =
+      sf_add_u64(sf_multiply_u64(sf_multiply_u64(synapses(net) - direction_synapses(net), counts->samples), SF_MAC_FJ),
+                 sf_multiply_u64(d_mac, SF_MAC_FJ));
   if (mac == UINT64_MAX || ledger->spiking_fj == UINT64_MAX || ledger->ann_fj == UINT64_MAX ||
       ledger->h_spikes_fj == UINT64_MAX || ledger->ann_hoisted_fj == UINT64_MAX)
     return sf_fail(SF_E_RANGE, "audit: the energy of %llu samples does not fit in 64 bits of fJ; audit fewer views",

@@ -3,21 +3,25 @@
 #include <math.h>
 
 const char *const sf_not_modelled[] = {
-    "memory traffic: weights, membranes, features and tables (their bytes are counted, not priced)",
-    "hash-grid interpolation and the spherical harmonics of the direction",
-    "marching, the occupancy test and compositing",
-    "leak, compare and reset of the neurons, exp and sigmoid (counted, not priced)",
-    "control, clocking, stalls and leakage power; transfers to and from the accelerator",
+    "arithmetic of the field (interpolation of its entries) and the spherical harmonics of the direction",
+    "marching, the occupancy test and the products of compositing (of which exp(-x) alone is priced)",
+    "spike bitmaps, queues and buffers between units; caches: a byte costs what a byte of the memory that holds it "
+    "costs",
+    "control, clock tree, interconnect, stalls and leakage power",
+    "transfers to and from the accelerator but for the pixels; training",
     NULL};
 
 const char *const sf_criticism[] = {
     "4.6 pJ is an fp32 multiply and add, 0.9 pJ an fp32 add (45 nm); a fixed-point add of these widths costs 0.03-0.1 "
-    "pJ",
-    "memory traffic is left out, and on real hardware it dominates",
-    "neuron updates are left out, although every neuron is updated at every step whether it fires or not",
+    "pJ: see the width-correct ledger",
+    "memory traffic is left out, and on real hardware it dominates: see the ledger with memory",
+    "neuron updates are left out, although every neuron is updated at every step whether it fires or not: see the "
+    "ledger "
+    "with neuron updates",
     "the first, real-valued layers are priced as MACs here; a reading that leaves them out flatters the spiking net",
-    "the twin spends the direction's products once per sample, the spiking net once per ray; the hoisted twin undoes "
-    "that",
+    "the fp32 twin spends the direction's products once per sample, the spiking net once per ray; the hoisted twin "
+    "undoes "
+    "that, and the integer twins are hoisted",
     NULL};
 
 void sf_json_add_u64(cJSON *object, const char *key, uint64_t value)
@@ -98,7 +102,7 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
   fprintf(out, "%-10s", "all");
   static const int column[4] = {SF_EVENT_MAC, SF_EVENT_SOP, SF_EVENT_UPDATES, SF_EVENT_SPIKES};
   for (int e = 0; e < 4; e++) fprintf(out, " %16" PRIu64, sf_event_total(counts, column[e]));
-  fprintf(out, "\nalso counted, not priced:");
+  fprintf(out, "\nalso counted:");
   for (int e = SF_EVENT_WEIGHT; e < SF_EVENTS; e++)
     fprintf(out, "%s %s %" PRIu64, e > SF_EVENT_WEIGHT ? "," : "", sf_events[e].title, sf_event_total(counts, e));
   fprintf(out, ",\n  hash-grid bytes read %" PRIu64 ", occupancy tests %" PRIu64 "\n", counts->grid_bytes,
@@ -159,9 +163,9 @@ cJSON *sf_ledger_json(const sf_ledger *l)
 
 void sf_limits_print(FILE *out)
 {
-  fprintf(out, "not modelled:\n");
+  fprintf(out, "not modelled, by any ledger:\n");
   for (int i = 0; sf_not_modelled[i]; i++) fprintf(out, "  - %s\n", sf_not_modelled[i]);
-  fprintf(out, "known criticism of this metric:\n");
+  fprintf(out, "known criticism of the paper's metric:\n");
   for (int i = 0; sf_criticism[i]; i++) fprintf(out, "  - %s\n", sf_criticism[i]);
 }
 

@@ -3,6 +3,16 @@
 #include <inttypes.h>
 #include <math.h>
 
+static void print_row(FILE *out, const char *title, uint64_t x, uint64_t y, uint64_t z, bool no_rtl)
+{
+  fprintf(out, "  %-22s %16" PRIu64, title, x);
+  if (no_rtl)
+    fprintf(out, " %16s", "-");
+  else
+    fprintf(out, " %16" PRIu64, y);
+  fprintf(out, " %16" PRIu64 "%s\n", z, x == z && (no_rtl || x == y) ? "" : "  DIFFERENT");
+}
+
 static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
 {
   if (s->rays == 0) {
@@ -12,13 +22,14 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
   fprintf(out, "three counts of %" PRIu64 " samples of %d rays (seed %" PRIu64 "), layers and steps added up here:\n",
           s->core.samples, s->rays, seed);
   fprintf(out, "  %-22s %16s %16s %16s\n", "event", "core", "accelerator", "recount");
-  for (int e = 0; e < SF_EVENTS; e++) {
-    uint64_t x = sf_event_total(&s->core, e), y = sf_event_total(&s->rtl, e), z = sf_event_total(&s->recount, e);
-    fprintf(out, "  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "%s\n", sf_events[e].title, x, y, z,
-            x == y && y == z ? "" : "  DIFFERENT");
-  }
-  fprintf(out, "  %-22s %16" PRIu64 " %16" PRIu64 " %16" PRIu64 "\n", "paper ledger, fJ", sf_energy_fj(&s->core),
-          sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount));
+  for (int e = 0; e < SF_EVENTS; e++)
+    print_row(out, sf_events[e].title, sf_event_total(&s->core, e), sf_event_total(&s->rtl, e),
+              sf_event_total(&s->recount, e), false);
+  const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
+  print_row(out, "field bytes read", x->table_bytes, y->table_bytes, z->table_bytes, s->no_rtl_traffic);
+  print_row(out, "exp(-x) of compositing", x->exp_neg, y->exp_neg, z->exp_neg, s->no_rtl_traffic);
+  print_row(out, "frame bytes written", x->frame_bytes, y->frame_bytes, z->frame_bytes, s->no_rtl_traffic);
+  print_row(out, "paper ledger, fJ", sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount), false);
   fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
           s->stalls);
   if (s->agreement.code == SF_OK)
@@ -40,12 +51,36 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   fprintf(out, "saturation: %s\n", census);
   if (sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected))
     fprintf(out, "UNEXPECTED saturation in %s\n", unexpected);
-  fprintf(out, "core = recount from the spike bitmaps, for all %" PRIu64 " samples\n\n", c->samples);
+  fprintf(out,
+          "vector core = portable core = recount from the spike bitmaps, for every event, layer and step, on %" PRIu64
+          " samples of %" PRIu64 " rays\n\n",
+          r->measure.recount.samples, r->measure.checked);
   print_three(out, &r->three, r->seed);
+  fprintf(out, "\n");
+  sf_ledgers_print(out, &r->ledgers, r->views);
   fprintf(out, "\n");
   sf_ledger_print(out, &r->ledger, r->views);
   fprintf(out, "\n");
   sf_limits_print(out);
+}
+
+static cJSON *traffic_json(const sf_traffic *traffic)
+{
+  cJSON *json = cJSON_CreateObject();
+  sf_json_add_u64(json, "table_bytes", traffic->table_bytes);
+  sf_json_add_u64(json, "exp_neg", traffic->exp_neg);
+  sf_json_add_u64(json, "frame_bytes", traffic->frame_bytes);
+  return json;
+}
+
+static cJSON *count_json(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic)
+{
+  cJSON *json = sf_counts_json(net, counts);
+  if (traffic)
+    cJSON_AddItemToObject(json, "traffic", traffic_json(traffic));
+  else
+    cJSON_AddNullToObject(json, "traffic");
+  return json;
 }
 
 static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
@@ -59,9 +94,9 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
   sf_json_add_u64(json, "core_fj", sf_energy_fj(&s->core));
   sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
   sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
-  cJSON_AddItemToObject(json, "core", sf_counts_json(net, &s->core));
-  cJSON_AddItemToObject(json, "rtl", sf_counts_json(net, &s->rtl));
-  cJSON_AddItemToObject(json, "recount", sf_counts_json(net, &s->recount));
+  cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic));
+  cJSON_AddItemToObject(json, "rtl", count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic));
+  cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic));
   return json;
 }
 
@@ -97,15 +132,18 @@ static void add_saturation(cJSON *json, const sf_audit_report *r)
 {
   char unexpected[64];
   cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
-  for (int l = 0; l < SF_LAYERS; l++) sf_json_add_u64(saturated, sf_layer_names[l], r->measure.core.saturated_samples[l]);
+  for (int l = 0; l < SF_LAYERS; l++)
+    sf_json_add_u64(saturated, sf_layer_names[l], r->measure.core.saturated_samples[l]);
   sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
 }
 
 static void add_agreement(cJSON *json, const sf_audit_report *r)
 {
-  bool all = sf_counts_compare(&r->measure.core, "core", &r->measure.recount, "recount").code == SF_OK;
+  bool all = sf_counts_compare(&r->measure.checked_core, "core", &r->measure.recount, "recount").code == SF_OK;
   bool three = r->three.agreement.code == SF_OK;
+  sf_json_add_u64(json, "recount_rays", r->measure.checked);
+  sf_json_add_u64(json, "recount_samples", r->measure.recount.samples);
   cJSON_AddBoolToObject(json, "core_equals_recount", all);
   if (r->three.rays > 0)
     cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
@@ -119,7 +157,8 @@ cJSON *sf_report_json(const sf_audit_report *r)
   cJSON *json = cJSON_CreateObject();
   add_origin(json, r);
   add_energy(json, r);
-  cJSON_AddItemToObject(json, "counts", sf_counts_json(r->net, &r->measure.core));
+  cJSON_AddItemToObject(json, "ledgers", sf_ledgers_json(&r->ledgers, r->views));
+  cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic));
   add_saturation(json, r);
   add_agreement(json, r);
   cJSON_AddItemToObject(json, "rtl_subset", three_json(&r->three, r->net));
@@ -128,16 +167,28 @@ cJSON *sf_report_json(const sf_audit_report *r)
   return json;
 }
 
-void sf_report_csv(FILE *out, const fx_net *net, const fx_counts *counts)
+static void csv_energies(FILE *out, const sf_ledgers *l, int row, int t)
+{
+  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) fprintf(out, ",%" PRIu64, l->cell[g][row][t]);
+  fprintf(out, "\n");
+}
+
+void sf_report_csv(FILE *out, const sf_audit_report *r)
 {
   fprintf(out, "layer,step,n_in,n_out");
   for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%s", sf_events[e].name);
-  fprintf(out, ",energy_fj\n");
+  fprintf(out, ",table_bytes,frame_bytes");
+  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) fprintf(out, ",%s_fj", sf_ledger_texts[g].key);
+  fprintf(out, "\n");
   for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < net->steps; t++) {
-      const fx_layer_counts *c = &counts->layer[l];
-      fprintf(out, "%s,%d,%d,%d", sf_layer_names[l], t, net->layer[l].n_in, net->layer[l].n_out);
-      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(c, e, t));
-      fprintf(out, ",%" PRIu64 "\n", c->mac[t] * SF_MAC_FJ + c->sop[t] * SF_SOP_FJ);
+    for (int t = 0; t < r->net->steps; t++) {
+      fprintf(out, "%s,%d,%d,%d", sf_layer_names[l], t, r->net->layer[l].n_in, r->net->layer[l].n_out);
+      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(&r->measure.core.layer[l], e, t));
+      fprintf(out, ",0,0");
+      csv_energies(out, &r->ledgers, l, t);
     }
+  fprintf(out, "field,0,0,0,0,0,0,0,0,0,0,0,%" PRIu64 ",0", r->traffic.table_bytes);
+  csv_energies(out, &r->ledgers, SF_ROW_FIELD, 0);
+  fprintf(out, "ray,0,0,0,0,0,0,0,0,0,0,%" PRIu64 ",0,%" PRIu64, r->traffic.exp_neg, r->traffic.frame_bytes);
+  csv_energies(out, &r->ledgers, SF_ROW_RAY, 0);
 }
