@@ -1,0 +1,455 @@
+/* Prices and ledgers, against pricing by hand. */
+#include "spikefield/audit.h"
+#include "spikefield/io.h"
+#include "tests/fx_fixture.h"
+#include <math.h>
+#include <unistd.h>
+
+/* An adder costs its bits, a multiplier the product of its widths, a byte 10 of memory and 1000 of DRAM. */
+static const char plain[] = "# comment\n"
+                            "name plain\n"
+                            "title  A plain technology  \n"
+                            "\n"
+                            "fp32_mac 4.6 pJ paper\n"
+                            "fp32_add 0.9 pJ paper\n"
+                            "int_add.32 32 fJ made up\n"
+                            "int_add.8 8 fJ made up\n"
+                            "int_multiply.8 64 fJ made up\n"
+                            "int_multiply.32 1.024 pJ made up\r\n"
+                            "sram.16384 80 fJ made up\n"
+                            "sram.64 80 fJ made up\n"
+                            "dram 0.008 nJ made up";
+
+static char folder[200], path[300];
+
+static void make_folder(void)
+{
+  const char *tmp = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
+  ck_assert_ptr_nonnull(mkdtemp(folder));
+  snprintf(path, sizeof path, "%s/t.tech", folder);
+}
+
+static void remove_folder(void)
+{
+  unlink(path);
+  ck_assert_int_eq(rmdir(folder), 0);
+}
+
+static sf_status load_text(sf_technology *tech, const char *text)
+{
+  ck_assert_int_eq(sf_write_file(path, text, strlen(text)).code, SF_OK);
+  return sf_technology_load(tech, path);
+}
+
+static sf_technology plain_technology(void)
+{
+  sf_technology tech;
+  sf_status status = load_text(&tech, plain);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return tech;
+}
+
+/* ---- technology files ---- */
+
+START_TEST(file_is_read)
+{
+  const sf_technology t = plain_technology();
+  static const struct {
+    const char *key;
+    uint64_t fj;
+  } wanted[] = {{"fp32_mac", 4600}, {"fp32_add", 900},      {"int_add.8", 8},
+                {"int_add.32", 32}, {"int_multiply.8", 64}, {"int_multiply.32", 1024},
+                {"sram.64", 80},    {"sram.16384", 80},     {"dram", 8000}};
+  ck_assert_str_eq(t.name, "plain");
+  ck_assert_str_eq(t.title, "A plain technology");
+  ck_assert_int_eq(t.count, 9);
+  for (int i = 0; i < t.count; i++) { /* in order of family and point, whatever the file's */
+    ck_assert_str_eq(t.price[i].key, wanted[i].key);
+    ck_assert_uint_eq(t.price[i].fj, wanted[i].fj);
+  }
+  ck_assert_str_eq(t.price[5].text, "1.024 pJ");
+  ck_assert_str_eq(t.price[5].source, "made up");
+}
+END_TEST
+
+/* Each mistake, put in place of a line of the plain file, and what the message says behind the path. */
+START_TEST(mistakes_are_named_with_line_and_key)
+{
+  static const struct {
+    const char *line, *instead, *message;
+  } mistakes[] = {
+      {"fp32_add 0.9 pJ paper", "fp23_add 0.9 pJ paper", ":6: unknown key 'fp23_add'"},
+      {"fp32_add 0.9 pJ paper", "fp32_add", ":6: key 'fp32_add' has no value"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 0.9 mJ paper", ":6: key 'fp32_add': unit 'mJ' is not fJ, pJ or nJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 0.9", ":6: key 'fp32_add': unit '' is not fJ, pJ or nJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 0.9 pJ", ":6: key 'fp32_add' has no source behind its price"},
+      {"fp32_add 0.9 pJ paper", "fp32_add -0.9 pJ x", ":6: key 'fp32_add': '-0.9 pJ' is not a whole number of fJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 1e3 pJ x", ":6: key 'fp32_add': '1e3 pJ' is not a whole number of fJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add . pJ x", ":6: key 'fp32_add': '. pJ' is not a whole number of fJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 0.9001 pJ x", ":6: key 'fp32_add': '0.9001 pJ' is not a whole number of fJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 1000001 nJ x", ":6: key 'fp32_add': 1000001 nJ is more than 1 mJ"},
+      {"fp32_add 0.9 pJ paper", "fp32_add 99999999999999999999999 fJ x",
+       ":6: key 'fp32_add': '99999999999999999999999 fJ' is not"},
+      {"fp32_add 0.9 pJ paper", "fp32_add.8 0.9 pJ x", ":6: key 'fp32_add.8' takes no '.8'"},
+      {"int_add.8 8 fJ made up", "int_add 8 fJ x", ":8: key 'int_add': expected int_add.BITS, 1 to 256"},
+      {"int_add.8 8 fJ made up", "int_add.x 8 fJ x", ":8: key 'int_add.x': expected int_add.BITS"},
+      {"int_add.8 8 fJ made up", "int_add.257 8 fJ x", ":8: key 'int_add.257': expected int_add.BITS"},
+      {"int_add.8 8 fJ made up", "int_add.32 8 fJ x", ":8: key 'int_add.32' is there twice"},
+      {"sram.64 80 fJ made up", "sram.0 80 fJ x", ":12: key 'sram.0': expected sram.BYTES"},
+      {"int_add.8 8 fJ made up", "", ": key 'int_add' needs two points to interpolate between"},
+      {"dram 0.008 nJ made up", "", ": key 'dram' is missing"},
+      {"name plain", "", ": key 'name' is missing"},
+      {"name plain", "name", ":2: key 'name' has no text"},
+      {"title  A plain technology  ", "", ": key 'title' is missing"}};
+  for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++) {
+    char text[2000], expected[500];
+    sf_technology tech;
+    const char *at = strstr(plain, mistakes[i].line);
+    ck_assert_ptr_nonnull(at);
+    snprintf(text, sizeof text, "%.*s%s%s", (int)(at - plain), plain, mistakes[i].instead,
+             at + strlen(mistakes[i].line));
+    const sf_status status = load_text(&tech, text);
+    snprintf(expected, sizeof expected, "%s%s", path, mistakes[i].message);
+    ck_assert_msg(status.code == SF_E_FORMAT || status.code == SF_E_RANGE, "%s: accepted", mistakes[i].instead);
+    ck_assert_msg(!strncmp(status.message, expected, strlen(expected)), "%s\n  expected %s", status.message, expected);
+  }
+  unlink(path);
+  sf_technology tech;
+  ck_assert_int_eq(sf_technology_load(&tech, path).code, SF_E_IO);
+}
+END_TEST
+
+START_TEST(prices_between_points)
+{
+  sf_technology t = plain_technology();
+  bool between = false;
+  ck_assert_uint_eq(sf_price_add(&t, 8, &between), 8);
+  ck_assert_uint_eq(sf_price_add(&t, 32, &between), 32);
+  ck_assert_uint_eq(sf_price_multiply(&t, 8, 8, &between), 64);
+  ck_assert_uint_eq(sf_price_multiply(&t, 64, 16, &between), 1024);
+  ck_assert_uint_eq(sf_price_byte(&t, 64, &between), 10);
+  ck_assert_uint_eq(sf_price_byte(&t, 3, &between), 10); /* smaller than the smallest: its price */
+  ck_assert_uint_eq(sf_price_byte(&t, 16384, &between), 10);
+  ck_assert_uint_eq(sf_price_byte(&t, 16385, &between), 1000);
+  ck_assert(!between);
+  ck_assert_uint_eq(sf_price_add(&t, 15, &between), 15);
+  ck_assert(between);
+  between = false;
+  ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, &between), 96);
+  ck_assert(between);
+  ck_assert_uint_eq(sf_price_add(&t, 40, NULL), 40); /* beyond the last: the same line */
+  ck_assert_uint_eq(sf_price_add(&t, 2, NULL), 2);
+  t.price[7].fj = 5120; /* 64 times the price for 256 times the size: the power 3/4 */
+  ck_assert_uint_eq(sf_price_byte(&t, 1024, NULL), 80);
+  t.price[2].fj = 40; /* 40 at 8 bits, 32 at 32: falls to nothing and not below */
+  ck_assert_uint_eq(sf_price_add(&t, 200, NULL), 0);
+}
+END_TEST
+
+/* The file that is installed: Horowitz's figure, and what the paper makes of it. */
+START_TEST(installed_prices)
+{
+  sf_technology t;
+  const sf_status status = sf_technology_load(&t, "share/tech/45nm.tech");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  static const uint64_t wanted[] = {SF_MAC_FJ, SF_SOP_FJ, 30, 100, 200, 3100, 10000, 20000, 100000, 1950000};
+  ck_assert_int_eq(t.count, 10);
+  for (int i = 0; i < t.count; i++) {
+    ck_assert_uint_eq(t.price[i].fj, wanted[i]);
+    ck_assert_ptr_nonnull(strstr(t.price[i].source, "Horowitz"));
+  }
+  ck_assert_uint_eq(sf_price_add(&t, 15, NULL), 50);           /* 30 + 7/24 * 70 = 50.4 */
+  ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, NULL), 297);  /* 200 + 32/960 * 2900 = 296.7 */
+  ck_assert_uint_eq(sf_price_byte(&t, 128 * 128, NULL), 1768); /* 10 * sqrt 2 pJ / 8 */
+}
+END_TEST
+
+/* ---- ledgers ---- */
+
+/* 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3; the counts of one sample, as test_audit.c has them. */
+static fx_net small_net(void)
+{
+  fx_net net = {.steps = 2, .mode = FX_HYBRID};
+  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
+  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
+  return net;
+}
+
+static fx_counts small_counts(const fx_net *net)
+{
+  static const uint64_t spikes[SF_LAYERS][SF_T_MAX][2] = {
+      [FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
+  fx_counts c = {0};
+  sf_recount_sample(net, spikes, true, &c);
+  return c;
+}
+
+static const sf_traffic small_traffic = {.table_bytes = 100, .exp_neg = 1, .frame_bytes = 48};
+
+static sf_ledgers *small_ledgers(const sf_technology *tech)
+{
+  sf_ledgers *l = malloc(sizeof *l);
+  const fx_net net = small_net();
+  const fx_counts c = small_counts(&net);
+  const sf_status status = sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return l;
+}
+
+START_TEST(paper_ledger_is_the_papers_metric)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  const fx_net net = small_net();
+  const fx_counts c = small_counts(&net);
+  ck_assert_uint_eq(l->total[SF_LEDGER_PAPER], sf_energy_fj(&c));
+  ck_assert_uint_eq(l->total[SF_LEDGER_ANN], sf_energy_ann_fj(&net, 1));
+  ck_assert_uint_eq(l->part[SF_LEDGER_PAPER][SF_PART_MAC], 40 * 4600);
+  ck_assert_uint_eq(l->part[SF_LEDGER_PAPER][SF_PART_SOP], 40 * 900);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_PAPER][FX_C1][0], 20 * 4600);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_PAPER][FX_C1][1], 8 * 4600);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_PAPER][FX_C3][1], 3 * 900);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_PAPER][SF_ROW_FIELD][0], 0);
+  ck_assert_double_eq_tol(l->saving[SF_LEDGER_PAPER], 37.0709, 1e-4);
+  ck_assert(!l->interpolated[SF_LEDGER_PAPER]);
+  ck_assert(isnan(l->saving[SF_LEDGER_INT]));
+  free(l);
+}
+END_TEST
+
+/* Sums are as wide as they get: D1 8 + 11 + 2 bits, C1 8 + 11 + 3; D2 and C2 8 + 2, C3 8 + 3. */
+START_TEST(width_ledger_by_hand)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_D1][0], 12 * (96 + 21));
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][0], 20 * (96 + 22));
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][1], 8 * (96 + 22));
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_D2][0], 6 * 10);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C2][1], 10 * 10);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C3][0], 15 * 11);
+  ck_assert_uint_eq(l->part[SF_LEDGER_WIDTH][SF_PART_MAC], 12 * 117 + 28 * 118);
+  ck_assert_uint_eq(l->part[SF_LEDGER_WIDTH][SF_PART_SOP], 12 * 10 + 10 * 10 + 18 * 11);
+  ck_assert(l->interpolated[SF_LEDGER_WIDTH]);
+  ck_assert_uint_eq(l->total[SF_LEDGER_INT], 76 * (64 + 32)); /* every synapse once: 1 ray of 1 sample */
+  free(l);
+}
+END_TEST
+
+START_TEST(memory_ledger_by_hand)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  const uint64_t *part = l->part[SF_LEDGER_MEMORY], *twin = l->part[SF_LEDGER_INT_MEMORY];
+  /* bytes by hand in test_audit.c: weights 12 + 9 + 28 + 10 + 15; state 27 + 12 + 36 + 45 + 36 */
+  ck_assert_uint_eq(part[SF_PART_WEIGHT], 74 * 10);
+  ck_assert_uint_eq(part[SF_PART_STATE], 156 * 10);
+  ck_assert_uint_eq(part[SF_PART_TABLE], 100 * 10);
+  ck_assert_uint_eq(part[SF_PART_FRAME], 48 * 1000);
+  ck_assert_uint_eq(part[SF_PART_NEURON], 0);
+  ck_assert_uint_eq(part[SF_PART_MAC], l->part[SF_LEDGER_WIDTH][SF_PART_MAC]);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_MEMORY][SF_ROW_FIELD][0], 1000);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_MEMORY][SF_ROW_RAY][0], 48000);
+  ck_assert_uint_eq(twin[SF_PART_WEIGHT], 76 * 10);
+  ck_assert_uint_eq(twin[SF_PART_STATE], 2 * (3 + 2 + 4 + 5) * 10); /* D1, h, C1, C2 written and read */
+  ck_assert_uint_eq(twin[SF_PART_TABLE], 100 * 10);
+  free(l);
+}
+END_TEST
+
+START_TEST(neuron_ledger_by_hand)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  const uint64_t *part = l->part[SF_LEDGER_NEURON], *twin = l->part[SF_LEDGER_INT_ALL];
+  /* 24 spiking updates, 2 of density (28 bits), 6 of colour (20 bits); leak of 13 bits */
+  ck_assert_uint_eq(part[SF_PART_NEURON], 24 * (24 * 13 + 4 * 24) + 2 * (28 * 13 + 2 * 28) + 6 * (20 * 13 + 2 * 20));
+  /* argument x 16 bits, 16 x 12 bits, two sums, two entries of 4 bytes */
+  ck_assert_uint_eq(part[SF_PART_SPECIAL], 2 * (10 * 16 + 192 + 2 * 28 + 80) + 6 * (11 * 16 + 192 + 2 * 20 + 80) +
+                                               1 * (20 * 16 + 192 + 2 * 20 + 80));
+  ck_assert_uint_eq(twin[SF_PART_NEURON], 14 * (32 * 16 + 32));
+  ck_assert_uint_eq(twin[SF_PART_SPECIAL], 1 * (32 * 16 + 192 + 2 * 28 + 80) + 3 * (32 * 16 + 192 + 2 * 20 + 80) +
+                                               1 * (20 * 16 + 192 + 2 * 20 + 80));
+  free(l);
+}
+END_TEST
+
+START_TEST(cells_and_parts_add_up)
+{
+  sf_technology tech;
+  ck_assert_int_eq(sf_technology_load(&tech, "share/tech/45nm.tech").code, SF_OK);
+  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  sf_ledgers *l = malloc(sizeof *l);
+  fx_counts c = {0};
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];
+  for (uint64_t i = 0; i < sizeof spikes / 8; i++)
+    (&spikes[0][0][0])[i] = sf_random_u64(1, 2, i) & sf_random_u64(1, 3, i);
+  for (int i = 0; i < 9; i++) sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])spikes, i % 3 == 0, &c);
+  const sf_traffic traffic = sf_traffic_recount(&scene, &c, 4);
+  ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
+  ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
+  ck_assert_int_eq(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l).code, SF_OK);
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    uint64_t cells = 0, parts = 0;
+    for (int r = 0; r < SF_ROWS; r++)
+      for (int t = 0; t < SF_T_MAX; t++) cells += l->cell[g][r][t];
+    for (int p = 0; p < SF_PARTS; p++) parts += l->part[g][p];
+    ck_assert_uint_eq(cells, l->total[g]);
+    ck_assert_uint_eq(parts, l->total[g]);
+    ck_assert_uint_gt(l->total[g], 0);
+  }
+  ck_assert_uint_eq(l->total[SF_LEDGER_PAPER], sf_energy_fj(&c));
+  /* The integer twin has the direction's products once per ray: 3 rays, 9 samples. */
+  ck_assert_uint_eq(l->total[SF_LEDGER_INT], (9 * 26880 - 6 * 2048) * (uint64_t)300);
+  fx_scene_free(&scene);
+  free(l);
+}
+END_TEST
+
+/* At the break-even rate, counts scaled to it cost what the twin costs. */
+START_TEST(break_even_rate_breaks_even)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  ck_assert_double_eq_tol(l->rate, 0.5, 1e-12); /* 12 spikes in 24 updates */
+  const sf_break_even *paper = &l->break_even[SF_LEDGER_PAPER];
+  ck_assert_int_eq(paper->twin, SF_LEDGER_ANN);
+  ck_assert_double_eq_tol(paper->rate, 0.5 * (349600 - 184000) / 36000.0, 1e-9);
+  for (int i = 0; i < SF_BREAK_EVENS; i++) {
+    const sf_break_even *b = &l->break_even[i];
+    const double total = (double)l->total[b->ledger], twin = (double)l->total[b->twin];
+    double spikes = (double)l->part[b->ledger][SF_PART_SOP];
+    if (b->ledger >= SF_LEDGER_MEMORY) spikes += (9 + 10 + 15) * 10; /* weights that spikes read */
+    if (twin < total - spikes)
+      ck_assert(isnan(b->rate));
+    else
+      ck_assert_double_eq_tol(total - spikes + spikes * b->rate / l->rate, twin, 1e-6 * twin);
+  }
+  ck_assert_int_eq(l->break_even[SF_SPIKING_LEDGERS].twin, SF_LEDGER_ANN);
+  free(l);
+}
+END_TEST
+
+START_TEST(sensitivity_is_the_saving_at_other_prices)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  ck_assert_int_eq(l->sensitivities, 9);
+  bool seen[9] = {false};
+  for (int i = 0; i < l->sensitivities; i++) {
+    const sf_sensitivity *s = &l->sensitivity[i];
+    double largest = 0;
+    seen[s->price] = true;
+    for (int more = 0; more < 2; more++) {
+      sf_technology other = tech;
+      other.price[s->price].fj = more ? other.price[s->price].fj * 3 / 2 : other.price[s->price].fj / 2;
+      sf_ledgers *o = small_ledgers(&other);
+      for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
+        ck_assert_double_eq(more ? s->more[g] : s->less[g], o->saving[g]);
+        largest = fmax(largest, fabs(o->saving[g] - l->saving[g]));
+      }
+      free(o);
+    }
+    ck_assert_double_eq(s->swing, largest);
+    if (i > 0) ck_assert_double_le(s->swing, l->sensitivity[i - 1].swing);
+  }
+  for (int i = 0; i < 9; i++) ck_assert(seen[i]);
+  ck_assert_double_gt(l->sensitivity[0].swing, 1);
+  free(l);
+}
+END_TEST
+
+/* A net without density layers: a decoder whose inputs all come with the sample. */
+START_TEST(a_decoder_alone_has_no_density_rows)
+{
+  const sf_technology tech = plain_technology();
+  fx_net net = {.steps = 1};
+  fx_counts c = {.samples = 2, .rays = 1};
+  static const int size[SF_LAYERS][2] = {{0, 0}, {0, 0}, {150, 128}, {128, 128}, {128, 3}};
+  for (int i = 0; i < SF_LAYERS; i++) net.layer[i].n_in = size[i][0], net.layer[i].n_out = size[i][1];
+  c.layer[FX_C1].mac[0] = c.layer[FX_C1].weight[0] = 2 * 19200;
+  sf_ledgers *l = malloc(sizeof *l);
+  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_OK);
+  ck_assert_uint_eq(l->total[SF_LEDGER_ANN], 2 * 35968 * (uint64_t)4600);
+  ck_assert_uint_eq(l->total[SF_LEDGER_INT], 2 * 35968 * (uint64_t)96);
+  ck_assert_uint_eq(l->total[SF_LEDGER_WIDTH], 2 * 19200 * (uint64_t)(96 + 27));
+  for (int g = 0; g < SF_LEDGERS; g++)
+    for (int r = FX_D1; r <= FX_D2; r++) ck_assert_uint_eq(l->cell[g][r][0], 0);
+  ck_assert(isnan(l->break_even[0].rate)); /* no spike */
+  free(l);
+}
+END_TEST
+
+START_TEST(too_much_energy_is_refused)
+{
+  const sf_technology tech = plain_technology();
+  const fx_net net = small_net();
+  fx_counts c = small_counts(&net);
+  sf_ledgers *l = malloc(sizeof *l);
+  const sf_traffic much = {.frame_bytes = UINT64_MAX / 1100};
+  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &much, 1000, l).code, SF_E_RANGE); /* at 1.5 times the price */
+  const sf_traffic less = {.frame_bytes = UINT64_MAX / 1600};
+  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &less, 1000, l).code, SF_OK);
+  c.layer[FX_D2].sop[0] = UINT64_MAX - 1;
+  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_E_RANGE);
+  free(l);
+}
+END_TEST
+
+START_TEST(report_and_json_show_every_ledger)
+{
+  const sf_technology tech = plain_technology();
+  sf_ledgers *l = small_ledgers(&tech);
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  sf_ledgers_print(out, l, 1);
+  fclose(out);
+  for (int g = 0; g < SF_LEDGERS; g++) ck_assert_ptr_nonnull(strstr(text, sf_ledger_texts[g].title));
+  for (int i = 0; i < tech.count; i++) ck_assert_ptr_nonnull(strstr(text, tech.price[i].source));
+  free(text);
+  cJSON *json = sf_ledgers_json(l, 1);
+  text = cJSON_PrintUnformatted(json);
+  cJSON_Delete(json);
+  json = cJSON_Parse(text);
+  const cJSON *list = cJSON_GetObjectItem(json, "list");
+  ck_assert_int_eq(cJSON_GetArraySize(list), SF_LEDGERS);
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    const cJSON *ledger = cJSON_GetArrayItem(list, g);
+    ck_assert_double_eq(cJSON_GetObjectItem(ledger, "total_fj")->valuedouble, (double)l->total[g]);
+    const cJSON *rows = cJSON_GetObjectItem(ledger, "rows");
+    ck_assert_int_eq(cJSON_GetArraySize(rows), SF_ROWS);
+    const cJSON *c1 = cJSON_GetObjectItem(cJSON_GetArrayItem(rows, FX_C1), "fj");
+    ck_assert_int_eq(cJSON_GetArraySize(c1), 2);
+    ck_assert_double_eq(cJSON_GetArrayItem(c1, 1)->valuedouble, (double)l->cell[g][FX_C1][1]);
+  }
+  cJSON_Delete(json);
+  free(text), free(l);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("ledger");
+  TCase *files = tcase_create("technology"), *ledgers = tcase_create("ledgers");
+  tcase_add_checked_fixture(files, make_folder, remove_folder);
+  tcase_add_checked_fixture(ledgers, make_folder, remove_folder);
+  tcase_add_test(files, file_is_read);
+  tcase_add_test(files, mistakes_are_named_with_line_and_key);
+  tcase_add_test(files, prices_between_points);
+  tcase_add_test(files, installed_prices);
+  tcase_add_test(ledgers, paper_ledger_is_the_papers_metric);
+  tcase_add_test(ledgers, width_ledger_by_hand);
+  tcase_add_test(ledgers, memory_ledger_by_hand);
+  tcase_add_test(ledgers, neuron_ledger_by_hand);
+  tcase_add_test(ledgers, cells_and_parts_add_up);
+  tcase_add_test(ledgers, break_even_rate_breaks_even);
+  tcase_add_test(ledgers, sensitivity_is_the_saving_at_other_prices);
+  tcase_add_test(ledgers, a_decoder_alone_has_no_density_rows);
+  tcase_add_test(ledgers, too_much_energy_is_refused);
+  tcase_add_test(ledgers, report_and_json_show_every_ledger);
+  suite_add_tcase(suite, files);
+  suite_add_tcase(suite, ledgers);
+  return fixture_run(suite);
+}
