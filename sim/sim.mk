@@ -88,11 +88,25 @@ $(eval $(call verilated_rule,$B/faults/verilated,$B/faults,$B/faults/.patched))
 $B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
+# Planted miscounts in the C core, the vector core and the recount: SF_FAULT=N chooses one at run time.
+C_FAULTS := $(sort $(wildcard tests/faults/c/*.patch))
+C_FAULTY := src/fx/count.c src/fx/rays.c src/audit/recount.c
+$B/faults/c/.patched: $(C_FAULTY) $(C_FAULTS)
+	$(call say,PATCH $(@D))
+	$Qrm -rf $(@D) && mkdir -p $(@D) && cp --parents $(C_FAULTY) $(@D)
+	$Qfor p in $(C_FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
+	@touch $@
+$(C_FAULTY:%.c=$B/faults/c/%.o): $B/faults/c/%.o: $B/faults/c/.patched
+	$(call say,CC    $@)
+	$Q$(CC) $(CFLAGS_ALL) -c $(@:.o=.c) -o $@
+$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $B/faults/verilated/libsfdut.a $(RAY_LIBS) $B/libspikefield.a
+	$(call say,LD    $@)
+	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(shell pkg-config --libs check 2>/dev/null) $(LIBS)
-faults: $B/faults/sf_cosim $B/faults/make_scene ## the co-simulation with planted faults, for its own test
+faults: $B/faults/sf_cosim $B/faults/energy_audit $B/faults/make_scene ## co-simulation and audit with planted faults, for their own tests
 
 $B/bin/sf_gen: $(patsubst %.c,$B/obj/%.o,$(wildcard tools/gen/*.c))
 
