@@ -2,6 +2,7 @@
 #include "bench.h"
 #include "bench_rig.h"
 #include "base/memory.h"
+#include "sim/three_counts.h"
 #include "spikefield/cli.h"
 #include "spikefield/quant.h"
 #include "spikefield/rng.h"
@@ -122,6 +123,64 @@ static double render_twin(const frame *f, uint64_t *taken)
   return sf_seconds() - start;
 }
 
+/* ---- the audit of the frame ---- */
+
+enum { RTL_RAYS = 16, RECOUNT_RAYS = 1000 }; /* the defaults of energy_audit */
+
+static sf_status frame_ray(void *user, uint64_t index, fx_ray *ray)
+{
+  const frame *f = user;
+  float origin[3], direction[3];
+  sf_camera_ray(&f->camera, (float)(index % FRAME) + 0.5f, (float)(index / FRAME) + 0.5f, origin, direction);
+  return sf_fx_ray_make(&f->scene, origin, direction, ray);
+}
+
+static void frame_ray_name(void *user, uint64_t index, char *text, size_t size)
+{
+  (void)user;
+  snprintf(text, size, "ray %llu", (unsigned long long)index);
+}
+
+/* What energy_audit does but for reading the scene and printing: counts of all rays, recount and accelerator on a
+ * sample of them, ledgers. */
+static sf_status audit_frame(frame *f, const sf_technology *tech, const fx_counts *counts, double *seconds)
+{
+  uint64_t index[RTL_RAYS], n;
+  sf_measure measure;
+  sf_three_counts three = {.wanted = RTL_RAYS};
+  sf_ledgers *ledgers = calloc(1, sizeof *ledgers);
+  const sf_measure_job job = {&f->scene, FRAME * FRAME, frame_ray, NULL, f, 1, RECOUNT_RAYS};
+  sf_three_job rtl = {.scene = &f->scene, .index = index, .ray = frame_ray, .name = frame_ray_name, .user = f};
+  const double start = sf_seconds();
+  sf_status status = ledgers ? sf_measure_rays(&job, &measure) : sf_fail(SF_E_MEMORY, "bench: out of memory");
+  if (!status.code) status = sf_measure_choose(&measure, 1, 2, RTL_RAYS, index, &n);
+  if (!status.code) rtl.rays = (int)n, status = sf_three_counts_run(&rtl, &three);
+  if (!status.code) status = three.agreement;
+  if (!status.code) {
+    const sf_traffic traffic = sf_traffic_of(&measure.core, FRAME * FRAME);
+    status = sf_ledgers_make(tech, &f->scene.net, &measure.core, &traffic, sf_table_size(&f->scene), ledgers);
+  }
+  *seconds = sf_seconds() - start;
+  if (!status.code && memcmp(&measure.core, counts, sizeof *counts))
+    status = sf_fail(SF_E_DIFFERENCE, "bench: the audit's counts are not those of the rendering");
+  free(ledgers);
+  if (!status.code) sf_measure_free(&measure);
+  return status;
+}
+
+static sf_status bench_audit(cJSON *json, frame *f, double rendering, const fx_counts *counts)
+{
+  sf_technology tech;
+  double seconds;
+  SF_TRY(sf_technology_load(&tech, "share/tech/45nm.tech"));
+  SF_TRY(audit_frame(f, &tech, counts, &seconds));
+  put(json, "audit.frame800", seconds, "s", rendering, NAN);
+  printf("  its audit: %.2f times the time of the rendering (ceiling: the rendering), %d rays recounted, %d in the "
+         "accelerator\n",
+         seconds / rendering, RECOUNT_RAYS, RTL_RAYS);
+  return sf_ok();
+}
+
 static sf_status load_frame(frame *f, const char *scene, const char *twin, const char *data)
 {
   SF_TRY(fx_scene_load(&f->scene, scene));
@@ -150,7 +209,7 @@ static sf_status bench_frame(cJSON *json, const ceilings *c, frame *f)
          "the time\n",
          f->scene.net.steps, (unsigned long long)counts.samples, (unsigned long long)counts.march_steps,
          (unsigned long long)taken, twin / seconds);
-  return sf_ok();
+  return bench_audit(json, f, seconds, &counts);
 }
 
 sf_status bench_fixed(cJSON *json, const ceilings *c, const char *scene, const char *twin, const char *data)

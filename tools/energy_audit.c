@@ -18,7 +18,7 @@ typedef struct options {
   bool json, published, quiet;
 } options;
 
-enum { RTL_RAYS = 32, RECOUNT_RAYS = 1000 };
+enum { RTL_RAYS = 16, RECOUNT_RAYS = 1000 };
 /* Streams of the random numbers of one seed. */
 enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y, STREAM_SUBSET };
 
@@ -234,7 +234,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--views", 0, SF_ARG_INT, &o->views, 1, 1 << 20, NULL, "N", "all pixels of the first N views (default 1)"},
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "all pixels of view K alone"},
       {"--rays", 0, SF_ARG_U64, &o->rays, 1, 1e9, NULL, "N", "N random rays instead of all pixels"},
-      {"--rtl-rays", 0, SF_ARG_INT, &o->rtl_rays, 0, 1 << 20, NULL, "N", "rays for the accelerator too (default 32)"},
+      {"--rtl-rays", 0, SF_ARG_INT, &o->rtl_rays, 0, 1 << 20, NULL, "N", "rays for the accelerator too (default 16)"},
       {"--recount-rays", 0, SF_ARG_U64, &o->recount_rays, 0, 1e9, NULL, "N",
        "rays recounted from their spike bitmaps (default 1000)"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps in place of the scene's t_r"},
