@@ -17,7 +17,9 @@ module sf_wmem #(
     input  wire [ROW_BITS-1:0] rrow_i,
     output reg  [32*WORDS-1:0] row_o
 );
+  // verilator tracing_off
   reg [32*WORDS-1:0] mem_q[0:ROWS-1];
+  // verilator tracing_on
   always_ff @(posedge clk_i) begin
     if (we_i) mem_q[wrow_i][32*wword_i+:32] <= wdata_i;
     if (re_i) row_o <= mem_q[rrow_i];

@@ -41,7 +41,14 @@ static void edge(sf_pins *pins, bool clk)
 
 extern "C" void sf_pins_dump(sf_pins *pins)
 {
+  if (pins->wave && !pins->wave->isOpen()) pins->wave->open(pins->wave_path.c_str());
   pins->dumping = pins->wave != nullptr;
+}
+
+extern "C" void sf_pins_dump_end(sf_pins *pins)
+{
+  pins->dumping = false;
+  if (pins->wave) pins->wave->close();
 }
 
 extern "C" void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out)

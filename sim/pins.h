@@ -44,8 +44,9 @@ typedef struct sf_pins sf_pins;
 /* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
 sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg); /* sf_ray_top */
-/* The waveform begins here. */
+/* The waveform begins here. sf_pins_dump_end: its file ends and is whole; sf_pins_dump then begins another by that name. */
 void sf_pins_dump(sf_pins *pins);
+void sf_pins_dump_end(sf_pins *pins);
 void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out);
 void sf_pins_close(sf_pins *pins);
 

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <memory>
 #include <new>
+#include <string>
 
 struct sf_pins {
   VerilatedContext context;
   std::unique_ptr<VerilatedFstC> wave;
+  std::string wave_path;
   bool dumping = false;
   virtual ~sf_pins() = default;
   virtual void drive(const sf_pins_in *in) = 0;
@@ -78,6 +80,7 @@ try {
   pins->context.traceEverOn(wave != nullptr);
   pins->top.reset(new Top(&pins->context));
   if (wave) {
+    pins->wave_path = wave;
     pins->wave.reset(new VerilatedFstC);
     pins->top->trace(pins->wave.get(), 99);
     pins->wave->open(wave);

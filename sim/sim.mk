@@ -13,7 +13,7 @@ RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 # Loops over lanes are written for unrolling; see rtl/README.md.
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
 VERILATOR_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
-  $(VERILATOR_UNROLL)
+  --trace-max-array 128 $(VERILATOR_UNROLL)
 # COVERAGE: folder in which every accelerator that is closed leaves its coverage; see sim/coverage.mk.
 ifneq ($(COVERAGE),)
 VERILATOR_FLAGS += --coverage-line --coverage-toggle
@@ -30,6 +30,9 @@ VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
+
+# Verilator brings the reader of its waveforms along.
+$B/obj/sim/wave.o: CFLAGS += -isystem $(VERILATOR_ROOT)/include
 
 # $1 folder, $2 folder that holds rtl/, $3 prerequisites, $4 top, $5 its pins in sim/
 define verilated_top_rule

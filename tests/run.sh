@@ -24,6 +24,7 @@ run() {
     golden_bench) command=("$here/golden_bench.sh" "$build") ;;
     other_dut) command=("$here/other_dut.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
+    activity) command=("$here/activity.sh" "$build") ;;
     lanes) command=("$here/lanes.sh" "$build") ;;
     mutate) command=("$here/mutate/mutate.sh" "$build" --sample) ;;
     formal) command=("$here/formal/run.sh" "$build" --quick) ;;

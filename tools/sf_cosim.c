@@ -1,4 +1,5 @@
 /* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
+#include "sim/activity.h"
 #include "sim/jobs.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
@@ -14,7 +15,8 @@ typedef struct options {
   sf_lockstep_options run;
   int split;
   bool json, quiet;
-  const char *replay, *junit, *dut, *dut_top;
+  const char *replay, *junit, *dut, *dut_top, *window;
+  sf_activity_options activity;
 } options;
 static const char *const split_name[] = {"test", "train"};
 
@@ -105,6 +107,60 @@ static sf_status play(const options *o)
   return status;
 }
 
+/* ---- activity for power tools ---- */
+
+static cJSON *activity_json(const options *o, const sf_activity_report *r)
+{
+  cJSON *json = cJSON_CreateObject();
+  if (o->activity.saif) cJSON_AddStringToObject(json, "saif", o->activity.saif);
+  if (o->activity.vcd) cJSON_AddStringToObject(json, "vcd", o->activity.vcd);
+  sf_json_add_u64(json, "rays", r->rays);
+  sf_json_add_u64(json, "samples", r->samples);
+  sf_json_add_u64(json, "differences", 0);
+  sf_json_add_u64(json, "cycles", r->cycles);
+  sf_json_add_u64(json, "bits", r->bits);
+  sf_json_add_u64(json, "quiet_bits", r->quiet);
+  sf_json_add_u64(json, "toggles", r->toggles);
+  sf_json_add_u64(json, "clock_toggles", r->clock_toggles);
+  cJSON_AddNumberToObject(json, "clock_mhz", o->activity.clock_mhz);
+  return json;
+}
+
+static sf_status report_activity(const options *o, const sf_activity_report *r)
+{
+  if (o->json) {
+    cJSON *json = activity_json(o, r);
+    char *text = cJSON_Print(json);
+    cJSON_Delete(json);
+    if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
+    puts(text);
+    free(text);
+  } else {
+    printf("%" PRIu64 " rays, %" PRIu64 " samples: 0 differences\n", r->rays, r->samples);
+    printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
+           r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
+    for (int i = 0; i < 2; i++) {
+      const char *path = i ? o->activity.vcd : o->activity.saif;
+      if (path) printf("%s: at %g MHz\n", path, o->activity.clock_mhz);
+    }
+  }
+  return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
+}
+
+static sf_status record_activity(const options *o, sf_lockstep *l)
+{
+  display d = {.begun = sf_seconds()};
+  sf_activity_report r;
+  SF_TRY(sf_lockstep_load(l, &o->run));
+  l->tick = show;
+  l->user = &d;
+  sf_progress_begin(&d.progress, o->quiet);
+  const sf_status status = sf_activity_run(l, &o->activity, &r);
+  sf_progress_end(&d.progress);
+  SF_TRY(status);
+  return report_activity(o, &r);
+}
+
 static sf_status run(options *o, const char *scene, const char *data)
 {
   if (o->replay)
@@ -113,9 +169,13 @@ static sf_status run(options *o, const char *scene, const char *data)
   o->run.scene = scene;
   o->run.data = data;
   o->run.split = split_name[o->split];
+  const bool activity = o->activity.saif || o->activity.vcd;
+  if (!activity && (o->window || o->activity.depth))
+    return sf_fail(SF_E_USAGE, "--window and --depth belong to --saif or --vcd");
+  if (o->window) SF_TRY(sf_activity_window(o->window, &o->activity));
   sf_lockstep *l = malloc(sizeof *l);
   if (!l) return sf_fail(SF_E_MEMORY, "out of memory");
-  const sf_status status = simulate(o, l);
+  const sf_status status = activity ? record_activity(o, l) : simulate(o, l);
   sf_lockstep_free(l);
   free(l);
   return status;
@@ -125,7 +185,8 @@ int main(int argc, char **argv)
 {
   options o = {
       .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = "sf_cosim-difference"},
-      .dut_top = "sf_top"};
+      .dut_top = "sf_top",
+      .activity = {.last = UINT64_MAX, .clock_mhz = 200}};
   sf_lockstep_options *r = &o.run;
   const char *positional[2];
   const sf_option table[] = {
@@ -198,6 +259,35 @@ int main(int argc, char **argv)
        .value = &o.junit,
        .argument = "FILE",
        .help = "the result as JUnit XML"},
+      {.name = "--saif",
+       .type = SF_ARG_STRING,
+       .value = &o.activity.saif,
+       .argument = "FILE",
+       .help = "stream the rays' samples through one accelerator and write its switching activity (docs/activity.md)"},
+      {.name = "--vcd",
+       .type = SF_ARG_STRING,
+       .value = &o.activity.vcd,
+       .argument = "FILE",
+       .help = "likewise, every change of every net"},
+      {.name = "--window",
+       .type = SF_ARG_STRING,
+       .value = &o.window,
+       .argument = "FIRST,LAST",
+       .help = "cycles of the stream for --saif and --vcd (default all)"},
+      {.name = "--depth",
+       .type = SF_ARG_INT,
+       .value = &o.activity.depth,
+       .min = 0,
+       .max = 64,
+       .argument = "N",
+       .help = "levels of the hierarchy for --saif and --vcd, the top is 1 (default 0: all)"},
+      {.name = "--clock",
+       .type = SF_ARG_DOUBLE,
+       .value = &o.activity.clock_mhz,
+       .min = 0.1,
+       .max = 1e5,
+       .argument = "MHZ",
+       .help = "clock of their times (default 200)"},
       {.name = "--plusarg",
        .type = SF_ARG_STRING,
        .value = &r->plusarg,
@@ -219,10 +309,12 @@ int main(int argc, char **argv)
                       .usage = "sf_cosim SCENE.snn DATA [options]\n       sf_cosim --replay FILE",
                       .summary = "Run the Verilog accelerator and the fixed-point core on the same samples and compare "
                                  "everything for equality.\nExit status 1 at the first difference.",
-                      .examples = "  sf_cosim scene.snn data --rays 200 --seed 1\n"
-                                  "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
-                                  "  sf_cosim --replay sf_cosim-difference.json\n"
-                                  "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n",
+                      .examples =
+                          "  sf_cosim scene.snn data --rays 200 --seed 1\n"
+                          "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
+                          "  sf_cosim --replay sf_cosim-difference.json\n"
+                          "  sf_cosim scene.snn data --rays 200 --stalls 0 --saif run.saif --depth 3\n"
+                          "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n",
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};

@@ -1,0 +1,71 @@
+#!/bin/bash
+# SAIF and VCD of a co-simulated run: what must hold of any run, what the harness knows of this one, and every bit of both
+# files against each other, counted by a program of its own.   usage: activity.sh BUILD
+set -u
+export LC_ALL=C
+build=$(cd "${1:?usage: activity.sh BUILD}" && pwd) || exit 2
+here=$(cd "$(dirname "$0")" && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_activity.XXXXXX") || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+failed=0
+fail() {
+  echo "FAILED: $1"
+  tail -n 5 "$work/out" "$work/err" 2>/dev/null
+  failed=1
+}
+"$build/bin/sf_scene" textured -o "$work/data" --size 24 --train 8 --test 2 >/dev/null || exit 1
+"$build/bin/sf_train" "$work/data" -o "$work/m.safetensors" --stage1 20 --stage2 40 --samples 512 --levels 4 \
+  --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32 --steps 3 --quiet >/dev/null &&
+  "$build/bin/sf_export" "$work/m.safetensors" -o "$work/m.snn" --steps 3 >/dev/null || exit 1
+# run OPTIONS...
+run() {
+  "$build/bin/sf_cosim" "$work/m.snn" "$work/data" --rays 40 --quiet --json "$@" >"$work/out" 2>"$work/err"
+}
+number() { sed -nE "s/.*\"$1\":[[:space:]]*([0-9]+).*/\1/p" "$work/out"; }
+# of NAME in FILE, top level: prints T1 TC
+top() { sed -nE "s/^    \($1 \(T0 [0-9]+\) \(T1 ([0-9]+)\) \(TX [0-9]+\) \(TC ([0-9]+)\).*/\1 \2/p" "$2"; }
+
+# The whole stream, 100 MHz: a cycle is 10000 ps.
+run --stalls 0 --clock 100 --saif "$work/all.saif" || fail "a SAIF file of the stream"
+cycles=$(number cycles) samples=$(number samples)
+[ "${cycles:-0}" -gt 17000 ] || fail "${cycles:-no} cycles: one piece of the waveform alone"
+[ "${samples:-0}" -gt 100 ] || fail "${samples:-no} samples"
+duration=$(sed -nE 's/^\(DURATION ([0-9]+)\)$/\1/p' "$work/all.saif")
+[ "$duration" = $((10000 * cycles)) ] || fail "duration $duration of $cycles cycles"
+[ "$(top clk_i "$work/all.saif")" = "$((5000 * cycles)) $((2 * cycles - 1))" ] || fail "toggles of the clock"
+[ "$(top rst_ni "$work/all.saif")" = "$duration 0" ] || fail "the reset"
+# Each sample: two result beats; D2 and C3 a tap beat each, D1, C1 and C2 one for each of the 3 steps.
+[ "$(top m_axis_tvalid_o "$work/all.saif" | cut -d' ' -f1)" = $((10000 * 2 * samples)) ] || fail "result beats"
+[ "$(top tap_valid_o "$work/all.saif" | cut -d' ' -f1)" = $((10000 * 11 * samples)) ] || fail "tap beats"
+awk -v d="$duration" '/\(T0 / { gsub(/[()]/, ""); bits++; if ($3 + $5 + $7 != d || $7 != 0) { print; exit 1 } }
+  END { if (bits < 50000) { print bits " bits"; exit 1 } }' "$work/all.saif" >"$work/out" || fail "T0 + T1 + TX is not the duration"
+[ "$(grep -c '(INSTANCE u_plif\|(INSTANCE u_core\|(INSTANCE u_csr' "$work/all.saif")" -ge 2 ] || fail "instances"
+
+run --saif "$work/one.saif" --depth 1 || fail "--depth 1"
+[ "$(grep -c '(INSTANCE' "$work/one.saif")" = 1 ] || fail "--depth 1 has more than one instance"
+
+# A window of the stream with stalls, by both.
+run --saif "$work/w.saif" --vcd "$work/w.vcd" --window 300,419 || fail "a window"
+[ "$(number cycles)" = 120 ] || fail "a window of 120 cycles has $(number cycles)"
+if command -v python3 >/dev/null; then
+  python3 "$here/vcd_activity.py" "$work/w.vcd" "$work/w.saif" >"$work/out" 2>&1 && cat "$work/out" || fail "VCD and SAIF differ"
+  # One toggle more, of one bit: seen.
+  sed -E '0,/\(TC [1-9][0-9]*\)/s//(TC 77777)/' "$work/w.saif" >"$work/wrong.saif"
+  python3 "$here/vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
+else
+  echo "python3 is not installed: VCD not counted"
+fi
+# Pieces of the waveform make no difference: the window cut in two adds up to it.
+run --saif "$work/a.saif" --window 300,340 && run --saif "$work/b.saif" --window 341,419 || fail "half a window"
+awk 'FNR == 1 { file++ } /\(T0 / { gsub(/[()]/, ""); if (file < 3) t[FNR] += $5; else if (t[FNR] != $5) { print; exit 1 } }' \
+  "$work/a.saif" "$work/b.saif" "$work/w.saif" >"$work/out" || fail "two halves are not the whole"
+
+# Refusals, and nothing left behind.
+run --saif "$work/no.saif" --window 9,3 && fail "a window backwards"
+run --window 1,2 && fail "a window of nothing"
+run --saif "$work/no.saif" --window 9000000,9000001 && fail "a window behind the end"
+grep -q 'but the stream has' "$work/err" || fail "a window behind the end is not explained"
+[ ! -e "$work/no.saif" ] || fail "a file of a refused run"
+[ -z "$(find "$work" -name '*.fst' -o -name '*.sf-*')" ] || fail "left behind: $(ls "$work")"
+exit $failed
