@@ -84,7 +84,7 @@ START_TEST(compaction_keeps_what_light_reaches)
       expected[r]++;
       sf_grid_features(&t->model, x, f);
       sf_net_sample(&t->model, f, sh, T, sigma, colour, NULL);
-      for (int p = 0; p < 3; p++) depth[p] += (double)sigma[prefix[p] - 1] * b->delta;
+      for (int p = 0; p < 3; p++) depth[p] += (double)sigma[prefix[p] - 1] * b->delta[lane];
     }
     dropped += b->ray[r].count - expected[r];
   }

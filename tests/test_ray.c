@@ -48,16 +48,19 @@ START_TEST(rays_follow_the_float_lattice)
     for (int a = 0; a < 3; a++) length += d[a] * d[a];
     for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
     const fx_ray ray = make_ray(&scene, o, d);
-    const sf_lattice real = sf_ray_lattice(&config, o, d);
+    sf_steps steps;
+    ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
+    const sf_lattice real = sf_ray_lattice(&steps, o, d);
     differ += ray.count != real.count;
     ck_assert_int_le(abs(ray.count - real.count), 1);
     hits += real.count > 0;
     if (ray.count == 0 || real.count == 0) continue;
-    ck_assert_double_eq_tol(ray.first_q16 / 65536.0, real.first / real.step, 2e-5 * (1 + real.first / real.step));
+    ck_assert_double_eq_tol(ray.first_q16 / 65536.0, real.first / steps.shortest,
+                            2e-5 * (1 + real.first / steps.shortest));
     for (int32_t n = 0; n < ray.count; n += 7)
       for (int a = 0; a < 3; a++) {
         const double p = ldexp((double)(ray.origin[a] + n * ray.step[a]), -40);
-        const double exact = (o[a] + (double)d[a] * (real.first + (double)n * real.step)) / 2 + 0.5;
+        const double exact = (o[a] + (double)d[a] * (real.first + (double)n * steps.shortest)) / 2 + 0.5;
         ck_assert_double_eq_tol(p, exact, 0x1p-25 * n + 4e-6);
       }
   }

@@ -8,12 +8,20 @@
 
 enum { N = 24 };
 
+/* Intervals that grow, from `first` to three times as long. */
+static const float *growing(float first)
+{
+  static float delta[N];
+  for (int s = 0; s < N; s++) delta[s] = first * (1 + 2 * (float)s / N);
+  return delta;
+}
+
 START_TEST(weights_and_transmittance_sum_to_one)
 {
   for (int trial = 0; trial < 200; trial++) {
     float sigma[N], weight[N], scale = powf(10, (float)(trial % 8) - 3);
     for (int s = 0; s < N; s++) sigma[s] = scale * sf_random_float(1, trial, s);
-    double sum = sf_composite_weights(N, sigma, 0.01f, weight);
+    double sum = sf_composite_weights(N, sigma, growing(0.01f), weight);
     for (int s = 0; s < N; s++) sum += weight[s];
     ck_assert_double_eq_tol(sum, 1, 1e-5); /* 2 N roundings of 2^-24 */
   }
@@ -23,7 +31,7 @@ END_TEST
 static double ray_value(const float *sigma, const float *g, float g_end)
 {
   float weight[N];
-  double sum = g_end * (double)sf_composite_weights(N, sigma, 0.05f, weight);
+  double sum = g_end * (double)sf_composite_weights(N, sigma, growing(0.05f), weight);
   for (int s = 0; s < N; s++) sum += (double)g[s] * weight[s];
   return sum;
 }
@@ -35,8 +43,8 @@ START_TEST(backward_is_the_slope)
     sigma[s] = 4 * sf_random_float(2, 1, s);
     g[s] = test_random(s);
   }
-  float end = sf_composite_weights(N, sigma, 0.05f, weight);
-  sf_composite_backward(N, weight, end, 0.05f, g, 0.7f, dsigma);
+  float end = sf_composite_weights(N, sigma, growing(0.05f), weight);
+  sf_composite_backward(N, weight, end, growing(0.05f), g, 0.7f, dsigma);
   for (int s = 0; s < N; s++) {
     float at = sigma[s], up, down;
     sigma[s] = up = at + 0.02f;
@@ -54,6 +62,8 @@ START_TEST(march_equals_testing_every_point)
 {
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   int found = 0;
+  sf_steps steps;
+  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
   for (int trial = 0; trial < 2000; trial++) {
     for (int i = 0; i < 64; i++) m.occupancy[i] = (uint8_t)(sf_random_u64(3, trial, i) & sf_random_u64(4, trial, i));
     float o[3], d[3], length = 0;
@@ -63,8 +73,8 @@ START_TEST(march_equals_testing_every_point)
       length += d[a] * d[a];
     }
     for (int a = 0; a < 3; a++) d[a] /= sqrtf(length) + 1e-12f;
-    sf_march march = sf_march_begin(&m, o, d, 1, 0.5f);
-    sf_lattice lattice = sf_ray_lattice(&m.config, o, d);
+    sf_march march = sf_march_begin(&m, &steps, o, d, 0.5f);
+    sf_lattice lattice = sf_ray_lattice(&steps, o, d);
     ck_assert_int_eq(march.lattice.count, lattice.count);
     int next = 0;
     for (int n = 0; n < lattice.count; n++) {
@@ -102,8 +112,10 @@ START_TEST(far_cameras_stay_in_the_lattice)
                                 {0, 0, -1}};
   sf_config config = sf_config_default();
   config.lattice = 1024;
+  sf_steps steps;
+  ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
   for (int i = 0; i < 3; i++) {
-    const sf_lattice lattice = sf_ray_lattice(&config, o[i], d[i]);
+    const sf_lattice lattice = sf_ray_lattice(&steps, o[i], d[i]);
     ck_assert_int_gt(lattice.count, 500);
     ck_assert_int_le(lattice.count, config.lattice);
   }
@@ -148,15 +160,17 @@ START_TEST(packets_equal_the_oracle)
   }
   ck_assert_int_eq(sf_render_rays(&m, o, d, RAYS, 3, background, rgb, NULL, NULL, NULL).code, SF_OK);
   int wrong = 0;
+  sf_steps steps;
+  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
   for (int r = 0; r < RAYS; r++) {
-    sf_march march = sf_march_begin(&m, o + 3 * r, d + 3 * r, 1, 0.5f);
+    sf_march march = sf_march_begin(&m, &steps, o + 3 * r, d + 3 * r, 0.5f);
     float x[3], transmittance = 1, out[3] = {0};
     for (int n = 0; (n = sf_march_next(&march, n, x)) >= 0 && transmittance >= 1e-4f; n++) {
       float f[32], sh[16], sigma[8], colour[24];
       sf_grid_features(&m, x, f);
       sf_sh4(d + 3 * r, sh);
       sf_net_sample(&m, f, sh, 3, sigma, colour, NULL);
-      float behind = transmittance * expf(-sigma[2] * march.lattice.step);
+      float behind = transmittance * expf(-sigma[2] * steps.length[n]);
       for (int c = 0; c < 3; c++) out[c] += (transmittance - behind) * colour[6 + c];
       transmittance = behind;
     }

@@ -212,11 +212,19 @@ START_TEST(loss_falls_and_both_twins_learn)
 }
 END_TEST
 
+/* Intervals of a ray: each its own. */
+static const float *intervals(void)
+{
+  static float delta[N];
+  for (int s = 0; s < N; s++) delta[s] = 0.05f * (1 + (float)s / N);
+  return delta;
+}
+
 /* Gradient of one ray's whole loss against central differences of the plan's sums. */
 static double ray_loss(const sf_loss_plan *p, const sf_ray *ray, sf_ray_work *w)
 {
   sf_loss_sums s = {0};
-  sf_loss_ray(p, ray, 0.05f, w, &s);
+  sf_loss_ray(p, ray, intervals(), w, &s);
   double share = fmin(fmax(p->d, 0.25), 0.75);
   if (p->stage == 1) return s.mse_full + s.regular;
   return (1 - share) * s.mse_floor + share * s.mse_ceil + s.regular +
@@ -234,7 +242,7 @@ static void check_plan(sf_loss_plan p)
       for (int c = 0; c < 3; c++) w.colour[t][3 * s + c] = sf_random_float(12, t, 3 * s + c);
     }
   sf_loss_sums sums = {0};
-  sf_loss_ray(&p, &ray, 0.05f, &w, &sums);
+  sf_loss_ray(&p, &ray, intervals(), &w, &sums);
   static float dsigma[T][N], dcolour[T][3 * N];
   for (int t = 0; t < T; t++) {
     memcpy(dsigma[t], w.dsigma[t], sizeof dsigma[t]);
@@ -291,7 +299,7 @@ START_TEST(sparsity_by_hand)
   for (int c = 0; c < 3; c++) w.colour[T - 1][c] = 0.5f;
   const sf_loss_plan plan = {.stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 0.25f};
   sf_loss_sums sums = {0};
-  sf_loss_ray(&plan, &ray, 0.05f, &w, &sums);
+  sf_loss_ray(&plan, &ray, intervals(), &w, &sums);
   ck_assert_double_eq_tol(w.dsigma[T - 1][0], 0.25 * 1e-6 * 2 / 7, 1e-9);
   ck_assert_double_eq_tol(sums.regular, 1e-6 * log(7), 1e-8);
   free(w.memory);

@@ -12,8 +12,8 @@
 typedef struct arguments {
   const char *output, *log, *summary, *fine_tune;
   sf_train_options train;
-  double scale, theta, checkpoint_minutes;
-  int downscale, threads, eval_views, prefix_views, limit, weight_bits;
+  double scale, theta, checkpoint_minutes, gamma;
+  int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits;
   bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
 } arguments;
 
@@ -42,20 +42,26 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid (default 16)"},
       {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries (default 19)"},
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level (default 16)"},
-      {"--finest-res", 0, SF_ARG_INT, &c->finest_res, 2, 32768, NULL, "N",
-       "resolution of the finest level (default 2048)"},
+      {"--finest-res", 0, SF_ARG_INT, &a->finest_res, 2, 32768, NULL, "N",
+       "resolution of the finest level (default 2048 x bound, at most 32768)"},
       {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
        "neurons of a spiking layer, multiple of 16 (default 128)"},
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25)"},
-      {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N", "samples across the box diagonal (default 1024)"},
+      {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
+       "the shortest step is the diagonal of a box of bound 1 divided by this (default 1024)"},
+      {"--bound", 0, SF_ARG_INT, &a->bound, 0, 64, NULL, "B",
+       "the box is [-B, B]^3 model units, B = 1, 2, 4, ... 64; 0 = the data's (default 0)"},
+      {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
+       "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0 (default -1)"},
       {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N",
        "occupancy cells per axis, power of two (default 128)"},
       {"--scale", 0, SF_ARG_DOUBLE, &a->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the layout's (default 0)"},
       {"--downscale", 'd', SF_ARG_INT, &a->downscale, 1, 64, NULL, "F", "box-filter the images by F (default 1)"},
       {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
-      {"--background", 0, SF_ARG_CHOICE, &t->background, 0, 0, "random|white|black", "KIND",
-       "behind transparent pixels (default random)"},
+      {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
+       "behind transparent pixels and rays that leave the box; auto: random where pictures have alpha, else white "
+       "(default auto)"},
       {"--no-stage1", 0, SF_ARG_FLAG, &a->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
       {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "ablation: without L_penalty"},
@@ -339,6 +345,48 @@ static sf_status load_start(const arguments *a, float scale, sf_model *model)
   return status;
 }
 
+/* The box, the steps through it and the finest level, but for what was asked for. */
+static void set_box(arguments *a, int bound)
+{
+  sf_config *c = &a->train.config;
+  sf_config_bound(c, a->bound ? a->bound : bound);
+  if (a->finest_res) c->finest_res = a->finest_res;
+  if (a->gamma >= 0) c->dt_gamma = (float)a->gamma;
+}
+
+static bool any_transparent(const sf_dataset *data)
+{
+  for (int v = 0; v < data->count; v++) {
+    const sf_image *image = &data->view[v].image;
+    const size_t n = image->rgba ? (size_t)image->width * (size_t)image->height : 0;
+    for (size_t i = 0; i < n; i++)
+      if (image->rgba[4 * i + 3] < 65535) return true;
+  }
+  return false;
+}
+
+/* What follows from the data. */
+static void settle(arguments *a, const sf_dataset *data)
+{
+  static const char *const name[] = {"random", "white", "black"};
+  const sf_config *c = &a->train.config;
+  const bool transparent = any_transparent(data);
+  a->train.config.scale = data->scale;
+  set_box(a, 1);
+  a->train.background = a->background ? a->background - 1 : transparent ? 0 : 1;
+  if (a->quiet) return;
+  fprintf(stderr, "sf_train: box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c),
+          c->bound > 1 ? "s" : "");
+  if (c->dt_gamma > 0)
+    fprintf(stderr, "steps of distance / %g", 1 / (double)c->dt_gamma);
+  else
+    fprintf(stderr, "equal steps");
+  fprintf(stderr, ", finest level %d, background %s (%s)\n", c->finest_res, name[a->train.background],
+          a->background ? "as asked for"
+          : transparent ? "the pictures have alpha"
+                        : "the pictures are opaque");
+}
+
 static sf_status run(arguments *a, const char *path)
 {
   char log_path[4096];
@@ -346,7 +394,7 @@ static sf_status run(arguments *a, const char *path)
   sf_dataset data;
   const sf_dataset_options how = {.downscale = a->downscale, .scale = (float)a->scale, .limit = a->limit};
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
-  a->train.config.scale = data.scale;
+  settle(a, &data);
   sf_model start = {0};
   sf_status status = sf_ok();
   if (a->fine_tune && !a->resume) {
@@ -365,7 +413,11 @@ static sf_status run(arguments *a, const char *path)
 
 int main(int argc, char **argv)
 {
-  arguments a = {.output = "model.safetensors", .train = sf_train_defaults(), .downscale = 1, .checkpoint_minutes = 2};
+  arguments a = {.output = "model.safetensors",
+                 .train = sf_train_defaults(),
+                 .downscale = 1,
+                 .checkpoint_minutes = 2,
+                 .gamma = -1};
   a.theta = (double)a.train.config.theta[0];
   sf_option options[64];
   const sf_cli cli = make_cli(&a, options);
@@ -383,6 +435,7 @@ int main(int argc, char **argv)
   if (a.weight_bits && !a.fine_tune)
     return sf_cli_finish(&cli, sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL"));
   sf_cli_catch_signals();
+  set_box(&a, 1);
   status = sf_config_check(&a.train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
   if (!status.code) status = run(&a, path[0]);

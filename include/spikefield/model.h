@@ -18,10 +18,22 @@ typedef struct sf_config {
   int32_t levels, log2_hash, base_res, finest_res; /* hash grid, 2 features per entry */
   int32_t hidden;                                  /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
   float theta[3];                                  /* thresholds of D1, C1, C2 */
-  float scale;     /* model units = world units * scale; the scene box is [-1,1]^3 model units */
-  int32_t lattice; /* samples across the box diagonal: step = 2 sqrt(3) / lattice model units */
-  int32_t occ_res; /* occupancy cells per axis */
+  float scale;     /* model units = world units * scale; the scene box is [-bound, bound]^3 model units */
+  int32_t lattice; /* the shortest step is 2 sqrt(3) / lattice model units */
+  int32_t occ_res; /* occupancy cells per axis of a cascade */
+  int32_t bound;   /* 1, 2, 4, ... 64; 1: objects */
+  float dt_gamma;  /* steps are distance * dt_gamma, at least the shortest; 0: all are the shortest. 0..1/8 */
 } sf_config;
+
+/* Occupancy grids, one inside the other: cascade c covers [-2^c, 2^c]^3, the last one the box. */
+static inline int sf_config_cascades(const sf_config *c)
+{
+  return 1 + __builtin_ctz((unsigned)c->bound);
+}
+static inline size_t sf_config_cells(const sf_config *c) /* of all cascades */
+{
+  return (size_t)sf_config_cascades(c) * (size_t)c->occ_res * (size_t)c->occ_res * (size_t)c->occ_res;
+}
 
 /* Parts of the parameter vector, in this order. Matrices are [out][in] as in torch.
  *   grid.table [entries][2]; density.w1 [hidden][2*levels]; density.w2 [16][hidden];
@@ -46,8 +58,8 @@ typedef struct sf_grid_level {
 
 /* What the exporter rounds to, once it is settled; fine-tuning learns weights for it. */
 typedef struct sf_scales {
-  int32_t weight_bits; /* weights within +-(2^(weight_bits-1) - 1), 2..SF_WEIGHT_BITS; 0: not settled */
-  struct sf_lsb {      /* values of one LSB, > 0 */
+  int32_t weight_bits;            /* weights within +-(2^(weight_bits-1) - 1), 2..SF_WEIGHT_BITS; 0: not settled */
+  struct sf_lsb {                 /* values of one LSB, > 0 */
     float entry[16], feature[16]; /* grid entries and features of a level */
     float direction;              /* spherical harmonics */
     float current[SF_LAYERS];     /* currents: weight = integer * current / LSB of its input */
@@ -63,11 +75,14 @@ typedef struct sf_model {
   sf_grid_level level[16];
   float t_star;       /* 1..T; T where no budget was learned */
   int32_t t_r;        /* round(t_star): steps at inference */
-  uint8_t *occupancy; /* occ_res^3 / 8 bytes, bit (z*res + y)*res + x, owned */
+  uint8_t *occupancy; /* sf_config_cells / 8 bytes, bit ((cascade*res + z)*res + y)*res + x, owned */
   sf_scales scales;
 } sf_model;
 
 sf_config sf_config_default(void);
+/* A box of this half edge with what goes with it: the growth of steps (1/128, none at 1) and the finest resolution
+ * (2048 * bound, at most 32768: positions have 24 bits in fixed point, places within a cell 8). */
+void sf_config_bound(sf_config *config, int bound);
 sf_status sf_config_check(const sf_config *config);
 /* Allocates, lays out and zeroes; occupancy all ones. */
 sf_status sf_model_create(sf_model *model, const sf_config *config);
@@ -83,20 +98,37 @@ sf_status sf_model_load(sf_model *model, const char *path);
 
 /* Value of one LSB of input `input` of layer D1 D2 C1 C2 C3 (1 for spikes). */
 double sf_scales_input(const sf_scales *scales, int layer, int input);
-/* The five weight matrices of model->value rounded to its settled scales, into value (laid out alike, may be the same). */
+/* The five weight matrices of model->value rounded to its settled scales, into value (laid out alike, may be the same).
+ */
 void sf_scales_round(const sf_model *model, float *value);
 /* Spherical harmonics to multiples of their LSB, as the accelerator gets them; as they are while nothing is settled. */
 void sf_scales_round_direction(const sf_scales *scales, float sh[SF_DIR_FEATURES]);
 /* Step to whose multiples h is rounded down once the scales are settled, as the accelerator does; 0: h is not. */
 float sf_scales_h_step(const sf_scales *scales);
 
-/* The same for every consumer: lattice of a ray in the box [-1,1]^3 with near plane 0.2.
- * Sample n of `count` is at distance first + n * step. count = 0: the ray misses. */
+/* The intervals of a ray from where it enters the box (or from the near plane at 0.2): the same for every ray and every
+ * consumer. Interval n begins at distance start[n] from there and is length[n] long: clamp((0.2 + start) * dt_gamma,
+ * shortest, longest), longest = 2 sqrt(3) bound / occ_res (torch-ngp, but for rays that enter from outside: there the
+ * distance to the camera is not that to the box). */
+enum { SF_STEPS_MAX = 1024 };
+#define SF_NEAR 0.2f /* model units; torch-ngp's min_near */
+typedef struct sf_steps {
+  int32_t count, stride, lattice; /* stride: this many of the scene's intervals are one */
+  float bound, shortest;          /* shortest: of the scene */
+  bool growing;
+  float start[SF_STEPS_MAX], length[SF_STEPS_MAX];
+  uint8_t cascade[SF_STEPS_MAX]; /* the finest whose cells are longer than the interval */
+} sf_steps;
+/* SF_E_RANGE when SF_STEPS_MAX intervals do not reach across the box. */
+sf_status sf_steps_make(sf_steps *steps, const sf_config *config, int stride);
+
+/* The part of a ray that is in the box: the centre of interval n is at distance first + start[n] + length[n] / 2 -
+ * shortest / 2. count = 0: the ray misses. */
 typedef struct sf_lattice {
-  float first, step;
+  float first;
   int32_t count;
 } sf_lattice;
-sf_lattice sf_ray_lattice(const sf_config *config, const float origin[3], const float direction[3]);
+sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const float direction[3]);
 
 /* Hash-grid features at x in [0,1]^3, scalar and obvious: the oracle of the vector kernels. f[2*levels]. */
 void sf_grid_features(const sf_model *model, const float x[3], float *f);

@@ -1,41 +1,54 @@
 #include "render/march.h"
 #include <math.h>
 
-static const float near_plane = 0.2f; /* torch-ngp's min_near */
-
-sf_lattice sf_ray_lattice(const sf_config *config, const float origin[3], const float direction[3])
+/* Intervals that end within `depth`. */
+static int32_t intervals_within(const sf_steps *s, float depth)
 {
-  float enter = near_plane, leave = INFINITY;
+  if (!s->growing) /* beyond the box there are no more, but far from it the distances have no precision left */
+    return (int32_t)fminf(floorf(depth / s->shortest), (float)s->lattice) / s->stride;
+  int32_t low = 0, high = s->count;
+  while (low < high) {
+    const int32_t middle = (low + high) / 2;
+    if (s->start[middle] + s->length[middle] <= depth)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const float direction[3])
+{
+  const float bound = steps->bound;
+  float enter = SF_NEAR, leave = INFINITY;
   for (int a = 0; a < 3; a++) {
     if (direction[a] == 0) {
-      if (fabsf(origin[a]) >= 1) return (sf_lattice){0};
+      if (fabsf(origin[a]) >= bound) return (sf_lattice){0};
       continue;
     }
-    float t0 = (-1 - origin[a]) / direction[a], t1 = (1 - origin[a]) / direction[a];
+    float t0 = (-bound - origin[a]) / direction[a], t1 = (bound - origin[a]) / direction[a];
     enter = fmaxf(enter, fminf(t0, t1));
     leave = fminf(leave, fmaxf(t0, t1));
   }
-  sf_lattice lattice = {.step = 2 * 1.7320508f / (float)config->lattice};
-  if (!(leave > enter)) return lattice;
-  lattice.first = enter + lattice.step / 2;
-  /* The box holds no more, but far from it the distances have no precision left. */
-  lattice.count = (int32_t)fminf(floorf((leave - enter) / lattice.step), (float)config->lattice);
-  return lattice;
+  if (!(leave > enter)) return (sf_lattice){0};
+  return (sf_lattice){.first = enter + steps->shortest / 2, .count = intervals_within(steps, leave - enter)};
 }
 
-sf_march sf_march_begin(const sf_model *model, const float origin[3], const float direction[3], int stride,
+sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const float origin[3], const float direction[3],
                         float jitter)
 {
-  sf_march m = {.occupancy = model->occupancy, .res = model->config.occ_res};
+  sf_march m = {.steps = steps,
+                .occupancy = model->occupancy,
+                .res = model->config.occ_res,
+                .cascades = sf_config_cascades(&model->config),
+                .jitter = jitter,
+                .shrink = 0.5f / steps->bound};
   for (int a = 0; a < 3; a++) {
     m.origin[a] = origin[a];
     m.direction[a] = direction[a];
   }
-  m.lattice = sf_ray_lattice(&model->config, origin, direction);
-  m.lattice.first -= m.lattice.step / 2;
-  m.lattice.count /= stride;
-  m.lattice.step *= (float)stride;
-  m.lattice.first += m.lattice.step * jitter;
+  m.lattice = sf_ray_lattice(steps, origin, direction);
+  m.lattice.first -= steps->shortest / 2;
   return m;
 }
 
@@ -43,29 +56,70 @@ void sf_march_at(const sf_march *m, int n, float x[3])
 {
   const float t = sf_march_distance(m, n);
   for (int a = 0; a < 3; a++) {
-    const float at = (m->origin[a] + t * m->direction[a]) * 0.5f + 0.5f; /* fminf would be a call */
+    const float at = (m->origin[a] + t * m->direction[a]) * m->shrink + 0.5f; /* fminf would be a call */
     x[a] = !(at > 0) ? 0 : at > 0x1.fffffep-1f ? 0x1.fffffep-1f : at;
   }
 }
 
+/* The cell at x is ((cascade*res + place[2])*res + place[1])*res + place[0]. Places of all cascades follow from those
+ * of the finest cells counted from the middle of the box: cascade c halves them c times. */
+typedef struct cell {
+  int cascade, place[3];
+} cell;
+
+static inline cell find_cell(const sf_march *m, int least, const float x[3])
+{
+  const int fine = m->res << (m->cascades - 1), middle = m->res / 2;
+  int at[3], farthest = 0;
+  for (int a = 0; a < 3; a++) {
+    at[a] = (int)(x[a] * (float)fine) - fine / 2;
+    farthest |= at[a] ^ at[a] >> 31; /* negative numbers reach one place farther */
+  }
+  cell c = {.cascade = least};
+  while (farthest >> c.cascade >= middle) c.cascade++;
+  for (int a = 0; a < 3; a++) c.place[a] = (at[a] >> c.cascade) + middle;
+  return c;
+}
+
+/* Distance from x to where the ray leaves the cell. */
+static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
+{
+  const int fine = m->res << (m->cascades - 1);
+  float ahead = INFINITY;
+  for (int a = 0; a < 3; a++) {
+    if (m->direction[a] == 0) continue;
+    const int place = c->place[a] + (m->direction[a] > 0) - m->res / 2;
+    const float face = (float)(place * (1 << c->cascade) + fine / 2) / (float)fine;
+    const float exit = (face - x[a]) * (2 * m->steps->bound) / m->direction[a];
+    ahead = exit < ahead ? exit : ahead;
+  }
+  return ahead;
+}
+
+/* The first point from n on that is not in the cell, whose exit is `ahead`. */
+static inline int skip(const sf_march *m, int n, float ahead)
+{
+  const sf_steps *s = m->steps;
+  const float farthest = 4 * s->bound;
+  if (!s->growing) {
+    const int points = (int)ceilf((ahead < farthest ? ahead : farthest) / s->length[n] - 1e-3f);
+    return n + (points > 1 ? points : 1);
+  }
+  const float end = sf_march_distance(m, n) + ahead - 1e-3f * s->length[n];
+  const int cascade = s->cascade[n]; /* where coarser cells begin, others may be occupied */
+  do n++;
+  while (n < m->lattice.count && s->cascade[n] == cascade && sf_march_distance(m, n) < end);
+  return n;
+}
+
 int sf_march_next(const sf_march *m, int n, float x[3])
 {
-  const float res = (float)m->res;
   while (n < m->lattice.count) {
-    int cell[3];
     sf_march_at(m, n, x);
-    for (int a = 0; a < 3; a++) cell[a] = (int)(x[a] * res);
-    const size_t bit = ((size_t)cell[2] * m->res + cell[1]) * m->res + cell[0];
+    const cell c = find_cell(m, m->steps->cascade[n], x);
+    const size_t bit = (((size_t)c.cascade * m->res + c.place[2]) * m->res + c.place[1]) * m->res + c.place[0];
     if (m->occupancy[bit / 8] >> (bit % 8) & 1) return n;
-    float ahead = INFINITY; /* distance to the cell's exit */
-    for (int a = 0; a < 3; a++) {
-      if (m->direction[a] == 0) continue;
-      float face = (float)(cell[a] + (m->direction[a] > 0)) / res;
-      const float exit = (face - x[a]) * 2 / m->direction[a];
-      ahead = exit < ahead ? exit : ahead;
-    }
-    int skip = (int)ceilf((ahead < 4 ? ahead : 4) / m->lattice.step - 1e-3f);
-    n += skip > 1 ? skip : 1;
+    n = skip(m, n, to_exit(m, &c, x));
   }
   return -1;
 }

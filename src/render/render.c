@@ -25,6 +25,7 @@ typedef struct worker {
   int steps;
   sf_block *block;
   sf_net_scratch *scratch;
+  sf_steps intervals;
   float x[3 * SF_BLOCK];
   ray_state ray[PACKET];
   int owner[SF_BLOCK], lattice[SF_BLOCK], fill;
@@ -44,7 +45,8 @@ static void flush(worker *w)
   for (int l = 0; l < w->fill; l++) {
     ray_state *r = &w->ray[w->owner[l]];
     if (r->transmittance < opaque) continue;
-    float behind = r->transmittance * expf(-sigma[l] * r->march.lattice.step), weight = r->transmittance - behind;
+    const float delta = w->intervals.length[w->lattice[l]];
+    float behind = r->transmittance * expf(-sigma[l] * delta), weight = r->transmittance - behind;
     for (int a = 0; a < 3; a++) r->rgb[a] += weight * colour[a * SF_BLOCK + l];
     r->depth += weight * sf_march_distance(&r->march, w->lattice[l]);
     r->samples += 1;
@@ -111,18 +113,21 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
   if (steps < 0 || steps > model->config.steps)
     return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
   if (!steps) steps = model->t_r;
+  sf_steps intervals;
+  SF_TRY(sf_steps_make(&intervals, &model->config, 1));
   int failed = 0;
 #pragma omp parallel reduction(| : failed)
   {
     worker *w = worker_create(model, steps);
     failed = !w || !w->net || !w->block || !w->scratch;
+    if (!failed) w->intervals = intervals;
 #pragma omp for schedule(dynamic, 1)
     for (size_t first = 0; first < count; first += PACKET) {
       if (failed) continue;
       const int n = (int)(count - first < PACKET ? count - first : PACKET);
       for (int i = 0; i < n; i++) {
         const float *o = origin + 3 * (first + i), *d = direction + 3 * (first + i);
-        w->ray[i] = (ray_state){.march = sf_march_begin(model, o, d, 1, 0.5f), .transmittance = 1};
+        w->ray[i] = (ray_state){.march = sf_march_begin(model, &w->intervals, o, d, 0.5f), .transmittance = 1};
         sf_sh4(d, w->ray[i].sh);
         sf_scales_round_direction(&model->scales, w->ray[i].sh);
       }

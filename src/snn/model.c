@@ -20,7 +20,15 @@ sf_config sf_config_default(void)
                      .theta = {1, 1, 1},
                      .scale = 0.8f,
                      .lattice = 1024,
-                     .occ_res = 128};
+                     .occ_res = 128,
+                     .bound = 1};
+}
+
+void sf_config_bound(sf_config *c, int bound)
+{
+  c->bound = bound;
+  c->dt_gamma = bound > 1 ? 1.0f / 128 : 0;
+  c->finest_res = bound < 16 ? 2048 * bound : 32768;
 }
 
 static sf_status check_range(const char *name, double value, double low, double high)
@@ -47,7 +55,11 @@ sf_status sf_config_check(const sf_config *c)
   SF_TRY(check_range("occ_res", c->occ_res, 8, 256));
   if (c->occ_res & (c->occ_res - 1))
     return sf_fail(SF_E_RANGE, "model config: occ_res = %d is not a power of two", c->occ_res);
-  return sf_ok();
+  SF_TRY(check_range("bound", c->bound, 1, 64));
+  if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
+  SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, 0.125));
+  sf_steps steps;
+  return sf_steps_make(&steps, c, 1);
 }
 
 /* torch-ngp's table: resolution ceil(base * s^l), one more point per axis, rounded up to 8 entries. */
@@ -104,7 +116,7 @@ static sf_status lay_out(sf_model *m, const sf_config *config)
 static sf_status allocate(sf_model *m)
 {
   const sf_config *config = &m->config;
-  size_t bytes = m->size * sizeof(float), cells = (size_t)config->occ_res * config->occ_res * config->occ_res;
+  size_t bytes = m->size * sizeof(float), cells = sf_config_cells(config);
   m->value = sf_aligned_alloc(bytes);
   m->occupancy = malloc(cells / 8);
   if (!m->value || !m->occupancy) {
@@ -182,6 +194,12 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   }
   SF_TRY(meta_number(set, "scale", &number));
   c->scale = (float)number;
+  c->bound = 1;
+  if (sf_tensors_meta(set, "bound")) SF_TRY(meta_int(set, "bound", &c->bound));
+  if (sf_tensors_meta(set, "dt_gamma")) {
+    SF_TRY(meta_number(set, "dt_gamma", &number));
+    c->dt_gamma = (float)number;
+  }
   sf_status status = sf_config_check(c);
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
 }
@@ -211,18 +229,18 @@ static sf_status load_scales(sf_scales *s, const sf_tensors *set)
 /* All tensors are found before memory is asked for: a few words of metadata can name a grid of gigabytes. */
 static sf_status load_tensors(sf_model *m, const sf_tensors *set)
 {
-  const int64_t cells = (int64_t)m->config.occ_res * m->config.occ_res * m->config.occ_res / 8;
+  const int64_t bytes = (int64_t)(sf_config_cells(&m->config) / 8);
   const sf_tensor *part[SF_P_COUNT], *occupancy;
   for (int i = 0; i < SF_P_COUNT; i++) {
     const sf_param *p = &m->param[i];
     SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &part[i]));
     SF_TRY(sf_tensor_finite(set->path, part[i]));
   }
-  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &cells, &occupancy));
+  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &bytes, &occupancy));
   SF_TRY(allocate(m));
   for (int i = 0; i < SF_P_COUNT; i++)
     memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
-  memcpy(m->occupancy, occupancy->data, (size_t)cells);
+  memcpy(m->occupancy, occupancy->data, (size_t)bytes);
   return sf_ok();
 }
 

@@ -10,14 +10,18 @@ static sf_status reserve(sf_batch *b, int blocks, int features)
   const int capacity = blocks + blocks / 4;
   free(b->x);
   free(b->spare_x);
+  free(b->delta);
+  free(b->spare_delta);
   free(b->f);
   free(b->df);
   const size_t n = (size_t)capacity * SF_BLOCK * sizeof(float);
   b->x = sf_aligned_alloc(3 * n);
   b->spare_x = sf_aligned_alloc(3 * n);
+  b->delta = sf_aligned_alloc(n);
+  b->spare_delta = sf_aligned_alloc(n);
   b->f = sf_aligned_alloc((size_t)features * n);
   b->df = sf_aligned_alloc((size_t)features * n);
-  b->block_capacity = b->x && b->spare_x && b->f && b->df ? capacity : 0;
+  b->block_capacity = b->x && b->spare_x && b->delta && b->spare_delta && b->f && b->df ? capacity : 0;
   return b->block_capacity ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d blocks of samples", capacity);
 }
 
@@ -38,6 +42,8 @@ void sf_batch_free(sf_batch *b)
   free(b->hit);
   free(b->x);
   free(b->spare_x);
+  free(b->delta);
+  free(b->spare_delta);
   free(b->f);
   free(b->df);
 }
@@ -95,10 +101,12 @@ static void place(sf_batch *b, const sf_march *march, int r)
 {
   const sf_ray *ray = &b->ray[r];
   int lane = ray->lane;
-  for (int word = 0; word < LATTICE_MAX / 64; word++)
+  for (int word = 0; word < SF_STEPS_MAX / 64; word++)
     for (uint64_t bits = b->hit[r][word]; bits; bits &= bits - 1, lane++) {
       float x[3], *at = b->x + (size_t)(lane / SF_BLOCK) * 3 * SF_BLOCK + lane % SF_BLOCK;
-      sf_march_at(march, 64 * word + __builtin_ctzll(bits), x);
+      const int n = 64 * word + __builtin_ctzll(bits);
+      b->delta[lane] = march->steps->length[n];
+      sf_march_at(march, n, x);
       for (int a = 0; a < 3; a++) at[a * SF_BLOCK] = x[a];
     }
 }
@@ -121,11 +129,12 @@ sf_status sf_batch_draw(sf_trainer *t)
   sf_march *march = malloc((size_t)t->rays * sizeof *march);
   if (!march) return sf_fail(SF_E_MEMORY, "train: no memory for %d rays", t->rays);
   b->rays = t->rays;
+  sf_status status = sf_steps_make(&t->intervals, &t->model.config, t->stride);
 #pragma omp parallel for schedule(dynamic, 64)
   for (int r = 0; r < b->rays; r++) {
     sf_ray *ray = &b->ray[r];
     draw_ray(t, base + r, ray);
-    march[r] = sf_march_begin(&t->model, ray->origin, ray->direction, t->stride,
+    march[r] = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                               sf_random_float(t->options.seed, RNG_JITTER, base + r));
     float x[3];
     ray->count = 0;
@@ -136,12 +145,11 @@ sf_status sf_batch_draw(sf_trainer *t)
     }
   }
   sf_batch_pack(b);
-  sf_status status = reserve(b, b->blocks, 2 * t->model.config.levels);
+  if (!status.code) status = reserve(b, b->blocks, 2 * t->model.config.levels);
   if (!status.code) {
     b->marched = 0;
     for (int r = 0; r < b->rays; r++) b->marched += b->ray[r].count;
     b->samples = b->marched;
-    b->delta = 2 * 1.7320508f / (float)t->model.config.lattice * (float)t->stride;
     memset(b->x, 0, (size_t)b->blocks * 3 * SF_BLOCK * sizeof(float));
 #pragma omp parallel for schedule(dynamic, 64)
     for (int r = 0; r < b->rays; r++) place(b, &march[r], r);

@@ -35,6 +35,8 @@ static void put_config(cJSON *meta, const sf_model *m)
   put(meta, "theta_c1", c->theta[1]);
   put(meta, "theta_c2", c->theta[2]);
   put(meta, "scale", c->scale);
+  put(meta, "bound", c->bound);
+  put(meta, "dt_gamma", c->dt_gamma);
   put(meta, "t_star", m->t_star);
   put(meta, "t_r", m->t_r);
   put(meta, "weight_bits", m->scales.weight_bits);
@@ -84,7 +86,7 @@ static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
 static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *list)
 {
   const sf_model *m = &t->model;
-  const int64_t res = m->config.occ_res;
+  const int64_t res = m->config.occ_res, layers = sf_config_cascades(&m->config) * res;
   int n = 0;
   const struct {
     const char *prefix;
@@ -97,9 +99,9 @@ static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *lis
       snprintf(x->name, sizeof x->name, "%s%s", sets[s].prefix, m->param[i].name);
       memcpy(x->shape, m->param[i].shape, sizeof m->param[i].shape);
     }
-  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {res * res * res / 8}, m->occupancy};
+  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {layers * res * res / 8}, m->occupancy};
   if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
-  if (with_optimiser) list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {res, res, res}, t->density};
+  if (with_optimiser) list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {layers, res, res}, t->density};
   return n;
 }
 

@@ -7,7 +7,7 @@
 static const float opaque = -9.2103404f;
 
 /* Samples of a ray up to where every composited prefix is opaque. */
-static int visible(const sf_loss_plan *p, const sf_ray *ray, float delta, const sf_block *block)
+static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta, const sf_block *block)
 {
   int count = 0;
   for (int t = 1; t <= p->steps; t++) {
@@ -15,7 +15,7 @@ static int visible(const sf_loss_plan *p, const sf_ray *ray, float delta, const 
     float depth = 0;
     int s = 0;
     for (; s < ray->count && depth > opaque; s++)
-      depth -= delta * block[(ray->first + s) / SF_BLOCK].sigma[t - 1][(ray->first + s) % SF_BLOCK];
+      depth -= delta[s] * block[(ray->first + s) / SF_BLOCK].sigma[t - 1][(ray->first + s) % SF_BLOCK];
     if (s > count) count = s;
   }
   return count;
@@ -30,7 +30,7 @@ static void look(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, 
     t->kernels->density(t->net, &w->block[b], p->steps, w->scratch);
   }
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++)
-    batch->ray[r].count = visible(p, &batch->ray[r], batch->delta, w->block);
+    batch->ray[r].count = visible(p, &batch->ray[r], batch->delta + batch->ray[r].lane, w->block);
 }
 
 /* to[block][rows][SF_BLOCK] at lane `at`.. = from at lane `start`.. */
@@ -76,6 +76,7 @@ void sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
   for (int r = 0; r < b->rays; r++) {
     const sf_ray *ray = &b->ray[r];
     move(b->x, ray->from, b->spare_x, ray->lane, ray->count, 3);
+    move(b->delta, ray->from, b->spare_delta, ray->lane, ray->count, 1);
     move(b->f, ray->from, b->df, ray->lane, ray->count, features);
   }
   for (int i = 0; i < b->bundles; i++) {
@@ -83,5 +84,6 @@ void sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
     clear_tail(b, &b->bundle[i], b->df, features);
   }
   exchange(&b->x, &b->spare_x);
+  exchange(&b->delta, &b->spare_delta);
   exchange(&b->f, &b->df);
 }

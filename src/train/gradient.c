@@ -89,7 +89,7 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     ray_in(p, &batch->ray[r], w);
-    sf_loss_ray(p, &batch->ray[r], batch->delta, &w->ray, &g->sums);
+    sf_loss_ray(p, &batch->ray[r], batch->delta + batch->ray[r].lane, &w->ray, &g->sums);
     ray_out(p, &batch->ray[r], w);
   }
   count_spikes(t, steps, &w->block[0], lanes < SF_BLOCK ? lanes : SF_BLOCK, g);

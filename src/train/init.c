@@ -27,7 +27,7 @@ void sf_probes_free(sf_probes *p)
 /* A cell of the first byte with occupied ones, from a random byte on; any cell where all are empty. */
 static size_t occupied_cell(const sf_trainer *t, uint64_t stream, uint64_t index)
 {
-  const size_t res = (size_t)t->model.config.occ_res, bytes = res * res * res / 8;
+  const size_t bytes = sf_config_cells(&t->model.config) / 8;
   const uint8_t *occupancy = t->model.occupancy;
   size_t byte = sf_random_below(t->options.seed, stream, index, bytes), bit = index % 8;
   for (size_t i = 0; i < bytes && !occupancy[byte]; i++) byte = (byte + 1) % bytes;
@@ -37,15 +37,15 @@ static size_t occupied_cell(const sf_trainer *t, uint64_t stream, uint64_t index
 
 void sf_probes_draw(const sf_trainer *t, uint64_t stream, int count, sf_probes *p)
 {
-  const size_t res = (size_t)t->model.config.occ_res;
   for (int i = 0; i < count; i++) {
     const uint64_t base = ((uint64_t)t->iteration * PROBES + i) * 5, seed = t->options.seed;
-    const size_t cell = occupied_cell(t, stream, base), at[3] = {cell % res, cell / res % res, cell / res / res};
+    const size_t cell = occupied_cell(t, stream, base);
     const float *pose = t->data->view[sf_random_below(seed, stream, base + 1, t->data->count)].camera.to_world;
-    float x[3], d[3], length = 0;
+    float place[3], x[3], d[3], length = 0;
+    for (int a = 0; a < 3; a++) place[a] = sf_random_float(seed, stream, base + 2 + a);
+    sf_occupancy_point(&t->model.config, cell, place, x);
     for (int a = 0; a < 3; a++) {
-      x[a] = fminf(((float)at[a] + sf_random_float(seed, stream, base + 2 + a)) / (float)res, 0x1.fffffep-1f);
-      d[a] = 2 * x[a] - 1 - pose[4 * a + 3];
+      d[a] = (float)t->model.config.bound * (2 * x[a] - 1) - pose[4 * a + 3];
       length += d[a] * d[a];
     }
     for (int a = 0; a < 3; a++) d[a] /= sqrtf(length) + 1e-9f;

@@ -9,7 +9,7 @@
 
 /* Work is cut into GROUPS parts that do not depend on the number of threads; each part adds up its own gradient in
  * sample order and the parts are added in order: same seed, same bits, any thread count. */
-enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64, LATTICE_MAX = 1024 };
+enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64 };
 
 /* A bundle is closed before it has more samples than this: what two threads keep for their backward passes (12 kB a
  * sample) then fits the last-level cache. A single ray may have more, up to BUNDLE_BLOCKS. */
@@ -42,13 +42,13 @@ typedef struct sf_bundle {
 typedef struct sf_batch {
   int rays, marched, samples; /* samples in occupied space, and those of them that light reaches */
   int bundles, blocks, block_capacity;
-  float delta;                       /* interval of a sample, model units */
-  sf_ray *ray;                       /* [RAYS_MAX] */
-  sf_bundle *bundle;                 /* [RAYS_MAX] */
-  uint64_t (*hit)[LATTICE_MAX / 64]; /* [RAYS_MAX] lattice points of a ray in occupied cells, a bit each */
-  float *x;                          /* [blocks][3][SF_BLOCK] positions in [0,1] */
-  float *f, *df;                     /* [blocks][features][SF_BLOCK] */
-  float *spare_x;                    /* for compaction; df serves f */
+  sf_ray *ray;                        /* [RAYS_MAX] */
+  sf_bundle *bundle;                  /* [RAYS_MAX] */
+  uint64_t (*hit)[SF_STEPS_MAX / 64]; /* [RAYS_MAX] lattice points of a ray in occupied cells, a bit each */
+  float *x;                           /* [blocks][3][SF_BLOCK] positions in [0,1] */
+  float *f, *df;                      /* [blocks][features][SF_BLOCK] */
+  float *delta;                       /* [blocks][SF_BLOCK] lengths of the samples' intervals, model units */
+  float *spare_x, *spare_delta;       /* for compaction; df serves f */
 } sf_batch;
 
 /* Loss of one iteration's steps, weights of its terms, and sums over its rays. */
@@ -78,7 +78,9 @@ typedef struct sf_ray_work {
   float *memory;
 } sf_ray_work;
 sf_status sf_ray_work_create(sf_ray_work *work, int samples);
-void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, float delta, sf_ray_work *work, sf_loss_sums *sums);
+/* delta[ray->count]: lengths of the samples' intervals. */
+void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, const float *delta, sf_ray_work *work,
+                 sf_loss_sums *sums);
 
 typedef struct sf_group {
   sf_net_grad *grad;
@@ -110,7 +112,8 @@ struct sf_trainer {
   float *rounded;                  /* in fine-tuning: parameters with rounded weights, [model.size], else NULL */
   float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
   int averaged;
-  float *density; /* occupancy's running density, [occ_res^3] */
+  float *density;     /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
+  sf_steps intervals; /* of this iteration's stride */
   sf_batch batch;
   sf_group group[GROUPS];
   sf_worker *worker;
@@ -175,6 +178,8 @@ void sf_health_leaks(sf_trainer *trainer);
  * nothing. */
 sf_status sf_health_check(sf_trainer *trainer, int event[3]);
 sf_status sf_occupancy_update(sf_trainer *trainer, int steps);
+/* The point of cell `cell` at `place` in [0,1]^3 of it, as a position in [0,1]^3 of the box. */
+void sf_occupancy_point(const sf_config *config, size_t cell, const float place[3], float x[3]);
 
 typedef struct sf_adam {
   double lr, beta1, beta2, epsilon;

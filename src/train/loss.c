@@ -33,7 +33,7 @@ typedef struct image {
   float *weight;
 } image;
 
-static image composite(const sf_ray *ray, int prefix, float delta, sf_ray_work *w, float *weight)
+static image composite(const sf_ray *ray, int prefix, const float *delta, sf_ray_work *w, float *weight)
 {
   image im = {.weight = weight};
   im.behind = sf_composite_weights(ray->count, w->sigma[prefix - 1], delta, weight);
@@ -54,7 +54,8 @@ static double squared_error(const float *a, const float *b)
 }
 
 /* Spreads the gradient of a prefix's rgb to its samples. */
-static void push(const sf_ray *ray, int prefix, float delta, const image *im, const float grgb[3], sf_ray_work *w)
+static void push(const sf_ray *ray, int prefix, const float *delta, const image *im, const float grgb[3],
+                 sf_ray_work *w)
 {
   const int n = ray->count;
   float *g = w->spare[5], *dcolour = w->dcolour[prefix - 1];
@@ -105,7 +106,7 @@ static float norm(int n, const float *x)
 }
 
 /* ||w tail|| / ||W|| + ||c tail|| / ||C_T|| of prefix t, whose gradient is scaled by `weight`. */
-static double add_extra(const sf_loss_plan *plan, const sf_ray *ray, float delta, int t, const image *full,
+static double add_extra(const sf_loss_plan *plan, const sf_ray *ray, const float *delta, int t, const image *full,
                         float weight, sf_ray_work *w, sf_loss_sums *sums)
 {
   const int n = ray->count, T = plan->steps, left = T - t;
@@ -159,7 +160,7 @@ static double add_extra(const sf_loss_plan *plan, const sf_ray *ray, float delta
   return value + na / nb;
 }
 
-static void stage_one(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_ray_work *w, sf_loss_sums *sums)
+static void stage_one(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)
 {
   image full = composite(ray, p->steps, delta, w, w->spare[0]);
   float grgb[3] = {0};
@@ -174,8 +175,8 @@ static void stage_one(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_
 }
 
 /* The terms that hang on one of the two prefixes around t^. `share` = 1-d or d. */
-static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, float delta, int t, float share, const image *full,
-                        sf_ray_work *w, sf_loss_sums *sums)
+static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, const float *delta, int t, float share,
+                        const image *full, sf_ray_work *w, sf_loss_sums *sums)
 {
   const float inverse = p->inverse_rays;
   image im = composite(ray, t, delta, w, w->spare[1]);
@@ -197,7 +198,7 @@ static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, float delta, i
         add_extra(p, ray, delta, t, full, p->extra * inverse * share, w, sums);
 }
 
-void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, float delta, sf_ray_work *w, sf_loss_sums *sums)
+void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)
 {
   for (int t = 0; t < p->steps; t++) {
     memset(w->dsigma[t], 0, ray->count * sizeof(float));

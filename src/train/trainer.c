@@ -93,9 +93,8 @@ static double stage1_weight(const sf_trainer *t)
 static sf_status copy_model(sf_model *to, const sf_model *from)
 {
   SF_TRY(sf_model_create(to, &from->config));
-  const size_t res = (size_t)from->config.occ_res;
   memcpy(to->value, from->value, from->size * sizeof *to->value);
-  memcpy(to->occupancy, from->occupancy, res * res * res / 8);
+  memcpy(to->occupancy, from->occupancy, sf_config_cells(&from->config) / 8);
   to->t_star = from->t_star;
   to->t_r = from->t_r;
   to->scales = from->scales;
@@ -114,7 +113,7 @@ static sf_status create(sf_trainer *t, const char *resume)
   t->grad = sf_aligned_alloc(bytes);
   t->moment1 = sf_aligned_alloc(bytes);
   t->moment2 = sf_aligned_alloc(bytes);
-  t->density = sf_aligned_alloc((size_t)c->occ_res * c->occ_res * c->occ_res * sizeof(float));
+  t->density = sf_aligned_alloc(sf_config_cells(c) * sizeof(float));
   if (!t->grad || !t->moment1 || !t->moment2 || !t->density)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
   SF_TRY(create_workers(t));

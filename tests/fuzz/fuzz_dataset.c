@@ -32,6 +32,8 @@ static const char *make_data_set(const char *input)
 static void use_rays(const sf_dataset *data)
 {
   const sf_config config = sf_config_default();
+  sf_steps steps;
+  FUZZ_EXPECT(sf_steps_make(&steps, &config, 1).code == SF_OK);
   for (int i = 0; i < data->count; i++) {
     const sf_camera *camera = &data->view[i].camera;
     for (int corner = 0; corner < 4; corner++) {
@@ -39,7 +41,7 @@ static void use_rays(const sf_dataset *data)
       sf_camera_ray(camera, corner & 1 ? 0.5f : (float)camera->width - 0.5f,
                     corner & 2 ? 0.5f : (float)camera->height - 0.5f, origin, direction);
       for (int a = 0; a < 3; a++) FUZZ_EXPECT(isfinite(origin[a]) && isfinite(direction[a]));
-      const sf_lattice lattice = sf_ray_lattice(&config, origin, direction);
+      const sf_lattice lattice = sf_ray_lattice(&steps, origin, direction);
       FUZZ_EXPECT(lattice.count >= 0 && lattice.count <= config.lattice);
     }
   }
