@@ -298,7 +298,7 @@ module sf_top #(
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
   initial begin
     if ((LANES != 32 && LANES != 64 && LANES != 128) || sf_arch_pkg::LANES != 128 || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
-        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 16 || sf_arch_pkg::LAYERS != 5
+        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::LAYERS != 5
         || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
         || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
         || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 1 || sf_arch_pkg::LEAK_FRAC > 12

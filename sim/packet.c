@@ -32,7 +32,7 @@ static int pack_all(uint64_t *words, const int16_t *value, int n)
 
 int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
 {
-  const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
+  const int n_dir = fx_net_constants(net);
   const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
   return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
 }

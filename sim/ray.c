@@ -10,9 +10,8 @@ enum { PATIENCE = 200000, STREAM_RAYS = 40, STREAM_PIXELS };
 static sf_ray_blob blob_of(const fx_scene *scene)
 {
   const fx_grid *grid = &scene->grid;
-  const fx_layer *layer = scene->net.layer;
   sf_ray_blob blob = {.levels = (uint32_t)grid->levels,
-                      .n_dir = (uint32_t)(layer[FX_C1].n_in - (layer[FX_D2].n_out - 1)),
+                      .n_dir = (uint32_t)fx_net_constants(&scene->net),
                       .dir_frac = (uint32_t)sf_fx_dir_frac(scene),
                       .trans_stop = (uint32_t)scene->trans_stop,
                       .max_samples = (uint32_t)scene->max_samples};

@@ -23,7 +23,7 @@ static cJSON *sample_json(const sf_replay_sample *s)
   sf_json_add_u64(json, "ray", s->ray);
   sf_json_add_u64(json, "sample", s->sample);
   cJSON_AddBoolToObject(json, "first", s->first);
-  cJSON_AddItemToObject(json, "direction", values_json(s->dir, SF_DIR_MAX));
+  cJSON_AddItemToObject(json, "direction", values_json(s->dir, FX_SH));
   cJSON_AddItemToObject(json, "features", values_json(s->f, SF_FEATURE_MAX));
   return json;
 }
@@ -103,7 +103,7 @@ static sf_status load_sample(const cJSON *json, const char *path, sf_replay_samp
   s->ray = (uint64_t)ray;
   s->sample = (uint64_t)sample;
   s->first = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "first"));
-  SF_TRY(load_values(json, path, "direction", SF_DIR_MAX, s->dir));
+  SF_TRY(load_values(json, path, "direction", FX_SH, s->dir));
   return load_values(json, path, "features", SF_FEATURE_MAX, s->f);
 }
 

@@ -89,7 +89,7 @@ sf_status rig_open(rig *r, const char *kernels, double rate)
   r->core->kernels->features(&r->scene.grid, r->block);
   for (int i = 0; i < FX_BLOCK; i++) {
     int16_t *dir = r->ray[i / RIG_RAY].dir;
-    for (int d = 0; d < SF_DIR_MAX; d++) dir[d] = (int16_t)pick(30, (uint64_t)(i / RIG_RAY * SF_DIR_MAX + d), 1024);
+    for (int d = 0; d < FX_SH; d++) dir[d] = (int16_t)pick(30, (uint64_t)(i / RIG_RAY * FX_SH + d), 1024);
     fx_net_direction(&r->scene.net, dir, r->base[i], NULL);
     r->block->base[i] = r->base[i];
   }

@@ -9,10 +9,13 @@
 #include <string.h>
 
 typedef struct fixture_sizes {
-  int levels, d_hidden, d_out, n_dir, c1, c2, steps, mode;
+  int levels, d_hidden, d_out, n_dir, c1, c2, steps, mode; /* levels, d_hidden, d_out = 0: a decoder */
+  int bias[SF_LAYERS];
 } fixture_sizes;
 
-static const fixture_sizes fixture_ingp = {16, 128, 16, 16, 128, 128, 4, FX_HYBRID};
+static const fixture_sizes fixture_ingp = {16, 128, 16, 16, 128, 128, 4, FX_HYBRID, {0}};
+static const fixture_sizes fixture_decoder = {
+    0, 0, 0, 150, 128, 128, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
 
 static inline int64_t fixture_pick(uint64_t seed, uint64_t stream, uint64_t index, int64_t low, int64_t high)
 {
@@ -30,6 +33,19 @@ static inline fixture_sizes fixture_random_sizes(uint64_t seed)
   s.c2 = (int)fixture_pick(seed, 1, 5, 1, 128);
   s.steps = (int)fixture_pick(seed, 1, 6, 1, SF_T_MAX);
   s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_NODECAY);
+  memset(s.bias, 0, sizeof s.bias);
+  if (fixture_pick(seed, 1, 8, 0, 2) == 0) s.bias[FX_C1] = (int)fixture_pick(seed, 1, 9, 1, 2047);
+  s.bias[FX_C2] = fixture_pick(seed, 1, 10, 0, 2) == 0;
+  s.bias[FX_C3] = fixture_pick(seed, 1, 11, 0, 2) == 0;
+  return s;
+}
+
+/* A decoder of 1..160 inputs. */
+static inline fixture_sizes fixture_random_decoder(uint64_t seed)
+{
+  fixture_sizes s = fixture_random_sizes(seed);
+  s.levels = s.d_hidden = s.d_out = 0;
+  s.n_dir = (int)fixture_pick(seed, 2, 0, 0, 3) ? (int)fixture_pick(seed, 2, 1, 1, SF_DIR_MAX) : SF_DIR_MAX;
   return s;
 }
 
@@ -52,8 +68,9 @@ static inline void fixture_set_sizes(fx_scene *scene, const fixture_sizes *s)
 {
   fx_layer *l = scene->net.layer;
   l[FX_D1].n_in = 2 * s->levels, l[FX_D1].n_out = l[FX_D2].n_in = s->d_hidden, l[FX_D2].n_out = s->d_out;
-  l[FX_C1].n_in = s->n_dir + s->d_out - 1, l[FX_C1].n_out = l[FX_C2].n_in = s->c1;
+  l[FX_C1].n_in = s->n_dir + (s->d_out ? s->d_out - 1 : 0), l[FX_C1].n_out = l[FX_C2].n_in = s->c1;
   l[FX_C2].n_out = l[FX_C3].n_in = s->c2, l[FX_C3].n_out = 3;
+  for (int i = 0; i < SF_LAYERS; i++) l[i].bias = s->bias[i];
   fixture_grid(&scene->grid, s->levels);
   scene->occ_res = 8;
 }
@@ -65,8 +82,8 @@ static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer *layer = &scene->net.layer[l];
     layer->k = (int32_t)fixture_pick(seed, 10, (uint64_t)l, 0, 4096);
-    layer->theta = theta[l];
-    for (int i = 0; i < layer->n_in; i++)
+    layer->theta = layer->n_out ? theta[l] : 0;
+    for (int i = 0; i < fx_layer_rows(layer); i++)
       for (int o = 0; o < layer->n_out; o++)
         layer->w[i * SF_LANES + o] =
             (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), -127, 127);
@@ -98,7 +115,7 @@ static inline fx_scene fixture_scene(const fixture_sizes *sizes, uint64_t seed)
 
 static inline void fixture_inputs(uint64_t seed, uint64_t index, int16_t *f, int n, int limit)
 {
-  for (int i = 0; i < n; i++) f[i] = (int16_t)fixture_pick(seed, 40, index * 64 + (uint64_t)i, -limit, limit);
+  for (int i = 0; i < n; i++) f[i] = (int16_t)fixture_pick(seed, 40, index * 256 + (uint64_t)i, -limit, limit);
 }
 
 /* ---- the naive nets ---- */
@@ -165,6 +182,10 @@ static inline void naive_synapses(naive_net *n, int l, int t, const bool *spike,
     }
     n->ever[l][i] = n->ever[l][i] || spike[i];
   }
+  for (int o = 0; layer->bias && o < layer->n_out; o++) {
+    current[o] += layer->w[layer->n_in * SF_LANES + o];
+    n->counts->layer[l].weight[t] += l == FX_C2 || t == 0;
+  }
 }
 
 static inline void naive_products(naive_net *n, int l, int t, int row, const int64_t *x, int count, int64_t *current)
@@ -211,11 +232,16 @@ static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t
 static inline void naive_colour(naive_net *n, int t, const int64_t *base, const int64_t *h)
 {
   const fx_net *net = n->net;
-  const int n_h = net->layer[FX_D2].n_out - 1;
+  const int n_h = net->layer[FX_D1].n_out ? net->layer[FX_D2].n_out - 1 : 0;
   bool spike[SF_LANES], spike2[SF_LANES];
   int64_t current[SF_LANES];
   memcpy(current, base, sizeof current);
   naive_products(n, FX_C1, t, net->layer[FX_C1].n_in - n_h, h, n_h, current);
+  for (int o = 0; o < net->layer[FX_C1].n_out; o++) {
+    const int64_t kept = naive_clamp(current[o], -8388608, 8388607);
+    n->counts->saturated[FX_C1] += kept != current[o] && t == 0;
+    current[o] = kept;
+  }
   naive_fire(n, FX_C1, t, current, 0, spike);
   naive_synapses(n, FX_C2, t, spike, current);
   naive_fire(n, FX_C2, t, current, 8, spike2);
@@ -231,23 +257,29 @@ static inline void naive_colour(naive_net *n, int t, const int64_t *base, const 
 static inline void naive_sample(const fx_net *net, const int16_t *f, const int16_t *dir, bool first, fx_out *out,
                                 fx_trace *trace, fx_counts *counts)
 {
-  const int n_h = net->layer[FX_D2].n_out - 1, n_dir = net->layer[FX_C1].n_in - n_h;
+  const bool decodes = net->layer[FX_D1].n_out == 0;
+  const fx_layer *c1 = &net->layer[FX_C1];
+  const int n_h = decodes ? 0 : net->layer[FX_D2].n_out - 1, n_dir = c1->n_in - n_h;
   naive_net n = {.net = net, .counts = counts, .trace = trace};
   fx_counts ignored = {0};
-  int64_t x[SF_LANES], d[SF_LANES], d1[SF_LANES] = {0}, base[SF_LANES] = {0}, h[SF_OUT_MAX] = {0};
+  int64_t x[SF_LANES], d[SF_DIR_MAX], d1[SF_LANES] = {0}, base[SF_LANES] = {0}, h[SF_OUT_MAX] = {0};
   for (int i = 0; i < net->layer[FX_D1].n_in; i++) x[i] = f[i];
   for (int i = 0; i < n_dir; i++) d[i] = dir[i];
   uint64_t before[SF_LAYERS];
   memcpy(before, counts->saturated, sizeof before);
   memset(trace, 0, sizeof *trace);
   counts->samples++;
-  counts->rays += first;
+  counts->rays += first && !decodes;
   naive_products(&n, FX_D1, 0, 0, x, net->layer[FX_D1].n_in, d1);
   n.counts = first ? counts : &ignored;
   naive_products(&n, FX_C1, 0, 0, d, n_dir, base);
+  for (int o = 0; c1->bias && o < c1->n_out; o++) {
+    base[o] += (int64_t)c1->bias * c1->w[c1->n_in * SF_LANES + o];
+    n.counts->layer[FX_C1].weight[0]++;
+  }
   n.counts = counts;
   for (int t = 0; t < net->steps; t++) {
-    naive_density(&n, t, d1, h);
+    if (!decodes) naive_density(&n, t, d1, h);
     naive_colour(&n, t, base, h);
   }
   for (int l = 0; l < SF_LAYERS; l++) counts->saturated_samples[l] += counts->saturated[l] != before[l];

@@ -46,7 +46,7 @@ static inline void hard_begin(hard *h, const hard_case *c, int variant)
   memset(h, 0, sizeof *h);
   h->scene = fixture_scene(&sizes, 11);
   fixture_inputs(12, 0, h->f, SF_FEATURE_MAX, 700);
-  fixture_inputs(13, 0, h->ray.dir, SF_DIR_MAX, 1024);
+  fixture_inputs(13, 0, h->ray.dir, FX_SH, 1024);
   if (c->kind == HARD_RAY) {
     memset(h->scene.occupancy, 0xff, 64);
     h->scene.net.exp_in = (fx_scale){0, 0, 0};
@@ -92,7 +92,7 @@ static inline void hard_theta(fx_net *net, int32_t theta)
 static inline void hard_inputs(hard *h, int16_t f, int16_t dir)
 {
   for (int i = 0; i < SF_FEATURE_MAX; i++) h->f[i] = f;
-  for (int i = 0; i < SF_DIR_MAX; i++) h->ray.dir[i] = dir;
+  for (int i = 0; i < FX_SH; i++) h->ray.dir[i] = dir;
 }
 
 /* ---- leak ---- */

@@ -42,7 +42,7 @@ static inline sf_dut *open_dut(const fx_net *net, uint64_t seed, int stalls)
 static inline void draw_batch(batch *b, random_source *r, int n, bool extreme)
 {
   for (int i = 0; i < n; i++) {
-    draw_values(r, b->ray[i].dir, SF_DIR_MAX, extreme);
+    draw_values(r, b->ray[i].dir, FX_SH, extreme);
     draw_values(r, b->f[i], SF_FEATURE_MAX, extreme);
     b->sample[i] = (sf_dut_sample){&b->ray[i], i == 0 || draw(r, 0, BATCH / RAYS_PER_BATCH - 1) == 0, b->f[i]};
   }

@@ -171,9 +171,9 @@ START_TEST(recount_equals_core_on_random_nets)
     fixture_sizes sizes = fixture_random_sizes(seed);
     fx_scene scene = fixture_scene(&sizes, seed);
     fx_counts core = {0}, recount = {0};
-    int16_t f[32], dir[SF_DIR_MAX];
+    int16_t f[32], dir[FX_SH];
     int32_t base[SF_LANES];
-    fixture_inputs(seed + 1, 0, dir, SF_DIR_MAX, 1024);
+    fixture_inputs(seed + 1, 0, dir, FX_SH, 1024);
     fx_net_direction(&scene.net, dir, base, &core);
     for (uint64_t n = 0; n < 5; n++) {
       fx_out out;
@@ -240,7 +240,7 @@ static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
     ray->origin[axis] = (int64_t)sf_random_below(9, (uint64_t)axis, index, 1 << 24) << 16;
   ray->step[0] = (int64_t)800000 << 16;
   ray->count = 20;
-  fixture_inputs(8, index, ray->dir, SF_DIR_MAX, 1024);
+  fixture_inputs(8, index, ray->dir, FX_SH, 1024);
   return sf_ok();
 }
 
@@ -251,7 +251,7 @@ static bool tick(void *user, uint64_t done)
 
 START_TEST(measure_does_not_depend_on_threads)
 {
-  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, UINT64_MAX};
@@ -319,7 +319,7 @@ END_TEST
 
 START_TEST(measure_reports_the_lowest_failing_ray)
 {
-  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
   rays user = {10, UINT64_MAX};
   sf_measure_job job = {&scene, 5000, make_ray, tick, &user, 7, 10};

@@ -12,7 +12,7 @@ static const sf_quant_widths widest[] = {{SF_WEIGHT_BITS, SF_INPUT_BITS, SF_LEAK
 
 enum { RAYS = 600 };
 
-static const fixture_sizes small = {6, 20, 6, 9, 24, 20, 3, FX_HYBRID};
+static const fixture_sizes small = {6, 20, 6, 9, 24, 20, 3, FX_HYBRID, {0}};
 
 static fx_scene small_scene(uint64_t seed, int mode)
 {
@@ -78,7 +78,7 @@ static void clear_row(fx_layer *layer, int i)
 static void spoil(fx_scene *scene)
 {
   fx_layer *l = scene->net.layer;
-  const int n_dir = l[FX_C1].n_in - (l[FX_D2].n_out - 1);
+  const int n_dir = fx_net_constants(&scene->net);
   clear_column(&l[FX_D1], 0), clear_column(&l[FX_C1], 5), clear_column(&l[FX_C2], 19); /* silent */
   clear_row(&l[FX_D2], 7), clear_row(&l[FX_C3], 3);                                    /* without fan-out */
   clear_row(&l[FX_C2], 9);

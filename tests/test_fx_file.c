@@ -44,7 +44,7 @@ static void setup(void)
 
 static fx_scene small_scene(uint64_t seed)
 {
-  const fixture_sizes sizes = {2, 16, 5, 9, 24, 40, 3, FX_NODECAY};
+  const fixture_sizes sizes = {2, 16, 5, 9, 24, 40, 3, FX_NODECAY, {0}};
   return fixture_scene(&sizes, seed);
 }
 
@@ -79,7 +79,8 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *x = &a->net.layer[l], *y = &b->net.layer[l];
     ck_assert(x->n_in == y->n_in && x->n_out == y->n_out && x->k == y->k && x->theta == y->theta);
-    ck_assert_mem_eq(x->w, y->w, (size_t)x->n_in * SF_LANES);
+    ck_assert_int_eq(x->bias, y->bias);
+    ck_assert_mem_eq(x->w, y->w, (size_t)fx_layer_rows(x) * SF_LANES);
     ck_assert(a->current_scale[l] == b->current_scale[l]);
   }
   ck_assert(a->net.mode == b->net.mode && a->net.steps == b->net.steps);

@@ -8,7 +8,7 @@ static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
   for (uint64_t n = 0; n < 4; n++) {
     int16_t f[32], dir[SF_DIR_MAX];
     fixture_inputs(seed, n, f, 32, n == 0 ? 2047 : 700);
-    fixture_inputs(seed + 1, n, dir, SF_DIR_MAX, 1024);
+    fixture_inputs(seed + 1, n, dir, SF_DIR_MAX, n == 0 ? 2047 : 1024);
     assert_sample(&scene.net, f, dir, trace);
   }
   free(trace);
@@ -35,14 +35,80 @@ START_TEST(net_equals_naive_at_random_sizes)
 }
 END_TEST
 
+START_TEST(decoder_equals_naive)
+{
+  for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++)
+    for (int steps = 1; steps <= SF_T_MAX; steps++) {
+      fixture_sizes sizes = fixture_decoder;
+      sizes.mode = mode, sizes.steps = steps, sizes.n_dir = steps % 2 ? 150 : 30;
+      check_sizes(&sizes, (uint64_t)(mode * 10 + steps));
+    }
+  for (uint64_t seed = 0; seed < 150; seed++) {
+    const fixture_sizes sizes = fixture_random_decoder(seed);
+    check_sizes(&sizes, seed);
+  }
+}
+END_TEST
+
+/* All weights and inputs at their rails: the exact sum of 160 products needs 27 bits, a membrane has 24. */
+START_TEST(decoder_current_saturates)
+{
+  fixture_sizes sizes = fixture_decoder;
+  sizes.n_dir = SF_DIR_MAX, sizes.bias[FX_C1] = 2047;
+  fx_scene scene = fixture_scene(&sizes, 3);
+  const fx_layer *c1 = &scene.net.layer[FX_C1];
+  for (int i = 0; i < fx_layer_rows(c1); i++)
+    for (int o = 0; o < SF_LANES; o++) c1->w[i * SF_LANES + o] = o % 2 ? 127 : -127;
+  int16_t dir[SF_DIR_MAX];
+  for (int i = 0; i < SF_DIR_MAX; i++) dir[i] = 2047;
+  fx_trace *trace = malloc(sizeof *trace);
+  assert_sample(&scene.net, NULL, dir, trace);
+  ck_assert_int_eq(trace->current[FX_C1][0][0], -(1 << 23));
+  ck_assert_int_eq(trace->current[FX_C1][1][1], (1 << 23) - 1);
+  fx_counts counts = {0};
+  int32_t base[SF_LANES];
+  fx_out out;
+  fx_net_direction(&scene.net, dir, base, &counts);
+  ck_assert_int_eq(base[1], 161 * 2047 * 127);
+  fx_net_sample(&scene.net, NULL, base, &out, NULL, &counts);
+  ck_assert_uint_eq(counts.saturated[FX_C1], 128);
+  ck_assert_uint_eq(counts.rays, 0);
+  free(trace);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* The paper's TensoRF decoder: 150 -> 128 -> 128 -> 3 has 35968 synapses, biases not among them. */
+START_TEST(decoder_macs_are_the_papers)
+{
+  fixture_sizes sizes = fixture_decoder;
+  fx_scene scene = fixture_scene(&sizes, 4);
+  const fx_layer *l = scene.net.layer;
+  ck_assert_int_eq(l[FX_C1].n_in * l[FX_C1].n_out + l[FX_C2].n_in * l[FX_C2].n_out + l[FX_C3].n_in * l[FX_C3].n_out,
+                   35968);
+  fx_counts c = {0};
+  fx_out out;
+  const int32_t silent[SF_LANES] = {0};
+  scene.net.steps = 2;
+  fx_net_sample(&scene.net, NULL, silent, &out, NULL, &c);
+  ck_assert_uint_eq(c.layer[FX_C1].mac[0], 150 * 128);
+  ck_assert_uint_eq(c.layer[FX_C1].weight[0], 151 * 128);
+  ck_assert_uint_eq(c.layer[FX_C2].sop[0], 0);
+  ck_assert_uint_eq(c.layer[FX_C2].weight[1], 128);
+  ck_assert_uint_eq(c.layer[FX_C3].weight[0], 3);
+  ck_assert_uint_eq(c.layer[FX_C3].weight[1], 0);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 /* The comparison means something only if a part of the neurons fires. */
 START_TEST(fixture_fires_in_part)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 77);
   fx_counts c = {0};
   int32_t base[SF_LANES];
-  int16_t f[32], dir[SF_DIR_MAX];
-  fixture_inputs(1, 0, dir, SF_DIR_MAX, 1024);
+  int16_t f[32], dir[FX_SH];
+  fixture_inputs(1, 0, dir, FX_SH, 1024);
   fx_net_direction(&scene.net, dir, base, NULL);
   for (uint64_t n = 0; n < 50; n++) {
     fx_out out;
@@ -105,7 +171,7 @@ static fx_ray diagonal_ray(uint64_t index)
     const int64_t to = fixture_pick(6, a, index, 0, ((int64_t)1 << 31) - 1) << 9;
     ray.origin[a] = from, ray.step[a] = (to - from) / 60;
   }
-  fixture_inputs(7, index, ray.dir, SF_DIR_MAX, 1024);
+  fixture_inputs(7, index, ray.dir, FX_SH, 1024);
   return ray;
 }
 
@@ -157,6 +223,9 @@ int main(void)
   tcase_set_timeout(nets, 300);
   tcase_add_test(nets, net_equals_naive_at_full_size);
   tcase_add_test(nets, net_equals_naive_at_random_sizes);
+  tcase_add_test(nets, decoder_equals_naive);
+  tcase_add_test(nets, decoder_current_saturates);
+  tcase_add_test(nets, decoder_macs_are_the_papers);
   tcase_add_test(nets, fixture_fires_in_part);
   tcase_add_test(nets, counts_add_up);
   tcase_add_test(nets, render_equals_naive_evaluation);

@@ -21,9 +21,10 @@ static int64_t pick(uint64_t seed, uint64_t what, int64_t low, int64_t high)
 
 /* Thresholds from 'always fires' over typical to 'never', so that C2 meets events and dense rows; every third scene has
  * its weights at the rails. */
-static fx_scene random_scene(uint64_t seed)
+static fx_scene random_net_scene(uint64_t seed, bool decodes)
 {
   fixture_sizes sizes = seed % 2 ? fixture_random_sizes(seed) : fixture_ingp;
+  if (decodes) sizes = seed % 2 ? fixture_random_decoder(seed) : fixture_decoder;
   sizes.mode = (int)(seed / 2 % 3), sizes.steps = (int)pick(seed, 0, 1, SF_T_MAX);
   fx_scene s = fixture_scene(&sizes, seed);
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -32,7 +33,7 @@ static fx_scene random_scene(uint64_t seed)
       layer->theta = (int32_t)pick(seed, 1 + (uint64_t)l, 0, 3) * 25000 * (l == FX_C2 ? 4 : 1) +
                      (int32_t)pick(seed, 6 + (uint64_t)l, 1, 30000);
     if (seed % 16 == 5 && layer->theta) layer->theta = FX_MEMBRANE_MAX;
-    for (int i = 0; seed % 3 == 0 && i < layer->n_in * SF_LANES; i++)
+    for (int i = 0; seed % 3 == 0 && i < fx_layer_rows(layer) * SF_LANES; i++)
       layer->w[i] = (int8_t)(layer->w[i] > 0 ? 127 : layer->w[i] < 0 ? -127 : 0);
     if (seed % 5 == 0) layer->k = (int32_t[]){0, 1, 4095, 4096}[pick(seed, 12 + (uint64_t)l, 0, 3)];
   }
@@ -49,6 +50,11 @@ static fx_scene random_scene(uint64_t seed)
   return s;
 }
 
+static fx_scene random_scene(uint64_t seed)
+{
+  return random_net_scene(seed, false);
+}
+
 static fx_core *open_core(const fx_scene *scene, const char *name)
 {
   fx_core *core;
@@ -63,7 +69,9 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
   static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   fx_events events;
   fx_out out;
-  fx_net_events(net, b->f[i], b->base[i], &out, &events, NULL);
+  int32_t base[SF_LANES];
+  if (fx_net_decodes(net)) fx_net_direction(net, b->constant[i], base, NULL);
+  fx_net_events(net, b->f[i], fx_net_decodes(net) ? base : b->base[i], &out, &events, NULL);
   for (int t = 0; t < net->steps; t++)
     for (int l = 0; l < FX_SPIKING; l++)
       ck_assert_msg(!memcmp(events.spikes[spiking[l]][t], b->spikes[l][t][i], 16),
@@ -77,6 +85,22 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
                   b->saturated[l][i], (unsigned long long)events.saturated[l]);
 }
 
+/* The events of a whole block are the sum of its samples'. */
+static void compare_events(const fx_net *net, const fx_block *b)
+{
+  fx_counts sum = {0}, block = {0};
+  for (int i = 0; i < b->n; i++) {
+    int32_t base[SF_LANES];
+    fx_out out;
+    if (fx_net_decodes(net)) fx_net_direction(net, b->constant[i], base, &sum);
+    fx_net_sample(net, b->f[i], fx_net_decodes(net) ? base : b->base[i], &out, NULL, &sum);
+  }
+  fx_count_firing(&block, net, &b->firing);
+  memcpy(block.saturated, sum.saturated, sizeof sum.saturated); /* compared sample by sample */
+  memcpy(block.saturated_samples, sum.saturated_samples, sizeof sum.saturated_samples);
+  assert_same_counts(&block, &sum);
+}
+
 /* Inputs over the whole range in half of the scenes. */
 static long compare_block(const fx_core *core, fx_block *b, fx_scratch *scratch, int n, const char *name, uint64_t seed,
                           uint64_t block)
@@ -85,22 +109,26 @@ static long compare_block(const fx_core *core, fx_block *b, fx_scratch *scratch,
   int32_t base[FX_BLOCK][SF_LANES];
   b->n = n;
   for (int i = 0; i < n; i++) {
-    int16_t dir[SF_DIR_MAX];
+    int16_t dir[FX_SH];
     fixture_inputs(seed, block * FX_BLOCK + (uint64_t)i, b->f[i], net->layer[FX_D1].n_in, seed / 3 % 2 ? 2047 : 700);
-    fixture_inputs(seed + 1, block * FX_BLOCK + (uint64_t)i, dir, SF_DIR_MAX, 2047);
-    fx_net_direction(net, dir, base[i], NULL);
+    fixture_inputs(seed + 1, block * FX_BLOCK + (uint64_t)i, dir, FX_SH, 2047);
+    if (!fx_net_decodes(net)) fx_net_direction(net, dir, base[i], NULL);
     b->base[i] = base[i];
+    fixture_inputs(seed + 2, block * FX_BLOCK + (uint64_t)i, b->constant[i], SF_DIR_MAX, seed / 3 % 2 ? 2047 : 700);
+    if (seed % 7 == 3) /* all at the rails: currents saturate */
+      for (int j = 0; j < SF_DIR_MAX; j++) b->constant[i][j] = 2047;
   }
   core->kernels->nets(core, b, scratch);
   for (int i = 0; i < n; i++) compare_sample(net, b, i, name, seed);
+  compare_events(net, b);
   return n;
 }
 
 /* Blocks of every length. */
-static long compare_nets(const char *name, uint64_t seed)
+static long compare_nets(const char *name, uint64_t seed, bool decodes)
 {
   enum { BLOCKS = 4 };
-  fx_scene scene = random_scene(seed);
+  fx_scene scene = random_net_scene(seed, decodes);
   fx_core *core = open_core(&scene, name);
   fx_block *b = sf_aligned_alloc(sizeof *b);
   fx_scratch *scratch = sf_aligned_alloc(sizeof *scratch);
@@ -151,7 +179,7 @@ static fx_ray random_ray(uint64_t seed, uint64_t index)
     const int64_t to = fixture_pick(seed, 6, index * 3 + a, 0, ((int64_t)1 << 31) - 1) << 9;
     ray.origin[a] = from, ray.step[a] = (to - from) / 300;
   }
-  fixture_inputs(seed, 1000 + index, ray.dir, SF_DIR_MAX, 1024);
+  fixture_inputs(seed, 1000 + index, ray.dir, FX_SH, 1024);
   return ray;
 }
 
@@ -198,9 +226,32 @@ static void campaign(const char *name, long (*compare)(const char *name, uint64_
   for (uint64_t seed = 1; wanted > 0; seed++) wanted -= compare(name, seed);
 }
 
+static long compare_density_nets(const char *name, uint64_t seed)
+{
+  return compare_nets(name, seed, false);
+}
+
+static long compare_decoders(const char *name, uint64_t seed)
+{
+  return compare_nets(name, seed, true);
+}
+
 START_TEST(nets_equal_portable)
 {
-  campaign(instruction_sets[_i], compare_nets, samples_wanted());
+  campaign(instruction_sets[_i], compare_density_nets, samples_wanted());
+}
+END_TEST
+
+START_TEST(decoders_equal_portable)
+{
+  campaign(instruction_sets[_i], compare_decoders, samples_wanted());
+}
+END_TEST
+
+START_TEST(portable_block_equals_single_samples)
+{
+  campaign("portable", compare_density_nets, 500);
+  campaign("portable", compare_decoders, 500);
 }
 END_TEST
 
@@ -288,6 +339,8 @@ int main(void)
   TCase *equal = tcase_create("equal");
   tcase_set_timeout(equal, 0);
   tcase_add_loop_test(equal, nets_equal_portable, 0, 2);
+  tcase_add_loop_test(equal, decoders_equal_portable, 0, 2);
+  tcase_add_test(equal, portable_block_equals_single_samples);
   tcase_add_loop_test(equal, grid_equals_portable, 0, 2);
   tcase_add_loop_test(equal, rays_equal_portable, 0, 2);
   tcase_add_test(equal, portable_waves_equal_single_rays);

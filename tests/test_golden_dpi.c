@@ -6,7 +6,7 @@
 #include <pthread.h>
 
 enum { SAMPLES = 24, THREADS = 4 };
-static int16_t direction[SF_DIR_MAX], features[SF_FEATURE_MAX];
+static int16_t direction[FX_SH], features[SF_FEATURE_MAX];
 
 static void *open_golden(void)
 {
@@ -22,7 +22,7 @@ static void draw_sample(uint64_t seed, int sample)
   memset(features, 0, sizeof features);
   memset(direction, 0, sizeof direction);
   draw_values(&r, features, core.net.layer[FX_D1].n_in, false);
-  draw_values(&r, direction, core.net.layer[FX_C1].n_in - (core.net.layer[FX_D2].n_out - 1), false);
+  draw_values(&r, direction, fx_net_constants(&core.net), false);
 }
 
 static bool begins_ray(int sample)
@@ -44,7 +44,7 @@ static int send(void *golden, const int16_t *value, int n, bool user, bool last)
 
 static int send_sample(void *golden, bool first)
 {
-  const int n_dir = core.net.layer[FX_C1].n_in - (core.net.layer[FX_D2].n_out - 1);
+  const int n_dir = fx_net_constants(&core.net);
   if (first) ck_assert_int_eq(send(golden, direction, n_dir, true, false), 0);
   return send(golden, features, core.net.layer[FX_D1].n_in, false, true);
 }

@@ -409,7 +409,7 @@ static void assert_widths_hold(const fx_scene *scene, const sf_quant_widths *w)
     for (int i = 0; i < 2 * scene->grid.levels; i++) ck_assert_int_le(abs(f[i]), input_max);
     if (w->feature_bits < SF_INPUT_BITS) ck_assert_uint_eq(counts.saturated_features, 0);
     ck_assert_int_eq(sf_fx_ray_make(scene, o, d, &ray).code, SF_OK);
-    for (int i = 0; i < SF_DIR_MAX; i++) ck_assert_int_le(abs(ray.dir[i]), input_max);
+    for (int i = 0; i < FX_SH; i++) ck_assert_int_le(abs(ray.dir[i]), input_max);
   }
 }
 

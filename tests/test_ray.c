@@ -177,7 +177,7 @@ END_TEST
 START_TEST(directions_that_are_none)
 {
   static const int16_t full[3] = {INT16_MIN, INT16_MAX, INT16_MAX}, one[3] = {-FX_UNIT_ONE, FX_UNIT_ONE, FX_UNIT_ONE};
-  int16_t a[SF_DIR_MAX], b[SF_DIR_MAX];
+  int16_t a[FX_SH], b[FX_SH];
   fx_sh(full, FX_DIR_FRAC_MAX, a);
   fx_sh(one, FX_DIR_FRAC_MAX, b);
   ck_assert_mem_eq(a, b, sizeof a); /* clamped to one */
@@ -186,7 +186,7 @@ START_TEST(directions_that_are_none)
   ck_assert_int_eq(a[0], 578);
   const int16_t zero[3] = {0};
   fx_sh(zero, 0, a);
-  for (int n = 0; n < SF_DIR_MAX; n++) ck_assert_int_eq(a[n], 0); /* 0.28 and -0.32 round to none */
+  for (int n = 0; n < FX_SH; n++) ck_assert_int_eq(a[n], 0); /* 0.28 and -0.32 round to none */
 }
 END_TEST
 

@@ -207,7 +207,7 @@ START_TEST(all_steps_under_stalls)
     }
     draw_batch(&shared, &r, BATCH, false);
     for (int i = 0; saturating && i < BATCH; i++) {
-      for (int k = 0; k < SF_DIR_MAX; k++) shared.ray[i].dir[k] = 2047;
+      for (int k = 0; k < FX_SH; k++) shared.ray[i].dir[k] = 2047;
       for (int k = 0; k < SF_FEATURE_MAX; k++) shared.f[i][k] = 2047;
     }
     fx_counts counts = {0};

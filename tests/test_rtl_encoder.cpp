@@ -132,7 +132,7 @@ private:
   void offer()
   {
     uint32_t pos[3];
-    int16_t f[2 * FX_LEVELS_MAX], v[3], dir[SF_DIR_MAX];
+    int16_t f[2 * FX_LEVELS_MAX], v[3], dir[FX_SH];
     const bool first = !in_ray || draw.percent(first_percent);
     for (int a = 0; a < 3; a++) pos[a] = table->coordinate(draw), v[a] = (int16_t)draw(-17000, 17000);
     fx_grid_features(&table->grid, pos, f, nullptr);

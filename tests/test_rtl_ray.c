@@ -137,7 +137,7 @@ END_TEST
 /* Ends and beginnings meet in every way: rays of up to 14 samples, each ended by its second. */
 START_TEST(short_rays_in_a_row)
 {
-  static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID};
+  static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 8);
   scene.step_q24 = 1 << 19, scene.max_samples = 2;
   memset(scene.occupancy, 0xff, 64);
@@ -189,7 +189,7 @@ static void put(sf_ray_dut *rays, uint32_t offset, uint32_t value)
 
 static fx_scene small_scene(void)
 {
-  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID};
+  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 21);
   scene.step_q24 = 1 << 20;
   return scene;

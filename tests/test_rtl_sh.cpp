@@ -26,7 +26,7 @@ static void offer(sh_unit &u, const int16_t v[3], int n, int frac)
 /* Returns the cycles from the first after the offer to the last value. A value that waits must not change. */
 static uint64_t receive(sh_unit &u, random_draw &draw, int stall, const int16_t v[3], int n, int frac)
 {
-  int16_t expected[SF_DIR_MAX];
+  int16_t expected[FX_SH];
   const uint64_t begin = u.cycle;
   fx_sh(v, frac, expected);
   for (int i = 0; i < n;) {

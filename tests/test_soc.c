@@ -146,7 +146,7 @@ static void make_rays(scenario *s)
       ray->origin[axis] = one / 100 * fixture_pick(7, 50, (uint64_t)(3 * i + axis), 10, 60);
       ray->step[axis] = one / 1000 * fixture_pick(7, 51, (uint64_t)(3 * i + axis), 2, 20);
     }
-    fixture_inputs(7, (uint64_t)i, ray->dir, SF_DIR_MAX, 700);
+    fixture_inputs(7, (uint64_t)i, ray->dir, FX_SH, 700);
     ray->count = i == PIXELS - 1 ? 0 : 6 + i;
     ray->first_q16 = 1000 * i;
   }
@@ -247,8 +247,9 @@ END_TEST
 
 START_TEST(so_it_does_for_other_nets)
 {
-  static const fixture_sizes sizes[] = {
-      {5, 77, 16, 3, 33, 128, 1, FX_DECAY}, {1, 1, 2, 0, 5, 1, 8, FX_NODECAY}, {3, 128, 1, 16, 128, 40, 3, FX_HYBRID}};
+  static const fixture_sizes sizes[] = {{5, 77, 16, 3, 33, 128, 1, FX_DECAY, {0}},
+                                        {1, 1, 2, 0, 5, 1, 8, FX_NODECAY, {0}},
+                                        {3, 128, 1, 16, 128, 40, 3, FX_HYBRID, {0}}};
   same_as_core(&sizes[_i], 20);
 }
 END_TEST

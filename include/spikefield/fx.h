@@ -7,6 +7,9 @@
  *   C1  d | h   -> 128   MAC, spiking      the d part once per ray, the h part at every step
  *   C2  spikes  -> 128   AC, spiking
  *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour
+ *
+ * A decoder is a net of the last three layers: D1 and D2 have no inputs and no outputs (fx_net_decodes), and all of
+ * C1's inputs, up to SF_DIR_MAX, are constant ones that come anew with every sample. It has no density: sigma is 0.
  */
 #ifndef SPIKEFIELD_FX_H
 #define SPIKEFIELD_FX_H
@@ -22,14 +25,23 @@ typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY } fx_input_mode;
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
  * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
  * >= n_out are zero. C1's rows are the n_dir direction rows first, then the n_h rows of h.
+ * `bias`: 0 for none; else one more row, w[n_in], belongs to an input that is always active: with the value `bias`,
+ * 1..2047, in C1, and as a spike at every step in C2 and C3 (bias = 1). D1 and D2 have none.
  * `theta` is in membrane LSB (so it carries the membrane's fraction bits) and must be >= 1 for
  * the spiking layers D1, C1, C2; for D2 and C3, `k` is the leak of the density and colour integrator. */
 typedef struct fx_layer {
   int32_t n_in, n_out;
   int32_t k;     /* U1.12, 0..4096 */
   int32_t theta; /* 1..2^23-1; 0 in D2 and C3 */
-  int8_t *w;     /* [n_in][SF_LANES] */
+  int32_t bias;  /* C1: 0..2047; C2, C3: 0 or 1 */
+  int8_t *w;     /* [n_in + (bias != 0)][SF_LANES] */
 } fx_layer;
+
+/* Rows of weights. */
+static inline int fx_layer_rows(const fx_layer *layer)
+{
+  return layer->n_in + (layer->bias != 0);
+}
 
 /* y = sat(rshift_round(current * mul, shift) + bias): a current to the argument of a table.
  * mul 0..65535, shift 0..31, bias in the result's LSB. */
@@ -39,11 +51,27 @@ typedef struct fx_scale {
 
 typedef struct fx_net {
   fx_layer layer[SF_LAYERS];
-  int32_t mode; /* fx_input_mode */
-  int32_t steps; /* t_r: time steps to unroll, 1..SF_T_MAX */
+  int32_t mode;        /* fx_input_mode */
+  int32_t steps;       /* t_r: time steps to unroll, 1..SF_T_MAX */
   fx_scale exp_in;     /* D2 current 0 -> log2 of density per box edge, Q.LOG_FRAC */
   fx_scale sigmoid_in; /* C3 current   -> sigmoid argument, Q.LOG_FRAC */
 } fx_net;
+
+/* Without a density net: C1, C2 and C3 alone. */
+static inline bool fx_net_decodes(const fx_net *net)
+{
+  return net->layer[FX_D1].n_out == 0;
+}
+
+/* Inputs of C1: those that change with the step (h), and before them the constant ones. */
+static inline int fx_net_h(const fx_net *net)
+{
+  return fx_net_decodes(net) ? 0 : net->layer[FX_D2].n_out - 1;
+}
+static inline int fx_net_constants(const fx_net *net)
+{
+  return net->layer[FX_C1].n_in - fx_net_h(net);
+}
 
 /* Multiresolution hash grid (Mueller et al. 2022), 2 features per entry.
  * Position in level l: pos = (x * (res[l] - 1) rounded to Q.8) + 1/2, as torch-ngp: see fx/grid.c. */
@@ -63,22 +91,22 @@ typedef struct fx_grid {
 typedef struct fx_scene {
   fx_net net;
   fx_grid grid;
-  int32_t occ_res;    /* cells per axis, power of two, <= 256 */
-  uint8_t *occupancy; /* occ_res^3 / 8 bytes */
-  int32_t step_q24;   /* distance between samples in box edges, Q0.24 */
-  int32_t max_samples; /* per ray, 1..1024 */
-  int32_t trans_stop; /* stop once transmittance <= this, Q.TRANS_FRAC */
+  int32_t occ_res;       /* cells per axis, power of two, <= 256 */
+  uint8_t *occupancy;    /* occ_res^3 / 8 bytes */
+  int32_t step_q24;      /* distance between samples in box edges, Q0.24 */
+  int32_t max_samples;   /* per ray, 1..1024 */
+  int32_t trans_stop;    /* stop once transmittance <= this, Q.TRANS_FRAC */
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
-  double dir_scale;   /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
+  double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
   double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
   double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
-  void *owner;        /* backing storage of w, table, occupancy; fx_scene_free releases it */
+  void *owner;                         /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
 
 /* Direction of a ray: each axis Q1.14. LSB of the direction features: 2^-frac. */
-enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11 };
+enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
 
 /* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count;
  * sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
@@ -87,19 +115,21 @@ typedef struct fx_ray {
   int32_t count;              /* lattice points in the box, 0 = misses */
   int32_t first_q16;          /* distance from the camera to sample 0 in lattice steps, Q16.16 */
   int16_t unit[3];            /* direction, unit length but for rounding, Q1.14 */
-  int16_t dir[SF_DIR_MAX];    /* its spherical harmonics (fx_sh), LSB dir_scale */
+  int16_t dir[FX_SH];         /* its spherical harmonics (fx_sh), LSB dir_scale */
 } fx_ray;
 
 /* Events, counted per layer and time step. What is one event, exactly:
  *   mac     D1: n_in*n_out per sample, at step 0. C1: n_dir*n_out per ray that has a sample (step 0 of its first
- *           sample) + n_h*n_out per step.  (zero inputs count too)
- *   sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out
+ *           sample) + n_h*n_out per step; of a decoder n_in*n_out per sample, at step 0.  (zero inputs count too)
+ *   sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out; biases are no MAC and no SOP
  *   spikes  D1, C1, C2: neurons that fired at step t
  *   updates D1, C1, C2: n_out per step; D2: 1 per step (density integrator); C3: 3 per step
  *   weight  bytes read, 1 per weight: D1 n_in*n_out at step 0; C1 as its MACs; C2 as its SOPs; D2, C3: n_out for
- *           each presynaptic neuron active at ANY step, at the first step at which it fired
+ *           each presynaptic neuron active at ANY step, at the first step at which it fired; biases n_out more: C1 with
+ *           its constant inputs, C2 at every step, C3 at step 0
  *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); no read at step 0
- *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations */
+ *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations
+ * A decoder has none in D1 and D2. */
 typedef struct fx_layer_counts {
   uint64_t mac[SF_T_MAX], sop[SF_T_MAX], spikes[SF_T_MAX], updates[SF_T_MAX], weight[SF_T_MAX], state_r[SF_T_MAX],
       state_w[SF_T_MAX], special[SF_T_MAX];
@@ -107,10 +137,10 @@ typedef struct fx_layer_counts {
 
 typedef struct fx_counts {
   fx_layer_counts layer[SF_LAYERS];
-  uint64_t samples, rays;  /* through the net; rays with at least one sample */
-  uint64_t grid_bytes;     /* hash-grid bytes read */
-  uint64_t march_steps;    /* lattice points tested against the occupancy grid */
-  uint64_t saturated[SF_LAYERS]; /* saturation events: membranes, or exp/sigmoid accumulators for D2/C3 */
+  uint64_t samples, rays; /* through the net; rays with at least one sample (of a decoder the caller's to count) */
+  uint64_t grid_bytes;    /* hash-grid bytes read */
+  uint64_t march_steps;   /* lattice points tested against the occupancy grid */
+  uint64_t saturated[SF_LAYERS];         /* saturation events: membranes, or exp/sigmoid accumulators for D2/C3 */
   uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one of them */
   uint64_t saturated_features;
 } fx_counts;
@@ -119,7 +149,7 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more);
 
 /* Everything a lockstep comparison needs of one sample. */
 typedef struct fx_trace {
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];         /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
   int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after */
   int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* the exact sum, without C2's fraction bits */
 } fx_trace;
@@ -131,12 +161,16 @@ typedef struct fx_out {
 
 /* The first 16 real spherical harmonics of a direction, LSB 2^-frac (0 <= frac <= FX_DIR_FRAC_MAX): within 1 LSB of
  * the real ones of the unrounded unit vector at any frac. Defined for every input: see fx/sh.c. */
-void fx_sh(const int16_t unit[3], int frac, int16_t dir[SF_DIR_MAX]);
+void fx_sh(const int16_t unit[3], int frac, int16_t dir[FX_SH]);
 
-/* The direction's current into C1, computed once per ray. base[SF_LANES]. Counts C1's d MACs and the ray. */
+/* The current of C1's constant inputs, dir[fx_net_constants], and of its bias: computed once per ray, of a decoder once
+ * per sample. base[SF_LANES]: exact, within 2^26. Counts C1's d MACs and the ray; of a decoder nothing, fx_net_sample
+ * does. */
 void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_counts *counts);
 
-/* One sample through both nets. f[n_feature] int12; base from fx_net_direction. trace and counts may be NULL. */
+/* One sample through both nets. f[n_feature] int12, of a decoder NULL; base from fx_net_direction. trace and counts may
+ * be NULL. C1's current is the exact sum saturated to the 24 bits of a membrane, which only a decoder's can exceed;
+ * that is one saturation event of its lane and sample. */
 void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_trace *trace,
                    fx_counts *counts);
 
@@ -148,8 +182,8 @@ int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint3
 
 /* Compositing of one ray, front to back. Conservation: weight_sum + transmittance == 1 << TRANS_FRAC, always. */
 typedef struct fx_pixel {
-  uint64_t colour[3];    /* Q8.36: sum of w (Q.20) * c (Q4.16) */
-  uint64_t depth;        /* sum of w * (distance in lattice steps, Q16.16) */
+  uint64_t colour[3];                 /* Q8.36: sum of w (Q.20) * c (Q4.16) */
+  uint64_t depth;                     /* sum of w * (distance in lattice steps, Q16.16) */
   uint32_t weight_sum, transmittance; /* Q.20 */
   uint32_t samples;
 } fx_pixel;
@@ -170,8 +204,8 @@ sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval
 
 /* ---- many rays at once ---- */
 
-/* A checked scene made ready for the vector kernels, which give the same bits as the functions above on every machine. The
- * scene must outlive it and stay as it is; one core serves any number of threads. kernels: "portable", "avx2",
+/* A checked scene made ready for the vector kernels, which give the same bits as the functions above on every machine.
+ * The scene must outlive it and stay as it is; one core serves any number of threads. kernels: "portable", "avx2",
  * "avx512vnni", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it lacks the named one. */
 typedef struct fx_core fx_core;
 sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernels);
@@ -195,7 +229,8 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 
 /* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). */
 sf_status fx_scene_load(fx_scene *scene, const char *path);
-sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size, const char *name); /* a file's contents */
+sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size,
+                               const char *name); /* a file's contents */
 sf_status fx_scene_save(const fx_scene *scene, const char *path);
 void fx_scene_free(fx_scene *scene);
 #endif

@@ -4,7 +4,8 @@ package sf_arch_pkg;
   localparam integer T_MAX = 8;  // time steps of one unrolling
   localparam integer OUT_MAX = 16;  // neurons of an integrating output layer; LANES = T_MAX * OUT_MAX
   localparam integer FEATURE_MAX = 32;  // features per sample: inputs of the first density layer
-  localparam integer DIR_MAX = 16;  // direction features per ray
+  localparam integer DIR_MAX = 160;  // constant inputs of C1: a ray's direction features, or all inputs of a decoder
+  localparam integer BIAS_ROW = 160;  // row of a layer's biases in the address of a weight
   localparam integer LAYERS = 5;  // D1 D2 C1 C2 C3
   localparam integer WEIGHT_BITS = 8;  // signed weight, symmetric: -127..127
   localparam integer INPUT_BITS = 12;  // signed real-valued input (f, d, h), symmetric: -2047..2047

@@ -15,7 +15,7 @@
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
-#define SF_REG_CONFIG_RESET 0x08410880
+#define SF_REG_CONFIG_RESET 0x50410880
 #define SF_REG_CONFIG_LANES_MASK 0x000000ff /* widest layer */
 #define SF_REG_CONFIG_LANES_SHIFT 0
 #define SF_REG_CONFIG_T_MAX_MASK 0x00000f00 /* time steps */
@@ -24,7 +24,7 @@
 #define SF_REG_CONFIG_OUT_MAX_SHIFT 12
 #define SF_REG_CONFIG_FEATURE_MAX_MASK 0x007e0000 /* features per sample */
 #define SF_REG_CONFIG_FEATURE_MAX_SHIFT 17
-#define SF_REG_CONFIG_DIR_MAX_MASK 0x0f800000 /* direction features per ray */
+#define SF_REG_CONFIG_DIR_MAX_MASK 0x7f800000 /* constant inputs of C1 */
 #define SF_REG_CONFIG_DIR_MAX_SHIFT 23
 
 /* commands; bits written as 1 act once, soft reset before the others, WO */

@@ -5,7 +5,7 @@ package sf_csr_pkg;
   localparam [12:0] VERSION = 13'h0004;
   localparam [31:0] VERSION_RESET = 32'h00010001;
   localparam [12:0] CONFIG = 13'h0008;
-  localparam [31:0] CONFIG_RESET = 32'h08410880;
+  localparam [31:0] CONFIG_RESET = 32'h50410880;
   localparam [12:0] CTRL = 13'h000c;
   localparam [12:0] STATUS = 13'h0010;
   localparam [12:0] ERROR = 13'h0014;

@@ -178,7 +178,7 @@ typedef struct harmonic {
   double one, xx, yy, zz, xy, yz, xz;
 } harmonic;
 
-static const harmonic harmonics[SF_DIR_MAX] = {
+static const harmonic harmonics[FX_SH] = {
     {.coefficient = 0.28209479177387814, .u = 3, .one = 1},
     {.coefficient = 0.48860251190291987, .u = 1, .one = 1},
     {.coefficient = 0.48860251190291987, .u = 2, .one = 1},
@@ -224,15 +224,15 @@ static void direction(sf_budget_row *row, uint64_t samples)
       length += v[a] * v[a];
     }
     if (length < 1e-6) continue;
-    int16_t unit[3], fixed[SF_DIR_MAX];
-    float real[SF_DIR_MAX];
+    int16_t unit[3], fixed[FX_SH];
+    float real[FX_SH];
     for (int a = 0; a < 3; a++) {
       v[a] /= sqrt(length);
       unit[a] = (int16_t)lrint(ldexp(v[a], FX_UNIT_FRAC));
     }
     sf_sh4((const float[]){(float)v[0], (float)v[1], (float)v[2]}, real);
     fx_sh(unit, FX_DIR_FRAC_MAX, fixed);
-    for (int n = 0; n < SF_DIR_MAX; n++)
+    for (int n = 0; n < FX_SH; n++)
       add(row, fixed[n] - ldexp((double)real[n], FX_DIR_FRAC_MAX),
           0.5 + ldexp(direction_bound(&harmonics[n], v), FX_DIR_FRAC_MAX) + float_error);
   }
@@ -254,7 +254,7 @@ static void make_net(small_net *n, uint64_t i)
   memset(n, 0, sizeof *n);
   for (int l = 0; l < SF_LAYERS; l++) {
     n->net.layer[l] =
-        (fx_layer){in[l], out[l], (int32_t)pick(30, i * 8 + (uint64_t)l, 0, FX_LEAK_ONE), theta[l], n->w[l]};
+        (fx_layer){in[l], out[l], (int32_t)pick(30, i * 8 + (uint64_t)l, 0, FX_LEAK_ONE), theta[l], 0, n->w[l]};
     for (int r = 0; r < in[l]; r++)
       for (int o = 0; o < out[l]; o++) {
         const int64_t any = pick(31 + (uint64_t)l, i << 14 | (uint64_t)(r * SF_LANES + o), -127, 127);
@@ -277,7 +277,7 @@ static void check_currents(sf_budget_row *row, const fx_net *net, const int16_t 
       for (int o = 0; o < layer->n_out; o++) {
         double sum = 0;
         for (int i = 0; i < layer->n_in; i++) {
-          const int h = i - SF_DIR_MAX;
+          const int h = i - FX_SH;
           const double x = l == FX_D1   ? f[i]
                            : l != FX_C1 ? (double)(trace->spikes[before][t][i / 64] >> i % 64 & 1)
                            : h < 0      ? dir[i]
@@ -294,13 +294,13 @@ static void currents(sf_budget_row *row, uint64_t samples)
   small_net n;
   fx_trace trace;
   for (uint64_t i = 0; row->inputs < samples; i++) {
-    int16_t f[SF_FEATURE_MAX], dir[SF_DIR_MAX];
+    int16_t f[SF_FEATURE_MAX], dir[FX_SH];
     int32_t base[SF_LANES];
     fx_out out;
     make_net(&n, i);
     for (uint64_t j = 0; j < SF_FEATURE_MAX; j++)
       f[j] = (int16_t)(i % 5 ? pick(40, i << 6 | j, -FX_INPUT_MAX, FX_INPUT_MAX) : FX_INPUT_MAX);
-    for (uint64_t j = 0; j < SF_DIR_MAX; j++) dir[j] = (int16_t)pick(41, i << 6 | j, -FX_INPUT_MAX, FX_INPUT_MAX);
+    for (uint64_t j = 0; j < FX_SH; j++) dir[j] = (int16_t)pick(41, i << 6 | j, -FX_INPUT_MAX, FX_INPUT_MAX);
     fx_net_direction(&n.net, dir, base, NULL);
     fx_net_sample(&n.net, f, base, &out, &trace, NULL);
     check_currents(row, &n.net, f, dir, &trace);
@@ -314,7 +314,7 @@ static void h_floor(sf_budget_row *row, uint64_t samples)
   (void)samples;
   small_net n;
   fx_trace trace;
-  const int16_t f[SF_FEATURE_MAX] = {1}, dir[SF_DIR_MAX] = {0};
+  const int16_t f[SF_FEATURE_MAX] = {1}, dir[FX_SH] = {0};
   int32_t base[SF_LANES];
   fx_out out;
   make_net(&n, 0);
@@ -322,7 +322,7 @@ static void h_floor(sf_budget_row *row, uint64_t samples)
   n.net.steps = 1, n.net.mode = FX_HYBRID;
   n.net.layer[FX_D1].theta = 1;
   memset(n.w[FX_D1], 1, SF_LANES);
-  n.w[FX_C1][SF_DIR_MAX * SF_LANES] = 1;
+  n.w[FX_C1][FX_SH * SF_LANES] = 1;
   fx_net_direction(&n.net, dir, base, NULL);
   for (int32_t current = -128 * 127; current <= 128 * 127; current++) {
     int32_t rest = current;

@@ -185,7 +185,7 @@ static double integrate(const sf_exact *e, double acc, double in, int l, int t, 
 
 void sf_exact_direction(const sf_exact *e, const double *dir, double *base)
 {
-  const int n_dir = e->scene->net.layer[FX_C1].n_in - (e->scene->net.layer[FX_D2].n_out - 1);
+  const int n_dir = fx_net_constants(&e->scene->net);
   memset(base, 0, SF_LANES * sizeof *base);
   for (int i = 0; i < n_dir; i++) add_row(e, FX_C1, i, dir[i], base);
 }
@@ -193,7 +193,7 @@ void sf_exact_direction(const sf_exact *e, const double *dir, double *base)
 void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_exact_out *out)
 {
   const fx_net *net = &e->scene->net;
-  const int n_h = net->layer[FX_D2].n_out - 1, n_dir = net->layer[FX_C1].n_in - n_h;
+  const int n_h = fx_net_h(net), n_dir = fx_net_constants(net);
   double d1[SF_LANES] = {0}, current[SF_LANES], v[3][SF_LANES] = {{0}};
   memset(out, 0, sizeof *out);
   for (int i = 0; i < net->layer[FX_D1].n_in; i++) add_row(e, FX_D1, i, f[i], d1);

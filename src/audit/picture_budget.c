@@ -39,7 +39,7 @@ typedef struct tracer {
   const sf_exact *exact; /* the row's blocks */
   const sf_exact *real;  /* all blocks, for the errors of currents; NULL in all rows but the first */
   fx_ray ray;
-  double dir[SF_DIR_MAX]; /* unrounded direction features, LSB */
+  double dir[FX_SH]; /* unrounded direction features, LSB */
   double unit[3];         /* direction */
   int32_t core_base[SF_LANES];
   double base[SF_LANES];
@@ -56,7 +56,7 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
 {
   int x, y;
   float origin[3], direction[3], sh[SF_DIR_FEATURES];
-  double dir[SF_DIR_MAX];
+  double dir[FX_SH];
   ray_pixel(job, i, &x, &y);
   sf_dataset_ray(job->data, job->view, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
   SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, x, y, &t->ray));

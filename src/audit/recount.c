@@ -36,26 +36,37 @@ static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[2], 
   count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
 }
 
+/* A row of biases is read, but it is no MAC and no SOP. */
+static void count_bias(fx_layer_counts *c, int t, const fx_layer *layer)
+{
+  if (layer->bias) c->weight[t] += (uint64_t)layer->n_out;
+}
+
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
                        fx_counts *counts)
 {
   const fx_layer *size = net->layer;
   fx_layer_counts *c = counts->layer;
   uint64_t seen_d1[2] = {0, 0}, seen_c2[2] = {0, 0};
-  int n_h = size[FX_D2].n_out - 1, n_dir = size[FX_C1].n_in - n_h;
+  const bool decodes = fx_net_decodes(net);
 
   counts->samples++;
-  counts->rays += first_of_ray;
+  counts->rays += first_of_ray && !decodes;
   count_mac(&c[FX_D1], 0, size[FX_D1].n_in, size[FX_D1].n_out);
-  if (first_of_ray) count_mac(&c[FX_C1], 0, n_dir, size[FX_C1].n_out);
+  if (first_of_ray || decodes) {
+    count_mac(&c[FX_C1], 0, fx_net_constants(net), size[FX_C1].n_out);
+    count_bias(&c[FX_C1], 0, &size[FX_C1]);
+  }
+  count_bias(&c[FX_C3], 0, &size[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
     for (int l = FX_D1; l <= FX_C2; l++) {
       if (l == FX_D2) continue;
       c[l].spikes[t] += fired(spikes[l][t]);
       count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
     }
-    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, 1);
-    count_mac(&c[FX_C1], t, n_h, size[FX_C1].n_out);
+    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, !decodes);
+    count_bias(&c[FX_C2], t, &size[FX_C2]);
+    count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
     uint64_t c2_sop = fired(spikes[FX_C1][t]) * (uint64_t)size[FX_C2].n_out;
     c[FX_C2].sop[t] += c2_sop;
     c[FX_C2].weight[t] += c2_sop;

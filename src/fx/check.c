@@ -16,15 +16,26 @@ static sf_status in_range(const char *path, const char *owner, const char *field
                  (long long)low, (long long)high);
 }
 
-static sf_status check_chain(const fx_net *net, const char *path)
+/* A decoder has no D1 and D2; the inputs of C1 are as many as the sum of its current has bits for. */
+static sf_status check_inputs(const fx_net *net, const char *path)
 {
   const fx_layer *l = net->layer;
+  const bool decodes = fx_net_decodes(net);
   const int n_h = l[FX_D2].n_out - 1;
-  SF_TRY(in_range(path, "D1", "n_in", l[FX_D1].n_in, 2, SF_FEATURE_MAX));
-  SF_TRY(in_range(path, "D1", "n_out", l[FX_D1].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, "D1", "n_in", l[FX_D1].n_in, decodes ? 0 : 2, decodes ? 0 : SF_FEATURE_MAX));
+  SF_TRY(in_range(path, "D1", "n_out", l[FX_D1].n_out, 0, SF_LANES));
   SF_TRY(in_range(path, "D2", "n_in", l[FX_D2].n_in, l[FX_D1].n_out, l[FX_D1].n_out));
-  SF_TRY(in_range(path, "D2", "n_out", l[FX_D2].n_out, 1, SF_OUT_MAX));
-  SF_TRY(in_range(path, "C1", "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + SF_DIR_MAX));
+  SF_TRY(in_range(path, "D2", "n_out", l[FX_D2].n_out, !decodes, decodes ? 0 : SF_OUT_MAX));
+  if (decodes) return in_range(path, "C1", "n_in", l[FX_C1].n_in, 1, SF_DIR_MAX);
+  return in_range(path, "C1", "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + FX_SH);
+}
+
+static sf_status check_chain(const fx_net *net, const char *path)
+{
+  static const int bias_max[SF_LAYERS] = {[FX_C1] = FX_INPUT_MAX, [FX_C2] = 1, [FX_C3] = 1};
+  const fx_layer *l = net->layer;
+  SF_TRY(check_inputs(net, path));
+  for (int id = 0; id < SF_LAYERS; id++) SF_TRY(in_range(path, layer_name[id], "bias", l[id].bias, 0, bias_max[id]));
   SF_TRY(in_range(path, "C1", "n_out", l[FX_C1].n_out, 1, SF_LANES));
   SF_TRY(in_range(path, "C2", "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
   SF_TRY(in_range(path, "C2", "n_out", l[FX_C2].n_out, 1, SF_LANES));
@@ -65,7 +76,7 @@ static sf_status check_grid(const fx_grid *grid, int n_feature, const char *path
 sf_status fx_check_sizes(const fx_scene *scene, const char *path)
 {
   SF_TRY(check_chain(&scene->net, path));
-  SF_TRY(check_grid(&scene->grid, scene->net.layer[FX_D1].n_in, path));
+  if (!fx_net_decodes(&scene->net)) SF_TRY(check_grid(&scene->grid, scene->net.layer[FX_D1].n_in, path));
   SF_TRY(in_range(path, "scene", "occ_res", scene->occ_res, 2, OCCUPANCY_MAX));
   if (scene->occ_res & (scene->occ_res - 1))
     return sf_fail(SF_E_RANGE, "%s: scene.occ_res is %d, expected a power of two", path, scene->occ_res);
@@ -75,7 +86,7 @@ sf_status fx_check_sizes(const fx_scene *scene, const char *path)
 static sf_status check_weights(const fx_layer *layer, const char *tensor, const char *path)
 {
   if (!layer->w) return sf_fail(SF_E_FORMAT, "%s: tensor '%s' is missing", path, tensor);
-  for (int i = 0; i < layer->n_in; i++)
+  for (int i = 0; i < fx_layer_rows(layer); i++)
     for (int o = 0; o < SF_LANES; o++) {
       const int8_t w = layer->w[(size_t)i * SF_LANES + o];
       if (w == INT8_MIN)
@@ -89,7 +100,7 @@ static sf_status check_weights(const fx_layer *layer, const char *tensor, const 
 
 static sf_status check_layer(const fx_layer *layer, int id, const char *path)
 {
-  const bool spiking = id != FX_D2 && id != FX_C3;
+  const bool spiking = id != FX_D2 && id != FX_C3 && layer->n_out > 0;
   SF_TRY(in_range(path, layer_name[id], "k", layer->k, 0, FX_LEAK_ONE));
   SF_TRY(in_range(path, layer_name[id], "theta", layer->theta, spiking, spiking ? FX_MEMBRANE_MAX : 0));
   return check_weights(layer, fx_layer_tensor[id], path);

@@ -17,12 +17,26 @@ static int unpacked(int o, int bytes)
   return block + at / 8 * 16 + half * 8 + at % 8;
 }
 
+static void arrange_biases(fx_words *words, const fx_net *net, int bytes)
+{
+  const fx_layer *c1 = &net->layer[FX_C1], *c2 = &net->layer[FX_C2], *c3 = &net->layer[FX_C3];
+  for (int o = 0; o < SF_LANES; o++) {
+    if (c1->bias) words->c1_bias[o] = c1->bias * c1->w[(size_t)c1->n_in * SF_LANES + (size_t)o];
+    if (c2->bias)
+      words->c2[FX_BIAS_ROW][unpacked(o, bytes)] = c2->w[(size_t)c2->n_in * SF_LANES + (size_t)o],
+                                         words->c2_bias[o] = words->c2[FX_BIAS_ROW][unpacked(o, bytes)];
+    if (c3->bias && o < SF_OUT_MAX) words->c3[FX_BIAS_ROW][o] = c3->w[(size_t)c3->n_in * SF_LANES + (size_t)o];
+  }
+}
+
 static void arrange(fx_words *words, const fx_net *net, int bytes)
 {
   const fx_layer *layer = net->layer;
-  const int n_h = layer[FX_D2].n_out - 1, n_dir = layer[FX_C1].n_in - n_h;
+  const int n_constant = fx_net_constants(net);
   pair_rows(words->d1, 0, layer[FX_D1].w, layer[FX_D1].n_in);
-  pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_dir * SF_LANES, n_h);
+  if (fx_net_decodes(net)) pair_rows(words->c1_constant, 0, layer[FX_C1].w, n_constant);
+  pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
+  arrange_biases(words, net, bytes);
   for (int i = 0; i < SF_LANES; i++)
     for (int o = 0; o < SF_LANES; o++) {
       const size_t at = (size_t)i * SF_LANES + (size_t)o;

@@ -8,23 +8,27 @@
 enum { FX_BLOCK = 48 }; /* samples */
 
 /* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
- * groups. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane multiplies them. Aligned: a row that
- * crosses a cache line costs two loads. */
+ * groups, and after it the row of the biases. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane
+ * multiplies them. Aligned: a row that crosses a cache line costs two loads. */
 typedef struct fx_words {
   _Alignas(64) int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
-  _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2]; /* by D2 current: row 0, the density's, is zero */
-  _Alignas(64) int16_t d2[SF_LANES + 1][SF_OUT_MAX];
-  _Alignas(64) int8_t c2[SF_LANES + 1][SF_LANES]; /* outputs permuted, see fx_kernels.unpack_bytes */
-  _Alignas(64) int16_t c3[SF_LANES + 1][SF_OUT_MAX];
+  _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2];        /* by D2 current: row 0, the density's, is zero */
+  _Alignas(64) int16_t c1_constant[SF_DIR_MAX / 2][SF_LANES][2]; /* of a decoder */
+  _Alignas(64) int32_t c1_bias[SF_LANES], c2_bias[SF_LANES];     /* currents; c1_bias of a decoder */
+  _Alignas(64) int16_t d2[SF_LANES + 2][SF_OUT_MAX];
+  _Alignas(64) int8_t c2[SF_LANES + 2][SF_LANES]; /* outputs permuted, see fx_kernels.unpack_bytes */
+  _Alignas(64) int16_t c3[SF_LANES + 2][SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
 } fx_words;
+enum { FX_ZERO_ROW = SF_LANES, FX_BIAS_ROW };
 
-/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base; the rest is output. Slots from n
- * on may hold anything. */
+/* Samples side by side. Inputs: pos, or f (zero beyond the layer's inputs), and base; of a decoder constant alone (zero
+ * beyond the inputs of C1). The rest is output. Slots from n on may hold anything. */
 typedef struct fx_block {
   int n;
   uint32_t pos[3][FX_BLOCK]; /* Q0.24 */
   int16_t f[FX_BLOCK][SF_FEATURE_MAX];
+  int16_t constant[FX_BLOCK][SF_DIR_MAX];
   const int32_t *base[FX_BLOCK]; /* [SF_LANES] each, from fx_net_direction */
   fx_out out[FX_BLOCK];
   uint64_t spikes[FX_SPIKING][SF_T_MAX][FX_BLOCK][2]; /* bitmaps of D1, C1, C2 */
@@ -47,8 +51,8 @@ static inline void fx_block_count(fx_block *b, int steps)
 
 /* Working memory of one thread: currents and membranes of a block. */
 typedef struct fx_scratch {
-  _Alignas(64) int32_t d1_current[FX_BLOCK][SF_LANES];
-  int32_t current[FX_BLOCK][SF_LANES]; /* of C1, and of C2 where its products are dense */
+  _Alignas(64) int32_t constant[FX_BLOCK][SF_LANES]; /* current that serves all steps: of D1, or of a decoder's C1 */
+  int32_t current[FX_BLOCK][SF_LANES];               /* of C1, and of C2 where its products are dense */
   int32_t v[FX_SPIKING][FX_BLOCK][SF_LANES];
   int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
   _Alignas(64) int16_t c2_current[FX_BLOCK][SF_LANES];

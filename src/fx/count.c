@@ -15,8 +15,13 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more)
 
 static uint64_t direction_macs(const fx_net *net)
 {
-  const int n_dir = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
-  return (uint64_t)n_dir * (uint64_t)net->layer[FX_C1].n_out;
+  return (uint64_t)fx_net_constants(net) * (uint64_t)net->layer[FX_C1].n_out;
+}
+
+/* Bytes of the biases' row, read as often as the constant inputs. */
+static uint64_t bias_bytes(const fx_layer *layer)
+{
+  return layer->bias ? (uint64_t)layer->n_out : 0;
 }
 
 static uint64_t feature_macs(const fx_net *net)
@@ -26,24 +31,30 @@ static uint64_t feature_macs(const fx_net *net)
 
 static uint64_t h_macs(const fx_net *net)
 {
-  return (uint64_t)(net->layer[FX_D2].n_out - 1) * (uint64_t)net->layer[FX_C1].n_out;
+  return (uint64_t)fx_net_h(net) * (uint64_t)net->layer[FX_C1].n_out;
 }
 
 uint64_t fx_macs_of_ray(const fx_net *net)
 {
-  return direction_macs(net);
+  return fx_net_decodes(net) ? 0 : direction_macs(net);
 }
 
 uint64_t fx_macs_of_sample(const fx_net *net)
 {
+  if (fx_net_decodes(net)) return direction_macs(net);
   return feature_macs(net) + (uint64_t)net->steps * h_macs(net);
+}
+
+static void count_constants(fx_counts *counts, const fx_net *net, uint64_t times)
+{
+  counts->layer[FX_C1].mac[0] += times * direction_macs(net);
+  counts->layer[FX_C1].weight[0] += times * (direction_macs(net) + bias_bytes(&net->layer[FX_C1]));
 }
 
 void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays)
 {
   counts->rays += rays;
-  counts->layer[FX_C1].mac[0] += rays * direction_macs(net);
-  counts->layer[FX_C1].weight[0] += rays * direction_macs(net);
+  if (!fx_net_decodes(net)) count_constants(counts, net, rays);
 }
 
 static void count_products(fx_layer_counts *c, int t, uint64_t macs)
@@ -70,24 +81,27 @@ void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firi
 {
   enum { D1, C1, C2 };
   const fx_layer *layer = net->layer;
-  const uint64_t n = firing->samples;
+  const uint64_t n = firing->samples, densities = fx_net_decodes(net) ? 0 : n;
   fx_layer_counts *c = counts->layer;
   counts->samples += n;
   count_products(&c[FX_D1], 0, n * feature_macs(net));
+  if (fx_net_decodes(net)) count_constants(counts, net, n);
+  c[FX_C3].weight[0] += n * bias_bytes(&layer[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
     c[FX_D1].spikes[t] += firing->spikes[D1][t];
     c[FX_C1].spikes[t] += firing->spikes[C1][t];
     c[FX_C2].spikes[t] += firing->spikes[C2][t];
     count_products(&c[FX_C1], t, n * h_macs(net));
+    c[FX_C2].weight[t] += n * bias_bytes(&layer[FX_C2]);
     count_synapses(&c[FX_D2], &layer[FX_D2], t, firing->spikes[D1][t], firing->fresh[D1][t]);
     count_synapses(&c[FX_C2], &layer[FX_C2], t, firing->spikes[C1][t], firing->spikes[C1][t]);
     count_synapses(&c[FX_C3], &layer[FX_C3], t, firing->spikes[C2][t], firing->fresh[C2][t]);
     count_updates(&c[FX_D1], t, n * (uint64_t)layer[FX_D1].n_out, MEMBRANE_BYTES);
     count_updates(&c[FX_C1], t, n * (uint64_t)layer[FX_C1].n_out, MEMBRANE_BYTES);
     count_updates(&c[FX_C2], t, n * (uint64_t)layer[FX_C2].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_D2], t, n, INTEGRATOR_BYTES);
+    count_updates(&c[FX_D2], t, densities, INTEGRATOR_BYTES);
     count_updates(&c[FX_C3], t, n * (uint64_t)layer[FX_C3].n_out, INTEGRATOR_BYTES);
-    c[FX_D2].special[t] += n;
+    c[FX_D2].special[t] += densities;
     c[FX_C3].special[t] += n * (uint64_t)layer[FX_C3].n_out;
   }
 }

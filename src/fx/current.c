@@ -28,12 +28,13 @@ static int list_spikes(uint8_t *index, const uint64_t spikes[2])
   return count;
 }
 
-void fx_current_spikes(int32_t *acc, const int8_t *w, const uint64_t spikes[2], int n)
+void fx_current_spikes(int32_t *acc, const int8_t *w, const uint64_t spikes[2], const int8_t *bias, int n)
 {
   uint8_t index[SF_LANES];
   const int count = list_spikes(index, spikes);
   for (int o = 0; o < n; o += STRIP) {
-    int16_t sum[STRIP] = {0}; /* 128 * 127 < 2^15 */
+    int16_t sum[STRIP] = {0}; /* 129 * 127 < 2^15 */
+    for (int lane = 0; bias && lane < STRIP; lane++) sum[lane] = bias[o + lane];
     for (int i = 0; i < count; i++) {
       const int8_t *row = w + (size_t)index[i] * SF_LANES + o;
       for (int lane = 0; lane < STRIP; lane++) sum[lane] = (int16_t)(sum[lane] + row[lane]);

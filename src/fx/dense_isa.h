@@ -3,6 +3,7 @@
 #ifndef SPIKEFIELD_FX_DENSE_ISA_H
 #define SPIKEFIELD_FX_DENSE_ISA_H
 #include "src/fx/core.h"
+#include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
 
 enum { GANG = 3 };
@@ -32,11 +33,12 @@ static __attribute__((noinline)) void pair_products(const int16_t *w, int pairs,
   EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
 }
 
-/* out[k][o] = sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
-static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], int32_t *out)
+/* out[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
+static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
+                                                    int32_t *out)
 {
   vec acc[GANG][TILE];
-  EACH(k, j) acc[k][j] = v_set(0);
+  EACH(k, j) acc[k][j] = v_load(from + j * WIDTH);
   for (int q = 0; q < SF_LANES / 4; q++) {
     vec in[GANG];
 #pragma GCC unroll 3
@@ -56,8 +58,32 @@ static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
   for (int i = 0; i < b->n; i += GANG)
     for (int first = 0; first < VECTORS; first += TILE)
       pair_products(words->d1[0][first * WIDTH], SF_FEATURE_MAX / 2,
-                    (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]}, NULL,
-                    &s->d1_current[i][first * WIDTH]);
+                    (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]}, NULL, &s->constant[i][first * WIDTH]);
+}
+
+/* Lanes beyond 24 bits become the nearest that fits; returns how many there were. */
+static INLINE uint32_t saturate(int32_t *current)
+{
+  uint32_t saturated = 0;
+  for (int j = 0; j < VECTORS; j++) {
+    const vec exact = v_load(current + j * WIDTH), kept = v_clamp(exact, -FX_MEMBRANE_MAX - 1, FX_MEMBRANE_MAX);
+    saturated += (uint32_t)__builtin_popcount(v_differ(exact, kept));
+    v_store(current + j * WIDTH, kept);
+  }
+  return saturated;
+}
+
+/* Of a decoder: constant inputs and biases, once per sample. */
+static void c1_constant_currents(const fx_words *words, int n_in, fx_block *b, fx_scratch *s)
+{
+  for (int i = 0; i < b->n; i += GANG)
+    for (int first = 0; first < VECTORS; first += TILE) {
+      const int32_t *bias = words->c1_bias + first * WIDTH;
+      pair_products(words->c1_constant[0][first * WIDTH], (n_in + 1) / 2,
+                    (const int16_t *const[]){b->constant[i], b->constant[i + 1], b->constant[i + 2]},
+                    (const int32_t *const[]){bias, bias, bias}, &s->constant[i][first * WIDTH]);
+    }
+  for (int i = 0; i < b->n; i++) b->saturated[FX_C1][i] += saturate(s->constant[i]);
 }
 
 static void c1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
@@ -87,7 +113,8 @@ static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[2]
     uint8_t x[GANG][SF_LANES];
     for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
     for (int first = 0; first < VECTORS; first += TILE)
-      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, &s->current[i][first * WIDTH]);
+      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, words->c2_bias + first * WIDTH,
+                    &s->current[i][first * WIDTH]);
   }
 }
 #endif

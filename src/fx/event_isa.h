@@ -3,12 +3,13 @@
 #define SPIKEFIELD_FX_EVENT_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/vec_isa.h"
+#include <stdbool.h>
 
-enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample */
+enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample, biases included */
 
 /* The spikes of one layer of a block at one step, sample after sample, in groups of GROUP rows: a loop over all groups
- * has no branch per sample. A sample's last group is filled up with SF_LANES, the row of zeros; a silent sample has one
- * such. */
+ * has no branch per sample. A sample's last group is filled up with the row of zeros; a silent sample has one such. The
+ * biases are one more row of every sample. */
 typedef struct events {
   int groups;
   uint8_t row[FX_BLOCK * (SF_LANES + GROUP) + 64];
@@ -29,14 +30,16 @@ static INLINE void list_spikes(uint8_t *row, const uint64_t bits[2], int low)
 #endif
 }
 
-static INLINE void list_events(events *e, const uint64_t (*spikes)[2], int n)
+static INLINE void list_events(events *e, const uint64_t (*spikes)[2], bool bias, int n)
 {
   e->groups = 0;
   for (int i = 0; i < n; i++) {
-    const int low = __builtin_popcountll(spikes[i][0]), count = low + __builtin_popcountll(spikes[i][1]);
+    const int low = __builtin_popcountll(spikes[i][0]), fired = low + __builtin_popcountll(spikes[i][1]);
+    const int count = fired + bias;
     uint8_t *row = e->row + e->groups * GROUP;
     list_spikes(row, spikes[i], low);
-    memset(row + count, SF_LANES, GROUP);
+    row[fired] = FX_BIAS_ROW;
+    memset(row + count, FX_ZERO_ROW, GROUP);
     for (int at = 0; at < GROUPS; at += 4 * WIDTH) /* what is written too far, the next sample overwrites */
       v_store(e->sample + e->groups + at, V(set1_epi8)((char)i));
     e->groups += count ? (count + GROUP - 1) / GROUP : 1;
@@ -109,10 +112,10 @@ static INLINE void add_rows(const events *e, const int8_t (*w)[SF_LANES], int16_
   }
 }
 
-static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[2], bool bias, int n, fx_scratch *s)
 {
   events e;
-  list_events(&e, spikes, n);
+  list_events(&e, spikes, bias, n);
   add_rows(&e, words->c2, s->c2_current);
 }
 #endif

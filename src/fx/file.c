@@ -51,6 +51,14 @@ static const int_field ints[] = {
 };
 enum { INTS = sizeof ints / sizeof ints[0] };
 
+/* Not in the file when 0. */
+static const int_field biases[] = {
+    {"C1.bias", offsetof(fx_scene, net.layer[FX_C1].bias)},
+    {"C2.bias", offsetof(fx_scene, net.layer[FX_C2].bias)},
+    {"C3.bias", offsetof(fx_scene, net.layer[FX_C3].bias)},
+};
+enum { BIASES = sizeof biases / sizeof biases[0] };
+
 static int32_t *int_of(const fx_scene *scene, const int_field *field)
 {
   return (int32_t *)((char *)scene + field->offset);
@@ -117,11 +125,13 @@ static int list_bulk(sf_tensor *tensor, fx_scene *scene)
 {
   tensor[0] = make_tensor("grid.table", SF_I8, scene->grid.table, 2, scene->grid.entries, FX_GRID_FEATURES);
   tensor[1] = make_tensor("occupancy", SF_U8, scene->occupancy, 1, (int64_t)fx_occupancy_bytes(scene), 0);
+  int count = 2;
   for (int id = 0; id < SF_LAYERS; id++) {
     const fx_layer *layer = &scene->net.layer[id];
-    tensor[2 + id] = make_tensor(fx_layer_tensor[id], SF_I8, layer->w, 2, layer->n_in, SF_LANES);
+    const int rows = fx_layer_rows(layer);
+    if (rows > 0) tensor[count++] = make_tensor(fx_layer_tensor[id], SF_I8, layer->w, 2, rows, SF_LANES);
   }
-  return 2 + SF_LAYERS;
+  return count;
 }
 
 /* ---- saving ---- */
@@ -141,6 +151,13 @@ static void describe_arch(char text[ARCH_TEXT])
            SF_AC_FRAC, SF_LEAK_FRAC, SF_H_SHIFT, SF_INPUT_BITS, SF_LOG_FRAC, SF_TRANS_FRAC, SF_DELTA_FRAC);
 }
 
+static void add_int(cJSON *metadata, const fx_scene *scene, const int_field *field)
+{
+  char text[16];
+  snprintf(text, sizeof text, "%" PRId32, *int_of(scene, field));
+  cJSON_AddStringToObject(metadata, field->key, text);
+}
+
 static cJSON *make_metadata(const fx_scene *scene)
 {
   char arch[ARCH_TEXT];
@@ -151,11 +168,9 @@ static cJSON *make_metadata(const fx_scene *scene)
   describe_arch(arch);
   cJSON_AddStringToObject(metadata, "arch", arch);
   cJSON_AddStringToObject(metadata, "mode", mode_name[scene->net.mode]);
-  for (int i = 0; i < INTS; i++) {
-    char text[16];
-    snprintf(text, sizeof text, "%" PRId32, *int_of(scene, &ints[i]));
-    cJSON_AddStringToObject(metadata, ints[i].key, text);
-  }
+  for (int i = 0; i < INTS; i++) add_int(metadata, scene, &ints[i]);
+  for (int i = 0; i < BIASES; i++)
+    if (*int_of(scene, &biases[i])) add_int(metadata, scene, &biases[i]);
   fx_reals_write(metadata, scene);
   return metadata;
 }
@@ -216,6 +231,8 @@ static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
   SF_TRY(expect_meta(set, "version", VERSION, SF_E_UNSUPPORTED));
   SF_TRY(expect_meta(set, "arch", arch, SF_E_UNSUPPORTED));
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
+  for (int i = 0; i < BIASES; i++)
+    if (sf_tensors_meta(set, biases[i].key)) SF_TRY(read_int(set, &biases[i], scene));
   SF_TRY(read_mode(set, scene));
   if (scene->net.steps < 1 || scene->net.steps > SF_T_MAX)
     return sf_fail(SF_E_RANGE, "%s: metadata 't_r' is %d, expected 1..%d", set->path, scene->net.steps, SF_T_MAX);

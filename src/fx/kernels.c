@@ -11,10 +11,13 @@ extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni;
 static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
 {
   static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
+  const bool decodes = fx_net_decodes(&core->scene->net);
   (void)scratch;
   for (int i = 0; i < b->n; i++) {
     fx_events events;
-    fx_net_events(&core->scene->net, b->f[i], b->base[i], &b->out[i], &events, NULL);
+    int32_t constant[SF_LANES];
+    if (decodes) fx_net_direction(&core->scene->net, b->constant[i], constant, NULL);
+    fx_net_events(&core->scene->net, b->f[i], decodes ? constant : b->base[i], &b->out[i], &events, NULL);
     for (int s = 0; s < FX_SPIKING; s++)
       for (int t = 0; t < core->scene->net.steps; t++)
         memcpy(b->spikes[s][t][i], events.spikes[spiking[s]][t], sizeof b->spikes[s][t][i]);

@@ -3,6 +3,7 @@
 #include "src/fx/net.h"
 #include "src/fx/count.h"
 #include "src/fx/current.h"
+#include "src/fx/round.h"
 #include "src/fx/unit.h"
 #include <string.h>
 #include "src/fx/nofloat.h"
@@ -17,6 +18,18 @@ typedef struct state {
   fx_events events;
   fx_out acc;
 } state;
+
+/* A current in the 24 bits of a membrane; the number of lanes that did not fit. */
+static int saturate(int32_t *current, int n)
+{
+  int saturated = 0;
+  for (int o = 0; o < n; o++) {
+    const int32_t kept = (int32_t)fx_sat(current[o], SF_MEMBRANE_BITS);
+    saturated += kept != current[o];
+    current[o] = kept;
+  }
+  return saturated;
+}
 
 /* Lanes beyond n_out have zero weights, hence no current, and theta >= 1: they stay silent. */
 static int strips(int n)
@@ -42,24 +55,31 @@ static void density_step(state *s, const fx_net *net, int t, fx_trace *trace)
   const fx_layer *d2 = &net->layer[FX_D2];
   keep_current(trace, FX_D1, t, s->d1_current, net->layer[FX_D1].n_out);
   fire(s, net, FX_D1, t, s->d1_current, trace);
-  fx_current_spikes(s->current, d2->w, s->events.spikes[FX_D1][t], strips(d2->n_out));
+  fx_current_spikes(s->current, d2->w, s->events.spikes[FX_D1][t], NULL, strips(d2->n_out));
   keep_current(trace, FX_D2, t, s->current, d2->n_out);
   const uint32_t e = fx_exp2(fx_exp2_argument(s->current[0], &net->exp_in));
   s->events.saturated[FX_D2] += e == (1u << SF_SIGMA_BITS) - 1;
   s->acc.sigma = fx_integrate_density(s->acc.sigma, e, d2->k, net->mode, t == 0, &s->events.saturated[FX_D2]);
   if (trace) trace->membrane[FX_D2][t][0] = (int32_t)s->acc.sigma;
-  for (int j = 0; j < d2->n_out - 1; j++) s->h[j] = (int16_t)(s->current[1 + j] >> SF_H_SHIFT);
+  for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(s->current[1 + j] >> SF_H_SHIFT);
+}
+
+static const int8_t *bias_row(const fx_layer *layer)
+{
+  return layer->bias ? layer->w + (size_t)layer->n_in * SF_LANES : NULL;
 }
 
 static void hidden_step(state *s, const fx_net *net, int t, const int32_t *base, fx_trace *trace)
 {
   const fx_layer *c1 = &net->layer[FX_C1], *c2 = &net->layer[FX_C2];
-  const int n_h = net->layer[FX_D2].n_out - 1, n_dir = c1->n_in - n_h;
+  const int8_t *w = c1->w + (size_t)fx_net_constants(net) * SF_LANES;
   memcpy(s->current, base, sizeof s->current);
-  fx_current_mac(s->current, c1->w + (size_t)n_dir * SF_LANES, s->h, n_h, strips(c1->n_out));
+  fx_current_mac(s->current, w, s->h, fx_net_h(net), strips(c1->n_out));
+  const int saturated = saturate(s->current, strips(c1->n_out));
+  if (t == 0) s->events.saturated[FX_C1] += (uint64_t)saturated; /* of a decoder, whose current does not change */
   keep_current(trace, FX_C1, t, s->current, c1->n_out);
   fire(s, net, FX_C1, t, s->current, trace);
-  fx_current_spikes(s->current, c2->w, s->events.spikes[FX_C1][t], strips(c2->n_out));
+  fx_current_spikes(s->current, c2->w, s->events.spikes[FX_C1][t], bias_row(c2), strips(c2->n_out));
   keep_current(trace, FX_C2, t, s->current, c2->n_out);
   for (int o = 0; o < strips(c2->n_out); o++) s->current[o] *= 1 << SF_AC_FRAC;
   fire(s, net, FX_C2, t, s->current, trace);
@@ -68,7 +88,7 @@ static void hidden_step(state *s, const fx_net *net, int t, const int32_t *base,
 static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
 {
   const fx_layer *c3 = &net->layer[FX_C3];
-  fx_current_spikes(s->current, c3->w, s->events.spikes[FX_C2][t], STRIP);
+  fx_current_spikes(s->current, c3->w, s->events.spikes[FX_C2][t], bias_row(c3), STRIP);
   keep_current(trace, FX_C3, t, s->current, c3->n_out);
   for (int o = 0; o < COLOURS; o++) {
     const uint32_t value = fx_sigmoid(fx_sigmoid_argument(s->current[o], &net->sigmoid_in));
@@ -82,8 +102,9 @@ void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_c
 {
   const fx_layer *c1 = &net->layer[FX_C1];
   memset(base, 0, SF_LANES * sizeof *base);
-  fx_current_mac(base, c1->w, dir, c1->n_in - (net->layer[FX_D2].n_out - 1), strips(c1->n_out));
-  if (counts) fx_count_rays(counts, net, 1);
+  fx_current_mac(base, c1->w, dir, fx_net_constants(net), strips(c1->n_out));
+  if (c1->bias) fx_current_mac(base, bias_row(c1), (const int16_t[]){(int16_t)c1->bias}, 1, strips(c1->n_out));
+  if (counts && !fx_net_decodes(net)) fx_count_rays(counts, net, 1);
 }
 
 void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_events *events,
@@ -97,7 +118,7 @@ void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_
   if (trace) memset(trace, 0, sizeof *trace);
   fx_current_mac(s.d1_current, d1->w, f, d1->n_in, strips(d1->n_out));
   for (int t = 0; t < net->steps; t++) {
-    density_step(&s, net, t, trace);
+    if (!fx_net_decodes(net)) density_step(&s, net, t, trace);
     hidden_step(&s, net, t, base, trace);
     colour_step(&s, net, t, trace);
   }

@@ -31,8 +31,8 @@ static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s,
 {
   const neurons n = neurons_of(&core->scene->net, FX_D1, mode, first, t);
   events e;
-  fire_layer(&n, 0, false, 0, s->d1_current, b, s, t);
-  list_events(&e, (const uint64_t(*)[2])b->spikes[0][t], b->n);
+  fire_layer(&n, 0, false, 0, s->constant, b, s, t);
+  list_events(&e, (const uint64_t(*)[2])b->spikes[0][t], false, b->n);
   add_rows16(&e, core->words.d2, s->d2_current);
   for (int i = 0; i < b->n; i++) {
     __m256i *current = (__m256i *)s->d2_current[i];
@@ -44,8 +44,9 @@ static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s,
 static INLINE void c1_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   const neurons n = neurons_of(&core->scene->net, FX_C1, mode, first, t);
-  c1_currents(&core->words, b, s);
-  fire_layer(&n, 1, false, 0, s->current, b, s, t);
+  const bool decodes = fx_net_decodes(&core->scene->net);
+  if (!decodes) c1_currents(&core->words, b, s);
+  fire_layer(&n, 1, false, 0, decodes ? s->constant : s->current, b, s, t);
 }
 
 static INLINE int spikes_of_block(const fx_block *b, int layer, int t)
@@ -64,7 +65,7 @@ static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
     c2_currents_dense(&core->words, spikes, b->n, s);
     fire_layer(&n, 2, false, SF_AC_FRAC, s->current, b, s, t);
   } else {
-    c2_currents_events(&core->words, spikes, b->n, s);
+    c2_currents_events(&core->words, spikes, core->scene->net.layer[FX_C2].bias != 0, b->n, s);
     fire_layer(&n, 2, true, SF_AC_FRAC, s->c2_current, b, s, t);
   }
 }
@@ -72,7 +73,7 @@ static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
 static INLINE void c3_step(const fx_core *core, fx_block *b, fx_scratch *s, int t)
 {
   events e;
-  list_events(&e, (const uint64_t(*)[2])b->spikes[2][t], b->n);
+  list_events(&e, (const uint64_t(*)[2])b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n);
   add_rows16(&e, core->words.c3, s->c3_current);
   for (int o = 0; o < COLOURS; o++)
     for (int i = 0; i < b->n; i++) s->argument[1 + o][i] = s->c3_current[i][o];
@@ -80,7 +81,7 @@ static INLINE void c3_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
 
 static INLINE void step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
-  density_step(core, b, s, mode, first, t);
+  if (!fx_net_decodes(&core->scene->net)) density_step(core, b, s, mode, first, t);
   c1_step(core, b, s, mode, first, t);
   c2_step(core, b, s, mode, first, t);
   c3_step(core, b, s, t);
@@ -91,8 +92,14 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
 {
   const fx_net *net = &core->scene->net;
   memset(b->saturated, 0, sizeof b->saturated);
-  for (int i = b->n; i % GANG; i++) b->base[i] = b->base[0]; /* the last gang may have members that nobody reads */
-  d1_currents(&core->words, b, s);
+  if (fx_net_decodes(net)) {
+    memset(b->spikes[0], 0, sizeof b->spikes[0]);
+    memset(s->acc[0], 0, sizeof s->acc[0]);
+    c1_constant_currents(&core->words, net->layer[FX_C1].n_in, b, s);
+  } else {
+    for (int i = b->n; i % GANG; i++) b->base[i] = b->base[0]; /* the last gang may have members that nobody reads */
+    d1_currents(&core->words, b, s);
+  }
   step(core, b, s, mode, true, 0);
   for (int t = 1; t < net->steps; t++) step(core, b, s, mode, false, t);
   fx_block_count(b, net->steps);

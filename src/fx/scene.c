@@ -23,7 +23,7 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path)
   const size_t table = aligned((size_t)scene->grid.entries * FX_GRID_FEATURES),
                bits = aligned(fx_occupancy_bytes(scene));
   size_t size = table + bits;
-  for (int id = 0; id < SF_LAYERS; id++) size += (size_t)scene->net.layer[id].n_in * SF_LANES;
+  for (int id = 0; id < SF_LAYERS; id++) size += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
   int8_t *block = aligned_alloc(ALIGN, aligned(size));
   if (!block) return sf_fail(SF_E_MEMORY, "%s: no memory for %zu bytes", path, size);
   memset(block, 0, aligned(size));
@@ -33,7 +33,7 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path)
   int8_t *w = block + table + bits;
   for (int id = 0; id < SF_LAYERS; id++) {
     scene->net.layer[id].w = w;
-    w += (size_t)scene->net.layer[id].n_in * SF_LANES;
+    w += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
   }
   return sf_ok();
 }

@@ -22,7 +22,7 @@ typedef struct harmonic {
   axis u;
 } harmonic;
 
-static const harmonic harmonics[SF_DIR_MAX] = {
+static const harmonic harmonics[FX_SH] = {
     {18487, AXIS_ONE}, {-32021, AXIS_Y},   {32021, AXIS_Z},   {-32021, AXIS_X}, {71601, AXIS_ONE}, {-71601, AXIS_ONE},
     {20670, AXIS_ONE}, {-71601, AXIS_ONE}, {35801, AXIS_ONE}, {38669, AXIS_Y},  {94720, AXIS_Z},   {29953, AXIS_Y},
     {24456, AXIS_Z},   {29953, AXIS_X},    {94720, AXIS_Z},   {-38669, AXIS_X},
@@ -34,7 +34,7 @@ static int32_t product(int32_t u, int32_t v)
 }
 
 /* The factors q of all harmonics. */
-static void factors(const int32_t v[3], int32_t q[SF_DIR_MAX])
+static void factors(const int32_t v[3], int32_t q[FX_SH])
 {
   const int32_t one = 1 << PRODUCT_FRAC, x = v[0], y = v[1], z = v[2];
   const int32_t xx = product(x, x), yy = product(y, y), zz = product(z, z);
@@ -45,13 +45,13 @@ static void factors(const int32_t v[3], int32_t q[SF_DIR_MAX])
   q[14] = xx - yy, q[15] = xx - 3 * yy;
 }
 
-void fx_sh(const int16_t unit[3], int frac, int16_t dir[SF_DIR_MAX])
+void fx_sh(const int16_t unit[3], int frac, int16_t dir[FX_SH])
 {
-  int32_t v[4] = {[AXIS_ONE] = FX_UNIT_ONE}, q[SF_DIR_MAX];
+  int32_t v[4] = {[AXIS_ONE] = FX_UNIT_ONE}, q[FX_SH];
   for (int i = 0; i < 3; i++)
     v[i] = unit[i] > FX_UNIT_ONE ? FX_UNIT_ONE : unit[i] < -FX_UNIT_ONE ? -FX_UNIT_ONE : unit[i];
   factors(v, q);
-  for (int i = 0; i < SF_DIR_MAX; i++) {
+  for (int i = 0; i < FX_SH; i++) {
     const int64_t a = fx_rshift_round((int64_t)harmonics[i].coefficient * v[harmonics[i].u], FX_UNIT_FRAC);
     const int64_t value = fx_rshift_round(a * q[i], COEFFICIENT_FRAC + PRODUCT_FRAC - frac);
     dir[i] = (int16_t)(value > FX_INPUT_MAX ? FX_INPUT_MAX : value < -FX_INPUT_MAX ? -FX_INPUT_MAX : value);

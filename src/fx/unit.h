@@ -29,7 +29,7 @@ uint32_t fx_exp_neg(uint64_t tau);
 /* 1 / (1 + exp(-x)), x in Q4.12 (s16) -> Q0.16, 0..65535. */
 uint32_t fx_sigmoid(int32_t x);
 
-/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16256, so the product is s32. */
+/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16383, so the product is s32. */
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
 

@@ -8,7 +8,7 @@ _Static_assert((int)SPIKEFIELD_LAYERS == (int)SF_LAYERS, "arch.def and spikefiel
 _Static_assert((int)SPIKEFIELD_STEPS_MAX == (int)SF_T_MAX, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_LANES == (int)SF_LANES, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_FEATURES_MAX == (int)SF_FEATURE_MAX, "arch.def and spikefield.h differ");
-_Static_assert((int)SPIKEFIELD_DIRECTIONS == (int)SF_DIR_MAX, "arch.def and spikefield.h differ");
+_Static_assert((int)SPIKEFIELD_DIRECTIONS == (int)FX_SH, "arch.def and spikefield.h differ");
 _Static_assert(SPIKEFIELD_INPUT_MAX == (1 << (SF_INPUT_BITS - 1)) - 1, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_E_STOPPED == (int)SF_E_STOPPED && (int)SPIKEFIELD_E_USAGE == (int)SF_E_USAGE,
                "sf_code and spikefield_code differ");

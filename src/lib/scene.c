@@ -82,7 +82,7 @@ static void describe_net(const fx_net *net, spikefield_scene_info *info)
   }
   info->mode = (spikefield_mode)net->mode, info->steps = net->steps;
   info->features = net->layer[FX_D1].n_in;
-  info->directions = net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
+  info->directions = fx_net_constants(net);
 }
 
 static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *info)

@@ -75,7 +75,7 @@ int sf_golden_outputs(void *handle, int layer)
 
 static int directions(const golden *g)
 {
-  return g->scene.net.layer[FX_C1].n_in - (g->scene.net.layer[FX_D2].n_out - 1);
+  return fx_net_constants(&g->scene.net);
 }
 
 static sf_status check_values(const char *what, const int16_t *value, int n)
@@ -114,9 +114,9 @@ static void unpack(const uint32_t *word, int16_t *value, int n)
 int sf_golden_sample(void *handle, int first, const uint32_t direction[8], const uint32_t features[16])
 {
   golden *g = handle;
-  int16_t d[SF_DIR_MAX], f[SF_FEATURE_MAX];
+  int16_t d[FX_SH], f[SF_FEATURE_MAX];
   if (!g || !g->open) return -1;
-  unpack(direction, d, SF_DIR_MAX);
+  unpack(direction, d, FX_SH);
   unpack(features, f, SF_FEATURE_MAX);
   return finish(g, evaluate(g, first ? d : NULL, f), 1);
 }

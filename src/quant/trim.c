@@ -11,7 +11,7 @@ static int64_t cells_of(const fx_scene *scene)
 
 static int directions_of(const fx_net *net)
 {
-  return net->layer[FX_C1].n_in - (net->layer[FX_D2].n_out - 1);
+  return fx_net_constants(net);
 }
 
 /* ---- use ---- */

@@ -66,7 +66,7 @@ static void make_rays(const fx_scene *scene, fx_ray ray[2])
     ray[1].origin[axis] = axis ? 1 : ((int64_t)1 << 40) - 1;
     ray[1].step[axis] = (int64_t)(axis ? 1 : -1) * ((((int64_t)1 << 40) - 2) / 63);
   }
-  for (int i = 0; i < SF_DIR_MAX; i++) ray[1].dir[i] = (int16_t)(i % 2 ? -2047 : 2047);
+  for (int i = 0; i < FX_SH; i++) ray[1].dir[i] = (int16_t)(i % 2 ? -2047 : 2047);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
