@@ -81,7 +81,7 @@ static sf_status collect_rays(activity *a)
     fx_pixel pixel;
     fx_counts march = {0};
     if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "stopped: no file is written");
-    SF_TRY(sf_pixel_ray(&l->fx, &l->data.view[p.view].camera, p.x, p.y, &ray));
+    SF_TRY(sf_pixel_ray(&l->fx, &l->data, &l->data.view[p.view], p.x, p.y, &ray));
     SF_TRY(fx_render_ray(&l->fx, &ray, collect, &c, &pixel, &march));
   }
   for (int i = 0; i < a->in.count; i++) a->in.sample[i].ray = &a->in.ray[i], a->in.sample[i].f = a->in.f[i];

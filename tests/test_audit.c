@@ -282,7 +282,7 @@ END_TEST
 
 START_TEST(checked_rays_are_a_seeded_choice)
 {
-  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, 50};
