@@ -87,10 +87,46 @@ typedef struct fx_grid {
   int8_t *table;                    /* [entries][2] */
 } fx_grid;
 
+/* The field of TensoRF (Chen et al. 2022): density and appearance as sums of products of a plane and a line, in
+ * three pairs: planes over the axes (x,y), (x,z), (y,z), lines along z, y, x. Grid points are at the ends of the box:
+ * position p of an axis is p * (res - 1), Q.8, rounded half up; linear weights are exact. Plane and line of a component
+ * share the LSB of their product, which is one for all components of the density.
+ * Equations and widths: fx/tensorf.c. */
+enum { FX_PAIRS = 3, FX_COMPONENTS_MAX = 64, FX_TENSORF_RES_MAX = 2048, FX_APPEARANCE_MAX = 32, FX_FREQS_MAX = 4 };
+typedef enum { FX_SOFTPLUS, FX_RELU } fx_activation;
+typedef struct fx_factors {
+  int32_t components[FX_PAIRS]; /* 1..FX_COMPONENTS_MAX */
+  int8_t *plane[FX_PAIRS];      /* [res of its second axis][res of its first axis][components] */
+  int8_t *line[FX_PAIRS];       /* [res of its axis][components] */
+} fx_factors;
+
+typedef struct fx_tensorf {
+  int32_t res[3]; /* grid points per axis, 1..FX_TENSORF_RES_MAX */
+  fx_factors density, appearance;
+  int32_t activation;  /* fx_activation */
+  fx_scale density_in; /* sum of products (Q.16 of their LSB) -> argument of the activation, Q.LOG_FRAC; shift 0..40 */
+  fx_scale sigma_out;  /* activation, Q.20 -> density per box edge, U16.12; bias 0 */
+  int32_t
+      weight_stop; /* a sample whose weight is <= this never reaches the decoder, but takes its light; Q.TRANS_FRAC */
+  int32_t product_shift; /* appearance: x = sat12(rshift_round(product, product_shift)); 0..31 */
+  int32_t features;      /* 1..FX_APPEARANCE_MAX */
+  int8_t *basis;         /* [appearance components][FX_APPEARANCE_MAX]: feature sums = x * basis */
+  fx_scale feature_in;   /* feature sum -> feature, int12; bias 0, shift 0..40 */
+  fx_scale phase_in; /* feature sum -> its phase as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
+  int32_t feature_freqs, view_freqs; /* sines and cosines of 1, 2, 4 ... times a value; 0..FX_FREQS_MAX */
+  int32_t encoding_frac;             /* LSB of directions, sines and cosines: 2^-encoding_frac, 0..FX_DIR_FRAC_MAX */
+  /* For quant/ only: box = (world * to_box_scale + to_box_offset) * stretch, per axis: the box has unequal edges, and
+   * lengths are in the longest. Rays begin and end at these distances from their origins, model units. */
+  double stretch[3], near, far;
+} fx_tensorf;
+
 /* Scene box [0,1)^3, marched in equal steps. occupancy: bit (z*res + y)*res + x, LSB first. */
+typedef enum { FX_INGP, FX_TENSORF } fx_backbone;
 typedef struct fx_scene {
+  int32_t backbone; /* fx_backbone: grid and both nets, or tensorf and the decoder (C1, C2, C3 of net) */
   fx_net net;
   fx_grid grid;
+  fx_tensorf tensorf;
   int32_t occ_res;       /* cells per axis, power of two, <= 256 */
   uint8_t *occupancy;    /* occ_res^3 / 8 bytes */
   int32_t step_q24;      /* distance between samples in box edges, Q0.24 */
@@ -143,6 +179,9 @@ typedef struct fx_counts {
   uint64_t saturated[SF_LAYERS];         /* saturation events: membranes, or exp/sigmoid accumulators for D2/C3 */
   uint64_t saturated_samples[SF_LAYERS]; /* samples with at least one of them */
   uint64_t saturated_features;
+  uint64_t field_samples; /* TensoRF: points whose density was read; `samples` went on through the decoder */
+  uint64_t field_mac;     /* products of the VM field: per component 4 of the plane, 2 of the line, 1 of both, and the
+                             basis matrix; its bytes of planes and lines are in grid_bytes */
 } fx_counts;
 
 void fx_counts_add(fx_counts *sum, const fx_counts *more);
@@ -177,6 +216,14 @@ void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_
 /* Grid features of one position. pos[3] Q0.24, f[2*levels]. counts may be NULL. */
 void fx_grid_features(const fx_grid *grid, const uint32_t *pos, int16_t *f, fx_counts *counts);
 
+/* TensoRF: density per box edge (U16.12) and the decoder's inputs of one position. pos[3] Q0.24; unit: direction,
+ * Q1.14. x[fx_tensorf_inputs]: features, direction, then sines and cosines of both: see fx/tensorf.c. counts may be
+ * NULL. */
+uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_counts *counts);
+void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
+                       fx_counts *counts);
+int fx_tensorf_inputs(const fx_tensorf *field);
+
 /* Next lattice point >= n whose cell is occupied, or -1. Writes its position. */
 int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint32_t *pos, fx_counts *counts);
 
@@ -185,10 +232,13 @@ typedef struct fx_pixel {
   uint64_t colour[3];                 /* Q8.36: sum of w (Q.20) * c (Q4.16) */
   uint64_t depth;                     /* sum of w * (distance in lattice steps, Q16.16) */
   uint32_t weight_sum, transmittance; /* Q.20 */
-  uint32_t samples;
+  uint32_t samples;                   /* whose colour was added */
 } fx_pixel;
 void fx_composite_begin(fx_pixel *pixel);
 void fx_composite_add(fx_pixel *pixel, const fx_out *sample, int32_t delta_q24, uint64_t distance_q16);
+/* The same in two parts: the weight that the sample has, then its colour, which may be left out. */
+uint32_t fx_composite_weight(fx_pixel *pixel, uint32_t sigma, int32_t delta_q24, uint64_t distance_q16);
+void fx_composite_colour(fx_pixel *pixel, uint32_t weight, const uint32_t colour[3]);
 void fx_composite_end(fx_pixel *pixel, const int32_t *background_q16);
 
 /* Pixel to raw integers of the golden image: RGB Q0.16 clamped to 0..65535, alpha Q0.16. */

@@ -8,7 +8,8 @@
  *
  * counts_sha256: the event counts, 8 bytes each. For layer D1 D2 C1 C2 C3, for event mac sop spikes updates weight
  * state_r state_w special, for step 0 .. t_r-1; then samples, rays, grid_bytes, march_steps; then saturated of the five
- * layers; then saturated_samples of the five layers; then saturated_features.
+ * layers; then saturated_samples of the five layers; then saturated_features; of a TensoRF scene then field_samples and
+ * field_mac.
  *
  * camera_sha256: width, height as 4-byte integers; fx fy cx cy and to_world[12] as IEEE single precision. Pictures can
  * only be equal where the rays are.

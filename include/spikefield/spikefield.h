@@ -137,6 +137,7 @@ typedef struct spikefield_counts {
   uint64_t saturated[SPIKEFIELD_LAYERS];                     /* saturation events */
   uint64_t saturated_samples[SPIKEFIELD_LAYERS];             /* samples with at least one of them */
   uint64_t saturated_features;
+  uint64_t field_samples, field_mac; /* TensoRF: points whose density was read; products of the field */
 } spikefield_counts;
 SPIKEFIELD_API void spikefield_counts_add(spikefield_counts *sum, const spikefield_counts *more);
 

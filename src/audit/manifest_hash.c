@@ -21,7 +21,7 @@ static sf_status hash_plane(const uint32_t *plane, size_t n, char hex[65])
 
 static void hash_counts(const fx_net *net, const fx_counts *c, char hex[65])
 {
-  uint8_t bytes[8 * (SF_LAYERS * SF_EVENTS * SF_T_MAX + 4 + 2 * SF_LAYERS + 1)], *to = bytes;
+  uint8_t bytes[8 * (SF_LAYERS * SF_EVENTS * SF_T_MAX + 4 + 2 * SF_LAYERS + 3)], *to = bytes;
   for (int l = 0; l < SF_LAYERS; l++)
     for (int e = 0; e < SF_EVENTS; e++)
       for (int t = 0; t < net->steps; t++) to = put(to, sf_event_count(&c->layer[l], e, t), 8);
@@ -30,6 +30,7 @@ static void hash_counts(const fx_net *net, const fx_counts *c, char hex[65])
   for (int l = 0; l < SF_LAYERS; l++) to = put(to, c->saturated[l], 8);
   for (int l = 0; l < SF_LAYERS; l++) to = put(to, c->saturated_samples[l], 8);
   to = put(to, c->saturated_features, 8);
+  if (c->field_samples || c->field_mac) to = put(to, c->field_samples, 8), to = put(to, c->field_mac, 8);
   sf_sha256(bytes, (size_t)(to - bytes), hex);
 }
 

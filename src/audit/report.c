@@ -82,6 +82,10 @@ cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts)
   sf_json_add_u64(json, "grid_bytes", counts->grid_bytes);
   sf_json_add_u64(json, "march_steps", counts->march_steps);
   sf_json_add_u64(json, "saturated_features", counts->saturated_features);
+  if (counts->field_samples) {
+    sf_json_add_u64(json, "field_samples", counts->field_samples);
+    sf_json_add_u64(json, "field_mac", counts->field_mac);
+  }
   return json;
 }
 

@@ -8,14 +8,6 @@ static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
 
 enum { ENTRIES_MAX = 1 << 28, HASH_BITS_MAX = 27, OCCUPANCY_MAX = 256, SAMPLES_MAX = 1024 };
 
-static sf_status in_range(const char *path, const char *owner, const char *field, int64_t value, int64_t low,
-                          int64_t high)
-{
-  if (value >= low && value <= high) return sf_ok();
-  return sf_fail(SF_E_RANGE, "%s: %s.%s is %lld, expected %lld..%lld", path, owner, field, (long long)value,
-                 (long long)low, (long long)high);
-}
-
 /* A decoder has no D1 and D2; the inputs of C1 are as many as the sum of its current has bits for. */
 static sf_status check_inputs(const fx_net *net, const char *path)
 {
@@ -73,10 +65,22 @@ static sf_status check_grid(const fx_grid *grid, int n_feature, const char *path
   return sf_ok();
 }
 
+/* What holds the field of the scene. */
+static sf_status check_field(const fx_scene *scene, const char *path)
+{
+  const fx_layer *layer = scene->net.layer;
+  SF_TRY(in_range(path, "scene", "backbone", scene->backbone, FX_INGP, FX_TENSORF));
+  if (scene->backbone == FX_TENSORF) {
+    SF_TRY(in_range(path, "D1", "n_out", layer[FX_D1].n_out, 0, 0));
+    return fx_check_tensorf_sizes(&scene->tensorf, layer[FX_C1].n_in, path);
+  }
+  return fx_net_decodes(&scene->net) ? sf_ok() : check_grid(&scene->grid, layer[FX_D1].n_in, path);
+}
+
 sf_status fx_check_sizes(const fx_scene *scene, const char *path)
 {
   SF_TRY(check_chain(&scene->net, path));
-  if (!fx_net_decodes(&scene->net)) SF_TRY(check_grid(&scene->grid, scene->net.layer[FX_D1].n_in, path));
+  SF_TRY(check_field(scene, path));
   SF_TRY(in_range(path, "scene", "occ_res", scene->occ_res, 2, OCCUPANCY_MAX));
   if (scene->occ_res & (scene->occ_res - 1))
     return sf_fail(SF_E_RANGE, "%s: scene.occ_res is %d, expected a power of two", path, scene->occ_res);
@@ -128,7 +132,10 @@ sf_status fx_scene_check(const fx_scene *scene, const char *path)
 {
   SF_TRY(fx_check_sizes(scene, path));
   SF_TRY(check_net(&scene->net, path));
-  if (!scene->grid.table) return sf_fail(SF_E_FORMAT, "%s: tensor 'grid.table' is missing", path);
+  if (scene->backbone == FX_TENSORF)
+    SF_TRY(fx_check_tensorf(&scene->tensorf, path));
+  else if (!scene->grid.table)
+    return sf_fail(SF_E_FORMAT, "%s: tensor 'grid.table' is missing", path);
   if (!scene->occupancy) return sf_fail(SF_E_FORMAT, "%s: tensor 'occupancy' is missing", path);
   SF_TRY(in_range(path, "scene", "step_q24", scene->step_q24, 1, 1 << SF_DELTA_FRAC));
   SF_TRY(in_range(path, "scene", "max_samples", scene->max_samples, 1, SAMPLES_MAX));

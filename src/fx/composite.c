@@ -13,17 +13,28 @@ void fx_composite_begin(fx_pixel *pixel)
   *pixel = (fx_pixel){.transmittance = FX_TRANS_ONE};
 }
 
-void fx_composite_add(fx_pixel *pixel, const fx_out *sample, int32_t delta_q24, uint64_t distance_q16)
+uint32_t fx_composite_weight(fx_pixel *pixel, uint32_t sigma, int32_t delta_q24, uint64_t distance_q16)
 {
-  const int64_t tau = fx_rshift_round((int64_t)sample->sigma * delta_q24, TAU_SHIFT); /* 28 + 24 bits */
+  const int64_t tau = fx_rshift_round((int64_t)sigma * delta_q24, TAU_SHIFT); /* 28 + 24 bits */
   const int64_t product = (int64_t)pixel->transmittance * fx_exp_neg((uint64_t)tau);
   const uint32_t after = (uint32_t)fx_rshift_round(product, SF_TRANS_FRAC);
-  const uint64_t weight = pixel->transmittance - after;
-  for (int o = 0; o < 3; o++) pixel->colour[o] += weight * sample->colour[o];
+  const uint32_t weight = pixel->transmittance - after;
   pixel->depth += weight * distance_q16;
-  pixel->weight_sum += (uint32_t)weight;
+  pixel->weight_sum += weight;
   pixel->transmittance = after;
+  return weight;
+}
+
+void fx_composite_colour(fx_pixel *pixel, uint32_t weight, const uint32_t colour[3])
+{
+  for (int o = 0; o < 3; o++) pixel->colour[o] += (uint64_t)weight * colour[o];
   pixel->samples++;
+}
+
+void fx_composite_add(fx_pixel *pixel, const fx_out *sample, int32_t delta_q24, uint64_t distance_q16)
+{
+  const uint32_t weight = fx_composite_weight(pixel, sample->sigma, delta_q24, distance_q16);
+  fx_composite_colour(pixel, weight, sample->colour);
 }
 
 void fx_composite_end(fx_pixel *pixel, const int32_t *background_q16)

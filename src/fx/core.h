@@ -79,6 +79,13 @@ struct fx_core {
   const fx_kernels *kernels;
 };
 
+/* Adds sample i's saturations to counts and its events to cost (may be NULL). */
+void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *counts, fx_cost *cost);
+
+/* fx_render_rays of a TensoRF scene: rays_tensorf.c. */
+sf_status fx_render_tensorf(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
+                            fx_counts *counts);
+
 /* "portable", "avx2", "avx512vnni", or NULL for the best of this CPU; NULL when CPU or build lacks it. */
 const fx_kernels *fx_kernels_select(const char *name);
 #endif

@@ -8,7 +8,8 @@
 
 #define FORMAT "spikefield-snn"
 #define VERSION "1"
-enum { TENSORS = SF_LAYERS + 7 };
+#define TENSORF "tensorf"
+enum { TENSORS = SF_LAYERS + FX_TENSORF_ARRAYS + 7 };
 
 static const char *const mode_name[] = {"hybrid", "decay", "no-decay"};
 
@@ -58,6 +59,27 @@ static const int_field biases[] = {
     {"C3.bias", offsetof(fx_scene, net.layer[FX_C3].bias)},
 };
 enum { BIASES = sizeof biases / sizeof biases[0] };
+
+#define SCALE(field) FIELD(field.mul), FIELD(field.shift), FIELD(field.bias)
+#define EACH(field) FIELD(field[0]), FIELD(field[1]), FIELD(field[2])
+/* Of scenes whose metadata 'backbone' says so. */
+static const int_field tensorf_ints[] = {
+    EACH(tensorf.res),
+    EACH(tensorf.density.components),
+    EACH(tensorf.appearance.components),
+    SCALE(tensorf.density_in),
+    SCALE(tensorf.sigma_out),
+    SCALE(tensorf.feature_in),
+    SCALE(tensorf.phase_in),
+    FIELD(tensorf.activation),
+    FIELD(tensorf.weight_stop),
+    FIELD(tensorf.product_shift),
+    FIELD(tensorf.features),
+    FIELD(tensorf.feature_freqs),
+    FIELD(tensorf.view_freqs),
+    FIELD(tensorf.encoding_frac),
+};
+enum { TENSORF_INTS = sizeof tensorf_ints / sizeof tensorf_ints[0] };
 
 static int32_t *int_of(const fx_scene *scene, const int_field *field)
 {
@@ -111,8 +133,10 @@ static sf_tensor make_tensor(const char *name, sf_dtype type, void *data, int di
 }
 
 /* The levels' arrays: their length is known before the sizes they hold. */
-static int list_levels(sf_tensor *tensor, fx_grid *grid)
+static int list_levels(sf_tensor *tensor, fx_scene *scene)
 {
+  fx_grid *grid = &scene->grid;
+  if (scene->backbone == FX_TENSORF) return 0;
   tensor[0] = make_tensor("grid.scale_q16", SF_I32, grid->scale_q16, 1, grid->levels, 0);
   tensor[1] = make_tensor("grid.stride", SF_I32, grid->stride, 1, grid->levels, 0);
   tensor[2] = make_tensor("grid.log2_size", SF_I32, grid->log2_size, 1, grid->levels, 0);
@@ -121,11 +145,25 @@ static int list_levels(sf_tensor *tensor, fx_grid *grid)
   return 5;
 }
 
+static int list_field(sf_tensor *tensor, fx_scene *scene)
+{
+  fx_array list[FX_TENSORF_ARRAYS];
+  if (scene->backbone == FX_INGP) {
+    tensor[0] = make_tensor("grid.table", SF_I8, scene->grid.table, 2, scene->grid.entries, FX_GRID_FEATURES);
+    return 1;
+  }
+  const int count = fx_tensorf_arrays(&scene->tensorf, list);
+  for (int i = 0; i < count; i++) {
+    tensor[i] = make_tensor(list[i].name, SF_I8, *list[i].data, list[i].dims, 0, 0);
+    memcpy(tensor[i].shape, list[i].shape, sizeof list[i].shape);
+  }
+  return count;
+}
+
 static int list_bulk(sf_tensor *tensor, fx_scene *scene)
 {
-  tensor[0] = make_tensor("grid.table", SF_I8, scene->grid.table, 2, scene->grid.entries, FX_GRID_FEATURES);
-  tensor[1] = make_tensor("occupancy", SF_U8, scene->occupancy, 1, (int64_t)fx_occupancy_bytes(scene), 0);
-  int count = 2;
+  int count = list_field(tensor, scene);
+  tensor[count++] = make_tensor("occupancy", SF_U8, scene->occupancy, 1, (int64_t)fx_occupancy_bytes(scene), 0);
   for (int id = 0; id < SF_LAYERS; id++) {
     const fx_layer *layer = &scene->net.layer[id];
     const int rows = fx_layer_rows(layer);
@@ -171,6 +209,10 @@ static cJSON *make_metadata(const fx_scene *scene)
   for (int i = 0; i < INTS; i++) add_int(metadata, scene, &ints[i]);
   for (int i = 0; i < BIASES; i++)
     if (*int_of(scene, &biases[i])) add_int(metadata, scene, &biases[i]);
+  if (scene->backbone == FX_TENSORF) {
+    cJSON_AddStringToObject(metadata, "backbone", TENSORF);
+    for (int i = 0; i < TENSORF_INTS; i++) add_int(metadata, scene, &tensorf_ints[i]);
+  }
   fx_reals_write(metadata, scene);
   return metadata;
 }
@@ -180,7 +222,7 @@ sf_status fx_scene_save(const fx_scene *scene, const char *path)
   sf_tensor tensor[TENSORS];
   fx_scene copy = *scene;
   SF_TRY(fx_scene_check(scene, path));
-  int count = list_levels(tensor, &copy.grid);
+  int count = list_levels(tensor, &copy);
   count += list_bulk(tensor + count, &copy);
   cJSON *metadata = make_metadata(scene);
   if (!metadata) return sf_fail(SF_E_MEMORY, "%s: no memory for the metadata", path);
@@ -223,6 +265,17 @@ static sf_status expect_meta(const sf_tensors *set, const char *key, const char 
   return sf_fail(code, "%s: metadata '%s' is '%.100s', expected '%s'", set->path, key, text ? text : "", expected);
 }
 
+/* Absent: INGP's, as all files were before there was another. */
+static sf_status read_backbone(const sf_tensors *set, fx_scene *scene)
+{
+  const char *text = sf_tensors_meta(set, "backbone");
+  if (!text) return sf_ok();
+  SF_TRY(expect_meta(set, "backbone", TENSORF, SF_E_UNSUPPORTED));
+  scene->backbone = FX_TENSORF;
+  for (int i = 0; i < TENSORF_INTS; i++) SF_TRY(read_int(set, &tensorf_ints[i], scene));
+  return sf_ok();
+}
+
 static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
 {
   SF_TRY(expect_meta(set, "format", FORMAT, SF_E_FORMAT));
@@ -233,10 +286,11 @@ static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
   for (int i = 0; i < BIASES; i++)
     if (sf_tensors_meta(set, biases[i].key)) SF_TRY(read_int(set, &biases[i], scene));
+  SF_TRY(read_backbone(set, scene));
   SF_TRY(read_mode(set, scene));
   if (scene->net.steps < 1 || scene->net.steps > SF_T_MAX)
     return sf_fail(SF_E_RANGE, "%s: metadata 't_r' is %d, expected 1..%d", set->path, scene->net.steps, SF_T_MAX);
-  if (scene->grid.levels < 1 || scene->grid.levels > FX_LEVELS_MAX)
+  if (scene->backbone == FX_INGP && (scene->grid.levels < 1 || scene->grid.levels > FX_LEVELS_MAX))
     return sf_fail(SF_E_RANGE, "%s: metadata 'grid.levels' is %d, expected 1..%d", set->path, scene->grid.levels,
                    FX_LEVELS_MAX);
   return fx_reals_read(set->metadata, scene, set->path);
@@ -272,8 +326,8 @@ static sf_status read_scene(const sf_tensors *set, fx_scene *scene)
 {
   sf_tensor want[TENSORS];
   SF_TRY(read_metadata(set, scene));
-  SF_TRY(copy_tensors(set, want, list_levels(want, &scene->grid)));
-  SF_TRY(read_entries(set, &scene->grid));
+  SF_TRY(copy_tensors(set, want, list_levels(want, scene)));
+  if (scene->backbone == FX_INGP) SF_TRY(read_entries(set, &scene->grid));
   SF_TRY(fx_scene_allocate(scene, set->path));
   SF_TRY(copy_tensors(set, want, list_bulk(want, scene)));
   SF_TRY(fx_scene_check(scene, set->path));

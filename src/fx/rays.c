@@ -22,7 +22,6 @@ typedef struct wave {
   const fx_ray *rays;
   fx_pixel *pixels;
   fx_cost *costs;
-  uint64_t macs_of_sample;
   fx_firing firing;
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
 } wave;
@@ -69,20 +68,18 @@ static void end_ray(wave *w, int i)
   for (int axis = 0; axis < 3; axis++) w->block.pos[axis][i] = w->block.pos[axis][last];
 }
 
-static void account(wave *w, int i)
+void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *counts, fx_cost *cost)
 {
-  const fx_layer *layer = w->core->scene->net.layer;
-  const fx_block *b = &w->block;
+  const fx_layer *layer = core->scene->net.layer;
   for (int l = 0; l < SF_LAYERS; l++) {
-    w->counts.saturated[l] += b->saturated[l][i];
-    w->counts.saturated_samples[l] += b->saturated[l][i] != 0;
+    counts->saturated[l] += b->saturated[l][i];
+    counts->saturated_samples[l] += b->saturated[l][i] != 0;
   }
-  if (!w->costs) return;
-  fx_cost *sum = &w->costs[w->slot[i].ray];
+  if (!cost) return;
   const uint64_t d1 = b->fired[0][i], c1 = b->fired[1][i], c2 = b->fired[2][i];
-  sum->macs += w->macs_of_sample;
-  sum->spikes += d1 + c1 + c2;
-  sum->sops +=
+  cost->macs += fx_macs_of_sample(&core->scene->net);
+  cost->spikes += d1 + c1 + c2;
+  cost->sops +=
       d1 * (uint64_t)layer[FX_D2].n_out + c1 * (uint64_t)layer[FX_C2].n_out + c2 * (uint64_t)layer[FX_C3].n_out;
 }
 
@@ -107,7 +104,7 @@ static void round_of_samples(wave *w)
   core->kernels->nets(core, b, &w->scratch);
   fx_firing_sum(&w->firing, &b->firing);
   for (int i = 0; i < b->n; i++) {
-    account(w, i);
+    fx_block_account(core, b, i, &w->counts, w->costs ? &w->costs[w->slot[i].ray] : NULL);
     ended[i] = !composite(w, i) || !advance(w, i, w->slot[i].at + 1);
   }
   for (int i = b->n - 1; i >= 0; i--)
@@ -128,10 +125,10 @@ static void add_counts(const wave *w, fx_counts *counts)
 sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
                          fx_counts *counts)
 {
+  if (core->scene->backbone == FX_TENSORF) return fx_render_tensorf(core, rays, n, pixels, costs, counts);
   wave *w = sf_aligned_alloc(sizeof *w);
   if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
   w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
-  w->macs_of_sample = fx_macs_of_sample(&core->scene->net);
   for (int i = 0; i < FX_BLOCK; i++) w->slot[i].base = w->base[i];
   if (costs) memset(costs, 0, n * sizeof *costs);
   for (size_t next = 0; next < n || w->block.n > 0;) {

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS };
+enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS, TENSORF_REALS = 5 };
 
 typedef struct real_field {
   const char *key;
@@ -30,6 +30,22 @@ static const real_field reals[REALS] = {
     REAL(current_scale[3], false),  REAL(current_scale[4], false),
 };
 
+static const real_field tensorf_reals[TENSORF_REALS] = {
+    REAL(tensorf.stretch[0], true), REAL(tensorf.stretch[1], true), REAL(tensorf.stretch[2], true),
+    REAL(tensorf.near, false),      REAL(tensorf.far, true),
+};
+
+/* Those of the scene's backbone. */
+static int reals_of(const fx_scene *scene)
+{
+  return scene->backbone == FX_TENSORF ? REALS + TENSORF_REALS : REALS;
+}
+
+static const real_field *real(int i)
+{
+  return i < REALS ? &reals[i] : &tensorf_reals[i - REALS];
+}
+
 static double *field_of(const fx_scene *scene, const real_field *field)
 {
   /* cppcheck-suppress invalidPointerCast ; offsetof a double of the same struct */
@@ -38,22 +54,22 @@ static double *field_of(const fx_scene *scene, const real_field *field)
 
 void fx_reals_write(cJSON *metadata, const fx_scene *scene)
 {
-  for (int i = 0; i < REALS; i++) {
+  for (int i = 0; i < reals_of(scene); i++) {
     char text[64];
-    snprintf(text, sizeof text, "%a", *field_of(scene, &reals[i]));
-    cJSON_AddStringToObject(metadata, reals[i].key, text);
+    snprintf(text, sizeof text, "%a", *field_of(scene, real(i)));
+    cJSON_AddStringToObject(metadata, real(i)->key, text);
   }
 }
 
 sf_status fx_reals_read(const cJSON *metadata, fx_scene *scene, const char *path)
 {
-  for (int i = 0; i < REALS; i++) {
-    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(metadata, reals[i].key));
+  for (int i = 0; i < reals_of(scene); i++) {
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(metadata, real(i)->key));
     char *end = NULL;
-    if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is missing", path, reals[i].key);
-    *field_of(scene, &reals[i]) = strtod(text, &end);
+    if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is missing", path, real(i)->key);
+    *field_of(scene, real(i)) = strtod(text, &end);
     if (end == text || *end)
-      return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is '%.40s', expected a number", path, reals[i].key, text);
+      return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is '%.40s', expected a number", path, real(i)->key, text);
   }
   return fx_reals_check(scene, path);
 }
@@ -67,11 +83,11 @@ static bool is_direction_lsb(double value)
 
 sf_status fx_reals_check(const fx_scene *scene, const char *path)
 {
-  for (int i = 0; i < REALS; i++) {
-    const double value = *field_of(scene, &reals[i]);
-    if (!isfinite(value) || (reals[i].positive && value <= 0))
-      return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, reals[i].key, value,
-                     reals[i].positive ? " positive" : "");
+  for (int i = 0; i < reals_of(scene); i++) {
+    const double value = *field_of(scene, real(i));
+    if (!isfinite(value) || (real(i)->positive && value <= 0))
+      return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, real(i)->key, value,
+                     real(i)->positive ? " positive" : "");
   }
   if (!is_direction_lsb(scene->dir_scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,

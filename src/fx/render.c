@@ -1,3 +1,5 @@
+/* One ray, sample by sample: the oracle of rays.c and rays_tensorf.c. */
+#include "src/fx/scene.h"
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
 
@@ -11,8 +13,60 @@ typedef struct core {
 static sf_status eval_core(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   core *c = user;
-  if (first) fx_net_direction(c->net, ray->dir, c->base, c->counts);
+  const bool decodes = fx_net_decodes(c->net);
+  if (first || decodes) fx_net_direction(c->net, decodes ? f : ray->dir, c->base, c->counts);
   fx_net_sample(c->net, f, c->base, out, NULL, c->counts);
+  return sf_ok();
+}
+
+static uint64_t distance_of(const fx_ray *ray, int32_t n)
+{
+  return ((uint64_t)n << 16) + (uint32_t)ray->first_q16;
+}
+
+static sf_status render_ingp(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
+                             fx_counts *counts)
+{
+  uint32_t pos[3];
+  for (int32_t n = fx_march_next(scene, ray, 0, pos, counts); n >= 0;
+       n = fx_march_next(scene, ray, n + 1, pos, counts)) {
+    int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
+    fx_out out;
+    fx_grid_features(&scene->grid, pos, f, counts);
+    SF_TRY(eval(user, ray, pixel->samples == 0, f, &out));
+    fx_composite_add(pixel, &out, scene->step_q24, distance_of(ray, n));
+    if (pixel->transmittance <= (uint32_t)scene->trans_stop) break;
+    if (pixel->samples >= (uint32_t)scene->max_samples) break;
+  }
+  return sf_ok();
+}
+
+uint32_t fx_tensorf_weight(const fx_scene *scene, const fx_ray *ray, int32_t n, const uint32_t pos[3], fx_pixel *pixel,
+                           fx_counts *counts)
+{
+  const uint32_t sigma = fx_tensorf_density(&scene->tensorf, pos, counts);
+  const uint32_t weight = fx_composite_weight(pixel, sigma, scene->step_q24, distance_of(ray, n));
+  return weight > (uint32_t)scene->tensorf.weight_stop ? weight : 0;
+}
+
+static sf_status render_tensorf(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
+                                fx_counts *counts)
+{
+  uint32_t pos[3];
+  for (int32_t n = fx_march_next(scene, ray, 0, pos, counts); n >= 0;
+       n = fx_march_next(scene, ray, n + 1, pos, counts)) {
+    const uint32_t weight = fx_tensorf_weight(scene, ray, n, pos, pixel, counts);
+    if (weight) {
+      int16_t x[SF_DIR_MAX];
+      fx_out out;
+      fx_tensorf_encode(&scene->tensorf, pos, ray->unit, x, counts);
+      if (counts) counts->rays += pixel->samples == 0;
+      SF_TRY(eval(user, ray, pixel->samples == 0, x, &out));
+      fx_composite_colour(pixel, weight, out.colour);
+    }
+    if (pixel->transmittance <= (uint32_t)scene->trans_stop) break;
+    if (pixel->samples >= (uint32_t)scene->max_samples) break;
+  }
   return sf_ok();
 }
 
@@ -22,17 +76,7 @@ sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval
   core own = {.net = &scene->net, .counts = counts};
   if (!eval) eval = eval_core, user = &own;
   fx_composite_begin(pixel);
-  uint32_t pos[3];
-  for (int32_t n = fx_march_next(scene, ray, 0, pos, counts); n >= 0;
-       n = fx_march_next(scene, ray, n + 1, pos, counts)) {
-    int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
-    fx_out out;
-    fx_grid_features(&scene->grid, pos, f, counts);
-    SF_TRY(eval(user, ray, pixel->samples == 0, f, &out));
-    fx_composite_add(pixel, &out, scene->step_q24, ((uint64_t)n << 16) + (uint32_t)ray->first_q16);
-    if (pixel->transmittance <= (uint32_t)scene->trans_stop) break;
-    if (pixel->samples >= (uint32_t)scene->max_samples) break;
-  }
+  SF_TRY((scene->backbone == FX_TENSORF ? render_tensorf : render_ingp)(scene, ray, eval, user, pixel, counts));
   fx_composite_end(pixel, scene->background);
   return sf_ok();
 }

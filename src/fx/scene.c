@@ -16,25 +16,37 @@ static size_t aligned(size_t size)
   return (size + ALIGN - 1) / ALIGN * ALIGN;
 }
 
+/* Lays everything out from `at` on and returns the bytes; NULL: only counts. */
+static size_t lay_out(fx_scene *scene, int8_t *at)
+{
+  fx_array list[FX_TENSORF_ARRAYS];
+  const int arrays = scene->backbone == FX_TENSORF ? fx_tensorf_arrays(&scene->tensorf, list) : 0;
+  const size_t table = aligned((size_t)scene->grid.entries * FX_GRID_FEATURES);
+  size_t size = table;
+  if (at && !arrays) scene->grid.table = at;
+  for (int i = 0; i < arrays; i++) {
+    if (at) *list[i].data = at + size;
+    size += aligned(fx_array_bytes(&list[i]));
+  }
+  if (at) scene->occupancy = (uint8_t *)(at + size);
+  size += aligned(fx_occupancy_bytes(scene));
+  for (int id = 0; id < SF_LAYERS; id++) {
+    if (at) scene->net.layer[id].w = at + size;
+    size += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
+  }
+  return aligned(size);
+}
+
 /* One block for everything: sizes are bounded by fx_check_sizes, so the sum cannot overflow. */
 sf_status fx_scene_allocate(fx_scene *scene, const char *path)
 {
   SF_TRY(fx_check_sizes(scene, path));
-  const size_t table = aligned((size_t)scene->grid.entries * FX_GRID_FEATURES),
-               bits = aligned(fx_occupancy_bytes(scene));
-  size_t size = table + bits;
-  for (int id = 0; id < SF_LAYERS; id++) size += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
-  int8_t *block = aligned_alloc(ALIGN, aligned(size));
+  const size_t size = lay_out(scene, NULL);
+  int8_t *block = aligned_alloc(ALIGN, size);
   if (!block) return sf_fail(SF_E_MEMORY, "%s: no memory for %zu bytes", path, size);
-  memset(block, 0, aligned(size));
+  memset(block, 0, size);
   scene->owner = block;
-  scene->grid.table = block;
-  scene->occupancy = (uint8_t *)(block + table);
-  int8_t *w = block + table + bits;
-  for (int id = 0; id < SF_LAYERS; id++) {
-    scene->net.layer[id].w = w;
-    w += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
-  }
+  lay_out(scene, block);
   return sf_ok();
 }
 

@@ -29,6 +29,14 @@ uint32_t fx_exp_neg(uint64_t tau);
 /* 1 / (1 + exp(-x)), x in Q4.12 (s16) -> Q0.16, 0..65535. */
 uint32_t fx_sigmoid(int32_t x);
 
+/* TensoRF's density activations, y s24 Q.12 -> unsigned Q.ACTIVATION_FRAC: log(1 + e^y), max(y, 0). */
+enum { FX_ACTIVATION_FRAC = 20, FX_ACTIVATION_BITS = SF_LOG_FRAC + 12 };
+uint32_t fx_softplus(int32_t y);
+uint32_t fx_relu(int32_t y);
+/* sin of a phase in turns: bits above PHASE_BITS are whole turns. Q1.14. */
+enum { FX_PHASE_BITS = 16 };
+int32_t fx_sine(uint32_t phase);
+
 /* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16383, so the product is s32. */
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */

@@ -34,6 +34,8 @@ SAME(spikefield_counts, fx_counts, march_steps);
 SAME(spikefield_counts, fx_counts, saturated);
 SAME(spikefield_counts, fx_counts, saturated_samples);
 SAME(spikefield_counts, fx_counts, saturated_features);
+SAME(spikefield_counts, fx_counts, field_samples);
+SAME(spikefield_counts, fx_counts, field_mac);
 _Static_assert(sizeof(spikefield_counts) == sizeof(fx_counts), "spikefield_counts differs from the core's");
 SAME(spikefield_trace, fx_trace, spikes);
 SAME(spikefield_trace, fx_trace, membrane);

@@ -1,0 +1,105 @@
+/* What a TensoRF scene holds, listed once for memory, file and checks. */
+#include "src/fx/scene.h"
+#include "src/fx/unit.h"
+#include "src/fx/nofloat.h"
+
+enum { FIELD_BYTES_MAX = 1 << 30, SHIFT_MAX = 40, PRODUCT_SHIFT_MAX = 31, MUL_MAX = 65535 };
+
+static int list_factors(fx_factors *f, const int32_t res[3], const char *const *names, fx_array *list)
+{
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const int32_t *axes = fx_pair_axes[pair];
+    const int64_t n = f->components[pair];
+    list[pair] = (fx_array){names[pair], &f->plane[pair], 3, {res[axes[1]], res[axes[0]], n}};
+    list[FX_PAIRS + pair] = (fx_array){names[FX_PAIRS + pair], &f->line[pair], 2, {res[axes[2]], n}};
+  }
+  return 2 * FX_PAIRS;
+}
+
+int fx_tensorf_arrays(fx_tensorf *field, fx_array list[FX_TENSORF_ARRAYS])
+{
+  static const char *const density[] = {"density_plane.0", "density_plane.1", "density_plane.2",
+                                        "density_line.0",  "density_line.1",  "density_line.2"};
+  static const char *const appearance[] = {"app_plane.0", "app_plane.1", "app_plane.2",
+                                           "app_line.0",  "app_line.1",  "app_line.2"};
+  int n = list_factors(&field->density, field->res, density, list);
+  n += list_factors(&field->appearance, field->res, appearance, list + n);
+  list[n++] = (fx_array){"basis_mat", &field->basis, 2, {fx_factors_components(&field->appearance), FX_APPEARANCE_MAX}};
+  return n;
+}
+
+size_t fx_array_bytes(const fx_array *array)
+{
+  size_t size = 1;
+  for (int i = 0; i < array->dims; i++) size *= (size_t)array->shape[i];
+  return size;
+}
+
+static sf_status check_factors(const fx_factors *factors, const char *name, const char *path)
+{
+  static const char *const field[] = {"components[0]", "components[1]", "components[2]"};
+  for (int pair = 0; pair < FX_PAIRS; pair++)
+    SF_TRY(in_range(path, name, field[pair], factors->components[pair], 1, FX_COMPONENTS_MAX));
+  return sf_ok();
+}
+
+/* Each array is below 2^28, so the sum of all cannot overflow. */
+static sf_status check_bytes(const fx_tensorf *field, const char *path)
+{
+  fx_tensorf copy = *field;
+  fx_array list[FX_TENSORF_ARRAYS];
+  const int n = fx_tensorf_arrays(&copy, list);
+  int64_t bytes = 0;
+  for (int i = 0; i < n; i++) bytes += (int64_t)fx_array_bytes(&list[i]);
+  return in_range(path, "tensorf", "bytes of planes and lines", bytes, 1, FIELD_BYTES_MAX);
+}
+
+sf_status fx_check_tensorf_sizes(const fx_tensorf *field, int inputs, const char *path)
+{
+  static const char *const res[] = {"res[0]", "res[1]", "res[2]"};
+  for (int axis = 0; axis < 3; axis++)
+    SF_TRY(in_range(path, "tensorf", res[axis], field->res[axis], 1, FX_TENSORF_RES_MAX));
+  SF_TRY(check_factors(&field->density, "tensorf.density", path));
+  SF_TRY(check_factors(&field->appearance, "tensorf.appearance", path));
+  SF_TRY(in_range(path, "tensorf", "features", field->features, 1, FX_APPEARANCE_MAX));
+  SF_TRY(in_range(path, "tensorf", "feature_freqs", field->feature_freqs, 0, FX_FREQS_MAX));
+  SF_TRY(in_range(path, "tensorf", "view_freqs", field->view_freqs, 0, FX_FREQS_MAX));
+  const int needed = fx_tensorf_inputs(field);
+  SF_TRY(in_range(path, "C1", "n_in", inputs, needed, needed));
+  return check_bytes(field, path);
+}
+
+static sf_status check_scale(const fx_scale *scale, const char *name, int bias_low, int bias_high, const char *path)
+{
+  SF_TRY(in_range(path, name, "mul", scale->mul, 0, MUL_MAX));
+  SF_TRY(in_range(path, name, "shift", scale->shift, 0, SHIFT_MAX));
+  return in_range(path, name, "bias", scale->bias, bias_low, bias_high);
+}
+
+static sf_status check_entries(const fx_array *array, const char *path)
+{
+  const int8_t *entry = *array->data;
+  if (!entry) return sf_fail(SF_E_FORMAT, "%s: tensor '%s' is missing", path, array->name);
+  for (size_t i = 0; i < fx_array_bytes(array); i++)
+    if (entry[i] == INT8_MIN)
+      return sf_fail(SF_E_RANGE, "%s: tensor '%s': element %zu is -128, expected -127..127", path, array->name, i);
+  return sf_ok();
+}
+
+sf_status fx_check_tensorf(const fx_tensorf *field, const char *path)
+{
+  const int bias = 1 << (FX_ACTIVATION_BITS - 1);
+  fx_tensorf copy = *field;
+  fx_array list[FX_TENSORF_ARRAYS];
+  SF_TRY(in_range(path, "tensorf", "activation", field->activation, FX_SOFTPLUS, FX_RELU));
+  SF_TRY(check_scale(&field->density_in, "tensorf.density_in", -bias, bias - 1, path));
+  SF_TRY(check_scale(&field->sigma_out, "tensorf.sigma_out", 0, 0, path));
+  SF_TRY(check_scale(&field->feature_in, "tensorf.feature_in", 0, 0, path));
+  SF_TRY(check_scale(&field->phase_in, "tensorf.phase_in", 0, 0, path));
+  SF_TRY(in_range(path, "tensorf", "product_shift", field->product_shift, 0, PRODUCT_SHIFT_MAX));
+  SF_TRY(in_range(path, "tensorf", "weight_stop", field->weight_stop, 0, FX_TRANS_ONE - 1));
+  SF_TRY(in_range(path, "tensorf", "encoding_frac", field->encoding_frac, 0, FX_DIR_FRAC_MAX));
+  const int n = fx_tensorf_arrays(&copy, list);
+  for (int i = 0; i < n; i++) SF_TRY(check_entries(&list[i], path));
+  return sf_ok();
+}

@@ -1,0 +1,95 @@
+/* Many rays of a TensoRF scene. Densities alone decide where a ray ends and which of its samples are decoded, so a ray
+ * is marched to its end at once; its samples wait for the decoder until a block is full, whosever they are. Colours are
+ * sums of integers: their order does not matter. */
+#include "src/fx/core.h"
+#include "src/fx/scene.h"
+#include "base/memory.h"
+#include <stdlib.h>
+#include <string.h>
+#include "src/fx/nofloat.h"
+
+enum { RAY_FRAC = 40 };
+
+typedef struct waiting {
+  size_t ray;
+  uint32_t weight;
+} waiting;
+
+typedef struct wave {
+  fx_block block;
+  fx_scratch scratch;
+  waiting sample[FX_BLOCK]; /* 0..block.n-1 */
+  const fx_core *core;
+  const fx_ray *rays;
+  fx_pixel *pixels;
+  fx_cost *costs;
+  fx_firing firing;
+  fx_counts counts; /* but for the nets' events, which follow from firing */
+} wave;
+
+static void decode(wave *w)
+{
+  fx_block *b = &w->block;
+  w->core->kernels->nets(w->core, b, &w->scratch);
+  fx_firing_sum(&w->firing, &b->firing);
+  for (int i = 0; i < b->n; i++) {
+    const waiting *s = &w->sample[i];
+    fx_block_account(w->core, b, i, &w->counts, w->costs ? &w->costs[s->ray] : NULL);
+    fx_composite_colour(&w->pixels[s->ray], s->weight, b->out[i].colour);
+  }
+  b->n = 0;
+}
+
+static void enqueue(wave *w, size_t ray, const uint32_t pos[3], uint32_t weight)
+{
+  const fx_scene *scene = w->core->scene;
+  fx_block *b = &w->block;
+  fx_tensorf_encode(&scene->tensorf, pos, w->rays[ray].unit, b->constant[b->n], &w->counts);
+  w->sample[b->n++] = (waiting){ray, weight};
+  if (b->n == FX_BLOCK) decode(w);
+}
+
+/* The next occupied point from n on and its position, or -1. */
+static int32_t next_point(wave *w, const fx_ray *ray, int32_t n, uint32_t pos[3])
+{
+  const int32_t found = w->core->kernels->march(w->core->scene, ray, n);
+  if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
+  if (found >= ray->count) return -1;
+  for (int axis = 0; axis < 3; axis++)
+    pos[axis] = (uint32_t)((ray->origin[axis] + found * ray->step[axis]) >> (RAY_FRAC - SF_POS_FRAC));
+  return found;
+}
+
+static void march(wave *w, size_t index)
+{
+  const fx_scene *scene = w->core->scene;
+  const fx_ray *ray = &w->rays[index];
+  fx_pixel *pixel = &w->pixels[index];
+  int32_t decoded = 0;
+  uint32_t pos[3];
+  fx_composite_begin(pixel);
+  for (int32_t n = next_point(w, ray, 0, pos); n >= 0; n = next_point(w, ray, n + 1, pos)) {
+    const uint32_t weight = fx_tensorf_weight(scene, ray, n, pos, pixel, &w->counts);
+    if (weight) enqueue(w, index, pos, weight), decoded++;
+    if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) break;
+  }
+  fx_composite_end(pixel, scene->background);
+  w->counts.rays += decoded > 0;
+}
+
+sf_status fx_render_tensorf(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
+                            fx_counts *counts)
+{
+  wave *w = sf_aligned_alloc(sizeof *w);
+  if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
+  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
+  if (costs) memset(costs, 0, n * sizeof *costs);
+  for (size_t i = 0; i < n; i++) march(w, i);
+  if (w->block.n > 0) decode(w);
+  if (counts) {
+    fx_count_firing(&w->counts, &core->scene->net, &w->firing);
+    fx_counts_add(counts, &w->counts);
+  }
+  free(w);
+  return sf_ok();
+}
