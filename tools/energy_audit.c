@@ -1,6 +1,7 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
 #include "spikefield/audit.h"
 #include "spikefield/cli.h"
+#include "spikefield/html.h"
 #include "spikefield/io.h"
 #include "spikefield/rng.h"
 #include "sim/three_counts.h"
@@ -14,7 +15,7 @@ typedef struct options {
   int view, views, downscale, threads, rtl_rays, stall, steps;
   uint64_t rays, seed, recount_rays;
   double scale;
-  const char *split, *csv, *plusarg, *scene, *data, *tech;
+  const char *split, *csv, *html, *model, *plusarg, *scene, *data, *tech;
   bool json, published, quiet;
 } options;
 
@@ -34,6 +35,8 @@ typedef struct audit {
   char hash[65];
   sf_technology technology;
   sf_audit_report report;
+  sf_page page; /* with --html */
+  char model[4096], command[4096];
   sf_progress progress;
   double start;
 } audit;
@@ -168,6 +171,58 @@ static sf_status write_csv(const audit *a)
   return sf_writer_commit(&writer);
 }
 
+/* ---- HTML ---- */
+
+/* The command in words that a shell reads back. */
+static void join_command(char *text, size_t size, int argc, char **argv)
+{
+  size_t used = 0;
+  for (int i = 0; i < argc && used < size; i++) {
+    const bool plain = argv[i][0] && !argv[i][strcspn(argv[i], " \t\n'\"\\$`*?[]{}()<>|&;#~!")];
+    const int n = snprintf(text + used, size - used, plain ? "%s%s" : "%s'%s'", i ? " " : "", argv[i]);
+    used += n > 0 ? (size_t)n : 0;
+  }
+}
+
+static bool page_tick(void *user, int done, int total)
+{
+  audit *a = user;
+  if (sf_progress_due(&a->progress)) sf_progress_show(&a->progress, "pictures of the report: %d of %d", done, total);
+  return !sf_cli_interrupted();
+}
+
+/* The float model: the one named, or model.safetensors beside the scene where it is there. */
+static const char *find_model(audit *a)
+{
+  const char *slash = strrchr(a->opt.scene, '/');
+  if (a->opt.model) return a->opt.model;
+  snprintf(a->model, sizeof a->model, "%.*smodel.safetensors", slash ? (int)(slash - a->opt.scene) + 1 : 0,
+           a->opt.scene);
+  return access(a->model, R_OK) == 0 ? a->model : NULL;
+}
+
+static sf_status make_page(audit *a)
+{
+  const options *o = &a->opt;
+  if (!o->html) return sf_ok();
+  a->page.report = &a->report, a->page.scene = &a->scene, a->page.view = &a->data.view[o->view >= 0 ? o->view : 0];
+  a->page.data = &a->data, a->page.model = find_model(a), a->page.command = a->command;
+  a->page.whole = o->rays == 0 && (o->view >= 0 || a->data.count == 1);
+  a->page.tick = page_tick, a->page.user = a;
+  SF_TRY(sf_page_gather(&a->page));
+  return sf_page_save(&a->page, o->html);
+}
+
+/* Fails before the work, not after it. */
+static sf_status check_writable(const char *path)
+{
+  sf_writer writer;
+  if (!path) return sf_ok();
+  SF_TRY(sf_writer_open(&writer, path));
+  sf_writer_abort(&writer);
+  return sf_ok();
+}
+
 static sf_status print_json(cJSON *json)
 {
   char *text = json ? cJSON_Print(json) : NULL;
@@ -181,7 +236,7 @@ static sf_status print_json(cJSON *json)
 static sf_status print_report(const audit *a)
 {
   if (a->opt.json) {
-    cJSON *json = sf_report_json(&a->report);
+    cJSON *json = a->opt.html ? sf_page_json(&a->page) : sf_report_json(&a->report);
     if (a->opt.published) cJSON_AddItemToObject(json, "published", sf_published_json());
     return print_json(json);
   }
@@ -216,6 +271,7 @@ static sf_status work(audit *a)
   double begin = sf_seconds();
   SF_TRY(load_technology(a));
   SF_TRY(load(a));
+  SF_TRY(check_writable(a->opt.html));
   sf_progress_begin(&a->progress, a->opt.quiet);
   a->start = sf_seconds();
   sf_status status = count(a);
@@ -223,6 +279,10 @@ static sf_status work(audit *a)
   SF_TRY(status);
   a->report.seconds = sf_seconds() - begin;
   SF_TRY(write_csv(a));
+  sf_progress_begin(&a->progress, a->opt.quiet);
+  status = make_page(a);
+  sf_progress_end(&a->progress);
+  SF_TRY(status);
   SF_TRY(print_report(a));
   if (a->report.three.agreement.code == SF_OK) return sf_ok();
   return sf_fail(SF_E_DIFFERENCE, "%s: %s", a->opt.scene, a->report.three.agreement.message);
@@ -246,6 +306,9 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the layout's (default 0)"},
       {"--csv", 0, SF_ARG_STRING, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
+      {"--html", 0, SF_ARG_STRING, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
+      {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
+       "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       {"--plusarg", 0, SF_ARG_STRING, &o->plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
@@ -272,6 +335,7 @@ int main(int argc, char **argv)
                     "Counts every operation of a scene in the fixed-point core, in the accelerator and again from the\n"
                     "spike bitmaps; prices the counts and the scene's ANN twin. Exit status 1 if any count differs.",
                 .examples = "  energy_audit scene.snn data --views 2 --json\n"
+                            "  energy_audit scene.snn data --view 0 --html report.html\n"
                             "  energy_audit --published\n",
                 .min_positional = 0,
                 .max_positional = 2};
@@ -286,10 +350,12 @@ int main(int argc, char **argv)
                      .seed = 1};
   sf_status status = parse(argc, argv, &a->opt, &cli);
   if (status.code == SF_OK) {
+    join_command(a->command, sizeof a->command, argc, argv);
     if (a->opt.threads) omp_set_num_threads(a->opt.threads);
     sf_cli_catch_signals();
     status = work(a);
   }
+  sf_page_free(&a->page);
   sf_measure_free(&a->report.measure);
   sf_dataset_free(&a->data);
   fx_scene_free(&a->scene);
