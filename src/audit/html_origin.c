@@ -119,8 +119,9 @@ const char *const html_style[] = {
     "a9b0b9;",
     "--p6:#c98bb0;--p7:#e3d34a}html{color-scheme:light}body{max-width:none;padding:0;font-size:11pt;",
     "print-color-adjust:exact;-webkit-print-color-adjust:exact}figure,tr,.facts{break-inside:avoid}",
-    "h2,h3,figcaption,caption{break-after:avoid}.scroll{overflow:visible}table{font-size:8pt}",
+    "h2,h3,figcaption,caption{break-after:avoid}table{font-size:8pt}",
     "th,td{padding-right:.5rem}a{color:inherit;text-decoration:none}}",
+    "@media print and (min-width:680px){.scroll{overflow:visible}}",
     NULL};
 
 /* A pointer on a layer's bar shows the same layer everywhere. */

@@ -114,7 +114,7 @@ static void break_even_row(FILE *out, const sf_page *page, int i, double y)
   svg_text(out, 0, y + 14, "lab", "%s against %s", sf_ledger_texts[b->ledger].title, sf_ledger_texts[b->twin].title);
   svg_line(out, X0, y + 32, X1, y + 32, "gridline");
   if (isnan(b->rate)) {
-    svg_text(out, W, y + 14, "num end bad", "%s", now > 0 ? "dearer at any rate" : "no neuron fired");
+    svg_text(out, W, y + 14, "num strong end bad", "none");
   } else {
     const double at = X0 + (X1 - X0) * fmin(b->rate, 1);
     svg_line(out, X0, y + 32, at, y + 32, "gain");
@@ -123,9 +123,9 @@ static void break_even_row(FILE *out, const sf_page *page, int i, double y)
             "data-value=\"%.17g\"/>\n",
             at, y + 30, i, b->rate);
     if (b->rate > 1)
-      svg_text(out, W, y + 14, "num end good", "cheaper at any rate");
+      svg_text(out, W, y + 14, "num strong end good", "above 100 %%");
     else
-      svg_text(out, W, y + 14, now < b->rate ? "num end good" : "num end bad", "breaks even at %.2f %%", 100 * b->rate);
+      svg_text(out, W, y + 14, now < b->rate ? "num strong end good" : "num strong end bad", "%.2f %%", 100 * b->rate);
   }
   fprintf(out,
           "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"6\" class=\"dot chosen\"><title>measured: %.2f %%</title></circle>\n",
@@ -136,10 +136,12 @@ static void break_even_figure(FILE *out, const sf_page *page)
 {
   enum { W = WIDTH, STEP = 46 };
   char caption[400];
-  snprintf(caption, sizeof caption,
-           "The mean firing rate at which the spiking network costs exactly what its twin does (triangle), and the "
-           "measured rate, %.2f %% (dot). A dot to the left of its triangle, on the coloured stretch, saves energy.",
-           100 * page->report->ledgers.rate);
+  snprintf(
+      caption, sizeof caption,
+      "The mean firing rate at which the spiking network costs exactly what its twin does (triangle), and the "
+      "measured rate, %.2f %% (dot). A dot to the left of its triangle, on the coloured stretch, saves energy. Above "
+      "100 %%: cheaper at any rate; none: dearer at any rate.",
+      100 * page->report->ledgers.rate);
   html_figure_begin(out, "fig-break-even", "", "Break-even firing rate.", caption);
   svg_begin(out, "svg-break-even", W, STEP * SF_BREAK_EVENS + 22, "Break-even firing rates",
             "One line per comparison, from 0 to 100 %");

@@ -77,8 +77,10 @@ static void draw_twin(FILE *out, const sf_page *page, const axes *a)
   char text[HTML_NUMBER];
   if (!page->whole) return;
   svg_line(out, x, TOP, x, HEIGHT - BOTTOM, "twin");
-  svg_text(out, x > WIDTH / 2 ? x - 6 : x + 6, TOP + 4, x > WIDTH / 2 ? "mut end" : "mut", "ReLU twin: %s",
-           html_energy(text, (double)page->report->ledger.ann_fj));
+  const char *style = x > WIDTH / 2.0 ? "mut end" : "mut";
+  const double at = x > WIDTH / 2.0 ? x - 6 : x + 6;
+  svg_text(out, at, TOP + 8, style, "ReLU twin");
+  svg_text(out, at, TOP + 26, style, "%s", html_energy(text, (double)page->report->ledger.ann_fj));
 }
 
 static void prefix_table(FILE *out, const sf_page *page)
