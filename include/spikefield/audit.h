@@ -98,7 +98,9 @@ sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_t
 uint64_t sf_table_size(const fx_scene *scene);
 
 /* The paper's published energies, recomputed: E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, samples from the ANN row,
- * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). */
+ * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). And once more with two rates,
+ * one of the first time step and one of the later ones, fr T = first + later (T - 1): in hybrid mode the first step
+ * charges a membrane with the whole current, so neurons fire more often then. Least squares of the relative residuals. */
 typedef struct sf_published_row {
   const char *backbone, *data, *beta; /* beta NULL: the ANN */
   const char *reading;                /* how R is read */
@@ -107,9 +109,10 @@ typedef struct sf_published_row {
   double samples;                     /* per view */
   double rate, mean_rate;             /* implied by this row; of the group */
   double recomputed_mj, residual_percent;
+  double first_rate, later_rate, two_rates_mj, two_rates_residual_percent; /* NAN: the ANN */
   double saving_percent, published_saving_percent; /* NaN where the paper prints none */
 } sf_published_row;
-enum { SF_PUBLISHED_MAX = 40 };
+enum { SF_PUBLISHED_MAX = 48 };
 int sf_published_rows(sf_published_row rows[SF_PUBLISHED_MAX]);
 void sf_published_print(FILE *out);
 cJSON *sf_published_json(void);
