@@ -99,12 +99,12 @@ START_TEST(options_and_stated_intrinsics)
   ck_good(load(&d,
                "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
                    "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
-               "test", (sf_dataset_options){.downscale = 2, .scale = 2.0f}));
+               "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
   ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
-  ck_assert(d.view[0].camera.to_world[3] == 2 && d.view[0].camera.to_world[11] == 6);
+  ck_assert(d.view[0].camera.to_world[3] == 0.5f && d.view[0].camera.to_world[11] == 1.5f);
   sf_dataset_free(&d);
   ck_good(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
@@ -156,7 +156,7 @@ static const struct {
     {"{\"camera_angle_x\":1e999,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, ".json", "not finite"},
     {"{\"camera_angle_x\":\"1\",\"frames\":[" FRAME("a", UNIT) "]}", SF_E_FORMAT, ".json", "not a number"},
     {"{\"fl_x\":-3,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, ".json", "fl_x is -3"},
-    {"{\"fl_x\":3,\"k2\":0.01,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json", "k2 = 0.01"},
+    {"{\"fl_x\":3,\"k3\":0.01,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json", "k3 = 0.01"},
     {"{\"fl_x\":3,\"camera_model\":\"FISHEYE\",\"frames\":[" FRAME("a", UNIT) "]}", SF_E_UNSUPPORTED, ".json",
      "FISHEYE"},
     {"{\"fl_x\":3,\"w\":8,\"h\":8,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_FORMAT, "frame 0 (a)", "says 8 x 8"},

@@ -4,6 +4,7 @@
 #include "spikefield/image.h"
 #include "spikefield/status.h"
 #include <stdbool.h>
+#include <stdio.h>
 
 typedef struct sf_camera {
   int width, height;
@@ -14,9 +15,11 @@ typedef struct sf_camera {
 
 /* Model units: the scene box is [-bound, bound]^3. Blender data: position * 0.8 as torch-ngp. */
 typedef struct sf_view {
-  char name[256];
+  char name[256]; /* of the picture, below the folder */
   sf_camera camera;
-  sf_image image; /* rgba NULL when the split has no picture for it */
+  const char *lens; /* its camera model, as COLMAP names it; a literal */
+  float brightness; /* mean of r, g, b, weighted by alpha, 0..1 */
+  sf_image image;   /* rgba NULL when the split has no picture for it, or none was to be kept */
 } sf_view;
 
 typedef enum { SF_LAYOUT_BLENDER, SF_LAYOUT_LLFF, SF_LAYOUT_COLMAP, SF_LAYOUT_INGP } sf_layout;
@@ -37,23 +40,44 @@ typedef struct sf_dataset {
   bool ndc;
   float ndc_near;
   float ndc_focal[2]; /* focal length over half the picture, along x and y */
+  double world[12];   /* row-major 3x4: the layout's own coordinates (OpenGL camera axes) to world */
+  float *point;       /* [points][3] sparse points, model units (not where ndc); NULL: none are known */
+  int points;
+  char (*warning)[400]; /* one line each: what looks wrong, and was passed over */
+  int warnings;
 } sf_dataset;
 
 typedef struct sf_dataset_options {
-  int downscale; /* >= 1 */
-  float scale;   /* 0 = default of the layout (0.8) */
-  int limit;     /* load at most this many views, 0 = all */
-  int first;     /* leave out this many views before; with limit 1, a large set is walked without holding it all */
+  int downscale;     /* >= 1; LLFF and COLMAP: of the full-size photographs, with images_N where that is there */
+  float scale;       /* 0 = default of the layout */
+  int limit;         /* load at most this many views, 0 = all */
+  int first;         /* leave out this many views before; with limit 1, a large set is walked without holding it all */
+  bool cameras_only; /* pictures are read, for their size and brightness, but not kept */
 } sf_dataset_options;
 
-/* Blender layout: dir/transforms_SPLIT.json. split: "train", "test". Where transforms_test.json is missing, every
- * 8th view of transforms_train.json (or transforms.json) is the test split. Every fault names file and frame.
- * count is 0 where first is beyond the last view. */
+/* One of these, looked for in this order (docs/data.md):
+ *   Blender      transforms_SPLIT.json
+ *   instant-ngp  transforms.json
+ *   LLFF         poses_bounds.npy, images or images_N
+ *   COLMAP       sparse/0 or sparse: cameras, images and perhaps points3D, .bin or .txt; images or images_N
+ * split: "train", "test". Where the folder names no test views, every 8th view, from the first on, is the test split.
+ * Every fault names file and place. count is 0 where first is beyond the last view. Fewer than half of the pictures of a
+ * split missing: a warning, total counts those that are there. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
+void sf_dataset_warn(FILE *out, const sf_dataset *data); /* "warning: ..." for each */
+
+/* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
+ * are not needed any more. */
+sf_status sf_dataset_survey(sf_dataset *data);
+/* Picture of 2 * size x size pixels: from above (x, y) and from the side (x, z). Views of the training split are blue,
+ * others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Free the image. */
+sf_status sf_plan_draw(const sf_dataset *train, const sf_dataset *test, int size, sf_image *image);
 
 /* Ray through pixel position (px, py), (0.5, 0.5) = centre of the first pixel. Unit direction. */
 void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3], float direction[3]);
+/* The inverse: where a point (model units) is seen. False where it is not in front of the camera. */
+bool sf_camera_project(const sf_camera *camera, const float point[3], float pixel[2]);
 /* The same of a view of `data`, in the space that models live in: what a trainer or a renderer is to ask. With NDC the
  * origin lies on the near plane (z = -scale) and infinity at z = scale. */
 void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],

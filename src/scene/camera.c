@@ -1,11 +1,16 @@
 /* Rays of cameras and of views. */
-#include "spikefield/scene.h"
+#include "src/scene/lens.h"
 #include <math.h>
 
 void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3], float direction[3])
 {
   const float *m = camera->to_world;
   float x = (px - camera->cx) / camera->fx, y = -(py - camera->cy) / camera->fy;
+  if (sf_lens_bends(camera)) {
+    double straight[2];
+    sf_lens_straighten(camera, (double[2]){(double)x, -(double)y}, straight);
+    x = (float)straight[0], y = -(float)straight[1];
+  }
   float d[3], length = 0;
   for (int i = 0; i < 3; i++) {
     d[i] = m[4 * i] * x + m[4 * i + 1] * y - m[4 * i + 2];
@@ -13,6 +18,18 @@ void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3],
   }
   length = sqrtf(length);
   for (int i = 0; i < 3; i++) direction[i] = d[i] / length, origin[i] = m[4 * i + 3];
+}
+
+bool sf_camera_project(const sf_camera *camera, const float point[3], float pixel[2])
+{
+  const float *m = camera->to_world;
+  double p[3] = {0}, bent[2];
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) p[k] += (double)m[4 * i + k] * ((double)point[i] - (double)m[4 * i + 3]);
+  if (!(p[2] < 0)) return false;
+  sf_lens_bend(camera, (double[2]){p[0] / -p[2], p[1] / p[2]}, bent);
+  pixel[0] = (float)(bent[0] * camera->fx + camera->cx), pixel[1] = (float)(bent[1] * camera->fy + camera->cy);
+  return true;
 }
 
 /* Mildenhall et al. 2020, appendix C: straight lines stay straight, the near plane goes to z = -1, infinity to z = 1. A

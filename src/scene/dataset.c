@@ -1,208 +1,36 @@
-/* Blender layout: transforms_*.json and pictures. */
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
-#include "src/scene/frames.h"
+/* A folder of posed pictures: which layout it has, and the way from its reader to the views. */
+#include "src/scene/capture.h"
 #include <math.h>
-#include <stdbool.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <sys/stat.h>
 
-#define DEFAULT_SCALE 0.8f
-/* Of a focal length and of an optical centre: beyond them rays lose all precision, and then their direction. */
-static const float FOCAL_MIN = 1e-3f, PIXELS_MAX = 1e9f;
 const char *const sf_layout_names[] = {"blender", "llff", "colmap", "ingp"};
-enum { HOLD_OUT = 8 }; /* every 8th view where the data names no test views */
 
-static bool is_file(const char *path)
+void sf_capture_free(sf_capture *capture)
 {
-  struct stat info;
-  return !stat(path, &info) && !S_ISDIR(info.st_mode);
+  free(capture->frame), free(capture->point);
+  memset(capture, 0, sizeof *capture);
 }
 
-static sf_status join(char *path, size_t room, const char *dir, const char *name, const char *tail)
+sf_status sf_warn(sf_dataset *data, const char *format, ...)
 {
-  bool absolute = name[0] == '/';
-  int n = snprintf(path, room, "%s%s%s%s", absolute ? "" : dir, absolute ? "" : "/", name, tail);
-  if (n < 0 || (size_t)n >= room) return sf_fail(SF_E_IO, "%.80s.../%.80s: name too long", dir, name);
+  char(*larger)[400] = realloc(data->warning, (size_t)(data->warnings + 1) * sizeof *larger);
+  if (!larger) return sf_fail(SF_E_MEMORY, "no memory for a warning");
+  data->warning = larger;
+  char text[400];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  const sf_status line = sf_fail(SF_E_RANGE, "%s", text); /* keeps it to one line */
+  memcpy(data->warning[data->warnings++], line.message, sizeof line.message);
   return sf_ok();
 }
 
-/* Which file lists the views, and which share of them is this split. */
-typedef struct listing {
-  char path[4096];
-  enum { ALL_VIEWS, ALL_BUT_HELD_OUT, ONLY_HELD_OUT } part;
-} listing;
-
-static sf_status find_listing(listing *list, const char *dir, const char *split)
+void sf_dataset_warn(FILE *out, const sf_dataset *data)
 {
-  char name[64], test[4096];
-  struct stat info;
-  if (stat(dir, &info) || !S_ISDIR(info.st_mode)) return sf_fail(SF_E_IO, "%s: no such folder", dir);
-  bool training = !strcmp(split, "train"), testing = !strcmp(split, "test");
-  snprintf(name, sizeof name, "transforms_%.32s.json", split);
-  SF_TRY(join(list->path, sizeof list->path, dir, name, ""));
-  SF_TRY(join(test, sizeof test, dir, "transforms_test.json", ""));
-  bool found = is_file(list->path);
-  list->part = training && !is_file(test) ? ALL_BUT_HELD_OUT : ALL_VIEWS;
-  if (found) return sf_ok();
-  if (!training && !testing) return sf_fail(SF_E_IO, "%s: no such file", list->path);
-  if (testing) list->part = ONLY_HELD_OUT;
-  const char *const others[] = {"transforms_train.json", "transforms.json"};
-  for (int i = training; i < 2; i++) {
-    SF_TRY(join(list->path, sizeof list->path, dir, others[i], ""));
-    if (is_file(list->path)) return sf_ok();
-  }
-  return sf_fail(SF_E_IO, "%s: neither transforms_train.json nor transforms.json is there", dir);
-}
-
-static bool wanted(const listing *list, int index)
-{
-  bool held_out = index % HOLD_OUT == 0;
-  return list->part == ALL_VIEWS || held_out == (list->part == ONLY_HELD_OUT);
-}
-
-static sf_status parse_listing(const listing *list, const cJSON *json, const sf_dataset_options *options,
-                               sf_frame **frames, int **numbers, int *count, int *total)
-{
-  const cJSON *array = cJSON_GetObjectItemCaseSensitive(json, "frames"), *item;
-  sf_lens shared = {0};
-  if (!cJSON_IsObject(json)) return sf_fail(SF_E_FORMAT, "%s: not a JSON object", list->path);
-  if (!cJSON_IsArray(array)) return sf_fail(SF_E_FORMAT, "%s: the array frames is missing", list->path);
-  int n = cJSON_GetArraySize(array), index = 0;
-  if (!n) return sf_fail(SF_E_RANGE, "%s: zero views: the array frames is empty", list->path);
-  SF_TRY(sf_lens_parse(&shared, json, list->path));
-  *frames = calloc((size_t)n, sizeof **frames);
-  *numbers = calloc((size_t)n, sizeof **numbers);
-  if (!*frames || !*numbers) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", list->path, n);
-  cJSON_ArrayForEach(item, array)
-  {
-    if (wanted(list, index) && (*total)++ >= options->first && (!options->limit || *count < options->limit)) {
-      SF_TRY(sf_frame_parse(&(*frames)[*count], item, &shared, list->path, index));
-      (*numbers)[(*count)++] = index;
-    }
-    index++;
-  }
-  if (!*total)
-    return sf_fail(SF_E_RANGE, "%s: zero views: all %d are held out for testing (every %dth)", list->path, n, HOLD_OUT);
-  return sf_ok();
-}
-
-/* ---- pictures ---- */
-
-static sf_status picture_path(char *path, size_t room, const char *dir, const char *file)
-{
-  const char *slash = strrchr(file, '/'), *dot = strrchr(slash ? slash : file, '.');
-  bool extension = dot && (!strcasecmp(dot, ".png") || !strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg"));
-  SF_TRY(join(path, room, dir, file, ""));
-  return extension || is_file(path) ? sf_ok() : join(path, room, dir, file, ".png");
-}
-
-/* Pixels of the stated size -> pixels of the picture; at most half a pixel of difference in shape is rounding. */
-static sf_status set_lens(sf_camera *camera, const sf_lens *lens, const sf_image *image, const char *where)
-{
-  double w = image->width, h = image->height, sx = 1, sy = 1;
-  if (lens->width > 0) sx = w / lens->width;
-  if (lens->height > 0) sy = h / lens->height;
-  if (lens->width > 0 && lens->height > 0 && fabs(lens->height * sx - h) > 0.5 + 0.5 * sx &&
-      fabs(lens->width * sy - w) > 0.5 + 0.5 * sy)
-    return sf_fail(SF_E_FORMAT, "%s: the picture has %g x %g pixels, the JSON says %g x %g", where, w, h, lens->width,
-                   lens->height);
-  double fx = lens->fl_x > 0 ? lens->fl_x * sx : 0.5 * w / tan(0.5 * lens->angle_x);
-  double fy = fx;
-  if (lens->fl_y > 0)
-    fy = lens->fl_y * sy;
-  else if (lens->fl_x > 0)
-    fy = lens->fl_x * sy;
-  else if (lens->angle_y > 0)
-    fy = 0.5 * h / tan(0.5 * lens->angle_y);
-  camera->width = image->width, camera->height = image->height;
-  camera->fx = (float)fx, camera->fy = (float)fy;
-  camera->cx = (float)(lens->has_cx ? lens->cx * sx : 0.5 * w);
-  camera->cy = (float)(lens->has_cy ? lens->cy * sy : 0.5 * h);
-  if (!(camera->fx > FOCAL_MIN && camera->fy > FOCAL_MIN && camera->fx < PIXELS_MAX && camera->fy < PIXELS_MAX))
-    return sf_fail(SF_E_RANGE, "%s: focal length of %g x %g pixels", where, fx, fy);
-  if (!(fabsf(camera->cx) < PIXELS_MAX && fabsf(camera->cy) < PIXELS_MAX))
-    return sf_fail(SF_E_RANGE, "%s: optical centre at pixel %g, %g", where, (double)camera->cx, (double)camera->cy);
-  return sf_ok();
-}
-
-/* A picture's own fault names the picture; the frame says where it was asked for. */
-static sf_status in_frame(sf_status status, const char *list, int number)
-{
-  if (status.code == SF_OK) return status;
-  return sf_fail(status.code, "%s (frame %d of %s)", status.message, number, list);
-}
-
-/* A picture may lie anywhere, also outside the folder. But a device or a pipe that a data set names may never end. */
-static sf_status refuse_device(const char *path)
-{
-  struct stat info;
-  if (!stat(path, &info) && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
-    return sf_fail(SF_E_IO, "cannot read %s: it is not a regular file", path);
-  return sf_ok();
-}
-
-static sf_status load_view(sf_view *view, const sf_frame *frame, int number, const listing *list, const char *dir,
-                           const sf_dataset_options *options, float scale)
-{
-  char path[4096], where[4096 + 340];
-  snprintf(where, sizeof where, "%s: frame %d (%s)", list->path, number, frame->file_path);
-  strcpy(view->name, frame->file_path);
-  memcpy(view->camera.to_world, frame->to_world, sizeof view->camera.to_world);
-  for (int i = 0; i < 3; i++) {
-    view->camera.to_world[4 * i + 3] *= scale;
-    if (!isfinite(view->camera.to_world[4 * i + 3]))
-      return sf_fail(SF_E_RANGE, "%s: position times scale %g is not finite", where, scale);
-  }
-  SF_TRY(picture_path(path, sizeof path, dir, frame->file_path));
-  SF_TRY(in_frame(refuse_device(path), list->path, number));
-  SF_TRY(in_frame(sf_image_load(&view->image, path), list->path, number));
-  SF_TRY(set_lens(&view->camera, &frame->lens, &view->image, where));
-  if (options->downscale <= 1) return sf_ok();
-  SF_TRY(in_frame(sf_image_downscale(&view->image, options->downscale, path), list->path, number));
-  sf_camera *camera = &view->camera;
-  float shrink = 1.0f / (float)options->downscale;
-  camera->width = view->image.width, camera->height = view->image.height;
-  camera->fx *= shrink, camera->fy *= shrink, camera->cx *= shrink, camera->cy *= shrink;
-  return sf_ok();
-}
-
-/* First fault in the order of the views, whatever the order of the threads. */
-static sf_status first_fault(const sf_dataset *data, const sf_frame *frames, const int *numbers,
-                             const sf_status *status, const char *list)
-{
-  for (int i = 0; i < data->count; i++) {
-    if (status[i].code != SF_OK) return status[i];
-    const sf_image *one = &data->view[0].image, *other = &data->view[i].image;
-    bool same = one->width == other->width && one->height == other->height;
-    if (!same && !(frames[0].own_size && frames[i].own_size))
-      return sf_fail(SF_E_FORMAT,
-                     "%s: pictures of different sizes: frame %d (%s) has %d x %d, frame %d (%s) has %d x %d", list,
-                     numbers[0], data->view[0].name, one->width, one->height, numbers[i], data->view[i].name,
-                     other->width, other->height);
-  }
-  return sf_ok();
-}
-
-static sf_status load_views(sf_dataset *data, const sf_frame *frames, const int *numbers, int count,
-                            const listing *list, const sf_dataset_options *options)
-{
-  if (count == 0) return sf_ok();
-  sf_status *status = calloc((size_t)count, sizeof *status);
-  data->view = calloc((size_t)count, sizeof *data->view);
-  if (!status || !data->view) {
-    free(status);
-    return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", list->path, count);
-  }
-  data->count = count;
-#pragma omp parallel for schedule(dynamic)
-  for (int i = 0; i < count; i++)
-    status[i] = load_view(&data->view[i], &frames[i], numbers[i], list, data->path, options, data->scale);
-  sf_status first = first_fault(data, frames, numbers, status, list->path);
-  free(status);
-  return first;
+  for (int i = 0; i < data->warnings; i++) fprintf(out, "warning: %s\n", data->warning[i]);
 }
 
 static sf_status check_options(const char *dir, const sf_dataset_options *options)
@@ -212,29 +40,87 @@ static sf_status check_options(const char *dir, const sf_dataset_options *option
   if (options->limit < 0 || options->first < 0)
     return sf_fail(SF_E_RANGE, "%s: %d views from view %d on", dir, options->limit, options->first);
   if (!(options->scale >= 0) || isinf(options->scale))
-    return sf_fail(SF_E_RANGE, "%s: scale %g is not a positive number", dir, options->scale);
+    return sf_fail(SF_E_RANGE, "%s: scale %g is not a positive number", dir, (double)options->scale);
   return sf_ok();
+}
+
+/* A folder with both holds the same poses twice. LLFF's rows alone know depths, for NDC; COLMAP's tables alone know
+ * each camera and its lens. */
+static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_options *options)
+{
+  char list[4096];
+  const bool llff = sf_llff_there(data->path), colmap = sf_colmap_there(data->path, list);
+  if (!llff) return sf_colmap_read(c, data->path, options);
+  SF_TRY(sf_llff_read(c, data->path, options));
+  if (!colmap) return sf_ok();
+  const bool forward = sf_forward_facing(c);
+  SF_TRY(sf_warn(data, "%s: poses_bounds.npy and a COLMAP model are both there: %s", data->path,
+                 forward ? "the views face forward, so poses_bounds.npy is used"
+                         : "the views do not face forward, so the COLMAP model is used"));
+  if (forward) return sf_ok();
+  sf_capture_free(c);
+  return sf_colmap_read(c, data->path, options);
+}
+
+static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split, const sf_dataset_options *options)
+{
+  char list[4096];
+  const char *dir = data->path;
+  const bool poses = sf_llff_there(dir) || sf_colmap_there(dir, list);
+  c->shrink = options->downscale;
+  if (!sf_is_folder(dir)) return sf_fail(SF_E_IO, "%s: no such folder", dir);
+  if (sf_transforms_there(dir) || !poses) {
+    SF_TRY(sf_transforms_read(c, dir, split));
+    return poses ? sf_warn(data, "%s: other poses are there too: %s is used", dir, c->list) : sf_ok();
+  }
+  if (!strcmp(split, "test"))
+    c->part = SF_ONLY_HELD_OUT;
+  else if (!strcmp(split, "train"))
+    c->part = SF_ALL_BUT_HELD_OUT;
+  else
+    return sf_fail(SF_E_IO, "%s: no split %.40s: expected train or test", dir, split);
+  const int part = c->part;
+  SF_TRY(read_poses(data, c, options));
+  c->part = part;
+  return sf_ok();
+}
+
+/* The first picture that can be read; its own faults are told when it is loaded. */
+static sf_sight look(const sf_dataset *data, const sf_capture *c)
+{
+  sf_sight sight = {0};
+  sf_image image = {0};
+  char path[4096];
+  for (int f = 0; f < c->count && !image.rgba && c->layout != SF_LAYOUT_BLENDER && !c->placed; f++)
+    if (sf_picture_find(path, data->path, c->frame[f].file_path).code == SF_OK && sf_is_file(path))
+      if (sf_image_load(&image, path).code != SF_OK) break;
+  if (!image.rgba) return sight;
+  sight.width = image.width, sight.height = image.height;
+  const size_t n = (size_t)image.width * (size_t)image.height;
+  for (size_t i = 0; i < n && !sight.transparent; i++) sight.transparent = image.rgba[4 * i + 3] == 0;
+  sf_image_free(&image);
+  return sight;
+}
+
+static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const sf_dataset_options *options)
+{
+  SF_TRY(read_capture(data, c, split, options));
+  const sf_sight sight = look(data, c);
+  SF_TRY(sf_place(data, c, options, &sight));
+  SF_TRY(sf_views_load(data, c, options));
+  return sf_check_sight(data, c, &sight);
 }
 
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options)
 {
   static const sf_dataset_options defaults = {.downscale = 1};
+  sf_capture capture = {0};
   if (!options) options = &defaults;
   memset(data, 0, sizeof *data);
   SF_TRY(check_options(dir, options));
   strcpy(data->path, dir);
-  data->scale = options->scale > 0 ? options->scale : DEFAULT_SCALE, data->bound = 1;
-  listing list;
-  SF_TRY(find_listing(&list, dir, split));
-  cJSON *json;
-  SF_TRY(sf_json_load(list.path, &json));
-  sf_frame *frames = NULL;
-  int *numbers = NULL, count = 0;
-  sf_status status = parse_listing(&list, json, options, &frames, &numbers, &count, &data->total);
-  cJSON_Delete(json);
-  if (status.code == SF_OK) status = load_views(data, frames, numbers, count, &list, options);
-  free(frames);
-  free(numbers);
+  const sf_status status = load(data, &capture, split, options);
+  sf_capture_free(&capture);
   if (status.code != SF_OK) sf_dataset_free(data);
   return status;
 }
@@ -242,6 +128,6 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
 void sf_dataset_free(sf_dataset *data)
 {
   for (int i = 0; data->view && i < data->count; i++) sf_image_free(&data->view[i].image);
-  free(data->view);
+  free(data->view), free(data->point), free(data->warning);
   memset(data, 0, sizeof *data);
 }

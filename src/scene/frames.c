@@ -1,10 +1,11 @@
-#include "src/scene/frames.h"
+/* The text of a transforms_*.json file, checked. */
+#include "src/scene/capture.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-static sf_status number(const cJSON *json, const char *key, const char *where, double low, double high, double *value,
-                        bool *given)
+sf_status sf_number_parse(const cJSON *json, const char *key, const char *where, double low, double high, double *value,
+                          bool *given)
 {
   const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
   if (given) *given = *given || item;
@@ -18,42 +19,53 @@ static sf_status number(const cJSON *json, const char *key, const char *where, d
   return sf_ok();
 }
 
-/* Pinhole cameras only: a lens that bends rays would be rendered wrongly in silence. */
-static sf_status refuse_distortion(const cJSON *json, const char *where)
+/* Of the lenses only OpenCV's first four numbers are modelled: others would be rendered wrongly in silence. */
+static sf_status parse_distortion(sf_lens *lens, const cJSON *json, const char *where)
 {
-  static const char *const keys[] = {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"};
-  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+  static const char *const more[] = {"k3", "k4", "k5", "k6"};
+  static const char *const models[] = {"PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", NULL};
+  const double most = 1e6;
+  for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
     double value = 0;
-    SF_TRY(number(json, keys[i], where, -HUGE_VAL, HUGE_VAL, &value, NULL));
+    SF_TRY(sf_number_parse(json, more[i], where, -HUGE_VAL, HUGE_VAL, &value, NULL));
     if (value != 0)
-      return sf_fail(SF_E_UNSUPPORTED, "%s: lens distortion %s = %g: undistort the pictures first", where, keys[i],
-                     value);
+      return sf_fail(SF_E_UNSUPPORTED, "%s: lens distortion %s = %g: k1, k2, p1 and p2 alone are modelled", where,
+                     more[i], value);
   }
+  SF_TRY(sf_number_parse(json, "k1", where, -most, most, &lens->k1, NULL));
+  SF_TRY(sf_number_parse(json, "k2", where, -most, most, &lens->k2, NULL));
+  SF_TRY(sf_number_parse(json, "p1", where, -most, most, &lens->p1, NULL));
+  SF_TRY(sf_number_parse(json, "p2", where, -most, most, &lens->p2, NULL));
   if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "is_fisheye")))
-    return sf_fail(SF_E_UNSUPPORTED, "%s: is_fisheye: only pinhole cameras are modelled", where);
+    return sf_fail(SF_E_UNSUPPORTED, "%s: is_fisheye: a fisheye lens is not modelled", where);
   const char *model = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "camera_model"));
-  /* OPENCV is a pinhole where its distortion is zero, which is checked above. */
-  if (model && strcmp(model, "PINHOLE") && strcmp(model, "SIMPLE_PINHOLE") && strcmp(model, "OPENCV"))
-    return sf_fail(SF_E_UNSUPPORTED, "%s: camera_model %.40s: only pinhole cameras are modelled", where, model);
-  return sf_ok();
+  if (!model) return sf_ok();
+  for (int i = 0; models[i]; i++) {
+    if (strcmp(model, models[i]) != 0) continue;
+    lens->model = models[i];
+    return sf_ok();
+  }
+  return sf_fail(SF_E_UNSUPPORTED,
+                 "%s: camera_model %.40s: expected PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV", where,
+                 model);
 }
 
 sf_status sf_lens_parse(sf_lens *lens, const cJSON *json, const char *where)
 {
   const double pixels = 1e7;
-  SF_TRY(refuse_distortion(json, where));
-  SF_TRY(number(json, "fl_x", where, 0, pixels, &lens->fl_x, NULL));
-  SF_TRY(number(json, "fl_y", where, 0, pixels, &lens->fl_y, NULL));
-  SF_TRY(number(json, "w", where, 0, pixels, &lens->width, NULL));
-  SF_TRY(number(json, "h", where, 0, pixels, &lens->height, NULL));
-  SF_TRY(number(json, "cx", where, -pixels, pixels, &lens->cx, &lens->has_cx));
-  SF_TRY(number(json, "cy", where, -pixels, pixels, &lens->cy, &lens->has_cy));
-  SF_TRY(number(json, "camera_angle_x", where, 0, M_PI, &lens->angle_x, NULL));
-  return number(json, "camera_angle_y", where, 0, M_PI, &lens->angle_y, NULL);
+  SF_TRY(parse_distortion(lens, json, where));
+  SF_TRY(sf_number_parse(json, "fl_x", where, 0, pixels, &lens->fl_x, NULL));
+  SF_TRY(sf_number_parse(json, "fl_y", where, 0, pixels, &lens->fl_y, NULL));
+  SF_TRY(sf_number_parse(json, "w", where, 0, pixels, &lens->width, NULL));
+  SF_TRY(sf_number_parse(json, "h", where, 0, pixels, &lens->height, NULL));
+  SF_TRY(sf_number_parse(json, "cx", where, -pixels, pixels, &lens->cx, &lens->has_cx));
+  SF_TRY(sf_number_parse(json, "cy", where, -pixels, pixels, &lens->cy, &lens->has_cy));
+  SF_TRY(sf_number_parse(json, "camera_angle_x", where, 0, M_PI, &lens->angle_x, NULL));
+  return sf_number_parse(json, "camera_angle_y", where, 0, M_PI, &lens->angle_y, NULL);
 }
 
 /* Lengths of the columns are taken out: some exporters leave a scale in them. */
-static sf_status normalise_rotation(float m[12], const char *where)
+static sf_status normalise_rotation(double m[12], const char *where)
 {
   double c[3][3];
   for (int k = 0; k < 3; k++) {
@@ -68,11 +80,11 @@ static sf_status normalise_rotation(float m[12], const char *where)
     return sf_fail(SF_E_RANGE, "%s: transform_matrix is degenerate: its axes lie in one plane (determinant %.3g)",
                    where, det);
   for (int k = 0; k < 3; k++)
-    for (int i = 0; i < 3; i++) m[4 * i + k] = (float)c[k][i];
+    for (int i = 0; i < 3; i++) m[4 * i + k] = c[k][i];
   return sf_ok();
 }
 
-static sf_status parse_matrix(float m[12], const cJSON *json, const char *where)
+static sf_status parse_matrix(double m[12], const cJSON *json, const char *where)
 {
   const cJSON *rows = cJSON_GetObjectItemCaseSensitive(json, "transform_matrix");
   if (!cJSON_IsArray(rows) || cJSON_GetArraySize(rows) != 4)
@@ -110,7 +122,7 @@ sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shar
                    sizeof frame->file_path - 1);
   strcpy(frame->file_path, file);
   snprintf(where, sizeof where, "%s: frame %d (%s)", path, index, file);
-  frame->lens = *shared;
+  frame->number = index, frame->lens = *shared;
   frame->own_size = cJSON_HasObjectItem(json, "w") && cJSON_HasObjectItem(json, "h");
   SF_TRY(sf_lens_parse(&frame->lens, json, where));
   if (!frame->lens.fl_x && !frame->lens.angle_x)

@@ -1,0 +1,95 @@
+/* What the reader of a layout finds: every view that is listed, before any picture is opened and before the scene is
+ * placed in its box. */
+#ifndef SPIKEFIELD_SCENE_CAPTURE_H
+#define SPIKEFIELD_SCENE_CAPTURE_H
+#include "spikefield/scene.h"
+#include <cjson/cJSON.h>
+
+enum { SF_HOLD_OUT = 8 }; /* every 8th view where the data names no test views */
+
+/* Lengths in pixels of the size below; 0 = not given. */
+typedef struct sf_lens {
+  double fl_x, fl_y, cx, cy, width, height, angle_x, angle_y, k1, k2, p1, p2;
+  bool has_cx, has_cy;
+  const char *model; /* COLMAP's name, a literal; NULL: as the numbers say */
+  int64_t camera;    /* its number in the file, or -1 */
+} sf_lens;
+
+typedef struct sf_frame {
+  char file_path[256]; /* below the folder */
+  double to_world[12]; /* row-major 3x4, OpenGL axes; columns of the rotation have length 1 */
+  sf_lens lens;
+  bool own_size; /* pictures of other sizes may stand beside this one */
+  int number;    /* place in the list, from 0 */
+} sf_frame;
+
+typedef struct sf_capture {
+  char list[4096]; /* the file that lists the views, for messages */
+  sf_layout layout;
+  enum { SF_ALL_VIEWS, SF_ALL_BUT_HELD_OUT, SF_ONLY_HELD_OUT } part; /* of the frames, which are the split */
+  sf_frame *frame;                                                   /* [count], owned */
+  int count;
+  int shrink;         /* the pictures, once loaded, by a box filter */
+  double (*point)[3]; /* [points] sparse points or NULL, owned */
+  int points;
+  double near;      /* LLFF: the nearest depth of all views */
+  bool placed;      /* instant-ngp: the file itself says where its box is: */
+  double box_scale; /* to instant-ngp's unit cube, */
+  double box_offset[3];
+  int32_t aabb_scale; /* edge of the box over that of the unit cube */
+} sf_capture;
+void sf_capture_free(sf_capture *capture);
+
+/* One reader per layout. `split` as in sf_dataset_load; on failure the caller frees what is there. */
+sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);
+sf_status sf_llff_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
+sf_status sf_colmap_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
+/* Whether the folder holds the layout. list: the file found. */
+bool sf_transforms_there(const char *dir);
+bool sf_llff_there(const char *dir);
+bool sf_colmap_there(const char *dir, char list[4096]);
+
+/* `frame` is one element of "frames", `index` its place; `path` is the JSON file, for messages. */
+sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shared, const char *path, int index);
+/* Reads the lens fields that `json` (file or frame) states into *lens; `where` starts each message. */
+sf_status sf_lens_parse(sf_lens *lens, const cJSON *json, const char *where);
+/* A finite number of JSON between low and high, both excluded; absent: *value stays. given may be NULL. */
+sf_status sf_number_parse(const cJSON *json, const char *key, const char *where, double low, double high, double *value,
+                          bool *given);
+
+/* ---- folders ---- */
+
+bool sf_is_file(const char *path);
+bool sf_is_folder(const char *path);
+/* dir/name + tail; an absolute name stands alone. */
+sf_status sf_join(char path[4096], const char *dir, const char *name, const char *tail);
+/* Folder `images` or `images_N` for pictures of the full size over `downscale`; *shrink: what is left to do. With
+ * downscale 1: the largest whose longer side is at most 1600 pixels, by the full width and height; else the smallest.
+ */
+sf_status sf_pictures_choose(const char *dir, int downscale, double width, double height, char folder[64], int *shrink);
+/* The names of its pictures (PNG, JPEG), sorted; free each and the list. */
+sf_status sf_pictures_list(const char *dir, const char *folder, char ***name, int *count);
+void sf_names_free(char **name, int count);
+/* The picture of a frame: the name itself, or with another ending where only that is there. */
+sf_status sf_picture_find(char path[4096], const char *dir, const char *file);
+
+/* ---- placing ---- */
+
+/* What must be known of one picture: whether it shows an object on nothing, and its size where the list has none. */
+typedef struct sf_sight {
+  bool transparent;
+  int width, height;
+} sf_sight;
+/* Turns, moves and scales the frames' positions into model units and fills all of data but its views and path. */
+sf_status sf_place(sf_dataset *data, sf_capture *capture, const sf_dataset_options *options, const sf_sight *sight);
+/* Views whose rays all pass by the box of the scene: a warning; all of them: SF_E_RANGE. */
+sf_status sf_check_sight(sf_dataset *data, const sf_capture *capture, const sf_sight *sight);
+/* All views look about one way, and from before the nearest thing. */
+bool sf_forward_facing(const sf_capture *capture);
+
+/* ---- pictures ---- */
+
+/* The views of the split, pictures loaded in parallel. Frames are placed. */
+sf_status sf_views_load(sf_dataset *data, const sf_capture *capture, const sf_dataset_options *options);
+sf_status sf_warn(sf_dataset *data, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#endif

@@ -1,0 +1,122 @@
+/* Where the cameras stand: the view from above beside the view from the side. */
+#include "spikefield/scene.h"
+#include <math.h>
+#include <stdlib.h>
+
+typedef struct colour {
+  uint8_t r, g, b;
+} colour;
+static const colour paper = {255, 255, 255}, edge = {150, 150, 150}, inner = {215, 215, 215}, dot = {150, 180, 150},
+                    train = {40, 90, 200}, test = {220, 70, 40};
+
+/* One panel: model axis `right` to the right, `up` upwards. */
+typedef struct panel {
+  sf_image *image;
+  int x, size, right, up;
+  double middle[3], reach; /* of the panel's half edge, model units */
+} panel;
+
+static void put(const panel *p, int x, int y, colour c)
+{
+  if (x < 0 || y < 0 || x >= p->size || y >= p->size) return;
+  uint16_t *pixel = p->image->rgba + 4 * ((size_t)y * (size_t)p->image->width + (size_t)(p->x + x));
+  pixel[0] = (uint16_t)(c.r * 257), pixel[1] = (uint16_t)(c.g * 257), pixel[2] = (uint16_t)(c.b * 257);
+}
+
+static void place(const panel *p, const double at[3], double out[2])
+{
+  const double half = 0.5 * p->size;
+  out[0] = half + half * (at[p->right] - p->middle[p->right]) / p->reach;
+  out[1] = half - half * (at[p->up] - p->middle[p->up]) / p->reach;
+}
+
+static void line(const panel *p, const double from[3], const double to[3], colour c)
+{
+  double a[2], b[2];
+  place(p, from, a), place(p, to, b);
+  const double steps = fmin(fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])) + 1, 8.0 * p->size);
+  for (int i = 0; i <= steps; i++) {
+    const double x = a[0] + (b[0] - a[0]) * i / steps, y = a[1] + (b[1] - a[1]) * i / steps;
+    if (fabs(x) < 1e6 && fabs(y) < 1e6) put(p, (int)floor(x), (int)floor(y), c);
+  }
+}
+
+static void square(const panel *p, double half, colour c)
+{
+  for (int k = 0; k < 4; k++) {
+    double from[3] = {0}, to[3] = {0};
+    from[p->right] = (k & 1) ^ (k >> 1) ? half : -half, from[p->up] = k >> 1 ? half : -half;
+    const int next = (k + 1) % 4;
+    to[p->right] = (next & 1) ^ (next >> 1) ? half : -half, to[p->up] = next >> 1 ? half : -half;
+    line(p, from, to, c);
+  }
+}
+
+/* The pyramid of what the picture shows, as long as `depth`. */
+static void frustum(const panel *p, const sf_camera *camera, double depth, colour c)
+{
+  const float *m = camera->to_world;
+  double eye[3], corner[4][3];
+  for (int i = 0; i < 3; i++) eye[i] = (double)m[4 * i + 3];
+  for (int k = 0; k < 4; k++) {
+    const double px = (k == 1 || k == 2 ? camera->width : 0), py = (k >= 2 ? camera->height : 0);
+    const double x = (px - (double)camera->cx) / (double)camera->fx, y = ((double)camera->cy - py) / (double)camera->fy;
+    for (int i = 0; i < 3; i++)
+      corner[k][i] = eye[i] + depth * ((double)m[4 * i] * x + (double)m[4 * i + 1] * y - (double)m[4 * i + 2]);
+  }
+  for (int k = 0; k < 4; k++) line(p, eye, corner[k], c), line(p, corner[k], corner[(k + 1) % 4], c);
+}
+
+static void draw(const panel *p, const sf_dataset *data, colour c)
+{
+  for (int v = 0; v < data->count; v++) frustum(p, &data->view[v].camera, 0.08 * p->reach, c);
+}
+
+static void fill(const panel *p, const sf_dataset *of_train, const sf_dataset *of_test)
+{
+  for (int n = 0; n < of_train->points && !of_train->ndc; n++) {
+    double at[3], spot[2];
+    for (int i = 0; i < 3; i++) at[i] = (double)of_train->point[3 * n + i];
+    place(p, at, spot);
+    if (fabs(spot[0]) < 1e6 && fabs(spot[1]) < 1e6) put(p, (int)floor(spot[0]), (int)floor(spot[1]), dot);
+  }
+  if (of_train->ndc) { /* the near plane is the edge of what can be modelled */
+    double from[3] = {-10 * p->reach, -10 * p->reach, -(double)of_train->ndc_near};
+    double to[3] = {10 * p->reach, 10 * p->reach, -(double)of_train->ndc_near};
+    line(p, from, to, edge);
+  } else {
+    square(p, 1, inner);
+    square(p, of_train->bound, edge);
+  }
+  draw(p, of_train, train);
+  draw(p, of_test, test);
+}
+
+/* Half the edge of a panel about `middle`: all cameras and the box, but not a stray one. */
+static double find_reach(const sf_dataset *data, const double middle[3])
+{
+  double sum = 0, most = 0;
+  for (int v = 0; v < data->count; v++) {
+    double away = 0;
+    for (int i = 0; i < 3; i++) away = fmax(away, fabs((double)data->view[v].camera.to_world[4 * i + 3] - middle[i]));
+    sum += away / data->count, most = fmax(most, away);
+  }
+  most = fmin(most, 4 * sum);
+  return 1.15 * (data->ndc ? fmax(most, 1.5 * (double)data->ndc_near) : fmax(most, data->bound));
+}
+
+sf_status sf_plan_draw(const sf_dataset *of_train, const sf_dataset *of_test, int size, sf_image *image)
+{
+  *image = (sf_image){2 * size, size, malloc((size_t)size * (size_t)size * 8 * sizeof *image->rgba)};
+  if (!image->rgba) return sf_fail(SF_E_MEMORY, "no memory for a picture of %d x %d", 2 * size, size);
+  for (size_t i = 0; i < (size_t)size * (size_t)size * 8; i++)
+    image->rgba[i] = (uint16_t)((i % 4 == 3 ? 255 : paper.r) * 257);
+  panel top = {.image = image, .size = size, .right = 0, .up = 1, .reach = 1};
+  top.reach = fmax(find_reach(of_train, top.middle), find_reach(of_test, top.middle));
+  panel side = top;
+  side.x = size, side.up = 2;
+  fill(&top, of_train, of_test), fill(&side, of_train, of_test);
+  const panel whole = {.image = image, .x = size, .size = size};
+  for (int y = 0; y < size; y++) put(&whole, 0, y, edge);
+  return sf_ok();
+}
