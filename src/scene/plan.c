@@ -80,11 +80,11 @@ static void fill(const panel *p, const sf_dataset *of_train, const sf_dataset *o
     place(p, at, spot);
     if (fabs(spot[0]) < 1e6 && fabs(spot[1]) < 1e6) put(p, (int)floor(spot[0]), (int)floor(spot[1]), dot);
   }
-  if (of_train->ndc) { /* the near plane is the edge of what can be modelled */
-    double from[3] = {-10 * p->reach, -10 * p->reach, -(double)of_train->ndc_near};
-    double to[3] = {10 * p->reach, 10 * p->reach, -(double)of_train->ndc_near};
-    line(p, from, to, edge);
-  } else {
+  if (of_train->ndc && p->up == 2) { /* the near plane is the edge of what can be modelled */
+    const double z = -(double)of_train->ndc_near;
+    line(p, (double[3]){-p->reach, 0, z}, (double[3]){p->reach, 0, z}, edge);
+  }
+  if (!of_train->ndc) {
     square(p, 1, inner);
     square(p, of_train->bound, edge);
   }
@@ -92,7 +92,7 @@ static void fill(const panel *p, const sf_dataset *of_train, const sf_dataset *o
   draw(p, of_test, test);
 }
 
-/* Half the edge of a panel about `middle`: all cameras and the box, but not a stray one. */
+/* Half the edge of a panel about `middle`: all cameras, but not a stray one, and of the box what leaves them large. */
 static double find_reach(const sf_dataset *data, const double middle[3])
 {
   double sum = 0, most = 0;
@@ -102,7 +102,7 @@ static double find_reach(const sf_dataset *data, const double middle[3])
     sum += away / data->count, most = fmax(most, away);
   }
   most = fmin(most, 4 * sum);
-  return 1.15 * (data->ndc ? fmax(most, 1.5 * (double)data->ndc_near) : fmax(most, data->bound));
+  return 1.15 * fmax(most, data->ndc ? (double)data->ndc_near : fmin(data->bound, 1.5 * most));
 }
 
 sf_status sf_plan_draw(const sf_dataset *of_train, const sf_dataset *of_test, int size, sf_image *image)
