@@ -254,11 +254,24 @@ static bool hits_box(const double o[3], const double d[3], double bound)
   return enter < leave;
 }
 
+static void model_position(const sf_dataset *data, const sf_frame *frame, double at[3])
+{
+  for (int i = 0; i < 3; i++) at[i] = frame->to_world[4 * i + 3] * (double)data->scale + (double)data->offset[i];
+}
+
+static bool turns_back(const sf_dataset *data, const sf_frame *frame)
+{
+  double at[3], back[3];
+  model_position(data, frame, at);
+  column(frame, 2, back);
+  return vec_dot(at, back) < 0;
+}
+
 static bool sees_box(const sf_dataset *data, const sf_frame *frame, const sf_sight *sight)
 {
   double half[2], at[3], d[3];
   half_view(&frame->lens, sight, half);
-  for (int i = 0; i < 3; i++) at[i] = frame->to_world[4 * i + 3] * (double)data->scale + (double)data->offset[i];
+  model_position(data, frame, at);
   for (int n = 0; n < 81; n++) {
     corner_ray(frame, half, n % 9 / 4.0 - 1, n / 9 / 4.0 - 1, d);
     if (hits_box(at, d, data->bound)) return true;
@@ -268,15 +281,17 @@ static bool sees_box(const sf_dataset *data, const sf_frame *frame, const sf_sig
 
 sf_status sf_check_sight(sf_dataset *data, const sf_capture *c, const sf_sight *sight)
 {
-  int away = 0, first = 0;
+  int away = 0, back = 0, first = 0;
   if (data->ndc) return sf_ok();
+  for (int f = 0; f < c->count; f++) back += turns_back(data, &c->frame[f]);
+  const bool inward = 4 * back < c->count; /* cameras about the scene, not amid it: one that turns its back is wrong */
   for (int f = c->count - 1; f >= 0; f--)
-    if (!sees_box(data, &c->frame[f], sight)) away++, first = f;
+    if (!sees_box(data, &c->frame[f], sight) || (inward && turns_back(data, &c->frame[f]))) away++, first = f;
   if (away == c->count)
     return sf_fail(SF_E_RANGE, "%s: no view looks at the scene: none of %d sees the box [-%d, %d]^3 at scale %g",
                    c->list, c->count, data->bound, data->bound, (double)data->scale);
   if (!away) return sf_ok();
-  return sf_warn(data, "%s: %d of %d views do not look at the scene box, the first is %s", c->list, away, c->count,
+  return sf_warn(data, "%s: %d of %d views do not look at the scene, the first is %s", c->list, away, c->count,
                  c->frame[first].file_path);
 }
 
