@@ -12,11 +12,12 @@
 #include <unistd.h>
 
 typedef struct options {
-  int view, views, downscale, threads, rtl_rays, stall, steps;
+  int view, views, downscale, threads, rtl_rays, stall, steps, steps_b;
   uint64_t rays, seed, recount_rays;
   double scale;
-  const char *split, *csv, *html, *model, *plusarg, *scene, *data, *tech;
-  bool json, published, quiet;
+  const char *split, *csv, *html, *model, *plusarg, *scene, *data, *tech, *tech_b, *other;
+  const char *command; /* of the page: the whole command line */
+  bool json, published, quiet, compare;
 } options;
 
 enum { RTL_RAYS = 16, RECOUNT_RAYS = 1000 };
@@ -36,7 +37,7 @@ typedef struct audit {
   sf_technology technology;
   sf_audit_report report;
   sf_page page; /* with --html */
-  char model[4096], command[4096];
+  char model[4096];
   sf_progress progress;
   double start;
 } audit;
@@ -206,10 +207,13 @@ static sf_status make_page(audit *a)
   const options *o = &a->opt;
   if (!o->html) return sf_ok();
   a->page.report = &a->report, a->page.scene = &a->scene, a->page.view = &a->data.view[o->view >= 0 ? o->view : 0];
-  a->page.data = &a->data, a->page.model = find_model(a), a->page.command = a->command;
+  a->page.data = &a->data, a->page.model = find_model(a), a->page.command = o->command;
   a->page.whole = o->rays == 0 && (o->view >= 0 || a->data.count == 1);
   a->page.tick = page_tick, a->page.user = a;
-  SF_TRY(sf_page_gather(&a->page));
+  sf_progress_begin(&a->progress, o->quiet);
+  const sf_status status = sf_page_gather(&a->page);
+  sf_progress_end(&a->progress);
+  SF_TRY(status);
   return sf_page_save(&a->page, o->html);
 }
 
@@ -261,31 +265,123 @@ static sf_status count(audit *a)
   return run_rtl(a);
 }
 
-static sf_status work(audit *a)
+static sf_status run(audit *a)
 {
-  if (!a->opt.scene) {
-    if (a->opt.json) return print_json(sf_published_json());
-    sf_published_print(stdout);
-    return sf_ok();
-  }
-  double begin = sf_seconds();
+  const double begin = sf_seconds();
   SF_TRY(load_technology(a));
   SF_TRY(load(a));
   SF_TRY(check_writable(a->opt.html));
   sf_progress_begin(&a->progress, a->opt.quiet);
   a->start = sf_seconds();
-  sf_status status = count(a);
+  const sf_status status = count(a);
   sf_progress_end(&a->progress);
-  SF_TRY(status);
   a->report.seconds = sf_seconds() - begin;
-  SF_TRY(write_csv(a));
-  sf_progress_begin(&a->progress, a->opt.quiet);
-  status = make_page(a);
-  sf_progress_end(&a->progress);
+  return status;
+}
+
+static void close_audit(audit *a)
+{
+  sf_page_free(&a->page);
+  sf_measure_free(&a->report.measure);
+  sf_dataset_free(&a->data);
+  fx_scene_free(&a->scene);
+  free(a);
+}
+
+static sf_status open_audit(audit **a, const options *opt)
+{
+  *a = calloc(1, sizeof **a);
+  if (!*a) return sf_fail(SF_E_MEMORY, "no memory");
+  (*a)->opt = *opt;
+  return sf_ok();
+}
+
+static sf_status audit_scene(const options *opt)
+{
+  audit *a;
+  SF_TRY(open_audit(&a, opt));
+  sf_status status = run(a);
+  if (status.code == SF_OK) status = write_csv(a);
+  if (status.code == SF_OK) status = make_page(a);
+  if (status.code == SF_OK) status = print_report(a);
+  if (status.code == SF_OK && a->report.three.agreement.code != SF_OK)
+    status = sf_fail(SF_E_DIFFERENCE, "%s: %s", opt->scene, a->report.three.agreement.message);
+  close_audit(a);
+  return status;
+}
+
+/* ---- comparison ---- */
+
+static bool is_report(const char *path)
+{
+  const size_t n = strlen(path);
+  return n > 5 && !strcmp(path + n - 5, ".json");
+}
+
+/* Through text, as a file would hold it: the report's integers are raw digits in memory. */
+static sf_status report_as_read(const audit *a, cJSON **json)
+{
+  cJSON *made = sf_report_json(&a->report);
+  char *text = made ? cJSON_PrintUnformatted(made) : NULL;
+  *json = text ? cJSON_Parse(text) : NULL;
+  cJSON_Delete(made);
+  free(text);
+  return *json ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the report");
+}
+
+/* One side: a report, or a scene that is audited now. */
+static sf_status side(const options *opt, cJSON **json)
+{
+  if (is_report(opt->scene)) return sf_json_load(opt->scene, json);
+  audit *a;
+  SF_TRY(open_audit(&a, opt));
+  sf_status status = run(a);
+  if (status.code == SF_OK) status = a->report.three.agreement;
+  if (status.code == SF_OK) status = report_as_read(a, json);
+  close_audit(a);
+  return status;
+}
+
+static sf_status compare(const options *opt)
+{
+  cJSON *a = NULL, *b = NULL, *comparison = NULL;
+  options other = *opt;
+  other.scene = opt->other;
+  if (opt->tech_b) other.tech = opt->tech_b;
+  if (opt->steps_b) other.steps = opt->steps_b;
+  sf_status status = side(opt, &a);
+  if (status.code == SF_OK) status = side(&other, &b);
+  if (status.code == SF_OK) status = sf_audits_compare(a, opt->scene, b, other.scene, &comparison);
+  cJSON_Delete(a), cJSON_Delete(b);
   SF_TRY(status);
-  SF_TRY(print_report(a));
-  if (a->report.three.agreement.code == SF_OK) return sf_ok();
-  return sf_fail(SF_E_DIFFERENCE, "%s: %s", a->opt.scene, a->report.three.agreement.message);
+  if (opt->json) return print_json(comparison);
+  sf_comparison_print(stdout, comparison);
+  cJSON_Delete(comparison);
+  return sf_ok();
+}
+
+static sf_status work(const options *opt)
+{
+  if (opt->compare) return compare(opt);
+  if (opt->scene) return audit_scene(opt);
+  if (opt->json) return print_json(sf_published_json());
+  sf_published_print(stdout);
+  return sf_ok();
+}
+
+static sf_status parse_comparison(options *o, const char *const positional[3])
+{
+  static const char usage[] = "energy_audit --compare A B [DATA]";
+  o->other = positional[1], o->data = positional[2];
+  if (!o->scene || !o->other) return sf_fail(SF_E_USAGE, "--compare needs two arguments; usage: %s", usage);
+  if (!o->data && !(is_report(o->scene) && is_report(o->other)))
+    return sf_fail(SF_E_USAGE, "--compare of scenes needs DATA; usage: %s", usage);
+  if (o->csv || o->html || o->published)
+    return sf_fail(SF_E_USAGE, "--compare and %s exclude each other",
+                   o->csv    ? "--csv"
+                   : o->html ? "--html"
+                             : "--published");
+  return sf_ok();
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -309,21 +405,29 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--html", 0, SF_ARG_STRING, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
       {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
        "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
+      {"--compare", 0, SF_ARG_FLAG, &o->compare, 0, 0, NULL, NULL,
+       "A B [DATA]: two reports (.json) or scenes, what changed"},
+      {"--tech-b", 0, SF_ARG_STRING, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
+      {"--steps-b", 0, SF_ARG_INT, &o->steps_b, 1, SF_T_MAX, NULL, "N", "time steps of B (default: as A)"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       {"--plusarg", 0, SF_ARG_STRING, &o->plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
-  const char *positional[2];
+  const char *positional[3];
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
   cli->options = NULL;
   SF_TRY(status);
   o->scene = positional[0], o->data = positional[1];
+  if (o->view >= 0 && o->views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
+  if (o->compare) return parse_comparison(o, positional);
+  if (positional[2]) return sf_fail(SF_E_USAGE, "unexpected argument %s; usage: %s", positional[2], cli->usage);
+  if (o->tech_b || o->steps_b)
+    return sf_fail(SF_E_USAGE, "%s goes with --compare", o->tech_b ? "--tech-b" : "--steps-b");
   if (o->scene && !o->data) return sf_fail(SF_E_USAGE, "missing argument DATA; usage: %s", cli->usage);
   if (!o->scene && !o->published) return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage);
-  if (o->view >= 0 && o->views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
   return sf_ok();
 }
 
@@ -336,29 +440,27 @@ int main(int argc, char **argv)
                     "spike bitmaps; prices the counts and the scene's ANN twin. Exit status 1 if any count differs.",
                 .examples = "  energy_audit scene.snn data --views 2 --json\n"
                             "  energy_audit scene.snn data --view 0 --html report.html\n"
+                            "  energy_audit scene.snn data --tech my.tech --csv counts.csv\n"
+                            "  energy_audit --compare a.json b.json\n"
+                            "  energy_audit --compare scene.snn scene.snn data --steps 2 --steps-b 1\n"
                             "  energy_audit --published\n",
                 .min_positional = 0,
-                .max_positional = 2};
-  audit *a = calloc(1, sizeof *a);
-  if (!a) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  a->opt = (options){.view = -1,
-                     .downscale = 1,
-                     .rtl_rays = RTL_RAYS,
-                     .recount_rays = RECOUNT_RAYS,
-                     .tech = "45nm",
-                     .split = "test",
-                     .seed = 1};
-  sf_status status = parse(argc, argv, &a->opt, &cli);
+                .max_positional = 3};
+  options opt = {.view = -1,
+                 .downscale = 1,
+                 .rtl_rays = RTL_RAYS,
+                 .recount_rays = RECOUNT_RAYS,
+                 .tech = "45nm",
+                 .split = "test",
+                 .seed = 1};
+  sf_status status = parse(argc, argv, &opt, &cli);
   if (status.code == SF_OK) {
-    join_command(a->command, sizeof a->command, argc, argv);
-    if (a->opt.threads) omp_set_num_threads(a->opt.threads);
+    char command[4096];
+    join_command(command, sizeof command, argc, argv);
+    opt.command = command;
+    if (opt.threads) omp_set_num_threads(opt.threads);
     sf_cli_catch_signals();
-    status = work(a);
+    status = work(&opt);
   }
-  sf_page_free(&a->page);
-  sf_measure_free(&a->report.measure);
-  sf_dataset_free(&a->data);
-  fx_scene_free(&a->scene);
-  free(a);
   return sf_cli_finish(&cli, status);
 }

@@ -178,6 +178,12 @@ cJSON *sf_report_json(const sf_audit_report *report);
 /* One row per layer and step, then field and ray: events, fJ of every spiking ledger. */
 void sf_report_csv(FILE *out, const sf_audit_report *report);
 
+/* Two audits as sf_report_json gives them (or read back): settings that differ, energies per view of every ledger by
+ * kind, layer and step, events; each list with its largest change first. SF_E_FORMAT names a side that is no audit. The
+ * caller deletes *comparison. */
+sf_status sf_audits_compare(const cJSON *a, const char *a_name, const cJSON *b, const char *b_name, cJSON **comparison);
+void sf_comparison_print(FILE *out, const cJSON *comparison);
+
 /* Saturation that the number formats rule out: membranes and colour in the modes whose state is a convex combination.
  * Density may saturate: alpha is 1 long before. Writes "none" or a comma-separated list of layers. */
 bool sf_saturation_unexpected(const fx_net *net, const uint64_t saturated[SF_LAYERS], char *list, size_t size);

@@ -1,0 +1,306 @@
+/* Two audits, read from their JSON: what differs in how they were made, in energy and in events. */
+#include "spikefield/audit.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct side {
+  const cJSON *json, *technology, *ledgers, *layers;
+  const char *name;
+  double views;
+} side;
+
+static const cJSON *get(const cJSON *object, const char *key)
+{
+  return cJSON_GetObjectItemCaseSensitive(object, key);
+}
+
+static sf_status open_side(const cJSON *json, const char *name, side *s)
+{
+  const cJSON *ledgers = get(json, "ledgers"), *views = get(json, "views");
+  *s = (side){.json = json, .name = name, .technology = get(ledgers, "technology"), .ledgers = get(ledgers, "list")};
+  s->layers = get(get(json, "counts"), "layers");
+  if (!cJSON_IsNumber(views) || !(views->valuedouble > 0) || !cJSON_IsArray(s->ledgers) || !cJSON_IsArray(s->layers) ||
+      !cJSON_IsArray(get(s->technology, "prices")) || cJSON_GetArraySize(s->ledgers) != SF_LEDGERS)
+    return sf_fail(SF_E_FORMAT, "%s: not an audit that energy_audit --json wrote", name);
+  s->views = views->valuedouble;
+  return sf_ok();
+}
+
+/* ---- settings ---- */
+
+static void add_setting(cJSON *list, const char *name, const cJSON *a, const cJSON *b)
+{
+  if (cJSON_Compare(a, b, true)) return;
+  cJSON *item = cJSON_CreateObject();
+  cJSON_AddStringToObject(item, "name", name);
+  cJSON_AddItemToObject(item, "a", a ? cJSON_Duplicate(a, true) : cJSON_CreateNull());
+  cJSON_AddItemToObject(item, "b", b ? cJSON_Duplicate(b, true) : cJSON_CreateNull());
+  cJSON_AddItemToArray(list, item);
+}
+
+static const cJSON *price_text(const side *s, const char *key)
+{
+  const cJSON *price;
+  cJSON_ArrayForEach(price, get(s->technology, "prices"))
+  {
+    const cJSON *name = get(price, "key");
+    if (cJSON_IsString(name) && !strcmp(name->valuestring, key)) return get(price, "text");
+  }
+  return NULL;
+}
+
+static void add_prices(cJSON *list, const side *of, const side *a, const side *b)
+{
+  const cJSON *price;
+  cJSON_ArrayForEach(price, get(of->technology, "prices"))
+  {
+    char name[80];
+    const cJSON *key = get(price, "key");
+    if (!cJSON_IsString(key) || (of == b && price_text(a, key->valuestring))) continue;
+    snprintf(name, sizeof name, "price of %s", key->valuestring);
+    add_setting(list, name, price_text(a, key->valuestring), price_text(b, key->valuestring));
+  }
+}
+
+static cJSON *settings(const side *a, const side *b)
+{
+  static const char *const keys[] = {"scene", "scene_sha256", "data", "split", "t_r", "views", "seed", "samples"};
+  cJSON *list = cJSON_CreateArray();
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+    add_setting(list, keys[i], get(a->json, keys[i]), get(b->json, keys[i]));
+  add_setting(list, "technology", get(a->technology, "title"), get(b->technology, "title"));
+  add_prices(list, a, a, b);
+  add_prices(list, b, a, b);
+  return list;
+}
+
+/* ---- figures ---- */
+
+typedef struct change {
+  char name[64];
+  double a, b, size; /* size: what the list is sorted by */
+} change;
+
+typedef struct changes {
+  change item[256];
+  int count;
+} changes;
+
+static void add_change(changes *list, const char *name, double a, double b, bool relative)
+{
+  if (list->count == (int)(sizeof list->item / sizeof *list->item) || a == b) return;
+  change *c = &list->item[list->count++];
+  snprintf(c->name, sizeof c->name, "%s", name);
+  c->a = a, c->b = b;
+  c->size = relative ? fabs(b - a) / fmax(fabs(a), fabs(b)) : fabs(b - a);
+}
+
+static int larger(const void *a, const void *b)
+{
+  const change *x = a, *y = b;
+  if (x->size != y->size) return x->size < y->size ? 1 : -1;
+  return strcmp(x->name, y->name);
+}
+
+static void add_percent(cJSON *json, double a, double b)
+{
+  if (a != 0)
+    cJSON_AddNumberToObject(json, "change_percent", 100 * (b / a - 1));
+  else
+    cJSON_AddNullToObject(json, "change_percent");
+}
+
+static cJSON *changes_json(changes *list)
+{
+  cJSON *json = cJSON_CreateArray();
+  qsort(list->item, (size_t)list->count, sizeof *list->item, larger);
+  for (int i = 0; i < list->count; i++) {
+    const change *c = &list->item[i];
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "name", c->name);
+    cJSON_AddNumberToObject(item, "a", c->a);
+    cJSON_AddNumberToObject(item, "b", c->b);
+    cJSON_AddNumberToObject(item, "change", c->b - c->a);
+    add_percent(item, c->a, c->b);
+    cJSON_AddItemToArray(json, item);
+  }
+  return json;
+}
+
+static double sum_of(const cJSON *list)
+{
+  double sum = 0;
+  const cJSON *item;
+  cJSON_ArrayForEach(item, list) sum += cJSON_IsNumber(item) ? item->valuedouble : 0;
+  return sum;
+}
+
+static double number(const cJSON *object, const char *key)
+{
+  const cJSON *item = get(object, key);
+  return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+static cJSON *ledger_totals(const side *a, const side *b)
+{
+  cJSON *list = cJSON_CreateArray();
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    const cJSON *x = cJSON_GetArrayItem(a->ledgers, g), *y = cJSON_GetArrayItem(b->ledgers, g);
+    const double from = number(x, "mj_per_view"), to = number(y, "mj_per_view");
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "key", sf_ledger_texts[g].key);
+    cJSON_AddNumberToObject(item, "a_mj_per_view", from);
+    cJSON_AddNumberToObject(item, "b_mj_per_view", to);
+    add_percent(item, from, to);
+    const cJSON *saving[2] = {get(x, "saving_percent"), get(y, "saving_percent")};
+    cJSON_AddItemToObject(item, "a_saving_percent", saving[0] ? cJSON_Duplicate(saving[0], 0) : cJSON_CreateNull());
+    cJSON_AddItemToObject(item, "b_saving_percent", saving[1] ? cJSON_Duplicate(saving[1], 0) : cJSON_CreateNull());
+    cJSON_AddItemToArray(list, item);
+  }
+  return list;
+}
+
+/* Of one ledger: by what the energy is spent on, then by row and step. mJ per view. */
+static cJSON *ledger_parts(const side *a, const side *b, int ledger)
+{
+  changes list = {.count = 0};
+  const cJSON *x = get(cJSON_GetArrayItem(a->ledgers, ledger), "parts_fj");
+  const cJSON *y = get(cJSON_GetArrayItem(b->ledgers, ledger), "parts_fj");
+  for (int p = 0; p < SF_PARTS; p++)
+    add_change(&list, sf_part_titles[p], number(x, sf_part_names[p]) * 1e-12 / a->views,
+               number(y, sf_part_names[p]) * 1e-12 / b->views, false);
+  return changes_json(&list);
+}
+
+static double cell(const side *s, int ledger, int row, int step)
+{
+  const cJSON *rows = get(cJSON_GetArrayItem(s->ledgers, ledger), "rows");
+  const cJSON *item = cJSON_GetArrayItem(get(cJSON_GetArrayItem(rows, row), "fj"), step);
+  return cJSON_IsNumber(item) ? item->valuedouble * 1e-12 / s->views : 0;
+}
+
+static cJSON *ledger_cells(const side *a, const side *b, int ledger)
+{
+  changes list = {.count = 0};
+  for (int r = 0; r < SF_ROWS; r++)
+    for (int t = 0; t < SF_T_MAX; t++) {
+      char name[64];
+      snprintf(name, sizeof name, r < SF_LAYERS ? "%s, step %d" : "%s", sf_row_names[r], t);
+      add_change(&list, name, cell(a, ledger, r, t), cell(b, ledger, r, t), false);
+    }
+  return changes_json(&list);
+}
+
+static cJSON *energies(const side *a, const side *b)
+{
+  cJSON *json = cJSON_CreateObject();
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    cJSON *ledger = cJSON_AddObjectToObject(json, sf_ledger_texts[g].key);
+    cJSON_AddItemToObject(ledger, "parts", ledger_parts(a, b, g));
+    cJSON_AddItemToObject(ledger, "cells", ledger_cells(a, b, g));
+  }
+  return json;
+}
+
+/* Events per view, all steps, and firing rates. */
+static cJSON *events(const side *a, const side *b)
+{
+  changes list = {.count = 0};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    const cJSON *x = cJSON_GetArrayItem(a->layers, l), *y = cJSON_GetArrayItem(b->layers, l);
+    char name[64];
+    for (int e = 0; e < SF_EVENTS; e++) {
+      snprintf(name, sizeof name, "%s of %s", sf_events[e].title, sf_layer_names[l]);
+      add_change(&list, name, sum_of(get(x, sf_events[e].name)) / a->views,
+                 sum_of(get(y, sf_events[e].name)) / b->views, true);
+    }
+  }
+  const cJSON *x = get(a->json, "counts"), *y = get(b->json, "counts");
+  add_change(&list, "samples", number(x, "samples") / a->views, number(y, "samples") / b->views, true);
+  add_change(&list, "rays with samples", number(x, "rays") / a->views, number(y, "rays") / b->views, true);
+  add_change(&list, "field bytes read", number(x, "grid_bytes") / a->views, number(y, "grid_bytes") / b->views, true);
+  return changes_json(&list);
+}
+
+sf_status sf_audits_compare(const cJSON *a, const char *a_name, const cJSON *b, const char *b_name, cJSON **comparison)
+{
+  side x, y;
+  *comparison = NULL;
+  SF_TRY(open_side(a, a_name, &x));
+  SF_TRY(open_side(b, b_name, &y));
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "a", a_name);
+  cJSON_AddStringToObject(json, "b", b_name);
+  cJSON_AddItemToObject(json, "settings", settings(&x, &y));
+  cJSON_AddItemToObject(json, "ledgers", ledger_totals(&x, &y));
+  cJSON_AddItemToObject(json, "energies_mj_per_view", energies(&x, &y));
+  cJSON_AddItemToObject(json, "events_per_view", events(&x, &y));
+  *comparison = json;
+  return sf_ok();
+}
+
+/* ---- text ---- */
+
+static void print_value(FILE *out, const cJSON *value)
+{
+  if (cJSON_IsString(value))
+    fprintf(out, "%s", value->valuestring);
+  else if (cJSON_IsNumber(value))
+    fprintf(out, "%.10g", value->valuedouble);
+  else
+    fprintf(out, "-");
+}
+
+static void print_percent(FILE *out, const cJSON *item, const char *key)
+{
+  const double percent = number(item, key);
+  if (isnan(percent))
+    fprintf(out, " %10s", "-");
+  else
+    fprintf(out, " %+9.2f%%", percent);
+}
+
+static void print_changes(FILE *out, const cJSON *list, const char *title, int most)
+{
+  const int count = cJSON_GetArraySize(list);
+  fprintf(out, "%s%s\n", title, count ? "" : ": none");
+  for (int i = 0; i < count && i < most; i++) {
+    const cJSON *item = cJSON_GetArrayItem(list, i);
+    fprintf(out, "  %-28s %14.6g %14.6g %+14.6g", get(item, "name")->valuestring, number(item, "a"), number(item, "b"),
+            number(item, "change"));
+    print_percent(out, item, "change_percent");
+    fprintf(out, "\n");
+  }
+  if (count > most) fprintf(out, "  and %d smaller ones\n", count - most);
+}
+
+void sf_comparison_print(FILE *out, const cJSON *comparison)
+{
+  enum { MOST = 16 };
+  const cJSON *item;
+  fprintf(out, "A: %s\nB: %s\n", get(comparison, "a")->valuestring, get(comparison, "b")->valuestring);
+  cJSON_ArrayForEach(item, get(comparison, "settings"))
+  {
+    fprintf(out, "  %-24s ", get(item, "name")->valuestring);
+    print_value(out, get(item, "a"));
+    fprintf(out, " -> ");
+    print_value(out, get(item, "b"));
+    fprintf(out, "\n");
+  }
+  fprintf(out, "\n%-21s %14s %14s %10s   %s\n", "mJ per view", "A", "B", "change", "saving of A and of B");
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    item = cJSON_GetArrayItem(get(comparison, "ledgers"), g);
+    fprintf(out, "%-21s %14.6g %14.6g", sf_ledger_texts[g].title, number(item, "a_mj_per_view"),
+            number(item, "b_mj_per_view"));
+    print_percent(out, item, "change_percent");
+    print_percent(out, item, "a_saving_percent");
+    print_percent(out, item, "b_saving_percent");
+    fprintf(out, "\n");
+  }
+  const cJSON *full = get(get(comparison, "energies_mj_per_view"), sf_ledger_texts[SF_LEDGER_NEURON].key);
+  fprintf(out, "\nWhat changed, largest first: A, B, change\n");
+  print_changes(out, get(full, "parts"), "energy of the ledger with neuron updates by kind, mJ per view", MOST);
+  print_changes(out, get(full, "cells"), "the same by layer and step", MOST);
+  print_changes(out, get(comparison, "events_per_view"), "events per view, by relative change", MOST);
+}
