@@ -139,7 +139,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults cosim_split firmware kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays

@@ -31,6 +31,7 @@ run() {
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
     cosim_split) command=("$here/cosim_split.sh" "$build") ;;
+    audit_report) command=("$here/audit_report.sh" "$build") ;;
     audit_faults) command=("$here/audit_faults.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
     synth) command=("$here/test_synth.sh") ;;

@@ -44,6 +44,9 @@ lib: $B/lib/libspikefield.a $B/lib/$(SHARED) $B/lib/$(DPI) ## the C library, sta
 INSTALLED := $(INCLUDEDIR)/spikefield/spikefield.h $(LIBDIR)/libspikefield.a $(LIBDIR)/$(SHARED) $(LIBDIR)/$(SONAME) \
   $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc \
   $(INCLUDEDIR)/spikefield/sf_golden_dpi.h $(LIBDIR)/$(DPI) $(DATADIR)/spikefield/sf_golden_dpi.sv
+# Prices and schemas of energy_audit, which finds them beside itself.
+SHARED_DATA := $(wildcard share/tech/*.tech share/schema/*.json)
+INSTALLED += $(SHARED_DATA:share/%=$(DATADIR)/spikefield/%)
 
 install: lib ## the C library, its header and its pkg-config file below PREFIX (/usr/local), staged in DESTDIR
 	$(call say,INST  $(DESTDIR)$(PREFIX))
@@ -53,6 +56,7 @@ install: lib ## the C library, its header and its pkg-config file below PREFIX (
 	$Qinstall -D -m 644 include/spikefield/sf_golden_dpi.h $(DESTDIR)$(INCLUDEDIR)/spikefield/sf_golden_dpi.h
 	$Qinstall -D -m 755 $B/lib/$(DPI) $(DESTDIR)$(LIBDIR)/$(DPI)
 	$Qinstall -D -m 644 src/lib/sf_golden_dpi.sv $(DESTDIR)$(DATADIR)/spikefield/sf_golden_dpi.sv
+	$Qfor f in $(SHARED_DATA:share/%=%); do install -D -m 644 share/$$f $(DESTDIR)$(DATADIR)/spikefield/$$f || exit 1; done
 	$Qln -sf $(SHARED) $(DESTDIR)$(LIBDIR)/$(SONAME) && ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libspikefield.so
 	$Qmkdir -p $(DESTDIR)$(LIBDIR)/pkgconfig && sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|' \
 	  -e 's|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(LIB_VERSION)|' src/lib/spikefield.pc.in \
@@ -60,6 +64,6 @@ install: lib ## the C library, its header and its pkg-config file below PREFIX (
 
 uninstall: ## remove what install put below PREFIX
 	$Qrm -f $(addprefix $(DESTDIR),$(INSTALLED))
-	$Qrmdir $(DESTDIR)$(INCLUDEDIR)/spikefield $(DESTDIR)$(DATADIR)/spikefield 2>/dev/null || true
+	$Qrmdir $(DESTDIR)$(INCLUDEDIR)/spikefield $(addprefix $(DESTDIR)$(DATADIR)/spikefield,/tech /schema /) 2>/dev/null || true
 
 .PHONY: lib install uninstall

@@ -1,0 +1,59 @@
+#!/bin/bash
+# Reports of energy_audit on a small scene: schemas, sums, comparison, technology files. usage: audit_report.sh BUILD
+set -u
+build=$(cd "$1" && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_audit_report.XXXXXX") || exit 1
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+"$build/faults/make_scene" "$work/s.snn" || exit 1
+"$build/bin/sf_scene" simple -o "$work/d" --size 32 --train 1 --test 2 >/dev/null || exit 1
+audit() { "$build/bin/energy_audit" "$work/s.snn" "$work/d" --rays 200 --rtl-rays 2 --recount-rays 20 --quiet "$@"; }
+
+# A technology of one's own: a copy gives the same report, one with another price another, a broken one none.
+audit --json >"$work/a.json" || fail "audit"
+cp share/tech/45nm.tech "$work/own.tech"
+audit --json --tech "$work/own.tech" >"$work/b.json" || fail "audit with a copy of the prices"
+"$build/bin/energy_audit" --compare "$work/a.json" "$work/b.json" >"$work/same.txt" || fail "comparison"
+[ "$(grep -c ': none$' "$work/same.txt")" -eq 3 ] || fail "a copy of the prices gives another report"
+sed -i 's/^sram.8192 .*/sram.8192 5 pJ half of it/' "$work/own.tech"
+audit --json --tech "$work/own.tech" >"$work/c.json" || fail "audit with other prices"
+"$build/bin/energy_audit" --compare "$work/a.json" "$work/c.json" >"$work/other.txt" || fail "comparison"
+grep -q 'price of sram.8192 *10 pJ -> 5 pJ' "$work/other.txt" || fail "the comparison does not name the price"
+grep -q 'events per view, by relative change: none' "$work/other.txt" || fail "a price changes events"
+grep -Eq '^paper .*\+0.00%' "$work/other.txt" || fail "a memory price changes the paper's metric"
+grep -Eq '^  weight bytes .* -[0-9.]+%$' "$work/other.txt" || fail "a memory price does not change the weights' energy"
+sed -i 's/^dram .*/dram 2 pj typing error/' "$work/own.tech"
+audit --tech "$work/own.tech" >"$work/out" 2>"$work/err" && fail "a broken technology file is accepted"
+line=$(grep -n '^dram' "$work/own.tech" | cut -d: -f1)
+grep -qF "own.tech:$line: key 'dram': unit 'pj'" "$work/err" || fail "not named: $(cat "$work/err")"
+[ ! -s "$work/out" ] || fail "output in spite of an error"
+
+# The prices stand beside the program, wherever the two are.
+mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"
+(cd / && "$work/moved/bin/energy_audit" "$work/s.snn" "$work/d" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"
+rm -r "$work/moved/share"
+(cd / && "$work/moved/bin/energy_audit" "$work/s.snn" "$work/d" --rays 20 --rtl-rays 0 -q >/dev/null 2>"$work/err") &&
+  fail "no prices, no error"
+grep -qF "moved/share/spikefield/tech/45nm.tech" "$work/err" || fail "the missing file is not named: $(cat "$work/err")"
+
+# The text: every ledger, the limits, the agreement.
+audit >"$work/text" || fail "text"
+for words in 'core = accelerator = recount' '+ neuron updates' 'integer ANN' 'not modelled' 'known criticism' \
+  'Firing rate at which' 'Horowitz' 'largest first'; do
+  grep -qF -e "$words" "$work/text" || fail "the report does not say '$words'"
+done
+
+if ! command -v python3 >/dev/null; then
+  echo "schemas: python3 is not installed, left out"
+else
+  python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/s.snn" "$work/d"
+  case $? in 0) ;; 77) echo "schemas: left out" ;; *) fail "schemas" ;; esac
+fi
+[ $failures -eq 0 ] && echo "reports of energy_audit: all as they should be"
+exit $((failures > 0))
