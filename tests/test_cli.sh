@@ -76,6 +76,8 @@ good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
 good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
+good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
+good energy_audit --compare s.snn s.snn d --rays 20 --rtl-rays 0 --steps-b 1 --json
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1
 good sf_cycles s.snn d --view 1 --clock 100 --json
@@ -154,12 +156,22 @@ number energy_audit --views 0 3 nan
 number energy_audit --view -1 2 nan
 number energy_audit --rtl-rays -1 nan
 number energy_audit --stall -1 91 nan
+number energy_audit --recount-rays -1 nan
+number energy_audit --steps 0 9 nan
+number energy_audit --steps-b 0 9 nan
 number error_budget --rays 0 -1 nan
 usage DATA error_budget model.safetensors s.snn
 usage nosuch sf_scene nosuch -o out
 usage -o sim_render s.snn d
 usage --output sf_export model.safetensors
 usage --views energy_audit s.snn d --view 0 --views 1
+usage --compare energy_audit --compare s.snn
+usage DATA energy_audit --compare s.snn s.snn
+usage DATA energy_audit --compare a.json s.snn
+usage --csv energy_audit --compare s.snn s.snn d --csv out
+usage --tech-b energy_audit s.snn d --tech-b 45nm
+usage --steps-b energy_audit s.snn d --steps-b 1
+usage extra energy_audit s.snn d extra
 absent out "usage errors"
 
 # ---- data ----
@@ -303,6 +315,10 @@ writers() { # PATTERN PATH
   data "$1" sf_train "${train[@]}" -o "$2"
   absent out "unwritable $2"
 }
+data nosuch energy_audit s.snn d --rays 1 --rtl-rays 0 --tech nosuch
+data nosuch.json energy_audit --compare nosuch.json nosuch.json
+printf '{"views": 1}' >none.json
+data none.json energy_audit --compare none.json none.json
 writers nodir/ nodir/x.out
 writers plain plain/x.out
 writers /proc /proc/spikefield.out
