@@ -66,8 +66,8 @@ void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sam
   int32_t at = -1;
   for (int i = 0; i < n; i++) {
     at = fx_march_next(scene, ray, at + 1, sample[i].pos, NULL);
-    sample[i].delta_q24 = scene->step_q24;
-    sample[i].distance_q16 = ((uint64_t)at << 16) + (uint32_t)ray->first_q16;
+    sample[i].delta_q24 = fx_delta(scene, at);
+    sample[i].distance_q16 = fx_distance(scene, ray, at);
   }
 }
 

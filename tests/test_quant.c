@@ -163,7 +163,7 @@ static void add_sample(tally *sum, const fx_scene *scene, const sf_model *m, uin
   }
   const double s = log(sigma[last]);
   sum->log += s, sum->log_square += s * s;
-  sum->log_error += pow(log(fmax(sf_fx_sigma_value(out.sigma), 1e-6)) - s, 2);
+  sum->log_error += pow(log(fmax(sf_fx_sigma_value(scene, out.sigma), 1e-6)) - s, 2);
   sum->n++;
 }
 
@@ -222,7 +222,7 @@ START_TEST(output_functions_have_the_right_units)
   const fx_net *net = &scene.net;
   for (int32_t c = -16256; c <= 16256; c++) {
     const double i = c * scene.current_scale[FX_D2], j = c * scene.current_scale[FX_C3];
-    const double sigma = sf_fx_sigma_value(fx_exp2(fx_exp2_argument(c, &net->exp_in)));
+    const double sigma = sf_fx_sigma_value(&scene, fx_exp2(fx_exp2_argument(c, &net->exp_in)));
     const double colour = sf_fx_colour_value(fx_sigmoid(fx_sigmoid_argument(c, &net->sigmoid_in)));
     if (i < 10) ck_assert_double_eq_tol(sigma, exp(i), 2.2e-4 * exp(i) + 0x1p-14 + 1e-9);
     ck_assert_double_eq_tol(colour, 1 / (1 + exp(-j)), fabs(j) < 8 ? 1e-4 : 4e-4);

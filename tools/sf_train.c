@@ -372,7 +372,7 @@ static void settle(arguments *a, const sf_dataset *data)
   const sf_config *c = &a->train.config;
   const bool transparent = any_transparent(data);
   a->train.config.scale = data->scale;
-  set_box(a, 1);
+  set_box(a, data->bound);
   a->train.background = a->background ? a->background - 1 : transparent ? 0 : 1;
   if (a->quiet) return;
   fprintf(stderr, "sf_train: box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c),

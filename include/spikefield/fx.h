@@ -120,18 +120,36 @@ typedef struct fx_tensorf {
   double stretch[3], near, far;
 } fx_tensorf;
 
-/* Scene box [0,1)^3, marched in equal steps. occupancy: bit (z*res + y)*res + x, LSB first. */
 typedef enum { FX_INGP, FX_TENSORF } fx_backbone;
+
+/* Steps that grow: interval n is length(n) = clamp(rshift_round((near + start(n)) * gamma, 24), 1, longest) lattice steps
+ * long, start(n+1) = start(n) + length(n), all Q16.16. Filled by fx_scene_allocate. */
+enum { FX_STEPS_MAX = 1024, FX_STEPS_END = 8 };
+typedef struct fx_steps {
+  int32_t count;                                /* lattice points that a ray may have */
+  int64_t at_q16[FX_STEPS_MAX + FX_STEPS_END];  /* from sample 0 to sample n (middle to middle), lattice steps */
+  int64_t cascade[FX_STEPS_MAX + FX_STEPS_END]; /* the finest whose cells are longer than the interval */
+  int32_t delta_q24[FX_STEPS_MAX];              /* length in box edges */
+} fx_steps;
+
+/* Scene box [0,1)^3. Cascade c of its occupancy grids has occ_res^3 cells in the middle 2^(c - log2_bound) of the box:
+ * bit ((c*res + z)*res + y)*res + x, LSB first. A sample looks in the finest one that holds it, at least steps->cascade.
+ */
 typedef struct fx_scene {
   int32_t backbone; /* fx_backbone: grid and both nets, or tensorf and the decoder (C1, C2, C3 of net) */
   fx_net net;
   fx_grid grid;
   fx_tensorf tensorf;
-  int32_t occ_res;       /* cells per axis, power of two, <= 256 */
-  uint8_t *occupancy;    /* occ_res^3 / 8 bytes */
-  int32_t step_q24;      /* distance between samples in box edges, Q0.24 */
-  int32_t max_samples;   /* per ray, 1..1024 */
-  int32_t trans_stop;    /* stop once transmittance <= this, Q.TRANS_FRAC */
+  int32_t occ_res;    /* cells per axis, power of two, <= 256 */
+  int32_t log2_bound; /* 0..6: there are this many cascades more than one */
+  uint8_t *occupancy; /* (log2_bound + 1) * occ_res^3 / 8 bytes */
+  int32_t step_q24;   /* a lattice step, the shortest distance between samples, in box edges, Q0.24 */
+  int32_t gamma_q24;  /* growth of the steps, 0..2^21; 0: all are one lattice step */
+  int32_t near_q16;   /* where gamma_q24 > 0: lattice steps of the near plane, and the longest step, Q16.16 */
+  int32_t longest_q16;
+  fx_steps *steps;    /* NULL where gamma_q24 is 0 */
+  int32_t max_samples; /* per ray, 1..1024 */
+  int32_t trans_stop; /* stop once transmittance <= this, Q.TRANS_FRAC */
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
@@ -144,8 +162,8 @@ typedef struct fx_scene {
 /* Direction of a ray: each axis Q1.14. LSB of the direction features: 2^-frac. */
 enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
 
-/* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count;
- * sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
+/* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count (with growing steps at_q16[n]
+ * instead of n, product >> 16); sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
 typedef struct fx_ray {
   int64_t origin[3], step[3]; /* Q24.40 */
   int32_t count;              /* lattice points in the box, 0 = misses */
@@ -223,6 +241,21 @@ uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_c
 void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
                        fx_counts *counts);
 int fx_tensorf_inputs(const fx_tensorf *field);
+
+/* Position of lattice point n on an axis, Q24.40; the length of its interval in box edges, Q0.24; its distance from the
+ * camera in lattice steps, Q16.16. */
+static inline int64_t fx_ray_at(const fx_scene *scene, const fx_ray *ray, int32_t n, int axis)
+{
+  return ray->origin[axis] + (scene->steps ? ray->step[axis] * scene->steps->at_q16[n] >> 16 : n * ray->step[axis]);
+}
+static inline int32_t fx_delta(const fx_scene *scene, int32_t n)
+{
+  return scene->steps ? scene->steps->delta_q24[n] : scene->step_q24;
+}
+static inline uint64_t fx_distance(const fx_scene *scene, const fx_ray *ray, int32_t n)
+{
+  return (uint64_t)(scene->steps ? scene->steps->at_q16[n] : (int64_t)n << 16) + (uint32_t)ray->first_q16;
+}
 
 /* Next lattice point >= n whose cell is occupied, or -1. Writes its position. */
 int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint32_t *pos, fx_counts *counts);

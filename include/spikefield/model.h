@@ -111,7 +111,7 @@ float sf_scales_h_step(const sf_scales *scales);
  * shortest, longest), longest = 2 sqrt(3) bound / occ_res (torch-ngp, but for rays that enter from outside: there the
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
-#define SF_NEAR 0.2f /* model units; torch-ngp's min_near */
+#define SF_NEAR 0.2 /* model units; torch-ngp's min_near */
 typedef struct sf_steps {
   int32_t count, stride, lattice; /* stride: this many of the scene's intervals are one */
   float bound, shortest;          /* shortest: of the scene */

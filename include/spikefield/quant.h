@@ -110,6 +110,6 @@ int sf_fx_dir_frac(const fx_scene *scene);
 sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3]);
 
 /* Fixed values back to units for comparison: per model unit, 0..1. */
-double sf_fx_sigma_value(uint32_t sigma);
+double sf_fx_sigma_value(const fx_scene *scene, uint32_t sigma);
 double sf_fx_colour_value(uint32_t colour);
 #endif

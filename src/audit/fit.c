@@ -383,6 +383,9 @@ sf_status sf_fit(fx_scene *fitted, const sf_fit_job *job, sf_fit_report *report)
   const uint64_t count = job->rays->count;
   memset(fitted, 0, sizeof *fitted);
   memset(report, 0, sizeof *report);
+  if (job->candidate[0]->log2_bound || job->candidate[0]->steps)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: %d occupancy grids and growing steps: only a box with one grid can be fitted",
+                   job->name, job->candidate[0]->log2_bound + 1);
   if (!(job->loss_db >= 0 && job->loss_db <= 100))
     return sf_fail(SF_E_RANGE, "%s: a loss of %g dB was asked for, expected 0..100", job->name, job->loss_db);
   if (count < 2 * RANK_MIN)

@@ -140,7 +140,7 @@ static sf_status observe_ray(const fx_scene *scene, const sf_fit_rays *rays, uin
     const uint32_t before = pixel.transmittance;
     fx_grid_features(&scene->grid, pos, f, NULL);
     fx_net_sample(&scene->net, f, base, &out, trace, NULL);
-    fx_composite_add(&pixel, &out, scene->step_q24, 0);
+    fx_composite_add(&pixel, &out, fx_delta(scene, n), 0);
     sf_trim_use_net(use, &scene->net, f, trace);
     if (places) sf_trim_use_place(use, scene, pos, before - pixel.transmittance);
     if (pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples) break;

@@ -298,6 +298,9 @@ static sf_status check_pair(const sf_picture_job *job)
                     l[FX_D2].n_out == SF_DENSITY_OUT && l[FX_C1].n_in == SF_DIR_FEATURES + SF_GEO_FEATURES &&
                     l[FX_C1].n_out == c->hidden && l[FX_C2].n_out == c->hidden &&
                     2 * job->scene->grid.entries == (int64_t)job->model->param[SF_P_GRID].size;
+  if (job->scene->log2_bound || job->scene->steps)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: %d occupancy grids and growing steps: the budget is of boxes with one grid",
+                   job->name, job->scene->log2_bound + 1);
   if (!same)
     return sf_fail(SF_E_UNSUPPORTED, "%s: its sizes are not those of the model it is compared with", job->name);
   for (int i = 0; i < SF_LAYERS; i++)

@@ -19,7 +19,7 @@ sf_status sf_steps_make(sf_steps *s, const sf_config *config, int stride)
                      config->bound, (double)config->dt_gamma, config->lattice, SF_STEPS_MAX, (double)start,
                      (double)(2 * root3 * bound));
     const int n = s->count;
-    const float step = (float)stride * fminf((SF_NEAR + start) * config->dt_gamma, longest);
+    const float step = (float)stride * fminf(((float)SF_NEAR + start) * config->dt_gamma, longest);
     s->start[n] = s->growing ? start : (float)n * shortest;
     s->length[n] = s->growing ? fmaxf(step, shortest) : shortest;
     while (s->cascade[n] < cascades - 1 && s->length[n] >= (float)(2 << s->cascade[n]) / (float)config->occ_res)

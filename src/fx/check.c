@@ -7,6 +7,7 @@ const char *const fx_layer_tensor[SF_LAYERS] = {"density.w1", "density.w2", "col
 static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
 
 enum { ENTRIES_MAX = 1 << 28, HASH_BITS_MAX = 27, OCCUPANCY_MAX = 256, SAMPLES_MAX = 1024 };
+enum { BOUND_LOG2_MAX = 6, GAMMA_MAX = 1 << 21, NEAR_MAX = 1 << 30 };
 
 /* A decoder has no D1 and D2; the inputs of C1 are as many as the sum of its current has bits for. */
 static sf_status check_inputs(const fx_net *net, const char *path)
@@ -77,6 +78,19 @@ static sf_status check_field(const fx_scene *scene, const char *path)
   return fx_net_decodes(&scene->net) ? sf_ok() : check_grid(&scene->grid, layer[FX_D1].n_in, path);
 }
 
+/* What the cascades and the table of steps are made from. */
+static sf_status check_steps(const fx_scene *scene, const char *path)
+{
+  SF_TRY(in_range(path, "scene", "log2_bound", scene->log2_bound, 0, BOUND_LOG2_MAX));
+  SF_TRY(in_range(path, "scene", "gamma_q24", scene->gamma_q24, 0, GAMMA_MAX));
+  if (!scene->gamma_q24) return sf_ok();
+  SF_TRY(in_range(path, "scene", "step_q24", scene->step_q24, 1, 1 << SF_DELTA_FRAC));
+  SF_TRY(in_range(path, "scene", "near_q16", scene->near_q16, 0, NEAR_MAX));
+  const int64_t diagonal = ((int64_t)29058991 << 16) / scene->step_q24; /* sqrt(3) in Q24: no step is longer */
+  return in_range(path, "scene", "longest_q16", scene->longest_q16, 1 << 16,
+                  diagonal < INT32_MAX ? diagonal : INT32_MAX);
+}
+
 sf_status fx_check_sizes(const fx_scene *scene, const char *path)
 {
   SF_TRY(check_chain(&scene->net, path));
@@ -84,7 +98,7 @@ sf_status fx_check_sizes(const fx_scene *scene, const char *path)
   SF_TRY(in_range(path, "scene", "occ_res", scene->occ_res, 2, OCCUPANCY_MAX));
   if (scene->occ_res & (scene->occ_res - 1))
     return sf_fail(SF_E_RANGE, "%s: scene.occ_res is %d, expected a power of two", path, scene->occ_res);
-  return sf_ok();
+  return check_steps(scene, path);
 }
 
 static sf_status check_weights(const fx_layer *layer, const char *tensor, const char *path)

@@ -53,12 +53,16 @@ static const int_field ints[] = {
 enum { INTS = sizeof ints / sizeof ints[0] };
 
 /* Not in the file when 0. */
-static const int_field biases[] = {
+static const int_field optional[] = {
     {"C1.bias", offsetof(fx_scene, net.layer[FX_C1].bias)},
     {"C2.bias", offsetof(fx_scene, net.layer[FX_C2].bias)},
     {"C3.bias", offsetof(fx_scene, net.layer[FX_C3].bias)},
+    FIELD(log2_bound),
+    FIELD(gamma_q24),
+    FIELD(near_q16),
+    FIELD(longest_q16),
 };
-enum { BIASES = sizeof biases / sizeof biases[0] };
+enum { OPTIONAL = sizeof optional / sizeof optional[0] };
 
 #define SCALE(field) FIELD(field.mul), FIELD(field.shift), FIELD(field.bias)
 #define EACH(field) FIELD(field[0]), FIELD(field[1]), FIELD(field[2])
@@ -207,8 +211,8 @@ static cJSON *make_metadata(const fx_scene *scene)
   cJSON_AddStringToObject(metadata, "arch", arch);
   cJSON_AddStringToObject(metadata, "mode", mode_name[scene->net.mode]);
   for (int i = 0; i < INTS; i++) add_int(metadata, scene, &ints[i]);
-  for (int i = 0; i < BIASES; i++)
-    if (*int_of(scene, &biases[i])) add_int(metadata, scene, &biases[i]);
+  for (int i = 0; i < OPTIONAL; i++)
+    if (*int_of(scene, &optional[i])) add_int(metadata, scene, &optional[i]);
   if (scene->backbone == FX_TENSORF) {
     cJSON_AddStringToObject(metadata, "backbone", TENSORF);
     for (int i = 0; i < TENSORF_INTS; i++) add_int(metadata, scene, &tensorf_ints[i]);
@@ -284,8 +288,8 @@ static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
   SF_TRY(expect_meta(set, "version", VERSION, SF_E_UNSUPPORTED));
   SF_TRY(expect_meta(set, "arch", arch, SF_E_UNSUPPORTED));
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
-  for (int i = 0; i < BIASES; i++)
-    if (sf_tensors_meta(set, biases[i].key)) SF_TRY(read_int(set, &biases[i], scene));
+  for (int i = 0; i < OPTIONAL; i++)
+    if (sf_tensors_meta(set, optional[i].key)) SF_TRY(read_int(set, &optional[i], scene));
   SF_TRY(read_backbone(set, scene));
   SF_TRY(read_mode(set, scene));
   if (scene->net.steps < 1 || scene->net.steps > SF_T_MAX)

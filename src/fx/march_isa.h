@@ -3,9 +3,10 @@
 #ifndef SPIKEFIELD_FX_MARCH_ISA_H
 #define SPIKEFIELD_FX_MARCH_ISA_H
 #include "src/fx/core.h"
+#include "src/fx/march.h"
 #include "src/fx/vec_isa.h"
 
-enum { RAY_FRAC = 40, POINTS = WIDTH / 2 };
+enum { POINTS = WIDTH / 2 };
 
 /* Bits of the cells of POINTS positions; lanes that are off read nothing and give 0. */
 static INLINE uint32_t occupied_points(const uint8_t *occupancy, const vec p[3], int bits, uint32_t on)
@@ -28,11 +29,15 @@ static INLINE uint32_t occupied_points(const uint8_t *occupancy, const vec p[3],
 #endif
 }
 
-static INLINE bool occupied_point(const uint8_t *occupancy, const int64_t p[3], int bits)
+/* Point by point: cascades or growing steps. */
+static int32_t march_cascades(const fx_scene *scene, const fx_ray *ray, int32_t n)
 {
-  const int drop = RAY_FRAC - bits;
-  const uint32_t cell = (uint32_t)((((p[2] >> drop << bits) + (p[1] >> drop)) << bits) + (p[0] >> drop));
-  return occupancy[cell >> 3] >> (cell & 7) & 1;
+  for (; n < ray->count; n++) {
+    int64_t p[3];
+    for (int axis = 0; axis < 3; axis++) p[axis] = fx_ray_at(scene, ray, n, axis);
+    if (fx_occupied(scene, p, n)) return n;
+  }
+  return ray->count;
 }
 
 static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
@@ -41,8 +46,9 @@ static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
   int64_t from[3];
   vec p[3], stride[3];
   if (n >= ray->count) return ray->count;
+  if (scene->log2_bound || scene->steps) return march_cascades(scene, ray, n);
   for (int axis = 0; axis < 3; axis++) from[axis] = ray->origin[axis] + n * ray->step[axis];
-  if (occupied_point(scene->occupancy, from, bits)) return n;
+  if (fx_occupied(scene, from, n)) return n;
   n++;
   for (int axis = 0; axis < 3; axis++) {
     int64_t lane[POINTS];

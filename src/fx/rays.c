@@ -1,6 +1,7 @@
 /* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that
  * has ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
 #include "src/fx/core.h"
+#include "src/fx/march.h"
 #include "src/fx/scene.h"
 #include "base/memory.h"
 #include <stdlib.h>
@@ -26,8 +27,6 @@ typedef struct wave {
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
 } wave;
 
-enum { RAY_FRAC = 40 };
-
 /* Moves slot i to the next occupied point from n on; false at the end of the ray. */
 static bool advance(wave *w, int i, int32_t n)
 {
@@ -37,7 +36,7 @@ static bool advance(wave *w, int i, int32_t n)
   if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
   s->at = found;
   for (int axis = 0; axis < 3 && found < ray->count; axis++)
-    w->block.pos[axis][i] = (uint32_t)((ray->origin[axis] + found * ray->step[axis]) >> (RAY_FRAC - SF_POS_FRAC));
+    w->block.pos[axis][i] = (uint32_t)(fx_ray_at(w->core->scene, ray, found, axis) >> (RAY_FRAC - SF_POS_FRAC));
   return found < ray->count;
 }
 
@@ -90,7 +89,7 @@ static bool composite(wave *w, int i)
   const slot *s = &w->slot[i];
   const fx_ray *ray = &w->rays[s->ray];
   fx_pixel *pixel = &w->pixels[s->ray];
-  fx_composite_add(pixel, &w->block.out[i], scene->step_q24, ((uint64_t)s->at << 16) + (uint32_t)ray->first_q16);
+  fx_composite_add(pixel, &w->block.out[i], fx_delta(scene, s->at), fx_distance(scene, ray, s->at));
   return pixel->transmittance > (uint32_t)scene->trans_stop && pixel->samples < (uint32_t)scene->max_samples;
 }
 

@@ -19,11 +19,6 @@ static sf_status eval_core(void *user, const fx_ray *ray, bool first, const int1
   return sf_ok();
 }
 
-static uint64_t distance_of(const fx_ray *ray, int32_t n)
-{
-  return ((uint64_t)n << 16) + (uint32_t)ray->first_q16;
-}
-
 static sf_status render_ingp(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
                              fx_counts *counts)
 {
@@ -34,7 +29,7 @@ static sf_status render_ingp(const fx_scene *scene, const fx_ray *ray, fx_net_fn
     fx_out out;
     fx_grid_features(&scene->grid, pos, f, counts);
     SF_TRY(eval(user, ray, pixel->samples == 0, f, &out));
-    fx_composite_add(pixel, &out, scene->step_q24, distance_of(ray, n));
+    fx_composite_add(pixel, &out, fx_delta(scene, n), fx_distance(scene, ray, n));
     if (pixel->transmittance <= (uint32_t)scene->trans_stop) break;
     if (pixel->samples >= (uint32_t)scene->max_samples) break;
   }
@@ -45,7 +40,7 @@ uint32_t fx_tensorf_weight(const fx_scene *scene, const fx_ray *ray, int32_t n, 
                            fx_counts *counts)
 {
   const uint32_t sigma = fx_tensorf_density(&scene->tensorf, pos, counts);
-  const uint32_t weight = fx_composite_weight(pixel, sigma, scene->step_q24, distance_of(ray, n));
+  const uint32_t weight = fx_composite_weight(pixel, sigma, fx_delta(scene, n), fx_distance(scene, ray, n));
   return weight > (uint32_t)scene->tensorf.weight_stop ? weight : 0;
 }
 

@@ -1,4 +1,5 @@
 #include "src/fx/scene.h"
+#include "src/fx/march.h"
 #include <stdlib.h>
 #include <string.h>
 #include "src/fx/nofloat.h"
@@ -8,7 +9,7 @@ enum { ALIGN = 64 };
 size_t fx_occupancy_bytes(const fx_scene *scene)
 {
   const size_t res = (size_t)scene->occ_res;
-  return res * res * res / 8;
+  return (size_t)(scene->log2_bound + 1) * (res * res * res / 8);
 }
 
 static size_t aligned(size_t size)
@@ -30,6 +31,8 @@ static size_t lay_out(fx_scene *scene, int8_t *at)
   }
   if (at) scene->occupancy = (uint8_t *)(at + size);
   size += aligned(fx_occupancy_bytes(scene));
+  if (at) scene->steps = scene->gamma_q24 ? (fx_steps *)(at + size) : NULL;
+  size += scene->gamma_q24 ? aligned(sizeof(fx_steps)) : 0;
   for (int id = 0; id < SF_LAYERS; id++) {
     if (at) scene->net.layer[id].w = at + size;
     size += (size_t)fx_layer_rows(&scene->net.layer[id]) * SF_LANES;
@@ -47,6 +50,7 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path)
   memset(block, 0, size);
   scene->owner = block;
   lay_out(scene, block);
+  if (scene->steps) fx_steps_fill(scene, scene->steps);
   return sf_ok();
 }
 

@@ -94,7 +94,8 @@ static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *
   describe_net(&fx->net, info);
   info->grid_levels = fx->grid.levels, info->grid_entries = fx->grid.entries;
   info->grid_bytes = fx->grid.entries * FX_GRID_FEATURES;
-  info->occupancy_res = fx->occ_res, info->occupancy_bytes = (int64_t)fx->occ_res * fx->occ_res * fx->occ_res / 8;
+  info->occupancy_res = fx->occ_res,
+  info->occupancy_bytes = (int64_t)(fx->log2_bound + 1) * fx->occ_res * fx->occ_res * fx->occ_res / 8;
   info->max_samples = fx->max_samples, info->step_q24 = fx->step_q24;
   memcpy(info->background_q16, fx->background, sizeof info->background_q16);
   info->to_box_scale = fx->to_box_scale, info->direction_lsb = fx->dir_scale;

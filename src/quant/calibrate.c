@@ -32,28 +32,51 @@ void sf_calibration_free(sf_calibration *c)
   memset(c, 0, sizeof *c);
 }
 
-/* Index of every occupied cell; of every cell when none is occupied. */
+/* The corner of a cell of the occupancy grids and its width in the box, Q0.24. */
+static uint32_t cell_corner(const sf_config *config, uint64_t cell, uint32_t corner[3])
+{
+  const uint64_t res = (uint64_t)config->occ_res, cascade = cell / (res * res * res);
+  const uint32_t edge = (1u << SF_POS_FRAC) / (uint32_t)config->bound << cascade;
+  const uint64_t place[3] = {cell % res, cell / res % res, cell / res / res % res};
+  for (int axis = 0; axis < 3; axis++)
+    corner[axis] = (1u << (SF_POS_FRAC - 1)) - edge / 2 + (uint32_t)place[axis] * (edge / (uint32_t)res);
+  return edge / (uint32_t)res;
+}
+
+/* Is it in a finer cascade, too? */
+static bool is_covered(const sf_config *config, uint64_t cell)
+{
+  const uint64_t res = (uint64_t)config->occ_res;
+  if (cell < res * res * res) return false;
+  const uint64_t place[3] = {cell % res, cell / res % res, cell / res / res % res};
+  for (int axis = 0; axis < 3; axis++)
+    if (place[axis] < res / 4 || place[axis] >= res - res / 4) return false;
+  return true;
+}
+
+/* Index of every occupied cell that samples look in (the middle of a coarse cascade is left to finer ones); of every
+ * cell when none is occupied. */
 static sf_status list_cells(const sf_model *model, uint32_t **list, uint64_t *count)
 {
-  const uint64_t res = (uint64_t)model->config.occ_res, cells = res * res * res;
+  const uint64_t cells = sf_config_cells(&model->config);
   uint32_t *cell = malloc(cells * sizeof *cell);
   if (!cell) return sf_fail(SF_E_MEMORY, "quantiser: no memory for %llu cells", (unsigned long long)cells);
   uint64_t n = 0;
   for (uint64_t i = 0; i < cells; i++)
-    if (model->occupancy[i >> 3] >> (i & 7) & 1) cell[n++] = (uint32_t)i;
+    if (model->occupancy[i >> 3] >> (i & 7) & 1 && !is_covered(&model->config, i)) cell[n++] = (uint32_t)i;
   if (n == 0)
     for (; n < cells; n++) cell[n] = (uint32_t)n;
   *list = cell, *count = n;
   return sf_ok();
 }
 
-static void draw_position(uint32_t *pos, uint32_t cell, uint32_t res, uint64_t seed, int sample)
+static void draw_position(uint32_t *pos, uint32_t cell, const sf_config *config, uint64_t seed, int sample)
 {
-  const uint32_t side = (1u << SF_POS_FRAC) / res;
-  const uint32_t corner[3] = {cell % res, cell / res % res, cell / res / res};
+  uint32_t corner[3];
+  const uint32_t side = cell_corner(config, cell, corner);
   for (int axis = 0; axis < 3; axis++)
-    pos[axis] = corner[axis] * side +
-                (uint32_t)sf_random_below(seed, STREAM_JITTER, (uint64_t)sample * 3 + (uint64_t)axis, side);
+    pos[axis] =
+        corner[axis] + (uint32_t)sf_random_below(seed, STREAM_JITTER, (uint64_t)sample * 3 + (uint64_t)axis, side);
 }
 
 static void draw_direction(float *direction, uint64_t seed, int sample)
@@ -115,7 +138,7 @@ sf_status sf_calibrate(sf_calibration *c, const sf_model *model, int steps, uint
   SF_TRY(list_cells(model, &cell, &cells));
   for (int sample = 0; sample < c->samples; sample++) {
     const uint64_t pick = sf_random_below(seed, STREAM_CELL, (uint64_t)sample, cells);
-    draw_position(c->pos + sample * 3, cell[pick], (uint32_t)model->config.occ_res, seed, sample);
+    draw_position(c->pos + sample * 3, cell[pick], &model->config, seed, sample);
   }
   free(cell);
   return run_samples(c, model, seed);

@@ -213,8 +213,9 @@ static sf_status all_layers(const context *c, int16_t *x)
   SF_TRY(finish_layer(c, FX_C2, x, spikes));
   spike_inputs(c->calibration, FX_C2, x);
   SF_TRY(finish_layer(c, FX_C3, x, spikes));
-  /* Density per box edge = 2 * density per model unit (the box is 2 model units wide): + log2(2). */
-  SF_TRY(set_scale(c, FX_D2, c->scene->current_scale[FX_D2] * log2e * one, 1 << SF_LOG_FRAC, &c->scene->net.exp_in));
+  /* Density per box edge = 2 bound * density per model unit (the box is 2 bound model units wide): + log2(2 bound). */
+  const int32_t bias = (1 + c->scene->log2_bound) << SF_LOG_FRAC;
+  SF_TRY(set_scale(c, FX_D2, c->scene->current_scale[FX_D2] * log2e * one, bias, &c->scene->net.exp_in));
   return set_scale(c, FX_C3, c->scene->current_scale[FX_C3] * one, 0, &c->scene->net.sigmoid_in);
 }
 

@@ -5,9 +5,9 @@
 enum { MAX_SAMPLES = 1024 };
 static const double TRANS_STOP = 1e-4; /* as sf_render_rays */
 
-double sf_fx_sigma_value(uint32_t sigma)
+double sf_fx_sigma_value(const fx_scene *scene, uint32_t sigma)
 {
-  return ldexp(sigma, -SF_SIGMA_FRAC) / 2; /* the box is 2 model units wide */
+  return ldexp(sigma, -SF_SIGMA_FRAC) * scene->to_box_scale;
 }
 
 double sf_fx_colour_value(uint32_t colour)
@@ -73,7 +73,7 @@ static sf_status resolve_widths(sf_quant_widths *widths, const char *name)
 int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
 {
   const int64_t res = scene->occ_res;
-  int64_t bits = res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
+  int64_t bits = (scene->log2_bound + 1) * res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
   for (int l = 0; l < SF_LAYERS; l++)
     bits += (int64_t)scene->net.layer[l].n_in * scene->net.layer[l].n_out * widths->weight_bits;
   return (bits + 7) / 8;
@@ -87,6 +87,7 @@ static void set_sizes(fx_scene *scene, const sf_model *model)
   for (int l = 0; l < SF_LAYERS; l++) scene->net.layer[l].n_in = n_in[l], scene->net.layer[l].n_out = n_out[l];
   sf_quantise_levels(&scene->grid, model);
   scene->occ_res = model->config.occ_res;
+  scene->log2_bound = sf_config_cascades(&model->config) - 1;
 }
 
 /* k with `bits` fraction bits, as U1.LEAK_FRAC. */
@@ -95,20 +96,31 @@ static int32_t leak_value(float logit, int bits)
   return (int32_t)nearbyint(ldexp(1 / (1 + exp(-(double)logit)), bits)) << (SF_LEAK_FRAC - bits);
 }
 
+static void set_steps(fx_scene *scene, const sf_config *config)
+{
+  const double step = 2 * sqrt(3.0) / config->lattice; /* model units */
+  scene->step_q24 = (int32_t)nearbyint(ldexp(step / (2 * config->bound), SF_DELTA_FRAC));
+  if (!(config->dt_gamma > 0)) return;
+  scene->gamma_q24 = (int32_t)nearbyint(ldexp((double)config->dt_gamma, 24));
+  scene->near_q16 = (int32_t)nearbyint(ldexp(SF_NEAR / step, 16));
+  scene->longest_q16 =
+      (int32_t)nearbyint(fmax(1, (double)config->lattice * config->bound / config->occ_res) * (1 << 16));
+}
+
 static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options, int leak_bits)
 {
   const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
   for (int l = 0; l < SF_LAYERS; l++) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
   scene->net.mode = model->config.mode;
   scene->net.steps = options->steps ? options->steps : model->t_r;
-  scene->step_q24 = (int32_t)nearbyint(ldexp(sqrt(3.0) / model->config.lattice, SF_DELTA_FRAC));
+  set_steps(scene, &model->config);
   scene->max_samples = MAX_SAMPLES;
   scene->trans_stop = (int32_t)floor(ldexp(TRANS_STOP, SF_TRANS_FRAC));
   for (int o = 0; o < 3; o++) {
     scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
     scene->to_box_offset[o] = 0.5;
   }
-  scene->to_box_scale = 0.5;
+  scene->to_box_scale = 0.5 / model->config.bound;
 }
 
 static sf_scales scales_of(const fx_scene *scene, int weight_bits)
@@ -126,11 +138,10 @@ static sf_scales scales_of(const fx_scene *scene, int weight_bits)
 static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                           sf_calibration *calibration, sf_quant_report *report)
 {
-  const size_t cells = (size_t)model->config.occ_res * (size_t)model->config.occ_res * (size_t)model->config.occ_res;
   set_sizes(scene, model);
   set_scalars(scene, model, options, report->widths.leak_bits);
   SF_TRY(fx_scene_allocate(scene, name));
-  memcpy(scene->occupancy, model->occupancy, cells / 8);
+  memcpy(scene->occupancy, model->occupancy, sf_config_cells(&model->config) / 8);
   SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
   report->samples = calibration->samples;
   report->packed_bytes = sf_packed_bytes(scene, &report->widths);

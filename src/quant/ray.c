@@ -1,10 +1,10 @@
 /* A ray in model units to the integer lattice of the box: the same lattice as sf_ray_lattice, in double precision. */
 #include "spikefield/quant.h"
+#include "spikefield/model.h"
 #include <math.h>
 #include <string.h>
 
 enum { RAY_FRAC = 40 };
-static const double NEAR = 0.2;          /* model units */
 static const double COUNT_MAX = 1 << 20; /* a step of one LSB would need 2^24: no scene has that */
 
 typedef struct interval {
@@ -14,7 +14,7 @@ typedef struct interval {
 /* The box is [0,1)^3 in box units: origin o, direction d per model unit of distance. */
 static interval clip_to_box(const double o[3], const double d[3])
 {
-  interval hit = {NEAR, INFINITY};
+  interval hit = {SF_NEAR, INFINITY};
   for (int axis = 0; axis < 3; axis++) {
     if (d[axis] == 0) {
       if (o[axis] <= 0 || o[axis] >= 1) return (interval){0, -1};
@@ -27,29 +27,53 @@ static interval clip_to_box(const double o[3], const double d[3])
   return hit;
 }
 
-static bool inside(const fx_ray *ray, int32_t n)
+static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
 {
   for (int axis = 0; axis < 3; axis++) {
-    const int64_t p = ray->origin[axis] + n * ray->step[axis];
+    const int64_t p = fx_ray_at(scene, ray, n, axis);
     if (p < 0 || p >= (int64_t)1 << RAY_FRAC) return false;
   }
   return true;
 }
 
-/* Rounding may leave an end of the lattice just outside; the box is convex, so only ends can be. */
-static void trim(fx_ray *ray)
+/* Rounding may leave an end of the lattice just outside; the box is convex, so only ends can be. Where steps grow the
+ * first point is moved in, by 2^-40: the table begins with it. */
+static void trim(const fx_scene *scene, fx_ray *ray)
 {
-  while (ray->count > 0 && !inside(ray, 0)) {
+  const int64_t last = ((int64_t)1 << RAY_FRAC) - 1;
+  for (int axis = 0; axis < 3 && scene->steps; axis++)
+    ray->origin[axis] = ray->origin[axis] < 0 ? 0 : ray->origin[axis] > last ? last : ray->origin[axis];
+  while (ray->count > 0 && !inside(scene, ray, 0)) {
     for (int axis = 0; axis < 3; axis++) ray->origin[axis] += ray->step[axis];
     ray->count--;
     if (ray->first_q16 <= INT32_MAX - 65536) ray->first_q16 += 65536;
   }
-  while (ray->count > 0 && !inside(ray, ray->count - 1)) ray->count--;
+  while (ray->count > 0 && !inside(scene, ray, ray->count - 1)) ray->count--;
 }
 
-static void set_lattice(fx_ray *ray, const double o[3], const double d[3], double step, interval hit)
+/* Length of interval n in lattice steps. */
+static double length_of(const fx_scene *scene, int32_t n)
 {
-  const double first = hit.enter + step / 2, count = floor((hit.leave - hit.enter) / step);
+  return (double)fx_delta(scene, n) / scene->step_q24;
+}
+
+/* Intervals that end within `depth` lattice steps. */
+static double intervals_within(const fx_scene *scene, double depth)
+{
+  if (!scene->steps) return fmin(floor(depth), COUNT_MAX);
+  int32_t n = 0;
+  const double before = length_of(scene, 0) / 2; /* the middle of the first interval */
+  while (n < scene->steps->count &&
+         before + ldexp((double)scene->steps->at_q16[n], -16) + length_of(scene, n) / 2 <= depth)
+    n++;
+  return n;
+}
+
+static void set_lattice(const fx_scene *scene, fx_ray *ray, const double o[3], const double d[3], double step,
+                        interval hit)
+{
+  const double first = hit.enter + step * length_of(scene, 0) / 2;
+  const double count = intervals_within(scene, (hit.leave - hit.enter) / step);
   if (!(count >= 1)) return;
   for (int axis = 0; axis < 3; axis++) {
     const double p = o[axis] + d[axis] * first;
@@ -57,9 +81,9 @@ static void set_lattice(fx_ray *ray, const double o[3], const double d[3], doubl
     ray->origin[axis] = llrint(ldexp(p, RAY_FRAC));
     ray->step[axis] = llrint(ldexp(d[axis] * step, RAY_FRAC));
   }
-  ray->count = (int32_t)fmin(count, COUNT_MAX);
+  ray->count = (int32_t)count;
   ray->first_q16 = (int32_t)fmin(nearbyint(first / step * 65536), INT32_MAX);
-  trim(ray);
+  trim(scene, ray);
 }
 
 int sf_fx_dir_frac(const fx_scene *scene)
@@ -91,7 +115,7 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
     d[axis] = unit[axis] * scene->to_box_scale;
   }
   set_direction(ray, unit, sf_fx_dir_frac(scene));
-  set_lattice(ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
+  set_lattice(scene, ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
   return sf_ok();
 }
 

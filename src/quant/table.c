@@ -73,8 +73,11 @@ void sf_grid_copy_level(const fx_grid *grid, int level, int log2_size, const uin
 
 static void mark_cell(const fx_scene *scene, int level, uint32_t cell, uint8_t *read)
 {
-  const uint32_t res = (uint32_t)scene->occ_res, side = (1u << SF_POS_FRAC) / res;
-  const uint32_t low[3] = {cell % res * side, cell / res % res * side, cell / res / res * side};
+  const uint32_t res = (uint32_t)scene->occ_res, cascade = cell / (res * res * res);
+  const uint32_t edge = (1u << SF_POS_FRAC) >> ((uint32_t)scene->log2_bound - cascade), side = edge / res;
+  const uint32_t corner = (1u << (SF_POS_FRAC - 1)) - edge / 2;
+  const uint32_t low[3] = {corner + cell % res * side, corner + cell / res % res * side,
+                           corner + cell / res / res % res * side};
   const uint32_t high[3] = {low[0] + side - 1, low[1] + side - 1, low[2] + side - 1};
   const sf_corners c = sf_grid_corners(&scene->grid, level, low, high);
   for (uint32_t z = c.base[2]; z <= c.last[2]; z++)
@@ -85,7 +88,7 @@ static void mark_cell(const fx_scene *scene, int level, uint32_t cell, uint8_t *
 /* Levels have tables of their own, so threads never share an entry. */
 static void mark_read(const fx_scene *scene, uint8_t *read)
 {
-  const uint32_t cells = (uint32_t)scene->occ_res * (uint32_t)scene->occ_res * (uint32_t)scene->occ_res;
+  const uint32_t res = (uint32_t)scene->occ_res, cells = (uint32_t)(scene->log2_bound + 1) * res * res * res;
 #pragma omp parallel for schedule(dynamic)
   for (int level = 0; level < scene->grid.levels; level++)
     for (uint32_t cell = 0; cell < cells; cell++)

@@ -20,7 +20,7 @@ static int32_t intervals_within(const sf_steps *s, float depth)
 sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const float direction[3])
 {
   const float bound = steps->bound;
-  float enter = SF_NEAR, leave = INFINITY;
+  float enter = (float)SF_NEAR, leave = INFINITY;
   for (int a = 0; a < 3; a++) {
     if (direction[a] == 0) {
       if (fabsf(origin[a]) >= bound) return (sf_lattice){0};
