@@ -6,9 +6,9 @@ static int32_t word(const uint8_t *block, uint32_t index)
   return (int32_t)((uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24);
 }
 
-static int in_memory(int32_t n)
+static int in_memory(const sf_layer_blob *layer)
 {
-  return n >= 1 && n <= SF_LANES;
+  return layer->n_in >= 0 && layer->n_in <= SF_DIR_MAX && layer->n_out >= 0 && layer->n_out <= SF_LANES;
 }
 
 int sf_blob_open(const uint8_t *block, uint32_t size, sf_net_blob *net)
@@ -23,10 +23,10 @@ int sf_blob_open(const uint8_t *block, uint32_t size, sf_net_blob *net)
   for (uint32_t l = 0; l < SF_LAYERS; l++) {
     const uint32_t w = SF_BLOB_HEADER_WORDS + l * SF_BLOB_LAYER_WORDS;
     sf_layer_blob *layer = &net->layer[l];
-    *layer = (sf_layer_blob){word(block, w), word(block, w + 1), word(block, w + 2), word(block, w + 3),
-                             (const int8_t *)block + at};
-    if (!in_memory(layer->n_in) || !in_memory(layer->n_out)) return -1;
-    at += (uint32_t)layer->n_in * SF_LANES;
+    *layer = (sf_layer_blob){word(block, w),     word(block, w + 1), word(block, w + 2),
+                             word(block, w + 3), word(block, w + 4), (const int8_t *)block + at};
+    if (!in_memory(layer)) return -1;
+    at += ((uint32_t)layer->n_in + (layer->bias != 0)) * SF_LANES;
   }
   return at == (uint32_t)word(block, 2) ? 0 : -1;
 }

@@ -1,15 +1,15 @@
 /* A net as one block of memory, for programs without a file system. Little-endian 32-bit words, then the weights:
  *   magic 'SFNB', version, bytes in all, mode, steps, exp mul shift bias, sigmoid mul shift bias,
- *   5 x (n_in, n_out, k, theta), 5 x n_in * SF_LANES weights. */
+ *   5 x (n_in, n_out, k, theta, bias), 5 x (n_in, and one more with a bias) * SF_LANES weights. */
 #ifndef SPIKEFIELD_FIRMWARE_BLOB_H
 #define SPIKEFIELD_FIRMWARE_BLOB_H
 #include "firmware/sf_driver.h"
 
 enum {
   SF_BLOB_MAGIC = 0x424e4653,
-  SF_BLOB_VERSION = 1,
+  SF_BLOB_VERSION = 2,
   SF_BLOB_HEADER_WORDS = 11,
-  SF_BLOB_LAYER_WORDS = 4,
+  SF_BLOB_LAYER_WORDS = 5,
   SF_BLOB_WORDS = SF_BLOB_HEADER_WORDS + SF_LAYERS * SF_BLOB_LAYER_WORDS
 };
 

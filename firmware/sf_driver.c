@@ -48,7 +48,8 @@ sf_driver_code sf_driver_probe(const sf_bus *bus)
   if (get(bus, SF_CSR_VERSION) >> 16 != SF_CSR_VERSION_RESET >> 16) return SF_DRIVER_VERSION;
   /* Fewer lanes are fine: a net that is too wide for them is refused at start. */
   const uint32_t config = get(bus, SF_CSR_CONFIG), lanes = config & CONFIG_LANES;
-  if ((config ^ SF_CSR_CONFIG_RESET) & ~(uint32_t)CONFIG_LANES || lanes == 0 || lanes > SF_LANES) return SF_DRIVER_CONFIG;
+  if ((config ^ SF_CSR_CONFIG_RESET) & ~(uint32_t)CONFIG_LANES || lanes == 0 || lanes > SF_LANES)
+    return SF_DRIVER_CONFIG;
   return SF_DRIVER_OK;
 }
 
@@ -69,15 +70,18 @@ static uint32_t pack(const int8_t *w)
          (uint32_t)(uint8_t)w[3] << 24;
 }
 
-static void program_weights(const sf_bus *bus, uint32_t id, const sf_layer_blob *layer)
+static void program_row(const sf_bus *bus, uint32_t id, const sf_layer_blob *layer, int32_t from, uint32_t to)
 {
   const int32_t words = (layer->n_out + WEIGHTS_PER_WORD - 1) / WEIGHTS_PER_WORD;
-  for (int32_t row = 0; row < layer->n_in; row++) {
-    put(bus, SF_CSR_WEIGHT_ADDRESS,
-        id << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB | (uint32_t)row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB);
-    for (int32_t word = 0; word < words; word++)
-      put(bus, SF_CSR_WEIGHT_DATA, pack(layer->w + row * SF_LANES + word * WEIGHTS_PER_WORD));
-  }
+  put(bus, SF_CSR_WEIGHT_ADDRESS, id << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB | to << SF_CSR_WEIGHT_ADDRESS_ROW_LSB);
+  for (int32_t word = 0; word < words; word++)
+    put(bus, SF_CSR_WEIGHT_DATA, pack(layer->w + from * SF_LANES + word * WEIGHTS_PER_WORD));
+}
+
+static void program_weights(const sf_bus *bus, uint32_t id, const sf_layer_blob *layer)
+{
+  for (int32_t row = 0; row < layer->n_in; row++) program_row(bus, id, layer, row, (uint32_t)row);
+  if (layer->bias) program_row(bus, id, layer, layer->n_in, SF_BIAS_ROW);
 }
 
 static void program_layer(const sf_bus *bus, uint32_t id, const sf_layer_blob *layer)
@@ -87,7 +91,17 @@ static void program_layer(const sf_bus *bus, uint32_t id, const sf_layer_blob *l
   put(bus, base + SF_CSR_D1_N_OUT, (uint32_t)layer->n_out);
   put(bus, base + SF_CSR_D1_K, (uint32_t)layer->k);
   put(bus, base + SF_CSR_D1_THETA, (uint32_t)layer->theta);
-  if (layer->n_in <= SF_LANES && layer->n_out <= SF_LANES) program_weights(bus, id, layer);
+  if (layer->n_in <= SF_DIR_MAX && layer->n_out <= SF_LANES) program_weights(bus, id, layer);
+}
+
+/* Values that do not fit, or biases of D1 and D2, set a bit that is refused at start. */
+static uint32_t biases(const sf_net_blob *net)
+{
+  enum { D1, D2, C1, C2, C3 };
+  const uint32_t c1 = (uint32_t)net->layer[C1].bias, c2 = (uint32_t)net->layer[C2].bias;
+  const uint32_t c3 = (uint32_t)net->layer[C3].bias;
+  if (net->layer[D1].bias || net->layer[D2].bias || c1 > SF_CSR_BIAS_C1 || c2 > 1 || c3 > 1) return UINT32_MAX;
+  return c1 << SF_CSR_BIAS_C1_LSB | c2 << SF_CSR_BIAS_C2_LSB | c3 << SF_CSR_BIAS_C3_LSB;
 }
 
 sf_driver_code sf_driver_program(const sf_bus *bus, const sf_net_blob *net)
@@ -100,6 +114,7 @@ sf_driver_code sf_driver_program(const sf_bus *bus, const sf_net_blob *net)
   put(bus, SF_CSR_SIGMOID_MUL, (uint32_t)net->sigmoid_in.mul);
   put(bus, SF_CSR_SIGMOID_SHIFT, (uint32_t)net->sigmoid_in.shift);
   put(bus, SF_CSR_SIGMOID_BIAS, (uint32_t)net->sigmoid_in.bias);
+  put(bus, SF_CSR_BIAS, biases(net));
   for (uint32_t id = 0; id < SF_LAYERS; id++) program_layer(bus, id, &net->layer[id]);
   return error_state(bus);
 }

@@ -21,9 +21,10 @@ typedef struct sf_bus {
   void *context;
 } sf_bus;
 
-/* A net as the hardware wants it. Weights: w[presynaptic * SF_LANES + neuron], lanes beyond n_out are 0. */
+/* A net as the hardware wants it. Weights: w[presynaptic * SF_LANES + neuron], lanes beyond n_out are 0; with a bias,
+ * a row more. D1 and D2 without inputs and outputs: a decoder. */
 typedef struct sf_layer_blob {
-  int32_t n_in, n_out, k, theta;
+  int32_t n_in, n_out, k, theta, bias;
   const int8_t *w;
 } sf_layer_blob;
 typedef struct sf_scale_blob {

@@ -16,7 +16,8 @@ static void put(const sf_stream *stream, uint32_t offset, uint32_t value)
 sf_stream sf_stream_for(const sf_bus *bus, const sf_net_blob *net)
 {
   enum { D1, D2, C1 };
-  return (sf_stream){*bus, net->layer[C1].n_in - (net->layer[D2].n_out - 1), net->layer[D1].n_in};
+  const int n_h = net->layer[D1].n_out ? net->layer[D2].n_out - 1 : 0;
+  return (sf_stream){*bus, net->layer[C1].n_in - n_h, net->layer[D1].n_in};
 }
 
 static uint32_t pair(const int16_t *value, int n)
@@ -58,7 +59,8 @@ static sf_driver_code receive(const sf_stream *stream, uint32_t result[4])
 sf_driver_code sf_stream_sample(const sf_stream *stream, const int16_t *dir, const int16_t *f, uint32_t result[4])
 {
   const int n_dir = dir ? stream->n_dir : 0;
-  sf_driver_code code = send(stream, dir, n_dir, SF_STREAM_CONTROL_FIRST, 0);
+  const uint32_t whole = stream->n_feature == 0 ? SF_STREAM_CONTROL_LAST : 0;
+  sf_driver_code code = send(stream, dir, n_dir, SF_STREAM_CONTROL_FIRST, whole);
   const uint32_t first = dir && n_dir == 0 ? SF_STREAM_CONTROL_FIRST : 0; /* a net without directions */
   if (code == SF_DRIVER_OK) code = send(stream, f, stream->n_feature, first, SF_STREAM_CONTROL_LAST);
   return code == SF_DRIVER_OK ? receive(stream, result) : code;

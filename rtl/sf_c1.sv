@@ -1,4 +1,6 @@
-// C1: the direction's current once per ray, then at every step the h of D2 on top of it. Mirror: src/fx/net.c
+// C1: the direction's current once per ray, then at every step the h of D2 on top of it. Of a decoder the constant
+// inputs once per sample: its current serves all steps, as D1's. Biases are one more row of the constant inputs.
+// Mirror: src/fx/net.c
 `default_nettype none
 
 module sf_c1 #(
@@ -7,19 +9,21 @@ module sf_c1 #(
     input  wire                clk_i,
     input  wire                rst_ni,
     input  wire                clear_i,
-    input  wire         [ 4:0] n_dir_i,
+    input  wire                decodes_i,
+    input  wire         [ 7:0] n_dir_i,        // constant inputs
+    input  wire         [10:0] bias_i,         // 0: none
     input  wire         [ 4:0] n_h_i,
     input  wire         [ 3:0] steps_i,
-    // weights: direction rows, then h rows
+    // weights: rows of the constant inputs, then those of h; the biases'
     input  wire                we_i,
-    input  wire         [ 4:0] wrow_i,
+    input  wire         [ 7:0] wrow_i,
     input  wire         [ 4:0] wword_i,
     input  wire         [31:0] wdata_i,
-    // a sample whose h is there
+    // a sample whose inputs are there
     input  wire                valid_i,
     input  wire                first_i,        // of a new ray
     output wire                done_o,
-    output wire         [ 3:0] dir_index_o,
+    output wire         [ 7:0] dir_index_o,
     input  wire         [11:0] dir_i,
     output wire         [ 6:0] h_index_o,      // {step, index}
     input  wire         [11:0] h_i,
@@ -30,6 +34,7 @@ module sf_c1 #(
     output wire [24*LANES-1:0] current_o,
     // events
     output wire                row_o,
+    output wire                bias_row_o,
     output wire         [ 2:0] row_step_o,
     output wire                ray_o,
     output wire                idle_o
@@ -40,18 +45,21 @@ module sf_c1 #(
   localparam [1:0] ROWS = 2'd3;
 
   reg [1:0] state_q, state_d;
-  reg [4:0] index_q, index_d;
+  reg [7:0] index_q, index_d;
   reg [2:0] step_q, step_d;
-  reg op_q, count_q, first_q, base_q, keep_q, last_q, move_q;
+  reg op_q, count_q, first_q, base_q, keep_q, last_q, move_q, biases_q;
   reg [2:0] op_step_q;
   reg signed [11:0] value_q;
   reg issue, zero, last;
   wire [8*LANES-1:0] row;
 
   // A sum without rows takes one cycle, too.
-  wire in_dir = state_q == DIR || (state_q == START && first_i);
-  wire [4:0] n_rows = in_dir ? n_dir_i : n_h_i;
-  wire rows_last = index_q + 5'd1 >= n_rows;
+  wire in_dir = state_q == DIR || (state_q == START && (first_i || decodes_i));
+  wire has_bias = bias_i != 11'd0;
+  wire at_bias = in_dir && index_q == n_dir_i && has_bias;
+  wire [7:0] n_rows = in_dir ? n_dir_i + {7'd0, has_bias} : {3'd0, n_h_i};
+  wire rows_last = index_q + 8'd1 >= n_rows;
+  wire current_last = rows_last && (!in_dir || decodes_i);  // the neurons' current is complete
   wire last_step = {1'b0, step_q} == steps_i - 4'd1;
 
   always_comb begin
@@ -60,20 +68,16 @@ module sf_c1 #(
     step_d = step_q;
     issue = 1'b0;
     last = 1'b0;
-    zero = n_rows == 5'd0;
+    zero = n_rows == 8'd0;
     if (state_q == KEEP) begin
       state_d = ROWS;
     end else if (state_q == START ? valid_i : 1'b1) begin
-      if (in_dir) begin
+      if (!current_last || fire_free_i) begin
         issue = 1'b1;
-        index_d = rows_last ? 5'd0 : index_q + 5'd1;
-        state_d = rows_last ? KEEP : DIR;
-      end else if (!rows_last || fire_free_i) begin
-        issue = 1'b1;
-        last = rows_last;
-        index_d = rows_last ? 5'd0 : index_q + 5'd1;
-        state_d = ROWS;
-        if (rows_last) begin
+        last = current_last;
+        index_d = rows_last ? 8'd0 : index_q + 8'd1;
+        state_d = !in_dir ? ROWS : !rows_last ? DIR : decodes_i ? START : KEEP;
+        if (rows_last && !in_dir) begin
           step_d = last_step ? 3'd0 : step_q + 3'd1;
           if (last_step) state_d = START;
         end
@@ -81,15 +85,15 @@ module sf_c1 #(
     end
   end
 
-  assign dir_index_o = index_q[3:0];
+  assign dir_index_o = index_q;
   assign h_index_o = {step_q, index_q[3:0]};
-  assign done_o = last && last_step;
+  assign done_o = last && (last_step || decodes_i);
   assign fire_next_o = last;
 
   sf_wmem #(
       .WORDS   (LANES / 4),
-      .ROWS    (32),
-      .ROW_BITS(5)
+      .ROWS    (sf_arch_pkg::BIAS_ROW + 1),
+      .ROW_BITS(8)
   ) u_weights (
       .clk_i  (clk_i),
       .we_i   (we_i),
@@ -97,11 +101,12 @@ module sf_c1 #(
       .wword_i(wword_i),
       .wdata_i(wdata_i),
       .re_i   (issue && !zero),
-      .rrow_i (in_dir ? index_q : n_dir_i + index_q),
+      .rrow_i (at_bias ? 8'(sf_arch_pkg::BIAS_ROW) : in_dir ? index_q : n_dir_i + index_q),
       .row_o  (row)
   );
   sf_mac #(
-      .LANES(LANES)
+      .LANES   (LANES),
+      .SUM_BITS(27)
   ) u_mac (
       .clk_i      (clk_i),
       .row_valid_i(op_q),
@@ -116,8 +121,8 @@ module sf_c1 #(
   );
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {state_q, index_q, step_q, op_q, count_q, keep_q, last_q, move_q} <= 15'd0;
-    else if (clear_i) {state_q, index_q, step_q, op_q, count_q, keep_q, last_q, move_q} <= 15'd0;
+    if (!rst_ni) {state_q, index_q, step_q, op_q, count_q, keep_q, last_q, move_q} <= 18'd0;
+    else if (clear_i) {state_q, index_q, step_q, op_q, count_q, keep_q, last_q, move_q} <= 18'd0;
     else begin
       state_q <= state_d;
       index_q <= index_d;
@@ -130,14 +135,16 @@ module sf_c1 #(
     end
   end
   always_ff @(posedge clk_i) begin
-    first_q <= index_q == 5'd0;
+    first_q <= index_q == 8'd0;
+    biases_q <= at_bias;
     base_q <= !in_dir;
     op_step_q <= step_q;
-    value_q <= in_dir ? dir_i : h_i;
+    value_q <= at_bias ? {1'b0, bias_i} : in_dir ? dir_i : h_i;
   end
 
   assign fire_valid_o = move_q;
-  assign row_o = count_q;
+  assign row_o = count_q && !biases_q;
+  assign bias_row_o = count_q && biases_q;
   assign row_step_o = op_step_q;
   assign ray_o = keep_q;
   assign idle_o = state_q == START && !op_q && !keep_q && !last_q && !move_q;

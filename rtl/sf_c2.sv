@@ -1,5 +1,5 @@
-// C2: adds the weight rows of the C1 neurons that fired, two per cycle. Mirror: src/fx/current.c
-// Width: |sum| <= 128 * 127 < 2^15.
+// C2: adds the weight rows of the C1 neurons that fired, two per cycle, to the biases. Mirror: src/fx/current.c
+// Width: |sum| <= 129 * 127 < 2^15.
 `default_nettype none
 
 module sf_c2 #(
@@ -10,8 +10,10 @@ module sf_c2 #(
     input  wire                clk_i,
     input  wire                rst_ni,
     input  wire                clear_i,
-    // weights, by neuron of C1
+    // weights, by neuron of C1; the biases
+    input  wire                bias_i,
     input  wire                we_i,
+    input  wire                bias_we_i,
     input  wire [      BITS:0] wrow_i,
     input  wire         [ 4:0] wword_i,
     input  wire         [31:0] wdata_i,
@@ -89,6 +91,12 @@ module sf_c2 #(
   assign done_o = go && last;
   assign fire_next_o = go && last;
 
+  reg [8*LANES-1:0] bias_q;
+  wire [8*LANES-1:0] bias = bias_i ? bias_q : {(8 * LANES) {1'b0}};
+  always_ff @(posedge clk_i) begin
+    if (bias_we_i) bias_q[32*wword_i+:32] <= wdata_i;
+  end
+
   reg signed [15:0] acc_q[0:LANES-1];
   reg [16*LANES-1:0] sums;  // names a whole row within one operation, not a register
   always_ff @(posedge clk_i) begin
@@ -98,7 +106,7 @@ module sf_c2 #(
     end
     if (op_q) begin
       if (first_q) begin
-        for (int l = 0; l < LANES; l++) acc_q[l] = 16'sd0;
+        for (int l = 0; l < LANES; l++) acc_q[l] = 16'($signed(bias[8*l+:8]));
       end
       if (even_q && odd_q) begin
         for (int l = 0; l < LANES; l++)

@@ -19,13 +19,14 @@ module sf_core #(
     // programming
     input  wire                we_i,
     input  wire         [ 2:0] wlayer_i,
-    input  wire         [ 6:0] wrow_i,
+    input  wire         [ 7:0] wrow_i,
     input  wire         [ 4:0] wword_i,
     input  wire         [31:0] wdata_i,
     input  wire         [39:0] n_in_i,
     input  wire         [39:0] n_out_i,
     input  wire         [64:0] k_i,
     input  wire        [119:0] theta_i,
+    input  wire         [12:0] bias_i,             // C3, C2, value of C1's
     input  wire         [ 1:0] mode_i,
     input  wire         [ 3:0] steps_i,
     // inputs of a sample
@@ -34,7 +35,7 @@ module sf_core #(
     output wire                sample_done_o,
     output wire         [ 4:0] feature_index_o,
     input  wire         [11:0] feature_i,
-    output wire         [ 3:0] dir_index_o,
+    output wire         [ 7:0] dir_index_o,
     input  wire         [11:0] dir_i,
     // currents of D2 and C3, one cycle after they were taken: {step, output}, 16 bits each
     input  wire                density_ready_i,
@@ -46,6 +47,7 @@ module sf_core #(
     // events, in the cycle in which they happen
     output wire                d1_row_o,
     output wire                c1_row_o,
+    output wire                c1_bias_row_o,
     output wire         [ 2:0] c1_step_o,
     output wire         [ 1:0] c2_rows_o,
     output wire         [ 2:0] c2_step_o,
@@ -68,9 +70,12 @@ module sf_core #(
   localparam QUEUE = 4;                 // steps between C1 and C2
 
   // Sizes; sf_csr has checked that they are consistent.
-  wire [7:0] n_h = n_out_i[15:8] - 8'd1;
+  wire decodes = n_out_i[7:0] == 8'd0;  // no D1 and D2: C1 takes its inputs from the buffer
+  wire [7:0] n_h = decodes ? 8'd0 : n_out_i[15:8] - 8'd1;
   wire [7:0] n_dir = n_in_i[23:16] - n_h;
-  wire unused_ok = &{1'b0, wrow_i, n_out_i[39:32], n_in_i[39:24], n_in_i[15:6], n_h[7:5], n_dir[7:5], theta_i[119:96], theta_i[47:24],
+  wire bias_we = we_i && wrow_i == 8'(sf_arch_pkg::BIAS_ROW);
+  wire row_we = we_i && !bias_we;
+  wire unused_ok = &{1'b0, wrow_i, n_out_i[39:32], n_in_i[39:24], n_in_i[15:6], n_h[7:5], theta_i[119:96], theta_i[47:24],
                      k_i[64:52], k_i[25:13]};
 
   // ---- neurons: what waits for its turn. The layer nearest to the output goes first.
@@ -100,7 +105,8 @@ module sf_core #(
   assign take_d2 = wanted_d2 && !wanted_c3 && !wanted[2] && !wanted[1] && !clear_i;
   assign fire[0] = wanted[0] && !wanted_c3 && !wanted[2] && !wanted[1] && !wanted_d2 && !clear_i;
   wire [2:0] fire_step = fire[2] ? c2_step_q : fire[1] ? c1_step_q : d1_step_q;
-  wire [2:0] fire_ends = {fire[2], fire[1], fire[0] && d1_ends};  // D1's current serves all steps
+  // D1's current serves all steps, and a decoder's of C1.
+  wire [2:0] fire_ends = {fire[2], fire[1] && (!decodes || c1_ends), fire[0] && d1_ends};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -144,7 +150,8 @@ module sf_core #(
   );
 
   // ---- D1
-  wire dir_we, first_we, first_in, d1_idle;
+  wire dir_we, first_we, first_in, d1_idle, d1_done;
+  wire [3:0] d1_dir_index;
   wire [11:0] dir_in;
   wire wd1 = we_i && wlayer_i == sf_op_pkg::D1;
   sf_d1 #(
@@ -160,14 +167,14 @@ module sf_core #(
       .wrow_i         (wrow_i[4:0]),
       .wword_i        (wword_i),
       .wdata_i        (wdata_i),
-      .sample_valid_i (sample_valid_i),
+      .sample_valid_i (sample_valid_i && !decodes),
       .sample_first_i (sample_first_i),
-      .sample_done_o  (sample_done_o),
+      .sample_done_o  (d1_done),
       .feature_index_o(feature_index_o),
       .feature_i      (feature_i),
       .dir_i          (dir_i),
       .dir_we_o       (dir_we),
-      .dir_index_o    (dir_index_o),
+      .dir_index_o    (d1_dir_index),
       .dir_o          (dir_in),
       .first_we_o     (first_we),
       .first_o        (first_in),
@@ -184,7 +191,9 @@ module sf_core #(
   reg [7:0] mark_q;
   reg [2:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
   wire c1_done, ray_done;
-  wire [3:0] c1_dir_index;
+  wire [7:0] c1_dir_index;
+  assign dir_index_o = decodes ? c1_dir_index : {4'd0, d1_dir_index};
+  assign sample_done_o = decodes ? c1_done : d1_done;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 12'd0;
     else if (clear_i) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 12'd0;
@@ -197,7 +206,7 @@ module sf_core #(
   end
   always_ff @(posedge clk_i) begin
     if (first_we) mark_q[mark_write_q] <= first_in;
-    if (dir_we) dir_q[{ray_write_q, dir_index_o}] <= dir_in;
+    if (dir_we) dir_q[{ray_write_q, d1_dir_index}] <= dir_in;
   end
 
   // ---- D2
@@ -233,7 +242,9 @@ module sf_core #(
       .clk_i       (clk_i),
       .rst_ni      (rst_ni),
       .clear_i     (clear_i),
-      .we_i        (we_i && wlayer_i == sf_op_pkg::D2),
+      .bias_i      (1'b0),
+      .we_i        (row_we && wlayer_i == sf_op_pkg::D2),
+      .bias_we_i   (1'b0),
       .wrow_i      (wrow_i[BITS:0]),
       .wword_i     (wword_i[1:0]),
       .wdata_i     (wdata_i),
@@ -296,18 +307,20 @@ module sf_core #(
       .clk_i       (clk_i),
       .rst_ni      (rst_ni),
       .clear_i     (clear_i),
-      .n_dir_i     (n_dir[4:0]),
+      .decodes_i   (decodes),
+      .n_dir_i     (n_dir),
+      .bias_i      (bias_i[10:0]),
       .n_h_i       (n_h[4:0]),
       .steps_i     (steps_i),
       .we_i        (we_i && wlayer_i == sf_op_pkg::C1),
-      .wrow_i      (wrow_i[4:0]),
+      .wrow_i      (wrow_i),
       .wword_i     (wword_i),
       .wdata_i     (wdata_i),
-      .valid_i     (h_full_q[h_read_q]),
+      .valid_i     (decodes ? sample_valid_i && !hold_i : h_full_q[h_read_q]),
       .first_i     (mark_q[mark_read_q]),
       .done_o      (c1_done),
       .dir_index_o (c1_dir_index),
-      .dir_i       (dir_q[{ray_read_q, c1_dir_index}]),
+      .dir_i       (decodes ? dir_i : dir_q[{ray_read_q, c1_dir_index[3:0]}]),
       .h_index_o   (h_index),
       .h_i         (h),
       .fire_free_i (!reserved_q[1]),
@@ -315,6 +328,7 @@ module sf_core #(
       .fire_valid_o(fire_valid[1]),
       .current_o   (c1_current),
       .row_o       (c1_row_o),
+      .bias_row_o  (c1_bias_row_o),
       .row_step_o  (c1_step_o),
       .ray_o       (ray_o),
       .idle_o      (c1_idle)
@@ -355,7 +369,9 @@ module sf_core #(
       .clk_i       (clk_i),
       .rst_ni      (rst_ni),
       .clear_i     (clear_i),
-      .we_i        (we_i && wlayer_i == sf_op_pkg::C2),
+      .bias_i      (bias_i[11]),
+      .we_i        (row_we && wlayer_i == sf_op_pkg::C2),
+      .bias_we_i   (bias_we && wlayer_i == sf_op_pkg::C2),
       .wrow_i      (wrow_i[BITS:0]),
       .wword_i     (wword_i),
       .wdata_i     (wdata_i),
@@ -406,7 +422,9 @@ module sf_core #(
       .clk_i       (clk_i),
       .rst_ni      (rst_ni),
       .clear_i     (clear_i),
-      .we_i        (we_i && wlayer_i == sf_op_pkg::C3),
+      .bias_i      (bias_i[12]),
+      .we_i        (row_we && wlayer_i == sf_op_pkg::C3),
+      .bias_we_i   (bias_we && wlayer_i == sf_op_pkg::C3),
       .wrow_i      (wrow_i[BITS:0]),
       .wword_i     (wword_i[1:0]),
       .wdata_i     (wdata_i),

@@ -9,7 +9,9 @@ module sf_counters (
     // engine (sf_core)
     input  wire [39:0] n_out_i,
     input  wire        d1_row_i,
+    input  wire [ 1:0] bias_i,           // C3, C2
     input  wire        c1_row_i,
+    input  wire        c1_bias_row_i,
     input  wire [ 2:0] c1_step_i,
     input  wire [ 1:0] c2_rows_i,
     input  wire [ 2:0] c2_step_i,
@@ -40,8 +42,9 @@ module sf_counters (
   localparam [63:0] NEURON_BYTES = 64'd3;
   localparam [63:0] INTEGRATOR_BYTES = 64'd4;
 
-  // By step, each layer where its events happen. A row of weights is read for each of its events.
-  reg [63:0] d1_mac_q;
+  // By step, each layer where its events happen. A row of weights is read for each of its events. Biases are weights
+  // that are read, but no events: a row of C2 for every step of its neurons, a row of C3 for its first integration.
+  reg [63:0] d1_mac_q, c1_bias_q;
   reg [63:0] c1_mac_q[0:7];
   reg [63:0] c2_sop_q[0:7];
   // By {C3 else D2, step}; a row that serves several steps was read at the first of them.
@@ -71,6 +74,9 @@ module sf_counters (
   wire [63:0] mac = at_layer == sf_op_pkg::C1 ? c1_mac_q[at_step]
                   : at_layer == sf_op_pkg::D1 && at_step == 3'd0 ? d1_mac_q : 64'd0;
   wire [63:0] add = at_layer == sf_op_pkg::C2 ? c2_sop_q[at_step] : 64'd0;
+  wire bias_c2 = bias_i[0] && at_layer == sf_op_pkg::C2;
+  wire bias_c3 = bias_i[1] && at_layer == sf_op_pkg::C3 && at_step == 3'd0;
+  wire [63:0] biases = bias_c2 || bias_c3 ? updates : at_layer == sf_op_pkg::C1 && at_step == 3'd0 ? c1_bias_q : 64'd0;
   reg [63:0] global_value, place_value;
   always_comb begin
     case (at_step)
@@ -87,7 +93,7 @@ module sf_counters (
       3'd1: place_value = integrating ? split_sop_q[at_narrow] : add;
       3'd2: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
       3'd3: place_value = updates;
-      3'd4: place_value = integrating ? split_weight_q[at_narrow] : mac + add;
+      3'd4: place_value = biases + (integrating ? split_weight_q[at_narrow] : mac + add);
       3'd5: place_value = at_step == 3'd0 ? 64'd0 : state_bytes;
       3'd6: place_value = state_bytes;
       default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
@@ -138,11 +144,13 @@ module sf_counters (
   wire [3:0] update_here = {update_colour_i, update_step_i};
   wire [15:0] d2_first = {d2_fired_i[15:8] & (~d2_fired_i[15:8] + 8'd1), d2_fired_i[7:0] & (~d2_fired_i[7:0] + 8'd1)};
   wire [15:0] c3_first = {c3_fired_i[15:8] & (~c3_fired_i[15:8] + 8'd1), c3_fired_i[7:0] & (~c3_fired_i[7:0] + 8'd1)};
-  wire [4:0] busy = {|c3_fired_i, |c2_rows_i, c1_row_i, |d2_fired_i, d1_row_i};
+  wire [4:0] busy = {|c3_fired_i, |c2_rows_i, c1_row_i || c1_bias_row_i, |d2_fired_i, d1_row_i};
 
   always_ff @(posedge clk_i) begin
     if (wipe && at_layer == sf_op_pkg::D1) d1_mac_q <= 64'd0;
     else if (d1_row_i) d1_mac_q <= d1_mac_q + n_d1;
+    if (wipe && at_layer == sf_op_pkg::C1) c1_bias_q <= 64'd0;
+    else if (c1_bias_row_i) c1_bias_q <= c1_bias_q + n_c1;
     if (wipe) c1_mac_q[at_step] <= 64'd0;
     else if (c1_row_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
     if (wipe) c2_sop_q[at_step] <= 64'd0;

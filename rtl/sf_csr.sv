@@ -38,9 +38,10 @@ module sf_csr #(
     output wire [ 39:0] n_out_o,
     output wire [ 64:0] k_o,
     output wire [119:0] theta_o,
+    output wire [ 12:0] bias_o,         // C3, C2, value of C1's
     output wire         we_o,
     output wire [  2:0] wlayer_o,
-    output wire [  6:0] wrow_o,
+    output wire [  7:0] wrow_o,
     output wire [  4:0] wword_o,
     output wire [ 31:0] wweights_o,
     // commands and state
@@ -70,7 +71,8 @@ module sf_csr #(
   reg [39:0] n_in_q, n_out_q;
   reg [64:0] k_q;
   reg [119:0] theta_q;
-  reg [14:0] weight_address_q;
+  reg [13:0] bias_q;
+  reg [15:0] weight_address_q;
 
   // ---- write channel: address and data are taken together
   reg bvalid_q;
@@ -89,7 +91,7 @@ module sf_csr #(
   wire to_irq_pending = wa == sf_csr_pkg::IRQ_PENDING;
   wire to_table = wa >= sf_csr_pkg::D1_N_IN && wa <= sf_csr_pkg::C3_THETA;
   wire to_weight = wa == sf_csr_pkg::WEIGHT_DATA;
-  wire to_config = wa >= sf_csr_pkg::MODE && wa <= sf_csr_pkg::WEIGHT_DATA;
+  wire to_config = wa >= sf_csr_pkg::MODE && wa <= sf_csr_pkg::BIAS;
   wire known = to_ctrl || to_error || to_irq_enable || to_irq_pending || to_config;
   wire config_write = word_write && to_config && !running_q;
   wire table_write = config_write && to_table;
@@ -101,19 +103,28 @@ module sf_csr #(
   wire [7:0] size_w = |wdata_i[31:8] ? 8'hff : wdata_i[7:0];
   wire [12:0] k_w = |wdata_i[31:13] ? 13'h1fff : wdata_i[12:0];
   wire [23:0] theta_w = |wdata_i[31:23] ? 24'd0 : wdata_i[23:0];
+  wire [13:0] bias_w = {|{wdata_i[31:18], wdata_i[15:11]}, wdata_i[17:16], wdata_i[10:0]};
   wire [16:0] mul_w = |wdata_i[31:16] ? 17'h10000 : wdata_i[16:0];
   wire [5:0] shift_w = |wdata_i[31:5] ? 6'h20 : wdata_i[5:0];
 
   // ---- weights
-  wire [2:0] wlayer = weight_address_q[14:12];
-  wire [6:0] wrow = weight_address_q[11:5];
+  wire [2:0] wlayer = weight_address_q[15:13];
+  wire [7:0] wrow = weight_address_q[12:5];
   wire [4:0] wword = weight_address_q[4:0];
   wire wnarrow = wlayer == sf_op_pkg::D2 || wlayer == sf_op_pkg::C3;
-  wire wshort = wlayer == sf_op_pkg::D1 || wlayer == sf_op_pkg::C1;
+  reg wrow_bad;
+  always_comb begin
+    case (wlayer)
+      sf_op_pkg::D1: wrow_bad = wrow >= 8'(sf_arch_pkg::FEATURE_MAX);
+      sf_op_pkg::D2: wrow_bad = wrow >= 8'(LANES);
+      sf_op_pkg::C1: wrow_bad = wrow > 8'(sf_arch_pkg::BIAS_ROW);
+      default: wrow_bad = wrow >= 8'(LANES) && wrow != 8'(sf_arch_pkg::BIAS_ROW);
+    endcase
+  end
   wire minus_128 = wdata_i[7:0] == 8'h80 || wdata_i[15:8] == 8'h80 || wdata_i[23:16] == 8'h80
       || wdata_i[31:24] == 8'h80;
-  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (wshort && wrow > 7'd31)
-      || (!wnarrow && {1'b0, wword} >= 6'(LANES / 4)) || (!wshort && {1'b0, wrow} >= 8'(LANES)) || minus_128;
+  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (!wnarrow && {1'b0, wword} >= 6'(LANES / 4))
+      || wrow_bad || minus_128;
   assign we_o = config_write && to_weight && !weight_bad;
   assign wlayer_o = wlayer;
   assign wrow_o = wrow;
@@ -132,15 +143,17 @@ module sf_csr #(
   wire [7:0] c3_in = n_in_q[39:32];
   wire [7:0] c3_out = n_out_q[39:32];
   wire [8:0] n_h = {1'b0, d2_out} - 9'd1;
-  wire bad_size = d1_in == 8'd0 || d1_in > 8'd32 || d1_out == 8'd0 || d1_out > 8'(LANES) || d2_in != d1_out
-      || d2_out == 8'd0 || d2_out > 8'd16 || c1_in == 8'd0 || {1'b0, c1_in} < n_h || {1'b0, c1_in} > n_h + 9'd16
-      || c1_out == 8'd0 || c1_out > 8'(LANES) || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'(LANES)
+  wire decodes = d1_out == 8'd0;
+  wire bad_density = d1_in == 8'd0 || d1_in > 8'd32 || d1_out > 8'(LANES) || d2_in != d1_out || d2_out == 8'd0
+      || d2_out > 8'd16 || {1'b0, c1_in} < n_h || {1'b0, c1_in} > n_h + 9'd16;
+  wire bad_decoder = d1_in != 8'd0 || d2_in != 8'd0 || d2_out != 8'd0 || c1_in > 8'(sf_arch_pkg::DIR_MAX);
+  wire bad_size = (decodes ? bad_decoder : bad_density) || bias_q[13] || c1_in == 8'd0 || c1_out == 8'd0 || c1_out > 8'(LANES) || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'(LANES)
       || c3_in != c2_out || c3_out != 8'd3;
   wire bad_steps = steps_q == 4'd0 || steps_q > 4'd8;
   localparam [12:0] LEAK_ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
   wire bad_leak = k_q[12:0] > LEAK_ONE || k_q[25:13] > LEAK_ONE || k_q[38:26] > LEAK_ONE || k_q[51:39] > LEAK_ONE
       || k_q[64:52] > LEAK_ONE;
-  wire bad_theta = theta_q[23:0] == 24'd0 || theta_q[71:48] == 24'd0 || theta_q[95:72] == 24'd0;
+  wire bad_theta = (!decodes && theta_q[23:0] == 24'd0) || theta_q[71:48] == 24'd0 || theta_q[95:72] == 24'd0;
   wire bad_mode = mode_q == 2'd3;
   wire bad_scale = exp_mul_q[16] || sigmoid_mul_q[16] || exp_shift_q[5] || sigmoid_shift_q[5];
   wire bad_config = bad_size || bad_steps || bad_leak || bad_theta || bad_mode || bad_scale;
@@ -198,7 +211,8 @@ module sf_csr #(
       n_out_q <= 40'd0;
       k_q <= 65'd0;
       theta_q <= 120'd0;
-      weight_address_q <= 15'd0;
+      bias_q <= 14'd0;
+      weight_address_q <= 16'd0;
     end else if (table_write) begin
       case (table_field)
         2'd0: n_in_q[8*table_layer+:8] <= size_w;
@@ -216,8 +230,9 @@ module sf_csr #(
         sf_csr_pkg::SIGMOID_MUL: sigmoid_mul_q <= mul_w;
         sf_csr_pkg::SIGMOID_SHIFT: sigmoid_shift_q <= shift_w;
         sf_csr_pkg::SIGMOID_BIAS: sigmoid_bias_q <= wdata_i;
-        sf_csr_pkg::WEIGHT_ADDRESS: weight_address_q <= |wdata_i[31:15] ? 15'h7fff : wdata_i[14:0];
-        default: weight_address_q <= weight_address_q + 15'd1;  // WEIGHT_DATA
+        sf_csr_pkg::WEIGHT_ADDRESS: weight_address_q <= |wdata_i[31:16] ? 16'hffff : wdata_i[15:0];
+        sf_csr_pkg::BIAS: bias_q <= bias_w;
+        default: weight_address_q <= weight_address_q + 16'd1;  // WEIGHT_DATA
       endcase
     end
   end
@@ -230,6 +245,7 @@ module sf_csr #(
   wire [12:0] rtable_offset = ra - sf_csr_pkg::D1_N_IN;
   wire [2:0] rlayer = rtable_offset[6:4];
   wire [1:0] rfield = ra[3:2];
+  wire [31:0] bias_r = {13'd0, bias_q[13:11], 5'd0, bias_q[10:0]};
   reg [31:0] rdata_d;
   always_comb begin
     case (ra)
@@ -248,7 +264,8 @@ module sf_csr #(
       sf_csr_pkg::SIGMOID_MUL: rdata_d = {15'd0, sigmoid_mul_q};
       sf_csr_pkg::SIGMOID_SHIFT: rdata_d = {26'd0, sigmoid_shift_q};
       sf_csr_pkg::SIGMOID_BIAS: rdata_d = sigmoid_bias_q;
-      sf_csr_pkg::WEIGHT_ADDRESS: rdata_d = {17'd0, weight_address_q};
+      sf_csr_pkg::WEIGHT_ADDRESS: rdata_d = {16'd0, weight_address_q};
+      sf_csr_pkg::BIAS: rdata_d = bias_r;
       default: begin
         rdata_d = 32'd0;
         if (ra >= sf_csr_pkg::D1_N_IN && ra <= sf_csr_pkg::C3_THETA) begin
@@ -301,6 +318,7 @@ module sf_csr #(
   assign n_out_o = n_out_q;
   assign k_o = k_q;
   assign theta_o = theta_q;
+  assign bias_o = bias_q[12:0];
   wire unused_ok = &{1'b0, awaddr_i[1:0], araddr_i[1:0], table_offset[12:7], table_offset[3:0], rtable_offset[12:7],
                      rtable_offset[3:0]};
 endmodule

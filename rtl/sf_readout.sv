@@ -6,6 +6,7 @@ module sf_readout (
     input  wire        clk_i,
     input  wire        rst_ni,
     input  wire        clear_i,
+    input  wire        decodes_i,        // no densities: 0 is their result
     // currents of a sample: {step, output}, 16 bits each
     output wire        density_ready_o,  // they may come in the next cycle
     input  wire        density_valid_i,
@@ -63,6 +64,7 @@ module sf_readout (
   wire start_colour = free && colour_waits && !done_q && !(valid1_q && colour1_q) && !(valid2_q && colour2_q);
   wire start_density = free && !start_colour && density_full_q && !(run_q && !colour_q);
   wire out = valid_o && ready_i;
+  wire pop = out && !decodes_i;
   wire push = valid2_q && last2_q && !colour2_q;
 
   wire [17:0] argument;
@@ -114,10 +116,10 @@ module sf_readout (
       valid2_q <= valid1_q;
       if (valid2_q && last2_q && colour2_q) done_q <= 1'b1;
       else if (out) done_q <= 1'b0;
-      queue_room_q <= queue_room_q + {3'd0, out} - {3'd0, density_valid_i};
-      queue_count_q <= queue_count_q + {3'd0, push} - {3'd0, out};
+      queue_room_q <= queue_room_q + {3'd0, pop} - {3'd0, density_valid_i};
+      queue_count_q <= queue_count_q + {3'd0, push} - {3'd0, pop};
       if (push) queue_write_q <= queue_write_q + 3'd1;
-      if (out) queue_read_q <= queue_read_q + 3'd1;
+      if (pop) queue_read_q <= queue_read_q + 3'd1;
     end
   end
 
@@ -160,8 +162,8 @@ module sf_readout (
   assign update_o = valid2_q;
   assign update_colour_o = colour2_q;
   assign update_step_o = step2_q;
-  assign valid_o = done_q && queue_count_q != 4'd0;
-  assign sigma_o = queue_q[queue_read_q];
+  assign valid_o = done_q && (decodes_i || queue_count_q != 4'd0);
+  assign sigma_o = decodes_i ? 28'd0 : queue_q[queue_read_q];
   assign colour_o = {colour_acc_q[2], colour_acc_q[1], colour_acc_q[0]};
 endmodule
 

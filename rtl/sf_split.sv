@@ -1,5 +1,5 @@
 // D2 and C3: 16 outputs for all 8 steps at once; two neurons that fired at any step are added per cycle, each to the
-// steps at which it fired. Mirror: src/fx/current.c. Width: |sum| <= 128 * 127 < 2^15.
+// steps at which it fired. C3's biases count at every step. Mirror: src/fx/current.c. Width: |sum| <= 129 * 127 < 2^15.
 `default_nettype none
 
 module sf_split #(
@@ -10,8 +10,10 @@ module sf_split #(
     input  wire               clk_i,
     input  wire               rst_ni,
     input  wire               clear_i,
-    // weights, by neuron of the layer before
+    // weights, by neuron of the layer before; the biases
+    input  wire               bias_i,
     input  wire               we_i,
+    input  wire               bias_we_i,
     input  wire [     BITS:0] wrow_i,
     input  wire        [ 1:0] wword_i,
     input  wire        [31:0] wdata_i,
@@ -104,6 +106,12 @@ module sf_split #(
   end
   always_ff @(posedge clk_i) first_q <= fresh_q;
 
+  reg [127:0] bias_q;
+  wire [127:0] bias = bias_i ? bias_q : 128'd0;
+  always_ff @(posedge clk_i) begin
+    if (bias_we_i) bias_q[32*wword_i+:32] <= wdata_i;
+  end
+
   reg signed [15:0] acc_q[0:127];
   reg [2047:0] sums;  // names a whole row within one operation, not a register
   always_ff @(posedge clk_i) begin
@@ -113,7 +121,7 @@ module sf_split #(
     end
     if (op_q) begin
       if (first_q) begin
-        for (int l = 0; l < 128; l++) acc_q[l] = 16'sd0;
+        for (int l = 0; l < 128; l++) acc_q[l] = 16'($signed(bias[8*(l&15)+:8]));
       end
       for (int t = 0; t < 8; t++) begin
         if (even_q[t]) begin

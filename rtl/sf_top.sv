@@ -55,9 +55,10 @@ module sf_top #(
   wire [39:0] n_in, n_out;
   wire [64:0] k;
   wire [119:0] theta;
+  wire [12:0] bias;
   wire we;
   wire [2:0] wlayer;
-  wire [6:0] wrow;
+  wire [7:0] wrow;
   wire [4:0] wword;
   wire [31:0] wweights;
   wire running, soft_reset, clear_counters, snapshot, counters_busy, error_packet, error_value;
@@ -66,12 +67,12 @@ module sf_top #(
 
   wire sample_valid, sample_first, sample_done, input_empty;
   wire [4:0] feature_index;
-  wire [3:0] dir_index;
+  wire [7:0] dir_index;
   wire [11:0] feature, dir;
   wire hold, core_idle, readout_idle, stall_out;
   wire density_ready, density_valid, colour_ready, colour_valid;
   wire [2047:0] density_current, colour_current;
-  wire d1_row, c1_row, ray;
+  wire d1_row, c1_row, c1_bias_row, ray;
   wire [1:0] c2_rows;
   wire [2:0] c1_step, c2_step, spikes_valid, spikes_step, update_step;
   wire [15:0] d2_fired, c3_fired;
@@ -81,7 +82,8 @@ module sf_top #(
   wire [27:0] sigma;
   wire [59:0] colour;
   wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
-  wire [7:0] n_dir = n_in[23:16] - (n_out[15:8] - 8'd1);
+  wire decodes = n_out[7:0] == 8'd0;
+  wire [7:0] n_dir = decodes ? n_in[23:16] : n_in[23:16] - (n_out[15:8] - 8'd1);
 
   // The tap's ports are as wide as the widest build's.
   wire [LANES-1:0] tap_spikes, tap_rows;
@@ -125,6 +127,7 @@ module sf_top #(
       .n_out_o        (n_out),
       .k_o            (k),
       .theta_o        (theta),
+      .bias_o         (bias),
       .we_o           (we),
       .wlayer_o       (wlayer),
       .wrow_o         (wrow),
@@ -148,7 +151,7 @@ module sf_top #(
       .clear_i        (soft_reset),
       .enable_i       (running),
       .n_feature_i    (n_in[5:0]),
-      .n_dir_i        (n_dir[4:0]),
+      .n_dir_i        (n_dir),
       .tvalid_i       (s_axis_tvalid_i),
       .tready_o       (s_axis_tready_o),
       .tdata_i        (s_axis_tdata_i),
@@ -184,6 +187,7 @@ module sf_top #(
       .n_out_i        (n_out),
       .k_i            (k),
       .theta_i        (theta),
+      .bias_i         (bias),
       .mode_i         (mode),
       .steps_i        (steps),
       .sample_valid_i (sample_valid),
@@ -201,6 +205,7 @@ module sf_top #(
       .colour_o       (colour_current),
       .d1_row_o       (d1_row),
       .c1_row_o       (c1_row),
+      .c1_bias_row_o  (c1_bias_row),
       .c1_step_o      (c1_step),
       .c2_rows_o      (c2_rows),
       .c2_step_o      (c2_step),
@@ -223,6 +228,7 @@ module sf_top #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
+      .decodes_i      (decodes),
       .density_ready_o(density_ready),
       .density_valid_i(density_valid),
       .density_i      (density_current),
@@ -268,7 +274,9 @@ module sf_top #(
       .rst_ni         (rst_ni),
       .n_out_i        (n_out),
       .d1_row_i       (d1_row),
+      .bias_i         (bias[12:11]),
       .c1_row_i       (c1_row),
+      .c1_bias_row_i  (c1_bias_row),
       .c1_step_i      (c1_step),
       .c2_rows_i      (c2_rows),
       .c2_step_i      (c2_step),
@@ -293,7 +301,6 @@ module sf_top #(
       .index_i        (counter_index),
       .counter_o      (counter)
   );
-  wire unused_ok = &{1'b0, n_dir[7:5]};
 
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
   initial begin

@@ -9,7 +9,7 @@ typedef struct entry {
   fx_ray ray;
   uint64_t number, sample; /* ray, sample of the ray */
   bool first;
-  int16_t f[SF_FEATURE_MAX];
+  int16_t f[SF_DIR_MAX]; /* [fx_net_inputs] */
   fx_out out;
   fx_trace trace;
 } entry;
@@ -59,8 +59,7 @@ static sf_status locate_count(const sf_cosim *c, sf_dut *dut, sf_cosim_place *pl
     const sf_dut_sample sample = {.ray = &e->ray, .first = e->first || i == 0, .f = e->f};
     sf_dut_result result;
     fx_counts actual;
-    if (sample.first) fx_net_direction(&c->scene->net, e->ray.dir, base, &expected);
-    fx_net_sample(&c->scene->net, e->f, base, &out, &trace, &expected);
+    fx_net_next(&c->scene->net, e->ray.dir, sample.first, e->f, base, &out, &trace, &expected);
     SF_TRY(sf_dut_run(dut, &sample, 1, &result));
     SF_TRY(sf_dut_counts(dut, &actual, NULL, NULL, NULL));
     if (sf_compare_counts(&expected, &actual, result.cycle, &place->what)) continue;
@@ -167,9 +166,8 @@ static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16
   e->sample = c->sample++;
   e->first = first;
   memset(e->f, 0, sizeof e->f);
-  memcpy(e->f, f, (size_t)c->scene->net.layer[FX_D1].n_in * sizeof *f);
-  if (first) fx_net_direction(&c->scene->net, ray->dir, c->base, &c->expected);
-  fx_net_sample(&c->scene->net, e->f, c->base, &e->out, &e->trace, &c->expected);
+  memcpy(e->f, f, (size_t)fx_net_inputs(&c->scene->net) * sizeof *f);
+  fx_net_next(&c->scene->net, ray->dir, first, e->f, c->base, &e->out, &e->trace, &c->expected);
   *out = e->out;
   return c->n == CHUNK ? flush(c) : sf_ok();
 }

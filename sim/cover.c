@@ -60,7 +60,9 @@ void sf_cover_sample(const fx_net *net, const fx_trace *core, const sf_dut_resul
   sf_cover *cover = sf_cover_open();
   if (!cover) return;
   hit(&cover->steps[net->mode][net->steps - 1]);
-  for (int l = 0; l < SF_LAYERS; l++)
+  const bool decodes = fx_net_decodes(net), biased = net->layer[FX_C2].bias != 0;
+  hit(&cover->inputs[decodes][biased]);
+  for (int l = decodes ? FX_C1 : FX_D1; l < SF_LAYERS; l++)
     for (int t = 0; t < net->steps; t++) cover_beat(cover, net, core, result, l, t);
   sf_cover_close(cover);
 }

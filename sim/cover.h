@@ -23,6 +23,7 @@ typedef struct sf_cover {
    * beat. */
   uint64_t beat[SF_LAYERS][SF_COVER_MODES][SF_T_MAX][2][2];
   uint64_t steps[SF_COVER_MODES][SF_T_MAX];    /* samples by mode and number of steps - 1 */
+  uint64_t inputs[2][2];                       /* with densities, decoder; without and with biases of C2 */
   uint64_t silent[SF_LAYERS], full[SF_LAYERS]; /* bitmaps with no neuron, with every neuron */
   uint64_t error[SF_COVER_ERRORS];             /* reads that found the bit of ERROR set */
   uint64_t reset[SF_PHASES];                   /* soft resets */

@@ -11,7 +11,7 @@ sf_net_blob sf_dut_blob(const fx_net *net)
                       .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->w};
+    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias, layer->w};
   }
   return blob;
 }
@@ -33,6 +33,7 @@ static int pack_all(uint64_t *words, const int16_t *value, int n)
 int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
 {
   const int n_dir = fx_net_constants(net);
+  if (fx_net_decodes(net)) return pack_all(words, sample->f, n_dir);
   const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
   return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
 }

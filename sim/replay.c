@@ -26,8 +26,7 @@ static bool compare_samples(const play *p, fx_counts *expected, sf_replayed *rep
   fx_trace trace;
   fx_out out;
   for (int i = 0; i < p->replay->count; i++) {
-    if (p->input[i].first) fx_net_direction(p->net, p->ray[i].dir, base, expected);
-    fx_net_sample(p->net, p->input[i].f, base, &out, &trace, expected);
+    fx_net_next(p->net, p->ray[i].dir, p->input[i].first, p->input[i].f, base, &out, &trace, expected);
     replayed->at = i;
     if (!sf_compare_sample(p->net, &trace, &out, &p->result[i], &p->trace[i], &replayed->what)) return false;
   }

@@ -24,7 +24,7 @@ static cJSON *sample_json(const sf_replay_sample *s)
   sf_json_add_u64(json, "sample", s->sample);
   cJSON_AddBoolToObject(json, "first", s->first);
   cJSON_AddItemToObject(json, "direction", values_json(s->dir, FX_SH));
-  cJSON_AddItemToObject(json, "features", values_json(s->f, SF_FEATURE_MAX));
+  cJSON_AddItemToObject(json, "features", values_json(s->f, SF_DIR_MAX));
   return json;
 }
 
@@ -83,8 +83,8 @@ static sf_status load_values(const cJSON *json, const char *path, const char *ke
 {
   const cJSON *array = cJSON_GetObjectItemCaseSensitive(json, key), *item;
   int i = 0;
-  if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) != n)
-    return sf_fail(SF_E_FORMAT, "%s: %s of a sample is no array of %d values", path, key, n);
+  if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) > n)
+    return sf_fail(SF_E_FORMAT, "%s: %s of a sample is no array of at most %d values", path, key, n);
   cJSON_ArrayForEach(item, array)
   {
     if (!cJSON_IsNumber(item) || item->valuedouble != item->valueint || abs(item->valueint) > INPUT_MAX)
@@ -104,7 +104,7 @@ static sf_status load_sample(const cJSON *json, const char *path, sf_replay_samp
   s->sample = (uint64_t)sample;
   s->first = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "first"));
   SF_TRY(load_values(json, path, "direction", FX_SH, s->dir));
-  return load_values(json, path, "features", SF_FEATURE_MAX, s->f);
+  return load_values(json, path, "features", SF_DIR_MAX, s->f);
 }
 
 static sf_status load_samples(const cJSON *json, const char *path, sf_replay *replay)

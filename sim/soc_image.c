@@ -17,7 +17,7 @@ static size_t aligned(size_t at)
 static size_t net_bytes(const fx_net *net)
 {
   size_t rows = 0;
-  for (int l = 0; l < SF_LAYERS; l++) rows += (size_t)net->layer[l].n_in;
+  for (int l = 0; l < SF_LAYERS; l++) rows += (size_t)fx_layer_rows(&net->layer[l]);
   return SF_BLOB_WORDS * 4 + rows * SF_LANES;
 }
 
@@ -53,10 +53,11 @@ static void put_net(uint8_t *to, const fx_net *net)
   uint8_t *weights = to + SF_BLOB_WORDS * 4;
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta};
+    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias};
     put_words(to + 4 * (SF_BLOB_HEADER_WORDS + l * SF_BLOB_LAYER_WORDS), field, SF_BLOB_LAYER_WORDS);
-    memcpy(weights, layer->w, (size_t)layer->n_in * SF_LANES);
-    weights += (size_t)layer->n_in * SF_LANES;
+    const size_t size = (size_t)fx_layer_rows(layer) * SF_LANES;
+    memcpy(weights, layer->w, size);
+    weights += size;
   }
 }
 

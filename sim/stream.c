@@ -28,7 +28,7 @@ static void offer(run *r)
   if (r->beat == 0) r->beats = sf_dut_packet(&r->dut->net, &r->sample[r->sent], r->packet);
   in->s_valid = true;
   in->s_data = r->packet[r->beat];
-  in->s_user = r->beat == 0 && r->sample[r->sent].first;
+  in->s_user = r->beat == 0 && (r->sample[r->sent].first || fx_net_decodes(&r->dut->net));
   in->s_last = r->beat == r->beats - 1;
 }
 
@@ -75,6 +75,7 @@ static bool is_spiking(int layer)
 
 static int taps_per_sample(const run *r, int layer)
 {
+  if (r->dut->net.layer[layer].n_out == 0) return 0;
   return is_spiking(layer) ? r->dut->net.steps : 1;
 }
 

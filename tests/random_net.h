@@ -39,8 +39,9 @@ static inline int8_t draw_weight(random_source *r, int kind, int i, int o)
 
 static inline void draw_weights(random_source *r, fx_layer *layer, int kind)
 {
-  memset(layer->w, 0, (size_t)layer->n_in * SF_LANES);
-  for (int i = 0; i < layer->n_in; i++)
+  const int rows = fx_layer_rows(layer);
+  memset(layer->w, 0, (size_t)rows * SF_LANES);
+  for (int i = 0; i < rows; i++)
     for (int o = 0; o < layer->n_out; o++) layer->w[i * SF_LANES + o] = draw_weight(r, kind, i, o);
 }
 
@@ -62,7 +63,7 @@ static inline int32_t draw_theta(random_source *r, int64_t typical)
 
 typedef struct random_net {
   fx_net net;
-  int8_t weights[SF_LAYERS][SF_LANES * SF_LANES];
+  int8_t weights[SF_LAYERS][(SF_DIR_MAX + 1) * SF_LANES];
 } random_net;
 
 static inline void net_sizes(fx_net *net, int n_feature, int hidden, int n_h, int n_dir, int hidden2, int hidden3)
@@ -77,6 +78,34 @@ static inline void bind_weights(random_net *n)
   for (int l = 0; l < SF_LAYERS; l++) n->net.layer[l].w = n->weights[l];
 }
 
+/* Of each of C1, C2 and C3 with an even chance; C1's value at its rails more often than chance would. */
+static inline void draw_biases(random_source *r, fx_net *net)
+{
+  const int64_t kind = draw(r, 0, 7);
+  net->layer[FX_C1].bias = kind == 0 ? 1 : kind == 1 ? 2047 : kind < 4 ? (int32_t)draw(r, 1, 2047) : 0;
+  net->layer[FX_C2].bias = (int32_t)draw(r, 0, 1);
+  net->layer[FX_C3].bias = (int32_t)draw(r, 0, 1);
+}
+
+static inline void random_net_fill(random_net *n, random_source *r, bool extreme);
+
+/* A decoder: n_in constant inputs. extreme: as random_net_make, its sizes, too, but for n_in. */
+static inline void random_decoder_make(random_net *n, random_source *r, int n_in, bool extreme)
+{
+  memset(n, 0, sizeof *n);
+  bind_weights(n);
+  fx_layer *l = n->net.layer;
+  l[FX_C1].n_in = n_in;
+  l[FX_C1].n_out = l[FX_C2].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, 128) : 128;
+  l[FX_C2].n_out = l[FX_C3].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, 128) : 128;
+  l[FX_C3].n_out = 3;
+  if (extreme)
+    draw_biases(r, &n->net);
+  else
+    l[FX_C1].bias = 1000, l[FX_C2].bias = l[FX_C3].bias = 1;
+  random_net_fill(n, r, extreme);
+}
+
 /* extreme: weights, leaks and thresholds from the corners too; else a net that behaves like a trained one. */
 static inline void random_net_make(random_net *n, random_source *r, bool extreme)
 {
@@ -88,7 +117,16 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
   net_sizes(net, full ? 32 : 2 * (int)draw(r, 1, 16), full ? 128 : (int)draw(r, 1, 128), n_h,
             full ? 16 : (int)draw(r, n_h ? 0 : 1, 16), full ? 128 : (int)draw(r, 1, 128),
             full ? 128 : (int)draw(r, 1, 128));
-  const int64_t typical[SF_LAYERS] = {300000, 0, 200000, 100000, 0};
+  if (extreme) draw_biases(r, net);
+  random_net_fill(n, r, extreme);
+}
+
+/* Weights and all else but the sizes. Thresholds go with the width of the currents' sum. */
+static inline void random_net_fill(random_net *n, random_source *r, bool extreme)
+{
+  fx_net *net = &n->net;
+  const int64_t wide = net->layer[FX_C1].n_in > 32 ? 2 : 1;
+  const int64_t typical[SF_LAYERS] = {fx_net_decodes(net) ? 0 : 300000, 0, wide * 200000, 100000, 0};
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer *layer = &net->layer[l];
     draw_weights(r, layer, extreme && draw(r, 0, 1) ? (int)draw(r, 0, 6) : 0);

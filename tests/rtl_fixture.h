@@ -10,7 +10,7 @@ enum { BATCH = 64, RAYS_PER_BATCH = 8 };
 
 typedef struct batch {
   fx_ray ray[BATCH];
-  int16_t f[BATCH][SF_FEATURE_MAX];
+  int16_t f[BATCH][SF_DIR_MAX];
   sf_dut_sample sample[BATCH];
   fx_trace trace[BATCH];
   fx_out out[BATCH];
@@ -43,7 +43,7 @@ static inline void draw_batch(batch *b, random_source *r, int n, bool extreme)
 {
   for (int i = 0; i < n; i++) {
     draw_values(r, b->ray[i].dir, FX_SH, extreme);
-    draw_values(r, b->f[i], SF_FEATURE_MAX, extreme);
+    draw_values(r, b->f[i], SF_DIR_MAX, extreme);
     b->sample[i] = (sf_dut_sample){&b->ray[i], i == 0 || draw(r, 0, BATCH / RAYS_PER_BATCH - 1) == 0, b->f[i]};
   }
 }
@@ -52,8 +52,7 @@ static inline void expect_core(batch *b, const fx_net *net, int n, fx_counts *co
 {
   int32_t base[SF_LANES] = {0};
   for (int i = 0; i < n; i++) {
-    if (b->sample[i].first) fx_net_direction(net, b->ray[i].dir, base, counts);
-    fx_net_sample(net, b->f[i], base, &b->out[i], &b->trace[i], counts);
+    fx_net_next(net, b->ray[i].dir, b->sample[i].first, b->f[i], base, &b->out[i], &b->trace[i], counts);
   }
 }
 

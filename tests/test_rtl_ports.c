@@ -107,8 +107,18 @@ START_TEST(weights_and_addresses_are_checked)
 {
   typical(47);
   sf_dut *dut = open_dut(&net_of_test.net, 13, 0);
-  static const uint32_t address[] = {5u << 12, 7u << 12 | 127 << 5, 1u << 12 | 4, 4u << 12 | 31,
-                                     32 << 5,  2u << 12 | 40 << 5,  1u << 15};
+  enum { ROW = SF_CSR_WEIGHT_ADDRESS_ROW_LSB, BIAS = SF_BIAS_ROW << ROW, LAYER = SF_CSR_WEIGHT_ADDRESS_LAYER_LSB };
+  static const uint32_t address[] = {
+      5u << LAYER,        7u << LAYER | 127 << ROW, 1u << LAYER | 4,          4u << LAYER | 31,         32 << ROW, BIAS,
+      1u << LAYER | BIAS, 2u << LAYER | 161 << ROW, 3u << LAYER | 128 << ROW, 4u << LAYER | 255 << ROW, 1u << 16};
+  static const uint32_t fits[] = {31 << ROW,          1u << LAYER | 127 << ROW, 2u << LAYER | 159 << ROW,
+                                  2u << LAYER | BIAS, 3u << LAYER | BIAS,       4u << LAYER | BIAS};
+  for (size_t i = 0; i < sizeof fits / sizeof *fits; i++) {
+    sf_driver_reset(&dut->bus);
+    put(dut, SF_CSR_WEIGHT_ADDRESS, fits[i]);
+    put(dut, SF_CSR_WEIGHT_DATA, 1);
+    ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
+  }
   for (size_t i = 0; i < sizeof address / sizeof *address; i++) {
     sf_driver_reset(&dut->bus);
     put(dut, SF_CSR_WEIGHT_ADDRESS, address[i]);
@@ -121,7 +131,7 @@ START_TEST(weights_and_addresses_are_checked)
     put(dut, SF_CSR_WEIGHT_DATA, 0x80u << 8 * byte);
     expect_error(dut, SF_CSR_ERROR_WEIGHT);
   }
-  static const uint32_t nowhere[] = {SF_CSR_ID, SF_CSR_STATUS, 0x098, 0x0fc, 0x800, SF_CSR_COUNTERS, 0x1ffc};
+  static const uint32_t nowhere[] = {SF_CSR_ID, SF_CSR_STATUS, 0x09c, 0x0fc, 0x800, SF_CSR_COUNTERS, 0x1ffc};
   for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
     sf_driver_reset(&dut->bus);
     put(dut, nowhere[i], 1);
@@ -148,8 +158,8 @@ START_TEST(registers_read_back)
     const uint32_t value = SF_CSR_##name == SF_CSR_MODE || SF_CSR_##name == SF_CSR_IRQ_ENABLE ? 1 : 7;                 \
     put(dut, SF_CSR_##name, value);                                                                                    \
     ck_assert_msg(get(dut, SF_CSR_##name) == value, "%s reads %u", #name, get(dut, SF_CSR_##name));                    \
-  }                                                                                                                    \
-  else if (reset) ck_assert_uint_eq(get(dut, SF_CSR_##name), (uint32_t)(reset));
+  } else if (reset)                                                                                                    \
+    ck_assert_uint_eq(get(dut, SF_CSR_##name), (uint32_t)(reset));
 #include "spikefield/csr.def"
 #undef SF_CSR
 #undef SF_CSR_FIELD
@@ -297,10 +307,11 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
   uint32_t at = SF_BLOB_WORDS * 4;
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    const int32_t field[] = {layer->n_in, layer->n_out, layer->k, layer->theta};
-    for (int i = 0; i < 4; i++) put_word(block, SF_BLOB_HEADER_WORDS + 4 * l + i, field[i]);
-    memcpy(block + at, layer->w, (size_t)layer->n_in * SF_LANES);
-    at += (uint32_t)layer->n_in * SF_LANES;
+    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias};
+    for (int i = 0; i < SF_BLOB_LAYER_WORDS; i++)
+      put_word(block, SF_BLOB_HEADER_WORDS + SF_BLOB_LAYER_WORDS * l + i, field[i]);
+    memcpy(block + at, layer->w, (size_t)fx_layer_rows(layer) * SF_LANES);
+    at += (uint32_t)fx_layer_rows(layer) * SF_LANES;
   }
   const int32_t head[] = {SF_BLOB_MAGIC,       SF_BLOB_VERSION,       (int32_t)at,         net->mode,
                           net->steps,          net->exp_in.mul,       net->exp_in.shift,   net->exp_in.bias,
@@ -313,7 +324,9 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
 START_TEST(net_from_memory)
 {
   static uint8_t block[SF_BLOB_WORDS * 4 + SF_LAYERS * SF_LANES * SF_LANES];
+  random_source r = {52, 0};
   typical(52);
+  if (_i) random_decoder_make(&net_of_test, &r, 150, false);
   fx_counts counts = {0};
   const uint32_t size = write_blob(block, &net_of_test.net);
   sf_net_blob net;
@@ -364,7 +377,7 @@ static Suite *suite(void)
   tcase_add_loop_test(ports, bad_packets_are_refused, 0, BAD_PACKETS);
   tcase_add_test(ports, soft_reset_at_any_time);
   tcase_add_test(ports, driver_refuses_another_device);
-  tcase_add_test(ports, net_from_memory);
+  tcase_add_loop_test(ports, net_from_memory, 0, 2);
   tcase_add_test(ports, waveform);
   suite_add_tcase(s, ports);
   return s;

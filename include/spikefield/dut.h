@@ -16,7 +16,7 @@ typedef struct sf_dut_options {
 typedef struct sf_dut_sample {
   const fx_ray *ray;
   bool first;       /* first sample of its ray: the direction is sent with it */
-  const int16_t *f; /* [n_feature] */
+  const int16_t *f; /* [n_feature]; of a decoder, whose rays have no directions, [fx_net_constants] */
 } sf_dut_sample;
 
 /* What the accelerator showed of one sample. */

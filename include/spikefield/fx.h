@@ -73,6 +73,12 @@ static inline int fx_net_constants(const fx_net *net)
   return net->layer[FX_C1].n_in - fx_net_h(net);
 }
 
+/* What every sample brings: features, or the inputs of a decoder. At most SF_DIR_MAX. */
+static inline int fx_net_inputs(const fx_net *net)
+{
+  return fx_net_decodes(net) ? net->layer[FX_C1].n_in : net->layer[FX_D1].n_in;
+}
+
 /* Multiresolution hash grid (Mueller et al. 2022), 2 features per entry.
  * Position in level l: pos = (x * (res[l] - 1) rounded to Q.8) + 1/2, as torch-ngp: see fx/grid.c. */
 enum { FX_LEVELS_MAX = 16, FX_GRID_FEATURES = 2 };
@@ -231,6 +237,12 @@ void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_c
 void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_trace *trace,
                    fx_counts *counts);
 
+/* fx_net_direction where it is due, then fx_net_sample. f[fx_net_inputs], of a density net its features, of a decoder its
+ * inputs; base[SF_LANES] is the caller's and stays along a ray. dir is read for the first sample of a ray; a decoder
+ * needs none. */
+void fx_net_next(const fx_net *net, const int16_t *dir, bool first, const int16_t *f, int32_t *base, fx_out *out,
+                 fx_trace *trace, fx_counts *counts);
+
 /* Grid features of one position. pos[3] Q0.24, f[2*levels]. counts may be NULL. */
 void fx_grid_features(const fx_grid *grid, const uint32_t *pos, int16_t *f, fx_counts *counts);
 
@@ -278,7 +290,7 @@ void fx_composite_end(fx_pixel *pixel, const int32_t *background_q16);
 void fx_pixel_rgba(const fx_pixel *pixel, uint32_t rgba[4]);
 
 /* Called for every sample of fx_render_ray in place of fx_net_sample, when not NULL. `first` is true for the
- * first sample of the ray. The RTL backend and co-simulation plug in here; a non-OK status ends the ray. */
+ * first sample of the ray; f[fx_net_inputs]. The RTL backend and co-simulation plug in here; a non-OK status ends the ray. */
 typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
 /* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */

@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00010001
+#define SF_REG_VERSION_RESET 0x00020000
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
@@ -51,7 +51,7 @@
 
 /* what was refused; every bit also raises IRQ_PENDING.ERROR, W1C */
 #define SF_REG_ERROR 0x0014
-#define SF_REG_ERROR_SIZE_MASK 0x00000001 /* start: a layer is larger than the memory, empty, or does not fit its neighbour */
+#define SF_REG_ERROR_SIZE_MASK 0x00000001 /* start: a layer is larger than the memory, empty, or does not fit its neighbour; or BIAS has other bits */
 #define SF_REG_ERROR_SIZE_SHIFT 0
 #define SF_REG_ERROR_STEPS_MASK 0x00000002 /* start: STEPS is 0 or more than T_MAX */
 #define SF_REG_ERROR_STEPS_SHIFT 1
@@ -108,7 +108,7 @@
 /* signed bias after it, Q.12, RW */
 #define SF_REG_SIGMOID_BIAS 0x003c
 
-/* features, 1..FEATURE_MAX, RW */
+/* features, 1..FEATURE_MAX; 0 in D1 and D2: a decoder, whose samples all bring their inputs of C1, RW */
 #define SF_REG_D1_N_IN 0x0040
 
 /* neurons, 1..LANES, RW */
@@ -132,7 +132,7 @@
 /* ignored, RW */
 #define SF_REG_D2_THETA 0x005c
 
-/* direction features (0..DIR_MAX) + h, RW */
+/* direction features (0..16) + h; of a decoder its inputs, 1..DIR_MAX, RW */
 #define SF_REG_C1_N_IN 0x0060
 
 /* neurons, 1..LANES, RW */
@@ -172,13 +172,22 @@
 #define SF_REG_WEIGHT_ADDRESS 0x0090
 #define SF_REG_WEIGHT_ADDRESS_WORD_MASK 0x0000001f /* output neuron / 4 */
 #define SF_REG_WEIGHT_ADDRESS_WORD_SHIFT 0
-#define SF_REG_WEIGHT_ADDRESS_ROW_MASK 0x00000fe0 /* presynaptic neuron */
+#define SF_REG_WEIGHT_ADDRESS_ROW_MASK 0x00001fe0 /* presynaptic neuron; BIAS_ROW (160) for the biases of C1, C2 and C3 */
 #define SF_REG_WEIGHT_ADDRESS_ROW_SHIFT 5
-#define SF_REG_WEIGHT_ADDRESS_LAYER_MASK 0x00007000 /* 0 D1, 1 D2, 2 C1, 3 C2, 4 C3 */
-#define SF_REG_WEIGHT_ADDRESS_LAYER_SHIFT 12
+#define SF_REG_WEIGHT_ADDRESS_LAYER_MASK 0x0000e000 /* 0 D1, 1 D2, 2 C1, 3 C2, 4 C3 */
+#define SF_REG_WEIGHT_ADDRESS_LAYER_SHIFT 13
 
 /* 4 signed weights, the lowest output neuron in bits 7:0, WO */
 #define SF_REG_WEIGHT_DATA 0x0094
+
+/* layers whose biases count: row 160 of their weights, an input that is always active, RW */
+#define SF_REG_BIAS 0x0098
+#define SF_REG_BIAS_C1_MASK 0x000007ff /* value of that input, 1..2047; 0: none */
+#define SF_REG_BIAS_C1_SHIFT 0
+#define SF_REG_BIAS_C2_MASK 0x00010000 /* it is a spike at every step */
+#define SF_REG_BIAS_C2_SHIFT 16
+#define SF_REG_BIAS_C3_MASK 0x00020000 /* it is a spike at every step */
+#define SF_REG_BIAS_C3_SHIFT 17
 
 /* commands of the ray stream, WO */
 #define SF_REG_RAY_CTRL 0x0400
@@ -232,8 +241,8 @@
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000
 
-/* WEIGHTS: 4 weights a word, word = layer << 12 | row << 5 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 and C1 rows 0..31 */
-#define SF_REG_WEIGHTS_WORDS 20480
+/* WEIGHTS: 4 weights a word, word = layer << 13 | row << 5 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 rows 0..31, C1 rows 0..159, and C1, C2 and C3 row 160, their biases */
+#define SF_REG_WEIGHTS_WORDS 40960
 #define SF_REG_WEIGHTS_BITS 32
 
 /* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this */

@@ -20,9 +20,8 @@ static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16
   sf_kit_sample *s = &d->sample[d->samples++];
   s->ray = d->rays;
   s->first = first;
-  memcpy(s->f, f, (size_t)net->layer[FX_D1].n_in * sizeof *f);
-  if (first) fx_net_direction(net, ray->dir, d->base, &d->counts);
-  fx_net_sample(net, s->f, d->base, &s->out, &s->trace, &d->counts);
+  memcpy(s->f, f, (size_t)fx_net_inputs(net) * sizeof *f);
+  fx_net_next(net, ray->dir, first, s->f, d->base, &s->out, &s->trace, &d->counts);
   d->ray[d->rays].samples++;
   *out = s->out;
   return sf_ok();

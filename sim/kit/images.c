@@ -46,7 +46,7 @@ static sf_status write_weights(sf_kit_output *output, const fx_net *net)
   sf_kit_writer file;
   SF_TRY(sf_kit_begin(output, &file, "weights.hex"));
   for (int l = 0; l < SF_LAYERS; l++)
-    for (int row = 0; row < net->layer[l].n_in; row++) {
+    for (int row = 0; row < fx_layer_rows(&net->layer[l]); row++) {
       for (int lane = SF_LANES - 1; lane >= 0; lane--)
         fprintf(file.writer.file, "%02x", (unsigned)(uint8_t)net->layer[l].w[row * SF_LANES + lane]);
       fputc('\n', file.writer.file);
@@ -67,7 +67,8 @@ static sf_status write_stimulus(sf_kit_output *output, const sf_kit_draw *d, int
     const sf_dut_sample sample = {.ray = &d->ray[s->ray].ray, .first = s->first, .f = s->f};
     const int n = sf_dut_packet(&d->scene->net, &sample, word);
     for (int b = 0; b < n; b++) {
-      const unsigned flags = (b == 0 && s->first ? 2u : 0u) | (b == n - 1 ? 1u : 0u);
+      const unsigned flags =
+          (b == 0 && (s->first || fx_net_decodes(&d->scene->net)) ? 2u : 0u) | (b == n - 1 ? 1u : 0u);
       fprintf(file.writer.file, "%x%016" PRIx64 "\n", flags, word[b]);
     }
     *beats += n;
@@ -191,7 +192,7 @@ static sf_status write_parameters(sf_kit_output *output, const fx_net *net, cons
 {
   sf_kit_writer file;
   int rows = 0;
-  for (int l = 0; l < SF_LAYERS; l++) rows += net->layer[l].n_in;
+  for (int l = 0; l < SF_LAYERS; l++) rows += fx_layer_rows(&net->layer[l]);
   SF_TRY(sf_kit_begin(output, &file, "sf_kit_params.svh"));
   FILE *f = file.writer.file;
   fprintf(f, "// Sizes of this kit and the registers its bench uses.\n");
@@ -201,6 +202,9 @@ static sf_status write_parameters(sf_kit_output *output, const fx_net *net, cons
           (uint32_t)(o->seed ^ o->seed >> 32));
   put_sizes(f, net, "N_IN", false);
   put_sizes(f, net, "N_OUT", true);
+  fprintf(f, "localparam [7:0] BIAS_ROW = 8'd%d;\nlocalparam [4:0] BIASES = 5'b", SF_BIAS_ROW);
+  for (int l = SF_LAYERS - 1; l >= 0; l--) fputc(net->layer[l].bias ? '1' : '0', f);
+  fputs(";  // layers that have them\n", f);
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \
   if (offset < SF_CSR_MODE || offset > SF_CSR_C3_THETA)                                                                \
     fprintf(f, "localparam [12:0] CSR_%s = 13'h%04x;\nlocalparam [31:0] CSR_%s_RESET = 32'h%08x;\n", #name,            \

@@ -36,7 +36,7 @@ typedef struct sf_kit_ray {
 typedef struct sf_kit_sample {
   int ray;
   bool first;
-  int16_t f[SF_FEATURE_MAX];
+  int16_t f[SF_DIR_MAX]; /* [fx_net_inputs] */
   fx_out out;
   fx_trace trace;
 } sf_kit_sample;

@@ -293,10 +293,11 @@ module sf_kit_tb;
     end
   endtask
   task expect_all_taps;
-    integer layer;
-    for (layer = D1; layer <= C3; layer = layer + 1)
-      if (tapped[layer] != (layer == D2 || layer == C3 ? SAMPLES : STEP_BEATS))
-        differ(-1, -1, -1, -1, "tap beats", layer == D2 || layer == C3 ? SAMPLES : STEP_BEATS, tapped[layer]);
+    integer layer, beats;
+    for (layer = D1; layer <= C3; layer = layer + 1) begin
+      beats = N_OUT[8*layer+:8] == 8'd0 ? 0 : layer == D2 || layer == C3 ? SAMPLES : STEP_BEATS;
+      if (tapped[layer] != beats) differ(-1, -1, -1, -1, "tap beats", beats, tapped[layer]);
+    end
   endtask
 
   // ---- counters: 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special
@@ -325,23 +326,22 @@ module sf_kit_tb;
     is_compared = at[5:3] <= C3 || (at[5:3] == 3'd7 && at[8:6] == 3'd0 && at[2:0] <= 3'd1);
   endfunction
 
-  // ---- the kit itself: the weights that are written are those of the weight image
+  // ---- the kit itself: the weights that are written are those of the weight image; a layer's biases follow its rows
   task check_weights;
-    integer i, layer, first_row;
-    reg [14:0] at;
+    integer i, layer, row;
+    reg [15:0] at;
     begin
-      at = 15'd0;
+      at = 16'd0;
       for (i = 0; i < WRITES; i = i + 1) begin
-        if (program_image[i][44:32] == CSR_WEIGHT_ADDRESS) at = program_image[i][14:0];
+        if (program_image[i][44:32] == CSR_WEIGHT_ADDRESS) at = program_image[i][15:0];
         if (program_image[i][44:32] == CSR_WEIGHT_DATA) begin
-          first_row = 0;
-          for (layer = D1; layer < at[14:12]; layer = layer + 1) first_row = first_row + N_IN[8*layer+:8];
-          if (program_image[i][31:0] !== weights[first_row+at[11:5]][32*at[4:0]+:32]) begin
-            $display("DIFFERENCE in the kit: program.hex line %0d is not row %0d of weights.hex", i + 1,
-                     first_row + at[11:5] + 1);
+          row = at[12:5] == BIAS_ROW ? N_IN[8*at[15:13]+:8] : at[12:5];
+          for (layer = D1; layer < at[15:13]; layer = layer + 1) row = row + N_IN[8*layer+:8] + BIASES[layer];
+          if (program_image[i][31:0] !== weights[row][32*at[4:0]+:32]) begin
+            $display("DIFFERENCE in the kit: program.hex line %0d is not row %0d of weights.hex", i + 1, row + 1);
             fail;
           end
-          at = at + 15'd1;
+          at = at + 16'd1;
         end
       end
     end

@@ -50,6 +50,7 @@ typedef struct output {
 
 struct sf_cycle_model {
   uint32_t n_feature, n_dir, n_h, steps;
+  bool decodes, biased; /* C1 takes its inputs from the buffer; its biases take a row */
   sf_cycle_sample ring[RING];
   uint32_t added; /* samples given so far */
   input in;
@@ -69,8 +70,10 @@ sf_cycle_model *sf_cycle_model_create(const fx_net *net)
   sf_cycle_model *m = calloc(1, sizeof *m);
   if (!m) return NULL;
   m->n_feature = (uint32_t)net->layer[FX_D1].n_in;
-  m->n_h = (uint32_t)net->layer[FX_D2].n_out - 1;
-  m->n_dir = (uint32_t)net->layer[FX_C1].n_in - m->n_h;
+  m->n_h = (uint32_t)fx_net_h(net);
+  m->n_dir = (uint32_t)fx_net_constants(net);
+  m->decodes = fx_net_decodes(net);
+  m->biased = net->layer[FX_C1].bias != 0;
   m->steps = (uint32_t)net->steps;
   m->c2.fresh = m->d2.fresh = m->c3.fresh = true;
   m->queue_room = QUEUE;
@@ -121,7 +124,8 @@ static bool active(const sf_cycle_model *m)
   const splitter *split[2] = {&m->d2, &m->c3};
   bool busy = m->in.begun || m->in.full || m->out.full || m->h_full || m->queue_count;
   for (int i = 0; i < 2; i++) {
-    busy = busy || mul[i]->state != START || mul[i]->index || mul[i]->row || mul[i]->last || mul[i]->move || mul[i]->kept;
+    busy =
+        busy || mul[i]->state != START || mul[i]->index || mul[i]->row || mul[i]->last || mul[i]->move || mul[i]->kept;
     busy = busy || !split[i]->fresh || split[i]->wait || split[i]->ready || split[i]->taken || split[i]->taking;
   }
   for (int i = 0; i < SPIKING; i++) busy = busy || m->reserved[i] || m->spikes[i];
@@ -135,7 +139,7 @@ static void tick_input(sf_cycle_model *m, const sf_cycle_model *was, bool done)
   const input *in = &was->in;
   m->in.full -= done;
   if (in->full == 2 || in->sent == was->added) return;
-  const uint32_t n_dir = sample(was, in->sent)->first ? was->n_dir : 0;
+  const uint32_t n_dir = was->decodes || sample(was, in->sent)->first ? was->n_dir : 0;
   const uint32_t beats = (n_dir + 3) / 4 + (was->n_feature + 3) / 4;
   m->in.begun = in->beat + 1 < beats;
   m->in.beat = m->in.begun ? in->beat + 1 : 0;
@@ -148,6 +152,7 @@ static void tick_input(sf_cycle_model *m, const sf_cycle_model *was, bool done)
 static bool tick_d1(sf_cycle_model *m, const sf_cycle_model *was)
 {
   const multiplier *d1 = &was->d1;
+  if (was->decodes) return false;
   const uint32_t n_dir = was->in.full && sample(was, d1->sample)->first ? was->n_dir : 0, next = d1->index + 1;
   const bool last = next >= was->n_feature && next >= n_dir, go = was->in.full && (!last || !was->reserved[D1]);
   m->d1.row = go && d1->index < was->n_feature;
@@ -157,28 +162,30 @@ static bool tick_d1(sf_cycle_model *m, const sf_cycle_model *was)
   if (go && last) m->d1.sample++, m->reserved[D1] = true;
   if (d1->move) m->pending[D1] = true;
   m->totals.busy[FX_D1] += d1->row;
-  m->totals.waits += !was->in.full && active(was);
   return go && last;
 }
 
-static void tick_c1(sf_cycle_model *m, const sf_cycle_model *was)
+/* True where it reads its inputs for the last time. */
+static bool tick_c1(sf_cycle_model *m, const sf_cycle_model *was)
 {
   const multiplier *c1 = &was->c1;
-  const bool direction = c1->state == DIRECTION || (c1->state == START && sample(was, c1->sample)->first);
-  const uint32_t rows = direction ? was->n_dir : was->n_h;
-  const bool rows_last = c1->index + 1 >= rows, last_step = c1->step + 1 == was->steps;
+  const bool starts = c1->state == START, first = starts && sample(was, c1->sample)->first;
+  const bool direction = was->decodes || c1->state == DIRECTION || first;
+  const uint32_t rows = direction ? was->n_dir + was->biased : was->n_h;
+  const bool rows_last = c1->index + 1 >= rows, ends = rows_last && (!direction || was->decodes);
+  const bool last_step = was->decodes || c1->step + 1 == was->steps;
   bool issue = false, last = false;
   if (c1->state == KEEP) {
     m->c1.state = ROWS;
-  } else if (c1->state != START || was->h_full) {
-    last = !direction && rows_last && !was->reserved[C1];
-    issue = direction || !rows_last || last;
+  } else if (!starts || (was->decodes ? was->in.full : was->h_full)) {
+    last = ends && !was->reserved[C1];
+    issue = !ends || last;
     if (issue) {
       m->c1.index = rows_last ? 0 : c1->index + 1;
-      m->c1.state = direction ? rows_last ? KEEP : DIRECTION : last && last_step ? START : ROWS;
+      m->c1.state = last && last_step ? START : !direction ? ROWS : rows_last ? KEEP : DIRECTION;
     }
     if (last) m->c1.step = last_step ? 0 : c1->step + 1, m->reserved[C1] = true;
-    if (last && last_step) m->c1.sample++, m->h_full--;
+    if (last && last_step) m->c1.sample++, m->h_full -= !was->decodes;
   }
   m->c1.row = issue;
   m->c1.kept = c1->state == KEEP;
@@ -186,6 +193,7 @@ static void tick_c1(sf_cycle_model *m, const sf_cycle_model *was)
   m->c1.move = c1->last;
   if (c1->move) m->pending[C1] = true;
   m->totals.busy[FX_C1] += issue && rows > 0;
+  return last && was->decodes;
 }
 
 static void tick_c2(sf_cycle_model *m, const sf_cycle_model *was)
@@ -243,7 +251,7 @@ static void tick_neurons(sf_cycle_model *m, const sf_cycle_model *was, bool dens
     const bool ends = was->step[i] + 1 == was->steps;
     m->spikes_step = was->step[i];
     m->step[i] = ends ? 0 : was->step[i] + 1;
-    if (i == D1 && !ends) continue; /* its current serves all steps */
+    if (!ends && (i == D1 || (i == C1 && was->decodes))) continue; /* its current serves all steps */
     m->reserved[i] = m->pending[i] = false;
   }
 }
@@ -265,24 +273,33 @@ static void tick_readout(sf_cycle_model *m, const sf_cycle_model *was)
   const bool working = (r->valid[0] && r->is_colour[0]) || (r->valid[1] && r->is_colour[1]);
   const bool colour = free_now && r->colour_full && !(r->run && r->colour) && !r->done && !working;
   const bool density = free_now && !colour && r->density_full && !(r->run && !r->colour);
-  const bool ready = !was->out.full || was->out.second, out = r->done && r->count && ready;
-  const bool push = r->valid[1] && r->is_last[1] && !r->is_colour[1];
+  const bool ready = !was->out.full || was->out.second, waits = r->done && (r->count || was->decodes),
+             out = waits && ready;
+  const bool pop = out && !was->decodes, push = r->valid[1] && r->is_last[1] && !r->is_colour[1];
   readout *next = &m->read;
-  if (was->d2.taking) next->density_full = true;
-  else if (ends && !r->colour) next->density_full = false;
-  if (was->c3.taking) next->colour_full = true;
-  else if (ends && r->colour) next->colour_full = false;
+  if (was->d2.taking)
+    next->density_full = true;
+  else if (ends && !r->colour)
+    next->density_full = false;
+  if (was->c3.taking)
+    next->colour_full = true;
+  else if (ends && r->colour)
+    next->colour_full = false;
   next->run = colour || density || (r->run && !ends);
-  if (colour || density) next->colour = colour, next->left = was->steps * (colour ? COLOURS : 1);
-  else next->left = r->left - r->run;
+  if (colour || density)
+    next->colour = colour, next->left = was->steps * (colour ? COLOURS : 1);
+  else
+    next->left = r->left - r->run;
   next->valid[0] = r->run, next->is_colour[0] = r->colour, next->is_last[0] = ends;
   next->valid[1] = r->valid[0], next->is_colour[1] = r->is_colour[0], next->is_last[1] = r->is_last[0];
-  if (r->valid[1] && r->is_last[1] && r->is_colour[1]) next->done = true;
-  else if (out) next->done = false;
-  next->room = r->room + out - was->d2.taking;
-  next->count = r->count + push - out;
+  if (r->valid[1] && r->is_last[1] && r->is_colour[1])
+    next->done = true;
+  else if (out)
+    next->done = false;
+  next->room = r->room + pop - was->d2.taking;
+  next->count = r->count + push - pop;
   m->totals.samples += out;
-  if (ready) m->out.full = r->done && r->count;
+  if (ready) m->out.full = waits;
   if (was->out.full) m->out.second = !was->out.second;
 }
 
@@ -290,9 +307,9 @@ static void tick(sf_cycle_model *m)
 {
   const sf_cycle_model was = *m;
   m->totals.cycles += active(&was);
-  const bool done = tick_d1(m, &was);
-  tick_input(m, &was, done);
-  tick_c1(m, &was);
+  m->totals.waits += !was.in.full && active(&was);
+  const bool d1_done = tick_d1(m, &was), c1_done = tick_c1(m, &was);
+  tick_input(m, &was, d1_done || c1_done);
   tick_c2(m, &was);
   tick_split(&m->d2, &was.d2, sample(&was, was.d2.sample)->d2, &m->totals.busy[FX_D2]);
   tick_split(&m->c3, &was.c3, sample(&was, was.c3.sample)->c3, &m->totals.busy[FX_C3]);
@@ -319,9 +336,11 @@ uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts)
 {
   static const uint64_t rows_per_cycle[SF_LAYERS] = {[FX_D1] = 1, [FX_D2] = 2, [FX_C1] = 1, [FX_C2] = 2, [FX_C3] = 2};
   uint64_t most = 0;
-  for (int l = 0; l < SF_LAYERS; l++) {
+  for (int l = fx_net_decodes(net) ? FX_C1 : FX_D1; l < SF_LAYERS; l++) {
     uint64_t rows = 0;
     for (int t = 0; t < net->steps; t++) rows += counts->layer[l].weight[t] / (uint64_t)net->layer[l].n_out;
+    if (net->layer[l].bias && l == FX_C2) rows -= counts->samples * (uint64_t)net->steps; /* a sum begins with them */
+    if (net->layer[l].bias && l == FX_C3) rows -= counts->samples;
     rows = (rows + rows_per_cycle[l] - 1) / rows_per_cycle[l];
     if (rows > most) most = rows;
   }

@@ -149,3 +149,11 @@ void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_
   if (trace) memcpy(trace->spikes, events.spikes, sizeof events.spikes);
   if (counts) count_events(net, &events, counts);
 }
+
+void fx_net_next(const fx_net *net, const int16_t *dir, bool first, const int16_t *f, int32_t *base, fx_out *out,
+                 fx_trace *trace, fx_counts *counts)
+{
+  const bool decodes = fx_net_decodes(net);
+  if (first || decodes) fx_net_direction(net, decodes ? f : dir, base, counts);
+  fx_net_sample(net, f, base, out, trace, counts);
+}

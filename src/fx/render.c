@@ -13,9 +13,7 @@ typedef struct core {
 static sf_status eval_core(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   core *c = user;
-  const bool decodes = fx_net_decodes(c->net);
-  if (first || decodes) fx_net_direction(c->net, decodes ? f : ray->dir, c->base, c->counts);
-  fx_net_sample(c->net, f, c->base, out, NULL, c->counts);
+  fx_net_next(c->net, ray->dir, first, f, c->base, out, NULL, c->counts);
   return sf_ok();
 }
 

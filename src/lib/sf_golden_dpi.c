@@ -26,8 +26,7 @@ void *sf_golden_open(const char *scene, int steps)
   const spikefield_options options = {.steps = steps};
   if (!g) return NULL;
   g->status = spikefield_scene_open(&g->owner, scene);
-  if (g->status.code == SPIKEFIELD_OK)
-    g->status = lib_status(lib_view(g->owner, &options, &g->scene));
+  if (g->status.code == SPIKEFIELD_OK) g->status = lib_status(lib_view(g->owner, &options, &g->scene));
   g->open = g->status.code == SPIKEFIELD_OK;
   return g;
 }
@@ -88,9 +87,10 @@ static sf_status check_values(const char *what, const int16_t *value, int n)
 }
 
 /* direction NULL: the ray goes on. */
-static sf_status evaluate(golden *g, const int16_t *direction, const int16_t *features)
+static sf_status evaluate(golden *g, const int16_t *direction, const int16_t *features, bool beats)
 {
   const fx_net *net = &g->scene.net;
+  if (!beats && fx_net_decodes(net)) return sf_fail(SF_E_USAGE, "a decoder's samples come as beats");
   if (!direction && !g->have_direction) return sf_fail(SF_E_USAGE, "a sample before the first direction");
   SF_TRY(check_values("feature", features, net->layer[FX_D1].n_in));
   if (direction) SF_TRY(check_values("harmonic", direction, directions(g)));
@@ -118,7 +118,7 @@ int sf_golden_sample(void *handle, int first, const uint32_t direction[8], const
   if (!g || !g->open) return -1;
   unpack(direction, d, FX_SH);
   unpack(features, f, SF_FEATURE_MAX);
-  return finish(g, evaluate(g, first ? d : NULL, f), 1);
+  return finish(g, evaluate(g, first ? d : NULL, f, false), 1);
 }
 
 /* Direction and features are each padded to whole beats. */
@@ -130,6 +130,7 @@ static int padded(int values)
 static sf_status take_beat(golden *g, const int16_t *value, bool user, bool last, bool *whole)
 {
   if (g->values == 0) g->first = user;
+  if (!g->first && fx_net_decodes(&g->scene.net)) return sf_fail(SF_E_FORMAT, "a decoder's sample without tuser");
   const int n_direction = g->first ? padded(directions(g)) : 0;
   const int n = n_direction + padded(g->scene.net.layer[FX_D1].n_in);
   SF_TRY(check_values("value", value, BEAT_VALUES));
@@ -138,7 +139,7 @@ static sf_status take_beat(golden *g, const int16_t *value, bool user, bool last
   *whole = g->values == n;
   if (*whole != last)
     return sf_fail(SF_E_FORMAT, "packet of %d values, expected %d: %s", g->values, n, last ? "too short" : "too long");
-  return *whole ? evaluate(g, g->first ? g->packet : NULL, g->packet + n_direction) : sf_ok();
+  return *whole ? evaluate(g, g->first ? g->packet : NULL, g->packet + n_direction, true) : sf_ok();
 }
 
 int sf_golden_beat(void *handle, uint64_t data, int user, int last)

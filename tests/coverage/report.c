@@ -83,7 +83,8 @@ int main(int argc, char **argv)
                {"spike bitmaps", 0, 0},
                {"errors", 0, 0},
                {"soft reset by phase", 0, 0},
-               {"clear and snapshot", 0, 0}};
+               {"clear and snapshot", 0, 0},
+               {"decoder x biases", 0, 0}};
   sf_cover *cover = sf_cover_open();
   if (!cover) {
     fputs("report: no functional coverage in this build\n", stderr);
@@ -96,6 +97,9 @@ int main(int argc, char **argv)
   for (int i = 0; i < 4; i++)
     bin(&g[5], cover->walk[i / 2][i % 2],
         (const char *[]){"clear, idle", "clear, at work", "snapshot, idle", "snapshot, at work"}[i]);
+  for (int i = 0; i < 4; i++)
+    bin(&g[6], cover->inputs[i / 2][i % 2],
+        (const char *[]){"densities", "densities, biases", "decoder", "decoder, biases"}[i]);
   sf_cover_close(cover);
   return finish(g, (int)(sizeof g / sizeof *g), argc > 1 ? atof(argv[1]) : 0);
 }

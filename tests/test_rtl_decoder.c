@@ -1,0 +1,319 @@
+/* Decoders (C1, C2 and C3 alone, inputs with every sample) and biases on the accelerator against the fixed-point core,
+ * bit for bit, and against the cycle model, in the build that runs the nets with densities. */
+#include "spikefield/cycles.h"
+#include "tests/rtl_fixture.h"
+
+static const int inputs_of[] = {150, 30, SF_DIR_MAX, 1};
+enum { SIZES = sizeof inputs_of / sizeof *inputs_of };
+
+/* Runs the batch that was drawn, on a fresh accelerator without stalls: results, counters, cycles of the model. */
+static void check_cycles(const fx_net *net, int n, uint64_t seed)
+{
+  fx_counts counts = {0}, actual;
+  uint64_t cycles, busy, stalls;
+  sf_dut *dut = open_dut(net, seed, 0);
+  run_batch(dut, net, n, &counts, seed);
+  same_counts(dut, &counts, seed);
+  ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
+  sf_cycle_model *model = sf_cycle_model_create(net);
+  ck_assert_ptr_nonnull(model);
+  for (int i = 0; i < n; i++) {
+    const sf_cycle_sample shape = sf_cycle_sample_make(net, &shared.trace[i], shared.sample[i].first);
+    sf_cycle_model_add(model, &shape);
+  }
+  sf_cycle_model_drain(model);
+  const sf_cycle_totals *totals = sf_cycle_model_totals(model);
+  ck_assert_msg(cycles == totals->cycles, "seed %llu: %llu cycles, the model's are %llu", (unsigned long long)seed,
+                (unsigned long long)cycles, (unsigned long long)totals->cycles);
+  ck_assert_uint_eq(stalls, totals->waits + totals->stalls);
+  for (int l = 0; l < SF_LAYERS; l++) ck_assert_uint_eq(sf_dut_layer_busy(dut)[l], totals->busy[l]);
+  ck_assert_uint_ge(cycles, sf_cycles_least(net, &counts));
+  sf_cycle_model_free(model);
+  sf_dut_close(dut);
+}
+
+START_TEST(trained_size_decoders)
+{
+  random_source r = {300 + (uint64_t)_i, 0};
+  random_decoder_make(&net_of_test, &r, inputs_of[_i], false);
+  fx_counts counts = {0};
+  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 25);
+  for (int i = 0; i < 4; i++) {
+    draw_batch(&shared, &r, BATCH, false);
+    run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
+  }
+  same_counts(dut, &counts, r.seed);
+  ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0); /* the case is not an empty one */
+  if (inputs_of[_i] > 1) ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
+  ck_assert_uint_eq(counts.layer[FX_D1].updates[0] + counts.layer[FX_D2].special[0] + counts.rays, 0);
+  sf_dut_close(dut);
+}
+END_TEST
+
+START_TEST(extreme_decoders)
+{
+  for (uint64_t i = 0; i < 16; i++) {
+    random_source r = {1000 + (uint64_t)_i * 16 + i, 0};
+    random_decoder_make(&net_of_test, &r, draw(&r, 0, 1) ? inputs_of[i % SIZES] : (int)draw(&r, 1, SF_DIR_MAX), true);
+    check_net(&net_of_test.net, &r, 24, true, (int)draw(&r, 0, 3) * 25);
+  }
+}
+END_TEST
+
+/* Every mode with every number of steps, with each set of biases. */
+START_TEST(modes_steps_and_biases)
+{
+  for (int steps = 1; steps <= SF_T_MAX; steps++)
+    for (int biases = 0; biases < 8; biases++) {
+      random_source r = {2000 + (uint64_t)(_i * 64 + steps * 8 + biases), 0};
+      random_decoder_make(&net_of_test, &r, inputs_of[biases % 2], false);
+      fx_net *net = &net_of_test.net;
+      net->mode = _i, net->steps = steps;
+      net->layer[FX_C1].bias = biases & 1 ? 2047 : 0;
+      net->layer[FX_C2].bias = biases >> 1 & 1, net->layer[FX_C3].bias = biases >> 2;
+      check_net(net, &r, 4, true, 10);
+    }
+}
+END_TEST
+
+START_TEST(cycles_are_those_of_the_model)
+{
+  for (uint64_t i = 0; i < 8; i++) {
+    random_source r = {5000 + (uint64_t)_i * 8 + i, 0};
+    random_decoder_make(&net_of_test, &r, _i ? (int)draw(&r, 1, SF_DIR_MAX) : inputs_of[i % SIZES], _i > 0);
+    net_of_test.net.steps = (int)draw(&r, 1, SF_T_MAX);
+    draw_batch(&shared, &r, BATCH, _i > 0);
+    check_cycles(&net_of_test.net, BATCH, r.seed);
+  }
+}
+END_TEST
+
+/* One row of 150 inputs and one of biases per cycle, sample after sample: no cycle is lost between two of them. */
+START_TEST(a_sample_takes_a_cycle_per_row)
+{
+  random_source r = {6000, 0};
+  random_decoder_make(&net_of_test, &r, 150, false);
+  net_of_test.net.steps = 2;
+  draw_batch(&shared, &r, BATCH, false);
+  fx_counts counts = {0}, actual;
+  uint64_t cycles, busy, stalls;
+  sf_dut *dut = open_dut(&net_of_test.net, 1, 0);
+  run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
+  ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
+  ck_assert_uint_eq(sf_dut_layer_busy(dut)[FX_C1], 151 * BATCH);
+  ck_assert_uint_lt(cycles, 151 * BATCH + 250); /* the first packet, the last sample's C2 and C3 */
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* ---- hard cases ---- */
+
+static void fill_row(fx_layer *layer, int row, int8_t w)
+{
+  for (int o = 0; o < layer->n_out; o++) layer->w[row * SF_LANES + o] = w;
+}
+
+/* 0, 1: every weight and bias at the same rail, inputs too; 2, 3: biases alone, the rest is 0: C1 silent or every
+ * neuron fires at every step; 4: zero inputs; 5: inputs against the bias. */
+START_TEST(hard_cases)
+{
+  for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++) {
+    random_source r = {7000 + (uint64_t)mode, 0};
+    random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
+    fx_net *net = &net_of_test.net;
+    net->mode = mode, net->steps = SF_T_MAX;
+    net->layer[FX_C1].bias = 2047;
+    draw_batch(&shared, &r, 4, false);
+    for (int l = FX_C1; l <= FX_C3; l++) {
+      fx_layer *layer = &net->layer[l];
+      for (int i = 0; i < fx_layer_rows(layer) && _i != 4; i++)
+        fill_row(layer, i, (int8_t)(_i == 0 ? 127 : _i == 1 ? -127 : _i == 5 ? -127 : 0));
+      if (_i == 2) fill_row(layer, layer->n_in, l == FX_C1 ? -127 : 127);
+      if (_i == 3 || _i == 5) fill_row(layer, layer->n_in, 127);
+      if (_i == 3 && l != FX_C3) layer->theta = 1, layer->k = 4096;
+    }
+    for (int i = 0; i < 4; i++)
+      for (int j = 0; j < SF_DIR_MAX; j++) shared.f[i][j] = (int16_t)(_i == 4 ? 0 : i % 2 ? 2047 : -2047);
+    check_cycles(net, 4, r.seed);
+    if (_i == 2) ck_assert_uint_eq(shared.trace[0].spikes[FX_C1][0][0] | shared.trace[0].spikes[FX_C1][7][1], 0);
+    if (_i == 2) ck_assert_int_eq(shared.trace[1].current[FX_C2][7][5], 127);
+    if (_i == 3) ck_assert_uint_eq(shared.trace[0].spikes[FX_C1][0][0], UINT64_MAX);
+    if (_i < 2) ck_assert_int_eq(abs(shared.trace[1].current[FX_C1][0][0]), (1 << 23) - !_i);
+  }
+}
+END_TEST
+
+/* ---- the same build ---- */
+
+static void next_net(sf_dut *dut, random_source *r, bool decoder)
+{
+  fx_counts counts = {0};
+  if (decoder)
+    random_decoder_make(&net_of_test, r, draw(r, 0, 1) ? 150 : 30, true);
+  else
+    random_net_make(&net_of_test, r, true);
+  ck_ok(sf_dut_load(dut, &net_of_test.net));
+  draw_batch(&shared, r, 24, true);
+  run_batch(dut, &net_of_test.net, 24, &counts, r->seed);
+  same_counts(dut, &counts, r->seed);
+}
+
+/* An INGP net, a decoder, and an INGP net again, and so on, in one simulation without a reset of the block. */
+START_TEST(nets_take_turns)
+{
+  random_source r = {8000 + (uint64_t)_i, 0};
+  random_net_make(&net_of_test, &r, true);
+  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
+  for (int i = 0; i < 7; i++) next_net(dut, &r, i % 2);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* With densities and biases: the direction's row of biases once a ray, C2's and C3's cost no cycle. */
+START_TEST(biases_of_other_nets)
+{
+  for (uint64_t i = 0; i < 8; i++) {
+    random_source r = {9000 + (uint64_t)_i * 8 + i, 0};
+    random_net_make(&net_of_test, &r, i % 2);
+    fx_layer *l = net_of_test.net.layer;
+    for (int id = FX_C1; id <= FX_C3; id++) {
+      l[id].bias = id == FX_C1 ? (int32_t)draw(&r, 1, 2047) : 1;
+      for (int o = 0; o < l[id].n_out; o++) l[id].w[l[id].n_in * SF_LANES + o] = (int8_t)draw(&r, -127, 127);
+    }
+    draw_batch(&shared, &r, BATCH, i % 2);
+    check_cycles(&net_of_test.net, BATCH, r.seed);
+  }
+}
+END_TEST
+
+/* ---- refused ---- */
+
+static void put(sf_dut *dut, uint32_t offset, uint32_t value)
+{
+  dut->bus.write(dut->bus.context, offset, value);
+}
+
+static uint32_t error_of(sf_dut *dut)
+{
+  return dut->bus.read(dut->bus.context, SF_CSR_ERROR);
+}
+
+START_TEST(illegal_programming_is_refused)
+{
+  static const struct {
+    uint32_t offset, value, error;
+  } bad[] = {{SF_CSR_D1_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D1_N_OUT, 1, SF_CSR_ERROR_SIZE},
+             {SF_CSR_D2_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D2_N_OUT, 1, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C1_N_IN, 0, SF_CSR_ERROR_SIZE},         {SF_CSR_C1_N_IN, 161, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C1_N_IN, 256 + 150, SF_CSR_ERROR_SIZE}, {SF_CSR_C1_N_OUT, 0, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C2_N_OUT, 129, SF_CSR_ERROR_SIZE},      {SF_CSR_C3_N_OUT, 1, SF_CSR_ERROR_SIZE},
+             {SF_CSR_BIAS, 1u << 11, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 15, SF_CSR_ERROR_SIZE},
+             {SF_CSR_BIAS, 1u << 18, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 31, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C1_THETA, 0, SF_CSR_ERROR_THETA},       {SF_CSR_C2_K, 4097, SF_CSR_ERROR_LEAK},
+             {SF_CSR_STEPS, 9, SF_CSR_ERROR_STEPS}};
+  random_source r = {10, 0};
+  fx_counts counts = {0};
+  random_decoder_make(&net_of_test, &r, 150, false);
+  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
+  sf_dut *dut = open_dut(&net_of_test.net, 11, 20);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    sf_driver_reset(&dut->bus);
+    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
+    put(dut, bad[i].offset, bad[i].value);
+    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_REFUSED);
+    ck_assert_uint_eq(error_of(dut) & bad[i].error, bad[i].error);
+  }
+  net_of_test.net.layer[FX_D2].bias = 1; /* the driver has no place for it */
+  ck_assert_int_ne(sf_dut_load(dut, &net_of_test.net).code, SF_OK);
+  net_of_test.net.layer[FX_D2].bias = 0;
+  ck_ok(sf_dut_load(dut, &net_of_test.net));
+  draw_batch(&shared, &r, 8, false);
+  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
+  same_counts(dut, &counts, r.seed);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* 0: a beat less, 1: a beat more, 2: no tuser, 3: no tuser on the second sample, 4: a value of 13 bits. */
+START_TEST(bad_packets_are_refused)
+{
+  random_source r = {20 + (uint64_t)_i, 0};
+  random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
+  sf_dut *dut = open_dut(&net_of_test.net, 12, 0);
+  draw_batch(&shared, &r, 8, false);
+  for (int sample = _i == 3 ? 0 : 1; sample < 2; sample++) {
+    uint64_t words[SF_PACKET_MAX + 1] = {0};
+    const int beats = sf_dut_packet(&net_of_test.net, &shared.sample[sample], words) + (_i == 1) - (_i == 0);
+    if (_i == 4) words[39] = (uint64_t)0x0800 << 48;
+    for (int beat = 0; beat < beats;) {
+      dut->in.s_valid = true;
+      dut->in.s_data = words[beat];
+      dut->in.s_user = beat == 0 && _i != 2 && sample <= (_i != 3);
+      dut->in.s_last = beat == beats - 1;
+      sf_dut_tick(dut);
+      beat += dut->out.s_ready;
+    }
+  }
+  dut->in.s_valid = false;
+  sf_dut_tick(dut);
+  ck_assert_uint_eq(error_of(dut), _i == 4 ? SF_CSR_ERROR_VALUE : SF_CSR_ERROR_PACKET);
+  fx_counts counts = {0};
+  ck_ok(sf_dut_load(dut, &net_of_test.net));
+  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
+  same_counts(dut, &counts, r.seed);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* Nobody takes a result for a long time: nothing is lost. Soft reset at many moments leaves no trace. */
+START_TEST(soft_reset_at_any_time)
+{
+  random_source r = {30, 0};
+  random_decoder_make(&net_of_test, &r, 30, false);
+  sf_dut *dut = open_dut(&net_of_test.net, 17, 0);
+  for (int delay = 1; delay < 400; delay += 23) {
+    uint64_t words[SF_PACKET_MAX];
+    draw_batch(&shared, &r, 4, false);
+    const int beats = sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
+    dut->in.m_ready = false;
+    for (int cycle = 0, beat = 0; cycle < delay; cycle++) {
+      dut->in.s_valid = true;
+      dut->in.s_data = words[beat];
+      dut->in.s_user = beat == 0;
+      dut->in.s_last = beat == beats - 1;
+      sf_dut_tick(dut);
+      if (dut->out.s_ready) beat = (beat + 1) % beats;
+    }
+    dut->in.s_valid = false;
+    fx_counts counts = {0};
+    ck_ok(sf_dut_load(dut, &net_of_test.net));
+    run_batch(dut, &net_of_test.net, 4, &counts, r.seed);
+    same_counts(dut, &counts, r.seed);
+  }
+  sf_dut_close(dut);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *s = suite_create("rtl_decoder");
+  TCase *nets = tcase_create("nets");
+  tcase_set_timeout(nets, 120);
+  tcase_add_loop_test(nets, trained_size_decoders, 0, SIZES);
+  tcase_add_loop_test(nets, extreme_decoders, 0, 10);
+  tcase_add_loop_test(nets, modes_steps_and_biases, 0, 3);
+  tcase_add_loop_test(nets, cycles_are_those_of_the_model, 0, 4);
+  tcase_add_test(nets, a_sample_takes_a_cycle_per_row);
+  tcase_add_loop_test(nets, hard_cases, 0, 6);
+  tcase_add_loop_test(nets, nets_take_turns, 0, 3);
+  tcase_add_loop_test(nets, biases_of_other_nets, 0, 3);
+  tcase_add_test(nets, illegal_programming_is_refused);
+  tcase_add_loop_test(nets, bad_packets_are_refused, 0, 5);
+  tcase_add_test(nets, soft_reset_at_any_time);
+  suite_add_tcase(s, nets);
+  SRunner *runner = srunner_create(s);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
