@@ -139,7 +139,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -174,6 +174,12 @@ cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS 
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 15 --rays 400
 
+report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/report.html), or print where it is
+	@[ -f "$(REPORT)" ] || { echo "$(REPORT): not there; make demo writes build/demo/report.html" >&2; exit 1; }
+	@echo "$(abspath $(REPORT))"
+	@[ -z "$$DISPLAY$$WAYLAND_DISPLAY" ] || ! command -v xdg-open >/dev/null || xdg-open "$(abspath $(REPORT))"
+REPORT ?= $B/demo/report.html
+
 PROFILE ?= quick
 reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots in build/reproduce/PROFILE (quick, full, smoke)
 	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(REPRODUCE)
@@ -207,6 +213,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego report reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

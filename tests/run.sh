@@ -23,6 +23,7 @@ run() {
     firmware) command=("$here/test_firmware.sh" "$build") ;;
     golden_bench) command=("$here/golden_bench.sh" "$build") ;;
     other_dut) command=("$here/other_dut.sh" "$build") ;;
+    html) command=("$here/html.sh" "$build") ;;
     kit) command=("$here/kit.sh" "$build") ;;
     activity) command=("$here/activity.sh" "$build") ;;
     lanes) command=("$here/lanes.sh" "$build") ;;

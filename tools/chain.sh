@@ -39,5 +39,5 @@ echo "crop $crop: identical"
 step "5/6 co-simulate: RTL against the fixed-point core, spike by spike"
 "$bin/sf_cosim" "$out/scene.snn" "$data" --rays "$rays" --seed 1 --evidence "$out/cosim-difference" --json >"$out/cosim.json"
 step "6/6 audit: every operation, counted three times"
-"$bin/energy_audit" "$out/scene.snn" "$data" --view "$view" --json >"$out/audit.json"
+"$bin/energy_audit" "$out/scene.snn" "$data" --view "$view" --html "$out/report.html" --model "$out/model.safetensors" --json >"$out/audit.json"
 "$bin/sf_summary" "$out" $(($(date +%s) - started))

@@ -36,6 +36,7 @@ static void explain(const field *f, const char *dir)
          f[SAMPLES].value, f[DIFFERENCES].value);
   printf("  energy        %.4f mJ spiking, %.4f mJ for its ReLU twin: %.1f %% saved (0.9 pJ per SOP, 4.6 pJ per MAC)\n",
          f[SNN].value * 1e-12, f[ANN].value * 1e-12, f[SAVING].value);
+  printf("Open %s/report.html: what every operation cost, with pictures, for anybody.\n", dir);
   printf("Look at %s/preview.png; %s/golden.exr holds depth, spikes and energy per pixel; %s/audit.json every count.\n",
          dir, dir, dir);
 }

@@ -67,20 +67,35 @@ static void draw_points(FILE *out, const sf_page *page, const axes *a)
             "data-value=\"%llu\"><title>t = %d: %.2f dB, %s</title></circle>\n",
             x, y, chosen ? 8 : 5, chosen ? "dot chosen" : "dot", t, (unsigned long long)p->fj, t + 1, p->psnr,
             html_energy(text, (double)p->fj));
-    svg_text(out, x, y - (chosen ? 14 : 11), chosen ? "lab mid" : "num mid", chosen ? "t = %d, learned" : "%d", t + 1);
+    svg_text(out, x, y - (chosen ? 14 : 11), chosen ? "lab mid" : "num mid", "%d", t + 1);
   }
+}
+
+/* Whether a label of two lines whose right or left end is at x, y would touch a point or its number. */
+static bool crowded(const sf_page *page, const axes *a, double x, double y, bool end)
+{
+  const double left = end ? x - 90 : x, right = left + 90;
+  for (int t = 0; t < SF_T_MAX; t++) {
+    const double px = at_x(a, (double)page->prefix[t].fj), py = at_y(a, page->prefix[t].psnr);
+    if (px > left - 14 && px < right + 14 && py > y - 24 && py < y + 54) return true;
+  }
+  return right > WIDTH || left < LEFT;
 }
 
 static void draw_twin(FILE *out, const sf_page *page, const axes *a)
 {
-  const double x = at_x(a, (double)page->report->ledger.ann_fj);
+  const double x = at_x(a, (double)page->report->ledger.ann_fj), high = TOP + 8, low = HEIGHT - BOTTOM - 28;
   char text[HTML_NUMBER];
   if (!page->whole) return;
   svg_line(out, x, TOP, x, HEIGHT - BOTTOM, "twin");
-  const char *style = x > WIDTH / 2.0 ? "mut end" : "mut";
-  const double at = x > WIDTH / 2.0 ? x - 6 : x + 6;
-  svg_text(out, at, TOP + 8, style, "ReLU twin");
-  svg_text(out, at, TOP + 26, style, "%s", html_energy(text, (double)page->report->ledger.ann_fj));
+  for (int i = 0; i < 4; i++) {
+    const bool end = i < 2;
+    const double at = end ? x - 6 : x + 6, y = i % 2 ? low : high;
+    if (crowded(page, a, at, y, end)) continue;
+    svg_text(out, at, y, end ? "mut end" : "mut", "ReLU twin");
+    svg_text(out, at, y + 18, end ? "mut end" : "mut", "%s", html_energy(text, (double)page->report->ledger.ann_fj));
+    return;
+  }
 }
 
 static void prefix_table(FILE *out, const sf_page *page)
@@ -114,10 +129,15 @@ void html_quality(FILE *out, const sf_page *page)
     prefix_table(out, page);
   } else {
     const axes a = choose_axes(page);
-    html_figure_begin(out, "fig-quality", "split", "One more step: what it costs, what it brings.",
-                      "The fixed-point core draws the view with 1 to 8 time steps. PSNR measures the likeness to the "
-                      "photograph (higher is better; 1 dB is 21 % less squared error). The network learned its own "
-                      "number of steps, t<sub>r</sub>; steps it was not trained to use bring nothing.");
+    char caption[512];
+    snprintf(
+        caption, sizeof caption,
+        "The fixed-point core draws the view with 1 to %d time steps. PSNR measures the likeness to the photograph "
+        "(higher is better; 1 dB is 21 %% less squared error). The large point, t = %d, is the number of steps of "
+        "this scene; the network was trained for it, and further steps may as well harm. The dashed line is what "
+        "the non-spiking twin spends.",
+        SF_T_MAX, page->report->net->steps);
+    html_figure_begin(out, "fig-quality", "split", "One more step: what it costs, what it brings.", caption);
     svg_begin(out, "svg-quality", WIDTH, HEIGHT, "PSNR against energy", "One point per number of time steps");
     draw_axes(out, &a);
     draw_twin(out, page, &a);

@@ -1,0 +1,345 @@
+/* The HTML report: well-formed, nothing fetched, every figure there with its data, every number the JSON's; and a page
+ * with a planted fault is caught. */
+#include "spikefield/html.h"
+#include "spikefield/io.h"
+#include "tests/fx_fixture.h"
+#include "tests/html_page.h"
+#include <unistd.h>
+
+typedef struct fixture {
+  char folder[64], path[96];
+  fx_scene scene;
+  sf_dataset data;
+  sf_view view;
+  sf_audit_report report;
+  sf_page page;
+  char *text;
+} fixture;
+
+enum { WIDTH = 20, HEIGHT = 12 };
+
+static const char technology[] =
+    "name plain\ntitle A plain technology\nfp32_mac 4.6 pJ a <source> & more\n"
+    "fp32_add 0.9 pJ s\nint_add.8 0.03 pJ s\nint_add.32 0.1 pJ s\nint_multiply.8 0.2 pJ s\n"
+    "int_multiply.32 3.1 pJ s\nsram.8192 10 pJ s\nsram.1048576 100 pJ s\ndram 1.95 nJ s\n";
+
+static void ok(sf_status status)
+{
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+}
+
+static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
+{
+  const fixture *f = user;
+  return sf_pixel_ray(&f->scene, &f->data, &f->view, (int)(index % WIDTH), (int)(index / WIDTH), ray);
+}
+
+static void make_view(fixture *f, bool picture)
+{
+  const float pose[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 3};
+  snprintf(f->view.name, sizeof f->view.name, "test/r_<0>");
+  f->view.camera =
+      (sf_camera){.width = WIDTH, .height = HEIGHT, .fx = 20, .fy = 20, .cx = WIDTH / 2.0f, .cy = HEIGHT / 2.0f};
+  memcpy(f->view.camera.to_world, pose, sizeof pose);
+  f->data.view = &f->view, f->data.count = f->data.total = 1, f->data.scale = 0.8f, f->data.bound = 1;
+  if (!picture) return;
+  f->view.image = (sf_image){WIDTH, HEIGHT, malloc(sizeof(uint16_t) * 4 * WIDTH * HEIGHT)};
+  for (int i = 0; i < 4 * WIDTH * HEIGHT; i++)
+    f->view.image.rgba[i] = (uint16_t)fixture_pick(9, 1, (uint64_t)i, 0, 65535);
+}
+
+static void make_report(fixture *f)
+{
+  sf_audit_report *r = &f->report;
+  sf_technology tech;
+  snprintf(f->path, sizeof f->path, "%s/plain.tech", f->folder);
+  ok(sf_write_file(f->path, technology, sizeof technology - 1));
+  ok(sf_technology_load(&tech, f->path));
+  *r = (sf_audit_report){.scene = "a/scene.snn",
+                         .data = "a/da<ta>&\"x\"",
+                         .split = "test",
+                         .sha256 = "00ff",
+                         .net = &f->scene.net,
+                         .rays = WIDTH * HEIGHT,
+                         .seed = 7,
+                         .views = 1};
+  const sf_measure_job job = {&f->scene, r->rays, make_ray, NULL, f, 7, UINT64_MAX};
+  ok(sf_measure_rays(&job, &r->measure));
+  ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
+  r->traffic = sf_traffic_of(&r->measure.core, r->rays);
+  ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
+  r->three = (sf_three_counts){.rays = (int)r->measure.checked,
+                               .core = r->measure.checked_core,
+                               .rtl = r->measure.checked_core,
+                               .recount = r->measure.recount};
+}
+
+static void read_page(fixture *f)
+{
+  size_t size;
+  free(f->text);
+  snprintf(f->path, sizeof f->path, "%s/page.html", f->folder);
+  ok(sf_page_save(&f->page, f->path));
+  ok(sf_read_file(f->path, 1 << 24, &f->text, &size));
+  ck_assert_uint_eq(strlen(f->text), size);
+}
+
+static fixture begin(int steps, bool picture, bool empty)
+{
+  static const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  fixture f = {.folder = "/tmp/sf_html_XXXXXX"};
+  ck_assert_ptr_nonnull(mkdtemp(f.folder));
+  f.scene = fixture_scene(&sizes, 3);
+  f.scene.net.steps = steps;
+  f.scene.step_q24 = 600000;
+  if (empty) memset(f.scene.occupancy, 0, 64);
+  make_view(&f, picture);
+  return f;
+}
+
+/* The fixture holds pointers to itself: this comes once it lies where it stays. */
+static void finish(fixture *f)
+{
+  f->data.view = &f->view;
+  make_report(f);
+  f->page = (sf_page){.report = &f->report,
+                      .scene = &f->scene,
+                      .data = &f->data,
+                      .view = &f->view,
+                      .command = "energy_audit 'a<b' --html x&y",
+                      .whole = true};
+  ok(sf_page_gather(&f->page));
+  read_page(f);
+}
+
+static void end(fixture *f)
+{
+  static const char *const file[] = {"plain.tech", "page.html"};
+  for (int i = 0; i < 2; i++) {
+    snprintf(f->path, sizeof f->path, "%s/%s", f->folder, file[i]);
+    unlink(f->path);
+  }
+  rmdir(f->folder);
+  free(f->text);
+  sf_page_free(&f->page);
+  sf_measure_free(&f->report.measure);
+  sf_image_free(&f->view.image);
+  fx_scene_free(&f->scene);
+}
+
+/* ---- the whole judgement of a page ---- */
+
+static void check_ledgers(faults *f, const char *page, const sf_ledgers *l)
+{
+  for (int g = 0; g < SF_LEDGERS; g++)
+    for (int p = 0; p < SF_PARTS; p++) {
+      char key[96];
+      int count = 0;
+      snprintf(key, sizeof key, "data-key=\"ledgers.list[%d].parts_fj.%s\"", g, sf_part_names[p]);
+      for (const char *at = page; (at = strstr(at, key)); at++) count++;
+      const int wanted = l->part[g][p] == 0 ? 0 : 2; /* a bar and a cell */
+      if (count < wanted) fault(f, "%s: %d of %d", key, count, wanted);
+    }
+}
+
+static void check_counts(faults *f, const char *page, int steps)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < steps; t++)
+      for (int e = 0; e < SF_EVENTS; e++) {
+        char key[96];
+        snprintf(key, sizeof key, "data-key=\"rtl_subset.core.layers[%d].%s[%d]\"", l, sf_events[e].name, t);
+        if (!strstr(page, key)) fault(f, "no %s", key);
+      }
+}
+
+static void check_figures(faults *f, const char *page, const sf_audit_report *r)
+{
+  const int steps = r->net->steps;
+  check_element(f, page, "figure", "fig-basics", "<svg", 2);
+  check_element(f, page, "figure", "fig-golden", "<img", 1);
+  check_element(f, page, "figure", "fig-energy-map", "<img", 1);
+  check_element(f, page, "figure", "fig-samples-map", "<img", 1);
+  check_element(f, page, "figure", "fig-steps-map", "<img", 1);
+  int cells = 0; /* layers and steps that cost something */
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < steps; t++)
+      cells += r->measure.core.layer[l].mac[t] + r->measure.core.layer[l].sop[t] > 0;
+  check_bars(f, page, "svg-by-step", "width", cells);
+  check_bars(f, page, "svg-by-layer", "width", cells);
+  check_element(f, page, "figure", "fig-raster", "<path class=\"tick", 3);
+  check_bars(f, page, "svg-rates-d1", "height", steps);
+  check_bars(f, page, "svg-rates-c1", "height", steps);
+  check_bars(f, page, "svg-rates-c2", "height", steps);
+  check_bars(f, page, "svg-savings", "width", SF_SPIKING_LEDGERS);
+  check_bars(f, page, "svg-readings", "width", 3);
+  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
+    char id[64];
+    snprintf(id, sizeof id, "svg-ledger-%s", sf_ledger_texts[g].key);
+    check_bars(f, page, id, "width", 3);
+  }
+  check_element(f, page, "figure", "fig-tornado", "<rect", 8);
+  check_element(f, page, "svg", "svg-break-even", "class=\"dot chosen\"", SF_BREAK_EVENS);
+  check_element(f, page, "svg", "svg-quality", "<circle", SF_T_MAX);
+  check_element(f, page, "table", "table-prices", "<tr>", r->ledgers.technology.count + 1);
+  check_element(f, page, "table", "table-three", "equal", SF_EVENTS + 4);
+  check_element(f, page, "ul", "not-modelled", "<li>", 3);
+  check_element(f, page, "ul", "criticism", "<li>", 3);
+  check_element(f, page, "pre", "command", "energy_audit", 1);
+}
+
+static faults judge(const char *page, const sf_audit_report *r)
+{
+  faults f = {0};
+  cJSON *json = page_json(page);
+  check_tags(&f, page);
+  check_references(&f, page);
+  check_figures(&f, page, r);
+  check_ledgers(&f, page, &r->ledgers);
+  check_counts(&f, page, r->net->steps);
+  if (!json) fault(&f, "no JSON");
+  if (check_numbers(&f, page, json) < 150) fault(&f, "fewer than 150 numbers");
+  cJSON_Delete(json);
+  return f;
+}
+
+START_TEST(a_page_is_whole)
+{
+  static const int steps[] = {1, 2, 3, 8};
+  fixture f = begin(steps[_i], true, false);
+  finish(&f);
+  const faults found = judge(f.text, &f.report);
+  ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
+  ck_assert_ptr_null(strstr(f.text, "da<ta>"));
+  ck_assert_ptr_null(strstr(f.text, "DIFFERENT"));
+  end(&f);
+}
+END_TEST
+
+/* What the pictures and the counts say of the same view is the same. */
+START_TEST(pictures_agree_with_the_audit)
+{
+  fixture f = begin(2, true, false);
+  finish(&f);
+  const sf_page *p = &f.page;
+  uint64_t samples = 0, spikes = 0, neurons = 0;
+  ck_assert_uint_eq(p->prefix[1].fj, f.report.ledger.spiking_fj);
+  for (int i = 0; i < WIDTH * HEIGHT; i++) {
+    samples += sf_golden_int(&p->golden, SF_PLANE_SAMPLES)[i];
+    ck_assert(sf_golden_int(&p->golden, SF_PLANE_SAMPLES)[i] ? p->steps[i] >= 1 && p->steps[i] <= SF_T_MAX
+                                                             : p->steps[i] == 0);
+  }
+  ck_assert_uint_eq(samples, f.report.measure.core.samples);
+  ck_assert_uint_eq(p->sampled, samples); /* fewer than are looked at: every one */
+  spikes = sf_event_total(&f.report.measure.core, SF_EVENT_SPIKES);
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int t = 0; t < SF_T_MAX; t++)
+      for (int o = 0; o < SF_LANES; o++) neurons += p->neuron[l][t][o];
+  ck_assert_uint_eq(neurons, spikes);
+  ck_assert_int_gt(p->ray.samples, 0);
+  ck_assert_uint_eq((unsigned)p->ray.all, sf_golden_int(&p->golden, SF_PLANE_SAMPLES)[p->ray.y * WIDTH + p->ray.x]);
+  f.report.measure.core.layer[FX_C2].sop[1]++;
+  sf_page_free(&f.page);
+  memset(f.page.neuron, 0, sizeof f.page.neuron);
+  const sf_status status = sf_page_gather(&f.page);
+  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
+  ck_assert_ptr_nonnull(strstr(status.message, "C2"));
+  end(&f);
+}
+END_TEST
+
+START_TEST(a_view_without_photograph_or_samples)
+{
+  fixture f = begin(2, _i == 1, _i == 1);
+  finish(&f);
+  faults found = {0};
+  cJSON *json = page_json(f.text);
+  check_tags(&found, f.text);
+  check_references(&found, f.text);
+  check_numbers(&found, f.text, json);
+  ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
+  ck_assert_ptr_null(strstr(f.text, "nan"));
+  ck_assert_ptr_null(strstr(f.text, "inf\""));
+  cJSON_Delete(json);
+  end(&f);
+}
+END_TEST
+
+START_TEST(a_difference_is_shown)
+{
+  fixture f = begin(2, true, false);
+  finish(&f);
+  f.report.three.rtl.layer[FX_C2].sop[1]++;
+  f.report.three.agreement = sf_fail(SF_E_DIFFERENCE, "C2 sop step 1: <core> differs");
+  read_page(&f);
+  faults found = {0};
+  check_tags(&found, f.text);
+  ck_assert_msg(found.count == 0, "%s", found.first);
+  ck_assert_ptr_nonnull(strstr(f.text, "the counts differ"));
+  ck_assert_ptr_nonnull(strstr(f.text, "&lt;core&gt; differs"));
+  ck_assert_ptr_nonnull(strstr(f.text, "DIFFERENT"));
+  end(&f);
+}
+END_TEST
+
+/* ---- planted faults ---- */
+
+typedef struct plant {
+  const char *from, *to; /* the first occurrence is replaced */
+} plant;
+
+static const plant plants[] = {
+    {"data-key=\"energy_spiking_fj\" value=\"", "data-key=\"energy_spiking_fj\" value=\"1"},
+    {"data-key=\"ledgers.list[3].total_fj\" value=\"", "data-key=\"ledgers.list[3].total_fj\" value=\"1"},
+    {"data-key=\"samples\" value", "data-key=\"rays\" value"},
+    {"data-key=\"ledgers.list[1].parts_fj.mac\"", "data-was=\"ledgers\""},
+    {"data-key=\"page.layer_fj[0][0]\" data-value=\"", "data-key=\"page.layer_fj[0][0]\" data-value=\"9"},
+    {"</figure>", ""},
+    {"</td>", "<td>"},
+    {"class=\"facts\"", "class=facts"},
+    {"id=\"fig-golden\"", "id=\"fig-gold\""},
+    {"id=\"svg-quality\"", "id=\"svg-q\""},
+    {"src=\"data:image", "src=\"https://a.org/image"},
+    {"href=\"#limits\"", "href=\"https://a.org\""},
+    {"id=\"limits\"", "id=\"limit\""},
+    {"<style>", "<style>@import 'x';"},
+    {"&lt;", "&nbsp;"},
+    {"<li>", "<b>"},
+    {">equal<", ">DIFFERENT<"},
+};
+
+START_TEST(planted_faults_are_seen)
+{
+  fixture f = begin(2, true, false);
+  finish(&f);
+  for (size_t i = 0; i < sizeof plants / sizeof *plants; i++) {
+    const char *at = strstr(f.text, plants[i].from);
+    ck_assert_msg(at, "nothing to plant at: %s", plants[i].from);
+    const size_t before = (size_t)(at - f.text), room = strlen(f.text) + 64;
+    char *page = malloc(room);
+    snprintf(page, room, "%.*s%s%s", (int)before, f.text, plants[i].to, at + strlen(plants[i].from));
+    const faults found = judge(page, &f.report);
+    ck_assert_msg(found.count > 0, "not seen: %s -> %s", plants[i].from, plants[i].to);
+    free(page);
+  }
+  end(&f);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("html");
+  TCase *c = tcase_create("page");
+  tcase_set_timeout(c, 60);
+  tcase_add_loop_test(c, a_page_is_whole, 0, 4);
+  tcase_add_test(c, pictures_agree_with_the_audit);
+  tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
+  tcase_add_test(c, a_difference_is_shown);
+  tcase_add_test(c, planted_faults_are_seen);
+  suite_add_tcase(suite, c);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_NORMAL);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
