@@ -3,7 +3,8 @@
 RISCV_FLAGS := -std=c11 -Os -Wall -Wextra -Wpedantic -Werror -march=rv32im_zicsr -mabi=ilp32 -mcmodel=medany -ffreestanding \
   -ffunction-sections -fdata-sections -fno-tree-loop-distribute-patterns $(ARCH_INCLUDE) -Iinclude -I. -Ifirmware/libc
 FIRMWARE_SRC := $(wildcard firmware/*.S firmware/*.c) \
-  $(addprefix src/fx/,render.c march.c grid.c composite.c exp2.c net.c current.c plif.c integrate.c sigmoid.c count.c)
+  $(addprefix src/fx/,render.c march.c grid.c tensorf.c composite.c exp2.c net.c current.c plif.c integrate.c sigmoid.c \
+  softplus.c sine.c count.c)
 FIRMWARE_OBJ := $(patsubst %,$B/obj/rv32/%.o,$(basename $(FIRMWARE_SRC)))
 FIRMWARE := $B/firmware/sf_firmware.elf
 

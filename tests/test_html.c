@@ -86,7 +86,7 @@ static void read_page(fixture *f)
 
 static fixture begin(int steps, bool picture, bool empty)
 {
-  static const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID};
+  static const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fixture f = {.folder = "/tmp/sf_html_XXXXXX"};
   ck_assert_ptr_nonnull(mkdtemp(f.folder));
   f.scene = fixture_scene(&sizes, 3);
