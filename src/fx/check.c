@@ -81,8 +81,9 @@ static sf_status check_field(const fx_scene *scene, const char *path)
 /* What the cascades and the table of steps are made from. */
 static sf_status check_steps(const fx_scene *scene, const char *path)
 {
-  SF_TRY(in_range(path, "scene", "log2_bound", scene->log2_bound, 0, BOUND_LOG2_MAX));
-  SF_TRY(in_range(path, "scene", "gamma_q24", scene->gamma_q24, 0, GAMMA_MAX));
+  const bool ingp = scene->backbone == FX_INGP; /* TensoRF's fields have one box and equal steps */
+  SF_TRY(in_range(path, "scene", "log2_bound", scene->log2_bound, 0, ingp ? BOUND_LOG2_MAX : 0));
+  SF_TRY(in_range(path, "scene", "gamma_q24", scene->gamma_q24, 0, ingp ? GAMMA_MAX : 0));
   if (!scene->gamma_q24) return sf_ok();
   SF_TRY(in_range(path, "scene", "step_q24", scene->step_q24, 1, 1 << SF_DELTA_FRAC));
   SF_TRY(in_range(path, "scene", "near_q16", scene->near_q16, 0, NEAR_MAX));
