@@ -23,10 +23,17 @@ check_scene() { # name, train options
   cmp "$dir/fixed.exr" "$dir/rtl.exr" || fail "${dir##*/}: the RTL's image differs from the fixed-point core's"
   "$bin/sf_cosim" "$dir/s.snn" "$dir" --rays 30 --seed 7 --stalls 20 --json >"$dir/cosim.json" || fail "${dir##*/}: co-simulation"
   grep -Eq '"differences":[[:space:]]*0,' "$dir/cosim.json" || fail "${dir##*/}: differences"
-  "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet --json >"$dir/fit.json"
-  "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 20 --seed 8 --stalls 20 --json >"$dir/fit-cosim.json" ||
-    fail "${dir##*/}: co-simulation of the fitted scene"
-  grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "${dir##*/}: the fitted scene differs in the RTL"
+  if [ "${dir##*/}" = plaza ]; then # only boxes with one grid can be fitted
+    if "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet 2>"$dir/fit.err"; then
+      fail "plaza: fitted"
+    fi
+    grep -q 'occupancy grids' "$dir/fit.err" || fail "plaza: the refusal of a fit does not say why"
+  else
+    "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet --json >"$dir/fit.json"
+    "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 20 --seed 8 --stalls 20 --json >"$dir/fit-cosim.json" ||
+      fail "${dir##*/}: co-simulation of the fitted scene"
+    grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "${dir##*/}: the fitted scene differs in the RTL"
+  fi
   "$bin/energy_audit" "$dir/s.snn" "$dir" --rays 100 --json >"$dir/audit.json" || fail "${dir##*/}: audit"
   echo "${dir##*/}: ok"
 }
@@ -35,6 +42,7 @@ check_scene textured
 check_scene simple --input-mode no-decay --steps 4
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_scene empty --steps 2
+check_scene plaza --steps 3 --bound 8
 
 # Interrupted and continued equals uninterrupted.
 scene=$work/simple

@@ -22,10 +22,20 @@ static void same_file(const char *a, const char *b)
   free(y);
 }
 
+/* In a box of bound 1, and in one with three cascades and growing steps. */
+static sf_train_options run_in_box(int kind)
+{
+  sf_train_options o = small_run();
+  const int finest = o.config.finest_res;
+  sf_config_bound(&o.config, kind ? 4 : 1);
+  o.config.finest_res = finest;
+  return o;
+}
+
 START_TEST(same_seed_same_bits_any_threads)
 {
   sf_dataset data = load("train");
-  sf_train_options o = small_run();
+  sf_train_options o = run_in_box(_i);
   omp_set_num_threads(1);
   sf_trainer *a = start(&data, &o, NULL);
   steps(a, 40);
@@ -63,7 +73,7 @@ static void check_resume(const sf_train_options *o, int before, int after)
 
 START_TEST(resume_continues_bit_identically)
 {
-  sf_train_options o = small_run();
+  sf_train_options o = run_in_box(_i);
   check_resume(&o, 17, 16);
   o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume */
   o.samples = 8192;
@@ -329,8 +339,8 @@ int main(void)
   TCase *tc = tcase_create("train");
   tcase_set_timeout(tc, 180);
   tcase_add_unchecked_fixture(tc, set_up, remove_folder);
-  tcase_add_test(tc, same_seed_same_bits_any_threads);
-  tcase_add_test(tc, resume_continues_bit_identically);
+  tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
+  tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
   tcase_add_test(tc, fixed_steps_freeze_the_budget);
   tcase_add_test(tc, every_prefix_is_evaluated);

@@ -1,11 +1,12 @@
-/* What stands in each procedural scene. Everything lies within 1.1 world units of the origin on each axis. */
+/* What stands in each procedural scene. Everything lies within 1.1 world units of the origin on each axis, but for
+ * "plaza", which reaches to 9: cameras are inside of it. */
 #include "src/scene/stage.h"
 #include "spikefield/scene.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>
 
-const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", NULL};
+const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", "plaza", NULL};
 
 /* Display colours; the shading squares them to linear light. */
 static const sf_material plinth = {
@@ -22,6 +23,10 @@ static const sf_material matt_red = {SF_PLAIN, 0, {{0.84, 0.30, 0.25}}, 0, 0};
 static const sf_material matt_green = {SF_PLAIN, 0, {{0.36, 0.66, 0.40}}, 0, 0};
 static const sf_material matt_blue = {SF_PLAIN, 0, {{0.30, 0.48, 0.78}}, 0, 0};
 static const sf_material matt_cream = {SF_PLAIN, 0, {{0.92, 0.86, 0.72}}, 0, 0};
+
+static const sf_material paving = {SF_CHECKER, 0.9, {{0.78, 0.74, 0.66}, {0.52, 0.55, 0.50}, {0.40, 0.38, 0.34}}, 0, 0};
+static const sf_material tower = {SF_STRIPES, 0.23, {{0.72, 0.36, 0.26}, {0.86, 0.80, 0.66}}, 0, 0};
+static const sf_material sky = {SF_SKY, 0, {{0.36, 0.56, 0.84}, {0.62, 0.76, 0.92}}, 0, 0};
 
 typedef struct vec {
   double x, y, z;
@@ -94,10 +99,26 @@ static void build_fog(sf_stage *stage)
   add_fog(stage, SF_BOX, (vec){0, 0, -0.55}, (vec){0.6, 0.6, 0.2}, 1.6, (vec){0.95, 0.78, 0.62});
 }
 
+/* Bricks in the middle, towers around the cameras, sky behind everything: no ray ends in nothing. */
+static void build_plaza(sf_stage *stage)
+{
+  enum { TOWERS = 9 };
+  add(stage, SF_SPHERE, (vec){0, 0, 0}, (vec){9, 0, 0}, 0.3, 0, &sky);
+  add(stage, SF_CYLINDER, (vec){0, 0, -0.66}, (vec){8.5, 0.02, 0}, 0.2, 0, &paving);
+  for (int i = 0; i < TOWERS; i++) {
+    const double a = 2 * M_PI * (i + 0.2) / TOWERS, away = 5.2 + 0.4 * (i % 3), half = 0.8 + 0.35 * (i % 4);
+    add(stage, SF_BOX, (vec){away * cos(a), away * sin(a), half - 0.64}, (vec){0.45, 0.45, half}, a, 0, &tower);
+  }
+  add_brick(stage, (vec){0.25, 0.2, -0.44}, (vec){0.5, 0.36, 0.2}, 0.35, (vec){0.3, 0.2, 0}, &red);
+  add_brick(stage, (vec){0.25, 0.2, -0.04}, (vec){0.3, 0.26, 0.2}, -0.3, (vec){0.18, 0.14, 0}, &blue);
+  add(stage, SF_SPHERE, (vec){-0.55, -0.4, -0.24}, (vec){0.4, 0, 0}, 0.5, 0.45, &ball);
+}
+
 void sf_stage_build(sf_stage *stage, int index)
 {
   memset(stage, 0, sizeof *stage);
   if (index == 0) build_textured(stage);
   if (index == 1) build_simple(stage);
   if (index == 2) build_fog(stage);
+  if (index == 4) build_plaza(stage);
 }

@@ -31,6 +31,7 @@ static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
     return sector & 1 || sector > 5 ? white : m->colour[sector / 2];
   }
   case SF_PLAIN:
+  case SF_SKY:
     break;
   }
   return m->colour[0];
@@ -55,14 +56,29 @@ static double light_arriving(const sf_stage *stage, const double at[3], const do
   for (int i = 0; i < 3; i++) ray.origin[i] = at[i] + SURFACE_GAP * normal[i], ray.direction[i] = light[i];
   for (int i = 0; i < stage->shapes; i++) {
     sf_hit hit = {.t = INFINITY};
+    if (stage->shape[i].material->pattern == SF_SKY) continue;
     if (sf_shape_near(&stage->shape[i], &ray, 0) && sf_shape_hit(&stage->shape[i], &ray, SURFACE_GAP, &hit)) return 0;
   }
   return stage->fogs ? exp(-optical_depth(stage, &ray, INFINITY)) : 1;
 }
 
+static void shade_sky(const sf_shape *sky, const sf_hit *hit, double colour[3])
+{
+  const double *p = hit->local, height = p[2] / sky->size[0];
+  const double wave = 0.5 + 0.5 * sin(6 * atan2(p[1], p[0])) * cos(9 * height), pale = 0.6 * fmax(height, 0);
+  for (int i = 0; i < 3; i++) {
+    const double *low = sky->material->colour[0], *high = sky->material->colour[1];
+    colour[i] = (1 - pale) * (low[i] + wave * (high[i] - low[i])) + pale;
+  }
+}
+
 /* Hemisphere ambient, Lambert and Blinn-Phong in linear light; display value = square root (gamma 2). */
 static void shade(const sf_stage *stage, const sf_shape *shape, const sf_ray *ray, const sf_hit *hit, double colour[3])
 {
+  if (shape->material->pattern == SF_SKY) {
+    shade_sky(shape, hit, colour);
+    return;
+  }
   const double *albedo = pattern_colour(shape, hit), *n = hit->normal;
   double at[3], half[3], length = 0;
   for (int i = 0; i < 3; i++) {
