@@ -1,5 +1,6 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "spikefield/golden.h"
+#include "src/fx/scene.h"
 #include "tests/fx_fixture.h"
 #include <math.h>
 #include <omp.h>
@@ -276,6 +277,76 @@ START_TEST(measure_does_not_depend_on_threads)
   ck_assert_uint_gt(one.core.samples, 1000);
   ck_assert_uint_eq(one.core.samples, one.recount.samples);
   sf_measure_free(&one), sf_measure_free(&four);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* A decoder behind planes and lines of different sizes; part of its samples weigh too little to be decoded. */
+static fx_scene tensorf_scene(void)
+{
+  fx_scene scene = {.backbone = FX_TENSORF, .occ_res = 8, .step_q24 = 400000, .max_samples = 1024, .trans_stop = 104};
+  fx_tensorf *field = &scene.tensorf;
+  *field =
+      (fx_tensorf){.res = {9, 8, 7}, .density = {.components = {2, 3, 4}}, .appearance = {.components = {3, 2, 4}}};
+  field->features = 5, field->feature_freqs = field->view_freqs = 1, field->weight_stop = 1 << 14;
+  field->density_in = (fx_scale){1000, 20, 0}, field->sigma_out = (fx_scale){30000, 20, 0};
+  field->product_shift = 12, field->feature_in = (fx_scale){1000, 12, 0}, field->phase_in = (fx_scale){1000, 12, 0};
+  field->encoding_frac = 10;
+  fx_layer *l = scene.net.layer;
+  l[FX_C1].n_in = fx_tensorf_inputs(field), l[FX_C1].n_out = l[FX_C2].n_in = 40;
+  l[FX_C2].n_out = l[FX_C3].n_in = 30, l[FX_C3].n_out = 3;
+  l[FX_C1].bias = 700, l[FX_C2].bias = l[FX_C3].bias = 1;
+  scene.net.steps = 3, scene.net.sigmoid_in = (fx_scale){50000, 13, 0};
+  sf_status status = fx_scene_allocate(&scene, "tensorf");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  for (int pair = 0; pair < 3; pair++)
+    for (int i = 0; i < 7 * 2; i++) {
+      field->density.line[pair][i] = (int8_t)(20 + i % 90), field->appearance.line[pair][i] = (int8_t)(i * 9 % 100);
+      field->density.plane[pair][i] = (int8_t)(i * 7), field->appearance.plane[pair][i] = (int8_t)(50 - i);
+    }
+  for (int i = 0; i < 9 * 5; i++) field->basis[i] = (int8_t)(i * 37 % 200 - 100);
+  for (int id = FX_C1; id <= FX_C3; id++) {
+    l[id].k = 1500, l[id].theta = id == FX_C3 ? 0 : 20000;
+    for (int i = 0; i < l[id].n_in + 1; i++)
+      for (int o = 0; o < l[id].n_out; o++)
+        l[id].w[i * SF_LANES + o] = (int8_t)fixture_pick(5, 9, (uint64_t)(i * 200 + o), -100, 127);
+  }
+  memset(scene.occupancy, 0xff, 64);
+  scene.to_box_scale = scene.dir_scale = 1, field->far = 1;
+  for (int axis = 0; axis < 3; axis++) field->stretch[axis] = 1;
+  status = fx_scene_check(&scene, "tensorf");
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  return scene;
+}
+
+START_TEST(tensorf_is_counted_by_the_same_three)
+{
+  fx_scene scene = tensorf_scene();
+  rays user = {UINT64_MAX, UINT64_MAX};
+  const sf_measure_job job = {&scene, 300, make_ray, tick, &user, 7, UINT64_MAX};
+  sf_measure m;
+  const sf_status status = sf_measure_rays(&job, &m);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  assert_same_counts(&m.checked_core, &m.core);
+  ck_assert_uint_gt(m.core.samples, 300);
+  ck_assert_uint_gt(m.core.field_samples, m.core.samples); /* some weigh too little */
+  ck_assert_uint_eq(m.recount.samples, m.core.samples);
+  ck_assert_uint_gt(sf_event_total(&m.core, SF_EVENT_SPIKES), 0);
+  ck_assert_uint_eq(sf_event_total(&m.core, SF_EVENT_MAC),
+                    m.core.samples * (uint64_t)(scene.net.layer[FX_C1].n_in * 40));
+  const sf_traffic core = sf_traffic_of(&m.core, 300);
+  const sf_traffic recount = sf_traffic_recount(&scene, &m.recount, m.core.field_samples, 300);
+  ck_assert_int_eq(sf_traffic_compare(&core, "core", &recount, "recount").code, SF_OK);
+  ck_assert_uint_eq(core.exp_neg, m.core.field_samples);
+  ck_assert_uint_eq(core.table_bytes, 6 * 9 * (m.core.field_samples + m.core.samples)); /* 9 components in each */
+  /* planes 9x8, 9x7, 8x7 with their lines 7, 8, 9: density 2, 3, 4 components, appearance 3, 2, 4 */
+  ck_assert_uint_eq(sf_table_size(&scene), 5 * (72 + 7) + 5 * (63 + 8) + 8 * (56 + 9));
+  sf_ledger l;
+  ck_assert_int_eq(sf_ledger_make(&scene.net, &m.core, &l).code, SF_OK);
+  ck_assert_uint_eq(l.spiking_fj, sf_energy_fj(&m.core));
+  ck_assert_uint_eq(l.ann_hoisted_fj, l.ann_fj); /* no direction of a ray to hoist */
+  ck_assert_uint_eq(l.h_once_fj, l.spiking_fj);
+  sf_measure_free(&m);
   fx_scene_free(&scene);
 }
 END_TEST
@@ -696,6 +767,7 @@ int main(void)
   tcase_add_test(counts, comparison_names_each_planted_difference);
   tcase_add_test(counts, comparison_names_the_first_and_ignores_the_rest);
   tcase_add_test(measure, measure_does_not_depend_on_threads);
+  tcase_add_test(measure, tensorf_is_counted_by_the_same_three);
   tcase_add_test(measure, checked_rays_are_a_seeded_choice);
   tcase_add_test(measure, measure_reports_the_lowest_failing_ray);
   tcase_add_test(measure, probe_names_the_sample_of_a_difference);

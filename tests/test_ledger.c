@@ -286,7 +286,7 @@ START_TEST(cells_and_parts_add_up)
   for (uint64_t i = 0; i < sizeof spikes / 8; i++)
     (&spikes[0][0][0])[i] = sf_random_u64(1, 2, i) & sf_random_u64(1, 3, i);
   for (int i = 0; i < 9; i++) sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])spikes, i % 3 == 0, &c);
-  const sf_traffic traffic = sf_traffic_recount(&scene, &c, 4);
+  const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
   ck_assert_int_eq(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l).code, SF_OK);

@@ -90,8 +90,10 @@ typedef struct sf_three_counts {
 
 /* Traffic of these counts and so many pixels, as the core counted it. */
 sf_traffic sf_traffic_of(const fx_counts *counts, uint64_t pixels);
-/* The same from the number of recounted samples and the shape of the field alone. */
-sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t pixels);
+/* The same from the number of recounted samples and the shape of the field alone. field_samples: positions at which
+ * TensoRF's density was asked, which leave no spikes; not looked at for INGP. */
+sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t field_samples,
+                              uint64_t pixels);
 /* SF_E_DIFFERENCE names the first event that differs. */
 sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name);
 /* Bytes of the field's tables: what chooses the price of a read. */

@@ -67,7 +67,8 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples)
 static uint64_t direction_synapses(const fx_net *net)
 {
   const fx_layer *c1 = &net->layer[FX_C1];
-  int n_h = net->layer[FX_D2].n_out - 1;
+  if (fx_net_decodes(net)) return 0; /* its inputs come with every sample */
+  int n_h = fx_net_h(net);
   return (uint64_t)(c1->n_in - n_h) * (uint64_t)c1->n_out;
 }
 
@@ -92,7 +93,7 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
   if (d_mac > c1_mac || net->steps < 1)
     return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
                    (unsigned long long)c1_mac, (unsigned long long)d_mac);
-  uint64_t h_mac = c1_mac - d_mac; /* at every step */
+  uint64_t h_mac = fx_net_decodes(net) ? 0 : c1_mac - d_mac; /* at every step */
   uint64_t h_sop =
       scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
 

@@ -76,13 +76,13 @@ static void spiking_events(const fx_counts *counts, const sf_traffic *traffic, e
 static void twin_events(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic, bool hoisted,
                         event_table e)
 {
-  const int n_h = net->layer[FX_D2].n_out > 0 ? net->layer[FX_D2].n_out - 1 : 0;
+  const int n_h = fx_net_h(net);
   memset(e, 0, sizeof(event_table));
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *size = &net->layer[l];
     const uint64_t n_in = (uint64_t)size->n_in, n_out = (uint64_t)size->n_out;
     uint64_t products = sf_multiply_u64(n_in * n_out, counts->samples);
-    if (hoisted && l == FX_C1 && n_h > 0)
+    if (hoisted && l == FX_C1 && !fx_net_decodes(net))
       products = sf_add_u64(sf_multiply_u64((uint64_t)n_h * n_out, counts->samples),
                             sf_multiply_u64((n_in - (uint64_t)n_h) * n_out, counts->rays));
     const uint64_t hidden = sf_multiply_u64(l == FX_C3 ? 0 : l == FX_D2 ? (uint64_t)n_h : n_out, counts->samples);
