@@ -48,6 +48,10 @@ CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 
+# NIR graphs are HDF5 files (libhdf5-dev); without it sf_export --nir says so.
+HDF5_LIBS := $(shell pkg-config --libs hdf5 2>/dev/null)
+HDF5_CFLAGS := $(if $(HDF5_LIBS),-DSF_HDF5 $(patsubst -I%,-isystem %,$(shell pkg-config --cflags hdf5)))
+
 # Without Unicorn (libunicorn-dev) there is no emulated system to run the firmware on, without the cross compiler no
 # firmware; the rest is whole. SOC_MISSING says what is not there.
 RISCV ?= riscv64-unknown-elf-
@@ -87,6 +91,9 @@ $B/obj/%_isa.$1.o: %_isa.c
 	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
 endef
 $(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
+
+$B/obj/src/audit/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
+$B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 $B/libspikefield.a: $(LIB_OBJ)
 	$(call say,AR    $@)
@@ -139,7 +146,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays

@@ -38,13 +38,14 @@ run() {
     synth) command=("$here/test_synth.sh") ;;
     package) command=("$here/test_package.sh") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
+    nir) command=(python3 "$here/crosscheck_nir.py" "$build/tests/test_nir") ;;
     *) command=("$build/tests/$name") ;;
   esac
   "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null
   status=$?
   if [ $status -eq 0 ]; then
     verdict=ok
-  elif [ $status -eq 77 ] || { [ "$name" = safetensors ] && ! command -v python3 >/dev/null; }; then
+  elif [ $status -eq 77 ] || { [[ $name == safetensors || $name == nir ]] && ! command -v python3 >/dev/null; }; then
     verdict="skipped: $(tail -n 1 "$logs/$name.log")"
   else
     verdict="FAILED ($status), see $logs/$name.log"

@@ -1,9 +1,9 @@
 /* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware; writes vectors
- * of a scene for any simulator. */
-#include "sim/kit/kit.h"
+ * of a scene for any simulator, its traces and graphs for other tools. */
 #include "spikefield/cli.h"
 #include "spikefield/fit.h"
 #include "spikefield/quant.h"
+#include "tools/export/extras.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,9 +11,10 @@
 #include <sys/stat.h>
 
 typedef struct options {
-  const char *output, *data, *vectors;
-  int steps, background, rays, samples;
-  uint64_t seed, fit_rays;
+  const char *output;
+  export_options extra;
+  int steps, background;
+  uint64_t fit_rays;
   double fit_loss;
   sf_quant_widths widths;
   bool json, fit, quiet;
@@ -28,39 +29,6 @@ static sf_status file_size(const char *path, long long *size)
   if (stat(path, &info)) return sf_fail(SF_E_IO, "%s: cannot be read back", path);
   *size = (long long)info.st_size;
   return sf_ok();
-}
-
-/* ---- --vectors ---- */
-
-static sf_status write_vectors(const fx_scene *scene, const char *path, const options *o, sf_kit_report *kit)
-{
-  const sf_kit_options how = {.scene_path = path, .seed = o->seed, .rays = o->rays, .samples = o->samples};
-  sf_dataset data;
-  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
-  sf_status status = data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
-  if (status.code == SF_OK) status = sf_kit_write(o->vectors, scene, &data, &how, kit);
-  sf_dataset_free(&data);
-  return status;
-}
-
-static void print_vectors(const sf_kit_report *kit, const char *folder)
-{
-  printf("%s: %d samples of %d rays, %d input beats, %d register writes; %d files, %.1f MB\n", folder, kit->samples,
-         kit->rays, kit->beats, kit->writes, kit->files, 1e-6 * (double)kit->bytes);
-  printf("make -C %s icarus verilator\n", folder);
-}
-
-static cJSON *vectors_json(const sf_kit_report *kit, const char *folder)
-{
-  cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "folder", folder);
-  cJSON_AddNumberToObject(json, "samples", kit->samples);
-  cJSON_AddNumberToObject(json, "rays", kit->rays);
-  cJSON_AddNumberToObject(json, "input_beats", kit->beats);
-  cJSON_AddNumberToObject(json, "register_writes", kit->writes);
-  cJSON_AddNumberToObject(json, "files", kit->files);
-  cJSON_AddNumberToObject(json, "bytes", (double)kit->bytes);
-  return json;
 }
 
 static sf_status put_json(cJSON *json, const char *path)
@@ -110,7 +78,7 @@ static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, co
 }
 
 static sf_status print_json(const fx_scene *scene, const sf_quant_report *report, const sf_fit_report *fit,
-                            const sf_kit_report *kit, const options *o, long long bytes)
+                            const export_extras *more, const options *o, long long bytes)
 {
   cJSON *json = cJSON_CreateObject(), *layers = cJSON_AddArrayToObject(json, "layers");
   cJSON_AddStringToObject(json, "scene", o->output);
@@ -130,7 +98,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   for (int l = 0; l < SF_LAYERS; l++)
     cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
   if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
-  if (o->vectors) cJSON_AddItemToObject(json, "vectors", vectors_json(kit, o->vectors));
+  export_extras_json(json, more, &o->extra);
   return put_json(json, o->output);
 }
 
@@ -164,7 +132,7 @@ static sf_status quantise(const sf_model *model, const char *path, const options
 {
   const float grey = o->background == 0 ? 1 : 0;
   const sf_quant_options how = {
-      .steps = o->steps, .background = {grey, grey, grey}, .seed = o->seed, .widths = *widths};
+      .steps = o->steps, .background = {grey, grey, grey}, .seed = o->extra.seed, .widths = *widths};
   SF_TRY(sf_quantise_report(&c->scene[c->count], model, path, &how, &c->report[c->count]));
   c->count++;
   return sf_ok();
@@ -214,8 +182,8 @@ static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_
   const sf_dataset_options how = {.downscale = 1, .scale = scale};
   sf_dataset data;
   sf_fit_rays rays;
-  SF_TRY(sf_dataset_load(&data, o->data, "train", &how));
-  sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->seed);
+  SF_TRY(sf_dataset_load(&data, o->extra.data, "train", &how));
+  sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   sf_dataset_free(&data);
   if (status.code != SF_OK) return status;
   status = fit_to_rays(c, &rays, o, report);
@@ -234,33 +202,63 @@ static sf_status save_and_report(const fx_scene *scene, const options *o, const 
                                  const sf_fit_report *fit)
 {
   long long bytes = 0;
-  sf_kit_report kit;
+  export_extras more;
   SF_TRY(fx_scene_save(scene, o->output));
   SF_TRY(file_size(o->output, &bytes));
-  if (o->vectors) SF_TRY(write_vectors(scene, o->output, o, &kit));
-  if (o->json) SF_TRY(print_json(scene, report, fit, &kit, o, bytes));
+  SF_TRY(export_extras_write(&more, scene, o->output, &o->extra));
+  if (o->json) SF_TRY(print_json(scene, report, fit, &more, o, bytes));
   if (!o->json) print_text(scene, report, o->output, bytes);
   if (!o->json && fit) sf_fit_print(stdout, fit);
-  if (!o->json && o->vectors) print_vectors(&kit, o->vectors);
+  if (!o->json) export_extras_print(&more, &o->extra);
   return flushed();
 }
 
-/* A scene that is there: its vectors alone. */
-static sf_status export_vectors(const char *path, const options *o)
+/* A scene that is there: what is made of it alone. */
+static sf_status export_beside(const char *path, const options *o)
 {
   fx_scene scene;
-  sf_kit_report kit;
+  export_extras more;
   SF_TRY(fx_scene_load(&scene, path));
-  const sf_status status = write_vectors(&scene, path, o, &kit);
+  const sf_status status = export_extras_write(&more, &scene, path, &o->extra);
   fx_scene_free(&scene);
   SF_TRY(status);
   if (o->json) {
     cJSON *json = cJSON_CreateObject();
-    cJSON_AddItemToObject(json, "vectors", vectors_json(&kit, o->vectors));
+    export_extras_json(json, &more, &o->extra);
     SF_TRY(put_json(json, path));
   } else
-    print_vectors(&kit, o->vectors);
+    export_extras_print(&more, &o->extra);
   return flushed();
+}
+
+static bool is_scene(const char *path)
+{
+  const size_t length = strlen(path);
+  return length > 4 && !strcmp(path + length - 4, ".snn");
+}
+
+/* A float model as a graph of real numbers. */
+static sf_status export_model_nir(const char *path, const options *o)
+{
+  sf_model model;
+  SF_TRY(sf_model_load(&model, path));
+  const sf_status status = sf_nir_write_model(o->extra.nir, &model);
+  sf_model_free(&model);
+  SF_TRY(status);
+  const export_extras none = {0};
+  if (o->json) {
+    cJSON *json = cJSON_CreateObject();
+    export_extras_json(json, &none, &o->extra);
+    SF_TRY(put_json(json, path));
+  } else
+    export_extras_print(&none, &o->extra);
+  return flushed();
+}
+
+static sf_status export_from(const char *path, const options *o)
+{
+  const bool graph_alone = o->extra.nir && !o->extra.vectors && !o->extra.traces;
+  return graph_alone && !is_scene(path) ? export_model_nir(path, o) : export_beside(path, o);
 }
 
 static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
@@ -286,17 +284,20 @@ static sf_status export_scene(const char *path, const options *o)
 
 static sf_status check_options(const options *o)
 {
-  if (o->vectors && !o->data) return sf_fail(SF_E_USAGE, "--vectors needs --data DATA: the views to draw rays from");
-  if (!o->output && o->fit)
-    return sf_fail(SF_E_USAGE, "--fit needs --output (-o) SCENE: the vectors alone fit nothing");
-  if (!o->output && !o->vectors) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
-  if (o->fit && !o->data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
+  const bool extras = o->extra.vectors || o->extra.traces || o->extra.nir;
+  if (o->extra.traces && !o->extra.data)
+    return sf_fail(SF_E_USAGE, "--traces needs --data DATA: the views to draw rays from");
+  if (o->extra.vectors && !o->extra.data)
+    return sf_fail(SF_E_USAGE, "--vectors needs --data DATA: the views to draw rays from");
+  if (!o->output && o->fit) return sf_fail(SF_E_USAGE, "--fit needs --output (-o) SCENE: nothing else is fitted");
+  if (!o->output && !extras) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
+  if (o->fit && !o->extra.data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
   return sf_ok();
 }
 
 int main(int argc, char **argv)
 {
-  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05, .rays = 1000, .samples = 48};
+  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05, .extra = {.samples = 48, .view = -1}};
   const sf_option table[] = {
       {.name = "--output",
        .letter = 'o',
@@ -319,11 +320,11 @@ int main(int argc, char **argv)
        .help = "colour behind the scene: white or black (default white)"},
       {.name = "--seed",
        .type = SF_ARG_U64,
-       .value = &o.seed,
+       .value = &o.extra.seed,
        .min = 0,
        .max = 18446744073709551615.0,
        .argument = "S",
-       .help = "seed of the calibration samples, or of the rays and stalls of --vectors (default 0)"},
+       .help = "seed of the calibration samples, or of the rays and stalls of --vectors and --traces (default 0)"},
       {"--weight-bits", 0, SF_ARG_INT, &o.widths.weight_bits, 2, SF_WEIGHT_BITS, NULL, "B", "bits of a weight"},
       {"--feature-bits", 0, SF_ARG_INT, &o.widths.feature_bits, 8, SF_INPUT_BITS, NULL, "B",
        "bits of the inputs of D1 and C1"},
@@ -349,47 +350,68 @@ int main(int argc, char **argv)
        .help = "rays that --fit looks at (default 262144)"},
       {.name = "--data",
        .type = SF_ARG_STRING,
-       .value = &o.data,
+       .value = &o.extra.data,
        .argument = "DATA",
-       .help = "data set for --fit and --vectors"},
+       .help = "data set for --fit, --vectors and --traces"},
       {.name = "--vectors",
        .type = SF_ARG_STRING,
-       .value = &o.vectors,
+       .value = &o.extra.vectors,
        .argument = "DIR",
        .help = "write programming, stimulus, everything expected, RTL and bench of the scene into DIR (docs/kit.md)"},
       {.name = "--samples",
        .type = SF_ARG_INT,
-       .value = &o.samples,
+       .value = &o.extra.samples,
        .min = 1,
        .max = SF_KIT_SAMPLES_MAX,
        .argument = "N",
        .help = "samples of --vectors (default 48)"},
       {.name = "--rays",
        .type = SF_ARG_INT,
-       .value = &o.rays,
+       .value = &o.extra.rays,
        .min = 1,
        .max = 1e9,
        .argument = "N",
-       .help = "rays that --vectors draws from the test views at most (default 1000)"},
+       .help = "rays that --vectors draws from the test views at most (default 1000), and --traces (default 20)"},
+      {.name = "--traces",
+       .type = SF_ARG_STRING,
+       .value = &o.extra.traces,
+       .argument = "DIR",
+       .help = "write spikes and membranes of random rays into DIR as SANA-FE does (docs/activity.md)"},
+      {.name = "--view",
+       .type = SF_ARG_INT,
+       .value = &o.extra.view,
+       .min = 0,
+       .max = 1 << 20,
+       .argument = "K",
+       .help = "test view of the rays of --traces (default: any)"},
+      {.name = "--nir",
+       .type = SF_ARG_STRING,
+       .value = &o.extra.nir,
+       .argument = "FILE",
+       .help = "write the spiking nets as a NIR graph (HDF5); of a model real numbers, of a scene integers"},
       {.name = "--quiet", .letter = 'q', .type = SF_ARG_FLAG, .value = &o.quiet, .help = "no progress line"},
       {.name = "--json", .type = SF_ARG_FLAG, .value = &o.json, .help = "print the report as JSON"},
       {0}};
   const sf_cli cli = {.program = "sf_export",
                       .usage = "sf_export MODEL -o SCENE [--vectors DIR] [options]\n       sf_export SCENE --vectors "
-                               "DIR --data DATA [options]",
+                               "DIR --data DATA [options]\n       sf_export SCENE --traces DIR --data DATA [options]\n"
+                               "       sf_export MODEL|SCENE --nir FILE",
                       .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
-                                 "the accelerator and the firmware; writes vectors of a scene for any simulator.",
+                                 "the accelerator and the firmware; writes vectors, traces and graphs for other "
+                                 "tools.",
                       .examples = "  sf_export model.safetensors -o scene.snn\n"
                                   "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
                                   "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
                                   "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
-                                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n",
+                                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n"
+                                  "  sf_export scene.snn --traces traces --data lego --view 0 --rays 20\n"
+                                  "  sf_export scene.snn --nir scene.nir\n",
                       .options = table,
                       .min_positional = 1,
                       .max_positional = 1};
   const char *model_path = NULL;
   sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
   if (status.code == SF_OK) status = check_options(&o);
-  if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_vectors(model_path, &o);
+  if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_from(model_path, &o);
   return sf_cli_finish(&cli, status);
 }

@@ -1,0 +1,530 @@
+/* NIR graphs read back with libhdf5 and simulated as their nodes, edges and metadata say: the spikes, membranes and
+ * outputs of the core and of the float oracle. */
+#include <stdio.h>
+#ifdef SF_HDF5
+#include "spikefield/exchange.h"
+#include "tests/float_fixture.h"
+#include "tests/folder_fixture.h"
+#include "tests/fx_fixture.h"
+#include "tests/random_net.h"
+#include <check.h>
+#include <hdf5.h>
+#include <math.h>
+
+enum { NODES = 16, EDGES = 16, TEXT = 128, GRAPHS = 12, INPUTS = 12 };
+
+/* ---- a reader of such files, which shares nothing with the writer ---- */
+
+typedef struct node {
+  char name[32], type[32];
+  int rows, columns, done; /* done: steps evaluated */
+  float *weight;
+  double bias[SF_LANES], current_bits;
+  double tau, r, theta, reset, v_leak, k, lsb, bits, input_step;
+  bool first_is_input, soft, has_k;
+  double v[SF_LANES], before[SF_LANES], out[SF_DIR_MAX]; /* before: reset */
+} node;
+
+typedef struct graph {
+  node node[NODES];
+  int from[EDGES], to[EDGES];
+  int nodes, edges;
+  double steps;
+} graph;
+
+static void read_text(hid_t group, const char *name, char text[TEXT])
+{
+  const hid_t set = H5Dopen2(group, name, H5P_DEFAULT), type = H5Dget_type(set);
+  char *value;
+  ck_assert_int_eq(H5Tget_class(type), H5T_STRING);
+  ck_assert(H5Tis_variable_str(type) > 0);
+  ck_assert_int_ge(H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value), 0);
+  snprintf(text, TEXT, "%s", value);
+  H5free_memory(value);
+  H5Tclose(type);
+  H5Dclose(set);
+}
+
+static bool has(hid_t group, const char *name)
+{
+  return H5Lexists(group, name, H5P_DEFAULT) > 0;
+}
+
+/* The value that all elements have; their number in *count. */
+static double read_number(hid_t group, const char *name, int *count)
+{
+  const hid_t set = H5Dopen2(group, name, H5P_DEFAULT), space = H5Dget_space(set);
+  double value[256];
+  const int n = (int)H5Sget_simple_extent_npoints(space);
+  ck_assert_int_le(n, 256);
+  ck_assert_int_ge(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, value), 0);
+  for (int i = 1; i < n; i++) ck_assert(value[i] == value[0]);
+  if (count) *count = n;
+  H5Sclose(space);
+  H5Dclose(set);
+  return value[0];
+}
+
+static void read_weight(hid_t group, node *n)
+{
+  hsize_t size[2];
+  const hid_t set = H5Dopen2(group, "weight", H5P_DEFAULT), space = H5Dget_space(set);
+  ck_assert_int_eq(H5Sget_simple_extent_ndims(space), 2);
+  H5Sget_simple_extent_dims(space, size, NULL);
+  n->rows = (int)size[0], n->columns = (int)size[1];
+  n->weight = malloc(size[0] * size[1] * sizeof *n->weight);
+  ck_assert_int_ge(H5Dread(set, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, n->weight), 0);
+  H5Sclose(space);
+  H5Dclose(set);
+}
+
+static void read_bias(hid_t group, node *n)
+{
+  const hid_t set = H5Dopen2(group, "bias", H5P_DEFAULT), space = H5Dget_space(set);
+  ck_assert_int_eq(H5Sget_simple_extent_npoints(space), n->rows);
+  ck_assert_int_ge(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, n->bias), 0);
+  H5Sclose(space);
+  H5Dclose(set);
+}
+
+static void read_neurons(hid_t group, node *n)
+{
+  const bool leaky = !strcmp(n->type, "LIF");
+  n->theta = read_number(group, "v_threshold", &n->rows);
+  n->r = read_number(group, "r", NULL);
+  n->tau = leaky ? read_number(group, "tau", NULL) : INFINITY;
+  n->v_leak = leaky ? read_number(group, "v_leak", NULL) : 0;
+  n->reset = read_number(group, "v_reset", NULL);
+  ck_assert(n->v_leak == 0 && n->reset == 0);
+}
+
+static void read_notes(hid_t group, node *n)
+{
+  char text[TEXT];
+  if (!has(group, "metadata")) return;
+  const hid_t notes = H5Gopen2(group, "metadata", H5P_DEFAULT);
+  if (has(notes, "k")) n->has_k = true, n->k = read_number(notes, "k", NULL);
+  if (has(notes, "membrane_lsb")) n->lsb = read_number(notes, "membrane_lsb", NULL);
+  if (has(notes, "membrane_bits")) n->bits = read_number(notes, "membrane_bits", NULL);
+  if (has(notes, "current_bits")) n->current_bits = read_number(notes, "current_bits", NULL);
+  if (has(notes, "input_step")) n->input_step = read_number(notes, "input_step", NULL);
+  if (has(notes, "first_step")) {
+    read_text(notes, "first_step", text);
+    ck_assert_str_eq(text, "v = I");
+    n->first_is_input = true;
+  }
+  if (has(notes, "reset")) {
+    read_text(notes, "reset", text);
+    ck_assert_str_eq(text, "v -= v_threshold");
+    n->soft = true;
+  }
+  H5Gclose(notes);
+}
+
+static herr_t read_node(hid_t nodes, const char *name, const H5L_info_t *info, void *user)
+{
+  graph *g = user;
+  node *n = &g->node[g->nodes++];
+  (void)info;
+  ck_assert_int_le(g->nodes, NODES);
+  const hid_t group = H5Gopen2(nodes, name, H5P_DEFAULT);
+  char type[TEXT];
+  snprintf(n->name, sizeof n->name, "%s", name);
+  read_text(group, "type", type);
+  snprintf(n->type, sizeof n->type, "%.30s", type);
+  if (!strcmp(type, "Linear") || !strcmp(type, "Affine"))
+    read_weight(group, n);
+  else if (!strcmp(type, "LIF") || !strcmp(type, "IF"))
+    read_neurons(group, n);
+  else
+    n->rows = (int)read_number(group, "shape", NULL);
+  ck_assert(has(group, "bias") == !strcmp(type, "Affine"));
+  if (has(group, "bias")) read_bias(group, n);
+  read_notes(group, n);
+  H5Gclose(group);
+  return 0;
+}
+
+static int find(const graph *g, const char *name)
+{
+  for (int i = 0; i < g->nodes; i++)
+    if (!strcmp(g->node[i].name, name)) return i;
+  return -1;
+}
+
+static void read_edges(hid_t group, graph *g)
+{
+  const hid_t set = H5Dopen2(group, "edges", H5P_DEFAULT), type = H5Dget_type(set), space = H5Dget_space(set);
+  hsize_t size[2];
+  char *name[EDGES][2];
+  H5Sget_simple_extent_dims(space, size, NULL);
+  ck_assert(size[0] <= EDGES && size[1] == 2);
+  g->edges = (int)size[0];
+  ck_assert_int_ge(H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), 0);
+  for (int e = 0; e < g->edges; e++) {
+    g->from[e] = find(g, name[e][0]), g->to[e] = find(g, name[e][1]);
+    ck_assert(g->from[e] >= 0 && g->to[e] >= 0);
+  }
+  H5Dvlen_reclaim(type, space, H5P_DEFAULT, name);
+  H5Tclose(type);
+  H5Sclose(space);
+  H5Dclose(set);
+}
+
+static void read_graph(graph *g, const char *path)
+{
+  char text[TEXT];
+  memset(g, 0, sizeof *g);
+  const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  ck_assert_int_ge(file, 0);
+  read_text(file, "version", text);
+  ck_assert_str_eq(text, "1.0.8");
+  const hid_t top = H5Gopen2(file, "node", H5P_DEFAULT), nodes = H5Gopen2(top, "nodes", H5P_DEFAULT);
+  read_text(top, "type", text);
+  ck_assert_str_eq(text, "NIRGraph");
+  H5Literate(nodes, H5_INDEX_NAME, H5_ITER_INC, NULL, read_node, g);
+  read_edges(top, g);
+  const hid_t notes = H5Gopen2(top, "metadata", H5P_DEFAULT);
+  g->steps = read_number(notes, "steps", NULL);
+  H5Gclose(notes);
+  H5Gclose(nodes);
+  H5Gclose(top);
+  H5Fclose(file);
+}
+
+static void free_graph(graph *g)
+{
+  for (int i = 0; i < g->nodes; i++) free(g->node[i].weight);
+}
+
+/* ---- simulation ---- */
+
+static void linear(node *n, double *in)
+{
+  for (int i = 0; i < n->columns && n->input_step > 0; i++)
+    in[i] = n->input_step * floor(in[i] / n->input_step + 1.0 / 16);
+  for (int o = 0; o < n->rows; o++) {
+    double sum = n->bias[o];
+    for (int i = 0; i < n->columns; i++) sum += (double)n->weight[o * n->columns + i] * in[i];
+    n->out[o] = sum;
+  }
+}
+
+/* One Euler step of tau dv/dt = -v + r I with dt = 1; with a membrane LSB, what leaks is rounded to it. */
+static double charge(const node *n, double v, double in, int t)
+{
+  if (t == 0 && n->first_is_input) return in;
+  if (n->lsb == 0) return v + (n->r * in - v) / n->tau;
+  if (n->r == 1 && !strcmp(n->type, "LIF")) return v + n->lsb * floor((in - v) / n->lsb * n->k + 0.5);
+  const double u = (v + in) / n->lsb - floor(v / n->lsb * n->k + 0.5), most = ldexp(1, (int)n->bits - 1);
+  return n->lsb * fmax(-most, fmin(most - 1, u));
+}
+
+static double clamped(double x, double bits)
+{
+  const double most = ldexp(1, (int)bits - 1);
+  return bits > 0 ? fmax(-most, fmin(most - 1, x)) : x;
+}
+
+static void neurons(node *n, const double *in, int t)
+{
+  for (int o = 0; o < n->rows; o++) {
+    const double v = charge(n, t ? n->v[o] : 0, clamped(in[o], n->current_bits), t);
+    n->before[o] = v;
+    n->out[o] = v >= n->theta;
+    n->v[o] = n->out[o] == 0 ? v : n->soft ? v - n->theta : n->reset;
+  }
+}
+
+static bool ready(const graph *g, int i, int t)
+{
+  for (int e = 0; e < g->edges; e++)
+    if (g->to[e] == i && g->node[g->from[e]].done <= t) return false;
+  return g->node[i].done <= t;
+}
+
+static void evaluate(graph *g, int i, int t)
+{
+  node *n = &g->node[i];
+  double in[SF_DIR_MAX] = {0};
+  n->done = t + 1;
+  if (!strcmp(n->type, "Input")) return;
+  for (int e = 0; e < g->edges; e++)
+    for (int a = 0; a < SF_DIR_MAX && g->to[e] == i; a++) in[a] += g->node[g->from[e]].out[a];
+  if (n->weight)
+    linear(n, in);
+  else if (!strcmp(n->type, "Output"))
+    memcpy(n->out, in, sizeof n->out);
+  else
+    neurons(n, in, t);
+}
+
+static void step(graph *g, int t)
+{
+  for (int count = 0; count < g->nodes;) {
+    const int before = count;
+    for (int i = 0; i < g->nodes; i++)
+      if (ready(g, i, t)) evaluate(g, i, t), count++;
+    ck_assert_int_gt(count, before);
+  }
+}
+
+static void begin(graph *g)
+{
+  for (int i = 0; i < g->nodes; i++) g->node[i].done = 0;
+}
+
+static node *need(graph *g, const char *name)
+{
+  const int i = find(g, name);
+  ck_assert_msg(i >= 0, "no node %s", name);
+  return &g->node[i];
+}
+
+/* ---- the fixed-point core ---- */
+
+static graph shared;
+
+static void set_inputs(graph *g, const char *name, const int16_t *value)
+{
+  const int i = find(g, name);
+  for (int a = 0; i >= 0 && a < g->node[i].rows; a++) g->node[i].out[a] = value[a];
+}
+
+static void same_layer(graph *g, const char *name, const fx_net *net, const fx_trace *trace, int l, int t)
+{
+  const node *n = need(g, name);
+  const double lsb = l == FX_C2 ? 1.0 / (1 << SF_AC_FRAC) : 1;
+  ck_assert_int_eq(n->rows, net->layer[l].n_out);
+  for (int o = 0; o < n->rows; o++) {
+    ck_assert_msg(n->before[o] == trace->membrane[l][t][o] * lsb, "%s step %d neuron %d: %.9g, core %d", name, t, o,
+                  n->before[o] / lsb, trace->membrane[l][t][o]);
+    ck_assert_int_eq(n->out[o] == 1, trace->spikes[l][t][o / 64] >> (o % 64) & 1);
+  }
+}
+
+static void same_output(graph *g, const char *name, const fx_net *net, const fx_trace *trace, int l, int t)
+{
+  const node *n = need(g, name);
+  ck_assert_int_eq(n->rows, net->layer[l].n_out);
+  for (int o = 0; o < n->rows; o++) ck_assert(n->out[o] == trace->current[l][t][o]);
+}
+
+static void same_as_core(graph *g, const fx_net *net, const int16_t *f, const int16_t *dir)
+{
+  int32_t base[SF_LANES];
+  static fx_trace trace;
+  fx_out out;
+  fx_net_direction(net, dir, base, NULL);
+  fx_net_sample(net, f, base, &out, &trace, NULL);
+  begin(g);
+  set_inputs(g, "features", f);
+  set_inputs(g, fx_net_decodes(net) ? "inputs" : "direction", dir);
+  ck_assert(g->steps == net->steps);
+  const bool density = !fx_net_decodes(net);
+  ck_assert(density == (find(g, "density") >= 0));
+  for (int t = 0; t < net->steps; t++) {
+    step(g, t);
+    if (density) same_layer(g, "D1", net, &trace, FX_D1, t);
+    if (density) same_output(g, "density", net, &trace, FX_D2, t);
+    same_layer(g, "C1", net, &trace, FX_C1, t);
+    same_layer(g, "C2", net, &trace, FX_C2, t);
+    same_output(g, "colour", net, &trace, FX_C3, t);
+  }
+}
+
+static void ck_scene(const fx_scene *scene, random_source *r, bool extreme)
+{
+  ck_good(sf_nir_write_scene(in("scene.nir"), scene));
+  read_graph(&shared, in("scene.nir"));
+  for (int s = 0; s < INPUTS; s++) {
+    int16_t f[SF_FEATURE_MAX], dir[SF_DIR_MAX];
+    draw_values(r, f, SF_FEATURE_MAX, extreme);
+    draw_values(r, dir, SF_DIR_MAX, extreme);
+    same_as_core(&shared, &scene->net, f, dir);
+  }
+  free_graph(&shared);
+}
+
+/* _i: from typical nets to those of all corners. */
+START_TEST(scene_gives_the_spikes_of_the_core)
+{
+  static random_net n;
+  random_source r = {(uint64_t)_i, 0};
+  for (int i = 0; i < GRAPHS; i++) {
+    random_net_make(&n, &r, _i > 0);
+    if (_i == 0) n.net.mode = i % 3;
+    ck_scene(&(fx_scene){.net = n.net}, &r, _i > 0);
+  }
+}
+END_TEST
+
+START_TEST(biases_and_decoders_too)
+{
+  random_source r = {(uint64_t)_i, 0};
+  for (uint64_t seed = 0; seed < GRAPHS; seed++) {
+    const uint64_t number = seed + (uint64_t)(_i * GRAPHS);
+    const fixture_sizes sizes = seed % 2 ? fixture_random_decoder(number) : fixture_random_sizes(number);
+    fx_scene scene = fixture_scene(&sizes, number);
+    ck_scene(&scene, &r, true);
+    fx_scene_free(&scene);
+  }
+}
+END_TEST
+
+/* ---- the float oracle ---- */
+
+/* Rounding decides only where membrane and threshold are this near: sums of 128 products of about 1 in fp32. */
+static const double NEAR = 1e-4;
+
+/* False: some membrane came too near to its threshold to say. */
+static bool same_as_oracle(graph *g, const sf_net_trace *trace, int steps)
+{
+  static const char *const name[3] = {"D1", "C1", "C2"};
+  static const int layer[3] = {0, 2, 3};
+  for (int t = 0; t < steps; t++) {
+    step(g, t);
+    for (int l = 0; l < 3; l++) {
+      const node *n = need(g, name[l]);
+      for (int o = 0; o < n->rows; o++) {
+        if (fabs(n->before[o] - n->theta) < NEAR) return false;
+        ck_assert_double_eq_tol(n->before[o], (double)trace->membrane[layer[l]][t][o], NEAR);
+        ck_assert_int_eq(n->out[o] == 1, trace->spike[layer[l]][t][o]);
+      }
+    }
+    for (int o = 0; o < 3; o++)
+      ck_assert_double_eq_tol(need(g, "colour")->out[o], (double)trace->current[4][t][o], NEAR);
+  }
+  return true;
+}
+
+START_TEST(model_gives_the_spikes_of_the_oracle)
+{
+  enum { STEPS = 5, SAMPLES = 60 };
+  static sf_net_trace trace;
+  sf_model m = test_model(SF_NET_SNN, (sf_input_mode)_i, 64, STEPS, 0.5f);
+  m.t_r = STEPS;
+  ck_good(sf_nir_write_model(in("model.nir"), &m));
+  read_graph(&shared, in("model.nir"));
+  ck_assert(shared.steps == STEPS);
+  int certain = 0, fired = 0;
+  for (int s = 0; s < SAMPLES; s++) {
+    float f[32], sh[SF_DIR_FEATURES], sigma[STEPS], colour[3 * STEPS];
+    for (int i = 0; i < 8; i++) f[i] = test_random(1000000 + (uint64_t)(100 * s + i));
+    for (int i = 0; i < SF_DIR_FEATURES; i++) sh[i] = test_random(1000050 + (uint64_t)(100 * s + i));
+    memset(&trace, 0, sizeof trace);
+    sf_net_sample(&m, f, sh, STEPS, sigma, colour, &trace);
+    begin(&shared);
+    for (int i = 0; i < 8; i++) need(&shared, "features")->out[i] = (double)f[i];
+    for (int i = 0; i < SF_DIR_FEATURES; i++) need(&shared, "direction")->out[i] = (double)sh[i];
+    certain += same_as_oracle(&shared, &trace, STEPS);
+    for (int o = 0; o < 64; o++) fired += trace.spike[3][STEPS - 1][o];
+  }
+  ck_assert_int_ge(certain, SAMPLES / 2);
+  ck_assert_int_gt(fired, 0);
+  free_graph(&shared);
+  sf_model_free(&m);
+}
+END_TEST
+
+START_TEST(the_relu_twin_is_refused)
+{
+  sf_model m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
+  const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
+  sf_model_free(&m);
+}
+END_TEST
+
+START_TEST(same_scene_same_bytes)
+{
+  static random_net n;
+  random_source r = {77, 0};
+  random_net_make(&n, &r, false);
+  const fx_scene scene = {.net = n.net};
+  ck_good(sf_nir_write_scene(in("a.nir"), &scene));
+  ck_good(sf_nir_write_scene(in("b.nir"), &scene));
+  char command[2 * sizeof folder + 40];
+  snprintf(command, sizeof command, "cmp -s '%s/a.nir' '%s/b.nir'", folder, folder);
+  ck_assert_int_eq(system(command), 0);
+  ck_assert_int_eq(sf_nir_write_scene(in("missing/a.nir"), &scene).code, SF_E_IO);
+}
+END_TEST
+
+/* ---- for tests/crosscheck_nir.py: a scene's graph, inputs, and what the core makes of them ---- */
+
+static void write_row(FILE *out, const char *name, const int16_t *value, int n)
+{
+  fprintf(out, "%s", name);
+  for (int i = 0; i < n; i++) fprintf(out, " %d", value[i]);
+  fprintf(out, "\n");
+}
+
+static void write_spikes(FILE *out, const fx_net *net, const fx_trace *trace)
+{
+  static const char *const name[SF_LAYERS] = {"D1", 0, "C1", "C2", 0};
+  for (int t = 0; t < net->steps; t++)
+    for (int l = 0; l < SF_LAYERS; l++) {
+      if (!name[l]) continue;
+      fprintf(out, "spikes %s %d", name[l], t);
+      for (int o = 0; o < net->layer[l].n_out; o++)
+        if (trace->spikes[l][t][o / 64] >> (o % 64) & 1) fprintf(out, " %d", o);
+      fprintf(out, "\n");
+    }
+}
+
+static int leave_case(const char *where, int mode)
+{
+  static random_net n;
+  static fx_trace trace;
+  random_source r = {(uint64_t)mode + 5, 0};
+  char path[4096];
+  random_net_make(&n, &r, false);
+  n.net.mode = mode;
+  const fx_scene scene = {.net = n.net};
+  snprintf(path, sizeof path, "%s/%d.nir", where, mode);
+  if (sf_nir_write_scene(path, &scene).code != SF_OK) return 1;
+  snprintf(path, sizeof path, "%s/%d.txt", where, mode);
+  FILE *out = fopen(path, "w");
+  for (int s = 0; out && s < INPUTS; s++) {
+    int16_t f[SF_FEATURE_MAX], dir[SF_DIR_MAX];
+    int32_t base[SF_LANES];
+    fx_out result;
+    draw_values(&r, f, SF_FEATURE_MAX, false);
+    draw_values(&r, dir, SF_DIR_MAX, false);
+    fx_net_direction(&n.net, dir, base, NULL);
+    fx_net_sample(&n.net, f, base, &result, &trace, NULL);
+    write_row(out, "features", f, n.net.layer[FX_D1].n_in);
+    write_row(out, "direction", dir, fx_net_constants(&n.net));
+    write_spikes(out, &n.net, &trace);
+  }
+  return !out || fclose(out);
+}
+
+int main(void)
+{
+  const char *where = getenv("SF_CROSSCHECK");
+  if (where) return leave_case(where, FX_HYBRID) || leave_case(where, FX_DECAY) || leave_case(where, FX_NODECAY);
+  Suite *suite = suite_create("nir");
+  TCase *tcase = tcase_create("nir");
+  tcase_add_checked_fixture(tcase, make_folder, remove_folder);
+  tcase_add_loop_test(tcase, scene_gives_the_spikes_of_the_core, 0, 6);
+  tcase_add_loop_test(tcase, biases_and_decoders_too, 0, 4);
+  tcase_add_loop_test(tcase, model_gives_the_spikes_of_the_oracle, SF_HYBRID, SF_NODECAY + 1);
+  tcase_add_test(tcase, the_relu_twin_is_refused);
+  tcase_add_test(tcase, same_scene_same_bytes);
+  suite_add_tcase(suite, tcase);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
+#else
+int main(void)
+{
+  puts("test_nir: skipped: this build has no HDF5 (libhdf5-dev)");
+  return 77;
+}
+#endif
