@@ -289,7 +289,7 @@ static void bench_adam(cJSON *json, const ceilings *c)
 {
   sf_model m = full_model(SF_NET_SNN, 8);
   float *g = sf_aligned_alloc(m.size * 4), *a = sf_aligned_alloc(m.size * 4), *v = sf_aligned_alloc(m.size * 4);
-  sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1};
+  sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1, 0};
   double best = 1e9, naive = 1e9;
   const double touched = 0.4; /* of the cache lines, as in an iteration of 16384 samples on lego */
   for (int i = 0; i < 5; i++) {

@@ -319,7 +319,7 @@ END_TEST
 START_TEST(adam_by_hand)
 {
   float value = 1, grad = 0.5f, m = 0, v = 0;
-  sf_adam adam = {0.1, 0.9, 0.99, 1e-15, 1};
+  sf_adam adam = {0.1, 0.9, 0.99, 1e-15, 1, 0};
   sf_adam_update(&adam, 1, &value, &grad, &m, &v);
   ck_assert_float_eq_tol(value, 0.9f, 1e-6f); /* the first bias-corrected step is lr * sign(g) */
   ck_assert_float_eq_tol(m, 0.05f, 1e-7f);

@@ -15,6 +15,8 @@ typedef struct arguments {
   double scale, theta, checkpoint_minutes, gamma;
   int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits;
   bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
+  int argc;
+  char **argv;
 } arguments;
 
 static sf_cli make_cli(arguments *a, sf_option *o)
@@ -23,6 +25,8 @@ static sf_cli make_cli(arguments *a, sf_option *o)
   sf_train_options *t = &a->train;
   const sf_option options[] = {
       {"--output", 'o', SF_ARG_STRING, &a->output, 0, 0, NULL, "FILE", "model to write (default model.safetensors)"},
+      {"--backbone", 0, SF_ARG_CHOICE, &c->backbone, 0, 0, "ingp|tensorf", "KIND",
+       "hash grid, or TensoRF's planes and lines (default ingp)"},
       {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M",
        "time budget, a quarter for stage I (default: iterations)"},
       {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
@@ -36,9 +40,14 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--seed", 's', SF_ARG_U64, &t->seed, 0, 9e15, NULL, "S", "same seed, same bits, any thread count (default 1)"},
       {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
       {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N",
-       "samples per iteration, about (default 16384)"},
-      {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R", "Adam's rate for the hash grid (default 1e-2)"},
-      {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks (default 5e-3)"},
+       "samples per iteration, about (default 16384, tensorf 131072)"},
+      {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "tensorf: rays per iteration at most (default 4096)"},
+      {"--voxels", 0, SF_ARG_INT, &t->voxels, 16, 1024, NULL, "N",
+       "tensorf: the finest grid has N^3 voxels (default by the layout: 300, NDC 400)"},
+      {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R",
+       "Adam's rate for the field (default 1e-2, tensorf 2e-2)"},
+      {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R",
+       "Adam's rate for nets and leaks (default 5e-3, tensorf 1e-3)"},
       {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid (default 16)"},
       {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries (default 19)"},
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level (default 16)"},
@@ -46,7 +55,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
        "resolution of the finest level (default 2048 x bound, at most 32768)"},
       {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
        "neurons of a spiking layer, multiple of 16 (default 128)"},
-      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25)"},
+      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25, tensorf 0.5)"},
       {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
        "the shortest step is the diagonal of a box of bound 1 divided by this (default 1024)"},
       {"--bound", 0, SF_ARG_INT, &a->bound, 0, 64, NULL, "B",
@@ -60,7 +69,8 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--downscale", 'd', SF_ARG_INT, &a->downscale, 1, 64, NULL, "F", "box-filter the images by F (default 1)"},
       {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
       {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
-       "behind transparent pixels and rays that leave the box; auto: random where pictures have alpha, else white "
+       "behind transparent pixels and rays that leave the box; auto: random where pictures have alpha, else white; "
+       "tensorf: the other way round "
        "(default auto)"},
       {"--no-stage1", 0, SF_ARG_FLAG, &a->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
@@ -97,6 +107,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
                               "  sf_train lego -o lego.safetensors --stage1 10000 --stage2 30000 --resume\n"
                               "  sf_train lego -o twin.safetensors --net ann --minutes 10\n"
+                              "  sf_train lego -o vm.safetensors --backbone tensorf --minutes 30\n"
                               "  sf_train lego -o four.safetensors --fine-tune lego.safetensors --weight-bits 4\n",
                   .options = o,
                   .min_positional = 1,
@@ -147,11 +158,11 @@ static void show(sf_progress *p, const sf_train_stats *s, const recent *r)
 
 static void warn(sf_progress *progress, const sf_train_stats *s)
 {
-  static const char *const layer[] = {"density.w1", "colour.w3", "colour.w4"};
+  static const char *const layer[] = {"D1", "C1", "C2"};
   for (int l = 0; l < 3; l++)
     if (s->event[l]) {
       sf_progress_end(progress);
-      fprintf(stderr, "sf_train: warning: iteration %lld: the neurons behind '%s' %s: brought back to the threshold\n",
+      fprintf(stderr, "sf_train: warning: iteration %lld: the neurons of %s %s: brought back to the threshold\n",
               (long long)s->iteration, layer[l], s->event[l] < 0 ? "were silent" : "fired all the time");
     }
 }
@@ -203,6 +214,7 @@ static cJSON *make_summary(const arguments *a, const sf_config *c, const sf_trai
   static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
   cJSON *json = cJSON_CreateObject();
   cJSON_AddStringToObject(json, "model", a->output);
+  cJSON_AddStringToObject(json, "backbone", c->backbone == SF_TENSORF ? "tensorf" : "ingp");
   cJSON_AddStringToObject(json, "net", net[c->net]);
   cJSON_AddStringToObject(json, "mode", mode[c->mode]);
   cJSON_AddNumberToObject(json, "beta", a->train.beta);
@@ -370,11 +382,11 @@ static void settle(arguments *a, const sf_dataset *data)
 {
   static const char *const name[] = {"random", "white", "black"};
   const sf_config *c = &a->train.config;
-  const bool transparent = any_transparent(data);
+  const bool transparent = any_transparent(data), vm = c->backbone == SF_TENSORF;
   a->train.config.scale = data->scale;
-  set_box(a, data->bound);
-  a->train.background = a->background ? a->background - 1 : transparent ? 0 : 1;
-  if (a->quiet) return;
+  if (!vm) set_box(a, data->bound);
+  a->train.background = a->background ? a->background - 1 : transparent != vm ? 0 : 1;
+  if (a->quiet || vm) return;
   fprintf(stderr, "sf_train: box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c),
           c->bound > 1 ? "s" : "");
   if (c->dt_gamma > 0)
@@ -387,6 +399,35 @@ static void settle(arguments *a, const sf_dataset *data)
                         : "the pictures are opaque");
 }
 
+/* What follows from the options, once they are parsed. */
+static sf_status finish_options(arguments *a)
+{
+  sf_config *c = &a->train.config;
+  if (c->net == SF_NET_ANN) c->steps = 1;
+  for (int i = 0; i < 3; i++) c->theta[i] = (float)a->theta;
+  if (a->no_budget) a->train.no_extra = a->train.no_penalty = true;
+  if (a->no_stage1) a->train.stage2 += a->train.stage1, a->train.stage1 = 0;
+  if (a->train.fixed_steps > c->steps)
+    return sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a->train.fixed_steps, c->steps);
+  if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
+  if (a->fine_tune && c->backbone == SF_TENSORF)
+    return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");
+  return sf_ok();
+}
+
+/* TensoRF's defaults depend on the data: the options once more, on top of them. */
+static sf_status take_tensorf_defaults(arguments *a, const sf_dataset *data)
+{
+  a->train = sf_train_defaults_tensorf(data);
+  a->theta = (double)a->train.config.theta[0];
+  sf_option options[64];
+  const sf_cli cli = make_cli(a, options);
+  const char *path[1] = {NULL};
+  SF_TRY(sf_cli_parse(&cli, a->argc, a->argv, path));
+  SF_TRY(finish_options(a));
+  return sf_config_check(&a->train.config);
+}
+
 static sf_status run(arguments *a, const char *path)
 {
   char log_path[4096];
@@ -394,10 +435,10 @@ static sf_status run(arguments *a, const char *path)
   sf_dataset data;
   const sf_dataset_options how = {.downscale = a->downscale, .scale = (float)a->scale, .limit = a->limit};
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
-  settle(a, &data);
   sf_model start = {0};
-  sf_status status = sf_ok();
-  if (a->fine_tune && !a->resume) {
+  sf_status status = a->train.config.backbone == SF_TENSORF ? take_tensorf_defaults(a, &data) : sf_ok();
+  settle(a, &data);
+  if (!status.code && a->fine_tune && !a->resume) {
     status = load_start(a, data.scale, &start);
     a->train.start = &start;
   }
@@ -417,7 +458,9 @@ int main(int argc, char **argv)
                  .train = sf_train_defaults(),
                  .downscale = 1,
                  .checkpoint_minutes = 2,
-                 .gamma = -1};
+                 .gamma = -1,
+                 .argc = argc,
+                 .argv = argv};
   a.theta = (double)a.train.config.theta[0];
   sf_option options[64];
   const sf_cli cli = make_cli(&a, options);
@@ -425,18 +468,11 @@ int main(int argc, char **argv)
   sf_status status = sf_cli_parse(&cli, argc, argv, path);
   if (status.code) return sf_cli_finish(&cli, status);
   if (a.threads) omp_set_num_threads(a.threads);
-  if (a.train.config.net == SF_NET_ANN) a.train.config.steps = 1;
-  for (int i = 0; i < 3; i++) a.train.config.theta[i] = (float)a.theta;
-  if (a.no_budget) a.train.no_extra = a.train.no_penalty = true;
-  if (a.no_stage1) a.train.stage2 += a.train.stage1, a.train.stage1 = 0;
-  if (a.train.fixed_steps > a.train.config.steps)
-    return sf_cli_finish(
-        &cli, sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a.train.fixed_steps, a.train.config.steps));
-  if (a.weight_bits && !a.fine_tune)
-    return sf_cli_finish(&cli, sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL"));
+  status = finish_options(&a);
+  if (status.code) return sf_cli_finish(&cli, status);
   sf_cli_catch_signals();
   set_box(&a, 1);
-  status = sf_config_check(&a.train.config);
+  status = a.train.config.backbone == SF_TENSORF ? sf_ok() : sf_config_check(&a.train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
   if (!status.code) status = run(&a, path[0]);
   return sf_cli_finish(&cli, status);

@@ -3,13 +3,16 @@
 #ifndef SPIKEFIELD_MODEL_H
 #define SPIKEFIELD_MODEL_H
 #include "spikefield/arch.h"
+#include "spikefield/io.h"
 #include "spikefield/status.h"
+#include "spikefield/tensorf.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 typedef enum { SF_HYBRID, SF_DECAY, SF_NODECAY } sf_input_mode; /* equal to fx_input_mode */
 typedef enum { SF_NET_SNN, SF_NET_ANN } sf_net_kind;
+typedef enum { SF_INGP, SF_TENSORF } sf_backbone_kind;
 
 typedef struct sf_config {
   int32_t net;                                     /* sf_net_kind */
@@ -18,11 +21,13 @@ typedef struct sf_config {
   int32_t levels, log2_hash, base_res, finest_res; /* hash grid, 2 features per entry */
   int32_t hidden;                                  /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
   float theta[3];                                  /* thresholds of D1, C1, C2 */
-  float scale;     /* model units = world units * scale; the scene box is [-bound, bound]^3 model units */
-  int32_t lattice; /* the shortest step is 2 sqrt(3) / lattice model units */
-  int32_t occ_res; /* occupancy cells per axis of a cascade */
-  int32_t bound;   /* 1, 2, 4, ... 64; 1: objects */
-  float dt_gamma;  /* steps are distance * dt_gamma, at least the shortest; 0: all are the shortest. 0..1/8 */
+  float scale;        /* model units = world units * scale; the scene box is [-bound, bound]^3 model units */
+  int32_t lattice;    /* the shortest step is 2 sqrt(3) / lattice model units */
+  int32_t occ_res;    /* occupancy cells per axis of a cascade */
+  int32_t bound;      /* 1, 2, 4, ... 64; 1: objects */
+  float dt_gamma;     /* steps are distance * dt_gamma, at least the shortest; 0: all are the shortest. 0..1/8 */
+  int32_t backbone;   /* sf_backbone_kind */
+  sf_tensorf tensorf; /* of SF_TENSORF; levels .. finest_res, lattice, bound and dt_gamma are INGP's */
 } sf_config;
 
 /* Occupancy grids, one inside the other: cascade c covers [-2^c, 2^c]^3, the last one the box. */
@@ -43,9 +48,11 @@ typedef enum { SF_P_GRID, SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5, SF_P_LEAK
 typedef struct sf_param {
   const char *name;
   size_t offset, size; /* in floats; offsets are multiples of 16 */
-  int64_t shape[2];
+  int64_t shape[3];
   int dims;
 } sf_param;
+
+enum { SF_PARAMS_MAX = SF_V_COUNT };
 
 enum { SF_DIR_FEATURES = 16, SF_DENSITY_OUT = 16, SF_GEO_FEATURES = 15 };
 
@@ -69,9 +76,10 @@ enum { SF_SCALES = sizeof(struct sf_lsb) / sizeof(float) };
 
 typedef struct sf_model {
   sf_config config;
-  sf_param param[SF_P_COUNT];
-  size_t size;  /* floats in value */
-  float *value; /* [size], 64-byte aligned, owned */
+  sf_param param[SF_PARAMS_MAX]; /* by sf_param_id, or by tensorf.h's SF_V_... */
+  int params;                    /* how many there are */
+  size_t size;                   /* floats in value */
+  float *value;                  /* [size], 64-byte aligned, owned */
   sf_grid_level level[16];
   float t_star;       /* 1..T; T where no budget was learned */
   int32_t t_r;        /* round(t_star): steps at inference */
@@ -87,7 +95,7 @@ sf_status sf_config_check(const sf_config *config);
 /* Allocates, lays out and zeroes; occupancy all ones. */
 sf_status sf_model_create(sf_model *model, const sf_config *config);
 void sf_model_free(sf_model *model);
-static inline float *sf_model_param(const sf_model *m, sf_param_id id)
+static inline float *sf_model_param(const sf_model *m, int id)
 {
   return m->value + m->param[id].offset;
 }
@@ -95,6 +103,13 @@ static inline float *sf_model_param(const sf_model *m, sf_param_id id)
 /* model.safetensors: the tensors above by name, "occupancy", metadata config + t_star + t_r. Every load check names
  * file and tensor. A checkpoint holds further tensors (optimiser) that this ignores. */
 sf_status sf_model_load(sf_model *model, const char *path);
+/* The model alone; atomic. */
+sf_status sf_model_save(const sf_model *model, const char *path);
+/* The same in parts, for files that hold more: metadata, and model->params + 2 tensors at most (how many). */
+void sf_model_describe(const sf_model *model, cJSON *metadata);
+int sf_model_tensors(const sf_model *model, sf_tensor *list);
+/* Leaks, SF_LAYERS of them. */
+float *sf_model_leak(const sf_model *model);
 
 /* Value of one LSB of input `input` of layer D1 D2 C1 C2 C3 (1 for spikes). */
 double sf_scales_input(const sf_scales *scales, int layer, int input);
@@ -113,13 +128,15 @@ float sf_scales_h_step(const sf_scales *scales);
 enum { SF_STEPS_MAX = 1024 };
 #define SF_NEAR 0.2 /* model units; torch-ngp's min_near */
 typedef struct sf_steps {
-  int32_t count, stride, lattice; /* stride: this many of the scene's intervals are one */
-  float bound, shortest;          /* shortest: of the scene */
+  int32_t count, stride, lattice;   /* stride: this many of the scene's intervals are one */
+  float low[3], high[3], near, far; /* the box, and the part of a ray that counts */
+  float shortest;                   /* of the scene */
   bool growing;
   float start[SF_STEPS_MAX], length[SF_STEPS_MAX];
   uint8_t cascade[SF_STEPS_MAX]; /* the finest whose cells are longer than the interval */
 } sf_steps;
-/* SF_E_RANGE when SF_STEPS_MAX intervals do not reach across the box. */
+/* TensoRF: equal steps of sf_tensorf_step in the field's own box between its near and far distance.
+ * SF_E_RANGE when SF_STEPS_MAX intervals do not reach across the box. */
 sf_status sf_steps_make(sf_steps *steps, const sf_config *config, int stride);
 
 /* The part of a ray that is in the box: the centre of interval n is at distance first + start[n] + length[n] / 2 -

@@ -17,6 +17,8 @@ typedef struct sf_train_options {
   bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
   int fixed_steps; /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
   int background;  /* 0 random per ray, 1 white, 2 black */
+  int rays;        /* TensoRF: of an iteration */
+  int voxels;      /* TensoRF: the finest grid has voxels^3 in the shrunk box */
   /* Fine-tuning for few bits: starts from this model, whose scales are settled, at its t_r, without stage I and at a
    * tenth of the rates, with the weights rounded as the exporter will. Not owned; replaces config. NULL: from scratch.
    */
@@ -24,6 +26,8 @@ typedef struct sf_train_options {
 } sf_train_options;
 
 sf_train_options sf_train_defaults(void);
+/* TensoRF's, by the layout of the data: Blender, or a forward-facing scene in NDC. */
+sf_train_options sf_train_defaults_tensorf(const sf_dataset *data);
 
 /* Of the last iteration. */
 typedef struct sf_train_stats {

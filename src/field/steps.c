@@ -2,13 +2,36 @@
 #include "spikefield/model.h"
 #include <math.h>
 
+/* Equal steps through a TensoRF field's own box. */
+static void make_equal(sf_steps *s, const sf_tensorf *f, int stride)
+{
+  *s = (sf_steps){.stride = stride,
+                  .lattice = SF_STEPS_MAX,
+                  .near = f->near,
+                  .far = f->far,
+                  .shortest = sf_tensorf_step(f),
+                  .count = SF_STEPS_MAX / stride};
+  for (int a = 0; a < 3; a++) s->low[a] = f->box[0][a], s->high[a] = f->box[1][a];
+  for (int n = 0; n < s->count; n++) {
+    s->length[n] = s->shortest * (float)stride;
+    s->start[n] = (float)n * s->length[n];
+  }
+}
+
 sf_status sf_steps_make(sf_steps *s, const sf_config *config, int stride)
 {
   const float root3 = 1.7320508f, bound = (float)config->bound;
   const int cascades = sf_config_cascades(config);
+  if (config->backbone == SF_TENSORF) {
+    make_equal(s, &config->tensorf, stride);
+    return sf_ok();
+  }
   *s = (sf_steps){.stride = stride,
                   .lattice = config->lattice * config->bound,
-                  .bound = bound,
+                  .low = {-bound, -bound, -bound},
+                  .high = {bound, bound, bound},
+                  .near = SF_NEAR,
+                  .far = INFINITY,
                   .shortest = 2 * root3 / (float)config->lattice,
                   .growing = config->dt_gamma > 0};
   const float shortest = s->shortest * (float)stride, longest = 2 * root3 * bound / (float)config->occ_res;

@@ -19,14 +19,13 @@ static int32_t intervals_within(const sf_steps *s, float depth)
 
 sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const float direction[3])
 {
-  const float bound = steps->bound;
-  float enter = (float)SF_NEAR, leave = INFINITY;
+  float enter = steps->near, leave = steps->far;
   for (int a = 0; a < 3; a++) {
     if (direction[a] == 0) {
-      if (fabsf(origin[a]) >= bound) return (sf_lattice){0};
+      if (origin[a] <= steps->low[a] || origin[a] >= steps->high[a]) return (sf_lattice){0};
       continue;
     }
-    float t0 = (-bound - origin[a]) / direction[a], t1 = (bound - origin[a]) / direction[a];
+    float t0 = (steps->low[a] - origin[a]) / direction[a], t1 = (steps->high[a] - origin[a]) / direction[a];
     enter = fmaxf(enter, fminf(t0, t1));
     leave = fminf(leave, fmaxf(t0, t1));
   }
@@ -41,11 +40,12 @@ sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const floa
                 .occupancy = model->occupancy,
                 .res = model->config.occ_res,
                 .cascades = sf_config_cascades(&model->config),
-                .jitter = jitter,
-                .shrink = 0.5f / steps->bound};
+                .jitter = jitter};
   for (int a = 0; a < 3; a++) {
     m.origin[a] = origin[a];
     m.direction[a] = direction[a];
+    m.scale[a] = 1 / (steps->high[a] - steps->low[a]);
+    m.offset[a] = -steps->low[a] * m.scale[a];
   }
   m.lattice = sf_ray_lattice(steps, origin, direction);
   m.lattice.first -= steps->shortest / 2;
@@ -56,7 +56,7 @@ void sf_march_at(const sf_march *m, int n, float x[3])
 {
   const float t = sf_march_distance(m, n);
   for (int a = 0; a < 3; a++) {
-    const float at = (m->origin[a] + t * m->direction[a]) * m->shrink + 0.5f; /* fminf would be a call */
+    const float at = (m->origin[a] + t * m->direction[a]) * m->scale[a] + m->offset[a]; /* fminf would be a call */
     x[a] = !(at > 0) ? 0 : at > 0x1.fffffep-1f ? 0x1.fffffep-1f : at;
   }
 }
@@ -90,7 +90,7 @@ static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
     if (m->direction[a] == 0) continue;
     const int place = c->place[a] + (m->direction[a] > 0) - m->res / 2;
     const float face = (float)(place * (1 << c->cascade) + fine / 2) / (float)fine;
-    const float exit = (face - x[a]) * (2 * m->steps->bound) / m->direction[a];
+    const float exit = (face - x[a]) * (m->steps->high[a] - m->steps->low[a]) / m->direction[a];
     ahead = exit < ahead ? exit : ahead;
   }
   return ahead;
@@ -100,7 +100,7 @@ static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
 static inline int skip(const sf_march *m, int n, float ahead)
 {
   const sf_steps *s = m->steps;
-  const float farthest = 4 * s->bound;
+  const float farthest = 2 * (s->high[0] - s->low[0]) + 2 * (s->high[1] - s->low[1]);
   if (!s->growing) {
     const int points = (int)ceilf((ahead < farthest ? ahead : farthest) / s->length[n] - 1e-3f);
     return n + (points > 1 ? points : 1);

@@ -7,7 +7,8 @@ typedef struct sf_march {
   const sf_steps *steps; /* must outlive it */
   const uint8_t *occupancy;
   int res, cascades;
-  float jitter, shrink, origin[3], direction[3]; /* box units = model units * shrink */
+  float jitter, origin[3], direction[3];
+  float scale[3], offset[3]; /* position in [0,1]^3 = model units * scale + offset */
   sf_lattice lattice;
 } sf_march;
 

@@ -2,6 +2,7 @@
  * alive into blocks, so that empty space, dead rays and saturated rays cost nothing. */
 #include "render/composite.h"
 #include "render/march.h"
+#include "render/render.h"
 #include "base/memory.h"
 #include "render/view.h"
 #include <math.h>
@@ -113,6 +114,8 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
   if (steps < 0 || steps > model->config.steps)
     return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
   if (!steps) steps = model->t_r;
+  if (model->config.backbone == SF_TENSORF)
+    return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples);
   sf_steps intervals;
   SF_TRY(sf_steps_make(&intervals, &model->config, 1));
   int failed = 0;

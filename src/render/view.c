@@ -18,3 +18,40 @@ sf_net_view sf_net_view_of(const sf_model *m)
   memcpy(v.theta, m->config.theta, sizeof v.theta);
   return v;
 }
+
+sf_decoder_view sf_decoder_view_of(const sf_model *m)
+{
+  const sf_tensorf *f = &m->config.tensorf;
+  sf_decoder_view v = {.net = {.w4 = sf_model_param(m, SF_V_W2),
+                               .w5 = sf_model_param(m, SF_V_W3),
+                               .hidden = m->config.hidden,
+                               .mode = m->config.mode,
+                               .relu = m->config.net == SF_NET_ANN},
+                       .w1 = sf_model_param(m, SF_V_W1),
+                       .b1 = sf_model_param(m, SF_V_B1),
+                       .b2 = sf_model_param(m, SF_V_B2),
+                       .b3 = sf_model_param(m, SF_V_B3),
+                       .basis = sf_model_param(m, SF_V_BASIS),
+                       .inputs = sf_tensorf_inputs(f),
+                       .features = f->features,
+                       .feature_freqs = f->feature_freqs,
+                       .columns = sf_tensorf_products(f),
+                       .products = (sf_tensorf_products(f) + 15) / 16 * 16};
+  for (int i = 0; i < SF_LAYERS; i++) v.net.k[i] = sf_sigmoid(sf_model_leak(m)[i]);
+  memcpy(v.net.theta, m->config.theta, sizeof v.net.theta);
+  return v;
+}
+
+sf_vm_field sf_vm_field_of(const sf_model *m, bool appearance)
+{
+  const sf_tensorf *f = &m->config.tensorf;
+  const int first = appearance ? SF_V_APP_PLANE : SF_V_DENSITY_PLANE;
+  sf_vm_field v = {.relu = f->activation == SF_RELU, .shift = f->shift, .distance_scale = f->distance_scale};
+  for (int i = 0; i < 3; i++) {
+    v.plane[i] = sf_model_param(m, first + i);
+    v.line[i] = sf_model_param(m, first + 3 + i);
+    v.resolution[i] = f->resolution[i];
+    v.channels[i] = appearance ? f->appearance[i] : f->density[i];
+  }
+  return v;
+}

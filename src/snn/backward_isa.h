@@ -130,15 +130,17 @@ static const word *activations(const sf_net_view *net, int layer, const float *h
   return operands(w->t);
 }
 
-/* Colour integrator and layers C3, C2, C1 at step t; leaves the gradient of i in gi[16][B], row 0 zero. */
-static void colour_backward(const sf_net_words *n, const sf_block *x, int t, float *gcolour, float *gi,
-                            sf_net_grad *grad, sf_net_scratch *w)
+/* Colour integrator and layers C3, C2 at step t; leaves the gradient of j in gj[4][B], the fourth row zero, and that of
+ * C2's current as words of rows in w->rows. sum: that gradient added up over the steps, or NULL. */
+static void colour_output_backward(const sf_net_words *n, const sf_block *x, int t, float *gcolour, float *gj,
+                                   float *sum, sf_net_grad *grad, sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
-  float c[3 * B], gj[4 * B] = {0};
+  float c[3 * B];
   word *rows = words(w->rows), *lanes = words(w->lanes), small[4 * B];
   sigmoid(3 * B, x->j[t], c);
+  memset(gj + 3 * B, 0, B * sizeof *gj);
   for (int a = 0; a < 3; a++)
     integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
                        w->leak[4]);
@@ -147,15 +149,24 @@ static void colour_backward(const sf_net_words *n, const sf_block *x, int t, flo
   add_outer(grad->w5, hidden, small, 4, activations(net, 2, x->m4[t], w), hidden);
   pack_rows(gj, 4, small);
   const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
-  layer_backward(
-      net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
-      (backward_out){w->g4, w->leak[3], NULL, events ? floats(w->lanes) : NULL, rows, events ? NULL : lanes});
+  layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
+                 (backward_out){w->g4, w->leak[3], sum, events ? floats(w->lanes) : NULL, rows, events ? NULL : lanes});
   if (events) {
     transpose(lanes, hidden, B, words(w->t), hidden);
     event_outer(grad->w4t, hidden, x->s3[t], floats(w->t));
   } else
     add_outer(grad->w4, hidden, lanes, hidden, activations(net, 1, x->m3[t], w), hidden);
-  word *rows3 = words(w->spikes);
+}
+
+/* Colour integrator and layers C3, C2, C1 at step t; leaves the gradient of i in gi[16][B], row 0 zero. */
+static void colour_backward(const sf_net_words *n, const sf_block *x, int t, float *gcolour, float *gi,
+                            sf_net_grad *grad, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  float gj[4 * B];
+  word *rows = words(w->rows), *lanes = words(w->lanes), *rows3 = words(w->spikes);
+  colour_output_backward(n, x, t, gcolour, gj, NULL, grad, w);
   layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, rows, x->m3[t],
                  (backward_out){w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
   gemm(operands(n->w3ht), hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);

@@ -122,19 +122,22 @@ static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratc
     density_step(n, x, t, 0, w->sum1, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
 }
 
-/* C2 at step t from the spikes of C1 in w->spikes; activations to w->rows. */
-static void colour_layer_2(const sf_net_words *n, sf_block *x, int t, int at, int before, sf_net_scratch *w)
+/* C2 at step t from the spikes of C1 in w->spikes; activations to w->rows. bias: [hidden][B] or NULL. */
+static void colour_layer_2(const sf_net_words *n, sf_block *x, int t, int at, int before, const float *bias,
+                           sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
   const word *weights = operands(n->w4);
-  float *current = NULL;
+  const float *current = bias;
   for (int r = 0; r < hidden; r++) x->s3[at][r] = spike_bits(x->m3[at] + r * B, net->theta[1]);
   if (!net->relu && few_spikes(x->s3[at], hidden, dense_forward)) {
     weights = NULL;
-    current = floats(w->lanes);
+    float *const sum = floats(w->lanes);
     event_current(n->w4_slice, hidden, x->s3[at], floats(w->t));
     transpose(words(w->t), B, hidden, words(w->lanes), B);
+    for (int i = 0; bias && i < hidden * B; i++) sum[i] += bias[i];
+    current = sum;
   }
   layer(net, 2, net->k[3], t, weights, hidden / PAIR, words(w->spikes), current, t ? x->m4[before] : NULL, x->m4[at],
         words(w->rows));
@@ -156,7 +159,7 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
     pack_rows(x->i[t], SF_DENSITY_OUT, rows);
     layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
           x->m3[at], spikes);
-    colour_layer_2(n, x, t, at, before, w);
+    colour_layer_2(n, x, t, at, before, NULL, w);
     gemm(operands(n->w5), pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
     sigmoid(3 * B, x->j[t], c);
     integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);

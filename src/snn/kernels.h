@@ -48,10 +48,49 @@ typedef struct sf_block {
   uint64_t s3[SF_T_MAX][SF_LANES]; /* spikes of C1, a bit per lane */
 } sf_block;
 
+/* TensoRF's appearance and decoder. basis [features][columns]; products: columns rounded up to 16. Of `net`, w4 and w5,
+ * the leaks and thresholds of C1, C2 and the colour integrator, hidden, mode and relu count. */
+typedef struct sf_decoder_view {
+  sf_net_view net;
+  const float *w1, *b1, *b2, *b3, *basis;
+  int inputs, features, feature_freqs, columns, products;
+} sf_decoder_view;
+
+typedef struct sf_decoder_words {
+  sf_net_words net;
+  uint32_t w1[SF_LANES * SF_DECODER_MAX], w1t[SF_DECODER_MAX * SF_LANES];
+  uint32_t basis[SF_APPEARANCE_MAX * SF_DECODER_MAX], basist[SF_DECODER_MAX * SF_APPEARANCE_MAX];
+  float b2[SF_LANES * SF_BLOCK], b3[4 * SF_BLOCK]; /* in every lane */
+  sf_decoder_view view;
+} sf_decoder_words;
+
+/* Rows of w1: inputs, the bias, zeros up to a multiple of 16; of basis: products. Of `net`, w4, w4t, w5 and leak. */
+typedef struct sf_decoder_grad {
+  sf_net_grad net;
+  float w1[SF_LANES * SF_DECODER_MAX], basis[SF_APPEARANCE_MAX * SF_DECODER_MAX], b2[SF_LANES], b3[4];
+} sf_decoder_grad;
+
+/* A block of samples that reach the decoder. The caller fills product, and of `in` the rows of the direction and its
+ * encodings, [inputs][SF_BLOCK] as sf_tensorf_encode orders them. */
+typedef struct sf_decoder_block {
+  sf_block net;                             /* j, colour, m3, m4, s3 */
+  float product[SF_BLOCK * SF_DECODER_MAX]; /* [SF_BLOCK][products] */
+  float product_rows[SF_DECODER_MAX * SF_BLOCK];
+  float in[SF_DECODER_MAX * SF_BLOCK];
+} sf_decoder_block;
+
+/* Three planes and three lines, and the activation of a density field (tensorf.h). */
+typedef struct sf_vm_field {
+  const float *plane[3], *line[3];
+  int resolution[3], channels[3];
+  int relu;
+  float shift, distance_scale;
+} sf_vm_field;
+
 /* Working memory of one thread. Words: operands of the next product, paired over rows or over lanes. */
 typedef struct sf_net_scratch {
-  uint32_t rows[SF_LANES * SF_BLOCK], lanes[SF_LANES * SF_BLOCK], spikes[SF_LANES * SF_BLOCK];
-  uint32_t t[SF_BLOCK * SF_LANES];                                                 /* transposed: [SF_BLOCK][rows] */
+  uint32_t rows[SF_DECODER_MAX * SF_BLOCK], lanes[SF_DECODER_MAX * SF_BLOCK], spikes[SF_DECODER_MAX * SF_BLOCK];
+  uint32_t t[SF_BLOCK * SF_DECODER_MAX];                                           /* transposed: [SF_BLOCK][rows] */
   float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
@@ -72,6 +111,20 @@ typedef struct sf_kernels {
    * gradient. */
   void (*grid_forward)(const sf_grid_level *level, const float *table, const float *x, float *out);
   void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
+  /* TensoRF. x[n][3] in [0,1]^3 of the box. Density per model unit and its slope, by the feature, of n samples;
+   * products [n][ld], ld >= the components of all modes, zeros behind them. */
+  void (*vm_density)(const sf_vm_field *field, const float *x, int n, float *sigma, float *slope);
+  void (*vm_products)(const sf_vm_field *field, const float *x, int n, float *product, int ld);
+  /* Adds the gradient of at most 16 components of one mode, from `first` on, samples in order. g[n][ld]: the first of
+   * them at g[0]; ld = 0: one gradient per sample, of the sum of all. Writes to no other component. */
+  void (*vm_backward)(const sf_vm_field *field, int mode, int first, int count, const float *x, int n, const float *g,
+                      int ld, float *dplane, float *dline);
+  void (*decoder_prepare)(const sf_decoder_view *view, sf_decoder_words *decoder);
+  void (*decoder_forward)(const sf_decoder_words *decoder, sf_decoder_block *block, int steps, int keep,
+                          sf_net_scratch *scratch);
+  /* Adds to grad; dproduct[SF_BLOCK][products]. dcolour[T][3*SF_BLOCK]. */
+  void (*decoder_backward)(const sf_decoder_words *decoder, sf_decoder_block *block, int steps, const float *dcolour,
+                           float *dproduct, sf_decoder_grad *grad, sf_net_scratch *scratch);
 } sf_kernels;
 
 /* "portable", "avx2", "avx512", "avx512bf16" (weights and gradients rounded to bfloat16, membranes and sums fp32), or

@@ -4,6 +4,7 @@
 #include "spikefield/io.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,6 +59,8 @@ sf_status sf_config_check(const sf_config *c)
   SF_TRY(check_range("bound", c->bound, 1, 64));
   if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
   SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, 0.125));
+  SF_TRY(check_range("backbone", c->backbone, SF_INGP, SF_TENSORF));
+  if (c->backbone == SF_TENSORF) return sf_tensorf_check(&c->tensorf);
   sf_steps steps;
   return sf_steps_make(&steps, c, 1);
 }
@@ -82,7 +85,23 @@ static size_t layout_levels(sf_model *m)
   return total;
 }
 
-static void layout_params(sf_model *m, size_t entries)
+/* Offsets and sizes of the parts whose names and shapes are there. */
+static void place_params(sf_model *m, const sf_param *param, int count)
+{
+  size_t offset = 0;
+  m->params = count;
+  for (int i = 0; i < count; i++) {
+    sf_param *p = &m->param[i];
+    *p = param[i];
+    p->offset = offset;
+    p->size = 1;
+    for (int d = 0; d < p->dims; d++) p->size *= (size_t)p->shape[d];
+    offset += (p->size + 15) / 16 * 16;
+  }
+  m->size = offset;
+}
+
+static void layout_ingp(sf_model *m, size_t entries)
 {
   const int64_t hidden = m->config.hidden, features = 2 * m->config.levels;
   const sf_param param[SF_P_COUNT] = {
@@ -94,14 +113,44 @@ static void layout_params(sf_model *m, size_t entries)
       [SF_P_W5] = {.name = "colour.w5", .shape = {3, hidden}, .dims = 2},
       [SF_P_LEAK] = {.name = "leak", .shape = {SF_LAYERS, 1}, .dims = 1},
   };
-  size_t offset = 0;
-  for (int i = 0; i < SF_P_COUNT; i++) {
-    m->param[i] = param[i];
-    m->param[i].offset = offset;
-    m->param[i].size = (size_t)(param[i].shape[0] * (param[i].dims > 1 ? param[i].shape[1] : 1));
-    offset += (m->param[i].size + 15) / 16 * 16;
+  place_params(m, param, SF_P_COUNT);
+}
+
+static void layout_tensorf(sf_model *m)
+{
+  static const char *const name[4][3] = {{"density_plane.0", "density_plane.1", "density_plane.2"},
+                                         {"density_line.0", "density_line.1", "density_line.2"},
+                                         {"app_plane.0", "app_plane.1", "app_plane.2"},
+                                         {"app_line.0", "app_line.1", "app_line.2"}};
+  const sf_tensorf *f = &m->config.tensorf;
+  const int64_t hidden = m->config.hidden;
+  sf_param param[SF_V_COUNT] = {
+      [SF_V_BASIS] = {.name = "basis_mat.weight", .shape = {f->features, sf_tensorf_products(f)}, .dims = 2},
+      [SF_V_W1] = {.name = "renderModule.mlp.0.weight", .shape = {hidden, sf_tensorf_inputs(f)}, .dims = 2},
+      [SF_V_B1] = {.name = "renderModule.mlp.0.bias", .shape = {hidden}, .dims = 1},
+      [SF_V_W2] = {.name = "renderModule.mlp.2.weight", .shape = {hidden, hidden}, .dims = 2},
+      [SF_V_B2] = {.name = "renderModule.mlp.2.bias", .shape = {hidden}, .dims = 1},
+      [SF_V_W3] = {.name = "renderModule.mlp.4.weight", .shape = {3, hidden}, .dims = 2},
+      [SF_V_B3] = {.name = "renderModule.mlp.4.bias", .shape = {3}, .dims = 1},
+      [SF_V_LEAK] = {.name = "leak", .shape = {SF_LAYERS}, .dims = 1},
+  };
+  for (int i = 0; i < 3; i++) {
+    const int *axis = sf_tensorf_axis[i];
+    const int64_t width = f->resolution[axis[0]], height = f->resolution[axis[1]], length = f->resolution[axis[2]];
+    for (int k = 0; k < 2; k++) {
+      const int64_t channels = k ? f->appearance[i] : f->density[i];
+      param[SF_V_DENSITY_PLANE + 6 * k + i] =
+          (sf_param){.name = name[2 * k][i], .shape = {height, width, channels}, .dims = 3};
+      param[SF_V_DENSITY_LINE + 6 * k + i] =
+          (sf_param){.name = name[2 * k + 1][i], .shape = {length, channels}, .dims = 2};
+    }
   }
-  m->size = offset;
+  place_params(m, param, SF_V_COUNT);
+}
+
+float *sf_model_leak(const sf_model *m)
+{
+  return m->value + m->param[m->config.backbone == SF_TENSORF ? SF_V_LEAK : (int)SF_P_LEAK].offset;
 }
 
 static sf_status lay_out(sf_model *m, const sf_config *config)
@@ -109,7 +158,10 @@ static sf_status lay_out(sf_model *m, const sf_config *config)
   memset(m, 0, sizeof *m);
   SF_TRY(sf_config_check(config));
   m->config = *config;
-  layout_params(m, layout_levels(m));
+  if (config->backbone == SF_TENSORF)
+    layout_tensorf(m);
+  else
+    layout_ingp(m, layout_levels(m));
   return sf_ok();
 }
 
@@ -163,6 +215,77 @@ static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value
   return sf_ok();
 }
 
+/* A number of the configuration by its metadata key, one table for both directions. */
+typedef struct config_field {
+  const char *key;
+  int32_t *integer;
+  float *number;
+} config_field;
+
+enum { CONFIG_FIELDS = 14, TENSORF_FIELDS = 24 };
+
+static void config_table(sf_config *c, config_field f[CONFIG_FIELDS])
+{
+  const config_field table[CONFIG_FIELDS] = {{"net", .integer = &c->net},
+                                             {"mode", .integer = &c->mode},
+                                             {"steps", .integer = &c->steps},
+                                             {"levels", .integer = &c->levels},
+                                             {"log2_hash", .integer = &c->log2_hash},
+                                             {"base_res", .integer = &c->base_res},
+                                             {"finest_res", .integer = &c->finest_res},
+                                             {"hidden", .integer = &c->hidden},
+                                             {"lattice", .integer = &c->lattice},
+                                             {"occ_res", .integer = &c->occ_res},
+                                             {"theta_d1", .number = &c->theta[0]},
+                                             {"theta_c1", .number = &c->theta[1]},
+                                             {"theta_c2", .number = &c->theta[2]},
+                                             {"scale", .number = &c->scale}};
+  memcpy(f, table, sizeof table);
+}
+
+static void tensorf_table(sf_tensorf *t, config_field f[TENSORF_FIELDS])
+{
+  const config_field table[TENSORF_FIELDS] = {{"box_min_x", .number = &t->box[0][0]},
+                                              {"box_min_y", .number = &t->box[0][1]},
+                                              {"box_min_z", .number = &t->box[0][2]},
+                                              {"box_max_x", .number = &t->box[1][0]},
+                                              {"box_max_y", .number = &t->box[1][1]},
+                                              {"box_max_z", .number = &t->box[1][2]},
+                                              {"resolution_x", .integer = &t->resolution[0]},
+                                              {"resolution_y", .integer = &t->resolution[1]},
+                                              {"resolution_z", .integer = &t->resolution[2]},
+                                              {"density_0", .integer = &t->density[0]},
+                                              {"density_1", .integer = &t->density[1]},
+                                              {"density_2", .integer = &t->density[2]},
+                                              {"appearance_0", .integer = &t->appearance[0]},
+                                              {"appearance_1", .integer = &t->appearance[1]},
+                                              {"appearance_2", .integer = &t->appearance[2]},
+                                              {"features", .integer = &t->features},
+                                              {"feature_freqs", .integer = &t->feature_freqs},
+                                              {"view_freqs", .integer = &t->view_freqs},
+                                              {"activation", .integer = &t->activation},
+                                              {"density_shift", .number = &t->shift},
+                                              {"distance_scale", .number = &t->distance_scale},
+                                              {"step_ratio", .number = &t->step_ratio},
+                                              {"near", .number = &t->near},
+                                              {"far", .number = &t->far}};
+  memcpy(f, table, sizeof table);
+}
+
+static sf_status load_fields(const sf_tensors *set, const config_field *f, int count)
+{
+  for (int i = 0; i < count; i++) {
+    double number;
+    if (f[i].integer)
+      SF_TRY(meta_int(set, f[i].key, f[i].integer));
+    else {
+      SF_TRY(meta_number(set, f[i].key, &number));
+      *f[i].number = (float)number;
+    }
+  }
+  return sf_ok();
+}
+
 static sf_status load_config(const sf_tensors *set, sf_config *c)
 {
   const char *format = sf_tensors_meta(set, "format"), *version = sf_tensors_meta(set, "version");
@@ -172,29 +295,17 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   if (!version || strcmp(version, "1"))
     return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads version 1", set->path,
                    version ? version : "absent");
-  struct {
-    const char *key;
-    int32_t *value;
-  } ints[] = {{"net", &c->net},
-              {"mode", &c->mode},
-              {"steps", &c->steps},
-              {"levels", &c->levels},
-              {"log2_hash", &c->log2_hash},
-              {"base_res", &c->base_res},
-              {"finest_res", &c->finest_res},
-              {"hidden", &c->hidden},
-              {"lattice", &c->lattice},
-              {"occ_res", &c->occ_res}};
-  for (size_t i = 0; i < sizeof ints / sizeof *ints; i++) SF_TRY(meta_int(set, ints[i].key, ints[i].value));
-  static const char *const theta[3] = {"theta_d1", "theta_c1", "theta_c2"};
-  double number;
-  for (int i = 0; i < 3; i++) {
-    SF_TRY(meta_number(set, theta[i], &number));
-    c->theta[i] = (float)number;
+  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
+  config_table(c, field);
+  SF_TRY(load_fields(set, field, CONFIG_FIELDS));
+  if (sf_tensors_meta(set, "backbone")) SF_TRY(meta_int(set, "backbone", &c->backbone));
+  if (c->backbone == SF_TENSORF) {
+    tensorf_table(&c->tensorf, more);
+    SF_TRY(load_fields(set, more, TENSORF_FIELDS));
+    SF_TRY(meta_int(set, "ndc", &c->tensorf.ndc));
   }
-  SF_TRY(meta_number(set, "scale", &number));
-  c->scale = (float)number;
   c->bound = 1;
+  double number;
   if (sf_tensors_meta(set, "bound")) SF_TRY(meta_int(set, "bound", &c->bound));
   if (sf_tensors_meta(set, "dt_gamma")) {
     SF_TRY(meta_number(set, "dt_gamma", &number));
@@ -202,6 +313,63 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   }
   sf_status status = sf_config_check(c);
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
+}
+
+static void put_number(cJSON *meta, const char *key, double value)
+{
+  char text[40];
+  snprintf(text, sizeof text, "%.17g", value);
+  cJSON_AddStringToObject(meta, key, text);
+}
+
+static void put_fields(cJSON *meta, const config_field *f, int count)
+{
+  for (int i = 0; i < count; i++) put_number(meta, f[i].key, f[i].integer ? *f[i].integer : (double)*f[i].number);
+}
+
+void sf_model_describe(const sf_model *m, cJSON *meta)
+{
+  sf_config c = m->config;
+  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
+  cJSON_AddStringToObject(meta, "format", "spikefield-model");
+  cJSON_AddStringToObject(meta, "version", "1");
+  config_table(&c, field);
+  put_fields(meta, field, CONFIG_FIELDS);
+  put_number(meta, "bound", c.bound);
+  put_number(meta, "dt_gamma", c.dt_gamma);
+  put_number(meta, "t_star", m->t_star);
+  put_number(meta, "t_r", m->t_r);
+  put_number(meta, "weight_bits", m->scales.weight_bits);
+  if (c.backbone != SF_TENSORF) return;
+  put_number(meta, "backbone", c.backbone);
+  put_number(meta, "ndc", c.tensorf.ndc);
+  tensorf_table(&c.tensorf, more);
+  put_fields(meta, more, TENSORF_FIELDS);
+}
+
+int sf_model_tensors(const sf_model *m, sf_tensor *list)
+{
+  int n = 0;
+  for (; n < m->params; n++) {
+    list[n] = (sf_tensor){.type = SF_F32, .dims = m->param[n].dims, .data = m->value + m->param[n].offset};
+    snprintf(list[n].name, sizeof list[n].name, "%s", m->param[n].name);
+    memcpy(list[n].shape, m->param[n].shape, sizeof m->param[n].shape);
+  }
+  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {(int64_t)(sf_config_cells(&m->config) / 8)}, m->occupancy};
+  if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
+  return n;
+}
+
+sf_status sf_model_save(const sf_model *m, const char *path)
+{
+  sf_tensor list[SF_PARAMS_MAX + 2];
+  const int n = sf_model_tensors(m, list);
+  cJSON *meta = cJSON_CreateObject();
+  if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
+  sf_model_describe(m, meta);
+  sf_status status = sf_tensors_save(list, n, meta, path);
+  cJSON_Delete(meta);
+  return status;
 }
 
 /* Only a fine-tuned model has any. */
@@ -230,15 +398,15 @@ static sf_status load_scales(sf_scales *s, const sf_tensors *set)
 static sf_status load_tensors(sf_model *m, const sf_tensors *set)
 {
   const int64_t bytes = (int64_t)(sf_config_cells(&m->config) / 8);
-  const sf_tensor *part[SF_P_COUNT], *occupancy;
-  for (int i = 0; i < SF_P_COUNT; i++) {
+  const sf_tensor *part[SF_PARAMS_MAX], *occupancy;
+  for (int i = 0; i < m->params; i++) {
     const sf_param *p = &m->param[i];
     SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &part[i]));
     SF_TRY(sf_tensor_finite(set->path, part[i]));
   }
   SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &bytes, &occupancy));
   SF_TRY(allocate(m));
-  for (int i = 0; i < SF_P_COUNT; i++)
+  for (int i = 0; i < m->params; i++)
     memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
   memcpy(m->occupancy, occupancy->data, (size_t)bytes);
   return sf_ok();

@@ -79,3 +79,34 @@ void sf_net_sample(const sf_model *model, const float *f, const float *sh, int s
     memcpy(trace->membrane[4][t], o_colour, sizeof o_colour);
   }
 }
+
+void sf_tensorf_decode(const sf_model *model, const float *in, int steps, float *colour, sf_net_trace *trace)
+{
+  const sf_config *c = &model->config;
+  const int hidden = c->hidden, inputs = sf_tensorf_inputs(&c->tensorf);
+  const float *leak = sf_model_leak(model), *b1 = sf_model_param(model, SF_V_B1), *b2 = sf_model_param(model, SF_V_B2),
+              *b3 = sf_model_param(model, SF_V_B3);
+  const dense w1 = {sf_model_param(model, SF_V_W1), hidden, inputs, inputs};
+  const dense w2 = {sf_model_param(model, SF_V_W2), hidden, hidden, hidden};
+  const dense w3 = {sf_model_param(model, SF_V_W3), 3, hidden, hidden};
+  neurons n[2];
+  for (int l = 0; l < 2; l++)
+    n[l] = (neurons){c->mode, c->net == SF_NET_ANN, sf_sigmoid(leak[2 + l]), c->theta[1 + l], {0}};
+  const float k_colour = sf_sigmoid(leak[4]);
+
+  float base[SF_LANES] = {0}, o[3] = {0};
+  memcpy(base, b1, (size_t)hidden * sizeof *b1);
+  accumulate(&w1, in, base);
+  for (int t = 0; t < steps; t++) {
+    float s[SF_LANES], current[SF_LANES] = {0}, j[3] = {b3[0], b3[1], b3[2]};
+    fire(&n[0], hidden, t, base, s, trace, 2);
+    memcpy(current, b2, (size_t)hidden * sizeof *b2);
+    accumulate(&w2, s, current);
+    fire(&n[1], hidden, t, current, s, trace, 3);
+    accumulate(&w3, s, j);
+    for (int a = 0; a < 3; a++) colour[3 * t + a] = o[a] = sf_plif_charge(c->mode, t, k_colour, o[a], sf_sigmoid(j[a]));
+    if (!trace) continue;
+    memcpy(trace->current[4][t], j, sizeof j);
+    memcpy(trace->membrane[4][t], o, sizeof o);
+  }
+}

@@ -18,6 +18,18 @@ static void pack_matrix(const float *w, int row, int column, int rows, int colum
     }
 }
 
+/* Layers C2 and C3, which both backbones have. */
+static void prepare_hidden(const sf_net_view *v, sf_net_words *n)
+{
+  const int hidden = v->hidden;
+  pack_matrix(v->w4, hidden, 1, hidden, hidden, hidden, n->w4);
+  pack_matrix(v->w5, hidden, 1, 3, hidden, hidden, n->w5); /* the fourth row stays zero */
+  pack_matrix(v->w4, 1, hidden, hidden, hidden, hidden, n->w4t);
+  pack_matrix(v->w5, 1, hidden, hidden, 3, 4, n->w5t);
+  for (int r = 0; r < hidden; r++)
+    for (int c = 0; c < hidden; c++) n->w4_slice[c / 64][r * 64 + c % 64] = operand(v->w4[c * hidden + r]);
+}
+
 static void prepare(const sf_net_view *v, sf_net_words *n)
 {
   const int hidden = v->hidden, features = v->features;
@@ -30,15 +42,10 @@ static void prepare(const sf_net_view *v, sf_net_words *n)
   pack_matrix(v->w2, hidden, 1, SF_DENSITY_OUT, hidden, hidden, n->w2);
   pack_matrix(v->w3, IN3, 1, hidden, SF_DIR_FEATURES, SF_DIR_FEATURES, n->w3d);
   pack_matrix(h, 16, 1, hidden, 16, 16, n->w3h);
-  pack_matrix(v->w4, hidden, 1, hidden, hidden, hidden, n->w4);
-  pack_matrix(v->w5, hidden, 1, 3, hidden, hidden, n->w5); /* the fourth row stays zero */
   pack_matrix(v->w1, 1, features, features, hidden, hidden, n->w1t);
   pack_matrix(v->w2, 1, hidden, hidden, SF_DENSITY_OUT, SF_DENSITY_OUT, n->w2t);
   pack_matrix(h, 1, 16, 16, hidden, hidden, n->w3ht);
-  pack_matrix(v->w4, 1, hidden, hidden, hidden, hidden, n->w4t);
-  pack_matrix(v->w5, 1, hidden, hidden, 3, 4, n->w5t);
-  for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) n->w4_slice[c / 64][r * 64 + c % 64] = operand(v->w4[c * hidden + r]);
+  prepare_hidden(v, n);
 }
 
 /* Words of neighbouring rows: x[rows][B] -> out[rows / PAIR][B]. */

@@ -22,6 +22,7 @@ void sf_adam_update(const sf_adam *a, size_t n, float *value, float *grad, float
   const float rate = (float)(a->lr / c1), root = (float)(1 / sqrt(c2));
   for (size_t i = 0; i < n; i += CHUNK) {
     const size_t end = i + CHUNK < n ? i + CHUNK : n;
+    for (size_t j = i; a->l1 > 0 && j < end; j++) grad[j] += value[j] > 0 ? a->l1 : value[j] < 0 ? -a->l1 : 0;
     if (end - i == CHUNK && !any(grad + i)) continue;
 #pragma omp simd
     for (size_t j = i; j < end; j++) {

@@ -48,8 +48,7 @@ void sf_batch_free(sf_batch *b)
   free(b->df);
 }
 
-/* A random pixel of a random view, composited with its alpha on this ray's background. */
-static void draw_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
+void sf_batch_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
 {
   const uint64_t seed = t->options.seed;
   const sf_view *view = &t->data->view[sf_random_below(seed, RNG_PIXEL, 3 * index, (uint64_t)t->data->count)];
@@ -119,7 +118,8 @@ void sf_batch_adapt(sf_trainer *t)
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
   if (t->rays < 512 && t->stride < 8) t->stride++, t->rays *= 2;
   if (t->rays > 1536 && t->stride > 1) t->stride--, t->rays /= 2;
-  t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > RAYS_MAX ? RAYS_MAX : t->rays;
+  const int most = t->options.rays ? t->options.rays : RAYS_MAX;
+  t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > most ? most : t->rays;
 }
 
 sf_status sf_batch_draw(sf_trainer *t)
@@ -133,7 +133,7 @@ sf_status sf_batch_draw(sf_trainer *t)
 #pragma omp parallel for schedule(dynamic, 64)
   for (int r = 0; r < b->rays; r++) {
     sf_ray *ray = &b->ray[r];
-    draw_ray(t, base + r, ray);
+    sf_batch_ray(t, base + r, ray);
     march[r] = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                               sf_random_float(t->options.seed, RNG_JITTER, base + r));
     float x[3];

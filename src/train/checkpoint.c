@@ -1,45 +1,19 @@
 /* Checkpoints: the model's tensors, and with the optimiser everything that a bit-identical continuation needs.
  * Random numbers are counter-based, so the iteration number is their whole state. */
 #include "spikefield/io.h"
-#include "train/internal.h"
+#include "train/vm.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { TENSORS_MAX = 4 * SF_P_COUNT + 3 };
+enum { TENSORS_MAX = 4 * SF_PARAMS_MAX + 3 };
 
 static void put(cJSON *meta, const char *key, double value)
 {
   char text[40];
   snprintf(text, sizeof text, "%.17g", value);
   cJSON_AddStringToObject(meta, key, text);
-}
-
-static void put_config(cJSON *meta, const sf_model *m)
-{
-  const sf_config *c = &m->config;
-  cJSON_AddStringToObject(meta, "format", "spikefield-model");
-  cJSON_AddStringToObject(meta, "version", "1");
-  put(meta, "net", c->net);
-  put(meta, "mode", c->mode);
-  put(meta, "steps", c->steps);
-  put(meta, "levels", c->levels);
-  put(meta, "log2_hash", c->log2_hash);
-  put(meta, "base_res", c->base_res);
-  put(meta, "finest_res", c->finest_res);
-  put(meta, "hidden", c->hidden);
-  put(meta, "lattice", c->lattice);
-  put(meta, "occ_res", c->occ_res);
-  put(meta, "theta_d1", c->theta[0]);
-  put(meta, "theta_c1", c->theta[1]);
-  put(meta, "theta_c2", c->theta[2]);
-  put(meta, "scale", c->scale);
-  put(meta, "bound", c->bound);
-  put(meta, "dt_gamma", c->dt_gamma);
-  put(meta, "t_star", m->t_star);
-  put(meta, "t_r", m->t_r);
-  put(meta, "weight_bits", m->scales.weight_bits);
 }
 
 /* The trainer's own numbers, one table for both directions. */
@@ -50,8 +24,8 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 25 };
-static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
+enum { STATE_FIELDS = 25, VM_FIELDS = 3 };
+static int state_table(sf_trainer *t, state_field f[STATE_FIELDS + VM_FIELDS])
 {
   const state_field table[STATE_FIELDS] = {
       {"train.iteration", .integer = &t->iteration},
@@ -81,27 +55,31 @@ static void state_table(sf_trainer *t, state_field f[STATE_FIELDS])
       {"train.quiet_c2", .small = &t->health.quiet[2]},
   };
   memcpy(f, table, sizeof table);
+  if (!t->vm) return STATE_FIELDS;
+  f[STATE_FIELDS] = (state_field){"train.vm_event", .small = &t->vm->event};
+  f[STATE_FIELDS + 1] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
+  f[STATE_FIELDS + 2] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
+  return STATE_FIELDS + VM_FIELDS;
 }
 
 static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *list)
 {
   const sf_model *m = &t->model;
   const int64_t res = m->config.occ_res, layers = sf_config_cascades(&m->config) * res;
-  int n = 0;
+  int n = sf_model_tensors(m, list);
   const struct {
     const char *prefix;
     float *data;
-  } sets[4] = {{"", m->value}, {"adam.m.", t->moment1}, {"adam.v.", t->moment2}, {"average.", t->average}};
-  for (int s = 0; s < (with_optimiser ? t->averaged ? 4 : 3 : 1); s++)
-    for (int i = 0; i < SF_P_COUNT; i++) {
+  } sets[3] = {{"adam.m.", t->moment1}, {"adam.v.", t->moment2}, {"average.", t->average}};
+  for (int s = 0; s < (!with_optimiser ? 0 : t->averaged ? 3 : 2); s++)
+    for (int i = 0; i < m->params; i++) {
       sf_tensor *x = &list[n++];
       *x = (sf_tensor){.type = SF_F32, .dims = m->param[i].dims, .data = sets[s].data + m->param[i].offset};
       snprintf(x->name, sizeof x->name, "%s%s", sets[s].prefix, m->param[i].name);
       memcpy(x->shape, m->param[i].shape, sizeof m->param[i].shape);
     }
-  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {layers * res * res / 8}, m->occupancy};
-  if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
-  if (with_optimiser) list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {layers, res, res}, t->density};
+  if (with_optimiser && t->density)
+    list[n++] = (sf_tensor){"occupancy.density", SF_F32, 3, {layers, res, res}, t->density};
   return n;
 }
 
@@ -114,13 +92,13 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   SF_TRY(sf_parameters_check(t));
   cJSON *meta = cJSON_CreateObject();
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
-  put_config(meta, &t->model);
+  sf_model_describe(&t->model, meta);
   put(meta, "beta", t->options.beta);
   put(meta, "seed", (double)t->options.seed);
   if (with_optimiser) {
-    state_field field[STATE_FIELDS];
-    state_table((sf_trainer *)t, field);
-    for (int i = 0; i < STATE_FIELDS; i++)
+    state_field field[STATE_FIELDS + VM_FIELDS];
+    const int fields = state_table((sf_trainer *)t, field);
+    for (int i = 0; i < fields; i++)
       put(meta, field[i].key,
           field[i].number    ? *field[i].number
           : field[i].integer ? (double)*field[i].integer
@@ -133,9 +111,9 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
 
 static sf_status load_state(sf_trainer *t, const sf_tensors *set)
 {
-  state_field field[STATE_FIELDS];
-  state_table(t, field);
-  for (int i = 0; i < STATE_FIELDS; i++) {
+  state_field field[STATE_FIELDS + VM_FIELDS];
+  const int fields = state_table(t, field);
+  for (int i = 0; i < fields; i++) {
     const char *text = sf_tensors_meta(set, field[i].key);
     char *end = NULL;
     const double value = text ? strtod(text, &end) : 0;
@@ -155,6 +133,10 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
                    set->path);
   if (!(t->progress >= 0 && t->progress <= 1 && t->stage_progress >= 0 && t->epoch >= 0))
     return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.progress, stage_progress or epoch is out of range",
+                   set->path);
+  if (t->vm && !(t->vm->event >= 0 && t->vm->event <= 5 && t->vm->fresh >= 0 && t->vm->fresh <= t->iteration &&
+                 t->vm->fresh_at >= 0 && t->vm->fresh_at <= 1))
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.vm_event, vm_fresh or vm_fresh_at is out of range",
                    set->path);
   for (int l = 0; l < 3; l++)
     if (t->health.revived[l] < 0 || t->health.revived[l] > 1000000)

@@ -29,7 +29,7 @@ static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
   }
 }
 
-static int spikes(const float *membrane, int rows, int lanes, float theta)
+int sf_count_spikes(const float *membrane, int rows, int lanes, float theta)
 {
   int count = 0;
   for (int r = 0; r < rows; r++)
@@ -42,9 +42,9 @@ static void count_spikes(const sf_trainer *t, int steps, const sf_block *b, int 
 {
   const sf_config *c = &t->model.config;
   for (int s = 0; s < steps; s++) {
-    g->spikes[0] += spikes(b->m1[s], c->hidden, lanes, c->theta[0]);
-    g->spikes[1] += spikes(b->m3[s], c->hidden, lanes, c->theta[1]);
-    g->spikes[2] += spikes(b->m4[s], c->hidden, lanes, c->theta[2]);
+    g->spikes[0] += sf_count_spikes(b->m1[s], c->hidden, lanes, c->theta[0]);
+    g->spikes[1] += sf_count_spikes(b->m3[s], c->hidden, lanes, c->theta[1]);
+    g->spikes[2] += sf_count_spikes(b->m4[s], c->hidden, lanes, c->theta[2]);
   }
   g->neurons += (double)steps * c->hidden * lanes;
 }
@@ -142,14 +142,14 @@ void sf_gradient_grid(sf_trainer *t, const sf_adam *adam)
   }
 }
 
-static void add_matrix(float *to, const float *from, int rows, int columns, int ld)
+void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld)
 {
   for (int r = 0; r < rows; r++)
     for (int c = 0; c < columns; c++) to[r * columns + c] += from[r * ld + c];
 }
 
 /* The losses as means over rays; the leaks' gradients carry that factor already. */
-static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
+void sf_sums_add(sf_loss_sums *to, const sf_loss_sums *x, double mean)
 {
   to->mse_full += mean * x->mse_full;
   to->mse_floor += mean * x->mse_floor;
@@ -162,17 +162,13 @@ static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
   to->g_colour_leak += x->g_colour_leak;
 }
 
-/* Adds the groups up in order, in the first one. */
-static void add_groups(sf_trainer *t)
+void sf_groups_add(float *const part[GROUPS], size_t n)
 {
-  const size_t n = sizeof(sf_net_grad) / sizeof(float), part = 4096;
+  const size_t chunk = 4096;
 #pragma omp parallel for schedule(static)
-  for (size_t first = 0; first < n; first += part)
-    for (int g = 1; g < GROUPS; g++) {
-      float *to = (float *)t->group[0].grad;
-      const float *from = (const float *)t->group[g].grad;
-      for (size_t i = first; i < n && i < first + part; i++) to[i] += from[i];
-    }
+  for (size_t first = 0; first < n; first += chunk)
+    for (int g = 1; g < GROUPS; g++)
+      for (size_t i = first; i < n && i < first + chunk; i++) part[0][i] += part[g][i];
 }
 
 /* The groups' sum into the flat gradient. */
@@ -181,25 +177,26 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
   const sf_model *m = &t->model;
   const int hidden = m->config.hidden, features = 2 * m->config.levels;
   double spikes[3] = {0}, neurons = 0;
-  float *at[SF_P_COUNT];
-  add_groups(t);
+  float *at[SF_P_COUNT], *part[GROUPS];
+  for (int g = 0; g < GROUPS; g++) part[g] = (float *)t->group[g].grad;
+  sf_groups_add(part, sizeof(sf_net_grad) / sizeof(float));
   const sf_net_grad *grad = t->group[0].grad;
   for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
-  add_matrix(at[SF_P_W1], grad->w1, hidden, features, (features + 15) / 16 * 16);
-  add_matrix(at[SF_P_W2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
+  sf_matrix_add(at[SF_P_W1], grad->w1, hidden, features, (features + 15) / 16 * 16);
+  sf_matrix_add(at[SF_P_W2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
   for (int r = 0; r < hidden; r++) {
     float *row = at[SF_P_W3] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
-    add_matrix(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
-    add_matrix(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
+    sf_matrix_add(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
+    sf_matrix_add(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
   }
-  add_matrix(at[SF_P_W4], grad->w4, hidden, hidden, hidden);
+  sf_matrix_add(at[SF_P_W4], grad->w4, hidden, hidden, hidden);
   for (int r = 0; r < hidden; r++)
     for (int c = 0; c < hidden; c++) at[SF_P_W4][r * hidden + c] += grad->w4t[c * hidden + r];
-  add_matrix(at[SF_P_W5], grad->w5, 3, hidden, hidden);
-  add_matrix(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
+  sf_matrix_add(at[SF_P_W5], grad->w5, 3, hidden, hidden);
+  sf_matrix_add(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
   for (int n = 0; n < GROUPS; n++) {
     const sf_group *g = &t->group[n];
-    add_sums(sums, &g->sums, mean);
+    sf_sums_add(sums, &g->sums, mean);
     for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
     neurons += g->neurons;
   }

@@ -9,10 +9,7 @@ enum { WINDOW = 64, CENSUS = 64 }; /* iterations between two counts; probes of a
 
 static const double dead = 1e-4, saturated = 0.95; /* spikes per neuron and step */
 
-static const struct {
-  sf_param_id weights;
-  int layer; /* of the leaks and of sf_net_trace */
-} part[3] = {{SF_P_W1, 0}, {SF_P_W3, 2}, {SF_P_W4, 3}};
+static const int spiking[3] = {0, 2, 3}; /* D1, C1, C2 among the layers */
 
 /* tau within 1.001 .. 1000: at both ends k is still 4 units of the hardware's 12 bits away from 0 and 1, where a
  * neuron would forget or ignore its input, and where the logit's gradient k (1-k) no longer brings it back. */
@@ -20,7 +17,7 @@ static const float logit_limit = 6.9067548f; /* ln 999 */
 
 void sf_health_leaks(sf_trainer *t)
 {
-  float *leak = sf_model_param(&t->model, SF_P_LEAK);
+  float *leak = sf_model_leak(&t->model);
   for (int l = 0; l < SF_LAYERS; l++) {
     if (leak[l] > logit_limit) leak[l] = logit_limit; /* not fminf: a NaN must stay one, to be found */
     if (leak[l] < -logit_limit) leak[l] = -logit_limit;
@@ -41,7 +38,7 @@ static void count(const sf_trainer *t, const sf_probes *probes, census c[3])
     sf_probe(&t->model, probes, i, steps);
     for (int l = 0; l < 3; l++)
       for (int s = 0; s < steps; s++)
-        for (int n = 0; n < hidden; n++) spikes[l][n] += probes->trace->spike[part[l].layer][s][n];
+        for (int n = 0; n < hidden; n++) spikes[l][n] += probes->trace->spike[spiking[l]][s][n];
   }
   for (int l = 0; l < 3; l++) {
     c[l] = (census){0};
@@ -61,15 +58,16 @@ static void forget(sf_trainer *t, size_t first, size_t count)
 /* What the layer learned is kept if its scale was all that was wrong. */
 static void revive(sf_trainer *t, int l, const sf_probes *probes)
 {
-  const sf_param *w = &t->model.param[part[l].weights];
-  const size_t leak = t->model.param[SF_P_LEAK].offset + part[l].layer;
+  const int layer = spiking[l];
+  const sf_param *w = &t->model.param[t->backbone->weights[layer]];
+  const size_t leak = (size_t)(sf_model_leak(&t->model) - t->model.value) + layer;
   census now[3];
   t->model.value[leak] = 0;
-  sf_layer_scale(t, part[l].weights, probes);
+  sf_layer_scale(t, layer, probes);
   count(t, probes, now);
   if (!(now[l].firing > 100 * dead && now[l].firing < saturated)) {
-    sf_layer_redraw(t, part[l].weights, RNG_REVIVE);
-    sf_layer_scale(t, part[l].weights, probes);
+    sf_layer_redraw(t, layer, RNG_REVIVE);
+    sf_layer_scale(t, layer, probes);
   }
   forget(t, w->offset, w->size);
   forget(t, leak, 1);
@@ -90,10 +88,11 @@ sf_status sf_health_check(sf_trainer *t, int event[3])
   if (t->model.config.net == SF_NET_ANN || sf_tuning(t) || (t->iteration + 1) % WINDOW) return sf_ok();
   sf_probes probes;
   census now[3];
-  SF_TRY(sf_probes_create(&probes, &t->model.config));
+  SF_TRY(sf_probes_create(&probes, t));
   sf_probes_draw(t, RNG_PROBE, CENSUS, &probes);
   count(t, &probes, now);
   for (int l = 0; l < 3; l++) {
+    if (t->backbone->weights[spiking[l]] < 0) continue;
     h->quiet[l] = now[l].quiet;
     h->run[l] = next_run(h->run[l], now[l].firing);
   }

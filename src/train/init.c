@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-sf_status sf_probes_create(sf_probes *p, const sf_config *config)
+sf_status sf_probes_create(sf_probes *p, const sf_trainer *t)
 {
-  p->features = 2 * config->levels;
+  p->features = t->backbone->probe_inputs(&t->model.config);
   p->f = malloc((size_t)PROBES * p->features * sizeof *p->f);
   p->sh = malloc(PROBES * SF_DIR_FEATURES * sizeof *p->sh);
   p->trace = calloc(1, sizeof *p->trace);
@@ -40,27 +40,24 @@ void sf_probes_draw(const sf_trainer *t, uint64_t stream, int count, sf_probes *
   for (int i = 0; i < count; i++) {
     const uint64_t base = ((uint64_t)t->iteration * PROBES + i) * 5, seed = t->options.seed;
     const size_t cell = occupied_cell(t, stream, base);
-    const float *pose = t->data->view[sf_random_below(seed, stream, base + 1, t->data->count)].camera.to_world;
-    float place[3], x[3], d[3], length = 0;
+    float place[3], x[3];
     for (int a = 0; a < 3; a++) place[a] = sf_random_float(seed, stream, base + 2 + a);
     sf_occupancy_point(&t->model.config, cell, place, x);
-    for (int a = 0; a < 3; a++) {
-      d[a] = (float)t->model.config.bound * (2 * x[a] - 1) - pose[4 * a + 3];
-      length += d[a] * d[a];
-    }
-    for (int a = 0; a < 3; a++) d[a] /= sqrtf(length) + 1e-9f;
-    sf_grid_features(&t->model, x, p->f + i * p->features);
-    sf_sh4(d, p->sh + i * SF_DIR_FEATURES);
+    t->backbone->probe(t, stream, base, x, i, p);
   }
 }
 
 void sf_probe(const sf_model *m, const sf_probes *p, int index, int steps)
 {
   float sigma[SF_T_MAX], colour[3 * SF_T_MAX];
-  sf_net_sample(m, p->f + index * p->features, p->sh + index * SF_DIR_FEATURES, steps, sigma, colour, p->trace);
+  const float *f = p->f + index * p->features;
+  if (m->config.backbone == SF_TENSORF)
+    sf_tensorf_decode(m, f, steps, colour, p->trace);
+  else
+    sf_net_sample(m, f, p->sh + index * SF_DIR_FEATURES, steps, sigma, colour, p->trace);
 }
 
-static void fill_uniform(const sf_trainer *t, sf_param_id id, float bound, uint64_t stream, uint64_t base)
+void sf_init_uniform(const sf_trainer *t, int id, float bound, uint64_t stream, uint64_t base)
 {
   const sf_param *p = &t->model.param[id];
   float *value = t->model.value + p->offset;
@@ -68,9 +65,10 @@ static void fill_uniform(const sf_trainer *t, sf_param_id id, float bound, uint6
     value[i] = bound * (2 * sf_random_float(t->options.seed, stream, base + p->offset + i) - 1);
 }
 
-void sf_layer_redraw(sf_trainer *t, sf_param_id id, uint64_t stream)
+void sf_layer_redraw(sf_trainer *t, int layer, uint64_t stream)
 {
-  fill_uniform(t, id, 1 / sqrtf((float)t->model.param[id].shape[1]), stream, (uint64_t)t->iteration << 32);
+  const int id = t->backbone->weights[layer];
+  sf_init_uniform(t, id, 1 / sqrtf((float)t->model.param[id].shape[1]), stream, (uint64_t)t->iteration << 32);
 }
 
 /* Root mean square of layer currents over the probes at their first step. */
@@ -84,33 +82,29 @@ static double current_rms(const sf_model *m, const sf_probes *p, int layer, int 
   return sqrt(sum / (PROBES * (double)outputs));
 }
 
-void sf_layer_scale(sf_trainer *t, sf_param_id id, const sf_probes *probes)
+void sf_layer_scale(sf_trainer *t, int layer, const sf_probes *probes)
 {
   const sf_config *c = &t->model.config;
-  const struct {
-    int layer, outputs;
-    double target;
-  } plan[] = {[SF_P_W1] = {0, c->hidden, c->theta[0]},
-              [SF_P_W2] = {1, SF_DENSITY_OUT, 0.5},
-              [SF_P_W3] = {2, c->hidden, c->theta[1]},
-              [SF_P_W4] = {3, c->hidden, c->theta[2]},
-              [SF_P_W5] = {4, 3, 0.5}};
-  const double rms = current_rms(&t->model, probes, plan[id].layer, plan[id].outputs);
+  const int id = t->backbone->weights[layer];
+  const double target[SF_LAYERS] = {c->theta[0], 0.5, c->theta[1], c->theta[2], 0.5};
+  const double rms = current_rms(&t->model, probes, layer, (int)t->model.param[id].shape[0]);
   if (!(rms > 1e-12 && rms < 1e12)) return; /* silent input: no scale helps */
   float *w = sf_model_param(&t->model, id);
-  for (size_t i = 0; i < t->model.param[id].size; i++) w[i] *= (float)(plan[id].target / rms);
+  for (size_t i = 0; i < t->model.param[id].size; i++) w[i] *= (float)(target[layer] / rms);
 }
 
 sf_status sf_init_parameters(sf_trainer *t)
 {
-  const bool ann = t->model.config.net == SF_NET_ANN;
-  fill_uniform(t, SF_P_GRID, ann ? 1e-4f : 0.1f, RNG_INIT, 0);
-  for (int id = SF_P_W1; id <= SF_P_W5; id++) sf_layer_redraw(t, id, RNG_INIT);
-  if (ann) return sf_ok();
+  const int *weights = t->backbone->weights;
+  t->backbone->init(t);
+  for (int layer = 0; layer < SF_LAYERS; layer++)
+    if (weights[layer] >= 0) sf_layer_redraw(t, layer, RNG_INIT);
+  if (t->model.config.net == SF_NET_ANN) return sf_ok();
   sf_probes probes;
-  SF_TRY(sf_probes_create(&probes, &t->model.config));
+  SF_TRY(sf_probes_create(&probes, t));
   sf_probes_draw(t, RNG_PROBE, PROBES, &probes);
-  for (int id = SF_P_W1; id <= SF_P_W5; id++) sf_layer_scale(t, id, &probes);
+  for (int layer = 0; layer < SF_LAYERS; layer++)
+    if (weights[layer] >= 0) sf_layer_scale(t, layer, &probes);
   sf_probes_free(&probes);
   return sf_ok();
 }

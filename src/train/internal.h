@@ -102,7 +102,33 @@ typedef struct sf_health {
   int quiet[3];   /* neurons without a spike, at the last count */
 } sf_health;
 
+struct sf_vm; /* vm.h */
+struct sf_probes;
+
+/* What differs between the backbones. The rest of the trainer does not ask which one it trains. */
+typedef struct sf_backbone {
+  int nets;                           /* first parameter that is not the field's */
+  int weights[SF_LAYERS];             /* parameters of layers D1 D2 C1 C2 C3; -1: no such layer */
+  sf_status (*create)(sf_trainer *t); /* memory; the model is there */
+  void (*destroy)(sf_trainer *t);
+  void (*init)(sf_trainer *t); /* the field of a new run, and the nets but for what sf_init_parameters does */
+  /* Before an iteration: what is empty, how fine the field is; steps: of the prefix that decides what is empty. */
+  sf_status (*begin)(sf_trainer *t, int steps);
+  sf_status (*draw)(sf_trainer *t); /* rays and their samples */
+  /* Forward, losses and backward of the batch: adds the nets' gradient to t->grad. mean: losses per ray. */
+  void (*gradient)(sf_trainer *t, const struct sf_loss_plan *plan, struct sf_loss_sums *mean, double firing[3]);
+  sf_status (*check)(const sf_trainer *t); /* the field's gradient is finite */
+  void (*update)(sf_trainer *t);           /* Adam on field and nets; clears t->grad */
+  int (*probe_inputs)(const sf_config *config);
+  /* The inputs of probe `index` at x in [0,1]^3; random numbers of `stream` from `base` on. */
+  void (*probe)(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int index,
+                struct sf_probes *probes);
+} sf_backbone;
+extern const sf_backbone sf_backbone_ingp, sf_backbone_tensorf;
+
 struct sf_trainer {
+  const sf_backbone *backbone;
+  struct sf_vm *vm; /* TensoRF's; NULL */
   sf_train_options options;
   const sf_dataset *data;
   const sf_kernels *kernels;
@@ -130,6 +156,8 @@ struct sf_trainer {
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);
+/* A random pixel of a random view, composited with its alpha on this ray's background; a function of seed and index. */
+void sf_batch_ray(const sf_trainer *trainer, uint64_t index, sf_ray *ray);
 /* Draws and marches `trainer->rays` rays; packs them into bundles. */
 sf_status sf_batch_draw(sf_trainer *trainer);
 /* Number of rays of the next iteration, from the samples of this one. */
@@ -159,18 +187,20 @@ void sf_train_prepare(sf_trainer *trainer);
 enum { PROBES = 256 };
 typedef struct sf_probes {
   int features;
-  float *f, *sh; /* [PROBES][features], [PROBES][16] */
+  float *f, *sh; /* [PROBES][features], [PROBES][16]; TensoRF: the decoder's inputs, nothing */
   sf_net_trace *trace;
 } sf_probes;
-sf_status sf_probes_create(sf_probes *probes, const sf_config *config);
+sf_status sf_probes_create(sf_probes *probes, const sf_trainer *trainer);
 void sf_probes_free(sf_probes *probes);
 /* The first `count`; a function of seed, stream and iteration. */
 void sf_probes_draw(const sf_trainer *trainer, uint64_t stream, int count, sf_probes *probes);
 /* Runs probe `index`, leaving probes->trace. */
 void sf_probe(const sf_model *model, const sf_probes *probes, int index, int steps);
 /* New random weights; weights scaled until the currents of all PROBES have the threshold as root mean square. */
-void sf_layer_redraw(sf_trainer *trainer, sf_param_id id, uint64_t stream);
-void sf_layer_scale(sf_trainer *trainer, sf_param_id id, const sf_probes *probes);
+void sf_layer_redraw(sf_trainer *trainer, int layer, uint64_t stream);
+void sf_layer_scale(sf_trainer *trainer, int layer, const sf_probes *probes);
+/* Parameter `id` uniform in +-bound. */
+void sf_init_uniform(const sf_trainer *trainer, int id, float bound, uint64_t stream, uint64_t base);
 
 /* After the update: leaks back into range. */
 void sf_health_leaks(sf_trainer *trainer);
@@ -184,6 +214,7 @@ void sf_occupancy_point(const sf_config *config, size_t cell, const float place[
 typedef struct sf_adam {
   double lr, beta1, beta2, epsilon;
   int64_t step; /* 1, 2, ... */
+  float l1;     /* gradient of |value|; 0 = none, and what has no gradient stays as it is */
 } sf_adam;
 /* value[n] -= ...; clears grad. */
 void sf_adam_update(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
@@ -192,6 +223,13 @@ sf_status sf_parameters_check(const sf_trainer *trainer);
 /* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */
 sf_status sf_average_update(sf_trainer *trainer, double progress_before);
 sf_status sf_average_reserve(sf_trainer *trainer);
+/* part[GROUPS][n]: adds the others to the first, in order. */
+void sf_groups_add(float *const part[GROUPS], size_t n);
+void sf_sums_add(sf_loss_sums *to, const sf_loss_sums *x, double mean);
+/* to[rows][columns] += from[rows][ld]. */
+void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
+/* Membranes [rows][SF_BLOCK] at or above theta in the first `lanes` lanes. */
+int sf_count_spikes(const float *membrane, int rows, int lanes, float theta);
 /* The features' gradient to the hash grid's, and Adam on the grid. */
 void sf_gradient_grid(sf_trainer *trainer, const sf_adam *adam);
 sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);

@@ -7,10 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OCCUPANCY_EVERY = 16, EPOCH_RAYS_PER_VIEW = 4096 };
+enum { EPOCH_RAYS_PER_VIEW = 4096 };
 
 static const double budget_rate = 1e5; /* of t*, per stage II */
-static const double tuning_rate = 0.1; /* of the learning rates */
 
 sf_train_options sf_train_defaults(void)
 {
@@ -27,6 +26,19 @@ sf_train_options sf_train_defaults(void)
   return options;
 }
 
+sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
+{
+  sf_train_options options = sf_train_defaults();
+  options.config = sf_tensorf_default(data->scale, 0);
+  options.lr_grid = 0.02;
+  options.lr_net = 1e-3;
+  options.background = 1;
+  options.rays = 4096;
+  options.samples = 1 << 17; /* more than that many rays have, once the scene has surfaces */
+  options.voxels = 300;
+  return options;
+}
+
 const sf_model *sf_trainer_model(const sf_trainer *t)
 {
   return &t->model;
@@ -35,45 +47,15 @@ const sf_model *sf_trainer_model(const sf_trainer *t)
 void sf_trainer_free(sf_trainer *t)
 {
   if (!t) return;
-  for (int i = 0; i < t->workers; i++) {
-    free(t->worker[i].block);
-    free(t->worker[i].scratch);
-    free(t->worker[i].ray.memory);
-    free(t->worker[i].dsigma);
-    free(t->worker[i].dcolour);
-  }
-  for (int g = 0; g < GROUPS; g++) free(t->group[g].grad);
-  free(t->worker);
-  free(t->net);
+  if (t->backbone) t->backbone->destroy(t);
   free(t->grad);
   free(t->moment1);
   free(t->moment2);
   free(t->average);
   free(t->rounded);
-  free(t->density);
   sf_batch_free(&t->batch);
   sf_model_free(&t->model);
   free(t);
-}
-
-static sf_status create_workers(sf_trainer *t)
-{
-  t->workers = omp_get_max_threads() < GROUPS ? omp_get_max_threads() : GROUPS;
-  t->worker = calloc((size_t)t->workers, sizeof *t->worker);
-  if (!t->worker) return sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
-  const size_t plane = (size_t)BUNDLE_BLOCKS * SF_T_MAX * SF_BLOCK * sizeof(float);
-  bool ok = (t->net = sf_aligned_alloc(sizeof *t->net)) != NULL;
-  for (int i = 0; i < t->workers; i++) {
-    sf_worker *w = &t->worker[i];
-    w->block = sf_aligned_alloc(BUNDLE_BLOCKS * sizeof *w->block);
-    w->scratch = sf_aligned_alloc(sizeof *w->scratch);
-    w->dsigma = sf_aligned_alloc(plane);
-    w->dcolour = sf_aligned_alloc(3 * plane);
-    SF_TRY(sf_ray_work_create(&w->ray, BUNDLE_BLOCKS * SF_BLOCK));
-    ok = ok && w->block && w->scratch && w->dsigma && w->dcolour;
-  }
-  for (int g = 0; g < GROUPS; g++) ok = (t->group[g].grad = sf_aligned_alloc(sizeof(sf_net_grad))) && ok;
-  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
 }
 
 /* t* at the start of the current stage. */
@@ -110,17 +92,15 @@ static sf_status create(sf_trainer *t, const char *resume)
   if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);
+  t->backbone = c->backbone == SF_TENSORF ? &sf_backbone_tensorf : &sf_backbone_ingp;
+  t->workers = omp_get_max_threads() < GROUPS ? omp_get_max_threads() : GROUPS;
   t->grad = sf_aligned_alloc(bytes);
   t->moment1 = sf_aligned_alloc(bytes);
   t->moment2 = sf_aligned_alloc(bytes);
-  t->density = sf_aligned_alloc(sf_config_cells(c) * sizeof(float));
-  if (!t->grad || !t->moment1 || !t->moment2 || !t->density)
+  if (!t->grad || !t->moment1 || !t->moment2)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
-  SF_TRY(create_workers(t));
-  SF_TRY(sf_batch_create(&t->batch, t->options.samples, 2 * c->levels));
+  SF_TRY(t->backbone->create(t));
   t->stage = stage1_weight(t) > 0 ? 1 : 2;
-  t->rays = 1024;
-  t->stride = sf_tuning(t) ? 1 : 4;
   t->occupied = 1;
   if (t->options.fixed_steps < 0 || t->options.fixed_steps > c->steps)
     return sf_fail(SF_E_RANGE, "train: %d fixed steps, the model has %d", t->options.fixed_steps, c->steps);
@@ -163,7 +143,8 @@ static bool scaled(const sf_trainer *t)
 static sf_loss_plan make_plan(const sf_trainer *t)
 {
   const sf_config *c = &t->model.config;
-  const float *leak = sf_model_param(&t->model, SF_P_LEAK);
+  const float *leak = sf_model_leak(&t->model);
+  const bool sigma_integrates = t->backbone->weights[1] >= 0;
   sf_loss_plan p = {.stage = t->stage,
                     .steps = sf_tuning(t) ? t->model.t_r
                              : scaled(t)  ? 2
@@ -171,7 +152,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
                     .inverse_rays = 1.0f / (float)t->batch.rays,
                     .extra = t->options.no_extra || t->options.fixed_steps ? 0 : (float)t->options.alpha,
                     .distill = !t->options.no_distill && !sf_tuning(t),
-                    .k_sigma = sf_sigmoid(leak[1]),
+                    .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const double t_hat = fmin(fmax(t->model.t_star, 1), p.steps);
   const bool one = t->stage == 1 || t->options.fixed_steps || p.steps == 1; /* one prefix is trained, not two */
@@ -190,11 +171,12 @@ static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
   const double from_tail[2] = {sums->g_sigma_leak, sums->g_colour_leak};
   double value = 0;
   for (int i = 0; i < 2; i++) {
-    const float w = sf_model_param(&t->model, SF_P_LEAK)[integrator[i]], k = sf_sigmoid(w);
+    if (t->backbone->weights[integrator[i]] < 0) continue;
+    float *leak = sf_model_leak(&t->model) + integrator[i];
+    const float w = *leak, k = sf_sigmoid(w);
     const double tau = fmin(1 + exp(-(double)w), 30.0); /* e^tau stays finite */
     value += exp(tau);
-    t->grad[t->model.param[SF_P_LEAK].offset + integrator[i]] +=
-        (float)(from_tail[i] * k * (1 - k) - p->extra * exp(tau) * exp(-(double)w));
+    t->grad[leak - t->model.value] += (float)(from_tail[i] * k * (1 - k) - p->extra * exp(tau) * exp(-(double)w));
   }
   return value;
 }
@@ -204,27 +186,17 @@ static sf_status check_gradient(const sf_trainer *t, double loss)
 {
   if (!isfinite(loss))
     return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
-  for (int i = SF_P_W1; i < SF_P_COUNT; i++)
+  for (int i = t->backbone->nets; i < t->model.params; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++)
       if (!(fabsf(t->grad[t->model.param[i].offset + j]) < 1e18f))
         return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is %g at index %zu",
                        (long long)t->iteration, t->model.param[i].name, t->grad[t->model.param[i].offset + j], j);
-  const size_t n = (size_t)t->batch.blocks * 2 * t->model.config.levels * SF_BLOCK;
-  int bad = 0, far = 0;
-#pragma omp parallel for simd reduction(| : bad, far)
-  for (size_t i = 0; i < n; i++) {
-    bad |= !(fabsf(t->batch.df[i]) < 1e12f);
-    far |= !(fabsf(t->batch.f[i]) < 1e6f);
-  }
-  if (bad || far)
-    return sf_fail(SF_E_RANGE, "train: iteration %lld: %s '%s' not finite or far too large", (long long)t->iteration,
-                   far ? "values of" : "gradient of", t->model.param[SF_P_GRID].name);
-  return sf_ok();
+  return t->backbone->check(t);
 }
 
 sf_status sf_parameters_check(const sf_trainer *t)
 {
-  for (int i = SF_P_W1; i < SF_P_COUNT; i++)
+  for (int i = t->backbone->nets; i < t->model.params; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++) {
       const float value = t->model.value[t->model.param[i].offset + j];
       if (!(fabsf(value) < 1e6f))
@@ -241,17 +213,6 @@ static double stage_share(const sf_trainer *t)
     return t->last_step / (t->options.minutes * 60 * (t->stage == 1 ? stage1_weight(t) : 1 - stage1_weight(t)));
   const int n = t->stage == 1 ? t->options.stage1 : t->options.stage2;
   return 1.0 / (n > 0 ? n : 1);
-}
-
-static void update_parameters(sf_trainer *t)
-{
-  const double fade = (sf_tuning(t) ? tuning_rate : 1) * pow(0.3, t->progress);
-  sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1};
-  sf_gradient_grid(t, &adam);
-  adam.lr = t->options.lr_net * fade;
-  const size_t nets = t->model.param[SF_P_W1].offset;
-  sf_adam_update(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
-                 t->moment2 + nets);
 }
 
 /* Gradient descent on the one scalar t*, not Adam: Adam's normalisation would discard the very magnitudes that beta
@@ -299,7 +260,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
                       .samples = t->batch.samples,
                       .occupied = t->occupied,
                       .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
-  for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_param(&t->model, SF_P_LEAK)[l]);
+  for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_leak(&t->model)[l]);
   memcpy(s.quiet, t->health.quiet, sizeof s.quiet);
   memcpy(s.revived, t->health.revived, sizeof s.revived);
   return s;
@@ -328,11 +289,11 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
 {
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
-  if (t->iteration % OCCUPANCY_EVERY == 0 && !sf_tuning(t)) SF_TRY(sf_occupancy_update(t, occupancy_steps(t)));
-  SF_TRY(sf_batch_draw(t));
+  SF_TRY(t->backbone->begin(t, occupancy_steps(t)));
+  SF_TRY(t->backbone->draw(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
-  sf_gradient_nets(t, &plan, &mean, t->firing);
+  t->backbone->gradient(t, &plan, &mean, t->firing);
   if (plan.t_c == plan.t_f) mean.mse_ceil = mean.mse_floor;
   const double e_tau = leak_terms(t, &plan, &mean);
   const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
@@ -343,7 +304,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
             plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau) +
             (t->options.no_penalty || t->options.fixed_steps ? 0 : t->options.beta * ratio * exp(t->model.t_star));
   SF_TRY(check_gradient(t, loss));
-  update_parameters(t);
+  t->backbone->update(t);
   sf_health_leaks(t);
   SF_TRY(sf_parameters_check(t));
   update_budget(t, &plan, &mean, ratio);

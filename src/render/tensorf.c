@@ -1,0 +1,119 @@
+/* Rendering of a TensoRF model: a ray's weights come from its densities alone, so the samples that count are known
+ * before the decoder sees any; they fill blocks across rays. */
+#include "base/memory.h"
+#include "render/render.h"
+#include "render/view.h"
+#include "render/vm_ray.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { PACKET = 256 };
+
+typedef struct worker {
+  const sf_model *model;
+  const sf_kernels *kernels;
+  sf_vm_field density, appearance;
+  sf_decoder_words *decoder;
+  sf_decoder_block *block;
+  sf_net_scratch *scratch;
+  sf_vm_samples samples;
+  sf_steps intervals;
+  int steps, fill;
+  float x[3 * SF_BLOCK], weight[SF_BLOCK];
+  float *owner[SF_BLOCK]; /* the ray's colour */
+} worker;
+
+static void flush(worker *w)
+{
+  if (!w->fill) return;
+  w->kernels->vm_products(&w->appearance, w->x, w->fill, w->block->product, w->decoder->view.products);
+  w->kernels->decoder_forward(w->decoder, w->block, w->steps, 0, w->scratch);
+  const float *colour = w->block->net.colour[w->steps - 1];
+  for (int l = 0; l < w->fill; l++)
+    for (int c = 0; c < 3; c++) w->owner[l][c] += w->weight[l] * colour[c * SF_BLOCK + l];
+  w->fill = 0;
+}
+
+/* One ray; what it needs of the decoder comes with a later flush. depth, alpha, samples: NULL or one number each. */
+static void render_ray(worker *w, const float *origin, const float *direction, const float background[3], float *rgb,
+                       float *depth, float *alpha, float *samples)
+{
+  const sf_tensorf *f = &w->model->config.tensorf;
+  const sf_march march = sf_march_begin(w->model, &w->intervals, origin, direction, 0.5f);
+  const sf_vm_direction encoded = sf_vm_encode_direction(f, direction);
+  float behind, far = 0;
+  const int n = sf_vm_ray(w->kernels, &w->density, &march, w->samples, &behind);
+  for (int c = 0; c < 3; c++) rgb[c] = behind * background[c];
+  for (int s = 0; s < n; s++) {
+    far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
+    if (w->samples.weight[s] <= sf_vm_weight_stop) continue;
+    memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));
+    w->weight[w->fill] = w->samples.weight[s];
+    w->owner[w->fill] = rgb;
+    sf_vm_put_direction(f, &encoded, w->block->in, w->fill);
+    if (++w->fill == SF_BLOCK) flush(w);
+  }
+  if (depth) *depth = far;
+  if (alpha) *alpha = 1 - behind;
+  if (samples) *samples = (float)n;
+}
+
+static void worker_free(worker *w)
+{
+  if (!w) return;
+  free(w->decoder);
+  free(w->block);
+  free(w->scratch);
+  free(w->samples.x);
+  free(w->samples.lattice);
+  free(w);
+}
+
+static worker *worker_create(const sf_model *model, int steps)
+{
+  worker *w = sf_aligned_alloc(sizeof *w);
+  if (!w) return NULL;
+  w->model = model;
+  w->steps = steps;
+  w->kernels = sf_kernels_select(NULL);
+  w->density = sf_vm_field_of(model, false);
+  w->appearance = sf_vm_field_of(model, true);
+  w->decoder = sf_aligned_alloc(sizeof *w->decoder);
+  w->block = sf_aligned_alloc(sizeof *w->block);
+  w->scratch = sf_aligned_alloc(sizeof *w->scratch);
+  float *at = sf_aligned_alloc(6 * SF_RAY_SAMPLES * sizeof *at);
+  w->samples = (sf_vm_samples){at, at + 3 * SF_RAY_SAMPLES, at + 4 * SF_RAY_SAMPLES, at + 5 * SF_RAY_SAMPLES,
+                               malloc(SF_RAY_SAMPLES * sizeof(int))};
+  if (!w->decoder || !w->block || !w->scratch || !at || !w->samples.lattice) {
+    worker_free(w);
+    return NULL;
+  }
+  if (sf_steps_make(&w->intervals, &model->config, 1).code) {
+    worker_free(w);
+    return NULL;
+  }
+  const sf_decoder_view view = sf_decoder_view_of(model);
+  w->kernels->decoder_prepare(&view, w->decoder);
+  return w;
+}
+
+sf_status sf_render_tensorf(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                            const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+{
+  int failed = 0;
+#pragma omp parallel reduction(| : failed)
+  {
+    worker *w = worker_create(model, steps);
+    failed = !w;
+#pragma omp for schedule(dynamic, 1)
+    for (size_t first = 0; first < count; first += PACKET) {
+      if (failed) continue;
+      for (size_t i = first; i < count && i < first + PACKET; i++)
+        render_ray(w, origin + 3 * i, direction + 3 * i, background, rgb + 3 * i, depth ? depth + i : NULL,
+                   alpha ? alpha + i : NULL, samples ? samples + i : NULL);
+      flush(w);
+    }
+    worker_free(w);
+  }
+  return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
+}

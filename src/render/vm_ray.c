@@ -1,0 +1,47 @@
+#include "render/vm_ray.h"
+#include <math.h>
+
+enum { BURST = 16 }; /* densities of so many samples at once: most rays end soon behind the surface */
+
+int sf_vm_ray(const sf_kernels *k, const sf_vm_field *density, const sf_march *march, sf_vm_samples s,
+              float *transmittance)
+{
+  int count = 0, next = 0;
+  *transmittance = 1;
+  while (next >= 0 && count < SF_RAY_SAMPLES) {
+    int found = count;
+    while (found < count + BURST && found < SF_RAY_SAMPLES) {
+      const int n = sf_march_next(march, next, s.x + 3 * found);
+      next = n < 0 ? -1 : n + 1;
+      if (n < 0) break;
+      if (s.lattice) s.lattice[found] = n;
+      found++;
+    }
+    k->vm_density(density, s.x + 3 * count, found - count, s.sigma + count, s.slope + count);
+    for (; count < found; count++) {
+      if (*transmittance < sf_vm_weight_stop) return count;
+      const float behind = *transmittance * expf(-s.sigma[count] * march->steps->length[0]);
+      s.weight[count] = *transmittance - behind;
+      *transmittance = behind;
+    }
+  }
+  return count;
+}
+
+sf_vm_direction sf_vm_encode_direction(const sf_tensorf *field, const float direction[3])
+{
+  sf_vm_direction d = {0};
+  sf_tensorf alone = *field;
+  alone.features = 0;
+  sf_tensorf_encode(&alone, d.value, direction, d.value);
+  return d;
+}
+
+void sf_vm_put_direction(const sf_tensorf *f, const sf_vm_direction *d, float *in, int lane)
+{
+  float *at = in + f->features * SF_BLOCK + lane;
+  for (int i = 0; i < 3 + 6 * f->view_freqs; i++, at += SF_BLOCK) {
+    if (i == 3) at += 2 * f->features * f->feature_freqs * SF_BLOCK;
+    *at = d->value[i];
+  }
+}

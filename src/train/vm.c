@@ -1,0 +1,129 @@
+/* The TensoRF backbone as the trainer sees it. */
+#include "train/vm.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static sf_status create_workers(sf_trainer *t)
+{
+  sf_vm *vm = t->vm;
+  bool ok = true;
+  vm->worker = calloc((size_t)t->workers, sizeof *vm->worker);
+  if (!vm->worker) return sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
+  for (int i = 0; i < t->workers; i++) {
+    sf_vm_worker *w = &vm->worker[i];
+    w->block = sf_aligned_alloc(BUNDLE_BLOCKS * sizeof *w->block);
+    w->scratch = sf_aligned_alloc(sizeof *w->scratch);
+    w->dcolour = sf_aligned_alloc((size_t)BUNDLE_BLOCKS * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
+    SF_TRY(sf_ray_work_create(&w->ray, SF_RAY_SAMPLES));
+    for (int step = 1; step < SF_T_MAX; step++) { /* the density is the same at every prefix */
+      w->ray.sigma[step] = w->ray.sigma[0];
+      w->ray.dsigma[step] = w->ray.dsigma[0];
+    }
+    ok = ok && w->block && w->scratch && w->dcolour;
+  }
+  for (int g = 0; g < GROUPS; g++) ok = (vm->group[g].grad = sf_aligned_alloc(sizeof(sf_decoder_grad))) && ok;
+  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
+}
+
+static sf_status create(sf_trainer *t)
+{
+  if (t->model.scales.weight_bits)
+    return sf_fail(SF_E_UNSUPPORTED, "train: fine-tuning for few bits knows the hash grid's nets only");
+  t->rays = 1024 < t->options.rays ? 1024 : t->options.rays;
+  t->stride = 4; /* as for the hash grid: while nothing is known to be empty */
+  sf_vm *vm = t->vm = calloc(1, sizeof *vm);
+  if (!vm) return sf_fail(SF_E_MEMORY, "train: no memory");
+  vm->decoder = sf_aligned_alloc(sizeof *vm->decoder);
+  vm->ray = calloc(RAYS_MAX, sizeof *vm->ray);
+  if (!vm->decoder || !vm->ray) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  SF_TRY(create_workers(t));
+  return sf_batch_create(&t->batch, 0, 0);
+}
+
+static void destroy(sf_trainer *t)
+{
+  sf_vm *vm = t->vm;
+  if (!vm) return;
+  for (int i = 0; vm->worker && i < t->workers; i++) {
+    free(vm->worker[i].block);
+    free(vm->worker[i].scratch);
+    free(vm->worker[i].ray.memory);
+    free(vm->worker[i].dcolour);
+  }
+  for (int g = 0; g < GROUPS; g++) {
+    free(vm->group[g].grad);
+    free(vm->part[g].x);
+    free(vm->part[g].sigma);
+    free(vm->part[g].slope);
+    free(vm->part[g].weight);
+  }
+  free(vm->worker);
+  free(vm->decoder);
+  free(vm->ray);
+  free(vm->x);
+  free(vm->dproduct);
+  free(vm);
+}
+
+/* Planes and lines 0.1 times a normal deviate (Box and Muller), the rest uniform as torch's linear layers; biases zero
+ * where the weights are scaled to the threshold afterwards. */
+static void init(sf_trainer *t)
+{
+  const sf_model *m = &t->model;
+  const uint64_t seed = t->options.seed;
+  const size_t field = m->param[SF_V_BASIS].offset;
+#pragma omp parallel for schedule(static)
+  for (size_t i = 0; i < field; i++) {
+    const double u = (sf_random_u64(seed, RNG_INIT, 2 * i) >> 11) * 0x1p-53;
+    const double angle = 6.283185307179586 * (double)(sf_random_u64(seed, RNG_INIT, 2 * i + 1) >> 11) * 0x1p-53;
+    m->value[i] = (float)(0.1 * sqrt(-2 * log1p(-u)) * cos(angle));
+  }
+  sf_init_uniform(t, SF_V_BASIS, 1 / sqrtf((float)m->param[SF_V_BASIS].shape[1]), RNG_INIT, field);
+  if (m->config.net != SF_NET_ANN) return;
+  sf_init_uniform(t, SF_V_B1, 1 / sqrtf((float)m->param[SF_V_W1].shape[1]), RNG_INIT, field);
+  sf_init_uniform(t, SF_V_B2, 1 / sqrtf((float)m->param[SF_V_W2].shape[1]), RNG_INIT, field);
+}
+
+static sf_status begin(sf_trainer *t, int steps)
+{
+  (void)steps; /* the density has none */
+  return sf_vm_grow(t);
+}
+
+static sf_status check(const sf_trainer *t)
+{
+  for (int g = 0; g < GROUPS; g++)
+    if (t->vm->group[g].wild)
+      return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' or '%s' not finite or far too large",
+                     (long long)t->iteration, t->model.param[SF_V_DENSITY_PLANE].name,
+                     t->model.param[SF_V_APP_PLANE].name);
+  return sf_ok();
+}
+
+static int probe_inputs(const sf_config *config)
+{
+  return sf_tensorf_inputs(&config->tensorf);
+}
+
+static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int i, sf_probes *p)
+{
+  float features[SF_APPEARANCE_MAX];
+  sf_ray ray;
+  sf_batch_ray(t, sf_random_u64(t->options.seed, stream, base + 1) >> 8, &ray);
+  sf_tensorf_appearance(&t->model, x, features);
+  sf_tensorf_encode(&t->model.config.tensorf, features, ray.direction, p->f + i * p->features);
+}
+
+const sf_backbone sf_backbone_tensorf = {.nets = SF_V_BASIS,
+                                         .weights = {-1, -1, SF_V_W1, SF_V_W2, SF_V_W3},
+                                         .create = create,
+                                         .destroy = destroy,
+                                         .init = init,
+                                         .begin = begin,
+                                         .draw = sf_vm_draw,
+                                         .gradient = sf_vm_gradient,
+                                         .check = check,
+                                         .update = sf_vm_update,
+                                         .probe_inputs = probe_inputs,
+                                         .probe = probe};

@@ -1,0 +1,116 @@
+/* Rays of one iteration and their densities. Rays that meet no cell of the mask are drawn again: TensoRF filters its
+ * rays once, which is the same choice without a list of pixels. */
+#include "train/vm.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { ATTEMPTS = 8 }; /* for a ray that meets the mask */
+
+static sf_status part_reserve(sf_vm_part *p)
+{
+  if (p->used + SF_RAY_SAMPLES <= p->capacity) return sf_ok();
+  const int capacity = 2 * p->capacity + 16 * SF_RAY_SAMPLES;
+  float **const array[] = {&p->x, &p->sigma, &p->slope, &p->weight};
+  for (int i = 0; i < 4; i++) {
+    float *bigger = realloc(*array[i], (size_t)capacity * (i ? 1 : 3) * sizeof **array[i]);
+    if (!bigger) return sf_fail(SF_E_MEMORY, "train: no memory for %d samples", capacity);
+    *array[i] = bigger;
+  }
+  p->capacity = capacity;
+  return sf_ok();
+}
+
+static sf_march draw(const sf_trainer *t, uint64_t index, sf_ray *ray)
+{
+  sf_march march;
+  for (uint64_t attempt = 0; attempt < ATTEMPTS; attempt++) {
+    float x[3];
+    sf_batch_ray(t, index + (attempt << 48), ray);
+    march = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
+                           sf_random_float(t->options.seed, RNG_JITTER, index));
+    if (sf_march_next(&march, 0, x) >= 0) break;
+  }
+  return march;
+}
+
+/* Densities of a ray; marks the samples that the decoder will see, and counts them in ray->count. */
+static void look(sf_trainer *t, int r, const sf_march *march, sf_vm_part *p)
+{
+  sf_vm *vm = t->vm;
+  const int at = p->used;
+  float behind;
+  const int n = sf_vm_ray(t->kernels, &vm->density, march,
+                          (sf_vm_samples){p->x + 3 * at, p->sigma + at, p->slope + at, p->weight + at, NULL}, &behind);
+  uint64_t *hit = t->batch.hit[r];
+  int kept = 0;
+  memset(hit, 0, sizeof t->batch.hit[r]);
+  for (int s = 0; s < n; s++)
+    if (p->weight[at + s] > sf_vm_weight_stop) {
+      hit[s / 64] |= (uint64_t)1 << s % 64;
+      kept++;
+    }
+  vm->ray[r].first = at;
+  vm->ray[r].count = n;
+  t->batch.ray[r].count = kept;
+  p->used += n;
+}
+
+static sf_status reserve_lanes(sf_vm *vm, int lanes, int products)
+{
+  if (lanes <= vm->lanes_capacity) return sf_ok();
+  vm->lanes_capacity = 0;
+  free(vm->x);
+  free(vm->dproduct);
+  const int capacity = lanes + lanes / 4;
+  vm->x = sf_aligned_alloc((size_t)capacity * 3 * sizeof *vm->x);
+  vm->dproduct = sf_aligned_alloc((size_t)capacity * products * sizeof *vm->dproduct);
+  if (!vm->x || !vm->dproduct) return sf_fail(SF_E_MEMORY, "train: no memory for %d samples", capacity);
+  vm->lanes_capacity = capacity;
+  return sf_ok();
+}
+
+/* Positions of the samples that were kept, in the lanes of the ray. */
+static void place(sf_trainer *t, int r)
+{
+  const sf_vm_ray_samples *from = &t->vm->ray[r];
+  const float *x = t->vm->part[from->part].x + 3 * (size_t)from->first;
+  float *to = t->vm->x + 3 * (size_t)t->batch.ray[r].lane;
+  for (int word = 0; word < SF_STEPS_MAX / 64; word++)
+    for (uint64_t bits = t->batch.hit[r][word]; bits; bits &= bits - 1, to += 3)
+      memcpy(to, x + 3 * (64 * word + __builtin_ctzll(bits)), 3 * sizeof *to);
+}
+
+sf_status sf_vm_draw(sf_trainer *t)
+{
+  sf_batch *b = &t->batch;
+  sf_vm *vm = t->vm;
+  const uint64_t base = (uint64_t)t->iteration * RAYS_MAX;
+  sf_status status[GROUPS] = {{0}};
+  vm->density = sf_vm_field_of(&t->model, false);
+  vm->appearance = sf_vm_field_of(&t->model, true);
+  b->rays = t->rays;
+  SF_TRY(sf_steps_make(&t->intervals, &t->model.config, t->stride));
+#pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
+  for (int part = 0; part < GROUPS; part++) {
+    sf_vm_part *p = &vm->part[part];
+    p->used = 0;
+    for (int r = b->rays * part / GROUPS; r < b->rays * (part + 1) / GROUPS && !status[part].code; r++) {
+      const sf_march march = draw(t, base + (uint64_t)r, &b->ray[r]);
+      status[part] = part_reserve(p);
+      vm->ray[r].part = part;
+      if (!status[part].code) look(t, r, &march, p);
+    }
+  }
+  for (int part = 0; part < GROUPS; part++) SF_TRY(status[part]);
+  b->marched = b->samples = 0;
+  for (int r = 0; r < b->rays; r++) {
+    b->marched += vm->ray[r].count;
+    b->samples += b->ray[r].count;
+  }
+  sf_batch_pack(b);
+  const int lanes = b->blocks * SF_BLOCK, products = (sf_tensorf_products(&t->model.config.tensorf) + 15) / 16 * 16;
+  SF_TRY(reserve_lanes(vm, lanes, products));
+  memset(vm->x, 0, (size_t)lanes * 3 * sizeof *vm->x);
+  for (int r = 0; r < b->rays; r++) place(t, r);
+  return sf_ok();
+}

@@ -1,0 +1,431 @@
+/* TensoRF's vector kernels against the oracles, and their gradients. */
+#include "tensorf_fixture.h"
+#include "base/memory.h"
+#include "render/view.h"
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const exact[] = {"portable", "avx2", "avx512"};
+
+enum { N = 2 * SF_BLOCK };
+
+static void positions(float *x)
+{
+  for (int i = 0; i < 3 * N; i++) x[i] = sf_random_float(5, 1, i);
+  for (int i = 0; i < 8; i++) /* the corners of the box, as marching clamps them */
+    for (int a = 0; a < 3; a++) x[3 * i + a] = i >> a & 1 ? 0x1.fffffep-1f : 0;
+}
+
+/* Bounds: contracted multiply-adds over 3 x 16 components; the activation's fit, 2 ulp. */
+START_TEST(density_equals_oracle)
+{
+  float x[3 * N], sigma[N], slope[N];
+  positions(x);
+  for (int i = 0; i < 3; i++)
+    for (int ndc = 0; ndc < 2; ndc++) {
+      const sf_kernels *k = sf_kernels_select(exact[i]);
+      if (!k) continue;
+      sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+      if (!ndc) m.config.tensorf.shift = -1; /* both ends of the softplus */
+      for (size_t j = 0; !ndc && j < m.param[SF_V_DENSITY_PLANE].size; j++) m.value[j] *= 60;
+      const sf_vm_field field = sf_vm_field_of(&m, false);
+      k->vm_density(&field, x, N, sigma, slope);
+      for (int s = 0; s < N; s++) {
+        const float feature = sf_tensorf_density_feature(&m, x + 3 * s);
+        const float expected = sf_tensorf_sigma(&m.config.tensorf, feature), h = 1e-2f;
+        ck_assert_float_eq_tol(sigma[s], expected, 2e-5f * (fabsf(expected) + m.config.tensorf.distance_scale));
+        const float up = sf_tensorf_sigma(&m.config.tensorf, feature + h),
+                    down = sf_tensorf_sigma(&m.config.tensorf, feature - h);
+        if (!ndc || fabsf(feature) > h) ck_assert_float_eq_tol(slope[s], (up - down) / (2 * h), 0.05f);
+      }
+      sf_model_free(&m);
+    }
+}
+END_TEST
+
+/* Small densities keep their relative accuracy: they decide what the alpha mask drops. */
+START_TEST(thin_density_is_accurate)
+{
+  const sf_kernels *k = sf_kernels_select(NULL);
+  float x[3 * N], sigma[N], slope[N];
+  positions(x);
+  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  const sf_vm_field field = sf_vm_field_of(&m, false);
+  k->vm_density(&field, x, N, sigma, slope);
+  for (int s = 0; s < N; s++) {
+    const float expected = sf_tensorf_sigma(&m.config.tensorf, sf_tensorf_density_feature(&m, x + 3 * s));
+    ck_assert_float_eq_tol(sigma[s], expected, 1e-5f * expected);
+  }
+  sf_model_free(&m);
+}
+END_TEST
+
+/* The density feature is bilinear in planes and lines: <g, feature(P + P', L)> - <g, feature(P, L)> = <dP, P'>, and so
+ * for lines; g = the gradient of the products, or one per sample. */
+static void check_adjoint(const char *isa, int ndc, bool appearance)
+{
+  const sf_kernels *k = sf_kernels_select(isa);
+  if (!k) return;
+  static float x[3 * N], g[N * SF_DECODER_MAX], product[N * SF_DECODER_MAX];
+  positions(x);
+  sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+  const int first = appearance ? SF_V_APP_PLANE : SF_V_DENSITY_PLANE, ld = 160;
+  const sf_vm_field f = sf_vm_field_of(&m, appearance);
+  for (int i = 0; i < N * ld; i++) g[i] = test_random(1u << 26 | i);
+  float *grad = calloc(m.size, sizeof *grad);
+  for (int mode = 0, at = 0; mode < 3; at += f.channels[mode++])
+    for (int c = 0; c < f.channels[mode]; c += 16)
+      k->vm_backward(&f, mode, c, f.channels[mode] - c < 16 ? f.channels[mode] - c : 16, x, N,
+                     appearance ? g + at + c : g, appearance ? ld : 0, grad + m.param[first + mode].offset,
+                     grad + m.param[first + 3 + mode].offset);
+  k->vm_products(&f, x, N, product, ld);
+  const int all = f.channels[0] + f.channels[1] + f.channels[2];
+  double left = 0, planes = 0, lines = 0;
+  for (int s = 0; s < N; s++) {
+    for (int c = 0; c < all; c++) left += (double)product[s * ld + c] * (appearance ? g[s * ld + c] : g[s]);
+    for (int c = all; c < ld; c++) ck_assert_float_eq(product[s * ld + c], 0);
+  }
+  for (int i = 0; i < 3; i++) {
+    const sf_param *p = &m.param[first + i], *l = &m.param[first + 3 + i];
+    for (size_t j = p->offset; j < p->offset + p->size; j++) planes += (double)grad[j] * m.value[j];
+    for (size_t j = l->offset; j < l->offset + l->size; j++) lines += (double)grad[j] * m.value[j];
+  }
+  /* float sums of at most 128 terms of size 0.1 */
+  ck_assert_double_eq_tol(left, planes, 1e-3);
+  ck_assert_double_eq_tol(left, lines, 1e-3);
+  free(grad);
+  sf_model_free(&m);
+}
+
+START_TEST(backward_is_the_adjoint)
+{
+  for (int i = 0; i < 3; i++)
+    for (int ndc = 0; ndc < 2; ndc++)
+      for (int appearance = 0; appearance < 2; appearance++) check_adjoint(exact[i], ndc, appearance);
+}
+END_TEST
+
+/* A plane's gradient against central differences, entry by entry: the products' sum is linear in it. */
+START_TEST(field_gradient_is_the_slope)
+{
+  const sf_kernels *k = sf_kernels_select("portable");
+  static float x[3 * N], g[N], sigma[N], slope[N];
+  positions(x);
+  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  m.config.tensorf.shift = 0;
+  const sf_vm_field f = sf_vm_field_of(&m, false);
+  float *grad = calloc(m.size, sizeof *grad);
+  k->vm_density(&f, x, N, sigma, slope);
+  for (int s = 0; s < N; s++) g[s] = test_random(900 + s) * slope[s];
+  for (int mode = 0; mode < 3; mode++)
+    k->vm_backward(&f, mode, 0, 16, x, N, g, 0, grad + m.param[SF_V_DENSITY_PLANE + mode].offset,
+                   grad + m.param[SF_V_DENSITY_LINE + mode].offset);
+  for (int id = SF_V_DENSITY_PLANE; id < SF_V_APP_PLANE; id++)
+    for (size_t i = m.param[id].offset; i < m.param[id].offset + m.param[id].size; i += 23) {
+      const float old = m.value[i], h = 1e-2f;
+      double value[2] = {0};
+      for (int side = 0; side < 2; side++) {
+        m.value[i] = old + (side ? h : -h);
+        k->vm_density(&f, x, N, sigma, slope);
+        for (int s = 0; s < N; s++) value[side] += test_random(900 + s) * (double)sigma[s];
+      }
+      m.value[i] = old;
+      const double expected = (value[1] - value[0]) / (2 * h);
+      /* softplus bends by h^2 / 8, its sum over the samples has 1e-7 * 30 * 128 of rounding over 2 h */
+      ck_assert_msg(fabs(expected - grad[i]) <= 0.01 * fabs(expected) + 0.05, "%s[%zu]: slope %g, gradient %g",
+                    m.param[id].name, i - m.param[id].offset, expected, (double)grad[i]);
+    }
+  free(grad);
+  sf_model_free(&m);
+}
+END_TEST
+
+typedef struct rig {
+  sf_model model;
+  sf_decoder_words *words;
+  sf_decoder_block *block;
+  sf_net_scratch *scratch;
+  sf_decoder_grad *grad;
+  float *dproduct;
+} rig;
+
+static void directions(rig *r)
+{
+  const sf_tensorf *f = &r->model.config.tensorf;
+  for (int l = 0; l < SF_BLOCK; l++) {
+    float d[3] = {test_random(3 * l + 50), test_random(3 * l + 51), test_random(3 * l + 52)}, in[SF_DECODER_MAX],
+          features[SF_APPEARANCE_MAX] = {0};
+    const float length = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int a = 0; a < 3; a++) d[a] /= length;
+    sf_tensorf_encode(f, features, d, in);
+    for (int i = f->features; i < sf_tensorf_inputs(f); i++) r->block->in[i * SF_BLOCK + l] = in[i];
+  }
+}
+
+static rig rig_make(sf_net_kind kind, sf_input_mode mode, int ndc, int hidden, int steps, float gain)
+{
+  rig r = {.model = test_tensorf(kind, ndc, hidden, steps)};
+  r.model.config.mode = mode;
+  r.words = sf_aligned_alloc(sizeof *r.words);
+  r.block = sf_aligned_alloc(sizeof *r.block);
+  r.scratch = sf_aligned_alloc(sizeof *r.scratch);
+  r.grad = sf_aligned_alloc(sizeof *r.grad);
+  r.dproduct = sf_aligned_alloc(SF_BLOCK * SF_DECODER_MAX * sizeof(float));
+  for (size_t i = 0; i < r.model.param[SF_V_W1].size; i++) sf_model_param(&r.model, SF_V_W1)[i] *= gain;
+  const int all = sf_tensorf_products(&r.model.config.tensorf), ld = (all + 15) / 16 * 16;
+  for (int l = 0; l < SF_BLOCK; l++)
+    for (int c = 0; c < all; c++) r.block->product[l * ld + c] = test_random(1u << 22 | (l * ld + c));
+  directions(&r);
+  return r;
+}
+
+static void rig_forward(rig *r, const sf_kernels *k, int keep)
+{
+  const sf_decoder_view view = sf_decoder_view_of(&r->model);
+  k->decoder_prepare(&view, r->words);
+  k->decoder_forward(r->words, r->block, r->model.config.steps, keep ? r->model.config.steps : 0, r->scratch);
+}
+
+static void rig_free(rig *r)
+{
+  sf_model_free(&r->model);
+  free(r->words);
+  free(r->block);
+  free(r->scratch);
+  free(r->grad);
+  free(r->dproduct);
+}
+
+static void oracle(const rig *r, int lane, float *colour)
+{
+  const sf_tensorf *f = &r->model.config.tensorf;
+  const int all = sf_tensorf_products(f), ld = (all + 15) / 16 * 16, rest = f->features;
+  float features[SF_APPEARANCE_MAX] = {0}, in[SF_DECODER_MAX];
+  const float *basis = sf_model_param(&r->model, SF_V_BASIS);
+  for (int o = 0; o < f->features; o++)
+    for (int c = 0; c < all; c++) features[o] += basis[o * all + c] * r->block->product[lane * ld + c];
+  const float direction[3] = {r->block->in[rest * SF_BLOCK + lane], r->block->in[(rest + 1) * SF_BLOCK + lane],
+                              r->block->in[(rest + 2) * SF_BLOCK + lane]};
+  sf_tensorf_encode(f, features, direction, in);
+  sf_tensorf_decode(&r->model, in, r->model.config.steps, colour, NULL);
+}
+
+/* Kernels against the oracles. A current within rounding of the threshold may fire in one and not in the other: a few
+ * samples may differ altogether, the others agree within `bound`. Gains: events below 25 % firing, dense above. */
+static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int ndc, float gain, float bound,
+                    int allowed)
+{
+  const sf_kernels *k = sf_kernels_select(isa);
+  if (!k) return;
+  rig r = rig_make(kind, mode, ndc, 48, 8, gain);
+  for (int keep = 0; keep < 2; keep++) {
+    int wrong = 0;
+    rig_forward(&r, k, keep);
+    for (int l = 0; l < SF_BLOCK; l++) {
+      float colour[3 * SF_T_MAX];
+      int bad = 0;
+      oracle(&r, l, colour);
+      for (int t = 0; t < r.model.config.steps; t++)
+        for (int c = 0; c < 3; c++)
+          bad |= !(fabsf(r.block->net.colour[t][c * SF_BLOCK + l] - colour[3 * t + c]) <= bound);
+      wrong += bad;
+    }
+    ck_assert_msg(wrong <= allowed, "%s, ndc %d: %d of 64 samples differ", k->name, ndc, wrong);
+  }
+  rig_free(&r);
+}
+
+START_TEST(decoder_equals_oracle)
+{
+  for (int i = 0; i < 3; i++)
+    for (int ndc = 0; ndc < 2; ndc++) {
+      for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
+        compare(exact[i], SF_NET_SNN, mode, ndc, 0.3f, 1e-4f, 3);
+        compare(exact[i], SF_NET_SNN, mode, ndc, 3, 1e-4f, 3);
+      }
+      compare(exact[i], SF_NET_ANN, SF_HYBRID, ndc, 1, 1e-4f, 0);
+    }
+}
+END_TEST
+
+/* The twin rounds every operand to bfloat16: 2^-9 through four layers. */
+START_TEST(bfloat16_decoder_near_oracle)
+{
+  for (int ndc = 0; ndc < 2; ndc++) compare("avx512bf16", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
+}
+END_TEST
+
+static double objective(const rig *r, const float *dcolour)
+{
+  double sum = 0;
+  for (int i = 0; i < r->model.config.steps; i++)
+    for (int l = 0; l < 3 * SF_BLOCK; l++) sum += dcolour[i * 3 * SF_BLOCK + l] * (double)r->block->net.colour[i][l];
+  return sum;
+}
+
+static double slope_at(rig *r, float *at, float h, const float *dcolour)
+{
+  const float old = *at;
+  double value[2];
+  for (int side = 0; side < 2; side++) {
+    *at = old + (side ? h : -h);
+    rig_forward(r, sf_kernels_select("portable"), 1);
+    value[side] = objective(r, dcolour);
+  }
+  *at = old;
+  return (value[1] - value[0]) / (2 * h);
+}
+
+/* Where the kernels put the gradient of entry i. */
+static float grad_at(const rig *r, int id, size_t i)
+{
+  const sf_tensorf *f = &r->model.config.tensorf;
+  const size_t inputs = (size_t)sf_tensorf_inputs(f), rows = (inputs + 1 + 15) / 16 * 16,
+               all = (size_t)sf_tensorf_products(f), hidden = (size_t)r->model.config.hidden;
+  switch (id) {
+  case SF_V_BASIS:
+    return r->grad->basis[i / all * ((all + 15) / 16 * 16) + i % all];
+  case SF_V_W1:
+    return r->grad->w1[i / inputs * rows + i % inputs];
+  case SF_V_B1:
+    return r->grad->w1[i * rows + inputs];
+  case SF_V_W2:
+    return r->grad->net.w4[i] + r->grad->net.w4t[i % hidden * hidden + i / hidden];
+  case SF_V_B2:
+    return r->grad->b2[i];
+  case SF_V_W3:
+    return r->grad->net.w5[i];
+  case SF_V_B3:
+    return r->grad->b3[i];
+  default:
+    return r->grad->net.leak[i];
+  }
+}
+
+static void random_gradient(float *dcolour)
+{
+  for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dcolour[i] = test_random(1u << 25 | i);
+}
+
+/* The twin is smooth but for its kinks: every third weight, every bias, and the products, against central differences.
+ * Bound: float cancellation, as in test_snn.c. */
+START_TEST(twin_gradient_is_the_slope)
+{
+  static float dc[SF_T_MAX * 3 * SF_BLOCK];
+  for (int ndc = 0; ndc < 2; ndc++) {
+    rig r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
+    const sf_kernels *k = sf_kernels_select(NULL);
+    random_gradient(dc);
+    rig_forward(&r, k, 1);
+    k->decoder_backward(r.words, r.block, 1, dc, r.dproduct, r.grad, r.scratch);
+    for (int id = SF_V_BASIS; id <= SF_V_B3; id++)
+      for (size_t i = 0; i < r.model.param[id].size; i += r.model.param[id].dims == 2 ? 11 : 1) {
+        const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 2e-3f, dc), actual = grad_at(&r, id, i);
+        ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.1, "ndc %d: %s[%zu]: slope %g, gradient %g",
+                      ndc, r.model.param[id].name, i, expected, actual);
+      }
+    const int all = sf_tensorf_products(&r.model.config.tensorf), ld = (all + 15) / 16 * 16;
+    for (int i = 0; i < SF_BLOCK; i += 3) {
+      const int at = i * ld + i * 7 % all;
+      const double expected = slope_at(&r, r.block->product + at, 2e-3f, dc);
+      ck_assert_double_eq_tol(r.dproduct[at], expected, 0.02 * fabs(expected) + 2e-3);
+    }
+    rig_free(&r);
+  }
+}
+END_TEST
+
+/* Of a spiking decoder the last layer and the integrator are smooth: no spike hangs on them. */
+START_TEST(smooth_parts_of_the_decoder_match_the_slope)
+{
+  static float dc[SF_T_MAX * 3 * SF_BLOCK];
+  const sf_kernels *k = sf_kernels_select(NULL);
+  for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
+    rig r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
+    random_gradient(dc);
+    rig_forward(&r, k, 1);
+    k->decoder_backward(r.words, r.block, 6, dc, r.dproduct, r.grad, r.scratch);
+    for (int id = SF_V_W3; id <= SF_V_B3; id++)
+      for (size_t i = 0; i < r.model.param[id].size; i += 2) {
+        const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 1e-2f, dc);
+        ck_assert_double_eq_tol(grad_at(&r, id, i), expected, 0.01 * fabs(expected) + 0.05);
+      }
+    const double expected = slope_at(&r, sf_model_leak(&r.model) + 4, 1e-2f, dc);
+    ck_assert_double_eq_tol(r.grad->net.leak[4], expected, 0.01 * fabs(expected) + 0.1);
+    rig_free(&r);
+  }
+}
+END_TEST
+
+static float distance(const float *a, const float *reference, size_t n)
+{
+  float worst = 0, scale = 0;
+  for (size_t i = 0; i < n; i++) {
+    worst = fmaxf(worst, fabsf(a[i] - reference[i]));
+    scale = fmaxf(scale, fabsf(reference[i]));
+  }
+  return worst / scale;
+}
+
+/* The same forward pass, the backward passes compared; bounds as for the nets of INGP (test_snn.c). */
+START_TEST(backward_of_every_isa_agrees)
+{
+  static const struct {
+    const char *isa;
+    float bound;
+  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}};
+  static float dc[SF_T_MAX * 3 * SF_BLOCK];
+  const sf_kernels *portable = sf_kernels_select("portable");
+  random_gradient(dc);
+  for (int kind = SF_NET_SNN; kind <= SF_NET_ANN; kind++)
+    for (int i = 0; i < 3; i++)
+      for (int g = 0; g < 2; g++) {
+        const sf_kernels *k = sf_kernels_select(other[i].isa);
+        if (!k) continue;
+        const int steps = kind == SF_NET_ANN ? 1 : 8;
+        rig a = rig_make(kind, SF_HYBRID, 0, 48, steps, g ? 3 : 0.3f), b = rig_make(kind, SF_HYBRID, 0, 48, steps, 1);
+        memcpy(b.model.value, a.model.value, a.model.size * sizeof(float));
+        rig_forward(&a, portable, 1);
+        const sf_decoder_view view = sf_decoder_view_of(&b.model);
+        k->decoder_prepare(&view, b.words);
+        memcpy(b.block, a.block, sizeof *a.block);
+        portable->decoder_backward(a.words, a.block, steps, dc, a.dproduct, a.grad, a.scratch);
+        k->decoder_backward(b.words, b.block, steps, dc, b.dproduct, b.grad, b.scratch);
+        for (int id = SF_V_BASIS; id < SF_V_LEAK; id++) {
+          const size_t n = a.model.param[id].size;
+          float *x = malloc(2 * n * sizeof *x);
+          for (size_t j = 0; j < n; j++) x[j] = grad_at(&b, id, j), x[n + j] = grad_at(&a, id, j);
+          const float far = distance(x, x + n, n);
+          ck_assert_msg(far <= other[i].bound, "%s: %s differs by %g", k->name, a.model.param[id].name, (double)far);
+          free(x);
+        }
+        ck_assert_float_le(distance(b.dproduct, a.dproduct, SF_BLOCK * 144), other[i].bound);
+        rig_free(&a);
+        rig_free(&b);
+      }
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("tensorf_kernels");
+  TCase *tc = tcase_create("tensorf_kernels");
+  tcase_set_timeout(tc, 120);
+  tcase_add_test(tc, density_equals_oracle);
+  tcase_add_test(tc, thin_density_is_accurate);
+  tcase_add_test(tc, backward_is_the_adjoint);
+  tcase_add_test(tc, field_gradient_is_the_slope);
+  tcase_add_test(tc, decoder_equals_oracle);
+  tcase_add_test(tc, bfloat16_decoder_near_oracle);
+  tcase_add_test(tc, twin_gradient_is_the_slope);
+  tcase_add_test(tc, smooth_parts_of_the_decoder_match_the_slope);
+  tcase_add_test(tc, backward_of_every_isa_agrees);
+  suite_add_tcase(suite, tc);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
