@@ -111,17 +111,15 @@ typedef struct fx_tensorf {
   fx_factors density, appearance;
   int32_t activation;  /* fx_activation */
   fx_scale density_in; /* sum of products (Q.16 of their LSB) -> argument of the activation, Q.LOG_FRAC; shift 0..40 */
-  fx_scale sigma_out;  /* activation, Q.20 -> density per box edge, U16.12; bias 0 */
-  int32_t
-      weight_stop; /* a sample whose weight is <= this never reaches the decoder, but takes its light; Q.TRANS_FRAC */
-  int32_t product_shift; /* appearance: x = sat12(rshift_round(product, product_shift)); 0..31 */
-  int32_t features;      /* 1..FX_APPEARANCE_MAX */
-  int8_t *basis;         /* [appearance components][FX_APPEARANCE_MAX]: feature sums = x * basis */
-  fx_scale feature_in;   /* feature sum -> feature, int12; bias 0, shift 0..40 */
-  fx_scale phase_in; /* feature sum -> its phase as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
+  fx_scale sigma_out;  /* activation, Q.20 -> density per box edge, U16.12; bias 0, shift 0..40 */
+  int32_t weight_stop; /* a sample of at most this weight takes its light, but is not decoded; Q.TRANS_FRAC */
+  int32_t features;    /* of the appearance, 1..FX_APPEARANCE_MAX */
+  int8_t *basis;       /* [appearance components][FX_APPEARANCE_MAX]: feature sums = products * basis */
+  fx_scale feature_in; /* feature sum -> feature, int12; bias 0, shift 0..40 */
+  fx_scale phase_in;   /* feature sum -> the same as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
   int32_t feature_freqs, view_freqs; /* sines and cosines of 1, 2, 4 ... times a value; 0..FX_FREQS_MAX */
   int32_t encoding_frac;             /* LSB of directions, sines and cosines: 2^-encoding_frac, 0..FX_DIR_FRAC_MAX */
-  /* For quant/ only: box = (world * to_box_scale + to_box_offset) * stretch, per axis: the box has unequal edges, and
+  /* For quant/ only: box = (world * to_box_scale + to_box_offset) * stretch, per axis: where the box has unequal edges,
    * lengths are in the longest. Rays begin and end at these distances from their origins, model units. */
   double stretch[3], near, far;
 } fx_tensorf;
@@ -253,6 +251,8 @@ uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_c
 void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
                        fx_counts *counts);
 int fx_tensorf_inputs(const fx_tensorf *field);
+/* What the basis matrix multiplies, for its fit: x[appearance components], Q.1 of the LSB of a product; how many. */
+int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x);
 
 /* Position of lattice point n on an axis, Q24.40; the length of its interval in box edges, Q0.24; its distance from the
  * camera in lattice steps, Q16.16. */

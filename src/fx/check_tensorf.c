@@ -3,7 +3,7 @@
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
 
-enum { FIELD_BYTES_MAX = 1 << 30, SHIFT_MAX = 40, PRODUCT_SHIFT_MAX = 31, MUL_MAX = 65535 };
+enum { FIELD_BYTES_MAX = 1 << 30, SHIFT_MAX = 40, MUL_MAX = 65535 };
 
 static int list_factors(fx_factors *f, const int32_t res[3], const char *const *names, fx_array *list)
 {
@@ -96,7 +96,6 @@ sf_status fx_check_tensorf(const fx_tensorf *field, const char *path)
   SF_TRY(check_scale(&field->sigma_out, "tensorf.sigma_out", 0, 0, path));
   SF_TRY(check_scale(&field->feature_in, "tensorf.feature_in", 0, 0, path));
   SF_TRY(check_scale(&field->phase_in, "tensorf.phase_in", 0, 0, path));
-  SF_TRY(in_range(path, "tensorf", "product_shift", field->product_shift, 0, PRODUCT_SHIFT_MAX));
   SF_TRY(in_range(path, "tensorf", "weight_stop", field->weight_stop, 0, FX_TRANS_ONE - 1));
   SF_TRY(in_range(path, "tensorf", "encoding_frac", field->encoding_frac, 0, FX_DIR_FRAC_MAX));
   const int n = fx_tensorf_arrays(&copy, list);

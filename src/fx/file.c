@@ -77,7 +77,6 @@ static const int_field tensorf_ints[] = {
     SCALE(tensorf.phase_in),
     FIELD(tensorf.activation),
     FIELD(tensorf.weight_stop),
-    FIELD(tensorf.product_shift),
     FIELD(tensorf.features),
     FIELD(tensorf.feature_freqs),
     FIELD(tensorf.view_freqs),

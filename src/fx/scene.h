@@ -37,8 +37,6 @@ extern const int fx_pair_axes[FX_PAIRS][3];
 int fx_factors_components(const fx_factors *factors); /* of all pairs */
 /* Sum of the density's products to density: see fx_tensorf. */
 uint32_t fx_tensorf_activate(const fx_tensorf *field, int64_t sum);
-/* Inputs of the basis matrix, all components; returns their number. */
-int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x, uint64_t *saturated);
 
 /* Lattice point n at pos through density and compositing; its weight, or 0 when it does not reach the decoder. */
 uint32_t fx_tensorf_weight(const fx_scene *scene, const fx_ray *ray, int32_t n, const uint32_t pos[3], fx_pixel *pixel,

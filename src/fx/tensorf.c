@@ -8,8 +8,8 @@
  *   density   sum of P * L over all components, exact in Q.16: 3 * 64 products below 2^30, so s38
  *             y = sat24(rshift_round(sum * mul, shift) + bias)
  *             sigma = usat28(rshift_round(activation(y) * mul, shift))
- *   features  x = sat12(rshift_round(P * L, product_shift)) per component
- *             sum of x * basis, exact: 192 * 2047 * 127, s27
+ *   features  x = rshift_round(P * L, 15) per component, s16: |x| <= 32258
+ *             sum of x * basis, exact: 192 * 32258 * 127 < 2^30
  *             feature = sat12(rshift_round(sum * mul, shift)); its angle in turns by another such factor, modulo 1
  *   inputs    features, direction, sin and cos of 2^k times each feature (all sines, then all cosines; value by value,
  *             k = 0 first), then of each axis of the direction: TensoRF's order
@@ -21,6 +21,7 @@
 #include "src/fx/nofloat.h"
 
 enum { CELL_FRAC = 8, ONE = 1 << CELL_FRAC, READS_PLANE = 4, READS_LINE = 2, PRODUCTS = READS_PLANE + READS_LINE + 1 };
+enum { PRODUCT_SHIFT = 15 };
 enum {
   TURNS_PER_UNIT_Q16 = 41722,
   PHASE_ONE = 1 << FX_PHASE_BITS
@@ -114,7 +115,7 @@ uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_c
   return fx_tensorf_activate(field, sum);
 }
 
-int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x, uint64_t *saturated)
+int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x)
 {
   const place p = find_place(field->res, pos);
   int n = 0;
@@ -122,16 +123,15 @@ int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t 
     int32_t product[FX_COMPONENTS_MAX];
     pair_products(&field->appearance, pair, field->res, &p, product);
     for (int c = 0; c < field->appearance.components[pair]; c++)
-      x[n++] = to_input(fx_rshift_round(product[c], field->product_shift), saturated);
+      x[n++] = (int16_t)fx_rshift_round(product[c], PRODUCT_SHIFT);
   }
   return n;
 }
 
-static void feature_sums(const fx_tensorf *field, const uint32_t pos[3], int32_t sum[FX_APPEARANCE_MAX],
-                         uint64_t *saturated)
+static void feature_sums(const fx_tensorf *field, const uint32_t pos[3], int32_t sum[FX_APPEARANCE_MAX])
 {
   int16_t x[FX_PAIRS * FX_COMPONENTS_MAX];
-  const int n = fx_tensorf_products(field, pos, x, saturated);
+  const int n = fx_tensorf_products(field, pos, x);
   for (int f = 0; f < FX_APPEARANCE_MAX; f++) sum[f] = 0;
   for (int c = 0; c < n; c++) {
     const int8_t *restrict row = field->basis + (size_t)c * FX_APPEARANCE_MAX;
@@ -165,7 +165,7 @@ void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int
   int32_t sum[FX_APPEARANCE_MAX];
   uint32_t phase[FX_APPEARANCE_MAX], turn[3];
   uint64_t saturated = 0;
-  feature_sums(field, pos, sum, &saturated);
+  feature_sums(field, pos, sum);
   for (int f = 0; f < n; f++) {
     x[f] = to_input(scaled(sum[f], &field->feature_in), &saturated);
     phase[f] = (uint32_t)scaled(sum[f], &field->phase_in);

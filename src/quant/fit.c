@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { INPUTS_MAX = FX_PAIRS * FX_COMPONENTS_MAX }; /* of the widest: TensoRF's basis matrix */
 enum { CANDIDATES = 40, PATIENCE = 8, SWEEPS = 6 };
 static const double STEP = 0.6 / (CANDIDATES - 1), SMALLEST_FACTOR = 0.05, RIDGE = 1e-3;
 
@@ -29,7 +30,7 @@ static void moments_free(moments *m)
 
 static void add_row(moments *m, const int16_t *x, const float *target)
 {
-  int active[SF_LANES], count = 0;
+  int active[INPUTS_MAX], count = 0;
   for (int i = 0; i < m->n_in; i++)
     if (x[i]) active[count++] = i;
   for (int p = 0; p < count; p++) {
@@ -102,7 +103,7 @@ static double column_error(const moments *m, int o, double unit, const double *q
 
 static double rounding_error(const moments *m, const sf_fit_weights *weights, double unit)
 {
-  double q[SF_LANES], error = m->energy;
+  double q[INPUTS_MAX], error = m->energy;
   for (int o = 0; o < m->n_out; o++) {
     round_column(weights, m->n_in, o, unit, q);
     error += column_error(m, o, unit, q);
@@ -137,7 +138,7 @@ static double choose_unit(const moments *m, const sf_fit_weights *weights)
 
 static void descend_column(const moments *m, const sf_fit_weights *weights, int o, double unit, double ridge, double *q)
 {
-  double gradient[SF_LANES];
+  double gradient[INPUTS_MAX];
   for (int i = 0; i < m->n_in; i++) {
     gradient[i] = ridge * (q[i] - ideal(weights, i, o, unit)) - m->b[o * m->n_in + i] / unit;
     for (int r = 0; r < m->n_in; r++) gradient[i] += m->a[i * m->n_in + r] * q[r];
@@ -168,7 +169,7 @@ static double quantise_columns(const moments *m, const moments *held_out, const 
                                int8_t *w, sf_quant_layer *result)
 {
   const double ridge = RIDGE * mean_diagonal(m);
-  double error = held_out->energy, q[SF_LANES];
+  double error = held_out->energy, q[INPUTS_MAX];
   for (int o = 0; o < m->n_out; o++) {
     round_column(weights, m->n_in, o, result->unit, q);
     if (refine) descend_column(m, weights, o, result->unit, ridge, q);

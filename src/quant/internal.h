@@ -46,6 +46,10 @@ static inline int sf_symmetric_max(int bits)
   return (1 << (bits - 1)) - 1;
 }
 
+/* factor = mul / 2^shift with 16 significant bits where a shifter of at most shift_max allows; false when factor is too
+ * large. */
+bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale);
+
 /* Chooses the unit and the int8 weights q[n_in][SF_LANES] that minimise the squared error of the currents.
  * `refine` false stops after the search for the unit. */
 sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,

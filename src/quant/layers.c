@@ -181,21 +181,25 @@ static sf_status colour_layer(const context *c, int16_t *x)
   return finish_layer(c, FX_C1, x, lsb);
 }
 
-/* factor = mul / 2^shift with 16 significant bits where the shifter allows. */
-static sf_status set_scale(const context *c, int layer, double factor, int bias, fx_scale *scale)
+bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale)
 {
   int exponent;
   frexp(factor, &exponent);
   int shift = 16 - exponent;
-  if (shift > 31) shift = 31;
+  if (shift > shift_max) shift = shift_max;
   double mul = nearbyint(ldexp(factor, shift));
   if (mul > 65535) mul = nearbyint(ldexp(factor, --shift));
-  if (shift < 0)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
-                   c->name, c->model->param[param_of[layer]].name,
-                   c->scene->current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
+  if (shift < 0) return false;
   *scale = (fx_scale){.mul = (int32_t)mul, .shift = shift, .bias = bias};
-  return sf_ok();
+  return true;
+}
+
+static sf_status set_scale(const context *c, int layer, double factor, int bias, fx_scale *scale)
+{
+  if (sf_quant_scale(factor, 31, bias, scale)) return sf_ok();
+  return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
+                 c->name, c->model->param[param_of[layer]].name,
+                 c->scene->current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
 }
 
 static sf_status all_layers(const context *c, int16_t *x)

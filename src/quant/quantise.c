@@ -1,4 +1,4 @@
-#include "src/quant/internal.h"
+#include "src/quant/tensorf.h"
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ double sf_fx_colour_value(uint32_t colour)
 
 static sf_status check_finite(const sf_model *model, const char *name)
 {
-  for (int id = 0; id < SF_P_COUNT; id++) {
+  for (int id = 0; id < model->params; id++) {
     const float *value = sf_model_param(model, id);
     for (size_t i = 0; i < model->param[id].size; i++)
       if (!isfinite(value[i]))
@@ -27,18 +27,28 @@ static sf_status check_finite(const sf_model *model, const char *name)
   return sf_ok();
 }
 
+static sf_status check_sizes(const sf_model *model, const char *name)
+{
+  const sf_config *config = &model->config;
+  const bool vm = config->backbone == SF_TENSORF;
+  if (config->hidden < 1 || config->hidden > SF_LANES)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d neurons, the accelerator has %d", name,
+                   model->param[vm ? (int)SF_V_W1 : (int)SF_P_W1].name, config->hidden, SF_LANES);
+  if (vm && model->scales.weight_bits)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'weight_bits': a TensoRF model cannot be fine-tuned", name);
+  if (!vm && (config->levels < 1 || config->levels > FX_LEVELS_MAX))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d levels, the accelerator has %d", name,
+                   model->param[SF_P_GRID].name, config->levels, FX_LEVELS_MAX);
+  return sf_ok();
+}
+
 static sf_status check_model(const sf_model *model, const char *name, const sf_quant_options *options)
 {
   const sf_config *config = &model->config;
   if (config->net != SF_NET_SNN)
     return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'net': an ANN has no spikes; the accelerator runs spiking nets only",
                    name);
-  if (config->hidden < 1 || config->hidden > SF_LANES)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d neurons, the accelerator has %d", name,
-                   model->param[SF_P_W1].name, config->hidden, SF_LANES);
-  if (config->levels < 1 || config->levels > FX_LEVELS_MAX)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d levels, the accelerator has %d", name,
-                   model->param[SF_P_GRID].name, config->levels, FX_LEVELS_MAX);
+  SF_TRY(check_sizes(model, name));
   for (int i = 0; i < 3; i++)
     if (!isfinite(config->theta[i]) || config->theta[i] <= 0)
       return sf_fail(SF_E_RANGE, "%s: metadata 'theta' [%d] is %g, expected a positive number", name, i,
@@ -74,13 +84,18 @@ int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
 {
   const int64_t res = scene->occ_res;
   int64_t bits = (scene->log2_bound + 1) * res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
+  bits += sf_field_entries(scene) * widths->grid_bits;
   for (int l = 0; l < SF_LAYERS; l++)
-    bits += (int64_t)scene->net.layer[l].n_in * scene->net.layer[l].n_out * widths->weight_bits;
+    bits += (int64_t)fx_layer_rows(&scene->net.layer[l]) * scene->net.layer[l].n_out * widths->weight_bits;
   return (bits + 7) / 8;
 }
 
 static void set_sizes(fx_scene *scene, const sf_model *model)
 {
+  if (model->config.backbone == SF_TENSORF) {
+    sf_tensorf_set_sizes(scene, model);
+    return;
+  }
   const int32_t hidden = model->config.hidden;
   const int32_t n_in[SF_LAYERS] = {2 * model->config.levels, hidden, SF_DIR_FEATURES + SF_GEO_FEATURES, hidden, hidden};
   const int32_t n_out[SF_LAYERS] = {hidden, SF_DENSITY_OUT, hidden, hidden, 3};
@@ -109,8 +124,9 @@ static void set_steps(fx_scene *scene, const sf_config *config)
 
 static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options, int leak_bits)
 {
-  const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
-  for (int l = 0; l < SF_LAYERS; l++) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
+  const float *leak = sf_model_leak(model); /* in the order of the layers */
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (scene->net.layer[l].n_out > 0) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
   scene->net.mode = model->config.mode;
   scene->net.steps = options->steps ? options->steps : model->t_r;
   set_steps(scene, &model->config);
@@ -121,6 +137,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
     scene->to_box_offset[o] = 0.5;
   }
   scene->to_box_scale = 0.5 / model->config.bound;
+  if (scene->backbone == FX_TENSORF) sf_tensorf_set_scalars(scene, model);
 }
 
 static sf_scales scales_of(const fx_scene *scene, int weight_bits)
@@ -142,9 +159,10 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   set_scalars(scene, model, options, report->widths.leak_bits);
   SF_TRY(fx_scene_allocate(scene, name));
   memcpy(scene->occupancy, model->occupancy, sf_config_cells(&model->config) / 8);
+  report->packed_bytes = sf_packed_bytes(scene, &report->widths);
+  if (scene->backbone == FX_TENSORF) return sf_quantise_tensorf(scene, model, name, options, report);
   SF_TRY(sf_calibrate(calibration, model, scene->net.steps, options->seed));
   report->samples = calibration->samples;
-  report->packed_bytes = sf_packed_bytes(scene, &report->widths);
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
   report->scales = scales_of(scene, report->widths.weight_bits);

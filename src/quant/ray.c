@@ -12,9 +12,10 @@ typedef struct interval {
 } interval;
 
 /* The box is [0,1)^3 in box units: origin o, direction d per model unit of distance. */
-static interval clip_to_box(const double o[3], const double d[3])
+static interval clip_to_box(const fx_scene *scene, const double o[3], const double d[3])
 {
-  interval hit = {SF_NEAR, INFINITY};
+  const bool vm = scene->backbone == FX_TENSORF;
+  interval hit = {vm ? scene->tensorf.near : SF_NEAR, vm ? scene->tensorf.far : INFINITY};
   for (int axis = 0; axis < 3; axis++) {
     if (d[axis] == 0) {
       if (o[axis] <= 0 || o[axis] >= 1) return (interval){0, -1};
@@ -25,6 +26,12 @@ static interval clip_to_box(const double o[3], const double d[3])
     hit.leave = fmin(hit.leave, fmax(a, b));
   }
   return hit;
+}
+
+/* Box units of an axis over those of the longest. */
+static double stretch(const fx_scene *scene, int axis)
+{
+  return scene->backbone == FX_TENSORF ? scene->tensorf.stretch[axis] : 1;
 }
 
 static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
@@ -111,11 +118,11 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
           (double)origin[0], (double)origin[1], (double)origin[2], (double)direction[0], (double)direction[1],
           (double)direction[2]);
     unit[axis] = direction[axis] / length;
-    o[axis] = origin[axis] * scene->to_box_scale + scene->to_box_offset[axis];
-    d[axis] = unit[axis] * scene->to_box_scale;
+    o[axis] = (origin[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
+    d[axis] = unit[axis] * scene->to_box_scale * stretch(scene, axis);
   }
   set_direction(ray, unit, sf_fx_dir_frac(scene));
-  set_lattice(scene, ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(o, d));
+  set_lattice(scene, ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(scene, o, d));
   return sf_ok();
 }
 
@@ -123,7 +130,7 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
 sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3])
 {
   for (int axis = 0; axis < 3; axis++) {
-    const double p = position[axis] * scene->to_box_scale + scene->to_box_offset[axis];
+    const double p = (position[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
     const int64_t fixed = p >= 0 && p < 1 ? llrint(ldexp(p, RAY_FRAC)) : -1;
     if (fixed < 0 || fixed >= (int64_t)1 << RAY_FRAC)
       return sf_fail(SF_E_RANGE, "position (%g, %g, %g): axis %d is at %.9g of the scene box, expected 0 <= x < 1",

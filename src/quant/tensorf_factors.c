@@ -1,0 +1,312 @@
+/* Planes and lines to int8. Only the product of a plane and a line matters, so the LSBs p of the plane and l of the
+ * line of a component are free but for their product u = p l. The density has one u for all components, chosen by the
+ * error of the opacity of samples; in the appearance every component uses the whole range of both, and its u goes into
+ * its column of the basis matrix, which is fitted as the layers of the nets are.
+ *
+ * Roundings of both weigh the same in the product where p rms(line) = l rms(plane). */
+#include "src/quant/tensorf.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, BASIS_FRAC = 15, PHASE_FRAC = 16 };
+static const double UNIT_STEP = 0.85, WEIGHT_STOP = 1e-4, TWO_PI = 6.283185307179586;
+
+typedef struct component {
+  double plane_max, plane_rms, line_max, line_rms;
+} component;
+
+typedef struct factor {
+  const float *value; /* [points][components] */
+  size_t points;
+  int components;
+  int8_t *to;
+} factor;
+
+static factor factor_of(const sf_model *model, int id, int8_t *to)
+{
+  const sf_param *p = &model->param[id];
+  const int components = (int)p->shape[p->dims - 1];
+  return (factor){sf_model_param(model, id), p->size / (size_t)components, components, to};
+}
+
+static void measure(const factor *f, int c, double *largest, double *rms)
+{
+  double square = 0;
+  *largest = 0;
+  for (size_t i = 0; i < f->points; i++) {
+    const double v = fabs((double)f->value[i * (size_t)f->components + (size_t)c]);
+    *largest = fmax(*largest, v), square += v * v;
+  }
+  *rms = sqrt(square / (double)f->points);
+}
+
+static component measure_component(const factor *plane, const factor *line, int c)
+{
+  component m;
+  measure(plane, c, &m.plane_max, &m.plane_rms);
+  measure(line, c, &m.line_max, &m.line_rms);
+  return m;
+}
+
+/* Entries of one component; the number that does not fit. */
+static int64_t round_component(const factor *f, int c, double lsb, int limit)
+{
+  int64_t clipped = 0;
+  for (size_t i = 0; i < f->points; i++) {
+    const size_t at = i * (size_t)f->components + (size_t)c;
+    const double q = lsb > 0 ? nearbyint(f->value[at] / lsb) : 0;
+    clipped += fabs(q) > limit;
+    f->to[at] = (int8_t)(q > limit ? limit : q < -limit ? -limit : q);
+  }
+  return clipped;
+}
+
+/* The plane's LSB for a given product of both: balanced, as far as neither is clipped. */
+static double plane_lsb(const component *m, double unit, int limit)
+{
+  if (!(m->plane_rms > 0) || !(m->line_rms > 0)) return sqrt(unit);
+  const double balanced = sqrt(unit * m->plane_rms / m->line_rms);
+  const double low = m->plane_max / limit, high = unit * limit / m->line_max;
+  return low > high ? sqrt(low * high) : fmin(fmax(balanced, low), high);
+}
+
+/* ---- density ---- */
+
+typedef struct density {
+  fx_scene *scene;
+  const sf_model *model;
+  const char *name;
+  const sf_vm_calibration *calibration;
+  component component[FX_PAIRS][SF_COMPONENTS_MAX];
+  int limit;
+} density;
+
+static factor density_factor(const density *d, int pair, bool line)
+{
+  const fx_factors *to = &d->scene->tensorf.density;
+  return line ? factor_of(d->model, SF_V_DENSITY_LINE + pair, to->line[pair])
+              : factor_of(d->model, SF_V_DENSITY_PLANE + pair, to->plane[pair]);
+}
+
+/* The unit that clips nothing. */
+static double widest_unit(density *d)
+{
+  double widest = 0;
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const factor plane = density_factor(d, pair, false), line = density_factor(d, pair, true);
+    for (int c = 0; c < plane.components; c++) {
+      const component m = d->component[pair][c] = measure_component(&plane, &line, c);
+      widest = fmax(widest, m.plane_max * m.line_max / d->limit / d->limit);
+    }
+  }
+  return widest > 0 ? widest : 1;
+}
+
+static int64_t round_density(const density *d, double unit)
+{
+  int64_t clipped = 0;
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const factor plane = density_factor(d, pair, false), line = density_factor(d, pair, true);
+    for (int c = 0; c < plane.components; c++) {
+      const double p = plane_lsb(&d->component[pair][c], unit, d->limit);
+      clipped += round_component(&plane, c, p, d->limit) + round_component(&line, c, unit / p, d->limit);
+    }
+  }
+  return clipped;
+}
+
+static sf_status set_density_scale(const density *d, double unit)
+{
+  const double one = 1 << SF_LOG_FRAC, bias = nearbyint(d->model->config.tensorf.shift * one);
+  if (sf_quant_scale(ldexp(unit, -PRODUCT_FRAC) * one, SHIFT_MAX, (int)bias, &d->scene->tensorf.density_in))
+    return sf_ok();
+  return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': densities are too large for the accelerator", d->name,
+                 d->model->param[SF_V_DENSITY_PLANE].name);
+}
+
+/* Mean squared error of the opacity of a sample. */
+static double opacity_error(const density *d)
+{
+  const sf_vm_calibration *c = d->calibration;
+  const double step = sf_tensorf_step(&d->model->config.tensorf);
+  double error = 0;
+  for (int i = 0; i < c->samples; i++) {
+    const uint32_t *pos = c->pos + (size_t)i * 3;
+    float x[3];
+    sf_vm_position(pos, x);
+    const double exact = sf_tensorf_sigma(&d->model->config.tensorf, sf_tensorf_density_feature(d->model, x));
+    const double fixed =
+        ldexp(fx_tensorf_density(&d->scene->tensorf, pos, NULL), -SF_SIGMA_FRAC) * d->scene->to_box_scale;
+    const double difference = exp(-exact * step) - exp(-fixed * step);
+    error += difference * difference;
+  }
+  return error / c->samples;
+}
+
+static sf_status quantise_density(density *d, sf_quant_report *report)
+{
+  const double widest = widest_unit(d);
+  double unit = widest, best = widest, best_error = INFINITY;
+  for (int i = 0; i < UNITS; i++, unit *= UNIT_STEP) {
+    round_density(d, unit);
+    SF_TRY(set_density_scale(d, unit));
+    const double error = opacity_error(d);
+    if (error >= best_error) break; /* clipping costs more than finer steps gain */
+    best = unit, best_error = error;
+  }
+  report->grid_clipped += round_density(d, best);
+  return set_density_scale(d, best);
+}
+
+/* ---- appearance ---- */
+
+/* Value of one LSB of every product as the basis matrix gets it. */
+static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, int limit, double *lsb)
+{
+  const fx_factors *to = &scene->tensorf.appearance;
+  int64_t clipped = 0;
+  int n = 0;
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const factor plane = factor_of(model, SF_V_APP_PLANE + pair, to->plane[pair]),
+                 line = factor_of(model, SF_V_APP_LINE + pair, to->line[pair]);
+    for (int c = 0; c < plane.components; c++) {
+      const component m = measure_component(&plane, &line, c);
+      const double p = m.plane_max / limit, l = m.line_max / limit;
+      clipped += round_component(&plane, c, p, limit) + round_component(&line, c, l, limit);
+      lsb[n++] = ldexp(p * l, BASIS_FRAC - PRODUCT_FRAC);
+    }
+  }
+  return clipped;
+}
+
+static double largest_feature(const sf_vm_calibration *c)
+{
+  double largest = 1e-6;
+  for (size_t i = 0; i < (size_t)c->samples * (size_t)c->n_features; i++)
+    largest = fmax(largest, fabs((double)c->features[i]));
+  return largest;
+}
+
+static sf_status set_feature_scales(fx_scene *scene, const sf_model *model, const char *name, double unit,
+                                    double feature_lsb)
+{
+  fx_tensorf *field = &scene->tensorf;
+  scene->feature_scale[0] = feature_lsb;
+  if (sf_quant_scale(unit / feature_lsb, SHIFT_MAX, 0, &field->feature_in) &&
+      sf_quant_scale(ldexp(unit / TWO_PI, PHASE_FRAC), SHIFT_MAX, 0, &field->phase_in))
+    return sf_ok();
+  return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': features are too large for the accelerator", name,
+                 model->param[SF_V_BASIS].name);
+}
+
+/* Fits the basis matrix to the features that the float field has where the integer products are these. */
+static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_vm_calibration *c, const double *lsb,
+                           int limit, sf_quant_layer *result)
+{
+  const fx_tensorf *field = &scene->tensorf;
+  const int n = sf_tensorf_products(&model->config.tensorf);
+  int16_t *x = malloc((size_t)c->samples * (size_t)n * sizeof *x);
+  int8_t *q = calloc((size_t)n, SF_LANES);
+  sf_status status = x && q ? sf_ok() : sf_fail(SF_E_MEMORY, "quantiser: no memory for the basis matrix");
+  if (status.code == SF_OK) {
+    for (int i = 0; i < c->samples; i++) fx_tensorf_products(field, c->pos + (size_t)i * 3, x + (size_t)i * (size_t)n);
+    const sf_fit_data data = {c->samples, n, field->features, x, c->features};
+    const sf_fit_weights weights = {
+        .w = sf_model_param(model, SF_V_BASIS), .stride = n, .lsb = lsb, .unit_min = 1e-30, .weight_max = limit};
+    status = sf_fit_layer(&data, &weights, true, q, result);
+  }
+  for (int i = 0; i < n && status.code == SF_OK; i++)
+    memcpy(field->basis + (size_t)i * FX_APPEARANCE_MAX, q + (size_t)i * SF_LANES, FX_APPEARANCE_MAX);
+  free(x), free(q);
+  return status;
+}
+
+sf_status sf_quantise_factors(fx_scene *scene, const sf_model *model, const char *name,
+                              const sf_vm_calibration *calibration, sf_quant_report *report)
+{
+  const int limit = sf_symmetric_max(report->widths.grid_bits);
+  density d = {.scene = scene, .model = model, .name = name, .calibration = calibration, .limit = limit};
+  double lsb[FX_PAIRS * SF_COMPONENTS_MAX];
+  sf_quant_layer basis;
+  SF_TRY(quantise_density(&d, report));
+  report->grid_clipped += quantise_appearance(scene, model, limit, lsb);
+  SF_TRY(fit_basis(scene, model, calibration, lsb, sf_symmetric_max(report->widths.weight_bits), &basis));
+  report->feature_error = basis.error;
+  const double room = 1.1; /* between the calibration points are larger ones */
+  return set_feature_scales(scene, model, name, basis.unit,
+                            largest_feature(calibration) * room / sf_symmetric_max(SF_INPUT_BITS));
+}
+
+sf_status sf_quantise_tensorf(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
+                              sf_quant_report *report)
+{
+  sf_vm_calibration calibration;
+  if (report->widths.feature_bits != SF_INPUT_BITS)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: %d bits asked for features, those of a TensoRF scene have %d", name,
+                   report->widths.feature_bits, SF_INPUT_BITS);
+  sf_status status = sf_vm_calibrate(&calibration, model, scene->net.steps, options->seed);
+  report->samples = calibration.samples;
+  if (status.code == SF_OK) status = sf_quantise_factors(scene, model, name, &calibration, report);
+  if (status.code == SF_OK) status = sf_quantise_decoder(scene, model, name, &calibration, report);
+  sf_vm_calibration_free(&calibration);
+  return status.code == SF_OK ? fx_scene_check(scene, name) : status;
+}
+
+/* ---- what is not found by fitting ---- */
+
+int64_t sf_field_entries(const fx_scene *scene)
+{
+  const fx_tensorf *f = &scene->tensorf;
+  int64_t entries = 0;
+  if (scene->backbone != FX_TENSORF) return 0;
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const int *axis = sf_tensorf_axis[pair];
+    const int64_t points = (int64_t)f->res[axis[0]] * f->res[axis[1]] + f->res[axis[2]];
+    entries += points * (f->density.components[pair] + f->appearance.components[pair]);
+    entries += (int64_t)f->appearance.components[pair] * f->features;
+  }
+  return entries;
+}
+
+static double longest_edge(const sf_tensorf *field)
+{
+  double longest = 0;
+  for (int axis = 0; axis < 3; axis++) longest = fmax(longest, (double)field->box[1][axis] - field->box[0][axis]);
+  return longest;
+}
+
+void sf_tensorf_set_sizes(fx_scene *scene, const sf_model *model)
+{
+  const sf_tensorf *from = &model->config.tensorf;
+  fx_tensorf *to = &scene->tensorf;
+  fx_layer *layer = scene->net.layer;
+  scene->backbone = FX_TENSORF;
+  scene->occ_res = model->config.occ_res;
+  for (int i = 0; i < 3; i++) {
+    to->res[i] = from->resolution[i];
+    to->density.components[i] = from->density[i], to->appearance.components[i] = from->appearance[i];
+  }
+  to->features = from->features;
+  to->feature_freqs = from->feature_freqs, to->view_freqs = from->view_freqs;
+  layer[FX_C1].n_in = sf_tensorf_inputs(from);
+  layer[FX_C1].n_out = layer[FX_C2].n_in = layer[FX_C2].n_out = layer[FX_C3].n_in = model->config.hidden;
+  layer[FX_C3].n_out = 3;
+  for (int l = FX_C1; l <= FX_C3; l++) layer[l].bias = 1;
+}
+
+void sf_tensorf_set_scalars(fx_scene *scene, const sf_model *model)
+{
+  const sf_tensorf *from = &model->config.tensorf;
+  fx_tensorf *to = &scene->tensorf;
+  const double edge = longest_edge(from);
+  scene->to_box_scale = 1 / edge;
+  for (int axis = 0; axis < 3; axis++) {
+    scene->to_box_offset[axis] = -from->box[0][axis] / edge;
+    to->stretch[axis] = edge / ((double)from->box[1][axis] - from->box[0][axis]);
+  }
+  to->near = from->near, to->far = from->far;
+  scene->step_q24 = (int32_t)nearbyint(ldexp(sf_tensorf_step(from) / edge, SF_DELTA_FRAC));
+  to->activation = from->activation == SF_RELU ? FX_RELU : FX_SOFTPLUS;
+  to->weight_stop = (int32_t)floor(ldexp(WEIGHT_STOP, SF_TRANS_FRAC));
+}
