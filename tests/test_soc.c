@@ -263,7 +263,7 @@ START_TEST(a_wrong_device_is_reported)
     const char *line;
   } bad[] = {
       {READ_AS, SF_CSR_ID, 0, "error: probe: no accelerator at this address\n"},
-      {READ_AS, SF_CSR_VERSION, 2 << 16, "error: probe: interface version differs from the driver's\n"},
+      {READ_AS, SF_CSR_VERSION, 9 << 16, "error: probe: interface version differs from the driver's\n"},
       {READ_AS, SF_CSR_CONFIG, 0x08410780, "error: probe: built with other sizes than the driver\n"},
       {READ_AS, SF_CSR_STATUS, SF_CSR_STATUS_COUNTERS, "error: clear counters: no answer\n"},
       {REPLACE, SF_CSR_STEPS, 9, "error: load: programming refused: STEPS: "},
