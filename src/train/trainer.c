@@ -29,13 +29,16 @@ sf_train_options sf_train_defaults(void)
 sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
 {
   sf_train_options options = sf_train_defaults();
-  options.config = sf_tensorf_default(data->scale, 0);
+  const int width = data->count ? data->view[0].camera.width : 800;
+  options.config = sf_tensorf_default(data->scale, data->ndc);
   options.lr_grid = 0.02;
   options.lr_net = 1e-3;
-  options.background = 1;
+  options.background = data->ndc ? 0 : 1;
   options.rays = 4096;
-  options.samples = 1 << 17; /* more than that many rays have, once the scene has surfaces */
-  options.voxels = 300;
+  options.samples = 1 << 15; /* many small iterations learn faster than few large ones */
+  /* TensoRF's grids are for pictures of 800 and 1008 pixels; finer ones than the pixels cost time alone. */
+  options.voxels = data->ndc ? 640 * width / 1008 : width / 2;
+  options.voxels = options.voxels > (data->ndc ? 640 : 300) ? (data->ndc ? 640 : 300) : options.voxels;
   return options;
 }
 

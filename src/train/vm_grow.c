@@ -211,7 +211,7 @@ sf_status sf_vm_grow(sf_trainer *t)
   int steps = 0, done = 0, masks = 0;
   for (int i = 0; i < EVENTS; i++) steps += e[i].grow;
   for (int i = 0; i < vm->event; i++) done += e[i].grow, masks += e[i].mask;
-  for (; vm->event < EVENTS && t->progress >= e[vm->event].at; vm->event++) {
+  for (; vm->event < EVENTS && t->progress >= e[vm->event].at - 1e-9; vm->event++) {
     const event *now = &e[vm->event];
     if (now->mask) SF_TRY(sf_vm_mask(t, masks > 0));
     if (now->mask && !masks++) SF_TRY(sf_vm_shrink(t));

@@ -1,0 +1,302 @@
+/* The TensoRF trainer: the schedule, what growing keeps, the mask, reproducibility, resuming. */
+#include "train_fixture.h"
+#include "train/vm.h"
+#include <omp.h>
+
+static sf_train_options small_vm(const sf_dataset *data, sf_net_kind net)
+{
+  sf_train_options o = sf_train_defaults_tensorf(data);
+  o.config.net = net;
+  o.config.steps = net == SF_NET_ANN ? 1 : T;
+  o.config.hidden = 32;
+  o.config.occ_res = 16;
+  o.voxels = 24;
+  o.rays = 128;
+  o.samples = 4096;
+  o.stage1 = 12;
+  o.stage2 = 28;
+  for (int a = 0; a < 3; a++) o.config.tensorf.resolution[a] = 16;
+  return o;
+}
+
+/* A ball of density in the field, so that there is something to mask: the first component of mode 0 is a smooth bump
+ * on the plane and along the line. */
+static void put_ball(sf_model *m)
+{
+  const sf_tensorf *f = &m->config.tensorf;
+  memset(m->value, 0, m->param[SF_V_APP_PLANE].offset * sizeof(float));
+  float *plane = sf_model_param(m, SF_V_DENSITY_PLANE), *line = sf_model_param(m, SF_V_DENSITY_LINE);
+  for (int y = 0; y < f->resolution[1]; y++)
+    for (int x = 0; x < f->resolution[0]; x++) {
+      const float u = (float)x / (float)(f->resolution[0] - 1) - 0.45f,
+                  v = (float)y / (float)(f->resolution[1] - 1) - 0.5f;
+      plane[((size_t)y * f->resolution[0] + x) * 16] = 30 * expf(-40 * (u * u + v * v));
+    }
+  for (int z = 0; z < f->resolution[2]; z++) {
+    const float w = (float)z / (float)(f->resolution[2] - 1) - 0.55f;
+    line[(size_t)z * 16] = expf(-40 * w * w);
+  }
+}
+
+static void to_box(const sf_tensorf *f, const float p[3], float x[3])
+{
+  for (int a = 0; a < 3; a++) x[a] = (p[a] - f->box[0][a]) / (f->box[1][a] - f->box[0][a]);
+}
+
+/* Random points of the box in model units. */
+static void point(const sf_tensorf *f, int i, float p[3])
+{
+  for (int a = 0; a < 3; a++)
+    p[a] = f->box[0][a] + (f->box[1][a] - f->box[0][a]) * sf_random_float(11, 1, 3 * (uint64_t)i + a);
+}
+
+/* From n to 2n - 1 points per axis every old point stays one, and bilinear values stay bilinear: nothing changes. */
+START_TEST(upsampling_keeps_the_field)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_trainer *t = start(&data, &o, NULL);
+  enum { N = 300 };
+  float before[N], p[N][3], x[3], features[2][SF_APPEARANCE_MAX];
+  for (int i = 0; i < N; i++) {
+    point(&t->model.config.tensorf, i, p[i]);
+    to_box(&t->model.config.tensorf, p[i], x);
+    before[i] = sf_tensorf_density_feature(&t->model, x);
+  }
+  sf_tensorf_appearance(&t->model, x, features[0]);
+  sf_tensorf finer = t->model.config.tensorf;
+  for (int a = 0; a < 3; a++) finer.resolution[a] = 31;
+  ck_good(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){0.5, 0.5, 0.5}));
+  for (int i = 0; i < N; i++) {
+    to_box(&t->model.config.tensorf, p[i], x);
+    ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), before[i], 1e-5f); /* 48 products of 0.01 */
+  }
+  sf_tensorf_appearance(&t->model, x, features[1]);
+  for (int i = 0; i < 27; i++) ck_assert_float_eq_tol(features[1][i], features[0][i], 1e-5f);
+  for (size_t i = 0; i < t->model.size; i++) ck_assert_float_eq(t->moment2[i], 0);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* Shrinking cuts at grid points: the same field inside. Rays have another step then, so that a picture changes by the
+ * error of its quadrature alone. */
+START_TEST(shrinking_keeps_what_is_seen)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_trainer *t = start(&data, &o, NULL);
+  put_ball(&t->model);
+  enum { N = 24 * 24 };
+  static float origin[N][3], direction[N][3], rgb[2][N][3], alpha[2][N];
+  const float white[3] = {1, 1, 1};
+  for (int i = 0; i < N; i++)
+    sf_dataset_ray(&data, &data.view[0], (float)(i % 24) + 0.5f, (float)(i / 24) + 0.5f, origin[i], direction[i]);
+  const float step = sf_tensorf_step(&t->model.config.tensorf);
+  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[0][0], NULL, alpha[0], NULL));
+  sf_model whole = {0};
+  ck_good(sf_model_create(&whole, &t->model.config));
+  memcpy(whole.value, t->model.value, whole.size * sizeof *whole.value);
+  ck_good(sf_vm_mask(t, false));
+  ck_assert_double_lt(t->occupied, 0.5);
+  ck_good(sf_vm_shrink(t));
+  const sf_tensorf *f = &t->model.config.tensorf;
+  ck_assert_int_lt(f->resolution[0], 16);
+  for (int i = 0; i < 300; i++) {
+    float p[3], x[3], y[3];
+    point(f, i, p);
+    to_box(f, p, x);
+    to_box(&whole.config.tensorf, p, y);
+    const float expected = sf_tensorf_density_feature(&whole, y);
+    ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), expected, 1e-4f * (1 + expected));
+  }
+  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[1][0], NULL, alpha[1], NULL));
+  ck_assert_float_eq_tol(sf_tensorf_step(f), step, 1e-5f); /* voxels are as long as before, so the steps are */
+  double largest = 0, error = 0;
+  for (int i = 0; i < N; i++) {
+    error = fmax(error, fabs((double)alpha[1][i] - (double)alpha[0][i]));
+    largest = fmax(largest, (double)alpha[0][i]);
+  }
+  ck_assert_double_gt(largest, 0.99);
+  ck_assert_double_lt(error, 0.1); /* at the rim: a sample's place within its interval of half a voxel */
+  sf_model_free(&whole);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* No point whose alpha is above four times the threshold lies in a cell that the mask drops: the mask looks at the
+ * corners of cells, and this field changes by less than that between them. Most of the box goes. */
+START_TEST(mask_keeps_what_is_visible)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_trainer *t = start(&data, &o, NULL);
+  put_ball(&t->model);
+  ck_good(sf_vm_mask(t, false));
+  const sf_tensorf *f = &t->model.config.tensorf;
+  int visible = 0;
+  for (int i = 0; i < 20000; i++) {
+    float x[3];
+    int cell[3];
+    for (int a = 0; a < 3; a++) {
+      x[a] = sf_random_float(12, 1, 3 * (uint64_t)i + a);
+      cell[a] = (int)(x[a] * 16);
+    }
+    const float sigma = sf_tensorf_sigma(f, sf_tensorf_density_feature(&t->model, x));
+    const double alpha = 1 - exp(-(double)sigma / 25 * (double)sf_tensorf_step(f));
+    if (alpha < 4e-4) continue;
+    const int bit = (cell[2] * 16 + cell[1]) * 16 + cell[0];
+    visible++;
+    ck_assert_msg(t->model.occupancy[bit / 8] >> (bit % 8) & 1, "alpha %g at %g %g %g is masked", alpha, (double)x[0],
+                  (double)x[1], (double)x[2]);
+  }
+  ck_assert_int_gt(visible, 200);
+  ck_assert_double_lt(t->occupied, 0.5);
+  const double once = t->occupied;
+  memset(t->model.occupancy, 0, 16 * 16 * 16 / 16);
+  ck_good(sf_vm_mask(t, true)); /* a later mask takes no cell back */
+  ck_assert_double_lt(t->occupied, once);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. */
+START_TEST(schedule_scales_with_the_run)
+{
+  make_scene(4);
+  sf_dataset data = load("train");
+  sf_train_options o = small_vm(&data, SF_NET_ANN);
+  o.stage1 = 60, o.stage2 = 240;
+  sf_trainer *t = start(&data, &o, NULL);
+  static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
+  for (int i = 0, event = 0; i < 80; i++) {
+    steps(t, 1);
+    if (event < 5 && i == at[event]) event++;
+    ck_assert_msg(t->vm->event == event, "iteration %d: %d events, expected %d", i, t->vm->event, event);
+    if (event) ck_assert_int_eq(t->vm->fresh, at[event - 1]);
+  }
+  const int32_t *r = t->model.config.tensorf.resolution;
+  const double voxels = (double)r[0] * r[1] * r[2];
+  ck_assert_double_gt(voxels, 0.75 * 24 * 24 * 24); /* rounded down along each axis */
+  ck_assert_double_le(voxels, 24 * 24 * 24);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* The whole way of a short run, spiking: the same bits with one thread and with three. */
+START_TEST(threads_do_not_matter)
+{
+  make_scene(4);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_trainer *t[2];
+  const int threads = omp_get_max_threads();
+  for (int i = 0; i < 2; i++) {
+    omp_set_num_threads(i ? 3 : 1);
+    t[i] = start(&data, &o, NULL);
+    const sf_train_stats s = steps(t[i], 40);
+    ck_assert_int_eq(s.stage, 3);
+  }
+  omp_set_num_threads(threads);
+  ck_assert_mem_eq(&t[0]->model.config, &t[1]->model.config, sizeof t[0]->model.config);
+  same_model(t[0], t[1]);
+  for (int i = 0; i < 2; i++) sf_trainer_free(t[i]);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* A checkpoint in the middle, after the field has grown, and what follows is the same as without. */
+START_TEST(resume_is_the_same_run)
+{
+  make_scene(4);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_trainer *a = start(&data, &o, NULL), *b = start(&data, &o, NULL);
+  steps(a, 40);
+  steps(b, 21);
+  ck_good(sf_trainer_save(b, in("run.safetensors"), true));
+  sf_trainer_free(b);
+  b = start(&data, &o, in("run.safetensors"));
+  steps(b, 19);
+  same_model(a, b);
+  sf_trainer_free(a);
+  sf_trainer_free(b);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
+START_TEST(it_learns)
+{
+  make_scene(8);
+  sf_dataset data = load("train");
+  for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
+    sf_train_options o = small_vm(&data, net);
+    o.stage1 = 40, o.stage2 = 110, o.rays = 512;
+    sf_trainer *t = start(&data, &o, NULL);
+    double psnr, ssim;
+    const sf_train_stats first = steps(t, 1), last = steps(t, 149);
+    ck_good(sf_evaluate(sf_trainer_model(t), &data, 2, 0, &psnr, &ssim));
+    ck_assert_msg(last.mse < 0.3 * first.mse && psnr > 15, "%s: error %g, was %g; %g dB", net ? "twin" : "spiking",
+                  last.mse, first.mse, psnr);
+    ck_assert_double_gt(last.occupied, 0);
+    sf_trainer_free(t);
+  }
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+/* A field that is not finite ends the run with its name; what is refused is not saved. */
+START_TEST(nan_is_found)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_trainer *t = start(&data, &o, NULL);
+  sf_train_stats s;
+  t->model.value[t->model.param[SF_V_DENSITY_LINE].offset] = NAN;
+  for (size_t i = 0; i < t->model.param[SF_V_DENSITY_LINE].size; i++)
+    t->model.value[t->model.param[SF_V_DENSITY_LINE].offset + i] = NAN;
+  ck_assert_int_ne(sf_trainer_step(t, &s).code, SF_OK);
+  const sf_status status = sf_trainer_save(t, in("bad.safetensors"), true);
+  ck_assert_int_ne(status.code, SF_OK);
+  ck_assert_ptr_nonnull(strstr(status.message, "density_line.0"));
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("tensorf_train");
+  TCase *tc = tcase_create("tensorf_train");
+  tcase_set_timeout(tc, 300);
+  tcase_add_test(tc, upsampling_keeps_the_field);
+  tcase_add_test(tc, shrinking_keeps_what_is_seen);
+  tcase_add_test(tc, mask_keeps_what_is_visible);
+  tcase_add_test(tc, schedule_scales_with_the_run);
+  tcase_add_test(tc, threads_do_not_matter);
+  tcase_add_test(tc, resume_is_the_same_run);
+  tcase_add_test(tc, it_learns);
+  tcase_add_test(tc, nan_is_found);
+  suite_add_tcase(suite, tc);
+  SRunner *runner = srunner_create(suite);
+  srunner_run_all(runner, CK_ENV);
+  int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
