@@ -200,7 +200,7 @@ pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CS
 bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
 	@models=$$(tests/bench_models.sh $B $(SCENES)) && $B/tests/bench $B/bench.json $$models
 
-$B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig)
+$B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig bench_tensorf)
 
 vectors: $B/bin/sf_export ## vector kit of the demo's scene after make demo (or SCENE=, DATA=), run in Icarus and Verilator: build/vectors
 	@$B/bin/sf_export $(or $(SCENE),$B/demo/scene.snn) --data $(or $(DATA),$B/demo/scene) --vectors $B/vectors --seed 1

@@ -353,6 +353,7 @@ static sf_status bench_iteration(cJSON *json, const ceilings *c)
   if (!status.code) status = iterations(&data, sf_kernels_training(), 64, &rate);
   if (!status.code) status = iterations(&data, sf_kernels_select("portable"), 20, &naive);
   if (!status.code) put(json, "train.iteration.t8", rate, "samples/s", iteration_ceiling(c), naive);
+  if (!status.code) status = bench_tensorf(json, c, &data);
   sf_dataset_free(&data);
   snprintf(command, sizeof command, "rm -rf %s", folder);
   if (system(command) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot remove", folder);

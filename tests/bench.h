@@ -1,6 +1,7 @@
 /* Shared by the files of the benchmark. */
 #ifndef SPIKEFIELD_TESTS_BENCH_H
 #define SPIKEFIELD_TESTS_BENCH_H
+#include "spikefield/scene.h"
 #include "spikefield/status.h"
 #include <cjson/cJSON.h>
 
@@ -18,4 +19,5 @@ void put(cJSON *json, const char *name, double value, const char *unit, double c
 /* scene, twin, data: a fixed-point scene, the float ReLU twin and their data set; scene NULL: no frame. */
 sf_status bench_fixed(cJSON *json, const ceilings *c, const char *scene, const char *twin, const char *data);
 sf_status bench_rtl(cJSON *json);
+sf_status bench_tensorf(cJSON *json, const ceilings *c, const sf_dataset *data);
 #endif
