@@ -168,6 +168,7 @@ static inline double shown_value(const char *text, double *half)
   for (int i = 0; i < 7; i++)
     if (!strncmp(text, unit[i].name, strlen(unit[i].name))) factor = unit[i].factor;
   *half *= factor;
+  if (!strncmp(text, " % more", 7)) sign = -1; /* spent, where the JSON has a negative saving */
   return n ? sign * atof(digits) * factor : (double)NAN;
 }
 

@@ -9,13 +9,14 @@ enum { HTML_NUMBER = 48 }; /* characters of a formatted number */
 const char *html_count(char text[HTML_NUMBER], uint64_t value);
 const char *html_energy(char text[HTML_NUMBER], double fj);
 const char *html_short(char text[HTML_NUMBER], double value);
+const char *html_tenths(char text[HTML_NUMBER], double value); /* a real minus sign, one decimal */
 const char *html_percent(char text[HTML_NUMBER], double percent);
 
 void html_escape(FILE *out, const char *text);
 /* <data> elements; key is the JSON path: "counts.layers[0].mac[1]". */
 void html_put_count(FILE *out, const char *key, uint64_t value);
 void html_put_energy(FILE *out, const char *key, uint64_t fj);
-void html_put_saving(FILE *out, int ledger, double saving);                       /* "61.7 % saved" */
+void html_put_saving(FILE *out, const char *key, double saving);                  /* "61.7 % saved", "7.1 % more" */
 void html_put_real(FILE *out, const char *key, double value, const char *format); /* "-" where not finite */
 /* <img> with the picture inside. alt is escaped. */
 sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, const uint8_t *palette, int colours,

@@ -18,10 +18,9 @@ static void result(FILE *out, const sf_page *page)
   fprintf(out, "</b> with the spiking network and <b>");
   html_put_energy(out, "energy_ann_fj", r->ledger.ann_fj);
   fprintf(out, "</b> with the same network in its ordinary, non-spiking form");
-  if (!isnan(saving)) {
-    fprintf(out, ": <b>");
-    html_put_real(out, "energy_saving_percent", saving, "%.1f");
-    fprintf(out, " %% %s</b>", saving < 0 ? "saved \xe2\x80\x93 it spends more" : "saved");
+  if (isfinite(saving)) {
+    fprintf(out, ": ");
+    html_put_saving(out, "energy_saving_percent", saving);
   }
   fprintf(out, ", when additions and multiplications alone are priced, as the literature does.</p>\n");
 }
@@ -32,9 +31,9 @@ static void other_results(FILE *out, const sf_page *page)
   const sf_ledgers *l = &page->report->ledgers;
   if (!isfinite(l->saving[SF_LEDGER_WIDTH]) || !isfinite(l->saving[SF_LEDGER_NEURON])) return;
   fprintf(out, "<p>Priced as integers of the widths that the hardware uses, and against a twin of integers, ");
-  html_put_saving(out, SF_LEDGER_WIDTH, l->saving[SF_LEDGER_WIDTH]);
+  html_put_saving(out, "ledgers.list[1].saving_percent", l->saving[SF_LEDGER_WIDTH]);
   fprintf(out, "; with memory traffic and neuron updates priced too, ");
-  html_put_saving(out, SF_LEDGER_NEURON, l->saving[SF_LEDGER_NEURON]);
+  html_put_saving(out, "ledgers.list[3].saving_percent", l->saving[SF_LEDGER_NEURON]);
   fprintf(out, ". <a href=\"#ledgers\">Every ledger</a> is below.</p>\n");
 }
 

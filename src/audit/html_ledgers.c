@@ -45,7 +45,7 @@ static void saving_bars(FILE *out, const char *id, const char *title, const savi
     low = fmin(low, row[i].saving), high = fmax(high, row[i].saving);
   }
   /* Room for the numbers on the sides that are used. */
-  const double left = low < 0 ? 64 : 0, scale = (WIDTH - left - 64) / fmax(high - low, 1), zero = left - low * scale;
+  const double left = low < 0 ? 72 : 0, scale = (WIDTH - left - 72) / fmax(high - low, 1), zero = left - low * scale;
   svg_begin(out, id, WIDTH, TOP + ROW * n, title, "Bars to the right: energy saved; to the left: more energy spent");
   if (low < 0) svg_text(out, zero - 8, 12, "mut end", "\xe2\x86\x90 spends more");
   svg_text(out, zero + 8, 12, "mut", "saves \xe2\x86\x92");
@@ -122,7 +122,8 @@ static void ledger_figure(FILE *out, const sf_page *page, int ledger)
   fprintf(out, "<figure id=\"%s\">\n<figcaption><b>", id);
   html_escape(out, sf_ledger_texts[ledger].title);
   fprintf(out, "</b>: ");
-  html_put_saving(out, ledger, l->saving[ledger]);
+  snprintf(id, sizeof id, "ledgers.list[%d].saving_percent", ledger);
+  html_put_saving(out, id, l->saving[ledger]);
   fprintf(out, ". ");
   html_escape(out, caption);
   fprintf(out, "</figcaption>\n");

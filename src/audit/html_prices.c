@@ -50,7 +50,7 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
   const int n = swings_of(l, ledger, list);
   const double now = l->saving[ledger];
   double low = now, high = now;
-  char id[48], title[96];
+  char id[48], title[96], text[HTML_NUMBER];
   for (int i = 0; i < n; i++) {
     low = fmin(low, fmin(list[i].less, list[i].more));
     high = fmax(high, fmax(list[i].less, list[i].more));
@@ -66,7 +66,7 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
             "Saving when a price is halved or raised by half, largest change first");
   const double mid = x0 + (now - low) * scale;
   svg_line(out, mid, TOP - 4, mid, TOP + ROW * n + 2, "ax");
-  svg_text(out, fmin(fmax(mid, 60), WIDTH - 60), 12, "num mid", "now %.1f %%", now);
+  svg_text(out, fmin(fmax(mid, 60), WIDTH - 60), 12, "num mid", "now %s", html_percent(text, now));
   for (int i = 0; i < n; i++) {
     const sf_price *price = &l->technology.price[l->sensitivity[list[i].index].price];
     const double y = TOP + ROW * i, a = fmin(list[i].less, list[i].more), b = fmax(list[i].less, list[i].more);
@@ -80,8 +80,8 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
              sf_ledger_texts[ledger].key);
     snprintf(tip, sizeof tip, "%s at one and a half times its price: %.2f %% saved", price->key, list[i].more);
     half_bar(out, key, now, list[i].more, x0, scale, low, y + 18, "dear", tip);
-    svg_text(out, x0 + (a - low) * scale - 4, y + 30, "num end", "%.1f", a);
-    svg_text(out, x0 + (b - low) * scale + 4, y + 30, "num", "%.1f", b);
+    svg_text(out, x0 + (a - low) * scale - 4, y + 30, "num end", "%s", html_tenths(text, a));
+    svg_text(out, x0 + (b - low) * scale + 4, y + 30, "num", "%s", html_tenths(text, b));
   }
   svg_end(out);
   fprintf(out, "</div>\n");

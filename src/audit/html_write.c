@@ -62,6 +62,12 @@ const char *html_percent(char text[HTML_NUMBER], double percent)
   return text;
 }
 
+const char *html_tenths(char text[HTML_NUMBER], double value)
+{
+  snprintf(text, HTML_NUMBER, "%s%.1f", value < 0 ? "\xe2\x88\x92" : "", fabs(value));
+  return text;
+}
+
 void html_escape(FILE *out, const char *text)
 {
   for (; *text; text++) switch (*text) {
@@ -95,16 +101,14 @@ void html_put_energy(FILE *out, const char *key, uint64_t fj)
   fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, fj, html_energy(text, (double)fj));
 }
 
-void html_put_saving(FILE *out, int ledger, double saving)
+void html_put_saving(FILE *out, const char *key, double saving)
 {
   if (!isfinite(saving)) {
     fprintf(out, "no saving is defined");
     return;
   }
-  fprintf(
-      out,
-      "<b class=\"%s\"><data data-key=\"ledgers.list[%d].saving_percent\" value=\"%.17g\">%s%.1f %%</data> saved</b>",
-      saving < 0 ? "bad" : "good", ledger, saving, saving < 0 ? "\xe2\x88\x92" : "", fabs(saving));
+  fprintf(out, "<b class=\"%s\"><data data-key=\"%s\" value=\"%.17g\">%.1f %% %s</data></b>",
+          saving < 0 ? "bad" : "good", key, saving, fabs(saving), saving < 0 ? "more" : "saved");
 }
 
 void html_put_real(FILE *out, const char *key, double value, const char *format)
