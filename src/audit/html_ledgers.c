@@ -35,6 +35,16 @@ static void reading_rows(const sf_page *page, saving_row row[READINGS])
                         sf_saving_percent(p->spiking_fj, p->ann_hoisted_fj), "ledger.hoisted_saving_percent"};
 }
 
+/* On the side of the line that has more room, and never beyond the picture. */
+static void place_title(FILE *out, const char *title, double zero, double y)
+{
+  const double width = 9.5 * (double)strlen(title); /* at most: of bold letters on a small screen */
+  if (zero > WIDTH / 2.0)
+    svg_text(out, fmax(zero - 8, width), y, "lab end", "%s", title);
+  else
+    svg_text(out, fmax(fmin(zero + 8, WIDTH - width), 0), y, "lab", "%s", title);
+}
+
 /* Percentages to the right of zero are saved, to the left spent in addition. */
 static void saving_bars(FILE *out, const char *id, const char *title, const saving_row *row, int n)
 {
@@ -45,15 +55,14 @@ static void saving_bars(FILE *out, const char *id, const char *title, const savi
     low = fmin(low, row[i].saving), high = fmax(high, row[i].saving);
   }
   /* Room for the numbers on the sides that are used. */
-  const double left = low < 0 ? 72 : 0, scale = (WIDTH - left - 72) / fmax(high - low, 1), zero = left - low * scale;
+  const double left = low < 0 ? 88 : 0, scale = (WIDTH - left - 88) / fmax(high - low, 1), zero = left - low * scale;
   svg_begin(out, id, WIDTH, TOP + ROW * n, title, "Bars to the right: energy saved; to the left: more energy spent");
   if (low < 0) svg_text(out, zero - 8, 12, "mut end", "\xe2\x86\x90 spends more");
   svg_text(out, zero + 8, 12, "mut", "saves \xe2\x86\x92");
   for (int i = 0; i < n; i++) {
     const double y = TOP + ROW * i, saving = isfinite(row[i].saving) ? row[i].saving : 0, width = fabs(saving) * scale;
     char text[HTML_NUMBER];
-    svg_text(out, zero > WIDTH / 2.0 ? zero - 8 : zero + 8, y + 12, zero > WIDTH / 2.0 ? "lab end" : "lab", "%s",
-             row[i].title);
+    place_title(out, row[i].title, zero, y + 12);
     fprintf(out,
             "<rect x=\"%.2f\" y=\"%g\" width=\"%.2f\" height=\"16\" class=\"bar %s\" data-key=\"%s\" "
             "data-value=\"%.17g\"><title>",
