@@ -34,6 +34,14 @@ line=$(grep -n '^dram' "$work/own.tech" | cut -d: -f1)
 grep -qF "own.tech:$line: key 'dram': unit 'pj'" "$work/err" || fail "not named: $(cat "$work/err")"
 [ ! -s "$work/out" ] || fail "output in spite of an error"
 
+# A twin of its own: every synapse an fp32 MAC, once for each of the samples that it takes.
+"$build/bin/sf_train" "$work/d" -o "$work/twin.safetensors" --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 \
+  --threads 1 -q >/dev/null || fail "twin"
+audit --json --twin "$work/twin.safetensors" | tr -d ' \n\t' >"$work/twin.json" || fail "audit with a twin"
+twin() { sed -E "s/.*\"twin\":\{[^}]*\"$1\":([0-9]+).*/\1/" "$work/twin.json"; }
+[ "$(twin samples)" -gt 0 ] && [ "$(twin macs_per_sample)" -gt 0 ] || fail "the twin counts nothing"
+[ "$(twin fj)" -eq $(($(twin samples) * $(twin macs_per_sample) * 4600)) ] || fail "the twin's energy"
+
 # The prices stand beside the program, wherever the two are.
 mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"
 (cd / && "$work/moved/bin/energy_audit" "$work/s.snn" "$work/d" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"

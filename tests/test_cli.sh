@@ -77,6 +77,8 @@ good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
+good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good energy_audit s.snn d --rays 20 --rtl-rays 0 --twin twin.safetensors
 good energy_audit --compare s.snn s.snn d --rays 20 --rtl-rays 0 --steps-b 1 --json
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1
@@ -316,6 +318,8 @@ writers() { # PATTERN PATH
   absent out "unwritable $2"
 }
 data nosuch energy_audit s.snn d --rays 1 --rtl-rays 0 --tech nosuch
+data nosuch energy_audit s.snn d --rays 1 --rtl-rays 0 --twin nosuch
+data model.safetensors energy_audit s.snn d --rays 1 --rtl-rays 0 --twin model.safetensors
 data nosuch.json energy_audit --compare nosuch.json nosuch.json
 printf '{"views": 1}' >none.json
 data none.json energy_audit --compare none.json none.json

@@ -76,8 +76,8 @@ void sf_limits_print(FILE *out);
 void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 
 /* The same rays counted by the core (a), the accelerator's own counters (b) and from the spike bitmaps (c). What lies
- * outside the nets is counted by (a) as it happens, by (b) at the ports of the accelerator that marches no more than the
- * core did (requests of its grid's memory, pixels that left it, the samples that it composited), by (c) from the
+ * outside the nets is counted by (a) as it happens, by (b) at the ports of the accelerator that marches no more than
+ * the core did (requests of its grid's memory, pixels that left it, the samples that it composited), by (c) from the
  * samples alone. */
 typedef struct sf_three_counts {
   int wanted, rays; /* rays asked for; rays run */
@@ -92,8 +92,7 @@ typedef struct sf_three_counts {
 sf_traffic sf_traffic_of(const fx_counts *counts, uint64_t pixels);
 /* The same from the number of recounted samples and the shape of the field alone. field_samples: positions at which
  * TensoRF's density was asked, which leave no spikes; not looked at for INGP. */
-sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t field_samples,
-                              uint64_t pixels);
+sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t field_samples, uint64_t pixels);
 /* SF_E_DIFFERENCE names the first event that differs. */
 sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name);
 /* Bytes of the field's tables: what chooses the price of a read. */
@@ -102,7 +101,8 @@ uint64_t sf_table_size(const fx_scene *scene);
 /* The paper's published energies, recomputed: E = 4.6 pJ R + 0.9 pJ fr T (F - R) per sample, samples from the ANN row,
  * one rate fr per backbone, data and reading of R (the mean of the rates its rows imply). And once more with two rates,
  * one of the first time step and one of the later ones, fr T = first + later (T - 1): in hybrid mode the first step
- * charges a membrane with the whole current, so neurons fire more often then. Least squares of the relative residuals. */
+ * charges a membrane with the whole current, so neurons fire more often then. Least squares of the relative residuals.
+ */
 typedef struct sf_published_row {
   const char *backbone, *data, *beta; /* beta NULL: the ANN */
   const char *reading;                /* how R is read */
@@ -112,7 +112,7 @@ typedef struct sf_published_row {
   double rate, mean_rate;             /* implied by this row; of the group */
   double recomputed_mj, residual_percent;
   double first_rate, later_rate, two_rates_mj, two_rates_residual_percent; /* NAN: the ANN */
-  double saving_percent, published_saving_percent; /* NaN where the paper prints none */
+  double saving_percent, published_saving_percent;                         /* NaN where the paper prints none */
 } sf_published_row;
 enum { SF_PUBLISHED_MAX = 48 };
 int sf_published_rows(sf_published_row rows[SF_PUBLISHED_MAX]);
@@ -162,6 +162,26 @@ void sf_measure_free(sf_measure *measure);
 sf_status sf_measure_choose(const sf_measure *measure, uint64_t seed, uint64_t stream, uint64_t limit, uint64_t *index,
                             uint64_t *count);
 
+/* A ReLU twin that was trained by itself: it takes samples of its own, which its float rendering of the same rays
+ * counts. Its nets are those of the scene's sizes: every synapse an fp32 MAC, once per sample. */
+typedef struct sf_twin_job {
+  const char *path; /* model.safetensors */
+  const fx_net *net;
+  uint64_t rays;
+  void (*ray)(void *user, uint64_t index, float origin[3], float direction[3]); /* world units */
+  bool (*tick)(void *user, uint64_t done);                                      /* false stops; may be NULL */
+  void *user;
+} sf_twin_job;
+typedef struct sf_twin {
+  const char *path; /* NULL: there is none */
+  uint64_t samples, macs, fj;
+  double saving_percent; /* of the spiking net in the paper ledger */
+} sf_twin;
+/* SF_E_UNSUPPORTED when the model is no ReLU net. */
+sf_status sf_twin_count(const sf_twin_job *job, sf_twin *twin);
+/* Sets fj and saving_percent. SF_E_RANGE when the energy does not fit in 64 bits. */
+sf_status sf_twin_price(const sf_technology *technology, uint64_t spiking_fj, sf_twin *twin);
+
 /* Everything one audit found. views: how many whole views the rays amount to. */
 typedef struct sf_audit_report {
   const char *scene, *data, *split, *sha256;
@@ -171,9 +191,10 @@ typedef struct sf_audit_report {
   bool random_rays;
   sf_measure measure;
   sf_three_counts three;
-  sf_ledger ledger;  /* the paper's metric and its readings, at 4.6 and 0.9 pJ */
+  sf_ledger ledger; /* the paper's metric and its readings, at 4.6 and 0.9 pJ */
   sf_traffic traffic;
   sf_ledgers ledgers; /* all, at the prices of a technology */
+  sf_twin twin;
 } sf_audit_report;
 void sf_report_print(FILE *out, const sf_audit_report *report);
 cJSON *sf_report_json(const sf_audit_report *report);

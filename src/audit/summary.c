@@ -38,6 +38,16 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
     fprintf(out, "  DIFFERENCE: %s\n", s->agreement.message);
 }
 
+static void print_twin(FILE *out, const sf_audit_report *r)
+{
+  if (!r->twin.path) return;
+  fprintf(out,
+          "paper ledger against a twin that was trained by itself, %s:\n  %" PRIu64 " samples (spiking net: %" PRIu64
+          "), %.6g mJ per view, saving %.2f%%\n\n",
+          r->twin.path, r->twin.samples, r->measure.core.samples, (double)r->twin.fj * 1e-12 / r->views,
+          r->twin.saving_percent);
+}
+
 void sf_report_print(FILE *out, const sf_audit_report *r)
 {
   const fx_counts *c = &r->measure.core;
@@ -59,6 +69,7 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   fprintf(out, "\n");
   sf_ledgers_print(out, &r->ledgers, r->views);
   fprintf(out, "\n");
+  print_twin(out, r);
   sf_ledger_print(out, &r->ledger, r->views);
   fprintf(out, "\n");
   sf_limits_print(out);
@@ -129,6 +140,20 @@ static void add_energy(cJSON *json, const sf_audit_report *r)
   cJSON_AddItemToObject(json, "ledger", sf_ledger_json(&r->ledger));
 }
 
+static void add_twin(cJSON *json, const sf_audit_report *r)
+{
+  if (!r->twin.path) return;
+  cJSON *twin = cJSON_AddObjectToObject(json, "twin");
+  cJSON_AddStringToObject(twin, "model", r->twin.path);
+  sf_json_add_u64(twin, "samples", r->twin.samples);
+  sf_json_add_u64(twin, "macs_per_sample", r->twin.macs);
+  sf_json_add_u64(twin, "fj", r->twin.fj);
+  if (isnan(r->twin.saving_percent))
+    cJSON_AddNullToObject(twin, "saving_percent");
+  else
+    cJSON_AddNumberToObject(twin, "saving_percent", r->twin.saving_percent);
+}
+
 static void add_saturation(cJSON *json, const sf_audit_report *r)
 {
   char unexpected[64];
@@ -159,6 +184,7 @@ cJSON *sf_report_json(const sf_audit_report *r)
   add_origin(json, r);
   add_energy(json, r);
   cJSON_AddItemToObject(json, "ledgers", sf_ledgers_json(&r->ledgers, r->views));
+  add_twin(json, r);
   cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic));
   add_saturation(json, r);
   add_agreement(json, r);

@@ -1,0 +1,184 @@
+#include "sim/audit_run.h"
+#include "spikefield/rng.h"
+#include "sim/three_counts.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Streams of the random numbers of one seed. */
+enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y, STREAM_SUBSET };
+
+typedef struct place {
+  int view, x, y;
+} place;
+
+/* ---- rays ---- */
+
+static place ray_place(const sf_audit *a, uint64_t index)
+{
+  const sf_camera *camera = &a->data.view[0].camera;
+  if (a->opt.rays == 0) {
+    uint64_t pixel = index % a->pixels;
+    int first = a->opt.view >= 0 ? a->opt.view : 0;
+    return (place){first + (int)(index / a->pixels), (int)(pixel % (uint64_t)camera->width),
+                   (int)(pixel / (uint64_t)camera->width)};
+  }
+  uint64_t seed = a->opt.seed;
+  int view = a->opt.view >= 0 ? a->opt.view : (int)sf_random_below(seed, STREAM_VIEW, index, (uint64_t)a->data.count);
+  return (place){view, (int)sf_random_below(seed, STREAM_X, index, (uint64_t)camera->width),
+                 (int)sf_random_below(seed, STREAM_Y, index, (uint64_t)camera->height)};
+}
+
+static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
+{
+  const sf_audit *a = user;
+  place p = ray_place(a, index);
+  return sf_pixel_ray(&a->scene, &a->data, &a->data.view[p.view], p.x, p.y, ray);
+}
+
+static bool tick(const sf_audit *a, const char *what, uint64_t done, uint64_t total)
+{
+  return !a->opt.tick || a->opt.tick(a->opt.user, what, done, total);
+}
+
+static bool core_tick(void *user, uint64_t done)
+{
+  const sf_audit *a = user;
+  return tick(a, "core", done, a->report.rays);
+}
+
+/* ---- files ---- */
+
+static sf_status load(sf_audit *a)
+{
+  sf_audit_options *o = &a->opt;
+  SF_TRY(fx_scene_load(&a->scene, o->scene));
+  SF_TRY(sf_sha256_file(o->scene, a->hash));
+  if (o->steps) a->scene.net.steps = o->steps;
+  /* Random rays come from every view unless one is named; whole views are many rays, so one is the default. */
+  if (o->views == 0 && o->view < 0 && o->rays == 0) o->views = 1;
+  sf_dataset_options how = {
+      .downscale = o->downscale, .scale = (float)o->scale, .limit = o->view >= 0 ? o->view + 1 : o->views};
+  SF_TRY(sf_dataset_load(&a->data, o->data, o->split, &how));
+  if (o->view >= a->data.count || o->views > a->data.count)
+    return sf_fail(SF_E_USAGE, "%s %d is out of range: %s has %d %s views", o->view >= 0 ? "--view" : "--views",
+                   o->view >= 0 ? o->view : o->views, o->data, a->data.count, o->split);
+  const sf_camera *first = &a->data.view[0].camera;
+  for (int i = 1; i < a->data.count; i++)
+    if (a->data.view[i].camera.width != first->width || a->data.view[i].camera.height != first->height)
+      return sf_fail(SF_E_FORMAT, "%s: view %s differs in size from view %s", o->data, a->data.view[i].name,
+                     a->data.view[0].name);
+  a->pixels = (uint64_t)first->width * (uint64_t)first->height;
+  a->report.rays = o->rays ? o->rays : a->pixels * (uint64_t)(o->view >= 0 ? 1 : a->data.count);
+  sf_audit_report *r = &a->report;
+  r->scene = o->scene, r->data = o->data, r->split = o->split, r->sha256 = a->hash, r->net = &a->scene.net;
+  r->seed = o->seed, r->random_rays = o->rays > 0, r->three.wanted = o->rtl_rays;
+  r->views = (double)r->rays / (double)a->pixels;
+  return sf_ok();
+}
+
+/* A file, or the name of one of those that stand beside the program: ../share/spikefield/tech/NAME.tech. */
+static sf_status load_technology(sf_audit *a)
+{
+  char path[4096 + 64];
+  const char *name = a->opt.tech;
+  if (strchr(name, '/') || access(name, F_OK) == 0) return sf_technology_load(&a->technology, name);
+  const ssize_t n = readlink("/proc/self/exe", path, 4096);
+  if (n <= 0) return sf_fail(SF_E_IO, "--tech %s: /proc/self/exe: cannot find the program's folder", name);
+  path[n] = 0;
+  for (int up = 0; up < 2 && strrchr(path, '/'); up++) *strrchr(path, '/') = 0;
+  const size_t folder = strlen(path);
+  snprintf(path + folder, sizeof path - folder, "/share/spikefield/tech/%.60s.tech", name);
+  return sf_technology_load(&a->technology, path);
+}
+
+/* ---- the rays for the accelerator ---- */
+
+static void name_ray(void *user, uint64_t index, char *text, size_t size)
+{
+  const sf_audit *a = user;
+  const place p = ray_place(a, index);
+  snprintf(text, size, "ray %" PRIu64 " (view %s, pixel %d,%d)", index, a->data.view[p.view].name, p.x, p.y);
+}
+
+static bool rtl_tick(void *user, int done)
+{
+  const sf_audit *a = user;
+  return tick(a, "accelerator", (uint64_t)done, (uint64_t)a->report.three.wanted);
+}
+
+static sf_status run_rtl(sf_audit *a)
+{
+  sf_three_counts *three = &a->report.three;
+  uint64_t count = 0, *index = calloc((size_t)three->wanted + 1, sizeof *index);
+  if (!index) return sf_fail(SF_E_MEMORY, "no memory for %d rays", three->wanted);
+  sf_status status =
+      sf_measure_choose(&a->report.measure, a->opt.seed, STREAM_SUBSET, (uint64_t)three->wanted, index, &count);
+  const sf_three_job job = {.scene = &a->scene,
+                            .index = index,
+                            .rays = (int)count,
+                            .ray = make_ray,
+                            .name = name_ray,
+                            .tick = rtl_tick,
+                            .user = a,
+                            .dut = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg}};
+  if (status.code == SF_OK) status = sf_three_counts_run(&job, three);
+  free(index);
+  return status;
+}
+
+/* ---- a twin of its own ---- */
+
+static void float_ray(void *user, uint64_t index, float origin[3], float direction[3])
+{
+  const sf_audit *a = user;
+  const place p = ray_place(a, index);
+  sf_dataset_ray(&a->data, &a->data.view[p.view], (float)p.x + 0.5f, (float)p.y + 0.5f, origin, direction);
+}
+
+static bool twin_tick(void *user, uint64_t done)
+{
+  const sf_audit *a = user;
+  return tick(a, "twin", done, a->report.rays);
+}
+
+static sf_status count_twin(sf_audit *a)
+{
+  sf_audit_report *r = &a->report;
+  if (!a->opt.twin) return sf_ok();
+  const sf_twin_job job = {a->opt.twin, r->net, r->rays, float_ray, twin_tick, a};
+  SF_TRY(sf_twin_count(&job, &r->twin));
+  return sf_twin_price(&a->technology, r->ledgers.total[SF_LEDGER_PAPER], &r->twin);
+}
+
+/* ---- all of it ---- */
+
+sf_status sf_audit_count(sf_audit *a)
+{
+  sf_audit_report *r = &a->report;
+  const sf_measure_job job = {&a->scene, r->rays, make_ray, core_tick, a, a->opt.seed, a->opt.recount_rays};
+  const sf_status status = sf_measure_rays(&job, &r->measure);
+  if (status.code == SF_E_DIFFERENCE) return sf_fail(status.code, "%s: %s", a->opt.scene, status.message);
+  SF_TRY(status);
+  const fx_counts *counts = &r->measure.core;
+  SF_TRY(sf_ledger_make(&a->scene.net, counts, &r->ledger));
+  r->traffic = sf_traffic_of(counts, r->rays);
+  SF_TRY(sf_ledgers_make(&a->technology, &a->scene.net, counts, &r->traffic, sf_table_size(&a->scene), &r->ledgers));
+  SF_TRY(count_twin(a));
+  return run_rtl(a);
+}
+
+sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options)
+{
+  *audit = (sf_audit){.opt = *options};
+  SF_TRY(load_technology(audit));
+  return load(audit);
+}
+
+void sf_audit_close(sf_audit *audit)
+{
+  sf_measure_free(&audit->report.measure);
+  sf_dataset_free(&audit->data);
+  fx_scene_free(&audit->scene);
+}
