@@ -102,7 +102,7 @@ $B/faults/c/.patched: $(C_FAULTY) $(C_FAULTS)
 $(C_FAULTY:%.c=$B/faults/c/%.o): $B/faults/c/%.o: $B/faults/c/.patched
 	$(call say,CC    $@)
 	$Q$(CC) $(CFLAGS_ALL) -c $(@:.o=.c) -o $@
-$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $B/faults/verilated/libsfdut.a $(RAY_LIBS) $B/libspikefield.a
+$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
