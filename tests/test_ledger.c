@@ -300,6 +300,7 @@ START_TEST(cells_and_parts_add_up)
     ck_assert_uint_gt(l->total[g], 0);
   }
   ck_assert_uint_eq(l->total[SF_LEDGER_PAPER], sf_energy_fj(&c));
+  ck_assert_uint_eq(l->total[SF_LEDGER_ANN], sf_energy_ann_fj(&scene.net, 9)); /* not hoisted */
   /* The integer twin has the direction's products once per ray: 3 rays, 9 samples. */
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], (9 * 26880 - 6 * 2048) * (uint64_t)300);
   fx_scene_free(&scene);
