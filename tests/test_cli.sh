@@ -63,6 +63,11 @@ size_of() { wc -c <"$1"; }
 # ---- something good to spoil ----
 
 good sf_scene simple -o d --size 16 --train 3 --test 2
+good sf_data d --png cameras.png
+good sf_data d --json
+usage "missing argument" sf_data
+data "no such folder" sf_data absent
+data "cannot write" sf_data d --png absent/cameras.png
 good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits 4 --stage2 2 --threads 1
 good sf_export tuned.safetensors -o tuned.snn

@@ -138,6 +138,7 @@ static sf_status run(page_audit *a)
   sf_audit_options how = a->opt.audit;
   how.tick = tick, how.user = a;
   SF_TRY(sf_audit_open(&a->audit, &how));
+  sf_dataset_warn(stderr, "energy_audit", &a->audit.data);
   SF_TRY(check_writable(a->opt.html));
   sf_progress_begin(&a->progress, a->opt.quiet);
   const sf_status status = sf_audit_count(&a->audit);

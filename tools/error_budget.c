@@ -50,6 +50,7 @@ static sf_status measure_picture(budget *b)
   SF_TRY(sf_model_load(&b->model, o->model));
   SF_TRY(fx_scene_load(&b->scene, o->scene));
   SF_TRY(sf_dataset_load(&b->data, o->data, o->split, &how));
+  sf_dataset_warn(stderr, "error_budget", &b->data);
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,
                    o->split);

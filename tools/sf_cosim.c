@@ -64,6 +64,7 @@ static sf_status simulate(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
   SF_TRY(sf_lockstep_load(l, &o->run));
+  sf_dataset_warn(stderr, "sf_cosim", &l->data);
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -152,6 +153,7 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
   display d = {.begun = sf_seconds()};
   sf_activity_report r;
   SF_TRY(sf_lockstep_load(l, &o->run));
+  sf_dataset_warn(stderr, "sf_cosim", &l->data);
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);

@@ -183,6 +183,7 @@ static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_
   sf_dataset data;
   sf_fit_rays rays;
   SF_TRY(sf_dataset_load(&data, o->extra.data, "train", &how));
+  sf_dataset_warn(stderr, "sf_export", &data);
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   sf_dataset_free(&data);
   if (status.code != SF_OK) return status;

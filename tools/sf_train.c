@@ -302,6 +302,7 @@ static sf_status evaluate(const sf_model *model, const char *data_path, const sf
   sf_dataset_options options = *how;
   options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
   SF_TRY(sf_dataset_load(&test, data_path, "test", &options));
+  sf_dataset_warn(stderr, "sf_train", &test);
   sf_status status = evaluate_views(model, &test, a, q);
   sf_dataset_free(&test);
   return status;
@@ -437,6 +438,7 @@ static sf_status run(arguments *a, const char *path)
   sf_dataset data;
   const sf_dataset_options how = {.downscale = a->downscale, .scale = (float)a->scale, .limit = a->limit};
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
+  sf_dataset_warn(stderr, "sf_train", &data);
   sf_model start = {0};
   sf_status status = a->train.config.backbone == SF_TENSORF ? take_tensorf_defaults(a, &data) : sf_ok();
   settle(a, &data);

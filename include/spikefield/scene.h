@@ -65,7 +65,8 @@ typedef struct sf_dataset_options {
  * split missing: a warning, total counts those that are there. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
-void sf_dataset_warn(FILE *out, const sf_dataset *data); /* "warning: ..." for each */
+/* "PROGRAM: warning: ..." for each. */
+void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data);
 
 /* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
  * are not needed any more. */

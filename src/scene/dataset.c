@@ -28,9 +28,9 @@ sf_status sf_warn(sf_dataset *data, const char *format, ...)
   return sf_ok();
 }
 
-void sf_dataset_warn(FILE *out, const sf_dataset *data)
+void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data)
 {
-  for (int i = 0; i < data->warnings; i++) fprintf(out, "warning: %s\n", data->warning[i]);
+  for (int i = 0; i < data->warnings; i++) fprintf(out, "%s: warning: %s\n", program, data->warning[i]);
 }
 
 static sf_status check_options(const char *dir, const sf_dataset_options *options)

@@ -5,8 +5,15 @@
 static sf_dataset *one_view(void)
 {
   static uint16_t pixel[4 * 4 * 4];
-  static sf_view view = {
-      .name = "view", .camera = {4, 4, 5, 5, 2, 2, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.5f}}, .image = {4, 4, pixel}};
+  static sf_view view = {.name = "view",
+                         .camera = {.width = 4,
+                                    .height = 4,
+                                    .fx = 5,
+                                    .fy = 5,
+                                    .cx = 2,
+                                    .cy = 2,
+                                    .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.5f}},
+                         .image = {4, 4, pixel}};
   static sf_dataset data = {.path = "data", .view = &view, .count = 1, .scale = 0.8f};
   for (size_t i = 0; i < sizeof pixel / sizeof *pixel; i++) pixel[i] = (uint16_t)(i * 977);
   return &data;

@@ -1,9 +1,8 @@
 /* transforms_*.json beside two small pictures, and the rays of the cameras that were accepted. */
+#include "data_set.h"
 #include "fuzz.h"
 #include "spikefield/io.h"
-#include "spikefield/model.h"
 #include "spikefield/scene.h"
-#include <math.h>
 
 static void put_picture(const char *name, int width, int height)
 {
@@ -29,24 +28,6 @@ static const char *make_data_set(const char *input)
   return data;
 }
 
-static void use_rays(const sf_dataset *data)
-{
-  const sf_config config = sf_config_default();
-  sf_steps steps;
-  FUZZ_EXPECT(sf_steps_make(&steps, &config, 1).code == SF_OK);
-  for (int i = 0; i < data->count; i++) {
-    const sf_camera *camera = &data->view[i].camera;
-    for (int corner = 0; corner < 4; corner++) {
-      float origin[3], direction[3];
-      sf_camera_ray(camera, corner & 1 ? 0.5f : (float)camera->width - 0.5f,
-                    corner & 2 ? 0.5f : (float)camera->height - 0.5f, origin, direction);
-      for (int a = 0; a < 3; a++) FUZZ_EXPECT(isfinite(origin[a]) && isfinite(direction[a]));
-      const sf_lattice lattice = sf_ray_lattice(&steps, origin, direction);
-      FUZZ_EXPECT(lattice.count >= 0 && lattice.count <= config.lattice);
-    }
-  }
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
   static const char *const split[] = {"train", "test"};
@@ -58,7 +39,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
       continue;
     }
     FUZZ_EXPECT(set.count > 0 && set.count <= 16);
-    use_rays(&set);
+    fuzz_use_views(&set);
     sf_dataset_free(&set);
   }
   return 0;

@@ -1,6 +1,7 @@
 /* Writes the first inputs of every fuzzing target: small valid files, made by the writers that the programs use.
  * usage: seeds FOLDER */
 #include "firmware/sf_blob.h"
+#include "data_set.h"
 #include "fuzz.h"
 #include "sim/soc_job.h"
 #include "tests/fx_fixture.h"
@@ -154,8 +155,15 @@ static sf_train_options small_run(void)
 static void put_models(void)
 {
   static uint16_t pixel[2 * 2 * 4];
-  sf_view view = {
-      .name = "view", .camera = {2, 2, 3, 3, 1, 1, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.5f}}, .image = {2, 2, pixel}};
+  sf_view view = {.name = "view",
+                  .camera = {.width = 2,
+                             .height = 2,
+                             .fx = 3,
+                             .fy = 3,
+                             .cx = 1,
+                             .cy = 1,
+                             .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2.5f}},
+                  .image = {2, 2, pixel}};
   const sf_dataset data = {.path = "data", .view = &view, .count = 1, .scale = 0.8f};
   const sf_train_options options = small_run();
   sf_train_stats stats;
@@ -216,8 +224,8 @@ static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t see
 
 static void put_scenes(void)
 {
-  put_scene("small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID}, 1);
-  put_scene("hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY}, 2);
+  put_scene("small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID, {0}}, 1);
+  put_scene("hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY, {0}}, 2);
 }
 
 static void put_manifest(bool is_float)
@@ -261,6 +269,37 @@ static void put_tensors(void)
   cJSON_Delete(metadata);
 }
 
+/* For fuzz_colmap: the number of the table in front. */
+static void put_table(const layout_file *file, int kind)
+{
+  uint8_t bytes[LAYOUT_BYTES + 1] = {(uint8_t)kind};
+  char name[20];
+  memcpy(bytes + 1, file->bytes, file->size);
+  snprintf(name, sizeof name, "table%d", kind);
+  put("colmap", name, bytes, file->size + 1);
+}
+
+static void put_layouts(void)
+{
+  static layout_file file;
+  const layout_rig rig = layout_small_rig();
+  for (int text = 0; text < 2; text++) {
+    layout_cameras(&file, &rig, text), put_table(&file, 3 * text);
+    layout_images(&file, &rig, text), put_table(&file, 3 * text + 1);
+    layout_points(&file, &rig, text), put_table(&file, 3 * text + 2);
+  }
+  for (int single = 0; single < 2; single++) {
+    layout_npy(&file, &rig, single, 2, 9);
+    put("llff", single ? "single.npy" : "double.npy", file.bytes, file.size);
+  }
+  put_text(
+      "dataset", "ngp.json",
+      "{\"fl_x\":5,\"fl_y\":5,\"cx\":2,\"cy\":1.5,\"w\":4,\"h\":3,\"k1\":0.05,\"k2\":-0.01,\"p1\":0.001,\"p2\":0.002,"
+      "\"aabb_scale\":4,\"scale\":0.3,\"offset\":[0.5,0.5,0.5],\"frames\":["
+      "{\"file_path\":\"a.png\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]},"
+      "{\"file_path\":\"a.png\",\"transform_matrix\":[[1,0,0,1],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]}");
+}
+
 int main(int argc, char **argv)
 {
   if (argc != 2) return fprintf(stderr, "usage: seeds FOLDER\n"), 2;
@@ -273,5 +312,6 @@ int main(int argc, char **argv)
   put_tensors();
   put_models();
   put_scenes();
+  put_layouts();
   return 0;
 }
