@@ -151,9 +151,9 @@ module sf_counters (
     else if (d1_row_i) d1_mac_q <= d1_mac_q + n_d1;
     if (wipe && at_layer == sf_op_pkg::C1) c1_bias_q <= 64'd0;
     else if (c1_bias_row_i) c1_bias_q <= c1_bias_q + n_c1;
-    if (wipe) c1_mac_q[at_step] <= 64'd0;
+    if (wipe && at_layer == sf_op_pkg::C1) c1_mac_q[at_step] <= 64'd0;
     else if (c1_row_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
-    if (wipe) c2_sop_q[at_step] <= 64'd0;
+    if (wipe && at_layer == sf_op_pkg::C2) c2_sop_q[at_step] <= 64'd0;
     else if (c2_rows_i != 2'd0)
       c2_sop_q[c2_step_i] <= c2_sop_q[c2_step_i] + (c2_rows_i[1] ? n_c2 << 1 : n_c2);
     if (wipe) begin

@@ -13,7 +13,7 @@ enum { PIECE = 16384, TICK = 1024, PS_PER_US = 1000000 }; /* cycles of one wavef
 
 typedef struct stream {
   sf_dut_sample *sample;
-  int16_t (*f)[SF_FEATURE_MAX];
+  int16_t (*f)[SF_DIR_MAX]; /* [fx_net_inputs] each */
   fx_ray *ray; /* per sample */
   int count, room;
 } stream;
@@ -62,10 +62,9 @@ static sf_status collect(void *user, const fx_ray *ray, bool first, const int16_
   collector *c = user;
   stream *in = c->in;
   if (in->count == in->room && !make_room(in)) return sf_fail(SF_E_MEMORY, "activity: no memory for the samples");
-  if (first) fx_net_direction(c->net, ray->dir, c->base, NULL);
-  fx_net_sample(c->net, f, c->base, out, NULL, NULL);
+  fx_net_next(c->net, ray->dir, first, f, c->base, out, NULL, NULL);
   memset(in->f[in->count], 0, sizeof in->f[0]);
-  memcpy(in->f[in->count], f, (size_t)c->net->layer[FX_D1].n_in * sizeof *f);
+  memcpy(in->f[in->count], f, (size_t)fx_net_inputs(c->net) * sizeof *f);
   in->ray[in->count] = *ray;
   in->sample[in->count++].first = first;
   return sf_ok();
@@ -159,8 +158,7 @@ static sf_status compare(const activity *a, const sf_dut_result *result)
   for (int i = 0; i < a->in.count; i++) {
     fx_trace trace;
     fx_out out;
-    if (a->in.sample[i].first) fx_net_direction(net, a->in.ray[i].dir, base, &expected);
-    fx_net_sample(net, a->in.f[i], base, &out, &trace, &expected);
+    fx_net_next(net, a->in.ray[i].dir, a->in.sample[i].first, a->in.f[i], base, &out, &trace, &expected);
     if (sf_compare_sample(net, &trace, &out, &result[i], NULL, &d)) continue;
     sf_difference_text(&d, text);
     return sf_fail(SF_E_DIFFERENCE, "sample %d of the stream: %s", i, text);

@@ -35,8 +35,8 @@ static void fill(fx_scene *s)
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer *layer = &s->net.layer[l];
     layer->k = 2000;
-    layer->theta = l == FX_D2 || l == FX_C3 ? 0 : 60000;
-    for (int i = 0; i < layer->n_in; i++)
+    layer->theta = l == FX_D2 || l == FX_C3 || !layer->n_out ? 0 : 60000;
+    for (int i = 0; i < fx_layer_rows(layer); i++)
       for (int o = 0; o < layer->n_out; o++)
         layer->w[i * SF_LANES + o] = (int8_t)pick(10 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), 127);
   }
@@ -45,24 +45,24 @@ static void fill(fx_scene *s)
   s->net.exp_in = (fx_scale){50000, 15, 4096}, s->net.sigmoid_in = (fx_scale){50000, 13, 0};
 }
 
-static double rate_of(const fx_block *b, int layer)
+static double rate_of(const fx_block *b, int layer, int steps)
 {
   long spikes = 0;
-  for (int t = 0; t < RIG_STEPS; t++)
+  for (int t = 0; t < steps; t++)
     for (int i = 0; i < b->n; i++)
       spikes += __builtin_popcountll(b->spikes[layer][t][i][0]) + __builtin_popcountll(b->spikes[layer][t][i][1]);
-  return (double)spikes / (RIG_STEPS * b->n * SF_LANES);
+  return (double)spikes / (steps * b->n * SF_LANES);
 }
 
 static void choose_thresholds(rig *r, double rate)
 {
   static const int spiking[] = {FX_D1, FX_C1, FX_C2};
-  for (int l = 0; l < FX_SPIKING; l++) {
+  for (int l = fx_net_decodes(&r->scene.net); l < FX_SPIKING; l++) {
     int32_t low = 1, high = (1 << 23) - 1, *theta = &r->scene.net.layer[spiking[l]].theta;
     while (high - low > 1) {
       *theta = low + (high - low) / 2;
       r->core->kernels->nets(r->core, r->block, r->scratch);
-      if (rate_of(r->block, l) > rate)
+      if (rate_of(r->block, l, r->scene.net.steps) > rate)
         low = *theta;
       else
         high = *theta;
@@ -93,6 +93,31 @@ sf_status rig_open(rig *r, const char *kernels, double rate)
     fx_net_direction(&r->scene.net, dir, r->base[i], NULL);
     r->block->base[i] = r->base[i];
   }
+  choose_thresholds(r, rate);
+  return sf_ok();
+}
+
+sf_status rig_open_decoder(rig *r, int inputs, int steps, double rate)
+{
+  *r = (rig){.block = sf_aligned_alloc(sizeof *r->block), .scratch = sf_aligned_alloc(sizeof *r->scratch)};
+  const int in[SF_LAYERS] = {0, 0, inputs, 128, 128}, out[SF_LAYERS] = {0, 0, 128, 128, 3};
+  size_t rows = 0;
+  for (int l = 0; l < SF_LAYERS; l++) {
+    r->scene.net.layer[l] = (fx_layer){.n_in = in[l], .n_out = out[l], .bias = l >= FX_C1};
+    rows += (size_t)fx_layer_rows(&r->scene.net.layer[l]);
+  }
+  int8_t *w = r->scene.owner = calloc(rows, SF_LANES);
+  if (!w) return sf_fail(SF_E_MEMORY, "bench: no memory for %zu rows of weights", rows);
+  for (int l = 0; l < SF_LAYERS; l++) {
+    r->scene.net.layer[l].w = w;
+    w += (size_t)fx_layer_rows(&r->scene.net.layer[l]) * SF_LANES;
+  }
+  fill(&r->scene);
+  r->scene.net.steps = steps;
+  SF_TRY(fx_core_open(&r->core, &r->scene, NULL));
+  r->block->n = FX_BLOCK;
+  for (int i = 0; i < FX_BLOCK; i++)
+    for (int j = 0; j < inputs; j++) r->block->constant[i][j] = (int16_t)pick(40, (uint64_t)(i * SF_DIR_MAX + j), 1024);
   choose_thresholds(r, rate);
   return sf_ok();
 }

@@ -17,6 +17,8 @@ typedef struct rig {
 
 /* rate: spikes per neuron and step. kernels: as fx_core_open. */
 sf_status rig_open(rig *r, const char *kernels, double rate);
+/* The same of a decoder with biases: random inputs in block->constant, no grid, no rays. */
+sf_status rig_open_decoder(rig *r, int inputs, int steps, double rate);
 void rig_close(rig *r);
 void rig_random_positions(fx_block *b, uint64_t stream);
 #endif

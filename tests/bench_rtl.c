@@ -49,6 +49,42 @@ static sf_status measure(double rate, double seconds, figures *f)
   return status;
 }
 
+/* Cycles per sample of TensoRF's decoder, from the accelerator's own counter. */
+static sf_status measure_decoder(int inputs, int steps, double rate, double *cycles_per_sample)
+{
+  enum { N = 4 * FX_BLOCK };
+  static rig r;
+  static sf_dut_result result[N];
+  sf_dut_sample sample[N];
+  fx_counts counts;
+  uint64_t cycles;
+  SF_TRY(rig_open_decoder(&r, inputs, steps, rate));
+  for (int i = 0; i < N; i++) sample[i] = (sf_dut_sample){.f = r.block->constant[i % FX_BLOCK]};
+  sf_dut *dut;
+  sf_status status = sf_dut_open(&dut, &r.scene, &(sf_dut_options){.seed = 1});
+  if (!status.code) status = sf_dut_run(dut, sample, N, result);
+  if (!status.code) status = sf_dut_counts(dut, &counts, &cycles, NULL, NULL);
+  if (!status.code) *cycles_per_sample = (double)cycles / N;
+  sf_dut_close(dut);
+  rig_close(&r);
+  return status;
+}
+
+/* naive: every product dense, one row a cycle, C1 once. */
+static sf_status bench_decoders(cJSON *json)
+{
+  static const int inputs[] = {150, 30}, percent[] = {10, 30};
+  for (int i = 0; i < 8; i++) {
+    const int n = inputs[i / 4], steps = 2 + i / 2 % 2, rate = percent[i % 2];
+    char name[64];
+    double cycles;
+    SF_TRY(measure_decoder(n, steps, rate / 100.0, &cycles));
+    snprintf(name, sizeof name, "rtl.decoder%d.cycles_per_sample.t%d.f%d", n, steps, rate);
+    put(json, name, cycles, "cycles", NAN, n + 2 * SF_LANES);
+  }
+  return sf_ok();
+}
+
 sf_status bench_rtl(cJSON *json)
 {
   figures low, high;
@@ -59,5 +95,5 @@ sf_status bench_rtl(cJSON *json)
   put(json, "rtl.cycles_per_sample.t3", low.cycles_per_sample, "cycles", NAN, DENSE_CYCLES);
   put(json, "rtl.cycles_per_sample.t3.f30", high.cycles_per_sample, "cycles", NAN, DENSE_CYCLES);
   put(json, "rtl.utilisation", high.utilisation, "of the busiest layer's cycles", NAN, NAN);
-  return sf_ok();
+  return bench_decoders(json);
 }

@@ -45,8 +45,7 @@ typedef struct tap {
 static sf_status take(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   tap *t = user;
-  if (first) fx_net_direction(t->net, ray->dir, t->base, NULL);
-  fx_net_sample(t->net, f, t->base, out, &t->trace, NULL);
+  fx_net_next(t->net, ray->dir, first, f, t->base, out, &t->trace, NULL);
   if (t->to->count == t->to->room) {
     const size_t room = t->to->room ? 2 * t->to->room : 4096;
     sf_cycle_sample *larger = realloc(t->to->at, room * sizeof *larger);

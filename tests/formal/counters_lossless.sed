@@ -13,7 +13,7 @@ s/^    output reg  (.*counter_o)/    input  wire [ 8:0] watched_i,\n    output w
   /^  assign hold_o/ {
     x
     s/place_q/watched_i/g
-    s/(event_w|at_layer|at_step|at_narrow|at_neurons|integrating|neurons|updates|state_bytes|mac|add|global_value|place_value)\b/w_\1/g
+    s/(event_w|at_layer|at_step|at_narrow|at_neurons|integrating|neurons|updates|state_bytes|mac|add|bias_c2|bias_c3|biases|global_value|place_value)\b/w_\1/g
     s/(d1_|c1_)w_(mac_q)/\1\2/g
     s/$/\n  assign value_o = w_place_value;\n  assign window_o = window_q;\n/
     p

@@ -9,6 +9,7 @@ module counters_lossless (
     input wire [39:0] n_out_i,
     input wire        d1_row_i,
     input wire        c1_row_i,
+    input wire        c1_bias_row_i,
     input wire [ 2:0] c1_step_i,
     input wire [ 1:0] c2_rows_i,
     input wire [ 2:0] c2_step_i,
@@ -31,6 +32,7 @@ module counters_lossless (
     input wire [ 8:0] index_i
 );
   (* anyconst *) wire [8:0] watched;
+  (* anyconst *) wire [1:0] bias;
   wire [2:0] kind = watched[8:6];
   wire [2:0] layer = watched[5:3];
   wire [2:0] step = watched[2:0];
@@ -44,7 +46,9 @@ module counters_lossless (
       .rst_ni         (rst_n_q),
       .n_out_i        (n_out_i),
       .d1_row_i       (d1_row_i),
+      .bias_i         (bias),
       .c1_row_i       (c1_row_i),
+      .c1_bias_row_i  (c1_bias_row_i),
       .c1_step_i      (c1_step_i),
       .c2_rows_i      (c2_rows_i),
       .c2_step_i      (c2_step_i),
@@ -91,7 +95,9 @@ module counters_lossless (
   wire [3:0] read = (first_here[0] ? n : 4'd0) + (first_here[1] ? n : 4'd0);
   wire [3:0] update = neurons ? (fires ? n : 4'd0) : {3'd0, updates};
   wire [3:0] bytes = neurons ? update + update + update : update << 2;
-  wire [4:0] works = {|c3_fired_i, |c2_rows_i, c1_row_i, |d2_fired_i, d1_row_i};
+  wire [3:0] biases = layer == 3'd2 ? (step == 3'd0 && c1_bias_row_i ? n : 4'd0) : layer == 3'd3 && bias[0] ? update
+                    : layer == 3'd4 && step == 3'd0 && bias[1] ? update : 4'd0;
+  wire [4:0] works = {|c3_fired_i, |c2_rows_i, c1_row_i || c1_bias_row_i, |d2_fired_i, d1_row_i};
   reg walking_q = 1'b0;
   reg [3:0] share;
   always @* begin
@@ -114,7 +120,7 @@ module counters_lossless (
         3'd1: share = neurons ? rows : sop;
         3'd2: share = neurons && fires ? spikes_count_i[3:0] : 4'd0;
         3'd3: share = update;
-        3'd4: share = neurons ? mac + rows : read;
+        3'd4: share = biases + (neurons ? mac + rows : read);
         3'd5: share = step == 3'd0 ? 4'd0 : bytes;
         3'd6: share = bytes;
         default: share = neurons ? 4'd0 : update;
@@ -151,7 +157,7 @@ module counters_lossless (
 
   wire [8:0] wiped_at = {3'd7, layer, step};
   wire passed = walking_q && place_q > watched;
-  wire events = d1_row_i || c1_row_i || c2_rows_i != 2'd0 || d2_fired_i != 16'd0 || c3_fired_i != 16'd0 || ray_i
+  wire events = d1_row_i || c1_row_i || c1_bias_row_i || c2_rows_i != 2'd0 || d2_fired_i != 16'd0 || c3_fired_i != 16'd0 || ray_i
               || spikes_valid_i != 3'd0 || update_i || sample_i || stall_out_i;
   always @* begin
     assume (!quiet_i || !events);   // sf_core, sf_readout: idle

@@ -13,12 +13,12 @@ module stream_in_packets (
     input wire        tlast_i,
     input wire        done_i,
     input wire [ 5:0] n_feature,
-    input wire [ 4:0] n_dir,
+    input wire [ 7:0] n_dir,
     input wire [ 4:0] feature_index,
-    input wire [ 3:0] dir_index
+    input wire [ 7:0] dir_index
 );
-  reg [19:0] constant_q;
-  wire [19:0] constant = {n_feature, n_dir, feature_index, dir_index};
+  reg [26:0] constant_q;
+  wire [26:0] constant = {n_feature, n_dir, feature_index, dir_index};
   always @(posedge clk_i) constant_q <= constant;
   reg rst_n_q = 1'b0;
   always @(posedge clk_i) rst_n_q <= 1'b1;
@@ -50,34 +50,34 @@ module stream_in_packets (
   );
 
   wire [1:0] peek_full_q, peek_first_q;
-  wire [2:0] peek_beat_q;
+  wire [5:0] peek_beat_q;
   wire peek_write_q, peek_read_q, peek_drop_q, peek_begun_q, peek_in_dir_q, peek_packet_first_q, peek_have_dir_q;
 
   // The specification: place in the packet, its length, samples inside.
-  reg [3:0] place_q = 4'd0;
+  reg [5:0] place_q = 6'd0;
   reg [1:0] inside_q = 2'd0;
   reg bad_q = 1'b0, had_one_q = 1'b0, first_packet_q = 1'b0;
   reg oldest_q, newest_q;  // their first flags
   reg waits_q = 1'b0, was_first_q;
   reg [11:0] was_feature_q, was_dir_q;
-  wire of_first = place_q == 4'd0 ? tuser_i : first_packet_q;
-  wire [3:0] dir_beats = of_first ? {1'b0, n_dir[4:2]} + {3'd0, |n_dir[1:0]} : 4'd0;
-  wire [3:0] beats = dir_beats + n_feature[5:2] + {3'd0, |n_feature[1:0]};
+  wire of_first = place_q == 6'd0 ? tuser_i : first_packet_q;
+  wire [5:0] dir_beats = of_first ? n_dir[7:2] + {5'd0, |n_dir[1:0]} : 6'd0;
+  wire [5:0] beats = dir_beats + {2'd0, n_feature[5:2]} + {5'd0, |n_feature[1:0]};
   wire take = tvalid_i && tready && !bad_q;
-  wire end_of_packet = place_q == beats - 4'd1;
+  wire end_of_packet = place_q == beats - 6'd1;
   wire wide = !(&tdata_i[15:11] || !(|tdata_i[15:11])) || !(&tdata_i[31:27] || !(|tdata_i[31:27]))
       || !(&tdata_i[47:43] || !(|tdata_i[47:43])) || !(&tdata_i[63:59] || !(|tdata_i[63:59]));
-  wire wrong = tlast_i != end_of_packet || (place_q == 4'd0 && !tuser_i && !had_one_q);
+  wire wrong = tlast_i != end_of_packet || (place_q == 6'd0 && !tuser_i && (!had_one_q || n_feature == 6'd0));
   wire good = take && end_of_packet && !wrong && !wide;
   always @(posedge clk_i) begin
     if (clear_i) begin
-      place_q <= 4'd0;
+      place_q <= 6'd0;
       inside_q <= 2'd0;
       bad_q <= 1'b0;
       had_one_q <= 1'b0;
     end else if (rst_n_q) begin
       if (take) begin
-        place_q <= end_of_packet ? 4'd0 : place_q + 4'd1;
+        place_q <= end_of_packet ? 6'd0 : place_q + 6'd1;
         first_packet_q <= of_first;
         bad_q <= wrong || wide;
       end
@@ -96,10 +96,10 @@ module stream_in_packets (
   end
 
   // Where the unit's own state stands to it.
-  wire [3:0] begun_dir_beats = first_packet_q ? {1'b0, n_dir[4:2]} + {3'd0, |n_dir[1:0]} : 4'd0;
-  wire [3:0] begun_place = {1'b0, peek_beat_q} + (peek_in_dir_q ? 4'd0 : begun_dir_beats);
+  wire [5:0] begun_dir_beats = first_packet_q ? n_dir[7:2] + {5'd0, |n_dir[1:0]} : 6'd0;
+  wire [5:0] begun_place = peek_beat_q + (peek_in_dir_q ? 6'd0 : begun_dir_beats);
   always @* begin
-    assume (n_feature >= 6'd1 && n_feature <= 6'd32 && n_dir <= 5'd16);
+    assume (n_feature == 6'd0 ? n_dir >= 8'd1 && n_dir <= 8'd160 : n_feature <= 6'd32 && n_dir <= 8'd160);
     assume (!done_i || valid);
     assume (!rst_n_q || constant == constant_q);  // any, but always the same
     if (rst_n_q) begin
@@ -113,7 +113,7 @@ module stream_in_packets (
       discards_after_an_error : assert (!bad_q || tready);
       accepts_when_it_can : assert (!(enable_i && inside_q != 2'd2) || tready);
       nothing_while_disabled : assert (bad_q || enable_i || !tready);
-      empty_means_nothing : assert (!empty || (inside_q == 2'd0 && place_q == 4'd0));
+      empty_means_nothing : assert (!empty || (inside_q == 2'd0 && place_q == 6'd0));
 
       invariant_drop : assert (peek_drop_q == bad_q && peek_have_dir_q == had_one_q);
       invariant_full : assert ({1'b0, peek_full_q[0]} + {1'b0, peek_full_q[1]} == inside_q);
@@ -121,10 +121,10 @@ module stream_in_packets (
                                                  : peek_write_q == peek_read_q);
       invariant_oldest : assert (inside_q == 2'd0 || peek_first_q[peek_read_q] == oldest_q);
       invariant_newest : assert (inside_q == 2'd0 || peek_first_q[!peek_write_q] == newest_q);
-      invariant_begun : assert (peek_begun_q == (place_q != 4'd0));
-      invariant_beat : assert (peek_begun_q || peek_beat_q == 3'd0 );
+      invariant_begun : assert (peek_begun_q == (place_q != 6'd0));
+      invariant_beat : assert (peek_begun_q || peek_beat_q == 6'd0);
       invariant_place : assert (!peek_begun_q || (begun_place == place_q && peek_packet_first_q == first_packet_q
-                                                  && place_q < begun_dir_beats + n_feature[5:2] + {3'd0, |n_feature[1:0]}));
+                                                  && (bad_q || place_q < begun_dir_beats + {2'd0, n_feature[5:2]} + {5'd0, |n_feature[1:0]})));
       invariant_dir : assert (!peek_begun_q || peek_in_dir_q == (place_q < begun_dir_beats));
     end
   end

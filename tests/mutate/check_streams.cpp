@@ -51,7 +51,7 @@ static void reset()
 #ifdef UNIT_sf_stream_in
 struct packet {
   bool first = false;
-  int16_t dir[16] = {0}, feature[32] = {0};
+  int16_t dir[160] = {0}, feature[32] = {0};
 };
 
 /* The unit's rules, a packet at a time. */
@@ -65,6 +65,7 @@ struct model {
   int beats(bool first) const { return (first ? (n_dir + 3) / 4 : 0) + (n_feature + 3) / 4; }
   bool is_first(bool user) const { return beat ? coming.first : user; }
   bool last(bool user) const { return beat == beats(is_first(user)) - 1; }
+  bool needs_direction() const { return !had_one || n_feature == 0; }
   void clear() { beat = 0, bad = had_one = false, inside.clear(); }
   void take(uint64_t data, bool user, bool wrong)
   {
@@ -98,6 +99,7 @@ static void run(int cycles, int wrong_percent)
 {
   model m;
   m.n_feature = percent(20) ? 32 : (int)draw(1, 32), m.n_dir = percent(20) ? 16 : (int)draw(0, 16);
+  if (percent(30)) m.n_feature = 0, m.n_dir = percent(20) ? 160 : (int)draw(1, 160); /* every packet has its direction */
   const int busy = (int)draw(20, 100), drain = (int)draw(5, 100), on = percent(50) ? 100 : 80;
   bool offered = false, user = false, last = false;
   uint64_t data = 0;
@@ -105,7 +107,7 @@ static void run(int cycles, int wrong_percent)
     const bool enable = percent(on), clear = percent(m.bad ? 20 : 1);
     if (!offered && percent(busy)) {
       offered = true;
-      user = (m.beat == 0 && (!m.had_one || percent(30))) != percent(wrong_percent);
+      user = (m.beat == 0 && (m.needs_direction() || percent(30))) != percent(wrong_percent);
       last = m.last(user) != percent(wrong_percent);
       data = 0;
       for (int i = 0; i < 4; i++) data |= value(wrong_percent) << 16 * i;
@@ -114,7 +116,7 @@ static void run(int cycles, int wrong_percent)
     top.n_feature_i = m.n_feature, top.n_dir_i = m.n_dir;
     top.enable_i = enable, top.clear_i = clear, top.done_i = done;
     top.tvalid_i = offered, top.tdata_i = data, top.tuser_i = user, top.tlast_i = last;
-    top.feature_index_i = draw(0, 31), top.dir_index_i = draw(0, 15);
+    top.feature_index_i = draw(0, 31), top.dir_index_i = draw(0, m.n_feature ? 15 : 159);
     top.eval();
     const bool ready = m.ready(enable), taken = offered && ready && !m.bad;
     bool wide = false;
@@ -122,7 +124,7 @@ static void run(int cycles, int wrong_percent)
       const int16_t v = (int16_t)(data >> 16 * i);
       wide |= v < -2048 || v > 2047;
     }
-    const bool framing = last != m.last(user) || (m.beat == 0 && !user && !m.had_one);
+    const bool framing = last != m.last(user) || (m.beat == 0 && !user && m.needs_direction());
     expect(top.tready_o, ready, "tready", cycle);
     expect(top.error_packet_o, taken && framing, "error_packet", cycle);
     expect(top.error_value_o, taken && wide, "error_value", cycle);
