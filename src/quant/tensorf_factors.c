@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, BASIS_FRAC = 15, PHASE_FRAC = 16 };
+enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, BASIS_FRAC = 15, PHASE_FRAC = 16, ACTIVATION_FRAC = 20 };
 static const double UNIT_STEP = 0.85, WEIGHT_STOP = 1e-4, TWO_PI = 6.283185307179586;
 
 typedef struct component {
@@ -116,10 +116,13 @@ static int64_t round_density(const density *d, double unit)
   return clipped;
 }
 
-static sf_status set_density_scale(const density *d, double unit)
+static sf_status set_density_scales(const density *d, double unit)
 {
-  const double one = 1 << SF_LOG_FRAC, bias = nearbyint(d->model->config.tensorf.shift * one);
-  if (sf_quant_scale(ldexp(unit, -PRODUCT_FRAC) * one, SHIFT_MAX, (int)bias, &d->scene->tensorf.density_in))
+  const sf_tensorf *from = &d->model->config.tensorf;
+  const double one = 1 << SF_LOG_FRAC, bias = nearbyint(from->shift * one);
+  const double density = from->distance_scale / d->scene->to_box_scale; /* per box edge and activation */
+  if (sf_quant_scale(ldexp(unit, -PRODUCT_FRAC) * one, SHIFT_MAX, (int)bias, &d->scene->tensorf.density_in) &&
+      sf_quant_scale(ldexp(density, SF_SIGMA_FRAC - ACTIVATION_FRAC), SHIFT_MAX, 0, &d->scene->tensorf.sigma_out))
     return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': densities are too large for the accelerator", d->name,
                  d->model->param[SF_V_DENSITY_PLANE].name);
@@ -150,13 +153,13 @@ static sf_status quantise_density(density *d, sf_quant_report *report)
   double unit = widest, best = widest, best_error = INFINITY;
   for (int i = 0; i < UNITS; i++, unit *= UNIT_STEP) {
     round_density(d, unit);
-    SF_TRY(set_density_scale(d, unit));
+    SF_TRY(set_density_scales(d, unit));
     const double error = opacity_error(d);
     if (error >= best_error) break; /* clipping costs more than finer steps gain */
     best = unit, best_error = error;
   }
   report->grid_clipped += round_density(d, best);
-  return set_density_scale(d, best);
+  return set_density_scales(d, best);
 }
 
 /* ---- appearance ---- */
