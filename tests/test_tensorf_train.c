@@ -230,6 +230,9 @@ START_TEST(resume_is_the_same_run)
   b = start(&data, &o, in("run.safetensors"));
   steps(b, 19);
   same_model(a, b);
+  const sf_train_options other = small_run();
+  sf_trainer *none;
+  ck_bad(sf_trainer_create(&none, &data, &other, in("run.safetensors")), SF_E_RANGE, "run.safetensors", "tensorf");
   sf_trainer_free(a);
   sf_trainer_free(b);
   sf_dataset_free(&data);

@@ -92,6 +92,9 @@ static sf_status create(sf_trainer *t, const char *resume)
     SF_TRY(sf_model_load(&t->model, resume));
   else
     SF_TRY(t->options.start ? copy_model(&t->model, t->options.start) : sf_model_create(&t->model, &t->options.config));
+  if (resume && t->model.config.backbone != t->options.config.backbone)
+    return sf_fail(SF_E_RANGE, "%s: the checkpoint is of the other backbone, %s", resume,
+                   t->model.config.backbone == SF_TENSORF ? "tensorf" : "ingp");
   if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);
