@@ -1,0 +1,252 @@
+/* The float model on file: metadata and tensors, checked one by one. */
+#include "snn/model.h"
+#include "spikefield/io.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static sf_status meta_number(const sf_tensors *set, const char *key, double *value)
+{
+  const char *text = sf_tensors_meta(set, key);
+  if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' is missing", set->path, key);
+  char *end;
+  *value = strtod(text, &end);
+  if (end == text || *end || !isfinite(*value))
+    return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' is not a number: '%.40s'", set->path, key, text);
+  return sf_ok();
+}
+
+static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value)
+{
+  double number = 0;
+  SF_TRY(meta_number(set, key, &number));
+  if (number != floor(number) || fabs(number) > 1e9)
+    return sf_fail(SF_E_FORMAT, "%s: metadata key '%s' = %g is not a small integer", set->path, key, number);
+  *value = (int32_t)number;
+  return sf_ok();
+}
+
+/* A number of the configuration by its metadata key, one table for both directions. */
+typedef struct config_field {
+  const char *key;
+  int32_t *integer;
+  float *number;
+} config_field;
+
+enum { CONFIG_FIELDS = 14, TENSORF_FIELDS = 24 };
+
+static void config_table(sf_config *c, config_field f[CONFIG_FIELDS])
+{
+  const config_field table[CONFIG_FIELDS] = {{"net", .integer = &c->net},
+                                             {"mode", .integer = &c->mode},
+                                             {"steps", .integer = &c->steps},
+                                             {"levels", .integer = &c->levels},
+                                             {"log2_hash", .integer = &c->log2_hash},
+                                             {"base_res", .integer = &c->base_res},
+                                             {"finest_res", .integer = &c->finest_res},
+                                             {"hidden", .integer = &c->hidden},
+                                             {"lattice", .integer = &c->lattice},
+                                             {"occ_res", .integer = &c->occ_res},
+                                             {"theta_d1", .number = &c->theta[0]},
+                                             {"theta_c1", .number = &c->theta[1]},
+                                             {"theta_c2", .number = &c->theta[2]},
+                                             {"scale", .number = &c->scale}};
+  memcpy(f, table, sizeof table);
+}
+
+static void tensorf_table(sf_tensorf *t, config_field f[TENSORF_FIELDS])
+{
+  const config_field table[TENSORF_FIELDS] = {{"box_min_x", .number = &t->box[0][0]},
+                                              {"box_min_y", .number = &t->box[0][1]},
+                                              {"box_min_z", .number = &t->box[0][2]},
+                                              {"box_max_x", .number = &t->box[1][0]},
+                                              {"box_max_y", .number = &t->box[1][1]},
+                                              {"box_max_z", .number = &t->box[1][2]},
+                                              {"resolution_x", .integer = &t->resolution[0]},
+                                              {"resolution_y", .integer = &t->resolution[1]},
+                                              {"resolution_z", .integer = &t->resolution[2]},
+                                              {"density_0", .integer = &t->density[0]},
+                                              {"density_1", .integer = &t->density[1]},
+                                              {"density_2", .integer = &t->density[2]},
+                                              {"appearance_0", .integer = &t->appearance[0]},
+                                              {"appearance_1", .integer = &t->appearance[1]},
+                                              {"appearance_2", .integer = &t->appearance[2]},
+                                              {"features", .integer = &t->features},
+                                              {"feature_freqs", .integer = &t->feature_freqs},
+                                              {"view_freqs", .integer = &t->view_freqs},
+                                              {"activation", .integer = &t->activation},
+                                              {"density_shift", .number = &t->shift},
+                                              {"distance_scale", .number = &t->distance_scale},
+                                              {"step_ratio", .number = &t->step_ratio},
+                                              {"near", .number = &t->near},
+                                              {"far", .number = &t->far}};
+  memcpy(f, table, sizeof table);
+}
+
+static sf_status load_fields(const sf_tensors *set, const config_field *f, int count)
+{
+  for (int i = 0; i < count; i++) {
+    double number;
+    if (f[i].integer)
+      SF_TRY(meta_int(set, f[i].key, f[i].integer));
+    else {
+      SF_TRY(meta_number(set, f[i].key, &number));
+      *f[i].number = (float)number;
+    }
+  }
+  return sf_ok();
+}
+
+static sf_status load_config(const sf_tensors *set, sf_config *c)
+{
+  const char *format = sf_tensors_meta(set, "format"), *version = sf_tensors_meta(set, "version");
+  if (!format || strcmp(format, "spikefield-model"))
+    return sf_fail(SF_E_FORMAT, "%s: not a spikefield model (metadata format is '%.40s')", set->path,
+                   format ? format : "absent");
+  if (!version || strcmp(version, "1"))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads version 1", set->path,
+                   version ? version : "absent");
+  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
+  config_table(c, field);
+  SF_TRY(load_fields(set, field, CONFIG_FIELDS));
+  if (sf_tensors_meta(set, "backbone")) SF_TRY(meta_int(set, "backbone", &c->backbone));
+  if (c->backbone == SF_TENSORF) {
+    tensorf_table(&c->tensorf, more);
+    SF_TRY(load_fields(set, more, TENSORF_FIELDS));
+    SF_TRY(meta_int(set, "ndc", &c->tensorf.ndc));
+  }
+  c->bound = 1;
+  double number;
+  if (sf_tensors_meta(set, "bound")) SF_TRY(meta_int(set, "bound", &c->bound));
+  if (sf_tensors_meta(set, "dt_gamma")) {
+    SF_TRY(meta_number(set, "dt_gamma", &number));
+    c->dt_gamma = (float)number;
+  }
+  sf_status status = sf_config_check(c);
+  return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
+}
+
+static void put_number(cJSON *meta, const char *key, double value)
+{
+  char text[40];
+  snprintf(text, sizeof text, "%.17g", value);
+  cJSON_AddStringToObject(meta, key, text);
+}
+
+static void put_fields(cJSON *meta, const config_field *f, int count)
+{
+  for (int i = 0; i < count; i++) put_number(meta, f[i].key, f[i].integer ? *f[i].integer : (double)*f[i].number);
+}
+
+void sf_model_describe(const sf_model *m, cJSON *meta)
+{
+  sf_config c = m->config;
+  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
+  cJSON_AddStringToObject(meta, "format", "spikefield-model");
+  cJSON_AddStringToObject(meta, "version", "1");
+  config_table(&c, field);
+  put_fields(meta, field, CONFIG_FIELDS);
+  put_number(meta, "bound", c.bound);
+  put_number(meta, "dt_gamma", c.dt_gamma);
+  put_number(meta, "t_star", m->t_star);
+  put_number(meta, "t_r", m->t_r);
+  put_number(meta, "weight_bits", m->scales.weight_bits);
+  if (c.backbone != SF_TENSORF) return;
+  put_number(meta, "backbone", c.backbone);
+  put_number(meta, "ndc", c.tensorf.ndc);
+  tensorf_table(&c.tensorf, more);
+  put_fields(meta, more, TENSORF_FIELDS);
+}
+
+int sf_model_tensors(const sf_model *m, sf_tensor *list)
+{
+  int n = 0;
+  for (; n < m->params; n++) {
+    list[n] = (sf_tensor){.type = SF_F32, .dims = m->param[n].dims, .data = m->value + m->param[n].offset};
+    snprintf(list[n].name, sizeof list[n].name, "%s", m->param[n].name);
+    memcpy(list[n].shape, m->param[n].shape, sizeof m->param[n].shape);
+  }
+  list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {(int64_t)(sf_config_cells(&m->config) / 8)}, m->occupancy};
+  if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
+  return n;
+}
+
+sf_status sf_model_save(const sf_model *m, const char *path)
+{
+  sf_tensor list[SF_PARAMS_MAX + 2];
+  const int n = sf_model_tensors(m, list);
+  cJSON *meta = cJSON_CreateObject();
+  if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
+  sf_model_describe(m, meta);
+  sf_status status = sf_tensors_save(list, n, meta, path);
+  cJSON_Delete(meta);
+  return status;
+}
+
+/* Only a fine-tuned model has any. */
+static sf_status load_scales(sf_scales *s, const sf_tensors *set)
+{
+  const int64_t shape[1] = {SF_SCALES};
+  const sf_tensor *t;
+  if (!sf_tensors_meta(set, "weight_bits")) return sf_ok();
+  SF_TRY(meta_int(set, "weight_bits", &s->weight_bits));
+  if (s->weight_bits == 0) return sf_ok();
+  if (s->weight_bits < 2 || s->weight_bits > SF_WEIGHT_BITS)
+    return sf_fail(SF_E_RANGE, "%s: metadata key 'weight_bits' is %d, expected 2..%d", set->path, s->weight_bits,
+                   SF_WEIGHT_BITS);
+  SF_TRY(sf_tensors_get(set, "scales", SF_F32, 1, shape, &t));
+  memcpy(&s->lsb, t->data, sizeof s->lsb);
+  for (int i = 0; i < SF_SCALES; i++) {
+    const float lsb = ((const float *)t->data)[i];
+    if (!(lsb > 1e-30f && lsb < 1e30f))
+      return sf_fail(SF_E_RANGE, "%s: tensor 'scales': element %d is %g, expected a positive number", set->path, i,
+                     (double)lsb);
+  }
+  return sf_ok();
+}
+
+/* All tensors are found before memory is asked for: a few words of metadata can name a grid of gigabytes. */
+static sf_status load_tensors(sf_model *m, const sf_tensors *set)
+{
+  const int64_t bytes = (int64_t)(sf_config_cells(&m->config) / 8);
+  const sf_tensor *part[SF_PARAMS_MAX], *occupancy;
+  for (int i = 0; i < m->params; i++) {
+    const sf_param *p = &m->param[i];
+    SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &part[i]));
+    SF_TRY(sf_tensor_finite(set->path, part[i]));
+  }
+  SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &bytes, &occupancy));
+  SF_TRY(sf_model_allocate(m));
+  for (int i = 0; i < m->params; i++)
+    memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
+  memcpy(m->occupancy, occupancy->data, (size_t)bytes);
+  return sf_ok();
+}
+
+static sf_status load_budget(sf_model *m, const sf_tensors *set)
+{
+  double t_star;
+  SF_TRY(meta_number(set, "t_star", &t_star));
+  SF_TRY(meta_int(set, "t_r", &m->t_r));
+  if (m->t_r < 1 || m->t_r > m->config.steps || t_star < 1 || t_star > m->config.steps)
+    return sf_fail(SF_E_RANGE, "%s: t_r = %d, t_star = %g outside 1..T = %d", set->path, m->t_r, t_star,
+                   m->config.steps);
+  m->t_star = (float)t_star;
+  return load_scales(&m->scales, set);
+}
+
+sf_status sf_model_load(sf_model *m, const char *path)
+{
+  memset(m, 0, sizeof *m);
+  sf_tensors set;
+  sf_config config = {0};
+  SF_TRY(sf_tensors_load(&set, path));
+  sf_status status = load_config(&set, &config);
+  if (!status.code) status = sf_model_lay_out(m, &config);
+  if (!status.code) status = load_tensors(m, &set);
+  if (!status.code) status = load_budget(m, &set);
+  if (status.code) sf_model_free(m);
+  sf_tensors_free(&set);
+  return status;
+}
