@@ -13,7 +13,10 @@ enum { WIDTH = 16, HEIGHT = 12, VIEWS = 17 };
 
 static void put(const char *name, const layout_file *file)
 {
-  ck_good(sf_write_file(in(name), file->bytes, file->size));
+  FILE *f = fopen(in(name), "wb");
+  ck_assert_ptr_nonnull(f);
+  ck_assert_uint_eq(fwrite(file->bytes, 1, file->size, f), file->size);
+  ck_assert_int_eq(fclose(f), 0);
 }
 
 static void put_picture(const char *name, int width, int height, int value, int alpha)
@@ -687,6 +690,38 @@ START_TEST(the_survey_names_what_looks_wrong)
 }
 END_TEST
 
+/* From above and from the side: each camera's own point has its colour, the box's edges are grey. */
+START_TEST(the_plan_shows_every_camera)
+{
+  enum { SIZE = 200 };
+  const layout_rig rig = orbit();
+  sf_dataset d, held;
+  sf_image image;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  load(&d, "train"), load(&held, "test");
+  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  ck_assert(image.width == 2 * SIZE && image.height == SIZE);
+  double most = 0;
+  for (int v = 0; v < d.count; v++)
+    for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)d.view[v].camera.to_world[4 * i + 3]));
+  for (int v = 0; v < held.count; v++)
+    for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)held.view[v].camera.to_world[4 * i + 3]));
+  for (int v = 0; v < held.count; v++) { /* drawn last */
+    const float *m = held.view[v].camera.to_world;
+    const double half = 0.5 * SIZE, reach = 1.15 * most;
+    for (int side = 0; side < 2; side++) {
+      const int x = side * SIZE + (int)floor(half + half * (double)m[3] / reach);
+      const int y = (int)floor(half - half * (double)m[side ? 11 : 7] / reach);
+      const uint16_t *p = image.rgba + 4 * (y * 2 * SIZE + x);
+      ck_assert_msg(p[0] > 50000 && p[2] < 20000, "camera %d, panel %d: %d %d %d", v, side, p[0], p[1], p[2]);
+    }
+  }
+  sf_image_free(&image);
+  sf_dataset_free(&d), sf_dataset_free(&held);
+}
+END_TEST
+
 START_TEST(cameras_that_all_look_away_are_refused)
 {
   layout_rig rig = orbit();
@@ -841,6 +876,7 @@ static Suite *suite(void)
   Suite *s = suite_create("layouts");
   TCase *t = tcase_create("all");
   tcase_add_checked_fixture(t, make_folder, remove_folder);
+  tcase_set_timeout(t, 60);
   tcase_add_loop_test(t, colmap_has_the_rays_of_its_poses, 0, 4);
   tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
@@ -858,6 +894,7 @@ static Suite *suite(void)
   tcase_add_test(t, a_few_missing_pictures_are_passed_over);
   tcase_add_test(t, other_endings_are_found);
   tcase_add_test(t, the_survey_names_what_looks_wrong);
+  tcase_add_test(t, the_plan_shows_every_camera);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);
   tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
   tcase_add_loop_test(t, truncated_files_are_named, 0, 4);

@@ -111,6 +111,10 @@ START_TEST(the_camera_is_part_of_the_view)
   sf_manifest_view after = before;
   sf_camera camera = some_camera();
   int plane;
+  camera.p2 = 1e-6f;
+  ck_good(sf_manifest_describe(&after, &net, &camera, &g));
+  ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);
+  camera.p2 = 0;
   camera.to_world[11] = nextafterf(camera.to_world[11], 9);
   ck_good(sf_manifest_describe(&after, &net, &camera, &g));
   ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);

@@ -104,7 +104,9 @@ static sf_cli make_cli(arguments *a, sf_option *o)
                   .usage = "sf_train DATA [-o model.safetensors] [options]",
                   .summary =
                       "Learns a spiking radiance field and, with it, how many time steps the scene needs (PATA).\n"
-                      "DATA is a folder in the Blender layout (transforms_train.json and PNG images).",
+                      "DATA is a folder of posed pictures in the Blender, LLFF, COLMAP or instant-ngp layout; sf_data "
+                      "says what is\n"
+                      "understood of it.",
                   .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
                               "  sf_train lego -o lego.safetensors --stage1 10000 --stage2 30000 --resume\n"

@@ -11,8 +11,8 @@
  * layers; then saturated_samples of the five layers; then saturated_features; of a TensoRF scene then field_samples and
  * field_mac.
  *
- * camera_sha256: width, height as 4-byte integers; fx fy cx cy and to_world[12] as IEEE single precision. Pictures can
- * only be equal where the rays are.
+ * camera_sha256: width, height as 4-byte integers; fx fy cx cy and to_world[12] as IEEE single precision; then, unless
+ * all are zero, k1 k2 p1 p2. Pictures can only be equal where the rays are.
  *
  * exr_sha256: the file beside the manifest, byte by byte. Tells whether it was changed, not what it shows.
  *

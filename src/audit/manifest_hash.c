@@ -43,12 +43,15 @@ static uint8_t *put_real(uint8_t *to, float value)
 
 static void hash_camera(const sf_camera *camera, char hex[65])
 {
-  uint8_t bytes[4 * (2 + 4 + 12)], *to = bytes;
+  const float lens[4] = {camera->k1, camera->k2, camera->p1, camera->p2};
+  uint8_t bytes[4 * (2 + 4 + 12 + 4)], *to = bytes;
   to = put(to, (uint64_t)camera->width, 4), to = put(to, (uint64_t)camera->height, 4);
   to = put_real(to, camera->fx), to = put_real(to, camera->fy);
   to = put_real(to, camera->cx), to = put_real(to, camera->cy);
   for (int i = 0; i < 12; i++) to = put_real(to, camera->to_world[i]);
-  sf_sha256(bytes, sizeof bytes, hex);
+  const bool pinhole = lens[0] == 0 && lens[1] == 0 && lens[2] == 0 && lens[3] == 0;
+  for (int i = 0; i < 4 && !pinhole; i++) to = put_real(to, lens[i]);
+  sf_sha256(bytes, (size_t)(to - bytes), hex);
 }
 
 sf_status sf_manifest_describe(sf_manifest_view *view, const fx_net *net, const sf_camera *camera,
