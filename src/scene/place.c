@@ -27,7 +27,7 @@ static void move_all(sf_dataset *data, sf_capture *c, const move *m)
 {
   for (int i = 0; i < 3; i++) {
     for (int k = 0; k < 3; k++) data->world[4 * i + k] = m->scale * m->turn[3 * i + k];
-    data->world[4 * i + 3] = -m->scale * vec_dot(m->turn + 3 * i, m->centre);
+    data->world[4 * i + 3] = 0 - m->scale * vec_dot(m->turn + 3 * i, m->centre);
   }
   if (!memcmp(m, &stay, sizeof stay)) return;
   for (int f = 0; f < c->count; f++) {
