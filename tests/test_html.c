@@ -2,7 +2,7 @@
  * with a planted fault is caught. */
 #include "spikefield/html.h"
 #include "spikefield/io.h"
-#include "tests/fx_fixture.h"
+#include "tests/fx_tensorf_fixture.h"
 #include "tests/html_page.h"
 #include <unistd.h>
 
@@ -163,8 +163,7 @@ static void check_figures(faults *f, const char *page, const sf_audit_report *r)
   check_element(f, page, "figure", "fig-steps-map", "<img", 1);
   int cells = 0; /* layers and steps that cost something */
   for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < steps; t++)
-      cells += r->measure.core.layer[l].mac[t] + r->measure.core.layer[l].sop[t] > 0;
+    for (int t = 0; t < steps; t++) cells += r->measure.core.layer[l].mac[t] + r->measure.core.layer[l].sop[t] > 0;
   check_bars(f, page, "svg-by-step", "width", cells);
   check_bars(f, page, "svg-by-layer", "width", cells);
   check_element(f, page, "figure", "fig-raster", "<path class=\"tick", 3);
@@ -212,6 +211,29 @@ START_TEST(a_page_is_whole)
   ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
   ck_assert_ptr_null(strstr(f.text, "da<ta>"));
   ck_assert_ptr_null(strstr(f.text, "DIFFERENT"));
+  end(&f);
+}
+END_TEST
+
+/* A decoder has no density network: its layers, figures and numbers are fewer, and they agree. */
+START_TEST(a_page_of_a_decoder)
+{
+  fixture f = begin(2, true, false);
+  fx_scene_free(&f.scene);
+  f.scene = tensorf_scene();
+  finish(&f);
+  faults found = {0};
+  cJSON *json = page_json(f.text);
+  check_tags(&found, f.text);
+  check_references(&found, f.text);
+  check_ledgers(&found, f.text, &f.report.ledgers);
+  check_numbers(&found, f.text, json);
+  check_element(&found, f.text, "figure", "fig-raster", "<path class=\"tick", 2);
+  check_element(&found, f.text, "figure", "fig-rates", "<svg", 2);
+  ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
+  ck_assert_ptr_null(strstr(f.text, "fig-readings"));
+  ck_assert_ptr_null(strstr(f.text, ">D1<"));
+  cJSON_Delete(json);
   end(&f);
 }
 END_TEST
@@ -332,6 +354,7 @@ int main(void)
   TCase *c = tcase_create("page");
   tcase_set_timeout(c, 60);
   tcase_add_loop_test(c, a_page_is_whole, 0, 4);
+  tcase_add_test(c, a_page_of_a_decoder);
   tcase_add_test(c, pictures_agree_with_the_audit);
   tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
   tcase_add_test(c, a_difference_is_shown);

@@ -88,7 +88,8 @@ static sf_status make_page(page_audit *a)
   if (!o->html) return sf_ok();
   a->page.report = &a->audit.report, a->page.scene = &a->audit.scene,
   a->page.view = &a->audit.data.view[o->audit.view >= 0 ? o->audit.view : 0];
-  a->page.data = &a->audit.data, a->page.model = find_model(a), a->page.command = o->command;
+  a->page.data = &a->audit.data, a->page.model = find_model(a);
+  a->page.model_optional = !o->model, a->page.command = o->command;
   a->page.whole = o->audit.rays == 0 && (o->audit.view >= 0 || a->audit.data.count == 1);
   a->page.tick = page_tick, a->page.user = a;
   sf_progress_begin(&a->progress, o->quiet);

@@ -27,6 +27,7 @@ typedef struct sf_page {
   const sf_dataset *data;
   const sf_view *view;                           /* of data: the pictured one */
   const char *model;                             /* float model for its PSNR, or NULL */
+  bool model_optional;                           /* leave its PSNR out where it is not the scene's */
   const char *command;                           /* that repeats the run */
   bool whole;                                    /* the audit covers every pixel of this view and nothing else */
   bool (*tick)(void *user, int done, int total); /* pictures; false stops. Or NULL */

@@ -53,9 +53,17 @@ static const layer_text layers[SF_LAYERS] = {
     [FX_C3] = {"turns spikes into red, green and blue", "SOP, at every step"},
 };
 
+/* A decoder alone, behind a field without a network. */
+static const layer_text decoder[SF_LAYERS] = {
+    [FX_C1] = {"reads the appearance of the sample and the direction", "MAC, once per sample"},
+    [FX_C2] = {"spikes in, spikes out", "SOP, at every step"},
+    [FX_C3] = {"turns spikes into red, green and blue", "SOP, at every step"},
+};
+
 static void layer_table(FILE *out, const sf_page *page)
 {
   const fx_net *net = page->report->net;
+  const layer_text *text = fx_net_decodes(net) ? decoder : layers;
   fprintf(out, "<div class=\"scroll\"><table><caption>The layers of this network</caption>\n<thead><tr><th>layer</th>"
                "<th>what it does</th><th class=\"n\">inputs</th><th class=\"n\">outputs</th><th>counted as</th></tr>"
                "</thead>\n<tbody>\n");
@@ -64,8 +72,8 @@ static void layer_table(FILE *out, const sf_page *page)
     fprintf(out,
             "<tr><th><i class=\"key l%d\"></i>%s</th><td>%s</td><td class=\"n\"><data data-key=\"counts.layers[%d]"
             ".n_in\" value=\"%d\">%d</data></td><td class=\"n\">%d</td><td>%s</td></tr>\n",
-            l, sf_layer_names[l], layers[l].role, l, net->layer[l].n_in, net->layer[l].n_in, net->layer[l].n_out,
-            layers[l].priced);
+            l, sf_layer_names[l], text[l].role, l, net->layer[l].n_in, net->layer[l].n_in, net->layer[l].n_out,
+            text[l].priced);
   }
   fprintf(out, "</tbody></table></div>\n");
 }

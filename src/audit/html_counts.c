@@ -137,14 +137,15 @@ void html_counts(FILE *out, const sf_page *page)
 static void census(FILE *out, const sf_page *page)
 {
   const fx_counts *c = &page->report->measure.core;
+  const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
   char list[64];
   fprintf(out, "<h3>Saturation</h3>\n<p>Fixed-point numbers have a largest value; a result beyond it is clipped to it. "
                "Samples in which that happened, of ");
   html_put_count(out, "samples", c->samples);
   fprintf(out, ":</p>\n<div class=\"scroll\"><table class=\"narrow\" id=\"table-saturation\"><thead><tr>");
-  for (int l = 0; l < SF_LAYERS; l++) fprintf(out, "<th class=\"n\">%s</th>", sf_layer_names[l]);
+  for (int l = first; l < SF_LAYERS; l++) fprintf(out, "<th class=\"n\">%s</th>", sf_layer_names[l]);
   fprintf(out, "<th class=\"n\">grid features</th></tr></thead>\n<tbody><tr>");
-  for (int l = 0; l < SF_LAYERS; l++) {
+  for (int l = first; l < SF_LAYERS; l++) {
     char key[40];
     snprintf(key, sizeof key, "saturated_samples.%s", sf_layer_names[l]);
     fprintf(out, "<td class=\"n\">");

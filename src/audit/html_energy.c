@@ -65,17 +65,20 @@ static void by_layer(FILE *out, const sf_page *page)
   uint64_t all = sf_energy_fj(c), top = 0;
   char text[HTML_NUMBER], name[12];
   for (int l = 0; l < SF_LAYERS; l++) top = layer_fj(c, l, steps) > top ? layer_fj(c, l, steps) : top;
-  svg_begin(out, "svg-by-layer", WIDTH, ROW * SF_LAYERS, "Energy by layer", "One bar per layer, stacked by step");
-  for (int l = 0; l < SF_LAYERS; l++) {
+  const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
+  svg_begin(out, "svg-by-layer", WIDTH, ROW * (SF_LAYERS - first), "Energy by layer",
+            "One bar per layer, stacked by step");
+  for (int l = first; l < SF_LAYERS; l++) {
+    const double y = ROW * (l - first);
     const uint64_t fj = layer_fj(c, l, steps);
     double x = 0;
-    svg_text(out, 0, ROW * l + 15, "lab", "%s: %s", sf_layer_names[l],
+    svg_text(out, 0, y + 15, "lab", "%s: %s", sf_layer_names[l],
              c->layer[l].mac[0] ? "multiplies (MAC)" : "adds on spikes (SOP)");
-    svg_text(out, WIDTH, ROW * l + 15, "num end", "%s  (%.1f %%)", html_energy(text, (double)fj),
+    svg_text(out, WIDTH, y + 15, "num end", "%s  (%.1f %%)", html_energy(text, (double)fj),
              all ? 100.0 * (double)fj / (double)all : 0);
     for (int t = 0; t < steps; t++) {
       snprintf(name, sizeof name, "t%d", t + 1);
-      x = segment(out, x, ROW * l + 20, top ? WIDTH / (double)top : 0, page, l, t, name);
+      x = segment(out, x, y + 20, top ? WIDTH / (double)top : 0, page, l, t, name);
     }
   }
   svg_end(out);
@@ -94,7 +97,7 @@ void html_energy_section(FILE *out, const sf_page *page)
   html_put_energy(out, "ledger.sop_fj", l->sop_fj);
   fprintf(out, ".</p>\n<div class=\"grid\">\n");
   html_figure_begin(out, "fig-energy-step", "", "By time step.",
-                    "The first step also pays for what happens once per sample: the first layer and the direction.");
+                    "The first step also pays for what happens once per sample or ray.");
   by_step(out, page);
   html_figure_end(out);
   html_figure_begin(out, "fig-energy-layer", "", "By layer.", "Each bar is divided into its time steps.");

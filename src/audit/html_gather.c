@@ -106,15 +106,17 @@ static sf_status gather_pictures(sf_page *page)
   return sf_counts_compare(&page->golden.counts, "picture", &page->report->measure.core, "audit");
 }
 
+static bool is_model_of(const sf_page *page, const sf_model *model)
+{
+  return page->scene->net.steps <= model->config.steps && page->data->scale == model->config.scale;
+}
+
 static sf_status float_quality(sf_page *page, const sf_model *model)
 {
   float background[3];
   double ssim;
   sf_golden golden;
   const sf_golden_job job = job_of(page, page->scene);
-  if (page->scene->net.steps > model->config.steps || model->config.scale != page->data->scale)
-    return sf_fail(SF_E_RANGE, "%s: not the model of this scene (T %d, scale %g)", page->model, model->config.steps,
-                   (double)model->config.scale);
   background_of(page->scene, background);
   SF_TRY(sf_golden_create(&golden, page->golden.width, page->golden.height, SF_FLOAT_PLANES));
   sf_status status = sf_golden_float(&job, model, &golden);
@@ -130,9 +132,15 @@ static sf_status gather_float(sf_page *page)
   page->psnr_float = NAN;
   if (!page->model) return sf_ok();
   SF_TRY(sf_model_load(&model, page->model));
-  page->trained_steps = model.config.steps;
-  sf_status status = sf_sha256_file(page->model, page->model_sha256);
-  if (status.code == SF_OK && page->view->image.rgba) status = float_quality(page, &model);
+  sf_status status = sf_ok();
+  if (is_model_of(page, &model)) {
+    page->trained_steps = model.config.steps;
+    status = sf_sha256_file(page->model, page->model_sha256);
+    if (status.code == SF_OK && page->view->image.rgba) status = float_quality(page, &model);
+  } else if (!page->model_optional) {
+    status = sf_fail(SF_E_RANGE, "%s: not the model of this scene (T %d, scale %g)", page->model, model.config.steps,
+                     (double)model.config.scale);
+  }
   sf_model_free(&model);
   return status;
 }

@@ -87,6 +87,10 @@ static void savings(FILE *out, const sf_page *page)
                     "one above it.");
   saving_bars(out, "svg-savings", "Savings of every ledger", ledger, SF_SPIKING_LEDGERS);
   html_figure_end(out);
+  if (fx_net_decodes(page->report->net)) { /* no h, and the direction comes with every sample */
+    fprintf(out, "</div>\n");
+    return;
+  }
   html_figure_begin(
       out, "fig-readings", "", "Other readings of the paper ledger.",
       "h, which the density network hands to C1, changes at every step: its products are counted at every "

@@ -133,11 +133,8 @@ static void rates_figure(FILE *out, const sf_page *page)
 void html_spikes(FILE *out, const sf_page *page)
 {
   fprintf(out, "<section id=\"spikes\">\n<h2>The spikes</h2>\n");
-  if (page->ray.samples == 0) {
-    fprintf(out, "<p>No ray of the view has samples: there is no spike.</p>\n");
-  } else {
-    raster_figure(out, page);
-    rates_figure(out, page);
-  }
+  if (page->sampled == 0) fprintf(out, "<p>No ray of the view has samples: there is no spike.</p>\n");
+  if (page->ray.samples > 0) raster_figure(out, page);
+  if (page->sampled > 0) rates_figure(out, page);
   fprintf(out, "</section>\n");
 }
