@@ -242,12 +242,12 @@ END_TEST
  * the camera. */
 START_TEST(integer_rays_follow_the_float_march)
 {
-  double largest = 0;
   for (int bound = 2; bound <= 16; bound *= 2) {
     sf_model m;
     fx_scene scene;
     sf_steps steps;
     int hits = 0, differ = 0;
+    double largest = 0;
     make_pair(bound, 64, &m, &scene);
     ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
     const double exact = ldexp(sqrt(3) / 1024 / bound, 24), drift = fabs(scene.step_q24 / exact - 1) + 1e-4;
@@ -274,9 +274,40 @@ START_TEST(integer_rays_follow_the_float_march)
     }
     ck_assert_int_gt(hits, 600);
     ck_assert_int_lt(differ, hits / 4); /* the last interval ends at the face, or beyond */
+    printf("bound %d: points up to %.5f model units from those of the float march\n", bound, largest);
+    ck_assert_double_lt(largest, 0.02);
     free_pair(&m, &scene);
   }
-  ck_assert_double_lt(largest, 0.02);
+}
+END_TEST
+
+/* Precision alone: points against the line that they should lie on. The step is off by half of 2^-40, as often as there
+ * are steps, and the product is cut to 2^-40. */
+START_TEST(positions_are_precise_in_the_largest_boxes)
+{
+  for (int bound = 16; bound <= 64; bound *= 2) {
+    sf_model m;
+    fx_scene scene;
+    double largest = 0;
+    make_pair(bound, 64, &m, &scene);
+    const double step = ldexp(scene.step_q24, -24);
+    for (uint64_t i = 0; i < 600; i++) {
+      float o[3], d[3];
+      fx_ray ray;
+      draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
+      const double length = sqrt((double)d[0] * d[0] + (double)d[1] * d[1] + (double)d[2] * d[2]);
+      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_OK);
+      for (int n = 0; n < ray.count; n += 3)
+        for (int a = 0; a < 3; a++) {
+          const double at = ldexp((double)scene.steps->at_q16[n], -16), exact = at * step * d[a] / length;
+          const double error = ldexp((double)(fx_ray_at(&scene, &ray, n, a) - ray.origin[a]), -40) - exact;
+          ck_assert_double_le(fabs(error), ldexp(at / 2 + 1.5, -40));
+          largest = fmax(largest, fabs(error));
+        }
+    }
+    printf("bound %d: rays bend by up to %.3f of 2^-24\n", bound, ldexp(largest, 24));
+    free_pair(&m, &scene);
+  }
 }
 END_TEST
 
@@ -457,6 +488,7 @@ int main(void)
   tcase_add_test(tc, integer_steps_grow_as_the_formula_says);
   tcase_add_test(tc, integer_cells_are_those_of_the_formula);
   tcase_add_test(tc, integer_rays_follow_the_float_march);
+  tcase_add_test(tc, positions_are_precise_in_the_largest_boxes);
   tcase_add_loop_test(tc, many_rays_equal_single_rays, 0, 3);
   tcase_add_test(tc, fog_takes_the_light_of_its_depth);
   tcase_add_test(tc, files_keep_the_box);
