@@ -128,12 +128,12 @@ typedef enum { FX_INGP, FX_TENSORF } fx_backbone;
 
 /* Steps that grow: interval n is length(n) = clamp(rshift_round((near + start(n)) * gamma, 24), 1, longest) lattice steps
  * long, start(n+1) = start(n) + length(n), all Q16.16. Filled by fx_scene_allocate. */
-enum { FX_STEPS_MAX = 1024, FX_STEPS_END = 8 };
+enum { FX_STEPS_MAX = 1024 };
 typedef struct fx_steps {
-  int32_t count;                                /* lattice points that a ray may have */
-  int64_t at_q16[FX_STEPS_MAX + FX_STEPS_END];  /* from sample 0 to sample n (middle to middle), lattice steps */
-  int64_t cascade[FX_STEPS_MAX + FX_STEPS_END]; /* the finest whose cells are longer than the interval */
-  int32_t delta_q24[FX_STEPS_MAX];              /* length in box edges */
+  int32_t count;                   /* lattice points that a ray may have */
+  int64_t at_q16[FX_STEPS_MAX];    /* from sample 0 to sample n (middle to middle), lattice steps */
+  int32_t delta_q24[FX_STEPS_MAX]; /* length in box edges */
+  uint8_t cascade[FX_STEPS_MAX];   /* the finest whose cells are longer than the interval */
 } fx_steps;
 
 /* Scene box [0,1)^3. Cascade c of its occupancy grids has occ_res^3 cells in the middle 2^(c - log2_bound) of the box:

@@ -9,7 +9,7 @@ void fx_steps_fill(const fx_scene *scene, fx_steps *steps)
   const int cell_bits = __builtin_ctz((unsigned)scene->occ_res) + scene->log2_bound; /* of the finest cells */
   int64_t start = 0, first = 0;
   steps->count = FX_STEPS_MAX;
-  for (int n = 0; n < FX_STEPS_MAX + FX_STEPS_END; n++) {
+  for (int n = 0; n < FX_STEPS_MAX; n++) {
     int64_t length = fx_rshift_round((scene->near_q16 + start) * scene->gamma_q24, GAMMA_FRAC);
     length = length < ONE ? ONE : length > scene->longest_q16 ? scene->longest_q16 : length;
     if (n == 0) first = length;
@@ -17,8 +17,8 @@ void fx_steps_fill(const fx_scene *scene, fx_steps *steps)
     int cascade = 0;
     while (cascade < scene->log2_bound && edges_q40 >> (RAY_FRAC - cell_bits + cascade)) cascade++;
     steps->at_q16[n] = start + ((length - first) >> 1);
-    steps->cascade[n] = cascade;
-    if (n < FX_STEPS_MAX) steps->delta_q24[n] = (int32_t)fx_rshift_round(edges_q40, 16);
+    steps->cascade[n] = (uint8_t)cascade;
+    steps->delta_q24[n] = (int32_t)fx_rshift_round(edges_q40, 16);
     start += length;
   }
 }

@@ -24,7 +24,7 @@ static inline uint32_t fx_cell(const fx_scene *scene, const int64_t p[3], int32_
 
 static inline bool fx_occupied(const fx_scene *scene, const int64_t p[3], int32_t n)
 {
-  const uint32_t cell = fx_cell(scene, p, scene->steps ? (int32_t)scene->steps->cascade[n] : 0);
+  const uint32_t cell = fx_cell(scene, p, scene->steps ? scene->steps->cascade[n] : 0);
   return scene->occupancy[cell >> 3] >> (cell & 7) & 1;
 }
 
