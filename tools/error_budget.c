@@ -49,6 +49,7 @@ static sf_status measure_picture(budget *b)
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .limit = o->view + 1};
   SF_TRY(sf_model_load(&b->model, o->model));
   SF_TRY(fx_scene_load(&b->scene, o->scene));
+  SF_TRY(fx_scene_need_grid(&b->scene, o->scene, "error budget of a picture"));
   SF_TRY(sf_dataset_load(&b->data, o->data, o->split, &how));
   sf_dataset_warn(stderr, "error_budget", &b->data);
   if (o->view >= b->data.count)

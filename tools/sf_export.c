@@ -45,12 +45,19 @@ static sf_status put_json(cJSON *json, const char *path)
 
 static void print_text(const fx_scene *scene, const sf_quant_report *report, const char *path, long long bytes)
 {
-  printf("%s: %lld bytes, t_r = %d, %lld grid entries, %d x %d x %d occupancy cells\n", path, bytes, scene->net.steps,
-         (long long)scene->grid.entries, scene->occ_res, scene->occ_res, scene->occ_res);
-  printf("features of %d levels     error %6.3f %%  %lld grid entries clipped\n", scene->grid.levels,
-         100 * report->feature_error, (long long)report->grid_clipped);
+  const bool vm = scene->backbone == FX_TENSORF;
+  const int32_t *res = scene->tensorf.res;
+  printf("%s: %lld bytes, t_r = %d, %lld %s entries, %d x %d x %d occupancy cells\n", path, bytes, scene->net.steps,
+         (long long)(vm ? fx_tensorf_bytes(&scene->tensorf) : scene->grid.entries), vm ? "TensoRF" : "grid",
+         scene->occ_res, scene->occ_res, scene->occ_res);
+  if (vm)
+    printf("%d features of %d x %d x %d points", scene->tensorf.features, res[0], res[1], res[2]);
+  else
+    printf("features of %d levels    ", scene->grid.levels);
+  printf(" error %6.3f %%  %lld grid entries clipped\n", 100 * report->feature_error, (long long)report->grid_clipped);
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &scene->net.layer[l];
+    if (!layer->n_out) continue; /* a decoder has no density net */
     printf("%s %3d x %-3d LSB %-11.6g error %6.3f %%  %d weights clipped, k = %d/%d", layer_name[l], layer->n_in,
            layer->n_out, report->layer[l].unit, 100 * report->layer[l].error, report->layer[l].clipped, layer->k,
            1 << SF_LEAK_FRAC);
@@ -86,7 +93,11 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "t_r", scene->net.steps);
   cJSON_AddNumberToObject(json, "grid_entries", (double)scene->grid.entries);
   cJSON_AddNumberToObject(json, "grid_clipped", (double)report->grid_clipped);
-  cJSON_AddItemToObject(json, "feature_lsb", cJSON_CreateDoubleArray(scene->feature_scale, scene->grid.levels));
+  const bool vm = scene->backbone == FX_TENSORF;
+  cJSON_AddStringToObject(json, "backbone", vm ? "tensorf" : "ingp");
+  if (vm) cJSON_AddNumberToObject(json, "field_bytes", (double)fx_tensorf_bytes(&scene->tensorf));
+  cJSON_AddItemToObject(json, "feature_lsb",
+                        cJSON_CreateDoubleArray(scene->feature_scale, vm ? 1 : scene->grid.levels));
   cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
   cJSON_AddNumberToObject(json, "direction_lsb", scene->dir_scale);
   cJSON_AddNumberToObject(json, "calibration_samples", report->samples);

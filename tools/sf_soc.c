@@ -71,6 +71,7 @@ static sf_status load(job *j)
   const options *o = &j->opt;
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .first = o->view, .limit = 1};
   SF_TRY(fx_scene_load(&j->scene, o->scene));
+  SF_TRY(fx_scene_need_grid(&j->scene, o->scene, "firmware rays"));
   SF_TRY(sf_dataset_load(&j->data, o->data, split_name[o->split], &how));
   sf_dataset_warn(stderr, "sf_soc", &j->data);
   if (j->data.count == 0)

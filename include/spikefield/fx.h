@@ -251,6 +251,7 @@ uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_c
 void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
                        fx_counts *counts);
 int fx_tensorf_inputs(const fx_tensorf *field);
+int64_t fx_tensorf_bytes(const fx_tensorf *field); /* planes, lines and basis matrix */
 /* What the basis matrix multiplies, for its fit: x[appearance components], Q.1 of the LSB of a product; how many. */
 int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x);
 
@@ -318,6 +319,9 @@ sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_p
 
 /* Refuses a scene that breaks a rule above, naming the field (`path` is only for the message). */
 sf_status fx_scene_check(const fx_scene *scene, const char *path);
+
+/* SF_E_UNSUPPORTED, "PATH: WHAT ...", for a scene without a hash grid. */
+sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char *what);
 
 /* Zeroed weights, table and occupancy for the sizes already set (which it checks); owner is set. */
 sf_status fx_scene_allocate(fx_scene *scene, const char *path);

@@ -94,8 +94,8 @@ typedef struct spikefield_scene_info {
   int32_t leak_q12[SPIKEFIELD_LAYERS];
   spikefield_mode mode;
   int32_t steps;         /* time steps the scene asks for */
-  int32_t grid_levels;   /* of the hash grid */
-  int32_t features;      /* per sample, 2 per level */
+  int32_t grid_levels;   /* of the hash grid; 0: a TensoRF scene */
+  int32_t features;      /* per sample, 2 per level; of a TensoRF scene the inputs of its decoder */
   int32_t directions;    /* harmonics that the net reads, the first of the 16 */
   int32_t max_samples;   /* per ray */
   int32_t occupancy_res; /* cells per axis */

@@ -383,6 +383,7 @@ sf_status sf_fit(fx_scene *fitted, const sf_fit_job *job, sf_fit_report *report)
   const uint64_t count = job->rays->count;
   memset(fitted, 0, sizeof *fitted);
   memset(report, 0, sizeof *report);
+  SF_TRY(fx_scene_need_grid(job->candidate[0], job->name, "fit"));
   if (job->candidate[0]->log2_bound || job->candidate[0]->steps)
     return sf_fail(SF_E_UNSUPPORTED, "%s: %d occupancy grids and growing steps: only a box with one grid can be fitted",
                    job->name, job->candidate[0]->log2_bound + 1);

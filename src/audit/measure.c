@@ -23,9 +23,7 @@ static sf_status recount_and_compare(sf_probe *probe, bool first)
 sf_status sf_probe_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   sf_probe *probe = user;
-  const bool decodes = fx_net_decodes(probe->net);
-  if (first || decodes) fx_net_direction(probe->net, decodes ? f : ray->dir, probe->base, &probe->core);
-  fx_net_sample(probe->net, f, probe->base, out, probe->trace, &probe->core);
+  fx_net_next(probe->net, ray->dir, first, f, probe->base, out, probe->trace, &probe->core);
   if (probe->trace) SF_TRY(recount_and_compare(probe, first));
   probe->sample++;
   return sf_ok();

@@ -65,8 +65,7 @@ static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16
 {
   tracer *w = user;
   const fx_net *net = &w->scene->net;
-  if (first) fx_net_direction(net, ray->dir, w->base, NULL);
-  fx_net_sample(net, f, w->base, out, &w->trace, NULL);
+  fx_net_next(net, ray->dir, first, f, w->base, out, &w->trace, NULL);
   fprintf(w->writer[SAMPLES].file, "%" PRIu64 ",%d,%s,%d,%d,%" PRIu64 "\n", w->report->timesteps + 1, w->ray,
           w->data->view[w->view].name, w->x, w->y, w->sample);
   for (int t = 0; t < net->steps; t++) write_step(w, t);

@@ -43,15 +43,21 @@ static sf_status check_factors(const fx_factors *factors, const char *name, cons
   return sf_ok();
 }
 
-/* Each array is below 2^28, so the sum of all cannot overflow. */
-static sf_status check_bytes(const fx_tensorf *field, const char *path)
+/* Each array is at most 2^28, so the sum cannot overflow. */
+int64_t fx_tensorf_bytes(const fx_tensorf *field)
 {
   fx_tensorf copy = *field;
   fx_array list[FX_TENSORF_ARRAYS];
   const int n = fx_tensorf_arrays(&copy, list);
   int64_t bytes = 0;
   for (int i = 0; i < n; i++) bytes += (int64_t)fx_array_bytes(&list[i]);
-  return in_range(path, "tensorf", "bytes of planes and lines", bytes, 1, FIELD_BYTES_MAX);
+  return bytes;
+}
+
+sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char *what)
+{
+  if (scene->backbone == FX_INGP) return sf_ok();
+  return sf_fail(SF_E_UNSUPPORTED, "%s: %s: for scenes with a hash grid only, this is a TensoRF scene", path, what);
 }
 
 sf_status fx_check_tensorf_sizes(const fx_tensorf *field, int inputs, const char *path)
@@ -66,7 +72,7 @@ sf_status fx_check_tensorf_sizes(const fx_tensorf *field, int inputs, const char
   SF_TRY(in_range(path, "tensorf", "view_freqs", field->view_freqs, 0, FX_FREQS_MAX));
   const int needed = fx_tensorf_inputs(field);
   SF_TRY(in_range(path, "C1", "n_in", inputs, needed, needed));
-  return check_bytes(field, path);
+  return in_range(path, "tensorf", "bytes of planes and lines", fx_tensorf_bytes(field), 1, FIELD_BYTES_MAX);
 }
 
 static sf_status check_scale(const fx_scale *scale, const char *name, int bias_low, int bias_high, const char *path)

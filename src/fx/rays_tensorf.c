@@ -56,7 +56,7 @@ static int32_t next_point(wave *w, const fx_ray *ray, int32_t n, uint32_t pos[3]
   if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
   if (found >= ray->count) return -1;
   for (int axis = 0; axis < 3; axis++)
-    pos[axis] = (uint32_t)((ray->origin[axis] + found * ray->step[axis]) >> (RAY_FRAC - SF_POS_FRAC));
+    pos[axis] = (uint32_t)(fx_ray_at(w->core->scene, ray, found, axis) >> (RAY_FRAC - SF_POS_FRAC));
   return found;
 }
 

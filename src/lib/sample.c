@@ -54,6 +54,7 @@ static sf_status features_of(const spikefield_scene *scene, const uint32_t *posi
   if (!n) return sf_ok();
   LIB_REQUIRE(positions);
   LIB_REQUIRE(features);
+  SF_TRY(fx_scene_need_grid(&scene->fx, "scene", "features of a position"));
   SF_TRY(check_positions(positions, n));
   const size_t width = (size_t)scene->fx.net.layer[FX_D1].n_in;
   for (size_t i = 0; i < n; i++) fx_grid_features(&scene->fx.grid, positions + 3 * i, features + width * i, &events);
@@ -92,15 +93,14 @@ static sf_status check_inputs(const char *what, const int16_t *value, size_t n, 
 static void run_batch(const batch *b, fx_trace *trace, fx_counts *events)
 {
   const fx_net *net = &b->view.net;
-  const size_t width = (size_t)net->layer[FX_D1].n_in;
+  const size_t width = (size_t)fx_net_inputs(net);
   int16_t own[SF_FEATURE_MAX];
   int32_t base[SF_LANES];
   fx_out out;
-  fx_net_direction(net, b->harmonics, base, events);
   for (size_t i = 0; i < b->n; i++) {
     const int16_t *f = b->features ? b->features + width * i : own;
     if (b->positions) fx_grid_features(&b->view.grid, b->positions + 3 * i, own, events);
-    fx_net_sample(net, f, base, &out, trace, events);
+    fx_net_next(net, b->harmonics, i == 0, f, base, &out, trace, events);
     lib_sample(&b->samples[i], &out);
     if (trace) memcpy(&b->traces[i], trace, sizeof *trace);
   }
@@ -115,7 +115,8 @@ static sf_status checked_batch(batch *b, const spikefield_scene *scene, const sp
   LIB_REQUIRE(b->harmonics);
   LIB_REQUIRE(b->samples);
   SF_TRY(check_inputs("harmonic", b->harmonics, 1, SPIKEFIELD_DIRECTIONS));
-  if (b->features) SF_TRY(check_inputs("feature", b->features, b->n, (size_t)b->view.net.layer[FX_D1].n_in));
+  if (b->features) SF_TRY(check_inputs("feature", b->features, b->n, (size_t)fx_net_inputs(&b->view.net)));
+  if (b->positions) SF_TRY(fx_scene_need_grid(&b->view, "scene", "samples by position"));
   if (b->positions) SF_TRY(check_positions(b->positions, b->n));
   fx_trace *trace = b->traces ? malloc(sizeof *trace) : NULL;
   if (b->traces && !trace) return sf_fail(SF_E_MEMORY, "no memory for a trace");
@@ -161,8 +162,7 @@ static sf_status tapped_net(void *user, const fx_ray *ray, bool first, const int
 {
   tapped *t = user;
   spikefield_sample sample;
-  if (first) fx_net_direction(t->net, ray->dir, t->base, &t->events);
-  fx_net_sample(t->net, f, t->base, out, &t->trace, &t->events);
+  fx_net_next(t->net, ray->dir, first, f, t->base, out, &t->trace, &t->events);
   memcpy(&t->shown, &t->trace, sizeof t->shown);
   lib_sample(&sample, out);
   const spikefield_tap tap = {t->index++, f, &sample, &t->shown};

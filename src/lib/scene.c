@@ -81,8 +81,8 @@ static void describe_net(const fx_net *net, spikefield_scene_info *info)
     info->weight_bytes += (int64_t)layer->n_in * layer->n_out;
   }
   info->mode = (spikefield_mode)net->mode, info->steps = net->steps;
-  info->features = net->layer[FX_D1].n_in;
-  info->directions = fx_net_constants(net);
+  info->features = fx_net_inputs(net);
+  info->directions = fx_net_decodes(net) ? 0 : fx_net_constants(net);
 }
 
 static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *info)
@@ -93,7 +93,7 @@ static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *
   memset(info, 0, sizeof *info);
   describe_net(&fx->net, info);
   info->grid_levels = fx->grid.levels, info->grid_entries = fx->grid.entries;
-  info->grid_bytes = fx->grid.entries * FX_GRID_FEATURES;
+  info->grid_bytes = fx->backbone == FX_TENSORF ? fx_tensorf_bytes(&fx->tensorf) : fx->grid.entries * FX_GRID_FEATURES;
   info->occupancy_res = fx->occ_res,
   info->occupancy_bytes = (int64_t)(fx->log2_bound + 1) * fx->occ_res * fx->occ_res * fx->occ_res / 8;
   info->max_samples = fx->max_samples, info->step_q24 = fx->step_q24;

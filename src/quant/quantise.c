@@ -84,7 +84,7 @@ int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
 {
   const int64_t res = scene->occ_res;
   int64_t bits = (scene->log2_bound + 1) * res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
-  bits += sf_field_entries(scene) * widths->grid_bits;
+  if (scene->backbone == FX_TENSORF) bits += fx_tensorf_bytes(&scene->tensorf) * widths->grid_bits;
   for (int l = 0; l < SF_LAYERS; l++)
     bits += (int64_t)fx_layer_rows(&scene->net.layer[l]) * scene->net.layer[l].n_out * widths->weight_bits;
   return (bits + 7) / 8;

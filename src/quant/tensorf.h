@@ -31,8 +31,6 @@ sf_status sf_quantise_decoder(fx_scene *scene, const sf_model *model, const char
 /* Everything of a TensoRF scene but what all scenes share (mode, steps, background, leaks). */
 void sf_tensorf_set_sizes(fx_scene *scene, const sf_model *model);
 void sf_tensorf_set_scalars(fx_scene *scene, const sf_model *model);
-/* Entries of planes, lines and basis matrix; 0 of a scene without. */
-int64_t sf_field_entries(const fx_scene *scene);
 /* The rest: calibrates and fits. Sizes and scalars are set, the scene is allocated. */
 sf_status sf_quantise_tensorf(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                               sf_quant_report *report);

@@ -258,20 +258,6 @@ sf_status sf_quantise_tensorf(fx_scene *scene, const sf_model *model, const char
 
 /* ---- what is not found by fitting ---- */
 
-int64_t sf_field_entries(const fx_scene *scene)
-{
-  const fx_tensorf *f = &scene->tensorf;
-  int64_t entries = 0;
-  if (scene->backbone != FX_TENSORF) return 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) {
-    const int *axis = sf_tensorf_axis[pair];
-    const int64_t points = (int64_t)f->res[axis[0]] * f->res[axis[1]] + f->res[axis[2]];
-    entries += points * (f->density.components[pair] + f->appearance.components[pair]);
-    entries += (int64_t)f->appearance.components[pair] * f->features;
-  }
-  return entries;
-}
-
 static double longest_edge(const sf_tensorf *field)
 {
   double longest = 0;
