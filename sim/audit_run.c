@@ -147,7 +147,7 @@ static sf_status count_twin(sf_audit *a)
 {
   sf_audit_report *r = &a->report;
   if (!a->opt.twin) return sf_ok();
-  const sf_twin_job job = {a->opt.twin, r->net, r->rays, float_ray, twin_tick, a};
+  const sf_twin_job job = {a->opt.twin, r->rays, float_ray, twin_tick, a};
   SF_TRY(sf_twin_count(&job, &r->twin));
   return sf_twin_price(&a->technology, r->ledgers.total[SF_LEDGER_PAPER], &r->twin);
 }

@@ -109,7 +109,7 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
   fprintf(out, "\nalso counted:");
   for (int e = SF_EVENT_WEIGHT; e < SF_EVENTS; e++)
     fprintf(out, "%s %s %" PRIu64, e > SF_EVENT_WEIGHT ? "," : "", sf_events[e].title, sf_event_total(counts, e));
-  fprintf(out, ",\n  hash-grid bytes read %" PRIu64 ", occupancy tests %" PRIu64 "\n", counts->grid_bytes,
+  fprintf(out, ",\n  field bytes read %" PRIu64 ", occupancy tests %" PRIu64 "\n", counts->grid_bytes,
           counts->march_steps);
 }
 

@@ -34,12 +34,13 @@ sf_status sf_twin_count(const sf_twin_job *job, sf_twin *twin)
   sf_status status = sf_ok();
   if (model.config.net != SF_NET_ANN)
     status = sf_fail(SF_E_UNSUPPORTED, "%s: a spiking net, expected a ReLU twin (sf_train --net ann)", job->path);
+  else if (model.config.backbone != SF_INGP)
+    status = sf_fail(SF_E_UNSUPPORTED, "%s: TensoRF, whose rendering does not count the samples it decodes", job->path);
   else if (!c)
     status = sf_fail(SF_E_MEMORY, "audit: out of memory");
   else
     status = count_samples(job, &model, c, &twin->samples);
-  for (int l = 0; l < SF_LAYERS; l++)
-    twin->macs += (uint64_t)job->net->layer[l].n_in * (uint64_t)job->net->layer[l].n_out;
+  for (int p = SF_P_W1; p <= SF_P_W5 && status.code == SF_OK; p++) twin->macs += model.param[p].size;
   free(c);
   sf_model_free(&model);
   return status;
