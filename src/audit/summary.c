@@ -48,8 +48,37 @@ static void print_twin(FILE *out, const sf_audit_report *r)
           r->twin.saving_percent);
 }
 
+static void print_words(FILE *out, const fx_net *net)
+{
+  fprintf(
+      out,
+      "A picture is made of rays, a ray of samples; each sample goes through a small spiking net for t_r time steps:\n"
+      "%scolour (C1 C2 C3). A MAC multiplies a real-valued input by a weight and adds; a SOP adds a weight because a\n"
+      "neuron fired; a neuron update is one leak, comparison and reset. The twin is a ReLU net of the same sizes.\n\n",
+      fx_net_decodes(net) ? "" : "density (D1 D2), ");
+}
+
+static const char *less(double saving)
+{
+  return saving < 0 ? "more" : "less";
+}
+
+static void print_result(FILE *out, const sf_audit_report *r)
+{
+  const sf_ledgers *l = &r->ledgers;
+  const double paper = l->saving[SF_LEDGER_PAPER], all = l->saving[SF_LEDGER_NEURON];
+  if (isnan(paper) || isnan(all)) return;
+  fprintf(out,
+          "In the paper's metric it costs %.6g mJ per view, %.2f%% %s than the twin; with memory and neuron updates "
+          "%.6g mJ,\n%.2f%% %s than an integer twin.\n\n",
+          (double)l->total[SF_LEDGER_PAPER] * 1e-12 / r->views, fabs(paper), less(paper),
+          (double)l->total[SF_LEDGER_NEURON] * 1e-12 / r->views, fabs(all), less(all));
+}
+
 void sf_report_print(FILE *out, const sf_audit_report *r)
 {
+  print_words(out, r->net);
+  print_result(out, r);
   const fx_counts *c = &r->measure.core;
   char census[256], unexpected[64];
   fprintf(out, "%s, %s views of %s: %" PRIu64 " %s rays (%.4g views), %" PRIu64 " with samples\n", r->scene, r->split,
