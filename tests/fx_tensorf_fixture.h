@@ -12,7 +12,7 @@ static inline fx_scene tensorf_scene(void)
       (fx_tensorf){.res = {9, 8, 7}, .density = {.components = {2, 3, 4}}, .appearance = {.components = {3, 2, 4}}};
   field->features = 5, field->feature_freqs = field->view_freqs = 1, field->weight_stop = 1 << 14;
   field->density_in = (fx_scale){1000, 20, 0}, field->sigma_out = (fx_scale){30000, 20, 0};
-  field->product_shift = 12, field->feature_in = (fx_scale){1000, 12, 0}, field->phase_in = (fx_scale){1000, 12, 0};
+  field->feature_in = field->phase_in = (fx_scale){1000, 24, 0};
   field->encoding_frac = 10;
   fx_layer *l = scene.net.layer;
   l[FX_C1].n_in = fx_tensorf_inputs(field), l[FX_C1].n_out = l[FX_C2].n_in = 40;
