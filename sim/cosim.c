@@ -178,7 +178,9 @@ sf_status sf_cosim_ray(sf_cosim *c, uint64_t number, const fx_ray *ray)
   fx_counts march = {0}; /* the accelerator neither marches nor reads the grid */
   c->number = number;
   c->sample = 0;
-  return fx_render_ray(c->scene, ray, evaluate, c, &pixel, &march);
+  SF_TRY(fx_render_ray(c->scene, ray, evaluate, c, &pixel, &march));
+  c->sum.core.rays += march.rays; /* of a decoder; else the nets count them */
+  return sf_ok();
 }
 
 sf_status sf_cosim_finish(sf_cosim *c)

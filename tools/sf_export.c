@@ -286,6 +286,10 @@ static sf_status export_scene(const char *path, const options *o)
   sf_model model;
   if (o->fit) sf_cli_catch_signals();
   SF_TRY(sf_model_load(&model, path));
+  if (o->fit && model.config.backbone == SF_TENSORF) {
+    sf_model_free(&model);
+    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
+  }
   candidates *c = calloc(1, sizeof *c);
   const sf_status status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
   for (int i = 0; c && i < CANDIDATES; i++) fx_scene_free(&c->scene[i]);

@@ -4,6 +4,7 @@
 #ifndef SPIKEFIELD_FX_CORE_H
 #define SPIKEFIELD_FX_CORE_H
 #include "src/fx/count.h"
+#include "src/fx/scene.h"
 
 enum { FX_BLOCK = 48 }; /* samples */
 
@@ -71,6 +72,7 @@ typedef struct fx_kernels {
   uint64_t (*features)(const fx_grid *grid, fx_block *block);
   /* The first lattice point >= n whose cell is occupied, or ray->count. */
   int32_t (*march)(const fx_scene *scene, const fx_ray *ray, int32_t n);
+  const fx_vm *vm; /* of a TensoRF scene */
 } fx_kernels;
 
 struct fx_core {

@@ -43,7 +43,7 @@ static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
   return found < 0 ? ray->count : found;
 }
 
-static const fx_kernels portable = {"portable", 16, nets, features, march};
+static const fx_kernels portable = {"portable", 16, nets, features, march, &fx_vm_portable};
 
 const fx_kernels *fx_kernels_select(const char *name)
 {

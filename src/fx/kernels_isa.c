@@ -2,6 +2,7 @@
 #include "src/fx/grid_isa.h"
 #include "src/fx/march_isa.h"
 #include "src/fx/nets_isa.h"
+#include "src/fx/tensorf_isa.h"
 #include "src/fx/nofloat.h"
 
 #define FX_JOIN_(a, b) a##b
@@ -9,4 +10,5 @@
 #define FX_TEXT_(a) #a
 #define FX_TEXT(a) FX_TEXT_(a)
 
-const fx_kernels FX_JOIN(fx_kernels_, SF_ISA) = {FX_TEXT(SF_ISA), 4 * WIDTH, nets, features, march};
+static const fx_vm vm = {vm_density, vm_features};
+const fx_kernels FX_JOIN(fx_kernels_, SF_ISA) = {FX_TEXT(SF_ISA), 4 * WIDTH, nets, features, march, &vm};

@@ -44,7 +44,7 @@ static void enqueue(wave *w, size_t ray, const uint32_t pos[3], uint32_t weight)
 {
   const fx_scene *scene = w->core->scene;
   fx_block *b = &w->block;
-  fx_tensorf_encode(&scene->tensorf, pos, w->rays[ray].unit, b->constant[b->n], &w->counts);
+  fx_vm_encode(&scene->tensorf, w->core->kernels->vm, pos, w->rays[ray].unit, b->constant[b->n], &w->counts);
   w->sample[b->n++] = (waiting){ray, weight};
   if (b->n == FX_BLOCK) decode(w);
 }
@@ -69,7 +69,7 @@ static void march(wave *w, size_t index)
   uint32_t pos[3];
   fx_composite_begin(pixel);
   for (int32_t n = next_point(w, ray, 0, pos); n >= 0; n = next_point(w, ray, n + 1, pos)) {
-    const uint32_t weight = fx_tensorf_weight(scene, ray, n, pos, pixel, &w->counts);
+    const uint32_t weight = fx_tensorf_weight(scene, w->core->kernels->vm, ray, n, pos, pixel, &w->counts);
     if (weight) enqueue(w, index, pos, weight), decoded++;
     if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) break;
   }

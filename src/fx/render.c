@@ -34,10 +34,10 @@ static sf_status render_ingp(const fx_scene *scene, const fx_ray *ray, fx_net_fn
   return sf_ok();
 }
 
-uint32_t fx_tensorf_weight(const fx_scene *scene, const fx_ray *ray, int32_t n, const uint32_t pos[3], fx_pixel *pixel,
-                           fx_counts *counts)
+uint32_t fx_tensorf_weight(const fx_scene *scene, const fx_vm *vm, const fx_ray *ray, int32_t n, const uint32_t pos[3],
+                           fx_pixel *pixel, fx_counts *counts)
 {
-  const uint32_t sigma = fx_tensorf_density(&scene->tensorf, pos, counts);
+  const uint32_t sigma = fx_vm_sigma(&scene->tensorf, vm, pos, counts);
   const uint32_t weight = fx_composite_weight(pixel, sigma, fx_delta(scene, n), fx_distance(scene, ray, n));
   return weight > (uint32_t)scene->tensorf.weight_stop ? weight : 0;
 }
@@ -48,7 +48,7 @@ static sf_status render_tensorf(const fx_scene *scene, const fx_ray *ray, fx_net
   uint32_t pos[3];
   for (int32_t n = fx_march_next(scene, ray, 0, pos, counts); n >= 0;
        n = fx_march_next(scene, ray, n + 1, pos, counts)) {
-    const uint32_t weight = fx_tensorf_weight(scene, ray, n, pos, pixel, counts);
+    const uint32_t weight = fx_tensorf_weight(scene, &fx_vm_portable, ray, n, pos, pixel, counts);
     if (weight) {
       int16_t x[SF_DIR_MAX];
       fx_out out;

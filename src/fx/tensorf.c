@@ -17,55 +17,15 @@
  * All sums are of integers, so their order does not matter. */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
-#include "src/fx/scene.h"
+#include "src/fx/tensorf_isa.h"
 #include "src/fx/nofloat.h"
 
-enum { CELL_FRAC = 8, ONE = 1 << CELL_FRAC, READS_PLANE = 4, READS_LINE = 2, PRODUCTS = READS_PLANE + READS_LINE + 1 };
-enum { PRODUCT_SHIFT = 15 };
-enum {
-  TURNS_PER_UNIT_Q16 = 41722,
-  PHASE_ONE = 1 << FX_PHASE_BITS
-}; /* 2^16 * 4 / (2 pi): Q1.14 radians to Q.16 turns */
+enum { READS_PLANE = 4, READS_LINE = 2, PRODUCTS = READS_PLANE + READS_LINE + 1 };
+enum { TURNS_PER_UNIT_Q16 = 41722, PHASE_ONE = 1 << FX_PHASE_BITS }; /* 2^16 * 4 / (2 pi): Q1.14 radians to turns */
 
 const int fx_pair_axes[FX_PAIRS][3] = {{0, 1, 2}, {0, 2, 1}, {1, 2, 0}};
 
-typedef struct place {
-  int32_t at[3], next[3]; /* grid points */
-  int32_t g[3];           /* 0..255 */
-} place;
-
-static place find_place(const int32_t res[3], const uint32_t pos[3])
-{
-  place p;
-  for (int axis = 0; axis < 3; axis++) {
-    const int32_t q8 = (int32_t)fx_rshift_round((int64_t)pos[axis] * (res[axis] - 1), SF_POS_FRAC - CELL_FRAC);
-    p.at[axis] = q8 >> CELL_FRAC;
-    p.g[axis] = q8 & (ONE - 1);
-    p.next[axis] = p.at[axis] + (p.g[axis] != 0);
-  }
-  return p;
-}
-
-/* product[components] of one pair, Q.16. */
-static void pair_products(const fx_factors *factors, int pair, const int32_t res[3], const place *p, int32_t *product)
-{
-  const int u = fx_pair_axes[pair][0], v = fx_pair_axes[pair][1], w = fx_pair_axes[pair][2];
-  const int n = factors->components[pair];
-  const size_t near = (size_t)p->at[v] * (size_t)res[u], far = (size_t)p->next[v] * (size_t)res[u];
-  const int8_t *plane = factors->plane[pair];
-  const int8_t *restrict e00 = plane + (near + (size_t)p->at[u]) * (size_t)n;
-  const int8_t *restrict e10 = plane + (near + (size_t)p->next[u]) * (size_t)n;
-  const int8_t *restrict e01 = plane + (far + (size_t)p->at[u]) * (size_t)n;
-  const int8_t *restrict e11 = plane + (far + (size_t)p->next[u]) * (size_t)n;
-  const int8_t *restrict l0 = factors->line[pair] + (size_t)p->at[w] * (size_t)n;
-  const int8_t *restrict l1 = factors->line[pair] + (size_t)p->next[w] * (size_t)n;
-  const int32_t g = p->g[u], h = p->g[v], k = p->g[w];
-  const int32_t w00 = (ONE - g) * (ONE - h), w10 = g * (ONE - h), w01 = (ONE - g) * h, w11 = g * h;
-  for (int c = 0; c < n; c++) {
-    const int32_t sum = e00[c] * w00 + e10[c] * w10 + e01[c] * w01 + e11[c] * w11;
-    product[c] = ((sum + ONE / 2) >> CELL_FRAC) * (l0[c] * (ONE - k) + l1[c] * k);
-  }
-}
+const fx_vm fx_vm_portable = {vm_density, vm_features};
 
 int fx_factors_components(const fx_factors *factors)
 {
@@ -99,44 +59,23 @@ uint32_t fx_tensorf_activate(const fx_tensorf *field, int64_t sum)
   return (uint32_t)fx_usat(scaled(activated, &field->sigma_out), SF_SIGMA_BITS);
 }
 
-uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_counts *counts)
+uint32_t fx_vm_sigma(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3], fx_counts *counts)
 {
-  const place p = find_place(field->res, pos);
-  int64_t sum = 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) {
-    int32_t product[FX_COMPONENTS_MAX];
-    pair_products(&field->density, pair, field->res, &p, product);
-    for (int c = 0; c < field->density.components[pair]; c++) sum += product[c];
-  }
   if (counts) {
     counts->field_samples++;
     count_field(counts, &field->density, 0);
   }
-  return fx_tensorf_activate(field, sum);
+  return fx_tensorf_activate(field, vm->density(field, pos));
+}
+
+uint32_t fx_tensorf_density(const fx_tensorf *field, const uint32_t pos[3], fx_counts *counts)
+{
+  return fx_vm_sigma(field, &fx_vm_portable, pos, counts);
 }
 
 int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x)
 {
-  const place p = find_place(field->res, pos);
-  int n = 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) {
-    int32_t product[FX_COMPONENTS_MAX];
-    pair_products(&field->appearance, pair, field->res, &p, product);
-    for (int c = 0; c < field->appearance.components[pair]; c++)
-      x[n++] = (int16_t)fx_rshift_round(product[c], PRODUCT_SHIFT);
-  }
-  return n;
-}
-
-static void feature_sums(const fx_tensorf *field, const uint32_t pos[3], int32_t sum[FX_APPEARANCE_MAX])
-{
-  int16_t x[FX_PAIRS * FX_COMPONENTS_MAX];
-  const int n = fx_tensorf_products(field, pos, x);
-  for (int f = 0; f < FX_APPEARANCE_MAX; f++) sum[f] = 0;
-  for (int c = 0; c < n; c++) {
-    const int8_t *restrict row = field->basis + (size_t)c * FX_APPEARANCE_MAX;
-    for (int f = 0; f < FX_APPEARANCE_MAX; f++) sum[f] += x[c] * row[f];
-  }
+  return vm_products(field, pos, x);
 }
 
 /* value in Q1.14 to the LSB of the encodings; 1.0 at the finest LSB is one too many for int12. */
@@ -161,11 +100,17 @@ static int16_t *waves(const fx_tensorf *field, const uint32_t *phase, int n, int
 void fx_tensorf_encode(const fx_tensorf *field, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
                        fx_counts *counts)
 {
+  fx_vm_encode(field, &fx_vm_portable, pos, unit, x, counts);
+}
+
+void fx_vm_encode(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
+                  fx_counts *counts)
+{
   const int n = field->features;
   int32_t sum[FX_APPEARANCE_MAX];
   uint32_t phase[FX_APPEARANCE_MAX], turn[3];
   uint64_t saturated = 0;
-  feature_sums(field, pos, sum);
+  vm->features(field, pos, sum);
   for (int f = 0; f < n; f++) {
     x[f] = to_input(scaled(sum[f], &field->feature_in), &saturated);
     phase[f] = (uint32_t)scaled(sum[f], &field->phase_in);
