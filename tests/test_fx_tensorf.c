@@ -3,6 +3,7 @@
  * model. */
 #include "spikefield/io.h"
 #include "spikefield/quant.h"
+#include "spikefield/spikefield.h"
 #include "src/fx/core.h"
 #include "src/fx/round.h"
 #include "tests/fx_fixture.h"
@@ -512,6 +513,50 @@ static void check_file(void)
   fx_scene_free(&scene);
 }
 
+/* The library opens such a scene and renders its rays; what needs a hash grid it refuses. */
+static void check_library(void)
+{
+  enum { RAYS = 40 };
+  float origin[RAYS][3], direction[RAYS][3];
+  spikefield_scene *opened;
+  spikefield_scene_info info;
+  spikefield_pixel pixel[RAYS];
+  spikefield_counts counts = {0};
+  const uint32_t somewhere[3] = {1, 2, 3};
+  int16_t inputs[SF_DIR_MAX] = {0}, harmonics[SPIKEFIELD_DIRECTIONS] = {0};
+  spikefield_sample sample;
+  uint64_t samples = 0;
+  fx_scene scene = foggy(8);
+  ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_OK);
+  ck_assert_int_eq(spikefield_scene_open(&opened, path).code, SPIKEFIELD_OK);
+  ck_assert_int_eq(spikefield_scene_describe(opened, &info).code, SPIKEFIELD_OK);
+  ck_assert_int_eq(info.features, fx_tensorf_inputs(&scene.tensorf));
+  ck_assert_int_eq(info.grid_bytes, fx_tensorf_bytes(&scene.tensorf));
+  for (int i = 0; i < RAYS; i++)
+    for (uint64_t a = 0; a < 3; a++) {
+      origin[i][a] = (float)fixture_pick(5, a, (uint64_t)i, 1, 99) / 100;
+      direction[i][a] = (float)fixture_pick(5, 3 + a, (uint64_t)i, -50, 50) / 100 + 0.001f;
+    }
+  ck_assert_int_eq(spikefield_rays(opened, NULL, origin[0], direction[0], RAYS, pixel, &counts).code, SPIKEFIELD_OK);
+  for (int i = 0; i < RAYS; i++) {
+    fx_ray ray;
+    fx_pixel core;
+    ck_assert_int_eq(sf_fx_ray_make(&scene, origin[i], direction[i], &ray).code, SF_OK);
+    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &core, NULL).code, SF_OK);
+    ck_assert_mem_eq(core.colour, pixel[i].colour, sizeof core.colour);
+    ck_assert(core.transmittance == pixel[i].transmittance && core.samples == pixel[i].samples);
+    samples += core.samples;
+  }
+  ck_assert_uint_gt(samples, RAYS);
+  ck_assert_uint_eq(counts.samples, samples);
+  ck_assert_uint_ge(counts.field_samples, samples);
+  ck_assert_int_eq(spikefield_samples(opened, NULL, harmonics, inputs, 1, &sample, NULL, NULL).code, SPIKEFIELD_OK);
+  const spikefield_status refused = spikefield_features(opened, somewhere, 1, inputs, NULL);
+  ck_assert_msg(refused.code == SPIKEFIELD_E_UNSUPPORTED && strstr(refused.message, "TensoRF"), "%s", refused.message);
+  spikefield_scene_close(opened);
+  fx_scene_free(&scene);
+}
+
 START_TEST(files)
 {
   snprintf(path, sizeof path, "/tmp/spikefield-vm-XXXXXX");
@@ -519,6 +564,7 @@ START_TEST(files)
   ck_assert_int_ge(file, 0);
   close(file);
   check_file();
+  check_library();
   unlink(path);
 }
 END_TEST
