@@ -1,7 +1,6 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "spikefield/golden.h"
-#include "src/fx/scene.h"
-#include "tests/fx_fixture.h"
+#include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
 #include <math.h>
 #include <omp.h>
@@ -236,13 +235,7 @@ static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
   /* The first failure waits for the other threads to start, the later ones come after it. */
   if (index >= r->fail_from) usleep(index == r->fail_from ? 3000 : 9000);
   if (index >= r->fail_from) return sf_fail(SF_E_RANGE, "no ray %llu", (unsigned long long)index);
-  memset(ray, 0, sizeof *ray);
-  if (index % 7 == 3) return sf_ok(); /* misses the box */
-  for (int axis = 1; axis < 3; axis++)
-    ray->origin[axis] = (int64_t)sf_random_below(9, (uint64_t)axis, index, 1 << 24) << 16;
-  ray->step[0] = (int64_t)800000 << 16;
-  ray->count = 20;
-  fixture_inputs(8, index, ray->dir, FX_SH, 1024);
+  audit_ray(index, ray);
   return sf_ok();
 }
 

@@ -1,0 +1,85 @@
+/* Core, accelerator and recount on whole rays: nets with a hash grid, and a decoder behind planes and lines. */
+#include "sim/three_counts.h"
+#include "tests/audit_fixture.h"
+
+enum { RAYS = 8 };
+
+static sf_status ray(void *user, uint64_t index, fx_ray *to)
+{
+  (void)user;
+  audit_ray(index, to);
+  return sf_ok();
+}
+
+static void name(void *user, uint64_t index, char *text, size_t size)
+{
+  (void)user;
+  snprintf(text, size, "ray %llu", (unsigned long long)index);
+}
+
+static sf_three_counts *run(const fx_scene *scene, int stall)
+{
+  static const uint64_t index[RAYS] = {0, 1, 2, 3, 4, 5, 6, 7};
+  sf_three_counts *counts = calloc(1, sizeof *counts);
+  const sf_three_job job = {.scene = scene,
+                            .index = index,
+                            .rays = RAYS,
+                            .ray = ray,
+                            .name = name,
+                            .dut = {.seed = 3, .stall_percent = stall}};
+  counts->wanted = RAYS;
+  const sf_status status = sf_three_counts_run(&job, counts);
+  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_assert_msg(counts->agreement.code == SF_OK, "%s", counts->agreement.message);
+  ck_assert_int_eq(counts->rays, RAYS);
+  ck_assert_uint_gt(counts->core.samples, RAYS);
+  ck_assert_uint_eq(counts->rtl.samples, counts->core.samples);
+  ck_assert_mem_eq(counts->rtl.layer, counts->core.layer, sizeof counts->core.layer);
+  ck_assert_mem_eq(counts->recount.layer, counts->core.layer, sizeof counts->core.layer);
+  ck_assert_uint_gt(sf_event_total(&counts->rtl, SF_EVENT_SPIKES), 0);
+  ck_assert_uint_gt(counts->cycles, counts->busy);
+  return counts;
+}
+
+START_TEST(hash_grid)
+{
+  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  scene.step_q24 = 1 << 19;
+  sf_three_counts *still = run(&scene, 0), *stalled = run(&scene, 40);
+  ck_assert(!still->no_rtl_traffic);
+  ck_assert_uint_eq(still->rtl_traffic.table_bytes, still->core.samples * 4 * 8 * 2);
+  ck_assert_uint_eq(still->rtl_traffic.exp_neg, still->core.samples);
+  ck_assert_uint_eq(still->rtl_traffic.frame_bytes, RAYS * SF_PIXEL_BYTES);
+  ck_assert_mem_eq(&still->rtl_traffic, &still->recount_traffic, sizeof(sf_traffic));
+  ck_assert_mem_eq(&still->rtl_traffic, &still->core_traffic, sizeof(sf_traffic));
+  ck_assert_mem_eq(&still->rtl_traffic, &stalled->rtl_traffic, sizeof(sf_traffic)); /* stalls change cycles alone */
+  ck_assert_uint_gt(stalled->cycles, still->cycles);
+  free(still), free(stalled);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+START_TEST(decoder)
+{
+  fx_scene scene = tensorf_scene();
+  sf_three_counts *counts = run(&scene, 20);
+  ck_assert(counts->no_rtl_traffic);
+  ck_assert_uint_eq(counts->rtl_traffic.table_bytes, 0);
+  ck_assert_mem_eq(&counts->core_traffic, &counts->recount_traffic, sizeof(sf_traffic));
+  ck_assert_uint_gt(counts->core_traffic.exp_neg, counts->core.samples);
+  free(counts);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("three_counts");
+  TCase *all = tcase_create("all");
+  tcase_set_timeout(all, 60);
+  tcase_add_test(all, hash_grid);
+  tcase_add_test(all, decoder);
+  suite_add_tcase(suite, all);
+  return fixture_run(suite);
+}
