@@ -196,6 +196,8 @@ typedef struct sf_audit_report {
   sf_twin twin;
 } sf_audit_report;
 void sf_report_print(FILE *out, const sf_audit_report *report);
+/* By share/schema/energy_audit.schema.json; "format" is SF_AUDIT_FORMAT. */
+#define SF_AUDIT_FORMAT "spikefield-audit-1"
 cJSON *sf_report_json(const sf_audit_report *report);
 /* One row per layer and step, then field and ray: events, fJ of every spiking ledger. */
 void sf_report_csv(FILE *out, const sf_audit_report *report);

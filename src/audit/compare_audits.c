@@ -15,14 +15,33 @@ static const cJSON *get(const cJSON *object, const char *key)
   return cJSON_GetObjectItemCaseSensitive(object, key);
 }
 
+static bool is(const cJSON *item, const char *text)
+{
+  return cJSON_IsString(item) && !strcmp(item->valuestring, text);
+}
+
+/* All ledgers of this version, in their order. */
+static bool has_ledgers(const cJSON *list)
+{
+  if (cJSON_GetArraySize(list) != SF_LEDGERS) return false;
+  for (int g = 0; g < SF_LEDGERS; g++) {
+    const cJSON *ledger = cJSON_GetArrayItem(list, g);
+    if (!is(get(ledger, "key"), sf_ledger_texts[g].key) || !cJSON_IsNumber(get(ledger, "mj_per_view")) ||
+        !cJSON_IsObject(get(ledger, "parts_fj")) || cJSON_GetArraySize(get(ledger, "rows")) != SF_ROWS)
+      return false;
+  }
+  return true;
+}
+
 static sf_status open_side(const cJSON *json, const char *name, side *s)
 {
   const cJSON *ledgers = get(json, "ledgers"), *views = get(json, "views");
   *s = (side){.json = json, .name = name, .technology = get(ledgers, "technology"), .ledgers = get(ledgers, "list")};
   s->layers = get(get(json, "counts"), "layers");
-  if (!cJSON_IsNumber(views) || !(views->valuedouble > 0) || !cJSON_IsArray(s->ledgers) || !cJSON_IsArray(s->layers) ||
-      !cJSON_IsArray(get(s->technology, "prices")) || cJSON_GetArraySize(s->ledgers) != SF_LEDGERS)
-    return sf_fail(SF_E_FORMAT, "%s: not an audit that energy_audit --json wrote", name);
+  if (!is(get(json, "format"), SF_AUDIT_FORMAT) || !cJSON_IsNumber(views) || !(views->valuedouble > 0) ||
+      !has_ledgers(s->ledgers) || cJSON_GetArraySize(s->layers) != SF_LAYERS ||
+      !cJSON_IsArray(get(s->technology, "prices")))
+    return sf_fail(SF_E_FORMAT, "%s: not a report of energy_audit --json, format %s", name, SF_AUDIT_FORMAT);
   s->views = views->valuedouble;
   return sf_ok();
 }

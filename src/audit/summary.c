@@ -142,7 +142,7 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
 
 static void add_origin(cJSON *json, const sf_audit_report *r)
 {
-  cJSON_AddStringToObject(json, "format", "spikefield-audit-1"); /* share/schema/energy_audit.schema.json */
+  cJSON_AddStringToObject(json, "format", SF_AUDIT_FORMAT);
   cJSON_AddStringToObject(json, "scene", r->scene);
   cJSON_AddStringToObject(json, "scene_sha256", r->sha256);
   cJSON_AddStringToObject(json, "data", r->data);
