@@ -1,6 +1,7 @@
 /* For the tests of the audit: a small scene of planes, lines and a decoder. */
 #ifndef SPIKEFIELD_TESTS_FX_TENSORF_FIXTURE_H
 #define SPIKEFIELD_TESTS_FX_TENSORF_FIXTURE_H
+#include "src/fx/scene.h"
 #include "tests/fx_fixture.h"
 
 /* A decoder behind planes and lines of different sizes; part of its samples weigh too little to be decoded. */

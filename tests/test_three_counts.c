@@ -1,6 +1,7 @@
 /* Core, accelerator and recount on whole rays: nets with a hash grid, and a decoder behind planes and lines. */
 #include "sim/three_counts.h"
 #include "tests/audit_fixture.h"
+#include "tests/fx_tensorf_fixture.h"
 
 enum { RAYS = 8 };
 
