@@ -13,8 +13,8 @@ enum { PIECE = 16384, TICK = 1024, PS_PER_US = 1000000 }; /* cycles of one wavef
 
 typedef struct stream {
   sf_dut_sample *sample;
-  int16_t (*f)[SF_DIR_MAX]; /* [fx_net_inputs] each */
-  fx_ray *ray; /* per sample */
+  int16_t (*f)[SF_DIR_MAX]; /* [fx_net_inputs] */
+  fx_ray *ray;              /* per sample */
   int count, room;
 } stream;
 

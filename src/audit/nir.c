@@ -124,9 +124,10 @@ static void density_part(sf_nir_graph *g, const nets *nets)
 /* Inputs that stay the same through the steps: the direction, or all that a decoder has. */
 static void constant_inputs(sf_nir_graph *g, const nets *nets)
 {
-  const char *name = nets->n_in[FX_D1] ? "direction" : "inputs";
+  const bool decodes = nets->n_in[FX_D1] == 0;
+  const char *name = decodes ? "inputs" : "direction";
   sf_nir_node *inputs = add_node(g, name, SF_NIR_INPUT, nets->n_in[FX_C1]);
-  note_number(&inputs->notes, "lsb", nets->direction_lsb);
+  if (!decodes) note_number(&inputs->notes, "lsb", nets->direction_lsb);
   add_bias(add_linear(g, nets, "C1_direction", FX_C1, 0, nets->n_in[FX_C1], 0), nets, FX_C1);
   add_edge(g, name, "C1_direction");
   add_edge(g, "C1_direction", "C1");
