@@ -6,7 +6,8 @@ UNITS_test_rtl_encoder := sf_encoder sf_encoder_4
 UNIT_TOP_sf_encoder_4 := sf_encoder
 UNIT_PARAMETERS_sf_encoder_4 := -GLOG2_PORTS=2
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
-UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder test_rtl_composite
+UNITS_test_rtl_ray_track := sf_ray_track
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder test_rtl_composite test_rtl_ray_track
 TESTS += $(UNIT_TESTS)
 
 LINT_TOPS := sf_ray_top
