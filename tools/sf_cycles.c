@@ -126,9 +126,81 @@ static int busiest(const sf_cycle_totals *t)
   return most;
 }
 
+/* ---- design space ---- */
+
+/* A row of weights is added in one cycle however many lanes there are, so lanes decide which nets run and how many of
+ * the lanes have work, and cores and clock the time. */
+static const int all_lanes[] = {32, 64, 128}, cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static int widest(const fx_net *net)
+{
+  int most = 0;
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (l != FX_D2 && l != FX_C3 && net->layer[l].n_out > most) most = net->layer[l].n_out;
+  return most;
+}
+
+/* Lanes of D1, C1 and C2 that add, of all they have, over all cycles. */
+static double lanes_at_work(const job *j, int lanes)
+{
+  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  const fx_net *net = &j->scene.net;
+  double work = 0, all = 0;
+  for (int l = FX_D1; l <= FX_C2; l++) {
+    if (l == FX_D2 || !net->layer[l].n_out) continue;
+    work += (double)t->busy[l] * net->layer[l].n_out;
+    all += (double)t->cycles * lanes;
+  }
+  return all > 0 ? work / all : 0;
+}
+
+static double frames_per_second(const job *j, int count, double mhz)
+{
+  const uint64_t cycles = sf_cycle_model_totals(j->model)->cycles;
+  return cycles ? 1e6 * mhz * count / (double)cycles : 0;
+}
+
+static void print_space(const job *j)
+{
+  const int least = widest(&j->scene.net);
+  for (size_t i = 0; i < COUNT(all_lanes); i++) {
+    if (all_lanes[i] < least) {
+      printf("\n%d lanes: the net has layers of %d neurons and is refused\n", all_lanes[i], least);
+      continue;
+    }
+    printf("\n%d lanes, %.1f %% of them at work\nframes/s      ", all_lanes[i], 100 * lanes_at_work(j, all_lanes[i]));
+    for (size_t c = 0; c < COUNT(cores); c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
+    for (size_t m = 0; m < COUNT(clocks); m++) {
+      printf("\n  %4d MHz    ", clocks[m]);
+      for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(j, cores[c], clocks[m]));
+    }
+    printf("\n");
+  }
+}
+
+static void add_space(const job *j, cJSON *json)
+{
+  cJSON *space = cJSON_AddArrayToObject(json, "design_space");
+  for (size_t i = 0; i < COUNT(all_lanes); i++) {
+    const bool fits = all_lanes[i] >= widest(&j->scene.net);
+    for (size_t c = 0; c < COUNT(cores) && fits; c++)
+      for (size_t m = 0; m < COUNT(clocks); m++) {
+        cJSON *point = cJSON_CreateObject();
+        cJSON_AddNumberToObject(point, "lanes", all_lanes[i]);
+        cJSON_AddNumberToObject(point, "lanes_at_work", lanes_at_work(j, all_lanes[i]));
+        cJSON_AddNumberToObject(point, "cores", cores[c]);
+        cJSON_AddNumberToObject(point, "clock_mhz", clocks[m]);
+        cJSON_AddNumberToObject(point, "frames_per_second", frames_per_second(j, cores[c], clocks[m]));
+        cJSON_AddItemToArray(space, point);
+      }
+  }
+}
+
+/* ---- output ---- */
+
 static void print_text(const job *j)
 {
-  static const int cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
   const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
   const int most = busiest(t);
   printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, T = %d\n", j->opt.data, j->opt.view, j->rays, t->samples,
@@ -137,13 +209,10 @@ static void print_text(const job *j)
          fx_net_decodes(&j->scene.net) ? "" : " (a dense ReLU net of the same sizes on these lanes: 210)");
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
   for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", layer_name[l], 100 * ratio(t->busy[l], t->cycles));
-  printf("; the busiest is %s\n\nframes/s      ", layer_name[most]);
-  for (size_t c = 0; c < sizeof cores / sizeof *cores; c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
-  for (size_t m = 0; m < sizeof clocks / sizeof *clocks; m++) {
-    printf("\n  %4d MHz    ", clocks[m]);
-    for (size_t c = 0; c < sizeof cores / sizeof *cores; c++)
-      printf("%12.2f", t->cycles ? 1e6 * clocks[m] * cores[c] / (double)t->cycles : 0);
-  }
+  printf("; the busiest is %s\n", layer_name[most]);
+  printf("%" PRIu64 " cycles without a sample for D1, %" PRIu64 " in which sums of D2 or C3 waited for the readout\n",
+         t->waits, t->stalls);
+  print_space(j);
   printf("\n%.2f ms per frame at %.0f MHz in one core\n", ratio(t->cycles, 1) / j->opt.clock / 1e3, j->opt.clock);
 }
 
@@ -157,10 +226,12 @@ static sf_status print_json(const job *j)
   cJSON_AddNumberToObject(json, "cycles_per_sample", ratio(t->cycles, t->samples));
   sf_json_add_u64(json, "latency", j->latency);
   sf_json_add_u64(json, "waits", t->waits);
+  sf_json_add_u64(json, "stalls", t->stalls);
   cJSON *busy = cJSON_AddObjectToObject(json, "utilisation");
   for (int l = 0; l < SF_LAYERS; l++) cJSON_AddNumberToObject(busy, layer_name[l], ratio(t->busy[l], t->cycles));
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
-  cJSON_AddNumberToObject(json, "frames_per_second", t->cycles ? 1e6 * j->opt.clock / (double)t->cycles : 0);
+  cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j, 1, j->opt.clock));
+  add_space(j, json);
   char *text = cJSON_Print(json);
   cJSON_Delete(json);
   if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
@@ -202,17 +273,17 @@ int main(int argc, char **argv)
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
-  const sf_cli cli = {
-      .program = "sf_cycles",
-      .usage = "sf_cycles SCENE.snn DATA [options]",
-      .summary =
-          "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the cycle model: its\n"
-          "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
-      .examples = "  sf_cycles scene.snn data --view 3\n"
-                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n",
-      .options = table,
-      .min_positional = 2,
-      .max_positional = 2};
+  const sf_cli cli = {.program = "sf_cycles",
+                      .usage = "sf_cycles SCENE.snn DATA [options]",
+                      .summary =
+                          "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the "
+                          "cycle model: its\n"
+                          "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
+                      .examples = "  sf_cycles scene.snn data --view 3\n"
+                                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n",
+                      .options = table,
+                      .min_positional = 2,
+                      .max_positional = 2};
   const char *positional[2] = {NULL, NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
   o->scene = positional[0], o->data = positional[1];
