@@ -61,8 +61,8 @@ typedef struct sf_dataset_options {
  *   LLFF         poses_bounds.npy, images or images_N
  *   COLMAP       sparse/0 or sparse: cameras, images and perhaps points3D, .bin or .txt; images or images_N
  * split: "train", "test". Where the folder names no test views, every 8th view, from the first on, is the test split.
- * Every fault names file and place. count is 0 where first is beyond the last view. Fewer than half of the pictures of a
- * split missing: a warning, total counts those that are there. */
+ * Every fault names file and place. count is 0 where first is beyond the last view. Fewer than half of the pictures of
+ * a split missing: a warning, total counts those that are there. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
 /* "PROGRAM: warning: ..." for each. */

@@ -131,16 +131,21 @@ static sf_status read_points(sf_colmap *model, cursor *c)
   return sf_ok();
 }
 
+static sf_status read_all(sf_colmap *model, cursor *c, sf_status (*table)(sf_colmap *, cursor *))
+{
+  SF_TRY(table(model, c));
+  if (c->at == c->size) return sf_ok();
+  return sf_fail(SF_E_FORMAT, "%s: %zu bytes too many behind its last entry at byte %zu", c->path, c->size - c->at,
+                 c->at);
+}
+
 static sf_status read_table(sf_colmap *model, const char *path, sf_status (*table)(sf_colmap *, cursor *))
 {
   char *bytes;
   cursor c = {.path = path};
   SF_TRY(sf_read_file(path, FILE_LIMIT, &bytes, &c.size));
   c.bytes = (const unsigned char *)bytes;
-  sf_status status = table(model, &c);
-  if (status.code == SF_OK && c.at != c.size)
-    status =
-        sf_fail(SF_E_FORMAT, "%s: %zu bytes too many behind its last entry at byte %zu", path, c.size - c.at, c.at);
+  const sf_status status = read_all(model, &c, table);
   free(bytes);
   return status;
 }

@@ -156,7 +156,7 @@ static int ascending(const void *a, const void *b)
 static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options *options)
 {
   move m = {.scale = 1 / (NEAR_FACTOR * c->near)};
-  double back[3], up[3], right[3], half[2], most = 1;
+  double back[3], up[3], right[3], half[2] = {0}, most = 1;
   mean_column(c, 2, back), mean_column(c, 1, up), mean_column(c, 3, m.centre);
   vec_normalise(back);
   vec_cross(up, back, right);
