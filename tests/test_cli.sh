@@ -83,6 +83,7 @@ good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --voxels 16 --rays 64 --samples 256 --threads 1
 good energy_audit s.snn d --rays 20 --rtl-rays 0 --twin twin.safetensors
 good energy_audit --compare s.snn s.snn d --rays 20 --rtl-rays 0 --steps-b 1 --json
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
@@ -132,6 +133,11 @@ number sf_train --hidden 0 129
 usage hidden sf_train d -o out --hidden 17
 number sf_train --input-mode sometimes nan ''
 number sf_train --net cnn
+number sf_train --backbone nerf
+number sf_train --voxels 8 2000 nan
+number sf_train --rays 1 nan
+usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
+data ingp sf_train d -o model.safetensors --backbone tensorf --resume
 number sf_train --fixed-steps -1 9 nan
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan
