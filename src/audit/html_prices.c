@@ -89,6 +89,12 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
 
 static void tornado_figure(FILE *out, const sf_page *page)
 {
+  int drawn = 0;
+  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
+    swing list[SF_PRICES_MAX];
+    drawn += isfinite(page->report->ledgers.saving[g]) && swings_of(&page->report->ledgers, g, list) > 0;
+  }
+  if (drawn == 0) return; /* nothing was counted */
   html_figure_begin(out, "fig-tornado", "", "If a price is wrong by half.",
                     "The saving, in percent, when one price is halved (<i class=\"key cheap\"></i>\xe2\x88\x92"
                     "50 %) or raised by "
@@ -123,7 +129,7 @@ static void break_even_row(FILE *out, const sf_page *page, int i, double y)
             "data-value=\"%.17g\"/>\n",
             at, y + 30, i, b->rate);
     if (b->rate > 1)
-      svg_text(out, W, y + 14, "num strong end good", "above 100 %%");
+      svg_text(out, W, y + 14, "num strong end good", ">100 %%");
     else
       svg_text(out, W, y + 14, now < b->rate ? "num strong end good" : "num strong end bad", "%.2f %%", 100 * b->rate);
   }

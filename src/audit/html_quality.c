@@ -124,8 +124,10 @@ static void prefix_table(FILE *out, const sf_page *page)
 void html_quality(FILE *out, const sf_page *page)
 {
   fprintf(out, "<section id=\"quality\">\n<h2>Picture quality against energy</h2>\n");
-  if (!isfinite(page->prefix[0].psnr)) {
-    fprintf(out, "<p>The view has no photograph to compare with: PSNR is not measured.</p>\n");
+  if (!isfinite(page->prefix[0].psnr) || page->prefix[0].fj == 0) {
+    fprintf(out, "<p>%s</p>\n",
+            page->prefix[0].fj ? "The view has no photograph to compare with: PSNR is not measured."
+                               : "No ray of the view has samples: there is nothing to plot.");
     prefix_table(out, page);
   } else {
     const axes a = choose_axes(page);
