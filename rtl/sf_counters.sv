@@ -149,7 +149,7 @@ module sf_counters (
   always_ff @(posedge clk_i) begin
     if (wipe && at_layer == sf_op_pkg::D1) d1_mac_q <= 64'd0;
     else if (d1_row_i) d1_mac_q <= d1_mac_q + n_d1;
-    if (wipe && at_layer == sf_op_pkg::C1) c1_bias_q <= 64'd0;
+    if (wipe && at_layer == sf_op_pkg::C1 && at_step == 3'd0) c1_bias_q <= 64'd0;
     else if (c1_bias_row_i) c1_bias_q <= c1_bias_q + n_c1;
     if (wipe && at_layer == sf_op_pkg::C1) c1_mac_q[at_step] <= 64'd0;
     else if (c1_row_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
