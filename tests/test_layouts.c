@@ -833,6 +833,7 @@ static const bad_text bad_texts[] = {
     {"1 PINHOLE 16 12 nan 20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "parameter 0 of PINHOLE is not finite"},
     {CAMERA CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n\n", SF_E_FORMAT, "cameras.txt", "camera 1 is listed twice"},
     {CAMERA, "", SF_E_RANGE, "images.txt", "zero views"},
+    {"# none\n", "1 1 0 0 0 0 0 0 2 p00.png\n\n", SF_E_FORMAT, "image 1 (p00.png)", "cameras.txt does not list"},
     {CAMERA, "1 1 0 0 0 0 0 0 2 p00.png\n\n", SF_E_FORMAT, "image 1 (p00.png)", "camera 2"},
     {CAMERA, "1 1 0 0 0 0 0 x 1 p00.png\n\n", SF_E_FORMAT, "images.txt:1", "number 8 cannot be read"},
     {CAMERA, "1 1 0 0 0.5 0 0 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "no unit quaternion"},

@@ -72,7 +72,8 @@ static sf_status set_frame(sf_frame *frame, const sf_colmap *model, int i, const
 {
   const sf_colmap_image *image = &model->image[i];
   const sf_colmap_camera key = {.id = image->camera};
-  const sf_colmap_camera *camera = bsearch(&key, model->camera, (size_t)model->cameras, sizeof key, by_id);
+  const sf_colmap_camera *camera =
+      model->cameras ? bsearch(&key, model->camera, (size_t)model->cameras, sizeof key, by_id) : NULL;
   if (!camera)
     return sf_fail(SF_E_FORMAT, "%s: image %lld (%s) is of camera %lld, which %s does not list", t->images,
                    (long long)image->id, image->name, (long long)image->camera, t->cameras);
