@@ -111,7 +111,8 @@ static void scatter(sf_model *m, uint64_t trial)
 START_TEST(march_equals_testing_every_point)
 {
   for (int bound = 2; bound <= 32; bound *= 4) {
-    const sf_config c = large_config(bound, 16);
+    sf_config c = large_config(bound, 16);
+    if (bound == 8) c.dt_gamma = 0.125f; /* steps pass to coarser cells inside of fine ones */
     sf_model m;
     sf_steps steps;
     int found = 0, in_cascade[7] = {0};
