@@ -215,7 +215,7 @@ empty_picture() { : >"$1"; }
 readers nodir nodir
 spoil; rm bad/*.json; readers bad bad
 spoil; rm bad/*/*.png; readers r_ bad
-spoil; rm bad/train/r_0.png bad/test/r_0.png; readers r_0 bad
+spoil; rm bad/train/r_[01].png bad/test/r_0.png; readers r_0 bad
 spoil; first_pictures cut_picture; readers r_0 bad
 spoil; first_pictures empty_picture; readers r_0 bad
 spoil; first_pictures flip_picture; readers r_0 bad

@@ -391,17 +391,17 @@ static void settle(arguments *a, const sf_dataset *data)
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data->bound);
   a->train.background = a->background ? a->background - 1 : transparent != vm ? 0 : 1;
-  if (a->quiet || vm) return;
-  fprintf(stderr, "sf_train: box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c),
-          c->bound > 1 ? "s" : "");
+  if (a->quiet || a->json || vm) return;
+  printf("box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c), c->bound > 1 ? "s" : "");
   if (c->dt_gamma > 0)
-    fprintf(stderr, "steps of distance / %g", 1 / (double)c->dt_gamma);
+    printf("steps of distance / %g", 1 / (double)c->dt_gamma);
   else
-    fprintf(stderr, "equal steps");
-  fprintf(stderr, ", finest level %d, background %s (%s)\n", c->finest_res, name[a->train.background],
-          a->background ? "as asked for"
-          : transparent ? "the pictures have alpha"
-                        : "the pictures are opaque");
+    printf("equal steps");
+  printf(", finest level %d, background %s (%s)\n", c->finest_res, name[a->train.background],
+         a->background ? "as asked for"
+         : transparent ? "the pictures have alpha"
+                       : "the pictures are opaque");
+  fflush(stdout);
 }
 
 /* What follows from the options, once they are parsed. */
