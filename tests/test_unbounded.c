@@ -227,7 +227,7 @@ START_TEST(integer_cells_are_those_of_the_formula)
         const int64_t half = (int64_t)1 << (39 - face / 2);
         const int64_t beside = (int64_t)sf_random_below(2, a, i, 3) - 1;
         p[a] = i % 2 ? (int64_t)1 << 39 : (int64_t)(sf_random_below(3, a, i, 1 << 24) << 16);
-        if (i % 2) p[a] += face % 2 ? half + (beside << 16) : -half + (beside << 16);
+        if (i % 2) p[a] += face % 2 ? half + beside * 65536 : -half + beside * 65536;
         p[a] = p[a] < 0 ? 0 : p[a] > (int64_t)0xffffff << 16 ? (int64_t)0xffffff << 16 : p[a];
         x[a] = ldexpf((float)(p[a] >> 16), -24);
       }

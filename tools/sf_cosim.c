@@ -159,6 +159,7 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
   sf_progress_begin(&d.progress, o->quiet);
   const sf_status status = sf_activity_run(l, &o->activity, &r);
   sf_progress_end(&d.progress);
+  l->user = NULL;
   SF_TRY(status);
   return report_activity(o, &r);
 }

@@ -63,7 +63,7 @@ static void by_layer(FILE *out, const sf_page *page)
   const fx_counts *c = &page->report->measure.core;
   const int steps = page->report->net->steps;
   uint64_t all = sf_energy_fj(c), top = 0;
-  char text[HTML_NUMBER], name[12];
+  char text[HTML_NUMBER], name[16];
   for (int l = 0; l < SF_LAYERS; l++) top = layer_fj(c, l, steps) > top ? layer_fj(c, l, steps) : top;
   const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
   svg_begin(out, "svg-by-layer", WIDTH, ROW * (SF_LAYERS - first), "Energy by layer",

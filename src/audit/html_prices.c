@@ -27,6 +27,7 @@ static int swings_of(const sf_ledgers *l, int ledger, swing list[SF_PRICES_MAX])
     const double less = l->sensitivity[i].less[ledger], more = l->sensitivity[i].more[ledger];
     if (isfinite(less) && isfinite(more) && fabs(less - more) > 1e-9) list[n++] = (swing){i, less, more};
   }
+  /* cppcheck-suppress uninitvar ; the first n are set above */
   qsort(list, (size_t)n, sizeof *list, by_swing);
   while (n > SWINGS || (n > 1 && fabs(list[n - 1].more - list[n - 1].less) < fabs(list[0].more - list[0].less) / 20))
     n--;

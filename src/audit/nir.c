@@ -164,8 +164,8 @@ static void colour_part(sf_nir_graph *g, const nets *nets)
 static sf_status write_nets(const char *path, const nets *nets)
 {
   sf_nir_graph *g = calloc(1, sizeof *g);
-  sf_status status = g ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: out of memory", path);
-  if (status.code != SF_OK) return status;
+  if (!g) return sf_fail(SF_E_MEMORY, "%s: out of memory", path);
+  sf_status status = sf_ok();
   if (nets->n_in[FX_D1]) density_part(g, nets);
   if (nets->n_in[FX_C1]) constant_inputs(g, nets);
   if (nets->n_h) hidden_inputs(g, nets);

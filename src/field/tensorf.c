@@ -139,7 +139,7 @@ void sf_tensorf_appearance(const sf_model *m, const float x[3], float *features)
 {
   const sf_tensorf *f = &m->config.tensorf;
   const int all = sf_tensorf_products(f);
-  float product[3 * SF_COMPONENTS_MAX];
+  float product[3 * SF_COMPONENTS_MAX] = {0};
   for (int i = 0, n = 0; i < 3; n += f->appearance[i++])
     products(m, SF_V_APP_PLANE + i, i, x, f->appearance[i], product + n);
   const float *basis = sf_model_param(m, SF_V_BASIS);

@@ -73,7 +73,7 @@ static inline cell find_cell(const sf_march *m, int least, const float x[3])
   int at[3], farthest = 0;
   for (int a = 0; a < 3; a++) {
     at[a] = (int)(x[a] * (float)fine) - fine / 2;
-    farthest |= at[a] ^ at[a] >> 31; /* negative numbers reach one place farther */
+    farthest |= at[a] < 0 ? ~at[a] : at[a]; /* negative numbers reach one place farther */
   }
   cell c = {.cascade = least};
   while (farthest >> c.cascade >= middle) c.cascade++;
