@@ -181,6 +181,12 @@ cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS 
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 15 --rays 400
 
+# A scene of one's own.
+MINUTES ?= 15
+scene: all ## the same chain on DATA=folder (any layout): build/scenes/NAME; MINUTES=15, TRAIN="--backbone tensorf ..."
+	@[ -z "$(filter file,$(origin DATA))" ] || { echo "make scene DATA=folder: which folder of pictures and poses?" >&2; exit 2; }
+	@STARTED=$(STARTED) tools/chain.sh $B "$(DATA)" "$B/scenes/$(notdir $(DATA:%/=%))" --minutes $(MINUTES) --train "$(TRAIN)"
+
 report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/report.html), or print where it is
 	@[ -f "$(REPORT)" ] || { echo "$(REPORT): not there; make demo writes build/demo/report.html" >&2; exit 1; }
 	@echo "$(abspath $(REPORT))"
@@ -220,6 +226,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego report reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif
