@@ -52,7 +52,7 @@ grep -qF "moved/share/spikefield/tech/45nm.tech" "$work/err" || fail "the missin
 
 # The text: every ledger, the limits, the agreement.
 audit >"$work/text" || fail "text"
-for words in 'core = accelerator = recount' '+ neuron updates' 'integer ANN' 'not modelled' 'known criticism' \
+for words in 'core = accelerator = recount' '+ neuron updates' 'integer ReLU twin' 'not modelled' 'known criticism' \
   'Firing rate at which' 'Horowitz' 'largest first'; do
   grep -qF -e "$words" "$work/text" || fail "the report does not say '$words'"
 done

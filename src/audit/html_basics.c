@@ -78,6 +78,25 @@ static void layer_table(FILE *out, const sf_page *page)
   fprintf(out, "</tbody></table></div>\n");
 }
 
+/* Words of the page that only some of its readers know. */
+static void glossary(FILE *out)
+{
+  static const char *const word[][2] = {
+      {"field bytes", "reads of the table that holds the scene: the hash grid, or planes and lines"},
+      {"state bytes", "reads and writes of membranes: what a neuron keeps between steps; in the twin, of activations"},
+      {"frame bytes", "finished pixels, written to memory"},
+      {"h", "what the density network hands to the colour network, at every step"},
+      {"t_r, T", "time steps that the network runs after its training; the most that the training allowed"},
+      {"SSIM", "likeness of two pictures in their structure; 1 is equal"},
+      {"fixed-point core", "C code that computes with the integers of the accelerator, bit for bit"},
+      {"golden image", "the picture that the fixed-point core renders: what hardware must reproduce"},
+  };
+  fprintf(out, "<h3>Words</h3>\n<dl id=\"glossary\">\n");
+  for (size_t i = 0; i < sizeof word / sizeof *word; i++)
+    fprintf(out, "<dt>%s</dt><dd>%s</dd>\n", word[i][0], word[i][1]);
+  fprintf(out, "</dl>\n");
+}
+
 void html_basics(FILE *out, const sf_page *page)
 {
   fprintf(out,
@@ -98,5 +117,6 @@ void html_basics(FILE *out, const sf_page *page)
                "literature uses them. 1 pJ (picojoule) is 10<sup>\xe2\x88\x92"
                "12</sup> J; 1 mJ is a billion pJ.</p>\n");
   layer_table(out, page);
+  glossary(out);
   fprintf(out, "</section>\n");
 }

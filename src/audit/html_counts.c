@@ -99,7 +99,8 @@ static void by_layer_and_step(FILE *out, const sf_page *page)
       fprintf(out, "</tr>\n");
     }
   }
-  fprintf(out, "</tbody></table></div>\n");
+  fprintf(out, "</tbody></table></div>\n<p class=\"note\">D2 and C3 fetch a row of weights once per sample, at the "
+               "first step at which its neuron fires: later steps fetch little.</p>\n");
 }
 
 void html_counts(FILE *out, const sf_page *page)
@@ -139,6 +140,8 @@ static void census(FILE *out, const sf_page *page)
   const fx_counts *c = &page->report->measure.core;
   const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
   char list[64];
+  uint64_t clipped = c->saturated_features;
+  for (int l = 0; l < SF_LAYERS; l++) clipped += c->saturated_samples[l];
   fprintf(out, "<h3>Saturation</h3>\n<p>Fixed-point numbers have a largest value; a result beyond it is clipped to it. "
                "Samples in which that happened, of ");
   html_put_count(out, "samples", c->samples);
@@ -159,6 +162,8 @@ static void census(FILE *out, const sf_page *page)
     fprintf(out, "<p class=\"bad\">Unexpected in ");
     html_escape(out, list);
     fprintf(out, ": the number formats rule it out.</p>\n");
+  } else if (clipped == 0) {
+    fprintf(out, "<p>None saturated.</p>\n");
   } else {
     fprintf(
         out,

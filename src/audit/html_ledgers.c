@@ -82,9 +82,12 @@ static void savings(FILE *out, const sf_page *page)
   ledger_rows(page, ledger);
   reading_rows(page, reading);
   fprintf(out, "<div class=\"grid\">\n");
-  html_figure_begin(out, "fig-savings", "", "Saved, by ledger.",
-                    "The spiking network against its twin under the same assumptions; each ledger prices more than the "
-                    "one above it.");
+  html_figure_begin(
+      out, "fig-savings", "", "Saved, by ledger.",
+      "The spiking network against its ReLU twin, priced in the same way. The width-correct ledger prices the "
+      "events of the paper ledger anew; those below it add to it. The twin of the paper ledger "
+      "multiplies the direction of a ray at every sample, the others once per ray as the spiking "
+      "network does.");
   saving_bars(out, "svg-savings", "Savings of every ledger", ledger, SF_SPIKING_LEDGERS);
   html_figure_end(out);
   if (fx_net_decodes(page->report->net)) { /* no h, and the direction comes with every sample */
@@ -116,7 +119,7 @@ static void stacked(FILE *out, const sf_page *page, int ledger, double y, double
     snprintf(style, sizeof style, "bar p%d", p);
     snprintf(tip, sizeof tip, "%s: %s", sf_part_titles[p], html_energy(text, (double)l->part[ledger][p]));
     svg_bar(out, x, y + 20, width, 22, style, key, l->part[ledger][p], tip);
-    if (width > 10.5 * (double)strlen(sf_part_titles[p]))
+    if (width > 8.6 * (double)strlen(sf_part_titles[p]))
       svg_text(out, x + width / 2, y + 35, p == SF_PART_MAC || p == SF_PART_SOP ? "in mid" : "part mid", "%s",
                sf_part_titles[p]);
     x += width;
@@ -156,9 +159,10 @@ static void parts_table(FILE *out, const sf_page *page)
   for (int p = 0; p < SF_PARTS; p++)
     fprintf(out, "<th class=\"n\"><i class=\"key p%d\"></i>%s</th>", p, sf_part_titles[p]);
   fprintf(out, "</tr></thead>\n<tbody>\n");
-  for (int g = 0; g < SF_LEDGERS; g++) {
+  for (int i = 0; i < 2 * SF_SPIKING_LEDGERS; i++) { /* a ledger, then its twin */
+    const int g = i % 2 ? sf_ledger_texts[i / 2].baseline : i / 2;
     char key[64];
-    fprintf(out, "<tr><th>");
+    fprintf(out, "<tr%s><th>", i % 2 ? "" : " class=\"first\"");
     html_escape(out, sf_ledger_texts[g].title);
     fprintf(out, "</th><td class=\"n strong\">");
     snprintf(key, sizeof key, "ledgers.list[%d].total_fj", g);
@@ -181,8 +185,9 @@ void html_ledgers(FILE *out, const sf_page *page)
   fprintf(out,
           "<section id=\"ledgers\">\n<h2>The same work under other assumptions</h2>\n"
           "<p>Counting operations is exact; pricing them is a choice. Each ledger prices the same counted events, and "
-          "each is compared with a twin \xe2\x80\x93 the same layers without spikes, on the same samples \xe2\x80\x93 "
-          "under the same assumptions.</p>\n");
+          "each is compared with its ReLU twin \xe2\x80\x93 the same layers without spikes, on the same samples "
+          "\xe2\x80\x93 "
+          "priced in the same way.</p>\n");
   savings(out, page);
   fprintf(out, "<p class=\"note\">Below, each ledger has a scale of its own: compare lengths within a ledger, numbers "
                "between them.</p>\n<div class=\"grid\">\n");

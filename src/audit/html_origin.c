@@ -41,8 +41,7 @@ const char *const html_style[] = {
     "0d1013;--dark:#0d1013;",
     "--l0:#3f9bd6;--l1:#93d0f5;--l2:#e8792e;--l3:#f3bb5e;--l4:#dba3c6;",
     "--p0:#e8792e;--p1:#3f9bd6;--p2:#2bb98d;--p3:#93d0f5;--p4:#f3bb5e;--p5:#9aa2ac;--p6:#dba3c6;--p7:#e9dc62}}",
-    "*{box-sizing:border-box}",
-    "html{-webkit-text-size-adjust:100%;color-scheme:light dark}",
+    "*{box-sizing:border-box}", "html{-webkit-text-size-adjust:100%;color-scheme:light dark}",
     "body{margin:0 auto;max-width:1120px;padding:28px 20px 60px;background:var(--bg);color:var(--ink);",
     "font:16px/1.55 system-ui,-apple-system,'Segoe UI','DejaVu Sans',sans-serif;font-variant-numeric:tabular-nums}",
     "h1{font-size:2rem;line-height:1.15;margin:.1em 0 .15em;letter-spacing:-.01em;overflow-wrap:anywhere}",
@@ -59,7 +58,10 @@ const char *const html_style[] = {
     ".facts div{background:var(--bg);padding:.6rem .9rem}.facts dt{color:var(--mut);font-size:.82rem}",
     ".facts dd{margin:0;font-size:1.25rem;font-weight:600;white-space:nowrap}",
     ".facts small{display:block;font-weight:400;font-size:.8rem;color:var(--mut)}data{white-space:nowrap}",
-    ".facts .unit{display:inline}",
+    ".facts .unit{display:inline}.facts .basis{white-space:normal;line-height:1.3}",
+    "#glossary{display:grid;grid-template-columns:max-content minmax(0,1fr);gap:.15rem "
+    "1rem;font-size:.9rem;max-width:84ch}",
+    "#glossary dt{font-weight:600}#glossary dd{margin:0}", "@media (max-width:520px){#glossary{display:block}}",
     "nav{margin:1rem 0 0;font-size:.92rem}nav a{margin-right:1rem;white-space:nowrap}",
     ".grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:1.6rem "
     "2rem;align-items:start;",
@@ -89,8 +91,7 @@ const char *const html_style[] = {
     ".ring{stroke:#fff;stroke-width:2;opacity:1}.box{fill:var(--soft);stroke-width:1.5}.box.ann{stroke:var(--ann)}",
     ".box.spk{stroke:var(--spk)}.box.none{stroke:var(--line);stroke-dasharray:4 3}.field{fill:var(--soft)}",
     ".tick{fill:none;stroke-width:1.5}.bar.spk{fill:var(--spk)}.bar.loss{fill:var(--loss)}",
-    ".bar.cheap,.key.cheap{fill:var(--p3);background:var(--p3)}.bar.dear,.key.dear{fill:var(--p0);background:var(--p0)"
-    "}",
+    ".bar.cheap,.key.cheap{fill:#8f72c9;background:#8f72c9}.bar.dear,.key.dear{fill:#8b8530;background:#8b8530}",
     ".l0{fill:var(--l0)}.l1{fill:var(--l1)}.l2{fill:var(--l2)}.l3{fill:var(--l3)}.l4{fill:var(--l4)}",
     "path.l0{stroke:var(--l0);fill:none}path.l2{stroke:var(--l2);fill:none}path.l3{stroke:var(--l3);fill:none}",
     ".p0{fill:var(--p0)}.p1{fill:var(--p1)}.p2{fill:var(--p2)}.p3{fill:var(--p3)}",
@@ -104,15 +105,19 @@ const char *const html_style[] = {
     ".key.p6{background:var(--p6)}.key.p7{background:var(--p7)}",
     ".plate{position:relative;background:var(--plate);line-height:0}.plate img{width:100%;height:auto;display:block}",
     "img.coarse{image-rendering:pixelated}.plate svg.over{position:absolute;inset:0;height:100%}",
-    ".scroll{overflow-x:auto;margin:1rem "
-    "0}table{border-collapse:collapse;font-size:.88rem;line-height:1.35;width:100%}",
+    /* a shadow at the side on which there is more */
+    ".scroll{overflow-x:auto;margin:1rem 0;background:linear-gradient(90deg,var(--bg) 40%,transparent) left/36px 100% "
+    "no-repeat local,",
+    "linear-gradient(270deg,var(--bg) 40%,transparent) right/36px 100% no-repeat local,",
+    "linear-gradient(90deg,var(--ann),transparent) left/14px 100% no-repeat scroll,",
+    "linear-gradient(270deg,var(--ann),transparent) right/14px 100% no-repeat "
+    "scroll}table{border-collapse:collapse;font-size:.88rem;line-height:1.35;width:100%}",
     "table.narrow{width:auto}caption{text-align:left;font-weight:600;padding-bottom:.4rem}",
     "th,td{text-align:left;padding:.32rem .9rem .32rem 0;border-bottom:1px solid var(--line);vertical-align:top}",
     "thead th{color:var(--mut);font-weight:500;vertical-align:bottom}tbody th{font-weight:600;white-space:nowrap}",
     ".n{text-align:right}td.n{white-space:nowrap}td.strong{font-weight:600}td.mut{color:var(--mut)}",
     "@media (max-width:520px){svg text,svg .in,svg .part{font-size:15.5px}.trio svg text{font-size:13px}}",
-    "tr.chosen{background:var(--soft)}",
-    "body[data-layer] svg .bar:not(.lit){opacity:.25}",
+    "tr.chosen{background:var(--soft)}", "body[data-layer] svg .bar:not(.lit){opacity:.25}",
     "@media print{:root{--bg:#fff;--ink:#000;--mut:#444;--line:#bbb;--soft:#f3f5f7;--plate:#d5d9de;--good:#00664b;",
     "--bad:#a8321a;--spk:#0072b2;--ann:#8a919b;--loss:#c24e00;--in:#fff;--dark:#1c2127;--l0:#0072b2;--l1:#6bbcec;",
     "--l2:#b84a00;--l3:#eba63c;--l4:#c98bb0;--p0:#b84a00;--p1:#0072b2;--p2:#009e73;--p3:#6bbcec;--p4:#eba63c;--p5:#"
@@ -121,8 +126,7 @@ const char *const html_style[] = {
     "print-color-adjust:exact;-webkit-print-color-adjust:exact}figure,tr,.facts{break-inside:avoid}",
     "h2,h3,figcaption,caption{break-after:avoid}table{font-size:8pt}",
     "th,td{padding-right:.5rem}a{color:inherit;text-decoration:none}}",
-    "@media print and (min-width:680px){.scroll{overflow:visible}}",
-    NULL};
+    "@media print and (min-width:680px){.scroll{overflow:visible}}", NULL};
 
 /* A pointer on a layer's bar shows the same layer everywhere. */
 const char *const html_script[] = {

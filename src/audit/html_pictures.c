@@ -139,10 +139,12 @@ static sf_status samples_picture(FILE *out, const sf_page *page)
 {
   double mean;
   const double top = plane_top(&page->golden, SF_PLANE_SAMPLES, &mean);
-  char caption[300];
-  snprintf(caption, sizeof caption,
-           "Points at which the network was asked: %.0f at most, %.1f on average where there are any (grey: none).",
-           top, mean);
+  char caption[400];
+  snprintf(
+      caption, sizeof caption,
+      "Points at which the network was asked: %.0f at most, %.1f on average where there are any (grey: none). Specks "
+      "beside the scene are samples in empty space that the occupancy grid takes for occupied.",
+      top, mean);
   html_figure_begin(out, "fig-samples-map", "", "Samples per pixel.", caption);
   fprintf(out, "<div class=\"plate\">");
   SF_TRY(heat_map(out, &page->golden, SF_PLANE_SAMPLES, top, "Heat map of the samples of every pixel"));
@@ -179,7 +181,10 @@ static sf_status steps_picture(FILE *out, const sf_page *page)
   for (size_t i = 0; i < n; i++) of[page->steps[i]]++;
   html_figure_begin(out, "fig-steps-map", "", "Time steps a pixel needs.",
                     "Fewest steps after which its colour is within 4/255 of the nearest it comes to the photograph at "
-                    "any t = 1..8. The network is unrolled for t<sub>r</sub> steps everywhere.");
+                    "any t = 1..8; below, shares of the pixels that have samples. The network runs t<sub>r</sub> "
+                    "steps everywhere: the budget that it was trained with weighs quality against energy "
+                    "(by \xce\xb2) and its weights were fitted to it, so that t<sub>r</sub> may exceed what most "
+                    "pixels need.");
   fprintf(out, "<div class=\"plate\">");
   SF_TRY(html_put_png(out, page->steps, page->golden.width, page->golden.height, palette, SF_T_MAX + 1,
                       "Map of the number of time steps that every pixel needs"));

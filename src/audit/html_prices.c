@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { WIDTH = 480, ROW = 40, TOP = 22, SWINGS = 6 };
+enum { WIDTH = 480, ROW = 46, TOP = 22, SWINGS = 6 };
 
 /* ---- tornado ---- */
 
@@ -76,13 +76,13 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
     snprintf(key, sizeof key, "ledgers.sensitivity[%d].saving_percent.%s.less", list[i].index,
              sf_ledger_texts[ledger].key);
     snprintf(tip, sizeof tip, "%s at half its price: %.2f %% saved", price->key, list[i].less);
-    half_bar(out, key, now, list[i].less, x0, scale, low, y + 18, "cheap", tip);
+    half_bar(out, key, now, list[i].less, x0, scale, low, y + 22, "cheap", tip);
     snprintf(key, sizeof key, "ledgers.sensitivity[%d].saving_percent.%s.more", list[i].index,
              sf_ledger_texts[ledger].key);
     snprintf(tip, sizeof tip, "%s at one and a half times its price: %.2f %% saved", price->key, list[i].more);
-    half_bar(out, key, now, list[i].more, x0, scale, low, y + 18, "dear", tip);
-    svg_text(out, x0 + (a - low) * scale - 4, y + 30, "num end", "%s", html_tenths(text, a));
-    svg_text(out, x0 + (b - low) * scale + 4, y + 30, "num", "%s", html_tenths(text, b));
+    half_bar(out, key, now, list[i].more, x0, scale, low, y + 22, "dear", tip);
+    svg_text(out, x0 + (a - low) * scale - 4, y + 34, "num end", "%s", html_tenths(text, a));
+    svg_text(out, x0 + (b - low) * scale + 4, y + 34, "num", "%s", html_tenths(text, b));
   }
   svg_end(out);
   fprintf(out, "</div>\n");
@@ -100,7 +100,8 @@ static void tornado_figure(FILE *out, const sf_page *page)
                     "The saving, in percent, when one price is halved (<i class=\"key cheap\"></i>\xe2\x88\x92"
                     "50 %) or raised by "
                     "half (<i class=\"key dear\"></i>+50 %) and the others stay. The longer the bar, the more the "
-                    "answer hangs on that price.");
+                    "answer hangs on that price. The largest six prices are shown, none whose bar is below a "
+                    "twentieth of the longest; each ledger has a scale of its own.");
   fprintf(out, "<div class=\"grid\">\n");
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
     swing list[SF_PRICES_MAX];
@@ -150,15 +151,15 @@ static void break_even_figure(FILE *out, const sf_page *page)
       "100 %%: cheaper at any rate; none: dearer at any rate.",
       100 * page->report->ledgers.rate);
   html_figure_begin(out, "fig-break-even", "", "Break-even firing rate.", caption);
-  svg_begin(out, "svg-break-even", W, STEP * SF_BREAK_EVENS + 22, "Break-even firing rates",
+  svg_begin(out, "svg-break-even", W, STEP * SF_SPIKING_LEDGERS + 22, "Break-even firing rates",
             "One line per comparison, from 0 to 100 %");
-  for (int i = 0; i < SF_BREAK_EVENS; i++) break_even_row(out, page, i, STEP * i);
+  for (int i = 0; i < SF_SPIKING_LEDGERS; i++) break_even_row(out, page, i, STEP * i);
   for (int i = 0; i <= 4; i++)
     svg_text(out,
              i == 0   ? 0
              : i == 4 ? W
                       : 8 + (W - 16) * i / 4.0,
-             STEP * SF_BREAK_EVENS + 16,
+             STEP * SF_SPIKING_LEDGERS + 16,
              i == 0   ? "num mut"
              : i == 4 ? "num mut end"
                       : "num mut mid",

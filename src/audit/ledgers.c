@@ -16,10 +16,10 @@ const sf_ledger_text sf_ledger_texts[SF_LEDGERS] = {
     {"width", "width-correct", "MAC and SOP at integer prices for the widths of the hardware", SF_LEDGER_INT},
     {"memory", "+ memory", "and the bytes of weights, membranes, field and frame", SF_LEDGER_INT_MEMORY},
     {"neuron", "+ neuron updates", "and leak, compare, reset, exp and sigmoid", SF_LEDGER_INT_ALL},
-    {"ann_fp32", "fp32 ANN twin", "the ReLU net of the same sizes on the same samples: every synapse an fp32 MAC", -1},
-    {"ann_int", "integer ANN twin", "the same in int8 x int8 + int32, the direction's products once per ray", -1},
-    {"ann_int_memory", "integer ANN + memory", "and the bytes of weights, activations, field and frame", -1},
-    {"ann_int_all", "integer ANN, all", "and ReLU, requantisation, exp and sigmoid", -1}};
+    {"ann_fp32", "fp32 ReLU twin", "the ReLU net of the same sizes on the same samples: every synapse an fp32 MAC", -1},
+    {"ann_int", "integer ReLU twin", "the same in int8 x int8 + int32, the direction's products once per ray", -1},
+    {"ann_int_memory", "ReLU twin + memory", "and the bytes of weights, activations, field and frame", -1},
+    {"ann_int_all", "ReLU twin, all", "and ReLU, requantisation, exp and sigmoid", -1}};
 
 /* What each ledger prices beyond MAC and SOP. */
 static bool is_integer(int ledger)

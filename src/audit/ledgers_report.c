@@ -18,7 +18,7 @@ static void print_percent(FILE *out, double percent)
 
 static void print_table(FILE *out, const sf_ledgers *l, double views)
 {
-  fprintf(out, "What it costs under four sets of assumptions, each beside a ReLU twin under the same (%s):\n",
+  fprintf(out, "What it costs under four sets of assumptions, each beside a ReLU twin priced in the same way (%s):\n",
           l->technology.title);
   fprintf(out, "  %-17s %13s   %-21s %13s %9s\n", "ledger", "mJ per view", "twin", "mJ per view", "saving");
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
@@ -37,7 +37,7 @@ static void print_table(FILE *out, const sf_ledgers *l, double views)
 static void print_parts(FILE *out, const sf_ledgers *l, double views)
 {
   fprintf(out, "\nWhat the energy of the last ledger goes into, mJ per view:\n  %-19s %13s %9s %19s\n", "",
-          "spiking net", "share", "integer ANN, all");
+          "spiking net", "share", "ReLU twin, all");
   for (int p = 0; p < SF_PARTS; p++) {
     const uint64_t a = l->part[SF_LEDGER_NEURON][p], b = l->part[SF_LEDGER_INT_ALL][p];
     const uint64_t all = l->total[SF_LEDGER_NEURON];
@@ -49,7 +49,7 @@ static void print_parts(FILE *out, const sf_ledgers *l, double views)
 static void print_break_even(FILE *out, const sf_ledgers *l)
 {
   fprintf(out, "\nFiring rate at which the spiking net costs what its twin does (measured: %.2f%%):\n", 100 * l->rate);
-  for (int i = 0; i < SF_BREAK_EVENS; i++) {
+  for (int i = 0; i < SF_SPIKING_LEDGERS; i++) {
     const sf_break_even *b = &l->break_even[i];
     fprintf(out, "  %-17s against %-21s ", sf_ledger_texts[b->ledger].title, sf_ledger_texts[b->twin].title);
     if (isnan(b->rate))

@@ -54,7 +54,9 @@ static void print_words(FILE *out, const fx_net *net)
       out,
       "A picture is made of rays, a ray of samples; each sample goes through a small spiking net for t_r time steps:\n"
       "%scolour (C1 C2 C3). A MAC multiplies a real-valued input by a weight and adds; a SOP adds a weight because a\n"
-      "neuron fired; a neuron update is one leak, comparison and reset. The twin is a ReLU net of the same sizes.\n\n",
+      "neuron fired; a neuron update is one leak, comparison and reset. The ReLU twin is a\n"
+      "count: a dense ReLU net of the same layer sizes on the same samples, every synapse a MAC, no zeros skipped; it was\n"
+      "not trained for this figure.\n\n",
       fx_net_decodes(net) ? "" : "density (D1 D2), ");
 }
 
@@ -69,8 +71,8 @@ static void print_result(FILE *out, const sf_audit_report *r)
   const double paper = l->saving[SF_LEDGER_PAPER], all = l->saving[SF_LEDGER_NEURON];
   if (isnan(paper) || isnan(all)) return;
   fprintf(out,
-          "In the paper's metric it costs %.6g mJ per view, %.2f%% %s than the twin; with memory and neuron updates "
-          "%.6g mJ,\n%.2f%% %s than an integer twin.\n\n",
+          "In the paper's metric it is estimated at %.6g mJ per view, %.2f%% %s than the twin; with memory and neuron "
+          "updates\n%.6g mJ, %.2f%% %s than an integer twin.\n\n",
           (double)l->total[SF_LEDGER_PAPER] * 1e-12 / r->views, fabs(paper), less(paper),
           (double)l->total[SF_LEDGER_NEURON] * 1e-12 / r->views, fabs(all), less(all));
 }
