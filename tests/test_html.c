@@ -181,6 +181,7 @@ static void check_figures(faults *f, const char *page, const sf_audit_report *r)
   check_element(f, page, "svg", "svg-break-even", "class=\"dot chosen\"", SF_SPIKING_LEDGERS);
   check_element(f, page, "svg", "svg-quality", "<circle", SF_T_MAX);
   check_element(f, page, "table", "table-prices", "<tr>", r->ledgers.technology.count + 1);
+  check_element(f, page, "table", "table-units", "<tr>", 20);
   check_element(f, page, "table", "table-three", "equal", SF_EVENTS + 4);
   check_element(f, page, "ul", "not-modelled", "<li>", 3);
   check_element(f, page, "ul", "criticism", "<li>", 3);

@@ -44,6 +44,8 @@ sf_status sf_technology_load(sf_technology *technology, const char *path);
  * price of the file is for exactly this; it never becomes false. */
 uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);
 uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bits, bool *interpolated);
+/* Bits of the sum of a layer's inputs: of products of an input and a weight, or of weights alone. */
+int sf_sum_bits(const fx_layer *layer, bool of_products);
 uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
 
 /* ---- events of the ledgers ---- */

@@ -16,6 +16,8 @@ void html_escape(FILE *out, const char *text);
 /* <data> elements; key is the JSON path: "counts.layers[0].mac[1]". */
 void html_put_count(FILE *out, const char *key, uint64_t value);
 void html_put_energy(FILE *out, const char *key, uint64_t fj);
+/* In the unit that suits `top`, for columns of one unit. */
+void html_put_energy_in(FILE *out, const char *key, uint64_t fj, uint64_t top);
 void html_put_saving(FILE *out, const char *key, double saving);                  /* "61.7 % saved", "7.1 % more" */
 void html_put_real(FILE *out, const char *key, double value, const char *format); /* "-" where not finite */
 /* <img> with the picture inside. alt is escaped. */
@@ -47,6 +49,7 @@ void html_energy_section(FILE *out, const sf_page *page);
 void html_spikes(FILE *out, const sf_page *page);
 void html_ledgers(FILE *out, const sf_page *page); /* html_prices follows inside */
 void html_prices(FILE *out, const sf_page *page);
+void html_units(FILE *out, const sf_page *page);
 void html_quality(FILE *out, const sf_page *page);
 void html_counts(FILE *out, const sf_page *page);
 void html_limits(FILE *out, const sf_page *page);

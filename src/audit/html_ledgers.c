@@ -154,6 +154,8 @@ static void ledger_figure(FILE *out, const sf_page *page, int ledger)
 static void parts_table(FILE *out, const sf_page *page)
 {
   const sf_ledgers *l = &page->report->ledgers;
+  uint64_t top = 0;
+  for (int g = 0; g < SF_LEDGERS; g++) top = l->total[g] > top ? l->total[g] : top;
   fprintf(out, "<div class=\"scroll\"><table><caption>Every ledger, by what the energy is spent on</caption>\n<thead>"
                "<tr><th>ledger</th><th class=\"n\">total</th>");
   for (int p = 0; p < SF_PARTS; p++)
@@ -166,12 +168,12 @@ static void parts_table(FILE *out, const sf_page *page)
     html_escape(out, sf_ledger_texts[g].title);
     fprintf(out, "</th><td class=\"n strong\">");
     snprintf(key, sizeof key, "ledgers.list[%d].total_fj", g);
-    html_put_energy(out, key, l->total[g]);
+    html_put_energy_in(out, key, l->total[g], top);
     for (int p = 0; p < SF_PARTS; p++) {
       fprintf(out, "</td><td class=\"n\">");
       snprintf(key, sizeof key, "ledgers.list[%d].parts_fj.%s", g, sf_part_names[p]);
       if (l->part[g][p] > 0)
-        html_put_energy(out, key, l->part[g][p]);
+        html_put_energy_in(out, key, l->part[g][p], top);
       else
         fprintf(out, "\xe2\x80\x93");
     }

@@ -1,6 +1,7 @@
 /* What must be known to repeat the audit, and the page's own stylesheet and script. */
 #include "src/audit/html.h"
 #include "spikefield/spikefield.h"
+#include <string.h>
 
 static void row(FILE *out, const char *name, const char *value)
 {
@@ -9,20 +10,49 @@ static void row(FILE *out, const char *name, const char *value)
   fprintf(out, "</code></td></tr>\n");
 }
 
+/* A file that went since the audit has no row. */
+static void hash_row(FILE *out, const char *name, const char *path)
+{
+  char hex[65];
+  if (sf_sha256_file(path, hex).code == SF_OK) row(out, name, hex);
+}
+
+/* The file that names the pictures and poses, where the layout has one. */
+static void listing(FILE *out, const sf_page *page)
+{
+  const sf_audit_report *r = page->report;
+  char path[4096];
+  int n = 0;
+  if (page->data->layout == SF_LAYOUT_BLENDER)
+    n = snprintf(path, sizeof path, "%s/transforms_%s.json", r->data, r->split);
+  else if (page->data->layout == SF_LAYOUT_INGP)
+    n = snprintf(path, sizeof path, "%s/transforms.json", r->data);
+  else if (page->data->layout == SF_LAYOUT_LLFF)
+    n = snprintf(path, sizeof path, "%s/poses_bounds.npy", r->data);
+  if (n > 0 && (size_t)n < sizeof path) hash_row(out, "data listing SHA-256", path);
+}
+
 void html_origin(FILE *out, const sf_page *page)
 {
   const sf_audit_report *r = page->report;
   char text[64];
   fprintf(out, "<section id=\"origin\">\n<h2>To repeat it</h2>\n<pre id=\"command\">");
   html_escape(out, page->command);
+  if (page->model_sha256[0] && !strstr(page->command, "--model ") && !strstr(page->command, "--model=")) {
+    fprintf(out, " --model ");
+    html_escape(out, page->model);
+  }
   fprintf(out, "</pre>\n<div class=\"scroll\"><table><tbody>\n");
   row(out, "spikefield", SPIKEFIELD_VERSION);
-  row(out, "scene", r->scene);
+  row(out, "scene", html_base_name(r->scene));
   row(out, "scene SHA-256", r->sha256);
-  if (page->model_sha256[0]) row(out, "float model", page->model), row(out, "model SHA-256", page->model_sha256);
-  row(out, "data", r->data);
+  if (page->model_sha256[0])
+    row(out, "float model", html_base_name(page->model)), row(out, "model SHA-256", page->model_sha256);
+  row(out, "data", html_base_name(r->data));
+  listing(out, page);
   row(out, "split, view", page->view->name);
-  row(out, "technology", page->report->ledgers.technology.path);
+  row(out, "technology", html_base_name(r->ledgers.technology.path));
+  hash_row(out, "technology SHA-256", r->ledgers.technology.path);
   snprintf(text, sizeof text, "%llu", (unsigned long long)r->seed);
   row(out, "seed of the random choices", text);
   fprintf(out, "</tbody></table></div>\n<p class=\"note\">Same inputs, same seed: the same counts and energies, to the "

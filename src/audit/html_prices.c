@@ -199,5 +199,6 @@ void html_prices(FILE *out, const sf_page *page)
   fprintf(out, "<div class=\"grid\">\n");
   break_even_figure(out, page);
   price_table(out, &page->report->ledgers.technology);
+  html_units(out, page);
   fprintf(out, "</section>\n");
 }

@@ -137,7 +137,7 @@ void html_quality(FILE *out, const sf_page *page)
         "The fixed-point core draws the view with 1 to %d time steps. PSNR measures the likeness to the photograph "
         "(higher is better; 1 dB is 21 %% less squared error). The large point, t = %d, is what this report audits: "
         "a network learns after how many steps to stop, and more of them may harm. The dashed line is what the "
-        "non-spiking twin spends.",
+        "ReLU twin spends.",
         SF_T_MAX, page->report->net->steps);
     html_figure_begin(out, "fig-quality", "split", "One more step: what it costs, what it brings.", caption);
     svg_begin(out, "svg-quality", WIDTH, HEIGHT, "PSNR against energy", "One point per number of time steps");

@@ -101,6 +101,16 @@ void html_put_energy(FILE *out, const char *key, uint64_t fj)
   fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, fj, html_energy(text, (double)fj));
 }
 
+void html_put_energy_in(FILE *out, const char *key, uint64_t fj, uint64_t top)
+{
+  static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
+  double scale = 1;
+  int i = 0;
+  for (; i < 6 && (double)top / scale >= 999.95; i++) scale *= 1000;
+  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%.*f %s</data>", key, fj, i ? 3 : 0, (double)fj / scale,
+          unit[i]);
+}
+
 void html_put_saving(FILE *out, const char *key, double saving)
 {
   if (!isfinite(saving)) {

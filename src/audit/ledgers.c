@@ -103,7 +103,7 @@ static int bits_of(int n) /* ceil(log2 n) */
   return bits;
 }
 
-static int sum_bits(const fx_layer *layer, bool of_products)
+int sf_sum_bits(const fx_layer *layer, bool of_products)
 {
   return SF_WEIGHT_BITS + (of_products ? SF_INPUT_BITS - 1 : 0) + bits_of(layer->n_in);
 }
@@ -147,9 +147,9 @@ static uint64_t integer_fj(const sf_technology *tech, const fx_net *net, int led
       return sf_price_multiply(tech, ACTIVATION_BITS, SF_WEIGHT_BITS, interpolated) +
              adds(tech, 1, TWIN_SUM_BITS, interpolated);
     return sf_price_multiply(tech, SF_INPUT_BITS, SF_WEIGHT_BITS, interpolated) +
-           adds(tech, 1, sum_bits(layer, true), interpolated);
+           adds(tech, 1, sf_sum_bits(layer, true), interpolated);
   case SF_PART_SOP:
-    return adds(tech, 1, sum_bits(layer, false), interpolated);
+    return adds(tech, 1, sf_sum_bits(layer, false), interpolated);
   case SF_PART_WEIGHT:
     return sf_price_byte(tech, (uint64_t)layer->n_in * (uint64_t)layer->n_out, interpolated);
   case SF_PART_STATE:
@@ -160,7 +160,7 @@ static uint64_t integer_fj(const sf_technology *tech, const fx_net *net, int led
              adds(tech, 1, TWIN_SUM_BITS, interpolated);
     return neuron_fj(tech, l, interpolated);
   case SF_PART_SPECIAL:
-    return special_fj(tech, twin ? TWIN_SUM_BITS : sum_bits(layer, false), result_bits, interpolated);
+    return special_fj(tech, twin ? TWIN_SUM_BITS : sf_sum_bits(layer, false), result_bits, interpolated);
   default:
     return 0;
   }
