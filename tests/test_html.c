@@ -329,6 +329,9 @@ static const plant plants[] = {
     {"&lt;", "&nbsp;"},
     {"<li>", "<b>"},
     {">equal<", ">DIFFERENT<"},
+    {"id=\"table-units\"", "id=\"table-unit\""},
+    {"rows[0].unit_fj.mac\" value=\"", "rows[0].unit_fj.mac\" value=\"1"},
+    {"data-key=\"ledger.hoisted_saving_percent\" value=\"", "data-key=\"ledger.hoisted_saving_percent\" value=\"1"},
 };
 
 START_TEST(planted_faults_are_seen)

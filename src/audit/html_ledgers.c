@@ -119,7 +119,7 @@ static void stacked(FILE *out, const sf_page *page, int ledger, double y, double
     snprintf(style, sizeof style, "bar p%d", p);
     snprintf(tip, sizeof tip, "%s: %s", sf_part_titles[p], html_energy(text, (double)l->part[ledger][p]));
     svg_bar(out, x, y + 20, width, 22, style, key, l->part[ledger][p], tip);
-    if (width > 8.6 * (double)strlen(sf_part_titles[p]))
+    if (width > 10 + 8.2 * (double)strlen(sf_part_titles[p]))
       svg_text(out, x + width / 2, y + 35, p == SF_PART_MAC || p == SF_PART_SOP ? "in mid" : "part mid", "%s",
                sf_part_titles[p]);
     x += width;

@@ -66,16 +66,21 @@ static bool counted(const sf_page *page, int row, int part)
   return true;
 }
 
+/* The layers of spikes have no MAC, the twin has no SOP and keeps nothing of its output. */
+static bool happens(int ledger, int row, int part)
+{
+  const bool of_spikes = row == FX_D2 || row == FX_C2 || row == FX_C3;
+  if (ledger < SF_SPIKING_LEDGERS) return part != SF_PART_MAC || !of_spikes;
+  return part != SF_PART_SOP && (row != FX_C3 || (part != SF_PART_STATE && part != SF_PART_NEURON));
+}
+
 static void unit(FILE *out, const sf_page *page, int ledger, int row, int part)
 {
   const sf_unit_price *u = &page->report->ledgers.unit[ledger][row][part];
   char key[80];
   snprintf(key, sizeof key, "ledgers.list[%d].rows[%d].unit_fj.%s", ledger, row, sf_part_names[part]);
   fprintf(out, "<td class=\"n\">");
-  /* the layers of spikes have no MAC, the twin no SOP */
-  const bool spikes = row == FX_D2 || row == FX_C2 || row == FX_C3, twin = ledger >= SF_SPIKING_LEDGERS;
-  const bool hidden = row != FX_C3 || (part != SF_PART_STATE && part != SF_PART_NEURON); /* what the twin keeps */
-  if (u->fj == 0 || (twin && !hidden) || (part == SF_PART_MAC && spikes && !twin) || (part == SF_PART_SOP && twin)) {
+  if (u->fj == 0 || !happens(ledger, row, part)) {
     fprintf(out, "\xe2\x80\x93</td>");
     return;
   }
