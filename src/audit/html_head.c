@@ -139,10 +139,11 @@ void html_head(FILE *out, const sf_page *page)
   twin(out, page);
   other_results(out, page);
   facts(out, page);
-  fprintf(out,
-          "<nav aria-label=\"contents\"><a href=\"#basics\">What is being counted</a> <a href=\"#pictures\">What each "
-          "pixel costs</a> <a href=\"#energy\">Where the energy goes</a> <a href=\"#spikes\">The spikes</a> "
-          "<a href=\"#ledgers\">Other assumptions</a> <a href=\"#prices\">How much hangs on the prices</a> "
-          "<a href=\"#quality\">Picture quality</a> <a href=\"#counts\">Three counts</a> "
-          "<a href=\"#limits\">What it does not show</a> <a href=\"#origin\">To repeat it</a></nav>\n</header>\n");
+  fprintf(
+      out,
+      "<nav aria-label=\"contents\"><a href=\"#basics\">What is being counted</a> <a href=\"#pictures\">What each "
+      "pixel costs</a> <a href=\"#energy\">Where the energy goes</a> <a href=\"#spikes\">The spikes</a> "
+      "<a href=\"#ledgers\">Other assumptions</a> <a href=\"#prices\">How much hangs on the prices</a> "
+      "<a href=\"#quality\">Picture quality</a> <a href=\"#counts\">Three counts</a> "
+      "<a href=\"#limits\">What this audit does not show</a> <a href=\"#origin\">To repeat it</a></nav>\n</header>\n");
 }

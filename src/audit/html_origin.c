@@ -142,7 +142,9 @@ const char *const html_style[] = {
     "linear-gradient(90deg,var(--ann),transparent) left/14px 100% no-repeat scroll,",
     "linear-gradient(270deg,var(--ann),transparent) right/14px 100% no-repeat "
     "scroll}table{border-collapse:collapse;font-size:.88rem;line-height:1.35;width:100%}",
-    "#table-units td:last-child{min-width:22em}table.narrow{width:auto}caption{text-align:left;font-weight:600;padding-bottom:.4rem}",
+    "#table-units "
+    "td:last-child{min-width:22em}table.narrow{width:auto}caption{text-align:left;font-weight:600;padding-bottom:."
+    "4rem}",
     "th,td{text-align:left;padding:.32rem .9rem .32rem 0;border-bottom:1px solid var(--line);vertical-align:top}",
     "thead th{color:var(--mut);font-weight:500;vertical-align:bottom}tbody th{font-weight:600;white-space:nowrap}",
     ".n{text-align:right}td.n{white-space:nowrap}td.strong{font-weight:600}td.mut{color:var(--mut)}",

@@ -10,8 +10,10 @@ const char *const sf_not_modelled[] = {
     "control, clock tree, interconnect, stalls and leakage power",
     "transfers to and from the accelerator but for the pixels; training",
     "zeros: ReLU's zeros are not skipped in the twin, as spikes that do not come are in the spiking net",
-    "reuse of weights over samples: they are fetched anew for every sample in both networks (C1's for the direction "
-    "once per ray, but for the twin of the paper ledger); with reuse the weight bytes, and this saving, shrink",
+    "reuse of weights over samples: they are fetched anew for every sample in both networks (the direction's of C1 "
+    "once "
+    "per ray where the net computes them so); with reuse the weight bytes shrink, and so does the saving that they "
+    "bring in the ledgers with memory",
     NULL};
 
 const char *const sf_criticism[] = {
