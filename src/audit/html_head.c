@@ -92,7 +92,7 @@ static void counts_fact(FILE *out, const sf_page *page)
   if (three->rays > 0)
     fprintf(out, "%s ray%s in RTL simulation (Verilator, not silicon), ", html_count(text, (uint64_t)three->rays),
             three->rays == 1 ? "" : "s");
-  fprintf(out, "%s recounted, all in the vector core</small></dd></div>\n",
+  fprintf(out, "%s rays recounted, all rays in the vector core</small></dd></div>\n",
           html_count(text, page->report->measure.checked));
 }
 
