@@ -194,8 +194,8 @@ report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/r
 REPORT ?= $B/demo/report.html
 
 PROFILE ?= quick
-reproduce: all ## the runs of the paper's tables on SCENES: table, JSON, plots in build/reproduce/PROFILE (quick, full, smoke)
-	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(REPRODUCE)
+reproduce: all ## the runs of the paper's tables on SCENES: build/reproduce/PROFILE (quick, full, smoke; scenes: any layout, both backbones, MINUTES=15)
+	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(if $(filter scenes,$(PROFILE)),--minutes $(MINUTES)) $(REPRODUCE)
 
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report

@@ -274,6 +274,47 @@ START_TEST(plots_and_json)
 }
 END_TEST
 
+/* Profile scenes: a row for every scene and backbone, below them the paper's for their kinds, each once. */
+START_TEST(pairs)
+{
+  static const struct {
+    const char *ann, *spiking, *summary, *kind;
+  } scene[] = {
+      {"a/ann", "a/beta-5e-7", "scenes/a/beta-5e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
+      {"b/ann", "b/beta-5e-7", "scenes/b/beta-5e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
+      {"c/ann", "c/beta-5e-7", "scenes/c/beta-5e-7/train.json", "\"ingp\",\"layout\":\"ingp\""},
+  };
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    char text[300];
+    write_run("scenes", scene[i].ann, 25, 1);
+    snprintf(text, sizeof text, "{\"psnr\":24.875,\"ssim\":0.5,\"t_r\":3,\"t_star\":2.5,\"seconds\":1,\"backbone\":%s}",
+             scene[i].kind);
+    write_text(scene[i].summary, text);
+    write_audit("scenes", scene[i].spiking, "audit-0.json", 10, 40, 1000);
+  }
+  write_text("scenes/a/beta-5e-7/cosim.json", "{\"samples\":1234,\"differences\":0}");
+  ck_good(sf_reproduction_load(&report, in("scenes")));
+  ck_assert_int_eq(report.count, 3);
+  ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
+  ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
+  print();
+  contains("table.md",
+           "| a           | tensorf  |       0 |  25.00 |      24.88 |      -0.12 | 0.5000 |     3 |      75.0 |",
+           true);
+  contains("table.md", "| paper: LLFF | tensorf  |       - |  26.73 |      26.50 |      -0.23 |  0.828 | 1.875", true);
+  contains("table.md", "|           1234 |           0 |", true);
+  contains("table.md", "Synthetic", false);
+  contains("table.md", "- b, beta-5e-7: not run", true); /* no status */
+  contains("table.md", "without stage I", false);
+  write_text("scenes/b/beta-5e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
+  write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
+  sf_reproduction_free(&report);
+  ck_good(sf_reproduction_load(&report, in("scenes")));
+  ck_assert_int_eq(report.problems, 2);
+  ck_assert_ptr_nonnull(strstr(report.problem[0], "RTL and fixed-point core differ: 1 of 100 samples"));
+}
+END_TEST
+
 START_TEST(too_many_prefixes)
 {
   write_text("s/ann/train.json",
@@ -297,6 +338,7 @@ int main(void)
   tcase_add_test(tc, order);
   tcase_add_test(tc, log_of_a_resumed_run);
   tcase_add_test(tc, plots_and_json);
+  tcase_add_test(tc, pairs);
   tcase_add_test(tc, too_many_prefixes);
   suite_add_tcase(suite, tc);
   SRunner *runner = srunner_create(suite);

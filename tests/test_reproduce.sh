@@ -122,7 +122,19 @@ times part | grep train.json | cmp - "$work/before" || fail "trained again for o
 flock "$work/part/reproduce/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
 [ "$(count 'another run')" -eq 1 ] || fail "the other run is not named"
 
-for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some"; do
+# Profile scenes: both backbones of a scene in the Blender layout, by the clock; twin, audit, co-simulation.
+data=$work/part/reproduce/smoke-data/textured
+"$script" "$work/part" --profile scenes --scenes "$data" --minutes 0.03 --audit-downscale 2 --cosim-rays 4 --rtl-rays 0 \
+  --train '--hidden 32 --samples 512' >"$work/out" 2>&1 || fail "profile scenes: exit status $?"
+[ "$(count '^\[.* dB, ')" -eq 4 ] || fail "profile scenes: not 4 runs"
+table=$work/part/reproduce/scenes/table.md
+for row in textured-ingp textured-tensorf; do
+  grep -Eq "^\| $row +\| ${row#*-} +\| +0 \| +[0-9.]+ \| +[0-9.]+ \|.* [0-9]+ \| +0 \|$" "$table" || { cat "$table"; fail "no row of $row"; }
+done
+grep -q 'Problems\|without a result' "$table" && fail "profile scenes: a run is missing or broken"
+echo "scenes: two backbones"
+
+for bad in "--minutes 3" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x" "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some"; do
   # shellcheck disable=SC2086
   reproduce part 2 $bad
   [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"

@@ -4,9 +4,12 @@
 set -u
 export LC_ALL=C
 usage="usage: reproduce.sh BUILD [options]
-  --profile NAME       quick (default), full, smoke (a procedural scene of its own, seconds)
-  --scenes FOLDER      a scene in the Blender layout, or a folder of scenes
-  --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full: all)
+  --profile NAME       quick (default), full, smoke (a procedural scene of its own, seconds); scenes: every scene with the
+                       backbones that the paper trains on its kind, twin and spiking, a time budget each
+  --scenes FOLDER      a scene in the Blender layout, or a folder of scenes; profile scenes: any layout
+  --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
+  --minutes M          scenes: training budget of a run (15)
+  --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -16,6 +19,7 @@ usage="usage: reproduce.sh BUILD [options]
   --audit-views N      held-out frames for the fixed-point core and the energy audit, spread over the split
   --audit-downscale F  shrink these frames by F
   --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
+  --cosim-rays N       rays of every scene through RTL and fixed-point core in lockstep
 Results: BUILD/reproduce/PROFILE/{table.md,results.json,plots/}; runs in SCENE/RUN/ beside them."
 
 die() { echo "reproduce: $1" >&2; exit "${2:-2}"; }
@@ -31,7 +35,7 @@ profile=quick
 for ((i = 1; i <= $#; i++)); do
   if [ "${!i}" = --profile ]; then j=$((i + 1)); profile=${!j:-}; fi
 done
-declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=1 [train]="" [rtl-rays]=4)
+declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=1 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0)
 case $profile in
   quick)
     set+=([stage1]=400 [stage2]=1200 [eval-views]=8 [prefix-views]=1 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
@@ -44,9 +48,13 @@ case $profile in
     set+=([samples]=512 [rtl-rays]=0)
     set+=([train]="--levels 4 --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32")
     ;;
-  *) die "--profile '$profile' is unknown: expected quick, full or smoke" ;;
+  scenes)
+    set+=([minutes]=15 [eval-views]=0 [prefix-views]=0 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=1)
+    set+=([samples]=0 [cosim-rays]=400)
+    ;;
+  *) die "--profile '$profile' is unknown: expected quick, full, scenes or smoke" ;;
 esac
-scenes="" only="" report_only=""
+scenes="" only="" report_only="" chosen=""
 while [ $# -gt 0 ]; do
   name=${1#--}
   case $1 in
@@ -59,11 +67,24 @@ while [ $# -gt 0 ]; do
     --scenes) scenes=$2 ;;
     --only) only=$2 ;;
     --train) set[train]="${set[train]}${set[train]:+ }$2" ;;
+    --minutes | --backbones)
+      [ "$profile" = scenes ] || die "$1 belongs to --profile scenes"
+      if [ "$1" = --minutes ]; then
+        [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
+        set[minutes]=$2
+      else
+        [[ $2 =~ ^((ingp|tensorf)( |$))+$ ]] || die "--backbones '$2' is unknown: expected ingp, tensorf or both"
+        chosen=$2
+      fi ;;
     --prefix-runs)
       [[ $2 =~ ^(learned|all)$ ]] || die "--prefix-runs '$2' is unknown: expected learned or all"
       set[$name]=$2 ;;
-    --stage1 | --stage2 | --samples | --steps | --seed | --downscale | --eval-views | --prefix-views | --audit-views | \
-      --audit-downscale | --rtl-rays)
+    --stage1 | --stage2)
+      [ "$profile" != scenes ] || die "$1: profile scenes has a time budget (--minutes)"
+      [[ $2 =~ ^[0-9]{1,9}$ ]] || die "$1 '$2' is not a whole number"
+      set[$name]=$((10#$2)) ;;
+    --samples | --steps | --seed | --downscale | --eval-views | --prefix-views | --audit-views | \
+      --audit-downscale | --rtl-rays | --cosim-rays)
       [[ $2 =~ ^[0-9]{1,9}$ ]] || die "$1 '$2' is not a whole number"
       set[$name]=$((10#$2)) ;;
     *) die "unknown option $1 (see reproduce.sh --help)" ;;
@@ -98,7 +119,14 @@ fi
 
 # ---- scenes ----
 
-is_scene() { [ -e "$1/transforms_train.json" ] || [ -e "$1/transforms.json" ]; }
+is_scene() {
+  local mark
+  for mark in transforms_train.json transforms.json poses_bounds.npy sparse colmap/sparse; do
+    [ ! -e "$1/$mark" ] || return 0
+  done
+  return 1
+}
+is_wanted() { if [ "$profile" = scenes ]; then is_scene "$1"; else is_blender "$1"; fi; }
 is_blender() { [ -e "$1/transforms_train.json" ] && [ -e "$1/transforms_test.json" ]; }
 paths=()
 mkdir -p "$out" || exit 1
@@ -118,19 +146,19 @@ else
   if is_scene "$scenes"; then
     paths=("$scenes")
   else
-    for folder in "$scenes"/*/; do is_blender "${folder%/}" && paths+=("${folder%/}"); done
+    for folder in "$scenes"/*/; do is_wanted "${folder%/}" && paths+=("${folder%/}"); done
     if [ -z "$only" ] && [ "$profile" = quick ] && [ ${#paths[@]} -gt 2 ]; then
       if is_blender "$scenes/lego" && is_blender "$scenes/mic"; then only="lego mic"; else paths=("${paths[@]:0:2}"); fi
     fi
     if [ -n "$only" ]; then
       paths=()
       for name in $only; do
-        is_scene "$scenes/$name" || die "$scenes/$name: no scene in the Blender layout there" 1
+        is_scene "$scenes/$name" || die "$scenes/$name: no scene there" 1
         paths+=("$scenes/$name")
       done
     fi
   fi
-  [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene with transforms_train.json and transforms_test.json there" 1
+  [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene $([ "$profile" = scenes ] || echo "with transforms_train.json and transforms_test.json ")there" 1
 fi
 
 child="" stop=""
@@ -138,22 +166,40 @@ trap on_signal INT TERM HUP
 
 # ---- all runs of a scene ----
 
+# What sf_data understands of the scene: its layout, its number of held-out views.
+look_at_data() {
+  local json
+  json=$("$bin/sf_data" "$data" --json 2>/dev/null)
+  layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
+  frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')
+}
+
 # Which held-out views are audited: spread evenly over the split.
 choose_views() {
-  local frames n i
-  frames=$(grep -o '"file_path"' "$data/transforms_test.json" 2>/dev/null | wc -l)
+  local n i
   n=${set[audit-views]} views=
   [ "$frames" -ge 1 ] || frames=1
   [ "$n" -le "$frames" ] || n=$frames
   for ((i = 0; i < n; i++)); do views="$views${views:+ }$((i * frames / n))"; done
 }
 
+# The options that all runs of a scene share.
+prepare_scene() {
+  data_id=$(cd "$data" && pwd -P && cat transforms*.json poses_bounds.npy {,colmap/}sparse/{,0/}{cameras,images}.{bin,txt} 2>/dev/null | cksum)
+  choose_views
+  if [ "$profile" = scenes ]; then
+    common="--minutes ${set[minutes]}"
+  else
+    common="--stage1 ${set[stage1]} --stage2 ${set[stage2]}"
+  fi
+  common="$common --steps ${set[steps]} --seed ${set[seed]}"
+  [ "${set[samples]}" -eq 0 ] || common="$common --samples ${set[samples]}"
+  common="$common --downscale ${set[downscale]} --eval-views ${set[eval-views]}${set[train]:+ ${set[train]}}"
+}
+
 one_scene() {
   scene=${data##*/}
-  data_id=$(cd "$data" && pwd -P && cat "$data"/transforms*.json | cksum)
-  choose_views
-  common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} --steps ${set[steps]} --seed ${set[seed]} --samples ${set[samples]}"
-  common="$common --downscale ${set[downscale]} --eval-views ${set[eval-views]}${set[train]:+ ${set[train]}}"
+  prepare_scene
   local prefixes="--psnr-prefixes ${set[prefix-views]}"
   prefixes_rest=
   [ "${set[prefix-runs]}" = learned ] || prefixes_rest=$prefixes
@@ -174,11 +220,43 @@ one_scene() {
   }
 }
 
+# Profile scenes: the backbones that the paper trains on data of this kind.
+backbones_of() {
+  case ${chosen:-$1} in
+    blender) echo ingp tensorf ;;
+    llff) echo tensorf ;;
+    colmap | ingp) echo ingp ;;
+    *) echo "${chosen:-ingp}" ;;
+  esac
+}
+
+one_backbone() {
+  scene=${data##*/}-$1
+  prepare_scene
+  common="$common --backbone $1"
+  one_run beta-5e-7 --beta 5e-7
+  one_run ann --net ann
+}
+
 started=$SECONDS done_seconds=0 done_runs=0 index=0 failures=0 ticker_pid=""
 total=$((14 * ${#paths[@]}))
 version=$("$bin/sf_train" --version)
+layouts=() frames_of=()
 for data in "${paths[@]}"; do
-  [ -n "$stop" ] || one_scene
+  look_at_data
+  layouts+=("$layout") frames_of+=("$frames")
+done
+if [ "$profile" = scenes ]; then
+  total=0
+  for layout in "${layouts[@]}"; do total=$((total + 2 * $(backbones_of "$layout" | wc -w))); done
+fi
+for i in "${!paths[@]}"; do
+  data=${paths[i]} frames=${frames_of[i]}
+  if [ "$profile" != scenes ]; then
+    [ -n "$stop" ] || one_scene
+  else
+    for backbone in $(backbones_of "${layouts[i]}"); do [ -n "$stop" ] || one_backbone "$backbone"; done
+  fi
 done
 if [ -n "$stop" ]; then
   echo "reproduce: stopped; nothing is lost: the same command goes on (make reproduce-report shows what is there)" >&2

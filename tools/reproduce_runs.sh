@@ -58,6 +58,9 @@ eta() {
   local left run_seconds
   if [ "$done_runs" -gt 0 ]; then
     run_seconds=$((done_seconds / done_runs))
+  elif [ "$profile" = scenes ]; then
+    run_seconds=${set[minutes]%.*}
+    run_seconds=$((60 * ${run_seconds:-0} + 30))
   elif [ "${1:-0}" -gt 0 ]; then
     run_seconds=$(((SECONDS - run_started) * (set[stage1] + set[stage2]) / $1))
   else
@@ -78,7 +81,8 @@ ticker() {
   trap - INT TERM HUP
   while sleep 1; do
     iteration=$(tail -n 1 "$dir/train.jsonl" 2>/dev/null | sed -nE 's/^\{"iteration":([0-9]+).*/\1/p')
-    what="iteration ${iteration:-0} of $((set[stage1] + set[stage2]))"
+    what="iteration ${iteration:-0}"
+    [ "$profile" = scenes ] || what="$what of $((set[stage1] + set[stage2]))"
     [ -e "$dir/train.json" ] && what="rendering and counting"
     printf '\r\033[K%s' "$(say "$what" "$iteration")" >&2
   done
@@ -165,6 +169,11 @@ evaluate_snn() {
     audit "$dir/audit-$view.json" "$dir/scene.snn" "$view" || return
   done
   [ "$name" = beta-5e-7 ] || return 0
+  if [ "${set[cosim-rays]}" -gt 0 ]; then
+    output "$dir/cosim.json" "$bin/sf_cosim" "$dir/scene.snn" "$data" --rays "${set[cosim-rays]}" --seed "${set[seed]}" \
+      --evidence "$dir/cosim-difference" --json --quiet || return
+  fi
+  [ "$profile" != scenes ] || return 0 # prefixes: the ablations' plots
   for ((t = 1; t <= set[steps]; t++)); do
     for view in $views; do
       [ -s "$dir/prefix-$t-$view.json" ] && continue
@@ -196,8 +205,9 @@ prepare() {
     keep "$dir/version" "$version"
   fi
   evaluation="sim_render, energy_audit: views $views, --downscale ${set[audit-downscale]} --rtl-rays ${set[rtl-rays]} --seed ${set[seed]}"
+  [ "${set[cosim-rays]}" -eq 0 ] || evaluation="$evaluation; sf_cosim --rays ${set[cosim-rays]}"
   if ! keep "$dir/eval.cmd" "$evaluation"; then
-    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir"/frame-*.png
+    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir/cosim.json" "$dir"/frame-*.png
     [ "$(cat "$dir/status" 2>/dev/null)" != "done" ] || rm -f "$dir/status"
   fi
 }

@@ -71,9 +71,8 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--downscale", 'd', SF_ARG_INT, &a->downscale, 1, 64, NULL, "F", "box-filter the images by F (default 1)"},
       {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
       {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
-       "behind transparent pixels and rays that leave the box; auto: random where pictures have alpha, else white; "
-       "tensorf: the other way round "
-       "(default auto)"},
+       "behind transparent pixels and rays that leave the box; auto: random, but white for tensorf on pictures with "
+       "alpha (default auto)"},
       {"--no-stage1", 0, SF_ARG_FLAG, &a->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
       {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "ablation: without L_penalty"},
@@ -211,6 +210,7 @@ static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_tra
 typedef struct quality {
   double psnr, ssim, prefix[SF_T_MAX];
   int views, prefixes;
+  const char *layout; /* of the data */
 } quality;
 
 static cJSON *make_summary(const arguments *a, const sf_config *c, const sf_train_stats *s, const quality *q)
@@ -219,6 +219,7 @@ static cJSON *make_summary(const arguments *a, const sf_config *c, const sf_trai
   cJSON *json = cJSON_CreateObject();
   cJSON_AddStringToObject(json, "model", a->output);
   cJSON_AddStringToObject(json, "backbone", c->backbone == SF_TENSORF ? "tensorf" : "ingp");
+  cJSON_AddStringToObject(json, "layout", q->layout);
   cJSON_AddStringToObject(json, "net", net[c->net]);
   cJSON_AddStringToObject(json, "mode", mode[c->mode]);
   cJSON_AddNumberToObject(json, "beta", a->train.beta);
@@ -305,6 +306,7 @@ static sf_status evaluate(const sf_model *model, const char *data_path, const sf
   options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
   SF_TRY(sf_dataset_load(&test, data_path, "test", &options));
   sf_dataset_warn(stderr, "sf_train", &test);
+  q->layout = sf_layout_names[test.layout];
   sf_status status = evaluate_views(model, &test, a, q);
   sf_dataset_free(&test);
   return status;
@@ -387,20 +389,17 @@ static void settle(arguments *a, const sf_dataset *data)
 {
   static const char *const name[] = {"random", "white", "black"};
   const sf_config *c = &a->train.config;
-  const bool transparent = any_transparent(data), vm = c->backbone == SF_TENSORF;
+  const bool vm = c->backbone == SF_TENSORF;
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data->bound);
-  a->train.background = a->background ? a->background - 1 : transparent != vm ? 0 : 1;
+  a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
   if (a->quiet || a->json || vm) return;
   printf("box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c), c->bound > 1 ? "s" : "");
   if (c->dt_gamma > 0)
     printf("steps of distance / %g", 1 / (double)c->dt_gamma);
   else
     printf("equal steps");
-  printf(", finest level %d, background %s (%s)\n", c->finest_res, name[a->train.background],
-         a->background ? "as asked for"
-         : transparent ? "the pictures have alpha"
-                       : "the pictures are opaque");
+  printf(", finest level %d, background %s\n", c->finest_res, name[a->train.background]);
   fflush(stdout);
 }
 

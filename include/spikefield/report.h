@@ -48,6 +48,14 @@ typedef struct sf_run_kind {
 } sf_run_kind;
 extern const sf_run_kind sf_run_kinds[SF_RUNS];
 
+/* The paper's averages over one set of scenes with one backbone: its twin, and beta = 5e-7. Energies: mJ per frame. */
+typedef struct sf_paper_group {
+  const char *backbone, *layout, *data; /* as in a trainer's summary; layout: of that set's folders; its name */
+  double ann_psnr, ann_energy, psnr, ssim, steps, energy;
+} sf_paper_group;
+enum { SF_PAPER_GROUPS = 4 };
+extern const sf_paper_group sf_paper_groups[SF_PAPER_GROUPS];
+
 typedef struct sf_run {
   double value[SF_METRICS]; /* NaN: missing */
   double t_star;
@@ -55,6 +63,7 @@ typedef struct sf_run {
   double prefix_psnr[SF_T_MAX];                          /* after 1..T steps */
   double prefix_energy[SF_T_MAX];                        /* mJ per frame; NaN: not audited */
   int audits, width, height;                             /* audited frames and their size in pixels */
+  double cosim_samples, cosim_differences;               /* in lockstep with the RTL; NaN: not run */
   int points;                                            /* t* over iterations, rising */
   double *iteration, *t_star_at;                         /* owned */
   char *status, *train_command, *eval_command, *version; /* text of the run's files or NULL, owned */
@@ -107,6 +116,9 @@ extern const double sf_order_tolerance[SF_METRICS];
  * order beyond the tolerance contradicts it. */
 sf_order_verdict sf_order_judge(double paper, double ours, double paper_tolerance, double tolerance);
 int sf_reproduction_order(const sf_reproduction *r, sf_order order[SF_ORDERS_MAX]);
+
+/* The paper's averages for the kind of scene that this is, NULL: none, or not known. */
+const sf_paper_group *sf_reproduction_group(const sf_report_scene *scene);
 
 /* Markdown for file and terminal. */
 void sf_reproduction_print(FILE *out, const sf_reproduction *r);

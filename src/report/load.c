@@ -106,6 +106,23 @@ static sf_status read_summary(sf_reproduction *r, const char *dir, bool ann, sf_
   return read_prefixes(r, path, run);
 }
 
+static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
+{
+  char path[4096 + 512];
+  cJSON *json;
+  snprintf(path, sizeof path, "%s/cosim.json", dir);
+  SF_TRY(sf_report_read_json(r, path, &json));
+  run->cosim_samples = sf_report_number(json, "samples");
+  run->cosim_differences = sf_report_number(json, "differences");
+  const bool broken = json && (isnan(run->cosim_samples) || isnan(run->cosim_differences));
+  cJSON_Delete(json);
+  if (broken) return sf_report_problem(r, "%s: no samples and differences", path);
+  if (run->cosim_differences > 0)
+    return sf_report_problem(r, "%s: RTL and fixed-point core differ: %.0f of %.0f samples", path,
+                             run->cosim_differences, run->cosim_samples);
+  return sf_ok();
+}
+
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
   char dir[4096 + 320], reference[4096 + 320], log[4096 + 384];
@@ -120,6 +137,7 @@ static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_
   SF_TRY(read_text(r, dir, "eval.cmd", &run->eval_command));
   SF_TRY(read_text(r, dir, "version", &run->version));
   SF_TRY(read_summary(r, dir, id == SF_RUN_ANN, run));
+  SF_TRY(read_cosim(r, dir, run));
   SF_TRY(sf_report_load_log(log, run));
   return sf_report_load_frames(r, dir, reference, id == SF_RUN_ANN, run);
 }

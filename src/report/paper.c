@@ -2,6 +2,7 @@
  * Fields", INGP backbone, averages over the eight Synthetic scenes at 800 x 800. */
 #include "spikefield/report.h"
 #include <math.h>
+#include <string.h>
 
 #define ROW(psnr, ssim, steps, energy, saving) {psnr, ssim, steps, energy, NAN, NAN, NAN, NAN, NAN}, saving
 
@@ -21,3 +22,25 @@ const sf_run_kind sf_run_kinds[SF_RUNS] = {
     [SF_RUN_T] = {"fixed-t", "fixed t_r", ROW(32.11, NAN, NAN, 491.70, NAN)},
     [SF_RUN_T_PLUS_1] = {"fixed-t-plus-1", "fixed t_r + 1", ROW(32.29, NAN, NAN, 623.01, NAN)},
 };
+
+const sf_paper_group sf_paper_groups[SF_PAPER_GROUPS] = {
+    {"ingp", "blender", "Synthetic", 32.14, 955.27, 32.21, 0.957, 3.625, 492.25},
+    {"ingp", "colmap", "Mip-NeRF 360", 25.48, 18980, 25.09, 0.646, 4.857, 13660},
+    {"tensorf", "blender", "Synthetic", 33.14, 1261, 32.91, 0.959, 2, 748.4},
+    {"tensorf", "llff", "LLFF", 26.73, 11910, 26.50, 0.828, 1.875, 3704},
+};
+
+static bool is(const cJSON *summary, const char *key, const char *wanted)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(summary, key);
+  return cJSON_IsString(item) && strcmp(item->valuestring, wanted) == 0;
+}
+
+const sf_paper_group *sf_reproduction_group(const sf_report_scene *scene)
+{
+  const cJSON *summary = scene->run[SF_RUN_BETA_5E7].summary;
+  for (int i = 0; summary && i < SF_PAPER_GROUPS; i++)
+    if (is(summary, "backbone", sf_paper_groups[i].backbone) && is(summary, "layout", sf_paper_groups[i].layout))
+      return &sf_paper_groups[i];
+  return NULL;
+}

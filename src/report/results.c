@@ -53,6 +53,8 @@ static cJSON *run_json(const sf_reproduction *r, int scene, int id)
   cJSON *json = numbers_json(r, scene, id);
   add_text(json, "status", run->status ? run->status : "not run");
   add_number(json, "t_star", run->t_star);
+  add_number(json, "cosim_samples", run->cosim_samples);
+  add_number(json, "cosim_differences", run->cosim_differences);
   cJSON_AddNumberToObject(json, "audited_frames", run->audits);
   cJSON_AddNumberToObject(json, "frame_width", run->width);
   cJSON_AddNumberToObject(json, "frame_height", run->height);
@@ -75,6 +77,16 @@ static cJSON *average_json(const sf_reproduction *r, int run)
   sf_reproduction_mean(r, -1, run, SF_METRIC_PSNR, &scenes);
   cJSON_AddNumberToObject(json, "scenes", scenes);
   cJSON_AddItemToObject(json, "paper", paper_json(run));
+  return json;
+}
+
+static cJSON *group_json(const sf_paper_group *g)
+{
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "data", g->data);
+  add_number(json, "ann_psnr", g->ann_psnr), add_number(json, "ann_energy_mj", g->ann_energy);
+  add_number(json, "psnr", g->psnr), add_number(json, "ssim", g->ssim), add_number(json, "steps", g->steps);
+  add_number(json, "energy_mj", g->energy);
   return json;
 }
 
@@ -118,6 +130,8 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
   cJSON *scenes = cJSON_AddObjectToObject(json, "scenes");
   for (int s = 0; s < r->count; s++) {
     cJSON *scene = cJSON_AddObjectToObject(scenes, r->scene[s].name);
+    const sf_paper_group *group = sf_reproduction_group(&r->scene[s]);
+    if (group) cJSON_AddItemToObject(scene, "paper", group_json(group));
     for (int i = 0; i < SF_RUNS; i++) cJSON_AddItemToObject(scene, sf_run_kinds[i].name, run_json(r, s, i));
   }
   cJSON *problems = cJSON_AddArrayToObject(json, "problems");

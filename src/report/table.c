@@ -109,15 +109,24 @@ static const sf_run *first_audited(const sf_reproduction *r)
   return NULL;
 }
 
+/* Twin and reference alone, on scenes of any kind. */
+static bool is_pairs(const sf_reproduction *r)
+{
+  return strcmp(r->profile, "scenes") == 0;
+}
+
 static void print_head(FILE *out, const sf_reproduction *r)
 {
   int runs;
+  const bool pairs = is_pairs(r);
   const double hours = training_hours(r, &runs);
   fprintf(out, "# Reproduction of the paper, profile %s\n\n", r->profile);
   fprintf(out, "%d %s:", r->count, r->count == 1 ? "scene" : "scenes");
   for (int s = 0; s < r->count; s++) fprintf(out, " %s", r->scene[s].name);
-  fprintf(out, ". %d of %d runs trained, %.2f h of training.\n", runs, r->count * SF_RUNS, hours);
+  fprintf(out, ". %d of %d runs trained, %.2f h of training.\n", runs, r->count * (pairs ? 2 : SF_RUNS), hours);
   const sf_run *run = first_done(r);
+  if (run && pairs) fprintf(out, "Every run: seed %.0f.\n\n", number_of(run->summary, "seed"));
+  if (pairs) return;
   if (run)
     fprintf(out, "Every run: %.0f iterations, seed %.0f; quality over %.0f held-out views.\n",
             number_of(run->summary, "iterations"), number_of(run->summary, "seed"), number_of(run->summary, "views"));
@@ -199,6 +208,63 @@ static void print_scenes(FILE *out, const sf_reproduction *r, table *t)
     for (int i = 0; i < SF_RUNS; i++) method_row(t, r, s, i);
     end(out, t);
   }
+}
+
+/* ---- scenes with several backbones ---- */
+
+static const char *text_of(const cJSON *json, const char *key)
+{
+  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  return cJSON_IsString(item) ? item->valuestring : "-";
+}
+
+static void pair_row(table *t, const sf_reproduction *r, int scene)
+{
+  const sf_report_scene *one = &r->scene[scene];
+  const sf_run *run = &one->run[SF_RUN_BETA_5E7];
+  const double ann = one->run[SF_RUN_ANN].value[SF_METRIC_PSNR];
+  row(t);
+  cell(t, "%s", one->name), cell(t, "%s", text_of(run->summary, "backbone"));
+  number(t, 0, run->value[SF_METRIC_SECONDS] / 60);
+  number(t, 2, ann), number(t, 2, run->value[SF_METRIC_PSNR]), number(t, 2, run->value[SF_METRIC_PSNR] - ann);
+  number(t, 4, run->value[SF_METRIC_SSIM]), number(t, 0, run->value[SF_METRIC_STEPS]);
+  number(t, 1, sf_reproduction_saving(r, scene, SF_RUN_BETA_5E7, SF_SAVING_TWIN));
+  number(t, 1, sf_reproduction_saving(r, scene, SF_RUN_BETA_5E7, SF_RUN_ANN));
+  number(t, 2, run->value[SF_METRIC_LOSS]);
+  number(t, 0, run->cosim_samples), number(t, 0, run->cosim_differences);
+}
+
+static void paper_row(table *t, const sf_paper_group *g)
+{
+  row(t);
+  cell(t, "paper: %s", g->data), cell(t, "%s", g->backbone), cell(t, "-");
+  number(t, 2, g->ann_psnr), number(t, 2, g->psnr), number(t, 2, g->psnr - g->ann_psnr), number(t, 3, g->ssim);
+  number(t, 3, g->steps), cell(t, "-"), number(t, 1, 100 * (1 - g->energy / g->ann_energy));
+  for (int i = 0; i < 3; i++) cell(t, "-");
+}
+
+static void print_pairs(FILE *out, const sf_reproduction *r, table *t)
+{
+  static const char *const title[] = {"scene",      "backbone",       "minutes",    "ANN dB",    "spiking dB",
+                                      "difference", "SSIM",           "t_r",        "of twin %", "saving %",
+                                      "fixed dB",   "samples in RTL", "differences"};
+  begin(t), row(t);
+  t->left = 2;
+  for (size_t i = 0; i < sizeof title / sizeof *title; i++) cell(t, "%s", title[i]);
+  for (int s = 0; s < r->count; s++) pair_row(t, r, s);
+  for (int g = 0; g < SF_PAPER_GROUPS; g++)
+    for (int s = 0; s < r->count; s++)
+      if (sf_reproduction_group(&r->scene[s]) == &sf_paper_groups[g]) {
+        paper_row(t, &sf_paper_groups[g]);
+        break;
+      }
+  end(out, t);
+  fprintf(out,
+          "minutes: of training, each run. PSNR and SSIM: float, all held-out views, spiking at its learned t_r. of "
+          "twin: energy saved against the\n"
+          "ReLU twin on the samples of the spiking frame; saving: against the ANN run on its own samples, as in the\n"
+          "paper. fixed: PSNR of the fixed-point core minus float, audited frames. samples in RTL: co-simulated with\n"
+          "the fixed-point core. Paper: averages over that set of scenes, beta = 5e-7, after its full training.\n\n");
 }
 
 /* ---- order and prefixes ---- */
@@ -289,10 +355,12 @@ static void print_prefixes(FILE *out, const sf_reproduction *r, table *t)
 static void print_unfinished(FILE *out, const sf_reproduction *r)
 {
   bool any = false;
+  const bool pairs = is_pairs(r);
   for (int s = 0; s < r->count; s++)
     for (int i = 0; i < SF_RUNS; i++) {
       const char *status = r->scene[s].run[i].status;
       if (status && strcmp(status, "done") == 0) continue;
+      if (pairs && i != SF_RUN_ANN && i != SF_RUN_BETA_5E7) continue;
       if (!any) fprintf(out, "## Runs without a result\n\n");
       any = true;
       fprintf(out, "- %s, %s: %s\n", r->scene[s].name, sf_run_kinds[i].name, status ? status : "not run");
@@ -307,9 +375,13 @@ void sf_reproduction_print(FILE *out, const sf_reproduction *r)
 {
   table t;
   print_head(out, r);
-  print_methods(out, r, &t);
-  print_order(out, r, &t);
-  print_prefixes(out, r, &t);
-  print_scenes(out, r, &t);
+  if (is_pairs(r)) {
+    print_pairs(out, r, &t);
+  } else {
+    print_methods(out, r, &t);
+    print_order(out, r, &t);
+    print_prefixes(out, r, &t);
+    print_scenes(out, r, &t);
+  }
   print_unfinished(out, r);
 }
