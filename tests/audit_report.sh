@@ -41,6 +41,12 @@ audit --json --twin "$work/twin.safetensors" | tr -d ' \n\t' >"$work/twin.json" 
 twin() { sed -E "s/.*\"twin\":\{[^}]*\"$1\":([0-9]+).*/\1/" "$work/twin.json"; }
 [ "$(twin samples)" -gt 0 ] && [ "$(twin macs_per_sample)" -gt 0 ] || fail "the twin counts nothing"
 [ "$(twin fj)" -eq $(($(twin samples) * $(twin macs_per_sample) * 4600)) ] || fail "the twin's energy"
+# TensoRF's decoder alone counts, on the samples that reach it: 150 * 128 + 128 * 128 + 128 * 3.
+"$build/bin/sf_train" "$work/d" -o "$work/decoder.safetensors" --backbone tensorf --net ann --stage1 2 --stage2 2 --voxels 16 \
+  --threads 1 -q >/dev/null || fail "TensoRF twin"
+audit --json --twin "$work/decoder.safetensors" | tr -d ' \n\t' >"$work/twin.json" || fail "audit with a TensoRF twin"
+[ "$(twin macs_per_sample)" -eq 35968 ] && [ "$(twin samples)" -gt 0 ] || fail "the decoder's synapses"
+[ "$(twin fj)" -eq $(($(twin samples) * 35968 * 4600)) ] || fail "the TensoRF twin's energy"
 
 # The prices stand beside the program, wherever the two are.
 mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"

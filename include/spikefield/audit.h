@@ -163,7 +163,7 @@ sf_status sf_measure_choose(const sf_measure *measure, uint64_t seed, uint64_t s
                             uint64_t *count);
 
 /* A ReLU twin that was trained by itself: it takes samples of its own, which its float rendering of the same rays
- * counts: every synapse of its nets an fp32 MAC, once per sample. */
+ * counts: every synapse of its nets (TensoRF: of its decoder) an fp32 MAC, once per sample. */
 typedef struct sf_twin_job {
   const char *path; /* model.safetensors */
   uint64_t rays;
@@ -176,7 +176,7 @@ typedef struct sf_twin {
   uint64_t samples, macs, fj;
   double saving_percent; /* of the spiking net in the paper ledger */
 } sf_twin;
-/* SF_E_UNSUPPORTED when the model is no ReLU net, or TensoRF. */
+/* SF_E_UNSUPPORTED when the model is no ReLU net. */
 sf_status sf_twin_count(const sf_twin_job *job, sf_twin *twin);
 /* Sets fj and saving_percent. SF_E_RANGE when the energy does not fit in 64 bits. */
 sf_status sf_twin_price(const sf_technology *technology, uint64_t spiking_fj, sf_twin *twin);

@@ -25,6 +25,17 @@ static sf_status count_samples(const sf_twin_job *job, const sf_model *model, ch
   return sf_ok();
 }
 
+static uint64_t synapses(const sf_model *model)
+{
+  static const int ingp[] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5}, decoder[] = {SF_V_W1, SF_V_W2, SF_V_W3};
+  uint64_t sum = 0;
+  if (model->config.backbone == SF_TENSORF)
+    for (int i = 0; i < 3; i++) sum += model->param[decoder[i]].size;
+  else
+    for (int i = 0; i < 5; i++) sum += model->param[ingp[i]].size;
+  return sum;
+}
+
 sf_status sf_twin_count(const sf_twin_job *job, sf_twin *twin)
 {
   sf_model model;
@@ -34,13 +45,11 @@ sf_status sf_twin_count(const sf_twin_job *job, sf_twin *twin)
   sf_status status = sf_ok();
   if (model.config.net != SF_NET_ANN)
     status = sf_fail(SF_E_UNSUPPORTED, "%s: a spiking net, expected a ReLU twin (sf_train --net ann)", job->path);
-  else if (model.config.backbone != SF_INGP)
-    status = sf_fail(SF_E_UNSUPPORTED, "%s: TensoRF, whose rendering does not count the samples it decodes", job->path);
   else if (!c)
     status = sf_fail(SF_E_MEMORY, "audit: out of memory");
   else
     status = count_samples(job, &model, c, &twin->samples);
-  for (int p = SF_P_W1; p <= SF_P_W5 && status.code == SF_OK; p++) twin->macs += model.param[p].size;
+  if (!status.code) twin->macs = synapses(&model);
   free(c);
   sf_model_free(&model);
   return status;

@@ -34,7 +34,8 @@ static void flush(worker *w)
   w->fill = 0;
 }
 
-/* One ray; what it needs of the decoder comes with a later flush. depth, alpha, samples: NULL or one number each. */
+/* One ray; what it needs of the decoder comes with a later flush. depth, alpha, samples: NULL or one number each;
+ * samples: those that the decoder sees. */
 static void render_ray(worker *w, const float *origin, const float *direction, const float background[3], float *rgb,
                        float *depth, float *alpha, float *samples)
 {
@@ -42,11 +43,13 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   const sf_march march = sf_march_begin(w->model, &w->intervals, origin, direction, 0.5f);
   const sf_vm_direction encoded = sf_vm_encode_direction(f, direction);
   float behind, far = 0;
+  int decoded = 0;
   const int n = sf_vm_ray(w->kernels, &w->density, &march, w->samples, &behind);
   for (int c = 0; c < 3; c++) rgb[c] = behind * background[c];
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
     if (w->samples.weight[s] <= sf_vm_weight_stop) continue;
+    decoded++;
     memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));
     w->weight[w->fill] = w->samples.weight[s];
     w->owner[w->fill] = rgb;
@@ -55,7 +58,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   }
   if (depth) *depth = far;
   if (alpha) *alpha = 1 - behind;
-  if (samples) *samples = (float)n;
+  if (samples) *samples = (float)decoded;
 }
 
 static void worker_free(worker *w)
