@@ -231,6 +231,8 @@ START_TEST(colmap_has_the_rays_of_its_poses)
   same_splits(&rig);
   load(&d, "train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_COLMAP);
+  const char *const list[] = {"sparse/0/images.bin", "sparse/0/images.txt", "sparse/images.bin", "sparse/images.txt"};
+  ck_assert_str_eq(d.list, in(list[_i]));
   ck_assert_str_eq(d.view[0].lens, "PINHOLE");
   ck_assert(!d.ndc && d.bound == 1); /* all points lie between the cameras */
   ck_assert_int_eq(d.points, rig.points);
@@ -304,6 +306,7 @@ START_TEST(blender_has_the_rays_of_its_poses)
   put_json("transforms_test.json", &rig, "", "images", 0, 2);
   load(&d, "train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_BLENDER);
+  ck_assert_str_eq(d.list, in("transforms_train.json"));
   ck_assert_int_eq(d.count, VIEWS / 2);
   same_rays(&d, &rig);
   sf_dataset_free(&d);
@@ -327,6 +330,7 @@ START_TEST(forward_facing_rays_are_ndc)
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   load(&d, "test");
   ck_assert_int_eq(d.layout, SF_LAYOUT_LLFF);
+  ck_assert_str_eq(d.list, in("poses_bounds.npy"));
   ck_assert(d.ndc && d.bound == 1 && d.ndc_near == 1);
   ck_assert_float_eq_tol(d.ndc_focal[0], 60 / 32.0f, 1e-6f);
   ck_assert_float_eq_tol(d.ndc_focal[1], 60 / 24.0f, 1e-6f);

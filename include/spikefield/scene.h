@@ -28,6 +28,7 @@ extern const char *const sf_layout_names[]; /* "blender", "llff", "colmap", "ing
 /* What lies in a folder, and one split of its views. docs/data.md says how each layout is understood. */
 typedef struct sf_dataset {
   char path[4096];
+  char list[4096]; /* the file that names pictures and poses; of a COLMAP model, its table of images */
   sf_layout layout;
   sf_view *view;
   int count;       /* loaded */

@@ -17,21 +17,6 @@ static void hash_row(FILE *out, const char *name, const char *path)
   if (sf_sha256_file(path, hex).code == SF_OK) row(out, name, hex);
 }
 
-/* The file that names the pictures and poses, where the layout has one. */
-static void listing(FILE *out, const sf_page *page)
-{
-  const sf_audit_report *r = page->report;
-  char path[4096];
-  int n = 0;
-  if (page->data->layout == SF_LAYOUT_BLENDER)
-    n = snprintf(path, sizeof path, "%s/transforms_%s.json", r->data, r->split);
-  else if (page->data->layout == SF_LAYOUT_INGP)
-    n = snprintf(path, sizeof path, "%s/transforms.json", r->data);
-  else if (page->data->layout == SF_LAYOUT_LLFF)
-    n = snprintf(path, sizeof path, "%s/poses_bounds.npy", r->data);
-  if (n > 0 && (size_t)n < sizeof path) hash_row(out, "data listing SHA-256", path);
-}
-
 void html_origin(FILE *out, const sf_page *page)
 {
   const sf_audit_report *r = page->report;
@@ -49,7 +34,7 @@ void html_origin(FILE *out, const sf_page *page)
   if (page->model_sha256[0])
     row(out, "float model", html_base_name(page->model)), row(out, "model SHA-256", page->model_sha256);
   row(out, "data", html_base_name(r->data));
-  listing(out, page);
+  hash_row(out, "data listing SHA-256", page->data->list);
   row(out, "split, view", page->view->name);
   row(out, "technology", html_base_name(r->ledgers.technology.path));
   hash_row(out, "technology SHA-256", r->ledgers.technology.path);

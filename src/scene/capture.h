@@ -44,10 +44,10 @@ void sf_capture_free(sf_capture *capture);
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);
 sf_status sf_llff_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
 sf_status sf_colmap_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
-/* Whether the folder holds the layout. list: the file found. */
+/* Whether the folder holds the layout. */
 bool sf_transforms_there(const char *dir);
 bool sf_llff_there(const char *dir);
-bool sf_colmap_there(const char *dir, char list[4096]);
+bool sf_colmap_there(const char *dir);
 
 /* `frame` is one element of "frames", `index` its place; `path` is the JSON file, for messages. */
 sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shared, const char *path, int index);

@@ -26,12 +26,10 @@ static bool find_tables(const char *dir, tables *t)
   return false;
 }
 
-bool sf_colmap_there(const char *dir, char list[4096])
+bool sf_colmap_there(const char *dir)
 {
   tables t;
-  if (!find_tables(dir, &t)) return false;
-  strcpy(list, t.images);
-  return true;
+  return find_tables(dir, &t);
 }
 
 /* World to camera with OpenCV axes (y down, z ahead) -> camera to world with OpenGL axes. */

@@ -48,8 +48,7 @@ static sf_status check_options(const char *dir, const sf_dataset_options *option
  * each camera and its lens. */
 static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_options *options)
 {
-  char list[4096];
-  const bool llff = sf_llff_there(data->path), colmap = sf_colmap_there(data->path, list);
+  const bool llff = sf_llff_there(data->path), colmap = sf_colmap_there(data->path);
   if (!llff) return sf_colmap_read(c, data->path, options);
   SF_TRY(sf_llff_read(c, data->path, options));
   if (!colmap) return sf_ok();
@@ -64,9 +63,8 @@ static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_op
 
 static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split, const sf_dataset_options *options)
 {
-  char list[4096];
   const char *dir = data->path;
-  const bool poses = sf_llff_there(dir) || sf_colmap_there(dir, list);
+  const bool poses = sf_llff_there(dir) || sf_colmap_there(dir);
   c->shrink = options->downscale;
   if (!sf_is_folder(dir)) return sf_fail(SF_E_IO, "%s: no such folder", dir);
   if (sf_transforms_there(dir) || !poses) {
@@ -105,6 +103,7 @@ static sf_sight look(const sf_dataset *data, const sf_capture *c)
 static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const sf_dataset_options *options)
 {
   SF_TRY(read_capture(data, c, split, options));
+  memcpy(data->list, c->list, sizeof data->list);
   const sf_sight sight = look(data, c);
   SF_TRY(sf_place(data, c, options, &sight));
   SF_TRY(sf_views_load(data, c, options));
