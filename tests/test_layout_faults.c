@@ -1,0 +1,302 @@
+/* Folders of posed pictures in which something is missing, broken or odd: passed over with a warning, or refused in one
+ * line. */
+#include "layout_folder.h"
+
+START_TEST(a_few_missing_pictures_are_passed_over)
+{
+  const layout_rig rig = orbit();
+  sf_dataset d;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  unlink(in("images/p03.png")), unlink(in("images/p09.png"));
+  load(&d, "train");
+  ck_assert_int_eq(d.count, 12);
+  ck_assert_int_eq(d.total, 12);
+  ck_assert_int_eq(d.warnings, 1);
+  ck_assert_ptr_nonnull(strstr(d.warning[0], "2 of 14 pictures are missing"));
+  ck_assert_ptr_nonnull(strstr(d.warning[0], "images/p03.png"));
+  same_rays(&d, &rig);
+  sf_dataset_free(&d);
+  ck_good(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1, .first = 2, .limit = 1}));
+  ck_assert_str_eq(d.view[0].name, "images/p04.png");
+  sf_dataset_free(&d);
+  load(&d, "test"); /* is whole */
+  ck_assert(d.count == 3 && d.warnings == 0);
+  sf_dataset_free(&d);
+  for (int v = 1; v < 8; v++) {
+    char name[40];
+    snprintf(name, sizeof name, "images/p%02d.png", v);
+    unlink(in(name));
+  }
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, "images/p01.png", "8 of 14 pictures are missing");
+}
+END_TEST
+
+START_TEST(other_endings_are_found)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  for (int v = 0; v < VIEWS; v++) snprintf(rig.view[v].name, sizeof rig.view[v].name, v % 2 ? "p%02d.JPG" : "p%02d", v);
+  put_colmap("sparse/0", &rig, 0);
+  load(&d, "test");
+  ck_assert_int_eq(d.count, 3);
+  sf_dataset_free(&d);
+}
+END_TEST
+
+static bool warned(const sf_dataset *d, const char *word, const char *name)
+{
+  for (int i = 0; i < d->warnings; i++)
+    if (strstr(d->warning[i], word) && strstr(d->warning[i], name)) return true;
+  return false;
+}
+
+START_TEST(the_survey_names_what_looks_wrong)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  rig.lenses = 3;
+  rig.lens[1] = (layout_lens){8, 1, "PINHOLE", WIDTH, HEIGHT, 4, {60, 20, 1, 6}};
+  rig.lens[2] = (layout_lens){9, 1, "PINHOLE", WIDTH, HEIGHT, 4, {2, 2, 8, 6}};
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_colmap("sparse/0", &rig, 0);
+  for (int v = 0; v < VIEWS; v++) {
+    char name[80];
+    snprintf(name, sizeof name, "images/%s", rig.view[v].name);
+    put_picture(name, WIDTH, HEIGHT, v == 6 ? 20 : 100 + v, 255);
+  }
+  load(&d, "train");
+  ck_good(sf_dataset_survey(&d));
+  ck_assert(warned(&d, "exposure", "images/p06.png") && warned(&d, "-2.", "1 of 14"));
+  ck_assert_int_eq(d.warnings, 1);
+  sf_dataset_free(&d);
+  rig.view[2].lens = 8, rig.view[3].lens = 9;
+  memcpy(rig.view[12].to_world, rig.view[11].to_world, sizeof rig.view[11].to_world);
+  for (int i = 0; i < 3; i++) rig.view[10].to_world[4 * i + 3] += 40 * rig.view[10].to_world[4 * i + 2];
+  for (int i = 0; i < 12; i++)
+    if (i % 4 == 0 || i % 4 == 2) rig.view[5].to_world[i] *= -1; /* turns its back */
+  put_colmap("sparse/0", &rig, 0);
+  load(&d, "train");
+  ck_assert(warned(&d, "do not look at the scene", "images/p05.png"));
+  ck_good(sf_dataset_survey(&d));
+  ck_assert(warned(&d, "factor 2", "images/p02.png"));
+  ck_assert(warned(&d, "stretched", "images/p02.png"));
+  ck_assert(warned(&d, "optical centre", "images/p02.png"));
+  ck_assert(warned(&d, "field of view: 152 degrees", "images/p03.png"));
+  ck_assert(warned(&d, "pose of another", "images/p12.png: that of images/p11.png"));
+  ck_assert(warned(&d, "far outside", "images/p10.png"));
+  sf_dataset_free(&d);
+}
+END_TEST
+
+/* From above and from the side: each camera's own point has its colour, the box's edges are grey. */
+START_TEST(the_plan_shows_every_camera)
+{
+  enum { SIZE = 200 };
+  const layout_rig rig = orbit();
+  sf_dataset d, held;
+  sf_image image;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  load(&d, "train"), load(&held, "test");
+  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  ck_assert(image.width == 2 * SIZE && image.height == SIZE);
+  double most = 0;
+  for (int v = 0; v < d.count; v++)
+    for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)d.view[v].camera.to_world[4 * i + 3]));
+  for (int v = 0; v < held.count; v++)
+    for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)held.view[v].camera.to_world[4 * i + 3]));
+  for (int v = 0; v < held.count; v++) { /* drawn last */
+    const float *m = held.view[v].camera.to_world;
+    const double half = 0.5 * SIZE, reach = 1.15 * most;
+    for (int side = 0; side < 2; side++) {
+      const int x = side * SIZE + (int)floor(half + half * (double)m[3] / reach);
+      const int y = (int)floor(half - half * (double)m[side ? 11 : 7] / reach);
+      const uint16_t *p = image.rgba + 4 * (y * 2 * SIZE + x);
+      ck_assert_msg(p[0] > 50000 && p[2] < 20000, "camera %d, panel %d: %d %d %d", v, side, p[0], p[1], p[2]);
+    }
+  }
+  sf_image_free(&image);
+  sf_dataset_free(&d), sf_dataset_free(&held);
+}
+END_TEST
+
+START_TEST(cameras_that_all_look_away_are_refused)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms_train.json", &rig, "", "images", 0,
+           1); /* Blender: about the origin; these are about (3, -2, 1) */
+  for (int v = 0; v < VIEWS; v++)
+    for (int i = 0; i < 12; i++)
+      if (i % 4 == 0 || i % 4 == 2) rig.view[v].to_world[i] *= -1;
+  put_json("transforms_train.json", &rig, "", "images", 0, 1);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms_train.json", "no view looks at the scene");
+}
+END_TEST
+
+typedef struct bad_npy {
+  const char *descr, *order, *shape;
+  int bytes; /* of numbers */
+  sf_code code;
+  const char *problem;
+} bad_npy;
+static const bad_npy bad_npys[] = {
+    {">f8", "False", "(17, 17)", 2312, SF_E_UNSUPPORTED, "dtype >f8 (most significant byte first)"},
+    {"<i8", "False", "(17, 17)", 2312, SF_E_UNSUPPORTED, "dtype <i8: expected <f8 or <f4"},
+    {"|O", "False", "(17, 17)", 2312, SF_E_UNSUPPORTED, "dtype |O"},
+    {"<f8", "True", "(17, 17)", 2312, SF_E_UNSUPPORTED, "fortran_order"},
+    {"<f8", "False", "(17, 15)", 2040, SF_E_FORMAT, "shape (17, 15): expected"},
+    {"<f8", "False", "(289,)", 2312, SF_E_FORMAT, "shape (289,): expected"},
+    {"<f8", "False", "(17, 17)", 2311, SF_E_FORMAT, "cut short: 2311 bytes"},
+    {"<f8", "False", "(17, 17)", 2313, SF_E_FORMAT, "too long: 2313 bytes"},
+    {"<f8", "False", "(0, 17)", 0, SF_E_RANGE, "0 rows"},
+    {"<f8", "False", "(17, 17)", 2312, SF_E_RANGE, "row 0: column 0 of the rotation"},
+};
+
+START_TEST(bad_numpy_files_are_named)
+{
+  static layout_file file;
+  const bad_npy *bad = &bad_npys[_i];
+  sf_dataset d;
+  layout_npy_header(&file, bad->descr, bad->order, bad->shape);
+  for (int i = 0; i < bad->bytes; i++) layout_put(&file, 0, 1);
+  put("poses_bounds.npy", &file);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, "poses_bounds.npy", bad->problem);
+}
+END_TEST
+
+/* Every shorter file is refused by name: none is read beyond its end, none is taken for whole. */
+START_TEST(truncated_files_are_named)
+{
+  static const char *const names[] = {"poses_bounds.npy", "sparse/0/cameras.bin", "sparse/0/images.bin",
+                                      "sparse/0/points3D.bin"};
+  static layout_file file;
+  layout_rig rig = orbit();
+  sf_dataset d;
+  rig.views = 3, rig.points = 4;
+  if (_i == 0) {
+    layout_npy(&file, &rig, 0, 1, 2);
+  } else {
+    put_colmap("sparse/0", &rig, 0);
+    if (_i == 1) layout_cameras(&file, &rig, 0);
+    if (_i == 2) layout_images(&file, &rig, 0);
+    if (_i == 3) layout_points(&file, &rig, 0);
+  }
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put(names[_i], &file);
+  ck_good(sf_dataset_load(&d, folder, "train", NULL));
+  sf_dataset_free(&d);
+  const size_t whole = file.size;
+  for (file.size = 0; file.size < whole; file.size += 1 + file.size / 40) {
+    put(names[_i], &file);
+    ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, names[_i], _i ? "cut short" : "");
+    ck_assert_ptr_null(d.view);
+  }
+  file.size = whole + 1;
+  put(names[_i], &file);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, names[_i], "too");
+}
+END_TEST
+
+START_TEST(camera_models_are_refused_by_name)
+{
+  static const layout_lens other[] = {{5, 5, "OPENCV_FISHEYE", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
+                                      {5, 6, "FULL_OPENCV", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
+                                      {5, 7, "FOV", WIDTH, HEIGHT, 5, {20, 20, 8, 6, 1}},
+                                      {5, 10, "THIN_PRISM_FISHEYE", WIDTH, HEIGHT, 8, {20, 20, 8, 6}}};
+  layout_rig rig = orbit();
+  sf_dataset d;
+  rig.lens[rig.lenses++] = other[_i];
+  if (other[_i].params == 8 && other[_i].model > 5) { /* 12 numbers: the rest from a camera behind it */
+    rig.lens[rig.lenses++] = other[0];
+  }
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_colmap("sparse/0", &rig, 0);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_UNSUPPORTED, "cameras.bin: camera 5", other[_i].name);
+}
+END_TEST
+
+typedef struct bad_text {
+  const char *cameras, *images;
+  sf_code code;
+  const char *where, *problem;
+} bad_text;
+#define CAMERA "1 PINHOLE 16 12 20 20 8 6\n"
+static const bad_text bad_texts[] = {
+    {"1 BLA 16 12 20 20 8 6\n", "", SF_E_UNSUPPORTED, "cameras.txt:1", "unknown camera model BLA"},
+    {"# x\n1 PINHOLE 16 12 20 20 8\n", "", SF_E_FORMAT, "cameras.txt:2", "number 4 cannot be read"},
+    {"1 PINHOLE 16 0 20 20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "16 x 0 pixels"},
+    {"1 PINHOLE 16 12 20 -20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "focal length"},
+    {"1 PINHOLE 16 12 nan 20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "parameter 0 of PINHOLE is not finite"},
+    {CAMERA CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n\n", SF_E_FORMAT, "cameras.txt", "camera 1 is listed twice"},
+    {CAMERA, "", SF_E_RANGE, "images.txt", "zero views"},
+    {"# none\n", "1 1 0 0 0 0 0 0 2 p00.png\n\n", SF_E_FORMAT, "image 1 (p00.png)", "cameras.txt does not list"},
+    {CAMERA, "1 1 0 0 0 0 0 0 2 p00.png\n\n", SF_E_FORMAT, "image 1 (p00.png)", "camera 2"},
+    {CAMERA, "1 1 0 0 0 0 0 x 1 p00.png\n\n", SF_E_FORMAT, "images.txt:1", "number 8 cannot be read"},
+    {CAMERA, "1 1 0 0 0.5 0 0 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "no unit quaternion"},
+    {CAMERA, "1 1 0 0 0 0 inf 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "position is inf"},
+    {CAMERA, "1 1 0 0 0 0 0 0 1\n\n", SF_E_FORMAT, "images.txt:1", "no name"},
+};
+
+START_TEST(bad_texts_are_named)
+{
+  const bad_text *bad = &bad_texts[_i];
+  const layout_rig rig = orbit();
+  sf_dataset d;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  ck_good(sf_make_dir(in("sparse/0")));
+  ck_good(sf_write_file(in("sparse/0/cameras.txt"), bad->cameras, strlen(bad->cameras)));
+  ck_good(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, bad->where, bad->problem);
+}
+END_TEST
+
+START_TEST(folders_that_do_not_fit_are_named)
+{
+  const layout_rig rig = row();
+  sf_dataset d;
+  put_llff(&rig, 0, 4, 40);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, folder, "no folder images or images_N");
+  put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
+  ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "no split val", "train or test");
+  ck_bad(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 2}), SF_E_RANGE, "images_4", "1/2");
+  put_picture("images_4/more.png", WIDTH, HEIGHT, 1, 255);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "poses of 17 views", "images_4 holds 18 pictures");
+  unlink(in("images_4/more.png"));
+  put_picture("images_4/p03.png", WIDTH, 2 * HEIGHT, 1, 255);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "images_4/p03.png",
+         "16 x 24 pixels, its camera says 64 x 48");
+}
+END_TEST
+
+static Suite *suite(void)
+{
+  Suite *s = suite_create("layout faults");
+  TCase *t = tcase_create("all");
+  tcase_add_checked_fixture(t, make_folder, remove_folder);
+  tcase_set_timeout(t, 60);
+  tcase_add_test(t, a_few_missing_pictures_are_passed_over);
+  tcase_add_test(t, other_endings_are_found);
+  tcase_add_test(t, the_survey_names_what_looks_wrong);
+  tcase_add_test(t, the_plan_shows_every_camera);
+  tcase_add_test(t, cameras_that_all_look_away_are_refused);
+  tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
+  tcase_add_loop_test(t, truncated_files_are_named, 0, 4);
+  tcase_add_loop_test(t, camera_models_are_refused_by_name, 0, 4);
+  tcase_add_loop_test(t, bad_texts_are_named, 0, sizeof bad_texts / sizeof *bad_texts);
+  tcase_add_test(t, folders_that_do_not_fit_are_named);
+  suite_add_tcase(s, t);
+  return s;
+}
+
+int main(void)
+{
+  SRunner *runner = srunner_create(suite());
+  srunner_run_all(runner, CK_ENV);
+  const int failed = srunner_ntests_failed(runner);
+  srunner_free(runner);
+  return failed != 0;
+}
