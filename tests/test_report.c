@@ -287,24 +287,32 @@ START_TEST(pairs)
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
     char text[300];
     write_run("scenes", scene[i].ann, 25, 1);
-    snprintf(text, sizeof text, "{\"psnr\":24.875,\"ssim\":0.5,\"t_r\":3,\"t_star\":2.5,\"seconds\":1,\"backbone\":%s}",
+    snprintf(text, sizeof text,
+             "{\"psnr\":24.875,\"ssim\":0.5,\"t_r\":3,\"t_star\":2.5,\"seconds\":1,\"beta\":5e-7,\"backbone\":%s}",
              scene[i].kind);
     write_text(scene[i].summary, text);
     write_audit("scenes", scene[i].spiking, "audit-0.json", 10, 40, 1000);
   }
   write_text("scenes/a/beta-5e-7/cosim.json", "{\"samples\":1234,\"differences\":0}");
+  write_text(
+      "scenes/a/beta-1e-6/train.json",
+      "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
+  write_text("scenes/b/beta-5e-7/status", "failed: no memory\n");
   ck_good(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
   ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
   print();
-  contains("table.md",
-           "| a           | tensorf  |       0 |  25.00 |      24.88 |      -0.12 | 0.5000 |     3 |      75.0 |",
+  contains(
+      "table.md",
+      "| a           | tensorf  | 5e-07 |       0 |  25.00 |      24.88 |      -0.12 | 0.5000 |     3 |      75.0 |",
+      true);
+  contains("table.md", "| paper: LLFF | tensorf  | 5e-07 |       - |  26.73 |      26.50 |      -0.23 |  0.828 | 1.875",
            true);
-  contains("table.md", "| paper: LLFF | tensorf  |       - |  26.73 |      26.50 |      -0.23 |  0.828 | 1.875", true);
   contains("table.md", "|           1234 |           0 |", true);
   contains("table.md", "Synthetic", false);
-  contains("table.md", "- b, beta-5e-7: not run", true); /* no status */
+  contains("table.md", "1e-06 |       0 |  25.00 |      24.50 |      -0.50 | 0.5000 |     2 |", true);
+  contains("table.md", "- b, beta-5e-7: failed: no memory", true);
   contains("table.md", "without stage I", false);
   write_text("scenes/b/beta-5e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");

@@ -129,12 +129,12 @@ data=$work/part/reproduce/smoke-data/textured
 [ "$(count '^\[.* dB, ')" -eq 4 ] || fail "profile scenes: not 4 runs"
 table=$work/part/reproduce/scenes/table.md
 for row in textured-ingp textured-tensorf; do
-  grep -Eq "^\| $row +\| ${row#*-} +\| +0 \| +[0-9.]+ \| +[0-9.]+ \|.* [0-9]+ \| +0 \|$" "$table" || { cat "$table"; fail "no row of $row"; }
+  grep -Eq "^\| $row +\| ${row#*-} +\| +5e-07 \| +0 \| +[0-9.]+ \| +[0-9.]+ \|.* [0-9]+ \| +0 \|$" "$table" || { cat "$table"; fail "no row of $row"; }
 done
 grep -q 'Problems\|without a result' "$table" && fail "profile scenes: a run is missing or broken"
 echo "scenes: two backbones"
 
-for bad in "--minutes 3" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x" "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some"; do
+for bad in "--profile scenes --betas 2" "--minutes 3" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x" "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some"; do
   # shellcheck disable=SC2086
   reproduce part 2 $bad
   [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"

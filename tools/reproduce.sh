@@ -10,6 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -54,7 +55,7 @@ case $profile in
     ;;
   *) die "--profile '$profile' is unknown: expected quick, full, scenes or smoke" ;;
 esac
-scenes="" only="" report_only="" chosen=""
+scenes="" only="" report_only="" chosen="" betas=5e-7
 while [ $# -gt 0 ]; do
   name=${1#--}
   case $1 in
@@ -67,11 +68,14 @@ while [ $# -gt 0 ]; do
     --scenes) scenes=$2 ;;
     --only) only=$2 ;;
     --train) set[train]="${set[train]}${set[train]:+ }$2" ;;
-    --minutes | --backbones)
+    --minutes | --backbones | --betas)
       [ "$profile" = scenes ] || die "$1 belongs to --profile scenes"
       if [ "$1" = --minutes ]; then
         [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
         set[minutes]=$2
+      elif [ "$1" = --betas ]; then
+        [[ $2 =~ ^((1e-7|5e-7|1e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6"
+        betas=$2
       else
         [[ $2 =~ ^((ingp|tensorf)( |$))+$ ]] || die "--backbones '$2' is unknown: expected ingp, tensorf or both"
         chosen=$2
@@ -234,7 +238,7 @@ one_backbone() {
   scene=${data##*/}-$1
   prepare_scene
   common="$common --backbone $1"
-  one_run beta-5e-7 --beta 5e-7
+  for beta in $betas; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }
 
@@ -248,7 +252,7 @@ for data in "${paths[@]}"; do
 done
 if [ "$profile" = scenes ]; then
   total=0
-  for layout in "${layouts[@]}"; do total=$((total + 2 * $(backbones_of "$layout" | wc -w))); done
+  for layout in "${layouts[@]}"; do total=$((total + (1 + $(wc -w <<<"$betas")) * $(backbones_of "$layout" | wc -w))); done
 fi
 for i in "${!paths[@]}"; do
   data=${paths[i]} frames=${frames_of[i]}

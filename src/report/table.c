@@ -123,7 +123,9 @@ static void print_head(FILE *out, const sf_reproduction *r)
   fprintf(out, "# Reproduction of the paper, profile %s\n\n", r->profile);
   fprintf(out, "%d %s:", r->count, r->count == 1 ? "scene" : "scenes");
   for (int s = 0; s < r->count; s++) fprintf(out, " %s", r->scene[s].name);
-  fprintf(out, ". %d of %d runs trained, %.2f h of training.\n", runs, r->count * (pairs ? 2 : SF_RUNS), hours);
+  fprintf(out, ". %d", runs);
+  if (!pairs) fprintf(out, " of %d", r->count * SF_RUNS);
+  fprintf(out, " runs trained, %.2f h of training.\n", hours);
   const sf_run *run = first_done(r);
   if (run && pairs) fprintf(out, "Every run: seed %.0f.\n\n", number_of(run->summary, "seed"));
   if (pairs) return;
@@ -218,18 +220,18 @@ static const char *text_of(const cJSON *json, const char *key)
   return cJSON_IsString(item) ? item->valuestring : "-";
 }
 
-static void pair_row(table *t, const sf_reproduction *r, int scene)
+static void pair_row(table *t, const sf_reproduction *r, int scene, int id)
 {
   const sf_report_scene *one = &r->scene[scene];
-  const sf_run *run = &one->run[SF_RUN_BETA_5E7];
+  const sf_run *run = &one->run[id];
   const double ann = one->run[SF_RUN_ANN].value[SF_METRIC_PSNR];
   row(t);
   cell(t, "%s", one->name), cell(t, "%s", text_of(run->summary, "backbone"));
-  number(t, 0, run->value[SF_METRIC_SECONDS] / 60);
+  cell(t, "%g", number_of(run->summary, "beta")), number(t, 0, run->value[SF_METRIC_SECONDS] / 60);
   number(t, 2, ann), number(t, 2, run->value[SF_METRIC_PSNR]), number(t, 2, run->value[SF_METRIC_PSNR] - ann);
   number(t, 4, run->value[SF_METRIC_SSIM]), number(t, 0, run->value[SF_METRIC_STEPS]);
-  number(t, 1, sf_reproduction_saving(r, scene, SF_RUN_BETA_5E7, SF_SAVING_TWIN));
-  number(t, 1, sf_reproduction_saving(r, scene, SF_RUN_BETA_5E7, SF_RUN_ANN));
+  number(t, 1, sf_reproduction_saving(r, scene, id, SF_SAVING_TWIN));
+  number(t, 1, sf_reproduction_saving(r, scene, id, SF_RUN_ANN));
   number(t, 2, run->value[SF_METRIC_LOSS]);
   number(t, 0, run->cosim_samples), number(t, 0, run->cosim_differences);
 }
@@ -237,7 +239,7 @@ static void pair_row(table *t, const sf_reproduction *r, int scene)
 static void paper_row(table *t, const sf_paper_group *g)
 {
   row(t);
-  cell(t, "paper: %s", g->data), cell(t, "%s", g->backbone), cell(t, "-");
+  cell(t, "paper: %s", g->data), cell(t, "%s", g->backbone), cell(t, "5e-07"), cell(t, "-");
   number(t, 2, g->ann_psnr), number(t, 2, g->psnr), number(t, 2, g->psnr - g->ann_psnr), number(t, 3, g->ssim);
   number(t, 3, g->steps), cell(t, "-"), number(t, 1, 100 * (1 - g->energy / g->ann_energy));
   for (int i = 0; i < 3; i++) cell(t, "-");
@@ -245,13 +247,15 @@ static void paper_row(table *t, const sf_paper_group *g)
 
 static void print_pairs(FILE *out, const sf_reproduction *r, table *t)
 {
-  static const char *const title[] = {"scene",      "backbone",       "minutes",    "ANN dB",    "spiking dB",
-                                      "difference", "SSIM",           "t_r",        "of twin %", "saving %",
-                                      "fixed dB",   "samples in RTL", "differences"};
+  static const char *const title[] = {"scene",      "backbone",   "beta",           "minutes",    "ANN dB",
+                                      "spiking dB", "difference", "SSIM",           "t_r",        "of twin %",
+                                      "saving %",   "fixed dB",   "samples in RTL", "differences"};
   begin(t), row(t);
   t->left = 2;
   for (size_t i = 0; i < sizeof title / sizeof *title; i++) cell(t, "%s", title[i]);
-  for (int s = 0; s < r->count; s++) pair_row(t, r, s);
+  for (int s = 0; s < r->count; s++)
+    for (int i = SF_RUN_BETA_1E7; i <= SF_RUN_BETA_1E6; i++)
+      if (r->scene[s].run[i].summary) pair_row(t, r, s, i);
   for (int g = 0; g < SF_PAPER_GROUPS; g++)
     for (int s = 0; s < r->count; s++)
       if (sf_reproduction_group(&r->scene[s]) == &sf_paper_groups[g]) {
@@ -360,7 +364,7 @@ static void print_unfinished(FILE *out, const sf_reproduction *r)
     for (int i = 0; i < SF_RUNS; i++) {
       const char *status = r->scene[s].run[i].status;
       if (status && strcmp(status, "done") == 0) continue;
-      if (pairs && i != SF_RUN_ANN && i != SF_RUN_BETA_5E7) continue;
+      if (pairs && !status) continue;
       if (!any) fprintf(out, "## Runs without a result\n\n");
       any = true;
       fprintf(out, "- %s, %s: %s\n", r->scene[s].name, sf_run_kinds[i].name, status ? status : "not run");

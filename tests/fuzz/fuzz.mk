@@ -2,6 +2,7 @@
 # `make check`. Included by the Makefile. See docs/fuzzing.md.
 
 FUZZ_TIME ?= 60
+FUZZ_JOBS ?= 1
 CLANG ?= clang
 FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ ?= $(FUZZ_TARGETS)
@@ -25,12 +26,12 @@ $(FUZZ_TARGETS:%=$B/bin/fuzz_%): $B/bin/fuzz_%: $B/obj/tests/fuzz/fuzz_%.o $(FUZ
 	$(call say,LD    $@)
 	$Q$(CC) $(SAN) -fsanitize=fuzzer -o $@ $^ $(LIBS)
 
-fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each; FUZZ=NAME chooses targets
+fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each, FUZZ_JOBS=1 at a time; FUZZ=NAME chooses targets
 	@tests/fuzz/run.sh --installed $(CLANG)
 	@$(MAKE) $B/tests/fuzz/seeds
 	@$(MAKE) B=$B/fuzz CC=$(CLANG) OPT=-O1 SAN="$(FUZZ_SAN)" \
 	  CFLAGS="-fsanitize=fuzzer-no-link -fno-openmp -Itests/fuzz/single -Wno-unknown-pragmas" $(FUZZ:%=$B/fuzz/bin/fuzz_%)
-	@tests/fuzz/run.sh $B $(FUZZ_TIME) $(FUZZ)
+	@tests/fuzz/run.sh $B $(FUZZ_TIME) $(FUZZ_JOBS) $(FUZZ)
 
 deps-fuzz: ## install what `make fuzz` needs besides (clang)
 	@DEPS="clang libclang-rt-dev" tools/deps.sh
