@@ -56,7 +56,7 @@ $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
 endef
 
-DUT_TESTS += test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs test_soc
+DUT_TESTS += test_rtl_registers test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs test_soc
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
