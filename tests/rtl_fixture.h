@@ -3,6 +3,7 @@
 #define SPIKEFIELD_TESTS_RTL_FIXTURE_H
 #include "sim/compare.h"
 #include "sim/sim.h"
+#include "spikefield/cycles.h"
 #include "tests/random_net.h"
 #include <check.h>
 
@@ -85,6 +86,36 @@ static inline void run_batch(sf_dut *dut, const fx_net *net, int n, fx_counts *c
   expect_core(&shared, net, n, counts);
   ck_ok(sf_dut_run_traced(dut, shared.sample, n, shared.result, shared.dut_trace));
   same_samples(&shared, net, n, seed);
+}
+
+/* What the cycle model says of the first n samples of the batch that was run. */
+static inline sf_cycle_totals modelled_cycles(const fx_net *net, int n)
+{
+  sf_cycle_model *model = sf_cycle_model_create(net);
+  ck_assert_ptr_nonnull(model);
+  for (int i = 0; i < n; i++) {
+    const sf_cycle_sample shape = sf_cycle_sample_make(net, &shared.trace[i], shared.sample[i].first);
+    sf_cycle_model_add(model, &shape);
+  }
+  sf_cycle_model_drain(model);
+  const sf_cycle_totals totals = *sf_cycle_model_totals(model);
+  ck_assert_uint_eq(totals.samples, (uint64_t)n);
+  sf_cycle_model_free(model);
+  return totals;
+}
+
+/* Every counter of time, of a run whose streams never made it wait. */
+static inline void same_cycles(sf_dut *dut, const fx_net *net, int n, uint64_t seed)
+{
+  const sf_cycle_totals model = modelled_cycles(net, n);
+  sf_driver_counters c;
+  ck_assert_int_eq(sf_driver_read_counters(&dut->bus, &c), SF_DRIVER_OK);
+  ck_assert_msg(c.cycles == model.cycles, "seed %llu: %llu cycles, the model's are %llu", (unsigned long long)seed,
+                (unsigned long long)c.cycles, (unsigned long long)model.cycles);
+  ck_assert_uint_eq(c.busy, model.any_busy);
+  ck_assert_uint_eq(c.stall_in, model.waits);
+  ck_assert_uint_eq(c.stall_out, model.stalls);
+  for (int l = 0; l < SF_LAYERS; l++) ck_assert_uint_eq(c.layer_busy[l], model.busy[l]);
 }
 
 static inline void check_net(const fx_net *net, random_source *r, int n, bool extreme, int stalls)

@@ -1,6 +1,5 @@
 /* The accelerator against the fixed-point core, bit for bit: outputs, spikes, membranes, rows, counters. Random nets,
  * tables, streams; the hard cases are in test_rtl_hard.c. */
-#include "spikefield/cycles.h"
 #include "tests/rtl_fixture.h"
 
 START_TEST(trained_size_nets)
@@ -20,21 +19,6 @@ START_TEST(trained_size_nets)
   sf_dut_close(dut);
 }
 END_TEST
-
-static sf_cycle_totals modelled_cycles(const fx_net *net, int n)
-{
-  sf_cycle_model *model = sf_cycle_model_create(net);
-  ck_assert_ptr_nonnull(model);
-  for (int i = 0; i < n; i++) {
-    const sf_cycle_sample shape = sf_cycle_sample_make(net, &shared.trace[i], shared.sample[i].first);
-    sf_cycle_model_add(model, &shape);
-  }
-  sf_cycle_model_drain(model);
-  const sf_cycle_totals totals = *sf_cycle_model_totals(model);
-  ck_assert_uint_eq(totals.samples, (uint64_t)n);
-  sf_cycle_model_free(model);
-  return totals;
-}
 
 /* A net whose time does not hang on the streams: with stalls the model is within a hundredth. */
 START_TEST(stalls_hide_behind_the_engine)
@@ -59,16 +43,11 @@ START_TEST(cycles_are_those_of_the_model)
   for (uint64_t i = 0; i < 4; i++) {
     random_source r = {5000 + (uint64_t)_i * 4 + i, 0};
     random_net_make(&net_of_test, &r, _i > 0);
-    fx_counts counts = {0}, actual;
-    uint64_t cycles, busy, stalls;
+    fx_counts counts = {0};
     sf_dut *dut = open_dut(&net_of_test.net, r.seed, 0);
     draw_batch(&shared, &r, BATCH, _i > 0);
     run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
-    ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
-    const sf_cycle_totals model = modelled_cycles(&net_of_test.net, BATCH);
-    ck_assert_uint_eq(cycles, model.cycles);
-    ck_assert_uint_eq(stalls, model.waits + model.stalls);
-    for (int l = 0; l < SF_LAYERS; l++) ck_assert_uint_eq(sf_dut_layer_busy(dut)[l], model.busy[l]);
+    same_cycles(dut, &net_of_test.net, BATCH, r.seed);
     sf_dut_close(dut);
   }
 }

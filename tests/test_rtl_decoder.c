@@ -1,6 +1,5 @@
 /* Decoders (C1, C2 and C3 alone, inputs with every sample) and biases on the accelerator against the fixed-point core,
  * bit for bit, and against the cycle model, in the build that runs the nets with densities. */
-#include "spikefield/cycles.h"
 #include "tests/rtl_fixture.h"
 
 static const int inputs_of[] = {150, 30, SF_DIR_MAX, 1};
@@ -9,26 +8,12 @@ enum { SIZES = sizeof inputs_of / sizeof *inputs_of };
 /* Runs the batch that was drawn, on a fresh accelerator without stalls: results, counters, cycles of the model. */
 static void check_cycles(const fx_net *net, int n, uint64_t seed)
 {
-  fx_counts counts = {0}, actual;
-  uint64_t cycles, busy, stalls;
+  fx_counts counts = {0};
   sf_dut *dut = open_dut(net, seed, 0);
   run_batch(dut, net, n, &counts, seed);
   same_counts(dut, &counts, seed);
-  ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
-  sf_cycle_model *model = sf_cycle_model_create(net);
-  ck_assert_ptr_nonnull(model);
-  for (int i = 0; i < n; i++) {
-    const sf_cycle_sample shape = sf_cycle_sample_make(net, &shared.trace[i], shared.sample[i].first);
-    sf_cycle_model_add(model, &shape);
-  }
-  sf_cycle_model_drain(model);
-  const sf_cycle_totals *totals = sf_cycle_model_totals(model);
-  ck_assert_msg(cycles == totals->cycles, "seed %llu: %llu cycles, the model's are %llu", (unsigned long long)seed,
-                (unsigned long long)cycles, (unsigned long long)totals->cycles);
-  ck_assert_uint_eq(stalls, totals->waits + totals->stalls);
-  for (int l = 0; l < SF_LAYERS; l++) ck_assert_uint_eq(sf_dut_layer_busy(dut)[l], totals->busy[l]);
-  ck_assert_uint_ge(cycles, sf_cycles_least(net, &counts));
-  sf_cycle_model_free(model);
+  same_cycles(dut, net, n, seed);
+  ck_assert_uint_ge(modelled_cycles(net, n).cycles, sf_cycles_least(net, &counts));
   sf_dut_close(dut);
 }
 

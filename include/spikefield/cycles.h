@@ -13,10 +13,11 @@ typedef struct sf_cycle_sample {
 } sf_cycle_sample;
 
 typedef struct sf_cycle_totals {
-  uint64_t samples, cycles;    /* cycles: from the first beat in until the last beat out is gone */
-  uint64_t busy[SF_LAYERS];    /* cycles in which the layer added up a row */
-  uint64_t waits;              /* cycles in which D1 had no sample */
-  uint64_t stalls;             /* cycles in which the sums of D2 or C3 waited for the readout */
+  uint64_t samples, cycles; /* cycles: from the first beat in until the last beat out is gone */
+  uint64_t busy[SF_LAYERS]; /* cycles in which the layer added up a row */
+  uint64_t any_busy;        /* cycles in which one of them did */
+  uint64_t waits;           /* cycles in which D1 had no sample */
+  uint64_t stalls;          /* cycles in which the sums of D2 or C3 waited for the readout */
 } sf_cycle_totals;
 
 typedef struct sf_cycle_model sf_cycle_model;

@@ -303,6 +303,12 @@ static void tick_readout(sf_cycle_model *m, const sf_cycle_model *was)
   if (was->out.full) m->out.second = !was->out.second;
 }
 
+static uint64_t rows_issued(const sf_cycle_model *m)
+{
+  const uint64_t *busy = m->totals.busy;
+  return busy[FX_D2] + busy[FX_C1] + busy[FX_C2] + busy[FX_C3];
+}
+
 static void tick(sf_cycle_model *m)
 {
   const sf_cycle_model was = *m;
@@ -316,6 +322,7 @@ static void tick(sf_cycle_model *m)
   const bool density_ready = !was.read.density_full && !was.d2.taking && was.read.room;
   const bool colour_ready = !was.read.colour_full && !was.c3.taking;
   m->totals.stalls += (was.c3.ready && !colour_ready) || (was.d2.ready && !density_ready);
+  m->totals.any_busy += m->d1.row || rows_issued(m) != rows_issued(&was); /* D1's own counter is a cycle behind */
   tick_neurons(m, &was, density_ready, colour_ready);
   tick_stores(m, &was);
   tick_readout(m, &was);
