@@ -27,7 +27,7 @@ run() {
     kit) command=("$here/kit.sh" "$build") ;;
     activity) command=("$here/activity.sh" "$build") ;;
     lanes) command=("$here/lanes.sh" "$build") ;;
-    mutate) command=("$here/mutate/mutate.sh" "$build" --sample) ;;
+    mutate) command=("$here/mutate/units.py" "$build" --sample) ;;
     formal) command=("$here/formal/run.sh" "$build" --quick) ;;
     install) command=("$here/install.sh" "$build") ;;
     golden_set) command=("$here/golden_set.sh" "$build") ;;
@@ -45,7 +45,7 @@ run() {
   status=$?
   if [ $status -eq 0 ]; then
     verdict=ok
-  elif [ $status -eq 77 ] || { [[ $name == safetensors || $name == nir ]] && ! command -v python3 >/dev/null; }; then
+  elif [ $status -eq 77 ] || { [[ $name == safetensors || $name == nir || $name == mutate ]] && ! command -v python3 >/dev/null; }; then
     verdict="skipped: $(tail -n 1 "$logs/$name.log")"
   else
     verdict="FAILED ($status), see $logs/$name.log"

@@ -2,8 +2,8 @@
 """Writes RTL modules with all their mutants in them; the environment's SF_MUTANT=N chooses one at run time.
 
 usage: operators.py RTL OUT MODULE...
-OUT/MODULE.sv is RTL/MODULE.sv in which every expression reads `mutant N ? changed : original`; OUT/mutants lists them:
-number, module, line, what was changed. The same sources give the same numbers.
+OUT/MODULE.sv is RTL/MODULE.sv in which every expression reads `mutant N ? changed : original`; OUT/mutants lists them
+with tabs between: number, module, place, what was changed. The same sources give the same numbers.
 
 Operators, on right sides, conditions and port expressions:
   && with ||, & with |, + with -, == with !=, < with <=, > with >=; ! and ~ dropped
@@ -71,7 +71,7 @@ class Module:
         return i
 
     def places(self):
-        """(kind, first token, end token, left side) of every expression that is mutated."""
+        """(kind, first token, end token, what it is given to) of every expression that is mutated."""
         t = [token[0] for token in self.tokens]
         i = t.index(";", t.index("module"))
         while i < len(t):
@@ -87,7 +87,7 @@ class Module:
             elif t[i] == "if":
                 end = self.match(i + 1)
                 if t[end + 1] != ":":
-                    yield "if", i + 2, end - 1, None
+                    yield "if", i + 2, end - 1, "if"
                 i = end
             elif t[i] == "begin" and t[i + 1] == ":" and t[i + 2].startswith("g_no_"):
                 i = self.block(i)
@@ -96,7 +96,7 @@ class Module:
             elif t[i] == "." and t[i + 2] == "(":
                 end = self.match(i + 2)
                 if any(x in SWAP or x in "!~?" for x in t[i + 3:end - 1]):
-                    yield "port", i + 3, end - 1, None
+                    yield "port", i + 3, end - 1, "." + t[i + 1]
                 i = end
             elif t[i] in "[{" or (t[i] == "(" and t[i - 1] == "case"):
                 i = self.match(i)
@@ -111,7 +111,7 @@ class Module:
                             break
                         first -= 1
                     first -= t[first] == "["
-                left = self.text[self.tokens[first][1]:self.tokens[i - 1][2]]
+                left = " ".join(self.text[self.tokens[first][1]:self.tokens[i - 1][2]].split())
                 if not left.startswith("unused"):
                     yield t[i], i + 1, end, left
                 i = end
@@ -127,8 +127,8 @@ class Module:
             old = self.text[spans[i][1]:spans[j - 1][2]]
             line = self.text.count("\n", 0, spans[i][1]) + 1
             around = " ".join(self.text[max(start, spans[i][1] - 24):min(stop, spans[j - 1][2] + 24)].split())
-            shown = new if new else "nothing"
-            return line, f"{old} -> {shown} in `{around}`", self.text[start:spans[i][1]] + new + self.text[spans[j - 1][2]:stop]
+            shown = new.strip() or "nothing"
+            return line, f"{left}: {old} -> {shown} in `{around}`", self.text[start:spans[i][1]] + new + self.text[spans[j - 1][2]:stop]
 
         whole = self.text.count("\n", 0, start) + 1
         if kind == "if":
@@ -197,7 +197,7 @@ def main():
         with open(f"{out}/{name}.sv", "w") as f:
             f.write(text)
     with open(f"{out}/mutants", "w") as f:
-        f.writelines("%d %s %s:%d %s\n" % (n, m, f"rtl/{m}.sv", line, what) for n, m, line, what in everything)
+        f.writelines(f"{n}\t{m}\trtl/{m}.sv:{line}\t{what}\n" for n, m, line, what in everything)
 
 
 main()

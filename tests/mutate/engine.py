@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+"""Counts how many mutants of the engine's control modules and of sf_csr the tests of the co-simulation kill.
+
+FOLDER has the checkers, linked with an accelerator that holds every mutant, and rtl/mutants, their list (operators.py);
+SF_MUTANT=N in the environment chooses one. Killed: a checker fails, crashes or hangs; they run in the order given, the
+first that kills ends it. MODULE...: all that are mutated; --modules: those of this run. --mutants: at most so many per
+module, spread evenly, the same ones every time. Verdicts are kept in FOLDER/results.MODULE (campaign.py).
+Equivalent: listed with its reason in tests/mutate/equivalent-engine. Exit 0 nothing unexplained survived, 1 not.
+"""
+import argparse
+import os
+import sys
+
+import campaign
+
+EQUIVALENT = "tests/mutate/equivalent-engine"
+
+
+def checker(folder, name):
+    """The checker with its limit, which is kept: without a mutant it takes its whole time."""
+    command = os.path.abspath(f"{folder}/{name}")
+    with open(command, "rb") as f:
+        key = campaign.digest(f.read())
+    path, kept = f"{folder}/limit.{name}", []
+    if os.path.exists(path):
+        with open(path) as f:
+            kept = f.read().split()
+    if len(kept) == 2 and kept[0] == key:
+        return campaign.Checker(name, command, key, int(kept[1]))
+    found = campaign.measured(name, command, key)
+    with open(path, "w") as f:
+        f.write(f"{key} {found.limit}\n")
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("all", nargs="+", metavar="MODULE")
+    parser.add_argument("--checkers", required=True)
+    parser.add_argument("--mutants", type=int, default=sys.maxsize)
+    parser.add_argument("--modules", default="")
+    given = parser.parse_intermixed_args()
+    modules = given.modules.split() or given.all
+    with open(f"{given.folder}/rtl/mutants") as f:
+        fields = [line.rstrip("\n").split("\t") for line in f]
+    mutants = campaign.unique([campaign.Mutant(int(n), module, place, what) for n, module, place, what in fields])
+    of = {module: [m for m in mutants if m.module == module] for module in given.all}
+    for module in modules:
+        if not of.get(module):
+            raise campaign.Stop(f"{module} is no mutated module")
+    equivalents = campaign.Equivalents(EQUIVALENT, given.all)
+    for module in given.all:
+        equivalents.match(module, of[module])
+
+    checkers = [checker(given.folder, name) for name in given.checkers.split()]
+    score = campaign.Score(equivalents)
+    for module in modules:
+        results = campaign.Results(f"{given.folder}/results.{module}", [c.key for c in checkers])
+        chosen = campaign.sample(of[module], given.mutants)
+        pending = [m for m in chosen if m.number not in results.verdicts]
+        progress = campaign.Progress(module, len(chosen) - len(pending), len(chosen))
+        campaign.judge_all(pending, checkers, results, progress, int(os.environ.get("MUTANT_JOBS", "2")))
+        progress.end()
+        score.row(module, chosen, len(of[module]), results)
+    return score.end(f"{given.folder}/mutate.json")
+
+
+if __name__ == "__main__":
+    campaign.stop_at(main)
