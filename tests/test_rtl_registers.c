@@ -1,176 +1,9 @@
-/* The registers against a model of csr.def: what reads back, what is refused and how, the interrupt. */
+/* The registers against a model of csr.def: what reads back, what is refused and how, the interrupt; the bus and the
+ * window of counters. */
+#include "tests/register_model.h"
 #include "tests/rtl_fixture.h"
 
-enum {
-  TRIALS = 4000,
-  ACCESSES = 6000,
-  LAYER_STRIDE = SF_CSR_D2_N_IN - SF_CSR_D1_N_IN,
-  KINDS = 4,
-  LEAK_ONE = 1 << SF_LEAK_FRAC
-};
-enum { N_IN, N_OUT, K, THETA }; /* registers of a layer */
-
-/* As they read. A value that does not fit is kept as an illegal one, so that the check at start sees it. */
-typedef struct registers {
-  bool running;
-  uint32_t error, irq_enable, irq_pending;
-  uint32_t mode, steps, exp[3], sigmoid[3]; /* multiplier, shift, bias */
-  uint32_t layer[SF_LAYERS][KINDS];
-  uint32_t weight_address, bias;
-} registers;
-
-/* ---- the model ---- */
-
-static uint32_t fitted(uint32_t value, int bits, uint32_t illegal)
-{
-  return value >> bits ? illegal : value;
-}
-
-static uint32_t *layer_register(registers *r, uint32_t offset)
-{
-  if (offset < SF_CSR_D1_N_IN || offset > SF_CSR_C3_THETA) return NULL;
-  const uint32_t at = offset - SF_CSR_D1_N_IN;
-  return &r->layer[at / LAYER_STRIDE][at % LAYER_STRIDE / 4];
-}
-
-static uint32_t layer_value(uint32_t offset, uint32_t value)
-{
-  switch (offset % LAYER_STRIDE / 4) {
-  case K:
-    return fitted(value, 13, 0x1fff);
-  case THETA:
-    return fitted(value, 23, 0);
-  default:
-    return fitted(value, 8, 0xff);
-  }
-}
-
-static bool outside(uint32_t value, uint32_t low, uint32_t high)
-{
-  return value < low || value > high;
-}
-
-static bool bad_size(const registers *r)
-{
-  const uint32_t(*l)[KINDS] = r->layer;
-  const bool decoder = !l[FX_D1][N_IN] && !l[FX_D1][N_OUT] && !l[FX_D2][N_IN] && !l[FX_D2][N_OUT];
-  const uint32_t h = l[FX_D2][N_OUT] - 1;
-  if (decoder && outside(l[FX_C1][N_IN], 1, SF_DIR_MAX)) return true;
-  if (!decoder && (outside(l[FX_D1][N_IN], 1, SF_FEATURE_MAX) || outside(l[FX_D1][N_OUT], 1, SF_LANES) ||
-                   l[FX_D2][N_IN] != l[FX_D1][N_OUT] || outside(l[FX_D2][N_OUT], 1, SF_OUT_MAX) ||
-                   l[FX_C1][N_IN] == 0 || outside(l[FX_C1][N_IN], h, h + FX_SH)))
-    return true;
-  return outside(l[FX_C1][N_OUT], 1, SF_LANES) || l[FX_C2][N_IN] != l[FX_C1][N_OUT] ||
-         outside(l[FX_C2][N_OUT], 1, SF_LANES) || l[FX_C3][N_IN] != l[FX_C2][N_OUT] || l[FX_C3][N_OUT] != 3 ||
-         r->bias & ~(SF_CSR_BIAS_C1 | SF_CSR_BIAS_C2 | SF_CSR_BIAS_C3);
-}
-
-static uint32_t start_errors(const registers *r)
-{
-  uint32_t error = bad_size(r) ? SF_CSR_ERROR_SIZE : 0;
-  if (outside(r->steps, 1, SF_T_MAX)) error |= SF_CSR_ERROR_STEPS;
-  for (int l = 0; l < SF_LAYERS; l++) {
-    const bool spikes = l == FX_C1 || l == FX_C2 || (l == FX_D1 && r->layer[FX_D1][N_OUT]);
-    if (r->layer[l][K] > LEAK_ONE) error |= SF_CSR_ERROR_LEAK;
-    if (spikes && !r->layer[l][THETA]) error |= SF_CSR_ERROR_THETA;
-  }
-  if (r->mode > FX_NODECAY) error |= SF_CSR_ERROR_MODE;
-  if (r->exp[0] > 65535 || r->sigmoid[0] > 65535 || r->exp[1] > 31 || r->sigmoid[1] > 31) error |= SF_CSR_ERROR_SCALE;
-  return error;
-}
-
-static bool weight_fits(uint32_t address, uint32_t weights)
-{
-  const uint32_t layer = address >> SF_CSR_WEIGHT_ADDRESS_LAYER_LSB, word = address & 31;
-  const uint32_t row = address >> SF_CSR_WEIGHT_ADDRESS_ROW_LSB & 255;
-  static const uint32_t rows[] = {SF_FEATURE_MAX, SF_LANES, SF_DIR_MAX, SF_LANES, SF_LANES};
-  for (int byte = 0; byte < 4; byte++)
-    if ((weights >> 8 * byte & 255) == 0x80) return false;
-  if (layer >= SF_LAYERS) return false;
-  if (word >= (layer == FX_D2 || layer == FX_C3 ? SF_OUT_MAX : SF_LANES) / 4) return false;
-  return row < rows[layer] || (layer >= FX_C1 && row == SF_BIAS_ROW);
-}
-
-static uint32_t command(registers *r, uint32_t value)
-{
-  uint32_t error = 0;
-  if (value & SF_CSR_CTRL_SOFT_RESET) r->running = false, r->error = 0;
-  if (value & SF_CSR_CTRL_START) {
-    error = r->running ? SF_CSR_ERROR_BUSY : start_errors(r);
-    r->running = r->running || !error;
-  }
-  return error;
-}
-
-/* Programming while the block stands still; the bits of ERROR that it sets. */
-static uint32_t programmed(registers *r, uint32_t offset, uint32_t value)
-{
-  const uint32_t known_bias = SF_CSR_BIAS_C1 | SF_CSR_BIAS_C2 | SF_CSR_BIAS_C3;
-  uint32_t *const table = layer_register(r, offset);
-  if (table) *table = layer_value(offset, value);
-  if (offset == SF_CSR_MODE) r->mode = fitted(value, 2, 3);
-  if (offset == SF_CSR_STEPS) r->steps = fitted(value, 4, 15);
-  if (offset == SF_CSR_EXP_MUL) r->exp[0] = fitted(value, 16, 1u << 16);
-  if (offset == SF_CSR_EXP_SHIFT) r->exp[1] = fitted(value, 5, 32);
-  if (offset == SF_CSR_EXP_BIAS) r->exp[2] = value;
-  if (offset == SF_CSR_SIGMOID_MUL) r->sigmoid[0] = fitted(value, 16, 1u << 16);
-  if (offset == SF_CSR_SIGMOID_SHIFT) r->sigmoid[1] = fitted(value, 5, 32);
-  if (offset == SF_CSR_SIGMOID_BIAS) r->sigmoid[2] = value;
-  if (offset == SF_CSR_BIAS) r->bias = (value & known_bias) | (value & ~known_bias ? 1u << 18 : 0);
-  if (offset == SF_CSR_WEIGHT_ADDRESS) r->weight_address = fitted(value, 16, 0xffff);
-  if (offset != SF_CSR_WEIGHT_DATA) return 0;
-  const bool fits = weight_fits(r->weight_address, value);
-  r->weight_address = (r->weight_address + 1) & 0xffff;
-  return fits ? 0 : SF_CSR_ERROR_WEIGHT;
-}
-
-/* The bits of ERROR that a write sets. */
-static uint32_t model_write(registers *r, uint32_t offset, uint32_t value)
-{
-  uint32_t error = 0;
-  if (offset == SF_CSR_CTRL)
-    error = command(r, value);
-  else if (offset == SF_CSR_ERROR)
-    r->error &= ~value;
-  else if (offset == SF_CSR_IRQ_ENABLE)
-    r->irq_enable = value & 3;
-  else if (offset == SF_CSR_IRQ_PENDING)
-    r->irq_pending &= ~value;
-  else if (outside(offset, SF_CSR_MODE, SF_CSR_BIAS))
-    error = SF_CSR_ERROR_ADDRESS;
-  else
-    error = r->running ? SF_CSR_ERROR_BUSY : programmed(r, offset, value);
-  r->error |= error;
-  if (error) r->irq_pending |= SF_CSR_IRQ_ENABLE_ERROR;
-  return error;
-}
-
-static uint32_t model_read(registers *r, uint32_t offset)
-{
-  const struct {
-    uint32_t offset, value;
-  } all[] = {{SF_CSR_ID, SF_CSR_ID_RESET},
-             {SF_CSR_VERSION, SF_CSR_VERSION_RESET},
-             {SF_CSR_CONFIG, SF_CSR_CONFIG_RESET},
-             {SF_CSR_STATUS, (r->running ? SF_CSR_STATUS_RUNNING : 0) | (r->error ? SF_CSR_STATUS_ERROR : 0)},
-             {SF_CSR_ERROR, r->error},
-             {SF_CSR_IRQ_ENABLE, r->irq_enable},
-             {SF_CSR_IRQ_PENDING, r->irq_pending},
-             {SF_CSR_MODE, r->mode},
-             {SF_CSR_STEPS, r->steps},
-             {SF_CSR_EXP_MUL, r->exp[0]},
-             {SF_CSR_EXP_SHIFT, r->exp[1]},
-             {SF_CSR_EXP_BIAS, r->exp[2]},
-             {SF_CSR_SIGMOID_MUL, r->sigmoid[0]},
-             {SF_CSR_SIGMOID_SHIFT, r->sigmoid[1]},
-             {SF_CSR_SIGMOID_BIAS, r->sigmoid[2]},
-             {SF_CSR_WEIGHT_ADDRESS, r->weight_address},
-             {SF_CSR_BIAS, r->bias}};
-  for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-    if (all[i].offset == offset) return all[i].value;
-  const uint32_t *table = layer_register(r, offset);
-  return table ? *table : 0;
-}
+enum { TRIALS = 4000, ACCESSES = 6000, PLACES = 512 /* of the window */ };
 
 /* ---- both ---- */
 
@@ -197,20 +30,31 @@ static void read_both(sf_dut *dut, registers *r, uint32_t offset)
   ck_assert_uint_eq(dut->out.rresp, 0);
 }
 
+/* A master may show anything while it is not valid: addresses and values of the other registers. */
+static void show_anything(void *context)
+{
+  sf_dut *dut = context;
+  random_source s = {7, dut->cycle * 4};
+  if (!dut->in.awvalid) dut->in.awaddr = 4 * (uint32_t)draw(&s, 0, SF_CSR_BIAS / 4);
+  if (!dut->in.wvalid) dut->in.wdata = draw(&s, 0, 1) ? (uint32_t)draw(&s, 0, 15) : UINT32_MAX;
+}
+
 static sf_dut *begin(registers *r, uint64_t seed)
 {
   sf_dut *dut;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = seed, .stall_percent = 20}));
   while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue; /* the walk after power-on */
+  ck_assert_uint_lt(dut->cycle, PLACES + 100);
   *r = (registers){.irq_pending = SF_CSR_IRQ_ENABLE_COUNTERS};
-  read_both(dut, r, SF_CSR_IRQ_PENDING);
+  dut->each_cycle = show_anything, dut->each_cycle_context = dut;
+  for (uint32_t offset = 0; offset <= SF_CSR_BIAS; offset += 4) read_both(dut, r, offset);
   return dut;
 }
 
 /* A value at or beside a limit of some register, or beside the value that is there. */
 static uint32_t near_a_limit(random_source *s, uint32_t now)
 {
-  static const uint32_t limit[] = {0, 3, 8, 15, 16, 32, 128, 160, 256, 512, 4096, 8192, 1 << 16, 1 << 23, 1u << 31};
+  static const uint32_t limit[] = {0, 1, 3, 8, 15, 16, 32, 128, 160, 256, 512, 4096, 8192, 1 << 16, 1 << 23, 1u << 31};
   const uint32_t beside = (uint32_t)draw(s, -1, 1);
   if (draw(s, 0, 3) == 0) return now + beside;
   if (draw(s, 0, 7) == 0) return now | 1u << draw(s, 0, 31);
@@ -363,6 +207,135 @@ START_TEST(any_access_in_any_state)
 }
 END_TEST
 
+/* ---- the bus ---- */
+
+/* The next access is offered while the response of the last one waits: as many responses as accesses, in their order.
+ */
+START_TEST(accesses_without_a_pause)
+{
+  random_source s = {100, 0};
+  registers r;
+  sf_dut *dut = begin(&r, s.seed);
+  sf_pins_in *in = &dut->in;
+  dut->each_cycle = NULL;
+  int written = 0, answered = 0, asked = 0, given = 0;
+  in->wstrb = 0xf;
+  for (int cycle = 0; cycle < 2000; cycle++) {
+    in->awvalid = in->wvalid = in->arvalid = true;
+    in->awaddr = written % 3 ? SF_CSR_EXP_BIAS : SF_CSR_ID; /* every third is refused */
+    in->wdata = (uint32_t)written;
+    in->araddr = asked % 3 ? SF_CSR_ID : SF_CSR_VERSION;
+    in->bready = draw(&s, 0, 2) == 0;
+    in->rready = draw(&s, 0, 2) == 0;
+    sf_dut_tick(dut);
+    if (dut->out.bvalid && in->bready) ck_assert_uint_eq(dut->out.bresp, answered++ % 3 ? 0 : 2);
+    if (dut->out.rvalid && in->rready)
+      ck_assert_uint_eq(dut->out.rdata, given++ % 3 ? SF_CSR_ID_RESET : SF_CSR_VERSION_RESET);
+    ck_assert(dut->out.awready == dut->out.wready);
+    written += dut->out.awready;
+    asked += dut->out.arready;
+    ck_assert_int_le(written - answered, 1);
+    ck_assert_int_le(asked - given, 1);
+  }
+  ck_assert_int_gt(written, 200);
+  ck_assert_int_gt(asked, 200);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* ---- the window of counters ---- */
+
+static bool has_meaning(int event, int layer, int step)
+{
+  return layer < SF_LAYERS || (layer == 7 && ((event == 0 && step < 6) || (event == 1 && step < SF_LAYERS)));
+}
+
+static uint32_t place_offset(int place)
+{
+  return SF_CSR_COUNTERS + 8 * (uint32_t)place;
+}
+
+static void snapshot(sf_dut *dut)
+{
+  dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT);
+  while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue;
+}
+
+/* All counters are 0 after power-on, without a command; later the places that no counter has read 0. */
+START_TEST(places_of_the_window)
+{
+  registers r;
+  fx_counts counts = {0};
+  sf_dut *dut = begin(&r, 110 + (uint64_t)_i);
+  snapshot(dut);
+  for (uint32_t word = 0; word < 2 * PLACES; word++) ck_assert_uint_eq(get(dut, SF_CSR_COUNTERS + 4 * word), 0);
+  typical(110);
+  dut->each_cycle = NULL;
+  ck_ok(sf_dut_load(dut, &net_of_test.net));
+  run_batch(dut, &net_of_test.net, 4, &counts, 110);
+  snapshot(dut);
+  for (int i = 0; i < PLACES; i++)
+    if (!has_meaning(i / 64, i / 8 % 8, i % 8)) ck_assert_uint_eq(get(dut, place_offset(i)), 0);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* A counter that was read and waits to be taken stays what it is, whatever a walk writes meanwhile. */
+START_TEST(a_response_that_waits)
+{
+  fx_counts counts = {0};
+  typical(111);
+  sf_dut *dut = open_dut(&net_of_test.net, 111, 0);
+  run_batch(dut, &net_of_test.net, 5, &counts, 111);
+  snapshot(dut);
+  const int place = 7 * 8; /* samples */
+  dut->in.araddr = place_offset(place), dut->in.arvalid = true, dut->in.rready = false;
+  sf_dut_tick(dut);
+  ck_assert(dut->out.arready);
+  dut->in.arvalid = false;
+  dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_CLEAR);
+  for (int walk = 0; walk < 2; walk++) {
+    for (int i = 0; i < PLACES + 10; i++) {
+      dut->in.araddr = place_offset(i % PLACES);
+      sf_dut_tick(dut);
+      ck_assert(dut->out.rvalid);
+      ck_assert_uint_eq(dut->out.rdata, 5);
+    }
+    dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT);
+  }
+  dut->in.rready = true;
+  sf_dut_tick(dut);
+  ck_assert_uint_eq(get(dut, place_offset(place)), 0);
+  sf_dut_close(dut);
+}
+END_TEST
+
+/* A packet that has begun: the block is active and D1 waits, but a walk is no time of the engine's. */
+START_TEST(a_walk_takes_no_time)
+{
+  sf_driver_counters c[2];
+  uint64_t at[2];
+  typical(112);
+  sf_dut *dut = open_dut(&net_of_test.net, 112, 0);
+  ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING);
+  uint64_t words[SF_PACKET_MAX];
+  sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
+  dut->in.s_valid = dut->in.s_user = true, dut->in.s_data = words[0], dut->in.s_last = false;
+  sf_dut_tick(dut);
+  ck_assert(dut->out.s_ready);
+  dut->in.s_valid = false;
+  ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE);
+  for (int i = 0; i < 2; i++) {
+    at[i] = dut->cycle;
+    ck_assert_int_eq(sf_driver_read_counters(&dut->bus, &c[i]), SF_DRIVER_OK);
+  }
+  ck_assert_uint_eq(c[1].cycles - c[0].cycles, at[1] - at[0] - PLACES);
+  ck_assert_uint_eq(c[1].stall_in - c[0].stall_in, at[1] - at[0] - PLACES - 1); /* nor is the cycle that waits for it */
+  ck_assert_uint_eq(c[1].busy + c[1].stall_out, 0);
+  sf_dut_close(dut);
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("rtl_registers");
@@ -370,6 +343,10 @@ int main(void)
   tcase_set_timeout(c, 60);
   tcase_add_loop_test(c, the_check_at_start, 0, 3);
   tcase_add_loop_test(c, any_access_in_any_state, 0, 2);
+  tcase_add_test(c, accesses_without_a_pause);
+  tcase_add_loop_test(c, places_of_the_window, 0, 2);
+  tcase_add_test(c, a_response_that_waits);
+  tcase_add_test(c, a_walk_takes_no_time);
   suite_add_tcase(suite, c);
   SRunner *runner = srunner_create(suite);
   srunner_run_all(runner, CK_ENV);
