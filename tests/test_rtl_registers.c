@@ -243,6 +243,33 @@ START_TEST(accesses_without_a_pause)
 }
 END_TEST
 
+/* Refused weights, other registers, what a master shows while it is not valid: none of it reaches the weights. */
+START_TEST(weights_are_written_by_nothing_else)
+{
+  typical(105);
+  fx_counts counts = {0};
+  const uint32_t first_word = (uint32_t)_i << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB;
+  sf_dut *dut = open_dut(&net_of_test.net, 105, 20);
+  const sf_bus *bus = &dut->bus;
+  sf_driver_reset(bus);
+  bus->write(bus->context, SF_CSR_WEIGHT_ADDRESS, first_word);
+  bus->write(bus->context, SF_CSR_WEIGHT_DATA, 0x80010101);
+  bus->write(bus->context, SF_CSR_ERROR, SF_CSR_ERROR_WEIGHT);
+  bus->write(bus->context, SF_CSR_WEIGHT_ADDRESS, first_word);
+  bus->write(bus->context, SF_CSR_STEPS, (uint32_t)net_of_test.net.steps);
+  dut->each_cycle = show_anything, dut->each_cycle_context = dut;
+  for (int i = 0; i < 100; i++) ck_assert_uint_eq(get(dut, SF_CSR_WEIGHT_ADDRESS), first_word);
+  dut->each_cycle = NULL;
+  ck_assert_int_eq(sf_driver_start(bus), SF_DRIVER_OK);
+  bus->write(bus->context, SF_CSR_WEIGHT_DATA, 0x01010101);
+  ck_assert_uint_eq(get(dut, SF_CSR_ERROR), SF_CSR_ERROR_BUSY);
+  bus->write(bus->context, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
+  bus->write(bus->context, SF_CSR_IRQ_PENDING, SF_CSR_IRQ_ENABLE_ERROR);
+  run_batch(dut, &net_of_test.net, 4, &counts, 105);
+  sf_dut_close(dut);
+}
+END_TEST
+
 /* ---- the window of counters ---- */
 
 static bool has_meaning(int event, int layer, int step)
@@ -344,6 +371,7 @@ int main(void)
   tcase_add_loop_test(c, the_check_at_start, 0, 3);
   tcase_add_loop_test(c, any_access_in_any_state, 0, 2);
   tcase_add_test(c, accesses_without_a_pause);
+  tcase_add_loop_test(c, weights_are_written_by_nothing_else, 0, SF_LAYERS);
   tcase_add_loop_test(c, places_of_the_window, 0, 2);
   tcase_add_test(c, a_response_that_waits);
   tcase_add_test(c, a_walk_takes_no_time);
