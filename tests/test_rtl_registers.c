@@ -12,6 +12,12 @@ static uint32_t get(sf_dut *dut, uint32_t offset)
   return dut->bus.read(dut->bus.context, offset);
 }
 
+static void wait_for_walk(sf_dut *dut)
+{
+  for (const uint64_t begin = dut->cycle; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS;)
+    ck_assert_uint_lt(dut->cycle, begin + 4 * PLACES);
+}
+
 static void write_both(sf_dut *dut, registers *r, uint32_t offset, uint32_t value)
 {
   dut->bus.write(dut->bus.context, offset, value);
@@ -43,8 +49,8 @@ static sf_dut *begin(registers *r, uint64_t seed)
 {
   sf_dut *dut;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = seed, .stall_percent = 20}));
-  while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue; /* the walk after power-on */
-  ck_assert_uint_lt(dut->cycle, PLACES + 100);
+  wait_for_walk(dut); /* after power-on */
+  ck_assert(!outside((uint32_t)dut->cycle, PLACES, PLACES + 100));
   *r = (registers){.irq_pending = SF_CSR_IRQ_ENABLE_COUNTERS};
   dut->each_cycle = show_anything, dut->each_cycle_context = dut;
   for (uint32_t offset = 0; offset <= SF_CSR_BIAS; offset += 4) read_both(dut, r, offset);
@@ -160,7 +166,7 @@ static void random_command(sf_dut *dut, registers *r, random_source *s)
   if (!walk) return;
   ck_assert_uint_ne(get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS, 0);
   read_both(dut, r, SF_CSR_IRQ_PENDING); /* not before its end */
-  while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue;
+  wait_for_walk(dut);
   r->irq_pending |= SF_CSR_IRQ_ENABLE_COUNTERS;
 }
 
@@ -282,10 +288,12 @@ static uint32_t place_offset(int place)
   return SF_CSR_COUNTERS + 8 * (uint32_t)place;
 }
 
-static void snapshot(sf_dut *dut)
+/* second: during the walk of the first one; 0: none. */
+static void commands(sf_dut *dut, uint32_t first, uint32_t second)
 {
-  dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT);
-  while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue;
+  dut->bus.write(dut->bus.context, SF_CSR_CTRL, first);
+  if (second) dut->bus.write(dut->bus.context, SF_CSR_CTRL, second);
+  wait_for_walk(dut);
 }
 
 /* All counters are 0 after power-on, without a command; later the places that no counter has read 0. */
@@ -294,15 +302,51 @@ START_TEST(places_of_the_window)
   registers r;
   fx_counts counts = {0};
   sf_dut *dut = begin(&r, 110 + (uint64_t)_i);
-  snapshot(dut);
+  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
   for (uint32_t word = 0; word < 2 * PLACES; word++) ck_assert_uint_eq(get(dut, SF_CSR_COUNTERS + 4 * word), 0);
   typical(110);
   dut->each_cycle = NULL;
   ck_ok(sf_dut_load(dut, &net_of_test.net));
   run_batch(dut, &net_of_test.net, 4, &counts, 110);
-  snapshot(dut);
+  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
   for (int i = 0; i < PLACES; i++)
     if (!has_meaning(i / 64, i / 8 % 8, i % 8)) ck_assert_uint_eq(get(dut, place_offset(i)), 0);
+  sf_dut_close(dut);
+}
+END_TEST
+
+static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
+{
+  for (uint32_t i = 0; i < 2 * PLACES; i++) words[i] = get(dut, SF_CSR_COUNTERS + 4 * i);
+}
+
+/* Neither events nor a clear change it, and a command that comes during a walk is one of its own. */
+START_TEST(the_window_is_of_the_last_snapshot)
+{
+  static uint32_t words[2][2 * PLACES];
+  static const uint32_t zero[2 * PLACES];
+  fx_counts counts = {0};
+  typical(113);
+  sf_dut *dut = open_dut(&net_of_test.net, 113, 0);
+  for (int during = 0; during < 2; during++) {
+    run_batch(dut, &net_of_test.net, 3, &counts, 113);
+    same_counts(dut, &counts, 113);
+    read_window(dut, words[0]);
+    if (during) {
+      commands(dut, SF_CSR_CTRL_SNAPSHOT, SF_CSR_CTRL_CLEAR);
+    } else {
+      run_batch(dut, &net_of_test.net, 2, &counts, 113);
+      read_window(dut, words[1]);
+      ck_assert_mem_eq(words[0], words[1], sizeof words[0]);
+      commands(dut, SF_CSR_CTRL_CLEAR, 0);
+    }
+    read_window(dut, words[1]);
+    ck_assert_mem_eq(words[0], words[1], sizeof words[0]);
+    counts = (fx_counts){0};
+  }
+  commands(dut, SF_CSR_CTRL_CLEAR, SF_CSR_CTRL_SNAPSHOT);
+  read_window(dut, words[1]);
+  ck_assert_mem_eq(words[1], zero, sizeof zero);
   sf_dut_close(dut);
 }
 END_TEST
@@ -314,7 +358,7 @@ START_TEST(a_response_that_waits)
   typical(111);
   sf_dut *dut = open_dut(&net_of_test.net, 111, 0);
   run_batch(dut, &net_of_test.net, 5, &counts, 111);
-  snapshot(dut);
+  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
   const int place = 7 * 8; /* samples */
   dut->in.araddr = place_offset(place), dut->in.arvalid = true, dut->in.rready = false;
   sf_dut_tick(dut);
@@ -373,6 +417,7 @@ int main(void)
   tcase_add_test(c, accesses_without_a_pause);
   tcase_add_loop_test(c, weights_are_written_by_nothing_else, 0, SF_LAYERS);
   tcase_add_loop_test(c, places_of_the_window, 0, 2);
+  tcase_add_test(c, the_window_is_of_the_last_snapshot);
   tcase_add_test(c, a_response_that_waits);
   tcase_add_test(c, a_walk_takes_no_time);
   suite_add_tcase(suite, c);

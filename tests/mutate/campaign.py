@@ -46,8 +46,10 @@ def unique(mutants):
     return out
 
 
-def sample(mutants, most):
-    """At most so many, spread evenly, the same ones every time."""
+def sample(mutants, most, results):
+    """At most so many, spread evenly, the same ones every time; for 0 those that have a verdict."""
+    if most == 0:
+        return [m for m in mutants if m.number in results.verdicts]
     take = min(most, len(mutants))
     return [mutants[i * len(mutants) // take] for i in range(take)]
 
@@ -77,6 +79,10 @@ class Equivalents:
         for (owner, what), (number, _) in self.reasons.items():
             if owner == module and what not in there:
                 raise Stop(f"{self.path}:{number}: no such mutant: {module} {what}")
+
+    def last(self, mutants):
+        """The same with those that are listed behind the others: they cost most and say least."""
+        return sorted(mutants, key=lambda m: self.reason(m) is not None)
 
     def reason(self, m):
         return self.reasons.get((m.module, m.what), (0, None))[1]

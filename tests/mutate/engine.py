@@ -4,7 +4,8 @@
 FOLDER has the checkers, linked with an accelerator that holds every mutant, and rtl/mutants, their list (operators.py);
 SF_MUTANT=N in the environment chooses one. Killed: a checker fails, crashes or hangs; they run in the order given, the
 first that kills ends it. MODULE...: all that are mutated; --modules: those of this run. --mutants: at most so many per
-module, spread evenly, the same ones every time. Verdicts are kept in FOLDER/results.MODULE (campaign.py).
+module, spread evenly, the same ones every time; 0 runs none: rows of the verdicts that are kept, in
+FOLDER/results.MODULE (campaign.py).
 Equivalent: listed with its reason in tests/mutate/equivalent-engine. Exit 0 nothing unexplained survived, 1 not.
 """
 import argparse
@@ -57,8 +58,8 @@ def main():
     score = campaign.Score(equivalents)
     for module in modules:
         results = campaign.Results(f"{given.folder}/results.{module}", [c.key for c in checkers])
-        chosen = campaign.sample(of[module], given.mutants)
-        pending = [m for m in chosen if m.number not in results.verdicts]
+        chosen = campaign.sample(of[module], given.mutants, results)
+        pending = equivalents.last([m for m in chosen if m.number not in results.verdicts])
         progress = campaign.Progress(module, len(chosen) - len(pending), len(chosen))
         campaign.judge_all(pending, checkers, results, progress, int(os.environ.get("MUTANT_JOBS", "2")))
         progress.end()

@@ -4,8 +4,8 @@
 Units, checkers and domains: tests/mutate/modules. Yosys lists every mutant of a unit (netlist.py); those of a run go into
 one netlist, CHUNK at a time, of which SF_MUTANT=N in the environment chooses one when the program starts. Killed: the
 checker fails, crashes or hangs. Equivalent: proven by Yosys, or listed with its reason in tests/mutate/equivalent.
---mutants: at most so many per unit, spread evenly, the same ones every time. Verdicts are kept in BUILD/mutate/MODULE
-(campaign.py). --sample: a few mutants of a few units, in seconds, for `make check`.
+--mutants: at most so many per unit, spread evenly, the same ones every time; 0 runs none: rows of the verdicts that are
+kept, in BUILD/mutate/MODULE (campaign.py). --sample: a few mutants of a few units, in seconds, for `make check`.
 Exit 0 nothing unexplained survived, 1 not, 77 no tool.
 """
 import argparse
@@ -45,10 +45,10 @@ def chunks(items, size):
     return [items[i:i + size] for i in range(0, len(items), size)]
 
 
-def judge(unit, work, chosen, results, key, build):
+def judge(unit, work, chosen, results, key, build, equivalents):
     """Gives every chosen mutant its verdict."""
     jobs = int(os.environ.get("MUTANT_JOBS", "2"))
-    pending = [m for m in chosen if m.number not in results.verdicts]
+    pending = equivalents.last([m for m in chosen if m.number not in results.verdicts])
     progress = campaign.Progress(unit.module, len(chosen) - len(pending), len(chosen))
     for chunk in chunks(pending, CHUNK):
         program = netlist.program(unit, work, chunk, build)
@@ -85,8 +85,8 @@ def main():
         unit, work = units[module], f"{folder}/{module}"
         key = key_of(unit)
         results = campaign.Results(f"{work}/results", [key])
-        chosen = campaign.sample(mutants, most)
-        judge(unit, work, chosen, results, key, given.build)
+        chosen = campaign.sample(mutants, most, results)
+        judge(unit, work, chosen, results, key, given.build, equivalents)
         score.row(module, chosen, len(mutants), results)
     return score.end(f"{folder}/mutate.json")
 
