@@ -86,6 +86,33 @@ START_TEST(hard_reset_at_any_time)
 }
 END_TEST
 
+/* The driver always begins with a soft reset; after a hard one it is not needed, at power-on or in mid-frame. */
+START_TEST(a_hard_reset_is_enough)
+{
+  random_source r = {68, (uint64_t)_i << 32};
+  sf_dut *dut;
+  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 68 + (uint64_t)_i}));
+  for (int trial = 0; trial < 6; trial++) {
+    fx_counts counts = {0};
+    if (trial % 2)
+      random_decoder_make(&net_of_test, &r, 30, false);
+    else
+      random_net_make(&net_of_test, &r, false);
+    draw_batch(&shared, &r, 6, false);
+    const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
+    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
+    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_OK);
+    dut->net = net_of_test.net;
+    run_batch(dut, &net_of_test.net, 6, &counts, r.seed);
+    same_counts(dut, &counts, r.seed);
+    feed f = {.m_percent = 60};
+    for (int64_t cycle = draw(&r, 1, 700); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
+    hard_reset(dut, 1 + trial % 3);
+  }
+  sf_dut_close(dut);
+}
+END_TEST
+
 /* Waits for the phase at the pins, then strikes at once. */
 START_TEST(soft_reset_in_every_phase)
 {
@@ -322,6 +349,7 @@ int main(void)
   TCase *c = tcase_create("disturbed");
   tcase_set_timeout(c, 60);
   tcase_add_test(c, hard_reset_at_any_time);
+  tcase_add_loop_test(c, a_hard_reset_is_enough, 0, 2);
   tcase_add_loop_test(c, soft_reset_in_every_phase, 0, SF_PHASES);
   tcase_add_loop_test(c, snapshot_and_clear_at_work, 0, 8);
   tcase_add_loop_test(c, all_steps_under_stalls, 0, 3);
