@@ -17,20 +17,23 @@ import campaign
 EQUIVALENT = "tests/mutate/equivalent-engine"
 
 
-def checker(folder, name):
-    """The checker with its limit, which is kept: without a mutant it takes its whole time."""
+def unmeasured(folder, name):
     command = os.path.abspath(f"{folder}/{name}")
     with open(command, "rb") as f:
-        key = campaign.digest(f.read())
-    path, kept = f"{folder}/limit.{name}", []
+        return campaign.Checker(name, command, campaign.digest(f.read()), None)
+
+
+def limited(folder, checker):
+    """The checker with its limit, which is kept: without a mutant it takes its whole time."""
+    path, kept = f"{folder}/limit.{checker.name}", []
     if os.path.exists(path):
         with open(path) as f:
             kept = f.read().split()
-    if len(kept) == 2 and kept[0] == key:
-        return campaign.Checker(name, command, key, int(kept[1]))
-    found = campaign.measured(name, command, key)
+    if len(kept) == 2 and kept[0] == checker.key:
+        return checker._replace(limit=int(kept[1]))
+    found = campaign.measured(checker.name, checker.command, checker.key)
     with open(path, "w") as f:
-        f.write(f"{key} {found.limit}\n")
+        f.write(f"{found.key} {found.limit}\n")
     return found
 
 
@@ -54,12 +57,14 @@ def main():
     for module in given.all:
         equivalents.match(module, of[module])
 
-    checkers = [checker(given.folder, name) for name in given.checkers.split()]
+    checkers = [unmeasured(given.folder, name) for name in given.checkers.split()]
     score = campaign.Score(equivalents)
     for module in modules:
         results = campaign.Results(f"{given.folder}/results.{module}", [c.key for c in checkers])
         chosen = campaign.sample(of[module], given.mutants, results)
         pending = equivalents.last([m for m in chosen if m.number not in results.verdicts])
+        if pending:
+            checkers = [limited(given.folder, c) for c in checkers]
         progress = campaign.Progress(module, len(chosen) - len(pending), len(chosen))
         campaign.judge_all(pending, checkers, results, progress, int(os.environ.get("MUTANT_JOBS", "2")))
         progress.end()
