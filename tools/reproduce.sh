@@ -10,7 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7, tensorf 1e-6)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -55,7 +55,7 @@ case $profile in
     ;;
   *) die "--profile '$profile' is unknown: expected quick, full, scenes or smoke" ;;
 esac
-scenes="" only="" report_only="" chosen="" betas=5e-7
+scenes="" only="" report_only="" chosen="" betas=""
 while [ $# -gt 0 ]; do
   name=${1#--}
   case $1 in
@@ -238,7 +238,9 @@ one_backbone() {
   scene=${data##*/}-$1
   prepare_scene
   common="$common --backbone $1"
-  for beta in $betas; do one_run "beta-$beta" --beta "$beta"; done
+  local default=5e-7
+  [ "$1" = ingp ] || default=1e-6
+  for beta in ${betas:-$default}; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }
 
@@ -252,7 +254,7 @@ for data in "${paths[@]}"; do
 done
 if [ "$profile" = scenes ]; then
   total=0
-  for layout in "${layouts[@]}"; do total=$((total + (1 + $(wc -w <<<"$betas")) * $(backbones_of "$layout" | wc -w))); done
+  for layout in "${layouts[@]}"; do total=$((total + (1 + $(wc -w <<<"${betas:-5e-7}")) * $(backbones_of "$layout" | wc -w))); done
 fi
 for i in "${!paths[@]}"; do
   data=${paths[i]} frames=${frames_of[i]}
