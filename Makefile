@@ -42,9 +42,11 @@ $(error no build with ARCH="$(ARCH)")
 endif
 ARCH_DEF := $B/$(ARCH_DEF)
 ARCH_INCLUDE := -I$B/include
+# What the public header cannot read from arch.def.
+ARCH_DEFINES := -DSPIKEFIELD_LANES=$(shell sed -n 's/^SF_ARCH.LANES, \([0-9]*\),.*/\1/p' $(ARCH_DEF))
 endif
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden $(ARCH_INCLUDE) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden $(ARCH_INCLUDE) $(ARCH_DEFINES) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 

@@ -6,15 +6,16 @@
 
 module golden_tb;
   localparam int DEPTH = 64;  // samples between input and result, at most
-  localparam int WRITES_MAX = 16384;
+  localparam int WRITES_MAX = 65536;
+  localparam int LANES = 256;  // of the golden model, however many the block has
   localparam int D1 = 0, D2 = 1, C1 = 2, C2 = 3, C3 = 4;
 
   // ---- the golden model, and what it said of the last samples
   chandle golden;
   int steps;
   longint unsigned result[0:2*DEPTH-1];
-  bit [127:0] spikes[0:5*8*DEPTH-1], rows[0:5*8*DEPTH-1];
-  bit [3071:0] membranes[0:5*8*DEPTH-1];
+  bit [LANES-1:0] spikes[0:5*8*DEPTH-1], rows[0:5*8*DEPTH-1];
+  bit [24*LANES-1:0] membranes[0:5*8*DEPTH-1];
   int modelled = 0;  // samples
 
   function automatic int at(int sample, int layer, int step);
@@ -45,8 +46,8 @@ module golden_tb;
   wire awready, wready, s_ready, m_valid, m_last, irq, tap_valid;
   wire [63:0] m_data;
   wire [2:0] tap_layer, tap_step;
-  wire [127:0] tap_spikes, tap_rows;
-  wire [3071:0] tap_membrane;
+  wire [sf_arch_pkg::LANES-1:0] tap_spikes, tap_rows;
+  wire [24*sf_arch_pkg::LANES-1:0] tap_membrane;
   always #5 clk = !clk;
 
   sf_top u_dut (

@@ -1,7 +1,7 @@
 #include "firmware/sf_driver.h"
 
 enum { POLLS_MAX = 1000000, LAYER_STRIDE = SF_CSR_D2_N_IN - SF_CSR_D1_N_IN, GLOBAL_LAYER = 7 };
-enum { WEIGHTS_PER_WORD = 4, CONFIG_LANES = 0xff /* the field */ };
+enum { WEIGHTS_PER_WORD = 4 };
 
 static uint32_t get(const sf_bus *bus, uint32_t offset)
 {
@@ -47,9 +47,8 @@ sf_driver_code sf_driver_probe(const sf_bus *bus)
   if (get(bus, SF_CSR_ID) != SF_CSR_ID_RESET) return SF_DRIVER_NO_DEVICE;
   if (get(bus, SF_CSR_VERSION) >> 16 != SF_CSR_VERSION_RESET >> 16) return SF_DRIVER_VERSION;
   /* Fewer lanes are fine: a net that is too wide for them is refused at start. */
-  const uint32_t config = get(bus, SF_CSR_CONFIG), lanes = config & CONFIG_LANES;
-  if ((config ^ SF_CSR_CONFIG_RESET) & ~(uint32_t)CONFIG_LANES || lanes == 0 || lanes > SF_LANES)
-    return SF_DRIVER_CONFIG;
+  const uint32_t config = get(bus, SF_CSR_CONFIG), lanes = (config & SF_CSR_CONFIG_LANES) + 1;
+  if ((config ^ SF_CSR_CONFIG_RESET) & ~(uint32_t)SF_CSR_CONFIG_LANES || lanes > SF_LANES) return SF_DRIVER_CONFIG;
   return SF_DRIVER_OK;
 }
 

@@ -16,8 +16,8 @@ module sf_c1 #(
     input  wire         [ 3:0] steps_i,
     // weights: rows of the constant inputs, then those of h; the biases'
     input  wire                we_i,
-    input  wire         [ 7:0] wrow_i,
-    input  wire         [ 4:0] wword_i,
+    input  wire         [ 8:0] wrow_i,
+    input  wire         [$clog2(LANES/4)-1:0] wword_i,
     input  wire         [31:0] wdata_i,
     // a sample whose inputs are there
     input  wire                valid_i,
@@ -43,6 +43,7 @@ module sf_c1 #(
   localparam [1:0] DIR = 2'd1;
   localparam [1:0] KEEP = 2'd2;
   localparam [1:0] ROWS = 2'd3;
+  localparam [7:0] BIASES = 8'(sf_arch_pkg::DIR_MAX);  // their row in the memory, behind those of the inputs
 
   reg [1:0] state_q, state_d;
   reg [7:0] index_q, index_d;
@@ -92,16 +93,17 @@ module sf_c1 #(
 
   sf_wmem #(
       .WORDS   (LANES / 4),
-      .ROWS    (sf_arch_pkg::BIAS_ROW + 1),
-      .ROW_BITS(8)
+      .ROWS    (sf_arch_pkg::DIR_MAX + 1),
+      .ROW_BITS(8),
+      .WORD_BITS($clog2(LANES / 4))
   ) u_weights (
       .clk_i  (clk_i),
       .we_i   (we_i),
-      .wrow_i (wrow_i),
+      .wrow_i (wrow_i == 9'(sf_arch_pkg::BIAS_ROW) ? BIASES : wrow_i[7:0]),
       .wword_i(wword_i),
       .wdata_i(wdata_i),
       .re_i   (issue && !zero),
-      .rrow_i (at_bias ? 8'(sf_arch_pkg::BIAS_ROW) : in_dir ? index_q : n_dir_i + index_q),
+      .rrow_i (at_bias ? BIASES : in_dir ? index_q : n_dir_i + index_q),
       .row_o  (row)
   );
   sf_mac #(

@@ -1,5 +1,5 @@
 // C2: adds the weight rows of the C1 neurons that fired, two per cycle, to the biases. Mirror: src/fx/current.c
-// Width: |sum| <= 129 * 127 < 2^15.
+// Width: |sum| <= 257 * 127 < 2^15.
 `default_nettype none
 
 module sf_c2 #(
@@ -15,7 +15,7 @@ module sf_c2 #(
     input  wire                we_i,
     input  wire                bias_we_i,
     input  wire [      BITS:0] wrow_i,
-    input  wire         [ 4:0] wword_i,
+    input  wire         [$clog2(LANES/4)-1:0] wword_i,
     input  wire         [31:0] wdata_i,
     // spikes of C1 at one step
     input  wire                valid_i,
@@ -62,7 +62,8 @@ module sf_c2 #(
   sf_wmem #(
       .WORDS   (LANES / 4),
       .ROWS    (LANES / 2),
-      .ROW_BITS(BITS)
+      .ROW_BITS(BITS),
+      .WORD_BITS($clog2(LANES / 4))
   ) u_even (
       .clk_i  (clk_i),
       .we_i   (we_i && !wrow_i[0]),
@@ -76,7 +77,8 @@ module sf_c2 #(
   sf_wmem #(
       .WORDS   (LANES / 4),
       .ROWS    (LANES / 2),
-      .ROW_BITS(BITS)
+      .ROW_BITS(BITS),
+      .WORD_BITS($clog2(LANES / 4))
   ) u_odd (
       .clk_i  (clk_i),
       .we_i   (we_i && wrow_i[0]),

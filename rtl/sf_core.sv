@@ -19,11 +19,11 @@ module sf_core #(
     // programming
     input  wire                we_i,
     input  wire         [ 2:0] wlayer_i,
-    input  wire         [ 7:0] wrow_i,
-    input  wire         [ 4:0] wword_i,
+    input  wire         [ 8:0] wrow_i,
+    input  wire         [ 5:0] wword_i,
     input  wire         [31:0] wdata_i,
-    input  wire         [39:0] n_in_i,
-    input  wire         [39:0] n_out_i,
+    input  wire         [44:0] n_in_i,             // 9 bits a layer, D1 in the lowest
+    input  wire         [44:0] n_out_i,
     input  wire         [64:0] k_i,
     input  wire        [119:0] theta_i,
     input  wire         [12:0] bias_i,             // C3, C2, value of C1's
@@ -56,7 +56,7 @@ module sf_core #(
     output wire                ray_o,
     output wire         [ 2:0] spikes_valid_o,     // C2, C1, D1: a step of the layer's neurons
     output wire         [ 2:0] spikes_step_o,
-    output wire         [ 7:0] spikes_count_o,
+    output wire         [ 8:0] spikes_count_o,
     output wire                stall_o,            // a layer waits for the readout
     // tap
     output wire                tap_valid_o,
@@ -67,15 +67,17 @@ module sf_core #(
     output wire [24*LANES-1:0] tap_membrane_o
 );
   localparam BITS = $clog2(LANES) - 1;  // of a row within a bank
+  localparam WORD_BITS = $clog2(LANES / 4);
   localparam QUEUE = 4;                 // steps between C1 and C2
 
   // Sizes; sf_csr has checked that they are consistent.
-  wire decodes = n_out_i[7:0] == 8'd0;  // no D1 and D2: C1 takes its inputs from the buffer
-  wire [7:0] n_h = decodes ? 8'd0 : n_out_i[15:8] - 8'd1;
-  wire [7:0] n_dir = n_in_i[23:16] - n_h;
-  wire bias_we = we_i && wrow_i == 8'(sf_arch_pkg::BIAS_ROW);
+  wire decodes = n_out_i[8:0] == 9'd0;  // no D1 and D2: C1 takes its inputs from the buffer
+  wire [7:0] n_h = decodes ? 8'd0 : n_out_i[16:9] - 8'd1;
+  wire [7:0] n_dir = n_in_i[25:18] - n_h;
+  wire bias_we = we_i && wrow_i == 9'(sf_arch_pkg::BIAS_ROW);
   wire row_we = we_i && !bias_we;
-  wire unused_ok = &{1'b0, wrow_i, n_out_i[39:32], n_in_i[39:24], n_in_i[15:6], n_h[7:5], theta_i[119:96], theta_i[47:24],
+  wire [WORD_BITS-1:0] word = wword_i[WORD_BITS-1:0];
+  wire unused_ok = &{1'b0, wrow_i, wword_i, n_out_i[44:36], n_out_i[17], n_in_i[44:26], n_in_i[17:6], n_h[7:5], theta_i[119:96], theta_i[47:24],
                      k_i[64:52], k_i[25:13]};
 
   // ---- neurons: what waits for its turn. The layer nearest to the output goes first.
@@ -136,7 +138,7 @@ module sf_core #(
       .mode_i        (mode_i),
       .k_i           ({k_i[51:26], k_i[12:0]}),
       .theta_i       ({theta_i[95:48], theta_i[23:0]}),
-      .n_out_i       ({n_out_i[31:16], n_out_i[7:0]}),
+      .n_out_i       ({n_out_i[35:18], n_out_i[8:0]}),
       .fire_i        (fire),
       .step_i        (fire_step),
       .d1_i          (d1_current),
@@ -165,7 +167,7 @@ module sf_core #(
       .n_dir_i        (n_dir[4:0]),
       .we_i           (wd1),
       .wrow_i         (wrow_i[4:0]),
-      .wword_i        (wword_i),
+      .wword_i        (word),
       .wdata_i        (wdata_i),
       .sample_valid_i (sample_valid_i && !decodes),
       .sample_first_i (sample_first_i),
@@ -314,7 +316,7 @@ module sf_core #(
       .steps_i     (steps_i),
       .we_i        (we_i && wlayer_i == sf_op_pkg::C1),
       .wrow_i      (wrow_i),
-      .wword_i     (wword_i),
+      .wword_i     (word),
       .wdata_i     (wdata_i),
       .valid_i     (decodes ? sample_valid_i && !hold_i : h_full_q[h_read_q]),
       .first_i     (mark_q[mark_read_q]),
@@ -373,7 +375,7 @@ module sf_core #(
       .we_i        (row_we && wlayer_i == sf_op_pkg::C2),
       .bias_we_i   (bias_we && wlayer_i == sf_op_pkg::C2),
       .wrow_i      (wrow_i[BITS:0]),
-      .wword_i     (wword_i),
+      .wword_i     (word),
       .wdata_i     (wdata_i),
       .valid_i     (queue_count_q != 3'd0),
       .spikes_i    (queue_q[queue_read_q]),

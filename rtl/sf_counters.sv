@@ -7,7 +7,7 @@ module sf_counters (
     input  wire        clk_i,
     input  wire        rst_ni,
     // engine (sf_core)
-    input  wire [39:0] n_out_i,
+    input  wire [44:0] n_out_i,
     input  wire        d1_row_i,
     input  wire [ 1:0] bias_i,           // C3, C2
     input  wire        c1_row_i,
@@ -20,7 +20,7 @@ module sf_counters (
     input  wire        ray_i,
     input  wire [ 2:0] spikes_valid_i,
     input  wire [ 2:0] spikes_step_i,
-    input  wire [ 7:0] spikes_count_i,
+    input  wire [ 8:0] spikes_count_i,
     // readout
     input  wire        update_i,
     input  wire        update_colour_i,
@@ -134,11 +134,11 @@ module sf_counters (
   end
 
   // ---- events
-  wire [63:0] n_d1 = {56'd0, n_out_i[7:0]};
-  wire [63:0] n_d2 = {56'd0, n_out_i[15:8]};
-  wire [63:0] n_c1 = {56'd0, n_out_i[23:16]};
-  wire [63:0] n_c2 = {56'd0, n_out_i[31:24]};
-  wire [63:0] n_c3 = {56'd0, n_out_i[39:32]};
+  wire [63:0] n_d1 = {55'd0, n_out_i[8:0]};
+  wire [63:0] n_d2 = {55'd0, n_out_i[17:9]};
+  wire [63:0] n_c1 = {55'd0, n_out_i[26:18]};
+  wire [63:0] n_c2 = {55'd0, n_out_i[35:27]};
+  wire [63:0] n_c3 = {55'd0, n_out_i[44:36]};
   wire [4:0] neurons_here = {spikes_valid_i[2] ? 2'd2 : spikes_valid_i[1] ? 2'd1 : 2'd0, spikes_step_i};
   wire [63:0] n_neurons = spikes_valid_i[2] ? n_c2 : spikes_valid_i[1] ? n_c1 : n_d1;
   wire [3:0] update_here = {update_colour_i, update_step_i};
@@ -162,7 +162,7 @@ module sf_counters (
         neuron_q[at_neurons] <= 64'd0;
       end
     end else if (spikes_valid_i != 3'd0) begin
-      spikes_q[neurons_here] <= spikes_q[neurons_here] + {56'd0, spikes_count_i};
+      spikes_q[neurons_here] <= spikes_q[neurons_here] + {55'd0, spikes_count_i};
       neuron_q[neurons_here] <= neuron_q[neurons_here] + n_neurons;
     end
     if (wipe && integrating) integrate_q[at_narrow] <= 64'd0;

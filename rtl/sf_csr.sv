@@ -34,15 +34,15 @@ module sf_csr #(
     output wire [ 15:0] sigmoid_mul_o,
     output wire [  4:0] sigmoid_shift_o,
     output wire [ 31:0] sigmoid_bias_o,
-    output wire [ 39:0] n_in_o,
-    output wire [ 39:0] n_out_o,
+    output wire [ 44:0] n_in_o,         // 9 bits a layer, D1 in the lowest
+    output wire [ 44:0] n_out_o,
     output wire [ 64:0] k_o,
     output wire [119:0] theta_o,
     output wire [ 12:0] bias_o,         // C3, C2, value of C1's
     output wire         we_o,
     output wire [  2:0] wlayer_o,
-    output wire [  7:0] wrow_o,
-    output wire [  4:0] wword_o,
+    output wire [  8:0] wrow_o,
+    output wire [  5:0] wword_o,
     output wire [ 31:0] wweights_o,
     // commands and state
     output wire         running_o,
@@ -67,12 +67,12 @@ module sf_csr #(
   reg [16:0] exp_mul_q, sigmoid_mul_q;
   reg [5:0] exp_shift_q, sigmoid_shift_q;
   reg [31:0] exp_bias_q, sigmoid_bias_q;
-  // One entry per layer, 8 bits per size, 13 per leak, 24 per threshold.
-  reg [39:0] n_in_q, n_out_q;
+  // One entry per layer, 9 bits per size, 13 per leak, 24 per threshold.
+  reg [44:0] n_in_q, n_out_q;
   reg [64:0] k_q;
   reg [119:0] theta_q;
   reg [13:0] bias_q;
-  reg [15:0] weight_address_q;
+  reg [17:0] weight_address_q;
 
   // ---- write channel: address and data are taken together
   reg bvalid_q;
@@ -100,7 +100,7 @@ module sf_csr #(
   wire [2:0] table_layer = table_offset[6:4];
 
   // Values that do not fit are stored as an illegal value, so that the check at start sees them.
-  wire [7:0] size_w = |wdata_i[31:8] ? 8'hff : wdata_i[7:0];
+  wire [8:0] size_w = |wdata_i[31:9] ? 9'h1ff : wdata_i[8:0];
   wire [12:0] k_w = |wdata_i[31:13] ? 13'h1fff : wdata_i[12:0];
   wire [23:0] theta_w = |wdata_i[31:23] ? 24'd0 : wdata_i[23:0];
   wire [13:0] bias_w = {|{wdata_i[31:18], wdata_i[15:11]}, wdata_i[17:16], wdata_i[10:0]};
@@ -108,22 +108,22 @@ module sf_csr #(
   wire [5:0] shift_w = |wdata_i[31:5] ? 6'h20 : wdata_i[5:0];
 
   // ---- weights
-  wire [2:0] wlayer = weight_address_q[15:13];
-  wire [7:0] wrow = weight_address_q[12:5];
-  wire [4:0] wword = weight_address_q[4:0];
+  wire [2:0] wlayer = weight_address_q[17:15];
+  wire [8:0] wrow = weight_address_q[14:6];
+  wire [5:0] wword = weight_address_q[5:0];
   wire wnarrow = wlayer == sf_op_pkg::D2 || wlayer == sf_op_pkg::C3;
   reg wrow_bad;
   always_comb begin
     case (wlayer)
-      sf_op_pkg::D1: wrow_bad = wrow >= 8'(sf_arch_pkg::FEATURE_MAX);
-      sf_op_pkg::D2: wrow_bad = wrow >= 8'(LANES);
-      sf_op_pkg::C1: wrow_bad = wrow > 8'(sf_arch_pkg::BIAS_ROW);
-      default: wrow_bad = wrow >= 8'(LANES) && wrow != 8'(sf_arch_pkg::BIAS_ROW);
+      sf_op_pkg::D1: wrow_bad = wrow >= 9'(sf_arch_pkg::FEATURE_MAX);
+      sf_op_pkg::D2: wrow_bad = wrow >= 9'(LANES);
+      sf_op_pkg::C1: wrow_bad = wrow >= 9'(sf_arch_pkg::DIR_MAX) && wrow != 9'(sf_arch_pkg::BIAS_ROW);
+      default: wrow_bad = wrow >= 9'(LANES) && wrow != 9'(sf_arch_pkg::BIAS_ROW);
     endcase
   end
   wire minus_128 = wdata_i[7:0] == 8'h80 || wdata_i[15:8] == 8'h80 || wdata_i[23:16] == 8'h80
       || wdata_i[31:24] == 8'h80;
-  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 5'd3) || (!wnarrow && {1'b0, wword} >= 6'(LANES / 4))
+  wire weight_bad = wlayer > sf_op_pkg::C3 || (wnarrow && wword > 6'd3) || (!wnarrow && {1'b0, wword} >= 7'(LANES / 4))
       || wrow_bad || minus_128;
   assign we_o = config_write && to_weight && !weight_bad;
   assign wlayer_o = wlayer;
@@ -132,23 +132,23 @@ module sf_csr #(
   assign wweights_o = wdata_i;
 
   // ---- check at start
-  wire [7:0] d1_in = n_in_q[7:0];
-  wire [7:0] d1_out = n_out_q[7:0];
-  wire [7:0] d2_in = n_in_q[15:8];
-  wire [7:0] d2_out = n_out_q[15:8];
-  wire [7:0] c1_in = n_in_q[23:16];
-  wire [7:0] c1_out = n_out_q[23:16];
-  wire [7:0] c2_in = n_in_q[31:24];
-  wire [7:0] c2_out = n_out_q[31:24];
-  wire [7:0] c3_in = n_in_q[39:32];
-  wire [7:0] c3_out = n_out_q[39:32];
-  wire [8:0] n_h = {1'b0, d2_out} - 9'd1;
-  wire decodes = d1_out == 8'd0;
-  wire bad_density = d1_in == 8'd0 || d1_in > 8'd32 || d1_out > 8'(LANES) || d2_in != d1_out || d2_out == 8'd0
-      || d2_out > 8'd16 || {1'b0, c1_in} < n_h || {1'b0, c1_in} > n_h + 9'd16;
-  wire bad_decoder = d1_in != 8'd0 || d2_in != 8'd0 || d2_out != 8'd0 || c1_in > 8'(sf_arch_pkg::DIR_MAX);
-  wire bad_size = (decodes ? bad_decoder : bad_density) || bias_q[13] || c1_in == 8'd0 || c1_out == 8'd0 || c1_out > 8'(LANES) || c2_in != c1_out || c2_out == 8'd0 || c2_out > 8'(LANES)
-      || c3_in != c2_out || c3_out != 8'd3;
+  wire [8:0] d1_in = n_in_q[8:0];
+  wire [8:0] d1_out = n_out_q[8:0];
+  wire [8:0] d2_in = n_in_q[17:9];
+  wire [8:0] d2_out = n_out_q[17:9];
+  wire [8:0] c1_in = n_in_q[26:18];
+  wire [8:0] c1_out = n_out_q[26:18];
+  wire [8:0] c2_in = n_in_q[35:27];
+  wire [8:0] c2_out = n_out_q[35:27];
+  wire [8:0] c3_in = n_in_q[44:36];
+  wire [8:0] c3_out = n_out_q[44:36];
+  wire [8:0] n_h = d2_out - 9'd1;
+  wire decodes = d1_out == 9'd0;
+  wire bad_density = d1_in == 9'd0 || d1_in > 9'd32 || d1_out > 9'(LANES) || d2_in != d1_out || d2_out == 9'd0
+      || d2_out > 9'd16 || c1_in < n_h || c1_in > n_h + 9'd16;
+  wire bad_decoder = d1_in != 9'd0 || d2_in != 9'd0 || d2_out != 9'd0 || c1_in > 9'(sf_arch_pkg::DIR_MAX);
+  wire bad_size = (decodes ? bad_decoder : bad_density) || bias_q[13] || c1_in == 9'd0 || c1_out == 9'd0 || c1_out > 9'(LANES) || c2_in != c1_out || c2_out == 9'd0 || c2_out > 9'(LANES)
+      || c3_in != c2_out || c3_out != 9'd3;
   wire bad_steps = steps_q == 4'd0 || steps_q > 4'd8;
   localparam [12:0] LEAK_ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
   wire bad_leak = k_q[12:0] > LEAK_ONE || k_q[25:13] > LEAK_ONE || k_q[38:26] > LEAK_ONE || k_q[51:39] > LEAK_ONE
@@ -207,16 +207,16 @@ module sf_csr #(
       {exp_mul_q, sigmoid_mul_q} <= 34'd0;
       {exp_shift_q, sigmoid_shift_q} <= 12'd0;
       {exp_bias_q, sigmoid_bias_q} <= 64'd0;
-      n_in_q <= 40'd0;
-      n_out_q <= 40'd0;
+      n_in_q <= 45'd0;
+      n_out_q <= 45'd0;
       k_q <= 65'd0;
       theta_q <= 120'd0;
       bias_q <= 14'd0;
-      weight_address_q <= 16'd0;
+      weight_address_q <= 18'd0;
     end else if (table_write) begin
       case (table_field)
-        2'd0: n_in_q[8*table_layer+:8] <= size_w;
-        2'd1: n_out_q[8*table_layer+:8] <= size_w;
+        2'd0: n_in_q[9*table_layer+:9] <= size_w;
+        2'd1: n_out_q[9*table_layer+:9] <= size_w;
         2'd2: k_q[13*table_layer+:13] <= k_w;
         default: theta_q[24*table_layer+:24] <= theta_w;
       endcase
@@ -230,9 +230,9 @@ module sf_csr #(
         sf_csr_pkg::SIGMOID_MUL: sigmoid_mul_q <= mul_w;
         sf_csr_pkg::SIGMOID_SHIFT: sigmoid_shift_q <= shift_w;
         sf_csr_pkg::SIGMOID_BIAS: sigmoid_bias_q <= wdata_i;
-        sf_csr_pkg::WEIGHT_ADDRESS: weight_address_q <= |wdata_i[31:16] ? 16'hffff : wdata_i[15:0];
+        sf_csr_pkg::WEIGHT_ADDRESS: weight_address_q <= |wdata_i[31:18] ? 18'h3ffff : wdata_i[17:0];
         sf_csr_pkg::BIAS: bias_q <= bias_w;
-        default: weight_address_q <= weight_address_q + 16'd1;  // WEIGHT_DATA
+        default: weight_address_q <= weight_address_q + 18'd1;  // WEIGHT_DATA
       endcase
     end
   end
@@ -251,7 +251,7 @@ module sf_csr #(
     case (ra)
       sf_csr_pkg::ID: rdata_d = sf_csr_pkg::ID_RESET;
       sf_csr_pkg::VERSION: rdata_d = sf_csr_pkg::VERSION_RESET;
-      sf_csr_pkg::CONFIG: rdata_d = {sf_csr_pkg::CONFIG_RESET[31:8], 8'(LANES)};
+      sf_csr_pkg::CONFIG: rdata_d = {sf_csr_pkg::CONFIG_RESET[31:8], 8'(LANES - 1)};
       sf_csr_pkg::STATUS: rdata_d = {28'd0, |error_q, counters_busy_i, active_i, running_q};
       sf_csr_pkg::ERROR: rdata_d = {21'd0, error_q};
       sf_csr_pkg::IRQ_ENABLE: rdata_d = {30'd0, irq_enable_q};
@@ -264,14 +264,14 @@ module sf_csr #(
       sf_csr_pkg::SIGMOID_MUL: rdata_d = {15'd0, sigmoid_mul_q};
       sf_csr_pkg::SIGMOID_SHIFT: rdata_d = {26'd0, sigmoid_shift_q};
       sf_csr_pkg::SIGMOID_BIAS: rdata_d = sigmoid_bias_q;
-      sf_csr_pkg::WEIGHT_ADDRESS: rdata_d = {16'd0, weight_address_q};
+      sf_csr_pkg::WEIGHT_ADDRESS: rdata_d = {14'd0, weight_address_q};
       sf_csr_pkg::BIAS: rdata_d = bias_r;
       default: begin
         rdata_d = 32'd0;
         if (ra >= sf_csr_pkg::D1_N_IN && ra <= sf_csr_pkg::C3_THETA) begin
           case (rfield)
-            2'd0: rdata_d = {24'd0, n_in_q[8*rlayer+:8]};
-            2'd1: rdata_d = {24'd0, n_out_q[8*rlayer+:8]};
+            2'd0: rdata_d = {23'd0, n_in_q[9*rlayer+:9]};
+            2'd1: rdata_d = {23'd0, n_out_q[9*rlayer+:9]};
             2'd2: rdata_d = {19'd0, k_q[13*rlayer+:13]};
             default: rdata_d = {8'd0, theta_q[24*rlayer+:24]};
           endcase

@@ -14,7 +14,7 @@ module sf_d1 #(
     // weights
     input  wire                we_i,
     input  wire         [ 4:0] wrow_i,
-    input  wire         [ 4:0] wword_i,
+    input  wire         [$clog2(LANES/4)-1:0] wword_i,
     input  wire         [31:0] wdata_i,
     // input buffer
     input  wire                sample_valid_i,
@@ -63,7 +63,8 @@ module sf_d1 #(
   sf_wmem #(
       .WORDS   (LANES / 4),
       .ROWS    (32),
-      .ROW_BITS(5)
+      .ROW_BITS(5),
+      .WORD_BITS($clog2(LANES / 4))
   ) u_weights (
       .clk_i  (clk_i),
       .we_i   (we_i),

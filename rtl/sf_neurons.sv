@@ -12,7 +12,7 @@ module sf_neurons #(
     input  wire         [ 1:0] mode_i,
     input  wire         [38:0] k_i,        // of D1, C1, C2
     input  wire         [71:0] theta_i,
-    input  wire         [23:0] n_out_i,
+    input  wire         [26:0] n_out_i,
     // one of them steps, or none
     input  wire         [ 2:0] fire_i,     // C2, C1, D1
     input  wire         [ 2:0] step_i,
@@ -23,7 +23,7 @@ module sf_neurons #(
     output wire         [ 2:0] valid_o,
     output wire         [ 2:0] step_o,
     output wire [   LANES-1:0] spikes_o,
-    output wire         [ 7:0] count_o,
+    output wire         [ 8:0] count_o,
     // tap, in the cycle after that: membranes after reset
     output wire [24*LANES-1:0] tap_membrane_o
 );
@@ -39,7 +39,7 @@ module sf_neurons #(
   wire [1:0] which = fire_i[2] ? 2'd2 : fire_i[1] ? 2'd1 : 2'd0;
   wire [12:0] k = k_i[13*which+:13];
   wire signed [23:0] theta = theta_i[24*which+:24];
-  wire [7:0] n_out = n_out_i[8*which+:8];
+  wire [8:0] n_out = n_out_i[9*which+:9];
   wire first = step_i == 3'd0;
 
   always_ff @(posedge clk_i) begin
@@ -73,7 +73,7 @@ module sf_neurons #(
   assign valid_o = valid_q;
   assign step_o = step_q;
   assign spikes_o = fired_q & lanes_q;
-  assign count_o = 8'($countones(spikes_o));
+  assign count_o = 9'($countones(spikes_o));
 
   generate
     if (TAP != 0) begin : g_tap

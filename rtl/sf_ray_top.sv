@@ -57,9 +57,9 @@ module sf_ray_top #(
     output wire          tap_valid_o,
     output wire [   2:0] tap_layer_o,
     output wire [   2:0] tap_step_o,
-    output wire [ 127:0] tap_spikes_o,
-    output wire [ 127:0] tap_rows_o,
-    output wire [3071:0] tap_membrane_o
+    output wire [   sf_arch_pkg::LANES-1:0] tap_spikes_o,
+    output wire [   sf_arch_pkg::LANES-1:0] tap_rows_o,
+    output wire [24*sf_arch_pkg::LANES-1:0] tap_membrane_o
 );
   // ---- registers: 0x400..0x7ff are the rays'
   wire net_awready, net_wready, net_bvalid, net_arready, net_rvalid, net_irq;

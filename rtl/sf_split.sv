@@ -1,5 +1,5 @@
 // D2 and C3: 16 outputs for all 8 steps at once; two neurons that fired at any step are added per cycle, each to the
-// steps at which it fired. C3's biases count at every step. Mirror: src/fx/current.c. Width: |sum| <= 129 * 127 < 2^15.
+// steps at which it fired. C3's biases count at every step. Mirror: src/fx/current.c. Width: |sum| <= 257 * 127 < 2^15.
 `default_nettype none
 
 module sf_split #(

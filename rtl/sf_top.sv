@@ -5,7 +5,7 @@
 
 module sf_top #(
     parameter TAP = 1,
-    parameter LANES = sf_arch_pkg::LANES  // neurons of the widest layer: 32, 64 or 128; CONFIG says it
+    parameter LANES = sf_arch_pkg::LANES  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -43,23 +43,24 @@ module sf_top #(
     output wire          tap_valid_o,
     output wire [   2:0] tap_layer_o,
     output wire [   2:0] tap_step_o,
-    output wire [ 127:0] tap_spikes_o,
-    output wire [ 127:0] tap_rows_o,
-    output wire [3071:0] tap_membrane_o
+    output wire [   sf_arch_pkg::LANES-1:0] tap_spikes_o,
+    output wire [   sf_arch_pkg::LANES-1:0] tap_rows_o,
+    output wire [24*sf_arch_pkg::LANES-1:0] tap_membrane_o
 );
+  localparam TAPS = sf_arch_pkg::LANES;  // the tap's ports are as wide as the widest block's
   wire [1:0] mode;
   wire [3:0] steps;
   wire [15:0] exp_mul, sigmoid_mul;
   wire [4:0] exp_shift, sigmoid_shift;
   wire [31:0] exp_bias, sigmoid_bias;
-  wire [39:0] n_in, n_out;
+  wire [44:0] n_in, n_out;
   wire [64:0] k;
   wire [119:0] theta;
   wire [12:0] bias;
   wire we;
   wire [2:0] wlayer;
-  wire [7:0] wrow;
-  wire [4:0] wword;
+  wire [8:0] wrow;
+  wire [5:0] wword;
   wire [31:0] wweights;
   wire running, soft_reset, clear_counters, snapshot, counters_busy, error_packet, error_value;
   wire [8:0] counter_index;
@@ -76,21 +77,20 @@ module sf_top #(
   wire [1:0] c2_rows;
   wire [2:0] c1_step, c2_step, spikes_valid, spikes_step, update_step;
   wire [15:0] d2_fired, c3_fired;
-  wire [7:0] spikes_count;
+  wire [8:0] spikes_count;
   wire update, update_colour;
   wire result_valid, result_ready;
   wire [27:0] sigma;
   wire [59:0] colour;
   wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
-  wire decodes = n_out[7:0] == 8'd0;
-  wire [7:0] n_dir = decodes ? n_in[23:16] : n_in[23:16] - (n_out[15:8] - 8'd1);
+  wire decodes = n_out[8:0] == 9'd0;
+  wire [7:0] n_dir = decodes ? n_in[25:18] : n_in[25:18] - (n_out[16:9] - 8'd1);
 
-  // The tap's ports are as wide as the widest build's.
   wire [LANES-1:0] tap_spikes, tap_rows;
   wire [24*LANES-1:0] tap_membrane;
-  assign tap_spikes_o = 128'(tap_spikes);
-  assign tap_rows_o = 128'(tap_rows);
-  assign tap_membrane_o = 3072'(tap_membrane);
+  assign tap_spikes_o = TAPS'(tap_spikes);
+  assign tap_rows_o = TAPS'(tap_rows);
+  assign tap_membrane_o = (24 * TAPS)'(tap_membrane);
 
   sf_csr #(
       .LANES(LANES)
@@ -304,8 +304,9 @@ module sf_top #(
 
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
   initial begin
-    if ((LANES != 32 && LANES != 64 && LANES != 128) || sf_arch_pkg::LANES != 128 || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
-        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::LAYERS != 5
+    if ((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES
+        || (sf_arch_pkg::LANES != 128 && sf_arch_pkg::LANES != 256) || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
+        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
         || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
         || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
         || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 1 || sf_arch_pkg::LEAK_FRAC > 12

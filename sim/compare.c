@@ -18,10 +18,10 @@ static bool differs(const comparison *c, int layer, int step, int neuron, const 
   return false;
 }
 
-static bool same_bits(const comparison *c, int layer, int step, const char *wire, const uint64_t expected[2],
-                      const uint64_t actual[2], uint64_t cycle)
+static bool same_bits(const comparison *c, int layer, int step, const char *wire,
+                      const uint64_t expected[SF_SPIKE_WORDS], const uint64_t actual[SF_SPIKE_WORDS], uint64_t cycle)
 {
-  for (int word = 0; word < 2; word++) {
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
     const uint64_t odd = expected[word] ^ actual[word];
     if (!odd) continue;
     const int bit = __builtin_ctzll(odd);
@@ -48,10 +48,10 @@ static bool same_neurons(const comparison *c, int layer, int step)
 /* D2 and C3 add up a presynaptic neuron that fired at any step, once. */
 static bool same_rows_any(const comparison *c, int layer, int presynaptic, uint64_t cycle)
 {
-  uint64_t any[2] = {0};
+  uint64_t any[SF_SPIKE_WORDS] = {0};
   if (!c->trace) return true;
   for (int t = 0; t < c->net->steps; t++)
-    for (int word = 0; word < 2; word++) any[word] |= c->core->spikes[presynaptic][t][word];
+    for (int word = 0; word < SF_SPIKE_WORDS; word++) any[word] |= c->core->spikes[presynaptic][t][word];
   return same_bits(c, layer, 0, "row", any, c->trace->rows[layer][0], cycle);
 }
 

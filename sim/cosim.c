@@ -92,7 +92,8 @@ static void add_spikes(sf_cosim *c, const entry *e)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < SF_T_MAX; t++)
-      for (int word = 0; word < 2; word++) c->sum.spikes += (uint64_t)__builtin_popcountll(e->trace.spikes[l][t][word]);
+      for (int word = 0; word < SF_SPIKE_WORDS; word++)
+        c->sum.spikes += (uint64_t)__builtin_popcountll(e->trace.spikes[l][t][word]);
 }
 
 static sf_status compare_samples(sf_cosim *c)

@@ -20,7 +20,7 @@ $(DUT_OUT)/Vsf_top__ALL.a: $(DUT_OUT)/Vsf_top.mk
 
 $(DUT_OUT)/pins.o: sim/pins.cpp sim/pins.h $(DUT_OUT)/Vsf_top.mk
 	$(call say,CXX   $< -> $@)
-	$Q$(CXX) -std=c++17 -O2 -I. -isystem $(VERILATOR_ROOT)/include -isystem $(DUT_OUT) -c $< -o $@
+	$Q$(CXX) -std=c++17 -O2 $(ARCH_INCLUDE) -Iinclude -I. -isystem $(VERILATOR_ROOT)/include -isystem $(DUT_OUT) -c $< -o $@
 
 # The harness comes from our library; the block and its pins stand before it.
 $(DUT_OUT)/sf_cosim: $B/obj/tools/sf_cosim.o $(DUT_OUT)/pins.o $(DUT_OUT)/Vsf_top__ALL.a $(DUT_LIBS) $B/libspikefield.a

@@ -1,6 +1,7 @@
 /* The Verilated model, sf_top or sf_ray_top, one clock cycle per call, behind a C interface. */
 #ifndef SPIKEFIELD_SIM_PINS_H
 #define SPIKEFIELD_SIM_PINS_H
+#include "spikefield/arch.h"
 #include <stdbool.h>
 #include <stdint.h>
 #ifdef __cplusplus
@@ -33,8 +34,8 @@ typedef struct sf_pins_out {
   uint64_t m_data;
   bool irq, tap_valid;
   uint8_t tap_layer, tap_step;
-  uint64_t tap_spikes[2], tap_rows[2];
-  uint32_t tap_membrane[96]; /* 128 x 24 bits, packed */
+  uint64_t tap_spikes[SF_SPIKE_WORDS], tap_rows[SF_SPIKE_WORDS];
+  uint32_t tap_membrane[SF_LANES * SF_MEMBRANE_BITS / 32]; /* packed */
   bool ray_ready, pixel_valid, mem_request;
   uint64_t pixel_data[6];
   uint32_t mem_address;
@@ -44,7 +45,8 @@ typedef struct sf_pins sf_pins;
 /* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
 sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg); /* sf_ray_top */
-/* The waveform begins here. sf_pins_dump_end: its file ends and is whole; sf_pins_dump then begins another by that name. */
+/* The waveform begins here. sf_pins_dump_end: its file ends and is whole; sf_pins_dump then begins another by that
+ * name. */
 void sf_pins_dump(sf_pins *pins);
 void sf_pins_dump_end(sf_pins *pins);
 void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out);

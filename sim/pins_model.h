@@ -54,11 +54,11 @@ template <class Top> struct sf_pins_common : sf_pins {
     if (!out->tap_valid) return;
     out->tap_layer = top->tap_layer_o;
     out->tap_step = top->tap_step_o;
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < SF_SPIKE_WORDS; i++) {
       out->tap_spikes[i] = static_cast<uint64_t>(top->tap_spikes_o[2 * i + 1]) << 32 | top->tap_spikes_o[2 * i];
       out->tap_rows[i] = static_cast<uint64_t>(top->tap_rows_o[2 * i + 1]) << 32 | top->tap_rows_o[2 * i];
     }
-    std::copy_n(&top->tap_membrane_o[0], 96, out->tap_membrane);
+    std::copy_n(&top->tap_membrane_o[0], SF_LANES * SF_MEMBRANE_BITS / 32, out->tap_membrane);
   }
 
   void clock(bool level) override

@@ -44,9 +44,10 @@ $1/V$4__ALL.a: $1/V$4.mk
 	$$(call say,CXX   $$@)
 	$$Q$$(MAKE) -s -C $1 -f V$4.mk $$(VERILATED_OPT) CXX=$$(CXX) V$4__ALL.a >/dev/null
 	@touch $$@
-$1/$5.o: sim/$5.cpp sim/pins.h sim/pins_model.h $1/V$4.mk
+$1/$5.o: sim/$5.cpp sim/pins.h sim/pins_model.h $(ARCH_DEF) $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) -I. -isystem $$(VERILATOR_ROOT)/include -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -c $$< -o $$@
+	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
+	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
 define verilated_rule
@@ -121,8 +122,10 @@ gen-check: $B/bin/sf_gen ## generated files are those that the sources give
 	@diff -r $B/gen-check/rtl/gen rtl/gen && diff $B/gen-check/docs/registers.md docs/registers.md && \
 	  diff $B/gen-check/spikefield.core spikefield.core && tools/check_mirror.sh
 
+# Of sf_top's parameter, as far as the package goes.
+LANES_BUILT := $(if $(findstring LANES=256,$(ARCH_DEFINES)),32 64 128 256,32 64 128)
 lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
-	@cd $(RTL_ROOT) && for lanes in 32 64 128; do \
+	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi

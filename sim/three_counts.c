@@ -29,12 +29,12 @@ static sf_status compare_outputs(const fx_net *net, const fx_out *core, const fx
   return sf_ok();
 }
 
-static sf_status compare_bitmaps(const fx_net *net, const uint64_t core[SF_LAYERS][SF_T_MAX][2],
-                                 const uint64_t rtl[SF_LAYERS][SF_T_MAX][2])
+static sf_status compare_bitmaps(const fx_net *net, const uint64_t core[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS],
+                                 const uint64_t rtl[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS])
 {
   for (int t = 0; t < net->steps; t++)
     for (int l = FX_D1; l <= FX_C2; l++)
-      for (int w = 0; w < 2 && l != FX_D2; w++) {
+      for (int w = 0; w < SF_SPIKE_WORDS && l != FX_D2; w++) {
         const uint64_t difference = core[l][t][w] ^ rtl[l][t][w];
         if (!difference) continue;
         const int bit = __builtin_ctzll(difference);
@@ -61,8 +61,8 @@ static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_
   fx_out core;
   SF_TRY(sf_probe_net(&r->core, ray, first, f, &core));
   SF_TRY(sf_dut_run(r->dut, &sample, 1, &r->result));
-  sf_status status = compare_bitmaps(r->core.net, (const uint64_t(*)[SF_T_MAX][2])r->core.trace->spikes,
-                                     (const uint64_t(*)[SF_T_MAX][2])r->result.spikes);
+  sf_status status = compare_bitmaps(r->core.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])r->core.trace->spikes,
+                                     (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])r->result.spikes);
   if (status.code == SF_OK) status = compare_outputs(r->core.net, &core, &r->result.out);
   if (status.code == SF_OK && r->check_counters) status = compare_counters(r);
   *out = r->result.out;

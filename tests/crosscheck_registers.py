@@ -55,13 +55,18 @@ def calls(text):
             yield start.group()[:-1], [a.strip() for a in arguments]
 
 
-ARCH = {a[0]: int(a[1]) for macro, a in calls(text_of("include/spikefield/arch.def")) if macro == "SF_ARCH"}
+ARCH = {}
 
 
 def value(expression):
     expression = re.sub(r"SF_([A-Z_0-9]+)", lambda m: str(ARCH[m.group(1)]), expression)
-    assert re.fullmatch(r"[0-9a-fA-Fx|<()\s]+", expression), expression
+    assert re.fullmatch(r"[0-9a-fA-Fx|<>+()\s-]+", expression), expression
     return eval(expression)  # pylint: disable=eval-used
+
+
+for kind, words in calls(text_of("include/spikefield/arch.def")):
+    if kind == "SF_ARCH":
+        ARCH[words[0]] = value(words[1])
 
 
 def read_source():

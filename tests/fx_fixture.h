@@ -13,9 +13,9 @@ typedef struct fixture_sizes {
   int bias[SF_LAYERS];
 } fixture_sizes;
 
-static const fixture_sizes fixture_ingp = {16, 128, 16, 16, 128, 128, 4, FX_HYBRID, {0}};
+static const fixture_sizes fixture_ingp = {16, SF_LANES, 16, 16, SF_LANES, SF_LANES, 4, FX_HYBRID, {0}};
 static const fixture_sizes fixture_decoder = {
-    0, 0, 0, 150, 128, 128, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
+    0, 0, 0, 150, SF_LANES, SF_LANES, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
 
 static inline int64_t fixture_pick(uint64_t seed, uint64_t stream, uint64_t index, int64_t low, int64_t high)
 {
@@ -26,11 +26,11 @@ static inline fixture_sizes fixture_random_sizes(uint64_t seed)
 {
   fixture_sizes s;
   s.levels = (int)fixture_pick(seed, 1, 0, 1, 16);
-  s.d_hidden = (int)fixture_pick(seed, 1, 1, 1, 128);
+  s.d_hidden = (int)fixture_pick(seed, 1, 1, 1, SF_LANES);
   s.d_out = (int)fixture_pick(seed, 1, 2, 1, 16);
   s.n_dir = (int)fixture_pick(seed, 1, 3, s.d_out == 1, 16);
-  s.c1 = (int)fixture_pick(seed, 1, 4, 1, 128);
-  s.c2 = (int)fixture_pick(seed, 1, 5, 1, 128);
+  s.c1 = (int)fixture_pick(seed, 1, 4, 1, SF_LANES);
+  s.c2 = (int)fixture_pick(seed, 1, 5, 1, SF_LANES);
   s.steps = (int)fixture_pick(seed, 1, 6, 1, SF_T_MAX);
   s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_NODECAY);
   memset(s.bias, 0, sizeof s.bias);

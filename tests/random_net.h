@@ -63,7 +63,7 @@ static inline int32_t draw_theta(random_source *r, int64_t typical)
 
 typedef struct random_net {
   fx_net net;
-  int8_t weights[SF_LAYERS][(SF_DIR_MAX + 1) * SF_LANES];
+  int8_t weights[SF_LAYERS][((SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES) + 1) * SF_LANES]; /* biases behind */
 } random_net;
 
 static inline void net_sizes(fx_net *net, int n_feature, int hidden, int n_h, int n_dir, int hidden2, int hidden3)
@@ -96,8 +96,8 @@ static inline void random_decoder_make(random_net *n, random_source *r, int n_in
   bind_weights(n);
   fx_layer *l = n->net.layer;
   l[FX_C1].n_in = n_in;
-  l[FX_C1].n_out = l[FX_C2].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, 128) : 128;
-  l[FX_C2].n_out = l[FX_C3].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, 128) : 128;
+  l[FX_C1].n_out = l[FX_C2].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, SF_LANES) : SF_LANES;
+  l[FX_C2].n_out = l[FX_C3].n_in = extreme && draw(r, 0, 1) ? (int)draw(r, 1, SF_LANES) : SF_LANES;
   l[FX_C3].n_out = 3;
   if (extreme)
     draw_biases(r, &n->net);
@@ -114,9 +114,9 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
   fx_net *net = &n->net;
   const bool full = draw(r, 0, 2) == 0 || !extreme;
   const int n_h = full ? 15 : (int)draw(r, 0, 15);
-  net_sizes(net, full ? 32 : 2 * (int)draw(r, 1, 16), full ? 128 : (int)draw(r, 1, 128), n_h,
-            full ? 16 : (int)draw(r, n_h ? 0 : 1, 16), full ? 128 : (int)draw(r, 1, 128),
-            full ? 128 : (int)draw(r, 1, 128));
+  net_sizes(net, full ? 32 : 2 * (int)draw(r, 1, 16), full ? SF_LANES : (int)draw(r, 1, SF_LANES), n_h,
+            full ? 16 : (int)draw(r, n_h ? 0 : 1, 16), full ? SF_LANES : (int)draw(r, 1, SF_LANES),
+            full ? SF_LANES : (int)draw(r, 1, SF_LANES));
   if (extreme) draw_biases(r, net);
   random_net_fill(n, r, extreme);
 }

@@ -16,7 +16,7 @@ static fx_net small_net(void)
   return net;
 }
 
-typedef uint64_t bitmaps[SF_LAYERS][SF_T_MAX][2];
+typedef uint64_t bitmaps[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
 static const bitmaps small_spikes = {[FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
 
 static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64_t t1)
@@ -60,13 +60,13 @@ END_TEST
 START_TEST(recount_sees_every_bit)
 {
   fx_net net = small_net();
-  net.layer[FX_D1].n_out = net.layer[FX_D2].n_in = 128;
-  for (int bit = 0; bit < 128; bit++) {
+  net.layer[FX_D1].n_out = net.layer[FX_D2].n_in = SF_LANES;
+  for (int bit = 0; bit < SF_LANES; bit++) {
     bitmaps one = {0};
     fx_counts c = {0};
     one[FX_D1][1][bit / 64] = (uint64_t)1 << bit % 64;
     one[FX_C2][0][bit / 64] = (uint64_t)1 << bit % 64; /* beyond C2's 5 lanes too: a fault must not vanish */
-    sf_recount_sample(&net, (const uint64_t(*)[SF_T_MAX][2])one, false, &c);
+    sf_recount_sample(&net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])one, false, &c);
     expect(&c, FX_D1, SF_EVENT_SPIKES, 0, 1);
     expect(&c, FX_D2, SF_EVENT_SOP, 0, 3);
     expect(&c, FX_D2, SF_EVENT_WEIGHT, 0, 3);
@@ -126,7 +126,7 @@ START_TEST(largest_frame_does_not_wrap)
   sf_ledger l;
   memset(all, 0xff, sizeof all);
   scene.net.steps = 8;
-  sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])all, true, &one);
+  sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])all, true, &one);
   const uint64_t samples = (uint64_t)800 * 800 * 1024;
   for (int i = 0; i < SF_LAYERS; i++)
     for (int e = 0; e < SF_EVENTS; e++)
@@ -180,7 +180,7 @@ START_TEST(recount_equals_core_on_random_nets)
       fx_out out;
       fixture_inputs(seed, n, f, 32, 1500);
       fx_net_sample(&scene.net, f, base, &out, trace, &core);
-      sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])trace->spikes, n == 0, &recount);
+      sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])trace->spikes, n == 0, &recount);
       sf_status status = sf_counts_compare(&core, "core", &recount, "recount");
       ck_assert_msg(status.code == SF_OK, "seed %llu: %s", (unsigned long long)seed, status.message);
     }

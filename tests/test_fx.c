@@ -119,7 +119,7 @@ static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int3
     ck_assert(!step.saturated);
   }
   int32_t lane[SF_LANES], in[SF_LANES], membrane[SF_LANES];
-  uint64_t spikes[2];
+  uint64_t spikes[SF_SPIKE_WORDS];
   for (int o = 0; o < SF_LANES; o++) lane[o] = v, in[o] = current;
   const int saturated = fx_plif_layer(lane, in, SF_LANES, layer, mode, first, spikes, membrane);
   ck_assert_int_eq(saturated, step.saturated * SF_LANES);
@@ -160,7 +160,7 @@ START_TEST(plif_lanes_are_independent)
   int32_t v[SF_LANES], in[SF_LANES], v_all[SF_LANES];
   const fx_layer layer = {.k = 1234, .theta = 5000};
   for (uint64_t round = 0; round < 200; round++) {
-    uint64_t spikes[2];
+    uint64_t spikes[SF_SPIKE_WORDS];
     const int mode = (int)round % 3;
     for (uint64_t o = 0; o < SF_LANES; o++) {
       v_all[o] = v[o] = (int32_t)fixture_pick(3, round, o, -20000, 20000);

@@ -74,7 +74,7 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
   fx_net_events(net, b->f[i], fx_net_decodes(net) ? base : b->base[i], &out, &events, NULL);
   for (int t = 0; t < net->steps; t++)
     for (int l = 0; l < FX_SPIKING; l++)
-      ck_assert_msg(!memcmp(events.spikes[spiking[l]][t], b->spikes[l][t][i], 16),
+      ck_assert_msg(!memcmp(events.spikes[spiking[l]][t], b->spikes[l][t][i], sizeof b->spikes[l][t][i]),
                     "%s, scene %llu, sample %d of %d: spikes of layer %d at step %d", name, (unsigned long long)seed, i,
                     b->n, spiking[l], t);
   ck_assert_msg(!memcmp(&out, &b->out[i], sizeof out), "%s, scene %llu, sample %d of %d: output", name,

@@ -53,7 +53,7 @@ static void same_trace(void *golden, const fx_trace *trace)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < core.net.steps; t++) {
-      uint32_t spikes[4];
+      uint32_t spikes[SF_GOLDEN_WORDS];
       sf_golden_spikes(golden, l, t, spikes);
       for (int n = 0; n < SF_LANES; n++) {
         const bool fired = trace->spikes[l][t][n / 64] >> (n % 64) & 1, has = n < core.net.layer[l].n_out;
@@ -65,20 +65,23 @@ static void same_trace(void *golden, const fx_trace *trace)
     }
 }
 
+static void same_words(const uint32_t *words, const uint64_t *bits)
+{
+  for (int n = 0; n < 32 * SF_GOLDEN_WORDS; n++)
+    ck_assert_uint_eq(words[n / 32] >> (n % 32) & 1, n < SF_LANES ? bits[n / 64] >> (n % 64) & 1 : 0);
+}
+
 static void same_rows(void *golden, const fx_trace *trace)
 {
-  uint32_t rows[4];
-  uint64_t any[2] = {0};
+  uint32_t rows[SF_GOLDEN_WORDS];
+  uint64_t any[SF_SPIKE_WORDS] = {0};
   for (int t = 0; t < core.net.steps; t++) {
     sf_golden_rows(golden, FX_C2, t, rows);
-    ck_assert_uint_eq(rows[0], (uint32_t)trace->spikes[FX_C1][t][0]);
-    ck_assert_uint_eq(rows[3], (uint32_t)(trace->spikes[FX_C1][t][1] >> 32));
-    for (int word = 0; word < 2; word++) any[word] |= trace->spikes[FX_C2][t][word];
+    same_words(rows, trace->spikes[FX_C1][t]);
+    for (int word = 0; word < SF_SPIKE_WORDS; word++) any[word] |= trace->spikes[FX_C2][t][word];
   }
   sf_golden_rows(golden, FX_C3, 0, rows);
-  ck_assert_uint_eq(rows[0], (uint32_t)any[0]);
-  ck_assert_uint_eq(rows[1], (uint32_t)(any[0] >> 32));
-  ck_assert_uint_eq(rows[2], (uint32_t)any[1]);
+  same_words(rows, any);
 }
 
 static void same_counters(void *golden, const fx_counts *counts)

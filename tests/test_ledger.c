@@ -178,7 +178,7 @@ static fx_net small_net(void)
 
 static fx_counts small_counts(const fx_net *net)
 {
-  static const uint64_t spikes[SF_LAYERS][SF_T_MAX][2] = {
+  static const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS] = {
       [FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
   fx_counts c = {0};
   sf_recount_sample(net, spikes, true, &c);
@@ -282,10 +282,11 @@ START_TEST(cells_and_parts_add_up)
   fx_scene scene = fixture_scene(&fixture_ingp, 5);
   sf_ledgers *l = malloc(sizeof *l);
   fx_counts c = {0};
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
   for (uint64_t i = 0; i < sizeof spikes / 8; i++)
     (&spikes[0][0][0])[i] = sf_random_u64(1, 2, i) & sf_random_u64(1, 3, i);
-  for (int i = 0; i < 9; i++) sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][2])spikes, i % 3 == 0, &c);
+  for (int i = 0; i < 9; i++)
+    sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])spikes, i % 3 == 0, &c);
   const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);

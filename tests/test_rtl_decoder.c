@@ -185,13 +185,14 @@ static uint32_t error_of(sf_dut *dut)
 
 START_TEST(illegal_programming_is_refused)
 {
+  enum { MORE = SF_LANES + 1 };
   static const struct {
     uint32_t offset, value, error;
   } bad[] = {{SF_CSR_D1_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D1_N_OUT, 1, SF_CSR_ERROR_SIZE},
              {SF_CSR_D2_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D2_N_OUT, 1, SF_CSR_ERROR_SIZE},
              {SF_CSR_C1_N_IN, 0, SF_CSR_ERROR_SIZE},         {SF_CSR_C1_N_IN, 161, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 256 + 150, SF_CSR_ERROR_SIZE}, {SF_CSR_C1_N_OUT, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C2_N_OUT, 129, SF_CSR_ERROR_SIZE},      {SF_CSR_C3_N_OUT, 1, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C1_N_IN, 512 + 150, SF_CSR_ERROR_SIZE}, {SF_CSR_C1_N_OUT, 0, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C2_N_OUT, MORE, SF_CSR_ERROR_SIZE},     {SF_CSR_C3_N_OUT, 1, SF_CSR_ERROR_SIZE},
              {SF_CSR_BIAS, 1u << 11, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 15, SF_CSR_ERROR_SIZE},
              {SF_CSR_BIAS, 1u << 18, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 31, SF_CSR_ERROR_SIZE},
              {SF_CSR_C1_THETA, 0, SF_CSR_ERROR_THETA},       {SF_CSR_C2_K, 4097, SF_CSR_ERROR_LEAK},

@@ -40,6 +40,7 @@ static void expect_error(sf_dut *dut, uint32_t bit)
 
 START_TEST(illegal_programming_is_refused)
 {
+  enum { MORE = SF_LANES + 1, LESS = SF_LANES - 1 };
   static const struct {
     uint32_t offset, value, error;
   } bad[] = {{SF_CSR_STEPS, 0, SF_CSR_ERROR_STEPS},         {SF_CSR_STEPS, 9, SF_CSR_ERROR_STEPS},
@@ -49,11 +50,11 @@ START_TEST(illegal_programming_is_refused)
              {SF_CSR_C2_K, ~0u, SF_CSR_ERROR_LEAK},         {SF_CSR_C3_K, 4097, SF_CSR_ERROR_LEAK},
              {SF_CSR_D1_THETA, 0, SF_CSR_ERROR_THETA},      {SF_CSR_C1_THETA, 1u << 23, SF_CSR_ERROR_THETA},
              {SF_CSR_C2_THETA, ~0u, SF_CSR_ERROR_THETA},    {SF_CSR_D1_N_IN, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D1_N_IN, 33, SF_CSR_ERROR_SIZE},       {SF_CSR_D1_N_IN, 256 + 32, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D1_N_OUT, 129, SF_CSR_ERROR_SIZE},     {SF_CSR_D1_N_OUT, 127, SF_CSR_ERROR_SIZE},
+             {SF_CSR_D1_N_IN, 33, SF_CSR_ERROR_SIZE},       {SF_CSR_D1_N_IN, 512 + 32, SF_CSR_ERROR_SIZE},
+             {SF_CSR_D1_N_OUT, MORE, SF_CSR_ERROR_SIZE},    {SF_CSR_D1_N_OUT, LESS, SF_CSR_ERROR_SIZE},
              {SF_CSR_D2_N_OUT, 17, SF_CSR_ERROR_SIZE},      {SF_CSR_D2_N_OUT, 0, SF_CSR_ERROR_SIZE},
              {SF_CSR_C1_N_IN, 32, SF_CSR_ERROR_SIZE},       {SF_CSR_C1_N_IN, 14, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_OUT, 1, SF_CSR_ERROR_SIZE},       {SF_CSR_C2_N_IN, 127, SF_CSR_ERROR_SIZE},
+             {SF_CSR_C1_N_OUT, 1, SF_CSR_ERROR_SIZE},       {SF_CSR_C2_N_IN, LESS, SF_CSR_ERROR_SIZE},
              {SF_CSR_C2_N_OUT, 200, SF_CSR_ERROR_SIZE},     {SF_CSR_C3_N_IN, 0, SF_CSR_ERROR_SIZE},
              {SF_CSR_C3_N_OUT, 4, SF_CSR_ERROR_SIZE},       {SF_CSR_EXP_MUL, 65536, SF_CSR_ERROR_SCALE},
              {SF_CSR_EXP_SHIFT, 32, SF_CSR_ERROR_SCALE},    {SF_CSR_SIGMOID_MUL, ~0u, SF_CSR_ERROR_SCALE},
@@ -108,11 +109,23 @@ START_TEST(weights_and_addresses_are_checked)
   typical(47);
   sf_dut *dut = open_dut(&net_of_test.net, 13, 0);
   enum { ROW = SF_CSR_WEIGHT_ADDRESS_ROW_LSB, BIAS = SF_BIAS_ROW << ROW, LAYER = SF_CSR_WEIGHT_ADDRESS_LAYER_LSB };
-  static const uint32_t address[] = {
-      5u << LAYER,        7u << LAYER | 127 << ROW, 1u << LAYER | 4,          4u << LAYER | 31,         32 << ROW, BIAS,
-      1u << LAYER | BIAS, 2u << LAYER | 161 << ROW, 3u << LAYER | 128 << ROW, 4u << LAYER | 255 << ROW, 1u << 16};
-  static const uint32_t fits[] = {31 << ROW,          1u << LAYER | 127 << ROW, 2u << LAYER | 159 << ROW,
-                                  2u << LAYER | BIAS, 3u << LAYER | BIAS,       4u << LAYER | BIAS};
+  enum { LAST = (SF_LANES - 1) << ROW, BEHIND = BIAS + (1 << ROW), TOP = 511 << ROW };
+  enum { NO_ROW = SF_LANES < SF_BIAS_ROW ? SF_LANES << ROW : BEHIND, NO_WORD = SF_LANES < 256 ? SF_LANES / 4 : BIAS };
+  static const uint32_t address[] = {5u << LAYER,
+                                     7u << LAYER | LAST,
+                                     1u << LAYER | 4,
+                                     4u << LAYER | 31,
+                                     32 << ROW,
+                                     BIAS,
+                                     1u << LAYER | BIAS,
+                                     2u << LAYER | 160 << ROW,
+                                     2u << LAYER | BEHIND,
+                                     3u << LAYER | NO_ROW,
+                                     4u << LAYER | TOP,
+                                     NO_WORD,
+                                     1u << 18};
+  static const uint32_t fits[] = {31 << ROW,          1u << LAYER | LAST, 2u << LAYER | 159 << ROW,
+                                  2u << LAYER | BIAS, 3u << LAYER | BIAS, 4u << LAYER | BIAS};
   for (size_t i = 0; i < sizeof fits / sizeof *fits; i++) {
     sf_driver_reset(&dut->bus);
     put(dut, SF_CSR_WEIGHT_ADDRESS, fits[i]);
@@ -290,7 +303,7 @@ START_TEST(driver_refuses_another_device)
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_OK);
   value[1] += 1 << 16;
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_VERSION);
-  value[1] = SF_CSR_VERSION_RESET, value[2] ^= 1;
+  value[1] = SF_CSR_VERSION_RESET, value[2] += 1;
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_CONFIG);
   value[0] = 0;
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_NO_DEVICE);

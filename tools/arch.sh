@@ -14,7 +14,7 @@ for setting in "$@"; do
     echo "ARCH: '$setting': expected NAME=VALUE with a name of $source" >&2
     exit 1
   fi
-  sed -E "s/^(SF_ARCH\(${BASH_REMATCH[1]}, )[0-9]+/\1${BASH_REMATCH[2]}/" "$new" >"$new.next"
+  sed -E "s/^(SF_ARCH\(${BASH_REMATCH[1]}, )[^,]+/\1${BASH_REMATCH[2]}/" "$new" >"$new.next"
   mv "$new.next" "$new"
 done
 cmp -s "$new" "$target" || mv "$new" "$target"

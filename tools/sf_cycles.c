@@ -130,7 +130,7 @@ static int busiest(const sf_cycle_totals *t)
 
 /* A row of weights is added in one cycle however many lanes there are, so lanes decide which nets run and how many of
  * the lanes have work, and cores and clock the time. */
-static const int all_lanes[] = {32, 64, 128}, cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
+static const int all_lanes[] = {32, 64, 128, 256}, cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
 static int widest(const fx_net *net)

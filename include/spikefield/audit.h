@@ -20,7 +20,7 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
 /* Recount of mac, sop, spikes, updates, weight bytes, state bytes, special functions of one sample from its spike
  * bitmaps alone, added to *counts; samples and rays too. Shares no code with src/fx. All 128 bits of a bitmap count:
  * a spike in a lane that the layer does not have is a difference to be seen, not one to be masked away. */
-void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
+void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
                        fx_counts *counts);
 
 /* Equality of two counts over the layers' events (not grid/march/saturation). On a difference names event, layer, step

@@ -22,7 +22,7 @@ typedef struct sf_dut_sample {
 /* What the accelerator showed of one sample. */
 typedef struct sf_dut_result {
   fx_out out;
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* as fx_trace; from the tap port */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* as fx_trace; from the tap port */
   uint64_t tap_cycle[SF_LAYERS][SF_T_MAX]; /* clock cycle of each tap beat; D2 and C3 have one, at step 0 */
   bool stalled[SF_LAYERS][SF_T_MAX];       /* a bubble or back-pressure since the layer\'s last beat */
   uint64_t cycle;                          /* clock cycle at which the result left */
@@ -37,7 +37,7 @@ int sf_dut_received(const sf_dut *dut); /* results of the last run, the one that
  * presynaptic rows that were added up (C2 per step; D2 and C3 of all steps together, at step 0). */
 typedef struct sf_dut_trace {
   int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES];
-  uint64_t rows[SF_LAYERS][SF_T_MAX][2];
+  uint64_t rows[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
 } sf_dut_trace;
 sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result,
                             sf_dut_trace *trace);

@@ -116,7 +116,7 @@ typedef struct fx_tensorf {
   int32_t features;    /* of the appearance, 1..FX_APPEARANCE_MAX */
   int8_t *basis;       /* [appearance components][FX_APPEARANCE_MAX]: feature sums = products * basis */
   fx_scale feature_in; /* feature sum -> feature, int12; bias 0, shift 0..40 */
-  fx_scale phase_in;   /* feature sum -> the same as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
+  fx_scale phase_in; /* feature sum -> the same as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
   int32_t feature_freqs, view_freqs; /* sines and cosines of 1, 2, 4 ... times a value; 0..FX_FREQS_MAX */
   int32_t encoding_frac;             /* LSB of directions, sines and cosines: 2^-encoding_frac, 0..FX_DIR_FRAC_MAX */
   /* For quant/ only: box = (world * to_box_scale + to_box_offset) * stretch, per axis: where the box has unequal edges,
@@ -126,8 +126,8 @@ typedef struct fx_tensorf {
 
 typedef enum { FX_INGP, FX_TENSORF } fx_backbone;
 
-/* Steps that grow: interval n is length(n) = clamp(rshift_round((near + start(n)) * gamma, 24), 1, longest) lattice steps
- * long, start(n+1) = start(n) + length(n), all Q16.16. Filled by fx_scene_allocate. */
+/* Steps that grow: interval n is length(n) = clamp(rshift_round((near + start(n)) * gamma, 24), 1, longest) lattice
+ * steps long, start(n+1) = start(n) + length(n), all Q16.16. Filled by fx_scene_allocate. */
 enum { FX_STEPS_MAX = 1024 };
 typedef struct fx_steps {
   int32_t count;                   /* lattice points that a ray may have */
@@ -137,7 +137,8 @@ typedef struct fx_steps {
 } fx_steps;
 
 /* Scene box [0,1)^3. Cascade c of its occupancy grids has occ_res^3 cells in the middle 2^(c - log2_bound) of the box:
- * bit ((c*res + z)*res + y)*res + x, LSB first. A sample looks in the finest one that holds it, at least steps->cascade.
+ * bit ((c*res + z)*res + y)*res + x, LSB first. A sample looks in the finest one that holds it, at least
+ * steps->cascade.
  */
 typedef struct fx_scene {
   int32_t backbone; /* fx_backbone: grid and both nets, or tensorf and the decoder (C1, C2, C3 of net) */
@@ -151,9 +152,9 @@ typedef struct fx_scene {
   int32_t gamma_q24;  /* growth of the steps, 0..2^21; 0: all are one lattice step */
   int32_t near_q16;   /* where gamma_q24 > 0: lattice steps of the near plane, and the longest step, Q16.16 */
   int32_t longest_q16;
-  fx_steps *steps;    /* NULL where gamma_q24 is 0 */
-  int32_t max_samples; /* per ray, 1..1024 */
-  int32_t trans_stop; /* stop once transmittance <= this, Q.TRANS_FRAC */
+  fx_steps *steps;       /* NULL where gamma_q24 is 0 */
+  int32_t max_samples;   /* per ray, 1..1024 */
+  int32_t trans_stop;    /* stop once transmittance <= this, Q.TRANS_FRAC */
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
@@ -166,8 +167,9 @@ typedef struct fx_scene {
 /* Direction of a ray: each axis Q1.14. LSB of the direction features: 2^-frac. */
 enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
 
-/* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count (with growing steps at_q16[n]
- * instead of n, product >> 16); sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only bridge). */
+/* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count (with growing steps
+ * at_q16[n] instead of n, product >> 16); sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only
+ * bridge). */
 typedef struct fx_ray {
   int64_t origin[3], step[3]; /* Q24.40 */
   int32_t count;              /* lattice points in the box, 0 = misses */
@@ -210,7 +212,7 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more);
 
 /* Everything a lockstep comparison needs of one sample. */
 typedef struct fx_trace {
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];         /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
   int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after */
   int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* the exact sum, without C2's fraction bits */
 } fx_trace;
@@ -235,9 +237,9 @@ void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_c
 void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_trace *trace,
                    fx_counts *counts);
 
-/* fx_net_direction where it is due, then fx_net_sample. f[fx_net_inputs], of a density net its features, of a decoder its
- * inputs; base[SF_LANES] is the caller's and stays along a ray. dir is read for the first sample of a ray; a decoder
- * needs none. */
+/* fx_net_direction where it is due, then fx_net_sample. f[fx_net_inputs], of a density net its features, of a decoder
+ * its inputs; base[SF_LANES] is the caller's and stays along a ray. dir is read for the first sample of a ray; a
+ * decoder needs none. */
 void fx_net_next(const fx_net *net, const int16_t *dir, bool first, const int16_t *f, int32_t *base, fx_out *out,
                  fx_trace *trace, fx_counts *counts);
 
@@ -291,7 +293,8 @@ void fx_composite_end(fx_pixel *pixel, const int32_t *background_q16);
 void fx_pixel_rgba(const fx_pixel *pixel, uint32_t rgba[4]);
 
 /* Called for every sample of fx_render_ray in place of fx_net_sample, when not NULL. `first` is true for the
- * first sample of the ray; f[fx_net_inputs]. The RTL backend and co-simulation plug in here; a non-OK status ends the ray. */
+ * first sample of the ray; f[fx_net_inputs]. The RTL backend and co-simulation plug in here; a non-OK status ends the
+ * ray. */
 typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
 /* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */

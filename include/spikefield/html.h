@@ -14,10 +14,10 @@ typedef struct sf_page_prefix {
 /* Spikes of the samples of one ray, from the front. */
 enum { SF_PAGE_COLUMNS = 64, SF_PAGE_BINS = 20 };
 typedef struct sf_page_ray {
-  int x, y;                                                 /* its pixel */
-  int samples;                                              /* shown: at most SF_PAGE_COLUMNS / steps */
-  int all;                                                  /* of the ray */
-  uint64_t spikes[SF_PAGE_COLUMNS][SF_LAYERS][SF_T_MAX][2]; /* as fx_trace */
+  int x, y;                                                              /* its pixel */
+  int samples;                                                           /* shown: at most SF_PAGE_COLUMNS / steps */
+  int all;                                                               /* of the ray */
+  uint64_t spikes[SF_PAGE_COLUMNS][SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* as fx_trace */
 } sf_page_ray;
 
 typedef struct sf_page {

@@ -3,7 +3,7 @@
  *
  * One handle is one ray after another; a bench may have any number of them, each used by one thread at a time. Nothing
  * is printed and nothing ends the simulation: a call that cannot do what it should leaves its reason in sf_golden_error
- * and gives 0 or -1 as said. SystemVerilog types in C: bit [127:0] is uint32_t[4], least significant word first. */
+ * and gives 0 or -1 as said. SystemVerilog types in C: bit [255:0] is uint32_t[8], least significant word first. */
 #ifndef SPIKEFIELD_SF_GOLDEN_DPI_H
 #define SPIKEFIELD_SF_GOLDEN_DPI_H
 #include <stdint.h>
@@ -35,8 +35,10 @@ SF_GOLDEN_API int sf_golden_sample(void *golden, int first, const uint32_t direc
 
 SF_GOLDEN_API uint32_t sf_golden_density(void *golden);
 SF_GOLDEN_API uint32_t sf_golden_colour(void *golden, int channel);
-SF_GOLDEN_API void sf_golden_spikes(void *golden, int layer, int step, uint32_t spikes[4]);
-SF_GOLDEN_API void sf_golden_rows(void *golden, int layer, int step, uint32_t rows[4]);
+/* Neuron n is bit n % 32 of word n / 32; bits beyond a build's lanes are 0. */
+enum { SF_GOLDEN_WORDS = 8 };
+SF_GOLDEN_API void sf_golden_spikes(void *golden, int layer, int step, uint32_t spikes[SF_GOLDEN_WORDS]);
+SF_GOLDEN_API void sf_golden_rows(void *golden, int layer, int step, uint32_t rows[SF_GOLDEN_WORDS]);
 SF_GOLDEN_API int sf_golden_membrane(void *golden, int layer, int step, int neuron);
 SF_GOLDEN_API int sf_golden_current(void *golden, int layer, int step, int neuron);
 

@@ -43,11 +43,15 @@
 extern "C" {
 #endif
 
+/* Neurons of the widest layer, which is the library's own: of one built for 256 its pkg-config file defines it so. */
+#ifndef SPIKEFIELD_LANES
+#define SPIKEFIELD_LANES 128
+#endif
+
 /* Sizes of the accelerator; a scene's own are in spikefield_scene_info. */
 enum {
   SPIKEFIELD_LAYERS = 5,    /* D1 D2 C1 C2 C3 */
   SPIKEFIELD_STEPS_MAX = 8, /* time steps */
-  SPIKEFIELD_LANES = 128,   /* neurons of the widest layer */
   SPIKEFIELD_FEATURES_MAX = 32,
   SPIKEFIELD_DIRECTIONS = 16, /* spherical harmonics of a direction */
   SPIKEFIELD_INPUT_MAX = 2047 /* features and harmonics: -2047..2047 */
@@ -131,11 +135,11 @@ typedef struct spikefield_layer_counts {
 } spikefield_layer_counts;
 typedef struct spikefield_counts {
   spikefield_layer_counts layer[SPIKEFIELD_LAYERS];
-  uint64_t samples, rays;                                    /* through the nets; rays with at least one sample */
-  uint64_t grid_bytes;                                       /* of the hash grid read */
-  uint64_t march_steps;                                      /* points tested against the occupancy grid */
-  uint64_t saturated[SPIKEFIELD_LAYERS];                     /* saturation events */
-  uint64_t saturated_samples[SPIKEFIELD_LAYERS];             /* samples with at least one of them */
+  uint64_t samples, rays;                        /* through the nets; rays with at least one sample */
+  uint64_t grid_bytes;                           /* of the hash grid read */
+  uint64_t march_steps;                          /* points tested against the occupancy grid */
+  uint64_t saturated[SPIKEFIELD_LAYERS];         /* saturation events */
+  uint64_t saturated_samples[SPIKEFIELD_LAYERS]; /* samples with at least one of them */
   uint64_t saturated_features;
   uint64_t field_samples, field_mac; /* TensoRF: points whose density was read; products of the field */
 } spikefield_counts;
@@ -155,7 +159,8 @@ typedef struct spikefield_sample {
 
 /* What one sample left at every layer and time step; 41 KB. */
 typedef struct spikefield_trace {
-  uint64_t spikes[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][2]; /* D1, C1, C2: neuron n is bit n % 64 of word n / 64 */
+  /* D1, C1, C2: neuron n is bit n % 64 of word n / 64. */
+  uint64_t spikes[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES / 64];
   /* D1, C1, C2: before firing and reset; D2 [0], C3 [0..2]: the accumulator after the step. */
   int32_t membrane[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES];
   int32_t current[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES]; /* exact sums */

@@ -11,12 +11,12 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00020000
+#define SF_REG_VERSION_RESET 0x00030000
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
-#define SF_REG_CONFIG_RESET 0x50410880
-#define SF_REG_CONFIG_LANES_MASK 0x000000ff /* widest layer */
+#define SF_REG_CONFIG_RESET 0x5041087f
+#define SF_REG_CONFIG_LANES_MASK 0x000000ff /* neurons of the widest layer, less 1 */
 #define SF_REG_CONFIG_LANES_SHIFT 0
 #define SF_REG_CONFIG_T_MAX_MASK 0x00000f00 /* time steps */
 #define SF_REG_CONFIG_T_MAX_SHIFT 8
@@ -170,17 +170,17 @@
 
 /* where WEIGHT_DATA goes; counts up by one word at each write of it, RW */
 #define SF_REG_WEIGHT_ADDRESS 0x0090
-#define SF_REG_WEIGHT_ADDRESS_WORD_MASK 0x0000001f /* output neuron / 4 */
+#define SF_REG_WEIGHT_ADDRESS_WORD_MASK 0x0000003f /* output neuron / 4 */
 #define SF_REG_WEIGHT_ADDRESS_WORD_SHIFT 0
-#define SF_REG_WEIGHT_ADDRESS_ROW_MASK 0x00001fe0 /* presynaptic neuron; BIAS_ROW (160) for the biases of C1, C2 and C3 */
-#define SF_REG_WEIGHT_ADDRESS_ROW_SHIFT 5
-#define SF_REG_WEIGHT_ADDRESS_LAYER_MASK 0x0000e000 /* 0 D1, 1 D2, 2 C1, 3 C2, 4 C3 */
-#define SF_REG_WEIGHT_ADDRESS_LAYER_SHIFT 13
+#define SF_REG_WEIGHT_ADDRESS_ROW_MASK 0x00007fc0 /* presynaptic neuron; BIAS_ROW (256) for the biases of C1, C2 and C3 */
+#define SF_REG_WEIGHT_ADDRESS_ROW_SHIFT 6
+#define SF_REG_WEIGHT_ADDRESS_LAYER_MASK 0x00038000 /* 0 D1, 1 D2, 2 C1, 3 C2, 4 C3 */
+#define SF_REG_WEIGHT_ADDRESS_LAYER_SHIFT 15
 
 /* 4 signed weights, the lowest output neuron in bits 7:0, WO */
 #define SF_REG_WEIGHT_DATA 0x0094
 
-/* layers whose biases count: row 160 of their weights, an input that is always active, RW */
+/* layers whose biases count: row 256 of their weights, an input that is always active, RW */
 #define SF_REG_BIAS 0x0098
 #define SF_REG_BIAS_C1_MASK 0x000007ff /* value of that input, 1..2047; 0: none */
 #define SF_REG_BIAS_C1_SHIFT 0
@@ -241,8 +241,8 @@
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000
 
-/* WEIGHTS: 4 weights a word, word = layer << 13 | row << 5 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 rows 0..31, C1 rows 0..159, and C1, C2 and C3 row 160, their biases */
-#define SF_REG_WEIGHTS_WORDS 40960
+/* WEIGHTS: 4 weights a word, word = layer << 15 | row << 6 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 rows 0..31, C1 rows 0..159, and C1, C2 and C3 row 256, their biases */
+#define SF_REG_WEIGHTS_WORDS 163840
 #define SF_REG_WEIGHTS_BITS 32
 
 /* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this */

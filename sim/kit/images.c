@@ -92,9 +92,10 @@ static sf_status write_outputs(sf_kit_output *output, const sf_kit_draw *d)
 
 static const bool spiking[SF_LAYERS] = {[FX_D1] = true, [FX_C1] = true, [FX_C2] = true};
 
-static void put_bits(FILE *file, const uint64_t bits[2])
+static void put_bits(FILE *file, const uint64_t bits[SF_SPIKE_WORDS])
 {
-  fprintf(file, "%016" PRIx64 "%016" PRIx64 "\n", bits[1], bits[0]);
+  for (int word = SF_SPIKE_WORDS - 1; word >= 0; word--) fprintf(file, "%016" PRIx64, bits[word]);
+  fputc('\n', file);
 }
 
 static void put_spikes(FILE *file, const sf_kit_sample *s, int layer, int step)
@@ -119,9 +120,9 @@ static void put_rows(FILE *file, const fx_net *net, const sf_kit_sample *s, int 
 {
   const int presynaptic = layer == FX_D2 ? FX_D1 : layer == FX_C2 ? FX_C1 : FX_C2;
   const int from = layer == FX_C2 ? step : 0, to = layer == FX_C2 ? step + 1 : net->steps;
-  uint64_t rows[2] = {0};
+  uint64_t rows[SF_SPIKE_WORDS] = {0};
   for (int t = from; t < to; t++)
-    for (int word = 0; word < 2; word++) rows[word] |= s->trace.spikes[presynaptic][t][word];
+    for (int word = 0; word < SF_SPIKE_WORDS; word++) rows[word] |= s->trace.spikes[presynaptic][t][word];
   put_bits(file, rows);
 }
 
@@ -181,10 +182,10 @@ static sf_status write_counters(sf_kit_output *output, const fx_counts *counts)
 
 static void put_sizes(FILE *file, const fx_net *net, const char *name, bool outputs)
 {
-  fprintf(file, "localparam [39:0] %s = 40'h", name);
+  fprintf(file, "localparam [79:0] %s = 80'h", name);
   for (int l = SF_LAYERS - 1; l >= 0; l--)
-    fprintf(file, "%02x", (unsigned)(outputs ? net->layer[l].n_out : net->layer[l].n_in));
-  fprintf(file, ";  // 8 bits a layer: C3 C2 C1 D2 D1\n");
+    fprintf(file, "%04x", (unsigned)(outputs ? net->layer[l].n_out : net->layer[l].n_in));
+  fprintf(file, ";  // 16 bits a layer: C3 C2 C1 D2 D1\n");
 }
 
 static sf_status write_parameters(sf_kit_output *output, const fx_net *net, const sf_kit_options *o,
@@ -202,7 +203,8 @@ static sf_status write_parameters(sf_kit_output *output, const fx_net *net, cons
           (uint32_t)(o->seed ^ o->seed >> 32));
   put_sizes(f, net, "N_IN", false);
   put_sizes(f, net, "N_OUT", true);
-  fprintf(f, "localparam [7:0] BIAS_ROW = 8'd%d;\nlocalparam [4:0] BIASES = 5'b", SF_BIAS_ROW);
+  fprintf(f, "localparam integer LANES = %d;\nlocalparam integer BIAS_ROW = %d;\nlocalparam [4:0] BIASES = 5'b",
+          SF_LANES, SF_BIAS_ROW);
   for (int l = SF_LAYERS - 1; l >= 0; l--) fputc(net->layer[l].bias ? '1' : '0', f);
   fputs(";  // layers that have them\n", f);
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \

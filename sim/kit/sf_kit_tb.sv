@@ -15,12 +15,12 @@ module sf_kit_tb;
 
   // ---- the kit
   reg [47:0] program_image[0:WRITES-1];  // {offset, data}
-  reg [1023:0] weights[0:WEIGHT_ROWS-1];
+  reg [8*LANES-1:0] weights[0:WEIGHT_ROWS-1];
   reg [67:0] stimulus[0:BEATS-1];  // {0, 0, tuser, tlast, tdata}
   reg [63:0] outputs[0:2*SAMPLES-1];
-  reg [127:0] spikes_d1[0:STEP_BEATS-1], spikes_c1[0:STEP_BEATS-1], spikes_c2[0:STEP_BEATS-1];
-  reg [3071:0] membranes_d1[0:STEP_BEATS-1], membranes_c1[0:STEP_BEATS-1], membranes_c2[0:STEP_BEATS-1];
-  reg [127:0] rows_d2[0:SAMPLES-1], rows_c2[0:STEP_BEATS-1], rows_c3[0:SAMPLES-1];
+  reg [LANES-1:0] spikes_d1[0:STEP_BEATS-1], spikes_c1[0:STEP_BEATS-1], spikes_c2[0:STEP_BEATS-1];
+  reg [24*LANES-1:0] membranes_d1[0:STEP_BEATS-1], membranes_c1[0:STEP_BEATS-1], membranes_c2[0:STEP_BEATS-1];
+  reg [LANES-1:0] rows_d2[0:SAMPLES-1], rows_c2[0:STEP_BEATS-1], rows_c3[0:SAMPLES-1];
   reg [63:0] counters[0:511];
 
   // ---- pins
@@ -39,8 +39,8 @@ module sf_kit_tb;
   wire [63:0] m_data;
   wire tap_valid;
   wire [2:0] tap_layer, tap_step;
-  wire [127:0] tap_spikes, tap_rows;
-  wire [3071:0] tap_membrane;
+  wire [LANES-1:0] tap_spikes, tap_rows;
+  wire [24*LANES-1:0] tap_membrane;
 
   always #5 clk = !clk;
 
@@ -228,25 +228,25 @@ module sf_kit_tb;
 
   // ---- tap: of one layer the beats come by sample, then step; layers are free among each other
   integer tapped[0:4];
-  reg [127:0] want_spikes, want_rows;
-  reg [3071:0] want_membranes, has_lane, shown_membranes;
+  reg [LANES-1:0] want_spikes, want_rows;
+  reg [24*LANES-1:0] want_membranes, has_lane, shown_membranes;
   reg spiking;
   integer place, tap_sample, lane, first_lane;
   always @* spiking = tap_layer == D1 || tap_layer == C1 || tap_layer == C2;
 
-  task compare_tap_bits(input [127:0] expected, input [127:0] actual, input [127:0] name);
+  task compare_tap_bits(input [LANES-1:0] expected, input [LANES-1:0] actual, input [127:0] name);
     if (expected !== actual) begin
-      for (lane = 127; lane >= 0; lane = lane - 1) if (expected[lane] !== actual[lane]) first_lane = lane;
+      for (lane = LANES - 1; lane >= 0; lane = lane - 1) if (expected[lane] !== actual[lane]) first_lane = lane;
       differ(tap_sample, tap_layer, tap_step, first_lane, name, {63'd0, expected[first_lane]},
              {63'd0, actual[first_lane]});
     end
   endtask
   task compare_tap_membranes;
     begin
-      has_lane = ~(~3072'd0 << (24 * N_OUT[8*tap_layer+:8]));
+      has_lane = ~({(24 * LANES) {1'b1}} << (24 * N_OUT[16*tap_layer+:16]));
       shown_membranes = tap_membrane & has_lane;
       if (shown_membranes !== want_membranes) begin
-        for (lane = 127; lane >= 0; lane = lane - 1)
+        for (lane = LANES - 1; lane >= 0; lane = lane - 1)
           if (shown_membranes[24*lane+:24] !== want_membranes[24*lane+:24]) first_lane = lane;
         differ(tap_sample, tap_layer, tap_step, first_lane, "membrane",
                {{40{want_membranes[24*first_lane+23]}}, want_membranes[24*first_lane+:24]},
@@ -295,7 +295,7 @@ module sf_kit_tb;
   task expect_all_taps;
     integer layer, beats;
     for (layer = D1; layer <= C3; layer = layer + 1) begin
-      beats = N_OUT[8*layer+:8] == 8'd0 ? 0 : layer == D2 || layer == C3 ? SAMPLES : STEP_BEATS;
+      beats = N_OUT[16*layer+:16] == 16'd0 ? 0 : layer == D2 || layer == C3 ? SAMPLES : STEP_BEATS;
       if (tapped[layer] != beats) differ(-1, -1, -1, -1, "tap beats", beats, tapped[layer]);
     end
   endtask
@@ -329,19 +329,19 @@ module sf_kit_tb;
   // ---- the kit itself: the weights that are written are those of the weight image; a layer's biases follow its rows
   task check_weights;
     integer i, layer, row;
-    reg [15:0] at;
+    reg [17:0] at;
     begin
-      at = 16'd0;
+      at = 18'd0;
       for (i = 0; i < WRITES; i = i + 1) begin
-        if (program_image[i][44:32] == CSR_WEIGHT_ADDRESS) at = program_image[i][15:0];
+        if (program_image[i][44:32] == CSR_WEIGHT_ADDRESS) at = program_image[i][17:0];
         if (program_image[i][44:32] == CSR_WEIGHT_DATA) begin
-          row = at[12:5] == BIAS_ROW ? N_IN[8*at[15:13]+:8] : at[12:5];
-          for (layer = D1; layer < at[15:13]; layer = layer + 1) row = row + N_IN[8*layer+:8] + BIASES[layer];
-          if (program_image[i][31:0] !== weights[row][32*at[4:0]+:32]) begin
+          row = at[14:6] == BIAS_ROW ? N_IN[16*at[17:15]+:16] : at[14:6];
+          for (layer = D1; layer < at[17:15]; layer = layer + 1) row = row + N_IN[16*layer+:16] + BIASES[layer];
+          if (program_image[i][31:0] !== weights[row][32*at[5:0]+:32]) begin
             $display("DIFFERENCE in the kit: program.hex line %0d is not row %0d of weights.hex", i + 1, row + 1);
             fail;
           end
-          at = at + 16'd1;
+          at = at + 18'd1;
         end
       end
     end

@@ -248,7 +248,8 @@ typedef struct small_net {
 /* theta about the size of the currents, so that a part fires; i counts weights at the rails too. */
 static void make_net(small_net *n, uint64_t i)
 {
-  static const int32_t in[SF_LAYERS] = {32, 128, 31, 128, 128}, out[SF_LAYERS] = {128, 16, 128, 128, 3};
+  static const int32_t in[SF_LAYERS] = {32, SF_LANES, 31, SF_LANES, SF_LANES};
+  static const int32_t out[SF_LAYERS] = {SF_LANES, 16, SF_LANES, SF_LANES, 3};
   static const int32_t theta[SF_LAYERS] = {300000, 0, 200000, 60000, 0};
   const int64_t limit = i % 4 == 3 ? 126 : 1;
   memset(n, 0, sizeof *n);
@@ -281,7 +282,7 @@ static void check_currents(sf_budget_row *row, const fx_net *net, const int16_t 
           const double x = l == FX_D1   ? f[i]
                            : l != FX_C1 ? (double)(trace->spikes[before][t][i / 64] >> i % 64 & 1)
                            : h < 0      ? dir[i]
-                                        : floor(trace->current[FX_D2][t][1 + h] / 8.0);
+                                        : floor(ldexp(trace->current[FX_D2][t][1 + h], -SF_H_SHIFT));
           sum += x * layer->w[i * SF_LANES + o];
         }
         add(row, trace->current[l][t][o] - sum, 0x1p-1022); /* none is allowed: any error is over its bound */
@@ -308,7 +309,7 @@ static void currents(sf_budget_row *row, uint64_t samples)
   row->bound = 0;
 }
 
-/* Every current of D2 (up to 127 spikes of weight 127 and one of the rest), seen through C1 with a weight of 1. */
+/* Every current of D2 (all spikes but one of weight 127 and one of the rest), seen through C1 with a weight of 1. */
 static void h_floor(sf_budget_row *row, uint64_t samples)
 {
   (void)samples;
@@ -324,14 +325,14 @@ static void h_floor(sf_budget_row *row, uint64_t samples)
   memset(n.w[FX_D1], 1, SF_LANES);
   n.w[FX_C1][FX_SH * SF_LANES] = 1;
   fx_net_direction(&n.net, dir, base, NULL);
-  for (int32_t current = -128 * 127; current <= 128 * 127; current++) {
+  for (int32_t current = -SF_LANES * 127; current <= SF_LANES * 127; current++) {
     int32_t rest = current;
     for (int i = 0; i < SF_LANES; i++) {
       const int32_t w = rest > 127 ? 127 : rest < -127 ? -127 : rest;
       n.w[FX_D2][i * SF_LANES + 1] = (int8_t)w, rest -= w;
     }
     fx_net_sample(&n.net, f, base, &out, &trace, NULL);
-    add(row, trace.current[FX_C1][0][0] - current / 8.0, 7 / 8.0);
+    add(row, trace.current[FX_C1][0][0] - ldexp(current, -SF_H_SHIFT), 1 - ldexp(1, -SF_H_SHIFT));
   }
 }
 
@@ -432,7 +433,7 @@ static void argument(sf_budget_row *row, uint64_t samples)
 {
   for (uint64_t i = 0; row->inputs < samples; i++) {
     const fx_scale scale = {(int32_t)pick(60, i, 0, 65535), (int32_t)pick(61, i, 0, 31), 0};
-    for (int32_t c = -128 * 127; c <= 128 * 127; c += 1 + (int32_t)(i % 64)) {
+    for (int32_t c = -SF_LANES * 127; c <= SF_LANES * 127; c += 1 + (int32_t)(i % 64)) {
       const double exact = ldexp((double)c * scale.mul, -scale.shift);
       if (fabs(exact) < 32767) add(row, fx_sigmoid_argument(c, &scale) - exact, 0.5);
       if (fabs(exact) < 131071) add(row, fx_exp2_argument(c, &scale) - exact, 0.5);

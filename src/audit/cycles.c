@@ -94,18 +94,19 @@ const sf_cycle_totals *sf_cycle_model_totals(const sf_cycle_model *model)
 static uint8_t pairs(const uint64_t *word)
 {
   const uint64_t even = 0x5555555555555555;
-  const int evens = __builtin_popcountll(word[0] & even) + __builtin_popcountll(word[1] & even);
-  const int odds = __builtin_popcountll(word[0] & ~even) + __builtin_popcountll(word[1] & ~even);
+  int evens = 0, odds = 0;
+  for (int w = 0; w < SF_SPIKE_WORDS; w++)
+    evens += __builtin_popcountll(word[w] & even), odds += __builtin_popcountll(word[w] & ~even);
   return (uint8_t)(evens > odds ? evens : odds);
 }
 
 sf_cycle_sample sf_cycle_sample_make(const fx_net *net, const fx_trace *trace, bool first)
 {
   sf_cycle_sample s = {.first = first};
-  uint64_t d1[2] = {0}, c2[2] = {0};
+  uint64_t d1[SF_SPIKE_WORDS] = {0}, c2[SF_SPIKE_WORDS] = {0};
   for (int t = 0; t < net->steps; t++) {
     s.c2[t] = pairs(trace->spikes[FX_C1][t]);
-    for (int w = 0; w < 2; w++) d1[w] |= trace->spikes[FX_D1][t][w], c2[w] |= trace->spikes[FX_C2][t][w];
+    for (int w = 0; w < SF_SPIKE_WORDS; w++) d1[w] |= trace->spikes[FX_D1][t][w], c2[w] |= trace->spikes[FX_C2][t][w];
   }
   s.d2 = pairs(d1), s.c3 = pairs(c2);
   return s;

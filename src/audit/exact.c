@@ -148,7 +148,7 @@ static void add_row(const sf_exact *e, int l, int i, double x, double *current)
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) current[o] += x * w[o];
 }
 
-static void add_spikes(const sf_exact *e, int l, const uint64_t spikes[2], double *current)
+static void add_spikes(const sf_exact *e, int l, const uint64_t spikes[SF_SPIKE_WORDS], double *current)
 {
   memset(current, 0, SF_LANES * sizeof *current);
   for (int i = 0; i < e->scene->net.layer[l].n_in; i++)

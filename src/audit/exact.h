@@ -24,7 +24,7 @@ typedef struct sf_exact {
 
 typedef struct sf_exact_out {
   double sigma, colour[3];
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2];
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
 } sf_exact_out;
 
 static inline bool sf_exact_is(const sf_exact *e, sf_exact_id id)

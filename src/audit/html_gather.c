@@ -185,7 +185,7 @@ static sf_status watch_sample(void *user, const fx_ray *ray, bool first, const i
   w->samples++;
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < steps; t++)
-      for (int word = 0; word < 2; word++)
+      for (int word = 0; word < SF_SPIKE_WORDS; word++)
         for (uint64_t bits = w->trace.spikes[l][t][word]; bits; bits &= bits - 1)
           w->neuron[l][t][64 * word + __builtin_ctzll(bits)]++;
   if (!w->ray) return sf_ok();

@@ -14,7 +14,8 @@ void sf_probe_begin(sf_probe *probe)
 
 static sf_status recount_and_compare(sf_probe *probe, bool first)
 {
-  sf_recount_sample(probe->net, (const uint64_t(*)[SF_T_MAX][2])probe->trace->spikes, first, &probe->recount);
+  sf_recount_sample(probe->net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])probe->trace->spikes, first,
+                    &probe->recount);
   if (memcmp(probe->core.layer, probe->recount.layer, sizeof probe->core.layer) == 0) return sf_ok();
   sf_status difference = sf_counts_compare(&probe->core, "core", &probe->recount, "recount");
   return sf_fail(difference.code, "sample %llu: %s", (unsigned long long)probe->sample, difference.message);

@@ -4,9 +4,11 @@
 
 enum { SPIKING_STATE_BYTES = 3, INTEGRATOR_STATE_BYTES = 4 };
 
-static uint64_t fired(const uint64_t bitmap[2])
+static uint64_t fired(const uint64_t bitmap[SF_SPIKE_WORDS])
 {
-  return (uint64_t)__builtin_popcountll(bitmap[0]) + (uint64_t)__builtin_popcountll(bitmap[1]);
+  uint64_t neurons = 0;
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) neurons += (uint64_t)__builtin_popcountll(bitmap[word]);
+  return neurons;
 }
 
 static void count_state(fx_layer_counts *c, int t, uint64_t neurons, uint64_t bytes)
@@ -25,11 +27,11 @@ static void count_mac(fx_layer_counts *c, int t, int n_in, int n_out)
 }
 
 /* D2, C3 keep what a row added for the later steps: a weight row is read when its neuron fires for the first time. */
-static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[2], uint64_t seen[2], uint64_t n_out,
-                               uint64_t integrators)
+static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE_WORDS],
+                               uint64_t seen[SF_SPIKE_WORDS], uint64_t n_out, uint64_t integrators)
 {
-  uint64_t new_rows[2] = {in[0] & ~seen[0], in[1] & ~seen[1]};
-  seen[0] |= in[0], seen[1] |= in[1];
+  uint64_t new_rows[SF_SPIKE_WORDS];
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) new_rows[word] = in[word] & ~seen[word], seen[word] |= in[word];
   c->sop[t] += fired(in) * n_out;
   c->weight[t] += fired(new_rows) * n_out;
   c->special[t] += integrators;
@@ -42,12 +44,12 @@ static void count_bias(fx_layer_counts *c, int t, const fx_layer *layer)
   if (layer->bias) c->weight[t] += (uint64_t)layer->n_out;
 }
 
-void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][2], bool first_of_ray,
+void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
                        fx_counts *counts)
 {
   const fx_layer *size = net->layer;
   fx_layer_counts *c = counts->layer;
-  uint64_t seen_d1[2] = {0, 0}, seen_c2[2] = {0, 0};
+  uint64_t seen_d1[SF_SPIKE_WORDS] = {0}, seen_c2[SF_SPIKE_WORDS] = {0};
   const bool decodes = fx_net_decodes(net);
 
   counts->samples++;

@@ -7,6 +7,7 @@
 #include "src/fx/scene.h"
 
 enum { FX_BLOCK = 48 }; /* samples */
+_Static_assert(SF_LANES == 128 || SF_LANES == 256, "arch.def: LANES is 128 or 256");
 
 /* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
  * groups, and after it the row of the biases. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane
@@ -32,10 +33,10 @@ typedef struct fx_block {
   int16_t constant[FX_BLOCK][SF_DIR_MAX];
   const int32_t *base[FX_BLOCK]; /* [SF_LANES] each, from fx_net_direction */
   fx_out out[FX_BLOCK];
-  uint64_t spikes[FX_SPIKING][SF_T_MAX][FX_BLOCK][2]; /* bitmaps of D1, C1, C2 */
-  uint32_t saturated[SF_LAYERS][FX_BLOCK];            /* events */
-  uint32_t fired[FX_SPIKING][FX_BLOCK];               /* spikes of all steps */
-  fx_firing firing;                                   /* of the block */
+  uint64_t spikes[FX_SPIKING][SF_T_MAX][FX_BLOCK][SF_SPIKE_WORDS]; /* bitmaps of D1, C1, C2 */
+  uint32_t saturated[SF_LAYERS][FX_BLOCK];                         /* events */
+  uint32_t fired[FX_SPIKING][FX_BLOCK];                            /* spikes of all steps */
+  fx_firing firing;                                                /* of the block */
 } fx_block;
 
 /* Fills fired and firing from spikes; here, so that every instruction set counts bits with its own instruction. */
@@ -44,7 +45,7 @@ static inline void fx_block_count(fx_block *b, int steps)
   b->firing = (fx_firing){.samples = (uint64_t)b->n};
   for (int l = 0; l < FX_SPIKING; l++)
     for (int i = 0; i < b->n; i++) {
-      uint64_t seen[2] = {0}, sum = 0;
+      uint64_t seen[SF_SPIKE_WORDS] = {0}, sum = 0;
       for (int t = 0; t < steps; t++) sum += fx_firing_add(&b->firing, l, t, b->spikes[l][t][i], seen);
       b->fired[l][i] = (uint32_t)sum;
     }

@@ -13,12 +13,17 @@ typedef struct fx_firing {
 } fx_firing;
 
 /* Adds one step of one neuron layer (0..FX_SPIKING-1) of one sample; seen starts at 0. Returns the number of spikes. */
-static inline uint64_t fx_firing_add(fx_firing *sum, int layer, int t, const uint64_t now[2], uint64_t seen[2])
+static inline uint64_t fx_firing_add(fx_firing *sum, int layer, int t, const uint64_t now[SF_SPIKE_WORDS],
+                                     uint64_t seen[SF_SPIKE_WORDS])
 {
-  const uint64_t spikes = (uint64_t)(__builtin_popcountll(now[0]) + __builtin_popcountll(now[1]));
+  uint64_t spikes = 0, fresh = 0;
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
+    spikes += (uint64_t)__builtin_popcountll(now[word]);
+    fresh += (uint64_t)__builtin_popcountll(now[word] & ~seen[word]);
+    seen[word] |= now[word];
+  }
   sum->spikes[layer][t] += spikes;
-  sum->fresh[layer][t] += (uint64_t)(__builtin_popcountll(now[0] & ~seen[0]) + __builtin_popcountll(now[1] & ~seen[1]));
-  seen[0] |= now[0], seen[1] |= now[1];
+  sum->fresh[layer][t] += fresh;
   return spikes;
 }
 

@@ -19,21 +19,21 @@ void fx_current_mac(int32_t *acc, const int8_t *w, const int16_t *x, int n_in, i
     if (x[i]) mac_row(acc, w + (size_t)i * SF_LANES, x[i], n);
 }
 
-static int list_spikes(uint8_t *index, const uint64_t spikes[2])
+static int list_spikes(uint8_t *index, const uint64_t spikes[SF_SPIKE_WORDS])
 {
   int count = 0;
-  for (int word = 0; word < 2; word++)
+  for (int word = 0; word < SF_SPIKE_WORDS; word++)
     for (uint64_t bits = spikes[word]; bits; bits &= bits - 1)
       index[count++] = (uint8_t)(word * 64 + __builtin_ctzll(bits));
   return count;
 }
 
-void fx_current_spikes(int32_t *acc, const int8_t *w, const uint64_t spikes[2], const int8_t *bias, int n)
+void fx_current_spikes(int32_t *acc, const int8_t *w, const uint64_t spikes[SF_SPIKE_WORDS], const int8_t *bias, int n)
 {
   uint8_t index[SF_LANES];
   const int count = list_spikes(index, spikes);
   for (int o = 0; o < n; o += STRIP) {
-    int16_t sum[STRIP] = {0}; /* 129 * 127 < 2^15 */
+    int16_t sum[STRIP] = {0}; /* 257 * 127 < 2^15 */
     for (int lane = 0; bias && lane < STRIP; lane++) sum[lane] = bias[o + lane];
     for (int i = 0; i < count; i++) {
       const int8_t *row = w + (size_t)index[i] * SF_LANES + o;

@@ -98,16 +98,16 @@ static void c1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
     }
 }
 
-static INLINE void spike_bytes(const uint64_t bits[2], uint8_t bytes[SF_LANES])
+static INLINE void spike_bytes(const uint64_t bits[SF_SPIKE_WORDS], uint8_t bytes[SF_LANES])
 {
 #if defined(__AVX512VNNI__)
-  for (int word = 0; word < 2; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
 #else
   for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
 #endif
 }
 
-static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[2], int n, fx_scratch *s)
+static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], int n, fx_scratch *s)
 {
   for (int i = 0; i < n; i += GANG) {
     uint8_t x[GANG][SF_LANES];

@@ -7,39 +7,57 @@
 
 enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample, biases included */
 
+/* The smallest type that counts all rows. */
+typedef __typeof__(__builtin_choose_expr(FX_BIAS_ROW <= UINT8_MAX, (uint8_t)0, (uint16_t)0)) row_index;
+enum { ROW_BITS = 8 * sizeof(row_index) };
+
 /* The spikes of one layer of a block at one step, sample after sample, in groups of GROUP rows: a loop over all groups
  * has no branch per sample. A sample's last group is filled up with the row of zeros; a silent sample has one such. The
  * biases are one more row of every sample. */
 typedef struct events {
   int groups;
-  uint8_t row[FX_BLOCK * (SF_LANES + GROUP) + 64];
+  row_index row[FX_BLOCK * (SF_LANES + GROUP) + 64];
   uint8_t sample[FX_BLOCK * GROUPS + 64];
 } events;
 
-static INLINE void list_spikes(uint8_t *row, const uint64_t bits[2], int low)
+static INLINE void list_spikes(row_index *row, const uint64_t bits[SF_SPIKE_WORDS])
 {
 #if defined(__AVX512VBMI2__)
   const vec iota = _mm512_set_epi64(0x3f3e3d3c3b3a3938, 0x3736353433323130, 0x2f2e2d2c2b2a2928, 0x2726252423222120,
                                     0x1f1e1d1c1b1a1918, 0x1716151413121110, 0x0f0e0d0c0b0a0908, 0x0706050403020100);
-  v_store(row, _mm512_maskz_compress_epi8(bits[0], iota));
-  v_store(row + low, _mm512_maskz_compress_epi8(bits[1], _mm512_or_si512(iota, _mm512_set1_epi8(64))));
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
+    const vec index = _mm512_or_si512(iota, _mm512_set1_epi8((char)(64 * word)));
+    const vec fired = _mm512_maskz_compress_epi8(bits[word], index);
+    if (ROW_BITS == 8) {
+      v_store(row, fired);
+    } else {
+      v_store(row, _mm512_cvtepu8_epi16(_mm512_castsi512_si256(fired)));
+      v_store(row + 32, _mm512_cvtepu8_epi16(_mm512_extracti64x4_epi64(fired, 1)));
+    }
+    row += __builtin_popcountll(bits[word]);
+  }
 #else
-  (void)low;
-  for (int word = 0; word < 2; word++)
-    for (uint64_t rest = bits[word]; rest; rest &= rest - 1) *row++ = (uint8_t)(word * 64 + __builtin_ctzll(rest));
+  for (int word = 0; word < SF_SPIKE_WORDS; word++)
+    for (uint64_t rest = bits[word]; rest; rest &= rest - 1) *row++ = (row_index)(word * 64 + __builtin_ctzll(rest));
 #endif
 }
 
-static INLINE void list_events(events *e, const uint64_t (*spikes)[2], bool bias, int n)
+static INLINE int count_spikes(const uint64_t bits[SF_SPIKE_WORDS])
+{
+  int spikes = 0;
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) spikes += __builtin_popcountll(bits[word]);
+  return spikes;
+}
+
+static INLINE void list_events(events *e, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n)
 {
   e->groups = 0;
   for (int i = 0; i < n; i++) {
-    const int low = __builtin_popcountll(spikes[i][0]), fired = low + __builtin_popcountll(spikes[i][1]);
-    const int count = fired + bias;
-    uint8_t *row = e->row + e->groups * GROUP;
-    list_spikes(row, spikes[i], low);
+    const int fired = count_spikes(spikes[i]), count = fired + bias;
+    row_index *row = e->row + e->groups * GROUP;
+    list_spikes(row, spikes[i]);
     row[fired] = FX_BIAS_ROW;
-    memset(row + count, FX_ZERO_ROW, GROUP);
+    for (int pad = 0; pad < GROUP; pad++) row[count + pad] = FX_ZERO_ROW;
     for (int at = 0; at < GROUPS; at += 4 * WIDTH) /* what is written too far, the next sample overwrites */
       v_store(e->sample + e->groups + at, V(set1_epi8)((char)i));
     e->groups += count ? (count + GROUP - 1) / GROUP : 1;
@@ -50,10 +68,10 @@ static INLINE void list_events(events *e, const uint64_t (*spikes)[2], bool bias
  * before, or 0 when it starts a new one. */
 static INLINE int32_t read_group(const events *e, int g, uint32_t row[GROUP], int *sample)
 {
-  uint32_t rows;
+  uint64_t rows = 0;
   const int before = *sample;
-  memcpy(&rows, e->row + g * GROUP, sizeof rows);
-  for (int i = 0; i < GROUP; i++) row[i] = rows >> 8 * i & 255;
+  memcpy(&rows, e->row + g * GROUP, GROUP * sizeof(row_index));
+  for (int i = 0; i < GROUP; i++) row[i] = (row_index)(rows >> ROW_BITS * i);
   *sample = e->sample[g];
   return -(*sample == before);
 }
@@ -87,10 +105,10 @@ static INLINE void add_bytes(vec a, vec b, vec sum[2])
   sum[1] = V(maddubs_epi16)(one, V(unpackhi_epi8)(a, b));
 }
 
-/* sum[sample] = sum of its rows of SF_LANES; exact in 16 bits. */
-static INLINE void add_rows(const events *e, const int8_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES])
+/* sum[sample] = sum of its rows of SF_LANES, of the vectors of bytes from `first` on; exact in 16 bits. */
+enum { BYTES = 4 * WIDTH, PARTS = SF_LANES / BYTES < 4 ? SF_LANES / BYTES : 4 /* that registers hold */ };
+static INLINE void add_parts(const events *e, const int8_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES], int first)
 {
-  enum { BYTES = 4 * WIDTH, PARTS = SF_LANES / BYTES };
   vec acc[PARTS][2];
   int sample = -1;
 #pragma GCC unroll 4
@@ -101,21 +119,24 @@ static INLINE void add_rows(const events *e, const int8_t (*w)[SF_LANES], int16_
 #pragma GCC unroll 4
     for (int j = 0; j < PARTS; j++) {
       vec a[2], b[2];
-      add_bytes(v_load(w[row[0]] + j * BYTES), v_load(w[row[1]] + j * BYTES), a);
-      add_bytes(v_load(w[row[2]] + j * BYTES), v_load(w[row[3]] + j * BYTES), b);
+      const int at = (first + j) * BYTES;
+      add_bytes(v_load(w[row[0]] + at), v_load(w[row[1]] + at), a);
+      add_bytes(v_load(w[row[2]] + at), v_load(w[row[3]] + at), b);
 #pragma GCC unroll 2
       for (int half = 0; half < 2; half++) {
         acc[j][half] = V(add_epi16)(V_BITS(and)(acc[j][half], go_on), V(add_epi16)(a[half], b[half]));
-        v_store(sum[sample] + j * BYTES + half * BYTES / 2, acc[j][half]);
+        v_store(sum[sample] + at + half * BYTES / 2, acc[j][half]);
       }
     }
   }
 }
 
-static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[2], bool bias, int n, fx_scratch *s)
+/* noipa: GCC 12.2 may lose sight of the stores, take the function for one without effects and drop its calls. */
+static __attribute__((noipa)) void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS],
+                                                      bool bias, int n, fx_scratch *s)
 {
   events e;
   list_events(&e, spikes, bias, n);
-  add_rows(&e, words->c2, s->c2_current);
+  for (int first = 0; first < SF_LANES / BYTES; first += PARTS) add_parts(&e, words->c2, s->c2_current, first);
 }
 #endif

@@ -279,12 +279,26 @@ static sf_status read_backbone(const sf_tensors *set, fx_scene *scene)
   return sf_ok();
 }
 
+/* Rows of weights are as long as the lanes of the build that wrote them. */
+static sf_status check_lanes(const sf_tensors *set)
+{
+  const int64_t shape[2] = {-1, -1};
+  const sf_tensor *w;
+  SF_TRY(sf_tensors_get(set, fx_layer_tensor[FX_C1], SF_I8, 2, shape, &w));
+  const int lanes = w->shape[1] == 128 || w->shape[1] == 256 ? (int)w->shape[1] : SF_LANES;
+  if (lanes == SF_LANES) return sf_ok();
+  return sf_fail(SF_E_UNSUPPORTED,
+                 "%s: tensor '%s' needs %d lanes, this build has %d (make B=build/l%d ARCH=\"LANES=%d\" has them)",
+                 set->path, w->name, lanes, SF_LANES, lanes, lanes);
+}
+
 static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
 {
   SF_TRY(expect_meta(set, "format", FORMAT, SF_E_FORMAT));
   char arch[ARCH_TEXT];
   describe_arch(arch);
   SF_TRY(expect_meta(set, "version", VERSION, SF_E_UNSUPPORTED));
+  SF_TRY(check_lanes(set));
   SF_TRY(expect_meta(set, "arch", arch, SF_E_UNSUPPORTED));
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
   for (int i = 0; i < OPTIONAL; i++)

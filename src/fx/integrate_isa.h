@@ -15,9 +15,12 @@ static const int32_t sigmoid_table[257] = {
 #include "spikefield/tables/sigmoid.inc"
 };
 
+/* Rounded in two shifts: the product alone takes 32 bits. */
 static INLINE vec argument(vec current, const fx_scale *scale, int bits)
 {
-  const vec y = v_shift_round(V(mullo_epi32)(current, v_set(scale->mul)), scale->shift);
+  const vec product = V(mullo_epi32)(current, v_set(scale->mul)), one = v_set(1);
+  const __m128i twice = _mm_cvtsi32_si128(scale->shift - 1);
+  const vec y = scale->shift == 0 ? product : V(srai_epi32)(V(add_epi32)(V(sra_epi32)(product, twice), one), 1);
   return v_clamp(V(add_epi32)(y, v_set(scale->bias)), -(1 << (bits - 1)), (1 << (bits - 1)) - 1);
 }
 

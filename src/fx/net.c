@@ -131,7 +131,7 @@ static void count_events(const fx_net *net, const fx_events *events, fx_counts *
   static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   fx_firing firing = {.samples = 1};
   for (int l = 0; l < FX_SPIKING; l++) {
-    uint64_t seen[2] = {0};
+    uint64_t seen[SF_SPIKE_WORDS] = {0};
     for (int t = 0; t < net->steps; t++) fx_firing_add(&firing, l, t, events->spikes[spiking[l]][t], seen);
   }
   fx_count_firing(counts, net, &firing);

@@ -4,7 +4,7 @@
 #include "spikefield/fx.h"
 
 typedef struct fx_events {
-  uint64_t spikes[SF_LAYERS][SF_T_MAX][2]; /* bitmaps, of D1, C1, C2 */
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* bitmaps, of D1, C1, C2 */
   uint64_t saturated[SF_LAYERS];
 } fx_events;
 

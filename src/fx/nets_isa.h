@@ -14,10 +14,10 @@ static INLINE void fire_layer(const neurons *n, int spiking, bool halves, int sh
 {
   static const int layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   for (int i = 0; i < b->n; i++) {
-    uint64_t bits[2] = {0};
+    uint64_t bits[SF_SPIKE_WORDS] = {0};
     const int16_t *half = (const int16_t *)current + i * SF_LANES;
     const int32_t *whole = (const int32_t *)current + i * SF_LANES;
-#pragma GCC unroll 16
+#pragma GCC unroll 32
     for (int j = 0; j < VECTORS; j++) {
       const vec in = halves ? v_widen(half + j * WIDTH) : v_load(whole + j * WIDTH);
       put_spikes(bits, j,
@@ -32,7 +32,7 @@ static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s,
   const neurons n = neurons_of(&core->scene->net, FX_D1, mode, first, t);
   events e;
   fire_layer(&n, 0, false, 0, s->constant, b, s, t);
-  list_events(&e, (const uint64_t(*)[2])b->spikes[0][t], false, b->n);
+  list_events(&e, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[0][t], false, b->n);
   add_rows16(&e, core->words.d2, s->d2_current);
   for (int i = 0; i < b->n; i++) {
     __m256i *current = (__m256i *)s->d2_current[i];
@@ -52,15 +52,14 @@ static INLINE void c1_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
 static INLINE int spikes_of_block(const fx_block *b, int layer, int t)
 {
   int sum = 0;
-  for (int i = 0; i < b->n; i++)
-    sum += __builtin_popcountll(b->spikes[layer][t][i][0]) + __builtin_popcountll(b->spikes[layer][t][i][1]);
+  for (int i = 0; i < b->n; i++) sum += count_spikes(b->spikes[layer][t][i]);
   return sum;
 }
 
 static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   const neurons n = neurons_of(&core->scene->net, FX_C2, mode, first, t);
-  const uint64_t(*spikes)[2] = (const uint64_t(*)[2])b->spikes[1][t];
+  const uint64_t(*spikes)[SF_SPIKE_WORDS] = (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[1][t];
   if (spikes_of_block(b, 1, t) * 100 > b->n * SF_LANES * C2_DENSE_PERCENT) {
     c2_currents_dense(&core->words, spikes, b->n, s);
     fire_layer(&n, 2, false, SF_AC_FRAC, s->current, b, s, t);
@@ -73,7 +72,7 @@ static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
 static INLINE void c3_step(const fx_core *core, fx_block *b, fx_scratch *s, int t)
 {
   events e;
-  list_events(&e, (const uint64_t(*)[2])b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n);
+  list_events(&e, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n);
   add_rows16(&e, core->words.c3, s->c3_current);
   for (int o = 0; o < COLOURS; o++)
     for (int i = 0; i < b->n; i++) s->argument[1 + o][i] = s->c3_current[i][o];

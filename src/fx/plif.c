@@ -64,7 +64,7 @@ static int charge_layer_nodecay(int32_t *restrict v, const int32_t *restrict cur
   return saturated;
 }
 
-static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spikes[2])
+static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spikes[SF_SPIKE_WORDS])
 {
   uint8_t fired[SF_LANES] = {0};
   for (int o = 0; o < n; o++) {
@@ -72,7 +72,7 @@ static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spike
     v[o] -= -spike & theta;
     fired[o] = (uint8_t)spike;
   }
-  for (int word = 0; word < 2; word++) {
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
     uint64_t bits = 0;
     for (int b = 0; b < 64; b++) bits |= (uint64_t)fired[word * 64 + b] << b;
     spikes[word] = bits;
@@ -80,7 +80,7 @@ static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spike
 }
 
 int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *layer, int32_t mode, bool first,
-                  uint64_t spikes[2], int32_t *membrane)
+                  uint64_t spikes[SF_SPIKE_WORDS], int32_t *membrane)
 {
   int saturated = 0;
   if (first)

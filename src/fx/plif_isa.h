@@ -62,7 +62,7 @@ static INLINE uint32_t fire(const neurons *n, int32_t *v, vec current, uint32_t 
   return spikes;
 }
 
-static INLINE void put_spikes(uint64_t bits[2], int vector, uint32_t spikes)
+static INLINE void put_spikes(uint64_t bits[SF_SPIKE_WORDS], int vector, uint32_t spikes)
 {
   bits[vector * WIDTH / 64] |= (uint64_t)spikes << vector * WIDTH % 64;
 }

@@ -20,7 +20,7 @@ fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32
 /* fx_plif_step over lanes 0..n-1, one leak and threshold. spikes: bitmap, rewritten whole. membrane[n] (before
  * reset) may be NULL. Returns the number of saturations. */
 int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *layer, int32_t mode, bool first,
-                  uint64_t spikes[2], int32_t *membrane);
+                  uint64_t spikes[SF_SPIKE_WORDS], int32_t *membrane);
 
 /* 2^y, y in Q.LOG_FRAC (s18) -> U16.12, saturating at 2^28 - 1 from y = 16.0 on. */
 uint32_t fx_exp2(int32_t y);
@@ -37,7 +37,7 @@ uint32_t fx_relu(int32_t y);
 enum { FX_PHASE_BITS = 16 };
 int32_t fx_sine(uint32_t phase);
 
-/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| <= 16383, so the product is s32. */
+/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| < 2^15, so the product is s32. */
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
 

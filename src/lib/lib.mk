@@ -59,7 +59,7 @@ install: lib ## the C library, its header and its pkg-config file below PREFIX (
 	$Qfor f in $(SHARED_DATA:share/%=%); do install -D -m 644 share/$$f $(DESTDIR)$(DATADIR)/spikefield/$$f || exit 1; done
 	$Qln -sf $(SHARED) $(DESTDIR)$(LIBDIR)/$(SONAME) && ln -sf $(SONAME) $(DESTDIR)$(LIBDIR)/libspikefield.so
 	$Qmkdir -p $(DESTDIR)$(LIBDIR)/pkgconfig && sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|' \
-	  -e 's|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(LIB_VERSION)|' src/lib/spikefield.pc.in \
+	  -e 's|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(LIB_VERSION)|; s|@DEFINES@|$(ARCH_DEFINES:%= %)|' src/lib/spikefield.pc.in \
 	  >$(DESTDIR)$(LIBDIR)/pkgconfig/spikefield.pc
 
 uninstall: ## remove what install put below PREFIX

@@ -180,26 +180,27 @@ uint32_t sf_golden_colour(void *handle, int channel)
   return g && channel >= 0 && channel < 3 ? g->out.colour[channel] : 0;
 }
 
-static void put_bits(const uint64_t bits[2], uint32_t to[4])
+static void put_bits(const uint64_t bits[SF_SPIKE_WORDS], uint32_t to[SF_GOLDEN_WORDS])
 {
-  for (int i = 0; i < 4; i++) to[i] = (uint32_t)(bits[i / 2] >> (32 * (i % 2)));
+  for (int i = 0; i < SF_GOLDEN_WORDS; i++)
+    to[i] = i < 2 * SF_SPIKE_WORDS ? (uint32_t)(bits[i / 2] >> (32 * (i % 2))) : 0;
 }
 
-void sf_golden_spikes(void *handle, int layer, int step, uint32_t spikes[4])
+void sf_golden_spikes(void *handle, int layer, int step, uint32_t spikes[SF_GOLDEN_WORDS])
 {
   const golden *g = sampled_at(handle, layer, step);
-  put_bits(g ? g->trace.spikes[layer][step] : (uint64_t[2]){0}, spikes);
+  put_bits(g ? g->trace.spikes[layer][step] : (uint64_t[SF_SPIKE_WORDS]){0}, spikes);
 }
 
-void sf_golden_rows(void *handle, int layer, int step, uint32_t rows[4])
+void sf_golden_rows(void *handle, int layer, int step, uint32_t rows[SF_GOLDEN_WORDS])
 {
   const golden *g = sampled_at(handle, layer, step);
-  uint64_t any[2] = {0};
+  uint64_t any[SF_SPIKE_WORDS] = {0};
   const int from = layer == FX_C2 ? step : 0, to = layer == FX_C2 ? step + 1 : sf_golden_steps(handle);
   if (g && (layer == FX_C2 || layer == FX_D2 || layer == FX_C3)) {
     const int presynaptic = layer == FX_D2 ? FX_D1 : layer == FX_C2 ? FX_C1 : FX_C2;
     for (int t = from; t < to; t++)
-      for (int word = 0; word < 2; word++) any[word] |= g->trace.spikes[presynaptic][t][word];
+      for (int word = 0; word < SF_SPIKE_WORDS; word++) any[word] |= g->trace.spikes[presynaptic][t][word];
   }
   put_bits(any, rows);
 }

@@ -25,12 +25,12 @@ package sf_golden_dpi;
 
   import "DPI-C" function int unsigned sf_golden_density(input chandle golden);              // U16.12
   import "DPI-C" function int unsigned sf_golden_colour(input chandle golden, input int channel);  // U4.16
-  // D1, C1, C2: neurons that fired at this step.
+  // D1, C1, C2: neurons that fired at this step; of 256 lanes, however many the block has.
   import "DPI-C" function void sf_golden_spikes(input chandle golden, input int layer, input int step,
-                                                output bit [127:0] spikes);
+                                                output bit [255:0] spikes);
   // Presynaptic neurons added up: C2 at this step, D2 and C3 of all steps.
   import "DPI-C" function void sf_golden_rows(input chandle golden, input int layer, input int step,
-                                              output bit [127:0] rows);
+                                              output bit [255:0] rows);
   // D1, C1, C2: after reset, as the tap shows it. D2 neuron 0, C3 neurons 0..2: the integrator after the step.
   import "DPI-C" function int sf_golden_membrane(input chandle golden, input int layer, input int step,
                                                  input int neuron);

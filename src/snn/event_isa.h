@@ -34,17 +34,26 @@ static void transpose_bits(uint64_t a[64])
       }
 }
 
-/* Indices of the set bits of 64 rows, offset added, to list (64 bytes writable); how many. */
-static inline int list_bits(uint64_t bits, uint8_t offset, uint8_t *list)
+/* The smallest type that counts the neurons of a layer, and a row of zeros. */
+typedef __typeof__(__builtin_choose_expr(SF_LANES <= UINT8_MAX, (uint8_t)0, (uint16_t)0)) row_index;
+
+/* Indices of the set bits of 64 rows, offset added, to list (64 places writable); how many. */
+static inline int list_bits(uint64_t bits, uint8_t offset, row_index *list)
 {
 #if defined(__AVX512VBMI2__)
   uint8_t iota[64];
   for (int i = 0; i < 64; i++) iota[i] = (uint8_t)i;
   const __m512i index = _mm512_add_epi8(_mm512_loadu_si512(iota), _mm512_set1_epi8((char)offset));
-  _mm512_storeu_si512(list, _mm512_maskz_compress_epi8(bits, index));
+  const __m512i set = _mm512_maskz_compress_epi8(bits, index);
+  if (sizeof *list == 1) {
+    _mm512_storeu_si512(list, set);
+  } else {
+    _mm512_storeu_si512(list, _mm512_cvtepu8_epi16(_mm512_castsi512_si256(set)));
+    _mm512_storeu_si512(list + 32, _mm512_cvtepu8_epi16(_mm512_extracti64x4_epi64(set, 1)));
+  }
 #else
   int n = 0;
-  for (uint64_t b = bits; b; b &= b - 1) list[n++] = (uint8_t)(offset + __builtin_ctzll(b));
+  for (uint64_t b = bits; b; b &= b - 1) list[n++] = (row_index)(offset + __builtin_ctzll(b));
 #endif
   return __builtin_popcountll(bits);
 }
@@ -60,8 +69,8 @@ static bool few_spikes(const uint64_t *spikes, int rows, float share)
 }
 
 /* out[V*VL] = sum of the listed rows; pairs of rows, the list ends with a row of zeros where needed. */
-static inline __attribute__((always_inline)) void add_rows(int V, const float *rows, int ld, const uint8_t *list, int n,
-                                                           float *out)
+static inline __attribute__((always_inline)) void add_rows(int V, const float *rows, int ld, const row_index *list,
+                                                           int n, float *out)
 {
   vf a[4], b[4];
 #pragma GCC unroll 4
@@ -82,7 +91,7 @@ static inline __attribute__((always_inline)) void add_rows(int V, const float *r
  * zero; spikes[hidden]; out[B][hidden]. A slice fits the first-level cache and leaves room there. */
 static void event_current(const float slice[][(SF_LANES + 1) * 64], int hidden, const uint64_t *spikes, float *out)
 {
-  uint8_t list[B][SF_LANES + 64];
+  row_index list[B][SF_LANES + 64];
   int count[B] = {0};
   for (int first = 0; first < hidden; first += 64) {
     uint64_t bits[64] = {0};
@@ -90,7 +99,7 @@ static void event_current(const float slice[][(SF_LANES + 1) * 64], int hidden, 
     transpose_bits(bits);
     for (int l = 0; l < B; l++) count[l] += list_bits(bits[l], (uint8_t)first, list[l] + count[l]);
   }
-  for (int l = 0; l < B; l++) list[l][count[l]] = (uint8_t)hidden;
+  for (int l = 0; l < B; l++) list[l][count[l]] = (row_index)hidden;
   int c = 0;
   for (; c + 4 * VL <= hidden; c += 4 * VL)
     for (int l = 0; l < B; l++) add_rows(4, slice[c / 64] + c % 64, 64, list[l], count[l], out + l * hidden + c);

@@ -6,7 +6,7 @@ s/counter_o <= window_q\[index_i\]/counter_o <= window_q/
 s/\[63:0\]/[3:0]/g
 s/64'd/4'd/g
 s/384'd0/24'd0/
-s/\{56'd0, (n_out_i\[[0-9:]*\]|spikes_count_i)\}/4'(\1)/
+s/\{55'd0, (n_out_i\[[0-9:]*\]|spikes_count_i)\}/4'(\1)/
 s/^    output reg  (.*counter_o)/    input  wire [ 8:0] watched_i,\n    output wire [ 3:0] value_o,\n    output wire [ 3:0] window_o,\n    output reg  \1/
 /wire \[2:0\] event_w = /,/^  assign hold_o/ {
   /^  assign hold_o/! H

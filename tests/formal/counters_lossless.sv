@@ -6,7 +6,7 @@
 
 module counters_lossless (
     input wire        clk_i,
-    input wire [39:0] n_out_i,
+    input wire [44:0] n_out_i,
     input wire        d1_row_i,
     input wire        c1_row_i,
     input wire        c1_bias_row_i,
@@ -18,7 +18,7 @@ module counters_lossless (
     input wire        ray_i,
     input wire [ 2:0] spikes_valid_i,
     input wire [ 2:0] spikes_step_i,
-    input wire [ 7:0] spikes_count_i,
+    input wire [ 8:0] spikes_count_i,
     input wire        update_i,
     input wire        update_colour_i,
     input wire [ 2:0] update_step_i,
@@ -81,8 +81,8 @@ module counters_lossless (
 
   // ---- what one cycle adds to the place
   wire neurons = layer == 3'd0 || layer == 3'd2 || layer == 3'd3;
-  wire [3:0] n = layer == 3'd0 ? n_out_i[3:0] : layer == 3'd1 ? n_out_i[11:8] : layer == 3'd2 ? n_out_i[19:16]
-               : layer == 3'd3 ? n_out_i[27:24] : n_out_i[35:32];
+  wire [3:0] n = layer == 3'd0 ? n_out_i[3:0] : layer == 3'd1 ? n_out_i[12:9] : layer == 3'd2 ? n_out_i[21:18]
+               : layer == 3'd3 ? n_out_i[30:27] : n_out_i[39:36];
   wire [15:0] fired = layer == 3'd1 ? d2_fired_i : c3_fired_i;
   wire [7:0] earlier = (8'd1 << step) - 8'd1;
   wire [1:0] here = {fired[{1'b1, step}], fired[{1'b0, step}]};
