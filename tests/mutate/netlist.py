@@ -14,7 +14,7 @@ import campaign
 PACKAGES = ["rtl/gen/sf_arch_pkg.sv", "rtl/gen/sf_csr_pkg.sv", "rtl/sf_op_pkg.sv"]
 ELABORATE = "proc; opt -full; wreduce; opt -full; opt_clean"
 # Registers become inputs and what they take outputs, so that a unit with them is proven like one without.
-CUT = "memory_collect; memory_map; dffunmap; expose -evert-dff t:*dff* %co1:+[Q] w:* %i"
+CUT = "memory_collect; memory_map; dffunmap; expose -evert-dff t:*dff* %co1:+[Q]"
 LINE = re.compile(r"-mode inv (-module \S+ -cell (\S+) -port (\S+) -portbit (\d+))(.*)")
 SELECT_BITS = 20
 PROOF_SECONDS = 60
