@@ -8,7 +8,7 @@ static int32_t word(const uint8_t *block, uint32_t index)
 
 static int in_memory(const sf_layer_blob *layer)
 {
-  return layer->n_in >= 0 && layer->n_in <= SF_DIR_MAX && layer->n_out >= 0 && layer->n_out <= SF_LANES;
+  return layer->n_in >= 0 && layer->n_in <= SF_DRIVER_INPUTS && layer->n_out >= 0 && layer->n_out <= SF_LANES;
 }
 
 int sf_blob_open(const uint8_t *block, uint32_t size, sf_net_blob *net)

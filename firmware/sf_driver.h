@@ -36,6 +36,9 @@ typedef struct sf_net_blob {
   sf_scale_blob exp_in, sigmoid_in;
 } sf_net_blob;
 
+/* Inputs of a layer, at most: those of a decoder, or the neurons before it. */
+enum { SF_DRIVER_INPUTS = SF_LANES > SF_DIR_MAX ? SF_LANES : SF_DIR_MAX };
+
 enum { SF_DRIVER_EVENTS = 8 }; /* mac sop spikes updates weight state_r state_w special */
 typedef struct sf_driver_counters {
   uint64_t event[SF_DRIVER_EVENTS][SF_LAYERS][SF_T_MAX];

@@ -226,7 +226,8 @@ static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t
   n->counts->saturated[FX_D2] += y >= 65536;
   n->sigma = naive_integrate(n, FX_D2, t, n->sigma, e, ((int64_t)1 << 28) - 1);
   n->trace->membrane[FX_D2][t][0] = (int32_t)n->sigma;
-  for (int j = 0; j + 1 < d2->n_out; j++) h[j] = naive_round(current[1 + j] * 2 - 7, 4); /* floor(i / 8) */
+  for (int j = 0; j + 1 < d2->n_out; j++)
+    h[j] = naive_round(current[1 + j] * 2 - ((1 << SF_H_SHIFT) - 1), SF_H_SHIFT + 1); /* floor */
 }
 
 static inline void naive_colour(naive_net *n, int t, const int64_t *base, const int64_t *h)

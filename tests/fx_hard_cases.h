@@ -175,8 +175,8 @@ static inline void expect_all_fire(const hard *h, const hard_seen *seen, int var
   for (int l = FX_D1; l <= FX_C2; l++)
     if (l != FX_D2) ck_assert_int_eq(hard_spikes(seen, l), HARD_ALL);
   for (int t = 0; t < SF_T_MAX; t++) {
-    ck_assert_int_eq(seen->trace->current[FX_D2][t][15], 128 * 127);
-    ck_assert_uint_eq(seen->counts.layer[FX_C2].sop[t], 128 * 128);
+    ck_assert_int_eq(seen->trace->current[FX_D2][t][15], SF_LANES * 127);
+    ck_assert_uint_eq(seen->counts.layer[FX_C2].sop[t], SF_LANES * SF_LANES);
   }
 }
 
@@ -273,7 +273,7 @@ static inline void make_exp_ends(hard *h, int variant)
 
 static inline void expect_exp_ends(const hard *h, const hard_seen *seen, int variant)
 {
-  ck_assert_int_eq(seen->trace->current[FX_D2][0][0], (variant ? 1 : -1) * 128 * 127);
+  ck_assert_int_eq(seen->trace->current[FX_D2][0][0], (variant ? 1 : -1) * SF_LANES * 127);
   if (h->scene.net.mode == FX_HYBRID) ck_assert_uint_eq(seen->out.sigma, variant ? (1u << SF_SIGMA_BITS) - 1 : 0);
 }
 
@@ -293,7 +293,7 @@ static inline void expect_nodecay(const hard *h, const hard_seen *seen, int vari
   if (h->scene.net.mode != FX_NODECAY) return;
   ck_assert_uint_eq(seen->out.sigma, variant ? 8 << SF_SIGMA_FRAC : (1u << SF_SIGMA_BITS) - 1);
   ck_assert_uint_eq(seen->counts.saturated[FX_D2], variant ? 0 : SF_T_MAX + SF_T_MAX - 1);
-  ck_assert_uint_eq(seen->counts.saturated[FX_D1], (SF_T_MAX - 1) * 128);
+  ck_assert_uint_eq(seen->counts.saturated[FX_D1], (SF_T_MAX - 1) * SF_LANES);
 }
 
 /* ---- checkpoints ---- */

