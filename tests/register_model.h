@@ -39,7 +39,7 @@ static inline uint32_t layer_value(uint32_t offset, uint32_t value)
   case THETA:
     return fitted(value, 23, 0);
   default:
-    return fitted(value, 8, 0xff);
+    return fitted(value, 9, 0x1ff);
   }
 }
 
@@ -79,8 +79,8 @@ static inline uint32_t start_errors(const registers *r)
 
 static inline bool weight_fits(uint32_t address, uint32_t weights)
 {
-  const uint32_t layer = address >> SF_CSR_WEIGHT_ADDRESS_LAYER_LSB, word = address & 31;
-  const uint32_t row = address >> SF_CSR_WEIGHT_ADDRESS_ROW_LSB & 255;
+  const uint32_t layer = address >> SF_CSR_WEIGHT_ADDRESS_LAYER_LSB, word = address & 63;
+  const uint32_t row = address >> SF_CSR_WEIGHT_ADDRESS_ROW_LSB & 511;
   static const uint32_t rows[] = {SF_FEATURE_MAX, SF_LANES, SF_DIR_MAX, SF_LANES, SF_LANES};
   for (int byte = 0; byte < 4; byte++)
     if ((weights >> 8 * byte & 255) == 0x80) return false;
@@ -115,10 +115,10 @@ static inline uint32_t programmed(registers *r, uint32_t offset, uint32_t value)
   if (offset == SF_CSR_SIGMOID_SHIFT) r->sigmoid[1] = fitted(value, 5, 32);
   if (offset == SF_CSR_SIGMOID_BIAS) r->sigmoid[2] = value;
   if (offset == SF_CSR_BIAS) r->bias = (value & known_bias) | (value & ~known_bias ? 1u << 18 : 0);
-  if (offset == SF_CSR_WEIGHT_ADDRESS) r->weight_address = fitted(value, 16, 0xffff);
+  if (offset == SF_CSR_WEIGHT_ADDRESS) r->weight_address = fitted(value, 18, 0x3ffff);
   if (offset != SF_CSR_WEIGHT_DATA) return 0;
   const bool fits = weight_fits(r->weight_address, value);
-  r->weight_address = (r->weight_address + 1) & 0xffff;
+  r->weight_address = (r->weight_address + 1) & 0x3ffff;
   return fits ? 0 : SF_CSR_ERROR_WEIGHT;
 }
 

@@ -80,7 +80,7 @@ planted spikefield.core "/rtl\/sf_scale.sv/d" "spikefield.core: rtl/sf_scale.sv 
 planted spikefield.core "s/rtl\/sf_scale.sv/rtl\/sf_scales.sv/" "rtl/sf_scales.sv is not there"
 planted spikefield.core "/sf_csr_pkg/d; s/^(      - rtl\/sf_wmem.sv)/\1\n      - rtl\/gen\/sf_csr_pkg.sv/" \
   "does not stand before"
-planted rtl/gen/sf_csr.rdl "s/ROW\[12:5\]/ROW[11:5]/" "WEIGHT_ADDRESS is"
+planted rtl/gen/sf_csr.rdl "s/ROW\[14:6\]/ROW[13:6]/" "WEIGHT_ADDRESS is"
 planted rtl/gen/sf_csr.rdl "s/mementries = 512/mementries = 511/" "COUNTERS is (4096, 511"
 planted rtl/gen/sf_csr_pkg.sv "s/13'h0078/13'h0074/" "C2_K is"
 planted docs/registers.md "s/ERROR \| W1C/ERROR | RW/" "ERROR is (20, 'RW'"

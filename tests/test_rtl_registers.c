@@ -172,10 +172,11 @@ static void random_command(sf_dut *dut, registers *r, random_source *s)
 
 static void random_weight(sf_dut *dut, registers *r, random_source *s)
 {
-  static const uint32_t rows[] = {0, 31, 32, 127, 128, 159, 160, 161, 255}, words[] = {0, 3, 4, 31};
-  const uint32_t row = draw(s, 0, 3) ? rows[draw(s, 0, 8)] : (uint32_t)draw(s, 0, 255);
+  static const uint32_t rows[] = {0, 31, 32, 127, 128, 159, 160, 255, 256, 257, 511};
+  static const uint32_t words[] = {0, 3, 4, 31, 32, 63};
+  const uint32_t row = draw(s, 0, 3) ? rows[draw(s, 0, 10)] : (uint32_t)draw(s, 0, 511);
   const uint32_t address = (uint32_t)draw(s, 0, 7) << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB |
-                           row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB | words[draw(s, 0, 3)];
+                           row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB | words[draw(s, 0, 5)];
   uint32_t weights = 0;
   for (int byte = 0; byte < 4; byte++)
     weights |= (uint32_t)(draw(s, 0, 11) ? draw(s, 0, 127) : draw(s, 127, 129)) << 8 * byte;
