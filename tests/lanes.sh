@@ -1,6 +1,7 @@
 #!/bin/bash
-# Builds of the accelerator with fewer lanes: a net that fits co-simulates with 0 differences, one that is too wide is
-# refused.   usage: lanes.sh BUILD
+# Builds of the accelerator with other lanes: a net that fits co-simulates with 0 differences, one that is too wide is
+# refused. 32 and 64 lanes in this build's system, 256 in a system of its own (BUILD/l256, as little of it as the
+# comparison needs, compiled for a quick build).   usage: lanes.sh BUILD
 set -u
 export LC_ALL=C
 build=$(cd "${1:?usage: lanes.sh BUILD}" && pwd) || exit 2
@@ -41,5 +42,29 @@ run 64 32 || fail "64 lanes: a net of 32 neurons"
 grep -qE "\"cycles\":[[:space:]]*${cycles:-none}," "$work/out" || fail "not the cycles of 32 lanes, ${cycles:-none}" # as sf_cycles says
 run 32 64 && fail "32 lanes took a net of 64 neurons"
 grep -q 'programming refused' "$work/err" || fail "32 lanes: the refusal is not the accelerator's"
+tail -n 1 "$work/err"
+
+wide=$build/l256
+rooms='$(filter-out %_isa.c,$(foreach room,base scene field snn render fx quant audit,$(wildcard src/$(room)/*.c)))'
+MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 LIB_SRC="$rooms" VERILATED_OPT="OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0" \
+  "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" >"$work/out" 2>"$work/err" || fail "256 lanes: no build"
+"$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"
+"$wide/bin/sf_cosim" "$work/256.snn" "$work/data" --rays 30 --limit-samples 500 --seed 1 --quiet --json \
+  --evidence "$work/evidence" >"$work/out" 2>"$work/err" || fail "256 lanes: a net of 256 neurons"
+grep -q '"differences":[[:space:]]*0' "$work/out" || fail "256 lanes: no report"
+samples=$(sed -nE 's/.*"samples":[[:space:]]*([0-9]+).*/\1/p' "$work/out" | head -n 1)
+[ "${samples:-0}" -ge 500 ] || fail "256 lanes: ${samples:-no} samples"
+echo "256 lanes: $samples samples, 0 differences"
+for case in every_neuron_fires weights_and_features_at_the_rails; do
+  CK_RUN_CASE=$case "$wide/tests/test_fx_vector" >"$work/out" 2>"$work/err" || fail "256 lanes: vector and portable core differ"
+  grep -q 'Checks: [1-9]' "$work/out" || fail "256 lanes: $case was not run"
+done
+# refuses PROGRAM SCENE NEEDED AVAILABLE
+refuses() {
+  "$1" "$2" "$work/data" --rays 1 >"$work/out" 2>"$work/err" && fail "$4 lanes: took a scene of $3"
+  grep -qF "$2: tensor 'colour.w3' needs $3 lanes, this build has $4" "$work/err" || fail "$4 lanes: not said what is missing"
+}
+refuses "$build/bin/sf_cosim" "$work/256.snn" 256 128
+refuses "$wide/bin/sf_cosim" "$work/32.snn" 128 256
 tail -n 1 "$work/err"
 exit $failed
