@@ -11,7 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { INPUTS_MAX = FX_PAIRS * FX_COMPONENTS_MAX }; /* of the widest: TensoRF's basis matrix */
+/* Of the widest: TensoRF's basis matrix, or a layer and its bias. */
+enum { BASIS = FX_PAIRS * FX_COMPONENTS_MAX, INPUTS_MAX = BASIS > SF_LANES ? BASIS : SF_LANES + 1 };
 enum { CANDIDATES = 40, PATIENCE = 8, SWEEPS = 6 };
 static const double STEP = 0.6 / (CANDIDATES - 1), SMALLEST_FACTOR = 0.05, RIDGE = 1e-3;
 

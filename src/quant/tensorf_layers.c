@@ -6,7 +6,8 @@
 #include <string.h>
 
 enum { MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1, INPUT_LIMIT = (1 << (SF_INPUT_BITS - 1)) - 1 };
-enum { LAYERS = 3, FRAC_MAX = FX_DIR_FRAC_MAX - 1, FRAC_MIN = 5, INPUTS_MAX = SF_DIR_MAX + 1, PATIENCE = 2 };
+enum { LAYERS = 3, FRAC_MAX = FX_DIR_FRAC_MAX - 1, FRAC_MIN = 5, PATIENCE = 2 };
+enum { INPUTS_MAX = (SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES) + 1 }; /* with the bias */
 
 typedef struct context {
   fx_scene *scene;
