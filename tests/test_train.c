@@ -71,6 +71,30 @@ static void check_resume(const sf_train_options *o, int before, int after)
   sf_dataset_free(&data);
 }
 
+/* t* moves in the first half of stage II; in the second the t_r that it chose is all that is unrolled. */
+START_TEST(the_chosen_steps_are_trained_alone)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = small_run();
+  o.beta = 1e-4;
+  sf_trainer *t = start(&data, &o, NULL);
+  const int search = o.stage1 + o.stage2 / 2;
+  sf_train_stats s = steps(t, search);
+  const double chosen = s.t_star;
+  ck_assert_double_lt(chosen, T - 1);
+  ck_assert_double_ne(s.mse, s.mse_full);
+  for (int i = search; i < o.stage1 + o.stage2; i++) {
+    s = steps(t, 1);
+    ck_assert_double_eq(s.t_star, chosen);
+    ck_assert_int_eq(s.t_r, lround(chosen));
+    ck_assert_double_eq(s.mse, s.mse_full);
+    ck_assert_double_eq(s.mse, s.mse_floor);
+  }
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
 START_TEST(resume_continues_bit_identically)
 {
   sf_train_options o = run_in_box(_i);
@@ -342,6 +366,7 @@ int main(void)
   tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
   tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
+  tcase_add_test(tc, the_chosen_steps_are_trained_alone);
   tcase_add_test(tc, fixed_steps_freeze_the_budget);
   tcase_add_test(tc, every_prefix_is_evaluated);
   tcase_add_test(tc, the_last_iterations_are_averaged);

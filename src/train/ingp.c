@@ -54,7 +54,7 @@ static void destroy(sf_trainer *t)
 
 static void init(sf_trainer *t)
 {
-  sf_init_uniform(t, SF_P_GRID, t->model.config.net == SF_NET_ANN ? 1e-4f : 0.1f, RNG_INIT, 0);
+  sf_init_uniform(t, SF_P_GRID, 1e-4f, RNG_INIT, 0);
 }
 
 static sf_status begin(sf_trainer *t, int steps)
@@ -108,6 +108,7 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
 }
 
 const sf_backbone sf_backbone_ingp = {.nets = SF_P_W1,
+                                      .growth = 1e3f,
                                       .weights = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5},
                                       .create = create,
                                       .destroy = destroy,

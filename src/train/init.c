@@ -103,6 +103,7 @@ sf_status sf_init_parameters(sf_trainer *t)
   sf_probes probes;
   SF_TRY(sf_probes_create(&probes, t));
   sf_probes_draw(t, RNG_PROBE, PROBES, &probes);
+  for (int i = 0; i < PROBES * probes.features; i++) probes.f[i] *= t->backbone->growth;
   for (int layer = 0; layer < SF_LAYERS; layer++)
     if (weights[layer] >= 0) sf_layer_scale(t, layer, &probes);
   sf_probes_free(&probes);

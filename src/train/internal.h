@@ -108,6 +108,7 @@ struct sf_probes;
 /* What differs between the backbones. The rest of the trainer does not ask which one it trains. */
 typedef struct sf_backbone {
   int nets;                           /* first parameter that is not the field's */
+  float growth;                       /* of features from the start of a run to the size that neurons are scaled for */
   int weights[SF_LAYERS];             /* parameters of layers D1 D2 C1 C2 C3; -1: no such layer */
   sf_status (*create)(sf_trainer *t); /* memory; the model is there */
   void (*destroy)(sf_trainer *t);

@@ -9,7 +9,8 @@
 
 enum { EPOCH_RAYS_PER_VIEW = 4096 };
 
-static const double budget_rate = 1e5; /* of t*, per stage II */
+static const double search = 0.5;      /* share of stage II in which t* moves; the rest trains t_r steps alone */
+static const double budget_rate = 1e5; /* of t*, over that share */
 
 sf_train_options sf_train_defaults(void)
 {
@@ -147,23 +148,29 @@ static bool scaled(const sf_trainer *t)
          t->epoch < (double)t->data->count * EPOCH_RAYS_PER_VIEW;
 }
 
+/* The steps of inference are all that is unrolled: neither teacher nor tail is left. */
+static bool settled(const sf_trainer *t)
+{
+  return sf_tuning(t) || (t->stage == 2 && t->stage_progress >= search - 1e-9);
+}
+
 static sf_loss_plan make_plan(const sf_trainer *t)
 {
   const sf_config *c = &t->model.config;
   const float *leak = sf_model_leak(&t->model);
-  const bool sigma_integrates = t->backbone->weights[1] >= 0;
+  const bool sigma_integrates = t->backbone->weights[1] >= 0, learned = !settled(t) && !t->options.fixed_steps;
   sf_loss_plan p = {.stage = t->stage,
-                    .steps = sf_tuning(t) ? t->model.t_r
-                             : scaled(t)  ? 2
-                                          : c->steps,
+                    .steps = settled(t)  ? t->model.t_r
+                             : scaled(t) ? 2
+                                         : c->steps,
                     .inverse_rays = 1.0f / (float)t->batch.rays,
-                    .extra = t->options.no_extra || t->options.fixed_steps ? 0 : (float)t->options.alpha,
-                    .distill = !t->options.no_distill && !sf_tuning(t),
+                    .extra = t->options.no_extra || !learned ? 0 : (float)t->options.alpha,
+                    .distill = !t->options.no_distill && !settled(t),
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const double t_hat = fmin(fmax(t->model.t_star, 1), p.steps);
-  const bool one = t->stage == 1 || t->options.fixed_steps || p.steps == 1; /* one prefix is trained, not two */
-  p.t_f = t->stage == 1 ? p.steps : one ? (int)t_hat : (int)fmin(floor(t_hat), p.steps - 1);
+  const bool one = t->stage == 1 || !learned || p.steps == 1; /* one prefix is trained, not two */
+  p.t_f = t->stage == 1 ? p.steps : one ? (int)fmin(t->model.t_r, p.steps) : (int)fmin(floor(t_hat), p.steps - 1);
   p.t_c = one ? p.t_f : p.t_f + 1;
   p.d = one ? 0 : t_hat - p.t_f;
   p.t_r = p.d >= 0.5 ? p.t_c : p.t_f;
@@ -193,12 +200,13 @@ static sf_status check_gradient(const sf_trainer *t, double loss)
 {
   if (!isfinite(loss))
     return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
+  SF_TRY(t->backbone->check(t)); /* first: what is wild in the field is wild in the nets, too */
   for (int i = t->backbone->nets; i < t->model.params; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++)
       if (!(fabsf(t->grad[t->model.param[i].offset + j]) < 1e18f))
         return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is %g at index %zu",
                        (long long)t->iteration, t->model.param[i].name, t->grad[t->model.param[i].offset + j], j);
-  return t->backbone->check(t);
+  return sf_ok();
 }
 
 sf_status sf_parameters_check(const sf_trainer *t)
@@ -224,11 +232,11 @@ static double stage_share(const sf_trainer *t)
 
 /* Gradient descent on the one scalar t*, not Adam: Adam's normalisation would discard the very magnitudes that beta
  * weighs, the error that one more step saves against b e^t. Without the error's signal t* follows
- * e^-t = e^-t0 + budget_rate * beta * progress, at most T per stage. */
+ * e^-t = e^-t0 + budget_rate * beta * progress, at most T per search. */
 static void update_budget(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double penalty_ratio)
 {
   if (p->t_c == p->t_f || p->steps < t->model.config.steps) return;
-  const double t_hat = t->model.t_star, share = stage_share(t), limit = t->model.config.steps * share;
+  const double t_hat = t->model.t_star, share = stage_share(t) / search, limit = t->model.config.steps * share;
   double g = mean->mse_ceil - mean->mse_floor + p->extra * (mean->extra_ceil - mean->extra_floor);
   if (!t->options.no_penalty) g += t->options.beta * penalty_ratio * exp(t_hat);
   t->t_momentum = 0.9 * t->t_momentum + 0.1 * g;
