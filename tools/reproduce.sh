@@ -10,7 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7, tensorf 1e-6)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf 2e-6)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -74,7 +74,7 @@ while [ $# -gt 0 ]; do
         [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
         set[minutes]=$2
       elif [ "$1" = --betas ]; then
-        [[ $2 =~ ^((1e-7|5e-7|1e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6"
+        [[ $2 =~ ^((1e-7|5e-7|1e-6|2e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6, 2e-6"
         betas=$2
       else
         [[ $2 =~ ^((ingp|tensorf)( |$))+$ ]] || die "--backbones '$2' is unknown: expected ingp, tensorf or both"
@@ -239,7 +239,7 @@ one_backbone() {
   prepare_scene
   common="$common --backbone $1"
   local default=5e-7
-  [ "$1" = ingp ] || default=1e-6
+  [ "$1" = ingp ] || default=2e-6
   for beta in ${betas:-$default}; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }

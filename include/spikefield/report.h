@@ -14,6 +14,7 @@ typedef enum {
   SF_RUN_BETA_1E7,
   SF_RUN_BETA_5E7, /* the reference: `full` of the ablations, t_r of the fixed runs */
   SF_RUN_BETA_1E6,
+  SF_RUN_BETA_2E6, /* tensorf's default */
   SF_RUN_HYBRID,
   SF_RUN_NO_DECAY,
   SF_RUN_DECAY,

@@ -125,13 +125,13 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
 
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
-  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6};
+  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6, SF_RUN_BETA_2E6};
   char dir[4096 + 320], reference[4096 + 320], log[4096 + 384];
   for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
   for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;
   run->t_star = NAN;
   snprintf(dir, sizeof dir, "%s/%s", scene_dir, sf_run_kinds[id].name);
-  for (int i = 0; i < 3; i++) { /* the first that there is */
+  for (int i = 0; i < (int)(sizeof spiking / sizeof *spiking); i++) { /* the first that there is */
     snprintf(reference, sizeof reference, "%s/%s", scene_dir, sf_run_kinds[spiking[i]].name);
     if (access(reference, F_OK) == 0) break;
   }

@@ -11,6 +11,7 @@ const sf_run_kind sf_run_kinds[SF_RUNS] = {
     [SF_RUN_BETA_1E7] = {"beta-1e-7", "beta = 1e-7", ROW(32.45, 0.959, 5.125, 643.39, 32.65)},
     [SF_RUN_BETA_5E7] = {"beta-5e-7", "beta = 5e-7 (full)", ROW(32.21, 0.957, 3.625, 492.25, 48.47)},
     [SF_RUN_BETA_1E6] = {"beta-1e-6", "beta = 1e-6", ROW(32.04, 0.956, 2.875, 405.33, 57.57)},
+    [SF_RUN_BETA_2E6] = {"beta-2e-6", "beta = 2e-6", ROW(NAN, NAN, NAN, NAN, NAN)},
     [SF_RUN_HYBRID] = {"mode-hybrid", "input hybrid, T = 8", ROW(32.12, NAN, 8, NAN, NAN)},
     [SF_RUN_NO_DECAY] = {"mode-no-decay", "input no-decay, T = 8", ROW(32.09, NAN, 8, NAN, NAN)},
     [SF_RUN_DECAY] = {"mode-decay", "input decay, T = 8", ROW(31.82, NAN, 8, NAN, NAN)},

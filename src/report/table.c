@@ -254,7 +254,7 @@ static void print_pairs(FILE *out, const sf_reproduction *r, table *t)
   t->left = 2;
   for (size_t i = 0; i < sizeof title / sizeof *title; i++) cell(t, "%s", title[i]);
   for (int s = 0; s < r->count; s++)
-    for (int i = SF_RUN_BETA_1E7; i <= SF_RUN_BETA_1E6; i++)
+    for (int i = SF_RUN_BETA_1E7; i <= SF_RUN_BETA_2E6; i++)
       if (r->scene[s].run[i].summary) pair_row(t, r, s, i);
   for (int g = 0; g < SF_PAPER_GROUPS; g++)
     for (int s = 0; s < r->count; s++)
