@@ -86,6 +86,28 @@ START_TEST(hard_reset_at_any_time)
 }
 END_TEST
 
+static void program_and_start(sf_dut *dut)
+{
+  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
+  ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
+  ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_OK);
+  dut->net = net_of_test.net;
+}
+
+/* The block keeps no direction: a first sample that brings none is refused. */
+static void has_no_direction(sf_dut *dut)
+{
+  uint64_t words[SF_PACKET_MAX];
+  sf_dut_sample without = shared.sample[0];
+  without.first = false;
+  dut->in.s_last = sf_dut_packet(&net_of_test.net, &without, words) == 1;
+  dut->in.s_data = words[0], dut->in.s_user = false, dut->in.s_valid = true;
+  sf_dut_tick(dut);
+  ck_assert(dut->out.s_ready);
+  dut->in.s_valid = false;
+  ck_assert_uint_eq(get(dut, SF_CSR_ERROR), SF_CSR_ERROR_PACKET);
+}
+
 /* The driver always begins with a soft reset; after a hard one it is not needed, at power-on or in mid-frame. */
 START_TEST(a_hard_reset_is_enough)
 {
@@ -99,15 +121,15 @@ START_TEST(a_hard_reset_is_enough)
     else
       random_net_make(&net_of_test, &r, false);
     draw_batch(&shared, &r, 6, false);
-    const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
-    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
-    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_OK);
-    dut->net = net_of_test.net;
+    program_and_start(dut);
     run_batch(dut, &net_of_test.net, 6, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
     feed f = {.m_percent = 60};
     for (int64_t cycle = draw(&r, 1, 700); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
     hard_reset(dut, 1 + trial % 3);
+    program_and_start(dut);
+    has_no_direction(dut);
+    hard_reset(dut, 1);
   }
   sf_dut_close(dut);
 }
