@@ -21,6 +21,8 @@ else
 
 STARTED := $(shell date +%s)
 B ?= build
+# One name, however it was given: dependency files hold it. Goals may go on naming it by its whole path.
+override B := $(patsubst $(CURDIR)/%,%,$(abspath $B))
 ifeq ($(origin CC),default)
 CC := gcc
 endif
@@ -96,6 +98,8 @@ $(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
 
 $B/obj/src/audit/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
+
+$(CURDIR)/$B/%: $B/% ;
 
 $B/libspikefield.a: $(LIB_OBJ)
 	$(call say,AR    $@)
