@@ -131,9 +131,8 @@ static INLINE void add_parts(const events *e, const int8_t (*w)[SF_LANES], int16
   }
 }
 
-/* noipa: GCC 12.2 may lose sight of the stores, take the function for one without effects and drop its calls. */
-static __attribute__((noipa)) void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS],
-                                                      bool bias, int n, fx_scratch *s)
+static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
+                               fx_scratch *s)
 {
   events e;
   list_events(&e, spikes, bias, n);
