@@ -1,6 +1,6 @@
 /* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
 #include "spikefield/io.h"
-#include "tests/fx_fixture.h"
+#include "tests/fx_tensorf_fixture.h"
 #include <dirent.h>
 #include <stdio.h>
 #include <unistd.h>
@@ -245,6 +245,29 @@ START_TEST(metadata_is_checked)
 }
 END_TEST
 
+/* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
+START_TEST(decoder_behind_a_grid_is_refused)
+{
+  static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
+  fx_scene scene = small_scene(9);
+  save(&scene);
+  for (size_t i = 0; i < sizeof none / sizeof *none; i++) edit(none[i], "0");
+  assert_refused("grid.levels is 2, expected 0..0");
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* They would size what is listed level by level. */
+START_TEST(levels_of_a_scene_without_a_grid_are_refused)
+{
+  fx_scene scene = tensorf_scene();
+  save(&scene);
+  edit("grid.levels", "17");
+  assert_refused("grid.levels is 17, expected 0..0");
+  fx_scene_free(&scene);
+}
+END_TEST
+
 /* Rewrites with one tensor's first element changed. */
 static void edit_tensor(const char *name, int64_t value)
 {
@@ -337,6 +360,8 @@ int main(void)
   tcase_add_test(files, cut_short_anywhere);
   tcase_add_test(files, edited_anywhere);
   tcase_add_test(files, metadata_is_checked);
+  tcase_add_test(files, decoder_behind_a_grid_is_refused);
+  tcase_add_test(files, levels_of_a_scene_without_a_grid_are_refused);
   tcase_add_test(files, tensors_are_checked);
   tcase_add_test(files, missing_tensor_is_named);
   tcase_add_test(files, lanes_beyond_the_layer_are_zero);

@@ -141,7 +141,8 @@ typedef struct fx_steps {
  * steps->cascade.
  */
 typedef struct fx_scene {
-  int32_t backbone; /* fx_backbone: grid and both nets, or tensorf and the decoder (C1, C2, C3 of net) */
+  int32_t backbone; /* fx_backbone: grid and both nets, or tensorf and the decoder (C1, C2, C3 of net). A decoder behind
+                       no field (FX_INGP, no levels) is for the nets' functions: it has no rays, and no file holds it */
   fx_net net;
   fx_grid grid;
   fx_tensorf tensorf;

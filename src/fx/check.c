@@ -66,16 +66,17 @@ static sf_status check_grid(const fx_grid *grid, int n_feature, const char *path
   return sf_ok();
 }
 
-/* What holds the field of the scene. */
+/* What holds the field of the scene. A decoder without one is a net for fx_net_*: there are no rays through it. */
 static sf_status check_field(const fx_scene *scene, const char *path)
 {
   const fx_layer *layer = scene->net.layer;
   SF_TRY(in_range(path, "scene", "backbone", scene->backbone, FX_INGP, FX_TENSORF));
-  if (scene->backbone == FX_TENSORF) {
-    SF_TRY(in_range(path, "D1", "n_out", layer[FX_D1].n_out, 0, 0));
-    return fx_check_tensorf_sizes(&scene->tensorf, layer[FX_C1].n_in, path);
-  }
-  return fx_net_decodes(&scene->net) ? sf_ok() : check_grid(&scene->grid, layer[FX_D1].n_in, path);
+  if (scene->backbone == FX_INGP && !fx_net_decodes(&scene->net))
+    return check_grid(&scene->grid, layer[FX_D1].n_in, path);
+  SF_TRY(in_range(path, "grid", "levels", scene->grid.levels, 0, 0));
+  if (scene->backbone == FX_INGP) return sf_ok();
+  SF_TRY(in_range(path, "D1", "n_out", layer[FX_D1].n_out, 0, 0));
+  return fx_check_tensorf_sizes(&scene->tensorf, layer[FX_C1].n_in, path);
 }
 
 /* What the cascades and the table of steps are made from. */
