@@ -1,5 +1,6 @@
 /* The float model: loading, and two rays through what was accepted. */
 #include "fuzz.h"
+#include "mutate_header.h"
 #include "spikefield/model.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,9 +1,10 @@
 /* The integer model: loading, and rays through what was accepted, in the portable and in the vector core. */
 #include "fuzz.h"
+#include "mutate_header.h"
 #include "spikefield/fx.h"
 #include "spikefield/quant.h"
 
-enum { SUM_CHARS = 18, SAMPLES = 6 };
+enum { SUM_CHARS = 18, SAMPLES = 6, POINTS = 64 };
 
 /* A mutated file has a wrong checksum, which the refusal states as it should be: puts it in, so that the fuzzer gets
  * past it. False where the file was refused for another reason. */
@@ -61,10 +62,11 @@ static void make_rays(const fx_scene *scene, fx_ray ray[2])
   const float origin[3] = {0.1f, 0.2f, 2.5f}, direction[3] = {0.05f, -0.1f, -1};
   if (!fuzz_good(sf_fx_ray_make(scene, origin, direction, &ray[0]))) ray[0] = (fx_ray){0};
   if (ray[0].count > 4096) ray[0].count = 4096;
-  ray[1] = (fx_ray){.count = 64};
+  ray[1] = (fx_ray){.count = POINTS};
+  const int64_t steps = scene->steps ? (scene->steps->at_q16[POINTS - 1] >> 16) + 1 : POINTS - 1;
   for (int axis = 0; axis < 3; axis++) {
     ray[1].origin[axis] = axis ? 1 : ((int64_t)1 << 40) - 1;
-    ray[1].step[axis] = (int64_t)(axis ? 1 : -1) * ((((int64_t)1 << 40) - 2) / 63);
+    ray[1].step[axis] = (int64_t)(axis ? 1 : -1) * ((((int64_t)1 << 40) - 2) / steps);
   }
   for (int i = 0; i < FX_SH; i++) ray[1].dir[i] = (int16_t)(i % 2 ? -2047 : 2047);
 }

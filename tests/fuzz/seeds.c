@@ -4,7 +4,7 @@
 #include "data_set.h"
 #include "fuzz.h"
 #include "sim/soc_job.h"
-#include "tests/fx_fixture.h"
+#include "tests/fx_tensorf_fixture.h"
 #include "spikefield/io.h"
 #include "spikefield/manifest.h"
 #include "spikefield/quant.h"
@@ -211,9 +211,9 @@ static void put_tile(const fx_scene *scene)
   free(image);
 }
 
-static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t seed)
+/* scene: what is not in the sizes. */
+static void put_scene(fx_scene scene, const char *name, const fixture_sizes *sizes, uint64_t seed)
 {
-  fx_scene scene = {0};
   fixture_set_sizes(&scene, sizes);
   FUZZ_EXPECT(fuzz_good(fx_scene_allocate(&scene, name)));
   fixture_fill(&scene, sizes, seed);
@@ -224,8 +224,15 @@ static void put_scene(const char *name, const fixture_sizes *sizes, uint64_t see
 
 static void put_scenes(void)
 {
-  put_scene("small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID, {0}}, 1);
-  put_scene("hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY, {0}}, 2);
+  /* step_q24 is the one that fixture_fill sets later: the table of steps is made before */
+  const fx_scene unbounded = {
+      .log2_bound = 2, .step_q24 = 30000, .gamma_q24 = 1 << 18, .near_q16 = 3 << 16, .longest_q16 = 9 << 16};
+  fx_scene factors = tensorf_scene();
+  put_scene((fx_scene){0}, "small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID, {0}}, 1);
+  put_scene((fx_scene){0}, "hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY, {0}}, 2);
+  put_scene(unbounded, "unbounded.snn", &(fixture_sizes){2, 3, 3, 2, 5, 4, 2, FX_DECAY, {0, 0, 900, 1, 1}}, 3);
+  FUZZ_EXPECT(fuzz_good(fx_scene_save(&factors, seed_path("snn", "tensorf.snn"))));
+  fx_scene_free(&factors);
 }
 
 static void put_manifest(bool is_float)
