@@ -82,6 +82,9 @@ struct fx_core {
   const fx_kernels *kernels;
 };
 
+/* fx_march_next by the core's kernels. */
+int32_t fx_core_march(const fx_core *core, const fx_ray *ray, int32_t n, uint32_t pos[3], fx_counts *counts);
+
 /* Adds sample i's saturations to counts and its events to cost (may be NULL). */
 void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *counts, fx_cost *cost);
 

@@ -15,11 +15,10 @@ static INLINE void fire_layer(const neurons *n, int spiking, bool halves, int sh
   static const int layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   for (int i = 0; i < b->n; i++) {
     uint64_t bits[SF_SPIKE_WORDS] = {0};
-    const int16_t *half = (const int16_t *)current + i * SF_LANES;
-    const int32_t *whole = (const int32_t *)current + i * SF_LANES;
 #pragma GCC unroll 32
     for (int j = 0; j < VECTORS; j++) {
-      const vec in = halves ? v_widen(half + j * WIDTH) : v_load(whole + j * WIDTH);
+      const int at = i * SF_LANES + j * WIDTH;
+      const vec in = halves ? v_widen((const int16_t *)current + at) : v_load((const int32_t *)current + at);
       put_spikes(bits, j,
                  fire(n, &s->v[spiking][i][j * WIDTH], V(slli_epi32)(in, shift), &b->saturated[layer[spiking]][i]));
     }

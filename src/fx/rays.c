@@ -27,17 +27,25 @@ typedef struct wave {
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
 } wave;
 
+int32_t fx_core_march(const fx_core *core, const fx_ray *ray, int32_t n, uint32_t pos[3], fx_counts *counts)
+{
+  const int32_t found = core->kernels->march(core->scene, ray, n);
+  if (n < ray->count) counts->march_steps += (uint64_t)(found - n + (found < ray->count));
+  if (found >= ray->count) return -1;
+  for (int axis = 0; axis < 3; axis++)
+    pos[axis] = (uint32_t)(fx_ray_at(core->scene, ray, found, axis) >> (RAY_FRAC - SF_POS_FRAC));
+  return found;
+}
+
 /* Moves slot i to the next occupied point from n on; false at the end of the ray. */
 static bool advance(wave *w, int i, int32_t n)
 {
+  uint32_t pos[3];
   slot *s = &w->slot[i];
-  const fx_ray *ray = &w->rays[s->ray];
-  const int32_t found = w->core->kernels->march(w->core->scene, ray, n);
-  if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
-  s->at = found;
-  for (int axis = 0; axis < 3 && found < ray->count; axis++)
-    w->block.pos[axis][i] = (uint32_t)(fx_ray_at(w->core->scene, ray, found, axis) >> (RAY_FRAC - SF_POS_FRAC));
-  return found < ray->count;
+  s->at = fx_core_march(w->core, &w->rays[s->ray], n, pos, &w->counts);
+  if (s->at < 0) return false;
+  for (int axis = 0; axis < 3; axis++) w->block.pos[axis][i] = pos[axis];
+  return true;
 }
 
 static void begin_ray(wave *w, size_t index)

@@ -8,8 +8,6 @@
 #include <string.h>
 #include "src/fx/nofloat.h"
 
-enum { RAY_FRAC = 40 };
-
 typedef struct waiting {
   size_t ray;
   uint32_t weight;
@@ -49,17 +47,6 @@ static void enqueue(wave *w, size_t ray, const uint32_t pos[3], uint32_t weight)
   if (b->n == FX_BLOCK) decode(w);
 }
 
-/* The next occupied point from n on and its position, or -1. */
-static int32_t next_point(wave *w, const fx_ray *ray, int32_t n, uint32_t pos[3])
-{
-  const int32_t found = w->core->kernels->march(w->core->scene, ray, n);
-  if (n < ray->count) w->counts.march_steps += (uint64_t)(found - n + (found < ray->count));
-  if (found >= ray->count) return -1;
-  for (int axis = 0; axis < 3; axis++)
-    pos[axis] = (uint32_t)(fx_ray_at(w->core->scene, ray, found, axis) >> (RAY_FRAC - SF_POS_FRAC));
-  return found;
-}
-
 static void march(wave *w, size_t index)
 {
   const fx_scene *scene = w->core->scene;
@@ -68,7 +55,8 @@ static void march(wave *w, size_t index)
   int32_t decoded = 0;
   uint32_t pos[3];
   fx_composite_begin(pixel);
-  for (int32_t n = next_point(w, ray, 0, pos); n >= 0; n = next_point(w, ray, n + 1, pos)) {
+  for (int32_t n = fx_core_march(w->core, ray, 0, pos, &w->counts); n >= 0;
+       n = fx_core_march(w->core, ray, n + 1, pos, &w->counts)) {
     const uint32_t weight = fx_tensorf_weight(scene, w->core->kernels->vm, ray, n, pos, pixel, &w->counts);
     if (weight) enqueue(w, index, pos, weight), decoded++;
     if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) break;
