@@ -66,10 +66,6 @@ static void destroy(sf_trainer *t)
   free(vm);
 }
 
-/* The current of C1 is constant. With hardly a leak its spikes count how often the threshold goes into it, 0 .. T; at
- * tau = 2 all thresholds lie between theta and 2 theta. */
-static const float constant_tau = 50;
-
 /* Planes and lines 0.1 times a normal deviate (Box and Muller), the rest uniform as torch's linear layers; biases zero
  * where the weights are scaled to the threshold afterwards. */
 static void init(sf_trainer *t)
@@ -84,10 +80,7 @@ static void init(sf_trainer *t)
     m->value[i] = (float)(0.1 * sqrt(-2 * log1p(-u)) * cos(angle));
   }
   sf_init_uniform(t, SF_V_BASIS, 1 / sqrtf((float)m->param[SF_V_BASIS].shape[1]), RNG_INIT, field);
-  if (m->config.net != SF_NET_ANN) {
-    sf_model_leak(m)[2] = -logf(constant_tau - 1);
-    return;
-  }
+  if (m->config.net != SF_NET_ANN) return;
   sf_init_uniform(t, SF_V_B1, 1 / sqrtf((float)m->param[SF_V_W1].shape[1]), RNG_INIT, field);
   sf_init_uniform(t, SF_V_B2, 1 / sqrtf((float)m->param[SF_V_W2].shape[1]), RNG_INIT, field);
 }
