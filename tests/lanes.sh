@@ -1,7 +1,8 @@
 #!/bin/bash
 # Builds of the accelerator with other lanes: a net that fits co-simulates with 0 differences, one that is too wide is
-# refused. 32 and 64 lanes in this build's system, 256 in a system of its own (BUILD/l256, as little of it as the
-# comparison needs, compiled for a quick build).   usage: lanes.sh BUILD
+# refused. 32 and 64 lanes in this build's system, 256 in a system of its own (BUILD/lanes, as little of it as the
+# comparison needs). What is built here runs a few hundred samples, so it is compiled for a quick build.
+# usage: lanes.sh BUILD
 set -u
 export LC_ALL=C
 build=$(cd "${1:?usage: lanes.sh BUILD}" && pwd) || exit 2
@@ -21,13 +22,15 @@ for hidden in 32 64; do
     --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden $hidden --steps 3 --quiet >/dev/null &&
     "$build/bin/sf_export" "$work/$hidden.safetensors" -o "$work/$hidden.snn" >/dev/null || exit 1
 done
-# The RTL of this build, in the order of the kit.
+# The RTL of this build, in the order of the kit; kept in its place while it stays the same, and so are builds of it.
+rtl=$build/lanes/rtl
 "$build/bin/sf_export" "$work/32.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
-rtl=$work/kit/rtl
+diff -rq "$work/kit/rtl" "$rtl" >/dev/null 2>&1 || { mkdir -p "$rtl" && rm -r "$rtl" && mv "$work/kit/rtl" "$rtl"; } || exit 1
 sources=$(sed "s|^|$rtl/|" "$work/kit/rtl.f" | tr '\n' ' ')
+quick='OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0' # --dut starts make without MAKEFLAGS; this one gets there
 # run LANES HIDDEN
 run() {
-  "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 150 --limit-samples 1500 --seed 1 --quiet --json \
+  GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }" "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 50 --limit-samples 400 --seed 1 --quiet --json \
     --evidence "$work/evidence" --dut "-GLANES=$1 +incdir+$rtl $sources" >"$work/out" 2>"$work/err"
 }
 for lanes in 32 64; do
@@ -44,10 +47,16 @@ run 32 64 && fail "32 lanes took a net of 64 neurons"
 grep -q 'programming refused' "$work/err" || fail "32 lanes: the refusal is not the accelerator's"
 tail -n 1 "$work/err"
 
-wide=$build/l256
-rooms='$(filter-out %_isa.c,$(foreach room,base scene field snn render fx quant audit,$(wildcard src/$(room)/*.c)))'
-MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 LIB_SRC="$rooms" VERILATED_OPT="OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0" \
-  "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" >"$work/out" 2>"$work/err" || fail "256 lanes: no build"
+wide=$build/lanes/256
+# make_wide GOAL or VARIABLE=...
+make_wide() {
+  MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 VERILATED_OPT="$quick" \
+    VERILATED_OBJ="$(printf "$build/verilated/runtime/%s.o " verilated verilated_fst_c verilated_threads)" "$@" >"$work/out" 2>"$work/err"
+}
+needed='$(filter-out %_isa.c,$(foreach room,base scene field snn fx quant,$(wildcard src/$(room)/*.c)))'
+needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256)'
+harness='$(filter-out sim/soc% sim/view_set% sim/three_counts% sim/audit_run%,$(wildcard sim/*.c))'
+make_wide LIB_SRC="$needed" SIM_SRC="$harness" ISAS_snn='' "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" || fail "256 lanes: no build"
 "$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"
 "$wide/bin/sf_cosim" "$work/256.snn" "$work/data" --rays 30 --limit-samples 500 --seed 1 --quiet --json \
   --evidence "$work/evidence" >"$work/out" 2>"$work/err" || fail "256 lanes: a net of 256 neurons"
