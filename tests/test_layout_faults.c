@@ -168,6 +168,17 @@ START_TEST(bad_numpy_files_are_named)
 }
 END_TEST
 
+START_TEST(positions_without_precision_are_named)
+{
+  layout_rig rig = row();
+  sf_dataset d;
+  rig.view[5].to_world[7] = 3e38;
+  put_llff(&rig, 0, 4, 40);
+  put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "poses_bounds.npy", "row 5: the position is 3e+38");
+}
+END_TEST
+
 /* Every shorter file is refused by name: none is read beyond its end, none is taken for whole. */
 START_TEST(truncated_files_are_named)
 {
@@ -284,6 +295,7 @@ static Suite *suite(void)
   tcase_add_test(t, the_plan_shows_every_camera);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);
   tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
+  tcase_add_test(t, positions_without_precision_are_named);
   tcase_add_loop_test(t, truncated_files_are_named, 0, 4);
   tcase_add_loop_test(t, camera_models_are_refused_by_name, 0, 4);
   tcase_add_loop_test(t, bad_texts_are_named, 0, sizeof bad_texts / sizeof *bad_texts);

@@ -183,6 +183,12 @@ START_TEST(poses_decide_what_faces_forward)
   load(&d, "train");
   ck_assert(!d.ndc);
   sf_dataset_free(&d);
+  rig = row(); /* or so far aside that it cannot see what the others see */
+  rig.view[3].to_world[7] += 1e5;
+  put_llff(&rig, 0, 4, 40);
+  load(&d, "train");
+  ck_assert(!d.ndc);
+  sf_dataset_free(&d);
 }
 END_TEST
 

@@ -7,6 +7,7 @@
 #include <string.h>
 
 enum { COLUMNS = 17 };
+static const double FARTHEST = 1e12; /* as of COLMAP's positions */
 
 bool sf_llff_there(const char *dir)
 {
@@ -30,6 +31,9 @@ static sf_status check_row(const char *path, int number, const double *row)
     return sf_fail(SF_E_RANGE, "%s: row %d: the rotation's axes are not at right angles", path, number);
   if (!(height >= 1 && width >= 1 && height < 1e6 && width < 1e6 && focal > 1e-3 && focal < 1e7))
     return sf_fail(SF_E_RANGE, "%s: row %d: %g x %g pixels, focal length %g", path, number, width, height, focal);
+  for (int i = 0; i < 3; i++)
+    if (!(fabs(row[5 * i + 3]) < FARTHEST))
+      return sf_fail(SF_E_RANGE, "%s: row %d: the position is %g", path, number, row[5 * i + 3]);
   if (!(row[15] > 0 && row[16] > row[15]))
     return sf_fail(SF_E_RANGE, "%s: row %d: depths from %g to %g", path, number, row[15], row[16]);
   return sf_ok();

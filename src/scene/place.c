@@ -8,6 +8,7 @@
 #define BLENDER_SCALE 0.8 /* torch-ngp */
 #define ORBIT 1.32        /* mean distance of cameras from what they look at: 4 * 0.33, instant-ngp's and torch-ngp's */
 #define NEAR_FACTOR 0.75  /* of the nearest depth: NeRF's bd_factor */
+#define SPREAD_MAX 1000.0 /* nearest depths from the mean position: farther off, NDC leaves the range of floats */
 enum { BOUND_MAX = 16 };
 
 /* world = scale * turn * (p - centre) */
@@ -104,6 +105,7 @@ bool sf_forward_facing(const sf_capture *capture)
     column(&capture->frame[f], 3, at);
     for (int i = 0; i < 3; i++) at[i] -= middle[i];
     if (!(-vec_dot(at, back) < NEAR_FACTOR * capture->near)) return false;
+    if (!(vec_length(at) < SPREAD_MAX * capture->near)) return false;
   }
   return true;
 }
