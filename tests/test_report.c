@@ -281,7 +281,7 @@ START_TEST(pairs)
     const char *ann, *spiking, *summary, *kind;
   } scene[] = {
       {"a/ann", "a/beta-5e-7", "scenes/a/beta-5e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
-      {"b/ann", "b/beta-5e-7", "scenes/b/beta-5e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
+      {"b/ann", "b/beta-2e-6", "scenes/b/beta-2e-6/train.json", "\"tensorf\",\"layout\":\"llff\""},
       {"c/ann", "c/beta-5e-7", "scenes/c/beta-5e-7/train.json", "\"ingp\",\"layout\":\"ingp\""},
   };
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
@@ -297,7 +297,7 @@ START_TEST(pairs)
   write_text(
       "scenes/a/beta-1e-6/train.json",
       "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
-  write_text("scenes/b/beta-5e-7/status", "failed: no memory\n");
+  write_text("scenes/b/beta-2e-6/status", "failed: no memory\n");
   ck_good(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
@@ -312,9 +312,9 @@ START_TEST(pairs)
   contains("table.md", "|           1234 |           0 |", true);
   contains("table.md", "Synthetic", false);
   contains("table.md", "1e-06 |       0 |  25.00 |      24.50 |      -0.50 | 0.5000 |     2 |", true);
-  contains("table.md", "- b, beta-5e-7: failed: no memory", true);
+  contains("table.md", "- b, beta-2e-6: failed: no memory", true);
   contains("table.md", "without stage I", false);
-  write_text("scenes/b/beta-5e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
+  write_text("scenes/b/beta-2e-6/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
   sf_reproduction_free(&report);
   ck_good(sf_reproduction_load(&report, in("scenes")));

@@ -40,7 +40,7 @@ static bool is(const cJSON *summary, const char *key, const char *wanted)
 const sf_paper_group *sf_reproduction_group(const sf_report_scene *scene)
 {
   const cJSON *summary = NULL;
-  for (int run = SF_RUN_BETA_1E7; run <= SF_RUN_BETA_1E6 && !summary; run++) summary = scene->run[run].summary;
+  for (int run = SF_RUN_BETA_1E7; run <= SF_RUN_BETA_2E6 && !summary; run++) summary = scene->run[run].summary;
   for (int i = 0; summary && i < SF_PAPER_GROUPS; i++)
     if (is(summary, "backbone", sf_paper_groups[i].backbone) && is(summary, "layout", sf_paper_groups[i].layout))
       return &sf_paper_groups[i];
