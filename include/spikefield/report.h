@@ -14,7 +14,6 @@ typedef enum {
   SF_RUN_BETA_1E7,
   SF_RUN_BETA_5E7, /* the reference: `full` of the ablations, t_r of the fixed runs */
   SF_RUN_BETA_1E6,
-  SF_RUN_BETA_2E6, /* tensorf's default */
   SF_RUN_HYBRID,
   SF_RUN_NO_DECAY,
   SF_RUN_DECAY,
@@ -25,7 +24,9 @@ typedef enum {
   SF_RUN_T_MINUS_1,
   SF_RUN_T,
   SF_RUN_T_PLUS_1,
-  SF_RUNS
+  SF_RUN_BETA_2E6, /* tensorf's default, not among the paper's runs */
+  SF_RUNS,
+  SF_PAPER_RUNS = SF_RUN_BETA_2E6
 } sf_run_id;
 
 /* One number per run. Energies: paper ledger, mJ per frame, mean over the audited views. */

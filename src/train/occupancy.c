@@ -77,7 +77,8 @@ static void threshold(sf_trainer *t, size_t cells)
   size_t occupied = 0;
   for (size_t byte = 0; byte < cells / 8; byte++) {
     unsigned bits = 0;
-    for (int b = 0; b < 8; b++) bits |= (unsigned)(t->density[8 * byte + b] >= limit) << b; /* all alike: none is empty */
+    for (int b = 0; b < 8; b++)
+      bits |= (unsigned)(t->density[8 * byte + b] >= limit) << b; /* all alike: none is empty */
     t->model.occupancy[byte] = (uint8_t)bits;
     occupied += (size_t)__builtin_popcount(bits);
   }
