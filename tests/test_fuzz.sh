@@ -8,7 +8,7 @@ trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 export TMPDIR=$work OMP_NUM_THREADS=1
 # A small file must not cost gigabytes. The sanitizers need the address space, but limit each allocation.
-export ASAN_OPTIONS=${ASAN_OPTIONS:-}:max_allocation_size_mb=1024
+export ASAN_OPTIONS=${ASAN_OPTIONS:-}:max_allocation_size_mb=512
 limit=$([ "${SANITIZED:-}" ] && echo unlimited || echo 700000)
 failed=0
 "$build/tests/fuzz/seeds" "$work/seeds" || exit 1
