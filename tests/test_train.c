@@ -95,6 +95,39 @@ START_TEST(the_chosen_steps_are_trained_alone)
 }
 END_TEST
 
+/* What is rendered has the intervals of the training's second half. */
+START_TEST(the_lattice_settles)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = run_in_box(_i);
+  o.samples = 64; /* few enough for a coarser lattice */
+  sf_trainer *t = start(&data, &o, NULL);
+  const int first = o.stage1, last = o.stage1 + o.stage2;
+  sf_train_stats s = steps(t, first);
+  ck_assert_int_gt(t->stride, 1);
+  ck_assert_int_eq(t->model.config.lattice, o.config.lattice);
+  int seen = s.lattice;
+  for (int i = first; i < last; i++) {
+    s = steps(t, 1);
+    const sf_config *c = &t->model.config;
+    if (t->progress < 0.5) {
+      seen = o.config.lattice / t->stride;
+    } else {
+      ck_assert_int_eq(t->stride, 1);
+      ck_assert_int_eq(c->lattice, seen);
+      ck_assert_float_eq(c->dt_gamma, o.config.dt_gamma * (float)(o.config.lattice / seen));
+    }
+    ck_assert_int_eq(s.lattice, c->lattice / t->stride);
+  }
+  ck_assert_int_lt(seen, o.config.lattice);
+  sf_steps rendered;
+  ck_good(sf_steps_make(&rendered, &t->model.config, 1));
+  ck_assert_int_eq(memcmp(&rendered, &t->intervals, sizeof rendered), 0);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
 START_TEST(resume_continues_bit_identically)
 {
   sf_train_options o = run_in_box(_i);
@@ -366,6 +399,7 @@ int main(void)
   tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
   tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
+  tcase_add_loop_test(tc, the_lattice_settles, 0, 2);
   tcase_add_test(tc, the_chosen_steps_are_trained_alone);
   tcase_add_test(tc, fixed_steps_freeze_the_budget);
   tcase_add_test(tc, every_prefix_is_evaluated);

@@ -59,7 +59,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
        "neurons of a spiking layer, multiple of 16 (default 128)"},
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25, tensorf 0.5)"},
       {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
-       "the shortest step is the diagonal of a box of bound 1 divided by this (default 1024)"},
+       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest (default 1024)"},
       {"--bound", 0, SF_ARG_INT, &a->bound, 0, 64, NULL, "B",
        "the box is [-B, B]^3 model units, B = 1, 2, 4, ... 64; 0 = the data's (default 0)"},
       {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
@@ -127,12 +127,13 @@ static void log_line(FILE *log, const sf_train_stats *s)
   fprintf(log,
           "{\"iteration\":%lld,\"stage\":%d,\"seconds\":%.3f,\"loss\":%.9g,\"mse\":%.9g,\"mse_full\":%.9g,"
           "\"mse_floor\":%.9g,\"mse_ceil\":%.9g,\"psnr\":%.4f,\"t_star\":%.6f,\"t_r\":%d,\"rays\":%d,\"samples\":%d,"
+          "\"lattice\":%d,"
           "\"occupied\":%.6f,\"tau\":[%.5f,%.5f,%.5f,%.5f,%.5f],\"firing\":[%.5f,%.5f,%.5f],\"quiet\":[%d,%d,%d],"
           "\"revived\":[%d,%d,%d]}\n",
           (long long)s->iteration, s->stage, s->seconds, s->loss, s->mse, s->mse_full, s->mse_floor, s->mse_ceil,
-          psnr_of(s->mse), s->t_star, s->t_r, s->rays, s->samples, s->occupied, s->tau[0], s->tau[1], s->tau[2],
-          s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2], s->quiet[0], s->quiet[1], s->quiet[2],
-          s->revived[0], s->revived[1], s->revived[2]);
+          psnr_of(s->mse), s->t_star, s->t_r, s->rays, s->samples, s->lattice, s->occupied, s->tau[0], s->tau[1],
+          s->tau[2], s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2], s->quiet[0], s->quiet[1],
+          s->quiet[2], s->revived[0], s->revived[1], s->revived[2]);
 }
 
 /* Averages for the eye; the log has the raw values. */
@@ -230,6 +231,7 @@ static cJSON *make_summary(const arguments *a, const sf_config *c, const sf_trai
   cJSON_AddNumberToObject(json, "T", c->steps);
   cJSON_AddNumberToObject(json, "t_r", s->t_r);
   cJSON_AddNumberToObject(json, "t_star", s->t_star);
+  if (c->backbone == SF_INGP) cJSON_AddNumberToObject(json, "lattice", c->lattice);
   cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
   cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
   cJSON_AddItemToObject(json, "quiet", cJSON_CreateIntArray(s->quiet, 3));
@@ -255,6 +257,9 @@ static void print_text(const arguments *a, const sf_config *c, const sf_train_st
   printf(
       "%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
       a->output, (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr, q->ssim, q->views);
+  if (c->backbone == SF_INGP)
+    printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
+           c->dt_gamma > 0 ? " near the camera" : "");
   if (!q->prefixes) return;
   printf("%s: PSNR at 1..%d steps:", a->output, q->prefixes);
   for (int i = 0; i < q->prefixes; i++) printf(" %.2f", q->prefix[i]);

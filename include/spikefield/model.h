@@ -127,6 +127,8 @@ float sf_scales_h_step(const sf_scales *scales);
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
 #define SF_NEAR 0.2 /* model units; torch-ngp's min_near */
+enum { SF_LATTICE_MIN = 16 };
+#define SF_GAMMA_MAX 0.125f /* of dt_gamma */
 typedef struct sf_steps {
   int32_t count, stride, lattice;   /* stride: this many of the scene's intervals are one */
   float low[3], high[3], near, far; /* the box, and the part of a ray that counts */

@@ -42,6 +42,7 @@ typedef struct sf_train_stats {
   double tau[SF_LAYERS];
   double firing[3];  /* spikes per neuron and step of D1, C1, C2 */
   int rays, samples; /* of the iteration */
+  int lattice;       /* its shortest step is 2 sqrt(3) / lattice model units; hash grids */
   double occupied;   /* share of occupied cells */
   int quiet[3];      /* neurons of D1, C1, C2 without a spike in 64 samples of the scene, counted every 64 iterations */
   int revived[3];    /* times that the layer was brought back to the threshold */

@@ -49,13 +49,13 @@ sf_status sf_config_check(const sf_config *c)
   if (c->hidden % 16) return sf_fail(SF_E_RANGE, "model config: hidden = %d is not a multiple of 16", c->hidden);
   for (int i = 0; i < 3; i++) SF_TRY(check_range("theta", c->theta[i], 1e-6, 1e6));
   SF_TRY(check_range("scale", c->scale, 1e-6, 1e6));
-  SF_TRY(check_range("lattice", c->lattice, 16, 1024));
+  SF_TRY(check_range("lattice", c->lattice, SF_LATTICE_MIN, 1024));
   SF_TRY(check_range("occ_res", c->occ_res, 8, 256));
   if (c->occ_res & (c->occ_res - 1))
     return sf_fail(SF_E_RANGE, "model config: occ_res = %d is not a power of two", c->occ_res);
   SF_TRY(check_range("bound", c->bound, 1, 64));
   if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
-  SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, 0.125));
+  SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, SF_GAMMA_MAX));
   SF_TRY(check_range("backbone", c->backbone, SF_INGP, SF_TENSORF));
   if (c->backbone == SF_TENSORF) return sf_tensorf_check(&c->tensorf);
   sf_steps steps;

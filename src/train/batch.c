@@ -110,16 +110,39 @@ static void place(sf_batch *b, const sf_march *march, int r)
     }
 }
 
-/* Rays of the next iteration for the wanted samples; a coarser lattice while nothing is known to be empty. */
+/* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
+ * be empty, the lattice is made coarser, until it is settled. */
+static bool may_double(const sf_trainer *t)
+{
+  const sf_config *c = &t->model.config;
+  return t->stride < 8 && c->lattice >= 2 * t->stride * SF_LATTICE_MIN &&
+         c->dt_gamma * 2 * (float)t->stride <= SF_GAMMA_MAX;
+}
+
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
   double ratio = t->options.samples / fmax(b->samples, 1);
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
-  if (t->rays < 512 && t->stride < 8) t->stride++, t->rays *= 2;
-  if (t->rays > 1536 && t->stride > 1) t->stride--, t->rays /= 2;
+  if (t->progress < sf_lattice_settles && !sf_tuning(t)) {
+    if (t->rays < 512 && may_double(t)) t->stride *= 2, t->rays *= 2;
+    if (t->rays > 1536 && t->stride > 1) t->stride /= 2, t->rays /= 2;
+  }
   const int most = t->options.rays ? t->options.rays : RAYS_MAX;
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > most ? most : t->rays;
+}
+
+void sf_batch_settle(sf_trainer *t)
+{
+  sf_config *c = &t->model.config;
+  if (c->backbone == SF_TENSORF) {
+    t->rays /= t->stride;
+  } else {
+    c->lattice /= t->stride;
+    c->dt_gamma *= (float)t->stride;
+  }
+  t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays;
+  t->stride = 1;
 }
 
 sf_status sf_batch_draw(sf_trainer *t)

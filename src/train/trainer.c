@@ -273,6 +273,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
                       .firing = {t->firing[0], t->firing[1], t->firing[2]},
                       .rays = t->batch.rays,
                       .samples = t->batch.samples,
+                      .lattice = t->model.config.lattice / t->stride,
                       .occupied = t->occupied,
                       .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
   for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_leak(&t->model)[l]);
@@ -330,6 +331,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   t->samples += t->batch.samples;
   const double before = t->progress;
   advance(t, stage_share(t));
+  if (before < sf_lattice_settles && t->progress >= sf_lattice_settles && !sf_tuning(t)) sf_batch_settle(t);
   SF_TRY(sf_average_update(t, before));
   if (t->stage == 3 && sf_tuning(t)) sf_scales_round(&t->model, t->model.value);
   report(t, &plan, &mean, loss, mse, stats);
