@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 static void put(const char *path, const void *data, size_t n)
@@ -84,7 +85,55 @@ START_TEST(unreadable_files)
   size_t n;
   ck_bad(sf_read_file(in("none"), 100, &data, &n), SF_E_IO, "none", "No such file");
   ck_bad(sf_read_file(folder, 100, &data, &n), SF_E_IO, folder, "folder");
-  ck_bad(sf_read_file("/dev/zero", 100000, &data, &n), SF_E_FORMAT, "/dev/zero", "limit");
+  ck_bad(sf_read_file("/dev/zero", 100000, &data, &n), SF_E_IO, "/dev/zero", "it is a device");
+  ck_assert_int_eq(symlink("/dev/null", in("link")), 0);
+  ck_bad(sf_read_file(in("link"), 100, &data, &n), SF_E_IO, "/link", "it is a device");
+}
+END_TEST
+
+/* A program that writes as many zeros as are taken, at most `total`; path: its pipe, as a shell's <(...) hands it over.
+ */
+static pid_t zeros(size_t total, int *end, char path[32])
+{
+  static const char block[1 << 16];
+  int ends[2];
+  ck_assert_int_eq(pipe(ends), 0);
+  const pid_t writer = fork();
+  ck_assert_int_ge(writer, 0);
+  if (!writer) {
+    close(ends[0]);
+    for (ssize_t n = 1; total && n > 0; total -= (size_t)n)
+      n = write(ends[1], block, total < sizeof block ? total : sizeof block);
+    _exit(0);
+  }
+  close(ends[1]);
+  *end = ends[0];
+  snprintf(path, 32, "/dev/fd/%d", ends[0]);
+  return writer;
+}
+
+static sf_status read_zeros(size_t total, size_t limit, size_t *size)
+{
+  char path[32], *data;
+  int end;
+  const pid_t writer = zeros(total, &end, path);
+  const sf_status status = sf_read_file(path, limit, &data, size);
+  free(data);
+  close(end);
+  ck_assert_int_eq(waitpid(writer, NULL, 0), writer);
+  return status;
+}
+
+START_TEST(pipes_are_read_up_to_a_limit)
+{
+  const size_t sizes[] = {0, 1, 4096, 4097, 8194, 99999, 100000};
+  size_t n;
+  for (int i = 0; i < 7; i++) {
+    ck_good(read_zeros(sizes[i], 100000, &n));
+    ck_assert_uint_eq(n, sizes[i]);
+  }
+  ck_bad(read_zeros(100001, 100000, &n), SF_E_FORMAT, "/dev/fd/", "limit of 100000 bytes");
+  ck_bad(read_zeros(SIZE_MAX, (size_t)1 << 34, &n), SF_E_FORMAT, "/dev/fd/", "limit of 268435456 bytes");
 }
 END_TEST
 
@@ -629,6 +678,7 @@ static Suite *suite(void)
   tcase_add_test(t, try_returns_the_failure);
   tcase_add_test(t, file_round_trip);
   tcase_add_test(t, unreadable_files);
+  tcase_add_test(t, pipes_are_read_up_to_a_limit);
   tcase_add_test(t, unwritable_targets_are_left_alone);
   tcase_add_test(t, full_disk_keeps_the_old_file);
   tcase_add_test(t, writer_abort_and_links);

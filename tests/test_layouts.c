@@ -1,5 +1,6 @@
 /* LLFF, COLMAP and instant-ngp against the Blender layout of the same cameras. */
 #include "layout_folder.h"
+#include <sys/stat.h>
 
 START_TEST(colmap_has_the_rays_of_its_poses)
 {
@@ -56,6 +57,19 @@ START_TEST(instant_ngp_has_the_rays_of_its_poses)
   ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
   sf_dataset_free(&d);
+}
+END_TEST
+
+/* Nobody writes into the pipe: opening it would wait for ever. */
+START_TEST(a_picture_is_no_pipe)
+{
+  const layout_rig rig = orbit();
+  sf_dataset d;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 0);
+  put_json("transforms.json", &rig, "", "images", 0, 1);
+  const char *first = in("images/p00.png");
+  ck_assert(!unlink(first) && !mkfifo(first, 0600));
+  ck_bad(sf_dataset_load(&d, folder, "test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
 }
 END_TEST
 
@@ -279,6 +293,7 @@ static Suite *suite(void)
   tcase_add_loop_test(t, colmap_has_the_rays_of_its_poses, 0, 4);
   tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
+  tcase_add_test(t, a_picture_is_no_pipe);
   tcase_add_test(t, blender_has_the_rays_of_its_poses);
   tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);
   tcase_add_test(t, forward_facing_poses_are_recentred);

@@ -7,7 +7,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* Whole file; *data is malloc'ed with a NUL behind it. Refuses files over `limit` bytes. */
+/* Whole file or pipe; *data is malloc'ed with a NUL behind it. Refuses files over `limit` bytes, pipes also over
+ * 256 MiB, and devices. */
 sf_status sf_read_file(const char *path, size_t limit, char **data, size_t *size);
 
 /* Write aside (same folder, unique name), then flush, fsync, check, rename: the target is whole or untouched. */

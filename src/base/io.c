@@ -7,6 +7,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* A pipe may never end: what a program hands over in one is far smaller. */
+static const size_t PIPE_LIMIT = (size_t)256 << 20;
+
 static sf_status read_stream(FILE *file, const char *path, size_t expected, size_t limit, char **data, size_t *size)
 {
   size_t room = expected + 1, used = 0;
@@ -20,12 +23,13 @@ static sf_status read_stream(FILE *file, const char *path, size_t expected, size
       return sf_fail(SF_E_FORMAT, "%s: larger than the limit of %zu bytes", path, limit);
     }
     if (used < room) break;
-    char *grown = room > SIZE_MAX / 2 - 1 ? NULL : realloc(buffer, 2 * room + 1);
+    room = room > limit / 2 ? limit + 1 : 2 * room;
+    char *grown = realloc(buffer, room + 1);
     if (!grown) {
       free(buffer);
       return sf_fail(SF_E_MEMORY, "%s: no memory for %zu bytes", path, room);
     }
-    buffer = grown, room *= 2;
+    buffer = grown;
   }
   if (ferror(file)) {
     free(buffer);
@@ -49,8 +53,12 @@ sf_status sf_read_file(const char *path, size_t limit, char **data, size_t *size
     status = sf_fail(SF_E_IO, "cannot read %s: it is a folder", path);
   else if (S_ISREG(info.st_mode) && (uintmax_t)info.st_size > limit)
     status = sf_fail(SF_E_FORMAT, "%s: %jd bytes, larger than the limit of %zu", path, (intmax_t)info.st_size, limit);
+  else if (S_ISREG(info.st_mode))
+    status = read_stream(file, path, (size_t)info.st_size, limit, data, size);
+  else if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode))
+    status = read_stream(file, path, 4096, limit < PIPE_LIMIT ? limit : PIPE_LIMIT, data, size);
   else
-    status = read_stream(file, path, S_ISREG(info.st_mode) ? (size_t)info.st_size : 4096, limit, data, size);
+    status = sf_fail(SF_E_IO, "cannot read %s: it is a device", path);
   fclose(file);
   return status;
 }

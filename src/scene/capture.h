@@ -72,6 +72,8 @@ sf_status sf_pictures_list(const char *dir, const char *folder, char ***name, in
 void sf_names_free(char **name, int count);
 /* The picture of a frame: the name itself, or with another ending where only that is there. */
 sf_status sf_picture_find(char path[4096], const char *dir, const char *file);
+/* It may lie anywhere, also outside the folder. But a device or a pipe that a data set names may never begin or end. */
+sf_status sf_picture_load(sf_image *image, const char *path);
 
 /* ---- placing ---- */
 

@@ -91,7 +91,7 @@ static sf_sight look(const sf_dataset *data, const sf_capture *c)
   char path[4096];
   for (int f = 0; f < c->count && !image.rgba && c->layout != SF_LAYOUT_BLENDER && !c->placed; f++)
     if (sf_picture_find(path, data->path, c->frame[f].file_path).code == SF_OK && sf_is_file(path))
-      if (sf_image_load(&image, path).code != SF_OK) break;
+      if (sf_picture_load(&image, path).code != SF_OK) break;
   if (!image.rgba) return sight;
   sight.width = image.width, sight.height = image.height;
   const size_t n = (size_t)image.width * (size_t)image.height;

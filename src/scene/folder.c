@@ -134,3 +134,11 @@ sf_status sf_picture_find(char path[4096], const char *dir, const char *file)
   }
   return is_picture(file) ? sf_join(path, dir, file, "") : sf_join(path, dir, file, ".png");
 }
+
+sf_status sf_picture_load(sf_image *image, const char *path)
+{
+  struct stat info;
+  if (!stat(path, &info) && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
+    return sf_fail(SF_E_IO, "cannot read %s: it is not a regular file", path);
+  return sf_image_load(image, path);
+}

@@ -79,15 +79,6 @@ static sf_status in_frame(sf_status status, const char *list, int number)
   return sf_fail(status.code, "%s (frame %d of %s)", status.message, number, list);
 }
 
-/* A picture may lie anywhere, also outside the folder. But a device or a pipe that a data set names may never end. */
-static sf_status refuse_device(const char *path)
-{
-  struct stat info;
-  if (!stat(path, &info) && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode))
-    return sf_fail(SF_E_IO, "cannot read %s: it is not a regular file", path);
-  return sf_ok();
-}
-
 static float mean_brightness(const sf_image *image)
 {
   uint64_t sum = 0, weight = 0;
@@ -116,8 +107,7 @@ static sf_status load_view(sf_view *view, const sf_frame *frame, const loading *
   view->lens = lens_name(&frame->lens);
   SF_TRY(set_pose(&view->camera, frame, l->data, where));
   SF_TRY(sf_picture_find(path, l->data->path, frame->file_path));
-  SF_TRY(in_frame(refuse_device(path), list, frame->number));
-  SF_TRY(in_frame(sf_image_load(&view->image, path), list, frame->number));
+  SF_TRY(in_frame(sf_picture_load(&view->image, path), list, frame->number));
   SF_TRY(set_lens(&view->camera, &frame->lens, &view->image, where));
   view->brightness = mean_brightness(&view->image);
   const int shrink = l->capture->shrink;
