@@ -24,4 +24,32 @@ for source in "$here"/fuzz_*.c; do
     echo "FAILED $target: $(ulimit -v "$limit" && FUZZ_VERBOSE=1 timeout -k 5 60 "$build/tests/fuzz/$target" "${inputs[@]}" 2>&1 | tail -n 20)"
   fi
 done
+
+# run.sh on stand-ins that end as libFuzzer does at a timeout: `nap` slept through its first one, which is none, so it is
+# called again; `spin` needs the processor for ever.
+mkdir -p "$work/stub/tests/fuzz" "$work/stub/fuzz/bin"
+printf '#!/bin/bash\nmkdir -p "$1"\n' >"$work/stub/tests/fuzz/seeds"
+cat >"$work/stub/fuzz/bin/fuzz_nap" <<'END'
+#!/bin/bash
+echo >>"$0.calls"
+name=${0##*/fuzz_}
+findings=${0%/bin/*}/findings/$name
+if [ $# -eq 2 ]; then # alone with the input
+  [ "$name" = nap ] && exit 0
+  while :; do :; done
+fi
+echo "#9 REDUCE cov: 3 ft: 4"
+echo "stat::number_of_executed_units: 10"
+[ "$name" = nap ] && [ "$(wc -l <"$0.calls")" -gt 1 ] && exit 0
+echo one >"$findings/timeout-1"
+echo "Test unit written to $findings/timeout-1"
+exit 70
+END
+cp "$work/stub/fuzz/bin/fuzz_nap" "$work/stub/fuzz/bin/fuzz_spin"
+chmod +x "$work"/stub/{tests/fuzz/seeds,fuzz/bin/*}
+table=$(FUZZ_PATIENCE=1 "$here/run.sh" "$work/stub" 60 1 nap spin 2>&1) && failed=1 && echo "FAILED: a timeout is no finding"
+grep -qE '^ +nap +20 .* none$' <<<"$table" && grep -qE '^ +spin +10 .* FOUND$' <<<"$table" || failed=1
+[ ! -e "$work/stub/fuzz/findings/nap/timeout-1" ] && [ -e "$work/stub/fuzz/findings/spin/timeout-1" ] || failed=1
+[ "$(wc -l <<<"$table")" -eq 4 ] || failed=1 # nothing of a killed process
+echo "$table"
 exit $failed

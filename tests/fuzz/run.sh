@@ -10,7 +10,7 @@ if [ "$1" = --installed ]; then
   echo "fuzz: $2 with its sanitizer libraries is not installed: \`make deps-fuzz\` installs clang and libclang-rt-dev" >&2
   exit 1
 fi
-build=$1 seconds=$2 jobs=$3
+build=$1 seconds=$2 jobs=$3 patience=${FUZZ_PATIENCE:-10} # seconds of one input
 shift 3
 here=$(dirname "$0")
 out=$build/fuzz
@@ -30,37 +30,42 @@ number() { # of the line "stat::NAME: value"
 
 # libFuzzer measures a timeout by the clock: on a busy machine the input has not had the time. True where it has.
 needs_long() { # TARGET INPUT
-  ! (ulimit -t 10 && exec "$out/bin/fuzz_$1" -timeout=3600 "$2") >/dev/null 2>&1
+  { ! (ulimit -t "$patience" && exec "$out/bin/fuzz_$1" -timeout=3600 "$2") >/dev/null 2>&1; } 2>/dev/null
 }
 
 # Adds to what was spent before; a finding begins anew. Prints hours.
 spend() { # TARGET STATUS "USER SYSTEM"
   local file=$out/spent/$1 before=0
-  [ "$2" -eq 0 ] || rm -f "$file"
   [ -s "$file" ] && before=$(cat "$file")
-  awk -v before="$before" '{ printf "%.1f\n", before + $1 + $2 }' <<<"$3" >"$file.part" && mv "$file.part" "$file"
+  awk -v before="$before" -v found="$2" '{ printf "%.1f\n", found ? 0 : before + $1 + $2 }' <<<"$3" >"$file.part" &&
+    mv "$file.part" "$file"
   awk '{ printf "%.2f", $1 / 3600 }' "$file"
 }
 
 fuzz() { # TARGET
-  local target=$1
+  local target=$1 end=$((SECONDS + seconds)) runs=0
   local corpus=$out/corpus/$target findings=$out/findings/$target log=$out/$target.log
-  local sources options status last artifact clock
+  local sources options status last artifact clock hours again count
   mkdir -p "$corpus" "$findings"
   sources=("$corpus" "$seeds/$target")
   [ -d "$here/regressions/$target" ] && sources+=("$here/regressions/$target")
-  options=(-max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=512 -print_final_stats=1
-    -artifact_prefix="$findings/")
+  options=(-timeout="$patience" -rss_limit_mb=2048 -malloc_limit_mb=512 -print_final_stats=1 -artifact_prefix="$findings/")
   [ -f "$here/$target.dict" ] && options+=(-dict="$here/$target.dict")
-  clock=$({ time "$out/bin/fuzz_$target" "${options[@]}" "${sources[@]}" >"$log" 2>&1; } 2>&1)
-  status=$?
-  artifact=$(sed -n 's/.*Test unit written to //p' "$log" | tail -n 1)
-  [[ $artifact == "$findings"/timeout-* ]] && ! needs_long "$target" "$artifact" && rm "$artifact" && status=0
+  while :; do
+    clock=$({ time "$out/bin/fuzz_$target" -max_total_time=$((end > SECONDS ? end - SECONDS : 1)) "${options[@]}" \
+      "${sources[@]}" >"$log" 2>&1; } 2>&1)
+    status=$? again=
+    artifact=$(sed -n 's/.*Test unit written to //p' "$log" | tail -n 1)
+    [[ $artifact == "$findings"/timeout-* ]] && ! needs_long "$target" "$artifact" && rm "$artifact" && status=0 again=yes
+    count=$(number number_of_executed_units "$log")
+    runs=$((runs + ${count:-0}))
+    hours=$(spend "$target" $status "$clock")
+    [ "$again" ] && [ $SECONDS -lt $end ] || break
+  done
   last=$(grep -a 'cov: ' "$log" | tail -n 1)
-  printf '  %-11s %10s %8s %9s %9s %7s %7s  %s\n' "$target" "$(number number_of_executed_units "$log")" \
-    "$(number average_exec_per_sec "$log")" "$(sed -n 's/.*cov: \([0-9]*\).*/\1/p' <<<"$last")" \
-    "$(sed -n 's/.*ft: \([0-9]*\).*/\1/p' <<<"$last")" "$(find "$corpus" -type f | wc -l)" \
-    "$(spend "$target" $status "$clock")" "$([ $status -eq 0 ] && echo none || echo FOUND)"
+  printf '  %-11s %10s %8s %9s %9s %7s %7s  %s\n' "$target" "$runs" "$(number average_exec_per_sec "$log")" \
+    "$(sed -n 's/.*cov: \([0-9]*\).*/\1/p' <<<"$last")" "$(sed -n 's/.*ft: \([0-9]*\).*/\1/p' <<<"$last")" \
+    "$(find "$corpus" -type f | wc -l)" "$hours" "$([ $status -eq 0 ] && echo none || echo FOUND)"
   [ $status -eq 0 ] && return
   grep -aE 'ERROR: |SUMMARY: |runtime error: |does not hold: ' "$log" | head -n 4 | sed 's/^/    /'
   echo "    replay: $out/bin/fuzz_$target ${artifact:-(no input was kept, see $log)}"
