@@ -165,14 +165,15 @@ typedef struct fx_scene {
   void *owner;                         /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
 
-/* Direction of a ray: each axis Q1.14. LSB of the direction features: 2^-frac. */
-enum { FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC, FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
+/* Points of a ray: Q24.40. Its direction: each axis Q1.14. LSB of the direction features: 2^-frac. */
+enum { FX_RAY_FRAC = 40, FX_UNIT_FRAC = 14, FX_UNIT_ONE = 1 << FX_UNIT_FRAC };
+enum { FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
 
 /* A ray in box units: p(n) = (origin + n * step) >> 16 in Q0.24 is sample n, 0 <= n < count (with growing steps
  * at_q16[n] instead of n, product >> 16); sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only
  * bridge). */
 typedef struct fx_ray {
-  int64_t origin[3], step[3]; /* Q24.40 */
+  int64_t origin[3], step[3]; /* Q24.RAY_FRAC */
   int32_t count;              /* lattice points in the box, 0 = misses */
   int32_t first_q16;          /* distance from the camera to sample 0 in lattice steps, Q16.16 */
   int16_t unit[3];            /* direction, unit length but for rounding, Q1.14 */

@@ -15,7 +15,7 @@ void fx_steps_fill(const fx_scene *scene, fx_steps *steps)
     if (n == 0) first = length;
     const int64_t edges_q40 = length * scene->step_q24;
     int cascade = 0;
-    while (cascade < scene->log2_bound && edges_q40 >> (RAY_FRAC - cell_bits + cascade)) cascade++;
+    while (cascade < scene->log2_bound && edges_q40 >> (FX_RAY_FRAC - cell_bits + cascade)) cascade++;
     steps->at_q16[n] = start + ((length - first) >> 1);
     steps->cascade[n] = (uint8_t)cascade;
     steps->delta_q24[n] = (int32_t)fx_rshift_round(edges_q40, 16);
@@ -36,6 +36,6 @@ int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint3
   }
   if (counts && n < ray->count) counts->march_steps += (uint64_t)(at - n + found);
   if (!found) return -1;
-  for (int axis = 0; axis < 3; axis++) pos[axis] = (uint32_t)(p[axis] >> (RAY_FRAC - SF_POS_FRAC));
+  for (int axis = 0; axis < 3; axis++) pos[axis] = (uint32_t)(p[axis] >> (FX_RAY_FRAC - SF_POS_FRAC));
   return at;
 }

@@ -3,8 +3,6 @@
 #define SPIKEFIELD_FX_MARCH_H
 #include "spikefield/fx.h"
 
-enum { RAY_FRAC = 40 };
-
 /* Places of all cascades follow from those of the finest cells counted from the middle of the box: cascade c halves
  * them c times, and the bits in use of the farthest one say which is the finest that holds it. */
 static inline uint32_t fx_cell(const fx_scene *scene, const int64_t p[3], int32_t least)
@@ -13,7 +11,7 @@ static inline uint32_t fx_cell(const fx_scene *scene, const int64_t p[3], int32_
   const int32_t middle = (int32_t)1 << (bits - 1), centre = (int32_t)1 << (fine - 1);
   int32_t at[3], farthest = 0, cascade = least;
   for (int axis = 0; axis < 3; axis++) {
-    at[axis] = (int32_t)(p[axis] >> (RAY_FRAC - fine)) - centre;
+    at[axis] = (int32_t)(p[axis] >> (FX_RAY_FRAC - fine)) - centre;
     farthest |= at[axis] ^ at[axis] >> 31;
   }
   while (farthest >> cascade >= middle) cascade++;

@@ -11,7 +11,7 @@ enum { POINTS = WIDTH / 2 };
 /* Bits of the cells of POINTS positions; lanes that are off read nothing and give 0. */
 static INLINE uint32_t occupied_points(const uint8_t *occupancy, const vec p[3], int bits, uint32_t on)
 {
-  const __m128i drop = _mm_cvtsi32_si128(RAY_FRAC - bits), axis = _mm_cvtsi32_si128(bits);
+  const __m128i drop = _mm_cvtsi32_si128(FX_RAY_FRAC - bits), axis = _mm_cvtsi32_si128(bits);
   const vec z = V(srl_epi64)(p[2], drop), y = V(srl_epi64)(p[1], drop), x = V(srl_epi64)(p[0], drop);
   const vec cell = V(add_epi64)(V(sll_epi64)(V(add_epi64)(V(sll_epi64)(z, axis), y), axis), x);
 #if defined(__AVX512VNNI__)

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { RAY_FRAC = 40 };
 static const double COUNT_MAX = 1 << 20; /* a step of one LSB would need 2^24: no scene has that */
 
 typedef struct interval {
@@ -38,7 +37,7 @@ static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
 {
   for (int axis = 0; axis < 3; axis++) {
     const int64_t p = fx_ray_at(scene, ray, n, axis);
-    if (p < 0 || p >= (int64_t)1 << RAY_FRAC) return false;
+    if (p < 0 || p >= (int64_t)1 << FX_RAY_FRAC) return false;
   }
   return true;
 }
@@ -47,7 +46,7 @@ static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
  * first point is moved in, by 2^-40: the table begins with it. */
 static void trim(const fx_scene *scene, fx_ray *ray)
 {
-  const int64_t last = ((int64_t)1 << RAY_FRAC) - 1;
+  const int64_t last = ((int64_t)1 << FX_RAY_FRAC) - 1;
   for (int axis = 0; axis < 3 && scene->steps; axis++)
     ray->origin[axis] = ray->origin[axis] < 0 ? 0 : ray->origin[axis] > last ? last : ray->origin[axis];
   while (ray->count > 0 && !inside(scene, ray, 0)) {
@@ -85,8 +84,8 @@ static void set_lattice(const fx_scene *scene, fx_ray *ray, const double o[3], c
   for (int axis = 0; axis < 3; axis++) {
     const double p = o[axis] + d[axis] * first;
     if (!(p > -1 && p < 2)) return; /* so far away that the distance has no precision left */
-    ray->origin[axis] = llrint(ldexp(p, RAY_FRAC));
-    ray->step[axis] = llrint(ldexp(d[axis] * step, RAY_FRAC));
+    ray->origin[axis] = llrint(ldexp(p, FX_RAY_FRAC));
+    ray->step[axis] = llrint(ldexp(d[axis] * step, FX_RAY_FRAC));
   }
   ray->count = (int32_t)count;
   ray->first_q16 = (int32_t)fmin(nearbyint(first / step * 65536), INT32_MAX);
@@ -131,11 +130,11 @@ sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], ui
 {
   for (int axis = 0; axis < 3; axis++) {
     const double p = (position[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
-    const int64_t fixed = p >= 0 && p < 1 ? llrint(ldexp(p, RAY_FRAC)) : -1;
-    if (fixed < 0 || fixed >= (int64_t)1 << RAY_FRAC)
+    const int64_t fixed = p >= 0 && p < 1 ? llrint(ldexp(p, FX_RAY_FRAC)) : -1;
+    if (fixed < 0 || fixed >= (int64_t)1 << FX_RAY_FRAC)
       return sf_fail(SF_E_RANGE, "position (%g, %g, %g): axis %d is at %.9g of the scene box, expected 0 <= x < 1",
                      (double)position[0], (double)position[1], (double)position[2], axis, p);
-    box[axis] = (uint32_t)(fixed >> (RAY_FRAC - SF_POS_FRAC));
+    box[axis] = (uint32_t)(fixed >> (FX_RAY_FRAC - SF_POS_FRAC));
   }
   return sf_ok();
 }
