@@ -333,6 +333,24 @@ START_TEST(unknown_kernels_are_refused)
 }
 END_TEST
 
+/* Made in memory, by nobody's reader: the kernels' tables have room for the sizes of arch.def alone. */
+START_TEST(absurd_scenes_are_refused)
+{
+  fx_scene scene = fixture_scene(&fixture_ingp, 1), bad = scene;
+  fx_core *core;
+  bad.net.layer[FX_D1].n_in = 1 << 20;
+  sf_status status = fx_core_open(&core, &bad, NULL);
+  ck_assert_int_eq(status.code, SF_E_RANGE);
+  ck_assert_ptr_nonnull(strstr(status.message, "scene: D1.n_in is 1048576"));
+  ck_assert_ptr_null(core);
+  bad = scene, bad.net.steps = SF_T_MAX + 1;
+  ck_assert_int_eq(fx_core_open(&core, &bad, NULL).code, SF_E_RANGE);
+  bad = scene, bad.net.layer[FX_C2].w = NULL;
+  ck_assert_int_eq(fx_core_open(&core, &bad, NULL).code, SF_E_FORMAT);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("fx_vector");
@@ -345,6 +363,7 @@ int main(void)
   tcase_add_loop_test(equal, rays_equal_portable, 0, 2);
   tcase_add_test(equal, portable_waves_equal_single_rays);
   tcase_add_test(equal, unknown_kernels_are_refused);
+  tcase_add_test(equal, absurd_scenes_are_refused);
   suite_add_tcase(suite, equal);
   hard_add(suite, hard_cases_equal_portable);
   return fixture_run(suite);

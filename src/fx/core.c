@@ -55,6 +55,7 @@ sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernel
   if (!chosen)
     return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2 or avx512vnni",
                    kernels);
+  SF_TRY(fx_scene_check(scene, "scene"));
   fx_core *c = sf_aligned_alloc(sizeof *c);
   if (!c) return sf_fail(SF_E_MEMORY, "no memory for the core's tables");
   c->scene = scene;
