@@ -334,6 +334,17 @@ START_TEST(lanes_beyond_the_layer_are_zero)
 }
 END_TEST
 
+START_TEST(a_decoder_alone_is_no_file)
+{
+  fx_scene scene = fixture_scene(&fixture_decoder, 9);
+  const sf_status status = fx_scene_save(&scene, path);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert(strstr(status.message, path) && strstr(status.message, "decoder"));
+  ck_assert_int_eq(files_in_folder(false), 0);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(unwritable_and_missing)
 {
   fx_scene scene = small_scene(8);
@@ -365,6 +376,7 @@ int main(void)
   tcase_add_test(files, tensors_are_checked);
   tcase_add_test(files, missing_tensor_is_named);
   tcase_add_test(files, lanes_beyond_the_layer_are_zero);
+  tcase_add_test(files, a_decoder_alone_is_no_file);
   tcase_add_test(files, unwritable_and_missing);
   suite_add_tcase(suite, files);
   return fixture_run(suite);

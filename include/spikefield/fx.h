@@ -336,6 +336,6 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 sf_status fx_scene_load(fx_scene *scene, const char *path);
 sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size,
                                const char *name); /* a file's contents */
-sf_status fx_scene_save(const fx_scene *scene, const char *path);
+sf_status fx_scene_save(const fx_scene *scene, const char *path); /* SF_E_UNSUPPORTED for a decoder behind no field */
 void fx_scene_free(fx_scene *scene);
 #endif
