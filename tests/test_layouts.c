@@ -1,5 +1,6 @@
 /* LLFF, COLMAP and instant-ngp against the Blender layout of the same cameras. */
 #include "layout_folder.h"
+#include "src/scene/capture.h"
 #include <sys/stat.h>
 
 START_TEST(colmap_has_the_rays_of_its_poses)
@@ -57,6 +58,27 @@ START_TEST(instant_ngp_has_the_rays_of_its_poses)
   ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
   sf_dataset_free(&d);
+}
+END_TEST
+
+/* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
+START_TEST(a_picture_is_found_by_a_long_name)
+{
+  char name[5000] = "", path[4096];
+  const layout_rig rig = orbit();
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  strcpy(name, "images/");
+  for (int i = 0; i < 300; i++) strcat(name, "./");
+  strcat(name, "p00.jpg");
+  ck_good(sf_picture_find(path, folder, name));
+  ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
+  ck_assert(sf_is_file(path));
+  name[strlen(name) - 4] = 0;
+  ck_good(sf_picture_find(path, folder, name));
+  ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
+  ck_assert(sf_is_file(path));
+  for (size_t n = strlen(name); n < 4200; n += 2) strcat(name, "./");
+  ck_bad(sf_picture_find(path, folder, name), SF_E_IO, folder, "too long");
 }
 END_TEST
 
@@ -294,6 +316,7 @@ static Suite *suite(void)
   tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
   tcase_add_test(t, a_picture_is_no_pipe);
+  tcase_add_test(t, a_picture_is_found_by_a_long_name);
   tcase_add_test(t, blender_has_the_rays_of_its_poses);
   tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);
   tcase_add_test(t, forward_facing_poses_are_recentred);

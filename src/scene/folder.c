@@ -124,12 +124,12 @@ sf_status sf_pictures_list(const char *dir, const char *folder, char ***name, in
 sf_status sf_picture_find(char path[4096], const char *dir, const char *file)
 {
   static const char *const ending[] = {".png", ".jpg", ".jpeg", ".PNG", ".JPG"};
+  SF_TRY(sf_join(path, dir, file, ".jpeg")); /* the longest: the others fit too */
   SF_TRY(sf_join(path, dir, file, ""));
   if (sf_is_file(path)) return sf_ok();
-  char stem[256];
-  snprintf(stem, sizeof stem, "%.*s", is_picture(file) ? (int)(strrchr(file, '.') - file) : 255, file);
+  char *end = is_picture(file) ? strrchr(path, '.') : path + strlen(path);
   for (int i = 0; i < 5; i++) {
-    SF_TRY(sf_join(path, dir, stem, ending[i]));
+    strcpy(end, ending[i]);
     if (sf_is_file(path)) return sf_ok();
   }
   return is_picture(file) ? sf_join(path, dir, file, "") : sf_join(path, dir, file, ".png");
