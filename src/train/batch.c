@@ -135,12 +135,10 @@ void sf_batch_adapt(sf_trainer *t)
 void sf_batch_settle(sf_trainer *t)
 {
   sf_config *c = &t->model.config;
-  if (c->backbone == SF_TENSORF) {
-    t->rays /= t->stride;
-  } else {
-    c->lattice /= t->stride;
-    c->dt_gamma *= (float)t->stride;
-  }
+  const int coarsest = c->backbone == SF_TENSORF ? 1 : 2, settled = t->stride < coarsest ? t->stride : coarsest;
+  t->rays = t->rays * settled / t->stride;
+  c->lattice /= settled;
+  c->dt_gamma *= (float)settled;
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays;
   t->stride = 1;
 }

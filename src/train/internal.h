@@ -165,8 +165,8 @@ sf_status sf_batch_draw(sf_trainer *trainer);
 void sf_batch_adapt(sf_trainer *trainer);
 /* Share of a run after which its lattice is the model's: what is rendered has the intervals that were trained. */
 static const double sf_lattice_settles = 0.5;
-/* Makes the stride of now the model's own: lattice / stride, dt_gamma * stride. TensoRF's step follows from its grids:
- * there the stride goes back to 1. */
+/* Makes the stride of now, but at most 2, the model's own: lattice / stride, dt_gamma * stride. TensoRF's step follows
+ * from its grids: there the stride goes back to 1. */
 void sf_batch_settle(sf_trainer *trainer);
 /* Bundles of the rays' samples as they are counted now. */
 void sf_batch_pack(sf_batch *batch);
