@@ -674,6 +674,7 @@ static Suite *suite(void)
   Suite *s = suite_create("base");
   TCase *t = tcase_create("all");
   tcase_add_checked_fixture(t, make_folder, remove_folder);
+  tcase_set_timeout(t, 60); /* a pipe of 256 MiB on a busy machine */
   tcase_add_test(t, status_is_one_line_and_fits);
   tcase_add_test(t, try_returns_the_failure);
   tcase_add_test(t, file_round_trip);
