@@ -3,6 +3,7 @@
 #include "spikefield/io.h"
 #include <errno.h>
 #include <fcntl.h>
+#include <libgen.h>
 #include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -12,15 +13,32 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* SF_SOURCE_ROOT, SF_BUILD: absolute folders of the source tree and of this build (sim/sim.mk). */
 enum { WORDS_MAX = 65536, HASH_LENGTH = 16, PATH_LENGTH = 4096 };
 
 /* One text that names what is built: every word with its absolute path, then the contents' hash of every source. */
 typedef struct request {
   char words[WORDS_MAX], key[2 * WORDS_MAX];
   size_t words_used, key_used;
+  char root[PATH_LENGTH], build[PATH_LENGTH]; /* the source tree, and the build folder that this program stands in */
   char folder[PATH_LENGTH];
 } request;
+
+/* BUILD/bin/sf_cosim, wherever the build lies now. SF_SOURCE_ROOT: of the source tree, from BUILD on or absolute
+ * (sim/sim.mk). */
+static sf_status find_build(request *r)
+{
+  char program[PATH_MAX] = "", path[2 * PATH_LENGTH];
+  if (readlink("/proc/self/exe", program, sizeof program - 1) < 0)
+    return sf_fail(SF_E_IO, "--dut: /proc/self/exe: %s", strerror(errno));
+  strcpy(r->build, dirname(dirname(program)));
+  const bool absolute = SF_SOURCE_ROOT[0] == '/';
+  snprintf(path, sizeof path, "%s/%s/sim/dut.mk", absolute ? "" : r->build, SF_SOURCE_ROOT);
+  if (access(path, R_OK))
+    return sf_fail(SF_E_IO, "--dut: %s is not the build folder of a source tree: no %s", r->build, path);
+  snprintf(path, sizeof path, "%s/%s", absolute ? "" : r->build, SF_SOURCE_ROOT);
+  if (!realpath(path, r->root)) return sf_fail(SF_E_IO, "--dut: %s: %s", path, strerror(errno));
+  return sf_ok();
+}
 
 static sf_status append(char *text, size_t *used, size_t size, const char *more)
 {
@@ -75,8 +93,8 @@ static sf_status read_request(request *r, const char *files, const char *top)
   SF_TRY(status);
   if (!r->words_used) return sf_fail(SF_E_USAGE, "--dut names no file");
   sf_sha256(r->key, r->key_used, hash);
-  if (snprintf(r->folder, sizeof r->folder, SF_BUILD "/dut/%.*s", HASH_LENGTH, hash) < PATH_LENGTH) return sf_ok();
-  return sf_fail(SF_E_RANGE, "--dut: " SF_BUILD ": the path is too long");
+  if (snprintf(r->folder, sizeof r->folder, "%s/dut/%.*s", r->build, HASH_LENGTH, hash) < PATH_LENGTH) return sf_ok();
+  return sf_fail(SF_E_RANGE, "--dut: %s: the path is too long", r->build);
 }
 
 /* ---- building ---- */
@@ -84,14 +102,15 @@ static sf_status read_request(request *r, const char *files, const char *top)
 /* In the child. What make and Verilator say goes to standard error: standard output is the report's. */
 static void become_make(const request *r, const char *top)
 {
-  char files[WORDS_MAX + 8], module[256 + 16], out[PATH_LENGTH + 16];
+  char files[WORDS_MAX + 8], module[256 + 16], out[PATH_LENGTH + 16], in[PATH_LENGTH + 16];
   snprintf(files, sizeof files, "DUT=%s", r->words);
   snprintf(module, sizeof module, "DUT_TOP=%s", top);
   snprintf(out, sizeof out, "DUT_OUT=%s", r->folder);
+  snprintf(in, sizeof in, "B=%s", r->build);
   unsetenv("MAKEFLAGS");
   unsetenv("MAKELEVEL");
   dup2(STDERR_FILENO, STDOUT_FILENO);
-  execlp("make", "make", "-s", "-C", SF_SOURCE_ROOT, "B=" SF_BUILD, files, module, out, "dut", (char *)NULL);
+  execlp("make", "make", "-s", "-C", r->root, in, files, module, out, "dut", (char *)NULL);
   _exit(127);
 }
 
@@ -159,7 +178,8 @@ sf_status sf_other_dut_run(const char *files, const char *top, char **argv)
   SF_TRY(check_name(top));
   request *r = calloc(1, sizeof *r);
   if (!r) return sf_fail(SF_E_MEMORY, "--dut: no memory");
-  sf_status status = read_request(r, files, top);
+  sf_status status = find_build(r);
+  if (status.code == SF_OK) status = read_request(r, files, top);
   if (status.code == SF_OK) status = build(r, top);
   snprintf(program, sizeof program, "%s/sf_cosim", r->folder);
   free(r);

@@ -154,8 +154,8 @@ $B/kit/files.o: $B/kit/files.c sim/kit/kit.h
 	$Q$(CC) $(CFLAGS_ALL) -c $< -o $@
 $B/bin/sf_export: $(KIT_OBJ) $B/obj/tools/export/extras.o
 
-# sf_cosim --dut builds itself around another accelerator.
-$B/obj/sim/other_dut.o: CFLAGS += -DSF_SOURCE_ROOT='"$(CURDIR)"' -DSF_BUILD='"$(abspath $B)"'
+# sf_cosim --dut builds itself around another accelerator. Folders that lie in the source tree can move with it.
+$B/obj/sim/other_dut.o: CFLAGS += -DSF_SOURCE_ROOT='"$(if $(filter /%,$B),$(CURDIR),$(shell realpath -m --relative-to=$B .))"'
 ifneq ($(DUT_OUT),)
 include sim/dut.mk
 endif

@@ -59,5 +59,19 @@ run name 2 --dut "$work/my_block.sv" --dut-top 'a b'
 has name.err "--dut-top"
 run nothing 2 --dut " "
 has nothing.err "--dut"
+
+# A program builds in the folder that it stands in, not in the one that it was built in.
+below=${build#"$root"/}
+if [ "$below" != "$build" ]; then
+  mkdir -p "$work/moved/$below/bin" "$work/moved/sim"
+  cp "$build/bin/sf_cosim" "$work/moved/$below/bin/"
+  build=$work/moved/$below
+  run lost 1 "${my_block[@]}"
+  has lost.err "$build is not the build folder of a source tree"
+  touch "$work/moved/sim/dut.mk"
+  printf 'dut:\n\t@echo "built in $B, $(DUT_OUT)" >&2; exit 1\n' >"$work/moved/Makefile"
+  run moved 1 "${my_block[@]}"
+  has moved.err "built in $build, $build/dut/"
+fi
 [ $failures -eq 0 ] && echo "another block co-simulates, its mistake is located, what does not build says where"
 exit $((failures > 0))
