@@ -44,12 +44,12 @@ static void put_png(const char *name, int depth, int colour, int interlace)
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
   png_infop info = png_create_info_struct(png);
   png_color palette[4] = {{0, 0, 0}, {255, 0, 0}, {0, 255, 0}, {9, 8, 7}};
-  png_byte alpha[2] = {0, 128}, row[6 * 8], *rows[5];
+  png_byte alpha[2] = {0, 128}, row[6 * 8], *rows[4];
   for (size_t i = 0; i < sizeof row; i++) row[i] = (png_byte)(i * 53);
-  for (int y = 0; y < 5; y++) rows[y] = row;
+  for (int y = 0; y < 4; y++) rows[y] = row; /* even sizes: the target halves them */
   FUZZ_EXPECT(file && info && !setjmp(png_jmpbuf(png)));
   png_init_io(png, file);
-  png_set_IHDR(png, info, 6, 5, depth, colour, interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, 6, 4, depth, colour, interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   if (colour == PNG_COLOR_TYPE_PALETTE) {
     png_set_PLTE(png, info, palette, 4);
     png_set_tRNS(png, info, alpha, 2, NULL);
@@ -70,13 +70,13 @@ static void put_jpeg(const char *name, int components, bool progressive)
   FUZZ_EXPECT(file);
   jpeg_create_compress(&codec);
   jpeg_stdio_dest(&codec, file);
-  codec.image_width = 18, codec.image_height = 17, codec.input_components = components;
+  codec.image_width = 18, codec.image_height = 18, codec.input_components = components;
   codec.in_color_space = components == 1 ? JCS_GRAYSCALE : JCS_RGB;
   jpeg_set_defaults(&codec);
   if (progressive) jpeg_simple_progression(&codec);
   codec.restart_interval = progressive ? 0 : 2;
   jpeg_start_compress(&codec, TRUE);
-  for (int y = 0; y < 17; y++) {
+  for (int y = 0; y < 18; y++) {
     for (size_t i = 0; i < sizeof line; i++) line[i] = (JSAMPLE)(i * 31 + (size_t)y * 17);
     jpeg_write_scanlines(&codec, rows, 1);
   }
@@ -125,6 +125,15 @@ static const char report_text[] =
     "\"prefix_psnr\": [20, 30, 31], \"crop\": [0, 0, 800, 800], \"energy_fj\": 72.5, \"energy_spiking_fj\": 72.5,\n"
     "\"energy_ann_fj\": 189.5, \"core_equals_recount\": true, \"core_equals_rtl_equals_recount\": false,\n"
     "\"iteration\": 7, \"model\": \"m.safetensors\"}\n";
+static const char report_parts[] =
+    "{\"backbone\": \"ingp\", \"layout\": \"blender\", \"psnr\": 30, \"ssim\": 0.9, \"t_r\": 3, \"t_star\": 2.6,\n"
+    "\"seconds\": 60, \"prefix_psnr\": [20, 25, 30], \"samples\": 500, \"differences\": 0, \"energy_spiking_fj\": "
+    "5e13,\n"
+    "\"energy_ann_fj\": 1e14, \"energy_fj\": 5e13}\034done\034{\"samples\": 9, \"differences\": 2}\034{\"psnr\": "
+    "33.5,\n"
+    "\"ssim\": 0.97, \"t_r\": 2, \"seconds\": 9, \"energy_spiking_fj\": 4e13, \"energy_ann_fj\": "
+    "2e14}\034{\"iteration\":\n"
+    "3}\034{\"psnr\": 31}\034stopped";
 static const char report_lines[] = "{\"iteration\": 1, \"t_star\": 8}\n{\"iteration\": 3, \"t_star\": 7.5}\n"
                                    "{\"iteration\": 2, \"t_star\": 7}\n{\"iteration\": 4, \"t_st";
 
@@ -134,6 +143,7 @@ static void put_texts(void)
   put_text("dataset", "fields.json", many_fields);
   put_text("report", "run.json", report_text);
   put_text("report", "log.jsonl", report_lines);
+  put_text("report", "parts", report_parts);
   put_text("json", "report.json", report_text);
   put_text("json", "frames.json", one_frame);
   put_text("json", "escapes.json", "[\"\\u00e9\\ud83d\\ude00\\n\", -1.5e-3, null, {\"\": {}}]");
