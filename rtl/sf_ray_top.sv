@@ -14,7 +14,8 @@
 `default_nettype none
 
 module sf_ray_top #(
-    parameter TAP = 1
+    parameter TAP = 1,
+    parameter LANES = sf_arch_pkg::LANES  // as sf_top's
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -187,7 +188,8 @@ module sf_ray_top #(
   wire result_valid, result_ready, result_last;
   wire [63:0] result;
   sf_top #(
-      .TAP(TAP)
+      .TAP  (TAP),
+      .LANES(LANES)
   ) u_nets (
       .clk_i           (clk_i),
       .rst_ni          (rst_ni),

@@ -6,6 +6,12 @@
 `ifndef SF_DUT
 `define SF_DUT sf_top
 `endif
+`ifdef SF_DUT_LANES  // the block's parameter, at most the kit's LANES
+`define SF_DUT_PARAMETERS #(.LANES(`SF_DUT_LANES))
+`else
+`define SF_DUT_LANES LANES
+`define SF_DUT_PARAMETERS
+`endif
 
 module sf_kit_tb;
   `include "sf_kit_params.svh"
@@ -44,7 +50,7 @@ module sf_kit_tb;
 
   always #5 clk = !clk;
 
-  `SF_DUT u_dut (
+  `SF_DUT `SF_DUT_PARAMETERS u_dut (
       .clk_i           (clk),
       .rst_ni          (rst_n),
       .s_axil_awvalid_i(awvalid),
@@ -426,7 +432,7 @@ module sf_kit_tb;
         go(SEEN_CONFIG, CSR_CONFIG);
       end
       SEEN_CONFIG: begin
-        expect_value(CSR_CONFIG_RESET, "CONFIG");
+        expect_value(CSR_CONFIG_RESET - (LANES - `SF_DUT_LANES), "CONFIG");  // its lowest byte: lanes - 1
         phase = PROGRAM;
       end
       PROGRAM: program_cycle;
