@@ -140,6 +140,20 @@ synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="3
 	@tools/synth.sh $B --rtl $(RTL_ROOT) $(if $(LANES),--lanes "$(LANES)") $(if $(MODULES),--modules "$(MODULES)") $(SYNTH)
 .PHONY: synth
 
+# Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
+define lanes_rule
+$(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)
+$B/lanes/$1/ray/Vsf_ray_top.mk: VERILATOR_FLAGS += -GLANES=$1
+$B/lanes/$1/%: $B/obj/tools/%.o $B/lanes/$1/ray/pins_ray.o $B/lanes/$1/ray/Vsf_ray_top__ALL.a $(DUT_LIBS) $B/libspikefield.a
+	$$(call say,LD    $$@)
+	$$Q$$(CXX) -fopenmp $(SAN) -o $$@ $$^ $(DUT_LDLIBS) $(UNICORN_LIBS) $$(LIBS)
+endef
+$(foreach n,32 64,$(eval $(call lanes_rule,$n)))
+
+lanes: all firmware $B/faults/make_scene ## 32, 64, 256 lanes: samples, rays, firmware, vector kit in both simulators, synthesis of a module (128: make check)
+	@tests/lanes.sh $B --whole
+.PHONY: lanes
+
 # The vector kit: writer, and the files that go with every kit.
 KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \
   $B/obj/firmware/sf_driver.o $B/kit/files.o

@@ -2,10 +2,11 @@
 # Builds of the accelerator with other lanes: a net that fits co-simulates with 0 differences, one that is too wide is
 # refused. 32 and 64 lanes in this build's system, 256 in a system of its own (BUILD/lanes, as little of it as the
 # comparison needs). What is built here runs a few hundred samples, so it is compiled for a quick build.
-# usage: lanes.sh BUILD
+# --whole: goes on to rays, firmware, the vector kit in both simulators and synthesis, of each number of lanes.
+# usage: lanes.sh BUILD [--whole]
 set -u
 export LC_ALL=C
-build=$(cd "${1:?usage: lanes.sh BUILD}" && pwd) || exit 2
+build=$(cd "${1:?usage: lanes.sh BUILD [--whole]}" && pwd) || exit 2
 root=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_lanes.XXXXXX") || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -76,4 +77,49 @@ refuses() {
 refuses "$build/bin/sf_cosim" "$work/256.snn" 256 128
 refuses "$wide/bin/sf_cosim" "$work/32.snn" 128 256
 tail -n 1 "$work/err"
+[ "${2:-}" = --whole ] || exit $failed
+
+# shows PATTERN WHAT PROGRAM ARGS...: it ends well and prints a line with the pattern
+shows() {
+  local pattern=$1 what=$2 started=$SECONDS
+  shift 2
+  if "$@" >"$work/out" 2>"$work/err" && grep -qE -- "$pattern" "$work/out"; then
+    echo "$what: $(grep -m 1 -E -- "$pattern" "$work/out" | sed 's/^[[:space:]]*//'), $((SECONDS - started)) s"
+  else
+    fail "$what"
+  fi
+}
+make_narrow() { MAKEFLAGS='' make -s -j1 -C "$root" B="$build" VERILATED_OPT="$quick" "$@" >"$work/out" 2>"$work/err"; }
+soc='' elf=firmware/sf_firmware.elf
+if [ -e "$build/bin/sf_soc" ] && [ -e "$build/$elf" ]; then soc=sf_soc; else echo "no emulated system, or no firmware: skipped"; fi
+
+# whole LANES BUILD RTL PROGRAMS: rooms beyond the nets, of a block with so many lanes
+whole() {
+  local lanes=$1 system=$2 rtl=$3 programs=$4 scene=$work/$1.snn here=$work/$1 backend simulator
+  mkdir "$here" || exit 1
+  # sim_render compares every pixel and counter with the core; the pictures are the same bytes.
+  for backend in rtl fixed; do
+    shows '"samples":[[:space:]]*[1-9]' "$lanes lanes: rays, $backend" "$programs/sim_render" "$scene" "$work/data" \
+      --crop 11,11,2,2 --backend $backend -o "$here/$backend.exr" --json --quiet
+  done
+  cmp "$here/rtl.exr" "$here/fixed.exr" || fail "$lanes lanes: another picture"
+  [ -z "$soc" ] || shows '^equal' "$lanes lanes: firmware" "$programs/sf_soc" "$scene" "$work/data" \
+    --firmware "$system/$elf" --crop 11,11,2,2 --stall 25 --quiet
+  "$system/bin/sf_export" "$scene" --vectors "$here/kit" --data "$work/data" --samples 4 >"$work/out" 2>"$work/err" ||
+    fail "$lanes lanes: no vector kit"
+  for simulator in $(command -v iverilog >/dev/null && echo icarus) verilator; do
+    shows '^PASS 4 samples' "$lanes lanes: kit in $simulator" env -u MAKEFLAGS make -s -C "$here/kit" LANES="$lanes" OPT=-O0 $simulator
+  done
+  if command -v yosys >/dev/null; then
+    shows "^\| .sf_pick. \| $lanes \|" "$lanes lanes: synthesis" "$root/tools/synth.sh" "$build/lanes/$lanes" \
+      --rtl "$rtl" --lanes "$lanes" --modules sf_pick
+  fi
+}
+for lanes in 32 64; do
+  programs=$build/lanes/$lanes
+  make_narrow "$programs/sim_render" ${soc:+"$programs/$soc"} || { fail "$lanes lanes: no build"; continue; }
+  whole $lanes "$build" "$root" "$programs"
+done
+make_wide "$wide/bin/sim_render" "$wide/bin/sf_export" ${soc:+"$wide/bin/$soc" "$wide/$elf"} || { fail "256 lanes: no build"; exit 1; }
+whole 256 "$wide" "$wide/variant" "$wide/bin"
 exit $failed
