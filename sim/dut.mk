@@ -15,7 +15,7 @@ $(DUT_OUT)/Vsf_top.mk: $(DUT_FILES) $(shell sed -n 's/^.*: //p' $(DUT_OUT)/Vsf_t
 
 $(DUT_OUT)/Vsf_top__ALL.a: $(DUT_OUT)/Vsf_top.mk
 	$(call say,CXX   $@)
-	$Q$(MAKE) -s -C $(DUT_OUT) -f Vsf_top.mk $(VERILATED_OPT) CXX=$(CXX) Vsf_top__ALL.a >/dev/null
+	$Q$(MAKE) -s -C $(DUT_OUT) -f Vsf_top.mk $(VERILATED_OPT) CXX=$(VERILATED_CXX) Vsf_top__ALL.a >/dev/null
 	@touch $@
 
 $(DUT_OUT)/pins.o: sim/pins.cpp sim/pins.h $(DUT_OUT)/Vsf_top.mk

@@ -22,7 +22,7 @@ $B/units/$1/V$1.mk: $(RTL_READY)
 	$$Qcd $(RTL_ROOT) && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $(or $(UNIT_TOP_$1),$1) \
 	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $B/units/$1) rtl/lint.vlt $$(RTL)
 $B/units/$1/V$1__ALL.a: $B/units/$1/V$1.mk
-	$$Q$$(MAKE) -s -C $B/units/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(CXX) V$1__ALL.a >/dev/null
+	$$Q$$(MAKE) -s -C $B/units/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$1__ALL.a >/dev/null
 	@touch $$@
 endef
 $(foreach u,$(UNIT_TOPS),$(eval $(call unit_rule,$u)))
