@@ -43,6 +43,10 @@ static void fill(fx_scene *s)
   for (int64_t i = 0; i < 2 * s->grid.entries; i++) s->grid.table[i] = (int8_t)pick(20, (uint64_t)i, 127);
   s->net.steps = RIG_STEPS;
   s->net.exp_in = (fx_scale){50000, 15, 4096}, s->net.sigmoid_in = (fx_scale){50000, 13, 0};
+  s->step_q24 = 30000, s->max_samples = 1024; /* from here on what no figure depends on */
+  s->to_box_scale = 0.5, s->dir_scale = 0x1p-10;
+  for (int l = 0; l < FX_LEVELS_MAX; l++) s->feature_scale[l] = 0x1p-10;
+  for (int l = 0; l < SF_LAYERS; l++) s->current_scale[l] = 0x1p-12;
 }
 
 static double rate_of(const fx_block *b, int layer, int steps)
@@ -101,17 +105,10 @@ sf_status rig_open_decoder(rig *r, int inputs, int steps, double rate)
 {
   *r = (rig){.block = sf_aligned_alloc(sizeof *r->block), .scratch = sf_aligned_alloc(sizeof *r->scratch)};
   const int in[SF_LAYERS] = {0, 0, inputs, 128, 128}, out[SF_LAYERS] = {0, 0, 128, 128, 3};
-  size_t rows = 0;
-  for (int l = 0; l < SF_LAYERS; l++) {
+  for (int l = 0; l < SF_LAYERS; l++)
     r->scene.net.layer[l] = (fx_layer){.n_in = in[l], .n_out = out[l], .bias = l >= FX_C1};
-    rows += (size_t)fx_layer_rows(&r->scene.net.layer[l]);
-  }
-  int8_t *w = r->scene.owner = calloc(rows, SF_LANES);
-  if (!w) return sf_fail(SF_E_MEMORY, "bench: no memory for %zu rows of weights", rows);
-  for (int l = 0; l < SF_LAYERS; l++) {
-    r->scene.net.layer[l].w = w;
-    w += (size_t)fx_layer_rows(&r->scene.net.layer[l]) * SF_LANES;
-  }
+  r->scene.occ_res = 8;
+  SF_TRY(fx_scene_allocate(&r->scene, "bench"));
   fill(&r->scene);
   r->scene.net.steps = steps;
   SF_TRY(fx_core_open(&r->core, &r->scene, NULL));
