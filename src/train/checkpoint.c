@@ -151,7 +151,7 @@ sf_status sf_checkpoint_load(sf_trainer *t, const char *path)
   sf_status status = load_state(t, &set);
   if (!status.code && t->averaged) status = sf_average_reserve(t);
   sf_tensor list[TENSORS_MAX];
-  const int n = list_tensors(t, true, list);
+  const int n = status.code ? 0 : list_tensors(t, true, list);
   for (int i = 0; i < n && !status.code; i++) {
     const sf_tensor *from;
     status = sf_tensors_get(&set, list[i].name, list[i].type, list[i].dims, list[i].shape, &from);
