@@ -112,20 +112,13 @@ static void place(sf_batch *b, const sf_march *march, int r)
 
 /* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
  * be empty, the lattice is made coarser, until it is settled. */
-static bool may_double(const sf_trainer *t)
-{
-  const sf_config *c = &t->model.config;
-  return t->stride < 8 && c->lattice >= 2 * t->stride * SF_LATTICE_MIN &&
-         c->dt_gamma * 2 * (float)t->stride <= SF_GAMMA_MAX;
-}
-
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
   double ratio = t->options.samples / fmax(b->samples, 1);
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
   if (t->progress < sf_lattice_settles && !sf_tuning(t)) {
-    if (t->rays < 512 && may_double(t)) t->stride *= 2, t->rays *= 2;
+    if (t->rays < 512 && t->stride < 8) t->stride *= 2, t->rays *= 2;
     if (t->rays > 1536 && t->stride > 1) t->stride /= 2, t->rays /= 2;
   }
   const int most = t->options.rays ? t->options.rays : RAYS_MAX;
@@ -135,7 +128,9 @@ void sf_batch_adapt(sf_trainer *t)
 void sf_batch_settle(sf_trainer *t)
 {
   sf_config *c = &t->model.config;
-  const int coarsest = c->backbone == SF_TENSORF ? 1 : 2, settled = t->stride < coarsest ? t->stride : coarsest;
+  const bool as_it_is =
+      t->stride == 1 || c->backbone == SF_TENSORF || c->lattice < 2 * SF_LATTICE_MIN || 2 * c->dt_gamma > SF_GAMMA_MAX;
+  const int settled = as_it_is ? 1 : 2;
   t->rays = t->rays * settled / t->stride;
   c->lattice /= settled;
   c->dt_gamma *= (float)settled;
