@@ -27,9 +27,9 @@ done
 
 # run.sh on stand-ins that end as libFuzzer does at a timeout: `nap` slept through its first one, which is none, so it is
 # called again; `spin` needs the processor for ever.
-mkdir -p "$work/stub/tests/fuzz" "$work/stub/fuzz/bin"
-printf '#!/bin/bash\nmkdir -p "$1"\n' >"$work/stub/tests/fuzz/seeds"
-cat >"$work/stub/fuzz/bin/fuzz_nap" <<'END'
+mkdir -p "$work/standins/tests/fuzz" "$work/standins/fuzz/bin"
+printf '#!/bin/bash\nmkdir -p "$1"\n' >"$work/standins/tests/fuzz/seeds"
+cat >"$work/standins/fuzz/bin/fuzz_nap" <<'END'
 #!/bin/bash
 echo >>"$0.calls"
 name=${0##*/fuzz_}
@@ -45,11 +45,11 @@ echo one >"$findings/timeout-1"
 echo "Test unit written to $findings/timeout-1"
 exit 70
 END
-cp "$work/stub/fuzz/bin/fuzz_nap" "$work/stub/fuzz/bin/fuzz_spin"
-chmod +x "$work"/stub/{tests/fuzz/seeds,fuzz/bin/*}
-table=$(FUZZ_PATIENCE=1 "$here/run.sh" "$work/stub" 60 1 nap spin 2>&1) && failed=1 && echo "FAILED: a timeout is no finding"
+cp "$work/standins/fuzz/bin/fuzz_nap" "$work/standins/fuzz/bin/fuzz_spin"
+chmod +x "$work"/standins/{tests/fuzz/seeds,fuzz/bin/*}
+table=$(FUZZ_PATIENCE=1 "$here/run.sh" "$work/standins" 60 1 nap spin 2>&1) && failed=1 && echo "FAILED: a timeout is no finding"
 grep -qE '^ +nap +20 .* none$' <<<"$table" && grep -qE '^ +spin +10 .* FOUND$' <<<"$table" || failed=1
-[ ! -e "$work/stub/fuzz/findings/nap/timeout-1" ] && [ -e "$work/stub/fuzz/findings/spin/timeout-1" ] || failed=1
+[ ! -e "$work/standins/fuzz/findings/nap/timeout-1" ] && [ -e "$work/standins/fuzz/findings/spin/timeout-1" ] || failed=1
 [ "$(wc -l <<<"$table")" -eq 4 ] || failed=1 # nothing of a killed process
 echo "$table"
 exit $failed
