@@ -173,7 +173,7 @@ enum { FX_DIR_FRAC_MAX = 11, FX_SH = 16 /* harmonics */ };
  * at_q16[n] instead of n, product >> 16); sample positions are inside [0, 2^24) on every axis. Made by quant/ (the only
  * bridge). */
 typedef struct fx_ray {
-  int64_t origin[3], step[3]; /* Q24.RAY_FRAC */
+  int64_t origin[3], step[3]; /* Q24.FX_RAY_FRAC */
   int32_t count;              /* lattice points in the box, 0 = misses */
   int32_t first_q16;          /* distance from the camera to sample 0 in lattice steps, Q16.16 */
   int16_t unit[3];            /* direction, unit length but for rounding, Q1.14 */
