@@ -1,8 +1,8 @@
 #!/bin/bash
 # Fuzzes targets, JOBS of them at a time.   usage: run.sh BUILD SECONDS JOBS TARGET...    run.sh --installed CLANG
 # Inputs that reach something new stay in BUILD/fuzz/corpus/TARGET for the next time, findings in
-# BUILD/fuzz/findings/TARGET, the processor time spent since the last finding in BUILD/fuzz/spent/TARGET. Exits with 1
-# when there was a finding.
+# BUILD/fuzz/findings/TARGET, the processor time spent since the last finding in BUILD/fuzz/spent/TARGET, kept every ten
+# minutes. Exits with 1 when there was a finding.
 set -u
 if [ "$1" = --installed ]; then
   echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' |
@@ -10,7 +10,7 @@ if [ "$1" = --installed ]; then
   echo "fuzz: $2 with its sanitizer libraries is not installed: \`make deps-fuzz\` installs clang and libclang-rt-dev" >&2
   exit 1
 fi
-build=$1 seconds=$2 jobs=$3 patience=${FUZZ_PATIENCE:-10} # seconds of one input
+build=$1 seconds=$2 jobs=$3 patience=${FUZZ_PATIENCE:-10} slice=600 # seconds of one input, of one call
 shift 3
 here=$(dirname "$0")
 out=$build/fuzz
@@ -45,22 +45,23 @@ spend() { # TARGET STATUS "USER SYSTEM"
 fuzz() { # TARGET
   local target=$1 end=$((SECONDS + seconds)) runs=0
   local corpus=$out/corpus/$target findings=$out/findings/$target log=$out/$target.log
-  local sources options status last artifact clock hours again count
+  local sources options status last artifact clock hours left count
   mkdir -p "$corpus" "$findings"
   sources=("$corpus" "$seeds/$target")
   [ -d "$here/regressions/$target" ] && sources+=("$here/regressions/$target")
   options=(-timeout="$patience" -rss_limit_mb=2048 -malloc_limit_mb=512 -print_final_stats=1 -artifact_prefix="$findings/")
   [ -f "$here/$target.dict" ] && options+=(-dict="$here/$target.dict")
   while :; do
-    clock=$({ time "$out/bin/fuzz_$target" -max_total_time=$((end > SECONDS ? end - SECONDS : 1)) "${options[@]}" \
+    left=$((end > SECONDS ? end - SECONDS : 1))
+    clock=$({ time "$out/bin/fuzz_$target" -max_total_time=$((left < slice ? left : slice)) "${options[@]}" \
       "${sources[@]}" >"$log" 2>&1; } 2>&1)
-    status=$? again=
+    status=$?
     artifact=$(sed -n 's/.*Test unit written to //p' "$log" | tail -n 1)
-    [[ $artifact == "$findings"/timeout-* ]] && ! needs_long "$target" "$artifact" && rm "$artifact" && status=0 again=yes
+    [[ $artifact == "$findings"/timeout-* ]] && ! needs_long "$target" "$artifact" && rm "$artifact" && status=0
     count=$(number number_of_executed_units "$log")
     runs=$((runs + ${count:-0}))
     hours=$(spend "$target" $status "$clock")
-    [ "$again" ] && [ $SECONDS -lt $end ] || break
+    [ $status -eq 0 ] && [ $SECONDS -lt $end ] || break
   done
   last=$(grep -a 'cov: ' "$log" | tail -n 1)
   printf '  %-11s %10s %8s %9s %9s %7s %7s  %s\n' "$target" "$runs" "$(number average_exec_per_sec "$log")" \
