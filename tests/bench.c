@@ -289,6 +289,7 @@ static void bench_adam(cJSON *json, const ceilings *c)
 {
   sf_model m = full_model(SF_NET_SNN, 8);
   float *g = sf_aligned_alloc(m.size * 4), *a = sf_aligned_alloc(m.size * 4), *v = sf_aligned_alloc(m.size * 4);
+  const sf_kernels *kernels = sf_kernels_training();
   sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1, 0};
   double best = 1e9, naive = 1e9;
   const double touched = 0.4; /* of the cache lines, as in an iteration of 16384 samples on lego */
@@ -299,7 +300,7 @@ static void bench_adam(cJSON *json, const ceilings *c)
 #pragma omp parallel for schedule(dynamic, 1)
     for (int l = 0; l < 16; l++) {
       const size_t at = 2 * m.level[l].offset;
-      sf_adam_update(&adam, (size_t)2 * m.level[l].entries, m.value + at, g + at, a + at, v + at);
+      kernels->adam(&adam, (size_t)2 * m.level[l].entries, m.value + at, g + at, a + at, v + at);
     }
     best = fmin(best, sf_seconds() - start);
     start = sf_seconds();

@@ -253,7 +253,10 @@ END_TEST
 /* The twin rounds every operand to bfloat16: 2^-9 through four layers. */
 START_TEST(bfloat16_decoder_near_oracle)
 {
-  for (int ndc = 0; ndc < 2; ndc++) compare("avx512bf16", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
+  for (int ndc = 0; ndc < 2; ndc++) {
+    compare("avx512bf16", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
+    compare("amx", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
+  }
 }
 END_TEST
 
@@ -375,12 +378,12 @@ START_TEST(backward_of_every_isa_agrees)
   static const struct {
     const char *isa;
     float bound;
-  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}};
+  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}, {"amx", 1e-2f}};
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *portable = sf_kernels_select("portable");
   random_gradient(dc);
   for (int kind = SF_NET_SNN; kind <= SF_NET_ANN; kind++)
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
       for (int g = 0; g < 2; g++) {
         const sf_kernels *k = sf_kernels_select(other[i].isa);
         if (!k) continue;

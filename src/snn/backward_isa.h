@@ -104,9 +104,9 @@ typedef struct backward_out {
 static void layer_backward(const sf_net_view *net, int index, float k, int t, const uint32_t *wt, int pairs,
                            const word *dy, const float *h, backward_out out)
 {
-  float tile[TILE * B];
+  float tile[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
-    n = tile_rows(net->hidden - m);
+    n = layer_rows(net->hidden - m);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     fire_backward(net, index, k, t, n, h + m * B, tile, out.carry + m * B, out.leak);
     if (out.sum) add_to(out.sum + m * B, tile, n * B);
@@ -201,6 +201,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
   const int hidden = net->hidden;
   const size_t plane = (size_t)hidden * B * sizeof(float);
   float gsigma[B] = {0}, gcolour[3 * B] = {0};
+  tiles_begin();
   memset(w->g1, 0, plane);
   memset(w->g3, 0, plane);
   memset(w->g4, 0, plane);
@@ -226,6 +227,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
                    (backward_out){w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
   }
   constant_backward(n, x, df, grad, w);
+  tiles_end();
   for (int i = 0; i < SF_LAYERS; i++)
     for (int l = 0; l < B; l++) grad->leak[i] += w->leak[i][l];
 }

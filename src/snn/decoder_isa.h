@@ -13,9 +13,14 @@ static inline int decoder_rows(const sf_decoder_view *v)
 }
 
 /* Rows of the appearance features as the products need them. */
+#if defined(__AMX_BF16__)
+enum { FEATURE_ROWS = TILE_SIDE };
+#else
+enum { FEATURE_ROWS = 4 };
+#endif
 static inline int feature_rows(const sf_decoder_view *v)
 {
-  return (v->features + 3) / 4 * 4;
+  return (v->features + FEATURE_ROWS - 1) / FEATURE_ROWS * FEATURE_ROWS;
 }
 
 static void decoder_prepare(const sf_decoder_view *v, sf_decoder_words *n)
@@ -119,6 +124,7 @@ static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int 
   const sf_net_view *v = &net->view;
   const int pairs = v->hidden / PAIR;
   sf_block *x = &d->net;
+  tiles_begin();
   decoder_inputs(n, d, w);
   for (int t = 0; t < steps; t++) {
     const int at = slot(t, keep), before = slot(t - 1, keep);
@@ -129,6 +135,7 @@ static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int 
     sigmoid(3 * B, x->j[t], c);
     integrate(v, v->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
   }
+  tiles_end();
 }
 
 /* grad[rows] += x[rows][B] summed over the lanes. */
@@ -156,7 +163,7 @@ static void decoder_inputs_backward(const sf_decoder_words *n, sf_decoder_block 
   pack_lanes(w->sum3, hidden, words(w->lanes));
   add_outer(grad->w1, rows, words(w->lanes), hidden, t, rows);
   pack_rows(w->sum3, hidden, words(w->rows));
-  gemm(operands(n->w1t), hidden / PAIR, v->inputs, hidden / PAIR, words(w->rows), B, B, NULL, 0, din, B);
+  gemm(operands(n->w1t), hidden / PAIR, rows, hidden / PAIR, words(w->rows), B, B, NULL, 0, din, B);
   encode_backward(v, d->in, din);
   memset(din + v->features * B, 0, (size_t)(features - v->features) * B * sizeof *din);
   pack_lanes(d->product_rows, v->products, packed);
@@ -176,6 +183,7 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   const int hidden = v->hidden;
   const size_t plane = (size_t)hidden * B * sizeof(float);
   float gcolour[3 * B] = {0}, gsum[4 * B] = {0};
+  tiles_begin();
   memset(w->g3, 0, plane);
   memset(w->g4, 0, plane);
   memset(w->sum1, 0, plane);
@@ -190,6 +198,7 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
                    (backward_out){w->g3, w->leak[2], w->sum3, NULL, NULL, NULL});
   }
   decoder_inputs_backward(n, d, dproduct, grad, w);
+  tiles_end();
   add_lane_sums(grad->b2, w->sum1, hidden);
   add_lane_sums(grad->b3, gsum, 3);
   for (int i = 0; i < SF_LAYERS; i++)

@@ -49,9 +49,9 @@ static inline void charge(const sf_net_view *net, int layer, float k, int t, int
 static void layer(const sf_net_view *net, int index, float k, int t, const word *w, int pairs, const word *in,
                   const float *init, const float *prev, float *h, word *s)
 {
-  float tile[TILE * B];
+  float tile[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n, s += n / PAIR * B) {
-    n = tile_rows(net->hidden - m);
+    n = layer_rows(net->hidden - m);
     const float *current = init ? init + m * B : NULL;
     if (w) {
       gemm(w + m * pairs, pairs, n, pairs, in, B, B, current, B, tile, B);
@@ -117,9 +117,11 @@ static void constant_current(const sf_net_words *n, const uint32_t *weights, int
 
 static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
 {
+  tiles_begin();
   constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
   for (int t = 0; t < steps; t++)
     density_step(n, x, t, 0, w->sum1, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+  tiles_end();
 }
 
 /* C2 at step t from the spikes of C1 in w->spikes; activations to w->rows. bias: [hidden][B] or NULL. */
@@ -148,6 +150,7 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
   const sf_net_view *net = &n->view;
   const int pairs = net->hidden / PAIR;
   word *spikes = words(w->spikes), *rows = words(w->rows);
+  tiles_begin();
   constant_current(n, n->w1, net->features, x->f, rows, w->sum1);
   constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, rows, w->sum3);
   for (int t = 0; t < steps; t++) {
@@ -164,5 +167,6 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
     sigmoid(3 * B, x->j[t], c);
     integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
   }
+  tiles_end();
 }
 #endif

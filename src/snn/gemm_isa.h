@@ -129,7 +129,7 @@ static inline __attribute__((always_inline)) void gemm_tile(int M, int V, const 
     for (int v = 0; v < V; v++) *(vf *)(c + m * ldc + v * VL) = acc[m][v];
 }
 
-/* Rows of the next tile: 6 or 4 for every multiple of 16 rows, so that pairs of rows stay together. */
+/* Rows of the next register tile: 6 or 4 for every multiple of 16 rows, so that pairs of rows stay together. */
 static inline int tile_rows(int left)
 {
   if (TILE_M == 6 && (left > 8 || left % 6 == 0)) return 6;
@@ -152,9 +152,8 @@ static inline __attribute__((always_inline)) void gemm_columns(int V, int m, con
   }
 }
 
-/* c[m][n] = init + a[m][k] b[k][n], k in words; n a multiple of 16. c may be init. */
-static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, int n, const float *init, int ldi,
-                 float *c, int ldc)
+static void gemm_vectors(const word *a, int lda, int m, int k, const word *b, int ldb, int n, const float *init,
+                         int ldi, float *c, int ldc)
 {
   int j = 0;
   for (; j + TILE_V * VL <= n; j += TILE_V * VL)
@@ -162,6 +161,36 @@ static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, i
   for (; j + 2 * VL <= n; j += 2 * VL)
     gemm_columns(2, m, a, lda, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
   for (; j < n; j += VL) gemm_columns(1, m, a, lda, k, b + j, ldb, init ? init + j : NULL, ldi, c + j, ldc);
+}
+
+/* layer_rows: rows of the next product of a layer, at most LAYER_ROWS, which are worked on while they are in the
+ * first-level cache. */
+#if defined(__AMX_BF16__)
+#include "snn/amx_isa.h"
+#else
+enum { LAYER_ROWS = TILE_M };
+
+static inline int layer_rows(int left)
+{
+  return tile_rows(left);
+}
+
+static inline void tiles_begin(void) {}
+
+static inline void tiles_end(void) {}
+#endif
+
+/* c[m][n] = init + a[m][k] b[k][n], k in words; n a multiple of 16. c may be init. */
+static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, int n, const float *init, int ldi,
+                 float *c, int ldc)
+{
+#if defined(__AMX_BF16__)
+  const int whole = k % TILE_HALF ? 0 : m / TILE_SIDE * TILE_SIDE;
+  if (whole) gemm_tiles(a, lda, whole, k, b, ldb, n, init, ldi, c, ldc);
+  if (whole == m) return;
+  a += whole * lda, m -= whole, c += whole * ldc, init = init ? init + whole * ldi : NULL;
+#endif
+  gemm_vectors(a, lda, m, k, b, ldb, n, init, ldi, c, ldc);
 }
 
 static inline vf interleave(vf a, vf b, int high)

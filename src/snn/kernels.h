@@ -96,6 +96,12 @@ typedef struct sf_net_scratch {
   float leak[SF_LAYERS][SF_BLOCK];
 } sf_net_scratch;
 
+typedef struct sf_adam {
+  double lr, beta1, beta2, epsilon;
+  int64_t step; /* 1, 2, ... */
+  float l1;     /* gradient of |value|; 0 = none, and what has no gradient stays as it is */
+} sf_adam;
+
 typedef struct sf_kernels {
   const char *name;
   /* Once per change of the parameters. */
@@ -125,10 +131,12 @@ typedef struct sf_kernels {
   /* Adds to grad; dproduct[SF_BLOCK][products]. dcolour[T][3*SF_BLOCK]. */
   void (*decoder_backward)(const sf_decoder_words *decoder, sf_decoder_block *block, int steps, const float *dcolour,
                            float *dproduct, sf_decoder_grad *grad, sf_net_scratch *scratch);
+  /* value[n] -= ...; clears grad. m, v: moments. */
+  void (*adam)(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
 } sf_kernels;
 
-/* "portable", "avx2", "avx512", "avx512bf16" (weights and gradients rounded to bfloat16, membranes and sums fp32), or
- * NULL for the best of this CPU that does not round; NULL when this CPU or build lacks it. */
+/* "portable", "avx2", "avx512", "avx512bf16" and "amx" (weights and gradients rounded to bfloat16, membranes and sums
+ * fp32), or NULL for the best of this CPU that does not round; NULL when this CPU or build lacks it. */
 const sf_kernels *sf_kernels_select(const char *name);
 /* The fastest for training on this CPU. */
 const sf_kernels *sf_kernels_training(void);

@@ -1,4 +1,5 @@
 /* The kernels of kernels.h for one instruction set: the build defines SF_ISA. */
+#include "snn/adam_isa.h"
 #include "snn/decoder_isa.h"
 #include "snn/grid_isa.h"
 #include "snn/vm_isa.h"
@@ -20,4 +21,5 @@ const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .vm_backward = vm_backward,
                                                  .decoder_prepare = decoder_prepare,
                                                  .decoder_forward = decoder_forward,
-                                                 .decoder_backward = decoder_backward};
+                                                 .decoder_backward = decoder_backward,
+                                                 .adam = adam_update};

@@ -5,7 +5,7 @@
 #include "snn/gemm_isa.h"
 #include "snn/kernels.h"
 
-enum { B = SF_BLOCK, IN3 = SF_DIR_FEATURES + SF_GEO_FEATURES, BW = B / PAIR, TILE = 6 };
+enum { B = SF_BLOCK, IN3 = SF_DIR_FEATURES + SF_GEO_FEATURES, BW = B / PAIR };
 
 /* Weights [rows][columns] (row stride ld) as words [rows][padded / PAIR], zero beyond `columns`. */
 static void pack_matrix(const float *w, int row, int column, int rows, int columns, int padded, uint32_t *out)

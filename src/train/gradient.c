@@ -137,8 +137,8 @@ void sf_gradient_grid(sf_trainer *t, const sf_adam *adam)
     for (int b = 0; b < t->batch.blocks; b++)
       t->kernels->grid_backward(l, t->batch.x + (size_t)b * 3 * SF_BLOCK,
                                 t->batch.df + ((size_t)b * levels + level) * 2 * SF_BLOCK, t->grad + table);
-    sf_adam_update(adam, (size_t)2 * l->entries, t->model.value + first, t->grad + first, t->moment1 + first,
-                   t->moment2 + first);
+    t->kernels->adam(adam, (size_t)2 * l->entries, t->model.value + first, t->grad + first, t->moment1 + first,
+                     t->moment2 + first);
   }
 }
 

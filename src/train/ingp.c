@@ -84,8 +84,8 @@ static void update(sf_trainer *t)
   sf_gradient_grid(t, &adam);
   adam.lr = t->options.lr_net * fade;
   const size_t nets = t->model.param[SF_P_W1].offset;
-  sf_adam_update(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
-                 t->moment2 + nets);
+  t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
+                   t->moment2 + nets);
 }
 
 static int probe_inputs(const sf_config *config)

@@ -217,13 +217,6 @@ sf_status sf_occupancy_update(sf_trainer *trainer, int steps);
 /* The point of cell `cell` at `place` in [0,1]^3 of it, as a position in [0,1]^3 of the box. */
 void sf_occupancy_point(const sf_config *config, size_t cell, const float place[3], float x[3]);
 
-typedef struct sf_adam {
-  double lr, beta1, beta2, epsilon;
-  int64_t step; /* 1, 2, ... */
-  float l1;     /* gradient of |value|; 0 = none, and what has no gradient stays as it is */
-} sf_adam;
-/* value[n] -= ...; clears grad. */
-void sf_adam_update(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
 /* The nets' weights and leaks are finite and of a size that a net can have. */
 sf_status sf_parameters_check(const sf_trainer *trainer);
 /* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */

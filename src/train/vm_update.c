@@ -68,8 +68,8 @@ static void update_part(sf_trainer *t, const sf_adam *adam, const sf_param *p)
   const size_t chunk = 1 << 14, end = p->offset + p->size;
 #pragma omp parallel for schedule(static)
   for (size_t i = p->offset; i < end; i += chunk)
-    sf_adam_update(adam, end - i < chunk ? end - i : chunk, t->model.value + i, t->grad + i, t->moment1 + i,
-                   t->moment2 + i);
+    t->kernels->adam(adam, end - i < chunk ? end - i : chunk, t->model.value + i, t->grad + i, t->moment1 + i,
+                     t->moment2 + i);
 }
 
 void sf_vm_update(sf_trainer *t)
@@ -88,6 +88,6 @@ void sf_vm_update(sf_trainer *t)
   adam.lr = t->options.lr_net * fade;
   adam.l1 = 0;
   const size_t nets = t->model.param[SF_V_BASIS].offset;
-  sf_adam_update(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
-                 t->moment2 + nets);
+  t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
+                   t->moment2 + nets);
 }
