@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #if defined(__x86_64__)
+#include <immintrin.h>
 typedef float lanes __attribute__((vector_size(64)));
 
 /* 24 independent chains of 16 lanes: as many as hide the latency of either instruction. */
@@ -40,16 +41,36 @@ CHAINS(fma_chain_avx512, "avx512f,fma", "vfmadd213ps")
 CHAINS(dot_chain_avx512vnni, "avx512f,avx512vnni", "vpdpbusd")  /* four 8-bit multiply-adds a lane */
 CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-adds a lane */
 
+/* Four independent 16 x 16 sums of products of 32 numbers. */
+__attribute__((target("amx-tile,amx-bf16"))) static double tile_chain(long rounds)
+{
+  const struct {
+    uint8_t palette, start, reserved[14];
+    uint16_t bytes[16];
+    uint8_t rows[16];
+  } shape = {.palette = 1, .bytes = {64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16}};
+  _tile_loadconfig(&shape);
+  for (long r = 0; r < rounds; r++) {
+    _tile_dpbf16ps(0, 4, 5);
+    _tile_dpbf16ps(1, 4, 5);
+    _tile_dpbf16ps(2, 4, 5);
+    _tile_dpbf16ps(3, 4, 5);
+  }
+  _tile_release();
+  return 1;
+}
+
 /* Multiply-adds per second of all threads in the arithmetic of the named kernels. */
 static double peak(const char *kernels)
 {
   static const struct {
     const char *name;
     double (*chain)(long rounds);
-    int per_lane;
-  } known[] = {{"avx512", fma_chain_avx512, 1},
-               {"avx512bf16", dot_chain_avx512bf16, 2},
-               {"avx512vnni", dot_chain_avx512vnni, 4}};
+    int per_round;
+  } known[] = {{"avx512", fma_chain_avx512, 24 * 16},
+               {"avx512bf16", dot_chain_avx512bf16, 24 * 16 * 2},
+               {"avx512vnni", dot_chain_avx512vnni, 24 * 16 * 4},
+               {"amx", tile_chain, 4 * 16 * 16 * 32}};
   const long rounds = 10000000;
   for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
     if (strcmp(kernels, known[i].name)) continue;
@@ -57,7 +78,7 @@ static double peak(const char *kernels)
 #pragma omp parallel reduction(+ : sink)
     sink += known[i].chain(rounds);
     const double seconds = sf_seconds() - start;
-    return sink == 0.123 ? 0 : (double)rounds * 24 * 16 * known[i].per_lane * omp_get_max_threads() / seconds;
+    return sink == 0.123 ? 0 : (double)rounds * known[i].per_round * omp_get_max_threads() / seconds;
   }
   return NAN;
 }
