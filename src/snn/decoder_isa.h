@@ -13,7 +13,7 @@ static inline int decoder_rows(const sf_decoder_view *v)
 }
 
 /* Rows of the appearance features as the products need them. */
-#if defined(__AMX_BF16__)
+#if defined(SF_AMX)
 enum { FEATURE_ROWS = TILE_SIDE };
 #else
 enum { FEATURE_ROWS = 4 };

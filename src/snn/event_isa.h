@@ -59,7 +59,7 @@ static inline int list_bits(uint64_t bits, uint8_t offset, row_index *list)
 }
 
 /* Above these shares of neurons firing in a block, the dense products are faster (measured: make bench). */
-#if defined(__AMX_BF16__)
+#if defined(SF_AMX)
 static const float dense_forward = 0, dense_backward = 0;
 #else
 static const float dense_forward = 0.25f, dense_backward = 0.45f;

@@ -21,6 +21,9 @@ typedef int vi __attribute__((vector_size(4 * VL)));
 #if defined(__AVX2__)
 #include <immintrin.h>
 #endif
+#if defined(__AMX_BF16__) || defined(__AMXBF16__) /* clang 14's name */
+#define SF_AMX
+#endif
 #if defined(__AVX512BF16__)
 enum { PAIR = 2 };
 typedef uint32_t word;
@@ -165,7 +168,7 @@ static void gemm_vectors(const word *a, int lda, int m, int k, const word *b, in
 
 /* layer_rows: rows of the next product of a layer, at most LAYER_ROWS, which are worked on while they are in the
  * first-level cache. */
-#if defined(__AMX_BF16__)
+#if defined(SF_AMX)
 #include "snn/amx_isa.h"
 #else
 enum { LAYER_ROWS = TILE_M };
@@ -184,7 +187,7 @@ static inline void tiles_end(void) {}
 static void gemm(const word *a, int lda, int m, int k, const word *b, int ldb, int n, const float *init, int ldi,
                  float *c, int ldc)
 {
-#if defined(__AMX_BF16__)
+#if defined(SF_AMX)
   const int whole = k % TILE_HALF ? 0 : m / TILE_SIDE * TILE_SIDE;
   if (whole) gemm_tiles(a, lda, whole, k, b, ldb, n, init, ldi, c, ldc);
   if (whole == m) return;
