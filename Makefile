@@ -63,8 +63,10 @@ SOC_MISSING := $(strip $(if $(UNICORN_LIBS),,libunicorn-dev) $(if $(shell comman
 NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc)
 TOOLS := $(filter-out $(NO_SOC),$(patsubst tools/%.c,%,$(wildcard tools/*.c)))
 TESTS := $(filter-out $(NO_SOC),$(patsubst tests/%.c,%,$(wildcard tests/test_*.c)))
-# Objects that only pattern rules name are kept; a bare .SECONDARY: would leave a library without what it newly needs.
+# What only pattern rules name is kept: objects, and goals given by their whole path. A bare .SECONDARY: would leave a
+# library without what it newly needs.
 .SECONDARY: $(patsubst %.c,$B/obj/%.o,$(wildcard tests/*.c tests/*/*.c tools/*.c))
+.SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
 DUT_TESTS := test_rtl bench
 
