@@ -44,7 +44,7 @@ CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-
 /* Four independent 16 x 16 sums of products of 32 numbers. */
 __attribute__((target("amx-tile,amx-bf16"))) static double tile_chain(long rounds)
 {
-  const struct {
+  static const struct { /* GCC does not see that it is read */
     uint8_t palette, start, reserved[14];
     uint16_t bytes[16];
     uint8_t rows[16];
