@@ -130,6 +130,29 @@ START_TEST(the_lattice_settles)
 }
 END_TEST
 
+/* Twice its steps would be no model's: in the first case the lattice would be too coarse, in the second dt_gamma too
+ * large. */
+START_TEST(a_lattice_at_its_limit_settles_as_it_is)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = run_in_box(_i);
+  o.samples = 64;
+  if (_i)
+    o.config.dt_gamma = 0.75f * SF_GAMMA_MAX;
+  else
+    o.config.lattice = 2 * SF_LATTICE_MIN - 1;
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, o.stage1);
+  ck_assert_int_gt(t->stride, 1);
+  steps(t, o.stage2);
+  ck_assert_int_eq(t->stride, 1);
+  ck_assert_int_eq(t->model.config.lattice, o.config.lattice);
+  ck_assert_float_eq(t->model.config.dt_gamma, o.config.dt_gamma);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+}
+END_TEST
+
 START_TEST(resume_continues_bit_identically)
 {
   sf_train_options o = run_in_box(_i);
@@ -385,6 +408,7 @@ int main(void)
   tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
   tcase_add_loop_test(tc, the_lattice_settles, 0, 2);
+  tcase_add_loop_test(tc, a_lattice_at_its_limit_settles_as_it_is, 0, 2);
   tcase_add_test(tc, the_chosen_steps_are_trained_alone);
   tcase_add_test(tc, fixed_steps_freeze_the_budget);
   tcase_add_test(tc, every_prefix_is_evaluated);
