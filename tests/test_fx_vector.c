@@ -6,7 +6,7 @@
 #include "src/fx/net.h"
 #include <stdio.h>
 
-static const char *const instruction_sets[] = {"avx2", "avx512vnni"};
+static const char *const instruction_sets[] = {"avx2", "avx512vnni", "amx"};
 
 static long samples_wanted(void)
 {
@@ -304,7 +304,7 @@ START_TEST(hard_cases_equal_portable)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++)
-    for (int set = 0; set < 2; set++) {
+    for (int set = 0; set < 3; set++) {
       hard h;
       if (!fx_kernels_select(instruction_sets[set])) continue;
       hard_begin(&h, c, variant);
@@ -356,11 +356,11 @@ int main(void)
   Suite *suite = suite_create("fx_vector");
   TCase *equal = tcase_create("equal");
   tcase_set_timeout(equal, 0);
-  tcase_add_loop_test(equal, nets_equal_portable, 0, 2);
-  tcase_add_loop_test(equal, decoders_equal_portable, 0, 2);
+  tcase_add_loop_test(equal, nets_equal_portable, 0, 3);
+  tcase_add_loop_test(equal, decoders_equal_portable, 0, 3);
   tcase_add_test(equal, portable_block_equals_single_samples);
-  tcase_add_loop_test(equal, grid_equals_portable, 0, 2);
-  tcase_add_loop_test(equal, rays_equal_portable, 0, 2);
+  tcase_add_loop_test(equal, grid_equals_portable, 0, 3);
+  tcase_add_loop_test(equal, rays_equal_portable, 0, 3);
   tcase_add_test(equal, portable_waves_equal_single_rays);
   tcase_add_test(equal, unknown_kernels_are_refused);
   tcase_add_test(equal, absurd_scenes_are_refused);

@@ -312,7 +312,7 @@ START_TEST(positions_are_precise_in_the_largest_boxes)
 }
 END_TEST
 
-static const char *const instruction_sets[] = {"portable", "avx2", "avx512vnni"};
+static const char *const instruction_sets[] = {"portable", "avx2", "avx512vnni", "amx"};
 
 /* Vector kernels and single rays: same pixels and events; and no light is lost or made. */
 START_TEST(many_rays_equal_single_rays)
@@ -490,7 +490,7 @@ int main(void)
   tcase_add_test(tc, integer_cells_are_those_of_the_formula);
   tcase_add_test(tc, integer_rays_follow_the_float_march);
   tcase_add_test(tc, positions_are_precise_in_the_largest_boxes);
-  tcase_add_loop_test(tc, many_rays_equal_single_rays, 0, 3);
+  tcase_add_loop_test(tc, many_rays_equal_single_rays, 0, 4);
   tcase_add_test(tc, fog_takes_the_light_of_its_depth);
   tcase_add_test(tc, files_keep_the_box);
   tcase_add_test(tc, fitting_refuses);

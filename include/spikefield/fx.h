@@ -307,7 +307,7 @@ sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval
 
 /* A scene made ready for the vector kernels, which give the same bits as the functions above on every machine. It must
  * outlive the core and stay as it is; what fx_scene_check refuses is refused. One core serves any number of threads.
- * kernels: "portable", "avx2", "avx512vnni", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it lacks the
+ * kernels: "portable", "avx2", "avx512vnni", "amx", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it lacks the
  * named one. */
 typedef struct fx_core fx_core;
 sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernels);

@@ -43,8 +43,8 @@ static void arrange(fx_words *words, const fx_net *net, int bytes)
       if (i < layer[FX_C2].n_in)
         words->c2[i][unpacked(o, bytes)] = words->c2_quads[i / 4][o][i % 4] = layer[FX_C2].w[at];
       if (o >= SF_OUT_MAX) continue;
-      if (i < layer[FX_D2].n_in) words->d2[i][o] = layer[FX_D2].w[at];
-      if (i < layer[FX_C3].n_in) words->c3[i][o] = layer[FX_C3].w[at];
+      if (i < layer[FX_D2].n_in) words->d2[i][o] = words->d2_quads[i / 4][o][i % 4] = layer[FX_D2].w[at];
+      if (i < layer[FX_C3].n_in) words->c3[i][o] = words->c3_quads[i / 4][o][i % 4] = layer[FX_C3].w[at];
     }
 }
 
@@ -53,7 +53,7 @@ sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernel
   const fx_kernels *chosen = fx_kernels_select(kernels);
   *core = NULL;
   if (!chosen)
-    return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2 or avx512vnni",
+    return sf_fail(SF_E_UNSUPPORTED, "kernels '%.40s': not on this machine; expected portable, avx2, avx512vnni or amx",
                    kernels);
   SF_TRY(fx_scene_check(scene, "scene"));
   fx_core *c = sf_aligned_alloc(sizeof *c);

@@ -21,6 +21,7 @@ typedef struct fx_words {
   _Alignas(64) int8_t c2[SF_LANES + 2][SF_LANES]; /* outputs permuted, see fx_kernels.unpack_bytes */
   _Alignas(64) int16_t c3[SF_LANES + 2][SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
+  _Alignas(64) int8_t d2_quads[SF_LANES / 4][SF_OUT_MAX][4], c3_quads[SF_LANES / 4][SF_OUT_MAX][4];
 } fx_words;
 enum { FX_ZERO_ROW = SF_LANES, FX_BIAS_ROW };
 
@@ -92,6 +93,6 @@ void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *
 sf_status fx_render_tensorf(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
                             fx_counts *counts);
 
-/* "portable", "avx2", "avx512vnni", or NULL for the best of this CPU; NULL when CPU or build lacks it. */
+/* "portable", "avx2", "avx512vnni", "amx", or NULL for the best of this CPU; NULL when CPU or build lacks it. */
 const fx_kernels *fx_kernels_select(const char *name);
 #endif

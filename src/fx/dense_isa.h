@@ -33,26 +33,6 @@ static __attribute__((noinline)) void pair_products(const int16_t *w, int pairs,
   EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
 }
 
-/* out[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
-static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
-                                                    int32_t *out)
-{
-  vec acc[GANG][TILE];
-  EACH(k, j) acc[k][j] = v_load(from + j * WIDTH);
-  for (int q = 0; q < SF_LANES / 4; q++) {
-    vec in[GANG];
-#pragma GCC unroll 3
-    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 4 * q);
-#pragma GCC unroll 8
-    for (int j = 0; j < TILE; j++) {
-      const vec row = v_load(w + 4 * (q * SF_LANES + j * WIDTH));
-#pragma GCC unroll 3
-      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
-    }
-  }
-  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
-}
-
 static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
 {
   for (int i = 0; i < b->n; i += GANG)
@@ -105,16 +85,5 @@ static INLINE void spike_bytes(const uint64_t bits[SF_SPIKE_WORDS], uint8_t byte
 #else
   for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
 #endif
-}
-
-static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], int n, fx_scratch *s)
-{
-  for (int i = 0; i < n; i += GANG) {
-    uint8_t x[GANG][SF_LANES];
-    for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
-    for (int first = 0; first < VECTORS; first += TILE)
-      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, words->c2_bias + first * WIDTH,
-                    &s->current[i][first * WIDTH]);
-  }
 }
 #endif

@@ -1,7 +1,8 @@
-/* Products with spikes: a row of weights for every neuron that fired. */
+/* Products with spikes: a row of weights for every neuron that fired, or all rows where many did. */
 #ifndef SPIKEFIELD_FX_EVENT_ISA_H
 #define SPIKEFIELD_FX_EVENT_ISA_H
 #include "src/fx/core.h"
+#include "src/fx/dense_isa.h"
 #include "src/fx/vec_isa.h"
 #include <stdbool.h>
 
@@ -96,6 +97,17 @@ static INLINE void add_rows16(const events *e, const int16_t (*w)[SF_OUT_MAX], i
   }
 }
 
+/* Currents of D2 or C3; quads: those of tiles, not used here. */
+static INLINE void small_currents(const int16_t (*rows)[SF_OUT_MAX], const int8_t (*quads)[SF_OUT_MAX][4],
+                                  const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
+                                  int16_t (*sum)[SF_OUT_MAX])
+{
+  events e;
+  (void)quads;
+  list_events(&e, spikes, bias, n);
+  add_rows16(&e, rows, sum);
+}
+
 /* a + b of 8-bit lanes as 16-bit lanes: low and high halves of each 128 bits; fx_words.c2 is ordered so that they are
  * neighbouring outputs. */
 static INLINE void add_bytes(vec a, vec b, vec sum[2])
@@ -138,4 +150,58 @@ static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[S
   list_events(&e, spikes, bias, n);
   for (int first = 0; first < SF_LANES / BYTES; first += PARTS) add_parts(&e, words->c2, s->c2_current, first);
 }
+/* out[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
+static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
+                                                    int32_t *out)
+{
+  vec acc[GANG][TILE];
+  EACH(k, j) acc[k][j] = v_load(from + j * WIDTH);
+  for (int q = 0; q < SF_LANES / 4; q++) {
+    vec in[GANG];
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) in[k] = v_word(x[k] + 4 * q);
+#pragma GCC unroll 8
+    for (int j = 0; j < TILE; j++) {
+      const vec row = v_load(w + 4 * (q * SF_LANES + j * WIDTH));
+#pragma GCC unroll 3
+      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
+    }
+  }
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], int n, fx_scratch *s)
+{
+  for (int i = 0; i < n; i += GANG) {
+    uint8_t x[GANG][SF_LANES];
+    for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
+    for (int first = 0; first < VECTORS; first += TILE)
+      quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, words->c2_bias + first * WIDTH,
+                    &s->current[i][first * WIDTH]);
+  }
+}
+static INLINE int spikes_of_block(const uint64_t (*spikes)[SF_SPIKE_WORDS], int n)
+{
+  int sum = 0;
+  for (int i = 0; i < n; i++) sum += count_spikes(spikes[i]);
+  return sum;
+}
+
+enum { C2_DENSE_PERCENT = 40 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
+
+/* Currents of C2, in s->c2_current if this says true, else in s->current. */
+static INLINE bool c2_currents(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
+                               fx_scratch *s)
+{
+  const bool few = spikes_of_block(spikes, n) * 100 <= n * SF_LANES * C2_DENSE_PERCENT;
+  if (few)
+    c2_currents_events(words, spikes, bias, n, s);
+  else
+    c2_currents_dense(words, spikes, n, s);
+  return few;
+}
+
+static INLINE void tiles_begin(void) {}
+
+static INLINE void tiles_end(void) {}
 #endif

@@ -1,11 +1,12 @@
 /* Choice of the instruction set at run time, and the portable kernels: the oracle, sample by sample. */
 #include "src/fx/core.h"
 #include "src/fx/net.h"
+#include "base/amx.h"
 #include <string.h>
 #include "src/fx/nofloat.h"
 
 #if defined(__x86_64__)
-extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni;
+extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni, fx_kernels_amx;
 #endif
 
 static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
@@ -47,13 +48,15 @@ static const fx_kernels portable = {"portable", 16, nets, features, march, &fx_v
 
 const fx_kernels *fx_kernels_select(const char *name)
 {
-  const fx_kernels *candidate[3];
+  const fx_kernels *candidate[4];
   int n = 0;
 #if defined(__x86_64__)
   __builtin_cpu_init();
   if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2"))
+      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2")) {
+    if (sf_have_amx()) candidate[n++] = &fx_kernels_amx;
     candidate[n++] = &fx_kernels_avx512vnni;
+  }
   if (__builtin_cpu_supports("avx2")) candidate[n++] = &fx_kernels_avx2;
 #endif
   candidate[n++] = &portable;

@@ -1,12 +1,13 @@
 /* Both nets for a block of samples, layer by layer and step by step. */
 #ifndef SPIKEFIELD_FX_NETS_ISA_H
 #define SPIKEFIELD_FX_NETS_ISA_H
-#include "src/fx/dense_isa.h"
-#include "src/fx/event_isa.h"
 #include "src/fx/integrate_isa.h"
 #include "src/fx/plif_isa.h"
-
-enum { C2_DENSE_PERCENT = 40 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
+#if defined(FX_TILES)
+#include "src/fx/tiles_isa.h"
+#else
+#include "src/fx/event_isa.h"
+#endif
 
 /* Every neuron of a spiking layer (0..FX_SPIKING-1) for all samples. halves: currents of C2 in 16 bits, else in 32. */
 static INLINE void fire_layer(const neurons *n, int spiking, bool halves, int shift, const void *current, fx_block *b,
@@ -29,10 +30,10 @@ static INLINE void fire_layer(const neurons *n, int spiking, bool halves, int sh
 static INLINE void density_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   const neurons n = neurons_of(&core->scene->net, FX_D1, mode, first, t);
-  events e;
+  const fx_words *words = &core->words;
   fire_layer(&n, 0, false, 0, s->constant, b, s, t);
-  list_events(&e, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[0][t], false, b->n);
-  add_rows16(&e, core->words.d2, s->d2_current);
+  small_currents(words->d2, words->d2_quads, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[0][t], false, b->n,
+                 s->d2_current);
   for (int i = 0; i < b->n; i++) {
     __m256i *current = (__m256i *)s->d2_current[i];
     s->argument[0][i] = s->d2_current[i][0];
@@ -48,31 +49,21 @@ static INLINE void c1_step(const fx_core *core, fx_block *b, fx_scratch *s, int 
   fire_layer(&n, 1, false, 0, decodes ? s->constant : s->current, b, s, t);
 }
 
-static INLINE int spikes_of_block(const fx_block *b, int layer, int t)
-{
-  int sum = 0;
-  for (int i = 0; i < b->n; i++) sum += count_spikes(b->spikes[layer][t][i]);
-  return sum;
-}
-
 static INLINE void c2_step(const fx_core *core, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   const neurons n = neurons_of(&core->scene->net, FX_C2, mode, first, t);
   const uint64_t(*spikes)[SF_SPIKE_WORDS] = (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[1][t];
-  if (spikes_of_block(b, 1, t) * 100 > b->n * SF_LANES * C2_DENSE_PERCENT) {
-    c2_currents_dense(&core->words, spikes, b->n, s);
-    fire_layer(&n, 2, false, SF_AC_FRAC, s->current, b, s, t);
-  } else {
-    c2_currents_events(&core->words, spikes, core->scene->net.layer[FX_C2].bias != 0, b->n, s);
+  const bool halves = c2_currents(&core->words, spikes, core->scene->net.layer[FX_C2].bias != 0, b->n, s);
+  if (halves)
     fire_layer(&n, 2, true, SF_AC_FRAC, s->c2_current, b, s, t);
-  }
+  else
+    fire_layer(&n, 2, false, SF_AC_FRAC, s->current, b, s, t);
 }
 
 static INLINE void c3_step(const fx_core *core, fx_block *b, fx_scratch *s, int t)
 {
-  events e;
-  list_events(&e, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n);
-  add_rows16(&e, core->words.c3, s->c3_current);
+  small_currents(core->words.c3, core->words.c3_quads, (const uint64_t(*)[SF_SPIKE_WORDS])b->spikes[2][t],
+                 core->scene->net.layer[FX_C3].bias != 0, b->n, s->c3_current);
   for (int o = 0; o < COLOURS; o++)
     for (int i = 0; i < b->n; i++) s->argument[1 + o][i] = s->c3_current[i][o];
 }
@@ -119,6 +110,7 @@ static void nets_nodecay(const fx_core *core, fx_block *block, fx_scratch *scrat
 
 static void nets(const fx_core *core, fx_block *block, fx_scratch *scratch)
 {
+  tiles_begin();
   switch (core->scene->net.mode) {
   case FX_HYBRID:
     nets_hybrid(core, block, scratch);
@@ -129,5 +121,6 @@ static void nets(const fx_core *core, fx_block *block, fx_scratch *scratch)
   default:
     nets_nodecay(core, block, scratch);
   }
+  tiles_end();
 }
 #endif

@@ -7,6 +7,9 @@
 #include <string.h>
 
 #define INLINE inline __attribute__((always_inline))
+#if defined(__AMX_INT8__) || defined(__AMXINT8__) /* clang 14's name */
+#define FX_TILES
+#endif
 
 #if defined(__AVX512VNNI__)
 typedef __m512i vec;

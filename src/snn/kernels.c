@@ -1,23 +1,11 @@
 /* Choice of the instruction set at run time. */
 #include "snn/kernels.h"
-#include <stdbool.h>
+#include "base/amx.h"
 #include <string.h>
 
 extern const sf_kernels sf_kernels_portable;
 #if defined(__x86_64__)
-#include <cpuid.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 extern const sf_kernels sf_kernels_avx2, sf_kernels_avx512, sf_kernels_avx512bf16, sf_kernels_amx;
-
-/* The CPU has AMX with bfloat16, and the kernel lets this process use it. */
-static bool have_amx(void)
-{
-  enum { REQUEST_PERMISSION = 0x1023, TILE_DATA = 18, BF16 = 1 << 22, TILE = 1 << 24 }; /* Linux, asm/prctl.h */
-  unsigned a, b, c, d;
-  return __get_cpuid_count(7, 0, &a, &b, &c, &d) && d & BF16 && d & TILE &&
-         syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
-}
 #endif
 
 const sf_kernels *sf_kernels_training(void)
@@ -41,7 +29,7 @@ const sf_kernels *sf_kernels_select(const char *name)
     candidate[n++] = &sf_kernels_avx512;
     if (__builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512vbmi2")) { /* round: only by name */
       candidate[n++] = &sf_kernels_avx512bf16;
-      if (name && !strcmp(name, "amx") && have_amx()) candidate[n++] = &sf_kernels_amx;
+      if (name && !strcmp(name, "amx") && sf_have_amx()) candidate[n++] = &sf_kernels_amx;
     }
   }
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) candidate[n++] = &sf_kernels_avx2;
