@@ -317,8 +317,8 @@ static void check_plif_backward(float gain)
           gs += w5[c * H + n] * go[c] * (t ? kc : 1) * s * (1 - s);
           go[c] *= 1 - kc;
         }
-        const double h = r.block->m4[t][n * SF_BLOCK + l], sg = 1 / (1 + exp(-4 * (h - 1)));
-        const double gh = (gs - gv) * 4 * sg * (1 - sg) + gv;
+        const double h = r.block->m4[t][n * SF_BLOCK + l], sg = 1 / (1 + exp(-SF_SURROGATE_ALPHA * (h - 1)));
+        const double gh = (gs - gv) * SF_SURROGATE_ALPHA * sg * (1 - sg) + gv;
         const double before = t ? r.block->m4[t - 1][n * SF_BLOCK + l] : 0, v = before - (before >= 1);
         if (t) dleak += (1 - k) * gh * (h - v);
         for (int m = 0; m < H; m++) dw4[n][m] += (t ? k : 1) * gh * (r.block->m3[t][m * SF_BLOCK + l] >= 1);

@@ -17,13 +17,15 @@ static inline vf reciprocal(vf x)
 #endif
 }
 
-/* The surrogate's slope alpha s (1 - s), s = sigmoid(alpha x), alpha = 4, which is 1 / cosh^2(2 x), its maximum 1:
- * within 7e-5 of it for every x. cosh^2 as a polynomial in x^2, fitted so that its inverse has the least largest error
- * (6.2e-6). */
+/* The surrogate's slope alpha s (1 - s), s = sigmoid(alpha x), which is alpha/4 / cosh^2(2 y), y = alpha/4 x: within
+ * 7e-5 of its maximum for every x. cosh^2 as a polynomial in y^2, fitted so that its inverse has the least largest
+ * error (6.2e-6). */
 static inline vf surrogate(vf x)
 {
   const vf far = (vf){0} + 64.0f;
-  vf w = x * x;
+  const float sharp = SF_SURROGATE_ALPHA / 4.0f;
+  const vf y = sharp * x;
+  vf w = y * y;
   const vi near = w < far;
   w = (vf)(((vi)w & near) | ((vi)far & ~near));
   vf p = w * 4.04860913e-2f + 6.45573130e-2f;
@@ -32,9 +34,8 @@ static inline vf surrogate(vf x)
   p = p * w + 5.34561520f;
   p = p * w + 3.99923221f;
   p = p * w + 1.00000616f;
-  return reciprocal(p);
+  return sharp * reciprocal(p);
 }
-_Static_assert(SF_SURROGATE_ALPHA == 4, "surrogate() is a fit for alpha = 4");
 
 /* Backward of fire at step t. g: gradient of the activation in, of the current out; carry: gradient of the membrane
  * after reset, in and out; leak[B]: sum of g_h * dh/dw per lane. dh/dw = k(1-k)(x - v) = (1-k)(h - v) where the input

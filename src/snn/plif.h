@@ -5,7 +5,7 @@
 #include "spikefield/model.h"
 #include <math.h>
 
-enum { SF_SURROGATE_ALPHA = 4 };
+enum { SF_SURROGATE_ALPHA = 8 };
 
 /* Membrane after charging, before fire: previous membrane v, current i, leak k = 1/tau, step t. */
 static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, float i)
