@@ -124,7 +124,7 @@ END_TEST
 
 /* The core on integers against the float nets on what they stand for, inputs on their grids: equal currents at t = 0
  * but for float sums (128 terms: 1e-5 of their size), h rounded down in both. C1's currents are so coarse that some
- * equal the threshold, where a float sum may fall short: then C2's differ, in at most 16 of 64 samples. */
+ * equal the threshold, where a float sum may fall short: such samples, at most 48 of 64, say nothing of C2. */
 START_TEST(float_nets_compute_what_the_core_does)
 {
   const sf_train_options o = tuning_run();
@@ -138,7 +138,7 @@ START_TEST(float_nets_compute_what_the_core_does)
   fx_trace *fixed = calloc(1, sizeof *fixed);
   sf_net_trace *real = calloc(1, sizeof *real);
   int spikes = 0, rounded = 0;
-  int apart = 0, ties = 0;
+  int edges = 0, ties = 0;
   for (int n = 0; n < 64; n++) {
     int16_t f[2 * FX_LEVELS_MAX], d[SF_DIR_FEATURES];
     float ff[2 * FX_LEVELS_MAX], sh[SF_DIR_FEATURES], sigma[SF_T_MAX], colour[3 * SF_T_MAX];
@@ -154,23 +154,24 @@ START_TEST(float_nets_compute_what_the_core_does)
     fx_net_direction(&scene.net, d, c1, NULL);
     fx_net_sample(&scene.net, f, c1, &out, fixed, NULL);
     sf_net_sample(m, ff, sh, 1, sigma, colour, real);
-    bool same = true, tie = false; /* at the threshold the float sum's rounding decides */
-    for (int i = 0; i < m->config.hidden; i++) tie |= fabsf(real->current[0][0][i] - m->config.theta[0]) < 1e-5f;
+    bool edge = false, tie = false; /* at the threshold of C1, of D1, the float sum's rounding decides */
+    for (int i = 0; i < m->config.hidden; i++) {
+      tie |= fabsf(real->current[0][0][i] - m->config.theta[0]) < 1e-5f;
+      edge |= fabsf(real->current[2][0][i] - m->config.theta[1]) < 1e-4f;
+    }
     ties += tie;
+    edges += edge;
     for (int l = 0; l < SF_LAYERS - 1 && !tie; l++)
       for (int i = 0; i < m->param[weights_of[l]].shape[0]; i++) {
         const double exact = (double)fixed->current[l][0][i] * s->lsb.current[l];
         const bool equal = fabs(real->current[l][0][i] - exact) <= 1e-4 * (1 + fabs(exact));
-        if (l == 3)
-          same = same && equal;
-        else
+        if (l < 3 || !edge)
           ck_assert_msg(equal, "layer %d neuron %d: %g, core %g", l, i, (double)real->current[l][0][i], exact);
         spikes += real->spike[l][0][i];
         rounded += l == 1 && i && fixed->current[l][0][i] % (1 << SF_H_SHIFT);
       }
-    apart += !same;
   }
-  ck_assert_int_le(apart, 16);
+  ck_assert_int_le(edges, 48);
   ck_assert_int_le(ties, 8);
   ck_assert_int_gt(spikes, 100);
   ck_assert_int_gt(rounded, 100);
