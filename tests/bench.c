@@ -4,6 +4,7 @@
  * bytes, or random reads of a table as large as one level over the 128 corners of one sample. Naive: the oracle where
  * there is one, else the portable build of the kernels; for Adam the textbook's loop over every parameter. */
 #include "bench.h"
+#include "base/amx.h"
 #include "float_fixture.h"
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
@@ -44,11 +45,8 @@ CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-
 /* Four independent 16 x 16 sums of products of 32 numbers. */
 __attribute__((target("amx-tile,amx-bf16"))) static double tile_chain(long rounds)
 {
-  static const struct { /* GCC does not see that it is read */
-    uint8_t palette, start, reserved[14];
-    uint16_t bytes[16];
-    uint8_t rows[16];
-  } shape = {.palette = 1, .bytes = {64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16}};
+  static const sf_tile_shapes shape = {
+      .palette = 1, .bytes = {64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16}};
   _tile_loadconfig(&shape);
   for (long r = 0; r < rounds; r++) {
     _tile_dpbf16ps(0, 4, 5);

@@ -3,6 +3,7 @@
  * rate of 10 %, and no slower at higher ones. */
 #ifndef SPIKEFIELD_FX_TILES_ISA_H
 #define SPIKEFIELD_FX_TILES_ISA_H
+#include "base/amx.h"
 #include "src/fx/core.h"
 #include "src/fx/dense_isa.h"
 #include <stdbool.h>
@@ -12,11 +13,8 @@ _Static_assert((int)FX_BLOCK == 3 * SIDE && (int)SF_OUT_MAX == SIDE, "a block is
 
 static INLINE void tiles_begin(void)
 {
-  static const struct { /* GCC does not see that it is read */
-    uint8_t palette, start, reserved[14];
-    uint16_t bytes[16]; /* of a row */
-    uint8_t rows[16];
-  } shape = {.palette = 1, .bytes = {64, 64, 64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16, 16, 16}};
+  static const sf_tile_shapes shape = {
+      .palette = 1, .bytes = {64, 64, 64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16, 16, 16}};
   _tile_loadconfig(&shape);
 }
 

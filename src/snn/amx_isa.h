@@ -6,6 +6,7 @@
  * each; 4 and 5 are 16 words of a and b, 6 and 7 the same of 8 words, for what is left of k. */
 #ifndef SF_SNN_AMX_ISA_H
 #define SF_SNN_AMX_ISA_H
+#include "base/amx.h"
 
 enum { TILE_SIDE = 16, TILE_HALF = 8, LAYER_ROWS = TILE_SIDE };
 
@@ -16,11 +17,8 @@ static inline int layer_rows(int left)
 
 static inline void tiles_begin(void)
 {
-  static const struct {
-    uint8_t palette, start, reserved[14];
-    uint16_t bytes[16]; /* of a row */
-    uint8_t rows[16];
-  } shape = {.palette = 1, .bytes = {64, 64, 64, 64, 64, 64, 32, 64}, .rows = {16, 16, 16, 16, 16, 16, 16, 8}};
+  static const sf_tile_shapes shape = {
+      .palette = 1, .bytes = {64, 64, 64, 64, 64, 64, 32, 64}, .rows = {16, 16, 16, 16, 16, 16, 16, 8}};
   _tile_loadconfig(&shape);
 }
 
