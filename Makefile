@@ -82,8 +82,8 @@ isa_portable :=
 isa_avx2 := -mavx2 -mfma -ffp-contract=fast
 isa_avx512 := -march=x86-64-v4 -mprefer-vector-width=512 -ffp-contract=fast
 isa_avx512bf16 := $(isa_avx512) -mavx512bf16 -mavx512vbmi2
-isa_avx512vnni := $(isa_avx512) -mavx512vnni -mavx512vbmi2
-isa_amx := $(isa_avx512bf16) -mavx512vnni -mamx-tile -mamx-bf16 -mamx-int8
+isa_avx512vnni := $(isa_avx512) -mavx512vnni -mavx512vbmi2 -mavx512vpopcntdq
+isa_amx := $(isa_avx512bf16) -mavx512vnni -mavx512vpopcntdq -mamx-tile -mamx-bf16 -mamx-int8
 LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS_snn),$B/obj/src/snn/kernels_isa.$i.o) \
   $(foreach i,$(ISAS_fx),$B/obj/src/fx/kernels_isa.$i.o)
 

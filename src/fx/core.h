@@ -40,23 +40,39 @@ typedef struct fx_block {
   fx_firing firing;                                                /* of the block */
 } fx_block;
 
-/* Fills fired and firing from spikes; here, so that every instruction set counts bits with its own instruction. */
+/* Fills fired and firing from spikes, word by word; here, so that every instruction set counts bits with its own
+ * instruction. */
 static inline void fx_block_count(fx_block *b, int steps)
 {
+  const int words = b->n * SF_SPIKE_WORDS;
   b->firing = (fx_firing){.samples = (uint64_t)b->n};
-  for (int l = 0; l < FX_SPIKING; l++)
-    for (int i = 0; i < b->n; i++) {
-      uint64_t seen[SF_SPIKE_WORDS] = {0}, sum = 0;
-      for (int t = 0; t < steps; t++) sum += fx_firing_add(&b->firing, l, t, b->spikes[l][t][i], seen);
-      b->fired[l][i] = (uint32_t)sum;
+  for (int l = 0; l < FX_SPIKING; l++) {
+    uint64_t seen[FX_BLOCK * SF_SPIKE_WORDS] = {0}, sum[FX_BLOCK * SF_SPIKE_WORDS] = {0};
+    for (int t = 0; t < steps; t++) {
+      const uint64_t *now = b->spikes[l][t][0];
+      uint64_t spikes = 0, fresh = 0;
+      for (int w = 0; w < words; w++) {
+        const uint64_t fired = (uint64_t)__builtin_popcountll(now[w]);
+        fresh += (uint64_t)__builtin_popcountll(now[w] & ~seen[w]);
+        seen[w] |= now[w];
+        sum[w] += fired;
+        spikes += fired;
+      }
+      b->firing.spikes[l][t] = spikes;
+      b->firing.fresh[l][t] = fresh;
     }
+    for (int i = 0; i < b->n; i++) {
+      b->fired[l][i] = 0;
+      for (int w = 0; w < SF_SPIKE_WORDS; w++) b->fired[l][i] += (uint32_t)sum[i * SF_SPIKE_WORDS + w];
+    }
+  }
 }
 
 /* Working memory of one thread: currents and membranes of a block. */
 typedef struct fx_scratch {
   _Alignas(64) int32_t constant[FX_BLOCK][SF_LANES]; /* current that serves all steps: of D1, or of a decoder's C1 */
   int32_t current[FX_BLOCK][SF_LANES];               /* of C1, and of C2 where its products are dense */
-  int32_t v[FX_SPIKING][FX_BLOCK][SF_LANES];
+  int32_t v[FX_SPIKING - 1][FX_BLOCK][SF_LANES];     /* of C1 and C2; those of constant currents stay in registers */
   int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
   _Alignas(64) int16_t c2_current[FX_BLOCK][SF_LANES];
   _Alignas(64) int32_t argument[4][FX_BLOCK];

@@ -12,21 +12,6 @@ typedef struct fx_firing {
   uint64_t fresh[FX_SPIKING][SF_T_MAX]; /* neurons that fired for the first time in their sample */
 } fx_firing;
 
-/* Adds one step of one neuron layer (0..FX_SPIKING-1) of one sample; seen starts at 0. Returns the number of spikes. */
-static inline uint64_t fx_firing_add(fx_firing *sum, int layer, int t, const uint64_t now[SF_SPIKE_WORDS],
-                                     uint64_t seen[SF_SPIKE_WORDS])
-{
-  uint64_t spikes = 0, fresh = 0;
-  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
-    spikes += (uint64_t)__builtin_popcountll(now[word]);
-    fresh += (uint64_t)__builtin_popcountll(now[word] & ~seen[word]);
-    seen[word] |= now[word];
-  }
-  sum->spikes[layer][t] += spikes;
-  sum->fresh[layer][t] += fresh;
-  return spikes;
-}
-
 static inline void fx_firing_sum(fx_firing *sum, const fx_firing *more)
 {
   uint64_t *to = (uint64_t *)sum;

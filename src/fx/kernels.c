@@ -53,7 +53,8 @@ const fx_kernels *fx_kernels_select(const char *name)
 #if defined(__x86_64__)
   __builtin_cpu_init();
   if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2")) {
+      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2") &&
+      __builtin_cpu_supports("avx512vpopcntdq")) {
     if (sf_have_amx()) candidate[n++] = &fx_kernels_amx;
     candidate[n++] = &fx_kernels_avx512vnni;
   }

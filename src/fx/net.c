@@ -126,13 +126,24 @@ void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_
   *events = s.events;
 }
 
+/* Adds one step of one neuron layer (0..FX_SPIKING-1); seen starts at 0. */
+static void add_firing(fx_firing *sum, int layer, int t, const uint64_t now[SF_SPIKE_WORDS],
+                       uint64_t seen[SF_SPIKE_WORDS])
+{
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) {
+    sum->spikes[layer][t] += (uint64_t)__builtin_popcountll(now[word]);
+    sum->fresh[layer][t] += (uint64_t)__builtin_popcountll(now[word] & ~seen[word]);
+    seen[word] |= now[word];
+  }
+}
+
 static void count_events(const fx_net *net, const fx_events *events, fx_counts *counts)
 {
   static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   fx_firing firing = {.samples = 1};
   for (int l = 0; l < FX_SPIKING; l++) {
     uint64_t seen[SF_SPIKE_WORDS] = {0};
-    for (int t = 0; t < net->steps; t++) fx_firing_add(&firing, l, t, events->spikes[spiking[l]][t], seen);
+    for (int t = 0; t < net->steps; t++) add_firing(&firing, l, t, events->spikes[spiking[l]][t], seen);
   }
   fx_count_firing(counts, net, &firing);
   for (int l = 0; l < SF_LAYERS; l++) {

@@ -53,13 +53,11 @@ static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool fi
   return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first, t + 1 == net->steps};
 }
 
-/* One vector of neurons; the spikes as bits. */
-static INLINE uint32_t fire(const neurons *n, int32_t *v, vec current, uint32_t *saturated)
+/* One vector of neurons with membranes v; the spikes as bits. */
+static INLINE uint32_t fire(const neurons *n, vec *v, vec current, uint32_t *saturated)
 {
-  vec membrane = charge(n->first ? v_set(0) : v_load(v), current, n->k, n->mode, n->first, saturated);
-  const uint32_t spikes = v_fire(&membrane, n->theta);
-  if (!n->last) v_store(v, membrane);
-  return spikes;
+  *v = charge(*v, current, n->k, n->mode, n->first, saturated);
+  return v_fire(v, n->theta);
 }
 
 static INLINE void put_spikes(uint64_t bits[SF_SPIKE_WORDS], int vector, uint32_t spikes)
