@@ -42,21 +42,24 @@ CHAINS(fma_chain_avx512, "avx512f,fma", "vfmadd213ps")
 CHAINS(dot_chain_avx512vnni, "avx512f,avx512vnni", "vpdpbusd")  /* four 8-bit multiply-adds a lane */
 CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-adds a lane */
 
-/* Four independent 16 x 16 sums of products of 32 numbers. */
-__attribute__((target("amx-tile,amx-bf16"))) static double tile_chain(long rounds)
-{
-  static const sf_tile_shapes shape = {
-      .palette = 1, .bytes = {64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16}};
-  _tile_loadconfig(&shape);
-  for (long r = 0; r < rounds; r++) {
-    _tile_dpbf16ps(0, 4, 5);
-    _tile_dpbf16ps(1, 4, 5);
-    _tile_dpbf16ps(2, 4, 5);
-    _tile_dpbf16ps(3, 4, 5);
+/* Four independent 16 x 16 sums of products of 32 or 64 numbers. */
+#define TILES(name, isa, multiply)                                                                                     \
+  __attribute__((target(isa))) static double name(long rounds)                                                         \
+  {                                                                                                                    \
+    static const sf_tile_shapes shape = {                                                                              \
+        .palette = 1, .bytes = {64, 64, 64, 64, 64, 64}, .rows = {16, 16, 16, 16, 16, 16}};                            \
+    _tile_loadconfig(&shape);                                                                                          \
+    for (long r = 0; r < rounds; r++) {                                                                                \
+      multiply(0, 4, 5);                                                                                               \
+      multiply(1, 4, 5);                                                                                               \
+      multiply(2, 4, 5);                                                                                               \
+      multiply(3, 4, 5);                                                                                               \
+    }                                                                                                                  \
+    _tile_release();                                                                                                   \
+    return 1;                                                                                                          \
   }
-  _tile_release();
-  return 1;
-}
+TILES(tile_chain, "amx-tile,amx-bf16", _tile_dpbf16ps)
+TILES(tile_chain8, "amx-tile,amx-int8", _tile_dpbusd)
 
 /* Multiply-adds per second of all threads in the arithmetic of the named kernels. */
 static double peak(const char *kernels)
@@ -68,7 +71,8 @@ static double peak(const char *kernels)
   } known[] = {{"avx512", fma_chain_avx512, 24 * 16},
                {"avx512bf16", dot_chain_avx512bf16, 24 * 16 * 2},
                {"avx512vnni", dot_chain_avx512vnni, 24 * 16 * 4},
-               {"amx", tile_chain, 4 * 16 * 16 * 32}};
+               {"amx", tile_chain, 4 * 16 * 16 * 32},
+               {"amx-int8", tile_chain8, 4 * 16 * 16 * 64}};
   const long rounds = 10000000;
   for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
     if (strcmp(kernels, known[i].name)) continue;
@@ -387,7 +391,8 @@ int main(int argc, char **argv)
 {
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
-  const ceilings c = {peak(kernels), fx_kernels_select("avx512vnni") ? peak("avx512vnni") : NAN, bandwidth(),
+  const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni") : NAN;
+  const ceilings c = {peak(kernels), dot8, fx_kernels_select("amx") ? peak("amx-int8") : dot8, bandwidth(),
                       random_reads()};
   printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",
          omp_get_max_threads(), kernels, c.fma * 1e-9, c.bytes * 1e-9, c.reads * 1e-9);

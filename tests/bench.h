@@ -9,6 +9,7 @@
 typedef struct ceilings {
   double fma;   /* multiply-adds of the training kernels */
   double dot8;  /* 8-bit multiply-adds */
+  double spike; /* 8-bit multiply-adds of the fixed-point core's products with spikes: on tiles where there are some */
   double bytes; /* of memory, read */
   double reads; /* of a random place of a table of 4 MiB */
 } ceilings;
