@@ -15,27 +15,30 @@ UNIT_TOPS := $(sort $(foreach t,$(UNIT_TESTS),$(UNITS_$t)))
 UNIT_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_UNROLL)
 UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.o)
 
+# $1 unit, $2 folder of the units, $3 folder that holds rtl/, $4 prerequisites
 define unit_rule
-$B/units/$1/V$1.mk: $(RTL_READY)
-	@mkdir -p $B/units/$1
-	$$(call say,VERI  $1)
-	$$Qcd $(RTL_ROOT) && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $(or $(UNIT_TOP_$1),$1) \
-	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $B/units/$1) rtl/lint.vlt $$(RTL)
-$B/units/$1/V$1__ALL.a: $B/units/$1/V$1.mk
-	$$Q$$(MAKE) -s -C $B/units/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$1__ALL.a >/dev/null
+$2/$1/V$1.mk: $4
+	@mkdir -p $2/$1
+	$$(call say,VERI  $2/$1)
+	$$Qcd $3 && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $(or $(UNIT_TOP_$1),$1) \
+	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $2/$1) rtl/lint.vlt $$(RTL)
+$2/$1/V$1__ALL.a: $2/$1/V$1.mk
+	$$Q$$(MAKE) -s -C $2/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$1__ALL.a >/dev/null
 	@touch $$@
 endef
-$(foreach u,$(UNIT_TOPS),$(eval $(call unit_rule,$u)))
+$(foreach u,$(UNIT_TOPS),$(eval $(call unit_rule,$u,$B/units,$(RTL_ROOT),$(RTL_READY))))
 
+# $1 test, $2 folder of the program, $3 of its units, $4 objects and flags for linking it
 define unit_test_rule
-$B/obj/tests/$1.o: tests/$1.cpp $(foreach u,$(UNITS_$1),$B/units/$u/V$u.mk)
+$3/$1.o: tests/$1.cpp $(foreach u,$(UNITS_$1),$3/$u/V$u.mk)
 	@mkdir -p $$(@D)
-	$$(call say,CXX   $$<)
+	$$(call say,CXX   $$< -> $$@)
 	$$Q$$(CXX) -std=c++17 -O2 -g -Wall -Wextra $(if $(CI),-Werror) $$(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
-	  $(foreach u,$(UNITS_$1),-isystem $B/units/$u) -MMD -MP -c $$< -o $$@
-$B/tests/$1: $B/obj/tests/$1.o $(foreach u,$(UNITS_$1),$B/units/$u/V$u__ALL.a) $(UNIT_RUNTIME) $B/libspikefield.a
+	  -isystem $$(VERILATOR_ROOT)/include/vltstd $(foreach u,$(UNITS_$1),-isystem $3/$u) -MMD -MP -c $$< -o $$@
+-include $3/$1.d
+$2/$1: $3/$1.o $(foreach u,$(UNITS_$1),$3/$u/V$u__ALL.a) $(filter %.o,$4) $(UNIT_RUNTIME) $B/libspikefield.a
 	@mkdir -p $$(@D)
 	$$(call say,LD    $$@)
-	$$Q$$(CXX) -fopenmp $$(SAN) -o $$@ $$^ $$(DUT_LDLIBS) $$(CHECK_LIBS) $$(LIBS)
+	$$Q$$(CXX) -fopenmp $$(SAN) $(filter-out %.o,$4) -o $$@ $$^ $$(DUT_LDLIBS) $$(CHECK_LIBS) $$(LIBS)
 endef
-$(foreach t,$(UNIT_TESTS),$(eval $(call unit_test_rule,$t)))
+$(foreach t,$(UNIT_TESTS),$(eval $(call unit_test_rule,$t,$B/tests,$B/units)))

@@ -6,22 +6,65 @@ mutate: $B/libspikefield.a $(UNIT_RUNTIME) ## mutate the RTL's modules and count
 	@tests/mutate/units.py $B --mutants $(MUTANTS) $(MODULES)
 .PHONY: mutate
 
-# The engine's control modules and sf_csr: mutants written into a copy of rtl/, the tests of the co-simulation as checkers.
-ENGINE_MODULES := sf_core sf_pick sf_store sf_split sf_c2 sf_c1 sf_d1 sf_counters sf_readout sf_csr
-ENGINE_CHECKERS := test_rtl_registers test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
-ENGINE := $B/mutate/engine
-$(ENGINE)/.written: $(RTL_READY) tests/mutate/operators.py
-	$(call say,MUTATE $(@D)/rtl)
-	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r $(RTL_ROOT)/rtl $(@D)/rtl
-	$Qpython3 tests/mutate/operators.py $(RTL_ROOT)/rtl $(@D)/rtl $(ENGINE_MODULES)
-	@touch $@
-$(ENGINE)/verilated/Vsf_top.mk: VERILATOR_FLAGS += -Wno-lint -Wno-style -Wno-fatal
-$(eval $(call verilated_rule,$(ENGINE)/verilated,$(ENGINE),$(ENGINE)/.written))
+# Mutants of the source: written into a copy of rtl/ in $B/mutate/GROUP, all of a group in one build.
+# MUTATED_GROUP: modules, with what $(MUTATE_GROUP) says to operators.py; MUTANT_CHECKERS_MODULE or else
+# MUTANT_CHECKERS_GROUP: programs in that folder, in the order in which they run.
+MUTATED_engine := sf_core sf_pick sf_store sf_split sf_c2 sf_c1 sf_d1 sf_counters sf_readout sf_csr sf_top sf_mac sf_neurons sf_wmem
+MUTATED_lanes := sf_mac sf_neurons sf_c2 sf_split
+MUTATED_ray := sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo sf_sh sf_encoder sf_exp_neg sf_composite sf_ray_track \
+  sf_ray_csr sf_ray_top
+MUTATE_lanes := --lanes
+MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
+MUTANT_CHECKERS_lanes := test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
+MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray
+$(foreach m,sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo,$(eval MUTANT_CHECKERS_$m := test_rtl_grid test_rtl_encoder))
+MUTANT_CHECKERS_sf_sh := test_rtl_sh test_rtl_encoder
+MUTANT_CHECKERS_sf_encoder := test_rtl_encoder test_rtl_ray
+$(foreach m,sf_exp_neg sf_composite,$(eval MUTANT_CHECKERS_$m := test_rtl_composite test_rtl_ray))
+MUTANT_CHECKERS_sf_ray_track := test_rtl_ray_track test_rtl_ray
+
+COMMA := ,
+SPACE := $(subst ,, )
+mutants_of = $(foreach m,$(MUTATED_$1),$m:$(subst $(SPACE),$(COMMA),$(strip $(or $(MUTANT_CHECKERS_$m),$(MUTANT_CHECKERS_$1)))))
+mutant_programs = $(sort $(foreach m,$(MUTATED_$1),$(or $(MUTANT_CHECKERS_$m),$(MUTANT_CHECKERS_$1))))
+MUTANT_OBJ := $B/obj/tests/mutate/mutant.o $B/obj/tests/mutate/first_failure.o
 # The first check that fails ends a checker.
-$(ENGINE)/%: $B/obj/tests/%.o $B/obj/tests/mutate/mutant.o $B/obj/tests/mutate/first_failure.o \
-  $(ENGINE)/verilated/libsfdut.a $B/libspikefield.a
+MUTANT_LDFLAGS := -Wl,--wrap=_ck_assert_failed
+define mutants_rule
+$B/mutate/$1/.written: $(RTL_READY) tests/mutate/operators.py
+	$$(call say,MUTATE $$(@D)/rtl)
+	$$Qrm -rf $$(@D)/rtl && mkdir -p $$(@D) && cp -r $(RTL_ROOT)/rtl $$(@D)/rtl
+	$$Qpython3 tests/mutate/operators.py $(MUTATE_$1) $(RTL_ROOT)/rtl $$(@D)/rtl $(MUTATED_$1)
+	@touch $$@
+mutate-$1: $(addprefix $B/mutate/$1/,$(call mutant_programs,$1))
+	@tests/mutate/sources.py $B/mutate/$1 --mutants $(MUTANTS) --modules "$(MODULES)" $(call mutants_of,$1)
+.PHONY: mutate-$1
+endef
+$(foreach g,engine lanes ray,$(eval $(call mutants_rule,$g)))
+mutate-engine: ## the same of the samples-in accelerator's source, by the co-simulation
+mutate-lanes: ## the same of its arithmetic in every lane (loops over lanes)
+mutate-ray: ## the same of what goes around it from rays to pixels, by the unit benches and the co-simulation of rays
+
+MUTANT_VERILATOR := -Wno-lint -Wno-style -Wno-fatal
+define mutated_dut_rule
+$B/mutate/$1/verilated/Vsf_top.mk: VERILATOR_FLAGS += $(MUTANT_VERILATOR)
+$(call verilated_rule,$B/mutate/$1/verilated,$B/mutate/$1,$B/mutate/$1/.written)
+$(MUTANT_CHECKERS_$1:%=$B/mutate/$1/%): $B/mutate/$1/%: $B/obj/tests/%.o $(MUTANT_OBJ) $B/mutate/$1/verilated/libsfdut.a $B/libspikefield.a
+	$$(call say,LD    $$@)
+	$$Q$$(CXX) -fopenmp $$(SAN) $(MUTANT_LDFLAGS) -o $$@ $$^ $$(DUT_LDLIBS) $$(CHECK_LIBS) $$(LIBS)
+endef
+$(foreach g,engine lanes,$(eval $(call mutated_dut_rule,$g)))
+
+# Around an accelerator without mutants; and the unit benches.
+MUTATED_RAY := $B/mutate/ray
+$(eval $(call verilated_top_rule,$(MUTATED_RAY)/verilated,$(MUTATED_RAY),$(MUTATED_RAY)/.written,sf_ray_top,pins_ray))
+$(MUTATED_RAY)/verilated/Vsf_ray_top.mk: VERILATOR_FLAGS += $(MUTANT_VERILATOR)
+$(MUTANT_CHECKERS_ray:%=$(MUTATED_RAY)/%): $(MUTATED_RAY)/%: $B/obj/tests/%.o $(MUTANT_OBJ) $(MUTATED_RAY)/verilated/pins_ray.o \
+  $(MUTATED_RAY)/verilated/Vsf_ray_top__ALL.a $(DUT_LIBS) $B/libspikefield.a
 	$(call say,LD    $@)
-	$Q$(CXX) -fopenmp $(SAN) -Wl,--wrap=_ck_assert_failed -o $@ $^ $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
-mutate-engine: $(ENGINE_CHECKERS:%=$(ENGINE)/%) ## the same of the engine's control modules and sf_csr, by the co-simulation
-	@tests/mutate/engine.py $(ENGINE) --mutants $(MUTANTS) --checkers "$(ENGINE_CHECKERS)" --modules "$(MODULES)" $(ENGINE_MODULES)
-.PHONY: mutate-engine
+	$Q$(CXX) -fopenmp $(SAN) $(MUTANT_LDFLAGS) -o $@ $^ $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
+MUTATED_UNIT_TESTS := $(filter $(UNIT_TESTS),$(call mutant_programs,ray))
+$(foreach u,$(sort $(foreach t,$(MUTATED_UNIT_TESTS),$(UNITS_$t))),$(eval \
+  $(call unit_rule,$u,$(MUTATED_RAY)/units,$(MUTATED_RAY),$(MUTATED_RAY)/.written)))
+$(MUTATED_RAY)/units/%: UNIT_FLAGS += $(MUTANT_VERILATOR)
+$(foreach t,$(MUTATED_UNIT_TESTS),$(eval $(call unit_test_rule,$t,$(MUTATED_RAY),$(MUTATED_RAY)/units,$(MUTANT_OBJ) $(MUTANT_LDFLAGS))))

@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
 """Writes RTL modules with all their mutants in them; the environment's SF_MUTANT=N chooses one at run time.
 
-usage: operators.py RTL OUT MODULE...
+usage: operators.py [--lanes] RTL OUT MODULE...
 OUT/MODULE.sv is RTL/MODULE.sv in which every expression reads `mutant N ? changed : original`; OUT/mutants lists them
 with tabs between: number, module, place, what was changed. The same sources give the same numbers.
 
-Operators, on right sides, conditions and port expressions:
+Operators, on right sides, conditions and what an instance's inputs are connected to:
   && with ||, & with |, + with -, == with !=, < with <=, > with >=; ! and ~ dropped
-  a bit (signal, or element of a vector) stuck at 0 and at 1; the lowest bit of a vector inverted
+  a bit (signal, or element of a vector) stuck at 0 and at 1; the lowest bit of a vector, of a part of it, of a word of
+  a memory inverted
   a constant one more and one less; a condition always true and never true; a register that keeps its value
-Not mutated: declarations, parameters, loops over more than 8 rounds (lanes), branches of builds without a tap.
+Not mutated: declarations, parameters, clocks and resets of instances, branches of builds without a tap, and loops over
+lanes (of more than 8 rounds); with --lanes nothing but these loops.
 """
+import os
 import re
 import sys
 
@@ -19,24 +22,43 @@ SWAP = {"&&": "||", "||": "&&", "&": "|", "|": "&", "+": "-", "-": "+", "==": "!
         ">": ">=", ">=": ">"}
 CLOSE = {"(": ")", "[": "]", "{": "}"}
 ROUNDS = 8
+INPUT = re.compile(r"\binput\s+wire\s*(?:signed\s*)?(?:\[[^\]]*\])?\s*(\w+)")
+
+
+def inputs(rtl):
+    """The inputs of every module that may be mutated at an instance of it."""
+    found = {}
+    for name in os.listdir(rtl):
+        if name.endswith(".sv"):
+            with open(f"{rtl}/{name}") as f:
+                found[name[:-3]] = set(INPUT.findall(f.read())) - {"clk_i", "rst_ni"}
+    return found
+
+
+def is_word(token):
+    return bool(re.fullmatch(r"[\w:']+", token))
 
 
 class Module:
-    def __init__(self, name, text):
-        self.name = name
+    """lanes: whether the loops over lanes are mutated or everything else; inputs: of each module."""
+
+    def __init__(self, name, text, inputs, lanes):
+        self.name, self.inputs, self.lanes = name, inputs, lanes
         self.source = text
         # Comments become blanks, so that places stay what they are.
         self.text = re.sub(r"//[^\n]*|/\*.*?\*/|`[^\n]*", lambda m: re.sub(r"[^\n]", " ", m[0]), text, flags=re.S)
         self.tokens = [(m[0], m.start(), m.end()) for m in TOKEN.finditer(self.text)]
-        self.bits, self.vectors = set(), set()
+        self.bits, self.vectors, self.memories, self.signed = set(), set(), set(), set()
         self.declared()
 
     def declared(self):
-        for m in re.finditer(r"\b(?:wire|reg)\b\s*(?:signed\s*)?(\[[^\]]*\])?\s*([^;=]*?)\s*(?=[;=)]|,\s*(?:input|output|$))",
+        for m in re.finditer(r"\b(?:wire|reg)\b\s*(signed\b)?\s*(\[[^\]]*\])?\s*([^;=]*?)\s*(?=[;=)]|,\s*(?:input|output|$))",
                              self.text, flags=re.M):
-            for name in m[2].split(","):
-                if re.fullmatch(r"\s*\w+\s*", name):  # a memory has a range behind its name
-                    (self.vectors if m[1] else self.bits).add(name.strip())
+            for one in m[3].split(","):
+                name, range_behind = re.fullmatch(r"\s*(\w*)\s*(\[.*)?", one, flags=re.S).groups()
+                (self.memories if range_behind else self.vectors if m[2] else self.bits).add(name)
+                if m[1]:
+                    self.signed.add(name)
 
     def match(self, i):
         """Token behind the bracket that closes token i."""
@@ -66,14 +88,22 @@ class Module:
                 return i
 
     def until(self, i, end):
-        while self.tokens[i][0] != end:
+        while self.tokens[i][0] not in end:
             i = self.match(i) if self.tokens[i][0][-1] in "([{" else i + 1
         return i
 
     def places(self):
         """(kind, first token, end token, what it is given to) of every expression that is mutated."""
+        loop_end = 0
+        for end, place in self.all_places():
+            loop_end = max(loop_end, end)
+            if place and (place[1] < loop_end) == self.lanes:
+                yield place
+
+    def all_places(self):
+        """(token behind a loop over lanes that begins here, else 0; place or None)."""
         t = [token[0] for token in self.tokens]
-        i = t.index(";", t.index("module"))
+        i, instance = t.index(";", t.index("module")), set()
         while i < len(t):
             if t[i] in ("localparam", "parameter", "initial"):
                 i = self.block(i)
@@ -82,12 +112,12 @@ class Module:
             elif t[i] == "for":
                 head, i = t[i:self.match(i + 1)], self.match(i + 1)
                 limit = head[head.index("<") + 1]
-                if not limit.isdigit() or int(limit) > ROUNDS:
-                    i = self.block(i)
+                if limit == "LANES" or (limit.isdigit() and int(limit) > ROUNDS):
+                    yield self.block(i), None
             elif t[i] == "if":
                 end = self.match(i + 1)
                 if t[end + 1] != ":":
-                    yield "if", i + 2, end - 1, "if"
+                    yield 0, ("if", i + 2, end - 1, "if")
                 i = end
             elif t[i] == "begin" and t[i + 1] == ":" and t[i + 2].startswith("g_no_"):
                 i = self.block(i)
@@ -95,13 +125,15 @@ class Module:
                 i = self.match(i + 1)
             elif t[i] == "." and t[i + 2] == "(":
                 end = self.match(i + 2)
-                if any(x in SWAP or x in "!~?" for x in t[i + 3:end - 1]):
-                    yield "port", i + 3, end - 1, "." + t[i + 1]
+                if t[i + 1] in instance:
+                    yield 0, ("port", i + 3, end - 1, "." + t[i + 1])
                 i = end
+            elif t[i] in self.inputs and i + 1 < len(t) and t[i + 1] != ";":
+                instance, i = self.inputs[t[i]], i + 1
             elif t[i] in "[{" or (t[i] == "(" and t[i - 1] == "case"):
                 i = self.match(i)
             elif t[i] in ("=", "<="):
-                end = self.until(i + 1, ";")
+                end = self.until(i + 1, (";",))
                 first = i - 1
                 if t[first] in ("]", "}"):
                     depth = 0
@@ -113,7 +145,7 @@ class Module:
                     first -= t[first] == "["
                 left = " ".join(self.text[self.tokens[first][1]:self.tokens[i - 1][2]].split())
                 if not left.startswith("unused"):
-                    yield t[i], i + 1, end, left
+                    yield 0, (t[i], i + 1, end, left)
                 i = end
             else:
                 i += 1
@@ -137,7 +169,14 @@ class Module:
             yield whole, f"if ({condition}) never", "1'b0"
         if kind == "<=":
             yield whole, f"{left} keeps its value", left
+        constant_end = 0  # behind the range of a part of a vector, or the count of a replication
         for i in range(first, end):
+            if t[i] == "[" and t[self.until(i + 1, (":", "]"))] == ":":
+                constant_end = max(constant_end, self.match(i))
+            if t[i] == "{":
+                constant_end = max(constant_end, self.count_end(i))
+            if i < constant_end:
+                continue
             before = t[i - 1] if i > first else "("
             binary = bool(re.fullmatch(r"[\w$:']*[\w]|[\])}]", before))
             if t[i] in SWAP and binary and not (t[i] == "&" and t[i + 1] == "&"):
@@ -158,8 +197,25 @@ class Module:
                     if not alone:
                         yield put(i, j, "1'b0")
                         yield put(i, j, "1'b1")
-                elif j == i + 1:
-                    yield put(i, j, f"({t[i]} ^ 1'b1)")
+                elif j == i + 1 or t[i] in self.vectors:
+                    yield put(i, j, self.inverted(i, j, t[i] in self.signed and j == i + 1))
+            elif t[i] in self.memories and t[i + 1] == "[":
+                j = self.match(i + 1)
+                if j == end or t[j] != "[":
+                    yield put(i, j, self.inverted(i, j, t[i] in self.signed))
+
+    def count_end(self, i):
+        """Token behind the count of the replication that token i opens, 0 if it is none."""
+        j = i + 1
+        while is_word(self.tokens[j][0]) or self.tokens[j][0] in "()*+-":
+            j += 1
+        return j if self.tokens[j][0] == "{" and j > i + 1 else 0
+
+    def inverted(self, first, end, signed):
+        """The lowest bit of a vector; an unsigned operand would make its whole expression unsigned."""
+        text = self.text[self.tokens[first][1]:self.tokens[end - 1][2]]
+        one = "2'sb01" if signed else "1'b1"
+        return f"({text} ^ {one})"
 
     def mutate(self, number):
         """The text with all mutants, numbered from `number`; their list."""
@@ -175,22 +231,24 @@ class Module:
                 mutants.append((number, self.name, line, what))
                 number += 1
             original = self.text[start:stop]
-            out += [self.text[at:start], f"(mutant_q >= {low} && mutant_q < {number} ? ({chain}({original})) : ({original}))"]
+            out += [self.source[at:start], f"(mutant_q >= {low} && mutant_q < {number} ? ({chain}({original})) : ({original}))"]
             at = stop
-        text = "".join(out) + self.text[at:]
+        text = "".join(out) + self.source[at:]
         choice = "\n  import \"DPI-C\" function int sf_mutant();\n  int mutant_q;\n  initial mutant_q = sf_mutant();\n"
         header = text.index("\n);") + 3
-        return "`default_nettype none\n" + text[:header] + choice + text[header:], mutants
+        return text[:header] + choice + text[header:], mutants
 
 
 def main():
-    if len(sys.argv) < 4:
+    given = sys.argv[1:]
+    lanes = given[:1] == ["--lanes"]
+    if len(given) < 3 + lanes:
         sys.exit(__doc__)
-    rtl, out, modules = sys.argv[1], sys.argv[2], sys.argv[3:]
-    number, everything = 1, []
+    (rtl, out), modules = given[lanes:lanes + 2], given[lanes + 2:]
+    number, everything, ports = 1, [], inputs(rtl)
     for name in modules:
         with open(f"{rtl}/{name}.sv") as f:
-            module = Module(name, f.read())
+            module = Module(name, f.read(), ports, lanes)
         text, mutants = module.mutate(number)
         number += len(mutants)
         everything += mutants

@@ -1,20 +1,18 @@
 #!/usr/bin/env python3
-"""Counts how many mutants of the engine's control modules and of sf_csr the tests of the co-simulation kill.
+"""Counts how many mutants of the RTL's source their checkers kill.
 
-FOLDER has the checkers, linked with an accelerator that holds every mutant, and rtl/mutants, their list (operators.py);
-SF_MUTANT=N in the environment chooses one. Killed: a checker fails, crashes or hangs; they run in the order given, the
-first that kills ends it. MODULE...: all that are mutated; --modules: those of this run. --mutants: at most so many per
-module, spread evenly, the same ones every time; 0 runs none: rows of the verdicts that are kept, in
+FOLDER/rtl/mutants is the list of the mutants (operators.py); FOLDER has the checkers, linked with hardware that holds
+every mutant, of which SF_MUTANT=N in the environment chooses one. MODULE:CHECKER,... names a module's checkers; they run
+in this order, and the first that fails, crashes or hangs kills the mutant. --modules: those of this run. --mutants: at
+most so many per module, spread evenly, the same ones every time; 0 runs none: rows of the verdicts that are kept, in
 FOLDER/results.MODULE (campaign.py).
-Equivalent: listed with its reason in tests/mutate/equivalent-engine. Exit 0 nothing unexplained survived, 1 not.
+Equivalent: listed with its reason in tests/mutate/equivalent-FOLDER. Exit 0 nothing unexplained survived, 1 not.
 """
 import argparse
 import os
 import sys
 
 import campaign
-
-EQUIVALENT = "tests/mutate/equivalent-engine"
 
 
 def unmeasured(folder, name):
@@ -40,26 +38,26 @@ def limited(folder, checker):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder")
-    parser.add_argument("all", nargs="+", metavar="MODULE")
-    parser.add_argument("--checkers", required=True)
+    parser.add_argument("modules_checkers", nargs="+", metavar="MODULE:CHECKER,...")
     parser.add_argument("--mutants", type=int, default=sys.maxsize)
     parser.add_argument("--modules", default="")
     given = parser.parse_intermixed_args()
-    modules = given.modules.split() or given.all
+    checkers_of = {module: checkers.split(",") for module, checkers in (m.split(":") for m in given.modules_checkers)}
+    modules = given.modules.split() or list(checkers_of)
     with open(f"{given.folder}/rtl/mutants") as f:
         fields = [line.rstrip("\n").split("\t") for line in f]
     mutants = campaign.unique([campaign.Mutant(int(n), module, place, what) for n, module, place, what in fields])
-    of = {module: [m for m in mutants if m.module == module] for module in given.all}
+    of = {module: [m for m in mutants if m.module == module] for module in checkers_of}
     for module in modules:
         if not of.get(module):
             raise campaign.Stop(f"{module} is no mutated module")
-    equivalents = campaign.Equivalents(EQUIVALENT, given.all)
-    for module in given.all:
+    equivalents = campaign.Equivalents(f"tests/mutate/equivalent-{os.path.basename(given.folder)}", checkers_of)
+    for module in checkers_of:
         equivalents.match(module, of[module])
 
-    checkers = [unmeasured(given.folder, name) for name in given.checkers.split()]
     score = campaign.Score(equivalents)
     for module in modules:
+        checkers = [unmeasured(given.folder, name) for name in checkers_of[module]]
         results = campaign.Results(f"{given.folder}/results.{module}", [c.key for c in checkers])
         chosen = campaign.sample(of[module], given.mutants, results)
         pending = equivalents.last([m for m in chosen if m.number not in results.verdicts])
