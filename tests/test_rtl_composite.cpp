@@ -50,7 +50,7 @@ END_TEST
 
 /* ---- compositor ---- */
 
-enum { PATIENCE = 10000, RAY_MAX = 40 };
+enum { PATIENCE = 10000, RAY_MAX = 40, STOP_LATENCY = 11, SAMPLE_CYCLES };
 
 struct sample {
   fx_out out = {};
@@ -66,7 +66,7 @@ struct bench {
   int stall;
   int32_t background[3] = {};
   std::deque<fx_pixel> expected; /* pixels that have not come yet */
-  uint64_t pixels = 0, stops = 0, stops_expected = 0;
+  uint64_t pixels = 0, stops = 0, stops_expected = 0, taken_at = 0; /* taken_at: cycle of the last sample */
   fx_pixel now = {};
   bool open = false;
 
@@ -110,6 +110,8 @@ struct bench {
     u.settle();
     const bool taken = u.top.valid_i && u.top.ready_o;
     stops += u.top.stop_o;
+    if (u.top.stop_o) ck_assert_uint_eq(u.cycle - taken_at, STOP_LATENCY);
+    if (taken) taken_at = u.cycle;
     if (u.top.valid_o && u.top.ready_i) same_pixel();
     u.edge();
     return taken;
@@ -227,6 +229,26 @@ START_TEST(one_sample_rays)
 }
 END_TEST
 
+/* A sample in every SAMPLE_CYCLES cycles, and a pixel five cycles behind the last. */
+START_TEST(the_pace)
+{
+  bench b(210, 0);
+  b.program(0, 1024);
+  sample s;
+  s.out.sigma = 4096, s.delta = 1 << 16;
+  for (int n = 1; n < 20; n++) {
+    for (int i = 0; i < n; i++) {
+      const uint64_t before = b.taken_at;
+      s.first = i == 0, s.last = i == n - 1;
+      b.give(s);
+      if (i) ck_assert_uint_eq(b.taken_at - before, SAMPLE_CYCLES);
+    }
+    b.drain();
+    ck_assert_uint_eq(b.u.cycle - b.taken_at, SAMPLE_CYCLES + 5);
+  }
+}
+END_TEST
+
 static void long_ray(bench &b, uint32_t sigma, int32_t delta, int n)
 {
   for (int i = 0; i < n; i++) {
@@ -293,6 +315,7 @@ int main()
   tcase_add_test(cases, exp_neg);
   tcase_add_loop_test(cases, random_rays, 0, 8);
   tcase_add_test(cases, one_sample_rays);
+  tcase_add_test(cases, the_pace);
   tcase_add_test(cases, hard_rays);
   tcase_add_test(cases, reset_in_mid_ray);
   suite_add_tcase(suite, cases);

@@ -424,6 +424,36 @@ START_TEST(the_encoder_is_programmed_by_its_words_alone)
 }
 END_TEST
 
+/* From the first sample that is taken to the pixel that is taken, whoever works on it. */
+START_TEST(active_until_the_pixel_has_left)
+{
+  enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
+  static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 22);
+  sf_ray_dut *rays;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 250}));
+  sf_dut *dut = rays->dut;
+  ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
+  for (int empty = 0; empty < 2; empty++) {
+    dut->in.ray_valid = dut->in.ray_user = dut->in.ray_last = true, dut->in.pixel_ready = false;
+    memset(dut->in.ray_data, 0, sizeof dut->in.ray_data);
+    dut->in.ray_data[3] = (uint64_t)empty << 48;
+    sf_dut_tick(dut);
+    ck_assert(dut->out.ray_ready);
+    dut->in.ray_valid = false;
+    int polls = 0;
+    for (; !dut->out.pixel_valid; polls++) ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), BUSY);
+    ck_assert_int_gt(polls, empty ? 0 : 20);
+    for (int i = 0; i < 20; i++) ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), BUSY);
+    dut->in.pixel_ready = true;
+    sf_dut_tick(dut);
+    ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
+  }
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("rtl_ray_registers");
@@ -434,6 +464,7 @@ int main(void)
   tcase_add_test(cases, accesses_without_a_pause);
   tcase_add_test(cases, an_error_beside_its_clearing);
   tcase_add_test(cases, the_encoder_is_programmed_by_its_words_alone);
+  tcase_add_test(cases, active_until_the_pixel_has_left);
   suite_add_tcase(suite, cases);
   return fixture_run(suite);
 }

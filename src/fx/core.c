@@ -29,6 +29,21 @@ static void arrange_biases(fx_words *words, const fx_net *net, int bytes)
   }
 }
 
+/* The upper half of its binary32: exact up to 8 bits. */
+static uint16_t bfloat16(int x)
+{
+  if (x == 0) return 0;
+  const uint32_t magnitude = (uint32_t)(x < 0 ? -x : x);
+  const int exponent = 31 - __builtin_clz(magnitude);
+  return (uint16_t)((uint32_t)(x < 0) << 15 | (uint32_t)(exponent + 127) << 7 | (magnitude << (7 - exponent) & 0x7f));
+}
+
+static void twice_rows(uint16_t (*to)[SF_LANES][2], const int8_t *w, int rows)
+{
+  for (int i = 0; i < rows; i++)
+    for (int o = 0; o < SF_LANES; o++) to[i][o][0] = to[i][o][1] = bfloat16(w[(size_t)i * SF_LANES + (size_t)o]);
+}
+
 static void arrange(fx_words *words, const fx_net *net, int bytes)
 {
   const fx_layer *layer = net->layer;
@@ -36,6 +51,8 @@ static void arrange(fx_words *words, const fx_net *net, int bytes)
   pair_rows(words->d1, 0, layer[FX_D1].w, layer[FX_D1].n_in);
   if (fx_net_decodes(net)) pair_rows(words->c1_constant, 0, layer[FX_C1].w, n_constant);
   pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
+  twice_rows(words->d1_twice, layer[FX_D1].w, layer[FX_D1].n_in);
+  twice_rows(words->c1_h_twice + 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
   arrange_biases(words, net, bytes);
   for (int i = 0; i < SF_LANES; i++)
     for (int o = 0; o < SF_LANES; o++) {

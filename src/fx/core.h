@@ -11,7 +11,8 @@ _Static_assert(SF_LANES == 128 || SF_LANES == 256, "arch.def: LANES is 128 or 25
 
 /* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
  * groups, and after it the row of the biases. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane
- * multiplies them. Aligned: a row that crosses a cache line costs two loads. */
+ * multiplies them. Twice: each weight for both parts of an input (tiles_isa.h). Aligned: a row that crosses a cache
+ * line costs two loads. */
 typedef struct fx_words {
   _Alignas(64) int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
   _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2];        /* by D2 current: row 0, the density's, is zero */
@@ -22,6 +23,7 @@ typedef struct fx_words {
   _Alignas(64) int16_t c3[SF_LANES + 2][SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
   _Alignas(64) int8_t d2_quads[SF_LANES / 4][SF_OUT_MAX][4], c3_quads[SF_LANES / 4][SF_OUT_MAX][4];
+  _Alignas(64) uint16_t d1_twice[SF_FEATURE_MAX][SF_LANES][2], c1_h_twice[SF_OUT_MAX][SF_LANES][2]; /* bfloat16 */
 } fx_words;
 enum { FX_ZERO_ROW = SF_LANES, FX_BIAS_ROW };
 
@@ -68,15 +70,16 @@ static inline void fx_block_count(fx_block *b, int steps)
   }
 }
 
-/* Working memory of one thread: currents and membranes of a block. */
+/* Working memory of one thread: what all steps of a block's layer need at once. Membranes stay in registers. */
 typedef struct fx_scratch {
-  _Alignas(64) int32_t constant[FX_BLOCK][SF_LANES]; /* current that serves all steps: of D1, or of a decoder's C1 */
-  int32_t current[FX_BLOCK][SF_LANES];               /* of C1, and of C2 where its products are dense */
-  int32_t v[FX_SPIKING - 1][FX_BLOCK][SF_LANES];     /* of C1 and C2; those of constant currents stay in registers */
-  int16_t d2_current[FX_BLOCK][SF_OUT_MAX], c3_current[FX_BLOCK][SF_OUT_MAX];
-  _Alignas(64) int16_t c2_current[FX_BLOCK][SF_LANES];
-  _Alignas(64) int32_t argument[4][FX_BLOCK];
-  uint32_t acc[4][FX_BLOCK]; /* density, red, green, blue */
+  _Alignas(64) int16_t d2_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
+  int16_t c3_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
+  _Alignas(64) int16_t c2_current[SF_T_MAX][FX_BLOCK][SF_LANES];
+  _Alignas(64) int32_t argument[SF_T_MAX][4][FX_BLOCK]; /* of the density and the colours */
+  uint32_t acc[4][FX_BLOCK];                            /* density, red, green, blue */
+  /* of tiles: inputs as rows of bytes, sums of 16 neurons */
+  _Alignas(64) uint8_t x[SF_T_MAX * FX_BLOCK][SF_LANES];
+  _Alignas(64) int32_t sum[SF_T_MAX * FX_BLOCK][16];
 } fx_scratch;
 
 typedef struct fx_kernels {

@@ -2,9 +2,7 @@
  * gang of three loads 11 vectors for 24 products; CPUs load fewer than they multiply. */
 #ifndef SPIKEFIELD_FX_DENSE_ISA_H
 #define SPIKEFIELD_FX_DENSE_ISA_H
-#include "src/fx/core.h"
-#include "src/fx/unit.h"
-#include "src/fx/vec_isa.h"
+#include "src/fx/plif_isa.h"
 
 enum { GANG = 3 };
 _Static_assert(FX_BLOCK % GANG == 0, "a block is whole gangs");
@@ -33,14 +31,6 @@ static __attribute__((noinline)) void pair_products(const int16_t *w, int pairs,
   EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
 }
 
-static void d1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
-{
-  for (int i = 0; i < b->n; i += GANG)
-    for (int first = 0; first < VECTORS; first += TILE)
-      pair_products(words->d1[0][first * WIDTH], SF_FEATURE_MAX / 2,
-                    (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]}, NULL, &s->constant[i][first * WIDTH]);
-}
-
 /* Lanes beyond 24 bits become the nearest that fits; returns how many there were. */
 static INLINE uint32_t saturate(int32_t *current)
 {
@@ -53,29 +43,37 @@ static INLINE uint32_t saturate(int32_t *current)
   return saturated;
 }
 
-/* Of a decoder: constant inputs and biases, once per sample. */
-static void c1_constant_currents(const fx_words *words, int n_in, fx_block *b, fx_scratch *s)
+/* Samples of a gang that the block has. */
+static INLINE int members(const fx_block *b, int gang)
 {
-  for (int i = 0; i < b->n; i += GANG)
-    for (int first = 0; first < VECTORS; first += TILE) {
-      const int32_t *bias = words->c1_bias + first * WIDTH;
-      pair_products(words->c1_constant[0][first * WIDTH], (n_in + 1) / 2,
-                    (const int16_t *const[]){b->constant[i], b->constant[i + 1], b->constant[i + 2]},
-                    (const int32_t *const[]){bias, bias, bias}, &s->constant[i][first * WIDTH]);
-    }
-  for (int i = 0; i < b->n; i++) b->saturated[FX_C1][i] += saturate(s->constant[i]);
+  return b->n - gang < GANG ? b->n - gang : GANG;
 }
 
-static void c1_currents(const fx_words *words, const fx_block *b, fx_scratch *s)
+static INLINE void fire_gang(const fx_net *net, int spiking, int mode, const int32_t *current, int step, int gang,
+                             fx_block *b)
 {
-  for (int i = 0; i < b->n; i += GANG)
-    for (int first = 0; first < VECTORS; first += TILE) {
-      const int at = first * WIDTH;
-      pair_products(words->c1_h[0][at], SF_OUT_MAX / 2,
-                    (const int16_t *const[]){s->d2_current[i], s->d2_current[i + 1], s->d2_current[i + 2]},
-                    (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
-                    &s->current[i][at]);
+  for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
+    const currents c = {.kind = WORDS, .from = current + at, .sample = SF_LANES, .step = step};
+    fire_layer(net, spiking, mode, &c, at, TILE, gang, members(b, gang), b);
+  }
+}
+
+/* C1 of a decoder: constant inputs and biases, once per sample. */
+static INLINE void c1_constant_layer(const fx_core *core, fx_block *b, int mode)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  for (int i = 0; i < b->n; i += GANG) {
+    int32_t current[GANG][SF_LANES];
+    for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
+      const int32_t *bias = words->c1_bias + at;
+      pair_products(words->c1_constant[0][at], (net->layer[FX_C1].n_in + 1) / 2,
+                    (const int16_t *const[]){b->constant[i], b->constant[i + 1], b->constant[i + 2]},
+                    (const int32_t *const[]){bias, bias, bias}, &current[0][at]);
     }
+    for (int k = 0; k < members(b, i); k++) b->saturated[FX_C1][i + k] += saturate(current[k]);
+    fire_gang(net, 1, mode, current[0], 0, i, b);
+  }
 }
 
 static INLINE void spike_bytes(const uint64_t bits[SF_SPIKE_WORDS], uint8_t bytes[SF_LANES])

@@ -1,9 +1,8 @@
 /* Products with spikes: a row of weights for every neuron that fired, or all rows where many did. */
 #ifndef SPIKEFIELD_FX_EVENT_ISA_H
 #define SPIKEFIELD_FX_EVENT_ISA_H
-#include "src/fx/core.h"
 #include "src/fx/dense_isa.h"
-#include "src/fx/vec_isa.h"
+#include "src/fx/integrate_isa.h"
 #include <stdbool.h>
 
 enum { GROUP = 4, GROUPS = SF_LANES / GROUP + 1 }; /* rows added at once; the most of one sample, biases included */
@@ -97,13 +96,13 @@ static INLINE void add_rows16(const events *e, const int16_t (*w)[SF_OUT_MAX], i
   }
 }
 
-/* Currents of D2 or C3; quads: those of tiles, not used here. */
-static INLINE void small_currents(const int16_t (*rows)[SF_OUT_MAX], const int8_t (*quads)[SF_OUT_MAX][4],
-                                  const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
+typedef const uint64_t (*bitmaps)[SF_SPIKE_WORDS];
+
+/* Currents of D2 or C3. */
+static INLINE void small_currents(const int16_t (*rows)[SF_OUT_MAX], bitmaps spikes, bool bias, int n,
                                   int16_t (*sum)[SF_OUT_MAX])
 {
   events e;
-  (void)quads;
   list_events(&e, spikes, bias, n);
   add_rows16(&e, rows, sum);
 }
@@ -143,16 +142,16 @@ static INLINE void add_parts(const events *e, const int8_t (*w)[SF_LANES], int16
   }
 }
 
-static void c2_currents_events(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
-                               fx_scratch *s)
+static void c2_currents_events(const fx_words *words, bitmaps spikes, bool bias, int n, int16_t (*sum)[SF_LANES])
 {
   events e;
   list_events(&e, spikes, bias, n);
-  for (int first = 0; first < SF_LANES / BYTES; first += PARTS) add_parts(&e, words->c2, s->c2_current, first);
+  for (int first = 0; first < SF_LANES / BYTES; first += PARTS) add_parts(&e, words->c2, sum, first);
 }
+
 /* out[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
 static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
-                                                    int32_t *out)
+                                                    int16_t *out)
 {
   vec acc[GANG][TILE];
   EACH(k, j) acc[k][j] = v_load(from + j * WIDTH);
@@ -167,20 +166,21 @@ static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8
       for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
     }
   }
-  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+  EACH(k, j) v_store_narrow(out + k * SF_LANES + j * WIDTH, acc[k][j]);
 }
 
-static void c2_currents_dense(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], int n, fx_scratch *s)
+static void c2_currents_dense(const fx_words *words, bitmaps spikes, int n, int16_t (*sum)[SF_LANES])
 {
   for (int i = 0; i < n; i += GANG) {
     uint8_t x[GANG][SF_LANES];
     for (int k = 0; k < GANG; k++) spike_bytes(spikes[i + k], x[k]);
     for (int first = 0; first < VECTORS; first += TILE)
       quad_products(words->c2_quads[0][first * WIDTH], (const uint8_t(*)[SF_LANES])x, words->c2_bias + first * WIDTH,
-                    &s->current[i][first * WIDTH]);
+                    &sum[i][first * WIDTH]);
   }
 }
-static INLINE int spikes_of_block(const uint64_t (*spikes)[SF_SPIKE_WORDS], int n)
+
+static INLINE int spikes_of_block(bitmaps spikes, int n)
 {
   int sum = 0;
   for (int i = 0; i < n; i++) sum += count_spikes(spikes[i]);
@@ -189,16 +189,73 @@ static INLINE int spikes_of_block(const uint64_t (*spikes)[SF_SPIKE_WORDS], int 
 
 enum { C2_DENSE_PERCENT = 40 }; /* firing rate of C1 at which rows for spikes cost as much as all rows */
 
-/* Currents of C2, in s->c2_current if this says true, else in s->current. */
-static INLINE bool c2_currents(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
-                               fx_scratch *s)
+static INLINE void c2_currents(const fx_words *words, bitmaps spikes, bool bias, int n, int16_t (*sum)[SF_LANES])
 {
-  const bool few = spikes_of_block(spikes, n) * 100 <= n * SF_LANES * C2_DENSE_PERCENT;
-  if (few)
-    c2_currents_events(words, spikes, bias, n, s);
+  if (spikes_of_block(spikes, n) * 100 <= n * SF_LANES * C2_DENSE_PERCENT)
+    c2_currents_events(words, spikes, bias, n, sum);
   else
-    c2_currents_dense(words, spikes, n, s);
-  return few;
+    c2_currents_dense(words, spikes, n, sum);
+}
+
+/* ---- the layers, all steps of a block ---- */
+
+static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  for (int i = 0; i < b->n; i += GANG) {
+    int32_t current[GANG][SF_LANES];
+    for (int at = 0; at < SF_LANES; at += TILE * WIDTH)
+      pair_products(words->d1[0][at], SF_FEATURE_MAX / 2, (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]},
+                    NULL, &current[0][at]);
+    fire_gang(net, 0, mode, current[0], 0, i, b);
+  }
+  for (int t = 0; t < net->steps; t++) {
+    small_currents(words->d2, (bitmaps)b->spikes[0][t], false, b->n, s->d2_current[t]);
+    for (int i = 0; i < b->n; i++) {
+      __m256i *current = (__m256i *)s->d2_current[t][i];
+      s->argument[t][0][i] = s->d2_current[t][i][0];
+      _mm256_storeu_si256(current, _mm256_srai_epi16(_mm256_loadu_si256(current), SF_H_SHIFT));
+    }
+  }
+}
+
+static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_net *net = &core->scene->net;
+  for (int i = b->n; i % GANG; i++) b->base[i] = b->base[0]; /* the last gang may have members that nobody reads */
+  for (int i = 0; i < b->n; i += GANG) {
+    int32_t current[SF_T_MAX][GANG][SF_LANES];
+    for (int at = 0; at < SF_LANES; at += TILE * WIDTH)
+      for (int t = 0; t < net->steps; t++) {
+        const int16_t(*h)[SF_OUT_MAX] = (const int16_t(*)[SF_OUT_MAX])s->d2_current[t];
+        pair_products(core->words.c1_h[0][at], SF_OUT_MAX / 2, (const int16_t *const[]){h[i], h[i + 1], h[i + 2]},
+                      (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
+                      &current[t][0][at]);
+      }
+    fire_gang(net, 1, mode, current[0][0], GANG * SF_LANES, i, b);
+  }
+}
+
+static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_net *net = &core->scene->net;
+  for (int t = 0; t < net->steps; t++)
+    c2_currents(&core->words, (bitmaps)b->spikes[1][t], net->layer[FX_C2].bias != 0, b->n, s->c2_current[t]);
+  for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
+    const currents c = {HALVES, &s->c2_current[0][0][at], SF_LANES, FX_BLOCK * SF_LANES, SF_AC_FRAC, NULL};
+    fire_layer(net, 2, mode, &c, at, TILE, 0, b->n, b);
+  }
+}
+
+static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s)
+{
+  for (int t = 0; t < core->scene->net.steps; t++) {
+    small_currents(core->words.c3, (bitmaps)b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n,
+                   s->c3_current[t]);
+    for (int o = 0; o < COLOURS; o++)
+      for (int i = 0; i < b->n; i++) s->argument[t][1 + o][i] = s->c3_current[t][i][o];
+  }
 }
 
 static INLINE void tiles_begin(void) {}

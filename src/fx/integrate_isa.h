@@ -78,21 +78,22 @@ static INLINE void integrate(uint32_t *acc, vec in, int32_t k, int mode, bool fi
 }
 
 /* The densities of samples i..i + WIDTH - 1. */
-static INLINE void integrate_densities(const fx_net *net, fx_block *b, fx_scratch *s, int i, int mode, bool first)
+static INLINE void integrate_densities(const fx_net *net, fx_block *b, fx_scratch *s, int i, int mode, bool first,
+                                       int t)
 {
-  const vec e = exp2_of(argument(v_load(&s->argument[0][i]), &net->exp_in, FX_EXP2_BITS));
+  const vec e = exp2_of(argument(v_load(&s->argument[t][0][i]), &net->exp_in, FX_EXP2_BITS));
   const uint32_t below = v_differ(e, v_set((1 << SF_SIGMA_BITS) - 1));
   for (uint32_t rest = ~below & (((uint32_t)1 << WIDTH) - 1); rest; rest &= rest - 1)
     b->saturated[FX_D2][i + __builtin_ctz(rest)]++;
   integrate(&s->acc[0][i], e, net->layer[FX_D2].k, mode, first, SF_SIGMA_BITS, &b->saturated[FX_D2][i]);
 }
 
-static INLINE void integrate_step(const fx_net *net, fx_block *b, fx_scratch *s, int mode, bool first)
+static INLINE void integrate_step(const fx_net *net, fx_block *b, fx_scratch *s, int mode, bool first, int t)
 {
   for (int i = 0; i < b->n; i += WIDTH) {
-    if (!fx_net_decodes(net)) integrate_densities(net, b, s, i, mode, first);
+    if (!fx_net_decodes(net)) integrate_densities(net, b, s, i, mode, first, t);
     for (int o = 1; o <= COLOURS; o++)
-      integrate(&s->acc[o][i], sigmoid_of(argument(v_load(&s->argument[o][i]), &net->sigmoid_in, FX_SIGMOID_BITS)),
+      integrate(&s->acc[o][i], sigmoid_of(argument(v_load(&s->argument[t][o][i]), &net->sigmoid_in, FX_SIGMOID_BITS)),
                 net->layer[FX_C3].k, mode, first, SF_COLOUR_BITS, &b->saturated[FX_C3][i]);
   }
 }

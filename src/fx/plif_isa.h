@@ -45,23 +45,62 @@ typedef struct neurons {
   leak k;
   vec theta;
   int mode;
-  bool first, last;
+  bool first;
 } neurons;
 
-static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first, int t)
+static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first)
 {
-  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first, t + 1 == net->steps};
+  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first};
 }
 
-/* One vector of neurons with membranes v; the spikes as bits. */
-static INLINE uint32_t fire(const neurons *n, vec *v, vec current, uint32_t *saturated)
+/* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH]. */
+typedef struct currents {
+  enum { WORDS, HALVES, REALS } kind; /* of 32 or 16 bits; whole numbers in binary32 */
+  const void *from;
+  int sample, step;
+  int shift;                  /* to a membrane's LSB */
+  const int32_t *const *base; /* what is added, of each sample; or NULL */
+} currents;
+
+static INLINE vec current_of(const currents *c, int i, int t, int j, int neuron)
 {
-  *v = charge(*v, current, n->k, n->mode, n->first, saturated);
-  return v_fire(v, n->theta);
+  const int at = t * c->step + i * c->sample + j * WIDTH;
+  vec x = c->kind == HALVES ? v_widen((const int16_t *)c->from + at) : v_load((const int32_t *)c->from + at);
+  if (c->kind == REALS) x = v_whole(x);
+  if (c->base) x = V(add_epi32)(x, v_load(c->base[i] + neuron + j * WIDTH));
+  return c->shift ? V(slli_epi32)(x, c->shift) : x;
 }
 
-static INLINE void put_spikes(uint64_t bits[SF_SPIKE_WORDS], int vector, uint32_t spikes)
+/* One step of some vectors of a sample's neurons. */
+static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c, int i, int t, int neuron,
+                        uint64_t spikes[SF_SPIKE_WORDS], uint32_t *saturated)
 {
-  bits[vector * WIDTH / 64] |= (uint64_t)spikes << vector * WIDTH % 64;
+  uint64_t bits[SF_SPIKE_WORDS] = {0};
+#pragma GCC unroll 8
+  for (int j = 0; j < vectors; j++) {
+    v[j] = charge(v[j], current_of(c, i, t, j, neuron), n->k, n->mode, n->first, saturated);
+    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->theta) << j * WIDTH % 64;
+  }
+  memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
+}
+
+static const int spiking_layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
+
+/* All steps of `vectors` (TILE or 1) vectors of neurons, from one on, of a spiking layer, for n samples from `sample`
+ * on, the first of which is sample 0 of the currents. Membranes stay in registers. */
+static INLINE void fire_layer(const fx_net *net, int spiking, int mode, const currents *c, int neuron, int vectors,
+                              int sample, int n, fx_block *b)
+{
+  const int layer = spiking_layer[spiking];
+  const neurons first = neurons_of(net, layer, mode, true), later = neurons_of(net, layer, mode, false);
+  for (int i = 0; i < n; i++) {
+    uint32_t *saturated = &b->saturated[layer][sample + i];
+    vec v[TILE];
+#pragma GCC unroll 8
+    for (int j = 0; j < vectors; j++) v[j] = v_set(0);
+    fire(&first, v, vectors, c, i, 0, neuron, b->spikes[spiking][0][sample + i], saturated);
+    for (int t = 1; t < net->steps; t++)
+      fire(&later, v, vectors, c, i, t, neuron, b->spikes[spiking][t][sample + i], saturated);
+  }
 }
 #endif

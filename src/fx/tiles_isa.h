@@ -1,15 +1,20 @@
-/* Products of spikes on AMX tiles of bytes (TDPBUSD: products and sums are exact): 16 samples, 64 neurons and 16
- * outputs at a time. Quads of weights (fx_words) lie as tiles want them. Faster than rows for spikes from a firing
- * rate of 10 % on, and no slower at higher ones. Every row is one cache line: two would cost two loads. */
+/* Products on AMX tiles: 16 neurons for 16 samples at a time, the weights of all inputs in tiles 0 and 1, all samples
+ * and steps of a block one tile after the other. Exact: spikes and 8-bit weights as bytes with 32-bit sums (TDPBUSD).
+ * The inputs of D1 and C1 have 12 bits: x = high + low, a multiple of 16 and 0..15, each exact in bfloat16, as the
+ * weight is; their products and the sums, below 2^24, are whole numbers in binary32 (TDPBF16PS), whatever their order.
+ *
+ * Per tile of 16 samples two loads and one store hide behind two products of 18 cycles; weights or biases loaded in
+ * between, or rows that cross a cache line, do not hide. */
 #ifndef SPIKEFIELD_FX_TILES_ISA_H
 #define SPIKEFIELD_FX_TILES_ISA_H
 #include "base/amx.h"
-#include "src/fx/core.h"
 #include "src/fx/dense_isa.h"
-#include <stdbool.h>
+#include "src/fx/integrate_isa.h"
 
-enum { SIDE = 16, TILE_BYTES = 64 };
-_Static_assert((int)FX_BLOCK == 3 * SIDE && (int)SF_OUT_MAX == SIDE, "a block is three tiles");
+enum { SIDE = 16, ROW = 64 /* bytes */ };
+_Static_assert((int)FX_BLOCK == 3 * SIDE && (int)SF_OUT_MAX == SIDE && (int)WIDTH == SIDE, "a block is three tiles");
+_Static_assert((int)SF_FEATURE_MAX == 2 * SIDE && SF_INPUT_BITS == 12, "D1 takes two tiles of inputs");
+_Static_assert(((SF_LANES * 127) >> SF_H_SHIFT) < 2048 && 2 * SIDE * (2048 + 15) * 127 < 1 << 24, "whole in binary32");
 
 static INLINE void tiles_begin(void)
 {
@@ -23,58 +28,129 @@ static INLINE void tiles_end(void)
   _tile_release();
 }
 
-/* Bytes 0 or 1 of every neuron. */
-static INLINE void spike_rows(const uint64_t (*spikes)[SF_SPIKE_WORDS], int n, uint8_t (*x)[SF_LANES])
-{
-  for (int i = 0; i < n; i++) spike_bytes(spikes[i], x[i]);
-}
+/* One tile of samples: x of two tiles side by side, or of one (twice is false). */
+#define PRODUCTS(acc, multiply)                                                                                        \
+  if (more)                                                                                                            \
+    _tile_loadd(acc, out, ROW);                                                                                        \
+  else if (from)                                                                                                       \
+    _tile_loadd(acc, from, 0);                                                                                         \
+  else                                                                                                                 \
+    _tile_zero(acc);                                                                                                   \
+  _tile_loadd(2, x, ldx);                                                                                              \
+  multiply(acc, 2, 0);                                                                                                 \
+  if (twice) {                                                                                                         \
+    _tile_loadd(3, x + ROW, ldx);                                                                                      \
+    multiply(acc, 3, 1);                                                                                               \
+  }                                                                                                                    \
+  _tile_stored(acc, out, ROW);                                                                                         \
+  x += SIDE * ldx, out += SIDE;
 
-/* out[i][o] = from[o] + sum of w[q][o] . x[i][q], quads, for the samples of a block and 16 outputs; ldw: quads from one
- * row to the next, ldo: outputs. */
-static INLINE void tile_products(const int8_t (*w)[4], int ldw, const uint8_t (*x)[SF_LANES], const int32_t *from,
-                                 int32_t *out, int ldo)
-{
-  __asm__ volatile("" ::: "memory"); /* GCC's tile loads do not say that they read memory */
-  _tile_loadd(0, from, 0);
-  _tile_loadd(1, from, 0);
-  _tile_loadd(2, from, 0);
-  for (int k = 0; k < SF_LANES; k += TILE_BYTES) {
-    _tile_loadd(3, w + k / 4 * ldw, 4 * ldw);
-    _tile_loadd(4, x[0] + k, SF_LANES);
-    _tile_loadd(5, x[SIDE] + k, SF_LANES);
-    _tile_loadd(6, x[2 * SIDE] + k, SF_LANES);
-    _tile_dpbusd(0, 4, 3);
-    _tile_dpbusd(1, 5, 3);
-    _tile_dpbusd(2, 6, 3);
+/* out[i][o] = sum of w . x[i] of 16 neurons, for `blocks` blocks of samples, more than from[o], or, for more, than
+ * out[i][o] before; from: 16 sums, or NULL. */
+#define GROUP_OF(name, multiply)                                                                                       \
+  static INLINE void name(const void *w, int ldw, bool twice, const uint8_t *x, int ldx, const int32_t *from,          \
+                          bool more, int blocks, int32_t(*out)[SIDE])                                                  \
+  {                                                                                                                    \
+    __asm__ volatile("" ::: "memory"); /* GCC's tile loads do not say that they read memory */                         \
+    _tile_loadd(0, w, ldw);                                                                                            \
+    if (twice) _tile_loadd(1, (const uint8_t *)w + SIDE * ldw, ldw);                                                   \
+    for (int block = 0; block < blocks; block++) {                                                                     \
+      PRODUCTS(4, multiply)                                                                                            \
+      PRODUCTS(5, multiply)                                                                                            \
+      PRODUCTS(6, multiply)                                                                                            \
+    }                                                                                                                  \
+    __asm__ volatile("" ::: "memory");                                                                                 \
   }
-  _tile_stored(0, out, 4 * ldo);
-  _tile_stored(1, out + SIDE * ldo, 4 * ldo);
-  _tile_stored(2, out + 2 * SIDE * ldo, 4 * ldo);
+GROUP_OF(byte_products, _tile_dpbusd)
+GROUP_OF(input_products, _tile_dpbf16ps)
+
+/* Of all spikes; w: quads of 16 outputs, ldw bytes from one to the next. */
+static INLINE void spike_products(const int8_t (*w)[4], int ldw, const uint8_t (*x)[SF_LANES], const int32_t *from,
+                                  int steps, int32_t (*out)[SIDE])
+{
+  for (int k = 0; k < SF_LANES; k += 2 * ROW)
+    byte_products((const int8_t *)w + k / 4 * ldw, ldw, true, x[0] + k, SF_LANES, from, k > 0, steps, out);
 }
 
-/* Currents of D2 or C3; rows: for the biases alone. */
-static INLINE void small_currents(const int16_t (*rows)[SF_OUT_MAX], const int8_t (*quads)[SF_OUT_MAX][4],
-                                  const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
-                                  int16_t (*sum)[SF_OUT_MAX])
+/* Bytes 0 or 1 of every neuron of a spiking layer, all steps. */
+static INLINE void spike_rows(const fx_block *b, int spiking, int steps, uint8_t (*x)[SF_LANES])
 {
-  _Alignas(64) uint8_t x[FX_BLOCK][SF_LANES];
-  _Alignas(64) int32_t from[SF_OUT_MAX], out[FX_BLOCK][SF_OUT_MAX];
-  for (int o = 0; o < SF_OUT_MAX; o++) from[o] = bias ? rows[FX_BIAS_ROW][o] : 0;
-  spike_rows(spikes, n, x);
-  tile_products(quads[0], SF_OUT_MAX, (const uint8_t(*)[SF_LANES])x, from, out[0], SF_OUT_MAX);
-  for (int i = 0; i < n; i++) _mm256_storeu_si256((__m256i *)sum[i], _mm512_cvtepi32_epi16(v_load(out[i])));
+  for (int t = 0; t < steps; t++)
+    for (int i = 0; i < b->n; i++) spike_bytes(b->spikes[spiking][t][i], x[t * FX_BLOCK + i]);
 }
 
-/* Currents of C2, in s->current: false. Biases are always added: they are zero where there are none. */
-static INLINE bool c2_currents(const fx_words *words, const uint64_t (*spikes)[SF_SPIKE_WORDS], bool bias, int n,
-                               fx_scratch *s)
+/* 16 inputs as pairs of low, high. */
+static INLINE void input_row(vec x, uint8_t *row)
 {
-  _Alignas(64) uint8_t x[FX_BLOCK][SF_LANES];
-  (void)bias;
-  spike_rows(spikes, n, x);
-  for (int o = 0; o < SF_LANES; o += SIDE)
-    tile_products(&words->c2_quads[0][o], SF_LANES, (const uint8_t(*)[SF_LANES])x, words->c2_bias + o,
-                  &s->current[0][o], SF_LANES);
-  return false;
+  const vec low = V_BITS(and)(x, v_set(15)), high = V(sub_epi32)(x, low);
+  const vec low32 = _mm512_castps_si512(_mm512_cvtepi32_ps(low)),
+            high32 = _mm512_castps_si512(_mm512_cvtepi32_ps(high));
+  v_store(row, V_BITS(or)(high32, V(srli_epi32)(low32, 16)));
+}
+
+/* ---- the layers, all steps of a block ---- */
+
+static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  for (int i = 0; i < b->n; i++)
+    for (int half = 0; half < 2; half++) input_row(v_widen(b->f[i] + SIDE * half), s->x[i] + ROW * half);
+  for (int o = 0; o < SF_LANES; o += SIDE) {
+    const currents c = {.kind = REALS, .from = s->sum, .sample = SIDE, .step = 0};
+    input_products(words->d1_twice[0][o], sizeof words->d1_twice[0], true, s->x[0], SF_LANES, NULL, false, 1, s->sum);
+    fire_layer(net, 0, mode, &c, o, 1, 0, b->n, b);
+  }
+  spike_rows(b, 0, net->steps, s->x);
+  spike_products(words->d2_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, NULL, net->steps, s->sum);
+  for (int t = 0; t < net->steps; t++)
+    for (int i = 0; i < b->n; i++) {
+      const vec current = v_load(s->sum[t * FX_BLOCK + i]);
+      s->argument[t][0][i] = s->sum[t * FX_BLOCK + i][0];
+      input_row(V(srai_epi32)(current, SF_H_SHIFT), s->x[t * FX_BLOCK + i]);
+    }
+}
+
+static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  for (int o = 0; o < SF_LANES; o += SIDE) {
+    const currents c = {.kind = REALS,
+                        .from = s->sum,
+                        .sample = SIDE,
+                        .step = FX_BLOCK * SIDE,
+                        .base = (const int32_t *const *)b->base};
+    input_products(words->c1_h_twice[0][o], sizeof words->c1_h_twice[0], false, s->x[0], SF_LANES, NULL, false,
+                   net->steps, s->sum);
+    fire_layer(net, 1, mode, &c, o, 1, 0, b->n, b);
+  }
+}
+
+static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  spike_rows(b, 1, net->steps, s->x);
+  for (int o = 0; o < SF_LANES; o += SIDE) {
+    const currents c = {WORDS, s->sum, SIDE, FX_BLOCK * SIDE, SF_AC_FRAC, NULL};
+    spike_products(&words->c2_quads[0][o], sizeof words->c2_quads[0], (const uint8_t(*)[SF_LANES])s->x,
+                   net->layer[FX_C2].bias ? words->c2_bias + o : NULL, net->steps, s->sum);
+    fire_layer(net, 2, mode, &c, o, 1, 0, b->n, b);
+  }
+}
+
+static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s)
+{
+  const fx_words *words = &core->words;
+  const fx_net *net = &core->scene->net;
+  _Alignas(64) int32_t bias[SIDE];
+  for (int o = 0; o < SIDE; o++) bias[o] = words->c3[FX_BIAS_ROW][o];
+  spike_rows(b, 2, net->steps, s->x);
+  spike_products(words->c3_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, net->layer[FX_C3].bias ? bias : NULL,
+                 net->steps, s->sum);
+  for (int t = 0; t < net->steps; t++)
+    for (int o = 0; o < COLOURS; o++)
+      for (int i = 0; i < b->n; i++) s->argument[t][1 + o][i] = s->sum[t * FX_BLOCK + i][o];
 }
 #endif

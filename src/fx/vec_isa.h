@@ -57,6 +57,14 @@ static INLINE vec v_widen(const int16_t *p)
 {
   return _mm512_cvtepi16_epi32(_mm256_loadu_si256((const __m256i *)p));
 }
+static INLINE vec v_whole(vec binary32) /* numbers that are whole */
+{
+  return _mm512_cvtps_epi32(_mm512_castsi512_ps(binary32));
+}
+static INLINE void v_store_narrow(int16_t *p, vec x) /* lanes of 16 bits */
+{
+  _mm256_storeu_si256((__m256i *)p, _mm512_cvtepi32_epi16(x));
+}
 #else
 typedef __m256i vec;
 enum { WIDTH = 8, TILE = 4 };
@@ -103,6 +111,15 @@ static INLINE vec v_set64(int64_t x)
 static INLINE vec v_widen(const int16_t *p)
 {
   return _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p));
+}
+static INLINE vec v_whole(vec binary32)
+{
+  return _mm256_cvtps_epi32(_mm256_castsi256_ps(binary32));
+}
+static INLINE void v_store_narrow(int16_t *p, vec x)
+{
+  const vec halves = _mm256_permute4x64_epi64(_mm256_packs_epi32(x, x), 0x08);
+  _mm_storeu_si128((__m128i *)p, _mm256_castsi256_si128(halves));
 }
 #endif
 

@@ -134,15 +134,17 @@ class Module:
                 i = self.match(i)
             elif t[i] in ("=", "<="):
                 end = self.until(i + 1, (";",))
-                first = i - 1
-                if t[first] in ("]", "}"):
+                first = i - 1  # of what is given: a name with brackets behind it, or braces
+                while t[first] in ("]", "}"):
                     depth = 0
                     while True:
                         depth += (t[first] in ("]", "}")) - (t[first] in ("[", "{"))
                         if depth == 0:
                             break
                         first -= 1
-                    first -= t[first] == "["
+                    if t[first] == "{":
+                        break
+                    first -= 1
                 left = " ".join(self.text[self.tokens[first][1]:self.tokens[i - 1][2]].split())
                 if not left.startswith("unused"):
                     yield 0, (t[i], i + 1, end, left)
