@@ -114,6 +114,13 @@ template <class module> static void configure(unit<module> &u, int address, int6
   u.top.cfg_we_i = 0;
 }
 
+/* The write port's address, up to `last`, and its data mean nothing but in a write. */
+template <class module> static void show_anything(unit<module> &u, random_draw &draw, int last)
+{
+  u.top.cfg_addr_i = (uint8_t)(draw(0, 1) ? draw(0, last) : last - draw(0, 3));
+  u.top.cfg_data_i = (uint32_t)draw(0, UINT32_MAX - 1);
+}
+
 template <class module> static void configure_levels(unit<module> &u, const fx_grid &grid)
 {
   for (int l = 0; l < grid.levels; l++) {

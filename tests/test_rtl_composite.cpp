@@ -109,6 +109,7 @@ struct bench {
     u.top.ready_i = !draw.percent(stall);
     u.settle();
     const bool taken = u.top.valid_i && u.top.ready_o;
+    if (open || !expected.empty()) ck_assert(!u.top.idle_o);
     stops += u.top.stop_o;
     if (u.top.stop_o) ck_assert_uint_eq(u.cycle - taken_at, STOP_LATENCY);
     if (taken) taken_at = u.cycle;
@@ -182,7 +183,7 @@ static void random_ray(bench &b, int kind)
   const int n = (int)(b.draw.percent(70) ? b.draw(1, 6) : b.draw(1, RAY_MAX));
   if (b.draw.percent(10)) {
     sample s = draw_sample(b.draw, kind);
-    s.first = s.last = s.empty = true;
+    s.first = b.draw.percent(50), s.last = s.empty = true; /* empty alone begins a ray, too */
     b.give(s);
   }
   for (int i = 0; i < n; i++) {

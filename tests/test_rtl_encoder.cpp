@@ -37,7 +37,7 @@ template <class module, int ports> struct encoder_bench {
   int stall = 0, n_dir = 0, frac = 0, first_percent = 0;
   std::deque<beat> expected, next; /* of accepted samples; of the one on offer */
   int accepted = 0, done = 0;
-  bool in_ray = false;
+  bool in_ray = false, waits_for_valid = false; /* waits_for_valid: a sink that is ready for a beat that it sees */
   sink_stalls sink;
   held output, request[ports];
 
@@ -52,7 +52,7 @@ template <class module, int ports> struct encoder_bench {
     table = fixture, n_dir = directions, frac = lsb, in_ray = false;
     configure_levels(u, fixture->grid);
     configure(u, 0x80, fixture->grid.levels);
-    configure(u, 0x81, n_dir);
+    configure(u, 0x81, n_dir < FX_SH ? n_dir : draw(FX_SH, 31)); /* no more than there are */
     configure(u, 0x82, frac);
   }
   void timing(int latency, int spread, int stalls, int first)
@@ -77,9 +77,11 @@ template <class module, int ports> struct encoder_bench {
   void cycle(int more)
   {
     if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) offer();
-    u.top.m_axis_tready_i = !sink(draw, u.cycle);
+    u.top.m_axis_tready_i = waits_for_valid ? 0 : !sink(draw, u.cycle);
+    show_anything(u, draw, 0x83);
     drive_memory();
     u.settle();
+    if (waits_for_valid) u.top.m_axis_tready_i = u.top.m_axis_tvalid_o, u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
     for (int p = 0; p < ports; p++) {
       const bool valid = u.top.mem_req_valid_o >> p & 1;
@@ -168,6 +170,7 @@ template <class bench> static void random_scenes(uint64_t seed)
     const grid_fixture fixture(b.draw, n % 4 ? (int)b.draw(1, 16) : n % 8 ? 1 : 16, n % 5 == 4);
     b.load(&fixture, n % 3 ? (int)b.draw(0, 16) : 16, (int)b.draw(0, 11));
     b.timing((int)b.draw(1, 60), (int)b.draw(0, 3) * 40, n % 3 == 0 ? 0 : n % 3 == 1 ? 20 : 70, (int)b.draw(0, 4) * 25);
+    b.waits_for_valid = n % 5 == 1;
     b.run(100);
     for (int i = 0; i < 20; i++) b.cycle(0); /* and no beat more */
     ck_assert(b.idle());
@@ -208,6 +211,26 @@ START_TEST(a_request_in_every_cycle)
     for (int latency = 1; latency <= 61; latency += 30) full_speed<one_port>(levels, latency, 100, 8 * levels);
   }
   for (int latency = 1; latency <= 91; latency += 30) full_speed<four_ports>(16, latency, 10, 32);
+}
+END_TEST
+
+/* A direction that waits for the harmonics of the one before holds up nothing but a third one. */
+START_TEST(a_direction_that_waits)
+{
+  enum { HARMONICS = 2 * FX_SH + 11 };
+  one_port b(75);
+  const grid_fixture fixture(b.draw, 1, 0);
+  b.load(&fixture, FX_SH, 6);
+  b.timing(1, 0, 0, 100);
+  while (b.accepted < 2) b.cycle(1); /* two rays */
+  const uint64_t begin = b.u.cycle;
+  b.timing(1, 0, 0, 0);
+  while (b.accepted < 4) b.cycle(1); /* two more samples of the second */
+  ck_assert_uint_lt(b.u.cycle - begin, 20);
+  b.timing(1, 0, 0, 100);
+  while (b.accepted < 5) b.cycle(1);
+  ck_assert_uint_gt(b.u.cycle - begin, HARMONICS / 2);
+  b.run(20);
 }
 END_TEST
 
@@ -274,6 +297,7 @@ int main(void)
   tcase_add_loop_test(cases, random_scenes_through_one_port, 0, 3);
   tcase_add_loop_test(cases, random_scenes_through_four_ports, 0, 3);
   tcase_add_test(cases, a_request_in_every_cycle);
+  tcase_add_test(cases, a_direction_that_waits);
   tcase_add_test(cases, reset_on_the_way_through_one_port);
   tcase_add_test(cases, reset_on_the_way_through_four_ports);
   tcase_add_test(cases, sizes_of_a_real_scene);

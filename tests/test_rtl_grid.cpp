@@ -122,6 +122,8 @@ struct grid_bench {
   };
   std::deque<sample> flying;    /* accepted; not all of its features have come */
   std::deque<uint32_t> entries; /* that must be asked for */
+  size_t owed = 0;              /* answers to requests of before a clear: until they have come, nothing is asked */
+  uint64_t memory_begins = 0;   /* cycle before which the memory takes nothing */
   sample next;
   int level = 0, accepted = 0, done = 0;
   sink_stalls sink;
@@ -148,6 +150,7 @@ struct grid_bench {
     flying.clear(), entries.clear();
     output = request = held(), level = 0, accepted = done;
     if (hard) memory.queue.clear();
+    owed = memory.queue.size();
   }
   /* Offers samples while `more`. */
   void cycle(int more)
@@ -160,11 +163,15 @@ struct grid_bench {
     }
     u.top.m_ready_i = !sink(draw, u.cycle);
     memory.drive(draw, u.cycle);
+    if (u.cycle < memory_begins) memory.ready = false;
+    show_anything(u, draw, 0x7f);
     u.top.mem_req_ready_i = memory.ready, u.top.mem_rsp_valid_i = memory.answers, u.top.mem_rsp_data_i = memory.word;
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
     request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
     const uint32_t entry = u.top.mem_req_addr_o;
+    if (owed) ck_assert(!u.top.mem_req_valid_o);
+    owed -= owed && memory.answers;
     if (memory.sample(draw, u.cycle, u.top.mem_req_valid_o, entry) && u.top.rst_ni) ask(entry);
     output.check(u.top.m_valid_o, u.top.m_ready_i, u.top.m_features_o << 1 | u.top.m_last_o);
     if (u.top.m_valid_o && u.top.m_ready_i && !quiet) take();
@@ -249,6 +256,22 @@ START_TEST(a_request_in_every_cycle)
 }
 END_TEST
 
+/* While the memory takes nothing, all that fits in before it fills up: one request waits, one index behind it. */
+START_TEST(a_memory_that_begins_late)
+{
+  enum { BEHIND = 3 };
+  for (int levels = 1; levels <= 16; levels += 5) {
+    grid_bench b(41);
+    const grid_fixture fixture(b.draw, levels, 0);
+    b.load(&fixture, 10, 0, 0);
+    b.memory_begins = b.u.cycle + 100;
+    const uint64_t begin = b.u.cycle, requests = 20 * (uint64_t)levels * CORNERS;
+    b.run(20);
+    ck_assert_uint_eq(b.u.cycle - begin, 100 + requests + 10 + BEHIND);
+  }
+}
+END_TEST
+
 /* Clear at any moment; the memory goes on answering what it had accepted. */
 START_TEST(reset_on_the_way)
 {
@@ -274,6 +297,7 @@ int main(void)
   tcase_add_loop_test(cases, sums_of_random_cells, 0, 3);
   tcase_add_loop_test(cases, random_grids, 0, 4);
   tcase_add_test(cases, a_request_in_every_cycle);
+  tcase_add_test(cases, a_memory_that_begins_late);
   tcase_add_test(cases, reset_on_the_way);
   suite_add_tcase(suite, cases);
   return unit_run(suite);

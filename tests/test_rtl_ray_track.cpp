@@ -223,13 +223,14 @@ START_TEST(wrong_order)
       if (wrong) s.first = true, b.give(s);
       b.give(s); /* without a first before it, or a second first */
       ck_assert(b.broken);
+      b.u.top.enable_i = 0; /* nothing holds up what is swallowed */
       for (int i = 0; i < 100; i++) {
         sample junk = draw_sample(b.draw);
         junk.first = b.draw.percent(50), junk.last = b.draw.percent(50);
         b.give(junk);
       }
       CData &signal = hard ? b.u.top.rst_ni : b.u.top.clear_i;
-      signal = !hard;
+      signal = !hard, b.u.top.enable_i = 1;
       b.u.edge();
       signal = hard;
       b.forget();

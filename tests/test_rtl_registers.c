@@ -277,6 +277,33 @@ START_TEST(weights_are_written_by_nothing_else)
 }
 END_TEST
 
+/* A row is written into its own place alone: the last one first, and all of them twice. */
+START_TEST(rows_in_any_order)
+{
+  typical(106);
+  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
+  fx_counts counts = {0};
+  sf_dut *dut = open_dut(&net_of_test.net, 106, 0);
+  const sf_bus *bus = &dut->bus;
+  sf_driver_reset(bus);
+  for (int order = 0; order < 2; order++)
+    for (uint32_t l = 0; l < SF_LAYERS; l++)
+      for (int32_t i = 0, n = blob.layer[l].n_in; i < n; i++) {
+        const int32_t row = order ? n - 1 - i : (i * 7 + n - 1) % n; /* some rows again and again */
+        const int8_t *w = blob.layer[l].w + row * SF_LANES;
+        bus->write(bus->context, SF_CSR_WEIGHT_ADDRESS,
+                   l << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB | (uint32_t)row << SF_CSR_WEIGHT_ADDRESS_ROW_LSB);
+        for (int32_t o = 0; o < blob.layer[l].n_out; o += 4)
+          bus->write(bus->context, SF_CSR_WEIGHT_DATA,
+                     (uint32_t)(uint8_t)w[o] | (uint32_t)(uint8_t)w[o + 1] << 8 | (uint32_t)(uint8_t)w[o + 2] << 16 |
+                         (uint32_t)(uint8_t)w[o + 3] << 24);
+      }
+  ck_assert_int_eq(sf_driver_start(bus), SF_DRIVER_OK);
+  run_batch(dut, &net_of_test.net, 4, &counts, 106);
+  sf_dut_close(dut);
+}
+END_TEST
+
 /* ---- the window of counters ---- */
 
 static bool has_meaning(int event, int layer, int step)
@@ -408,6 +435,27 @@ START_TEST(a_walk_takes_no_time)
 }
 END_TEST
 
+/* Samples that come while a walk clears or copies wait for its end, and are counted whole. */
+START_TEST(samples_that_come_during_a_walk)
+{
+  typical(114);
+  sf_dut *dut = open_dut(&net_of_test.net, 114, 0);
+  for (int round = 0; round < 6; round++) {
+    fx_counts counts = {0};
+    run_batch(dut, &net_of_test.net, 3, &counts, 114);
+    dut->bus.write(dut->bus.context, SF_CSR_CTRL,
+                   round % 2 ? SF_CSR_CTRL_CLEAR | SF_CSR_CTRL_SNAPSHOT : SF_CSR_CTRL_CLEAR);
+    for (int i = 0; i < 100 * round; i++) sf_dut_tick(dut);
+    ck_assert_uint_ne(get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS, 0);
+    counts = (fx_counts){0};
+    run_batch(dut, &net_of_test.net, 2, &counts, 114);
+    same_counts(dut, &counts, 114);
+    commands(dut, SF_CSR_CTRL_CLEAR, 0);
+  }
+  sf_dut_close(dut);
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("rtl_registers");
@@ -417,10 +465,12 @@ int main(void)
   tcase_add_loop_test(c, any_access_in_any_state, 0, 2);
   tcase_add_test(c, accesses_without_a_pause);
   tcase_add_loop_test(c, weights_are_written_by_nothing_else, 0, SF_LAYERS);
+  tcase_add_test(c, rows_in_any_order);
   tcase_add_loop_test(c, places_of_the_window, 0, 2);
   tcase_add_test(c, the_window_is_of_the_last_snapshot);
   tcase_add_test(c, a_response_that_waits);
   tcase_add_test(c, a_walk_takes_no_time);
+  tcase_add_test(c, samples_that_come_during_a_walk);
   suite_add_tcase(suite, c);
   SRunner *runner = srunner_create(suite);
   srunner_run_all(runner, CK_ENV);
