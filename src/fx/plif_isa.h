@@ -84,23 +84,36 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
   memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
 }
 
+enum { TOGETHER = 2 }; /* samples whose steps overlap */
+
 static const int spiking_layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
 
-/* All steps of `vectors` (TILE or 1) vectors of neurons, from one on, of a spiking layer, for n samples from `sample`
- * on, the first of which is sample 0 of the currents. Membranes stay in registers. */
+/* All steps of `vectors` vectors of neurons of some samples, from i on of the currents. Membranes stay in registers. */
+static INLINE void fire_samples(const neurons *first, const neurons *later, int steps, int spiking, const currents *c,
+                                int neuron, int vectors, int sample, int i, int samples, fx_block *b)
+{
+  uint32_t *saturated = &b->saturated[spiking_layer[spiking]][sample + i];
+  vec v[TILE];
+#pragma GCC unroll 8
+  for (int j = 0; j < samples * vectors; j++) v[j] = v_set(0);
+#pragma GCC unroll 8
+  for (int s = 0; s < samples; s++)
+    fire(first, v + s * vectors, vectors, c, i + s, 0, neuron, b->spikes[spiking][0][sample + i + s], saturated + s);
+  for (int t = 1; t < steps; t++)
+#pragma GCC unroll 8
+    for (int s = 0; s < samples; s++)
+      fire(later, v + s * vectors, vectors, c, i + s, t, neuron, b->spikes[spiking][t][sample + i + s], saturated + s);
+}
+
+/* The same of n samples from `sample` on, the first of which is sample 0 of the currents; vectors: TILE or 1. */
 static INLINE void fire_layer(const fx_net *net, int spiking, int mode, const currents *c, int neuron, int vectors,
                               int sample, int n, fx_block *b)
 {
-  const int layer = spiking_layer[spiking];
+  const int layer = spiking_layer[spiking], together = vectors == 1 ? TOGETHER : 1;
   const neurons first = neurons_of(net, layer, mode, true), later = neurons_of(net, layer, mode, false);
-  for (int i = 0; i < n; i++) {
-    uint32_t *saturated = &b->saturated[layer][sample + i];
-    vec v[TILE];
-#pragma GCC unroll 8
-    for (int j = 0; j < vectors; j++) v[j] = v_set(0);
-    fire(&first, v, vectors, c, i, 0, neuron, b->spikes[spiking][0][sample + i], saturated);
-    for (int t = 1; t < net->steps; t++)
-      fire(&later, v, vectors, c, i, t, neuron, b->spikes[spiking][t][sample + i], saturated);
-  }
+  int i = 0;
+  for (; i + together <= n; i += together)
+    fire_samples(&first, &later, net->steps, spiking, c, neuron, vectors, sample, i, together, b);
+  for (; i < n; i++) fire_samples(&first, &later, net->steps, spiking, c, neuron, vectors, sample, i, 1, b);
 }
 #endif
