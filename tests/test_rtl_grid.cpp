@@ -124,6 +124,7 @@ struct grid_bench {
   std::deque<uint32_t> entries; /* that must be asked for */
   size_t owed = 0;              /* answers to requests of before a clear: until they have come, nothing is asked */
   uint64_t memory_begins = 0;   /* cycle before which the memory takes nothing */
+  uint64_t asked = 0, ask_most = UINT64_MAX; /* requests that it has taken, that it takes */
   sample next;
   int level = 0, accepted = 0, done = 0;
   sink_stalls sink;
@@ -163,7 +164,7 @@ struct grid_bench {
     }
     u.top.m_ready_i = !sink(draw, u.cycle);
     memory.drive(draw, u.cycle);
-    if (u.cycle < memory_begins) memory.ready = false;
+    if (u.cycle < memory_begins || asked == ask_most) memory.ready = false;
     show_anything(u, draw, 0x7f);
     u.top.mem_req_ready_i = memory.ready, u.top.mem_rsp_valid_i = memory.answers, u.top.mem_rsp_data_i = memory.word;
     u.settle();
@@ -204,6 +205,7 @@ private:
     ck_assert_msg(entry == entries.front(), "entry %u asked for, expected %u (%zu before the end)", entry,
                   entries.front(), entries.size());
     entries.pop_front();
+    asked++;
   }
   void take()
   {
@@ -272,6 +274,23 @@ START_TEST(a_memory_that_begins_late)
 }
 END_TEST
 
+/* The next sample's first index is made while the last request of the one before still waits. */
+START_TEST(an_index_behind_a_request_that_waits)
+{
+  grid_bench b(42);
+  const grid_fixture fixture(b.draw, 1, 0);
+  b.load(&fixture, 10, 0, 0);
+  b.ask_most = CORNERS - 1;
+  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
+  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
+  ck_assert_uint_eq(b.asked, CORNERS - 1);
+  b.ask_most = UINT64_MAX;
+  b.cycle(0), b.cycle(0);
+  ck_assert_uint_eq(b.asked, CORNERS + 1);
+  while (b.done < 2) b.cycle(0);
+}
+END_TEST
+
 /* Clear at any moment; the memory goes on answering what it had accepted. */
 START_TEST(reset_on_the_way)
 {
@@ -298,6 +317,7 @@ int main(void)
   tcase_add_loop_test(cases, random_grids, 0, 4);
   tcase_add_test(cases, a_request_in_every_cycle);
   tcase_add_test(cases, a_memory_that_begins_late);
+  tcase_add_test(cases, an_index_behind_a_request_that_waits);
   tcase_add_test(cases, reset_on_the_way);
   suite_add_tcase(suite, cases);
   return unit_run(suite);
