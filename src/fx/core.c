@@ -38,10 +38,18 @@ static uint16_t bfloat16(int x)
   return (uint16_t)((uint32_t)(x < 0) << 15 | (uint32_t)(exponent + 127) << 7 | (magnitude << (7 - exponent) & 0x7f));
 }
 
-static void twice_rows(uint16_t (*to)[SF_LANES][2], const int8_t *w, int rows)
+static void arrange_tiles(fx_words *words, const fx_net *net)
 {
-  for (int i = 0; i < rows; i++)
-    for (int o = 0; o < SF_LANES; o++) to[i][o][0] = to[i][o][1] = bfloat16(w[(size_t)i * SF_LANES + (size_t)o]);
+  const fx_layer *d1 = &net->layer[FX_D1], *c1 = &net->layer[FX_C1], *c2 = &net->layer[FX_C2];
+  const int8_t *h = c1->w + (size_t)fx_net_constants(net) * SF_LANES;
+  for (int o = 0; o < SF_LANES; o++) {
+    const int group = o / 16, at = o % 16;
+    for (int i = 0; i < d1->n_in; i++)
+      for (int part = 0; part < 2; part++) words->d1_twice[group][i][at][part] = bfloat16(d1->w[i * SF_LANES + o]);
+    for (int i = 0; i < fx_net_h(net); i++)
+      for (int part = 0; part < 2; part++) words->c1_h_twice[group][i + 1][at][part] = bfloat16(h[i * SF_LANES + o]);
+    for (int i = 0; i < c2->n_in; i++) words->c2_tiles[group][i / 4][at][i % 4] = c2->w[i * SF_LANES + o];
+  }
 }
 
 static void arrange(fx_words *words, const fx_net *net, int bytes)
@@ -51,8 +59,7 @@ static void arrange(fx_words *words, const fx_net *net, int bytes)
   pair_rows(words->d1, 0, layer[FX_D1].w, layer[FX_D1].n_in);
   if (fx_net_decodes(net)) pair_rows(words->c1_constant, 0, layer[FX_C1].w, n_constant);
   pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
-  twice_rows(words->d1_twice, layer[FX_D1].w, layer[FX_D1].n_in);
-  twice_rows(words->c1_h_twice + 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
+  arrange_tiles(words, net);
   arrange_biases(words, net, bytes);
   for (int i = 0; i < SF_LANES; i++)
     for (int o = 0; o < SF_LANES; o++) {

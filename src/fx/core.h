@@ -11,8 +11,8 @@ _Static_assert(SF_LANES == 128 || SF_LANES == 256, "arch.def: LANES is 128 or 25
 
 /* Rows are by presynaptic neuron; a row of zeros follows the last, so that lists of spikes can be padded to whole
  * groups, and after it the row of the biases. Pairs and quads: neighbouring rows interleaved, as one 32-bit lane
- * multiplies them. Twice: each weight for both parts of an input (tiles_isa.h). Aligned: a row that crosses a cache
- * line costs two loads. */
+ * multiplies them. Tiles: of 16 neurons, one behind the other; twice: each weight for both parts of an input
+ * (tiles_isa.h). Aligned: a row that crosses a cache line costs two loads. */
 typedef struct fx_words {
   _Alignas(64) int16_t d1[SF_FEATURE_MAX / 2][SF_LANES][2];
   _Alignas(64) int16_t c1_h[SF_OUT_MAX / 2][SF_LANES][2];        /* by D2 current: row 0, the density's, is zero */
@@ -23,7 +23,8 @@ typedef struct fx_words {
   _Alignas(64) int16_t c3[SF_LANES + 2][SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
   _Alignas(64) int8_t d2_quads[SF_LANES / 4][SF_OUT_MAX][4], c3_quads[SF_LANES / 4][SF_OUT_MAX][4];
-  _Alignas(64) uint16_t d1_twice[SF_FEATURE_MAX][SF_LANES][2], c1_h_twice[SF_OUT_MAX][SF_LANES][2]; /* bfloat16 */
+  _Alignas(64) uint16_t d1_twice[SF_LANES / 16][SF_FEATURE_MAX][16][2], c1_h_twice[SF_LANES / 16][SF_OUT_MAX][16][2];
+  _Alignas(64) int8_t c2_tiles[SF_LANES / 16][SF_LANES / 4][16][4];
 } fx_words;
 enum { FX_ZERO_ROW = SF_LANES, FX_BIAS_ROW };
 

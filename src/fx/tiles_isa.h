@@ -98,7 +98,7 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     for (int half = 0; half < 2; half++) input_row(v_widen(b->f[i] + SIDE * half), s->x[i] + ROW * half);
   for (int o = 0; o < SF_LANES; o += SIDE) {
     const currents c = {.kind = REALS, .from = s->sum, .sample = SIDE, .step = 0};
-    input_products(words->d1_twice[0][o], sizeof words->d1_twice[0], true, s->x[0], SF_LANES, NULL, false, 1, s->sum);
+    input_products(words->d1_twice[o / SIDE], ROW, true, s->x[0], SF_LANES, NULL, false, 1, s->sum);
     fire_layer(net, 0, mode, &c, o, 1, 0, b->n, b);
   }
   spike_rows(b, 0, net->steps, s->x);
@@ -121,8 +121,7 @@ static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
                         .sample = SIDE,
                         .step = FX_BLOCK * SIDE,
                         .base = (const int32_t *const *)b->base};
-    input_products(words->c1_h_twice[0][o], sizeof words->c1_h_twice[0], false, s->x[0], SF_LANES, NULL, false,
-                   net->steps, s->sum);
+    input_products(words->c1_h_twice[o / SIDE], ROW, false, s->x[0], SF_LANES, NULL, false, net->steps, s->sum);
     fire_layer(net, 1, mode, &c, o, 1, 0, b->n, b);
   }
 }
@@ -134,7 +133,7 @@ static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
   spike_rows(b, 1, net->steps, s->x);
   for (int o = 0; o < SF_LANES; o += SIDE) {
     const currents c = {WORDS, s->sum, SIDE, FX_BLOCK * SIDE, SF_AC_FRAC, NULL};
-    spike_products(&words->c2_quads[0][o], sizeof words->c2_quads[0], (const uint8_t(*)[SF_LANES])s->x,
+    spike_products(words->c2_tiles[o / SIDE][0], ROW, (const uint8_t(*)[SF_LANES])s->x,
                    net->layer[FX_C2].bias ? words->c2_bias + o : NULL, net->steps, s->sum);
     fire_layer(net, 2, mode, &c, o, 1, 0, b->n, b);
   }
