@@ -41,9 +41,9 @@ mutate-$1: $(addprefix $B/mutate/$1/,$(call mutant_programs,$1))
 .PHONY: mutate-$1
 endef
 $(foreach g,engine lanes ray,$(eval $(call mutants_rule,$g)))
-mutate-engine: ## the same of the samples-in accelerator's source, by the co-simulation
-mutate-lanes: ## the same of its arithmetic in every lane (loops over lanes)
-mutate-ray: ## the same of what goes around it from rays to pixels, by the unit benches and the co-simulation of rays
+mutate-engine: ## mutants of the source of the samples-in accelerator, against the co-simulation (MUTANTS, MODULES as mutate)
+mutate-lanes: ## mutants of its arithmetic in every lane (loops over lanes)
+mutate-ray: ## mutants of what goes around it from rays to pixels, against unit benches and the co-simulation of rays
 
 MUTANT_VERILATOR := -Wno-lint -Wno-style -Wno-fatal
 define mutated_dut_rule
