@@ -7,6 +7,7 @@ here=$(dirname "$0")
 logs=$build/tests/logs
 mkdir -p "$logs"
 export OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive} # threads that spin slow each other down on a busy machine
+export CK_TIMEOUT_MULTIPLIER=${CK_TIMEOUT_MULTIPLIER:-10} # a timeout ends what hangs; it is no measure of speed
 set -m # a group for each test, so that an interrupt ends all of it, and tests that interrupt programs can
 trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/null; wait; exit 130' INT TERM
 
