@@ -62,10 +62,10 @@ DUT_TESTS += test_rtl_registers test_rtl_decoder test_rtl_ports test_rtl_hard te
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit tests/test_rtl_ray tests/test_rtl_ray_registers tests/test_three_counts tests/bench
+RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit tests/test_rtl_ray tests/test_rtl_ray_registers tests/test_rtl_ray_lone tests/test_three_counts tests/bench
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
-DUT_TESTS += test_rtl_ray test_rtl_ray_registers test_three_counts
+DUT_TESTS += test_rtl_ray test_rtl_ray_registers test_rtl_ray_lone test_three_counts
 
 $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	@mkdir -p $(@D)
