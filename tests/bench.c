@@ -389,6 +389,10 @@ static sf_status bench_iteration(cJSON *json, const ceilings *c)
 
 int main(int argc, char **argv)
 {
+  if (argc > 1 && argv[1][0] == '-') {
+    puts("usage: bench [FILE.json [SCENE.snn TWIN.safetensors DATA]]    `make bench` starts it");
+    return argv[1][1] == '-' && argv[1][2] == 'h' ? 0 : 2;
+  }
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
   const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni") : NAN;
