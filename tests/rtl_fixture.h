@@ -4,8 +4,8 @@
 #include "sim/compare.h"
 #include "sim/sim.h"
 #include "spikefield/cycles.h"
+#include "tests/ck_ok.h"
 #include "tests/random_net.h"
-#include <check.h>
 
 enum { BATCH = 64, RAYS_PER_BATCH = 8 };
 
@@ -20,12 +20,6 @@ typedef struct batch {
 } batch;
 static batch shared; /* each test runs in a process of its own */
 static random_net net_of_test;
-
-#define ck_ok(call)                                                                                                    \
-  do {                                                                                                                 \
-    const sf_status status_ = (call);                                                                                  \
-    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
-  } while (0)
 
 static inline sf_dut *open_with(const sf_dut_options *options, const fx_net *net)
 {

@@ -3,13 +3,8 @@
 #include "sim/ray.h"
 #include "spikefield/audit.h"
 #include "spikefield/quant.h"
+#include "tests/ck_ok.h"
 #include "tests/fx_hard_cases.h"
-
-#define ck_ok(call)                                                                                                    \
-  do {                                                                                                                 \
-    const sf_status status_ = (call);                                                                                  \
-    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
-  } while (0)
 
 enum { RAYS = 12, SAMPLES_MAX = 1024 };
 

@@ -2,14 +2,9 @@
  */
 #include "sim/ray.h"
 #include "spikefield/quant.h"
+#include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
-
-#define ck_ok(call)                                                                                                    \
-  do {                                                                                                                 \
-    const sf_status status_ = (call);                                                                                  \
-    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
-  } while (0)
 
 enum { LONE = 12 };
 

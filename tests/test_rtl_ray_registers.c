@@ -3,14 +3,9 @@
 #include "firmware/sf_ray_driver.h"
 #include "sim/ray.h"
 #include "spikefield/quant.h"
+#include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
-
-#define ck_ok(call)                                                                                                    \
-  do {                                                                                                                 \
-    const sf_status status_ = (call);                                                                                  \
-    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
-  } while (0)
 
 enum { ACCESSES = 8000, RAYS = 4, SAMPLES_MAX = 1024, OKAY = 0, SLVERR = 2, WHOLE = 0xf };
 enum { WINDOW = 0x400, WINDOW_END = 0x800 };

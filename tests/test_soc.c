@@ -5,16 +5,11 @@
 #include "firmware/sf_tile.h"
 #include "sim/soc_job.h"
 #include "spikefield/audit.h"
+#include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include <libgen.h>
 #include <stdio.h>
 #include <unistd.h>
-
-#define ck_ok(call)                                                                                                    \
-  do {                                                                                                                 \
-    const sf_status status_ = (call);                                                                                  \
-    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
-  } while (0)
 
 enum { OUTPUT_MAX = 1 << 14, WIDTH = 3, HEIGHT = 2, PIXELS = WIDTH * HEIGHT, INSTRUCTIONS = 300000000 };
 static char output[OUTPUT_MAX]; /* each test runs in a process of its own */
