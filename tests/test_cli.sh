@@ -45,8 +45,10 @@ data() { # PATTERN PROGRAM ARGS...
   judge "data: ${*:2}" "$2" 1 "$1"
 }
 
-good() { # PROGRAM ARGS...
-  run "$@"
+good() { # PROGRAM ARGS...; without progress, which a busy machine would show
+  local quiet=()
+  if "$BIN/$1" --help | grep -q -e --quiet; then quiet=(--quiet); fi
+  run "$@" "${quiet[@]}"
   if [ "$status" -ne 0 ]; then fail "good: $*" "exit status $status"
   elif [ -s err ]; then fail "good: $*" "a good run wrote on stderr"
   else passed=$((passed + 1)); fi
@@ -73,7 +75,7 @@ good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
 good sf_export model.safetensors -o s.snn
-good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 -q --json
+good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 --json
 good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
@@ -399,7 +401,7 @@ timeout --foreground -k 20 --preserve-status -s INT 2 "$BIN/sf_train" "${brief[@
 status=$?
 sed -i '/evaluation: view/d' err # progress lines
 judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
-good sf_train "${brief[@]}" --resume --quiet --eval-views 1 --json
+good sf_train "${brief[@]}" --resume --eval-views 1 --json
 if grep -q '"iterations":2,.*"views":1' stdout.txt; then passed=$((passed + 1)); else fail "resumed evaluation" "no summary"; fi
 run sf_train "${brief[@]}" --resume --quiet
 judge "finished: sf_train --resume" sf_train 1 "cannot resume"
