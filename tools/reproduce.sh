@@ -10,7 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf 2e-6)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf but for LLFF 2e-6)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -239,7 +239,7 @@ one_backbone() {
   prepare_scene
   common="$common --backbone $1"
   local default=5e-7
-  [ "$1" = ingp ] || default=2e-6
+  [ "$1" = ingp ] || [ "${layouts[i]}" = llff ] || default=2e-6
   for beta in ${betas:-$default}; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }

@@ -32,7 +32,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
       {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II (default 7500)"},
       {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B",
-       "quality (small) against energy (large) (default 5e-7, tensorf 2e-6)"},
+       "quality (small) against energy (large) (default 5e-7, tensorf but for NDC 2e-6)"},
       {"--steps", 'T', SF_ARG_INT, &c->steps, 1, SF_T_MAX, NULL, "T", "time steps unrolled in training (default 8)"},
       {"--net", 0, SF_ARG_CHOICE, &c->net, 0, 0, "snn|ann", "KIND", "spiking nets or their ReLU twin (default snn)"},
       {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE",

@@ -34,7 +34,7 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
   options.config = sf_tensorf_default(data->scale, data->ndc);
   options.lr_grid = 0.02;
   options.lr_net = 1e-3;
-  options.beta = 2e-6;
+  options.beta = data->ndc ? 5e-7 : 2e-6; /* 40 % of energy saved with 150 inputs means two steps */
   options.background = data->ndc ? 0 : 1;
   options.rays = 4096;
   options.samples = 1 << 15; /* many small iterations learn faster than few large ones */
