@@ -44,6 +44,32 @@ START_TEST(rays_follow_opengl_axes)
 }
 END_TEST
 
+/* A spacing of the points that the function counts is a pixel of the picture at the middle of the box. */
+START_TEST(points_of_the_box_lie_a_pixel_apart)
+{
+  sf_view view[2] = {{.camera = {.width = 100,
+                                 .height = 100,
+                                 .fx = 80,
+                                 .fy = 80,
+                                 .cx = 50,
+                                 .cy = 50,
+                                 .to_world = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2}}}};
+  sf_dataset data = {.view = view, .count = 1};
+  const int points = sf_dataset_pixels(&data, 4);
+  float at[2];
+  ck_assert(sf_camera_project(&view[0].camera, (float[3]){8 / (float)points, 0, 0}, at));
+  ck_assert_float_eq_tol(at[0], 51, 1e-4f);
+  ck_assert_int_eq(sf_dataset_pixels(&data, 1), points / 4);
+  view[1] = view[0]; /* twice the focal length at four times the distance: 120 px at 5 units in the mean */
+  view[1].camera.fx = view[1].camera.fy = 160, view[1].camera.to_world[11] = 8, data.count = 2;
+  ck_assert_int_eq(sf_dataset_pixels(&data, 1), 48);
+  view[1].camera.fx = view[1].camera.fy = 1e-6f, view[0] = view[1];
+  ck_assert_int_eq(sf_dataset_pixels(&data, 1), 1);
+  for (int v = 0; v < 2; v++) view[v].camera.fx = 80, view[v].camera.fy = 80, view[v].camera.to_world[11] = 0;
+  ck_assert_int_eq(sf_dataset_pixels(&data, 64), 1 << 20); /* cameras in the middle */
+}
+END_TEST
+
 /* ---- the loader ---- */
 
 #define UNIT "[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]"
@@ -575,6 +601,7 @@ static Suite *suite(void)
   tcase_add_checked_fixture(t, make_folder, remove_folder);
   tcase_set_timeout(t, 60);
   tcase_add_test(t, rays_follow_opengl_axes);
+  tcase_add_test(t, points_of_the_box_lie_a_pixel_apart);
   tcase_add_test(t, loads_camera_angle);
   tcase_add_test(t, options_and_stated_intrinsics);
   tcase_add_test(t, every_eighth_view_is_held_out);

@@ -54,7 +54,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries (default 19)"},
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level (default 16)"},
       {"--finest-res", 0, SF_ARG_INT, &a->finest_res, 2, 32768, NULL, "N",
-       "resolution of the finest level (default 2048 x bound, at most 32768)"},
+       "resolution of the finest level (default a pixel of the pictures, at most 2048 x bound and 32768)"},
       {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
        "neurons of a spiking layer, multiple of 16 (default 128)"},
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25, tensorf 0.5)"},
@@ -369,11 +369,14 @@ static sf_status load_start(const arguments *a, float scale, sf_model *model)
   return status;
 }
 
-/* The box, the steps through it and the finest level, but for what was asked for. */
-static void set_box(arguments *a, int bound)
+/* The box, the steps through it and the finest level, but for what was asked for. A level finer than the pixels costs
+ * time and learns noise. Without data: what the options alone say. */
+static void set_box(arguments *a, const sf_dataset *data)
 {
   sf_config *c = &a->train.config;
-  sf_config_bound(c, a->bound ? a->bound : bound);
+  sf_config_bound(c, a->bound ? a->bound : data ? data->bound : 1);
+  const int pixels = data ? sf_dataset_pixels(data, c->bound) : c->finest_res;
+  if (pixels < c->finest_res) c->finest_res = pixels > c->base_res ? pixels : c->base_res;
   if (a->finest_res) c->finest_res = a->finest_res;
   if (a->gamma >= 0) c->dt_gamma = (float)a->gamma;
 }
@@ -396,7 +399,7 @@ static void settle(arguments *a, const sf_dataset *data)
   const sf_config *c = &a->train.config;
   const bool vm = c->backbone == SF_TENSORF;
   a->train.config.scale = data->scale;
-  if (!vm) set_box(a, data->bound);
+  if (!vm) set_box(a, data);
   a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
   if (a->quiet || a->json || vm) return;
   printf("box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c), c->bound > 1 ? "s" : "");
@@ -481,7 +484,7 @@ int main(int argc, char **argv)
   status = finish_options(&a);
   if (status.code) return sf_cli_finish(&cli, status);
   sf_cli_catch_signals();
-  set_box(&a, 1);
+  set_box(&a, NULL);
   status = a.train.config.backbone == SF_TENSORF ? sf_ok() : sf_config_check(&a.train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
   if (!status.code) status = run(&a, path[0]);
