@@ -71,6 +71,17 @@ usage "missing argument" sf_data
 data "no such folder" sf_data absent
 data "cannot write" sf_data d --png absent/cameras.png
 good sf_train d -o model.safetensors --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+# A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level.
+while read -r finest options; do
+  # shellcheck disable=SC2086
+  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --threads 1 $options
+  if grep -q "finest level $finest," stdout.txt; then passed=$((passed + 1)); else fail "sf_train $options" "finest level is not $finest"; fi
+done <<'END'
+14 --base-res 2
+56 --base-res 2 --bound 4
+16
+77 --finest-res 77
+END
 good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits 4 --stage2 2 --threads 1
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
