@@ -482,6 +482,8 @@ static void check_file(void)
       {"tensorf.encoding_frac", "12", "encoding_frac"},
       {"tensorf.stretch[2]", "0", "stretch[2]"},
       {"tensorf.near", "nan", "near"},
+      {"tensorf.near", "-0.1", "near"},
+      {"tensorf.far", "0.1", "far"},
       {"tensorf.far", NULL, "far"},
       {"tensorf.weight_stop", "105", "checksum"},
       {"D1.n_out", "1", "D1"},

@@ -92,5 +92,9 @@ sf_status fx_reals_check(const fx_scene *scene, const char *path)
   if (!is_direction_lsb(scene->dir_scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,
                    scene->dir_scale, FX_DIR_FRAC_MAX);
+  const double near = scene->tensorf.near, far = scene->tensorf.far;
+  if (scene->backbone == FX_TENSORF && !(near >= 0 && near < far))
+    return sf_fail(SF_E_RANGE, "%s: metadata 'tensorf.near' is %g and 'tensorf.far' %g, expected 0 <= near < far", path,
+                   near, far);
   return sf_ok();
 }
