@@ -14,6 +14,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
+
 static void put(const char *path, const void *data, size_t n)
 {
   unlink(path); /* some file systems sync a file that is cut and written again */
@@ -503,11 +505,18 @@ typedef struct values {
   const char *text;
 } values;
 
-static sf_status parse(values *v, const char **positional, const char *line)
+static sf_status parse_line(const sf_cli *cli, const char **positional, const char *line)
 {
   static char copy[500];
   char *argv[20] = {"prog"};
   int argc = 1;
+  snprintf(copy, sizeof copy, "%s", line);
+  for (char *word = strtok(copy, " "); word; word = strtok(NULL, " ")) argv[argc++] = strcmp(word, "''") ? word : "";
+  return sf_cli_parse(cli, argc, argv, positional);
+}
+
+static sf_status parse(values *v, const char **positional, const char *line)
+{
   const sf_option options[] = {{"--flag", 'f', SF_ARG_FLAG, &v->flag, 0, 0, NULL, NULL, "a flag"},
                                {"--number", 'n', SF_ARG_INT, &v->number, -5, 10, NULL, "N", "a number"},
                                {"--any", 0, SF_ARG_INT, &v->number, 0, 0, NULL, "N", "any number"},
@@ -517,9 +526,18 @@ static sf_status parse(values *v, const char **positional, const char *line)
                                {"--out", 'o', SF_ARG_STRING, &v->text, 0, 0, NULL, "FILE", "a file"},
                                {0}};
   const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2};
-  snprintf(copy, sizeof copy, "%s", line);
-  for (char *word = strtok(copy, " "); word; word = strtok(NULL, " ")) argv[argc++] = strcmp(word, "''") ? word : "";
-  return sf_cli_parse(&cli, argc, argv, positional);
+  return parse_line(&cli, positional, line);
+}
+
+static sf_status parse_paths(const char *line, const char **positional)
+{
+  const char *output = NULL, *log = NULL, *start = NULL;
+  const sf_option options[] = {{"--output", 'o', SF_ARG_OUTPUT, &output, 0, 0, NULL, "FILE", "a file"},
+                               {"--log", 0, SF_ARG_PLACE, &log, 0, 0, NULL, "FILE", "a log"},
+                               {"--start", 0, SF_ARG_STRING, &start, 0, 0, NULL, "FILE", "an input"},
+                               {0}};
+  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2};
+  return parse_line(&cli, positional, line);
 }
 
 START_TEST(cli_values)
@@ -568,6 +586,30 @@ START_TEST(cli_refused)
   values v = {0};
   const char *p[2];
   ck_bad(parse(&v, p, bad_lines[_i].line), SF_E_USAGE, bad_lines[_i].name, bad_lines[_i].problem);
+}
+END_TEST
+
+/* What would be lost at the end is refused at the start; nothing stays behind, and no file is changed. */
+START_TEST(cli_outputs)
+{
+  static const char *const lines[][3] = {{"a -o a", "--output", "is the input"},
+                                         {"b -o ./a", "--output", "is the input"},
+                                         {"a --log b", "--log", "is the input"},
+                                         {"in --start a -o b", "--output", "also --start"},
+                                         {"in -o c --log c", "--output", "also --log"},
+                                         {"in --log d/../c -o c", "--output", "also --log"}};
+  static const char *const unwritable[] = {"in -o none/c", "in -o d", "in -o a/c", "in -o /dev/null"};
+  static const char *const good[] = {"a -o c --log d", "d --log d -o d/a", "in --start c -o x", "in --log none/c"};
+  const char *p[2];
+  ck_assert_int_eq(chdir(folder), 0);
+  ck_good(sf_write_file("a", "a", 1));
+  ck_assert_int_eq(symlink("a", "b"), 0);
+  ck_good(sf_make_dir("d"));
+  for (int i = 0; i < COUNT(lines); i++) ck_bad(parse_paths(lines[i][0], p), SF_E_USAGE, lines[i][1], lines[i][2]);
+  for (int i = 0; i < COUNT(unwritable); i++)
+    ck_bad(parse_paths(unwritable[i], p), SF_E_IO, "cannot write", strrchr(unwritable[i], ' ') + 1);
+  for (int i = 0; i < COUNT(good); i++) ck_good(parse_paths(good[i], p));
+  ck_assert_int_eq(entries(), 3);
 }
 END_TEST
 
@@ -667,8 +709,6 @@ START_TEST(mixing_is_splitmix64)
 }
 END_TEST
 
-#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
-
 static Suite *suite(void)
 {
   Suite *s = suite_create("base");
@@ -696,6 +736,7 @@ static Suite *suite(void)
   tcase_add_test(t, tensors_not_saved);
   tcase_add_test(t, cli_values);
   tcase_add_loop_test(t, cli_refused, 0, COUNT(bad_lines));
+  tcase_add_test(t, cli_outputs);
   tcase_add_test(t, cli_exit_status);
   tcase_add_test(t, cli_full_standard_output_is_an_error);
   tcase_add_test(t, first_signal_asks_to_stop);

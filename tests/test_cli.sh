@@ -347,6 +347,17 @@ data model.safetensors energy_audit s.snn d --rays 1 --rtl-rays 0 --twin model.s
 data nosuch.json energy_audit --compare nosuch.json nosuch.json
 printf '{"views": 1}' >none.json
 data none.json energy_audit --compare none.json none.json
+usage --output sf_export model.safetensors -o model.safetensors
+usage --nir sf_export s.snn --nir ./s.snn
+usage --output sim_render s.snn d -o s.snn
+usage --png sim_render s.snn d -o same.out --png same.out
+usage --saif sf_cosim s.snn d --saif s.snn
+usage --html energy_audit s.snn d --csv same.out --html same.out
+usage --output sf_train d -o model.safetensors --fine-tune model.safetensors
+data nodir/x sf_cosim s.snn d --junit nodir/x
+data nodir/x sf_cosim s.snn d --evidence nodir/x
+data nodir/x sf_train "${train[@]}" -o out --summary nodir/x
+absent out "unwritable summary"
 writers nodir/ nodir/x.out
 writers plain plain/x.out
 writers /proc /proc/spikefield.out

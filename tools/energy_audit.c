@@ -99,16 +99,6 @@ static sf_status make_page(page_audit *a)
   return sf_page_save(&a->page, o->html);
 }
 
-/* Fails before the work, not after it. */
-static sf_status check_writable(const char *path)
-{
-  sf_writer writer;
-  if (!path) return sf_ok();
-  SF_TRY(sf_writer_open(&writer, path));
-  sf_writer_abort(&writer);
-  return sf_ok();
-}
-
 static sf_status print_json(cJSON *json)
 {
   char *text = json ? cJSON_Print(json) : NULL;
@@ -140,7 +130,6 @@ static sf_status run(page_audit *a)
   how.tick = tick, how.user = a;
   SF_TRY(sf_audit_open(&a->audit, &how));
   sf_dataset_warn(stderr, "energy_audit", &a->audit.data);
-  SF_TRY(check_writable(a->opt.html));
   sf_progress_begin(&a->progress, a->opt.quiet);
   const sf_status status = sf_audit_count(&a->audit);
   sf_progress_end(&a->progress);
@@ -271,8 +260,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the layout's (default 0)"},
-      {"--csv", 0, SF_ARG_STRING, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
-      {"--html", 0, SF_ARG_STRING, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
+      {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
+      {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
       {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
        "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
       {"--compare", 0, SF_ARG_FLAG, &o->compare, 0, 0, NULL, NULL,

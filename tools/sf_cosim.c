@@ -60,9 +60,21 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
   return status->code == SF_E_DIFFERENCE ? sf_ok() : print_text(l, seconds);
 }
 
+static const char default_evidence[] = "sf_cosim-difference";
+
+/* A run in a folder that cannot be written may still find no difference, unless a place was asked for. */
+static sf_status check_evidence(const options *o)
+{
+  char path[4096];
+  if (o->run.evidence == default_evidence) return sf_ok();
+  snprintf(path, sizeof path, "%s.json", o->run.evidence);
+  return sf_writable(path);
+}
+
 static sf_status simulate(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
+  SF_TRY(check_evidence(o));
   SF_TRY(sf_lockstep_load(l, &o->run));
   sf_dataset_warn(stderr, "sf_cosim", &l->data);
   l->tick = show;
@@ -187,7 +199,7 @@ static sf_status run(options *o, const char *scene, const char *data)
 int main(int argc, char **argv)
 {
   options o = {
-      .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = "sf_cosim-difference"},
+      .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = default_evidence},
       .dut_top = "sf_top",
       .activity = {.last = UINT64_MAX, .clock_mhz = 200}};
   sf_lockstep_options *r = &o.run;
@@ -206,16 +218,16 @@ int main(int argc, char **argv)
        "processes; the result does not depend on it (default 1)"},
       {"--block", 0, SF_ARG_INT, &r->block, 1, 1e9, NULL, "N",
        "rays per unit of work, each on a freshly powered accelerator (default 256)"},
-      {"--checkpoint", 0, SF_ARG_STRING, &r->checkpoint, 0, 0, NULL, "FILE",
+      {"--checkpoint", 0, SF_ARG_OUTPUT, &r->checkpoint, 0, 0, NULL, "FILE",
        "finished units; where it is there, the run goes on from it"},
       {"--evidence", 0, SF_ARG_STRING, &r->evidence, 0, 0, NULL, "PREFIX",
        "of a difference: PREFIX.json to replay, PREFIX.fst waveform (default sf_cosim-difference)"},
       {"--replay", 0, SF_ARG_STRING, &o.replay, 0, 0, NULL, "FILE",
        "the samples of such a file, and nothing else; writes PREFIX.fst"},
-      {"--junit", 0, SF_ARG_STRING, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
-      {"--saif", 0, SF_ARG_STRING, &o.activity.saif, 0, 0, NULL, "FILE",
+      {"--junit", 0, SF_ARG_OUTPUT, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
+      {"--saif", 0, SF_ARG_OUTPUT, &o.activity.saif, 0, 0, NULL, "FILE",
        "stream the rays' samples through one accelerator and write its switching activity (docs/activity.md)"},
-      {"--vcd", 0, SF_ARG_STRING, &o.activity.vcd, 0, 0, NULL, "FILE", "likewise, every change of every net"},
+      {"--vcd", 0, SF_ARG_OUTPUT, &o.activity.vcd, 0, 0, NULL, "FILE", "likewise, every change of every net"},
       {"--window", 0, SF_ARG_STRING, &o.window, 0, 0, NULL, "FIRST,LAST",
        "cycles of the stream for --saif and --vcd (default all)"},
       {"--depth", 0, SF_ARG_INT, &o.activity.depth, 0, 64, NULL, "N",

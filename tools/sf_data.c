@@ -252,7 +252,7 @@ int main(int argc, char **argv)
 {
   job j = {.downscale = 1};
   const sf_option options[] = {
-      {"--png", 0, SF_ARG_STRING, &j.png, 0, 0, NULL, "FILE",
+      {"--png", 0, SF_ARG_OUTPUT, &j.png, 0, 0, NULL, "FILE",
        "picture of the cameras from above and from the side: blue to learn from, red held out"},
       {"--downscale", 0, SF_ARG_INT, &j.downscale, 1, 64, NULL, "N", "as the other programs (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &j.scale, 0, 1e6, NULL, "S",

@@ -43,7 +43,7 @@ int main(int argc, char **argv)
 {
   scene_args args = {.size = 200, .train = 60, .test = 10, .seed = 1};
   const sf_option options[] = {
-      {"--output", 'o', SF_ARG_STRING, &args.output, 0, 0, NULL, "DIR", "folder to fill; made where it is missing"},
+      {"--output", 'o', SF_ARG_PLACE, &args.output, 0, 0, NULL, "DIR", "folder to fill; made where it is missing"},
       {"--size", 0, SF_ARG_INT, &args.size, 1, 8192, NULL, "N", "width and height of each picture (default 200)"},
       {"--train", 0, SF_ARG_INT, &args.train, 1, 10000, NULL, "N", "views to learn from (default 60)"},
       {"--test", 0, SF_ARG_INT, &args.test, 1, 10000, NULL, "N", "views held out (default 10)"},

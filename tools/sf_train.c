@@ -24,7 +24,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
   sf_config *c = &a->train.config;
   sf_train_options *t = &a->train;
   const sf_option options[] = {
-      {"--output", 'o', SF_ARG_STRING, &a->output, 0, 0, NULL, "FILE", "model to write (default model.safetensors)"},
+      {"--output", 'o', SF_ARG_OUTPUT, &a->output, 0, 0, NULL, "FILE", "model to write (default model.safetensors)"},
       {"--backbone", 0, SF_ARG_CHOICE, &c->backbone, 0, 0, "ingp|tensorf", "KIND",
        "hash grid, or TensoRF's planes and lines (default ingp)"},
       {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M",
@@ -92,9 +92,9 @@ static sf_cli make_cli(arguments *a, sf_option *o)
       {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M",
        "time between checkpoints (default 2)"},
       {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL, "continue from the checkpoint at --output"},
-      {"--log", 0, SF_ARG_STRING, &a->log, 0, 0, NULL, "FILE",
+      {"--log", 0, SF_ARG_PLACE, &a->log, 0, 0, NULL, "FILE",
        "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
-      {"--summary", 0, SF_ARG_STRING, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"},
+      {"--summary", 0, SF_ARG_OUTPUT, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"},
       {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};

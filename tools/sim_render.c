@@ -53,16 +53,6 @@ static sf_status choose_crop(job *j)
   return sf_ok();
 }
 
-/* Fails before the work, not after it, when a result could not be written. */
-static sf_status check_writable(const char *path)
-{
-  sf_writer writer;
-  if (!path) return sf_ok();
-  SF_TRY(sf_writer_open(&writer, path));
-  sf_writer_abort(&writer);
-  return sf_ok();
-}
-
 static sf_status open_studio(job *j)
 {
   const options *o = &j->opt;
@@ -88,8 +78,7 @@ static sf_status load_view(job *j)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,
                    o->split);
   SF_TRY(choose_crop(j));
-  SF_TRY(check_writable(o->output));
-  return check_writable(o->png);
+  return sf_writable(o->output);
 }
 
 /* ---- progress ---- */
@@ -299,8 +288,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--verify", 0, SF_ARG_STRING, &o->verify, 0, 0, NULL, "MANIFEST",
        "render again what the manifest lists and compare"},
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
-      {"--output", 'o', SF_ARG_STRING, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
-      {"--png", 0, SF_ARG_STRING, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
+      {"--output", 'o', SF_ARG_PLACE, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
+      {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},

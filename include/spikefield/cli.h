@@ -4,12 +4,22 @@
 #include "spikefield/status.h"
 #include <stdbool.h>
 
-typedef enum { SF_ARG_FLAG, SF_ARG_INT, SF_ARG_U64, SF_ARG_DOUBLE, SF_ARG_STRING, SF_ARG_CHOICE } sf_arg_type;
+/* OUTPUT: a file that will be written; PLACE: a folder, or what the program itself opens before it works. */
+typedef enum {
+  SF_ARG_FLAG,
+  SF_ARG_INT,
+  SF_ARG_U64,
+  SF_ARG_DOUBLE,
+  SF_ARG_STRING,
+  SF_ARG_OUTPUT,
+  SF_ARG_PLACE,
+  SF_ARG_CHOICE
+} sf_arg_type;
 typedef struct sf_option {
   const char *name;   /* "--beta" */
   char letter;        /* 'o' for -o, or 0 */
   sf_arg_type type;
-  void *value;        /* bool*, int*, uint64_t*, double*, const char** ; CHOICE: int* index into choices */
+  void *value;        /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
   double min, max;    /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
   const char *choices; /* "hybrid|decay|no-decay" */
   const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)" */
@@ -21,8 +31,9 @@ typedef struct sf_cli {
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
- * exit 0. SF_E_USAGE names the offending option. Options may follow positionals; --name=value works. Ignores SIGXFSZ,
- * so that a file-size limit is an ordinary write error. */
+ * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another argument is one.
+ * SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores SIGXFSZ, so
+ * that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
 /* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */

@@ -1,4 +1,5 @@
 #include "spikefield/cli.h"
+#include "spikefield/io.h"
 #include "spikefield/spikefield.h"
 #include <ctype.h>
 #include <errno.h>
@@ -9,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* ---- help ---- */
 
@@ -131,6 +133,8 @@ static sf_status set_value(const sf_option *o, const char *text)
   case SF_ARG_CHOICE:
     return set_choice(o, text);
   case SF_ARG_STRING:
+  case SF_ARG_OUTPUT:
+  case SF_ARG_PLACE:
     if (!*text) return sf_fail(SF_E_USAGE, "%s needs a value that is not empty", o->name);
     *(const char **)o->value = text;
     return sf_ok();
@@ -138,6 +142,57 @@ static sf_status set_value(const sf_option *o, const char *text)
     break;
   }
   *(bool *)o->value = true;
+  return sf_ok();
+}
+
+/* ---- outputs ---- */
+
+static bool folder_info(const char *path, struct stat *info)
+{
+  const char *slash = strrchr(path, '/');
+  char folder[4096];
+  snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+  return !stat(folder, info);
+}
+
+static const char *last_part(const char *path)
+{
+  const char *slash = strrchr(path, '/');
+  return slash ? slash + 1 : path;
+}
+
+/* Also where neither is there yet. A folder may serve two ends. */
+static bool same_file(const char *a, const char *b)
+{
+  struct stat p, q;
+  const bool there = !stat(a, &p);
+  if (there != !stat(b, &q)) return false;
+  if (!there && (strcmp(last_part(a), last_part(b)) || !folder_info(a, &p) || !folder_info(b, &q))) return false;
+  return (!there || S_ISREG(p.st_mode)) && p.st_dev == q.st_dev && p.st_ino == q.st_ino;
+}
+
+/* The path that the option names; NULL where it names none. */
+static const char *path_of(const sf_option *o)
+{
+  const bool path = o->type == SF_ARG_STRING || o->type == SF_ARG_OUTPUT || o->type == SF_ARG_PLACE;
+  return path ? *(const char **)o->value : NULL;
+}
+
+/* An output over an input or another output would lose one of them, at the end of the work. */
+static sf_status check_outputs(const sf_cli *cli, const char *const *positional)
+{
+  for (const sf_option *o = cli->options; o && o->name; o++) {
+    if (o->type != SF_ARG_OUTPUT && o->type != SF_ARG_PLACE) continue;
+    const char *path = path_of(o);
+    if (!path) continue;
+    for (int i = 0; i < cli->max_positional && positional[i]; i++)
+      if (same_file(path, positional[i]))
+        return sf_fail(SF_E_USAGE, "%s %.200s is the input %.200s", o->name, path, positional[i]);
+    for (const sf_option *other = cli->options; other->name; other++)
+      if (other != o && path_of(other) && same_file(path, path_of(other)))
+        return sf_fail(SF_E_USAGE, "%s %.200s is also %s", o->name, path, other->name);
+    if (o->type == SF_ARG_OUTPUT) SF_TRY(sf_writable(path));
+  }
   return sf_ok();
 }
 
@@ -208,7 +263,7 @@ sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **po
   }
   if (count < cli->min_positional)
     return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage ? cli->usage : cli->program);
-  return sf_ok();
+  return check_outputs(cli, positional);
 }
 
 int sf_cli_finish(const sf_cli *cli, sf_status status)

@@ -143,6 +143,14 @@ void sf_writer_abort(sf_writer *writer)
   writer->file = NULL, writer->aside[0] = 0;
 }
 
+sf_status sf_writable(const char *path)
+{
+  sf_writer writer;
+  SF_TRY(sf_writer_open(&writer, path));
+  sf_writer_abort(&writer);
+  return sf_ok();
+}
+
 sf_status sf_write_file(const char *path, const void *data, size_t size)
 {
   sf_writer writer;
