@@ -192,13 +192,13 @@ cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS 
 	@tools/cosim_campaign.sh $B "$(SCENE)" "$(DATA)" $(if $(filter file,$(origin SAMPLES)),1000000,$(SAMPLES)) "$(SEEDS)"
 
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
-	@STARTED=$(STARTED) tools/chain.sh $B $(SCENES)/lego $B/lego --minutes 15 --rays 400
+	@STARTED=$(STARTED) tools/chain.sh $B "$(SCENES)/lego" $B/lego --minutes 15 --rays 400
 
 # A scene of one's own.
 MINUTES ?= 15
 scene: all ## the same chain on DATA=folder (any layout): build/scenes/NAME; MINUTES=15, TRAIN="--backbone tensorf ..."
 	@[ -z "$(filter file,$(origin DATA))" ] || { echo "make scene DATA=folder: which folder of pictures and poses?" >&2; exit 2; }
-	@STARTED=$(STARTED) tools/chain.sh $B "$(DATA)" "$B/scenes/$(notdir $(DATA:%/=%))" --minutes $(MINUTES) --train "$(TRAIN)"
+	@STARTED=$(STARTED) tools/chain.sh $B "$(DATA)" "$B/scenes/$$(basename "$(DATA)")" --minutes $(MINUTES) --train "$(TRAIN)"
 
 report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/report.html), or print where it is
 	@[ -f "$(REPORT)" ] || { echo "$(REPORT): not there; make demo writes build/demo/report.html" >&2; exit 1; }
@@ -214,10 +214,10 @@ reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report
 
 pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
-	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(DATA),--data "$(DATA)") $(PARETO)
+	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
 
 bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
-	@models=$$(tests/bench_models.sh $B $(SCENES)) && $B/tests/bench $B/bench.json $$models
+	@models=$$(tests/bench_models.sh $B "$(SCENES)") && mapfile -t model <<<"$$models" && $B/tests/bench $B/bench.json "$${model[@]}"
 
 $B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig bench_tensorf)
 
@@ -231,6 +231,7 @@ error-budget: $B/bin/error_budget ## error of each fixed-point block and its bou
 	@$B/bin/error_budget $(BUDGET)
 
 format: ## clang-format every C file
+	@command -v clang-format >/dev/null || { echo "format: clang-format is not installed" >&2; exit 1; }
 	clang-format -i $$(git ls-files '*.c' '*.h')
 
 clean: ## remove build/

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Models for the frame of the benchmark, made once: usage: bench_models.sh BUILD SCENES. Prints scene, twin and data folder.
+# Models for the frame of the benchmark, made once: usage: bench_models.sh BUILD SCENES. Prints scene, twin and data folder, a line each.
 # The scene is that of `make lego` where it has run, else lego (or, without SCENES/lego, a procedural scene) after a minute.
 set -euo pipefail
 build=$1 data=$2/lego out=$1/bench
@@ -18,4 +18,4 @@ if [[ ! -e $scene ]]; then
   fi
 fi
 [[ -e $out/twin.done ]] || { train "$out/twin.safetensors" --net ann && touch "$out/twin.done"; }
-echo "$scene" "$out/twin.safetensors" "$data"
+printf '%s\n' "$scene" "$out/twin.safetensors" "$data"

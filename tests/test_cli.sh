@@ -347,6 +347,9 @@ data model.safetensors energy_audit s.snn d --rays 1 --rtl-rays 0 --twin model.s
 data nosuch.json energy_audit --compare nosuch.json nosuch.json
 printf '{"views": 1}' >none.json
 data none.json energy_audit --compare none.json none.json
+timeout -k 5 60 "$BIN/sf_train" --help >/dev/full 2>err
+status=$?
+judge "--help, full disk" sf_train 1 "standard output"
 usage --output sf_export model.safetensors -o model.safetensors
 usage --nir sf_export s.snn --nir ./s.snn
 usage --output sim_render s.snn d -o s.snn

@@ -59,6 +59,7 @@ esac
 every=${every:-$default_every}
 [ "$every" -ge 1 ] || die "--every starts at 1"
 [ -z "$model" ] || [ -n "$data" ] || die "--model needs --data FOLDER (make pareto MODEL=file DATA=folder)"
+[ -z "$data" ] || [ -n "$model" ] || die "--data needs --model FILE (make pareto MODEL=file DATA=folder)"
 for program in sf_point sf_pareto sf_train sf_scene; do
   [ -x "$bin/$program" ] || die "$bin/$program is missing: run make first" 1
 done

@@ -35,7 +35,7 @@ int main(int argc, char **argv)
       .usage = "sf_pareto DIR [--quiet]",
       .summary = "Gathers DIR/points/*.json of `make pareto` (written by sf_point) into DIR/table.md (printed, too),\n"
                  "DIR/points.csv and DIR/plots/*.gp; names the points that no other beats.",
-      .examples = "  sf_pareto build/pareto/sweep\n",
+      .examples = "  sf_pareto build/pareto/quick\n",
       .options = options,
       .min_positional = 1,
       .max_positional = 1};

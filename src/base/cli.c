@@ -222,7 +222,7 @@ static void answer_and_exit(const sf_cli *cli, bool version)
     printf("%s (spikefield) %s\n", cli->program, SPIKEFIELD_VERSION);
   else
     print_help(cli);
-  exit(fflush(stdout) ? 1 : 0);
+  exit(sf_cli_finish(cli, sf_ok()));
 }
 
 static sf_status take_option(const sf_cli *cli, int argc, char **argv, int *at)

@@ -44,7 +44,7 @@ lib: $B/lib/libspikefield.a $B/lib/$(SHARED) $B/lib/$(DPI) ## the C library, sta
 INSTALLED := $(INCLUDEDIR)/spikefield/spikefield.h $(LIBDIR)/libspikefield.a $(LIBDIR)/$(SHARED) $(LIBDIR)/$(SONAME) \
   $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc \
   $(INCLUDEDIR)/spikefield/sf_golden_dpi.h $(LIBDIR)/$(DPI) $(DATADIR)/spikefield/sf_golden_dpi.sv
-# Prices and schemas of energy_audit, which finds them beside itself.
+# Prices of technologies and schemas of the reports.
 SHARED_DATA := $(wildcard share/tech/*.tech share/schema/*.json)
 INSTALLED += $(SHARED_DATA:share/%=$(DATADIR)/spikefield/%)
 
