@@ -392,6 +392,14 @@ START_TEST(downscale_weighs_by_alpha)
   ck_assert_uint_eq(image.rgba[6], 8);
   ck_assert_uint_eq(image.rgba[7], 0);
   sf_image_free(&image);
+  uint16_t row[2][5][4] = {{{2}, {4}, {6}, {8}, {900}}, {{2}, {4}, {6}, {8}, {900}}};
+  image = (sf_image){5, 2, malloc(sizeof row)};
+  memcpy(image.rgba, row, sizeof row);
+  ck_good(sf_image_downscale(&image, 2, "")); /* the fifth column fills no box */
+  ck_assert_int_eq(image.width, 2);
+  ck_assert_uint_eq(image.rgba[0], 3);
+  ck_assert_uint_eq(image.rgba[4], 7);
+  sf_image_free(&image);
 }
 END_TEST
 

@@ -275,11 +275,36 @@ START_TEST(pictures_of_the_size_asked_for)
     same_rays(&d, &rig);
     sf_dataset_free(&d);
   }
-  /* photographs of 4000 pixels are not what anybody means: the first not above 1600 */
+  /* photographs of 4000 pixels are not what anybody means: the first folder not above 1600 */
   rig.lens[0].width = 4000, rig.lens[0].height = 3000;
   put_colmap("sparse/0", &rig, 0);
   ck_good(sf_dataset_load(&d, folder, "test", NULL));
   ck_assert_int_eq(d.view[0].camera.width, 8);
+  sf_dataset_free(&d);
+}
+END_TEST
+
+/* In the one size that the camera took: shrunk by the smallest factor that brings them to 1600 pixels. */
+START_TEST(photographs_are_shrunk_unasked)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  rig.lens[0].width = 3301, rig.lens[0].height = 40;
+  rig.lens[0].param[0] = rig.lens[0].param[1] = 3000;
+  rig.lens[0].param[2] = 1650, rig.lens[0].param[3] = 20;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, 3301, 40, 255);
+  ck_good(sf_dataset_load(&d, folder, "test", NULL));
+  ck_assert_int_eq(d.view[0].camera.width, 1100);
+  ck_assert_int_eq(d.view[0].camera.height, 13);
+  ck_assert_float_eq_tol(d.view[0].camera.fx, 1000, 1e-3f);
+  rig.lens[0].width = 3300, rig.lens[0].height = 39; /* what fills whole boxes of 3 x 3 */
+  same_rays(&d, &rig);
+  sf_dataset_free(&d);
+  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
+  ck_assert_int_eq(d.view[0].camera.width, 165);
+  rig.lens[0].height = 40;
+  same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
 END_TEST
@@ -323,6 +348,7 @@ static Suite *suite(void)
   tcase_add_test(t, poses_decide_what_faces_forward);
   tcase_add_test(t, one_layout_wins_and_says_so);
   tcase_add_test(t, pictures_of_the_size_asked_for);
+  tcase_add_test(t, photographs_are_shrunk_unasked);
   tcase_add_loop_test(t, each_picture_has_its_own_camera, 0, 2);
   suite_add_tcase(s, t);
   return s;

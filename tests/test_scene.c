@@ -271,7 +271,7 @@ START_TEST(folder_and_option_faults)
   ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "transforms_val.json", "no such file");
   put_picture("a.png", 8, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "]}";
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 3}), SF_E_RANGE, "a.png", "8 x 4");
+  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 5}), SF_E_RANGE, "a.png", "8 x 4");
   ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
   ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
   ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",

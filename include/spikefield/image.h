@@ -18,7 +18,8 @@ sf_status sf_image_save_png(const sf_image *image, const char *path);
 /* PNG in memory, *data malloc'ed. pixel: [height][width] RGB, or with a palette of `colours` RGBA entries their indices. */
 sf_status sf_png_encode(const uint8_t *pixel, int width, int height, const uint8_t *palette, int colours, void **data,
                         size_t *size);
-/* Box filter by an integer factor >= 1, alpha-weighted; sizes must divide. */
+/* Box filter by an integer factor >= 1, alpha-weighted. Columns on the right and rows at the bottom that fill no whole
+ * box are left out, so that pixel (x, y) lies where factor x, factor y did. */
 sf_status sf_image_downscale(sf_image *image, int factor, const char *name);
 void sf_image_free(sf_image *image);
 

@@ -64,8 +64,8 @@ sf_status sf_image_downscale(sf_image *image, int factor, const char *name)
 {
   if (factor < 1) return sf_fail(SF_E_RANGE, "%s: downscale factor %d is below 1", name, factor);
   if (factor == 1) return sf_ok();
-  if (image->width % factor || image->height % factor)
-    return sf_fail(SF_E_RANGE, "%s: %d x %d pixels cannot be divided by the downscale factor %d", name, image->width,
+  if (image->width < factor || image->height < factor)
+    return sf_fail(SF_E_RANGE, "%s: of %d x %d pixels nothing is left by a downscale factor of %d", name, image->width,
                    image->height, factor);
   sf_image small;
   SF_TRY(sf_image_alloc(&small, name, (uint64_t)(image->width / factor), (uint64_t)(image->height / factor)));

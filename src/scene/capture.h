@@ -29,7 +29,7 @@ typedef struct sf_capture {
   enum { SF_ALL_VIEWS, SF_ALL_BUT_HELD_OUT, SF_ONLY_HELD_OUT } part; /* of the frames, which are the split */
   sf_frame *frame;                                                   /* [count], owned */
   int count;
-  int shrink;         /* the pictures, once loaded, by a box filter */
+  int shrink;         /* the pictures, once loaded, by a box filter; 0: each to at most SF_LONG_SIDE */
   double (*point)[3]; /* [points] sparse points or NULL, owned */
   int points;
   double near;      /* LLFF: the nearest depth of all views */
@@ -63,9 +63,10 @@ bool sf_is_file(const char *path);
 bool sf_is_folder(const char *path);
 /* dir/name + tail; an absolute name stands alone. */
 sf_status sf_join(char path[4096], const char *dir, const char *name, const char *tail);
+enum { SF_LONG_SIDE = 1600 }; /* pixels of the pictures that are chosen unasked */
 /* Folder `images` or `images_N` for pictures of the full size over `downscale`; *shrink: what is left to do. With
- * downscale 1: the largest whose longer side is at most 1600 pixels, by the full width and height; else the smallest.
- */
+ * downscale 1: the largest whose longer side is at most SF_LONG_SIDE, by the full width and height; else the smallest,
+ * and *shrink = 0. */
 sf_status sf_pictures_choose(const char *dir, int downscale, double width, double height, char folder[64], int *shrink);
 /* The names of its pictures (PNG, JPEG), sorted; free each and the list. */
 sf_status sf_pictures_list(const char *dir, const char *folder, char ***name, int *count);

@@ -7,7 +7,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-enum { LONG_SIDE = 1600, SHRINK_MAX = 64 }; /* pixels of the pictures that are chosen unasked */
+enum { SHRINK_MAX = 64 };
 
 bool sf_is_file(const char *path)
 {
@@ -59,7 +59,7 @@ sf_status sf_pictures_choose(const char *dir, int downscale, double width, doubl
   for (int n = 1; n <= SHRINK_MAX; n++) {
     if (!has(dir, n)) continue;
     smallest = n;
-    if (!fitting && side / n <= LONG_SIDE) fitting = n;
+    if (!fitting && side / n <= SF_LONG_SIDE) fitting = n;
     if (downscale > 1 && downscale % n == 0) found = n;
   }
   if (!smallest) return sf_fail(SF_E_IO, "%s: no folder images or images_N with the pictures", dir);
@@ -70,7 +70,7 @@ sf_status sf_pictures_choose(const char *dir, int downscale, double width, doubl
                    downscale, folder);
   }
   folder_name(folder, found);
-  *shrink = downscale > 1 ? downscale / found : 1;
+  *shrink = downscale > 1 ? downscale / found : 0;
   return sf_ok();
 }
 

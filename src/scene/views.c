@@ -90,6 +90,13 @@ static float mean_brightness(const sf_image *image)
   return weight ? (float)((double)sum / (double)weight * 65536 / 65535) : 0;
 }
 
+/* The factor asked for, or the smallest that brings the picture to what is chosen unasked. */
+static int factor_of(const sf_capture *capture, const sf_image *image)
+{
+  const int side = image->width > image->height ? image->width : image->height;
+  return capture->shrink ? capture->shrink : (side + SF_LONG_SIDE - 1) / SF_LONG_SIDE;
+}
+
 static void shrink_camera(sf_camera *camera, const sf_image *image, int factor)
 {
   const float shrink = 1.0f / (float)factor;
@@ -110,7 +117,7 @@ static sf_status load_view(sf_view *view, const sf_frame *frame, const loading *
   SF_TRY(in_frame(sf_picture_load(&view->image, path), list, frame->number));
   SF_TRY(set_lens(&view->camera, &frame->lens, &view->image, where));
   view->brightness = mean_brightness(&view->image);
-  const int shrink = l->capture->shrink;
+  const int shrink = factor_of(l->capture, &view->image);
   if (shrink > 1) {
     SF_TRY(in_frame(sf_image_downscale(&view->image, shrink, path), list, frame->number));
     shrink_camera(&view->camera, &view->image, shrink);
