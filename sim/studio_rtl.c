@@ -1,3 +1,4 @@
+#include "sim/compare.h"
 #include "sim/studio.h"
 #include <string.h>
 
@@ -42,8 +43,8 @@ static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, 
   SF_TRY(sf_dut_clear_counts(dut));
   SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
   SF_TRY(same_pixel(&core, pixel, sf_dut_cycle(dut)));
-  if (request.n > 0) SF_TRY(sf_dut_counts(dut, rtl, &cycles, &busy, &stalls));
-  return sf_counts_compare(&e->core.core, "core", rtl, "accelerator");
+  SF_TRY(sf_dut_counts(dut, rtl, &cycles, &busy, &stalls));
+  return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
 }
 
 /* The core's samples, the accelerator's colours. */
@@ -56,8 +57,8 @@ static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, rtl_eval 
   SF_TRY(sf_dut_clear_counts(e->dut));
   SF_TRY(fx_render_ray(scene, ray, sf_dut_net, e->dut, pixel, NULL));
   SF_TRY(same_pixel(&core, pixel, sf_dut_cycle(e->dut)));
-  if (core.samples > 0) SF_TRY(sf_dut_counts(e->dut, rtl, &cycles, &busy, &stalls));
-  return sf_counts_compare(&e->core.core, "core", rtl, "accelerator");
+  SF_TRY(sf_dut_counts(e->dut, rtl, &cycles, &busy, &stalls));
+  return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
 }
 
 static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, sf_golden *golden)

@@ -1,4 +1,5 @@
 #include "sim/three_counts.h"
+#include "sim/compare.h"
 #include "sim/ray.h"
 #include <stdlib.h>
 #include <string.h>
@@ -50,7 +51,7 @@ static sf_status compare_counters(run *r)
   fx_counts rtl;
   uint64_t cycles, busy, stalls;
   SF_TRY(sf_dut_counts(r->dut, &rtl, &cycles, &busy, &stalls));
-  return sf_counts_compare(&r->core.core, "core", &rtl, "accelerator");
+  return sf_compare_ray_counts(r->core.net, &r->core.core, &rtl);
 }
 
 static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
@@ -112,7 +113,6 @@ static sf_status ray_traffic(run *r, const fx_ray *ray, const fx_pixel *core)
 
 static sf_status compare_all(const sf_three_counts *s)
 {
-  SF_TRY(sf_counts_compare(&s->core, "core", &s->rtl, "accelerator"));
   SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
   SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount"));
   if (s->no_rtl_traffic) return sf_ok();
@@ -125,15 +125,15 @@ static sf_status one_ray(run *r, uint64_t index)
   fx_ray ray;
   fx_pixel pixel;
   SF_TRY(r->job->ray(r->job->user, index, &ray));
-  SF_TRY(name_ray(r, index, net_ray(r, &ray, &pixel)));
   s->rays++;
+  SF_TRY(name_ray(r, index, net_ray(r, &ray, &pixel)));
   fx_counts_add(&s->core, &r->core.core);
   fx_counts_add(&s->recount, &r->core.recount);
   s->core_traffic = sf_traffic_of(&s->core, (uint64_t)s->rays);
   s->recount_traffic = sf_traffic_recount(r->job->scene, &s->recount, s->core.field_samples, (uint64_t)s->rays);
   SF_TRY(sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls));
   if (r->rays) SF_TRY(ray_traffic(r, &ray, &pixel));
-  const sf_status status = sf_counts_compare(&s->core, "core", &s->rtl, "accelerator");
+  const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
   if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, &ray, status));
   return name_ray(r, index, compare_all(s));
 }

@@ -45,5 +45,8 @@ recount=$(sed -E 's/.*core ([0-9]+), recount ([0-9]+)$/\2/' "$work/4.err")
 expect 5 1 'ray [0-9]+, sample 0: .* core [0-9]+, recount [0-9]+$'
 # The vector core alone: a sample less than the portable core.
 expect 6 1 'ray [0-9]+, MAC of layer D1 at step 0: vector core [0-9]+, portable core [0-9]+$'
-[ $failures -eq 0 ] && echo "4 planted miscounts caught and located, none without a fault"
+# The accelerator's global counters: a sample, a ray too many.
+expect 7 1 'ray [0-9]+ \(view .*samples: core [0-9]+, accelerator [0-9]+$'
+expect 8 1 'ray [0-9]+ \(view .*rays: core [0-9]+, accelerator [0-9]+$'
+[ $failures -eq 0 ] && echo "6 planted miscounts caught and located, none without a fault"
 exit $((failures > 0))

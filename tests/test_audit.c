@@ -218,6 +218,8 @@ START_TEST(comparison_names_the_first_and_ignores_the_rest)
   fx_counts a = {0}, b = {0};
   a.grid_bytes = 1, a.march_steps = 2, a.saturated[3] = 3, a.saturated_features = 4;
   ck_assert_int_eq(sf_counts_compare(&a, "a", &b, "b").code, SF_OK);
+  b.samples = 6;
+  ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "samples: a 0, b 6");
   b.layer[FX_C2].sop[1] = 7, b.layer[FX_C1].spikes[5] = 8, b.layer[FX_C1].updates[5] = 9;
   ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "spikes of layer C1 at step 5: a 0, b 8");
 }
@@ -560,6 +562,29 @@ START_TEST(report_says_that_counts_differ)
 }
 END_TEST
 
+/* The first ray of the accelerator can be the one that differs: there is nothing but the difference then. */
+START_TEST(report_says_that_the_first_ray_differs)
+{
+  fx_net net = small_net();
+  sf_audit_report *r = calloc(1, sizeof *r);
+  *r = (sf_audit_report){
+      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  r->three.wanted = 16;
+  r->three.agreement = sf_fail(SF_E_DIFFERENCE, "ray 0: sample 0: red: core 1, accelerator 0");
+  cJSON *json = sf_report_json(r);
+  ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  sf_report_print(out, r);
+  fclose(out);
+  ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: ray 0: sample 0"));
+  ck_assert_ptr_null(strstr(text, "nothing to run"));
+  free(text), free(r);
+  cJSON_Delete(json);
+}
+END_TEST
+
 START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
 {
   fx_net net = small_net();
@@ -732,6 +757,7 @@ int main(void)
   tcase_add_test(report, json_keeps_every_digit);
   tcase_add_test(report, report_json_holds_what_was_counted);
   tcase_add_test(report, report_says_that_counts_differ);
+  tcase_add_test(report, report_says_that_the_first_ray_differs);
   tcase_add_test(report, saturation_is_expected_only_where_the_formats_allow_it);
   tcase_add_test(report, sha256_of_known_texts);
   tcase_add_test(report, golden_planes_hold_the_pixel);

@@ -301,6 +301,10 @@ START_TEST(a_difference_is_shown)
   ck_assert_ptr_nonnull(strstr(f.text, "the counts differ"));
   ck_assert_ptr_nonnull(strstr(f.text, "&lt;core&gt; differs"));
   ck_assert_ptr_nonnull(strstr(f.text, "DIFFERENT"));
+  f.report.three.rays = 0; /* already the first ray */
+  read_page(&f);
+  ck_assert_ptr_nonnull(strstr(f.text, "the counts differ"));
+  ck_assert_ptr_null(strstr(f.text, "was left out"));
   end(&f);
 }
 END_TEST

@@ -157,12 +157,15 @@ START_TEST(faults)
   ck_assert_ptr_nonnull(strstr(report.problem[0], "10000000000001 fJ in the rendering"));
   write_text("a/beta-5e-7/audit-1.json",
              "{\"energy_spiking_fj\":1,\"energy_ann_fj\":2,\"core_equals_recount\":false,\"samples\":1}");
+  write_text("a/beta-5e-7/audit-2.json",
+             "{\"energy_spiking_fj\":1,\"energy_ann_fj\":2,\"difference\":\"ray 0: it differs\",\"samples\":1}");
   write_text("a/no-extra/train.json", "{\"psnr\":");
   write_text("a/no-stage1/train.json", "{\"psnr\":null,\"ssim\":0.5,\"t_r\":3,\"seconds\":1}");
   load();
-  ck_assert_int_eq(report.problems, 4);
-  ck_assert_ptr_nonnull(strstr(report.problem[2], "no-stage1/train.json: no finite number 'psnr'"));
-  ck_assert_ptr_nonnull(strstr(report.problem[3], "no-extra/train.json"));
+  ck_assert_int_eq(report.problems, 5);
+  ck_assert_ptr_nonnull(strstr(report.problem[2], "the audit of view 2: ray 0: it differs"));
+  ck_assert_ptr_nonnull(strstr(report.problem[3], "no-stage1/train.json: no finite number 'psnr'"));
+  ck_assert_ptr_nonnull(strstr(report.problem[4], "no-extra/train.json"));
   ck_assert(isnan(mean(-1, SF_RUN_NO_EXTRA, SF_METRIC_PSNR)));
   ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 30);
   print();

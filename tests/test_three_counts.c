@@ -1,4 +1,5 @@
 /* Core, accelerator and recount on whole rays: nets with a hash grid, and a decoder behind planes and lines. */
+#include "sim/compare.h"
 #include "sim/three_counts.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
@@ -74,6 +75,53 @@ START_TEST(decoder)
 }
 END_TEST
 
+/* The core's net changes behind the accelerator's back: every ray of it differs, already the first. */
+static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
+{
+  fx_scene *scene = user;
+  scene->net.sigmoid_in.bias = 1 << 15;
+  return ray(NULL, index, to);
+}
+
+START_TEST(the_first_ray_differs)
+{
+  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  scene.step_q24 = 1 << 19;
+  static const uint64_t index[] = {0, 1};
+  const sf_three_job job = {.scene = &scene,
+                            .index = index,
+                            .rays = 2,
+                            .ray = ray_of_another_net,
+                            .name = name,
+                            .user = &scene,
+                            .dut = {.seed = 3}};
+  sf_three_counts *counts = calloc(1, sizeof *counts);
+  counts->wanted = 2;
+  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
+  ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
+  ck_assert_ptr_nonnull(strstr(counts->agreement.message, "ray 0: sample 0: red: core "));
+  ck_assert_int_eq(counts->rays, 1);
+  free(counts);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* The accelerator's samples and rays count, too; a decoder has no directions and counts no rays. */
+START_TEST(samples_and_rays_are_compared)
+{
+  fx_counts core = {.samples = 5, .rays = 2}, rtl = core;
+  fx_net net = {.layer[FX_D1].n_out = 1};
+  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  rtl.rays = 3;
+  ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "rays: core 2, accelerator 3");
+  net.layer[FX_D1].n_out = 0;
+  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  rtl.samples = 4;
+  ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "samples: core 5, accelerator 4");
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("three_counts");
@@ -81,6 +129,8 @@ int main(void)
   tcase_set_timeout(all, 60);
   tcase_add_test(all, hash_grid);
   tcase_add_test(all, decoder);
+  tcase_add_test(all, the_first_ray_differs);
+  tcase_add_test(all, samples_and_rays_are_compared);
   suite_add_tcase(suite, all);
   return fixture_run(suite);
 }

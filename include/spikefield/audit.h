@@ -23,8 +23,8 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
                        fx_counts *counts);
 
-/* Equality of two counts over the layers' events (not grid/march/saturation). On a difference names event, layer, step
- * and both values. */
+/* Equality of two counts over the layers' events and samples (not rays/grid/march/saturation). On a difference names
+ * event, layer, step and both values. */
 sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_counts *b, const char *b_name);
 cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts);
 extern const char *const sf_layer_names[SF_LAYERS]; /* "D1", "D2", "C1", "C2", "C3" */

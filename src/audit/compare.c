@@ -13,5 +13,7 @@ sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_cou
                          sf_layer_names[l], t, a_name, (unsigned long long)x, b_name, (unsigned long long)y);
       }
   }
-  return sf_ok();
+  if (a->samples == b->samples) return sf_ok();
+  return sf_fail(SF_E_DIFFERENCE, "samples: %s %llu, %s %llu", a_name, (unsigned long long)a->samples, b_name,
+                 (unsigned long long)b->samples);
 }

@@ -113,7 +113,7 @@ void html_counts(FILE *out, const sf_page *page)
           "rays below the Verilog accelerator counts too, in registers of its own. The three must be equal, for every "
           "event, layer and step.</p>\n<p>Core = recount for all %s samples of %s rays. ",
           html_count(samples, page->report->measure.recount.samples), html_count(rays, page->report->measure.checked));
-  if (s->rays == 0) {
+  if (s->rays == 0 && s->agreement.code == SF_OK) {
     fprintf(out, "The accelerator was left out.</p>\n</section>\n");
     return;
   }

@@ -201,7 +201,7 @@ static sf_status same_counts(const fx_counts *vector, const fx_counts *portable)
   if (vector->grid_bytes != portable->grid_bytes)
     return sf_fail(SF_E_DIFFERENCE, "grid bytes: vector core %llu, portable core %llu",
                    (unsigned long long)vector->grid_bytes, (unsigned long long)portable->grid_bytes);
-  return sf_fail(SF_E_DIFFERENCE, "samples, lattice points or saturations differ between vector and portable core");
+  return sf_fail(SF_E_DIFFERENCE, "rays, lattice points or saturations differ between vector and portable core");
 }
 
 /* The vector core's sums differ from the portable one's: which ray is the first? */

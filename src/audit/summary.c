@@ -15,7 +15,7 @@ static void print_row(FILE *out, const char *title, uint64_t x, uint64_t y, uint
 
 static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
 {
-  if (s->rays == 0) {
+  if (s->rays == 0 && s->agreement.code == SF_OK) {
     fprintf(out, "accelerator: %s\n", s->wanted ? "no ray has samples, nothing to run" : "left out");
     return;
   }
@@ -202,7 +202,7 @@ static void add_agreement(cJSON *json, const sf_audit_report *r)
   sf_json_add_u64(json, "recount_rays", r->measure.checked);
   sf_json_add_u64(json, "recount_samples", r->measure.recount.samples);
   cJSON_AddBoolToObject(json, "core_equals_recount", all);
-  if (r->three.rays > 0)
+  if (r->three.rays > 0 || !three)
     cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
   else
     cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");

@@ -58,7 +58,9 @@ static sf_status check_agreement(frames *f, const cJSON *audit, int view)
   for (int i = 0; i < 2; i++)
     if (cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(audit, key[i])))
       SF_TRY(sf_report_problem(f->report, "%s: the audit of view %d says %s: false", f->dir, view, key[i]));
-  return sf_ok();
+  const cJSON *difference = cJSON_GetObjectItemCaseSensitive(audit, "difference");
+  if (!cJSON_IsString(difference)) return sf_ok();
+  return sf_report_problem(f->report, "%s: the audit of view %d: %s", f->dir, view, difference->valuestring);
 }
 
 /* The rendering's own counts are a second reading of the same frame. */
