@@ -95,7 +95,9 @@ START_TEST(mistakes_are_named_with_line_and_key)
       {"int_add.8 8 fJ made up", "int_add 8 fJ x", ":8: key 'int_add': expected int_add.BITS, 1 to 256"},
       {"int_add.8 8 fJ made up", "int_add.x 8 fJ x", ":8: key 'int_add.x': expected int_add.BITS"},
       {"int_add.8 8 fJ made up", "int_add.257 8 fJ x", ":8: key 'int_add.257': expected int_add.BITS"},
-      {"int_add.8 8 fJ made up", "int_add.32 8 fJ x", ":8: key 'int_add.32' is there twice"},
+      {"int_add.8 8 fJ made up", "int_add.32 8 fJ x", ":8: key 'int_add.32' is there twice, first as 'int_add.32'"},
+      {"int_add.8 8 fJ made up", "int_add.032 8 fJ x", ":8: key 'int_add.032' is there twice, first as 'int_add.32'"},
+      {"fp32_add 0.9 pJ paper", "fp32_mac 0.9 pJ x", ":6: key 'fp32_mac' is there twice"},
       {"sram.64 80 fJ made up", "sram.0 80 fJ x", ":12: key 'sram.0': expected sram.BYTES"},
       {"int_add.8 8 fJ made up", "", ": key 'int_add' needs two points to interpolate between"},
       {"dram 0.008 nJ made up", "", ": key 'dram' is missing"},
@@ -142,8 +144,12 @@ START_TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_add(&t, 2, NULL), 2);
   t.price[7].fj = 5120; /* 64 times the price for 256 times the size: the power 3/4 */
   ck_assert_uint_eq(sf_price_byte(&t, 1024, NULL), 80);
-  t.price[2].fj = 40; /* 40 at 8 bits, 32 at 32: falls to nothing and not below */
-  ck_assert_uint_eq(sf_price_add(&t, 200, NULL), 0);
+  t.price[2].fj = 40; /* 40 at 8 bits, 32 at 32: where the line falls to nothing, the price of the last point */
+  ck_assert_uint_eq(sf_price_add(&t, 120, NULL), 3);
+  ck_assert_uint_eq(sf_price_add(&t, 200, NULL), 32);
+  t.price[4].fj = 64, t.price[5].fj = 2000; /* 64 at 8 x 8 bits, 2000 at 32 x 32: nothing at 33 */
+  ck_assert_uint_eq(sf_price_multiply(&t, 6, 6, NULL), 8);
+  ck_assert_uint_eq(sf_price_multiply(&t, 4, 4, NULL), 64);
 }
 END_TEST
 

@@ -105,8 +105,9 @@ static sf_status insert(const reader *r, const sf_price *price, int family)
   sf_technology *t = r->to;
   int at = t->count;
   for (int i = 0; i < t->count; i++)
-    if (!strcmp(t->price[i].key, price->key))
-      return sf_fail(SF_E_FORMAT, "%s:%d: key '%s' is there twice", r->path, r->line, price->key);
+    if (family_of(t->price[i].key) == family && t->price[i].at == price->at)
+      return sf_fail(SF_E_FORMAT, "%s:%d: key '%s' is there twice, first as '%s'", r->path, r->line, price->key,
+                     t->price[i].key);
   if (t->count == SF_PRICES_MAX)
     return sf_fail(SF_E_RANGE, "%s:%d: key '%s': more than %d prices", r->path, r->line, price->key, SF_PRICES_MAX);
   for (; at > 0; at--) {
@@ -221,6 +222,14 @@ static uint64_t round_positive(double fj)
   return fj > 0 ? (uint64_t)llround(fj) : 0;
 }
 
+/* At x on the line through a and b; where it falls to nothing outside of them, the price of the nearer one. */
+static uint64_t on_line(const sf_price *a, double x_a, const sf_price *b, double x_b, double x)
+{
+  const uint64_t fj = round_positive((double)a->fj + (x - x_a) / (x_b - x_a) * ((double)b->fj - (double)a->fj));
+  if (fj > 0) return fj;
+  return x < x_a ? a->fj : x > x_b ? b->fj : 0;
+}
+
 static void note(bool *interpolated, bool value)
 {
   if (interpolated) *interpolated = *interpolated || value;
@@ -231,8 +240,7 @@ uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpola
   const sf_price *a, *b;
   neighbours(technology, SF_PRICE_INT_ADD, (uint64_t)bits, &a, &b);
   note(interpolated, a->at != (uint32_t)bits && b->at != (uint32_t)bits);
-  const double share = ((double)bits - a->at) / ((double)b->at - a->at);
-  return round_positive((double)a->fj + share * ((double)b->fj - (double)a->fj));
+  return on_line(a, a->at, b, b->at, bits);
 }
 
 uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bits, bool *interpolated)
@@ -242,7 +250,7 @@ uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bi
   neighbours(technology, SF_PRICE_INT_MULTIPLY, (uint64_t)ceil(sqrt(cells)), &a, &b);
   const double low = (double)a->at * a->at, high = (double)b->at * b->at;
   note(interpolated, cells != low && cells != high);
-  return round_positive((double)a->fj + (cells - low) / (high - low) * ((double)b->fj - (double)a->fj));
+  return on_line(a, low, b, high, cells);
 }
 
 uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated)
