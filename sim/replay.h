@@ -4,7 +4,7 @@
 #include "sim/compare.h"
 #include <cjson/cJSON.h>
 
-enum { SF_REPLAY_MAX = 128 };
+enum { SF_REPLAY_MAX = 128, SF_PLUSARG_MAX = 63 };
 
 typedef struct sf_replay_sample {
   uint64_t ray, sample; /* for the reader: `sample` counts from 0 along the ray */
@@ -15,7 +15,7 @@ typedef struct sf_replay_sample {
 typedef struct sf_replay {
   uint64_t seed; /* of stalls and register contents at power-on */
   int stall_percent;
-  char plusarg[64]; /* "" for none */
+  char plusarg[SF_PLUSARG_MAX + 1]; /* "" for none */
   int count;
   sf_replay_sample sample[SF_REPLAY_MAX];
 } sf_replay;
