@@ -172,7 +172,8 @@ module sf_csr #(
   wire bad_busy = start_busy || (word_write && to_config && running_q);
   wire bad_address = write && (!known || wstrb_i != 4'hf);
   wire bad_weight = config_write && to_weight && weight_bad;
-  wire [10:0] error_set = {error_value_i, error_packet_i, bad_weight, bad_address, bad_busy,
+  // A soft reset drops a beat that comes beside it.
+  wire [10:0] error_set = {error_value_i && !soft_reset, error_packet_i && !soft_reset, bad_weight, bad_address, bad_busy,
                            start_check ? {bad_scale, bad_mode, bad_theta, bad_leak, bad_steps, bad_size} : 6'd0};
   wire [10:0] error_keep = soft_reset ? 11'd0 : word_write && to_error ? error_q & ~wdata_i[10:0] : error_q;
   wire [1:0] pending_keep = word_write && to_irq_pending ? irq_pending_q & ~wdata_i[1:0] : irq_pending_q;
@@ -232,7 +233,7 @@ module sf_csr #(
         sf_csr_pkg::SIGMOID_BIAS: sigmoid_bias_q <= wdata_i;
         sf_csr_pkg::WEIGHT_ADDRESS: weight_address_q <= |wdata_i[31:18] ? 18'h3ffff : wdata_i[17:0];
         sf_csr_pkg::BIAS: bias_q <= bias_w;
-        default: weight_address_q <= weight_address_q + 18'd1;  // WEIGHT_DATA
+        default: if (!weight_bad) weight_address_q <= weight_address_q + 18'd1;  // WEIGHT_DATA
       endcase
     end
   end

@@ -83,7 +83,7 @@ module sf_ray_csr (
     end else begin
       if (soft_reset_i) running_q <= 1'b0;
       else if (start) running_q <= running_q || !bad_value;
-      error_q <= error_keep | {error_order_i, bad_address, bad_busy, bad_start};
+      error_q <= error_keep | {error_order_i && !soft_reset_i, bad_address, bad_busy, bad_start};
       if (word_write && to_irq_enable) irq_enable_q <= wdata_i[3:0];
       if (write) begin
         bvalid_q <= 1'b1;

@@ -43,7 +43,7 @@ module sf_ray_track (
   reg drop_q;     // and is not needed
   reg broken_q;
   reg [4:0] ray_q, composed_q;  // rays are told apart by their number: fewer than 32 are inside
-  wire bad = inside_q ? first_i : !first_i;
+  wire bad = inside_q ? first_i || empty_i : !first_i || (empty_i && !last_i);
 
   // ---- input: one sample waits for the encoder
   reg pending_q, first_q;

@@ -117,9 +117,9 @@ static inline uint32_t programmed(registers *r, uint32_t offset, uint32_t value)
   if (offset == SF_CSR_BIAS) r->bias = (value & known_bias) | (value & ~known_bias ? 1u << 18 : 0);
   if (offset == SF_CSR_WEIGHT_ADDRESS) r->weight_address = fitted(value, 18, 0x3ffff);
   if (offset != SF_CSR_WEIGHT_DATA) return 0;
-  const bool fits = weight_fits(r->weight_address, value);
+  if (!weight_fits(r->weight_address, value)) return SF_CSR_ERROR_WEIGHT;
   r->weight_address = (r->weight_address + 1) & 0x3ffff;
-  return fits ? 0 : SF_CSR_ERROR_WEIGHT;
+  return 0;
 }
 
 /* The bits of ERROR that a write sets. */

@@ -352,6 +352,39 @@ START_TEST(an_error_beside_its_clearing)
 }
 END_TEST
 
+/* A sample out of order in every cycle around a soft reset: one that comes beside it is dropped like any other. */
+START_TEST(an_error_beside_a_soft_reset)
+{
+  int together = 0;
+  sf_dut *dut = begin(231);
+  dut->each_cycle = NULL, dut->stall_percent = 0;
+  registers r = {0};
+  random_source s = {231, 0};
+  program_legal(dut, &r, &s);
+  for (int beat = 0; beat < 6; beat++)
+    for (int write = 0; write < 6; write++) {
+      sf_pins_in *in = &dut->in;
+      bool written = false;
+      soft_reset_both(dut, &r);
+      write_both(dut, &r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
+      in->awaddr = SF_CSR_CTRL, in->wdata = SF_CSR_CTRL_SOFT_RESET, in->wstrb = WHOLE, in->bready = true;
+      in->ray_user = false;
+      for (int cycle = 0; cycle < 12; cycle++) {
+        in->ray_valid = cycle == beat;
+        in->awvalid = in->wvalid = !written && cycle >= write;
+        sf_dut_tick(dut);
+        together += in->ray_valid && dut->out.ray_ready && in->awvalid && dut->out.awready;
+        written |= in->awvalid && dut->out.awready;
+      }
+      in->bready = false;
+      ck_assert(written);
+      ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), 0);
+    }
+  ck_assert_int_gt(together, 3);
+  sf_dut_close(dut);
+}
+END_TEST
+
 /* ---- the encoder's words ---- */
 
 static sf_ray_sample samples[RAYS][SAMPLES_MAX];
@@ -482,6 +515,7 @@ int main(void)
   tcase_add_test(cases, the_other_window);
   tcase_add_test(cases, accesses_without_a_pause);
   tcase_add_test(cases, an_error_beside_its_clearing);
+  tcase_add_test(cases, an_error_beside_a_soft_reset);
   tcase_add_test(cases, the_encoder_is_programmed_by_its_words_alone);
   tcase_add_test(cases, active_until_the_pixel_has_left);
   tcase_add_test(cases, a_hard_reset_drops_responses);

@@ -88,14 +88,17 @@ struct bench {
     return broken || (inside && drop) || (u.top.enable_i && !in_hand && compositor.size() < DEPTH);
   }
 
+  /* The order is wrong: a ray that begins inside another or not at all; an empty one is a ray of its own. */
+  bool wrong(const sample &s) const { return s.first == inside || (s.empty && !(s.first && s.last)); }
+
   void enter(const sample &s)
   {
-    if (broken || (inside && drop && !s.first)) {
+    if (broken || (inside && drop && !wrong(s))) {
       dropped += !broken;
       inside = broken ? inside : !s.last;
       return;
     }
-    if (s.first == inside) { /* the order is wrong */
+    if (wrong(s)) {
       broken = true;
       return;
     }
@@ -122,7 +125,7 @@ struct bench {
     ck_assert_uint_eq(u.top.idle_o, compositor.empty() && !was_in_hand);
     if (u.top.valid_o) same_compositor();
     const bool given = s && u.top.ready_o;
-    ck_assert_uint_eq(u.top.error_order_o, given && !was_broken && s->first == inside);
+    ck_assert_uint_eq(u.top.error_order_o, given && !was_broken && wrong(*s));
     const bool stop_here = u.top.stop_i && composed == ray;
     stops += stop_here && inside;
     if (was_in_hand && u.top.encode_ready_i) same_encoder();
@@ -212,16 +215,24 @@ START_TEST(a_late_stop_hits_nobody)
 }
 END_TEST
 
-/* A ray that begins inside another, or that lacks its beginning: one error, then nothing until a clear. */
+/* A ray that begins inside another, or that lacks its beginning; an empty one inside another, without a beginning or
+ * without an end: one error, then nothing until a clear. */
 START_TEST(wrong_order)
 {
-  for (int wrong = 0; wrong < 2; wrong++)
+  static const struct {
+    bool inside, first, last, empty;
+  } wrong[] = {{false, false, false, false}, {true, true, false, false}, {true, false, false, true},
+               {true, false, true, true},    {true, true, true, true},   {false, true, false, true},
+               {false, false, true, true}};
+  for (size_t kind = 0; kind < sizeof wrong / sizeof *wrong; kind++)
     for (int hard = 0; hard < 2; hard++) {
-      bench b(300 + (uint64_t)(2 * wrong + hard), 20);
+      bench b(300 + (uint64_t)(2 * kind + hard), 20);
       random_ray(b);
       sample s = draw_sample(b.draw);
-      if (wrong) s.first = true, b.give(s);
-      b.give(s); /* without a first before it, or a second first */
+      s.first = true;
+      if (wrong[kind].inside) b.give(s);
+      s.first = wrong[kind].first, s.last = wrong[kind].last, s.empty = wrong[kind].empty;
+      b.give(s);
       ck_assert(b.broken);
       b.u.top.enable_i = 0; /* nothing holds up what is swallowed */
       for (int i = 0; i < 100; i++) {

@@ -168,7 +168,7 @@
 /* ignored, RW */
 #define SF_REG_C3_THETA 0x008c
 
-/* where WEIGHT_DATA goes; counts up by one word at each write of it, RW */
+/* where WEIGHT_DATA goes; counts up by one word at each write of it that is not refused, RW */
 #define SF_REG_WEIGHT_ADDRESS 0x0090
 #define SF_REG_WEIGHT_ADDRESS_WORD_MASK 0x0000003f /* output neuron / 4 */
 #define SF_REG_WEIGHT_ADDRESS_WORD_SHIFT 0
@@ -211,7 +211,7 @@
 #define SF_REG_RAY_ERROR_BUSY_SHIFT 1
 #define SF_REG_RAY_ERROR_ADDRESS_MASK 0x00000004 /* write to a register that is not there or is read-only */
 #define SF_REG_RAY_ERROR_ADDRESS_SHIFT 2
-#define SF_REG_RAY_ERROR_ORDER_MASK 0x00000008 /* tuser on a sample inside a ray, or none on its first one; input is discarded until soft reset */
+#define SF_REG_RAY_ERROR_ORDER_MASK 0x00000008 /* tuser on a sample inside a ray, or none on its first one; an empty ray without tuser or tlast; input is discarded until soft reset */
 #define SF_REG_RAY_ERROR_ORDER_SHIFT 3
 
 /* the interrupt is also any bit of RAY_ERROR that is enabled here, RW */
