@@ -85,7 +85,7 @@ static void print(void)
 {
   FILE *out = fopen(in("table.md"), "w");
   ck_assert_ptr_nonnull(out);
-  sf_reproduction_print(out, &report);
+  ck_good(sf_reproduction_print(out, &report));
   ck_assert_int_eq(fclose(out), 0);
 }
 
@@ -337,6 +337,24 @@ START_TEST(too_many_prefixes)
 }
 END_TEST
 
+/* Scenes of any kind are as many as there are: each has its rows. */
+START_TEST(many_scenes)
+{
+  char name[32], row[48];
+  for (int i = 0; i < 60; i++) {
+    snprintf(name, sizeof name, "scenes/s%02d", i);
+    write_run(name, "beta-5e-7", 20 + i, 2);
+  }
+  sf_reproduction_free(&report);
+  ck_good(sf_reproduction_load(&report, in("scenes")));
+  print();
+  for (int i = 0; i < 60; i++) {
+    snprintf(row, sizeof row, "\n| s%02d ", i);
+    contains("table.md", row, true);
+  }
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("report");
@@ -351,6 +369,7 @@ int main(void)
   tcase_add_test(tc, plots_and_json);
   tcase_add_test(tc, pairs);
   tcase_add_test(tc, too_many_prefixes);
+  tcase_add_test(tc, many_scenes);
   suite_add_tcase(suite, tc);
   SRunner *runner = srunner_create(suite);
   srunner_run_all(runner, CK_ENV);

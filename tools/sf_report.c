@@ -10,8 +10,10 @@ static sf_status write_table(const sf_reproduction *r)
   sf_writer writer;
   snprintf(path, sizeof path, "%s/table.md", r->dir);
   SF_TRY(sf_writer_open(&writer, path));
-  sf_reproduction_print(writer.file, r);
-  return sf_writer_commit(&writer);
+  const sf_status status = sf_reproduction_print(writer.file, r);
+  if (status.code == SF_OK) return sf_writer_commit(&writer);
+  sf_writer_abort(&writer);
+  return status;
 }
 
 static sf_status write_json(const sf_reproduction *r)
@@ -28,11 +30,12 @@ static sf_status write_json(const sf_reproduction *r)
 static sf_status report(const sf_reproduction *r, bool quiet)
 {
   int plots;
+  if (r->count == 0) return sf_fail(SF_E_FORMAT, "%s: no folder SCENE/RUN of make reproduce", r->dir);
   SF_TRY(write_table(r));
   SF_TRY(write_json(r));
   SF_TRY(sf_reproduction_plots(r, &plots));
   if (!quiet) {
-    sf_reproduction_print(stdout, r);
+    SF_TRY(sf_reproduction_print(stdout, r));
     printf("wrote %s/table.md, results.json and %d scripts in plots/\n", r->dir, plots);
   }
   if (!r->problems) return sf_ok();
@@ -49,7 +52,8 @@ int main(int argc, char **argv)
       .usage = "sf_report DIR [--quiet]",
       .summary = "Gathers DIR/SCENE/RUN/ of `make reproduce` into DIR/table.md (printed, too), DIR/results.json\n"
                  "and DIR/plots/*.gp, beside the values of the paper. Missing runs appear as '-'. Exit status 1\n"
-                 "when a file is unreadable or two counts of one frame differ; the report is written all the same.",
+                 "when a file is unreadable or two counts of one frame differ; the report is written all the same.\n"
+                 "Where there is no run nothing is written.",
       .examples = "  sf_report build/reproduce/quick\n"
                   "  sf_report build/reproduce/full --quiet\n",
       .options = options,

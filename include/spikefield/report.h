@@ -123,7 +123,7 @@ int sf_reproduction_order(const sf_reproduction *r, sf_order order[SF_ORDERS_MAX
 const sf_paper_group *sf_reproduction_group(const sf_report_scene *scene);
 
 /* Markdown for file and terminal. */
-void sf_reproduction_print(FILE *out, const sf_reproduction *r);
+sf_status sf_reproduction_print(FILE *out, const sf_reproduction *r);
 cJSON *sf_reproduction_json(const sf_reproduction *r); /* NULL: no memory */
 /* DIR/plots/NAME.gp: self-contained gnuplot scripts that write DIR/plots/NAME.svg. *count: how many. */
 sf_status sf_reproduction_plots(const sf_reproduction *r, int *count);

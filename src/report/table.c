@@ -2,16 +2,26 @@
 #include "spikefield/report.h"
 #include <math.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* ---- a table with aligned columns ---- */
 
-enum { COLUMNS = 16, ROWS = SF_ORDERS_MAX + 2, CELL = 96 };
+enum { COLUMNS = 16, CELL = 96 };
 
 typedef struct table {
-  char cell[ROWS][COLUMNS][CELL];
-  int rows, columns, at, left; /* left: columns of text, the first ones */
+  char (*cell)[COLUMNS][CELL];       /* [room] */
+  int room, rows, columns, at, left; /* left: columns of text, the first ones */
 } table;
+
+/* Room for the longest of a report's tables. */
+static bool open_table(table *t, const sf_reproduction *r)
+{
+  const int runs = (r->count + 1) * SF_RUNS;
+  t->room = 2 + SF_PAPER_GROUPS + (runs > SF_ORDERS_MAX ? runs : SF_ORDERS_MAX);
+  t->cell = calloc((size_t)t->room, sizeof *t->cell);
+  return t->cell;
+}
 
 static void begin(table *t)
 {
@@ -21,7 +31,7 @@ static void begin(table *t)
 
 static void row(table *t)
 {
-  if (t->rows < ROWS) t->rows++;
+  t->rows++;
   t->at = 0;
 }
 
@@ -375,9 +385,10 @@ static void print_unfinished(FILE *out, const sf_reproduction *r)
   if (r->problems) fprintf(out, "\n");
 }
 
-void sf_reproduction_print(FILE *out, const sf_reproduction *r)
+sf_status sf_reproduction_print(FILE *out, const sf_reproduction *r)
 {
-  table t;
+  table t = {.rows = 0};
+  if (!open_table(&t, r)) return sf_fail(SF_E_MEMORY, "%s: no memory for the tables", r->dir);
   print_head(out, r);
   if (is_pairs(r)) {
     print_pairs(out, r, &t);
@@ -388,4 +399,6 @@ void sf_reproduction_print(FILE *out, const sf_reproduction *r)
     print_scenes(out, r, &t);
   }
   print_unfinished(out, r);
+  free(t.cell);
+  return sf_ok();
 }
