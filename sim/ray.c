@@ -78,6 +78,8 @@ typedef struct run {
   fx_pixel *pixel;
   int n, sent, at, received;
   uint64_t progress; /* cycle of the last beat */
+  bool waits;        /* a pixel was shown and not taken */
+  uint64_t waiting[6];
 } run;
 
 static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
@@ -117,9 +119,21 @@ static void accept_input(run *r)
   r->sent++;
 }
 
+/* A pixel that is shown stays as it is until it is taken, as AXI4-Stream demands. */
+static sf_status check_stable(run *r)
+{
+  const sf_pins_out *out = &r->dut->out;
+  if (r->waits && (!out->pixel_valid || memcmp(out->pixel_data, r->waiting, sizeof r->waiting)))
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: pixel changed before it was taken at cycle %" PRIu64, r->dut->cycle);
+  r->waits = out->pixel_valid && !r->dut->in.pixel_ready;
+  memcpy(r->waiting, out->pixel_data, sizeof r->waiting);
+  return sf_ok();
+}
+
 static sf_status accept_pixel(run *r)
 {
   const sf_pins_out *out = &r->dut->out;
+  SF_TRY(check_stable(r));
   if (!r->dut->in.pixel_ready || !out->pixel_valid) return sf_ok();
   if (r->received == r->sent + (r->at > 0))
     return sf_fail(SF_E_DIFFERENCE, "accelerator: pixel without a ray at cycle %" PRIu64, r->dut->cycle);

@@ -18,6 +18,9 @@ typedef struct run {
   uint64_t tap_cycle[SF_LAYERS]; /* of the last one */
   uint64_t packet[SF_PACKET_MAX];
   uint64_t progress; /* cycle of the last beat */
+  bool waits;        /* a result was shown and not taken: */
+  uint64_t waiting_data;
+  bool waiting_last;
 } run;
 
 /* A beat that was offered stays until it is taken, as AXI4-Stream demands. */
@@ -42,9 +45,21 @@ static void accept_input(run *r)
   r->sent++;
 }
 
+/* What the accelerator shows stays, too. */
+static sf_status check_stable(run *r)
+{
+  const sf_pins_out *out = &r->dut->out;
+  if (r->waits && (!out->m_valid || out->m_data != r->waiting_data || out->m_last != r->waiting_last))
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: result changed before it was taken at cycle %" PRIu64, r->dut->cycle);
+  r->waits = out->m_valid && !r->dut->in.m_ready;
+  r->waiting_data = out->m_data, r->waiting_last = out->m_last;
+  return sf_ok();
+}
+
 static sf_status accept_output(run *r)
 {
   const sf_pins_out *out = &r->dut->out;
+  SF_TRY(check_stable(r));
   if (!r->dut->in.m_ready || !out->m_valid) return sf_ok();
   if (out->m_last != (r->out_beat == RESULT_BEATS - 1) || r->dut->received == r->sent + (r->beat > 0))
     return sf_fail(SF_E_DIFFERENCE, "accelerator: result stream out of step at cycle %" PRIu64, r->dut->cycle);

@@ -37,7 +37,12 @@ expect 1 1 '"layer":"C2"' '"neuron":37,' '"wire":"membrane"'
 expect 2 1 '"layer":"C2"' '"step":1,' '"neuron":64,' '"wire":"row"' '"expected":1,' '"actual":0,'
 expect 3 1 '"layer":"C1"' '"step":2,' '"wire":"spikes"' '"sample_exact":true'
 [ "$(field 3 actual)" -eq $(($(field 3 expected) + 1)) ] || fail "fault 3: the counter is not one too high"
+expect 7 1 '"wire":"samples"'
+expect 8 1 '"wire":"rays"'
+# A result that is not the one that was shown while it waited.
+expect 9 1
+grep -qE 'result changed before it was taken at cycle [0-9]+' "$work/9.err" || fail "fault 9: $(cat "$work/9.err")"
 # A rounding that truncates is one LSB too low.
 [ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
-[ $failures -eq 0 ] && echo "3 planted faults caught and located, none without a fault"
+[ $failures -eq 0 ] && echo "6 planted faults caught and located, none without a fault"
 exit $((failures > 0))

@@ -1,6 +1,6 @@
 /* The harness's own end of the streams, on an accelerator made up here: tap beats of different layers in any order, and
  * every way of getting them wrong. The functions of sim/pins.h defined here take the place of the Verilated ones. */
-#include "sim/sim.h"
+#include "sim/ray.h"
 #include "spikefield/rng.h"
 #include <check.h>
 #include <stdlib.h>
@@ -12,18 +12,28 @@ typedef struct beat {
   int layer, step, sample;
 } beat;
 
+/* What changes while a result or a pixel waits to be taken. */
+typedef enum { NOTHING, VALID, DATA, LAST } change;
+
 /* Takes all input, then shows the beats, some of them only after the results. */
 struct sf_pins {
   beat tap[BEATS_MAX];
   int taps, shown, late; /* late: beats after the results */
   int input, result, results;
   bool bad_last;
+  change unstable;
+  bool waited;
+  int rays, pixels; /* in, out */
 };
 
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg)
 {
   (void)seed, (void)wave, (void)plusarg;
   return NULL;
+}
+sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg)
+{
+  return sf_pins_open(seed, wave, plusarg);
 }
 void sf_pins_dump(sf_pins *pins)
 {
@@ -49,9 +59,27 @@ static void show_tap(sf_pins *p, sf_pins_out *out)
   for (int i = 0; i < 96; i++) out->tap_membrane[i] = (uint32_t)mark(b, 4);
 }
 
+/* True in the cycle after one in which `ready` was missing, where that makes a difference. */
+static bool changes(sf_pins *p, change what, bool ready)
+{
+  const bool now = p->unstable == what && p->waited;
+  if (p->unstable == what) p->waited = !ready && !now;
+  return now;
+}
+
+static void show_pixel(sf_pins *p, const sf_pins_in *in, sf_pins_out *out)
+{
+  out->pixel_valid = !changes(p, VALID, in->pixel_ready);
+  out->pixel_data[5] = (uint64_t)p->pixels + changes(p, DATA, in->pixel_ready);
+  p->pixels += out->pixel_valid && in->pixel_ready;
+}
+
 void sf_pins_cycle(sf_pins *p, const sf_pins_in *in, sf_pins_out *out)
 {
   memset(out, 0, sizeof *out);
+  out->ray_ready = true;
+  p->rays += in->ray_valid;
+  if (p->pixels < p->rays) show_pixel(p, in, out);
   out->s_ready = true;
   out->arready = out->rvalid = in->arvalid;
   p->input += in->s_valid && in->s_last;
@@ -59,10 +87,10 @@ void sf_pins_cycle(sf_pins *p, const sf_pins_in *in, sf_pins_out *out)
   if (p->shown < p->taps - p->late || (p->shown < p->taps && p->result == p->results)) {
     show_tap(p, out);
   } else if (p->result < p->results) {
-    out->m_valid = true;
-    out->m_last = (p->result & 1) != p->bad_last;
-    out->m_data = (uint64_t)p->result;
-    p->result += in->m_ready;
+    out->m_valid = !changes(p, VALID, in->m_ready);
+    out->m_last = (p->result & 1) != (p->bad_last || changes(p, LAST, in->m_ready));
+    out->m_data = (uint64_t)p->result + changes(p, DATA, in->m_ready);
+    p->result += out->m_valid && in->m_ready;
   }
 }
 
@@ -202,6 +230,33 @@ START_TEST(results_out_of_step)
 }
 END_TEST
 
+/* What was shown and not taken must be there in the next cycle, as it was. */
+START_TEST(a_result_that_does_not_wait)
+{
+  for (change what = VALID; what <= LAST; what++) {
+    begin(6);
+    b.pins.unstable = what;
+    expect("result changed before it was taken at cycle");
+  }
+}
+END_TEST
+
+START_TEST(a_pixel_that_does_not_wait)
+{
+  for (change what = NOTHING; what <= DATA; what++) {
+    sf_ray_request request[SAMPLES];
+    fx_pixel pixel[SAMPLES];
+    begin(7);
+    for (int i = 0; i < SAMPLES; i++) request[i] = (sf_ray_request){.ray = &b.ray};
+    b.pins.unstable = what;
+    sf_ray_dut rays = {.dut = &b.dut};
+    const sf_status status = sf_ray_dut_run(&rays, request, SAMPLES, pixel);
+    ck_assert_int_eq(status.code, what ? SF_E_DIFFERENCE : SF_OK);
+    if (what) ck_assert_ptr_nonnull(strstr(status.message, "pixel changed before it was taken at cycle"));
+  }
+}
+END_TEST
+
 START_TEST(a_result_is_missing)
 {
   begin(5);
@@ -220,6 +275,8 @@ int main(void)
   tcase_add_test(c, a_beat_is_missing);
   tcase_add_test(c, a_beat_too_many);
   tcase_add_test(c, results_out_of_step);
+  tcase_add_test(c, a_result_that_does_not_wait);
+  tcase_add_test(c, a_pixel_that_does_not_wait);
   tcase_add_test(c, a_result_is_missing);
   suite_add_tcase(s, c);
   SRunner *runner = srunner_create(s);
