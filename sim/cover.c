@@ -49,8 +49,8 @@ static void cover_beat(sf_cover *cover, const fx_net *net, const fx_trace *core,
   for (int o = 0; o < n && !rail; o++) rail = at_rail(l, core->membrane[l][t][o]);
   hit(&cover->beat[l][net->mode][t][rail][result->stalled[l][spiking ? t : 0]]);
   if (!spiking) return;
-  const uint64_t *bits = core->spikes[l][t];
-  const int fired = __builtin_popcountll(bits[0]) + __builtin_popcountll(bits[1]);
+  int fired = 0;
+  for (int w = 0; w < SF_SPIKE_WORDS; w++) fired += __builtin_popcountll(core->spikes[l][t][w]);
   if (fired == 0) hit(&cover->silent[l]);
   if (fired == n) hit(&cover->full[l]);
 }

@@ -1,4 +1,5 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
+#include "spikefield/cycles.h"
 #include "spikefield/golden.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
@@ -585,6 +586,15 @@ START_TEST(report_says_that_the_first_ray_differs)
 }
 END_TEST
 
+START_TEST(cycles_of_a_dense_net)
+{
+  fx_net net = {.layer[FX_D1] = {.n_in = 5, .n_out = SF_LANES},
+                .layer[FX_D2] = {.n_in = 1, .n_out = 1}, /* a part of the lanes takes a cycle, too */
+                .layer[FX_C3] = {.n_in = SF_LANES, .n_out = 3}};
+  ck_assert_uint_eq(sf_cycles_dense(&net), 5 + 1 + 3);
+}
+END_TEST
+
 START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
 {
   fx_net net = small_net();
@@ -758,6 +768,7 @@ int main(void)
   tcase_add_test(report, report_json_holds_what_was_counted);
   tcase_add_test(report, report_says_that_counts_differ);
   tcase_add_test(report, report_says_that_the_first_ray_differs);
+  tcase_add_test(report, cycles_of_a_dense_net);
   tcase_add_test(report, saturation_is_expected_only_where_the_formats_allow_it);
   tcase_add_test(report, sha256_of_known_texts);
   tcase_add_test(report, golden_planes_hold_the_pixel);

@@ -205,8 +205,8 @@ static void print_text(const job *j)
   const int most = busiest(t);
   printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, T = %d\n", j->opt.data, j->opt.view, j->rays, t->samples,
          j->scene.net.steps);
-  printf("%" PRIu64 " cycles, %.1f per sample%s\n", t->cycles, ratio(t->cycles, t->samples),
-         fx_net_decodes(&j->scene.net) ? "" : " (a dense ReLU net of the same sizes on these lanes: 210)");
+  printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: %" PRIu64 ")\n",
+         t->cycles, ratio(t->cycles, t->samples), sf_cycles_dense(&j->scene.net));
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
   for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", layer_name[l], 100 * ratio(t->busy[l], t->cycles));
   printf("; the busiest is %s\n", layer_name[most]);

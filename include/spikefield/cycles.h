@@ -36,4 +36,6 @@ void sf_cycle_model_free(sf_cycle_model *model);
 /* From sums alone: what the busiest layer needs for its rows. The model's cycles are about a tenth more, because even
  * and odd neurons do not fire in pairs and the busiest layer changes from sample to sample. */
 uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts);
+/* Of a dense net of the same sizes: every weight of a sample once, SF_LANES a cycle. */
+uint64_t sf_cycles_dense(const fx_net *net);
 #endif

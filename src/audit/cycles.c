@@ -354,3 +354,11 @@ uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts)
   }
   return most;
 }
+
+uint64_t sf_cycles_dense(const fx_net *net)
+{
+  uint64_t cycles = 0;
+  for (int l = 0; l < SF_LAYERS; l++)
+    cycles += ((uint64_t)net->layer[l].n_in * (uint64_t)net->layer[l].n_out + SF_LANES - 1) / SF_LANES;
+  return cycles;
+}

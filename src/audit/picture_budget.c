@@ -121,7 +121,7 @@ static void input(const tracer *t, int l, int step, int i, const double *f, cons
   } else if (h < 0) {
     *x = t->dir[i], *xq = t->ray.dir[i];
   } else {
-    *x = t->trace.current[FX_D2][step][1 + h] / 8.0, *xq = floor(*x);
+    *x = ldexp(t->trace.current[FX_D2][step][1 + h], -SF_H_SHIFT), *xq = floor(*x);
   }
 }
 
@@ -151,7 +151,7 @@ static void count_flips(const tracer *t, const sf_exact_out *out, ray_result *r)
     if (l == FX_D2) continue;
     r->decisions[l] += (uint64_t)net->layer[l].n_out * (uint64_t)net->steps;
     for (int step = 0; step < net->steps; step++)
-      for (int w = 0; w < 2; w++)
+      for (int w = 0; w < SF_SPIKE_WORDS; w++)
         r->flips[l] += (uint64_t)__builtin_popcountll(t->trace.spikes[l][step][w] ^ out->spikes[l][step][w]);
   }
 }
