@@ -3,6 +3,7 @@
 # or the file, no partial output, never a crash.   usage: test_cli.sh BIN_DIR
 set -u
 BIN=$(cd "${1:?usage: test_cli.sh BIN_DIR}" && pwd) || exit 2
+TOOLS=$(cd "$(dirname "$0")/../tools" && pwd) || exit 2
 export LC_ALL=C OMP_NUM_THREADS=2
 WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-cli-XXXXXX") || exit 2
 trap 'rm -rf "$WORK"' EXIT
@@ -100,7 +101,7 @@ good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --vox
 good energy_audit s.snn d --rays 20 --rtl-rays 0 --twin twin.safetensors
 good energy_audit --compare s.snn s.snn d --rays 20 --rtl-rays 0 --steps-b 1 --json
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
-good sf_cosim s.snn d --rays 1 --seed 1
+good sf_cosim s.snn d --rays 1 --seed 1 -q
 good sf_cycles s.snn d --view 1 --clock 100 --json
 if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.exr and x.exr differ"; fi
 for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
@@ -198,7 +199,33 @@ usage --csv energy_audit --compare s.snn s.snn d --csv out
 usage --tech-b energy_audit s.snn d --tech-b 45nm
 usage --steps-b energy_audit s.snn d --steps-b 1
 usage extra energy_audit s.snn d extra
+usage --model energy_audit s.snn d --model model.safetensors
+for bad in "--junit out" "--checkpoint out" "--limit-samples 1" "--jobs 1" "--block 1" "--evidence out"; do
+  # shellcheck disable=SC2086
+  usage "${bad% *}" sf_cosim s.snn d --saif out $bad
+done
+usage --clock sf_cosim s.snn d --clock 100
+usage --dut-top sf_cosim s.snn d --dut-top my_top
+for length in 63 1942; do usage "at most 63 characters" sf_cosim s.snn d --plusarg "+$(printf "%${length}s" '' | tr ' ' x)"; done
+usage SECONDS sf_summary d x
+usage SECONDS sf_summary d nan
+data "no folder SCENE/RUN" sf_report d
+absent d/table.md "sf_report without a run"
 absent out "usage errors"
+
+script() { # PATTERN SCRIPT ARGS...
+  "$TOOLS/$2.sh" "${@:3}" >stdout.txt 2>err
+  status=$?
+  if [ "$status" -eq 2 ] && [ "$(wc -l <err)" -eq 1 ] && grep -qF -e "$1" err; then passed=$((passed + 1))
+  else fail "script: ${*:2}" "exit status $status, not 2 and '$1'"; fi
+}
+script usage: cosim_campaign
+script usage: cosim_campaign --help
+script "'abc' is not a whole number" cosim_campaign out s.snn d abc 1
+script "'1e6' is not a whole number" cosim_campaign out s.snn d 1e6 1
+script usage: chain
+script usage: chain --help
+absent out "usage of scripts"
 
 # ---- data ----
 

@@ -2,6 +2,10 @@
 # The whole chain on one scene: train, export, render, co-simulate, audit, summary.
 # usage: chain.sh BUILD DATA OUT [--minutes M] [--rays N] [--view K] [--train "OPTIONS"]
 set -euo pipefail
+if [ $# -lt 3 ]; then
+  echo 'usage: chain.sh BUILD DATA OUT [--minutes M] [--rays N] [--view K] [--train "OPTIONS"]' >&2
+  exit 2
+fi
 build=$1 data=$2 out=$3
 shift 3
 minutes=10 rays=400 view=0 train=

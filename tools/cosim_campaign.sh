@@ -3,13 +3,18 @@
 # usage: cosim_campaign.sh BUILD SCENE DATA SAMPLES "SEEDS" [STALLS]
 # Interrupted, the same command goes on. A seed that is finished is not run again while program, scene and options are the same.
 set -u
+if [ $# -lt 5 ]; then
+  echo 'usage: cosim_campaign.sh BUILD SCENE DATA SAMPLES "SEEDS" [STALLS]' >&2
+  exit 2
+fi
 build=$1 scene=$2 data=$3 samples=$4 seeds=$5 stalls=${6:-20}
 out=$build/cosim
 jobs=${JOBS:-$(nproc)}
 program=$build/bin/sf_cosim
+case $samples in *[!0-9]*) echo "cosim_campaign: SAMPLES '$samples' is not a whole number" >&2; exit 2 ;; esac
 read -ra seed <<<"$seeds"
-[ ${#seed[@]} -gt 0 ] && [ "$samples" -gt 0 ] || { echo "cosim_campaign: SAMPLES or SEEDS is empty" >&2; exit 2; }
-each=$(((samples + ${#seed[@]} - 1) / ${#seed[@]}))
+[ ${#seed[@]} -gt 0 ] && [ "${samples:-0}" -gt 0 ] || { echo "cosim_campaign: SAMPLES or SEEDS is empty" >&2; exit 2; }
+each=$(((10#$samples + ${#seed[@]} - 1) / ${#seed[@]}))
 mkdir -p "$out" || exit 1
 field() { sed -nE "s/^\t\"$2\":\t([^,]*).*/\1/p" "$1"; }
 

@@ -281,6 +281,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   SF_TRY(status);
   o->audit.scene = positional[0], o->audit.data = positional[1];
   if (o->audit.view >= 0 && o->audit.views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
+  if (o->model && !o->html) return sf_fail(SF_E_USAGE, "--model goes with --html");
   if (o->compare) return parse_comparison(o, positional);
   if (positional[2]) return sf_fail(SF_E_USAGE, "unexpected argument %s; usage: %s", positional[2], cli->usage);
   if (o->tech_b || o->steps_b)

@@ -60,21 +60,9 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
   return status->code == SF_E_DIFFERENCE ? sf_ok() : print_text(l, seconds);
 }
 
-static const char default_evidence[] = "sf_cosim-difference";
-
-/* A run in a folder that cannot be written may still find no difference, unless a place was asked for. */
-static sf_status check_evidence(const options *o)
-{
-  char path[4096];
-  if (o->run.evidence == default_evidence) return sf_ok();
-  snprintf(path, sizeof path, "%s.json", o->run.evidence);
-  return sf_writable(path);
-}
-
 static sf_status simulate(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
-  SF_TRY(check_evidence(o));
   SF_TRY(sf_lockstep_load(l, &o->run));
   sf_dataset_warn(stderr, "sf_cosim", &l->data);
   l->tick = show;
@@ -176,6 +164,35 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
   return report_activity(o, &r);
 }
 
+/* A run in a folder that cannot be written may still find no difference, unless a place was asked for. */
+static sf_status check_evidence(const char *prefix)
+{
+  char path[4096];
+  if (!prefix) return sf_ok();
+  snprintf(path, sizeof path, "%s.json", prefix);
+  return sf_writable(path);
+}
+
+/* Options that would have no effect are refused; those that were not given get their defaults. */
+static sf_status settle(options *o)
+{
+  sf_lockstep_options *r = &o->run;
+  const bool activity = o->activity.saif || o->activity.vcd;
+  if (!activity && (o->window || o->activity.depth || o->activity.clock_mhz))
+    return sf_fail(SF_E_USAGE, "--window, --depth and --clock belong to --saif or --vcd");
+  if (activity && (o->junit || r->checkpoint || r->limit || r->jobs || r->block || r->evidence))
+    return sf_fail(SF_E_USAGE, "--saif and --vcd take no --junit, --checkpoint, --limit-samples, --jobs, --block or "
+                               "--evidence: their samples go through one accelerator");
+  if (o->dut_top && !o->dut) return sf_fail(SF_E_USAGE, "--dut-top belongs to --dut");
+  SF_TRY(check_evidence(r->evidence));
+  if (!r->jobs) r->jobs = 1;
+  if (!r->block) r->block = 256;
+  if (!r->evidence) r->evidence = "sf_cosim-difference";
+  if (!o->activity.clock_mhz) o->activity.clock_mhz = 200;
+  if (!o->dut_top) o->dut_top = "sf_top";
+  return sf_ok();
+}
+
 static sf_status run(options *o, const char *scene, const char *data)
 {
   if (o->replay)
@@ -185,8 +202,6 @@ static sf_status run(options *o, const char *scene, const char *data)
   o->run.data = data;
   o->run.split = split_name[o->split];
   const bool activity = o->activity.saif || o->activity.vcd;
-  if (!activity && (o->window || o->activity.depth))
-    return sf_fail(SF_E_USAGE, "--window and --depth belong to --saif or --vcd");
   if (o->window) SF_TRY(sf_activity_window(o->window, &o->activity));
   sf_lockstep *l = malloc(sizeof *l);
   if (!l) return sf_fail(SF_E_MEMORY, "out of memory");
@@ -198,10 +213,7 @@ static sf_status run(options *o, const char *scene, const char *data)
 
 int main(int argc, char **argv)
 {
-  options o = {
-      .run = {.rays = 200, .seed = 1, .stall_percent = 20, .block = 256, .jobs = 1, .evidence = default_evidence},
-      .dut_top = "sf_top",
-      .activity = {.last = UINT64_MAX, .clock_mhz = 200}};
+  options o = {.run = {.rays = 200, .seed = 1, .stall_percent = 20}, .activity = {.last = UINT64_MAX}};
   sf_lockstep_options *r = &o.run;
   const char *positional[2];
   const sf_option table[] = {
@@ -213,7 +225,7 @@ int main(int argc, char **argv)
        "percent of cycles with a bubble or back-pressure (default 20)"},
       {"--limit-samples", 0, SF_ARG_U64, &r->limit, 0, 0x1p53, NULL, "N", "begin no unit of work after N samples"},
       {"--json", 0, SF_ARG_FLAG, &o.json, 0, 0, NULL, NULL, "print one JSON object"},
-      {"--quiet", 0, SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
       {"--jobs", 0, SF_ARG_INT, &r->jobs, 1, SF_JOBS_MAX, NULL, "N",
        "processes; the result does not depend on it (default 1)"},
       {"--block", 0, SF_ARG_INT, &r->block, 1, 1e9, NULL, "N",
@@ -234,7 +246,7 @@ int main(int argc, char **argv)
        "levels of the hierarchy for --saif and --vcd, the top is 1 (default 0: all)"},
       {"--clock", 0, SF_ARG_DOUBLE, &o.activity.clock_mhz, 0.1, 1e5, NULL, "MHZ", "clock of their times (default 200)"},
       {"--plusarg", 0, SF_ARG_STRING, &r->plusarg, 0, 0, NULL, "ARG",
-       "passed to the simulation, for a fault build: +fault=1"},
+       "passed to the simulation, for a fault build: +fault=1; at most 63 characters"},
       {"--dut", 0, SF_ARG_STRING, &o.dut, 0, 0, NULL, "FILES",
        "Verilog sources of another block with the ports of rtl/sf_top.sv, and options of Verilator (docs/kit.md)"},
       {"--dut-top", 0, SF_ARG_STRING, &o.dut_top, 0, 0, NULL, "NAME", "its module (default sf_top)"},
@@ -253,6 +265,7 @@ int main(int argc, char **argv)
                       .min_positional = 0,
                       .max_positional = 2};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  if (status.code == SF_OK) status = settle(&o);
   if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) status = run(&o, positional[0], positional[1]);

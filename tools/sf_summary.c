@@ -41,7 +41,15 @@ static void explain(const field *f, const char *dir)
          dir, dir, dir);
 }
 
-static sf_status run(const char *dir, const char *seconds)
+static sf_status parse_seconds(const char *text, double *seconds)
+{
+  char *end;
+  *seconds = strtod(text, &end);
+  if (end != text && !*end && *seconds >= 0 && *seconds <= 1e9) return sf_ok();
+  return sf_fail(SF_E_USAGE, "SECONDS is '%.40s', expected a number of 0..1e9", text);
+}
+
+static sf_status run(const char *dir, double seconds)
 {
   field f[FIELDS] = {{"psnr_float", "float.json", "psnr", 0},
                      {"psnr_fixed", "fixed.json", "psnr", 0},
@@ -54,7 +62,7 @@ static sf_status run(const char *dir, const char *seconds)
                      {"energy_ann_fj", "audit.json", "energy_ann_fj", 0},
                      {"energy_saving_percent", "audit.json", "energy_saving_percent", 0},
                      {"psnr_held_out", "train.json", "psnr", 0},
-                     {"seconds", NULL, NULL, atof(seconds)}};
+                     {"seconds", NULL, NULL, seconds}};
   cJSON *json = cJSON_CreateObject();
   sf_status status = json ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: no memory", dir);
   for (int i = 0; i < FIELDS && !status.code; i++) {
@@ -82,6 +90,8 @@ int main(int argc, char **argv)
                       .max_positional = 2};
   const char *argument[2] = {NULL, NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, argument);
-  if (!status.code) status = run(argument[0], argument[1]);
+  double seconds = 0;
+  if (!status.code) status = parse_seconds(argument[1], &seconds);
+  if (!status.code) status = run(argument[0], seconds);
   return sf_cli_finish(&cli, status);
 }
