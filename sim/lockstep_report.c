@@ -30,7 +30,7 @@ static void add_place(const sf_lockstep *l, cJSON *json)
   const sf_difference *d = &where->what;
   const sf_lockstep_pixel p = sf_lockstep_pick(l, where->ray);
   sf_json_add_u64(json, "ray", where->ray);
-  cJSON_AddStringToObject(json, "view", l->data.view[p.view].name);
+  sf_json_add_text(json, "view", l->data.view[p.view].name);
   cJSON_AddNumberToObject(json, "x", p.x);
   cJSON_AddNumberToObject(json, "y", p.y);
   sf_json_add_u64(json, "sample", where->sample);
@@ -49,15 +49,15 @@ static cJSON *difference_json(const sf_lockstep *l, const sf_status *status)
   char path[4096];
   if (status->code != SF_E_DIFFERENCE) return cJSON_CreateNull();
   cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "message", status->message);
+  sf_json_add_text(json, "message", status->message);
   if (!l->place.found) return json;
   add_place(l, json);
   cJSON_AddNumberToObject(json, "replay_samples", l->replay.count);
   cJSON_AddBoolToObject(json, "replay_shows_it", l->replays);
   snprintf(path, sizeof path, "%s.json", l->options.evidence);
-  cJSON_AddStringToObject(json, "replay", path);
+  sf_json_add_text(json, "replay", path);
   snprintf(path, sizeof path, "%s.fst", l->options.evidence);
-  cJSON_AddStringToObject(json, "wave", path);
+  sf_json_add_text(json, "wave", path);
   return json;
 }
 
@@ -117,17 +117,6 @@ void sf_lockstep_print(FILE *out, const sf_lockstep *l, double seconds)
           l->options.jobs, l->options.seed, l->options.stall_percent);
 }
 
-static void put_escaped(FILE *out, const char *text)
-{
-  for (; *text; text++) {
-    const char *entity = *text == '<' ? "&lt;" : *text == '&' ? "&amp;" : *text == '"' ? "&quot;" : NULL;
-    if (entity)
-      fputs(entity, out);
-    else
-      fputc(*text, out);
-  }
-}
-
 sf_status sf_lockstep_junit(const sf_lockstep *l, const sf_status *status, double seconds, const char *path)
 {
   sf_writer writer;
@@ -141,7 +130,7 @@ sf_status sf_lockstep_junit(const sf_lockstep *l, const sf_status *status, doubl
           failed, seconds, l->options.seed, l->sum.samples, l->options.stall_percent, seconds);
   if (failed) {
     fputs("<failure message=\"", writer.file);
-    put_escaped(writer.file, status->message);
+    sf_xml_escape(writer.file, status->message);
     fputs("\"/>", writer.file);
   }
   fputs("</testcase>\n</testsuite>\n", writer.file);

@@ -510,6 +510,34 @@ START_TEST(json_keeps_every_digit)
 }
 END_TEST
 
+/* Each ill-formed byte is one replacement. */
+START_TEST(text_from_outside_becomes_utf8)
+{
+  static const struct {
+    const char *text, *wanted;
+  } rows[] = {{"", ""},
+              {"sc\xff.snn", "sc\xef\xbf\xbd.snn"},
+              {"\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80", "\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80"},
+              {"\xe2\x82", "\xef\xbf\xbd\xef\xbf\xbd"},                 /* cut off */
+              {"\xc0\xaf\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, /* too long a form */
+              {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}, /* half a pair */
+              {"\xf4\x90\x80\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}};
+  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    cJSON *json = cJSON_CreateObject();
+    char *text = NULL;
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    sf_json_add_text(json, "t", rows[i].text);
+    ck_assert_str_eq(at(json, "t")->valuestring, rows[i].wanted);
+    sf_xml_escape(out, rows[i].text);
+    fclose(out);
+    ck_assert_str_eq(text, rows[i].wanted);
+    free(text);
+    cJSON_Delete(json);
+  }
+}
+END_TEST
+
 START_TEST(report_json_holds_what_was_counted)
 {
   fx_net net = small_net();
@@ -765,6 +793,7 @@ int main(void)
   tcase_add_test(report, published_rates);
   tcase_add_test(report, published_residuals);
   tcase_add_test(report, json_keeps_every_digit);
+  tcase_add_test(report, text_from_outside_becomes_utf8);
   tcase_add_test(report, report_json_holds_what_was_counted);
   tcase_add_test(report, report_says_that_counts_differ);
   tcase_add_test(report, report_says_that_the_first_ray_differs);

@@ -145,6 +145,24 @@ START_TEST(every_spike_and_membrane_is_the_nets)
 }
 END_TEST
 
+START_TEST(names_of_views_are_quoted)
+{
+  const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  scene.step_q24 = 500000;
+  sf_traces_report report;
+  char line[LINE];
+  strcpy(view[0].name, "r,\"0");
+  ck_good(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = 0, .rays = RAYS, .seed = 5}, &report));
+  FILE *samples = open_file("samples.csv");
+  next_line(samples, line);
+  next_line(samples, line);
+  ck_assert_msg(strstr(line, ",\"r,\"\"0\",") != NULL, "%s", line);
+  fclose(samples);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(refusals_leave_nothing)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
@@ -166,6 +184,7 @@ int main(void)
   TCase *tcase = tcase_create("traces");
   tcase_add_checked_fixture(tcase, make_data, remove_folder);
   tcase_add_loop_test(tcase, every_spike_and_membrane_is_the_nets, FX_HYBRID, FX_NODECAY + 1);
+  tcase_add_test(tcase, names_of_views_are_quoted);
   tcase_add_test(tcase, refusals_leave_nothing);
   suite_add_tcase(suite, tcase);
   SRunner *runner = srunner_create(suite);

@@ -113,8 +113,8 @@ static sf_status play(const options *o)
 static cJSON *activity_json(const options *o, const sf_activity_report *r)
 {
   cJSON *json = cJSON_CreateObject();
-  if (o->activity.saif) cJSON_AddStringToObject(json, "saif", o->activity.saif);
-  if (o->activity.vcd) cJSON_AddStringToObject(json, "vcd", o->activity.vcd);
+  if (o->activity.saif) sf_json_add_text(json, "saif", o->activity.saif);
+  if (o->activity.vcd) sf_json_add_text(json, "vcd", o->activity.vcd);
   sf_json_add_u64(json, "rays", r->rays);
   sf_json_add_u64(json, "samples", r->samples);
   sf_json_add_u64(json, "differences", 0);

@@ -65,6 +65,11 @@ cJSON *sf_ledger_json(const sf_ledger *ledger);
 
 /* Integers of JSON keep all their digits: cJSON numbers are doubles. */
 void sf_json_add_u64(cJSON *object, const char *key, uint64_t value);
+/* Text from outside, as a path or a view's name: what is no UTF-8 becomes U+FFFD. */
+void sf_json_add_text(cJSON *object, const char *key, const char *text);
+void sf_xml_escape(FILE *out, const char *text); /* of an element or an attribute; control characters become '?' */
+/* A field of CSV, quoted where it has to be (RFC 4180). */
+void sf_csv_text(FILE *out, const char *text);
 
 /* Tables for a person. */
 void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts);

@@ -249,8 +249,8 @@ sf_status sf_audits_compare(const cJSON *a, const char *a_name, const cJSON *b, 
   SF_TRY(open_side(a, a_name, &x));
   SF_TRY(open_side(b, b_name, &y));
   cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "a", a_name);
-  cJSON_AddStringToObject(json, "b", b_name);
+  sf_json_add_text(json, "a", a_name);
+  sf_json_add_text(json, "b", b_name);
   cJSON_AddItemToObject(json, "settings", settings(&x, &y));
   cJSON_AddItemToObject(json, "ledgers", ledger_totals(&x, &y));
   cJSON_AddItemToObject(json, "energies_mj_per_view", energies(&x, &y));

@@ -62,7 +62,7 @@ static void add_rates(cJSON *json, const sf_page *page)
 cJSON *sf_page_json(const sf_page *page)
 {
   cJSON *report = sf_report_json(page->report), *json = cJSON_AddObjectToObject(report, "page");
-  cJSON_AddStringToObject(json, "view", page->view->name);
+  sf_json_add_text(json, "view", page->view->name);
   cJSON_AddNumberToObject(json, "width", page->view->camera.width);
   cJSON_AddNumberToObject(json, "height", page->view->camera.height);
   add_real(json, "psnr_fixed", page->prefix[page->report->net->steps - 1].psnr);
@@ -100,9 +100,9 @@ static void write_lines(FILE *out, const char *const *line)
 static sf_status write_page(FILE *out, const sf_page *page)
 {
   fprintf(out, "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<title>Energy audit: ");
-  html_escape(out, html_base_name(page->report->data));
+  sf_xml_escape(out, html_base_name(page->report->data));
   fprintf(out, ", view ");
-  html_escape(out, page->view->name);
+  sf_xml_escape(out, page->view->name);
   fprintf(out, "</title>\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<style>\n");
   write_lines(out, html_style);
   fprintf(out, "</style>\n</head>\n<body>\n");

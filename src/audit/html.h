@@ -12,7 +12,6 @@ const char *html_short(char text[HTML_NUMBER], double value);
 const char *html_tenths(char text[HTML_NUMBER], double value); /* a real minus sign, one decimal */
 const char *html_percent(char text[HTML_NUMBER], double percent);
 
-void html_escape(FILE *out, const char *text);
 /* <data> elements; key is the JSON path: "counts.layers[0].mac[1]". */
 void html_put_count(FILE *out, const char *key, uint64_t value);
 void html_put_energy(FILE *out, const char *key, uint64_t fj);

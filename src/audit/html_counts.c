@@ -125,7 +125,7 @@ void html_counts(FILE *out, const sf_page *page)
     fprintf(out, ": <b class=\"good\">core = accelerator = recount</b>, difference 0 fJ.</p>\n");
   } else {
     fprintf(out, ": <b class=\"bad\">the counts differ</b>. ");
-    html_escape(out, s->agreement.message);
+    sf_xml_escape(out, s->agreement.message);
     fprintf(out, "</p>\n");
   }
   totals(out, page);
@@ -160,7 +160,7 @@ static void census(FILE *out, const sf_page *page)
   fprintf(out, "</td></tr></tbody></table></div>\n");
   if (sf_saturation_unexpected(page->report->net, c->saturated_samples, list, sizeof list)) {
     fprintf(out, "<p class=\"bad\">Unexpected in ");
-    html_escape(out, list);
+    sf_xml_escape(out, list);
     fprintf(out, ": the number formats rule it out.</p>\n");
   } else if (clipped == 0) {
     fprintf(out, "<p>None saturated.</p>\n");
@@ -176,7 +176,7 @@ static void list(FILE *out, const char *id, const char *title, const char *const
   fprintf(out, "<div><h3>%s</h3>\n<ul id=\"%s\">\n", title, id);
   for (; *text; text++) {
     fprintf(out, "<li>");
-    html_escape(out, *text);
+    sf_xml_escape(out, *text);
     fprintf(out, "</li>\n");
   }
   fprintf(out, "</ul></div>\n");

@@ -126,11 +126,11 @@ void html_head(FILE *out, const sf_page *page)
 {
   const sf_audit_report *r = page->report;
   fprintf(out, "<header>\n<p class=\"kicker\">spikefield energy audit</p>\n<h1>");
-  html_escape(out, html_base_name(r->data));
+  sf_xml_escape(out, html_base_name(r->data));
   fprintf(out, ", view ");
-  html_escape(out, page->view->name);
+  sf_xml_escape(out, page->view->name);
   fprintf(out, "</h1>\n<p class=\"sub\">");
-  html_escape(out, html_base_name(r->scene));
+  sf_xml_escape(out, html_base_name(r->scene));
   fprintf(out, " at %d \xc3\x97 %d pixels, ", page->view->camera.width, page->view->camera.height);
   html_put_count(out, "rays", r->rays);
   fprintf(out, " %s rays audited, one per pixel", r->random_rays ? "random" : "");

@@ -67,7 +67,7 @@ static void saving_bars(FILE *out, const char *id, const char *title, const savi
             "<rect x=\"%.2f\" y=\"%g\" width=\"%.2f\" height=\"16\" class=\"bar %s\" data-key=\"%s\" "
             "data-value=\"%.17g\"><title>",
             saving < 0 ? zero - width : zero, y + 18, width, saving < 0 ? "loss" : "spk", row[i].key, saving);
-    html_escape(out, row[i].title), fprintf(out, ", against "), html_escape(out, row[i].against);
+    sf_xml_escape(out, row[i].title), fprintf(out, ", against "), sf_xml_escape(out, row[i].against);
     fprintf(out, "</title></rect>\n");
     svg_text(out, saving < 0 ? zero - width - 6 : zero + width + 6, y + 31,
              saving < 0 ? "num strong end" : "num strong", "%s", html_percent(text, row[i].saving));
@@ -136,12 +136,12 @@ static void ledger_figure(FILE *out, const sf_page *page, int ledger)
   snprintf(caption, sizeof caption, "%s%s.%s", strncmp(sf_ledger_texts[ledger].meaning, "and ", 4) ? "" : "As before, ",
            sf_ledger_texts[ledger].meaning, l->interpolated[ledger] ? " Some prices are interpolated." : "");
   fprintf(out, "<figure id=\"%s\">\n<figcaption><b>", id);
-  html_escape(out, sf_ledger_texts[ledger].title);
+  sf_xml_escape(out, sf_ledger_texts[ledger].title);
   fprintf(out, "</b>: ");
   snprintf(id, sizeof id, "ledgers.list[%d].saving_percent", ledger);
   html_put_saving(out, id, l->saving[ledger]);
   fprintf(out, ". ");
-  html_escape(out, caption);
+  sf_xml_escape(out, caption);
   fprintf(out, "</figcaption>\n");
   snprintf(id, sizeof id, "svg-ledger-%s", sf_ledger_texts[ledger].key);
   svg_begin(out, id, WIDTH, 98, "Spiking network and twin", "Two bars, divided into what the energy is spent on");
@@ -165,7 +165,7 @@ static void parts_table(FILE *out, const sf_page *page)
     const int g = i % 2 ? sf_ledger_texts[i / 2].baseline : i / 2;
     char key[64];
     fprintf(out, "<tr%s><th>", i % 2 ? "" : " class=\"first\"");
-    html_escape(out, sf_ledger_texts[g].title);
+    sf_xml_escape(out, sf_ledger_texts[g].title);
     fprintf(out, "</th><td class=\"n strong\">");
     snprintf(key, sizeof key, "ledgers.list[%d].total_fj", g);
     html_put_energy_in(out, key, l->total[g], top);

@@ -6,7 +6,7 @@
 static void row(FILE *out, const char *name, const char *value)
 {
   fprintf(out, "<tr><th>%s</th><td><code>", name);
-  html_escape(out, value);
+  sf_xml_escape(out, value);
   fprintf(out, "</code></td></tr>\n");
 }
 
@@ -22,10 +22,10 @@ void html_origin(FILE *out, const sf_page *page)
   const sf_audit_report *r = page->report;
   char text[64];
   fprintf(out, "<section id=\"origin\">\n<h2>To repeat it</h2>\n<pre id=\"command\">");
-  html_escape(out, page->command);
+  sf_xml_escape(out, page->command);
   if (page->model_sha256[0] && !strstr(page->command, "--model ") && !strstr(page->command, "--model=")) {
     fprintf(out, " --model ");
-    html_escape(out, page->model);
+    sf_xml_escape(out, page->model);
   }
   fprintf(out, "</pre>\n<div class=\"scroll\"><table><tbody>\n");
   row(out, "spikefield", SPIKEFIELD_VERSION);

@@ -61,7 +61,7 @@ static void tornado(FILE *out, const sf_page *page, int ledger)
   snprintf(id, sizeof id, "svg-tornado-%s", sf_ledger_texts[ledger].key);
   snprintf(title, sizeof title, "Sensitivity of the %s ledger", sf_ledger_texts[ledger].title);
   fprintf(out, "<div><h3>");
-  html_escape(out, sf_ledger_texts[ledger].title);
+  sf_xml_escape(out, sf_ledger_texts[ledger].title);
   fprintf(out, "</h3>\n");
   svg_begin(out, id, WIDTH, TOP + ROW * n + 4, title,
             "Saving when a price is halved or raised by half, largest change first");
@@ -173,17 +173,17 @@ static void break_even_figure(FILE *out, const sf_page *page)
 static void price_table(FILE *out, const sf_technology *t)
 {
   fprintf(out, "<div><div class=\"scroll\"><table id=\"table-prices\"><caption>Prices: ");
-  html_escape(out, t->title);
+  sf_xml_escape(out, t->title);
   fprintf(out,
           "</caption>\n<thead><tr><th>operation</th><th class=\"n\">price</th><th>source</th></tr></thead>\n<tbody>\n");
   for (int i = 0; i < t->count; i++) {
     fprintf(out, "<tr><th><code>");
-    html_escape(out, t->price[i].key);
+    sf_xml_escape(out, t->price[i].key);
     fprintf(out, "</code></th><td class=\"n\"><data data-key=\"ledgers.technology.prices[%d].fj\" value=\"%llu\">", i,
             (unsigned long long)t->price[i].fj);
-    html_escape(out, t->price[i].text);
+    sf_xml_escape(out, t->price[i].text);
     fprintf(out, "</data></td><td>");
-    html_escape(out, t->price[i].source);
+    sf_xml_escape(out, t->price[i].source);
     fprintf(out, "</td></tr>\n");
   }
   fprintf(

@@ -25,7 +25,7 @@ void svg_text(FILE *out, double x, double y, const char *style, const char *form
   vsnprintf(text, sizeof text, format, args);
   va_end(args);
   fprintf(out, "<text x=\"%.4g\" y=\"%.4g\" class=\"%s\">", x, y, style);
-  html_escape(out, text);
+  sf_xml_escape(out, text);
   fprintf(out, "</text>\n");
 }
 
@@ -41,7 +41,7 @@ void svg_bar(FILE *out, double x, double y, double width, double height, const c
   if (key) fprintf(out, " data-key=\"%s\" data-value=\"%" PRIu64 "\"", key, value);
   if (tip) {
     fprintf(out, "><title>");
-    html_escape(out, tip);
+    sf_xml_escape(out, tip);
     fprintf(out, "</title></rect>\n");
   } else {
     fprintf(out, "/>\n");

@@ -68,27 +68,6 @@ const char *html_tenths(char text[HTML_NUMBER], double value)
   return text;
 }
 
-void html_escape(FILE *out, const char *text)
-{
-  for (; *text; text++) switch (*text) {
-    case '<':
-      fputs("&lt;", out);
-      break;
-    case '>':
-      fputs("&gt;", out);
-      break;
-    case '&':
-      fputs("&amp;", out);
-      break;
-    case '"':
-      fputs("&quot;", out);
-      break;
-    default:
-      /* Other control characters do not exist in XML. */
-      fputc((unsigned char)*text < ' ' && *text != '\n' && *text != '\t' ? '?' : *text, out);
-    }
-}
-
 void html_put_count(FILE *out, const char *key, uint64_t value)
 {
   char text[HTML_NUMBER];
@@ -155,7 +134,7 @@ sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, c
   size_t size;
   SF_TRY(sf_png_encode(pixel, width, height, palette, colours, &data, &size));
   fprintf(out, "<img width=\"%d\" height=\"%d\"%s alt=\"", width, height, width <= 320 ? " class=\"coarse\"" : "");
-  html_escape(out, alt);
+  sf_xml_escape(out, alt);
   fprintf(out, "\" src=\"data:image/png;base64,");
   base64(out, data, size);
   fprintf(out, "\"/>\n");

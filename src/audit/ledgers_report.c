@@ -112,15 +112,15 @@ static void add_number(cJSON *object, const char *key, double value)
 static cJSON *technology_json(const sf_technology *t)
 {
   cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "name", t->name);
-  cJSON_AddStringToObject(json, "title", t->title);
+  sf_json_add_text(json, "name", t->name);
+  sf_json_add_text(json, "title", t->title);
   cJSON *list = cJSON_AddArrayToObject(json, "prices");
   for (int i = 0; i < t->count; i++) {
     cJSON *price = cJSON_CreateObject();
     cJSON_AddStringToObject(price, "key", t->price[i].key);
     sf_json_add_u64(price, "fj", t->price[i].fj);
-    cJSON_AddStringToObject(price, "text", t->price[i].text);
-    cJSON_AddStringToObject(price, "source", t->price[i].source);
+    sf_json_add_text(price, "text", t->price[i].text);
+    sf_json_add_text(price, "source", t->price[i].source);
     cJSON_AddItemToArray(list, price);
   }
   return json;

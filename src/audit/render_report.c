@@ -27,9 +27,9 @@ cJSON *sf_render_report_json(const sf_render_report *r)
   const sf_window *c = &r->crop;
   cJSON *json = cJSON_CreateObject();
   cJSON_AddStringToObject(json, "backend", r->backend);
-  cJSON_AddStringToObject(json, "scene", r->scene);
+  sf_json_add_text(json, "scene", r->scene);
   cJSON_AddStringToObject(json, "scene_sha256", r->sha256);
-  cJSON_AddStringToObject(json, "view", r->view);
+  sf_json_add_text(json, "view", r->view);
   cJSON_AddNumberToObject(json, "t_r", r->net->steps);
   cJSON_AddItemToObject(json, "crop", cJSON_CreateIntArray((const int[4]){c->x, c->y, c->width, c->height}, 4));
   add_number(json, "psnr", r->psnr);
@@ -38,8 +38,8 @@ cJSON *sf_render_report_json(const sf_render_report *r)
   sf_json_add_u64(json, "rays", r->golden->counts.rays);
   if (r->events) add_events(json, r);
   add_number(json, "seconds", r->seconds);
-  cJSON_AddStringToObject(json, "exr", r->exr);
-  if (r->png) cJSON_AddStringToObject(json, "png", r->png);
+  sf_json_add_text(json, "exr", r->exr);
+  if (r->png) sf_json_add_text(json, "png", r->png);
   return json;
 }
 

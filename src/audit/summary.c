@@ -145,9 +145,9 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
 static void add_origin(cJSON *json, const sf_audit_report *r)
 {
   cJSON_AddStringToObject(json, "format", SF_AUDIT_FORMAT);
-  cJSON_AddStringToObject(json, "scene", r->scene);
+  sf_json_add_text(json, "scene", r->scene);
   cJSON_AddStringToObject(json, "scene_sha256", r->sha256);
-  cJSON_AddStringToObject(json, "data", r->data);
+  sf_json_add_text(json, "data", r->data);
   cJSON_AddStringToObject(json, "split", r->split);
   cJSON_AddNumberToObject(json, "t_r", r->net->steps);
   sf_json_add_u64(json, "seed", r->seed);
@@ -175,7 +175,7 @@ static void add_twin(cJSON *json, const sf_audit_report *r)
 {
   if (!r->twin.path) return;
   cJSON *twin = cJSON_AddObjectToObject(json, "twin");
-  cJSON_AddStringToObject(twin, "model", r->twin.path);
+  sf_json_add_text(twin, "model", r->twin.path);
   sf_json_add_u64(twin, "samples", r->twin.samples);
   sf_json_add_u64(twin, "macs_per_sample", r->twin.macs);
   sf_json_add_u64(twin, "fj", r->twin.fj);
@@ -206,7 +206,7 @@ static void add_agreement(cJSON *json, const sf_audit_report *r)
     cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
   else
     cJSON_AddNullToObject(json, "core_equals_rtl_equals_recount");
-  if (!three) cJSON_AddStringToObject(json, "difference", r->three.agreement.message);
+  if (!three) sf_json_add_text(json, "difference", r->three.agreement.message);
 }
 
 cJSON *sf_report_json(const sf_audit_report *r)

@@ -66,8 +66,10 @@ static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16
   tracer *w = user;
   const fx_net *net = &w->scene->net;
   fx_net_next(net, ray->dir, first, f, w->base, out, &w->trace, NULL);
-  fprintf(w->writer[SAMPLES].file, "%" PRIu64 ",%d,%s,%d,%d,%" PRIu64 "\n", w->report->timesteps + 1, w->ray,
-          w->data->view[w->view].name, w->x, w->y, w->sample);
+  FILE *samples = w->writer[SAMPLES].file;
+  fprintf(samples, "%" PRIu64 ",%d,", w->report->timesteps + 1, w->ray);
+  sf_csv_text(samples, w->data->view[w->view].name);
+  fprintf(samples, ",%d,%d,%" PRIu64 "\n", w->x, w->y, w->sample);
   for (int t = 0; t < net->steps; t++) write_step(w, t);
   w->report->rays += w->sample++ == 0;
   w->report->samples++;

@@ -1,5 +1,6 @@
 /* Everything of a reproduction for machines: no path, date or name of this machine. */
 #include "spikefield/report.h"
+#include "spikefield/audit.h"
 #include <math.h>
 
 static const char *const metric_key[SF_METRICS] = {
@@ -16,7 +17,7 @@ static void add_number(cJSON *object, const char *key, double value)
 static void add_text(cJSON *object, const char *key, const char *text)
 {
   if (text)
-    cJSON_AddStringToObject(object, key, text);
+    sf_json_add_text(object, key, text);
   else
     cJSON_AddNullToObject(object, key);
 }
@@ -120,7 +121,7 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
 {
   cJSON *json = cJSON_CreateObject();
   if (!json) return NULL;
-  cJSON_AddStringToObject(json, "profile", r->profile);
+  sf_json_add_text(json, "profile", r->profile);
   cJSON_AddStringToObject(json, "paper",
                           "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields: "
                           "INGP backbone, averages over the eight Synthetic scenes, 800 x 800");
