@@ -453,7 +453,15 @@ timeout --foreground -k 20 --preserve-status -s INT 2 "$BIN/sf_train" "${brief[@
 status=$?
 sed -i '/evaluation: view/d' err # progress lines
 judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
-good sf_train "${brief[@]}" --resume --eval-views 1 --json
+# A checkpoint keeps the options of its run: others are refused, and none are needed.
+for option in "--beta 1e-06" "--seed 2" "--stage2 3" "--minutes 1" "--net ann" "--steps 4" "--theta 0.5" "--no-extra" "--limit 1"; do
+  data "stop.safetensors: its run has ${option%% *}" sf_train views -o stop.safetensors --resume $option
+done
+data "--beta 5e-07, the command line says 1e-06" sf_train "${brief[@]}" --resume --beta 1e-6
+data "other views" sf_train wide -o stop.safetensors --resume
+sed 's/"option.beta":"5e-07"/"option.beta":"5e+07"/' stop.safetensors >edited.file
+data "edited.file: cannot resume: --beta 5e+07" sf_train views -o edited.file --resume
+good sf_train views -o stop.safetensors --resume --stage2 1 --beta 5e-7 --eval-views 1 --json
 if grep -q '"iterations":2,.*"views":1' stdout.txt; then passed=$((passed + 1)); else fail "resumed evaluation" "no summary"; fi
 run sf_train "${brief[@]}" --resume --quiet
 judge "finished: sf_train --resume" sf_train 1 "cannot resume"

@@ -163,6 +163,53 @@ START_TEST(resume_continues_bit_identically)
 }
 END_TEST
 
+/* With other views, another scale or another box a checkpoint is not resumed; one that does not say its views is. */
+START_TEST(a_checkpoint_is_of_its_data)
+{
+  sf_dataset data = load("train");
+  sf_train_options o = small_run();
+  sf_trainer *t = start(&data, &o, NULL);
+  char *text;
+  size_t size;
+  steps(t, 2);
+  const char *const path = in("a.safetensors");
+  cJSON *record = cJSON_CreateObject();
+  cJSON_AddStringToObject(record, "option.beta", "0.5");
+  t->options.record = record;
+  ck_good(sf_trainer_save(t, path, true));
+  sf_trainer_free(t);
+  sf_tensors set;
+  ck_good(sf_tensors_load(&set, path));
+  ck_assert_str_eq(sf_tensors_meta(&set, "option.beta"), "0.5");
+  sf_tensors_free(&set);
+  cJSON_Delete(record);
+  float *const number[] = {&data.view[1].camera.to_world[3], &data.view[0].camera.fx, &data.view[2].brightness,
+                           &data.offset[1]};
+  for (int i = 0; i < 4; i++) {
+    const float before = *number[i];
+    *number[i] += 0.001f;
+    ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "other views");
+    *number[i] = before;
+  }
+  data.count--;
+  ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "other views");
+  data.count++;
+  data.scale *= 1.00001f;
+  ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "'scale'");
+  data.scale /= 1.00001f;
+  o.config.bound = 2;
+  ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "'bound' is 1, here it is 2");
+  o.config.bound = 1;
+  ck_good(sf_read_file(path, 1 << 24, &text, &size));
+  *strstr(text + 8, "train.views") = 'T';
+  ck_good(sf_write_file(path, text, size));
+  free(text);
+  data.view[0].camera.fx += 0.1f;
+  sf_trainer_free(start(&data, &o, path));
+  sf_dataset_free(&data);
+}
+END_TEST
+
 START_TEST(saved_model_loads_and_saves_equal)
 {
   sf_dataset data = load("train");
@@ -406,6 +453,7 @@ int main(void)
   tcase_add_unchecked_fixture(tc, set_up, remove_folder);
   tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
   tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
+  tcase_add_test(tc, a_checkpoint_is_of_its_data);
   tcase_add_test(tc, saved_model_loads_and_saves_equal);
   tcase_add_loop_test(tc, the_lattice_settles, 0, 2);
   tcase_add_loop_test(tc, a_lattice_at_its_limit_settles_as_it_is, 0, 2);

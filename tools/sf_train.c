@@ -2,12 +2,15 @@
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
 #include "spikefield/quant.h"
+#include "spikefield/record.h"
 #include "spikefield/train.h"
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+enum { OPTIONS_MAX = 64 };
 
 typedef struct arguments {
   const char *output, *log, *summary, *fine_tune;
@@ -17,7 +20,15 @@ typedef struct arguments {
   bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
   int argc;
   char **argv;
+  char *before[OPTIONS_MAX]; /* the program's name and what the run to resume was started with */
+  int words;                 /* of it */
+  cJSON *record;
 } arguments;
+
+/* Options that decide nothing of what is learned: a run may be resumed with others. */
+static const char *const apart[] = {"--output", "--threads", "--eval-views", "--psnr-prefixes", "--checkpoint-minutes",
+                                    "--resume", "--log",     "--summary",    "--json",          "--quiet",
+                                    NULL};
 
 static sf_cli make_cli(arguments *a, sf_option *o)
 {
@@ -91,7 +102,8 @@ static sf_cli make_cli(arguments *a, sf_option *o)
        "PSNR at every prefix 1..T over N test views, 0 = off (default 0)"},
       {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M",
        "time between checkpoints (default 2)"},
-      {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL, "continue from the checkpoint at --output"},
+      {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL,
+       "continue from the checkpoint at --output, with the options of its run"},
       {"--log", 0, SF_ARG_PLACE, &a->log, 0, 0, NULL, "FILE",
        "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
       {"--summary", 0, SF_ARG_OUTPUT, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"},
@@ -108,7 +120,7 @@ static sf_cli make_cli(arguments *a, sf_option *o)
                       "understood of it.",
                   .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
-                              "  sf_train lego -o lego.safetensors --stage1 10000 --stage2 30000 --resume\n"
+                              "  sf_train lego -o lego.safetensors --resume\n"
                               "  sf_train lego -o twin.safetensors --net ann --minutes 10\n"
                               "  sf_train lego -o vm.safetensors --backbone tensorf --minutes 30\n"
                               "  sf_train lego -o four.safetensors --fine-tune lego.safetensors --weight-bits 4\n",
@@ -427,15 +439,42 @@ static sf_status finish_options(arguments *a)
   return sf_ok();
 }
 
+/* The command line on top of what the run was started with, if that is known. */
+static sf_status parse(arguments *a, const char **path)
+{
+  sf_option options[OPTIONS_MAX];
+  sf_cli cli = make_cli(a, options);
+  cli.min_positional = 0;
+  SF_TRY(sf_cli_parse(&cli, a->words, a->before, path));
+  cli.min_positional = 1;
+  SF_TRY(sf_cli_parse(&cli, a->argc, a->argv, path));
+  cJSON_Delete(a->record);
+  a->train.record = a->record = sf_record_make(options, apart);
+  return a->record ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the options");
+}
+
+/* The options of the run at --output; other ones on the command line would make another run of it. */
+static sf_status restore(arguments *a, const char **path)
+{
+  sf_tensors set;
+  sf_option options[OPTIONS_MAX];
+  make_cli(a, options);
+  SF_TRY(sf_tensors_load(&set, a->output));
+  sf_status status = sf_record_words(&set, options, apart, a->before, &a->words, OPTIONS_MAX);
+  if (!status.code) status = parse(a, path);
+  if (status.code == SF_E_USAGE) status = sf_fail(SF_E_FORMAT, "%s: cannot resume: %s", a->output, status.message);
+  if (!status.code) status = sf_record_compare(&set, a->record);
+  sf_tensors_free(&set);
+  return status;
+}
+
 /* TensoRF's defaults depend on the data: the options once more, on top of them. */
 static sf_status take_tensorf_defaults(arguments *a, const sf_dataset *data)
 {
   a->train = sf_train_defaults_tensorf(data);
   a->theta = (double)a->train.config.theta[0];
-  sf_option options[64];
-  const sf_cli cli = make_cli(a, options);
-  const char *path[1] = {NULL};
-  SF_TRY(sf_cli_parse(&cli, a->argc, a->argv, path));
+  const char *path[1];
+  SF_TRY(parse(a, path));
   SF_TRY(finish_options(a));
   return sf_config_check(&a->train.config);
 }
@@ -465,6 +504,20 @@ static sf_status run(arguments *a, const char *path)
   return status;
 }
 
+static sf_status start(arguments *a, const char **path)
+{
+  SF_TRY(parse(a, path));
+  if (a->resume) SF_TRY(restore(a, path));
+  if (a->threads) omp_set_num_threads(a->threads);
+  SF_TRY(finish_options(a));
+  sf_cli_catch_signals();
+  set_box(a, NULL);
+  if (a->train.config.backbone == SF_TENSORF) return sf_ok();
+  sf_status status = sf_config_check(&a->train.config);
+  if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
+  return status;
+}
+
 int main(int argc, char **argv)
 {
   arguments a = {.output = "model.safetensors",
@@ -473,20 +526,16 @@ int main(int argc, char **argv)
                  .checkpoint_minutes = 2,
                  .gamma = -1,
                  .argc = argc,
-                 .argv = argv};
+                 .argv = argv,
+                 .before = {argv[0]},
+                 .words = 1};
   a.theta = (double)a.train.config.theta[0];
-  sf_option options[64];
+  sf_option options[OPTIONS_MAX];
   const sf_cli cli = make_cli(&a, options);
   const char *path[1] = {NULL};
-  sf_status status = sf_cli_parse(&cli, argc, argv, path);
-  if (status.code) return sf_cli_finish(&cli, status);
-  if (a.threads) omp_set_num_threads(a.threads);
-  status = finish_options(&a);
-  if (status.code) return sf_cli_finish(&cli, status);
-  sf_cli_catch_signals();
-  set_box(&a, NULL);
-  status = a.train.config.backbone == SF_TENSORF ? sf_ok() : sf_config_check(&a.train.config);
-  if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
+  sf_status status = start(&a, path);
   if (!status.code) status = run(&a, path[0]);
+  for (int i = 1; i < a.words; i++) free(a.before[i]);
+  cJSON_Delete(a.record);
   return sf_cli_finish(&cli, status);
 }

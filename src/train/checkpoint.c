@@ -16,6 +16,27 @@ static void put(cJSON *meta, const char *key, double value)
   cJSON_AddStringToObject(meta, key, text);
 }
 
+/* FNV-1a. */
+static uint64_t mix(uint64_t hash, const void *data, size_t bytes)
+{
+  const unsigned char *byte = data;
+  for (size_t i = 0; i < bytes; i++) hash = (hash ^ byte[i]) * 0x100000001b3;
+  return hash;
+}
+
+/* Of the cameras, of the pictures' sizes and brightness, and of where the scene lies. */
+static void write_views(const sf_dataset *data, char text[17])
+{
+  const float space[] = {data->scale,        data->offset[0],    data->offset[1],   data->offset[2], (float)data->bound,
+                         data->ndc ? 1 : 0, data->ndc_focal[0], data->ndc_focal[1]};
+  uint64_t hash = mix(0xcbf29ce484222325, space, sizeof space);
+  for (int v = 0; v < data->count; v++) {
+    hash = mix(hash, &data->view[v].camera, sizeof data->view[v].camera);
+    hash = mix(hash, &data->view[v].brightness, sizeof data->view[v].brightness);
+  }
+  snprintf(text, 17, "%016llx", (unsigned long long)hash);
+}
+
 /* The trainer's own numbers, one table for both directions. */
 typedef struct state_field {
   const char *key;
@@ -96,6 +117,11 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   put(meta, "beta", t->options.beta);
   put(meta, "seed", (double)t->options.seed);
   if (with_optimiser) {
+    const cJSON *item;
+    char views[17];
+    write_views(t->data, views);
+    cJSON_AddStringToObject(meta, "train.views", views);
+    cJSON_ArrayForEach(item, t->options.record) cJSON_AddStringToObject(meta, item->string, item->valuestring);
     state_field field[STATE_FIELDS + VM_FIELDS];
     const int fields = state_table((sf_trainer *)t, field);
     for (int i = 0; i < fields; i++)
@@ -144,11 +170,22 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
   return sf_ok();
 }
 
+static sf_status check_views(const sf_dataset *data, const sf_tensors *set)
+{
+  char views[17];
+  const char *before = sf_tensors_meta(set, "train.views");
+  write_views(data, views);
+  if (!before || !strcmp(before, views)) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: cannot resume: its run learned from other views than the %d of %s", set->path,
+                 data->count, data->list);
+}
+
 sf_status sf_checkpoint_load(sf_trainer *t, const char *path)
 {
   sf_tensors set;
   SF_TRY(sf_tensors_load(&set, path));
   sf_status status = load_state(t, &set);
+  if (!status.code) status = check_views(t->data, &set);
   if (!status.code && t->averaged) status = sf_average_reserve(t);
   sf_tensor list[TENSORS_MAX];
   const int n = status.code ? 0 : list_tensors(t, true, list);

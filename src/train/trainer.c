@@ -88,15 +88,32 @@ static sf_status copy_model(sf_model *to, const sf_model *from)
   return sf_ok();
 }
 
+/* A checkpoint and what it is resumed with. */
+static sf_status check_resumed(const sf_trainer *t, const char *path)
+{
+  const sf_config *c = &t->model.config, *o = &t->options.config;
+  const float scale = t->data->scale;
+  if (c->backbone != o->backbone)
+    return sf_fail(SF_E_RANGE, "%s: the checkpoint is of the other backbone, %s", path,
+                   c->backbone == SF_TENSORF ? "tensorf" : "ingp");
+  if (!(fabsf(c->scale - scale) <= 1e-6f * scale))
+    return sf_fail(SF_E_RANGE, "%s: metadata 'scale' is %g, the data has %g (see --scale)", path, (double)c->scale,
+                   (double)scale);
+  if (c->backbone == SF_INGP && !sf_tuning(t) && c->bound != o->bound)
+    return sf_fail(SF_E_RANGE, "%s: metadata 'bound' is %d, here it is %d (see --bound)", path, c->bound, o->bound);
+  if (c->backbone == SF_TENSORF && c->tensorf.ndc != t->data->ndc)
+    return sf_fail(SF_E_RANGE, "%s: the checkpoint is %s NDC, the data is %s it", path,
+                   c->tensorf.ndc ? "in" : "without", t->data->ndc ? "in" : "without");
+  return sf_ok();
+}
+
 static sf_status create(sf_trainer *t, const char *resume)
 {
   if (resume)
     SF_TRY(sf_model_load(&t->model, resume));
   else
     SF_TRY(t->options.start ? copy_model(&t->model, t->options.start) : sf_model_create(&t->model, &t->options.config));
-  if (resume && t->model.config.backbone != t->options.config.backbone)
-    return sf_fail(SF_E_RANGE, "%s: the checkpoint is of the other backbone, %s", resume,
-                   t->model.config.backbone == SF_TENSORF ? "tensorf" : "ingp");
+  if (resume) SF_TRY(check_resumed(t, resume));
   if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);
