@@ -61,6 +61,49 @@ START_TEST(instant_ngp_has_the_rays_of_its_poses)
 }
 END_TEST
 
+/* The training file says where the scene lies, in words or by its poses, for the views of the other file, too. */
+START_TEST(splits_in_two_files_have_the_same_coordinates)
+{
+  static const char *const training[] = {"transforms.json", "transforms_train.json", "transforms_train.json"};
+  static const char *const more[] = {"", "\"aabb_scale\":4,", ""};
+  const layout_rig rig = orbit();
+  sf_dataset train, test;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json(training[_i], &rig, more[_i], "images", 3, 2);
+  put_json("transforms_test.json", &rig, "", "images", 0, 5);
+  load(&train, "train"), load(&test, "test");
+  ck_assert_int_eq(train.layout, _i < 2 ? SF_LAYOUT_INGP : SF_LAYOUT_BLENDER);
+  ck_assert_int_eq(test.layout, train.layout);
+  ck_assert(train.count == 7 && train.total == 7 && test.count == 4 && test.total == 4);
+  ck_assert_str_eq(train.view[0].name, "images/p03.png");
+  ck_assert_str_eq(test.view[1].name, "images/p05.png");
+  same_rays(&train, &rig), same_rays(&test, &rig);
+  ck_good(sf_dataset_agree(&train, &test));
+  sf_dataset_free(&train), sf_dataset_free(&test);
+}
+END_TEST
+
+START_TEST(splits_in_other_coordinates_are_refused)
+{
+  const layout_rig rig = row();
+  sf_dataset train, test;
+  put_llff(&rig, 0, 4, 40);
+  put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
+  load(&train, "train"), load(&test, "test");
+  ck_good(sf_dataset_agree(&train, &test));
+  float *const number[] = {&test.scale, &test.offset[2], &test.ndc_near, &test.ndc_focal[1]};
+  for (int i = 0; i < 6; i++) {
+    const sf_dataset before = test;
+    if (i < 4) *number[i] += 1e-3f;
+    if (i == 4) test.bound = 2;
+    if (i == 5) test.world[7] += 1e-9;
+    ck_bad(sf_dataset_agree(&train, &test), SF_E_FORMAT, "poses_bounds.npy", "other coordinates");
+    test = before;
+  }
+  sf_dataset_free(&train), sf_dataset_free(&test);
+}
+END_TEST
+
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
 START_TEST(a_picture_is_found_by_a_long_name)
 {
@@ -341,6 +384,8 @@ static Suite *suite(void)
   tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
   tcase_add_test(t, a_picture_is_no_pipe);
+  tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
+  tcase_add_test(t, splits_in_other_coordinates_are_refused);
   tcase_add_test(t, a_picture_is_found_by_a_long_name);
   tcase_add_test(t, blender_has_the_rays_of_its_poses);
   tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);

@@ -65,6 +65,7 @@ static sf_status load(job *j)
 {
   const sf_dataset_options how = {.downscale = j->downscale, .scale = (float)j->scale, .cameras_only = true};
   for (int s = 0; s < SPLITS; s++) SF_TRY(sf_dataset_load(&j->split[s], j->path, split_name[s], &how));
+  SF_TRY(sf_dataset_agree(&j->split[TRAIN], &j->split[TEST]));
   return join_splits(j);
 }
 

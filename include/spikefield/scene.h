@@ -66,6 +66,8 @@ typedef struct sf_dataset_options {
  * a split missing: a warning, total counts those that are there. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
+/* SF_E_FORMAT unless both splits lie in the same coordinates and box: what one was learned from shows in the other. */
+sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test);
 /* "PROGRAM: warning: ..." for each. */
 void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data);
 

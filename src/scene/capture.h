@@ -29,6 +29,7 @@ typedef struct sf_capture {
   enum { SF_ALL_VIEWS, SF_ALL_BUT_HELD_OUT, SF_ONLY_HELD_OUT } part; /* of the frames, which are the split */
   sf_frame *frame;                                                   /* [count], owned */
   int count;
+  int first;          /* those before are not of the split: they say where the scene lies, and the others do not */
   int shrink;         /* the pictures, once loaded, by a box filter; 0: each to at most SF_LONG_SIDE */
   double (*point)[3]; /* [points] sparse points or NULL, owned */
   int points;
@@ -39,6 +40,11 @@ typedef struct sf_capture {
   int32_t aabb_scale; /* edge of the box over that of the unit cube */
 } sf_capture;
 void sf_capture_free(sf_capture *capture);
+/* The frames, from the first on, that say where the scene lies. */
+static inline int sf_capture_guides(const sf_capture *capture)
+{
+  return capture->first ? capture->first : capture->count;
+}
 
 /* One reader per layout. `split` as in sf_dataset_load; on failure the caller frees what is there. */
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);

@@ -124,6 +124,19 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
   return status;
 }
 
+sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test)
+{
+  if (train->ndc == test->ndc && train->bound == test->bound && train->scale == test->scale &&
+      train->ndc_near == test->ndc_near && !memcmp(train->offset, test->offset, sizeof train->offset) &&
+      !memcmp(train->ndc_focal, test->ndc_focal, sizeof train->ndc_focal) &&
+      !memcmp(train->world, test->world, sizeof train->world))
+    return sf_ok();
+  return sf_fail(SF_E_FORMAT,
+                 "%s: its views lie in other coordinates than those of %s: scale %g and %g, bound %d and %d, %s and %s",
+                 test->list, train->list, (double)test->scale, (double)train->scale, test->bound, train->bound,
+                 test->ndc ? "NDC" : "no NDC", train->ndc ? "NDC" : "none");
+}
+
 void sf_dataset_free(sf_dataset *data)
 {
   for (int i = 0; data->view && i < data->count; i++) sf_image_free(&data->view[i].image);

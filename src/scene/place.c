@@ -54,9 +54,10 @@ static void column(const sf_frame *frame, int k, double out[3])
 
 static void mean_column(const sf_capture *c, int k, double out[3])
 {
+  const int n = sf_capture_guides(c);
   memset(out, 0, 3 * sizeof *out);
-  for (int f = 0; f < c->count; f++)
-    for (int i = 0; i < 3; i++) out[i] += c->frame[f].to_world[4 * i + k] / c->count;
+  for (int f = 0; f < n; f++)
+    for (int i = 0; i < 3; i++) out[i] += c->frame[f].to_world[4 * i + k] / n;
 }
 
 /* Half the width and height of the picture at distance 1. */
@@ -113,11 +114,12 @@ bool sf_forward_facing(const sf_capture *capture)
 /* The point nearest to all optical axes, held to the mean position where they are parallel. */
 static void look_at(const sf_capture *c, double point[3])
 {
-  const double hold = 1e-3 * c->count;
+  const int n = sf_capture_guides(c);
+  const double hold = 1e-3 * n;
   double a[9] = {hold, 0, 0, 0, hold, 0, 0, 0, hold}, b[3];
   mean_column(c, 3, b);
   for (int i = 0; i < 3; i++) b[i] *= hold;
-  for (int f = 0; f < c->count; f++) {
+  for (int f = 0; f < n; f++) {
     double axis[3], at[3];
     column(&c->frame[f], 2, axis);
     column(&c->frame[f], 3, at);
@@ -218,22 +220,23 @@ static int32_t find_bound(const sf_capture *c, double scale, double farthest)
 static sf_status place_orbit(sf_dataset *data, sf_capture *c, const sf_dataset_options *options, const sf_sight *sight)
 {
   move m = stay;
-  double *reach = malloc((size_t)c->count * sizeof *reach), mean = 0, farthest = 0;
-  if (!reach) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", c->list, c->count);
+  const int n = sf_capture_guides(c);
+  double *reach = malloc((size_t)n * sizeof *reach), mean = 0, farthest = 0;
+  if (!reach) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", c->list, n);
   look_at(c, m.centre);
   turn_up(c, m.turn);
   move_all(data, c, &m);
-  for (int f = 0; f < c->count; f++) {
+  for (int f = 0; f < n; f++) {
     double at[3], half[2];
     column(&c->frame[f], 3, at);
     half_view(&c->frame[f].lens, sight, half);
     const double distance = vec_length(at);
-    mean += distance / c->count, farthest = fmax(farthest, distance);
+    mean += distance / n, farthest = fmax(farthest, distance);
     reach[f] = distance * fmin(half[0], half[1]);
   }
-  qsort(reach, (size_t)c->count, sizeof *reach, ascending);
+  qsort(reach, (size_t)n, sizeof *reach, ascending);
   /* An object on nothing fills the box as far as the middle one of its views sees it. */
-  double scale = sight->transparent ? 1 / reach[c->count / 2] : ORBIT / mean;
+  double scale = sight->transparent ? 1 / reach[n / 2] : ORBIT / mean;
   if (!(scale < 1e9) || !(scale > 1e-9)) scale = 1; /* all from one point */
   data->scale = options->scale > 0 ? options->scale : (float)scale;
   data->bound = sight->transparent ? 1 : find_bound(c, (double)data->scale, farthest);
@@ -283,17 +286,18 @@ static bool sees_box(const sf_dataset *data, const sf_frame *frame, const sf_sig
 
 sf_status sf_check_sight(sf_dataset *data, const sf_capture *c, const sf_sight *sight)
 {
+  const int n = c->count - c->first;
   int away = 0, back = 0, first = 0;
   if (data->ndc) return sf_ok();
-  for (int f = 0; f < c->count; f++) back += turns_back(data, &c->frame[f]);
-  const bool inward = 4 * back < c->count; /* cameras about the scene, not amid it: one that turns its back is wrong */
-  for (int f = c->count - 1; f >= 0; f--)
+  for (int f = c->first; f < c->count; f++) back += turns_back(data, &c->frame[f]);
+  const bool inward = 4 * back < n; /* cameras about the scene, not amid it: one that turns its back is wrong */
+  for (int f = c->count - 1; f >= c->first; f--)
     if (!sees_box(data, &c->frame[f], sight) || (inward && turns_back(data, &c->frame[f]))) away++, first = f;
-  if (away == c->count)
+  if (away == n)
     return sf_fail(SF_E_RANGE, "%s: no view looks at the scene: none of %d sees the box [-%d, %d]^3 at scale %g",
-                   c->list, c->count, data->bound, data->bound, (double)data->scale);
+                   c->list, n, data->bound, data->bound, (double)data->scale);
   if (!away) return sf_ok();
-  return sf_warn(data, "%s: %d of %d views do not look at the scene, the first is %s", c->list, away, c->count,
+  return sf_warn(data, "%s: %d of %d views do not look at the scene, the first is %s", c->list, away, n,
                  c->frame[first].file_path);
 }
 

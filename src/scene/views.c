@@ -168,6 +168,7 @@ static sf_status load_chosen(loading *l)
 static bool wanted(const sf_capture *c, int index)
 {
   bool held_out = index % SF_HOLD_OUT == 0;
+  if (index < c->first) return false;
   return c->part == SF_ALL_VIEWS || held_out == (c->part == SF_ONLY_HELD_OUT);
 }
 
