@@ -280,6 +280,11 @@ spoil; both 's/"camera_angle_x":.*,/"camera_angle_x": 0,/'; readers .json bad
 spoil; both 's/"camera_angle_x":.*,/"camera_angle_x": -1e999,/'; readers .json bad
 spoil; both '/camera_angle_x/d'; readers .json bad
 
+# What is evaluated on is looked at before anything is learned.
+spoil; rm bad/test/*.png
+data test/r_0 sf_train bad -o out --stage1 100000000 --levels 2 --log2-hash 8 --threads 1
+absent out.jsonl "bad test views"
+
 # ---- models and scenes ----
 
 models() { # PATTERN FILE

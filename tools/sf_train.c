@@ -315,14 +315,32 @@ static sf_status evaluate_views(const sf_model *model, const sf_dataset *test, c
   return status;
 }
 
+static sf_status load_test(sf_dataset *test, const char *data_path, const sf_dataset_options *how, const arguments *a,
+                           bool cameras_only)
+{
+  sf_dataset_options options = *how;
+  options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
+  options.cameras_only = cameras_only;
+  return sf_dataset_load(test, data_path, "test", &options);
+}
+
+/* The faults of what is evaluated on, before anything is learned. */
+static sf_status check_test(const sf_dataset *data, const char *data_path, const sf_dataset_options *how,
+                            const arguments *a)
+{
+  sf_dataset test;
+  SF_TRY(load_test(&test, data_path, how, a, true));
+  sf_dataset_warn(stderr, "sf_train", &test);
+  const sf_status status = sf_dataset_agree(data, &test);
+  sf_dataset_free(&test);
+  return status;
+}
+
 static sf_status evaluate(const sf_model *model, const char *data_path, const sf_dataset_options *how,
                           const arguments *a, quality *q)
 {
   sf_dataset test;
-  sf_dataset_options options = *how;
-  options.limit = !a->eval_views || a->eval_views > a->prefix_views ? a->eval_views : a->prefix_views;
-  SF_TRY(sf_dataset_load(&test, data_path, "test", &options));
-  sf_dataset_warn(stderr, "sf_train", &test);
+  SF_TRY(load_test(&test, data_path, how, a, false));
   q->layout = sf_layout_names[test.layout];
   sf_status status = evaluate_views(model, &test, a, q);
   sf_dataset_free(&test);
@@ -488,8 +506,9 @@ static sf_status run(arguments *a, const char *path)
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
   sf_dataset_warn(stderr, "sf_train", &data);
   sf_model start = {0};
-  sf_status status = a->train.config.backbone == SF_TENSORF ? take_tensorf_defaults(a, &data) : sf_ok();
-  settle(a, &data);
+  sf_status status = check_test(&data, path, &how, a);
+  if (!status.code && a->train.config.backbone == SF_TENSORF) status = take_tensorf_defaults(a, &data);
+  if (!status.code) settle(a, &data);
   if (!status.code && a->fine_tune && !a->resume) {
     status = load_start(a, data.scale, &start);
     a->train.start = &start;
