@@ -283,6 +283,48 @@ START_TEST(nan_is_found)
 }
 END_TEST
 
+/* Blender scenes have TensoRF's box in their units; others, whose unit may be anything, the box of the data. */
+START_TEST(the_box_is_that_of_the_layout)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  sf_config c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 0);
+  ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
+  data.layout = SF_LAYOUT_COLMAP, data.bound = 2;
+  for (data.scale = 0.01f; data.scale < 200; data.scale *= 100) {
+    c = sf_train_defaults_tensorf(&data).config;
+    ck_assert_float_eq(c.scale, data.scale);
+    for (int a = 0; a < 3; a++) {
+      ck_assert(c.tensorf.box[0][a] == -2 && c.tensorf.box[1][a] == 2);
+      ck_assert_int_eq(c.tensorf.resolution[a], 128);
+    }
+    ck_assert(c.tensorf.near == (float)SF_NEAR && c.tensorf.far > 1e5f);
+    ck_assert_float_eq(c.tensorf.distance_scale, 18.75f);
+    ck_good(sf_config_check(&c));
+  }
+  data.ndc = true;
+  c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 1);
+  ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
+START_TEST(rays_that_all_miss_the_box_are_refused)
+{
+  make_scene(2);
+  sf_dataset data = load("train");
+  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_train_stats stats;
+  o.config.tensorf.near = 100, o.config.tensorf.far = 101;
+  sf_trainer *t = start(&data, &o, NULL);
+  ck_bad(sf_trainer_step(t, &stats), SF_E_RANGE, "iteration 0: none of", "meets the box");
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("tensorf_train");
@@ -295,6 +337,8 @@ int main(void)
   tcase_add_test(tc, threads_do_not_matter);
   tcase_add_test(tc, resume_is_the_same_run);
   tcase_add_test(tc, it_learns);
+  tcase_add_test(tc, the_box_is_that_of_the_layout);
+  tcase_add_test(tc, rays_that_all_miss_the_box_are_refused);
   tcase_add_test(tc, nan_is_found);
   suite_add_tcase(suite, tc);
   SRunner *runner = srunner_create(suite);

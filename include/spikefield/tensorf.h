@@ -65,6 +65,9 @@ extern const int sf_tensorf_axis[3][3];
 /* A Blender scene of `scale` model units per world unit: box +-1.5 world units, 16 and 48 components, encodings 2/2;
  * or, with ndc, a forward-facing scene: 16,4,4 and 48,12,12 components, no encodings, ReLU. */
 struct sf_config sf_tensorf_default(float scale, int ndc);
+/* For a scene in units of its own: the box [-bound, bound]^3 model units, all of it seen from SF_NEAR on, and the
+ * Blender scene's densities in its half edge. */
+void sf_tensorf_bound(struct sf_config *config, int bound);
 sf_status sf_tensorf_check(const sf_tensorf *field);
 /* Grid points per axis of about `voxels` voxels, cubes, in the box. */
 void sf_tensorf_resolution(float box[2][3], double voxels, int32_t resolution[3]);

@@ -27,7 +27,7 @@ typedef struct sf_train_options {
 } sf_train_options;
 
 sf_train_options sf_train_defaults(void);
-/* TensoRF's, by the layout of the data: Blender, or a forward-facing scene in NDC. */
+/* TensoRF's, by the layout of the data: Blender, a forward-facing scene in NDC, or a scene in units of its own. */
 sf_train_options sf_train_defaults_tensorf(const sf_dataset *data);
 
 /* Of the last iteration. */

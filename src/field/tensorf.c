@@ -34,6 +34,16 @@ sf_config sf_tensorf_default(float scale, int ndc)
   return c;
 }
 
+void sf_tensorf_bound(sf_config *c, int bound)
+{
+  sf_tensorf *f = &c->tensorf;
+  for (int i = 0; i < 3; i++) f->box[1][i] = (float)bound, f->box[0][i] = -f->box[1][i];
+  f->distance_scale = 25 * 1.5f / (float)bound;
+  f->near = (float)SF_NEAR;
+  f->far = 1e6f;
+  sf_tensorf_resolution(f->box, 128 * 128 * 128, f->resolution);
+}
+
 static sf_status check(const char *name, double value, double low, double high)
 {
   if (value >= low && value <= high) return sf_ok();

@@ -32,6 +32,7 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
   sf_train_options options = sf_train_defaults();
   const int width = data->count ? data->view[0].camera.width : 800;
   options.config = sf_tensorf_default(data->scale, data->ndc);
+  if (data->layout != SF_LAYOUT_BLENDER && !data->ndc) sf_tensorf_bound(&options.config, data->bound);
   options.lr_grid = 0.02;
   options.lr_net = 1e-3;
   options.beta = data->ndc ? 5e-7 : 2e-6; /* 40 % of energy saved with 150 inputs means two steps */
@@ -318,12 +319,21 @@ static int occupancy_steps(const sf_trainer *t)
   return scaled(t) && trained > 2 ? 2 : trained;
 }
 
+/* While nothing is known to be empty, rays without samples pass by the box. */
+static sf_status check_samples(const sf_trainer *t)
+{
+  if (t->batch.marched || t->occupied < 1) return sf_ok();
+  return sf_fail(SF_E_RANGE, "train: iteration %lld: none of %d rays meets the box of the scene (see --scale)",
+                 (long long)t->iteration, t->batch.rays);
+}
+
 sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
 {
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
   SF_TRY(t->backbone->begin(t, occupancy_steps(t)));
   SF_TRY(t->backbone->draw(t));
+  SF_TRY(check_samples(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
   t->backbone->gradient(t, &plan, &mean, t->firing);
