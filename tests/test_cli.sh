@@ -151,6 +151,15 @@ number sf_train --backbone nerf
 number sf_train --voxels 8 2000 nan
 number sf_train --rays 1 nan
 usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
+data "vm.safetensors: --fine-tune knows" sf_train d -o out --fine-tune vm.safetensors
+for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3; do
+  usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune model.safetensors $option
+done
+for option in --rays --voxels; do usage "$option has no effect on --backbone ingp" sf_train d -o out $option 64; done
+for option in --levels --finest-res --bound; do
+  usage "$option has no effect on --backbone tensorf" sf_train d -o out --backbone tensorf $option 4
+done
+data "cannot open the log for writing: No such file" sf_train d -o out --log absent/x.jsonl
 data ingp sf_train d -o model.safetensors --backbone tensorf --resume
 number sf_train --fixed-steps -1 9 nan
 number sf_train --psnr-prefixes -1 nan

@@ -4,6 +4,7 @@
 #include "spikefield/quant.h"
 #include "spikefield/record.h"
 #include "spikefield/train.h"
+#include <errno.h>
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -387,6 +388,11 @@ static sf_status load_start(const arguments *a, float scale, sf_model *model)
   sf_quant_report report;
   fx_scene scene;
   SF_TRY(sf_model_load(model, a->fine_tune));
+  if (model->config.backbone == SF_TENSORF) {
+    sf_model_free(model);
+    return sf_fail(SF_E_UNSUPPORTED, "%s: --fine-tune knows the hash grid's nets only, the model is of tensorf",
+                   a->fine_tune);
+  }
   sf_status status = sf_quantise_report(&scene, model, a->fine_tune, &how, &report);
   if (!status.code) {
     fx_scene_free(&scene);
@@ -439,6 +445,45 @@ static void settle(arguments *a, const sf_dataset *data)
     printf("equal steps");
   printf(", finest level %d, background %s\n", c->finest_res, name[a->train.background]);
   fflush(stdout);
+}
+
+static bool named(const char *const *list, const char *name)
+{
+  while (*list && strcmp(*list, name) != 0) list++;
+  return *list;
+}
+
+/* Is the option among the command line's words? */
+static bool given(const arguments *a, const sf_option *o)
+{
+  const size_t length = strlen(o->name);
+  for (int i = 1; i < a->argc && strcmp(a->argv[i], "--") != 0; i++) {
+    const char *word = a->argv[i];
+    if (!strncmp(word, o->name, length) && (!word[length] || word[length] == '=')) return true;
+    if (o->letter && word[0] == '-' && word[1] == o->letter) return true;
+  }
+  return false;
+}
+
+/* What only the other backbone has, and what a model to fine-tune has settled. */
+static sf_status check_effect(arguments *a)
+{
+  static const char *const grid[] = {"--levels", "--log2-hash", "--base-res", "--finest-res",
+                                     "--lattice", "--bound", "--dt-gamma", NULL};
+  static const char *const planes[] = {"--rays", "--voxels", NULL};
+  static const char *const settled[] = {"--net",   "--steps",   "--input-mode", "--hidden",
+                                        "--theta", "--occ-res", "--fixed-steps", "--stage1", NULL};
+  const bool tensorf = a->train.config.backbone == SF_TENSORF;
+  sf_option options[OPTIONS_MAX];
+  make_cli(a, options);
+  for (const sf_option *o = options; o->name; o++) {
+    if (!given(a, o)) continue;
+    if (named(tensorf ? grid : planes, o->name))
+      return sf_fail(SF_E_USAGE, "%s has no effect on --backbone %s", o->name, tensorf ? "tensorf" : "ingp");
+    if (a->fine_tune && (named(grid, o->name) || named(settled, o->name)))
+      return sf_fail(SF_E_USAGE, "%s has no effect beside --fine-tune: the model has its own", o->name);
+  }
+  return sf_ok();
 }
 
 /* What follows from the options, once they are parsed. */
@@ -514,7 +559,7 @@ static sf_status run(arguments *a, const char *path)
     a->train.start = &start;
   }
   FILE *log = status.code ? NULL : fopen(a->log, a->resume ? "a" : "w");
-  if (!status.code) status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing", a->log);
+  if (!status.code) status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
   if (log) setvbuf(log, NULL, _IOLBF, 0);
   if (!status.code) status = train_and_report(path, &data, &how, a, log);
   if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
@@ -527,6 +572,7 @@ static sf_status start(arguments *a, const char **path)
 {
   SF_TRY(parse(a, path));
   if (a->resume) SF_TRY(restore(a, path));
+  SF_TRY(check_effect(a));
   if (a->threads) omp_set_num_threads(a->threads);
   SF_TRY(finish_options(a));
   sf_cli_catch_signals();
