@@ -184,30 +184,39 @@ static void warn(sf_progress *progress, const sf_train_stats *s)
     }
 }
 
+/* A disk that is full now may not be later: only what must be saved now has to be. good: one was saved. */
+static sf_status checkpoint(const sf_trainer *trainer, const arguments *a, bool now, sf_progress *progress, bool *good)
+{
+  const sf_status status = sf_trainer_save(trainer, a->output, true);
+  if (!status.code) *good = true;
+  if (now || status.code != SF_E_IO) return status;
+  sf_progress_end(progress);
+  fprintf(stderr, "sf_train: warning: %s: no checkpoint, the run goes on\n", status.message);
+  return sf_ok();
+}
+
 static sf_status loop(sf_trainer *trainer, const arguments *a, FILE *log, sf_train_stats *s)
 {
   sf_progress progress;
   recent r = {0};
-  const double start = sf_seconds();
-  double saved = start;
+  double tried = sf_seconds();
+  bool good = a->resume;
   sf_progress_begin(&progress, a->quiet);
   do {
     const double before = s->seconds;
     sf_status status = sf_trainer_step(trainer, s);
     if (status.code) {
       sf_progress_end(&progress);
-      return a->resume || saved > start
-                 ? sf_fail(status.code, "%s (last good checkpoint: %s)", status.message, a->output)
-                 : status;
+      return good ? sf_fail(status.code, "%s (last good checkpoint: %s)", status.message, a->output) : status;
     }
     smooth(&r, s, s->seconds - before);
     warn(&progress, s);
     if (s->iteration % 16 == 0 || s->stage == 3) log_line(log, s);
     if (sf_progress_due(&progress)) show(&progress, s, &r);
     const bool stop = sf_cli_interrupted() && s->stage != 3;
-    if (s->stage != 3 && (stop || sf_seconds() - saved > 60 * a->checkpoint_minutes)) {
-      SF_TRY(sf_trainer_save(trainer, a->output, true));
-      saved = sf_seconds();
+    if (s->stage != 3 && (stop || sf_seconds() - tried > 60 * a->checkpoint_minutes)) {
+      SF_TRY(checkpoint(trainer, a, stop, &progress, &good));
+      tried = sf_seconds();
     }
     if (stop) {
       sf_progress_end(&progress);
