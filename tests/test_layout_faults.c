@@ -137,6 +137,24 @@ START_TEST(cameras_that_all_look_away_are_refused)
 }
 END_TEST
 
+/* OpenCV's axes, taken for OpenGL's: about the scene, but looking out. A few such views are named one by one. */
+START_TEST(cameras_that_turn_their_backs_are_told)
+{
+  static const int every[] = {1, 3, 8};
+  layout_rig rig = orbit();
+  sf_dataset d;
+  for (int v = 0; v < VIEWS; v += every[_i])
+    for (int i = 0; i < 12; i++)
+      if (i % 4 == 1 || i % 4 == 2) rig.view[v].to_world[i] *= -1;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms.json", &rig, "", "images", 0, 1);
+  load(&d, "train");
+  ck_assert(warned(&d, _i ? "6 of 17" : "17 of 17", "turn their backs") == (_i < 2));
+  ck_assert(warned(&d, "3 of 17", "do not look at the scene") == (_i == 2));
+  sf_dataset_free(&d);
+}
+END_TEST
+
 typedef struct bad_npy {
   const char *descr, *order, *shape;
   int bytes; /* of numbers */
@@ -294,6 +312,7 @@ static Suite *suite(void)
   tcase_add_test(t, the_survey_names_what_looks_wrong);
   tcase_add_test(t, the_plan_shows_every_camera);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);
+  tcase_add_loop_test(t, cameras_that_turn_their_backs_are_told, 0, 3);
   tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
   tcase_add_test(t, positions_without_precision_are_named);
   tcase_add_loop_test(t, truncated_files_are_named, 0, 4);

@@ -296,6 +296,9 @@ sf_status sf_check_sight(sf_dataset *data, const sf_capture *c, const sf_sight *
   if (away == n)
     return sf_fail(SF_E_RANGE, "%s: no view looks at the scene: none of %d sees the box [-%d, %d]^3 at scale %g",
                    c->list, n, data->bound, data->bound, (double)data->scale);
+  if (!inward)
+    SF_TRY(sf_warn(data, "%s: %d of %d cameras turn their backs to the middle of the scene: are the axes OpenCV's?",
+                   c->list, back, n));
   if (!away) return sf_ok();
   return sf_warn(data, "%s: %d of %d views do not look at the scene, the first is %s", c->list, away, n,
                  c->frame[first].file_path);
