@@ -70,7 +70,7 @@ static sf_status render_view(sf_view_set *set, sf_shot *shot)
   return keep(set, shot, &view);
 }
 
-/* The first view tells the scale and the number of views. */
+/* The first view tells the scale, the number of views and whether the window can be inside. */
 static sf_status take_origin(sf_view_set *set, const sf_window *crop)
 {
   const sf_studio *studio = set->studio;
@@ -82,6 +82,7 @@ static sf_status take_origin(sf_view_set *set, const sf_window *crop)
                             .scale = shot.data.scale,
                             .crop = *crop};
   set->manifest.total = shot.data.total;
+  if (status.code == SF_OK) status = place_window(set, &shot);
   sf_shot_free(&shot);
   SF_TRY(status);
   memcpy(o->scene_sha256, studio->scene_sha256, sizeof o->scene_sha256);
@@ -90,21 +91,39 @@ static sf_status take_origin(sf_view_set *set, const sf_window *crop)
   return sf_sha256_file(studio->model_path, o->model_sha256);
 }
 
+static sf_status same_camera(const sf_view_set *set, const sf_manifest_view *view)
+{
+  sf_shot shot;
+  sf_status status = sf_shot_load(set->studio, view->index, &shot);
+  if (status.code == SF_OK) status = sf_manifest_same_camera(view, shot.view->name, &shot.view->camera);
+  sf_shot_free(&shot);
+  if (status.code != SF_E_DIFFERENCE) return status;
+  return sf_fail(status.code, "view[%d]: %s", view->index, status.message);
+}
+
+static sf_status same_set(const sf_view_set *set, const sf_manifest *found)
+{
+  SF_TRY(sf_manifest_same_origin(&found->origin, &set->manifest.origin));
+  if (found->total != set->manifest.total)
+    return sf_fail(SF_E_DIFFERENCE, "views is %d, here it is %d", found->total, set->manifest.total);
+  for (int i = 0; i < found->count; i++) SF_TRY(same_camera(set, &found->view[i]));
+  return sf_ok();
+}
+
 /* Views that are there already are taken over, if they are views of this very set. */
 static sf_status resume(sf_view_set *set)
 {
   if (access(set->manifest_path, F_OK)) return sf_ok();
   sf_manifest found;
   SF_TRY(sf_manifest_load(&found, set->manifest_path));
-  sf_status status = sf_manifest_same_origin(&found.origin, &set->manifest.origin);
-  if (status.code == SF_OK && found.total != set->manifest.total)
-    status = sf_fail(SF_E_DIFFERENCE, "views is %d, here it is %d", found.total, set->manifest.total);
-  if (status.code != SF_OK) {
+  if (found.count == 0) return sf_ok();
+  const sf_status status = same_set(set, &found);
+  if (status.code == SF_OK)
+    set->manifest = found;
+  else
     sf_manifest_free(&found);
-    return sf_fail(status.code, "%s belongs to another set: %s", set->manifest_path, status.message);
-  }
-  set->manifest = found;
-  return sf_ok();
+  if (status.code != SF_E_DIFFERENCE) return status;
+  return sf_fail(status.code, "%s belongs to another set: %s", set->manifest_path, status.message);
 }
 
 static sf_status render_missing(sf_view_set *set, const bool *done)

@@ -18,8 +18,8 @@ typedef struct sf_view_set {
 } sf_view_set;
 
 /* Renders the views that folder/manifest.json does not list or whose picture was changed; makes the folder. The
- * manifest is written after every view, so an interruption loses one view at most. A manifest of another origin is
- * refused: SF_E_DIFFERENCE. crop: width 0 for whole views. */
+ * manifest is written after every view, so an interruption loses one view at most. A manifest of another origin or
+ * with other cameras is refused, SF_E_DIFFERENCE, unless it lists no view. crop: width 0 for whole views. */
 sf_status sf_view_set_render(sf_view_set *set, const sf_window *crop);
 
 /* What became of one view. */

@@ -71,6 +71,10 @@ expect 1 "one/manifest.json belongs to another set: scene_sha256 is" s2.snn d --
 expect 1 "one/manifest.json belongs to another set: t_r is" s1.snn d --all -o one --steps 1
 expect 1 "one/manifest.json belongs to another set: crop is" s1.snn d --all -o one --crop 0,0,4,4
 expect 1 "one/manifest.json belongs to another set: downscale is" s1.snn d --all -o one --downscale 2
+cp -r d turned && sed -i '0,/\[\[\(-*[0-9]\)\(\.[0-9]*\)/s//[[\1.25/' turned/transforms_test.json
+expect 1 "one/manifest.json belongs to another set: view[0]: camera_sha256 is" s1.snn turned --all -o one
+cp -r d named && sed -i 's,test/r_2,test/s_2,' named/transforms_test.json && mv named/test/r_2.png named/test/s_2.png
+expect 1 "one/manifest.json belongs to another set: view[2]: name is test/r_2, here it is test/s_2" s1.snn named --all -o one
 check "a refusal changes nothing" diff -r one two
 
 # Views enough for the signal to come in the middle, whatever the speed.
@@ -124,7 +128,6 @@ check "the cut file is named" grep -q 'its file DIFFERS: spoilt/view_0002.exr' o
 check "other bytes, same planes" grep -q 'note: view_0003.exr is not the file of the manifest' out
 expect 0 "OK: 1 of 4 views" s1.snn d --verify spoilt/manifest.json --view 3
 
-cp -r d turned && sed -i '0,/\[\[\(-*[0-9]\)\(\.[0-9]*\)/s//[[\1.25/' turned/transforms_test.json
 expect 1 "1 of 4 views differ; view test/r_0: camera_sha256 is" s1.snn turned --verify bare/manifest.json
 cp -r d grey && cp d/test/r_0.png grey/test/r_1.png
 expect 0 "note: PSNR" s1.snn grey --verify bare/manifest.json --view 1
@@ -145,6 +148,11 @@ done
 expect 2 "cannot verify" s1.snn d --verify two/manifest.json --backend float
 expect 2 "--view 4 is out of range" s1.snn d --verify two/manifest.json --view 4
 expect 1 "is not inside" s1.snn d --all -o x --crop 8,8,8,8
+check "a window that is refused makes no folder" [ ! -e x ]
+mkdir x && sed -e '/"view":/,$d' -e '/"totals"/,/}/s/:\t[0-9][0-9]*/:\t0/' -e 's/"complete":.*/"complete":\tfalse,/' \
+  -e 's/"\(psnr\|ssim\)":.*/"\1":\tnull,/' -e 's/"crop":.*/"crop":\t[0, 0, 3, 3],/' two/manifest.json >x/manifest.json
+echo '"view": []}' >>x/manifest.json # interrupted in its first view
+expect 0 "4 views rendered" s1.snn d --all -o x --crop 0,0,4,4
 expect 1 "none.json" s1.snn d --verify none.json
 : >plain
 expect 1 "plain" s1.snn d --all -o plain

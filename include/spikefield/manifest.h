@@ -76,9 +76,12 @@ const sf_manifest_view *sf_manifest_find(const sf_manifest *manifest, int index)
 
 /* SF_E_DIFFERENCE names the first field that differs and both values; here: what is being rendered now. */
 sf_status sf_manifest_same_origin(const sf_manifest_origin *wanted, const sf_manifest_origin *here);
+/* Name of the picture and camera: what a view is of, rendered or not. */
+sf_status sf_manifest_same_camera(const sf_manifest_view *wanted, const char *name, const sf_camera *here);
 /* Camera, size, planes, counts; not name, file and quality. *plane: the first plane that differs, or -1. */
 sf_status sf_manifest_same_view(const sf_manifest_view *wanted, const sf_manifest_view *here, int *plane);
 
+void sf_manifest_hash_camera(const sf_camera *camera, char hex[65]); /* camera_sha256 */
 /* Fills size, hashes and counts from a rendered picture. */
 sf_status sf_manifest_describe(sf_manifest_view *view, const fx_net *net, const sf_camera *camera,
                                const sf_golden *golden);

@@ -107,6 +107,14 @@ sf_status sf_manifest_same_origin(const sf_manifest_origin *wanted, const sf_man
   return same_text("crop", a, b);
 }
 
+sf_status sf_manifest_same_camera(const sf_manifest_view *wanted, const char *name, const sf_camera *here)
+{
+  char hash[65];
+  SF_TRY(same_text("name", wanted->name, name));
+  sf_manifest_hash_camera(here, hash);
+  return same_text("camera_sha256", wanted->camera_sha256, hash);
+}
+
 sf_status sf_manifest_same_view(const sf_manifest_view *wanted, const sf_manifest_view *here, int *plane)
 {
   *plane = -1;

@@ -41,7 +41,7 @@ static uint8_t *put_real(uint8_t *to, float value)
   return put(to, bits, 4);
 }
 
-static void hash_camera(const sf_camera *camera, char hex[65])
+void sf_manifest_hash_camera(const sf_camera *camera, char hex[65])
 {
   const float lens[4] = {camera->k1, camera->k2, camera->p1, camera->p2};
   uint8_t bytes[4 * (2 + 4 + 12 + 4)], *to = bytes;
@@ -59,7 +59,7 @@ sf_status sf_manifest_describe(sf_manifest_view *view, const fx_net *net, const 
 {
   view->width = golden->width, view->height = golden->height;
   view->samples = golden->counts.samples, view->rays = golden->counts.rays;
-  hash_camera(camera, view->camera_sha256);
+  sf_manifest_hash_camera(camera, view->camera_sha256);
   if (golden->planes == SF_FLOAT_PLANES) return sf_ok();
   for (int p = 0; p < SF_PLANES; p++)
     if (sf_plane_is_integer((sf_plane)p))
