@@ -1,4 +1,5 @@
 #include "sim/audit_run.h"
+#include "spikefield/quant.h"
 #include "spikefield/rng.h"
 #include "sim/three_counts.h"
 #include <inttypes.h>
@@ -60,7 +61,7 @@ static sf_status load(sf_audit *a)
   if (o->views == 0 && o->view < 0 && o->rays == 0) o->views = 1;
   sf_dataset_options how = {
       .downscale = o->downscale, .scale = (float)o->scale, .limit = o->view >= 0 ? o->view + 1 : o->views};
-  SF_TRY(sf_dataset_load(&a->data, o->data, o->split, &how));
+  SF_TRY(sf_fx_dataset_load(&a->data, &a->scene, o->scene, o->data, o->split, &how));
   if (o->view >= a->data.count || o->views > a->data.count)
     return sf_fail(SF_E_USAGE, "%s %d is out of range: %s has %d %s views", o->view >= 0 ? "--view" : "--views",
                    o->view >= 0 ? o->view : o->views, o->data, a->data.count, o->split);

@@ -1,4 +1,5 @@
 #include "sim/studio.h"
+#include "spikefield/quant.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,7 +48,7 @@ sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot)
   const sf_studio_options *o = &studio->options;
   *shot = (sf_shot){.index = index, .psnr = NAN, .ssim = NAN};
   sf_dataset_options how = {.downscale = o->downscale, .scale = o->scale, .first = index, .limit = 1};
-  SF_TRY(sf_dataset_load(&shot->data, o->data, o->split, &how));
+  SF_TRY(sf_fx_dataset_load(&shot->data, &studio->scene, o->scene, o->data, o->split, &how));
   if (shot->data.count == 0) return sf_ok();
   shot->view = &shot->data.view[0];
   shot->window = (sf_window){0, 0, shot->view->camera.width, shot->view->camera.height};

@@ -13,7 +13,7 @@ typedef struct sf_studio_options {
   const char *model; /* float: NULL = model.safetensors beside the scene */
   int steps;         /* 0 = the scene's t_r */
   int downscale;     /* >= 1 */
-  float scale;       /* model units per world unit, 0 = the layout's */
+  float scale;       /* model units per world unit, 0 = the scene's */
   uint64_t seed;     /* rtl: of the random reset values */
 } sf_studio_options;
 

@@ -107,6 +107,28 @@ if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.e
 for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
   if [ -s $f ]; then passed=$((passed + 1)); else fail "good runs" "$f is missing"; fi
 done
+# Cameras that turn away from the box at the layout's scale and stand in it at the scale that the scene was trained at.
+mkdir away && cp -r d/train d/test away
+for split in train test; do
+  echo '{"camera_angle_x": 0.7, "frames": [{"file_path": "./'$split'/r_0", "transform_matrix":
+    [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 2], [0, 0, 0, 1]]}]}' >away/transforms_$split.json
+done
+good sf_train d -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_export small.safetensors -o small.snn
+good sf_export small.safetensors -o fitted.snn --fit --data away --fit-rays 256 --traces small_traces --rays 4
+good sim_render small.snn away -o out
+good sim_render small.snn away -o out --scale 0.4 --backend float --model small.safetensors
+good energy_audit small.snn away --rays 20 --rtl-rays 0
+good error_budget small.safetensors small.snn away --samples 100 --rays 4
+good sf_cosim small.snn away --rays 20
+good sf_cycles small.snn away
+good sf_export fitted.snn --vectors small_kit --samples 1 --data away
+rm -rf out small_traces small_kit
+data "no view looks at the scene" sim_render s.snn away -o out
+for p in "sim_render -o out" energy_audit "error_budget small.safetensors"; do
+  # shellcheck disable=SC2086
+  data "small.snn: trained at scale 0.4, d is to be read at 0.8; give --scale 0.4" $p small.snn d --scale 0.8
+done
 [ "$failed" -eq 0 ] || echo "note: good runs failed, the rest builds on them"
 
 # ---- usage ----

@@ -92,6 +92,7 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   ck_assert_mem_eq(a->occupancy, b->occupancy, 64);
   ck_assert(a->step_q24 == b->step_q24 && a->max_samples == b->max_samples && a->trans_stop == b->trans_stop);
   ck_assert_mem_eq(a->background, b->background, sizeof a->background);
+  ck_assert(a->model_scale == b->model_scale);
   ck_assert(a->to_box_scale == b->to_box_scale && a->dir_scale == b->dir_scale);
   for (int l = 0; l < FX_LEVELS_MAX; l++) ck_assert(a->feature_scale[l] == b->feature_scale[l]);
   for (int o = 0; o < 3; o++) ck_assert(a->to_box_offset[o] == b->to_box_offset[o]);
@@ -103,7 +104,7 @@ START_TEST(round_trip)
     const fixture_sizes sizes = fixture_random_sizes(seed);
     fx_scene scene = fixture_scene(&sizes, seed), again;
     scene.to_box_scale = 1.0 / 3, scene.dir_scale = 0x1p-11, scene.to_box_offset[1] = -1e6 / 7;
-    scene.background[2] = 12345;
+    scene.background[2] = 12345, scene.model_scale = seed % 2 ? 0.4 : 0;
     save(&scene);
     const sf_status status = fx_scene_load(&again, path);
     ck_assert_msg(status.code == SF_OK, "%s", status.message);
@@ -234,6 +235,10 @@ START_TEST(metadata_is_checked)
       {"dir_scale", "0x1.8p-7", "dir_scale"},
       {"to_box_offset[2]", "inf", "to_box_offset[2]"},
       {"to_box_scale", "one", "to_box_scale"},
+      {"model_scale", "0", "model_scale"},
+      {"model_scale", "-1", "model_scale"},
+      {"model_scale", "inf", "model_scale"},
+      {"model_scale", "1", "checksum"},
   };
   fx_scene scene = small_scene(4);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

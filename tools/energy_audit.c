@@ -259,7 +259,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--split", 0, SF_ARG_STRING, &o->audit.split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the layout's (default 0)"},
+       "model units per world unit, 0 = the scene's (default 0)"},
       {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
       {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
       {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",

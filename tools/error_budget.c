@@ -1,6 +1,7 @@
 /* error_budget: what is lost where, from doubles to the integers of the core. */
 #include "spikefield/budget.h"
 #include "spikefield/cli.h"
+#include "spikefield/quant.h"
 #include <omp.h>
 #include <stdlib.h>
 
@@ -50,7 +51,7 @@ static sf_status measure_picture(budget *b)
   SF_TRY(sf_model_load(&b->model, o->model));
   SF_TRY(fx_scene_load(&b->scene, o->scene));
   SF_TRY(fx_scene_need_grid(&b->scene, o->scene, "error budget of a picture"));
-  SF_TRY(sf_dataset_load(&b->data, o->data, o->split, &how));
+  SF_TRY(sf_fx_dataset_load(&b->data, &b->scene, o->scene, o->data, o->split, &how));
   sf_dataset_warn(stderr, "error_budget", &b->data);
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,
@@ -106,7 +107,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the layout's (default 0)"},
+       "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of the choice of rays (default 1)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},

@@ -187,13 +187,12 @@ static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const optio
   return sf_ok();
 }
 
-/* scale: the model's, which the poses must be in. */
-static sf_status fit_scene(candidates *c, float scale, const options *o, sf_fit_report *report)
+static sf_status fit_scene(candidates *c, const options *o, sf_fit_report *report)
 {
-  const sf_dataset_options how = {.downscale = 1, .scale = scale};
   sf_dataset data;
   sf_fit_rays rays;
-  SF_TRY(sf_dataset_load(&data, o->extra.data, "train", &how));
+  SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], o->output, o->extra.data, "train",
+                            &(sf_dataset_options){.downscale = 1}));
   sf_dataset_warn(stderr, "sf_export", &data);
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   sf_dataset_free(&data);
@@ -211,17 +210,16 @@ static sf_status flushed(void)
 }
 
 static sf_status save_and_report(const fx_scene *scene, const options *o, const sf_quant_report *report,
-                                 const sf_fit_report *fit)
+                                 const sf_fit_report *fit, export_extras *more)
 {
   long long bytes = 0;
-  export_extras more;
   SF_TRY(fx_scene_save(scene, o->output));
   SF_TRY(file_size(o->output, &bytes));
-  SF_TRY(export_extras_write(&more, scene, o->output, &o->extra));
-  if (o->json) SF_TRY(print_json(scene, report, fit, &more, o, bytes));
+  SF_TRY(export_extras_write(more, scene, o->output, &o->extra));
+  if (o->json) SF_TRY(print_json(scene, report, fit, more, o, bytes));
   if (!o->json) print_text(scene, report, o->output, bytes);
   if (!o->json && fit) sf_fit_print(stdout, fit);
-  if (!o->json) export_extras_print(&more, &o->extra);
+  if (!o->json) export_extras_print(more, &o->extra);
   return flushed();
 }
 
@@ -231,7 +229,9 @@ static sf_status export_beside(const char *path, const options *o)
   fx_scene scene;
   export_extras more;
   SF_TRY(fx_scene_load(&scene, path));
-  const sf_status status = export_extras_write(&more, &scene, path, &o->extra);
+  sf_status status = export_extras_open(&more, &scene, path, &o->extra);
+  if (status.code == SF_OK) status = export_extras_write(&more, &scene, path, &o->extra);
+  export_extras_close(&more);
   fx_scene_free(&scene);
   SF_TRY(status);
   if (o->json) {
@@ -273,12 +273,21 @@ static sf_status export_from(const char *path, const options *o)
   return graph_alone && !is_scene(path) ? export_model_nir(path, o) : export_beside(path, o);
 }
 
-static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
+static sf_status fit_and_save(candidates *c, const options *o, export_extras *more)
 {
   sf_fit_report fit;
+  if (o->fit) SF_TRY(fit_scene(c, o, &fit));
+  return save_and_report(&c->scene[0], o, &c->report[0], o->fit ? &fit : NULL, more);
+}
+
+static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
+{
+  export_extras more;
   SF_TRY(quantise_all(model, path, o, c));
-  if (o->fit) SF_TRY(fit_scene(c, model->config.scale, o, &fit));
-  return save_and_report(&c->scene[0], o, &c->report[0], o->fit ? &fit : NULL);
+  sf_status status = export_extras_open(&more, &c->scene[0], path, &o->extra);
+  if (status.code == SF_OK) status = fit_and_save(c, o, &more);
+  export_extras_close(&more);
+  return status;
 }
 
 static sf_status export_scene(const char *path, const options *o)

@@ -5,6 +5,7 @@
 #include "spikefield/cli.h"
 #include "spikefield/golden.h"
 #include "spikefield/io.h"
+#include "spikefield/quant.h"
 #include "sim/studio.h"
 #include <inttypes.h>
 #include <libgen.h>
@@ -72,7 +73,7 @@ static sf_status load(job *j)
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .first = o->view, .limit = 1};
   SF_TRY(fx_scene_load(&j->scene, o->scene));
   SF_TRY(fx_scene_need_grid(&j->scene, o->scene, "firmware rays"));
-  SF_TRY(sf_dataset_load(&j->data, o->data, split_name[o->split], &how));
+  SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, o->scene, o->data, split_name[o->split], &how));
   sf_dataset_warn(stderr, "sf_soc", &j->data);
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->data.total,
@@ -290,7 +291,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--split", 0, SF_ARG_CHOICE, &o->split, 0, 0, "test|train", "NAME", "views to take (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the layout's (default 0)"},
+       "model units per world unit, 0 = the scene's (default 0)"},
       {"--firmware", 0, SF_ARG_STRING, &o->firmware, 0, 0, NULL, "ELF",
        "program to run (default ../firmware/sf_firmware.elf from here)"},
       {"--image", 0, SF_ARG_STRING, &o->image, 0, 0, NULL, "FILE", "memory image to load instead of the tile's own"},

@@ -159,6 +159,7 @@ typedef struct fx_scene {
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
+  double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
   double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
   double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
   double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
@@ -332,7 +333,8 @@ sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char
 /* Zeroed weights, table and occupancy for the sizes already set (which it checks); owner is set. */
 sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 
-/* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). */
+/* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). What is 0 in most scenes
+ * (the biases, log2_bound, growing steps, model_scale) is in the metadata only where it is not 0. */
 sf_status fx_scene_load(fx_scene *scene, const char *path);
 sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size,
                                const char *name); /* a file's contents */

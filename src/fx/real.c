@@ -35,6 +35,9 @@ static const real_field tensorf_reals[TENSORF_REALS] = {
     REAL(tensorf.near, false),      REAL(tensorf.far, true),
 };
 
+/* Not in the file when 0. */
+static const real_field optional = REAL(model_scale, true);
+
 /* Those of the scene's backbone. */
 static int reals_of(const fx_scene *scene)
 {
@@ -52,24 +55,44 @@ static double *field_of(const fx_scene *scene, const real_field *field)
   return (double *)((char *)scene + field->offset);
 }
 
+static sf_status check_real(const fx_scene *scene, const real_field *field, const char *path)
+{
+  const double value = *field_of(scene, field);
+  if (isfinite(value) && (!field->positive || value > 0)) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, field->key, value,
+                 field->positive ? " positive" : "");
+}
+
+static void write_real(cJSON *metadata, const fx_scene *scene, const real_field *field)
+{
+  char text[64];
+  snprintf(text, sizeof text, "%a", *field_of(scene, field));
+  cJSON_AddStringToObject(metadata, field->key, text);
+}
+
 void fx_reals_write(cJSON *metadata, const fx_scene *scene)
 {
-  for (int i = 0; i < reals_of(scene); i++) {
-    char text[64];
-    snprintf(text, sizeof text, "%a", *field_of(scene, real(i)));
-    cJSON_AddStringToObject(metadata, real(i)->key, text);
-  }
+  for (int i = 0; i < reals_of(scene); i++) write_real(metadata, scene, real(i));
+  if (*field_of(scene, &optional) != 0) write_real(metadata, scene, &optional);
+}
+
+static sf_status read_real(const cJSON *metadata, fx_scene *scene, const real_field *field, const char *path)
+{
+  const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(metadata, field->key));
+  char *end = NULL;
+  if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is missing", path, field->key);
+  *field_of(scene, field) = strtod(text, &end);
+  if (end == text || *end)
+    return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is '%.40s', expected a number", path, field->key, text);
+  return sf_ok();
 }
 
 sf_status fx_reals_read(const cJSON *metadata, fx_scene *scene, const char *path)
 {
-  for (int i = 0; i < reals_of(scene); i++) {
-    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(metadata, real(i)->key));
-    char *end = NULL;
-    if (!text) return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is missing", path, real(i)->key);
-    *field_of(scene, real(i)) = strtod(text, &end);
-    if (end == text || *end)
-      return sf_fail(SF_E_FORMAT, "%s: metadata '%s' is '%.40s', expected a number", path, real(i)->key, text);
+  for (int i = 0; i < reals_of(scene); i++) SF_TRY(read_real(metadata, scene, real(i), path));
+  if (cJSON_HasObjectItem(metadata, optional.key)) {
+    SF_TRY(read_real(metadata, scene, &optional, path));
+    SF_TRY(check_real(scene, &optional, path));
   }
   return fx_reals_check(scene, path);
 }
@@ -83,12 +106,8 @@ static bool is_direction_lsb(double value)
 
 sf_status fx_reals_check(const fx_scene *scene, const char *path)
 {
-  for (int i = 0; i < reals_of(scene); i++) {
-    const double value = *field_of(scene, real(i));
-    if (!isfinite(value) || (real(i)->positive && value <= 0))
-      return sf_fail(SF_E_RANGE, "%s: metadata '%s' is %g, expected a finite%s number", path, real(i)->key, value,
-                     real(i)->positive ? " positive" : "");
-  }
+  for (int i = 0; i < reals_of(scene); i++) SF_TRY(check_real(scene, real(i), path));
+  if (*field_of(scene, &optional) != 0) SF_TRY(check_real(scene, &optional, path));
   if (!is_direction_lsb(scene->dir_scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,
                    scene->dir_scale, FX_DIR_FRAC_MAX);

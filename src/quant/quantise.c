@@ -137,6 +137,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
     scene->to_box_offset[o] = 0.5;
   }
   scene->to_box_scale = 0.5 / model->config.bound;
+  scene->model_scale = (double)model->config.scale;
   if (scene->backbone == FX_TENSORF) sf_tensorf_set_scalars(scene, model);
 }
 

@@ -5,16 +5,12 @@ enum { VECTOR_RAYS = 1000, TRACE_RAYS = 20 };
 
 /* ---- --vectors ---- */
 
-static sf_status write_vectors(const fx_scene *scene, const char *path, const export_options *o, sf_kit_report *kit)
+static sf_status write_vectors(const fx_scene *scene, const char *path, const sf_dataset *data,
+                               const export_options *o, sf_kit_report *kit)
 {
   const sf_kit_options how = {
       .scene_path = path, .seed = o->seed, .rays = o->rays ? o->rays : VECTOR_RAYS, .samples = o->samples};
-  sf_dataset data;
-  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
-  sf_status status = data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
-  if (status.code == SF_OK) status = sf_kit_write(o->vectors, scene, &data, &how, kit);
-  sf_dataset_free(&data);
-  return status;
+  return sf_kit_write(o->vectors, scene, data, &how, kit);
 }
 
 static void print_vectors(const sf_kit_report *kit, const char *folder)
@@ -37,17 +33,13 @@ static cJSON *vectors_json(const sf_kit_report *kit, const char *folder)
   return json;
 }
 
-/* ---- --traces, --nir ---- */
+/* ---- --traces ---- */
 
-static sf_status write_traces(const fx_scene *scene, const export_options *o, sf_traces_report *traces)
+static sf_status write_traces(const fx_scene *scene, const sf_dataset *data, const export_options *o,
+                              sf_traces_report *traces)
 {
   const sf_traces_options how = {.view = o->view, .rays = o->rays ? o->rays : TRACE_RAYS, .seed = o->seed};
-  sf_dataset data;
-  SF_TRY(sf_dataset_load(&data, o->data, "test", &(sf_dataset_options){.downscale = 1}));
-  const sf_status status = data.count ? sf_traces_write(o->traces, scene, &data, &how, traces)
-                                      : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
-  sf_dataset_free(&data);
-  return status;
+  return sf_traces_write(o->traces, scene, data, &how, traces);
 }
 
 static cJSON *traces_json(const sf_traces_report *traces, const char *folder)
@@ -61,10 +53,26 @@ static cJSON *traces_json(const sf_traces_report *traces, const char *folder)
   return json;
 }
 
+/* ---- all of them ---- */
+
+sf_status export_extras_open(export_extras *e, const fx_scene *scene, const char *path, const export_options *o)
+{
+  const sf_dataset_options how = {.downscale = 1, .cameras_only = true};
+  *e = (export_extras){0};
+  if (!o->vectors && !o->traces) return sf_ok();
+  SF_TRY(sf_fx_dataset_load(&e->data, scene, path, o->data, "test", &how));
+  return e->data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
+}
+
+void export_extras_close(export_extras *e)
+{
+  sf_dataset_free(&e->data);
+}
+
 sf_status export_extras_write(export_extras *e, const fx_scene *scene, const char *path, const export_options *o)
 {
-  if (o->vectors) SF_TRY(write_vectors(scene, path, o, &e->kit));
-  if (o->traces) SF_TRY(write_traces(scene, o, &e->traces));
+  if (o->vectors) SF_TRY(write_vectors(scene, path, &e->data, o, &e->kit));
+  if (o->traces) SF_TRY(write_traces(scene, &e->data, o, &e->traces));
   return o->nir ? sf_nir_write_scene(o->nir, scene) : sf_ok();
 }
 

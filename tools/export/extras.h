@@ -3,6 +3,7 @@
 #define SPIKEFIELD_TOOLS_EXPORT_EXTRAS_H
 #include "sim/kit/kit.h"
 #include "spikefield/exchange.h"
+#include "spikefield/quant.h"
 #include <cjson/cJSON.h>
 
 typedef struct export_options {
@@ -13,11 +14,16 @@ typedef struct export_options {
 } export_options;
 
 typedef struct export_extras {
+  sf_dataset data; /* the test views, without pictures */
   sf_kit_report kit;
   sf_traces_report traces;
 } export_extras;
 
-/* scene_path: for the vectors' record. */
+/* Reads what is to be read, so that a fault of it is known before anything is written. scene_path: for messages and the
+ * vectors' record. Close it even after a failure. */
+sf_status export_extras_open(export_extras *extras, const fx_scene *scene, const char *scene_path,
+                             const export_options *options);
+void export_extras_close(export_extras *extras);
 sf_status export_extras_write(export_extras *extras, const fx_scene *scene, const char *scene_path,
                               const export_options *options);
 void export_extras_print(const export_extras *extras, const export_options *options);
