@@ -129,6 +129,8 @@ for p in "sim_render -o out" energy_audit "error_budget small.safetensors"; do
   # shellcheck disable=SC2086
   data "small.snn: trained at scale 0.4, d is to be read at 0.8; give --scale 0.4" $p small.snn d --scale 0.8
 done
+good sf_export tuned.safetensors -o fitted.snn --fit --data d --fit-rays 256 --fit-loss 100 --json
+if grep -q '"weight_bits":.*4,' stdout.txt; then passed=$((passed + 1)); else fail "--fit" "not the weights that the model was tuned for"; fi
 [ "$failed" -eq 0 ] || echo "note: good runs failed, the rest builds on them"
 
 # ---- usage ----

@@ -149,12 +149,14 @@ static sf_status quantise(const sf_model *model, const char *path, const options
   return sf_ok();
 }
 
-/* The widths that were asked for; when none were and the scene is to be fitted, narrower ones too. */
+/* The widths that were asked for or that the model was fine-tuned for; when there are none and the scene is to be
+ * fitted, narrower ones too. */
 static sf_status quantise_all(const sf_model *model, const char *path, const options *o, candidates *c)
 {
   const sf_quant_widths *w = &o->widths;
   SF_TRY(quantise(model, path, o, w, c));
-  const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits;
+  const bool asked =
+      w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
   for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++)
     SF_TRY(quantise(model, path, o, &narrower[i - 1], c));
   return sf_ok();
