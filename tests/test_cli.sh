@@ -91,6 +91,9 @@ good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-ra
 good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
+# Threads that the address space has no room for are not asked for.
+(ulimit -v 4000000 && OMP_STACKSIZE=16m "$BIN/sim_render" s.snn d --threads 1024 -o t.exr -q >stdout.txt 2>err)
+if cmp -s t.exr g.exr; then passed=$((passed + 1)); else fail "sim_render --threads 1024" "no picture"; fi
 good sim_render s.snn d -o r.exr --backend rtl --crop 7,7,2,2 --view 1
 good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv

@@ -92,6 +92,29 @@ START_TEST(one_scene_serves_many_threads)
 }
 END_TEST
 
+static bool count_team(void *user, uint64_t done, uint64_t total)
+{
+  (void)done, (void)total;
+  *(int *)user = omp_get_num_threads();
+  return true;
+}
+
+START_TEST(no_thread_without_work_is_started)
+{
+  static spikefield_pixel frame[HEIGHT * WIDTH];
+  const spikefield_camera camera = make_camera();
+  const float up[3] = {0, 0, 1};
+  int team = 0;
+  const spikefield_options options = {.threads = 1024, .progress = count_team, .user = &team};
+  lib_good(spikefield_frame(scene, &options, &camera, frame, NULL));
+  ck_assert_int_ge(team, 1);
+  ck_assert_int_le(team, omp_get_num_procs());
+  ck_assert_int_le(team, 3); /* blocks of 256 rays */
+  lib_good(spikefield_rays(scene, &options, up, up, 1, frame, NULL));
+  ck_assert_int_eq(team, 1);
+}
+END_TEST
+
 typedef struct watcher {
   uint64_t calls, last, stop_at;
 } watcher;
@@ -204,6 +227,7 @@ int main(void)
   tcase_add_test(cases, frames_are_those_of_the_core);
   tcase_add_test(cases, threads_change_no_bit);
   tcase_add_test(cases, one_scene_serves_many_threads);
+  tcase_add_test(cases, no_thread_without_work_is_started);
   tcase_add_test(cases, progress_is_told_and_can_stop);
   tcase_add_test(cases, the_first_bad_ray_is_named);
   tcase_add_test(cases, distance_is_that_of_the_golden_image);

@@ -300,7 +300,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "rtl: random reset values (default 1)"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default, and most: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
@@ -311,6 +311,14 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   SF_TRY(status);
   o->scene = positional[0], o->data = positional[1];
   return check_modes(o);
+}
+
+/* 0: as many as there are. More than the processors would have nothing to do, and one that the system refuses would end
+ * the program. */
+static void set_threads(int threads)
+{
+  const int most = omp_get_num_procs();
+  if (threads) omp_set_num_threads(threads < most ? threads : most);
 }
 
 int main(int argc, char **argv)
@@ -338,7 +346,7 @@ int main(int argc, char **argv)
   sf_status status = parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK && j->opt.crop) status = sf_window_parse(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
-    if (j->opt.threads) omp_set_num_threads(j->opt.threads);
+    set_threads(j->opt.threads);
     sf_cli_catch_signals();
     status = work(j);
   }

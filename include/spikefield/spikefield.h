@@ -117,7 +117,8 @@ SPIKEFIELD_API spikefield_status spikefield_scene_describe(const spikefield_scen
 /* NULL wherever options are taken, or all zero: the defaults. */
 typedef struct spikefield_options {
   int32_t steps;   /* time steps, 1..8; 0: the scene's */
-  int32_t threads; /* of spikefield_rays and _frame, 1..1024; 0: all of the machine (OMP_NUM_THREADS) */
+  int32_t threads; /* of spikefield_rays and _frame, 1..1024; 0: all of the machine (OMP_NUM_THREADS). No more than its
+                      processors, or than one for 256 rays, are started */
   /* Now and then, from one thread at a time, with rays done and rays in all; false stops: SPIKEFIELD_E_STOPPED. */
   bool (*progress)(void *user, uint64_t done, uint64_t total);
   void *user;

@@ -86,13 +86,21 @@ static void run_block(job *j, uint64_t block)
   finish_block(j, block, n, &status, &events);
 }
 
+/* A thread that the system refuses would end the program, and more than these have nothing to do. */
+static int threads_of_use(const job *j)
+{
+  int threads = j->threads;
+  if (threads > omp_get_num_procs()) threads = omp_get_num_procs();
+  return (uint64_t)threads > j->blocks ? (int)j->blocks : threads;
+}
+
 static sf_status run(job *j, spikefield_counts *counts)
 {
   j->blocks = j->rays / BLOCK + (j->rays % BLOCK > 0);
   j->failed_block = UINT64_MAX, j->failed = sf_ok();
   if (j->rays >= FEW) SF_TRY(fx_core_open(&j->core, &j->view, NULL));
   omp_init_lock(&j->lock);
-#pragma omp parallel for schedule(dynamic) num_threads(j->threads)
+#pragma omp parallel for schedule(dynamic) num_threads(threads_of_use(j))
   for (uint64_t block = 0; block < j->blocks; block++) run_block(j, block);
   omp_destroy_lock(&j->lock);
   fx_core_close(j->core);
