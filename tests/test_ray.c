@@ -121,11 +121,16 @@ START_TEST(rays_far_away_and_refused)
 {
   const fx_scene scene = box_scene(1024);
   fx_ray ray;
-  for (int e = 0; e < 38; e++) {
-    const float o[3] = {powf(10, (float)e), 0, 0}, d[3] = {-1, 0, 0};
-    const fx_ray far = make_ray(&scene, o, d);
-    if (e < 5) ck_assert_int_ge(far.count, 500);
-    ck_assert_int_ge(far.first_q16, 0);
+  const double step = ldexp(scene.step_q24, -24) / scene.to_box_scale; /* 32768 of them are 110.85 */
+  for (int e = 0; e < 120; e++) {
+    const float o[3] = {1 + powf(2, (float)e), 0, 0}, d[3] = {-1, 0, 0}, aside[3] = {0, 1, 0};
+    ck_assert_int_eq(make_ray(&scene, o, aside).count, 0);
+    const sf_status status = sf_fx_ray_make(&scene, o, d, &ray);
+    ck_assert_msg(status.code == (e < 7 ? SF_OK : e < 50 ? SF_E_RANGE : status.code), "2^%d: %s", e, status.message);
+    if (e == 7) ck_assert_msg(strstr(status.message, "128.002 model units away, 37837.6") != NULL, "%s", status.message);
+    if (status.code != SF_OK || e >= 50) continue;
+    ck_assert_int_ge(ray.count, 500);
+    ck_assert_double_eq_tol(ray.first_q16 / 65536.0, (o[0] - 1) / step + 0.5, 1e-4);
   }
   const float bad[] = {NAN, INFINITY, -INFINITY};
   for (int i = 0; i < 3; i++)

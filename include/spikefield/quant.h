@@ -106,7 +106,7 @@ int64_t sf_grid_zero_unread(fx_scene *scene);
 sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char *name, const char *dir,
                              const char *split, const sf_dataset_options *options);
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
- * is refused. */
+ * is refused, and a ray whose first point is 32768 lattice steps away or farther: no first_q16 could tell. */
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray);
 /* dir_scale as the shift that fx_sh takes: 2^-frac. */
 int sf_fx_dir_frac(const fx_scene *scene);

@@ -43,18 +43,19 @@ static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
 }
 
 /* Rounding may leave an end of the lattice just outside; the box is convex, so only ends can be. Where steps grow the
- * first point is moved in, by 2^-40: the table begins with it. */
-static void trim(const fx_scene *scene, fx_ray *ray)
+ * first point is moved in, by 2^-40: the table begins with it. Returns how many points went in front. */
+static int32_t trim(const fx_scene *scene, fx_ray *ray)
 {
+  int32_t gone = 0;
   const int64_t last = ((int64_t)1 << FX_RAY_FRAC) - 1;
   for (int axis = 0; axis < 3 && scene->steps; axis++)
     ray->origin[axis] = ray->origin[axis] < 0 ? 0 : ray->origin[axis] > last ? last : ray->origin[axis];
   while (ray->count > 0 && !inside(scene, ray, 0)) {
     for (int axis = 0; axis < 3; axis++) ray->origin[axis] += ray->step[axis];
-    ray->count--;
-    if (ray->first_q16 <= INT32_MAX - 65536) ray->first_q16 += 65536;
+    ray->count--, gone++;
   }
   while (ray->count > 0 && !inside(scene, ray, ray->count - 1)) ray->count--;
+  return gone;
 }
 
 /* Length of interval n in lattice steps. */
@@ -75,21 +76,30 @@ static double intervals_within(const fx_scene *scene, double depth)
   return n;
 }
 
-static void set_lattice(const fx_scene *scene, fx_ray *ray, const double o[3], const double d[3], double step,
-                        interval hit)
+static sf_status too_far(double first, double step)
+{
+  return sf_fail(SF_E_RANGE, "ray: its first point is %g model units away, %.6g lattice steps: expected at most %d", first,
+                 first / step, INT32_MAX >> 16);
+}
+
+static sf_status set_lattice(const fx_scene *scene, fx_ray *ray, const double o[3], const double d[3], double step,
+                             interval hit)
 {
   const double first = hit.enter + step * length_of(scene, 0) / 2;
   const double count = intervals_within(scene, (hit.leave - hit.enter) / step);
-  if (!(count >= 1)) return;
+  if (!(count >= 1)) return sf_ok();
   for (int axis = 0; axis < 3; axis++) {
     const double p = o[axis] + d[axis] * first;
-    if (!(p > -1 && p < 2)) return; /* so far away that the distance has no precision left */
+    if (!(p > -1 && p < 2)) return too_far(first, step); /* the distance has no precision left */
     ray->origin[axis] = llrint(ldexp(p, FX_RAY_FRAC));
     ray->step[axis] = llrint(ldexp(d[axis] * step, FX_RAY_FRAC));
   }
   ray->count = (int32_t)count;
-  ray->first_q16 = (int32_t)fmin(nearbyint(first / step * 65536), INT32_MAX);
-  trim(scene, ray);
+  const double first_q16 = nearbyint(first / step * 65536) + 65536.0 * trim(scene, ray);
+  if (ray->count == 0) return sf_ok();
+  if (first_q16 > INT32_MAX) return too_far(first, step);
+  ray->first_q16 = (int32_t)first_q16;
+  return sf_ok();
 }
 
 int sf_fx_dir_frac(const fx_scene *scene)
@@ -121,8 +131,8 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
     d[axis] = unit[axis] * scene->to_box_scale * stretch(scene, axis);
   }
   set_direction(ray, unit, sf_fx_dir_frac(scene));
-  set_lattice(scene, ray, o, d, ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale, clip_to_box(scene, o, d));
-  return sf_ok();
+  const double step = ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale;
+  return set_lattice(scene, ray, o, d, step, clip_to_box(scene, o, d));
 }
 
 /* As the points of a ray: the nearest Q40, cut to Q24. */
