@@ -87,9 +87,9 @@ wait $parent
 for child in $children; do alive "$child" && fail "interrupted: process $child is still there"; done
 grep -q '"complete":[[:space:]]*false' stopped.json || fail "interrupted: no partial totals"
 grep -q 'samples equal; the same command goes on from part' stopped.err || fail "interrupted: $(cat stopped.err)"
-done=$(sed -nE 's/.*stopped after ([0-9]+) of.*/\1/p' stopped.err)
+done=$(sed -nE 's/.*stopped after .* rays, ([0-9]+) samples equal.*/\1/p' stopped.err)
 [ "${done:-0}" -gt 0 ] || fail "interrupted: nothing was done"
-limit=$((20 * done + 300))
+limit=$((done + 3000)) # beyond what is finished
 cosim part 0 --rays 100000 --block 2 --jobs 2 --limit-samples $limit --checkpoint part
 cosim whole 0 --rays 100000 --block 2 --jobs 3 --limit-samples $limit
 cmp -s part.json whole.json || fail "an interrupted run that was continued differs"

@@ -55,7 +55,7 @@ make_wide() {
     VERILATED_OBJ="$(printf "$build/verilated/runtime/%s.o " verilated verilated_fst_c verilated_threads)" "$@" >"$work/out" 2>"$work/err"
 }
 needed='$(filter-out %_isa.c,$(foreach room,base scene field snn fx quant,$(wildcard src/$(room)/*.c)))'
-needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256)'
+needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256 text)'
 harness='$(filter-out sim/soc% sim/view_set% sim/three_counts% sim/audit_run%,$(wildcard sim/*.c))'
 make_wide LIB_SRC="$needed" SIM_SRC="$harness" ISAS_snn='' "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" || fail "256 lanes: no build"
 "$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"

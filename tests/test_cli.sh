@@ -110,11 +110,11 @@ if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.e
 for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
   if [ -s $f ]; then passed=$((passed + 1)); else fail "good runs" "$f is missing"; fi
 done
-# Cameras that turn away from the box at the layout's scale and stand in it at the scale that the scene was trained at.
+# Cameras that look past the box at the layout's scale and stand in it at the scale that the scene was trained at.
 mkdir away && cp -r d/train d/test away
 for split in train test; do
   echo '{"camera_angle_x": 0.7, "frames": [{"file_path": "./'$split'/r_0", "transform_matrix":
-    [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 2], [0, 0, 0, 1]]}]}' >away/transforms_$split.json
+    [[0, 0, -1, 0], [-1, 0, 0, 0], [0, 1, 0, 2], [0, 0, 0, 1]]}]}' >away/transforms_$split.json
 done
 good sf_train d -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_export small.safetensors -o small.snn
