@@ -397,6 +397,27 @@ START_TEST(a_flipped_pixel_is_located)
 }
 END_TEST
 
+/* The header of an EXR is plain text. */
+START_TEST(the_file_says_what_its_distances_are)
+{
+  make_folder();
+  sf_golden g = some_golden();
+  for (int ndc = 0; ndc < 2; ndc++) {
+    const sf_golden_label label = {
+        .net = &net, .scene_sha256 = "0", .view = "a", .split = "test", .downscale = 1, .ndc = ndc};
+    char *bytes;
+    size_t size;
+    ck_good(sf_golden_save_labelled(&g, in("labelled.exr"), &label));
+    ck_good(sf_read_file(in("labelled.exr"), 1 << 20, &bytes, &size));
+    ck_assert_int_eq(memmem(bytes, size, "world units of the data set", 27) != NULL, !ndc);
+    ck_assert_int_eq(memmem(bytes, size, "NDC units from the near plane", 29) != NULL, ndc);
+    free(bytes);
+  }
+  sf_golden_free(&g);
+  remove_folder();
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("manifest");
@@ -413,6 +434,7 @@ int main(void)
   tcase_add_test(t, other_files_are_refused);
   tcase_add_test(t, origins_differ_by_name);
   tcase_add_test(t, a_flipped_pixel_is_located);
+  tcase_add_test(t, the_file_says_what_its_distances_are);
   suite_add_tcase(suite, t);
   SRunner *runner = srunner_create(suite);
   srunner_run_all(runner, CK_ENV);

@@ -328,8 +328,8 @@ int main(int argc, char **argv)
       .usage = "sim_render scene.snn DATA [--view K] -o golden.exr | --all -o DIR | --verify MANIFEST [options]",
       .summary =
           "Renders views through the float field, the fixed-point core or the Verilog accelerator.\n"
-          "EXR channels: R G B A, Z (mean distance, world units), samples; fixed and rtl also spikes,\n"
-          "sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi fx.Zlo.\n"
+          "EXR channels: R G B A, Z (mean distance, world units; forward-facing data: NDC), samples;\n"
+          "fixed and rtl also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi fx.Zlo.\n"
           "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
           "equal on any machine (include/spikefield/manifest.h). --verify names the first difference, exit status 1.",
       .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"

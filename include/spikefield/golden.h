@@ -7,7 +7,8 @@
 #include "spikefield/model.h"
 
 /* R G B: composited over the scene's background, 1.0 = white; fixed: fx.* / 65535. A: what the ray hit.
- * Z: mean distance from the camera of what the ray hit, world units of the data set; 0 where it hit nothing.
+ * Z: mean distance from the camera of what the ray hit, world units of the data set; 0 where it hit nothing. Of
+ * a forward-facing data set: from the near plane, in units of NDC, which are no lengths of the world.
  * samples: through the nets. spikes, sops, macs: events; energy_fJ: paper ledger, 4600 * macs + 900 * sops.
  * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC; fx.Zhi, fx.Zlo: the two halves of
  * fx_pixel.depth. */
@@ -53,7 +54,7 @@ static inline uint32_t *sf_golden_int(const sf_golden *g, sf_plane plane)
   return g->plane[plane];
 }
 
-/* Pixel i of a fixed-point image. step_length: distance between samples in world units. */
+/* Pixel i of a fixed-point image. step_length: distance between samples in units of Z. */
 void sf_golden_set(sf_golden *golden, size_t i, const fx_pixel *pixel, const fx_cost *cost, double step_length);
 
 /* A window of a view, pixels from its top left corner. */
@@ -70,7 +71,7 @@ typedef struct sf_golden_job {
   bool (*tick)(void *user, size_t pixels); /* so many more are done; from one thread at a time; false stops. Or NULL */
   void *user;
 } sf_golden_job;
-double sf_golden_step_length(const sf_golden_job *job); /* between samples, world units */
+double sf_golden_step_length(const sf_golden_job *job); /* between samples, units of Z */
 sf_status sf_golden_stopped(const sf_golden_job *job);  /* SF_E_STOPPED, naming the view */
 /* Planes and counts, the same for any number of threads. SF_E_STOPPED when tick says so. */
 sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden);
@@ -86,6 +87,7 @@ typedef struct sf_golden_label {
   const char *scene_sha256, *view, *split;
   sf_window window;
   int downscale;
+  bool ndc; /* of the data set: what Z is */
 } sf_golden_label;
 sf_status sf_golden_save_labelled(const sf_golden *golden, const char *path, const sf_golden_label *label);
 /* R G B, opaque. */

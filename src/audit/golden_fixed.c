@@ -8,7 +8,7 @@ typedef struct picture {
   const sf_golden_job *job;
   fx_core *core;
   sf_golden *golden;
-  double step_length; /* between samples, world units */
+  double step_length; /* between samples, units of Z */
 } picture;
 
 typedef struct block {
