@@ -202,6 +202,35 @@ usage --data sf_export s.snn --vectors out
 usage --data sf_export model.safetensors -o out --vectors kit
 usage --fit sf_export s.snn --vectors out --data d --fit
 number sf_export --samples 0 4097 nan
+while read -r option value; do
+  usage "$option needs" sf_export model.safetensors -o out $option $value
+done <<'END'
+--fit-loss 0.1
+--fit-rays 256
+--data d
+--samples 4
+--rays 4
+--view 0
+END
+while read -r option value; do
+  usage "$option needs" sf_export s.snn --nir out $option $value
+done <<'END'
+--steps 1
+--background white
+--weight-bits 4
+--feature-bits 9
+--leak-bits 6
+--grid-bits 4
+--data d
+END
+usage "--view needs --traces" sf_export s.snn --vectors out --data d --view 0
+usage "--samples needs --vectors" sf_export s.snn --traces out --data d --samples 4
+absent out "options that nothing reads"
+data nodir sf_export model.safetensors -o out --traces traces --data nodir
+absent out "traces of nothing"
+usage "--model needs --backend float" sim_render s.snn d -o out --model model.safetensors
+usage "--model needs --backend float" sim_render s.snn d --verify none.json --model model.safetensors
+usage "--seed needs --backend rtl" sim_render s.snn d -o out --seed 1
 number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x
 number sf_cosim --block 0 x

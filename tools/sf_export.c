@@ -20,7 +20,8 @@ typedef struct options {
   bool json, fit, quiet;
 } options;
 
-enum { FIT_RAYS = 262144 };
+enum { FIT_RAYS = 262144, KIT_SAMPLES = 48 };
+static const double FIT_LOSS = 0.05;
 static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
 
 static sf_status file_size(const char *path, long long *size)
@@ -309,6 +310,30 @@ static sf_status export_scene(const char *path, const options *o)
   return status;
 }
 
+static sf_status only(bool given, const char *option, bool used, const char *by)
+{
+  return given && !used ? sf_fail(SF_E_USAGE, "%s needs %s", option, by) : sf_ok();
+}
+
+/* Options that nothing would read. */
+static sf_status check_use(const options *o)
+{
+  const export_options *e = &o->extra;
+  static const char *const output = "--output (-o) SCENE: nothing else is quantised";
+  SF_TRY(only(o->steps, "--steps", o->output, output));
+  SF_TRY(only(o->background >= 0, "--background", o->output, output));
+  SF_TRY(only(o->widths.weight_bits, "--weight-bits", o->output, output));
+  SF_TRY(only(o->widths.feature_bits, "--feature-bits", o->output, output));
+  SF_TRY(only(o->widths.leak_bits, "--leak-bits", o->output, output));
+  SF_TRY(only(o->widths.grid_bits, "--grid-bits", o->output, output));
+  SF_TRY(only(o->fit_loss >= 0, "--fit-loss", o->fit, "--fit"));
+  SF_TRY(only(o->fit_rays, "--fit-rays", o->fit, "--fit"));
+  SF_TRY(only(e->data, "--data", o->fit || e->vectors || e->traces, "--fit, --vectors or --traces"));
+  SF_TRY(only(e->samples, "--samples", e->vectors, "--vectors"));
+  SF_TRY(only(e->rays, "--rays", e->vectors || e->traces, "--vectors or --traces"));
+  return only(e->view >= 0, "--view", e->traces, "--traces");
+}
+
 static sf_status check_options(const options *o)
 {
   const bool extras = o->extra.vectors || o->extra.traces || o->extra.nir;
@@ -319,12 +344,20 @@ static sf_status check_options(const options *o)
   if (!o->output && o->fit) return sf_fail(SF_E_USAGE, "--fit needs --output (-o) SCENE: nothing else is fitted");
   if (!o->output && !extras) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
   if (o->fit && !o->extra.data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");
-  return sf_ok();
+  return check_use(o);
+}
+
+static void set_defaults(options *o)
+{
+  if (o->background < 0) o->background = 0;
+  if (o->fit_loss < 0) o->fit_loss = FIT_LOSS;
+  if (!o->fit_rays) o->fit_rays = FIT_RAYS;
+  if (!o->extra.samples) o->extra.samples = KIT_SAMPLES;
 }
 
 int main(int argc, char **argv)
 {
-  options o = {.fit_rays = FIT_RAYS, .fit_loss = 0.05, .extra = {.samples = 48, .view = -1}};
+  options o = {.background = -1, .fit_loss = -1, .extra = {.view = -1}}; /* and 0: not given */
   const sf_option table[] = {
       {"--output", 'o', SF_ARG_OUTPUT, &o.output, 0, 0, NULL, "SCENE", "scene file to write (.snn)"},
       {"--steps", 0, SF_ARG_INT, &o.steps, 1, SF_T_MAX, NULL, "N",
@@ -378,6 +411,7 @@ int main(int argc, char **argv)
   const char *model_path = NULL;
   sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
   if (status.code == SF_OK) status = check_options(&o);
+  set_defaults(&o);
   if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_from(model_path, &o);
   return sf_cli_finish(&cli, status);
 }

@@ -6,7 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RTL_CROP = 16 };
+enum { RTL_CROP = 16, SEED = 1 };
+static const uint64_t NO_SEED = UINT64_MAX; /* not given */
+static const double SEED_MAX = 1e19;
 
 typedef struct options {
   int view, backend, downscale, steps, threads;
@@ -251,8 +253,18 @@ static sf_status refuse(bool given, const char *option, const char *reason)
   return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
 }
 
+/* Options that only one backend reads. */
+static sf_status check_backend(options *o)
+{
+  SF_TRY(refuse(o->model && o->backend != SF_BACKEND_FLOAT, "--model", "needs --backend float"));
+  SF_TRY(refuse(o->seed != NO_SEED && o->backend != SF_BACKEND_RTL, "--seed", "needs --backend rtl"));
+  if (o->seed == NO_SEED) o->seed = SEED;
+  return sf_ok();
+}
+
 static sf_status check_modes(options *o)
 {
+  SF_TRY(check_backend(o));
   if (o->verify) {
     static const char *const reason = "does not go with --verify: the manifest decides";
     SF_TRY(refuse(o->all, "--all", reason));
@@ -299,7 +311,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
-      {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "rtl: random reset values (default 1)"},
+      {"--seed", 0, SF_ARG_U64, &o->seed, 0, SEED_MAX, NULL, "S", "rtl: random reset values (default 1)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default, and most: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
@@ -342,7 +354,7 @@ int main(int argc, char **argv)
       .max_positional = 2};
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = 1};
+  j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = NO_SEED};
   sf_status status = parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK && j->opt.crop) status = sf_window_parse(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
