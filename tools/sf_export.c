@@ -293,17 +293,24 @@ static sf_status export_model(const sf_model *model, const char *path, const opt
   return status;
 }
 
+static sf_status check_fit(const sf_config *config, const char *path)
+{
+  if (config->backbone == SF_TENSORF)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
+  if (config->bound > 1 || config->dt_gamma > 0)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for boxes of bound 1 with equal steps only, this one has bound %d and steps that grow by %g",
+                   path, config->bound, (double)config->dt_gamma);
+  return sf_ok();
+}
+
 static sf_status export_scene(const char *path, const options *o)
 {
   sf_model model;
   if (o->fit) sf_cli_catch_signals();
   SF_TRY(sf_model_load(&model, path));
-  if (o->fit && model.config.backbone == SF_TENSORF) {
-    sf_model_free(&model);
-    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
-  }
   candidates *c = calloc(1, sizeof *c);
-  const sf_status status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
+  sf_status status = o->fit ? check_fit(&model.config, path) : sf_ok();
+  if (status.code == SF_OK) status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
   for (int i = 0; c && i < CANDIDATES; i++) fx_scene_free(&c->scene[i]);
   free(c);
   sf_model_free(&model);
