@@ -1,6 +1,7 @@
 /* Scenes and samples of the C library against the core behind it; every refusal is a value that names what is wrong. */
 #include "spikefield/audit.h"
 #include "spikefield/io.h"
+#include "tests/fx_tensorf_fixture.h"
 #include "tests/lib_fixture.h"
 #include <locale.h>
 
@@ -158,6 +159,26 @@ START_TEST(samples_are_those_of_the_core)
 }
 END_TEST
 
+START_TEST(samples_of_a_decoder_are_of_one_ray_too)
+{
+  fx_scene with_decoder = tensorf_scene();
+  spikefield_scene *decoder;
+  spikefield_counts counts = {0};
+  spikefield_sample sample[3];
+  const int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0};
+  int16_t feature[3 * SF_DIR_MAX] = {0};
+  ck_good(fx_scene_save(&with_decoder, in("decoder.snn")));
+  lib_good(spikefield_scene_open(&decoder, in("decoder.snn")));
+  lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 3, sample, NULL, &counts));
+  ck_assert_uint_eq(counts.samples, 3);
+  ck_assert_uint_eq(counts.rays, 1);
+  lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 0, sample, NULL, &counts));
+  ck_assert_uint_eq(counts.rays, 1);
+  spikefield_scene_close(decoder);
+  fx_scene_free(&with_decoder);
+}
+END_TEST
+
 START_TEST(positions_and_directions_are_rounded_once)
 {
   const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};
@@ -278,6 +299,7 @@ int main(void)
   tcase_add_test(cases, damaged_scenes_are_refused);
   tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
   tcase_add_test(cases, samples_are_those_of_the_core);
+  tcase_add_test(cases, samples_of_a_decoder_are_of_one_ray_too);
   tcase_add_test(cases, positions_and_directions_are_rounded_once);
   tcase_add_test(cases, null_is_refused_by_name);
   tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);

@@ -177,8 +177,8 @@ SPIKEFIELD_API spikefield_status spikefield_direction(const spikefield_scene *sc
 SPIKEFIELD_API spikefield_status spikefield_features(const spikefield_scene *scene, const uint32_t *positions, size_t n,
                                                      int16_t *features, spikefield_counts *counts);
 
-/* n samples of one ray through the nets: features[n][info.features] -> samples[n], traces[n] (NULL: none). The MACs of
- * the harmonics are counted once per call. */
+/* n samples of one ray through the nets: features[n][info.features] -> samples[n], traces[n] (NULL: none). A call with
+ * samples counts as one ray, and so do the MACs of the harmonics. */
 SPIKEFIELD_API spikefield_status spikefield_samples(const spikefield_scene *scene, const spikefield_options *options,
                                                     const int16_t harmonics[SPIKEFIELD_DIRECTIONS],
                                                     const int16_t *features, size_t n, spikefield_sample *samples,
