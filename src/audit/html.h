@@ -5,10 +5,9 @@
 
 enum { HTML_NUMBER = 48 }; /* characters of a formatted number */
 
-/* "12 345" with narrow spaces; "70.98 mJ", the unit chosen so that 1..999 stands before it; "12.02 G". */
+/* "12 345" with narrow spaces; "70.98 mJ", the unit chosen so that 1..999 stands before it. */
 const char *html_count(char text[HTML_NUMBER], uint64_t value);
 const char *html_energy(char text[HTML_NUMBER], double fj);
-const char *html_short(char text[HTML_NUMBER], double value);
 const char *html_tenths(char text[HTML_NUMBER], double value); /* a real minus sign, one decimal */
 const char *html_percent(char text[HTML_NUMBER], double percent);
 

@@ -27,30 +27,15 @@ static const char *digits4(double value)
   return size >= 999.95 ? "%.0f" : size >= 99.995 ? "%.1f" : size >= 9.9995 ? "%.2f" : "%.3f";
 }
 
-static const char *scaled(char text[HTML_NUMBER], double value, const char *const *unit, int units, double step)
-{
-  int i = 0;
-  while (i + 1 < units && fabs(value) >= 999.95) value /= step, i++;
-  char format[16];
-  snprintf(format, sizeof format, "%s%s%%s", digits4(value), unit[i][0] ? " " : "");
-  snprintf(text, HTML_NUMBER, format, value, unit[i]);
-  return text;
-}
-
 const char *html_energy(char text[HTML_NUMBER], double fj)
 {
   static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
-  return scaled(text, fj, unit, 7, 1000);
-}
-
-const char *html_short(char text[HTML_NUMBER], double value)
-{
-  static const char *const unit[] = {"", "k", "M", "G", "T", "P"};
-  if (value < 1000 && value == floor(value)) {
-    snprintf(text, HTML_NUMBER, "%.0f", value);
-    return text;
-  }
-  return scaled(text, value, unit, 6, 1000);
+  int i = 0;
+  while (i + 1 < 7 && fabs(fj) >= 999.95) fj /= 1000, i++;
+  char format[16];
+  snprintf(format, sizeof format, "%s %%s", digits4(fj));
+  snprintf(text, HTML_NUMBER, format, fj, unit[i]);
+  return text;
 }
 
 const char *html_percent(char text[HTML_NUMBER], double percent)
