@@ -187,7 +187,8 @@ static sf_status load_frame(frame *f, const char *scene, const char *twin, const
   SF_TRY(fx_scene_load(&f->scene, scene));
   SF_TRY(fx_core_open(&f->core, &f->scene, NULL));
   SF_TRY(sf_model_load(&f->twin, twin));
-  SF_TRY(sf_fx_dataset_load(&f->data, &f->scene, scene, data, "test", &(sf_dataset_options){.downscale = 1, .limit = 1}));
+  SF_TRY(
+      sf_fx_dataset_load(&f->data, &f->scene, scene, data, "test", &(sf_dataset_options){.downscale = 1, .limit = 1}));
   f->camera = f->data.view[0].camera;
   const float zoom = (float)FRAME / (float)f->camera.width;
   f->camera.fx *= zoom, f->camera.fy *= zoom, f->camera.cx *= zoom, f->camera.cy *= zoom;

@@ -127,7 +127,8 @@ START_TEST(rays_far_away_and_refused)
     ck_assert_int_eq(make_ray(&scene, o, aside).count, 0);
     const sf_status status = sf_fx_ray_make(&scene, o, d, &ray);
     ck_assert_msg(status.code == (e < 7 ? SF_OK : e < 50 ? SF_E_RANGE : status.code), "2^%d: %s", e, status.message);
-    if (e == 7) ck_assert_msg(strstr(status.message, "128.002 model units away, 37837.6") != NULL, "%s", status.message);
+    if (e == 7)
+      ck_assert_msg(strstr(status.message, "128.002 model units away, 37837.6") != NULL, "%s", status.message);
     if (status.code != SF_OK || e >= 50) continue;
     ck_assert_int_ge(ray.count, 500);
     ck_assert_double_eq_tol(ray.first_q16 / 65536.0, (o[0] - 1) / step + 0.5, 1e-4);

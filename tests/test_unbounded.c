@@ -62,7 +62,8 @@ END_TEST
 
 enum { KINDS = 6 };
 
-/* From inside, from far outside (32768 lattice steps are 110), along an axis, in the face between two cascades, along its edge, and any ray. */
+/* From inside, from far outside (32768 lattice steps are 110), along an axis, in the face between two cascades, along
+ * its edge, and any ray. */
 static void draw_ray(int kind, uint64_t i, float bound, float o[3], float d[3])
 {
   float length = 0;

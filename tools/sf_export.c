@@ -156,8 +156,7 @@ static sf_status quantise_all(const sf_model *model, const char *path, const opt
 {
   const sf_quant_widths *w = &o->widths;
   SF_TRY(quantise(model, path, o, w, c));
-  const bool asked =
-      w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
+  const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
   for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++)
     SF_TRY(quantise(model, path, o, &narrower[i - 1], c));
   return sf_ok();
@@ -298,8 +297,10 @@ static sf_status check_fit(const sf_config *config, const char *path)
   if (config->backbone == SF_TENSORF)
     return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
   if (config->bound > 1 || config->dt_gamma > 0)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for boxes of bound 1 with equal steps only, this one has bound %d and steps that grow by %g",
-                   path, config->bound, (double)config->dt_gamma);
+    return sf_fail(
+        SF_E_UNSUPPORTED,
+        "%s: --fit: for boxes of bound 1 with equal steps only, this one has bound %d and steps that grow by %g", path,
+        config->bound, (double)config->dt_gamma);
   return sf_ok();
 }
 

@@ -341,7 +341,8 @@ int main(int argc, char **argv)
       .summary =
           "Renders views through the float field, the fixed-point core or the Verilog accelerator.\n"
           "EXR channels: R G B A, Z (mean distance, world units; forward-facing data: NDC), samples;\n"
-          "fixed and rtl also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi fx.Zlo.\n"
+          "fixed and rtl also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi "
+          "fx.Zlo.\n"
           "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
           "equal on any machine (include/spikefield/manifest.h). --verify names the first difference, exit status 1.",
       .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"

@@ -160,7 +160,7 @@ typedef struct fx_scene {
   /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
   double to_box_scale, to_box_offset[3];
   double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
-  double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
+  double dir_scale;   /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
   double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
   double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
   void *owner;                         /* backing storage of w, table, occupancy; fx_scene_free releases it */

@@ -101,8 +101,8 @@ int64_t sf_grid_level_entries(const fx_grid *grid, int level);
  * are zero then, or -1 without memory. */
 int64_t sf_grid_zero_unread(fx_scene *scene);
 
-/* sf_dataset_load at the scale that the scene was trained at; where the scene does not tell, as the options say. Options
- * with another scale are refused: SF_E_RANGE. name: the scene's file, for the message. */
+/* sf_dataset_load at the scale that the scene was trained at; where the scene does not tell, as the options say.
+ * Options with another scale are refused: SF_E_RANGE. name: the scene's file, for the message. */
 sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char *name, const char *dir,
                              const char *split, const sf_dataset_options *options);
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input

@@ -203,8 +203,8 @@ typedef struct spikefield_pixel {
 /* Mean distance from the camera of what the ray hit, model units; 0 where it hit nothing. */
 SPIKEFIELD_API double spikefield_pixel_distance(const spikefield_scene *scene, const spikefield_pixel *pixel);
 
-/* n rays on all threads: origins[n][3], directions[n][3] (of any length > 0), model units -> pixels[n]. A ray that enters
- * the box 32768 steps (spikefield_scene_info) away or farther is refused, SPIKEFIELD_E_RANGE. */
+/* n rays on all threads: origins[n][3], directions[n][3] (of any length > 0), model units -> pixels[n]. A ray that
+ * enters the box 32768 steps (spikefield_scene_info) away or farther is refused, SPIKEFIELD_E_RANGE. */
 SPIKEFIELD_API spikefield_status spikefield_rays(const spikefield_scene *scene, const spikefield_options *options,
                                                  const float *origins, const float *directions, size_t n,
                                                  spikefield_pixel *pixels, spikefield_counts *counts);

@@ -78,8 +78,8 @@ static double intervals_within(const fx_scene *scene, double depth)
 
 static sf_status too_far(double first, double step)
 {
-  return sf_fail(SF_E_RANGE, "ray: its first point is %g model units away, %.6g lattice steps: expected at most %d", first,
-                 first / step, INT32_MAX >> 16);
+  return sf_fail(SF_E_RANGE, "ray: its first point is %g model units away, %.6g lattice steps: expected at most %d",
+                 first, first / step, INT32_MAX >> 16);
 }
 
 static sf_status set_lattice(const fx_scene *scene, fx_ray *ray, const double o[3], const double d[3], double step,

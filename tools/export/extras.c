@@ -5,8 +5,8 @@ enum { VECTOR_RAYS = 1000, TRACE_RAYS = 20 };
 
 /* ---- --vectors ---- */
 
-static sf_status write_vectors(const fx_scene *scene, const char *path, const sf_dataset *data,
-                               const export_options *o, sf_kit_report *kit)
+static sf_status write_vectors(const fx_scene *scene, const char *path, const sf_dataset *data, const export_options *o,
+                               sf_kit_report *kit)
 {
   const sf_kit_options how = {
       .scene_path = path, .seed = o->seed, .rays = o->rays ? o->rays : VECTOR_RAYS, .samples = o->samples};
