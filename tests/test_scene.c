@@ -115,19 +115,27 @@ START_TEST(options_and_stated_intrinsics)
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
-  /* stated for 16 x 8, the pictures are half of that; frame b overrides the focal length */
+  /* stated for 16 x 8, the pictures are half of that; frame b has a field of view of its own */
   ck_good(load(&d,
                "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
                    "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
                "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
-  ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 3.0f);
+  ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 5.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
   ck_assert(d.view[0].camera.to_world[3] == 0.5f && d.view[0].camera.to_world[11] == 1.5f);
   sf_dataset_free(&d);
   ck_good(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
+  sf_dataset_free(&d);
+  ck_good(load(&d,
+               "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
+                   "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
+               "test", (sf_dataset_options){.downscale = 1}));
+  ck_assert(d.view[0].camera.fx == 10.0f && d.view[0].camera.fy == 12.0f);
+  ck_assert_float_eq_tol(d.view[1].camera.fx, 4, 1e-6f);
+  ck_assert_float_eq_tol(d.view[1].camera.fy, 4, 1e-6f);
   sf_dataset_free(&d);
 }
 END_TEST
