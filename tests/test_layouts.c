@@ -83,6 +83,20 @@ START_TEST(splits_in_two_files_have_the_same_coordinates)
 }
 END_TEST
 
+/* A surveyor's coordinates: the metres that floats lose are taken off before. */
+START_TEST(far_coordinates_lose_nothing)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 512345.25, rig.view[v].to_world[7] += 5412345.5;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms.json", &rig, "", "images", 0, 1);
+  load(&d, "train");
+  same_rays(&d, &rig);
+  sf_dataset_free(&d);
+}
+END_TEST
+
 START_TEST(splits_in_other_coordinates_are_refused)
 {
   const layout_rig rig = row();
@@ -189,6 +203,11 @@ START_TEST(forward_facing_rays_are_ndc)
   const double scale = (double)d.scale, tolerance = _i ? 3e-6 : 2e-6;
   sf_dataset unit = d;
   unit.scale = 1;
+  float here[3], beside[3], dir[3];
+  const int points = sf_dataset_pixels(&d, 2); /* as far apart as the pixels on the near plane, where all look alike */
+  sf_dataset_ray(&d, &d.view[1], 8, 6, here, dir), sf_dataset_ray(&d, &d.view[1], 9, 6, beside, dir);
+  ck_assert_int_eq(points, (int)ceil(2 * WIDTH / scale));
+  ck_assert_double_eq_tol((double)(beside[0] - here[0]) * points / 4, 1, 0.1);
   for (int n = 0; n < 12 * d.count; n++) {
     const sf_view *view = &d.view[n / 12];
     const double px = WIDTH * (n % 4) / 3.0, py = HEIGHT * (n / 4 % 3) / 2.0, depth[4] = {0.01, 5, 50, 1e9};
@@ -385,6 +404,7 @@ static Suite *suite(void)
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
   tcase_add_test(t, a_picture_is_no_pipe);
   tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
+  tcase_add_test(t, far_coordinates_lose_nothing);
   tcase_add_test(t, splits_in_other_coordinates_are_refused);
   tcase_add_test(t, a_picture_is_found_by_a_long_name);
   tcase_add_test(t, blender_has_the_rays_of_its_poses);

@@ -87,7 +87,8 @@ bool sf_camera_project(const sf_camera *camera, const float point[3], float pixe
 void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
                     float direction[3]);
 /* Points along an edge of [-bound, bound]^3, model units, that lie a pixel apart where the views see the middle of the
- * box: focal length over distance from the origin, in the mean of all views; 1 at least, 1 << 20 at most. */
+ * box: focal length over distance from the origin, in the mean of all views; with NDC, where a picture spans 2 * scale,
+ * its longer side over that; 1 at least, 1 << 20 at most. */
 int sf_dataset_pixels(const sf_dataset *data, int bound);
 
 /* Procedural scenes: exact rendering of analytic shapes. names: NULL-terminated list. */

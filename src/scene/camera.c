@@ -58,12 +58,14 @@ void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float
 
 int sf_dataset_pixels(const sf_dataset *data, int bound)
 {
-  double focal = 0, distance = 0;
+  double focal = 0, distance = 0, side = 0;
   for (int v = 0; v < data->count; v++) {
     const sf_camera *c = &data->view[v].camera;
     const double at[3] = {(double)c->to_world[3], (double)c->to_world[7], (double)c->to_world[11]};
     focal += sqrt((double)c->fx * (double)c->fy);
+    side += (double)(c->width > c->height ? c->width : c->height) / data->count;
     distance += sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
   }
-  return (int)ceil(fmin(fmax(2 * bound * focal / fmax(distance, 1e-9), 1), 1 << 20));
+  const double points = data->ndc ? bound * side / (double)data->scale : 2 * bound * focal / fmax(distance, 1e-9);
+  return (int)ceil(fmin(fmax(points, 1), 1 << 20));
 }
