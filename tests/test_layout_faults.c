@@ -42,6 +42,33 @@ START_TEST(other_endings_are_found)
   load(&d, "test");
   ck_assert_int_eq(d.count, 3);
   sf_dataset_free(&d);
+  ck_assert_int_eq(rename(in("images/p00.png"), in("images/p00.JPEG")), 0);
+  load(&d, "test");
+  ck_assert_int_eq(d.count, 3);
+  sf_dataset_free(&d);
+}
+END_TEST
+
+/* Two of its files start with UTF-8's mark, as some editors leave it. */
+START_TEST(a_mark_before_a_text_is_skipped)
+{
+  static layout_file file, marked;
+  const layout_rig rig = orbit();
+  sf_dataset d;
+  put_colmap("sparse/0", &rig, 1);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  for (int i = 0; i < 2; i++) {
+    if (i)
+      layout_images(&file, &rig, 1);
+    else
+      layout_cameras(&file, &rig, 1);
+    marked.size = 0;
+    layout_text(&marked, "\xef\xbb\xbf"), layout_text(&marked, file.bytes);
+    put(i ? "sparse/0/images.txt" : "sparse/0/cameras.txt", &marked);
+  }
+  load(&d, "train");
+  same_rays(&d, &rig);
+  sf_dataset_free(&d);
 }
 END_TEST
 
@@ -267,6 +294,8 @@ static const bad_text bad_texts[] = {
     {CAMERA, "1 1 0 0 0 0 0 x 1 p00.png\n\n", SF_E_FORMAT, "images.txt:1", "number 8 cannot be read"},
     {CAMERA, "1 1 0 0 0.5 0 0 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "no unit quaternion"},
     {CAMERA, "1 1 0 0 0 0 inf 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "position is inf"},
+    {CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n2 1 0 0 0 0 0 0 1 p01.png\n", SF_E_FORMAT, "images.txt:2", "X Y POINT3D_ID"},
+    {CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n1 2 3 4 5 \r\n", SF_E_FORMAT, "images.txt:2", "X Y POINT3D_ID"},
     {CAMERA, "1 1 0 0 0 0 0 0 1\n\n", SF_E_FORMAT, "images.txt:1", "no name"},
 };
 
@@ -309,6 +338,7 @@ static Suite *suite(void)
   tcase_set_timeout(t, 60);
   tcase_add_test(t, a_few_missing_pictures_are_passed_over);
   tcase_add_test(t, other_endings_are_found);
+  tcase_add_test(t, a_mark_before_a_text_is_skipped);
   tcase_add_test(t, the_survey_names_what_looks_wrong);
   tcase_add_test(t, the_plan_shows_every_camera);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);

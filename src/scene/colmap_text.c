@@ -86,6 +86,20 @@ static sf_status read_cameras(sf_colmap *model, lines *l)
   return sf_ok();
 }
 
+/* Nothing, or X Y POINT3D_ID in triples: another line means that the lines of points were left out. */
+static sf_status check_image_points(char *at, const char *where)
+{
+  int n = 0;
+  for (at += strspn(at, " \t\r"); *at; at += strspn(at, " \t\r"), n++) {
+    char *end;
+    strtod(at, &end);
+    if (end == at || (*end && !strchr(" \t\r", *end))) break;
+    at = end;
+  }
+  if (!*at && n % 3 == 0) return sf_ok();
+  return sf_fail(SF_E_FORMAT, "%s: expected X Y POINT3D_ID of the image in the line before, or an empty line", where);
+}
+
 static sf_status read_images(sf_colmap *model, lines *l)
 {
   static const char expected[] = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
@@ -106,7 +120,10 @@ static sf_status read_images(sf_colmap *model, lines *l)
                      sizeof image.name - 1);
     strcpy(image.name, at);
     SF_TRY(sf_colmap_add_image(model, where, &image));
-    if (!next_line(l, true)) break; /* its points; the last line may be missing where there are none */
+    at = next_line(l, true);
+    if (!at) break; /* the last line of points may be missing where there are none */
+    say_where(l, where);
+    SF_TRY(check_image_points(at, where));
   }
   return sf_ok();
 }
@@ -128,7 +145,8 @@ static sf_status read_table(sf_colmap *model, const char *path, sf_status (*tabl
   char *text;
   size_t size;
   SF_TRY(sf_read_file(path, FILE_LIMIT, &text, &size));
-  lines l = {.path = path, .next = text, .end = text + size};
+  const size_t mark = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0; /* of UTF-8 */
+  lines l = {.path = path, .next = text + mark, .end = text + size};
   const char *zero = memchr(text, 0, size);
   const sf_status status =
       zero ? sf_fail(SF_E_FORMAT, "%s: not a text: a zero at byte %zu", path, (size_t)(zero - text)) : table(model, &l);

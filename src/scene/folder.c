@@ -123,12 +123,12 @@ sf_status sf_pictures_list(const char *dir, const char *folder, char ***name, in
 
 sf_status sf_picture_find(char path[4096], const char *dir, const char *file)
 {
-  static const char *const ending[] = {".png", ".jpg", ".jpeg", ".PNG", ".JPG"};
+  static const char *const ending[] = {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"};
   SF_TRY(sf_join(path, dir, file, ".jpeg")); /* the longest: the others fit too */
   SF_TRY(sf_join(path, dir, file, ""));
   if (sf_is_file(path)) return sf_ok();
   char *end = is_picture(file) ? strrchr(path, '.') : path + strlen(path);
-  for (int i = 0; i < 5; i++) {
+  for (size_t i = 0; i < sizeof ending / sizeof *ending; i++) {
     strcpy(end, ending[i]);
     if (sf_is_file(path)) return sf_ok();
   }
