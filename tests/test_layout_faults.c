@@ -182,6 +182,69 @@ START_TEST(cameras_that_turn_their_backs_are_told)
 }
 END_TEST
 
+START_TEST(mirrored_poses_are_told)
+{
+  layout_rig rig = orbit();
+  sf_dataset d;
+  for (int v = 2; v < VIEWS; v += 3)
+    for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i] *= -1;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms.json", &rig, "", "images", 0, 1);
+  load(&d, "test");
+  ck_assert(warned(&d, "5 of 17 poses are mirrored", "images/p02.png"));
+  sf_dataset_free(&d);
+  unlink(in("transforms.json"));
+  put_llff(&rig, 0, 4, 40);
+  load(&d, "train");
+  ck_assert(warned(&d, "poses_bounds.npy: 5 of 17 poses are mirrored", "images/p02.png"));
+  sf_dataset_free(&d);
+  memcpy(rig.view[4].to_world, rig.view[3].to_world, sizeof rig.view[4].to_world);
+  for (int i = 0; i < 3; i++) rig.view[4].to_world[4 * i + 2] = rig.view[4].to_world[4 * i + _i];
+  put_llff(&rig, 0, 4, 40);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "row 4", "not at right angles");
+}
+END_TEST
+
+/* The one that is used is said to be the smaller; equal ones need no word. */
+START_TEST(a_larger_model_beside_is_told)
+{
+  layout_rig rig = orbit(), part = rig;
+  sf_dataset d;
+  part.views = 9;
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_colmap("sparse/0", &part, _i);
+  put_colmap("sparse/1", &part, _i);
+  load(&d, "train");
+  ck_assert_int_eq(d.warnings, 0);
+  sf_dataset_free(&d);
+  put_colmap("sparse/2", &rig, _i);
+  load(&d, "train");
+  ck_assert(d.count == 7 && d.warnings == 1);
+  ck_assert(warned(&d, "another model is larger", _i ? "sparse/2/images.txt" : "sparse/2/images.bin"));
+  sf_dataset_free(&d);
+}
+END_TEST
+
+/* Quaternions of two digits: axes at right angles and of length 1 all the same. */
+START_TEST(rounded_quaternions_are_rotations)
+{
+  const layout_rig rig = orbit();
+  sf_dataset d;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  ck_good(sf_write_file(in("sparse/0/cameras.txt"), "1 PINHOLE 16 12 20 20 8 6\n", 26));
+  const char images[] = "1 0.71 0.71 0 0 0 0 4 1 p00.png\n\n2 0.71 0 0.7 0 0 0 4 1 p01.png\n\n";
+  ck_good(sf_write_file(in("sparse/0/images.txt"), images, sizeof images - 1));
+  unlink(in("sparse/0/cameras.bin"));
+  load(&d, _i ? "train" : "test");
+  const float *m = d.view[0].camera.to_world;
+  for (int a = 0; a < 3; a++)
+    for (int b = 0; b < 3; b++)
+      ck_assert_double_eq_tol((double)(m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b]), a == b, 1e-6);
+  sf_dataset_free(&d);
+}
+END_TEST
+
 typedef struct bad_npy {
   const char *descr, *order, *shape;
   int bytes; /* of numbers */
@@ -343,6 +406,9 @@ static Suite *suite(void)
   tcase_add_test(t, the_plan_shows_every_camera);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);
   tcase_add_loop_test(t, cameras_that_turn_their_backs_are_told, 0, 3);
+  tcase_add_loop_test(t, mirrored_poses_are_told, 0, 2);
+  tcase_add_loop_test(t, a_larger_model_beside_is_told, 0, 2);
+  tcase_add_loop_test(t, rounded_quaternions_are_rotations, 0, 2);
   tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
   tcase_add_test(t, positions_without_precision_are_named);
   tcase_add_loop_test(t, truncated_files_are_named, 0, 4);

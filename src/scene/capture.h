@@ -50,6 +50,8 @@ static inline int sf_capture_guides(const sf_capture *capture)
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);
 sf_status sf_llff_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
 sf_status sf_colmap_read(sf_capture *capture, const char *dir, const sf_dataset_options *options);
+/* A warning where data->list is of a COLMAP model and a larger one lies beside it. */
+sf_status sf_colmap_check_others(sf_dataset *data);
 /* Whether the folder holds the layout. */
 bool sf_transforms_there(const char *dir);
 bool sf_llff_there(const char *dir);

@@ -1,7 +1,9 @@
 /* COLMAP layout: a sparse model and the pictures that it was made from, or smaller ones. */
 #include "src/scene/colmap.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 typedef struct tables {
   char cameras[4096], images[4096], points[4096]; /* points: "" where there are none */
@@ -35,7 +37,10 @@ bool sf_colmap_there(const char *dir)
 /* World to camera with OpenCV axes (y down, z ahead) -> camera to world with OpenGL axes. */
 static void set_pose(sf_frame *frame, const sf_colmap_image *image)
 {
-  const double w = image->q[0], x = image->q[1], y = image->q[2], z = image->q[3];
+  double length = 0;
+  for (int i = 0; i < 4; i++) length += image->q[i] * image->q[i];
+  length = sqrt(length); /* 1 but for the digits that were written */
+  const double w = image->q[0] / length, x = image->q[1] / length, y = image->q[2] / length, z = image->q[3] / length;
   const double r[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
                        2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
                        2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
@@ -120,4 +125,23 @@ sf_status sf_colmap_read(sf_capture *capture, const char *dir, const sf_dataset_
   if (status.code == SF_OK) status = take_model(capture, &model, dir, &t, options->downscale);
   sf_colmap_free(&model);
   return status;
+}
+
+/* sparse/1 and on hold what COLMAP could not join to sparse/0: by their size on disk. */
+sf_status sf_colmap_check_others(sf_dataset *data)
+{
+  static const char *const ending[] = {".bin", ".txt"};
+  char path[4096], largest[4096] = "";
+  struct stat info;
+  if (!strstr(data->list, "/sparse/0/") || stat(data->list, &info)) return sf_ok();
+  off_t most = info.st_size;
+  for (int i = 2; i < 40; i++) {
+    char name[40];
+    snprintf(name, sizeof name, "sparse/%d/images", i / 2);
+    if (sf_join(path, data->path, name, ending[i % 2]).code != SF_OK || stat(path, &info) || info.st_size <= most) continue;
+    most = info.st_size;
+    strcpy(largest, path);
+  }
+  if (!largest[0]) return sf_ok();
+  return sf_warn(data, "%s: another model is larger: %s is not used", data->list, largest);
 }

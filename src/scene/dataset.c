@@ -104,6 +104,7 @@ static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const 
 {
   SF_TRY(read_capture(data, c, split, options));
   memcpy(data->list, c->list, sizeof data->list);
+  if (c->layout == SF_LAYOUT_COLMAP) SF_TRY(sf_colmap_check_others(data));
   const sf_sight sight = look(data, c);
   SF_TRY(sf_place(data, c, options, &sight));
   SF_TRY(sf_views_load(data, c, options));

@@ -18,16 +18,17 @@ bool sf_llff_there(const char *dir)
 static sf_status check_row(const char *path, int number, const double *row)
 {
   const double height = row[4], width = row[9], focal = row[14];
-  double length[3] = {0}, dot = 0;
-  for (int i = 0; i < 3; i++) {
-    for (int k = 0; k < 3; k++) length[k] += row[5 * i + k] * row[5 * i + k];
-    dot += row[5 * i] * row[5 * i + 1];
-  }
+  double length[3] = {0}, dot[3] = {0};
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) {
+      length[k] += row[5 * i + k] * row[5 * i + k];
+      dot[k] += row[5 * i + k] * row[5 * i + (k + 1) % 3];
+    }
   for (int k = 0; k < 3; k++)
     if (!(fabs(length[k] - 1) < 1e-2))
       return sf_fail(SF_E_RANGE, "%s: row %d: column %d of the rotation has length %g", path, number, k,
                      sqrt(length[k]));
-  if (!(fabs(dot) < 1e-2))
+  if (!(fabs(dot[0]) < 1e-2 && fabs(dot[1]) < 1e-2 && fabs(dot[2]) < 1e-2))
     return sf_fail(SF_E_RANGE, "%s: row %d: the rotation's axes are not at right angles", path, number);
   if (!(height >= 1 && width >= 1 && height < 1e6 && width < 1e6 && focal > 1e-3 && focal < 1e7))
     return sf_fail(SF_E_RANGE, "%s: row %d: %g x %g pixels, focal length %g", path, number, width, height, focal);

@@ -316,9 +316,25 @@ static sf_status keep_points(sf_dataset *data, const sf_capture *c)
   return sf_ok();
 }
 
+/* Left-handed axes show a scene that is not the pictures': a sign is wrong in what wrote them. */
+static sf_status warn_mirrored(sf_dataset *data, const sf_capture *c)
+{
+  int mirrored = 0, first = 0;
+  for (int f = c->count - 1; f >= c->first; f--) {
+    double right[3], up[3], back[3], out[3];
+    column(&c->frame[f], 0, right), column(&c->frame[f], 1, up), column(&c->frame[f], 2, back);
+    vec_cross(right, up, out);
+    if (vec_dot(out, back) < 0) mirrored++, first = f;
+  }
+  if (!mirrored) return sf_ok();
+  return sf_warn(data, "%s: %d of %d poses are mirrored (determinant -1), the first is %s: are x, y and z right, up, back?",
+                 c->list, mirrored, c->count - c->first, c->frame[first].file_path);
+}
+
 sf_status sf_place(sf_dataset *data, sf_capture *capture, const sf_dataset_options *options, const sf_sight *sight)
 {
   data->layout = capture->layout, data->bound = 1;
+  SF_TRY(warn_mirrored(data, capture));
   if (capture->layout == SF_LAYOUT_LLFF && sf_forward_facing(capture)) {
     place_ndc(data, capture, options);
     return sf_ok();
