@@ -131,7 +131,8 @@ START_TEST(options_and_stated_intrinsics)
   sf_dataset_free(&d);
   ck_good(load(&d,
                "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
-                   "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
+                   "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
+                              "}]}",
                "test", (sf_dataset_options){.downscale = 1}));
   ck_assert(d.view[0].camera.fx == 10.0f && d.view[0].camera.fy == 12.0f);
   ck_assert_float_eq_tol(d.view[1].camera.fx, 4, 1e-6f);

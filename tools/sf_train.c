@@ -477,11 +477,11 @@ static bool given(const arguments *a, const sf_option *o)
 /* What only the other backbone has, and what a model to fine-tune has settled. */
 static sf_status check_effect(arguments *a)
 {
-  static const char *const grid[] = {"--levels", "--log2-hash", "--base-res", "--finest-res",
-                                     "--lattice", "--bound", "--dt-gamma", NULL};
+  static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
+                                     "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--net",   "--steps",   "--input-mode", "--hidden",
-                                        "--theta", "--occ-res", "--fixed-steps", "--stage1", NULL};
+  static const char *const settled[] = {"--net",     "--steps",       "--input-mode", "--hidden", "--theta",
+                                        "--occ-res", "--fixed-steps", "--stage1",     NULL};
   const bool tensorf = a->train.config.backbone == SF_TENSORF;
   sf_option options[OPTIONS_MAX];
   make_cli(a, options);
@@ -568,7 +568,8 @@ static sf_status run(arguments *a, const char *path)
     a->train.start = &start;
   }
   FILE *log = status.code ? NULL : fopen(a->log, a->resume ? "a" : "w");
-  if (!status.code) status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
+  if (!status.code)
+    status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
   if (log) setvbuf(log, NULL, _IOLBF, 0);
   if (!status.code) status = train_and_report(path, &data, &how, a, log);
   if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);

@@ -53,8 +53,8 @@ typedef struct sf_train_stats {
 
 typedef struct sf_trainer sf_trainer;
 
-/* data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config. It
- * is refused where the data's scale, NDC or views, or the options' bound, are not those that it was made with. */
+/* data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config.
+ * It is refused where the data's scale, NDC or views, or the options' bound, are not those that it was made with. */
 sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const sf_train_options *options,
                             const char *resume);
 /* One iteration. NaN, Inf or divergence anywhere fails and names the tensor. The run is over then: the weights that

@@ -138,7 +138,8 @@ sf_status sf_colmap_check_others(sf_dataset *data)
   for (int i = 2; i < 40; i++) {
     char name[40];
     snprintf(name, sizeof name, "sparse/%d/images", i / 2);
-    if (sf_join(path, data->path, name, ending[i % 2]).code != SF_OK || stat(path, &info) || info.st_size <= most) continue;
+    if (sf_join(path, data->path, name, ending[i % 2]).code != SF_OK || stat(path, &info) || info.st_size <= most)
+      continue;
     most = info.st_size;
     strcpy(largest, path);
   }

@@ -98,7 +98,8 @@ static sf_status parse_matrix(double m[12], const cJSON *json, const char *where
       if (!cJSON_IsNumber(item))
         return sf_fail(SF_E_FORMAT, "%s: transform_matrix[%d][%d] is not a number", where, i, k);
       const double value = item->valuedouble;
-      if (!isfinite((float)value)) return sf_fail(SF_E_RANGE, "%s: transform_matrix[%d][%d] is not finite", where, i, k);
+      if (!isfinite((float)value))
+        return sf_fail(SF_E_RANGE, "%s: transform_matrix[%d][%d] is not finite", where, i, k);
       if (i < 3)
         m[4 * i + k] = value;
       else if (fabs(value - (k == 3)) > 1e-5)
@@ -123,7 +124,8 @@ sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shar
   strcpy(frame->file_path, file);
   snprintf(where, sizeof where, "%s: frame %d (%s)", path, index, file);
   frame->number = index, frame->lens = *shared;
-  if (cJSON_HasObjectItem(json, "fl_x") || cJSON_HasObjectItem(json, "camera_angle_x")) /* its field of view is its own */
+  if (cJSON_HasObjectItem(json, "fl_x") ||
+      cJSON_HasObjectItem(json, "camera_angle_x")) /* its field of view is its own */
     frame->lens.fl_x = frame->lens.fl_y = frame->lens.angle_x = frame->lens.angle_y = 0;
   frame->own_size = cJSON_HasObjectItem(json, "w") && cJSON_HasObjectItem(json, "h");
   SF_TRY(sf_lens_parse(&frame->lens, json, where));

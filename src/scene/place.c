@@ -327,7 +327,8 @@ static sf_status warn_mirrored(sf_dataset *data, const sf_capture *c)
     if (vec_dot(out, back) < 0) mirrored++, first = f;
   }
   if (!mirrored) return sf_ok();
-  return sf_warn(data, "%s: %d of %d poses are mirrored (determinant -1), the first is %s: are x, y and z right, up, back?",
+  return sf_warn(data,
+                 "%s: %d of %d poses are mirrored (determinant -1), the first is %s: are x, y and z right, up, back?",
                  c->list, mirrored, c->count - c->first, c->frame[first].file_path);
 }
 

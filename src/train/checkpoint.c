@@ -27,8 +27,8 @@ static uint64_t mix(uint64_t hash, const void *data, size_t bytes)
 /* Of the cameras, of the pictures' sizes and brightness, and of where the scene lies. */
 static void write_views(const sf_dataset *data, char text[17])
 {
-  const float space[] = {data->scale,        data->offset[0],    data->offset[1],   data->offset[2], (float)data->bound,
-                         data->ndc ? 1 : 0, data->ndc_focal[0], data->ndc_focal[1]};
+  const float space[] = {data->scale,        data->offset[0],   data->offset[1],    data->offset[2],
+                         (float)data->bound, data->ndc ? 1 : 0, data->ndc_focal[0], data->ndc_focal[1]};
   uint64_t hash = mix(0xcbf29ce484222325, space, sizeof space);
   for (int v = 0; v < data->count; v++) {
     hash = mix(hash, &data->view[v].camera, sizeof data->view[v].camera);
@@ -121,7 +121,10 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
     char views[17];
     write_views(t->data, views);
     cJSON_AddStringToObject(meta, "train.views", views);
-    cJSON_ArrayForEach(item, t->options.record) cJSON_AddStringToObject(meta, item->string, item->valuestring);
+    cJSON_ArrayForEach(item, t->options.record)
+    {
+      cJSON_AddStringToObject(meta, item->string, item->valuestring);
+    }
     state_field field[STATE_FIELDS + VM_FIELDS];
     const int fields = state_table((sf_trainer *)t, field);
     for (int i = 0; i < fields; i++)
