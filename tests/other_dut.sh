@@ -28,7 +28,7 @@ sources=$(grep -v '^sf_top.sv' "$work/kit/rtl.f" | sed "s|^|$rtl/|" | tr '\n' ' 
 run() {
   local name=$1 want=$2 got
   shift 2
-  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 200 --limit-samples 3000 --seed 7 --quiet --json "$@" \
+  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 200 --limit-samples 3000 --seed 7 --quiet --json --evidence "$work/evidence" "$@" \
     >"$work/$name.json" 2>"$work/$name.err"
   got=$?
   while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/$name.err")

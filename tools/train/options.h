@@ -1,0 +1,30 @@
+/* The command line of sf_train: its options, those of the run that it resumes, and what follows from both. */
+#ifndef SPIKEFIELD_TOOLS_TRAIN_OPTIONS_H
+#define SPIKEFIELD_TOOLS_TRAIN_OPTIONS_H
+#include "spikefield/cli.h"
+#include "spikefield/train.h"
+
+enum { TRAIN_OPTIONS_MAX = 64 };
+
+typedef struct train_arguments {
+  const char *output, *log, *summary, *fine_tune;
+  sf_train_options train;
+  double scale, theta, checkpoint_minutes, gamma;
+  int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits;
+  bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
+  int argc;
+  char **argv;
+  char *before[TRAIN_OPTIONS_MAX]; /* the program's name and what the run to resume was started with */
+  int words;                       /* of it */
+  cJSON *record;
+} train_arguments;
+
+void train_defaults(train_arguments *a, int argc, char **argv);
+void train_arguments_free(train_arguments *a);
+/* options: TRAIN_OPTIONS_MAX, filled. */
+sf_cli train_cli(train_arguments *a, sf_option *options);
+/* path: of the data. With --resume on top of the options of the run at --output. */
+sf_status train_parse(train_arguments *a, const char **path);
+/* What follows from the data: TensoRF's defaults, the box, the background; says so unless quiet. */
+sf_status train_settle(train_arguments *a, const sf_dataset *data);
+#endif

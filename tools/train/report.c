@@ -1,0 +1,118 @@
+#include "tools/train/report.h"
+#include "spikefield/io.h"
+#include <math.h>
+#include <stdlib.h>
+
+static double psnr_of(double mse)
+{
+  return mse > 0 ? -10 * log10(mse) : 99;
+}
+
+void train_log_line(FILE *log, const sf_train_stats *s)
+{
+  fprintf(log,
+          "{\"iteration\":%lld,\"stage\":%d,\"seconds\":%.3f,\"loss\":%.9g,\"mse\":%.9g,\"mse_full\":%.9g,"
+          "\"mse_floor\":%.9g,\"mse_ceil\":%.9g,\"psnr\":%.4f,\"t_star\":%.6f,\"t_r\":%d,\"rays\":%d,\"samples\":%d,"
+          "\"lattice\":%d,"
+          "\"occupied\":%.6f,\"tau\":[%.5f,%.5f,%.5f,%.5f,%.5f],\"firing\":[%.5f,%.5f,%.5f],\"quiet\":[%d,%d,%d],"
+          "\"revived\":[%d,%d,%d]}\n",
+          (long long)s->iteration, s->stage, s->seconds, s->loss, s->mse, s->mse_full, s->mse_floor, s->mse_ceil,
+          psnr_of(s->mse), s->t_star, s->t_r, s->rays, s->samples, s->lattice, s->occupied, s->tau[0], s->tau[1],
+          s->tau[2], s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2], s->quiet[0], s->quiet[1],
+          s->quiet[2], s->revived[0], s->revived[1], s->revived[2]);
+}
+
+void train_smooth(train_recent *r, const sf_train_stats *s, double step)
+{
+  const double keep = r->mse > 0 ? 0.95 : 0;
+  r->mse = keep * r->mse + (1 - keep) * s->mse;
+  r->loss = keep * r->loss + (1 - keep) * s->loss;
+  r->rate = keep * r->rate + (1 - keep) * s->samples / fmax(step, 1e-9);
+}
+
+void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r)
+{
+  const double left = s->progress > 1e-6 ? s->seconds * (1 - s->progress) / s->progress : 0;
+  sf_progress_show(p,
+                   "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f  firing %.2f "
+                   "%.2f %.2f  ETA %d:%02d",
+                   s->stage == 1 ? "I " : "II", 100 * s->progress, (long long)s->iteration, r->rate / 1e3, r->loss,
+                   psnr_of(r->mse), s->t_star, s->firing[0], s->firing[1], s->firing[2], (int)left / 60,
+                   (int)left % 60);
+}
+
+void train_warn(sf_progress *progress, const sf_train_stats *s)
+{
+  static const char *const layer[] = {"D1", "C1", "C2"};
+  for (int l = 0; l < 3; l++)
+    if (s->event[l]) {
+      sf_progress_end(progress);
+      fprintf(stderr, "sf_train: warning: iteration %lld: the neurons of %s %s: brought back to the threshold\n",
+              (long long)s->iteration, layer[l], s->event[l] < 0 ? "were silent" : "fired all the time");
+    }
+}
+
+static cJSON *make_summary(const train_arguments *a, const sf_config *c, const sf_train_stats *s,
+                           const train_quality *q)
+{
+  static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "model", a->output);
+  cJSON_AddStringToObject(json, "backbone", c->backbone == SF_TENSORF ? "tensorf" : "ingp");
+  cJSON_AddStringToObject(json, "layout", q->layout);
+  cJSON_AddStringToObject(json, "net", net[c->net]);
+  cJSON_AddStringToObject(json, "mode", mode[c->mode]);
+  cJSON_AddNumberToObject(json, "beta", a->train.beta);
+  cJSON_AddNumberToObject(json, "seed", (double)a->train.seed);
+  cJSON_AddNumberToObject(json, "iterations", (double)s->iteration);
+  cJSON_AddNumberToObject(json, "seconds", s->seconds);
+  cJSON_AddNumberToObject(json, "samples_per_second", s->samples_per_second);
+  cJSON_AddNumberToObject(json, "T", c->steps);
+  cJSON_AddNumberToObject(json, "t_r", s->t_r);
+  cJSON_AddNumberToObject(json, "t_star", s->t_star);
+  if (c->backbone == SF_INGP) cJSON_AddNumberToObject(json, "lattice", c->lattice);
+  cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
+  cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
+  cJSON_AddItemToObject(json, "quiet", cJSON_CreateIntArray(s->quiet, 3));
+  cJSON_AddItemToObject(json, "revived", cJSON_CreateIntArray(s->revived, 3));
+  cJSON_AddNumberToObject(json, "psnr", q->psnr);
+  cJSON_AddNumberToObject(json, "ssim", q->ssim);
+  cJSON_AddNumberToObject(json, "views", q->views);
+  if (q->prefixes) cJSON_AddItemToObject(json, "prefix_psnr", cJSON_CreateDoubleArray(q->prefix, q->prefixes));
+  return json;
+}
+
+static sf_status print_json(const cJSON *json, const char *model)
+{
+  char *text = cJSON_PrintUnformatted(json);
+  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the summary", model);
+  puts(text);
+  free(text);
+  return sf_ok();
+}
+
+static void print_text(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
+{
+  printf(
+      "%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
+      a->output, (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr, q->ssim, q->views);
+  if (c->backbone == SF_INGP)
+    printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
+           c->dt_gamma > 0 ? " near the camera" : "");
+  if (!q->prefixes) return;
+  printf("%s: PSNR at 1..%d steps:", a->output, q->prefixes);
+  for (int i = 0; i < q->prefixes; i++) printf(" %.2f", q->prefix[i]);
+  printf(" dB\n");
+}
+
+sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
+{
+  cJSON *json = make_summary(a, c, s, q);
+  sf_status status = a->summary ? sf_json_save(json, a->summary) : sf_ok();
+  if (!status.code && a->json)
+    status = print_json(json, a->output);
+  else if (!status.code)
+    print_text(a, c, s, q);
+  cJSON_Delete(json);
+  return status;
+}

@@ -1,0 +1,26 @@
+/* What sf_train tells while it learns and at the end. */
+#ifndef SPIKEFIELD_TOOLS_TRAIN_REPORT_H
+#define SPIKEFIELD_TOOLS_TRAIN_REPORT_H
+#include "tools/train/options.h"
+#include <stdio.h>
+
+/* Averages for the eye; the log has the raw values. */
+typedef struct train_recent {
+  double mse, loss, rate;
+} train_recent;
+
+/* Held-out quality at the end. */
+typedef struct train_quality {
+  double psnr, ssim, prefix[SF_T_MAX];
+  int views, prefixes;
+  const char *layout; /* of the data */
+} train_quality;
+
+void train_log_line(FILE *log, const sf_train_stats *s);
+/* step: seconds of the latest iteration. */
+void train_smooth(train_recent *r, const sf_train_stats *s, double step);
+void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r);
+void train_warn(sf_progress *progress, const sf_train_stats *s);
+/* To standard output as text or JSON, and to --summary. */
+sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q);
+#endif
