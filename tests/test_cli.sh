@@ -255,6 +255,7 @@ number error_budget --rays 0 -1 nan
 usage DATA error_budget model.safetensors s.snn
 usage nosuch sf_scene nosuch -o out
 usage -o sim_render s.snn d
+usage "--png is for previews" sim_render s.snn d -o x.png
 usage --output sf_export model.safetensors
 usage --views energy_audit s.snn d --view 0 --views 1
 usage --compare energy_audit --compare s.snn

@@ -5,6 +5,7 @@
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { RTL_CROP = 16, SEED = 1 };
 static const uint64_t NO_SEED = UINT64_MAX; /* not given */
@@ -284,6 +285,8 @@ static sf_status check_modes(options *o)
     SF_TRY(
         refuse(o->backend == SF_BACKEND_RTL && !o->crop, "--all --backend rtl", "needs --crop: whole views take days"));
   }
+  const char *dot = strrchr(o->output, '.');
+  if (!o->all) SF_TRY(refuse(dot && !strcasecmp(dot, ".png"), o->output, "would hold an EXR: --png is for previews"));
   if (!o->split) o->split = "test";
   if (!o->downscale) o->downscale = 1;
   if (o->view < 0) o->view = 0;
