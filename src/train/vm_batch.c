@@ -110,7 +110,7 @@ sf_status sf_vm_draw(sf_trainer *t)
   sf_batch_pack(b);
   const int lanes = b->blocks * SF_BLOCK, products = (sf_tensorf_products(&t->model.config.tensorf) + 15) / 16 * 16;
   SF_TRY(reserve_lanes(vm, lanes, products));
-  memset(vm->x, 0, (size_t)lanes * 3 * sizeof *vm->x);
+  if (lanes > 0) memset(vm->x, 0, (size_t)lanes * 3 * sizeof *vm->x);
   for (int r = 0; r < b->rays; r++) place(t, r);
   return sf_ok();
 }
