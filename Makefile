@@ -147,6 +147,8 @@ all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 
 # Tests
 CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
+$(TESTS:%=$B/tests/%): $B/obj/tests/ck_mark.o
+$(TESTS:%=$B/tests/%): CHECK_LIBS += -Wl,--wrap=_mark_point
 $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
@@ -172,7 +174,7 @@ asan: ## the C tests under address and undefined-behaviour sanitizers
 
 ASAN_TESTS := $(filter-out $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
-	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 tests/run.sh $B $(ASAN_TESTS) fuzz
+	@ASAN_OPTIONS=detect_leaks=0 SANITIZED=1 SF_FX_SAMPLES=10000 tests/run.sh $B $(ASAN_TESTS) fuzz
 
 include sim/coverage.mk
 include tests/formal/formal.mk
