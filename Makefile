@@ -234,9 +234,9 @@ BUDGET ?= $(if $(wildcard $B/demo/scene.snn),$B/demo/model.safetensors $B/demo/s
 error-budget: $B/bin/error_budget ## error of each fixed-point block and its bound; its cost in dB after make demo or BUDGET="MODEL SCENE DATA"
 	@$B/bin/error_budget $(BUDGET)
 
-format: ## clang-format every C file
+format: ## clang-format every C file but the generated ones
 	@command -v clang-format >/dev/null || { echo "format: clang-format is not installed" >&2; exit 1; }
-	clang-format -i $$(git ls-files '*.c' '*.h')
+	clang-format -i $$(git ls-files '*.c' '*.h' ':!rtl/gen')
 
 clean: ## remove build/
 	rm -rf $B

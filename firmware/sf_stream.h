@@ -10,7 +10,8 @@ typedef struct sf_stream {
 } sf_stream;
 sf_stream sf_stream_for(const sf_bus *bus, const sf_net_blob *net);
 
-/* f[n_feature]; dir[n_dir] for the first sample of a ray, NULL for the others; of a decoder dir alone, for every one. result: density, then three colours.
- * SF_DRIVER_TIMEOUT when the accelerator takes or gives nothing: its ERROR register may say why. */
+/* f[n_feature]; dir[n_dir] for the first sample of a ray, NULL for the others; of a decoder dir alone, for every one.
+ * result: density, then three colours. SF_DRIVER_TIMEOUT when the accelerator takes or gives nothing: its ERROR
+ * register may say why. */
 sf_driver_code sf_stream_sample(const sf_stream *stream, const int16_t *dir, const int16_t *f, uint32_t result[4]);
 #endif

@@ -7,8 +7,8 @@
 enum { SF_REPLAY_MAX = 128, SF_PLUSARG_MAX = 63 };
 
 typedef struct sf_replay_sample {
-  uint64_t ray, sample; /* for the reader: `sample` counts from 0 along the ray */
-  bool first;           /* the direction is sent with it */
+  uint64_t ray, sample;              /* for the reader: `sample` counts from 0 along the ray */
+  bool first;                        /* the direction is sent with it */
   int16_t dir[FX_SH], f[SF_DIR_MAX]; /* [fx_net_inputs] */
 } sf_replay_sample;
 

@@ -592,12 +592,10 @@ END_TEST
 /* What would be lost at the end is refused at the start; nothing stays behind, and no file is changed. */
 START_TEST(cli_outputs)
 {
-  static const char *const lines[][3] = {{"a -o a", "--output", "is the input"},
-                                         {"b -o ./a", "--output", "is the input"},
-                                         {"a --log b", "--log", "is the input"},
-                                         {"in --start a -o b", "--output", "also --start"},
-                                         {"in -o c --log c", "--output", "also --log"},
-                                         {"in --log d/../c -o c", "--output", "also --log"}};
+  static const char *const lines[][3] = {
+      {"a -o a", "--output", "is the input"},        {"b -o ./a", "--output", "is the input"},
+      {"a --log b", "--log", "is the input"},        {"in --start a -o b", "--output", "also --start"},
+      {"in -o c --log c", "--output", "also --log"}, {"in --log d/../c -o c", "--output", "also --log"}};
   static const char *const unwritable[] = {"in -o none/c", "in -o d", "in -o a/c", "in -o /dev/null"};
   static const char *const good[] = {"a -o c --log d", "d --log d -o d/a", "in --start c -o x", "in --log none/c"};
   const char *p[2];

@@ -641,7 +641,8 @@ static double picture_psnr(int ndc)
          report.layer[2].error, report.layer[3].error, report.layer[4].error, scene.feature_scale[0], scene.dir_scale,
          scene.net.layer[FX_C1].bias);
   for (int i = 0; i < PIXELS; i++) pixel_ray(i, ndc, origin[i], direction[i]);
-  ck_assert_int_eq(sf_render_rays(&m, origin[0], direction[0], PIXELS, 0, white, rgb[0], NULL, NULL, decoded).code, SF_OK);
+  ck_assert_int_eq(sf_render_rays(&m, origin[0], direction[0], PIXELS, 0, white, rgb[0], NULL, NULL, decoded).code,
+                   SF_OK);
   for (int i = 0; i < PIXELS; i++) {
     fx_ray ray;
     fx_pixel pixel;

@@ -50,7 +50,7 @@ static sf_train_options long_run(void)
   sf_train_options o = small_run();
   o.stage1 = 400;
   o.stage2 = 0;
-  o.lr_net = 3e-4; /* too slow for a dead layer to come back by itself, ... */
+  o.lr_net = 3e-4;                                   /* too slow for a dead layer to come back by itself, ... */
   for (int i = 0; i < 3; i++) o.config.theta[i] = 1; /* ... and its surrogate's slope too small */
   return o;
 }

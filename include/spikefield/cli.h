@@ -16,17 +16,17 @@ typedef enum {
   SF_ARG_CHOICE
 } sf_arg_type;
 typedef struct sf_option {
-  const char *name;   /* "--beta" */
-  char letter;        /* 'o' for -o, or 0 */
+  const char *name; /* "--beta" */
+  char letter;      /* 'o' for -o, or 0 */
   sf_arg_type type;
-  void *value;        /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
-  double min, max;    /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
-  const char *choices; /* "hybrid|decay|no-decay" */
+  void *value;                 /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
+  double min, max;             /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
+  const char *choices;         /* "hybrid|decay|no-decay" */
   const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)" */
 } sf_option;
 typedef struct sf_cli {
   const char *program, *usage, *summary, *examples; /* shown by --help */
-  const sf_option *options; /* ends with name == NULL */
+  const sf_option *options;                         /* ends with name == NULL */
   int min_positional, max_positional;
 } sf_cli;
 
@@ -53,5 +53,5 @@ void sf_progress_begin(sf_progress *progress, bool quiet);
 bool sf_progress_due(const sf_progress *progress);
 void sf_progress_show(sf_progress *progress, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void sf_progress_end(sf_progress *progress); /* leaves the last line standing */
-double sf_seconds(void); /* monotonic clock */
+double sf_seconds(void);                     /* monotonic clock */
 #endif

@@ -308,8 +308,8 @@ sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval
 
 /* A scene made ready for the vector kernels, which give the same bits as the functions above on every machine. It must
  * outlive the core and stay as it is; what fx_scene_check refuses is refused. One core serves any number of threads.
- * kernels: "portable", "avx2", "avx512vnni", "amx", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it lacks the
- * named one. */
+ * kernels: "portable", "avx2", "avx512vnni", "amx", or NULL for the best that this CPU has; SF_E_UNSUPPORTED when it
+ * lacks the named one. */
 typedef struct fx_core fx_core;
 sf_status fx_core_open(fx_core **core, const fx_scene *scene, const char *kernels);
 void fx_core_close(fx_core *core); /* NULL is fine */
@@ -337,7 +337,7 @@ sf_status fx_scene_allocate(fx_scene *scene, const char *path);
  * (the biases, log2_bound, growing steps, model_scale) is in the metadata only where it is not 0. */
 sf_status fx_scene_load(fx_scene *scene, const char *path);
 sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size,
-                               const char *name); /* a file's contents */
+                               const char *name);                 /* a file's contents */
 sf_status fx_scene_save(const fx_scene *scene, const char *path); /* SF_E_UNSUPPORTED for a decoder behind no field */
 void fx_scene_free(fx_scene *scene);
 #endif

@@ -15,7 +15,8 @@ typedef struct sf_image {
 sf_status sf_image_load(sf_image *image, const char *path);
 /* 8-bit RGBA PNG; written aside, then renamed. */
 sf_status sf_image_save_png(const sf_image *image, const char *path);
-/* PNG in memory, *data malloc'ed. pixel: [height][width] RGB, or with a palette of `colours` RGBA entries their indices. */
+/* PNG in memory, *data malloc'ed. pixel: [height][width] RGB, or with a palette of `colours` RGBA entries their
+ * indices. */
 sf_status sf_png_encode(const uint8_t *pixel, int width, int height, const uint8_t *palette, int colours, void **data,
                         size_t *size);
 /* Box filter by an integer factor >= 1, alpha-weighted. Columns on the right and rows at the bottom that fill no whole

@@ -45,7 +45,8 @@ typedef struct sf_tensors {
   char *buffer;    /* owned file contents after load */
   char path[4096];
 } sf_tensors;
-/* Checks header length, types, shapes against offsets, overlap, holes and file length; F32 may hold NaN: see sf_tensor_finite. */
+/* Checks header length, types, shapes against offsets, overlap, holes and file length; F32 may hold NaN: see
+ * sf_tensor_finite. */
 sf_status sf_tensors_load(sf_tensors *set, const char *path);
 /* The same of a file's contents; they are copied. `name` stands for the path in messages. */
 sf_status sf_tensors_load_memory(sf_tensors *set, const void *data, size_t size, const char *name);

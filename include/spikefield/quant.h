@@ -55,22 +55,23 @@ int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths);
 
 enum { SF_CELL_CLASSES = 16 };
 
-/* Which parts of a scene stay. All steps, thresholds and weights keep their meaning, so the result is an ordinary scene. */
+/* Which parts of a scene stay. All steps, thresholds and weights keep their meaning, so the result is an ordinary
+ * scene. */
 typedef struct sf_trim {
-  bool neuron[SF_LAYERS][SF_LANES];  /* D1, C1, C2; of D2 the outputs: [0] is the density and always stays */
-  bool level[FX_LEVELS_MAX];         /* of the grid, with their two features */
-  int32_t log2_size[FX_LEVELS_MAX];  /* -1: the level's table as it is; else hashed into this many entries */
-  int32_t directions;                /* leading spherical harmonics, >= 1 unless the scene has none */
-  int32_t steps, trans_stop;         /* as in fx_net, fx_scene */
-  bool cells[SF_CELL_CLASSES];       /* occupancy cells by class (sf_cell_class): all of a class stay or go */
+  bool neuron[SF_LAYERS][SF_LANES]; /* D1, C1, C2; of D2 the outputs: [0] is the density and always stays */
+  bool level[FX_LEVELS_MAX];        /* of the grid, with their two features */
+  int32_t log2_size[FX_LEVELS_MAX]; /* -1: the level's table as it is; else hashed into this many entries */
+  int32_t directions;               /* leading spherical harmonics, >= 1 unless the scene has none */
+  int32_t steps, trans_stop;        /* as in fx_net, fx_scene */
+  bool cells[SF_CELL_CLASSES];      /* occupancy cells by class (sf_cell_class): all of a class stay or go */
 } sf_trim;
 
 /* What the samples of a set of rays used. Counts of samples x steps but `entry`, `visits`, `weight2`. */
 typedef struct sf_trim_use {
-  uint64_t fired[SF_LAYERS][SF_LANES];     /* spikes; of D2: outputs h that were not 0 */
-  uint64_t feature[SF_FEATURE_MAX];        /* samples in which the feature was not 0 */
-  uint64_t *entry;                         /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
-  uint64_t *visits, *weight2;              /* [cells] samples; sum of their squared compositing weights, Q.40 */
+  uint64_t fired[SF_LAYERS][SF_LANES]; /* spikes; of D2: outputs h that were not 0 */
+  uint64_t feature[SF_FEATURE_MAX];    /* samples in which the feature was not 0 */
+  uint64_t *entry;            /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
+  uint64_t *visits, *weight2; /* [cells] samples; sum of their squared compositing weights, Q.40 */
 } sf_trim_use;
 sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene);
 void sf_trim_use_free(sf_trim_use *use);

@@ -40,7 +40,7 @@ typedef struct tracer {
   const sf_exact *real;  /* all blocks, for the errors of currents; NULL in all rows but the first */
   fx_ray ray;
   double dir[FX_SH]; /* unrounded direction features, LSB */
-  double unit[3];         /* direction */
+  double unit[3];    /* direction */
   int32_t core_base[SF_LANES];
   double base[SF_LANES];
   fx_trace trace;

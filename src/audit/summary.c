@@ -55,8 +55,8 @@ static void print_words(FILE *out, const fx_net *net)
       "A picture is made of rays, a ray of samples; each sample goes through a small spiking net for t_r time steps:\n"
       "%scolour (C1 C2 C3). A MAC multiplies a real-valued input by a weight and adds; a SOP adds a weight because a\n"
       "neuron fired; a neuron update is one leak, comparison and reset. The ReLU twin is a\n"
-      "count: a dense ReLU net of the same layer sizes on the same samples, every synapse a MAC, no zeros skipped; it was\n"
-      "not trained for this figure.\n\n",
+      "count: a dense ReLU net of the same layer sizes on the same samples, every synapse a MAC, no zeros skipped; it\n"
+      "was not trained for this figure.\n\n",
       fx_net_decodes(net) ? "" : "density (D1 D2), ");
 }
 
