@@ -221,6 +221,7 @@ done <<'END'
 --feature-bits 9
 --leak-bits 6
 --grid-bits 4
+--seed 2
 --data d
 END
 usage "--view needs --traces" sf_export s.snn --vectors out --data d --view 0

@@ -337,6 +337,7 @@ static sf_status check_use(const options *o)
   SF_TRY(only(o->fit_loss >= 0, "--fit-loss", o->fit, "--fit"));
   SF_TRY(only(o->fit_rays, "--fit-rays", o->fit, "--fit"));
   SF_TRY(only(e->data, "--data", o->fit || e->vectors || e->traces, "--fit, --vectors or --traces"));
+  SF_TRY(only(e->seed, "--seed", o->output || e->vectors || e->traces, "--output (-o), --vectors or --traces"));
   SF_TRY(only(e->samples, "--samples", e->vectors, "--vectors"));
   SF_TRY(only(e->rays, "--rays", e->vectors || e->traces, "--vectors or --traces"));
   return only(e->view >= 0, "--view", e->traces, "--traces");
