@@ -2,9 +2,9 @@
  * other, every event counted where it happens. Shares only the two table functions with the core. */
 #ifndef SPIKEFIELD_TESTS_FX_FIXTURE_H
 #define SPIKEFIELD_TESTS_FX_FIXTURE_H
+#include "ck_run.h"
 #include "spikefield/rng.h"
 #include "src/fx/unit.h"
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -325,14 +325,5 @@ static inline fx_out assert_sample(const fx_net *net, const int16_t *f, const in
   assert_same_counts(&a, &b);
   free(naive);
   return fast;
-}
-
-static inline int fixture_run(Suite *suite)
-{
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
 }
 #endif

@@ -2,11 +2,11 @@
 #ifndef SPIKEFIELD_TESTS_RTL_UNIT_H
 #define SPIKEFIELD_TESTS_RTL_UNIT_H
 extern "C" {
+#include "ck_run.h"
 #include "spikefield/rng.h"
 #include "src/fx/unit.h"
 }
 #include "verilated.h"
-#include <check.h>
 #include <cstdlib>
 
 struct random_draw {
@@ -67,14 +67,5 @@ static inline int unit_length()
   const char *text = getenv("SF_UNIT_LONG");
   const int n = text ? atoi(text) : 1;
   return n > 0 ? n : 1;
-}
-
-static inline int unit_run(Suite *suite)
-{
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
 }
 #endif

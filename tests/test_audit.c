@@ -1,4 +1,5 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
+#include "ck_run.h"
 #include "spikefield/cycles.h"
 #include "spikefield/golden.h"
 #include "tests/audit_fixture.h"
@@ -806,5 +807,5 @@ int main(void)
   suite_add_tcase(suite, counts);
   suite_add_tcase(suite, measure);
   suite_add_tcase(suite, report);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* Packing of rays into bundles of blocks, and compaction against the naive transmittance. */
+#include "ck_run.h"
 #include "render/composite.h"
 #include "train_fixture.h"
 
@@ -124,10 +125,5 @@ int main(void)
   tcase_add_test(c, every_ray_is_in_one_bundle);
   tcase_add_test(c, compaction_keeps_what_light_reaches);
   suite_add_tcase(s, c);
-  SRunner *runner = srunner_create(s);
-  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run_in(s, CK_NOFORK); // OpenMP does not survive a fork
 }

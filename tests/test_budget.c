@@ -1,8 +1,8 @@
 /* The error budget: no block's error is over its derived bound, and no bound is idle. */
+#include "ck_run.h"
 #include "spikefield/budget.h"
 #include "spikefield/quant.h"
 #include "tests/float_fixture.h"
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -122,9 +122,5 @@ int main(void)
   tcase_add_loop_test(cases, picture_from_fixed_to_float, SF_HYBRID, SF_NODECAY + 1);
   tcase_add_test(cases, currents_within_their_bounds);
   suite_add_tcase(suite, cases);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+  return ck_run(suite);
 }

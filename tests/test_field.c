@@ -1,7 +1,7 @@
 /* Hash grid and spherical harmonics. */
+#include "ck_run.h"
 #include "float_fixture.h"
 #include "snn/kernels.h"
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -121,9 +121,5 @@ int main(void)
   tcase_add_test(tc, backward_is_the_adjoint);
   tcase_add_test(tc, harmonics_are_orthonormal);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

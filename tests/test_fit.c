@@ -1,4 +1,5 @@
 /* Trimming and fitting: what is left out without effect changes no bit, the rest stays within the bound. */
+#include "ck_run.h"
 #include "spikefield/fit.h"
 #include "src/quant/internal.h"
 #include "tests/folder_fixture.h"
@@ -421,5 +422,5 @@ int main(void)
   tcase_add_test(tc, refusals);
   tcase_add_test(tc, targets);
   suite_add_tcase(suite, tc);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* The units of the fixed-point core, each against an independent form; errors against real numbers: test_budget. */
+#include "ck_run.h"
 #include "src/fx/round.h"
 #include "tests/fx_fixture.h"
 #include <math.h>
@@ -299,5 +300,5 @@ int main(void)
   tcase_add_test(units, grid_reproduces_constants);
   tcase_add_test(units, march_tests_every_point);
   suite_add_tcase(suite, units);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

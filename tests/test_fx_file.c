@@ -1,4 +1,5 @@
 /* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "tests/fx_tensorf_fixture.h"
 #include <dirent.h>
@@ -384,5 +385,5 @@ int main(void)
   tcase_add_test(files, a_decoder_alone_is_no_file);
   tcase_add_test(files, unwritable_and_missing);
   suite_add_tcase(suite, files);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

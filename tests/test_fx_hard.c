@@ -1,5 +1,6 @@
 /* The hard cases of the fixed-point contract through the core and the naive nets: everything is compared (currents,
  * membranes, spikes, outputs, pixels, counts), and each case's own expectation holds. */
+#include "ck_run.h"
 #include "tests/fx_hard_cases.h"
 
 static void run_net(hard *h, const hard_case *c, int variant)
@@ -54,5 +55,5 @@ int main(void)
 {
   Suite *suite = suite_create("fx_hard");
   hard_add(suite, core);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* The nets and the rendering of a ray against naive forms; event counts against counting each event. */
+#include "ck_run.h"
 #include "tests/fx_fixture.h"
 
 static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
@@ -231,5 +232,5 @@ int main(void)
   tcase_add_test(nets, render_equals_naive_evaluation);
   tcase_add_test(nets, render_hands_on_a_failure);
   suite_add_tcase(suite, nets);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,6 +1,7 @@
 /* TensoRF in integers: units against their definitions over every input, the field against real numbers within a
  * derived bound, hard cases, files, and whole rays: portable = vector, thresholds, and pictures against the float
  * model. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "spikefield/quant.h"
 #include "spikefield/spikefield.h"
@@ -720,9 +721,5 @@ int main(void)
     tcase_set_timeout(cases[i], 120);
     suite_add_tcase(suite, cases[i]);
   }
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_NORMAL);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? 1 : 0;
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* Vector kernels against the portable core, bit for bit: nets, grid, marching, whole rays with their counts, on random
  * scenes of every size and mode. SF_FX_SAMPLES: samples through the nets for each instruction set (default 40 000). */
+#include "ck_run.h"
 #include "base/memory.h"
 #include "fx_hard_cases.h"
 #include "src/fx/core.h"
@@ -366,5 +367,5 @@ int main(void)
   tcase_add_test(equal, absurd_scenes_are_refused);
   suite_add_tcase(suite, equal);
   hard_add(suite, hard_cases_equal_portable);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* The golden model for SystemVerilog benches against the core itself: beats and samples, results, spikes, rows,
  * membranes, counters; what it refuses; many handles in many threads. */
+#include "ck_run.h"
 #include "spikefield/sf_golden_dpi.h"
 #include "tests/lib_fixture.h"
 #include "tests/random_net.h"
@@ -213,9 +214,5 @@ int main(void)
   tcase_add_test(tests, what_it_refuses);
   tcase_add_test(tests, handles_do_not_share);
   suite_add_tcase(suite, tests);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_NORMAL);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* The HTML report: well-formed, nothing fetched, every figure there with its data, every number the JSON's; and a page
  * with a planted fault is caught. */
+#include "ck_run.h"
 #include "spikefield/html.h"
 #include "spikefield/io.h"
 #include "tests/fx_tensorf_fixture.h"
@@ -368,9 +369,5 @@ int main(void)
   tcase_add_test(c, a_difference_is_shown);
   tcase_add_test(c, planted_faults_are_seen);
   suite_add_tcase(suite, c);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_NORMAL);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

@@ -1,9 +1,9 @@
 /* PNG, JPEG, EXR, downscaling, PSNR and SSIM. */
+#include "ck_run.h"
 #include "spikefield/image.h"
 #include "spikefield/io.h"
 #include "folder_fixture.h"
 #include "spikefield/rng.h"
-#include <check.h>
 #include <dirent.h>
 #include <math.h>
 #include <png.h>
@@ -616,9 +616,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? 1 : 0;
+  return ck_run(suite());
 }

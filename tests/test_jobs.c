@@ -1,8 +1,8 @@
 /* Units of work over processes: order, early end, lost processes, interruption; no process stays behind. */
+#include "ck_run.h"
 #include "sim/jobs.h"
 #include "spikefield/cli.h"
 #include "spikefield/rng.h"
-#include <check.h>
 #include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -130,9 +130,5 @@ int main(void)
   tcase_add_test(c, a_process_dies);
   tcase_add_test(c, interrupted);
   suite_add_tcase(s, c);
-  SRunner *runner = srunner_create(s);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(s);
 }

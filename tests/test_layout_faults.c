@@ -1,5 +1,6 @@
 /* Folders of posed pictures in which something is missing, broken or odd: passed over with a warning, or refused in one
  * line. */
+#include "ck_run.h"
 #include "layout_folder.h"
 
 START_TEST(a_few_missing_pictures_are_passed_over)
@@ -421,9 +422,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

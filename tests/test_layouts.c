@@ -1,4 +1,5 @@
 /* LLFF, COLMAP and instant-ngp against the Blender layout of the same cameras. */
+#include "ck_run.h"
 #include "layout_folder.h"
 #include "src/scene/capture.h"
 #include <sys/stat.h>
@@ -421,9 +422,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

@@ -1,4 +1,5 @@
 /* Prices and ledgers, against pricing by hand. */
+#include "ck_run.h"
 #include "spikefield/audit.h"
 #include "spikefield/io.h"
 #include "tests/fx_fixture.h"
@@ -459,5 +460,5 @@ int main(void)
   tcase_add_test(ledgers, report_and_json_show_every_ledger);
   suite_add_tcase(suite, files);
   suite_add_tcase(suite, ledgers);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* Lenses against OpenCV's equations, and as every layout brings them. */
+#include "ck_run.h"
 #include "layout_folder.h"
 #include "src/scene/lens.h"
 
@@ -128,9 +129,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

@@ -1,4 +1,5 @@
 /* Scenes and samples of the C library against the core behind it; every refusal is a value that names what is wrong. */
+#include "ck_run.h"
 #include "spikefield/audit.h"
 #include "spikefield/io.h"
 #include "tests/fx_tensorf_fixture.h"
@@ -305,5 +306,5 @@ int main(void)
   tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
   tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
   suite_add_tcase(suite, cases);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

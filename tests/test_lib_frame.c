@@ -1,4 +1,5 @@
 /* Rays, frames and taps of the C library against the core: same integers, same counts, whatever the threads. */
+#include "ck_run.h"
 #include "spikefield/audit.h"
 #include "tests/lib_fixture.h"
 #include <omp.h>
@@ -233,5 +234,5 @@ int main(void)
   tcase_add_test(cases, distance_is_that_of_the_golden_image);
   tcase_add_test(cases, taps_show_every_sample_of_a_ray);
   suite_add_tcase(suite, cases);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* The manifest of golden images: canonical hashes against values made by another program, round trips, every edit seen,
  * pixels located. */
+#include "ck_run.h"
 #include "folder_fixture.h"
 #include "spikefield/io.h"
 #include "spikefield/manifest.h"
@@ -436,9 +437,5 @@ int main(void)
   tcase_add_test(t, a_flipped_pixel_is_located);
   tcase_add_test(t, the_file_says_what_its_distances_are);
   suite_add_tcase(suite, t);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+  return ck_run(suite);
 }

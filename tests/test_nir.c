@@ -2,13 +2,13 @@
  * outputs of the core and of the float oracle. */
 #include <stdio.h>
 #ifdef SF_HDF5
+#include "ck_run.h"
 #include "spikefield/exchange.h"
 #include "tests/float_fixture.h"
 #include "tests/tensorf_fixture.h"
 #include "tests/folder_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
-#include <check.h>
 #include <hdf5.h>
 #include <math.h>
 
@@ -546,11 +546,7 @@ int main(void)
   tcase_add_test(tcase, the_relu_twin_is_refused);
   tcase_add_test(tcase, same_scene_same_bytes);
   suite_add_tcase(suite, tcase);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }
 #else
 int main(void)

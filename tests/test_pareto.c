@@ -1,4 +1,5 @@
 /* Sweeps: loading, the front against its definition, names, tables; measured points against their parts. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "spikefield/pareto.h"
 #include "spikefield/rng.h"
@@ -150,9 +151,5 @@ int main(void)
   tcase_add_test(cases, what_prints_alike_is_alike);
   tcase_add_test(cases, files);
   suite_add_tcase(suite, cases);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+  return ck_run(suite);
 }

@@ -1,10 +1,10 @@
 /* Procedural scenes: shapes, the tracer, the files they are written to. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "folder_fixture.h"
 #include "spikefield/rng.h"
 #include "spikefield/scene.h"
 #include "src/scene/stage.h"
-#include <check.h>
 #include <math.h>
 #include <omp.h>
 #include <stdbool.h>
@@ -340,9 +340,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? 1 : 0;
+  return ck_run(suite());
 }

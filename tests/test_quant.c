@@ -1,9 +1,9 @@
 /* Quantiser: fixed against float per block, refusals, determinism. */
+#include "ck_run.h"
 #include "spikefield/quant.h"
 #include "spikefield/rng.h"
 #include "src/fx/unit.h"
 #include "src/quant/internal.h"
-#include <check.h>
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>
@@ -534,9 +534,5 @@ int main(void)
   tcase_add_test(cases, narrow_inputs_never_clip);
   tcase_add_test(cases, extreme_models);
   suite_add_tcase(suite, cases);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+  return ck_run(suite);
 }

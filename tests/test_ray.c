@@ -1,7 +1,7 @@
 /* Rays to integers: every point inside the box, and the lattice that of the float renderer. */
+#include "ck_run.h"
 #include "spikefield/quant.h"
 #include "spikefield/rng.h"
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -209,9 +209,5 @@ int main(void)
   tcase_add_test(cases, direction_features_within_one_lsb);
   tcase_add_test(cases, directions_that_are_none);
   suite_add_tcase(suite, cases);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+  return ck_run(suite);
 }

@@ -1,8 +1,8 @@
 /* Marching and compositing. */
+#include "ck_run.h"
 #include "float_fixture.h"
 #include "render/composite.h"
 #include "render/march.h"
-#include <check.h>
 #include <math.h>
 #include <string.h>
 
@@ -195,9 +195,5 @@ int main(void)
   tcase_add_test(tc, empty_and_missing_rays_show_the_background);
   tcase_add_test(tc, packets_equal_the_oracle);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

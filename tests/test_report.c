@@ -1,4 +1,5 @@
 /* The report of `make reproduce` from folders made by hand: averages, energies, the paper's order, what is missing. */
+#include "ck_run.h"
 #include "folder_fixture.h"
 #include "spikefield/io.h"
 #include "spikefield/report.h"
@@ -371,9 +372,5 @@ int main(void)
   tcase_add_test(tc, too_many_prefixes);
   tcase_add_test(tc, many_scenes);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? 1 : 0;
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* The accelerator against the fixed-point core, bit for bit: outputs, spikes, membranes, rows, counters. Random nets,
  * tables, streams; the hard cases are in test_rtl_hard.c. */
+#include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
 START_TEST(trained_size_nets)
@@ -212,9 +213,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

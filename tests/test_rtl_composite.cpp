@@ -320,5 +320,5 @@ int main()
   tcase_add_test(cases, hard_rays);
   tcase_add_test(cases, reset_in_mid_ray);
   suite_add_tcase(suite, cases);
-  return unit_run(suite);
+  return ck_run(suite);
 }

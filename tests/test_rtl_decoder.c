@@ -1,5 +1,6 @@
 /* Decoders (C1, C2 and C3 alone, inputs with every sample) and biases on the accelerator against the fixed-point core,
  * bit for bit, and against the cycle model, in the build that runs the nets with densities. */
+#include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
 static const int inputs_of[] = {150, 30, SF_DIR_MAX, 1};
@@ -304,9 +305,5 @@ int main(void)
   tcase_add_loop_test(nets, bad_packets_are_refused, 0, 5);
   tcase_add_test(nets, soft_reset_at_any_time);
   suite_add_tcase(s, nets);
-  SRunner *runner = srunner_create(s);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(s);
 }

@@ -1,5 +1,6 @@
 /* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, register accesses
  * that overlap. Afterwards it works as if nothing had been. */
+#include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
 enum { PATIENCE = 4000 };
@@ -378,9 +379,5 @@ int main(void)
   tcase_add_loop_test(c, register_accesses_overlap, 0, 4);
   tcase_add_test(c, part_of_a_word);
   suite_add_tcase(s, c);
-  SRunner *runner = srunner_create(s);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(s);
 }

@@ -302,5 +302,5 @@ int main(void)
   tcase_add_test(cases, reset_on_the_way_through_four_ports);
   tcase_add_test(cases, sizes_of_a_real_scene);
   suite_add_tcase(suite, cases);
-  return unit_run(suite);
+  return ck_run(suite);
 }

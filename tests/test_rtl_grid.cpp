@@ -320,5 +320,5 @@ int main(void)
   tcase_add_test(cases, an_index_behind_a_request_that_waits);
   tcase_add_test(cases, reset_on_the_way);
   suite_add_tcase(suite, cases);
-  return unit_run(suite);
+  return ck_run(suite);
 }

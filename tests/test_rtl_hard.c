@@ -1,5 +1,6 @@
 /* The hard cases of the fixed-point contract through the Verilated accelerator: equal to the core (spikes, rows,
  * membranes, outputs, pixels, counters), and each case's own expectation holds of what the accelerator gave. */
+#include "ck_run.h"
 #include "tests/fx_hard_cases.h"
 #include "tests/rtl_fixture.h"
 
@@ -55,5 +56,5 @@ int main(void)
 {
   Suite *suite = suite_create("rtl_hard");
   hard_add(suite, accelerator);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

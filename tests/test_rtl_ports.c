@@ -1,4 +1,5 @@
 /* The accelerator's ports: illegal programming, bad packets, soft reset, counters, the driver. */
+#include "ck_run.h"
 #include "firmware/sf_blob.h"
 #include "tests/rtl_fixture.h"
 #include <stdio.h>
@@ -431,9 +432,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

@@ -1,5 +1,6 @@
 /* sf_ray_top against the fixed-point core, bit for bit: sample positions in, pixels and counters out. Random scenes and
  * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
+#include "ck_run.h"
 #include "sim/ray.h"
 #include "spikefield/audit.h"
 #include "spikefield/quant.h"
@@ -343,5 +344,5 @@ int main(void)
   tcase_add_test(cases, beats_out_of_order_are_refused);
   suite_add_tcase(suite, cases);
   hard_add(suite, hard_rays);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

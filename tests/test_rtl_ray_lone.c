@@ -1,5 +1,6 @@
 /* sf_ray_top, ray by ray: rays of one sample at any position, or of none, against the core's parts; pixels that wait.
  */
+#include "ck_run.h"
 #include "sim/ray.h"
 #include "spikefield/quant.h"
 #include "tests/ck_ok.h"
@@ -116,5 +117,5 @@ int main(void)
   tcase_add_test(cases, pixels_that_wait);
   tcase_add_test(cases, every_bit_of_a_position);
   suite_add_tcase(suite, cases);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

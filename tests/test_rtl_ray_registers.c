@@ -1,5 +1,6 @@
 /* The registers of sf_ray_top against a model of csr.def: what reads back, what is refused and how, the interrupt, both
  * windows behind one bus, and what reaches the encoder. */
+#include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
 #include "sim/ray.h"
 #include "spikefield/quant.h"
@@ -520,5 +521,5 @@ int main(void)
   tcase_add_test(cases, active_until_the_pixel_has_left);
   tcase_add_test(cases, a_hard_reset_drops_responses);
   suite_add_tcase(suite, cases);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -310,5 +310,5 @@ int main()
   tcase_add_test(cases, disabled);
   tcase_add_test(cases, reset_in_mid_ray);
   suite_add_tcase(suite, cases);
-  return unit_run(suite);
+  return ck_run(suite);
 }

@@ -1,5 +1,6 @@
 /* The registers against a model of csr.def: what reads back, what is refused and how, the interrupt; the bus and the
  * window of counters. */
+#include "ck_run.h"
 #include "tests/register_model.h"
 #include "tests/rtl_fixture.h"
 
@@ -472,9 +473,5 @@ int main(void)
   tcase_add_test(c, a_walk_takes_no_time);
   tcase_add_test(c, samples_that_come_during_a_walk);
   suite_add_tcase(suite, c);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

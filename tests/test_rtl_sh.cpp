@@ -135,5 +135,5 @@ int main(void)
   tcase_add_loop_test(cases, random_directions_and_stalls, 0, 3);
   tcase_add_test(cases, reset_on_the_way);
   suite_add_tcase(suite, cases);
-  return unit_run(suite);
+  return ck_run(suite);
 }

@@ -1,8 +1,8 @@
 /* Cameras, the Blender loader. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "folder_fixture.h"
 #include "spikefield/scene.h"
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -311,9 +311,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed ? 1 : 0;
+  return ck_run(suite());
 }

@@ -1,9 +1,9 @@
 /* Spiking nets: equations by hand, oracle against kernels, gradients against finite differences. */
+#include "ck_run.h"
 #include "float_fixture.h"
 #include "base/memory.h"
 #include "render/view.h"
 #include "snn/plif.h"
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -470,9 +470,5 @@ int main(void)
   tcase_add_test(tc, adam_by_hand);
   tcase_add_test(tc, adam_of_every_isa_skips_what_has_no_gradient);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

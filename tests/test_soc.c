@@ -1,5 +1,6 @@
 /* The emulated system: programs by hand that misbehave, the firmware against the core, and the firmware with an
  * accelerator, a bus or an image that is not as it should be. */
+#include "ck_run.h"
 #include "sim/soc.h"
 #include "firmware/sf_soc.h"
 #include "firmware/sf_tile.h"
@@ -491,9 +492,5 @@ static Suite *suite(void)
 
 int main(void)
 {
-  SRunner *runner = srunner_create(suite());
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite());
 }

@@ -1,4 +1,5 @@
 /* TensoRF: layout, field and decoder by hand, files. */
+#include "ck_run.h"
 #include "tensorf_fixture.h"
 #include "folder_fixture.h"
 #include "snn/plif.h"
@@ -157,9 +158,5 @@ int main(void)
   tcase_add_test(tc, twin_is_a_network_with_biases);
   tcase_add_test(tc, save_and_load);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

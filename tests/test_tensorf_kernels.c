@@ -1,8 +1,8 @@
 /* TensoRF's vector kernels against the oracles, and their gradients. */
+#include "ck_run.h"
 #include "tensorf_fixture.h"
 #include "base/memory.h"
 #include "render/view.h"
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -426,9 +426,5 @@ int main(void)
   tcase_add_test(tc, smooth_parts_of_the_decoder_match_the_slope);
   tcase_add_test(tc, backward_of_every_isa_agrees);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* The TensoRF trainer: the schedule, what growing keeps, the mask, reproducibility, resuming. */
+#include "ck_run.h"
 #include "train_fixture.h"
 #include "train/vm.h"
 #include <omp.h>
@@ -341,9 +342,5 @@ int main(void)
   tcase_add_test(tc, rays_that_all_miss_the_box_are_refused);
   tcase_add_test(tc, nan_is_found);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* Core, accelerator and recount on whole rays: nets with a hash grid, and a decoder behind planes and lines. */
+#include "ck_run.h"
 #include "sim/compare.h"
 #include "sim/three_counts.h"
 #include "tests/audit_fixture.h"
@@ -132,5 +133,5 @@ int main(void)
   tcase_add_test(all, the_first_ray_differs);
   tcase_add_test(all, samples_and_rays_are_compared);
   suite_add_tcase(suite, all);
-  return fixture_run(suite);
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* Traces in SANA-FE's files: every spike and membrane against the naive nets, sample by sample. */
+#include "ck_run.h"
 #include "spikefield/audit.h"
 #include "spikefield/exchange.h"
 #include "tests/folder_fixture.h"
@@ -187,9 +188,5 @@ int main(void)
   tcase_add_test(tcase, names_of_views_are_quoted);
   tcase_add_test(tcase, refusals_leave_nothing);
   suite_add_tcase(suite, tcase);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_ENV);
-  const int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }

@@ -1,4 +1,5 @@
 /* Losses, determinism, resume, time budget of the trainer. */
+#include "ck_run.h"
 #include "spikefield/io.h"
 #include "train_fixture.h"
 #include <omp.h>
@@ -465,10 +466,5 @@ int main(void)
   tcase_add_test(tc, loss_gradients_are_the_slopes);
   tcase_add_test(tc, sparsity_by_hand);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
 }

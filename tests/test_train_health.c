@@ -1,4 +1,5 @@
 /* What goes wrong in training: layers that die, numbers that are not finite, scenes with nothing to see. */
+#include "ck_run.h"
 #include "train_fixture.h"
 
 static void set_up(void)
@@ -261,10 +262,5 @@ int main(void)
   tcase_add_loop_test(tc, hard_cases_stay_finite_and_in_range, 0, CASES);
   tcase_add_loop_test(tc, hard_scenes_with_the_twin, 0, SCENES);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
 }

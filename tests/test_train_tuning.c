@@ -1,4 +1,5 @@
 /* Fine-tuning for few bits: what it trains is what the exporter writes. */
+#include "ck_run.h"
 #include "snn/kernels.h"
 #include "spikefield/io.h"
 #include "spikefield/quant.h"
@@ -239,10 +240,5 @@ int main(void)
   tcase_add_test(tc, damaged_scales_are_refused);
   tcase_add_test(tc, kernels_round_h_as_the_oracle); /* last: rounds the base model's weights */
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_set_fork_status(runner, CK_NOFORK); /* OpenMP does not survive a fork */
-  srunner_run_all(runner, CK_ENV);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
 }

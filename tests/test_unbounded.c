@@ -499,9 +499,5 @@ int main(void)
   tcase_add_test(tc, unread_entries_change_no_ray);
   tcase_add_test(tc, fixed_pictures_equal_float_ones);
   suite_add_tcase(suite, tc);
-  SRunner *runner = srunner_create(suite);
-  srunner_run_all(runner, CK_NORMAL);
-  int failed = srunner_ntests_failed(runner);
-  srunner_free(runner);
-  return failed != 0;
+  return ck_run(suite);
 }
