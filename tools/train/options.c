@@ -35,9 +35,8 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
        "samples per iteration, about (default 16384, tensorf 32768)"},
       {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "tensorf: rays per iteration at most (default 4096)"},
       {"--voxels", 0, SF_ARG_INT, &t->voxels, 16, 1024, NULL, "N",
-       "tensorf: the finest grid has N^3 voxels (default half the pictures' width, at most 300; NDC: 0.63 of it, at "
-       "most "
-       "640)"},
+       "tensorf: the finest grid has N^3 voxels (default half the pictures' width, at most 300; NDC: 0.63 of it, "
+       "at most 640)"},
       {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R",
        "Adam's rate for the field (default 1e-2, tensorf 2e-2)"},
       {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R",
