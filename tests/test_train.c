@@ -446,6 +446,33 @@ START_TEST(sparsity_by_hand)
 }
 END_TEST
 
+/* Few rays may all pass by a small box: more are drawn. */
+START_TEST(few_rays_that_miss_are_no_fault)
+{
+  make_scene(4);
+  for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++)
+    for (int away = 0; away < 2; away++) {
+      sf_dataset data;
+      ck_good(
+          sf_dataset_load(&data, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = away ? 40 : 12}));
+      sf_train_options o = small_run();
+      o.samples = 256, o.stage1 = 20, o.stage2 = 20, o.config.net = net, o.config.scale = data.scale;
+      if (net == SF_NET_ANN) o.config.steps = 1;
+      sf_trainer *t = start(&data, &o, NULL);
+      sf_train_stats stats = {0};
+      sf_status status = sf_ok();
+      while (!status.code && stats.stage != 3) status = sf_trainer_step(t, &stats);
+      if (away)
+        ck_bad(status, SF_E_RANGE, "none of 32768 rays", "meets the box");
+      else
+        ck_good(status);
+      sf_trainer_free(t);
+      sf_dataset_free(&data);
+    }
+  remove_folder();
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("train");
@@ -465,6 +492,7 @@ int main(void)
   tcase_add_test(tc, loss_falls_and_both_twins_learn);
   tcase_add_test(tc, loss_gradients_are_the_slopes);
   tcase_add_test(tc, sparsity_by_hand);
+  tcase_add_test(tc, few_rays_that_miss_are_no_fault);
   suite_add_tcase(suite, tc);
   return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
 }

@@ -13,7 +13,7 @@ typedef struct sf_train_options {
   uint64_t seed;
   int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
-  bool no_extra, no_penalty, no_distill;
+  bool no_stage1, no_extra, no_penalty, no_distill;
   bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
   int fixed_steps; /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
   int background;  /* 0 random per ray, 1 white, 2 black */

@@ -112,6 +112,11 @@ static void place(sf_batch *b, const sf_march *march, int r)
 
 /* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
  * be empty, the lattice is made coarser, until it is settled. */
+int sf_batch_most(const sf_trainer *t)
+{
+  return t->options.rays ? t->options.rays : RAYS_MAX;
+}
+
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
@@ -121,7 +126,7 @@ void sf_batch_adapt(sf_trainer *t)
     if (t->rays < 512 && t->stride < 8) t->stride *= 2, t->rays *= 2;
     if (t->rays > 1536 && t->stride > 1) t->stride /= 2, t->rays /= 2;
   }
-  const int most = t->options.rays ? t->options.rays : RAYS_MAX;
+  const int most = sf_batch_most(t);
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > most ? most : t->rays;
 }
 

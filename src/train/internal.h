@@ -163,6 +163,7 @@ void sf_batch_ray(const sf_trainer *trainer, uint64_t index, sf_ray *ray);
 sf_status sf_batch_draw(sf_trainer *trainer);
 /* Number of rays of the next iteration, from the samples of this one. */
 void sf_batch_adapt(sf_trainer *trainer);
+int sf_batch_most(const sf_trainer *t); /* rays of an iteration */
 /* Share of a run after which its lattice is the model's: what is rendered has the intervals that were trained. */
 static const double sf_lattice_settles = 0.5;
 /* Makes the stride of now, but at most 2, the model's own: lattice / stride, dt_gamma * stride. TensoRF's step follows

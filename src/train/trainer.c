@@ -75,7 +75,7 @@ static void start_budget(sf_trainer *t)
 /* Length of stage I in iterations, or as a share of the time budget. */
 static double stage1_weight(const sf_trainer *t)
 {
-  return sf_tuning(t) ? 0 : t->options.minutes > 0 ? 0.25 : t->options.stage1;
+  return sf_tuning(t) || t->options.no_stage1 ? 0 : t->options.minutes > 0 ? 0.25 : t->options.stage1;
 }
 
 static sf_status copy_model(sf_model *to, const sf_model *from)
@@ -319,10 +319,10 @@ static int occupancy_steps(const sf_trainer *t)
   return scaled(t) && trained > 2 ? 2 : trained;
 }
 
-/* While nothing is known to be empty, rays without samples pass by the box. */
+/* Few rays may all pass by the box or through empty space: sf_batch_adapt draws more. That so many do is no chance. */
 static sf_status check_samples(const sf_trainer *t)
 {
-  if (t->batch.marched || t->occupied < 1) return sf_ok();
+  if (t->batch.marched || t->batch.rays < sf_batch_most(t)) return sf_ok();
   return sf_fail(SF_E_RANGE, "train: iteration %lld: none of %d rays meets the box of the scene (see --scale)",
                  (long long)t->iteration, t->batch.rays);
 }
