@@ -59,6 +59,14 @@ START_TEST(instant_ngp_has_the_rays_of_its_poses)
   ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
   sf_dataset_free(&d);
+  /* half a million units away, in single precision 1/32 */
+  for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 500000;
+  put_json("transforms.json", &rig, "\"aabb_scale\":1,\"scale\":0.25,\"offset\":[-124999.4,0.5,0.4],", "images", 0, 1);
+  load(&d, "test");
+  const sf_view *a = &d.view[0], *b = &d.view[1];
+  const double apart = named(&rig, b->name)->to_world[3] - named(&rig, a->name)->to_world[3];
+  ck_assert_float_eq_tol(b->camera.to_world[3] - a->camera.to_world[3], (float)(0.5 * apart), 1e-6f);
+  sf_dataset_free(&d);
 }
 END_TEST
 
@@ -304,6 +312,10 @@ START_TEST(one_layout_wins_and_says_so)
   put_llff(&rig, 0, 0.001, 40); /* nothing is behind so near a plane */
   load(&d, "train");
   ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1 && strstr(d.warning[0], "COLMAP model is used"));
+  sf_dataset_free(&d);
+  put_picture("images/zz.png", 4 * WIDTH, 4 * HEIGHT, 9, 255); /* that COLMAP did not register */
+  load(&d, "train");
+  ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1);
   sf_dataset_free(&d);
   rig.lens[0].param[1] = rig.lens[0].param[0];
   put_json("transforms.json", &rig, "", "images", 0, 1);

@@ -78,9 +78,7 @@ static void unload(job *j)
 /* The same of both splits once. */
 static bool told_before(const job *j, int s, const char *text)
 {
-  for (int i = 0; s == TEST && i < j->split[TRAIN].warnings; i++)
-    if (!strcmp(text, j->split[TRAIN].warning[i])) return true;
-  return false;
+  return s == TEST && sf_dataset_has_warning(&j->split[TRAIN], text);
 }
 
 /* ---- text ---- */

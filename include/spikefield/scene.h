@@ -68,8 +68,9 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
 void sf_dataset_free(sf_dataset *data);
 /* SF_E_FORMAT unless both splits lie in the same coordinates and box: what one was learned from shows in the other. */
 sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test);
-/* "PROGRAM: warning: ..." for each. */
-void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data);
+/* "PROGRAM: warning: ..." for each, but for those of the data that was told before (NULL: none). */
+void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data, const sf_dataset *told);
+bool sf_dataset_has_warning(const sf_dataset *data, const char *text);
 
 /* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
  * are not needed any more. */

@@ -28,9 +28,18 @@ sf_status sf_warn(sf_dataset *data, const char *format, ...)
   return sf_ok();
 }
 
-void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data)
+bool sf_dataset_has_warning(const sf_dataset *data, const char *text)
 {
-  for (int i = 0; i < data->warnings; i++) fprintf(out, "%s: warning: %s\n", program, data->warning[i]);
+  int i = 0;
+  while (i < data->warnings && strcmp(data->warning[i], text) != 0) i++;
+  return i < data->warnings;
+}
+
+void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data, const sf_dataset *told)
+{
+  for (int i = 0; i < data->warnings; i++)
+    if (!told || !sf_dataset_has_warning(told, data->warning[i]))
+      fprintf(out, "%s: warning: %s\n", program, data->warning[i]);
 }
 
 static sf_status check_options(const char *dir, const sf_dataset_options *options)
@@ -50,9 +59,10 @@ static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_op
 {
   const bool llff = sf_llff_there(data->path), colmap = sf_colmap_there(data->path);
   if (!llff) return sf_colmap_read(c, data->path, options);
-  SF_TRY(sf_llff_read(c, data->path, options));
-  if (!colmap) return sf_ok();
+  const sf_status status = sf_llff_read(c, data->path, options);
+  if (!colmap) return status;
   const bool forward = sf_forward_facing(c);
+  if (status.code && (forward || !c->count)) return status; /* else its rows were read, and are not used */
   SF_TRY(sf_warn(data, "%s: poses_bounds.npy and a COLMAP model are both there: %s", data->path,
                  forward ? "the views face forward, so poses_bounds.npy is used"
                          : "the views do not face forward, so the COLMAP model is used"));

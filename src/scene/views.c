@@ -63,7 +63,9 @@ static sf_status set_pose(sf_camera *camera, const sf_frame *frame, const sf_dat
   for (int i = 0; i < 12; i++) camera->to_world[i] = (float)frame->to_world[i];
   for (int i = 0; i < 3; i++) {
     float *position = &camera->to_world[4 * i + 3];
-    if (!data->ndc) *position = *position * data->scale + data->offset[i];
+    if (!data->ndc) *position *= data->scale;
+    if (data->offset[i] != 0) /* it may take most of a position away */
+      *position = (float)(frame->to_world[4 * i + 3] * (double)data->scale + (double)data->offset[i]);
     if (!isfinite(*position))
       return sf_fail(SF_E_RANGE, "%s: position times scale %g is not finite", where, (double)data->scale);
   }
