@@ -107,7 +107,9 @@ static sf_status save(sf_lockstep *l)
   memcpy(c.identity, l->identity, sizeof c.identity);
   c.blocks = l->blocks, c.rays = l->rays, c.sum = l->sum;
   l->saved = sf_seconds();
-  return sf_write_file(l->options.checkpoint, &c, sizeof c);
+  SF_TRY(sf_write_file(l->options.checkpoint, &c, sizeof c));
+  l->kept = c.rays;
+  return sf_ok();
 }
 
 static sf_status resume(sf_lockstep *l)
@@ -123,7 +125,7 @@ static sf_status resume(sf_lockstep *l)
   free(data);
   if (!ours) return sf_fail(SF_E_FORMAT, "%s: checkpoint of another program, scene, data set or other options", path);
   l->blocks = c.blocks, l->rays = c.rays, l->sum = c.sum;
-  l->resumed = c.sum.samples;
+  l->resumed = c.sum.samples, l->kept = c.rays;
   return sf_ok();
 }
 
@@ -201,28 +203,42 @@ static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
   cJSON *json = cJSON_CreateObject();
   char text[200] = "";
   if (replayed.what.wire) sf_difference_text(&replayed.what, text);
-  cJSON_AddStringToObject(json, "in_the_run", status->message);
-  cJSON_AddStringToObject(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
-  cJSON_AddStringToObject(json, "wave", path);
+  sf_json_add_text(json, "in_the_run", status->message);
+  sf_json_add_text(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
+  sf_json_add_text(json, "wave", path);
   snprintf(path, sizeof path, "%s.json", l->options.evidence);
   return sf_replay_save(&l->replay, l->options.scene, json, path);
+}
+
+static sf_status stopped(const sf_lockstep *l)
+{
+  char kept[4200] = "";
+  if (l->options.checkpoint)
+    snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " rays, the same command goes on from there",
+             l->options.checkpoint, l->kept);
+  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d rays, %" PRIu64 " samples equal%s", l->rays,
+                 l->options.rays, l->sum.samples, kept);
+}
+
+/* A difference stays one where its evidence cannot be written. */
+static sf_status difference(sf_lockstep *l, const sf_status *found)
+{
+  const sf_status status = sf_lockstep_difference(l, found);
+  l->unwritten = write_evidence(l, &status);
+  if (l->unwritten.code == SF_OK) return status;
+  return sf_fail(status.code, "%.*s; no evidence: %s", (int)sizeof status.message / 2, status.message,
+                 l->unwritten.message);
 }
 
 sf_status sf_lockstep_run(sf_lockstep *l)
 {
   SF_TRY(resume(l));
-  sf_status status = run_blocks(l);
+  const sf_status status = run_blocks(l);
   l->complete = status.code == SF_OK;
   const sf_status energy = compare_energy(l);
-  if (status.code == SF_E_STOPPED)
-    return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d rays, %" PRIu64 " samples equal%s%s", l->rays,
-                   l->options.rays, l->sum.samples, l->options.checkpoint ? "; the same command goes on from " : "",
-                   l->options.checkpoint ? l->options.checkpoint : "");
+  if (status.code == SF_E_STOPPED) return stopped(l);
   if (status.code == SF_OK) return energy;
-  if (!l->place.found) return status;
-  status = sf_lockstep_difference(l, &status);
-  SF_TRY(write_evidence(l, &status));
-  return status;
+  return l->place.found ? difference(l, &status) : status;
 }
 
 sf_status sf_lockstep_load(sf_lockstep *l, const sf_lockstep_options *options)

@@ -34,14 +34,16 @@ typedef struct sf_lockstep {
   uint64_t resumed;     /* samples that the checkpoint brought along */
   void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
   void *user;
-  double saved;      /* time of the last checkpoint */
-  char identity[65]; /* of program, scene, data and options: a checkpoint is continued by nothing else */
-  sf_status trouble; /* what ended it */
+  double saved;        /* time of the last checkpoint */
+  uint64_t kept;       /* rays in it */
+  sf_status unwritten; /* of a difference: why there is no evidence; SF_OK where there is */
+  char identity[65];   /* of program, scene, data and options: a checkpoint is continued by nothing else */
+  sf_status trouble;   /* what ended it */
 } sf_lockstep;
 
 sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);
-/* SF_E_DIFFERENCE: `place` says where and the evidence is written. SF_E_STOPPED: interrupted, the totals are of what
- * was compared until then. */
+/* SF_E_DIFFERENCE: `place` says where, and the evidence is written unless `unwritten` says why not. SF_E_STOPPED:
+ * interrupted, the totals are of what was compared until then. */
 sf_status sf_lockstep_run(sf_lockstep *lockstep);
 /* View and pixel of a ray. */
 typedef struct sf_lockstep_pixel {

@@ -54,6 +54,10 @@ static cJSON *difference_json(const sf_lockstep *l, const sf_status *status)
   add_place(l, json);
   cJSON_AddNumberToObject(json, "replay_samples", l->replay.count);
   cJSON_AddBoolToObject(json, "replay_shows_it", l->replays);
+  if (l->unwritten.code != SF_OK) {
+    sf_json_add_text(json, "no_evidence", l->unwritten.message);
+    return json;
+  }
   snprintf(path, sizeof path, "%s.json", l->options.evidence);
   sf_json_add_text(json, "replay", path);
   snprintf(path, sizeof path, "%s.fst", l->options.evidence);

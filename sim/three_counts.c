@@ -126,13 +126,16 @@ static sf_status one_ray(run *r, uint64_t index)
   fx_pixel pixel;
   SF_TRY(r->job->ray(r->job->user, index, &ray));
   s->rays++;
-  SF_TRY(name_ray(r, index, net_ray(r, &ray, &pixel)));
+  const sf_status ran = net_ray(r, &ray, &pixel); /* broken off by a difference: what was counted until then */
+  if (ran.code != SF_OK && ran.code != SF_E_DIFFERENCE) return ran;
   fx_counts_add(&s->core, &r->core.core);
   fx_counts_add(&s->recount, &r->core.recount);
   s->core_traffic = sf_traffic_of(&s->core, (uint64_t)s->rays);
   s->recount_traffic = sf_traffic_recount(r->job->scene, &s->recount, s->core.field_samples, (uint64_t)s->rays);
-  SF_TRY(sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls));
-  if (r->rays) SF_TRY(ray_traffic(r, &ray, &pixel));
+  const sf_status read = sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls);
+  if (ran.code != SF_OK) return name_ray(r, index, ran);
+  SF_TRY(read);
+  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, &ray, &pixel)));
   const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
   if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, &ray, status));
   return name_ray(r, index, compare_all(s));

@@ -86,7 +86,7 @@ wait $parent
 [ $? -eq 130 ] || fail "interrupted: exit status is not 130"
 for child in $children; do alive "$child" && fail "interrupted: process $child is still there"; done
 grep -q '"complete":[[:space:]]*false' stopped.json || fail "interrupted: no partial totals"
-grep -q 'samples equal; the same command goes on from part' stopped.err || fail "interrupted: $(cat stopped.err)"
+grep -q 'samples equal; part holds [0-9]* rays, the same command goes on from there' stopped.err || fail "interrupted: $(cat stopped.err)"
 done=$(sed -nE 's/.*stopped after .* rays, ([0-9]+) samples equal.*/\1/p' stopped.err)
 [ "${done:-0}" -gt 0 ] || fail "interrupted: nothing was done"
 limit=$((done + 3000)) # beyond what is finished

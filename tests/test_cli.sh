@@ -179,15 +179,19 @@ number sf_train --voxels 8 2000 nan
 number sf_train --rays 1 nan
 usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
 data "vm.safetensors: --fine-tune knows" sf_train d -o out --fine-tune vm.safetensors
-for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3; do
+for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3 --no-stage1 --no-distill --beta\ 1; do
   usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune model.safetensors $option
 done
+for option in --stage1 --stage2; do usage "$option has no effect beside --minutes" sf_train d -o out -m 1 $option 4; done
+usage "also --summary" sf_train d -o out --summary out.jsonl
 for option in --rays --voxels; do usage "$option has no effect on --backbone ingp" sf_train d -o out $option 64; done
 for option in --levels --finest-res --bound; do
   usage "$option has no effect on --backbone tensorf" sf_train d -o out --backbone tensorf $option 4
 done
 data "cannot open the log for writing: No such file" sf_train d -o out --log absent/x.jsonl
-data ingp sf_train d -o model.safetensors --backbone tensorf --resume
+for options in "" "--backbone tensorf" "--scale 0.3"; do
+  data "cannot resume: this is no checkpoint but a finished model" sf_train d -o model.safetensors --resume $options
+done
 number sf_train --fixed-steps -1 9 nan
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan
@@ -229,6 +233,8 @@ usage "--samples needs --vectors" sf_export s.snn --traces out --data d --sample
 absent out "options that nothing reads"
 data nodir sf_export model.safetensors -o out --traces traces --data nodir
 absent out "traces of nothing"
+usage "--view 9 is out of range" sf_export model.safetensors -o out --traces traces --data d --view 9
+absent out "traces of no view"
 usage "--model needs --backend float" sim_render s.snn d -o out --model model.safetensors
 usage "--model needs --backend float" sim_render s.snn d --verify none.json --model model.safetensors
 usage "--seed needs --backend rtl" sim_render s.snn d -o out --seed 1
@@ -267,6 +273,18 @@ usage --tech-b energy_audit s.snn d --tech-b 45nm
 usage --steps-b energy_audit s.snn d --steps-b 1
 usage extra energy_audit s.snn d extra
 usage --model energy_audit s.snn d --model model.safetensors
+for option in --tech-b\ nosuch --steps-b\ 1; do
+  usage "${option% *} has no effect: B is a report" energy_audit --compare s.snn b.json d $option
+done
+for option in --rays\ 5 --steps\ 1 --tech\ nosuch --view\ 0 --split\ train; do
+  usage "${option% *} has no effect: no scene is counted" energy_audit --compare a.json b.json $option
+done
+for option in --csv --html --twin; do
+  usage "$option has no effect: no scene is counted" energy_audit --published $option out
+done
+for option in --json --junit\ out --rays\ 3 --plusarg=+fault=1 --checkpoint\ out; do
+  usage "has no effect beside --replay" sf_cosim --replay evidence.json $option
+done
 for bad in "--junit out" "--checkpoint out" "--limit-samples 1" "--jobs 1" "--block 1" "--evidence out"; do
   # shellcheck disable=SC2086
   usage "${bad% *}" sf_cosim s.snn d --saif out $bad
@@ -524,8 +542,16 @@ stop stop.snn sf_export model.safetensors -o stop.snn --fit --data wide --fit-ra
 stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
 absent stop.exr.png "interrupted: sim_render"
 
-# The evaluation after a training can be interrupted, too: its checkpoint is resumed to the evaluation alone.
 good sf_scene simple -o views --size 64 --train 2 --test 30
+# Interrupted while it loads, a training leaves what is there.
+cp model.safetensors before.safetensors
+cp model.safetensors early.safetensors
+timeout --foreground -k 20 --preserve-status -s INT 0.02 "$BIN/sf_train" views -o early.safetensors >stdout.txt 2>err </dev/null
+status=$?
+judge "interrupted at once: sf_train" sf_train 130 ""
+if cmp -s before.safetensors early.safetensors; then passed=$((passed + 1)); else fail "interrupted at once" "model lost"; fi
+
+# The evaluation after a training can be interrupted, too: its checkpoint is resumed to the evaluation alone.
 brief=(views -o stop.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8)
 timeout --foreground -k 20 --preserve-status -s INT 2 "$BIN/sf_train" "${brief[@]}" --psnr-prefixes 30 >stdout.txt 2>err </dev/null
 status=$?

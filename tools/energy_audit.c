@@ -129,7 +129,7 @@ static sf_status run(page_audit *a)
   sf_audit_options how = a->opt.audit;
   how.tick = tick, how.user = a;
   SF_TRY(sf_audit_open(&a->audit, &how));
-  sf_dataset_warn(stderr, "energy_audit", &a->audit.data);
+  sf_dataset_warn(stderr, "energy_audit", &a->audit.data, NULL);
   sf_progress_begin(&a->progress, a->opt.quiet);
   const sf_status status = sf_audit_count(&a->audit);
   sf_progress_end(&a->progress);
@@ -225,10 +225,26 @@ static sf_status work(const options *opt)
   return sf_ok();
 }
 
+/* Options that nothing would read: there is no scene to count, or B is a report. */
+static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
+{
+  static const char *const pages[] = {"--csv", "--html", "--model", NULL}, *const b[] = {"--tech-b", "--steps-b", NULL};
+  static const char *const counts[] = {"--views", "--view",      "--rays",    "--rtl-rays", "--recount-rays", "--steps",
+                                       "--tech",  "--twin",      "--seed",    "--stall",    "--split",        "--scale",
+                                       "--model", "--downscale", "--plusarg", NULL};
+  static const char none[] = "has no effect: no scene is counted";
+  const bool a_counts = o->audit.scene && !(o->compare && is_report(o->audit.scene));
+  const bool b_counts = o->compare && o->other && !is_report(o->other);
+  if (o->compare && !b_counts) SF_TRY(sf_cli_refuse(cli, argc, argv, b, "has no effect: B is a report"));
+  if (a_counts || b_counts) return sf_ok();
+  SF_TRY(sf_cli_refuse(cli, argc, argv, counts, none));
+  return sf_cli_refuse(cli, argc, argv, pages, none);
+}
+
 static sf_status parse_comparison(options *o, const char *const positional[3])
 {
   static const char usage[] = "energy_audit --compare A B [DATA]";
-  o->other = positional[1], o->audit.data = positional[2];
+  o->audit.data = positional[2];
   if (!o->audit.scene || !o->other) return sf_fail(SF_E_USAGE, "--compare needs two arguments; usage: %s", usage);
   if (!o->audit.data && !(is_report(o->audit.scene) && is_report(o->other)))
     return sf_fail(SF_E_USAGE, "--compare of scenes needs DATA; usage: %s", usage);
@@ -277,9 +293,10 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   const char *positional[3];
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
+  o->audit.scene = positional[0], o->audit.data = positional[1], o->other = o->compare ? positional[1] : NULL;
+  if (status.code == SF_OK) status = check_effect(o, cli, argc, argv);
   cli->options = NULL;
   SF_TRY(status);
-  o->audit.scene = positional[0], o->audit.data = positional[1];
   if (o->audit.view >= 0 && o->audit.views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
   if (o->model && !o->html) return sf_fail(SF_E_USAGE, "--model goes with --html");
   if (o->compare) return parse_comparison(o, positional);

@@ -52,7 +52,7 @@ static sf_status measure_picture(budget *b)
   SF_TRY(fx_scene_load(&b->scene, o->scene));
   SF_TRY(fx_scene_need_grid(&b->scene, o->scene, "error budget of a picture"));
   SF_TRY(sf_fx_dataset_load(&b->data, &b->scene, o->scene, o->data, o->split, &how));
-  sf_dataset_warn(stderr, "error_budget", &b->data);
+  sf_dataset_warn(stderr, "error_budget", &b->data, NULL);
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,
                    o->split);

@@ -64,7 +64,7 @@ static sf_status simulate(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
   SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data);
+  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -153,7 +153,7 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
   display d = {.begun = sf_seconds()};
   sf_activity_report r;
   SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data);
+  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -264,7 +264,12 @@ int main(int argc, char **argv)
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};
+  static const char *const named_by_replay[] = {
+      "--rays",  "--seed", "--split", "--stalls", "--limit-samples", "--json",  "--jobs",    "--block", "--checkpoint",
+      "--junit", "--saif", "--vcd",   "--window", "--depth",         "--clock", "--plusarg", NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  if (status.code == SF_OK && o.replay)
+    status = sf_cli_refuse(&cli, argc, argv, named_by_replay, "has no effect beside --replay: its file is the run");
   if (status.code == SF_OK) status = settle(&o);
   if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
   sf_cli_catch_signals();

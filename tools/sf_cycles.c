@@ -245,7 +245,7 @@ static sf_status run(job *j)
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
   const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, j->opt.scene, j->opt.data, j->opt.split, &how));
-  sf_dataset_warn(stderr, "sf_cycles", &j->data);
+  sf_dataset_warn(stderr, "sf_cycles", &j->data, NULL);
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has fewer %s views", j->opt.view, j->opt.data,
                    j->opt.split);

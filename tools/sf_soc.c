@@ -74,7 +74,7 @@ static sf_status load(job *j)
   SF_TRY(fx_scene_load(&j->scene, o->scene));
   SF_TRY(fx_scene_need_grid(&j->scene, o->scene, "firmware rays"));
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, o->scene, o->data, split_name[o->split], &how));
-  sf_dataset_warn(stderr, "sf_soc", &j->data);
+  sf_dataset_warn(stderr, "sf_soc", &j->data, NULL);
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->data.total,
                    split_name[o->split]);

@@ -104,7 +104,7 @@ static sf_status check_test(const sf_dataset *data, const char *data_path, const
 {
   sf_dataset test;
   SF_TRY(load_test(&test, data_path, how, a, true));
-  sf_dataset_warn(stderr, "sf_train", &test);
+  sf_dataset_warn(stderr, "sf_train", &test, data);
   const sf_status status = sf_dataset_agree(data, &test);
   sf_dataset_free(&test);
   return status;
@@ -130,17 +130,26 @@ static sf_status finish(const sf_trainer *trainer, const char *data_path, const 
   return train_report(a, &model->config, s, &q);
 }
 
+static sf_status learn(sf_trainer *trainer, const train_arguments *a, sf_train_stats *stats)
+{
+  if (stats->stage == 3) return sf_ok();
+  FILE *log = fopen(a->log, a->resume ? "a" : "w");
+  if (!log) return sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
+  setvbuf(log, NULL, _IOLBF, 0);
+  sf_status status = loop(trainer, a, log, stats);
+  if (fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
+  return status.code ? status : sf_trainer_save(trainer, a->output, true); /* the evaluation can be interrupted, too */
+}
+
 static sf_status train_and_report(const char *path, const sf_dataset *data, const sf_dataset_options *how,
-                                  const train_arguments *a, FILE *log)
+                                  const train_arguments *a)
 {
   sf_trainer *trainer;
   SF_TRY(sf_trainer_create(&trainer, data, &a->train, a->resume ? a->output : NULL));
   sf_train_stats stats = sf_trainer_stats(trainer);
   sf_status status = sf_ok();
-  if (stats.stage != 3) {
-    status = loop(trainer, a, log, &stats);
-    if (!status.code) status = sf_trainer_save(trainer, a->output, true); /* the evaluation can be interrupted, too */
-  }
+  if (sf_cli_interrupted()) status = sf_fail(SF_E_STOPPED, "interrupted before the training: nothing was written");
+  if (!status.code) status = learn(trainer, a, &stats);
   if (!status.code) status = finish(trainer, path, how, a, &stats);
   if (!status.code) status = sf_trainer_save(trainer, a->output, false);
   sf_trainer_free(trainer);
@@ -173,12 +182,10 @@ static sf_status load_start(const train_arguments *a, float scale, sf_model *mod
 
 static sf_status run(train_arguments *a, const char *path)
 {
-  char log_path[4096];
-  if (!a->log) snprintf(log_path, sizeof log_path, "%s.jsonl", a->output), a->log = log_path;
   sf_dataset data;
   const sf_dataset_options how = {.downscale = a->downscale, .scale = (float)a->scale, .limit = a->limit};
   SF_TRY(sf_dataset_load(&data, path, "train", &how));
-  sf_dataset_warn(stderr, "sf_train", &data);
+  sf_dataset_warn(stderr, "sf_train", &data, NULL);
   sf_model start = {0};
   sf_status status = check_test(&data, path, &how, a);
   if (!status.code) status = train_settle(a, &data);
@@ -186,12 +193,7 @@ static sf_status run(train_arguments *a, const char *path)
     status = load_start(a, data.scale, &start);
     a->train.start = &start;
   }
-  FILE *log = status.code ? NULL : fopen(a->log, a->resume ? "a" : "w");
-  if (!status.code)
-    status = log ? sf_ok() : sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
-  if (log) setvbuf(log, NULL, _IOLBF, 0);
-  if (!status.code) status = train_and_report(path, &data, &how, a, log);
-  if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
+  if (!status.code) status = train_and_report(path, &data, &how, a);
   sf_model_free(&start);
   sf_dataset_free(&data);
   return status;

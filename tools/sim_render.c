@@ -76,7 +76,7 @@ static sf_status load_view(job *j)
   const options *o = &j->opt;
   SF_TRY(open_studio(j));
   SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
-  sf_dataset_warn(stderr, "sim_render", &j->shot.data);
+  sf_dataset_warn(stderr, "sim_render", &j->shot.data, NULL);
   if (!j->shot.view)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,
                    o->split);
@@ -104,7 +104,7 @@ static bool tick(void *user, size_t pixels)
 static void begin_view(void *user, const sf_shot *shot)
 {
   job *j = user;
-  if (!j->set.rendered) sf_dataset_warn(stderr, "sim_render", &shot->data); /* the same for every view */
+  if (!j->set.rendered) sf_dataset_warn(stderr, "sim_render", &shot->data, NULL); /* the same for every view */
   size_t pixels = (size_t)shot->window.width * (size_t)shot->window.height;
   j->all = j->done + pixels * (size_t)(j->set.todo - j->set.rendered);
 }

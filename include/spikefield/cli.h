@@ -36,6 +36,10 @@ typedef struct sf_cli {
  * that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
+/* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
+ * parsed. */
+sf_status sf_cli_refuse(const sf_cli *cli, int argc, char **argv, const char *const *names, const char *why);
+
 /* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */
 int sf_cli_finish(const sf_cli *cli, sf_status status);
 

@@ -111,8 +111,13 @@ void html_counts(FILE *out, const sf_page *page)
           "<section id=\"counts\">\n<h2>Three counts of every event</h2>\n<p>Each event is counted by the fixed-point "
           "core as it computes, and once more from the recorded spikes by code that shares nothing with it; for the "
           "rays below the Verilog accelerator counts too, in registers of its own. The three must be equal, for every "
-          "event, layer and step.</p>\n<p>Core = recount for all %s samples of %s rays. ",
-          html_count(samples, page->report->measure.recount.samples), html_count(rays, page->report->measure.checked));
+          "event, layer and step.</p>\n<p>");
+  if (page->report->measure.recount.samples)
+    fprintf(out, "Core = recount for all %s samples of %s rays. ",
+            html_count(samples, page->report->measure.recount.samples),
+            html_count(rays, page->report->measure.checked));
+  else
+    fprintf(out, "Nothing was counted again. ");
   if (s->rays == 0 && s->agreement.code == SF_OK) {
     fprintf(out, "The accelerator was left out.</p>\n</section>\n");
     return;

@@ -92,10 +92,13 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   fprintf(out, "saturation: %s\n", census);
   if (sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected))
     fprintf(out, "UNEXPECTED saturation in %s\n", unexpected);
-  fprintf(out,
-          "vector core = portable core = recount from the spike bitmaps, for every event, layer and step, on %" PRIu64
-          " samples of %" PRIu64 " rays\n\n",
-          r->measure.recount.samples, r->measure.checked);
+  if (r->measure.recount.samples)
+    fprintf(out,
+            "vector core = portable core = recount from the spike bitmaps, for every event, layer and step, on %" PRIu64
+            " samples of %" PRIu64 " rays\n\n",
+            r->measure.recount.samples, r->measure.checked);
+  else
+    fprintf(out, "recount: %s\n\n", r->measure.checked ? "no ray has samples, nothing to count again" : "left out");
   print_three(out, &r->three, r->seed);
   fprintf(out, "\n");
   sf_ledgers_print(out, &r->ledgers, r->views);
@@ -201,7 +204,10 @@ static void add_agreement(cJSON *json, const sf_audit_report *r)
   bool three = r->three.agreement.code == SF_OK;
   sf_json_add_u64(json, "recount_rays", r->measure.checked);
   sf_json_add_u64(json, "recount_samples", r->measure.recount.samples);
-  cJSON_AddBoolToObject(json, "core_equals_recount", all);
+  if (r->measure.recount.samples || !all)
+    cJSON_AddBoolToObject(json, "core_equals_recount", all);
+  else
+    cJSON_AddNullToObject(json, "core_equals_recount");
   if (r->three.rays > 0 || !three)
     cJSON_AddBoolToObject(json, "core_equals_rtl_equals_recount", three);
   else

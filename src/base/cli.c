@@ -266,6 +266,19 @@ sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **po
   return check_outputs(cli, positional);
 }
 
+sf_status sf_cli_refuse(const sf_cli *cli, int argc, char **argv, const char *const *names, const char *why)
+{
+  for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+    const char *value;
+    const sf_option *o = argv[i][0] == '-' && argv[i][1] ? find_option(cli, argv[i], &value) : NULL;
+    if (!o) continue;
+    if (!value && o->type != SF_ARG_FLAG) i++; /* its value may look like an option */
+    for (const char *const *name = names; *name; name++)
+      if (!strcmp(*name, o->name)) return sf_fail(SF_E_USAGE, "%s %s", *name, why);
+  }
+  return sf_ok();
+}
+
 int sf_cli_finish(const sf_cli *cli, sf_status status)
 {
   if (fflush(stdout) || ferror(stdout)) {

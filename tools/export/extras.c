@@ -61,7 +61,10 @@ sf_status export_extras_open(export_extras *e, const fx_scene *scene, const char
   *e = (export_extras){0};
   if (!o->vectors && !o->traces) return sf_ok();
   SF_TRY(sf_fx_dataset_load(&e->data, scene, path, o->data, "test", &how));
-  return e->data.count ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no views", o->data);
+  if (!e->data.count) return sf_fail(SF_E_FORMAT, "%s: no views", o->data);
+  if (o->traces && o->view >= e->data.count)
+    return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d test views", o->view, o->data, e->data.count);
+  return sf_ok();
 }
 
 void export_extras_close(export_extras *e)

@@ -3,6 +3,7 @@
 #include "spikefield/quant.h"
 #include "spikefield/record.h"
 #include <omp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -64,7 +65,7 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
       {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
        "behind transparent pixels and rays that leave the box; auto: random, but white for tensorf on pictures with "
        "alpha (default auto)"},
-      {"--no-stage1", 0, SF_ARG_FLAG, &a->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
+      {"--no-stage1", 0, SF_ARG_FLAG, &t->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
       {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "ablation: without L_penalty"},
       {"--no-budget", 0, SF_ARG_FLAG, &a->no_budget, 0, 0, NULL, NULL, "ablation: without both (L_budg)"},
@@ -140,7 +141,7 @@ static void settle_space(train_arguments *a, const sf_dataset *data)
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data);
   a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
-  if (a->quiet || a->json || vm) return;
+  if (a->quiet || a->json || vm || a->fine_tune) return;
   printf("box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c), c->bound > 1 ? "s" : "");
   if (c->dt_gamma > 0)
     printf("steps of distance / %g", 1 / (double)c->dt_gamma);
@@ -150,43 +151,28 @@ static void settle_space(train_arguments *a, const sf_dataset *data)
   fflush(stdout);
 }
 
-static bool named(const char *const *list, const char *name)
-{
-  while (*list && strcmp(*list, name) != 0) list++;
-  return *list;
-}
-
-/* Is the option among the command line's words? */
-static bool given(const train_arguments *a, const sf_option *o)
-{
-  const size_t length = strlen(o->name);
-  for (int i = 1; i < a->argc && strcmp(a->argv[i], "--") != 0; i++) {
-    const char *word = a->argv[i];
-    if (!strncmp(word, o->name, length) && (!word[length] || word[length] == '=')) return true;
-    if (o->letter && word[0] == '-' && word[1] == o->letter) return true;
-  }
-  return false;
-}
-
 /* What only the other backbone has, and what a model to fine-tune has settled. */
 static sf_status check_effect(train_arguments *a)
 {
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--net",     "--steps",       "--input-mode", "--hidden", "--theta",
-                                        "--occ-res", "--fixed-steps", "--stage1",     NULL};
-  const bool tensorf = a->train.config.backbone == SF_TENSORF;
+  static const char *const settled[] = {"--net",        "--steps",      "--input-mode",  "--hidden",
+                                        "--theta",      "--occ-res",    "--fixed-steps", "--stage1",
+                                        "--no-stage1",  "--no-extra",   "--no-penalty",  "--no-budget",
+                                        "--no-distill", "--no-scaling", "--beta",        NULL},
+                           *const iterations[] = {"--stage1", "--stage2", NULL};
+  static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
-  train_cli(a, options);
-  for (const sf_option *o = options; o->name; o++) {
-    if (!given(a, o)) continue;
-    if (named(tensorf ? grid : planes, o->name))
-      return sf_fail(SF_E_USAGE, "%s has no effect on --backbone %s", o->name, tensorf ? "tensorf" : "ingp");
-    if (a->fine_tune && (named(grid, o->name) || named(settled, o->name)))
-      return sf_fail(SF_E_USAGE, "%s has no effect beside --fine-tune: the model has its own", o->name);
-  }
-  return sf_ok();
+  const sf_cli cli = train_cli(a, options);
+  if (a->train.config.backbone == SF_TENSORF)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, "has no effect on --backbone tensorf"));
+  else
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
+  if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
+  if (!a->fine_tune) return sf_ok();
+  SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, fine_tune));
+  return sf_cli_refuse(&cli, a->argc, a->argv, settled, fine_tune);
 }
 
 /* What follows from the options, once they are parsed. */
@@ -196,7 +182,7 @@ static sf_status finish_options(train_arguments *a)
   if (c->net == SF_NET_ANN) c->steps = 1;
   for (int i = 0; i < 3; i++) c->theta[i] = (float)a->theta;
   if (a->no_budget) a->train.no_extra = a->train.no_penalty = true;
-  if (a->no_stage1) a->train.stage2 += a->train.stage1, a->train.stage1 = 0;
+  if (a->train.no_stage1) a->train.stage2 += a->train.stage1, a->train.stage1 = 0;
   if (a->train.fixed_steps > c->steps)
     return sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a->train.fixed_steps, c->steps);
   if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
@@ -226,7 +212,11 @@ static sf_status restore(train_arguments *a, const char **path)
   sf_option options[TRAIN_OPTIONS_MAX];
   train_cli(a, options);
   SF_TRY(sf_tensors_load(&set, a->output));
-  sf_status status = sf_record_words(&set, options, apart, a->before, &a->words, TRAIN_OPTIONS_MAX);
+  sf_status status =
+      sf_tensors_meta(&set, "train.iteration")
+          ? sf_ok()
+          : sf_fail(SF_E_FORMAT, "%s: cannot resume: this is no checkpoint but a finished model", a->output);
+  if (!status.code) status = sf_record_words(&set, options, apart, a->before, &a->words, TRAIN_OPTIONS_MAX);
   if (!status.code) status = parse(a, path);
   if (status.code == SF_E_USAGE) status = sf_fail(SF_E_FORMAT, "%s: cannot resume: %s", a->output, status.message);
   if (!status.code) status = sf_record_compare(&set, a->record);
@@ -248,6 +238,10 @@ static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *dat
 sf_status train_parse(train_arguments *a, const char **path)
 {
   SF_TRY(parse(a, path));
+  if (!a->log) {
+    snprintf(a->log_path, sizeof a->log_path, "%s.jsonl", a->output), a->log = a->log_path;
+    SF_TRY(parse(a, path)); /* it is an output, too */
+  }
   if (a->resume) SF_TRY(restore(a, path));
   SF_TRY(check_effect(a));
   if (a->threads) omp_set_num_threads(a->threads);

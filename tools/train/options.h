@@ -11,12 +11,13 @@ typedef struct train_arguments {
   sf_train_options train;
   double scale, theta, checkpoint_minutes, gamma;
   int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits;
-  bool resume, quiet, json, no_hybrid, no_stage1, no_budget;
+  bool resume, quiet, json, no_budget;
   int argc;
   char **argv;
   char *before[TRAIN_OPTIONS_MAX]; /* the program's name and what the run to resume was started with */
   int words;                       /* of it */
   cJSON *record;
+  char log_path[4096]; /* where no --log is given */
 } train_arguments;
 
 void train_defaults(train_arguments *a, int argc, char **argv);
