@@ -34,6 +34,12 @@ field() { sed -E "s/.*\"$2\":([0-9-]+).*/\1/" "$work/$1.first"; }
 expect 0 0 null
 expect 1 1 '"layer":"C2"' '"neuron":37,' '"wire":"membrane"'
 [ "$(field 1 step)" -ge 1 ] || fail "fault 1: step 0 rounds nothing in hybrid mode"
+# A difference whose evidence cannot be written is one, in every report.
+mkdir "$work/wave.fst" # no file can be there
+"$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --json \
+  --evidence "$work/wave" --junit "$work/lost.xml" --plusarg +fault=1 >"$work/lost.json" 2>"$work/lost.err"
+[ $? -eq 1 ] && grep -q 'C2.*no evidence: .*wave.fst' "$work/lost.err" && grep -q '"no_evidence":' "$work/lost.json" &&
+  grep -q '<failure' "$work/lost.xml" || fail "a difference without evidence: $(cat "$work/lost.err")"
 expect 2 1 '"layer":"C2"' '"step":1,' '"neuron":64,' '"wire":"row"' '"expected":1,' '"actual":0,'
 expect 3 1 '"layer":"C1"' '"step":2,' '"wire":"spikes"' '"sample_exact":true'
 [ "$(field 3 actual)" -eq $(($(field 3 expected) + 1)) ] || fail "fault 3: the counter is not one too high"
