@@ -543,6 +543,21 @@ stop stop.csv energy_audit s.snn wide --rays 1000000000 --csv stop.csv
 absent stop.exr.png "interrupted: sim_render"
 
 good sf_scene simple -o views --size 64 --train 2 --test 30
+# Names are bytes, reports are UTF-8.
+name=$(printf 'r_\377')
+cp -r d bytes
+mv bytes/test/r_0.png "bytes/test/$name.png"
+sed -i "s#test/r_0\"#test/$name\"#" bytes/transforms_test.json
+while read -r line; do
+  good $line
+  if iconv -f UTF-8 -t UTF-8 stdout.txt >/dev/null; then passed=$((passed + 1)); else fail "$line" "no UTF-8"; fi
+done <<'END'
+sf_data bytes --json
+sim_render s.snn bytes --all -o bytes_all --json -q
+sim_render s.snn bytes --verify bytes_all/manifest.json --json -q
+energy_audit s.snn bytes --rays 20 --rtl-rays 1 --json -q
+END
+
 # Interrupted while it loads, a training leaves what is there.
 cp model.safetensors before.safetensors
 cp model.safetensors early.safetensors

@@ -99,22 +99,12 @@ static sf_status make_page(page_audit *a)
   return sf_page_save(&a->page, o->html);
 }
 
-static sf_status print_json(cJSON *json)
-{
-  char *text = json ? cJSON_Print(json) : NULL;
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
-}
-
 static sf_status print_report(const page_audit *a)
 {
   if (a->opt.json) {
     cJSON *json = a->opt.html ? sf_page_json(&a->page) : sf_report_json(&a->audit.report);
     if (a->opt.published) cJSON_AddItemToObject(json, "published", sf_published_json());
-    return print_json(json);
+    return sf_json_print(json, true);
   }
   sf_report_print(stdout, &a->audit.report);
   if (a->opt.published) printf("\n"), sf_published_print(stdout);
@@ -210,7 +200,7 @@ static sf_status compare(const options *opt)
   if (status.code == SF_OK) status = sf_audits_compare(a, opt->audit.scene, b, other.audit.scene, &comparison);
   cJSON_Delete(a), cJSON_Delete(b);
   SF_TRY(status);
-  if (opt->json) return print_json(comparison);
+  if (opt->json) return sf_json_print(comparison, true);
   sf_comparison_print(stdout, comparison);
   cJSON_Delete(comparison);
   return sf_ok();
@@ -220,7 +210,7 @@ static sf_status work(const options *opt)
 {
   if (opt->compare) return compare(opt);
   if (opt->audit.scene) return audit_scene(opt);
-  if (opt->json) return print_json(sf_published_json());
+  if (opt->json) return sf_json_print(sf_published_json(), true);
   sf_published_print(stdout);
   return sf_ok();
 }

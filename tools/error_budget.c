@@ -73,12 +73,7 @@ static sf_status print_json(const budget *b)
   cJSON *json = cJSON_CreateObject();
   cJSON_AddItemToObject(json, "units", sf_budget_json(b->row, SF_BUDGET_BLOCKS));
   if (b->opt.model) cJSON_AddItemToObject(json, "picture", sf_picture_budget_json(&b->picture));
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
+  return sf_json_print(json, true);
 }
 
 static sf_status work(budget *b)

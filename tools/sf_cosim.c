@@ -35,17 +35,6 @@ static void show(void *user, const sf_lockstep *l)
                    l->options.jobs);
 }
 
-static sf_status print_json(const sf_lockstep *l, const sf_status *status, double seconds)
-{
-  cJSON *json = sf_lockstep_json(l, status, seconds);
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  const bool written = puts(text) >= 0 && fflush(stdout) == 0;
-  free(text);
-  return written ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
-}
-
 static sf_status print_text(const sf_lockstep *l, double seconds)
 {
   sf_lockstep_print(stdout, l, seconds);
@@ -56,7 +45,7 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
 {
   if (status->code != SF_OK && status->code != SF_E_DIFFERENCE && status->code != SF_E_STOPPED) return sf_ok();
   if (o->junit) SF_TRY(sf_lockstep_junit(l, status, seconds, o->junit));
-  if (o->json) return print_json(l, status, seconds);
+  if (o->json) return sf_json_print(sf_lockstep_json(l, status, seconds), true);
   return status->code == SF_E_DIFFERENCE ? sf_ok() : print_text(l, seconds);
 }
 
@@ -129,21 +118,13 @@ static cJSON *activity_json(const options *o, const sf_activity_report *r)
 
 static sf_status report_activity(const options *o, const sf_activity_report *r)
 {
-  if (o->json) {
-    cJSON *json = activity_json(o, r);
-    char *text = cJSON_Print(json);
-    cJSON_Delete(json);
-    if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-    puts(text);
-    free(text);
-  } else {
-    printf("%" PRIu64 " rays, %" PRIu64 " samples: 0 differences\n", r->rays, r->samples);
-    printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
-           r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
-    for (int i = 0; i < 2; i++) {
-      const char *path = i ? o->activity.vcd : o->activity.saif;
-      if (path) printf("%s: at %g MHz\n", path, o->activity.clock_mhz);
-    }
+  if (o->json) return sf_json_print(activity_json(o, r), true);
+  printf("%" PRIu64 " rays, %" PRIu64 " samples: 0 differences\n", r->rays, r->samples);
+  printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
+         r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
+  for (int i = 0; i < 2; i++) {
+    const char *path = i ? o->activity.vcd : o->activity.saif;
+    if (path) printf("%s: at %g MHz\n", path, o->activity.clock_mhz);
   }
   return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
 }

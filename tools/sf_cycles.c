@@ -232,12 +232,7 @@ static sf_status print_json(const job *j)
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
   cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j, 1, j->opt.clock));
   add_space(j, json);
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
+  return sf_json_print(json, true);
 }
 
 static sf_status run(job *j)

@@ -213,12 +213,7 @@ static sf_status print_json(const job *j, const kind *kinds, int n)
     for (int v = 0; v < j->split[s].count; v++) cJSON_AddItemToArray(views, view_json(&j->split[s].view[v]));
   }
   add_warnings(json, j);
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the report", j->path);
-  puts(text);
-  free(text);
-  return sf_ok();
+  return sf_json_print(json, true);
 }
 
 /* ---- program ---- */

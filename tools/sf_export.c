@@ -32,16 +32,6 @@ static sf_status file_size(const char *path, long long *size)
   return sf_ok();
 }
 
-static sf_status put_json(cJSON *json, const char *path)
-{
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the report", path);
-  puts(text);
-  free(text);
-  return sf_ok();
-}
-
 /* ---- report ---- */
 
 static void print_text(const fx_scene *scene, const sf_quant_report *report, const char *path, long long bytes)
@@ -111,7 +101,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
     cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
   if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
   export_extras_json(json, more, &o->extra);
-  return put_json(json, o->output);
+  return sf_json_print(json, true);
 }
 
 /* ---- --fit ---- */
@@ -239,7 +229,7 @@ static sf_status export_beside(const char *path, const options *o)
   if (o->json) {
     cJSON *json = cJSON_CreateObject();
     export_extras_json(json, &more, &o->extra);
-    SF_TRY(put_json(json, path));
+    SF_TRY(sf_json_print(json, true));
   } else
     export_extras_print(&more, &o->extra);
   return flushed();
@@ -263,7 +253,7 @@ static sf_status export_model_nir(const char *path, const options *o)
   if (o->json) {
     cJSON *json = cJSON_CreateObject();
     export_extras_json(json, &none, &o->extra);
-    SF_TRY(put_json(json, path));
+    SF_TRY(sf_json_print(json, true));
   } else
     export_extras_print(&none, &o->extra);
   return flushed();

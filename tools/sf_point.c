@@ -2,18 +2,6 @@
 #include "spikefield/cli.h"
 #include "spikefield/pareto.h"
 #include <omp.h>
-#include <stdlib.h>
-
-static sf_status print_json(const sf_point *point)
-{
-  cJSON *json = sf_point_json(point);
-  char *text = json ? cJSON_Print(json) : NULL;
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
-}
 
 int main(int argc, char **argv)
 {
@@ -51,7 +39,7 @@ int main(int argc, char **argv)
   o.model = positional[0], o.data = positional[1];
   if (status.code == SF_OK && threads) omp_set_num_threads(threads);
   if (status.code == SF_OK) status = sf_point_measure(&point, &o);
-  if (status.code == SF_OK && json) status = print_json(&point);
+  if (status.code == SF_OK && json) status = sf_json_print(sf_point_json(&point), true);
   if (status.code == SF_OK && !json) sf_point_print(stdout, &point);
   if (status.code == SF_OK && fflush(stdout)) status = sf_fail(SF_E_IO, "standard output: the report was not written");
   return sf_cli_finish(&cli, status);

@@ -236,12 +236,7 @@ static sf_status print_json(const job *j, const sf_status *status)
   sf_json_add_u64(json, "register_writes", total.writes);
   sf_json_add_u64(json, "cycles", sf_dut_cycle(j->dut));
   cJSON_AddNumberToObject(json, "seconds", j->seconds);
-  char *text = cJSON_Print(json);
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  const bool written = puts(text) >= 0 && fflush(stdout) == 0;
-  free(text);
-  return written ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
+  return sf_json_print(json, true);
 }
 
 static sf_status print_text(const job *j)

@@ -118,16 +118,6 @@ static void begin_run(job *j)
 
 /* ---- one view ---- */
 
-static sf_status print_json(cJSON *json)
-{
-  char *text = json ? cJSON_Print(json) : NULL;
-  cJSON_Delete(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
-  puts(text);
-  free(text);
-  return sf_ok();
-}
-
 static void fill_report(job *j, double seconds)
 {
   j->report.scene = j->opt.scene, j->report.sha256 = j->studio.scene_sha256, j->report.view = j->shot.view->name;
@@ -149,7 +139,7 @@ static sf_status render_one(job *j)
   fill_report(j, sf_seconds() - j->start);
   if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
   SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.output));
-  if (j->opt.json) return print_json(sf_render_report_json(&j->report));
+  if (j->opt.json) return sf_json_print(sf_render_report_json(&j->report), true);
   sf_render_report_print(stdout, &j->report);
   return sf_ok();
 }
@@ -173,7 +163,7 @@ static sf_status render_all(job *j)
   if (j->opt.json) {
     cJSON *json = sf_manifest_report_json(&j->set.manifest);
     sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
-    return print_json(json);
+    return sf_json_print(json, true);
   }
   sf_manifest_report_print(stdout, &j->set.manifest);
   sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
@@ -232,7 +222,7 @@ static sf_status verify(job *j)
     cJSON_AddItemToObject(json, "view", j->verdicts);
     j->verdicts = NULL;
     sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
-    SF_TRY(print_json(json));
+    SF_TRY(sf_json_print(json, true));
   } else {
     sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
   }

@@ -60,3 +60,40 @@ sf_status sf_json_save(const cJSON *json, const char *path)
   cJSON_free(text);
   return status;
 }
+
+size_t sf_utf8_length(const char *text)
+{
+  const unsigned char *c = (const unsigned char *)text;
+  if (c[0] < 0x80) return 1;
+  const size_t n = c[0] >= 0xf0 ? 4 : c[0] >= 0xe0 ? 3 : 2;
+  uint32_t code = c[0] & (0x7fu >> n);
+  for (size_t i = 1; i < n; i++) {
+    if ((c[i] & 0xc0) != 0x80) return 0;
+    code = code << 6 | (c[i] & 0x3fu);
+  }
+  static const uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000};
+  const bool surrogate = code >= 0xd800 && code < 0xe000, none = code == 0xfffe || code == 0xffff;
+  return c[0] < 0xc0 || c[0] > 0xf4 || code < least[n] || code > 0x10ffff || surrogate || none ? 0 : n;
+}
+
+const char sf_utf8_replacement[] = "\xef\xbf\xbd";
+
+void sf_utf8_write(FILE *out, const char *text)
+{
+  for (size_t n; *text; text += n ? n : 1) {
+    n = sf_utf8_length(text);
+    fwrite(n ? text : sf_utf8_replacement, 1, n ? n : strlen(sf_utf8_replacement), out);
+  }
+}
+
+sf_status sf_json_print(cJSON *json, bool lines)
+{
+  char *text = json ? lines ? cJSON_Print(json) : cJSON_PrintUnformatted(json) : NULL;
+  cJSON_Delete(json);
+  if (!text) return sf_fail(SF_E_MEMORY, "no memory for the report");
+  sf_utf8_write(stdout, text);
+  putchar('\n');
+  cJSON_free(text);
+  return fflush(stdout) == 0 && !ferror(stdout) ? sf_ok()
+                                                : sf_fail(SF_E_IO, "standard output: cannot write the report");
+}

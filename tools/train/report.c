@@ -1,7 +1,6 @@
 #include "tools/train/report.h"
 #include "spikefield/io.h"
 #include <math.h>
-#include <stdlib.h>
 
 static double psnr_of(double mse)
 {
@@ -82,15 +81,6 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   return json;
 }
 
-static sf_status print_json(const cJSON *json, const char *model)
-{
-  char *text = cJSON_PrintUnformatted(json);
-  if (!text) return sf_fail(SF_E_MEMORY, "%s: no memory for the summary", model);
-  puts(text);
-  free(text);
-  return sf_ok();
-}
-
 static void print_text(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
 {
   printf(
@@ -108,11 +98,9 @@ static void print_text(const train_arguments *a, const sf_config *c, const sf_tr
 sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
 {
   cJSON *json = make_summary(a, c, s, q);
-  sf_status status = a->summary ? sf_json_save(json, a->summary) : sf_ok();
-  if (!status.code && a->json)
-    status = print_json(json, a->output);
-  else if (!status.code)
-    print_text(a, c, s, q);
+  const sf_status status = a->summary ? sf_json_save(json, a->summary) : sf_ok();
+  if (!status.code && a->json) return sf_json_print(json, false);
   cJSON_Delete(json);
+  if (!status.code) print_text(a, c, s, q);
   return status;
 }
