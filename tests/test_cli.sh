@@ -102,6 +102,8 @@ good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --te
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --voxels 16 --rays 64 --samples 256 --threads 1
 good energy_audit s.snn d --rays 20 --rtl-rays 0 --twin twin.safetensors
+good energy_audit s.snn d --rays 20 --rtl-rays 0 --recount-rays 0 --json
+if grep -q '"core_equals_recount":.null' stdout.txt; then passed=$((passed + 1)); else fail "a recount of nothing" "is equal"; fi
 good energy_audit --compare s.snn s.snn d --rays 20 --rtl-rays 0 --steps-b 1 --json
 good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1 -q
