@@ -218,17 +218,15 @@ static sf_status work(const options *opt)
 /* Options that nothing would read: there is no scene to count, or B is a report. */
 static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
 {
-  static const char *const pages[] = {"--csv", "--html", "--model", NULL}, *const b[] = {"--tech-b", "--steps-b", NULL};
-  static const char *const counts[] = {"--views", "--view",      "--rays",    "--rtl-rays", "--recount-rays", "--steps",
-                                       "--tech",  "--twin",      "--seed",    "--stall",    "--split",        "--scale",
-                                       "--model", "--downscale", "--plusarg", NULL};
-  static const char none[] = "has no effect: no scene is counted";
+  static const char *const b[] = {"--tech-b", "--steps-b", NULL};
+  static const char *const counting[] = {
+      "--views", "--view",  "--rays",      "--rtl-rays", "--recount-rays", "--steps", "--tech", "--twin",  "--seed",
+      "--stall", "--split", "--downscale", "--scale",    "--plusarg",      "--csv",   "--html", "--model", NULL};
   const bool a_counts = o->audit.scene && !(o->compare && is_report(o->audit.scene));
   const bool b_counts = o->compare && o->other && !is_report(o->other);
   if (o->compare && !b_counts) SF_TRY(sf_cli_refuse(cli, argc, argv, b, "has no effect: B is a report"));
-  if (a_counts || b_counts) return sf_ok();
-  SF_TRY(sf_cli_refuse(cli, argc, argv, counts, none));
-  return sf_cli_refuse(cli, argc, argv, pages, none);
+  return a_counts || b_counts ? sf_ok()
+                              : sf_cli_refuse(cli, argc, argv, counting, "has no effect: no scene is counted");
 }
 
 static sf_status parse_comparison(options *o, const char *const positional[3])
