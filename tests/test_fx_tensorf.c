@@ -326,7 +326,12 @@ static void same_rays(const fx_scene *scene, const char *kernels)
   static fx_cost cost[RAYS];
   fx_core *core;
   fx_counts sum = {0}, all = {0};
-  if (fx_core_open(&core, scene, kernels).code != SF_OK) return; /* not on this machine */
+  const sf_status status = fx_core_open(&core, scene, kernels);
+  if (status.code == SF_E_UNSUPPORTED) {
+    printf("%s: not on this machine\n", kernels);
+    return;
+  }
+  ck_assert_int_eq(status.code, SF_OK);
   for (uint64_t i = 0; i < RAYS; i++) ray[i] = make_ray(3, i, 1 + (int)(i % 7) * 40);
   ck_assert_int_eq(fx_render_rays(core, ray, RAYS, many, cost, &all).code, SF_OK);
   for (int i = 0; i < RAYS; i++) {

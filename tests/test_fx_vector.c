@@ -12,7 +12,9 @@ static const char *const instruction_sets[] = {"avx2", "avx512vnni", "amx"};
 static long samples_wanted(void)
 {
   const char *text = getenv("SF_FX_SAMPLES");
-  return text ? atol(text) : 40000;
+  const long wanted = text ? atol(text) : 40000;
+  ck_assert_msg(wanted > 0, "SF_FX_SAMPLES=%s: at least one", text);
+  return wanted;
 }
 
 static int64_t pick(uint64_t seed, uint64_t what, int64_t low, int64_t high)

@@ -8,6 +8,9 @@ build=$1/formal
 shift
 quick=
 [ "${1:-}" = --quick ] && quick=1 && shift
+for want; do
+  grep -qE "^$want " tests/formal/properties || { echo "formal: $want: no such property in tests/formal/properties" >&2; exit 1; }
+done
 for program in yosys yosys-smtbmc z3; do
   command -v $program >/dev/null || { echo "formal: $program is not installed (apt-get install yosys z3)"; exit 77; }
 done
@@ -81,9 +84,10 @@ verdict() {
   echo proved
 }
 
-failures=0
+failures=0 rows=0
 row() { # name, method, parameters, seconds, verdict, expected
   local result=$5
+  rows=$((rows + 1))
   [ "$5" = "$6" ] || { result="$5, expected $6: $build/$1.log"; failures=$((failures + 1)); }
   printf '%-28s %-10s %-20s %7.1f  %s\n' "$1" "$2" "$3" "$4" "$result"
 }
@@ -128,5 +132,6 @@ while read -r name number when file change; do
   result=$(verdict "$name+$number" "$top" "$files" "$method" "$parameters" "$build/$name+$number")
   row "$name+$number" "$method" "${change:0:20}" "$(bc <<<"$EPOCHREALTIME - $start")" "$result" refuted
 done <tests/formal/faults
+[ $rows -gt 0 ] || { echo "formal: no property was tried" >&2; exit 1; }
 [ $failures -eq 0 ] || echo "formal: $failures not as expected"
 [ $failures -eq 0 ]

@@ -15,6 +15,7 @@ import os
 import shutil
 import sys
 
+sys.dont_write_bytecode = True  # the source tree stays as it is
 import campaign
 import netlist
 
