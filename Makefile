@@ -7,14 +7,17 @@ endif
 .DELETE_ON_ERROR:
 SHELL := /bin/bash
 
-ifneq ($(filter deps,$(MAKECMDGOALS)),)
-# Nothing else may start, or even be looked up, before the packages are there: the other goals run afterwards.
-REST := $(filter-out deps,$(MAKECMDGOALS))
+FIRST := $(filter deps clean,$(MAKECMDGOALS))
+REST := $(filter-out deps clean,$(MAKECMDGOALS))
+ifneq ($(filter deps,$(FIRST))$(and $(FIRST),$(REST)),)
+# Nothing else may start, or even be looked up, before the packages are there and build/ is gone: the other goals run
+# afterwards.
 .NOTPARALLEL:
-.PHONY: deps $(REST)
+.PHONY: $(FIRST) $(REST)
 deps: ## install what is missing with apt (Debian, Ubuntu); prints what it does
 	@tools/deps.sh
-$(REST): deps
+$(REST): $(FIRST)
+clean $(REST):
 	@$(MAKE) $@
 else
 

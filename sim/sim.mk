@@ -45,10 +45,11 @@ $1/V$4__ALL.a: $1/V$4.mk
 	$$(call say,CXX   $$@)
 	$$Q$$(MAKE) -s -C $1 -f V$4.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$4__ALL.a >/dev/null
 	@touch $$@
-$1/$5.o: sim/$5.cpp sim/pins.h sim/pins_model.h $(ARCH_DEF) $1/V$4.mk
+-include $1/$5.d
+$1/$5.o: sim/$5.cpp $(ARCH_DEF) $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
 	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
-	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -c $$< -o $$@
+	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -MMD -MP -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
 define verilated_rule
@@ -103,7 +104,8 @@ $B/faults/c/.patched: $(C_FAULTY) $(C_FAULTS)
 	@touch $@
 $(C_FAULTY:%.c=$B/faults/c/%.o): $B/faults/c/%.o: $B/faults/c/.patched
 	$(call say,CC    $@)
-	$Q$(CC) $(CFLAGS_ALL) -c $(@:.o=.c) -o $@
+	$Q$(CC) $(CFLAGS_ALL) -MMD -MP -c $(@:.o=.c) -o $@
+-include $(C_FAULTY:%.c=$B/faults/c/%.d)
 $B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
