@@ -525,18 +525,19 @@ static sf_status parse(values *v, const char **positional, const char *line)
                                {"--mode", 0, SF_ARG_CHOICE, &v->choice, 0, 0, "hybrid|decay|no-decay", NULL, "a mode"},
                                {"--out", 'o', SF_ARG_STRING, &v->text, 0, 0, NULL, "FILE", "a file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2};
+  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2, false};
   return parse_line(&cli, positional, line);
 }
 
 static sf_status parse_paths(const char *line, const char **positional)
 {
-  const char *output = NULL, *log = NULL, *start = NULL;
+  const char *output = NULL, *log = NULL, *start = NULL, *word = NULL;
   const sf_option options[] = {{"--output", 'o', SF_ARG_OUTPUT, &output, 0, 0, NULL, "FILE", "a file"},
                                {"--log", 0, SF_ARG_PLACE, &log, 0, 0, NULL, "FILE", "a log"},
-                               {"--start", 0, SF_ARG_STRING, &start, 0, 0, NULL, "FILE", "an input"},
+                               {"--start", 0, SF_ARG_INPUT, &start, 0, 0, NULL, "FILE", "an input"},
+                               {"--word", 0, SF_ARG_STRING, &word, 0, 0, NULL, "WORD", "no file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2};
+  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2, false};
   return parse_line(&cli, positional, line);
 }
 
@@ -597,7 +598,8 @@ START_TEST(cli_outputs)
       {"a --log b", "--log", "is the input"},        {"in --start a -o b", "--output", "also --start"},
       {"in -o c --log c", "--output", "also --log"}, {"in --log d/../c -o c", "--output", "also --log"}};
   static const char *const unwritable[] = {"in -o none/c", "in -o d", "in -o a/c", "in -o /dev/null"};
-  static const char *const good[] = {"a -o c --log d", "d --log d -o d/a", "in --start c -o x", "in --log none/c"};
+  static const char *const good[] = {"a -o c --log d", "d --log d -o d/a", "in --start c -o x", "in --log none/c",
+                                     "in --word c -o c"};
   const char *p[2];
   ck_assert_int_eq(chdir(folder), 0);
   ck_good(sf_write_file("a", "a", 1));

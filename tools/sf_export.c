@@ -374,7 +374,7 @@ int main(int argc, char **argv)
       {"--fit-loss", 0, SF_ARG_DOUBLE, &o.fit_loss, 0, 100, NULL, "DB",
        "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
       {"--fit-rays", 0, SF_ARG_U64, &o.fit_rays, 256, 1e8, NULL, "N", "rays that --fit looks at (default 262144)"},
-      {"--data", 0, SF_ARG_STRING, &o.extra.data, 0, 0, NULL, "DATA", "data set for --fit, --vectors and --traces"},
+      {"--data", 0, SF_ARG_INPUT, &o.extra.data, 0, 0, NULL, "DATA", "data set for --fit, --vectors and --traces"},
       {"--vectors", 0, SF_ARG_PLACE, &o.extra.vectors, 0, 0, NULL, "DIR",
        "write programming, stimulus, everything expected, RTL and bench of the scene into DIR (docs/kit.md)"},
       {"--samples", 0, SF_ARG_INT, &o.extra.samples, 1, SF_KIT_SAMPLES_MAX, NULL, "N",

@@ -65,6 +65,7 @@ int main(int argc, char **argv)
                   "  sf_scene fog -o scene --size 100 --train 40 --test 5 --seed 7",
       .options = options,
       .max_positional = 1,
+      .words = true,
   };
   const char *name;
   sf_status status = sf_cli_parse(&cli, argc, argv, &name);

@@ -207,10 +207,10 @@ static cJSON *output_json(const char *output)
 {
   cJSON *lines = cJSON_CreateArray();
   for (size_t length; *output; output += length + (output[length] == '\n')) {
-    char line[512];
     length = strcspn(output, "\n");
-    snprintf(line, sizeof line, "%.*s", (int)length, output);
-    cJSON_AddItemToArray(lines, cJSON_CreateString(line));
+    char *line = strndup(output, length);
+    if (line) cJSON_AddItemToArray(lines, cJSON_CreateString(line));
+    free(line);
   }
   return lines;
 }
@@ -287,9 +287,9 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
-      {"--firmware", 0, SF_ARG_STRING, &o->firmware, 0, 0, NULL, "ELF",
+      {"--firmware", 0, SF_ARG_INPUT, &o->firmware, 0, 0, NULL, "ELF",
        "program to run (default ../firmware/sf_firmware.elf from here)"},
-      {"--image", 0, SF_ARG_STRING, &o->image, 0, 0, NULL, "FILE", "memory image to load instead of the tile's own"},
+      {"--image", 0, SF_ARG_INPUT, &o->image, 0, 0, NULL, "FILE", "memory image to load instead of the tile's own"},
       {"--save-image", 0, SF_ARG_OUTPUT, &o->save_image, 0, 0, NULL, "FILE",
        "write the memory image, for other systems"},
       {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "write the firmware's pixels"},

@@ -137,8 +137,8 @@ static sf_status render_one(job *j)
   if (status.code == SF_E_STOPPED) return sf_fail(status.code, "stopped; nothing was written");
   SF_TRY(status);
   fill_report(j, sf_seconds() - j->start);
-  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
   SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.output));
+  if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
   if (j->opt.json) return sf_json_print(sf_render_report_json(&j->report), true);
   sf_render_report_print(stdout, &j->report);
   return sf_ok();
@@ -290,7 +290,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
        "which view of the split, from 0 (default 0; --verify: all)"},
       {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
        "every view of the split, into the folder -o, with a manifest"},
-      {"--verify", 0, SF_ARG_STRING, &o->verify, 0, 0, NULL, "MANIFEST",
+      {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
        "render again what the manifest lists and compare"},
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
       {"--output", 'o', SF_ARG_PLACE, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
@@ -298,7 +298,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
-      {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
+      {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "for float (default model.safetensors beside the scene)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},

@@ -4,13 +4,15 @@
 #include "spikefield/status.h"
 #include <stdbool.h>
 
-/* OUTPUT: a file that will be written; PLACE: a folder, or what the program itself opens before it works. */
+/* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or what
+ * the program itself opens before it works. */
 typedef enum {
   SF_ARG_FLAG,
   SF_ARG_INT,
   SF_ARG_U64,
   SF_ARG_DOUBLE,
   SF_ARG_STRING,
+  SF_ARG_INPUT,
   SF_ARG_OUTPUT,
   SF_ARG_PLACE,
   SF_ARG_CHOICE
@@ -28,10 +30,11 @@ typedef struct sf_cli {
   const char *program, *usage, *summary, *examples; /* shown by --help */
   const sf_option *options;                         /* ends with name == NULL */
   int min_positional, max_positional;
+  bool words; /* the positionals are words, not files or folders that are read */
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
- * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another argument is one.
+ * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another file of the line is one.
  * SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores SIGXFSZ, so
  * that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);

@@ -133,6 +133,7 @@ static sf_status set_value(const sf_option *o, const char *text)
   case SF_ARG_CHOICE:
     return set_choice(o, text);
   case SF_ARG_STRING:
+  case SF_ARG_INPUT:
   case SF_ARG_OUTPUT:
   case SF_ARG_PLACE:
     if (!*text) return sf_fail(SF_E_USAGE, "%s needs a value that is not empty", o->name);
@@ -174,7 +175,7 @@ static bool same_file(const char *a, const char *b)
 /* The path that the option names; NULL where it names none. */
 static const char *path_of(const sf_option *o)
 {
-  const bool path = o->type == SF_ARG_STRING || o->type == SF_ARG_OUTPUT || o->type == SF_ARG_PLACE;
+  const bool path = o->type == SF_ARG_INPUT || o->type == SF_ARG_OUTPUT || o->type == SF_ARG_PLACE;
   return path ? *(const char **)o->value : NULL;
 }
 
@@ -185,7 +186,7 @@ static sf_status check_outputs(const sf_cli *cli, const char *const *positional)
     if (o->type != SF_ARG_OUTPUT && o->type != SF_ARG_PLACE) continue;
     const char *path = path_of(o);
     if (!path) continue;
-    for (int i = 0; i < cli->max_positional && positional[i]; i++)
+    for (int i = 0; i < cli->max_positional && !cli->words && positional[i]; i++)
       if (same_file(path, positional[i]))
         return sf_fail(SF_E_USAGE, "%s %.200s is the input %.200s", o->name, path, positional[i]);
     for (const sf_option *other = cli->options; other->name; other++)

@@ -44,6 +44,7 @@ static void write_value(const sf_option *o, char text[TEXT])
     write_choice(o->choices, *(int *)o->value, text);
     break;
   case SF_ARG_STRING:
+  case SF_ARG_INPUT:
     if (*(const char **)o->value) snprintf(text, TEXT, "%s", *(const char **)o->value);
     break;
   case SF_ARG_FLAG:

@@ -73,7 +73,7 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
       {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "ablation: without max time-step scaling"},
       {"--fixed-steps", 0, SF_ARG_INT, &t->fixed_steps, 0, SF_T_MAX, NULL, "N",
        "stage II trains the prefix of N steps alone, t* = N, without L_budg; 0 = t* is learned (default 0)"},
-      {"--fine-tune", 0, SF_ARG_STRING, &a->fine_tune, 0, 0, NULL, "MODEL",
+      {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
        "start from this trained model, at its t_r, with weights rounded as sf_export does; stage II alone"},
       {"--weight-bits", 0, SF_ARG_INT, &a->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B",
        "of --fine-tune: bits of a weight (default 8)"},
@@ -197,7 +197,7 @@ static sf_status parse(train_arguments *a, const char **path)
   sf_option options[TRAIN_OPTIONS_MAX];
   sf_cli cli = train_cli(a, options);
   cli.min_positional = 0;
-  SF_TRY(sf_cli_parse(&cli, a->words, a->before, path));
+  if (a->words > 1) SF_TRY(sf_cli_parse(&cli, a->words, a->before, path));
   cli.min_positional = 1;
   SF_TRY(sf_cli_parse(&cli, a->argc, a->argv, path));
   cJSON_Delete(a->record);
