@@ -79,19 +79,17 @@ static sf_status load(sf_audit *a)
   return sf_ok();
 }
 
-/* A file, or the name of one of those that stand beside the program: ../share/spikefield/tech/NAME.tech. */
-static sf_status load_technology(sf_audit *a)
+sf_status sf_audit_technology(sf_technology *technology, const char *name)
 {
   char path[4096 + 64];
-  const char *name = a->opt.tech;
-  if (strchr(name, '/') || access(name, F_OK) == 0) return sf_technology_load(&a->technology, name);
+  if (strchr(name, '/') || access(name, F_OK) == 0) return sf_technology_load(technology, name);
   const ssize_t n = readlink("/proc/self/exe", path, 4096);
   if (n <= 0) return sf_fail(SF_E_IO, "--tech %s: /proc/self/exe: cannot find the program's folder", name);
   path[n] = 0;
   for (int up = 0; up < 2 && strrchr(path, '/'); up++) *strrchr(path, '/') = 0;
   const size_t folder = strlen(path);
   snprintf(path + folder, sizeof path - folder, "/share/spikefield/tech/%.60s.tech", name);
-  return sf_technology_load(&a->technology, path);
+  return sf_technology_load(technology, path);
 }
 
 /* ---- the rays for the accelerator ---- */
@@ -173,7 +171,7 @@ sf_status sf_audit_count(sf_audit *a)
 sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options)
 {
   *audit = (sf_audit){.opt = *options};
-  SF_TRY(load_technology(audit));
+  SF_TRY(sf_audit_technology(&audit->technology, audit->opt.tech));
   return load(audit);
 }
 

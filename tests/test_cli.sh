@@ -66,6 +66,7 @@ size_of() { wc -c <"$1"; }
 # ---- something good to spoil ----
 
 good sf_scene simple -o d --size 16 --train 3 --test 2
+good sf_scene simple -o simple --size 4 --train 1 --test 1
 good sf_data d --png cameras.png
 good sf_data d --json
 usage "missing argument" sf_data
@@ -91,6 +92,7 @@ good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-ra
 good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png
 good sim_render s.snn d -o f.exr --backend float
+good sim_render s.snn d -o train --all --split train
 # Threads that the address space has no room for are not asked for.
 (ulimit -v 4000000 && OMP_STACKSIZE=16m "$BIN/sim_render" s.snn d --threads 1024 -o t.exr -q >stdout.txt 2>err)
 if cmp -s t.exr g.exr; then passed=$((passed + 1)); else fail "sim_render --threads 1024" "no picture"; fi
@@ -274,6 +276,11 @@ usage --csv energy_audit --compare s.snn s.snn d --csv out
 usage --tech-b energy_audit s.snn d --tech-b 45nm
 usage --steps-b energy_audit s.snn d --steps-b 1
 usage extra energy_audit s.snn d extra
+usage "missing argument" energy_audit --steps 2
+usage "--compare needs two arguments" energy_audit --compare s.snn --steps-b 1
+usage "d has no effect: reports" energy_audit --compare a.json b.json d
+usage "--tech has no effect: A is a report" energy_audit --compare a.json s.snn d --tech 45nm --tech-b 45nm
+usage "--stall has no effect beside --rtl-rays 0" energy_audit s.snn d --rtl-rays 0 --stall 5
 usage --model energy_audit s.snn d --model model.safetensors
 for option in --tech-b\ nosuch --steps-b\ 1; do
   usage "${option% *} has no effect: B is a report" energy_audit --compare s.snn b.json d $option
@@ -461,7 +468,11 @@ writers() { # PATTERN PATH
   absent out "unwritable $2"
 }
 data nosuch energy_audit s.snn d --rays 1 --rtl-rays 0 --tech nosuch
-data nosuch energy_audit s.snn d --rays 1 --rtl-rays 0 --twin nosuch
+data nosuch energy_audit s.snn d --rays 1000000000 --twin nosuch
+data nosuch energy_audit s.snn d --rays 1000000000 --html out --model nosuch
+data nosuch energy_audit --compare s.snn s.snn d --rays 1000000000 --tech-b nosuch
+(mkdir -p here/model.safetensors && cd here && timeout 60 "$BIN/sf_train" --help) >stdout.txt 2>err
+if [ -s stdout.txt ] && [ ! -s err ]; then passed=$((passed + 1)); else fail "sf_train --help" "looks at outputs"; fi
 data model.safetensors energy_audit s.snn d --rays 1 --rtl-rays 0 --twin model.safetensors
 data nosuch.json energy_audit --compare nosuch.json nosuch.json
 printf '{"views": 1}' >none.json
@@ -510,6 +521,14 @@ full full.out sf_export model.safetensors -o full.out
 full full.out sim_render s.snn d -o full.out
 full full.out sim_render s.snn d -o full.out --backend float
 full full.out energy_audit s.snn d --rays 20 --rtl-rays 0 --json --csv full.out
+# What was counted, compared or learned is told, though its file could not be written.
+told() { # TEXT PROGRAM ARGS...
+  { (ulimit -f 0; exec timeout -k 5 60 "$BIN/$2" "${@:3}" 2>/dev/null </dev/null); echo "status $?"; } | cat >stdout.txt
+  if grep -qF -e "$1" stdout.txt && grep -qx "status 1" stdout.txt; then passed=$((passed + 1))
+  else fail "full disk: ${*:2}" "nothing is reported, or no failure"; fi
+}
+told '"samples":' energy_audit s.snn d --rays 20 --rtl-rays 0 --json --csv full.out
+told '"samples":' sf_cosim s.snn d --rays 3 --json --junit full.out
 full full.out sf_train "${train[@]}" -o full.out --log log.out
 # Checkpoints along the way may fail, the model may not: 3 of 4 iterations are followed by one.
 (ulimit -f 1; exec timeout -k 5 60 "$BIN/sf_train" "${train[@]}" -o full.out --log log.out --checkpoint-minutes 0 >stdout.txt 2>err </dev/null)

@@ -54,15 +54,21 @@ static sf_status write_csv(const page_audit *a)
 
 /* ---- HTML ---- */
 
-/* The command in words that a shell reads back. */
-static void join_command(char *text, size_t size, int argc, char **argv)
+/* The command in words that a shell reads back; NULL: no memory. */
+static char *join_command(int argc, char **argv)
 {
-  size_t used = 0;
-  for (int i = 0; i < argc && used < size; i++) {
-    const bool plain = argv[i][0] && !argv[i][strcspn(argv[i], " \t\n'\"\\$`*?[]{}()<>|&;#~!")];
-    const int n = snprintf(text + used, size - used, plain ? "%s%s" : "%s'%s'", i ? " " : "", argv[i]);
-    used += n > 0 ? (size_t)n : 0;
+  static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789%+,-./:=@_";
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  for (int i = 0; out && i < argc; i++) {
+    const bool quoted = !argv[i][0] || argv[i][strspn(argv[i], plain)];
+    fputs(quoted ? i ? " '" : "'" : i ? " " : "", out);
+    for (const char *c = argv[i]; *c; c++) fputs(*c == '\'' ? "'\\''" : (char[]){*c, 0}, out);
+    if (quoted) fputc('\'', out);
   }
+  if (!out || fclose(out)) return NULL;
+  return text;
 }
 
 static bool page_tick(void *user, int done, int total)
@@ -99,10 +105,10 @@ static sf_status make_page(page_audit *a)
   return sf_page_save(&a->page, o->html);
 }
 
-static sf_status print_report(const page_audit *a)
+static sf_status print_report(const page_audit *a, bool page)
 {
   if (a->opt.json) {
-    cJSON *json = a->opt.html ? sf_page_json(&a->page) : sf_report_json(&a->audit.report);
+    cJSON *json = page ? sf_page_json(&a->page) : sf_report_json(&a->audit.report);
     if (a->opt.published) cJSON_AddItemToObject(json, "published", sf_published_json());
     return sf_json_print(json, true);
   }
@@ -142,16 +148,25 @@ static sf_status open_audit(page_audit **a, const options *opt)
   return sf_ok();
 }
 
+/* What was counted is printed whatever becomes of the files. The worst of all is told: a difference. */
+static sf_status report(page_audit *a)
+{
+  const sf_status *agreement = &a->audit.report.three.agreement;
+  const sf_status csv = write_csv(a), page = make_page(a);
+  const sf_status printed = print_report(a, a->opt.html && page.code == SF_OK);
+  const sf_status *const failed = page.code == SF_E_DIFFERENCE || csv.code == SF_OK ? &page : &csv;
+  if (agreement->code != SF_OK)
+    return sf_fail(SF_E_DIFFERENCE, "%s: %.150s%s%.150s", a->opt.audit.scene, agreement->message,
+                   failed->code == SF_OK ? "" : "; ", failed->message);
+  return failed->code == SF_OK ? printed : *failed;
+}
+
 static sf_status audit_scene(const options *opt)
 {
   page_audit *a;
   SF_TRY(open_audit(&a, opt));
   sf_status status = run(a);
-  if (status.code == SF_OK) status = write_csv(a);
-  if (status.code == SF_OK) status = make_page(a);
-  if (status.code == SF_OK) status = print_report(a);
-  if (status.code == SF_OK && a->audit.report.three.agreement.code != SF_OK)
-    status = sf_fail(SF_E_DIFFERENCE, "%s: %s", opt->audit.scene, a->audit.report.three.agreement.message);
+  if (status.code == SF_OK) status = report(a);
   close_audit(a);
   return status;
 }
@@ -215,16 +230,22 @@ static sf_status work(const options *opt)
   return sf_ok();
 }
 
-/* Options that nothing would read: there is no scene to count, or B is a report. */
+/* Options that nothing would read: there is no scene to count, or that side is a report. */
 static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
 {
-  static const char *const b[] = {"--tech-b", "--steps-b", NULL};
+  static const char *const b[] = {"--tech-b", "--steps-b", NULL}, *const tech[] = {"--tech", NULL},
+                           *const steps[] = {"--steps", NULL}, *const rtl[] = {"--stall", "--plusarg", NULL};
   static const char *const counting[] = {
       "--views", "--view",  "--rays",      "--rtl-rays", "--recount-rays", "--steps", "--tech", "--twin",  "--seed",
       "--stall", "--split", "--downscale", "--scale",    "--plusarg",      "--csv",   "--html", "--model", NULL};
   const bool a_counts = o->audit.scene && !(o->compare && is_report(o->audit.scene));
   const bool b_counts = o->compare && o->other && !is_report(o->other);
   if (o->compare && !b_counts) SF_TRY(sf_cli_refuse(cli, argc, argv, b, "has no effect: B is a report"));
+  if (b_counts && !a_counts) {
+    if (o->tech_b) SF_TRY(sf_cli_refuse(cli, argc, argv, tech, "has no effect: A is a report"));
+    if (o->steps_b) SF_TRY(sf_cli_refuse(cli, argc, argv, steps, "has no effect: A is a report"));
+  }
+  if (!o->audit.rtl_rays) SF_TRY(sf_cli_refuse(cli, argc, argv, rtl, "has no effect beside --rtl-rays 0"));
   return a_counts || b_counts ? sf_ok()
                               : sf_cli_refuse(cli, argc, argv, counting, "has no effect: no scene is counted");
 }
@@ -234,14 +255,39 @@ static sf_status parse_comparison(options *o, const char *const positional[3])
   static const char usage[] = "energy_audit --compare A B [DATA]";
   o->audit.data = positional[2];
   if (!o->audit.scene || !o->other) return sf_fail(SF_E_USAGE, "--compare needs two arguments; usage: %s", usage);
-  if (!o->audit.data && !(is_report(o->audit.scene) && is_report(o->other)))
-    return sf_fail(SF_E_USAGE, "--compare of scenes needs DATA; usage: %s", usage);
+  const bool reports = is_report(o->audit.scene) && is_report(o->other);
+  if (!o->audit.data && !reports) return sf_fail(SF_E_USAGE, "--compare of scenes needs DATA; usage: %s", usage);
+  if (o->audit.data && reports)
+    return sf_fail(SF_E_USAGE, "%s has no effect: reports are compared without data", o->audit.data);
   if (o->csv || o->html || o->published)
     return sf_fail(SF_E_USAGE, "--compare and %s exclude each other",
                    o->csv    ? "--csv"
                    : o->html ? "--html"
                              : "--published");
   return sf_ok();
+}
+
+/* What is missing or does not fit together. */
+static sf_status check_arguments(options *o, const sf_cli *cli, const char *const positional[3])
+{
+  if (o->audit.view >= 0 && o->audit.views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
+  if (o->model && !o->html) return sf_fail(SF_E_USAGE, "--model goes with --html");
+  if (o->compare) return parse_comparison(o, positional);
+  if (positional[2]) return sf_fail(SF_E_USAGE, "unexpected argument %s; usage: %s", positional[2], cli->usage);
+  if (o->tech_b || o->steps_b)
+    return sf_fail(SF_E_USAGE, "%s goes with --compare", o->tech_b ? "--tech-b" : "--steps-b");
+  if (o->audit.scene && !o->audit.data) return sf_fail(SF_E_USAGE, "missing argument DATA; usage: %s", cli->usage);
+  if (!o->audit.scene && !o->published) return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage);
+  return sf_ok();
+}
+
+/* Inputs that are read after the counting. */
+static sf_status check_inputs(const options *o)
+{
+  sf_technology technology;
+  if (o->model) SF_TRY(sf_readable(o->model));
+  if (o->audit.twin) SF_TRY(sf_readable(o->audit.twin));
+  return o->tech_b ? sf_audit_technology(&technology, o->tech_b) : sf_ok();
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -255,8 +301,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--recount-rays", 0, SF_ARG_U64, &o->audit.recount_rays, 0, 1e9, NULL, "N",
        "rays recounted from their spike bitmaps (default 1000)"},
       {"--steps", 0, SF_ARG_INT, &o->audit.steps, 1, SF_T_MAX, NULL, "N", "time steps in place of the scene's t_r"},
-      {"--tech", 0, SF_ARG_STRING, &o->audit.tech, 0, 0, NULL, "FILE", "prices: a file or a name (default 45nm)"},
-      {"--twin", 0, SF_ARG_STRING, &o->audit.twin, 0, 0, NULL, "FILE",
+      {"--tech", 0, SF_ARG_INPUT, &o->audit.tech, 0, 0, NULL, "FILE", "prices: a file or a name (default 45nm)"},
+      {"--twin", 0, SF_ARG_INPUT, &o->audit.twin, 0, 0, NULL, "FILE",
        "float model of a ReLU twin, trained by itself: its own samples"},
       {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
       {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
@@ -266,11 +312,11 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
       {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
-      {"--model", 0, SF_ARG_STRING, &o->model, 0, 0, NULL, "FILE",
+      {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
       {"--compare", 0, SF_ARG_FLAG, &o->compare, 0, 0, NULL, NULL,
        "A B [DATA]: two reports (.json) or scenes, what changed"},
-      {"--tech-b", 0, SF_ARG_STRING, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
+      {"--tech-b", 0, SF_ARG_INPUT, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
       {"--steps-b", 0, SF_ARG_INT, &o->steps_b, 1, SF_T_MAX, NULL, "N", "time steps of B (default: as A)"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       {"--plusarg", 0, SF_ARG_STRING, &o->audit.plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
@@ -282,18 +328,11 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
   o->audit.scene = positional[0], o->audit.data = positional[1], o->other = o->compare ? positional[1] : NULL;
+  if (status.code == SF_OK) status = check_arguments(o, cli, positional);
   if (status.code == SF_OK) status = check_effect(o, cli, argc, argv);
+  if (status.code == SF_OK) status = check_inputs(o);
   cli->options = NULL;
-  SF_TRY(status);
-  if (o->audit.view >= 0 && o->audit.views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");
-  if (o->model && !o->html) return sf_fail(SF_E_USAGE, "--model goes with --html");
-  if (o->compare) return parse_comparison(o, positional);
-  if (positional[2]) return sf_fail(SF_E_USAGE, "unexpected argument %s; usage: %s", positional[2], cli->usage);
-  if (o->tech_b || o->steps_b)
-    return sf_fail(SF_E_USAGE, "%s goes with --compare", o->tech_b ? "--tech-b" : "--steps-b");
-  if (o->audit.scene && !o->audit.data) return sf_fail(SF_E_USAGE, "missing argument DATA; usage: %s", cli->usage);
-  if (!o->audit.scene && !o->published) return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage);
-  return sf_ok();
+  return status;
 }
 
 int main(int argc, char **argv)
@@ -320,12 +359,12 @@ int main(int argc, char **argv)
                            .seed = 1}};
   sf_status status = parse(argc, argv, &opt, &cli);
   if (status.code == SF_OK) {
-    char command[4096];
-    join_command(command, sizeof command, argc, argv);
-    opt.command = command;
+    char *command = join_command(argc, argv);
+    opt.command = command ? command : cli.program;
     if (opt.threads) omp_set_num_threads(opt.threads);
     sf_cli_catch_signals();
     status = work(&opt);
+    free(command);
   }
   return sf_cli_finish(&cli, status);
 }

@@ -44,9 +44,12 @@ static sf_status print_text(const sf_lockstep *l, double seconds)
 static sf_status report(const options *o, const sf_lockstep *l, const sf_status *status, double seconds)
 {
   if (status->code != SF_OK && status->code != SF_E_DIFFERENCE && status->code != SF_E_STOPPED) return sf_ok();
-  if (o->junit) SF_TRY(sf_lockstep_junit(l, status, seconds, o->junit));
-  if (o->json) return sf_json_print(sf_lockstep_json(l, status, seconds), true);
-  return status->code == SF_E_DIFFERENCE ? sf_ok() : print_text(l, seconds);
+  const sf_status saved = o->junit ? sf_lockstep_junit(l, status, seconds, o->junit) : sf_ok();
+  if (o->json)
+    SF_TRY(sf_json_print(sf_lockstep_json(l, status, seconds), true));
+  else if (status->code != SF_E_DIFFERENCE)
+    SF_TRY(print_text(l, seconds));
+  return saved;
 }
 
 static sf_status simulate(const options *o, sf_lockstep *l)
@@ -63,7 +66,8 @@ static sf_status simulate(const options *o, sf_lockstep *l)
   if (status.code == SF_OK && l->sum.samples == 0)
     status = sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: nothing was compared", l->data.path, o->run.rays);
   const sf_status reported = report(o, l, &status, sf_seconds() - d.begun);
-  return status.code == SF_OK ? reported : status;
+  if (status.code == SF_OK) return reported;
+  return reported.code == SF_OK ? status : sf_fail(status.code, "%.199s; %.199s", status.message, reported.message);
 }
 
 /* ---- replay ---- */
@@ -215,7 +219,7 @@ int main(int argc, char **argv)
        "finished units; where it is there, the run goes on from it"},
       {"--evidence", 0, SF_ARG_STRING, &r->evidence, 0, 0, NULL, "PREFIX",
        "of a difference: PREFIX.json to replay, PREFIX.fst waveform (default sf_cosim-difference)"},
-      {"--replay", 0, SF_ARG_STRING, &o.replay, 0, 0, NULL, "FILE",
+      {"--replay", 0, SF_ARG_INPUT, &o.replay, 0, 0, NULL, "FILE",
        "the samples of such a file, and nothing else; writes PREFIX.fst"},
       {"--junit", 0, SF_ARG_OUTPUT, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
       {"--saif", 0, SF_ARG_OUTPUT, &o.activity.saif, 0, 0, NULL, "FILE",

@@ -92,7 +92,10 @@ static sf_status run_frame(job *j)
         sf_cycle_model_add(j->model, &row[i].at[s]);
         if (j->latency) continue;
         sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net);
-        if (!alone) return sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+        if (!alone) {
+          status = sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+          break;
+        }
         sf_cycle_model_add(alone, &row[i].at[s]);
         sf_cycle_model_drain(alone);
         j->latency = sf_cycle_model_totals(alone)->cycles;

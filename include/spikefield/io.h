@@ -20,7 +20,9 @@ typedef struct sf_writer {
 sf_status sf_writer_open(sf_writer *writer, const char *path);
 sf_status sf_writer_commit(sf_writer *writer);
 void sf_writer_abort(sf_writer *writer); /* removes the file aside; safe after commit */
-sf_status sf_writable(const char *path); /* whether a writer could be opened: before the work, not after it */
+/* Whether a file could be read, a writer be opened: before the work, not after it. */
+sf_status sf_readable(const char *path);
+sf_status sf_writable(const char *path);
 sf_status sf_write_file(const char *path, const void *data, size_t size);
 sf_status sf_make_dir(const char *path); /* with parents; existing is fine */
 

@@ -76,7 +76,7 @@ static sf_status scene_json(const char *path, const fx_net *net, cJSON *json)
   const char *slash = strrchr(path, '/');
   SF_TRY(sf_sha256_file(path, hash));
   cJSON *scene = cJSON_AddObjectToObject(json, "scene");
-  cJSON_AddStringToObject(scene, "name", slash ? slash + 1 : path);
+  sf_json_add_text(scene, "name", slash ? slash + 1 : path);
   cJSON_AddStringToObject(scene, "sha256", hash);
   cJSON_AddNumberToObject(scene, "steps", net->steps);
   cJSON_AddStringToObject(scene, "mode", mode[net->mode]);
@@ -100,7 +100,7 @@ static void rays_json(const sf_kit_draw *draw, const sf_dataset *data, cJSON *js
     const sf_kit_ray *r = &draw->ray[i];
     cJSON *ray = cJSON_CreateObject();
     sf_json_add_u64(ray, "ray", r->number);
-    cJSON_AddStringToObject(ray, "view", data->view[r->view].name);
+    sf_json_add_text(ray, "view", data->view[r->view].name);
     cJSON_AddNumberToObject(ray, "x", r->x);
     cJSON_AddNumberToObject(ray, "y", r->y);
     cJSON_AddNumberToObject(ray, "samples", r->samples);

@@ -151,6 +151,14 @@ sf_status sf_writable(const char *path)
   return sf_ok();
 }
 
+sf_status sf_readable(const char *path)
+{
+  FILE *file = fopen(path, "rb");
+  if (!file) return sf_fail(SF_E_IO, "cannot read %s: %s", path, strerror(errno));
+  fclose(file);
+  return sf_ok();
+}
+
 sf_status sf_write_file(const char *path, const void *data, size_t size)
 {
   sf_writer writer;

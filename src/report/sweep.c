@@ -274,7 +274,10 @@ void sf_sweep_csv(FILE *out, const sf_sweep *sweep)
   fprintf(out, ",rtl_cells,rtl_cycles\n");
   for (int p = 0; p < sweep->count; p++) {
     const sf_point *point = &sweep->point[p];
-    fprintf(out, "%s,%s,%d", point->name, point->model, point->front);
+    sf_csv_text(out, point->name);
+    fputc(',', out);
+    sf_csv_text(out, point->model);
+    fprintf(out, ",%d", point->front);
     for (int i = 0; i < SF_AXES; i++) fprintf(out, ",%d", point->axis[i]);
     for (int i = 0; i < SF_POINT_FIGURES; i++) fprintf(out, ",%.9g", point->figure[i]);
     fprintf(out, ",not available,not available\n");

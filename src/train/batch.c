@@ -110,13 +110,13 @@ static void place(sf_batch *b, const sf_march *march, int r)
     }
 }
 
-/* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
- * be empty, the lattice is made coarser, until it is settled. */
 int sf_batch_most(const sf_trainer *t)
 {
   return t->options.rays ? t->options.rays : RAYS_MAX;
 }
 
+/* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
+ * be empty, the lattice is made coarser, until it is settled. */
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;

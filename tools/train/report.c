@@ -1,4 +1,5 @@
 #include "tools/train/report.h"
+#include "spikefield/audit.h"
 #include "spikefield/io.h"
 #include <math.h>
 
@@ -56,7 +57,7 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
 {
   static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
   cJSON *json = cJSON_CreateObject();
-  cJSON_AddStringToObject(json, "model", a->output);
+  sf_json_add_text(json, "model", a->output);
   cJSON_AddStringToObject(json, "backbone", c->backbone == SF_TENSORF ? "tensorf" : "ingp");
   cJSON_AddStringToObject(json, "layout", q->layout);
   cJSON_AddStringToObject(json, "net", net[c->net]);
@@ -98,9 +99,12 @@ static void print_text(const train_arguments *a, const sf_config *c, const sf_tr
 sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
 {
   cJSON *json = make_summary(a, c, s, q);
-  const sf_status status = a->summary ? sf_json_save(json, a->summary) : sf_ok();
-  if (!status.code && a->json) return sf_json_print(json, false);
-  cJSON_Delete(json);
-  if (!status.code) print_text(a, c, s, q);
-  return status;
+  const sf_status saved = a->summary ? sf_json_save(json, a->summary) : sf_ok();
+  if (a->json) {
+    SF_TRY(sf_json_print(json, false));
+  } else {
+    cJSON_Delete(json);
+    print_text(a, c, s, q);
+  }
+  return saved;
 }
