@@ -4,8 +4,8 @@
 #include "spikefield/status.h"
 #include <stdbool.h>
 
-/* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or what
- * the program itself opens before it works. */
+/* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or
+ * what the program itself opens before it works. */
 typedef enum {
   SF_ARG_FLAG,
   SF_ARG_INT,
@@ -34,9 +34,9 @@ typedef struct sf_cli {
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
- * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another file of the line is one.
- * SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores SIGXFSZ, so
- * that a file-size limit is an ordinary write error. */
+ * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another file of the line
+ * is one. SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores
+ * SIGXFSZ, so that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
 /* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
