@@ -27,6 +27,31 @@ static void check_layout(const sf_batch *b)
   ck_assert_int_eq(blocks, b->blocks);
 }
 
+/* Where samples leave there may be more blocks, but no more than there is room for. */
+START_TEST(fewer_samples_may_take_more_blocks)
+{
+  static const int count[] = {384, 128, 2, 510};
+  sf_batch b;
+  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  b.rays = 4;
+  for (int r = 0; r < 4; r++) b.ray[r].count = count[r];
+  sf_batch_pack(&b);
+  ck_assert_int_eq(b.blocks, 16);
+  b.ray[1].count--;
+  sf_batch_pack(&b);
+  ck_assert_int_eq(b.blocks, 17);
+  for (uint64_t seed = 0; seed < 3000; seed++) {
+    const uint64_t longest = seed % 2 ? 1025 : 2 + seed / 2 % 600;
+    int samples = 0;
+    b.rays = 1 + (int)sf_random_below(seed, 1, 0, 60);
+    for (int r = 0; r < b.rays; r++) samples += b.ray[r].count = (int)sf_random_below(seed, 2, r, longest);
+    sf_batch_pack(&b);
+    ck_assert_int_le(b.blocks, sf_batch_blocks(samples));
+  }
+  sf_batch_free(&b);
+}
+END_TEST
+
 static double empty_lanes(const sf_batch *b)
 {
   double used = 0;
@@ -92,6 +117,7 @@ START_TEST(compaction_keeps_what_light_reaches)
   ck_assert_int_gt(dropped, 50);
   sf_loss_sums mean = {0};
   double firing[3];
+  ck_assert_int_le(sf_batch_blocks(b->marched), b->block_capacity);
   sf_gradient_nets(t, &plan, &mean, firing);
   check_layout(b);
   int differ = 0, samples = 0;
@@ -123,6 +149,7 @@ int main(void)
   tcase_set_timeout(c, 60);
   tcase_add_unchecked_fixture(c, set_up, remove_folder);
   tcase_add_test(c, every_ray_is_in_one_bundle);
+  tcase_add_test(c, fewer_samples_may_take_more_blocks);
   tcase_add_test(c, compaction_keeps_what_light_reaches);
   suite_add_tcase(s, c);
   return ck_run_in(s, CK_NOFORK); // OpenMP does not survive a fork

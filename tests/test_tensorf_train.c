@@ -289,8 +289,18 @@ START_TEST(the_box_is_that_of_the_layout)
 {
   make_scene(2);
   sf_dataset data = load("train");
-  sf_config c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 0);
-  ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
+  sf_config c, plain = sf_tensorf_default(data.scale, 0);
+  float *const place = data.view[0].camera.to_world;
+  data.count = 1;
+  for (float distance = 1; distance < 200; distance *= 1.5f) { /* world units; 2 before and behind the middle */
+    place[3] = 0, place[7] = 0.6f * distance * data.scale, place[11] = 0.8f * distance * data.scale;
+    c = sf_train_defaults_tensorf(&data).config;
+    const float near = c.tensorf.near / data.scale, far = c.tensorf.far / data.scale;
+    ck_assert_float_eq_tol(near, fmaxf(fminf(2, distance - 2), (float)SF_NEAR / data.scale), 1e-4f);
+    ck_assert_float_eq_tol(far, fmaxf(6, distance + 2), 1e-4f);
+    c.tensorf.near = plain.tensorf.near, c.tensorf.far = plain.tensorf.far;
+    ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
+  }
   data.layout = SF_LAYOUT_COLMAP, data.bound = 2;
   for (data.scale = 0.01f; data.scale < 200; data.scale *= 100) {
     c = sf_train_defaults_tensorf(&data).config;

@@ -58,7 +58,8 @@ static sf_status evaluate_views(const sf_model *model, const sf_dataset *test, c
   sf_progress progress;
   sf_status status = sf_ok();
   sf_progress_begin(&progress, a->quiet);
-  for (int v = 0, used = 0, prefixed = 0; v < test->count && !status.code; v++) {
+  double ssims = 0;
+  for (int v = 0, used = 0, compared = 0, prefixed = 0; v < test->count && !status.code; v++) {
     const bool whole = !a->eval_views || used < a->eval_views, prefixes = prefixed < a->prefix_views;
     if (!test->view[v].image.rgba || (!whole && !prefixes)) continue;
     if (sf_cli_interrupted()) {
@@ -75,7 +76,8 @@ static sf_status evaluate_views(const sf_model *model, const sf_dataset *test, c
       status = sf_evaluate(model, &one, 1, 0, &psnr, &ssim);
       used = ++q->views;
       q->psnr += (psnr - q->psnr) / used;
-      q->ssim += (ssim - q->ssim) / used;
+      if (!isnan(ssim)) ssims += ssim, compared++;
+      q->ssim = compared ? ssims / compared : NAN;
     }
     if (prefixes && !status.code) {
       q->prefixes = model->config.steps;

@@ -68,7 +68,8 @@ sf_train_stats sf_trainer_stats(const sf_trainer *trainer);
 const sf_model *sf_trainer_model(const sf_trainer *trainer);
 void sf_trainer_free(sf_trainer *trainer);
 
-/* PSNR and SSIM of the first `views` views (0 = all) at `steps` steps (0 = t_r), composited on white. */
+/* Means of PSNR (a view's at most 99 dB) and SSIM (of the views of 11 x 11 pixels and more, else NaN) of the first
+ * `views` views (0 = all) at `steps` steps (0 = t_r), composited on white. */
 sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr, double *ssim);
 /* PSNR of the same at every prefix: psnr[0 .. T-1] for 1 .. T steps. */
 sf_status sf_evaluate_prefixes(const sf_model *model, const sf_dataset *data, int views, double *psnr);

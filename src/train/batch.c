@@ -79,6 +79,11 @@ static int bundle_end(const sf_batch *b, int first)
   return r < b->rays && end ? end : r;
 }
 
+int sf_batch_blocks(int samples)
+{
+  return samples / SF_BLOCK + 2 * samples / BUNDLE_FILL + 2;
+}
+
 void sf_batch_pack(sf_batch *b)
 {
   b->bundles = b->blocks = 0;
@@ -166,11 +171,11 @@ sf_status sf_batch_draw(sf_trainer *t)
     }
   }
   sf_batch_pack(b);
-  if (!status.code) status = reserve(b, b->blocks, 2 * t->model.config.levels);
+  b->marched = 0;
+  for (int r = 0; r < b->rays; r++) b->marched += b->ray[r].count;
+  b->samples = b->marched;
+  if (!status.code) status = reserve(b, sf_batch_blocks(b->marched), 2 * t->model.config.levels);
   if (!status.code) {
-    b->marched = 0;
-    for (int r = 0; r < b->rays; r++) b->marched += b->ray[r].count;
-    b->samples = b->marched;
     memset(b->x, 0, (size_t)b->blocks * 3 * SF_BLOCK * sizeof(float));
 #pragma omp parallel for schedule(dynamic, 64)
     for (int r = 0; r < b->rays; r++) place(b, &march[r], r);

@@ -1,6 +1,9 @@
 /* Held-out quality of the float model. */
 #include "spikefield/train.h"
+#include <math.h>
 #include <stdlib.h>
+
+static const double PSNR_MOST = 99;
 
 static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, const sf_view *view, int steps,
                                double *psnr, double *ssim)
@@ -20,8 +23,8 @@ static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, co
   sf_status status = sf_render_rays(model, origin, direction, n, steps, white, rgb, NULL, NULL, NULL);
   if (!status.code) {
     for (size_t i = 0; i < 3 * n; i++) rgb[i] = rgb[i] < 0 ? 0 : rgb[i] > 1 ? 1 : rgb[i];
-    *psnr = sf_psnr(rgb, truth, 3 * n);
-    *ssim = im->width >= 11 && im->height >= 11 ? sf_ssim(rgb, truth, im->width, im->height, 3) : 0;
+    *psnr = fmin(sf_psnr(rgb, truth, 3 * n), PSNR_MOST);
+    *ssim = im->width >= 11 && im->height >= 11 ? sf_ssim(rgb, truth, im->width, im->height, 3) : NAN;
   }
   free(memory);
   return status;
@@ -29,19 +32,19 @@ static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, co
 
 sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr, double *ssim)
 {
-  int used = 0;
+  int used = 0, compared = 0;
   *psnr = *ssim = 0;
   for (int v = 0; v < data->count && (views == 0 || used < views); v++) {
     if (!data->view[v].image.rgba) continue;
     double p = 0, s = 0;
     SF_TRY(evaluate_view(model, data, &data->view[v], steps, &p, &s));
     *psnr += p;
-    *ssim += s;
+    if (!isnan(s)) *ssim += s, compared++;
     used++;
   }
   if (!used) return sf_fail(SF_E_FORMAT, "%s: no view with a picture to evaluate on", data->path);
   *psnr /= used;
-  *ssim /= used;
+  *ssim = compared ? *ssim / compared : NAN;
   return sf_ok();
 }
 

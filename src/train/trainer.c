@@ -27,12 +27,24 @@ sf_train_options sf_train_defaults(void)
   return options;
 }
 
+/* TensoRF's 2 and 6 world units are for cameras 4 away; nearer and farther ones see as much of the box. */
+static void see_all(sf_tensorf *f, const sf_dataset *data)
+{
+  const float half = 2 * data->scale;
+  for (int v = 0; v < data->count; v++) {
+    const float *m = data->view[v].camera.to_world, d = sqrtf(m[3] * m[3] + m[7] * m[7] + m[11] * m[11]);
+    f->near = fmaxf(fminf(f->near, d - half), (float)SF_NEAR);
+    f->far = fmaxf(f->far, d + half);
+  }
+}
+
 sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
 {
   sf_train_options options = sf_train_defaults();
   const int width = data->count ? data->view[0].camera.width : 800;
   options.config = sf_tensorf_default(data->scale, data->ndc);
   if (data->layout != SF_LAYOUT_BLENDER && !data->ndc) sf_tensorf_bound(&options.config, data->bound);
+  if (data->layout == SF_LAYOUT_BLENDER) see_all(&options.config.tensorf, data);
   options.lr_grid = 0.02;
   options.lr_net = 1e-3;
   options.beta = data->ndc ? 5e-7 : 2e-6; /* 40 % of energy saved with 150 inputs means two steps */

@@ -84,9 +84,10 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
 
 static void print_text(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
 {
-  printf(
-      "%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB, SSIM %.4f over %d views\n",
-      a->output, (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr, q->ssim, q->views);
+  printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB", a->output,
+         (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr);
+  if (!isnan(q->ssim)) printf(", SSIM %.4f", q->ssim);
+  printf(" over %d views\n", q->views);
   if (c->backbone == SF_INGP)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
            c->dt_gamma > 0 ? " near the camera" : "");
