@@ -194,8 +194,8 @@ START_TEST(blender_has_the_rays_of_its_poses)
 }
 END_TEST
 
-/* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; the origin is on
- * the near plane. */
+/* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked at
+ * from the near plane on. */
 START_TEST(forward_facing_rays_are_ndc)
 {
   const layout_rig rig = row();
@@ -223,7 +223,8 @@ START_TEST(forward_facing_rays_are_ndc)
     const ray r = rig_ray(named(&rig, view->name), &rig.lens[0], 4 * px, 4 * py);
     float o[3], dir[3];
     sf_dataset_ray(&d, view, (float)px, (float)py, o, dir);
-    ck_assert_float_eq(o[2], -d.scale);
+    for (int i = 0; i < 3; i++) o[i] += (float)SF_NEAR * dir[i];
+    ck_assert_float_eq_tol(o[2], -d.scale, 1e-6f);
     ck_assert_double_eq_tol(sqrt((double)(dir[0] * dir[0] + dir[1] * dir[1] + dir[2] * dir[2])), 1, 1e-6);
     for (int k = 0; k < 4; k++) {
       double far[3], p[3], ndc[3];

@@ -411,7 +411,7 @@ START_TEST(the_file_says_what_its_distances_are)
     ck_good(sf_golden_save_labelled(&g, in("labelled.exr"), &label));
     ck_good(sf_read_file(in("labelled.exr"), 1 << 20, &bytes, &size));
     ck_assert_int_eq(memmem(bytes, size, "world units of the data set", 27) != NULL, !ndc);
-    ck_assert_int_eq(memmem(bytes, size, "NDC units from the near plane", 29) != NULL, ndc);
+    ck_assert_int_eq(memmem(bytes, size, "NDC units from the rays' origins", 31) != NULL, ndc);
     free(bytes);
   }
   sf_golden_free(&g);

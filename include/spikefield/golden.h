@@ -8,7 +8,7 @@
 
 /* R G B: composited over the scene's background, 1.0 = white; fixed: fx.* / 65535. A: what the ray hit.
  * Z: mean distance from the camera of what the ray hit, world units of the data set; 0 where it hit nothing. Of
- * a forward-facing data set: from the near plane, in units of NDC, which are no lengths of the world.
+ * a forward-facing data set: from the ray's origin, in units of NDC, which are no lengths of the world.
  * samples: through the nets. spikes, sops, macs: events; energy_fJ: paper ledger, 4600 * macs + 900 * sops.
  * fx.R .. fx.A: fx_pixel_rgba; fx.T: transmittance left, Q.TRANS_FRAC; fx.Zhi, fx.Zlo: the two halves of
  * fx_pixel.depth. */

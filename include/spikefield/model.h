@@ -4,6 +4,7 @@
 #define SPIKEFIELD_MODEL_H
 #include "spikefield/arch.h"
 #include "spikefield/io.h"
+#include "spikefield/scene.h"
 #include "spikefield/status.h"
 #include "spikefield/tensorf.h"
 #include <stdbool.h>
@@ -126,7 +127,6 @@ float sf_scales_h_step(const sf_scales *scales);
  * shortest, longest), longest = 2 sqrt(3) bound / occ_res (torch-ngp, but for rays that enter from outside: there the
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
-#define SF_NEAR 0.2 /* model units; torch-ngp's min_near */
 enum { SF_LATTICE_MIN = 16 };
 #define SF_GAMMA_MAX 0.125f /* of dt_gamma */
 typedef struct sf_steps {

@@ -6,6 +6,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
+#define SF_NEAR 0.2 /* model units from where on a ray is looked at; torch-ngp's min_near */
+
 typedef struct sf_camera {
   int width, height;
   float fx, fy, cx, cy; /* pixels */

@@ -26,7 +26,7 @@ sf_status sf_golden_save_labelled(const sf_golden *golden, const char *path, con
                                     "arithmetic",
                                     is_float ? "float" : "fixed",
                                     "Z_units",
-                                    label->ndc ? "NDC units from the near plane, 0 = nothing hit"
+                                    label->ndc ? "NDC units from the rays' origins, 0 = nothing hit"
                                                : "world units of the data set, 0 = nothing hit",
                                     is_float ? NULL : "saturation",
                                     saturation,

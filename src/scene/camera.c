@@ -33,7 +33,8 @@ bool sf_camera_project(const sf_camera *camera, const float point[3], float pixe
 }
 
 /* Mildenhall et al. 2020, appendix C: straight lines stay straight, the near plane goes to z = -1, infinity to z = 1. A
- * ray that does not look ahead has no such image: it is taken to leave sideways. */
+ * ray that does not look ahead has no such image: it is taken to leave sideways. Origins lie SF_NEAR before the near
+ * plane: from there on rays are looked at. */
 static void to_ndc(const sf_dataset *data, float origin[3], float direction[3])
 {
   const float ahead = fminf(direction[2], -1e-6f), t = -(data->ndc_near + origin[2]) / ahead;
@@ -46,7 +47,7 @@ static void to_ndc(const sf_dataset *data, float origin[3], float direction[3])
   origin[2] = -data->scale;
   for (int i = 0; i < 3; i++) length += d[i] * d[i];
   length = sqrtf(length);
-  for (int i = 0; i < 3; i++) direction[i] = d[i] / length;
+  for (int i = 0; i < 3; i++) direction[i] = d[i] / length, origin[i] -= (float)SF_NEAR * direction[i];
 }
 
 void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
