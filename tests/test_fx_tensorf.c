@@ -257,7 +257,8 @@ START_TEST(inputs_are_encoded)
       for (int a = 0; a < 3; a++) {
         ck_assert_int_eq(x[9 + a], naive_round(unit[a], 5));
         for (int k = 0; k < freqs; k++) {
-          const double angle = ldexp(unit[a] * 0x1p-14, k), bound = 0.5 * lsb + 0.83 * 0x1p-14 + 1.2e-4 * (1 << k);
+          const double angle = ldexp(unit[a] * 0x1p-14, k);
+          const double bound = 0.5 * lsb + 0.83 * 0x1p-14 + 1.24 * acos(-1) * ldexp(1, k - 16) + 1e-9;
           ck_assert_double_le(fabs(x[12 + 18 * freqs + a * freqs + k] * lsb - sin(angle)), bound);
           ck_assert_double_le(fabs(x[12 + 18 * freqs + 3 * freqs + a * freqs + k] * lsb - cos(angle)), bound);
         }

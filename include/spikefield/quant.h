@@ -109,6 +109,8 @@ sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input
  * is refused, and a ray whose first point is 32768 lattice steps away or farther: no first_q16 could tell. */
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray);
+/* The direction alone, of any length > 0: unit and dir of the ray, whose other fields become 0, and unit in doubles. */
+sf_status sf_fx_direction_make(const fx_scene *scene, const float direction[3], fx_ray *ray, double unit[3]);
 /* dir_scale as the shift that fx_sh takes: 2^-frac. */
 int sf_fx_dir_frac(const fx_scene *scene);
 /* A point in model units to the box, Q0.24. SF_E_RANGE when it is outside or not finite. */

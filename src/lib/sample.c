@@ -22,9 +22,9 @@ static sf_status direction_of(const spikefield_scene *scene, const float *direct
   LIB_REQUIRE(scene);
   LIB_REQUIRE(direction);
   LIB_REQUIRE(harmonics);
-  const float anywhere[3] = {0};
+  double unit[3];
   fx_ray ray;
-  SF_TRY(sf_fx_ray_make(&scene->fx, anywhere, direction, &ray));
+  SF_TRY(sf_fx_direction_make(&scene->fx, direction, &ray, unit));
   memcpy(harmonics, ray.dir, sizeof ray.dir);
   return sf_ok();
 }

@@ -107,30 +107,30 @@ int sf_fx_dir_frac(const fx_scene *scene)
   return -ilogb(scene->dir_scale);
 }
 
-static void set_direction(fx_ray *ray, const double unit[3], int frac)
+sf_status sf_fx_direction_make(const fx_scene *scene, const float direction[3], fx_ray *ray, double unit[3])
 {
+  const double x = (double)direction[0], y = (double)direction[1], z = (double)direction[2],
+               length = sqrt(x * x + y * y + z * z);
+  memset(ray, 0, sizeof *ray);
+  if (!isfinite(length) || length == 0)
+    return sf_fail(SF_E_RANGE, "ray: direction (%g, %g, %g): expected finite numbers and a nonzero direction", x, y, z);
+  unit[0] = x / length, unit[1] = y / length, unit[2] = z / length;
   for (int axis = 0; axis < 3; axis++) ray->unit[axis] = (int16_t)lrint(ldexp(unit[axis], FX_UNIT_FRAC));
-  fx_sh(ray->unit, frac, ray->dir);
+  fx_sh(ray->unit, sf_fx_dir_frac(scene), ray->dir);
+  return sf_ok();
 }
 
 sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const float direction[3], fx_ray *ray)
 {
-  const double length = sqrt((double)direction[0] * direction[0] + (double)direction[1] * direction[1] +
-                             (double)direction[2] * direction[2]);
   double unit[3], o[3], d[3];
-  memset(ray, 0, sizeof *ray);
+  SF_TRY(sf_fx_direction_make(scene, direction, ray, unit));
   for (int axis = 0; axis < 3; axis++) {
-    if (!isfinite(origin[axis]) || !isfinite(direction[axis]) || length == 0)
-      return sf_fail(
-          SF_E_RANGE,
-          "ray: origin (%g, %g, %g), direction (%g, %g, %g): expected finite numbers and a nonzero direction",
-          (double)origin[0], (double)origin[1], (double)origin[2], (double)direction[0], (double)direction[1],
-          (double)direction[2]);
-    unit[axis] = direction[axis] / length;
+    if (!isfinite(origin[axis]))
+      return sf_fail(SF_E_RANGE, "ray: origin (%g, %g, %g): expected finite numbers", (double)origin[0],
+                     (double)origin[1], (double)origin[2]);
     o[axis] = (origin[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
     d[axis] = unit[axis] * scene->to_box_scale * stretch(scene, axis);
   }
-  set_direction(ray, unit, sf_fx_dir_frac(scene));
   const double step = ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale;
   return set_lattice(scene, ray, o, d, step, clip_to_box(scene, o, d));
 }
