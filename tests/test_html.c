@@ -289,6 +289,30 @@ START_TEST(a_view_without_photograph_or_samples)
 }
 END_TEST
 
+/* PSNR is infinite after one number of steps, then after all. */
+START_TEST(pictures_equal_to_the_photograph)
+{
+  fixture f = begin(2, true, false);
+  finish(&f);
+  for (int all = 0; all < 2; all++) {
+    for (int t = all ? 0 : 2; t < (all ? SF_T_MAX : 3); t++) f.page.prefix[t].psnr = INFINITY;
+    read_page(&f);
+    faults found = {0};
+    cJSON *json = page_json(f.text);
+    check_tags(&found, f.text);
+    check_references(&found, f.text);
+    check_numbers(&found, f.text, json);
+    ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
+    ck_assert_ptr_null(strstr(f.text, "nan"));
+    ck_assert_ptr_null(strstr(f.text, "inf"));
+    ck_assert_ptr_null(strstr(f.text, "has no photograph"));
+    ck_assert_int_eq(strstr(f.text, "equals the photograph") != NULL, all);
+    cJSON_Delete(json);
+  }
+  end(&f);
+}
+END_TEST
+
 START_TEST(a_difference_is_shown)
 {
   fixture f = begin(2, true, false);
@@ -366,6 +390,7 @@ int main(void)
   tcase_add_test(c, a_page_of_a_decoder);
   tcase_add_test(c, pictures_agree_with_the_audit);
   tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
+  tcase_add_test(c, pictures_equal_to_the_photograph);
   tcase_add_test(c, a_difference_is_shown);
   tcase_add_test(c, planted_faults_are_seen);
   suite_add_tcase(suite, c);

@@ -18,12 +18,26 @@ static double at_y(const axes *a, double psnr)
   return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (psnr - a->y0) / (a->y1 - a->y0);
 }
 
+/* A picture that equals the photograph has no PSNR. */
+static bool drawn(const sf_page_prefix *p)
+{
+  return isfinite(p->psnr);
+}
+
+static int points(const sf_page *page)
+{
+  int n = 0;
+  for (int t = 0; t < SF_T_MAX; t++) n += drawn(&page->prefix[t]);
+  return n;
+}
+
 static axes choose_axes(const sf_page *page)
 {
   axes a = {.x1 = 0, .y0 = INFINITY, .y1 = -INFINITY};
   for (int t = 0; t < SF_T_MAX; t++) {
     const sf_page_prefix *p = &page->prefix[t];
-    a.x1 = fmax(a.x1, (double)p->fj), a.y0 = fmin(a.y0, p->psnr), a.y1 = fmax(a.y1, p->psnr);
+    a.x1 = fmax(a.x1, (double)p->fj);
+    if (drawn(p)) a.y0 = fmin(a.y0, p->psnr), a.y1 = fmax(a.y1, p->psnr);
   }
   if (page->whole) a.x1 = fmax(a.x1, (double)page->report->ledger.ann_fj);
   const double pad = fmax((a.y1 - a.y0) * 0.12, 0.1);
@@ -53,12 +67,17 @@ static void draw_axes(FILE *out, const axes *a)
 
 static void draw_points(FILE *out, const sf_page *page, const axes *a)
 {
+  char to = 'M';
   fprintf(out, "<path class=\"curve\" d=\"");
-  for (int t = 0; t < SF_T_MAX; t++)
-    fprintf(out, "%c%.1f %.1f", t ? 'L' : 'M', at_x(a, (double)page->prefix[t].fj), at_y(a, page->prefix[t].psnr));
+  for (int t = 0; t < SF_T_MAX; t++) {
+    if (!drawn(&page->prefix[t])) continue;
+    fprintf(out, "%c%.1f %.1f", to, at_x(a, (double)page->prefix[t].fj), at_y(a, page->prefix[t].psnr));
+    to = 'L';
+  }
   fprintf(out, "\"/>\n");
   for (int t = 0; t < SF_T_MAX; t++) {
     const sf_page_prefix *p = &page->prefix[t];
+    if (!drawn(p)) continue;
     const bool chosen = t + 1 == page->report->net->steps;
     const double x = at_x(a, (double)p->fj), y = at_y(a, p->psnr);
     char text[HTML_NUMBER];
@@ -77,7 +96,7 @@ static bool crowded(const sf_page *page, const axes *a, double x, double y, bool
   const double left = end ? x - 90 : x, right = left + 90;
   for (int t = 0; t < SF_T_MAX; t++) {
     const double px = at_x(a, (double)page->prefix[t].fj), py = at_y(a, page->prefix[t].psnr);
-    if (px > left - 14 && px < right + 14 && py > y - 24 && py < y + 54) return true;
+    if (drawn(&page->prefix[t]) && px > left - 14 && px < right + 14 && py > y - 24 && py < y + 54) return true;
   }
   return right > WIDTH || left < LEFT;
 }
@@ -124,10 +143,11 @@ static void prefix_table(FILE *out, const sf_page *page)
 void html_quality(FILE *out, const sf_page *page)
 {
   fprintf(out, "<section id=\"quality\">\n<h2>Picture quality against energy</h2>\n");
-  if (!isfinite(page->prefix[0].psnr) || page->prefix[0].fj == 0) {
+  if (!points(page) || page->prefix[0].fj == 0) {
     fprintf(out, "<p>%s</p>\n",
-            page->prefix[0].fj ? "The view has no photograph to compare with: PSNR is not measured."
-                               : "No ray of the view has samples: there is nothing to plot.");
+            !page->prefix[0].fj      ? "No ray of the view has samples: there is nothing to plot."
+            : page->view->image.rgba ? "The picture equals the photograph: there is no PSNR to plot."
+                                     : "The view has no photograph to compare with: PSNR is not measured.");
     prefix_table(out, page);
   } else {
     const axes a = choose_axes(page);
