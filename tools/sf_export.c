@@ -34,7 +34,9 @@ static sf_status file_size(const char *path, long long *size)
 
 /* ---- report ---- */
 
-static void print_text(const fx_scene *scene, const sf_quant_report *report, const char *path, long long bytes)
+/* fit: what was measured at the quantisation is of the scene before it was cut down, and left out. */
+static void print_text(const fx_scene *scene, const sf_quant_report *report, bool fit, const char *path,
+                       long long bytes)
 {
   const bool vm = scene->backbone == FX_TENSORF;
   const int32_t *res = scene->tensorf.res;
@@ -44,24 +46,26 @@ static void print_text(const fx_scene *scene, const sf_quant_report *report, con
   if (vm)
     printf("%d features of %d x %d x %d points", scene->tensorf.features, res[0], res[1], res[2]);
   else
-    printf("features of %d levels    ", scene->grid.levels);
-  printf(" error %6.3f %%  %lld grid entries clipped\n", 100 * report->feature_error, (long long)report->grid_clipped);
+    printf("features of %d levels", scene->grid.levels);
+  if (!fit)
+    printf(", error %.3f %%, %lld grid entries clipped", 100 * report->feature_error, (long long)report->grid_clipped);
+  putchar('\n');
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &scene->net.layer[l];
     if (!layer->n_out) continue; /* a decoder has no density net */
-    printf("%s %3d x %-3d LSB %-11.6g error %6.3f %%  %d weights clipped, k = %d/%d", layer_name[l], layer->n_in,
-           layer->n_out, report->layer[l].unit, 100 * report->layer[l].error, report->layer[l].clipped, layer->k,
-           1 << SF_LEAK_FRAC);
+    printf("%s %3d x %-3d LSB %-11.6g", layer_name[l], layer->n_in, layer->n_out, report->layer[l].unit);
+    if (!fit) printf(" error %6.3f %%  %d weights clipped,", 100 * report->layer[l].error, report->layer[l].clipped);
+    printf(" k = %d/%d", layer->k, 1 << SF_LEAK_FRAC);
     if (layer->theta) printf(", theta = %d", layer->theta);
     putchar('\n');
   }
   printf("packed: %lld bytes at %d-bit weights, %d-bit features, %d-bit leaks, %d-bit grid entries\n",
          (long long)report->packed_bytes, report->widths.weight_bits, report->widths.feature_bits,
          report->widths.leak_bits, report->widths.grid_bits);
-  printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
+  if (!fit) printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
 }
 
-static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, const char *name)
+static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, bool fit, const char *name)
 {
   cJSON *item = cJSON_CreateObject();
   cJSON_AddStringToObject(item, "layer", name);
@@ -70,6 +74,7 @@ static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, co
   cJSON_AddNumberToObject(item, "k", layer->k);
   cJSON_AddNumberToObject(item, "theta", layer->theta);
   cJSON_AddNumberToObject(item, "current_lsb", report->unit);
+  if (fit) return item;
   cJSON_AddNumberToObject(item, "current_error", report->error);
   cJSON_AddNumberToObject(item, "clipped_weights", report->clipped);
   return item;
@@ -83,13 +88,13 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "bytes", (double)bytes);
   cJSON_AddNumberToObject(json, "t_r", scene->net.steps);
   cJSON_AddNumberToObject(json, "grid_entries", (double)scene->grid.entries);
-  cJSON_AddNumberToObject(json, "grid_clipped", (double)report->grid_clipped);
+  if (!fit) cJSON_AddNumberToObject(json, "grid_clipped", (double)report->grid_clipped);
   const bool vm = scene->backbone == FX_TENSORF;
   cJSON_AddStringToObject(json, "backbone", vm ? "tensorf" : "ingp");
   if (vm) cJSON_AddNumberToObject(json, "field_bytes", (double)fx_tensorf_bytes(&scene->tensorf));
   cJSON_AddItemToObject(json, "feature_lsb",
                         cJSON_CreateDoubleArray(scene->feature_scale, vm ? 1 : scene->grid.levels));
-  cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
+  if (!fit) cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
   cJSON_AddNumberToObject(json, "direction_lsb", scene->dir_scale);
   cJSON_AddNumberToObject(json, "calibration_samples", report->samples);
   cJSON_AddNumberToObject(json, "packed_bytes", (double)report->packed_bytes);
@@ -98,7 +103,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "leak_bits", report->widths.leak_bits);
   cJSON_AddNumberToObject(json, "grid_bits", report->widths.grid_bits);
   for (int l = 0; l < SF_LAYERS; l++)
-    cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], layer_name[l]));
+    cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], fit, layer_name[l]));
   if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
   export_extras_json(json, more, &o->extra);
   return sf_json_print(json, true);
@@ -147,8 +152,11 @@ static sf_status quantise_all(const sf_model *model, const char *path, const opt
   const sf_quant_widths *w = &o->widths;
   SF_TRY(quantise(model, path, o, w, c));
   const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
-  for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++)
-    SF_TRY(quantise(model, path, o, &narrower[i - 1], c));
+  for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++) {
+    const sf_status status = quantise(model, path, o, &narrower[i - 1], c);
+    if (status.code == SF_E_UNSUPPORTED) break; /* too narrow for this model */
+    SF_TRY(status);
+  }
   return sf_ok();
 }
 
@@ -209,7 +217,7 @@ static sf_status save_and_report(const fx_scene *scene, const options *o, const 
   SF_TRY(file_size(o->output, &bytes));
   SF_TRY(export_extras_write(more, scene, o->output, &o->extra));
   if (o->json) SF_TRY(print_json(scene, report, fit, more, o, bytes));
-  if (!o->json) print_text(scene, report, o->output, bytes);
+  if (!o->json) print_text(scene, report, fit, o->output, bytes);
   if (!o->json && fit) sf_fit_print(stdout, fit);
   if (!o->json) export_extras_print(more, &o->extra);
   return flushed();

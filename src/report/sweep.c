@@ -1,5 +1,6 @@
 /* A folder of points to tables: which widths cost what, and which points no other beats. */
 #include "report/internal.h"
+#include "spikefield/audit.h"
 #include "spikefield/io.h"
 #include "spikefield/pareto.h"
 #include <dirent.h>
