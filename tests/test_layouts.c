@@ -194,8 +194,8 @@ START_TEST(blender_has_the_rays_of_its_poses)
 }
 END_TEST
 
-/* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked at
- * from the near plane on. */
+/* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked
+ * at from the near plane on. */
 START_TEST(forward_facing_rays_are_ndc)
 {
   const layout_rig rig = row();

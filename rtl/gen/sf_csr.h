@@ -180,7 +180,7 @@
 /* 4 signed weights, the lowest output neuron in bits 7:0, WO */
 #define SF_REG_WEIGHT_DATA 0x0094
 
-/* layers whose biases count: row 256 of their weights, an input that is always active, RW */
+/* layers whose biases count: row 256 of their weights, an input that is always active; a snapshot adds those of C2 and C3 by its value then: take it before a net with other biases is loaded, RW */
 #define SF_REG_BIAS 0x0098
 #define SF_REG_BIAS_C1_MASK 0x000007ff /* value of that input, 1..2047; 0: none */
 #define SF_REG_BIAS_C1_SHIFT 0
