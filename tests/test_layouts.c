@@ -176,6 +176,41 @@ START_TEST(an_object_on_nothing_fills_the_box)
 }
 END_TEST
 
+/* The optical axis is far beside the picture: what it shows counts, not what the camera is turned to. */
+START_TEST(a_crop_looks_where_its_picture_is)
+{
+  const layout_rig rig = orbit();
+  layout_rig crop = rig;
+  sf_dataset whole, d;
+  const double slope = tan(M_PI / 3), angle[2] = {cos(M_PI / 3), sin(M_PI / 3)};
+  char more[100];
+  crop.lens[0].param[2] -= slope * crop.lens[0].param[0];
+  for (int v = 0; v < VIEWS; v++)
+    for (int i = 0; i < 3; i++) {
+      const double *m = rig.view[v].to_world + 4 * i;
+      crop.view[v].to_world[4 * i] = angle[0] * m[0] - angle[1] * m[2];
+      crop.view[v].to_world[4 * i + 2] = angle[1] * m[0] + angle[0] * m[2];
+    }
+  put_pictures("images", &rig, WIDTH, HEIGHT, 0);
+  put_json("transforms.json", &rig, "", "images", 0, 1), load(&whole, "train");
+  snprintf(more, sizeof more, "\"cx\":%.17g,", crop.lens[0].param[2]);
+  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  ck_assert_int_eq(d.warnings, 0);
+  same_rays(&d, &crop);
+  for (int i = 0; i < 12; i++) ck_assert_double_eq_tol(d.world[i], whole.world[i], 1e-9);
+  ck_assert_float_eq_tol(d.scale, whole.scale * 2, 1e-5f); /* 60 degrees off: the object is at half the depth */
+  sf_dataset_free(&whole), sf_dataset_free(&d);
+  for (int v = 0; v < VIEWS; v++)
+    for (int i = 0; i < 3; i++) crop.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
+  strcat(more, "\"aabb_scale\":1,");
+  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  ck_assert_int_eq(d.warnings, 0);
+  sf_dataset_free(&d);
+  put_json("transforms.json", &crop, "\"cx\":100,\"aabb_scale\":1,", "images", 0, 1);
+  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
+}
+END_TEST
+
 START_TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
@@ -416,6 +451,7 @@ static Suite *suite(void)
   tcase_add_loop_test(t, colmap_has_the_rays_of_its_poses, 0, 4);
   tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
   tcase_add_test(t, an_object_on_nothing_fills_the_box);
+  tcase_add_test(t, a_crop_looks_where_its_picture_is);
   tcase_add_test(t, a_picture_is_no_pipe);
   tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
   tcase_add_test(t, far_coordinates_lose_nothing);

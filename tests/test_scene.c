@@ -202,6 +202,8 @@ static const struct {
      "focal length of 2.4e+10"},
     {"{\"fl_x\":3,\"cx\":9e6,\"w\":1e-2,\"h\":1e-2,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, "frame 0 (a)",
      "optical centre at pixel 7.2e+09"},
+    {"{\"fl_x\":8,\"cx\":100,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, ".json", "no view looks at the scene"},
+    {"{\"fl_x\":8,\"cy\":100,\"frames\":[" FRAME("a", UNIT) "]}", SF_E_RANGE, ".json", "no view looks at the scene"},
     {"{" ANGLE "\"frames\":[" FRAME("/dev/zero", UNIT) "]}", SF_E_IO, "/dev/zero", "not a regular file"},
     {ONE("[[1,0,0,1],[0,1,0,2],[0,0,1,3]]"), SF_E_FORMAT, "frame 1 (a)", "4 rows"},
     {ONE("[[1,0,0,1],[0,1,0],[0,0,1,3],[0,0,0,1]]"), SF_E_FORMAT, "frame 1 (a)", "transform_matrix[1]"},

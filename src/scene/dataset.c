@@ -93,13 +93,20 @@ static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split
   return sf_ok();
 }
 
+/* What places the scene, and the size that an optical centre is stated for. */
+static bool must_look(const sf_capture *c, const sf_lens *lens)
+{
+  if (c->layout != SF_LAYOUT_BLENDER && !c->placed) return true;
+  return (lens->has_cx || lens->has_cy) && !(lens->width > 0 && lens->height > 0);
+}
+
 /* The first picture that can be read; its own faults are told when it is loaded. */
 static sf_sight look(const sf_dataset *data, const sf_capture *c)
 {
   sf_sight sight = {0};
   sf_image image = {0};
   char path[4096];
-  for (int f = 0; f < c->count && !image.rgba && c->layout != SF_LAYOUT_BLENDER && !c->placed; f++)
+  for (int f = 0; f < c->count && !image.rgba && must_look(c, &c->frame[f].lens); f++)
     if (sf_picture_find(path, data->path, c->frame[f].file_path).code == SF_OK && sf_is_file(path))
       if (sf_picture_load(&image, path).code != SF_OK) break;
   if (!image.rgba) return sight;

@@ -60,33 +60,47 @@ static void mean_column(const sf_capture *c, int k, double out[3])
     for (int i = 0; i < 3; i++) out[i] += c->frame[f].to_world[4 * i + k] / n;
 }
 
-/* Half the width and height of the picture at distance 1. */
-static void half_view(const sf_lens *lens, const sf_sight *sight, double half[2])
+/* The picture at distance 1: its middle from the optical axis, x right, y up, and half its width and height. */
+typedef struct extent {
+  double middle[2], half[2];
+} extent;
+
+static void view_extent(const sf_lens *lens, const sf_sight *sight, extent *e)
 {
   const double w = lens->width > 0 ? lens->width : sight->width, h = lens->height > 0 ? lens->height : sight->height;
+  double *half = e->half;
   half[0] = lens->fl_x > 0 ? 0.5 * w / lens->fl_x : tan(0.5 * lens->angle_x);
   half[1] = lens->fl_y > 0 ? 0.5 * h / lens->fl_y : half[0];
   if (lens->fl_y <= 0 && w > 0 && h > 0) half[1] *= h / w;
   for (int i = 0; i < 2; i++)
     if (!(half[i] > 0)) half[i] = 1; /* a size that nobody states: anything up to 45 degrees may be seen */
+  e->middle[0] = lens->has_cx && w > 0 ? half[0] * (1 - 2 * lens->cx / w) : 0;
+  e->middle[1] = lens->has_cy && h > 0 ? half[1] * (2 * lens->cy / h - 1) : 0;
 }
 
-/* Corner 0..3 of the picture, not of unit length. */
-static void corner_ray(const sf_frame *frame, const double half[2], double x, double y, double direction[3])
+/* Through the picture at x, y, each -1..1, not of unit length. */
+static void picture_ray(const sf_frame *frame, const extent *e, double x, double y, double direction[3])
 {
-  const double *m = frame->to_world;
-  for (int i = 0; i < 3; i++) direction[i] = m[4 * i] * x * half[0] + m[4 * i + 1] * y * half[1] - m[4 * i + 2];
+  const double *m = frame->to_world, right = e->middle[0] + x * e->half[0], up = e->middle[1] + y * e->half[1];
+  for (int i = 0; i < 3; i++) direction[i] = m[4 * i] * right + m[4 * i + 1] * up - m[4 * i + 2];
+}
+
+/* Of the ray through the picture's middle; 1 on the optical axis. */
+static double middle_length(const extent *e)
+{
+  return sqrt(1 + e->middle[0] * e->middle[0] + e->middle[1] * e->middle[1]);
 }
 
 static bool looks_ahead(const sf_frame *frame, const double back[3])
 {
   const double half_turn = 0.7071067811865476; /* at most 45 degrees off the mean direction */
-  double axis[3], half[2], direction[3];
+  double axis[3], direction[3];
+  extent e;
   column(frame, 2, axis);
   if (!(vec_dot(axis, back) > half_turn)) return false;
-  half_view(&frame->lens, &(sf_sight){0}, half);
+  view_extent(&frame->lens, &(sf_sight){0}, &e);
   for (int k = 0; k < 4; k++) {
-    corner_ray(frame, half, k & 1 ? 1 : -1, k & 2 ? 1 : -1, direction);
+    picture_ray(frame, &e, k & 1 ? 1 : -1, k & 2 ? 1 : -1, direction);
     if (!(vec_dot(direction, back) < -0.05 * vec_length(direction))) return false;
   }
   return true;
@@ -111,8 +125,8 @@ bool sf_forward_facing(const sf_capture *capture)
   return true;
 }
 
-/* The point nearest to all optical axes, held to the mean position where they are parallel. */
-static void look_at(const sf_capture *c, double point[3])
+/* The point nearest to the middle rays of all pictures, held to the mean position where they are parallel. */
+static void look_at(const sf_capture *c, const sf_sight *sight, double point[3])
 {
   const int n = sf_capture_guides(c);
   const double hold = 1e-3 * n;
@@ -121,8 +135,11 @@ static void look_at(const sf_capture *c, double point[3])
   for (int i = 0; i < 3; i++) b[i] *= hold;
   for (int f = 0; f < n; f++) {
     double axis[3], at[3];
-    column(&c->frame[f], 2, axis);
+    extent e;
+    view_extent(&c->frame[f].lens, sight, &e);
+    picture_ray(&c->frame[f], &e, 0, 0, axis);
     column(&c->frame[f], 3, at);
+    for (int i = 0; i < 3; i++) axis[i] /= middle_length(&e);
     const double along = vec_dot(axis, at);
     for (int i = 0; i < 3; i++) {
       b[i] += at[i] - axis[i] * along;
@@ -160,7 +177,8 @@ static int ascending(const void *a, const void *b)
 static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options *options)
 {
   move m = {.scale = 1 / (NEAR_FACTOR * c->near)};
-  double back[3], up[3], right[3], half[2] = {0}, most = 1;
+  double back[3], up[3], right[3], most = 1;
+  extent e;
   mean_column(c, 2, back), mean_column(c, 1, up), mean_column(c, 3, m.centre);
   vec_normalise(back);
   vec_cross(up, back, right);
@@ -168,14 +186,14 @@ static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options 
   vec_cross(back, right, up);
   memcpy(m.turn, right, sizeof right), memcpy(m.turn + 3, up, sizeof up), memcpy(m.turn + 6, back, sizeof back);
   move_all(data, c, &m);
-  half_view(&c->frame[0].lens, &(sf_sight){0}, half);
+  view_extent(&c->frame[0].lens, &(sf_sight){0}, &e);
   data->ndc = true, data->ndc_near = 1;
-  for (int i = 0; i < 2; i++) data->ndc_focal[i] = (float)(1 / half[i]);
+  for (int i = 0; i < 2; i++) data->ndc_focal[i] = (float)(1 / e.half[i]);
   for (int n = 0; n < 4 * c->count; n++) {
     const sf_frame *frame = &c->frame[n / 4];
     double d[3], at[3];
-    half_view(&frame->lens, &(sf_sight){0}, half);
-    corner_ray(frame, half, n & 1 ? 1 : -1, n & 2 ? 1 : -1, d);
+    view_extent(&frame->lens, &(sf_sight){0}, &e);
+    picture_ray(frame, &e, n & 1 ? 1 : -1, n & 2 ? 1 : -1, d);
     column(frame, 3, at);
     const double t = (1 + at[2]) / -d[2];
     for (int i = 0; i < 2; i++) {
@@ -223,16 +241,17 @@ static sf_status place_orbit(sf_dataset *data, sf_capture *c, const sf_dataset_o
   const int n = sf_capture_guides(c);
   double *reach = malloc((size_t)n * sizeof *reach), mean = 0, farthest = 0;
   if (!reach) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", c->list, n);
-  look_at(c, m.centre);
+  look_at(c, sight, m.centre);
   turn_up(c, m.turn);
   move_all(data, c, &m);
   for (int f = 0; f < n; f++) {
-    double at[3], half[2];
+    double at[3];
+    extent e;
     column(&c->frame[f], 3, at);
-    half_view(&c->frame[f].lens, sight, half);
+    view_extent(&c->frame[f].lens, sight, &e);
     const double distance = vec_length(at);
     mean += distance / n, farthest = fmax(farthest, distance);
-    reach[f] = distance * fmin(half[0], half[1]);
+    reach[f] = distance / middle_length(&e) * fmin(e.half[0], e.half[1]);
   }
   qsort(reach, (size_t)n, sizeof *reach, ascending);
   /* An object on nothing fills the box as far as the middle one of its views sees it. */
@@ -274,11 +293,12 @@ static bool turns_back(const sf_dataset *data, const sf_frame *frame)
 
 static bool sees_box(const sf_dataset *data, const sf_frame *frame, const sf_sight *sight)
 {
-  double half[2], at[3], d[3];
-  half_view(&frame->lens, sight, half);
+  double at[3], d[3];
+  extent e;
+  view_extent(&frame->lens, sight, &e);
   model_position(data, frame, at);
   for (int n = 0; n < 81; n++) {
-    corner_ray(frame, half, n % 9 / 4.0 - 1, n / 9 / 4.0 - 1, d);
+    picture_ray(frame, &e, n % 9 / 4.0 - 1, n / 9 / 4.0 - 1, d);
     if (hits_box(at, d, data->bound)) return true;
   }
   return false;
