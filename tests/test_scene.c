@@ -141,6 +141,31 @@ START_TEST(options_and_stated_intrinsics)
 }
 END_TEST
 
+/* Of 16 x 8 where the pictures have half of that: by one number as by both. */
+START_TEST(one_side_states_the_size)
+{
+  static const char *const size[] = {"\"w\":16,\"h\":8", "\"w\":16", "\"h\":8"};
+  float scale = 0;
+  put_picture("a.png", 8, 4, 0);
+  for (int i = 0; i < 3; i++) {
+    char json[400];
+    sf_dataset d;
+    snprintf(json, sizeof json,
+             "{%s,\"fl_x\":20,\"cx\":6,\"cy\":5,\"frames\":[" FRAME("a", UNIT) "," FRAME(
+                 "a", "[[0,0,1,4],[0,1,0,2],[-1,0,0,0],[0,0,0,1]]") "]}",
+             size[i]);
+    put_text(in("transforms.json"), json);
+    ck_good(sf_dataset_load(&d, folder, "train", NULL));
+    const sf_camera *c = &d.view[0].camera;
+    ck_assert(c->fx == 10 && c->fy == 10 && c->cx == 3 && c->cy == 2.5f);
+    if (!i) scale = d.scale;
+    ck_assert_float_gt(scale, 1); /* of what is seen: 0.2 of the distance */
+    ck_assert(d.scale == scale);
+    sf_dataset_free(&d);
+  }
+}
+END_TEST
+
 START_TEST(every_eighth_view_is_held_out)
 {
   char json[4000] = "{" ANGLE "\"frames\":[";
@@ -302,6 +327,7 @@ static Suite *suite(void)
   tcase_add_test(t, points_of_the_box_lie_a_pixel_apart);
   tcase_add_test(t, loads_camera_angle);
   tcase_add_test(t, options_and_stated_intrinsics);
+  tcase_add_test(t, one_side_states_the_size);
   tcase_add_test(t, every_eighth_view_is_held_out);
   tcase_add_loop_test(t, faults_name_file_and_frame, 0, COUNT(bad_scenes));
   tcase_add_test(t, a_split_is_walked_view_by_view);

@@ -67,7 +67,9 @@ typedef struct extent {
 
 static void view_extent(const sf_lens *lens, const sf_sight *sight, extent *e)
 {
-  const double w = lens->width > 0 ? lens->width : sight->width, h = lens->height > 0 ? lens->height : sight->height;
+  double w = lens->width > 0 ? lens->width : sight->width, h = lens->height > 0 ? lens->height : sight->height;
+  if (lens->width > 0 && !(lens->height > 0) && sight->width) h *= w / sight->width;
+  if (lens->height > 0 && !(lens->width > 0) && sight->height) w *= h / sight->height;
   double *half = e->half;
   half[0] = lens->fl_x > 0 ? 0.5 * w / lens->fl_x : tan(0.5 * lens->angle_x);
   half[1] = lens->fl_y > 0 ? 0.5 * h / lens->fl_y : half[0];

@@ -33,6 +33,8 @@ static sf_status set_lens(sf_camera *camera, const sf_lens *lens, const sf_image
   double w = image->width, h = image->height, sx = 1, sy = 1;
   if (lens->width > 0) sx = w / lens->width;
   if (lens->height > 0) sy = h / lens->height;
+  if (!(lens->width > 0)) sx = sy;
+  if (!(lens->height > 0)) sy = sx;
   if (lens->width > 0 && lens->height > 0 && fabs(lens->height * sx - h) > 0.5 + 0.5 * sx &&
       fabs(lens->width * sy - w) > 0.5 + 0.5 * sy)
     return sf_fail(SF_E_FORMAT, "%s: the picture has %g x %g pixels, its camera says %g x %g", where, w, h, lens->width,
