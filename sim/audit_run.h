@@ -7,9 +7,9 @@ typedef struct sf_audit_options {
   const char *scene, *data, *split; /* .snn file, data set, "train" or "test" */
   int view, views;                  /* one view, or the first `views`; -1 and 0: not given */
   uint64_t rays;                    /* so many random ones in place of all pixels; 0: all pixels */
-  int downscale;
-  double scale; /* of the world, 0: the scene's */
-  int steps;    /* in place of the scene's t_r; 0: as it is */
+  int downscale;                    /* as sf_dataset_options */
+  double scale;                     /* of the world, 0: the scene's */
+  int steps;                        /* in place of the scene's t_r; 0: as it is */
   uint64_t seed, recount_rays;
   int rtl_rays, stall;
   const char *plusarg;

@@ -248,8 +248,7 @@ sf_status sf_lockstep_load(sf_lockstep *l, const sf_lockstep_options *options)
   if (options->plusarg && strlen(options->plusarg) > SF_PLUSARG_MAX)
     return sf_fail(SF_E_USAGE, "--plusarg takes at most %d characters", SF_PLUSARG_MAX);
   SF_TRY(fx_scene_load(&l->fx, options->scene));
-  SF_TRY(sf_fx_dataset_load(&l->data, &l->fx, options->scene, options->data, options->split,
-                            &(sf_dataset_options){.downscale = 1}));
+  SF_TRY(sf_fx_dataset_load(&l->data, &l->fx, options->scene, options->data, options->split, &(sf_dataset_options){0}));
   if (l->data.count < 1) return sf_fail(SF_E_FORMAT, "%s: no views", options->data);
   return identify(l);
 }

@@ -95,7 +95,7 @@ sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char 
                                  .view = shot->view->name,
                                  .split = studio->options.split,
                                  .window = shot->window,
-                                 .downscale = studio->options.downscale,
+                                 .downscale = shot->data.downscale,
                                  .ndc = shot->data.ndc};
   return sf_golden_save_labelled(&shot->golden, path, &label);
 }

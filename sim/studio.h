@@ -12,7 +12,7 @@ typedef struct sf_studio_options {
   const char *scene, *data, *split;
   const char *model; /* float: NULL = model.safetensors beside the scene */
   int steps;         /* 0 = the scene's t_r */
-  int downscale;     /* >= 1 */
+  int downscale;     /* as sf_dataset_options */
   float scale;       /* model units per world unit, 0 = the scene's */
   uint64_t seed;     /* rtl: of the random reset values */
 } sf_studio_options;

@@ -77,10 +77,8 @@ static sf_status take_origin(sf_view_set *set, const sf_window *crop)
   sf_manifest_origin *o = &set->manifest.origin;
   sf_shot shot;
   sf_status status = sf_shot_load(studio, 0, &shot);
-  *o = (sf_manifest_origin){.steps = studio->scene.net.steps,
-                            .downscale = studio->options.downscale,
-                            .scale = shot.data.scale,
-                            .crop = *crop};
+  *o = (sf_manifest_origin){
+      .steps = studio->scene.net.steps, .downscale = shot.data.downscale, .scale = shot.data.scale, .crop = *crop};
   set->manifest.total = shot.data.total;
   if (status.code == SF_OK) status = place_window(set, &shot);
   sf_shot_free(&shot);

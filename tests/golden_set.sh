@@ -62,6 +62,7 @@ expect 1 "float pictures may differ" s1.snn d --verify float/manifest.json
 
 cp one/manifest.json before.json
 expect 0 "0 views rendered" s1.snn d --all -o one
+expect 0 "0 views rendered" s1.snn d --all -o one --downscale 1
 cp one/view_0001.exr one/view_0003.exr
 expect 0 "1 views rendered" s1.snn d --all -o one
 rm one/view_0000.exr

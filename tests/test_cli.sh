@@ -246,11 +246,11 @@ number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x
 number sf_cosim --block 0 x
 number sf_cycles --view -1 nan 2 99999999999
-number sf_cycles --downscale 0 -1 nan
+number sf_cycles --downscale -1 65 nan
 number sf_cycles --clock 0 nan inf
 number sim_render --view -1 nan 2 99999999999
 number sim_render --backend gpu nan ''
-number sim_render --downscale 0 -1 nan
+number sim_render --downscale -1 65 nan
 number sim_render --steps 0 9 nan
 number sim_render --threads 0 nan
 number sim_render --crop '' 1 1,2,3 1,2,3,4,5 0,0,0,1 0,0,1,0 0,0,17,1 16,0,1,1 -1,0,1,1 nan,0,1,1 0,0,1,1x 99999999999,0,1,1
@@ -602,7 +602,7 @@ status=$?
 sed -i '/evaluation: view/d' err # progress lines
 judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
 # A checkpoint keeps the options of its run: others are refused, and none are needed.
-for option in "--beta 1e-06" "--seed 2" "--stage2 3" "--minutes 1" "--net ann" "--steps 4" "--theta 0.5" "--no-extra" "--limit 1"; do
+for option in "--beta 1e-06" "--seed 2" "--stage2 3" "--minutes 1" "--net ann" "--steps 4" "--theta 0.5" "--no-extra" "--limit 1" "--downscale 1"; do
   data "stop.safetensors: its run has ${option%% *}" sf_train views -o stop.safetensors --resume $option
 done
 data "--beta 5e-07, the command line says 1e-06" sf_train "${brief[@]}" --resume --beta 1e-6

@@ -385,6 +385,7 @@ START_TEST(folders_that_do_not_fit_are_named)
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "no split val", "train or test");
   ck_bad(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 2}), SF_E_RANGE, "images_4", "1/2");
+  ck_bad(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1}), SF_E_RANGE, "images_4", "1/1");
   put_picture("images_4/more.png", WIDTH, HEIGHT, 1, 255);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "poses of 17 views", "images_4 holds 18 pictures");
   unlink(in("images_4/more.png"));

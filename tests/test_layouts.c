@@ -390,7 +390,10 @@ START_TEST(pictures_of_the_size_asked_for)
   rig.lens[0].width = 4000, rig.lens[0].height = 3000;
   put_colmap("sparse/0", &rig, 0);
   ck_good(sf_dataset_load(&d, folder, "test", NULL));
-  ck_assert_int_eq(d.view[0].camera.width, 8);
+  ck_assert(d.view[0].camera.width == 8 && d.downscale == 0);
+  sf_dataset_free(&d);
+  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
+  ck_assert(d.view[0].camera.width == 32 && d.downscale == 1);
   sf_dataset_free(&d);
 }
 END_TEST
@@ -411,6 +414,9 @@ START_TEST(photographs_are_shrunk_unasked)
   ck_assert_float_eq_tol(d.view[0].camera.fx, 1000, 1e-3f);
   rig.lens[0].width = 3300, rig.lens[0].height = 39; /* what fills whole boxes of 3 x 3 */
   same_rays(&d, &rig);
+  sf_dataset_free(&d);
+  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1}));
+  ck_assert_int_eq(d.view[0].camera.width, 3301);
   sf_dataset_free(&d);
   ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
   ck_assert_int_eq(d.view[0].camera.width, 165);

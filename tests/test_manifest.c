@@ -130,7 +130,8 @@ static sf_manifest some_manifest(bool is_float, int views)
   sf_manifest m = {.total = 3};
   sf_golden g = some_golden();
   if (is_float) g.planes = SF_FLOAT_PLANES;
-  m.origin = (sf_manifest_origin){.split = "test", .steps = 2, .downscale = 4, .scale = 0.8f, .crop = {1, 2, 3, 1}};
+  m.origin = (sf_manifest_origin){
+      .split = "test", .steps = 2, .downscale = is_float ? 0 : 4, .scale = 0.8f, .crop = {1, 2, 3, 1}};
   sf_sha256("scene", 5, m.origin.scene_sha256);
   if (is_float) sf_sha256("model", 5, m.origin.model_sha256);
   for (int i = 0; i < views; i++) {

@@ -307,7 +307,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
       {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->audit.split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
@@ -350,13 +351,9 @@ int main(int argc, char **argv)
                             "  energy_audit --published\n",
                 .min_positional = 0,
                 .max_positional = 3};
-  options opt = {.audit = {.view = -1,
-                           .downscale = 1,
-                           .rtl_rays = RTL_RAYS,
-                           .recount_rays = RECOUNT_RAYS,
-                           .tech = "45nm",
-                           .split = "test",
-                           .seed = 1}};
+  options opt = {
+      .audit = {
+          .view = -1, .rtl_rays = RTL_RAYS, .recount_rays = RECOUNT_RAYS, .tech = "45nm", .split = "test", .seed = 1}};
   sf_status status = parse(argc, argv, &opt, &cli);
   if (status.code == SF_OK) {
     char *command = join_command(argc, argv);

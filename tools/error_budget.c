@@ -100,7 +100,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--rays", 0, SF_ARG_U64, &o->rays, 1, 1e6, NULL, "N", "random rays of the view (default 1000)"},
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "view (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of the choice of rays (default 1)"},
@@ -132,7 +133,7 @@ int main(int argc, char **argv)
                 .max_positional = 3};
   budget *b = calloc(1, sizeof *b);
   if (!b) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  b->opt = (options){.split = "test", .rays = 1000, .samples = 1000000, .seed = 1, .downscale = 1};
+  b->opt = (options){.split = "test", .rays = 1000, .samples = 1000000, .seed = 1};
   sf_status status = parse(argc, argv, &b->opt, &cli);
   if (status.code == SF_OK) {
     if (b->opt.threads) omp_set_num_threads(b->opt.threads);

@@ -18,7 +18,7 @@ usage="usage: reproduce.sh BUILD [options]
   --prefix-views N     held-out views for the PSNR after every step (0 = none)
   --prefix-runs WHICH  learned (the three betas and the ANN) or all
   --audit-views N      held-out frames for the fixed-point core and the energy audit, spread over the split
-  --audit-downscale F  shrink these frames by F
+  --audit-downscale F  these frames of 1/F of the full size (0 = by the layout, as --downscale)
   --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
   --cosim-rays N       rays of every scene through RTL and fixed-point core in lockstep
 Results: BUILD/reproduce/PROFILE/{table.md,results.json,plots/}; runs in SCENE/RUN/ beside them."
@@ -36,21 +36,21 @@ profile=quick
 for ((i = 1; i <= $#; i++)); do
   if [ "${!i}" = --profile ]; then j=$((i + 1)); profile=${!j:-}; fi
 done
-declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=1 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0)
+declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=0 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0)
 case $profile in
   quick)
     set+=([stage1]=400 [stage2]=1200 [eval-views]=8 [prefix-views]=1 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
     ;;
   full)
-    set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=1)
+    set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=0)
     ;;
   smoke)
-    set+=([stage1]=30 [stage2]=60 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=1)
+    set+=([stage1]=30 [stage2]=60 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=0)
     set+=([samples]=512 [rtl-rays]=0)
     set+=([train]="--levels 4 --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32")
     ;;
   scenes)
-    set+=([minutes]=15 [eval-views]=0 [prefix-views]=0 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=1)
+    set+=([minutes]=15 [eval-views]=0 [prefix-views]=0 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=0)
     set+=([samples]=0 [cosim-rays]=400)
     ;;
   *) die "--profile '$profile' is unknown: expected quick, full, scenes or smoke" ;;
@@ -95,7 +95,7 @@ while [ $# -gt 0 ]; do
   esac
   shift 2
 done
-for name in audit-views audit-downscale steps downscale; do [ "${set[$name]}" -ge 1 ] || die "--$name starts at 1"; done
+for name in audit-views steps; do [ "${set[$name]}" -ge 1 ] || die "--$name starts at 1"; done
 [ "${set[steps]}" -le 8 ] || die "--steps ${set[steps]} is out of range: 1..8"
 out=$build/reproduce/$profile
 for program in sf_train sf_export sim_render energy_audit sf_report sf_scene; do

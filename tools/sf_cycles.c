@@ -260,12 +260,13 @@ static sf_status run(job *j)
 
 int main(int argc, char **argv)
 {
-  job j = {.opt = {.split = "test", .downscale = 1, .clock = 200}};
+  job j = {.opt = {.split = "test", .clock = 200}};
   options *o = &j.opt;
   const sf_option table[] = {
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the view by N (default 1)"},
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
+       "a view of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--clock", 0, SF_ARG_DOUBLE, &o->clock, 1, 1e5, NULL, "MHZ", "for the last line and --json (default 200)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},

@@ -191,8 +191,7 @@ static sf_status fit_scene(candidates *c, const options *o, sf_fit_report *repor
 {
   sf_dataset data;
   sf_fit_rays rays;
-  SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], o->output, o->extra.data, "train",
-                            &(sf_dataset_options){.downscale = 1}));
+  SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], o->output, o->extra.data, "train", &(sf_dataset_options){0}));
   sf_dataset_warn(stderr, "sf_export", &data, NULL);
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   sf_dataset_free(&data);

@@ -284,7 +284,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H", "the tile (default: 8x8 in the centre)"},
       {"--split", 0, SF_ARG_CHOICE, &o->split, 0, 0, "test|train", "NAME", "views to take (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--firmware", 0, SF_ARG_INPUT, &o->firmware, 0, 0, NULL, "ELF",
@@ -336,7 +337,7 @@ int main(int argc, char **argv)
       .max_positional = 2};
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.downscale = 1, .seed = 1, .instructions = 10000000000};
+  j->opt = (options){.seed = 1, .instructions = 10000000000};
   sf_status status = parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK) {
     find_firmware(j);

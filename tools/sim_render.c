@@ -278,7 +278,6 @@ static sf_status check_modes(options *o)
   const char *dot = strrchr(o->output, '.');
   if (!o->all) SF_TRY(refuse(dot && !strcasecmp(dot, ".png"), o->output, "would hold an EXR: --png is for previews"));
   if (!o->split) o->split = "test";
-  if (!o->downscale) o->downscale = 1;
   if (o->view < 0) o->view = 0;
   return sf_ok();
 }
@@ -301,7 +300,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "for float (default model.safetensors beside the scene)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 1, 64, NULL, "N", "shrink the views by N (default 1)"},
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, SEED_MAX, NULL, "S", "rtl: random reset values (default 1)"},

@@ -86,8 +86,8 @@ typedef struct sf_golden_label {
   const fx_net *net;
   const char *scene_sha256, *view, *split;
   sf_window window;
-  int downscale;
-  bool ndc; /* of the data set: what Z is */
+  int downscale; /* as sf_dataset's */
+  bool ndc;      /* of the data set: what Z is */
 } sf_golden_label;
 sf_status sf_golden_save_labelled(const sf_golden *golden, const char *path, const sf_golden_label *label);
 /* R G B, opaque. */

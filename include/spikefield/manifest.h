@@ -30,8 +30,8 @@ typedef struct sf_manifest_origin {
   char scene_sha256[65];
   char model_sha256[65]; /* float; else "" */
   char split[64];
-  int steps; /* t_r */
-  int downscale;
+  int steps;      /* t_r */
+  int downscale;  /* as sf_dataset's */
   float scale;    /* model units per world unit */
   sf_window crop; /* of every view; width 0: whole views */
 } sf_manifest_origin;

@@ -35,6 +35,7 @@ typedef struct sf_dataset {
   sf_view *view;
   int count;       /* loaded */
   int total;       /* in the split, loaded or not */
+  int downscale;   /* that was asked for; where the layout has one size, 1 for 0 */
   float scale;     /* model = world * scale + offset, world as the layout's reader turns it */
   float offset[3]; /* of the origin */
   int32_t bound;   /* proposed half edge of the scene box for INGP, model units: 1, 2, 4, ... 64 */
@@ -51,7 +52,7 @@ typedef struct sf_dataset {
 } sf_dataset;
 
 typedef struct sf_dataset_options {
-  int downscale;     /* >= 1; LLFF and COLMAP: of the full-size photographs, with images_N where that is there */
+  int downscale;     /* of the full-size photographs, which are 1; 0: the size that docs/data.md says for the layout */
   float scale;       /* 0 = default of the layout */
   int limit;         /* load at most this many views, 0 = all */
   int first;         /* leave out this many views before; with limit 1, a large set is walked without holding it all */

@@ -163,7 +163,7 @@ static sf_status read_origin(object *o, sf_manifest_origin *origin)
   if (is_float) SF_TRY(read_hash(o, "model_sha256", origin->model_sha256));
   SF_TRY(read_text(o, "split", origin->split, sizeof origin->split));
   SF_TRY(read_int(o, "t_r", 1, SF_T_MAX, &origin->steps));
-  SF_TRY(read_int(o, "downscale", 1, 64, &origin->downscale));
+  SF_TRY(read_int(o, "downscale", 0, 64, &origin->downscale));
   SF_TRY(read_scale(o, &origin->scale));
   return read_crop(o, &origin->crop);
 }

@@ -66,7 +66,7 @@ static sf_status load(bench *b)
 {
   const sf_point_options *o = b->options;
   SF_TRY(sf_model_load(&b->model, o->model));
-  const sf_dataset_options how = {.downscale = 1, .scale = b->model.config.scale, .limit = o->view + 1};
+  const sf_dataset_options how = {.scale = b->model.config.scale, .limit = o->view + 1};
   SF_TRY(sf_dataset_load(&b->data, o->data, o->split, &how));
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,

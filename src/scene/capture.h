@@ -73,7 +73,7 @@ bool sf_is_folder(const char *path);
 sf_status sf_join(char path[4096], const char *dir, const char *name, const char *tail);
 enum { SF_LONG_SIDE = 1600 }; /* pixels of the pictures that are chosen unasked */
 /* Folder `images` or `images_N` for pictures of the full size over `downscale`; *shrink: what is left to do. With
- * downscale 1: the largest whose longer side is at most SF_LONG_SIDE, by the full width and height; else the smallest,
+ * downscale 0: the largest whose longer side is at most SF_LONG_SIDE, by the full width and height; else the smallest,
  * and *shrink = 0. */
 sf_status sf_pictures_choose(const char *dir, int downscale, double width, double height, char folder[64], int *shrink);
 /* The names of its pictures (PNG, JPEG), sorted; free each and the list. */

@@ -45,7 +45,7 @@ void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data, con
 static sf_status check_options(const char *dir, const sf_dataset_options *options)
 {
   if (strlen(dir) >= sizeof((sf_dataset *)0)->path) return sf_fail(SF_E_IO, "%.80s...: name too long", dir);
-  if (options->downscale < 0) return sf_fail(SF_E_RANGE, "%s: downscale factor %d is below 1", dir, options->downscale);
+  if (options->downscale < 0) return sf_fail(SF_E_RANGE, "%s: downscale factor %d is below 0", dir, options->downscale);
   if (options->limit < 0 || options->first < 0)
     return sf_fail(SF_E_RANGE, "%s: %d views from view %d on", dir, options->limit, options->first);
   if (!(options->scale >= 0) || isinf(options->scale))
@@ -75,9 +75,11 @@ static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split
 {
   const char *dir = data->path;
   const bool poses = sf_llff_there(dir) || sf_colmap_there(dir);
-  c->shrink = options->downscale;
+  data->downscale = options->downscale;
   if (!sf_is_folder(dir)) return sf_fail(SF_E_IO, "%s: no such folder", dir);
   if (sf_transforms_there(dir) || !poses) {
+    if (!data->downscale) data->downscale = 1;
+    c->shrink = data->downscale;
     SF_TRY(sf_transforms_read(c, dir, split));
     return poses ? sf_warn(data, "%s: other poses are there too: %s is used", dir, c->list) : sf_ok();
   }
@@ -130,7 +132,7 @@ static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const 
 
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options)
 {
-  static const sf_dataset_options defaults = {.downscale = 1};
+  static const sf_dataset_options defaults = {0};
   sf_capture capture = {0};
   if (!options) options = &defaults;
   memset(data, 0, sizeof *data);

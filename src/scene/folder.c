@@ -60,17 +60,17 @@ sf_status sf_pictures_choose(const char *dir, int downscale, double width, doubl
     if (!has(dir, n)) continue;
     smallest = n;
     if (!fitting && side / n <= SF_LONG_SIDE) fitting = n;
-    if (downscale > 1 && downscale % n == 0) found = n;
+    if (downscale && downscale % n == 0) found = n;
   }
   if (!smallest) return sf_fail(SF_E_IO, "%s: no folder images or images_N with the pictures", dir);
-  if (downscale <= 1) found = fitting ? fitting : smallest;
+  if (!downscale) found = fitting ? fitting : smallest;
   if (!found) {
     folder_name(folder, smallest);
     return sf_fail(SF_E_RANGE, "%s: pictures of 1/%d of the full size are asked for: they cannot be made from %s", dir,
                    downscale, folder);
   }
   folder_name(folder, found);
-  *shrink = downscale > 1 ? downscale / found : 0;
+  *shrink = downscale / found;
   return sf_ok();
 }
 

@@ -52,7 +52,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
   const int kind = data[0] % KINDS;
   const char *folder = make_data_set(kind, fuzz_file(data + 1, size - 1));
   sf_dataset set;
-  if (!fuzz_good(sf_dataset_load(&set, folder, "train", &(sf_dataset_options){.downscale = 1, .limit = 16}))) {
+  if (!fuzz_good(sf_dataset_load(&set, folder, "train", &(sf_dataset_options){.limit = 16}))) {
     FUZZ_EXPECT(!set.view && !set.point && !set.warning);
     return 0;
   }

@@ -57,7 +57,7 @@ static cJSON *traces_json(const sf_traces_report *traces, const char *folder)
 
 sf_status export_extras_open(export_extras *e, const fx_scene *scene, const char *path, const export_options *o)
 {
-  const sf_dataset_options how = {.downscale = 1, .cameras_only = true};
+  const sf_dataset_options how = {.cameras_only = true};
   *e = (export_extras){0};
   if (!o->vectors && !o->traces) return sf_ok();
   SF_TRY(sf_fx_dataset_load(&e->data, scene, path, o->data, "test", &how));

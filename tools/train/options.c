@@ -60,7 +60,8 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
        "occupancy cells per axis, power of two (default 128)"},
       {"--scale", 0, SF_ARG_DOUBLE, &a->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the layout's (default 0)"},
-      {"--downscale", 'd', SF_ARG_INT, &a->downscale, 1, 64, NULL, "F", "box-filter the images by F (default 1)"},
+      {"--downscale", 'd', SF_ARG_INT, &a->downscale, 0, 64, NULL, "F",
+       "images of 1/F of the full size, 0 = by the layout (default 0)"},
       {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
       {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
        "behind transparent pixels and rays that leave the box; auto: random, but white for tensorf on pictures with "
@@ -265,7 +266,6 @@ void train_defaults(train_arguments *a, int argc, char **argv)
 {
   *a = (train_arguments){.output = "model.safetensors",
                          .train = sf_train_defaults(),
-                         .downscale = 1,
                          .checkpoint_minutes = 2,
                          .gamma = -1,
                          .argc = argc,
