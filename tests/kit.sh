@@ -95,8 +95,15 @@ faulty 0 0 PASS
 faulty 1 1 'layer C2' 'neuron 37 membrane'
 faulty 2 1 'layer C2 step 1 neuron 64 row: expected 1, actual 0'
 faulty 3 1 'DIFFERENCE layer C1 step 2 spikes: expected'
-# Another neuron of the same behaviour, and a wrong one.
-run icarus 0 PASS -- OVERLAY="$PWD/tests/dut/serial" BUILD=serial
-run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong" BUILD=wrong
+# Another neuron of the same behaviour, and a wrong one: older files than what was built, in the same folder.
+run icarus 0 PASS -- OVERLAY="$PWD/tests/dut/serial"
+run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong"
+run icarus 1 'nowhere' -- DUT=nowhere
+run verilator 1 'nowhere' -- DUT=nowhere
+sed 's/^module sf_top/module my_top/' "$kit/rtl/sf_top.sv" >"$work/my_top.sv"
+touch -d '1 hour ago' "$work/my_top.sv"
+sources="$(grep -v '^sf_top.sv' "$kit/rtl.f" | sed 's|^|rtl/|' | tr '\n' ' ')"
+run icarus 0 PASS -- SOURCES="$sources $work/my_top.sv" DUT=my_top
+run icarus 1 'my_top' -- SOURCES="$sources" DUT=my_top
 [ $failures -eq 0 ] && echo "the kit passes in both simulators; wrong bits and planted faults are caught and located"
 exit $((failures > 0))
