@@ -147,7 +147,7 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   }
   l->rays += b->rays;
   sf_cosim_totals_add(&l->sum, &b->sum);
-  if (b->status.code == SF_E_STOPPED) return true;
+  if (b->status.code == SF_E_STOPPED) return sf_cli_interrupted(); /* else this process alone was stopped */
   if (b->status.code != SF_OK) l->trouble = b->status;
   l->place = b->place;
   l->replay = b->replay;
@@ -179,7 +179,7 @@ static sf_status run_blocks(sf_lockstep *l)
   const sf_status status = sf_jobs_run(&jobs);
   SF_TRY(l->trouble);
   if (!l->partial) SF_TRY(save(l));
-  return status;
+  return l->partial && status.code == SF_OK ? sf_fail(SF_E_STOPPED, "stopped") : status;
 }
 
 static sf_status compare_energy(sf_lockstep *l)

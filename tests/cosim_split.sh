@@ -96,6 +96,16 @@ cmp -s part.json whole.json || fail "an interrupted run that was continued diffe
 cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
 grep -q "part: checkpoint of another" other.err || fail "another run's checkpoint: $(cat other.err)"
 
+# ---- one process stopped, its parent not: no success ----
+"$build/faults/sf_cosim" scene.snn data --rays 100000 --block 20 --jobs 2 --limit-samples 20000 --quiet --json >lone.json 2>lone.err &
+parent=$!
+for ((i = 0; i < 100; i++)); do [ "$(ps -o pid= --ppid $parent | wc -l)" -eq 2 ] && break; sleep 0.1; done
+sleep 0.3
+kill -TERM "$(ps -o pid= --ppid $parent | head -n 1 | tr -d ' ')"
+wait $parent
+[ $? -eq 130 ] || fail "one process stopped: exit status is not 130: $(cat lone.err)"
+grep -q '"complete":[[:space:]]*false' lone.json || fail "one process stopped: complete"
+
 # ---- killed outright: the processes end, too ----
 "$build/faults/sf_cosim" scene.snn data --rays 100000 --jobs 2 --quiet >/dev/null 2>&1 &
 parent=$!
