@@ -4,7 +4,7 @@
 DUT_TOP ?= sf_top
 DUT_FILES := $(filter-out -% +%,$(DUT))
 DUT_FLAGS := --cc --prefix Vsf_top --top-module $(DUT_TOP) -O3 -Wno-fatal -Wno-lint -Wno-style --x-assign unique \
-  --x-initial unique --trace-fst $(VERILATOR_UNROLL)
+  --x-initial unique $(VERILATOR_TRACE) $(VERILATOR_UNROLL)
 
 # What Verilator read, included files too, is known after the first time.
 $(DUT_OUT)/Vsf_top.mk: $(DUT_FILES) $(shell sed -n 's/^.*: //p' $(DUT_OUT)/Vsf_top__ver.d 2>/dev/null)

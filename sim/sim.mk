@@ -12,8 +12,9 @@ RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
 RTL_READY := $(if $(ARCH_INCLUDE),$B/variant/.generated,$(RTL_ALL))
 # Loops over lanes are written for unrolling; see rtl/README.md.
 VERILATOR_UNROLL := --unroll-count 256 --unroll-stmts 1000000
-VERILATOR_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique --trace-fst \
-  --trace-max-array 128 $(VERILATOR_UNROLL)
+# Arrays over lanes are in waveforms, too: Verilator leaves out those of more than 32 elements.
+VERILATOR_TRACE := --trace-fst --trace-max-array $(if $(findstring LANES=256,$(ARCH_DEFINES)),256,128)
+VERILATOR_FLAGS := --cc -Wall -O3 --x-assign unique --x-initial unique $(VERILATOR_TRACE) $(VERILATOR_UNROLL)
 # COVERAGE: folder in which every accelerator that is closed leaves its coverage; see sim/coverage.mk.
 ifneq ($(COVERAGE),)
 VERILATOR_FLAGS += --coverage-line --coverage-toggle

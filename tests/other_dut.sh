@@ -42,6 +42,11 @@ run serial 0 "${my_block[@]}"
 [ "$(field serial samples)" -ge 3000 ] && [ "$(field serial differences)" = 0 ] || fail "the other neuron: $(cat "$work/serial.json")"
 run again 0 "${my_block[@]}"
 [ ! -s "$work/again.err" ] || fail "built again without a change: $(head -n 1 "$work/again.err")"
+# Its activity has the nets of what it shares with ours: arrays over lanes, too.
+saif() { "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 2 --quiet --saif "$work/$1.saif" "${@:2}" >/dev/null; }
+saif own && saif other "${my_block[@]}" || fail "a SAIF file"
+own=$(grep -c '(acc_q' "$work/own.saif") other=$(grep -c '(acc_q' "$work/other.saif")
+[ "$own" -ge 1000 ] && [ "$own" -eq "$other" ] || fail "$own bits of acc_q, of the other block $other"
 
 cp "$root/tests/dut/wrong/sf_plif.svh" "$work/overlay"
 run wrong 1 "${my_block[@]}"
