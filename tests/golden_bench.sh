@@ -37,6 +37,8 @@ run() {
 run 0 'PASS 300 random samples' +fault=0
 run 1 ': membrane of neuron 37' +fault=1
 run 1 'layer 3 step 1: rows' +fault=2
+run 1 ': 0 tap beats, expected' +fault=15
+run 1 ': surplus tap beat' +fault=16
 mv "$work/scene.snn" "$work/away.snn"
 run 1 'scene.snn: ' +fault=0
 [ $failures -eq 0 ] && echo "the example bench passes beside the golden model and sees planted faults"
