@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define FORMAT "spikefield replay 1"
+#define PROGRAM "/proc/self/exe"
 enum { INPUT_MAX = (1 << (SF_INPUT_BITS - 1)) - 1 };
 
 static cJSON *values_json(const int16_t *value, int n)
@@ -29,12 +30,13 @@ static cJSON *sample_json(const sf_replay_sample *s)
 }
 
 /* The seed is text: a JSON number would lose its last bits. */
-static cJSON *replay_json(const sf_replay *replay, const char *scene, const char *hash)
+static cJSON *replay_json(const sf_replay *replay, const char *scene, const char *hash, const char *program)
 {
   char seed[32];
   cJSON *json = cJSON_CreateObject();
   snprintf(seed, sizeof seed, "%" PRIu64, replay->seed);
   cJSON_AddStringToObject(json, "format", FORMAT);
+  cJSON_AddStringToObject(json, "program_sha256", program);
   cJSON_AddStringToObject(json, "scene", scene);
   cJSON_AddStringToObject(json, "scene_sha256", hash);
   cJSON_AddStringToObject(json, "seed", seed);
@@ -47,15 +49,16 @@ static cJSON *replay_json(const sf_replay *replay, const char *scene, const char
 
 sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path)
 {
-  char hash[65], *whole = realpath(scene, NULL);
+  char hash[65], program[65], *whole = realpath(scene, NULL);
   sf_status status = sf_sha256_file(scene, hash);
+  if (status.code == SF_OK) status = sf_sha256_file(PROGRAM, program);
   if (!whole && status.code == SF_OK) status = sf_fail(SF_E_IO, "%s: %s", scene, strerror(errno));
   if (status.code != SF_OK) {
     cJSON_Delete(difference);
     free(whole);
     return status;
   }
-  cJSON *json = replay_json(replay, whole, hash);
+  cJSON *json = replay_json(replay, whole, hash, program);
   if (difference) cJSON_AddItemToObject(json, "difference", difference);
   status = sf_json_save(json, path);
   cJSON_Delete(json);
@@ -151,6 +154,16 @@ static sf_status same_scene(const cJSON *json, const char *path, char **scene)
   return *scene ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: out of memory", path);
 }
 
+/* A file of before this field is another program's. */
+static sf_status same_program(const cJSON *json, bool *other)
+{
+  const char *writer = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "program_sha256"));
+  char hash[65];
+  SF_TRY(sf_sha256_file(PROGRAM, hash));
+  *other = !writer || strcmp(writer, hash) != 0;
+  return sf_ok();
+}
+
 sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path)
 {
   cJSON *json;
@@ -158,6 +171,7 @@ sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path)
   *scene = NULL;
   SF_TRY(sf_json_load(path, &json));
   sf_status status = load_run(json, path, replay);
+  if (status.code == SF_OK) status = same_program(json, &replay->other_program);
   if (status.code == SF_OK) status = same_scene(json, path, scene);
   cJSON_Delete(json);
   return status;

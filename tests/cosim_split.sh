@@ -54,7 +54,10 @@ what() { sed -E 's/.*(ray [0-9]+).*(sample [0-9]+: .*), cycle.*/\1 \2/' "$1"; }
 [ -s elsewhere/sf_cosim-difference.fst ] || fail "replay: no waveform"
 # Without the fault there is nothing to be seen.
 sed 's/+fault=3/+fault=0/' fault1.replay >repaired.replay
-"$build/faults/sf_cosim" --replay repaired.replay >replay.out 2>&1 || fail "repaired: $(cat replay.out)"
+"$build/faults/sf_cosim" --replay repaired.replay >replay.out 2>&1 && grep -q 'no difference$' replay.out ||
+  fail "repaired: $(cat replay.out)"
+"$build/bin/sf_cosim" --replay fault1.replay >replay.out 2>&1 &&
+  grep -q 'no difference; the file was written by another program$' replay.out || fail "another program: $(cat replay.out)"
 # The waveform is of the last two samples: that of 41 samples is not much larger than that of one or two.
 cosim near 1 --rays 60 --seed 7 --plusarg +fault=2
 [ "$(stat -c %s fault1.fst)" -lt $((6 * $(stat -c %s evidence.fst))) ] || fail "the waveform is of more than the last samples"

@@ -77,7 +77,8 @@ static sf_status say_replayed(const char *path, const sf_replay *replay, const s
   char text[200];
   const sf_replay_sample *s = &replay->sample[replayed->at];
   if (!replayed->differs) {
-    printf("%s: %d samples, no difference\n", path, replay->count);
+    printf("%s: %d samples, no difference%s\n", path, replay->count,
+           replay->other_program ? "; the file was written by another program" : "");
     return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
   }
   if (replayed->what.wire) sf_difference_text(&replayed->what, text);
