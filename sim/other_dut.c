@@ -1,6 +1,7 @@
 #include "sim/other_dut.h"
 #include "spikefield/audit.h"
 #include "spikefield/io.h"
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <libgen.h>
@@ -15,7 +16,8 @@
 
 enum { WORDS_MAX = 65536, HASH_LENGTH = 16, PATH_LENGTH = 4096 };
 
-/* One text that names what is built: every word with its absolute path, then the contents' hash of every source. */
+/* One text that names what is built: every word with its absolute path, then the contents' hash of every source, or a
+ * hash of the names in an include folder: a new one may stand before what was included. */
 typedef struct request {
   char words[WORDS_MAX], key[2 * WORDS_MAX];
   size_t words_used, key_used;
@@ -60,6 +62,29 @@ static sf_status absolute(const char *prefix, const char *path, char to[PATH_LEN
   return sf_fail(SF_E_RANGE, "--dut: %s: the path is too long", path);
 }
 
+static int is_verilog(const struct dirent *entry)
+{
+  static const char *const suffixes[] = {".svh", ".vh", ".sv", ".v"};
+  const char *dot = strrchr(entry->d_name, '.');
+  for (size_t i = 0; dot && i < sizeof suffixes / sizeof *suffixes; i++)
+    if (!strcmp(dot, suffixes[i])) return 1;
+  return 0;
+}
+
+static sf_status add_names(request *r, const char *folder)
+{
+  char text[65 + NAME_MAX + 1], hash[65] = "";
+  struct dirent **entry;
+  const int n = scandir(folder, &entry, is_verilog, alphasort);
+  if (n < 0) return sf_fail(SF_E_IO, "--dut: %s: %s", folder, strerror(errno));
+  for (int i = 0; i < n; i++) {
+    sf_sha256(text, (size_t)snprintf(text, sizeof text, "%s%s", hash, entry[i]->d_name), hash);
+    free(entry[i]);
+  }
+  free(entry);
+  return append(r->key, &r->key_used, sizeof r->key, hash);
+}
+
 static sf_status add_word(request *r, const char *word)
 {
   char full[PATH_LENGTH], hash[65];
@@ -67,6 +92,7 @@ static sf_status add_word(request *r, const char *word)
   if (plus || letter) {
     SF_TRY(absolute(plus ? "+incdir+" : "-I", word + (plus ? 8 : 2), full));
     SF_TRY(append(r->key, &r->key_used, sizeof r->key, full));
+    SF_TRY(add_names(r, strchr(full, '/')));
     return append(r->words, &r->words_used, sizeof r->words, full);
   }
   if (word[0] == '-' || word[0] == '+') {

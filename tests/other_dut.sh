@@ -77,6 +77,14 @@ if [ "$below" != "$build" ]; then
   printf 'dut:\n\t@echo "built in $B, $(DUT_OUT)" >&2; exit 1\n' >"$work/moved/Makefile"
   run moved 1 "${my_block[@]}"
   has moved.err "built in $build, $build/dut/"
+  # A new file in an include folder may stand before the one that was included: another build.
+  touch "$work/overlay/notes.txt"
+  run same 1 "${my_block[@]}"
+  cmp -s "$work/moved.err" "$work/same.err" || fail "another build for a file that is no Verilog"
+  touch "$work/overlay/other.svh"
+  run shadow 1 "${my_block[@]}"
+  has shadow.err "built in $build, $build/dut/"
+  cmp -s "$work/moved.err" "$work/shadow.err" && fail "no other build for a new file in an include folder"
 fi
 [ $failures -eq 0 ] && echo "another block co-simulates, its mistake is located, what does not build says where"
 exit $((failures > 0))
