@@ -6,7 +6,7 @@ enum { BUS_PATIENCE = 4096, STREAM_AW = 1, STREAM_W, STREAM_B, STREAM_AR, STREAM
 
 void sf_dut_tick(sf_dut *dut)
 {
-  sf_pins_cycle(dut->pins, &dut->in, &dut->out);
+  if (!dut->out.finished) sf_pins_cycle(dut->pins, &dut->in, &dut->out);
   sf_phase_follow(&dut->phase, &dut->in, &dut->out);
   dut->cycle++;
   if (dut->each_cycle) dut->each_cycle(dut->each_cycle_context);

@@ -8,6 +8,7 @@ enum { RESET_CYCLES = 4 };
 
 static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
 {
+  if (dut->out.finished) return sf_fail(SF_E_DIFFERENCE, "accelerator: %s: the simulation ended by itself", what);
   if (dut->bus_hung)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what,
                    dut->cycle);

@@ -57,6 +57,7 @@ extern "C" void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *
   edge(pins, false);
   pins->sample(out);
   edge(pins, true);
+  out->finished = pins->context.gotFinish();
 }
 
 #ifdef SF_COVERAGE

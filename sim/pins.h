@@ -39,6 +39,7 @@ typedef struct sf_pins_out {
   bool ray_ready, pixel_valid, mem_request;
   uint64_t pixel_data[6];
   uint32_t mem_address;
+  bool finished; /* the block has called $finish: another cycle may end this process */
 } sf_pins_out;
 
 typedef struct sf_pins sf_pins;

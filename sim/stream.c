@@ -134,6 +134,8 @@ static sf_status step(run *r)
   offer(r);
   dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT);
   sf_dut_tick(dut);
+  if (dut->out.finished)
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: the simulation ended by itself at cycle %" PRIu64, dut->cycle);
   if ((dut->out.s_ready && !dut->in.s_valid && r->sent < r->n) || (dut->out.m_valid && !dut->in.m_ready))
     dut->stall_cycle = dut->cycle;
   accept_input(r);

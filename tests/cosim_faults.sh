@@ -48,7 +48,20 @@ expect 8 1 '"wire":"rays"'
 # A result that is not the one that was shown while it waited.
 expect 9 1
 grep -qE 'result changed before it was taken at cycle [0-9]+' "$work/9.err" || fail "fault 9: $(cat "$work/9.err")"
+# says FAULT TEXT: what a register access, a stream or the simulation itself does wrong
+says() {
+  expect "$1" 1
+  grep -qE "$2" "$work/$1.err" || fail "fault $1: $(cat "$work/$1.err")"
+}
+says 17 'the simulation ended by itself'
+cp "$work/evidence.json" "$work/end.json"
+for how in "--replay $work/end.json --evidence $work/end" \
+  "$work/scene.snn $work/data --rays 20 --plusarg +fault=17 --saif $work/end.saif"; do
+  # shellcheck disable=SC2086
+  "$build/faults/sf_cosim" $how --quiet >"$work/end.out" 2>&1
+  [ $? -eq 1 ] && grep -q 'the simulation ended by itself' "$work/end.out" || fail "$how: $(cat "$work/end.out")"
+done
 # A rounding that truncates is one LSB too low.
 [ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
-[ $failures -eq 0 ] && echo "6 planted faults caught and located, none without a fault"
+[ $failures -eq 0 ] && echo "7 planted faults caught and located, none without a fault"
 exit $((failures > 0))
