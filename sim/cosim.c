@@ -148,7 +148,8 @@ static sf_status flush(sf_cosim *c)
   for (int i = 0; i < c->n; i++)
     c->input[i] = (sf_dut_sample){.ray = &c->chunk[i].ray, .first = c->chunk[i].first, .f = c->chunk[i].f};
   if (c->n == 0) return sf_ok();
-  const sf_status ran = sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace);
+  sf_status ran = sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace);
+  if (ran.code == SF_OK) ran = sf_dut_quiet(c->dut);
   if (ran.code != SF_OK) return stuck(c, &ran);
   SF_TRY(compare_samples(c));
   SF_TRY(compare_counts(c));

@@ -36,7 +36,8 @@ static bool compare_samples(const play *p, fx_counts *expected, sf_replayed *rep
 static sf_status compare(play *p, sf_dut *dut, sf_replayed *replayed)
 {
   fx_counts expected = {0}, actual;
-  const sf_status status = sf_dut_run_traced(dut, p->input, p->replay->count, p->result, p->trace);
+  sf_status status = sf_dut_run_traced(dut, p->input, p->replay->count, p->result, p->trace);
+  if (status.code == SF_OK) status = sf_dut_quiet(dut);
   if (status.code == SF_E_DIFFERENCE) {
     replayed->differs = true;
     replayed->at = sf_dut_received(dut) < p->replay->count ? sf_dut_received(dut) : p->replay->count - 1;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* The longest sample takes about 10^3 cycles; stalls of up to 90 % slow the streams only. */
-enum { PATIENCE = 100000, TAP_PATIENCE = 1000, STREAM_INPUT = 16, STREAM_OUTPUT, RESULT_BEATS = 2 };
+enum { PATIENCE = 100000, TAP_PATIENCE = 1000, QUIET = 16, STREAM_INPUT = 16, STREAM_OUTPUT, RESULT_BEATS = 2 };
 
 typedef struct run {
   sf_dut *dut;
@@ -176,6 +176,20 @@ sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_
   if (status.code == SF_OK) status = wait_for_taps(&r);
   dut->in.s_valid = dut->in.m_ready = false;
   return status;
+}
+
+sf_status sf_dut_quiet(sf_dut *dut)
+{
+  const sf_pins_out *out = &dut->out;
+  const char *what = NULL;
+  dut->in.m_ready = true;
+  for (int i = 0; i < QUIET && !what; i++) {
+    sf_dut_tick(dut);
+    what = out->m_valid ? "result" : out->tap_valid ? "tap beat" : out->irq ? "interrupt" : NULL;
+  }
+  dut->in.m_ready = false;
+  if (!what) return sf_ok();
+  return sf_fail(SF_E_DIFFERENCE, "accelerator: %s after the last sample at cycle %" PRIu64, what, dut->cycle);
 }
 
 sf_status sf_dut_run(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result)

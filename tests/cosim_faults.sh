@@ -53,6 +53,7 @@ says() {
   expect "$1" 1
   grep -qE "$2" "$work/$1.err" || fail "fault $1: $(cat "$work/$1.err")"
 }
+says 16 'tap beat after the last sample'
 says 17 'the simulation ended by itself'
 cp "$work/evidence.json" "$work/end.json"
 for how in "--replay $work/end.json --evidence $work/end" \
@@ -63,5 +64,5 @@ for how in "--replay $work/end.json --evidence $work/end" \
 done
 # A rounding that truncates is one LSB too low.
 [ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
-[ $failures -eq 0 ] && echo "7 planted faults caught and located, none without a fault"
+[ $failures -eq 0 ] && echo "8 planted faults caught and located, none without a fault"
 exit $((failures > 0))
