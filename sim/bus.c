@@ -17,20 +17,31 @@ bool sf_dut_stalls(const sf_dut *dut, uint64_t which)
   return dut->stall_percent && sf_random_below(dut->seed, which, dut->cycle, 100) < dut->stall_percent;
 }
 
+static void check_answer(sf_dut *dut, uint32_t offset, bool asked, uint8_t response)
+{
+  const char *what = !asked ? "answered before it was asked" : response ? "refused (SLVERR or DECERR)" : NULL;
+  if (!what || dut->bus_fault.what) return;
+  dut->bus_fault.what = what;
+  dut->bus_fault.offset = offset;
+  dut->bus_fault.cycle = dut->cycle;
+}
+
+/* Address and data are theirs no longer than they are on offer. */
 static uint32_t bus_read(void *context, uint32_t offset)
 {
   sf_dut *dut = context;
   bool asked = false;
   for (int i = 0; i < BUS_PATIENCE; i++) {
-    dut->in.araddr = offset;
     dut->in.arvalid = !asked && (dut->in.arvalid || !sf_dut_stalls(dut, STREAM_AR));
+    dut->in.araddr = dut->in.arvalid ? offset : ~offset;
     dut->in.rready = !sf_dut_stalls(dut, STREAM_R);
     sf_dut_tick(dut);
     if (dut->in.arvalid && dut->out.arready) {
       asked = true;
       dut->in.arvalid = false;
     }
-    if (dut->in.rready && dut->out.rvalid) {
+    if (dut->out.rvalid) check_answer(dut, offset, asked, dut->out.rresp);
+    if (asked && dut->in.rready && dut->out.rvalid) {
       dut->in.rready = false;
       sf_cover_read(dut->cover, offset, dut->out.rdata);
       return dut->out.rdata;
@@ -48,15 +59,16 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
   sf_cover_write(dut->cover, offset, value, dut->phase);
   dut->in.wstrb = 0xf;
   for (int i = 0; i < BUS_PATIENCE; i++) {
-    dut->in.awaddr = offset;
-    dut->in.wdata = value;
     dut->in.awvalid = !addressed && (dut->in.awvalid || !sf_dut_stalls(dut, STREAM_AW));
     dut->in.wvalid = !given && (dut->in.wvalid || !sf_dut_stalls(dut, STREAM_W));
+    dut->in.awaddr = dut->in.awvalid ? offset : ~offset;
+    dut->in.wdata = dut->in.wvalid ? value : ~value;
     dut->in.bready = !sf_dut_stalls(dut, STREAM_B);
     sf_dut_tick(dut);
     if (dut->in.awvalid && dut->out.awready) addressed = true, dut->in.awvalid = false;
     if (dut->in.wvalid && dut->out.wready) given = true, dut->in.wvalid = false;
-    if (dut->in.bready && dut->out.bvalid) {
+    if (dut->out.bvalid) check_answer(dut, offset, addressed && given, dut->out.bresp);
+    if (addressed && given && dut->in.bready && dut->out.bvalid) {
       dut->in.bready = false;
       if (offset == SF_CSR_CTRL && value & SF_CSR_CTRL_SOFT_RESET) dut->phase = SF_PHASE_IDLE;
       dut->bus_response = dut->out.bresp;

@@ -6,12 +6,22 @@
 
 enum { RESET_CYCLES = 4 };
 
+/* For the driver; what was refused before is no fault of what follows. */
+static const sf_bus *driver_bus(sf_dut *dut)
+{
+  dut->bus_fault.what = NULL;
+  return &dut->bus;
+}
+
 static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
 {
   if (dut->out.finished) return sf_fail(SF_E_DIFFERENCE, "accelerator: %s: the simulation ended by itself", what);
   if (dut->bus_hung)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what,
                    dut->cycle);
+  if (dut->bus_fault.what && code != SF_DRIVER_REFUSED)
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: access to register %03" PRIx32 " %s at cycle %" PRIu64, what,
+                   dut->bus_fault.offset, dut->bus_fault.what, dut->bus_fault.cycle);
   if (code == SF_DRIVER_OK) return sf_ok();
   if (code != SF_DRIVER_REFUSED)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s at cycle %" PRIu64, what, sf_driver_text(code), dut->cycle);
@@ -40,7 +50,7 @@ sf_status sf_dut_open_pins(sf_dut **dut_out, const sf_dut_options *options, sf_p
   for (int i = 0; i < RESET_CYCLES; i++) sf_dut_tick(dut);
   dut->in.rst_n = true;
   sf_dut_tick(dut);
-  const sf_status status = driver_status(dut, sf_driver_probe(&dut->bus), "probe");
+  const sf_status status = driver_status(dut, sf_driver_probe(driver_bus(dut)), "probe");
   if (status.code != SF_OK) {
     sf_dut_close(dut);
     return status;
@@ -57,8 +67,9 @@ sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options)
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net)
 {
   const sf_net_blob blob = sf_dut_blob(net);
-  SF_TRY(driver_status(dut, sf_driver_load(&dut->bus, &blob), "load"));
-  dut->bus.write(dut->bus.context, SF_CSR_IRQ_ENABLE, SF_CSR_IRQ_ENABLE_ERROR);
+  const sf_driver_code code = sf_driver_load(driver_bus(dut), &blob);
+  if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_IRQ_ENABLE, SF_CSR_IRQ_ENABLE_ERROR);
+  SF_TRY(driver_status(dut, code, "load"));
   dut->net = *net;
   return sf_dut_clear_counts(dut);
 }
@@ -78,13 +89,13 @@ sf_status sf_dut_open(sf_dut **dut_out, const fx_scene *scene, const sf_dut_opti
 
 sf_status sf_dut_clear_counts(sf_dut *dut)
 {
-  return driver_status(dut, sf_driver_clear(&dut->bus), "clear counters");
+  return driver_status(dut, sf_driver_clear(driver_bus(dut)), "clear counters");
 }
 
 sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls)
 {
   sf_driver_counters read;
-  SF_TRY(driver_status(dut, sf_driver_read_counters(&dut->bus, &read), "read counters"));
+  SF_TRY(driver_status(dut, sf_driver_read_counters(driver_bus(dut), &read), "read counters"));
   memset(counts, 0, sizeof *counts);
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer_counts *c = &counts->layer[l];

@@ -14,7 +14,12 @@ struct sf_dut {
   sf_bus bus;           /* the driver's way in: AXI4-Lite */
   bool bus_hung;        /* a register access was never answered */
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
-  fx_net net;           /* sizes of the loaded net */
+  struct {
+    const char *what; /* NULL: none */
+    uint32_t offset;
+    uint64_t cycle;
+  } bus_fault; /* the first one since the driver was called */
+  fx_net net;  /* sizes of the loaded net */
   uint64_t layer_busy[SF_LAYERS];
   int wave_from, received;
   void (*each_cycle)(void *context); /* a system around the accelerator moves its streams here; or NULL */

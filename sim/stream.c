@@ -5,7 +5,8 @@
 #include <string.h>
 
 /* The longest sample takes about 10^3 cycles; stalls of up to 90 % slow the streams only. */
-enum { PATIENCE = 100000, TAP_PATIENCE = 1000, QUIET = 16, STREAM_INPUT = 16, STREAM_OUTPUT, RESULT_BEATS = 2 };
+enum { PATIENCE = 100000, TAP_PATIENCE = 1000, QUIET = 16, RESULT_BEATS = 2 };
+enum { STREAM_INPUT = 16, STREAM_OUTPUT, STREAM_SHY = 20 };
 
 typedef struct run {
   sf_dut *dut;
@@ -18,6 +19,7 @@ typedef struct run {
   uint64_t tap_cycle[SF_LAYERS]; /* of the last one */
   uint64_t packet[SF_PACKET_MAX];
   uint64_t progress; /* cycle of the last beat */
+  bool shy;          /* ready for the next beat only after it was seen */
   bool waits;        /* a result was shown and not taken: */
   uint64_t waiting_data;
   bool waiting_last;
@@ -70,6 +72,7 @@ static sf_status accept_output(run *r)
   else
     value->colour[1] = low, value->colour[2] = high;
   r->progress = r->dut->cycle;
+  r->shy = sf_dut_stalls(r->dut, STREAM_SHY);
   if (++r->out_beat < RESULT_BEATS) return sf_ok();
   r->out_beat = 0;
   r->result[r->dut->received++].cycle = r->dut->cycle;
@@ -132,7 +135,7 @@ static sf_status step(run *r)
   sf_dut *dut = r->dut;
   if (r->sent == dut->wave_from) sf_pins_dump(dut->pins);
   offer(r);
-  dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT);
+  dut->in.m_ready = !sf_dut_stalls(dut, STREAM_OUTPUT) && (r->waits || !r->shy);
   sf_dut_tick(dut);
   if (dut->out.finished)
     return sf_fail(SF_E_DIFFERENCE, "accelerator: the simulation ended by itself at cycle %" PRIu64, dut->cycle);

@@ -95,6 +95,9 @@ faulty 0 0 PASS
 faulty 1 1 'layer C2' 'neuron 37 membrane'
 faulty 2 1 'layer C2 step 1 neuron 64 row: expected 1, actual 0'
 faulty 3 1 'DIFFERENCE layer C1 step 2 spikes: expected'
+faulty 10 1 'layer D1 step 0 mac'
+faulty 13 1 'answered before it was asked'
+faulty 14 1 'no sign of life'
 # Another neuron of the same behaviour, and a wrong one: older files than what was built, in the same folder.
 run icarus 0 PASS -- OVERLAY="$PWD/tests/dut/serial"
 run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong"

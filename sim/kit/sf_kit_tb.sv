@@ -139,10 +139,12 @@ module sf_kit_tb;
 
   // ---- AXI4-Lite: one access at a time; address and data of a write may come in either order
   reg bus_busy = 1'b0, writing, aw_left, w_left, ar_left;
+  reg [12:0] register;
   reg [31:0] value;  // that was read
   task begin_write(input [12:0] address, input [31:0] data);
     begin
       {bus_busy, writing, aw_left, w_left, ar_left} = 5'b11110;
+      register = address;
       awaddr <= address;
       wdata <= data;
     end
@@ -150,28 +152,47 @@ module sf_kit_tb;
   task begin_read(input [12:0] address);
     begin
       {bus_busy, writing, aw_left, w_left, ar_left} = 5'b10001;
+      register = address;
       araddr <= address;
     end
   endtask
-  task check_response(input [1:0] response, input [12:0] address);
+  task check_asked(input asked);
+    if (!asked) begin
+      $display("DIFFERENCE register %03x: answered before it was asked", register);
+      fail;
+    end
+  endtask
+  task check_response(input [1:0] response);
     begin
       bus_busy = 1'b0;
       quiet = 0;
       if (response !== 2'd0) begin
-        $display("DIFFERENCE register %03x: response %0d to a %0s", address, response, writing ? "write" : "read");
+        $display("DIFFERENCE register %03x: response %0d to a %0s", register, response, writing ? "write" : "read");
         fail;
       end
     end
   endtask
+  // What was taken is no longer on offer.
   task bus_cycle;
     begin
-      if (awvalid && awready) aw_left = 1'b0;
-      if (wvalid && wready) w_left = 1'b0;
-      if (arvalid && arready) ar_left = 1'b0;
-      if (bvalid && bready) check_response(bresp, awaddr);
+      if (awvalid && awready) begin
+        aw_left = 1'b0;
+        awaddr <= ~awaddr;
+      end
+      if (wvalid && wready) begin
+        w_left = 1'b0;
+        wdata <= ~wdata;
+      end
+      if (arvalid && arready) begin
+        ar_left = 1'b0;
+        araddr <= ~araddr;
+      end
+      if (bvalid) check_asked(bus_busy && writing && !aw_left && !w_left);
+      if (rvalid) check_asked(bus_busy && !writing && !ar_left);
+      if (bvalid && bready) check_response(bresp);
       if (rvalid && rready) begin
         value = rdata;
-        check_response(rresp, araddr);
+        check_response(rresp);
       end
       awvalid <= aw_left && (awvalid || !stall(bus_random));
       wvalid <= w_left && (wvalid || !stall({bus_random[15:0], bus_random[31:16]}));
@@ -198,7 +219,7 @@ module sf_kit_tb;
 
   // ---- results out
   integer received = 0;
-  reg held = 1'b0;
+  reg held = 1'b0, shy = 1'b0;  // shy: ready for the next beat only after it was seen
   reg [64:0] held_beat;
   wire [63:0] expected_output = outputs[received];
   task compare_output;
@@ -227,8 +248,9 @@ module sf_kit_tb;
         quiet = 0;
         compare_output;
         received = received + 1;
+        shy = stall({out_random[15:0], out_random[31:16]});
       end
-      m_ready <= !stall(out_random);
+      m_ready <= !stall(out_random) && (held || !shy);
     end
   endtask
 
