@@ -7,7 +7,7 @@ DUT_FLAGS := --cc --prefix Vsf_top --top-module $(DUT_TOP) -O3 -Wno-fatal -Wno-l
   --x-initial unique $(VERILATOR_TRACE) $(VERILATOR_UNROLL)
 
 # What Verilator read, included files too, is known after the first time.
-$(DUT_OUT)/Vsf_top.mk: $(DUT_FILES) $(shell sed -n 's/^.*: //p' $(DUT_OUT)/Vsf_top__ver.d 2>/dev/null)
+$(DUT_OUT)/Vsf_top.mk: sim/dut.mk sim/sim.mk $(DUT_FILES) $(shell sed -n 's/^.*: //p' $(DUT_OUT)/Vsf_top__ver.d 2>/dev/null)
 	@mkdir -p $(DUT_OUT)
 	$(call say,VERI  $(DUT_OUT))
 	$Q$(VERILATOR) $(DUT_FLAGS) --Mdir $(DUT_OUT) $(DUT)
