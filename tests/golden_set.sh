@@ -143,7 +143,7 @@ expect 2 "-o DIR is missing" s1.snn d --all
 expect 2 "--view does not go with --all" s1.snn d --all -o x --view 1
 expect 2 "--png does not go with --all" s1.snn d --all -o x --png x.png
 expect 2 "needs --crop" s1.snn d --all -o x --backend rtl
-for option in "--all" "-o x" "--png x" "--crop 0,0,1,1" "--steps 1" "--split test" "--downscale 1" "--scale 1"; do
+for option in "--all" "-o x" "--png x" "--crop 0,0,1,1" "--steps 1" "--split test" "--downscale 1" "--downscale 0" "--scale 1"; do
   expect 2 "does not go with --verify" s1.snn d --verify two/manifest.json $option
 done
 expect 2 "cannot verify" s1.snn d --verify two/manifest.json --backend float

@@ -598,8 +598,8 @@ START_TEST(cli_outputs)
       {"a --log b", "--log", "is the input"},        {"in --start a -o b", "--output", "also --start"},
       {"in -o c --log c", "--output", "also --log"}, {"in --log d/../c -o c", "--output", "also --log"}};
   static const char *const unwritable[] = {"in -o none/c", "in -o d", "in -o a/c", "in -o /dev/null"};
-  static const char *const good[] = {"a -o c --log d", "d --log d -o d/a", "in --start c -o x", "in --log none/c",
-                                     "in --word c -o c"};
+  static const char *const good[] = {"a -o c --log d",  "d --log d -o d/a", "in --start c -o x",
+                                     "in --log none/c", "in --word c -o c", "in --start c -o c"};
   const char *p[2];
   ck_assert_int_eq(chdir(folder), 0);
   ck_good(sf_write_file("a", "a", 1));

@@ -293,10 +293,12 @@ START_TEST(the_box_is_that_of_the_layout)
   float *const place = data.view[0].camera.to_world;
   data.count = 1;
   for (float distance = 1; distance < 200; distance *= 1.5f) { /* world units; 2 before and behind the middle */
+    data.scale = distance < 10 ? 0.8f : 0.03f;
+    plain = sf_tensorf_default(data.scale, 0);
     place[3] = 0, place[7] = 0.6f * distance * data.scale, place[11] = 0.8f * distance * data.scale;
     c = sf_train_defaults_tensorf(&data).config;
     const float near = c.tensorf.near / data.scale, far = c.tensorf.far / data.scale;
-    ck_assert_float_eq_tol(near, fmaxf(fminf(2, distance - 2), (float)SF_NEAR / data.scale), 1e-4f);
+    ck_assert_float_eq_tol(near, fmaxf(fminf(2, distance - 2), fminf(2, (float)SF_NEAR / data.scale)), 1e-4f);
     ck_assert_float_eq_tol(far, fmaxf(6, distance + 2), 1e-4f);
     c.tensorf.near = plain.tensorf.near, c.tensorf.far = plain.tensorf.far;
     ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);

@@ -256,18 +256,7 @@ static sf_status check_backend(options *o)
 static sf_status check_modes(options *o)
 {
   SF_TRY(check_backend(o));
-  if (o->verify) {
-    static const char *const reason = "does not go with --verify: the manifest decides";
-    SF_TRY(refuse(o->all, "--all", reason));
-    SF_TRY(refuse(o->output, "--output", reason));
-    SF_TRY(refuse(o->png, "--png", reason));
-    SF_TRY(refuse(o->crop, "--crop", reason));
-    SF_TRY(refuse(o->steps, "--steps", reason));
-    SF_TRY(refuse(o->split, "--split", reason));
-    SF_TRY(refuse(o->downscale, "--downscale", reason));
-    SF_TRY(refuse(o->scale != 0, "--scale", reason));
-    return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
-  }
+  if (o->verify) return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
   if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
   if (o->all) {
     SF_TRY(refuse(o->view >= 0, "--view", "does not go with --all"));
@@ -309,9 +298,13 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
+  static const char *const of_manifest[] = {"--all",   "--output",    "--png",   "--crop", "--steps",
+                                            "--split", "--downscale", "--scale", NULL};
   const char *positional[2];
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
+  if (status.code == SF_OK && o->verify)
+    status = sf_cli_refuse(cli, argc, argv, of_manifest, "does not go with --verify: the manifest decides");
   cli->options = NULL;
   SF_TRY(status);
   o->scene = positional[0], o->data = positional[1];

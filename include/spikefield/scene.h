@@ -87,7 +87,7 @@ void sf_camera_ray(const sf_camera *camera, float px, float py, float origin[3],
 /* The inverse: where a point (model units) is seen. False where it is not in front of the camera. */
 bool sf_camera_project(const sf_camera *camera, const float point[3], float pixel[2]);
 /* The same of a view of `data`, in the space that models live in: what a trainer or a renderer is to ask. With NDC the
- * origin lies on the near plane (z = -scale) and infinity at z = scale. */
+ * origin lies SF_NEAR before its point on the near plane (z = -scale), and infinity at z = scale. */
 void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
                     float direction[3]);
 /* Points along an edge of [-bound, bound]^3, model units, that lie a pixel apart where the views see the middle of the

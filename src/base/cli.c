@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 /* ---- help ---- */
 
@@ -172,11 +173,12 @@ static bool same_file(const char *a, const char *b)
   return (!there || S_ISREG(p.st_mode)) && p.st_dev == q.st_dev && p.st_ino == q.st_ino;
 }
 
-/* The path that the option names; NULL where it names none. */
+/* The path that the option names; NULL where it names none. An input may be the name of something else. */
 static const char *path_of(const sf_option *o)
 {
   const bool path = o->type == SF_ARG_INPUT || o->type == SF_ARG_OUTPUT || o->type == SF_ARG_PLACE;
-  return path ? *(const char **)o->value : NULL;
+  const char *text = path ? *(const char **)o->value : NULL;
+  return text && o->type == SF_ARG_INPUT && access(text, F_OK) ? NULL : text;
 }
 
 /* An output over an input or another output would lose one of them, at the end of the work. */

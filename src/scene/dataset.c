@@ -108,8 +108,9 @@ static sf_sight look(const sf_dataset *data, const sf_capture *c)
   sf_sight sight = {0};
   sf_image image = {0};
   char path[4096];
-  for (int f = 0; f < c->count && !image.rgba && must_look(c, &c->frame[f].lens); f++)
-    if (sf_picture_find(path, data->path, c->frame[f].file_path).code == SF_OK && sf_is_file(path))
+  for (int f = 0; f < c->count && !image.rgba; f++)
+    if (must_look(c, &c->frame[f].lens) && sf_picture_find(path, data->path, c->frame[f].file_path).code == SF_OK &&
+        sf_is_file(path))
       if (sf_picture_load(&image, path).code != SF_OK) break;
   if (!image.rgba) return sight;
   sight.width = image.width, sight.height = image.height;

@@ -30,10 +30,10 @@ sf_train_options sf_train_defaults(void)
 /* TensoRF's 2 and 6 world units are for cameras 4 away; nearer and farther ones see as much of the box. */
 static void see_all(sf_tensorf *f, const sf_dataset *data)
 {
-  const float half = 2 * data->scale;
+  const float half = 2 * data->scale, least = fminf(f->near, (float)SF_NEAR);
   for (int v = 0; v < data->count; v++) {
     const float *m = data->view[v].camera.to_world, d = sqrtf(m[3] * m[3] + m[7] * m[7] + m[11] * m[11]);
-    f->near = fmaxf(fminf(f->near, d - half), (float)SF_NEAR);
+    f->near = fmaxf(fminf(f->near, d - half), least);
     f->far = fmaxf(f->far, d + half);
   }
 }
