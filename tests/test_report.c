@@ -162,6 +162,7 @@ START_TEST(faults)
              "{\"energy_spiking_fj\":1,\"energy_ann_fj\":2,\"difference\":\"ray 0: it differs\",\"samples\":1}");
   write_text("a/no-extra/train.json", "{\"psnr\":");
   write_text("a/no-stage1/train.json", "{\"psnr\":null,\"ssim\":0.5,\"t_r\":3,\"seconds\":1}");
+  write_text("a/no-budget/train.json", "{\"psnr\":20,\"ssim\":null,\"t_r\":3,\"seconds\":1}"); /* tiny views */
   load();
   ck_assert_int_eq(report.problems, 5);
   ck_assert_ptr_nonnull(strstr(report.problem[2], "the audit of view 2: ray 0: it differs"));

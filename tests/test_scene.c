@@ -166,6 +166,21 @@ START_TEST(one_side_states_the_size)
 }
 END_TEST
 
+/* Of the picture that states no size, whatever the first states. */
+START_TEST(a_later_size_is_looked_at)
+{
+  sf_dataset d;
+  put_picture("a.png", 8, 4, 0);
+  put_text(in("transforms_train.json"),
+           "{" ANGLE "\"frames\":[{\"file_path\":\"a\",\"w\":8,\"h\":4,\"cx\":4,\"transform_matrix\":" UNIT
+           "},{\"file_path\":\"a\",\"cx\":200,\"transform_matrix\":" UNIT "}]}");
+  ck_good(sf_dataset_load(&d, folder, "train", NULL));
+  ck_assert_int_eq(d.warnings, 1);
+  ck_assert_ptr_nonnull(strstr(d.warning[0], "not look at the scene"));
+  sf_dataset_free(&d);
+}
+END_TEST
+
 START_TEST(every_eighth_view_is_held_out)
 {
   char json[4000] = "{" ANGLE "\"frames\":[";
@@ -328,6 +343,7 @@ static Suite *suite(void)
   tcase_add_test(t, loads_camera_angle);
   tcase_add_test(t, options_and_stated_intrinsics);
   tcase_add_test(t, one_side_states_the_size);
+  tcase_add_test(t, a_later_size_is_looked_at);
   tcase_add_test(t, every_eighth_view_is_held_out);
   tcase_add_loop_test(t, faults_name_file_and_frame, 0, COUNT(bad_scenes));
   tcase_add_test(t, a_split_is_walked_view_by_view);
