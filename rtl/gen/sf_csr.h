@@ -232,7 +232,7 @@
 /* blue, RW */
 #define SF_REG_RAY_BACKGROUND_B 0x0420
 
-/* where ENCODER_DATA goes, 0..255; counts up by one word at each write of it, RW */
+/* where ENCODER_DATA goes, modulo 256; counts up by one word at each write of it, RW */
 #define SF_REG_ENCODER_ADDRESS 0x0424
 
 /* a word of the encoder's programming, WO */
