@@ -130,14 +130,15 @@ static void power_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t 
 
 /* ---- what the processor does ---- */
 
-/* Counts instructions block by block: a block that an access ends early counts whole. */
+/* Counts instructions block by block: a block that an access ends early counts whole, one of a compressed instruction
+ * as one, so that every endless program comes to its limit. */
 static void on_block(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
   (void)uc;
   sf_soc *soc = user;
   const sf_soc_options *o = &soc->options;
   soc->block = address;
-  soc->total.instructions += size / INSTRUCTION_BYTES;
+  soc->total.instructions += (size + INSTRUCTION_BYTES - 1) / INSTRUCTION_BYTES;
   if (o->instructions && soc->total.instructions > o->instructions)
     blame(soc, "no end after %" PRIu64 " instructions", soc->total.instructions);
   if (soc->total.instructions < soc->next_tick) return;

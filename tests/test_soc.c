@@ -82,6 +82,7 @@ START_TEST(bad_programs_end_with_a_reason)
     const char *reason;
   } bad[] = {
       {{JUMP_HERE}, "no end after 400"},
+      {{0xa001a001}, "no end after 400"}, /* compressed jumps here, of two bytes */
       {{addi(T0, T0, 1), 0xffffffff}, "trap: illegal instruction (cause 2), in the block of code at 0x80000000"},
       {{ECALL}, "environment call"},
       {{EBREAK}, "Invalid instruction"},
@@ -104,7 +105,7 @@ START_TEST(bad_programs_end_with_a_reason)
                 status.message);
 }
 END_TEST
-enum { BAD_PROGRAMS = 15 };
+enum { BAD_PROGRAMS = 16 };
 
 START_TEST(a_program_ends_with_its_status)
 {
