@@ -23,6 +23,14 @@ static sf_status load_segment(sf_soc *soc, const char *path, const char *file, s
   return sf_ok();
 }
 
+static sf_status check_flags(const char *path, uint32_t flags)
+{
+  const char *what = flags & EF_RISCV_RVC         ? "built with compressed instructions"
+                     : flags & EF_RISCV_FLOAT_ABI ? "built for floating-point registers"
+                                                  : NULL;
+  return what ? sf_fail(SF_E_UNSUPPORTED, "%s: %s: the system is RV32IM", path, what) : sf_ok();
+}
+
 static sf_status load(sf_soc *soc, const char *path, const char *file, size_t size)
 {
   Elf32_Ehdr head;
@@ -31,6 +39,7 @@ static sf_status load(sf_soc *soc, const char *path, const char *file, size_t si
   memcpy(&head, file, sizeof head);
   if (head.e_ident[EI_CLASS] != ELFCLASS32 || head.e_machine != EM_RISCV || head.e_type != ET_EXEC)
     return sf_fail(SF_E_UNSUPPORTED, "%s: not a 32-bit RISC-V program", path);
+  SF_TRY(check_flags(path, head.e_flags));
   if (head.e_phentsize != sizeof(Elf32_Phdr) || head.e_phoff > size ||
       (size_t)head.e_phnum * sizeof(Elf32_Phdr) > size - head.e_phoff)
     return sf_fail(SF_E_FORMAT, "%s: the table of segments is cut short", path);

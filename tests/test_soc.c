@@ -443,6 +443,8 @@ START_TEST(a_bad_program_file_is_refused)
              {40, 0, 0x7f, "not an ELF file"},
              {size, 4, 2, "not a 32-bit RISC-V"},
              {size, 18, 3, "not a 32-bit RISC-V"},
+             {size, 36, 1, "built with compressed instructions: the system is RV32IM"},
+             {size, 36, 4, "built for floating-point registers: the system is RV32IM"},
              {size, 31, 0x7f, "segments is cut short"},
              {60, 0, 0x7f, "segments is cut short"},
              {5000, 0, 0x7f, "is cut short"}};
