@@ -6,14 +6,21 @@
 
 enum { RESET_CYCLES = 4 };
 
-/* For the driver; what was refused before is no fault of what follows. */
-static const sf_bus *driver_bus(sf_dut *dut)
+const sf_error_source sf_dut_error = {SF_CSR_ERROR, sf_driver_error_text};
+
+const char *sf_dut_error_text(sf_dut *dut, const sf_error_source *error)
+{
+  const uint32_t value = dut->bus.read(dut->bus.context, error->offset);
+  return dut->bus_hung ? "registers do not answer" : error->text(value);
+}
+
+const sf_bus *sf_dut_driver_bus(sf_dut *dut)
 {
   dut->bus_fault.what = NULL;
   return &dut->bus;
 }
 
-static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
+sf_status sf_dut_driver_status(sf_dut *dut, sf_driver_code code, const char *what, const sf_error_source *error)
 {
   if (dut->out.finished) return sf_fail(SF_E_DIFFERENCE, "accelerator: %s: the simulation ended by itself", what);
   if (dut->bus_hung)
@@ -25,8 +32,13 @@ static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *wha
   if (code == SF_DRIVER_OK) return sf_ok();
   if (code != SF_DRIVER_REFUSED)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s at cycle %" PRIu64, what, sf_driver_text(code), dut->cycle);
-  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
-  return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s: %s", what, sf_driver_text(code), sf_driver_error_text(error));
+  return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s: %s", what, sf_driver_text(code),
+                 sf_dut_error_text(dut, error));
+}
+
+static sf_status driver_status(sf_dut *dut, sf_driver_code code, const char *what)
+{
+  return sf_dut_driver_status(dut, code, what, &sf_dut_error);
 }
 
 sf_status sf_dut_open_pins(sf_dut **dut_out, const sf_dut_options *options, sf_pins_opener open)
@@ -50,7 +62,7 @@ sf_status sf_dut_open_pins(sf_dut **dut_out, const sf_dut_options *options, sf_p
   for (int i = 0; i < RESET_CYCLES; i++) sf_dut_tick(dut);
   dut->in.rst_n = true;
   sf_dut_tick(dut);
-  const sf_status status = driver_status(dut, sf_driver_probe(driver_bus(dut)), "probe");
+  const sf_status status = driver_status(dut, sf_driver_probe(sf_dut_driver_bus(dut)), "probe");
   if (status.code != SF_OK) {
     sf_dut_close(dut);
     return status;
@@ -67,7 +79,7 @@ sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options)
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net)
 {
   const sf_net_blob blob = sf_dut_blob(net);
-  const sf_driver_code code = sf_driver_load(driver_bus(dut), &blob);
+  const sf_driver_code code = sf_driver_load(sf_dut_driver_bus(dut), &blob);
   if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_IRQ_ENABLE, SF_CSR_IRQ_ENABLE_ERROR);
   SF_TRY(driver_status(dut, code, "load"));
   dut->net = *net;
@@ -89,13 +101,13 @@ sf_status sf_dut_open(sf_dut **dut_out, const fx_scene *scene, const sf_dut_opti
 
 sf_status sf_dut_clear_counts(sf_dut *dut)
 {
-  return driver_status(dut, sf_driver_clear(driver_bus(dut)), "clear counters");
+  return driver_status(dut, sf_driver_clear(sf_dut_driver_bus(dut)), "clear counters");
 }
 
 sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls)
 {
   sf_driver_counters read;
-  SF_TRY(driver_status(dut, sf_driver_read_counters(driver_bus(dut), &read), "read counters"));
+  SF_TRY(driver_status(dut, sf_driver_read_counters(sf_dut_driver_bus(dut), &read), "read counters"));
   memset(counts, 0, sizeof *counts);
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer_counts *c = &counts->layer[l];

@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PATIENCE = 200000, STREAM_RAYS = 40, STREAM_PIXELS };
+enum { PATIENCE = 200000, QUIET = 16, STREAM_RAYS = 40, STREAM_PIXELS };
+static const sf_error_source ray_error = {SF_CSR_RAY_ERROR, sf_ray_driver_error_text};
 
 static sf_ray_blob blob_of(const fx_scene *scene)
 {
@@ -28,11 +29,9 @@ sf_status sf_ray_dut_load(sf_ray_dut *rays)
   sf_dut *dut = rays->dut;
   const sf_ray_blob blob = blob_of(rays->scene);
   SF_TRY(sf_dut_load(dut, &rays->scene->net));
-  if (sf_ray_driver_load(&dut->bus, &blob) != SF_DRIVER_OK)
-    return sf_fail(SF_E_UNSUPPORTED, "accelerator: rays refused: %s",
-                   sf_ray_driver_error_text(dut->bus.read(dut->bus.context, SF_CSR_RAY_ERROR)));
-  dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);
-  return sf_ok();
+  const sf_driver_code code = sf_ray_driver_load(sf_dut_driver_bus(dut), &blob);
+  if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);
+  return sf_dut_driver_status(dut, code, "load rays", &ray_error);
 }
 
 sf_status sf_ray_dut_open(sf_ray_dut **out, const fx_scene *scene, const sf_dut_options *options)
@@ -152,11 +151,9 @@ static sf_status trouble(run *r, const char *what)
   sf_dut *dut = r->dut;
   const uint64_t cycle = dut->cycle;
   dut->in.ray_valid = dut->in.pixel_ready = false;
-  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
-  const uint32_t ray_error = dut->bus.read(dut->bus.context, SF_CSR_RAY_ERROR);
+  const char *error = sf_dut_error_text(dut, &sf_dut_error), *of_rays = sf_dut_error_text(dut, &ray_error);
   return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d rays in, %d pixels out: %s; rays: %s",
-                 what, cycle, r->sent, r->n, r->received, sf_driver_error_text(error),
-                 sf_ray_driver_error_text(ray_error));
+                 what, cycle, r->sent, r->n, r->received, error, of_rays);
 }
 
 static sf_status step(run *r)
@@ -165,6 +162,8 @@ static sf_status step(run *r)
   offer(r);
   dut->in.pixel_ready = !sf_dut_stalls(dut, STREAM_PIXELS);
   sf_dut_tick(dut);
+  if (dut->out.finished)
+    return sf_fail(SF_E_DIFFERENCE, "accelerator: the simulation ended by itself at cycle %" PRIu64, dut->cycle);
   accept_input(r);
   SF_TRY(accept_pixel(r));
   if (dut->out.irq) return trouble(r, "interrupt");
@@ -172,13 +171,27 @@ static sf_status step(run *r)
   return dut->cycle - r->progress > PATIENCE ? trouble(r, "hang") : sf_ok();
 }
 
+static sf_status quiet(sf_dut *dut, int cycles)
+{
+  const sf_pins_out *out = &dut->out;
+  const char *what = NULL;
+  dut->in.pixel_ready = true;
+  for (; cycles > 0 && !what; cycles--) {
+    sf_dut_tick(dut);
+    what = out->finished ? "end of the simulation" : out->pixel_valid ? "pixel" : out->irq ? "interrupt" : NULL;
+  }
+  dut->in.pixel_ready = false;
+  if (!what) return sf_ok();
+  return sf_fail(SF_E_DIFFERENCE, "accelerator: %s without a ray at cycle %" PRIu64, what, dut->cycle);
+}
+
 sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel)
 {
   sf_dut *dut = rays->dut;
-  run r = {.dut = dut, .memory = &rays->memory, .request = request, .pixel = pixel, .n = n, .progress = dut->cycle};
   sf_pins_dump(dut->pins);
-  sf_status status = sf_ok();
+  sf_status status = quiet(dut, 1);
+  run r = {.dut = dut, .memory = &rays->memory, .request = request, .pixel = pixel, .n = n, .progress = dut->cycle};
   while ((r.received < n || r.sent < n) && status.code == SF_OK) status = step(&r);
   dut->in.ray_valid = dut->in.pixel_ready = false;
-  return status;
+  return status.code == SF_OK ? quiet(dut, QUIET) : status;
 }

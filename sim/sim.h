@@ -42,6 +42,18 @@ sf_status sf_dut_open_pins(sf_dut **dut, const sf_dut_options *options, sf_pins_
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net);
 sf_net_blob sf_dut_blob(const fx_net *net);
 
+/* For the driver; what was refused before is no fault of what follows. */
+const sf_bus *sf_dut_driver_bus(sf_dut *dut);
+/* An ERROR register, and what its bits say. */
+typedef struct sf_error_source {
+  uint32_t offset;
+  const char *(*text)(uint32_t error);
+} sf_error_source;
+extern const sf_error_source sf_dut_error; /* of sf_top */
+const char *sf_dut_error_text(sf_dut *dut, const sf_error_source *error);
+/* What the driver says, and what the bus saw meanwhile. */
+sf_status sf_dut_driver_status(sf_dut *dut, sf_driver_code code, const char *what, const sf_error_source *error);
+
 /* Packet of a sample: beats of 4 values. words[SF_PACKET_MAX]; returns the number of beats. */
 enum { SF_PACKET_MAX = (SF_DIR_MAX + SF_FEATURE_MAX) / 4 };
 int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words);

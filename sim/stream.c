@@ -125,9 +125,8 @@ static sf_status trouble(run *r, const char *what)
   sf_dut *dut = r->dut;
   const uint64_t cycle = dut->cycle;
   dut->in.s_valid = dut->in.m_ready = false;
-  const uint32_t error = dut->bus.read(dut->bus.context, SF_CSR_ERROR);
   return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d samples in, %d results out: %s", what,
-                 cycle, r->sent, r->n, r->dut->received, sf_driver_error_text(error));
+                 cycle, r->sent, r->n, r->dut->received, sf_dut_error_text(dut, &sf_dut_error));
 }
 
 static sf_status step(run *r)

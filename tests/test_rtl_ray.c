@@ -235,6 +235,54 @@ START_TEST(illegal_programming_is_refused)
 }
 END_TEST
 
+/* Between driver and bus: writes of one register go to another, a read of it finds nobody. */
+typedef struct spy {
+  sf_dut *dut;
+  sf_bus real;
+  uint32_t offset, to; /* to = 0: deaf */
+} spy;
+
+static uint32_t spy_read(void *context, uint32_t offset)
+{
+  spy *s = context;
+  if (offset != s->offset || s->to) return s->real.read(s->real.context, offset);
+  s->dut->bus_hung = true;
+  return ~0u;
+}
+
+static void spy_write(void *context, uint32_t offset, uint32_t value)
+{
+  spy *s = context;
+  s->real.write(s->real.context, offset == s->offset && s->to ? s->to : offset, value);
+}
+
+START_TEST(what_goes_wrong_at_load_is_told)
+{
+  static const struct {
+    uint32_t offset, to;
+    const char *text;
+  } bad[] = {{SF_CSR_RAY_IRQ_ENABLE, SF_CSR_RAY_STATUS,
+              "load rays: access to register 404 refused (SLVERR or DECERR) at cycle"},
+             {SF_CSR_RAY_TRANS_STOP, 0x7fc, "load rays: programming refused: ADDRESS: "},
+             {SF_CSR_RAY_BACKGROUND_B, SF_CSR_RAY_MAX_SAMPLES, "load rays: programming refused: VALUE: "},
+             {SF_CSR_RAY_ERROR, 0, "load rays: register access not answered at cycle"}};
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 5, 20);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    const sf_bus real = rays->dut->bus;
+    spy s = {rays->dut, real, bad[i].offset, bad[i].to};
+    rays->dut->bus = (sf_bus){spy_read, spy_write, &s};
+    const sf_status status = sf_ray_dut_load(rays);
+    rays->dut->bus = real, rays->dut->bus_hung = false;
+    ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+    ck_assert_msg(strstr(status.message, bad[i].text), "'%s' is not in '%s'", bad[i].text, status.message);
+  }
+  works(rays, 7);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(registers)
 {
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
@@ -339,6 +387,7 @@ int main(void)
   tcase_add_test(cases, rays_go_on_after_their_end);
   tcase_add_test(cases, short_rays_in_a_row);
   tcase_add_test(cases, illegal_programming_is_refused);
+  tcase_add_test(cases, what_goes_wrong_at_load_is_told);
   tcase_add_test(cases, registers);
   tcase_add_test(cases, soft_reset_in_mid_ray);
   tcase_add_test(cases, beats_out_of_order_are_refused);

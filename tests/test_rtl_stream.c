@@ -24,6 +24,9 @@ struct sf_pins {
   change unstable;
   bool waited;
   int rays, pixels; /* in, out */
+  int surplus;      /* pixels after the last one */
+  int irq_at;       /* pixels before the interrupt, 0: none */
+  bool ends, deaf;  /* the simulation ends at the last ray; registers do not answer */
 };
 
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg)
@@ -79,9 +82,11 @@ void sf_pins_cycle(sf_pins *p, const sf_pins_in *in, sf_pins_out *out)
   memset(out, 0, sizeof *out);
   out->ray_ready = true;
   p->rays += in->ray_valid;
-  if (p->pixels < p->rays) show_pixel(p, in, out);
+  out->finished = p->ends && p->rays == SAMPLES;
+  out->irq = p->irq_at && p->pixels >= p->irq_at;
+  if (p->pixels < p->rays + (p->rays == SAMPLES ? p->surplus : 0)) show_pixel(p, in, out);
   out->s_ready = true;
-  out->arready = out->rvalid = in->arvalid;
+  out->arready = out->rvalid = in->arvalid && !p->deaf;
   p->input += in->s_valid && in->s_last;
   if (p->input < SAMPLES) return;
   if (p->shown < p->taps - p->late || (p->shown < p->taps && p->result == p->results)) {
@@ -241,19 +246,63 @@ START_TEST(a_result_that_does_not_wait)
 }
 END_TEST
 
+/* text: NULL for a run without a difference. */
+static void expect_rays(const char *text)
+{
+  sf_ray_request request[SAMPLES];
+  fx_pixel pixel[SAMPLES];
+  for (int i = 0; i < SAMPLES; i++) request[i] = (sf_ray_request){.ray = &b.ray};
+  sf_ray_dut rays = {.dut = &b.dut};
+  const sf_status status = sf_ray_dut_run(&rays, request, SAMPLES, pixel);
+  ck_assert_int_eq(status.code, text ? SF_E_DIFFERENCE : SF_OK);
+  if (text) ck_assert_msg(strstr(status.message, text) != NULL, "'%s' is not in '%s'", text, status.message);
+}
+
 START_TEST(a_pixel_that_does_not_wait)
 {
   for (change what = NOTHING; what <= DATA; what++) {
-    sf_ray_request request[SAMPLES];
-    fx_pixel pixel[SAMPLES];
     begin(7);
-    for (int i = 0; i < SAMPLES; i++) request[i] = (sf_ray_request){.ray = &b.ray};
     b.pins.unstable = what;
-    sf_ray_dut rays = {.dut = &b.dut};
-    const sf_status status = sf_ray_dut_run(&rays, request, SAMPLES, pixel);
-    ck_assert_int_eq(status.code, what ? SF_E_DIFFERENCE : SF_OK);
-    if (what) ck_assert_ptr_nonnull(strstr(status.message, "pixel changed before it was taken at cycle"));
+    expect_rays(what ? "pixel changed before it was taken at cycle" : NULL);
   }
+}
+END_TEST
+
+START_TEST(nothing_comes_without_a_ray)
+{
+  begin(8);
+  b.pins.surplus = 1;
+  expect_rays("pixel without a ray at cycle");
+  begin(8);
+  b.pins.pixels = -1; /* one before the first ray */
+  b.dut.stall_percent = 0;
+  expect_rays("pixel without a ray at cycle");
+  begin(8);
+  b.pins.irq_at = SAMPLES;
+  expect_rays("interrupt without a ray at cycle");
+}
+END_TEST
+
+START_TEST(the_simulation_ends_at_the_last_ray)
+{
+  begin(9);
+  b.pins.ends = true;
+  expect_rays("the simulation ended by itself at cycle");
+}
+END_TEST
+
+/* No cause is made up of what a dead bus reads as. */
+START_TEST(registers_that_do_not_answer)
+{
+  begin(10);
+  b.pins.irq_at = 3, b.pins.deaf = true;
+  expect_rays("interrupt at cycle");
+  begin(10);
+  b.pins.irq_at = 3, b.pins.deaf = true;
+  expect_rays("registers do not answer");
+  begin(10);
+  b.pins.results = 2 * 4 + 1, b.pins.deaf = true;
+  expect("4 results out: registers do not answer");
 }
 END_TEST
 
@@ -277,6 +326,9 @@ int main(void)
   tcase_add_test(c, results_out_of_step);
   tcase_add_test(c, a_result_that_does_not_wait);
   tcase_add_test(c, a_pixel_that_does_not_wait);
+  tcase_add_test(c, nothing_comes_without_a_ray);
+  tcase_add_test(c, the_simulation_ends_at_the_last_ray);
+  tcase_add_test(c, registers_that_do_not_answer);
   tcase_add_test(c, a_result_is_missing);
   suite_add_tcase(s, c);
   return ck_run(s);
