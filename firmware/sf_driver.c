@@ -27,6 +27,8 @@ const char *sf_driver_text(sf_driver_code code)
     return "programming refused";
   case SF_DRIVER_TIMEOUT:
     return "no answer";
+  case SF_DRIVER_MISFIT:
+    return "the encoder's levels or directions are not the net's";
   }
   return "unknown code";
 }

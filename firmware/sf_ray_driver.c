@@ -1,7 +1,12 @@
 #include "firmware/sf_ray_driver.h"
+#include <stdbool.h>
 
 enum { LEVEL_WORDS = 8 }; /* of the encoder's programming; five are used */
 
+static uint32_t get(const sf_bus *bus, uint32_t offset)
+{
+  return bus->read(bus->context, offset);
+}
 static void put(const sf_bus *bus, uint32_t offset, uint32_t value)
 {
   bus->write(bus->context, offset, value);
@@ -18,6 +23,14 @@ const char *sf_ray_driver_error_text(uint32_t error)
   return "no error";
 }
 
+/* C1's inputs are the directions and all outputs of D2 but the density. */
+static bool fits(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  const uint32_t h = get(bus, SF_CSR_D2_N_OUT) - 1;
+  return rays->levels >= 1 && rays->levels <= SF_RAY_LEVELS_MAX && 2 * rays->levels == get(bus, SF_CSR_D1_N_IN) &&
+         rays->n_dir <= SF_RAY_DIR_MAX && rays->n_dir == get(bus, SF_CSR_C1_N_IN) - h;
+}
+
 static void program_level(const sf_bus *bus, uint32_t index, const sf_ray_level_blob *level)
 {
   put(bus, SF_CSR_ENCODER_ADDRESS, index * LEVEL_WORDS);
@@ -30,7 +43,7 @@ static void program_level(const sf_bus *bus, uint32_t index, const sf_ray_level_
 
 static void program_encoder(const sf_bus *bus, const sf_ray_blob *rays)
 {
-  for (uint32_t l = 0; l < rays->levels && l < SF_RAY_LEVELS_MAX; l++) program_level(bus, l, &rays->level[l]);
+  for (uint32_t l = 0; l < rays->levels; l++) program_level(bus, l, &rays->level[l]);
   put(bus, SF_CSR_ENCODER_ADDRESS, SF_RAY_LEVELS_MAX * LEVEL_WORDS);
   put(bus, SF_CSR_ENCODER_DATA, rays->levels);
   put(bus, SF_CSR_ENCODER_DATA, rays->n_dir);
@@ -39,6 +52,7 @@ static void program_encoder(const sf_bus *bus, const sf_ray_blob *rays)
 
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays)
 {
+  if (!fits(bus, rays)) return SF_DRIVER_MISFIT;
   program_encoder(bus, rays);
   put(bus, SF_CSR_RAY_TRANS_STOP, rays->trans_stop);
   put(bus, SF_CSR_RAY_MAX_SAMPLES, rays->max_samples);
@@ -46,5 +60,5 @@ sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays)
   put(bus, SF_CSR_RAY_BACKGROUND_G, rays->background[1]);
   put(bus, SF_CSR_RAY_BACKGROUND_B, rays->background[2]);
   put(bus, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
-  return bus->read(bus->context, SF_CSR_RAY_ERROR) ? SF_DRIVER_REFUSED : SF_DRIVER_OK;
+  return get(bus, SF_CSR_RAY_ERROR) ? SF_DRIVER_REFUSED : SF_DRIVER_OK;
 }

@@ -3,7 +3,7 @@
 #define SPIKEFIELD_FIRMWARE_RAY_DRIVER_H
 #include "firmware/sf_driver.h"
 
-enum { SF_RAY_LEVELS_MAX = 16 };
+enum { SF_RAY_LEVELS_MAX = 16, SF_RAY_DIR_MAX = 16 };
 
 /* The grid's levels and how rays end. The table itself lies in the block's external memory. */
 typedef struct sf_ray_level_blob {
@@ -19,7 +19,8 @@ typedef struct sf_ray_blob {
   uint32_t trans_stop, max_samples, background[3];
 } sf_ray_blob;
 
-/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. SF_DRIVER_REFUSED: RAY_ERROR. */
+/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. SF_DRIVER_REFUSED: RAY_ERROR;
+ * SF_DRIVER_MISFIT: levels or n_dir, which the block does not check. */
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays);
 /* First bit of a RAY_ERROR register as text, "no error" for 0. */
 const char *sf_ray_driver_error_text(uint32_t error);

@@ -1,6 +1,7 @@
 /* sf_ray_top against the fixed-point core, bit for bit: sample positions in, pixels and counters out. Random scenes and
  * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
 #include "ck_run.h"
+#include "firmware/sf_ray_driver.h"
 #include "sim/ray.h"
 #include "spikefield/audit.h"
 #include "spikefield/quant.h"
@@ -283,6 +284,28 @@ START_TEST(what_goes_wrong_at_load_is_told)
 }
 END_TEST
 
+/* Of a net with four levels and nine direction features. */
+START_TEST(sizes_that_are_not_the_nets_are_refused)
+{
+  static const struct {
+    uint32_t levels, n_dir;
+  } bad[] = {{0, 9},          {3, 9}, {5, 9}, {16, 9}, {17, 9}, {20, 9},
+             {0x80000004, 9}, {4, 0}, {4, 8}, {4, 16}, {4, 25}, {4, 41}};
+  fx_scene scene = small_scene();
+  sf_ray_dut *rays = open_rays(&scene, 6, 0);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    const sf_ray_blob blob = {.levels = bad[i].levels, .n_dir = bad[i].n_dir, .max_samples = 1024};
+    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    ck_assert_str_eq(sf_driver_text(sf_ray_driver_load(&rays->dut->bus, &blob)),
+                     "the encoder's levels or directions are not the net's");
+    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), 0);
+  }
+  works(rays, 8);
+  sf_ray_dut_close(rays);
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(registers)
 {
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
@@ -388,6 +411,7 @@ int main(void)
   tcase_add_test(cases, short_rays_in_a_row);
   tcase_add_test(cases, illegal_programming_is_refused);
   tcase_add_test(cases, what_goes_wrong_at_load_is_told);
+  tcase_add_test(cases, sizes_that_are_not_the_nets_are_refused);
   tcase_add_test(cases, registers);
   tcase_add_test(cases, soft_reset_in_mid_ray);
   tcase_add_test(cases, beats_out_of_order_are_refused);
