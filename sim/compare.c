@@ -112,3 +112,22 @@ sf_status sf_compare_ray_counts(const fx_net *net, const fx_counts *core, const 
   return sf_fail(SF_E_DIFFERENCE, "rays: core %llu, accelerator %llu", (unsigned long long)core->rays,
                  (unsigned long long)rtl->rays);
 }
+
+sf_status sf_compare_pixel(const fx_pixel *core, const fx_pixel *rtl, uint64_t cycle)
+{
+  const struct {
+    const char *name;
+    uint64_t core, rtl;
+  } field[] = {{"number of samples", core->samples, rtl->samples},
+               {"transmittance", core->transmittance, rtl->transmittance},
+               {"weight", core->weight_sum, rtl->weight_sum},
+               {"red", core->colour[0], rtl->colour[0]},
+               {"green", core->colour[1], rtl->colour[1]},
+               {"blue", core->colour[2], rtl->colour[2]},
+               {"depth", core->depth, rtl->depth}};
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++)
+    if (field[i].core != field[i].rtl)
+      return sf_fail(SF_E_DIFFERENCE, "%s is %llu in the core, %llu in the accelerator, cycle %llu", field[i].name,
+                     (unsigned long long)field[i].core, (unsigned long long)field[i].rtl, (unsigned long long)cycle);
+  return sf_ok();
+}

@@ -21,4 +21,5 @@ bool sf_compare_sample(const fx_net *net, const fx_trace *core, const fx_out *co
 bool sf_compare_counts(const fx_counts *core, const fx_counts *dut, uint64_t cycle, sf_difference *difference);
 /* The same of whole rays, as a status. A decoder, whose rays have no directions, counts no rays. */
 sf_status sf_compare_ray_counts(const fx_net *net, const fx_counts *core, const fx_counts *rtl);
+sf_status sf_compare_pixel(const fx_pixel *core, const fx_pixel *rtl, uint64_t cycle);
 #endif

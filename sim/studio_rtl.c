@@ -11,25 +11,6 @@ typedef struct rtl_eval {
   sf_ray_sample sample[SAMPLES_MAX];
 } rtl_eval;
 
-static sf_status same_pixel(const fx_pixel *core, const fx_pixel *rtl, uint64_t cycle)
-{
-  const struct {
-    const char *name;
-    uint64_t core, rtl;
-  } field[] = {{"number of samples", core->samples, rtl->samples},
-               {"transmittance", core->transmittance, rtl->transmittance},
-               {"weight", core->weight_sum, rtl->weight_sum},
-               {"red", core->colour[0], rtl->colour[0]},
-               {"green", core->colour[1], rtl->colour[1]},
-               {"blue", core->colour[2], rtl->colour[2]},
-               {"depth", core->depth, rtl->depth}};
-  for (size_t i = 0; i < sizeof field / sizeof *field; i++)
-    if (field[i].core != field[i].rtl)
-      return sf_fail(SF_E_DIFFERENCE, "%s is %llu in the core, %llu in the accelerator, cycle %llu", field[i].name,
-                     (unsigned long long)field[i].core, (unsigned long long)field[i].rtl, (unsigned long long)cycle);
-  return sf_ok();
-}
-
 /* The core says how many samples the ray takes; the accelerator gets them and has to end it there too. */
 static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, fx_pixel *pixel, fx_counts *rtl)
 {
@@ -42,7 +23,7 @@ static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, 
   sf_ray_samples(scene, ray, e->sample, request.n);
   SF_TRY(sf_dut_clear_counts(dut));
   SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
-  SF_TRY(same_pixel(&core, pixel, sf_dut_cycle(dut)));
+  SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(dut)));
   SF_TRY(sf_dut_counts(dut, rtl, &cycles, &busy, &stalls));
   return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
 }
@@ -56,7 +37,7 @@ static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, rtl_eval 
   SF_TRY(fx_render_ray(scene, ray, sf_probe_net, &e->core, &core, &e->core.core));
   SF_TRY(sf_dut_clear_counts(e->dut));
   SF_TRY(fx_render_ray(scene, ray, sf_dut_net, e->dut, pixel, NULL));
-  SF_TRY(same_pixel(&core, pixel, sf_dut_cycle(e->dut)));
+  SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(e->dut)));
   SF_TRY(sf_dut_counts(e->dut, rtl, &cycles, &busy, &stalls));
   return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
 }

@@ -2,15 +2,18 @@
 #include "ck_run.h"
 #include "sim/compare.h"
 #include "sim/three_counts.h"
+#include "spikefield/quant.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
 
 enum { RAYS = 8 };
 
+/* user: the scene. The hardware makes the inputs of the direction. */
 static sf_status ray(void *user, uint64_t index, fx_ray *to)
 {
-  (void)user;
+  const fx_scene *scene = user;
   audit_ray(index, to);
+  if (scene->backbone == FX_INGP) fx_sh(to->unit, sf_fx_dir_frac(scene), to->dir);
   return sf_ok();
 }
 
@@ -20,7 +23,7 @@ static void name(void *user, uint64_t index, char *text, size_t size)
   snprintf(text, size, "ray %llu", (unsigned long long)index);
 }
 
-static sf_three_counts *run(const fx_scene *scene, int stall)
+static sf_three_counts *run(fx_scene *scene, int stall)
 {
   static const uint64_t index[RAYS] = {0, 1, 2, 3, 4, 5, 6, 7};
   sf_three_counts *counts = calloc(1, sizeof *counts);
@@ -29,6 +32,7 @@ static sf_three_counts *run(const fx_scene *scene, int stall)
                             .rays = RAYS,
                             .ray = ray,
                             .name = name,
+                            .user = scene,
                             .dut = {.seed = 3, .stall_percent = stall}};
   counts->wanted = RAYS;
   const sf_status status = sf_three_counts_run(&job, counts);
@@ -81,7 +85,7 @@ static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
 {
   fx_scene *scene = user;
   scene->net.sigmoid_in.bias = 1 << 15;
-  return ray(NULL, index, to);
+  return ray(scene, index, to);
 }
 
 START_TEST(the_first_ray_differs)
@@ -103,6 +107,41 @@ START_TEST(the_first_ray_differs)
   ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
   ck_assert_ptr_nonnull(strstr(counts->agreement.message, "ray 0: sample 0: red: core "));
   ck_assert_int_eq(counts->rays, 1);
+  free(counts);
+  fx_scene_free(&scene);
+}
+END_TEST
+
+/* The core's rays change behind the back of the accelerator that has encoder and compositor; the nets agree. */
+static sf_status ray_on_another_background(void *user, uint64_t index, fx_ray *to)
+{
+  fx_scene *scene = user;
+  scene->background[1] = 4321;
+  return ray(scene, index, to);
+}
+
+START_TEST(a_pixel_differs)
+{
+  static const struct {
+    sf_status (*ray)(void *user, uint64_t index, fx_ray *to);
+    const char *message;
+  } changed[] = {{ray_on_another_background, "ray 0: green is "}};
+  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  scene.step_q24 = 1 << 19;
+  static const uint64_t index[] = {0, 1};
+  const sf_three_job job = {.scene = &scene,
+                            .index = index,
+                            .rays = 2,
+                            .ray = changed[_i].ray,
+                            .name = name,
+                            .user = &scene,
+                            .dut = {.seed = 3}};
+  sf_three_counts *counts = calloc(1, sizeof *counts);
+  counts->wanted = 2;
+  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
+  ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
+  ck_assert_msg(strstr(counts->agreement.message, changed[_i].message), "%s", counts->agreement.message);
   free(counts);
   fx_scene_free(&scene);
 }
@@ -131,6 +170,7 @@ int main(void)
   tcase_add_test(all, hash_grid);
   tcase_add_test(all, decoder);
   tcase_add_test(all, the_first_ray_differs);
+  tcase_add_loop_test(all, a_pixel_differs, 0, 1);
   tcase_add_test(all, samples_and_rays_are_compared);
   suite_add_tcase(suite, all);
   return ck_run(suite);
