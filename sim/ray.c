@@ -70,6 +70,14 @@ void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sam
   }
 }
 
+sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample)
+{
+  const bool stops =
+      core->transmittance <= (uint32_t)scene->trans_stop || core->samples >= (uint32_t)scene->max_samples;
+  sf_ray_samples(scene, ray, sample, (int)core->samples);
+  return (sf_ray_request){ray, sample, (int)core->samples, stops};
+}
+
 typedef struct run {
   sf_dut *dut;
   const sf_memory *memory;
@@ -85,12 +93,12 @@ static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
 {
   const int16_t *d = request->ray->unit;
   memset(in->ray_data, 0, sizeof in->ray_data);
-  in->ray_user = at == 0, in->ray_last = at >= request->n - 1;
+  in->ray_user = at == 0, in->ray_last = at >= request->n - !request->stops;
   if (request->n == 0) {
     in->ray_data[3] = (uint64_t)1 << 48;
     return;
   }
-  const sf_ray_sample *s = &request->sample[at];
+  const sf_ray_sample *s = &request->sample[at < request->n ? at : 0]; /* beyond the last: dropped, whatever it is */
   in->ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
   in->ray_data[1] = (uint64_t)(uint32_t)s->delta_q24 << 32 | s->pos[2];
   in->ray_data[2] = s->distance_q16;
@@ -101,8 +109,10 @@ static void offer(run *r)
 {
   sf_pins_in *in = &r->dut->in;
   if (in->ray_valid || r->sent == r->n || sf_dut_stalls(r->dut, STREAM_RAYS)) return;
+  const sf_ray_request *request = &r->request[r->sent];
+  if (request->stops && r->at == request->n && r->received <= r->sent) return; /* its pixel comes first */
   in->ray_valid = true;
-  set_beat(in, &r->request[r->sent], r->at);
+  set_beat(in, request, r->at);
 }
 
 static void accept_input(run *r)

@@ -10,11 +10,13 @@ typedef struct sf_ray_sample {
   uint64_t distance_q16; /* below 2^44 */
 } sf_ray_sample;
 
-/* The samples of one ray, n >= 0. The hardware may stop before the last one, by the core's own rule. */
+/* The samples of one ray, n >= 0. The hardware may stop before the last one, by the core's own rule. stops: it has to
+ * stop at the last one, which is not marked as such; once its pixel has come, one more that is ends the ray. */
 typedef struct sf_ray_request {
   const fx_ray *ray;
   const sf_ray_sample *sample;
   int n;
+  bool stops;
 } sf_ray_request;
 
 /* The grid's memory: answers in order, each after a random number of cycles. */
@@ -46,4 +48,6 @@ void sf_ray_dut_close(sf_ray_dut *rays);
 
 /* The first n samples of the ray's march. */
 void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
+/* Those that the core took for its pixel: the counters become the core's. */
+sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
 #endif

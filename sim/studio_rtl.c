@@ -11,7 +11,6 @@ typedef struct rtl_eval {
   sf_ray_sample sample[SAMPLES_MAX];
 } rtl_eval;
 
-/* The core says how many samples the ray takes; the accelerator gets them and has to end it there too. */
 static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, fx_pixel *pixel, fx_counts *rtl)
 {
   sf_dut *dut = e->rays->dut;
@@ -19,8 +18,7 @@ static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, 
   uint64_t cycles, busy, stalls;
   sf_probe_begin(&e->core);
   SF_TRY(fx_render_ray(scene, ray, sf_probe_net, &e->core, &core, &e->core.core));
-  const sf_ray_request request = {ray, e->sample, (int)core.samples};
-  sf_ray_samples(scene, ray, e->sample, request.n);
+  const sf_ray_request request = sf_ray_request_as(scene, ray, &core, e->sample);
   SF_TRY(sf_dut_clear_counts(dut));
   SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
   SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(dut)));

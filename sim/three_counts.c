@@ -97,14 +97,13 @@ static sf_status find_counter_sample(run *r, const fx_ray *ray, sf_status differ
   return status.code == SF_E_DIFFERENCE ? status : difference;
 }
 
-/* The samples that the core took through the accelerator with encoder and compositor: its pixel,
- * what it reads, what it writes. */
+/* The samples that the core took through the accelerator with encoder and compositor: its pixel, what it reads, what
+ * it writes. */
 static sf_status ray_traffic(run *r, const fx_ray *ray, const fx_pixel *core)
 {
-  const sf_ray_request request = {ray, r->sample, (int)core->samples};
+  const sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);
   const uint64_t asked = r->rays->memory.asked;
   fx_pixel pixel;
-  sf_ray_samples(r->job->scene, ray, r->sample, request.n);
   SF_TRY(sf_ray_dut_run(r->rays, &request, 1, &pixel));
   SF_TRY(sf_compare_pixel(core, &pixel, sf_dut_cycle(r->rays->dut)));
   r->sum->rtl_traffic.table_bytes += (r->rays->memory.asked - asked) * sizeof *r->rays->memory.data;

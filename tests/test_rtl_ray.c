@@ -55,7 +55,7 @@ static void expect_core(const fx_scene *scene, int n, bool whole)
     ck_ok(fx_render_ray(scene, ray, NULL, NULL, &shared.expected[i], &shared.counts));
     const int samples = whole ? whole_march(scene, ray) : (int)shared.expected[i].samples;
     sf_ray_samples(scene, ray, shared.sample[i], samples);
-    shared.request[i] = (sf_ray_request){ray, shared.sample[i], samples};
+    shared.request[i] = (sf_ray_request){ray, shared.sample[i], samples, false};
   }
 }
 
@@ -75,6 +75,13 @@ static void run(sf_ray_dut *rays, int n)
 {
   ck_ok(sf_ray_dut_run(rays, shared.request, n, shared.actual));
   same_pixels(n);
+}
+
+/* The accelerator has to end by itself the rays that the core broke off. */
+static void expect_stops(const fx_scene *scene)
+{
+  for (int i = 0; i < RAYS; i++)
+    shared.request[i] = sf_ray_request_as(scene, &shared.ray[i], &shared.expected[i], shared.sample[i]);
 }
 
 static void same_counts(sf_ray_dut *rays)
@@ -98,6 +105,10 @@ START_TEST(random_scenes)
   draw_rays(&scene, seed);
   expect_core(&scene, RAYS, false);
   ck_assert_uint_gt(shared.counts.samples, 0);
+  run(rays, RAYS);
+  same_counts(rays);
+  ck_ok(sf_dut_clear_counts(rays->dut));
+  expect_stops(&scene);
   run(rays, RAYS);
   same_counts(rays);
   expect_core(&scene, RAYS, true);

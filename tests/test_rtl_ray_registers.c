@@ -407,7 +407,7 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
     ck_ok(sf_fx_ray_make(scene, origin, direction, &ray[i]));
     ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
     sf_ray_samples(scene, &ray[i], samples[i], (int)expected.samples);
-    request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples};
+    request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false};
     count += expected.samples;
   }
   ck_assert_uint_gt(count, 0);

@@ -120,12 +120,20 @@ static sf_status ray_on_another_background(void *user, uint64_t index, fx_ray *t
   return ray(scene, index, to);
 }
 
+static sf_status ray_that_stops_early(void *user, uint64_t index, fx_ray *to)
+{
+  fx_scene *scene = user;
+  scene->max_samples = 2;
+  return ray(scene, index, to);
+}
+
 START_TEST(a_pixel_differs)
 {
   static const struct {
     sf_status (*ray)(void *user, uint64_t index, fx_ray *to);
     const char *message;
-  } changed[] = {{ray_on_another_background, "ray 0: green is "}};
+  } changed[] = {{ray_on_another_background, "ray 0: green is "},
+                 {ray_that_stops_early, "ray 0: accelerator: hang at cycle "}};
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 1 << 19;
@@ -170,7 +178,7 @@ int main(void)
   tcase_add_test(all, hash_grid);
   tcase_add_test(all, decoder);
   tcase_add_test(all, the_first_ray_differs);
-  tcase_add_loop_test(all, a_pixel_differs, 0, 1);
+  tcase_add_loop_test(all, a_pixel_differs, 0, 2);
   tcase_add_test(all, samples_and_rays_are_compared);
   suite_add_tcase(suite, all);
   return ck_run(suite);
