@@ -230,6 +230,7 @@ sf_status sf_soc_open(sf_soc **soc_out, sf_dut *dut, const sf_soc_options *optio
   if (!soc) return sf_fail(SF_E_MEMORY, "no memory for the system");
   soc->options = *options;
   soc->dut = dut;
+  dut->bus_fault.what = NULL;
   sf_soc_stream_attach(&soc->stream, dut);
   const sf_status status = build(soc);
   if (status.code == SF_OK)
@@ -273,4 +274,12 @@ sf_status sf_soc_run(sf_soc *soc, uint32_t *exit_status)
 sf_soc_totals sf_soc_total(const sf_soc *soc)
 {
   return soc->total;
+}
+
+sf_status sf_soc_explain(const sf_soc *soc, sf_status failure)
+{
+  const sf_dut *dut = soc->dut;
+  if (failure.code == SF_OK || failure.code == SF_E_STOPPED || !dut->bus_fault.what) return failure;
+  return sf_fail(failure.code, "%s; first bad access: register %03" PRIx32 " %s at cycle %" PRIu64, failure.message,
+                 dut->bus_fault.offset, dut->bus_fault.what, dut->bus_fault.cycle);
 }

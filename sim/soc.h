@@ -33,4 +33,6 @@ uint8_t *sf_soc_memory(sf_soc *soc, uint32_t address, uint64_t size);
  * so. */
 sf_status sf_soc_run(sf_soc *soc, uint32_t *exit_status);
 sf_soc_totals sf_soc_total(const sf_soc *soc);
+/* A failure, with the first register access that the accelerator refused, if there was one. */
+sf_status sf_soc_explain(const sf_soc *soc, sf_status failure);
 #endif

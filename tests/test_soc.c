@@ -69,7 +69,7 @@ static sf_status run_words(const uint32_t *word, int n, bool stopped, uint32_t *
   ck_ok(sf_soc_open(&soc, dut, &options));
   memcpy(sf_soc_memory(soc, SF_SOC_RAM, (uint64_t)n * 4), word, (size_t)n * 4);
   sf_soc_begin_at(soc, SF_SOC_RAM);
-  const sf_status status = sf_soc_run(soc, exit_status);
+  const sf_status status = sf_soc_explain(soc, sf_soc_run(soc, exit_status));
   sf_soc_close(soc);
   sf_dut_close(dut);
   return status;
@@ -92,6 +92,8 @@ START_TEST(bad_programs_end_with_a_reason)
       {{lui(T0, 0x20000000), JUMP_T0}, "fetch"},
       {{lui(T0, SF_SOC_IMAGE), JUMP_T0}, "fetch"},
       {{lui(T0, SF_SOC_ACCELERATOR), store(BYTE, T1, T0, 12)}, "accelerator: access of 1 bytes at offset 0xc"},
+      {{lui(T0, SF_SOC_ACCELERATOR), store(WORD, T1, T0, SF_CSR_RAY_CTRL), store(WORD, T1, T0, SF_CSR_ID), ECALL},
+       "in the block of code at 0x80000000; first bad access: register 400 refused (SLVERR or DECERR) at cycle "},
       {{lui(T0, SF_SOC_STREAM), load(T1, T0, SF_STREAM_RESULT_HIGH)}, "a result was taken that is not there"},
       {{lui(T0, SF_SOC_STREAM), load(T1, T0, 0x40)}, "offset 0x40: read of a register that is not there"},
       {{lui(T0, SF_SOC_STREAM), store(WORD, T1, T0, 0x40)}, "offset 0x40: write to a register that is not there"},
@@ -105,7 +107,7 @@ START_TEST(bad_programs_end_with_a_reason)
                 status.message);
 }
 END_TEST
-enum { BAD_PROGRAMS = 16 };
+enum { BAD_PROGRAMS = 17 };
 
 START_TEST(a_program_ends_with_its_status)
 {

@@ -261,6 +261,7 @@ static sf_status work(job *j)
   SF_TRY(build(j));
   sf_status status = run_firmware(j);
   if (status.code == SF_OK) status = compare(j);
+  status = sf_soc_explain(j->soc, status);
   if (status.code == SF_OK) status = save_png(j);
   if (status.code == SF_E_STOPPED) return status;
   const sf_status printed = j->opt.json ? print_json(j, &status) : status.code == SF_OK ? print_text(j) : sf_ok();
