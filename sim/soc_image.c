@@ -94,9 +94,10 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
                             size_t *size)
 {
   const size_t n = (size_t)width * (size_t)height;
-  if (scene->log2_bound || scene->steps)
-    return sf_fail(SF_E_UNSUPPORTED, "the firmware marches through one box with equal steps; the scene has %d cascades",
-                   scene->log2_bound + 1);
+  static const char marches[] = "the firmware marches through one box with equal steps";
+  if (scene->log2_bound)
+    return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has %d cascades", marches, scene->log2_bound + 1);
+  if (scene->steps) return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has growing steps", marches);
   const plan p = make_plan(scene, n);
   if (p.end + 8 + n * sizeof(fx_pixel) > SF_SOC_IMAGE_SPACE)
     return sf_fail(SF_E_RANGE, "scene and tile of %d x %d pixels take %zu bytes, the system's memory has %u", width,

@@ -374,6 +374,24 @@ START_TEST(checksums_are_zlibs)
 }
 END_TEST
 
+START_TEST(a_scene_that_the_firmware_cannot_march_is_refused)
+{
+  static fx_steps growing;
+  scenario *s = make_scenario(&fixture_ingp);
+  fx_scene scene = s->scene;
+  uint8_t *image = NULL;
+  size_t size;
+  scene.steps = &growing;
+  const sf_status grows = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
+  ck_assert_str_eq(grows.message, "the firmware marches through one box with equal steps; the scene has growing steps");
+  scene.log2_bound = 2;
+  const sf_status cascades = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
+  ck_assert_str_eq(cascades.message, "the firmware marches through one box with equal steps; the scene has 3 cascades");
+  ck_assert_ptr_null(image);
+  free_scenario(s);
+}
+END_TEST
+
 START_TEST(a_tile_that_is_too_large_is_refused)
 {
   scenario *s = make_scenario(&fixture_ingp);
@@ -488,6 +506,7 @@ static Suite *suite(void)
   tcase_add_test(t, a_damaged_image_is_refused);
   tcase_add_test(t, an_image_stays_inside_its_memory);
   tcase_add_test(t, checksums_are_zlibs);
+  tcase_add_test(t, a_scene_that_the_firmware_cannot_march_is_refused);
   tcase_add_test(t, a_tile_that_is_too_large_is_refused);
   tcase_add_test(t, the_comparison_sees_every_change);
   tcase_add_test(t, a_bad_program_file_is_refused);
