@@ -22,11 +22,13 @@ static void check_answer(sf_dut *dut, uint32_t offset, bool asked, uint8_t respo
   const char *what = !asked ? "answered before it was asked" : response ? "refused (SLVERR or DECERR)" : NULL;
   if (!what || dut->bus_fault.what) return;
   dut->bus_fault.what = what;
+  dut->bus_fault.early = !asked;
   dut->bus_fault.offset = offset;
   dut->bus_fault.cycle = dut->cycle;
 }
 
-/* Address and data are theirs no longer than they are on offer. */
+/* Address and data are theirs no longer than they are on offer. An answer that comes too early ends the access, too:
+ * there may be no other. */
 static uint32_t bus_read(void *context, uint32_t offset)
 {
   sf_dut *dut = context;
@@ -41,8 +43,8 @@ static uint32_t bus_read(void *context, uint32_t offset)
       dut->in.arvalid = false;
     }
     if (dut->out.rvalid) check_answer(dut, offset, asked, dut->out.rresp);
-    if (asked && dut->in.rready && dut->out.rvalid) {
-      dut->in.rready = false;
+    if (dut->in.rready && dut->out.rvalid) {
+      dut->in.arvalid = dut->in.rready = false;
       sf_cover_read(dut->cover, offset, dut->out.rdata);
       return dut->out.rdata;
     }
@@ -68,8 +70,8 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
     if (dut->in.awvalid && dut->out.awready) addressed = true, dut->in.awvalid = false;
     if (dut->in.wvalid && dut->out.wready) given = true, dut->in.wvalid = false;
     if (dut->out.bvalid) check_answer(dut, offset, addressed && given, dut->out.bresp);
-    if (addressed && given && dut->in.bready && dut->out.bvalid) {
-      dut->in.bready = false;
+    if (dut->in.bready && dut->out.bvalid) {
+      dut->in.awvalid = dut->in.wvalid = dut->in.bready = false;
       if (offset == SF_CSR_CTRL && value & SF_CSR_CTRL_SOFT_RESET) dut->phase = SF_PHASE_IDLE;
       dut->bus_response = dut->out.bresp;
       return;

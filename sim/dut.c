@@ -23,12 +23,12 @@ const sf_bus *sf_dut_driver_bus(sf_dut *dut)
 sf_status sf_dut_driver_status(sf_dut *dut, sf_driver_code code, const char *what, const sf_error_source *error)
 {
   if (dut->out.finished) return sf_fail(SF_E_DIFFERENCE, "accelerator: %s: the simulation ended by itself", what);
+  if (dut->bus_fault.what && (dut->bus_fault.early || dut->bus_hung || code != SF_DRIVER_REFUSED))
+    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: access to register %03" PRIx32 " %s at cycle %" PRIu64, what,
+                   dut->bus_fault.offset, dut->bus_fault.what, dut->bus_fault.cycle);
   if (dut->bus_hung)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: register access not answered at cycle %" PRIu64, what,
                    dut->cycle);
-  if (dut->bus_fault.what && code != SF_DRIVER_REFUSED)
-    return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: access to register %03" PRIx32 " %s at cycle %" PRIu64, what,
-                   dut->bus_fault.offset, dut->bus_fault.what, dut->bus_fault.cycle);
   if (code == SF_DRIVER_OK) return sf_ok();
   if (code != SF_DRIVER_REFUSED)
     return sf_fail(SF_E_UNSUPPORTED, "accelerator: %s: %s at cycle %" PRIu64, what, sf_driver_text(code), dut->cycle);

@@ -16,6 +16,7 @@ struct sf_dut {
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   struct {
     const char *what; /* NULL: none */
+    bool early;       /* the block does not follow AXI: what the driver read is of no use */
     uint32_t offset;
     uint64_t cycle;
   } bus_fault; /* the first one since the driver was called */
