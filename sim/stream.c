@@ -187,7 +187,11 @@ sf_status sf_dut_quiet(sf_dut *dut)
   dut->in.m_ready = true;
   for (int i = 0; i < QUIET && !what; i++) {
     sf_dut_tick(dut);
-    what = out->m_valid ? "result" : out->tap_valid ? "tap beat" : out->irq ? "interrupt" : NULL;
+    what = out->finished    ? "end of the simulation"
+           : out->m_valid   ? "result"
+           : out->tap_valid ? "tap beat"
+           : out->irq       ? "interrupt"
+                            : NULL;
   }
   dut->in.m_ready = false;
   if (!what) return sf_ok();
