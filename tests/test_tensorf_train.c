@@ -241,6 +241,27 @@ START_TEST(resume_is_the_same_run)
 }
 END_TEST
 
+/* Biases far below the threshold: neither scaled nor new weights would fire again. */
+START_TEST(a_layer_that_its_biases_silence_comes_back)
+{
+  make_scene(4);
+  sf_dataset data = load("train");
+  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
+  sf_trainer *t = start(&data, &o, NULL);
+  steps(t, 70);
+  for (size_t i = 0; i < t->model.param[SF_V_B1].size; i++) sf_model_param(&t->model, SF_V_B1)[i] = -20;
+  sf_train_stats s = {0};
+  for (int i = 0; i < 200 && !s.event[1]; i++) ck_good(sf_trainer_step(t, &s));
+  ck_assert_int_eq(s.event[1], -1);
+  s = steps(t, 10);
+  ck_assert_double_gt(s.firing[1], 0.01);
+  sf_trainer_free(t);
+  sf_dataset_free(&data);
+  remove_folder();
+}
+END_TEST
+
 /* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
 START_TEST(it_learns)
 {
@@ -349,6 +370,7 @@ int main(void)
   tcase_add_test(tc, schedule_scales_with_the_run);
   tcase_add_test(tc, threads_do_not_matter);
   tcase_add_test(tc, resume_is_the_same_run);
+  tcase_add_test(tc, a_layer_that_its_biases_silence_comes_back);
   tcase_add_test(tc, it_learns);
   tcase_add_test(tc, the_box_is_that_of_the_layout);
   tcase_add_test(tc, rays_that_all_miss_the_box_are_refused);

@@ -36,8 +36,10 @@ typedef struct worker {
 static void flush(worker *w)
 {
   if (!w->fill) return;
-  for (int l = w->fill; l < SF_BLOCK; l++)
+  for (int l = w->fill; l < SF_BLOCK; l++) { /* spikes of every lane choose between events and dense products */
     for (int a = 0; a < 3; a++) w->x[a * SF_BLOCK + l] = w->x[a * SF_BLOCK];
+    for (int i = 0; i < SF_DIR_FEATURES; i++) w->block->sh[i * SF_BLOCK + l] = w->block->sh[i * SF_BLOCK];
+  }
   const float *table = sf_model_param(w->model, SF_P_GRID);
   for (int level = 0; level < w->model->config.levels; level++)
     w->kernels->grid_forward(&w->model->level[level], table, w->x, w->block->f + 2 * level * SF_BLOCK);

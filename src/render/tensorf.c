@@ -23,10 +23,22 @@ typedef struct worker {
   float *owner[SF_BLOCK]; /* the ray's colour */
 } worker;
 
+/* Lanes that hold no sample become the first: spikes of every lane choose between events and dense products. */
+static void pad(worker *w)
+{
+  const int products = w->decoder->view.products, inputs = sf_tensorf_inputs(&w->model->config.tensorf);
+  float *product = w->block->product, *in = w->block->in;
+  for (int l = w->fill; l < SF_BLOCK; l++) {
+    memcpy(product + (size_t)l * (size_t)products, product, (size_t)products * sizeof *product);
+    for (int i = 0; i < inputs; i++) in[i * SF_BLOCK + l] = in[i * SF_BLOCK];
+  }
+}
+
 static void flush(worker *w)
 {
   if (!w->fill) return;
   w->kernels->vm_products(&w->appearance, w->x, w->fill, w->block->product, w->decoder->view.products);
+  pad(w);
   w->kernels->decoder_forward(w->decoder, w->block, w->steps, 0, w->scratch);
   const float *colour = w->block->net.colour[w->steps - 1];
   for (int l = 0; l < w->fill; l++)

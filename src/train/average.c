@@ -26,6 +26,7 @@ sf_status sf_average_update(sf_trainer *t, double progress_before)
     SF_TRY(sf_average_reserve(t));
     const float share = 1.0f / (float)++t->averaged, *value = t->model.value;
     float *average = t->average;
+    if (t->averaged == 1) memset(average, 0, t->model.size * sizeof(float));
 #pragma omp parallel for simd schedule(static)
     for (size_t i = 0; i < t->model.size; i++) average[i] += share * (value[i] - average[i]);
   }

@@ -125,13 +125,13 @@ int sf_batch_most(const sf_trainer *t)
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
+  const int most = sf_batch_most(t), few = most < 512 ? most : 512, many = most < 768 ? 2 * most - 1 : 1536;
   double ratio = t->options.samples / fmax(b->samples, 1);
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
   if (t->progress < sf_lattice_settles && !sf_tuning(t)) {
-    if (t->rays < 512 && t->stride < 8) t->stride *= 2, t->rays *= 2;
-    if (t->rays > 1536 && t->stride > 1) t->stride /= 2, t->rays /= 2;
+    if (t->rays < few && t->stride < 8) t->stride *= 2, t->rays *= 2;
+    if (t->rays > many && t->stride > 1) t->stride /= 2, t->rays /= 2;
   }
-  const int most = sf_batch_most(t);
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > most ? most : t->rays;
 }
 

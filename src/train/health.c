@@ -55,7 +55,16 @@ static void forget(sf_trainer *t, size_t first, size_t count)
   memset(t->moment2 + first, 0, count * sizeof(float));
 }
 
-/* What the layer learned is kept if its scale was all that was wrong. */
+/* A bias beyond the threshold would decide alone, whatever the scale of the weights. */
+static void clear_bias(sf_trainer *t, int weights)
+{
+  if (t->model.config.backbone != SF_TENSORF) return;
+  const sf_param *b = &t->model.param[weights + 1];
+  memset(t->model.value + b->offset, 0, b->size * sizeof(float));
+  forget(t, b->offset, b->size);
+}
+
+/* What the layer learned is kept if its scale was all that was wrong. Snapshots of before are of another model. */
 static void revive(sf_trainer *t, int l, const sf_probes *probes)
 {
   const int layer = spiking[l];
@@ -63,6 +72,8 @@ static void revive(sf_trainer *t, int l, const sf_probes *probes)
   const size_t leak = (size_t)(sf_model_leak(&t->model) - t->model.value) + layer;
   census now[3];
   t->model.value[leak] = 0;
+  t->averaged = 0;
+  clear_bias(t, t->backbone->weights[layer]);
   sf_layer_scale(t, layer, probes);
   count(t, probes, now);
   if (!(now[l].firing > 100 * dead && now[l].firing < saturated)) {

@@ -9,6 +9,7 @@
 
 enum { EPOCH_RAYS_PER_VIEW = 4096 };
 
+static const double longest = 10;      /* that an iteration counts in a time budget: so many times their mean */
 static const double search = 0.5;      /* share of stage II in which t* moves; the rest trains t_r steps alone */
 static const double budget_rate = 1e5; /* of t*, over that share */
 
@@ -182,6 +183,13 @@ static bool scaled(const sf_trainer *t)
 static bool settled(const sf_trainer *t)
 {
   return sf_tuning(t) || (t->stage == 2 && t->stage_progress >= search - 1e-9);
+}
+
+/* What is trained now is what the run leaves. */
+static bool final_part(const sf_trainer *t)
+{
+  const bool stage2 = t->options.minutes > 0 ? stage1_weight(t) < 1 : t->options.stage2 > 0;
+  return settled(t) || (t->stage == 1 ? !stage2 : t->options.fixed_steps > 0);
 }
 
 static sf_loss_plan make_plan(const sf_trainer *t)
@@ -365,13 +373,15 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   update_budget(t, &plan, &mean, ratio);
   int event[3];
   SF_TRY(sf_health_check(t, event));
-  t->last_step = sf_seconds() - start;
+  /* A process that was stopped meanwhile has not trained: a pause is no share of a time budget. */
+  t->last_step = fmin(sf_seconds() - start, t->iteration < 16 ? INFINITY : longest * t->seconds / (double)t->iteration);
   t->seconds += t->last_step;
   t->samples += t->batch.samples;
   const double before = t->progress;
+  const bool last = final_part(t);
   advance(t, stage_share(t));
   if (before < sf_lattice_settles && t->progress >= sf_lattice_settles && !sf_tuning(t)) sf_batch_settle(t);
-  SF_TRY(sf_average_update(t, before));
+  if (last) SF_TRY(sf_average_update(t, before));
   if (t->stage == 3 && sf_tuning(t)) sf_scales_round(&t->model, t->model.value);
   report(t, &plan, &mean, loss, mse, stats);
   memcpy(stats->event, event, sizeof event);
