@@ -115,7 +115,12 @@ echo "failure: reported, repeated alone"
 
 # Other frames: audited again, not trained again.
 times part | grep train.json >"$work/before"
+energy() { sed -nE 's/.*"energy_spiking_fj":[[:space:]]*([0-9.e+]+).*/\1/p' "$(runs part)/beta-5e-7/prefix-$1-0.json" | head -n 1; }
+three=$(energy 3)
+[ "$three" != "$(energy 2)" ] || fail "two and three steps cost the same"
+echo stopped >"$(runs part)/beta-5e-7/prefix-3.part"
 reproduce part 0 --audit-views 2
+[ "$(energy 3)" = "$three" ] || fail "an export of other steps was audited"
 [ "$(count 'finished before')" -eq 0 ] || fail "new frames were not audited"
 times part | grep train.json | cmp - "$work/before" || fail "trained again for other frames"
 [ -s "$(runs part)/fixed-t/audit-1.json" ] || fail "the second frame was not audited"
@@ -142,4 +147,14 @@ for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch
 done
 "$script" "$work/part" --scenes "$work/nowhere" >"$work/out" 2>&1 && fail "scenes from nowhere"
 [ "$(count nowhere)" -eq 1 ] || fail "the missing folder is not named"
+mkdir -p "$work"/scenes/{a,b/a,.c}
+touch "$work"/scenes/{a,b/a,.c}/transforms_train.json
+only() { "$script" "$work/part" --scenes "$work/scenes" --only "$1" >"$work/out" 2>&1; }
+only 'a/' && fail "an empty scene was trained"
+[ -d "$work/part/reproduce/quick/a/ann" ] || fail "a/: not in a folder of its name"
+for bad in "a b/a//" ".c" "a/."; do
+  only "$bad"
+  got="$? $(wc -l <"$work/out")"
+  [ "$got" = "1 1" ] || fail "--only '$bad': exit status and lines are $got"
+done
 echo "parameters: ok"

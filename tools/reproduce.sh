@@ -157,6 +157,7 @@ else
     if [ -n "$only" ]; then
       paths=()
       for name in $only; do
+        while [[ $name == */ ]]; do name=${name%/}; done
         is_scene "$scenes/$name" || die "$scenes/$name: no scene there" 1
         paths+=("$scenes/$name")
       done
@@ -164,17 +165,25 @@ else
   fi
   [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene $([ "$profile" = scenes ] || echo "with transforms_train.json and transforms_test.json ")there" 1
 fi
+declare -A path_of=() # a scene's results are in a folder of its name
+for data in "${paths[@]}"; do
+  name=${data##*/}
+  [[ $name == [!.]* ]] || die "$data: the folder of a scene needs a name that begins without a dot" 1
+  [ -z "${path_of[$name]:-}" ] || die "${path_of[$name]} and $data: two scenes named $name" 1
+  path_of[$name]=$data
+done
 
 child="" stop=""
 trap on_signal INT TERM HUP
 
 # ---- all runs of a scene ----
 
-# What sf_data understands of the scene: its layout, its number of held-out views.
+# What sf_data understands of the scene: its layout, NDC or not, its number of held-out views.
 look_at_data() {
   local json
   json=$("$bin/sf_data" "$data" --json 2>/dev/null)
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
+  ndc=$(sed -nE 's/^[[:space:]]*"ndc":[[:space:]]*(true|false).*/\1/p' <<<"$json" | head -n 1)
   frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')
 }
 

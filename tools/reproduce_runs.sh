@@ -176,6 +176,7 @@ evaluate_snn() {
       --evidence "$dir/cosim-difference" --json --quiet || return
   fi
   [ "$profile" != scenes ] && [ "$name" = beta-5e-7 ] || return 0 # prefixes: for the plots
+  rm -f "$dir"/prefix-*.part "$dir/prefix.snn" # of a run that was stopped: the scene may be of other steps
   for ((t = 1; t <= set[steps]; t++)); do
     for view in $views; do
       [ -s "$dir/prefix-$t-$view.json" ] && continue
