@@ -10,7 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf but for LLFF 2e-6)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf but for NDC 2e-6)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -198,7 +198,10 @@ choose_views() {
 
 # The options that all runs of a scene share.
 prepare_scene() {
-  data_id=$(cd "$data" && pwd -P && cat transforms*.json poses_bounds.npy {,colmap/}sparse/{,0/}{cameras,images}.{bin,txt} 2>/dev/null | cksum)
+  data_id=$(cd "$data" && pwd -P && {
+    cat transforms*.json poses_bounds.npy {,colmap/}sparse/{,0/}{cameras,images,points3D}.{bin,txt} 2>/dev/null
+    find -L . -type f -regextype egrep -iregex '.*\.(png|jpe?g)' -printf '%p %s %T@\n' | sort
+  } | cksum)
   choose_views
   if [ "$profile" = scenes ]; then
     common="--minutes ${set[minutes]}"
@@ -248,7 +251,7 @@ one_backbone() {
   prepare_scene
   common="$common --backbone $1"
   local default=5e-7
-  [ "$1" = ingp ] || [ "${layouts[i]}" = llff ] || default=2e-6
+  [ "$1" = ingp ] || [ "${ndcs[i]}" = true ] || default=2e-6
   for beta in ${betas:-$default}; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }
@@ -256,10 +259,10 @@ one_backbone() {
 started=$SECONDS done_seconds=0 done_runs=0 index=0 failures=0 ticker_pid=""
 total=$((14 * ${#paths[@]}))
 version=$("$bin/sf_train" --version)
-layouts=() frames_of=()
+layouts=() ndcs=() frames_of=()
 for data in "${paths[@]}"; do
   look_at_data
-  layouts+=("$layout") frames_of+=("$frames")
+  layouts+=("$layout") ndcs+=("$ndc") frames_of+=("$frames")
 done
 if [ "$profile" = scenes ]; then
   total=0
