@@ -38,6 +38,12 @@ LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 # Other widths, in a build folder of their own that remembers them: make B=build/ac4 ARCH="AC_FRAC=4 LEAK_FRAC=8"
 ifneq ($(origin ARCH),command line)
 ARCH := $(shell cat $B/arch 2>/dev/null)
+else ifeq ($(filter clean,$(MAKECMDGOALS)),)
+# What is built there depends on the other arch.def: dependency files say so.
+ifneq ($(if $(strip $(ARCH)),$(if $(wildcard $B/arch),,$(wildcard $B/obj)),$(wildcard $B/arch)),)
+$(error $B is built with $(if $(strip $(ARCH)),the widths of include/spikefield/arch.def,ARCH="$(shell cat $B/arch)"): \
+  other widths, ARCH="$(ARCH)", need a folder of their own (B=folder))
+endif
 endif
 ARCH_DEF := include/spikefield/arch.def
 ifneq ($(strip $(ARCH)),)

@@ -15,10 +15,11 @@ fail() {
   exit 1
 }
 build() { mkdir -p "$work/$1/bin" && ln -s "$programs"/* "$work/$1/bin/"; }
-# point LINE: a stand-in in build `part` that runs LINE and goes on as sf_point.
+# point LINE: a stand-in in build `part`, always the same program, runs LINE and goes on as sf_point.
 point() {
+  echo "$1" >"$work/line"
   rm "$work/part/bin/sf_point"
-  printf '%s\n' '#!/bin/bash' "$1" "exec '$programs/sf_point' \"\$@\"" >"$work/part/bin/sf_point"
+  printf '%s\n' '#!/bin/bash' ". '$work/line'" "exec '$programs/sf_point' \"\$@\"" >"$work/part/bin/sf_point"
   chmod +x "$work/part/bin/sf_point"
 }
 pareto() { # NAME STATUS OPTIONS...: output in $work/out
@@ -34,6 +35,7 @@ number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" | head -n
 facts() { (cd "$(points "$1")" && grep -v '"samples_per_second"' ./*.json); }
 
 build whole
+echo "H_SHIFT=3" >"$work/whole/arch" # as it is without
 pareto whole 0
 [ "$(count '^\[.* dB, elapsed')" -eq 11 ] || fail "not 11 points"
 sweep=$work/whole/pareto/smoke
@@ -42,6 +44,7 @@ grep -q '^## Pareto front' "$sweep/table.md" || fail "no front in table.md"
 grep -q 'not available' "$sweep/points.csv" || fail "the missing RTL cost is not named"
 [ "$(number "$(points whole)/tiny-AC_FRAC=4.json" ac_frac)" = 4 ] || fail "the variant has no 4 fraction bits"
 [ "$(number "$(points whole)/tiny.json" ac_frac)" = 8 ] || fail "the centre has no 8 fraction bits"
+[ "$(cat "$work/whole/pareto/variant/H_SHIFT-3-AC_FRAC-4/arch")" = "H_SHIFT=3 AC_FRAC=4" ] || fail "the variant has lost the build's widths"
 if command -v gnuplot >/dev/null; then
   for plot in widths front-energy front-bytes front-traffic; do
     grep -q '</svg>' "$sweep/plots/$plot.svg" || fail "$plot.svg is not whole"
@@ -102,6 +105,9 @@ pareto part 0 --variants none
 [ "$(count 'finished before')" -eq 8 ] || fail "the failed point was not repeated alone"
 pareto part 0 --variants none --every 3
 [ "$(count 'finished before')" -eq 0 ] || fail "points of other pixels were kept"
+echo "#" >>"$work/part/bin/sf_point"
+pareto part 0 --variants none --every 3
+[ "$(count 'finished before')" -eq 0 ] || fail "points of another program were kept"
 pareto part 0 --report
 [ "$(count '^## ')" -ge 5 ] || fail "--report prints no tables"
 echo '{"name": "x"' >"$(points part)/tiny-steps=1.json"
@@ -118,4 +124,19 @@ for bad in "--profile fast" "--every x" "--every 0" "--variants some" "--nosuch 
 done
 pareto part 1 --model "$work/nowhere" --data "$work"
 [ "$(count nowhere)" -eq 1 ] || fail "the missing model is not named"
+mkdir "$work/a" "$work/b"
+cp "$data/tiny.safetensors" "$work/a/t.safetensors"
+cp "$data/tiny.safetensors" "$work/b/t.safetensors"
+pareto part 1 --variants none --model "$data/tiny.safetensors $work/a/t.safetensors $work/b/t.safetensors" --data "$data"
+[ "$(count 'two points would be named t-steps=')" -eq 1 ] || fail "two models of one name"
+
+# Makefile: a folder keeps its widths.
+refused() { # ARCH
+  make -s -C "$(dirname "$script")/.." B="$work/built" ARCH="$1" help >"$work/out" 2>&1 && fail "ARCH='$1' in a folder of other widths"
+  [ "$(count 'need a folder of their own')" -eq 1 ] || fail "ARCH='$1': not refused"
+}
+mkdir -p "$work/built/obj"
+refused AC_FRAC=4
+echo AC_FRAC=4 >"$work/built/arch"
+refused ""
 echo "parameters: ok"

@@ -66,6 +66,7 @@ done
 out=$build/pareto/$profile
 # shellcheck disable=SC2034 # read by reproduce_runs.sh; dir is where the log goes
 dir=$out child="" stop=""
+arch=$(cat "$build/arch" 2>/dev/null) # widths that the build has already
 # shellcheck source=tools/reproduce_runs.sh
 . "$tools/reproduce_runs.sh"
 
@@ -123,11 +124,12 @@ name_of() { # FILE VARIANT OPTIONS...: the file name of a point
 
 # The program of a variant, built when it is missing; its log is BUILD/pareto/variant/NAME.log.
 variant_program() {
-  local folder
+  local folder widths="${arch:+$arch }$1"
   [ -n "$1" ] || { program=$bin/sf_point; return 0; }
-  folder=$(cd "$build" && pwd)/pareto/variant/${1//=/-}
+  folder=${widths//=/-}
+  folder=$(cd "$build" && pwd)/pareto/variant/${folder// /-}
   program=$folder/bin/sf_point
-  mkdir -p "${folder%/*}" && run env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -C "$tools/.." B="$folder" ARCH="$1" "$program" \
+  mkdir -p "${folder%/*}" && run env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -C "$tools/.." B="$folder" ARCH="$widths" "$program" \
     >"$folder.log" 2>&1 && return
   last_line "$folder.log" >>"$out/log"
   return 1
@@ -162,7 +164,7 @@ point() { # FILE VARIANT OPTIONS...
 
 settings() (
   echo "models: $(cksum "${models[@]}"); data: $(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)
-view $view, every $every, $("$bin/sf_point" --version)"
+view $view, every $every, $("$bin/sf_point" --version) $(cksum <"$bin/sf_point")${arch:+, $arch}"
 )
 keep "$out/settings" "$(settings)" || rm -f "$out"/points/* "$out/log"
 started=$SECONDS index=0 fresh=0 failures=0 total=1
@@ -209,6 +211,14 @@ if [ "$with_variants" = all ]; then
   done
 fi
 mapfile -t plan < <(printf '%s\n' "${plan[@]}" | awk '!seen[$0]++')
+twice=$(
+  for entry in "${plan[@]}"; do
+    IFS='|' read -r file variant options <<<"$entry"
+    # shellcheck disable=SC2086
+    name_of "$file" "$variant" $options
+  done | sort | uniq -d | head -n 1
+)
+[ -z "$twice" ] || die "--model: two points would be named $twice; give the models other file names" 1
 total=$((1 + ${#plan[@]}))
 for entry in "${plan[@]}"; do
   IFS='|' read -r file variant options <<<"$entry"
