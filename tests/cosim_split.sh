@@ -126,6 +126,9 @@ total=$(sed -nE 's/^([0-9]+) samples over 2 seeds, stalls 20 %, 0 differences.*/
 [ "${total:-0}" -ge 400 ] || fail "campaign: $(cat campaign.out)"
 [ "$(grep -c '<testcase.*/testcase>' b/cosim/campaign.xml)" -eq 2 ] || fail "campaign: JUnit"
 campaign && [ "$(grep -c 'done before' campaign.out)" -eq 2 ] || fail "campaign: finished seeds are run again"
+rm b/cosim/campaign.json && mkdir -p b/cosim/campaign.json.part
+campaign && fail "campaign: success without campaign.json"
+grep -q 'campaign.json cannot be written' campaign.out || fail "campaign: $(cat campaign.out)"
 
 [ $failures -eq 0 ] && echo "1, 2, 3 processes, interrupted, continued and replayed: the same result"
 exit $((failures > 0))

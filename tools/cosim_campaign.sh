@@ -14,6 +14,8 @@ program=$build/bin/sf_cosim
 case $samples in *[!0-9]*) echo "cosim_campaign: SAMPLES '$samples' is not a whole number" >&2; exit 2 ;; esac
 read -ra seed <<<"$seeds"
 [ ${#seed[@]} -gt 0 ] && [ "${samples:-0}" -gt 0 ] || { echo "cosim_campaign: SAMPLES or SEEDS is empty" >&2; exit 2; }
+twice=$(printf '%s\n' "${seed[@]}" | sed -E 's/^0+([0-9])/\1/' | sort | uniq -d | head -n 1)
+[ -z "$twice" ] || { echo "cosim_campaign: SEEDS holds $twice twice" >&2; exit 2; }
 each=$(((10#$samples + ${#seed[@]} - 1) / ${#seed[@]}))
 mkdir -p "$out" || exit 1
 field() { sed -nE "s/^\t\"$2\":\t([^,]*).*/\1/p" "$1"; }
@@ -38,23 +40,36 @@ for s in "${seed[@]}"; do
   touch "$out/seed-$s.done"
 done
 
-total=0 differences=0
-{
-  echo '<?xml version="1.0" encoding="UTF-8"?>'
-  echo '<testsuites>'
-  for s in "${seed[@]}"; do sed 1d "$out/seed-$s.xml"; done
+# write FILE COMMAND: FILE is whole, or the campaign fails.
+write() {
+  if "$2" >"$1.part" && mv -T "$1.part" "$1"; then return; fi
+  rm -f "$1.part"
+  echo "cosim_campaign: $1 cannot be written" >&2
+  exit 1
+}
+junit() {
+  printf '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n' || return
+  for s in "${seed[@]}"; do sed 1d "$out/seed-$s.xml" || return; done
   echo '</testsuites>'
-} >"$out/campaign.xml"
+}
+json() {
+  printf '{"samples": %d, "differences": %d, "stall_percent": %d, "seeds": [\n' $total $differences "$stalls" || return
+  comma=
+  for s in "${seed[@]}"; do
+    printf '%s' "$comma" || return
+    cat "$out/seed-$s.json" || return
+    comma=,
+  done
+  echo ']}'
+}
+total=0 differences=0
 for s in "${seed[@]}"; do
   n=$(field "$out/seed-$s.json" samples) d=$(field "$out/seed-$s.json" differences)
+  [ -n "$n" ] && [ -n "$d" ] || { echo "cosim_campaign: $out/seed-$s.json is not whole" >&2; exit 1; }
   echo "seed $s: $n samples, $d differences, $(field "$out/seed-$s.json" cycles) cycles"
   total=$((total + n)) differences=$((differences + d))
 done
-{
-  printf '{"samples": %d, "differences": %d, "stall_percent": %d, "seeds": [\n' $total $differences "$stalls"
-  comma=
-  for s in "${seed[@]}"; do printf '%s' "$comma"; cat "$out/seed-$s.json"; comma=,; done
-  echo ']}'
-} >"$out/campaign.json"
+write "$out/campaign.xml" junit
+write "$out/campaign.json" json
 echo "$total samples over ${#seed[@]} seeds, stalls $stalls %, $differences differences: $out/campaign.json, $out/campaign.xml"
 [ $failed -eq 0 ]
