@@ -303,6 +303,13 @@ usage --dut-top sf_cosim s.snn d --dut-top my_top
 for length in 63 1942; do usage "at most 63 characters" sf_cosim s.snn d --plusarg "+$(printf "%${length}s" '' | tr ' ' x)"; done
 usage SECONDS sf_summary d x
 usage SECONDS sf_summary d nan
+mkdir -p tiny
+echo '{"psnr": 30, "ssim": null, "T": 8, "t_r": 2}' | tee tiny/{train,float}.json >tiny/fixed.json
+echo '{"samples": 1, "differences": 0}' >tiny/cosim.json
+echo '{"energy_spiking_fj": 1, "energy_ann_fj": 2, "energy_saving_percent": 50}' >tiny/audit.json
+good sf_summary tiny 3
+grep -q 'SSIM -$' stdout.txt || fail "sf_summary" "no '-' for an SSIM that there is not"
+grep -Eq '"ssim_fixed":[[:space:]]*null' tiny/summary.json || fail "sf_summary" "no null in summary.json"
 data "no folder SCENE/RUN" sf_report d
 absent d/table.md "sf_report without a run"
 absent out "usage errors"
@@ -317,6 +324,7 @@ script usage: cosim_campaign
 script usage: cosim_campaign --help
 script "'abc' is not a whole number" cosim_campaign out s.snn d abc 1
 script "'1e6' is not a whole number" cosim_campaign out s.snn d 1e6 1
+script "SEEDS holds 3 twice" cosim_campaign out s.snn d 9 "3 1 03"
 script usage: chain
 script usage: chain --help
 absent out "usage of scripts"

@@ -1,10 +1,12 @@
 /* sf_summary: the reports of one run of the chain in one table and one summary.json. */
 #include "spikefield/cli.h"
 #include "spikefield/io.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* null, the quality of what cannot be compared (SSIM of tiny views, PSNR of equal images), is NaN. */
 static sf_status number(const char *dir, const char *file, const char *key, double *value)
 {
   char path[4096];
@@ -12,8 +14,9 @@ static sf_status number(const char *dir, const char *file, const char *key, doub
   snprintf(path, sizeof path, "%s/%s", dir, file);
   SF_TRY(sf_json_load(path, &json));
   const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
-  const bool found = cJSON_IsNumber(item);
-  if (found) *value = item->valuedouble;
+  const bool none = cJSON_IsNull(item) && (!strcmp(key, "psnr") || !strcmp(key, "ssim"));
+  const bool found = cJSON_IsNumber(item) || none;
+  if (found) *value = none ? NAN : item->valuedouble;
   cJSON_Delete(json);
   return found ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no number '%s'", path, key);
 }
@@ -25,13 +28,24 @@ typedef struct field {
 
 enum { FLOAT, FIXED, SSIM, T, T_R, SAMPLES, DIFFERENCES, SNN, ANN, SAVING, HELD_OUT, SECONDS, FIELDS };
 
+typedef struct figure {
+  char text[32];
+} figure;
+
+static figure quality(int digits, double value)
+{
+  figure f = {"-"};
+  if (!isnan(value)) snprintf(f.text, sizeof f.text, "%.*f", digits, value);
+  return f;
+}
+
 static void explain(const field *f, const char *dir)
 {
   printf("\nFrom photographs to silicon in %.0f s\n", f[SECONDS].value);
-  printf("  learned       t_r = %.0f of T = %.0f time steps; held-out PSNR %.2f dB (float, all test views)\n",
-         f[T_R].value, f[T].value, f[HELD_OUT].value);
-  printf("  golden view   PSNR %.2f dB float, %.2f dB fixed point, SSIM %.4f\n", f[FLOAT].value, f[FIXED].value,
-         f[SSIM].value);
+  printf("  learned       t_r = %.0f of T = %.0f time steps; held-out PSNR %s dB (float, all test views)\n",
+         f[T_R].value, f[T].value, quality(2, f[HELD_OUT].value).text);
+  printf("  golden view   PSNR %s dB float, %s dB fixed point, SSIM %s\n", quality(2, f[FLOAT].value).text,
+         quality(2, f[FIXED].value).text, quality(4, f[SSIM].value).text);
   printf("  RTL           %.0f samples through the Verilog accelerator, %.0f differences from the fixed-point core\n",
          f[SAMPLES].value, f[DIFFERENCES].value);
   printf("  energy        %.4f mJ spiking, %.4f mJ for its ReLU twin: %.1f %% saved (0.9 pJ per SOP, 4.6 pJ per MAC)\n",
