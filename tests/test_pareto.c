@@ -137,6 +137,20 @@ START_TEST(files)
   ck_assert_int_eq(plots, 4);
   ck_assert_int_eq(access(in("plots/front-bytes.gp"), R_OK), 0);
   sf_sweep_free(&sweep);
+  other = centre, other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal to float */
+  save("c", &other);
+  ck_good(sf_sweep_load(&sweep, folder));
+  out = fmemopen(text, sizeof text - 1, "w");
+  sf_sweep_print(out, &sweep);
+  fclose(out);
+  ck_assert_ptr_nonnull(strstr(text, "| centre | 30.00 | equal |"));
+  ck_good(sf_sweep_plots(&sweep, &plots));
+  char *script;
+  size_t size;
+  ck_good(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
+  ck_assert_ptr_null(strstr(script, "nan with lines"));
+  free(script);
+  sf_sweep_free(&sweep);
 }
 END_TEST
 

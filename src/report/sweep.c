@@ -183,8 +183,12 @@ static void print_row(FILE *out, const char *first, const sf_point *point)
 {
   fprintf(out, "| %s |", first);
   for (int c = 0; c < COLUMNS; c++) {
+    const double value = point->figure[columns[c]];
     fputc(' ', out);
-    fprintf(out, sf_point_figures[columns[c]].format, point->figure[columns[c]]);
+    if (isnan(value)) /* a PSNR of equal images, and what is lost against one */
+      fputs(columns[c] == SF_POINT_LOSS ? "-" : "equal", out);
+    else
+      fprintf(out, sf_point_figures[columns[c]].format, value);
     fprintf(out, " |");
   }
   fputc('\n', out);

@@ -25,15 +25,20 @@ static void plot_widths(FILE *out, const sf_sweep *sweep, const char *name)
             shown[axis]++;
     fprintf(out, "EOD\n");
   }
-  fprintf(out, "plot ");
+  const double centre = sweep->centre->figure[SF_POINT_PSNR_FLOAT];
+  bool any = !isnan(centre); /* else equal to float: no line */
+  for (int axis = 0; axis < SF_AXIS_TABLE; axis++) any |= shown[axis] > 1;
+  fputs(any ? "plot " : "set xrange [0:1]\nset yrange [0:1]\nplot ", out);
   for (int axis = 0; axis < SF_AXIS_TABLE; axis++)
     if (shown[axis] > 1)
       fprintf(out,
               "$axis%d using 1:2 smooth unique with linespoints linecolor '%s' linewidth 2 pointtype 7 pointsize 0.7 "
               "title '%s', ",
               axis, sf_plot_colour[lines++ % SF_PLOT_COLOURS], sf_axes[axis].title);
-  fprintf(out, "%.6g with lines linecolor '#999999' dashtype 2 title 'centre'\n",
-          sweep->centre->figure[SF_POINT_PSNR_FLOAT]);
+  if (isnan(centre))
+    fprintf(out, "NaN notitle\n");
+  else
+    fprintf(out, "%.6g with lines linecolor '#999999' dashtype 2 title 'centre'\n", centre);
 }
 
 /* ---- PSNR against one cost ---- */
