@@ -39,7 +39,8 @@ static sf_status report(const sf_reproduction *r, bool quiet)
     printf("wrote %s/table.md, results.json and %d scripts in plots/\n", r->dir, plots);
   }
   if (!r->problems) return sf_ok();
-  return sf_fail(SF_E_FORMAT, "%.300s%s", r->problem[0], r->problems > 1 ? " (and others, see table.md)" : "");
+  return sf_fail(SF_E_FORMAT, "%.200s: %.300s%s", r->dir, r->problem[0],
+                 r->problems > 1 ? " (and others, see table.md)" : "");
 }
 
 int main(int argc, char **argv)

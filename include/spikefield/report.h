@@ -78,8 +78,7 @@ typedef struct sf_report_scene {
 } sf_report_scene;
 
 typedef struct sf_reproduction {
-  char dir[4096];
-  const char *profile; /* last part of dir */
+  char dir[4096], profile[256]; /* its last part */
   int count;
   sf_report_scene *scene; /* sorted by name, owned */
   char **problem;         /* what could not be read or does not agree, one line each, owned */

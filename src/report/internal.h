@@ -3,7 +3,9 @@
 #define SPIKEFIELD_REPORT_INTERNAL_H
 #include "spikefield/report.h"
 
-/* Adds one line to r->problem. */
+/* Profile scenes: twin and spiking runs alone, on scenes of any kind. */
+bool sf_report_is_pairs(const sf_reproduction *r);
+/* Adds one line to r->problem, less the report's folder in paths. */
 sf_status sf_report_problem(sf_reproduction *r, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* *json is NULL where the file is missing (no problem) or malformed (a problem). */
 sf_status sf_report_read_json(sf_reproduction *r, const char *path, cJSON **json);

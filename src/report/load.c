@@ -22,6 +22,9 @@ sf_status sf_report_problem(sf_reproduction *r, const char *format, ...)
   va_start(args, format);
   vsnprintf(text, sizeof text, format, args);
   va_end(args);
+  const size_t n = strlen(r->dir);
+  for (char *at = text; n && (at = strstr(at, r->dir)); at++) /* no path of this machine */
+    if (at[n] == '/' && (at == text || at[-1] == ' ')) memmove(at, at + n + 1, strlen(at + n + 1) + 1);
   char **list = realloc(r->problem, (size_t)(r->problems + 1) * sizeof *list);
   if (!list) return no_memory(r);
   r->problem = list;
@@ -127,14 +130,15 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
   static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6, SF_RUN_BETA_2E6};
-  char dir[4096 + 320], reference[4096 + 320], log[4096 + 384];
+  char dir[4096 + 320], reference[4096 + 320], log[4096 + 384], exported[4096 + 384];
   for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
   for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;
   run->t_star = NAN;
   snprintf(dir, sizeof dir, "%s/%s", scene_dir, sf_run_kinds[id].name);
-  for (int i = 0; i < (int)(sizeof spiking / sizeof *spiking); i++) { /* the first that there is */
+  for (int i = 0; i < (int)(sizeof spiking / sizeof *spiking); i++) { /* as reproduce.sh */
     snprintf(reference, sizeof reference, "%s/%s", scene_dir, sf_run_kinds[spiking[i]].name);
-    if (access(reference, F_OK) == 0) break;
+    snprintf(exported, sizeof exported, "%s/scene.snn", reference);
+    if (access(exported, F_OK) == 0) break;
   }
   snprintf(log, sizeof log, "%s/train.jsonl", dir);
   SF_TRY(read_text(r, dir, "status", &run->status));
@@ -155,6 +159,11 @@ static void free_run(sf_run *run)
 }
 
 /* ---- scenes ---- */
+
+bool sf_report_is_pairs(const sf_reproduction *r)
+{
+  return strcmp(r->profile, "scenes") == 0;
+}
 
 static bool is_scene(const char *dir)
 {
@@ -181,13 +190,71 @@ static sf_status load_scene(sf_reproduction *r, const char *name)
   return sf_ok();
 }
 
+/* ---- one set of parameters ---- */
+
+/* Its own options are last in a run's command; reproduce.sh begins them with one of these. */
+static size_t common_length(const char *command)
+{
+  const char *end = NULL;
+  for (const char *at = command; (at = strchr(at, ' ')); at++)
+    if (!strncmp(at, " --beta ", 8) || !strncmp(at, " --net ", 7)) end = at;
+  return end ? (size_t)(end - command) : strlen(command);
+}
+
+static bool same_training(const sf_run *a, const sf_run *b)
+{
+  const size_t n = common_length(a->train_command);
+  return n == common_length(b->train_command) && !strncmp(a->train_command, b->train_command, n);
+}
+
+/* Other scenes may have other views. */
+static bool same_evaluation(const sf_run *a, const sf_run *b, bool same_scene)
+{
+  const char *x = a->eval_command, *y = b->eval_command;
+  if (!x || !y) return true;
+  const char *p = strstr(x, ", --"), *q = strstr(y, ", --");
+  return same_scene || !p || !q ? !strcmp(x, y) : !strcmp(p, q);
+}
+
+/* Scenes of any kind have rows of their own, each with its minutes. */
+static sf_status compare_parameters(sf_reproduction *r)
+{
+  const sf_run *first = NULL;
+  int scene = 0, id = 0;
+  for (int s = 0; s < r->count; s++) {
+    if (sf_report_is_pairs(r)) first = NULL;
+    for (int i = 0; i < SF_RUNS; i++) {
+      const sf_run *run = &r->scene[s].run[i];
+      if (!run->train_command) continue;
+      if (!first) first = run, scene = s, id = i;
+      const bool trained = same_training(first, run);
+      if (trained && same_evaluation(first, run, s == scene)) continue;
+      return sf_report_problem(r, "runs of different parameters: %s, %s: '%s'; %s, %s: '%s'", r->scene[scene].name,
+                               sf_run_kinds[id].name, trained ? first->eval_command : first->train_command,
+                               r->scene[s].name, sf_run_kinds[i].name,
+                               trained ? run->eval_command : run->train_command);
+    }
+  }
+  return sf_ok();
+}
+
+static const char *last_part(const char *path)
+{
+  const char *slash = strrchr(path, '/');
+  return slash && slash[1] ? slash + 1 : path;
+}
+
 sf_status sf_reproduction_load(sf_reproduction *r, const char *dir)
 {
   *r = (sf_reproduction){0};
   snprintf(r->dir, sizeof r->dir, "%s", dir);
   for (size_t n = strlen(r->dir); n > 1 && r->dir[n - 1] == '/'; n--) r->dir[n - 1] = 0;
-  const char *slash = strrchr(r->dir, '/');
-  r->profile = slash && slash[1] ? slash + 1 : r->dir;
+  snprintf(r->profile, sizeof r->profile, "%s", last_part(r->dir));
+  if (!strcmp(r->profile, ".") || !strcmp(r->profile, "..")) {
+    char *whole = realpath(r->dir, NULL);
+    if (whole) snprintf(r->profile, sizeof r->profile, "%s", last_part(whole));
+    free(whole);
+  }
   struct dirent **entry;
   const int n = scandir(r->dir, &entry, NULL, alphasort);
   if (n < 0) return sf_fail(SF_E_IO, "%s: cannot list the folder", r->dir);
@@ -197,6 +264,7 @@ sf_status sf_reproduction_load(sf_reproduction *r, const char *dir)
     free(entry[i]);
   }
   free(entry);
+  if (!status.code) status = compare_parameters(r);
   if (status.code) sf_reproduction_free(r);
   return status;
 }

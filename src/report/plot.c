@@ -58,7 +58,7 @@ static double ann_psnr(const sf_reproduction *r, int scene)
 
 static void plot_steps(FILE *out, const sf_reproduction *r, int scene, const char *name)
 {
-  char title[512];
+  char title[640];
   const double ann = ann_psnr(r, scene);
   bool shown[BETAS] = {false};
   title_of(r, scene, "PSNR after every time step", title, sizeof title);
@@ -125,7 +125,7 @@ static double psnr_at_t_r(const sf_reproduction *r, int scene, int run)
 
 static void plot_energy(FILE *out, const sf_reproduction *r, int scene, const char *name)
 {
-  char title[512], block[16];
+  char title[640], block[16];
   title_of(r, scene, "PSNR against energy", title, sizeof title);
   sf_plot_head(out, name, title, "energy, mJ per frame (counted by the audit, paper ledger)",
                "PSNR, dB (float, held-out views)", "outside right top");
@@ -167,7 +167,7 @@ static bool has_energy(const sf_reproduction *r, int scene)
 
 static void plot_t_star(FILE *out, const sf_reproduction *r, int scene, const char *name)
 {
-  char title[512];
+  char title[640];
   title_of(r, scene, "t* over the iterations", title, sizeof title);
   sf_plot_head(out, name, title, "iteration", "t*, time steps", "outside right top");
   fprintf(out, "set yrange [0.8:%d.2]\nset ytics 1\nset xrange [0:*]\n", SF_T_MAX);

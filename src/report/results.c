@@ -1,7 +1,9 @@
-/* Everything of a reproduction for machines: no path, date or name of this machine. */
-#include "spikefield/report.h"
+/* Everything of a reproduction for machines: no date or name of this machine, no path but what a failed run says. */
+#include "report/internal.h"
 #include "spikefield/audit.h"
 #include <math.h>
+
+#define PAPER "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields"
 
 static const char *const metric_key[SF_METRICS] = {
     "psnr", "ssim", "steps", "energy_mj", "twin_energy_mj", "psnr_fixed", "psnr_float", "fixed_minus_float", "seconds"};
@@ -122,12 +124,15 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
   cJSON *json = cJSON_CreateObject();
   if (!json) return NULL;
   sf_json_add_text(json, "profile", r->profile);
-  cJSON_AddStringToObject(json, "paper",
-                          "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields: "
-                          "INGP backbone, averages over the eight Synthetic scenes, 800 x 800");
-  cJSON *average = cJSON_AddObjectToObject(json, "average");
-  for (int i = 0; i < SF_PAPER_RUNS; i++) cJSON_AddItemToObject(average, sf_run_kinds[i].name, average_json(r, i));
-  add_orders(json, r);
+  if (sf_report_is_pairs(r)) {
+    cJSON_AddStringToObject(json, "paper", PAPER);
+  } else {
+    cJSON_AddStringToObject(json, "paper",
+                            PAPER ": INGP backbone, averages over the eight Synthetic scenes, 800 x 800");
+    cJSON *average = cJSON_AddObjectToObject(json, "average");
+    for (int i = 0; i < SF_PAPER_RUNS; i++) cJSON_AddItemToObject(average, sf_run_kinds[i].name, average_json(r, i));
+    add_orders(json, r);
+  }
   cJSON *scenes = cJSON_AddObjectToObject(json, "scenes");
   for (int s = 0; s < r->count; s++) {
     cJSON *scene = cJSON_AddObjectToObject(scenes, r->scene[s].name);

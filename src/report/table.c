@@ -1,5 +1,5 @@
 /* The report as Markdown that reads as plain text, too. */
-#include "spikefield/report.h"
+#include "report/internal.h"
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -119,16 +119,10 @@ static const sf_run *first_audited(const sf_reproduction *r)
   return NULL;
 }
 
-/* Twin and reference alone, on scenes of any kind. */
-static bool is_pairs(const sf_reproduction *r)
-{
-  return strcmp(r->profile, "scenes") == 0;
-}
-
 static void print_head(FILE *out, const sf_reproduction *r)
 {
   int runs;
-  const bool pairs = is_pairs(r);
+  const bool pairs = sf_report_is_pairs(r);
   const double hours = training_hours(r, &runs);
   fprintf(out, "# Reproduction of the paper, profile %s\n\n", r->profile);
   fprintf(out, "%d %s:", r->count, r->count == 1 ? "scene" : "scenes");
@@ -369,7 +363,7 @@ static void print_prefixes(FILE *out, const sf_reproduction *r, table *t)
 static void print_unfinished(FILE *out, const sf_reproduction *r)
 {
   bool any = false;
-  const bool pairs = is_pairs(r);
+  const bool pairs = sf_report_is_pairs(r);
   for (int s = 0; s < r->count; s++)
     for (int i = 0; i < SF_RUNS; i++) {
       const char *status = r->scene[s].run[i].status;
@@ -390,7 +384,7 @@ sf_status sf_reproduction_print(FILE *out, const sf_reproduction *r)
   table t = {.rows = 0};
   if (!open_table(&t, r)) return sf_fail(SF_E_MEMORY, "%s: no memory for the tables", r->dir);
   print_head(out, r);
-  if (is_pairs(r)) {
+  if (sf_report_is_pairs(r)) {
     print_pairs(out, r, &t);
   } else {
     print_methods(out, r, &t);
