@@ -200,7 +200,7 @@ choose_views() {
 prepare_scene() {
   data_id=$(cd "$data" && pwd -P && {
     cat transforms*.json poses_bounds.npy {,colmap/}sparse/{,0/}{cameras,images,points3D}.{bin,txt} 2>/dev/null
-    find -L . -type f -regextype egrep -iregex '.*\.(png|jpe?g)' -printf '%p %s %T@\n' | sort
+    find -L . -type f -regextype egrep -iregex '.*\.(png|jpe?g)' -printf '%p %s\n' | sort
   } | cksum)
   choose_views
   if [ "$profile" = scenes ]; then
