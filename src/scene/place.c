@@ -65,19 +65,21 @@ typedef struct extent {
   double middle[2], half[2];
 } extent;
 
-static void view_extent(const sf_lens *lens, const sf_sight *sight, extent *e)
+static extent view_extent(const sf_lens *lens, const sf_sight *sight)
 {
+  extent e;
   double w = lens->width > 0 ? lens->width : sight->width, h = lens->height > 0 ? lens->height : sight->height;
   if (lens->width > 0 && !(lens->height > 0) && sight->width) h *= w / sight->width;
   if (lens->height > 0 && !(lens->width > 0) && sight->height) w *= h / sight->height;
-  double *half = e->half;
+  double *half = e.half;
   half[0] = lens->fl_x > 0 ? 0.5 * w / lens->fl_x : tan(0.5 * lens->angle_x);
   half[1] = lens->fl_y > 0 ? 0.5 * h / lens->fl_y : half[0];
   if (lens->fl_y <= 0 && w > 0 && h > 0) half[1] *= h / w;
   for (int i = 0; i < 2; i++)
     if (!(half[i] > 0)) half[i] = 1; /* a size that nobody states: anything up to 45 degrees may be seen */
-  e->middle[0] = lens->has_cx && w > 0 ? half[0] * (1 - 2 * lens->cx / w) : 0;
-  e->middle[1] = lens->has_cy && h > 0 ? half[1] * (2 * lens->cy / h - 1) : 0;
+  e.middle[0] = lens->has_cx && w > 0 ? half[0] * (1 - 2 * lens->cx / w) : 0;
+  e.middle[1] = lens->has_cy && h > 0 ? half[1] * (2 * lens->cy / h - 1) : 0;
+  return e;
 }
 
 /* Through the picture at x, y, each -1..1, not of unit length. */
@@ -100,7 +102,7 @@ static bool looks_ahead(const sf_frame *frame, const double back[3])
   extent e;
   column(frame, 2, axis);
   if (!(vec_dot(axis, back) > half_turn)) return false;
-  view_extent(&frame->lens, &(sf_sight){0}, &e);
+  e = view_extent(&frame->lens, &(sf_sight){0});
   for (int k = 0; k < 4; k++) {
     picture_ray(frame, &e, k & 1 ? 1 : -1, k & 2 ? 1 : -1, direction);
     if (!(vec_dot(direction, back) < -0.05 * vec_length(direction))) return false;
@@ -138,7 +140,7 @@ static void look_at(const sf_capture *c, const sf_sight *sight, double point[3])
   for (int f = 0; f < n; f++) {
     double axis[3], at[3];
     extent e;
-    view_extent(&c->frame[f].lens, sight, &e);
+    e = view_extent(&c->frame[f].lens, sight);
     picture_ray(&c->frame[f], &e, 0, 0, axis);
     column(&c->frame[f], 3, at);
     for (int i = 0; i < 3; i++) axis[i] /= middle_length(&e);
@@ -188,13 +190,13 @@ static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options 
   vec_cross(back, right, up);
   memcpy(m.turn, right, sizeof right), memcpy(m.turn + 3, up, sizeof up), memcpy(m.turn + 6, back, sizeof back);
   move_all(data, c, &m);
-  view_extent(&c->frame[0].lens, &(sf_sight){0}, &e);
+  e = view_extent(&c->frame[0].lens, &(sf_sight){0});
   data->ndc = true, data->ndc_near = 1;
   for (int i = 0; i < 2; i++) data->ndc_focal[i] = (float)(1 / e.half[i]);
   for (int n = 0; n < 4 * c->count; n++) {
     const sf_frame *frame = &c->frame[n / 4];
     double d[3], at[3];
-    view_extent(&frame->lens, &(sf_sight){0}, &e);
+    e = view_extent(&frame->lens, &(sf_sight){0});
     picture_ray(frame, &e, n & 1 ? 1 : -1, n & 2 ? 1 : -1, d);
     column(frame, 3, at);
     const double t = (1 + at[2]) / -d[2];
@@ -250,7 +252,7 @@ static sf_status place_orbit(sf_dataset *data, sf_capture *c, const sf_dataset_o
     double at[3];
     extent e;
     column(&c->frame[f], 3, at);
-    view_extent(&c->frame[f].lens, sight, &e);
+    e = view_extent(&c->frame[f].lens, sight);
     const double distance = vec_length(at);
     mean += distance / n, farthest = fmax(farthest, distance);
     reach[f] = distance / middle_length(&e) * fmin(e.half[0], e.half[1]);
@@ -297,7 +299,7 @@ static bool sees_box(const sf_dataset *data, const sf_frame *frame, const sf_sig
 {
   double at[3], d[3];
   extent e;
-  view_extent(&frame->lens, sight, &e);
+  e = view_extent(&frame->lens, sight);
   model_position(data, frame, at);
   for (int n = 0; n < 81; n++) {
     picture_ray(frame, &e, n % 9 / 4.0 - 1, n / 9 / 4.0 - 1, d);
