@@ -80,6 +80,25 @@ START_TEST(decoder)
 }
 END_TEST
 
+/* Two rays whose core changes meanwhile, in a way of `changing`. */
+static void check_difference(sf_status (*changing)(void *user, uint64_t index, fx_ray *to), const char *message)
+{
+  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
+  fx_scene scene = fixture_scene(&sizes, 3);
+  scene.step_q24 = 1 << 19;
+  static const uint64_t index[] = {0, 1};
+  const sf_three_job job = {
+      .scene = &scene, .index = index, .rays = 2, .ray = changing, .name = name, .user = &scene, .dut = {.seed = 3}};
+  sf_three_counts *counts = calloc(1, sizeof *counts);
+  counts->wanted = 2;
+  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
+  ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
+  ck_assert_msg(strstr(counts->agreement.message, message), "%s", counts->agreement.message);
+  ck_assert_int_eq(counts->rays, 1);
+  free(counts);
+  fx_scene_free(&scene);
+}
+
 /* The core's net changes behind the accelerator's back: every ray of it differs, already the first. */
 static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
 {
@@ -90,25 +109,7 @@ static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
 
 START_TEST(the_first_ray_differs)
 {
-  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
-  scene.step_q24 = 1 << 19;
-  static const uint64_t index[] = {0, 1};
-  const sf_three_job job = {.scene = &scene,
-                            .index = index,
-                            .rays = 2,
-                            .ray = ray_of_another_net,
-                            .name = name,
-                            .user = &scene,
-                            .dut = {.seed = 3}};
-  sf_three_counts *counts = calloc(1, sizeof *counts);
-  counts->wanted = 2;
-  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
-  ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
-  ck_assert_ptr_nonnull(strstr(counts->agreement.message, "ray 0: sample 0: red: core "));
-  ck_assert_int_eq(counts->rays, 1);
-  free(counts);
-  fx_scene_free(&scene);
+  check_difference(ray_of_another_net, "ray 0: sample 0: red: core ");
 }
 END_TEST
 
@@ -134,24 +135,7 @@ START_TEST(a_pixel_differs)
     const char *message;
   } changed[] = {{ray_on_another_background, "ray 0: green is "},
                  {ray_that_stops_early, "ray 0: accelerator: hang at cycle "}};
-  const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
-  scene.step_q24 = 1 << 19;
-  static const uint64_t index[] = {0, 1};
-  const sf_three_job job = {.scene = &scene,
-                            .index = index,
-                            .rays = 2,
-                            .ray = changed[_i].ray,
-                            .name = name,
-                            .user = &scene,
-                            .dut = {.seed = 3}};
-  sf_three_counts *counts = calloc(1, sizeof *counts);
-  counts->wanted = 2;
-  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
-  ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
-  ck_assert_msg(strstr(counts->agreement.message, changed[_i].message), "%s", counts->agreement.message);
-  free(counts);
-  fx_scene_free(&scene);
+  check_difference(changed[_i].ray, changed[_i].message);
 }
 END_TEST
 
