@@ -19,28 +19,31 @@
 
 #if defined(__x86_64__)
 #include <immintrin.h>
-typedef float lanes __attribute__((vector_size(64)));
+typedef float lanes8 __attribute__((vector_size(32)));
+typedef float lanes16 __attribute__((vector_size(64)));
 
-/* 24 independent chains of 16 lanes: as many as hide the latency of either instruction. */
-#define CHAINS(name, isa, instruction)                                                                                 \
+/* Independent chains, as many as hide the latency of the instructions; code: %0 += %2 . %3, %1 is free. */
+#define CHAINS(name, isa, lanes, chains, code)                                                                         \
   __attribute__((target(isa))) static double name(long rounds)                                                         \
   {                                                                                                                    \
-    lanes acc[24];                                                                                                     \
-    for (int i = 0; i < 24; i++) acc[i] = (lanes){0} + (float)i;                                                       \
+    lanes acc[chains], product;                                                                                        \
+    for (int i = 0; i < chains; i++) acc[i] = (lanes){0} + (float)i;                                                   \
     const lanes x = (lanes){0} + 0.999f, y = (lanes){0} + 0.001f;                                                      \
-    for (long r = 0; r < rounds; r++) _Pragma("GCC unroll 24") for (int i = 0; i < 24; i++)                            \
+    for (long r = 0; r < rounds; r++) _Pragma("GCC unroll 24") for (int i = 0; i < chains; i++)                        \
       {                                                                                                                \
         lanes z = acc[i];                                                                                              \
-        __asm__ volatile(instruction " %2, %1, %0" : "+v"(z) : "v"(x), "v"(y));                                        \
+        __asm__ volatile(code : "+v"(z), "=&v"(product) : "v"(x), "v"(y));                                             \
         acc[i] = z;                                                                                                    \
       }                                                                                                                \
     double sum = 0;                                                                                                    \
-    for (int i = 0; i < 24; i++) sum += acc[i][0];                                                                     \
+    for (int i = 0; i < chains; i++) sum += acc[i][0];                                                                 \
     return sum;                                                                                                        \
   }
-CHAINS(fma_chain_avx512, "avx512f,fma", "vfmadd213ps")
-CHAINS(dot_chain_avx512vnni, "avx512f,avx512vnni", "vpdpbusd")  /* four 8-bit multiply-adds a lane */
-CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", "vdpbf16ps") /* two multiply-adds a lane */
+CHAINS(fma_chain_avx2, "avx2,fma", lanes8, 12, "vfmadd213ps %3, %2, %0")
+CHAINS(dot_chain_avx2, "avx2", lanes8, 12, "vpmaddubsw %3, %2, %1; vpaddw %1, %0, %0") /* four 8-bit ones a lane */
+CHAINS(fma_chain_avx512, "avx512f,fma", lanes16, 24, "vfmadd213ps %3, %2, %0")
+CHAINS(dot_chain_avx512vnni, "avx512f,avx512vnni", lanes16, 24, "vpdpbusd %3, %2, %0")  /* the same in one */
+CHAINS(dot_chain_avx512bf16, "avx512f,avx512bf16", lanes16, 24, "vdpbf16ps %3, %2, %0") /* two multiply-adds a lane */
 
 /* Four independent 16 x 16 sums of products of 32 or 64 numbers. */
 #define TILES(name, isa, multiply)                                                                                     \
@@ -68,7 +71,9 @@ static double peak(const char *kernels)
     const char *name;
     double (*chain)(long rounds);
     int per_round;
-  } known[] = {{"avx512", fma_chain_avx512, 24 * 16},
+  } known[] = {{"avx2", fma_chain_avx2, 12 * 8},
+               {"avx2-int8", dot_chain_avx2, 12 * 8 * 4},
+               {"avx512", fma_chain_avx512, 24 * 16},
                {"avx512bf16", dot_chain_avx512bf16, 24 * 16 * 2},
                {"avx512vnni", dot_chain_avx512vnni, 24 * 16 * 4},
                {"amx", tile_chain, 4 * 16 * 16 * 32},
@@ -395,7 +400,9 @@ int main(int argc, char **argv)
   }
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
-  const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni") : NAN;
+  const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni")
+                      : fx_kernels_select("avx2")     ? peak("avx2-int8")
+                                                      : NAN;
   const ceilings c = {peak(kernels), dot8, fx_kernels_select("amx") ? peak("amx-int8") : dot8, bandwidth(),
                       random_reads()};
   printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",

@@ -51,14 +51,6 @@ static double field(const field_rig *r, const sf_kernels *k)
   return SAMPLES / best;
 }
 
-static double naive_field(const field_rig *r)
-{
-  const double start = sf_seconds();
-#pragma omp parallel for schedule(static)
-  for (int i = 0; i < SAMPLES / 8; i++) r->sigma[i] = sf_tensorf_density_feature(&r->model, r->x + 3 * i);
-  return SAMPLES / 8 / (sf_seconds() - start);
-}
-
 static sf_status bench_field(cJSON *json, const ceilings *c)
 {
   field_rig r = {0};
@@ -74,7 +66,7 @@ static sf_status bench_field(cJSON *json, const ceilings *c)
       r.model.value[i] = sf_random_float(2, 2, i) - 0.5f;
     put_rays(&r.model, r.x);
     put(json, "train.tensorf.field", field(&r, sf_kernels_training()), "samples/s", c->fma / (4 * 18 * 16),
-        naive_field(&r));
+        field(&r, sf_kernels_select("portable")));
   }
   free(r.x), free(r.sigma), free(r.slope), free(r.grad);
   sf_model_free(&r.model);
