@@ -20,6 +20,22 @@ typedef struct events {
   uint8_t sample[FX_BLOCK * GROUPS + 64];
 } events;
 
+#if !defined(__AVX512VBMI2__)
+/* ones[b][k]: position of one k of byte b. Its place is the number of prefixes of b with at most k ones. */
+#define PREFIX(b, n, k) (__builtin_popcount((b) & ((2 << (n)) - 1)) <= (k))
+#define ONE(b, k)                                                                                                      \
+  PREFIX(b, 0, k) + PREFIX(b, 1, k) + PREFIX(b, 2, k) + PREFIX(b, 3, k) + PREFIX(b, 4, k) + PREFIX(b, 5, k) +          \
+      PREFIX(b, 6, k) + PREFIX(b, 7, k)
+#define ONES(b)                                                                                                        \
+  {                                                                                                                    \
+    ONE(b, 0), ONE(b, 1), ONE(b, 2), ONE(b, 3), ONE(b, 4), ONE(b, 5), ONE(b, 6), ONE(b, 7)                             \
+  }
+#define ONES4(b) ONES(b), ONES((b) + 1), ONES((b) + 2), ONES((b) + 3)
+#define ONES16(b) ONES4(b), ONES4((b) + 4), ONES4((b) + 8), ONES4((b) + 12)
+#define ONES64(b) ONES16(b), ONES16((b) + 16), ONES16((b) + 32), ONES16((b) + 48)
+static const uint8_t ones[256][8] = {ONES64(0), ONES64(64), ONES64(128), ONES64(192)};
+#endif
+
 static INLINE void list_spikes(row_index *row, const uint64_t bits[SF_SPIKE_WORDS])
 {
 #if defined(__AVX512VBMI2__)
@@ -37,8 +53,15 @@ static INLINE void list_spikes(row_index *row, const uint64_t bits[SF_SPIKE_WORD
     row += __builtin_popcountll(bits[word]);
   }
 #else
-  for (int word = 0; word < SF_SPIKE_WORDS; word++)
-    for (uint64_t rest = bits[word]; rest; rest &= rest - 1) *row++ = (row_index)(word * 64 + __builtin_ctzll(rest));
+  for (int byte = 0; byte < 8 * SF_SPIKE_WORDS; byte++) {
+    const uint8_t fired = ((const uint8_t *)bits)[byte]; /* little-endian */
+    const __m128i index = _mm_add_epi8(_mm_loadl_epi64((const __m128i *)ones[fired]), _mm_set1_epi8((char)(8 * byte)));
+    if (ROW_BITS == 8)
+      _mm_storel_epi64((__m128i *)row, index);
+    else
+      _mm_storeu_si128((__m128i *)row, _mm_cvtepu8_epi16(index));
+    row += __builtin_popcount(fired);
+  }
 #endif
 }
 
