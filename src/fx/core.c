@@ -25,7 +25,7 @@ static void arrange_biases(fx_words *words, const fx_net *net, int bytes)
     if (c2->bias)
       words->c2[FX_BIAS_ROW][unpacked(o, bytes)] = c2->w[(size_t)c2->n_in * SF_LANES + (size_t)o],
                                          words->c2_bias[o] = words->c2[FX_BIAS_ROW][unpacked(o, bytes)];
-    if (c3->bias && o < SF_OUT_MAX) words->c3[FX_BIAS_ROW][o] = c3->w[(size_t)c3->n_in * SF_LANES + (size_t)o];
+    if (c3->bias && o < SF_OUT_MAX) words->c3_bias[o] = c3->w[(size_t)c3->n_in * SF_LANES + (size_t)o];
   }
 }
 
@@ -68,7 +68,7 @@ static void arrange(fx_words *words, const fx_net *net, int bytes)
         words->c2[i][unpacked(o, bytes)] = words->c2_quads[i / 4][o][i % 4] = layer[FX_C2].w[at];
       if (o >= SF_OUT_MAX) continue;
       if (i < layer[FX_D2].n_in) words->d2[i][o] = words->d2_quads[i / 4][o][i % 4] = layer[FX_D2].w[at];
-      if (i < layer[FX_C3].n_in) words->c3[i][o] = words->c3_quads[i / 4][o][i % 4] = layer[FX_C3].w[at];
+      if (i < layer[FX_C3].n_in) words->c3_inputs[o][i] = words->c3_quads[i / 4][o][i % 4] = layer[FX_C3].w[at];
     }
 }
 

@@ -20,7 +20,8 @@ typedef struct fx_words {
   _Alignas(64) int32_t c1_bias[SF_LANES], c2_bias[SF_LANES];     /* currents; c1_bias of a decoder */
   _Alignas(64) int16_t d2[SF_LANES + 2][SF_OUT_MAX];
   _Alignas(64) int8_t c2[SF_LANES + 2][SF_LANES]; /* outputs permuted, see fx_kernels.unpack_bytes */
-  _Alignas(64) int16_t c3[SF_LANES + 2][SF_OUT_MAX];
+  _Alignas(64) int8_t c3_inputs[SF_OUT_MAX][SF_LANES];
+  _Alignas(64) int32_t c3_bias[SF_OUT_MAX];
   _Alignas(64) int8_t c2_quads[SF_LANES / 4][SF_LANES][4];
   _Alignas(64) int8_t d2_quads[SF_LANES / 4][SF_OUT_MAX][4], c3_quads[SF_LANES / 4][SF_OUT_MAX][4];
   _Alignas(64) uint16_t d1_twice[SF_LANES / 16][SF_FEATURE_MAX][16][2], c1_h_twice[SF_LANES / 16][SF_OUT_MAX][16][2];
@@ -74,7 +75,6 @@ static inline void fx_block_count(fx_block *b, int steps)
 /* Working memory of one thread: what all steps of a block's layer need at once. Membranes stay in registers. */
 typedef struct fx_scratch {
   _Alignas(64) int16_t d2_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
-  int16_t c3_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
   _Alignas(64) int16_t c2_current[SF_T_MAX][FX_BLOCK][SF_LANES];
   _Alignas(64) int32_t argument[SF_T_MAX][4][FX_BLOCK]; /* of the density and the colours */
   uint32_t acc[4][FX_BLOCK];                            /* density, red, green, blue */

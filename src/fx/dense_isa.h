@@ -81,7 +81,12 @@ static INLINE void spike_bytes(const uint64_t bits[SF_SPIKE_WORDS], uint8_t byte
 #if defined(__AVX512VNNI__)
   for (int word = 0; word < SF_SPIKE_WORDS; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
 #else
-  for (int i = 0; i < SF_LANES; i++) bytes[i] = bits[i / 64] >> i % 64 & 1;
+  const vec eighth = _mm256_set_epi64x(0x0303030303030303, 0x0202020202020202, 0x0101010101010101, 0);
+  const vec bit = v_set64((int64_t)0x8040201008040201);
+  for (int at = 0; at < SF_LANES; at += 32) {
+    const vec byte = _mm256_shuffle_epi8(v_word((const uint8_t *)bits + at / 8), eighth);
+    v_store(bytes + at, _mm256_min_epu8(_mm256_and_si256(byte, bit), _mm256_set1_epi8(1)));
+  }
 #endif
 }
 #endif

@@ -121,12 +121,10 @@ static INLINE void add_rows16(const events *e, const int16_t (*w)[SF_OUT_MAX], i
 
 typedef const uint64_t (*bitmaps)[SF_SPIKE_WORDS];
 
-/* Currents of D2 or C3. */
-static INLINE void small_currents(const int16_t (*rows)[SF_OUT_MAX], bitmaps spikes, bool bias, int n,
-                                  int16_t (*sum)[SF_OUT_MAX])
+static INLINE void d2_currents(const int16_t (*rows)[SF_OUT_MAX], bitmaps spikes, int n, int16_t (*sum)[SF_OUT_MAX])
 {
   events e;
-  list_events(&e, spikes, bias, n);
+  list_events(&e, spikes, false, n);
   add_rows16(&e, rows, sum);
 }
 
@@ -234,7 +232,7 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     fire_gang(net, 0, mode, current[0], 0, i, b);
   }
   for (int t = 0; t < net->steps; t++) {
-    small_currents(words->d2, (bitmaps)b->spikes[0][t], false, b->n, s->d2_current[t]);
+    d2_currents(words->d2, (bitmaps)b->spikes[0][t], b->n, s->d2_current[t]);
     for (int i = 0; i < b->n; i++) {
       __m256i *current = (__m256i *)s->d2_current[t][i];
       s->argument[t][0][i] = s->d2_current[t][i][0];
@@ -271,14 +269,34 @@ static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
   }
 }
 
+/* Three outputs are too few for a row of weights per spike: their weights stand input by input, beside the spikes as
+ * bytes, and 16-bit sums hold all of them. Outputs twice over, halves that remain to be added. */
+static INLINE __m256i c3_sums(const int8_t (*w)[SF_LANES], const uint8_t x[SF_LANES])
+{
+  __m256i sum[COLOURS];
+#pragma GCC unroll 3
+  for (int o = 0; o < COLOURS; o++) {
+    sum[o] = _mm256_setzero_si256();
+#pragma GCC unroll 4
+    for (int at = 0; at < SF_LANES; at += 32)
+      sum[o] = _mm256_add_epi16(sum[o], _mm256_maddubs_epi16(_mm256_load_si256((const __m256i *)(x + at)),
+                                                             _mm256_load_si256((const __m256i *)(w[o] + at))));
+    sum[o] = _mm256_madd_epi16(sum[o], _mm256_set1_epi16(1));
+  }
+  return _mm256_hadd_epi32(_mm256_hadd_epi32(sum[0], sum[1]), _mm256_hadd_epi32(sum[2], sum[2]));
+}
+
 static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s)
 {
-  for (int t = 0; t < core->scene->net.steps; t++) {
-    small_currents(core->words.c3, (bitmaps)b->spikes[2][t], core->scene->net.layer[FX_C3].bias != 0, b->n,
-                   s->c3_current[t]);
-    for (int o = 0; o < COLOURS; o++)
-      for (int i = 0; i < b->n; i++) s->argument[t][1 + o][i] = s->c3_current[t][i][o];
-  }
+  const fx_words *words = &core->words;
+  for (int t = 0; t < core->scene->net.steps; t++)
+    for (int i = 0; i < b->n; i++) {
+      _Alignas(64) uint8_t x[SF_LANES];
+      int32_t half[2][4];
+      spike_bytes(b->spikes[2][t][i], x);
+      _mm256_storeu_si256((__m256i *)half, c3_sums(words->c3_inputs, x));
+      for (int o = 0; o < COLOURS; o++) s->argument[t][1 + o][i] = half[0][o] + half[1][o] + words->c3_bias[o];
+    }
 }
 
 static INLINE void tiles_begin(void) {}

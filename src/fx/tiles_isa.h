@@ -143,11 +143,9 @@ static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *
 {
   const fx_words *words = &core->words;
   const fx_net *net = &core->scene->net;
-  _Alignas(64) int32_t bias[SIDE];
-  for (int o = 0; o < SIDE; o++) bias[o] = words->c3[FX_BIAS_ROW][o];
   spike_rows(b, 2, net->steps, s->x);
-  spike_products(words->c3_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, net->layer[FX_C3].bias ? bias : NULL,
-                 net->steps, s->sum);
+  spike_products(words->c3_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x,
+                 net->layer[FX_C3].bias ? words->c3_bias : NULL, net->steps, s->sum);
   for (int t = 0; t < net->steps; t++)
     for (int o = 0; o < COLOURS; o++)
       for (int i = 0; i < b->n; i++) s->argument[t][1 + o][i] = s->sum[t * FX_BLOCK + i][o];
