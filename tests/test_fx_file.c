@@ -252,6 +252,22 @@ START_TEST(metadata_is_checked)
 END_TEST
 
 /* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
+/* With the default H_SHIFT every h fits; a build with a smaller one refuses what the 12 bits of h do not hold. */
+START_TEST(largest_h_must_fit)
+{
+  const fixture_sizes sizes = {2, SF_LANES, 5, 9, 24, 40, 3, FX_NODECAY, {0}};
+  fx_scene scene = fixture_scene(&sizes, 4);
+  fx_layer *d2 = &scene.net.layer[FX_D2];
+  for (int sign = -1; sign <= 1; sign += 2) {
+    for (int i = 0; i < d2->n_in; i++) d2->w[i * SF_LANES] = 127, d2->w[i * SF_LANES + 1] = (int8_t)(sign * 127);
+    const int most = (d2->n_in * 127) >> SF_H_SHIFT;
+    ck_assert_int_eq(fx_largest_h(d2), most);
+    ck_assert_int_eq(fx_scene_check(&scene, "here").code, most < 2048 ? SF_OK : SF_E_RANGE);
+  }
+  fx_scene_free(&scene);
+}
+END_TEST
+
 START_TEST(decoder_behind_a_grid_is_refused)
 {
   static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
@@ -377,6 +393,7 @@ int main(void)
   tcase_add_test(files, cut_short_anywhere);
   tcase_add_test(files, edited_anywhere);
   tcase_add_test(files, metadata_is_checked);
+  tcase_add_test(files, largest_h_must_fit);
   tcase_add_test(files, decoder_behind_a_grid_is_refused);
   tcase_add_test(files, levels_of_a_scene_without_a_grid_are_refused);
   tcase_add_test(files, tensors_are_checked);

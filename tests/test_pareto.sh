@@ -35,22 +35,23 @@ number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" | head -n
 facts() { (cd "$(points "$1")" && grep -v '"samples_per_second"' ./*.json); }
 
 build whole
-echo "H_SHIFT=3" >"$work/whole/arch" # as it is without
+echo "TRANS_FRAC=20" >"$work/whole/arch" # as it is without
 pareto whole 0
-[ "$(count '^\[.* dB, elapsed')" -eq 11 ] || fail "not 11 points"
+[ "$(count '^\[.* dB, elapsed')" -eq 12 ] || fail "not 12 points"
 sweep=$work/whole/pareto/smoke
-[ "$(wc -l <"$sweep/points.csv")" -eq 12 ] || fail "points.csv has not 11 rows"
+[ "$(wc -l <"$sweep/points.csv")" -eq 13 ] || fail "points.csv has not 12 rows"
 grep -q '^## Pareto front' "$sweep/table.md" || fail "no front in table.md"
 grep -q 'not available' "$sweep/points.csv" || fail "the missing RTL cost is not named"
 [ "$(number "$(points whole)/tiny-AC_FRAC=4.json" ac_frac)" = 4 ] || fail "the variant has no 4 fraction bits"
 [ "$(number "$(points whole)/tiny.json" ac_frac)" = 8 ] || fail "the centre has no 8 fraction bits"
-[ "$(cat "$work/whole/pareto/variant/H_SHIFT-3-AC_FRAC-4/arch")" = "H_SHIFT=3 AC_FRAC=4" ] || fail "the variant has lost the build's widths"
+[ "$(cat "$work/whole/pareto/variant/TRANS_FRAC-20-AC_FRAC-4/arch")" = "TRANS_FRAC=20 AC_FRAC=4" ] || fail "the variant has lost the build's widths"
 if command -v gnuplot >/dev/null; then
   for plot in widths front-energy front-bytes front-traffic; do
     grep -q '</svg>' "$sweep/plots/$plot.svg" || fail "$plot.svg is not whole"
   done
 fi
-echo "whole: 11 points"
+[ "$(number "$(points whole)/tiny-H_SHIFT=1.json" h_shift)" = 1 ] || fail "the variant does not keep all bits of h but one"
+echo "whole: 12 points"
 
 # The same picture as sim_render makes of the exported scene.
 data=$work/whole/pareto/smoke-data
@@ -90,7 +91,7 @@ done_before=$(find "$(points part)" -name '*.json' | wc -l)
 [ -z "$(find "$(points part)" -name '*.part')" ] || fail "a part of a point was left"
 pareto part 0 --variants none
 [ "$(count 'finished before')" -eq "$done_before" ] || fail "finished points were repeated"
-rm "$(points whole)"/tiny-AC_FRAC=4*.json
+rm "$(points whole)"/tiny-AC_FRAC=4*.json "$(points whole)"/tiny-H_SHIFT=1*.json
 diff <(facts whole) <(facts part) >"$work/difference" || { cat "$work/difference"; fail "an interrupted sweep differs"; }
 echo "interrupted: the same points"
 

@@ -52,7 +52,7 @@ case $profile in
   quick) grid_weights="8 6 5 4" grid_grids="8 6 5 4" near=1 default_every=4 ;;
   full) grid_weights="8 7 6 5 4" grid_grids="8 7 6 5 4" near=8 default_every=2 ;;
   smoke)
-    weights="4" features="9" grids="4" leaks="6" variants="AC_FRAC=4" low_weights=
+    weights="4" features="9" grids="4" leaks="6" variants="AC_FRAC=4 H_SHIFT=1" low_weights=
     grid_weights="8 4" grid_grids="8 4" near=0 default_every=2 ;;
   *) die "--profile '$profile' is unknown: expected quick, full or smoke" ;;
 esac
@@ -131,7 +131,7 @@ variant_program() {
   program=$folder/bin/sf_point
   mkdir -p "${folder%/*}" && run env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -C "$tools/.." B="$folder" ARCH="$widths" "$program" \
     >"$folder.log" 2>&1 && return
-  last_line "$folder.log" >>"$out/log"
+  { grep -m 1 -i 'error:' "$folder.log" || last_line "$folder.log"; } >>"$out/log"
   return 1
 }
 

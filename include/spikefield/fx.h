@@ -37,6 +37,9 @@ typedef struct fx_layer {
   int8_t *w;     /* [n_in + (bias != 0)][SF_LANES] */
 } fx_layer;
 
+/* The largest |h| that D2's weights allow, whatever fires: what fx_scene_check holds against INPUT_BITS. */
+int fx_largest_h(const fx_layer *d2);
+
 /* Rows of weights. */
 static inline int fx_layer_rows(const fx_layer *layer)
 {

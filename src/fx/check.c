@@ -118,6 +118,21 @@ static sf_status check_weights(const fx_layer *layer, const char *tensor, const 
   return sf_ok();
 }
 
+int fx_largest_h(const fx_layer *d2)
+{
+  int largest = 0;
+  for (int o = 1; o < d2->n_out; o++) {
+    int positive = 0, negative = 0;
+    for (int i = 0; i < d2->n_in; i++) {
+      const int w = d2->w[(size_t)i * SF_LANES + (size_t)o];
+      *(w > 0 ? &positive : &negative) += w;
+    }
+    if (largest < positive >> SF_H_SHIFT) largest = positive >> SF_H_SHIFT;
+    if (largest < -(negative >> SF_H_SHIFT)) largest = -(negative >> SF_H_SHIFT);
+  }
+  return largest;
+}
+
 static sf_status check_layer(const fx_layer *layer, int id, const char *path)
 {
   const bool spiking = id != FX_D2 && id != FX_C3 && layer->n_out > 0;
@@ -141,7 +156,7 @@ static sf_status check_net(const fx_net *net, const char *path)
   SF_TRY(check_scale(&net->exp_in, "exp_in", -bias, bias - 1, path));
   SF_TRY(check_scale(&net->sigmoid_in, "sigmoid_in", 0, 0, path));
   for (int id = 0; id < SF_LAYERS; id++) SF_TRY(check_layer(&net->layer[id], id, path));
-  return sf_ok();
+  return in_range(path, "D2", "largest h", fx_largest_h(&net->layer[FX_D2]), 0, FX_INPUT_MAX);
 }
 
 sf_status fx_scene_check(const fx_scene *scene, const char *path)

@@ -14,7 +14,7 @@
 enum { SIDE = 16, ROW = 64 /* bytes */ };
 _Static_assert((int)FX_BLOCK == 3 * SIDE && (int)SF_OUT_MAX == SIDE && (int)WIDTH == SIDE, "a block is three tiles");
 _Static_assert((int)SF_FEATURE_MAX == 2 * SIDE && SF_INPUT_BITS == 12, "D1 takes two tiles of inputs");
-_Static_assert(((SF_LANES * 127) >> SF_H_SHIFT) < 2048 && 2 * SIDE * (2048 + 15) * 127 < 1 << 24, "whole in binary32");
+_Static_assert(2 * SIDE * (FX_INPUT_MAX + 1 + 15) * 127 < 1 << 24, "whole in binary32"); /* h: fx_scene_check */
 
 static INLINE void tiles_begin(void)
 {

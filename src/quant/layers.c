@@ -72,22 +72,6 @@ static sf_status set_theta(const context *c, int layer, double unit)
   return sf_ok();
 }
 
-/* The largest |h| that D2's weights allow, whatever fires. */
-static int largest_h(const fx_layer *d2)
-{
-  int largest = 0;
-  for (int o = 1; o < d2->n_out; o++) {
-    int positive = 0, negative = 0;
-    for (int i = 0; i < d2->n_in; i++) {
-      const int w = d2->w[(size_t)i * SF_LANES + (size_t)o];
-      *(w > 0 ? &positive : &negative) += w;
-    }
-    if (largest < positive >> SF_H_SHIFT) largest = positive >> SF_H_SHIFT;
-    if (largest < -(negative >> SF_H_SHIFT)) largest = -(negative >> SF_H_SHIFT);
-  }
-  return largest;
-}
-
 /* A unit so coarse that h fits C1's inputs. At the widths of the core the first one is. */
 static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf_quant_layer *result)
 {
@@ -95,7 +79,7 @@ static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf
   double unit_min = smallest_unit(c->model, FX_D2);
   for (;;) {
     SF_TRY(fit(c, FX_D2, x, lsb, unit_min, true, result));
-    const int largest = largest_h(&c->scene->net.layer[FX_D2]);
+    const int largest = fx_largest_h(&c->scene->net.layer[FX_D2]);
     if (largest <= limit || sf_settled_scales(c->model, &c->report->widths)) return sf_ok();
     unit_min = result->unit * fmax(1.01, (double)largest / limit);
   }
