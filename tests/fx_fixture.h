@@ -75,6 +75,13 @@ static inline void fixture_set_sizes(fx_scene *scene, const fixture_sizes *s)
   scene->occ_res = 8;
 }
 
+/* The largest weight of an output: with a smaller H_SHIFT than the default, h must fit its 12 bits all the same. */
+static inline int8_t fixture_rail(int layer, int output)
+{
+  const int less = 2 + (SF_LANES >> 7) - SF_H_SHIFT;
+  return (int8_t)(layer == FX_D2 && output > 0 && less > 0 ? 127 >> less : 127);
+}
+
 /* Random weights; thresholds of the size of one standard deviation of the currents, so that a part fires. */
 static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_t seed)
 {
@@ -85,8 +92,8 @@ static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_
     layer->theta = layer->n_out ? theta[l] : 0;
     for (int i = 0; i < fx_layer_rows(layer); i++)
       for (int o = 0; o < layer->n_out; o++)
-        layer->w[i * SF_LANES + o] =
-            (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o), -127, 127);
+        layer->w[i * SF_LANES + o] = (int8_t)fixture_pick(seed, 20 + (uint64_t)l, (uint64_t)(i * SF_LANES + o),
+                                                          -fixture_rail(l, o), fixture_rail(l, o));
   }
   for (int64_t i = 0; i < scene->grid.entries * 2; i++)
     scene->grid.table[i] = (int8_t)fixture_pick(seed, 30, (uint64_t)i, -127, 127);

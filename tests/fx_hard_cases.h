@@ -81,7 +81,10 @@ static inline void hard_weights(fx_net *net, int8_t even, int8_t odd)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int i = 0; i < net->layer[l].n_in; i++)
-      for (int o = 0; o < net->layer[l].n_out; o++) net->layer[l].w[i * SF_LANES + o] = (i + o) % 2 ? odd : even;
+      for (int o = 0; o < net->layer[l].n_out; o++) {
+        const int w = (i + o) % 2 ? odd : even, rail = fixture_rail(l, o);
+        net->layer[l].w[i * SF_LANES + o] = (int8_t)(w > rail ? rail : w < -rail ? -rail : w);
+      }
 }
 
 static inline void hard_theta(fx_net *net, int32_t theta)
@@ -175,7 +178,7 @@ static inline void expect_all_fire(const hard *h, const hard_seen *seen, int var
   for (int l = FX_D1; l <= FX_C2; l++)
     if (l != FX_D2) ck_assert_int_eq(hard_spikes(seen, l), HARD_ALL);
   for (int t = 0; t < SF_T_MAX; t++) {
-    ck_assert_int_eq(seen->trace->current[FX_D2][t][15], SF_LANES * 127);
+    ck_assert_int_eq(seen->trace->current[FX_D2][t][15], SF_LANES * fixture_rail(FX_D2, 15));
     ck_assert_uint_eq(seen->counts.layer[FX_C2].sop[t], SF_LANES * SF_LANES);
   }
 }

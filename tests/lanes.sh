@@ -57,7 +57,7 @@ make_wide() {
 needed='$(filter-out %_isa.c,$(foreach room,base scene field snn fx quant,$(wildcard src/$(room)/*.c)))'
 needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256 text)'
 harness='$(filter-out sim/soc% sim/view_set% sim/three_counts% sim/audit_run%,$(wildcard sim/*.c))'
-make_wide LIB_SRC="$needed" SIM_SRC="$harness" ISAS_snn='' "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" || fail "256 lanes: no build"
+make_wide LIB_SRC="$needed" SIM_SRC="$harness" ISAS_snn='' "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" "$wide/tests/test_snn" || fail "256 lanes: no build"
 "$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"
 "$wide/bin/sf_cosim" "$work/256.snn" "$work/data" --rays 30 --limit-samples 500 --seed 1 --quiet --json \
   --evidence "$work/evidence" >"$work/out" 2>"$work/err" || fail "256 lanes: a net of 256 neurons"
@@ -69,6 +69,7 @@ for case in every_neuron_fires weights_and_features_at_the_rails; do
   CK_RUN_CASE=$case "$wide/tests/test_fx_vector" >"$work/out" 2>"$work/err" || fail "256 lanes: vector and portable core differ"
   grep -q 'Checks: [1-9]' "$work/out" || fail "256 lanes: $case was not run"
 done
+"$wide/tests/test_snn" >"$work/out" 2>"$work/err" || fail "256 lanes: training"
 # refuses PROGRAM SCENE NEEDED AVAILABLE
 refuses() {
   "$1" "$2" "$work/data" --rays 1 >"$work/out" 2>"$work/err" && fail "$4 lanes: took a scene of $3"

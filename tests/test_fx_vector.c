@@ -37,7 +37,7 @@ static fx_scene random_net_scene(uint64_t seed, bool decodes)
                      (int32_t)pick(seed, 6 + (uint64_t)l, 1, 30000);
     if (seed % 16 == 5 && layer->theta) layer->theta = FX_MEMBRANE_MAX;
     for (int i = 0; seed % 3 == 0 && i < fx_layer_rows(layer) * SF_LANES; i++)
-      layer->w[i] = (int8_t)(layer->w[i] > 0 ? 127 : layer->w[i] < 0 ? -127 : 0);
+      layer->w[i] = (int8_t)(((layer->w[i] > 0) - (layer->w[i] < 0)) * fixture_rail(l, i % SF_LANES));
     if (seed % 5 == 0) layer->k = (int32_t[]){0, 1, 4095, 4096}[pick(seed, 12 + (uint64_t)l, 0, 3)];
   }
   s.net.exp_in = (fx_scale){(int32_t)pick(seed, 20, 0, 65535), (int32_t)pick(seed, 21, 0, 31),

@@ -107,7 +107,7 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     for (int i = 0; i < b->n; i++) {
       const vec current = v_load(s->sum[t * FX_BLOCK + i]);
       s->argument[t][0][i] = s->sum[t * FX_BLOCK + i][0];
-      input_row(V(srai_epi32)(current, SF_H_SHIFT), s->x[t * FX_BLOCK + i]);
+      input_row(_mm512_maskz_srai_epi32(0xfffe, current, SF_H_SHIFT), s->x[t * FX_BLOCK + i]); /* the density is no h */
     }
 }
 

@@ -87,10 +87,12 @@ typedef struct sf_vm_field {
   float shift, distance_scale;
 } sf_vm_field;
 
+enum { SF_ROWS_MAX = (int)SF_LANES > (int)SF_DECODER_MAX ? (int)SF_LANES : (int)SF_DECODER_MAX }; /* of a product */
+
 /* Working memory of one thread. Words: operands of the next product, paired over rows or over lanes. */
 typedef struct sf_net_scratch {
-  uint32_t rows[SF_DECODER_MAX * SF_BLOCK], lanes[SF_DECODER_MAX * SF_BLOCK], spikes[SF_DECODER_MAX * SF_BLOCK];
-  uint32_t t[SF_BLOCK * SF_DECODER_MAX];                                           /* transposed: [SF_BLOCK][rows] */
+  uint32_t rows[SF_ROWS_MAX * SF_BLOCK], lanes[SF_ROWS_MAX * SF_BLOCK], spikes[SF_ROWS_MAX * SF_BLOCK];
+  uint32_t t[SF_BLOCK * SF_ROWS_MAX];                                              /* transposed: [SF_BLOCK][rows] */
   float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
