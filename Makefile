@@ -51,6 +51,7 @@ ifneq ($(shell tools/arch.sh $B $(ARCH) && echo ok),ok)
 $(error no build with ARCH="$(ARCH)")
 endif
 ARCH_DEF := $B/$(ARCH_DEF)
+SAME_ARCH := ARCH="$(ARCH)"
 ARCH_INCLUDE := -I$B/include
 # What the public header cannot read from arch.def.
 ARCH_DEFINES := -DSPIKEFIELD_LANES=$(shell sed -n 's/^SF_ARCH.LANES, \([0-9]*\),.*/\1/p' $(ARCH_DEF))
@@ -179,7 +180,7 @@ vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAM
 	SF_FX_SAMPLES=$(SAMPLES) $B/tests/test_fx_vector
 
 asan: ## the C tests under address and undefined-behaviour sanitizers
-	@$(MAKE) B=$B/asan OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
+	@$(MAKE) B=$B/asan $(SAME_ARCH) OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
 ASAN_TESTS := $(filter-out $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)

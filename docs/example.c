@@ -85,6 +85,7 @@ int main(int argc, char **argv)
   spikefield_status status = spikefield_scene_open(&scene, argv[1]);
   if (status.code == SPIKEFIELD_OK && pixel) status = run(scene, width, pixel, argv[2]);
   if (status.code != SPIKEFIELD_OK) fprintf(stderr, "example: %s\n", status.message);
+  if (!pixel) fprintf(stderr, "example: no memory for %d x %d pixels\n", width, width);
   spikefield_scene_close(scene);
   free(pixel);
   return status.code != SPIKEFIELD_OK || !pixel;

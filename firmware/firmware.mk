@@ -29,6 +29,9 @@ firmware:
 	@echo "  firmware: $(RISCV)gcc is not installed, skipped"
 endif
 
+ifeq ($(SOC_MISSING),)
+$B/bin/sf_soc: | $(FIRMWARE)
+endif
 $B/bin/sf_soc $B/tests/test_soc: DUT_LDLIBS += $(UNICORN_LIBS)
 
 FIRMWARE_RUN ?= $B/demo/scene.snn $B/demo/scene

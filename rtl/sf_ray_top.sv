@@ -269,6 +269,11 @@ module sf_ray_top #(
   assign m_axis_tdata_o = {53'd0, samples, 11'd0, transmittance, 11'd0, weight_sum, depth, 24'd0, colour[119:80], 24'd0,
                            colour[79:40], 24'd0, colour[39:0]};
   assign active = !track_idle || !composite_idle;
+  // See sf_top: marching and compositing are written for these widths.
+  initial begin
+    if (sf_arch_pkg::POS_FRAC != 24 || sf_arch_pkg::DELTA_FRAC != 24 || sf_arch_pkg::TRANS_FRAC != 20)
+      $error("arch.def has other widths than this RTL is written for");
+  end
   wire unused_ok = &{1'b0, s_axis_tdata_i[255:241], s_axis_tdata_i[191:172], s_axis_tdata_i[127:121],
                      s_axis_tdata_i[95:88], s_axis_tdata_i[63:56], s_axis_tdata_i[31:24], first_beat_q[63:52],
                      first_beat_q[31:28]};

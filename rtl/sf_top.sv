@@ -309,7 +309,7 @@ module sf_top #(
         || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
         || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
         || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
-        || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 1 || sf_arch_pkg::LEAK_FRAC > 12
+        || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 8 || sf_arch_pkg::LEAK_FRAC > 12
         || sf_arch_pkg::LOG_FRAC != 12 || sf_arch_pkg::SIGMA_BITS != 28 || sf_arch_pkg::SIGMA_FRAC != 12
         || sf_arch_pkg::COLOUR_BITS != 20 || sf_arch_pkg::COLOUR_FRAC != 16 || sf_arch_pkg::COUNTER_BITS != 64)
       $error("arch.def has other sizes than this RTL is written for");

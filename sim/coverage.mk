@@ -3,7 +3,7 @@ COVER := $B/coverage
 COVER_TESTS := test_rtl test_rtl_registers test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_disturbed
 coverage: ## line, toggle and functional coverage of the RTL: table, holes, build/coverage/lcov.info (about 15 minutes)
 	@mkdir -p $(COVER)/points
-	@$(MAKE) B=$(COVER) COVERAGE=$(COVER)/points coverage-run
+	@$(MAKE) B=$(COVER) $(SAME_ARCH) COVERAGE=$(COVER)/points coverage-run
 
 coverage-run: $(COVER_TESTS:%=$B/tests/%) $B/bin/sf_cosim $B/bin/sf_scene $B/coverage_report $B/faults/make_scene
 	@tests/coverage.sh $B $(COVER_TESTS)

@@ -9,12 +9,13 @@ Synthesise modules of the accelerator (yosys, synth_xilinx -family xc7) and prin
 BUILD/synth/synth.md and BUILD/synth/synth.json. Every finished run is kept in BUILD/synth/runs until the RTL, the
 tool or the recipe changes, so an interrupted set goes on where it stopped.
 
-  --modules "NAME..."  these only (default: every module but sf_top, small ones first)
+  --modules "NAME..."  these only (default: every module but sf_top and sf_ray_top, small
+                       ones first)
   --lanes "N..."       numbers of lanes (default: the one of sf_arch_pkg); a module without a parameter LANES exists
                        for that one alone
   --rtl DIR            folder that holds rtl/ (default: that of this script)
-  --top                sf_top too, without tap ports: minutes to an hour and gigabytes
-  --report             only what is there; run nothing
+  --top                sf_top and sf_ray_top, too, without tap ports: minutes to an hour and gigabytes
+  --report             only what is there, for every number of lanes there is; run nothing
   --json               print the JSON instead of the table
   --quiet              no progress
 
@@ -56,13 +57,14 @@ sources=$(ls -rS rtl/*.sv rtl/gen/*.sv | grep -v '_pkg\.sv$')
 built_for=$(sed -nE 's/.*\bLANES = ([0-9]+);.*/\1/p' rtl/gen/sf_arch_pkg.sv)
 [ -n "$built_for" ] || die 1 "rtl/gen/sf_arch_pkg.sv: no LANES"
 for n in $lanes; do [[ $n =~ ^[1-9][0-9]{0,3}$ ]] || die 2 "--lanes: '$n' is no number of lanes"; done
+[ -n "$lanes" ] || [ -z "$report" ] || lanes=$(for run in "$out"/runs/*-*[0-9]; do echo "${run##*-}"; done | grep -x '[0-9]*' | sort -nu)
 lanes=${lanes:-$built_for}
 if [ -z "$modules" ]; then
   for file in $(ls -rS rtl/*.sv | grep -v '_pkg\.sv$'); do
-    [ "$file" = rtl/sf_top.sv ] || modules+=" $(basename "$file" .sv)"
+    [[ $file = rtl/sf_top.sv || $file = rtl/sf_ray_top.sv ]] || modules+=" $(basename "$file" .sv)"
   done
 fi
-[ -z "$top" ] || modules+=" sf_top"
+[ -z "$top" ] || modules+=" sf_top sf_ray_top"
 # What yosys printed, as "name value" lines. First statistics: memories are still memories. Last: mapped.
 extract() {
   awk '
@@ -97,7 +99,7 @@ exists_for() { # MODULE LANES
 synthesise() { # MODULE LANES RESULT
   local log=$3.log parameters='' started=$SECONDS
   if grep -qE '^ *parameter +(integer +|int +)?LANES\b' "rtl/$1.sv"; then parameters="-chparam LANES $2"; fi
-  if [ "$1" = sf_top ]; then parameters+=" -chparam TAP 0"; fi
+  if [[ $1 = sf_top || $1 = sf_ray_top ]]; then parameters+=" -chparam TAP 0"; fi
   local map="synth_xilinx -family xc7 -flatten -noiopad -top $1"
   # shellcheck disable=SC2086
   if ! nice -n 10 yosys -q -l "$log" -p "read_verilog -sv -defer -Irtl $(echo $packages $sources)

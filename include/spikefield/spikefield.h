@@ -19,19 +19,20 @@
  *   bits      Integers out are the same on every machine, with any number of threads. Of the inputs only poses and
  *             positions are real numbers; they pass one rounding to integers (spikefield_position, _direction).
  *
- * Units. The scene box is [0,1)^3 in box units; model units are those the scene was trained in: box = model *
- * to_box_scale + to_box_offset. A data set in the Blender layout has model = world * 0.8 unless trained otherwise.
- * Qa.b: a fixed-point number with b fraction bits. */
+ * Units. The scene box is [0,1)^3 in box units; model units are those the scene was trained in: box = (model *
+ * to_box_scale + to_box_offset) * stretch, per axis; a box edge below is the longest. A data set in the Blender layout
+ * has model = world * 0.8 unless trained otherwise. Qa.b: a fixed-point number with b fraction bits. The formats are
+ * those of the default widths; a build with others (ARCH) has a soname of its own. */
 #ifndef SPIKEFIELD_SPIKEFIELD_H
 #define SPIKEFIELD_SPIKEFIELD_H
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#define SPIKEFIELD_VERSION_MAJOR 0 /* of the soname: changes with every change of a type or a function below */
-#define SPIKEFIELD_VERSION_MINOR 1
+#define SPIKEFIELD_VERSION_MAJOR 1 /* of the soname: changes with every change of a type or a function below */
+#define SPIKEFIELD_VERSION_MINOR 0
 #define SPIKEFIELD_VERSION_PATCH 0
-#define SPIKEFIELD_VERSION "0.1.0"
+#define SPIKEFIELD_VERSION "1.0.0"
 
 #if defined(__GNUC__)
 #define SPIKEFIELD_API __attribute__((visibility("default")))
@@ -77,7 +78,7 @@ typedef struct spikefield_status {
   char message[400]; /* one line: what, where (file, tensor, ray, sample) and what was expected; "" when OK */
 } spikefield_status;
 
-/* The version of the library that runs, "0.1.0"; SPIKEFIELD_VERSION is the one compiled against. */
+/* The version of the library that runs, "1.0.0"; SPIKEFIELD_VERSION is the one compiled against. */
 SPIKEFIELD_API const char *spikefield_version(void);
 
 /* ---- scenes ---- */
@@ -103,18 +104,19 @@ typedef struct spikefield_scene_info {
   int32_t directions;    /* harmonics that the net reads, the first of the 16 */
   int32_t max_samples;   /* per ray */
   int32_t occupancy_res; /* cells per axis */
-  int32_t step_q24;      /* between samples, box edges in Q0.24 */
+  int32_t step_q24;      /* between samples, box edges in Q0.24; the shortest */
   int32_t background_q16[3];
   int64_t grid_entries, grid_bytes, weight_bytes, occupancy_bytes;
-  double to_box_scale, to_box_offset[3];
-  double step;          /* between samples, model units */
+  double to_box_scale, to_box_offset[3], stretch[3]; /* stretch: 1 but where a TensoRF box has unequal edges */
+  double step;          /* between samples, model units; the shortest, where steps grow with the distance */
   double direction_lsb; /* value of one LSB of the harmonics */
 } spikefield_scene_info;
 SPIKEFIELD_API spikefield_status spikefield_scene_describe(const spikefield_scene *scene, spikefield_scene_info *info);
 
 /* ---- how to run ---- */
 
-/* NULL wherever options are taken, or all zero: the defaults. */
+/* Where a thread cannot be created, the OpenMP runtime ends the program; threads = 1 creates none.
+ * NULL wherever options are taken, or all zero: the defaults. */
 typedef struct spikefield_options {
   int32_t steps;   /* time steps, 1..8; 0: the scene's */
   int32_t threads; /* of spikefield_rays and _frame, 1..1024; 0: all of the machine (OMP_NUM_THREADS). No more than its
@@ -154,7 +156,7 @@ SPIKEFIELD_API uint64_t spikefield_relu_energy_fj(const spikefield_scene *scene,
 /* ---- samples ---- */
 
 typedef struct spikefield_sample {
-  uint32_t density;   /* U16.12 per box edge, before multiplication by the step */
+  uint32_t density;   /* U16.12 per box edge, before multiplication by the step; of a TensoRF scene 0: no net has it */
   uint32_t colour[3]; /* U4.16 */
 } spikefield_sample;
 
@@ -224,7 +226,7 @@ SPIKEFIELD_API spikefield_status spikefield_frame(const spikefield_scene *scene,
 
 /* One sample of a ray, valid during the call. */
 typedef struct spikefield_tap {
-  uint32_t index; /* along the ray, from 0 */
+  uint32_t index; /* along the ray, from 0; of a TensoRF scene among those that reach the decoder */
   const int16_t *features;
   const spikefield_sample *sample;
   const spikefield_trace *trace;

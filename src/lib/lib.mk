@@ -10,8 +10,11 @@ DATADIR ?= $(PREFIX)/share
 OBJCOPY ?= objcopy
 PUBLIC_HEADER := include/spikefield/spikefield.h
 LIB_VERSION := $(shell sed -n 's/^.define SPIKEFIELD_VERSION "\(.*\)"/\1/p' $(PUBLIC_HEADER))
-SONAME := libspikefield.so.$(firstword $(subst ., ,$(LIB_VERSION)))
-SHARED := libspikefield.so.$(LIB_VERSION)
+# Types and formats of other widths are others.
+space := $(subst ,, )
+LIB_WIDTHS := $(if $(SAME_ARCH),-$(subst $(space),-,$(subst =,-,$(strip $(ARCH)))))
+SONAME := libspikefield.so.$(firstword $(subst ., ,$(LIB_VERSION)))$(LIB_WIDTHS)
+SHARED := libspikefield.so.$(LIB_VERSION)$(LIB_WIDTHS)
 
 $B/lib/spikefield.o: $(filter $B/obj/src/lib/%,$(LIB_OBJ)) $B/libspikefield.a
 	@mkdir -p $(@D)

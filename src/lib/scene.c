@@ -78,7 +78,7 @@ static void describe_net(const fx_net *net, spikefield_scene_info *info)
     const fx_layer *layer = &net->layer[l];
     info->inputs[l] = layer->n_in, info->outputs[l] = layer->n_out;
     info->theta[l] = layer->theta, info->leak_q12[l] = layer->k;
-    info->weight_bytes += (int64_t)layer->n_in * layer->n_out;
+    info->weight_bytes += (int64_t)fx_layer_rows(layer) * layer->n_out;
   }
   info->mode = (spikefield_mode)net->mode, info->steps = net->steps;
   info->features = fx_net_inputs(net);
@@ -100,6 +100,7 @@ static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *
   memcpy(info->background_q16, fx->background, sizeof info->background_q16);
   info->to_box_scale = fx->to_box_scale, info->direction_lsb = fx->dir_scale;
   memcpy(info->to_box_offset, fx->to_box_offset, sizeof info->to_box_offset);
+  for (int a = 0; a < 3; a++) info->stretch[a] = fx->backbone == FX_TENSORF ? fx->tensorf.stretch[a] : 1;
   info->step = (double)fx->step_q24 / (1 << SF_DELTA_FRAC) / fx->to_box_scale;
   return sf_ok();
 }

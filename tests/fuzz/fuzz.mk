@@ -29,7 +29,7 @@ $(FUZZ_TARGETS:%=$B/bin/fuzz_%): $B/bin/fuzz_%: $B/obj/tests/fuzz/fuzz_%.o $(FUZ
 fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each, FUZZ_JOBS=1 at a time; FUZZ=NAME chooses targets
 	@tests/fuzz/run.sh --installed $(CLANG)
 	@$(MAKE) $B/tests/fuzz/seeds
-	@$(MAKE) B=$B/fuzz CC=$(CLANG) OPT=-O1 SAN="$(FUZZ_SAN)" \
+	@$(MAKE) B=$B/fuzz $(SAME_ARCH) CC=$(CLANG) OPT=-O1 SAN="$(FUZZ_SAN)" \
 	  CFLAGS="-fsanitize=fuzzer-no-link -fno-openmp -Itests/fuzz/single -Wno-unknown-pragmas" $(FUZZ:%=$B/fuzz/bin/fuzz_%)
 	@tests/fuzz/run.sh $B $(FUZZ_TIME) $(FUZZ_JOBS) $(FUZZ)
 
