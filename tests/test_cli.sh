@@ -87,6 +87,9 @@ END
 good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits 4 --stage2 2 --threads 1
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
+if grep -q "scales are not used" stdout.txt; then fail "tuned.safetensors" "a note about widths that are its own"; fi
+good sf_export tuned.safetensors -o tuned.snn --grid-bits 7
+if ! grep -q "scales are not used" stdout.txt; then fail "tuned.safetensors" "no note that its scales are not used"; fi
 good sf_export model.safetensors -o s.snn
 good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 --json
 good sf_cosim fit.snn d --rays 1 --seed 1

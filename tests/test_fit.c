@@ -368,6 +368,12 @@ START_TEST(refusals)
   ck_bad(fit(candidate, 1, &rays, 0.1, &fitted, &r), SF_E_RANGE, "out.snn", "100 rays");
   ck_assert_ptr_null(fitted.owner);
   rays.count = RAYS;
+  uint8_t *seen = scene.occupancy, empty[64 * 64] = {0};
+  ck_assert_uint_le((size_t)scene.occ_res * scene.occ_res * scene.occ_res / 8, sizeof empty);
+  scene.occupancy = empty;
+  ck_bad(fit(candidate, 1, &rays, 0.1, &fitted, &r), SF_E_RANGE, "out.snn", "no ray of the data set meets");
+  scene.occupancy = seen;
+  ck_assert_ptr_null(fitted.owner);
   sf_fit_job job = {.candidate = candidate,
                     .widths = widest,
                     .candidates = 1,

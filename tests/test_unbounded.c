@@ -55,6 +55,10 @@ START_TEST(boxes_that_steps_do_not_cross_are_refused)
   ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
   c.bound = 12;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound"));
+  c = sf_tensorf_default(0.8f, 0); /* one occupancy grid, equal steps */
+  ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
+  c.bound = 2;
+  ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound = 2"));
 }
 END_TEST
 

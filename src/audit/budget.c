@@ -69,14 +69,24 @@ static void ray(sf_budget_row *row, uint64_t i, bool ideal)
     }
 }
 
+/* Some rays have no lattice point: the next one instead. */
+static void some_rays(sf_budget_row *row, uint64_t samples, bool ideal)
+{
+  for (uint64_t without = 0; row->inputs < samples;) {
+    const uint64_t before = row->inputs;
+    ray(row, before + without, ideal);
+    without += row->inputs == before;
+  }
+}
+
 static void rays(sf_budget_row *row, uint64_t samples)
 {
-  while (row->inputs < samples) ray(row, row->inputs, false);
+  some_rays(row, samples, false);
 }
 
 static void rays_ideal(sf_budget_row *row, uint64_t samples)
 {
-  while (row->inputs < samples) ray(row, row->inputs, true);
+  some_rays(row, samples, true);
 }
 
 /* ---- grid ---- */

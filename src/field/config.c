@@ -53,6 +53,9 @@ sf_status sf_config_check(const sf_config *c)
   if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
   SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, SF_GAMMA_MAX));
   SF_TRY(check_range("backbone", c->backbone, SF_INGP, SF_TENSORF));
+  if (c->backbone == SF_TENSORF && (c->bound != 1 || c->dt_gamma > 0))
+    return sf_fail(SF_E_RANGE, "model config: bound = %d and dt_gamma = %g with TensoRF, expected 1 and 0", c->bound,
+                   (double)c->dt_gamma);
   if (c->backbone == SF_TENSORF) return sf_tensorf_check(&c->tensorf);
   sf_steps steps;
   return sf_steps_make(&steps, c, 1);

@@ -84,7 +84,12 @@ int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths)
 {
   const int64_t res = scene->occ_res;
   int64_t bits = (scene->log2_bound + 1) * res * res * res + scene->grid.entries * FX_GRID_FEATURES * widths->grid_bits;
-  if (scene->backbone == FX_TENSORF) bits += fx_tensorf_bytes(&scene->tensorf) * widths->grid_bits;
+  if (scene->backbone == FX_TENSORF) {
+    const int64_t rows = scene->tensorf.appearance.components[0] + scene->tensorf.appearance.components[1] +
+                         scene->tensorf.appearance.components[2];
+    bits += (fx_tensorf_bytes(&scene->tensorf) - rows * FX_APPEARANCE_MAX) * widths->grid_bits;
+    bits += rows * scene->tensorf.features * widths->weight_bits;
+  }
   for (int l = 0; l < SF_LAYERS; l++)
     bits += (int64_t)fx_layer_rows(&scene->net.layer[l]) * scene->net.layer[l].n_out * widths->weight_bits;
   return (bits + 7) / 8;
@@ -166,6 +171,8 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   report->samples = calibration->samples;
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
+  report->tuned_bits = model->scales.weight_bits;
+  report->settled = sf_settled_scales(model, &report->widths) != NULL;
   report->scales = scales_of(scene, report->widths.weight_bits);
   return fx_scene_check(scene, name);
 }
