@@ -68,6 +68,15 @@ static sf_picture_budget make_picture(sf_model *m)
   const sf_picture_job job = {m, &scene, &data, &view, "scene", 60, 3, NULL, NULL};
   const sf_status status = sf_picture_budget_make(&job, &budget);
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  float *w4 = sf_model_param(m, SF_P_W4);
+  const size_t last = m->param[SF_P_W4].size - 1;
+  for (size_t i = 0; i <= last / 2; i++) { /* another model's */
+    const float other = w4[i];
+    w4[i] = w4[last - i], w4[last - i] = other;
+  }
+  const sf_status stranger = sf_picture_budget_make(&job, &(sf_picture_budget){0});
+  ck_assert_int_eq(stranger.code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_nonnull(strstr(stranger.message, "layer C2"));
   scene.net.layer[FX_C2].n_out--;
   ck_assert_int_eq(sf_picture_budget_make(&job, &(sf_picture_budget){0}).code, SF_E_UNSUPPORTED);
   fx_scene_free(&scene);

@@ -88,6 +88,8 @@ good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
 if grep -q "scales are not used" stdout.txt; then fail "tuned.safetensors" "a note about widths that are its own"; fi
+sed 's/"h_shift":"3"/"h_shift":"4"/' tuned.safetensors >shifted.safetensors
+data "h = current >> 4" sf_export shifted.safetensors -o out
 good sf_export tuned.safetensors -o tuned.snn --grid-bits 7
 if ! grep -q "scales are not used" stdout.txt; then fail "tuned.safetensors" "no note that its scales are not used"; fi
 good sf_export model.safetensors -o s.snn

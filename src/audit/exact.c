@@ -27,17 +27,33 @@ static double input_lsb(const fx_scene *scene, int layer, int i)
   return i < SF_DIR_FEATURES ? scene->dir_scale : ldexp(scene->current_scale[FX_D2], SF_H_SHIFT);
 }
 
-static void set_weights(sf_exact *e, int l)
+/* A weight of the model in the units of the scene's. */
+static double real_weight(const fx_scene *scene, const sf_model *model, int l, int o, int i)
 {
   static const sf_param_id id[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
+  const double w = sf_model_param(model, id[l])[o * scene->net.layer[l].n_in + i];
+  return w * input_lsb(scene, l, i) / scene->current_scale[l];
+}
+
+static void set_weights(sf_exact *e, int l)
+{
   const fx_layer *layer = &e->scene->net.layer[l];
-  const float *w = sf_model_param(e->model, id[l]);
+  const bool real = sf_exact_is(e, (sf_exact_id)(SF_EXACT_D1 + l));
   for (int i = 0; i < layer->n_in; i++)
     for (int o = 0; o < layer->n_out; o++)
-      e->w[l][i * SF_LANES + o] =
-          sf_exact_is(e, (sf_exact_id)(SF_EXACT_D1 + l))
-              ? (double)w[o * layer->n_in + i] * input_lsb(e->scene, l, i) / e->scene->current_scale[l]
-              : layer->w[i * SF_LANES + o];
+      e->w[l][i * SF_LANES + o] = real ? real_weight(e->scene, e->model, l, o, i) : layer->w[i * SF_LANES + o];
+}
+
+bool sf_exact_resembles(const fx_scene *scene, const sf_model *model, int l)
+{
+  const fx_layer *layer = &scene->net.layer[l];
+  double all = 0, apart = 0;
+  for (int i = 0; i < layer->n_in; i++)
+    for (int o = 0; o < layer->n_out; o++) {
+      const double w = real_weight(scene, model, l, o, i);
+      all += w * w, apart += pow(w - layer->w[i * SF_LANES + o], 2);
+    }
+  return apart <= all / 4;
 }
 
 static void set_scalars(sf_exact *e)
@@ -205,7 +221,7 @@ void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_
     memcpy(current, base, sizeof current);
     for (int j = 0; j < n_h; j++) {
       const double h = ldexp(d2[1 + j], -SF_H_SHIFT);
-      add_row(e, FX_C1, n_dir + j, sf_exact_is(e, SF_EXACT_H) ? h : floor(h), current);
+      add_row(e, FX_C1, n_dir + j, sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits ? h : floor(h), current);
     }
     fire(e, FX_C1, t, v[1], current, out);
     add_spikes(e, FX_C2, out->spikes[FX_C1][t], current);

@@ -61,6 +61,7 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
   sf_dataset_ray(job->data, job->view, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
   SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, x, y, &t->ray));
   sf_sh4(direction, sh);
+  sf_scales_round_direction(&job->model->scales, sh); /* as a fine-tuned model sees them */
   for (int a = 0; a < 3; a++) t->unit[a] = direction[a];
   for (int j = 0; j < SF_DIR_FEATURES; j++) {
     t->dir[j] = sh[j] / job->scene->dir_scale;
@@ -122,6 +123,7 @@ static void input(const tracer *t, int l, int step, int i, const double *f, cons
     *x = t->dir[i], *xq = t->ray.dir[i];
   } else {
     *x = ldexp(t->trace.current[FX_D2][step][1 + h], -SF_H_SHIFT), *xq = floor(*x);
+    if (t->exact->model->scales.weight_bits) *x = *xq;
   }
 }
 
@@ -306,6 +308,10 @@ static sf_status check_pair(const sf_picture_job *job)
   for (int i = 0; i < SF_LAYERS; i++)
     if (!(job->scene->current_scale[i] > 0))
       return sf_fail(SF_E_UNSUPPORTED, "%s: the unit of layer %s is not known", job->name, sf_layer_names[i]);
+  for (int i = 0; i < SF_LAYERS; i++)
+    if (!sf_exact_resembles(job->scene, job->model, i))
+      return sf_fail(SF_E_UNSUPPORTED, "%s: the weights of layer %s are not those of the model it is compared with",
+                     job->name, sf_layer_names[i]);
   return sf_ok();
 }
 

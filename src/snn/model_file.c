@@ -152,6 +152,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   put_number(meta, "t_star", m->t_star);
   put_number(meta, "t_r", m->t_r);
   put_number(meta, "weight_bits", m->scales.weight_bits);
+  if (m->scales.weight_bits) put_number(meta, "h_shift", SF_H_SHIFT);
   if (c.backbone != SF_TENSORF) return;
   put_number(meta, "backbone", c.backbone);
   put_number(meta, "ndc", c.tensorf.ndc);
@@ -195,6 +196,11 @@ static sf_status load_scales(sf_scales *s, const sf_tensors *set)
   if (s->weight_bits < 2 || s->weight_bits > SF_WEIGHT_BITS)
     return sf_fail(SF_E_RANGE, "%s: metadata key 'weight_bits' is %d, expected 2..%d", set->path, s->weight_bits,
                    SF_WEIGHT_BITS);
+  int32_t h_shift = 3; /* of files that do not say */
+  if (sf_tensors_meta(set, "h_shift")) SF_TRY(meta_int(set, "h_shift", &h_shift));
+  if (h_shift != SF_H_SHIFT)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: fine-tuned for h = current >> %d, this build has H_SHIFT = %d", set->path,
+                   h_shift, SF_H_SHIFT);
   SF_TRY(sf_tensors_get(set, "scales", SF_F32, 1, shape, &t));
   memcpy(&s->lsb, t->data, sizeof s->lsb);
   for (int i = 0; i < SF_SCALES; i++) {
