@@ -55,9 +55,9 @@ make_wide() {
     VERILATED_OBJ="$(printf "$build/verilated/runtime/%s.o " verilated verilated_fst_c verilated_threads)" "$@" >"$work/out" 2>"$work/err"
 }
 needed='$(filter-out %_isa.c,$(foreach room,base scene field snn fx quant,$(wildcard src/$(room)/*.c)))'
-needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256 text)'
+needed+=' $(patsubst %,src/audit/%.c,compare energy measure recount report sha256 text) src/render/view.c'
 harness='$(filter-out sim/soc% sim/view_set% sim/three_counts% sim/audit_run%,$(wildcard sim/*.c))'
-make_wide LIB_SRC="$needed" SIM_SRC="$harness" ISAS_snn='' "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" "$wide/tests/test_snn" || fail "256 lanes: no build"
+make_wide LIB_SRC="$needed" SIM_SRC="$harness" "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" "$wide/tests/test_snn" || fail "256 lanes: no build"
 "$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"
 "$wide/bin/sf_cosim" "$work/256.snn" "$work/data" --rays 30 --limit-samples 500 --seed 1 --quiet --json \
   --evidence "$work/evidence" >"$work/out" 2>"$work/err" || fail "256 lanes: a net of 256 neurons"

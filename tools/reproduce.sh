@@ -45,7 +45,7 @@ case $profile in
     set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=0)
     ;;
   smoke)
-    set+=([stage1]=30 [stage2]=60 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=0)
+    set+=([stage1]=30 [stage2]=40 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=0)
     set+=([samples]=512 [rtl-rays]=0)
     set+=([train]="--levels 4 --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32")
     ;;
