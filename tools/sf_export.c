@@ -62,10 +62,10 @@ static void print_text(const fx_scene *scene, const sf_quant_report *report, boo
   printf("packed: %lld bytes at %d-bit weights, %d-bit features, %d-bit leaks, %d-bit grid entries\n",
          (long long)report->packed_bytes, report->widths.weight_bits, report->widths.feature_bits,
          report->widths.leak_bits, report->widths.grid_bits);
-  if (report->tuned_bits && !report->settled)
+  if (report->unused_tuning)
     printf("note: fine-tuned for %d-bit weights, %d-bit features and %d-bit grid entries; those scales are not used "
            "here\n",
-           report->tuned_bits, SF_INPUT_BITS, SF_GRID_BITS);
+           report->unused_tuning, SF_INPUT_BITS, SF_GRID_BITS);
   if (!fit) printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
 }
 

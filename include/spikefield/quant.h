@@ -42,10 +42,9 @@ typedef struct sf_quant_report {
   int64_t grid_clipped;   /* grid entries beyond the largest that grid_bits hold */
   int32_t samples;        /* calibration samples */
   sf_quant_widths widths; /* as used: no zeros */
-  sf_scales scales;       /* as chosen, or the model's own if it was fine-tuned for these widths: settled */
-  bool settled;
-  int32_t tuned_bits;   /* weights that the model was fine-tuned for; 0: it was not */
-  int64_t packed_bytes; /* sf_packed_bytes */
+  sf_scales scales;       /* as chosen, or the model's own if it was fine-tuned for these widths */
+  int32_t unused_tuning;  /* bits of the weights that it was fine-tuned for at other widths than these; else 0 */
+  int64_t packed_bytes;   /* sf_packed_bytes */
 } sf_quant_report;
 sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                              sf_quant_report *report);

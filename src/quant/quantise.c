@@ -171,8 +171,7 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   report->samples = calibration->samples;
   sf_quantise_grid(scene, model, calibration, report);
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
-  report->tuned_bits = model->scales.weight_bits;
-  report->settled = sf_settled_scales(model, &report->widths) != NULL;
+  report->unused_tuning = sf_settled_scales(model, &report->widths) ? 0 : model->scales.weight_bits;
   report->scales = scales_of(scene, report->widths.weight_bits);
   return fx_scene_check(scene, name);
 }
