@@ -85,9 +85,9 @@ START_TEST(compaction_keeps_what_light_reaches)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
-  o.stage1 = 60;
+  o.stage1 = 110;
   sf_trainer *t = start(&data, &o, NULL);
-  steps(t, 50);
+  steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
   for (int i = 0; i < t->model.config.hidden; i++) sf_model_param(&t->model, SF_P_W2)[i] *= 6; /* opaque objects */
   ck_good(sf_batch_draw(t));

@@ -19,6 +19,7 @@ typedef struct budget {
   fx_scene scene;
   sf_dataset data;
   sf_budget_row row[SF_BUDGET_BLOCKS];
+  sf_picture_job job;
   sf_picture_budget picture;
   sf_progress progress;
 } budget;
@@ -44,7 +45,8 @@ static bool tick(void *user, int row)
   return !sf_cli_interrupted();
 }
 
-static sf_status measure_picture(budget *b)
+/* Whatever is wrong with the three files is said before the blocks are measured. */
+static sf_status load_picture(budget *b)
 {
   const options *o = &b->opt;
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .limit = o->view + 1};
@@ -56,16 +58,16 @@ static sf_status measure_picture(budget *b)
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,
                    o->split);
-  const sf_picture_job job = {.model = &b->model,
-                              .scene = &b->scene,
-                              .data = &b->data,
-                              .view = &b->data.view[o->view],
-                              .name = o->scene,
-                              .rays = o->rays,
-                              .seed = o->seed,
-                              .tick = tick,
-                              .user = b};
-  return sf_picture_budget_make(&job, &b->picture);
+  b->job = (sf_picture_job){.model = &b->model,
+                            .scene = &b->scene,
+                            .data = &b->data,
+                            .view = &b->data.view[o->view],
+                            .name = o->scene,
+                            .rays = o->rays,
+                            .seed = o->seed,
+                            .tick = tick,
+                            .user = b};
+  return sf_picture_budget_check(&b->job);
 }
 
 static sf_status print_json(const budget *b)
@@ -78,9 +80,10 @@ static sf_status print_json(const budget *b)
 
 static sf_status work(budget *b)
 {
+  if (b->opt.model) SF_TRY(load_picture(b));
   sf_progress_begin(&b->progress, b->opt.quiet);
   sf_status status = measure_blocks(b);
-  if (status.code == SF_OK && b->opt.model) status = measure_picture(b);
+  if (status.code == SF_OK && b->opt.model) status = sf_picture_budget_make(&b->job, &b->picture);
   sf_progress_end(&b->progress);
   SF_TRY(status);
   if (b->opt.json) return print_json(b);

@@ -103,6 +103,8 @@ typedef struct sf_picture_job {
   bool (*tick)(void *user, int row);
   void *user;
 } sf_picture_job;
+/* SF_E_UNSUPPORTED if the scene is not the plain export of this model: other sizes or weights, unknown units. */
+sf_status sf_picture_budget_check(const sf_picture_job *job);
 sf_status sf_picture_budget_make(const sf_picture_job *job, sf_picture_budget *budget);
 void sf_picture_budget_print(FILE *out, const sf_picture_budget *budget);
 cJSON *sf_picture_budget_json(const sf_picture_budget *budget);

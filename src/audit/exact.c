@@ -47,10 +47,12 @@ static void set_weights(sf_exact *e, int l)
 bool sf_exact_resembles(const fx_scene *scene, const sf_model *model, int l)
 {
   const fx_layer *layer = &scene->net.layer[l];
-  double all = 0, apart = 0;
+  double all = 0, apart = 0, limit = 0;
+  for (int i = 0; i < layer->n_in; i++)
+    for (int o = 0; o < layer->n_out; o++) limit = fmax(limit, abs(layer->w[i * SF_LANES + o]));
   for (int i = 0; i < layer->n_in; i++)
     for (int o = 0; o < layer->n_out; o++) {
-      const double w = real_weight(scene, model, l, o, i);
+      const double w = clamp(real_weight(scene, model, l, o, i), -limit, limit);
       all += w * w, apart += pow(w - layer->w[i * SF_LANES + o], 2);
     }
   return apart <= all / 4;

@@ -32,7 +32,8 @@ static inline bool sf_exact_is(const sf_exact *e, sf_exact_id id)
   return e->mask >> id & 1;
 }
 
-/* The scene's weights of a layer are the model's, rounded: a quarter of their power apart at most. */
+/* The scene's weights of a layer are the model's, rounded and, where inputs are silent, clipped: a quarter of their
+ * power apart at most. */
 bool sf_exact_resembles(const fx_scene *scene, const sf_model *model, int layer);
 sf_status sf_exact_open(sf_exact *exact, const fx_scene *scene, const sf_model *model, uint32_t mask);
 void sf_exact_close(sf_exact *exact);

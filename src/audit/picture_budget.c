@@ -291,8 +291,7 @@ static sf_status make_row(const sf_picture_job *job, int row, ray_result *result
   return sf_ok();
 }
 
-/* The scene must be the plain export of this model: same sizes, known units. */
-static sf_status check_pair(const sf_picture_job *job)
+sf_status sf_picture_budget_check(const sf_picture_job *job)
 {
   const sf_config *c = &job->model->config;
   const fx_layer *l = job->scene->net.layer;
@@ -318,7 +317,7 @@ static sf_status check_pair(const sf_picture_job *job)
 sf_status sf_picture_budget_make(const sf_picture_job *job, sf_picture_budget *budget)
 {
   *budget = (sf_picture_budget){.rays = job->rays};
-  SF_TRY(check_pair(job));
+  SF_TRY(sf_picture_budget_check(job));
   ray_result *result = calloc(2 * job->rays, sizeof *result);
   if (!result) return sf_fail(SF_E_MEMORY, "no memory for %llu rays", (unsigned long long)job->rays);
   sf_status status = sf_ok();
