@@ -36,16 +36,32 @@ header() { # FOLDER that holds rtl/
 }
 header . || fail "sf_csr.h and csr.def differ: $(grep -m 1 error "$work/out")"
 
-first_look() { # FOLDER: the bench of sim/ with the RTL files that spikefield.core names
+simulate() { # FOLDER TOP: the RTL files that spikefield.core names, in Icarus
   local files
   files=$(sed -n 's/^      - \([a-z_0-9/]*\.sv\)$/\1/p' "$1/spikefield.core")
   # shellcheck disable=SC2086
-  (cd "$1" && iverilog -g2012 -Irtl -s sf_registers_tb -o "$work/tb" $files) >"$work/out" 2>&1 &&
+  (cd "$1" && iverilog -g2012 -Irtl -s "$2" -o "$work/tb" $files) >"$work/out" 2>&1 &&
     vvp -n "$work/tb" >"$work/out" 2>&1
+}
+first_look() { simulate "$1" sf_registers_tb; }
+# Widths in arch.def that a top level is not written for: it says so when a simulation starts, and else is silent.
+refuses() { # FOLDER TOP NAME OTHER: with that value of the package, and not without it
+  simulate "$1" "$2" || fail "$2: $(head -n 3 "$work/out")"
+  grep -q "is written for" "$work/out" && fail "$2 refuses its own widths"
+  rm -rf "$work/other"
+  mkdir "$work/other"
+  cp -r "$1/rtl" "$1/sim" "$1/spikefield.core" "$work/other"
+  sed -i -E "s/( $3 = )[0-9]+;/\1$4;/" "$work/other/rtl/gen/sf_arch_pkg.sv"
+  simulate "$work/other" "$2"
+  grep -q "is written for" "$work/out" || { echo "$2 takes $3 = $4"; return 1; }
 }
 if command -v iverilog >/dev/null; then
   first_look . || fail "sf_registers_tb: $(tail -n 2 "$work/out")"
   tail -n 1 "$work/out"
+  for width in POS_FRAC=23 DELTA_FRAC=23 TRANS_FRAC=16; do
+    refuses . sf_ray_top "${width%=*}" "${width#*=}" || fail "widths that sf_ray_top is not written for"
+  done
+  refuses . sf_top WEIGHT_BITS 7 || fail "widths that sf_top is not written for"
 else
   echo "skipped: iverilog is not installed; the first simulation was not run"
 fi
@@ -89,6 +105,8 @@ header_of() { header "$1" || { cat "$work/out"; return 1; }; }
 planted rtl/gen/sf_csr.h "s/(SF_REG_STEPS 0x00)24/\128/" "STEPS" header_of
 if command -v iverilog >/dev/null; then
   look_of() { first_look "$1" || { cat "$work/out" >"$work/said"; cat "$work/said"; return 1; }; }
+  refuses_of() { refuses "$1" sf_ray_top TRANS_FRAC 16; }
+  planted rtl/sf_ray_top.sv "s/ \|\| sf_arch_pkg::TRANS_FRAC != 20//" "sf_ray_top takes TRANS_FRAC" refuses_of
   planted rtl/sf_csr.sv "s/& ~wdata_i\[10:0\]/\& wdata_i[10:0]/" "expected" look_of
 fi
 echo "package: $seen planted faults seen"
