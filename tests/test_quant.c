@@ -495,7 +495,7 @@ START_TEST(narrow_inputs_never_clip)
 }
 END_TEST
 
-/* Models at the edge of sense still give a scene that passes its check. */
+/* Models at the edge of sense still give a scene that passes its check, and scales that a model's file may hold. */
 START_TEST(extreme_models)
 {
   static const float scales[] = {0, 1e-42f, 1e-20f, 1e-4f, 1};
@@ -503,13 +503,21 @@ START_TEST(extreme_models)
     for (int part = 0; part < SF_P_LEAK; part++) {
       sf_model m = make_model(16, 3, SF_HYBRID);
       fx_scene scene;
+      sf_quant_report report;
       float *value = sf_model_param(&m, part);
       if (scales[i] != 1)
         for (size_t n = 0; n < m.param[part].size; n++) value[n] *= scales[i];
       if (scales[i] == 1) m.config.theta[part % 3] = 1e6f, memset(m.occupancy, 0, 512);
+      if (scales[i] == 1e-4f && part == SF_P_GRID)
+        memset(value, 0, m.param[part].size / 16 * sizeof *value); /* a level, too */
       m.config.scale = i % 2 ? 1e-6f : 1e6f;
-      const sf_status status = sf_quantise(&scene, &m, "model", &plain);
+      const sf_status status = sf_quantise_report(&scene, &m, "model", &plain, &report);
       ck_assert_msg(status.code == SF_OK, "part %d scale %g: %s", part, (double)scales[i], status.message);
+      for (int n = 0; n < SF_SCALES; n++) {
+        const float lsb = ((const float *)&report.scales.lsb)[n];
+        ck_assert_msg(lsb > 1e-30f && lsb < 1e30f, "part %d scale %g: LSB %d is %g", part, (double)scales[i], n,
+                      (double)lsb);
+      }
       fx_scene_free(&scene);
       sf_model_free(&m);
     }

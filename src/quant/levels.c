@@ -6,8 +6,8 @@
 #include <string.h>
 
 enum { PRODUCT_FRAC = 16, SHIFT_MAX = 31, TRIALS = 4, SCALE_TRIALS = 8, SCALE_TRIALS_MAX = 20 };
-static const double NARROWER = 0.86;      /* 0.86^7 = 0.35 of the widest scale is tried, and less where that pays */
-static const double SCALE_MIN = 0x1p-140; /* below every difference of two floats */
+enum { EXPONENT_MIN = -70 };         /* of the LSB of features: what is smaller is zero, and scales fit a file */
+static const double NARROWER = 0.86; /* 0.86^7 = 0.35 of the widest scale is tried, and less where that pays */
 
 /* Geometry alone: what fx_scene_allocate needs. */
 void sf_quantise_levels(fx_grid *grid, const sf_model *model)
@@ -41,7 +41,7 @@ static int feature_exponent(const sf_calibration *c, int feature_max)
   double largest = 0, best_error = INFINITY;
   for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(c->f[i]));
   if (largest == 0) return -10;
-  const int widest = (int)ceil(log2(largest / feature_max));
+  const int widest = (int)fmax(ceil(log2(largest / feature_max)), EXPONENT_MIN);
   int best = widest;
   for (int trial = 0; trial < TRIALS; trial++) {
     const double lsb = ldexp(1, widest - trial);
@@ -124,13 +124,14 @@ static int64_t fill_settled(fx_scene *scene, const float *value, const sf_scales
   return clipped;
 }
 
-/* The scale that just holds the level's largest entry; a level without entries of its own gets any. */
-static double widest_scale(const fx_grid *grid, const float *value, int level, int entry_max)
+/* The scale that just holds the level's largest entry, but not so fine that the largest shift leaves its features
+ * below `common`: such a level says nothing, or is empty. */
+static double widest_scale(const fx_grid *grid, const float *value, int level, const format *format)
 {
   double largest = 0;
   const int64_t end = level_end(grid, level) * FX_GRID_FEATURES;
   for (int64_t i = grid->offset[level] * FX_GRID_FEATURES; i < end; i++) largest = fmax(largest, fabs(value[i]));
-  return fmax(largest / entry_max, SCALE_MIN);
+  return fmax(largest / format->entry_max, ldexp(format->common, PRODUCT_FRAC - SHIFT_MAX));
 }
 
 /* Squared error of each level's features on the calibration positions with the table as it stands. */
@@ -155,7 +156,7 @@ static void choose_scales(fx_scene *scene, const float *value, const sf_calibrat
 {
   double widest[FX_LEVELS_MAX], best_error[FX_LEVELS_MAX];
   for (int l = 0; l < scene->grid.levels; l++)
-    widest[l] = widest_scale(&scene->grid, value, l, format->entry_max), best_error[l] = INFINITY;
+    widest[l] = widest_scale(&scene->grid, value, l, format), best_error[l] = INFINITY;
   bool better = true;
   for (int trial = 0; trial < SCALE_TRIALS || (better && trial < SCALE_TRIALS_MAX); trial++) {
     double scale[FX_LEVELS_MAX], error[FX_LEVELS_MAX];
