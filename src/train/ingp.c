@@ -108,7 +108,7 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
 }
 
 const sf_backbone sf_backbone_ingp = {.nets = SF_P_W1,
-                                      .growth = 1e3f,
+                                      .growth = 3e3f,
                                       .weights = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5},
                                       .create = create,
                                       .destroy = destroy,
