@@ -90,21 +90,20 @@ typedef struct sf_picture_budget {
   sf_current_row current[SF_LAYERS];
 } sf_picture_budget;
 
-/* `rays` random pixels of one view (seeded), rendered once per row. The row "none" must be the core's picture bit for
- * bit, which is checked (SF_E_DIFFERENCE). scene must be the plain export of model; sizes that differ are refused
- * (SF_E_UNSUPPORTED). tick may be NULL; false stops. */
 typedef struct sf_picture_job {
   const sf_model *model;
-  const fx_scene *scene;
+  const fx_scene *scene; /* the plain export of model */
   const sf_dataset *data;
   const sf_view *view; /* of data */
   const char *name;    /* of the scene, for messages */
   uint64_t rays, seed;
-  bool (*tick)(void *user, int row);
+  bool (*tick)(void *user, int row); /* before each row; false stops; may be NULL */
   void *user;
 } sf_picture_job;
 /* SF_E_UNSUPPORTED if the scene is not the plain export of this model: other sizes or weights, unknown units. */
 sf_status sf_picture_budget_check(const sf_picture_job *job);
+/* `rays` random pixels of one view (seeded), rendered once per row. The row "none" must be the core's picture bit for
+ * bit, which is checked (SF_E_DIFFERENCE). Makes the check above, too. */
 sf_status sf_picture_budget_make(const sf_picture_job *job, sf_picture_budget *budget);
 void sf_picture_budget_print(FILE *out, const sf_picture_budget *budget);
 cJSON *sf_picture_budget_json(const sf_picture_budget *budget);
