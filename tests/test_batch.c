@@ -1,4 +1,4 @@
-/* Packing of rays into bundles of blocks, their number, and compaction against the naive transmittance. */
+/* Packing of rays into bundles of blocks, and compaction against the naive transmittance. */
 #include "ck_run.h"
 #include "render/composite.h"
 #include "train_fixture.h"
@@ -137,37 +137,6 @@ START_TEST(compaction_keeps_what_light_reaches)
 }
 END_TEST
 
-/* Rays of 16 samples, once the count has come to rest. */
-static int rays_wanted(sf_trainer *t, double minutes, double progress)
-{
-  t->options.minutes = minutes;
-  t->progress = progress;
-  for (int i = 0; i < 8; i++) {
-    t->batch.samples = 16 * t->rays;
-    sf_batch_adapt(t);
-  }
-  return t->rays;
-}
-
-START_TEST(batches_grow_in_a_time_budget)
-{
-  sf_dataset data = load("train");
-  sf_train_options o = small_run();
-  o.samples = 1 << 14;
-  o.minutes = 1;
-  sf_trainer *t = start(&data, &o, NULL);
-  const int stride = t->stride;
-  ck_assert_int_eq(t->rays, 128);
-  ck_assert_int_eq(rays_wanted(t, 1, 0), 128);
-  ck_assert_int_eq(rays_wanted(t, 1, 0.5), 362); /* 2^-1.5 */
-  ck_assert_int_eq(rays_wanted(t, 1, 1), 1024);
-  ck_assert_int_eq(rays_wanted(t, 0, 0), 1024);
-  ck_assert_int_eq(t->stride, stride); /* fewer rays were asked for: no reason for a coarser lattice */
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-}
-END_TEST
-
 static void set_up(void)
 {
   make_scene(4);
@@ -182,7 +151,6 @@ int main(void)
   tcase_add_test(c, every_ray_is_in_one_bundle);
   tcase_add_test(c, fewer_samples_may_take_more_blocks);
   tcase_add_test(c, compaction_keeps_what_light_reaches);
-  tcase_add_test(c, batches_grow_in_a_time_budget);
   suite_add_tcase(s, c);
   return ck_run_in(s, CK_NOFORK); // OpenMP does not survive a fork
 }

@@ -11,7 +11,7 @@ typedef struct sf_train_options {
   int stage1, stage2; /* iterations; ignored when minutes > 0 */
   double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;
-  int samples;            /* samples per iteration, about; hash grid with minutes: at the end, an eighth at first */
+  int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
   bool no_stage1, no_extra, no_penalty, no_distill;
   bool no_scaling; /* no max time-step scaling in the first epoch of each stage */

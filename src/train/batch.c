@@ -120,19 +120,13 @@ int sf_batch_most(const sf_trainer *t)
   return t->options.rays ? t->options.rays : RAYS_MAX;
 }
 
-double sf_batch_share(const sf_trainer *t)
-{
-  return t->options.minutes > 0 && !sf_tuning(t) ? pow(t->backbone->first_batch, 1 - t->progress) : 1;
-}
-
 /* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
  * be empty, the lattice is made coarser, until it is settled. */
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
-  const int most = sf_batch_most(t), all_few = most < 512 ? most : 512, all_many = most < 768 ? 2 * most - 1 : 1536;
-  const double share = sf_batch_share(t), ratio = share * t->options.samples / fmax(b->samples, 1);
-  const int few = (int)(share * all_few), many = (int)(share * all_many);
+  const int most = sf_batch_most(t), few = most < 512 ? most : 512, many = most < 768 ? 2 * most - 1 : 1536;
+  double ratio = t->options.samples / fmax(b->samples, 1);
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
   if (t->progress < sf_lattice_settles && !sf_tuning(t)) {
     if (t->rays < few && t->stride < 8) t->stride *= 2, t->rays *= 2;

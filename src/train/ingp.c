@@ -29,7 +29,7 @@ static sf_status create_workers(sf_trainer *t)
 
 static sf_status create(sf_trainer *t)
 {
-  t->rays = (int)(1024 * sf_batch_share(t));
+  t->rays = 1024;
   t->stride = sf_tuning(t) ? 1 : 4;
   t->density = sf_aligned_alloc(sf_config_cells(&t->model.config) * sizeof(float));
   if (!t->density) return sf_fail(SF_E_MEMORY, "train: no memory for the occupancy grid");
@@ -109,7 +109,6 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
 
 const sf_backbone sf_backbone_ingp = {.nets = SF_P_W1,
                                       .growth = 3e3f,
-                                      .first_batch = 0.125f,
                                       .weights = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5},
                                       .create = create,
                                       .destroy = destroy,

@@ -109,7 +109,6 @@ struct sf_probes;
 typedef struct sf_backbone {
   int nets;                           /* first parameter that is not the field's */
   float growth;                       /* of features from the start of a run to the size that neurons are scaled for */
-  float first_batch;                  /* samples of the first iterations of a time budget, over those of the last */
   int weights[SF_LAYERS];             /* parameters of layers D1 D2 C1 C2 C3; -1: no such layer */
   sf_status (*create)(sf_trainer *t); /* memory; the model is there */
   void (*destroy)(sf_trainer *t);
@@ -162,9 +161,6 @@ void sf_batch_free(sf_batch *batch);
 void sf_batch_ray(const sf_trainer *trainer, uint64_t index, sf_ray *ray);
 /* Draws and marches `trainer->rays` rays; packs them into bundles. */
 sf_status sf_batch_draw(sf_trainer *trainer);
-/* Of the asked samples, in the next iteration: where minutes are given and not iterations, many small ones come first,
- * and they grow by the same factor in every tenth of the run. */
-double sf_batch_share(const sf_trainer *trainer);
 /* Number of rays of the next iteration, from the samples of this one. */
 void sf_batch_adapt(sf_trainer *trainer);
 int sf_batch_most(const sf_trainer *t); /* rays of an iteration */

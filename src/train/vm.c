@@ -117,7 +117,6 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
 
 const sf_backbone sf_backbone_tensorf = {.nets = SF_V_BASIS,
                                          .growth = 1,
-                                         .first_batch = 1,
                                          .weights = {-1, -1, SF_V_W1, SF_V_W2, SF_V_W3},
                                          .create = create,
                                          .destroy = destroy,

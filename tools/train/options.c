@@ -33,7 +33,7 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
       {"--seed", 's', SF_ARG_U64, &t->seed, 0, 9e15, NULL, "S", "same seed, same bits, any thread count (default 1)"},
       {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
       {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N",
-       "samples per iteration, about; --minutes on the hash grid starts with an eighth (default 16384, tensorf 32768)"},
+       "samples per iteration, about (default 16384, tensorf 32768)"},
       {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "tensorf: rays per iteration at most (default 4096)"},
       {"--voxels", 0, SF_ARG_INT, &t->voxels, 16, 1024, NULL, "N",
        "tensorf: the finest grid has N^3 voxels (default half the pictures' width, at most 300; NDC: 0.63 of it, "
