@@ -180,7 +180,7 @@ vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAM
 	SF_FX_SAMPLES=$(SAMPLES) $B/tests/test_fx_vector
 
 asan: ## the C tests under address and undefined-behaviour sanitizers
-	@$(MAKE) B=$B/asan $(SAME_ARCH) OPT=-O1 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
+	@$(MAKE) B=$B/asan $(SAME_ARCH) OPT=-O2 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
 ASAN_TESTS := $(filter-out $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
