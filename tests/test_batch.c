@@ -89,7 +89,7 @@ START_TEST(compaction_keeps_what_light_reaches)
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
-  for (int i = 0; i < t->model.config.hidden; i++) sf_model_param(&t->model, SF_P_W2)[i] *= 6; /* opaque objects */
+  for (int i = 0; i < t->model.config.hidden; i++) sf_model_param(&t->model, SF_P_W2)[i] *= 20; /* opaque objects */
   ck_good(sf_batch_draw(t));
   sf_batch *b = &t->batch;
   const int rays = b->rays;
