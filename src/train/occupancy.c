@@ -1,10 +1,16 @@
-/* Occupancy grid: density of random points of some cells, running maximum with decay, threshold (torch-ngp). */
+/* Occupancy grid: density of random points of some cells, running maximum with decay, threshold (torch-ngp).
+ *
+ * A cell that is taken for empty gets no rays, so nothing but a visit brings it back. Two rules keep thin parts:
+ * nothing is called empty before it was looked at, and the neighbours of what is occupied are looked at each time. */
 #include "train/internal.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
-/* An update visits 1/SHARE of the cells of one cascade (but anywhere), and as many of the occupied ones. */
-enum { SHARE = 32 };
+/* An update visits 1/SHARE of the cells of one cascade (but anywhere), as many of the occupied ones, and as many of
+ * their neighbours. Updates at iterations FIRST, 4 FIRST and 16 FIRST visit every cell: by then the field has changed
+ * so much that what was seen before says nothing. */
+enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
 static const float decay = 0.95f, density_threshold = 10.0f;
 
@@ -85,20 +91,71 @@ static void threshold(sf_trainer *t, size_t cells)
   t->occupied = (double)occupied / (double)cells;
 }
 
+/* The empty cells that touch an occupied one, in the order in which the occupied ones find them. list: the occupied
+ * cells; replaced. */
+static size_t list_neighbours(const sf_trainer *t, uint32_t *list, size_t occupied, uint8_t *seen)
+{
+  const size_t res = (size_t)t->model.config.occ_res, per = res * res * res;
+  size_t found = occupied;
+  memcpy(seen, t->model.occupancy, sf_config_cells(&t->model.config) / 8);
+  for (size_t i = 0; i < occupied; i++) {
+    const size_t in = list[i] % per, x = in % res, y = in / res % res, z = in / res / res;
+    for (size_t k = z ? z - 1 : 0; k <= z + 1 && k < res; k++)
+      for (size_t j = y ? y - 1 : 0; j <= y + 1 && j < res; j++)
+        for (size_t h = x ? x - 1 : 0; h <= x + 1 && h < res; h++) {
+          const size_t cell = list[i] - in + (k * res + j) * res + h;
+          if (seen[cell / 8] >> cell % 8 & 1) continue;
+          seen[cell / 8] |= (uint8_t)(1u << cell % 8);
+          list[found++] = (uint32_t)cell;
+        }
+  }
+  memmove(list, list + occupied, (found - occupied) * sizeof *list);
+  return found - occupied;
+}
+
+/* As many of the listed cells as an update visits, spread over the list. */
+static void visit_list(sf_trainer *t, const uint32_t *list, size_t count, size_t most, uint64_t stream, int steps)
+{
+  const size_t stride = (count + most - 1) / most;
+  const visit some = {list, stride ? count / stride : 0, stride ? stride : 1, stream};
+  if (some.count) visit_cells(t, &some, steps);
+}
+
+static bool is_sweep(int64_t iteration)
+{
+  for (int64_t at = FIRST; at <= LAST_SWEEP; at *= 4)
+    if (iteration == at) return true;
+  return false;
+}
+
+static void update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen)
+{
+  const size_t cells = sf_config_cells(&t->model.config);
+  const size_t share = SHARE * (size_t)sf_config_cascades(&t->model.config), most = cells / share;
+  if (is_sweep(t->iteration)) {
+    memset(t->density, 0, cells * sizeof *t->density);
+    visit_cells(t, &(visit){NULL, cells, 1, RNG_OCCUPANCY}, steps);
+  } else {
+    size_t occupied = 0;
+    for (size_t i = 0; i < cells; i++)
+      if (t->model.occupancy[i / 8] >> (i % 8) & 1) list[occupied++] = (uint32_t)i;
+    visit_cells(t, &(visit){NULL, most, share, RNG_OCCUPANCY}, steps);
+    visit_list(t, list, occupied, most, RNG_OCCUPANCY + 16, steps);
+    const size_t near = list_neighbours(t, list, occupied, seen);
+    visit_list(t, list, near, most, RNG_OCCUPANCY + 32, steps);
+  }
+  threshold(t, cells);
+}
+
 sf_status sf_occupancy_update(sf_trainer *t, int steps)
 {
-  const size_t cells = sf_config_cells(&t->model.config), share = SHARE * (size_t)sf_config_cascades(&t->model.config);
-  const visit all = {NULL, t->iteration ? cells / share : cells, t->iteration ? share : 1, RNG_OCCUPANCY};
+  const size_t cells = sf_config_cells(&t->model.config);
+  if (t->iteration < FIRST) return sf_ok();
   uint32_t *list = malloc(cells * sizeof *list);
-  if (!list) return sf_fail(SF_E_MEMORY, "train: no memory for the occupancy update");
-  size_t occupied = 0;
-  for (size_t i = 0; i < cells; i++)
-    if (t->model.occupancy[i / 8] >> (i % 8) & 1) list[occupied++] = (uint32_t)i;
-  visit_cells(t, &all, steps);
-  const size_t stride = (occupied + cells / share - 1) / (cells / share);
-  const visit some = {list, stride ? occupied / stride : 0, stride ? stride : 1, RNG_OCCUPANCY + 16};
-  if (t->iteration && some.count) visit_cells(t, &some, steps);
-  threshold(t, cells);
+  uint8_t *seen = malloc(cells / 8);
+  if (list && seen) update(t, steps, list, seen);
+  const bool ok = list && seen;
   free(list);
-  return sf_ok();
+  free(seen);
+  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for the occupancy update");
 }
