@@ -173,7 +173,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
+	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce quality pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -230,6 +230,9 @@ reproduce-report: all ## table and plots of the runs that are there
 pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
 	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
 
+quality: all ## what short runs of eight scenes learn, spiking and twin, beside the last table kept (SCENES=, QUALITY="--keep"): build/quality
+	@tools/quality.sh $B --scenes "$(SCENES)" $(QUALITY)
+
 bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
 	@models=$$(tests/bench_models.sh $B "$(SCENES)") && mapfile -t model <<<"$$models" && $B/tests/bench $B/bench.json "$${model[@]}"
 
@@ -254,6 +257,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report quality pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

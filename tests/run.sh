@@ -39,6 +39,7 @@ run() {
     synth) command=("$here/test_synth.sh") ;;
     package) command=("$here/test_package.sh") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
+    quality) command=("$here/quality.sh" "$build") ;;
     nir) command=(python3 "$here/crosscheck_nir.py" "$build/tests/test_nir") ;;
     *) command=("$build/tests/$name") ;;
   esac

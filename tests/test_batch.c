@@ -95,7 +95,7 @@ START_TEST(compaction_keeps_what_light_reaches)
   for (int i = 0; i < b->blocks * SF_BLOCK; i++) b->delta[i] *= 30; /* light ends, sample by sample */
   int *expected = calloc((size_t)rays, sizeof *expected), dropped = 0;
   float *first_x = calloc((size_t)rays, sizeof *first_x);
-  const sf_loss_plan plan = {.stage = 2, .steps = T, .t_f = 2, .t_c = 3, .t_r = 2};
+  const sf_loss_plan plan = {.steps = T, .regular_at = 3, .weight = {[1] = 0.5f, [2] = 0.5f, [T - 1] = 1}};
   for (int r = 0; r < rays; r++) {
     double depth[3] = {0};
     const int prefix[3] = {2, 3, T};

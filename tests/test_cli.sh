@@ -188,7 +188,7 @@ number sf_train --voxels 8 2000 nan
 number sf_train --rays 1 nan
 usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
 data "vm.safetensors: --fine-tune knows" sf_train d -o out --fine-tune vm.safetensors
-for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3 --no-stage1 --no-distill --beta\ 1; do
+for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3 --no-stage1 --no-distill --beta\ 1 --price\ energy --target-loss\ 1 --objective\ paper; do
   usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune model.safetensors $option
 done
 for option in --stage1 --stage2; do usage "$option has no effect beside --minutes" sf_train d -o out -m 1 $option 4; done
@@ -202,6 +202,12 @@ for options in "" "--backbone tensorf" "--scale 0.3"; do
   data "cannot resume: this is no checkpoint but a finished model" sf_train d -o model.safetensors --resume $options
 done
 number sf_train --fixed-steps -1 9 nan
+number sf_train --target-loss -1 21 nan x
+number sf_train --target-saving -1 101 nan x
+number sf_train --search-rate 0 -1 101 nan x
+usage --price sf_train d -o out --price euros
+usage --objective sf_train d -o out --objective none
+usage "exclude each other" sf_train d -o out --target-loss 0.1 --target-saving 50
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan
 usage --fine-tune sf_train d -o out --weight-bits 4
@@ -313,6 +319,11 @@ echo '{"psnr": 30, "ssim": null, "T": 8, "t_r": 2}' | tee tiny/{train,float}.jso
 echo '{"samples": 1, "differences": 0}' >tiny/cosim.json
 echo '{"energy_spiking_fj": 1, "energy_ann_fj": 2, "energy_saving_percent": 50}' >tiny/audit.json
 good sf_summary tiny 3
+grep -q 'time steps' stdout.txt && fail "sf_summary" "a search that was not"
+sed -i 's/{/{"t_star": 2.5, "search": {"state": "balanced", "worth": 1.5e-5, "worth_error": 2e-6, "price": 1.4e-5}, /' tiny/train.json
+good sf_summary tiny 3
+grep -q 't\* = 2.50 (balanced): one more is worth 1.5e-05 +- 2e-06 of squared error and costs 1.4e-05$' stdout.txt ||
+  fail "sf_summary" "no line about the search"
 grep -q 'SSIM -$' stdout.txt || fail "sf_summary" "no '-' for an SSIM that there is not"
 grep -Eq '"ssim_fixed":[[:space:]]*null' tiny/summary.json || fail "sf_summary" "no null in summary.json"
 data "no folder SCENE/RUN" sf_report d

@@ -211,7 +211,7 @@ START_TEST(trace_faults)
 {
   const float o[3] = {0, 0, 3}, d[3] = {0, 0, -1}, none[3] = {0};
   float c[4];
-  ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars", "textured, simple, fog, empty, plaza");
+  ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars", "textured, simple, fog, empty, plaza, wires");
   ck_bad(sf_procedural_trace("fog", o, none, c), SF_E_RANGE, "fog", "direction");
 }
 END_TEST

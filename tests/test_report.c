@@ -258,7 +258,7 @@ START_TEST(plots_and_json)
   write_run("it's", "beta-5e-7", 30, 2);
   write_text("it's/beta-5e-7/train.json",
              "{\"model\":\"/home/somebody/m\",\"psnr\":30,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,"
-             "\"prefix_psnr\":[25,30,30.5]}");
+             "\"search\":{\"worth\":2e-5,\"worth_error\":1e-6,\"price\":3e-5},\"prefix_psnr\":[25,30,30.5]}");
   write_text("it's/fixed-t-minus-1/status", "skipped: 0 steps are outside 1..8\n");
   write_text("notes/readme", "no scene\n");
   load();
@@ -266,7 +266,9 @@ START_TEST(plots_and_json)
   ck_assert(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 1) == 30);
   ck_assert(isnan(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 3)));
   ck_good(sf_reproduction_plots(&report, &count));
-  ck_assert_int_eq(count, 2);
+  ck_assert_int_eq(count, 3);
+  contains("plots/balance-it's.gp", "\n2.00000 2e-05 1e-06\n", true);
+  contains("plots/balance-it's.gp", "plot 3e-05 * exp(x - 2.00000) with lines", true);
   contains("plots/psnr-steps.gp", "\n2 30\n", true);
   contains("plots/psnr-steps-it's.gp", "set title 'PSNR after every time step: it_s", true);
   print();
@@ -288,7 +290,7 @@ START_TEST(pairs)
     const char *ann, *spiking, *summary, *kind;
   } scene[] = {
       {"a/ann", "a/beta-5e-7", "scenes/a/beta-5e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
-      {"b/ann", "b/beta-2e-6", "scenes/b/beta-2e-6/train.json", "\"tensorf\",\"layout\":\"llff\""},
+      {"b/ann", "b/beta-1e-7", "scenes/b/beta-1e-7/train.json", "\"tensorf\",\"layout\":\"llff\""},
       {"c/ann", "c/beta-5e-7", "scenes/c/beta-5e-7/train.json", "\"ingp\",\"layout\":\"ingp\""},
   };
   for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
@@ -304,7 +306,7 @@ START_TEST(pairs)
   write_text(
       "scenes/a/beta-1e-6/train.json",
       "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
-  write_text("scenes/b/beta-2e-6/status", "failed: no memory\n");
+  write_text("scenes/b/beta-1e-7/status", "failed: no memory\n");
   ck_good(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
@@ -319,14 +321,14 @@ START_TEST(pairs)
   contains("table.md", "|           1234 |           0 |", true);
   contains("table.md", "Synthetic", false);
   contains("table.md", "1e-06 |       0 |  25.00 |      24.50 |      -0.50 | 0.5000 |     2 |", true);
-  contains("table.md", "- b, beta-2e-6: failed: no memory", true);
+  contains("table.md", "- b, beta-1e-7: failed: no memory", true);
   contains("table.md", "without stage I", false);
-  write_text("scenes/b/beta-2e-6/cosim.json", "{\"samples\":100,\"differences\":1}");
+  write_text("scenes/b/beta-1e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
   sf_reproduction_free(&report);
   ck_good(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.problems, 2);
-  ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-2e-6/cosim.json: RTL and fixed-point core differ: 1 of 100"));
+  ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-1e-7/cosim.json: RTL and fixed-point core differ: 1 of 100"));
   ck_assert_ptr_null(strstr(report.problem[0], folder)); /* no path of this machine */
   cJSON *json = sf_reproduction_json(&report);
   ck_assert(!cJSON_HasObjectItem(json, "average") && !cJSON_HasObjectItem(json, "order"));

@@ -72,7 +72,7 @@ static void check_resume(const sf_train_options *o, int before, int after)
   sf_dataset_free(&data);
 }
 
-/* t* moves in the first half of stage II; in the second the t_r that it chose is all that is unrolled. */
+/* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
 START_TEST(the_chosen_steps_are_trained_alone)
 {
   sf_dataset data = load("train");
@@ -82,14 +82,16 @@ START_TEST(the_chosen_steps_are_trained_alone)
   const int search = o.stage1 + o.stage2 / 2;
   sf_train_stats s = steps(t, search);
   const double chosen = s.t_star;
+  ck_assert_int_gt(s.search.state, SF_SEARCH_RUNNING);
+  ck_assert_int_gt(s.search.measured, 0);
   ck_assert_double_lt(chosen, T - 1);
-  ck_assert_double_ne(s.mse, s.mse_full);
   for (int i = search; i < o.stage1 + o.stage2; i++) {
+    const sf_search_report before = s.search;
     s = steps(t, 1);
     ck_assert_double_eq(s.t_star, chosen);
     ck_assert_int_eq(s.t_r, lround(chosen));
-    ck_assert_double_eq(s.mse, s.mse_full);
-    ck_assert_double_eq(s.mse, s.mse_floor);
+    ck_assert_int_eq(s.search.measured, before.measured);
+    ck_assert_int_eq(s.search.state, before.state);
   }
   sf_trainer_free(t);
   sf_dataset_free(&data);
@@ -252,8 +254,7 @@ START_TEST(fixed_steps_freeze_the_budget)
     samples += s.samples;
     ck_assert_int_eq(s.t_r, i + 1 < o.stage1 ? T : 3);
     ck_assert_double_eq(s.t_star, s.t_r);
-    ck_assert_double_eq(s.mse, s.mse_floor);
-    ck_assert_double_eq(s.mse_ceil, s.mse_floor);
+    ck_assert_int_eq(s.search.state, SF_SEARCH_NONE);
     ck_assert_double_eq_tol(s.samples_per_second * s.seconds, (double)samples, 1e-6 * (double)samples);
   }
   same_model(a, b);
@@ -365,10 +366,9 @@ static double ray_loss(const sf_loss_plan *p, const sf_ray *ray, sf_ray_work *w)
 {
   sf_loss_sums s = {0};
   sf_loss_ray(p, ray, intervals(), w, &s);
-  double share = fmin(fmax(p->d, 0.25), 0.75);
-  if (p->stage == 1) return s.mse_full + s.regular;
-  return (1 - share) * s.mse_floor + share * s.mse_ceil + s.regular +
-         p->extra * ((1 - share) * s.extra_floor + share * s.extra_ceil);
+  double loss = s.regular + p->distill * s.distill;
+  for (int t = 0; t < p->steps; t++) loss += p->weight[t] * s.prefix[t];
+  return loss + p->extra * ((1 - p->d) * s.extra_floor + p->d * s.extra_ceil);
 }
 
 static void check_plan(sf_loss_plan p)
@@ -409,23 +409,28 @@ static void check_plan(sf_loss_plan p)
 START_TEST(loss_gradients_are_the_slopes)
 {
   sf_loss_plan one = {
-      .stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
+      .steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
   check_plan(one);
-  /* distillation off: its teacher carries no gradient by decision, so it is not the slope of a function */
-  sf_loss_plan two = one;
-  two.stage = 2;
-  two.t_f = 2;
-  two.t_c = 3;
-  two.d = 0.4;
-  two.t_r = 2;
-  check_plan(two);
-  two.extra = 0.3f;
-  check_plan(two);
-  two.t_f = T - 1;
-  two.t_c = T;
-  two.d = 0.7;
-  two.t_r = T;
-  check_plan(two);
+  sf_loss_plan all = one; /* every prefix, and both ends of the distillation */
+  all.full = true;
+  all.t_f = 2;
+  all.t_c = 3;
+  all.t_r = 2;
+  all.d = 0.4;
+  for (int t = 0; t < T; t++) all.weight[t] = 0.1f * (float)(t + 1);
+  check_plan(all);
+  all.distill = 0.7f;
+  check_plan(all);
+  all.extra = 0.3f;
+  check_plan(all);
+  sf_loss_plan paper = all; /* M_smooth, next to the last step */
+  memset(paper.weight, 0, sizeof paper.weight);
+  paper.weight[T - 2] = 0.3f;
+  paper.weight[T - 1] = 0.7f;
+  paper.t_f = T - 1;
+  paper.t_c = paper.t_r = T;
+  paper.d = 0.7;
+  check_plan(paper);
 }
 END_TEST
 
@@ -437,7 +442,7 @@ START_TEST(sparsity_by_hand)
   const sf_ray ray = {.target = {0.5f, 0.5f, 0.5f}, .background = {0.5f, 0.5f, 0.5f}, .count = 1};
   w.sigma[T - 1][0] = 3;
   for (int c = 0; c < 3; c++) w.colour[T - 1][c] = 0.5f;
-  const sf_loss_plan plan = {.stage = 1, .steps = T, .t_f = T, .t_c = T, .t_r = T, .inverse_rays = 0.25f};
+  const sf_loss_plan plan = {.steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 0.25f};
   sf_loss_sums sums = {0};
   sf_loss_ray(&plan, &ray, intervals(), &w, &sums);
   ck_assert_double_eq_tol(w.dsigma[T - 1][0], 0.25 * 1e-6 * 2 / 7, 1e-9);

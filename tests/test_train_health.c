@@ -223,7 +223,7 @@ static void hard_case(int which, int net)
     const sf_train_stats s = steps(t, 1);
     if (i < 10) first += s.mse;
     if (i >= 90) last += s.mse;
-    ck_assert(isfinite(s.loss) && isfinite(s.mse_full));
+    ck_assert(isfinite(s.loss) && isfinite(s.mse));
     ck_assert(s.t_star >= 1 && s.t_star <= o.config.steps && s.t_r >= 1 && s.t_r <= o.config.steps);
     for (int l = 0; l < SF_LAYERS; l++) ck_assert(s.tau[l] > 1.0009 && s.tau[l] < 1000.1);
     for (int l = 0; l < 3; l++) ck_assert(s.firing[l] >= 0 && s.firing[l] <= 1);

@@ -10,7 +10,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7, 1e-6 and 2e-6 (5e-7, tensorf but for NDC 2e-6)
+  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -74,7 +74,7 @@ while [ $# -gt 0 ]; do
         [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
         set[minutes]=$2
       elif [ "$1" = --betas ]; then
-        [[ $2 =~ ^((1e-7|5e-7|1e-6|2e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6, 2e-6"
+        [[ $2 =~ ^((1e-7|5e-7|1e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6"
         betas=$2
       else
         [[ $2 =~ ^((ingp|tensorf)( |$))+$ ]] || die "--backbones '$2' is unknown: expected ingp, tensorf or both"
@@ -178,12 +178,11 @@ trap on_signal INT TERM HUP
 
 # ---- all runs of a scene ----
 
-# What sf_data understands of the scene: its layout, NDC or not, its number of held-out views.
+# What sf_data understands of the scene: its layout, its number of held-out views.
 look_at_data() {
   local json
   json=$("$bin/sf_data" "$data" --json 2>/dev/null)
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
-  ndc=$(sed -nE 's/^[[:space:]]*"ndc":[[:space:]]*(true|false).*/\1/p' <<<"$json" | head -n 1)
   frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')
 }
 
@@ -250,19 +249,17 @@ one_backbone() {
   scene=${data##*/}-$1
   prepare_scene
   common="$common --backbone $1"
-  local default=5e-7
-  [ "$1" = ingp ] || [ "${ndcs[i]}" = true ] || default=2e-6
-  for beta in ${betas:-$default}; do one_run "beta-$beta" --beta "$beta"; done
+  for beta in ${betas:-5e-7}; do one_run "beta-$beta" --beta "$beta"; done
   one_run ann --net ann
 }
 
 started=$SECONDS done_seconds=0 done_runs=0 index=0 failures=0 ticker_pid=""
 total=$((14 * ${#paths[@]}))
 version=$("$bin/sf_train" --version)
-layouts=() ndcs=() frames_of=()
+layouts=() frames_of=()
 for data in "${paths[@]}"; do
   look_at_data
-  layouts+=("$layout") ndcs+=("$ndc") frames_of+=("$frames")
+  layouts+=("$layout") frames_of+=("$frames")
 done
 if [ "$profile" = scenes ]; then
   total=0

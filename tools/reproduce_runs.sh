@@ -151,7 +151,7 @@ audit() { # FILE SCENE VIEW
 
 evaluate_ann() {
   local view reference="" beta
-  for beta in 2e-6 1e-6 1e-7 5e-7; do
+  for beta in 1e-6 1e-7 5e-7; do
     [ -s "$out/$scene/beta-$beta/scene.snn" ] && reference=$out/$scene/beta-$beta/scene.snn
   done
   if [ -z "$reference" ]; then

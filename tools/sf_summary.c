@@ -39,11 +39,32 @@ static figure quality(int digits, double value)
   return f;
 }
 
-static void explain(const field *f, const char *dir)
+/* Where the search for t* ended, where there was one. */
+static sf_status explain_search(const char *dir)
+{
+  char path[4096];
+  cJSON *json;
+  snprintf(path, sizeof path, "%s/train.json", dir);
+  SF_TRY(sf_json_load(path, &json));
+  const cJSON *search = cJSON_GetObjectItemCaseSensitive(json, "search");
+  const cJSON *worth = cJSON_GetObjectItemCaseSensitive(search, "worth"),
+              *error = cJSON_GetObjectItemCaseSensitive(search, "worth_error"),
+              *price = cJSON_GetObjectItemCaseSensitive(search, "price"),
+              *t_star = cJSON_GetObjectItemCaseSensitive(json, "t_star");
+  const char *state = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(search, "state"));
+  if (state && cJSON_IsNumber(worth) && cJSON_IsNumber(error) && cJSON_IsNumber(price) && cJSON_IsNumber(t_star))
+    printf("  time steps    t* = %.2f (%s): one more is worth %.1e +- %.0e of squared error and costs %.1e\n",
+           t_star->valuedouble, state, worth->valuedouble, error->valuedouble, price->valuedouble);
+  cJSON_Delete(json);
+  return sf_ok();
+}
+
+static sf_status explain(const field *f, const char *dir)
 {
   printf("\nFrom photographs to silicon in %.0f s\n", f[SECONDS].value);
   printf("  learned       t_r = %.0f of T = %.0f time steps; held-out PSNR %s dB (float, all test views)\n",
          f[T_R].value, f[T].value, quality(2, f[HELD_OUT].value).text);
+  SF_TRY(explain_search(dir));
   printf("  golden view   PSNR %s dB float, %s dB fixed point, SSIM %s\n", quality(2, f[FLOAT].value).text,
          quality(2, f[FIXED].value).text, quality(4, f[SSIM].value).text);
   printf("  RTL           %.0f samples through the Verilog accelerator, %.0f differences from the fixed-point core\n",
@@ -53,6 +74,7 @@ static void explain(const field *f, const char *dir)
   printf("Open %s/report.html: what every operation cost, with pictures, for anybody.\n", dir);
   printf("Look at %s/preview.png; %s/golden.exr holds depth, spikes and energy per pixel; %s/audit.json every count.\n",
          dir, dir, dir);
+  return sf_ok();
 }
 
 static sf_status parse_seconds(const char *text, double *seconds)
@@ -87,8 +109,7 @@ static sf_status run(const char *dir, double seconds)
   snprintf(path, sizeof path, "%s/summary.json", dir);
   if (!status.code) status = sf_json_save(json, path);
   cJSON_Delete(json);
-  if (!status.code) explain(f, dir);
-  return status;
+  return status.code ? status : explain(f, dir);
 }
 
 int main(int argc, char **argv)

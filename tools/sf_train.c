@@ -33,7 +33,7 @@ static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, 
     }
     train_smooth(&r, s, s->seconds - before);
     train_warn(&progress, s);
-    if (s->iteration % 16 == 0 || s->stage == 3) train_log_line(log, s);
+    if (s->iteration % 16 == 0 || s->stage == 3) train_log_line(log, s, sf_trainer_model(trainer)->config.steps);
     if (sf_progress_due(&progress)) train_show(&progress, s, &r);
     const bool stop = sf_cli_interrupted() && s->stage != 3;
     if (s->stage != 3 && (stop || sf_seconds() - tried > 60 * a->checkpoint_minutes)) {

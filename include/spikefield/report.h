@@ -24,9 +24,7 @@ typedef enum {
   SF_RUN_T_MINUS_1,
   SF_RUN_T,
   SF_RUN_T_PLUS_1,
-  SF_RUN_BETA_2E6, /* tensorf's default, not among the paper's runs */
-  SF_RUNS,
-  SF_PAPER_RUNS = SF_RUN_BETA_2E6
+  SF_RUNS
 } sf_run_id;
 
 /* One number per run. Energies: paper ledger, mJ per frame, mean over the audited views. */

@@ -4,12 +4,29 @@
 #include "spikefield/model.h"
 #include "spikefield/scene.h"
 
+/* What is trained while t* is searched. */
+typedef enum {
+  SF_OBJECTIVE_PREFIXES, /* the mean over all prefixes: what a step is worth does not depend on where t* stands */
+  SF_OBJECTIVE_PAPER     /* M_smooth, as the paper has it, through all T steps in every iteration */
+} sf_objective;
+
+/* What one more step is charged with, times beta M_T / M_smooth. */
+typedef enum {
+  SF_PRICE_EXPONENTIAL, /* e^t, the paper's */
+  SF_PRICE_ENERGY       /* what it costs on this scene: mJ per frame, 0.9 pJ per SOP, 4.6 pJ per MAC */
+} sf_step_price;
+
 typedef struct sf_train_options {
   sf_config config;
-  double beta;        /* weight of L_penalty: quality (small) against energy (large) */
-  double alpha;       /* weight of L_extra */
-  int stage1, stage2; /* iterations; ignored when minutes > 0 */
-  double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
+  double beta; /* weight of L_penalty: quality (small) against energy (large) */
+  sf_objective objective;
+  sf_step_price price;
+  double target_loss;   /* dB: t* is the fewest steps that lose at most this; 0 = beta decides */
+  double target_saving; /* percent of the ReLU twin's energy: t* is the most steps that save it; 0 = beta decides */
+  double search_rate;   /* how fast the search's averages forget, 1 = default; the result should not hang on it */
+  double alpha;         /* weight of L_extra */
+  int stage1, stage2;   /* iterations; ignored when minutes > 0 */
+  double minutes;       /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;
   int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
@@ -30,16 +47,39 @@ sf_train_options sf_train_defaults(void);
 /* TensoRF's, by the layout of the data: Blender, a forward-facing scene in NDC, or a scene in units of its own. */
 sf_train_options sf_train_defaults_tensorf(const sf_dataset *data);
 
+typedef enum {
+  SF_SEARCH_NONE,        /* t* is not learned: stage I, fixed steps, one step, fine-tuning */
+  SF_SEARCH_RUNNING,     /* t* moves */
+  SF_SEARCH_BALANCED,    /* t* rested where worth and price are equal, or where the target is met */
+  SF_SEARCH_AT_END,      /* at 1 or T steps worth and price are not equal yet */
+  SF_SEARCH_MISSED,      /* no number of steps meets the target */
+  SF_SEARCH_NOT_REACHED, /* t* still moved when the search ended */
+  SF_SEARCH_TOO_SHORT    /* nothing was measured: t_r is where the search starts */
+} sf_search_state;
+extern const char *const sf_search_names[]; /* "none", "running", "balanced", ... */
+
+/* Where the search for t* stands. Squared errors are means over rays and colours, in [0,1]. */
+typedef struct sf_search_report {
+  sf_search_state state;
+  int measured;                /* iterations that measured all prefixes */
+  double worth, worth_error;   /* squared error that one more step saves at t*, and its standard error */
+  double price, price_error;   /* beta (M_T / M_smooth) e^t, or what the step costs */
+  double beta;                 /* the option, or what the target stands for */
+  double prefix_mse[SF_T_MAX]; /* after 1..T steps */
+  double saving;               /* share of the ReLU twin's energy at t_r, by the firing in training */
+  double step_energy;          /* mJ per frame of one more step */
+} sf_search_report;
+
 /* Of the last iteration. */
 typedef struct sf_train_stats {
   int stage; /* 1, 2; 3 = finished */
   int64_t iteration;
-  double progress;                      /* 0..1 of the whole run */
-  double seconds;                       /* training time, over resumes */
-  double loss, mse;                     /* total loss; M_T in stage I, M_smooth in stage II */
-  double mse_full, mse_floor, mse_ceil; /* M_T, M_{t_f}, M_{t_c} */
+  double progress;  /* 0..1 of the whole run */
+  double seconds;   /* training time, over resumes */
+  double loss, mse; /* total loss; squared error of what is trained: M_T in stage I, M_{t_r} after the search */
   double t_star;
   int t_r;
+  sf_search_report search;
   double tau[SF_LAYERS];
   double firing[3];  /* spikes per neuron and step of D1, C1, C2 */
   int rays, samples; /* of the iteration */

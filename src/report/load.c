@@ -129,7 +129,7 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
 
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
-  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6, SF_RUN_BETA_2E6};
+  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6};
   char dir[4096 + 320], reference[4096 + 320], log[4096 + 384], exported[4096 + 384];
   for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
   for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;

@@ -21,7 +21,6 @@ const sf_run_kind sf_run_kinds[SF_RUNS] = {
     [SF_RUN_T_MINUS_1] = {"fixed-t-minus-1", "fixed t_r - 1", ROW(31.69, NAN, NAN, 398.37, NAN)},
     [SF_RUN_T] = {"fixed-t", "fixed t_r", ROW(32.11, NAN, NAN, 491.70, NAN)},
     [SF_RUN_T_PLUS_1] = {"fixed-t-plus-1", "fixed t_r + 1", ROW(32.29, NAN, NAN, 623.01, NAN)},
-    [SF_RUN_BETA_2E6] = {"beta-2e-6", "beta = 2e-6", ROW(NAN, NAN, NAN, NAN, NAN)},
 };
 
 const sf_paper_group sf_paper_groups[SF_PAPER_GROUPS] = {

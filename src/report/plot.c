@@ -194,6 +194,47 @@ static bool has_t_star(const sf_reproduction *r, int scene)
   return false;
 }
 
+/* ---- worth and price of a step ---- */
+
+static double search_number(const sf_reproduction *r, int scene, int run, const char *key)
+{
+  return sf_report_number(cJSON_GetObjectItemCaseSensitive(r->scene[scene].run[run].summary, "search"), key);
+}
+
+static bool has_balance(const sf_reproduction *r, int scene)
+{
+  for (int i = 0; i < BETAS; i++)
+    if (search_number(r, scene, betas[i], "worth") > 0 && search_number(r, scene, betas[i], "price") > 0) return true;
+  return false;
+}
+
+/* Of every beta the price over t, the worth as a level line, and t* where they cross. */
+static void plot_balance(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  char title[640];
+  title_of(r, scene, "What a step is worth and what it costs", title, sizeof title);
+  sf_plot_head(out, name, title, "t, time steps", "squared error", "outside right top");
+  fprintf(out, "set logscale y\nset format y '%%.0e'\nset xrange [1:%d]\nset samples 200\n", SF_T_MAX);
+  for (int i = 0; i < BETAS; i++) {
+    fprintf(out, "$b%d << EOD\n", i);
+    const double worth = search_number(r, scene, betas[i], "worth"),
+                 error = search_number(r, scene, betas[i], "worth_error"), at = r->scene[scene].run[betas[i]].t_star;
+    if (worth > 0 && !isnan(at)) fprintf(out, "%.5f %.6g %.6g\n", at, worth, isnan(error) ? 0 : error);
+    fprintf(out, "EOD\n");
+  }
+  fprintf(out, "plot ");
+  for (int i = 0; i < BETAS; i++) {
+    const double worth = search_number(r, scene, betas[i], "worth"), price = search_number(r, scene, betas[i], "price");
+    if (!(worth > 0 && price > 0)) continue;
+    const char *colour = sf_plot_colour[i], *what = sf_run_kinds[betas[i]].title;
+    fprintf(out,
+            "%.6g * exp(x - %.5f) with lines linecolor '%s' title '%s: price', %.6g with lines linecolor '%s' "
+            "dashtype 2 title 'worth', $b%d using 1:2:3 with yerrorbars linecolor '%s' pointtype 7 notitle, ",
+            price, r->scene[scene].run[betas[i]].t_star, colour, what, worth, colour, i, colour);
+  }
+  fprintf(out, "NaN notitle\n");
+}
+
 /* ---- files ---- */
 
 typedef struct plot {
@@ -205,7 +246,8 @@ typedef struct plot {
 
 static const plot plots[] = {{"psnr-steps", has_steps, plot_steps, true},
                              {"psnr-energy", has_energy, plot_energy, true},
-                             {"t-star", has_t_star, plot_t_star, false}};
+                             {"t-star", has_t_star, plot_t_star, false},
+                             {"balance", has_balance, plot_balance, false}};
 
 static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, int *count)
 {

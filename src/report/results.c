@@ -130,7 +130,7 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
     cJSON_AddStringToObject(json, "paper",
                             PAPER ": INGP backbone, averages over the eight Synthetic scenes, 800 x 800");
     cJSON *average = cJSON_AddObjectToObject(json, "average");
-    for (int i = 0; i < SF_PAPER_RUNS; i++) cJSON_AddItemToObject(average, sf_run_kinds[i].name, average_json(r, i));
+    for (int i = 0; i < SF_RUNS; i++) cJSON_AddItemToObject(average, sf_run_kinds[i].name, average_json(r, i));
     add_orders(json, r);
   }
   cJSON *scenes = cJSON_AddObjectToObject(json, "scenes");
@@ -139,7 +139,6 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
     const sf_paper_group *group = sf_reproduction_group(&r->scene[s]);
     if (group) cJSON_AddItemToObject(scene, "paper", group_json(group));
     for (int i = 0; i < SF_RUNS; i++)
-      if (i < SF_PAPER_RUNS || r->scene[s].run[i].status)
         cJSON_AddItemToObject(scene, sf_run_kinds[i].name, run_json(r, s, i));
   }
   cJSON *problems = cJSON_AddArrayToObject(json, "problems");

@@ -128,7 +128,7 @@ static void print_head(FILE *out, const sf_reproduction *r)
   fprintf(out, "%d %s:", r->count, r->count == 1 ? "scene" : "scenes");
   for (int s = 0; s < r->count; s++) fprintf(out, " %s", r->scene[s].name);
   fprintf(out, ". %d", runs);
-  if (!pairs) fprintf(out, " of %d", r->count * SF_PAPER_RUNS);
+  if (!pairs) fprintf(out, " of %d", r->count * SF_RUNS);
   fprintf(out, " runs trained, %.2f h of training.\n", hours);
   const sf_run *run = first_done(r);
   if (run && pairs) fprintf(out, "Every run: seed %.0f.\n\n", number_of(run->summary, "seed"));
@@ -198,7 +198,7 @@ static void print_methods(FILE *out, const sf_reproduction *r, table *t)
   method_head(t, true);
   for (int i = SF_RUN_HYBRID; i <= SF_RUN_NO_BUDGET; i++) method_row(t, r, -1, i);
   method_row(t, r, -1, SF_RUN_BETA_5E7);
-  for (int i = SF_RUN_T_MINUS_1; i < SF_PAPER_RUNS; i++) method_row(t, r, -1, i);
+  for (int i = SF_RUN_T_MINUS_1; i < SF_RUNS; i++) method_row(t, r, -1, i);
   end(out, t);
   fprintf(
       out,
@@ -211,7 +211,7 @@ static void print_scenes(FILE *out, const sf_reproduction *r, table *t)
   for (int s = 0; s < r->count; s++) {
     fprintf(out, "## Scene %s\n\n", r->scene[s].name);
     method_head(t, false);
-    for (int i = 0; i < SF_PAPER_RUNS; i++) method_row(t, r, s, i);
+    for (int i = 0; i < SF_RUNS; i++) method_row(t, r, s, i);
     end(out, t);
   }
 }
@@ -368,7 +368,7 @@ static void print_unfinished(FILE *out, const sf_reproduction *r)
     for (int i = 0; i < SF_RUNS; i++) {
       const char *status = r->scene[s].run[i].status;
       if (status && strcmp(status, "done") == 0) continue;
-      if ((pairs || i >= SF_PAPER_RUNS) && !status) continue;
+      if (pairs && !status) continue;
       if (!any) fprintf(out, "## Runs without a result\n\n");
       any = true;
       fprintf(out, "- %s, %s: %s\n", r->scene[s].name, sf_run_kinds[i].name, status ? status : "not run");

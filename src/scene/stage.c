@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", "plaza", NULL};
+const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", "plaza", "wires", NULL};
 
 /* Display colours; the shading squares them to linear light. */
 static const sf_material plinth = {
@@ -114,6 +114,35 @@ static void build_plaza(sf_stage *stage)
   add(stage, SF_SPHERE, (vec){-0.55, -0.4, -0.24}, (vec){0.4, 0, 0}, 0.5, 0.45, &ball);
 }
 
+/* Thin parts, 1.4 to 2 pixels wide in pictures of 200: a fence of posts and rails, stays from a mast to the ground, a
+ * cable in coils, and a ball that is no thin part. */
+static void build_wires(sf_stage *stage)
+{
+  enum { POSTS = 9, STAYS = 6, COILS = 4 };
+  const double floor = -0.5, side = 0.85;
+  add(stage, SF_BOX, (vec){0, 0, floor - 0.05}, (vec){1.0, 1.0, 0.05}, 0, 0, &matt_cream);
+  for (int i = 0; i < POSTS; i++) {
+    const double along = side * (2.0 * i / (POSTS - 1) - 1);
+    add(stage, SF_CYLINDER, (vec){along, -side, floor + 0.2}, (vec){0.014, 0.2, 0}, 0, 0, &matt_green);
+    add(stage, SF_CYLINDER, (vec){-side, along, floor + 0.2}, (vec){0.014, 0.2, 0}, 0, 0, &matt_blue);
+  }
+  for (int i = 0; i < 2; i++) {
+    const double height = floor + 0.15 + 0.2 * i;
+    add(stage, SF_CYLINDER, (vec){0, -side, height}, (vec){0.01, side, 0}, M_PI / 2, M_PI / 2, &matt_green);
+    add(stage, SF_CYLINDER, (vec){-side, 0, height}, (vec){0.01, side, 0}, 0, M_PI / 2, &matt_blue);
+  }
+  add(stage, SF_CYLINDER, (vec){0.2, 0.2, floor + 0.6}, (vec){0.02, 0.6, 0}, 0, 0, &mast);
+  for (int i = 0; i < STAYS; i++) { /* from the top of the mast, 1.2 high, to 0.6 away from its foot */
+    const double a = 2 * M_PI * (i + 0.25) / STAYS, lean = atan2(0.6, 1.2);
+    add(stage, SF_CYLINDER, (vec){0.2 + 0.3 * cos(a), 0.2 + 0.3 * sin(a), floor + 0.6},
+        (vec){0.01, 0.5 * hypot(0.6, 1.2), 0}, a + M_PI / 2, -lean, &brass);
+  }
+  for (int i = 0; i < COILS; i++)
+    add(stage, SF_TORUS, (vec){0.62, -0.4, floor + 0.03 + 0.06 * i}, (vec){0.2 - 0.02 * i, 0.012, 0}, 0.4 * i, 0.12,
+        &red);
+  add(stage, SF_SPHERE, (vec){-0.35, -0.3, floor + 0.25}, (vec){0.25, 0, 0}, 0.5, 0.45, &ball);
+}
+
 void sf_stage_build(sf_stage *stage, int index)
 {
   memset(stage, 0, sizeof *stage);
@@ -121,4 +150,5 @@ void sf_stage_build(sf_stage *stage, int index)
   if (index == 1) build_simple(stage);
   if (index == 2) build_fog(stage);
   if (index == 4) build_plaza(stage);
+  if (index == 5) build_wires(stage);
 }

@@ -45,8 +45,8 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 25, VM_FIELDS = 3 };
-static int state_table(sf_trainer *t, state_field f[STATE_FIELDS + VM_FIELDS])
+enum { STATE_FIELDS = 45, VM_FIELDS = 3, FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS };
+static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
 {
   const state_field table[STATE_FIELDS] = {
       {"train.iteration", .integer = &t->iteration},
@@ -59,7 +59,27 @@ static int state_table(sf_trainer *t, state_field f[STATE_FIELDS + VM_FIELDS])
       {"train.seconds", .number = &t->seconds},
       {"train.progress", .number = &t->progress},
       {"train.stage_progress", .number = &t->stage_progress},
-      {"train.t_momentum", .number = &t->t_momentum},
+      {"train.search_state", .small = &t->search.state},
+      {"train.search_measured", .small = &t->search.measured},
+      {"train.search_fast", .number = &t->search.fast[0]},
+      {"train.search_fast2", .number = &t->search.fast[1]},
+      {"train.search_slow", .number = &t->search.slow[0]},
+      {"train.search_slow2", .number = &t->search.slow[1]},
+      {"train.search_slope", .number = &t->search.slope},
+      {"train.search_slope2", .number = &t->search.slope2},
+      {"train.search_slope_level", .number = &t->search.slope_level},
+      {"train.search_level", .number = &t->search.level},
+      {"train.search_level2", .number = &t->search.level2},
+      {"train.search_ratio", .number = &t->search.ratio},
+      {"train.search_ratio2", .number = &t->search.ratio2},
+      {"train.search_firing_d1", .number = &t->search.firing[0]},
+      {"train.search_firing_c1", .number = &t->search.firing[1]},
+      {"train.search_firing_c2", .number = &t->search.firing[2]},
+      {"train.search_samples", .number = &t->search.samples_per_frame},
+      {"train.search_at", .number = &t->search.at},
+      {"train.search_mark", .number = &t->search.mark},
+      {"train.search_mark_at", .number = &t->search.mark_at},
+      {"train.search_moved", .number = &t->search.moved},
       {"train.occupied", .number = &t->occupied},
       {"train.epoch", .number = &t->epoch},
       {"train.firing_d1", .number = &t->firing[0]},
@@ -75,12 +95,17 @@ static int state_table(sf_trainer *t, state_field f[STATE_FIELDS + VM_FIELDS])
       {"train.quiet_c1", .small = &t->health.quiet[1]},
       {"train.quiet_c2", .small = &t->health.quiet[2]},
   };
+  static const char *const prefix[] = {"train.search_m1", "train.search_m2", "train.search_m3", "train.search_m4",
+                                       "train.search_m5", "train.search_m6", "train.search_m7", "train.search_m8"};
+  _Static_assert(SF_T_MAX <= sizeof prefix / sizeof *prefix, "a name per prefix");
   memcpy(f, table, sizeof table);
-  if (!t->vm) return STATE_FIELDS;
-  f[STATE_FIELDS] = (state_field){"train.vm_event", .small = &t->vm->event};
-  f[STATE_FIELDS + 1] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
-  f[STATE_FIELDS + 2] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
-  return STATE_FIELDS + VM_FIELDS;
+  int n = STATE_FIELDS;
+  for (int i = 0; i < SF_T_MAX; i++) f[n++] = (state_field){prefix[i], .number = &t->search.prefix[i]};
+  if (!t->vm) return n;
+  f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
+  f[n++] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
+  f[n++] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
+  return n;
 }
 
 static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *list)
@@ -125,7 +150,7 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
     {
       cJSON_AddStringToObject(meta, item->string, item->valuestring);
     }
-    state_field field[STATE_FIELDS + VM_FIELDS];
+    state_field field[FIELDS_MAX];
     const int fields = state_table((sf_trainer *)t, field);
     for (int i = 0; i < fields; i++)
       put(meta, field[i].key,
@@ -140,7 +165,7 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
 
 static sf_status load_state(sf_trainer *t, const sf_tensors *set)
 {
-  state_field field[STATE_FIELDS + VM_FIELDS];
+  state_field field[FIELDS_MAX];
   const int fields = state_table(t, field);
   for (int i = 0; i < fields; i++) {
     const char *text = sf_tensors_meta(set, field[i].key);
@@ -166,6 +191,10 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
   if (t->vm && !(t->vm->event >= 0 && t->vm->event <= 5 && t->vm->fresh >= 0 && t->vm->fresh <= t->iteration &&
                  t->vm->fresh_at >= 0 && t->vm->fresh_at <= 1))
     return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.vm_event, vm_fresh or vm_fresh_at is out of range",
+                   set->path);
+  if (t->search.state < SF_SEARCH_NONE || t->search.state > SF_SEARCH_TOO_SHORT || t->search.measured < 0 ||
+      !(t->search.fast[0] >= 0 && t->search.slow[0] >= 0 && t->search.at >= 0 && t->search.at <= 1))
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.search_state, measured, fast, slow or at is out of range",
                    set->path);
   for (int l = 0; l < 3; l++)
     if (t->health.revived[l] < 0 || t->health.revived[l] > 1000000)

@@ -78,12 +78,10 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
 {
   const sf_batch *batch = &t->batch;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
-  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
-  const int steps = p->stage == 1 ? p->steps : p->t_c;
   const int lanes = load_directions(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &w->block[b]);
-    t->kernels->forward(net, &w->block[b], p->steps, steps, w->scratch);
+    t->kernels->forward(net, &w->block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
@@ -92,9 +90,9 @@ static void run_bundle(const sf_trainer *t, const sf_loss_plan *p, const sf_net_
     sf_loss_ray(p, &batch->ray[r], batch->delta + batch->ray[r].lane, &w->ray, &g->sums);
     ray_out(p, &batch->ray[r], w);
   }
-  count_spikes(t, steps, &w->block[0], lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
+  count_spikes(t, p->steps, &w->block[0], lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
   for (int b = 0; b < bundle->blocks; b++)
-    t->kernels->backward(net, &w->block[b], steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
+    t->kernels->backward(net, &w->block[b], p->steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
                          w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
                          batch->df + (size_t)(bundle->block + b) * plane, g->grad, w->scratch);
 }
@@ -151,9 +149,7 @@ void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld)
 /* The losses as means over rays; the leaks' gradients carry that factor already. */
 void sf_sums_add(sf_loss_sums *to, const sf_loss_sums *x, double mean)
 {
-  to->mse_full += mean * x->mse_full;
-  to->mse_floor += mean * x->mse_floor;
-  to->mse_ceil += mean * x->mse_ceil;
+  for (int t = 0; t < SF_T_MAX; t++) to->prefix[t] += mean * x->prefix[t];
   to->regular += mean * x->regular;
   to->extra_floor += mean * x->extra_floor;
   to->extra_ceil += mean * x->extra_ceil;

@@ -24,7 +24,8 @@ enum {
   RNG_OCCUPANCY,
   RNG_OCCUPANCY_JITTER,
   RNG_PROBE,
-  RNG_REVIVE
+  RNG_REVIVE,
+  RNG_PREFIX
 };
 
 typedef struct sf_ray {
@@ -51,24 +52,29 @@ typedef struct sf_batch {
   float *spare_x, *spare_delta;       /* for compaction; df serves f */
 } sf_batch;
 
-/* Loss of one iteration's steps, weights of its terms, and sums over its rays. */
+/* What one iteration trains: weights of the loss's terms. Prefixes count from 1. */
 typedef struct sf_loss_plan {
-  int stage, steps, t_f, t_c, t_r;
-  double d; /* t^ - t_f */
+  int steps;              /* unrolled, forward and backward */
+  bool full;              /* all T steps: every prefix's error is measured, and C_T and C_{t_r} are compared */
+  float weight[SF_T_MAX]; /* of each prefix's squared error */
+  int regular_at;         /* the prefix with the norm, cosine and sparsity terms */
+  int t_f, t_c, t_r;      /* around t^; in a full iteration */
+  double d;               /* t^ - t_f */
   float inverse_rays;
   float extra;   /* weight of L_extra, 0 = off */
-  float distill; /* 1 or 0 */
+  float distill; /* weight of L_distill */
   float k_sigma, k_colour;
 } sf_loss_plan;
 
 /* Is the prefix composited? */
 static inline bool sf_loss_needs(const sf_loss_plan *p, int prefix)
 {
-  return prefix == p->steps || prefix == p->t_f || prefix == p->t_c;
+  return p->full || p->weight[prefix - 1] > 0;
 }
 
 typedef struct sf_loss_sums {
-  double mse_full, mse_floor, mse_ceil, regular, extra_floor, extra_ceil, distill;
+  double prefix[SF_T_MAX]; /* squared error of the prefixes that are composited */
+  double regular, extra_floor, extra_ceil, distill;
   double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
 } sf_loss_sums;
 
@@ -101,6 +107,19 @@ typedef struct sf_health {
   int revived[3]; /* times */
   int quiet[3];   /* neurons without a spike, at the last count */
 } sf_health;
+
+/* The search for t*: averages over its recent full iterations (search.c). */
+typedef struct sf_search {
+  int state, measured;     /* sf_search_state; full iterations so far */
+  double fast[2], slow[2]; /* of the averages: sums of the measurements' weights, and of their squares */
+  double prefix[SF_T_MAX]; /* fast: squared error of every prefix */
+  double ratio, ratio2;    /* fast: M_T / M_smooth, and its square */
+  double slope, level;     /* slow: slope of the curve of prefixes, and their mean error */
+  double slope2, slope_level, level2;
+  double firing[3], samples_per_frame;
+  double at;                   /* share of the search at the last measurement */
+  double mark, mark_at, moved; /* t* of a quarter of the search ago, where that was, and how far it moved in one */
+} sf_search;
 
 struct sf_vm; /* vm.h */
 struct sf_probes;
@@ -148,12 +167,22 @@ struct sf_trainer {
   int64_t iteration, stage_start;
   int stage, rays, stride;
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
-  double t_momentum;                                   /* smoothed gradient of t* */
-  double firing[3];                                    /* spikes per neuron and step of D1, C1, C2, last iteration */
-  double occupied, epoch;                              /* epoch: passes over the training pixels in this stage */
+  sf_search search;
+  double firing[3];       /* spikes per neuron and step of D1, C1, C2, last iteration */
+  double occupied, epoch; /* epoch: passes over the training pixels in this stage */
   sf_health health;
   int64_t samples; /* through the nets, over the run */
 };
+
+/* At the start of stage II. */
+void sf_search_begin(sf_trainer *trainer);
+/* After a full iteration: ratio = M_T / M_smooth; at: share of the search that is done. Moves t*. */
+void sf_search_update(sf_trainer *trainer, const sf_loss_sums *mean, double ratio, double at);
+void sf_search_end(sf_trainer *trainer);
+sf_search_report sf_search_now(const sf_trainer *trainer);
+/* Of a frame at so many steps by the firing that was measured, mJ; and what that saves of the twin's, as a share. */
+double sf_search_energy(const sf_trainer *trainer, double steps);
+double sf_search_saving(const sf_trainer *trainer, double steps);
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);

@@ -8,10 +8,6 @@
 
 static const float g0 = 5e-5f, g1 = 5e-2f, g2 = 1e-6f;
 
-/* Both prefixes around t^ are trained with at least this share of M_smooth: their difference drives t*, and
- * a prefix that is not trained would always look worse and lock t* where it is. */
-static const float least_share = 0.25f;
-
 sf_status sf_ray_work_create(sf_ray_work *w, int samples)
 {
   size_t n = (size_t)samples, total = n * (SF_T_MAX * 8 + 6 * 3);
@@ -160,57 +156,50 @@ static double add_extra(const sf_loss_plan *plan, const sf_ray *ray, const float
   return value + na / nb;
 }
 
-static void stage_one(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)
+/* L_distill between C_T and C_{t_r}: both are pulled (the paper detaches neither). */
+static void add_distillation(const sf_loss_plan *p, const image *full, const image *im, float gfull[3], float grgb[3],
+                             sf_loss_sums *sums)
 {
-  image full = composite(ray, p->steps, delta, w, w->spare[0]);
-  float grgb[3] = {0};
-  double mse = squared_error(full.rgb, ray->target);
-  sums->mse_full += mse;
-  sums->mse_floor += mse;
-  sums->mse_ceil += mse;
-  add_mse(ray, &full, p->inverse_rays, grgb);
-  sums->regular += add_regular(ray, &full, p->inverse_rays, grgb);
-  push(ray, p->steps, delta, &full, grgb, w);
-  sums->regular += add_sparsity(ray->count, w->sigma[p->steps - 1], p->inverse_rays, w->dsigma[p->steps - 1]);
+  sums->distill += squared_error(im->rgb, full->rgb);
+  for (int c = 0; c < 3; c++) {
+    const float g = p->distill * p->inverse_rays * 2 / 3 * (im->rgb[c] - full->rgb[c]);
+    grgb[c] += g;
+    gfull[c] -= g;
+  }
 }
 
-/* The terms that hang on one of the two prefixes around t^. `share` = 1-d or d. */
-static void near_prefix(const sf_loss_plan *p, const sf_ray *ray, const float *delta, int t, float share,
-                        const image *full, sf_ray_work *w, sf_loss_sums *sums)
+/* The terms that hang on prefix t alone. */
+static void add_prefix(const sf_loss_plan *p, const sf_ray *ray, int t, const image *im, float grgb[3], sf_ray_work *w,
+                       sf_loss_sums *sums)
 {
-  const float inverse = p->inverse_rays;
-  image im = composite(ray, t, delta, w, w->spare[1]);
-  double mse = squared_error(im.rgb, ray->target);
-  float grgb[3] = {0};
-  *(t == p->t_f ? &sums->mse_floor : &sums->mse_ceil) += mse;
-  add_mse(ray, &im, inverse * share, grgb);
-  if (t == p->t_r) {
-    sums->regular += add_regular(ray, &im, inverse, grgb);
-    if (p->distill > 0 && squared_error(full->rgb, ray->target) < mse) { /* a worse teacher teaches nothing */
-      sums->distill += squared_error(im.rgb, full->rgb);
-      for (int c = 0; c < 3; c++) grgb[c] += p->distill * inverse * 2 / 3 * (im.rgb[c] - full->rgb[c]);
-    }
-    sums->regular += add_sparsity(ray->count, w->sigma[t - 1], inverse, w->dsigma[t - 1]);
-  }
-  push(ray, t, delta, &im, grgb, w);
-  if (p->extra > 0)
-    *(t == p->t_f ? &sums->extra_floor : &sums->extra_ceil) +=
-        add_extra(p, ray, delta, t, full, p->extra * inverse * share, w, sums);
+  sums->prefix[t - 1] += squared_error(im->rgb, ray->target);
+  add_mse(ray, im, p->inverse_rays * p->weight[t - 1], grgb);
+  if (t != p->regular_at) return;
+  sums->regular += add_regular(ray, im, p->inverse_rays, grgb);
+  sums->regular += add_sparsity(ray->count, w->sigma[t - 1], p->inverse_rays, w->dsigma[t - 1]);
 }
 
 void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)
 {
-  for (int t = 0; t < p->steps; t++) {
+  const int T = p->steps;
+  for (int t = 0; t < T; t++) {
     memset(w->dsigma[t], 0, ray->count * sizeof(float));
     memset(w->dcolour[t], 0, 3 * ray->count * sizeof(float));
   }
-  if (p->stage == 1) {
-    stage_one(p, ray, delta, w, sums);
-    return;
+  const image full = composite(ray, T, delta, w, w->spare[0]);
+  float gfull[3] = {0};
+  for (int t = 1; t < T; t++) {
+    if (!sf_loss_needs(p, t)) continue;
+    const image im = composite(ray, t, delta, w, w->spare[1]);
+    float grgb[3] = {0};
+    add_prefix(p, ray, t, &im, grgb, w, sums);
+    if (p->full && t == p->t_r && p->distill > 0) add_distillation(p, &full, &im, gfull, grgb, sums);
+    push(ray, t, delta, &im, grgb, w);
   }
-  image full = composite(ray, p->steps, delta, w, w->spare[0]);
-  sums->mse_full += squared_error(full.rgb, ray->target);
-  const float share = p->t_c == p->t_f ? 0 : fminf(fmaxf((float)p->d, least_share), 1 - least_share);
-  near_prefix(p, ray, delta, p->t_f, 1 - share, &full, w, sums);
-  if (p->t_c != p->t_f) near_prefix(p, ray, delta, p->t_c, share, &full, w, sums);
+  add_prefix(p, ray, T, &full, gfull, w, sums);
+  push(ray, T, delta, &full, gfull, w);
+  if (!p->full || p->extra == 0) return;
+  const float scale = p->extra * p->inverse_rays;
+  sums->extra_floor += add_extra(p, ray, delta, p->t_f, &full, scale * (float)(1 - p->d), w, sums);
+  if (p->t_c != p->t_f) sums->extra_ceil += add_extra(p, ray, delta, p->t_c, &full, scale * (float)p->d, w, sums);
 }

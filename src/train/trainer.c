@@ -9,15 +9,18 @@
 
 enum { EPOCH_RAYS_PER_VIEW = 4096 };
 
-static const double longest = 10;      /* that an iteration counts in a time budget: so many times their mean */
-static const double search = 0.5;      /* share of stage II in which t* moves; the rest trains t_r steps alone */
-static const double budget_rate = 1e5; /* of t*, over that share */
+static const double longest = 10; /* that an iteration counts in a time budget: so many times their mean */
+static const double search = 0.5; /* share of stage II in which t* moves, at most; the rest trains t_r alone */
+
+/* Every so many iterations of the search are full ones; the others train one prefix, drawn at random. */
+enum { FULL_EVERY = 4 };
 
 sf_train_options sf_train_defaults(void)
 {
   sf_train_options options = {.config = sf_config_default(),
                               .beta = 5e-7,
                               .alpha = 1e-6,
+                              .search_rate = 1,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,
@@ -48,7 +51,6 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
   if (data->layout == SF_LAYOUT_BLENDER) see_all(&options.config.tensorf, data);
   options.lr_grid = 0.02;
   options.lr_net = 1e-3;
-  options.beta = data->ndc ? 5e-7 : 2e-6; /* 40 % of energy saved with 150 inputs means two steps */
   options.background = data->ndc ? 0 : 1;
   options.rays = 4096;
   options.samples = 1 << 15; /* many small iterations learn faster than few large ones */
@@ -83,6 +85,7 @@ static void start_budget(sf_trainer *t)
   const int T = t->model.config.steps;
   t->model.t_r = t->stage == 1 ? T : t->options.fixed_steps ? t->options.fixed_steps : T > 1 ? T - 1 : 1;
   t->model.t_star = (float)t->model.t_r;
+  if (t->stage == 2) sf_search_begin(t);
 }
 
 /* Length of stage I in iterations, or as a share of the time budget. */
@@ -179,56 +182,86 @@ static bool scaled(const sf_trainer *t)
          t->epoch < (double)t->data->count * EPOCH_RAYS_PER_VIEW;
 }
 
-/* The steps of inference are all that is unrolled: neither teacher nor tail is left. */
-static bool settled(const sf_trainer *t)
+/* t* moves. */
+static bool searching(const sf_trainer *t)
 {
-  return sf_tuning(t) || (t->stage == 2 && t->stage_progress >= search - 1e-9);
+  return t->stage == 2 && t->search.state == SF_SEARCH_RUNNING;
 }
 
 /* What is trained now is what the run leaves. */
 static bool final_part(const sf_trainer *t)
 {
   const bool stage2 = t->options.minutes > 0 ? stage1_weight(t) < 1 : t->options.stage2 > 0;
-  return settled(t) || (t->stage == 1 ? !stage2 : t->options.fixed_steps > 0);
+  return t->stage == 1 ? !stage2 : !searching(t);
+}
+
+/* One prefix is all that is unrolled. */
+static void train_one(sf_loss_plan *p, int prefix)
+{
+  p->steps = p->regular_at = p->t_f = p->t_c = p->t_r = prefix;
+  p->weight[prefix - 1] = 1;
+}
+
+/* All T steps. The paper trains M_smooth there; here L_render(T) and the mean over all prefixes, which the iterations
+ * between estimate with one prefix each: so what a step is worth does not depend on where t* stands. */
+static void train_all(const sf_trainer *t, sf_loss_plan *p)
+{
+  const sf_train_options *o = &t->options;
+  const int T = t->model.config.steps;
+  const double t_hat = fmin(fmax(t->model.t_star, 1), T);
+  p->full = true;
+  p->steps = p->regular_at = T;
+  p->t_f = (int)fmin(floor(t_hat), T - 1);
+  p->t_c = p->t_f + 1;
+  p->d = t_hat - p->t_f;
+  p->t_r = t->model.t_r;
+  p->extra = o->no_extra ? 0 : (float)o->alpha;
+  p->distill = !o->no_distill;
+  if (o->objective == SF_OBJECTIVE_PAPER) {
+    p->weight[p->t_f - 1] = (float)(1 - p->d);
+    p->weight[p->t_c - 1] = (float)p->d;
+    return;
+  }
+  for (int i = 0; i < T; i++) p->weight[i] = 1.0f / (float)T;
+  p->weight[T - 1] = 1;
 }
 
 static sf_loss_plan make_plan(const sf_trainer *t)
 {
-  const sf_config *c = &t->model.config;
+  const int T = t->model.config.steps;
   const float *leak = sf_model_leak(&t->model);
-  const bool sigma_integrates = t->backbone->weights[1] >= 0, learned = !settled(t) && !t->options.fixed_steps;
-  sf_loss_plan p = {.stage = t->stage,
-                    .steps = settled(t)  ? t->model.t_r
-                             : scaled(t) ? 2
-                                         : c->steps,
-                    .inverse_rays = 1.0f / (float)t->batch.rays,
-                    .extra = t->options.no_extra || !learned ? 0 : (float)t->options.alpha,
-                    .distill = !t->options.no_distill && !settled(t),
+  const bool sigma_integrates = t->backbone->weights[1] >= 0;
+  sf_loss_plan p = {.inverse_rays = 1.0f / (float)t->batch.rays,
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
-  const double t_hat = fmin(fmax(t->model.t_star, 1), p.steps);
-  const bool one = t->stage == 1 || !learned || p.steps == 1; /* one prefix is trained, not two */
-  p.t_f = t->stage == 1 ? p.steps : one ? (int)fmin(t->model.t_r, p.steps) : (int)fmin(floor(t_hat), p.steps - 1);
-  p.t_c = one ? p.t_f : p.t_f + 1;
-  p.d = one ? 0 : t_hat - p.t_f;
-  p.t_r = p.d >= 0.5 ? p.t_c : p.t_f;
+  const bool learned = searching(t);
+  if (!learned || scaled(t)) {
+    const int wanted = t->stage == 1 || learned ? T : t->model.t_r;
+    train_one(&p, scaled(t) && wanted > 2 ? 2 : wanted);
+  } else if (t->options.objective == SF_OBJECTIVE_PAPER || !t->search.measured || t->iteration % FULL_EVERY == 0)
+    train_all(t, &p);
+  else
+    train_one(&p, 1 + (int)sf_random_below(t->options.seed, RNG_PREFIX, (uint64_t)t->iteration, (uint64_t)T));
   return p;
 }
 
-/* L_extra's part in the integrators' leaks: the decay factors and e^tau. */
+/* L_extra's part in the leaks: the integrators' decay factors, and e^tau of the neurons. */
 static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *sums)
 {
-  if (p->stage == 1 || p->extra == 0) return 0;
-  static const int integrator[2] = {1, 4};
+  if (p->extra == 0) return 0;
+  static const int integrator[2] = {1, 4}, spiking[3] = {0, 2, 3};
   const double from_tail[2] = {sums->g_sigma_leak, sums->g_colour_leak};
+  float *leak = sf_model_leak(&t->model), *grad = t->grad + (leak - t->model.value);
   double value = 0;
   for (int i = 0; i < 2; i++) {
-    if (t->backbone->weights[integrator[i]] < 0) continue;
-    float *leak = sf_model_leak(&t->model) + integrator[i];
-    const float w = *leak, k = sf_sigmoid(w);
-    const double tau = fmin(1 + exp(-(double)w), 30.0); /* e^tau stays finite */
+    const float k = sf_sigmoid(leak[integrator[i]]);
+    grad[integrator[i]] += (float)(from_tail[i] * k * (1 - k));
+  }
+  for (int i = 0; i < 3; i++) {
+    if (t->backbone->weights[spiking[i]] < 0) continue;
+    const double inverse = exp(-(double)leak[spiking[i]]), tau = fmin(1 + inverse, 30.0); /* e^tau stays finite */
     value += exp(tau);
-    t->grad[leak - t->model.value] += (float)(from_tail[i] * k * (1 - k) - p->extra * exp(tau) * exp(-(double)w));
+    grad[spiking[i]] -= (float)(p->extra * exp(tau) * inverse);
   }
   return value;
 }
@@ -268,19 +301,10 @@ static double stage_share(const sf_trainer *t)
   return 1.0 / (n > 0 ? n : 1);
 }
 
-/* Gradient descent on the one scalar t*, not Adam: Adam's normalisation would discard the very magnitudes that beta
- * weighs, the error that one more step saves against b e^t. Without the error's signal t* follows
- * e^-t = e^-t0 + budget_rate * beta * progress, at most T per search. */
-static void update_budget(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double penalty_ratio)
+/* M_smooth of the measured curve. */
+static double smooth_error(const sf_loss_plan *p, const sf_loss_sums *mean)
 {
-  if (p->t_c == p->t_f || p->steps < t->model.config.steps) return;
-  const double t_hat = t->model.t_star, share = stage_share(t) / search, limit = t->model.config.steps * share;
-  double g = mean->mse_ceil - mean->mse_floor + p->extra * (mean->extra_ceil - mean->extra_floor);
-  if (!t->options.no_penalty) g += t->options.beta * penalty_ratio * exp(t_hat);
-  t->t_momentum = 0.9 * t->t_momentum + 0.1 * g;
-  const double move = fmin(fmax(budget_rate * share * t->t_momentum, -limit), limit);
-  t->model.t_star = (float)fmin(fmax(t_hat - move, 1), t->model.config.steps);
-  t->model.t_r = (int)lroundf(t->model.t_star);
+  return (1 - p->d) * mean->prefix[p->t_f - 1] + p->d * mean->prefix[p->t_c - 1];
 }
 
 static void advance(sf_trainer *t, double share)
@@ -291,6 +315,7 @@ static void advance(sf_trainer *t, double share)
   const double n1 = stage1_weight(t), n2 = t->options.minutes > 0 ? 1 - n1 : t->options.stage2;
   const double whole = n1 + n2 > 0 ? n1 + n2 : 1;
   t->progress = ((t->stage == 1 ? 0 : n1) + (t->stage == 1 ? n1 : n2) * fmin(t->stage_progress, 1)) / whole;
+  if (searching(t) && t->stage_progress >= search - 1e-9) sf_search_end(t);
   if (t->stage_progress < 1 - 1e-9) return;
   if (t->stage == 1 && n2 > 0) {
     t->stage = 2;
@@ -308,6 +333,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
                       .seconds = t->seconds,
                       .t_star = t->model.t_star,
                       .t_r = t->model.t_r,
+                      .search = sf_search_now(t),
                       .firing = {t->firing[0], t->firing[1], t->firing[2]},
                       .rays = t->batch.rays,
                       .samples = t->batch.samples,
@@ -318,18 +344,6 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
   memcpy(s.quiet, t->health.quiet, sizeof s.quiet);
   memcpy(s.revived, t->health.revived, sizeof s.revived);
   return s;
-}
-
-static void report(const sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *mean, double loss, double mse,
-                   sf_train_stats *s)
-{
-  *s = sf_trainer_stats(t);
-  if (t->stage != 3) s->stage = p->stage;
-  s->loss = loss;
-  s->mse = mse;
-  s->mse_full = mean->mse_full;
-  s->mse_floor = mean->mse_floor;
-  s->mse_ceil = mean->mse_ceil;
 }
 
 /* The prefix whose density decides what is empty: the one that is trained, which inference will use. */
@@ -351,26 +365,28 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
 {
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
+  const int stage = t->stage;
   SF_TRY(t->backbone->begin(t, occupancy_steps(t)));
   SF_TRY(t->backbone->draw(t));
   SF_TRY(check_samples(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
   t->backbone->gradient(t, &plan, &mean, t->firing);
-  if (plan.t_c == plan.t_f) mean.mse_ceil = mean.mse_floor;
   const double e_tau = leak_terms(t, &plan, &mean);
-  const double mse = plan.stage == 1 ? mean.mse_full : (1 - plan.d) * mean.mse_floor + plan.d * mean.mse_ceil;
-  const double ratio = mean.mse_full / fmax(mse, 1e-12);
+  double mse = 0;
+  for (int i = 0; i < plan.steps; i++) mse += plan.weight[i] * mean.prefix[i];
   double loss = mse + mean.regular;
-  if (plan.stage == 2)
-    loss += plan.distill * mean.distill +
-            plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau) +
-            (t->options.no_penalty || t->options.fixed_steps ? 0 : t->options.beta * ratio * exp(t->model.t_star));
+  if (plan.full) {
+    loss +=
+        plan.distill * mean.distill + plan.extra * ((1 - plan.d) * mean.extra_floor + plan.d * mean.extra_ceil + e_tau);
+    mse = smooth_error(&plan, &mean);
+  }
   SF_TRY(check_gradient(t, loss));
   t->backbone->update(t);
   sf_health_leaks(t);
   SF_TRY(sf_parameters_check(t));
-  update_budget(t, &plan, &mean, ratio);
+  if (plan.full)
+    sf_search_update(t, &mean, mean.prefix[plan.steps - 1] / fmax(mse, 1e-12), fmin(t->stage_progress / search, 1));
   int event[3];
   SF_TRY(sf_health_check(t, event));
   /* A process that was stopped meanwhile has not trained: a pause is no share of a time budget. */
@@ -383,7 +399,10 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   if (before < sf_lattice_settles && t->progress >= sf_lattice_settles && !sf_tuning(t)) sf_batch_settle(t);
   if (last) SF_TRY(sf_average_update(t, before));
   if (t->stage == 3 && sf_tuning(t)) sf_scales_round(&t->model, t->model.value);
-  report(t, &plan, &mean, loss, mse, stats);
+  *stats = sf_trainer_stats(t);
+  if (t->stage != 3) stats->stage = stage;
+  stats->loss = loss;
+  stats->mse = mse;
   memcpy(stats->event, event, sizeof event);
   return sf_ok();
 }

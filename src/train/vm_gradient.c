@@ -76,13 +76,11 @@ static void run_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bu
 {
   sf_vm *vm = t->vm;
   const int products = vm->decoder->view.products;
-  /* Beyond t_c only L_extra's 1e-6 of a gradient would flow: not worth half of the backward pass. */
-  const int steps = p->stage == 1 ? p->steps : p->t_c;
   const int lanes = load_directions(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,
                             w->block[b].product, products);
-    t->kernels->decoder_forward(vm->decoder, &w->block[b], p->steps, steps, w->scratch);
+    t->kernels->decoder_forward(vm->decoder, &w->block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
@@ -93,10 +91,10 @@ static void run_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bu
     ray_out(t, p, r, w);
     g->wild |= wild(vm->part[vm->ray[r].part].slope + vm->ray[r].first, whole.count);
   }
-  if (bundle->blocks) count_spikes(t, steps, &w->block[0].net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
+  if (bundle->blocks) count_spikes(t, p->steps, &w->block[0].net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
   for (int b = 0; b < bundle->blocks; b++) {
     float *dproduct = vm->dproduct + (size_t)(bundle->block + b) * SF_BLOCK * products;
-    t->kernels->decoder_backward(vm->decoder, &w->block[b], steps, w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
+    t->kernels->decoder_backward(vm->decoder, &w->block[b], p->steps, w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
                                  dproduct, g->grad, w->scratch);
     g->wild |= wild(dproduct, SF_BLOCK * products);
   }

@@ -25,7 +25,18 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
       {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
       {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II (default 7500)"},
       {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B",
-       "quality (small) against energy (large) (default 5e-7, tensorf but for NDC 2e-6)"},
+       "quality (small) against energy (large) (default 5e-7)"},
+      {"--price", 0, SF_ARG_CHOICE, &t->price, 0, 0, "exponential|energy", "KIND",
+       "what beta weighs: e^t, as the paper, or what one more step costs here, mJ per frame (default exponential)"},
+      {"--target-loss", 0, SF_ARG_DOUBLE, &t->target_loss, 0, 20, NULL, "DB",
+       "in place of --beta: the fewest steps that are at most so far behind the best number of steps"},
+      {"--target-saving", 0, SF_ARG_DOUBLE, &t->target_saving, 0, 100, NULL, "PERCENT",
+       "in place of --beta: the most steps that save so much of the ReLU twin's energy"},
+      {"--objective", 0, SF_ARG_CHOICE, &t->objective, 0, 0, "prefixes|paper", "KIND",
+       "what is trained while t* is searched: the mean over all numbers of steps, or the paper's M_smooth through all "
+       "T steps (default prefixes)"},
+      {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
+       "how fast the averages of the search forget; what it finds should not hang on it (default 1)"},
       {"--steps", 'T', SF_ARG_INT, &c->steps, 1, SF_T_MAX, NULL, "T", "time steps unrolled in training (default 8)"},
       {"--net", 0, SF_ARG_CHOICE, &c->net, 0, 0, "snn|ann", "KIND", "spiking nets or their ReLU twin (default snn)"},
       {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE",
@@ -102,6 +113,8 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
                       "understood of it.",
                   .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
                               "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
+                              "  sf_train lego -o lego.safetensors --minutes 10 --target-loss 0.1\n"
+                              "  sf_train lego -o lego.safetensors --minutes 10 --target-saving 50\n"
                               "  sf_train lego -o lego.safetensors --resume\n"
                               "  sf_train lego -o twin.safetensors --net ann --minutes 10\n"
                               "  sf_train lego -o vm.safetensors --backbone tensorf --minutes 30\n"
@@ -158,10 +171,13 @@ static sf_status check_effect(train_arguments *a)
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--net",        "--steps",      "--input-mode",  "--hidden",
-                                        "--theta",      "--occ-res",    "--fixed-steps", "--stage1",
-                                        "--no-stage1",  "--no-extra",   "--no-penalty",  "--no-budget",
-                                        "--no-distill", "--no-scaling", "--beta",        NULL},
+  static const char *const settled[] = {"--net",         "--steps",       "--input-mode",
+                                        "--hidden",      "--theta",       "--occ-res",
+                                        "--fixed-steps", "--stage1",      "--no-stage1",
+                                        "--no-extra",    "--no-penalty",  "--no-budget",
+                                        "--no-distill",  "--no-scaling",  "--beta",
+                                        "--price",       "--target-loss", "--target-saving",
+                                        "--objective",   "--search-rate", NULL},
                            *const iterations[] = {"--stage1", "--stage2", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
@@ -186,6 +202,8 @@ static sf_status finish_options(train_arguments *a)
   if (a->train.no_stage1) a->train.stage2 += a->train.stage1, a->train.stage1 = 0;
   if (a->train.fixed_steps > c->steps)
     return sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a->train.fixed_steps, c->steps);
+  if (a->train.target_loss > 0 && a->train.target_saving > 0)
+    return sf_fail(SF_E_USAGE, "--target-loss and --target-saving exclude each other");
   if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
   if (a->fine_tune && c->backbone == SF_TENSORF)
     return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");

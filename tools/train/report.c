@@ -8,18 +8,26 @@ static double psnr_of(double mse)
   return mse > 0 ? -10 * log10(mse) : 99;
 }
 
-void train_log_line(FILE *log, const sf_train_stats *s)
+void train_log_line(FILE *log, const sf_train_stats *s, int steps)
 {
   fprintf(log,
-          "{\"iteration\":%lld,\"stage\":%d,\"seconds\":%.3f,\"loss\":%.9g,\"mse\":%.9g,\"mse_full\":%.9g,"
-          "\"mse_floor\":%.9g,\"mse_ceil\":%.9g,\"psnr\":%.4f,\"t_star\":%.6f,\"t_r\":%d,\"rays\":%d,\"samples\":%d,"
+          "{\"iteration\":%lld,\"stage\":%d,\"seconds\":%.3f,\"loss\":%.9g,\"mse\":%.9g,\"psnr\":%.4f,\"t_star\":%.6f,"
+          "\"t_r\":%d,\"rays\":%d,\"samples\":%d,"
           "\"lattice\":%d,"
           "\"occupied\":%.6f,\"tau\":[%.5f,%.5f,%.5f,%.5f,%.5f],\"firing\":[%.5f,%.5f,%.5f],\"quiet\":[%d,%d,%d],"
-          "\"revived\":[%d,%d,%d]}\n",
-          (long long)s->iteration, s->stage, s->seconds, s->loss, s->mse, s->mse_full, s->mse_floor, s->mse_ceil,
-          psnr_of(s->mse), s->t_star, s->t_r, s->rays, s->samples, s->lattice, s->occupied, s->tau[0], s->tau[1],
-          s->tau[2], s->tau[3], s->tau[4], s->firing[0], s->firing[1], s->firing[2], s->quiet[0], s->quiet[1],
-          s->quiet[2], s->revived[0], s->revived[1], s->revived[2]);
+          "\"revived\":[%d,%d,%d]",
+          (long long)s->iteration, s->stage, s->seconds, s->loss, s->mse, psnr_of(s->mse), s->t_star, s->t_r, s->rays,
+          s->samples, s->lattice, s->occupied, s->tau[0], s->tau[1], s->tau[2], s->tau[3], s->tau[4], s->firing[0],
+          s->firing[1], s->firing[2], s->quiet[0], s->quiet[1], s->quiet[2], s->revived[0], s->revived[1],
+          s->revived[2]);
+  if (s->search.measured) {
+    const sf_search_report *r = &s->search;
+    fprintf(log, ",\"worth\":%.6g,\"worth_error\":%.3g,\"price\":%.6g,\"price_error\":%.3g,\"prefix_mse\":[", r->worth,
+            r->worth_error, r->price, r->price_error);
+    for (int i = 0; i < steps; i++) fprintf(log, "%s%.6g", i ? "," : "", r->prefix_mse[i]);
+    fprintf(log, "]");
+  }
+  fprintf(log, "}\n");
 }
 
 void train_smooth(train_recent *r, const sf_train_stats *s, double step)
@@ -33,11 +41,14 @@ void train_smooth(train_recent *r, const sf_train_stats *s, double step)
 void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r)
 {
   const double left = s->progress > 1e-6 ? s->seconds * (1 - s->progress) / s->progress : 0;
+  char worth[48] = "";
+  if (s->search.measured)
+    snprintf(worth, sizeof worth, " (a step is worth %.1e +- %.0e)", s->search.worth, s->search.worth_error);
   sf_progress_show(p,
-                   "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f  firing %.2f "
+                   "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f%s  firing %.2f "
                    "%.2f %.2f  ETA %d:%02d",
                    s->stage == 1 ? "I " : "II", 100 * s->progress, (long long)s->iteration, r->rate / 1e3, r->loss,
-                   psnr_of(r->mse), s->t_star, s->firing[0], s->firing[1], s->firing[2], (int)left / 60,
+                   psnr_of(r->mse), s->t_star, worth, s->firing[0], s->firing[1], s->firing[2], (int)left / 60,
                    (int)left % 60);
 }
 
@@ -50,6 +61,30 @@ void train_warn(sf_progress *progress, const sf_train_stats *s)
       fprintf(stderr, "sf_train: warning: iteration %lld: the neurons of %s %s: brought back to the threshold\n",
               (long long)s->iteration, layer[l], s->event[l] < 0 ? "were silent" : "fired all the time");
     }
+}
+
+/* dB between the best prefix and t_r, on the rays of the search. */
+static double train_behind(const sf_search_report *r, int t_r, int steps)
+{
+  double best = r->prefix_mse[0];
+  for (int i = 1; i < steps; i++) best = fmin(best, r->prefix_mse[i]);
+  return psnr_of(best) - psnr_of(r->prefix_mse[t_r - 1]);
+}
+
+static cJSON *search_json(const sf_config *c, const sf_search_report *r)
+{
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddStringToObject(json, "state", sf_search_names[r->state]);
+  cJSON_AddNumberToObject(json, "measured", r->measured);
+  cJSON_AddNumberToObject(json, "beta", r->beta);
+  cJSON_AddNumberToObject(json, "worth", r->worth);
+  cJSON_AddNumberToObject(json, "worth_error", r->worth_error);
+  cJSON_AddNumberToObject(json, "price", r->price);
+  cJSON_AddNumberToObject(json, "price_error", r->price_error);
+  cJSON_AddItemToObject(json, "prefix_mse", cJSON_CreateDoubleArray(r->prefix_mse, c->steps));
+  cJSON_AddNumberToObject(json, "saving_estimate", r->saving);
+  cJSON_AddNumberToObject(json, "step_mj_per_frame", r->step_energy);
+  return json;
 }
 
 static cJSON *make_summary(const train_arguments *a, const sf_config *c, const sf_train_stats *s,
@@ -70,6 +105,7 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   cJSON_AddNumberToObject(json, "T", c->steps);
   cJSON_AddNumberToObject(json, "t_r", s->t_r);
   cJSON_AddNumberToObject(json, "t_star", s->t_star);
+  if (s->search.state != SF_SEARCH_NONE) cJSON_AddItemToObject(json, "search", search_json(c, &s->search));
   if (c->backbone == SF_INGP) cJSON_AddNumberToObject(json, "lattice", c->lattice);
   cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
   cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
@@ -82,12 +118,30 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   return json;
 }
 
+static void print_search(const train_arguments *a, const sf_train_stats *s)
+{
+  const sf_search_report *r = &s->search;
+  const sf_train_options *o = &a->train;
+  if (r->state == SF_SEARCH_NONE) return;
+  printf("%s: search for t*: %s; ", a->output, sf_search_names[r->state]);
+  if (!r->measured) {
+    printf("the run has no time for it, t_r is where it starts\n");
+    return;
+  }
+  printf("one more step is worth %.2e +- %.1e and costs %.2e +- %.1e\n", r->worth, r->worth_error, r->price,
+         r->price_error);
+  if (o->target_loss > 0 || o->target_saving > 0)
+    printf("%s: that is beta = %.2e; about %.1f %% of the ReLU twin's energy saved, %.2f dB behind the best prefix\n",
+           a->output, r->beta, 100 * r->saving, train_behind(r, s->t_r, a->train.config.steps));
+}
+
 static void print_text(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
 {
   printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB", a->output,
          (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr);
   if (!isnan(q->ssim)) printf(", SSIM %.4f", q->ssim);
   printf(" over %d views\n", q->views);
+  print_search(a, s);
   if (c->backbone == SF_INGP)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
            c->dt_gamma > 0 ? " near the camera" : "");

@@ -16,7 +16,8 @@ typedef struct train_quality {
   const char *layout; /* of the data */
 } train_quality;
 
-void train_log_line(FILE *log, const sf_train_stats *s);
+/* steps: T. */
+void train_log_line(FILE *log, const sf_train_stats *s, int steps);
 /* step: seconds of the latest iteration. */
 void train_smooth(train_recent *r, const sf_train_stats *s, double step);
 void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r);

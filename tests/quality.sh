@@ -1,0 +1,49 @@
+#!/bin/bash
+# make quality on one scene and a few iterations: the table, what is kept, what is compared, what is refused.
+set -u
+build=$1
+here=$(cd "$(dirname "$0")/.." && pwd)
+dir=$(mktemp -d)
+trap 'rm -rf "$dir"' EXIT
+failed=0
+fail() { echo "FAILED: $1" >&2; failed=1; }
+short=(--only simple --seeds "1 2" --stage1 20 --stage2 60 --samples 512 --out "$dir/q")
+
+# Pictures of 32 pixels where the script would make some of 200.
+mkdir -p "$dir/b/quality-data"
+ln -s "$(cd "$build" && pwd)/bin" "$dir/b/bin"
+"$build/bin/sf_scene" simple -o "$dir/b/quality-data/simple" --size 32 --train 8 --test 2 -q || fail "no scene"
+touch "$dir/b/quality-data/simple/complete"
+
+run() { "$here/tools/quality.sh" "$dir/b" "$@" >"$dir/out" 2>"$dir/err"; }
+row() { grep '^| simple |' "$dir/out"; }
+
+run "${short[@]}" --keep || fail "a short measurement: $(cat "$dir/err")"
+row | grep -qE '^\| simple \| [0-9.]+ \+- [0-9.]+ \| [0-9.]+ \+- ' || fail "no row of simple with two seeds: $(cat "$dir/out")"
+row | grep -q '(' && fail "compared with nothing"
+[ -s "$dir/q/kept.json" ] || fail "--keep kept nothing"
+for key in psnr twin_psnr excess_mse t_star t_r worth price lost_cells; do
+  grep -q "\"$key\"" "$dir/q/quality.json" || fail "quality.json has no $key"
+done
+
+touch -d '2001-01-01' "$dir/q/simple/snn-1/train.jsonl"
+run "${short[@]}" || fail "the second call: $(cat "$dir/err")"
+[ "$(date -r "$dir/q/simple/snn-1/train.jsonl" +%Y)" = 2001 ] || fail "a finished run ran again"
+[ "$(row | grep -o '(' | wc -l)" -ge 8 ] || fail "the kept table is not compared: $(row)"
+run "${short[@]}" --train "--beta 1" || fail "other options: $(cat "$dir/err")"
+[ "$(date -r "$dir/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of other options was kept"
+row | cut -d'|' -f6 | grep -q ' 1.00 ' || fail "beta = 1 does not learn one step: $(row)"
+
+# The share of lost cells: none of itself; all of an empty grid.
+for seed in 1 2; do cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/ann-2/model.safetensors"; done
+cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-1/model.safetensors"
+cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-2/model.safetensors"
+"$build/bin/sf_quality" "$dir/q" | grep '^| simple' | cut -d'|' -f10 | grep -q ' 0.000 +- 0.000 ' || fail "a model has lost cells of itself"
+
+run --only mars; [ $? -eq 2 ] && grep -q "scene 'mars' is unknown" "$dir/err" || fail "an unknown scene: $(cat "$dir/err")"
+run --seeds x; [ $? -eq 2 ] || fail "--seeds x"
+run --only mic; [ $? -eq 1 ] && grep -q 'no scene is left' "$dir/err" || fail "no scene there: $(cat "$dir/err")"
+mkdir "$dir/none"
+"$build/bin/sf_quality" "$dir/none" >"$dir/out" 2>"$dir/err"; [ $? -eq 1 ] && grep -q 'no finished run' "$dir/err" || fail "an empty folder"
+[ ! -e "$dir/none/quality.json" ] || fail "a table of nothing was written"
+exit $failed

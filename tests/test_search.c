@@ -1,0 +1,302 @@
+/* The search for t*: where worth and price meet, on curves that are known; and two scenes of unlike difficulty. */
+#include "ck_run.h"
+#include "train_fixture.h"
+
+static sf_dataset data;
+
+static void set_up(void)
+{
+  make_scene(12);
+  data = load("train");
+}
+
+static void tear_down(void)
+{
+  sf_dataset_free(&data);
+  remove_folder();
+}
+
+/* A trainer at the start of stage II, with the net's firing of a fifth. */
+static sf_trainer *searcher(const sf_train_options *o)
+{
+  sf_trainer *t = start(&data, o, NULL);
+  t->stage = 2;
+  t->batch.rays = 100;
+  t->batch.samples = 500;
+  for (int l = 0; l < 3; l++) t->firing[l] = 0.2;
+  t->model.t_r = T - 1;
+  t->model.t_star = T - 1;
+  sf_search_begin(t);
+  return t;
+}
+
+/* Prefix t has the error floor + height / 2^(t-1), times 1 + noise that changes from call to call. */
+typedef struct curve {
+  double floor, height, noise, fall; /* fall: of all errors over the search, exponent */
+} curve;
+
+static double error_of(const curve *c, int prefix, double at, int call)
+{
+  const double shake = 1 + c->noise * (2 * sf_random_float(5, 1, (uint64_t)call) - 1);
+  return (c->floor + c->height * pow(0.5, prefix - 1)) * shake * exp(-c->fall * at);
+}
+
+/* n full iterations over the whole search, or until it ends. */
+static void measure(sf_trainer *t, const curve *c, int n, double ratio)
+{
+  for (int i = 0; i < n && t->search.state == SF_SEARCH_RUNNING; i++) {
+    sf_loss_sums mean = {0};
+    const double at = (i + 1.0) / n;
+    for (int p = 1; p <= T; p++) mean.prefix[p - 1] = error_of(c, p, at, i);
+    sf_search_update(t, &mean, ratio, at);
+  }
+  sf_search_end(t);
+}
+
+/* Least squares by the normal equations. */
+static double slope_of(const curve *c)
+{
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (int p = 1; p <= T; p++) {
+    const double y = error_of(c, p, 0, 0);
+    sx += p, sy += y, sxx += p * p, sxy += p * y;
+  }
+  return -(T * sxy - sx * sy) / (T * sxx - sx * sx);
+}
+
+static sf_train_options search_run(void)
+{
+  sf_train_options o = small_run();
+  o.beta = 5e-7;
+  return o;
+}
+
+START_TEST(worth_equals_price)
+{
+  static const double betas[] = {1e-7, 5e-7, 1e-6};
+  const curve c = {1e-3, 1e-4, 0, 0};
+  const double worth = slope_of(&c), ratio = 0.9;
+  for (int i = 0; i < 3; i++) {
+    sf_train_options o = search_run();
+    o.beta = betas[i];
+    sf_trainer *t = searcher(&o);
+    measure(t, &c, 40, ratio);
+    const sf_search_report r = sf_search_now(t);
+    const double expected = log(worth / (o.beta * ratio));
+    ck_assert_double_eq_tol(t->model.t_star, expected, 1e-5);
+    ck_assert_int_eq(t->model.t_r, lround(expected));
+    ck_assert_double_eq_tol(r.worth, worth, 1e-9 * worth);
+    ck_assert_double_eq_tol(r.price, worth, 1e-5 * worth);
+    ck_assert_double_lt(r.worth_error, 1e-6 * worth);
+    ck_assert_int_eq(r.state, SF_SEARCH_BALANCED);
+    ck_assert_double_lt(t->search.at, 0.6); /* it rests, so it stops */
+    sf_trainer_free(t);
+  }
+}
+END_TEST
+
+/* t* of noisy curves that fall, at a search rate. */
+static double found(const curve *c, double rate, sf_search_report *report)
+{
+  sf_train_options o = search_run();
+  o.search_rate = rate;
+  sf_trainer *t = searcher(&o);
+  measure(t, c, 200, 1);
+  const double t_star = t->model.t_star;
+  *report = sf_search_now(t);
+  sf_trainer_free(t);
+  return t_star;
+}
+
+START_TEST(the_rate_decides_nothing)
+{
+  const curve c = {1e-3, 1e-4, 0.1, 0.4};
+  sf_search_report slow, normal, fast;
+  const double at = found(&c, 1, &normal);
+  ck_assert_double_eq_tol(found(&c, 3, &fast), at, 0.3);
+  ck_assert_double_eq_tol(found(&c, 1.0 / 3, &slow), at, 0.3);
+  /* The standard error is of the size of the noise: 0.1 / sqrt(3) a batch, over 200 memory / rate / 2 batches or so. */
+  ck_assert_double_gt(normal.worth_error, 0.005 * normal.worth);
+  ck_assert_double_lt(normal.worth_error, 0.05 * normal.worth);
+  ck_assert_double_gt(fast.worth_error, 1.2 * normal.worth_error);
+}
+END_TEST
+
+START_TEST(the_scene_decides)
+{
+  const curve easy = {1e-4, 1e-5, 0, 0}, hard = {1e-3, 1e-4, 0, 0};
+  sf_search_report r;
+  ck_assert_double_eq_tol(found(&hard, 1, &r) - found(&easy, 1, &r), log(10), 1e-4);
+}
+END_TEST
+
+START_TEST(ends_of_the_range)
+{
+  const curve c = {1e-3, 1e-4, 0, 0}, rising = {1e-3, -1e-4, 0, 0}, nothing = {0};
+  static const struct {
+    double beta;
+    int steps;
+  } cases[] = {{0, T}, {1e-12, T}, {1, 1}};
+  for (int i = 0; i < 3; i++) {
+    sf_train_options o = search_run();
+    o.beta = cases[i].beta;
+    sf_trainer *t = searcher(&o);
+    measure(t, &c, 40, 1);
+    ck_assert_int_eq(t->model.t_r, cases[i].steps);
+    ck_assert_double_eq(t->model.t_star, cases[i].steps);
+    ck_assert_int_eq(t->search.state, SF_SEARCH_AT_END);
+    sf_trainer_free(t);
+  }
+  const curve *const worthless[] = {&rising, &nothing};
+  for (int i = 0; i < 2; i++) {
+    sf_train_options o = search_run();
+    sf_trainer *t = searcher(&o);
+    measure(t, worthless[i], 40, 1);
+    ck_assert_int_eq(t->model.t_r, 1);
+    ck_assert(isfinite(sf_search_now(t).worth) && isfinite(sf_search_now(t).worth_error));
+    sf_trainer_free(t);
+  }
+  sf_train_options o = search_run();
+  o.no_penalty = true;
+  sf_trainer *t = searcher(&o);
+  measure(t, &c, 40, 1);
+  ck_assert_int_eq(t->model.t_r, T);
+  sf_trainer_free(t);
+}
+END_TEST
+
+START_TEST(what_was_not_reached_is_said)
+{
+  const curve falling = {1e-3, 1e-4, 0, 4}, still = {1e-3, 1e-4, 0, 0};
+  sf_train_options o = search_run();
+  sf_trainer *t = searcher(&o);
+  measure(t, &falling, 40, 1);
+  ck_assert_int_eq(t->search.state, SF_SEARCH_NOT_REACHED);
+  sf_trainer_free(t);
+  t = searcher(&o);
+  measure(t, &still, 1, 1); /* moves all the same: it is all that is known */
+  ck_assert_int_eq(t->search.state, SF_SEARCH_NOT_REACHED);
+  ck_assert_double_eq_tol(t->model.t_star, log(slope_of(&still) / 5e-7), 1e-5);
+  sf_trainer_free(t);
+  t = searcher(&o);
+  sf_search_end(t);
+  ck_assert_int_eq(t->search.state, SF_SEARCH_TOO_SHORT);
+  ck_assert_int_eq(t->model.t_r, T - 1);
+  sf_trainer_free(t);
+}
+END_TEST
+
+/* The price of a step is what the ledger says: the step at which it is no longer worth it. */
+START_TEST(energy_as_price)
+{
+  const curve c = {1e-3, 1e-4, 0, 0};
+  sf_train_options o = search_run();
+  o.price = SF_PRICE_ENERGY;
+  sf_trainer *t = searcher(&o);
+  measure(t, &c, 40, 1);
+  const sf_config *g = &t->model.config;
+  const double h = g->hidden, frame = 5 * 24 * 24, sop = 0.2 * h * (SF_DENSITY_OUT + h + 3);
+  const double step = (0.9 * sop + 4.6 * h * SF_GEO_FEATURES) * frame * 1e-9; /* mJ */
+  ck_assert_double_eq_tol(sf_search_now(t).step_energy, step, 1e-9 * step);
+  sf_trainer_free(t);
+  for (int k = 2; k < T; k++) { /* step k saves more than it costs, step k+1 less */
+    o.beta = 1e-4 * pow(0.5, k) * sqrt(2) / step;
+    t = searcher(&o);
+    measure(t, &c, 40, 1);
+    ck_assert_int_eq(t->model.t_r, k);
+    const sf_search_report r = sf_search_now(t);
+    ck_assert_double_eq_tol(r.worth, r.price, 1e-5 * r.price);
+    sf_trainer_free(t);
+  }
+}
+END_TEST
+
+START_TEST(targets_find_beta)
+{
+  const curve c = {1e-3, 1e-3, 0, 0}; /* 2e-3, 1.5e-3, 1.25e-3, ... */
+  sf_train_options o = search_run();
+  const double best = error_of(&c, T, 0, 0);
+  for (int k = 1; k < T; k++) {
+    o.target_loss = 10 * log10(error_of(&c, k, 0, 0) / best) + 1e-6;
+    sf_trainer *t = searcher(&o);
+    measure(t, &c, 40, 1);
+    ck_assert_int_eq(t->model.t_r, k);
+    const sf_search_report r = sf_search_now(t);
+    ck_assert_double_eq_tol(r.beta, slope_of(&c) / exp(k), 1e-6 * r.beta);
+    ck_assert_double_eq_tol(r.price, r.worth, 1e-9);
+    sf_trainer_free(t);
+  }
+  o.target_loss = 0;
+  for (int k = 1; k < 3; k++) { /* more would cost more than the twin of so few neurons */
+    sf_trainer *t = searcher(&o);
+    measure(t, &c, 40, 1);
+    o.target_saving = 100 * sf_search_saving(t, k) - 1e-6;
+    ck_assert_double_gt(o.target_saving, 1);
+    sf_trainer_free(t);
+    t = searcher(&o);
+    measure(t, &c, 40, 1);
+    ck_assert_int_eq(t->model.t_r, k);
+    ck_assert_int_eq(t->search.state, SF_SEARCH_BALANCED);
+    sf_trainer_free(t);
+    o.target_saving = 0;
+  }
+  o.target_saving = 99.9;
+  sf_trainer *t = searcher(&o);
+  measure(t, &c, 40, 1);
+  ck_assert_int_eq(t->model.t_r, 1);
+  ck_assert_int_eq(t->search.state, SF_SEARCH_MISSED);
+  sf_trainer_free(t);
+}
+END_TEST
+
+/* The whole trainer on the textured scene with so much contrast, at a search rate: where t* ends. */
+static double learned(float contrast, double rate)
+{
+  sf_dataset scene = load("train");
+  for (int v = 0; v < scene.count; v++) {
+    const sf_image *image = &scene.view[v].image;
+    for (size_t i = 0; i < (size_t)image->width * (size_t)image->height; i++)
+      for (int c = 0; c < 3; c++) image->rgba[4 * i + c] = (uint16_t)((float)image->rgba[4 * i + c] * contrast);
+  }
+  sf_train_options o = small_run();
+  o.background = 2;
+  o.beta = 5e-7;
+  o.search_rate = rate;
+  o.stage1 = 100;
+  o.stage2 = 400;
+  o.samples = 2048;
+  sf_trainer *t = start(&scene, &o, NULL);
+  const sf_train_stats s = steps(t, o.stage1 + o.stage2);
+  sf_trainer_free(t);
+  sf_dataset_free(&scene);
+  return s.t_star;
+}
+
+/* A search whose rate decides finds the same steps for both, and other ones at another rate. */
+START_TEST(two_scenes_at_one_beta)
+{
+  for (int i = 0; i < 2; i++) {
+    const double rate = i ? 3 : 1.0 / 3, easy = learned(0.4f, rate), hard = learned(1, rate);
+    if (getenv("SHOW")) fprintf(stderr, "%g %g\n", easy, hard);
+    ck_assert_msg(lround(hard) > lround(easy), "rate %g: t* = %g and %g", rate, easy, hard);
+  }
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("search");
+  TCase *tc = tcase_create("search");
+  tcase_set_timeout(tc, 240);
+  tcase_add_unchecked_fixture(tc, set_up, tear_down);
+  tcase_add_test(tc, worth_equals_price);
+  tcase_add_test(tc, the_rate_decides_nothing);
+  tcase_add_test(tc, the_scene_decides);
+  tcase_add_test(tc, ends_of_the_range);
+  tcase_add_test(tc, what_was_not_reached_is_said);
+  tcase_add_test(tc, energy_as_price);
+  tcase_add_test(tc, targets_find_beta);
+  tcase_add_test(tc, two_scenes_at_one_beta);
+  suite_add_tcase(suite, tc);
+  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
+}
