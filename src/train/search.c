@@ -87,7 +87,7 @@ static double worth_at(const sf_trainer *t, double at)
       size[--parts - 1] = a + b;
     }
   }
-  double level[SF_T_MAX];
+  double level[SF_T_MAX] = {0};
   for (int p = 0, i = 0; p < parts; p++)
     for (int k = 0; k < size[p]; k++) level[i++] = fmax(gain[p], 1e-3 * fmax(gain[0], 1e-12));
   const double x = fmin(fmax(at - 1.5, 0), n - 2);
