@@ -1,0 +1,101 @@
+/* The occupancy grid of the hash grid's trainer: which cells an update looks at. */
+#include "ck_run.h"
+#include "train_fixture.h"
+
+static sf_dataset data;
+
+static void set_up(void)
+{
+  make_scene(4);
+  data = load("train");
+}
+
+static void tear_down(void)
+{
+  sf_dataset_free(&data);
+  remove_folder();
+}
+
+static bool occupied(const sf_trainer *t, size_t cell)
+{
+  return t->model.occupancy[cell / 8] >> cell % 8 & 1;
+}
+
+static size_t count_occupied(const sf_trainer *t)
+{
+  size_t n = 0;
+  for (size_t i = 0; i < sf_config_cells(&t->model.config); i++) n += occupied(t, i);
+  return n;
+}
+
+/* Before the first visit of all cells none is empty; that visit leaves no cell as it was. */
+START_TEST(nothing_is_empty_before_it_was_looked_at)
+{
+  sf_train_options o = small_run();
+  o.stage1 = 300;
+  sf_trainer *t = start(&data, &o, NULL);
+  const size_t cells = sf_config_cells(&t->model.config);
+  for (int i = 0; i < 16; i++) {
+    steps(t, 1);
+    ck_assert_uint_eq(count_occupied(t), cells);
+  }
+  for (int sweep = 16; sweep <= 256; sweep *= 4) {
+    while (t->iteration < sweep) steps(t, 1);
+    for (size_t i = 0; i < cells; i++) t->density[i] = 1e9f; /* what nobody looks at stays large */
+    steps(t, 1);
+    for (size_t i = 0; i < cells; i++) ck_assert_float_lt(t->density[i], 1e8f);
+  }
+  sf_trainer_free(t);
+}
+END_TEST
+
+/* One cell is occupied, all others are taken for empty: an update finds all that touch it, and nothing of another
+ * cascade. At the start the density is 1 everywhere, so what was looked at becomes occupied. */
+static void check_neighbours(int bound, int x, int y, int z)
+{
+  sf_train_options o = small_run();
+  sf_config_bound(&o.config, bound);
+  o.config.finest_res = 64;
+  sf_trainer *t = start(&data, &o, NULL);
+  const int res = o.config.occ_res;
+  const size_t cells = sf_config_cells(&o.config),
+               cell = ((size_t)z * (size_t)res + (size_t)y) * (size_t)res + (size_t)x;
+  t->iteration = 32;
+  memset(t->model.occupancy, 0, cells / 8);
+  t->model.occupancy[cell / 8] = (uint8_t)(1u << cell % 8);
+  ck_good(sf_occupancy_update(t, 2));
+  for (int k = z - 1; k <= z + 1; k++)
+    for (int j = y - 1; j <= y + 1; j++)
+      for (int i = x - 1; i <= x + 1; i++)
+        if (i >= 0 && j >= 0 && k >= 0 && i < res && j < res && k < res)
+          ck_assert(occupied(t, ((size_t)k * (size_t)res + (size_t)j) * (size_t)res + (size_t)i));
+  /* Beside them an update looks at 1/32 of one cascade's cells, anywhere. */
+  ck_assert_uint_le(count_occupied(t), 27 + (size_t)(res * res * res) / 32);
+  ck_assert_uint_ge(count_occupied(t), (size_t)(res * res * res) / 32);
+  size_t behind = 0; /* where the next layer would be, were the cascades one grid */
+  for (int j = y - 1; bound > 1 && j <= y + 1; j++)
+    for (int i = x - 1; i <= x + 1; i++) behind += occupied(t, (size_t)res * res * res + (size_t)(j * res + i));
+  ck_assert_uint_lt(behind, 5);
+  sf_trainer_free(t);
+}
+
+START_TEST(neighbours_of_what_is_occupied_are_looked_at)
+{
+  check_neighbours(1, 7, 8, 9);
+  check_neighbours(1, 0, 0, 0);
+  check_neighbours(1, 15, 15, 15);
+  check_neighbours(4, 5, 6, 15);
+}
+END_TEST
+
+int main(void)
+{
+  Suite *suite = suite_create("occupancy");
+  TCase *tc = tcase_create("occupancy");
+  tcase_set_timeout(tc, 60);
+  tcase_add_unchecked_fixture(tc, set_up, tear_down);
+  tcase_add_test(tc, nothing_is_empty_before_it_was_looked_at);
+  tcase_add_test(tc, neighbours_of_what_is_occupied_are_looked_at);
+  suite_add_tcase(suite, tc);
+  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
+}
