@@ -178,7 +178,9 @@ static sf_status check_effect(train_arguments *a)
                                         "--no-distill",  "--no-scaling",  "--beta",
                                         "--price",       "--target-loss", "--target-saving",
                                         "--objective",   "--search-rate", NULL},
-                           *const iterations[] = {"--stage1", "--stage2", NULL};
+                           *const iterations[] = {"--stage1", "--stage2", NULL}, *const budget[] = {"--beta", NULL},
+                           *const search[] = {"--target-loss", "--target-saving", "--price",
+                                              "--objective",   "--search-rate",   NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -187,6 +189,10 @@ static sf_status check_effect(train_arguments *a)
   else
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
   if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
+  if (a->train.target_loss > 0 || a->train.target_saving > 0)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
+  if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, search, "has no effect where the number of steps is fixed"));
   if (!a->fine_tune) return sf_ok();
   SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, fine_tune));
   return sf_cli_refuse(&cli, a->argc, a->argv, settled, fine_tune);
