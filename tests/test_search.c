@@ -132,7 +132,7 @@ END_TEST
 
 START_TEST(ends_of_the_range)
 {
-  const curve c = {1e-3, 1e-4, 0, 0}, rising = {1e-3, -1e-4, 0, 0}, nothing = {0};
+  const curve c = {1e-3, 1e-4, 0.9, 0}, rising = {1e-3, -1e-4, 0, 0}, nothing = {0}; /* however noisy it is */
   static const struct {
     double beta;
     int steps;
@@ -167,7 +167,7 @@ END_TEST
 
 START_TEST(what_was_not_reached_is_said)
 {
-  const curve falling = {1e-3, 1e-4, 0, 4}, still = {1e-3, 1e-4, 0, 0};
+  const curve falling = {1e-3, 1e-4, 0, 2}, still = {1e-3, 1e-4, 0, 0};
   sf_train_options o = search_run();
   sf_trainer *t = searcher(&o);
   measure(t, &falling, 40, 1);

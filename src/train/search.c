@@ -135,7 +135,7 @@ static double fewest_steps(const sf_trainer *t, double decibel)
   double best = INFINITY;
   for (int i = 0; i < n; i++) best = fmin(best, t->search.prefix[i]);
   for (int i = 0; i < n; i++)
-    if (10 * log10(t->search.prefix[i] / best) <= decibel) return i + 1;
+    if (t->search.prefix[i] <= best * pow(10, decibel / 10)) return i + 1;
   return n;
 }
 
@@ -174,8 +174,7 @@ static double squared(double x)
   return x * x;
 }
 
-/* Standard error of an average over its own value: the batches' spread, by the average's effective number of batches.
- */
+/* Standard error of an average over its value: the batches' spread, by the average's effective number of batches. */
 static double relative_error(double variance, double mean, const double weight[2])
 {
   return sqrt(fmax(variance, 0) * weight[1]) / fmax(weight[0] * fabs(mean), 1e-300);
@@ -279,25 +278,32 @@ void sf_search_update(sf_trainer *t, const sf_loss_sums *mean, double ratio, dou
   if (rests(t)) sf_search_end(t);
 }
 
+/* At 1 or T steps worth and price are apart by more than the worth is uncertain. */
+static bool at_end(const sf_trainer *t)
+{
+  const double at = t->model.t_star, price = t->options.beta * unit_price_at(t, at), worth = worth_at(t, at);
+  if (has_target(t) || (at > 1 && at < t->model.config.steps)) return false;
+  return price == 0 || fabs(worth - price) > 3 * fabs(worth) * worth_error(&t->search);
+}
+
 /* Targets that no number of steps meets, t* at an end of 1..T, and a search that ends before t* rests have words of
  * their own. */
 void sf_search_end(sf_trainer *t)
 {
   sf_search *s = &t->search;
-  const int n = t->model.config.steps;
   if (s->state != SF_SEARCH_RUNNING) return;
   if (s->measured) move(t);
-  const double since =
-      fabs(t->model.t_star - s->mark); /* where t* was marked just now, the quarter before counts, too */
+  /* Where t* was marked just now, the quarter before counts, too. */
+  const double since = fabs(t->model.t_star - s->mark);
   const double moved = s->at < s->mark_at + quarter / 2 ? fmax(since, s->moved) : since;
   if (!s->measured)
     s->state = SF_SEARCH_TOO_SHORT;
   else if (t->options.target_saving > 0 && sf_search_saving(t, t->model.t_r) < t->options.target_saving / 100)
     s->state = SF_SEARCH_MISSED;
+  else if (at_end(t))
+    s->state = SF_SEARCH_AT_END;
   else if (moved > close_enough || s->mark_at == 0 || worth_error(s) > close_enough)
     s->state = SF_SEARCH_NOT_REACHED;
-  else if (!has_target(t) && (t->model.t_star <= 1 || t->model.t_star >= n))
-    s->state = SF_SEARCH_AT_END;
   else
     s->state = SF_SEARCH_BALANCED;
 }
