@@ -293,9 +293,9 @@ void sf_search_end(sf_trainer *t)
   sf_search *s = &t->search;
   if (s->state != SF_SEARCH_RUNNING) return;
   if (s->measured) move(t);
-  /* Where t* was marked just now, the quarter before counts, too. */
-  const double since = fabs(t->model.t_star - s->mark);
-  const double moved = s->at < s->mark_at + quarter / 2 ? fmax(since, s->moved) : since;
+  /* In a quarter of the search: in the one before where t* was marked just now. */
+  const double part = (s->at - s->mark_at) / quarter, since = fabs(t->model.t_star - s->mark);
+  const double moved = part < 0.5 ? fmax(since, s->moved) : since / part;
   if (!s->measured)
     s->state = SF_SEARCH_TOO_SHORT;
   else if (t->options.target_saving > 0 && sf_search_saving(t, t->model.t_r) < t->options.target_saving / 100)
