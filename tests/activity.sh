@@ -20,7 +20,7 @@ fail() {
   "$build/bin/sf_export" "$work/m.safetensors" -o "$work/m.snn" --steps 3 >/dev/null || exit 1
 # run OPTIONS...
 run() {
-  "$build/bin/sf_cosim" "$work/m.snn" "$work/data" --rays 40 --quiet --json "$@" >"$work/out" 2>"$work/err"
+  "$build/bin/sf_cosim" "$work/m.snn" "$work/data" --rays 100 --quiet --json "$@" >"$work/out" 2>"$work/err"
 }
 number() { sed -nE "s/.*\"$1\":[[:space:]]*([0-9]+).*/\1/p" "$work/out"; }
 # of NAME in FILE, top level: prints T1 TC

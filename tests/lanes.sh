@@ -31,7 +31,7 @@ sources=$(sed "s|^|$rtl/|" "$work/kit/rtl.f" | tr '\n' ' ')
 quick='OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0' # --dut starts make without MAKEFLAGS; this one gets there
 # run LANES HIDDEN
 run() {
-  GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }" "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 50 --limit-samples 400 --seed 1 --quiet --json \
+  GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }" "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 150 --limit-samples 400 --seed 1 --quiet --json \
     --evidence "$work/evidence" --dut "-GLANES=$1 +incdir+$rtl $sources" >"$work/out" 2>"$work/err"
 }
 for lanes in 32 64; do

@@ -322,7 +322,7 @@ echo '{"psnr": 30, "ssim": null, "T": 8, "t_r": 2}' | tee tiny/{train,float}.jso
 echo '{"samples": 1, "differences": 0}' >tiny/cosim.json
 echo '{"energy_spiking_fj": 1, "energy_ann_fj": 2, "energy_saving_percent": 50}' >tiny/audit.json
 good sf_summary tiny 3
-grep -q 'time steps' stdout.txt && fail "sf_summary" "a search that was not"
+grep -q '^  time steps' stdout.txt && fail "sf_summary" "a search that was not"
 sed -i 's/{/{"t_star": 2.5, "search": {"state": "balanced", "worth": 1.5e-5, "worth_error": 2e-6, "price": 1.4e-5}, /' tiny/train.json
 good sf_summary tiny 3
 grep -q 't\* = 2.50 (balanced): one more is worth 1.5e-05 +- 2e-06 of squared error and costs 1.4e-05$' stdout.txt ||
