@@ -23,6 +23,7 @@ static sf_trainer *searcher(const sf_train_options *o)
   t->stage = 2;
   t->batch.rays = 100;
   t->batch.samples = 500;
+  for (int r = 0; r < 25; r++) t->batch.ray[r].count = 20;
   for (int l = 0; l < 3; l++) t->firing[l] = 0.2;
   t->model.t_r = T - 1;
   t->model.t_star = T - 1;
@@ -198,6 +199,11 @@ START_TEST(energy_as_price)
   const double h = g->hidden, frame = 5 * 24 * 24, sop = 0.2 * h * (SF_DENSITY_OUT + h + 3);
   const double step = (0.9 * sop + 4.6 * h * SF_GEO_FEATURES) * frame * 1e-9; /* mJ */
   ck_assert_double_eq_tol(sf_search_now(t).step_energy, step, 1e-9 * step);
+  /* All of it: D1's products once, the direction's for a ray of 20 samples; the twin multiplies at every synapse. */
+  const double once = 4.6 * h * (2 * g->levels + SF_DIR_FEATURES / 20.0) * frame * 1e-9;
+  const double twin = 4.6 * h * (2 * g->levels + SF_DENSITY_OUT + 31 + h + 3) * frame * 1e-9;
+  ck_assert_double_eq_tol(sf_search_energy(t, 2), once + 2 * step, 1e-9);
+  ck_assert_double_eq_tol(sf_search_saving(t, 2), 1 - (once + 2 * step) / twin, 1e-9);
   sf_trainer_free(t);
   for (int k = 2; k < T; k++) { /* step k saves more than it costs, step k+1 less */
     o.beta = 1e-4 * pow(0.5, k) * sqrt(2) / step;

@@ -45,7 +45,7 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 45, VM_FIELDS = 3, FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS };
+enum { STATE_FIELDS = 46, VM_FIELDS = 3, FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS };
 static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
 {
   const state_field table[STATE_FIELDS] = {
@@ -76,6 +76,7 @@ static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
       {"train.search_firing_c1", .number = &t->search.firing[1]},
       {"train.search_firing_c2", .number = &t->search.firing[2]},
       {"train.search_samples", .number = &t->search.samples_per_frame},
+      {"train.search_rays", .number = &t->search.rays_per_sample},
       {"train.search_at", .number = &t->search.at},
       {"train.search_mark", .number = &t->search.mark},
       {"train.search_mark_at", .number = &t->search.mark_at},

@@ -116,7 +116,7 @@ typedef struct sf_search {
   double ratio, ratio2;    /* fast: M_T / M_smooth, and its square */
   double slope, level;     /* slow: slope of the curve of prefixes, and their mean error */
   double slope2, slope_level, level2;
-  double firing[3], samples_per_frame;
+  double firing[3], samples_per_frame, rays_per_sample; /* fast */
   double at;                   /* share of the search at the last measurement */
   double mark, mark_at, moved; /* t* of a quarter of the search ago, where that was, and how far it moved in one */
 } sf_search;

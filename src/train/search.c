@@ -37,8 +37,8 @@ static double slope(const double *error, int n)
   return -along / square;
 }
 
-/* Energy of a sample that runs n steps, pJ: the paper's prices. D1's and the direction's products once, h's and the
- * additions of spikes at every step. */
+/* Energy of a sample that runs n steps, pJ: the paper's prices. D1's products once, the direction's once a ray, h's and
+ * the additions of spikes at every step. */
 static double sample_energy(const sf_trainer *t, double n)
 {
   const sf_config *c = &t->model.config;
@@ -46,7 +46,7 @@ static double sample_energy(const sf_trainer *t, double n)
   const double *firing = t->search.firing;
   if (c->backbone == SF_TENSORF)
     return mac * hidden * sf_tensorf_inputs(&c->tensorf) + n * sop * hidden * (firing[1] * hidden + firing[2] * 3);
-  return mac * hidden * (2 * c->levels + SF_DIR_FEATURES) +
+  return mac * hidden * (2 * c->levels + SF_DIR_FEATURES * t->search.rays_per_sample) +
          n * hidden * (mac * SF_GEO_FEATURES + sop * (firing[0] * SF_DENSITY_OUT + firing[1] * hidden + firing[2] * 3));
 }
 
@@ -244,7 +244,10 @@ static void average(sf_trainer *t, const sf_loss_sums *mean, double ratio, doubl
   for (int l = 0; l < 3; l++) s->firing[l] += fast * (t->firing[l] - s->firing[l]);
   const sf_camera *c = &t->data->view[0].camera;
   const double frame = (double)t->batch.samples / t->batch.rays * c->width * c->height;
+  int rays = 0; /* that have a sample */
+  for (int r = 0; r < t->batch.rays; r++) rays += t->batch.ray[r].count > 0;
   s->samples_per_frame += fast * (frame - s->samples_per_frame);
+  s->rays_per_sample += fast * (rays / fmax(t->batch.samples, 1) - s->rays_per_sample);
   s->at = at;
   s->measured++;
 }
