@@ -34,7 +34,7 @@ run "${short[@]}" --train "--beta 1" || fail "other options: $(cat "$dir/err")"
 [ "$(date -r "$dir/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of other options was kept"
 row | cut -d'|' -f6 | grep -q ' 1.00 ' || fail "beta = 1 does not learn one step: $(row)"
 
-# The share of lost cells: none of itself; all of an empty grid.
+# The share of lost cells: none of itself.
 for seed in 1 2; do cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/ann-2/model.safetensors"; done
 cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-1/model.safetensors"
 cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-2/model.safetensors"
