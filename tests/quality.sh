@@ -38,7 +38,28 @@ row | cut -d'|' -f6 | grep -q ' 1.00 ' || fail "beta = 1 does not learn one step
 for seed in 1 2; do cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/ann-2/model.safetensors"; done
 cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-1/model.safetensors"
 cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-2/model.safetensors"
-"$build/bin/sf_quality" "$dir/q" | grep '^| simple' | cut -d'|' -f10 | grep -q ' 0.000 +- 0.000 ' || fail "a model has lost cells of itself"
+lost() { "$build/bin/sf_quality" "$dir/q" | grep '^| simple' | cut -d'|' -f10; }
+lost | grep -q ' 0.000 +- 0.000 ' || fail "a model has lost cells of itself"
+
+# occupancy MODEL OCTAL...: fills equal parts of the model's occupancy grid, one byte value (in octal) each.
+occupancy() {
+  local file=$1 header range first last
+  shift
+  header=$(od -An -tu8 -N8 "$file" | tr -d ' ')
+  range=$(head -c $((8 + header)) "$file" | grep -ao '"occupancy":{[^}]*}' | grep -o 'data_offsets":\[[^]]*' | grep -o '[0-9]*,[0-9]*')
+  first=${range%,*} last=${range#*,}
+  for value in "$@"; do
+    head -c $(((last - first) / $#)) /dev/zero | tr '\000' "\\$value"
+  done | dd of="$file" bs=64K seek=$((8 + header + first)) oflag=seek_bytes conv=notrunc status=none
+}
+# Both twins have all cells of the first half and four of eight in the second: 6 parts of 8. Spiking models: the first one lacks
+# the first quarter, 2 of 6. The second one lacks half of the first half and all that the twins share in the second, 4 of 6.
+occupancy "$dir/q/simple/ann-1/model.safetensors" 377
+occupancy "$dir/q/simple/ann-2/model.safetensors" 377 017
+occupancy "$dir/q/simple/snn-1/model.safetensors" 000 377 377 377
+occupancy "$dir/q/simple/snn-2/model.safetensors" 360
+lost | grep -q ' 0.500 +- ' || fail "the share of lost cells is not (2/6 + 4/6) / 2: $(lost)"
+grep -A9 '"lost_cells"' "$dir/q/quality.json" | grep -q '0\.333' || fail "the least share of lost cells is not 2/6"
 
 run --only mars; [ $? -eq 2 ] && grep -q "scene 'mars' is unknown" "$dir/err" || fail "an unknown scene: $(cat "$dir/err")"
 run --seeds x; [ $? -eq 2 ] || fail "--seeds x"
