@@ -60,7 +60,9 @@ run published energy_audit --published
 run tuned sf_train textured -o tuned.safetensors --stage2 40 --samples 2048 --threads 2 --quiet --fine-tune snn.safetensors --json
 run fit sf_export snn.safetensors -o fit.snn --fit --data textured --fit-rays 512 --quiet --json
 run golden sim_render snn.snn textured --all --crop 16,16,8,8 -o golden --quiet --json
-# Without what the clock decides.
+# Without what the clock decides, where the programs lie, and copies of the RTL's text.
+sed -i "s|$bin/||g" ./*.txt ./*.html
+rm -rf ./*.kit/rtl ./*.kit/manifest.json
 sed -E -i 's/"([a-z_]*seconds|[a-z_]*per_second)":[[:space:]]*[0-9.e+-]+,?//g; s/ in [0-9.]+ m?s\>//; s/[0-9.]+ [kM]?[a-z]+\/s//g' ./*.txt ./*.jsonl ./*.html
 
 [ -n "$reference" ] || exit 0
