@@ -113,7 +113,7 @@ $(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
 # take that for an access to NULL, do not see the stores behind it, and calls are dropped (GCC's fix: 13dfb01e5c30).
 $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 
-$B/obj/src/audit/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
+$B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 $(CURDIR)/$B/%: $B/% ;

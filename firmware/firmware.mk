@@ -1,7 +1,7 @@
 # The firmware, freestanding RV32IM, and what runs it: Unicorn with the Verilated accelerator. Included by the Makefile.
 
 RISCV_FLAGS := -std=c11 -Os -Wall -Wextra -Wpedantic -Werror -march=rv32im_zicsr -mabi=ilp32 -mcmodel=medany -ffreestanding \
-  -ffunction-sections -fdata-sections -fno-tree-loop-distribute-patterns $(ARCH_INCLUDE) -Iinclude -I. -Ifirmware/libc
+  -ffunction-sections -fdata-sections -fno-tree-loop-distribute-patterns $(ARCH_INCLUDE) -Iinclude -Isrc -I. -Ifirmware/libc
 FIRMWARE_SRC := $(wildcard firmware/*.S firmware/*.c) \
   $(addprefix src/fx/,render.c march.c grid.c tensorf.c composite.c exp2.c net.c current.c plif.c integrate.c sigmoid.c \
   softplus.c sine.c count.c)

@@ -1,8 +1,8 @@
 /* A net as one block of memory, for programs without a file system. Little-endian 32-bit words, then the weights:
  *   magic 'SFNB', version, bytes in all, mode, steps, exp mul shift bias, sigmoid mul shift bias,
  *   5 x (n_in, n_out, k, theta, bias), 5 x (n_in, and one more with a bias) * SF_LANES weights. */
-#ifndef SPIKEFIELD_FIRMWARE_BLOB_H
-#define SPIKEFIELD_FIRMWARE_BLOB_H
+#ifndef SF_FIRMWARE_SF_BLOB_H
+#define SF_FIRMWARE_SF_BLOB_H
 #include "firmware/sf_driver.h"
 
 enum {

@@ -1,8 +1,8 @@
 /* Driver of the accelerator: freestanding C, no allocation, no libc. The same source programs the hardware on a RISC-V
  * processor and the Verilated model on a host; only the bus differs. */
-#ifndef SPIKEFIELD_FIRMWARE_DRIVER_H
-#define SPIKEFIELD_FIRMWARE_DRIVER_H
-#include "spikefield/arch.h"
+#ifndef SF_FIRMWARE_SF_DRIVER_H
+#define SF_FIRMWARE_SF_DRIVER_H
+#include "base/arch.h"
 #include <stdint.h>
 
 /* Byte offsets SF_CSR_<name>, expected contents SF_CSR_<name>_RESET, masks SF_CSR_<register>_<field>. */

@@ -1,6 +1,6 @@
 /* Driver of sf_ray_top: what comes on top of sf_driver.h when encoder and compositor are in hardware too. */
-#ifndef SPIKEFIELD_FIRMWARE_RAY_DRIVER_H
-#define SPIKEFIELD_FIRMWARE_RAY_DRIVER_H
+#ifndef SF_FIRMWARE_SF_RAY_DRIVER_H
+#define SF_FIRMWARE_SF_RAY_DRIVER_H
 #include "firmware/sf_driver.h"
 
 enum { SF_RAY_LEVELS_MAX = 16, SF_RAY_DIR_MAX = 16 };

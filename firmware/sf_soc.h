@@ -1,7 +1,7 @@
-/* The reference system-on-chip: where the firmware finds what. The emulated system (sim/soc.h) is built from the same
+/* The reference system-on-chip: where the firmware finds what. The emulated system (sim/soc/soc.h) is built from the same
  * numbers; a port to another system changes them here and in link.ld. Macros, for C and assembler. */
-#ifndef SPIKEFIELD_FIRMWARE_SOC_H
-#define SPIKEFIELD_FIRMWARE_SOC_H
+#ifndef SF_FIRMWARE_SF_SOC_H
+#define SF_FIRMWARE_SF_SOC_H
 
 #define SF_SOC_ACCELERATOR 0x40000000 /* AXI4-Lite port of sf_top: csr.def */
 #define SF_SOC_ACCELERATOR_SIZE 0x2000

@@ -1,7 +1,7 @@
 /* One sample through the stream FIFOs of the reference system (sf_soc.h). A system that moves beats in another way, by
  * DMA for one, replaces this file alone. */
-#ifndef SPIKEFIELD_FIRMWARE_STREAM_H
-#define SPIKEFIELD_FIRMWARE_STREAM_H
+#ifndef SF_FIRMWARE_SF_STREAM_H
+#define SF_FIRMWARE_SF_STREAM_H
 #include "firmware/sf_driver.h"
 
 typedef struct sf_stream {

@@ -1,10 +1,10 @@
 /* The image: a scene and a tile of rays as one block of memory, all that the firmware needs to make pixels.
  * Little-endian; the header, then in any order, each 8-byte aligned: the net (sf_blob.h), the grid's table, the
  * occupancy bitmap, one fx_ray per pixel, row by row. */
-#ifndef SPIKEFIELD_FIRMWARE_TILE_H
-#define SPIKEFIELD_FIRMWARE_TILE_H
+#ifndef SF_FIRMWARE_SF_TILE_H
+#define SF_FIRMWARE_SF_TILE_H
 #include "firmware/sf_blob.h"
-#include "spikefield/fx.h"
+#include "fx/fx.h"
 
 enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 2, SF_TILE_SIDE_MAX = 4096 };
 

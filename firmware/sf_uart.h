@@ -1,6 +1,6 @@
 /* Text over the UART: no libc, no buffer. */
-#ifndef SPIKEFIELD_FIRMWARE_UART_H
-#define SPIKEFIELD_FIRMWARE_UART_H
+#ifndef SF_FIRMWARE_SF_UART_H
+#define SF_FIRMWARE_SF_UART_H
 #include <stdint.h>
 
 void sf_uart_text(const char *text);

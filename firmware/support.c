@@ -1,5 +1,5 @@
 /* What compiler and core expect of a C library. */
-#include "spikefield/status.h"
+#include "base/status.h"
 #include <string.h>
 
 void *memcpy(void *restrict to, const void *restrict from, size_t size)

@@ -4,7 +4,7 @@
 //   D1 -> neurons -> store -> D2 -> h -> C1 -> neurons -> queue -> C2 -> neurons -> store -> C3
 //
 // A layer hands its current over and begins the next sum while the neurons are at work on the last one. Cycles without
-// stalls: src/audit/cycles.c
+// stalls: src/cycles/cycles.c
 `default_nettype none
 
 module sf_core #(

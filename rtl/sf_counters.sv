@@ -1,5 +1,5 @@
 // Event counters, 64 bits each, per layer and step, where the event happens: every row, neuron step and integrator
-// step that executes adds its own share. What is one event: include/spikefield/fx.h (struct fx_counts).
+// step that executes adds its own share. What is one event: src/fx/fx.h (struct fx_counts).
 // Clear and snapshot walk over all 512 places of the window, between samples: the sequencer holds meanwhile.
 `default_nettype none
 

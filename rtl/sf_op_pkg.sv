@@ -1,11 +1,11 @@
 // Encodings shared by the sequencer, the lanes and the counters.
 package sf_op_pkg;
-  // Input modes. Mirror: include/spikefield/fx.h (fx_input_mode)
+  // Input modes. Mirror: src/fx/fx.h (fx_input_mode)
   localparam [1:0] HYBRID = 2'd0;
   localparam [1:0] DECAY = 2'd1;
   localparam [1:0] NODECAY = 2'd2;
 
-  // Layers. Mirror: include/spikefield/fx.h (fx_layer_id)
+  // Layers. Mirror: src/fx/fx.h (fx_layer_id)
   localparam [2:0] D1 = 3'd0;
   localparam [2:0] D2 = 3'd1;
   localparam [2:0] C1 = 3'd2;

@@ -1,7 +1,7 @@
 #include "sim/audit_run.h"
-#include "spikefield/quant.h"
-#include "spikefield/rng.h"
-#include "sim/three_counts.h"
+#include "quant/quant.h"
+#include "base/rng.h"
+#include "sim/ray/three_counts.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* One audit from its files to its figures: what energy_audit runs, once or for each side of a comparison. */
-#ifndef SPIKEFIELD_SIM_AUDIT_RUN_H
-#define SPIKEFIELD_SIM_AUDIT_RUN_H
-#include "spikefield/audit.h"
+#ifndef SF_SIM_AUDIT_RUN_H
+#define SF_SIM_AUDIT_RUN_H
+#include "energy/energy.h"
 
 typedef struct sf_audit_options {
   const char *scene, *data, *split; /* .snn file, data set, "train" or "test" */

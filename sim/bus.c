@@ -1,6 +1,6 @@
 /* AXI4-Lite master: one access at a time, each channel with its own random delay. */
 #include "sim/sim.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 
 enum { BUS_PATIENCE = 4096, STREAM_AW = 1, STREAM_W, STREAM_B, STREAM_AR, STREAM_R };
 

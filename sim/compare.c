@@ -1,6 +1,6 @@
 #include "sim/compare.h"
 #include "sim/cover.h"
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 
 typedef struct comparison {
   const fx_net *net;

@@ -1,7 +1,7 @@
 /* One sample: the fixed-point core against what the accelerator showed. */
-#ifndef SPIKEFIELD_SIM_COMPARE_H
-#define SPIKEFIELD_SIM_COMPARE_H
-#include "spikefield/dut.h"
+#ifndef SF_SIM_COMPARE_H
+#define SF_SIM_COMPARE_H
+#include "sim/dut.h"
 
 /* layer, step, neuron are -1 where they do not apply. */
 typedef struct sf_difference {

@@ -1,7 +1,7 @@
 /* Lockstep of the fixed-point core and the accelerator on the samples of real rays, in chunks: outputs, spike bitmaps,
  * membranes, rows and every counter, for equality. */
-#ifndef SPIKEFIELD_SIM_COSIM_H
-#define SPIKEFIELD_SIM_COSIM_H
+#ifndef SF_SIM_COSIM_H
+#define SF_SIM_COSIM_H
 #include "sim/replay.h"
 
 typedef struct sf_cosim sf_cosim;

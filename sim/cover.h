@@ -1,9 +1,9 @@
 /* Functional coverage: what the samples, the errors and the soft resets of all tests have been through. Collected only
  * in a build with COVERAGE, in one file that every process adds to; elsewhere sf_cover_open gives NULL. */
-#ifndef SPIKEFIELD_SIM_COVER_H
-#define SPIKEFIELD_SIM_COVER_H
+#ifndef SF_SIM_COVER_H
+#define SF_SIM_COVER_H
 #include "sim/pins.h"
-#include "spikefield/dut.h"
+#include "sim/dut.h"
 
 /* Where a soft reset struck, by the last thing that happened at the pins. */
 typedef enum {

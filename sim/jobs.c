@@ -1,5 +1,5 @@
 #include "sim/jobs.h"
-#include "spikefield/cli.h"
+#include "cli/cli.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <poll.h>

@@ -1,8 +1,8 @@
 /* Numbered units of work over forked processes. What comes of them depends neither on how many processes there are nor
  * on which of them did what: results are handed over by unit, in order. */
-#ifndef SPIKEFIELD_SIM_JOBS_H
-#define SPIKEFIELD_SIM_JOBS_H
-#include "spikefield/status.h"
+#ifndef SF_SIM_JOBS_H
+#define SF_SIM_JOBS_H
+#include "base/status.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

@@ -1,10 +1,10 @@
 #include "sim/lockstep.h"
 #include "sim/jobs.h"
-#include "spikefield/audit.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
-#include "spikefield/quant.h"
-#include "spikefield/rng.h"
+#include "energy/energy.h"
+#include "cli/cli.h"
+#include "base/io.h"
+#include "quant/quant.h"
+#include "base/rng.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

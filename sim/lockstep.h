@@ -1,10 +1,10 @@
 /* A whole co-simulation: random rays of a data set, cut into blocks that are worked on by several processes. Everything
  * depends on the block alone, which is a fresh accelerator with a seed of its own: totals and the first difference
  * do not depend on the number of processes. */
-#ifndef SPIKEFIELD_SIM_LOCKSTEP_H
-#define SPIKEFIELD_SIM_LOCKSTEP_H
+#ifndef SF_SIM_LOCKSTEP_H
+#define SF_SIM_LOCKSTEP_H
 #include "sim/cosim.h"
-#include "spikefield/scene.h"
+#include "scene/scene.h"
 #include <stdio.h>
 
 typedef struct sf_lockstep_options {

@@ -1,6 +1,6 @@
 #include "sim/lockstep.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include <inttypes.h>
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
 #include "sim/other_dut.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>

@@ -1,7 +1,7 @@
 /* sf_cosim --dut: the same program with another accelerator inside, built with Verilator on first use. */
-#ifndef SPIKEFIELD_SIM_OTHER_DUT_H
-#define SPIKEFIELD_SIM_OTHER_DUT_H
-#include "spikefield/status.h"
+#ifndef SF_SIM_OTHER_DUT_H
+#define SF_SIM_OTHER_DUT_H
+#include "base/status.h"
 
 /* files: Verilog sources in compilation order and options of Verilator (+incdir+DIR, -IDIR, -DNAME), parted by spaces;
  * paths below the working folder. top: name of the module with the ports of rtl/sf_top.sv. Builds in a folder of its

@@ -1,7 +1,7 @@
 /* The Verilated model, sf_top or sf_ray_top, one clock cycle per call, behind a C interface. */
-#ifndef SPIKEFIELD_SIM_PINS_H
-#define SPIKEFIELD_SIM_PINS_H
-#include "spikefield/arch.h"
+#ifndef SF_SIM_PINS_H
+#define SF_SIM_PINS_H
+#include "base/arch.h"
 #include <stdbool.h>
 #include <stdint.h>
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
 /* What the two Verilated tops have in common. C++. */
-#ifndef SPIKEFIELD_SIM_PINS_MODEL_H
-#define SPIKEFIELD_SIM_PINS_MODEL_H
+#ifndef SF_SIM_PINS_MODEL_H
+#define SF_SIM_PINS_MODEL_H
 #include "sim/pins.h"
 #include "verilated.h"
 #include "verilated_fst_c.h"

@@ -1,6 +1,6 @@
 /* The few samples that show a difference, as a file that needs nothing but the scene. */
-#ifndef SPIKEFIELD_SIM_REPLAY_H
-#define SPIKEFIELD_SIM_REPLAY_H
+#ifndef SF_SIM_REPLAY_H
+#define SF_SIM_REPLAY_H
 #include "sim/compare.h"
 #include <cjson/cJSON.h>
 

@@ -1,7 +1,7 @@
 /* Replay files. */
 #include "sim/replay.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>

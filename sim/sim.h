@@ -1,9 +1,9 @@
 /* Inside of the harness, for its own files and for tests that go below spikefield/dut.h. */
-#ifndef SPIKEFIELD_SIM_SIM_H
-#define SPIKEFIELD_SIM_SIM_H
+#ifndef SF_SIM_SIM_H
+#define SF_SIM_SIM_H
 #include "firmware/sf_driver.h"
 #include "sim/cover.h"
-#include "spikefield/dut.h"
+#include "sim/dut.h"
 
 struct sf_dut {
   sf_pins *pins;

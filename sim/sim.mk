@@ -29,12 +29,12 @@ VERILATED_SIMD := -march=native $(if $(findstring clang,$(VERILATED_CXX)),,-ftre
 VERILATED_SIMD := $(shell $(VERILATED_CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc.c),$(wildcard sim/*.c))
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/soc/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
 # Verilator brings the reader of its waveforms along.
-$B/obj/sim/wave.o: CFLAGS += -isystem $(VERILATOR_ROOT)/include
+$B/obj/sim/activity/wave.o: CFLAGS += -isystem $(VERILATOR_ROOT)/include
 
 # $1 folder, $2 folder that holds rtl/, $3 prerequisites, $4 top, $5 its pins in sim/
 define verilated_top_rule
@@ -49,7 +49,7 @@ $1/V$4__ALL.a: $1/V$4.mk
 -include $1/$5.d
 $1/$5.o: sim/$5.cpp $(ARCH_DEF) $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
+	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $$(VERILATOR_ROOT)/include \
 	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -MMD -MP -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
@@ -97,7 +97,7 @@ $B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/li
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 # Planted miscounts in the C core, the vector core and the recount: SF_FAULT=N chooses one at run time.
 C_FAULTS := $(sort $(wildcard tests/faults/c/*.patch))
-C_FAULTY := src/fx/count.c src/fx/rays.c src/audit/recount.c
+C_FAULTY := src/fx/count.c src/fx/rays.c src/energy/recount.c
 $B/faults/c/.patched: $(C_FAULTY) $(C_FAULTS)
 	$(call say,PATCH $(@D))
 	$Qrm -rf $(@D) && mkdir -p $(@D) && cp --parents $(C_FAULTY) $(@D)

@@ -1,5 +1,5 @@
 #include "sim/studio.h"
-#include "spikefield/quant.h"
+#include "quant/quant.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* Where pictures are made: one scene, one data set, one of three backends. Views are loaded one at a time. */
-#ifndef SPIKEFIELD_SIM_STUDIO_H
-#define SPIKEFIELD_SIM_STUDIO_H
-#include "sim/ray.h"
-#include "spikefield/golden.h"
+#ifndef SF_SIM_STUDIO_H
+#define SF_SIM_STUDIO_H
+#include "sim/ray/ray.h"
+#include "golden/golden.h"
 
 typedef enum { SF_BACKEND_FLOAT, SF_BACKEND_FIXED, SF_BACKEND_RTL } sf_backend;
 extern const char *const sf_backend_names[]; /* "float", "fixed", "rtl" */

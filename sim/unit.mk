@@ -33,7 +33,7 @@ define unit_test_rule
 $3/$1.o: tests/$1.cpp $(foreach u,$(UNITS_$1),$3/$u/V$u.mk)
 	@mkdir -p $$(@D)
 	$$(call say,CXX   $$< -> $$@)
-	$$Q$$(CXX) -std=c++17 -O2 -g -Wall -Wextra $(if $(CI),-Werror) $$(ARCH_INCLUDE) -Iinclude -I. -isystem $$(VERILATOR_ROOT)/include \
+	$$Q$$(CXX) -std=c++17 -O2 -g -Wall -Wextra $(if $(CI),-Werror) $$(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $$(VERILATOR_ROOT)/include \
 	  -isystem $$(VERILATOR_ROOT)/include/vltstd $(foreach u,$(UNITS_$1),-isystem $3/$u) -MMD -MP -c $$< -o $$@
 -include $3/$1.d
 $2/$1: $3/$1.o $(foreach u,$(UNITS_$1),$3/$u/V$u__ALL.a) $(filter %.o,$4) $(UNIT_RUNTIME) $B/libspikefield.a

@@ -1,5 +1,5 @@
 #include "sim/view_set.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* All views of a split: rendered into a folder with a manifest, or rendered again and compared with one. */
-#ifndef SPIKEFIELD_SIM_VIEW_SET_H
-#define SPIKEFIELD_SIM_VIEW_SET_H
+#ifndef SF_SIM_VIEW_SET_H
+#define SF_SIM_VIEW_SET_H
 #include "sim/studio.h"
-#include "spikefield/manifest.h"
+#include "golden/manifest.h"
 
 #define SF_MANIFEST_NAME "manifest.json"
 

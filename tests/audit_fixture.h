@@ -1,6 +1,6 @@
 /* For the tests of the audit: rays through the box. */
-#ifndef SPIKEFIELD_TESTS_AUDIT_FIXTURE_H
-#define SPIKEFIELD_TESTS_AUDIT_FIXTURE_H
+#ifndef SF_TESTS_AUDIT_FIXTURE_H
+#define SF_TESTS_AUDIT_FIXTURE_H
 #include "tests/fx_fixture.h"
 
 /* A ray along x at a random place; one of seven misses the box. */

@@ -6,8 +6,8 @@
 #include "bench.h"
 #include "base/amx.h"
 #include "float_fixture.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
+#include "cli/cli.h"
+#include "base/io.h"
 #include "src/fx/core.h"
 #include "train/internal.h"
 #include <math.h>

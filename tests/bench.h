@@ -1,8 +1,8 @@
 /* Shared by the files of the benchmark. */
-#ifndef SPIKEFIELD_TESTS_BENCH_H
-#define SPIKEFIELD_TESTS_BENCH_H
-#include "spikefield/scene.h"
-#include "spikefield/status.h"
+#ifndef SF_TESTS_BENCH_H
+#define SF_TESTS_BENCH_H
+#include "scene/scene.h"
+#include "base/status.h"
 #include <cjson/cJSON.h>
 
 /* Measured on the spot, all threads, per second. */

@@ -2,10 +2,10 @@
 #include "bench.h"
 #include "bench_rig.h"
 #include "base/memory.h"
-#include "sim/three_counts.h"
-#include "spikefield/cli.h"
-#include "spikefield/quant.h"
-#include "spikefield/rng.h"
+#include "sim/ray/three_counts.h"
+#include "cli/cli.h"
+#include "quant/quant.h"
+#include "base/rng.h"
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>

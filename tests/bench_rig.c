@@ -1,7 +1,7 @@
 /* A scene of random weights whose thresholds give a firing rate. */
 #include "bench_rig.h"
 #include "base/memory.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include <math.h>
 #include <stdlib.h>
 

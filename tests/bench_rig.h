@@ -1,6 +1,6 @@
 /* What the benchmarks of core and accelerator work on. */
-#ifndef SPIKEFIELD_TESTS_BENCH_RIG_H
-#define SPIKEFIELD_TESTS_BENCH_RIG_H
+#ifndef SF_TESTS_BENCH_RIG_H
+#define SF_TESTS_BENCH_RIG_H
 #include "src/fx/core.h"
 
 enum { RIG_STEPS = 3, RIG_RAY = 8 /* samples per ray */ };

@@ -1,8 +1,8 @@
 /* The Verilated accelerator: simulation speed, cycles per sample at a firing rate, utilisation. */
 #include "bench.h"
 #include "bench_rig.h"
-#include "spikefield/cli.h"
-#include "spikefield/dut.h"
+#include "cli/cli.h"
+#include "sim/dut.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

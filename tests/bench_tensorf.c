@@ -3,8 +3,8 @@
 #include "bench.h"
 #include "base/memory.h"
 #include "render/view.h"
-#include "spikefield/cli.h"
-#include "spikefield/rng.h"
+#include "cli/cli.h"
+#include "base/rng.h"
 #include "train/vm.h"
 #include <math.h>
 #include <omp.h>

@@ -1,7 +1,7 @@
 /* A call that has to succeed; otherwise the test fails with the call's message. */
 #ifndef SF_TESTS_CK_OK_H
 #define SF_TESTS_CK_OK_H
-#include "spikefield/status.h"
+#include "base/status.h"
 #include <check.h>
 
 #define ck_ok(call)                                                                                                    \

@@ -1,5 +1,5 @@
 /* The fixed-point pixels of a golden image as a 16-bit PPM on stdout: exr_to_ppm GOLDEN.exr */
-#include "spikefield/image.h"
+#include "image/image.h"
 #include <stdio.h>
 #include <string.h>
 

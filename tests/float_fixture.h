@@ -1,8 +1,8 @@
 /* A small random model and random inputs for the tests of the float part. */
 #ifndef SF_TESTS_FLOAT_FIXTURE_H
 #define SF_TESTS_FLOAT_FIXTURE_H
-#include "spikefield/model.h"
-#include "spikefield/rng.h"
+#include "snn/model.h"
+#include "base/rng.h"
 
 static inline float test_random(uint64_t index)
 {

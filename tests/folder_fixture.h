@@ -1,7 +1,7 @@
 /* A folder of one's own for the tests that write files, and the two ways in which a status is judged. */
 #ifndef SF_TESTS_FOLDER_FIXTURE_H
 #define SF_TESTS_FOLDER_FIXTURE_H
-#include "spikefield/status.h"
+#include "base/status.h"
 #include <check.h>
 #include <dirent.h>
 #include <stdio.h>

@@ -1,9 +1,9 @@
 /* For the tests of src/fx: random scenes, and the nets once more, naively: dense sums in 64 bits, one neuron after the
  * other, every event counted where it happens. Shares only the two table functions with the core. */
-#ifndef SPIKEFIELD_TESTS_FX_FIXTURE_H
-#define SPIKEFIELD_TESTS_FX_FIXTURE_H
+#ifndef SF_TESTS_FX_FIXTURE_H
+#define SF_TESTS_FX_FIXTURE_H
 #include "ck_run.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include "src/fx/unit.h"
 #include <stdlib.h>
 #include <string.h>

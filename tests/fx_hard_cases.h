@@ -7,9 +7,9 @@
  *   HARD_REFUSED  `make` itself checks that the input is refused; nothing is run
  *
  * A runner calls hard_begin, then its backend, then `expect` with what that backend gave, then hard_end. */
-#ifndef SPIKEFIELD_TESTS_FX_HARD_CASES_H
-#define SPIKEFIELD_TESTS_FX_HARD_CASES_H
-#include "spikefield/quant.h"
+#ifndef SF_TESTS_FX_HARD_CASES_H
+#define SF_TESTS_FX_HARD_CASES_H
+#include "quant/quant.h"
 #include "tests/float_fixture.h"
 #include "tests/fx_fixture.h"
 #include <math.h>

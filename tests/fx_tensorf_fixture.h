@@ -1,6 +1,6 @@
 /* For the tests of the audit: a small scene of planes, lines and a decoder. */
-#ifndef SPIKEFIELD_TESTS_FX_TENSORF_FIXTURE_H
-#define SPIKEFIELD_TESTS_FX_TENSORF_FIXTURE_H
+#ifndef SF_TESTS_FX_TENSORF_FIXTURE_H
+#define SF_TESTS_FX_TENSORF_FIXTURE_H
 #include "src/fx/scene.h"
 #include "tests/fx_fixture.h"
 

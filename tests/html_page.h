@@ -1,6 +1,6 @@
 /* For test_html.c: reads a page as text and counts what is wrong with it; the first fault is kept in words. */
-#ifndef SPIKEFIELD_TESTS_HTML_PAGE_H
-#define SPIKEFIELD_TESTS_HTML_PAGE_H
+#ifndef SF_TESTS_HTML_PAGE_H
+#define SF_TESTS_HTML_PAGE_H
 #include <cjson/cJSON.h>
 #include <ctype.h>
 #include <math.h>

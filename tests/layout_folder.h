@@ -3,9 +3,9 @@
 #define SF_TESTS_LAYOUT_FOLDER_H
 #include "folder_fixture.h"
 #include "layout_fixture.h"
-#include "spikefield/io.h"
-#include "spikefield/rng.h"
-#include "spikefield/scene.h"
+#include "base/io.h"
+#include "base/rng.h"
+#include "scene/scene.h"
 #include <math.h>
 
 enum { WIDTH = 16, HEIGHT = 12, VIEWS = 17 };

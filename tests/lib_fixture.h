@@ -1,7 +1,7 @@
 /* For the tests of the C library: one scene as file, as core and as the library opened it; a camera that sees it. */
-#ifndef SPIKEFIELD_TESTS_LIB_FIXTURE_H
-#define SPIKEFIELD_TESTS_LIB_FIXTURE_H
-#include "spikefield/quant.h"
+#ifndef SF_TESTS_LIB_FIXTURE_H
+#define SF_TESTS_LIB_FIXTURE_H
+#include "quant/quant.h"
 #include "spikefield/spikefield.h"
 #include "tests/folder_fixture.h"
 #include "tests/fx_fixture.h"

@@ -1,9 +1,9 @@
 /* Random nets and samples for tests of the fixed-point core's mirror: sizes, modes, leaks, thresholds and weights over
  * their whole ranges, extremes more often than chance would. */
-#ifndef SPIKEFIELD_TESTS_RANDOM_NET_H
-#define SPIKEFIELD_TESTS_RANDOM_NET_H
-#include "spikefield/fx.h"
-#include "spikefield/rng.h"
+#ifndef SF_TESTS_RANDOM_NET_H
+#define SF_TESTS_RANDOM_NET_H
+#include "fx/fx.h"
+#include "base/rng.h"
 #include <stdlib.h>
 #include <string.h>
 

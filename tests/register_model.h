@@ -1,8 +1,8 @@
 /* The accelerator's registers as csr.def describes them: what a write does and refuses, what reads back. */
-#ifndef SPIKEFIELD_TESTS_REGISTER_MODEL_H
-#define SPIKEFIELD_TESTS_REGISTER_MODEL_H
+#ifndef SF_TESTS_REGISTER_MODEL_H
+#define SF_TESTS_REGISTER_MODEL_H
 #include "firmware/sf_driver.h"
-#include "spikefield/fx.h"
+#include "fx/fx.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

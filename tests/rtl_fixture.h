@@ -1,9 +1,9 @@
 /* For the tests of the accelerator: batches of samples through the core and through the hardware, compared. */
-#ifndef SPIKEFIELD_TESTS_RTL_FIXTURE_H
-#define SPIKEFIELD_TESTS_RTL_FIXTURE_H
+#ifndef SF_TESTS_RTL_FIXTURE_H
+#define SF_TESTS_RTL_FIXTURE_H
 #include "sim/compare.h"
 #include "sim/sim.h"
-#include "spikefield/cycles.h"
+#include "cycles/cycles.h"
 #include "tests/ck_ok.h"
 #include "tests/random_net.h"
 

@@ -1,9 +1,9 @@
 /* For the unit benches of the RTL: one Verilated module with random reset values, its clock, random stalls. C++. */
-#ifndef SPIKEFIELD_TESTS_RTL_UNIT_H
-#define SPIKEFIELD_TESTS_RTL_UNIT_H
+#ifndef SF_TESTS_RTL_UNIT_H
+#define SF_TESTS_RTL_UNIT_H
 extern "C" {
 #include "ck_run.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include "src/fx/unit.h"
 }
 #include "verilated.h"

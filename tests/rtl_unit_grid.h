@@ -1,7 +1,7 @@
 /* For the benches of sf_grid and sf_encoder: grids of every kind of level, positions on faces and ends, a memory that
  * answers in order after any time. C++. */
-#ifndef SPIKEFIELD_TESTS_RTL_UNIT_GRID_H
-#define SPIKEFIELD_TESTS_RTL_UNIT_GRID_H
+#ifndef SF_TESTS_RTL_UNIT_GRID_H
+#define SF_TESTS_RTL_UNIT_GRID_H
 #include "tests/rtl_unit.h"
 #include <deque>
 #include <vector>

@@ -1,7 +1,7 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "ck_run.h"
-#include "spikefield/cycles.h"
-#include "spikefield/golden.h"
+#include "cycles/cycles.h"
+#include "golden/golden.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
 #include <math.h>

@@ -1,9 +1,9 @@
 /* Status, files, JSON, safetensors, command lines. */
 #include "ck_run.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
+#include "cli/cli.h"
+#include "base/io.h"
 #include "folder_fixture.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include <dirent.h>
 #include <math.h>
 #include <signal.h>

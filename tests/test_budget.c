@@ -1,7 +1,7 @@
 /* The error budget: no block's error is over its derived bound, and no bound is idle. */
 #include "ck_run.h"
-#include "spikefield/budget.h"
-#include "spikefield/quant.h"
+#include "bounds/bounds.h"
+#include "quant/quant.h"
 #include "tests/float_fixture.h"
 #include <math.h>
 #include <stdlib.h>

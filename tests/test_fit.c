@@ -1,6 +1,6 @@
 /* Trimming and fitting: what is left out without effect changes no bit, the rest stays within the bound. */
 #include "ck_run.h"
-#include "spikefield/fit.h"
+#include "fit/fit.h"
 #include "src/quant/internal.h"
 #include "tests/folder_fixture.h"
 #include "tests/fx_fixture.h"

@@ -1,6 +1,6 @@
 /* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
 #include "ck_run.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "tests/fx_tensorf_fixture.h"
 #include <dirent.h>
 #include <stdio.h>

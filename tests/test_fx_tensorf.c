@@ -2,8 +2,8 @@
  * derived bound, hard cases, files, and whole rays: portable = vector, thresholds, and pictures against the float
  * model. */
 #include "ck_run.h"
-#include "spikefield/io.h"
-#include "spikefield/quant.h"
+#include "base/io.h"
+#include "quant/quant.h"
 #include "spikefield/spikefield.h"
 #include "src/fx/core.h"
 #include "src/fx/round.h"

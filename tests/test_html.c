@@ -1,8 +1,8 @@
 /* The HTML report: well-formed, nothing fetched, every figure there with its data, every number the JSON's; and a page
  * with a planted fault is caught. */
 #include "ck_run.h"
-#include "spikefield/html.h"
-#include "spikefield/io.h"
+#include "page/page.h"
+#include "base/io.h"
 #include "tests/fx_tensorf_fixture.h"
 #include "tests/html_page.h"
 #include <unistd.h>

@@ -1,9 +1,9 @@
 /* PNG, JPEG, EXR, downscaling, PSNR and SSIM. */
 #include "ck_run.h"
-#include "spikefield/image.h"
-#include "spikefield/io.h"
+#include "image/image.h"
+#include "base/io.h"
 #include "folder_fixture.h"
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include <dirent.h>
 #include <math.h>
 #include <png.h>

@@ -1,8 +1,8 @@
 /* Units of work over processes: order, early end, lost processes, interruption; no process stays behind. */
 #include "ck_run.h"
 #include "sim/jobs.h"
-#include "spikefield/cli.h"
-#include "spikefield/rng.h"
+#include "cli/cli.h"
+#include "base/rng.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Prices and ledgers, against pricing by hand. */
 #include "ck_run.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include "tests/fx_fixture.h"
 #include <math.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 /* Scenes and samples of the C library against the core behind it; every refusal is a value that names what is wrong. */
 #include "ck_run.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include "tests/fx_tensorf_fixture.h"
 #include "tests/lib_fixture.h"
 #include <locale.h>

@@ -1,6 +1,6 @@
 /* Rays, frames and taps of the C library against the core: same integers, same counts, whatever the threads. */
 #include "ck_run.h"
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include "tests/lib_fixture.h"
 #include <omp.h>
 

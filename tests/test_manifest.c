@@ -2,8 +2,8 @@
  * pixels located. */
 #include "ck_run.h"
 #include "folder_fixture.h"
-#include "spikefield/io.h"
-#include "spikefield/manifest.h"
+#include "base/io.h"
+#include "golden/manifest.h"
 #include <math.h>
 #include <stdbool.h>
 

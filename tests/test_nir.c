@@ -3,7 +3,7 @@
 #include <stdio.h>
 #ifdef SF_HDF5
 #include "ck_run.h"
-#include "spikefield/exchange.h"
+#include "exchange/exchange.h"
 #include "tests/float_fixture.h"
 #include "tests/tensorf_fixture.h"
 #include "tests/folder_fixture.h"

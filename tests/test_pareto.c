@@ -1,8 +1,8 @@
 /* Sweeps: loading, the front against its definition, names, tables; measured points against their parts. */
 #include "ck_run.h"
-#include "spikefield/io.h"
-#include "spikefield/pareto.h"
-#include "spikefield/rng.h"
+#include "base/io.h"
+#include "sweep/sweep.h"
+#include "base/rng.h"
 #include "tests/folder_fixture.h"
 #include <math.h>
 

@@ -1,9 +1,9 @@
 /* Procedural scenes: shapes, the tracer, the files they are written to. */
 #include "ck_run.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "folder_fixture.h"
-#include "spikefield/rng.h"
-#include "spikefield/scene.h"
+#include "base/rng.h"
+#include "scene/scene.h"
 #include "src/scene/stage.h"
 #include <math.h>
 #include <omp.h>

@@ -1,7 +1,7 @@
 /* Quantiser: fixed against float per block, refusals, determinism. */
 #include "ck_run.h"
-#include "spikefield/quant.h"
-#include "spikefield/rng.h"
+#include "quant/quant.h"
+#include "base/rng.h"
 #include "src/fx/unit.h"
 #include "src/quant/internal.h"
 #include <math.h>

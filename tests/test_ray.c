@@ -1,7 +1,7 @@
 /* Rays to integers: every point inside the box, and the lattice that of the float renderer. */
 #include "ck_run.h"
-#include "spikefield/quant.h"
-#include "spikefield/rng.h"
+#include "quant/quant.h"
+#include "base/rng.h"
 #include <math.h>
 #include <stdlib.h>
 

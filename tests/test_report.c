@@ -1,8 +1,8 @@
 /* The report of `make reproduce` from folders made by hand: averages, energies, the paper's order, what is missing. */
 #include "ck_run.h"
 #include "folder_fixture.h"
-#include "spikefield/io.h"
-#include "spikefield/report.h"
+#include "base/io.h"
+#include "report/report.h"
 #include <math.h>
 
 static sf_reproduction report;

@@ -2,9 +2,9 @@
  * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray.h"
-#include "spikefield/audit.h"
-#include "spikefield/quant.h"
+#include "sim/ray/ray.h"
+#include "energy/energy.h"
+#include "quant/quant.h"
 #include "tests/ck_ok.h"
 #include "tests/fx_hard_cases.h"
 

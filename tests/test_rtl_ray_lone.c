@@ -1,8 +1,8 @@
 /* sf_ray_top, ray by ray: rays of one sample at any position, or of none, against the core's parts; pixels that wait.
  */
 #include "ck_run.h"
-#include "sim/ray.h"
-#include "spikefield/quant.h"
+#include "sim/ray/ray.h"
+#include "quant/quant.h"
 #include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"

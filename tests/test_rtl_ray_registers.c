@@ -2,8 +2,8 @@
  * windows behind one bus, and what reaches the encoder. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray.h"
-#include "spikefield/quant.h"
+#include "sim/ray/ray.h"
+#include "quant/quant.h"
 #include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"

@@ -1,8 +1,8 @@
 /* The harness's own end of the streams, on an accelerator made up here: tap beats of different layers in any order, and
  * every way of getting them wrong. The functions of sim/pins.h defined here take the place of the Verilated ones. */
 #include "ck_run.h"
-#include "sim/ray.h"
-#include "spikefield/rng.h"
+#include "sim/ray/ray.h"
+#include "base/rng.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,8 +1,8 @@
 /* Cameras, the Blender loader. */
 #include "ck_run.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "folder_fixture.h"
-#include "spikefield/scene.h"
+#include "scene/scene.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,11 +1,11 @@
 /* The emulated system: programs by hand that misbehave, the firmware against the core, and the firmware with an
  * accelerator, a bus or an image that is not as it should be. */
 #include "ck_run.h"
-#include "sim/soc.h"
+#include "sim/soc/soc.h"
 #include "firmware/sf_soc.h"
 #include "firmware/sf_tile.h"
-#include "sim/soc_job.h"
-#include "spikefield/audit.h"
+#include "sim/soc/job.h"
+#include "energy/energy.h"
 #include "tests/ck_ok.h"
 #include "tests/fx_fixture.h"
 #include <libgen.h>

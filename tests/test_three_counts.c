@@ -1,8 +1,8 @@
 /* Core, accelerator and recount on whole rays: nets with a hash grid, and a decoder behind planes and lines. */
 #include "ck_run.h"
 #include "sim/compare.h"
-#include "sim/three_counts.h"
-#include "spikefield/quant.h"
+#include "sim/ray/three_counts.h"
+#include "quant/quant.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
 

@@ -1,7 +1,7 @@
 /* Traces in SANA-FE's files: every spike and membrane against the naive nets, sample by sample. */
 #include "ck_run.h"
-#include "spikefield/audit.h"
-#include "spikefield/exchange.h"
+#include "energy/energy.h"
+#include "exchange/exchange.h"
 #include "tests/folder_fixture.h"
 #include "tests/fx_fixture.h"
 

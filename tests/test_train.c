@@ -1,6 +1,6 @@
 /* Losses, determinism, resume, time budget of the trainer. */
 #include "ck_run.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "train_fixture.h"
 #include <omp.h>
 

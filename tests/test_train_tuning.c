@@ -1,8 +1,8 @@
 /* Fine-tuning for few bits: what it trains is what the exporter writes. */
 #include "ck_run.h"
 #include "snn/kernels.h"
-#include "spikefield/io.h"
-#include "spikefield/quant.h"
+#include "base/io.h"
+#include "quant/quant.h"
 #include "train_fixture.h"
 
 enum { BITS = 4, LIMIT = 7 };

@@ -3,8 +3,8 @@
 #include "folder_fixture.h"
 #include "fx_fixture.h"
 #include "render/march.h"
-#include "spikefield/fit.h"
-#include "spikefield/quant.h"
+#include "fit/fit.h"
+#include "quant/quant.h"
 #include "src/fx/march.h"
 #include <check.h>
 #include <math.h>

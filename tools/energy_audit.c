@@ -1,8 +1,8 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
-#include "spikefield/audit.h"
-#include "spikefield/cli.h"
-#include "spikefield/html.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "cli/cli.h"
+#include "page/page.h"
+#include "base/io.h"
 #include "sim/audit_run.h"
 #include <inttypes.h>
 #include <omp.h>

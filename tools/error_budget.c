@@ -1,7 +1,7 @@
 /* error_budget: what is lost where, from doubles to the integers of the core. */
-#include "spikefield/budget.h"
-#include "spikefield/cli.h"
-#include "spikefield/quant.h"
+#include "bounds/bounds.h"
+#include "cli/cli.h"
+#include "quant/quant.h"
 #include <omp.h>
 #include <stdlib.h>
 

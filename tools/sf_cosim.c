@@ -1,11 +1,11 @@
 /* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
-#include "sim/activity.h"
+#include "sim/activity/activity.h"
 #include "sim/jobs.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
-#include "spikefield/audit.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "cli/cli.h"
+#include "base/io.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

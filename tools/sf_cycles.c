@@ -1,9 +1,9 @@
 /* sf_cycles: how long the accelerator takes for a frame, from the cycle model. */
-#include "spikefield/audit.h"
-#include "spikefield/cli.h"
-#include "spikefield/cycles.h"
-#include "spikefield/quant.h"
-#include "spikefield/scene.h"
+#include "energy/energy.h"
+#include "cli/cli.h"
+#include "cycles/cycles.h"
+#include "quant/quant.h"
+#include "scene/scene.h"
 #include <inttypes.h>
 #include <omp.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* sf_data: what the programs understand of a folder of posed pictures, and what looks wrong with it. */
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
+#include "cli/cli.h"
+#include "base/io.h"
+#include "scene/scene.h"
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>

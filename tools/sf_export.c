@@ -1,8 +1,8 @@
 /* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware; writes vectors
  * of a scene for any simulator, its traces and graphs for other tools. */
-#include "spikefield/cli.h"
-#include "spikefield/fit.h"
-#include "spikefield/quant.h"
+#include "cli/cli.h"
+#include "fit/fit.h"
+#include "quant/quant.h"
 #include "tools/export/extras.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* sf_pareto: tables, CSV and plot scripts from the points of `make pareto`. */
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
-#include "spikefield/pareto.h"
+#include "cli/cli.h"
+#include "base/io.h"
+#include "sweep/sweep.h"
 
 static sf_status write_file(const sf_sweep *sweep, const char *name, void (*write)(FILE *out, const sf_sweep *sweep))
 {

@@ -1,6 +1,6 @@
 /* sf_point: what one choice of widths costs a model in picture quality, energy and bytes. */
-#include "spikefield/cli.h"
-#include "spikefield/pareto.h"
+#include "cli/cli.h"
+#include "sweep/sweep.h"
 #include <omp.h>
 
 int main(int argc, char **argv)

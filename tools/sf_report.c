@@ -1,7 +1,7 @@
 /* sf_report: tables, JSON and plot scripts from the runs of `make reproduce`. */
-#include "spikefield/report.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
+#include "report/report.h"
+#include "cli/cli.h"
+#include "base/io.h"
 #include <string.h>
 
 static sf_status write_table(const sf_reproduction *r)

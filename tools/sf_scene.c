@@ -1,6 +1,6 @@
 /* Makes a procedural scene: pictures and camera poses in the Blender layout. */
-#include "spikefield/cli.h"
-#include "spikefield/scene.h"
+#include "cli/cli.h"
+#include "scene/scene.h"
 #include <stdio.h>
 
 typedef struct scene_args {

@@ -1,11 +1,11 @@
 /* sf_soc: the firmware renders a tile on an emulated system-on-chip with the Verilated accelerator. */
-#include "sim/soc.h"
+#include "sim/soc/soc.h"
 #include "firmware/sf_soc.h"
-#include "sim/soc_job.h"
-#include "spikefield/cli.h"
-#include "spikefield/golden.h"
-#include "spikefield/io.h"
-#include "spikefield/quant.h"
+#include "sim/soc/job.h"
+#include "cli/cli.h"
+#include "golden/golden.h"
+#include "base/io.h"
+#include "quant/quant.h"
 #include "sim/studio.h"
 #include <inttypes.h>
 #include <libgen.h>

@@ -1,5 +1,5 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
-#include "spikefield/quant.h"
+#include "quant/quant.h"
 #include "tools/train/report.h"
 #include <errno.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
 #include "sim/view_set.h"
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
+#include "cli/cli.h"
+#include "base/io.h"
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -330,7 +330,7 @@ int main(int argc, char **argv)
           "fixed and rtl also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi "
           "fx.Zlo.\n"
           "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
-          "equal on any machine (include/spikefield/manifest.h). --verify names the first difference, exit status 1.",
+          "equal on any machine (src/golden/manifest.h). --verify names the first difference, exit status 1.",
       .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
                   "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
                   "  sim_render scene.snn data --all -o golden\n"

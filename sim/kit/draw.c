@@ -1,7 +1,7 @@
 /* Rays of the kit and what the fixed-point core makes of their samples. */
 #include "sim/kit/kit.h"
-#include "spikefield/audit.h"
-#include "spikefield/rng.h"
+#include "energy/energy.h"
+#include "base/rng.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* The images that the bench reads with $readmemh, one word per line, the most significant digit first. */
 #include "sim/kit/kit.h"
 #include "sim/sim.h"
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include <inttypes.h>
 
 enum { WINDOW = 512, GLOBAL_LAYER = 7, GLOBAL_SAMPLES = 0, GLOBAL_RAYS = 1 };

@@ -1,6 +1,6 @@
 /* The folder: every file hashed as it is written, the manifest last. */
 #include "sim/kit/kit.h"
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include "spikefield/spikefield.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,10 @@
 /* The vector kit: a folder with which any simulator checks the accelerator, or another block with its ports, against
  * the fixed-point core: programming, stimulus, everything expected, RTL, a bench in plain SystemVerilog. docs/kit.md */
-#ifndef SPIKEFIELD_SIM_KIT_H
-#define SPIKEFIELD_SIM_KIT_H
-#include "spikefield/fx.h"
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
+#ifndef SF_SIM_KIT_KIT_H
+#define SF_SIM_KIT_KIT_H
+#include "fx/fx.h"
+#include "base/io.h"
+#include "scene/scene.h"
 
 enum { SF_KIT_VERSION = 1, SF_KIT_SAMPLES_MAX = 4096 };
 

@@ -1,5 +1,5 @@
 /* Two audits, read from their JSON: what differs in how they were made, in energy and in events. */
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* One audit as text, JSON and CSV. */
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include <inttypes.h>
 #include <math.h>
 

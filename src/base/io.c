@@ -1,4 +1,4 @@
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <stdlib.h>
 #include <string.h>
 

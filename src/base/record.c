@@ -1,4 +1,4 @@
-#include "spikefield/record.h"
+#include "base/record.h"
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* safetensors, read with the checks of the format's own library. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>

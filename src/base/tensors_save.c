@@ -1,5 +1,5 @@
 /* safetensors, written as the format's own library writes it. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Configuration of the float model: defaults and ranges. */
-#include "spikefield/model.h"
+#include "snn/model.h"
 
 sf_config sf_config_default(void)
 {

@@ -1,5 +1,5 @@
 /* Real spherical harmonics up to degree 3 (16 values), torch-ngp's order and signs. */
-#include "spikefield/model.h"
+#include "snn/model.h"
 
 void sf_sh4(const float direction[3], float out[16])
 {

@@ -1,5 +1,5 @@
 /* The intervals of a ray: torch-ngp's recurrence dt = clamp(t * dt_gamma, dt_min, dt_max). */
-#include "spikefield/model.h"
+#include "snn/model.h"
 #include <math.h>
 
 /* Equal steps through a TensoRF field's own box. */

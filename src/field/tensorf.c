@@ -1,7 +1,7 @@
 /* The VM-factorised field, sample by sample: the oracle of the kernels in src/snn/vm_isa.h. Chen et al. 2022, in the
  * form of their code: grid_sample with align_corners, planes and lines of one mode multiplied component by component.
  */
-#include "spikefield/model.h"
+#include "snn/model.h"
 #include <math.h>
 #include <string.h>
 

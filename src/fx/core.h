@@ -1,8 +1,8 @@
 /* Many samples at once: the scene's weights as the vector kernels read them, and the kernels' interface.
  * kernels_isa.c is compiled once per instruction set; the portable build calls the oracle (net.c, grid.c, march.c)
  * sample by sample, and every other build gives the same bits. */
-#ifndef SPIKEFIELD_FX_CORE_H
-#define SPIKEFIELD_FX_CORE_H
+#ifndef SF_FX_CORE_H
+#define SF_FX_CORE_H
 #include "src/fx/count.h"
 #include "src/fx/scene.h"
 

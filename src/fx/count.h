@@ -1,7 +1,7 @@
 /* Event counters of the nets; the definition of each event is in fx.h. */
-#ifndef SPIKEFIELD_FX_COUNT_H
-#define SPIKEFIELD_FX_COUNT_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_COUNT_H
+#define SF_FX_COUNT_H
+#include "fx/fx.h"
 
 enum { FX_SPIKING = 3 }; /* D1, C1, C2 in this order */
 

@@ -1,7 +1,7 @@
 /* Currents: exact sums of weight rows. */
-#ifndef SPIKEFIELD_FX_CURRENT_H
-#define SPIKEFIELD_FX_CURRENT_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_CURRENT_H
+#define SF_FX_CURRENT_H
+#include "fx/fx.h"
 
 /* acc[o] += x[i] * w[i][o] over n_in rows, o < n. |x| <= 2047, n_in <= 161: |acc| < 2^26. */
 void fx_current_mac(int32_t *acc, const int8_t *w, const int16_t *x, int n_in, int n);

@@ -1,7 +1,7 @@
 /* Dense products: GANG samples at once, in functions of their own, where the compiler keeps all sums in registers. A
  * gang of three loads 11 vectors for 24 products; CPUs load fewer than they multiply. */
-#ifndef SPIKEFIELD_FX_DENSE_ISA_H
-#define SPIKEFIELD_FX_DENSE_ISA_H
+#ifndef SF_FX_DENSE_ISA_H
+#define SF_FX_DENSE_ISA_H
 #include "src/fx/plif_isa.h"
 
 enum { GANG = 3 };

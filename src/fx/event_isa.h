@@ -1,6 +1,6 @@
 /* Products with spikes: a row of weights for every neuron that fired, or all rows where many did. */
-#ifndef SPIKEFIELD_FX_EVENT_ISA_H
-#define SPIKEFIELD_FX_EVENT_ISA_H
+#ifndef SF_FX_EVENT_ISA_H
+#define SF_FX_EVENT_ISA_H
 #include "src/fx/dense_isa.h"
 #include "src/fx/integrate_isa.h"
 #include <stdbool.h>

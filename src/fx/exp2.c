@@ -1,7 +1,7 @@
 /* Powers of two from one table.
  * Mirror: rtl/sf_exp2.sv (fx_exp2)
  * Mirror: rtl/sf_exp_neg.sv (fx_exp_neg)
- * Table: include/spikefield/tables/exp2.inc, 257 decimal integers, one per line with a comma:
+ * Table: src/fx/tables/exp2.inc, 257 decimal integers, one per line with a comma:
  * T[i] = round(2^(i/256) * 2^24), i = 0..256; 26 bits unsigned (only T[256] = 2^25 needs the 26th). */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
@@ -11,7 +11,7 @@ enum { TABLE_FRAC = 24, ARGUMENT_FRAC = 20, LOW_BITS = ARGUMENT_FRAC - 8 };
 enum { LOG2E_Q24 = 24204406, TAU_MAX = 32 << SF_TRANS_FRAC };
 
 static const int32_t exp2_table[257] = {
-#include "spikefield/tables/exp2.inc"
+#include "fx/tables/exp2.inc"
 };
 
 /* 2^fraction in Q.24 for fraction Q0.20: 2^24 <= t < 2^25. With 12 significant fraction bits (low = low4 << 8) the

@@ -1,5 +1,5 @@
 /* .snn: a safetensors file of integer tensors; scalars are metadata strings. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "src/fx/scene.h"
 #include <inttypes.h>
 #include <stdlib.h>

@@ -2,8 +2,8 @@
  *
  * A corner and its neighbour in x are often in one 32-bit word: in a dense level always, in a hashed one when x is
  * even, as the hash of x is x itself. */
-#ifndef SPIKEFIELD_FX_GRID_ISA_H
-#define SPIKEFIELD_FX_GRID_ISA_H
+#ifndef SF_FX_GRID_ISA_H
+#define SF_FX_GRID_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"

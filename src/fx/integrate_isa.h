@@ -1,6 +1,6 @@
 /* Activations and integrators, one sample to a lane; the arithmetic is that of exp2.c, sigmoid.c and integrate.c. */
-#ifndef SPIKEFIELD_FX_INTEGRATE_ISA_H
-#define SPIKEFIELD_FX_INTEGRATE_ISA_H
+#ifndef SF_FX_INTEGRATE_ISA_H
+#define SF_FX_INTEGRATE_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
@@ -9,10 +9,10 @@ enum { COLOURS = 3 };
 _Static_assert(FX_BLOCK % WIDTH == 0, "a block is whole vectors");
 
 static const int32_t exp2_table[257] = {
-#include "spikefield/tables/exp2.inc"
+#include "fx/tables/exp2.inc"
 };
 static const int32_t sigmoid_table[257] = {
-#include "spikefield/tables/sigmoid.inc"
+#include "fx/tables/sigmoid.inc"
 };
 
 /* Rounded in two shifts: the product alone takes 32 bits. */

@@ -1,7 +1,7 @@
 /* Inside src/fx: the cell of the occupancy grids at a point of a ray. */
-#ifndef SPIKEFIELD_FX_MARCH_H
-#define SPIKEFIELD_FX_MARCH_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_MARCH_H
+#define SF_FX_MARCH_H
+#include "fx/fx.h"
 
 /* Places of all cascades follow from those of the finest cells counted from the middle of the box: cascade c halves
  * them c times, and the bits in use of the farthest one say which is the finest that holds it. */

@@ -1,7 +1,7 @@
 /* Marching, one lattice point to a 64-bit lane. The first point is tested alone: within matter it is the next sample.
  */
-#ifndef SPIKEFIELD_FX_MARCH_ISA_H
-#define SPIKEFIELD_FX_MARCH_ISA_H
+#ifndef SF_FX_MARCH_ISA_H
+#define SF_FX_MARCH_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/march.h"
 #include "src/fx/vec_isa.h"

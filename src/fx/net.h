@@ -1,7 +1,7 @@
 /* One sample through both nets, with what happened on the way. */
-#ifndef SPIKEFIELD_FX_NET_H
-#define SPIKEFIELD_FX_NET_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_NET_H
+#define SF_FX_NET_H
+#include "fx/fx.h"
 
 typedef struct fx_events {
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* bitmaps, of D1, C1, C2 */

@@ -1,6 +1,6 @@
 /* Both nets for a block of samples, layer by layer, all steps of a layer at once. */
-#ifndef SPIKEFIELD_FX_NETS_ISA_H
-#define SPIKEFIELD_FX_NETS_ISA_H
+#ifndef SF_FX_NETS_ISA_H
+#define SF_FX_NETS_ISA_H
 #include "src/fx/vec_isa.h"
 #if defined(FX_TILES)
 #include "src/fx/tiles_isa.h"

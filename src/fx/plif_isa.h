@@ -4,8 +4,8 @@
  *   rshift_round(d * k, L) = h * 2k + rshift_round(l * k, L)
  * and rshift_round(l * k, L) is what one rounding 16-bit multiplication gives of l << (15 - L) and k. So d << (15 - L),
  * split at bit 16, holds both parts, and one 16-bit dot product adds h * 2k + l' * 1 to the membrane. |d| < 2^25. */
-#ifndef SPIKEFIELD_FX_PLIF_ISA_H
-#define SPIKEFIELD_FX_PLIF_ISA_H
+#ifndef SF_FX_PLIF_ISA_H
+#define SF_FX_PLIF_ISA_H
 #include "src/fx/core.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"

@@ -1,6 +1,6 @@
 /* The one rounding, the one saturation. Mirror: rtl/sf_round.svh */
-#ifndef SPIKEFIELD_FX_ROUND_H
-#define SPIKEFIELD_FX_ROUND_H
+#ifndef SF_FX_ROUND_H
+#define SF_FX_ROUND_H
 #include <stdint.h>
 
 /* x / 2^n, round half up; arithmetic shift. 0 <= n <= 62; the caller's width proof covers x + 2^(n-1). */

@@ -1,7 +1,7 @@
 /* Inside src/fx: pieces shared by check.c, scene.c, file.c. */
-#ifndef SPIKEFIELD_FX_SCENE_H
-#define SPIKEFIELD_FX_SCENE_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_SCENE_H
+#define SF_FX_SCENE_H
+#include "fx/fx.h"
 
 enum { FX_DIMENSION_MAX = 3 };
 extern const char *const fx_layer_tensor[SF_LAYERS]; /* tensor names, also used in messages */

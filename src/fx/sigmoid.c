@@ -1,6 +1,6 @@
 /* Logistic function from one table over [0, 8), odd symmetry about (0, 1/2).
  * Mirror: rtl/sf_sigmoid.sv
- * Table: include/spikefield/tables/sigmoid.inc, 257 decimal integers, one per line with a comma:
+ * Table: src/fx/tables/sigmoid.inc, 257 decimal integers, one per line with a comma:
  * S[i] = round(65536 / (1 + exp(-i/32))), i = 0..256; 16 bits unsigned.
  *
  *   m = min(|x|, 32767);  i = m >> 7;  low = m & 127
@@ -10,7 +10,7 @@
 #include "src/fx/nofloat.h"
 
 static const int32_t sigmoid_table[257] = {
-#include "spikefield/tables/sigmoid.inc"
+#include "fx/tables/sigmoid.inc"
 };
 
 uint32_t fx_sigmoid(int32_t x)

@@ -1,5 +1,5 @@
 /* Sine of a phase in turns, from one table of a quarter turn.
- * Table: include/spikefield/tables/sine.inc, 257 decimal integers, one per line with a comma:
+ * Table: src/fx/tables/sine.inc, 257 decimal integers, one per line with a comma:
  * S[i] = round(sin(pi/2 * i/256) * 2^16), i = 0..256; 17 bits unsigned (only S[256] = 2^16 needs the 17th).
  *
  *   q = phase within its half turn, folded at the quarter: 0..2^14;  i = q >> 6;  low = q & 63
@@ -12,7 +12,7 @@
 enum { TABLE_FRAC = 16, LOW_BITS = 6, QUARTER = 1 << (FX_PHASE_BITS - 2), HALF = 2 * QUARTER };
 
 static const int32_t sine_table[257] = {
-#include "spikefield/tables/sine.inc"
+#include "fx/tables/sine.inc"
 };
 
 int32_t fx_sine(uint32_t phase)

@@ -1,6 +1,6 @@
 /* The density activation of TensoRF: softplus(y) = log(1 + e^y) = max(y, 0) + log(1 + e^-|y|), the second term from
  * one table over [0, 16).
- * Table: include/spikefield/tables/softplus.inc, 257 decimal integers, one per line with a comma:
+ * Table: src/fx/tables/softplus.inc, 257 decimal integers, one per line with a comma:
  * L[i] = round(log(1 + exp(-i/16)) * 2^24), i = 0..256; 24 bits unsigned.
  *
  *   m = |y|, Q.12;  i = m >> 8;  low = m & 255
@@ -13,7 +13,7 @@
 enum { TABLE_FRAC = 24, LOW_BITS = SF_LOG_FRAC - 4, ENTRIES = 256 };
 
 static const int32_t softplus_table[ENTRIES + 1] = {
-#include "spikefield/tables/softplus.inc"
+#include "fx/tables/softplus.inc"
 };
 
 static int64_t tail(int32_t m)

@@ -1,7 +1,7 @@
 /* TensoRF's planes and lines at one position. Included once per instruction set: the compiler makes vectors of the
  * loops over components, and sums of integers do not depend on their order. Widths and equations: tensorf.c. */
-#ifndef SPIKEFIELD_FX_TENSORF_ISA_H
-#define SPIKEFIELD_FX_TENSORF_ISA_H
+#ifndef SF_FX_TENSORF_ISA_H
+#define SF_FX_TENSORF_ISA_H
 #include "src/fx/scene.h"
 
 enum { VM_FRAC = 8, VM_ONE = 1 << VM_FRAC, VM_PRODUCT_SHIFT = 15 };

@@ -5,8 +5,8 @@
  *
  * Per tile of 16 samples two loads and one store hide behind two products of 18 cycles; weights or biases loaded in
  * between, or rows that cross a cache line, do not hide. */
-#ifndef SPIKEFIELD_FX_TILES_ISA_H
-#define SPIKEFIELD_FX_TILES_ISA_H
+#ifndef SF_FX_TILES_ISA_H
+#define SF_FX_TILES_ISA_H
 #include "base/amx.h"
 #include "src/fx/dense_isa.h"
 #include "src/fx/integrate_isa.h"

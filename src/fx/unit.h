@@ -1,9 +1,9 @@
 /* The arithmetic units of the accelerator as pure functions. Each has a combinational RTL module of the same
  * name (fx_plif_step <-> sf_plif, fx_exp2 <-> sf_exp2, fx_sigmoid <-> sf_sigmoid, fx_integrate_* <-> sf_integrate,
  * fx_grid_weights <-> sf_grid_weight). */
-#ifndef SPIKEFIELD_FX_UNIT_H
-#define SPIKEFIELD_FX_UNIT_H
-#include "spikefield/fx.h"
+#ifndef SF_FX_UNIT_H
+#define SF_FX_UNIT_H
+#include "fx/fx.h"
 
 enum { FX_MEMBRANE_MAX = (1 << (SF_MEMBRANE_BITS - 1)) - 1, FX_LEAK_ONE = 1 << SF_LEAK_FRAC };
 enum { FX_INPUT_MAX = (1 << (SF_INPUT_BITS - 1)) - 1, FX_TRANS_ONE = 1 << SF_TRANS_FRAC };

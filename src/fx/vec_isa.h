@@ -1,7 +1,7 @@
 /* Vectors of 32-bit lanes for AVX-512 VNNI and AVX2. Signed unless the name says u. */
-#ifndef SPIKEFIELD_FX_VEC_ISA_H
-#define SPIKEFIELD_FX_VEC_ISA_H
-#include "spikefield/arch.h"
+#ifndef SF_FX_VEC_ISA_H
+#define SF_FX_VEC_ISA_H
+#include "base/arch.h"
 #include <immintrin.h>
 #include <stdint.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* The core's types and the public ones: equal layouts, which the compiler proves; copied, so that neither header needs
  * the other. */
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include "src/lib/internal.h"
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* Rays and frames on all threads. Pixels do not depend on one another and counts are integer sums, so neither depends
  * on the threads; of several failures the one of the first block is reported. */
-#include "spikefield/quant.h"
+#include "quant/quant.h"
 #include "src/lib/internal.h"
 #include <math.h>
 #include <omp.h>

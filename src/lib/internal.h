@@ -1,7 +1,7 @@
 /* Inside src/lib: what the files behind the public header share. */
-#ifndef SPIKEFIELD_LIB_INTERNAL_H
-#define SPIKEFIELD_LIB_INTERNAL_H
-#include "spikefield/fx.h"
+#ifndef SF_LIB_INTERNAL_H
+#define SF_LIB_INTERNAL_H
+#include "fx/fx.h"
 #include "spikefield/spikefield.h"
 
 struct spikefield_scene {

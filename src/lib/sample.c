@@ -1,5 +1,5 @@
 /* Single samples: positions to features, features through the nets, the taps of a ray. */
-#include "spikefield/quant.h"
+#include "quant/quant.h"
 #include "src/lib/internal.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include "src/quant/internal.h"
 #include <math.h>
 #include <stdlib.h>

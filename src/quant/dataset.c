@@ -1,4 +1,4 @@
-#include "spikefield/quant.h"
+#include "quant/quant.h"
 
 sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char *name, const char *dir,
                              const char *split, const sf_dataset_options *options)

@@ -1,7 +1,7 @@
 /* Inside src/quant. */
-#ifndef SPIKEFIELD_QUANT_INTERNAL_H
-#define SPIKEFIELD_QUANT_INTERNAL_H
-#include "spikefield/quant.h"
+#ifndef SF_QUANT_INTERNAL_H
+#define SF_QUANT_INTERNAL_H
+#include "quant/quant.h"
 
 /* Calibration samples: positions in occupied cells with random directions, and what the float nets do there.
  * Rows of a layer's data are samples x steps (D1: samples alone, its current is constant). */

@@ -1,6 +1,6 @@
 /* A ray in model units to the integer lattice of the box: the same lattice as sf_ray_lattice, in double precision. */
-#include "spikefield/quant.h"
-#include "spikefield/model.h"
+#include "quant/quant.h"
+#include "snn/model.h"
 #include <math.h>
 #include <string.h>
 

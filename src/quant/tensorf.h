@@ -1,6 +1,6 @@
 /* Inside src/quant: TensoRF's field and decoder to integers. */
-#ifndef SPIKEFIELD_QUANT_TENSORF_H
-#define SPIKEFIELD_QUANT_TENSORF_H
+#ifndef SF_QUANT_TENSORF_H
+#define SF_QUANT_TENSORF_H
 #include "src/quant/internal.h"
 
 /* Points that a ray sees, with random directions, and what the float decoder does there. Layers C1, C2, C3 are 0, 1, 2;

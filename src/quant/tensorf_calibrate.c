@@ -1,5 +1,5 @@
 /* Calibration of a TensoRF model: points where its decoder is asked, and what the float field and decoder do there. */
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include "src/quant/tensorf.h"
 #include <math.h>
 #include <stdlib.h>

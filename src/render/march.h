@@ -1,7 +1,7 @@
 /* Marching a ray through the scene box over the occupied cells of the occupancy grids. */
 #ifndef SF_RENDER_MARCH_H
 #define SF_RENDER_MARCH_H
-#include "spikefield/model.h"
+#include "snn/model.h"
 
 typedef struct sf_march {
   const sf_steps *steps; /* must outlive it */

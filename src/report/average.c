@@ -1,5 +1,5 @@
 /* Averages over scenes, and the paper's order. */
-#include "spikefield/report.h"
+#include "report/report.h"
 #include <math.h>
 
 /* ---- means ---- */

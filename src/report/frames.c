@@ -1,7 +1,7 @@
 /* Energies and fixed-point quality of the audited frames, and t* over the iterations. */
 #include "report/internal.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include <dirent.h>
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* What the report's files share. */
-#ifndef SPIKEFIELD_REPORT_INTERNAL_H
-#define SPIKEFIELD_REPORT_INTERNAL_H
-#include "spikefield/report.h"
+#ifndef SF_REPORT_INTERNAL_H
+#define SF_REPORT_INTERNAL_H
+#include "report/report.h"
 
 /* Profile scenes: twin and spiking runs alone, on scenes of any kind. */
 bool sf_report_is_pairs(const sf_reproduction *r);

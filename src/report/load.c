@@ -1,6 +1,6 @@
 /* Folders of runs to numbers. */
 #include "report/internal.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <dirent.h>
 #include <math.h>
 #include <stdarg.h>

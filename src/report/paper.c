@@ -1,6 +1,6 @@
 /* The runs and what the paper reports for them: "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance
  * Fields", INGP backbone, averages over the eight Synthetic scenes at 800 x 800. */
-#include "spikefield/report.h"
+#include "report/report.h"
 #include <math.h>
 #include <string.h>
 

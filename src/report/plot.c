@@ -1,6 +1,6 @@
 /* Gnuplot scripts with their data inside. */
 #include "report/internal.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <math.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
-#include "spikefield/quality.h"
+#include "report/quality.h"
 #include "report/internal.h"
-#include "spikefield/io.h"
-#include "spikefield/model.h"
+#include "base/io.h"
+#include "snn/model.h"
 #include <dirent.h>
 #include <math.h>
 #include <stdlib.h>

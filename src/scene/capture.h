@@ -1,8 +1,8 @@
 /* What the reader of a layout finds: every view that is listed, before any picture is opened and before the scene is
  * placed in its box. */
-#ifndef SPIKEFIELD_SCENE_CAPTURE_H
-#define SPIKEFIELD_SCENE_CAPTURE_H
-#include "spikefield/scene.h"
+#ifndef SF_SCENE_CAPTURE_H
+#define SF_SCENE_CAPTURE_H
+#include "scene/scene.h"
 #include <cjson/cJSON.h>
 
 enum { SF_HOLD_OUT = 8 }; /* every 8th view where the data names no test views */

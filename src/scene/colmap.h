@@ -1,6 +1,6 @@
 /* The tables of a COLMAP sparse model (colmap.github.io/format.html), whichever of its two forms is on disk. */
-#ifndef SPIKEFIELD_SCENE_COLMAP_H
-#define SPIKEFIELD_SCENE_COLMAP_H
+#ifndef SF_SCENE_COLMAP_H
+#define SF_SCENE_COLMAP_H
 #include "src/scene/capture.h"
 
 enum { SF_COLMAP_PARAMS = 16 };

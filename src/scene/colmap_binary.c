@@ -1,5 +1,5 @@
 /* cameras.bin, images.bin, points3D.bin: least significant byte first, no padding. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "src/scene/colmap.h"
 #include <stdlib.h>
 #include <string.h>

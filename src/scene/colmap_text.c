@@ -1,5 +1,5 @@
 /* cameras.txt, images.txt, points3D.txt: a line per entry, two per image; lines with # in front are comments. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "src/scene/colmap.h"
 #include <math.h>
 #include <stdlib.h>

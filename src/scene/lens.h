@@ -1,7 +1,7 @@
 /* OpenCV's lens: radial k1, k2 and tangential p1, p2, on coordinates over the focal length, y down. */
-#ifndef SPIKEFIELD_SCENE_LENS_H
-#define SPIKEFIELD_SCENE_LENS_H
-#include "spikefield/scene.h"
+#ifndef SF_SCENE_LENS_H
+#define SF_SCENE_LENS_H
+#include "scene/scene.h"
 
 bool sf_lens_bends(const sf_camera *camera);
 /* Where the pinhole's point `straight` comes to lie. */

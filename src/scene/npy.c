@@ -1,5 +1,5 @@
 #include "src/scene/npy.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>

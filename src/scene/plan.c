@@ -1,5 +1,5 @@
 /* Where the cameras stand: the view from above beside the view from the side. */
-#include "spikefield/scene.h"
+#include "scene/scene.h"
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,8 +1,8 @@
 /* Procedural scenes in the Blender layout. */
-#include "spikefield/cli.h"
-#include "spikefield/io.h"
-#include "spikefield/rng.h"
-#include "spikefield/scene.h"
+#include "cli/cli.h"
+#include "base/io.h"
+#include "base/rng.h"
+#include "scene/scene.h"
 #include "src/scene/stage.h"
 #include <math.h>
 #include <stdlib.h>

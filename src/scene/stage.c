@@ -1,7 +1,7 @@
 /* What stands in each procedural scene. Everything lies within 1.1 world units of the origin on each axis, but for
  * "plaza", which reaches to 9: cameras are inside of it. */
 #include "src/scene/stage.h"
-#include "spikefield/scene.h"
+#include "scene/scene.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* Analytic shapes and fogs of the procedural scenes. World units; z is up; double precision throughout. */
-#ifndef SPIKEFIELD_SCENE_STAGE_H
-#define SPIKEFIELD_SCENE_STAGE_H
+#ifndef SF_SCENE_STAGE_H
+#define SF_SCENE_STAGE_H
 #include <stdbool.h>
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 /* Three numbers. */
-#ifndef SPIKEFIELD_SCENE_VEC_H
-#define SPIKEFIELD_SCENE_VEC_H
+#ifndef SF_SCENE_VEC_H
+#define SF_SCENE_VEC_H
 #include <math.h>
 
 static inline double vec_dot(const double a[3], const double b[3])

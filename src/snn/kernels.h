@@ -6,7 +6,7 @@
  * portable build is the oracle of the others (they contract multiply-adds, so last bits differ). */
 #ifndef SF_SNN_KERNELS_H
 #define SF_SNN_KERNELS_H
-#include "spikefield/model.h"
+#include "snn/model.h"
 
 enum { SF_BLOCK = 64 };
 

@@ -1,6 +1,6 @@
 /* Layout of the float model. */
 #include "base/memory.h"
-#include "snn/model.h"
+#include "snn/layout.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* The float model on file: metadata and tensors, checked one by one. */
-#include "snn/model.h"
-#include "spikefield/io.h"
+#include "snn/layout.h"
+#include "base/io.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

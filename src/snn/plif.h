@@ -2,7 +2,7 @@
  * The scalar form, used by the oracle; src/snn/forward_isa.h holds the block form. */
 #ifndef SF_SNN_PLIF_H
 #define SF_SNN_PLIF_H
-#include "spikefield/model.h"
+#include "snn/model.h"
 #include <math.h>
 
 enum { SF_SURROGATE_ALPHA = 8 };

@@ -1,5 +1,5 @@
 /* Weights on the grid of a core of few bits. */
-#include "spikefield/model.h"
+#include "snn/model.h"
 #include <math.h>
 
 static const sf_param_id weights_of[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};

@@ -1,6 +1,6 @@
 /* Checkpoints: the model's tensors, and with the optimiser everything that a bit-identical continuation needs.
  * Random numbers are counter-based, so the iteration number is their whole state. */
-#include "spikefield/io.h"
+#include "base/io.h"
 #include "train/vm.h"
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* Held-out quality of the float model. */
-#include "spikefield/train.h"
+#include "train/train.h"
 #include <math.h>
 #include <stdlib.h>
 

@@ -4,8 +4,8 @@
 #include "base/memory.h"
 #include "render/march.h"
 #include "render/view.h"
-#include "spikefield/rng.h"
-#include "spikefield/train.h"
+#include "base/rng.h"
+#include "train/train.h"
 
 /* Work is cut into GROUPS parts that do not depend on the number of threads; each part adds up its own gradient in
  * sample order and the parts are added in order: same seed, same bits, any thread count. */

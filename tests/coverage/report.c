@@ -1,6 +1,6 @@
 /* Table of the functional coverage, with the holes named: report [MINIMUM_PERCENT] */
 #include "sim/cover.h"
-#include "spikefield/audit.h"
+#include "energy/energy.h"
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -2,8 +2,8 @@
 #ifndef SF_TESTS_FUZZ_DATA_SET_H
 #define SF_TESTS_FUZZ_DATA_SET_H
 #include "tests/layout_fixture.h"
-#include "spikefield/model.h"
-#include "spikefield/scene.h"
+#include "snn/model.h"
+#include "scene/scene.h"
 #include "fuzz.h"
 #include <math.h>
 

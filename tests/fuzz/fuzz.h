@@ -1,8 +1,8 @@
 /* What the fuzzing targets share. A target is one file fuzz_NAME.c with LLVMFuzzerTestOneInput(): libFuzzer calls it
  * (make fuzz), or replay.c with the files named on its command line (make check). See docs/fuzzing.md. */
-#ifndef SF_TESTS_FUZZ_H
-#define SF_TESTS_FUZZ_H
-#include "spikefield/status.h"
+#ifndef SF_TESTS_FUZZ_FUZZ_H
+#define SF_TESTS_FUZZ_FUZZ_H
+#include "base/status.h"
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>

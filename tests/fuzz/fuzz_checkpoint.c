@@ -1,7 +1,7 @@
 /* Resuming a training run, and one iteration of it. */
 #include "fuzz.h"
 #include "mutate_header.h"
-#include "spikefield/train.h"
+#include "train/train.h"
 
 static sf_dataset *one_view(void)
 {

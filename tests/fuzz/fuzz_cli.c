@@ -1,6 +1,6 @@
 /* Command lines: one argument per line. */
 #include "fuzz.h"
-#include "spikefield/cli.h"
+#include "cli/cli.h"
 #include <math.h>
 
 enum { ARGUMENTS = 16 };

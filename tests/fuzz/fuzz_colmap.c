@@ -1,7 +1,7 @@
 /* One table of a COLMAP model, beside whole ones and small pictures. The first byte of the input says which table. */
 #include "fuzz.h"
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
+#include "base/io.h"
+#include "scene/scene.h"
 #include "data_set.h"
 #include <math.h>
 

@@ -1,8 +1,8 @@
 /* transforms_*.json beside two small pictures, and the rays of the cameras that were accepted. */
 #include "data_set.h"
 #include "fuzz.h"
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
+#include "base/io.h"
+#include "scene/scene.h"
 
 static void put_picture(const char *name, int width, int height)
 {

@@ -1,6 +1,6 @@
 /* EXR images. */
 #include "fuzz.h"
-#include "spikefield/image.h"
+#include "image/image.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

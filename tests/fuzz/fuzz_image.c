@@ -2,7 +2,7 @@
  */
 #include "firmware/sf_tile.h"
 #include "fuzz.h"
-#include "spikefield/image.h"
+#include "image/image.h"
 
 static uint32_t big_endian(const uint8_t *at)
 {

@@ -1,6 +1,6 @@
 /* JSON files: reports, data sets. */
 #include "fuzz.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

@@ -1,7 +1,7 @@
 /* poses_bounds.npy beside small pictures. */
 #include "fuzz.h"
-#include "spikefield/io.h"
-#include "spikefield/scene.h"
+#include "base/io.h"
+#include "scene/scene.h"
 #include "data_set.h"
 #include <math.h>
 

@@ -1,6 +1,6 @@
 /* Manifests of golden images: what is accepted is written and read back the same. */
 #include "fuzz.h"
-#include "spikefield/manifest.h"
+#include "golden/manifest.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

@@ -1,7 +1,7 @@
 /* The float model: loading, and two rays through what was accepted. */
 #include "fuzz.h"
 #include "mutate_header.h"
-#include "spikefield/model.h"
+#include "snn/model.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {

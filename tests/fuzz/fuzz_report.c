@@ -1,8 +1,8 @@
 /* Folders of runs: two scenes with four runs each, whose files are the parts of the input. A byte 0x1c ends a part;
  * when there are fewer parts than slots they begin again. */
 #include "fuzz.h"
-#include "spikefield/io.h"
-#include "spikefield/report.h"
+#include "base/io.h"
+#include "report/report.h"
 
 enum { SLOTS = 7 };
 

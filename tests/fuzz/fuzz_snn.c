@@ -1,8 +1,8 @@
 /* The integer model: loading, and rays through what was accepted, in the portable and in the vector core. */
 #include "fuzz.h"
 #include "mutate_header.h"
-#include "spikefield/fx.h"
-#include "spikefield/quant.h"
+#include "fx/fx.h"
+#include "quant/quant.h"
 
 enum { SUM_CHARS = 18, SAMPLES = 6, POINTS = 64 };
 

@@ -1,6 +1,6 @@
 /* The safetensors container: what is accepted is described truly, and can be written and read again. */
 #include "fuzz.h"
-#include "spikefield/io.h"
+#include "base/io.h"
 #include <math.h>
 
 static size_t bytes_of(const sf_tensor *tensor)

@@ -3,12 +3,12 @@
 #include "firmware/sf_blob.h"
 #include "data_set.h"
 #include "fuzz.h"
-#include "sim/soc_job.h"
+#include "sim/soc/job.h"
 #include "tests/fx_tensorf_fixture.h"
-#include "spikefield/io.h"
-#include "spikefield/manifest.h"
-#include "spikefield/quant.h"
-#include "spikefield/train.h"
+#include "base/io.h"
+#include "golden/manifest.h"
+#include "quant/quant.h"
+#include "train/train.h"
 #include <png.h>
 #include <jpeglib.h>
 

@@ -1,7 +1,7 @@
 /* sf_stream_in or sf_stream_out, cycle by cycle against a model: random sizes, stalls, bubbles, bad packets, clears in
  * any cycle. Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
 extern "C" {
-#include "spikefield/rng.h"
+#include "base/rng.h"
 }
 #include <cstdint>
 #include <cstdio>

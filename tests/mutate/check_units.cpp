@@ -1,7 +1,7 @@
 /* One combinational unit against its C mirror: small inputs exhausted, large ones at their corners and at random.
  * Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
 extern "C" {
-#include "spikefield/rng.h"
+#include "base/rng.h"
 #include "src/fx/unit.h"
 }
 #include <cstdio>

@@ -1,9 +1,9 @@
 /* What sf_export writes beside a scene, for other tools: vectors, traces, graphs. */
-#ifndef SPIKEFIELD_TOOLS_EXPORT_EXTRAS_H
-#define SPIKEFIELD_TOOLS_EXPORT_EXTRAS_H
+#ifndef SF_TOOLS_EXPORT_EXTRAS_H
+#define SF_TOOLS_EXPORT_EXTRAS_H
 #include "sim/kit/kit.h"
-#include "spikefield/exchange.h"
-#include "spikefield/quant.h"
+#include "exchange/exchange.h"
+#include "quant/quant.h"
 #include <cjson/cJSON.h>
 
 typedef struct export_options {

@@ -1,6 +1,6 @@
 /* What sf_gen writes about the registers: tables read from csr.def, and one writer per language. */
-#ifndef SPIKEFIELD_TOOLS_GEN_H
-#define SPIKEFIELD_TOOLS_GEN_H
+#ifndef SF_TOOLS_GEN_GEN_H
+#define SF_TOOLS_GEN_GEN_H
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>

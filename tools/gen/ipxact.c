@@ -1,7 +1,7 @@
 /* The block as an IP-XACT component (IEEE 1685-2014): bus interfaces, memory maps, ports of sf_top, files. AXI bus
  * definitions are Arm's (amba.com), those of clock, reset and interrupt the common ones of xilinx.com. */
 #include "tools/gen/gen.h"
-#include "spikefield/arch.h"
+#include "base/arch.h"
 #include <inttypes.h>
 #include <string.h>
 

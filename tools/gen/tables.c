@@ -1,6 +1,6 @@
 /* csr.def as tables. */
 #include "tools/gen/gen.h"
-#include "spikefield/arch.h"
+#include "base/arch.h"
 #include <string.h>
 
 const gen_register gen_registers[] = {

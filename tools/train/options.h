@@ -1,8 +1,8 @@
 /* The command line of sf_train: its options, those of the run that it resumes, and what follows from both. */
-#ifndef SPIKEFIELD_TOOLS_TRAIN_OPTIONS_H
-#define SPIKEFIELD_TOOLS_TRAIN_OPTIONS_H
-#include "spikefield/cli.h"
-#include "spikefield/train.h"
+#ifndef SF_TOOLS_TRAIN_OPTIONS_H
+#define SF_TOOLS_TRAIN_OPTIONS_H
+#include "cli/cli.h"
+#include "train/train.h"
 
 enum { TRAIN_OPTIONS_MAX = 64 };
 

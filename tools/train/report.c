@@ -1,6 +1,6 @@
 #include "tools/train/report.h"
-#include "spikefield/audit.h"
-#include "spikefield/io.h"
+#include "energy/energy.h"
+#include "base/io.h"
 #include <math.h>
 
 static double psnr_of(double mse)

@@ -1,6 +1,6 @@
 /* What sf_train tells while it learns and at the end. */
-#ifndef SPIKEFIELD_TOOLS_TRAIN_REPORT_H
-#define SPIKEFIELD_TOOLS_TRAIN_REPORT_H
+#ifndef SF_TOOLS_TRAIN_REPORT_H
+#define SF_TOOLS_TRAIN_REPORT_H
 #include "tools/train/options.h"
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
 /* One thread, without OpenMP's library: fuzzers run faster so, and the same input always takes the same path. */
-#ifndef SF_TESTS_FUZZ_OMP_H
-#define SF_TESTS_FUZZ_OMP_H
+#ifndef SF_TESTS_FUZZ_SINGLE_OMP_H
+#define SF_TESTS_FUZZ_SINGLE_OMP_H
 typedef int omp_lock_t;
 #define omp_get_max_threads() 1
 #define omp_get_thread_num() 0

@@ -1,0 +1,53 @@
+/* sf_ray_top, Verilated: rays in, pixels out, with the grid in a memory that answers late. Registers, counters and
+ * bus are those of sim/sim.h. */
+#ifndef SF_SIM_RAY_RAY_H
+#define SF_SIM_RAY_RAY_H
+#include "sim/sim.h"
+
+typedef struct sf_ray_sample {
+  uint32_t pos[3]; /* Q0.24 */
+  int32_t delta_q24;
+  uint64_t distance_q16; /* below 2^44 */
+} sf_ray_sample;
+
+/* The samples of one ray, n >= 0. The hardware may stop before the last one, by the core's own rule. stops: it has to
+ * stop at the last one, which is not marked as such; once its pixel has come, one more that is ends the ray. */
+typedef struct sf_ray_request {
+  const fx_ray *ray;
+  const sf_ray_sample *sample;
+  int n;
+  bool stops;
+} sf_ray_request;
+
+/* The grid's memory: answers in order, each after a random number of cycles. */
+enum { SF_MEMORY_QUEUE = 64 };
+typedef struct sf_memory {
+  sf_dut *dut;
+  const fx_grid *grid;
+  uint64_t asked, answered;      /* requests taken, answers given */
+  uint64_t outside;              /* requests beyond the table */
+  uint64_t due[SF_MEMORY_QUEUE]; /* ring: earliest cycle of the answer */
+  uint16_t data[SF_MEMORY_QUEUE];
+} sf_memory;
+
+/* The dut's each_cycle, with the memory as its context: takes a request, gives an answer. */
+void sf_memory_cycle(void *memory);
+
+typedef struct sf_ray_dut {
+  sf_dut *dut;
+  const fx_scene *scene; /* kept: its grid is the memory's contents */
+  sf_memory memory;
+} sf_ray_dut;
+/* Programmed and started. The scene must outlive it. */
+sf_status sf_ray_dut_open(sf_ray_dut **rays, const fx_scene *scene, const sf_dut_options *options);
+/* Net, encoder and compositor of the scene once more, after a soft reset or a change of the scene. */
+sf_status sf_ray_dut_load(sf_ray_dut *rays);
+/* Streams n rays in and n pixels out. A hang is an error that names the cycle. */
+sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
+void sf_ray_dut_close(sf_ray_dut *rays);
+
+/* The first n samples of the ray's march. */
+void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
+/* Those that the core took for its pixel: the counters become the core's. */
+sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
+#endif

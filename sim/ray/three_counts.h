@@ -1,0 +1,22 @@
+/* The same rays counted three times: by the core, by the accelerator, from the spike bitmaps. */
+#ifndef SF_SIM_RAY_THREE_COUNTS_H
+#define SF_SIM_RAY_THREE_COUNTS_H
+#include "energy/energy.h"
+#include "sim/dut.h"
+
+typedef struct sf_three_job {
+  const fx_scene *scene;
+  const uint64_t *index; /* the rays */
+  int rays;
+  sf_status (*ray)(void *user, uint64_t index, fx_ray *ray);
+  void (*name)(void *user, uint64_t index, char *text, size_t size); /* of a ray, for messages */
+  bool (*tick)(void *user, int done);                                /* false stops; may be NULL */
+  void *user;
+  sf_dut_options dut;
+} sf_three_job;
+
+/* Counts must hold what `wanted` says; everything else is set. Each sample goes through core and accelerator: outputs,
+ * spike bitmaps and, per ray, all counters are compared, so that a difference names ray, sample, layer, step, event, of
+ * a spike the neuron too. A difference is counts->agreement, not a failure: the report shows it. */
+sf_status sf_three_counts_run(const sf_three_job *job, sf_three_counts *counts);
+#endif

@@ -1,0 +1,124 @@
+/* Writes the image that firmware/sf_tile.c reads. */
+#include "sim/soc/job.h"
+#include "firmware/sf_soc.h"
+#include "firmware/sf_tile.h"
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct plan {
+  size_t net, table, occupancy, rays, end;
+} plan;
+
+static size_t aligned(size_t at)
+{
+  return (at + 7) / 8 * 8;
+}
+
+static size_t net_bytes(const fx_net *net)
+{
+  size_t rows = 0;
+  for (int l = 0; l < SF_LAYERS; l++) rows += (size_t)fx_layer_rows(&net->layer[l]);
+  return SF_BLOB_WORDS * 4 + rows * SF_LANES;
+}
+
+static size_t occupancy_bytes(const fx_scene *scene)
+{
+  const size_t res = (size_t)scene->occ_res;
+  return res * res * res / 8;
+}
+
+static plan make_plan(const fx_scene *scene, size_t rays)
+{
+  plan p = {.net = aligned(sizeof(sf_tile_header))};
+  p.table = aligned(p.net + net_bytes(&scene->net));
+  p.occupancy = aligned(p.table + (size_t)scene->grid.entries * FX_GRID_FEATURES);
+  p.rays = aligned(p.occupancy + occupancy_bytes(scene));
+  p.end = p.rays + rays * sizeof(fx_ray);
+  return p;
+}
+
+static void put_words(uint8_t *to, const int32_t *word, int n)
+{
+  for (int i = 0; i < n; i++)
+    for (int b = 0; b < 4; b++) to[4 * i + b] = (uint8_t)((uint32_t)word[i] >> 8 * b);
+}
+
+static void put_net(uint8_t *to, const fx_net *net)
+{
+  const int32_t head[SF_BLOB_HEADER_WORDS] = {
+      SF_BLOB_MAGIC,       SF_BLOB_VERSION,       (int32_t)net_bytes(net), net->mode,
+      net->steps,          net->exp_in.mul,       net->exp_in.shift,       net->exp_in.bias,
+      net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias};
+  put_words(to, head, SF_BLOB_HEADER_WORDS);
+  uint8_t *weights = to + SF_BLOB_WORDS * 4;
+  for (int l = 0; l < SF_LAYERS; l++) {
+    const fx_layer *layer = &net->layer[l];
+    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias};
+    put_words(to + 4 * (SF_BLOB_HEADER_WORDS + l * SF_BLOB_LAYER_WORDS), field, SF_BLOB_LAYER_WORDS);
+    const size_t size = (size_t)fx_layer_rows(layer) * SF_LANES;
+    memcpy(weights, layer->w, size);
+    weights += size;
+  }
+}
+
+static sf_tile_header make_header(const fx_scene *scene, const plan *p, int width, int height)
+{
+  sf_tile_header h = {.magic = SF_TILE_MAGIC,
+                      .version = SF_TILE_VERSION,
+                      .bytes = (uint32_t)p->end,
+                      .width = (uint32_t)width,
+                      .height = (uint32_t)height,
+                      .net = (uint32_t)p->net,
+                      .net_bytes = (uint32_t)net_bytes(&scene->net),
+                      .table = (uint32_t)p->table,
+                      .occupancy = (uint32_t)p->occupancy,
+                      .rays = (uint32_t)p->rays,
+                      .levels = (uint32_t)scene->grid.levels,
+                      .entries = (uint32_t)scene->grid.entries,
+                      .occ_res = (uint32_t)scene->occ_res,
+                      .step_q24 = scene->step_q24,
+                      .max_samples = scene->max_samples,
+                      .trans_stop = scene->trans_stop};
+  memcpy(h.background, scene->background, sizeof h.background);
+  for (int l = 0; l < scene->grid.levels; l++) {
+    h.scale_q16[l] = scene->grid.scale_q16[l];
+    h.stride[l] = scene->grid.stride[l];
+    h.log2_size[l] = scene->grid.log2_size[l];
+    h.shift[l] = scene->grid.shift[l];
+    h.offset[l] = (uint32_t)scene->grid.offset[l];
+  }
+  return h;
+}
+
+sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width, int height, uint8_t **image,
+                            size_t *size)
+{
+  const size_t n = (size_t)width * (size_t)height;
+  static const char marches[] = "the firmware marches through one box with equal steps";
+  if (scene->log2_bound)
+    return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has %d cascades", marches, scene->log2_bound + 1);
+  if (scene->steps) return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has growing steps", marches);
+  const plan p = make_plan(scene, n);
+  if (p.end + 8 + n * sizeof(fx_pixel) > SF_SOC_IMAGE_SPACE)
+    return sf_fail(SF_E_RANGE, "scene and tile of %d x %d pixels take %zu bytes, the system's memory has %u", width,
+                   height, p.end + n * sizeof(fx_pixel), SF_SOC_IMAGE_SPACE);
+  uint8_t *bytes = calloc(1, p.end);
+  if (!bytes) return sf_fail(SF_E_MEMORY, "no memory for an image of %zu bytes", p.end);
+  sf_tile_header head = make_header(scene, &p, width, height);
+  memcpy(bytes, &head, sizeof head);
+  put_net(bytes + p.net, &scene->net);
+  memcpy(bytes + p.table, scene->grid.table, (size_t)scene->grid.entries * FX_GRID_FEATURES);
+  memcpy(bytes + p.occupancy, scene->occupancy, occupancy_bytes(scene));
+  memcpy(bytes + p.rays, rays, n * sizeof *rays);
+  const size_t from = offsetof(sf_tile_header, crc) + sizeof head.crc;
+  head.crc = sf_crc32(0, bytes + from, (uint32_t)(p.end - from));
+  memcpy(bytes, &head, sizeof head);
+  *image = bytes;
+  *size = p.end;
+  return sf_ok();
+}
+
+size_t sf_soc_image_pixels_at(const uint8_t *image)
+{
+  return sf_tile_pixels_at(((const sf_tile_header *)image)->bytes);
+}

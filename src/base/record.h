@@ -1,0 +1,17 @@
+/* Options of a command line kept in a safetensors file's metadata, so that a later command goes on with them. The key
+ * of --beta is "option.beta". */
+#ifndef SF_BASE_RECORD_H
+#define SF_BASE_RECORD_H
+#include "cli/cli.h"
+#include "base/io.h"
+
+/* The values that the options have now, but for those named in `apart` (ends with NULL) and for outputs; "" for what
+ * was not asked for: a flag, a string or a number outside its limits. NULL: no memory. */
+cJSON *sf_record_make(const sf_option *options, const char *const *apart);
+/* What the file has of them as words of a command line, behind word[*words]; `room` in all. Free each. */
+sf_status sf_record_words(const sf_tensors *set, const sf_option *options, const char *const *apart, char **word,
+                          int *words, int room);
+/* SF_E_RANGE names the first option whose value in `record` is not the one in the file. An option that the file does
+ * not know may have any. */
+sf_status sf_record_compare(const sf_tensors *set, const cJSON *record);
+#endif

@@ -1,0 +1,110 @@
+/* Error budget of the fixed-point core: per block a bound that is derived (docs/fixed-point.md), and the error that is
+ * measured against double precision; then what each block costs in a picture. */
+#ifndef SF_BOUNDS_BOUNDS_H
+#define SF_BOUNDS_BOUNDS_H
+#include "fx/fx.h"
+#include "snn/model.h"
+#include "scene/scene.h"
+#include <cjson/cJSON.h>
+#include <stdio.h>
+
+typedef enum {
+  SF_BUDGET_RAY,
+  SF_BUDGET_STEP,
+  SF_BUDGET_GRID,
+  SF_BUDGET_FEATURE,
+  SF_BUDGET_DIRECTION,
+  SF_BUDGET_CURRENT,
+  SF_BUDGET_H,
+  SF_BUDGET_CHARGE,
+  SF_BUDGET_MEMBRANE,
+  SF_BUDGET_ARGUMENT,
+  SF_BUDGET_EXP2,
+  SF_BUDGET_EXP2_HIGH,
+  SF_BUDGET_SIGMOID,
+  SF_BUDGET_DENSITY,
+  SF_BUDGET_COLOUR,
+  SF_BUDGET_INTEGRATORS,
+  SF_BUDGET_EXP_NEG,
+  SF_BUDGET_ALPHA,
+  SF_BUDGET_TRANSMITTANCE,
+  SF_BUDGET_PIXEL,
+  SF_BUDGET_BLOCKS
+} sf_budget_id;
+
+/* `bound` is the one of the input with the largest error: some depend on the input (the samples before, the value
+ * itself). `ratio` is the largest error over its own bound; above 1 it refutes the derivation. */
+typedef struct sf_budget_row {
+  const char *block, *unit;
+  const char *bites; /* where it bites, and which width of arch.def buys less of it */
+  bool exhaustive;   /* over every input that can make a difference */
+  double bound, measured, ratio;
+  uint64_t inputs;
+} sf_budget_row;
+
+/* Measures one block: exhaustively, or over `samples` random and adversarial inputs. Deterministic. */
+sf_budget_row sf_budget_measure(sf_budget_id id, uint64_t samples);
+void sf_budget_print(FILE *out, const sf_budget_row *row, int rows);
+cJSON *sf_budget_json(const sf_budget_row *row, int rows);
+
+/* What can be computed in double precision in place of the fixed block; together: the float model. */
+typedef enum {
+  SF_EXACT_LATTICE,  /* unrounded positions and step */
+  SF_EXACT_POSITION, /* cell fractions, corner weights and features unrounded, from the int8 tables */
+  SF_EXACT_ENTRIES,  /* float table entries */
+  SF_EXACT_D1,       /* float weights */
+  SF_EXACT_D2,
+  SF_EXACT_C1,
+  SF_EXACT_C2,
+  SF_EXACT_C3,
+  SF_EXACT_DIRECTION,  /* unrounded spherical harmonics */
+  SF_EXACT_H,          /* no floor behind i >> 3 */
+  SF_EXACT_LEAK,       /* k and theta of the float model */
+  SF_EXACT_MEMBRANE,   /* leak products unrounded, no saturation */
+  SF_EXACT_EXP2,       /* argument and 2^y */
+  SF_EXACT_SIGMOID,    /* argument and logistic function */
+  SF_EXACT_INTEGRATOR, /* both output integrators */
+  SF_EXACT_COMPOSITE,  /* sigma * delta, exp, transmittance */
+  SF_EXACT_BLOCKS
+} sf_exact_id;
+
+typedef struct sf_exact_row {
+  const char *block;
+  double psnr;                   /* dB against the fixed picture; INFINITY when equal */
+  double psnr_truth;             /* dB against the photograph, same rays */
+  uint64_t flips[SF_LAYERS];     /* spikes that differ from the fixed core's at the same position (D1, C1, C2) */
+  uint64_t decisions[SF_LAYERS]; /* neurons * steps * samples looked at */
+} sf_exact_row;
+
+/* One layer's currents, the core's own inputs given: |error| <= sum |x| |dw| + |w| |dx|, in LSB of the current. */
+typedef struct sf_current_row {
+  double bound, measured, ratio; /* as in sf_budget_row */
+  double rms;
+  uint64_t currents;
+} sf_current_row;
+
+enum { SF_EXACT_ROWS = SF_EXACT_BLOCKS + 2 }; /* none, each alone, all */
+typedef struct sf_picture_budget {
+  uint64_t rays, samples;
+  sf_exact_row row[SF_EXACT_ROWS];
+  sf_current_row current[SF_LAYERS];
+} sf_picture_budget;
+
+typedef struct sf_picture_job {
+  const sf_model *model;
+  const fx_scene *scene; /* the plain export of model */
+  const sf_dataset *data;
+  const sf_view *view; /* of data */
+  const char *name;    /* of the scene, for messages */
+  uint64_t rays, seed;
+  bool (*tick)(void *user, int row); /* before each row; false stops; may be NULL */
+  void *user;
+} sf_picture_job;
+/* SF_E_UNSUPPORTED if the scene is not the plain export of this model: other sizes or weights, unknown units. */
+sf_status sf_picture_budget_check(const sf_picture_job *job);
+/* `rays` random pixels of one view (seeded), rendered once per row. The row "none" must be the core's picture bit for
+ * bit, which is checked (SF_E_DIFFERENCE). Makes the check above, too. */
+sf_status sf_picture_budget_make(const sf_picture_job *job, sf_picture_budget *budget);
+void sf_picture_budget_print(FILE *out, const sf_picture_budget *budget);
+cJSON *sf_picture_budget_json(const sf_picture_budget *budget);
+#endif

@@ -1,0 +1,47 @@
+/* Inside src/audit: the fixed-point core once more in double precision, where each block can be the fixed one or the
+ * one of real numbers. All values are in LSB of the fixed formats; with no block exact every bit is the core's. */
+#ifndef SF_BOUNDS_EXACT_H
+#define SF_BOUNDS_EXACT_H
+#include "bounds/bounds.h"
+
+/* Entry of a corner of a cell: bit 0 of `corner` = x + 1, bit 1 = y + 1, bit 2 = z + 1. */
+static inline int64_t sf_exact_entry(const fx_grid *grid, int level, const uint32_t base[3], uint32_t corner)
+{
+  const uint32_t x = base[0] + (corner & 1), y = base[1] + (corner >> 1 & 1), z = base[2] + (corner >> 2 & 1);
+  const uint64_t s = (uint64_t)grid->stride[level], hash = x ^ y * 2654435761u ^ z * 805459861u;
+  return grid->offset[level] + (int64_t)(s ? x + s * y + s * s * z : hash % (1u << grid->log2_size[level]));
+}
+
+/* One choice of blocks. Weights in the units of the integer ones: float weight * LSB of its input / LSB of the current.
+ */
+typedef struct sf_exact {
+  const fx_scene *scene;
+  const sf_model *model;
+  uint32_t mask;                               /* bit per sf_exact_id */
+  double k[SF_LAYERS], theta[SF_LAYERS], step; /* U1.12; membrane LSB; Q0.24 */
+  double *w[SF_LAYERS];                        /* [n_in][SF_LANES], owned */
+} sf_exact;
+
+typedef struct sf_exact_out {
+  double sigma, colour[3];
+  uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
+} sf_exact_out;
+
+static inline bool sf_exact_is(const sf_exact *e, sf_exact_id id)
+{
+  return e->mask >> id & 1;
+}
+
+/* The scene's weights of a layer are the model's, rounded and, where inputs are silent, clipped: a quarter of their
+ * power apart at most. */
+bool sf_exact_resembles(const fx_scene *scene, const sf_model *model, int layer);
+sf_status sf_exact_open(sf_exact *exact, const fx_scene *scene, const sf_model *model, uint32_t mask);
+void sf_exact_close(sf_exact *exact);
+/* pos[3] in Q0.24, f[n_feature] in LSB of the features. */
+void sf_exact_features(const sf_exact *exact, const double pos[3], double *f);
+/* dir[n_dir] in LSB of the direction features, base[SF_LANES] the direction's current into C1. */
+void sf_exact_direction(const sf_exact *exact, const double *dir, double *base);
+void sf_exact_sample(const sf_exact *exact, const double *f, const double *base, sf_exact_out *out);
+/* Transmittance (LSB of Q.20) behind a sample. */
+double sf_exact_behind(const sf_exact *exact, double transmittance, double sigma);
+#endif

@@ -1,0 +1,64 @@
+/* Command lines for the programs of tools/: one table gives parsing, checking and --help. */
+#ifndef SF_CLI_CLI_H
+#define SF_CLI_CLI_H
+#include "base/status.h"
+#include <stdbool.h>
+
+/* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or
+ * what the program itself opens before it works. */
+typedef enum {
+  SF_ARG_FLAG,
+  SF_ARG_INT,
+  SF_ARG_U64,
+  SF_ARG_DOUBLE,
+  SF_ARG_STRING,
+  SF_ARG_INPUT,
+  SF_ARG_OUTPUT,
+  SF_ARG_PLACE,
+  SF_ARG_CHOICE
+} sf_arg_type;
+typedef struct sf_option {
+  const char *name; /* "--beta" */
+  char letter;      /* 'o' for -o, or 0 */
+  sf_arg_type type;
+  void *value;                 /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
+  double min, max;             /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
+  const char *choices;         /* "hybrid|decay|no-decay" */
+  const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)" */
+} sf_option;
+typedef struct sf_cli {
+  const char *program, *usage, *summary, *examples; /* shown by --help */
+  const sf_option *options;                         /* ends with name == NULL */
+  int min_positional, max_positional;
+  bool words; /* the positionals are words, not files or folders that are read */
+} sf_cli;
+
+/* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
+ * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another file of the line
+ * is one. SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores
+ * SIGXFSZ, so that a file-size limit is an ordinary write error. */
+sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
+
+/* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
+ * parsed. */
+sf_status sf_cli_refuse(const sf_cli *cli, int argc, char **argv, const char *const *names, const char *why);
+
+/* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */
+int sf_cli_finish(const sf_cli *cli, sf_status status);
+
+/* SIGINT and SIGTERM set a flag that long loops poll; the second signal kills. */
+void sf_cli_catch_signals(void);
+bool sf_cli_interrupted(void);
+
+/* One self-overwriting line on a terminal's stderr; elsewhere plain lines, at most one per 5 s; nothing when quiet. */
+typedef struct sf_progress {
+  bool terminal, quiet;
+  double last;
+  int width;
+} sf_progress;
+void sf_progress_begin(sf_progress *progress, bool quiet);
+bool sf_progress_due(const sf_progress *progress);
+void sf_progress_show(sf_progress *progress, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void sf_progress_end(sf_progress *progress); /* leaves the last line standing */
+double sf_seconds(void);                     /* monotonic clock */
+#endif

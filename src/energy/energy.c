@@ -1,0 +1,120 @@
+#include "energy/energy.h"
+#include "bounds/saturate.h"
+#include <math.h>
+
+const char *const sf_layer_names[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
+
+const sf_event sf_events[SF_EVENTS] = {
+    {"mac", "MAC", offsetof(fx_layer_counts, mac)},
+    {"sop", "SOP", offsetof(fx_layer_counts, sop)},
+    {"spikes", "spikes", offsetof(fx_layer_counts, spikes)},
+    {"updates", "neuron updates", offsetof(fx_layer_counts, updates)},
+    {"weight", "weight bytes read", offsetof(fx_layer_counts, weight)},
+    {"state_r", "state bytes read", offsetof(fx_layer_counts, state_r)},
+    {"state_w", "state bytes written", offsetof(fx_layer_counts, state_w)},
+    {"special", "special functions", offsetof(fx_layer_counts, special)},
+};
+
+uint64_t sf_event_count(const fx_layer_counts *layer, int event, int step)
+{
+  return ((const uint64_t *)((const char *)layer + sf_events[event].offset))[step];
+}
+
+static uint64_t layer_total(const fx_layer_counts *layer, int event)
+{
+  uint64_t sum = 0;
+  for (int t = 0; t < SF_T_MAX; t++) sum = sf_add_u64(sum, sf_event_count(layer, event, t));
+  return sum;
+}
+
+uint64_t sf_event_total(const fx_counts *counts, int event)
+{
+  uint64_t sum = 0;
+  for (int l = 0; l < SF_LAYERS; l++) sum = sf_add_u64(sum, layer_total(&counts->layer[l], event));
+  return sum;
+}
+
+uint64_t sf_cost_fj(const fx_cost *cost)
+{
+  return sf_add_u64(sf_multiply_u64(cost->macs, SF_MAC_FJ), sf_multiply_u64(cost->sops, SF_SOP_FJ));
+}
+
+fx_cost sf_cost_of(const fx_counts *counts)
+{
+  return (fx_cost){sf_event_total(counts, SF_EVENT_MAC), sf_event_total(counts, SF_EVENT_SOP),
+                   sf_event_total(counts, SF_EVENT_SPIKES)};
+}
+
+uint64_t sf_energy_fj(const fx_counts *counts)
+{
+  const fx_cost cost = sf_cost_of(counts);
+  return sf_cost_fj(&cost);
+}
+
+static uint64_t synapses(const fx_net *net)
+{
+  uint64_t sum = 0;
+  for (int l = 0; l < SF_LAYERS; l++) sum += (uint64_t)net->layer[l].n_in * (uint64_t)net->layer[l].n_out;
+  return sum;
+}
+
+uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples)
+{
+  return sf_multiply_u64(sf_multiply_u64(synapses(net), samples), SF_MAC_FJ);
+}
+
+/* C1 reads [d | h]; h is what the density net puts out beside the density current. */
+static uint64_t direction_synapses(const fx_net *net)
+{
+  const fx_layer *c1 = &net->layer[FX_C1];
+  if (fx_net_decodes(net)) return 0; /* its inputs come with every sample */
+  int n_h = fx_net_h(net);
+  return (uint64_t)(c1->n_in - n_h) * (uint64_t)c1->n_out;
+}
+
+/* round(a * b / c) without losing bits; a <= UINT64_MAX, b <= c. */
+static uint64_t scale_round(uint64_t a, uint64_t b, uint64_t c)
+{
+  __extension__ typedef unsigned __int128 u128;
+  return c == 0 ? 0 : (uint64_t)(((u128)a * b + c / 2) / c);
+}
+
+static uint64_t spiking_neurons(const fx_counts *counts, int event)
+{
+  return sf_add_u64(sf_add_u64(layer_total(&counts->layer[FX_D1], event), layer_total(&counts->layer[FX_C1], event)),
+                    layer_total(&counts->layer[FX_C2], event));
+}
+
+sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *ledger)
+{
+  uint64_t mac = sf_event_total(counts, SF_EVENT_MAC), sop = sf_event_total(counts, SF_EVENT_SOP);
+  uint64_t c1_mac = layer_total(&counts->layer[FX_C1], SF_EVENT_MAC);
+  uint64_t d_mac = sf_multiply_u64(direction_synapses(net), counts->rays);
+  if (d_mac > c1_mac || net->steps < 1)
+    return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
+                   (unsigned long long)c1_mac, (unsigned long long)d_mac);
+  uint64_t h_mac = fx_net_decodes(net) ? 0 : c1_mac - d_mac; /* at every step */
+  uint64_t h_sop =
+      scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
+
+  *ledger = (sf_ledger){.mac_fj = sf_multiply_u64(mac, SF_MAC_FJ), .sop_fj = sf_multiply_u64(sop, SF_SOP_FJ)};
+  ledger->spiking_fj = sf_energy_fj(counts);
+  ledger->h_once_fj =
+      sf_add_u64(sf_multiply_u64(mac - h_mac + h_mac / (uint64_t)net->steps, SF_MAC_FJ), ledger->sop_fj);
+  ledger->h_spikes_fj =
+      sf_add_u64(sf_multiply_u64(mac - h_mac, SF_MAC_FJ), sf_multiply_u64(sf_add_u64(sop, h_sop), SF_SOP_FJ));
+  ledger->ann_fj = sf_energy_ann_fj(net, counts->samples);
+  ledger->ann_hoisted_fj =
+      sf_add_u64(sf_multiply_u64(sf_multiply_u64(synapses(net) - direction_synapses(net), counts->samples), SF_MAC_FJ),
+                 sf_multiply_u64(d_mac, SF_MAC_FJ));
+  if (mac == UINT64_MAX || ledger->spiking_fj == UINT64_MAX || ledger->ann_fj == UINT64_MAX ||
+      ledger->h_spikes_fj == UINT64_MAX || ledger->ann_hoisted_fj == UINT64_MAX)
+    return sf_fail(SF_E_RANGE, "audit: the energy of %llu samples does not fit in 64 bits of fJ; audit fewer views",
+                   (unsigned long long)counts->samples);
+  return sf_ok();
+}
+
+double sf_saving_percent(uint64_t spiking_fj, uint64_t ann_fj)
+{
+  return ann_fj == 0 ? NAN : 100 * (1 - (double)spiking_fj / (double)ann_fj);
+}

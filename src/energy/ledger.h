@@ -1,0 +1,147 @@
+/* What an audit's events cost: the prices of a technology and every ledger side by side. Energies are integer
+ * femtojoules; UINT64_MAX never stands in a ledger (sf_ledgers_make refuses what does not fit in 64 bits). */
+#ifndef SF_ENERGY_LEDGER_H
+#define SF_ENERGY_LEDGER_H
+#include "fx/fx.h"
+#include <cjson/cJSON.h>
+#include <stdio.h>
+
+/* ---- prices ---- */
+
+/* One price of a technology file. `at` is what the price holds for: the width in bits of int_add, the square root of
+ * the product of the operands' widths of int_multiply, the bytes of the memory of sram; 0 of the others. */
+typedef struct sf_price {
+  char key[40]; /* as in the file: "int_add.8" */
+  uint32_t at;
+  uint64_t fj;      /* per operation; of memories per access of 64 bits */
+  char text[40];    /* as in the file: "0.03 pJ" */
+  char source[200]; /* where the number is from */
+} sf_price;
+
+/* The families that every technology has; those with `at` hold at least two points, which are interpolated. */
+typedef enum {
+  SF_PRICE_FP32_MAC,     /* fp32_mac: multiply and add, per MAC */
+  SF_PRICE_FP32_ADD,     /* fp32_add */
+  SF_PRICE_INT_ADD,      /* int_add.BITS: linear in the width */
+  SF_PRICE_INT_MULTIPLY, /* int_multiply.BITS: BITS x BITS; linear in the product of the two widths */
+  SF_PRICE_SRAM,         /* sram.BYTES: power law of the size; a smaller memory costs what the smallest costs */
+  SF_PRICE_DRAM,         /* dram: of whatever is larger than the largest sram */
+  SF_PRICE_FAMILIES
+} sf_price_family;
+extern const char *const sf_price_families[SF_PRICE_FAMILIES]; /* "fp32_mac", ... */
+
+enum { SF_PRICES_MAX = 48 };
+typedef struct sf_technology {
+  char name[40], title[160]; /* "45nm", "45 nm CMOS, 0.9 V" */
+  char path[512];
+  int count;
+  sf_price price[SF_PRICES_MAX]; /* by family, then by `at` */
+} sf_technology;
+
+/* Reads a technology file: docs/energy.md says how to write one. Errors name file, line and key. */
+sf_status sf_technology_load(sf_technology *technology, const char *path);
+/* In fJ, rounded to the nearest; of a byte an eighth of an access. *interpolated (may be NULL) becomes true where no
+ * price of the file is for exactly this; it never becomes false. */
+uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);
+uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bits, bool *interpolated);
+/* Bits of the sum of a layer's inputs: of products of an input and a weight, or of weights alone. */
+int sf_sum_bits(const fx_layer *layer, bool of_products);
+uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
+
+/* ---- events of the ledgers ---- */
+
+/* Rows: the layers, then what happens once per sample or pixel outside of them. */
+enum { SF_ROW_FIELD = SF_LAYERS, SF_ROW_RAY, SF_ROWS };
+extern const char *const sf_row_names[SF_ROWS]; /* "D1" .. "C3", "field" (grid or planes), "ray" (exp(-x), frame) */
+
+/* What is outside the nets: all of it at step 0 of its row. */
+typedef struct sf_traffic {
+  uint64_t table_bytes; /* row field: hash-grid or plane bytes read */
+  uint64_t exp_neg;     /* row ray: exp(-x), one per composited sample */
+  uint64_t frame_bytes; /* row ray: bytes of pixels written, SF_PIXEL_BYTES each */
+} sf_traffic;
+enum { SF_PIXEL_BYTES = 48 }; /* an fx_pixel, as the accelerator writes it */
+
+/* ---- ledgers ---- */
+
+typedef enum {
+  SF_LEDGER_PAPER,      /* MAC and SOP at fp32 prices, nothing else */
+  SF_LEDGER_WIDTH,      /* MAC and SOP at integer prices for the widths of arch.def */
+  SF_LEDGER_MEMORY,     /* + weight, state, table and frame bytes */
+  SF_LEDGER_NEURON,     /* + leak, compare, reset and special functions */
+  SF_LEDGER_ANN,        /* ReLU twin of the same sizes on the same samples: fp32 MACs (baseline of the paper) */
+  SF_LEDGER_INT,        /* the bit-matched integer twin: int8 x int8 + int32 add (baseline of WIDTH) */
+  SF_LEDGER_INT_MEMORY, /* + weight, activation, table and frame bytes (baseline of MEMORY) */
+  SF_LEDGER_INT_ALL,    /* + ReLU and special functions (baseline of NEURON) */
+  SF_LEDGERS
+} sf_ledger_id;
+enum { SF_SPIKING_LEDGERS = SF_LEDGER_ANN };
+
+typedef struct sf_ledger_text {
+  const char *key, *title, *meaning; /* "width", "width-correct", one sentence */
+  int baseline;                      /* sf_ledger_id of the twin under the same assumptions; -1 of a twin */
+} sf_ledger_text;
+extern const sf_ledger_text sf_ledger_texts[SF_LEDGERS];
+
+/* What an energy is spent on. */
+typedef enum {
+  SF_PART_MAC,
+  SF_PART_SOP,
+  SF_PART_WEIGHT,  /* weight bytes */
+  SF_PART_STATE,   /* membranes; activations of the twin */
+  SF_PART_TABLE,   /* grid or plane bytes */
+  SF_PART_FRAME,   /* pixel bytes */
+  SF_PART_NEURON,  /* leak, compare, reset; ReLU of the twin */
+  SF_PART_SPECIAL, /* exp, sigmoid, exp(-x) */
+  SF_PARTS
+} sf_part_id;
+extern const char *const sf_part_names[SF_PARTS];  /* "mac", "sop", "weight", ... */
+extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight bytes", ... */
+
+/* fJ of one event of a row, the same at all steps, and how it comes about. */
+typedef struct sf_unit_price {
+  uint64_t fj;
+  bool interpolated;
+} sf_unit_price;
+
+/* One firing rate at which a spiking ledger costs what a twin does, all layers and steps scaled alike. */
+typedef struct sf_break_even {
+  int ledger, twin; /* sf_ledger_id */
+  double rate;      /* 0..1 and above; NAN: dearer than the twin even without a spike, or nothing depends on spikes */
+} sf_break_even;
+enum { SF_BREAK_EVENS = SF_SPIKING_LEDGERS + 1 }; /* each against its own baseline, NEURON against the fp32 twin too */
+
+/* One price halved and raised by half: the savings that come out, percent. */
+typedef struct sf_sensitivity {
+  int price;                                                 /* index in technology->price */
+  double less[SF_SPIKING_LEDGERS], more[SF_SPIKING_LEDGERS]; /* saving at 0.5 and 1.5 times the price */
+  double swing; /* largest |change| of the saving of any ledger, percentage points; the list is sorted by it */
+  int ledger;   /* where the largest is */
+} sf_sensitivity;
+
+typedef struct sf_ledgers {
+  sf_technology technology;
+  int steps;
+  uint64_t cell[SF_LEDGERS][SF_ROWS][SF_T_MAX]; /* fJ; of the twins and of rows field and ray all at step 0 */
+  uint64_t part[SF_LEDGERS][SF_PARTS];          /* the same energy by what it is spent on */
+  uint64_t total[SF_LEDGERS];                   /* sum of the cells = sum of the parts */
+  double saving[SF_LEDGERS];                    /* percent against the baseline; NAN of twins and where that is 0 */
+  sf_unit_price unit[SF_LEDGERS][SF_ROWS][SF_PARTS]; /* 0 where the ledger does not price the part */
+  bool interpolated[SF_LEDGERS];
+  double rate; /* measured firing rate of the spiking layers, all steps; 0 without any */
+  sf_break_even break_even[SF_BREAK_EVENS];
+  int sensitivities;
+  sf_sensitivity sensitivity[SF_PRICES_MAX]; /* largest swing first */
+} sf_ledgers;
+
+/* All of it. SF_E_RANGE when an energy does not fit in 64 bits. table_bytes of memory: what the grid's (or planes')
+ * tables take; it chooses their price. */
+sf_status sf_ledgers_make(const sf_technology *technology, const fx_net *net, const fx_counts *counts,
+                          const sf_traffic *traffic, uint64_t table_size, sf_ledgers *ledgers);
+
+/* Terminal: the ledgers as a table, savings, break-even rates, sensitivity. views: whole views that the counts cover.
+ */
+void sf_ledgers_print(FILE *out, const sf_ledgers *ledgers, double views);
+cJSON *sf_ledgers_json(const sf_ledgers *ledgers, double views);
+
+#endif

@@ -1,0 +1,77 @@
+/* The third, independent count: what the events of one sample must have been, from its spike bitmaps and the sizes of
+ * the net alone. It mirrors the definitions in fx.h, not the code of src/fx. */
+#include "energy/energy.h"
+
+enum { SPIKING_STATE_BYTES = 3, INTEGRATOR_STATE_BYTES = 4 };
+
+static uint64_t fired(const uint64_t bitmap[SF_SPIKE_WORDS])
+{
+  uint64_t neurons = 0;
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) neurons += (uint64_t)__builtin_popcountll(bitmap[word]);
+  return neurons;
+}
+
+static void count_state(fx_layer_counts *c, int t, uint64_t neurons, uint64_t bytes)
+{
+  c->updates[t] += neurons;
+  c->state_w[t] += neurons * bytes;
+  /* cppcheck-suppress arrayIndexOutOfBoundsCond ; t < steps <= SF_T_MAX, checked by fx_scene_check */
+  if (t > 0) c->state_r[t] += neurons * bytes;
+}
+
+static void count_mac(fx_layer_counts *c, int t, int n_in, int n_out)
+{
+  uint64_t products = (uint64_t)n_in * (uint64_t)n_out;
+  c->mac[t] += products;
+  c->weight[t] += products;
+}
+
+/* D2, C3 keep what a row added for the later steps: a weight row is read when its neuron fires for the first time. */
+static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE_WORDS],
+                               uint64_t seen[SF_SPIKE_WORDS], uint64_t n_out, uint64_t integrators)
+{
+  uint64_t new_rows[SF_SPIKE_WORDS];
+  for (int word = 0; word < SF_SPIKE_WORDS; word++) new_rows[word] = in[word] & ~seen[word], seen[word] |= in[word];
+  c->sop[t] += fired(in) * n_out;
+  c->weight[t] += fired(new_rows) * n_out;
+  c->special[t] += integrators;
+  count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
+}
+
+/* A row of biases is read, but it is no MAC and no SOP. */
+static void count_bias(fx_layer_counts *c, int t, const fx_layer *layer)
+{
+  if (layer->bias) c->weight[t] += (uint64_t)layer->n_out;
+}
+
+void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
+                       fx_counts *counts)
+{
+  const fx_layer *size = net->layer;
+  fx_layer_counts *c = counts->layer;
+  uint64_t seen_d1[SF_SPIKE_WORDS] = {0}, seen_c2[SF_SPIKE_WORDS] = {0};
+  const bool decodes = fx_net_decodes(net);
+
+  counts->samples++;
+  counts->rays += first_of_ray && !decodes;
+  count_mac(&c[FX_D1], 0, size[FX_D1].n_in, size[FX_D1].n_out);
+  if (first_of_ray || decodes) {
+    count_mac(&c[FX_C1], 0, fx_net_constants(net), size[FX_C1].n_out);
+    count_bias(&c[FX_C1], 0, &size[FX_C1]);
+  }
+  count_bias(&c[FX_C3], 0, &size[FX_C3]);
+  for (int t = 0; t < net->steps; t++) {
+    for (int l = FX_D1; l <= FX_C2; l++) {
+      if (l == FX_D2) continue;
+      c[l].spikes[t] += fired(spikes[l][t]);
+      count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
+    }
+    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, !decodes);
+    count_bias(&c[FX_C2], t, &size[FX_C2]);
+    count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
+    uint64_t c2_sop = fired(spikes[FX_C1][t]) * (uint64_t)size[FX_C2].n_out;
+    c[FX_C2].sop[t] += c2_sop;
+    c[FX_C2].weight[t] += c2_sop;
+    count_output_layer(&c[FX_C3], t, spikes[FX_C2][t], seen_c2, (uint64_t)size[FX_C3].n_out, 3);
+  }
+}

@@ -1,0 +1,69 @@
+/* Models only what a scene needs: searches the smallest trim (quant.h) of a quantised scene whose pictures of the
+ * training views lose at most a stated number of decibels. */
+#ifndef SF_FIT_FIT_H
+#define SF_FIT_FIT_H
+#include "energy/energy.h"
+#include "quant/quant.h"
+
+/* Rays through random pixels of a data set's views and the colours that they should have. */
+typedef struct sf_fit_rays {
+  uint64_t count;
+  double pixels;             /* mean pixels of a view: a frame */
+  float *origin, *direction; /* [count][3] model units, owned */
+  uint32_t *target;          /* [count][3] Q0.16, 65535 = 1.0, over the background; owned */
+} sf_fit_rays;
+/* background: of the scene, Q0.16. Refuses a view without a picture, naming it. */
+sf_status sf_fit_rays_draw(sf_fit_rays *rays, const sf_dataset *data, const int32_t background[3], uint64_t count,
+                           uint64_t seed);
+void sf_fit_rays_free(sf_fit_rays *rays);
+
+/* Rays begin..end-1 through the core on all threads. Integer sums: they do not depend on the threads.
+ * picture: [end - begin][3] Q0.16, or NULL. */
+typedef struct sf_fit_sum {
+  uint64_t error; /* squared difference from the targets, Q0.32, all channels */
+  fx_counts counts;
+} sf_fit_sum;
+sf_status sf_fit_measure(const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin, uint64_t end,
+                         uint32_t *picture, sf_fit_sum *sum);
+/* Adds what rays begin..end-1 use. places false: in the nets alone; the loss of leaving places out can then be measured
+ * on these rays. */
+sf_status sf_fit_observe(const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin, uint64_t end, bool places,
+                         sf_trim_use *use);
+
+typedef struct sf_fit_job {
+  const fx_scene *const *candidate; /* quantisations of one model; [0] is the reference, then narrower and narrower */
+  const sf_quant_widths *widths;    /* [candidates], no zeros */
+  int candidates;                   /* the last one that loses at most half of loss_db is trimmed */
+  const sf_fit_rays *rays;
+  double loss_db; /* >= 0; 0: only what changes no bit on the rays */
+  const char *name;
+  bool (*tick)(void *user, const char *what, int done,
+               int total); /* false stops; what is NULL between reports; may be NULL */
+  void *user;
+} sf_fit_job;
+
+/* A scene's sizes, and what the checking rays cost and lose. */
+typedef struct sf_fit_state {
+  int32_t n_in[SF_LAYERS], n_out[SF_LAYERS];
+  int32_t levels, directions, steps, trans_stop;
+  sf_quant_widths widths;
+  int64_t entries, zero_entries, cells;
+  uint64_t bytes;             /* grid tables, weights, occupancy: what a memory has to hold */
+  uint64_t cycles, energy_fj; /* of sum */
+  sf_fit_sum sum;
+  double psnr; /* dB against the pictures */
+} sf_fit_state;
+
+typedef struct sf_fit_report {
+  int chosen;                                /* candidate */
+  uint64_t observed, first_checked, checked; /* rays whose use was observed; those that the loss was measured on */
+  double pixels;                             /* of a frame */
+  double bound_db, loss_db; /* loss_db: reference against result, negative where the result is better */
+  sf_fit_state before, after;
+  int silent[SF_LAYERS], dropped[SF_LAYERS]; /* neurons without effect on the observed rays; further ones, at a loss */
+  int idle_levels, dropped_levels, smaller_tables;
+} sf_fit_report;
+sf_status sf_fit(fx_scene *fitted, const sf_fit_job *job, sf_fit_report *report);
+void sf_fit_print(FILE *out, const sf_fit_report *report);
+cJSON *sf_fit_json(const sf_fit_report *report);
+#endif

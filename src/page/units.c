@@ -1,0 +1,114 @@
+/* What one event costs in each ledger: the effective prices, the widths and memories that they come from. */
+#include "page/internal.h"
+#include <string.h>
+
+/* How the price of an event came about; widths as in docs/energy.md. */
+static void width_basis(FILE *out, const fx_net *net, int row, int part)
+{
+  const bool integrates = row == FX_D2 || row == FX_C3;
+  const int state = row == FX_D2 ? SF_SIGMA_BITS : row == FX_C3 ? SF_COLOUR_BITS : SF_MEMBRANE_BITS;
+  switch (part) {
+  case SF_PART_MAC:
+    if (row == FX_D1 || row == FX_C1)
+      fprintf(out, "%d \xc3\x97 %d bits, sum of %d; ", SF_INPUT_BITS, SF_WEIGHT_BITS,
+              sf_sum_bits(&net->layer[row], true));
+    fprintf(out, "twin 8 \xc3\x97 %d, sum of 32", SF_WEIGHT_BITS);
+    break;
+  case SF_PART_SOP:
+    fprintf(out, "sum of %d bits", sf_sum_bits(&net->layer[row], false));
+    break;
+  case SF_PART_NEURON:
+    fprintf(out, "%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
+            integrates ? "leak of an integrator" : "leak, compare, reset", state);
+    break;
+  default:
+    fprintf(out, "two products, two additions and two reads of a table of 1028 bytes");
+  }
+}
+
+static void memory(FILE *out, const sf_technology *t, uint64_t bytes)
+{
+  uint64_t largest = 0;
+  char text[HTML_NUMBER];
+  for (int i = 0; i < t->count; i++)
+    if (!strncmp(t->price[i].key, "sram.", 5) && t->price[i].at > largest) largest = t->price[i].at;
+  fprintf(out, "%s of %s bytes", bytes > largest ? "DRAM, for a table" : "SRAM", html_count(text, bytes));
+}
+
+static void basis(FILE *out, const sf_page *page, int row, int part)
+{
+  const fx_net *net = page->report->net;
+  const sf_technology *t = &page->report->ledgers.technology;
+  char text[HTML_NUMBER];
+  if (part == SF_PART_FRAME) {
+    fprintf(out, "DRAM");
+  } else if (part == SF_PART_TABLE) {
+    memory(out, t, sf_table_size(page->scene));
+  } else if (part == SF_PART_WEIGHT) {
+    memory(out, t, (uint64_t)net->layer[row].n_in * (uint64_t)net->layer[row].n_out);
+  } else if (part == SF_PART_STATE) {
+    memory(out, t, 4 * (uint64_t)net->layer[row].n_out);
+    fprintf(out, "; twin %s", html_count(text, (uint64_t)net->layer[row].n_out));
+  } else {
+    width_basis(out, net, row, part);
+  }
+}
+
+/* Whether any event of this kind was counted, in the net or in its twin. */
+static bool counted(const sf_page *page, int row, int part)
+{
+  const sf_ledgers *l = &page->report->ledgers;
+  const fx_counts *c = &page->report->measure.core;
+  if (l->unit[SF_LEDGER_NEURON][row][part].fj == 0 && l->unit[SF_LEDGER_INT_ALL][row][part].fj == 0) return false;
+  if (row >= SF_LAYERS) return true;
+  if (part == SF_PART_SOP) return row == FX_D2 || row == FX_C2 || row == FX_C3;
+  if (part == SF_PART_SPECIAL) return c->layer[row].special[0] > 0;
+  return true;
+}
+
+/* The layers of spikes have no MAC, the twin has no SOP and keeps nothing of its output. */
+static bool happens(int ledger, int row, int part)
+{
+  const bool of_spikes = row == FX_D2 || row == FX_C2 || row == FX_C3;
+  if (ledger < SF_SPIKING_LEDGERS) return part != SF_PART_MAC || !of_spikes;
+  return part != SF_PART_SOP && (row != FX_C3 || (part != SF_PART_STATE && part != SF_PART_NEURON));
+}
+
+static void unit(FILE *out, const sf_page *page, int ledger, int row, int part)
+{
+  const sf_unit_price *u = &page->report->ledgers.unit[ledger][row][part];
+  char key[80];
+  snprintf(key, sizeof key, "ledgers.list[%d].rows[%d].unit_fj.%s", ledger, row, sf_part_names[part]);
+  fprintf(out, "<td class=\"n\">");
+  if (u->fj == 0 || !happens(ledger, row, part)) {
+    fprintf(out, "\xe2\x80\x93</td>");
+    return;
+  }
+  html_put_count(out, key, u->fj);
+  fprintf(out, "%s</td>", u->interpolated ? "*" : "");
+}
+
+void html_units(FILE *out, const sf_page *page)
+{
+  static const int column[] = {SF_LEDGER_PAPER, SF_LEDGER_ANN, SF_LEDGER_NEURON, SF_LEDGER_INT_ALL};
+  fprintf(out,
+          "<div class=\"scroll\"><table id=\"table-units\"><caption>What one event costs, in fJ</caption>\n<thead><tr>"
+          "<th>event</th><th class=\"n\">paper</th><th class=\"n\">its ReLU twin</th><th class=\"n\">the other "
+          "ledgers</th><th class=\"n\">their ReLU twin</th><th>widths, memory</th></tr></thead>\n<tbody>\n");
+  for (int p = 0; p < SF_PARTS; p++)
+    for (int r = 0; r < SF_ROWS; r++) {
+      if (!counted(page, r, p)) continue;
+      fprintf(out, "<tr><th>%s, %s</th>", sf_part_titles[p], sf_row_names[r]);
+      for (int i = 0; i < 4; i++) unit(out, page, column[i], r, p);
+      fprintf(out, "<td>");
+      basis(out, page, r, p);
+      fprintf(out, "</td></tr>\n");
+    }
+  fprintf(
+      out,
+      "</tbody></table></div>\n<p class=\"note\">The width-correct ledger has MAC and SOP of the last two columns of "
+      "prices, + memory the "
+      "bytes as well, + neuron updates all. * interpolated between prices of the list above. A memory smaller than the "
+      "smallest of the list costs what the smallest costs. A byte is "
+      "priced as an eighth of an access of 64 bits to the memory that the row names.</p>\n");
+}

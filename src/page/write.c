@@ -1,0 +1,138 @@
+/* Text, numbers and pictures as HTML. */
+#include "page/internal.h"
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NARROW "\xe2\x80\xaf" /* U+202F, a space that does not break and does not tear digits apart */
+
+const char *html_count(char text[HTML_NUMBER], uint64_t value)
+{
+  char digits[24];
+  const int n = snprintf(digits, sizeof digits, "%" PRIu64, value);
+  size_t used = 0;
+  for (int i = 0; i < n; i++) {
+    if (i > 0 && (n - i) % 3 == 0) memcpy(text + used, NARROW, 3), used += 3;
+    text[used++] = digits[i];
+  }
+  text[used] = 0;
+  return text;
+}
+
+/* Four significant digits, plain. */
+static const char *digits4(double value)
+{
+  const double size = fabs(value);
+  return size >= 999.95 ? "%.0f" : size >= 99.995 ? "%.1f" : size >= 9.9995 ? "%.2f" : "%.3f";
+}
+
+const char *html_energy(char text[HTML_NUMBER], double fj)
+{
+  static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
+  int i = 0;
+  while (i + 1 < 7 && fabs(fj) >= 999.95) fj /= 1000, i++;
+  char format[16];
+  snprintf(format, sizeof format, "%s %%s", digits4(fj));
+  snprintf(text, HTML_NUMBER, format, fj, unit[i]);
+  return text;
+}
+
+const char *html_percent(char text[HTML_NUMBER], double percent)
+{
+  if (!isfinite(percent))
+    snprintf(text, HTML_NUMBER, "-");
+  else
+    snprintf(text, HTML_NUMBER, "%s%.1f %%", percent < 0 ? "\xe2\x88\x92" : "", fabs(percent));
+  return text;
+}
+
+const char *html_tenths(char text[HTML_NUMBER], double value)
+{
+  snprintf(text, HTML_NUMBER, "%s%.1f", value < 0 ? "\xe2\x88\x92" : "", fabs(value));
+  return text;
+}
+
+void html_put_count(FILE *out, const char *key, uint64_t value)
+{
+  char text[HTML_NUMBER];
+  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, value, html_count(text, value));
+}
+
+void html_put_energy(FILE *out, const char *key, uint64_t fj)
+{
+  char text[HTML_NUMBER];
+  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, fj, html_energy(text, (double)fj));
+}
+
+void html_put_energy_in(FILE *out, const char *key, uint64_t fj, uint64_t top)
+{
+  static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
+  double scale = 1;
+  int i = 0;
+  for (; i < 6 && (double)top / scale >= 999.95; i++) scale *= 1000;
+  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%.*f %s</data>", key, fj, i ? 3 : 0, (double)fj / scale,
+          unit[i]);
+}
+
+void html_put_saving(FILE *out, const char *key, double saving)
+{
+  if (!isfinite(saving)) {
+    fprintf(out, "no saving is defined");
+    return;
+  }
+  fprintf(out, "<b class=\"%s\"><data data-key=\"%s\" value=\"%.17g\">%.1f %% %s</data></b>",
+          saving < 0 ? "bad" : "good", key, saving, fabs(saving), saving < 0 ? "more" : "saved");
+}
+
+void html_put_real(FILE *out, const char *key, double value, const char *format)
+{
+  if (!isfinite(value)) {
+    fprintf(out, "-");
+    return;
+  }
+  fprintf(out, "<data data-key=\"%s\" value=\"%.17g\">", key, value);
+  if (value < 0) fputs("\xe2\x88\x92", out);
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+  fprintf(out, format, fabs(value));
+#pragma GCC diagnostic pop
+  fprintf(out, "</data>");
+}
+
+static void base64(FILE *out, const uint8_t *data, size_t size)
+{
+  static const char letter[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  for (size_t i = 0; i < size; i += 3) {
+    const size_t left = size - i;
+    const uint32_t three =
+        (uint32_t)data[i] << 16 | (left > 1 ? (uint32_t)data[i + 1] << 8 : 0) | (left > 2 ? (uint32_t)data[i + 2] : 0);
+    fputc(letter[three >> 18], out), fputc(letter[three >> 12 & 63], out);
+    fputc(left > 1 ? letter[three >> 6 & 63] : '=', out), fputc(left > 2 ? letter[three & 63] : '=', out);
+  }
+}
+
+sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, const uint8_t *palette, int colours,
+                       const char *alt)
+{
+  void *data;
+  size_t size;
+  SF_TRY(sf_png_encode(pixel, width, height, palette, colours, &data, &size));
+  fprintf(out, "<img width=\"%d\" height=\"%d\"%s alt=\"", width, height, width <= 320 ? " class=\"coarse\"" : "");
+  sf_xml_escape(out, alt);
+  fprintf(out, "\" src=\"data:image/png;base64,");
+  base64(out, data, size);
+  fprintf(out, "\"/>\n");
+  free(data);
+  return sf_ok();
+}
+
+void html_figure_begin(FILE *out, const char *id, const char *style, const char *title, const char *caption)
+{
+  fprintf(out, "<figure id=\"%s\" class=\"%s\">\n<figcaption><b>%s</b> %s</figcaption>\n", id, style, title, caption);
+}
+
+void html_figure_end(FILE *out)
+{
+  fprintf(out, "</figure>\n");
+}
