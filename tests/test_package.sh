@@ -32,7 +32,7 @@ _Static_assert(SF_REG_ID_RESET == SF_CSR_ID_RESET && SF_REG_CONFIG_RESET == SF_C
 SOURCE
 # shellcheck disable=SC2086
 header() { # FOLDER that holds rtl/
-  "$cc" -std=c11 $strict -I"$1" -I. -Iinclude "$work/header.c" 2>"$work/out"
+  "$cc" -std=c11 $strict -I"$1" -I. -Iinclude -Isrc "$work/header.c" 2>"$work/out"
 }
 header . || fail "sf_csr.h and csr.def differ: $(grep -m 1 error "$work/out")"
 

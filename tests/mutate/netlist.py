@@ -167,7 +167,7 @@ def program(unit, work, chunk, build):
           f"{work}/{module}.v"], f"{work}/verilator.log")
     call(["make", "-s", "-C", made, "-f", f"V{module}.mk", "OPT_FAST=-O2", f"V{module}__ALL.a"], f"{work}/make.log")
     call(["gcc", "-O2", "-c", "tests/mutate/mutant.c", "-o", f"{work}/mutant.o"], f"{work}/gcc.log")
-    includes = ["-Iinclude", "-I."]
+    includes = ["-Iinclude", "-Isrc", "-I."]
     for path in (f"{root}/include", f"{root}/include/vltstd", made):
         includes += ["-isystem", path]
     path = os.path.abspath(f"{work}/checker")
