@@ -1,6 +1,7 @@
 /* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware; writes vectors
  * of a scene for any simulator, its traces and graphs for other tools. */
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "fit/fit.h"
 #include "quant/quant.h"
 #include "tools/export/extras.h"

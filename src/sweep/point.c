@@ -1,6 +1,6 @@
 /* One point of a sweep: a model at some widths against its float field and against the picture. */
 #include "energy/energy.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "golden/golden.h"
 #include "sweep/sweep.h"
 #include <math.h>
