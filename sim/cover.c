@@ -35,15 +35,15 @@ static void hit(uint64_t *bin)
 
 static bool at_rail(int layer, int32_t v)
 {
-  if (layer == FX_D2) return v == (1 << SF_SIGMA_BITS) - 1;
-  if (layer == FX_C3) return v == (1 << SF_COLOUR_BITS) - 1;
-  return v == (1 << (SF_MEMBRANE_BITS - 1)) - 1 || v == -(1 << (SF_MEMBRANE_BITS - 1));
+  const int bits = fx_layer_table[layer].state_bits;
+  if (!fx_layer_fires(layer)) return v == (1 << bits) - 1;
+  return v == (1 << (bits - 1)) - 1 || v == -(1 << (bits - 1));
 }
 
 static void cover_beat(sf_cover *cover, const fx_net *net, const fx_trace *core, const sf_dut_result *result, int l,
                        int t)
 {
-  const bool spiking = l != FX_D2 && l != FX_C3;
+  const bool spiking = fx_layer_fires(l);
   const int n = l == FX_D2 ? 1 : net->layer[l].n_out;
   bool rail = false;
   for (int o = 0; o < n && !rail; o++) rail = at_rail(l, core->membrane[l][t][o]);
@@ -60,9 +60,9 @@ void sf_cover_sample(const fx_net *net, const fx_trace *core, const sf_dut_resul
   sf_cover *cover = sf_cover_open();
   if (!cover) return;
   hit(&cover->steps[net->mode][net->steps - 1]);
-  const bool decodes = fx_net_decodes(net), biased = net->layer[FX_C2].bias != 0;
-  hit(&cover->inputs[decodes][biased]);
-  for (int l = decodes ? FX_C1 : FX_D1; l < SF_LAYERS; l++)
+  const bool per_sample = fx_net_constants_per_sample(net), biased = net->layer[FX_C2].bias != 0;
+  hit(&cover->inputs[per_sample][biased]);
+  for (int l = fx_net_first_layer(net); l < SF_LAYERS; l++)
     for (int t = 0; t < net->steps; t++) cover_beat(cover, net, core, result, l, t);
   sf_cover_close(cover);
 }

@@ -2,6 +2,7 @@
 #include "sim/jobs.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "base/io.h"
 #include "quant/quant.h"
 #include "base/rng.h"

@@ -7,7 +7,7 @@
 void sf_difference_text(const sf_difference *d, char text[200])
 {
   char layer[48] = "", neuron[32] = "";
-  if (d->layer >= 0) snprintf(layer, sizeof layer, "layer %s step %d ", sf_layer_names[d->layer], d->step);
+  if (d->layer >= 0) snprintf(layer, sizeof layer, "layer %s step %d ", fx_layer_name(d->layer), d->step);
   if (d->neuron >= 0) snprintf(neuron, sizeof neuron, "neuron %d ", d->neuron);
   snprintf(text, 200, "%s%s%s: expected %" PRId64 ", actual %" PRId64 ", cycle %" PRIu64, layer, neuron, d->wire,
            d->expected, d->actual, d->cycle);
@@ -35,7 +35,7 @@ static void add_place(const sf_lockstep *l, cJSON *json)
   cJSON_AddNumberToObject(json, "y", p.y);
   sf_json_add_u64(json, "sample", where->sample);
   cJSON_AddBoolToObject(json, "sample_exact", where->exact);
-  if (d->layer >= 0) cJSON_AddStringToObject(json, "layer", sf_layer_names[d->layer]);
+  if (d->layer >= 0) cJSON_AddStringToObject(json, "layer", fx_layer_name(d->layer));
   if (d->layer >= 0) cJSON_AddNumberToObject(json, "step", d->step);
   if (d->neuron >= 0) cJSON_AddNumberToObject(json, "neuron", d->neuron);
   cJSON_AddStringToObject(json, "wire", d->wire ? d->wire : "result");

@@ -32,8 +32,6 @@ static int pack_all(uint64_t *words, const int16_t *value, int n)
 
 int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words)
 {
-  const int n_dir = fx_net_constants(net);
-  if (fx_net_decodes(net)) return pack_all(words, sample->f, n_dir);
-  const int beats = sample->first ? pack_all(words, sample->ray->dir, n_dir) : 0;
-  return beats + pack_all(words + beats, sample->f, net->layer[FX_D1].n_in);
+  const int beats = sample->first ? pack_all(words, sample->ray->dir, fx_net_harmonics(net)) : 0;
+  return beats + pack_all(words + beats, sample->f, fx_net_inputs(net));
 }

@@ -33,7 +33,7 @@ static void offer(run *r)
   if (r->beat == 0) r->beats = sf_dut_packet(&r->dut->net, &r->sample[r->sent], r->packet);
   in->s_valid = true;
   in->s_data = r->packet[r->beat];
-  in->s_user = r->beat == 0 && (r->sample[r->sent].first || fx_net_decodes(&r->dut->net));
+  in->s_user = r->beat == 0 && (r->sample[r->sent].first || fx_net_constants_per_sample(&r->dut->net));
   in->s_last = r->beat == r->beats - 1;
 }
 
@@ -86,15 +86,10 @@ static int32_t membrane_lane(const uint32_t *packed, int lane)
   return (int32_t)((uint32_t)(pair >> shift) << (32 - SF_MEMBRANE_BITS)) >> (32 - SF_MEMBRANE_BITS);
 }
 
-static bool is_spiking(int layer)
-{
-  return layer != FX_D2 && layer != FX_C3;
-}
-
 static int taps_per_sample(const run *r, int layer)
 {
-  if (r->dut->net.layer[layer].n_out == 0) return 0;
-  return is_spiking(layer) ? r->dut->net.steps : 1;
+  const fx_net *net = &r->dut->net;
+  return net->layer[layer].n_out == 0 ? 0 : fx_layer_outputs(layer, net->steps);
 }
 
 static sf_status observe(run *r)
@@ -112,10 +107,10 @@ static sf_status observe(run *r)
   r->result[at].tap_cycle[l][t] = r->dut->cycle;
   r->result[at].stalled[l][t] = r->dut->stall_cycle > r->tap_cycle[l];
   r->tap_cycle[l] = r->dut->cycle;
-  if (is_spiking(l)) memcpy(r->result[at].spikes[l][t], out->tap_spikes, sizeof out->tap_spikes);
+  if (fx_layer_fires(l)) memcpy(r->result[at].spikes[l][t], out->tap_spikes, sizeof out->tap_spikes);
   if (!r->trace) return sf_ok();
   memcpy(r->trace[at].rows[l][t], out->tap_rows, sizeof out->tap_rows);
-  for (int lane = 0; is_spiking(l) && lane < SF_LANES; lane++)
+  for (int lane = 0; fx_layer_fires(l) && lane < SF_LANES; lane++)
     r->trace[at].membrane[l][t][lane] = membrane_lane(out->tap_membrane, lane);
   return sf_ok();
 }

@@ -6,7 +6,7 @@
 #include "bench.h"
 #include "base/amx.h"
 #include "float_fixture.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "base/io.h"
 #include "src/fx/core.h"
 #include "train/internal.h"

@@ -3,7 +3,7 @@
 #include "bench_rig.h"
 #include "base/memory.h"
 #include "sim/ray/three_counts.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "quant/quant.h"
 #include "base/rng.h"
 #include <math.h>

@@ -1,7 +1,7 @@
 /* The Verilated accelerator: simulation speed, cycles per sample at a firing rate, utilisation. */
 #include "bench.h"
 #include "bench_rig.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "sim/dut.h"
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #include "bench.h"
 #include "base/memory.h"
 #include "render/view.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "base/rng.h"
 #include "train/vm.h"
 #include <math.h>

@@ -26,7 +26,7 @@ static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64
   const uint64_t wanted[2] = {t0, t1};
   for (int t = 0; t < SF_T_MAX; t++) {
     uint64_t value = sf_event_count(&c->layer[layer], event, t);
-    ck_assert_msg(value == (t < 2 ? wanted[t] : 0), "%s %s step %d: %llu", sf_layer_names[layer], sf_events[event].name,
+    ck_assert_msg(value == (t < 2 ? wanted[t] : 0), "%s %s step %d: %llu", fx_layer_name(layer), sf_events[event].name,
                   t, (unsigned long long)value);
   }
 }
@@ -208,7 +208,7 @@ START_TEST(comparison_names_each_planted_difference)
         ((uint64_t *)((char *)&b.layer[l] + sf_events[e].offset))[t] = UINT64_MAX;
         sf_status status = sf_counts_compare(&a, "left", &b, "right");
         snprintf(expected, sizeof expected, "%s of layer %s at step %d: left %llu, right %llu", sf_events[e].title,
-                 sf_layer_names[l], t, (unsigned long long)UINT64_MAX - 1, (unsigned long long)UINT64_MAX);
+                 fx_layer_name(l), t, (unsigned long long)UINT64_MAX - 1, (unsigned long long)UINT64_MAX);
         ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
         ck_assert_str_eq(status.message, expected);
       }

@@ -69,7 +69,6 @@ static fx_core *open_core(const fx_scene *scene, const char *name)
 
 static void compare_sample(const fx_net *net, const fx_block *b, int i, const char *name, uint64_t seed)
 {
-  static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   fx_events events;
   fx_out out;
   int32_t base[SF_LANES];
@@ -77,9 +76,9 @@ static void compare_sample(const fx_net *net, const fx_block *b, int i, const ch
   fx_net_events(net, b->f[i], fx_net_decodes(net) ? base : b->base[i], &out, &events, NULL);
   for (int t = 0; t < net->steps; t++)
     for (int l = 0; l < FX_SPIKING; l++)
-      ck_assert_msg(!memcmp(events.spikes[spiking[l]][t], b->spikes[l][t][i], sizeof b->spikes[l][t][i]),
+      ck_assert_msg(!memcmp(events.spikes[fx_spiking_layers[l]][t], b->spikes[l][t][i], sizeof b->spikes[l][t][i]),
                     "%s, scene %llu, sample %d of %d: spikes of layer %d at step %d", name, (unsigned long long)seed, i,
-                    b->n, spiking[l], t);
+                    b->n, fx_spiking_layers[l], t);
   ck_assert_msg(!memcmp(&out, &b->out[i], sizeof out), "%s, scene %llu, sample %d of %d: output", name,
                 (unsigned long long)seed, i, b->n);
   for (int l = 0; l < SF_LAYERS; l++)

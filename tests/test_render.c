@@ -165,7 +165,7 @@ START_TEST(packets_equal_the_oracle)
   for (int r = 0; r < RAYS; r++) {
     sf_march march = sf_march_begin(&m, &steps, o + 3 * r, d + 3 * r, 0.5f);
     float x[3], transmittance = 1, out[3] = {0};
-    for (int n = 0; (n = sf_march_next(&march, n, x)) >= 0 && transmittance >= 1e-4f; n++) {
+    for (int n = 0; (n = sf_march_next(&march, n, x)) >= 0 && transmittance >= sf_opaque; n++) {
       float f[32], sh[16], sigma[8], colour[24];
       sf_grid_features(&m, x, f);
       sf_sh4(d + 3 * r, sh);

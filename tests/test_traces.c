@@ -56,9 +56,9 @@ static void ck_group(expectation *e, int l, int t, char **rest)
     const long v = strtol(*rest, rest, 10);
     const int32_t expected = e->trace.membrane[l][t][n] - (fired ? e->net->layer[l].theta : 0);
     if (*(*rest)++ != ',' || v != expected)
-      ck_abort_msg("%s.%d at %llu: %ld instead of %d", sf_layer_names[l], n, e->now, v, expected);
+      ck_abort_msg("%s.%d at %llu: %ld instead of %d", fx_layer_name(l), n, e->now, v, expected);
     if (!fired) continue;
-    snprintf(text, sizeof text, "%s.%d,%llu\n", sf_layer_names[l], n, e->now);
+    snprintf(text, sizeof text, "%s.%d,%llu\n", fx_layer_name(l), n, e->now);
     if (!fgets(line, sizeof line, e->spikes) || strcmp(line, text)) ck_abort_msg("no line %s", text);
     e->spike_lines++;
   }
@@ -90,7 +90,7 @@ static void ck_headers(expectation *e)
   int at = snprintf(expected, LINE, "timestep,");
   for (int g = 0; g < 3; g++)
     for (int n = 0; n < e->net->layer[group[g]].n_out; n++)
-      at += snprintf(expected + at, (size_t)(LINE - at), "neuron %s.%d,", sf_layer_names[group[g]], n);
+      at += snprintf(expected + at, (size_t)(LINE - at), "neuron %s.%d,", fx_layer_name(group[g]), n);
   next_line(e->potentials, line);
   line[strcspn(line, "\n")] = 0;
   ck_assert_str_eq(line, expected);

@@ -1,6 +1,7 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
 #include "energy/energy.h"
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "page/page.h"
 #include "base/io.h"
 #include "sim/audit_run.h"

@@ -5,6 +5,7 @@
 #include "sim/other_dut.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "base/io.h"
 #include <inttypes.h>
 #include <stdlib.h>

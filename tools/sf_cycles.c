@@ -119,8 +119,6 @@ static double ratio(uint64_t a, uint64_t b)
   return b ? (double)a / (double)b : 0;
 }
 
-static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
-
 static int busiest(const sf_cycle_totals *t)
 {
   int most = 0;
@@ -140,7 +138,7 @@ static int widest(const fx_net *net)
 {
   int most = 0;
   for (int l = 0; l < SF_LAYERS; l++)
-    if (l != FX_D2 && l != FX_C3 && net->layer[l].n_out > most) most = net->layer[l].n_out;
+    if (fx_layer_fires(l) && net->layer[l].n_out > most) most = net->layer[l].n_out;
   return most;
 }
 
@@ -150,8 +148,9 @@ static double lanes_at_work(const job *j, int lanes)
   const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
   const fx_net *net = &j->scene.net;
   double work = 0, all = 0;
-  for (int l = FX_D1; l <= FX_C2; l++) {
-    if (l == FX_D2 || !net->layer[l].n_out) continue;
+  for (int s = 0; s < FX_SPIKING; s++) {
+    const int l = fx_spiking_layers[s];
+    if (!net->layer[l].n_out) continue;
     work += (double)t->busy[l] * net->layer[l].n_out;
     all += (double)t->cycles * lanes;
   }
@@ -211,8 +210,8 @@ static void print_text(const job *j)
   printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: %" PRIu64 ")\n",
          t->cycles, ratio(t->cycles, t->samples), sf_cycles_dense(&j->scene.net));
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
-  for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", layer_name[l], 100 * ratio(t->busy[l], t->cycles));
-  printf("; the busiest is %s\n", layer_name[most]);
+  for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", fx_layer_name(l), 100 * ratio(t->busy[l], t->cycles));
+  printf("; the busiest is %s\n", fx_layer_name(most));
   printf("%" PRIu64 " cycles without a sample for D1, %" PRIu64 " in which sums of D2 or C3 waited for the readout\n",
          t->waits, t->stalls);
   print_space(j);
@@ -231,7 +230,7 @@ static sf_status print_json(const job *j)
   sf_json_add_u64(json, "waits", t->waits);
   sf_json_add_u64(json, "stalls", t->stalls);
   cJSON *busy = cJSON_AddObjectToObject(json, "utilisation");
-  for (int l = 0; l < SF_LAYERS; l++) cJSON_AddNumberToObject(busy, layer_name[l], ratio(t->busy[l], t->cycles));
+  for (int l = 0; l < SF_LAYERS; l++) cJSON_AddNumberToObject(busy, fx_layer_name(l), ratio(t->busy[l], t->cycles));
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
   cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j, 1, j->opt.clock));
   add_space(j, json);

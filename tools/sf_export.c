@@ -1,6 +1,7 @@
 /* Quantises a trained model to the scene file of the fixed-point core, the accelerator and the firmware; writes vectors
  * of a scene for any simulator, its traces and graphs for other tools. */
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "fit/fit.h"
 #include "quant/quant.h"
 #include "tools/export/extras.h"
@@ -22,7 +23,6 @@ typedef struct options {
 
 enum { FIT_RAYS = 262144, KIT_SAMPLES = 48 };
 static const double FIT_LOSS = 0.05;
-static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
 
 static sf_status file_size(const char *path, long long *size)
 {
@@ -53,7 +53,7 @@ static void print_text(const fx_scene *scene, const sf_quant_report *report, boo
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &scene->net.layer[l];
     if (!layer->n_out) continue; /* a decoder has no density net */
-    printf("%s %3d x %-3d LSB %-11.6g", layer_name[l], layer->n_in, layer->n_out, report->layer[l].unit);
+    printf("%s %3d x %-3d LSB %-11.6g", fx_layer_name(l), layer->n_in, layer->n_out, report->layer[l].unit);
     if (!fit) printf(" error %6.3f %%  %d weights clipped,", 100 * report->layer[l].error, report->layer[l].clipped);
     printf(" k = %d/%d", layer->k, 1 << SF_LEAK_FRAC);
     if (layer->theta) printf(", theta = %d", layer->theta);
@@ -107,7 +107,7 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddNumberToObject(json, "leak_bits", report->widths.leak_bits);
   cJSON_AddNumberToObject(json, "grid_bits", report->widths.grid_bits);
   for (int l = 0; l < SF_LAYERS; l++)
-    cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], fit, layer_name[l]));
+    cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], fit, fx_layer_name(l)));
   if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
   export_extras_json(json, more, &o->extra);
   return sf_json_print(json, true);

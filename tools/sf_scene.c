@@ -1,5 +1,6 @@
 /* Makes a procedural scene: pictures and camera poses in the Blender layout. */
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "scene/scene.h"
 #include <stdio.h>
 

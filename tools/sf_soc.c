@@ -3,6 +3,7 @@
 #include "firmware/sf_soc.h"
 #include "sim/soc/job.h"
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "golden/golden.h"
 #include "base/io.h"
 #include "quant/quant.h"

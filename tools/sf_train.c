@@ -1,6 +1,7 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
 #include "quant/quant.h"
 #include "tools/train/report.h"
+#include "base/clock.h"
 #include <errno.h>
 #include <math.h>
 #include <string.h>

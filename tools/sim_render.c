@@ -1,6 +1,7 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
 #include "sim/view_set.h"
 #include "cli/cli.h"
+#include "base/clock.h"
 #include "base/io.h"
 #include <omp.h>
 #include <stdlib.h>

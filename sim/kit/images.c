@@ -68,7 +68,7 @@ static sf_status write_stimulus(sf_kit_output *output, const sf_kit_draw *d, int
     const int n = sf_dut_packet(&d->scene->net, &sample, word);
     for (int b = 0; b < n; b++) {
       const unsigned flags =
-          (b == 0 && (s->first || fx_net_decodes(&d->scene->net)) ? 2u : 0u) | (b == n - 1 ? 1u : 0u);
+          (b == 0 && (s->first || fx_net_constants_per_sample(&d->scene->net)) ? 2u : 0u) | (b == n - 1 ? 1u : 0u);
       fprintf(file.writer.file, "%x%016" PRIx64 "\n", flags, word[b]);
     }
     *beats += n;
@@ -89,8 +89,6 @@ static sf_status write_outputs(sf_kit_output *output, const sf_kit_draw *d)
 }
 
 /* ---- taps ---- */
-
-static const bool spiking[SF_LAYERS] = {[FX_D1] = true, [FX_C1] = true, [FX_C2] = true};
 
 static void put_bits(FILE *file, const uint64_t bits[SF_SPIKE_WORDS])
 {
@@ -118,8 +116,8 @@ static void put_membranes(FILE *file, const fx_net *net, const sf_kit_sample *s,
 /* Presynaptic neurons that were added up: C2 those of the step, D2 and C3 those that fired at any step. */
 static void put_rows(FILE *file, const fx_net *net, const sf_kit_sample *s, int layer, int step)
 {
-  const int presynaptic = layer == FX_D2 ? FX_D1 : layer == FX_C2 ? FX_C1 : FX_C2;
-  const int from = layer == FX_C2 ? step : 0, to = layer == FX_C2 ? step + 1 : net->steps;
+  const int presynaptic = fx_layer_table[layer].spikes_of;
+  const int from = fx_layer_fires(layer) ? step : 0, to = fx_layer_fires(layer) ? step + 1 : net->steps;
   uint64_t rows[SF_SPIKE_WORDS] = {0};
   for (int t = from; t < to; t++)
     for (int word = 0; word < SF_SPIKE_WORDS; word++) rows[word] |= s->trace.spikes[presynaptic][t][word];
@@ -134,10 +132,10 @@ static sf_status write_tap(sf_kit_output *output, const sf_kit_draw *d, tap_kind
   const fx_net *net = &d->scene->net;
   sf_kit_writer file;
   char name[40];
-  snprintf(name, sizeof name, "expected_%s_%s.hex", tap_name[kind], sf_layer_names[layer]);
+  snprintf(name, sizeof name, "expected_%s_%s.hex", tap_name[kind], fx_layer_name(layer));
   SF_TRY(sf_kit_begin(output, &file, name));
   for (int i = 0; i < d->samples; i++)
-    for (int t = 0; t < (spiking[layer] ? net->steps : 1); t++) switch (kind) {
+    for (int t = 0; t < fx_layer_outputs(layer, net->steps); t++) switch (kind) {
       case SPIKES:
         put_spikes(file.writer.file, &d->sample[i], layer, t);
         break;
@@ -154,9 +152,9 @@ static sf_status write_tap(sf_kit_output *output, const sf_kit_draw *d, tap_kind
 static sf_status write_taps(sf_kit_output *output, const sf_kit_draw *d)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
-    if (spiking[l]) SF_TRY(write_tap(output, d, SPIKES, l));
-    if (spiking[l]) SF_TRY(write_tap(output, d, MEMBRANES, l));
-    if (!spiking[l] || l == FX_C2) SF_TRY(write_tap(output, d, ROWS, l));
+    if (fx_layer_fires(l)) SF_TRY(write_tap(output, d, SPIKES, l));
+    if (fx_layer_fires(l)) SF_TRY(write_tap(output, d, MEMBRANES, l));
+    if (fx_layer_reads_spikes(l)) SF_TRY(write_tap(output, d, ROWS, l));
   }
   return sf_ok();
 }

@@ -83,7 +83,7 @@ static sf_status scene_json(const char *path, const fx_net *net, cJSON *json)
   cJSON *layers = cJSON_AddArrayToObject(scene, "layers");
   for (int l = 0; l < SF_LAYERS; l++) {
     cJSON *layer = cJSON_CreateObject();
-    cJSON_AddStringToObject(layer, "layer", sf_layer_names[l]);
+    cJSON_AddStringToObject(layer, "layer", fx_layer_name(l));
     cJSON_AddNumberToObject(layer, "n_in", net->layer[l].n_in);
     cJSON_AddNumberToObject(layer, "n_out", net->layer[l].n_out);
     cJSON_AddNumberToObject(layer, "k", net->layer[l].k);

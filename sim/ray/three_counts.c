@@ -25,7 +25,7 @@ static sf_status compare_outputs(const fx_net *net, const fx_out *core, const fx
   static const char *const name[4] = {"density", "red", "green", "blue"};
   const uint32_t x[4] = {core->sigma, core->colour[0], core->colour[1], core->colour[2]};
   const uint32_t y[4] = {rtl->sigma, rtl->colour[0], rtl->colour[1], rtl->colour[2]};
-  for (int i = fx_net_decodes(net); i < 4; i++)
+  for (int i = fx_net_first_layer(net) != FX_D1; i < 4; i++)
     if (x[i] != y[i]) return sf_fail(SF_E_DIFFERENCE, "%s: core %u, accelerator %u", name[i], x[i], y[i]);
   return sf_ok();
 }
@@ -34,13 +34,14 @@ static sf_status compare_bitmaps(const fx_net *net, const uint64_t core[SF_LAYER
                                  const uint64_t rtl[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS])
 {
   for (int t = 0; t < net->steps; t++)
-    for (int l = FX_D1; l <= FX_C2; l++)
-      for (int w = 0; w < SF_SPIKE_WORDS && l != FX_D2; w++) {
+    for (int s = 0; s < FX_SPIKING; s++)
+      for (int w = 0; w < SF_SPIKE_WORDS; w++) {
+        const int l = fx_spiking_layers[s];
         const uint64_t difference = core[l][t][w] ^ rtl[l][t][w];
         if (!difference) continue;
         const int bit = __builtin_ctzll(difference);
         return sf_fail(SF_E_DIFFERENCE, "spike of layer %s at step %d, neuron %d: core %d, accelerator %d",
-                       sf_layer_names[l], t, 64 * w + bit, (int)(core[l][t][w] >> bit & 1),
+                       fx_layer_name(l), t, 64 * w + bit, (int)(core[l][t][w] >> bit & 1),
                        (int)(rtl[l][t][w] >> bit & 1));
       }
   return sf_ok();

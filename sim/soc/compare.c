@@ -35,7 +35,7 @@ sf_status sf_soc_compare_pixels(const fx_pixel *core, const fx_pixel *firmware, 
 
 static void layer_line(const fx_counts *counts, int layer, char line[LINE_MAX])
 {
-  int at = snprintf(line, LINE_MAX, "%s%s", audit_prefix, sf_layer_names[layer]);
+  int at = snprintf(line, LINE_MAX, "%s%s", audit_prefix, fx_layer_name(layer));
   for (int e = 0; e < SF_EVENTS; e++) {
     uint64_t sum = 0;
     for (int t = 0; t < SF_T_MAX; t++) sum += sf_event_count(&counts->layer[layer], e, t);

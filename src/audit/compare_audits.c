@@ -230,7 +230,7 @@ static cJSON *events(const side *a, const side *b)
     const cJSON *x = cJSON_GetArrayItem(a->layers, l), *y = cJSON_GetArrayItem(b->layers, l);
     char name[64];
     for (int e = 0; e < SF_EVENTS; e++) {
-      snprintf(name, sizeof name, "%s of %s", sf_events[e].title, sf_layer_names[l]);
+      snprintf(name, sizeof name, "%s of %s", sf_events[e].title, fx_layer_name(l));
       add_change(&list, name, sum_of(get(x, sf_events[e].name)) / a->views,
                  sum_of(get(y, sf_events[e].name)) / b->views, true);
     }

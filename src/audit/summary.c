@@ -57,7 +57,7 @@ static void print_words(FILE *out, const fx_net *net)
       "neuron fired; a neuron update is one leak, comparison and reset. The ReLU twin is a\n"
       "count: a dense ReLU net of the same layer sizes on the same samples, every synapse a MAC, no zeros skipped; it\n"
       "was not trained for this figure.\n\n",
-      fx_net_decodes(net) ? "" : "density (D1 D2), ");
+      fx_net_first_layer(net) == FX_D1 ? "density (D1 D2), " : "");
 }
 
 static const char *less(double saving)
@@ -193,7 +193,7 @@ static void add_saturation(cJSON *json, const sf_audit_report *r)
   char unexpected[64];
   cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
   for (int l = 0; l < SF_LAYERS; l++)
-    sf_json_add_u64(saturated, sf_layer_names[l], r->measure.core.saturated_samples[l]);
+    sf_json_add_u64(saturated, fx_layer_name(l), r->measure.core.saturated_samples[l]);
   sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
 }
@@ -246,7 +246,7 @@ void sf_report_csv(FILE *out, const sf_audit_report *r)
   fprintf(out, "\n");
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < r->net->steps; t++) {
-      fprintf(out, "%s,%d,%d,%d", sf_layer_names[l], t, r->net->layer[l].n_in, r->net->layer[l].n_out);
+      fprintf(out, "%s,%d,%d,%d", fx_layer_name(l), t, r->net->layer[l].n_in, r->net->layer[l].n_out);
       for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(&r->measure.core.layer[l], e, t));
       fprintf(out, ",0,0");
       csv_energies(out, &r->ledgers, l, t);

@@ -42,7 +42,7 @@ void sf_picture_budget_print(FILE *out, const sf_picture_budget *b)
   fprintf(out, "| currents: weights and inputs rounded | bound, LSB | measured | of its bound | RMS | currents |\n");
   fprintf(out, "|---|---|---|---|---|---|\n");
   for (int l = 0; l < SF_LAYERS; l++)
-    fprintf(out, "| %s | %.4g | %.4g | %.0f %% | %.3g | %" PRIu64 " |\n", sf_layer_names[l], b->current[l].bound,
+    fprintf(out, "| %s | %.4g | %.4g | %.0f %% | %.3g | %" PRIu64 " |\n", fx_layer_name(l), b->current[l].bound,
             b->current[l].measured, 100 * b->current[l].ratio, b->current[l].rms, b->current[l].currents);
   fprintf(out, "\n| in double precision | dB to fixed | dB to photograph | gain, dB | flips D1 | C1 | C2 |\n");
   fprintf(out, "|---|---|---|---|---|---|---|\n");
@@ -72,7 +72,7 @@ cJSON *sf_picture_budget_json(const sf_picture_budget *b)
   cJSON *currents = cJSON_AddArrayToObject(json, "currents"), *rows = cJSON_AddArrayToObject(json, "blocks");
   for (int l = 0; l < SF_LAYERS; l++) {
     cJSON *item = cJSON_CreateObject();
-    cJSON_AddStringToObject(item, "layer", sf_layer_names[l]);
+    cJSON_AddStringToObject(item, "layer", fx_layer_name(l));
     cJSON_AddNumberToObject(item, "bound", b->current[l].bound);
     cJSON_AddNumberToObject(item, "measured", b->current[l].measured);
     cJSON_AddNumberToObject(item, "of_its_bound", b->current[l].ratio);

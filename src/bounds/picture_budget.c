@@ -149,8 +149,8 @@ static void add_layers(const tracer *t, const double pos[3], const int16_t *fq, 
 static void count_flips(const tracer *t, const sf_exact_out *out, ray_result *r)
 {
   const fx_net *net = &t->exact->scene->net;
-  for (int l = FX_D1; l <= FX_C2; l++) {
-    if (l == FX_D2) continue;
+  for (int s = 0; s < FX_SPIKING; s++) {
+    const int l = fx_spiking_layers[s];
     r->decisions[l] += (uint64_t)net->layer[l].n_out * (uint64_t)net->steps;
     for (int step = 0; step < net->steps; step++)
       for (int w = 0; w < SF_SPIKE_WORDS; w++)
@@ -306,11 +306,11 @@ sf_status sf_picture_budget_check(const sf_picture_job *job)
     return sf_fail(SF_E_UNSUPPORTED, "%s: its sizes are not those of the model it is compared with", job->name);
   for (int i = 0; i < SF_LAYERS; i++)
     if (!(job->scene->current_scale[i] > 0))
-      return sf_fail(SF_E_UNSUPPORTED, "%s: the unit of layer %s is not known", job->name, sf_layer_names[i]);
+      return sf_fail(SF_E_UNSUPPORTED, "%s: the unit of layer %s is not known", job->name, fx_layer_name(i));
   for (int i = 0; i < SF_LAYERS; i++)
     if (!sf_exact_resembles(job->scene, job->model, i))
       return sf_fail(SF_E_UNSUPPORTED, "%s: the weights of layer %s are not those of the model it is compared with",
-                     job->name, sf_layer_names[i]);
+                     job->name, fx_layer_name(i));
   return sf_ok();
 }
 

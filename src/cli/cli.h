@@ -60,5 +60,4 @@ void sf_progress_begin(sf_progress *progress, bool quiet);
 bool sf_progress_due(const sf_progress *progress);
 void sf_progress_show(sf_progress *progress, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void sf_progress_end(sf_progress *progress); /* leaves the last line standing */
-double sf_seconds(void);                     /* monotonic clock */
 #endif

@@ -1,11 +1,11 @@
-/* Progress on stderr, the clock, and the stop flag. */
+/* Progress on stderr, and the stop flag. */
 #include "cli/cli.h"
+#include "base/clock.h"
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include <time.h>
 #include <unistd.h>
 
 /* The one piece of global state: a signal handler can reach nothing else. */
@@ -31,13 +31,6 @@ void sf_cli_catch_signals(void)
 bool sf_cli_interrupted(void)
 {
   return stop_requested != 0;
-}
-
-double sf_seconds(void)
-{
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 void sf_progress_begin(sf_progress *progress, bool quiet)

@@ -72,7 +72,7 @@ sf_cycle_model *sf_cycle_model_create(const fx_net *net)
   m->n_feature = (uint32_t)net->layer[FX_D1].n_in;
   m->n_h = (uint32_t)fx_net_h(net);
   m->n_dir = (uint32_t)fx_net_constants(net);
-  m->decodes = fx_net_decodes(net);
+  m->decodes = fx_net_constants_per_sample(net);
   m->biased = net->layer[FX_C1].bias != 0;
   m->steps = (uint32_t)net->steps;
   m->c2.fresh = m->d2.fresh = m->c3.fresh = true;
@@ -344,7 +344,7 @@ uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts)
 {
   static const uint64_t rows_per_cycle[SF_LAYERS] = {[FX_D1] = 1, [FX_D2] = 2, [FX_C1] = 1, [FX_C2] = 2, [FX_C3] = 2};
   uint64_t most = 0;
-  for (int l = fx_net_decodes(net) ? FX_C1 : FX_D1; l < SF_LAYERS; l++) {
+  for (int l = fx_net_first_layer(net); l < SF_LAYERS; l++) {
     uint64_t rows = 0;
     for (int t = 0; t < net->steps; t++) rows += counts->layer[l].weight[t] / (uint64_t)net->layer[l].n_out;
     if (net->layer[l].bias && l == FX_C2) rows -= counts->samples * (uint64_t)net->steps; /* a sum begins with them */

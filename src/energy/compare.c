@@ -10,7 +10,7 @@ sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_cou
         uint64_t x = sf_event_count(&a->layer[l], e, t), y = sf_event_count(&b->layer[l], e, t);
         if (x != y)
           return sf_fail(SF_E_DIFFERENCE, "%s of layer %s at step %d: %s %llu, %s %llu", sf_events[e].title,
-                         sf_layer_names[l], t, a_name, (unsigned long long)x, b_name, (unsigned long long)y);
+                         fx_layer_name(l), t, a_name, (unsigned long long)x, b_name, (unsigned long long)y);
       }
   }
   if (a->samples == b->samples) return sf_ok();

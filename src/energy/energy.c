@@ -2,8 +2,6 @@
 #include "bounds/saturate.h"
 #include <math.h>
 
-const char *const sf_layer_names[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
-
 const sf_event sf_events[SF_EVENTS] = {
     {"mac", "MAC", offsetof(fx_layer_counts, mac)},
     {"sop", "SOP", offsetof(fx_layer_counts, sop)},
@@ -63,13 +61,9 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples)
   return sf_multiply_u64(sf_multiply_u64(synapses(net), samples), SF_MAC_FJ);
 }
 
-/* C1 reads [d | h]; h is what the density net puts out beside the density current. */
 static uint64_t direction_synapses(const fx_net *net)
 {
-  const fx_layer *c1 = &net->layer[FX_C1];
-  if (fx_net_decodes(net)) return 0; /* its inputs come with every sample */
-  int n_h = fx_net_h(net);
-  return (uint64_t)(c1->n_in - n_h) * (uint64_t)c1->n_out;
+  return (uint64_t)fx_net_harmonics(net) * (uint64_t)net->layer[FX_C1].n_out;
 }
 
 /* round(a * b / c) without losing bits; a <= UINT64_MAX, b <= c. */
@@ -81,8 +75,9 @@ static uint64_t scale_round(uint64_t a, uint64_t b, uint64_t c)
 
 static uint64_t spiking_neurons(const fx_counts *counts, int event)
 {
-  return sf_add_u64(sf_add_u64(layer_total(&counts->layer[FX_D1], event), layer_total(&counts->layer[FX_C1], event)),
-                    layer_total(&counts->layer[FX_C2], event));
+  uint64_t sum = 0;
+  for (int s = 0; s < FX_SPIKING; s++) sum = sf_add_u64(sum, layer_total(&counts->layer[fx_spiking_layers[s]], event));
+  return sum;
 }
 
 sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *ledger)
@@ -93,7 +88,7 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
   if (d_mac > c1_mac || net->steps < 1)
     return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
                    (unsigned long long)c1_mac, (unsigned long long)d_mac);
-  uint64_t h_mac = fx_net_decodes(net) ? 0 : c1_mac - d_mac; /* at every step */
+  uint64_t h_mac = fx_net_constants_per_sample(net) ? 0 : c1_mac - d_mac; /* at every step */
   uint64_t h_sop =
       scale_round(h_mac, spiking_neurons(counts, SF_EVENT_SPIKES), spiking_neurons(counts, SF_EVENT_UPDATES));
 

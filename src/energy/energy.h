@@ -27,7 +27,6 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
  * event, layer, step and both values. */
 sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_counts *b, const char *b_name);
 cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts);
-extern const char *const sf_layer_names[SF_LAYERS]; /* "D1", "D2", "C1", "C2", "C3" */
 
 /* The eight events of fx_layer_counts, in its order. */
 typedef enum {

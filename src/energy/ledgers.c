@@ -81,10 +81,9 @@ static void twin_events(const fx_net *net, const fx_counts *counts, const sf_tra
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *size = &net->layer[l];
     const uint64_t n_in = (uint64_t)size->n_in, n_out = (uint64_t)size->n_out;
-    uint64_t products = sf_multiply_u64(n_in * n_out, counts->samples);
-    if (hoisted && l == FX_C1 && !fx_net_decodes(net))
-      products = sf_add_u64(sf_multiply_u64((uint64_t)n_h * n_out, counts->samples),
-                            sf_multiply_u64((n_in - (uint64_t)n_h) * n_out, counts->rays));
+    const uint64_t once = hoisted && l == FX_C1 ? (uint64_t)fx_net_harmonics(net) : 0;
+    const uint64_t products = sf_add_u64(sf_multiply_u64((n_in - once) * n_out, counts->samples),
+                                         sf_multiply_u64(once * n_out, counts->rays));
     const uint64_t hidden = sf_multiply_u64(l == FX_C3 ? 0 : l == FX_D2 ? (uint64_t)n_h : n_out, counts->samples);
     e[l][0][SF_PART_MAC] = e[l][0][SF_PART_WEIGHT] = products;
     e[l][0][SF_PART_STATE] = sf_multiply_u64(hidden, 2);
@@ -130,8 +129,8 @@ static uint64_t special_fj(const sf_technology *tech, int argument_bits, int res
  * integrators of D2 and C3 neither compare nor reset. */
 static uint64_t neuron_fj(const sf_technology *tech, int l, bool *interpolated)
 {
-  const bool spiking = l != FX_D2 && l != FX_C3;
-  const int bits = spiking ? SF_MEMBRANE_BITS : l == FX_D2 ? SF_SIGMA_BITS : SF_COLOUR_BITS;
+  const bool spiking = fx_layer_fires(l);
+  const int bits = fx_layer_table[l].state_bits;
   return sf_price_multiply(tech, bits, K_BITS, interpolated) + adds(tech, spiking ? 4 : 2, bits, interpolated);
 }
 
@@ -248,7 +247,7 @@ static double spike_driven(const book *b, const sf_ledgers *l, int ledger)
 {
   double fj = (double)l->part[ledger][SF_PART_SOP];
   for (int r = 0; r < SF_LAYERS; r++)
-    for (int t = 0; t < SF_T_MAX && (r == FX_D2 || r == FX_C2 || r == FX_C3); t++)
+    for (int t = 0; t < SF_T_MAX && fx_layer_reads_spikes(r); t++)
       fj += (double)b->spiking[r][t][SF_PART_WEIGHT] * (double)l->unit[ledger][r][SF_PART_WEIGHT].fj;
   return fj;
 }
@@ -310,9 +309,10 @@ static bool sensitivity(const book *b, sf_ledgers *l, sf_ledgers *scratch)
 static double firing_rate(const fx_counts *counts)
 {
   double spikes = 0, updates = 0;
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < SF_T_MAX && l != FX_D2 && l != FX_C3; t++)
-      spikes += (double)counts->layer[l].spikes[t], updates += (double)counts->layer[l].updates[t];
+  for (int s = 0; s < FX_SPIKING; s++) {
+    const fx_layer_counts *c = &counts->layer[fx_spiking_layers[s]];
+    for (int t = 0; t < SF_T_MAX; t++) spikes += (double)c->spikes[t], updates += (double)c->updates[t];
+  }
   return updates > 0 ? spikes / updates : 0;
 }
 

@@ -50,23 +50,23 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
   const fx_layer *size = net->layer;
   fx_layer_counts *c = counts->layer;
   uint64_t seen_d1[SF_SPIKE_WORDS] = {0}, seen_c2[SF_SPIKE_WORDS] = {0};
-  const bool decodes = fx_net_decodes(net);
+  const bool per_sample = fx_net_constants_per_sample(net);
 
   counts->samples++;
-  counts->rays += first_of_ray && !decodes;
+  counts->rays += first_of_ray && !per_sample;
   count_mac(&c[FX_D1], 0, size[FX_D1].n_in, size[FX_D1].n_out);
-  if (first_of_ray || decodes) {
+  if (first_of_ray || per_sample) {
     count_mac(&c[FX_C1], 0, fx_net_constants(net), size[FX_C1].n_out);
     count_bias(&c[FX_C1], 0, &size[FX_C1]);
   }
   count_bias(&c[FX_C3], 0, &size[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
-    for (int l = FX_D1; l <= FX_C2; l++) {
-      if (l == FX_D2) continue;
+    for (int s = 0; s < FX_SPIKING; s++) {
+      const int l = fx_spiking_layers[s];
       c[l].spikes[t] += fired(spikes[l][t]);
       count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
     }
-    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, !decodes);
+    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, size[FX_D2].n_out > 0);
     count_bias(&c[FX_C2], t, &size[FX_C2]);
     count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
     uint64_t c2_sop = fired(spikes[FX_C1][t]) * (uint64_t)size[FX_C2].n_out;

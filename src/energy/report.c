@@ -53,20 +53,15 @@ static double firing_rate(const fx_layer_counts *layer, int t)
   return layer->updates[t] ? (double)layer->spikes[t] / (double)layer->updates[t] : 0;
 }
 
-static bool is_spiking(int layer)
-{
-  return layer == FX_D1 || layer == FX_C1 || layer == FX_C2;
-}
-
 static cJSON *layer_json(const fx_net *net, const fx_counts *counts, int l)
 {
   cJSON *layer = cJSON_CreateObject();
-  cJSON_AddStringToObject(layer, "name", sf_layer_names[l]);
+  cJSON_AddStringToObject(layer, "name", fx_layer_name(l));
   cJSON_AddNumberToObject(layer, "n_in", net->layer[l].n_in);
   cJSON_AddNumberToObject(layer, "n_out", net->layer[l].n_out);
   for (int e = 0; e < SF_EVENTS; e++)
     cJSON_AddItemToObject(layer, sf_events[e].name, steps_json(&counts->layer[l], e, net->steps));
-  if (is_spiking(l)) {
+  if (fx_layer_fires(l)) {
     cJSON *rate = cJSON_AddArrayToObject(layer, "firing_rate");
     for (int t = 0; t < net->steps; t++)
       cJSON_AddItemToArray(rate, cJSON_CreateNumber(firing_rate(&counts->layer[l], t)));
@@ -101,9 +96,9 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer_counts *c = &counts->layer[l];
     for (int t = 0; t < net->steps; t++) {
-      fprintf(out, "%-5s %4d %16" PRIu64 " %16" PRIu64 " %16" PRIu64, sf_layer_names[l], t, c->mac[t], c->sop[t],
+      fprintf(out, "%-5s %4d %16" PRIu64 " %16" PRIu64 " %16" PRIu64, fx_layer_name(l), t, c->mac[t], c->sop[t],
               c->updates[t]);
-      if (is_spiking(l))
+      if (fx_layer_fires(l))
         fprintf(out, " %16" PRIu64 " %7.2f%%\n", c->spikes[t], 100 * firing_rate(c, t));
       else
         fprintf(out, " %16s %8s\n", "-", "-");

@@ -20,7 +20,7 @@ bool sf_saturation_unexpected(const fx_net *net, const uint64_t saturated[SF_LAY
   for (int l = 0; l < SF_LAYERS; l++) {
     if (saturated[l] == 0 || l == FX_D2 || net->mode == FX_NODECAY) continue;
     if (!any) used = 0;
-    append(list, size, &used, "%s%s", any ? "," : "", sf_layer_names[l]);
+    append(list, size, &used, "%s%s", any ? "," : "", fx_layer_name(l));
     any = true;
   }
   return any;
@@ -34,7 +34,7 @@ void sf_saturation_census(const uint64_t samples[SF_LAYERS], uint64_t features, 
   for (int l = 0; l < SF_LAYERS; l++) {
     if (samples[l] == 0) continue;
     if (!any) used = 0;
-    append(text, size, &used, "%s%s %" PRIu64 " samples", any ? ", " : "", sf_layer_names[l], samples[l]);
+    append(text, size, &used, "%s%s %" PRIu64 " samples", any ? ", " : "", fx_layer_name(l), samples[l]);
     any = true;
   }
   if (features == 0) return;

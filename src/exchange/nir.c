@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SPIKING = 3 };
-static const int spiking[SPIKING] = {FX_D1, FX_C1, FX_C2};
 static const char *const mode_name[] = {"hybrid", "decay", "no-decay"};
 
 /* What model and scene have in common. */
@@ -85,7 +83,7 @@ static void add_neurons(sf_nir_graph *g, const nets *nets, int l)
 {
   const double k = nets->k[l];
   const bool no_decay = nets->mode == FX_NODECAY, lossless = no_decay && k == 0;
-  sf_nir_node *n = add_node(g, sf_layer_names[l], lossless ? SF_NIR_IF : SF_NIR_LIF, nets->n_out[l]);
+  sf_nir_node *n = add_node(g, fx_layer_name(l), lossless ? SF_NIR_IF : SF_NIR_LIF, nets->n_out[l]);
   n->tau = 1 / k;
   n->r = no_decay && !lossless ? n->tau : 1;
   n->v_threshold = nets->theta[l];
@@ -213,7 +211,7 @@ sf_status sf_nir_write_scene(const char *path, const fx_scene *scene)
             .feature_lsb = scene->feature_scale,
             .levels = scene->grid.levels,
             .direction_lsb = scene->dir_scale,
-            .current_bits = fx_net_decodes(net) ? SF_MEMBRANE_BITS : 0,
+            .current_bits = fx_net_constants_per_sample(net) ? SF_MEMBRANE_BITS : 0,
             .weight = scene_weight,
             .bias = scene_bias,
             .from = net};
@@ -224,8 +222,8 @@ sf_status sf_nir_write_scene(const char *path, const fx_scene *scene)
     n.k[l] = ldexp(net->layer[l].k, -SF_LEAK_FRAC);
   }
   n.n_in[FX_C1] -= n.n_h;
-  for (int s = 0; s < SPIKING; s++) {
-    const int l = spiking[s];
+  for (int s = 0; s < FX_SPIKING; s++) {
+    const int l = fx_spiking_layers[s];
     n.membrane_lsb[l] = l == FX_C2 ? ldexp(1, -SF_AC_FRAC) : 1;
     n.theta[l] = net->layer[l].theta * n.membrane_lsb[l];
   }
@@ -283,6 +281,6 @@ sf_status sf_nir_write_model(const char *path, const sf_model *m)
             .from = m};
   model_sizes(&n, m);
   for (int l = 0; l < SF_LAYERS; l++) n.k[l] = (double)sf_sigmoid(leak[l]);
-  for (int s = 0; s < SPIKING; s++) n.theta[spiking[s]] = (double)c->theta[s];
+  for (int s = 0; s < FX_SPIKING; s++) n.theta[fx_spiking_layers[s]] = (double)c->theta[s];
   return write_nets(path, &n);
 }

@@ -37,7 +37,7 @@ static void write_header(const tracer *w)
   fprintf(out, "timestep,");
   for (int g = 0; g < GROUPS; g++)
     for (int n = 0; n < w->scene->net.layer[group[g]].n_out; n++)
-      fprintf(out, "neuron %s.%d,", sf_layer_names[group[g]], n);
+      fprintf(out, "neuron %s.%d,", fx_layer_name(group[g]), n);
   fprintf(out, "\n");
   fprintf(w->writer[SAMPLES].file, "timestep,ray,view,x,y,sample\n");
 }
@@ -52,7 +52,7 @@ static void write_step(tracer *w, int t)
     const fx_layer *layer = &w->scene->net.layer[l];
     for (int n = 0; n < layer->n_out; n++) {
       const bool spike = fired(&w->trace, l, t, n);
-      if (spike) fprintf(spikes, "%s.%d,%" PRIu64 "\n", sf_layer_names[l], n, now);
+      if (spike) fprintf(spikes, "%s.%d,%" PRIu64 "\n", fx_layer_name(l), n, now);
       fprintf(potentials, "%" PRId32 ",", w->trace.membrane[l][t][n] - (spike ? layer->theta : 0));
       w->report->spikes += spike;
     }

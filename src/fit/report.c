@@ -66,7 +66,7 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
 static cJSON *layers_json(const int *value)
 {
   cJSON *json = cJSON_CreateObject();
-  for (int l = FX_D1; l <= FX_C2; l++) cJSON_AddNumberToObject(json, sf_layer_names[l], value[l]);
+  for (int l = FX_D1; l <= FX_C2; l++) cJSON_AddNumberToObject(json, fx_layer_name(l), value[l]);
   return json;
 }
 

@@ -3,9 +3,6 @@
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
 
-const char *const fx_layer_tensor[SF_LAYERS] = {"density.w1", "density.w2", "colour.w3", "colour.w4", "colour.w5"};
-static const char *const layer_name[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
-
 enum { ENTRIES_MAX = 1 << 28, HASH_BITS_MAX = 27, OCCUPANCY_MAX = 256, SAMPLES_MAX = 1024 };
 enum { BOUND_LOG2_MAX = 6, GAMMA_MAX = 1 << 21, NEAR_MAX = 1 << 30 };
 
@@ -28,7 +25,7 @@ static sf_status check_chain(const fx_net *net, const char *path)
   static const int bias_max[SF_LAYERS] = {[FX_C1] = FX_INPUT_MAX, [FX_C2] = 1, [FX_C3] = 1};
   const fx_layer *l = net->layer;
   SF_TRY(check_inputs(net, path));
-  for (int id = 0; id < SF_LAYERS; id++) SF_TRY(in_range(path, layer_name[id], "bias", l[id].bias, 0, bias_max[id]));
+  for (int id = 0; id < SF_LAYERS; id++) SF_TRY(in_range(path, fx_layer_name(id), "bias", l[id].bias, 0, bias_max[id]));
   SF_TRY(in_range(path, "C1", "n_out", l[FX_C1].n_out, 1, SF_LANES));
   SF_TRY(in_range(path, "C2", "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
   SF_TRY(in_range(path, "C2", "n_out", l[FX_C2].n_out, 1, SF_LANES));
@@ -135,10 +132,10 @@ int fx_largest_h(const fx_layer *d2)
 
 static sf_status check_layer(const fx_layer *layer, int id, const char *path)
 {
-  const bool spiking = id != FX_D2 && id != FX_C3 && layer->n_out > 0;
-  SF_TRY(in_range(path, layer_name[id], "k", layer->k, 0, FX_LEAK_ONE));
-  SF_TRY(in_range(path, layer_name[id], "theta", layer->theta, spiking, spiking ? FX_MEMBRANE_MAX : 0));
-  return check_weights(layer, fx_layer_tensor[id], path);
+  const bool spiking = fx_layer_fires(id) && layer->n_out > 0;
+  SF_TRY(in_range(path, fx_layer_name(id), "k", layer->k, 0, FX_LEAK_ONE));
+  SF_TRY(in_range(path, fx_layer_name(id), "theta", layer->theta, spiking, spiking ? FX_MEMBRANE_MAX : 0));
+  return check_weights(layer, fx_layer_table[id].tensor, path);
 }
 
 static sf_status check_scale(const fx_scale *scale, const char *name, int bias_low, int bias_high, const char *path)

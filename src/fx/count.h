@@ -3,8 +3,6 @@
 #define SF_FX_COUNT_H
 #include "fx/fx.h"
 
-enum { FX_SPIKING = 3 }; /* D1, C1, C2 in this order */
-
 /* All that the counters of any number of samples follow from. */
 typedef struct fx_firing {
   uint64_t samples;

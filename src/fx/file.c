@@ -170,7 +170,7 @@ static int list_bulk(sf_tensor *tensor, fx_scene *scene)
   for (int id = 0; id < SF_LAYERS; id++) {
     const fx_layer *layer = &scene->net.layer[id];
     const int rows = fx_layer_rows(layer);
-    if (rows > 0) tensor[count++] = make_tensor(fx_layer_tensor[id], SF_I8, layer->w, 2, rows, SF_LANES);
+    if (rows > 0) tensor[count++] = make_tensor(fx_layer_table[id].tensor, SF_I8, layer->w, 2, rows, SF_LANES);
   }
   return count;
 }
@@ -286,7 +286,7 @@ static sf_status check_lanes(const sf_tensors *set)
 {
   const int64_t shape[2] = {-1, -1};
   const sf_tensor *w;
-  SF_TRY(sf_tensors_get(set, fx_layer_tensor[FX_C1], SF_I8, 2, shape, &w));
+  SF_TRY(sf_tensors_get(set, fx_layer_table[FX_C1].tensor, SF_I8, 2, shape, &w));
   const int lanes = w->shape[1] == 128 || w->shape[1] == 256 ? (int)w->shape[1] : SF_LANES;
   if (lanes == SF_LANES) return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED,

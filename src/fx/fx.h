@@ -15,11 +15,11 @@
 #define SF_FX_FX_H
 #include "base/arch.h"
 #include "base/status.h"
+#include "fx/layers.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-typedef enum { FX_D1, FX_D2, FX_C1, FX_C2, FX_C3 } fx_layer_id;
 typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY } fx_input_mode;
 
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
@@ -74,6 +74,25 @@ static inline int fx_net_h(const fx_net *net)
 static inline int fx_net_constants(const fx_net *net)
 {
   return net->layer[FX_C1].n_in - fx_net_h(net);
+}
+
+/* The first layer that the net has. */
+static inline int fx_net_first_layer(const fx_net *net)
+{
+  return fx_net_decodes(net) ? FX_C1 : FX_D1;
+}
+
+/* Whether C1's constant inputs come with every sample, not once per ray. Then the net counts no rays: the caller does.
+ */
+static inline bool fx_net_constants_per_sample(const fx_net *net)
+{
+  return fx_net_decodes(net);
+}
+
+/* Those of C1's constant inputs that belong to the ray: harmonics of its direction. */
+static inline int fx_net_harmonics(const fx_net *net)
+{
+  return fx_net_constants_per_sample(net) ? 0 : fx_net_constants(net);
 }
 
 /* What every sample brings: features, or the inputs of a decoder. At most SF_DIR_MAX. */

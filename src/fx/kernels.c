@@ -11,7 +11,6 @@ extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni, fx_kernels_amx;
 
 static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
 {
-  static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   const bool decodes = fx_net_decodes(&core->scene->net);
   (void)scratch;
   for (int i = 0; i < b->n; i++) {
@@ -21,7 +20,7 @@ static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
     fx_net_events(&core->scene->net, b->f[i], decodes ? constant : b->base[i], &b->out[i], &events, NULL);
     for (int s = 0; s < FX_SPIKING; s++)
       for (int t = 0; t < core->scene->net.steps; t++)
-        memcpy(b->spikes[s][t][i], events.spikes[spiking[s]][t], sizeof b->spikes[s][t][i]);
+        memcpy(b->spikes[s][t][i], events.spikes[fx_spiking_layers[s]][t], sizeof b->spikes[s][t][i]);
     for (int l = 0; l < SF_LAYERS; l++) b->saturated[l][i] = (uint32_t)events.saturated[l];
   }
   fx_block_count(b, core->scene->net.steps);

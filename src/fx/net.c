@@ -139,11 +139,10 @@ static void add_firing(fx_firing *sum, int layer, int t, const uint64_t now[SF_S
 
 static void count_events(const fx_net *net, const fx_events *events, fx_counts *counts)
 {
-  static const int spiking[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
   fx_firing firing = {.samples = 1};
   for (int l = 0; l < FX_SPIKING; l++) {
     uint64_t seen[SF_SPIKE_WORDS] = {0};
-    for (int t = 0; t < net->steps; t++) add_firing(&firing, l, t, events->spikes[spiking[l]][t], seen);
+    for (int t = 0; t < net->steps; t++) add_firing(&firing, l, t, events->spikes[fx_spiking_layers[l]][t], seen);
   }
   fx_count_firing(counts, net, &firing);
   for (int l = 0; l < SF_LAYERS; l++) {

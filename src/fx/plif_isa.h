@@ -86,13 +86,11 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
 
 enum { TOGETHER = 2 }; /* samples whose steps overlap */
 
-static const int spiking_layer[FX_SPIKING] = {FX_D1, FX_C1, FX_C2};
-
 /* All steps of `vectors` vectors of neurons of some samples, from i on of the currents. Membranes stay in registers. */
 static INLINE void fire_samples(const neurons *first, const neurons *later, int steps, int spiking, const currents *c,
                                 int neuron, int vectors, int sample, int i, int samples, fx_block *b)
 {
-  uint32_t *saturated = &b->saturated[spiking_layer[spiking]][sample + i];
+  uint32_t *saturated = &b->saturated[fx_spiking_layers[spiking]][sample + i];
   vec v[TILE];
 #pragma GCC unroll 8
   for (int j = 0; j < samples * vectors; j++) v[j] = v_set(0);
@@ -109,7 +107,7 @@ static INLINE void fire_samples(const neurons *first, const neurons *later, int 
 static INLINE void fire_layer(const fx_net *net, int spiking, int mode, const currents *c, int neuron, int vectors,
                               int sample, int n, fx_block *b)
 {
-  const int layer = spiking_layer[spiking], together = vectors == 1 ? TOGETHER : 1;
+  const int layer = fx_spiking_layers[spiking], together = vectors == 1 ? TOGETHER : 1;
   const neurons first = neurons_of(net, layer, mode, true), later = neurons_of(net, layer, mode, false);
   int i = 0;
   for (; i + together <= n; i += together)

@@ -4,7 +4,6 @@
 #include "fx/fx.h"
 
 enum { FX_DIMENSION_MAX = 3 };
-extern const char *const fx_layer_tensor[SF_LAYERS]; /* tensor names, also used in messages */
 
 /* Sizes alone: everything that memory is allocated and indexed by. */
 sf_status fx_check_sizes(const fx_scene *scene, const char *path);

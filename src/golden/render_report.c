@@ -17,7 +17,7 @@ static void add_events(cJSON *json, const sf_render_report *r)
   sf_json_add_u64(json, "energy_fj", sf_energy_fj(&r->golden->counts));
   cJSON *samples = cJSON_AddObjectToObject(json, "saturated_samples");
   for (int l = 0; l < SF_LAYERS; l++)
-    sf_json_add_u64(samples, sf_layer_names[l], r->golden->counts.saturated_samples[l]);
+    sf_json_add_u64(samples, fx_layer_name(l), r->golden->counts.saturated_samples[l]);
   sf_saturation_unexpected(r->net, r->golden->counts.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
 }

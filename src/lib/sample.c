@@ -104,7 +104,7 @@ static void run_batch(const batch *b, fx_trace *trace, fx_counts *events)
     lib_sample(&b->samples[i], &out);
     if (trace) memcpy(&b->traces[i], trace, sizeof *trace);
   }
-  if (fx_net_decodes(net)) events->rays++; /* counted where the field is, which a batch leaves out */
+  if (fx_net_constants_per_sample(net)) events->rays++; /* counted where the field is, which a batch leaves out */
 }
 
 static sf_status checked_batch(batch *b, const spikefield_scene *scene, const spikefield_options *options,

@@ -82,7 +82,7 @@ static void describe_net(const fx_net *net, spikefield_scene_info *info)
   }
   info->mode = (spikefield_mode)net->mode, info->steps = net->steps;
   info->features = fx_net_inputs(net);
-  info->directions = fx_net_decodes(net) ? 0 : fx_net_constants(net);
+  info->directions = fx_net_harmonics(net);
 }
 
 static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *info)

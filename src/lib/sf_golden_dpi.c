@@ -90,7 +90,7 @@ static sf_status check_values(const char *what, const int16_t *value, int n)
 static sf_status evaluate(golden *g, const int16_t *direction, const int16_t *features, bool beats)
 {
   const fx_net *net = &g->scene.net;
-  if (!beats && fx_net_decodes(net)) return sf_fail(SF_E_USAGE, "a decoder's samples come as beats");
+  if (!beats && fx_net_constants_per_sample(net)) return sf_fail(SF_E_USAGE, "a decoder's samples come as beats");
   if (!direction && !g->have_direction) return sf_fail(SF_E_USAGE, "a sample before the first direction");
   SF_TRY(check_values("feature", features, net->layer[FX_D1].n_in));
   if (direction) SF_TRY(check_values("harmonic", direction, directions(g)));
@@ -130,7 +130,8 @@ static int padded(int values)
 static sf_status take_beat(golden *g, const int16_t *value, bool user, bool last, bool *whole)
 {
   if (g->values == 0) g->first = user;
-  if (!g->first && fx_net_decodes(&g->scene.net)) return sf_fail(SF_E_FORMAT, "a decoder's sample without tuser");
+  if (!g->first && fx_net_constants_per_sample(&g->scene.net))
+    return sf_fail(SF_E_FORMAT, "a decoder's sample without tuser");
   const int n_direction = g->first ? padded(directions(g)) : 0;
   const int n = n_direction + padded(g->scene.net.layer[FX_D1].n_in);
   SF_TRY(check_values("value", value, BEAT_VALUES));
@@ -196,9 +197,9 @@ void sf_golden_rows(void *handle, int layer, int step, uint32_t rows[SF_GOLDEN_W
 {
   const golden *g = sampled_at(handle, layer, step);
   uint64_t any[SF_SPIKE_WORDS] = {0};
-  const int from = layer == FX_C2 ? step : 0, to = layer == FX_C2 ? step + 1 : sf_golden_steps(handle);
-  if (g && (layer == FX_C2 || layer == FX_D2 || layer == FX_C3)) {
-    const int presynaptic = layer == FX_D2 ? FX_D1 : layer == FX_C2 ? FX_C1 : FX_C2;
+  if (g && fx_layer_reads_spikes(layer)) {
+    const int presynaptic = fx_layer_table[layer].spikes_of;
+    const int from = fx_layer_fires(layer) ? step : 0, to = fx_layer_fires(layer) ? step + 1 : g->scene.net.steps;
     for (int t = from; t < to; t++)
       for (int word = 0; word < SF_SPIKE_WORDS; word++) any[word] |= g->trace.spikes[presynaptic][t][word];
   }

@@ -63,7 +63,7 @@ static const layer_text decoder[SF_LAYERS] = {
 static void layer_table(FILE *out, const sf_page *page)
 {
   const fx_net *net = page->report->net;
-  const layer_text *text = fx_net_decodes(net) ? decoder : layers;
+  const layer_text *text = fx_net_first_layer(net) == FX_D1 ? layers : decoder;
   fprintf(out, "<div class=\"scroll\"><table><caption>The layers of this network</caption>\n<thead><tr><th>layer</th>"
                "<th>what it does</th><th class=\"n\">inputs</th><th class=\"n\">outputs</th><th>counted as</th></tr>"
                "</thead>\n<tbody>\n");
@@ -72,7 +72,7 @@ static void layer_table(FILE *out, const sf_page *page)
     fprintf(out,
             "<tr><th><i class=\"key l%d\"></i>%s</th><td>%s</td><td class=\"n\"><data data-key=\"counts.layers[%d]"
             ".n_in\" value=\"%d\">%d</data></td><td class=\"n\">%d</td><td>%s</td></tr>\n",
-            l, sf_layer_names[l], text[l].role, l, net->layer[l].n_in, net->layer[l].n_in, net->layer[l].n_out,
+            l, fx_layer_name(l), text[l].role, l, net->layer[l].n_in, net->layer[l].n_in, net->layer[l].n_out,
             text[l].priced);
   }
   fprintf(out, "</tbody></table></div>\n");

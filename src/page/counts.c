@@ -94,7 +94,7 @@ static void by_layer_and_step(FILE *out, const sf_page *page)
     if (page->report->net->layer[l].n_out == 0) continue;
     for (int t = 0; t < page->report->net->steps; t++) {
       fprintf(out, "<tr%s><th><i class=\"key l%d\"></i>%s</th><td class=\"n\">%d</td>", t ? "" : " class=\"first\"", l,
-              sf_layer_names[l], t + 1);
+              fx_layer_name(l), t + 1);
       for (int e = 0; e < SF_EVENTS; e++) cell(out, page, l, t, e);
       fprintf(out, "</tr>\n");
     }
@@ -143,7 +143,7 @@ void html_counts(FILE *out, const sf_page *page)
 static void census(FILE *out, const sf_page *page)
 {
   const fx_counts *c = &page->report->measure.core;
-  const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
+  const int first = fx_net_first_layer(page->report->net);
   char list[64];
   uint64_t clipped = c->saturated_features;
   for (int l = 0; l < SF_LAYERS; l++) clipped += c->saturated_samples[l];
@@ -151,11 +151,11 @@ static void census(FILE *out, const sf_page *page)
                "Samples in which that happened, of ");
   html_put_count(out, "samples", c->samples);
   fprintf(out, ":</p>\n<div class=\"scroll\"><table class=\"narrow\" id=\"table-saturation\"><thead><tr>");
-  for (int l = first; l < SF_LAYERS; l++) fprintf(out, "<th class=\"n\">%s</th>", sf_layer_names[l]);
+  for (int l = first; l < SF_LAYERS; l++) fprintf(out, "<th class=\"n\">%s</th>", fx_layer_name(l));
   fprintf(out, "<th class=\"n\">grid features</th></tr></thead>\n<tbody><tr>");
   for (int l = first; l < SF_LAYERS; l++) {
     char key[40];
-    snprintf(key, sizeof key, "saturated_samples.%s", sf_layer_names[l]);
+    snprintf(key, sizeof key, "saturated_samples.%s", fx_layer_name(l));
     fprintf(out, "<td class=\"n\">");
     html_put_count(out, key, c->saturated_samples[l]);
     fprintf(out, "</td>");

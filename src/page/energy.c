@@ -31,10 +31,10 @@ static double segment(FILE *out, double x, double y, double scale, const sf_page
   const double width = (double)fj * scale;
   snprintf(style, sizeof style, "bar l%d", l);
   snprintf(key, sizeof key, "page.layer_fj[%d][%d]", l, t);
-  snprintf(tip, sizeof tip, "%s, step %d: %s", sf_layer_names[l], t + 1, html_energy(text, (double)fj));
+  snprintf(tip, sizeof tip, "%s, step %d: %s", fx_layer_name(l), t + 1, html_energy(text, (double)fj));
   svg_bar(out, x, y, width > 1.2 ? width - 1 : width, BAR, style, key, fj, tip);
   if (width > 26)
-    svg_text(out, x + (width - 1) / 2, y + 14.5, l == FX_D1 || l == FX_C1 ? "in mid" : "in dark mid", "%s", name);
+    svg_text(out, x + (width - 1) / 2, y + 14.5, fx_layer_reads_spikes(l) ? "in dark mid" : "in mid", "%s", name);
   return x + width;
 }
 
@@ -53,7 +53,7 @@ static void by_step(FILE *out, const sf_page *page)
     svg_text(out, WIDTH, ROW * t + 15, "num end", "%s  (%.1f %%)", html_energy(text, (double)fj),
              all ? 100.0 * (double)fj / (double)all : 0);
     for (int l = 0; l < SF_LAYERS; l++)
-      x = segment(out, x, ROW * t + 20, top ? WIDTH / (double)top : 0, page, l, t, sf_layer_names[l]);
+      x = segment(out, x, ROW * t + 20, top ? WIDTH / (double)top : 0, page, l, t, fx_layer_name(l));
   }
   svg_end(out);
 }
@@ -65,14 +65,14 @@ static void by_layer(FILE *out, const sf_page *page)
   uint64_t all = sf_energy_fj(c), top = 0;
   char text[HTML_NUMBER], name[16];
   for (int l = 0; l < SF_LAYERS; l++) top = layer_fj(c, l, steps) > top ? layer_fj(c, l, steps) : top;
-  const int first = fx_net_decodes(page->report->net) ? FX_C1 : FX_D1;
+  const int first = fx_net_first_layer(page->report->net);
   svg_begin(out, "svg-by-layer", WIDTH, ROW * (SF_LAYERS - first), "Energy by layer",
             "One bar per layer, stacked by step");
   for (int l = first; l < SF_LAYERS; l++) {
     const double y = ROW * (l - first);
     const uint64_t fj = layer_fj(c, l, steps);
     double x = 0;
-    svg_text(out, 0, y + 15, "lab", "%s: %s", sf_layer_names[l],
+    svg_text(out, 0, y + 15, "lab", "%s: %s", fx_layer_name(l),
              c->layer[l].mac[0] ? "multiplies (MAC)" : "adds on spikes (SOP)");
     svg_text(out, WIDTH, y + 15, "num end", "%s  (%.1f %%)", html_energy(text, (double)fj),
              all ? 100.0 * (double)fj / (double)all : 0);

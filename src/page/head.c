@@ -59,7 +59,7 @@ static void other_results(FILE *out, const sf_page *page)
   const sf_ledger *paper = &page->report->ledger;
   fprintf(out, "<p>The paper ledger is that of \xe2\x80\x9c"
                "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields\xe2\x80\x9d (PATA).");
-  if (!fx_net_decodes(page->report->net) && paper->ann_hoisted_fj > 0) {
+  if (!fx_net_constants_per_sample(page->report->net) && paper->ann_hoisted_fj > 0) {
     fprintf(out, " Its twin multiplies the direction of a ray at every sample, the spiking network once per ray; like "
                  "for like, both once per ray: ");
     html_put_saving(out, "ledger.hoisted_saving_percent", sf_saving_percent(paper->spiking_fj, paper->ann_hoisted_fj));

@@ -60,8 +60,4 @@ extern const char *const html_script[]; /* without '<' and '&': the page is XML 
 int html_rate_bins(const sf_page *page, int layer, int step, int bin[SF_PAGE_BINS]);
 /* Paper ledger of one layer at one step. */
 uint64_t html_layer_fj(const fx_counts *counts, int layer, int step);
-static inline bool html_spiking(int layer)
-{
-  return layer == FX_D1 || layer == FX_C1 || layer == FX_C2;
-}
 #endif

@@ -90,7 +90,7 @@ static void savings(FILE *out, const sf_page *page)
       "network does.");
   saving_bars(out, "svg-savings", "Savings of every ledger", ledger, SF_SPIKING_LEDGERS);
   html_figure_end(out);
-  if (fx_net_decodes(page->report->net)) { /* no h, and the direction comes with every sample */
+  if (fx_net_constants_per_sample(page->report->net)) { /* no h, and the direction comes with every sample */
     fprintf(out, "</div>\n");
     return;
   }

@@ -49,8 +49,8 @@ static void add_rates(cJSON *json, const sf_page *page)
   sf_json_add_u64(json, "rate_samples", page->sampled);
   cJSON *rates = cJSON_AddObjectToObject(json, "rate_bins");
   for (int l = 0; l < SF_LAYERS; l++) {
-    if (!html_spiking(l)) continue;
-    cJSON *steps = cJSON_AddArrayToObject(rates, sf_layer_names[l]);
+    if (!fx_layer_fires(l)) continue;
+    cJSON *steps = cJSON_AddArrayToObject(rates, fx_layer_name(l));
     for (int t = 0; t < page->report->net->steps; t++) {
       int bin[SF_PAGE_BINS];
       html_rate_bins(page, l, t, bin);

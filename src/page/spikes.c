@@ -19,7 +19,7 @@ static void raster(FILE *out, const sf_page *page, int l)
                cell = (sample - gap) / steps;
   uint64_t spikes = 0;
   char title[64];
-  snprintf(title, sizeof title, "Spikes of layer %s", sf_layer_names[l]);
+  snprintf(title, sizeof title, "Spikes of layer %s", fx_layer_name(l));
   svg_begin(out, raster_id[l], WIDTH, TOP + ROW * n + 36, title,
             "Neurons from top to bottom, samples and steps from left to right");
   fprintf(out, "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" class=\"field\"/>\n<path class=\"tick l%d\" d=\"",
@@ -32,7 +32,7 @@ static void raster(FILE *out, const sf_page *page, int l)
         spikes++;
       }
   fprintf(out, "\"/>\n");
-  svg_text(out, LEFT, 13, "lab", "%s", sf_layer_names[l]);
+  svg_text(out, LEFT, 13, "lab", "%s", fx_layer_name(l));
   svg_text(out, WIDTH, 13, "num end", "%.1f %% fire", 100.0 * (double)spikes / ((double)ray->samples * steps * n));
   svg_text(out, LEFT - 5, TOP + 10, "num mut end", "0");
   svg_text(out, LEFT - 5, TOP + ROW * n, "num mut end", "%d", n - 1);
@@ -54,7 +54,7 @@ static void raster_figure(FILE *out, const sf_page *page)
       page->report->net->steps, page->report->net->steps == 1 ? "" : "s");
   html_figure_begin(out, "fig-raster", "trio", "Spikes along one ray.", caption);
   for (int l = 0; l < SF_LAYERS; l++)
-    if (html_spiking(l) && page->report->net->layer[l].n_out > 0) raster(out, page, l);
+    if (fx_layer_fires(l) && page->report->net->layer[l].n_out > 0) raster(out, page, l);
   html_figure_end(out);
 }
 
@@ -81,10 +81,10 @@ static void rates(FILE *out, const sf_page *page, int l)
     for (int b = 0; b < SF_PAGE_BINS; b++) top = bin[t][b] > top ? bin[t][b] : top;
   }
   char title[64], tip[96], key[48];
-  snprintf(title, sizeof title, "Firing rates of layer %s", sf_layer_names[l]);
+  snprintf(title, sizeof title, "Firing rates of layer %s", fx_layer_name(l));
   svg_begin(out, rates_id[l], WIDTH, TOP + STEP * steps + 34, title,
             "Histogram of the firing rates of the neurons, one per step");
-  svg_text(out, 0, 13, "lab", "%s", sf_layer_names[l]);
+  svg_text(out, 0, 13, "lab", "%s", fx_layer_name(l));
   svg_text(out, WIDTH, 13, "num mut end", "highest bar: %d of %d neurons", top, n);
   for (int t = 0; t < steps; t++) {
     const double y = TOP + STEP * t + 24 + PLOT, w = WIDTH / (double)SF_PAGE_BINS;
@@ -96,7 +96,7 @@ static void rates(FILE *out, const sf_page *page, int l)
       snprintf(style, sizeof style, "bar l%d", l);
       snprintf(tip, sizeof tip, "%d neurons fire in %d to %d %% of the samples at step %d", bin[t][b],
                b * 100 / SF_PAGE_BINS, (b + 1) * 100 / SF_PAGE_BINS, t + 1);
-      snprintf(key, sizeof key, "page.rate_bins.%s[%d][%d]", sf_layer_names[l], t, b);
+      snprintf(key, sizeof key, "page.rate_bins.%s[%d][%d]", fx_layer_name(l), t, b);
       const double height = PLOT * bin[t][b] / (double)top;
       svg_bar(out, b * w, y - height, w - 1, height, style, key, (uint64_t)bin[t][b], tip);
     }
@@ -126,7 +126,7 @@ static void rates_figure(FILE *out, const sf_page *page)
       100 / SF_PAGE_BINS, html_count(text, page->sampled));
   html_figure_begin(out, "fig-rates", "trio", "Firing rates.", caption);
   for (int l = 0; l < SF_LAYERS; l++)
-    if (html_spiking(l) && page->report->net->layer[l].n_out > 0) rates(out, page, l);
+    if (fx_layer_fires(l) && page->report->net->layer[l].n_out > 0) rates(out, page, l);
   html_figure_end(out);
 }
 

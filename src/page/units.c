@@ -5,11 +5,9 @@
 /* How the price of an event came about; widths as in docs/energy.md. */
 static void width_basis(FILE *out, const fx_net *net, int row, int part)
 {
-  const bool integrates = row == FX_D2 || row == FX_C3;
-  const int state = row == FX_D2 ? SF_SIGMA_BITS : row == FX_C3 ? SF_COLOUR_BITS : SF_MEMBRANE_BITS;
   switch (part) {
   case SF_PART_MAC:
-    if (row == FX_D1 || row == FX_C1)
+    if (row < SF_LAYERS && !fx_layer_reads_spikes(row))
       fprintf(out, "%d \xc3\x97 %d bits, sum of %d; ", SF_INPUT_BITS, SF_WEIGHT_BITS,
               sf_sum_bits(&net->layer[row], true));
     fprintf(out, "twin 8 \xc3\x97 %d, sum of 32", SF_WEIGHT_BITS);
@@ -19,7 +17,7 @@ static void width_basis(FILE *out, const fx_net *net, int row, int part)
     break;
   case SF_PART_NEURON:
     fprintf(out, "%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
-            integrates ? "leak of an integrator" : "leak, compare, reset", state);
+            fx_layer_fires(row) ? "leak, compare, reset" : "leak of an integrator", fx_layer_table[row].state_bits);
     break;
   default:
     fprintf(out, "two products, two additions and two reads of a table of 1028 bytes");
@@ -61,7 +59,7 @@ static bool counted(const sf_page *page, int row, int part)
   const fx_counts *c = &page->report->measure.core;
   if (l->unit[SF_LEDGER_NEURON][row][part].fj == 0 && l->unit[SF_LEDGER_INT_ALL][row][part].fj == 0) return false;
   if (row >= SF_LAYERS) return true;
-  if (part == SF_PART_SOP) return row == FX_D2 || row == FX_C2 || row == FX_C3;
+  if (part == SF_PART_SOP) return fx_layer_reads_spikes(row);
   if (part == SF_PART_SPECIAL) return c->layer[row].special[0] > 0;
   return true;
 }
@@ -69,7 +67,7 @@ static bool counted(const sf_page *page, int row, int part)
 /* The layers of spikes have no MAC, the twin has no SOP and keeps nothing of its output. */
 static bool happens(int ledger, int row, int part)
 {
-  const bool of_spikes = row == FX_D2 || row == FX_C2 || row == FX_C3;
+  const bool of_spikes = row < SF_LAYERS && fx_layer_reads_spikes(row);
   if (ledger < SF_SPIKING_LEDGERS) return part != SF_PART_MAC || !of_spikes;
   return part != SF_PART_SOP && (row != FX_C3 || (part != SF_PART_STATE && part != SF_PART_NEURON));
 }

@@ -1,9 +1,9 @@
 #include "src/quant/tensorf.h"
+#include "render/composite.h"
 #include <math.h>
 #include <string.h>
 
 enum { MAX_SAMPLES = 1024 };
-static const double TRANS_STOP = 1e-4; /* as sf_render_rays */
 
 double sf_fx_sigma_value(const fx_scene *scene, uint32_t sigma)
 {
@@ -136,7 +136,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->net.steps = options->steps ? options->steps : model->t_r;
   set_steps(scene, &model->config);
   scene->max_samples = MAX_SAMPLES;
-  scene->trans_stop = (int32_t)floor(ldexp(TRANS_STOP, SF_TRANS_FRAC));
+  scene->trans_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
   for (int o = 0; o < 3; o++) {
     scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
     scene->to_box_offset[o] = 0.5;

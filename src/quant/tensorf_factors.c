@@ -5,12 +5,13 @@
  *
  * Roundings of both weigh the same in the product where p rms(line) = l rms(plane). */
 #include "src/quant/tensorf.h"
+#include "render/composite.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, BASIS_FRAC = 15, PHASE_FRAC = 16, ACTIVATION_FRAC = 20 };
-static const double UNIT_STEP = 0.85, WEIGHT_STOP = 1e-4, TWO_PI = 6.283185307179586;
+static const double UNIT_STEP = 0.85, TWO_PI = 6.283185307179586;
 
 typedef struct component {
   double plane_max, plane_rms, line_max, line_rms;
@@ -297,5 +298,5 @@ void sf_tensorf_set_scalars(fx_scene *scene, const sf_model *model)
   to->near = from->near, to->far = from->far;
   scene->step_q24 = (int32_t)nearbyint(ldexp(sf_tensorf_step(from) / edge, SF_DELTA_FRAC));
   to->activation = from->activation == SF_RELU ? FX_RELU : FX_SOFTPLUS;
-  to->weight_stop = (int32_t)floor(ldexp(WEIGHT_STOP, SF_TRANS_FRAC));
+  to->weight_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
 }

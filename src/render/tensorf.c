@@ -1,6 +1,7 @@
 /* Rendering of a TensoRF model: a ray's weights come from its densities alone, so the samples that count are known
  * before the decoder sees any; they fill blocks across rays. */
 #include "base/memory.h"
+#include "render/composite.h"
 #include "render/render.h"
 #include "render/view.h"
 #include "render/vm_ray.h"
@@ -60,7 +61,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   for (int c = 0; c < 3; c++) rgb[c] = behind * background[c];
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
-    if (w->samples.weight[s] <= sf_vm_weight_stop) continue;
+    if (w->samples.weight[s] <= sf_opaque) continue;
     decoded++;
     memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));
     w->weight[w->fill] = w->samples.weight[s];

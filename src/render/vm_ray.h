@@ -6,9 +6,6 @@
 
 enum { SF_RAY_SAMPLES = SF_STEPS_MAX }; /* of a ray at most */
 
-/* Samples whose weight is at most this never reach the decoder; a ray ends where its transmittance is below. */
-static const float sf_vm_weight_stop = 1e-4f;
-
 /* The samples of a ray in occupied cells, front to back, until it is opaque; each array has room for SF_RAY_SAMPLES. */
 typedef struct sf_vm_samples {
   float *x;             /* [n][3] in [0,1]^3 */

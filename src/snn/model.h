@@ -167,7 +167,7 @@ void sf_net_sample(const sf_model *model, const float *f, const float *sh, int s
 /* Renders `count` rays on all threads through the vector kernels, the first `steps` steps (0 = t_r).
  * origin, direction [count][3]; rgb [count][3], depth, alpha, samples [count] (each may be NULL but rgb).
  * samples: those that the nets see; of TensoRF, those that the decoder sees.
- * background: 3 floats. Empty space is skipped; rays stop at transmittance < 1e-4. */
+ * background: 3 floats. Empty space is skipped; rays stop where the light is gone (sf_opaque). */
 sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
                          const float background[3], float *rgb, float *depth, float *alpha, float *samples);
 #endif

@@ -1,6 +1,6 @@
 /* One point of a sweep: a model at some widths against its float field and against the picture. */
 #include "energy/energy.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include "golden/golden.h"
 #include "sweep/sweep.h"
 #include <math.h>
@@ -183,10 +183,9 @@ static int state_bits(const bench *b, int layer)
 {
   const sf_quant_widths *w = &b->report.widths;
   const int64_t rows = (int64_t)b->scene.net.layer[layer].n_in * ((1 << (w->weight_bits - 1)) - 1);
-  return layer == FX_D2   ? SF_SIGMA_BITS
-         : layer == FX_C3 ? SF_COLOUR_BITS
-         : layer == FX_C2 ? signed_bits(rows << SF_AC_FRAC)
-                          : signed_bits(rows * ((1 << (w->feature_bits - 1)) - 1));
+  return !fx_layer_fires(layer)         ? fx_layer_table[layer].state_bits
+         : fx_layer_reads_spikes(layer) ? signed_bits(rows << SF_AC_FRAC)
+                                        : signed_bits(rows * ((1 << (w->feature_bits - 1)) - 1));
 }
 
 /* Events of the audit, each with the width that it has here; the audit itself counts whole bytes of the accelerator. */

@@ -1,10 +1,8 @@
 /* Samples that no light reaches leave the batch before the nets see them. */
 #include "train/internal.h"
+#include "render/composite.h"
 #include <omp.h>
 #include <string.h>
-
-/* Natural logarithm of the transmittance at which rendering stops, 1e-4. */
-static const float opaque = -9.2103404f;
 
 /* Samples of a ray up to where every composited prefix is opaque. */
 static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta, const sf_block *block)
@@ -14,7 +12,7 @@ static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta,
     if (!sf_loss_needs(p, t)) continue;
     float depth = 0;
     int s = 0;
-    for (; s < ray->count && depth > opaque; s++)
+    for (; s < ray->count && depth > sf_opaque_log; s++)
       depth -= delta[s] * block[(ray->first + s) / SF_BLOCK].sigma[t - 1][(ray->first + s) % SF_BLOCK];
     if (s > count) count = s;
   }

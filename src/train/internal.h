@@ -117,7 +117,7 @@ typedef struct sf_search {
   double slope, level;     /* slow: slope of the curve of prefixes, and their mean error */
   double slope2, slope_level, level2;
   double firing[3], samples_per_frame, rays_per_sample; /* fast */
-  double at;                   /* share of the search at the last measurement */
+  double at;                                            /* share of the search at the last measurement */
   double mark, mark_at, moved; /* t* of a quarter of the search ago, where that was, and how far it moved in one */
 } sf_search;
 
@@ -203,7 +203,7 @@ void sf_batch_settle(sf_trainer *trainer);
 int sf_batch_blocks(int samples);
 /* Bundles of the rays' samples as they are counted now. */
 void sf_batch_pack(sf_batch *batch);
-/* Drops the samples behind which less than 1e-4 of the light is left in every prefix that the plan trains, as rendering
+/* Drops the samples behind which the light is gone (sf_opaque) in every prefix that the plan trains, as rendering
  * does: nothing of them would be seen or learned. Needs the features; moves samples and features together. */
 void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
 

@@ -1,7 +1,7 @@
 /* One iteration of PATA: draw, forward, losses, backward, Adam, time budget, occupancy. */
 #include "train/internal.h"
 #include "snn/plif.h"
-#include "cli/cli.h"
+#include "base/clock.h"
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 /* Rays of one iteration and their densities. Rays that meet no cell of the mask are drawn again: TensoRF filters its
  * rays once, which is the same choice without a list of pixels. */
 #include "train/vm.h"
+#include "render/composite.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,7 +46,7 @@ static void look(sf_trainer *t, int r, const sf_march *march, sf_vm_part *p)
   int kept = 0;
   memset(hit, 0, sizeof t->batch.hit[r]);
   for (int s = 0; s < n; s++)
-    if (p->weight[at + s] > sf_vm_weight_stop) {
+    if (p->weight[at + s] > sf_opaque) {
       hit[s / 64] |= (uint64_t)1 << s % 64;
       kept++;
     }

@@ -41,7 +41,7 @@ static void beats(const sf_cover *cover, group *g)
         for (int i = 0; i < 4; i++) {
           const bool saturated = i & 1, stalled = i >> 1;
           if (!possible(l, m, t, saturated)) continue;
-          snprintf(name, sizeof name, "%s %s step %d, %s, %s", sf_layer_names[l], mode_name[m], t,
+          snprintf(name, sizeof name, "%s %s step %d, %s, %s", fx_layer_name(l), mode_name[m], t,
                    saturated ? "saturated" : "in range", stalled ? "stalled" : "not stalled");
           bin(g, cover->beat[l][m][t][saturated][stalled], name);
         }
@@ -57,9 +57,9 @@ static void samples(const sf_cover *cover, group *steps, group *spikes)
     }
   for (int l = 0; l < SF_LAYERS; l++) {
     if (l == FX_D2 || l == FX_C3) continue;
-    snprintf(name, sizeof name, "%s silent", sf_layer_names[l]);
+    snprintf(name, sizeof name, "%s silent", fx_layer_name(l));
     bin(spikes, cover->silent[l], name);
-    snprintf(name, sizeof name, "%s all firing", sf_layer_names[l]);
+    snprintf(name, sizeof name, "%s all firing", fx_layer_name(l));
     bin(spikes, cover->full[l], name);
   }
 }

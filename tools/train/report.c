@@ -54,12 +54,12 @@ void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r)
 
 void train_warn(sf_progress *progress, const sf_train_stats *s)
 {
-  static const char *const layer[] = {"D1", "C1", "C2"};
-  for (int l = 0; l < 3; l++)
+  for (int l = 0; l < FX_SPIKING; l++)
     if (s->event[l]) {
       sf_progress_end(progress);
       fprintf(stderr, "sf_train: warning: iteration %lld: the neurons of %s %s: brought back to the threshold\n",
-              (long long)s->iteration, layer[l], s->event[l] < 0 ? "were silent" : "fired all the time");
+              (long long)s->iteration, fx_layer_name(fx_spiking_layers[l]),
+              s->event[l] < 0 ? "were silent" : "fired all the time");
     }
 }
 
