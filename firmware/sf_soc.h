@@ -1,5 +1,5 @@
-/* The reference system-on-chip: where the firmware finds what. The emulated system (sim/soc/soc.h) is built from the same
- * numbers; a port to another system changes them here and in link.ld. Macros, for C and assembler. */
+/* The reference system-on-chip: where the firmware finds what. The emulated system (sim/soc/soc.h) is built from the
+ * same numbers; a port to another system changes them here and in link.ld. Macros, for C and assembler. */
 #ifndef SF_FIRMWARE_SF_SOC_H
 #define SF_FIRMWARE_SF_SOC_H
 

@@ -1,4 +1,5 @@
 #include "sim/lockstep.h"
+#include "base/sha256.h"
 #include "sim/jobs.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
@@ -11,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y, STREAM_BLOCK, SAVE_SECONDS = 5 };
+enum { STREAM_BLOCK = SF_LOCKSTEP_STREAM, SAVE_SECONDS = 5 };
 
 typedef struct block {
   uint64_t rays; /* finished */
@@ -26,16 +27,6 @@ typedef struct checkpoint {
   uint64_t blocks, rays;
   sf_cosim_totals sum;
 } checkpoint;
-
-sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *l, uint64_t ray)
-{
-  const uint64_t seed = l->options.seed;
-  sf_lockstep_pixel p = {.view = (int)sf_random_below(seed, STREAM_VIEW, ray, (uint64_t)l->data.count)};
-  const sf_camera *camera = &l->data.view[p.view].camera;
-  p.x = (int)sf_random_below(seed, STREAM_X, ray, (uint64_t)camera->width);
-  p.y = (int)sf_random_below(seed, STREAM_Y, ray, (uint64_t)camera->height);
-  return p;
-}
 
 /* ---- one block, in a process of its own ---- */
 

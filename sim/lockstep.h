@@ -49,6 +49,7 @@ sf_status sf_lockstep_run(sf_lockstep *lockstep);
 typedef struct sf_lockstep_pixel {
   int view, x, y;
 } sf_lockstep_pixel;
+enum { SF_LOCKSTEP_STREAM = 4 }; /* of random numbers: the first that picking leaves free */
 sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *lockstep, uint64_t ray);
 void sf_lockstep_free(sf_lockstep *lockstep);
 

@@ -1,4 +1,5 @@
 #include "sim/other_dut.h"
+#include "base/sha256.h"
 #include "energy/energy.h"
 #include "base/io.h"
 #include <dirent.h>

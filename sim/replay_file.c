@@ -1,5 +1,6 @@
 /* Replay files. */
 #include "sim/replay.h"
+#include "base/sha256.h"
 #include "energy/energy.h"
 #include "base/io.h"
 #include <errno.h>

@@ -29,7 +29,7 @@ VERILATED_SIMD := -march=native $(if $(findstring clang,$(VERILATED_CXX)),,-ftre
 VERILATED_SIMD := $(shell $(VERILATED_CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/soc/*.c))
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/studio/*.c sim/soc/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
@@ -164,7 +164,7 @@ lanes: all firmware $B/faults/make_scene ## 32, 64, 256 lanes: samples, rays, fi
 .PHONY: lanes
 
 # The vector kit: writer, and the files that go with every kit.
-KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/packet.o \
+KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/kit/output.o $B/obj/sim/packet.o \
   $B/obj/firmware/sf_driver.o $B/kit/files.o
 KIT_FILES := sf_kit_tb.sv Makefile README.md
 $B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh

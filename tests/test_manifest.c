@@ -1,6 +1,7 @@
 /* The manifest of golden images: canonical hashes against values made by another program, round trips, every edit seen,
  * pixels located. */
 #include "ck_run.h"
+#include "base/sha256.h"
 #include "folder_fixture.h"
 #include "base/io.h"
 #include "golden/manifest.h"

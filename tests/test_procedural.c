@@ -218,12 +218,19 @@ END_TEST
 
 static sf_procedural_options small = {24, 20, 3, 2, 5};
 
-static void count_progress(void *user, int done, int total)
+static bool count_progress(void *user, int done, int total)
 {
   int *last = user;
   ck_assert_int_eq(done, *last + 1);
   ck_assert_int_eq(total, 5);
   *last = done;
+  return true;
+}
+
+static bool stop_at_two(void *user, int done, int total)
+{
+  (void)user, (void)total;
+  return done < 2;
 }
 
 /* Written, loaded, and each pixel equal to the mean of 4 x 4 exact rays. */
@@ -312,6 +319,8 @@ START_TEST(write_faults)
   ck_bad(sf_procedural_write("fog", in("x"), &none, NULL, NULL), SF_E_RANGE, "fog", "0 x 20");
   fclose(fopen(in("file"), "wb"));
   ck_bad(sf_procedural_write("fog", in("file"), &small, NULL, NULL), SF_E_IO, "/file", "Not a directory");
+  ck_bad(sf_procedural_write("fog", in("x"), &small, stop_at_two, NULL), SF_E_STOPPED, "interrupted",
+         "after 2 pictures");
   ck_bad(sf_procedural_write("mars", in("x"), &small, NULL, NULL), SF_E_USAGE, "mars", "empty");
   struct stat info;
   ck_assert_int_ne(stat(in("x"), &info), 0);

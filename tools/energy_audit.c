@@ -4,7 +4,7 @@
 #include "base/clock.h"
 #include "page/page.h"
 #include "base/io.h"
-#include "sim/audit_run.h"
+#include "sim/studio/audit_run.h"
 #include <inttypes.h>
 #include <omp.h>
 #include <stdlib.h>

@@ -11,11 +11,12 @@ typedef struct scene_args {
   bool list, quiet;
 } scene_args;
 
-static void show_progress(void *user, int done, int total)
+static bool show_progress(void *user, int done, int total)
 {
   sf_progress *progress = user;
   if (done == total || sf_progress_due(progress))
     sf_progress_show(progress, "rendering: %d of %d pictures", done, total);
+  return !sf_cli_interrupted();
 }
 
 static void print_names(void)

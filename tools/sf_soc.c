@@ -7,7 +7,7 @@
 #include "golden/golden.h"
 #include "base/io.h"
 #include "quant/quant.h"
-#include "sim/studio.h"
+#include "sim/studio/studio.h"
 #include <inttypes.h>
 #include <libgen.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
-#include "sim/view_set.h"
+#include "sim/studio/view_set.h"
 #include "cli/cli.h"
 #include "base/clock.h"
 #include "base/io.h"

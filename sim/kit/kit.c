@@ -1,5 +1,6 @@
 /* The folder: every file hashed as it is written, the manifest last. */
 #include "sim/kit/kit.h"
+#include "base/sha256.h"
 #include "energy/energy.h"
 #include "spikefield/spikefield.h"
 #include <stdlib.h>
@@ -8,38 +9,6 @@
 #include <unistd.h>
 
 #define MANIFEST "manifest.json"
-
-static sf_status path_of(const sf_kit_output *output, const char *name, char path[4096])
-{
-  if (snprintf(path, 4096, "%s/%s", output->folder, name) < 4096) return sf_ok();
-  return sf_fail(SF_E_RANGE, "%s: the path is too long", output->folder);
-}
-
-sf_status sf_kit_begin(const sf_kit_output *output, sf_kit_writer *file, const char *name)
-{
-  char path[4096];
-  file->name = name;
-  SF_TRY(path_of(output, name, path));
-  return sf_writer_open(&file->writer, path);
-}
-
-sf_status sf_kit_end(sf_kit_output *output, sf_kit_writer *file)
-{
-  struct stat info;
-  char path[4096], hash[65];
-  SF_TRY(path_of(output, file->name, path));
-  SF_TRY(sf_writer_commit(&file->writer));
-  SF_TRY(sf_sha256_file(path, hash));
-  if (stat(path, &info)) return sf_fail(SF_E_IO, "%s: cannot be read back", path);
-  cJSON *entry = cJSON_CreateObject();
-  cJSON_AddStringToObject(entry, "name", file->name);
-  cJSON_AddNumberToObject(entry, "bytes", (double)info.st_size);
-  cJSON_AddStringToObject(entry, "sha256", hash);
-  cJSON_AddItemToArray(output->list, entry);
-  output->files++;
-  output->bytes += (uint64_t)info.st_size;
-  return sf_ok();
-}
 
 /* ---- files of the source tree ---- */
 
@@ -120,7 +89,7 @@ static sf_status write_manifest(const sf_kit_output *output, const sf_kit_draw *
                                 const sf_kit_options *o, const sf_kit_report *report)
 {
   char path[4096];
-  SF_TRY(path_of(output, MANIFEST, path));
+  SF_TRY(sf_kit_path(output, MANIFEST, path));
   cJSON *json = cJSON_CreateObject();
   cJSON_AddStringToObject(json, "format", "spikefield-vectors");
   cJSON_AddNumberToObject(json, "version", SF_KIT_VERSION);
@@ -144,9 +113,9 @@ static sf_status write_folder(sf_kit_output *output, const sf_kit_draw *draw, co
                               const sf_kit_options *options, sf_kit_report *report)
 {
   char path[4096];
-  SF_TRY(path_of(output, "rtl/gen", path));
+  SF_TRY(sf_kit_path(output, "rtl/gen", path));
   SF_TRY(sf_make_dir(path));
-  SF_TRY(path_of(output, MANIFEST, path));
+  SF_TRY(sf_kit_path(output, MANIFEST, path));
   unlink(path); /* a folder without one is not whole */
   SF_TRY(sf_kit_images(output, draw, options, report));
   SF_TRY(copy_files(output));

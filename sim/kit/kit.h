@@ -74,6 +74,7 @@ typedef struct sf_kit_writer {
   sf_writer writer;
   const char *name;
 } sf_kit_writer;
+sf_status sf_kit_path(const sf_kit_output *output, const char *name, char path[4096]);
 sf_status sf_kit_begin(const sf_kit_output *output, sf_kit_writer *file, const char *name);
 sf_status sf_kit_end(sf_kit_output *output, sf_kit_writer *file);
 

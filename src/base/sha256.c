@@ -1,5 +1,4 @@
-/* SHA-256 (FIPS 180-4): names the scene a picture or a report was made from. */
-#include "energy/energy.h"
+#include "base/sha256.h"
 #include "base/io.h"
 #include <stdlib.h>
 #include <string.h>

@@ -2,6 +2,7 @@
 #include "quant/quant.h"
 #include "bounds/budget_blocks.h"
 #include "src/fx/unit.h"
+#include <string.h>
 
 /* ---- nets ---- */
 

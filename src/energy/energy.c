@@ -1,5 +1,5 @@
 #include "energy/energy.h"
-#include "bounds/saturate.h"
+#include "base/saturate.h"
 #include <math.h>
 
 const sf_event sf_events[SF_EVENTS] = {

@@ -217,8 +217,4 @@ void sf_comparison_print(FILE *out, const cJSON *comparison);
 bool sf_saturation_unexpected(const fx_net *net, const uint64_t saturated[SF_LAYERS], char *list, size_t size);
 /* "none", or "D2 12 samples, 3 features": samples with a saturation per layer, grid features that were clipped. */
 void sf_saturation_census(const uint64_t samples[SF_LAYERS], uint64_t features, char *text, size_t size);
-
-/* SHA-256 of a file, as sha256sum prints it. */
-sf_status sf_sha256_file(const char *path, char hex[65]);
-void sf_sha256(const void *data, size_t size, char hex[65]);
 #endif

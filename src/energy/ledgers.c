@@ -1,7 +1,7 @@
 /* Events times prices. A ledger is one list of prices per row and part, laid over the counts of the spiking net or of
  * its twin; everything else (savings, break-even, sensitivity) follows from these products. */
 #include "energy/energy.h"
-#include "bounds/saturate.h"
+#include "base/saturate.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* The twin's own samples, from its float rendering. */
 #include "energy/energy.h"
 #include "snn/model.h"
-#include "bounds/saturate.h"
+#include "base/saturate.h"
 #include <stdlib.h>
 
 enum { CHUNK = 4096 };

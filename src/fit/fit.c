@@ -371,7 +371,8 @@ static sf_status run(search *s, fx_scene *fitted, sf_fit_report *report)
 {
   SF_TRY(choose_candidate(s, &report->chosen));
   if (!s->reference.counts.samples)
-    return sf_fail(SF_E_RANGE, "%s: no ray of the data set meets an occupied cell: is it another scene's?", s->job->name);
+    return sf_fail(SF_E_RANGE, "%s: no ray of the data set meets an occupied cell: is it another scene's?",
+                   s->job->name);
   SF_TRY(observe(s));
   sf_trim_all(s->scene, &s->trim);
   sf_trim_exact(s->scene, &s->use, &s->trim);

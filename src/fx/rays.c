@@ -27,16 +27,6 @@ typedef struct wave {
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
 } wave;
 
-int32_t fx_core_march(const fx_core *core, const fx_ray *ray, int32_t n, uint32_t pos[3], fx_counts *counts)
-{
-  const int32_t found = core->kernels->march(core->scene, ray, n);
-  if (n < ray->count) counts->march_steps += (uint64_t)(found - n + (found < ray->count));
-  if (found >= ray->count) return -1;
-  for (int axis = 0; axis < 3; axis++)
-    pos[axis] = (uint32_t)(fx_ray_at(core->scene, ray, found, axis) >> (FX_RAY_FRAC - SF_POS_FRAC));
-  return found;
-}
-
 /* Moves slot i to the next occupied point from n on; false at the end of the ray. */
 static bool advance(wave *w, int i, int32_t n)
 {
@@ -73,21 +63,6 @@ static void end_ray(wave *w, int i)
   w->slot[i] = w->slot[last];
   w->slot[last] = ended;
   for (int axis = 0; axis < 3; axis++) w->block.pos[axis][i] = w->block.pos[axis][last];
-}
-
-void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *counts, fx_cost *cost)
-{
-  const fx_layer *layer = core->scene->net.layer;
-  for (int l = 0; l < SF_LAYERS; l++) {
-    counts->saturated[l] += b->saturated[l][i];
-    counts->saturated_samples[l] += b->saturated[l][i] != 0;
-  }
-  if (!cost) return;
-  const uint64_t d1 = b->fired[0][i], c1 = b->fired[1][i], c2 = b->fired[2][i];
-  cost->macs += fx_macs_of_sample(&core->scene->net);
-  cost->spikes += d1 + c1 + c2;
-  cost->sops +=
-      d1 * (uint64_t)layer[FX_D2].n_out + c1 * (uint64_t)layer[FX_C2].n_out + c2 * (uint64_t)layer[FX_C3].n_out;
 }
 
 /* Adds the sample to its ray; true when the ray goes on. */

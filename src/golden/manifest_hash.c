@@ -1,5 +1,6 @@
 /* Canonical bytes: least significant first, whatever the machine. */
 #include "golden/manifest.h"
+#include "base/sha256.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,7 @@
 /* What the page shows beyond the audit: the view at every number of steps, the spikes of one ray, the rates of the
  * neurons. */
 #include "page/page.h"
+#include "base/sha256.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

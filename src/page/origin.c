@@ -1,5 +1,6 @@
 /* What must be known to repeat the audit, and the page's own stylesheet and script. */
 #include "page/internal.h"
+#include "base/sha256.h"
 #include "spikefield/spikefield.h"
 #include <string.h>
 

@@ -13,21 +13,6 @@ void sf_capture_free(sf_capture *capture)
   memset(capture, 0, sizeof *capture);
 }
 
-sf_status sf_warn(sf_dataset *data, const char *format, ...)
-{
-  char(*larger)[400] = realloc(data->warning, (size_t)(data->warnings + 1) * sizeof *larger);
-  if (!larger) return sf_fail(SF_E_MEMORY, "no memory for a warning");
-  data->warning = larger;
-  char text[400];
-  va_list args;
-  va_start(args, format);
-  vsnprintf(text, sizeof text, format, args);
-  va_end(args);
-  const sf_status line = sf_fail(SF_E_RANGE, "%s", text); /* keeps it to one line */
-  memcpy(data->warning[data->warnings++], line.message, sizeof line.message);
-  return sf_ok();
-}
-
 bool sf_dataset_has_warning(const sf_dataset *data, const char *text)
 {
   int i = 0;

@@ -1,5 +1,4 @@
 /* Procedural scenes in the Blender layout. */
-#include "cli/cli.h"
 #include "base/io.h"
 #include "base/rng.h"
 #include "scene/scene.h"
@@ -134,14 +133,14 @@ typedef struct writing {
   const char *dir;
   sf_stage stage;
   int done;
-  void (*progress)(void *user, int done, int total);
+  bool (*progress)(void *user, int done, int total);
   void *user;
 } writing;
 
 static sf_status write_views(writing *job, const char *split, int split_index, int count, cJSON *frames)
 {
+  const int all = job->options->train_views + job->options->test_views;
   for (int i = 0; i < count; i++) {
-    if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "interrupted after %d pictures", job->done);
     char path[4096], file_path[64];
     sf_camera camera;
     snprintf(file_path, sizeof file_path, "./%s/r_%d", split, i);
@@ -151,7 +150,8 @@ static sf_status write_views(writing *job, const char *split, int split_index, i
     SF_TRY(render_view(&job->stage, &camera, path));
     if (!add_frame(frames, file_path, &camera)) return sf_fail(SF_E_MEMORY, "%s: no memory", path);
     job->done++;
-    if (job->progress) job->progress(job->user, job->done, job->options->train_views + job->options->test_views);
+    if (job->progress && !job->progress(job->user, job->done, all) && job->done < all)
+      return sf_fail(SF_E_STOPPED, "interrupted after %d pictures", job->done);
   }
   return sf_ok();
 }
@@ -176,7 +176,7 @@ static sf_status write_split(writing *job, const char *split, int split_index, i
 }
 
 sf_status sf_procedural_write(const char *name, const char *dir, const sf_procedural_options *options,
-                              void (*progress)(void *user, int done, int total), void *user)
+                              bool (*progress)(void *user, int done, int total), void *user)
 {
   writing job = {.options = options, .dir = dir, .progress = progress, .user = user};
   int index;

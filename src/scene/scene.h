@@ -101,9 +101,10 @@ typedef struct sf_procedural_options {
   uint64_t seed; /* camera positions */
 } sf_procedural_options;
 extern const char *const sf_procedural_names[];
-/* Writes the Blender layout below dir. progress may be NULL. */
+/* Writes the Blender layout below dir. progress may be NULL; it is called after each picture, and false stops:
+ * SF_E_STOPPED. */
 sf_status sf_procedural_write(const char *name, const char *dir, const sf_procedural_options *options,
-                              void (*progress)(void *user, int done, int total), void *user);
+                              bool (*progress)(void *user, int done, int total), void *user);
 /* Exact colour along one ray (world units), straight alpha RGBA in 0..1. */
 sf_status sf_procedural_trace(const char *name, const float origin[3], const float direction[3], float rgba[4]);
 #endif

@@ -1,5 +1,5 @@
 /* Gnuplot scripts of a sweep, with their data inside. */
-#include "report/internal.h"
+#include "report/plot.h"
 #include "base/io.h"
 #include "sweep/sweep.h"
 #include <math.h>

@@ -280,18 +280,6 @@ static sf_status check_gradient(const sf_trainer *t, double loss)
   return sf_ok();
 }
 
-sf_status sf_parameters_check(const sf_trainer *t)
-{
-  for (int i = t->backbone->nets; i < t->model.params; i++)
-    for (size_t j = 0; j < t->model.param[i].size; j++) {
-      const float value = t->model.value[t->model.param[i].offset + j];
-      if (!(fabsf(value) < 1e6f))
-        return sf_fail(SF_E_RANGE, "train: iteration %lld: '%s' has diverged: %g at index %zu", (long long)t->iteration,
-                       t->model.param[i].name, value, j);
-    }
-  return sf_ok();
-}
-
 /* The iteration's part of its stage: 1 / iterations, or the last iteration's share of the time budget. */
 static double stage_share(const sf_trainer *t)
 {

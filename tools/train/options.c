@@ -1,7 +1,7 @@
 #include "tools/train/options.h"
 #include "base/io.h"
 #include "quant/quant.h"
-#include "base/record.h"
+#include "cli/record.h"
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>

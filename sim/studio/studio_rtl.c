@@ -1,5 +1,5 @@
 #include "sim/compare.h"
-#include "sim/studio.h"
+#include "sim/studio/studio.h"
 #include <string.h>
 
 enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */

@@ -1,4 +1,4 @@
-#include "base/record.h"
+#include "cli/record.h"
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

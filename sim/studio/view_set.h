@@ -1,7 +1,7 @@
 /* All views of a split: rendered into a folder with a manifest, or rendered again and compared with one. */
 #ifndef SF_SIM_VIEW_SET_H
 #define SF_SIM_VIEW_SET_H
-#include "sim/studio.h"
+#include "sim/studio/studio.h"
 #include "golden/manifest.h"
 
 #define SF_MANIFEST_NAME "manifest.json"

@@ -1,4 +1,5 @@
-#include "sim/audit_run.h"
+#include "sim/studio/audit_run.h"
+#include "base/sha256.h"
 #include "quant/quant.h"
 #include "base/rng.h"
 #include "sim/ray/three_counts.h"

@@ -1,4 +1,5 @@
-#include "sim/view_set.h"
+#include "sim/studio/view_set.h"
+#include "base/sha256.h"
 #include "base/io.h"
 #include <math.h>
 #include <stdlib.h>

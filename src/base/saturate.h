@@ -1,6 +1,6 @@
-/* Inside src/audit: sums and products of counts. UINT64_MAX absorbs: a total that overflowed once stays "too large". */
-#ifndef SF_BOUNDS_SATURATE_H
-#define SF_BOUNDS_SATURATE_H
+/* Sums and products of counts. UINT64_MAX absorbs: a total that overflowed once stays "too large". */
+#ifndef SF_BASE_SATURATE_H
+#define SF_BASE_SATURATE_H
 #include <stdint.h>
 
 static inline uint64_t sf_add_u64(uint64_t a, uint64_t b)

@@ -1,4 +1,4 @@
-#include "sim/view_set.h"
+#include "sim/studio/view_set.h"
 
 cJSON *sf_verdict_json(const sf_verdict *v)
 {

@@ -1,4 +1,5 @@
-#include "sim/studio.h"
+#include "sim/studio/studio.h"
+#include "base/sha256.h"
 #include "quant/quant.h"
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Options of a command line kept in a safetensors file's metadata, so that a later command goes on with them. The key
  * of --beta is "option.beta". */
-#ifndef SF_BASE_RECORD_H
-#define SF_BASE_RECORD_H
+#ifndef SF_CLI_RECORD_H
+#define SF_CLI_RECORD_H
 #include "cli/cli.h"
 #include "base/io.h"
 
