@@ -173,7 +173,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli golden_set chain reproduce quality pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
+	@tests/run.sh $B $(TESTS) cli house golden_set chain reproduce quality pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
@@ -189,6 +189,11 @@ asan-run: $(ASAN_TESTS:%=$B/tests/%) $(FUZZ_REPLAYS)
 include sim/coverage.mk
 include tests/formal/formal.mk
 include tests/mutate/mutate.mk
+
+house: all ## the order of rooms (README's map), format, sentences of the documents
+	@! command -v python3 >/dev/null || { tools/check_rooms.py $B && tools/check_prose.py README.md docs/*.md rtl/README.md; }
+	@if ! command -v clang-format >/dev/null; then echo "  house: clang-format is not installed, the format is not checked"; \
+	else clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); fi
 
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
@@ -257,6 +262,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report quality pareto bench vectors error-budget format clean help lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

@@ -133,7 +133,7 @@ endif
 
 # Of sf_top's parameter, as far as the package goes.
 LANES_BUILT := $(if $(findstring LANES=256,$(ARCH_DEFINES)),32 64 128 256,32 64 128)
-lint: $(RTL_READY) ## Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
+lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
 	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv

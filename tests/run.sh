@@ -36,6 +36,7 @@ run() {
     audit_report) command=("$here/audit_report.sh" "$build") ;;
     audit_faults) command=("$here/audit_faults.sh" "$build") ;;
     cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
+    house) command=("$here/house.sh" "$build") ;;
     synth) command=("$here/test_synth.sh") ;;
     package) command=("$here/test_package.sh") ;;
     safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;

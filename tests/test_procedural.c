@@ -319,7 +319,7 @@ START_TEST(write_faults)
   ck_bad(sf_procedural_write("fog", in("x"), &none, NULL, NULL), SF_E_RANGE, "fog", "0 x 20");
   fclose(fopen(in("file"), "wb"));
   ck_bad(sf_procedural_write("fog", in("file"), &small, NULL, NULL), SF_E_IO, "/file", "Not a directory");
-  ck_bad(sf_procedural_write("fog", in("x"), &small, stop_at_two, NULL), SF_E_STOPPED, "interrupted",
+  ck_bad(sf_procedural_write("fog", in("stopped"), &small, stop_at_two, NULL), SF_E_STOPPED, "interrupted",
          "after 2 pictures");
   ck_bad(sf_procedural_write("mars", in("x"), &small, NULL, NULL), SF_E_USAGE, "mars", "empty");
   struct stat info;

@@ -116,7 +116,8 @@ def main():
     for group in circles(calls):
         faults.append(f"a circle of calls: {', '.join(group)}")
         faults += [f"  {a} -> {b}: {', '.join(names)}" for (a, b), names in sorted(calls.items()) if a in group and b in group]
-    print("\n".join(faults), file=sys.stderr)
+    for fault in faults:
+        print(fault, file=sys.stderr)
     sys.exit(1 if faults else 0)
 
 

@@ -1,0 +1,47 @@
+#!/bin/bash
+# The checks of the house see what they are for: a small house, in order and with each fault planted.
+# usage: house.sh BUILD
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tools=$PWD/tools
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "house: $1" >&2; exit 1; }
+cd "$work"
+git init -q .
+
+house() { # the house in order: src/up calls src/low
+  rm -rf README.md src build
+  mkdir -p src/low src/up build/obj/src/low build/obj/src/up
+  printf '# x\n\n## Map of the house\n\n    src/low/   below\n    src/up/    above it\n\n## End\n' >README.md
+  echo 'int low(void);' >src/low/low.h
+  printf '#include "low/low.h"\nint low(void) { return 1; }\n' >src/low/low.c
+  printf '#include "low/low.h"\nint up(void) { return low(); }\n' >src/up/up.c
+}
+build() { for file in src/*/*.c; do gcc -Isrc -c "$file" -o "build/obj/${file%.c}.o"; done; }
+expect() { # PATTERN: the check fails and says so
+  build
+  ! "$tools/check_rooms.py" build 2>said || fail "not seen: $1"
+  grep -q -- "$1" said || { cat said >&2; fail "not named: $1"; }
+}
+
+house && build
+"$tools/check_rooms.py" build || fail "a house in order is refused"
+echo 'int up(void);' >src/up/up.h && sed -i '1i #include "up/up.h"' src/low/low.c
+expect 'src/low/low.c: includes src/up/up.h, which stands below it'
+house
+printf 'int up(void);\nint low(void) { return up(); }\n' >src/low/low.c && printf 'int up(void) { return 1; }\n' >src/up/up.c
+expect 'src/low/low.c: calls up of src/up/up.c, which stands below it'
+house
+printf 'int low(void);\nint other(void) { return low(); }\n' >src/low/other.c
+printf 'int other(void);\nint low(void) { return other(); }\n' >src/low/low.c
+expect 'a circle of calls: src/low/low.c, src/low/other.c'
+house
+mkdir -p src/shed build/obj/src/shed && echo 'int shed;' >src/shed/shed.c
+expect "src/shed/shed.c: in no room"
+
+printf 'Short. %s end.\n' "$(printf 'word %.0s' {1..40})" >long.md
+! "$tools/check_prose.py" long.md 2>said || fail "a sentence of 41 words is accepted"
+grep -q 'long.md:1: a sentence of 41 words' said || fail "a long sentence is not named"
+printf '| %s |\n\n    %s\n' "$(printf 'word %.0s' {1..40})" "$(printf 'word %.0s' {1..40})" >table.md
+"$tools/check_prose.py" table.md || fail "tables and code count as sentences"
