@@ -176,9 +176,9 @@ static sf_model full_model(sf_net_kind net, int steps)
   sf_model m;
   if (sf_model_create(&m, &c).code) exit(1);
   for (size_t i = 0; i < m.size; i++) m.value[i] = 0.1f * test_random(i);
-  for (int i = 0; i < 128 * 32; i++) sf_model_param(&m, SF_P_W1)[i] *= 5;
-  for (int i = 0; i < 128 * 31; i++) sf_model_param(&m, SF_P_W3)[i] *= 10;
-  for (int i = 0; i < 128 * 128; i++) sf_model_param(&m, SF_P_W4)[i] *= 3.5f;
+  for (int i = 0; i < 128 * 32; i++) sf_model_param(&m, SF_P_D1)[i] *= 5;
+  for (int i = 0; i < 128 * 31; i++) sf_model_param(&m, SF_P_C1)[i] *= 10;
+  for (int i = 0; i < 128 * 128; i++) sf_model_param(&m, SF_P_C2)[i] *= 3.5f;
   return m;
 }
 

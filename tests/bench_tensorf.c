@@ -44,8 +44,8 @@ static double field(const field_rig *r, const sf_kernels *k)
 #pragma omp parallel for schedule(dynamic, 1)
     for (int mode = 0; mode < 3; mode++)
       k->vm_backward(&f, mode, 0, 16, r->x, SAMPLES, r->slope, 0,
-                     r->grad + r->model.param[SF_V_DENSITY_PLANE + mode].offset,
-                     r->grad + r->model.param[SF_V_DENSITY_LINE + mode].offset);
+                     r->grad + r->model.param[SF_P_DENSITY_PLANE + mode].offset,
+                     r->grad + r->model.param[SF_P_DENSITY_LINE + mode].offset);
     best = fmin(best, sf_seconds() - start);
   }
   return SAMPLES / best;
@@ -62,7 +62,7 @@ static sf_status bench_field(cJSON *json, const ceilings *c)
   r.slope = sf_aligned_alloc(SAMPLES * sizeof(float));
   r.grad = sf_aligned_alloc(r.model.size * sizeof(float));
   if (r.x && r.sigma && r.slope && r.grad) {
-    for (size_t i = 0; i < r.model.param[SF_V_APP_PLANE].offset; i++)
+    for (size_t i = 0; i < r.model.param[SF_P_APP_PLANE].offset; i++)
       r.model.value[i] = sf_random_float(2, 2, i) - 0.5f;
     put_rays(&r.model, r.x);
     put(json, "train.tensorf.field", field(&r, sf_kernels_training()), "samples/s", c->fma / (4 * 18 * 16),

@@ -68,8 +68,8 @@ static sf_picture_budget make_picture(sf_model *m)
   const sf_picture_job job = {m, &scene, &data, &view, "scene", 60, 3, NULL, NULL};
   const sf_status status = sf_picture_budget_make(&job, &budget);
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  float *w4 = sf_model_param(m, SF_P_W4);
-  const size_t last = m->param[SF_P_W4].size - 1;
+  float *w4 = sf_model_param(m, SF_P_C2);
+  const size_t last = m->param[SF_P_C2].size - 1;
   for (size_t i = 0; i <= last / 2; i++) { /* another model's */
     const float other = w4[i];
     w4[i] = w4[last - i], w4[last - i] = other;

@@ -583,7 +583,7 @@ END_TEST
 /* Smooth blobs: what training makes is smooth, too. */
 static void smooth(sf_model *m)
 {
-  for (int id = 0; id < SF_V_BASIS; id++) {
+  for (int id = 0; id < SF_P_BASIS; id++) {
     const sf_param *p = &m->param[id];
     const int n = (int)p->shape[p->dims - 1], width = (int)p->shape[p->dims - 2],
               height = p->dims == 3 ? (int)p->shape[0] : 1;
@@ -608,7 +608,7 @@ static sf_model smooth_model(int ndc)
   c.tensorf.distance_scale = ndc ? 1 : 6;
   sf_model larger;
   ck_assert_int_eq(sf_model_create(&larger, &c).code, SF_OK);
-  for (int id = SF_V_BASIS; id < larger.params; id++)
+  for (int id = SF_P_BASIS; id < SF_P_COUNT; id++)
     memcpy(sf_model_param(&larger, id), sf_model_param(&m, id), larger.param[id].size * sizeof(float));
   smooth(&larger);
   larger.t_r = 3;
@@ -688,10 +688,10 @@ START_TEST(what_cannot_be_represented_is_refused)
   sf_model m = smooth_model(0);
   fx_scene scene;
   sf_quant_options options = {.seed = 1};
-  sf_model_param(&m, SF_V_APP_LINE + 1)[5] = NAN;
+  sf_model_param(&m, SF_P_APP_LINE + 1)[5] = NAN;
   sf_status status = sf_quantise(&scene, &m, "m.safetensors", &options);
   ck_assert_msg(status.code == SF_E_RANGE && strstr(status.message, "'app_line.1'"), "%s", status.message);
-  sf_model_param(&m, SF_V_APP_LINE + 1)[5] = 0;
+  sf_model_param(&m, SF_P_APP_LINE + 1)[5] = 0;
   options.widths.feature_bits = 9;
   status = sf_quantise(&scene, &m, "m.safetensors", &options);
   ck_assert_msg(status.code == SF_E_UNSUPPORTED && strstr(status.message, "features"), "%s", status.message);

@@ -448,7 +448,7 @@ START_TEST(tensorf_gives_the_spikes_of_the_oracle)
       need(&shared, "inputs")->out[i] = (double)values[i];
     }
     memset(&trace, 0, sizeof trace);
-    sf_tensorf_decode(&m, values, STEPS, colour, &trace);
+    sf_net_sample(&m, values, NULL, STEPS, NULL, colour, &trace);
     certain += same_as_oracle(&shared, &trace, STEPS);
   }
   ck_assert_int_ge(certain, SAMPLES / 2);

@@ -36,11 +36,11 @@ static sf_model make_model(int hidden, int levels, int mode)
   for (int l = 0; l < levels; l++)
     for (size_t i = 2 * m.level[l].offset; i < 2 * (m.level[l].offset + m.level[l].entries); i++)
       sf_model_param(&m, SF_P_GRID)[i] *= 0.8f / (float)(1 + l);
-  fill(&m, SF_P_W1, 1.2f);
-  fill(&m, SF_P_W2, 0.5f);
-  fill(&m, SF_P_W3, 0.5f);
-  fill(&m, SF_P_W4, 0.3f);
-  fill(&m, SF_P_W5, 0.3f);
+  fill(&m, SF_P_D1, 1.2f);
+  fill(&m, SF_P_D2, 0.5f);
+  fill(&m, SF_P_C1, 0.5f);
+  fill(&m, SF_P_C2, 0.3f);
+  fill(&m, SF_P_C3, 0.3f);
   fill(&m, SF_P_LEAK, 0.5f);
   m.t_r = 3;
   m.t_star = 3.2f;
@@ -274,7 +274,7 @@ START_TEST(refinement_lowers_the_held_out_error)
   for (int i = 0; i < SF_LANES; i++) ones[i] = 1;
   for (int i = 0; i < rows * 128; i++) x[i] = c.spikes[FX_C1][i];
   const sf_fit_data data = {rows, 128, 128, x, c.target[FX_C2]};
-  const sf_fit_weights weights = {sf_model_param(&m, SF_P_W4), 128, ones, 1e-9, 127, 0};
+  const sf_fit_weights weights = {sf_model_param(&m, SF_P_C2), 128, ones, 1e-9, 127, 0};
   sf_quant_layer rounded, refined;
   ck_assert_int_eq(sf_fit_layer(&data, &weights, false, q, &rounded).code, SF_OK);
   ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &refined).code, SF_OK);
@@ -471,7 +471,7 @@ START_TEST(narrow_inputs_never_clip)
   sf_model m = make_model(128, 2, SF_HYBRID);
   fx_scene scene;
   sf_quant_report report;
-  float *w3 = sf_model_param(&m, SF_P_W3), *grid = sf_model_param(&m, SF_P_GRID);
+  float *w3 = sf_model_param(&m, SF_P_C1), *grid = sf_model_param(&m, SF_P_GRID);
   memset(m.occupancy, 0, 512);
   m.occupancy[0] = 1; /* the first of 16^3 cells: the first 4 points of level 0 along every axis hold it */
   for (uint32_t i = 0; i < 2 * m.level[0].entries; i++) grid[i] *= 20;
@@ -479,8 +479,8 @@ START_TEST(narrow_inputs_never_clip)
     const uint32_t entry = (i % 4 ^ i / 4 % 4 * 2654435761u ^ i / 16 * 805459861u) % m.level[0].entries;
     grid[2 * entry] = grid[2 * entry + 1] = 0.5f;
   }
-  for (size_t i = 0; i < m.param[SF_P_W2].size; i++) sf_model_param(&m, SF_P_W2)[i] = 0.5f;
-  for (size_t i = 0; i < m.param[SF_P_W3].size; i++)
+  for (size_t i = 0; i < m.param[SF_P_D2].size; i++) sf_model_param(&m, SF_P_D2)[i] = 0.5f;
+  for (size_t i = 0; i < m.param[SF_P_C1].size; i++)
     if (i % (SF_DIR_FEATURES + SF_GEO_FEATURES) < SF_DIR_FEATURES) w3[i] = 0;
   quantise(&m, &scene, &report);
   ck_assert_int_gt(worst_h(&scene.net.layer[FX_D2]), 1023);

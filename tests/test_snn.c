@@ -69,7 +69,7 @@ static void rig_forward(rig *r, const sf_kernels *kernels, int keep)
 static const float gains[2] = {0.6f, 6.0f};
 static void drive(rig *r, float gain)
 {
-  for (size_t i = 0; i < r->model.param[SF_P_W3].size; i++) sf_model_param(&r->model, SF_P_W3)[i] *= gain;
+  for (size_t i = 0; i < r->model.param[SF_P_C1].size; i++) sf_model_param(&r->model, SF_P_C1)[i] *= gain;
 }
 
 /* Spikes per neuron of C1 at step t of the last forward pass. */
@@ -218,15 +218,15 @@ static float grad_at(const rig *r, sf_param_id id, size_t i)
 {
   const int hidden = r->model.config.hidden;
   switch (id) {
-  case SF_P_W1:
+  case SF_P_D1:
     return r->grad->w1[i / 8 * 16 + i % 8];
-  case SF_P_W2:
+  case SF_P_D2:
     return r->grad->w2[i];
-  case SF_P_W3:
+  case SF_P_C1:
     return r->grad->w3[i / 31 * 32 + i % 31 + (i % 31 >= 16)];
-  case SF_P_W4:
+  case SF_P_C2:
     return r->grad->w4[i] + r->grad->w4t[i % hidden * hidden + i / hidden];
-  case SF_P_W5:
+  case SF_P_C3:
     return r->grad->w5[i];
   default:
     return hidden ? r->grad->leak[i] : 0;
@@ -257,7 +257,7 @@ START_TEST(ann_gradient_is_the_slope)
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
   kernels->backward(r.net, r.block, 1, ds, dc, df, r.grad, r.scratch);
-  for (int id = SF_P_W1; id <= SF_P_W5; id++)
+  for (int id = SF_P_D1; id <= SF_P_C3; id++)
     for (size_t i = 0; i < r.model.param[id].size; i += 3) {
       double expected = slope(&r, id, i, 2e-3f, ds, dc), actual = grad_at(&r, id, i);
       ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.3, "%s[%zu]: slope %g, gradient %g",
@@ -277,9 +277,9 @@ START_TEST(snn_smooth_parts_match_the_slope)
     random_output_gradient(ds, dc);
     rig_forward(&r, kernels, 1);
     kernels->backward(r.net, r.block, 6, ds, dc, df, r.grad, r.scratch);
-    for (size_t i = 0; i < r.model.param[SF_P_W5].size; i += r.model.param[SF_P_W5].size / 19) {
-      double expected = slope(&r, SF_P_W5, i, 1e-2f, ds, dc);
-      ck_assert_double_eq_tol(grad_at(&r, SF_P_W5, i), expected, 0.01 * fabs(expected) + 0.05);
+    for (size_t i = 0; i < r.model.param[SF_P_C3].size; i += r.model.param[SF_P_C3].size / 19) {
+      double expected = slope(&r, SF_P_C3, i, 1e-2f, ds, dc);
+      ck_assert_double_eq_tol(grad_at(&r, SF_P_C3, i), expected, 0.01 * fabs(expected) + 0.05);
     }
     for (int leak = 1; leak <= 4; leak += 3) {
       double expected = slope(&r, SF_P_LEAK, leak, 1e-2f, ds, dc);
@@ -303,7 +303,7 @@ static void check_plif_backward(float gain)
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
   kernels->backward(r.net, r.block, T, ds, dc, df, r.grad, r.scratch);
-  const float *w5 = sf_model_param(&r.model, SF_P_W5);
+  const float *w5 = sf_model_param(&r.model, SF_P_C3);
   double dw4[H][H] = {{0}}, dleak = 0;
   const double k = r.net->view.k[3], kc = r.net->view.k[4];
   for (int l = 0; l < SF_BLOCK; l++)
@@ -327,7 +327,7 @@ static void check_plif_backward(float gain)
     }
   for (int n = 0; n < H; n++)
     for (int m = 0; m < H; m++)
-      ck_assert_double_eq_tol(grad_at(&r, SF_P_W4, n * H + m), dw4[n][m],
+      ck_assert_double_eq_tol(grad_at(&r, SF_P_C2, n * H + m), dw4[n][m],
                               1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
   ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
   rig_free(&r);
@@ -382,7 +382,7 @@ START_TEST(backward_of_every_isa_agrees)
         for (int r = 0; r < 48; r++) b.grad->w3[32 * r + 16] = a.grad->w3[32 * r + 16]; /* scratch column */
         ck_assert_float_le(distance(b.grad->w3, a.grad->w3, 48 * 32), bound);
         for (int w = 0; w < 48 * 48; w++)
-          a.grad->w4[w] = grad_at(&a, SF_P_W4, w), b.grad->w4[w] = grad_at(&b, SF_P_W4, w);
+          a.grad->w4[w] = grad_at(&a, SF_P_C2, w), b.grad->w4[w] = grad_at(&b, SF_P_C2, w);
         ck_assert_float_le(distance(b.grad->w4, a.grad->w4, 48 * 48), bound);
         ck_assert_float_le(distance(b.grad->w5, a.grad->w5, 3 * 48), bound);
         if (kind == SF_NET_SNN) ck_assert_float_le(distance(b.grad->leak, a.grad->leak, SF_LAYERS), bound);

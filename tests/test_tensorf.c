@@ -12,7 +12,7 @@ START_TEST(inputs_are_tensorf)
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27}), 30);
   sf_model m = test_tensorf(SF_NET_SNN, 1, 16, 2);
   ck_assert_int_eq(sf_tensorf_products(&m.config.tensorf), 72);
-  ck_assert_int_eq(m.param[SF_V_APP_PLANE + 1].shape[2], 12);
+  ck_assert_int_eq(m.param[SF_P_APP_PLANE + 1].shape[2], 12);
   sf_model_free(&m);
 }
 END_TEST
@@ -38,7 +38,7 @@ START_TEST(interpolation_is_linear)
   sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_tensorf *f = &m.config.tensorf;
   for (int mode = 0; mode < 3; mode++) {
-    const sf_param *plane = &m.param[SF_V_DENSITY_PLANE + mode], *line = &m.param[SF_V_DENSITY_LINE + mode];
+    const sf_param *plane = &m.param[SF_P_DENSITY_PLANE + mode], *line = &m.param[SF_P_DENSITY_LINE + mode];
     for (size_t i = 0; i < plane->size; i++) {
       const size_t texel = i / 16, column = texel % (size_t)plane->shape[1], row = texel / (size_t)plane->shape[1];
       m.value[plane->offset + i] = i % 16 ? 0 : (float)column + 10 * (float)row;
@@ -93,20 +93,20 @@ START_TEST(twin_is_a_network_with_biases)
   float in[30], colour[3];
   double h[2][16];
   for (int i = 0; i < 30; i++) in[i] = test_random(77 + i);
-  sf_tensorf_decode(&m, in, 1, colour, NULL);
-  const float *w1 = sf_model_param(&m, SF_V_W1), *w2 = sf_model_param(&m, SF_V_W2), *w3 = sf_model_param(&m, SF_V_W3);
+  sf_net_sample(&m, in, NULL, 1, NULL, colour, NULL);
+  const float *w1 = sf_model_param(&m, SF_P_C1), *w2 = sf_model_param(&m, SF_P_C2), *w3 = sf_model_param(&m, SF_P_C3);
   for (int o = 0; o < 16; o++) {
-    h[0][o] = sf_model_param(&m, SF_V_B1)[o];
+    h[0][o] = sf_model_param(&m, SF_P_C1_BIAS)[o];
     for (int i = 0; i < 30; i++) h[0][o] += w1[o * 30 + i] * in[i];
     h[0][o] = fmax(h[0][o], 0);
   }
   for (int o = 0; o < 16; o++) {
-    h[1][o] = sf_model_param(&m, SF_V_B2)[o];
+    h[1][o] = sf_model_param(&m, SF_P_C2_BIAS)[o];
     for (int i = 0; i < 16; i++) h[1][o] += w2[o * 16 + i] * h[0][i];
     h[1][o] = fmax(h[1][o], 0);
   }
   for (int o = 0; o < 3; o++) {
-    double j = sf_model_param(&m, SF_V_B3)[o];
+    double j = sf_model_param(&m, SF_P_C3_BIAS)[o];
     for (int i = 0; i < 16; i++) j += w3[o * 16 + i] * h[1][i];
     ck_assert_float_eq_tol(colour[o], (float)(1 / (1 + exp(-j))), 1e-6f);
   }

@@ -29,7 +29,7 @@ START_TEST(density_equals_oracle)
       if (!k) continue;
       sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
       if (!ndc) m.config.tensorf.shift = -1; /* both ends of the softplus */
-      for (size_t j = 0; !ndc && j < m.param[SF_V_DENSITY_PLANE].size; j++) m.value[j] *= 60;
+      for (size_t j = 0; !ndc && j < m.param[SF_P_DENSITY_PLANE].size; j++) m.value[j] *= 60;
       const sf_vm_field field = sf_vm_field_of(&m, false);
       k->vm_density(&field, x, N, sigma, slope);
       for (int s = 0; s < N; s++) {
@@ -71,7 +71,7 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   static float x[3 * N], g[N * SF_DECODER_MAX], product[N * SF_DECODER_MAX];
   positions(x);
   sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
-  const int first = appearance ? SF_V_APP_PLANE : SF_V_DENSITY_PLANE, ld = 160;
+  const int first = appearance ? SF_P_APP_PLANE : SF_P_DENSITY_PLANE, ld = 160;
   const sf_vm_field f = sf_vm_field_of(&m, appearance);
   for (int i = 0; i < N * ld; i++) g[i] = test_random(1u << 26 | i);
   float *grad = calloc(m.size, sizeof *grad);
@@ -120,9 +120,9 @@ START_TEST(field_gradient_is_the_slope)
   k->vm_density(&f, x, N, sigma, slope);
   for (int s = 0; s < N; s++) g[s] = test_random(900 + s) * slope[s];
   for (int mode = 0; mode < 3; mode++)
-    k->vm_backward(&f, mode, 0, 16, x, N, g, 0, grad + m.param[SF_V_DENSITY_PLANE + mode].offset,
-                   grad + m.param[SF_V_DENSITY_LINE + mode].offset);
-  for (int id = SF_V_DENSITY_PLANE; id < SF_V_APP_PLANE; id++)
+    k->vm_backward(&f, mode, 0, 16, x, N, g, 0, grad + m.param[SF_P_DENSITY_PLANE + mode].offset,
+                   grad + m.param[SF_P_DENSITY_LINE + mode].offset);
+  for (int id = SF_P_DENSITY_PLANE; id < SF_P_APP_PLANE; id++)
     for (size_t i = m.param[id].offset; i < m.param[id].offset + m.param[id].size; i += 23) {
       const float old = m.value[i], h = 1e-2f;
       double value[2] = {0};
@@ -173,7 +173,7 @@ static rig rig_make(sf_net_kind kind, sf_input_mode mode, int ndc, int hidden, i
   r.scratch = sf_aligned_alloc(sizeof *r.scratch);
   r.grad = sf_aligned_alloc(sizeof *r.grad);
   r.dproduct = sf_aligned_alloc(SF_BLOCK * SF_DECODER_MAX * sizeof(float));
-  for (size_t i = 0; i < r.model.param[SF_V_W1].size; i++) sf_model_param(&r.model, SF_V_W1)[i] *= gain;
+  for (size_t i = 0; i < r.model.param[SF_P_C1].size; i++) sf_model_param(&r.model, SF_P_C1)[i] *= gain;
   const int all = sf_tensorf_products(&r.model.config.tensorf), ld = (all + 15) / 16 * 16;
   for (int l = 0; l < SF_BLOCK; l++)
     for (int c = 0; c < all; c++) r.block->product[l * ld + c] = test_random(1u << 22 | (l * ld + c));
@@ -203,13 +203,13 @@ static void oracle(const rig *r, int lane, float *colour)
   const sf_tensorf *f = &r->model.config.tensorf;
   const int all = sf_tensorf_products(f), ld = (all + 15) / 16 * 16, rest = f->features;
   float features[SF_APPEARANCE_MAX] = {0}, in[SF_DECODER_MAX];
-  const float *basis = sf_model_param(&r->model, SF_V_BASIS);
+  const float *basis = sf_model_param(&r->model, SF_P_BASIS);
   for (int o = 0; o < f->features; o++)
     for (int c = 0; c < all; c++) features[o] += basis[o * all + c] * r->block->product[lane * ld + c];
   const float direction[3] = {r->block->in[rest * SF_BLOCK + lane], r->block->in[(rest + 1) * SF_BLOCK + lane],
                               r->block->in[(rest + 2) * SF_BLOCK + lane]};
   sf_tensorf_encode(f, features, direction, in);
-  sf_tensorf_decode(&r->model, in, r->model.config.steps, colour, NULL);
+  sf_net_sample(&r->model, in, NULL, r->model.config.steps, NULL, colour, NULL);
 }
 
 /* Kernels against the oracles. A current within rounding of the threshold may fire in one and not in the other: a few
@@ -288,19 +288,19 @@ static float grad_at(const rig *r, int id, size_t i)
   const size_t inputs = (size_t)sf_tensorf_inputs(f), rows = (inputs + 1 + 15) / 16 * 16,
                all = (size_t)sf_tensorf_products(f), hidden = (size_t)r->model.config.hidden;
   switch (id) {
-  case SF_V_BASIS:
+  case SF_P_BASIS:
     return r->grad->basis[i / all * ((all + 15) / 16 * 16) + i % all];
-  case SF_V_W1:
+  case SF_P_C1:
     return r->grad->w1[i / inputs * rows + i % inputs];
-  case SF_V_B1:
+  case SF_P_C1_BIAS:
     return r->grad->w1[i * rows + inputs];
-  case SF_V_W2:
+  case SF_P_C2:
     return r->grad->net.w4[i] + r->grad->net.w4t[i % hidden * hidden + i / hidden];
-  case SF_V_B2:
+  case SF_P_C2_BIAS:
     return r->grad->b2[i];
-  case SF_V_W3:
+  case SF_P_C3:
     return r->grad->net.w5[i];
-  case SF_V_B3:
+  case SF_P_C3_BIAS:
     return r->grad->b3[i];
   default:
     return r->grad->net.leak[i];
@@ -323,7 +323,7 @@ START_TEST(twin_gradient_is_the_slope)
     random_gradient(dc);
     rig_forward(&r, k, 1);
     k->decoder_backward(r.words, r.block, 1, dc, r.dproduct, r.grad, r.scratch);
-    for (int id = SF_V_BASIS; id <= SF_V_B3; id++)
+    for (int id = SF_P_BASIS; id <= SF_P_C3_BIAS; id++)
       for (size_t i = 0; i < r.model.param[id].size; i += r.model.param[id].dims == 2 ? 11 : 1) {
         const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 2e-3f, dc), actual = grad_at(&r, id, i);
         ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.1, "ndc %d: %s[%zu]: slope %g, gradient %g",
@@ -350,12 +350,12 @@ START_TEST(smooth_parts_of_the_decoder_match_the_slope)
     random_gradient(dc);
     rig_forward(&r, k, 1);
     k->decoder_backward(r.words, r.block, 6, dc, r.dproduct, r.grad, r.scratch);
-    for (int id = SF_V_W3; id <= SF_V_B3; id++)
+    for (int id = SF_P_C3; id <= SF_P_C3_BIAS; id++)
       for (size_t i = 0; i < r.model.param[id].size; i += 2) {
         const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 1e-2f, dc);
         ck_assert_double_eq_tol(grad_at(&r, id, i), expected, 0.01 * fabs(expected) + 0.05);
       }
-    const double expected = slope_at(&r, sf_model_leak(&r.model) + 4, 1e-2f, dc);
+    const double expected = slope_at(&r, sf_model_param(&r.model, SF_P_LEAK) + 4, 1e-2f, dc);
     ck_assert_double_eq_tol(r.grad->net.leak[4], expected, 0.01 * fabs(expected) + 0.1);
     rig_free(&r);
   }
@@ -396,7 +396,7 @@ START_TEST(backward_of_every_isa_agrees)
         memcpy(b.block, a.block, sizeof *a.block);
         portable->decoder_backward(a.words, a.block, steps, dc, a.dproduct, a.grad, a.scratch);
         k->decoder_backward(b.words, b.block, steps, dc, b.dproduct, b.grad, b.scratch);
-        for (int id = SF_V_BASIS; id < SF_V_LEAK; id++) {
+        for (int id = SF_P_BASIS; id < SF_P_LEAK; id++) {
           const size_t n = a.model.param[id].size;
           float *x = malloc(2 * n * sizeof *x);
           for (size_t j = 0; j < n; j++) x[j] = grad_at(&b, id, j), x[n + j] = grad_at(&a, id, j);

@@ -25,8 +25,8 @@ static sf_train_options small_vm(const sf_dataset *data, sf_net_kind net)
 static void put_ball(sf_model *m)
 {
   const sf_tensorf *f = &m->config.tensorf;
-  memset(m->value, 0, m->param[SF_V_APP_PLANE].offset * sizeof(float));
-  float *plane = sf_model_param(m, SF_V_DENSITY_PLANE), *line = sf_model_param(m, SF_V_DENSITY_LINE);
+  memset(m->value, 0, m->param[SF_P_APP_PLANE].offset * sizeof(float));
+  float *plane = sf_model_param(m, SF_P_DENSITY_PLANE), *line = sf_model_param(m, SF_P_DENSITY_LINE);
   for (int y = 0; y < f->resolution[1]; y++)
     for (int x = 0; x < f->resolution[0]; x++) {
       const float u = (float)x / (float)(f->resolution[0] - 1) - 0.45f,
@@ -250,7 +250,7 @@ START_TEST(a_layer_that_its_biases_silence_comes_back)
   o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 70);
-  for (size_t i = 0; i < t->model.param[SF_V_B1].size; i++) sf_model_param(&t->model, SF_V_B1)[i] = -20;
+  for (size_t i = 0; i < t->model.param[SF_P_C1_BIAS].size; i++) sf_model_param(&t->model, SF_P_C1_BIAS)[i] = -20;
   sf_train_stats s = {0};
   for (int i = 0; i < 200 && !s.event[1]; i++) ck_good(sf_trainer_step(t, &s));
   ck_assert_int_eq(s.event[1], -1);
@@ -292,9 +292,9 @@ START_TEST(nan_is_found)
   const sf_train_options o = small_vm(&data, SF_NET_ANN);
   sf_trainer *t = start(&data, &o, NULL);
   sf_train_stats s;
-  t->model.value[t->model.param[SF_V_DENSITY_LINE].offset] = NAN;
-  for (size_t i = 0; i < t->model.param[SF_V_DENSITY_LINE].size; i++)
-    t->model.value[t->model.param[SF_V_DENSITY_LINE].offset + i] = NAN;
+  t->model.value[t->model.param[SF_P_DENSITY_LINE].offset] = NAN;
+  for (size_t i = 0; i < t->model.param[SF_P_DENSITY_LINE].size; i++)
+    t->model.value[t->model.param[SF_P_DENSITY_LINE].offset + i] = NAN;
   ck_assert_int_ne(sf_trainer_step(t, &s).code, SF_OK);
   const sf_status status = sf_trainer_save(t, in("bad.safetensors"), true);
   ck_assert_int_ne(status.code, SF_OK);

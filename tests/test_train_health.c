@@ -33,11 +33,11 @@ static const struct fault {
   int layer;
   float factor, value;
   int event;
-} faults[] = {{SF_P_W1, 0, 1e-20f, 0, -1},
-              {SF_P_W4, 2, 0, -1, -1},
-              {SF_P_W4, 2, 0, 0, -1},
-              {SF_P_W4, 2, 0, 50, 1},
-              {SF_P_W3, 1, 1e-20f, 0, -1}};
+} faults[] = {{SF_P_D1, 0, 1e-20f, 0, -1},
+              {SF_P_C2, 2, 0, -1, -1},
+              {SF_P_C2, 2, 0, 0, -1},
+              {SF_P_C2, 2, 0, 50, 1},
+              {SF_P_C1, 1, 1e-20f, 0, -1}};
 
 static void plant(sf_trainer *t, const struct fault *f)
 {

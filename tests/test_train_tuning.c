@@ -7,7 +7,7 @@
 
 enum { BITS = 4, LIMIT = 7 };
 
-static const sf_param_id weights_of[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
+static const sf_param_id weights_of[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
 static sf_dataset data;
 static sf_model base; /* trained for a moment, its scales settled */
 

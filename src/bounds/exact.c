@@ -30,7 +30,7 @@ static double input_lsb(const fx_scene *scene, int layer, int i)
 /* A weight of the model in the units of the scene's. */
 static double real_weight(const fx_scene *scene, const sf_model *model, int l, int o, int i)
 {
-  static const sf_param_id id[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
+  static const sf_param_id id[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
   const double w = sf_model_param(model, id[l])[o * scene->net.layer[l].n_in + i];
   return w * input_lsb(scene, l, i) / scene->current_scale[l];
 }

@@ -27,12 +27,8 @@ static sf_status count_samples(const sf_twin_job *job, const sf_model *model, ch
 
 static uint64_t synapses(const sf_model *model)
 {
-  static const int ingp[] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5}, decoder[] = {SF_V_W1, SF_V_W2, SF_V_W3};
   uint64_t sum = 0;
-  if (model->config.backbone == SF_TENSORF)
-    for (int i = 0; i < 3; i++) sum += model->param[decoder[i]].size;
-  else
-    for (int i = 0; i < 5; i++) sum += model->param[ingp[i]].size;
+  for (int l = 0; l < SF_LAYERS; l++) sum += model->param[sf_layer_weights[l]].size;
   return sum;
 }
 

@@ -232,35 +232,28 @@ sf_status sf_nir_write_scene(const char *path, const fx_scene *scene)
 
 /* ---- a model: real numbers ---- */
 
-/* Matrices and biases of each layer: [backbone]; -1: none. */
-static const int matrix[2][SF_LAYERS] = {{SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5},
-                                         {-1, -1, SF_V_W1, SF_V_W2, SF_V_W3}};
-static const int bias[SF_LAYERS] = {-1, -1, SF_V_B1, SF_V_B2, SF_V_B3}; /* TensoRF's */
-
 static float model_weight(const void *from, int l, int i, int o)
 {
   const sf_model *m = from;
-  const int id = matrix[m->config.backbone][l];
+  const int id = sf_layer_weights[l];
   return sf_model_param(m, id)[(int64_t)o * m->param[id].shape[1] + i];
 }
 
 static double model_bias(const void *from, int l, int o)
 {
-  return (double)sf_model_param(from, bias[l])[o];
+  return (double)sf_model_param(from, sf_layer_bias[l])[o];
 }
 
 static void model_sizes(nets *n, const sf_model *m)
 {
-  const sf_config *c = &m->config;
-  const bool decodes = c->backbone == SF_TENSORF;
   for (int l = 0; l < SF_LAYERS; l++) {
-    const int id = matrix[c->backbone][l];
-    if (id < 0) continue;
+    const int id = sf_layer_weights[l];
+    if (!sf_model_has(m, id)) continue;
     n->n_out[l] = (int)m->param[id].shape[0];
     n->n_in[l] = (int)m->param[id].shape[1];
-    n->has_bias[l] = decodes;
+    n->has_bias[l] = sf_layer_bias[l] >= 0 && sf_model_has(m, sf_layer_bias[l]);
   }
-  n->n_h = decodes ? 0 : SF_GEO_FEATURES;
+  n->n_h = sf_model_decodes(m) ? 0 : SF_GEO_FEATURES;
   n->n_in[FX_C1] -= n->n_h;
 }
 
@@ -269,7 +262,7 @@ sf_status sf_nir_write_model(const char *path, const sf_model *m)
   const sf_config *c = &m->config;
   if (c->net != SF_NET_SNN)
     return sf_fail(SF_E_UNSUPPORTED, "%s: the model is the ReLU twin; a NIR graph is of spiking nets", path);
-  const float *leak = sf_model_leak(m);
+  const float *leak = sf_model_param(m, SF_P_LEAK);
   nets n = {.mode = c->mode,
             .steps = m->t_r,
             .input_step = (double)sf_scales_h_step(&m->scales),

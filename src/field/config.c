@@ -1,28 +1,15 @@
-/* Configuration of the float model: defaults and ranges. */
-#include "snn/model.h"
+/* Configuration of the float model: which field it has, and the ranges of its numbers. */
+#include "field/field.h"
 
-sf_config sf_config_default(void)
+const sf_field *sf_field_of(const sf_config *config)
 {
-  return (sf_config){.net = SF_NET_SNN,
-                     .mode = SF_HYBRID,
-                     .steps = SF_T_MAX,
-                     .levels = 16,
-                     .log2_hash = 19,
-                     .base_res = 16,
-                     .finest_res = 2048,
-                     .hidden = 128,
-                     .theta = {1, 1, 1},
-                     .scale = 0.8f,
-                     .lattice = 1024,
-                     .occ_res = 128,
-                     .bound = 1};
+  static const sf_field *const field[SF_FIELDS] = {[SF_INGP] = &sf_field_grid, [SF_TENSORF] = &sf_field_planes};
+  return field[config->backbone];
 }
 
-void sf_config_bound(sf_config *c, int bound)
+sf_status sf_steps_make(sf_steps *steps, const sf_config *config, int stride)
 {
-  c->bound = bound;
-  c->dt_gamma = bound > 1 ? 1.0f / 128 : 0;
-  c->finest_res = bound < 16 ? 2048 * bound : 32768;
+  return sf_field_of(config)->steps(steps, config, stride);
 }
 
 static sf_status check_range(const char *name, double value, double low, double high)
@@ -52,11 +39,6 @@ sf_status sf_config_check(const sf_config *c)
   SF_TRY(check_range("bound", c->bound, 1, 64));
   if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
   SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, SF_GAMMA_MAX));
-  SF_TRY(check_range("backbone", c->backbone, SF_INGP, SF_TENSORF));
-  if (c->backbone == SF_TENSORF && (c->bound != 1 || c->dt_gamma > 0))
-    return sf_fail(SF_E_RANGE, "model config: bound = %d and dt_gamma = %g with TensoRF, expected 1 and 0", c->bound,
-                   (double)c->dt_gamma);
-  if (c->backbone == SF_TENSORF) return sf_tensorf_check(&c->tensorf);
-  sf_steps steps;
-  return sf_steps_make(&steps, c, 1);
+  SF_TRY(check_range("backbone", c->backbone, 0, SF_FIELDS - 1));
+  return sf_field_of(c)->check(c);
 }

@@ -1,6 +1,6 @@
 /* Hash-grid features, sample by sample: the oracle of the grid kernels in src/snn/grid_isa.h. Mueller et al. 2022,
  * in torch-ngp's form: pos = x * scale + 1/2, dense levels x fastest, hashed levels xor of coordinate * prime. */
-#include "snn/model.h"
+#include "field/model.h"
 #include <math.h>
 
 static uint32_t entry_index(const sf_grid_level *level, const uint32_t p[3])

@@ -1,5 +1,5 @@
 /* Real spherical harmonics up to degree 3 (16 values), torch-ngp's order and signs. */
-#include "snn/model.h"
+#include "field/model.h"
 
 void sf_sh4(const float direction[3], float out[16])
 {

@@ -1,9 +1,8 @@
 /* The intervals of a ray: torch-ngp's recurrence dt = clamp(t * dt_gamma, dt_min, dt_max). */
-#include "snn/model.h"
+#include "field/field.h"
 #include <math.h>
 
-/* Equal steps through a TensoRF field's own box. */
-static void make_equal(sf_steps *s, const sf_tensorf *f, int stride)
+void sf_steps_equal(sf_steps *s, const sf_tensorf *f, int stride)
 {
   *s = (sf_steps){.stride = stride,
                   .lattice = SF_STEPS_MAX,
@@ -18,14 +17,10 @@ static void make_equal(sf_steps *s, const sf_tensorf *f, int stride)
   }
 }
 
-sf_status sf_steps_make(sf_steps *s, const sf_config *config, int stride)
+sf_status sf_steps_growing(sf_steps *s, const sf_config *config, int stride)
 {
   const float root3 = 1.7320508f, bound = (float)config->bound;
   const int cascades = sf_config_cascades(config);
-  if (config->backbone == SF_TENSORF) {
-    make_equal(s, &config->tensorf, stride);
-    return sf_ok();
-  }
   *s = (sf_steps){.stride = stride,
                   .lattice = config->lattice * config->bound,
                   .low = {-bound, -bound, -bound},

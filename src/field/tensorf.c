@@ -1,48 +1,11 @@
 /* The VM-factorised field, sample by sample: the oracle of the kernels in src/snn/vm_isa.h. Chen et al. 2022, in the
  * form of their code: grid_sample with align_corners, planes and lines of one mode multiplied component by component.
  */
-#include "snn/model.h"
+#include "field/model.h"
 #include <math.h>
 #include <string.h>
 
 const int sf_tensorf_axis[3][3] = {{0, 1, 2}, {0, 2, 1}, {1, 2, 0}};
-
-sf_config sf_tensorf_default(float scale, int ndc)
-{
-  static const float half[3] = {1.5f, 1.67f, 1};
-  sf_config c = sf_config_default();
-  sf_tensorf *f = &c.tensorf;
-  c.backbone = SF_TENSORF;
-  c.scale = scale;
-  for (int i = 0; i < 3; i++) {
-    c.theta[i] = 0.5f;
-    f->box[1][i] = (ndc ? half[i] : 1.5f) * scale;
-    f->box[0][i] = -f->box[1][i];
-    f->density[i] = ndc && i ? 4 : 16;
-    f->appearance[i] = ndc && i ? 12 : 48;
-  }
-  f->features = 27;
-  f->feature_freqs = f->view_freqs = ndc ? 0 : 2;
-  f->activation = ndc ? SF_RELU : SF_SOFTPLUS;
-  f->shift = ndc ? 0 : -10;
-  f->distance_scale = 25 / scale;
-  f->step_ratio = 0.5f;
-  f->near = ndc ? 0 : 2 * scale;
-  f->far = ndc ? 1e6f : 6 * scale;
-  f->ndc = ndc;
-  sf_tensorf_resolution(f->box, 128 * 128 * 128, f->resolution);
-  return c;
-}
-
-void sf_tensorf_bound(sf_config *c, int bound)
-{
-  sf_tensorf *f = &c->tensorf;
-  for (int i = 0; i < 3; i++) f->box[1][i] = (float)bound, f->box[0][i] = -f->box[1][i];
-  f->distance_scale = 25 * 1.5f / (float)bound;
-  f->near = (float)SF_NEAR;
-  f->far = 1e6f;
-  sf_tensorf_resolution(f->box, 128 * 128 * 128, f->resolution);
-}
 
 static sf_status check(const char *name, double value, double low, double high)
 {
@@ -107,7 +70,7 @@ static between locate(float x, int resolution)
   return (between){low, low + 1, at - (float)low};
 }
 
-/* plane[c] * line[c] of one mode. first: the id of its plane, SF_V_DENSITY_PLANE or SF_V_APP_PLANE + mode. */
+/* plane[c] * line[c] of one mode. first: the id of its plane, SF_P_DENSITY_PLANE or SF_P_APP_PLANE + mode. */
 static void products(const sf_model *m, int first, int mode, const float x[3], int components, float *out)
 {
   const sf_tensorf *f = &m->config.tensorf;
@@ -132,7 +95,7 @@ float sf_tensorf_density_feature(const sf_model *m, const float x[3])
   float sum = 0, product[SF_COMPONENTS_MAX];
   for (int i = 0; i < 3; i++) {
     const int n = m->config.tensorf.density[i];
-    products(m, SF_V_DENSITY_PLANE + i, i, x, n, product);
+    products(m, SF_P_DENSITY_PLANE + i, i, x, n, product);
     for (int c = 0; c < n; c++) sum += product[c];
   }
   return sum;
@@ -151,8 +114,8 @@ void sf_tensorf_appearance(const sf_model *m, const float x[3], float *features)
   const int all = sf_tensorf_products(f);
   float product[3 * SF_COMPONENTS_MAX] = {0};
   for (int i = 0, n = 0; i < 3; n += f->appearance[i++])
-    products(m, SF_V_APP_PLANE + i, i, x, f->appearance[i], product + n);
-  const float *basis = sf_model_param(m, SF_V_BASIS);
+    products(m, SF_P_APP_PLANE + i, i, x, f->appearance[i], product + n);
+  const float *basis = sf_model_param(m, SF_P_BASIS);
   for (int o = 0; o < f->features; o++) {
     features[o] = 0;
     for (int c = 0; c < all; c++) features[o] += basis[o * all + c] * product[c];

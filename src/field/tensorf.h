@@ -16,7 +16,6 @@
 
 struct sf_config;
 struct sf_model;
-struct sf_net_trace;
 
 typedef enum { SF_SOFTPLUS, SF_RELU } sf_activation;
 
@@ -37,27 +36,6 @@ typedef struct sf_tensorf {
 } sf_tensorf;
 
 enum { SF_COMPONENTS_MAX = 48, SF_APPEARANCE_MAX = 32, SF_DECODER_MAX = 160, SF_FREQS_MAX = 4 };
-
-/* Parts of a TensoRF model's parameter vector, in this order, named as TensoRF names them. Planes are
- * [rows along the second axis][columns along the first][components], lines [points][components]; matrices are
- * [out][in]. density_plane.0..2, density_line.0..2, app_plane.0..2, app_line.0..2; basis_mat.weight
- * [features][products]; renderModule.mlp.0.weight [hidden][inputs] and .bias, .2 [hidden][hidden], .4 [3][hidden]; leak
- * [5]: as SF_P_LEAK's, the first two (density net) are not used */
-enum {
-  SF_V_DENSITY_PLANE = 0,
-  SF_V_DENSITY_LINE = 3,
-  SF_V_APP_PLANE = 6,
-  SF_V_APP_LINE = 9,
-  SF_V_BASIS = 12,
-  SF_V_W1,
-  SF_V_B1,
-  SF_V_W2,
-  SF_V_B2,
-  SF_V_W3,
-  SF_V_B3,
-  SF_V_LEAK,
-  SF_V_COUNT
-};
 
 /* Axes of mode m: the plane's columns, its rows, the line. */
 extern const int sf_tensorf_axis[3][3];
@@ -93,8 +71,4 @@ float sf_tensorf_sigma(const sf_tensorf *field, float feature);
 void sf_tensorf_appearance(const struct sf_model *model, const float x[3], float *features);
 /* in[inputs] of appearance features and the unit direction of the ray. */
 void sf_tensorf_encode(const sf_tensorf *field, const float *features, const float direction[3], float *in);
-/* The colour decoder of one sample: colour[steps][3] at every prefix. Layers C1, C2, C3 of the trace (indices 2, 3, 4).
- */
-void sf_tensorf_decode(const struct sf_model *model, const float *in, int steps, float *colour,
-                       struct sf_net_trace *trace);
 #endif

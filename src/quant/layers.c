@@ -15,7 +15,7 @@ typedef struct context {
   sf_quant_report *report;
 } context;
 
-static const sf_param_id param_of[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
+static const sf_param_id param_of[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
 
 static int frac_of(int layer)
 {

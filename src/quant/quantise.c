@@ -17,7 +17,7 @@ double sf_fx_colour_value(uint32_t colour)
 
 static sf_status check_finite(const sf_model *model, const char *name)
 {
-  for (int id = 0; id < model->params; id++) {
+  for (int id = 0; id < SF_P_COUNT; id++) {
     const float *value = sf_model_param(model, id);
     for (size_t i = 0; i < model->param[id].size; i++)
       if (!isfinite(value[i]))
@@ -33,7 +33,7 @@ static sf_status check_sizes(const sf_model *model, const char *name)
   const bool vm = config->backbone == SF_TENSORF;
   if (config->hidden < 1 || config->hidden > SF_LANES)
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d neurons, the accelerator has %d", name,
-                   model->param[vm ? (int)SF_V_W1 : (int)SF_P_W1].name, config->hidden, SF_LANES);
+                   model->param[vm ? SF_P_C1 : SF_P_D1].name, config->hidden, SF_LANES);
   if (vm && model->scales.weight_bits)
     return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'weight_bits': a TensoRF model cannot be fine-tuned", name);
   if (!vm && (config->levels < 1 || config->levels > FX_LEVELS_MAX))
@@ -129,7 +129,7 @@ static void set_steps(fx_scene *scene, const sf_config *config)
 
 static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_options *options, int leak_bits)
 {
-  const float *leak = sf_model_leak(model); /* in the order of the layers */
+  const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
   for (int l = 0; l < SF_LAYERS; l++)
     if (scene->net.layer[l].n_out > 0) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
   scene->net.mode = model->config.mode;

@@ -98,7 +98,7 @@ static void run_sample(sf_vm_calibration *c, const sf_model *model, int sample, 
   sf_tensorf_appearance(model, x, features);
   sf_tensorf_encode(&model->config.tensorf, features, direction, inputs);
   memset(trace, 0, sizeof *trace);
-  sf_tensorf_decode(model, inputs, c->steps, colour, trace);
+  sf_net_sample(model, inputs, NULL, c->steps, NULL, colour, trace);
   keep_trace(c, trace, (size_t)sample);
 }
 

@@ -86,8 +86,8 @@ typedef struct density {
 static factor density_factor(const density *d, int pair, bool line)
 {
   const fx_factors *to = &d->scene->tensorf.density;
-  return line ? factor_of(d->model, SF_V_DENSITY_LINE + pair, to->line[pair])
-              : factor_of(d->model, SF_V_DENSITY_PLANE + pair, to->plane[pair]);
+  return line ? factor_of(d->model, SF_P_DENSITY_LINE + pair, to->line[pair])
+              : factor_of(d->model, SF_P_DENSITY_PLANE + pair, to->plane[pair]);
 }
 
 /* The unit that clips nothing. */
@@ -126,7 +126,7 @@ static sf_status set_density_scales(const density *d, double unit)
       sf_quant_scale(ldexp(density, SF_SIGMA_FRAC - ACTIVATION_FRAC), SHIFT_MAX, 0, &d->scene->tensorf.sigma_out))
     return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': densities are too large for the accelerator", d->name,
-                 d->model->param[SF_V_DENSITY_PLANE].name);
+                 d->model->param[SF_P_DENSITY_PLANE].name);
 }
 
 /* Mean squared error of the opacity of a sample. */
@@ -172,8 +172,8 @@ static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, int l
   int64_t clipped = 0;
   int n = 0;
   for (int pair = 0; pair < FX_PAIRS; pair++) {
-    const factor plane = factor_of(model, SF_V_APP_PLANE + pair, to->plane[pair]),
-                 line = factor_of(model, SF_V_APP_LINE + pair, to->line[pair]);
+    const factor plane = factor_of(model, SF_P_APP_PLANE + pair, to->plane[pair]),
+                 line = factor_of(model, SF_P_APP_LINE + pair, to->line[pair]);
     for (int c = 0; c < plane.components; c++) {
       const component m = measure_component(&plane, &line, c);
       const double p = m.plane_max / limit, l = m.line_max / limit;
@@ -201,7 +201,7 @@ static sf_status set_feature_scales(fx_scene *scene, const sf_model *model, cons
       sf_quant_scale(ldexp(unit / TWO_PI, PHASE_FRAC), SHIFT_MAX, 0, &field->phase_in))
     return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': features are too large for the accelerator", name,
-                 model->param[SF_V_BASIS].name);
+                 model->param[SF_P_BASIS].name);
 }
 
 /* Fits the basis matrix to the features that the float field has where the integer products are these. */
@@ -217,7 +217,7 @@ static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_vm_c
     for (int i = 0; i < c->samples; i++) fx_tensorf_products(field, c->pos + (size_t)i * 3, x + (size_t)i * (size_t)n);
     const sf_fit_data data = {c->samples, n, field->features, x, c->features};
     const sf_fit_weights weights = {
-        .w = sf_model_param(model, SF_V_BASIS), .stride = n, .lsb = lsb, .unit_min = 1e-30, .weight_max = limit};
+        .w = sf_model_param(model, SF_P_BASIS), .stride = n, .lsb = lsb, .unit_min = 1e-30, .weight_max = limit};
     status = sf_fit_layer(&data, &weights, true, q, result);
   }
   for (int i = 0; i < n && status.code == SF_OK; i++)

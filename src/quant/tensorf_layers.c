@@ -17,7 +17,8 @@ typedef struct context {
   sf_quant_report *report;
 } context;
 
-static const int weight_id[LAYERS] = {SF_V_W1, SF_V_W2, SF_V_W3}, bias_id[LAYERS] = {SF_V_B1, SF_V_B2, SF_V_B3};
+static const int weight_id[LAYERS] = {SF_P_C1, SF_P_C2, SF_P_C3},
+                 bias_id[LAYERS] = {SF_P_C1_BIAS, SF_P_C2_BIAS, SF_P_C3_BIAS};
 
 static int rows_of(const sf_vm_calibration *c, int layer)
 {
@@ -101,8 +102,8 @@ static int16_t to_input(double value)
 /* The largest value of the bias' input with which no weight of a bias decides the layer's unit. */
 static int bias_input(const context *c, const input_format *f)
 {
-  const sf_param *p = &c->model->param[SF_V_W1];
-  const float *w = sf_model_param(c->model, SF_V_W1), *bias = sf_model_param(c->model, SF_V_B1);
+  const sf_param *p = &c->model->param[SF_P_C1];
+  const float *w = sf_model_param(c->model, SF_P_C1), *bias = sf_model_param(c->model, SF_P_C1_BIAS);
   double largest = 0, bias_max = 0;
   for (int64_t o = 0; o < p->shape[0]; o++) {
     for (int64_t i = 0; i < p->shape[1]; i++)
@@ -199,7 +200,7 @@ static sf_status all_layers(const context *c, int16_t *x)
   if (sf_quant_scale(c->scene->current_scale[FX_C3] * (1 << SF_LOG_FRAC), 31, 0, &c->scene->net.sigmoid_in))
     return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights are too large for the output function", c->name,
-                 c->model->param[SF_V_W3].name);
+                 c->model->param[SF_P_C3].name);
 }
 
 sf_status sf_quantise_decoder(fx_scene *scene, const sf_model *model, const char *name,

@@ -4,11 +4,11 @@
 
 sf_net_view sf_net_view_of(const sf_model *m)
 {
-  sf_net_view v = {.w1 = sf_model_param(m, SF_P_W1),
-                   .w2 = sf_model_param(m, SF_P_W2),
-                   .w3 = sf_model_param(m, SF_P_W3),
-                   .w4 = sf_model_param(m, SF_P_W4),
-                   .w5 = sf_model_param(m, SF_P_W5),
+  sf_net_view v = {.w1 = sf_model_param(m, SF_P_D1),
+                   .w2 = sf_model_param(m, SF_P_D2),
+                   .w3 = sf_model_param(m, SF_P_C1),
+                   .w4 = sf_model_param(m, SF_P_C2),
+                   .w5 = sf_model_param(m, SF_P_C3),
                    .h_step = sf_scales_h_step(&m->scales),
                    .hidden = m->config.hidden,
                    .features = 2 * m->config.levels,
@@ -22,22 +22,22 @@ sf_net_view sf_net_view_of(const sf_model *m)
 sf_decoder_view sf_decoder_view_of(const sf_model *m)
 {
   const sf_tensorf *f = &m->config.tensorf;
-  sf_decoder_view v = {.net = {.w4 = sf_model_param(m, SF_V_W2),
-                               .w5 = sf_model_param(m, SF_V_W3),
+  sf_decoder_view v = {.net = {.w4 = sf_model_param(m, SF_P_C2),
+                               .w5 = sf_model_param(m, SF_P_C3),
                                .hidden = m->config.hidden,
                                .mode = m->config.mode,
                                .relu = m->config.net == SF_NET_ANN},
-                       .w1 = sf_model_param(m, SF_V_W1),
-                       .b1 = sf_model_param(m, SF_V_B1),
-                       .b2 = sf_model_param(m, SF_V_B2),
-                       .b3 = sf_model_param(m, SF_V_B3),
-                       .basis = sf_model_param(m, SF_V_BASIS),
+                       .w1 = sf_model_param(m, SF_P_C1),
+                       .b1 = sf_model_param(m, SF_P_C1_BIAS),
+                       .b2 = sf_model_param(m, SF_P_C2_BIAS),
+                       .b3 = sf_model_param(m, SF_P_C3_BIAS),
+                       .basis = sf_model_param(m, SF_P_BASIS),
                        .inputs = sf_tensorf_inputs(f),
                        .features = f->features,
                        .feature_freqs = f->feature_freqs,
                        .columns = sf_tensorf_products(f),
                        .products = (sf_tensorf_products(f) + 15) / 16 * 16};
-  for (int i = 0; i < SF_LAYERS; i++) v.net.k[i] = sf_sigmoid(sf_model_leak(m)[i]);
+  for (int i = 0; i < SF_LAYERS; i++) v.net.k[i] = sf_sigmoid(sf_model_param(m, SF_P_LEAK)[i]);
   memcpy(v.net.theta, m->config.theta, sizeof v.net.theta);
   return v;
 }
@@ -45,7 +45,7 @@ sf_decoder_view sf_decoder_view_of(const sf_model *m)
 sf_vm_field sf_vm_field_of(const sf_model *m, bool appearance)
 {
   const sf_tensorf *f = &m->config.tensorf;
-  const int first = appearance ? SF_V_APP_PLANE : SF_V_DENSITY_PLANE;
+  const int first = appearance ? SF_P_APP_PLANE : SF_P_DENSITY_PLANE;
   sf_vm_field v = {.relu = f->activation == SF_RELU, .shift = f->shift, .distance_scale = f->distance_scale};
   for (int i = 0; i < 3; i++) {
     v.plane[i] = sf_model_param(m, first + i);

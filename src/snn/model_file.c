@@ -1,5 +1,7 @@
 /* The float model on file: metadata and tensors, checked one by one. */
-#include "snn/layout.h"
+#include "field/field.h"
+#include "field/layout.h"
+#include "snn/model.h"
 #include "base/io.h"
 #include <math.h>
 #include <stdio.h>
@@ -27,64 +29,28 @@ static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value
   return sf_ok();
 }
 
-/* A number of the configuration by its metadata key, one table for both directions. */
-typedef struct config_field {
-  const char *key;
-  int32_t *integer;
-  float *number;
-} config_field;
+enum { CONFIG_NUMBERS = 14 }; /* of every model */
 
-enum { CONFIG_FIELDS = 14, TENSORF_FIELDS = 24 };
-
-static void config_table(sf_config *c, config_field f[CONFIG_FIELDS])
+static void config_numbers(sf_config *c, sf_number f[CONFIG_NUMBERS])
 {
-  const config_field table[CONFIG_FIELDS] = {{"net", .integer = &c->net},
-                                             {"mode", .integer = &c->mode},
-                                             {"steps", .integer = &c->steps},
-                                             {"levels", .integer = &c->levels},
-                                             {"log2_hash", .integer = &c->log2_hash},
-                                             {"base_res", .integer = &c->base_res},
-                                             {"finest_res", .integer = &c->finest_res},
-                                             {"hidden", .integer = &c->hidden},
-                                             {"lattice", .integer = &c->lattice},
-                                             {"occ_res", .integer = &c->occ_res},
-                                             {"theta_d1", .number = &c->theta[0]},
-                                             {"theta_c1", .number = &c->theta[1]},
-                                             {"theta_c2", .number = &c->theta[2]},
-                                             {"scale", .number = &c->scale}};
+  const sf_number table[CONFIG_NUMBERS] = {{"net", .integer = &c->net},
+                                           {"mode", .integer = &c->mode},
+                                           {"steps", .integer = &c->steps},
+                                           {"levels", .integer = &c->levels},
+                                           {"log2_hash", .integer = &c->log2_hash},
+                                           {"base_res", .integer = &c->base_res},
+                                           {"finest_res", .integer = &c->finest_res},
+                                           {"hidden", .integer = &c->hidden},
+                                           {"lattice", .integer = &c->lattice},
+                                           {"occ_res", .integer = &c->occ_res},
+                                           {"theta_d1", .number = &c->theta[0]},
+                                           {"theta_c1", .number = &c->theta[1]},
+                                           {"theta_c2", .number = &c->theta[2]},
+                                           {"scale", .number = &c->scale}};
   memcpy(f, table, sizeof table);
 }
 
-static void tensorf_table(sf_tensorf *t, config_field f[TENSORF_FIELDS])
-{
-  const config_field table[TENSORF_FIELDS] = {{"box_min_x", .number = &t->box[0][0]},
-                                              {"box_min_y", .number = &t->box[0][1]},
-                                              {"box_min_z", .number = &t->box[0][2]},
-                                              {"box_max_x", .number = &t->box[1][0]},
-                                              {"box_max_y", .number = &t->box[1][1]},
-                                              {"box_max_z", .number = &t->box[1][2]},
-                                              {"resolution_x", .integer = &t->resolution[0]},
-                                              {"resolution_y", .integer = &t->resolution[1]},
-                                              {"resolution_z", .integer = &t->resolution[2]},
-                                              {"density_0", .integer = &t->density[0]},
-                                              {"density_1", .integer = &t->density[1]},
-                                              {"density_2", .integer = &t->density[2]},
-                                              {"appearance_0", .integer = &t->appearance[0]},
-                                              {"appearance_1", .integer = &t->appearance[1]},
-                                              {"appearance_2", .integer = &t->appearance[2]},
-                                              {"features", .integer = &t->features},
-                                              {"feature_freqs", .integer = &t->feature_freqs},
-                                              {"view_freqs", .integer = &t->view_freqs},
-                                              {"activation", .integer = &t->activation},
-                                              {"density_shift", .number = &t->shift},
-                                              {"distance_scale", .number = &t->distance_scale},
-                                              {"step_ratio", .number = &t->step_ratio},
-                                              {"near", .number = &t->near},
-                                              {"far", .number = &t->far}};
-  memcpy(f, table, sizeof table);
-}
-
-static sf_status load_fields(const sf_tensors *set, const config_field *f, int count)
+static sf_status load_numbers(const sf_tensors *set, const sf_number *f, int count)
 {
   for (int i = 0; i < count; i++) {
     double number;
@@ -107,15 +73,14 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   if (!version || strcmp(version, "1"))
     return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads version 1", set->path,
                    version ? version : "absent");
-  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
-  config_table(c, field);
-  SF_TRY(load_fields(set, field, CONFIG_FIELDS));
+  sf_number number_of[CONFIG_NUMBERS], more[SF_NUMBERS_MAX];
+  config_numbers(c, number_of);
+  SF_TRY(load_numbers(set, number_of, CONFIG_NUMBERS));
   if (sf_tensors_meta(set, "backbone")) SF_TRY(meta_int(set, "backbone", &c->backbone));
-  if (c->backbone == SF_TENSORF) {
-    tensorf_table(&c->tensorf, more);
-    SF_TRY(load_fields(set, more, TENSORF_FIELDS));
-    SF_TRY(meta_int(set, "ndc", &c->tensorf.ndc));
-  }
+  if (c->backbone < 0 || c->backbone >= SF_FIELDS)
+    return sf_fail(SF_E_RANGE, "%s: model config: backbone = %d is outside 0..%d", set->path, c->backbone,
+                   SF_FIELDS - 1);
+  SF_TRY(load_numbers(set, more, sf_field_of(c)->numbers(c, more)));
   c->bound = 1;
   double number;
   if (sf_tensors_meta(set, "bound")) SF_TRY(meta_int(set, "bound", &c->bound));
@@ -134,7 +99,7 @@ static void put_number(cJSON *meta, const char *key, double value)
   cJSON_AddStringToObject(meta, key, text);
 }
 
-static void put_fields(cJSON *meta, const config_field *f, int count)
+static void put_numbers(cJSON *meta, const sf_number *f, int count)
 {
   for (int i = 0; i < count; i++) put_number(meta, f[i].key, f[i].integer ? *f[i].integer : (double)*f[i].number);
 }
@@ -142,31 +107,29 @@ static void put_fields(cJSON *meta, const config_field *f, int count)
 void sf_model_describe(const sf_model *m, cJSON *meta)
 {
   sf_config c = m->config;
-  config_field field[CONFIG_FIELDS], more[TENSORF_FIELDS];
+  sf_number number_of[CONFIG_NUMBERS], more[SF_NUMBERS_MAX];
   cJSON_AddStringToObject(meta, "format", "spikefield-model");
   cJSON_AddStringToObject(meta, "version", "1");
-  config_table(&c, field);
-  put_fields(meta, field, CONFIG_FIELDS);
+  config_numbers(&c, number_of);
+  put_numbers(meta, number_of, CONFIG_NUMBERS);
   put_number(meta, "bound", c.bound);
   put_number(meta, "dt_gamma", c.dt_gamma);
   put_number(meta, "t_star", m->t_star);
   put_number(meta, "t_r", m->t_r);
   put_number(meta, "weight_bits", m->scales.weight_bits);
   if (m->scales.weight_bits) put_number(meta, "h_shift", SF_H_SHIFT);
-  if (c.backbone != SF_TENSORF) return;
-  put_number(meta, "backbone", c.backbone);
-  put_number(meta, "ndc", c.tensorf.ndc);
-  tensorf_table(&c.tensorf, more);
-  put_fields(meta, more, TENSORF_FIELDS);
+  if (c.backbone) put_number(meta, "backbone", c.backbone);
+  put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
 }
 
 int sf_model_tensors(const sf_model *m, sf_tensor *list)
 {
   int n = 0;
-  for (; n < m->params; n++) {
-    list[n] = (sf_tensor){.type = SF_F32, .dims = m->param[n].dims, .data = m->value + m->param[n].offset};
-    snprintf(list[n].name, sizeof list[n].name, "%s", m->param[n].name);
-    memcpy(list[n].shape, m->param[n].shape, sizeof m->param[n].shape);
+  for (const sf_param *p = m->param; p < m->param + SF_P_COUNT; p++) {
+    if (!p->name) continue;
+    list[n] = (sf_tensor){.type = SF_F32, .dims = p->dims, .data = m->value + p->offset};
+    snprintf(list[n].name, sizeof list[n].name, "%s", p->name);
+    memcpy(list[n++].shape, p->shape, sizeof p->shape);
   }
   list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {(int64_t)(sf_config_cells(&m->config) / 8)}, m->occupancy};
   if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
@@ -175,7 +138,7 @@ int sf_model_tensors(const sf_model *m, sf_tensor *list)
 
 sf_status sf_model_save(const sf_model *m, const char *path)
 {
-  sf_tensor list[SF_PARAMS_MAX + 2];
+  sf_tensor list[SF_P_COUNT + 2];
   const int n = sf_model_tensors(m, list);
   cJSON *meta = cJSON_CreateObject();
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
@@ -216,16 +179,17 @@ static sf_status load_scales(sf_scales *s, const sf_tensors *set)
 static sf_status load_tensors(sf_model *m, const sf_tensors *set)
 {
   const int64_t bytes = (int64_t)(sf_config_cells(&m->config) / 8);
-  const sf_tensor *part[SF_PARAMS_MAX], *occupancy;
-  for (int i = 0; i < m->params; i++) {
+  const sf_tensor *part[SF_P_COUNT], *occupancy;
+  for (int i = 0; i < SF_P_COUNT; i++) {
     const sf_param *p = &m->param[i];
+    if (!p->name) continue;
     SF_TRY(sf_tensors_get(set, p->name, SF_F32, p->dims, p->shape, &part[i]));
     SF_TRY(sf_tensor_finite(set->path, part[i]));
   }
   SF_TRY(sf_tensors_get(set, "occupancy", SF_U8, 1, &bytes, &occupancy));
   SF_TRY(sf_model_allocate(m));
-  for (int i = 0; i < m->params; i++)
-    memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
+  for (int i = 0; i < SF_P_COUNT; i++)
+    if (sf_model_has(m, i)) memcpy(m->value + m->param[i].offset, part[i]->data, m->param[i].size * sizeof(float));
   memcpy(m->occupancy, occupancy->data, (size_t)bytes);
   return sf_ok();
 }

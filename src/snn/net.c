@@ -35,18 +35,32 @@ static void fire(neurons *n, int count, int t, const float *current, float *out,
   }
 }
 
-void sf_net_sample(const sf_model *model, const float *f, const float *sh, int steps, float *sigma, float *colour,
+/* The matrix of a layer's parameter from input `first` on, n_in of them. */
+static dense matrix(const sf_model *m, int id, int first, int n_in)
+{
+  const int stride = (int)m->param[id].shape[1];
+  return (dense){sf_model_param(m, id) + first, (int)m->param[id].shape[0], n_in, stride};
+}
+
+/* out[count]: the layer's biases, or zeros. */
+static void begin(const sf_model *m, int bias, int count, float *out)
+{
+  memset(out, 0, (size_t)count * sizeof *out);
+  if (sf_model_has(m, bias)) memcpy(out, sf_model_param(m, bias), (size_t)count * sizeof *out);
+}
+
+void sf_net_sample(const sf_model *model, const float *in, const float *sh, int steps, float *sigma, float *colour,
                    sf_net_trace *trace)
 {
   const sf_config *c = &model->config;
-  const int hidden = c->hidden, in3 = SF_DIR_FEATURES + SF_GEO_FEATURES;
+  const bool decodes = sf_model_decodes(model);
+  const int hidden = c->hidden, n_h = decodes ? 0 : SF_GEO_FEATURES;
+  const int n_in = (int)model->param[decodes ? SF_P_C1 : SF_P_D1].shape[1],
+            constants = decodes ? n_in : SF_DIR_FEATURES;
   const float *leak = sf_model_param(model, SF_P_LEAK);
-  const dense w1 = {sf_model_param(model, SF_P_W1), hidden, 2 * c->levels, 2 * c->levels};
-  const dense w2 = {sf_model_param(model, SF_P_W2), SF_DENSITY_OUT, hidden, hidden};
-  const dense w3d = {sf_model_param(model, SF_P_W3), hidden, SF_DIR_FEATURES, in3};
-  const dense w3h = {sf_model_param(model, SF_P_W3) + SF_DIR_FEATURES, hidden, SF_GEO_FEATURES, in3};
-  const dense w4 = {sf_model_param(model, SF_P_W4), hidden, hidden, hidden};
-  const dense w5 = {sf_model_param(model, SF_P_W5), 3, hidden, hidden};
+  const dense d1 = matrix(model, SF_P_D1, 0, n_in), d2 = matrix(model, SF_P_D2, 0, hidden);
+  const dense c1 = matrix(model, SF_P_C1, 0, constants), c1_h = matrix(model, SF_P_C1, constants, n_h);
+  const dense c2 = matrix(model, SF_P_C2, 0, hidden), c3 = matrix(model, SF_P_C3, 0, hidden);
   neurons n[3];
   static const int leak_of[3] = {0, 2, 3};
   for (int l = 0; l < 3; l++)
@@ -54,59 +68,31 @@ void sf_net_sample(const sf_model *model, const float *f, const float *sh, int s
   const float k_sigma = sf_sigmoid(leak[1]), k_colour = sf_sigmoid(leak[4]);
   const float h_step = sf_scales_h_step(&model->scales);
 
-  float current1[SF_LANES] = {0}, base3[SF_LANES] = {0}, o_sigma = 0, o_colour[3] = {0};
-  accumulate(&w1, f, current1);
-  accumulate(&w3d, sh, base3);
+  float current1[SF_LANES] = {0}, base[SF_LANES], o_sigma = 0, o_colour[3] = {0};
+  if (!decodes) accumulate(&d1, in, current1);
+  begin(model, SF_P_C1_BIAS, hidden, base);
+  accumulate(&c1, decodes ? in : sh, base);
   for (int t = 0; t < steps; t++) {
-    float s[SF_LANES], i[SF_DENSITY_OUT] = {0}, h[SF_GEO_FEATURES], current[SF_LANES], j[3] = {0};
-    fire(&n[0], hidden, t, current1, s, trace, 0);
-    accumulate(&w2, s, i);
-    memcpy(current, base3, sizeof current);
-    for (int a = 0; a < SF_GEO_FEATURES; a++) h[a] = h_step > 0 ? sf_round_h(i[1 + a], h_step) : i[1 + a];
-    accumulate(&w3h, h, current);
+    float s[SF_LANES], i[SF_DENSITY_OUT] = {0}, h[SF_GEO_FEATURES], current[SF_LANES], j[3];
+    if (!decodes) {
+      fire(&n[0], hidden, t, current1, s, trace, 0);
+      accumulate(&d2, s, i);
+      sigma[t] = o_sigma = sf_plif_charge(c->mode, t, k_sigma, o_sigma, expf(i[0]));
+    }
+    memcpy(current, base, (size_t)hidden * sizeof *base);
+    for (int a = 0; a < n_h; a++) h[a] = h_step > 0 ? sf_round_h(i[1 + a], h_step) : i[1 + a];
+    accumulate(&c1_h, h, current);
     fire(&n[1], hidden, t, current, s, trace, 2);
-    memset(current, 0, sizeof current);
-    accumulate(&w4, s, current);
+    begin(model, SF_P_C2_BIAS, hidden, current);
+    accumulate(&c2, s, current);
     fire(&n[2], hidden, t, current, s, trace, 3);
-    accumulate(&w5, s, j);
-    sigma[t] = o_sigma = sf_plif_charge(c->mode, t, k_sigma, o_sigma, expf(i[0]));
+    begin(model, SF_P_C3_BIAS, 3, j);
+    accumulate(&c3, s, j);
     for (int a = 0; a < 3; a++)
       colour[3 * t + a] = o_colour[a] = sf_plif_charge(c->mode, t, k_colour, o_colour[a], sf_sigmoid(j[a]));
     if (!trace) continue;
-    memcpy(trace->current[1][t], i, sizeof i);
+    if (!decodes) memcpy(trace->current[1][t], i, sizeof i), trace->membrane[1][t][0] = o_sigma;
     memcpy(trace->current[4][t], j, sizeof j);
-    trace->membrane[1][t][0] = o_sigma;
     memcpy(trace->membrane[4][t], o_colour, sizeof o_colour);
-  }
-}
-
-void sf_tensorf_decode(const sf_model *model, const float *in, int steps, float *colour, sf_net_trace *trace)
-{
-  const sf_config *c = &model->config;
-  const int hidden = c->hidden, inputs = sf_tensorf_inputs(&c->tensorf);
-  const float *leak = sf_model_leak(model), *b1 = sf_model_param(model, SF_V_B1), *b2 = sf_model_param(model, SF_V_B2),
-              *b3 = sf_model_param(model, SF_V_B3);
-  const dense w1 = {sf_model_param(model, SF_V_W1), hidden, inputs, inputs};
-  const dense w2 = {sf_model_param(model, SF_V_W2), hidden, hidden, hidden};
-  const dense w3 = {sf_model_param(model, SF_V_W3), 3, hidden, hidden};
-  neurons n[2];
-  for (int l = 0; l < 2; l++)
-    n[l] = (neurons){c->mode, c->net == SF_NET_ANN, sf_sigmoid(leak[2 + l]), c->theta[1 + l], {0}};
-  const float k_colour = sf_sigmoid(leak[4]);
-
-  float base[SF_LANES] = {0}, o[3] = {0};
-  memcpy(base, b1, (size_t)hidden * sizeof *b1);
-  accumulate(&w1, in, base);
-  for (int t = 0; t < steps; t++) {
-    float s[SF_LANES], current[SF_LANES] = {0}, j[3] = {b3[0], b3[1], b3[2]};
-    fire(&n[0], hidden, t, base, s, trace, 2);
-    memcpy(current, b2, (size_t)hidden * sizeof *b2);
-    accumulate(&w2, s, current);
-    fire(&n[1], hidden, t, current, s, trace, 3);
-    accumulate(&w3, s, j);
-    for (int a = 0; a < 3; a++) colour[3 * t + a] = o[a] = sf_plif_charge(c->mode, t, k_colour, o[a], sf_sigmoid(j[a]));
-    if (!trace) continue;
-    memcpy(trace->current[4][t], j, sizeof j);
-    memcpy(trace->membrane[4][t], o, sizeof o);
   }
 }

@@ -2,8 +2,6 @@
 #include "snn/model.h"
 #include <math.h>
 
-static const sf_param_id weights_of[SF_LAYERS] = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5};
-
 double sf_scales_input(const sf_scales *s, int layer, int input)
 {
   if (layer == 0) return s->lsb.feature[input / 2];
@@ -16,7 +14,7 @@ void sf_scales_round(const sf_model *model, float *value)
   const sf_scales *s = &model->scales;
   const double limit = (1 << (s->weight_bits - 1)) - 1;
   for (int layer = 0; layer < SF_LAYERS; layer++) {
-    const sf_param *p = &model->param[weights_of[layer]];
+    const sf_param *p = &model->param[sf_layer_weights[layer]];
     for (int64_t in = 0; in < p->shape[1]; in++) {
       const double step = s->lsb.current[layer] / sf_scales_input(s, layer, (int)in);
       for (int64_t out = 0; out < p->shape[0]; out++) {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TENSORS_MAX = 4 * SF_PARAMS_MAX + 3 };
+enum { TENSORS_MAX = 4 * SF_P_COUNT + 3 };
 
 static void put(cJSON *meta, const char *key, double value)
 {
@@ -119,7 +119,8 @@ static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *lis
     float *data;
   } sets[3] = {{"adam.m.", t->moment1}, {"adam.v.", t->moment2}, {"average.", t->average}};
   for (int s = 0; s < (!with_optimiser ? 0 : t->averaged ? 3 : 2); s++)
-    for (int i = 0; i < m->params; i++) {
+    for (int i = 0; i < SF_P_COUNT; i++) {
+      if (!sf_model_has(m, i)) continue;
       sf_tensor *x = &list[n++];
       *x = (sf_tensor){.type = SF_F32, .dims = m->param[i].dims, .data = sets[s].data + m->param[i].offset};
       snprintf(x->name, sizeof x->name, "%s%s", sets[s].prefix, m->param[i].name);

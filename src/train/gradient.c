@@ -178,17 +178,17 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
   sf_groups_add(part, sizeof(sf_net_grad) / sizeof(float));
   const sf_net_grad *grad = t->group[0].grad;
   for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
-  sf_matrix_add(at[SF_P_W1], grad->w1, hidden, features, (features + 15) / 16 * 16);
-  sf_matrix_add(at[SF_P_W2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
+  sf_matrix_add(at[SF_P_D1], grad->w1, hidden, features, (features + 15) / 16 * 16);
+  sf_matrix_add(at[SF_P_D2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
   for (int r = 0; r < hidden; r++) {
-    float *row = at[SF_P_W3] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
+    float *row = at[SF_P_C1] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
     sf_matrix_add(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
     sf_matrix_add(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
   }
-  sf_matrix_add(at[SF_P_W4], grad->w4, hidden, hidden, hidden);
+  sf_matrix_add(at[SF_P_C2], grad->w4, hidden, hidden, hidden);
   for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) at[SF_P_W4][r * hidden + c] += grad->w4t[c * hidden + r];
-  sf_matrix_add(at[SF_P_W5], grad->w5, 3, hidden, hidden);
+    for (int c = 0; c < hidden; c++) at[SF_P_C2][r * hidden + c] += grad->w4t[c * hidden + r];
+  sf_matrix_add(at[SF_P_C3], grad->w5, 3, hidden, hidden);
   sf_matrix_add(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
   for (int n = 0; n < GROUPS; n++) {
     const sf_group *g = &t->group[n];

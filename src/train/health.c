@@ -17,7 +17,7 @@ static const float logit_limit = 6.9067548f; /* ln 999 */
 
 void sf_health_leaks(sf_trainer *t)
 {
-  float *leak = sf_model_leak(&t->model);
+  float *leak = sf_model_param(&t->model, SF_P_LEAK);
   for (int l = 0; l < SF_LAYERS; l++) {
     if (leak[l] > logit_limit) leak[l] = logit_limit; /* not fminf: a NaN must stay one, to be found */
     if (leak[l] < -logit_limit) leak[l] = -logit_limit;
@@ -56,10 +56,10 @@ static void forget(sf_trainer *t, size_t first, size_t count)
 }
 
 /* A bias beyond the threshold would decide alone, whatever the scale of the weights. */
-static void clear_bias(sf_trainer *t, int weights)
+static void clear_bias(sf_trainer *t, int layer)
 {
-  if (t->model.config.backbone != SF_TENSORF) return;
-  const sf_param *b = &t->model.param[weights + 1];
+  if (sf_layer_bias[layer] < 0) return;
+  const sf_param *b = &t->model.param[sf_layer_bias[layer]];
   memset(t->model.value + b->offset, 0, b->size * sizeof(float));
   forget(t, b->offset, b->size);
 }
@@ -68,12 +68,12 @@ static void clear_bias(sf_trainer *t, int weights)
 static void revive(sf_trainer *t, int l, const sf_probes *probes)
 {
   const int layer = spiking[l];
-  const sf_param *w = &t->model.param[t->backbone->weights[layer]];
-  const size_t leak = (size_t)(sf_model_leak(&t->model) - t->model.value) + layer;
+  const sf_param *w = &t->model.param[sf_layer_weights[layer]];
+  const size_t leak = t->model.param[SF_P_LEAK].offset + (size_t)layer;
   census now[3];
   t->model.value[leak] = 0;
   t->averaged = 0;
-  clear_bias(t, t->backbone->weights[layer]);
+  clear_bias(t, layer);
   sf_layer_scale(t, layer, probes);
   count(t, probes, now);
   if (!(now[l].firing > 100 * dead && now[l].firing < saturated)) {
@@ -103,7 +103,7 @@ sf_status sf_health_check(sf_trainer *t, int event[3])
   sf_probes_draw(t, RNG_PROBE, CENSUS, &probes);
   count(t, &probes, now);
   for (int l = 0; l < 3; l++) {
-    if (t->backbone->weights[spiking[l]] < 0) continue;
+    if (!sf_model_has(&t->model, sf_layer_weights[spiking[l]])) continue;
     h->quiet[l] = now[l].quiet;
     h->run[l] = next_run(h->run[l], now[l].firing);
   }
@@ -122,7 +122,7 @@ sf_status sf_health_check(sf_trainer *t, int event[3])
 
 sf_status sf_parameters_check(const sf_trainer *t)
 {
-  for (int i = t->backbone->nets; i < t->model.params; i++)
+  for (int i = SF_P_NETS; i < SF_P_COUNT; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++) {
       const float value = t->model.value[t->model.param[i].offset + j];
       if (!(fabsf(value) < 1e6f))

@@ -83,14 +83,9 @@ static void update(sf_trainer *t)
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1, 0};
   sf_gradient_grid(t, &adam);
   adam.lr = t->options.lr_net * fade;
-  const size_t nets = t->model.param[SF_P_W1].offset;
+  const size_t nets = t->model.param[SF_P_NETS].offset;
   t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
                    t->moment2 + nets);
-}
-
-static int probe_inputs(const sf_config *config)
-{
-  return 2 * config->levels;
 }
 
 static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int i, sf_probes *p)
@@ -107,9 +102,7 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
   sf_sh4(d, p->sh + i * SF_DIR_FEATURES);
 }
 
-const sf_backbone sf_backbone_ingp = {.nets = SF_P_W1,
-                                      .growth = 3e3f,
-                                      .weights = {SF_P_W1, SF_P_W2, SF_P_W3, SF_P_W4, SF_P_W5},
+const sf_backbone sf_backbone_ingp = {.growth = 3e3f,
                                       .create = create,
                                       .destroy = destroy,
                                       .init = init,
@@ -118,5 +111,4 @@ const sf_backbone sf_backbone_ingp = {.nets = SF_P_W1,
                                       .gradient = sf_gradient_nets,
                                       .check = check,
                                       .update = update,
-                                      .probe_inputs = probe_inputs,
                                       .probe = probe};

@@ -1,5 +1,6 @@
 /* Initial parameters. The ReLU twin starts as torch-ngp; a spiking net's weights are scaled layer by layer until the
  * currents of random samples have the spread that makes neurons fire (after Mishkin & Matas 2016). */
+#include "field/field.h"
 #include "train/internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 
 sf_status sf_probes_create(sf_probes *p, const sf_trainer *t)
 {
-  p->features = t->backbone->probe_inputs(&t->model.config);
+  p->features = sf_field_of(&t->model.config)->inputs(&t->model.config);
   p->f = malloc((size_t)PROBES * p->features * sizeof *p->f);
   p->sh = malloc(PROBES * SF_DIR_FEATURES * sizeof *p->sh);
   p->trace = calloc(1, sizeof *p->trace);
@@ -51,10 +52,7 @@ void sf_probe(const sf_model *m, const sf_probes *p, int index, int steps)
 {
   float sigma[SF_T_MAX], colour[3 * SF_T_MAX];
   const float *f = p->f + index * p->features;
-  if (m->config.backbone == SF_TENSORF)
-    sf_tensorf_decode(m, f, steps, colour, p->trace);
-  else
-    sf_net_sample(m, f, p->sh + index * SF_DIR_FEATURES, steps, sigma, colour, p->trace);
+  sf_net_sample(m, f, p->sh + index * SF_DIR_FEATURES, steps, sigma, colour, p->trace);
 }
 
 void sf_init_uniform(const sf_trainer *t, int id, float bound, uint64_t stream, uint64_t base)
@@ -67,7 +65,7 @@ void sf_init_uniform(const sf_trainer *t, int id, float bound, uint64_t stream, 
 
 void sf_layer_redraw(sf_trainer *t, int layer, uint64_t stream)
 {
-  const int id = t->backbone->weights[layer];
+  const int id = sf_layer_weights[layer];
   sf_init_uniform(t, id, 1 / sqrtf((float)t->model.param[id].shape[1]), stream, (uint64_t)t->iteration << 32);
 }
 
@@ -85,7 +83,7 @@ static double current_rms(const sf_model *m, const sf_probes *p, int layer, int 
 void sf_layer_scale(sf_trainer *t, int layer, const sf_probes *probes)
 {
   const sf_config *c = &t->model.config;
-  const int id = t->backbone->weights[layer];
+  const int id = sf_layer_weights[layer];
   const double target[SF_LAYERS] = {c->theta[0], 0.5, c->theta[1], c->theta[2], 0.5};
   const double rms = current_rms(&t->model, probes, layer, (int)t->model.param[id].shape[0]);
   if (!(rms > 1e-12 && rms < 1e12)) return; /* silent input: no scale helps */
@@ -95,17 +93,16 @@ void sf_layer_scale(sf_trainer *t, int layer, const sf_probes *probes)
 
 sf_status sf_init_parameters(sf_trainer *t)
 {
-  const int *weights = t->backbone->weights;
   t->backbone->init(t);
   for (int layer = 0; layer < SF_LAYERS; layer++)
-    if (weights[layer] >= 0) sf_layer_redraw(t, layer, RNG_INIT);
+    if (sf_model_has(&t->model, sf_layer_weights[layer])) sf_layer_redraw(t, layer, RNG_INIT);
   if (t->model.config.net == SF_NET_ANN) return sf_ok();
   sf_probes probes;
   SF_TRY(sf_probes_create(&probes, t));
   sf_probes_draw(t, RNG_PROBE, PROBES, &probes);
   for (int i = 0; i < PROBES * probes.features; i++) probes.f[i] *= t->backbone->growth;
   for (int layer = 0; layer < SF_LAYERS; layer++)
-    if (weights[layer] >= 0) sf_layer_scale(t, layer, &probes);
+    if (sf_model_has(&t->model, sf_layer_weights[layer])) sf_layer_scale(t, layer, &probes);
   sf_probes_free(&probes);
   return sf_ok();
 }

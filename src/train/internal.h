@@ -124,11 +124,9 @@ typedef struct sf_search {
 struct sf_vm; /* vm.h */
 struct sf_probes;
 
-/* What differs between the backbones. The rest of the trainer does not ask which one it trains. */
+/* How a field and its net are trained. The rest of the trainer does not ask which field it trains. */
 typedef struct sf_backbone {
-  int nets;                           /* first parameter that is not the field's */
   float growth;                       /* of features from the start of a run to the size that neurons are scaled for */
-  int weights[SF_LAYERS];             /* parameters of layers D1 D2 C1 C2 C3; -1: no such layer */
   sf_status (*create)(sf_trainer *t); /* memory; the model is there */
   void (*destroy)(sf_trainer *t);
   void (*init)(sf_trainer *t); /* the field of a new run, and the nets but for what sf_init_parameters does */
@@ -139,7 +137,6 @@ typedef struct sf_backbone {
   void (*gradient)(sf_trainer *t, const struct sf_loss_plan *plan, struct sf_loss_sums *mean, double firing[3]);
   sf_status (*check)(const sf_trainer *t); /* the field's gradient is finite */
   void (*update)(sf_trainer *t);           /* Adam on field and nets; clears t->grad */
-  int (*probe_inputs)(const sf_config *config);
   /* The inputs of probe `index` at x in [0,1]^3; random numbers of `stream` from `base` on. */
   void (*probe)(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int index,
                 struct sf_probes *probes);

@@ -8,6 +8,7 @@
  * The worth falls while the nets learn, mostly because the error as a whole does: the share of the error that a step
  * saves hardly changes. So that share is averaged over much of the search, the error over its last part alone, and the
  * worth is their product. Older measurements fade out of both. */
+#include "field/field.h"
 #include "train/internal.h"
 #include <math.h>
 #include <string.h>
@@ -44,18 +45,20 @@ static double sample_energy(const sf_trainer *t, double n)
   const sf_config *c = &t->model.config;
   const double mac = 4.6, sop = 0.9, hidden = c->hidden;
   const double *firing = t->search.firing;
-  if (c->backbone == SF_TENSORF)
-    return mac * hidden * sf_tensorf_inputs(&c->tensorf) + n * sop * hidden * (firing[1] * hidden + firing[2] * 3);
-  return mac * hidden * (2 * c->levels + SF_DIR_FEATURES * t->search.rays_per_sample) +
+  const double inputs = sf_field_of(c)->inputs(c);
+  if (sf_model_decodes(&t->model))
+    return mac * hidden * inputs + n * sop * hidden * (firing[1] * hidden + firing[2] * 3);
+  return mac * hidden * (inputs + SF_DIR_FEATURES * t->search.rays_per_sample) +
          n * hidden * (mac * SF_GEO_FEATURES + sop * (firing[0] * SF_DENSITY_OUT + firing[1] * hidden + firing[2] * 3));
 }
 
 /* Of the ReLU twin: every synapse a MAC, once. */
-static double twin_energy(const sf_config *c)
+static double twin_energy(const sf_model *m)
 {
-  const double mac = 4.6, hidden = c->hidden;
-  if (c->backbone == SF_TENSORF) return mac * hidden * (sf_tensorf_inputs(&c->tensorf) + hidden + 3);
-  return mac * hidden * (2 * c->levels + SF_DENSITY_OUT + SF_DIR_FEATURES + SF_GEO_FEATURES + hidden + 3);
+  const double mac = 4.6, hidden = m->config.hidden;
+  double synapses = 0;
+  for (int l = 0; l < SF_LAYERS; l++) synapses += (double)m->param[sf_layer_weights[l]].size;
+  return mac * hidden * (synapses / hidden);
 }
 
 /* Of the error that one more step saves; nothing of no error. */
@@ -111,7 +114,7 @@ double sf_search_energy(const sf_trainer *t, double steps)
 
 double sf_search_saving(const sf_trainer *t, double steps)
 {
-  return 1 - sample_energy(t, steps) / twin_energy(&t->model.config);
+  return 1 - sample_energy(t, steps) / twin_energy(&t->model);
 }
 
 /* Where worth and price meet, or the end of 1..T on which side they do. */

@@ -1,4 +1,5 @@
 /* One iteration of PATA: draw, forward, losses, backward, Adam, time budget, occupancy. */
+#include "field/field.h"
 #include "train/internal.h"
 #include "snn/plif.h"
 #include "base/clock.h"
@@ -111,14 +112,13 @@ static sf_status check_resumed(const sf_trainer *t, const char *path)
   const sf_config *c = &t->model.config, *o = &t->options.config;
   const float scale = t->data->scale;
   if (c->backbone != o->backbone)
-    return sf_fail(SF_E_RANGE, "%s: the checkpoint is of the other backbone, %s", path,
-                   c->backbone == SF_TENSORF ? "tensorf" : "ingp");
+    return sf_fail(SF_E_RANGE, "%s: the checkpoint is of the other backbone, %s", path, sf_field_of(c)->name);
   if (!(fabsf(c->scale - scale) <= 1e-6f * scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'scale' is %g, the data has %g (see --scale)", path, (double)c->scale,
                    (double)scale);
-  if (c->backbone == SF_INGP && !sf_tuning(t) && c->bound != o->bound)
+  if (c->bound != o->bound && !sf_tuning(t))
     return sf_fail(SF_E_RANGE, "%s: metadata 'bound' is %d, here it is %d (see --bound)", path, c->bound, o->bound);
-  if (c->backbone == SF_TENSORF && c->tensorf.ndc != t->data->ndc)
+  if (sf_model_decodes(&t->model) && c->tensorf.ndc != t->data->ndc)
     return sf_fail(SF_E_RANGE, "%s: the checkpoint is %s NDC, the data is %s it", path,
                    c->tensorf.ndc ? "in" : "without", t->data->ndc ? "in" : "without");
   return sf_ok();
@@ -134,7 +134,8 @@ static sf_status create(sf_trainer *t, const char *resume)
   if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);
-  t->backbone = c->backbone == SF_TENSORF ? &sf_backbone_tensorf : &sf_backbone_ingp;
+  static const sf_backbone *const backbone[SF_FIELDS] = {&sf_backbone_ingp, &sf_backbone_tensorf};
+  t->backbone = backbone[c->backbone];
   t->workers = omp_get_max_threads() < GROUPS ? omp_get_max_threads() : GROUPS;
   t->grad = sf_aligned_alloc(bytes);
   t->moment1 = sf_aligned_alloc(bytes);
@@ -229,8 +230,8 @@ static void train_all(const sf_trainer *t, sf_loss_plan *p)
 static sf_loss_plan make_plan(const sf_trainer *t)
 {
   const int T = t->model.config.steps;
-  const float *leak = sf_model_leak(&t->model);
-  const bool sigma_integrates = t->backbone->weights[1] >= 0;
+  const float *leak = sf_model_param(&t->model, SF_P_LEAK);
+  const bool sigma_integrates = !sf_model_decodes(&t->model);
   sf_loss_plan p = {.inverse_rays = 1.0f / (float)t->batch.rays,
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
@@ -251,14 +252,14 @@ static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sum
   if (p->extra == 0) return 0;
   static const int integrator[2] = {1, 4}, spiking[3] = {0, 2, 3};
   const double from_tail[2] = {sums->g_sigma_leak, sums->g_colour_leak};
-  float *leak = sf_model_leak(&t->model), *grad = t->grad + (leak - t->model.value);
+  float *leak = sf_model_param(&t->model, SF_P_LEAK), *grad = t->grad + (leak - t->model.value);
   double value = 0;
   for (int i = 0; i < 2; i++) {
     const float k = sf_sigmoid(leak[integrator[i]]);
     grad[integrator[i]] += (float)(from_tail[i] * k * (1 - k));
   }
   for (int i = 0; i < 3; i++) {
-    if (t->backbone->weights[spiking[i]] < 0) continue;
+    if (!sf_model_has(&t->model, sf_layer_weights[spiking[i]])) continue;
     const double inverse = exp(-(double)leak[spiking[i]]), tau = fmin(1 + inverse, 30.0); /* e^tau stays finite */
     value += exp(tau);
     grad[spiking[i]] -= (float)(p->extra * exp(tau) * inverse);
@@ -272,7 +273,7 @@ static sf_status check_gradient(const sf_trainer *t, double loss)
   if (!isfinite(loss))
     return sf_fail(SF_E_RANGE, "train: iteration %lld: the loss is %g", (long long)t->iteration, loss);
   SF_TRY(t->backbone->check(t)); /* first: what is wild in the field is wild in the nets, too */
-  for (int i = t->backbone->nets; i < t->model.params; i++)
+  for (int i = SF_P_NETS; i < SF_P_COUNT; i++)
     for (size_t j = 0; j < t->model.param[i].size; j++)
       if (!(fabsf(t->grad[t->model.param[i].offset + j]) < 1e18f))
         return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' is %g at index %zu",
@@ -328,7 +329,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
                       .lattice = t->model.config.lattice / t->stride,
                       .occupied = t->occupied,
                       .samples_per_second = t->seconds > 0 ? (double)t->samples / t->seconds : 0};
-  for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_leak(&t->model)[l]);
+  for (int l = 0; l < SF_LAYERS; l++) s.tau[l] = 1 / sf_sigmoid(sf_model_param(&t->model, SF_P_LEAK)[l]);
   memcpy(s.quiet, t->health.quiet, sizeof s.quiet);
   memcpy(s.revived, t->health.revived, sizeof s.revived);
   return s;

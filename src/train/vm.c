@@ -72,17 +72,17 @@ static void init(sf_trainer *t)
 {
   const sf_model *m = &t->model;
   const uint64_t seed = t->options.seed;
-  const size_t field = m->param[SF_V_BASIS].offset;
+  const size_t field = m->param[SF_P_BASIS].offset;
 #pragma omp parallel for schedule(static)
   for (size_t i = 0; i < field; i++) {
     const double u = (sf_random_u64(seed, RNG_INIT, 2 * i) >> 11) * 0x1p-53;
     const double angle = 6.283185307179586 * (double)(sf_random_u64(seed, RNG_INIT, 2 * i + 1) >> 11) * 0x1p-53;
     m->value[i] = (float)(0.1 * sqrt(-2 * log1p(-u)) * cos(angle));
   }
-  sf_init_uniform(t, SF_V_BASIS, 1 / sqrtf((float)m->param[SF_V_BASIS].shape[1]), RNG_INIT, field);
+  sf_init_uniform(t, SF_P_BASIS, 1 / sqrtf((float)m->param[SF_P_BASIS].shape[1]), RNG_INIT, field);
   if (m->config.net != SF_NET_ANN) return;
-  sf_init_uniform(t, SF_V_B1, 1 / sqrtf((float)m->param[SF_V_W1].shape[1]), RNG_INIT, field);
-  sf_init_uniform(t, SF_V_B2, 1 / sqrtf((float)m->param[SF_V_W2].shape[1]), RNG_INIT, field);
+  sf_init_uniform(t, SF_P_C1_BIAS, 1 / sqrtf((float)m->param[SF_P_C1].shape[1]), RNG_INIT, field);
+  sf_init_uniform(t, SF_P_C2_BIAS, 1 / sqrtf((float)m->param[SF_P_C2].shape[1]), RNG_INIT, field);
 }
 
 static sf_status begin(sf_trainer *t, int steps)
@@ -96,14 +96,9 @@ static sf_status check(const sf_trainer *t)
   for (int g = 0; g < GROUPS; g++)
     if (t->vm->group[g].wild)
       return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' or '%s' not finite or far too large",
-                     (long long)t->iteration, t->model.param[SF_V_DENSITY_PLANE].name,
-                     t->model.param[SF_V_APP_PLANE].name);
+                     (long long)t->iteration, t->model.param[SF_P_DENSITY_PLANE].name,
+                     t->model.param[SF_P_APP_PLANE].name);
   return sf_ok();
-}
-
-static int probe_inputs(const sf_config *config)
-{
-  return sf_tensorf_inputs(&config->tensorf);
 }
 
 static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int i, sf_probes *p)
@@ -115,9 +110,7 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
   sf_tensorf_encode(&t->model.config.tensorf, features, ray.direction, p->f + i * p->features);
 }
 
-const sf_backbone sf_backbone_tensorf = {.nets = SF_V_BASIS,
-                                         .growth = 1,
-                                         .weights = {-1, -1, SF_V_W1, SF_V_W2, SF_V_W3},
+const sf_backbone sf_backbone_tensorf = {.growth = 1,
                                          .create = create,
                                          .destroy = destroy,
                                          .init = init,
@@ -126,5 +119,4 @@ const sf_backbone sf_backbone_tensorf = {.nets = SF_V_BASIS,
                                          .gradient = sf_vm_gradient,
                                          .check = check,
                                          .update = sf_vm_update,
-                                         .probe_inputs = probe_inputs,
                                          .probe = probe};

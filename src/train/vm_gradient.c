@@ -120,21 +120,21 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
   const sf_decoder_view *v = &t->vm->decoder->view;
   const int hidden = m->config.hidden, rows = (v->inputs + 1 + 15) / 16 * 16;
   double spikes[3] = {0}, neurons = 0;
-  float *at[SF_V_COUNT], *part[GROUPS];
+  float *at[SF_P_COUNT], *part[GROUPS];
   for (int g = 0; g < GROUPS; g++) part[g] = (float *)t->vm->group[g].grad;
   sf_groups_add(part, sizeof(sf_decoder_grad) / sizeof(float));
   const sf_decoder_grad *grad = t->vm->group[0].grad;
-  for (int i = 0; i < SF_V_COUNT; i++) at[i] = t->grad + m->param[i].offset;
-  sf_matrix_add(at[SF_V_BASIS], grad->basis, v->features, v->columns, v->products);
-  sf_matrix_add(at[SF_V_W1], grad->w1, hidden, v->inputs, rows);
-  sf_matrix_add(at[SF_V_B1], grad->w1 + v->inputs, hidden, 1, rows);
-  sf_matrix_add(at[SF_V_W2], grad->net.w4, hidden, hidden, hidden);
+  for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
+  sf_matrix_add(at[SF_P_BASIS], grad->basis, v->features, v->columns, v->products);
+  sf_matrix_add(at[SF_P_C1], grad->w1, hidden, v->inputs, rows);
+  sf_matrix_add(at[SF_P_C1_BIAS], grad->w1 + v->inputs, hidden, 1, rows);
+  sf_matrix_add(at[SF_P_C2], grad->net.w4, hidden, hidden, hidden);
   for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) at[SF_V_W2][r * hidden + c] += grad->net.w4t[c * hidden + r];
-  sf_matrix_add(at[SF_V_B2], grad->b2, 1, hidden, hidden);
-  sf_matrix_add(at[SF_V_W3], grad->net.w5, 3, hidden, hidden);
-  sf_matrix_add(at[SF_V_B3], grad->b3, 1, 3, 3);
-  sf_matrix_add(at[SF_V_LEAK], grad->net.leak, 1, SF_LAYERS, SF_LAYERS);
+    for (int c = 0; c < hidden; c++) at[SF_P_C2][r * hidden + c] += grad->net.w4t[c * hidden + r];
+  sf_matrix_add(at[SF_P_C2_BIAS], grad->b2, 1, hidden, hidden);
+  sf_matrix_add(at[SF_P_C3], grad->net.w5, 3, hidden, hidden);
+  sf_matrix_add(at[SF_P_C3_BIAS], grad->b3, 1, 3, 3);
+  sf_matrix_add(at[SF_P_LEAK], grad->net.leak, 1, SF_LAYERS, SF_LAYERS);
   for (int n = 0; n < GROUPS; n++) {
     const sf_vm_group *g = &t->vm->group[n];
     sf_sums_add(sums, &g->sums, mean);

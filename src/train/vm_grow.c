@@ -76,8 +76,8 @@ sf_status sf_vm_resample(sf_trainer *t, const sf_tensorf *field, const double st
   sf_config config = old->config;
   config.tensorf = *field;
   SF_TRY(sf_model_create(&new, &config));
-  for (int id = 0; id < SF_V_BASIS; id++) resample_param(old, &new, id, start, stride);
-  for (int id = SF_V_BASIS; id < SF_V_COUNT; id++)
+  for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) resample_param(old, &new, id, start, stride);
+  for (int id = SF_P_BASIS; id < SF_P_COUNT; id++)
     memcpy(new.value + new.param[id].offset, old->value + old->param[id].offset, old->param[id].size * sizeof(float));
   const size_t res = (size_t)config.occ_res;
   memcpy(new.occupancy, old->occupancy, res * res * res / 8);

@@ -35,7 +35,7 @@ static void scatter(sf_trainer *t)
 #pragma omp parallel for schedule(dynamic, 1)
   for (int i = 0; i < n; i++) {
     const slice s = list[i];
-    const int plane = (s.appearance ? SF_V_APP_PLANE : SF_V_DENSITY_PLANE) + s.mode;
+    const int plane = (s.appearance ? SF_P_APP_PLANE : SF_P_DENSITY_PLANE) + s.mode;
     float *dplane = t->grad + t->model.param[plane].offset, *dline = t->grad + t->model.param[plane + 3].offset;
     if (s.appearance)
       t->kernels->vm_backward(&vm->appearance, s.mode, s.first, s.count, vm->x, t->batch.blocks * SF_BLOCK,
@@ -78,16 +78,16 @@ void sf_vm_update(sf_trainer *t)
   const double from = t->vm->fresh_at, fade = pow(0.1, (t->progress - from) / fmax(1 - from, 1e-3));
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-8, t->iteration - t->vm->fresh + 1, 0};
   scatter(t);
-  for (int id = 0; id < SF_V_BASIS; id++) {
+  for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) {
     const sf_param *p = &t->model.param[id];
-    const bool plane = p->dims == 3, density = id < SF_V_APP_PLANE;
+    const bool plane = p->dims == 3, density = id < SF_P_APP_PLANE;
     if (ndc && plane) add_variation(p, tv_weight * fade, t->model.value + p->offset, t->grad + p->offset);
     adam.l1 = !ndc && density ? (float)((t->vm->event ? l1_rest : l1_first) / (double)p->size) : 0;
     update_part(t, &adam, p);
   }
   adam.lr = t->options.lr_net * fade;
   adam.l1 = 0;
-  const size_t nets = t->model.param[SF_V_BASIS].offset;
+  const size_t nets = t->model.param[SF_P_BASIS].offset;
   t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
                    t->moment2 + nets);
 }
