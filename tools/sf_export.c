@@ -2,6 +2,7 @@
  * of a scene for any simulator, its traces and graphs for other tools. */
 #include "cli/cli.h"
 #include "base/clock.h"
+#include "field/field.h"
 #include "fit/fit.h"
 #include "quant/quant.h"
 #include "tools/export/extras.h"
@@ -295,7 +296,7 @@ static sf_status export_model(const sf_model *model, const char *path, const opt
 
 static sf_status check_fit(const sf_config *config, const char *path)
 {
-  if (config->backbone == SF_TENSORF)
+  if (sf_field_decoded(sf_field_of(config)))
     return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
   if (config->bound > 1 || config->dt_gamma > 0)
     return sf_fail(

@@ -166,7 +166,7 @@ static sf_status load_start(const train_arguments *a, float scale, sf_model *mod
   sf_quant_report report;
   fx_scene scene;
   SF_TRY(sf_model_load(model, a->fine_tune));
-  if (model->config.backbone == SF_TENSORF) {
+  if (sf_model_decodes(model)) {
     sf_model_free(model);
     return sf_fail(SF_E_UNSUPPORTED, "%s: --fine-tune knows the hash grid's nets only, the model is of tensorf",
                    a->fine_tune);

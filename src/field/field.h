@@ -14,6 +14,7 @@ enum { SF_NUMBERS_MAX = 25 };
 
 typedef struct sf_field {
   const char *name; /* as --backbone spells it */
+  bool lattice;     /* rays have the configuration's lattice; without: steps of the field's own */
   /* Names of the net's tensors in files, layers D1 D2 C1 C2 C3; NULL: the net behind this field has none. */
   const char *weights[SF_LAYERS], *bias[SF_LAYERS];
   sf_status (*check)(const sf_config *config);
@@ -24,6 +25,11 @@ typedef struct sf_field {
   /* Numbers of the field alone, in the order of the file; how many. */
   int (*numbers)(sf_config *config, sf_number number[SF_NUMBERS_MAX]);
 } sf_field;
+/* The net behind it is a decoder. */
+static inline bool sf_field_decoded(const sf_field *field)
+{
+  return !field->weights[0];
+}
 extern const sf_field sf_field_grid, sf_field_planes;
 enum { SF_FIELDS = SF_TENSORF + 1 };
 const sf_field *sf_field_of(const sf_config *config);

@@ -47,6 +47,7 @@ static int numbers(sf_config *config, sf_number number[SF_NUMBERS_MAX])
 }
 
 const sf_field sf_field_grid = {.name = "ingp",
+                                .lattice = true,
                                 .weights = {"density.w1", "density.w2", "colour.w3", "colour.w4", "colour.w5"},
                                 .check = check,
                                 .inputs = inputs,

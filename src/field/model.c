@@ -12,7 +12,7 @@ const int sf_layer_bias[SF_LAYERS] = {-1, -1, SF_P_C1_BIAS, SF_P_C2_BIAS, SF_P_C
 static void lay_out_net(const sf_config *c, const sf_field *field, sf_param param[SF_P_COUNT])
 {
   const int64_t hidden = c->hidden, inputs = field->inputs(c);
-  const int64_t in_c1 = field->weights[0] ? SF_DIR_FEATURES + SF_GEO_FEATURES : inputs;
+  const int64_t in_c1 = sf_field_decoded(field) ? inputs : SF_DIR_FEATURES + SF_GEO_FEATURES;
   const int64_t in[SF_LAYERS] = {inputs, hidden, in_c1, hidden, hidden};
   const int64_t out[SF_LAYERS] = {hidden, SF_DENSITY_OUT, hidden, hidden, 3};
   for (int l = 0; l < SF_LAYERS; l++) {

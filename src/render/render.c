@@ -114,7 +114,7 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
   if (steps < 0 || steps > model->config.steps)
     return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
   if (!steps) steps = model->t_r;
-  if (model->config.backbone == SF_TENSORF)
+  if (sf_model_decodes(model)) /* its weights are known before it decodes */
     return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples);
   sf_steps intervals;
   SF_TRY(sf_steps_make(&intervals, &model->config, 1));

@@ -47,7 +47,7 @@ static sf_status add_twin(cells *c, const char *path)
   sf_status status = sf_model_load(&m, path);
   const size_t bytes = status.code ? 0 : sf_config_cells(&m.config) / 8;
   if (!status.code && !c->bits) {
-    *c = (cells){malloc(bytes), bytes, m.config.backbone == SF_INGP};
+    *c = (cells){malloc(bytes), bytes, sf_model_has(&m, SF_P_GRID)};
     if (c->bits)
       memcpy(c->bits, m.occupancy, bytes);
     else

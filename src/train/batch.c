@@ -139,7 +139,7 @@ void sf_batch_settle(sf_trainer *t)
 {
   sf_config *c = &t->model.config;
   const bool as_it_is =
-      t->stride == 1 || c->backbone == SF_TENSORF || c->lattice < 2 * SF_LATTICE_MIN || 2 * c->dt_gamma > SF_GAMMA_MAX;
+      t->stride == 1 || !t->backbone->settles || c->lattice < 2 * SF_LATTICE_MIN || 2 * c->dt_gamma > SF_GAMMA_MAX;
   const int settled = as_it_is ? 1 : 2;
   t->rays = t->rays * settled / t->stride;
   c->lattice /= settled;

@@ -103,6 +103,7 @@ static void probe(const sf_trainer *t, uint64_t stream, uint64_t base, const flo
 }
 
 const sf_backbone sf_backbone_ingp = {.growth = 3e3f,
+                                      .settles = true,
                                       .create = create,
                                       .destroy = destroy,
                                       .init = init,

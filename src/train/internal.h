@@ -127,6 +127,7 @@ struct sf_probes;
 /* How a field and its net are trained. The rest of the trainer does not ask which field it trains. */
 typedef struct sf_backbone {
   float growth;                       /* of features from the start of a run to the size that neurons are scaled for */
+  bool settles;                       /* its lattice may keep a stride of 2 for good: sf_batch_settle */
   sf_status (*create)(sf_trainer *t); /* memory; the model is there */
   void (*destroy)(sf_trainer *t);
   void (*init)(sf_trainer *t); /* the field of a new run, and the nets but for what sf_init_parameters does */

@@ -2,6 +2,7 @@
 #include "base/io.h"
 #include "quant/quant.h"
 #include "cli/record.h"
+#include "field/field.h"
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -151,7 +152,7 @@ static void settle_space(train_arguments *a, const sf_dataset *data)
 {
   static const char *const name[] = {"random", "white", "black"};
   const sf_config *c = &a->train.config;
-  const bool vm = c->backbone == SF_TENSORF;
+  const bool vm = !sf_field_of(c)->lattice;
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data);
   a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
@@ -184,7 +185,7 @@ static sf_status check_effect(train_arguments *a)
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
-  if (a->train.config.backbone == SF_TENSORF)
+  if (!sf_field_of(&a->train.config)->lattice)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, "has no effect on --backbone tensorf"));
   else
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
@@ -211,7 +212,7 @@ static sf_status finish_options(train_arguments *a)
   if (a->train.target_loss > 0 && a->train.target_saving > 0)
     return sf_fail(SF_E_USAGE, "--target-loss and --target-saving exclude each other");
   if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
-  if (a->fine_tune && c->backbone == SF_TENSORF)
+  if (a->fine_tune && sf_field_decoded(sf_field_of(c)))
     return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");
   return sf_ok();
 }
@@ -273,7 +274,7 @@ sf_status train_parse(train_arguments *a, const char **path)
   SF_TRY(finish_options(a));
   sf_cli_catch_signals();
   set_box(a, NULL);
-  if (a->train.config.backbone == SF_TENSORF) return sf_ok();
+  if (!sf_field_of(&a->train.config)->lattice) return sf_ok();
   sf_status status = sf_config_check(&a->train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
   return status;
@@ -281,7 +282,7 @@ sf_status train_parse(train_arguments *a, const char **path)
 
 sf_status train_settle(train_arguments *a, const sf_dataset *data)
 {
-  if (a->train.config.backbone == SF_TENSORF) SF_TRY(take_tensorf_defaults(a, data));
+  if (!sf_field_of(&a->train.config)->lattice) SF_TRY(take_tensorf_defaults(a, data));
   settle_space(a, data);
   return sf_ok();
 }

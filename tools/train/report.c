@@ -1,4 +1,5 @@
 #include "tools/train/report.h"
+#include "field/field.h"
 #include "energy/energy.h"
 #include "base/io.h"
 #include <math.h>
@@ -93,7 +94,7 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
   cJSON *json = cJSON_CreateObject();
   sf_json_add_text(json, "model", a->output);
-  cJSON_AddStringToObject(json, "backbone", c->backbone == SF_TENSORF ? "tensorf" : "ingp");
+  cJSON_AddStringToObject(json, "backbone", sf_field_of(c)->name);
   cJSON_AddStringToObject(json, "layout", q->layout);
   cJSON_AddStringToObject(json, "net", net[c->net]);
   cJSON_AddStringToObject(json, "mode", mode[c->mode]);
@@ -106,7 +107,7 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   cJSON_AddNumberToObject(json, "t_r", s->t_r);
   cJSON_AddNumberToObject(json, "t_star", s->t_star);
   if (s->search.state != SF_SEARCH_NONE) cJSON_AddItemToObject(json, "search", search_json(c, &s->search));
-  if (c->backbone == SF_INGP) cJSON_AddNumberToObject(json, "lattice", c->lattice);
+  if (sf_field_of(c)->lattice) cJSON_AddNumberToObject(json, "lattice", c->lattice);
   cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
   cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
   cJSON_AddItemToObject(json, "quiet", cJSON_CreateIntArray(s->quiet, 3));
@@ -142,7 +143,7 @@ static void print_text(const train_arguments *a, const sf_config *c, const sf_tr
   if (!isnan(q->ssim)) printf(", SSIM %.4f", q->ssim);
   printf(" over %d views\n", q->views);
   print_search(a, s);
-  if (c->backbone == SF_INGP)
+  if (sf_field_of(c)->lattice)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
            c->dt_gamma > 0 ? " near the camera" : "");
   if (!q->prefixes) return;
