@@ -324,10 +324,12 @@ static inline void expect_denormals(const hard *h, const hard_seen *seen, int va
   for (int o = 0; o < 3; o++) ck_assert_uint_eq(seen->out.colour[o], 32768);
 }
 
+enum { HARD_PARAMS = 7 };
 static inline void make_not_finite(hard *h, int variant)
 {
+  static const sf_param_id params[HARD_PARAMS] = {SF_P_GRID, SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3, SF_P_LEAK};
   static const float bad[] = {NAN, INFINITY, -INFINITY};
-  const sf_param_id id = (sf_param_id)(variant / 3);
+  const sf_param_id id = params[variant / 3];
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 1);
   m.t_r = 4;
   sf_model_param(&m, id)[m.param[id].size / 2] = bad[variant % 3];
@@ -612,7 +614,7 @@ static const hard_case hard_cases[] = {
     {"density_at_both_ends_of_exp", HARD_NET, 2, make_exp_ends, expect_exp_ends},
     {"nodecay_saturates_and_counts", HARD_NET, 2, make_nodecay, expect_nodecay},
     {"denormals_in_a_checkpoint", HARD_NET, 2, make_denormals, expect_denormals},
-    {"nan_and_inf_in_a_checkpoint", HARD_REFUSED, 3 * SF_P_COUNT, make_not_finite, NULL},
+    {"nan_and_inf_in_a_checkpoint", HARD_REFUSED, 3 * HARD_PARAMS, make_not_finite, NULL},
     {"optical_depth_zero_and_saturated", HARD_RAY, 4, make_depth, expect_depth},
     {"transmittance_underflow", HARD_RAY, 1, make_underflow, expect_underflow},
     {"empty_scene", HARD_RAY, 3, make_empty, expect_empty},
