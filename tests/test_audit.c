@@ -1,5 +1,6 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "ck_run.h"
+#include "base/text.h"
 #include "cycles/cycles.h"
 #include "golden/golden.h"
 #include "tests/audit_fixture.h"

@@ -5,7 +5,7 @@
 #include "image/image.h"
 #include "energy/ledger.h"
 #include "scene/scene.h"
-#include <cjson/cJSON.h>
+#include "base/json.h"
 #include <stdio.h>
 
 enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply-add, fp32 add, 45 nm (Horowitz 2014) */
@@ -61,14 +61,6 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
 /* 100 * (1 - spiking / ann); NaN when ann is 0. */
 double sf_saving_percent(uint64_t spiking_fj, uint64_t ann_fj);
 cJSON *sf_ledger_json(const sf_ledger *ledger);
-
-/* Integers of JSON keep all their digits: cJSON numbers are doubles. */
-void sf_json_add_u64(cJSON *object, const char *key, uint64_t value);
-/* Text from outside, as a path or a view's name: what is no UTF-8 becomes U+FFFD. */
-void sf_json_add_text(cJSON *object, const char *key, const char *text);
-void sf_xml_escape(FILE *out, const char *text); /* of an element or an attribute; control characters become '?' */
-/* A field of CSV, quoted where it has to be (RFC 4180). */
-void sf_csv_text(FILE *out, const char *text);
 
 /* Tables for a person. */
 void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts);
