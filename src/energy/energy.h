@@ -115,18 +115,18 @@ int sf_published_rows(sf_published_row rows[SF_PUBLISHED_MAX]);
 void sf_published_print(FILE *out);
 cJSON *sf_published_json(void);
 
-/* One ray through the core under observation; see sf_probe_net. Zero it, then set net. */
-typedef struct sf_probe {
+/* One ray through the core under observation; see sf_observer_net. Zero it, then set net. */
+typedef struct sf_observer {
   const fx_net *net;
   fx_trace *trace;   /* where not NULL, every sample is recounted from its spike bitmaps and compared */
   fx_counts core;    /* (a) */
   fx_counts recount; /* (c), from trace */
-  uint64_t sample;   /* of this ray, from 0; sf_probe_begin resets it */
+  uint64_t sample;   /* of this ray, from 0; sf_observer_begin resets it */
   int32_t base[SF_LANES];
-} sf_probe;
-void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
-/* fx_net_fn; user is the sf_probe. Pass &probe->core to fx_render_ray too: it counts grid and march there. */
-sf_status sf_probe_net(void *probe, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
+} sf_observer;
+void sf_observer_begin(sf_observer *observer); /* clears everything but net and trace */
+/* fx_net_fn; user is the sf_observer. Pass &observer->core to fx_render_ray too: it counts grid and march there. */
+sf_status sf_observer_net(void *observer, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
 /* The ray through the centre of a pixel. */
 sf_status sf_pixel_ray(const fx_scene *scene, const sf_dataset *data, const sf_view *view, int x, int y, fx_ray *ray);
