@@ -1,6 +1,6 @@
 // Neuron unit: combinational, storage outside. Mirror: src/fx/plif.c (fx_plif_step)
-// The 128 lanes of sf_layer use the same function; this module is the unit by itself, for synthesis reports and
-// unit benches.
+// The lanes of sf_neurons use the same function; this module is the unit by itself, for synthesis reports and unit
+// benches.
 `default_nettype none
 
 module sf_plif (

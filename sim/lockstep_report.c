@@ -1,6 +1,7 @@
 #include "sim/lockstep.h"
 #include "energy/energy.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <inttypes.h>
 #include <stdio.h>
 

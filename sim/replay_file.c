@@ -69,23 +69,9 @@ sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *diff
 
 /* ---- loading ---- */
 
-static sf_status text_field(const cJSON *json, const char *path, const char *key, const char **text)
-{
-  *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, key));
-  return *text ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: %s is missing or no text", path, key);
-}
-
-static sf_status int_field(const cJSON *json, const char *path, const char *key, double max, double *value)
-{
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
-  *value = item ? item->valuedouble : -1;
-  if (cJSON_IsNumber(item) && *value >= 0 && *value <= max && *value == (double)(uint64_t)*value) return sf_ok();
-  return sf_fail(SF_E_FORMAT, "%s: %s is missing or no integer of 0..%.0f", path, key, max);
-}
-
 static sf_status load_values(const cJSON *json, const char *path, const char *key, int n, int16_t *value)
 {
-  const cJSON *array = cJSON_GetObjectItemCaseSensitive(json, key), *item;
+  const cJSON *array = sf_json_get(json, key), *item;
   int i = 0;
   if (!cJSON_IsArray(array) || cJSON_GetArraySize(array) > n)
     return sf_fail(SF_E_FORMAT, "%s: %s of a sample is no array of at most %d values", path, key, n);
@@ -102,18 +88,18 @@ static sf_status load_values(const cJSON *json, const char *path, const char *ke
 static sf_status load_sample(const cJSON *json, const char *path, sf_replay_sample *s)
 {
   double ray, sample;
-  SF_TRY(int_field(json, path, "ray", 0x1p53, &ray));
-  SF_TRY(int_field(json, path, "sample", 0x1p53, &sample));
+  SF_TRY(sf_json_need_whole(json, path, "ray", 0, 0x1p53, &ray));
+  SF_TRY(sf_json_need_whole(json, path, "sample", 0, 0x1p53, &sample));
   s->ray = (uint64_t)ray;
   s->sample = (uint64_t)sample;
-  s->first = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(json, "first"));
+  s->first = cJSON_IsTrue(sf_json_get(json, "first"));
   SF_TRY(load_values(json, path, "direction", FX_SH, s->dir));
   return load_values(json, path, "features", SF_DIR_MAX, s->f);
 }
 
 static sf_status load_samples(const cJSON *json, const char *path, sf_replay *replay)
 {
-  const cJSON *samples = cJSON_GetObjectItemCaseSensitive(json, "samples"), *item;
+  const cJSON *samples = sf_json_get(json, "samples"), *item;
   const int n = cJSON_IsArray(samples) ? cJSON_GetArraySize(samples) : 0;
   if (n < 1 || n > SF_REPLAY_MAX) return sf_fail(SF_E_FORMAT, "%s: samples is no array of 1..%d", path, SF_REPLAY_MAX);
   cJSON_ArrayForEach(item, samples) SF_TRY(load_sample(item, path, &replay->sample[replay->count++]));
@@ -122,31 +108,28 @@ static sf_status load_samples(const cJSON *json, const char *path, sf_replay *re
 
 static sf_status load_run(const cJSON *json, const char *path, sf_replay *replay)
 {
-  const char *format, *seed, *plusarg;
+  char format[64], seed[64];
   double stalls;
   char *end;
-  SF_TRY(text_field(json, path, "format", &format));
+  SF_TRY(sf_json_need_text(json, path, "format", format, sizeof format));
   if (strcmp(format, FORMAT) != 0)
     return sf_fail(SF_E_FORMAT, "%s: format is '%.40s', expected '" FORMAT "'", path, format);
-  SF_TRY(text_field(json, path, "seed", &seed));
+  SF_TRY(sf_json_need_text(json, path, "seed", seed, sizeof seed));
   errno = 0;
   replay->seed = strtoull(seed, &end, 10);
   if (*seed < '0' || *seed > '9' || *end || errno)
     return sf_fail(SF_E_FORMAT, "%s: seed is '%.40s', no integer", path, seed);
-  SF_TRY(int_field(json, path, "stall_percent", 90, &stalls));
+  SF_TRY(sf_json_need_whole(json, path, "stall_percent", 0, 90, &stalls));
   replay->stall_percent = (int)stalls;
-  SF_TRY(text_field(json, path, "plusarg", &plusarg));
-  if (strlen(plusarg) >= sizeof replay->plusarg) return sf_fail(SF_E_FORMAT, "%s: plusarg is too long", path);
-  strcpy(replay->plusarg, plusarg);
+  SF_TRY(sf_json_need_text(json, path, "plusarg", replay->plusarg, sizeof replay->plusarg));
   return load_samples(json, path, replay);
 }
 
 static sf_status same_scene(const cJSON *json, const char *path, char **scene)
 {
-  const char *name, *expected;
-  char hash[65];
-  SF_TRY(text_field(json, path, "scene", &name));
-  SF_TRY(text_field(json, path, "scene_sha256", &expected));
+  char name[4096], expected[65], hash[65];
+  SF_TRY(sf_json_need_text(json, path, "scene", name, sizeof name));
+  SF_TRY(sf_json_need_text(json, path, "scene_sha256", expected, sizeof expected));
   SF_TRY(sf_sha256_file(name, hash));
   if (strcmp(hash, expected) != 0)
     return sf_fail(SF_E_FORMAT, "%s: the scene has changed: %s has SHA-256 %.12s..., the replay is of %.12s...", path,
@@ -158,7 +141,7 @@ static sf_status same_scene(const cJSON *json, const char *path, char **scene)
 /* A file of before this field is another program's. */
 static sf_status same_program(const cJSON *json, bool *other)
 {
-  const char *writer = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, "program_sha256"));
+  const char *writer = sf_json_text(json, "program_sha256");
   char hash[65];
   SF_TRY(sf_sha256_file(PROGRAM, hash));
   *other = !writer || strcmp(writer, hash) != 0;

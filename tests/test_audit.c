@@ -1,6 +1,7 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "ck_run.h"
 #include "base/sha256.h"
+#include "base/text.h"
 #include "cycles/cycles.h"
 #include "golden/golden.h"
 #include "tests/audit_fixture.h"
@@ -372,24 +373,24 @@ START_TEST(probe_names_the_sample_of_a_difference)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 3);
   fx_trace *trace = malloc(sizeof *trace);
-  sf_probe *probe = calloc(1, sizeof *probe);
+  sf_observer *observer = calloc(1, sizeof *observer);
   rays user = {UINT64_MAX, UINT64_MAX};
   fx_ray ray;
   int16_t f[32];
   fx_out out;
-  probe->net = &scene.net, probe->trace = trace;
-  sf_probe_begin(probe);
-  ck_assert_ptr_eq(probe->trace, trace);
+  observer->net = &scene.net, observer->trace = trace;
+  sf_observer_begin(observer);
+  ck_assert_ptr_eq(observer->trace, trace);
   make_ray(&user, 0, &ray);
   fixture_inputs(4, 0, f, 32, 900);
-  ck_assert_int_eq(sf_probe_net(probe, &ray, true, f, &out).code, SF_OK);
-  ck_assert_int_eq(sf_probe_net(probe, &ray, false, f, &out).code, SF_OK);
-  probe->core.layer[FX_C1].spikes[2]++; /* the fault */
-  sf_status status = sf_probe_net(probe, &ray, false, f, &out);
+  ck_assert_int_eq(sf_observer_net(observer, &ray, true, f, &out).code, SF_OK);
+  ck_assert_int_eq(sf_observer_net(observer, &ray, false, f, &out).code, SF_OK);
+  observer->core.layer[FX_C1].spikes[2]++; /* the fault */
+  sf_status status = sf_observer_net(observer, &ray, false, f, &out);
   ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
   ck_assert_msg(strstr(status.message, "sample 2: spikes of layer C1 at step 2: core ") == status.message, "%s",
                 status.message);
-  free(trace), free(probe);
+  free(trace), free(observer);
   fx_scene_free(&scene);
 }
 END_TEST

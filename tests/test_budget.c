@@ -5,6 +5,7 @@
 #include "tests/float_fixture.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SHORT = 200000 };
 
@@ -13,6 +14,7 @@ START_TEST(bound_holds_and_bites)
 {
   const sf_budget_row row = sf_budget_measure((sf_budget_id)_i, SHORT);
   ck_assert_uint_gt(row.inputs, 0);
+  if (_i == SF_BUDGET_H) ck_assert_int_eq(strtol(strrchr(row.block, '>') + 1, NULL, 10), SF_H_SHIFT);
   ck_assert_msg(row.ratio <= 1, "%s: error %g, bound %g %s", row.block, row.measured, row.bound, row.unit);
   if (_i == SF_BUDGET_CURRENT)
     ck_assert(row.measured == 0 && row.bound == 0);

@@ -140,4 +140,7 @@ mkdir -p "$work/built/obj"
 refused AC_FRAC=4
 echo AC_FRAC=4 >"$work/built/arch"
 refused ""
+# What has a name in arch.def but one value.
+make -s -C "$(dirname "$script")/.." B="$work/narrow" ARCH="AC_FRAC=4 MEMBRANE_BITS=20" help >"$work/out" 2>&1 && fail "MEMBRANE_BITS=20 is taken"
+[ "$(count "'MEMBRANE_BITS=20': MEMBRANE_BITS is no parameter")" -eq 1 ] || fail "MEMBRANE_BITS: not said why"
 echo "parameters: ok"

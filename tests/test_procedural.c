@@ -31,7 +31,7 @@ static double inside(const sf_shape *s, const double p[3])
   return NAN;
 }
 
-static double inside_world(const sf_shape *s, const sf_ray *ray, double t)
+static double inside_world(const sf_shape *s, const sf_stage_ray *ray, double t)
 {
   double p[3] = {0}, q[3];
   for (int i = 0; i < 3; i++) q[i] = ray->origin[i] + t * ray->direction[i] - s->centre[i];
@@ -40,9 +40,9 @@ static double inside_world(const sf_shape *s, const sf_ray *ray, double t)
   return inside(s, p);
 }
 
-static sf_ray random_ray(uint64_t i)
+static sf_stage_ray random_ray(uint64_t i)
 {
-  sf_ray ray;
+  sf_stage_ray ray;
   double length = 0;
   for (unsigned k = 0; k < 3; k++) {
     ray.origin[k] = 6 * sf_random_float(11, k, i) - 3;
@@ -62,7 +62,7 @@ START_TEST(hits_equal_marching)
   int hits = 0;
   sf_shape_place(&shape, (sf_shape_kind)_i, centre, sizes[_i], 0.7, 0.4);
   for (uint64_t i = 0; i < 1500; i++) {
-    sf_ray ray = random_ray(i);
+    sf_stage_ray ray = random_ray(i);
     sf_hit hit = {.t = INFINITY};
     bool found = sf_shape_hit(&shape, &ray, 0, &hit);
     double t = 0, start = inside_world(&shape, &ray, 0);
@@ -91,7 +91,7 @@ START_TEST(rays_along_axes_hit)
   for (int axis = 0; axis < 3; axis++) {
     sf_shape s;
     sf_hit hit = {.t = INFINITY};
-    sf_ray ray = {{0}, {0}};
+    sf_stage_ray ray = {{0}, {0}};
     ray.origin[axis] = 2, ray.direction[axis] = -1;
     sf_shape_place(&s, (sf_shape_kind)_i, centre, size, 0, 0);
     bool found = sf_shape_hit(&s, &ray, 0, &hit);

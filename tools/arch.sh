@@ -14,6 +14,10 @@ for setting in "$@"; do
     echo "ARCH: '$setting': expected NAME=VALUE with a name of $source" >&2
     exit 1
   fi
+  if [ "${BASH_REMATCH[1]}" = MEMBRANE_BITS ]; then # the RTL, the vector kernels and the packed taps are written for 24 bits
+    echo "ARCH: '$setting': MEMBRANE_BITS is no parameter, membranes have 24 bits; AC_FRAC and LEAK_FRAC can be changed" >&2
+    exit 1
+  fi
   sed -E "s/^(SF_ARCH\(${BASH_REMATCH[1]}, )[^,]+/\1${BASH_REMATCH[2]}/" "$new" >"$new.next"
   mv "$new.next" "$new"
 done

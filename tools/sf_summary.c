@@ -13,7 +13,7 @@ static sf_status number(const char *dir, const char *file, const char *key, doub
   cJSON *json;
   snprintf(path, sizeof path, "%s/%s", dir, file);
   SF_TRY(sf_json_load(path, &json));
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
+  const cJSON *item = sf_json_get(json, key);
   const bool none = cJSON_IsNull(item) && (!strcmp(key, "psnr") || !strcmp(key, "ssim"));
   const bool found = cJSON_IsNumber(item) || none;
   if (found) *value = none ? NAN : item->valuedouble;
@@ -46,15 +46,13 @@ static sf_status explain_search(const char *dir)
   cJSON *json;
   snprintf(path, sizeof path, "%s/train.json", dir);
   SF_TRY(sf_json_load(path, &json));
-  const cJSON *search = cJSON_GetObjectItemCaseSensitive(json, "search");
-  const cJSON *worth = cJSON_GetObjectItemCaseSensitive(search, "worth"),
-              *error = cJSON_GetObjectItemCaseSensitive(search, "worth_error"),
-              *price = cJSON_GetObjectItemCaseSensitive(search, "price"),
-              *t_star = cJSON_GetObjectItemCaseSensitive(json, "t_star");
-  const char *state = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(search, "state"));
-  if (state && cJSON_IsNumber(worth) && cJSON_IsNumber(error) && cJSON_IsNumber(price) && cJSON_IsNumber(t_star))
-    printf("  time steps    t* = %.2f (%s): one more is worth %.1e +- %.0e of squared error and costs %.1e\n",
-           t_star->valuedouble, state, worth->valuedouble, error->valuedouble, price->valuedouble);
+  const cJSON *search = sf_json_get(json, "search");
+  const double worth = sf_json_number(search, "worth"), error = sf_json_number(search, "worth_error"),
+               price = sf_json_number(search, "price"), t_star = sf_json_number(json, "t_star");
+  const char *state = sf_json_text(search, "state");
+  if (state && !isnan(worth + error + price + t_star))
+    printf("  time steps    t* = %.2f (%s): one more is worth %.1e +- %.0e of squared error and costs %.1e\n", t_star,
+           state, worth, error, price);
   cJSON_Delete(json);
   return sf_ok();
 }

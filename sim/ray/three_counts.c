@@ -11,7 +11,7 @@ typedef struct run {
   sf_three_counts *sum;
   sf_dut *dut;
   sf_ray_dut *rays; /* NULL: it has no encoder for the scene's field */
-  sf_probe core;
+  sf_observer core;
   sf_dut_result result;
   bool check_counters; /* after every sample: only to find the sample of a difference, it is slow */
   sf_ray_sample sample[SAMPLES_MAX];
@@ -61,7 +61,7 @@ static sf_status rtl_net(void *user, const fx_ray *ray, bool first, const int16_
   const sf_dut_sample sample = {.ray = ray, .first = first, .f = f};
   const unsigned long long index = r->core.sample;
   fx_out core;
-  SF_TRY(sf_probe_net(&r->core, ray, first, f, &core));
+  SF_TRY(sf_observer_net(&r->core, ray, first, f, &core));
   SF_TRY(sf_dut_run(r->dut, &sample, 1, &r->result));
   sf_status status = compare_bitmaps(r->core.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])r->core.trace->spikes,
                                      (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])r->result.spikes);
@@ -84,7 +84,7 @@ static sf_status name_ray(const run *r, uint64_t index, sf_status status)
 
 static sf_status net_ray(run *r, const fx_ray *ray, fx_pixel *pixel)
 {
-  sf_probe_begin(&r->core);
+  sf_observer_begin(&r->core);
   return fx_render_ray(r->job->scene, ray, rtl_net, r, pixel, &r->core.core);
 }
 

@@ -7,7 +7,7 @@ enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */
 typedef struct rtl_eval {
   sf_ray_dut *rays;
   sf_dut *dut; /* not NULL: the decoder alone */
-  sf_probe core;
+  sf_observer core;
   sf_ray_sample sample[SAMPLES_MAX];
 } rtl_eval;
 
@@ -16,8 +16,8 @@ static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, 
   sf_dut *dut = e->rays->dut;
   fx_pixel core;
   uint64_t cycles, busy, stalls;
-  sf_probe_begin(&e->core);
-  SF_TRY(fx_render_ray(scene, ray, sf_probe_net, &e->core, &core, &e->core.core));
+  sf_observer_begin(&e->core);
+  SF_TRY(fx_render_ray(scene, ray, sf_observer_net, &e->core, &core, &e->core.core));
   const sf_ray_request request = sf_ray_request_as(scene, ray, &core, e->sample);
   SF_TRY(sf_dut_clear_counts(dut));
   SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
@@ -31,8 +31,8 @@ static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, rtl_eval 
 {
   fx_pixel core;
   uint64_t cycles, busy, stalls;
-  sf_probe_begin(&e->core);
-  SF_TRY(fx_render_ray(scene, ray, sf_probe_net, &e->core, &core, &e->core.core));
+  sf_observer_begin(&e->core);
+  SF_TRY(fx_render_ray(scene, ray, sf_observer_net, &e->core, &core, &e->core.core));
   SF_TRY(sf_dut_clear_counts(e->dut));
   SF_TRY(fx_render_ray(scene, ray, sf_dut_net, e->dut, pixel, NULL));
   SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(e->dut)));

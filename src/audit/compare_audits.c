@@ -10,24 +10,14 @@ typedef struct side {
   double views;
 } side;
 
-static const cJSON *get(const cJSON *object, const char *key)
-{
-  return cJSON_GetObjectItemCaseSensitive(object, key);
-}
-
-static bool is(const cJSON *item, const char *text)
-{
-  return cJSON_IsString(item) && !strcmp(item->valuestring, text);
-}
-
 /* All ledgers of this version, in their order. */
 static bool has_ledgers(const cJSON *list)
 {
   if (cJSON_GetArraySize(list) != SF_LEDGERS) return false;
   for (int g = 0; g < SF_LEDGERS; g++) {
     const cJSON *ledger = cJSON_GetArrayItem(list, g);
-    if (!is(get(ledger, "key"), sf_ledger_texts[g].key) || !cJSON_IsNumber(get(ledger, "mj_per_view")) ||
-        !cJSON_IsObject(get(ledger, "parts_fj")) || cJSON_GetArraySize(get(ledger, "rows")) != SF_ROWS)
+    if (!sf_json_says(ledger, "key", sf_ledger_texts[g].key) || !cJSON_IsNumber(sf_json_get(ledger, "mj_per_view")) ||
+        !cJSON_IsObject(sf_json_get(ledger, "parts_fj")) || cJSON_GetArraySize(sf_json_get(ledger, "rows")) != SF_ROWS)
       return false;
   }
   return true;
@@ -35,12 +25,15 @@ static bool has_ledgers(const cJSON *list)
 
 static sf_status open_side(const cJSON *json, const char *name, side *s)
 {
-  const cJSON *ledgers = get(json, "ledgers"), *views = get(json, "views");
-  *s = (side){.json = json, .name = name, .technology = get(ledgers, "technology"), .ledgers = get(ledgers, "list")};
-  s->layers = get(get(json, "counts"), "layers");
-  if (!is(get(json, "format"), SF_AUDIT_FORMAT) || !cJSON_IsNumber(views) || !(views->valuedouble > 0) ||
+  const cJSON *ledgers = sf_json_get(json, "ledgers"), *views = sf_json_get(json, "views");
+  *s = (side){.json = json,
+              .name = name,
+              .technology = sf_json_get(ledgers, "technology"),
+              .ledgers = sf_json_get(ledgers, "list")};
+  s->layers = sf_json_get(sf_json_get(json, "counts"), "layers");
+  if (!sf_json_says(json, "format", SF_AUDIT_FORMAT) || !cJSON_IsNumber(views) || !(views->valuedouble > 0) ||
       !has_ledgers(s->ledgers) || cJSON_GetArraySize(s->layers) != SF_LAYERS ||
-      !cJSON_IsArray(get(s->technology, "prices")))
+      !cJSON_IsArray(sf_json_get(s->technology, "prices")))
     return sf_fail(SF_E_FORMAT, "%s: not a report of energy_audit --json, format %s", name, SF_AUDIT_FORMAT);
   s->views = views->valuedouble;
   return sf_ok();
@@ -61,10 +54,10 @@ static void add_setting(cJSON *list, const char *name, const cJSON *a, const cJS
 static const cJSON *price_text(const side *s, const char *key)
 {
   const cJSON *price;
-  cJSON_ArrayForEach(price, get(s->technology, "prices"))
+  cJSON_ArrayForEach(price, sf_json_get(s->technology, "prices"))
   {
-    const cJSON *name = get(price, "key");
-    if (cJSON_IsString(name) && !strcmp(name->valuestring, key)) return get(price, "text");
+    const cJSON *name = sf_json_get(price, "key");
+    if (cJSON_IsString(name) && !strcmp(name->valuestring, key)) return sf_json_get(price, "text");
   }
   return NULL;
 }
@@ -72,10 +65,10 @@ static const cJSON *price_text(const side *s, const char *key)
 static void add_prices(cJSON *list, const side *of, const side *a, const side *b)
 {
   const cJSON *price;
-  cJSON_ArrayForEach(price, get(of->technology, "prices"))
+  cJSON_ArrayForEach(price, sf_json_get(of->technology, "prices"))
   {
     char name[80];
-    const cJSON *key = get(price, "key");
+    const cJSON *key = sf_json_get(price, "key");
     if (!cJSON_IsString(key) || (of == b && price_text(a, key->valuestring))) continue;
     snprintf(name, sizeof name, "price of %s", key->valuestring);
     add_setting(list, name, price_text(a, key->valuestring), price_text(b, key->valuestring));
@@ -87,8 +80,8 @@ static cJSON *settings(const side *a, const side *b)
   static const char *const keys[] = {"scene", "scene_sha256", "data", "split", "t_r", "views", "seed", "samples"};
   cJSON *list = cJSON_CreateArray();
   for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-    add_setting(list, keys[i], get(a->json, keys[i]), get(b->json, keys[i]));
-  add_setting(list, "technology", get(a->technology, "title"), get(b->technology, "title"));
+    add_setting(list, keys[i], sf_json_get(a->json, keys[i]), sf_json_get(b->json, keys[i]));
+  add_setting(list, "technology", sf_json_get(a->technology, "title"), sf_json_get(b->technology, "title"));
   add_prices(list, a, a, b);
   add_prices(list, b, a, b);
   return list;
@@ -155,24 +148,18 @@ static double sum_of(const cJSON *list)
   return sum;
 }
 
-static double number(const cJSON *object, const char *key)
-{
-  const cJSON *item = get(object, key);
-  return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 static cJSON *ledger_totals(const side *a, const side *b)
 {
   cJSON *list = cJSON_CreateArray();
   for (int g = 0; g < SF_LEDGERS; g++) {
     const cJSON *x = cJSON_GetArrayItem(a->ledgers, g), *y = cJSON_GetArrayItem(b->ledgers, g);
-    const double from = number(x, "mj_per_view"), to = number(y, "mj_per_view");
+    const double from = sf_json_number(x, "mj_per_view"), to = sf_json_number(y, "mj_per_view");
     cJSON *item = cJSON_CreateObject();
     cJSON_AddStringToObject(item, "key", sf_ledger_texts[g].key);
     cJSON_AddNumberToObject(item, "a_mj_per_view", from);
     cJSON_AddNumberToObject(item, "b_mj_per_view", to);
     add_percent(item, from, to);
-    const cJSON *saving[2] = {get(x, "saving_percent"), get(y, "saving_percent")};
+    const cJSON *saving[2] = {sf_json_get(x, "saving_percent"), sf_json_get(y, "saving_percent")};
     cJSON_AddItemToObject(item, "a_saving_percent", saving[0] ? cJSON_Duplicate(saving[0], 0) : cJSON_CreateNull());
     cJSON_AddItemToObject(item, "b_saving_percent", saving[1] ? cJSON_Duplicate(saving[1], 0) : cJSON_CreateNull());
     cJSON_AddItemToArray(list, item);
@@ -184,18 +171,18 @@ static cJSON *ledger_totals(const side *a, const side *b)
 static cJSON *ledger_parts(const side *a, const side *b, int ledger)
 {
   changes list = {.count = 0};
-  const cJSON *x = get(cJSON_GetArrayItem(a->ledgers, ledger), "parts_fj");
-  const cJSON *y = get(cJSON_GetArrayItem(b->ledgers, ledger), "parts_fj");
+  const cJSON *x = sf_json_get(cJSON_GetArrayItem(a->ledgers, ledger), "parts_fj");
+  const cJSON *y = sf_json_get(cJSON_GetArrayItem(b->ledgers, ledger), "parts_fj");
   for (int p = 0; p < SF_PARTS; p++)
-    add_change(&list, sf_part_titles[p], number(x, sf_part_names[p]) * 1e-12 / a->views,
-               number(y, sf_part_names[p]) * 1e-12 / b->views, false);
+    add_change(&list, sf_part_titles[p], sf_json_number(x, sf_part_names[p]) * 1e-12 / a->views,
+               sf_json_number(y, sf_part_names[p]) * 1e-12 / b->views, false);
   return changes_json(&list);
 }
 
 static double cell(const side *s, int ledger, int row, int step)
 {
-  const cJSON *rows = get(cJSON_GetArrayItem(s->ledgers, ledger), "rows");
-  const cJSON *item = cJSON_GetArrayItem(get(cJSON_GetArrayItem(rows, row), "fj"), step);
+  const cJSON *rows = sf_json_get(cJSON_GetArrayItem(s->ledgers, ledger), "rows");
+  const cJSON *item = cJSON_GetArrayItem(sf_json_get(cJSON_GetArrayItem(rows, row), "fj"), step);
   return cJSON_IsNumber(item) ? item->valuedouble * 1e-12 / s->views : 0;
 }
 
@@ -231,14 +218,16 @@ static cJSON *events(const side *a, const side *b)
     char name[64];
     for (int e = 0; e < SF_EVENTS; e++) {
       snprintf(name, sizeof name, "%s of %s", sf_events[e].title, fx_layer_name(l));
-      add_change(&list, name, sum_of(get(x, sf_events[e].name)) / a->views,
-                 sum_of(get(y, sf_events[e].name)) / b->views, true);
+      add_change(&list, name, sum_of(sf_json_get(x, sf_events[e].name)) / a->views,
+                 sum_of(sf_json_get(y, sf_events[e].name)) / b->views, true);
     }
   }
-  const cJSON *x = get(a->json, "counts"), *y = get(b->json, "counts");
-  add_change(&list, "samples", number(x, "samples") / a->views, number(y, "samples") / b->views, true);
-  add_change(&list, "rays with samples", number(x, "rays") / a->views, number(y, "rays") / b->views, true);
-  add_change(&list, "field bytes read", number(x, "grid_bytes") / a->views, number(y, "grid_bytes") / b->views, true);
+  const cJSON *x = sf_json_get(a->json, "counts"), *y = sf_json_get(b->json, "counts");
+  add_change(&list, "samples", sf_json_number(x, "samples") / a->views, sf_json_number(y, "samples") / b->views, true);
+  add_change(&list, "rays with samples", sf_json_number(x, "rays") / a->views, sf_json_number(y, "rays") / b->views,
+             true);
+  add_change(&list, "field bytes read", sf_json_number(x, "grid_bytes") / a->views,
+             sf_json_number(y, "grid_bytes") / b->views, true);
   return changes_json(&list);
 }
 
@@ -273,7 +262,7 @@ static void print_value(FILE *out, const cJSON *value)
 
 static void print_percent(FILE *out, const cJSON *item, const char *key)
 {
-  const double percent = number(item, key);
+  const double percent = sf_json_number(item, key);
   if (isnan(percent))
     fprintf(out, " %10s", "-");
   else
@@ -286,8 +275,8 @@ static void print_changes(FILE *out, const cJSON *list, const char *title, int m
   fprintf(out, "%s%s\n", title, count ? "" : ": none");
   for (int i = 0; i < count && i < most; i++) {
     const cJSON *item = cJSON_GetArrayItem(list, i);
-    fprintf(out, "  %-28s %14.6g %14.6g %+14.6g", get(item, "name")->valuestring, number(item, "a"), number(item, "b"),
-            number(item, "change"));
+    fprintf(out, "  %-28s %14.6g %14.6g %+14.6g", sf_json_get(item, "name")->valuestring, sf_json_number(item, "a"),
+            sf_json_number(item, "b"), sf_json_number(item, "change"));
     print_percent(out, item, "change_percent");
     fprintf(out, "\n");
   }
@@ -298,28 +287,29 @@ void sf_comparison_print(FILE *out, const cJSON *comparison)
 {
   enum { MOST = 16 };
   const cJSON *item;
-  fprintf(out, "A: %s\nB: %s\n", get(comparison, "a")->valuestring, get(comparison, "b")->valuestring);
-  cJSON_ArrayForEach(item, get(comparison, "settings"))
+  fprintf(out, "A: %s\nB: %s\n", sf_json_get(comparison, "a")->valuestring, sf_json_get(comparison, "b")->valuestring);
+  cJSON_ArrayForEach(item, sf_json_get(comparison, "settings"))
   {
-    fprintf(out, "  %-24s ", get(item, "name")->valuestring);
-    print_value(out, get(item, "a"));
+    fprintf(out, "  %-24s ", sf_json_get(item, "name")->valuestring);
+    print_value(out, sf_json_get(item, "a"));
     fprintf(out, " -> ");
-    print_value(out, get(item, "b"));
+    print_value(out, sf_json_get(item, "b"));
     fprintf(out, "\n");
   }
   fprintf(out, "\n%-21s %14s %14s %10s   %s\n", "mJ per view", "A", "B", "change", "saving of A and of B");
   for (int g = 0; g < SF_LEDGERS; g++) {
-    item = cJSON_GetArrayItem(get(comparison, "ledgers"), g);
-    fprintf(out, "%-21s %14.6g %14.6g", sf_ledger_texts[g].title, number(item, "a_mj_per_view"),
-            number(item, "b_mj_per_view"));
+    item = cJSON_GetArrayItem(sf_json_get(comparison, "ledgers"), g);
+    fprintf(out, "%-21s %14.6g %14.6g", sf_ledger_texts[g].title, sf_json_number(item, "a_mj_per_view"),
+            sf_json_number(item, "b_mj_per_view"));
     print_percent(out, item, "change_percent");
     print_percent(out, item, "a_saving_percent");
     print_percent(out, item, "b_saving_percent");
     fprintf(out, "\n");
   }
-  const cJSON *full = get(get(comparison, "energies_mj_per_view"), sf_ledger_texts[SF_LEDGER_NEURON].key);
+  const cJSON *full =
+      sf_json_get(sf_json_get(comparison, "energies_mj_per_view"), sf_ledger_texts[SF_LEDGER_NEURON].key);
   fprintf(out, "\nWhat changed, largest first: A, B, change\n");
-  print_changes(out, get(full, "parts"), "energy of the ledger with neuron updates by kind, mJ per view", MOST);
-  print_changes(out, get(full, "cells"), "the same by layer and step", MOST);
-  print_changes(out, get(comparison, "events_per_view"), "events per view, by relative change", MOST);
+  print_changes(out, sf_json_get(full, "parts"), "energy of the ledger with neuron updates by kind, mJ per view", MOST);
+  print_changes(out, sf_json_get(full, "cells"), "the same by layer and step", MOST);
+  print_changes(out, sf_json_get(comparison, "events_per_view"), "events per view, by relative change", MOST);
 }

@@ -1,8 +1,8 @@
-/* Checked file access, atomic writes, safetensors, JSON helpers. */
+/* Checked file access, atomic writes, safetensors. */
 #ifndef SF_BASE_IO_H
 #define SF_BASE_IO_H
+#include "base/json.h"
 #include "base/status.h"
-#include <cjson/cJSON.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -25,18 +25,6 @@ sf_status sf_readable(const char *path);
 sf_status sf_writable(const char *path);
 sf_status sf_write_file(const char *path, const void *data, size_t size);
 sf_status sf_make_dir(const char *path); /* with parents; existing is fine */
-
-/* Parsed JSON with a message that names path, line and column. Free with cJSON_Delete. Rejects trailing text. */
-sf_status sf_json_load(const char *path, cJSON **json);
-sf_status sf_json_save(const cJSON *json, const char *path);
-/* To standard output, as lines or as one; frees it. NULL is SF_E_MEMORY. What is no UTF-8 becomes U+FFFD. */
-sf_status sf_json_print(cJSON *json, bool lines);
-
-/* Names of files and views in reports: any bytes come in, UTF-8 goes out. */
-extern const char sf_utf8_replacement[]; /* U+FFFD */
-/* Bytes of the character that begins here; 0 where there is none that is well-formed and allowed in XML. */
-size_t sf_utf8_length(const char *text);
-void sf_utf8_write(FILE *out, const char *text);
 
 /* safetensors (https://github.com/huggingface/safetensors): 8-byte LE header size, JSON header, data. */
 typedef enum { SF_F32, SF_I8, SF_U8, SF_I16, SF_I32, SF_I64, SF_U64 } sf_dtype;

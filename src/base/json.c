@@ -1,4 +1,8 @@
+#include "base/json.h"
 #include "base/io.h"
+#include "base/text.h"
+#include <inttypes.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -61,31 +65,6 @@ sf_status sf_json_save(const cJSON *json, const char *path)
   return status;
 }
 
-size_t sf_utf8_length(const char *text)
-{
-  const unsigned char *c = (const unsigned char *)text;
-  if (c[0] < 0x80) return 1;
-  const size_t n = c[0] >= 0xf0 ? 4 : c[0] >= 0xe0 ? 3 : 2;
-  uint32_t code = c[0] & (0x7fu >> n);
-  for (size_t i = 1; i < n; i++) {
-    if ((c[i] & 0xc0) != 0x80) return 0;
-    code = code << 6 | (c[i] & 0x3fu);
-  }
-  static const uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000};
-  const bool surrogate = code >= 0xd800 && code < 0xe000, none = code == 0xfffe || code == 0xffff;
-  return c[0] < 0xc0 || c[0] > 0xf4 || code < least[n] || code > 0x10ffff || surrogate || none ? 0 : n;
-}
-
-const char sf_utf8_replacement[] = "\xef\xbf\xbd";
-
-void sf_utf8_write(FILE *out, const char *text)
-{
-  for (size_t n; *text; text += n ? n : 1) {
-    n = sf_utf8_length(text);
-    fwrite(n ? text : sf_utf8_replacement, 1, n ? n : strlen(sf_utf8_replacement), out);
-  }
-}
-
 sf_status sf_json_print(cJSON *json, bool lines)
 {
   char *text = json ? lines ? cJSON_Print(json) : cJSON_PrintUnformatted(json) : NULL;
@@ -96,4 +75,76 @@ sf_status sf_json_print(cJSON *json, bool lines)
   cJSON_free(text);
   return fflush(stdout) == 0 && !ferror(stdout) ? sf_ok()
                                                 : sf_fail(SF_E_IO, "standard output: cannot write the report");
+}
+
+/* ---- fields ---- */
+
+const cJSON *sf_json_get(const cJSON *object, const char *key)
+{
+  return cJSON_GetObjectItemCaseSensitive(object, key);
+}
+
+double sf_json_number(const cJSON *object, const char *key)
+{
+  const cJSON *item = sf_json_get(object, key);
+  return cJSON_IsNumber(item) && isfinite(item->valuedouble) ? item->valuedouble : NAN;
+}
+
+const char *sf_json_text(const cJSON *object, const char *key)
+{
+  return cJSON_GetStringValue(sf_json_get(object, key));
+}
+
+bool sf_json_says(const cJSON *object, const char *key, const char *text)
+{
+  const char *value = sf_json_text(object, key);
+  return value && !strcmp(value, text);
+}
+
+sf_status sf_json_need(const cJSON *object, const char *where, const char *key, const cJSON **item)
+{
+  *item = sf_json_get(object, key);
+  return *item ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: %s is missing", where, key);
+}
+
+sf_status sf_json_need_whole(const cJSON *object, const char *where, const char *key, double low, double high,
+                             double *value)
+{
+  const cJSON *item;
+  SF_TRY(sf_json_need(object, where, key, &item));
+  *value = cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
+  if (*value >= low && *value <= high && *value == floor(*value)) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: %s is not a whole number from %.0f to %.0f", where, key, low, high);
+}
+
+sf_status sf_json_need_text(const cJSON *object, const char *where, const char *key, char *text, size_t size)
+{
+  const cJSON *item;
+  SF_TRY(sf_json_need(object, where, key, &item));
+  const char *value = cJSON_GetStringValue(item);
+  if (!value || strlen(value) >= size)
+    return sf_fail(SF_E_FORMAT, "%s: %s is not a text of at most %zu bytes", where, key, size - 1);
+  memcpy(text, value, strlen(value) + 1);
+  return sf_ok();
+}
+
+void sf_json_add_u64(cJSON *object, const char *key, uint64_t value)
+{
+  char digits[24];
+  snprintf(digits, sizeof digits, "%" PRIu64, value);
+  cJSON_AddRawToObject(object, key, digits);
+}
+
+void sf_json_add_text(cJSON *object, const char *key, const char *text)
+{
+  char *whole = malloc(strlen(text) * strlen(sf_utf8_replacement) + 1), *to = whole;
+  if (!whole) return;
+  for (size_t n; *text; text += n ? n : 1) {
+    n = sf_utf8_length(text);
+    memcpy(to, n ? text : sf_utf8_replacement, n ? n : strlen(sf_utf8_replacement));
+    to += n ? n : strlen(sf_utf8_replacement);
+  }
+  *to = 0;
+  cJSON_AddStringToObject(object, key, whole);
+  free(whole);
 }

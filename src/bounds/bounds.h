@@ -47,6 +47,8 @@ sf_budget_row sf_budget_measure(sf_budget_id id, uint64_t samples);
 void sf_budget_print(FILE *out, const sf_budget_row *row, int rows);
 cJSON *sf_budget_json(const sf_budget_row *row, int rows);
 
+extern const char sf_h_text[]; /* "h = i >> 3": the shift is H_SHIFT */
+
 /* What can be computed in double precision in place of the fixed block; together: the float model. */
 typedef enum {
   SF_EXACT_LATTICE,  /* unrounded positions and step */
@@ -58,7 +60,7 @@ typedef enum {
   SF_EXACT_C2,
   SF_EXACT_C3,
   SF_EXACT_DIRECTION,  /* unrounded spherical harmonics */
-  SF_EXACT_H,          /* no floor behind i >> 3 */
+  SF_EXACT_H,          /* no floor behind i >> H_SHIFT */
   SF_EXACT_LEAK,       /* k and theta of the float model */
   SF_EXACT_MEMBRANE,   /* leak products unrounded, no saturation */
   SF_EXACT_EXP2,       /* argument and 2^y */

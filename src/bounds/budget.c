@@ -2,6 +2,9 @@
  * The derivations are in docs/fixed-point.md, row by row. */
 #include "bounds/budget_blocks.h"
 
+const char sf_h_text[] = {'h', ' ', '=', ' ', 'i', ' ', '>', '>', ' ', '0' + SF_H_SHIFT, 0};
+_Static_assert(SF_H_SHIFT < 10, "the shift is one digit");
+
 /* clang-format off */
 static const struct block {
   const char *name, *unit, *bites;
@@ -14,7 +17,7 @@ static const struct block {
     [SF_BUDGET_FEATURE] = {"grid: feature f", "LSB of int12", "spikes of D1: INPUT_BITS", true, sf_budget_feature},
     [SF_BUDGET_DIRECTION] = {"direction features", "LSB of 2^-11", "spikes of C1, once per ray", false, sf_budget_direction},
     [SF_BUDGET_CURRENT] = {"currents, all layers: sums", "LSB of a current", "exact", false, sf_budget_currents},
-    [SF_BUDGET_H] = {"h = i >> 3", "LSB of h", "spikes of C1: H_SHIFT", true, sf_budget_h_floor},
+    [SF_BUDGET_H] = {sf_h_text, "LSB of h", "spikes of C1: H_SHIFT", true, sf_budget_h_floor},
     [SF_BUDGET_CHARGE] = {"membrane: one leak product", "LSB of s24", "spikes at the threshold", true, sf_budget_charge},
     [SF_BUDGET_MEMBRANE] = {"membrane: after 8 steps", "LSB of s24", "C2, whose current has AC_FRAC bits", false, sf_budget_membranes},
     [SF_BUDGET_ARGUMENT] = {"argument of the tables", "LSB of Q.12", "relative error of density: LOG_FRAC", false, sf_budget_argument},

@@ -17,7 +17,7 @@ static const char *const block_name[SF_EXACT_ROWS] = {"none: the fixed-point cor
                                                       "C2 weights",
                                                       "C3 weights",
                                                       "direction features",
-                                                      "h = i >> 3",
+                                                      sf_h_text,
                                                       "leak k and threshold",
                                                       "membranes",
                                                       "2^y and its argument",

@@ -5,7 +5,7 @@
 #include "image/image.h"
 #include "energy/ledger.h"
 #include "scene/scene.h"
-#include <cjson/cJSON.h>
+#include "base/json.h"
 #include <stdio.h>
 
 enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply-add, fp32 add, 45 nm (Horowitz 2014) */
@@ -62,14 +62,6 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
 double sf_saving_percent(uint64_t spiking_fj, uint64_t ann_fj);
 cJSON *sf_ledger_json(const sf_ledger *ledger);
 
-/* Integers of JSON keep all their digits: cJSON numbers are doubles. */
-void sf_json_add_u64(cJSON *object, const char *key, uint64_t value);
-/* Text from outside, as a path or a view's name: what is no UTF-8 becomes U+FFFD. */
-void sf_json_add_text(cJSON *object, const char *key, const char *text);
-void sf_xml_escape(FILE *out, const char *text); /* of an element or an attribute; control characters become '?' */
-/* A field of CSV, quoted where it has to be (RFC 4180). */
-void sf_csv_text(FILE *out, const char *text);
-
 /* Tables for a person. */
 void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts);
 /* views: how many views the counts cover (a fraction for a sample of rays), for the figures per view. */
@@ -123,18 +115,18 @@ int sf_published_rows(sf_published_row rows[SF_PUBLISHED_MAX]);
 void sf_published_print(FILE *out);
 cJSON *sf_published_json(void);
 
-/* One ray through the core under observation; see sf_probe_net. Zero it, then set net. */
-typedef struct sf_probe {
+/* One ray through the core under observation; see sf_observer_net. Zero it, then set net. */
+typedef struct sf_observer {
   const fx_net *net;
   fx_trace *trace;   /* where not NULL, every sample is recounted from its spike bitmaps and compared */
   fx_counts core;    /* (a) */
   fx_counts recount; /* (c), from trace */
-  uint64_t sample;   /* of this ray, from 0; sf_probe_begin resets it */
+  uint64_t sample;   /* of this ray, from 0; sf_observer_begin resets it */
   int32_t base[SF_LANES];
-} sf_probe;
-void sf_probe_begin(sf_probe *probe); /* clears everything but net and trace */
-/* fx_net_fn; user is the sf_probe. Pass &probe->core to fx_render_ray too: it counts grid and march there. */
-sf_status sf_probe_net(void *probe, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
+} sf_observer;
+void sf_observer_begin(sf_observer *observer); /* clears everything but net and trace */
+/* fx_net_fn; user is the sf_observer. Pass &observer->core to fx_render_ray too: it counts grid and march there. */
+sf_status sf_observer_net(void *observer, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
 /* The ray through the centre of a pixel. */
 sf_status sf_pixel_ray(const fx_scene *scene, const sf_dataset *data, const sf_view *view, int x, int y, fx_ray *ray);

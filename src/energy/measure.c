@@ -5,28 +5,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-void sf_probe_begin(sf_probe *probe)
+void sf_observer_begin(sf_observer *observer)
 {
-  const fx_net *net = probe->net;
-  fx_trace *trace = probe->trace;
-  *probe = (sf_probe){.net = net, .trace = trace};
+  const fx_net *net = observer->net;
+  fx_trace *trace = observer->trace;
+  *observer = (sf_observer){.net = net, .trace = trace};
 }
 
-static sf_status recount_and_compare(sf_probe *probe, bool first)
+static sf_status recount_and_compare(sf_observer *observer, bool first)
 {
-  sf_recount_sample(probe->net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])probe->trace->spikes, first,
-                    &probe->recount);
-  if (memcmp(probe->core.layer, probe->recount.layer, sizeof probe->core.layer) == 0) return sf_ok();
-  sf_status difference = sf_counts_compare(&probe->core, "core", &probe->recount, "recount");
-  return sf_fail(difference.code, "sample %llu: %s", (unsigned long long)probe->sample, difference.message);
+  sf_recount_sample(observer->net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])observer->trace->spikes, first,
+                    &observer->recount);
+  if (memcmp(observer->core.layer, observer->recount.layer, sizeof observer->core.layer) == 0) return sf_ok();
+  sf_status difference = sf_counts_compare(&observer->core, "core", &observer->recount, "recount");
+  return sf_fail(difference.code, "sample %llu: %s", (unsigned long long)observer->sample, difference.message);
 }
 
-sf_status sf_probe_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+sf_status sf_observer_net(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
-  sf_probe *probe = user;
-  fx_net_next(probe->net, ray->dir, first, f, probe->base, out, probe->trace, &probe->core);
-  if (probe->trace) SF_TRY(recount_and_compare(probe, first));
-  probe->sample++;
+  sf_observer *observer = user;
+  fx_net_next(observer->net, ray->dir, first, f, observer->base, out, observer->trace, &observer->core);
+  if (observer->trace) SF_TRY(recount_and_compare(observer, first));
+  observer->sample++;
   return sf_ok();
 }
 
@@ -148,13 +148,13 @@ static sf_status render_all(shared *s, fx_counts *sum)
 
 /* ---- the checked rays: portable core, recount ---- */
 
-static sf_status check_ray(const sf_measure_job *job, uint64_t index, sf_probe *probe)
+static sf_status check_ray(const sf_measure_job *job, uint64_t index, sf_observer *observer)
 {
   fx_ray ray;
   fx_pixel pixel;
   SF_TRY(job->ray(job->user, index, &ray));
-  sf_probe_begin(probe);
-  sf_status status = fx_render_ray(job->scene, &ray, sf_probe_net, probe, &pixel, &probe->core);
+  sf_observer_begin(observer);
+  sf_status status = fx_render_ray(job->scene, &ray, sf_observer_net, observer, &pixel, &observer->core);
   if (status.code == SF_E_DIFFERENCE)
     return sf_fail(status.code, "ray %llu, %s", (unsigned long long)index, status.message);
   return status;
@@ -165,21 +165,21 @@ static sf_status check_all(shared *s)
   s->failed = (failure){UINT64_MAX, sf_ok()};
 #pragma omp parallel
   {
-    sf_probe *probe = calloc(1, sizeof *probe);
+    sf_observer *observer = calloc(1, sizeof *observer);
     fx_trace *trace = calloc(1, sizeof *trace);
     sf_measure *part = calloc(1, sizeof *part);
-    const bool memory = probe && trace && part;
+    const bool memory = observer && trace && part;
     if (memory)
-      probe->net = &s->job->scene->net, probe->trace = trace;
+      observer->net = &s->job->scene->net, observer->trace = trace;
     else
       note_failure(s, 0, sf_fail(SF_E_MEMORY, "audit: out of memory"));
 #pragma omp for schedule(dynamic, 16)
     for (uint64_t i = 0; i < s->count; i++) {
       if (!memory || skip_chunk(s, i)) continue;
-      const sf_status status = check_ray(s->job, s->index[i], probe);
+      const sf_status status = check_ray(s->job, s->index[i], observer);
       if (status.code != SF_OK) note_failure(s, s->index[i], status);
-      fx_counts_add(&part->checked_core, &probe->core);
-      fx_counts_add(&part->recount, &probe->recount);
+      fx_counts_add(&part->checked_core, &observer->core);
+      fx_counts_add(&part->recount, &observer->recount);
       note_progress(s, i);
     }
     if (memory) {
@@ -189,7 +189,7 @@ static sf_status check_all(shared *s)
         fx_counts_add(&s->sum->recount, &part->recount);
       }
     }
-    free(probe), free(trace), free(part);
+    free(observer), free(trace), free(part);
   }
   return s->failed.status;
 }

@@ -30,13 +30,6 @@ const char *const sf_criticism[] = {
     "once per ray; a twin that does so once per ray too (a hoisted twin) is beside it, and the integer twins all do",
     NULL};
 
-void sf_json_add_u64(cJSON *object, const char *key, uint64_t value)
-{
-  char digits[24];
-  snprintf(digits, sizeof digits, "%" PRIu64, value);
-  cJSON_AddRawToObject(object, key, digits);
-}
-
 static cJSON *steps_json(const fx_layer_counts *layer, int event, int steps)
 {
   cJSON *list = cJSON_CreateArray();

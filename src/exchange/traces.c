@@ -3,6 +3,7 @@
 #include "energy/energy.h"
 #include "exchange/exchange.h"
 #include "base/io.h"
+#include "base/text.h"
 #include "base/rng.h"
 #include <inttypes.h>
 #include <string.h>

@@ -3,7 +3,7 @@
  *
  * Layers (n_in -> n_out; sizes are run-time state up to arch.def):
  *   D1  f[32]   -> 128   MAC, spiking      constant current, computed once per sample
- *   D2  spikes  -> 16    AC, integrating   i(t)[0] drives the density, i(t)[1..15] >> 3 = h(t)
+ *   D2  spikes  -> 16    AC, integrating   i(t)[0] drives the density, i(t)[1..15] >> H_SHIFT = h(t)
  *   C1  d | h   -> 128   MAC, spiking      the d part once per ray, the h part at every step
  *   C2  spikes  -> 128   AC, spiking
  *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour

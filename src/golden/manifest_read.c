@@ -16,8 +16,7 @@ typedef struct object {
 
 static sf_status field(object *o, const char *key, const cJSON **item)
 {
-  *item = cJSON_GetObjectItemCaseSensitive(o->json, key);
-  if (!*item) return sf_fail(SF_E_FORMAT, "%s: %s is missing", o->where, key);
+  SF_TRY(sf_json_need(o->json, o->where, key, item));
   o->taken++;
   return sf_ok();
 }
@@ -40,13 +39,9 @@ static sf_status leave(const object *o)
 
 static sf_status read_text(object *o, const char *key, char *text, size_t size)
 {
-  const cJSON *item;
-  SF_TRY(field(o, key, &item));
-  const char *value = cJSON_GetStringValue(item);
-  if (!value || !*value || strlen(value) >= size)
-    return sf_fail(SF_E_FORMAT, "%s: %s is not a text of 1 to %zu bytes", o->where, key, size - 1);
-  strcpy(text, value);
-  return sf_ok();
+  SF_TRY(sf_json_need_text(o->json, o->where, key, text, size));
+  o->taken++;
+  return *text ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: %s is an empty text", o->where, key);
 }
 
 static sf_status read_hash(object *o, const char *key, char hex[65])
@@ -66,11 +61,8 @@ static sf_status expect_text(object *o, const char *key, const char *wanted)
 
 static sf_status read_whole(object *o, const char *key, double low, double high, double *value)
 {
-  const cJSON *item;
-  SF_TRY(field(o, key, &item));
-  *value = cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
-  if (*value >= low && *value <= high && *value == floor(*value)) return sf_ok();
-  return sf_fail(SF_E_RANGE, "%s: %s is not a whole number from %.0f to %.0f", o->where, key, low, high);
+  o->taken++;
+  return sf_json_need_whole(o->json, o->where, key, low, high, value);
 }
 
 static sf_status read_int(object *o, const char *key, int low, int high, int *value)

@@ -172,7 +172,7 @@ static ptrdiff_t choose_ray(const sf_page *page)
 }
 
 typedef struct watch {
-  sf_probe probe;
+  sf_observer observer;
   fx_trace trace;
   sf_page_ray *ray; /* or NULL */
   uint64_t neuron[SF_LAYERS][SF_T_MAX][SF_LANES], samples;
@@ -181,8 +181,8 @@ typedef struct watch {
 static sf_status watch_sample(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   watch *w = user;
-  SF_TRY(sf_probe_net(&w->probe, ray, first, f, out));
-  const int steps = w->probe.net->steps;
+  SF_TRY(sf_observer_net(&w->observer, ray, first, f, out));
+  const int steps = w->observer.net->steps;
   w->samples++;
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < steps; t++)
@@ -202,8 +202,8 @@ static sf_status watch_pixel(const sf_page *page, size_t i, watch *w)
   fx_ray ray;
   fx_pixel pixel;
   SF_TRY(sf_pixel_ray(page->scene, page->data, page->view, (int)(i % width), (int)(i / width), &ray));
-  sf_probe_begin(&w->probe);
-  return fx_render_ray(page->scene, &ray, watch_sample, w, &pixel, &w->probe.core);
+  sf_observer_begin(&w->observer);
+  return fx_render_ray(page->scene, &ray, watch_sample, w, &pixel, &w->observer.core);
 }
 
 static sf_status watch_rows(sf_page *page, size_t stride, sf_status *failed)
@@ -212,7 +212,7 @@ static sf_status watch_rows(sf_page *page, size_t stride, sf_status *failed)
   {
     watch *w = calloc(1, sizeof *w);
     sf_status status = w ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the spikes");
-    if (w) w->probe.net = &page->scene->net, w->probe.trace = &w->trace;
+    if (w) w->observer.net = &page->scene->net, w->observer.trace = &w->trace;
 #pragma omp for schedule(dynamic, 256)
     for (size_t i = 0; i < pixels(page); i++)
       if (i % stride == stride / 2 && status.code == SF_OK) status = watch_pixel(page, i, w);
@@ -236,7 +236,7 @@ static sf_status gather_spikes(sf_page *page)
   SF_TRY(watch_rows(page, (size_t)(page->golden.counts.samples / SAMPLED) + 1, &failed));
   watch *w = calloc(1, sizeof *w);
   if (!w) return sf_fail(SF_E_MEMORY, "no memory for the spikes of a ray");
-  w->probe.net = &page->scene->net, w->probe.trace = &w->trace, w->ray = &page->ray;
+  w->observer.net = &page->scene->net, w->observer.trace = &w->trace, w->ray = &page->ray;
   page->ray.x = (int)(chosen % page->golden.width), page->ray.y = (int)(chosen / page->golden.width);
   const sf_status status = watch_pixel(page, (size_t)chosen, w);
   free(w);

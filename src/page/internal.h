@@ -1,6 +1,7 @@
 /* What the parts of the page share. Text between tags is escaped, numbers come with their place in the JSON. */
 #ifndef SF_PAGE_INTERNAL_H
 #define SF_PAGE_INTERNAL_H
+#include "base/text.h"
 #include "page/page.h"
 
 enum { HTML_NUMBER = 48 }; /* characters of a formatted number */

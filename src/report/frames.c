@@ -56,9 +56,9 @@ static sf_status check_agreement(frames *f, const cJSON *audit, int view)
 {
   static const char *const key[] = {"core_equals_recount", "core_equals_rtl_equals_recount"};
   for (int i = 0; i < 2; i++)
-    if (cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(audit, key[i])))
+    if (cJSON_IsFalse(sf_json_get(audit, key[i])))
       SF_TRY(sf_report_problem(f->report, "%s: the audit of view %d says %s: false", f->dir, view, key[i]));
-  const cJSON *difference = cJSON_GetObjectItemCaseSensitive(audit, "difference");
+  const cJSON *difference = sf_json_get(audit, "difference");
   if (!cJSON_IsString(difference)) return sf_ok();
   return sf_report_problem(f->report, "%s: the audit of view %d: %s", f->dir, view, difference->valuestring);
 }
@@ -69,9 +69,8 @@ static sf_status add_fixed(frames *f, int view, double audited_fj, double *sum, 
   cJSON *json;
   SF_TRY(open_json(f->report, f->dir, "fixed-", view, &json));
   if (!json) return sf_ok();
-  const double psnr = sf_report_number(json, "psnr"), fj = sf_report_number(json, "energy_fj");
-  const cJSON *crop = cJSON_GetObjectItemCaseSensitive(json, "crop"), *w = cJSON_GetArrayItem(crop, 2),
-              *h = cJSON_GetArrayItem(crop, 3);
+  const double psnr = sf_json_number(json, "psnr"), fj = sf_json_number(json, "energy_fj");
+  const cJSON *crop = sf_json_get(json, "crop"), *w = cJSON_GetArrayItem(crop, 2), *h = cJSON_GetArrayItem(crop, 3);
   if (cJSON_IsNumber(w) && cJSON_IsNumber(h)) run->width = w->valueint, run->height = h->valueint;
   cJSON_Delete(json);
   if (!isnan(psnr)) *sum += psnr, ++*count;
@@ -85,7 +84,7 @@ static sf_status add_float(frames *f, int view, double *sum, int *count)
 {
   cJSON *json;
   SF_TRY(open_json(f->report, f->dir, "float-", view, &json));
-  const double psnr = sf_report_number(json, "psnr");
+  const double psnr = sf_json_number(json, "psnr");
   cJSON_Delete(json);
   if (!isnan(psnr)) *sum += psnr, ++*count;
   return sf_ok();
@@ -99,7 +98,7 @@ static sf_status load_spiking(frames *f, sf_run *run)
   for (int i = 0; i < f->count; i++) {
     cJSON *audit;
     SF_TRY(open_json(f->report, f->dir, "audit-", f->view[i], &audit));
-    const double a = sf_report_number(audit, "energy_spiking_fj"), b = sf_report_number(audit, "energy_ann_fj");
+    const double a = sf_json_number(audit, "energy_spiking_fj"), b = sf_json_number(audit, "energy_ann_fj");
     sf_status status = audit ? check_agreement(f, audit, f->view[i]) : sf_ok();
     const bool broken = audit && (isnan(a) || isnan(b));
     cJSON_Delete(audit);
@@ -128,7 +127,7 @@ static sf_status load_prefixes(frames *f, sf_run *run)
     for (int i = 0; i < f->count; i++) {
       cJSON *json;
       SF_TRY(open_json(f->report, f->dir, prefix, f->view[i], &json));
-      const double fj = sf_report_number(json, "energy_spiking_fj");
+      const double fj = sf_json_number(json, "energy_spiking_fj");
       cJSON_Delete(json);
       if (!isnan(fj)) sum += fj, count++;
     }
@@ -144,7 +143,7 @@ static sf_status twin_price(sf_reproduction *r, const char *reference, int view,
 {
   cJSON *audit;
   SF_TRY(open_json(r, reference, "audit-", view, &audit));
-  *fj = sf_report_number(audit, "energy_ann_fj") / sf_report_number(audit, "samples");
+  *fj = sf_json_number(audit, "energy_ann_fj") / sf_json_number(audit, "samples");
   cJSON_Delete(audit);
   return sf_ok();
 }
@@ -158,7 +157,7 @@ static sf_status load_ann(frames *f, const char *reference, sf_run *run)
     cJSON *json;
     double price;
     SF_TRY(open_json(f->report, f->dir, "float-", f->view[i], &json));
-    const double samples = sf_report_number(json, "samples"), p = sf_report_number(json, "psnr");
+    const double samples = sf_json_number(json, "samples"), p = sf_json_number(json, "psnr");
     cJSON_Delete(json);
     SF_TRY(twin_price(f->report, reference, f->view[i], &price));
     if (!isnan(samples * price)) energy += samples * price, run->audits++;
@@ -209,7 +208,7 @@ sf_status sf_report_load_log(const char *path, sf_run *run)
     next = strchr(line, '\n');
     if (next) *next++ = 0;
     cJSON *json = cJSON_Parse(line);
-    const double x = sf_report_number(json, "iteration"), y = sf_report_number(json, "t_star");
+    const double x = sf_json_number(json, "iteration"), y = sf_json_number(json, "t_star");
     cJSON_Delete(json);
     if (!isnan(x) && !isnan(y)) status = add_point(run, &room, x, y);
   }

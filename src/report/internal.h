@@ -11,7 +11,6 @@ sf_status sf_report_no_memory(const sf_reproduction *r);
 sf_status sf_report_problem(sf_reproduction *r, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* *json is NULL where the file is missing (no problem) or malformed (a problem). */
 sf_status sf_report_read_json(sf_reproduction *r, const char *path, cJSON **json);
-double sf_report_number(const cJSON *object, const char *key); /* NaN where it is no number */
 
 /* The audits and renderings of a run: audit-K.json, fixed-K.json, float-K.json, prefix-T-K.json of views K.
  * `reference`: the folder whose audits give the sizes of the nets; the ANN has no audits of its own. */

@@ -35,7 +35,7 @@ static sf_status read_text(sf_reproduction *r, const char *dir, const char *name
 
 static sf_status read_prefixes(sf_reproduction *r, const char *path, sf_run *run)
 {
-  const cJSON *list = cJSON_GetObjectItemCaseSensitive(run->summary, "prefix_psnr");
+  const cJSON *list = sf_json_get(run->summary, "prefix_psnr");
   const int n = cJSON_GetArraySize(list);
   if (n > SF_T_MAX) return sf_report_problem(r, "%s: prefix_psnr has %d numbers, at most %d", path, n, SF_T_MAX);
   for (const cJSON *item = list ? list->child : NULL; item; item = item->next)
@@ -56,12 +56,12 @@ static sf_status read_summary(sf_reproduction *r, const char *dir, bool ann, sf_
   } field[] = {
       {"psnr", SF_METRIC_PSNR}, {"ssim", SF_METRIC_SSIM}, {"t_r", SF_METRIC_STEPS}, {"seconds", SF_METRIC_SECONDS}};
   for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
-    run->value[field[i].metric] = sf_report_number(run->summary, field[i].key);
-    const bool none = cJSON_IsNull(cJSON_GetObjectItemCaseSensitive(run->summary, field[i].key));
+    run->value[field[i].metric] = sf_json_number(run->summary, field[i].key);
+    const bool none = cJSON_IsNull(sf_json_get(run->summary, field[i].key));
     if (isnan(run->value[field[i].metric]) && !(field[i].metric == SF_METRIC_SSIM && none)) /* tiny views have none */
       SF_TRY(sf_report_problem(r, "%s: no finite number '%s'", path, field[i].key));
   }
-  run->t_star = sf_report_number(run->summary, "t_star");
+  run->t_star = sf_json_number(run->summary, "t_star");
   if (ann) run->value[SF_METRIC_STEPS] = run->t_star = NAN;
   return read_prefixes(r, path, run);
 }
@@ -72,8 +72,8 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
   cJSON *json;
   snprintf(path, sizeof path, "%s/cosim.json", dir);
   SF_TRY(sf_report_read_json(r, path, &json));
-  run->cosim_samples = sf_report_number(json, "samples");
-  run->cosim_differences = sf_report_number(json, "differences");
+  run->cosim_samples = sf_json_number(json, "samples");
+  run->cosim_differences = sf_json_number(json, "differences");
   const bool broken = json && (isnan(run->cosim_samples) || isnan(run->cosim_differences));
   cJSON_Delete(json);
   if (broken) return sf_report_problem(r, "%s: no samples and differences", path);

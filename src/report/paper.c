@@ -1,6 +1,7 @@
 /* The runs and what the paper reports for them: "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance
  * Fields", INGP backbone, averages over the eight Synthetic scenes at 800 x 800. */
 #include "report/report.h"
+#include "base/json.h"
 #include <math.h>
 #include <string.h>
 
@@ -30,18 +31,13 @@ const sf_paper_group sf_paper_groups[SF_PAPER_GROUPS] = {
     {"tensorf", "llff", "LLFF", 26.73, 11910, 26.50, 0.828, 1.875, 3704},
 };
 
-static bool is(const cJSON *summary, const char *key, const char *wanted)
-{
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(summary, key);
-  return cJSON_IsString(item) && strcmp(item->valuestring, wanted) == 0;
-}
-
 const sf_paper_group *sf_reproduction_group(const sf_report_scene *scene)
 {
   const cJSON *summary = NULL;
   for (int run = SF_RUN_BETA_1E7; run < SF_RUNS && !summary; run++) summary = scene->run[run].summary;
   for (int i = 0; summary && i < SF_PAPER_GROUPS; i++)
-    if (is(summary, "backbone", sf_paper_groups[i].backbone) && is(summary, "layout", sf_paper_groups[i].layout))
+    if (sf_json_says(summary, "backbone", sf_paper_groups[i].backbone) &&
+        sf_json_says(summary, "layout", sf_paper_groups[i].layout))
       return &sf_paper_groups[i];
   return NULL;
 }

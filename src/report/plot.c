@@ -198,7 +198,7 @@ static bool has_t_star(const sf_reproduction *r, int scene)
 
 static double search_number(const sf_reproduction *r, int scene, int run, const char *key)
 {
-  return sf_report_number(cJSON_GetObjectItemCaseSensitive(r->scene[scene].run[run].summary, "search"), key);
+  return sf_json_number(sf_json_get(r->scene[scene].run[run].summary, "search"), key);
 }
 
 static bool has_balance(const sf_reproduction *r, int scene)

@@ -27,12 +27,6 @@ static int by_name(const void *a, const void *b)
   return strcmp(((const sf_quality_scene *)a)->name, ((const sf_quality_scene *)b)->name);
 }
 
-static double number(const cJSON *json, const char *key)
-{
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
-  return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 /* Occupied cells that the twins of all seeds have: what one of them has alone is its noise. */
 typedef struct cells {
   uint8_t *bits; /* owned; NULL before the first twin */
@@ -77,7 +71,7 @@ static sf_status lost_cells(const cells *twin, const char *path, double *lost)
 
 static void add_state(sf_quality_scene *scene, const cJSON *search)
 {
-  const char *state = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(search, "state"));
+  const char *state = sf_json_text(search, "state");
   if (!state || strstr(scene->states, state)) return;
   const size_t used = strlen(scene->states);
   snprintf(scene->states + used, sizeof scene->states - used, "%s%s", used ? ", " : "", state);
@@ -101,15 +95,15 @@ static sf_status load_seed(const char *dir, const char *seed, const cells *twin,
   }
   for (int i = 0; i < SF_QUALITIES; i++) value[i] = NAN;
   if (!status.code) {
-    const cJSON *search = cJSON_GetObjectItemCaseSensitive(run[0], "search");
-    value[SF_QUALITY_PSNR] = number(run[0], "psnr");
-    value[SF_QUALITY_TWIN] = number(run[1], "psnr");
+    const cJSON *search = sf_json_get(run[0], "search");
+    value[SF_QUALITY_PSNR] = sf_json_number(run[0], "psnr");
+    value[SF_QUALITY_TWIN] = sf_json_number(run[1], "psnr");
     value[SF_QUALITY_EXCESS] = squared_error(value[SF_QUALITY_PSNR]) - squared_error(value[SF_QUALITY_TWIN]);
-    value[SF_QUALITY_T_STAR] = number(run[0], "t_star");
-    value[SF_QUALITY_STEPS] = number(run[0], "t_r");
-    value[SF_QUALITY_WORTH] = number(search, "worth");
-    value[SF_QUALITY_PRICE] = number(search, "price");
-    value[SF_QUALITY_SECONDS] = number(run[0], "seconds");
+    value[SF_QUALITY_T_STAR] = sf_json_number(run[0], "t_star");
+    value[SF_QUALITY_STEPS] = sf_json_number(run[0], "t_r");
+    value[SF_QUALITY_WORTH] = sf_json_number(search, "worth");
+    value[SF_QUALITY_PRICE] = sf_json_number(search, "price");
+    value[SF_QUALITY_SECONDS] = sf_json_number(run[0], "seconds");
     add_state(scene, search);
     snprintf(path, sizeof path, "%s/%s/snn-%s/model.safetensors", dir, scene->name, seed);
     if (run[0]) status = lost_cells(twin, path, &value[SF_QUALITY_LOST]);
@@ -227,7 +221,7 @@ static void print_cell(FILE *out, int column, const sf_spread *v, const cJSON *b
     fprintf(out, " +- ");
     print_value(out, columns[column].format, (v->most - v->least) / 2);
   }
-  const double old = number(cJSON_GetObjectItemCaseSensitive(before, columns[column].key), "mean");
+  const double old = sf_json_number(sf_json_get(before, columns[column].key), "mean");
   if (!isnan(old)) {
     fprintf(out, " (");
     print_value(out, columns[column].format, old);
@@ -246,8 +240,7 @@ void sf_quality_print(FILE *out, const sf_quality *q, const cJSON *before)
   for (int s = 0; s < q->count; s++) {
     const sf_quality_scene *scene = &q->scene[s];
     fprintf(out, "| %s |", scene->name);
-    for (int i = 0; i < SF_QUALITIES; i++)
-      print_cell(out, i, &scene->value[i], cJSON_GetObjectItemCaseSensitive(before, scene->name));
+    for (int i = 0; i < SF_QUALITIES; i++) print_cell(out, i, &scene->value[i], sf_json_get(before, scene->name));
     fprintf(out, " %s |\n", scene->states);
   }
 }

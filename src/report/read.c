@@ -44,9 +44,3 @@ sf_status sf_report_read_json(sf_reproduction *r, const char *path, cJSON **json
   if (!status.code || status.code == SF_E_MEMORY) return status;
   return sf_report_problem(r, "%s", status.message);
 }
-
-double sf_report_number(const cJSON *object, const char *key)
-{
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-  return cJSON_IsNumber(item) && isfinite(item->valuedouble) ? item->valuedouble : NAN;
-}

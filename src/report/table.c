@@ -1,5 +1,6 @@
 /* The report as Markdown that reads as plain text, too. */
 #include "report/internal.h"
+#include "base/json.h"
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -108,8 +109,8 @@ static double training_hours(const sf_reproduction *r, int *runs)
 
 static double number_of(const cJSON *json, const char *key)
 {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
-  return cJSON_IsNumber(item) ? item->valuedouble : 0;
+  const double number = sf_json_number(json, key);
+  return isnan(number) ? 0 : number;
 }
 
 static const sf_run *first_audited(const sf_reproduction *r)
@@ -220,8 +221,8 @@ static void print_scenes(FILE *out, const sf_reproduction *r, table *t)
 
 static const char *text_of(const cJSON *json, const char *key)
 {
-  const cJSON *item = cJSON_GetObjectItemCaseSensitive(json, key);
-  return cJSON_IsString(item) ? item->valuestring : "-";
+  const char *text = sf_json_text(json, key);
+  return text ? text : "-";
 }
 
 static void pair_row(table *t, const sf_reproduction *r, int scene, int id)

@@ -41,7 +41,7 @@ sf_status sf_procedural_trace(const char *name, const float origin[3], const flo
   SF_TRY(find_scene(name, &index));
   sf_stage stage;
   sf_stage_build(&stage, index);
-  sf_ray ray;
+  sf_stage_ray ray;
   double length = 0, sum[4], straight[4];
   for (int i = 0; i < 3; i++) length += (double)direction[i] * direction[i];
   if (!(length > 0) || !isfinite(length)) return sf_fail(SF_E_RANGE, "scene %s: a ray without direction", name);
@@ -52,7 +52,7 @@ sf_status sf_procedural_trace(const char *name, const float origin[3], const flo
   return sf_ok();
 }
 
-static void pixel_ray(const sf_camera *camera, double px, double py, sf_ray *ray)
+static void pixel_ray(const sf_camera *camera, double px, double py, sf_stage_ray *ray)
 {
   float origin[3], direction[3];
   double length = 0;
@@ -63,7 +63,7 @@ static void pixel_ray(const sf_camera *camera, double px, double py, sf_ray *ray
 
 static void render_pixel(const sf_stage *stage, const sf_camera *camera, int x, int y, uint16_t out[4])
 {
-  sf_ray ray;
+  sf_stage_ray ray;
   uint64_t candidates = 0;
   double sum[4] = {0}, one[4], straight[4];
   /* The shapes that this pixel can see, found once: 0.75 > half the pixel's diagonal. */

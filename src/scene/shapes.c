@@ -31,7 +31,7 @@ void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3],
   }
 }
 
-bool sf_shape_near(const sf_shape *shape, const sf_ray *ray, double spread)
+bool sf_shape_near(const sf_shape *shape, const sf_stage_ray *ray, double spread)
 {
   double to[3];
   for (int i = 0; i < 3; i++) to[i] = shape->centre[i] - ray->origin[i];
@@ -237,7 +237,7 @@ static bool hit_torus(const local_ray *ray, const double size[3], double *t, dou
   return false;
 }
 
-static void to_local(const sf_shape *shape, const sf_ray *ray, local_ray *local)
+static void to_local(const sf_shape *shape, const sf_stage_ray *ray, local_ray *local)
 {
   double from[3];
   for (int i = 0; i < 3; i++) from[i] = ray->origin[i] - shape->centre[i];
@@ -247,7 +247,7 @@ static void to_local(const sf_shape *shape, const sf_ray *ray, local_ray *local)
   }
 }
 
-bool sf_shape_hit(const sf_shape *shape, const sf_ray *ray, double near, sf_hit *hit)
+bool sf_shape_hit(const sf_shape *shape, const sf_stage_ray *ray, double near, sf_hit *hit)
 {
   local_ray local = {.near = near, .far = hit->t};
   double t = 0, normal[3];
@@ -274,7 +274,7 @@ bool sf_shape_hit(const sf_shape *shape, const sf_ray *ray, double near, sf_hit 
   return true;
 }
 
-bool sf_shape_interval(const sf_shape *shape, const sf_ray *ray, double *enter, double *leave)
+bool sf_shape_interval(const sf_shape *shape, const sf_stage_ray *ray, double *enter, double *leave)
 {
   local_ray local;
   int first, last;

@@ -4,9 +4,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef struct sf_ray {
+typedef struct sf_stage_ray {
   double origin[3], direction[3]; /* unit direction */
-} sf_ray;
+} sf_stage_ray;
 
 typedef enum {
   SF_SPHERE,   /* size: radius */
@@ -62,15 +62,15 @@ typedef struct sf_hit {
 void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3], const double size[3], double yaw,
                     double tilt);
 /* Nearest hit with t in (near, hit->t); true when found, and then *hit is replaced. */
-bool sf_shape_hit(const sf_shape *shape, const sf_ray *ray, double near, sf_hit *hit);
+bool sf_shape_hit(const sf_shape *shape, const sf_stage_ray *ray, double near, sf_hit *hit);
 /* Whether a cone around the ray (spread = half width per unit of distance) can touch the shape. */
-bool sf_shape_near(const sf_shape *shape, const sf_ray *ray, double spread);
+bool sf_shape_near(const sf_shape *shape, const sf_stage_ray *ray, double spread);
 /* Entry and exit along the ray; spheres and boxes only. */
-bool sf_shape_interval(const sf_shape *shape, const sf_ray *ray, double *enter, double *leave);
+bool sf_shape_interval(const sf_shape *shape, const sf_stage_ray *ray, double *enter, double *leave);
 
 /* Builds scene `index` of sf_procedural_names. */
 void sf_stage_build(sf_stage *stage, int index);
 /* Premultiplied display colour and alpha of one ray; `candidates`: bit i set = shape i may be hit. */
-void sf_stage_trace(const sf_stage *stage, const sf_ray *ray, uint64_t candidates, double rgba[4]);
+void sf_stage_trace(const sf_stage *stage, const sf_stage_ray *ray, uint64_t candidates, double rgba[4]);
 
 #endif

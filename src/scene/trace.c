@@ -38,7 +38,7 @@ static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
 }
 
 /* Optical depth of all fogs from the origin to `far`. */
-static double optical_depth(const sf_stage *stage, const sf_ray *ray, double far)
+static double optical_depth(const sf_stage *stage, const sf_stage_ray *ray, double far)
 {
   double depth = 0, enter, leave;
   for (int i = 0; i < stage->fogs; i++) {
@@ -52,7 +52,7 @@ static double optical_depth(const sf_stage *stage, const sf_ray *ray, double far
 /* Share of the key light that arrives: 0 behind a shape, dimmed exactly by fog. */
 static double light_arriving(const sf_stage *stage, const double at[3], const double normal[3])
 {
-  sf_ray ray;
+  sf_stage_ray ray;
   for (int i = 0; i < 3; i++) ray.origin[i] = at[i] + SURFACE_GAP * normal[i], ray.direction[i] = light[i];
   for (int i = 0; i < stage->shapes; i++) {
     sf_hit hit = {.t = INFINITY};
@@ -73,7 +73,8 @@ static void shade_sky(const sf_shape *sky, const sf_hit *hit, double colour[3])
 }
 
 /* Hemisphere ambient, Lambert and Blinn-Phong in linear light; display value = square root (gamma 2). */
-static void shade(const sf_stage *stage, const sf_shape *shape, const sf_ray *ray, const sf_hit *hit, double colour[3])
+static void shade(const sf_stage *stage, const sf_shape *shape, const sf_stage_ray *ray, const sf_hit *hit,
+                  double colour[3])
 {
   if (shape->material->pattern == SF_SKY) {
     shade_sky(shape, hit, colour);
@@ -99,7 +100,7 @@ static void shade(const sf_stage *stage, const sf_shape *shape, const sf_ray *ra
 }
 
 /* Between two neighbouring boundaries the fog is homogeneous, so each piece has a closed form. */
-static double add_fog(const sf_stage *stage, const sf_ray *ray, double far, double rgb[3])
+static double add_fog(const sf_stage *stage, const sf_stage_ray *ray, double far, double rgb[3])
 {
   double enter[SF_STAGE_FOGS], leave[SF_STAGE_FOGS], cut[2 * SF_STAGE_FOGS], through = 1;
   int cuts = 0;
@@ -129,7 +130,7 @@ static double add_fog(const sf_stage *stage, const sf_ray *ray, double far, doub
   return through;
 }
 
-void sf_stage_trace(const sf_stage *stage, const sf_ray *ray, uint64_t candidates, double rgba[4])
+void sf_stage_trace(const sf_stage *stage, const sf_stage_ray *ray, uint64_t candidates, double rgba[4])
 {
   sf_hit hit = {.t = INFINITY};
   const sf_shape *nearest = NULL;

@@ -2,6 +2,7 @@
 #include "report/internal.h"
 #include "energy/energy.h"
 #include "base/io.h"
+#include "base/text.h"
 #include "sweep/sweep.h"
 #include <dirent.h>
 #include <math.h>
@@ -12,27 +13,20 @@ enum { POINTS_MAX = 65536, NAME_MAX_BYTES = 256, TEXT_MAX = 4096 };
 
 /* ---- loading ---- */
 
-static sf_status copy_text(const cJSON *json, const char *key, const char *path, char *text, size_t size)
-{
-  const char *value = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(json, key));
-  if (!value || strlen(value) >= size) return sf_fail(SF_E_FORMAT, "%s: no text '%s'", path, key);
-  memcpy(text, value, strlen(value) + 1);
-  return sf_ok();
-}
-
 static sf_status read_point(const cJSON *json, const char *path, sf_point *point)
 {
-  SF_TRY(copy_text(json, "name", path, point->name, sizeof point->name));
-  SF_TRY(copy_text(json, "model", path, point->model, sizeof point->model));
+  SF_TRY(sf_json_need_text(json, path, "name", point->name, sizeof point->name));
+  SF_TRY(sf_json_need_text(json, path, "model", point->model, sizeof point->model));
   for (int i = 0; i < SF_AXES; i++) {
-    const double value = sf_report_number(json, sf_axes[i].name);
+    const double value = sf_json_number(json, sf_axes[i].name);
     if (!(value >= 0 && value <= 64)) return sf_fail(SF_E_FORMAT, "%s: no number '%s' in 0..64", path, sf_axes[i].name);
     point->axis[i] = (int)value;
   }
   for (int i = 0; i < SF_POINT_FIGURES; i++) {
     const char *key = sf_point_figures[i].name;
-    if (!cJSON_HasObjectItem(json, key)) return sf_fail(SF_E_FORMAT, "%s: no number '%s'", path, key);
-    point->figure[i] = sf_report_number(json, key); /* null, a PSNR of equal images, is NaN */
+    const cJSON *item;
+    SF_TRY(sf_json_need(json, path, key, &item));
+    point->figure[i] = sf_json_number(json, key); /* null, a PSNR of equal images, is NaN */
   }
   return sf_ok();
 }

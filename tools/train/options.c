@@ -148,11 +148,17 @@ static bool any_transparent(const sf_dataset *data)
   return false;
 }
 
+/* Whether the field is of planes and lines, whose defaults follow from the data; else it is a hash grid. */
+static bool has_planes(const train_arguments *a)
+{
+  return !sf_field_of(&a->train.config)->lattice;
+}
+
 static void settle_space(train_arguments *a, const sf_dataset *data)
 {
   static const char *const name[] = {"random", "white", "black"};
   const sf_config *c = &a->train.config;
-  const bool vm = !sf_field_of(c)->lattice;
+  const bool vm = has_planes(a);
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data);
   a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
@@ -185,7 +191,7 @@ static sf_status check_effect(train_arguments *a)
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
-  if (!sf_field_of(&a->train.config)->lattice)
+  if (has_planes(a))
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, "has no effect on --backbone tensorf"));
   else
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
@@ -212,8 +218,7 @@ static sf_status finish_options(train_arguments *a)
   if (a->train.target_loss > 0 && a->train.target_saving > 0)
     return sf_fail(SF_E_USAGE, "--target-loss and --target-saving exclude each other");
   if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
-  if (a->fine_tune && sf_field_decoded(sf_field_of(c)))
-    return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");
+  if (a->fine_tune && has_planes(a)) return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");
   return sf_ok();
 }
 
@@ -274,7 +279,7 @@ sf_status train_parse(train_arguments *a, const char **path)
   SF_TRY(finish_options(a));
   sf_cli_catch_signals();
   set_box(a, NULL);
-  if (!sf_field_of(&a->train.config)->lattice) return sf_ok();
+  if (has_planes(a)) return sf_ok();
   sf_status status = sf_config_check(&a->train.config);
   if (status.code == SF_E_RANGE) status.code = SF_E_USAGE;
   return status;
@@ -282,7 +287,7 @@ sf_status train_parse(train_arguments *a, const char **path)
 
 sf_status train_settle(train_arguments *a, const sf_dataset *data)
 {
-  if (!sf_field_of(&a->train.config)->lattice) SF_TRY(take_tensorf_defaults(a, data));
+  if (has_planes(a)) SF_TRY(take_tensorf_defaults(a, data));
   settle_space(a, data);
   return sf_ok();
 }
