@@ -139,7 +139,6 @@ lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys 
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
-	@! command -v python3 >/dev/null || tools/check_prose.py README.md docs/*.md rtl/README.md
 	@cd $(RTL_ROOT) && for top in $(LINT_TOPS); do \
 	  $(VERILATOR) --lint-only --top-module $$top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; \
 	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -Irtl -s $$top -t null $(RTL) || exit 1; \
