@@ -44,9 +44,9 @@ static void fill(fx_scene *s)
   s->net.steps = RIG_STEPS;
   s->net.exp_in = (fx_scale){50000, 15, 4096}, s->net.sigmoid_in = (fx_scale){50000, 13, 0};
   s->step_q24 = 30000, s->max_samples = 1024; /* from here on what no figure depends on */
-  s->to_box_scale = 0.5, s->dir_scale = 0x1p-10;
-  for (int l = 0; l < FX_LEVELS_MAX; l++) s->feature_scale[l] = 0x1p-10;
-  for (int l = 0; l < SF_LAYERS; l++) s->current_scale[l] = 0x1p-12;
+  s->units.to_box_scale = 0.5, s->units.dir_scale = 0x1p-10;
+  for (int l = 0; l < FX_LEVELS_MAX; l++) s->units.feature_scale[l] = 0x1p-10;
+  for (int l = 0; l < SF_LAYERS; l++) s->units.current_scale[l] = 0x1p-12;
 }
 
 static double rate_of(const fx_block *b, int layer, int steps)

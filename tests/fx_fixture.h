@@ -102,10 +102,10 @@ static inline void fixture_fill(fx_scene *scene, const fixture_sizes *s, uint64_
   scene->net.exp_in = (fx_scale){50000, 15, 4096};
   scene->net.sigmoid_in = (fx_scale){50000, 13, 0};
   scene->step_q24 = 30000, scene->max_samples = 1024, scene->trans_stop = 104;
-  for (int o = 0; o < 3; o++) scene->background[o] = 65536, scene->to_box_offset[o] = 0.5;
-  scene->to_box_scale = 0.5, scene->dir_scale = 0x1p-10;
-  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->feature_scale[l] = 0x1p-10;
-  for (int l = 0; l < SF_LAYERS; l++) scene->current_scale[l] = 0x1p-12;
+  for (int o = 0; o < 3; o++) scene->background[o] = 65536, scene->units.to_box_offset[o] = 0.5;
+  scene->units.to_box_scale = 0.5, scene->units.dir_scale = 0x1p-10;
+  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->units.feature_scale[l] = 0x1p-10;
+  for (int l = 0; l < SF_LAYERS; l++) scene->units.current_scale[l] = 0x1p-12;
 }
 
 static inline fx_scene fixture_scene(const fixture_sizes *sizes, uint64_t seed)

@@ -35,8 +35,8 @@ static inline fx_scene tensorf_scene(void)
         l[id].w[i * SF_LANES + o] = (int8_t)fixture_pick(5, 9, (uint64_t)(i * 200 + o), -100, 127);
   }
   memset(scene.occupancy, 0xff, 64);
-  scene.to_box_scale = scene.dir_scale = 1, field->far = 100;
-  for (int axis = 0; axis < 3; axis++) field->stretch[axis] = 1;
+  scene.units.to_box_scale = scene.units.dir_scale = 1, scene.units.far = 100;
+  for (int axis = 0; axis < 3; axis++) scene.units.stretch[axis] = 1;
   status = fx_scene_check(&scene, "tensorf");
   if (status.code != SF_OK) ck_abort_msg("%s", status.message);
   return scene;

@@ -82,7 +82,7 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
     ck_assert(x->n_in == y->n_in && x->n_out == y->n_out && x->k == y->k && x->theta == y->theta);
     ck_assert_int_eq(x->bias, y->bias);
     ck_assert_mem_eq(x->w, y->w, (size_t)fx_layer_rows(x) * SF_LANES);
-    ck_assert(a->current_scale[l] == b->current_scale[l]);
+    ck_assert(a->units.current_scale[l] == b->units.current_scale[l]);
   }
   ck_assert(a->net.mode == b->net.mode && a->net.steps == b->net.steps);
   ck_assert_mem_eq(&a->net.exp_in, &b->net.exp_in, sizeof a->net.exp_in);
@@ -93,10 +93,10 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   ck_assert_mem_eq(a->occupancy, b->occupancy, 64);
   ck_assert(a->step_q24 == b->step_q24 && a->max_samples == b->max_samples && a->trans_stop == b->trans_stop);
   ck_assert_mem_eq(a->background, b->background, sizeof a->background);
-  ck_assert(a->model_scale == b->model_scale);
-  ck_assert(a->to_box_scale == b->to_box_scale && a->dir_scale == b->dir_scale);
-  for (int l = 0; l < FX_LEVELS_MAX; l++) ck_assert(a->feature_scale[l] == b->feature_scale[l]);
-  for (int o = 0; o < 3; o++) ck_assert(a->to_box_offset[o] == b->to_box_offset[o]);
+  ck_assert(a->units.model_scale == b->units.model_scale);
+  ck_assert(a->units.to_box_scale == b->units.to_box_scale && a->units.dir_scale == b->units.dir_scale);
+  for (int l = 0; l < FX_LEVELS_MAX; l++) ck_assert(a->units.feature_scale[l] == b->units.feature_scale[l]);
+  for (int o = 0; o < 3; o++) ck_assert(a->units.to_box_offset[o] == b->units.to_box_offset[o]);
 }
 
 START_TEST(round_trip)
@@ -104,8 +104,8 @@ START_TEST(round_trip)
   for (uint64_t seed = 0; seed < 20; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
     fx_scene scene = fixture_scene(&sizes, seed), again;
-    scene.to_box_scale = 1.0 / 3, scene.dir_scale = 0x1p-11, scene.to_box_offset[1] = -1e6 / 7;
-    scene.background[2] = 12345, scene.model_scale = seed % 2 ? 0.4 : 0;
+    scene.units.to_box_scale = 1.0 / 3, scene.units.dir_scale = 0x1p-11, scene.units.to_box_offset[1] = -1e6 / 7;
+    scene.background[2] = 12345, scene.units.model_scale = seed % 2 ? 0.4 : 0;
     save(&scene);
     const sf_status status = fx_scene_load(&again, path);
     ck_assert_msg(status.code == SF_OK, "%s", status.message);

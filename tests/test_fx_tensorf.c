@@ -82,11 +82,11 @@ static fx_scene make_scene(const int32_t res[3], int components, int freqs, uint
   fx_tensorf *f = &scene.tensorf;
   fx_layer *l = scene.net.layer;
   for (int i = 0; i < 3; i++) {
-    f->res[i] = res[i], f->stretch[i] = 1, scene.background[i] = 65536;
+    f->res[i] = res[i], scene.units.stretch[i] = 1, scene.background[i] = 65536;
     f->density.components[i] = components + i, f->appearance.components[i] = 2 * components + i;
   }
   f->features = 9, f->feature_freqs = freqs, f->view_freqs = freqs, f->encoding_frac = 9;
-  f->far = 6;
+  scene.units.far = 6;
   f->density_in = (fx_scale){30000, 28, 0}, f->sigma_out = (fx_scale){40000, 15, 0};
   f->feature_in = (fx_scale){40000, 33, 0}, f->phase_in = (fx_scale){50000, 30, 0};
   f->weight_stop = 104;
@@ -120,7 +120,7 @@ static fx_scene make_scene(const int32_t res[3], int components, int freqs, uint
         l[id].w[i * SF_LANES + o] = (int8_t)fixture_pick(seed, 70 + (uint64_t)id, (uint64_t)(i * 128 + o), -127, 127);
   }
   scene.step_q24 = 1 << 17, scene.max_samples = 1024, scene.trans_stop = 104;
-  scene.to_box_scale = 1, scene.dir_scale = 0x1p-9;
+  scene.units.to_box_scale = 1, scene.units.dir_scale = 0x1p-9;
   return scene;
 }
 
@@ -497,11 +497,11 @@ static void check_file(void)
       {"C2.bias", "2", "C2.bias"},
   };
   fx_scene scene = foggy(8), again;
-  scene.tensorf.stretch[1] = 4 / 3.0, scene.tensorf.near = 0.1;
+  scene.units.stretch[1] = 4 / 3.0, scene.units.near = 0.1;
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_OK);
   const sf_status status = fx_scene_load(&again, path);
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  ck_assert(again.tensorf.stretch[1] == 4 / 3.0 && again.tensorf.near == 0.1);
+  ck_assert(again.units.stretch[1] == 4 / 3.0 && again.units.near == 0.1);
   for (uint64_t i = 0; i < 40; i++) {
     const fx_ray ray = make_ray(4, i, 90);
     fx_pixel a, b;
@@ -645,8 +645,8 @@ static double picture_psnr(int ndc)
   uint64_t samples = 0;
   ck_assert_msg(status.code == SF_OK, "%s", status.message);
   printf("ndc %d: errors: features %.4f, C1 %.4f, C2 %.4f, C3 %.4f; LSB %g, %g; bias %d\n", ndc, report.feature_error,
-         report.layer[2].error, report.layer[3].error, report.layer[4].error, scene.feature_scale[0], scene.dir_scale,
-         scene.net.layer[FX_C1].bias);
+         report.layer[2].error, report.layer[3].error, report.layer[4].error, scene.units.feature_scale[0],
+         scene.units.dir_scale, scene.net.layer[FX_C1].bias);
   for (int i = 0; i < PIXELS; i++) pixel_ray(i, ndc, origin[i], direction[i]);
   ck_assert_int_eq(sf_render_rays(&m, origin[0], direction[0], PIXELS, 0, white, rgb[0], NULL, NULL, decoded).code,
                    SF_OK);

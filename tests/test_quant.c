@@ -82,7 +82,7 @@ static void draw(uint64_t sample, uint32_t pos[3], float x[3], float sh[16])
 /* Largest error of a table entry of one level, in units of the features; its range of values too. */
 static double entry_error(const sf_model *m, const fx_scene *scene, int level, double *range)
 {
-  const double lsb = scene->feature_scale[level] * ldexp(1, 16 - scene->grid.shift[level]);
+  const double lsb = scene->units.feature_scale[level] * ldexp(1, 16 - scene->grid.shift[level]);
   const float *value = sf_model_param(m, SF_P_GRID);
   double worst = 0, low = 0, high = 0;
   for (size_t i = 2 * m->level[level].offset; i < 2 * (m->level[level].offset + m->level[level].entries); i++) {
@@ -111,7 +111,7 @@ START_TEST(features_against_float)
     sf_grid_features(&m, x, f);
     fx_grid_features(&scene.grid, pos, q, NULL);
     for (int i = 0; i < 32; i++) {
-      const double lsb = scene.feature_scale[i / 2], beyond = fmax(0, fabs(f[i]) - 2047 * lsb);
+      const double lsb = scene.units.feature_scale[i / 2], beyond = fmax(0, fabs(f[i]) - 2047 * lsb);
       const double bound = range[i / 2] * 3 / 512 + entry[i / 2] + lsb * 0.51 + beyond;
       ck_assert_msg(fabs(f[i] - q[i] * lsb) <= bound + 1e-4, "feature %d: %g, float %g, bound %g", i, q[i] * lsb,
                     (double)f[i], bound);
@@ -134,7 +134,7 @@ static void add_currents(tally *sum, const fx_scene *scene, const fx_trace *fixe
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int o = 0; o < scene->net.layer[l].n_out; o++) {
-      const double exact = real->current[l][t][o], d = fixed->current[l][t][o] * scene->current_scale[l] - exact;
+      const double exact = real->current[l][t][o], d = fixed->current[l][t][o] * scene->units.current_scale[l] - exact;
       sum->current_error[l] += d * d, sum->current_energy[l] += exact * exact;
     }
 }
@@ -151,7 +151,7 @@ static void add_sample(tally *sum, const fx_scene *scene, const sf_model *m, uin
   sf_grid_features(m, x, f);
   sf_net_sample(m, f, sh, scene->net.steps, sigma, colour, real);
   fx_grid_features(&scene->grid, pos, q, NULL);
-  for (int i = 0; i < 16; i++) dir[i] = (int16_t)nearbyint(sh[i] / scene->dir_scale);
+  for (int i = 0; i < 16; i++) dir[i] = (int16_t)nearbyint(sh[i] / scene->units.dir_scale);
   fx_net_direction(&scene->net, dir, base, NULL);
   fx_net_sample(&scene->net, q, base, &out, fixed, NULL);
   const int last = scene->net.steps - 1;
@@ -221,7 +221,7 @@ START_TEST(output_functions_have_the_right_units)
   quantise(&m, &scene, &report);
   const fx_net *net = &scene.net;
   for (int32_t c = -16256; c <= 16256; c++) {
-    const double i = c * scene.current_scale[FX_D2], j = c * scene.current_scale[FX_C3];
+    const double i = c * scene.units.current_scale[FX_D2], j = c * scene.units.current_scale[FX_C3];
     const double sigma = sf_fx_sigma_value(&scene, fx_exp2(fx_exp2_argument(c, &net->exp_in)));
     const double colour = sf_fx_colour_value(fx_sigmoid(fx_sigmoid_argument(c, &net->sigmoid_in)));
     if (i < 10) ck_assert_double_eq_tol(sigma, exp(i), 2.2e-4 * exp(i) + 0x1p-14 + 1e-9);
@@ -298,7 +298,7 @@ START_TEST(same_seed_same_bits_any_threads)
   ck_assert_mem_eq(a.grid.table, b.grid.table, (size_t)a.grid.entries * 2);
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
-    ck_assert(a.current_scale[l] == b.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
+    ck_assert(a.units.current_scale[l] == b.units.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
   }
   fx_scene_free(&a), fx_scene_free(&b);
   sf_model_free(&m);
@@ -417,11 +417,11 @@ static void assert_same_scene(const fx_scene *a, const fx_scene *b)
 {
   ck_assert_mem_eq(a->grid.table, b->grid.table, (size_t)a->grid.entries * 2);
   ck_assert_mem_eq(a->grid.shift, b->grid.shift, sizeof a->grid.shift);
-  ck_assert(a->dir_scale == b->dir_scale);
+  ck_assert(a->units.dir_scale == b->units.dir_scale);
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *x = &a->net.layer[l], *y = &b->net.layer[l];
     ck_assert_mem_eq(x->w, y->w, (size_t)x->n_in * SF_LANES);
-    ck_assert(x->k == y->k && x->theta == y->theta && a->current_scale[l] == b->current_scale[l]);
+    ck_assert(x->k == y->k && x->theta == y->theta && a->units.current_scale[l] == b->units.current_scale[l]);
   }
 }
 

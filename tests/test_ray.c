@@ -14,7 +14,7 @@ static float normal(uint64_t stream, uint64_t i)
 
 static fx_scene box_scene(int lattice)
 {
-  fx_scene s = {.to_box_scale = 0.5, .to_box_offset = {0.5, 0.5, 0.5}, .dir_scale = 0x1p-10};
+  fx_scene s = {.units.to_box_scale = 0.5, .units.to_box_offset = {0.5, 0.5, 0.5}, .units.dir_scale = 0x1p-10};
   s.step_q24 = (int32_t)lround(sqrt(3.0) / lattice * 16777216);
   return s;
 }
@@ -121,7 +121,7 @@ START_TEST(rays_far_away_and_refused)
 {
   const fx_scene scene = box_scene(1024);
   fx_ray ray;
-  const double step = ldexp(scene.step_q24, -24) / scene.to_box_scale; /* 32768 of them are 110.85 */
+  const double step = ldexp(scene.step_q24, -24) / scene.units.to_box_scale; /* 32768 of them are 110.85 */
   for (int e = 0; e < 120; e++) {
     const float o[3] = {1 + powf(2, (float)e), 0, 0}, d[3] = {-1, 0, 0}, aside[3] = {0, 1, 0};
     ck_assert_int_eq(make_ray(&scene, o, aside).count, 0);
@@ -155,7 +155,7 @@ START_TEST(direction_features_within_one_lsb)
   for (uint64_t i = 0; i < 20000; i++) {
     fx_scene scene = box_scene(256);
     const int frac = (int)(i % (FX_DIR_FRAC_MAX + 1));
-    scene.dir_scale = ldexp(1, -frac);
+    scene.units.dir_scale = ldexp(1, -frac);
     ck_assert_int_eq(sf_fx_dir_frac(&scene), frac);
     float d[3], sh[SF_DIR_FEATURES], length = 0;
     for (uint64_t a = 0; a < 3; a++) d[a] = normal(80 + a, i) * (i % 3 == a ? 1 : i % 5 ? 1 : 0.001f);

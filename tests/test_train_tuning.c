@@ -93,10 +93,10 @@ START_TEST(export_reproduces_the_rounded_weights)
   ck_good(sf_quantise(&loaded, &m, "tuned", &as_recorded));
   ck_assert_int_eq(same_integers(&m, &loaded, &after), 0);
   for (int l = 0; l < base.config.levels; l++) {
-    ck_assert_double_eq(loaded.feature_scale[l], base.scales.lsb.feature[l]);
+    ck_assert_double_eq(loaded.units.feature_scale[l], base.scales.lsb.feature[l]);
     ck_assert_int_eq(loaded.grid.shift[l], before.grid.shift[l]);
   }
-  ck_assert_double_eq(loaded.dir_scale, base.scales.lsb.direction);
+  ck_assert_double_eq(loaded.units.dir_scale, base.scales.lsb.direction);
   sf_model_free(&m);
   fx_scene_free(&before);
   fx_scene_free(&after);

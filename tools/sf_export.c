@@ -98,9 +98,9 @@ static sf_status print_json(const fx_scene *scene, const sf_quant_report *report
   cJSON_AddStringToObject(json, "backbone", vm ? "tensorf" : "ingp");
   if (vm) cJSON_AddNumberToObject(json, "field_bytes", (double)fx_tensorf_bytes(&scene->tensorf));
   cJSON_AddItemToObject(json, "feature_lsb",
-                        cJSON_CreateDoubleArray(scene->feature_scale, vm ? 1 : scene->grid.levels));
+                        cJSON_CreateDoubleArray(scene->units.feature_scale, vm ? 1 : scene->grid.levels));
   if (!fit) cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
-  cJSON_AddNumberToObject(json, "direction_lsb", scene->dir_scale);
+  cJSON_AddNumberToObject(json, "direction_lsb", scene->units.dir_scale);
   cJSON_AddNumberToObject(json, "calibration_samples", report->samples);
   cJSON_AddNumberToObject(json, "packed_bytes", (double)report->packed_bytes);
   cJSON_AddNumberToObject(json, "weight_bits", report->widths.weight_bits);

@@ -28,7 +28,7 @@ static real_ray clip(const float o[3], const float d[3], double step)
 static void ray(sf_budget_row *row, uint64_t i, bool ideal)
 {
   const int lattice = i % 2 ? 1024 : (int)budget_pick(1, i, 16, 1024);
-  fx_scene scene = {.to_box_scale = 0.5, .to_box_offset = {0.5, 0.5, 0.5}, .dir_scale = 0x1p-10};
+  fx_scene scene = {.units.to_box_scale = 0.5, .units.to_box_offset = {0.5, 0.5, 0.5}, .units.dir_scale = 0x1p-10};
   const double step = sqrt(3.0) / lattice; /* box units */
   scene.step_q24 = (int32_t)nearbyint(ldexp(step, SF_DELTA_FRAC));
   float o[3], d[3];

@@ -22,9 +22,9 @@ static int frac_of(int layer)
 /* Value of one LSB of input i of a layer. */
 static double input_lsb(const fx_scene *scene, int layer, int i)
 {
-  if (layer == FX_D1) return scene->feature_scale[i / FX_GRID_FEATURES];
+  if (layer == FX_D1) return scene->units.feature_scale[i / FX_GRID_FEATURES];
   if (layer != FX_C1) return 1;
-  return i < SF_DIR_FEATURES ? scene->dir_scale : ldexp(scene->current_scale[FX_D2], SF_H_SHIFT);
+  return i < SF_DIR_FEATURES ? scene->units.dir_scale : ldexp(scene->units.current_scale[FX_D2], SF_H_SHIFT);
 }
 
 /* A weight of the model in the units of the scene's. */
@@ -32,7 +32,7 @@ static double real_weight(const fx_scene *scene, const sf_model *model, int l, i
 {
   static const sf_param_id id[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
   const double w = sf_model_param(model, id[l])[o * scene->net.layer[l].n_in + i];
-  return w * input_lsb(scene, l, i) / scene->current_scale[l];
+  return w * input_lsb(scene, l, i) / scene->units.current_scale[l];
 }
 
 static void set_weights(sf_exact *e, int l)
@@ -67,7 +67,7 @@ static void set_scalars(sf_exact *e)
     const bool real = sf_exact_is(e, SF_EXACT_LEAK);
     e->k[l] = real ? ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC) : e->scene->net.layer[l].k;
     e->theta[l] =
-        real ? ldexp(theta[l] / e->scene->current_scale[l], frac_of(l)) : (double)e->scene->net.layer[l].theta;
+        real ? ldexp(theta[l] / e->scene->units.current_scale[l], frac_of(l)) : (double)e->scene->net.layer[l].theta;
   }
   e->step = sf_exact_is(e, SF_EXACT_LATTICE) ? ldexp(sqrt(3.0) / config->lattice, SF_DELTA_FRAC) : e->scene->step_q24;
 }
@@ -106,7 +106,8 @@ static double entry_value(const sf_exact *e, int level, int64_t entry, int which
   const fx_scene *s = e->scene;
   const size_t i = (size_t)entry * FX_GRID_FEATURES + (size_t)which;
   if (!sf_exact_is(e, SF_EXACT_ENTRIES)) return s->grid.table[i];
-  return (double)sf_model_param(e->model, SF_P_GRID)[i] / ldexp(s->feature_scale[level], 16 - s->grid.shift[level]);
+  return (double)sf_model_param(e->model, SF_P_GRID)[i] /
+         ldexp(s->units.feature_scale[level], 16 - s->grid.shift[level]);
 }
 
 void sf_exact_features(const sf_exact *e, const double pos[3], double *f)
@@ -183,14 +184,14 @@ static double density(const sf_exact *e, double current)
 {
   const fx_net *net = &e->scene->net;
   if (!sf_exact_is(e, SF_EXACT_EXP2)) return fx_exp2((int32_t)table_argument(current, &net->exp_in, FX_EXP2_BITS));
-  const double y = current * e->scene->current_scale[FX_D2] / log(2) + ldexp(net->exp_in.bias, -SF_LOG_FRAC);
+  const double y = current * e->scene->units.current_scale[FX_D2] / log(2) + ldexp(net->exp_in.bias, -SF_LOG_FRAC);
   return exp2(fmin(y, 64) + SF_SIGMA_FRAC);
 }
 
 static double colour(const sf_exact *e, double current)
 {
   const fx_net *net = &e->scene->net;
-  if (sf_exact_is(e, SF_EXACT_SIGMOID)) return 65536 / (1 + exp(-current * e->scene->current_scale[FX_C3]));
+  if (sf_exact_is(e, SF_EXACT_SIGMOID)) return 65536 / (1 + exp(-current * e->scene->units.current_scale[FX_C3]));
   return fx_sigmoid((int32_t)table_argument(current, &net->sigmoid_in, FX_SIGMOID_BITS));
 }
 

@@ -64,7 +64,7 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
   sf_scales_round_direction(&job->model->scales, sh); /* as a fine-tuned model sees them */
   for (int a = 0; a < 3; a++) t->unit[a] = direction[a];
   for (int j = 0; j < SF_DIR_FEATURES; j++) {
-    t->dir[j] = sh[j] / job->scene->dir_scale;
+    t->dir[j] = sh[j] / job->scene->units.dir_scale;
     dir[j] = sf_exact_is(t->exact, SF_EXACT_DIRECTION) ? t->dir[j] : t->ray.dir[j];
   }
   sf_exact_direction(t->exact, dir, t->base);
@@ -305,7 +305,7 @@ sf_status sf_picture_budget_check(const sf_picture_job *job)
   if (!same)
     return sf_fail(SF_E_UNSUPPORTED, "%s: its sizes are not those of the model it is compared with", job->name);
   for (int i = 0; i < SF_LAYERS; i++)
-    if (!(job->scene->current_scale[i] > 0))
+    if (!(job->scene->units.current_scale[i] > 0))
       return sf_fail(SF_E_UNSUPPORTED, "%s: the unit of layer %s is not known", job->name, fx_layer_name(i));
   for (int i = 0; i < SF_LAYERS; i++)
     if (!sf_exact_resembles(job->scene, job->model, i))

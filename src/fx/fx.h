@@ -141,9 +141,6 @@ typedef struct fx_tensorf {
   fx_scale phase_in; /* feature sum -> the same as an angle in turns, Q.16, whole turns dropped; bias 0, shift 0..40 */
   int32_t feature_freqs, view_freqs; /* sines and cosines of 1, 2, 4 ... times a value; 0..FX_FREQS_MAX */
   int32_t encoding_frac;             /* LSB of directions, sines and cosines: 2^-encoding_frac, 0..FX_DIR_FRAC_MAX */
-  /* For quant/ only: box = (world * to_box_scale + to_box_offset) * stretch, per axis: where the box has unequal edges,
-   * lengths are in the longest. Rays begin and end at these distances from their origins, model units. */
-  double stretch[3], near, far;
 } fx_tensorf;
 
 typedef enum { FX_INGP, FX_TENSORF } fx_backbone;
@@ -157,6 +154,20 @@ typedef struct fx_steps {
   int32_t delta_q24[FX_STEPS_MAX]; /* length in box edges */
   uint8_t cascade[FX_STEPS_MAX];   /* the finest whose cells are longer than the interval */
 } fx_steps;
+
+/* What the integers of a scene mean in real units: for quant/, which makes them and the rays, and for reports and files
+ * that translate integers back. No arithmetic of the core reads them; in src/fx only real.c does, for the file.
+ *   box = (world * to_box_scale + to_box_offset) * stretch, per axis, world in model units
+ * Of TensoRF alone: stretch (where the box has unequal edges, lengths are in the longest), near and far. */
+typedef struct fx_units {
+  double to_box_scale, to_box_offset[3];
+  double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
+  double stretch[3];
+  double near, far; /* rays begin and end at these distances from their origins, model units */
+  double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
+  double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
+  double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
+} fx_units;
 
 /* Scene box [0,1)^3. Cascade c of its occupancy grids has occ_res^3 cells in the middle 2^(c - log2_bound) of the box:
  * bit ((c*res + z)*res + y)*res + x, LSB first. A sample looks in the finest one that holds it, at least
@@ -179,13 +190,8 @@ typedef struct fx_scene {
   int32_t max_samples;   /* per ray, 1..1024 */
   int32_t trans_stop;    /* stop once transmittance <= this, Q.TRANS_FRAC */
   int32_t background[3]; /* Q0.16, 65536 = 1.0 */
-  /* Model units to box units, for quant/ only: box = world * to_box_scale + to_box_offset. */
-  double to_box_scale, to_box_offset[3];
-  double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
-  double dir_scale;   /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
-  double feature_scale[FX_LEVELS_MAX]; /* value of one LSB of a level's features, for reports */
-  double current_scale[SF_LAYERS];     /* value of one LSB of each layer's current; 0 = unknown */
-  void *owner;                         /* backing storage of w, table, occupancy; fx_scene_free releases it */
+  fx_units units;
+  void *owner; /* backing storage of w, table, occupancy; fx_scene_free releases it */
 } fx_scene;
 
 /* Points of a ray: Q24.40. Its direction: each axis Q1.14. LSB of the direction features: 2^-frac. */

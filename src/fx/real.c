@@ -15,7 +15,8 @@ typedef struct real_field {
 } real_field;
 
 /* clang-format off */
-#define REAL(field, positive) {#field, offsetof(fx_scene, field), positive}
+#define REAL(field, positive) {#field, offsetof(fx_scene, units.field), positive}
+#define TENSORF_REAL(field, positive) {"tensorf." #field, offsetof(fx_scene, units.field), positive}
 /* clang-format on */
 /* The scales of currents and features serve reports only: 0 where unknown. */
 static const real_field reals[REALS] = {
@@ -31,8 +32,8 @@ static const real_field reals[REALS] = {
 };
 
 static const real_field tensorf_reals[TENSORF_REALS] = {
-    REAL(tensorf.stretch[0], true), REAL(tensorf.stretch[1], true), REAL(tensorf.stretch[2], true),
-    REAL(tensorf.near, false),      REAL(tensorf.far, true),
+    TENSORF_REAL(stretch[0], true), TENSORF_REAL(stretch[1], true), TENSORF_REAL(stretch[2], true),
+    TENSORF_REAL(near, false),      TENSORF_REAL(far, true),
 };
 
 /* Not in the file when 0. */
@@ -108,10 +109,10 @@ sf_status fx_reals_check(const fx_scene *scene, const char *path)
 {
   for (int i = 0; i < reals_of(scene); i++) SF_TRY(check_real(scene, real(i), path));
   if (*field_of(scene, &optional) != 0) SF_TRY(check_real(scene, &optional, path));
-  if (!is_direction_lsb(scene->dir_scale))
+  if (!is_direction_lsb(scene->units.dir_scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,
-                   scene->dir_scale, FX_DIR_FRAC_MAX);
-  const double near = scene->tensorf.near, far = scene->tensorf.far;
+                   scene->units.dir_scale, FX_DIR_FRAC_MAX);
+  const double near = scene->units.near, far = scene->units.far;
   if (scene->backbone == FX_TENSORF && !(near >= 0 && near < far))
     return sf_fail(SF_E_RANGE, "%s: metadata 'tensorf.near' is %g and 'tensorf.far' %g, expected 0 <= near < far", path,
                    near, far);

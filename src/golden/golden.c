@@ -48,7 +48,7 @@ void sf_golden_free(sf_golden *golden)
 
 double sf_golden_step_length(const sf_golden_job *job)
 {
-  return job->scene->step_q24 / 16777216.0 / job->scene->to_box_scale / (double)job->data->scale;
+  return job->scene->step_q24 / 16777216.0 / job->scene->units.to_box_scale / (double)job->data->scale;
 }
 
 sf_status sf_golden_stopped(const sf_golden_job *job)

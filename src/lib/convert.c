@@ -103,5 +103,5 @@ double spikefield_pixel_distance(const spikefield_scene *scene, const spikefield
 {
   if (!scene || !pixel || !pixel->weight_sum) return 0;
   const double steps = (double)pixel->depth / (double)pixel->weight_sum / 65536;
-  return steps * scene->fx.step_q24 / (1 << SF_DELTA_FRAC) / scene->fx.to_box_scale;
+  return steps * scene->fx.step_q24 / (1 << SF_DELTA_FRAC) / scene->fx.units.to_box_scale;
 }

@@ -98,10 +98,10 @@ static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *
   info->occupancy_bytes = (int64_t)(fx->log2_bound + 1) * fx->occ_res * fx->occ_res * fx->occ_res / 8;
   info->max_samples = fx->max_samples, info->step_q24 = fx->step_q24;
   memcpy(info->background_q16, fx->background, sizeof info->background_q16);
-  info->to_box_scale = fx->to_box_scale, info->direction_lsb = fx->dir_scale;
-  memcpy(info->to_box_offset, fx->to_box_offset, sizeof info->to_box_offset);
-  for (int a = 0; a < 3; a++) info->stretch[a] = fx->backbone == FX_TENSORF ? fx->tensorf.stretch[a] : 1;
-  info->step = (double)fx->step_q24 / (1 << SF_DELTA_FRAC) / fx->to_box_scale;
+  info->to_box_scale = fx->units.to_box_scale, info->direction_lsb = fx->units.dir_scale;
+  memcpy(info->to_box_offset, fx->units.to_box_offset, sizeof info->to_box_offset);
+  for (int a = 0; a < 3; a++) info->stretch[a] = fx->backbone == FX_TENSORF ? fx->units.stretch[a] : 1;
+  info->step = (double)fx->step_q24 / (1 << SF_DELTA_FRAC) / fx->units.to_box_scale;
   return sf_ok();
 }
 

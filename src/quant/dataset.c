@@ -3,7 +3,7 @@
 sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char *name, const char *dir,
                              const char *split, const sf_dataset_options *options)
 {
-  const float scale = (float)scene->model_scale;
+  const float scale = (float)scene->units.model_scale;
   sf_dataset_options how = *options;
   *data = (sf_dataset){0};
   if (scale > 0 && how.scale != 0 && how.scale != scale)

@@ -55,13 +55,13 @@ bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale);
 sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,
                        sf_quant_layer *result);
 
-/* Grid tables and the LSB of each level's features. Writes scene->grid (allocated) and scene->feature_scale. Here and
- * below report->widths are the widths to keep to. */
+/* Grid tables and the LSB of each level's features. Writes scene->grid (allocated) and scene->units.feature_scale. Here
+ * and below report->widths are the widths to keep to. */
 void sf_quantise_levels(fx_grid *grid, const sf_model *model);
 void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibration *calibration,
                       sf_quant_report *report);
 
-/* Layers in order; scene->feature_scale and the grid are ready. */
+/* Layers in order; scene->units.feature_scale and the grid are ready. */
 sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
                              const sf_calibration *calibration, sf_quant_report *report);
 

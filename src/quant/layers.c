@@ -93,7 +93,7 @@ static sf_status finish_layer(const context *c, int layer, const int16_t *x, con
     SF_TRY(fit_h(c, x, lsb, result));
   else
     SF_TRY(fit(c, layer, x, lsb, smallest_unit(c->model, layer), true, result));
-  c->scene->current_scale[layer] = result->unit;
+  c->scene->units.current_scale[layer] = result->unit;
   return layer == FX_D2 || layer == FX_C3 ? sf_ok() : set_theta(c, layer, result->unit);
 }
 
@@ -145,7 +145,7 @@ static void colour_lsb(double *lsb, double d_lsb, double h_lsb)
  * 3/4 and fill `feature_bits` at 2^-(feature_bits-1). Ends DIR_PATIENCE trials after the best one. */
 static sf_status colour_layer(const context *c, int16_t *x)
 {
-  const double h_lsb = ldexp(c->scene->current_scale[FX_D2], SF_H_SHIFT);
+  const double h_lsb = ldexp(c->scene->units.current_scale[FX_D2], SF_H_SHIFT);
   const int bits = c->report->widths.feature_bits - 1, finest = bits < DIR_FRAC ? bits : DIR_FRAC;
   const sf_scales *settled = sf_settled_scales(c->model, &c->report->widths);
   double lsb[C1_INPUTS], best = settled ? settled->lsb.direction : ldexp(1, -finest), best_error = INFINITY;
@@ -159,7 +159,7 @@ static sf_status colour_layer(const context *c, int16_t *x)
     best = d_lsb, best_error = result.error;
     if (last > frac - DIR_PATIENCE) last = frac - DIR_PATIENCE;
   }
-  c->scene->dir_scale = best;
+  c->scene->units.dir_scale = best;
   colour_lsb(lsb, best, h_lsb);
   colour_inputs(c, best, h_lsb, x);
   return finish_layer(c, FX_C1, x, lsb);
@@ -183,14 +183,14 @@ static sf_status set_scale(const context *c, int layer, double factor, int bias,
   if (sf_quant_scale(factor, 31, bias, scale)) return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
                  c->name, c->model->param[param_of[layer]].name,
-                 c->scene->current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
+                 c->scene->units.current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
 }
 
 static sf_status all_layers(const context *c, int16_t *x)
 {
   const double log2e = 1.4426950408889634, one = 1 << SF_LOG_FRAC;
   double features[SF_FEATURE_MAX], spikes[SF_LANES];
-  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->feature_scale[i / FX_GRID_FEATURES];
+  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->units.feature_scale[i / FX_GRID_FEATURES];
   for (int i = 0; i < SF_LANES; i++) spikes[i] = 1;
   density_inputs(c, x);
   SF_TRY(finish_layer(c, FX_D1, x, features));
@@ -203,8 +203,8 @@ static sf_status all_layers(const context *c, int16_t *x)
   SF_TRY(finish_layer(c, FX_C3, x, spikes));
   /* Density per box edge = 2 bound * density per model unit (the box is 2 bound model units wide): + log2(2 bound). */
   const int32_t bias = (1 + c->scene->log2_bound) << SF_LOG_FRAC;
-  SF_TRY(set_scale(c, FX_D2, c->scene->current_scale[FX_D2] * log2e * one, bias, &c->scene->net.exp_in));
-  return set_scale(c, FX_C3, c->scene->current_scale[FX_C3] * one, 0, &c->scene->net.sigmoid_in);
+  SF_TRY(set_scale(c, FX_D2, c->scene->units.current_scale[FX_D2] * log2e * one, bias, &c->scene->net.exp_in));
+  return set_scale(c, FX_C3, c->scene->units.current_scale[FX_C3] * one, 0, &c->scene->net.sigmoid_in);
 }
 
 sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,

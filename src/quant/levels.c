@@ -86,7 +86,7 @@ static void set_level(fx_scene *scene, int level, double scale, const format *fo
   if (shift < format->shift_min) shift = format->shift_min;
   if (shift > SHIFT_MAX) shift = SHIFT_MAX;
   scene->grid.shift[level] = shift;
-  scene->feature_scale[level] = ldexp(scale, shift - PRODUCT_FRAC);
+  scene->units.feature_scale[level] = ldexp(scale, shift - PRODUCT_FRAC);
 }
 
 static int64_t fill_level(fx_grid *grid, const float *value, int level, double scale, int entry_max)
@@ -118,7 +118,7 @@ static int64_t fill_settled(fx_scene *scene, const float *value, const sf_scales
     const double ratio = (double)settled->lsb.feature[l] / settled->lsb.entry[l];
     const int shift = PRODUCT_FRAC + (int)nearbyint(log2(ratio));
     scene->grid.shift[l] = shift < 0 ? 0 : shift > SHIFT_MAX ? SHIFT_MAX : shift;
-    scene->feature_scale[l] = settled->lsb.feature[l];
+    scene->units.feature_scale[l] = settled->lsb.feature[l];
     clipped += fill_level(&scene->grid, value, l, settled->lsb.entry[l], entry_max);
   }
   return clipped;
@@ -143,7 +143,8 @@ static void level_errors(const fx_scene *scene, const sf_calibration *c, double 
     fx_grid_features(&scene->grid, c->pos + sample * 3, f, NULL);
     for (int i = 0; i < c->features; i++) {
       const int level = i / FX_GRID_FEATURES;
-      const double d = c->f[(size_t)sample * (size_t)c->features + (size_t)i] - f[i] * scene->feature_scale[level];
+      const double d =
+          c->f[(size_t)sample * (size_t)c->features + (size_t)i] - f[i] * scene->units.feature_scale[level];
       error[level] += d * d;
     }
   }
@@ -184,7 +185,7 @@ void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibrati
   const float *value = sf_model_param(model, SF_P_GRID);
   const format format = choose_format(calibration, &report->widths);
   double scale[FX_LEVELS_MAX];
-  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->feature_scale[l] = format.common;
+  for (int l = 0; l < FX_LEVELS_MAX; l++) scene->units.feature_scale[l] = format.common;
   const sf_scales *settled = sf_settled_scales(model, &report->widths);
   if (settled)
     report->grid_clipped = fill_settled(scene, value, settled, format.entry_max);

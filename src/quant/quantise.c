@@ -7,7 +7,7 @@ enum { MAX_SAMPLES = 1024 };
 
 double sf_fx_sigma_value(const fx_scene *scene, uint32_t sigma)
 {
-  return ldexp(sigma, -SF_SIGMA_FRAC) * scene->to_box_scale;
+  return ldexp(sigma, -SF_SIGMA_FRAC) * scene->units.to_box_scale;
 }
 
 double sf_fx_colour_value(uint32_t colour)
@@ -139,22 +139,22 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->trans_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
   for (int o = 0; o < 3; o++) {
     scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
-    scene->to_box_offset[o] = 0.5;
+    scene->units.to_box_offset[o] = 0.5;
   }
-  scene->to_box_scale = 0.5 / model->config.bound;
-  scene->model_scale = (double)model->config.scale;
+  scene->units.to_box_scale = 0.5 / model->config.bound;
+  scene->units.model_scale = (double)model->config.scale;
   if (scene->backbone == FX_TENSORF) sf_tensorf_set_scalars(scene, model);
 }
 
 static sf_scales scales_of(const fx_scene *scene, int weight_bits)
 {
-  sf_scales s = {.weight_bits = weight_bits, .lsb.direction = (float)scene->dir_scale};
+  sf_scales s = {.weight_bits = weight_bits, .lsb.direction = (float)scene->units.dir_scale};
   for (int l = 0; l < FX_LEVELS_MAX; l++) s.lsb.entry[l] = s.lsb.feature[l] = 1;
   for (int l = 0; l < scene->grid.levels; l++) {
-    s.lsb.feature[l] = (float)scene->feature_scale[l];
+    s.lsb.feature[l] = (float)scene->units.feature_scale[l];
     s.lsb.entry[l] = ldexpf(s.lsb.feature[l], 16 - scene->grid.shift[l]);
   }
-  for (int l = 0; l < SF_LAYERS; l++) s.lsb.current[l] = (float)scene->current_scale[l];
+  for (int l = 0; l < SF_LAYERS; l++) s.lsb.current[l] = (float)scene->units.current_scale[l];
   return s;
 }
 

@@ -14,7 +14,7 @@ typedef struct interval {
 static interval clip_to_box(const fx_scene *scene, const double o[3], const double d[3])
 {
   const bool vm = scene->backbone == FX_TENSORF;
-  interval hit = {vm ? scene->tensorf.near : SF_NEAR, vm ? scene->tensorf.far : INFINITY};
+  interval hit = {vm ? scene->units.near : SF_NEAR, vm ? scene->units.far : INFINITY};
   for (int axis = 0; axis < 3; axis++) {
     if (d[axis] == 0) {
       if (o[axis] <= 0 || o[axis] >= 1) return (interval){0, -1};
@@ -30,7 +30,7 @@ static interval clip_to_box(const fx_scene *scene, const double o[3], const doub
 /* Box units of an axis over those of the longest. */
 static double stretch(const fx_scene *scene, int axis)
 {
-  return scene->backbone == FX_TENSORF ? scene->tensorf.stretch[axis] : 1;
+  return scene->backbone == FX_TENSORF ? scene->units.stretch[axis] : 1;
 }
 
 static bool inside(const fx_scene *scene, const fx_ray *ray, int32_t n)
@@ -104,7 +104,7 @@ static sf_status set_lattice(const fx_scene *scene, fx_ray *ray, const double o[
 
 int sf_fx_dir_frac(const fx_scene *scene)
 {
-  return -ilogb(scene->dir_scale);
+  return -ilogb(scene->units.dir_scale);
 }
 
 sf_status sf_fx_direction_make(const fx_scene *scene, const float direction[3], fx_ray *ray, double unit[3])
@@ -128,10 +128,10 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
     if (!isfinite(origin[axis]))
       return sf_fail(SF_E_RANGE, "ray: origin (%g, %g, %g): expected finite numbers", (double)origin[0],
                      (double)origin[1], (double)origin[2]);
-    o[axis] = (origin[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
-    d[axis] = unit[axis] * scene->to_box_scale * stretch(scene, axis);
+    o[axis] = (origin[axis] * scene->units.to_box_scale + scene->units.to_box_offset[axis]) * stretch(scene, axis);
+    d[axis] = unit[axis] * scene->units.to_box_scale * stretch(scene, axis);
   }
-  const double step = ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->to_box_scale;
+  const double step = ldexp(scene->step_q24, -SF_DELTA_FRAC) / scene->units.to_box_scale;
   return set_lattice(scene, ray, o, d, step, clip_to_box(scene, o, d));
 }
 
@@ -139,7 +139,8 @@ sf_status sf_fx_ray_make(const fx_scene *scene, const float origin[3], const flo
 sf_status sf_fx_position_make(const fx_scene *scene, const float position[3], uint32_t box[3])
 {
   for (int axis = 0; axis < 3; axis++) {
-    const double p = (position[axis] * scene->to_box_scale + scene->to_box_offset[axis]) * stretch(scene, axis);
+    const double p =
+        (position[axis] * scene->units.to_box_scale + scene->units.to_box_offset[axis]) * stretch(scene, axis);
     const int64_t fixed = p >= 0 && p < 1 ? llrint(ldexp(p, FX_RAY_FRAC)) : -1;
     if (fixed < 0 || fixed >= (int64_t)1 << FX_RAY_FRAC)
       return sf_fail(SF_E_RANGE, "position (%g, %g, %g): axis %d is at %.9g of the scene box, expected 0 <= x < 1",

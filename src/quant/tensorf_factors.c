@@ -121,7 +121,7 @@ static sf_status set_density_scales(const density *d, double unit)
 {
   const sf_tensorf *from = &d->model->config.tensorf;
   const double one = 1 << SF_LOG_FRAC, bias = nearbyint(from->shift * one);
-  const double density = from->distance_scale / d->scene->to_box_scale; /* per box edge and activation */
+  const double density = from->distance_scale / d->scene->units.to_box_scale; /* per box edge and activation */
   if (sf_quant_scale(ldexp(unit, -PRODUCT_FRAC) * one, SHIFT_MAX, (int)bias, &d->scene->tensorf.density_in) &&
       sf_quant_scale(ldexp(density, SF_SIGMA_FRAC - ACTIVATION_FRAC), SHIFT_MAX, 0, &d->scene->tensorf.sigma_out))
     return sf_ok();
@@ -141,7 +141,7 @@ static double opacity_error(const density *d)
     sf_vm_position(pos, x);
     const double exact = sf_tensorf_sigma(&d->model->config.tensorf, sf_tensorf_density_feature(d->model, x));
     const double fixed =
-        ldexp(fx_tensorf_density(&d->scene->tensorf, pos, NULL), -SF_SIGMA_FRAC) * d->scene->to_box_scale;
+        ldexp(fx_tensorf_density(&d->scene->tensorf, pos, NULL), -SF_SIGMA_FRAC) * d->scene->units.to_box_scale;
     const double difference = exp(-exact * step) - exp(-fixed * step);
     error += difference * difference;
   }
@@ -196,7 +196,7 @@ static sf_status set_feature_scales(fx_scene *scene, const sf_model *model, cons
                                     double feature_lsb)
 {
   fx_tensorf *field = &scene->tensorf;
-  scene->feature_scale[0] = feature_lsb;
+  scene->units.feature_scale[0] = feature_lsb;
   if (sf_quant_scale(unit / feature_lsb, SHIFT_MAX, 0, &field->feature_in) &&
       sf_quant_scale(ldexp(unit / TWO_PI, PHASE_FRAC), SHIFT_MAX, 0, &field->phase_in))
     return sf_ok();
@@ -290,12 +290,12 @@ void sf_tensorf_set_scalars(fx_scene *scene, const sf_model *model)
   const sf_tensorf *from = &model->config.tensorf;
   fx_tensorf *to = &scene->tensorf;
   const double edge = longest_edge(from);
-  scene->to_box_scale = 1 / edge;
+  scene->units.to_box_scale = 1 / edge;
   for (int axis = 0; axis < 3; axis++) {
-    scene->to_box_offset[axis] = -from->box[0][axis] / edge;
-    to->stretch[axis] = edge / ((double)from->box[1][axis] - from->box[0][axis]);
+    scene->units.to_box_offset[axis] = -from->box[0][axis] / edge;
+    scene->units.stretch[axis] = edge / ((double)from->box[1][axis] - from->box[0][axis]);
   }
-  to->near = from->near, to->far = from->far;
+  scene->units.near = from->near, scene->units.far = from->far;
   scene->step_q24 = (int32_t)nearbyint(ldexp(sf_tensorf_step(from) / edge, SF_DELTA_FRAC));
   to->activation = from->activation == SF_RELU ? FX_RELU : FX_SOFTPLUS;
   to->weight_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));

@@ -69,7 +69,7 @@ static sf_status finish_layer(const context *c, int layer, const int16_t *x, con
   fx_layer *to = &c->scene->net.layer[FX_C1 + layer];
   sf_quant_layer *result = &c->report->layer[FX_C1 + layer];
   SF_TRY(fit(c, layer, x, lsb, true, result));
-  c->scene->current_scale[FX_C1 + layer] = result->unit;
+  c->scene->units.current_scale[FX_C1 + layer] = result->unit;
   if (layer == 2) return sf_ok();
   const double exact = theta_of(c, layer) / result->unit, rounded = nearbyint(exact);
   if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
@@ -144,7 +144,7 @@ static sf_status try_format(const context *c, const input_format *f, int16_t *x,
 static sf_status choose_format(const context *c, int16_t *x, input_format *best)
 {
   double error, best_error;
-  input_format f = {c->scene->feature_scale[0], FRAC_MAX};
+  input_format f = {c->scene->units.feature_scale[0], FRAC_MAX};
   *best = f;
   SF_TRY(try_format(c, &f, x, &best_error));
   for (int tries = 0; f.frac > FRAC_MIN && tries < PATIENCE; tries++) {
@@ -167,11 +167,11 @@ static sf_status first_layer(const context *c, int16_t *x)
   double lsb[INPUTS_MAX];
   input_format format;
   SF_TRY(choose_format(c, x, &format));
-  const double coarser = format.feature_lsb / scene->feature_scale[0]; /* a power of two */
+  const double coarser = format.feature_lsb / scene->units.feature_scale[0]; /* a power of two */
   scene->tensorf.feature_in.shift += ilogb(coarser);
-  scene->feature_scale[0] = format.feature_lsb;
+  scene->units.feature_scale[0] = format.feature_lsb;
   scene->tensorf.encoding_frac = format.frac;
-  scene->dir_scale = ldexp(1, -format.frac);
+  scene->units.dir_scale = ldexp(1, -format.frac);
   scene->net.layer[FX_C1].bias = c1_inputs(c, &format, x, lsb);
   return finish_layer(c, 0, x, lsb);
 }
@@ -197,7 +197,7 @@ static sf_status all_layers(const context *c, int16_t *x)
   SF_TRY(first_layer(c, x));
   SF_TRY(spike_layer(c, 1, x));
   SF_TRY(spike_layer(c, 2, x));
-  if (sf_quant_scale(c->scene->current_scale[FX_C3] * (1 << SF_LOG_FRAC), 31, 0, &c->scene->net.sigmoid_in))
+  if (sf_quant_scale(c->scene->units.current_scale[FX_C3] * (1 << SF_LOG_FRAC), 31, 0, &c->scene->net.sigmoid_in))
     return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights are too large for the output function", c->name,
                  c->model->param[SF_P_C3].name);

@@ -209,7 +209,7 @@ static void set_sizes(const fx_scene *scene, const sf_trim *trim, fx_scene *resu
     to->log2_size[at] = size < 0 ? from->log2_size[l] : size;
     to->offset[at] = to->entries;
     to->entries += size < 0 ? sf_grid_level_entries(from, l) : (int64_t)1 << size;
-    result->feature_scale[at] = scene->feature_scale[l];
+    result->units.feature_scale[at] = scene->units.feature_scale[l];
   }
   for (int l = 0; l < SF_LAYERS; l++) {
     bool row[SF_LANES];
