@@ -57,7 +57,7 @@ static void arrange(fx_words *words, const fx_net *net, int bytes)
   const fx_layer *layer = net->layer;
   const int n_constant = fx_net_constants(net);
   pair_rows(words->d1, 0, layer[FX_D1].w, layer[FX_D1].n_in);
-  if (fx_net_decodes(net)) pair_rows(words->c1_constant, 0, layer[FX_C1].w, n_constant);
+  if (fx_net_constants_per_sample(net)) pair_rows(words->c1_constant, 0, layer[FX_C1].w, n_constant);
   pair_rows(words->c1_h, 1, layer[FX_C1].w + (size_t)n_constant * SF_LANES, fx_net_h(net));
   arrange_tiles(words, net);
   arrange_biases(words, net, bytes);

@@ -36,13 +36,12 @@ static uint64_t h_macs(const fx_net *net)
 
 uint64_t fx_macs_of_ray(const fx_net *net)
 {
-  return fx_net_decodes(net) ? 0 : direction_macs(net);
+  return fx_net_constants_per_sample(net) ? 0 : direction_macs(net);
 }
 
 uint64_t fx_macs_of_sample(const fx_net *net)
 {
-  if (fx_net_decodes(net)) return direction_macs(net);
-  return feature_macs(net) + (uint64_t)net->steps * h_macs(net);
+  return feature_macs(net) + (uint64_t)net->steps * h_macs(net) + direction_macs(net) - fx_macs_of_ray(net);
 }
 
 static void count_constants(fx_counts *counts, const fx_net *net, uint64_t times)
@@ -54,7 +53,7 @@ static void count_constants(fx_counts *counts, const fx_net *net, uint64_t times
 void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays)
 {
   counts->rays += rays;
-  if (!fx_net_decodes(net)) count_constants(counts, net, rays);
+  if (!fx_net_constants_per_sample(net)) count_constants(counts, net, rays);
 }
 
 static void count_products(fx_layer_counts *c, int t, uint64_t macs)
@@ -85,7 +84,7 @@ void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firi
   fx_layer_counts *c = counts->layer;
   counts->samples += n;
   count_products(&c[FX_D1], 0, n * feature_macs(net));
-  if (fx_net_decodes(net)) count_constants(counts, net, n);
+  if (fx_net_constants_per_sample(net)) count_constants(counts, net, n);
   c[FX_C3].weight[0] += n * bias_bytes(&layer[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
     c[FX_D1].spikes[t] += firing->spikes[D1][t];

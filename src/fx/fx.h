@@ -98,7 +98,7 @@ static inline int fx_net_harmonics(const fx_net *net)
 /* What every sample brings: features, or the inputs of a decoder. At most SF_DIR_MAX. */
 static inline int fx_net_inputs(const fx_net *net)
 {
-  return fx_net_decodes(net) ? net->layer[FX_C1].n_in : net->layer[FX_D1].n_in;
+  return net->layer[fx_net_first_layer(net)].n_in;
 }
 
 /* Multiresolution hash grid (Mueller et al. 2022), 2 features per entry.

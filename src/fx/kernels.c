@@ -11,7 +11,7 @@ extern const fx_kernels fx_kernels_avx2, fx_kernels_avx512vnni, fx_kernels_amx;
 
 static void nets(const fx_core *core, fx_block *b, fx_scratch *scratch)
 {
-  const bool decodes = fx_net_decodes(&core->scene->net);
+  const bool decodes = fx_net_constants_per_sample(&core->scene->net);
   (void)scratch;
   for (int i = 0; i < b->n; i++) {
     fx_events events;

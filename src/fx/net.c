@@ -104,7 +104,7 @@ void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_c
   memset(base, 0, SF_LANES * sizeof *base);
   fx_current_mac(base, c1->w, dir, fx_net_constants(net), strips(c1->n_out));
   if (c1->bias) fx_current_mac(base, bias_row(c1), (const int16_t[]){(int16_t)c1->bias}, 1, strips(c1->n_out));
-  if (counts && !fx_net_decodes(net)) fx_count_rays(counts, net, 1);
+  if (counts && !fx_net_constants_per_sample(net)) fx_count_rays(counts, net, 1);
 }
 
 void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_out *out, fx_events *events,
@@ -163,7 +163,7 @@ void fx_net_sample(const fx_net *net, const int16_t *f, const int32_t *base, fx_
 void fx_net_next(const fx_net *net, const int16_t *dir, bool first, const int16_t *f, int32_t *base, fx_out *out,
                  fx_trace *trace, fx_counts *counts)
 {
-  const bool decodes = fx_net_decodes(net);
-  if (first || decodes) fx_net_direction(net, decodes ? f : dir, base, counts);
+  const bool anew = fx_net_constants_per_sample(net);
+  if (first || anew) fx_net_direction(net, anew ? f : dir, base, counts);
   fx_net_sample(net, f, base, out, trace, counts);
 }

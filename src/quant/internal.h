@@ -3,17 +3,48 @@
 #define SF_QUANT_INTERNAL_H
 #include "quant/quant.h"
 
-/* Calibration samples: positions in occupied cells with random directions, and what the float nets do there.
- * Rows of a layer's data are samples x steps (D1: samples alone, its current is constant). */
+/* Calibration samples: positions with random directions, and what the float field and nets do there. A row of a layer's
+ * data is one step of one sample; where C1 has no input that changes with the step, its row is the sample. */
 typedef struct sf_calibration {
-  int samples, steps, hidden, features;
+  int samples, steps;
+  int features, constants; /* of the field; inputs of C1 that come with the sample: harmonics, or all of a decoder's */
+  int per_sample[SF_LAYERS];  /* rows of a sample; 0: the net has no such layer */
   uint32_t *pos;              /* [samples][3] Q0.24 */
-  float *f, *direction;       /* [samples][features], [samples][SF_DIR_FEATURES] */
+  float *f, *constant;        /* [samples][features], [samples][constants] */
   float *target[SF_LAYERS];   /* [rows][n_out] currents of the float nets */
-  uint8_t *spikes[SF_LAYERS]; /* [rows][hidden] of D1, C1, C2 */
+  uint8_t *spikes[SF_LAYERS]; /* [rows][n_out] of D1, C1, C2 */
 } sf_calibration;
 sf_status sf_calibrate(sf_calibration *calibration, const sf_model *model, int steps, uint64_t seed);
 void sf_calibration_free(sf_calibration *calibration);
+
+/* What is particular to a field; the rest of the quantiser is one for all. report->widths are the widths to keep to. */
+typedef struct sf_field_quantiser {
+  uint64_t direction_stream; /* of sf_random */
+  int tried, coarsest; /* LSBs 2^n of directions and encodings: finer ones than `tried` all compete, coarser ones up to
+                          `coarsest` while they help */
+  int (*features)(const sf_model *model); /* that a position has */
+  sf_status (*check)(const sf_model *model, const char *name);
+  /* Sizes of the field in the scene, before it is allocated; then the place of the box and the steps in it. */
+  sf_status (*set_sizes)(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_widths *widths);
+  void (*set_scalars)(fx_scene *scene, const sf_model *model);
+  /* Positions of all samples; then one sample through field and nets: f, constant, trace. */
+  sf_status (*draw)(sf_calibration *calibration, const sf_model *model, uint64_t seed);
+  void (*sample)(const sf_model *model, const float x[3], const float direction[3], int steps, float *f,
+                 float *constant, sf_net_trace *trace);
+  /* The field's numbers, and units.feature_scale. */
+  sf_status (*quantise)(fx_scene *scene, const sf_model *model, const char *name, const sf_calibration *calibration,
+                        sf_quant_report *report);
+  /* The LSBs that C1's inputs got, of features and of encodings; NULL: no C1 input is the field's own. */
+  void (*set_inputs)(fx_scene *scene, double feature, double encoding);
+  /* Scales for fine-tuning; NULL: it cannot be. */
+  void (*describe)(const fx_scene *scene, const sf_model *model, sf_quant_report *report);
+} sf_field_quantiser;
+extern const sf_field_quantiser sf_grid_quantiser, sf_tensorf_quantiser;
+
+static inline const sf_field_quantiser *sf_field_quantiser_of(const sf_model *model)
+{
+  return sf_model_decodes(model) ? &sf_tensorf_quantiser : &sf_grid_quantiser;
+}
 
 /* Integer inputs of a layer against the currents they should cause. */
 typedef struct sf_fit_data {
@@ -55,15 +86,25 @@ bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale);
 sf_status sf_fit_layer(const sf_fit_data *data, const sf_fit_weights *weights, bool refine, int8_t *q,
                        sf_quant_layer *result);
 
-/* Grid tables and the LSB of each level's features. Writes scene->grid (allocated) and scene->units.feature_scale. Here
- * and below report->widths are the widths to keep to. */
+/* The hash grid's geometry alone: what fx_scene_allocate needs; then its tables and the LSB of each level's features.
+ */
 void sf_quantise_levels(fx_grid *grid, const sf_model *model);
-void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibration *calibration,
-                      sf_quant_report *report);
+sf_status sf_quantise_grid(fx_scene *scene, const sf_model *model, const char *name, const sf_calibration *calibration,
+                           sf_quant_report *report);
 
-/* Layers in order; scene->units.feature_scale and the grid are ready. */
+/* Planes, lines, and the scales from their products to density and features. */
+sf_status sf_quantise_factors(fx_scene *scene, const sf_model *model, const char *name,
+                              const sf_calibration *calibration, sf_quant_report *report);
+
+/* Layers in order; the field is ready. */
 sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
                              const sf_calibration *calibration, sf_quant_report *report);
+
+/* A sample's position as the float field takes it. */
+static inline void sf_calibration_position(const uint32_t pos[3], float x[3])
+{
+  for (int axis = 0; axis < 3; axis++) x[axis] = (float)pos[axis] * 0x1p-24f;
+}
 
 /* Entries that a position in [low, high] reads of a level: corners base[0..2] to last[0..2], inclusive. The same cell
  * rule as src/fx/grid.c. */

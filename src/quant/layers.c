@@ -1,21 +1,28 @@
-/* The five layers in the order of the data flow: each unit follows from the one before. */
+/* The layers of the net in the order of the data flow: each unit follows from the one before. A bias is the weight of
+ * one more input, which is always active. */
 #include "src/quant/internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1 };
-enum { DIR_FRAC = 10, DIR_TRIALS = 7, DIR_PATIENCE = 2, C1_INPUTS = SF_DIR_FEATURES + SF_GEO_FEATURES };
+enum { MEMBRANE_LIMIT = (1 << (SF_MEMBRANE_BITS - 1)) - 1, DIR_FRAC = 10, PATIENCE = 2 };
+enum { INPUTS_MAX = (SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES) + 1 }; /* with the bias */
 
 typedef struct context {
   fx_scene *scene;
   const sf_model *model;
   const char *name;
+  const sf_field_quantiser *field;
   const sf_calibration *calibration;
   sf_quant_report *report;
+  const sf_scales *settled; /* NULL: to be found */
+  int input_limit;          /* of features, harmonics and h */
 } context;
 
-static const sf_param_id param_of[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
+/* The LSBs of C1's inputs: of the field's own features, of what else comes with the sample, and of h. */
+typedef struct input_format {
+  double feature, constant, h;
+} input_format;
 
 static int frac_of(int layer)
 {
@@ -24,10 +31,9 @@ static int frac_of(int layer)
 
 static double theta_of(const sf_model *model, int layer)
 {
-  return layer == FX_D1   ? model->config.theta[0]
-         : layer == FX_C1 ? model->config.theta[1]
-         : layer == FX_C2 ? model->config.theta[2]
-                          : 0;
+  for (int s = 0; s < FX_SPIKING; s++)
+    if (fx_spiking_layers[s] == layer) return (double)model->config.theta[s];
+  return 0;
 }
 
 /* With a smaller unit theta would not fit the membrane. Integrating layers have no threshold; their unit only has to
@@ -38,28 +44,48 @@ static double smallest_unit(const sf_model *model, int layer)
   return theta > 0 ? ldexp(theta, frac_of(layer)) / MEMBRANE_LIMIT : 1e-12;
 }
 
-static int rows_of(const sf_calibration *c)
+static int rows_of(const sf_calibration *c, int layer)
 {
-  return c->samples * c->steps;
+  return c->samples * c->per_sample[layer];
 }
 
+static const char *tensor_of(const context *c, int layer)
+{
+  return c->model->param[sf_layer_weights[layer]].name;
+}
+
+/* Weights and bias of the float layer side by side: [n_out][fx_layer_rows]. */
+static float *join_weights(const context *c, int layer)
+{
+  const fx_layer *to = &c->scene->net.layer[layer];
+  const size_t n_in = (size_t)to->n_in, rows = (size_t)fx_layer_rows(to), n_out = (size_t)to->n_out;
+  const float *w = sf_model_param(c->model, sf_layer_weights[layer]);
+  float *joined = malloc(n_out * rows * sizeof *joined);
+  for (size_t o = 0; joined && o < n_out; o++) {
+    memcpy(joined + o * rows, w + o * n_in, n_in * sizeof *w);
+    if (to->bias) joined[o * rows + n_in] = sf_model_param(c->model, sf_layer_bias[layer])[o];
+  }
+  return joined;
+}
+
+/* x[rows][fx_layer_rows], lsb[fx_layer_rows]. */
 static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, double unit_min, bool refine,
                      sf_quant_layer *result)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
-  const sf_scales *settled = sf_settled_scales(c->model, &c->report->widths);
-  const sf_fit_data data = {.rows = rows_of(c->calibration),
-                            .n_in = to->n_in,
-                            .n_out = to->n_out,
-                            .x = x,
-                            .target = c->calibration->target[layer]};
-  const sf_fit_weights weights = {.w = sf_model_param(c->model, param_of[layer]),
-                                  .stride = to->n_in,
+  const int inputs = fx_layer_rows(to);
+  float *w = join_weights(c, layer);
+  if (!w) return sf_fail(SF_E_MEMORY, "%s: no memory for the weights of a layer", c->name);
+  const sf_fit_data data = {rows_of(c->calibration, layer), inputs, to->n_out, x, c->calibration->target[layer]};
+  const sf_fit_weights weights = {.w = w,
+                                  .stride = inputs,
                                   .lsb = lsb,
                                   .unit_min = unit_min,
-                                  .unit = settled ? settled->lsb.current[layer] : 0,
+                                  .unit = c->settled ? c->settled->lsb.current[layer] : 0,
                                   .weight_max = sf_symmetric_max(c->report->widths.weight_bits)};
-  return sf_fit_layer(&data, &weights, refine, to->w, result);
+  const sf_status status = sf_fit_layer(&data, &weights, refine, to->w, result);
+  free(w);
+  return status;
 }
 
 static sf_status set_theta(const context *c, int layer, double unit)
@@ -67,7 +93,7 @@ static sf_status set_theta(const context *c, int layer, double unit)
   const double exact = ldexp(theta_of(c->model, layer) / unit, frac_of(layer)), rounded = nearbyint(exact);
   if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d",
-                   c->name, c->model->param[param_of[layer]].name, theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
+                   c->name, tensor_of(c, layer), theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
   c->scene->net.layer[layer].theta = (int32_t)rounded;
   return sf_ok();
 }
@@ -75,13 +101,12 @@ static sf_status set_theta(const context *c, int layer, double unit)
 /* A unit so coarse that h fits C1's inputs. At the widths of the core the first one is. */
 static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf_quant_layer *result)
 {
-  const int limit = sf_symmetric_max(c->report->widths.feature_bits);
   double unit_min = smallest_unit(c->model, FX_D2);
   for (;;) {
     SF_TRY(fit(c, FX_D2, x, lsb, unit_min, true, result));
     const int largest = fx_largest_h(&c->scene->net.layer[FX_D2]);
-    if (largest <= limit || sf_settled_scales(c->model, &c->report->widths)) return sf_ok();
-    unit_min = result->unit * fmax(1.01, (double)largest / limit);
+    if (largest <= c->input_limit || c->settled) return sf_ok();
+    unit_min = result->unit * fmax(1.01, (double)largest / c->input_limit);
   }
 }
 
@@ -94,26 +119,32 @@ static sf_status finish_layer(const context *c, int layer, const int16_t *x, con
   else
     SF_TRY(fit(c, layer, x, lsb, smallest_unit(c->model, layer), true, result));
   c->scene->units.current_scale[layer] = result->unit;
-  return layer == FX_D2 || layer == FX_C3 ? sf_ok() : set_theta(c, layer, result->unit);
+  return theta_of(c->model, layer) > 0 ? set_theta(c, layer, result->unit) : sf_ok();
 }
 
+/* ---- D1 ---- */
+
 /* The same features at every step: the fit counts each sample once per step, which changes nothing. */
-static void density_inputs(const context *c, int16_t *x)
+static sf_status density_layer(const context *c, int16_t *x)
 {
   const sf_calibration *cal = c->calibration;
-  const size_t n = (size_t)cal->features;
+  const size_t n = (size_t)cal->features, steps = (size_t)cal->per_sample[FX_D1];
+  double lsb[SF_FEATURE_MAX];
+  for (int i = 0; i < SF_FEATURE_MAX; i++) lsb[i] = c->scene->units.feature_scale[i / FX_GRID_FEATURES];
   for (int sample = 0; sample < cal->samples; sample++) {
     int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
     fx_grid_features(&c->scene->grid, cal->pos + sample * 3, f, NULL);
-    for (int t = 0; t < cal->steps; t++)
-      memcpy(x + ((size_t)sample * (size_t)cal->steps + (size_t)t) * n, f, n * sizeof *x);
+    for (size_t t = 0; t < steps; t++) memcpy(x + ((size_t)sample * steps + t) * n, f, n * sizeof *x);
   }
+  return finish_layer(c, FX_D1, x, lsb);
 }
 
-static void spike_inputs(const sf_calibration *cal, int from, int16_t *x)
+/* ---- C1 ---- */
+
+static double lsb_of(const context *c, const input_format *f, int input)
 {
-  const size_t n = (size_t)rows_of(cal) * (size_t)cal->hidden;
-  for (size_t i = 0; i < n; i++) x[i] = cal->spikes[from][i];
+  const int own = c->field->set_inputs ? c->calibration->features : 0; /* of the field, among C1's */
+  return input < own ? f->feature : input < c->calibration->constants ? f->constant : f->h;
 }
 
 static int16_t to_input(double value, int limit)
@@ -121,98 +152,142 @@ static int16_t to_input(double value, int limit)
   return (int16_t)(value > limit ? limit : value < -limit ? -limit : value);
 }
 
-/* d rounded to its LSB, h rounded down to its own as the accelerator does. */
-static void colour_inputs(const context *c, double d_lsb, double h_lsb, int16_t *x)
+/* The largest value of the bias' input with which no weight of a bias decides the layer's unit. */
+static int bias_input(const context *c, const double *lsb)
+{
+  const sf_param *p = &c->model->param[SF_P_C1];
+  const float *w = sf_model_param(c->model, SF_P_C1), *bias = sf_model_param(c->model, SF_P_C1_BIAS);
+  double largest = 0, bias_max = 0;
+  for (int64_t o = 0; o < p->shape[0]; o++) {
+    for (int64_t i = 0; i < p->shape[1]; i++) largest = fmax(largest, fabs(w[o * p->shape[1] + i]) * lsb[i]);
+    bias_max = fmax(bias_max, fabs((double)bias[o]));
+  }
+  const double value = largest > 0 ? ceil(bias_max / largest) : 1;
+  return value < 1 ? 1 : value > c->input_limit ? c->input_limit : (int)value;
+}
+
+/* Constant inputs rounded to their LSB, h rounded down to its own as the accelerator does. Sets the bias' input. */
+static void colour_inputs(const context *c, const input_format *f, int16_t *x, double *lsb)
 {
   const sf_calibration *cal = c->calibration;
-  const int limit = sf_symmetric_max(c->report->widths.feature_bits), one = 1 << SF_H_SHIFT;
-  for (int row = 0; row < rows_of(cal); row++) {
-    const float *d = cal->direction + (size_t)(row / cal->steps) * SF_DIR_FEATURES;
-    const float *current = cal->target[FX_D2] + (size_t)row * SF_DENSITY_OUT;
-    int16_t *to = x + (size_t)row * C1_INPUTS;
-    for (int i = 0; i < SF_DIR_FEATURES; i++) to[i] = to_input(nearbyint(d[i] / d_lsb), limit);
-    for (int j = 0; j < SF_GEO_FEATURES; j++)
-      to[SF_DIR_FEATURES + j] = to_input(floor(nearbyint(one * current[1 + j] / h_lsb) / one), limit);
+  fx_layer *to = &c->scene->net.layer[FX_C1];
+  const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, per_sample = cal->per_sample[FX_C1];
+  for (int i = 0; i < to->n_in; i++) lsb[i] = lsb_of(c, f, i);
+  if (to->bias) to->bias = bias_input(c, lsb), lsb[to->n_in] = 1.0 / to->bias;
+  for (int row = 0; row < rows_of(cal, FX_C1); row++) {
+    const float *constant = cal->constant + (size_t)(row / per_sample) * (size_t)n;
+    const float *current = h ? cal->target[FX_D2] + (size_t)row * (size_t)(h + 1) : NULL;
+    int16_t *in = x + (size_t)row * (size_t)fx_layer_rows(to);
+    for (int i = 0; i < n; i++) in[i] = to_input(nearbyint(constant[i] / lsb[i]), c->input_limit);
+    for (int j = 0; j < h; j++)
+      in[n + j] = to_input(floor(nearbyint(one * current[1 + j] / f->h) / one), c->input_limit);
+    if (to->bias) in[to->n_in] = (int16_t)to->bias;
   }
 }
 
-static void colour_lsb(double *lsb, double d_lsb, double h_lsb)
+static sf_status try_format(const context *c, const input_format *f, int16_t *x, double *error)
 {
-  for (int i = 0; i < C1_INPUTS; i++) lsb[i] = i < SF_DIR_FEATURES ? d_lsb : h_lsb;
+  double lsb[INPUTS_MAX];
+  sf_quant_layer result;
+  colour_inputs(c, f, x, lsb);
+  SF_TRY(fit(c, FX_C1, x, lsb, smallest_unit(c->model, FX_C1), false, &result));
+  *error = result.error;
+  return sf_ok();
 }
 
-/* C1 has one unit for rows of d and of h, whose LSBs differ: a coarser d makes its weights finer. Harmonics are below
- * 3/4 and fill `feature_bits` at 2^-(feature_bits-1). Ends DIR_PATIENCE trials after the best one. */
+/* C1 has one unit for inputs whose LSBs differ: a coarser LSB of some makes their weights finer. First that of
+ * harmonics or encodings (below 1: they fill `bits` at 2^-bits), then that of the field's own features, each from its
+ * finest on. Either search ends PATIENCE trials after its best one. */
+static sf_status choose_format(const context *c, int16_t *x, input_format *best)
+{
+  const int bits = c->report->widths.feature_bits - 1, finest = -(bits < DIR_FRAC ? bits : DIR_FRAC);
+  double error, best_error = INFINITY;
+  input_format f = *best;
+  for (int n = finest, last = c->field->tried; n <= last && n <= c->field->coarsest; n++) {
+    f.constant = ldexp(1, n);
+    SF_TRY(try_format(c, &f, x, &error));
+    if (error >= best_error) continue;
+    *best = f, best_error = error;
+    if (last < n + PATIENCE) last = n + PATIENCE;
+  }
+  f = *best;
+  for (int tries = 0; c->field->set_inputs && tries < PATIENCE; tries++) {
+    f.feature *= 2;
+    SF_TRY(try_format(c, &f, x, &error));
+    if (error < best_error) *best = f, best_error = error, tries = -1;
+  }
+  return sf_ok();
+}
+
 static sf_status colour_layer(const context *c, int16_t *x)
 {
-  const double h_lsb = ldexp(c->scene->units.current_scale[FX_D2], SF_H_SHIFT);
-  const int bits = c->report->widths.feature_bits - 1, finest = bits < DIR_FRAC ? bits : DIR_FRAC;
-  const sf_scales *settled = sf_settled_scales(c->model, &c->report->widths);
-  double lsb[C1_INPUTS], best = settled ? settled->lsb.direction : ldexp(1, -finest), best_error = INFINITY;
-  for (int frac = settled ? 0 : finest, last = DIR_FRAC - DIR_TRIALS + 1; frac >= last && frac > 0; frac--) {
-    const double d_lsb = ldexp(1, -frac);
-    sf_quant_layer result;
-    colour_lsb(lsb, d_lsb, h_lsb);
-    colour_inputs(c, d_lsb, h_lsb, x);
-    SF_TRY(fit(c, FX_C1, x, lsb, smallest_unit(c->model, FX_C1), false, &result));
-    if (result.error >= best_error) continue;
-    best = d_lsb, best_error = result.error;
-    if (last > frac - DIR_PATIENCE) last = frac - DIR_PATIENCE;
-  }
-  c->scene->units.dir_scale = best;
-  colour_lsb(lsb, best, h_lsb);
-  colour_inputs(c, best, h_lsb, x);
+  double lsb[INPUTS_MAX];
+  input_format best = {.feature = c->scene->units.feature_scale[0],
+                       .constant = c->settled ? c->settled->lsb.direction : 0,
+                       .h = ldexp(c->scene->units.current_scale[FX_D2], SF_H_SHIFT)};
+  if (!c->settled) SF_TRY(choose_format(c, x, &best));
+  if (c->field->set_inputs) c->field->set_inputs(c->scene, best.feature, best.constant);
+  c->scene->units.dir_scale = best.constant;
+  colour_inputs(c, &best, x, lsb);
   return finish_layer(c, FX_C1, x, lsb);
 }
 
-bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale)
+/* ---- D2, C2, C3 ---- */
+
+static sf_status spike_layer(const context *c, int layer, int from, int16_t *x)
 {
-  int exponent;
-  frexp(factor, &exponent);
-  int shift = 16 - exponent;
-  if (shift > shift_max) shift = shift_max;
-  double mul = nearbyint(ldexp(factor, shift));
-  if (mul > 65535) mul = nearbyint(ldexp(factor, --shift));
-  if (shift < 0) return false;
-  *scale = (fx_scale){.mul = (int32_t)mul, .shift = shift, .bias = bias};
-  return true;
+  const fx_layer *to = &c->scene->net.layer[layer];
+  const size_t n_in = (size_t)to->n_in, inputs = (size_t)fx_layer_rows(to);
+  double lsb[SF_LANES + 1];
+  for (size_t i = 0; i < inputs; i++) lsb[i] = 1;
+  for (size_t row = 0; row < (size_t)rows_of(c->calibration, layer); row++) {
+    for (size_t i = 0; i < n_in; i++) x[row * inputs + i] = c->calibration->spikes[from][row * n_in + i];
+    if (to->bias) x[row * inputs + n_in] = 1;
+  }
+  return finish_layer(c, layer, x, lsb);
 }
 
 static sf_status set_scale(const context *c, int layer, double factor, int bias, fx_scale *scale)
 {
   if (sf_quant_scale(factor, 31, bias, scale)) return sf_ok();
   return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': weights of up to %g are too large for the output function",
-                 c->name, c->model->param[param_of[layer]].name,
+                 c->name, tensor_of(c, layer),
                  c->scene->units.current_scale[layer] * sf_symmetric_max(c->report->widths.weight_bits));
+}
+
+static sf_status density_net(const context *c, int16_t *x)
+{
+  const double log2e = 1.4426950408889634, one = 1 << SF_LOG_FRAC;
+  SF_TRY(density_layer(c, x));
+  SF_TRY(spike_layer(c, FX_D2, FX_D1, x));
+  /* Density per box edge = 2 bound * density per model unit (the box is 2 bound model units wide): + log2(2 bound). */
+  const int32_t bias = (1 + c->scene->log2_bound) << SF_LOG_FRAC;
+  return set_scale(c, FX_D2, c->scene->units.current_scale[FX_D2] * log2e * one, bias, &c->scene->net.exp_in);
 }
 
 static sf_status all_layers(const context *c, int16_t *x)
 {
-  const double log2e = 1.4426950408889634, one = 1 << SF_LOG_FRAC;
-  double features[SF_FEATURE_MAX], spikes[SF_LANES];
-  for (int i = 0; i < SF_FEATURE_MAX; i++) features[i] = c->scene->units.feature_scale[i / FX_GRID_FEATURES];
-  for (int i = 0; i < SF_LANES; i++) spikes[i] = 1;
-  density_inputs(c, x);
-  SF_TRY(finish_layer(c, FX_D1, x, features));
-  spike_inputs(c->calibration, FX_D1, x);
-  SF_TRY(finish_layer(c, FX_D2, x, spikes));
+  if (!sf_model_decodes(c->model)) SF_TRY(density_net(c, x));
   SF_TRY(colour_layer(c, x));
-  spike_inputs(c->calibration, FX_C1, x);
-  SF_TRY(finish_layer(c, FX_C2, x, spikes));
-  spike_inputs(c->calibration, FX_C2, x);
-  SF_TRY(finish_layer(c, FX_C3, x, spikes));
-  /* Density per box edge = 2 bound * density per model unit (the box is 2 bound model units wide): + log2(2 bound). */
-  const int32_t bias = (1 + c->scene->log2_bound) << SF_LOG_FRAC;
-  SF_TRY(set_scale(c, FX_D2, c->scene->units.current_scale[FX_D2] * log2e * one, bias, &c->scene->net.exp_in));
-  return set_scale(c, FX_C3, c->scene->units.current_scale[FX_C3] * one, 0, &c->scene->net.sigmoid_in);
+  SF_TRY(spike_layer(c, FX_C2, FX_C1, x));
+  SF_TRY(spike_layer(c, FX_C3, FX_C2, x));
+  return set_scale(c, FX_C3, c->scene->units.current_scale[FX_C3] * (1 << SF_LOG_FRAC), 0, &c->scene->net.sigmoid_in);
 }
 
 sf_status sf_quantise_layers(fx_scene *scene, const sf_model *model, const char *name,
                              const sf_calibration *calibration, sf_quant_report *report)
 {
-  const context c = {scene, model, name, calibration, report};
-  int16_t *x = malloc((size_t)rows_of(calibration) * SF_LANES * sizeof *x);
-  if (!x) return sf_fail(SF_E_MEMORY, "%s: no memory for %d calibration rows", name, rows_of(calibration));
+  const context c = {.scene = scene,
+                     .model = model,
+                     .name = name,
+                     .field = sf_field_quantiser_of(model),
+                     .calibration = calibration,
+                     .report = report,
+                     .settled = sf_settled_scales(model, &report->widths),
+                     .input_limit = sf_symmetric_max(report->widths.feature_bits)};
+  const size_t rows = (size_t)calibration->samples * (size_t)calibration->steps;
+  int16_t *x = malloc(rows * INPUTS_MAX * sizeof *x);
+  if (!x) return sf_fail(SF_E_MEMORY, "%s: no memory for %zu calibration rows", name, rows);
   const sf_status status = all_layers(&c, x);
   free(x);
   return status;

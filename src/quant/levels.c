@@ -179,9 +179,10 @@ static double relative_error(const fx_scene *scene, const sf_calibration *c)
   return energy > 0 ? sqrt(sum / energy) : 0;
 }
 
-void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibration *calibration,
-                      sf_quant_report *report)
+sf_status sf_quantise_grid(fx_scene *scene, const sf_model *model, const char *name, const sf_calibration *calibration,
+                           sf_quant_report *report)
 {
+  (void)name;
   const float *value = sf_model_param(model, SF_P_GRID);
   const format format = choose_format(calibration, &report->widths);
   double scale[FX_LEVELS_MAX];
@@ -194,4 +195,5 @@ void sf_quantise_grid(fx_scene *scene, const sf_model *model, const sf_calibrati
     report->grid_clipped = fill_all(scene, value, scale, &format);
   }
   report->feature_error = relative_error(scene, calibration);
+  return sf_ok();
 }

@@ -4,8 +4,7 @@
  * its column of the basis matrix, which is fitted as the layers of the nets are.
  *
  * Roundings of both weigh the same in the product where p rms(line) = l rms(plane). */
-#include "src/quant/tensorf.h"
-#include "render/composite.h"
+#include "src/quant/internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,7 +77,7 @@ typedef struct density {
   fx_scene *scene;
   const sf_model *model;
   const char *name;
-  const sf_vm_calibration *calibration;
+  const sf_calibration *calibration;
   component component[FX_PAIRS][SF_COMPONENTS_MAX];
   int limit;
 } density;
@@ -132,13 +131,13 @@ static sf_status set_density_scales(const density *d, double unit)
 /* Mean squared error of the opacity of a sample. */
 static double opacity_error(const density *d)
 {
-  const sf_vm_calibration *c = d->calibration;
+  const sf_calibration *c = d->calibration;
   const double step = sf_tensorf_step(&d->model->config.tensorf);
   double error = 0;
   for (int i = 0; i < c->samples; i++) {
     const uint32_t *pos = c->pos + (size_t)i * 3;
     float x[3];
-    sf_vm_position(pos, x);
+    sf_calibration_position(pos, x);
     const double exact = sf_tensorf_sigma(&d->model->config.tensorf, sf_tensorf_density_feature(d->model, x));
     const double fixed =
         ldexp(fx_tensorf_density(&d->scene->tensorf, pos, NULL), -SF_SIGMA_FRAC) * d->scene->units.to_box_scale;
@@ -184,11 +183,10 @@ static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, int l
   return clipped;
 }
 
-static double largest_feature(const sf_vm_calibration *c)
+static double largest_feature(const sf_calibration *c)
 {
   double largest = 1e-6;
-  for (size_t i = 0; i < (size_t)c->samples * (size_t)c->n_features; i++)
-    largest = fmax(largest, fabs((double)c->features[i]));
+  for (size_t i = 0; i < (size_t)c->samples * (size_t)c->features; i++) largest = fmax(largest, fabs((double)c->f[i]));
   return largest;
 }
 
@@ -205,7 +203,7 @@ static sf_status set_feature_scales(fx_scene *scene, const sf_model *model, cons
 }
 
 /* Fits the basis matrix to the features that the float field has where the integer products are these. */
-static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_vm_calibration *c, const double *lsb,
+static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_calibration *c, const double *lsb,
                            int limit, sf_quant_layer *result)
 {
   const fx_tensorf *field = &scene->tensorf;
@@ -215,7 +213,7 @@ static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_vm_c
   sf_status status = x && q ? sf_ok() : sf_fail(SF_E_MEMORY, "quantiser: no memory for the basis matrix");
   if (status.code == SF_OK) {
     for (int i = 0; i < c->samples; i++) fx_tensorf_products(field, c->pos + (size_t)i * 3, x + (size_t)i * (size_t)n);
-    const sf_fit_data data = {c->samples, n, field->features, x, c->features};
+    const sf_fit_data data = {c->samples, n, field->features, x, c->f};
     const sf_fit_weights weights = {
         .w = sf_model_param(model, SF_P_BASIS), .stride = n, .lsb = lsb, .unit_min = 1e-30, .weight_max = limit};
     status = sf_fit_layer(&data, &weights, true, q, result);
@@ -227,7 +225,7 @@ static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_vm_c
 }
 
 sf_status sf_quantise_factors(fx_scene *scene, const sf_model *model, const char *name,
-                              const sf_vm_calibration *calibration, sf_quant_report *report)
+                              const sf_calibration *calibration, sf_quant_report *report)
 {
   const int limit = sf_symmetric_max(report->widths.grid_bits);
   density d = {.scene = scene, .model = model, .name = name, .calibration = calibration, .limit = limit};
@@ -240,63 +238,4 @@ sf_status sf_quantise_factors(fx_scene *scene, const sf_model *model, const char
   const double room = 1.1; /* between the calibration points are larger ones */
   return set_feature_scales(scene, model, name, basis.unit,
                             largest_feature(calibration) * room / sf_symmetric_max(SF_INPUT_BITS));
-}
-
-sf_status sf_quantise_tensorf(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
-                              sf_quant_report *report)
-{
-  sf_vm_calibration calibration;
-  if (report->widths.feature_bits != SF_INPUT_BITS)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: %d bits asked for features, those of a TensoRF scene have %d", name,
-                   report->widths.feature_bits, SF_INPUT_BITS);
-  sf_status status = sf_vm_calibrate(&calibration, model, scene->net.steps, options->seed);
-  report->samples = calibration.samples;
-  if (status.code == SF_OK) status = sf_quantise_factors(scene, model, name, &calibration, report);
-  if (status.code == SF_OK) status = sf_quantise_decoder(scene, model, name, &calibration, report);
-  sf_vm_calibration_free(&calibration);
-  return status.code == SF_OK ? fx_scene_check(scene, name) : status;
-}
-
-/* ---- what is not found by fitting ---- */
-
-static double longest_edge(const sf_tensorf *field)
-{
-  double longest = 0;
-  for (int axis = 0; axis < 3; axis++) longest = fmax(longest, (double)field->box[1][axis] - field->box[0][axis]);
-  return longest;
-}
-
-void sf_tensorf_set_sizes(fx_scene *scene, const sf_model *model)
-{
-  const sf_tensorf *from = &model->config.tensorf;
-  fx_tensorf *to = &scene->tensorf;
-  fx_layer *layer = scene->net.layer;
-  scene->backbone = FX_TENSORF;
-  scene->occ_res = model->config.occ_res;
-  for (int i = 0; i < 3; i++) {
-    to->res[i] = from->resolution[i];
-    to->density.components[i] = from->density[i], to->appearance.components[i] = from->appearance[i];
-  }
-  to->features = from->features;
-  to->feature_freqs = from->feature_freqs, to->view_freqs = from->view_freqs;
-  layer[FX_C1].n_in = sf_tensorf_inputs(from);
-  layer[FX_C1].n_out = layer[FX_C2].n_in = layer[FX_C2].n_out = layer[FX_C3].n_in = model->config.hidden;
-  layer[FX_C3].n_out = 3;
-  for (int l = FX_C1; l <= FX_C3; l++) layer[l].bias = 1;
-}
-
-void sf_tensorf_set_scalars(fx_scene *scene, const sf_model *model)
-{
-  const sf_tensorf *from = &model->config.tensorf;
-  fx_tensorf *to = &scene->tensorf;
-  const double edge = longest_edge(from);
-  scene->units.to_box_scale = 1 / edge;
-  for (int axis = 0; axis < 3; axis++) {
-    scene->units.to_box_offset[axis] = -from->box[0][axis] / edge;
-    scene->units.stretch[axis] = edge / ((double)from->box[1][axis] - from->box[0][axis]);
-  }
-  scene->units.near = from->near, scene->units.far = from->far;
-  scene->step_q24 = (int32_t)nearbyint(ldexp(sf_tensorf_step(from) / edge, SF_DELTA_FRAC));
-  to->activation = from->activation == SF_RELU ? FX_RELU : FX_SOFTPLUS;
-  to->weight_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
 }
