@@ -158,7 +158,7 @@ sf_driver_code sf_driver_read_counters(const sf_bus *bus, sf_driver_counters *co
   put(bus, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT);
   const sf_driver_code code = wait_counters(bus);
   if (code != SF_DRIVER_OK) return code;
-  for (uint32_t event = 0; event < SF_DRIVER_EVENTS; event++)
+  for (uint32_t event = 0; event < SF_EVENTS; event++)
     for (uint32_t layer = 0; layer < SF_LAYERS; layer++)
       for (uint32_t step = 0; step < SF_T_MAX; step++)
         counters->event[event][layer][step] = counter(bus, event, layer, step);

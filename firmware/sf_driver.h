@@ -3,6 +3,7 @@
 #ifndef SF_FIRMWARE_SF_DRIVER_H
 #define SF_FIRMWARE_SF_DRIVER_H
 #include "base/arch.h"
+#include "base/event.h"
 #include <stdint.h>
 
 /* Byte offsets SF_CSR_<name>, expected contents SF_CSR_<name>_RESET, masks SF_CSR_<register>_<field>. */
@@ -39,9 +40,8 @@ typedef struct sf_net_blob {
 /* Inputs of a layer, at most: those of a decoder, or the neurons before it. */
 enum { SF_DRIVER_INPUTS = SF_LANES > SF_DIR_MAX ? SF_LANES : SF_DIR_MAX };
 
-enum { SF_DRIVER_EVENTS = 8 }; /* mac sop spikes updates weight state_r state_w special */
 typedef struct sf_driver_counters {
-  uint64_t event[SF_DRIVER_EVENTS][SF_LAYERS][SF_T_MAX];
+  uint64_t event[SF_EVENTS][SF_LAYERS][SF_T_MAX];
   uint64_t samples, rays, cycles, busy, stall_in, stall_out;
   uint64_t layer_busy[SF_LAYERS]; /* cycles in which the layer added up rows */
 } sf_driver_counters;

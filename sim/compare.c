@@ -96,7 +96,7 @@ bool sf_compare_counts(const fx_counts *core, const fx_counts *dut, uint64_t cyc
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < SF_T_MAX; t++)
       for (int e = 0; e < SF_EVENTS; e++) {
-        const uint64_t expected = sf_event_count(&core->layer[l], e, t), actual = sf_event_count(&dut->layer[l], e, t);
+        const uint64_t expected = core->layer[l].event[e][t], actual = dut->layer[l].event[e][t];
         if (expected == actual) continue;
         *difference = (sf_difference){l, t, -1, sf_events[e].name, (int64_t)expected, (int64_t)actual, cycle};
         return false;

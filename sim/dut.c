@@ -109,12 +109,9 @@ sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64
   sf_driver_counters read;
   SF_TRY(driver_status(dut, sf_driver_read_counters(sf_dut_driver_bus(dut), &read), "read counters"));
   memset(counts, 0, sizeof *counts);
-  for (int l = 0; l < SF_LAYERS; l++) {
-    fx_layer_counts *c = &counts->layer[l];
-    uint64_t *const to[SF_DRIVER_EVENTS] = {c->mac,    c->sop,     c->spikes,  c->updates,
-                                            c->weight, c->state_r, c->state_w, c->special};
-    for (int e = 0; e < SF_DRIVER_EVENTS; e++) memcpy(to[e], read.event[e][l], sizeof c->mac);
-  }
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int e = 0; e < SF_EVENTS; e++)
+      memcpy(counts->layer[l].event[e], read.event[e][l], sizeof counts->layer[l].event[e]);
   counts->samples = read.samples;
   counts->rays = read.rays;
   if (cycles) *cycles = read.cycles;

@@ -27,7 +27,7 @@ static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64
 {
   const uint64_t wanted[2] = {t0, t1};
   for (int t = 0; t < SF_T_MAX; t++) {
-    uint64_t value = sf_event_count(&c->layer[layer], event, t);
+    uint64_t value = c->layer[layer].event[event][t];
     ck_assert_msg(value == (t < 2 ? wanted[t] : 0), "%s %s step %d: %llu", fx_layer_name(layer), sf_events[event].name,
                   t, (unsigned long long)value);
   }
@@ -134,9 +134,7 @@ START_TEST(largest_frame_does_not_wrap)
   const uint64_t samples = (uint64_t)800 * 800 * 1024;
   for (int i = 0; i < SF_LAYERS; i++)
     for (int e = 0; e < SF_EVENTS; e++)
-      for (int t = 0; t < SF_T_MAX; t++)
-        ((uint64_t *)((char *)&frame.layer[i] + sf_events[e].offset))[t] =
-            sf_event_count(&one.layer[i], e, t) * samples;
+      for (int t = 0; t < SF_T_MAX; t++) frame.layer[i].event[e][t] = one.layer[i].event[e][t] * samples;
   frame.samples = frame.rays = samples;
   u128 exact = (u128)samples * (4096 + 2048 + 8 * 1920) * 4600 + (u128)samples * 8 * 128 * (16 + 128 + 3) * 900;
   ck_assert(exact < UINT64_MAX);
@@ -206,8 +204,8 @@ START_TEST(comparison_names_each_planted_difference)
       for (int e = 0; e < SF_EVENTS; e++) {
         fx_counts a = {0}, b = {0};
         char expected[200];
-        ((uint64_t *)((char *)&a.layer[l] + sf_events[e].offset))[t] = UINT64_MAX - 1;
-        ((uint64_t *)((char *)&b.layer[l] + sf_events[e].offset))[t] = UINT64_MAX;
+        a.layer[l].event[e][t] = UINT64_MAX - 1;
+        b.layer[l].event[e][t] = UINT64_MAX;
         sf_status status = sf_counts_compare(&a, "left", &b, "right");
         snprintf(expected, sizeof expected, "%s of layer %s at step %d: left %llu, right %llu", sf_events[e].title,
                  fx_layer_name(l), t, (unsigned long long)UINT64_MAX - 1, (unsigned long long)UINT64_MAX);

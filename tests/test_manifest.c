@@ -26,8 +26,7 @@ static sf_golden some_golden(void)
     memcpy(g.plane[p], (const uint32_t[3]){1, 0x01020304, UINT32_MAX}, 3 * sizeof(uint32_t));
   for (int l = 0; l < SF_LAYERS; l++) {
     for (int e = 0; e < SF_EVENTS; e++)
-      for (int t = 0; t < 2; t++)
-        ((uint64_t *)((char *)&g.counts.layer[l] + sf_events[e].offset))[t] = (uint64_t)(1000 * l + 100 * e + t + 1);
+      for (int t = 0; t < 2; t++) g.counts.layer[l].event[e][t] = (uint64_t)(1000 * l + 100 * e + t + 1);
     g.counts.saturated[l] = (uint64_t)(21 + l), g.counts.saturated_samples[l] = (uint64_t)(41 + l);
   }
   g.counts.samples = 7, g.counts.rays = 5, g.counts.grid_bytes = ((uint64_t)1 << 40) + 3, g.counts.march_steps = 11;

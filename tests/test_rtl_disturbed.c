@@ -188,11 +188,8 @@ static fx_counts read_window(sf_dut *dut)
 {
   fx_counts counts = {.samples = window(dut, 0, 7, 0), .rays = window(dut, 0, 7, 1)};
   for (int l = 0; l < SF_LAYERS; l++) {
-    fx_layer_counts *c = &counts.layer[l];
-    uint64_t *const to[SF_DRIVER_EVENTS] = {c->mac,    c->sop,     c->spikes,  c->updates,
-                                            c->weight, c->state_r, c->state_w, c->special};
-    for (int e = 0; e < SF_DRIVER_EVENTS; e++)
-      for (int t = 0; t < SF_T_MAX; t++) to[e][t] = window(dut, e, l, t);
+    for (int e = 0; e < SF_EVENTS; e++)
+      for (int t = 0; t < SF_T_MAX; t++) counts.layer[l].event[e][t] = window(dut, e, l, t);
   }
   return counts;
 }

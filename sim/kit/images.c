@@ -168,7 +168,7 @@ static sf_status write_counters(sf_kit_output *output, const fx_counts *counts)
   sf_kit_writer file;
   for (int e = 0; e < SF_EVENTS; e++)
     for (int l = 0; l < SF_LAYERS; l++)
-      for (int t = 0; t < SF_T_MAX; t++) window[(e * 8 + l) * 8 + t] = sf_event_count(&counts->layer[l], e, t);
+      for (int t = 0; t < SF_T_MAX; t++) window[(e * 8 + l) * 8 + t] = counts->layer[l].event[e][t];
   window[GLOBAL_LAYER * 8 + GLOBAL_SAMPLES] = counts->samples;
   window[GLOBAL_LAYER * 8 + GLOBAL_RAYS] = counts->rays;
   SF_TRY(sf_kit_begin(output, &file, "expected_counters.hex"));

@@ -38,7 +38,7 @@ static void layer_line(const fx_counts *counts, int layer, char line[LINE_MAX])
   int at = snprintf(line, LINE_MAX, "%s%s", audit_prefix, fx_layer_name(layer));
   for (int e = 0; e < SF_EVENTS; e++) {
     uint64_t sum = 0;
-    for (int t = 0; t < SF_T_MAX; t++) sum += sf_event_count(&counts->layer[layer], e, t);
+    for (int t = 0; t < SF_T_MAX; t++) sum += counts->layer[layer].event[e][t];
     at += snprintf(line + at, (size_t)(LINE_MAX - at), " %s %" PRIu64, sf_events[e].name, sum);
   }
 }

@@ -247,7 +247,7 @@ void sf_report_csv(FILE *out, const sf_audit_report *r)
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < r->net->steps; t++) {
       fprintf(out, "%s,%d,%d,%d", fx_layer_name(l), t, r->net->layer[l].n_in, r->net->layer[l].n_out);
-      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, sf_event_count(&r->measure.core.layer[l], e, t));
+      for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, r->measure.core.layer[l].event[e][t]);
       fprintf(out, ",0,0");
       csv_energies(out, &r->ledgers, l, t);
     }

@@ -3,25 +3,14 @@
 #include <math.h>
 
 const sf_event sf_events[SF_EVENTS] = {
-    {"mac", "MAC", offsetof(fx_layer_counts, mac)},
-    {"sop", "SOP", offsetof(fx_layer_counts, sop)},
-    {"spikes", "spikes", offsetof(fx_layer_counts, spikes)},
-    {"updates", "neuron updates", offsetof(fx_layer_counts, updates)},
-    {"weight", "weight bytes read", offsetof(fx_layer_counts, weight)},
-    {"state_r", "state bytes read", offsetof(fx_layer_counts, state_r)},
-    {"state_w", "state bytes written", offsetof(fx_layer_counts, state_w)},
-    {"special", "special functions", offsetof(fx_layer_counts, special)},
+#define SF_EVENT(id, name, title) {#name, title},
+#include "spikefield/event.def"
 };
-
-uint64_t sf_event_count(const fx_layer_counts *layer, int event, int step)
-{
-  return ((const uint64_t *)((const char *)layer + sf_events[event].offset))[step];
-}
 
 static uint64_t layer_total(const fx_layer_counts *layer, int event)
 {
   uint64_t sum = 0;
-  for (int t = 0; t < SF_T_MAX; t++) sum = sf_add_u64(sum, sf_event_count(layer, event, t));
+  for (int t = 0; t < SF_T_MAX; t++) sum = sf_add_u64(sum, layer->event[event][t]);
   return sum;
 }
 

@@ -28,24 +28,11 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
 sf_status sf_counts_compare(const fx_counts *a, const char *a_name, const fx_counts *b, const char *b_name);
 cJSON *sf_counts_json(const fx_net *net, const fx_counts *counts);
 
-/* The eight events of fx_layer_counts, in its order. */
-typedef enum {
-  SF_EVENT_MAC,
-  SF_EVENT_SOP,
-  SF_EVENT_SPIKES,
-  SF_EVENT_UPDATES,
-  SF_EVENT_WEIGHT,
-  SF_EVENT_STATE_R,
-  SF_EVENT_STATE_W,
-  SF_EVENT_SPECIAL,
-  SF_EVENTS
-} sf_event_id;
+/* What event.def says of each event, by sf_event_id. */
 typedef struct sf_event {
-  const char *name, *title; /* "state_r", "state read, bytes" */
-  size_t offset;            /* of its uint64_t[SF_T_MAX] in fx_layer_counts */
+  const char *name, *title; /* "state_r", "state bytes read" */
 } sf_event;
 extern const sf_event sf_events[SF_EVENTS];
-uint64_t sf_event_count(const fx_layer_counts *layer, int event, int step);
 uint64_t sf_event_total(const fx_counts *counts, int event); /* over layers and steps */
 
 /* One price list, several readings of what is a MAC. All in fJ. */

@@ -35,7 +35,7 @@ static cJSON *steps_json(const fx_layer_counts *layer, int event, int steps)
   cJSON *list = cJSON_CreateArray();
   for (int t = 0; t < steps; t++) {
     char digits[24];
-    snprintf(digits, sizeof digits, "%" PRIu64, sf_event_count(layer, event, t));
+    snprintf(digits, sizeof digits, "%" PRIu64, layer->event[event][t]);
     cJSON_AddItemToArray(list, cJSON_CreateRaw(digits));
   }
   return list;

@@ -14,6 +14,7 @@
 #ifndef SF_FX_FX_H
 #define SF_FX_FX_H
 #include "base/arch.h"
+#include "base/event.h"
 #include "base/status.h"
 #include "fx/layers.h"
 #include <stdbool.h>
@@ -221,9 +222,12 @@ typedef struct fx_ray {
  *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); no read at step 0
  *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations
  * A decoder has none in D1 and D2. */
-typedef struct fx_layer_counts {
-  uint64_t mac[SF_T_MAX], sop[SF_T_MAX], spikes[SF_T_MAX], updates[SF_T_MAX], weight[SF_T_MAX], state_r[SF_T_MAX],
-      state_w[SF_T_MAX], special[SF_T_MAX];
+typedef union fx_layer_counts {
+  uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
+  struct {
+#define SF_EVENT(id, name, title) uint64_t name[SF_T_MAX];
+#include "spikefield/event.def"
+  }; /* the same by name */
 } fx_layer_counts;
 
 typedef struct fx_counts {

@@ -25,7 +25,7 @@ static void hash_counts(const fx_net *net, const fx_counts *c, char hex[65])
   uint8_t bytes[8 * (SF_LAYERS * SF_EVENTS * SF_T_MAX + 4 + 2 * SF_LAYERS + 3)], *to = bytes;
   for (int l = 0; l < SF_LAYERS; l++)
     for (int e = 0; e < SF_EVENTS; e++)
-      for (int t = 0; t < net->steps; t++) to = put(to, sf_event_count(&c->layer[l], e, t), 8);
+      for (int t = 0; t < net->steps; t++) to = put(to, c->layer[l].event[e][t], 8);
   to = put(to, c->samples, 8), to = put(to, c->rays, 8);
   to = put(to, c->grid_bytes, 8), to = put(to, c->march_steps, 8);
   for (int l = 0; l < SF_LAYERS; l++) to = put(to, c->saturated[l], 8);

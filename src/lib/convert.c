@@ -18,14 +18,8 @@ _Static_assert(sizeof(spikefield_status) == sizeof(sf_status), "sf_status and sp
   _Static_assert(offsetof(type, member) == offsetof(core, member) &&                                                   \
                      sizeof(((type *)0)->member) == sizeof(((core *)0)->member),                                       \
                  #type "." #member " differs from the core's")
-SAME(spikefield_layer_counts, fx_layer_counts, mac);
-SAME(spikefield_layer_counts, fx_layer_counts, sop);
-SAME(spikefield_layer_counts, fx_layer_counts, spikes);
-SAME(spikefield_layer_counts, fx_layer_counts, updates);
-SAME(spikefield_layer_counts, fx_layer_counts, weight);
-SAME(spikefield_layer_counts, fx_layer_counts, state_r);
-SAME(spikefield_layer_counts, fx_layer_counts, state_w);
-SAME(spikefield_layer_counts, fx_layer_counts, special);
+#define SF_EVENT(id, name, title) SAME(spikefield_layer_counts, fx_layer_counts, name);
+#include "spikefield/event.def"
 SAME(spikefield_counts, fx_counts, layer);
 SAME(spikefield_counts, fx_counts, samples);
 SAME(spikefield_counts, fx_counts, rays);

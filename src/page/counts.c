@@ -67,8 +67,8 @@ static void totals(FILE *out, const sf_page *page)
 static void cell(FILE *out, const sf_page *page, int l, int t, int e)
 {
   const sf_three_counts *s = &page->report->three;
-  const uint64_t core = sf_event_count(&s->core.layer[l], e, t), rtl = sf_event_count(&s->rtl.layer[l], e, t),
-                 recount = sf_event_count(&s->recount.layer[l], e, t);
+  const uint64_t core = s->core.layer[l].event[e][t], rtl = s->rtl.layer[l].event[e][t],
+                 recount = s->recount.layer[l].event[e][t];
   char key[80], text[HTML_NUMBER];
   snprintf(key, sizeof key, "rtl_subset.core.layers[%d].%s[%d]", l, sf_events[e].name, t);
   if (same(core, rtl, recount)) {
