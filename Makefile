@@ -73,12 +73,15 @@ SOC_MISSING := $(strip $(if $(UNICORN_LIBS),,libunicorn-dev) $(if $(shell comman
 NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc)
 TOOLS := $(filter-out $(NO_SOC),$(patsubst tools/%.c,%,$(wildcard tools/*.c)))
 TESTS := $(filter-out $(NO_SOC),$(patsubst tests/%.c,%,$(wildcard tests/test_*.c)))
+# Scripts that try whole programs; they take longest, so they begin.
+CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)))
 # What only pattern rules name is kept: objects, and goals given by their whole path. A bare .SECONDARY: would leave a
 # library without what it newly needs.
 .SECONDARY: $(patsubst %.c,$B/obj/%.o,$(wildcard tests/*.c tests/*/*.c tools/*.c))
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
-DUT_TESTS := test_rtl bench
+# Those that drive the Verilated accelerator.
+DUT_TESTS := bench test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
@@ -173,7 +176,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
-	@tests/run.sh $B $(TESTS) cli house golden_set chain reproduce quality pareto cosim_faults audit_faults audit_report cosim_split firmware html kit golden_bench other_dut lanes activity package synth formal mutate install fuzz safetensors nir
+	@tests/run.sh $B $(CHAIN_TESTS) $(TESTS)
 
 SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays

@@ -60,14 +60,12 @@ $1/libsfdut.a: $1/Vsf_top__ALL.a $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ)
 	$$Qrm -f $$@ && cp $1/Vsf_top__ALL.a $$@ && $$(AR) rs $$@ $1/pins.o $(DUT_OBJ) $(VERILATED_OBJ) 2>/dev/null
 endef
 
-DUT_TESTS += test_rtl_registers test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_stream test_rtl_disturbed test_jobs test_soc
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit tests/test_rtl_ray tests/test_rtl_ray_registers tests/test_rtl_ray_lone tests/test_three_counts tests/bench
+RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/bench
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
-DUT_TESTS += test_rtl_ray test_rtl_ray_registers test_rtl_ray_lone test_three_counts
 
 $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	@mkdir -p $(@D)
@@ -160,7 +158,7 @@ endef
 $(foreach n,32 64,$(eval $(call lanes_rule,$n)))
 
 lanes: all firmware $B/faults/make_scene ## 32, 64, 256 lanes: samples, rays, firmware, vector kit in both simulators, synthesis of a module (128: make check)
-	@tests/lanes.sh $B --whole
+	@tests/chain/lanes.sh $B --whole
 .PHONY: lanes
 
 # The vector kit: writer, and the files that go with every kit.

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Runs the named tests, JOBS at a time (default: one per processor), and ends with one closing line; BUILD/tests/junit.xml.
-# usage: run.sh BUILD NAME...     A name is a Check program in BUILD/tests, or one of the scripts below.
+# usage: run.sh BUILD NAME...     A name is a Check program in BUILD/tests, or a script of tests/chain, which gets BUILD and
+# exits with 77 where this machine lacks what it needs.
 build=$1
 shift
 here=$(dirname "$0")
@@ -15,40 +16,18 @@ trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/nu
 run() {
   local name=$1 start command status verdict
   start=$(date +%s)
-  case $name in
-    cli) command=("$here/test_cli.sh" "$build/bin") ;;
-    reproduce) command=("$here/test_reproduce.sh" "$build") ;;
-    pareto) command=("$here/test_pareto.sh" "$build") ;;
-    fuzz) command=("$here/test_fuzz.sh" "$build") ;;
-    chain) command=("$here/chain.sh" "$build") ;;
-    firmware) command=("$here/test_firmware.sh" "$build") ;;
-    golden_bench) command=("$here/golden_bench.sh" "$build") ;;
-    other_dut) command=("$here/other_dut.sh" "$build") ;;
-    html) command=("$here/html.sh" "$build") ;;
-    kit) command=("$here/kit.sh" "$build") ;;
-    activity) command=("$here/activity.sh" "$build") ;;
-    lanes) command=("$here/lanes.sh" "$build") ;;
-    mutate) command=("$here/mutate/units.py" "$build" --sample) ;;
-    formal) command=("$here/formal/run.sh" "$build" --quick) ;;
-    install) command=("$here/install.sh" "$build") ;;
-    golden_set) command=("$here/golden_set.sh" "$build") ;;
-    cosim_split) command=("$here/cosim_split.sh" "$build") ;;
-    audit_report) command=("$here/audit_report.sh" "$build") ;;
-    audit_faults) command=("$here/audit_faults.sh" "$build") ;;
-    cosim_faults) command=("$here/cosim_faults.sh" "$build") ;;
-    house) command=("$here/house.sh" "$build") ;;
-    synth) command=("$here/test_synth.sh") ;;
-    package) command=("$here/test_package.sh") ;;
-    safetensors) command=(python3 "$here/crosscheck_safetensors.py" "$build/tests/test_base") ;;
-    quality) command=("$here/quality.sh" "$build") ;;
-    nir) command=(python3 "$here/crosscheck_nir.py" "$build/tests/test_nir") ;;
-    *) command=("$build/tests/$name") ;;
-  esac
+  if [ -x "$build/tests/$name" ]; then
+    command=("$build/tests/$name")
+  elif [ -f "$here/chain/$name.sh" ]; then
+    command=("$here/chain/$name.sh" "$build")
+  else
+    command=(python3 "$here/chain/$name.py" "$build")
+  fi
   "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null
   status=$?
   if [ $status -eq 0 ]; then
     verdict="ok$(sed -n 's/^\([a-z0-9]*\): not on this machine$/, without \1/p' "$logs/$name.log" | sort -u | tr -d '\n')"
-  elif [ $status -eq 77 ] || { [[ $name == safetensors || $name == nir || $name == mutate ]] && ! command -v python3 >/dev/null; }; then
+  elif [ $status -eq 77 ] || { [ "${command[0]}" = python3 ] && ! command -v python3 >/dev/null; }; then
     verdict="skipped: $(tail -n 1 "$logs/$name.log")"
   else
     verdict="FAILED ($status), see $logs/$name.log"

@@ -1,8 +1,8 @@
 #!/bin/bash
 # The block as others take it away: registers in every generated form, IP-XACT, FuseSoC, C header, a first simulation.
-# Ends by planting faults in a copy, to see each check fail.   usage: test_package.sh
+# Ends by planting faults in a copy, to see each check fail.   usage: package.sh
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-package-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 fail() { echo "package: $1" >&2; exit 1; }

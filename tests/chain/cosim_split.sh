@@ -119,7 +119,7 @@ sleep 0.5
 for child in $children; do alive "$child" && fail "killed: process $child is still there"; done
 
 # ---- the campaign: every seed its share, totals, JUnit; what is finished is not run again ----
-campaign() { JOBS=2 "$here/../tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
+campaign() { JOBS=2 "$here/../../tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
 mkdir -p b/bin && ln -s "$build/faults/sf_cosim" b/bin/sf_cosim
 campaign || fail "campaign: $(cat campaign.out)"
 total=$(sed -nE 's/^([0-9]+) samples over 2 seeds, stalls 20 %, 0 differences.*/\1/p' campaign.out)

@@ -1,8 +1,8 @@
 #!/bin/bash
-# Every fuzzing target over its seeds and over what fuzzing once found.   usage: test_fuzz.sh BUILD
+# Every fuzzing target over its seeds and over what fuzzing once found.   usage: fuzz.sh BUILD
 set -u
-build=${1:?usage: test_fuzz.sh BUILD}
-here=$(cd "$(dirname "$0")" && pwd)/fuzz
+build=${1:?usage: fuzz.sh BUILD}
+here=$(cd "$(dirname "$0")" && pwd)/../fuzz
 work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-fuzz-XXXXXX") || exit 2
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM

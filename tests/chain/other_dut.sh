@@ -3,7 +3,7 @@
 # file changes, it is built again and its mistake located; what does not build says where. usage: other_dut.sh BUILD
 set -u
 build=$(cd "$1" && pwd)
-root=$(cd "$(dirname "$0")/.." && pwd)
+root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_other.XXXXXX") || exit 1
 built=()
 trap 'rm -rf "$work" "${built[@]}"' EXIT

@@ -89,7 +89,7 @@ flipped weights.hex 20 'in the kit'
 flipped program.hex 1000 'in the kit'
 flipped program.hex 4 'sample 0 layer'  # other time steps than the kit's
 
-# As tests/cosim_faults.sh: the RTL with planted faults, one chosen at run time.
+# As tests/chain/cosim_faults.sh: the RTL with planted faults, one chosen at run time.
 faulty() { run icarus "${@:2}" -- RTL="$build/faults/rtl" BUILD=faulty ARGS="+fault=$1"; }
 faulty 0 0 PASS
 faulty 1 1 'layer C2' 'neuron 37 membrane'

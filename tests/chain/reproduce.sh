@@ -1,10 +1,10 @@
 #!/bin/bash
 # make reproduce on a tiny scene of its own: all runs; interrupted in the middle and continued equals uninterrupted; a
-# run that fails; what is run again and what is not.   usage: test_reproduce.sh BUILD
+# run that fails; what is run again and what is not.   usage: reproduce.sh BUILD
 set -u
 export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
-programs=$(cd "${1:?usage: test_reproduce.sh BUILD}/bin" && pwd) || exit 2
-script=$(cd "$(dirname "$0")/../tools" && pwd)/reproduce.sh
+programs=$(cd "${1:?usage: reproduce.sh BUILD}/bin" && pwd) || exit 2
+script=$(cd "$(dirname "$0")/../../tools" && pwd)/reproduce.sh
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_reproduce.XXXXXX") || exit 1
 pid=
 trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT

@@ -1,10 +1,10 @@
 #!/bin/bash
 # make pareto on a tiny model of its own: points against sim_render; a variant build; interrupted and continued equals
-# uninterrupted; a point that fails; other parameters start again.   usage: test_pareto.sh BUILD
+# uninterrupted; a point that fails; other parameters start again.   usage: pareto.sh BUILD
 set -u
 export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} OPT=-O0 CFLAGS=-g0
-programs=$(cd "${1:?usage: test_pareto.sh BUILD}/bin" && pwd) || exit 2
-script=$(cd "$(dirname "$0")/../tools" && pwd)/pareto.sh
+programs=$(cd "${1:?usage: pareto.sh BUILD}/bin" && pwd) || exit 2
+script=$(cd "$(dirname "$0")/../../tools" && pwd)/pareto.sh
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_pareto.XXXXXX") || exit 1
 pid=
 trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT

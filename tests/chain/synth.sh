@@ -1,8 +1,8 @@
 #!/bin/bash
 # tools/synth.sh: a module whose cost is known by counting, for two numbers of lanes; one real module; runs are kept
-# until the RTL changes; errors name their cause.   usage: test_synth.sh
+# until the RTL changes; errors name their cause.   usage: synth.sh
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 command -v yosys >/dev/null || { echo "skipped: yosys is not installed"; exit 77; }
 work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-synth-XXXXXX")
 trap 'rm -rf "$work"' EXIT

@@ -49,10 +49,10 @@ run --saif "$work/one.saif" --depth 1 || fail "--depth 1"
 run --saif "$work/w.saif" --vcd "$work/w.vcd" --window 300,419 || fail "a window"
 [ "$(number cycles)" = 120 ] || fail "a window of 120 cycles has $(number cycles)"
 if command -v python3 >/dev/null; then
-  python3 "$here/vcd_activity.py" "$work/w.vcd" "$work/w.saif" >"$work/out" 2>&1 && cat "$work/out" || fail "VCD and SAIF differ"
+  python3 "$here/../vcd_activity.py" "$work/w.vcd" "$work/w.saif" >"$work/out" 2>&1 && cat "$work/out" || fail "VCD and SAIF differ"
   # One toggle more, of one bit: seen.
   sed -E '0,/\(TC [1-9][0-9]*\)/s//(TC 77777)/' "$work/w.saif" >"$work/wrong.saif"
-  python3 "$here/vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
+  python3 "$here/../vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
 else
   echo "python3 is not installed: VCD not counted"
 fi

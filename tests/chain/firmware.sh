@@ -1,8 +1,8 @@
 #!/bin/bash
 # sf_soc from the command line: the firmware's tile and audit are those of the host, an image can be kept and loaded, and
-# everything that can go wrong is one line and an exit status.   usage: test_firmware.sh BUILD
+# everything that can go wrong is one line and an exit status.   usage: firmware.sh BUILD
 set -u
-build=$(cd "${1:?usage: test_firmware.sh BUILD}" && pwd) || exit 2
+build=$(cd "${1:?usage: firmware.sh BUILD}" && pwd) || exit 2
 export LC_ALL=C OMP_NUM_THREADS=1
 for needed in "$build/bin/sf_soc" "$build/firmware/sf_firmware.elf"; do
   [ -e "$needed" ] && continue

@@ -72,7 +72,7 @@ if [ -z "$chromium" ]; then
 fi
 mkdir -p "$shots"
 for print in 0 1; do # the check comes first, to see every error
-  awk -v paper="$print" -v check="$here/html/check.js" '
+  awk -v paper="$print" -v check="$here/../html/check.js" '
     !done && /<head>/ { print $0; print "<script>var PRINT=" paper ";"; while ((getline line < check) > 0) print line; print "</script>"; done = 1; next }
     { print }' "$work/page.html" >"$work/checked-$print.html"
 done

@@ -7,7 +7,7 @@
 set -u
 export LC_ALL=C
 build=$(cd "${1:?usage: lanes.sh BUILD [--whole]}" && pwd) || exit 2
-root=$(cd "$(dirname "$0")/.." && pwd)
+root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_lanes.XXXXXX") || exit 1
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM

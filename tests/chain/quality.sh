@@ -2,7 +2,7 @@
 # make quality on one scene and a few iterations: the table, what is kept, what is compared, what is refused.
 set -u
 build=$1
-here=$(cd "$(dirname "$0")/.." && pwd)
+here=$(cd "$(dirname "$0")/../.." && pwd)
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
 failed=0

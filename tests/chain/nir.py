@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reads our NIR graphs with NIR's own library and simulates them: the spikes of the fixed-point core.
 
-usage: crosscheck_nir.py TEST_NIR     (the built tests/test_nir.c)
+usage: nir.py BUILD     runs BUILD/tests/test_nir
 Exits 0 when equal, 1 when not, 77 (skipped) where the Python modules are not installed.
 """
 import os
@@ -14,7 +14,7 @@ try:
     import numpy as np
     from nir.serialization import read_version
 except ImportError as missing:
-    print(f"crosscheck_nir: skipped: {missing}")
+    print(f"nir: skipped: {missing}")
     sys.exit(77)
 
 def charge(node, v, current, first):
@@ -80,13 +80,13 @@ def main():
         print(__doc__)
         return 2
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.argv[1]], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
+        subprocess.run([os.path.join(sys.argv[1], "tests", "test_nir")], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
         if not os.listdir(folder):
-            print("crosscheck_nir: skipped: this build has no HDF5 (libhdf5-dev)")
+            print("nir: skipped: this build has no HDF5 (libhdf5-dev)")
             return 77
         samples = [check(folder, mode) for mode in range(3)]
     assert min(samples) >= 12, samples
-    print(f"crosscheck_nir: spikes of {sum(samples)} samples equal, nir {nir.__version__}")
+    print(f"nir: spikes of {sum(samples)} samples equal, nir {nir.__version__}")
     return 0
 
 

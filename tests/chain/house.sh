@@ -2,7 +2,10 @@
 # The checks of the house see what they are for: a small house, in order and with each fault planted.
 # usage: house.sh BUILD
 set -euo pipefail
-cd "$(dirname "$0")/.."
+for need in python3 git; do
+  command -v $need >/dev/null || { echo "house: skipped: $need is not installed"; exit 77; }
+done
+cd "$(dirname "$0")/../.."
 tools=$PWD/tools
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Exchanges a safetensors file with the format's own library, in both directions.
 
-usage: crosscheck_safetensors.py TEST_BASE     (the built tests/test_base.c)
+usage: safetensors.py BUILD     runs BUILD/tests/test_base
 Exits 0 when equal, 1 when not, 77 (skipped) where the Python modules are not installed.
 """
 import os
@@ -14,7 +14,7 @@ try:
     from safetensors import safe_open
     from safetensors.numpy import save_file
 except ImportError as missing:
-    print(f"crosscheck_safetensors: skipped: {missing}")
+    print(f"safetensors: skipped: {missing}")
     sys.exit(77)
 
 
@@ -38,7 +38,7 @@ def main():
     expected, metadata = tensors(), {"version": "1", "text": 'a "quoted"\nline, \u00e9'}
     with tempfile.TemporaryDirectory() as folder:
         save_file(expected, os.path.join(folder, "theirs.safetensors"), metadata=metadata)
-        subprocess.run([sys.argv[1]], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
+        subprocess.run([os.path.join(sys.argv[1], "tests", "test_base")], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
         with safe_open(os.path.join(folder, "ours.safetensors"), "np") as ours:
             assert ours.metadata() == metadata, ours.metadata()
             assert set(ours.keys()) == set(expected), ours.keys()
@@ -46,7 +46,7 @@ def main():
                 got = ours.get_tensor(name)
                 assert got.dtype == value.dtype and got.shape == value.shape, (name, got.dtype, got.shape)
                 assert np.array_equal(got, value), (name, got)
-    print("crosscheck_safetensors: equal in both directions")
+    print("safetensors: equal in both directions")
     return 0
 
 

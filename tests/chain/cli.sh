@@ -1,9 +1,9 @@
 #!/bin/bash
 # Bad input to every program: exit status 2 for usage and 1 for data, exactly one line on stderr that names the option
-# or the file, no partial output, never a crash.   usage: test_cli.sh BIN_DIR
+# or the file, no partial output, never a crash.   usage: cli.sh BIN_DIR
 set -u
-BIN=$(cd "${1:?usage: test_cli.sh BIN_DIR}" && pwd) || exit 2
-TOOLS=$(cd "$(dirname "$0")/../tools" && pwd) || exit 2
+BIN=$(cd "${1:?usage: cli.sh BUILD}/bin" && pwd) || exit 2
+TOOLS=$(cd "$(dirname "$0")/../../tools" && pwd) || exit 2
 export LC_ALL=C OMP_NUM_THREADS=2
 WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-cli-XXXXXX") || exit 2
 trap 'rm -rf "$WORK"' EXIT
