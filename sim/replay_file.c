@@ -2,7 +2,7 @@
 #include "sim/replay.h"
 #include "base/sha256.h"
 #include "energy/energy.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>

@@ -173,7 +173,7 @@ $B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh
 $B/kit/files.o: $B/kit/files.c sim/kit/kit.h
 	$(call say,CC    $@)
 	$Q$(CC) $(CFLAGS_ALL) -c $< -o $@
-$B/bin/sf_export: $(KIT_OBJ) $B/obj/tools/export/extras.o
+$B/bin/sf_export: $(KIT_OBJ) $B/obj/tools/export/extras.o $B/obj/tools/export/report.o
 
 # sf_cosim --dut builds itself around another accelerator. Folders that lie in the source tree can move with it.
 $B/obj/sim/other_dut.o: CFLAGS += -DSF_SOURCE_ROOT='"$(if $(filter /%,$B),$(CURDIR),$(shell realpath -m --relative-to=$B .))"'

@@ -6,6 +6,7 @@
 #include "fit/fit.h"
 #include "quant/quant.h"
 #include "tools/export/extras.h"
+#include "tools/export/report.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,87 +32,6 @@ static sf_status file_size(const char *path, long long *size)
   if (stat(path, &info)) return sf_fail(SF_E_IO, "%s: cannot be read back", path);
   *size = (long long)info.st_size;
   return sf_ok();
-}
-
-/* ---- report ---- */
-
-/* fit: what was measured at the quantisation is of the scene before it was cut down, and left out. */
-static void print_text(const fx_scene *scene, const sf_quant_report *report, bool fit, const char *path,
-                       long long bytes)
-{
-  const bool vm = scene->backbone == FX_TENSORF;
-  const int32_t *res = scene->tensorf.res;
-  printf("%s: %lld bytes, t_r = %d, %lld %s entries, %d x %d x %d occupancy cells\n", path, bytes, scene->net.steps,
-         (long long)(vm ? fx_tensorf_bytes(&scene->tensorf) : scene->grid.entries), vm ? "TensoRF" : "grid",
-         scene->occ_res, scene->occ_res, scene->occ_res);
-  if (vm)
-    printf("%d features of %d x %d x %d points", scene->tensorf.features, res[0], res[1], res[2]);
-  else
-    printf("features of %d levels", scene->grid.levels);
-  if (!fit)
-    printf(", error %.3f %%, %lld grid entries clipped", 100 * report->feature_error, (long long)report->grid_clipped);
-  putchar('\n');
-  for (int l = 0; l < SF_LAYERS; l++) {
-    const fx_layer *layer = &scene->net.layer[l];
-    if (!layer->n_out) continue; /* a decoder has no density net */
-    printf("%s %3d x %-3d LSB %-11.6g", fx_layer_name(l), layer->n_in, layer->n_out, report->layer[l].unit);
-    if (!fit) printf(" error %6.3f %%  %d weights clipped,", 100 * report->layer[l].error, report->layer[l].clipped);
-    printf(" k = %d/%d", layer->k, 1 << SF_LEAK_FRAC);
-    if (layer->theta) printf(", theta = %d", layer->theta);
-    putchar('\n');
-  }
-  printf("packed: %lld bytes at %d-bit weights, %d-bit features, %d-bit leaks, %d-bit grid entries\n",
-         (long long)report->packed_bytes, report->widths.weight_bits, report->widths.feature_bits,
-         report->widths.leak_bits, report->widths.grid_bits);
-  if (report->unused_tuning)
-    printf("note: fine-tuned for %d-bit weights, %d-bit features and %d-bit grid entries; those scales are not used "
-           "here\n",
-           report->unused_tuning, SF_INPUT_BITS, SF_GRID_BITS);
-  if (!fit) printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
-}
-
-static cJSON *layer_json(const fx_layer *layer, const sf_quant_layer *report, bool fit, const char *name)
-{
-  cJSON *item = cJSON_CreateObject();
-  cJSON_AddStringToObject(item, "layer", name);
-  cJSON_AddNumberToObject(item, "n_in", layer->n_in);
-  cJSON_AddNumberToObject(item, "n_out", layer->n_out);
-  cJSON_AddNumberToObject(item, "k", layer->k);
-  cJSON_AddNumberToObject(item, "theta", layer->theta);
-  cJSON_AddNumberToObject(item, "current_lsb", report->unit);
-  if (fit) return item;
-  cJSON_AddNumberToObject(item, "current_error", report->error);
-  cJSON_AddNumberToObject(item, "clipped_weights", report->clipped);
-  return item;
-}
-
-static sf_status print_json(const fx_scene *scene, const sf_quant_report *report, const sf_fit_report *fit,
-                            const export_extras *more, const options *o, long long bytes)
-{
-  cJSON *json = cJSON_CreateObject(), *layers = cJSON_AddArrayToObject(json, "layers");
-  cJSON_AddStringToObject(json, "scene", o->output);
-  cJSON_AddNumberToObject(json, "bytes", (double)bytes);
-  cJSON_AddNumberToObject(json, "t_r", scene->net.steps);
-  cJSON_AddNumberToObject(json, "grid_entries", (double)scene->grid.entries);
-  if (!fit) cJSON_AddNumberToObject(json, "grid_clipped", (double)report->grid_clipped);
-  const bool vm = scene->backbone == FX_TENSORF;
-  cJSON_AddStringToObject(json, "backbone", vm ? "tensorf" : "ingp");
-  if (vm) cJSON_AddNumberToObject(json, "field_bytes", (double)fx_tensorf_bytes(&scene->tensorf));
-  cJSON_AddItemToObject(json, "feature_lsb",
-                        cJSON_CreateDoubleArray(scene->units.feature_scale, vm ? 1 : scene->grid.levels));
-  if (!fit) cJSON_AddNumberToObject(json, "feature_error", report->feature_error);
-  cJSON_AddNumberToObject(json, "direction_lsb", scene->units.dir_scale);
-  cJSON_AddNumberToObject(json, "calibration_samples", report->samples);
-  cJSON_AddNumberToObject(json, "packed_bytes", (double)report->packed_bytes);
-  cJSON_AddNumberToObject(json, "weight_bits", report->widths.weight_bits);
-  cJSON_AddNumberToObject(json, "feature_bits", report->widths.feature_bits);
-  cJSON_AddNumberToObject(json, "leak_bits", report->widths.leak_bits);
-  cJSON_AddNumberToObject(json, "grid_bits", report->widths.grid_bits);
-  for (int l = 0; l < SF_LAYERS; l++)
-    cJSON_AddItemToArray(layers, layer_json(&scene->net.layer[l], &report->layer[l], fit, fx_layer_name(l)));
-  if (fit) cJSON_AddItemToObject(json, "fit", sf_fit_json(fit));
-  export_extras_json(json, more, &o->extra);
-  return sf_json_print(json, true);
 }
 
 /* ---- --fit ---- */
@@ -220,8 +140,12 @@ static sf_status save_and_report(const fx_scene *scene, const options *o, const 
   SF_TRY(fx_scene_save(scene, o->output));
   SF_TRY(file_size(o->output, &bytes));
   SF_TRY(export_extras_write(more, scene, o->output, &o->extra));
-  if (o->json) SF_TRY(print_json(scene, report, fit, more, o, bytes));
-  if (!o->json) print_text(scene, report, fit, o->output, bytes);
+  if (o->json) {
+    cJSON *json = export_report_json(scene, report, fit, o->output, bytes);
+    export_extras_json(json, more, &o->extra);
+    SF_TRY(sf_json_print(json, true));
+  }
+  if (!o->json) export_report_print(scene, report, fit, o->output, bytes);
   if (!o->json && fit) sf_fit_print(stdout, fit);
   if (!o->json) export_extras_print(more, &o->extra);
   return flushed();

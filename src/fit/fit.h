@@ -53,6 +53,9 @@ typedef struct sf_fit_state {
   sf_fit_sum sum;
   double psnr; /* dB against the pictures */
 } sf_fit_state;
+/* sum: of `rays` checking rays. */
+void sf_fit_describe(const fx_scene *scene, const sf_quant_widths *widths, const sf_fit_sum *sum, uint64_t rays,
+                     sf_fit_state *state);
 
 typedef struct sf_fit_report {
   int chosen;                                /* candidate */

@@ -20,7 +20,7 @@ typedef struct ray_state {
 typedef struct worker {
   const sf_model *model;
   const sf_kernels *kernels;
-  sf_net_words *net;
+  const sf_net_words *net; /* of all workers */
   int steps;
   sf_block *block;
   sf_net_scratch *scratch;
@@ -84,15 +84,13 @@ static void render_packet(worker *w, int count)
   }
 }
 
-static worker *worker_create(const sf_model *model, int steps)
+static worker *worker_create(const sf_model *model, const sf_net_words *net, int steps)
 {
   worker *w = sf_aligned_alloc(sizeof *w);
   if (!w) return NULL;
   w->model = model;
   w->kernels = sf_kernels_select(NULL);
-  const sf_net_view net = sf_net_view_of(model);
-  w->net = sf_aligned_alloc(sizeof *w->net);
-  if (w->net) w->kernels->prepare(&net, w->net);
+  w->net = net;
   w->steps = steps;
   w->block = sf_aligned_alloc(sizeof *w->block);
   w->scratch = sf_aligned_alloc(sizeof *w->scratch);
@@ -102,7 +100,6 @@ static worker *worker_create(const sf_model *model, int steps)
 static void worker_free(worker *w)
 {
   if (!w) return;
-  free(w->net);
   free(w->block);
   free(w->scratch);
   free(w);
@@ -118,11 +115,15 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
     return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples);
   sf_steps intervals;
   SF_TRY(sf_steps_make(&intervals, &model->config, 1));
+  sf_net_words *net = sf_aligned_alloc(sizeof *net);
+  if (!net) return sf_fail(SF_E_MEMORY, "render: no memory for the weights");
+  const sf_net_view view = sf_net_view_of(model);
+  sf_kernels_select(NULL)->prepare(&view, net);
   int failed = 0;
 #pragma omp parallel reduction(| : failed)
   {
-    worker *w = worker_create(model, steps);
-    failed = !w || !w->net || !w->block || !w->scratch;
+    worker *w = worker_create(model, net, steps);
+    failed = !w || !w->block || !w->scratch;
     if (!failed) w->intervals = intervals;
 #pragma omp for schedule(dynamic, 1)
     for (size_t first = 0; first < count; first += PACKET) {
@@ -145,5 +146,6 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
     }
     worker_free(w);
   }
+  free(net);
   return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
 }

@@ -14,7 +14,7 @@ typedef struct worker {
   const sf_model *model;
   const sf_kernels *kernels;
   sf_vm_field density, appearance;
-  sf_decoder_words *decoder;
+  const sf_decoder_words *decoder; /* of all workers */
   sf_decoder_block *block;
   sf_net_scratch *scratch;
   sf_vm_samples samples;
@@ -77,7 +77,6 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
 static void worker_free(worker *w)
 {
   if (!w) return;
-  free(w->decoder);
   free(w->block);
   free(w->scratch);
   free(w->samples.x);
@@ -85,7 +84,7 @@ static void worker_free(worker *w)
   free(w);
 }
 
-static worker *worker_create(const sf_model *model, int steps)
+static worker *worker_create(const sf_model *model, const sf_decoder_words *decoder, int steps)
 {
   worker *w = sf_aligned_alloc(sizeof *w);
   if (!w) return NULL;
@@ -94,13 +93,13 @@ static worker *worker_create(const sf_model *model, int steps)
   w->kernels = sf_kernels_select(NULL);
   w->density = sf_vm_field_of(model, false);
   w->appearance = sf_vm_field_of(model, true);
-  w->decoder = sf_aligned_alloc(sizeof *w->decoder);
+  w->decoder = decoder;
   w->block = sf_aligned_alloc(sizeof *w->block);
   w->scratch = sf_aligned_alloc(sizeof *w->scratch);
   float *at = sf_aligned_alloc(6 * SF_RAY_SAMPLES * sizeof *at);
   w->samples = (sf_vm_samples){at, at + 3 * SF_RAY_SAMPLES, at + 4 * SF_RAY_SAMPLES, at + 5 * SF_RAY_SAMPLES,
                                malloc(SF_RAY_SAMPLES * sizeof(int))};
-  if (!w->decoder || !w->block || !w->scratch || !at || !w->samples.lattice) {
+  if (!w->block || !w->scratch || !at || !w->samples.lattice) {
     worker_free(w);
     return NULL;
   }
@@ -108,18 +107,20 @@ static worker *worker_create(const sf_model *model, int steps)
     worker_free(w);
     return NULL;
   }
-  const sf_decoder_view view = sf_decoder_view_of(model);
-  w->kernels->decoder_prepare(&view, w->decoder);
   return w;
 }
 
 sf_status sf_render_tensorf(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
                             const float background[3], float *rgb, float *depth, float *alpha, float *samples)
 {
+  sf_decoder_words *decoder = sf_aligned_alloc(sizeof *decoder);
+  if (!decoder) return sf_fail(SF_E_MEMORY, "render: no memory for the weights");
+  const sf_decoder_view view = sf_decoder_view_of(model);
+  sf_kernels_select(NULL)->decoder_prepare(&view, decoder);
   int failed = 0;
 #pragma omp parallel reduction(| : failed)
   {
-    worker *w = worker_create(model, steps);
+    worker *w = worker_create(model, decoder, steps);
     failed = !w;
 #pragma omp for schedule(dynamic, 1)
     for (size_t first = 0; first < count; first += PACKET) {
@@ -131,5 +132,6 @@ sf_status sf_render_tensorf(const sf_model *model, const float *origin, const fl
     }
     worker_free(w);
   }
+  free(decoder);
   return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
 }

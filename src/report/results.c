@@ -1,6 +1,6 @@
 /* Everything of a reproduction for machines: no date or name of this machine, no path but what a failed run says. */
 #include "report/internal.h"
-#include "energy/energy.h"
+#include "base/json.h"
 #include <math.h>
 
 #define PAPER "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields"

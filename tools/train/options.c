@@ -1,6 +1,5 @@
 #include "tools/train/options.h"
 #include "base/io.h"
-#include "quant/quant.h"
 #include "cli/record.h"
 #include "field/field.h"
 #include <omp.h>

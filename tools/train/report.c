@@ -1,7 +1,7 @@
 #include "tools/train/report.h"
 #include "field/field.h"
 #include "energy/energy.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <math.h>
 
 static double psnr_of(double mse)
