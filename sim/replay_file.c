@@ -1,7 +1,7 @@
 /* Replay files. */
 #include "sim/replay.h"
 #include "energy/energy.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* sf_data: what the programs understand of a folder of posed pictures, and what looks wrong with it. */
 #include "cli/cli.h"
-#include "base/io.h"
+#include "base/json.h"
 #include "scene/scene.h"
 #include <math.h>
 #include <omp.h>

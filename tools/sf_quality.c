@@ -1,7 +1,7 @@
 /* sf_quality: the table of `make quality`. */
 #include "report/quality.h"
 #include "cli/cli.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <stdio.h>
 
 static sf_status report(const sf_quality *q, const char *dir, const char *before, bool as_json)

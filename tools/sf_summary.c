@@ -1,6 +1,6 @@
 /* sf_summary: the reports of one run of the chain in one table and one summary.json. */
 #include "cli/cli.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

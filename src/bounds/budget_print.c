@@ -1,4 +1,3 @@
-#include "energy/energy.h"
 #include "bounds/bounds.h"
 #include <inttypes.h>
 #include <math.h>

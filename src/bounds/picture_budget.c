@@ -1,6 +1,5 @@
 /* What each block of the fixed-point core costs: the same rays with one block at a time in double precision. */
 #include "energy/energy.h"
-#include "image/image.h"
 #include "base/rng.h"
 #include "bounds/exact.h"
 #include <math.h>

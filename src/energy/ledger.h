@@ -28,7 +28,6 @@ typedef enum {
   SF_PRICE_DRAM,         /* dram: of whatever is larger than the largest sram */
   SF_PRICE_FAMILIES
 } sf_price_family;
-extern const char *const sf_price_families[SF_PRICE_FAMILIES]; /* "fp32_mac", ... */
 
 enum { SF_PRICES_MAX = 48 };
 typedef struct sf_technology {

@@ -8,8 +8,8 @@
 enum { FILE_LIMIT = 1 << 20, WIDTH_MAX = 256 };
 static const uint64_t FJ_MAX = 1000000000000; /* 1 mJ: far above any access, and products stay far below 2^63 */
 
-const char *const sf_price_families[SF_PRICE_FAMILIES] = {"fp32_mac",     "fp32_add", "int_add",
-                                                          "int_multiply", "sram",     "dram"};
+static const char *const families[SF_PRICE_FAMILIES] = {"fp32_mac",     "fp32_add", "int_add",
+                                                        "int_multiply", "sram",     "dram"};
 
 static bool has_points(int family)
 {
@@ -26,8 +26,8 @@ typedef struct reader {
 static int family_of(const char *key)
 {
   for (int f = 0; f < SF_PRICE_FAMILIES; f++) {
-    const size_t n = strlen(sf_price_families[f]);
-    if (strncmp(key, sf_price_families[f], n)) continue;
+    const size_t n = strlen(families[f]);
+    if (strncmp(key, families[f], n)) continue;
     if (key[n] == 0 || key[n] == '.') return f;
   }
   return -1;
@@ -83,7 +83,7 @@ static sf_status parse_value(const reader *r, const char *key, const char *value
 /* The number behind the point: a width in bits or a size in bytes. */
 static sf_status parse_point(const reader *r, const char *key, int family, uint32_t *at)
 {
-  const char *digits = key + strlen(sf_price_families[family]);
+  const char *digits = key + strlen(families[family]);
   *at = 0;
   if (!has_points(family)) {
     if (*digits) return sf_fail(SF_E_FORMAT, "%s:%d: key '%s' takes no '%s'", r->path, r->line, key, digits);
@@ -93,8 +93,8 @@ static sf_status parse_point(const reader *r, const char *key, int family, uint3
   const unsigned long limit = family == SF_PRICE_SRAM ? 1u << 31 : WIDTH_MAX;
   const unsigned long value = *digits ? strtoul(digits + 1, &end, 10) : 0;
   if (!end || *end || digits[1] < '0' || digits[1] > '9' || value < 1 || value > limit)
-    return sf_fail(SF_E_FORMAT, "%s:%d: key '%s': expected %s.%s, 1 to %lu", r->path, r->line, key,
-                   sf_price_families[family], family == SF_PRICE_SRAM ? "BYTES" : "BITS", limit);
+    return sf_fail(SF_E_FORMAT, "%s:%d: key '%s': expected %s.%s, 1 to %lu", r->path, r->line, key, families[family],
+                   family == SF_PRICE_SRAM ? "BYTES" : "BITS", limit);
   *at = (uint32_t)value;
   return sf_ok();
 }
@@ -175,9 +175,9 @@ static sf_status check(const sf_technology *t, const char *path)
   if (!t->title[0]) return sf_fail(SF_E_FORMAT, "%s: key 'title' is missing", path);
   for (int f = 0; f < SF_PRICE_FAMILIES; f++) {
     const int n = points(t, f);
-    if (n == 0) return sf_fail(SF_E_FORMAT, "%s: key '%s' is missing", path, sf_price_families[f]);
+    if (n == 0) return sf_fail(SF_E_FORMAT, "%s: key '%s' is missing", path, families[f]);
     if (has_points(f) && n < 2)
-      return sf_fail(SF_E_FORMAT, "%s: key '%s' needs two points to interpolate between", path, sf_price_families[f]);
+      return sf_fail(SF_E_FORMAT, "%s: key '%s' needs two points to interpolate between", path, families[f]);
   }
   return sf_ok();
 }

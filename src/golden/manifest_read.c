@@ -1,5 +1,5 @@
 /* A manifest is read back strictly: what is missing, unknown or contradicts itself is refused. */
-#include "base/io.h"
+#include "base/json.h"
 #include "golden/manifest.h"
 #include <math.h>
 #include <stdlib.h>

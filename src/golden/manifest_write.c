@@ -1,4 +1,4 @@
-#include "base/io.h"
+#include "base/json.h"
 #include "golden/manifest.h"
 #include <math.h>
 

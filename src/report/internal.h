@@ -16,10 +16,8 @@ sf_status sf_report_load_frames(sf_reproduction *r, const char *dir, const char 
 /* t* over the iterations from the trainer's log; a line cut by a kill and lines repeated after a resume are dropped. */
 sf_status sf_report_load_log(const char *path, sf_run *run);
 
-/* Gnuplot: the head of NAME.gp, which writes NAME.svg; a string without what could end it; Okabe and Ito's colours,
- * told apart by all eyes. */
+/* Gnuplot: the head of NAME.gp, which writes NAME.svg; Okabe and Ito's colours, told apart by all eyes. */
 void sf_plot_head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key);
-void sf_plot_quote(char *to, size_t size, const char *from);
 enum { SF_PLOT_COLOURS = 7 };
 extern const char *const sf_plot_colour[SF_PLOT_COLOURS];
 #endif

@@ -1,6 +1,6 @@
 #include "report/quality.h"
 #include "report/internal.h"
-#include "base/io.h"
+#include "base/json.h"
 #include "snn/model.h"
 #include <dirent.h>
 #include <math.h>

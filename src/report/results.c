@@ -1,6 +1,6 @@
 /* Everything of a reproduction for machines: no date or name of this machine, no path but what a failed run says. */
 #include "report/internal.h"
-#include "energy/energy.h"
+#include "base/json.h"
 #include <math.h>
 
 #define PAPER "Adaptive Time-step Training for Enhancing Spike-Based Neural Radiance Fields"
@@ -138,8 +138,7 @@ cJSON *sf_reproduction_json(const sf_reproduction *r)
     cJSON *scene = cJSON_AddObjectToObject(scenes, r->scene[s].name);
     const sf_paper_group *group = sf_reproduction_group(&r->scene[s]);
     if (group) cJSON_AddItemToObject(scene, "paper", group_json(group));
-    for (int i = 0; i < SF_RUNS; i++)
-        cJSON_AddItemToObject(scene, sf_run_kinds[i].name, run_json(r, s, i));
+    for (int i = 0; i < SF_RUNS; i++) cJSON_AddItemToObject(scene, sf_run_kinds[i].name, run_json(r, s, i));
   }
   cJSON *problems = cJSON_AddArrayToObject(json, "problems");
   for (int i = 0; i < r->problems; i++) cJSON_AddItemToArray(problems, cJSON_CreateString(r->problem[i]));

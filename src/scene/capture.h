@@ -39,7 +39,6 @@ typedef struct sf_capture {
   double box_offset[3];
   int32_t aabb_scale; /* edge of the box over that of the unit cube */
 } sf_capture;
-void sf_capture_free(sf_capture *capture);
 /* The frames, from the first on, that say where the scene lies. */
 static inline int sf_capture_guides(const sf_capture *capture)
 {

@@ -7,7 +7,7 @@
 
 const char *const sf_layout_names[] = {"blender", "llff", "colmap", "ingp"};
 
-void sf_capture_free(sf_capture *capture)
+static void capture_free(sf_capture *capture)
 {
   free(capture->frame), free(capture->point);
   memset(capture, 0, sizeof *capture);
@@ -67,7 +67,7 @@ static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_op
                  forward ? "the views face forward, so poses_bounds.npy is used"
                          : "the views do not face forward, so the COLMAP model is used"));
   if (forward) return sf_ok();
-  sf_capture_free(c);
+  capture_free(c);
   return sf_colmap_read(c, data->path, options);
 }
 
@@ -140,7 +140,7 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
   SF_TRY(check_options(dir, options));
   strcpy(data->path, dir);
   const sf_status status = load(data, &capture, split, options);
-  sf_capture_free(&capture);
+  capture_free(&capture);
   if (status.code != SF_OK) sf_dataset_free(data);
   return status;
 }

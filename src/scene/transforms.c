@@ -1,5 +1,5 @@
 /* Blender and instant-ngp layouts: which transforms_*.json lists the views of a split, and what it says of them all. */
-#include "base/io.h"
+#include "base/json.h"
 #include "src/scene/capture.h"
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,5 @@
 #include "tools/train/options.h"
 #include "base/io.h"
-#include "quant/quant.h"
 #include "base/record.h"
 #include <omp.h>
 #include <stdio.h>

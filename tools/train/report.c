@@ -1,6 +1,6 @@
 #include "tools/train/report.h"
 #include "energy/energy.h"
-#include "base/io.h"
+#include "base/json.h"
 #include <math.h>
 
 static double psnr_of(double mse)
