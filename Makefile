@@ -194,7 +194,7 @@ include tests/formal/formal.mk
 include tests/mutate/mutate.mk
 
 house: all ## the order of rooms (README's map), format, sentences of the documents
-	@! command -v python3 >/dev/null || { tools/check_rooms.py $B && tools/check_prose.py README.md docs/*.md rtl/README.md; }
+	@! command -v python3 >/dev/null || { tools/check_rooms.py $B && tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; }
 	@if ! command -v clang-format >/dev/null; then echo "  house: clang-format is not installed, the format is not checked"; \
 	else clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); fi
 
