@@ -16,7 +16,7 @@ trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/nu
 run() {
   local name=$1 start command status verdict
   start=$(date +%s)
-  if [ -x "$build/tests/$name" ]; then
+  if [ -f "$build/tests/$name" ]; then
     command=("$build/tests/$name")
   elif [ -f "$here/chain/$name.sh" ]; then
     command=("$here/chain/$name.sh" "$build")

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BEAT_VALUES = 4, PACKET_VALUES = SF_DIR_MAX + SF_FEATURE_MAX, COUNTER_EVENTS = 8, GLOBAL_LAYER = 7 };
+enum { BEAT_VALUES = 4, PACKET_VALUES = SF_DIR_MAX + SF_FEATURE_MAX, GLOBAL_LAYER = 7 };
 
 typedef struct golden {
   spikefield_scene *owner;
@@ -226,13 +226,10 @@ uint64_t sf_golden_counter(void *handle, int at)
 {
   const golden *g = handle;
   const int event = at / 64, layer = at / 8 % 8, step = at % 8;
-  if (!g || at < 0 || event >= COUNTER_EVENTS) return 0;
+  if (!g || at < 0 || event >= SF_EVENTS) return 0;
   if (layer == GLOBAL_LAYER && event == 0) return step == 0 ? g->counts.samples : step == 1 ? g->counts.rays : 0;
   if (layer >= SF_LAYERS) return 0;
-  const fx_layer_counts *c = &g->counts.layer[layer];
-  const uint64_t *const events[COUNTER_EVENTS] = {c->mac,    c->sop,     c->spikes,  c->updates,
-                                                  c->weight, c->state_r, c->state_w, c->special};
-  return events[event][step];
+  return g->counts.layer[layer].event[event][step];
 }
 
 void sf_golden_clear_counters(void *handle)
