@@ -118,7 +118,7 @@ START_TEST(compaction_keeps_what_light_reaches)
   sf_loss_sums mean = {0};
   double firing[3];
   ck_assert_int_le(sf_batch_blocks(b->marched), b->block_capacity);
-  sf_gradient_nets(t, &plan, &mean, firing);
+  sf_gradient_run(t, &plan, &mean, firing);
   check_layout(b);
   int differ = 0, samples = 0;
   for (int r = 0; r < rays; r++) {

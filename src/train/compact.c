@@ -22,13 +22,14 @@ static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta,
 static void look(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w)
 {
   sf_batch *batch = &t->batch;
+  sf_block *block = w->block;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   for (int b = 0; b < bundle->blocks; b++) {
-    memcpy(w->block[b].f, batch->f + (size_t)(bundle->block + b) * plane, plane * sizeof(float));
-    t->kernels->density(t->net, &w->block[b], p->steps, w->scratch);
+    memcpy(block[b].f, batch->f + (size_t)(bundle->block + b) * plane, plane * sizeof(float));
+    t->kernels->density(t->net, &block[b], p->steps, w->scratch);
   }
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++)
-    batch->ray[r].count = visible(p, &batch->ray[r], batch->delta + batch->ray[r].lane, w->block);
+    batch->ray[r].count = visible(p, &batch->ray[r], batch->delta + batch->ray[r].lane, block);
 }
 
 /* to[block][rows][SF_BLOCK] at lane `at`.. = from at lane `start`.. */

@@ -1,31 +1,12 @@
 /* The hash-grid backbone as the trainer sees it. */
 #include "train/internal.h"
 #include <math.h>
-#include <omp.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { OCCUPANCY_EVERY = 16 };
 
 static const double tuning_rate = 0.1; /* of the learning rates */
-
-static sf_status create_workers(sf_trainer *t)
-{
-  t->worker = calloc((size_t)t->workers, sizeof *t->worker);
-  if (!t->worker) return sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
-  const size_t plane = (size_t)BUNDLE_BLOCKS * SF_T_MAX * SF_BLOCK * sizeof(float);
-  bool ok = (t->net = sf_aligned_alloc(sizeof *t->net)) != NULL;
-  for (int i = 0; i < t->workers; i++) {
-    sf_worker *w = &t->worker[i];
-    w->block = sf_aligned_alloc(BUNDLE_BLOCKS * sizeof *w->block);
-    w->scratch = sf_aligned_alloc(sizeof *w->scratch);
-    w->dsigma = sf_aligned_alloc(plane);
-    w->dcolour = sf_aligned_alloc(3 * plane);
-    SF_TRY(sf_ray_work_create(&w->ray, BUNDLE_BLOCKS * SF_BLOCK));
-    ok = ok && w->block && w->scratch && w->dsigma && w->dcolour;
-  }
-  for (int g = 0; g < GROUPS; g++) ok = (t->group[g].grad = sf_aligned_alloc(sizeof(sf_net_grad))) && ok;
-  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
-}
 
 static sf_status create(sf_trainer *t)
 {
@@ -33,21 +14,13 @@ static sf_status create(sf_trainer *t)
   t->stride = sf_tuning(t) ? 1 : 4;
   t->density = sf_aligned_alloc(sf_config_cells(&t->model.config) * sizeof(float));
   if (!t->density) return sf_fail(SF_E_MEMORY, "train: no memory for the occupancy grid");
-  SF_TRY(create_workers(t));
+  t->net = sf_aligned_alloc(sizeof *t->net);
+  if (!t->net) return sf_fail(SF_E_MEMORY, "train: no memory for the nets");
   return sf_batch_create(&t->batch, t->options.samples, 2 * t->model.config.levels);
 }
 
 static void destroy(sf_trainer *t)
 {
-  for (int i = 0; t->worker && i < t->workers; i++) {
-    free(t->worker[i].block);
-    free(t->worker[i].scratch);
-    free(t->worker[i].ray.memory);
-    free(t->worker[i].dsigma);
-    free(t->worker[i].dcolour);
-  }
-  for (int g = 0; g < GROUPS; g++) free(t->group[g].grad);
-  free(t->worker);
   free(t->net);
   free(t->density);
 }
@@ -60,6 +33,144 @@ static void init(sf_trainer *t)
 static sf_status begin(sf_trainer *t, int steps)
 {
   return t->iteration % OCCUPANCY_EVERY || sf_tuning(t) ? sf_ok() : sf_occupancy_update(t, steps);
+}
+
+/* ---- the samples through both nets, forward and backward ---- */
+
+static void ray_in(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
+{
+  for (int t = 0; t < p->steps; t++) {
+    if (!sf_loss_needs(p, t + 1)) continue;
+    for (int s = 0; s < ray->count; s++) {
+      const sf_block *b = (const sf_block *)w->block + (ray->first + s) / SF_BLOCK;
+      const int lane = (ray->first + s) % SF_BLOCK;
+      w->ray.sigma[t][s] = b->sigma[t][lane];
+      for (int c = 0; c < 3; c++) w->ray.colour[t][3 * s + c] = b->colour[t][c * SF_BLOCK + lane];
+    }
+  }
+}
+
+static void ray_out(const sf_loss_plan *p, const sf_ray *ray, sf_worker *w)
+{
+  for (int t = 0; t < p->steps; t++) {
+    if (!sf_loss_needs(p, t + 1)) continue;
+    for (int s = 0; s < ray->count; s++) {
+      const int block = (ray->first + s) / SF_BLOCK, lane = (ray->first + s) % SF_BLOCK;
+      w->dsigma[(block * SF_T_MAX + t) * SF_BLOCK + lane] = w->ray.dsigma[t][s];
+      for (int c = 0; c < 3; c++)
+        w->dcolour[((block * SF_T_MAX + t) * 3 + c) * SF_BLOCK + lane] = w->ray.dcolour[t][3 * s + c];
+    }
+  }
+}
+
+static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, sf_block *b)
+{
+  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  memcpy(b->f, t->batch.f + (size_t)(bundle->block + index) * plane, plane * sizeof(float));
+}
+
+/* Spherical harmonics of every lane, zeros in those after the last sample; how many lanes hold samples. */
+static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+{
+  const sf_batch *batch = &t->batch;
+  int lane = 0;
+  for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
+    const sf_ray *ray = &batch->ray[r];
+    float sh[SF_DIR_FEATURES];
+    sf_sh4(ray->direction, sh);
+    sf_scales_round_direction(&t->model.scales, sh);
+    for (lane = ray->first; lane < ray->first + ray->count; lane++)
+      for (int i = 0; i < SF_DIR_FEATURES; i++)
+        ((sf_block *)w->block)[lane / SF_BLOCK].sh[i * SF_BLOCK + lane % SF_BLOCK] = sh[i];
+  }
+  for (int l = lane; l < bundle->blocks * SF_BLOCK; l++)
+    for (int i = 0; i < SF_DIR_FEATURES; i++) ((sf_block *)w->block)[l / SF_BLOCK].sh[i * SF_BLOCK + l % SF_BLOCK] = 0;
+  return lane;
+}
+
+static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w, sf_group *g)
+{
+  sf_block *block = w->block;
+  const sf_net_words *net = t->net;
+  const sf_batch *batch = &t->batch;
+  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  const int lanes = load_directions(t, bundle, w);
+  for (int b = 0; b < bundle->blocks; b++) {
+    load_block(t, bundle, b, &block[b]);
+    t->kernels->forward(net, &block[b], p->steps, p->steps, w->scratch);
+  }
+  memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));
+  memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
+  for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
+    ray_in(p, &batch->ray[r], w);
+    sf_loss_ray(p, &batch->ray[r], batch->delta + batch->ray[r].lane, &w->ray, &g->sums);
+    ray_out(p, &batch->ray[r], w);
+  }
+  sf_count_spikes(t, 0, p->steps, block, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
+  for (int b = 0; b < bundle->blocks; b++)
+    t->kernels->backward(net, &block[b], p->steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
+                         w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
+                         batch->df + (size_t)(bundle->block + b) * plane, g->grad, w->scratch);
+}
+
+static void encode(sf_trainer *t)
+{
+  const int levels = t->model.config.levels, parts = 8;
+  const float *table = sf_model_param(&t->model, SF_P_GRID);
+#pragma omp parallel for schedule(dynamic, 1) collapse(2)
+  for (int level = 0; level < levels; level++)
+    for (int part = 0; part < parts; part++)
+      for (int b = t->batch.blocks * part / parts; b < t->batch.blocks * (part + 1) / parts; b++)
+        t->kernels->grid_forward(&t->model.level[level], table, t->batch.x + (size_t)b * 3 * SF_BLOCK,
+                                 t->batch.f + ((size_t)b * levels + level) * 2 * SF_BLOCK);
+}
+
+/* One thread per level, samples in order: no atomics, and the sum does not depend on the threads. Adam follows while
+ * the level's gradient is in the cache. */
+static void grid_gradient(sf_trainer *t, const sf_adam *adam)
+{
+  const int levels = t->model.config.levels;
+  const size_t table = t->model.param[SF_P_GRID].offset;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int level = levels - 1; level >= 0; level--) {
+    const sf_grid_level *l = &t->model.level[level];
+    const size_t first = table + 2 * l->offset;
+    for (int b = 0; b < t->batch.blocks; b++)
+      t->kernels->grid_backward(l, t->batch.x + (size_t)b * 3 * SF_BLOCK,
+                                t->batch.df + ((size_t)b * levels + level) * 2 * SF_BLOCK, t->grad + table);
+    t->kernels->adam(adam, (size_t)2 * l->entries, t->model.value + first, t->grad + first, t->moment1 + first,
+                     t->moment2 + first);
+  }
+}
+
+/* The groups' sum into the flat gradient. */
+static void collect(sf_trainer *t, const void *sum)
+{
+  const sf_net_grad *grad = sum;
+  const sf_model *m = &t->model;
+  const int hidden = m->config.hidden, features = 2 * m->config.levels;
+  float *at[SF_P_COUNT];
+  for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
+  sf_matrix_add(at[SF_P_D1], grad->w1, hidden, features, (features + 15) / 16 * 16);
+  sf_matrix_add(at[SF_P_D2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
+  for (int r = 0; r < hidden; r++) {
+    float *row = at[SF_P_C1] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
+    sf_matrix_add(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
+    sf_matrix_add(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
+  }
+  sf_matrix_add(at[SF_P_C2], grad->w4, hidden, hidden, hidden);
+  for (int r = 0; r < hidden; r++)
+    for (int c = 0; c < hidden; c++) at[SF_P_C2][r * hidden + c] += grad->w4t[c * hidden + r];
+  sf_matrix_add(at[SF_P_C3], grad->w5, 3, hidden, hidden);
+  sf_matrix_add(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
+}
+
+static void prepare(sf_trainer *t, const sf_loss_plan *plan)
+{
+  encode(t);
+  sf_train_prepare(t);
+  sf_batch_compact(t, plan);
+  sf_batch_adapt(t);
 }
 
 static sf_status check(const sf_trainer *t)
@@ -81,7 +192,7 @@ static void update(sf_trainer *t)
 {
   const double fade = (sf_tuning(t) ? tuning_rate : 1) * pow(0.3, t->progress);
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1, 0};
-  sf_gradient_grid(t, &adam);
+  grid_gradient(t, &adam);
   adam.lr = t->options.lr_net * fade;
   const size_t nets = t->model.param[SF_P_NETS].offset;
   t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,
@@ -109,7 +220,12 @@ const sf_backbone sf_backbone_ingp = {.growth = 3e3f,
                                       .init = init,
                                       .begin = begin,
                                       .draw = sf_batch_draw,
-                                      .gradient = sf_gradient_nets,
+                                      .prepare = prepare,
+                                      .bundle = bundle_gradient,
+                                      .collect = collect,
+                                      .block_bytes = sizeof(sf_block),
+                                      .grad_bytes = sizeof(sf_net_grad),
+                                      .ray_samples = BUNDLE_BLOCKS * SF_BLOCK,
                                       .check = check,
                                       .update = update,
                                       .probe = probe};

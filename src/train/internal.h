@@ -88,14 +88,17 @@ sf_status sf_ray_work_create(sf_ray_work *work, int samples);
 void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, const float *delta, sf_ray_work *work,
                  sf_loss_sums *sums);
 
+/* What one of the GROUPS parts of a batch adds up. */
 typedef struct sf_group {
-  sf_net_grad *grad;
+  void *grad; /* sf_backbone.grad_bytes, floats */
   sf_loss_sums sums;
-  double spikes[3], neurons;
+  double spikes[3], neurons; /* of the first block of each bundle */
+  bool wild;                 /* a gradient of the field that is not finite, or far too large */
 } sf_group;
 
+/* Work arrays of one thread. */
 typedef struct sf_worker {
-  sf_block *block; /* [BUNDLE_BLOCKS] */
+  void *block; /* [BUNDLE_BLOCKS] of sf_backbone.block_bytes */
   sf_net_scratch *scratch;
   sf_ray_work ray;
   float *dsigma, *dcolour; /* [BUNDLE_BLOCKS][T][SF_BLOCK], [..][3*SF_BLOCK] */
@@ -134,8 +137,13 @@ typedef struct sf_backbone {
   /* Before an iteration: what is empty, how fine the field is; steps: of the prefix that decides what is empty. */
   sf_status (*begin)(sf_trainer *t, int steps);
   sf_status (*draw)(sf_trainer *t); /* rays and their samples */
-  /* Forward, losses and backward of the batch: adds the nets' gradient to t->grad. mean: losses per ray. */
-  void (*gradient)(sf_trainer *t, const struct sf_loss_plan *plan, struct sf_loss_sums *mean, double firing[3]);
+  /* Of sf_gradient_run: before the bundles; forward, losses and backward of one bundle; the groups' sum to t->grad. */
+  void (*prepare)(sf_trainer *t, const struct sf_loss_plan *plan);
+  void (*bundle)(sf_trainer *t, const struct sf_loss_plan *plan, const struct sf_bundle *bundle,
+                 struct sf_worker *worker, struct sf_group *group);
+  void (*collect)(sf_trainer *t, const void *grad);
+  size_t block_bytes, grad_bytes;          /* of a block of samples with its activations; of a group's gradient */
+  int ray_samples;                         /* that a ray may have */
   sf_status (*check)(const sf_trainer *t); /* the field's gradient is finite */
   void (*update)(sf_trainer *t);           /* Adam on field and nets; clears t->grad */
   /* The inputs of probe `index` at x in [0,1]^3; random numbers of `stream` from `base` on. */
@@ -205,9 +213,12 @@ void sf_batch_pack(sf_batch *batch);
  * does: nothing of them would be seen or learned. Needs the features; moves samples and features together. */
 void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
 
-/* Features, nets and losses of the batch, forward and backward: adds the nets' gradient to trainer->grad and leaves the
- * features' gradient in batch.df. mean: losses per ray. */
-void sf_gradient_nets(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
+/* Work arrays of the threads and groups. Free them even after a failure. */
+sf_status sf_workers_create(sf_trainer *trainer);
+void sf_workers_free(sf_trainer *trainer);
+/* Forward, losses and backward of the batch, bundle by bundle: adds the nets' gradient to trainer->grad and leaves what
+ * the field's needs. mean: losses per ray. */
+void sf_gradient_run(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
 sf_status sf_init_parameters(sf_trainer *trainer);
 
 /* Fine-tuning: the model's scales are settled. */
@@ -253,14 +264,9 @@ sf_status sf_parameters_check(const sf_trainer *trainer);
 /* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */
 sf_status sf_average_update(sf_trainer *trainer, double progress_before);
 sf_status sf_average_reserve(sf_trainer *trainer);
-/* part[GROUPS][n]: adds the others to the first, in order. */
-void sf_groups_add(float *const part[GROUPS], size_t n);
-void sf_sums_add(sf_loss_sums *to, const sf_loss_sums *x, double mean);
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
-/* Membranes [rows][SF_BLOCK] at or above theta in the first `lanes` lanes. */
-int sf_count_spikes(const float *membrane, int rows, int lanes, float theta);
-/* The features' gradient to the hash grid's, and Adam on the grid. */
-void sf_gradient_grid(sf_trainer *trainer, const sf_adam *adam);
+/* Adds the spikes of spiking layers `first`..2 in the first `lanes` lanes of a block. */
+void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *block, int lanes, sf_group *group);
 sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);
 #endif

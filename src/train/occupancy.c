@@ -54,10 +54,11 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
     for (int a = 0; a < 3; a++) x[a * SF_BLOCK + l] = point[a];
   }
   const float *table = sf_model_param(&t->model, SF_P_GRID);
+  sf_block *block = w->block;
   for (int level = 0; level < t->model.config.levels; level++)
-    t->kernels->grid_forward(&t->model.level[level], table, x, w->block->f + 2 * level * SF_BLOCK);
-  t->kernels->density(t->net, w->block, steps, w->scratch);
-  const float *sigma = w->block->sigma[steps - 1];
+    t->kernels->grid_forward(&t->model.level[level], table, x, block->f + 2 * level * SF_BLOCK);
+  t->kernels->density(t->net, block, steps, w->scratch);
+  const float *sigma = block->sigma[steps - 1];
   for (size_t l = 0; l < n; l++) {
     const float width = (float)(1 << cell[l] / cells); /* what counts is how much light a cell takes (instant-ngp) */
     t->density[cell[l]] = fmaxf(t->density[cell[l]] * decay, sigma[l] * width);

@@ -70,6 +70,7 @@ void sf_trainer_free(sf_trainer *t)
 {
   if (!t) return;
   if (t->backbone) t->backbone->destroy(t);
+  sf_workers_free(t);
   free(t->grad);
   free(t->moment1);
   free(t->moment2);
@@ -142,6 +143,7 @@ static sf_status create(sf_trainer *t, const char *resume)
   t->moment2 = sf_aligned_alloc(bytes);
   if (!t->grad || !t->moment1 || !t->moment2)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
+  SF_TRY(sf_workers_create(t));
   SF_TRY(t->backbone->create(t));
   t->stage = stage1_weight(t) > 0 ? 1 : 2;
   t->occupied = 1;
@@ -360,7 +362,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   SF_TRY(check_samples(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
-  t->backbone->gradient(t, &plan, &mean, t->firing);
+  sf_gradient_run(t, &plan, &mean, t->firing);
   const double e_tau = leak_terms(t, &plan, &mean);
   double mse = 0;
   for (int i = 0; i < plan.steps; i++) mse += plan.weight[i] * mean.prefix[i];

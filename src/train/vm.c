@@ -4,28 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static sf_status create_workers(sf_trainer *t)
-{
-  sf_vm *vm = t->vm;
-  bool ok = true;
-  vm->worker = calloc((size_t)t->workers, sizeof *vm->worker);
-  if (!vm->worker) return sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
-  for (int i = 0; i < t->workers; i++) {
-    sf_vm_worker *w = &vm->worker[i];
-    w->block = sf_aligned_alloc(BUNDLE_BLOCKS * sizeof *w->block);
-    w->scratch = sf_aligned_alloc(sizeof *w->scratch);
-    w->dcolour = sf_aligned_alloc((size_t)BUNDLE_BLOCKS * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
-    SF_TRY(sf_ray_work_create(&w->ray, SF_RAY_SAMPLES));
-    for (int step = 1; step < SF_T_MAX; step++) { /* the density is the same at every prefix */
-      w->ray.sigma[step] = w->ray.sigma[0];
-      w->ray.dsigma[step] = w->ray.dsigma[0];
-    }
-    ok = ok && w->block && w->scratch && w->dcolour;
-  }
-  for (int g = 0; g < GROUPS; g++) ok = (vm->group[g].grad = sf_aligned_alloc(sizeof(sf_decoder_grad))) && ok;
-  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
-}
-
 static sf_status create(sf_trainer *t)
 {
   if (t->model.scales.weight_bits)
@@ -37,7 +15,11 @@ static sf_status create(sf_trainer *t)
   vm->decoder = sf_aligned_alloc(sizeof *vm->decoder);
   vm->ray = calloc(RAYS_MAX, sizeof *vm->ray);
   if (!vm->decoder || !vm->ray) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
-  SF_TRY(create_workers(t));
+  for (int i = 0; i < t->workers; i++) /* the density is the same at every prefix */
+    for (int step = 1; step < SF_T_MAX; step++) {
+      t->worker[i].ray.sigma[step] = t->worker[i].ray.sigma[0];
+      t->worker[i].ray.dsigma[step] = t->worker[i].ray.dsigma[0];
+    }
   return sf_batch_create(&t->batch, 0, 0);
 }
 
@@ -45,20 +27,12 @@ static void destroy(sf_trainer *t)
 {
   sf_vm *vm = t->vm;
   if (!vm) return;
-  for (int i = 0; vm->worker && i < t->workers; i++) {
-    free(vm->worker[i].block);
-    free(vm->worker[i].scratch);
-    free(vm->worker[i].ray.memory);
-    free(vm->worker[i].dcolour);
-  }
   for (int g = 0; g < GROUPS; g++) {
-    free(vm->group[g].grad);
     free(vm->part[g].x);
     free(vm->part[g].sigma);
     free(vm->part[g].slope);
     free(vm->part[g].weight);
   }
-  free(vm->worker);
   free(vm->decoder);
   free(vm->ray);
   free(vm->x);
@@ -94,7 +68,7 @@ static sf_status begin(sf_trainer *t, int steps)
 static sf_status check(const sf_trainer *t)
 {
   for (int g = 0; g < GROUPS; g++)
-    if (t->vm->group[g].wild)
+    if (t->group[g].wild)
       return sf_fail(SF_E_RANGE, "train: iteration %lld: gradient of '%s' or '%s' not finite or far too large",
                      (long long)t->iteration, t->model.param[SF_P_DENSITY_PLANE].name,
                      t->model.param[SF_P_APP_PLANE].name);
@@ -116,7 +90,12 @@ const sf_backbone sf_backbone_tensorf = {.growth = 1,
                                          .init = init,
                                          .begin = begin,
                                          .draw = sf_vm_draw,
-                                         .gradient = sf_vm_gradient,
+                                         .prepare = sf_vm_prepare,
+                                         .bundle = sf_vm_bundle,
+                                         .collect = sf_vm_collect,
+                                         .block_bytes = sizeof(sf_decoder_block),
+                                         .grad_bytes = sizeof(sf_decoder_grad),
+                                         .ray_samples = SF_RAY_SAMPLES,
                                          .check = check,
                                          .update = sf_vm_update,
                                          .probe = probe};

@@ -15,20 +15,6 @@ typedef struct sf_vm_ray_samples {
   int part, first, count;
 } sf_vm_ray_samples;
 
-typedef struct sf_vm_worker {
-  sf_decoder_block *block; /* [BUNDLE_BLOCKS] */
-  sf_net_scratch *scratch;
-  sf_ray_work ray;
-  float *dcolour; /* [BUNDLE_BLOCKS][T][3*SF_BLOCK] */
-} sf_vm_worker;
-
-typedef struct sf_vm_group {
-  sf_decoder_grad *grad;
-  sf_loss_sums sums;
-  double spikes[3], neurons;
-  bool wild; /* a gradient that is not finite, or far too large */
-} sf_vm_group;
-
 typedef struct sf_vm {
   sf_vm_field density, appearance; /* of the current parameters */
   sf_decoder_words *decoder;
@@ -36,15 +22,17 @@ typedef struct sf_vm {
   sf_vm_ray_samples *ray; /* [RAYS_MAX] */
   float *x, *dproduct;    /* of the lanes of the batch: [lanes][3], [lanes][products] */
   int lanes_capacity;
-  sf_vm_worker *worker;
-  sf_vm_group group[GROUPS];
   int event;       /* of the schedule, to come */
   int64_t fresh;   /* iteration at which the optimiser started anew */
   double fresh_at; /* progress there */
 } sf_vm;
 
 sf_status sf_vm_draw(sf_trainer *trainer);
-void sf_vm_gradient(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
+/* Those of sf_backbone. */
+void sf_vm_prepare(sf_trainer *trainer, const sf_loss_plan *plan);
+void sf_vm_bundle(sf_trainer *trainer, const sf_loss_plan *plan, const sf_bundle *bundle, sf_worker *worker,
+                  sf_group *group);
+void sf_vm_collect(sf_trainer *trainer, const void *grad);
 void sf_vm_update(sf_trainer *trainer);
 /* Runs what the schedule asks for at the current progress: masks, shrinking, upsampling. */
 sf_status sf_vm_grow(sf_trainer *trainer);

@@ -1,11 +1,10 @@
 /* Forward, losses and backward of one iteration's samples through the decoder, and the field's gradient. */
 #include "train/vm.h"
 #include <math.h>
-#include <omp.h>
 #include <string.h>
 
 /* Directions of every lane, zeros in those after the last sample; how many lanes hold samples. */
-static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_vm_worker *w)
+static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
 {
   const sf_tensorf *f = &t->model.config.tensorf;
   int lane = 0;
@@ -13,16 +12,16 @@ static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_vm_w
     const sf_ray *ray = &t->batch.ray[r];
     const sf_vm_direction d = sf_vm_encode_direction(f, ray->direction);
     for (lane = ray->first; lane < ray->first + ray->count; lane++)
-      sf_vm_put_direction(f, &d, w->block[lane / SF_BLOCK].in, lane % SF_BLOCK);
+      sf_vm_put_direction(f, &d, ((sf_decoder_block *)w->block)[lane / SF_BLOCK].in, lane % SF_BLOCK);
   }
   const sf_vm_direction none = {0};
   for (int l = lane; l < bundle->blocks * SF_BLOCK; l++)
-    sf_vm_put_direction(f, &none, w->block[l / SF_BLOCK].in, l % SF_BLOCK);
+    sf_vm_put_direction(f, &none, ((sf_decoder_block *)w->block)[l / SF_BLOCK].in, l % SF_BLOCK);
   return lane;
 }
 
 /* Densities of all samples of the ray, which every prefix shares; colours where the decoder ran, elsewhere black. */
-static void ray_in(const sf_trainer *t, const sf_loss_plan *p, int r, sf_vm_worker *w)
+static void ray_in(const sf_trainer *t, const sf_loss_plan *p, int r, sf_worker *w)
 {
   const sf_vm_ray_samples *s = &t->vm->ray[r];
   memcpy(w->ray.sigma[0], t->vm->part[s->part].sigma + s->first, (size_t)s->count * sizeof(float));
@@ -33,13 +32,13 @@ static void ray_in(const sf_trainer *t, const sf_loss_plan *p, int r, sf_vm_work
     memset(colour, 0, (size_t)s->count * 3 * sizeof *colour);
     for (int word = 0; word < SF_STEPS_MAX / 64; word++)
       for (uint64_t bits = t->batch.hit[r][word]; bits; bits &= bits - 1, lane++) {
-        const float *from = w->block[lane / SF_BLOCK].net.colour[step] + lane % SF_BLOCK;
+        const float *from = ((const sf_decoder_block *)w->block)[lane / SF_BLOCK].net.colour[step] + lane % SF_BLOCK;
         for (int c = 0; c < 3; c++) colour[3 * (64 * word + __builtin_ctzll(bits)) + c] = from[c * SF_BLOCK];
       }
   }
 }
 
-static void ray_out(sf_trainer *t, const sf_loss_plan *p, int r, sf_vm_worker *w)
+static void ray_out(sf_trainer *t, const sf_loss_plan *p, int r, sf_worker *w)
 {
   const sf_vm_ray_samples *s = &t->vm->ray[r];
   float *g = t->vm->part[s->part].slope + s->first;
@@ -55,16 +54,6 @@ static void ray_out(sf_trainer *t, const sf_loss_plan *p, int r, sf_vm_worker *w
   }
 }
 
-static void count_spikes(const sf_trainer *t, int steps, const sf_block *b, int lanes, sf_vm_group *g)
-{
-  const sf_config *c = &t->model.config;
-  for (int s = 0; s < steps; s++) {
-    g->spikes[1] += sf_count_spikes(b->m3[s], c->hidden, lanes, c->theta[1]);
-    g->spikes[2] += sf_count_spikes(b->m4[s], c->hidden, lanes, c->theta[2]);
-  }
-  g->neurons += (double)steps * c->hidden * lanes;
-}
-
 static bool wild(const float *x, int n)
 {
   int bad = 0;
@@ -72,15 +61,16 @@ static bool wild(const float *x, int n)
   return bad;
 }
 
-static void run_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_vm_worker *w, sf_vm_group *g)
+void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w, sf_group *g)
 {
+  sf_decoder_block *block = w->block;
   sf_vm *vm = t->vm;
   const int products = vm->decoder->view.products;
   const int lanes = load_directions(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,
-                            w->block[b].product, products);
-    t->kernels->decoder_forward(vm->decoder, &w->block[b], p->steps, p->steps, w->scratch);
+                            block[b].product, products);
+    t->kernels->decoder_forward(vm->decoder, &block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
@@ -91,39 +81,30 @@ static void run_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bu
     ray_out(t, p, r, w);
     g->wild |= wild(vm->part[vm->ray[r].part].slope + vm->ray[r].first, whole.count);
   }
-  if (bundle->blocks) count_spikes(t, p->steps, &w->block[0].net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
+  if (bundle->blocks) sf_count_spikes(t, 1, p->steps, &block->net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
   for (int b = 0; b < bundle->blocks; b++) {
     float *dproduct = vm->dproduct + (size_t)(bundle->block + b) * SF_BLOCK * products;
-    t->kernels->decoder_backward(vm->decoder, &w->block[b], p->steps, w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
+    t->kernels->decoder_backward(vm->decoder, &block[b], p->steps, w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
                                  dproduct, g->grad, w->scratch);
     g->wild |= wild(dproduct, SF_BLOCK * products);
   }
 }
 
-static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
+void sf_vm_prepare(sf_trainer *t, const sf_loss_plan *plan)
 {
-#pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int part = 0; part < GROUPS; part++) {
-    sf_vm_group *g = &t->vm->group[part];
-    sf_decoder_grad *grad = g->grad;
-    *g = (sf_vm_group){.grad = grad};
-    memset(grad, 0, sizeof *grad);
-    for (int b = t->batch.bundles * part / GROUPS; b < t->batch.bundles * (part + 1) / GROUPS; b++)
-      run_bundle(t, p, &t->batch.bundle[b], &t->vm->worker[omp_get_thread_num()], g);
-  }
+  (void)plan;
+  const sf_decoder_view view = sf_decoder_view_of(&t->model);
+  t->kernels->decoder_prepare(&view, t->vm->decoder);
+  sf_batch_adapt(t);
 }
 
-/* The groups' sum into the flat gradient. */
-static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing[3])
+void sf_vm_collect(sf_trainer *t, const void *sum)
 {
+  const sf_decoder_grad *grad = sum;
   const sf_model *m = &t->model;
   const sf_decoder_view *v = &t->vm->decoder->view;
   const int hidden = m->config.hidden, rows = (v->inputs + 1 + 15) / 16 * 16;
-  double spikes[3] = {0}, neurons = 0;
-  float *at[SF_P_COUNT], *part[GROUPS];
-  for (int g = 0; g < GROUPS; g++) part[g] = (float *)t->vm->group[g].grad;
-  sf_groups_add(part, sizeof(sf_decoder_grad) / sizeof(float));
-  const sf_decoder_grad *grad = t->vm->group[0].grad;
+  float *at[SF_P_COUNT];
   for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
   sf_matrix_add(at[SF_P_BASIS], grad->basis, v->features, v->columns, v->products);
   sf_matrix_add(at[SF_P_C1], grad->w1, hidden, v->inputs, rows);
@@ -135,20 +116,4 @@ static void reduce(sf_trainer *t, double mean, sf_loss_sums *sums, double firing
   sf_matrix_add(at[SF_P_C3], grad->net.w5, 3, hidden, hidden);
   sf_matrix_add(at[SF_P_C3_BIAS], grad->b3, 1, 3, 3);
   sf_matrix_add(at[SF_P_LEAK], grad->net.leak, 1, SF_LAYERS, SF_LAYERS);
-  for (int n = 0; n < GROUPS; n++) {
-    const sf_vm_group *g = &t->vm->group[n];
-    sf_sums_add(sums, &g->sums, mean);
-    for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
-    neurons += g->neurons;
-  }
-  for (int l = 0; l < 3; l++) firing[l] = neurons > 0 ? spikes[l] / neurons : 0;
-}
-
-void sf_vm_gradient(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
-{
-  const sf_decoder_view view = sf_decoder_view_of(&t->model);
-  t->kernels->decoder_prepare(&view, t->vm->decoder);
-  sf_batch_adapt(t);
-  run_bundles(t, plan);
-  reduce(t, plan->inverse_rays, mean, firing);
 }
