@@ -583,14 +583,14 @@ END_TEST
 /* Smooth blobs: what training makes is smooth, too. */
 static void smooth(sf_model *m)
 {
-  for (int id = 0; id < SF_P_BASIS; id++) {
+  for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) {
     const sf_param *p = &m->param[id];
-    const int n = (int)p->shape[p->dims - 1], width = (int)p->shape[p->dims - 2],
+    const int at = id - SF_P_DENSITY_PLANE, n = (int)p->shape[p->dims - 1], width = (int)p->shape[p->dims - 2],
               height = p->dims == 3 ? (int)p->shape[0] : 1;
     float *value = sf_model_param(m, id);
     for (int c = 0; c < n; c++) {
-      const float u = 3 * test_random((uint64_t)(id * 997 + c)), v = 3 * test_random((uint64_t)(id * 991 + c + 500)),
-                  phase = 3 * test_random((uint64_t)(id * 983 + c + 900)), size = id < 6 ? 1.6f : 1;
+      const float u = 3 * test_random((uint64_t)(at * 997 + c)), v = 3 * test_random((uint64_t)(at * 991 + c + 500)),
+                  phase = 3 * test_random((uint64_t)(at * 983 + c + 900)), size = id < SF_P_APP_PLANE ? 1.6f : 1;
       for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++)
           value[(y * width + x) * n + c] =

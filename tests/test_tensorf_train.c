@@ -51,7 +51,8 @@ static void point(const sf_tensorf *f, int i, float p[3])
     p[a] = f->box[0][a] + (f->box[1][a] - f->box[0][a]) * sf_random_float(11, 1, 3 * (uint64_t)i + a);
 }
 
-/* From n to 2n - 1 points per axis every old point stays one, and bilinear values stay bilinear: nothing changes. */
+/* From n to 2n - 1, 3n - 2 and 4n - 3 points along the axes every old point stays one, and bilinear values stay
+ * bilinear: nothing changes. */
 START_TEST(upsampling_keeps_the_field)
 {
   make_scene(2);
@@ -67,8 +68,8 @@ START_TEST(upsampling_keeps_the_field)
   }
   sf_tensorf_appearance(&t->model, x, features[0]);
   sf_tensorf finer = t->model.config.tensorf;
-  for (int a = 0; a < 3; a++) finer.resolution[a] = 31;
-  ck_good(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){0.5, 0.5, 0.5}));
+  for (int a = 0; a < 3; a++) finer.resolution[a] = (2 + a) * (finer.resolution[a] - 1) + 1;
+  ck_good(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){1.0 / 2, 1.0 / 3, 1.0 / 4}));
   for (int i = 0; i < N; i++) {
     to_box(&t->model.config.tensorf, p[i], x);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), before[i], 1e-5f); /* 48 products of 0.01 */

@@ -41,7 +41,7 @@ static void sample(const float *from, const int64_t size[2], double row, double 
 static void resample_param(const sf_model *from, sf_model *to, int id, const double start[3], const double stride[3])
 {
   const sf_param *p = &from->param[id], *q = &to->param[id];
-  const int *axis = sf_tensorf_axis[id % 3];
+  const int *axis = sf_tensorf_axis[(id - SF_P_DENSITY_PLANE) % 3];
   const bool line = p->dims == 2;
   const int row = line ? axis[2] : axis[1], column = axis[0];
   const int64_t n = q->shape[line ? 1 : 2], columns = line ? 1 : q->shape[1];
