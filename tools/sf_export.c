@@ -70,14 +70,12 @@ static sf_status quantise(const sf_model *model, const char *path, const options
   return sf_ok();
 }
 
-/* The widths that were asked for or that the model was fine-tuned for; when there are none and the scene is to be
- * fitted, narrower ones too. */
-static sf_status quantise_all(const sf_model *model, const char *path, const options *o, candidates *c)
+/* More candidates for the fit: narrower ones, where no widths were asked for or fine-tuned for. */
+static sf_status quantise_narrower(const sf_model *model, const char *path, const options *o, candidates *c)
 {
   const sf_quant_widths *w = &o->widths;
-  SF_TRY(quantise(model, path, o, w, c));
   const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
-  for (int i = 1; i < CANDIDATES && o->fit && o->fit_loss > 0 && !asked; i++) {
+  for (int i = 1; i < CANDIDATES && o->fit_loss > 0 && !asked; i++) {
     const sf_status status = quantise(model, path, o, &narrower[i - 1], c);
     if (status.code == SF_E_UNSUPPORTED) break; /* too narrow for this model */
     SF_TRY(status);
@@ -112,7 +110,9 @@ static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const optio
   return sf_ok();
 }
 
-static sf_status fit_scene(candidates *c, const options *o, sf_fit_report *report)
+/* The data first: what is wrong with it is said before the candidates' turn. */
+static sf_status fit_scene(const sf_model *model, const char *path, candidates *c, const options *o,
+                           sf_fit_report *report)
 {
   sf_dataset data;
   sf_fit_rays rays;
@@ -121,7 +121,8 @@ static sf_status fit_scene(candidates *c, const options *o, sf_fit_report *repor
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   sf_dataset_free(&data);
   if (status.code != SF_OK) return status;
-  status = fit_to_rays(c, &rays, o, report);
+  status = quantise_narrower(model, path, o, c);
+  if (status.code == SF_OK) status = fit_to_rays(c, &rays, o, report);
   sf_fit_rays_free(&rays);
   return status;
 }
@@ -201,19 +202,20 @@ static sf_status export_from(const char *path, const options *o)
   return graph_alone && !is_scene(path) ? export_model_nir(path, o) : export_beside(path, o);
 }
 
-static sf_status fit_and_save(candidates *c, const options *o, export_extras *more)
+static sf_status fit_and_save(const sf_model *model, const char *path, candidates *c, const options *o,
+                              export_extras *more)
 {
   sf_fit_report fit;
-  if (o->fit) SF_TRY(fit_scene(c, o, &fit));
+  if (o->fit) SF_TRY(fit_scene(model, path, c, o, &fit));
   return save_and_report(&c->scene[0], o, &c->report[0], o->fit ? &fit : NULL, more);
 }
 
 static sf_status export_model(const sf_model *model, const char *path, const options *o, candidates *c)
 {
   export_extras more;
-  SF_TRY(quantise_all(model, path, o, c));
+  SF_TRY(quantise(model, path, o, &o->widths, c));
   sf_status status = export_extras_open(&more, &c->scene[0], path, &o->extra);
-  if (status.code == SF_OK) status = fit_and_save(c, o, &more);
+  if (status.code == SF_OK) status = fit_and_save(model, path, c, o, &more);
   export_extras_close(&more);
   return status;
 }
