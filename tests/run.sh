@@ -40,8 +40,14 @@ run() {
   )" # in one piece
 }
 
+# What took longest last time begins, after what is new.
+mapfile -t ordered < <(for name in "$@"; do
+  seconds=99999
+  read -r seconds _ 2>/dev/null <"$logs/$name.result"
+  echo "$seconds $name"
+done 2>/dev/null | sort -s -k1,1nr | cut -d' ' -f2)
 rm -f "$logs"/*.result
-for name in "$@"; do
+for name in "${ordered[@]}"; do
   while [ "$(jobs -rp | wc -l)" -ge "${JOBS:-$(nproc)}" ]; do wait -n; done
   run "$name" &
 done

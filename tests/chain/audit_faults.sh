@@ -1,18 +1,6 @@
 #!/bin/bash
 # Plants a miscount in each of the counts and sees energy_audit catch and locate it. usage: audit_faults.sh BUILD
-set -u
-build=$1
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_audit_faults.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-failures=0
-
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-
-"$build/faults/make_scene" "$work/scene.snn" || exit 1
-"$build/bin/sf_scene" simple -o "$work/data" --size 32 --train 1 --test 2 >/dev/null || exit 1
+. "$(dirname "$0")/../small_scene.bash" "$@"
 
 # expect FAULT STATUS TEXT...: exit status, and each text in the one line on stderr
 expect() {
@@ -48,5 +36,4 @@ expect 6 1 'ray [0-9]+, MAC of layer D1 at step 0: vector core [0-9]+, portable 
 # The accelerator's global counters: a sample, a ray too many.
 expect 7 1 'ray [0-9]+ \(view .*samples: core [0-9]+, accelerator [0-9]+$'
 expect 8 1 'ray [0-9]+ \(view .*rays: core [0-9]+, accelerator [0-9]+$'
-[ $failures -eq 0 ] && echo "6 planted miscounts caught and located, none without a fault"
-exit $((failures > 0))
+finish "6 planted miscounts caught and located, none without a fault"

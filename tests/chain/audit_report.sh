@@ -1,19 +1,7 @@
 #!/bin/bash
 # Reports of energy_audit on a small scene: schemas, sums, comparison, technology files. usage: audit_report.sh BUILD
-set -u
-build=$(cd "$1" && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_audit_report.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-failures=0
-
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-
-"$build/faults/make_scene" "$work/s.snn" || exit 1
-"$build/bin/sf_scene" simple -o "$work/d" --size 32 --train 1 --test 2 >/dev/null || exit 1
-audit() { "$build/bin/energy_audit" "$work/s.snn" "$work/d" --rays 200 --rtl-rays 2 --recount-rays 20 --quiet "$@"; }
+. "$(dirname "$0")/../small_scene.bash" "$@"
+audit() { "$build/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 200 --rtl-rays 2 --recount-rays 20 --quiet "$@"; }
 
 # A technology of one's own: a copy gives the same report, one with another price another, a broken one none.
 audit --json >"$work/a.json" || fail "audit"
@@ -35,14 +23,14 @@ grep -qF "own.tech:$line: key 'dram': unit 'pj'" "$work/err" || fail "not named:
 [ ! -s "$work/out" ] || fail "output in spite of an error"
 
 # A twin of its own: every synapse an fp32 MAC, once for each of the samples that it takes.
-"$build/bin/sf_train" "$work/d" -o "$work/twin.safetensors" --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 \
+"$build/bin/sf_train" "$work/data" -o "$work/twin.safetensors" --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 \
   --threads 1 -q >/dev/null || fail "twin"
 audit --json --twin "$work/twin.safetensors" | tr -d ' \n\t' >"$work/twin.json" || fail "audit with a twin"
 twin() { sed -E "s/.*\"twin\":\{[^}]*\"$1\":([0-9]+).*/\1/" "$work/twin.json"; }
 [ "$(twin samples)" -gt 0 ] && [ "$(twin macs_per_sample)" -gt 0 ] || fail "the twin counts nothing"
 [ "$(twin fj)" -eq $(($(twin samples) * $(twin macs_per_sample) * 4600)) ] || fail "the twin's energy"
 # TensoRF's decoder alone counts, on the samples that reach it: 150 * 128 + 128 * 128 + 128 * 3.
-"$build/bin/sf_train" "$work/d" -o "$work/decoder.safetensors" --backbone tensorf --net ann --stage1 2 --stage2 2 --voxels 16 \
+"$build/bin/sf_train" "$work/data" -o "$work/decoder.safetensors" --backbone tensorf --net ann --stage1 2 --stage2 2 --voxels 16 \
   --threads 1 -q >/dev/null || fail "TensoRF twin"
 audit --json --twin "$work/decoder.safetensors" | tr -d ' \n\t' >"$work/twin.json" || fail "audit with a TensoRF twin"
 [ "$(twin macs_per_sample)" -eq 35968 ] && [ "$(twin samples)" -gt 0 ] || fail "the decoder's synapses"
@@ -50,9 +38,9 @@ audit --json --twin "$work/decoder.safetensors" | tr -d ' \n\t' >"$work/twin.jso
 
 # The prices stand beside the program, wherever the two are.
 mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"
-(cd / && "$work/moved/bin/energy_audit" "$work/s.snn" "$work/d" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"
+(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"
 rm -r "$work/moved/share"
-(cd / && "$work/moved/bin/energy_audit" "$work/s.snn" "$work/d" --rays 20 --rtl-rays 0 -q >/dev/null 2>"$work/err") &&
+(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null 2>"$work/err") &&
   fail "no prices, no error"
 grep -qF "moved/share/spikefield/tech/45nm.tech" "$work/err" || fail "the missing file is not named: $(cat "$work/err")"
 
@@ -66,8 +54,7 @@ done
 if ! command -v python3 >/dev/null; then
   echo "schemas: python3 is not installed, left out"
 else
-  python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/s.snn" "$work/d"
+  python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/scene.snn" "$work/data"
   case $? in 0) ;; 77) echo "schemas: left out" ;; *) fail "schemas" ;; esac
 fi
-[ $failures -eq 0 ] && echo "reports of energy_audit: all as they should be"
-exit $((failures > 0))
+finish "reports of energy_audit: all as they should be"

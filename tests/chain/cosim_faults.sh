@@ -1,18 +1,6 @@
 #!/bin/bash
 # Plants one fault after another in a copy of the RTL and sees sf_cosim catch and locate each. usage: cosim_faults.sh BUILD
-set -u
-build=$1
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_faults.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-failures=0
-
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-
-"$build/faults/make_scene" "$work/scene.snn" || exit 1
-"$build/bin/sf_scene" "${SF_FAULT_SCENE:-simple}" -o "$work/data" --size 32 --train 1 --test 2 >/dev/null || exit 1
+. "$(dirname "$0")/../small_scene.bash" "$@"
 
 # expect FAULT STATUS TEXT...: exit status, and each text in the first difference
 expect() {
@@ -70,5 +58,4 @@ for how in "--replay $work/end.json --evidence $work/end" \
 done
 # A rounding that truncates is one LSB too low.
 [ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
-[ $failures -eq 0 ] && echo "14 planted faults caught and located, none without a fault"
-exit $((failures > 0))
+finish "14 planted faults caught and located, none without a fault"

@@ -1,23 +1,10 @@
 #!/bin/bash
 # sf_cosim over several processes, interrupted, continued, replayed: always the same result. usage: cosim_split.sh BUILD
-set -u
-here=$(cd "$(dirname "$0")" && pwd)
-build=$(cd "$1" && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_split.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
+. "$(dirname "$0")/../small_scene.bash" "$@"
 cd "$work" || exit 1
-failures=0
-
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
 
 # alive PID: a zombie that nobody has waited for has ended
 alive() { ps -o stat= -p "$1" | grep -qv Z; }
-
-"$build/faults/make_scene" scene.snn || exit 1
-"$build/bin/sf_scene" simple -o data --size 32 --train 1 --test 2 >/dev/null || exit 1
 
 # cosim NAME STATUS ARGS...: JSON without what may differ in NAME.json, message in NAME.err
 cosim() {
@@ -119,7 +106,7 @@ sleep 0.5
 for child in $children; do alive "$child" && fail "killed: process $child is still there"; done
 
 # ---- the campaign: every seed its share, totals, JUnit; what is finished is not run again ----
-campaign() { JOBS=2 "$here/../../tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
+campaign() { JOBS=2 "$root/tools/cosim_campaign.sh" "$work/b" scene.snn data 400 "1 2" >campaign.out 2>&1; }
 mkdir -p b/bin && ln -s "$build/faults/sf_cosim" b/bin/sf_cosim
 campaign || fail "campaign: $(cat campaign.out)"
 total=$(sed -nE 's/^([0-9]+) samples over 2 seeds, stalls 20 %, 0 differences.*/\1/p' campaign.out)
@@ -130,5 +117,4 @@ rm b/cosim/campaign.json && mkdir -p b/cosim/campaign.json.part
 campaign && fail "campaign: success without campaign.json"
 grep -q 'campaign.json cannot be written' campaign.out || fail "campaign: $(cat campaign.out)"
 
-[ $failures -eq 0 ] && echo "1, 2, 3 processes, interrupted, continued and replayed: the same result"
-exit $((failures > 0))
+finish "1, 2, 3 processes, interrupted, continued and replayed: the same result"

@@ -1,19 +1,7 @@
 #!/bin/bash
 # docs/golden_tb.sv, built as docs/kit.md says around the RTL with planted faults: it passes without a fault, names what
 # differs with one, and says why a scene cannot be read. usage: golden_bench.sh BUILD
-set -u
-build=$(cd "$1" && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_golden.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-failures=0
-
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-
-"$build/faults/make_scene" "$work/scene.snn" || exit 1
-"$build/bin/sf_scene" simple -o "$work/data" --size 32 --train 1 --test 1 >/dev/null || exit 1
+. "$(dirname "$0")/../small_scene.bash" "$@"
 "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
 rtl=$build/faults/rtl
 # shellcheck disable=SC2046
@@ -41,5 +29,4 @@ run 1 ': 0 tap beats, expected' +fault=15
 run 1 ': surplus tap beat' +fault=16
 mv "$work/scene.snn" "$work/away.snn"
 run 1 'scene.snn: ' +fault=0
-[ $failures -eq 0 ] && echo "the example bench passes beside the golden model and sees planted faults"
-exit $((failures > 0))
+finish "the example bench passes beside the golden model and sees planted faults"

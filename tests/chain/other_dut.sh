@@ -1,21 +1,10 @@
 #!/bin/bash
 # sf_cosim --dut: a top level of another name around another neuron co-simulates with 0 differences; when an included
 # file changes, it is built again and its mistake located; what does not build says where. usage: other_dut.sh BUILD
-set -u
-build=$(cd "$1" && pwd)
-root=$(cd "$(dirname "$0")/../.." && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_other.XXXXXX") || exit 1
+. "$(dirname "$0")/../small_scene.bash" "$@"
 built=()
 trap 'rm -rf "$work" "${built[@]}"' EXIT
-failures=0
 
-fail() {
-  echo "FAILED: $*"
-  failures=$((failures + 1))
-}
-
-"$build/faults/make_scene" "$work/scene.snn" || exit 1
-"$build/bin/sf_scene" simple -o "$work/data" --size 32 --train 1 --test 2 >/dev/null || exit 1
 # The RTL of this build (which may be a variant), in the order of the kit.
 "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
 rtl=$work/kit/rtl
@@ -86,5 +75,4 @@ if [ "$below" != "$build" ]; then
   has shadow.err "built in $build, $build/dut/"
   cmp -s "$work/moved.err" "$work/shadow.err" && fail "no other build for a new file in an include folder"
 fi
-[ $failures -eq 0 ] && echo "another block co-simulates, its mistake is located, what does not build says where"
-exit $((failures > 0))
+finish "another block co-simulates, its mistake is located, what does not build says where"
