@@ -194,9 +194,12 @@ include tests/formal/formal.mk
 include tests/mutate/mutate.mk
 
 house: all ## the order of rooms (README's map), format, sentences of the documents
-	@! command -v python3 >/dev/null || { tools/check_rooms.py $B && tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; }
-	@if ! command -v clang-format >/dev/null; then echo "  house: clang-format is not installed, the format is not checked"; \
-	else clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); fi
+	@if [ -e .git ] && command -v git >/dev/null && command -v python3 >/dev/null; then tools/check_rooms.py $B && \
+	  tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; \
+	else echo "  house: rooms and sentences are not checked: that needs a git checkout, git and python3"; fi
+	@if [ -e .git ] && command -v git >/dev/null && command -v clang-format >/dev/null; then \
+	  clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); \
+	else echo "  house: the format is not checked: that needs a git checkout, git and clang-format"; fi
 
 cppcheck: ## static analysis of the C code
 	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

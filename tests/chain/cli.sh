@@ -1,6 +1,6 @@
 #!/bin/bash
 # Bad input to every program: exit status 2 for usage and 1 for data, exactly one line on stderr that names the option
-# or the file, no partial output, never a crash.   usage: cli.sh BIN_DIR
+# or the file, no partial output, never a crash.   usage: cli.sh BUILD
 set -u
 BIN=$(cd "${1:?usage: cli.sh BUILD}/bin" && pwd) || exit 2
 TOOLS=$(cd "$(dirname "$0")/../../tools" && pwd) || exit 2
