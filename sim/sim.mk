@@ -147,6 +147,10 @@ synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="3
 	@tools/synth.sh $B --rtl $(RTL_ROOT) $(if $(LANES),--lanes "$(LANES)") $(if $(MODULES),--modules "$(MODULES)") $(SYNTH)
 .PHONY: synth
 
+fpga: $(RTL_READY) $(if $(SCENE),$B/bin/sf_cycles) ## place and route for an ECP5: cost, f_max, longest path (MODULES=, SCENE= DATA=; tools from PyPI): build/fpga
+	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(if $(SCENE),--scene "$(SCENE)" --data "$(DATA)") $(FPGA)
+.PHONY: fpga
+
 # Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
 define lanes_rule
 $(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)
