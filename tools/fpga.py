@@ -22,6 +22,22 @@ PACKAGE = "CABGA381"
 BOARD = "sf_ray_top:TAP=0"
 CELLS = {"logic": "TRELLIS_COMB", "flip_flops": "TRELLIS_FF", "multipliers": "MULT18X18D", "block_rams": "DP16KD"}
 BLOCK_RAM_BITS = 18432
+# A tool as WebAssembly, with a stack for the long chains of cells that Yosys walks along recursively.
+LAUNCH = """import ctypes, sys, threading, wasmtime
+from wasmtime import _ffi
+plain = wasmtime.Config
+def deep():
+    config = plain()
+    limit = _ffi.dll.wasmtime_config_async_stack_size_set
+    limit.argtypes, limit.restype = [ctypes.c_void_p, ctypes.c_uint64], None
+    limit(ctypes.cast(config.ptr(), ctypes.c_void_p), 1 << 30)
+    config.max_wasm_stack = 1 << 29
+    return config
+wasmtime.Config = deep
+threading.stack_size(1 << 30)
+tool = sys.argv.pop(1)
+module = __import__("yowasp_" + tool)
+sys.exit(getattr(module, "run_" + tool)(sys.argv[1:]))"""
 CLOCK, RESET = "clk_i", "rst_ni"
 
 
@@ -89,9 +105,8 @@ class Tools:
 
     def run(self, name, arguments, log, cwd):
         """Runs a tool, its output in a log; returns the output. Raises Stop with the tool's own error."""
-        command = ["nice", "-n", "10", os.path.join(self.folder, "bin", "yowasp-" + name), *arguments]
-        # The cache of compiled WebAssembly lies in the environment, not in the user's home.
-        environment = dict(os.environ, XDG_CACHE_HOME=os.path.abspath(os.path.join(self.folder, "cache")))
+        command = ["nice", "-n", "10", os.path.join(self.folder, "bin", "python"), "-c", LAUNCH, name, *arguments]
+        environment = dict(os.environ, YOWASP_CACHE_DIR=os.path.abspath(os.path.join(self.folder, "cache")))
         with open(log, "w", encoding="utf-8") as file:
             done = subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, check=False, cwd=cwd, env=environment)
         output = open(log, encoding="utf-8", errors="replace").read()
@@ -231,7 +246,7 @@ def place(build, tools, arguments, key, say):
     if not kept(report, key):
         say(f"{build.name}: place and route")
         started = time.monotonic()
-        tools.run("nextpnr-ecp5", [f"--{arguments.device}", "--package", PACKAGE, "--speed", arguments.speed, "--json", "netlist.json",
+        tools.run("nextpnr_ecp5", [f"--{arguments.device}", "--package", PACKAGE, "--speed", arguments.speed, "--json", "netlist.json",
                                    "--freq", str(arguments.freq), "--seed", str(arguments.seed), "--report", "timing.json",
                                    "--lpf-allow-unconstrained", "--timing-allow-fail"],
                   build.path("nextpnr.log"), build.folder)
