@@ -7,13 +7,19 @@ module sf_readout (
     input  wire        rst_ni,
     input  wire        clear_i,
     input  wire        decodes_i,        // no densities: 0 is their result
-    // currents of a sample: {step, output}, 16 bits each
-    output wire        density_ready_o,  // they may come in the next cycle
+    // currents of a sample, a step per cycle: promised by begin, complete with last
+    output wire        density_ready_o,
+    input  wire        density_begin_i,
     input  wire        density_valid_i,
-    input  wire [2047:0] density_i,
+    input  wire [ 2:0] density_step_i,
+    input  wire        density_last_i,
+    input  wire [15:0] density_i,
     output wire        colour_ready_o,
+    input  wire        colour_begin_i,
     input  wire        colour_valid_i,
-    input  wire [2047:0] colour_i,
+    input  wire [ 2:0] colour_step_i,
+    input  wire        colour_last_i,
+    input  wire [47:0] colour_i,
     output wire        idle_o,
     input  wire [ 1:0] mode_i,
     input  wire [ 3:0] steps_i,
@@ -38,7 +44,8 @@ module sf_readout (
   // Stage 0 reads a current and scales it; 1 looks up; 2 integrates.
   reg [15:0] density_q[0:7];
   reg [15:0] current_q[0:31];  // {step, colour}
-  reg density_full_q, colour_full_q;
+  reg density_full_q, colour_full_q;    // complete
+  reg density_taken_q, colour_taken_q;  // promised or complete
   reg run_q, colour_q;
   reg [2:0] step_q;
   reg [1:0] out_q;
@@ -101,22 +108,26 @@ module sf_readout (
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 6'd0;
+      {density_taken_q, colour_taken_q, density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 8'd0;
       {queue_room_q, queue_count_q, queue_write_q, queue_read_q} <= {4'(QUEUE), 10'd0};
     end else if (clear_i) begin
-      {density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 6'd0;
+      {density_taken_q, colour_taken_q, density_full_q, colour_full_q, run_q, valid1_q, valid2_q, done_q} <= 8'd0;
       {queue_room_q, queue_count_q, queue_write_q, queue_read_q} <= {4'(QUEUE), 10'd0};
     end else begin
-      if (density_valid_i) density_full_q <= 1'b1;
+      if (density_begin_i) density_taken_q <= 1'b1;
+      else if (run_q && last && !colour_q) density_taken_q <= 1'b0;
+      if (colour_begin_i) colour_taken_q <= 1'b1;
+      else if (run_q && last && colour_q) colour_taken_q <= 1'b0;
+      if (density_valid_i && density_last_i) density_full_q <= 1'b1;
       else if (run_q && last && !colour_q) density_full_q <= 1'b0;
-      if (colour_valid_i) colour_full_q <= 1'b1;
+      if (colour_valid_i && colour_last_i) colour_full_q <= 1'b1;
       else if (run_q && last && colour_q) colour_full_q <= 1'b0;
       run_q <= start_colour || start_density || (run_q && !last);
       valid1_q <= run_q;
       valid2_q <= valid1_q;
       if (valid2_q && last2_q && colour2_q) done_q <= 1'b1;
       else if (out) done_q <= 1'b0;
-      queue_room_q <= queue_room_q + {3'd0, pop} - {3'd0, density_valid_i};
+      queue_room_q <= queue_room_q + {3'd0, pop} - {3'd0, density_begin_i};
       queue_count_q <= queue_count_q + {3'd0, push} - {3'd0, pop};
       if (push) queue_write_q <= queue_write_q + 3'd1;
       if (pop) queue_read_q <= queue_read_q + 3'd1;
@@ -124,13 +135,9 @@ module sf_readout (
   end
 
   always_ff @(posedge clk_i) begin
-    if (density_valid_i) begin
-      for (int t = 0; t < 8; t++) density_q[t] <= density_i[256*t+:16];
-    end
+    if (density_valid_i) density_q[density_step_i] <= density_i;
     if (colour_valid_i) begin
-      for (int t = 0; t < 8; t++) begin
-        for (int o = 0; o < 3; o++) current_q[4*t+o] <= colour_i[256*t+16*o+:16];
-      end
+      for (int o = 0; o < 3; o++) current_q[{colour_step_i, o[1:0]}] <= colour_i[16*o+:16];
     end
     if (start_colour || start_density) begin
       colour_q <= start_colour;
@@ -155,9 +162,9 @@ module sf_readout (
     if (push) queue_q[queue_write_q] <= acc;
   end
 
-  assign density_ready_o = !density_full_q && !density_valid_i && queue_room_q != 4'd0;
-  assign colour_ready_o = !colour_full_q && !colour_valid_i;
-  assign idle_o = !density_full_q && !colour_full_q && !run_q && !valid1_q && !valid2_q && !done_q
+  assign density_ready_o = !density_taken_q && queue_room_q != 4'd0;
+  assign colour_ready_o = !colour_taken_q;
+  assign idle_o = !density_taken_q && !colour_taken_q && !run_q && !valid1_q && !valid2_q && !done_q
       && queue_count_q == 4'd0;
   assign update_o = valid2_q;
   assign update_colour_o = colour2_q;

@@ -5,7 +5,10 @@
 
 module sf_top #(
     parameter TAP = 1,
-    parameter LANES = sf_arch_pkg::LANES  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
+    parameter LANES = sf_arch_pkg::LANES,  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
+    parameter MACS = LANES,         // multipliers of D1 and C1; LANES / MACS parts of a row go one after another
+    parameter NEURONS = 16,         // neuron units
+    parameter STEPS_AT_ONCE = 2     // steps of C2 that are summed up side by side
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -72,12 +75,17 @@ module sf_top #(
   wire [11:0] feature, dir;
   wire hold, core_idle, readout_idle, stall_out;
   wire density_ready, density_valid, colour_ready, colour_valid;
-  wire [2047:0] density_current, colour_current;
-  wire d1_row, c1_row, c1_bias_row, ray;
-  wire [1:0] c2_rows;
-  wire [2:0] c1_step, c2_step, spikes_valid, spikes_step, update_step;
-  wire [15:0] d2_fired, c3_fired;
-  wire [8:0] spikes_count;
+  wire density_begin, density_last, colour_begin, colour_last;
+  wire [2:0] density_step, colour_step;
+  wire [15:0] density_current;
+  wire [47:0] colour_current;
+  wire d1_row, c1_row, c1_bias_row, c1_products, ray;
+  wire [2:0] c1_step, fed_row, fed_bias, neurons_step, update_step;
+  wire [23:0] fed_fired;
+  wire [4:0] busy;
+  wire neurons_valid, neurons_last;
+  wire [1:0] neurons_layer;
+  wire [8:0] neurons_fired;
   wire update, update_colour;
   wire result_valid, result_ready;
   wire [27:0] sigma;
@@ -170,8 +178,11 @@ module sf_top #(
   );
 
   sf_core #(
-      .TAP  (TAP),
-      .LANES(LANES)
+      .TAP          (TAP),
+      .LANES        (LANES),
+      .MACS         (MACS),
+      .NEURONS      (NEURONS),
+      .STEPS_AT_ONCE(STEPS_AT_ONCE)
   ) u_core (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
@@ -198,23 +209,32 @@ module sf_top #(
       .dir_index_o    (dir_index),
       .dir_i          (dir),
       .density_ready_i(density_ready),
+      .density_begin_o(density_begin),
       .density_valid_o(density_valid),
+      .density_step_o (density_step),
+      .density_last_o (density_last),
       .density_o      (density_current),
       .colour_ready_i (colour_ready),
+      .colour_begin_o (colour_begin),
       .colour_valid_o (colour_valid),
+      .colour_step_o  (colour_step),
+      .colour_last_o  (colour_last),
       .colour_o       (colour_current),
       .d1_row_o       (d1_row),
       .c1_row_o       (c1_row),
       .c1_bias_row_o  (c1_bias_row),
+      .c1_products_o  (c1_products),
       .c1_step_o      (c1_step),
-      .c2_rows_o      (c2_rows),
-      .c2_step_o      (c2_step),
-      .d2_fired_o     (d2_fired),
-      .c3_fired_o     (c3_fired),
+      .fed_row_o      (fed_row),
+      .fed_fired_o    (fed_fired),
+      .fed_bias_o     (fed_bias),
+      .busy_o         (busy),
       .ray_o          (ray),
-      .spikes_valid_o (spikes_valid),
-      .spikes_step_o  (spikes_step),
-      .spikes_count_o (spikes_count),
+      .neurons_valid_o(neurons_valid),
+      .neurons_layer_o(neurons_layer),
+      .neurons_step_o (neurons_step),
+      .neurons_last_o (neurons_last),
+      .neurons_fired_o(neurons_fired),
       .stall_o        (stall_out),
       .tap_valid_o    (tap_valid_o),
       .tap_layer_o    (tap_layer_o),
@@ -230,10 +250,16 @@ module sf_top #(
       .clear_i        (soft_reset),
       .decodes_i      (decodes),
       .density_ready_o(density_ready),
+      .density_begin_i(density_begin),
       .density_valid_i(density_valid),
+      .density_step_i (density_step),
+      .density_last_i (density_last),
       .density_i      (density_current),
       .colour_ready_o (colour_ready),
+      .colour_begin_i (colour_begin),
       .colour_valid_i (colour_valid),
+      .colour_step_i  (colour_step),
+      .colour_last_i  (colour_last),
       .colour_i       (colour_current),
       .idle_o         (readout_idle),
       .mode_i         (mode),
@@ -274,18 +300,20 @@ module sf_top #(
       .rst_ni         (rst_ni),
       .n_out_i        (n_out),
       .d1_row_i       (d1_row),
-      .bias_i         (bias[12:11]),
       .c1_row_i       (c1_row),
       .c1_bias_row_i  (c1_bias_row),
+      .c1_products_i  (c1_products),
       .c1_step_i      (c1_step),
-      .c2_rows_i      (c2_rows),
-      .c2_step_i      (c2_step),
-      .d2_fired_i     (d2_fired),
-      .c3_fired_i     (c3_fired),
+      .fed_row_i      (fed_row),
+      .fed_fired_i    (fed_fired),
+      .fed_bias_i     (fed_bias),
+      .busy_i         (busy),
       .ray_i          (ray),
-      .spikes_valid_i (spikes_valid),
-      .spikes_step_i  (spikes_step),
-      .spikes_count_i (spikes_count),
+      .neurons_valid_i(neurons_valid),
+      .neurons_layer_i(neurons_layer),
+      .neurons_step_i (neurons_step),
+      .neurons_last_i (neurons_last),
+      .neurons_fired_i(neurons_fired),
       .update_i       (update),
       .update_colour_i(update_colour),
       .update_step_i  (update_step),
