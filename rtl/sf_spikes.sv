@@ -81,10 +81,12 @@ module sf_spikes #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {taken_q, full_q, write_q, read_q, have_q, valid_q, bias_q} <= 9'd0;
+      full_q <= 2'd0;
+      {taken_q, write_q, read_q, have_q, valid_q, bias_q} <= 7'd0;
       group_q <= {GROUP_BITS{1'b0}};
     end else if (clear_i) begin
-      {taken_q, full_q, write_q, read_q, have_q, valid_q, bias_q} <= 9'd0;
+      full_q <= 2'd0;
+      {taken_q, write_q, read_q, have_q, valid_q, bias_q} <= 7'd0;
       group_q <= {GROUP_BITS{1'b0}};
     end else begin
       taken_q <= taken_q + {1'b0, take_i} - {1'b0, load_last};

@@ -99,11 +99,13 @@ module sf_sums #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {fresh_q, write_q, read_q, full_q} <= 5'b10000;
+      full_q <= 2'd0;
+      {fresh_q, write_q, read_q} <= 3'b100;
       part_q <= {PART_BITS{1'b0}};
       {begun0_q, begun1_q} <= {(16 * PARTS) {1'b0}};
     end else if (clear_i) begin
-      {fresh_q, write_q, read_q, full_q} <= 5'b10000;
+      full_q <= 2'd0;
+      {fresh_q, write_q, read_q} <= 3'b100;
       part_q <= {PART_BITS{1'b0}};
       {begun0_q, begun1_q} <= {(16 * PARTS) {1'b0}};
     end else begin
