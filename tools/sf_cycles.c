@@ -91,7 +91,7 @@ static sf_status run_frame(job *j)
       for (size_t s = 0; s < row[i].count; s++) {
         sf_cycle_model_add(j->model, &row[i].at[s]);
         if (j->latency) continue;
-        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net);
+        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net, &sf_engine_default);
         if (!alone) {
           status = sf_fail(SF_E_MEMORY, "no memory for the cycle model");
           break;
@@ -246,7 +246,7 @@ static sf_status run(job *j)
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has fewer %s views", j->opt.view, j->opt.data,
                    j->opt.split);
-  j->model = sf_cycle_model_create(&j->scene.net);
+  j->model = sf_cycle_model_create(&j->scene.net, &sf_engine_default);
   if (!j->model) return sf_fail(SF_E_MEMORY, "no memory for the cycle model");
   sf_progress_begin(&j->progress, j->opt.quiet);
   const sf_status status = run_frame(j);
