@@ -161,15 +161,15 @@ module sf_core #(
 
   // ---- from a group's turn to its currents: four cycles
   reg [3:0] run_q, last_q;
-  reg [2:0] load_q;
+  reg load_q;
   reg [7:0] run_layer_q;
   reg [11:0] run_step_q;
   reg [4*GROUP_BITS-1:0] run_group_q;
   reg [PART_BITS-1:0] load_part_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {run_q, load_q} <= 7'd0;
-    else if (clear_i) {run_q, load_q} <= 7'd0;
-    else {run_q, load_q} <= {run_q[2:0], run, load_q[1:0], load};
+    if (!rst_ni) {run_q, load_q} <= 5'd0;
+    else if (clear_i) {run_q, load_q} <= 5'd0;
+    else {run_q, load_q} <= {run_q[2:0], run, load};
   end
   always_ff @(posedge clk_i) begin
     last_q <= {last_q[2:0], group_ends};
@@ -181,18 +181,17 @@ module sf_core #(
 
   wire [24*MACS-1:0] values;
   wire [16*MACS-1:0] c2_sums;
-  wire [24*MACS-1:0] c2_values;
+  // The group whose turn it is, of the part that was loaded last.
+  wire [7:0] place = 8'(32'(run_group_q[3*GROUP_BITS+:GROUP_BITS]) % PART_GROUPS);
+  wire [24*NEURONS-1:0] current;
   genvar l;
   generate
-    for (l = 0; l < MACS; l = l + 1) begin : g_lane
-      assign c2_values[24*l+:24] = 24'($signed(c2_sums[16*l+:16])) <<< sf_arch_pkg::AC_FRAC;
+    for (l = 0; l < NEURONS; l = l + 1) begin : g_lane
+      wire [15:0] c2_sum = c2_sums[16*(NEURONS*place+l)+:16];
+      wire [23:0] value = values[24*(NEURONS*place+l)+:24];
+      assign current[24*l+:24] = run_layer_q[6+:2] == C2 ? 24'($signed(c2_sum)) <<< sf_arch_pkg::AC_FRAC : value;
     end
   endgenerate
-  reg [24*MACS-1:0] current_q;  // of a part; the group whose turn it is in the lowest bits
-  always_ff @(posedge clk_i) begin
-    if (load_q[2]) current_q <= run_layer_q[4+:2] == C2 ? c2_values : values;
-    else if (run_q[3]) current_q <= current_q >> (24 * NEURONS);
-  end
 
   wire spikes_valid, spikes_last, neurons_idle;
   wire [1:0] spikes_layer;
@@ -216,7 +215,7 @@ module sf_core #(
       .step_i    (run_step_q[9+:3]),
       .group_i   (run_group_q[3*GROUP_BITS+:GROUP_BITS]),
       .last_i    (last_q[3]),
-      .current_i (current_q[24*NEURONS-1:0]),
+      .current_i (current),
       .valid_o   (spikes_valid),
       .layer_o   (spikes_layer),
       .step_o    (spikes_step),
@@ -469,7 +468,7 @@ module sf_core #(
       .idle_o     (idle_c2),
       .tap_rows_o (c2_rows)
   );
-  assign load_c2 = load_q[0] && run_layer_q[1:0] == C2;
+  assign load_c2 = load_q && run_layer_q[1:0] == C2;
   assign step_c2 = run_step_q[2:0];
   assign last_c2 = released_q;
 
@@ -546,9 +545,9 @@ module sf_core #(
 
   // ---- D2's sums, a step per cycle: the density to the readout, the others as h to C1. h = current >>> H_SHIFT: 16384 >> 3
   // fits 12 bits; with a smaller H_SHIFT the scene's weights see to it.
-  reg [1:0] read_d2_q, read_c3_q;  // a step's sums are there in two cycles, in one
-  reg [5:0] read_d2_step_q, read_c3_step_q;
-  reg [1:0] read_d2_last_q, read_c3_last_q;
+  reg [2:0] read_d2_q, read_c3_q;  // a step's sums are there in three cycles, in two, in one
+  reg [8:0] read_d2_step_q, read_c3_step_q;
+  reg [2:0] read_d2_last_q, read_c3_last_q;
   reg reading_d2_q, reading_c3_q;
   reg [2:0] next_d2_q, next_c3_q;
   wire d2_begins = !reading_d2_q && d2_full && density_ready_i && !h_taken_q[1] && !clear_i;
@@ -559,21 +558,21 @@ module sf_core #(
   assign step_c3 = next_c3_q;
   assign last_d2 = load_d2 && {1'b0, next_d2_q} == steps_i - 4'd1;
   assign last_c3 = load_c3 && {1'b0, next_c3_q} == steps_i - 4'd1;
-  wire h_complete = read_d2_q[1] && read_d2_last_q[1];
+  wire h_complete = read_d2_q[2] && read_d2_last_q[2];
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 12'd0;
+      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 14'd0;
       {h_taken_q, h_full_q, h_write_q, h_read_q} <= 6'd0;
     end else if (clear_i) begin
-      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 12'd0;
+      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 14'd0;
       {h_taken_q, h_full_q, h_write_q, h_read_q} <= 6'd0;
     end else begin
       reading_d2_q <= load_d2 && !last_d2;
       reading_c3_q <= load_c3 && !last_c3;
       if (load_d2) next_d2_q <= last_d2 ? 3'd0 : next_d2_q + 3'd1;
       if (load_c3) next_c3_q <= last_c3 ? 3'd0 : next_c3_q + 3'd1;
-      read_d2_q <= {read_d2_q[0], load_d2};
-      read_c3_q <= {read_c3_q[0], load_c3};
+      read_d2_q <= {read_d2_q[1:0], load_d2};
+      read_c3_q <= {read_c3_q[1:0], load_c3};
       h_taken_q <= h_taken_q + {1'b0, d2_begins} - {1'b0, h_done};
       h_full_q <= h_full_q + {1'b0, h_complete} - {1'b0, h_done};
       if (h_complete) h_write_q <= !h_write_q;
@@ -590,21 +589,21 @@ module sf_core #(
   wire [191:0] h_word = {12'd0, h_q[{h_read_q, h_step}]};
   assign h = h_word[12*h_index+:12];
   always_ff @(posedge clk_i) begin
-    read_d2_step_q <= {read_d2_step_q[2:0], next_d2_q};
-    read_c3_step_q <= {read_c3_step_q[2:0], next_c3_q};
-    read_d2_last_q <= {read_d2_last_q[0], last_d2};
-    read_c3_last_q <= {read_c3_last_q[0], last_c3};
-    if (read_d2_q[1]) h_q[{h_write_q, read_d2_step_q[5:3]}] <= h_sums;
+    read_d2_step_q <= {read_d2_step_q[5:0], next_d2_q};
+    read_c3_step_q <= {read_c3_step_q[5:0], next_c3_q};
+    read_d2_last_q <= {read_d2_last_q[1:0], last_d2};
+    read_c3_last_q <= {read_c3_last_q[1:0], last_c3};
+    if (read_d2_q[2]) h_q[{h_write_q, read_d2_step_q[8:6]}] <= h_sums;
   end
   assign density_begin_o = d2_begins;
-  assign density_valid_o = read_d2_q[1];
-  assign density_step_o = read_d2_step_q[5:3];
-  assign density_last_o = read_d2_last_q[1];
+  assign density_valid_o = read_d2_q[2];
+  assign density_step_o = read_d2_step_q[8:6];
+  assign density_last_o = read_d2_last_q[2];
   assign density_o = d2_sums[15:0];
   assign colour_begin_o = c3_begins;
-  assign colour_valid_o = read_c3_q[1];
-  assign colour_step_o = read_c3_step_q[5:3];
-  assign colour_last_o = read_c3_last_q[1];
+  assign colour_valid_o = read_c3_q[2];
+  assign colour_step_o = read_c3_step_q[8:6];
+  assign colour_last_o = read_c3_last_q[2];
   assign colour_o = c3_sums[47:0];
   assign busy_o = {busy_c3, busy_c2, values_busy[1], busy_d2, values_busy[0]};
 
@@ -612,8 +611,8 @@ module sf_core #(
 
   assign stall_o = (c3_full && !reading_c3_q && !colour_ready_i) || (d2_full && !reading_d2_q && !density_ready_i);
   assign idle_o = values_idle && idle_d2 && idle_c2 && idle_c3 && spikes_idle_d2 && spikes_idle_c2 && spikes_idle_c3
-      && !active_q && run_q == 4'd0 && neurons_idle && !neurons_valid_q && h_taken_q == 2'd0 && read_d2_q == 2'd0
-      && read_c3_q == 2'd0;
+      && !active_q && run_q == 4'd0 && neurons_idle && !neurons_valid_q && h_taken_q == 2'd0 && read_d2_q == 3'd0
+      && read_c3_q == 3'd0;
 
   // Tap: one beat per spiking layer and step, one per sample of D2 and C3, which wait for a cycle without another.
   generate

@@ -29,7 +29,7 @@ module sf_sums #(
     input  wire [                7:0] fired_i,
     input  wire                       last_i,         // of the sample
     output wire                       next_o,
-    // sums of a sample, until released. A load has the adders for itself; two cycles later the sums are there for one cycle
+    // sums of a sample, until released. A load has the adders for itself; its sums are there three cycles later, until the next
     output wire                       full_o,
     input  wire                       load_i,
     input  wire [                2:0] load_step_i,
@@ -59,7 +59,7 @@ module sf_sums #(
   reg [PART_BITS-1:0] part_q;
   reg write_q, read_q;
   reg [1:0] full_q;
-  reg [8*PARTS-1:0] begun0_q, begun1_q;  // of both samples, {part, step}: the sum has been begun
+  reg [8*PARTS-1:0] begun_low_q, begun_high_q;  // of both samples, {part, step}: the sum has been begun
   wire [7:0] steps = fresh_q ? fired_i : left_q;
   wire go = valid_i && !full_q[write_q] && !load_i && !clear_i;
   wire last_part = part_q == part_i;
@@ -102,12 +102,12 @@ module sf_sums #(
       full_q <= 2'd0;
       {fresh_q, write_q, read_q} <= 3'b100;
       part_q <= {PART_BITS{1'b0}};
-      {begun0_q, begun1_q} <= {(16 * PARTS) {1'b0}};
+      {begun_low_q, begun_high_q} <= {(16 * PARTS) {1'b0}};
     end else if (clear_i) begin
       full_q <= 2'd0;
       {fresh_q, write_q, read_q} <= 3'b100;
       part_q <= {PART_BITS{1'b0}};
-      {begun0_q, begun1_q} <= {(16 * PARTS) {1'b0}};
+      {begun_low_q, begun_high_q} <= {(16 * PARTS) {1'b0}};
     end else begin
       if (go) begin
         fresh_q <= ends;
@@ -121,8 +121,8 @@ module sf_sums #(
         full_q[read_q] <= 1'b0;
         read_q <= !read_q;
       end
-      begun0_q <= release_i && !read_q ? {(8 * PARTS) {1'b0}} : begun0_q | (write_q ? {(8 * PARTS) {1'b0}} : begins);
-      begun1_q <= release_i && read_q ? {(8 * PARTS) {1'b0}} : begun1_q | (write_q ? begins : {(8 * PARTS) {1'b0}});
+      begun_low_q <= release_i && !read_q ? {(8 * PARTS) {1'b0}} : begun_low_q | (write_q ? {(8 * PARTS) {1'b0}} : begins);
+      begun_high_q <= release_i && read_q ? {(8 * PARTS) {1'b0}} : begun_high_q | (write_q ? begins : {(8 * PARTS) {1'b0}});
     end
   end
   always_ff @(posedge clk_i) begin
@@ -147,23 +147,29 @@ module sf_sums #(
       .row_o  (row)
   );
   reg [8*ADDERS-1:0] row2_q;
-  always_ff @(posedge clk_i) row2_q <= row;
+  reg moved_q;  // a row comes out of the memory
+  always_ff @(posedge clk_i) if (moved_q) row2_q <= row;
 
-  wire [8*PARTS-1:0] begun_w = write_q ? begun1_q : begun0_q;
-  wire [8*PARTS-1:0] begun_r = read_q ? begun1_q : begun0_q;
+  wire [8*PARTS-1:0] begun_w = write_q ? begun_high_q : begun_low_q;
+  wire [8*PARTS-1:0] begun_r = read_q ? begun_high_q : begun_low_q;
   wire [7:0] begun_part = 8'(begun_w >> (8 * 32'(part_q)));
   wire [7:0] begun_load = 8'(begun_r >> (8 * 32'(load_part_i)));
-  reg [2:0] load1_q, load2_q;
-  always_ff @(posedge clk_i) begin
-    load1_q <= load_step_i;
-    load2_q <= load1_q;
-  end
   wire half = load_i ? read_q : write_q;
   wire [PART_BITS-1:0] part = load_i ? load_part_i : part_q;
-  wire [16*ADDERS-1:0] bank_sums[0:BANKS-1];
+  reg [1:0] load_q;
+  reg [2:0] load1_step_q, load2_step_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) {load_q, moved_q} <= 3'd0;
+    else if (clear_i) {load_q, moved_q} <= 3'd0;
+    else {load_q, moved_q} <= {load_q[0], load_i, go && fresh_q};
+  end
+  always_ff @(posedge clk_i) {load2_step_q, load1_step_q} <= {load1_step_q, load_step_i};
+
+  wire [BANKS-1:0] op2, begun2;
+  wire [PLACE_BITS*BANKS-1:0] place2;
   generate
     for (b = 0; b < BANKS; b = b + 1) begin : g_bank
-      reg op1_q, op2_q, begun1_bank_q, begun2_q;
+      reg op1_q, op2_q, begun1_q, begun2_q;
       reg [PLACE_BITS-1:0] place1_q, place2_q;
       wire [2:0] at = load_i ? load_step_i : step[3*b+:3];
       always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -173,23 +179,30 @@ module sf_sums #(
       end
       always_ff @(posedge clk_i) begin
         place1_q <= PLACE_BITS'({half, at} >> $clog2(BANKS)) * PLACE_BITS'(PARTS) + PLACE_BITS'(part);
-        place2_q <= place1_q;
-        begun1_bank_q <= load_i ? begun_load[load_step_i] : begun_part[step[3*b+:3]];
-        begun2_q <= begun1_bank_q;
+        begun1_q <= load_i ? begun_load[load_step_i] : begun_part[step[3*b+:3]];
+        {place2_q, begun2_q} <= {place1_q, begun1_q};
       end
-      reg [16*ADDERS-1:0] sum_q[0:DEPTH-1];
-      wire [16*ADDERS-1:0] old = sum_q[place2_q] & {(16 * ADDERS) {begun2_q}};
-      wire [16*ADDERS-1:0] next;
-      for (k = 0; k < ADDERS; k = k + 1) begin : g_adder
-        assign next[16*k+:16] = old[16*k+:16] + 16'($signed(row2_q[8*k+:8]));
+      assign op2[b] = op2_q;
+      assign begun2[b] = begun2_q;
+      assign place2[PLACE_BITS*b+:PLACE_BITS] = place2_q;
+    end
+    for (k = 0; k < ADDERS; k = k + 1) begin : g_adder
+      reg [15:0] out_q;
+      wire [16*BANKS-1:0] old;
+      for (b = 0; b < BANKS; b = b + 1) begin : g_bank
+        // verilator tracing_off
+        reg [15:0] sum_q[0:DEPTH-1];
+        // verilator tracing_on
+        wire [PLACE_BITS-1:0] place = place2[PLACE_BITS*b+:PLACE_BITS];
+        always_ff @(posedge clk_i) begin
+          if (op2[b]) sum_q[place] <= (begun2[b] ? sum_q[place] : 16'd0) + 16'($signed(row2_q[8*k+:8]));
+        end
+        assign old[16*b+:16] = begun2[b] ? sum_q[place] : 16'd0;
       end
-      always_ff @(posedge clk_i) begin
-        if (op2_q) sum_q[place2_q] <= next;
-      end
-      assign bank_sums[b] = old;
+      always_ff @(posedge clk_i) if (load_q[1]) out_q <= old[16*(32'(load2_step_q)%BANKS)+:16];
+      assign sums_o[16*k+:16] = out_q;
     end
   endgenerate
-  assign sums_o = bank_sums[32'(load2_q) % BANKS];
 
   reg row_q, bias_row_q, busy_q;
   reg [7:0] fired_q;

@@ -45,7 +45,7 @@ module sf_values #(
     output wire [                3:0] h_index_o,
     input  wire [               11:0] h_i,
     input  wire [               11:0] h_dir_i,        // dir_index_o of its ray
-    // sums: complete until taken. A load has the array for itself; three cycles later its current is there for one cycle
+    // sums: complete until taken. A load has the array for itself; its current is there four cycles later, until the next
     output wire                       d1_full_o,
     output wire                       c1_full_o,
     input  wire                       d1_taken_i,
@@ -54,7 +54,7 @@ module sf_values #(
     input  wire                       load_c1_i,
     input  wire [                2:0] load_step_i,
     input  wire [      PART_BITS-1:0] load_part_i,
-    output wire [        24*MACS-1:0] current_o,
+    output wire [        24*MACS-1:0] current_o,      // saturated
     // events, in the cycle in which they happen
     output wire                       d1_row_o,       // a row read, a product per weight
     output wire                       c1_row_o,       // a row read
@@ -65,8 +65,6 @@ module sf_values #(
     output wire [                1:0] busy_o,         // C1, D1
     output wire                       idle_o
 );
-  `include "sf_round.svh"
-
   localparam PARTS = LANES / MACS;
   localparam C1_ROWS = sf_arch_pkg::FEATURE_MAX;
   localparam BIASES = sf_arch_pkg::FEATURE_MAX + sf_arch_pkg::DIR_MAX;
@@ -178,16 +176,17 @@ module sf_values #(
   reg signed [11:0] value1_q, value2_q;
   reg [SLOT_BITS-1:0] from1_q, from2_q, from3_q, to1_q, to2_q, to3_q;
   reg [8*MACS-1:0] row2_q;
-  reg [20*MACS-1:0] product3_q;
+  reg [2:0] load_q;
   reg [2:0] events_q;  // D1 row, C1 row, C1 biases
   reg products_q, ray_q;
   reg [2:0] event_step_q;
   reg [1:0] busy_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {op1_q, op2_q, op3_q, events_q, products_q, ray_q, busy_q} <= 10'd0;
-    else if (clear_i) {op1_q, op2_q, op3_q, events_q, products_q, ray_q, busy_q} <= 10'd0;
+    if (!rst_ni) {op1_q, op2_q, op3_q, load_q, events_q, products_q, ray_q, busy_q} <= 13'd0;
+    else if (clear_i) {op1_q, op2_q, op3_q, load_q, events_q, products_q, ray_q, busy_q} <= 13'd0;
     else begin
       op1_q <= multiplies;
+      load_q <= {load_q[1:0], load_i};
       op2_q <= op1_q;
       op3_q <= op2_q;
       events_q <= {3{go && is_row && first_part && step_q == 3'd0}}
@@ -208,33 +207,36 @@ module sf_values #(
     {to3_q, to2_q} <= {to2_q, to1_q};
     zero1_q <= zero;
     {zero3_q, zero2_q} <= {zero2_q, zero1_q};
-    row2_q <= row;
+    if (op1_q) row2_q <= row;
   end
 
-  reg [SUM_BITS*MACS-1:0] sum_q[0:SLOTS-1];
-  wire [SUM_BITS*MACS-1:0] sum = sum_q[from3_q];
-  wire [SUM_BITS*MACS-1:0] next;
   genvar l;
   generate
     for (l = 0; l < MACS; l = l + 1) begin : g_lane
-      wire signed [SUM_BITS-1:0] old = sum[SUM_BITS*l+:SUM_BITS];
-      wire signed [19:0] product = product3_q[20*l+:20];
-      assign next[SUM_BITS*l+:SUM_BITS] = (zero3_q ? {SUM_BITS{1'b0}} : old) + SUM_BITS'(product);
-      wire over = old[SUM_BITS-1:23] != {(SUM_BITS - 23) {old[SUM_BITS-1]}};
-      assign current_o[24*l+:24] = over ? {old[SUM_BITS-1], {23{!old[SUM_BITS-1]}}} : old[23:0];
-      always_ff @(posedge clk_i) product3_q[20*l+:20] <= $signed(row2_q[8*l+:8]) * value2_q;
+      // verilator tracing_off
+      reg signed [SUM_BITS-1:0] sum_q[0:SLOTS-1];
+      // verilator tracing_on
+      reg signed [19:0] product3_q;
+      reg [23:0] current_q;
+      always_ff @(posedge clk_i) begin
+        if (op2_q) product3_q <= $signed(row2_q[8*l+:8]) * value2_q;
+        if (op3_q) sum_q[to3_q] <= (zero3_q ? {SUM_BITS{1'b0}} : sum_q[from3_q]) + SUM_BITS'(product3_q);
+        if (load_q[2]) begin
+          if (sum_q[from3_q] > 27'sd8388607) current_q <= 24'h7fffff;
+          else if (sum_q[from3_q] < -27'sd8388608) current_q <= 24'h800000;
+          else current_q <= 24'(sum_q[from3_q]);
+        end
+      end
+      assign current_o[24*l+:24] = current_q;
     end
   endgenerate
-  always_ff @(posedge clk_i) begin
-    if (op3_q) sum_q[to3_q] <= next;
-  end
 
   assign {d1_row_o, c1_row_o, c1_bias_row_o} = events_q;
   assign c1_products_o = products_q;
   assign c1_step_o = event_step_q;
   assign ray_o = ray_q;
   assign busy_o = busy_q;
-  assign idle_o = job_q == NONE && !d1_full_q && !c1_full_q && !op1_q && !op2_q && !op3_q && busy_q == 2'd0 && !ray_q;
+  assign idle_o = job_q == NONE && !d1_full_q && !c1_full_q && !op1_q && !op2_q && !op3_q && load_q == 3'd0 && busy_q == 2'd0 && !ray_q;
 endmodule
 
 `default_nettype wire

@@ -59,7 +59,7 @@ typedef struct sums {
 
 /* Sums of D2 or C3 on their way out, a step per cycle (rtl/sf_core.sv). */
 typedef struct reader {
-  bool reading, way[2], way_last[2];
+  bool reading, way[3], way_last[3];
   uint32_t step;
 } reader;
 
@@ -168,7 +168,7 @@ static bool active(const state *s)
   }
   busy = busy || s->neuron.active || s->neuron.counted;
   for (int i = 0; i < 4 + DEPTH - 1; i++) busy = busy || s->neuron.way[i].valid;
-  for (int i = 0; i < 2; i++) busy = busy || s->read_d2.way[i] || s->read_c3.way[i];
+  for (int i = 0; i < 3; i++) busy = busy || s->read_d2.way[i] || s->read_c3.way[i];
   const readout *r = &s->read;
   return busy || r->density_taken || r->colour_taken || r->run || r->valid[0] || r->valid[1] || r->done || r->count;
 }
@@ -328,6 +328,7 @@ static bool tick_reader(const sf_cycle_model *m, reader *to, const reader *r, bo
   *last = load && r->step + 1 == m->steps;
   to->reading = load && !*last;
   if (load) to->step = *last ? 0 : r->step + 1;
+  to->way[2] = r->way[1], to->way_last[2] = r->way_last[1];
   to->way[1] = r->way[0], to->way_last[1] = r->way_last[0];
   to->way[0] = load, to->way_last[0] = *last;
   return load;
@@ -347,8 +348,8 @@ static void tick_readout(sf_cycle_model *m, state *s, const state *was, bool den
   const bool density_ends = ends && !r->colour, colour_ends = ends && r->colour;
   next->density_taken = density_begins || (r->density_taken && !density_ends);
   next->colour_taken = colour_begins || (r->colour_taken && !colour_ends);
-  next->density_full = (was->read_d2.way[1] && was->read_d2.way_last[1]) || (r->density_full && !density_ends);
-  next->colour_full = (was->read_c3.way[1] && was->read_c3.way_last[1]) || (r->colour_full && !colour_ends);
+  next->density_full = (was->read_d2.way[2] && was->read_d2.way_last[2]) || (r->density_full && !density_ends);
+  next->colour_full = (was->read_c3.way[2] && was->read_c3.way_last[2]) || (r->colour_full && !colour_ends);
   next->run = colour || density || (r->run && !ends);
   if (colour || density)
     next->colour = colour, next->left = m->steps * (colour ? COLOURS : 1);
@@ -388,7 +389,7 @@ static void tick(sf_cycle_model *m)
   tick_spikes(m, s, &was, C2, tick_sums(m, s, &was, C2, was.neuron.load_c2, was.neuron.released));
   tick_spikes(m, s, &was, C3, tick_sums(m, s, &was, C3, c3_load, c3_last));
   s->h_taken += d2_begins;
-  s->h_full += was.read_d2.way[1] && was.read_d2.way_last[1];
+  s->h_full += was.read_d2.way[2] && was.read_d2.way_last[2];
   tick_readout(m, s, &was, d2_begins, c3_begins);
   const bool busy[SF_LAYERS] = {s->mac.busy[0], s->sum[D2].busy, s->mac.busy[1], s->sum[C2].busy, s->sum[C3].busy};
   for (int l = 0; l < SF_LAYERS; l++) m->totals.busy[l] += busy[l];
