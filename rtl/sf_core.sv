@@ -130,7 +130,7 @@ module sf_core #(
   wire want_c1 = c1_full && space_c2;
   wire want_d1 = d1_full && space_d2;
   wire [1:0] layer = active_q ? layer_q : want_c2 ? C2 : want_c1 ? C1 : D1;
-  wire run = (active_q ? wait_q == 3'd0 : want_c2 || want_c1 || want_d1) && !clear_i;
+  wire run = active_q ? wait_q == 3'd0 : want_c2 || want_c1 || want_d1;
   wire [GROUP_BITS-1:0] last_group = layer == C2 ? c2_group_q : layer == C1 ? c1_group_q : d1_group_q;
   wire [PART_BITS-1:0] last_part = layer == C2 ? c2_part_q : layer == C1 ? c1_part_q : d1_part_q;
   wire [PART_BITS-1:0] part = PART_BITS'(32'(group_q) / PART_GROUPS);
@@ -231,7 +231,7 @@ module sf_core #(
   reg [8:0] neurons_fired_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) neurons_valid_q <= 1'b0;
-    else neurons_valid_q <= spikes_valid && !clear_i;
+    else neurons_valid_q <= spikes_valid;
   end
   always_ff @(posedge clk_i) begin
     neurons_last_q <= spikes_last;
@@ -550,8 +550,8 @@ module sf_core #(
   reg [2:0] read_d2_last_q, read_c3_last_q;
   reg reading_d2_q, reading_c3_q;
   reg [2:0] next_d2_q, next_c3_q;
-  wire d2_begins = !reading_d2_q && d2_full && density_ready_i && !h_taken_q[1] && !clear_i;
-  wire c3_begins = !reading_c3_q && c3_full && colour_ready_i && !clear_i;
+  wire d2_begins = !reading_d2_q && d2_full && density_ready_i && !h_taken_q[1];
+  wire c3_begins = !reading_c3_q && c3_full && colour_ready_i;
   assign load_d2 = d2_begins || reading_d2_q;
   assign load_c3 = c3_begins || reading_c3_q;
   assign step_d2 = next_d2_q;

@@ -61,7 +61,7 @@ module sf_sums #(
   reg [1:0] full_q;
   reg [8*PARTS-1:0] begun_low_q, begun_high_q;  // of both samples, {part, step}: the sum has been begun
   wire [7:0] steps = fresh_q ? fired_i : left_q;
-  wire go = valid_i && !full_q[write_q] && !load_i && !clear_i;
+  wire go = valid_i && !full_q[write_q] && !load_i;
   wire last_part = part_q == part_i;
   wire first_part = part_q == {PART_BITS{1'b0}};
 
@@ -165,8 +165,7 @@ module sf_sums #(
   end
   always_ff @(posedge clk_i) {load2_step_q, load1_step_q} <= {load1_step_q, load_step_i};
 
-  wire [BANKS-1:0] op2, begun2;
-  wire [PLACE_BITS*BANKS-1:0] place2;
+  wire [16*ADDERS*BANKS-1:0] olds;
   generate
     for (b = 0; b < BANKS; b = b + 1) begin : g_bank
       reg op1_q, op2_q, begun1_q, begun2_q;
@@ -182,27 +181,23 @@ module sf_sums #(
         begun1_q <= load_i ? begun_load[load_step_i] : begun_part[step[3*b+:3]];
         {place2_q, begun2_q} <= {place1_q, begun1_q};
       end
-      assign op2[b] = op2_q;
-      assign begun2[b] = begun2_q;
-      assign place2[PLACE_BITS*b+:PLACE_BITS] = place2_q;
-    end
-    for (k = 0; k < ADDERS; k = k + 1) begin : g_adder
-      reg [15:0] out_q;
-      wire [16*BANKS-1:0] old;
-      for (b = 0; b < BANKS; b = b + 1) begin : g_bank
-        // verilator tracing_off
-        reg [15:0] sum_q[0:DEPTH-1];
-        // verilator tracing_on
-        wire [PLACE_BITS-1:0] place = place2[PLACE_BITS*b+:PLACE_BITS];
-        always_ff @(posedge clk_i) begin
-          if (op2[b]) sum_q[place] <= (begun2[b] ? sum_q[place] : 16'd0) + 16'($signed(row2_q[8*k+:8]));
+      // verilator tracing_off
+      reg [16*ADDERS-1:0] sum_q[0:DEPTH-1];
+      // verilator tracing_on
+      wire [16*ADDERS-1:0] old = begun2_q ? sum_q[place2_q] : {(16 * ADDERS) {1'b0}};
+      reg [16*ADDERS-1:0] next;  // a name within the operation, not a register
+      always_ff @(posedge clk_i) begin
+        if (op2_q) begin
+          for (int i = 0; i < ADDERS; i++) next[16*i+:16] = old[16*i+:16] + 16'($signed(row2_q[8*i+:8]));
+          sum_q[place2_q] <= next;
         end
-        assign old[16*b+:16] = begun2[b] ? sum_q[place] : 16'd0;
       end
-      always_ff @(posedge clk_i) if (load_q[1]) out_q <= old[16*(32'(load2_step_q)%BANKS)+:16];
-      assign sums_o[16*k+:16] = out_q;
+      assign olds[16*ADDERS*b+:16*ADDERS] = old;
     end
   endgenerate
+  reg [16*ADDERS-1:0] sums_q;
+  always_ff @(posedge clk_i) if (load_q[1]) sums_q <= olds[16*ADDERS*(32'(load2_step_q)%BANKS)+:16*ADDERS];
+  assign sums_o = sums_q;
 
   reg row_q, bias_row_q, busy_q;
   reg [7:0] fired_q;

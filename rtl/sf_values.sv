@@ -94,7 +94,7 @@ module sf_values #(
   wire [1:0] job = job_q != NONE ? job_q
                  : c1_begins ? (decodes_i || h_first_i ? CONSTANTS : STATES)
                  : valid_i && !decodes_i && !d1_full_q ? FEATURES : NONE;
-  wire go = job != NONE && !load_i && !clear_i;
+  wire go = job != NONE && !load_i;
   // The direction is passed on beside the rows of D1; it may be longer than they are.
   wire [7:0] n_dir = first_i ? n_dir_i : 8'd0;
   wire [7:0] n_feature = {2'd0, n_feature_i};
@@ -210,26 +210,33 @@ module sf_values #(
     if (op1_q) row2_q <= row;
   end
 
-  genvar l;
-  generate
-    for (l = 0; l < MACS; l = l + 1) begin : g_lane
-      // verilator tracing_off
-      reg signed [SUM_BITS-1:0] sum_q[0:SLOTS-1];
-      // verilator tracing_on
-      reg signed [19:0] product3_q;
-      reg [23:0] current_q;
-      always_ff @(posedge clk_i) begin
-        if (op2_q) product3_q <= $signed(row2_q[8*l+:8]) * value2_q;
-        if (op3_q) sum_q[to3_q] <= (zero3_q ? {SUM_BITS{1'b0}} : sum_q[from3_q]) + SUM_BITS'(product3_q);
-        if (load_q[2]) begin
-          if (sum_q[from3_q] > 27'sd8388607) current_q <= 24'h7fffff;
-          else if (sum_q[from3_q] < -27'sd8388608) current_q <= 24'h800000;
-          else current_q <= 24'(sum_q[from3_q]);
-        end
-      end
-      assign current_o[24*l+:24] = current_q;
+  // verilator tracing_off
+  reg [SUM_BITS*MACS-1:0] sum_q[0:SLOTS-1];
+  // verilator tracing_on
+  reg [20*MACS-1:0] product3_q;
+  reg [24*MACS-1:0] current_q;
+  wire [SUM_BITS*MACS-1:0] from_row = sum_q[from3_q];
+  reg [SUM_BITS*MACS-1:0] next;  // names within an operation, not registers
+  reg signed [SUM_BITS-1:0] old;
+  always_ff @(posedge clk_i) begin
+    if (op2_q) begin
+      for (int l = 0; l < MACS; l++) product3_q[20*l+:20] <= $signed(row2_q[8*l+:8]) * value2_q;
     end
-  endgenerate
+    if (op3_q) begin
+      for (int l = 0; l < MACS; l++) begin
+        old = zero3_q ? {SUM_BITS{1'b0}} : from_row[SUM_BITS*l+:SUM_BITS];
+        next[SUM_BITS*l+:SUM_BITS] = old + SUM_BITS'($signed(product3_q[20*l+:20]));
+      end
+      sum_q[to3_q] <= next;
+    end
+    if (load_q[2]) begin
+      for (int l = 0; l < MACS; l++) begin
+        old = from_row[SUM_BITS*l+:SUM_BITS];
+        current_q[24*l+:24] <= old > 27'sd8388607 ? 24'h7fffff : old < -27'sd8388608 ? 24'h800000 : old[23:0];
+      end
+    end
+  end
+  assign current_o = current_q;
 
   assign {d1_row_o, c1_row_o, c1_bias_row_o} = events_q;
   assign c1_products_o = products_q;
