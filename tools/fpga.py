@@ -168,7 +168,7 @@ def ports_of(build, tools, sources):
     """[(direction, bits, name)] of the module with its parameters, as Yosys sees them."""
     chosen = "".join(f" -chparam {name} {value}" for name, value in build.parameters.items())
     script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)}; hierarchy -top {build.module}{chosen}; "
-              f"rename -top {build.module}; portlist {build.module}")
+              "rename -top fpga_ports; portlist fpga_ports")
     output = tools.run("yosys", ["-p", script], build.path("ports.log"), build.folder)
     found = re.findall(r"^(input|output|inout) \[(\d+):0\] (\w+)$", output, re.M)
     if not found:
