@@ -193,10 +193,11 @@ include sim/coverage.mk
 include tests/formal/formal.mk
 include tests/mutate/mutate.mk
 
-house: all ## the order of rooms (README's map), format, sentences of the documents
+PAGES := README.md CONTRIBUTING.md $(wildcard docs/*.md docs/notes/*.md) rtl/README.md
+house: all ## the order of rooms (README's map), format, sentences and links of the documents
 	@if [ -e .git ] && command -v git >/dev/null && command -v python3 >/dev/null; then tools/check_rooms.py $B && \
-	  tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; \
-	else echo "  house: rooms and sentences are not checked: that needs a git checkout, git and python3"; fi
+	  tools/check_prose.py $(PAGES) && tools/check_links.py $(PAGES); \
+	else echo "  house: rooms, sentences and links are not checked: that needs a git checkout, git and python3"; fi
 	@if [ -e .git ] && command -v git >/dev/null && command -v clang-format >/dev/null; then \
 	  clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); \
 	else echo "  house: the format is not checked: that needs a git checkout, git and clang-format"; fi
