@@ -49,10 +49,9 @@ static void totals(FILE *out, const sf_page *page)
     fprintf(out, same(n[0], n[1], n[2]) ? "<td class=\"good\">equal</td></tr>\n"
                                         : "<td class=\"bad\">DIFFERENT</td></tr>\n");
   }
-  const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
-  traffic_row(out, s, "field bytes read", "table_bytes", x->table_bytes, y->table_bytes, z->table_bytes);
-  traffic_row(out, s, "exp(\xe2\x88\x92x) of compositing", "exp_neg", x->exp_neg, y->exp_neg, z->exp_neg);
-  traffic_row(out, s, "frame bytes written", "frame_bytes", x->frame_bytes, y->frame_bytes, z->frame_bytes);
+  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
+    traffic_row(out, s, sf_traffic_events[e].title, sf_traffic_events[e].name, s->core_traffic.event[e],
+                s->rtl_traffic.event[e], s->recount_traffic.event[e]);
   const uint64_t fj[3] = {sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount)};
   fprintf(out, "<tr><th>paper ledger, fJ</th><td class=\"n\">");
   html_put_count(out, "rtl_subset.core_fj", fj[0]);
