@@ -27,7 +27,7 @@ static void heat_palette(uint8_t palette[4 * (HEAT + 1)], int colours)
   }
 }
 
-static double plane_value(const sf_golden *g, sf_plane plane, size_t i)
+double html_plane_value(const sf_golden *g, sf_plane plane, size_t i)
 {
   return sf_plane_is_integer(plane) ? sf_golden_int(g, plane)[i] : (double)sf_golden_real(g, plane)[i];
 }
@@ -39,7 +39,7 @@ static sf_status heat_map(FILE *out, const sf_golden *g, sf_plane plane, double 
   if (!index) return sf_fail(SF_E_MEMORY, "no memory for a picture of %d x %d pixels", g->width, g->height);
   heat_palette(palette, HEAT);
   for (size_t i = 0; i < n; i++) {
-    const double x = top > 0 ? plane_value(g, plane, i) / top : 0;
+    const double x = top > 0 ? html_plane_value(g, plane, i) / top : 0;
     index[i] = x > 0 ? (uint8_t)(1 + (int)((HEAT - 1) * (x < 1 ? x : 1) + 0.5)) : 0;
   }
   const sf_status status = html_put_png(out, index, g->width, g->height, palette, HEAT + 1, alt);
@@ -72,34 +72,19 @@ static void colour_bar(FILE *out, const char *id, double top, double scale, cons
   svg_end(out);
 }
 
-static double plane_top(const sf_golden *g, sf_plane plane, double *mean)
-{
-  const size_t n = (size_t)g->width * (size_t)g->height;
-  double top = 0, sum = 0;
-  size_t hits = 0;
-  for (size_t i = 0; i < n; i++) {
-    const double x = plane_value(g, plane, i);
-    top = x > top ? x : top, sum += x, hits += x > 0;
-  }
-  *mean = hits ? sum / (double)hits : 0;
-  return top;
-}
-
 /* ---- the four pictures ---- */
 
-static sf_status golden_picture(FILE *out, const sf_page *page)
+HTML_FUNCTION(golden_picture)
 {
+  const sf_page *page = ((const html_view *)user)->page;
   const sf_golden *g = &page->golden;
   const size_t n = (size_t)g->width * (size_t)g->height;
   uint8_t *rgb = malloc(3 * n);
+  (void)value;
   if (!rgb) return sf_fail(SF_E_MEMORY, "no memory for a picture of %d x %d pixels", g->width, g->height);
   for (size_t i = 0; i < n; i++)
     for (int c = 0; c < 3; c++)
       rgb[3 * i + (size_t)c] = (uint8_t)((sf_golden_int(g, SF_PLANE_FX_R + c)[i] * 255u + 32767u) / 65535u);
-  html_figure_begin(out, "fig-golden", "", "Golden image.",
-                    "What the fixed-point core computes, bit for bit what the accelerator computes. The ring marks "
-                    "the ray whose spikes are shown below.");
-  fprintf(out, "<div class=\"plate\">");
   const sf_status status =
       html_put_png(out, rgb, g->width, g->height, NULL, 0, "The view as the fixed-point core renders it");
   if (page->ray.samples > 0)
@@ -108,57 +93,61 @@ static sf_status golden_picture(FILE *out, const sf_page *page)
             "class=\"halo\"/><circle cx=\"%g\" cy=\"%g\" r=\"%g\" class=\"ring\"/></svg>",
             g->width, g->height, page->ray.x + 0.5, page->ray.y + 0.5, g->width * 0.02, page->ray.x + 0.5,
             page->ray.y + 0.5, g->width * 0.02);
-  fprintf(out, "</div>\n");
-  html_figure_end(out);
   free(rgb);
   return status;
 }
 
-static sf_status energy_picture(FILE *out, const sf_page *page)
+HTML_FUNCTION(energy_map)
 {
-  static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ"};
-  double mean, scale = 1;
-  const double top = plane_top(&page->golden, SF_PLANE_ENERGY, &mean);
-  int u = 0;
-  char caption[300], a[HTML_NUMBER], b[HTML_NUMBER];
-  for (; u < 4 && top / scale >= 1000; u++) scale *= 1000;
-  snprintf(caption, sizeof caption,
-           "Paper ledger. %s at most, %s on average where there are samples; nothing where the ray meets only empty "
-           "space (grey).",
-           html_energy(a, top), html_energy(b, mean));
-  html_figure_begin(out, "fig-energy-map", "", "Energy per pixel.", caption);
-  fprintf(out, "<div class=\"plate\">");
-  SF_TRY(heat_map(out, &page->golden, SF_PLANE_ENERGY, top, "Heat map of the energy of every pixel"));
-  fprintf(out, "</div>\n");
-  if (top > 0) colour_bar(out, "svg-energy-scale", top, scale, unit[u]);
-  html_figure_end(out);
-  return sf_ok();
+  html_view *v = user;
+  (void)value;
+  return heat_map(out, &v->page->golden, SF_PLANE_ENERGY, html_real(v, "page.energy_map.most"),
+                  "Heat map of the energy of every pixel");
 }
 
-static sf_status samples_picture(FILE *out, const sf_page *page)
+HTML_FUNCTION(energy_scale)
 {
-  double mean;
-  const double top = plane_top(&page->golden, SF_PLANE_SAMPLES, &mean);
-  char caption[400];
-  snprintf(
-      caption, sizeof caption,
-      "Points at which the network was asked: %.0f at most, %.1f on average where there are any (grey: none). Specks "
-      "beside the scene are samples in empty space that the occupancy grid takes for occupied.",
-      top, mean);
-  html_figure_begin(out, "fig-samples-map", "", "Samples per pixel.", caption);
-  fprintf(out, "<div class=\"plate\">");
-  SF_TRY(heat_map(out, &page->golden, SF_PLANE_SAMPLES, top, "Heat map of the samples of every pixel"));
-  fprintf(out, "</div>\n");
-  if (top > 0) colour_bar(out, "svg-samples-scale", top, 1, "samples");
-  html_figure_end(out);
-  return sf_ok();
+  html_view *v = user;
+  double scale, top = html_real(v, "page.energy_map.most");
+  const char *unit = html_unit(top, &scale);
+  (void)value;
+  colour_bar(out, "svg-energy-scale", top, scale, unit);
+  return v->status;
 }
 
-static void step_legend(FILE *out, const uint64_t of[SF_T_MAX + 1])
+HTML_FUNCTION(samples_map)
+{
+  html_view *v = user;
+  (void)value;
+  return heat_map(out, &v->page->golden, SF_PLANE_SAMPLES, html_real(v, "page.samples_map.most"),
+                  "Heat map of the samples of every pixel");
+}
+
+HTML_FUNCTION(samples_scale)
+{
+  html_view *v = user;
+  (void)value;
+  colour_bar(out, "svg-samples-scale", html_real(v, "page.samples_map.most"), 1, "samples");
+  return v->status;
+}
+
+HTML_FUNCTION(steps_map)
+{
+  const sf_page *page = ((const html_view *)user)->page;
+  uint8_t palette[4 * (HEAT + 1)];
+  (void)value;
+  heat_palette(palette, SF_T_MAX);
+  return html_put_png(out, page->steps, page->golden.width, page->golden.height, palette, SF_T_MAX + 1,
+                      "Map of the number of time steps that every pixel needs");
+}
+
+HTML_FUNCTION(steps_scale)
 {
   enum { CELL = 60 };
-  uint64_t hits = 0;
-  for (int t = 1; t <= SF_T_MAX; t++) hits += of[t];
+  html_view *v = user;
+  double hits = 0;
+  (void)value;
+  for (int t = 1; t <= SF_T_MAX; t++) hits += html_real(v, "page.steps_needed[%d]", t);
   svg_begin(out, "svg-steps-scale", 480, 50, "Colours of the steps", "Share of the pixels that need t steps");
   for (int t = 1; t <= SF_T_MAX; t++) {
     uint8_t rgb[3];
@@ -166,42 +155,9 @@ static void step_legend(FILE *out, const uint64_t of[SF_T_MAX + 1])
     fprintf(out, "<rect x=\"%d\" y=\"4\" width=\"%d\" height=\"12\" fill=\"#%02x%02x%02x\"/>\n", (t - 1) * CELL,
             CELL - 2, rgb[0], rgb[1], rgb[2]);
     svg_text(out, (t - 0.5) * CELL - 1, 32, "num mid", "t = %d", t);
-    svg_text(out, (t - 0.5) * CELL - 1, 48, "num mid mut", "%.1f %%", hits ? 100.0 * (double)of[t] / (double)hits : 0);
+    svg_text(out, (t - 0.5) * CELL - 1, 48, "num mid mut", "%.1f %%",
+             hits > 0 ? 100.0 * html_real(v, "page.steps_needed[%d]", t) / hits : 0);
   }
   svg_end(out);
-}
-
-static sf_status steps_picture(FILE *out, const sf_page *page)
-{
-  uint64_t of[SF_T_MAX + 1] = {0};
-  uint8_t palette[4 * (HEAT + 1)];
-  const size_t n = (size_t)page->golden.width * (size_t)page->golden.height;
-  if (!page->steps) return sf_ok();
-  heat_palette(palette, SF_T_MAX);
-  for (size_t i = 0; i < n; i++) of[page->steps[i]]++;
-  html_figure_begin(out, "fig-steps-map", "", "Time steps a pixel needs.",
-                    "Fewest steps after which its colour is within 4/255 of the nearest it comes to the photograph at "
-                    "any t = 1..8; below, shares of the pixels that have samples. The network runs t<sub>r</sub> "
-                    "steps everywhere: the budget that it was trained with weighs quality against energy "
-                    "(by \xce\xb2) and its weights were fitted to it, so that t<sub>r</sub> may exceed what most "
-                    "pixels need.");
-  fprintf(out, "<div class=\"plate\">");
-  SF_TRY(html_put_png(out, page->steps, page->golden.width, page->golden.height, palette, SF_T_MAX + 1,
-                      "Map of the number of time steps that every pixel needs"));
-  fprintf(out, "</div>\n");
-  step_legend(out, of);
-  html_figure_end(out);
-  return sf_ok();
-}
-
-sf_status html_pictures(FILE *out, const sf_page *page)
-{
-  fprintf(out,
-          "<section id=\"pictures\">\n<h2>The view, and what each pixel costs</h2>\n<div class=\"grid pictures\">\n");
-  SF_TRY(golden_picture(out, page));
-  SF_TRY(energy_picture(out, page));
-  SF_TRY(samples_picture(out, page));
-  SF_TRY(steps_picture(out, page));
-  fprintf(out, "</div>\n</section>\n");
-  return sf_ok();
+  return v->status;
 }
