@@ -240,6 +240,25 @@ START_TEST(a_page_of_a_decoder)
 }
 END_TEST
 
+/* The energies per sample, over all samples, are the energy of the view; their map is not that of the samples. */
+static void check_maps(const fixture *f)
+{
+  cJSON *json = sf_page_json(&f->page);
+  const double least = sf_json_number(json_at(json, "page.energy_per_sample"), "least_fj");
+  const double most = sf_json_number(json_at(json, "page.energy_per_sample"), "most_fj");
+  const double mean = sf_json_number(json_at(json, "page.energy_per_sample"), "mean_fj");
+  const double fj = (double)f->report.ledger.spiking_fj, samples = (double)f->report.measure.core.samples;
+  ck_assert(least > 0 && least < mean && mean < most);
+  ck_assert_double_eq_tol(mean * samples, fj, 1e-6 * fj);
+  cJSON_Delete(json);
+  char *energy = element(f->text, "figure", "fig-energy-map"), *number = element(f->text, "figure", "fig-samples-map");
+  ck_assert(energy && number);
+  const char *a = strstr(energy, "base64,"), *b = strstr(number, "base64,");
+  ck_assert(a && b);
+  ck_assert_uint_ne(strcspn(a, "\"") == strcspn(b, "\"") && !strncmp(a, b, strcspn(a, "\"")), 1);
+  free(energy), free(number);
+}
+
 /* What the pictures and the counts say of the same view is the same. */
 START_TEST(pictures_agree_with_the_audit)
 {
@@ -260,6 +279,7 @@ START_TEST(pictures_agree_with_the_audit)
     for (int t = 0; t < SF_T_MAX; t++)
       for (int o = 0; o < SF_LANES; o++) neurons += p->neuron[l][t][o];
   ck_assert_uint_eq(neurons, spikes);
+  check_maps(&f);
   ck_assert_int_gt(p->ray.samples, 0);
   ck_assert_uint_eq((unsigned)p->ray.all, sf_golden_int(&p->golden, SF_PLANE_SAMPLES)[p->ray.y * WIDTH + p->ray.x]);
   f.report.measure.core.layer[FX_C2].sop[1]++;

@@ -47,7 +47,9 @@ void svg_percents(FILE *out, double x0, double x1, double width, double y); /* l
 /* Step of an axis that gives at most `most` intervals up to `span`: 1, 2 or 5 times a power of ten. */
 double svg_tick(double span, int most);
 
-double html_plane_value(const sf_golden *golden, sf_plane plane, size_t pixel);
+/* What a heat map shows of a pixel: its samples; the energy of one of them, 0 without any. */
+typedef double html_pixel(const sf_golden *golden, size_t pixel);
+html_pixel html_samples, html_sample_fj;
 /* Prices of one event, by part and row, and how they come about. */
 void html_add_units(cJSON *json, const sf_page *page);
 

@@ -85,26 +85,30 @@ static void add_rates(cJSON *json, const sf_page *page)
   }
 }
 
-/* Largest value of the pixels, mean of those that have samples. */
-static void add_map(cJSON *json, const char *key, const sf_golden *golden, sf_plane plane)
+static void add_maps(cJSON *json, const sf_golden *golden)
 {
   const size_t n = (size_t)golden->width * (size_t)golden->height;
-  double most = 0, sum = 0;
+  double least = INFINITY, most = 0, fj = 0, samples = 0, most_samples = 0;
   size_t hits = 0;
   for (size_t i = 0; i < n; i++) {
-    const double x = html_plane_value(golden, plane, i);
-    most = fmax(most, x), sum += x, hits += x > 0;
+    const double x = html_samples(golden, i), each = html_sample_fj(golden, i);
+    if (!(x > 0)) continue;
+    least = fmin(least, each), most = fmax(most, each), most_samples = fmax(most_samples, x);
+    fj += x * each, samples += x, hits++;
   }
-  cJSON *map = cJSON_AddObjectToObject(json, key);
-  cJSON_AddNumberToObject(map, "most", most);
-  cJSON_AddNumberToObject(map, "mean", hits ? sum / (double)hits : 0);
+  cJSON *energy = cJSON_AddObjectToObject(json, "energy_per_sample");
+  cJSON_AddNumberToObject(energy, "least_fj", hits ? least : 0);
+  cJSON_AddNumberToObject(energy, "most_fj", most);
+  cJSON_AddNumberToObject(energy, "mean_fj", hits ? fj / samples : 0);
+  cJSON *pixel = cJSON_AddObjectToObject(json, "samples_per_pixel");
+  cJSON_AddNumberToObject(pixel, "most", most_samples);
+  cJSON_AddNumberToObject(pixel, "mean", hits ? samples / (double)hits : 0);
 }
 
 static void add_pictures(cJSON *json, const sf_page *page)
 {
   int of[SF_T_MAX + 1] = {0};
-  add_map(json, "energy_map", &page->golden, SF_PLANE_ENERGY);
-  add_map(json, "samples_map", &page->golden, SF_PLANE_SAMPLES);
+  add_maps(json, &page->golden);
   for (int i = 0; page->steps && i < page->golden.width * page->golden.height; i++) of[page->steps[i]]++;
   cJSON_AddItemToObject(json, "steps_needed",
                         page->steps ? cJSON_CreateIntArray(of, SF_T_MAX + 1) : cJSON_CreateNull());

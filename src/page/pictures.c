@@ -27,48 +27,66 @@ static void heat_palette(uint8_t palette[4 * (HEAT + 1)], int colours)
   }
 }
 
-double html_plane_value(const sf_golden *g, sf_plane plane, size_t i)
+double html_samples(const sf_golden *g, size_t i)
 {
-  return sf_plane_is_integer(plane) ? sf_golden_int(g, plane)[i] : (double)sf_golden_real(g, plane)[i];
+  return sf_golden_int(g, SF_PLANE_SAMPLES)[i];
 }
 
-static sf_status heat_map(FILE *out, const sf_golden *g, sf_plane plane, double top, const char *alt)
+double html_sample_fj(const sf_golden *g, size_t i)
+{
+  const double samples = html_samples(g, i);
+  return samples > 0 ? (double)sf_golden_real(g, SF_PLANE_ENERGY)[i] / samples : 0;
+}
+
+/* Colours from low to high; none where the pixel has no samples. */
+static sf_status heat_map(FILE *out, const sf_golden *g, html_pixel *value, double low, double high, const char *alt)
 {
   const size_t n = (size_t)g->width * (size_t)g->height;
   uint8_t palette[4 * (HEAT + 1)], *index = malloc(n);
   if (!index) return sf_fail(SF_E_MEMORY, "no memory for a picture of %d x %d pixels", g->width, g->height);
   heat_palette(palette, HEAT);
   for (size_t i = 0; i < n; i++) {
-    const double x = top > 0 ? html_plane_value(g, plane, i) / top : 0;
-    index[i] = x > 0 ? (uint8_t)(1 + (int)((HEAT - 1) * (x < 1 ? x : 1) + 0.5)) : 0;
+    const double x = high > low ? (value(g, i) - low) / (high - low) : 1;
+    index[i] = html_samples(g, i) > 0 ? (uint8_t)(1 + (int)((HEAT - 1) * fmax(0, fmin(x, 1)) + 0.5)) : 0;
   }
   const sf_status status = html_put_png(out, index, g->width, g->height, palette, HEAT + 1, alt);
   free(index);
   return status;
 }
 
-/* Bar below a heat map. unit: what one of `value` is; values are multiples of `scale`. */
-static void colour_bar(FILE *out, const char *id, double top, double scale, const char *unit)
+enum { BAR_WIDTH = 480, X0 = 10, X1 = BAR_WIDTH - 10, END = 100, BEGIN = 60 }; /* room of the labels at the ends */
+
+/* The ends of the scale, the unit with the upper one; round numbers between them. */
+static void bar_labels(FILE *out, double low, double high, const char *unit)
 {
-  enum { WIDTH = 480, X0 = 10, X1 = WIDTH - 10 };
-  const double shown = top / scale, step = svg_tick(shown, 5);
+  const double span = high - low, step = svg_tick(span, 5), first = low > 0 ? X0 + BEGIN : X0;
+  if (low > 0) {
+    svg_line(out, X0, 16, X0, 21, "ax");
+    svg_text(out, 0, 36, "num", "%.4g", low);
+  }
+  for (double v = ceil(low / step) * step; span > 0 && X0 + (X1 - X0) * (v - low) / span < X1 - END; v += step) {
+    const double x = X0 + (X1 - X0) * (v - low) / span;
+    if (x < first) continue;
+    svg_line(out, x, 16, x, 21, "ax");
+    svg_text(out, x, 36, "num mid", "%.4g", v);
+  }
+  svg_line(out, X1, 16, X1, 21, "ax");
+  svg_text(out, BAR_WIDTH, 36, "num end", "%.4g %s", high, unit);
+}
+
+/* Below a heat map. Numbers are in the unit. */
+static void colour_bar(FILE *out, const char *id, double low, double high, const char *unit)
+{
   char title[160];
-  snprintf(title, sizeof title, "Colour scale from 0 to %.4g %s", shown, unit);
-  svg_begin(out, id, WIDTH, 42, title, title);
+  snprintf(title, sizeof title, "Colour scale from %.4g to %.4g %s", low, high, unit);
+  svg_begin(out, id, BAR_WIDTH, 42, title, title);
   fprintf(out, "<defs><linearGradient id=\"%s-g\">", id);
   for (int i = 0; i < 10; i++)
     fprintf(out, "<stop offset=\"%.4f\" stop-color=\"#%02x%02x%02x\"/>", i / 9.0, viridis[i][0], viridis[i][1],
             viridis[i][2]);
   fprintf(out, "</linearGradient></defs>\n<rect x=\"%d\" y=\"4\" width=\"%d\" height=\"12\" fill=\"url(#%s-g)\"/>\n",
           X0, X1 - X0, id);
-  /* Round numbers, then the largest value with the unit at the end. */
-  for (double v = 0; X0 + (X1 - X0) * v / shown < X1 - 100; v += step) {
-    const double x = X0 + (X1 - X0) * v / shown;
-    svg_line(out, x, 16, x, 21, "ax");
-    svg_text(out, x, 36, "num mid", "%.4g", v);
-  }
-  svg_line(out, X1, 16, X1, 21, "ax");
-  svg_text(out, WIDTH, 36, "num end", "%.4g %s", shown, unit);
+  bar_labels(out, low, high, unit);
   svg_end(out);
 }
 
@@ -101,17 +119,19 @@ HTML_FUNCTION(energy_map)
 {
   html_view *v = user;
   (void)value;
-  return heat_map(out, &v->page->golden, SF_PLANE_ENERGY, html_real(v, "page.energy_map.most"),
-                  "Heat map of the energy of every pixel");
+  return heat_map(out, &v->page->golden, html_sample_fj, html_real(v, "page.energy_per_sample.least_fj"),
+                  html_real(v, "page.energy_per_sample.most_fj"), "Heat map of the energy per sample of every pixel");
 }
 
 HTML_FUNCTION(energy_scale)
 {
   html_view *v = user;
-  double scale, top = html_real(v, "page.energy_map.most");
-  const char *unit = html_unit(top, &scale);
+  double scale;
+  const double low = html_real(v, "page.energy_per_sample.least_fj"),
+               high = html_real(v, "page.energy_per_sample.most_fj");
+  const char *unit = html_unit(high, &scale);
   (void)value;
-  colour_bar(out, "svg-energy-scale", top, scale, unit);
+  colour_bar(out, "svg-energy-scale", low / scale, high / scale, unit);
   return v->status;
 }
 
@@ -119,7 +139,7 @@ HTML_FUNCTION(samples_map)
 {
   html_view *v = user;
   (void)value;
-  return heat_map(out, &v->page->golden, SF_PLANE_SAMPLES, html_real(v, "page.samples_map.most"),
+  return heat_map(out, &v->page->golden, html_samples, 0, html_real(v, "page.samples_per_pixel.most"),
                   "Heat map of the samples of every pixel");
 }
 
@@ -127,7 +147,7 @@ HTML_FUNCTION(samples_scale)
 {
   html_view *v = user;
   (void)value;
-  colour_bar(out, "svg-samples-scale", html_real(v, "page.samples_map.most"), 1, "samples");
+  colour_bar(out, "svg-samples-scale", 0, html_real(v, "page.samples_per_pixel.most"), "samples");
   return v->status;
 }
 
@@ -154,9 +174,9 @@ HTML_FUNCTION(steps_scale)
     heat_colour((t - 1) / (double)(SF_T_MAX - 1), rgb);
     fprintf(out, "<rect x=\"%d\" y=\"4\" width=\"%d\" height=\"12\" fill=\"#%02x%02x%02x\"/>\n", (t - 1) * CELL,
             CELL - 2, rgb[0], rgb[1], rgb[2]);
-    svg_text(out, (t - 0.5) * CELL - 1, 32, "num mid", "t = %d", t);
-    svg_text(out, (t - 0.5) * CELL - 1, 48, "num mid mut", "%.1f %%",
-             hits > 0 ? 100.0 * html_real(v, "page.steps_needed[%d]", t) / hits : 0);
+    svg_text(out, (t - 0.5) * CELL - 1, 32, "num mid", t == 1 ? "t = %d" : "%d", t);
+    const double percent = hits > 0 ? 100.0 * html_real(v, "page.steps_needed[%d]", t) / hits : 0;
+    svg_text(out, (t - 0.5) * CELL - 1, 48, "num mid mut", percent < 9.95 ? "%.1f %%" : "%.0f %%", percent);
   }
   svg_end(out);
   return v->status;
