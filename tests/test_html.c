@@ -352,6 +352,36 @@ START_TEST(a_difference_is_shown)
 }
 END_TEST
 
+/* What a usual audit does not have: a trained twin, random rays, no traffic of the accelerator, a saturated layer. */
+START_TEST(what_is_rare_is_shown)
+{
+  static const char *const words[] = {
+      "trained by itself takes",
+      "3.5 % more",
+      "Unexpected in C1:",
+      "\nrandom\nrays audited",
+      "(the pictures show one view)",
+      "The audited rays are estimated",
+      "<td class=\"n\">\xe2\x80\x93</td><td class=\"n\"><data data-key=\"rtl_subset.recount",
+      "x&amp;y --model a/m&amp;m.safetensors</pre>",
+      "<code>m&amp;m.safetensors</code>",
+      "<code>0123abcd</code>"};
+  fixture f = begin(2, true, false);
+  finish(&f);
+  f.report.twin = (sf_twin){"twin.safetensors", 100, 5, 2300000, -3.5};
+  f.report.random_rays = true, f.page.whole = false;
+  f.report.three.no_rtl_traffic = true;
+  f.report.measure.core.saturated_samples[FX_C1] = 3;
+  f.page.model = "a/m&m.safetensors";
+  snprintf(f.page.model_sha256, sizeof f.page.model_sha256, "0123abcd");
+  read_page(&f);
+  check_plain(f.text);
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+    ck_assert_msg(strstr(f.text, words[i]), "the page does not say: %s", words[i]);
+  end(&f);
+}
+END_TEST
+
 /* ---- planted faults ---- */
 
 typedef struct plant {
@@ -410,6 +440,7 @@ int main(void)
   tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
   tcase_add_test(c, pictures_equal_to_the_photograph);
   tcase_add_test(c, a_difference_is_shown);
+  tcase_add_test(c, what_is_rare_is_shown);
   tcase_add_test(c, planted_faults_are_seen);
   suite_add_tcase(suite, c);
   return ck_run(suite);

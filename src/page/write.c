@@ -42,13 +42,13 @@ const char *html_percent(char text[HTML_NUMBER], double percent)
   if (!isfinite(percent))
     snprintf(text, HTML_NUMBER, "-");
   else
-    snprintf(text, HTML_NUMBER, "%s%.1f %%", percent < 0 ? "\xe2\x88\x92" : "", fabs(percent));
+    snprintf(text, HTML_NUMBER, "%s%.1f %%", percent <= -0.05 ? "\xe2\x88\x92" : "", fabs(percent));
   return text;
 }
 
 const char *html_tenths(char text[HTML_NUMBER], double value)
 {
-  snprintf(text, HTML_NUMBER, "%s%.1f", value < 0 ? "\xe2\x88\x92" : "", fabs(value));
+  snprintf(text, HTML_NUMBER, "%s%.1f", value <= -0.05 ? "\xe2\x88\x92" : "", fabs(value));
   return text;
 }
 
