@@ -189,12 +189,39 @@ static void check_figures(faults *f, const char *page, const sf_audit_report *r)
   check_element(f, page, "pre", "command", "energy_audit", 1);
 }
 
+/* The result stands in front, with where each number is from. */
+static void check_head(faults *f, const char *page)
+{
+  static const char *const keys[] = {"energy_spiking_fj",
+                                     "energy_ann_fj",
+                                     "energy_saving_percent",
+                                     "ledgers.list[3].total_fj",
+                                     "ledgers.list[7].total_fj",
+                                     "ledgers.list[3].saving_percent",
+                                     "ledgers.list[1].saving_percent",
+                                     "ledger.hoisted_saving_percent",
+                                     "rays",
+                                     "t_r",
+                                     "samples",
+                                     "samples_per_ray",
+                                     "page.psnr_fixed",
+                                     "page.ssim_fixed"};
+  const char *end = strstr(page, "</header>");
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+    char data[96];
+    snprintf(data, sizeof data, "<data data-key=\"%s\"", keys[i]);
+    const char *at = strstr(page, data);
+    if (!at || !end || at > end) fault(f, "the header has no %s", keys[i]);
+  }
+}
+
 static faults judge(const char *page, const sf_audit_report *r)
 {
   faults f = {0};
   cJSON *json = page_json(page);
   check_tags(&f, page);
   check_references(&f, page);
+  check_head(&f, page);
   check_figures(&f, page, r);
   check_ledgers(&f, page, &r->ledgers);
   check_counts(&f, page, r->net->steps);
@@ -394,6 +421,8 @@ static const plant plants[] = {
     {"data-key=\"samples\" value", "data-key=\"rays\" value"},
     {"data-key=\"ledgers.list[1].parts_fj.mac\"", "data-was=\"ledgers\""},
     {"data-key=\"page.layer_fj[0][0]\" data-value=\"", "data-key=\"page.layer_fj[0][0]\" data-value=\"9"},
+    {"<data data-key=\"ledgers.list[7].total_fj\" value=\"", "<data data-was=\""},
+    {"</header>", ""},
     {"</figure>", ""},
     {"</td>", "<td>"},
     {"class=\"facts\"", "class=facts"},

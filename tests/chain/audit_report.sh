@@ -36,9 +36,11 @@ audit --json --twin "$work/decoder.safetensors" | tr -d ' \n\t' >"$work/twin.jso
 [ "$(twin macs_per_sample)" -eq 35968 ] && [ "$(twin samples)" -gt 0 ] || fail "the decoder's synapses"
 [ "$(twin fj)" -eq $(($(twin samples) * 35968 * 4600)) ] || fail "the TensoRF twin's energy"
 
-# The prices stand beside the program, wherever the two are.
+# The prices stand beside the program, wherever the two are; the page's template is inside.
 mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"
-(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"
+(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q --html "$work/moved.html" >/dev/null) ||
+  fail "moved program"
+grep -q 'id="audit-json"' "$work/moved.html" || fail "the page of a moved program"
 rm -r "$work/moved/share"
 (cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null 2>"$work/err") &&
   fail "no prices, no error"
