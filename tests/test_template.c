@@ -1,6 +1,6 @@
 /* The filler of the report's template: what it writes, and that it names file, line and cause of what is wrong. */
 #include "ck_run.h"
-#include "page/template.h"
+#include "base/template.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -155,6 +155,25 @@ START_TEST(limits)
 }
 END_TEST
 
+START_TEST(values_by_path)
+{
+  static const char *const nowhere[] = {"nosuch",        "list[2]", "list.name",    "n.m",
+                                        "list[0].v[-1]", "[0]x",    "list[0]..name"};
+  cJSON *json = cJSON_Parse(tree);
+  cJSON_AddRawToObject(json, "digits", "18446744073709551615");
+  ck_assert_ptr_eq(sf_json_at(json, ""), json);
+  ck_assert_double_eq(sf_json_real(sf_json_at(json, "list[1].v[0]")), 20);
+  ck_assert_uint_eq(sf_json_u64(sf_json_at(json, "n")), 3);
+  ck_assert_uint_eq(sf_json_u64(sf_json_at(json, "digits")), UINT64_MAX);
+  ck_assert_double_eq(sf_json_real(sf_json_at(json, "digits")), 18446744073709551616.0);
+  ck_assert_uint_eq(sf_json_u64(sf_json_at(json, "text")), 0);
+  ck_assert(sf_json_real(sf_json_at(json, "none")) != sf_json_real(sf_json_at(json, "none")));
+  for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++)
+    ck_assert_msg(!sf_json_at(json, nowhere[i]), "there is a %s", nowhere[i]);
+  cJSON_Delete(json);
+}
+END_TEST
+
 int main(void)
 {
   Suite *suite = suite_create("template");
@@ -162,6 +181,7 @@ int main(void)
   tcase_add_loop_test(c, texts, 0, (int)(sizeof good / sizeof *good));
   tcase_add_loop_test(c, faults, 0, (int)(sizeof bad / sizeof *bad));
   tcase_add_test(c, limits);
+  tcase_add_test(c, values_by_path);
   suite_add_tcase(suite, c);
   return ck_run(suite);
 }

@@ -4,7 +4,7 @@
 #define SF_PAGE_INTERNAL_H
 #include "base/text.h"
 #include "page/page.h"
-#include "page/template.h"
+#include "base/template.h"
 
 extern const char html_report[], html_style[];
 extern const char html_script[]; /* without '<' and '&': the page is XML too */

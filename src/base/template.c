@@ -1,40 +1,6 @@
-#include "page/template.h"
+#include "base/template.h"
 #include "base/text.h"
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
-
-/* ---- values ---- */
-
-const cJSON *sf_json_at(const cJSON *json, const char *path)
-{
-  while (json && *path) {
-    char name[64];
-    int length = 0;
-    unsigned index;
-    if (*path == '.') path++;
-    if (sscanf(path, "[%u]%n", &index, &length) == 1 && length > 0)
-      json = cJSON_GetArrayItem(json, (int)index);
-    else if (sscanf(path, "%63[^.[]%n", name, &length) == 1)
-      json = cJSON_GetObjectItemCaseSensitive(json, name);
-    else
-      return NULL;
-    path += length;
-  }
-  return json;
-}
-
-double sf_json_real(const cJSON *node)
-{
-  if (cJSON_IsRaw(node)) return strtod(node->valuestring, NULL);
-  return cJSON_IsNumber(node) ? node->valuedouble : (double)NAN;
-}
-
-uint64_t sf_json_u64(const cJSON *node)
-{
-  if (cJSON_IsRaw(node)) return strtoull(node->valuestring, NULL, 10);
-  return cJSON_IsNumber(node) && node->valuedouble > 0 ? (uint64_t)node->valuedouble : 0;
-}
 
 /* ---- the text being filled ---- */
 

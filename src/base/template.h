@@ -10,8 +10,8 @@
  *
  * PATH is "counts.layers[0].mac[1]". In it @NAME is a member's key or place, (PATH) the text that stands there:
  * "saturated_samples.(l.name)", "l.mac[@t]". A line with nothing but one tag of a section leaves no line. */
-#ifndef SF_PAGE_TEMPLATE_H
-#define SF_PAGE_TEMPLATE_H
+#ifndef SF_BASE_TEMPLATE_H
+#define SF_BASE_TEMPLATE_H
 #include "base/json.h"
 #include <stdio.h>
 
@@ -37,10 +37,4 @@ typedef struct sf_template {
 /* SF_E_FORMAT names file, line and what is wrong: a value that is not there, an unknown function, a section that does
  * not close. */
 sf_status sf_template_fill(FILE *out, const sf_template *t);
-
-/* "ledgers.list[2].parts_fj.mac"; NULL: not there. */
-const cJSON *sf_json_at(const cJSON *json, const char *path);
-/* Numbers as cJSON keeps them or as digits of 64 bits; NaN, 0: no number. */
-double sf_json_real(const cJSON *node);
-uint64_t sf_json_u64(const cJSON *node);
 #endif
