@@ -119,6 +119,9 @@ $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
+# The report's texts lie in the program.
+$B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+
 $(CURDIR)/$B/%: $B/% ;
 
 $B/libspikefield.a: $(LIB_OBJ)
