@@ -134,6 +134,9 @@ include src/lib/lib.mk
 # File readers under fuzzing.
 include tests/fuzz/fuzz.mk
 
+# What continuous integration installs besides.
+include tests/ci.mk
+
 # The driver's program for RV32IM, and the emulated system that runs it.
 include firmware/firmware.mk
 

@@ -52,7 +52,7 @@ for words in 'core = accelerator = recount' '+ neuron updates' 'integer ReLU twi
 done
 
 if ! command -v python3 >/dev/null; then
-  echo "schemas: python3 is not installed, left out"
+  echo "the schemas were left out"; echo "python3: not installed"
 else
   python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/scene.snn" "$work/data"
   case $? in 0) ;; 77) echo "schemas: left out" ;; *) fail "schemas" ;; esac
