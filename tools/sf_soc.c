@@ -269,7 +269,7 @@ static sf_status work(job *j)
   return status.code == SF_OK ? printed : status;
 }
 
-/* BUILD/bin/sf_soc has BUILD/firmware/sf_firmware.elf; an installed PREFIX/bin/sf_soc has it in PREFIX/lib/spikefield. */
+/* Built: BUILD/firmware/sf_firmware.elf beside BUILD/bin. Installed: PREFIX/lib/spikefield beside PREFIX/bin. */
 static void find_firmware(job *j)
 {
   char program[4000] = "";
