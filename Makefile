@@ -201,7 +201,7 @@ include tests/mutate/mutate.mk
 
 house: all ## the order of rooms (README's map), format, sentences of the documents
 	@if [ -e .git ] && command -v git >/dev/null && command -v python3 >/dev/null; then tools/check_rooms.py $B && \
-	  tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; \
+	  tools/check_prose.py README.md CHANGELOG.md docs/*.md docs/notes/*.md rtl/README.md; \
 	else echo "  house: rooms and sentences are not checked: that needs a git checkout, git and python3"; fi
 	@if [ -e .git ] && command -v git >/dev/null && command -v clang-format >/dev/null; then \
 	  clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); \

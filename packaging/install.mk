@@ -65,9 +65,10 @@ uninstall: ## remove what install put below PREFIX
 
 .PHONY: man installable install uninstall
 
+DEB_PACKAGES := build-essential debhelper help2man lintian
 deb: ## Debian packages of programs and library that lintian accepts: build/deb
 	@[ -z '$(strip $(ARCH))' ] || { echo "deb: a package has the widths of include/spikefield/arch.def, not $(strip $(ARCH))" >&2; exit 2; }
 	$Qpackaging/deb.sh $B $(LIB_VERSION)
 deps-deb: ## install with apt what `make deb` needs besides (debhelper, lintian)
-	@DEPS="build-essential debhelper help2man lintian" tools/deps.sh
+	@DEPS="$(DEB_PACKAGES)" tools/deps.sh
 .PHONY: deb deps-deb
