@@ -22,6 +22,12 @@ so=${version%%.*}
 maintainer="${DEBFULLNAME:-spikefield} <${DEBEMAIL:-spikefield@localhost}>"
 sed -i "s/@SOVERSION@/$so/; s/@MAINTAINER@/$maintainer/" debian/control
 mv debian/libspikefield.install "debian/libspikefield$so.install"
+if [ -z "${DEBEMAIL:-}" ]; then
+  for package in spikefield "libspikefield$so" libspikefield-dev; do
+    printf '# %s\n%s\n%s\n' "Built for this machine: nobody's address. DEBEMAIL names one." \
+      "$package: bogus-mail-host *" "$package: bogus-mail-host-in-debian-changelog *" >>"debian/$package.lintian-overrides"
+  done
+fi
 
 # The changelog is the section of CHANGELOG.md, which has to be of this version.
 section=$(awk '/^## / { on++ } on == 1' CHANGELOG.md)
@@ -39,7 +45,15 @@ export DEB_BUILD_OPTIONS="noautodbgsym parallel=$(nproc)"
 unset MAKEFLAGS MAKELEVEL MFLAGS CI
 dpkg-buildpackage -b -us -uc >"$out/log" 2>&1 || { tail -n 20 "$out/log" >&2; fail "the package does not build"; }
 cd "$out"
-lintian --fail-on error,warning ./*.deb || fail "lintian refuses the packages"
-rm -rf "$tree"
+lintian --allow-root --fail-on error,warning ./*.deb || fail "lintian refuses the packages"
+# Unpacked, the programs run and are of this version.
+for package in *.deb; do
+  dpkg-deb -x "$package" unpacked
+  [ "$(dpkg-deb -f "$package" Version)" = "$version" ] || fail "$package is not of version $version"
+done
+for program in unpacked/usr/bin/*; do
+  [ "$($program --version)" = "$(basename "$program") (spikefield) $version" ] || fail "$program --version: $($program --version 2>&1)"
+done
+rm -rf "$tree" unpacked
 for package in *.deb; do echo "  DEB   $build/deb/$package"; done
 echo "  install them: apt-get install$(printf " ./$build/deb/%s" *.deb)"
