@@ -20,7 +20,8 @@ cp -r packaging/debian "$tree/debian"
 cd "$tree"
 so=${version%%.*}
 maintainer="${DEBFULLNAME:-spikefield} <${DEBEMAIL:-spikefield@localhost}>"
-sed -i "s/@SOVERSION@/$so/; s/@MAINTAINER@/$maintainer/" debian/control
+control=$(sed "s/@SOVERSION@/$so/" debian/control)
+echo "${control/@MAINTAINER@/"$maintainer"}" >debian/control
 mv debian/libspikefield.install "debian/libspikefield$so.install"
 if [ -z "${DEBEMAIL:-}" ]; then
   for package in spikefield "libspikefield$so" libspikefield-dev; do

@@ -12,6 +12,6 @@ $B/python/.done: $(REQUIREMENTS)
 	$Qrm -rf $(@D)
 	$Qpython3 -m venv $(@D) || { echo "python: no environment in $(@D): is python3-venv installed? (make deps-ci)" >&2; exit 1; }
 	$Q$(@D)/bin/python3 -m pip install --quiet --disable-pip-version-check -r $< || { \
-	  rm -rf $(@D); echo "python: the package index cannot be reached, or lacks what $< lists: read_nir and read_safetensors are skipped, package and audit_report are cut short" >&2; exit 1; }
+	  rm -rf $(@D); echo "python: the package index cannot be reached, or lacks what $< lists: the tests read_nir and read_safetensors are skipped, and package leaves parts out" >&2; exit 1; }
 	@touch $@
 .PHONY: deps-ci python
