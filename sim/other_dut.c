@@ -35,6 +35,9 @@ static sf_status find_build(request *r)
     return sf_fail(SF_E_IO, "--dut: /proc/self/exe: %s", strerror(errno));
   strcpy(r->build, dirname(dirname(program)));
   const bool absolute = SF_SOURCE_ROOT[0] == '/';
+  snprintf(path, sizeof path, "%s/libspikefield.a", r->build);
+  if (absolute && access(path, R_OK)) /* installed: the source tree may be there, but would build into PREFIX */
+    return sf_fail(SF_E_IO, "--dut: %s is not the build folder of a source tree: no %s", r->build, path);
   snprintf(path, sizeof path, "%s/%s/sim/dut.mk", absolute ? "" : r->build, SF_SOURCE_ROOT);
   if (access(path, R_OK))
     return sf_fail(SF_E_IO, "--dut: %s is not the build folder of a source tree: no %s", r->build, path);

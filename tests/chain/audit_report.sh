@@ -54,7 +54,7 @@ for words in 'core = accelerator = recount' '+ neuron updates' 'integer ReLU twi
 done
 
 if ! command -v python3 >/dev/null; then
-  echo "schemas: python3 is not installed, left out"
+  echo "the schemas were left out"; echo "python3: not installed"
 else
   "$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 2 --stage2 2 --voxels 16 \
     --threads 1 -q >/dev/null && "$build/bin/sf_export" "$work/planes.safetensors" -o "$work/planes.snn" >/dev/null || fail "TensoRF scene"

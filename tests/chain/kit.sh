@@ -25,7 +25,7 @@ flip expected_membranes_C2.hex 41
 run verilator 1 'sample 13 layer C2 step 1 neuron 0 membrane' --
 cp "$work/kept" "$kit/expected_membranes_C2.hex"
 run verilator 1 'nowhere' -- DUT=nowhere # whatever was built before
-command -v iverilog >/dev/null || { echo "iverilog: not on this machine"; finish "Icarus skipped"; }
+command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 
 run icarus 0 PASS -- >"$work/icarus"
 cat "$work/icarus"

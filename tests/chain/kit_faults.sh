@@ -2,7 +2,7 @@
 # The vector kit around other RTL than its own: every planted fault caught and located, another neuron passes, a wrong one
 # does not, another top level is named. usage: kit_faults.sh BUILD
 . "$(dirname "$0")/../kit_run.bash" "$@"
-command -v iverilog >/dev/null || { echo "iverilog: not on this machine"; finish "Icarus skipped"; }
+command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 
 # As tests/chain/cosim_faults.sh: the RTL with planted faults, one chosen at run time.
 faulty() { run icarus "${@:2}" -- RTL="$build/faults/rtl" BUILD=faulty ARGS="+fault=$1"; }

@@ -92,7 +92,7 @@ shows() {
 }
 make_narrow() { MAKEFLAGS='' make -s -j1 -C "$root" B="$build" VERILATED_OPT="$quick" "$@" >"$work/out" 2>"$work/err"; }
 soc='' elf=firmware/sf_firmware.elf
-if [ -e "$build/bin/sf_soc" ] && [ -e "$build/$elf" ]; then soc=sf_soc; else echo "no emulated system, or no firmware: skipped"; fi
+if [ -e "$build/bin/sf_soc" ] && [ -e "$build/$elf" ]; then soc=sf_soc; else echo "no emulated system, or no firmware"; echo "firmware: not installed"; fi
 
 # whole LANES BUILD RTL PROGRAMS: rooms beyond the nets, of a block with so many lanes
 whole() {

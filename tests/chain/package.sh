@@ -63,7 +63,7 @@ if command -v iverilog >/dev/null; then
   done
   refuses . sf_top WEIGHT_BITS 7 || fail "widths that sf_top is not written for"
 else
-  echo "skipped: iverilog is not installed; the first simulation was not run"
+  echo "the first simulation was not run"; echo "iverilog: not installed"
 fi
 
 command -v python3 >/dev/null || { echo "skipped: python3 is not installed"; exit 77; }
