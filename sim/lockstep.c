@@ -7,6 +7,7 @@
 #include "base/io.h"
 #include "quant/quant.h"
 #include "base/rng.h"
+#include "base/text.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,8 +25,8 @@ typedef struct block {
 
 typedef struct checkpoint {
   char identity[65];
-  uint64_t blocks, rays;
-  sf_cosim_totals sum;
+  int of;                       /* rays of the run that wrote it */
+  sf_lockstep_state now, whole; /* now: for a run of as many rays */
 } checkpoint;
 
 /* ---- one block, in a process of its own ---- */
@@ -78,8 +79,8 @@ static sf_status identify(sf_lockstep *l)
   char text[2048], program[65], scene[65];
   SF_TRY(sf_sha256_file("/proc/self/exe", program));
   SF_TRY(sf_sha256_file(o->scene, scene));
-  int n = snprintf(text, sizeof text, "%s %s %s %" PRIu64 " %d %d %d %s", program, scene, o->split, o->seed, o->rays,
-                   o->block, o->stall_percent, o->plusarg ? o->plusarg : "");
+  int n = snprintf(text, sizeof text, "%s %s %s %" PRIu64 " %d %d %s", program, scene, o->split, o->seed, o->block,
+                   o->stall_percent, o->plusarg ? o->plusarg : "");
   char cameras[65];
   sf_camera *camera = calloc((size_t)l->data.count, sizeof *camera);
   if (!camera) return sf_fail(SF_E_MEMORY, "%s: out of memory", o->data);
@@ -97,10 +98,12 @@ static sf_status save(sf_lockstep *l)
   checkpoint c;
   memset(&c, 0, sizeof c);
   memcpy(c.identity, l->identity, sizeof c.identity);
-  c.blocks = l->blocks, c.rays = l->rays, c.sum = l->sum;
+  c.of = l->options.rays;
+  c.now = (sf_lockstep_state){l->blocks, l->rays, l->sum};
+  c.whole = l->whole;
   l->saved = sf_seconds();
   SF_TRY(sf_write_file(l->options.checkpoint, &c, sizeof c));
-  l->kept = c.rays;
+  l->kept = c.now.rays;
   return sf_ok();
 }
 
@@ -116,8 +119,13 @@ static sf_status resume(sf_lockstep *l)
   if (ours) memcpy(&c, data, sizeof c);
   free(data);
   if (!ours) return sf_fail(SF_E_FORMAT, "%s: checkpoint of another program, scene, data set or other options", path);
-  l->blocks = c.blocks, l->rays = c.rays, l->sum = c.sum;
-  l->resumed = c.sum.samples, l->kept = c.rays;
+  const sf_lockstep_state *from = c.of == l->options.rays ? &c.now : &c.whole;
+  if (from->rays > (uint64_t)l->options.rays)
+    return sf_fail(SF_E_USAGE, "%s: holds %" PRIu64 " rays, more than --rays %d; a checkpoint goes on, not back", path,
+                   from->rays, l->options.rays);
+  l->whole = c.whole;
+  l->blocks = from->blocks, l->rays = from->rays, l->sum = from->sum;
+  l->resumed = from->sum.samples, l->kept = from->rays;
   return sf_ok();
 }
 
@@ -145,6 +153,8 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   l->replay = b->replay;
   if (b->status.code != SF_OK) return false;
   l->blocks++;
+  if (!l->partial && l->rays % (uint64_t)l->options.block == 0)
+    l->whole = (sf_lockstep_state){l->blocks, l->rays, l->sum};
   if (sf_seconds() - l->saved > SAVE_SECONDS && !l->partial && l->trouble.code == SF_OK) l->trouble = save(l);
   return l->trouble.code == SF_OK && !enough(l);
 }
@@ -206,10 +216,11 @@ static sf_status stopped(const sf_lockstep *l)
 {
   char kept[4200] = "";
   if (l->options.checkpoint)
-    snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " rays, the same command goes on from there",
-             l->options.checkpoint, l->kept);
-  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d rays, %" PRIu64 " samples equal%s", l->rays,
-                 l->options.rays, l->sum.samples, kept);
+    snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " ray%s, the same command goes on from there",
+             l->options.checkpoint, l->kept, sf_plural(l->kept));
+  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d ray%s, %" PRIu64 " sample%s equal%s", l->rays,
+                 l->options.rays, sf_plural((uint64_t)l->options.rays), l->sum.samples, sf_plural(l->sum.samples),
+                 kept);
 }
 
 /* A difference stays one where its evidence cannot be written. */

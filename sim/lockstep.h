@@ -18,6 +18,12 @@ typedef struct sf_lockstep_options {
   const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst */
 } sf_lockstep_options;
 
+/* Blocks that are finished, and what they add up to. */
+typedef struct sf_lockstep_state {
+  uint64_t blocks, rays;
+  sf_cosim_totals sum;
+} sf_lockstep_state;
+
 typedef struct sf_lockstep {
   sf_lockstep_options options;
   fx_scene fx;
@@ -34,11 +40,13 @@ typedef struct sf_lockstep {
   uint64_t resumed;     /* samples that the checkpoint brought along */
   void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
   void *user;
-  double saved;        /* time of the last checkpoint */
-  uint64_t kept;       /* rays in it */
-  sf_status unwritten; /* of a difference: why there is no evidence; SF_OK where there is */
-  char identity[65];   /* of program, scene, data and options: a checkpoint is continued by nothing else */
-  sf_status trouble;   /* what ended it */
+  double saved;            /* time of the last checkpoint */
+  uint64_t kept;           /* rays in it */
+  sf_lockstep_state whole; /* without a last block of fewer rays: from there a run of more rays goes on */
+  sf_status unwritten;     /* of a difference: why there is no evidence; SF_OK where there is */
+  char identity[65]; /* of program, scene, data and options but the number of rays: a checkpoint is continued by nothing
+                        else */
+  sf_status trouble; /* what ended it */
 } sf_lockstep;
 
 sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);

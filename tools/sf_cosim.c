@@ -7,6 +7,7 @@
 #include "cli/cli.h"
 #include "base/clock.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,9 +32,9 @@ static void show(void *user, const sf_lockstep *l)
   display *d = user;
   const double seconds = sf_seconds() - d->begun;
   if (!sf_progress_due(&d->progress)) return;
-  sf_progress_show(&d->progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s  %d processes", l->rays,
+  sf_progress_show(&d->progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s  %d process%s", l->rays,
                    l->options.rays, l->sum.samples, seconds > 0 ? (double)(l->sum.samples - l->resumed) / seconds : 0,
-                   l->options.jobs);
+                   l->options.jobs, l->options.jobs == 1 ? "" : "es");
 }
 
 static sf_status print_text(const sf_lockstep *l, double seconds)
@@ -65,7 +66,8 @@ static sf_status simulate(const options *o, sf_lockstep *l)
   sf_progress_end(&d.progress);
   l->user = NULL;
   if (status.code == SF_OK && l->sum.samples == 0)
-    status = sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: nothing was compared", l->data.path, o->run.rays);
+    status = sf_fail(SF_E_FORMAT, "%s: none of %d ray%s has a sample: nothing was compared", l->data.path, o->run.rays,
+                     sf_plural((uint64_t)o->run.rays));
   const sf_status reported = report(o, l, &status, sf_seconds() - d.begun);
   if (status.code == SF_OK) return reported;
   return reported.code == SF_OK ? status : sf_fail(status.code, "%.199s; %.199s", status.message, reported.message);
@@ -78,7 +80,7 @@ static sf_status say_replayed(const char *path, const sf_replay *replay, const s
   char text[200];
   const sf_replay_sample *s = &replay->sample[replayed->at];
   if (!replayed->differs) {
-    printf("%s: %d samples, no difference%s\n", path, replay->count,
+    printf("%s: %d sample%s, no difference%s\n", path, replay->count, sf_plural((uint64_t)replay->count),
            replay->other_program ? "; the file was written by another program" : "");
     return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
   }
@@ -125,7 +127,8 @@ static cJSON *activity_json(const options *o, const sf_activity_report *r)
 static sf_status report_activity(const options *o, const sf_activity_report *r)
 {
   if (o->json) return sf_json_print(activity_json(o, r), true);
-  printf("%" PRIu64 " rays, %" PRIu64 " samples: 0 differences\n", r->rays, r->samples);
+  printf("%" PRIu64 " ray%s, %" PRIu64 " sample%s: 0 differences\n", r->rays, sf_plural(r->rays), r->samples,
+         sf_plural(r->samples));
   printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
          r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
   for (int i = 0; i < 2; i++) {

@@ -28,6 +28,12 @@ mkdir "$work/wave.fst" # no file can be there
   --evidence "$work/wave" --junit "$work/lost.xml" --plusarg +fault=1 >"$work/lost.json" 2>"$work/lost.err"
 [ $? -eq 1 ] && grep -q 'C2.*no evidence: .*wave.fst' "$work/lost.err" && grep -q '"no_evidence":' "$work/lost.json" &&
   grep -q '<failure' "$work/lost.xml" || fail "a difference without evidence: $(cat "$work/lost.err")"
+# What the report counts is of the samples that it names: the counters of the chunk with the difference are read, too.
+samples=$(sed -nE 's/^\t"samples":\t([0-9]+),$/\1/p' "$work/1.json")
+counted=$(sed -nE 's/^\t\t"samples":\t([0-9]+),$/\1/p' "$work/1.json" | tail -n 1)
+sops=$(sed -nE 's/^\t\t\t"sop":\t([0-9]+),$/\1/p' "$work/1.json" | head -n 1)
+[ "${samples:-0}" -gt 0 ] && [ "$samples" = "$counted" ] && [ "${sops:-0}" -gt 0 ] ||
+  fail "fault 1: ${samples:-no} samples, counts of ${counted:-no} with ${sops:-no} SOP"
 expect 2 1 '"layer":"C2"' '"step":1,' '"neuron":64,' '"wire":"row"' '"expected":1,' '"actual":0,'
 expect 3 1 '"layer":"C1"' '"step":2,' '"wire":"spikes"' '"sample_exact":true'
 [ "$(field 3 actual)" -eq $(($(field 3 expected) + 1)) ] || fail "fault 3: the counter is not one too high"

@@ -86,6 +86,20 @@ cmp -s part.json whole.json || fail "an interrupted run that was continued diffe
 cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
 grep -q "part: checkpoint of another" other.err || fail "another run's checkpoint: $(cat other.err)"
 
+# ---- a finished run is continued with more rays, also from a last block that was not full; never with fewer ----
+plain() { "$build/bin/sf_cosim" scene.snn data --quiet "$@" 2>&1; }
+cosim grown 0 --rays 17 --block 7 --checkpoint grown.part
+grep -q '"rays":[[:space:]]*17,' grown.json || fail "17 rays: $(cat grown.json)"
+cp grown.part grown.kept
+cosim grown 0 --rays 40 --block 7 --jobs 2 --checkpoint grown.part
+cosim ungrown 0 --rays 40 --block 7
+cmp -s grown.json ungrown.json || fail "a run that was continued with more rays differs: $(diff grown.json ungrown.json | head -n 6)"
+cmp -s grown.part grown.kept && fail "the checkpoint of 40 rays is that of 17"
+cosim shrunk 2 --rays 20 --block 7 --checkpoint grown.part
+grep -q 'grown.part: holds 35 rays, more than --rays 20' shrunk.err || fail "fewer rays: $(cat shrunk.err)"
+plain --rays 1 --block 1 >one.out
+grep -q '^1 ray (' one.out && grep -q 'samples/s by 1 process,' one.out || fail "one of each: $(cat one.out)"
+
 # ---- one process stopped, its parent not: no success ----
 "$build/faults/sf_cosim" scene.snn data --rays 100000 --block 20 --jobs 2 --limit-samples 20000 --quiet --json >lone.json 2>lone.err &
 parent=$!
