@@ -8,6 +8,8 @@
 #include "quant/quant.h"
 #include "base/rng.h"
 #include "base/text.h"
+#include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -195,12 +197,31 @@ static sf_status compare_energy(sf_lockstep *l)
 
 /* ---- evidence ---- */
 
-static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
+/* An earlier difference keeps its files: PREFIX, PREFIX-2, PREFIX-3... The file that reserves the name becomes the
+ * replay file. */
+static sf_status reserve(sf_lockstep *l, char path[4096])
+{
+  for (int n = 1; n < 10000; n++) {
+    char number[16] = "";
+    if (n > 1) snprintf(number, sizeof number, "-%d", n);
+    if (snprintf(l->evidence, sizeof l->evidence, "%s%s", l->options.evidence, number) >= (int)sizeof l->evidence)
+      break;
+    snprintf(path, 4096, "%s.fst", l->evidence);
+    if (!access(path, F_OK)) continue;
+    snprintf(path, 4096, "%s.json", l->evidence);
+    const int file = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0) return close(file), sf_ok();
+    if (errno != EEXIST) return sf_fail(SF_E_IO, "cannot write %s: %s", path, strerror(errno));
+  }
+  return sf_fail(SF_E_IO, "%.100s: no name is left for the evidence", l->options.evidence);
+}
+
+static sf_status write_replay(sf_lockstep *l, const sf_status *status)
 {
   char path[4096];
   sf_replayed replayed;
   SF_TRY(sf_replay_shrink(&l->replay, &l->fx.net, &l->replays));
-  snprintf(path, sizeof path, "%s.fst", l->options.evidence);
+  snprintf(path, sizeof path, "%s.fst", l->evidence);
   SF_TRY(sf_replay_run(&l->replay, &l->fx.net, path, &replayed));
   cJSON *json = cJSON_CreateObject();
   char text[200] = "";
@@ -208,8 +229,20 @@ static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
   sf_json_add_text(json, "in_the_run", status->message);
   sf_json_add_text(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
   sf_json_add_text(json, "wave", path);
-  snprintf(path, sizeof path, "%s.json", l->options.evidence);
+  snprintf(path, sizeof path, "%s.json", l->evidence);
   return sf_replay_save(&l->replay, l->options.scene, json, path);
+}
+
+static sf_status write_evidence(sf_lockstep *l, const sf_status *difference)
+{
+  char reserved[4096];
+  sf_status status = reserve(l, reserved);
+  if (status.code == SF_OK) {
+    status = write_replay(l, difference);
+    if (status.code != SF_OK) unlink(reserved);
+  }
+  if (status.code != SF_OK) l->evidence[0] = 0;
+  return status;
 }
 
 static sf_status stopped(const sf_lockstep *l)

@@ -15,7 +15,7 @@ typedef struct sf_lockstep_options {
   const char *plusarg;                  /* NULL or text */
   const char *checkpoint; /* file of the finished blocks: begun anew where it is missing, continued where it is there;
                              or NULL */
-  const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst */
+  const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst; EVIDENCE-2 where these are there */
 } sf_lockstep_options;
 
 /* Blocks that are finished, and what they add up to. */
@@ -32,12 +32,13 @@ typedef struct sf_lockstep {
   uint64_t rays;
   sf_cosim_totals sum;
   uint64_t energy_core_fj, energy_rtl_fj;
-  sf_cosim_place place; /* found: the first difference */
-  sf_replay replay;     /* of it */
-  bool replays;         /* the samples of the replay file show it */
-  bool partial;         /* the last blocks were interrupted; no checkpoint is written of them */
-  bool complete;        /* every ray, or the limit */
-  uint64_t resumed;     /* samples that the checkpoint brought along */
+  sf_cosim_place place;    /* found: the first difference */
+  sf_replay replay;        /* of it */
+  char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
+  bool replays;            /* the samples of the replay file show it */
+  bool partial;            /* the last blocks were interrupted; no checkpoint is written of them */
+  bool complete;           /* every ray, or the limit */
+  uint64_t resumed;        /* samples that the checkpoint brought along */
   void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
   void *user;
   double saved;            /* time of the last checkpoint */

@@ -59,9 +59,9 @@ static cJSON *difference_json(const sf_lockstep *l, const sf_status *status)
     sf_json_add_text(json, "no_evidence", l->unwritten.message);
     return json;
   }
-  snprintf(path, sizeof path, "%s.json", l->options.evidence);
+  snprintf(path, sizeof path, "%s.json", l->evidence);
   sf_json_add_text(json, "replay", path);
-  snprintf(path, sizeof path, "%s.fst", l->options.evidence);
+  snprintf(path, sizeof path, "%s.fst", l->evidence);
   sf_json_add_text(json, "wave", path);
   return json;
 }

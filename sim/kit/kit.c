@@ -23,15 +23,17 @@ static sf_status copy_files(sf_kit_output *output)
   return sf_ok();
 }
 
-/* Names relative to rtl/, in the order in which they compile. */
+/* As simulators take it (-f in the folder, -F from elsewhere): the include folder, and the files in the order in which
+ * they compile. */
 static sf_status list_rtl(sf_kit_output *output)
 {
   sf_kit_writer file;
   SF_TRY(sf_kit_begin(output, &file, "rtl.f"));
+  fprintf(file.writer.file, "+incdir+rtl\n");
   for (const sf_kit_file *from = sf_kit_files; from->name; from++) {
     const size_t length = strlen(from->name);
     if (strncmp(from->name, "rtl/", 4) == 0 && strcmp(from->name + length - 3, ".sv") == 0)
-      fprintf(file.writer.file, "%s\n", from->name + 4);
+      fprintf(file.writer.file, "%s\n", from->name);
   }
   return sf_kit_end(output, &file);
 }

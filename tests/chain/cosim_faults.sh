@@ -6,6 +6,7 @@
 expect() {
   local fault=$1 want=$2 got
   shift 2
+  rm -f "$work"/evidence*
   "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --json \
     --evidence "$work/evidence" --plusarg "+fault=$fault" >"$work/$fault.json" 2>"$work/$fault.err"
   got=$?
@@ -23,10 +24,12 @@ expect 0 0 null
 expect 1 1 '"layer":"C2"' '"neuron":37,' '"wire":"membrane"'
 [ "$(field 1 step)" -ge 1 ] || fail "fault 1: step 0 rounds nothing in hybrid mode"
 # A difference whose evidence cannot be written is one, in every report.
-mkdir "$work/wave.fst" # no file can be there
+mkdir "$work/gone" && cd "$work/gone" && rmdir "$work/gone" || exit 1 # no file can be there
 "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --json \
-  --evidence "$work/wave" --junit "$work/lost.xml" --plusarg +fault=1 >"$work/lost.json" 2>"$work/lost.err"
-[ $? -eq 1 ] && grep -q 'C2.*no evidence: .*wave.fst' "$work/lost.err" && grep -q '"no_evidence":' "$work/lost.json" &&
+  --junit "$work/lost.xml" --plusarg +fault=1 >"$work/lost.json" 2>"$work/lost.err"
+got=$?
+cd "$work" || exit 1
+[ $got -eq 1 ] && grep -q 'C2.*no evidence: .*sf_cosim-difference' "$work/lost.err" && ! grep -q '^evidence:' "$work/lost.err" && grep -q '"no_evidence":' "$work/lost.json" &&
   grep -q '<failure' "$work/lost.xml" || fail "a difference without evidence: $(cat "$work/lost.err")"
 # What the report counts is of the samples that it names: the counters of the chunk with the difference are read, too.
 samples=$(sed -nE 's/^\t"samples":\t([0-9]+),$/\1/p' "$work/1.json")
@@ -56,7 +59,7 @@ says 14 'hang at cycle'
 says 16 'tap beat after the last sample'
 says 17 'the simulation ended by itself'
 cp "$work/evidence.json" "$work/end.json"
-for how in "--replay $work/end.json --evidence $work/end" \
+for how in "--replay $work/end.json --evidence $work/end-again" \
   "$work/scene.snn $work/data --rays 20 --plusarg +fault=17 --saif $work/end.saif"; do
   # shellcheck disable=SC2086
   "$build/faults/sf_cosim" $how --quiet >"$work/end.out" 2>&1
