@@ -45,7 +45,6 @@ tail -n 1 "$work/wrong.err"
 
 # The line that the difference ends with replays it on that block; told when the block has changed, is another, is gone.
 line=$(sed -n 's/^replay: *//p' "$work/wrong.err")
-cp "$work/evidence.json" "$work/kept.json" # `wrong` wrote it
 # replay STATUS TEXT [COMMAND]
 replay() {
   (cd "$work" && bash -c "${3:-$line}") >"$work/replay.out" 2>&1
@@ -54,13 +53,9 @@ replay() {
 }
 replay 1 "membrane: expected $(field wrong expected), actual $(field wrong actual)"
 grep -q 'changed\|another' "$work/replay.out" && fail "the same block: $(cat "$work/replay.out")"
-replay 0 'no difference; the file is of another block' "$build/bin/sf_cosim --replay kept.json --dut '-F kit/rtl.f'"
-while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")
-cp "$work/my_block.sv" "$work/kept_block.sv"
-echo '// other contents' >>"$work/my_block.sv"
-replay 1 "the block's sources have changed since the file was written"
-while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")
-rm "$work/my_block.sv"
+sed 's/"sources":.*/"sources": "of before"/' "$work/evidence.json" >"$work/before.json"
+replay 1 "the block's sources have changed since the file was written" "$build/bin/sf_cosim --replay before.json"
+mv "$work/my_block.sv" "$work/kept_block.sv"
 replay 1 "evidence.json: the block that differed: --dut: $work/my_block.sv: No such file"
 mv "$work/kept_block.sv" "$work/my_block.sv"
 
@@ -72,6 +67,7 @@ documented=$(sed -n 's/^    \(sf_cosim scene.snn data --dut "+incdir.*\)/\1/p' "
 replay 1 'neuron' "PATH=$build/bin:\$PATH; $documented --quiet"
 grep -q '^replay: *sf_cosim --replay sf_cosim-difference.json$' "$work/replay.out" || fail "$documented: $(tail -n 4 "$work/replay.out")"
 while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")
+replay 1 'the file is of another block' "$build/bin/sf_cosim --replay evidence.json ${documented#*data }"
 replay 1 'No such file or directory (names in -f kit/rtl.f' "$build/bin/sf_cosim scene.snn data --dut '-f kit/rtl.f'"
 replay 2 '-F names no list' "$build/bin/sf_cosim scene.snn data --dut '-F'"
 printf '// none\n-F list.f # again\n' >"$work/list.f"
