@@ -1,6 +1,7 @@
 #include "sim/activity/activity.h"
 #include "sim/activity/saif.h"
 #include "sim/sim.h"
+#include "sim/wave_file.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/io.h"
@@ -110,8 +111,11 @@ static void end_piece(activity *a, uint64_t cycle)
 {
   sf_pins_dump_end(a->dut->pins);
   a->dumping = false;
+  if (a->status.code == SF_OK) a->status = sf_wave_file_check(a->path);
   if (a->status.code == SF_OK && !a->opened) a->status = open_wave(a);
   if (a->status.code == SF_OK) a->status = sf_wave_add(&a->wave, a->path, 2 * cycle);
+  if (a->status.code == SF_OK && a->options->vcd && ferror(a->vcd_file.file))
+    a->status = sf_writer_commit(&a->vcd_file); /* says why */
 }
 
 static void begin_piece(activity *a, uint64_t cycle)

@@ -121,8 +121,9 @@ sf_status sf_writer_commit(sf_writer *writer)
 {
   if (!writer->file) return sf_fail(SF_E_IO, "cannot write %s: it is not open", writer->path);
   int error = 0;
-  if (ferror(writer->file)) error = errno ? errno : EIO;
-  if (fflush(writer->file) && !error) error = errno;
+  const bool lost = ferror(writer->file);
+  if (fflush(writer->file)) error = errno; /* what could not be written is tried again, and fails for the same cause */
+  if (lost && !error) error = EIO;
   if (!error && fsync(fileno(writer->file)) && errno != EINVAL && errno != EROFS) error = errno;
   if (fclose(writer->file) && !error) error = errno;
   writer->file = NULL;

@@ -30,6 +30,20 @@ command -v iverilog >/dev/null || { echo "iverilog: not on this machine"; finish
 run icarus 0 PASS -- >"$work/icarus"
 cat "$work/icarus"
 diff "$work/verilator" "$work/icarus" || fail "the simulators take other ways"
+# A user sees the verdict last, after one line that says what is built, and not the compiler's command.
+make -C "$kit" icarus BUILD=shown 2>&1 | grep -v 'Entering\|Leaving' >"$work/shown"
+[ "$(wc -l <"$work/shown")" -eq 2 ] && [ "$(tail -n 1 "$work/shown")" = "$(cat "$work/icarus")" ] ||
+  fail "make icarus: $(cut -c1-200 "$work/shown" | head -n 5)"
+# Waveforms: the bench and every level of the block, up to the last cycle.
+for simulator in icarus verilator; do
+  run $simulator 0 PASS -- VCD=run.vcd BUILD=waves OPT=-O0 >/dev/null
+  grep -q '^\$scope module u_dut' < <(sed 's/^ *//' "$kit/run.vcd") && grep -q 'm_axis_tdata_o' "$kit/run.vcd" || fail "$simulator: no nets in run.vcd"
+  cycles=$(sed -nE 's/^PASS.* ([0-9]+) cycles.*/\1/p' "$work/icarus")
+  [ "$(grep '^#' "$kit/run.vcd" | tail -n 1 | tr -d '#')" -ge $((cycles * 10000 - 10000)) ] || fail "$simulator: run.vcd ends early"
+  rm "$kit/run.vcd"
+done
+run icarus 1 'FAIL: +vcd: nowhere/run.vcd cannot be written' -- VCD=nowhere/run.vcd
+run verilator 1 'built without waveforms' -- ARGS=+vcd=run.vcd BUILD=build
 run icarus 0 'PASS 48 samples' -- STALLS=0 TAP=0
 run icarus 0 'PASS 48 samples' -- STALLS=80 SEED=11
 [ "$(grep -c '^2' "$kit/stimulus.hex")" -ge 2 ] || fail "the kit has no second ray"
