@@ -47,10 +47,10 @@ $1/V$4__ALL.a: $1/V$4.mk
 	$$Q$$(MAKE) -s -C $1 -f V$4.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$4__ALL.a >/dev/null
 	@touch $$@
 -include $1/$5.d
-$1/$5.o: sim/$5.cpp $(ARCH_DEF) $1/V$4.mk
+$1/$5.o: sim/$5.cpp $(ARCH_DEF) tools/plusargs.sh $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
 	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $$(VERILATOR_ROOT)/include \
-	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -MMD -MP -c $$< -o $$@
+	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -DSF_PLUSARGS="\"$$$$(tools/plusargs.sh $1)\"" -MMD -MP -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
 define verilated_rule

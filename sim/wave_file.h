@@ -1,4 +1,5 @@
-/* Waveform files (FST) as Verilator leaves them: it says nothing where the disk was full, and its reader crashes there. */
+/* Waveform files (FST) as Verilator leaves them: it says nothing where the disk was full, and its reader crashes there.
+ */
 #ifndef SF_SIM_WAVE_FILE_H
 #define SF_SIM_WAVE_FILE_H
 #include "base/status.h"

@@ -3,6 +3,7 @@
 #include "sim/jobs.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
+#include "sim/plusarg.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/clock.h"
@@ -56,11 +57,18 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
   return saved;
 }
 
+static sf_status load(const options *o, sf_lockstep *l)
+{
+  SF_TRY(sf_plusarg_check(o->run.plusarg));
+  SF_TRY(sf_lockstep_load(l, &o->run));
+  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  return sf_ok();
+}
+
 static sf_status simulate(options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
-  SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  SF_TRY(load(o, l));
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -191,8 +199,7 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
   sf_activity_report r;
-  SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  SF_TRY(load(o, l));
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -270,13 +277,11 @@ int main(int argc, char **argv)
       {"--block", 0, SF_ARG_INT, &r->block, 1, 1e9, NULL, "N",
        "rays per unit of work, each on a freshly powered accelerator (default 256)"},
       {"--checkpoint", 0, SF_ARG_OUTPUT, &r->checkpoint, 0, 0, NULL, "FILE",
-       "finished units; where it is there, the run goes on from it"},
+       "finished units; where it is there, the run goes on from it, also with more --rays"},
       {"--evidence", 0, SF_ARG_STRING, &r->evidence, 0, 0, NULL, "PREFIX",
-       "of a difference: PREFIX.json to replay, PREFIX.fst waveform, PREFIX-2 where these are there (default "
-       "sf_cosim-difference)"},
+       "where a difference goes: PREFIX.json, PREFIX.fst, the next one PREFIX-2 (default sf_cosim-difference)"},
       {"--replay", 0, SF_ARG_INPUT, &o.replay, 0, 0, NULL, "FILE",
-       "the samples of such a file, and nothing else, on the block that it names; writes PREFIX.fst (default "
-       "sf_cosim-replay.fst)"},
+       "only the samples of such a .json, on the block that it is of; writes PREFIX.fst (default sf_cosim-replay)"},
       {"--junit", 0, SF_ARG_OUTPUT, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
       {"--saif", 0, SF_ARG_OUTPUT, &o.activity.saif, 0, 0, NULL, "FILE",
        "stream the rays' samples through one accelerator and write its switching activity (docs/activity.md)"},
@@ -289,8 +294,7 @@ int main(int argc, char **argv)
       {"--plusarg", 0, SF_ARG_STRING, &r->plusarg, 0, 0, NULL, "ARG",
        "passed to the simulation, for a fault build: +fault=1; at most 63 characters"},
       {"--dut", 0, SF_ARG_STRING, &o.dut, 0, 0, NULL, "FILES",
-       "Verilog sources of another block with the ports of rtl/sf_top.sv, options of Verilator, and lists of both: -F "
-       "LIST (docs/kit.md)"},
+       "another block with the ports of rtl/sf_top.sv: Verilog sources, options of Verilator, -F LIST (docs/kit.md)"},
       {"--dut-top", 0, SF_ARG_STRING, &o.dut_top, 0, 0, NULL, "NAME", "its module (default sf_top)"},
       {0}};
   const sf_cli cli = {.program = "sf_cosim",

@@ -65,6 +65,18 @@ for how in "--replay $work/end.json --evidence $work/end-again" \
   "$build/faults/sf_cosim" $how --quiet >"$work/end.out" 2>&1
   [ $? -eq 1 ] && grep -q 'the simulation ended by itself' "$work/end.out" || fail "$how: $(cat "$work/end.out")"
 done
+# A word that no block reads is refused: the run would look like one with a fault that is not seen.
+refused() { # TEXT PROGRAM ARGUMENT...
+  "${@:2}" --quiet >"$work/word.out" 2>&1
+  [ $? -eq 2 ] && grep -qF -- "$1" "$work/word.out" || fail "${*:2}: $(head -n 3 "$work/word.out")"
+}
+refused '--plusarg +fault=1 would change nothing: the block in this program reads no such word' \
+  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 1 --plusarg +fault=1
+refused '--plusarg +fault=1 would change nothing' \
+  "$build/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 1 --rtl-rays 1 --plusarg +fault=1
+refused '--plusarg +fuss=1 would change nothing: the block in this program reads only fault=' \
+  "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 1 --plusarg +fuss=1
+refused '--plusarg fault=1: expected +NAME' "$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 1 --plusarg fault=1
 # A rounding that truncates is one LSB too low.
 [ "$(field 1 actual)" -eq $(($(field 1 expected) - 1)) ] || fail "fault 1: the membrane is not one too low"
 finish "14 planted faults caught and located, none without a fault"

@@ -5,6 +5,18 @@
 "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/again" --data "$work/data" --seed 3 >/dev/null || exit 1
 diff -r "$kit" "$work/again" || fail "the same seed gives other files"
 
+# A kit may be written again, over one that was interrupted, too, and into an empty folder; among other things not.
+vectors() { "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/$1" --data "$work/data" --seed 3 >"$work/out" 2>&1; }
+rm -r "$work/again/manifest.json" "$work/again/rtl"
+mkdir "$work/empty" "$work/thesis"
+echo precious >"$work/thesis/README.md"
+for folder in again empty; do
+  vectors $folder && diff -r "$kit" "$work/$folder" || fail "a kit in the folder '$folder': $(cat "$work/out")"
+done
+vectors thesis
+[ $? -eq 2 ] && grep -q 'thesis: holds other things than a vector kit' "$work/out" || fail "a kit among other things: $(cat "$work/out")"
+[ "$(ls "$work/thesis")" = README.md ] && [ "$(cat "$work/thesis/README.md")" = precious ] || fail "what was there is not as it was"
+
 # Every file is in the manifest with its size and hash.
 tr -d ' \t\n' <"$kit/manifest.json" | grep -oE '"name":"[^"]*","bytes":[0-9]+,"sha256":"[0-9a-f]{64}"' |
   sed -E 's/"name":"([^"]*)","bytes":([0-9]+),"sha256":"([0-9a-f]*)"/\3  \1/' >"$work/sums"
