@@ -239,7 +239,11 @@ static sf_status write_evidence(sf_lockstep *l, const sf_status *difference)
   sf_status status = reserve(l, reserved);
   if (status.code == SF_OK) {
     status = write_replay(l, difference);
-    if (status.code != SF_OK) unlink(reserved);
+    if (status.code != SF_OK) {
+      unlink(reserved);
+      snprintf(reserved, sizeof reserved, "%s.fst", l->evidence);
+      unlink(reserved);
+    }
   }
   if (status.code != SF_OK) l->evidence[0] = 0;
   return status;

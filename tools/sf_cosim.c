@@ -59,8 +59,8 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
 
 static sf_status load(const options *o, sf_lockstep *l)
 {
-  SF_TRY(sf_plusarg_check(o->run.plusarg));
   SF_TRY(sf_lockstep_load(l, &o->run));
+  SF_TRY(sf_plusarg_check(o->run.plusarg));
   sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
   return sf_ok();
 }
