@@ -30,10 +30,9 @@ static bool is_whole(int file)
 static int refusal(int file)
 {
   static const char nothing[4096];
-  errno = 0;
   lseek(file, 0, SEEK_END);
-  for (int done = 0; done < MORE; done += (int)sizeof nothing)
-    if (write(file, nothing, sizeof nothing) != (ssize_t)sizeof nothing) return errno ? errno : ENOSPC;
+  for (ssize_t n, done = 0; done < MORE; done += n) /* where there is room for less than that, the next one says why */
+    if ((n = write(file, nothing, sizeof nothing)) <= 0) return n < 0 ? errno : EIO;
   return 0;
 }
 
