@@ -1,4 +1,5 @@
 /* sf_soc: the firmware renders a tile on an emulated system-on-chip with the Verilated accelerator. */
+#include "sim/plusarg.h"
 #include "sim/soc/soc.h"
 #include "firmware/sf_soc.h"
 #include "sim/soc/job.h"
@@ -140,6 +141,7 @@ static sf_status build(job *j)
   const options *o = &j->opt;
   const sf_dut_options dut = {.seed = o->seed, .stall_percent = o->stall, .plusarg = o->plusarg};
   const sf_soc_options soc = {.instructions = o->instructions, .uart = uart, .tick = tick, .user = j};
+  SF_TRY(sf_plusarg_check(o->plusarg));
   j->output = calloc(1, OUTPUT_MAX);
   if (!j->output) return sf_fail(SF_E_MEMORY, "no memory for the firmware's output");
   SF_TRY(sf_dut_open_bare(&j->dut, &dut));

@@ -19,7 +19,7 @@ run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong"
 run icarus 1 'nowhere' -- DUT=nowhere
 sed 's/^module sf_top/module my_top/' "$kit/rtl/sf_top.sv" >"$work/my_top.sv"
 touch -d '1 hour ago' "$work/my_top.sv"
-sources="$(grep -v '^sf_top.sv' "$kit/rtl.f" | sed 's|^|rtl/|' | tr '\n' ' ')"
+sources="$(grep '^rtl/' "$kit/rtl.f" | grep -v '/sf_top.sv$' | tr '\n' ' ')"
 run icarus 0 PASS -- SOURCES="$sources $work/my_top.sv" DUT=my_top
 run icarus 1 'my_top' -- SOURCES="$sources" DUT=my_top
 finish "planted faults of the RTL are caught and located through the kit"
