@@ -2,7 +2,7 @@
 # Debian packages of the source tree, in BUILD/deb; lintian must accept them. The maintainer is DEBFULLNAME <DEBEMAIL>.
 # usage: deb.sh BUILD VERSION
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 build=$1 version=$2
 fail() { echo "deb: $1" >&2; exit 1; }
 missing=
