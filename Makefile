@@ -34,7 +34,7 @@ SAN ?=
 SCENES ?= ../shared/data
 PKGS := OpenEXR libcjson libpng libjpeg
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
-LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
+LIBS := $(LDFLAGS) $(shell pkg-config --libs $(PKGS) 2>/dev/null) -lm
 # Other widths, in a build folder of their own that remembers them: make B=build/ac4 ARCH="AC_FRAC=4 LEAK_FRAC=8"
 ifneq ($(origin ARCH),command line)
 ARCH := $(shell cat $B/arch 2>/dev/null)
@@ -57,7 +57,7 @@ ARCH_INCLUDE := -I$B/include
 ARCH_DEFINES := -DSPIKEFIELD_LANES=$(shell sed -n 's/^SF_ARCH.LANES, \([0-9]*\),.*/\1/p' $(ARCH_DEF))
 endif
 WARN := -Wall -Wextra -Wpedantic $(if $(CI),-Werror)
-CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden $(ARCH_INCLUDE) $(ARCH_DEFINES) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+CFLAGS_ALL = -std=c11 -D_GNU_SOURCE $(OPT) -g $(WARN) -ffp-contract=off -fopenmp -fPIC -fvisibility=hidden $(ARCH_INCLUDE) $(ARCH_DEFINES) -Iinclude -Isrc -I. $(SAN) $(PKG_CFLAGS) $(CPPFLAGS) $(CFLAGS)
 Q := $(if $(V),,@)
 say = $(if $V,,@echo "  $1")
 
@@ -119,6 +119,9 @@ $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
+# The report's texts lie in the program.
+$B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+
 $(CURDIR)/$B/%: $B/% ;
 
 $B/libspikefield.a: $(LIB_OBJ)
@@ -134,8 +137,14 @@ include src/lib/lib.mk
 # File readers under fuzzing.
 include tests/fuzz/fuzz.mk
 
+# What continuous integration installs besides.
+include tests/ci.mk
+
 # The driver's program for RV32IM, and the emulated system that runs it.
 include firmware/firmware.mk
+
+# Everything installed, and the Debian package.
+include tools/packaging/install.mk
 
 # Programs. Those of DUT_TOOLS drive the Verilated accelerator; the others link the library alone.
 $(DUT_TOOLS:%=$B/bin/%): $B/bin/%: $B/obj/tools/%.o $(DUT_LIBS) $B/libspikefield.a
@@ -175,7 +184,7 @@ $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
-check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults lib $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
+check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults installable $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
 	@tests/run.sh $B $(CHAIN_TESTS) $(TESTS)
 
 SAMPLES ?= 10000000
@@ -193,10 +202,11 @@ include sim/coverage.mk
 include tests/formal/formal.mk
 include tests/mutate/mutate.mk
 
-house: all ## the order of rooms (README's map), format, sentences of the documents
+PAGES := README.md CONTRIBUTING.md CHANGELOG.md $(wildcard docs/*.md docs/notes/*.md) rtl/README.md
+house: all ## the order of rooms (README's map), format, sentences and links of the documents
 	@if [ -e .git ] && command -v git >/dev/null && command -v python3 >/dev/null; then tools/check_rooms.py $B && \
-	  tools/check_prose.py README.md docs/*.md docs/notes/*.md rtl/README.md; \
-	else echo "  house: rooms and sentences are not checked: that needs a git checkout, git and python3"; fi
+	  tools/check_prose.py $(PAGES) && tools/check_links.py $(PAGES); \
+	else echo "  house: rooms, sentences and links are not checked: that needs a git checkout, git and python3"; fi
 	@if [ -e .git ] && command -v git >/dev/null && command -v clang-format >/dev/null; then \
 	  clang-format --dry-run -Werror $$(git ls-files '*.c' '*.h' ':!rtl/gen'); \
 	else echo "  house: the format is not checked: that needs a git checkout, git and clang-format"; fi

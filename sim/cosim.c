@@ -100,8 +100,6 @@ static sf_status compare_samples(sf_cosim *c)
 {
   for (int i = 0; i < c->n; i++) {
     const entry *e = &c->chunk[i];
-    c->sum.samples++;
-    add_spikes(c, e);
     if (sf_compare_sample(&c->scene->net, &e->trace, &e->out, &c->result[i], &c->trace[i], &c->place.what)) continue;
     c->place.found = c->place.exact = true;
     c->place.ray = e->number;
@@ -111,19 +109,26 @@ static sf_status compare_samples(sf_cosim *c)
   return sf_ok();
 }
 
-static sf_status compare_counts(sf_cosim *c)
+/* The whole chunk, even one with a difference: samples and counts are of the same samples. */
+static sf_status add_chunk(sf_cosim *c, fx_counts *actual)
 {
-  fx_counts actual;
-  sf_difference difference;
   uint64_t cycles, busy, stalls;
-  SF_TRY(sf_dut_counts(c->dut, &actual, &cycles, &busy, &stalls));
+  SF_TRY(sf_dut_counts(c->dut, actual, &cycles, &busy, &stalls));
+  c->sum.samples += (uint64_t)c->n;
+  for (int i = 0; i < c->n; i++) add_spikes(c, &c->chunk[i]);
   fx_counts_add(&c->sum.core, &c->expected);
-  fx_counts_add(&c->sum.rtl, &actual);
+  fx_counts_add(&c->sum.rtl, actual);
   c->sum.cycles += cycles;
   c->sum.busy += busy;
   for (int l = 0; l < SF_LAYERS; l++) c->sum.layer_busy[l] += sf_dut_layer_busy(c->dut)[l];
   c->sum.stalls += stalls;
-  if (!sf_compare_counts(&c->expected, &actual, sf_dut_cycle(c->dut), &difference)) {
+  return sf_ok();
+}
+
+static sf_status compare_counts(sf_cosim *c, const fx_counts *actual)
+{
+  sf_difference difference;
+  if (!sf_compare_counts(&c->expected, actual, sf_dut_cycle(c->dut), &difference)) {
     SF_TRY(count_difference(c, &difference));
     return differ(c);
   }
@@ -151,8 +156,11 @@ static sf_status flush(sf_cosim *c)
   sf_status ran = sf_dut_run_traced(c->dut, c->input, c->n, c->result, c->trace);
   if (ran.code == SF_OK) ran = sf_dut_quiet(c->dut);
   if (ran.code != SF_OK) return stuck(c, &ran);
-  SF_TRY(compare_samples(c));
-  SF_TRY(compare_counts(c));
+  fx_counts actual;
+  const sf_status equal = compare_samples(c), counted = add_chunk(c, &actual);
+  SF_TRY(equal);
+  SF_TRY(counted);
+  SF_TRY(compare_counts(c, &actual));
   memset(&c->expected, 0, sizeof c->expected);
   c->n = 0;
   return sf_ok();

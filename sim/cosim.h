@@ -8,7 +8,7 @@ typedef struct sf_cosim sf_cosim;
 
 typedef struct sf_cosim_totals {
   fx_counts core, rtl;
-  uint64_t samples, spikes; /* compared; spikes = bits set in the bitmaps */
+  uint64_t samples, spikes; /* those that the counts are of; spikes = bits set in the bitmaps */
   uint64_t cycles, busy, stalls, layer_busy[SF_LAYERS];
 } sf_cosim_totals;
 

@@ -19,9 +19,10 @@ $(DUT_OUT)/Vsf_top__ALL.a: $(DUT_OUT)/Vsf_top.mk
 	@touch $@
 
 -include $(DUT_OUT)/pins.d
-$(DUT_OUT)/pins.o: sim/pins.cpp $(ARCH_DEF) $(DUT_OUT)/Vsf_top.mk
+$(DUT_OUT)/pins.o: sim/pins.cpp $(ARCH_DEF) tools/plusargs.sh $(DUT_OUT)/Vsf_top.mk
 	$(call say,CXX   $< -> $@)
-	$Q$(CXX) -std=c++17 -O2 $(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $(VERILATOR_ROOT)/include -isystem $(DUT_OUT) -MMD -MP -c $< -o $@
+	$Q$(CXX) -std=c++17 -O2 $(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $(VERILATOR_ROOT)/include -isystem $(DUT_OUT) \
+	  -DSF_PLUSARGS="\"$$(tools/plusargs.sh $(DUT_OUT))\"" -MMD -MP -c $< -o $@
 
 # The harness comes from our library; the block and its pins stand before it.
 $(DUT_OUT)/sf_cosim: $B/obj/tools/sf_cosim.o $(DUT_OUT)/pins.o $(DUT_OUT)/Vsf_top__ALL.a $(DUT_LIBS) $B/libspikefield.a

@@ -185,8 +185,9 @@ sf_status sf_jobs_run(const sf_jobs *jobs)
   pool p = {.jobs = jobs, .begun = jobs->first, .taken = jobs->first, .window = (uint64_t)jobs->processes * AHEAD};
   p.result = calloc(p.window, jobs->result_size);
   p.ready = calloc(p.window, sizeof *p.ready);
-  const sf_status status =
-      p.result && p.ready ? run(&p) : sf_fail(SF_E_MEMORY, "no memory for %d processes", jobs->processes);
+  const sf_status status = p.result && p.ready ? run(&p)
+                                               : sf_fail(SF_E_MEMORY, "no memory for %d process%s", jobs->processes,
+                                                         jobs->processes == 1 ? "" : "es");
   end_all(&p);
   free(p.result);
   free(p.ready);

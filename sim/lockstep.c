@@ -7,6 +7,9 @@
 #include "base/io.h"
 #include "quant/quant.h"
 #include "base/rng.h"
+#include "base/text.h"
+#include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,8 +27,8 @@ typedef struct block {
 
 typedef struct checkpoint {
   char identity[65];
-  uint64_t blocks, rays;
-  sf_cosim_totals sum;
+  int of;                       /* rays of the run that wrote it */
+  sf_lockstep_state now, whole; /* now: for a run of as many rays */
 } checkpoint;
 
 /* ---- one block, in a process of its own ---- */
@@ -78,8 +81,8 @@ static sf_status identify(sf_lockstep *l)
   char text[2048], program[65], scene[65];
   SF_TRY(sf_sha256_file("/proc/self/exe", program));
   SF_TRY(sf_sha256_file(o->scene, scene));
-  int n = snprintf(text, sizeof text, "%s %s %s %" PRIu64 " %d %d %d %s", program, scene, o->split, o->seed, o->rays,
-                   o->block, o->stall_percent, o->plusarg ? o->plusarg : "");
+  int n = snprintf(text, sizeof text, "%s %s %s %" PRIu64 " %d %d %s", program, scene, o->split, o->seed, o->block,
+                   o->stall_percent, o->plusarg ? o->plusarg : "");
   char cameras[65];
   sf_camera *camera = calloc((size_t)l->data.count, sizeof *camera);
   if (!camera) return sf_fail(SF_E_MEMORY, "%s: out of memory", o->data);
@@ -97,10 +100,12 @@ static sf_status save(sf_lockstep *l)
   checkpoint c;
   memset(&c, 0, sizeof c);
   memcpy(c.identity, l->identity, sizeof c.identity);
-  c.blocks = l->blocks, c.rays = l->rays, c.sum = l->sum;
+  c.of = l->options.rays;
+  c.now = (sf_lockstep_state){l->blocks, l->rays, l->sum};
+  c.whole = l->whole;
   l->saved = sf_seconds();
   SF_TRY(sf_write_file(l->options.checkpoint, &c, sizeof c));
-  l->kept = c.rays;
+  l->kept = c.now.rays;
   return sf_ok();
 }
 
@@ -116,8 +121,13 @@ static sf_status resume(sf_lockstep *l)
   if (ours) memcpy(&c, data, sizeof c);
   free(data);
   if (!ours) return sf_fail(SF_E_FORMAT, "%s: checkpoint of another program, scene, data set or other options", path);
-  l->blocks = c.blocks, l->rays = c.rays, l->sum = c.sum;
-  l->resumed = c.sum.samples, l->kept = c.rays;
+  const sf_lockstep_state *from = c.of == l->options.rays ? &c.now : &c.whole;
+  if (from->rays > (uint64_t)l->options.rays)
+    return sf_fail(SF_E_USAGE, "%s: holds %" PRIu64 " rays, more than --rays %d; a checkpoint goes on, not back", path,
+                   from->rays, l->options.rays);
+  l->whole = c.whole;
+  l->blocks = from->blocks, l->rays = from->rays, l->sum = from->sum;
+  l->resumed = from->sum.samples, l->kept = from->rays;
   return sf_ok();
 }
 
@@ -145,6 +155,8 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   l->replay = b->replay;
   if (b->status.code != SF_OK) return false;
   l->blocks++;
+  if (!l->partial && l->rays % (uint64_t)l->options.block == 0)
+    l->whole = (sf_lockstep_state){l->blocks, l->rays, l->sum};
   if (sf_seconds() - l->saved > SAVE_SECONDS && !l->partial && l->trouble.code == SF_OK) l->trouble = save(l);
   return l->trouble.code == SF_OK && !enough(l);
 }
@@ -185,12 +197,31 @@ static sf_status compare_energy(sf_lockstep *l)
 
 /* ---- evidence ---- */
 
-static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
+/* An earlier difference keeps its files: PREFIX, PREFIX-2, PREFIX-3... The file that reserves the name becomes the
+ * replay file. */
+static sf_status reserve(sf_lockstep *l, char path[4096])
+{
+  for (int n = 1; n < 10000; n++) {
+    char number[16] = "";
+    if (n > 1) snprintf(number, sizeof number, "-%d", n);
+    if (snprintf(l->evidence, sizeof l->evidence, "%s%s", l->options.evidence, number) >= (int)sizeof l->evidence)
+      break;
+    snprintf(path, 4096, "%s.fst", l->evidence);
+    if (!access(path, F_OK)) continue;
+    snprintf(path, 4096, "%s.json", l->evidence);
+    const int file = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0) return close(file), sf_ok();
+    if (errno != EEXIST) return sf_fail(SF_E_IO, "cannot write %s: %s", path, strerror(errno));
+  }
+  return sf_fail(SF_E_IO, "%.100s: no name is left for the evidence", l->options.evidence);
+}
+
+static sf_status write_replay(sf_lockstep *l, const sf_status *status)
 {
   char path[4096];
   sf_replayed replayed;
   SF_TRY(sf_replay_shrink(&l->replay, &l->fx.net, &l->replays));
-  snprintf(path, sizeof path, "%s.fst", l->options.evidence);
+  snprintf(path, sizeof path, "%s.fst", l->evidence);
   SF_TRY(sf_replay_run(&l->replay, &l->fx.net, path, &replayed));
   cJSON *json = cJSON_CreateObject();
   char text[200] = "";
@@ -198,18 +229,35 @@ static sf_status write_evidence(sf_lockstep *l, const sf_status *status)
   sf_json_add_text(json, "in_the_run", status->message);
   sf_json_add_text(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
   sf_json_add_text(json, "wave", path);
-  snprintf(path, sizeof path, "%s.json", l->options.evidence);
+  snprintf(path, sizeof path, "%s.json", l->evidence);
   return sf_replay_save(&l->replay, l->options.scene, json, path);
+}
+
+static sf_status write_evidence(sf_lockstep *l, const sf_status *difference)
+{
+  char reserved[4096];
+  sf_status status = reserve(l, reserved);
+  if (status.code == SF_OK) {
+    status = write_replay(l, difference);
+    if (status.code != SF_OK) {
+      unlink(reserved);
+      snprintf(reserved, sizeof reserved, "%s.fst", l->evidence);
+      unlink(reserved);
+    }
+  }
+  if (status.code != SF_OK) l->evidence[0] = 0;
+  return status;
 }
 
 static sf_status stopped(const sf_lockstep *l)
 {
   char kept[4200] = "";
   if (l->options.checkpoint)
-    snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " rays, the same command goes on from there",
-             l->options.checkpoint, l->kept);
-  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d rays, %" PRIu64 " samples equal%s", l->rays,
-                 l->options.rays, l->sum.samples, kept);
+    snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " ray%s, the same command goes on from there",
+             l->options.checkpoint, l->kept, sf_plural(l->kept));
+  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d ray%s, %" PRIu64 " sample%s equal%s", l->rays,
+                 l->options.rays, sf_plural((uint64_t)l->options.rays), l->sum.samples, sf_plural(l->sum.samples),
+                 kept);
 }
 
 /* A difference stays one where its evidence cannot be written. */

@@ -15,8 +15,14 @@ typedef struct sf_lockstep_options {
   const char *plusarg;                  /* NULL or text */
   const char *checkpoint; /* file of the finished blocks: begun anew where it is missing, continued where it is there;
                              or NULL */
-  const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst */
+  const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst; EVIDENCE-2 where these are there */
 } sf_lockstep_options;
+
+/* Blocks that are finished, and what they add up to. */
+typedef struct sf_lockstep_state {
+  uint64_t blocks, rays;
+  sf_cosim_totals sum;
+} sf_lockstep_state;
 
 typedef struct sf_lockstep {
   sf_lockstep_options options;
@@ -26,19 +32,22 @@ typedef struct sf_lockstep {
   uint64_t rays;
   sf_cosim_totals sum;
   uint64_t energy_core_fj, energy_rtl_fj;
-  sf_cosim_place place; /* found: the first difference */
-  sf_replay replay;     /* of it */
-  bool replays;         /* the samples of the replay file show it */
-  bool partial;         /* the last blocks were interrupted; no checkpoint is written of them */
-  bool complete;        /* every ray, or the limit */
-  uint64_t resumed;     /* samples that the checkpoint brought along */
+  sf_cosim_place place;    /* found: the first difference */
+  sf_replay replay;        /* of it */
+  char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
+  bool replays;            /* the samples of the replay file show it */
+  bool partial;            /* the last blocks were interrupted; no checkpoint is written of them */
+  bool complete;           /* every ray, or the limit */
+  uint64_t resumed;        /* samples that the checkpoint brought along */
   void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
   void *user;
-  double saved;        /* time of the last checkpoint */
-  uint64_t kept;       /* rays in it */
-  sf_status unwritten; /* of a difference: why there is no evidence; SF_OK where there is */
-  char identity[65];   /* of program, scene, data and options: a checkpoint is continued by nothing else */
-  sf_status trouble;   /* what ended it */
+  double saved;            /* time of the last checkpoint */
+  uint64_t kept;           /* rays in it */
+  sf_lockstep_state whole; /* without a last block of fewer rays: from there a run of more rays goes on */
+  sf_status unwritten;     /* of a difference: why there is no evidence; SF_OK where there is */
+  char identity[65]; /* of program, scene, data and options but the number of rays: a checkpoint is continued by nothing
+                        else */
+  sf_status trouble; /* what ended it */
 } sf_lockstep;
 
 sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);

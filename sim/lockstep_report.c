@@ -59,9 +59,9 @@ static cJSON *difference_json(const sf_lockstep *l, const sf_status *status)
     sf_json_add_text(json, "no_evidence", l->unwritten.message);
     return json;
   }
-  snprintf(path, sizeof path, "%s.json", l->options.evidence);
+  snprintf(path, sizeof path, "%s.json", l->evidence);
   sf_json_add_text(json, "replay", path);
-  snprintf(path, sizeof path, "%s.fst", l->options.evidence);
+  snprintf(path, sizeof path, "%s.fst", l->evidence);
   sf_json_add_text(json, "wave", path);
   return json;
 }
@@ -110,16 +110,18 @@ void sf_lockstep_print(FILE *out, const sf_lockstep *l, double seconds)
 {
   const sf_cosim_totals *sum = &l->sum;
   const double speed = seconds > 0 ? (double)(sum->samples - l->resumed) / seconds : 0;
-  fprintf(out, "%" PRIu64 " rays (%" PRIu64 " with samples), %" PRIu64 " samples, %" PRIu64 " spikes: 0 differences\n",
-          l->rays, sum->core.rays, sum->samples, sum->spikes);
+  fprintf(out,
+          "%" PRIu64 " ray%s (%" PRIu64 " with samples), %" PRIu64 " sample%s, %" PRIu64 " spike%s: 0 differences\n",
+          l->rays, sf_plural(l->rays), sum->core.rays, sum->samples, sf_plural(sum->samples), sum->spikes,
+          sf_plural(sum->spikes));
   fprintf(out, "compared: outputs, spikes, membranes and rows per layer and step, every counter, energy\n");
   fprintf(out, "%" PRIu64 " cycles, %.1f per sample, utilisation of the busiest layer %.1f %%, stalled %.1f %%\n",
           sum->cycles, ratio(sum->cycles, sum->samples), 100 * ratio(busiest(sum), sum->cycles),
           100 * ratio(sum->stalls, sum->cycles));
   fprintf(out, "energy %" PRIu64 " fJ by the core, %" PRIu64 " fJ by the accelerator\n", l->energy_core_fj,
           l->energy_rtl_fj);
-  fprintf(out, "%.1f s, %.0f samples/s by %d processes, seed %" PRIu64 ", stalls %d %%\n", seconds, speed,
-          l->options.jobs, l->options.seed, l->options.stall_percent);
+  fprintf(out, "%.1f s, %.0f samples/s by %d process%s, seed %" PRIu64 ", stalls %d %%\n", seconds, speed,
+          l->options.jobs, l->options.jobs == 1 ? "" : "es", l->options.seed, l->options.stall_percent);
 }
 
 sf_status sf_lockstep_junit(const sf_lockstep *l, const sf_status *status, double seconds, const char *path)

@@ -32,6 +32,11 @@ extern "C" sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *pl
   return sf_pins_make<top_pins, Vsf_top>(seed, wave, plusarg);
 }
 
+extern "C" const char *sf_pins_plusargs(void)
+{
+  return SF_PLUSARGS; // tools/plusargs.sh
+}
+
 static void edge(sf_pins *pins, bool clk)
 {
   pins->clock(clk);
@@ -71,9 +76,7 @@ static void leave_coverage(sf_pins *pins)
   pins->context.coveragep()->write(path);
 }
 #else
-static void leave_coverage(sf_pins *)
-{
-}
+static void leave_coverage(sf_pins *) {}
 #endif
 
 extern "C" void sf_pins_close(sf_pins *pins)

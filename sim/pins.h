@@ -46,6 +46,8 @@ typedef struct sf_pins sf_pins;
 /* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
 sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg); /* sf_ray_top */
+/* The words that sf_top reads from a plusarg, as its source names them, each with a blank behind it: "fault=%d ". */
+const char *sf_pins_plusargs(void);
 /* The waveform begins here. sf_pins_dump_end: its file ends and is whole; sf_pins_dump then begins another by that
  * name. */
 void sf_pins_dump(sf_pins *pins);

@@ -1,4 +1,5 @@
 #include "sim/replay.h"
+#include "sim/wave_file.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -71,6 +72,7 @@ sf_status sf_replay_run(const sf_replay *replay, const fx_net *net, const char *
   if (status.code == SF_OK) {
     status = compare(p, dut, replayed);
     sf_dut_close(dut);
+    if (wave && status.code == SF_OK) status = sf_wave_file_check(wave);
   }
   free(p);
   return status;

@@ -17,6 +17,7 @@ typedef struct sf_replay {
   int stall_percent;
   char plusarg[SF_PLUSARG_MAX + 1]; /* "" for none */
   bool other_program;               /* of a loaded one: not this program wrote it */
+  const char *other_block;          /* of a loaded one: how the block in this program is not the file's; or NULL */
   int count;
   sf_replay_sample sample[SF_REPLAY_MAX];
 } sf_replay;
@@ -35,8 +36,8 @@ sf_status sf_replay_run(const sf_replay *replay, const fx_net *net, const char *
  * of them do. */
 sf_status sf_replay_shrink(sf_replay *replay, const fx_net *net, bool *differs);
 
-/* JSON: SHA-256 of this program, scene path and SHA-256, seed, stalls, samples. `difference`, which may be NULL, is for
- * the reader and is freed.
+/* JSON: SHA-256 of this program, its block (--dut), scene path and SHA-256, seed, stalls, samples. `difference`, which
+ * may be NULL, is for the reader and is freed.
  */
 sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path);
 /* Checks every field; the scene must have the same contents still. *scene: malloc'ed path. */

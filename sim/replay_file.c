@@ -1,5 +1,6 @@
 /* Replay files. */
 #include "sim/replay.h"
+#include "sim/other_dut.h"
 #include "base/sha256.h"
 #include "energy/energy.h"
 #include "base/json.h"
@@ -51,15 +52,19 @@ static cJSON *replay_json(const sf_replay *replay, const char *scene, const char
 sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path)
 {
   char hash[65], program[65], *whole = realpath(scene, NULL);
+  cJSON *dut = NULL;
   sf_status status = sf_sha256_file(scene, hash);
   if (status.code == SF_OK) status = sf_sha256_file(PROGRAM, program);
+  if (status.code == SF_OK) status = sf_other_dut_own(&dut);
   if (!whole && status.code == SF_OK) status = sf_fail(SF_E_IO, "%s: %s", scene, strerror(errno));
   if (status.code != SF_OK) {
     cJSON_Delete(difference);
+    cJSON_Delete(dut);
     free(whole);
     return status;
   }
   cJSON *json = replay_json(replay, whole, hash, program);
+  if (dut) cJSON_AddItemToObject(json, "dut", dut);
   if (difference) cJSON_AddItemToObject(json, "difference", difference);
   status = sf_json_save(json, path);
   cJSON_Delete(json);
@@ -148,6 +153,15 @@ static sf_status same_program(const cJSON *json, bool *other)
   return sf_ok();
 }
 
+static sf_status same_block(const cJSON *json, const char **other)
+{
+  cJSON *own;
+  SF_TRY(sf_other_dut_own(&own));
+  *other = sf_other_dut_departs(own, sf_json_get(json, "dut"));
+  cJSON_Delete(own);
+  return sf_ok();
+}
+
 sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path)
 {
   cJSON *json;
@@ -156,6 +170,7 @@ sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path)
   SF_TRY(sf_json_load(path, &json));
   sf_status status = load_run(json, path, replay);
   if (status.code == SF_OK) status = same_program(json, &replay->other_program);
+  if (status.code == SF_OK) status = same_block(json, &replay->other_block);
   if (status.code == SF_OK) status = same_scene(json, path, scene);
   cJSON_Delete(json);
   return status;

@@ -47,10 +47,10 @@ $1/V$4__ALL.a: $1/V$4.mk
 	$$Q$$(MAKE) -s -C $1 -f V$4.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$4__ALL.a >/dev/null
 	@touch $$@
 -include $1/$5.d
-$1/$5.o: sim/$5.cpp $(ARCH_DEF) $1/V$4.mk
+$1/$5.o: sim/$5.cpp $(ARCH_DEF) tools/plusargs.sh $1/V$4.mk
 	$$(call say,CXX   $$< -> $$@)
 	$$Q$$(CXX) -std=c++17 -O2 -Wall -Wextra $(if $(CI),-Werror) $(COVERAGE_FLAGS) $(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $$(VERILATOR_ROOT)/include \
-	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -MMD -MP -c $$< -o $$@
+	  -isystem $$(VERILATOR_ROOT)/include/vltstd -isystem $1 -DSF_PLUSARGS="\"$$$$(tools/plusargs.sh $1)\"" -MMD -MP -c $$< -o $$@
 endef
 # $1 to $3 as above: the library of sf_top and of everything in sim/ but sf_ray_top itself
 define verilated_rule
@@ -72,7 +72,12 @@ $B/verilated/runtime/%.o: $(VERILATOR_ROOT)/include/%.cpp
 	$(call say,CXX   $<)
 	$Q$(CXX) -std=c++17 -O2 $(COVERAGE_FLAGS) -I$(VERILATOR_ROOT)/include -I$(VERILATOR_ROOT)/include/vltstd -c $< -o $@
 
-$B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen
+# FuseSoC takes the last core of a name that it finds: those below the build folder are not to be found.
+$B/FUSESOC_IGNORE:
+	@mkdir -p $(@D) && touch $@
+all: $B/FUSESOC_IGNORE
+
+$B/variant/.generated: $(RTL_ALL) $(ARCH_DEF) $B/bin/sf_gen | $B/FUSESOC_IGNORE
 	$(call say,GEN   $(@D)/rtl)
 	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r rtl $(@D)/rtl && $B/bin/sf_gen --root $(@D) $(RTL_ALL)
 	@touch $@
@@ -123,7 +128,7 @@ ifneq ($(SAME_ARCH),)
 gen-check:
 	@echo "  gen-check: other widths than the committed files', skipped"
 else
-gen-check: $B/bin/sf_gen ## generated files are those that the sources give
+gen-check: $B/bin/sf_gen | $B/FUSESOC_IGNORE ## generated files are those that the sources give
 	@rm -rf $B/gen-check && $B/bin/sf_gen --root $B/gen-check $(RTL_ALL)
 	@diff -r $B/gen-check/rtl/gen rtl/gen && diff $B/gen-check/docs/registers.md docs/registers.md && \
 	  diff $B/gen-check/spikefield.core spikefield.core && tools/check_mirror.sh

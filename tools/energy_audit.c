@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "page/page.h"
 #include "base/io.h"
+#include "sim/plusarg.h"
 #include "sim/studio/audit_run.h"
 #include <inttypes.h>
 #include <omp.h>
@@ -224,6 +225,7 @@ static sf_status compare(const options *opt)
 
 static sf_status work(const options *opt)
 {
+  SF_TRY(sf_plusarg_check(opt->audit.plusarg));
   if (opt->compare) return compare(opt);
   if (opt->audit.scene) return audit_scene(opt);
   if (opt->json) return sf_json_print(sf_published_json(), true);

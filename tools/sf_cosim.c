@@ -3,10 +3,12 @@
 #include "sim/jobs.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
+#include "sim/plusarg.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/clock.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +20,8 @@ typedef struct options {
   bool json, quiet;
   const char *replay, *junit, *dut, *dut_top, *window;
   sf_activity_options activity;
+  char evidence[4096]; /* where a difference's lies, "" where there is none */
+  bool replays;        /* the replay shows it */
 } options;
 static const char *const split_name[] = {"test", "train"};
 
@@ -31,9 +35,9 @@ static void show(void *user, const sf_lockstep *l)
   display *d = user;
   const double seconds = sf_seconds() - d->begun;
   if (!sf_progress_due(&d->progress)) return;
-  sf_progress_show(&d->progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s  %d processes", l->rays,
+  sf_progress_show(&d->progress, "ray %" PRIu64 "/%d  %" PRIu64 " samples equal  %.0f samples/s  %d process%s", l->rays,
                    l->options.rays, l->sum.samples, seconds > 0 ? (double)(l->sum.samples - l->resumed) / seconds : 0,
-                   l->options.jobs);
+                   l->options.jobs, l->options.jobs == 1 ? "" : "es");
 }
 
 static sf_status print_text(const sf_lockstep *l, double seconds)
@@ -53,38 +57,92 @@ static sf_status report(const options *o, const sf_lockstep *l, const sf_status 
   return saved;
 }
 
-static sf_status simulate(const options *o, sf_lockstep *l)
+static sf_status load(const options *o, sf_lockstep *l)
+{
+  SF_TRY(sf_lockstep_load(l, &o->run));
+  SF_TRY(sf_plusarg_check(o->run.plusarg));
+  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  return sf_ok();
+}
+
+static sf_status simulate(options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
-  SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  SF_TRY(load(o, l));
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
   sf_status status = sf_lockstep_run(l);
   sf_progress_end(&d.progress);
   l->user = NULL;
+  snprintf(o->evidence, sizeof o->evidence, "%s", l->evidence);
+  o->replays = l->replays;
   if (status.code == SF_OK && l->sum.samples == 0)
-    status = sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: nothing was compared", l->data.path, o->run.rays);
+    status = sf_fail(SF_E_FORMAT, "%s: none of %d ray%s has a sample: nothing was compared", l->data.path, o->run.rays,
+                     sf_plural((uint64_t)o->run.rays));
   const sf_status reported = report(o, l, &status, sf_seconds() - d.begun);
   if (status.code == SF_OK) return reported;
   return reported.code == SF_OK ? status : sf_fail(status.code, "%.199s; %.199s", status.message, reported.message);
 }
 
+/* ---- evidence ---- */
+
+/* For a shell. */
+static void print_word(FILE *out, const char *word)
+{
+  if (word[strcspn(word, " \t\n'\"\\$`&|;<>()*?[#~!{")] == 0) {
+    fputs(word, out);
+    return;
+  }
+  putc('\'', out);
+  for (; *word; word++) fputs(*word == '\'' ? "'\\''" : (char[]){*word, 0}, out);
+  putc('\'', out);
+}
+
+/* After the difference itself. */
+static void say_evidence(FILE *out, const options *o, const char *program)
+{
+  char path[4096 + 8];
+  if (!o->evidence[0]) return;
+  snprintf(path, sizeof path, "%s.json", o->evidence);
+  fprintf(out, "evidence: %s, waveform %s.fst\n", path, o->evidence);
+  if (!o->replays) {
+    fprintf(out, "replay:   these samples alone do not show it; the same command again does\n");
+    return;
+  }
+  fprintf(out, "replay:   ");
+  print_word(out, program);
+  fprintf(out, " --replay ");
+  print_word(out, path);
+  putc('\n', out);
+}
+
 /* ---- replay ---- */
 
-static sf_status say_replayed(const char *path, const sf_replay *replay, const sf_replayed *replayed)
+static sf_status say_replayed(const char *path, const sf_replay *replay, const sf_replayed *replayed, const char *wave)
 {
-  char text[200];
+  char text[200], note[120] = "";
   const sf_replay_sample *s = &replay->sample[replayed->at];
+  if (replay->other_block) snprintf(note, sizeof note, "; %s", replay->other_block);
   if (!replayed->differs) {
-    printf("%s: %d samples, no difference%s\n", path, replay->count,
-           replay->other_program ? "; the file was written by another program" : "");
+    if (!note[0] && replay->other_program) snprintf(note, sizeof note, "; the file was written by another program");
+    printf("%s: %d sample%s, no difference%s\n", path, replay->count, sf_plural((uint64_t)replay->count), note);
+    printf("waveform: %s\n", wave);
     return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
   }
   if (replayed->what.wire) sf_difference_text(&replayed->what, text);
-  return sf_fail(SF_E_DIFFERENCE, "%s: ray %" PRIu64 " sample %" PRIu64 ": %s", path, s->ray, s->sample,
-                 replayed->what.wire ? text : replayed->message);
+  return sf_fail(SF_E_DIFFERENCE, "%s: ray %" PRIu64 " sample %" PRIu64 ": %s; waveform %s%s", path, s->ray, s->sample,
+                 replayed->what.wire ? text : replayed->message, wave, note);
+}
+
+/* A replay's waveform may be written again and again, that of a difference not. */
+static sf_status keep_evidence(const options *o)
+{
+  char path[4096];
+  snprintf(path, sizeof path, "%s.json", o->run.evidence);
+  if (access(path, F_OK)) return sf_ok();
+  return sf_fail(SF_E_USAGE, "--evidence %s: %s is of a difference, whose waveform would be written over",
+                 o->run.evidence, path);
 }
 
 static sf_status play(const options *o)
@@ -93,11 +151,12 @@ static sf_status play(const options *o)
   sf_replayed replayed;
   fx_scene scene = {0};
   char *name, wave[4096];
+  SF_TRY(keep_evidence(o));
   SF_TRY(sf_replay_load(&replay, &name, o->replay));
   snprintf(wave, sizeof wave, "%s.fst", o->run.evidence);
   sf_status status = fx_scene_load(&scene, name);
   if (status.code == SF_OK) status = sf_replay_run(&replay, &scene.net, wave, &replayed);
-  if (status.code == SF_OK) status = say_replayed(o->replay, &replay, &replayed);
+  if (status.code == SF_OK) status = say_replayed(o->replay, &replay, &replayed, wave);
   fx_scene_free(&scene);
   free(name);
   return status;
@@ -125,7 +184,8 @@ static cJSON *activity_json(const options *o, const sf_activity_report *r)
 static sf_status report_activity(const options *o, const sf_activity_report *r)
 {
   if (o->json) return sf_json_print(activity_json(o, r), true);
-  printf("%" PRIu64 " rays, %" PRIu64 " samples: 0 differences\n", r->rays, r->samples);
+  printf("%" PRIu64 " ray%s, %" PRIu64 " sample%s: 0 differences\n", r->rays, sf_plural(r->rays), r->samples,
+         sf_plural(r->samples));
   printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
          r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
   for (int i = 0; i < 2; i++) {
@@ -139,8 +199,7 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
   sf_activity_report r;
-  SF_TRY(sf_lockstep_load(l, &o->run));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  SF_TRY(load(o, l));
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
@@ -174,7 +233,7 @@ static sf_status settle(options *o)
   SF_TRY(check_evidence(r->evidence));
   if (!r->jobs) r->jobs = 1;
   if (!r->block) r->block = 256;
-  if (!r->evidence) r->evidence = "sf_cosim-difference";
+  if (!r->evidence) r->evidence = o->replay ? "sf_cosim-replay" : "sf_cosim-difference";
   if (!o->activity.clock_mhz) o->activity.clock_mhz = 200;
   if (!o->dut_top) o->dut_top = "sf_top";
   return sf_ok();
@@ -218,11 +277,11 @@ int main(int argc, char **argv)
       {"--block", 0, SF_ARG_INT, &r->block, 1, 1e9, NULL, "N",
        "rays per unit of work, each on a freshly powered accelerator (default 256)"},
       {"--checkpoint", 0, SF_ARG_OUTPUT, &r->checkpoint, 0, 0, NULL, "FILE",
-       "finished units; where it is there, the run goes on from it"},
+       "finished units; where it is there, the run goes on from it, also with more --rays"},
       {"--evidence", 0, SF_ARG_STRING, &r->evidence, 0, 0, NULL, "PREFIX",
-       "of a difference: PREFIX.json to replay, PREFIX.fst waveform (default sf_cosim-difference)"},
+       "where a difference goes: PREFIX.json, PREFIX.fst, the next one PREFIX-2 (default sf_cosim-difference)"},
       {"--replay", 0, SF_ARG_INPUT, &o.replay, 0, 0, NULL, "FILE",
-       "the samples of such a file, and nothing else; writes PREFIX.fst"},
+       "only the samples of such a .json, on the block that it is of; writes PREFIX.fst (default sf_cosim-replay)"},
       {"--junit", 0, SF_ARG_OUTPUT, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
       {"--saif", 0, SF_ARG_OUTPUT, &o.activity.saif, 0, 0, NULL, "FILE",
        "stream the rays' samples through one accelerator and write its switching activity (docs/activity.md)"},
@@ -235,7 +294,7 @@ int main(int argc, char **argv)
       {"--plusarg", 0, SF_ARG_STRING, &r->plusarg, 0, 0, NULL, "ARG",
        "passed to the simulation, for a fault build: +fault=1; at most 63 characters"},
       {"--dut", 0, SF_ARG_STRING, &o.dut, 0, 0, NULL, "FILES",
-       "Verilog sources of another block with the ports of rtl/sf_top.sv, and options of Verilator (docs/kit.md)"},
+       "another block with the ports of rtl/sf_top.sv: Verilog sources, options of Verilator, -F LIST (docs/kit.md)"},
       {"--dut-top", 0, SF_ARG_STRING, &o.dut_top, 0, 0, NULL, "NAME", "its module (default sf_top)"},
       {0}};
   const sf_cli cli = {.program = "sf_cosim",
@@ -247,7 +306,8 @@ int main(int argc, char **argv)
                           "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
                           "  sf_cosim --replay sf_cosim-difference.json\n"
                           "  sf_cosim scene.snn data --rays 200 --stalls 0 --saif run.saif --depth 3\n"
-                          "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n",
+                          "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n"
+                          "  sf_cosim scene.snn data --dut \"-F kit/rtl.f\"\n",
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};
@@ -259,7 +319,10 @@ int main(int argc, char **argv)
     status = sf_cli_refuse(&cli, argc, argv, named_by_replay, "has no effect beside --replay: its file is the run");
   if (status.code == SF_OK) status = settle(&o);
   if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
+  if (status.code == SF_OK && o.replay) status = sf_other_dut_replay(o.replay, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) status = run(&o, positional[0], positional[1]);
-  return sf_cli_finish(&cli, status);
+  const int code = sf_cli_finish(&cli, status);
+  if (status.code == SF_E_DIFFERENCE) say_evidence(stderr, &o, argv[0]);
+  return code;
 }

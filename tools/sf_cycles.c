@@ -3,6 +3,8 @@
 #include "cli/cli.h"
 #include "cycles/cycles.h"
 #include "quant/quant.h"
+#include "base/io.h"
+#include "report/plot.h"
 #include "scene/scene.h"
 #include <inttypes.h>
 #include <omp.h>
@@ -13,7 +15,7 @@
 enum { BAND = 16 }; /* rows of pixels between two looks at the model */
 
 typedef struct options {
-  const char *scene, *data, *split;
+  const char *scene, *data, *split, *plot;
   int view, downscale, threads;
   double clock;
   bool json, quiet;
@@ -127,6 +129,11 @@ static int busiest(const sf_cycle_totals *t)
   return most;
 }
 
+static bool has_layer(const job *j, int layer)
+{
+  return j->scene.net.layer[layer].n_out > 0;
+}
+
 /* ---- design space ---- */
 
 /* A row of weights is added in one cycle however many lanes there are, so lanes decide which nets run and how many of
@@ -199,21 +206,71 @@ static void add_space(const job *j, cJSON *json)
   }
 }
 
+/* ---- plot ---- */
+
+/* The script that draws NAME.svg is NAME.gp. */
+static sf_status plot_name(const char *path, char name[256])
+{
+  const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
+  const size_t length = strlen(file);
+  if (length < 4 || length > 250 || strcmp(file + length - 3, ".gp") != 0 || strpbrk(file, "'\\\n"))
+    return sf_fail(SF_E_USAGE, "--plot %s: expected NAME.gp, a gnuplot script that writes NAME.svg", path);
+  snprintf(name, 256, "%.*s", (int)(length - 3), file);
+  return sf_ok();
+}
+
+static void put_plot(FILE *out, const job *j, const char *name)
+{
+  char text[400], title[400];
+  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  snprintf(text, sizeof text, "Frames per second: %.200s, view %d, t_r = %d, %.1f cycles per sample", j->opt.data,
+           j->opt.view, j->scene.net.steps, ratio(t->cycles, t->samples));
+  sf_plot_quote(title, sizeof title, text);
+  sf_plot_head(out, name, title, "clock, MHz", "frames per second (cycle model)", "outside right top");
+  fprintf(out, "set logscale xy 2\nset xtics (");
+  for (size_t m = 0; m < COUNT(clocks); m++) fprintf(out, "%s%d", m ? ", " : "", clocks[m]);
+  fprintf(out, ")\n$frames << EOD\n");
+  for (size_t m = 0; m < COUNT(clocks); m++) {
+    fprintf(out, "%d", clocks[m]);
+    for (size_t c = 0; c < COUNT(cores); c++) fprintf(out, " %.6g", frames_per_second(j, cores[c], clocks[m]));
+    putc('\n', out);
+  }
+  fprintf(out, "EOD\nplot ");
+  for (size_t c = 0; c < COUNT(cores); c++)
+    fprintf(out, "%s$frames using 1:%zu with linespoints linecolor '%s' linewidth 2 pointtype 7 title '%d core%s'",
+            c ? ", " : "", c + 2, sf_plot_colour[c], cores[c], cores[c] > 1 ? "s" : "");
+  putc('\n', out);
+}
+
+static sf_status write_plot(const job *j)
+{
+  char name[256];
+  sf_writer writer;
+  SF_TRY(plot_name(j->opt.plot, name));
+  SF_TRY(sf_writer_open(&writer, j->opt.plot));
+  put_plot(writer.file, j, name);
+  SF_TRY(sf_writer_commit(&writer));
+  fprintf(stderr, "wrote %s; gnuplot makes %s.svg of it\n", j->opt.plot, name);
+  return sf_ok();
+}
+
 /* ---- output ---- */
 
 static void print_text(const job *j)
 {
   const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
   const int most = busiest(t);
-  printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, T = %d\n", j->opt.data, j->opt.view, j->rays, t->samples,
-         j->scene.net.steps);
+  printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, t_r = %d\n", j->opt.data, j->opt.view, j->rays,
+         t->samples, j->scene.net.steps);
   printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: %" PRIu64 ")\n",
          t->cycles, ratio(t->cycles, t->samples), sf_cycles_dense(&j->scene.net));
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
-  for (int l = 0; l < SF_LAYERS; l++) printf(" %s %.1f %%", fx_layer_name(l), 100 * ratio(t->busy[l], t->cycles));
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (has_layer(j, l)) printf(" %s %.1f %%", fx_layer_name(l), 100 * ratio(t->busy[l], t->cycles));
   printf("; the busiest is %s\n", fx_layer_name(most));
-  printf("%" PRIu64 " cycles without a sample for D1, %" PRIu64 " in which sums of D2 or C3 waited for the readout\n",
-         t->waits, t->stalls);
+  printf("%" PRIu64 " cycles without a sample for %s, %" PRIu64 " in which sums of %s waited for the readout\n",
+         t->waits, fx_layer_name(has_layer(j, FX_D1) ? FX_D1 : FX_C1), t->stalls,
+         has_layer(j, FX_D2) ? "D2 or C3" : "C3");
   print_space(j);
   printf("\n%.2f ms per frame at %.0f MHz in one core\n", ratio(t->cycles, 1) / j->opt.clock / 1e3, j->opt.clock);
 }
@@ -230,7 +287,8 @@ static sf_status print_json(const job *j)
   sf_json_add_u64(json, "waits", t->waits);
   sf_json_add_u64(json, "stalls", t->stalls);
   cJSON *busy = cJSON_AddObjectToObject(json, "utilisation");
-  for (int l = 0; l < SF_LAYERS; l++) cJSON_AddNumberToObject(busy, fx_layer_name(l), ratio(t->busy[l], t->cycles));
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (has_layer(j, l)) cJSON_AddNumberToObject(busy, fx_layer_name(l), ratio(t->busy[l], t->cycles));
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
   cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j, 1, j->opt.clock));
   add_space(j, json);
@@ -239,6 +297,8 @@ static sf_status print_json(const job *j)
 
 static sf_status run(job *j)
 {
+  char name[256];
+  if (j->opt.plot) SF_TRY(plot_name(j->opt.plot, name));
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
   const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, j->opt.scene, j->opt.data, j->opt.split, &how));
@@ -252,6 +312,7 @@ static sf_status run(job *j)
   const sf_status status = run_frame(j);
   sf_progress_end(&j->progress);
   SF_TRY(status);
+  if (j->opt.plot) SF_TRY(write_plot(j));
   if (j->opt.json) return print_json(j);
   print_text(j);
   return sf_ok();
@@ -269,6 +330,8 @@ int main(int argc, char **argv)
       {"--clock", 0, SF_ARG_DOUBLE, &o->clock, 1, 1e5, NULL, "MHZ", "for the last line and --json (default 200)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
+       "gnuplot script of frames per second over clock and cores; gnuplot writes NAME.svg"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const sf_cli cli = {.program = "sf_cycles",
@@ -278,7 +341,8 @@ int main(int argc, char **argv)
                           "cycle model: its\n"
                           "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
                       .examples = "  sf_cycles scene.snn data --view 3\n"
-                                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n",
+                                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
+                                  "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n",
                       .options = table,
                       .min_positional = 2,
                       .max_positional = 2};

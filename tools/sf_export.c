@@ -278,6 +278,7 @@ static sf_status check_options(const options *o)
     return sf_fail(SF_E_USAGE, "--traces needs --data DATA: the views to draw rays from");
   if (o->extra.vectors && !o->extra.data)
     return sf_fail(SF_E_USAGE, "--vectors needs --data DATA: the views to draw rays from");
+  if (o->extra.vectors) SF_TRY(sf_kit_check_folder(o->extra.vectors));
   if (!o->output && o->fit) return sf_fail(SF_E_USAGE, "--fit needs --output (-o) SCENE: nothing else is fitted");
   if (!o->output && !extras) return sf_fail(SF_E_USAGE, "--output (-o) SCENE is missing");
   if (o->fit && !o->extra.data) return sf_fail(SF_E_USAGE, "--fit needs --data DATA: the training views to fit to");

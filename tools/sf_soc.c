@@ -1,4 +1,5 @@
 /* sf_soc: the firmware renders a tile on an emulated system-on-chip with the Verilated accelerator. */
+#include "sim/plusarg.h"
 #include "sim/soc/soc.h"
 #include "firmware/sf_soc.h"
 #include "sim/soc/job.h"
@@ -140,6 +141,7 @@ static sf_status build(job *j)
   const options *o = &j->opt;
   const sf_dut_options dut = {.seed = o->seed, .stall_percent = o->stall, .plusarg = o->plusarg};
   const sf_soc_options soc = {.instructions = o->instructions, .uart = uart, .tick = tick, .user = j};
+  SF_TRY(sf_plusarg_check(o->plusarg));
   j->output = calloc(1, OUTPUT_MAX);
   if (!j->output) return sf_fail(SF_E_MEMORY, "no memory for the firmware's output");
   SF_TRY(sf_dut_open_bare(&j->dut, &dut));
@@ -269,15 +271,18 @@ static sf_status work(job *j)
   return status.code == SF_OK ? printed : status;
 }
 
-/* The firmware is built beside the programs: BUILD/bin/sf_soc, BUILD/firmware/sf_firmware.elf. */
+/* Built: BUILD/firmware/sf_firmware.elf beside BUILD/bin. Installed: PREFIX/lib/spikefield beside PREFIX/bin. */
 static void find_firmware(job *j)
 {
   char program[4000] = "";
   const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
-  if (j->opt.firmware || length < 0)
+  if (j->opt.firmware || length < 0) {
     snprintf(j->firmware, sizeof j->firmware, "%s", j->opt.firmware ? j->opt.firmware : "sf_firmware.elf");
-  else
-    snprintf(j->firmware, sizeof j->firmware, "%s/../firmware/sf_firmware.elf", dirname(program));
+    return;
+  }
+  const char *folder = dirname(program);
+  snprintf(j->firmware, sizeof j->firmware, "%s/../lib/spikefield/sf_firmware.elf", folder);
+  if (access(j->firmware, F_OK)) snprintf(j->firmware, sizeof j->firmware, "%s/../firmware/sf_firmware.elf", folder);
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
@@ -291,7 +296,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--firmware", 0, SF_ARG_INPUT, &o->firmware, 0, 0, NULL, "ELF",
-       "program to run (default ../firmware/sf_firmware.elf from here)"},
+       "program to run (default: the one built or installed with sf_soc)"},
       {"--image", 0, SF_ARG_INPUT, &o->image, 0, 0, NULL, "FILE", "memory image to load instead of the tile's own"},
       {"--save-image", 0, SF_ARG_OUTPUT, &o->save_image, 0, 0, NULL, "FILE",
        "write the memory image, for other systems"},

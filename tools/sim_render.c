@@ -3,6 +3,7 @@
 #include "cli/cli.h"
 #include "base/clock.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -94,7 +95,9 @@ static bool tick(void *user, size_t pixels)
   if (sf_progress_due(&j->progress)) {
     double all = (double)j->all, done = (double)j->done, elapsed = sf_seconds() - j->start;
     char views[48] = "";
-    if (j->set.todo > 0) snprintf(views, sizeof views, "%d of %d views, ", j->set.rendered, j->set.todo);
+    if (j->set.todo > 0)
+      snprintf(views, sizeof views, "%d of %d view%s, ", j->set.rendered, j->set.todo,
+               sf_plural((uint64_t)j->set.todo));
     sf_progress_show(&j->progress, "%s: %s%.0f of %.0f pixels, %.0f pixels/s, ETA %.0f s",
                      sf_backend_names[j->opt.backend], views, done, all, done / elapsed, elapsed * (all - done) / done);
   }
@@ -228,8 +231,11 @@ static sf_status verify(job *j)
     sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
   }
   if (differences > 0)
-    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ; %s", j->opt.verify, differences, j->set.todo, j->first);
-  if (!j->opt.json) printf("OK: %d of %d views are as %s says\n", j->set.todo, j->set.manifest.total, j->opt.verify);
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d view%s differ; %s", j->opt.verify, differences, j->set.todo,
+                   sf_plural((uint64_t)j->set.todo), j->first);
+  if (!j->opt.json)
+    printf("OK: %d of %d view%s as %s says\n", j->set.todo, j->set.manifest.total,
+           j->set.manifest.total == 1 ? " is" : "s are", j->opt.verify);
   return sf_ok();
 }
 

@@ -29,10 +29,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* The version of the library, the programs and their data: it is set here alone. */
 #define SPIKEFIELD_VERSION_MAJOR 1 /* of the soname: changes with every change of a type or a function below */
-#define SPIKEFIELD_VERSION_MINOR 0
+#define SPIKEFIELD_VERSION_MINOR 1
 #define SPIKEFIELD_VERSION_PATCH 0
-#define SPIKEFIELD_VERSION "1.0.0"
+#define SPIKEFIELD_JOINED(major, minor, patch) #major "." #minor "." #patch
+#define SPIKEFIELD_TEXT(major, minor, patch) SPIKEFIELD_JOINED(major, minor, patch)
+#define SPIKEFIELD_VERSION SPIKEFIELD_TEXT(SPIKEFIELD_VERSION_MAJOR, SPIKEFIELD_VERSION_MINOR, SPIKEFIELD_VERSION_PATCH)
 
 #if defined(__GNUC__)
 #define SPIKEFIELD_API __attribute__((visibility("default")))
@@ -78,7 +81,7 @@ typedef struct spikefield_status {
   char message[400]; /* one line: what, where (file, tensor, ray, sample) and what was expected; "" when OK */
 } spikefield_status;
 
-/* The version of the library that runs, "1.0.0"; SPIKEFIELD_VERSION is the one compiled against. */
+/* The version of the library that runs, "MAJOR.MINOR.PATCH"; SPIKEFIELD_VERSION is the one compiled against. */
 SPIKEFIELD_API const char *spikefield_version(void);
 
 /* ---- scenes ---- */

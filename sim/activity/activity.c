@@ -1,9 +1,11 @@
 #include "sim/activity/activity.h"
 #include "sim/activity/saif.h"
 #include "sim/sim.h"
+#include "sim/wave_file.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,8 +88,8 @@ static sf_status collect_rays(activity *a)
   for (int i = 0; i < a->in.count; i++) a->in.sample[i].ray = &a->in.ray[i], a->in.sample[i].f = a->in.f[i];
   a->report->rays = (uint64_t)l->options.rays;
   return a->in.count ? sf_ok()
-                     : sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: nothing to stream", l->data.path,
-                               l->options.rays);
+                     : sf_fail(SF_E_FORMAT, "%s: none of %d ray%s has a sample: nothing to stream", l->data.path,
+                               l->options.rays, sf_plural((uint64_t)l->options.rays));
 }
 
 /* ---- the waveform, a piece at a time ---- */
@@ -109,8 +111,11 @@ static void end_piece(activity *a, uint64_t cycle)
 {
   sf_pins_dump_end(a->dut->pins);
   a->dumping = false;
+  if (a->status.code == SF_OK) a->status = sf_wave_file_check(a->path);
   if (a->status.code == SF_OK && !a->opened) a->status = open_wave(a);
   if (a->status.code == SF_OK) a->status = sf_wave_add(&a->wave, a->path, 2 * cycle);
+  if (a->status.code == SF_OK && a->options->vcd && ferror(a->vcd_file.file))
+    a->status = sf_writer_commit(&a->vcd_file); /* says why */
 }
 
 static void begin_piece(activity *a, uint64_t cycle)
@@ -166,7 +171,7 @@ static sf_status compare(const activity *a, const sf_dut_result *result)
   SF_TRY(sf_dut_counts(a->dut, &actual, NULL, NULL, NULL));
   if (sf_compare_counts(&expected, &actual, sf_dut_cycle(a->dut), &d)) return sf_ok();
   sf_difference_text(&d, text);
-  return sf_fail(SF_E_DIFFERENCE, "stream of %d samples: %s", a->in.count, text);
+  return sf_fail(SF_E_DIFFERENCE, "stream of %d sample%s: %s", a->in.count, sf_plural((uint64_t)a->in.count), text);
 }
 
 static sf_status stream_samples(activity *a, sf_dut_result *result)

@@ -2,6 +2,7 @@
 #include "sim/kit/kit.h"
 #include "energy/energy.h"
 #include "base/rng.h"
+#include "base/text.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -52,7 +53,8 @@ sf_status sf_kit_draw_samples(sf_kit_draw *draw, const fx_scene *scene, const sf
   for (int i = 0; i < options->rays && draw->samples < draw->limit; i++)
     SF_TRY(draw_ray(draw, data, options->seed, (uint64_t)i));
   if (draw->samples) return sf_ok();
-  return sf_fail(SF_E_FORMAT, "%s: none of %d rays has a sample: no vectors", data->path, options->rays);
+  return sf_fail(SF_E_FORMAT, "%s: none of %d ray%s has a sample: no vectors", data->path, options->rays,
+                 sf_plural((uint64_t)options->rays));
 }
 
 void sf_kit_draw_free(sf_kit_draw *draw)

@@ -30,7 +30,7 @@ static void record_write(void *context, uint32_t offset, uint32_t value)
 static sf_status write_program(sf_kit_output *output, const fx_net *net, int *writes)
 {
   sf_kit_writer file;
-  SF_TRY(sf_kit_begin(output, &file, "program.hex"));
+  SF_TRY(sf_kit_begin(output, &file, SF_KIT_FIRST));
   recorder r = {.file = file.writer.file};
   const sf_bus bus = {.read = record_read, .write = record_write, .context = &r};
   const sf_net_blob blob = sf_dut_blob(net);

@@ -3,6 +3,8 @@
 #include "base/sha256.h"
 #include "energy/energy.h"
 #include "spikefield/spikefield.h"
+#include <dirent.h>
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -23,15 +25,17 @@ static sf_status copy_files(sf_kit_output *output)
   return sf_ok();
 }
 
-/* Names relative to rtl/, in the order in which they compile. */
+/* As simulators take it (-f in the folder, -F from elsewhere): the include folder, and the files in the order in which
+ * they compile. */
 static sf_status list_rtl(sf_kit_output *output)
 {
   sf_kit_writer file;
   SF_TRY(sf_kit_begin(output, &file, "rtl.f"));
+  fprintf(file.writer.file, "+incdir+rtl\n");
   for (const sf_kit_file *from = sf_kit_files; from->name; from++) {
     const size_t length = strlen(from->name);
     if (strncmp(from->name, "rtl/", 4) == 0 && strcmp(from->name + length - 3, ".sv") == 0)
-      fprintf(file.writer.file, "%s\n", from->name + 4);
+      fprintf(file.writer.file, "%s\n", from->name);
   }
   return sf_kit_end(output, &file);
 }
@@ -107,17 +111,50 @@ static sf_status write_manifest(const sf_kit_output *output, const sf_kit_draw *
   return status;
 }
 
+/* ---- the folder ---- */
+
+static sf_status is_kit(const char *folder, bool *kit)
+{
+  const sf_kit_output output = {.folder = folder};
+  char path[4096];
+  SF_TRY(sf_kit_path(&output, SF_KIT_FIRST, path));
+  *kit = access(path, F_OK) == 0;
+  return sf_ok();
+}
+
+static bool is_empty(DIR *dir)
+{
+  const struct dirent *entry;
+  while ((entry = readdir(dir)))
+    if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0 && strncmp(entry->d_name, ".sf-", 4) != 0)
+      return false;
+  return true;
+}
+
+sf_status sf_kit_check_folder(const char *folder)
+{
+  bool kit, empty = true;
+  SF_TRY(is_kit(folder, &kit));
+  DIR *dir = opendir(folder);
+  if (!dir) return errno == ENOENT ? sf_ok() : sf_fail(SF_E_IO, "%s: %s", folder, strerror(errno));
+  empty = is_empty(dir);
+  closedir(dir);
+  if (kit || empty) return sf_ok();
+  return sf_fail(SF_E_USAGE, "%s: holds other things than a vector kit; name a new or empty folder", folder);
+}
+
 /* ---- all of it ---- */
 
 static sf_status write_folder(sf_kit_output *output, const sf_kit_draw *draw, const sf_dataset *data,
                               const sf_kit_options *options, sf_kit_report *report)
 {
   char path[4096];
-  SF_TRY(sf_kit_path(output, "rtl/gen", path));
-  SF_TRY(sf_make_dir(path));
+  SF_TRY(sf_make_dir(output->folder));
   SF_TRY(sf_kit_path(output, MANIFEST, path));
   unlink(path); /* a folder without one is not whole */
   SF_TRY(sf_kit_images(output, draw, options, report));
+  SF_TRY(sf_kit_path(output, "rtl/gen", path));
+  SF_TRY(sf_make_dir(path));
   SF_TRY(copy_files(output));
   SF_TRY(list_rtl(output));
   return write_manifest(output, draw, data, options, report);
@@ -128,7 +165,12 @@ sf_status sf_kit_write(const char *folder, const fx_scene *scene, const sf_datas
 {
   sf_kit_output output = {.folder = folder, .list = cJSON_CreateArray()};
   sf_kit_draw draw;
-  sf_status status = sf_kit_draw_samples(&draw, scene, data, options);
+  sf_status status = sf_kit_check_folder(folder);
+  if (status.code != SF_OK) {
+    cJSON_Delete(output.list);
+    return status;
+  }
+  status = sf_kit_draw_samples(&draw, scene, data, options);
   *report = (sf_kit_report){.rays = draw.rays, .samples = draw.samples};
   if (status.code == SF_OK) status = write_folder(&output, &draw, data, options, report);
   report->files = output.files, report->bytes = output.bytes;

@@ -6,6 +6,7 @@
 #include "base/io.h"
 #include "scene/scene.h"
 
+#define SF_KIT_FIRST "program.hex" /* of its files, the first to be written */
 enum { SF_KIT_VERSION = 1, SF_KIT_SAMPLES_MAX = 4096 };
 
 typedef struct sf_kit_options {
@@ -19,6 +20,8 @@ typedef struct sf_kit_report {
   uint64_t bytes;
 } sf_kit_report;
 
+/* SF_E_USAGE where the folder holds something else than a kit, whole or not: nothing is mixed up with a kit. */
+sf_status sf_kit_check_folder(const char *folder);
 /* The same seed draws the rays that sf_cosim draws; of each, the first 12 samples at most. SF_E_FORMAT when none of
  * them has a sample. */
 sf_status sf_kit_write(const char *folder, const fx_scene *scene, const sf_dataset *data, const sf_kit_options *options,

@@ -1,6 +1,6 @@
 // Self-checking bench of a vector kit: programs the block over AXI4-Lite, streams the samples with random bubbles and
 // back-pressure, compares results, tap beats and counters. PASS, or the first difference and a failing exit status.
-// Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +notap (the block shows no tap beats)
+// Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +notap (the block shows no tap beats) +vcd=FILE (waveform)
 `timescale 1ns / 1ps
 `default_nettype none
 `ifndef SF_DUT
@@ -442,7 +442,7 @@ module sf_kit_tb;
   task pass;
     begin
       $display("PASS %0d samples, %0d steps, %0d cycles, stalls %0d %%, seed %0d", SAMPLES, STEPS, cycle, stalls, seed);
-      $finish;
+      $finish(0);  // says nothing more
     end
   endtask
 
@@ -504,9 +504,25 @@ module sf_kit_tb;
   end
 
   integer i;
+  reg [8*1024-1:0] wave;  // name of a file
   initial begin
     if ($value$plusargs("stalls=%d", stalls) == 0) stalls = 20;
     if ($value$plusargs("seed=%d", seed) == 0) seed = SEED;
+    if ($value$plusargs("vcd=%s", wave) != 0) begin
+`ifdef SF_KIT_NO_WAVE
+      $display("FAIL: +vcd: this simulation was built without waveforms (make verilator VCD=FILE builds another)");
+      $fatal(1, "no waveform");
+`else
+      i = $fopen(wave, "w");
+      if (i == 0) begin
+        $display("FAIL: +vcd: %0s cannot be written", wave);
+        $fatal(1, "no waveform");
+      end
+      $fclose(i);
+      $dumpfile(wave);
+      $dumpvars(0, sf_kit_tb);
+`endif
+    end
     if ($test$plusargs("notap")) with_tap = 1'b0;
     // xorshift stays at 0
     bus_random = seed == 32'h9e3779b9 ? 32'd1 : seed ^ 32'h9e3779b9;

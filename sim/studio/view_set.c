@@ -1,6 +1,7 @@
 #include "sim/studio/view_set.h"
 #include "base/sha256.h"
 #include "base/io.h"
+#include "base/text.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,8 +135,8 @@ static sf_status render_missing(sf_view_set *set, const bool *done)
     if (status.code == SF_OK) status = render_view(set, &shot);
     sf_shot_free(&shot);
     if (status.code == SF_E_STOPPED)
-      return sf_fail(status.code, "stopped; %s holds %d of %d views, the same command goes on", set->folder,
-                     set->manifest.count, set->manifest.total);
+      return sf_fail(status.code, "stopped; %s holds %d of %d view%s, the same command goes on", set->folder,
+                     set->manifest.count, set->manifest.total, sf_plural((uint64_t)set->manifest.total));
     SF_TRY(status);
   }
   return sf_ok();
@@ -149,7 +150,9 @@ sf_status sf_view_set_render(sf_view_set *set, const sf_window *crop)
   SF_TRY(resume(set));
   SF_TRY(sf_manifest_save(&set->manifest, set->manifest_path));
   bool *done = calloc((size_t)set->manifest.total, sizeof *done);
-  if (!done) return sf_fail(SF_E_MEMORY, "no memory for %d views", set->manifest.total);
+  if (!done)
+    return sf_fail(SF_E_MEMORY, "no memory for %d view%s", set->manifest.total,
+                   sf_plural((uint64_t)set->manifest.total));
   for (int i = 0; i < set->manifest.total; i++) set->todo += !(done[i] = finished(set, i));
   sf_status status = render_missing(set, done);
   free(done);
@@ -198,7 +201,8 @@ static sf_status verify_view(sf_view_set *set, sf_shot *shot, sf_verdict *verdic
   sf_manifest_view here;
   int plane = -1;
   if (!shot->view) {
-    verdict->picture = sf_fail(SF_E_DIFFERENCE, "%s has %d views", set->studio->options.data, shot->data.total);
+    verdict->picture = sf_fail(SF_E_DIFFERENCE, "%s has %d view%s", set->studio->options.data, shot->data.total,
+                               sf_plural((uint64_t)shot->data.total));
     return sf_ok();
   }
   if (strcmp(shot->view->name, verdict->view->name) != 0) {
@@ -241,7 +245,8 @@ sf_status sf_view_set_verify(sf_view_set *set, int only, void (*report)(void *us
     sf_status status = sf_shot_load(set->studio, m->view[i].index, &shot);
     if (status.code == SF_OK) status = verify_view(set, &shot, &verdict);
     sf_shot_free(&shot);
-    if (status.code == SF_E_STOPPED) return sf_fail(status.code, "stopped after %d views", set->rendered);
+    if (status.code == SF_E_STOPPED)
+      return sf_fail(status.code, "stopped after %d view%s", set->rendered, sf_plural((uint64_t)set->rendered));
     SF_TRY(status);
     *differences += verdict.picture.code != SF_OK || verdict.file.code != SF_OK;
     report(set->user, &verdict);

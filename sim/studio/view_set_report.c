@@ -1,4 +1,5 @@
 #include "sim/studio/view_set.h"
+#include "base/text.h"
 
 cJSON *sf_verdict_json(const sf_verdict *v)
 {
@@ -30,6 +31,6 @@ void sf_view_set_add_run(const sf_view_set *set, double seconds, cJSON *json)
 
 void sf_view_set_print_run(FILE *out, const sf_view_set *set, double seconds)
 {
-  fprintf(out, "%d views rendered by %s in %.2f s, %.0f pixels/s\n", set->rendered,
+  fprintf(out, "%d view%s rendered by %s in %.2f s, %.0f pixels/s\n", set->rendered, sf_plural((uint64_t)set->rendered),
           sf_backend_names[set->studio->options.backend], seconds, (double)set->pixels / seconds);
 }

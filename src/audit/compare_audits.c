@@ -226,7 +226,7 @@ static cJSON *events(const side *a, const side *b)
   add_change(&list, "samples", sf_json_number(x, "samples") / a->views, sf_json_number(y, "samples") / b->views, true);
   add_change(&list, "rays with samples", sf_json_number(x, "rays") / a->views, sf_json_number(y, "rays") / b->views,
              true);
-  add_change(&list, "field bytes read", sf_json_number(x, "grid_bytes") / a->views,
+  add_change(&list, sf_traffic_events[SF_TRAFFIC_TABLE].title, sf_json_number(x, "grid_bytes") / a->views,
              sf_json_number(y, "grid_bytes") / b->views, true);
   return changes_json(&list);
 }

@@ -26,9 +26,8 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
     print_row(out, sf_events[e].title, sf_event_total(&s->core, e), sf_event_total(&s->rtl, e),
               sf_event_total(&s->recount, e), false);
   const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
-  print_row(out, "field bytes read", x->table_bytes, y->table_bytes, z->table_bytes, s->no_rtl_traffic);
-  print_row(out, "exp(-x) of compositing", x->exp_neg, y->exp_neg, z->exp_neg, s->no_rtl_traffic);
-  print_row(out, "frame bytes written", x->frame_bytes, y->frame_bytes, z->frame_bytes, s->no_rtl_traffic);
+  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
+    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e], s->no_rtl_traffic);
   print_row(out, "paper ledger, fJ", sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount), false);
   fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
           s->stalls);
@@ -112,9 +111,7 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
 static cJSON *traffic_json(const sf_traffic *traffic)
 {
   cJSON *json = cJSON_CreateObject();
-  sf_json_add_u64(json, "table_bytes", traffic->table_bytes);
-  sf_json_add_u64(json, "exp_neg", traffic->exp_neg);
-  sf_json_add_u64(json, "frame_bytes", traffic->frame_bytes);
+  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++) sf_json_add_u64(json, sf_traffic_events[e].name, traffic->event[e]);
   return json;
 }
 
@@ -155,6 +152,7 @@ static void add_origin(cJSON *json, const sf_audit_report *r)
   cJSON_AddNumberToObject(json, "t_r", r->net->steps);
   sf_json_add_u64(json, "seed", r->seed);
   sf_json_add_u64(json, "rays", r->rays);
+  cJSON_AddBoolToObject(json, "random_rays", r->random_rays);
   cJSON_AddNumberToObject(json, "views", r->views);
   sf_json_add_u64(json, "samples", r->measure.core.samples);
   cJSON_AddNumberToObject(json, "samples_per_ray", (double)r->measure.core.samples / (double)r->rays);
@@ -190,12 +188,31 @@ static void add_twin(cJSON *json, const sf_audit_report *r)
 
 static void add_saturation(cJSON *json, const sf_audit_report *r)
 {
-  char unexpected[64];
+  char unexpected[64], census[256];
   cJSON *saturated = cJSON_AddObjectToObject(json, "saturated_samples");
   for (int l = 0; l < SF_LAYERS; l++)
     sf_json_add_u64(saturated, fx_layer_name(l), r->measure.core.saturated_samples[l]);
   sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected);
   cJSON_AddStringToObject(json, "unexpected_saturation", unexpected);
+  sf_saturation_census(r->measure.core.saturated_samples, r->measure.core.saturated_features, census, sizeof census);
+  cJSON_AddStringToObject(json, "saturation", census);
+}
+
+static void add_titles(cJSON *titles, const char *key, const sf_event *event, int events)
+{
+  cJSON *json = cJSON_AddObjectToObject(titles, key);
+  for (int e = 0; e < events; e++) cJSON_AddStringToObject(json, event[e].name, event[e].title);
+}
+
+/* The names of events and of parts of the energy, for people. */
+static cJSON *titles_json(void)
+{
+  cJSON *json = cJSON_CreateObject();
+  add_titles(json, "events", sf_events, SF_EVENTS);
+  add_titles(json, "traffic", sf_traffic_events, SF_TRAFFIC_EVENTS);
+  cJSON *parts = cJSON_AddObjectToObject(json, "parts");
+  for (int p = 0; p < SF_PARTS; p++) cJSON_AddStringToObject(parts, sf_part_names[p], sf_part_titles[p]);
+  return json;
 }
 
 static void add_agreement(cJSON *json, const sf_audit_report *r)
@@ -227,6 +244,7 @@ cJSON *sf_report_json(const sf_audit_report *r)
   add_agreement(json, r);
   cJSON_AddItemToObject(json, "rtl_subset", three_json(&r->three, r->net));
   sf_limits_json(json);
+  cJSON_AddItemToObject(json, "titles", titles_json());
   cJSON_AddNumberToObject(json, "seconds", r->seconds);
   return json;
 }
@@ -241,7 +259,7 @@ void sf_report_csv(FILE *out, const sf_audit_report *r)
 {
   fprintf(out, "layer,step,n_in,n_out");
   for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%s", sf_events[e].name);
-  fprintf(out, ",table_bytes,frame_bytes");
+  fprintf(out, ",%s,%s", sf_traffic_events[SF_TRAFFIC_TABLE].name, sf_traffic_events[SF_TRAFFIC_FRAME].name);
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) fprintf(out, ",%s_fj", sf_ledger_texts[g].key);
   fprintf(out, "\n");
   for (int l = 0; l < SF_LAYERS; l++)

@@ -117,11 +117,21 @@ static void sync_folder(const char *path)
   close(fd);
 }
 
+/* Why writing failed earlier: errno is of something else by now, but one more write fails for the same cause. */
+static int refusal(int file)
+{
+  static const char nothing[65536];
+  errno = 0;
+  const ssize_t n = write(file, nothing, sizeof nothing);
+  if (n >= 0 && n < (ssize_t)sizeof nothing) (void)!write(file, nothing, sizeof nothing); /* room for less than that */
+  return errno ? errno : EIO;
+}
+
 sf_status sf_writer_commit(sf_writer *writer)
 {
   if (!writer->file) return sf_fail(SF_E_IO, "cannot write %s: it is not open", writer->path);
   int error = 0;
-  if (ferror(writer->file)) error = errno ? errno : EIO;
+  if (ferror(writer->file)) error = refusal(fileno(writer->file));
   if (fflush(writer->file) && !error) error = errno;
   if (!error && fsync(fileno(writer->file)) && errno != EINVAL && errno != EROFS) error = errno;
   if (fclose(writer->file) && !error) error = errno;

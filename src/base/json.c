@@ -101,6 +101,36 @@ bool sf_json_says(const cJSON *object, const char *key, const char *text)
   return value && !strcmp(value, text);
 }
 
+const cJSON *sf_json_at(const cJSON *json, const char *path)
+{
+  while (json && *path) {
+    char name[64];
+    int length = 0;
+    unsigned index;
+    if (*path == '.') path++;
+    if (sscanf(path, "[%u]%n", &index, &length) == 1 && length > 0)
+      json = cJSON_GetArrayItem(json, (int)index);
+    else if (sscanf(path, "%63[^.[]%n", name, &length) == 1)
+      json = cJSON_GetObjectItemCaseSensitive(json, name);
+    else
+      return NULL;
+    path += length;
+  }
+  return json;
+}
+
+double sf_json_real(const cJSON *item)
+{
+  if (cJSON_IsRaw(item)) return strtod(item->valuestring, NULL);
+  return cJSON_IsNumber(item) ? item->valuedouble : (double)NAN;
+}
+
+uint64_t sf_json_u64(const cJSON *item)
+{
+  if (cJSON_IsRaw(item)) return strtoull(item->valuestring, NULL, 10);
+  return cJSON_IsNumber(item) && item->valuedouble > 0 ? (uint64_t)item->valuedouble : 0;
+}
+
 sf_status sf_json_need(const cJSON *object, const char *where, const char *key, const cJSON **item)
 {
   *item = sf_json_get(object, key);

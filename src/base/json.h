@@ -18,6 +18,11 @@ const cJSON *sf_json_get(const cJSON *object, const char *key);            /* NU
 double sf_json_number(const cJSON *object, const char *key);               /* NaN: no finite number */
 const char *sf_json_text(const cJSON *object, const char *key);            /* NULL: no text */
 bool sf_json_says(const cJSON *object, const char *key, const char *text); /* this text and no other */
+/* "ledgers.list[2].parts_fj.mac"; NULL: not there. */
+const cJSON *sf_json_at(const cJSON *json, const char *path);
+/* Of a number or of the digits of sf_json_add_u64; NaN, 0: neither. */
+double sf_json_real(const cJSON *item);
+uint64_t sf_json_u64(const cJSON *item);
 /* Fields that have to be there; the message is "where: key ..." */
 sf_status sf_json_need(const cJSON *object, const char *where, const char *key, const cJSON **item);
 /* A whole number, low to high: else SF_E_RANGE. */

@@ -60,3 +60,8 @@ void sf_csv_text(FILE *out, const char *text)
   }
   if (quoted) fputc('"', out);
 }
+
+const char *sf_plural(uint64_t count)
+{
+  return count == 1 ? "" : "s";
+}

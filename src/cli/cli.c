@@ -219,12 +219,14 @@ static bool names_option(const sf_cli *cli, const char *word)
   return word[0] == '-' && word[1] == '-' && word[2] && find_option(cli, word, &value);
 }
 
-static void answer_and_exit(const sf_cli *cli, bool version)
+static void print_version(const sf_cli *cli)
 {
-  if (version)
-    printf("%s (spikefield) %s\n", cli->program, SPIKEFIELD_VERSION);
-  else
-    print_help(cli);
+  printf("%s (spikefield) %s\n", cli->program, SPIKEFIELD_VERSION);
+}
+
+static void answer_and_exit(const sf_cli *cli, void (*answer)(const sf_cli *))
+{
+  answer(cli);
   exit(sf_cli_finish(cli, sf_ok()));
 }
 
@@ -233,8 +235,9 @@ static sf_status take_option(const sf_cli *cli, int argc, char **argv, int *at)
   const char *word = argv[*at], *value;
   const sf_option *o = find_option(cli, word, &value);
   if (!o) {
-    if (!strcmp(word, "--help") || !strcmp(word, "-h")) answer_and_exit(cli, false);
-    if (!strcmp(word, "--version")) answer_and_exit(cli, true);
+    if (!strcmp(word, "--help") || !strcmp(word, "-h")) answer_and_exit(cli, print_help);
+    if (!strcmp(word, "--version")) answer_and_exit(cli, print_version);
+    if (!strcmp(word, "--completion")) answer_and_exit(cli, sf_cli_print_completion);
     return sf_fail(SF_E_USAGE, "unknown option %.80s", word);
   }
   if (o->type == SF_ARG_FLAG) {

@@ -33,11 +33,14 @@ typedef struct sf_cli {
   bool words; /* the positionals are words, not files or folders that are read */
 } sf_cli;
 
-/* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and
- * exit 0. SF_E_USAGE names the offending option; an OUTPUT or PLACE that is the same file as another file of the line
- * is one. SF_E_IO: an OUTPUT that cannot be written. Options may follow positionals; --name=value works. Ignores
- * SIGXFSZ, so that a file-size limit is an ordinary write error. */
+/* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and exit 0,
+ * and --completion, which `make install` uses and the help leaves out. SF_E_USAGE names the offending option; an OUTPUT
+ * or PLACE that is the same file as another file of the line is one. SF_E_IO: an OUTPUT that cannot be written. Options
+ * may follow positionals; --name=value works. Ignores SIGXFSZ, so that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
+
+/* The completion script for bash. */
+void sf_cli_print_completion(const sf_cli *cli);
 
 /* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
  * parsed. */

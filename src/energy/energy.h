@@ -33,6 +33,7 @@ typedef struct sf_event {
   const char *name, *title; /* "state_r", "state bytes read" */
 } sf_event;
 extern const sf_event sf_events[SF_EVENTS];
+extern const sf_event sf_traffic_events[SF_TRAFFIC_EVENTS];  /* of what is outside the nets, by sf_traffic_id */
 uint64_t sf_event_total(const fx_counts *counts, int event); /* over layers and steps */
 
 /* One price list, several readings of what is a MAC. All in fJ. */

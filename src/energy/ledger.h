@@ -54,10 +54,14 @@ enum { SF_ROW_FIELD = SF_LAYERS, SF_ROW_RAY, SF_ROWS };
 extern const char *const sf_row_names[SF_ROWS]; /* "D1" .. "C3", "field" (grid or planes), "ray" (exp(-x), frame) */
 
 /* What is outside the nets: all of it at step 0 of its row. */
-typedef struct sf_traffic {
-  uint64_t table_bytes; /* row field: hash-grid or plane bytes read */
-  uint64_t exp_neg;     /* row ray: exp(-x), one per composited sample */
-  uint64_t frame_bytes; /* row ray: bytes of pixels written, SF_PIXEL_BYTES each */
+typedef enum { SF_TRAFFIC_TABLE, SF_TRAFFIC_EXP_NEG, SF_TRAFFIC_FRAME, SF_TRAFFIC_EVENTS } sf_traffic_id;
+typedef union sf_traffic {
+  uint64_t event[SF_TRAFFIC_EVENTS]; /* by sf_traffic_id */
+  struct {
+    uint64_t table_bytes; /* row field: hash-grid or plane bytes read */
+    uint64_t exp_neg;     /* row ray: exp(-x), one per composited sample */
+    uint64_t frame_bytes; /* row ray: bytes of pixels written, SF_PIXEL_BYTES each */
+  };
 } sf_traffic;
 enum { SF_PIXEL_BYTES = 48 }; /* an fx_pixel, as the accelerator writes it */
 

@@ -103,8 +103,8 @@ void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts)
   fprintf(out, "\nalso counted:");
   for (int e = SF_EVENT_WEIGHT; e < SF_EVENTS; e++)
     fprintf(out, "%s %s %" PRIu64, e > SF_EVENT_WEIGHT ? "," : "", sf_events[e].title, sf_event_total(counts, e));
-  fprintf(out, ",\n  field bytes read %" PRIu64 ", occupancy tests %" PRIu64 "\n", counts->grid_bytes,
-          counts->march_steps);
+  fprintf(out, ",\n  %s %" PRIu64 ", occupancy tests %" PRIu64 "\n", sf_traffic_events[SF_TRAFFIC_TABLE].title,
+          counts->grid_bytes, counts->march_steps);
   if (counts->field_samples)
     fprintf(out, "  densities read %" PRIu64 ", of which %.1f %% are decoded; products of the field %" PRIu64 "\n",
             counts->field_samples, 100 * (double)counts->samples / (double)counts->field_samples, counts->field_mac);

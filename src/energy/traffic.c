@@ -2,6 +2,9 @@
 #include "energy/energy.h"
 
 _Static_assert(sizeof(fx_pixel) == SF_PIXEL_BYTES, "a pixel leaves the accelerator as it lies in memory");
+const sf_event sf_traffic_events[SF_TRAFFIC_EVENTS] = {
+    {"table_bytes", "field bytes read"}, {"exp_neg", "exp(-x) of compositing"}, {"frame_bytes", "frame bytes written"}};
+
 enum { CORNERS = 8, PLANE_READS = 4, LINE_READS = 2 }; /* of a component: int8 each */
 
 /* Samples whose light was attenuated: TensoRF composites before it decodes. */
@@ -12,7 +15,7 @@ static uint64_t composited(const fx_counts *counts)
 
 sf_traffic sf_traffic_of(const fx_counts *counts, uint64_t pixels)
 {
-  return (sf_traffic){counts->grid_bytes, composited(counts), pixels * SF_PIXEL_BYTES};
+  return (sf_traffic){{counts->grid_bytes, composited(counts), pixels * SF_PIXEL_BYTES}};
 }
 
 static uint64_t factors_read(const fx_factors *factors)
@@ -26,25 +29,19 @@ sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, u
 {
   const uint64_t frame = pixels * SF_PIXEL_BYTES;
   if (scene->backbone == FX_TENSORF)
-    return (sf_traffic){field_samples * factors_read(&scene->tensorf.density) +
-                            recount->samples * factors_read(&scene->tensorf.appearance),
-                        field_samples, frame};
+    return (sf_traffic){{field_samples * factors_read(&scene->tensorf.density) +
+                             recount->samples * factors_read(&scene->tensorf.appearance),
+                         field_samples, frame}};
   const uint64_t entry = FX_GRID_FEATURES * sizeof *scene->grid.table;
-  return (sf_traffic){recount->samples * (uint64_t)scene->grid.levels * CORNERS * entry, recount->samples, frame};
+  return (sf_traffic){{recount->samples * (uint64_t)scene->grid.levels * CORNERS * entry, recount->samples, frame}};
 }
 
 sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name)
 {
-  const struct {
-    const char *name;
-    uint64_t a, b;
-  } event[] = {{"field bytes read", a->table_bytes, b->table_bytes},
-               {"exp(-x) of compositing", a->exp_neg, b->exp_neg},
-               {"frame bytes written", a->frame_bytes, b->frame_bytes}};
-  for (size_t i = 0; i < sizeof event / sizeof *event; i++)
-    if (event[i].a != event[i].b)
-      return sf_fail(SF_E_DIFFERENCE, "%s: %s %llu, %s %llu", event[i].name, a_name, (unsigned long long)event[i].a,
-                     b_name, (unsigned long long)event[i].b);
+  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
+    if (a->event[e] != b->event[e])
+      return sf_fail(SF_E_DIFFERENCE, "%s: %s %llu, %s %llu", sf_traffic_events[e].title, a_name,
+                     (unsigned long long)a->event[e], b_name, (unsigned long long)b->event[e]);
   return sf_ok();
 }
 

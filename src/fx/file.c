@@ -192,6 +192,21 @@ static void describe_arch(char text[ARCH_TEXT])
            SF_AC_FRAC, SF_LEAK_FRAC, SF_H_SHIFT, SF_INPUT_BITS, SF_LOG_FRAC, SF_TRANS_FRAC, SF_DELTA_FRAC);
 }
 
+/* Names the first parameter that is another one. */
+static sf_status check_arch(const sf_tensors *set)
+{
+  char ours[ARCH_TEXT];
+  const char *theirs = sf_tensors_meta(set, "arch");
+  size_t at = 0;
+  describe_arch(ours);
+  if (!theirs) return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'arch' is missing", set->path);
+  if (!strcmp(theirs, ours)) return sf_ok();
+  while (ours[at] && ours[at] == theirs[at]) at++;
+  while (at && ours[at - 1] != ' ') at--;
+  return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'arch': the scene has %.*s, this build %.*s", set->path,
+                 (int)strcspn(theirs + at, " "), theirs + at, (int)strcspn(ours + at, " "), ours + at);
+}
+
 static void add_int(cJSON *metadata, const fx_scene *scene, const int_field *field)
 {
   char text[16];
@@ -297,11 +312,9 @@ static sf_status check_lanes(const sf_tensors *set)
 static sf_status read_metadata(const sf_tensors *set, fx_scene *scene)
 {
   SF_TRY(expect_meta(set, "format", FORMAT, SF_E_FORMAT));
-  char arch[ARCH_TEXT];
-  describe_arch(arch);
   SF_TRY(expect_meta(set, "version", VERSION, SF_E_UNSUPPORTED));
   SF_TRY(check_lanes(set));
-  SF_TRY(expect_meta(set, "arch", arch, SF_E_UNSUPPORTED));
+  SF_TRY(check_arch(set));
   for (int i = 0; i < INTS; i++) SF_TRY(read_int(set, &ints[i], scene));
   for (int i = 0; i < OPTIONAL; i++)
     if (sf_tensors_meta(set, optional[i].key)) SF_TRY(read_int(set, &optional[i], scene));

@@ -1,15 +1,16 @@
 /* SVG, element by element. Colours and type are classes of the page's style sheet: light, dark and print follow it. */
 #include "page/internal.h"
-#include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
 
 void svg_begin(FILE *out, const char *id, double width, double height, const char *title, const char *description)
 {
-  fprintf(out,
-          "<svg id=\"%s\" viewBox=\"0 0 %g %g\" role=\"img\" aria-labelledby=\"%s-t %s-d\">\n"
-          "<title id=\"%s-t\">%s</title><desc id=\"%s-d\">%s</desc>\n",
-          id, width, height, id, id, id, title, id, description);
+  fprintf(out, "<svg id=\"%s\" viewBox=\"0 0 %g %g\" role=\"img\" aria-labelledby=\"%s-t %s-d\">\n<title id=\"%s-t\">",
+          id, width, height, id, id, id);
+  sf_xml_escape(out, title);
+  fprintf(out, "</title><desc id=\"%s-d\">", id);
+  sf_xml_escape(out, description);
+  fprintf(out, "</desc>\n");
 }
 
 void svg_end(FILE *out)
@@ -34,17 +35,22 @@ void svg_line(FILE *out, double x1, double y1, double x2, double y2, const char 
   fprintf(out, "<line x1=\"%.5g\" y1=\"%.5g\" x2=\"%.5g\" y2=\"%.5g\" class=\"%s\"/>\n", x1, y1, x2, y2, style);
 }
 
-void svg_bar(FILE *out, double x, double y, double width, double height, const char *style, const char *key,
-             uint64_t value, const char *tip)
+void svg_bar(FILE *out, double x, double y, double width, double height, const char *style,
+             const sf_template_value *value, const char *tip)
 {
   fprintf(out, "<rect x=\"%.6g\" y=\"%.6g\" width=\"%.6g\" height=\"%.6g\" class=\"%s\"", x, y, width, height, style);
-  if (key) fprintf(out, " data-key=\"%s\" data-value=\"%" PRIu64 "\"", key, value);
-  if (tip) {
-    fprintf(out, "><title>");
-    sf_xml_escape(out, tip);
-    fprintf(out, "</title></rect>\n");
-  } else {
-    fprintf(out, "/>\n");
+  fprintf(out, " data-key=\"%s\" data-value=\"", value->path);
+  html_put_exact(out, value->node);
+  fprintf(out, "\"><title>");
+  sf_xml_escape(out, tip);
+  fprintf(out, "</title></rect>\n");
+}
+
+void svg_percents(FILE *out, double x0, double x1, double width, double y)
+{
+  for (int i = 0; i <= 4; i++) {
+    const double x = i == 0 ? 0 : i == 4 ? width : x0 + (x1 - x0) * i / 4.0;
+    svg_text(out, x, y, i == 0 ? "num mut" : i == 4 ? "num mut end" : "num mut mid", "%d %%", 25 * i);
   }
 }
 

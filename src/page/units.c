@@ -1,5 +1,6 @@
 /* What one event costs in each ledger: the effective prices, the widths and memories that they come from. */
 #include "page/internal.h"
+#include <stdlib.h>
 #include <string.h>
 
 /* How the price of an event came about; widths as in docs/energy.md. */
@@ -72,41 +73,41 @@ static bool happens(int ledger, int row, int part)
   return part != SF_PART_SOP && (row != FX_C3 || (part != SF_PART_STATE && part != SF_PART_NEURON));
 }
 
-static void unit(FILE *out, const sf_page *page, int ledger, int row, int part)
-{
-  const sf_unit_price *u = &page->report->ledgers.unit[ledger][row][part];
-  char key[80];
-  snprintf(key, sizeof key, "ledgers.list[%d].rows[%d].unit_fj.%s", ledger, row, sf_part_names[part]);
-  fprintf(out, "<td class=\"n\">");
-  if (u->fj == 0 || !happens(ledger, row, part)) {
-    fprintf(out, "\xe2\x80\x93</td>");
-    return;
-  }
-  html_put_count(out, key, u->fj);
-  fprintf(out, "%s</td>", u->interpolated ? "*" : "");
-}
-
-void html_units(FILE *out, const sf_page *page)
+/* The ledgers of the columns: paper, its twin, the others, their twin. */
+static cJSON *ledgers_json(const sf_page *page, int row, int part)
 {
   static const int column[] = {SF_LEDGER_PAPER, SF_LEDGER_ANN, SF_LEDGER_NEURON, SF_LEDGER_INT_ALL};
-  fprintf(out,
-          "<div class=\"scroll\"><table id=\"table-units\"><caption>What one event costs, in fJ</caption>\n<thead><tr>"
-          "<th>event</th><th class=\"n\">paper</th><th class=\"n\">its ReLU twin</th><th class=\"n\">the other "
-          "ledgers</th><th class=\"n\">their ReLU twin</th><th>widths, memory</th></tr></thead>\n<tbody>\n");
+  cJSON *list = cJSON_CreateArray();
+  for (int i = 0; i < 4; i++) {
+    const sf_unit_price *u = &page->report->ledgers.unit[column[i]][row][part];
+    const bool shown = u->fj > 0 && happens(column[i], row, part);
+    cJSON *unit = cJSON_CreateObject();
+    cJSON_AddItemToObject(unit, "list", shown ? cJSON_CreateNumber(column[i]) : cJSON_CreateNull());
+    cJSON_AddBoolToObject(unit, "interpolated", u->interpolated);
+    cJSON_AddItemToArray(list, unit);
+  }
+  return list;
+}
+
+static cJSON *unit_json(const sf_page *page, int row, int part)
+{
+  cJSON *unit = cJSON_CreateObject();
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  cJSON_AddStringToObject(unit, "part", sf_part_names[part]);
+  cJSON_AddNumberToObject(unit, "row", row);
+  cJSON_AddItemToObject(unit, "ledgers", ledgers_json(page, row, part));
+  if (out) basis(out, page, row, part);
+  if (out && fclose(out) == 0) cJSON_AddStringToObject(unit, "basis", text);
+  free(text);
+  return unit;
+}
+
+void html_add_units(cJSON *json, const sf_page *page)
+{
+  cJSON *list = cJSON_AddArrayToObject(json, "units");
   for (int p = 0; p < SF_PARTS; p++)
-    for (int r = 0; r < SF_ROWS; r++) {
-      if (!counted(page, r, p)) continue;
-      fprintf(out, "<tr><th>%s, %s</th>", sf_part_titles[p], sf_row_names[r]);
-      for (int i = 0; i < 4; i++) unit(out, page, column[i], r, p);
-      fprintf(out, "<td>");
-      basis(out, page, r, p);
-      fprintf(out, "</td></tr>\n");
-    }
-  fprintf(
-      out,
-      "</tbody></table></div>\n<p class=\"note\">The width-correct ledger has MAC and SOP of the last two columns of "
-      "prices, + memory the "
-      "bytes as well, + neuron updates all. * interpolated between prices of the list above. A memory smaller than the "
-      "smallest of the list costs what the smallest costs. A byte is "
-      "priced as an eighth of an access of 64 bits to the memory that the row names.</p>\n");
+    for (int r = 0; r < SF_ROWS; r++)
+      if (counted(page, r, p)) cJSON_AddItemToArray(list, unit_json(page, r, p));
 }

@@ -1,4 +1,4 @@
-/* Text, numbers and pictures as HTML. */
+/* Numbers and pictures as text. */
 #include "page/internal.h"
 #include <inttypes.h>
 #include <math.h>
@@ -29,12 +29,11 @@ static const char *digits4(double value)
 
 const char *html_energy(char text[HTML_NUMBER], double fj)
 {
-  static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
-  int i = 0;
-  while (i + 1 < 7 && fabs(fj) >= 999.95) fj /= 1000, i++;
+  double scale;
+  const char *unit = html_unit(fabs(fj), &scale);
   char format[16];
-  snprintf(format, sizeof format, "%s %%s", digits4(fj));
-  snprintf(text, HTML_NUMBER, format, fj, unit[i]);
+  snprintf(format, sizeof format, "%s %%s", digits4(fj / scale));
+  snprintf(text, HTML_NUMBER, format, fj / scale, unit);
   return text;
 }
 
@@ -43,61 +42,31 @@ const char *html_percent(char text[HTML_NUMBER], double percent)
   if (!isfinite(percent))
     snprintf(text, HTML_NUMBER, "-");
   else
-    snprintf(text, HTML_NUMBER, "%s%.1f %%", percent < 0 ? "\xe2\x88\x92" : "", fabs(percent));
+    snprintf(text, HTML_NUMBER, "%s%.1f %%", percent <= -0.05 ? "\xe2\x88\x92" : "", fabs(percent));
   return text;
 }
 
 const char *html_tenths(char text[HTML_NUMBER], double value)
 {
-  snprintf(text, HTML_NUMBER, "%s%.1f", value < 0 ? "\xe2\x88\x92" : "", fabs(value));
+  snprintf(text, HTML_NUMBER, "%s%.1f", value <= -0.05 ? "\xe2\x88\x92" : "", fabs(value));
   return text;
 }
 
-void html_put_count(FILE *out, const char *key, uint64_t value)
-{
-  char text[HTML_NUMBER];
-  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, value, html_count(text, value));
-}
-
-void html_put_energy(FILE *out, const char *key, uint64_t fj)
-{
-  char text[HTML_NUMBER];
-  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%s</data>", key, fj, html_energy(text, (double)fj));
-}
-
-void html_put_energy_in(FILE *out, const char *key, uint64_t fj, uint64_t top)
+const char *html_unit(double top_fj, double *scale)
 {
   static const char *const unit[] = {"fJ", "pJ", "nJ", "\xc2\xb5J", "mJ", "J", "kJ"};
-  double scale = 1;
   int i = 0;
-  for (; i < 6 && (double)top / scale >= 999.95; i++) scale *= 1000;
-  fprintf(out, "<data data-key=\"%s\" value=\"%" PRIu64 "\">%.*f %s</data>", key, fj, i ? 3 : 0, (double)fj / scale,
-          unit[i]);
+  for (*scale = 1; i < 6 && top_fj / *scale >= 999.95; i++) *scale *= 1000;
+  return unit[i];
 }
 
-void html_put_saving(FILE *out, const char *key, double saving)
+void html_put_exact(FILE *out, const cJSON *node)
 {
-  if (!isfinite(saving)) {
-    fprintf(out, "no saving is defined");
-    return;
-  }
-  fprintf(out, "<b class=\"%s\"><data data-key=\"%s\" value=\"%.17g\">%.1f %% %s</data></b>",
-          saving < 0 ? "bad" : "good", key, saving, fabs(saving), saving < 0 ? "more" : "saved");
-}
-
-void html_put_real(FILE *out, const char *key, double value, const char *format)
-{
-  if (!isfinite(value)) {
-    fprintf(out, "-");
-    return;
-  }
-  fprintf(out, "<data data-key=\"%s\" value=\"%.17g\">", key, value);
-  if (value < 0) fputs("\xe2\x88\x92", out);
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wformat-nonliteral"
-  fprintf(out, format, fabs(value));
-#pragma GCC diagnostic pop
-  fprintf(out, "</data>");
+  const double real = sf_json_real(node);
+  if (cJSON_IsRaw(node))
+    fputs(node->valuestring, out);
+  else
+    fprintf(out, "%.17g", isfinite(real) ? real : 0);
 }
 
 static void base64(FILE *out, const uint8_t *data, size_t size)
@@ -125,14 +94,4 @@ sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, c
   fprintf(out, "\"/>\n");
   free(data);
   return sf_ok();
-}
-
-void html_figure_begin(FILE *out, const char *id, const char *style, const char *title, const char *caption)
-{
-  fprintf(out, "<figure id=\"%s\" class=\"%s\">\n<figcaption><b>%s</b> %s</figcaption>\n", id, style, title, caption);
-}
-
-void html_figure_end(FILE *out)
-{
-  fprintf(out, "</figure>\n");
 }

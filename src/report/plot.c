@@ -14,8 +14,7 @@ enum { LEARNED = 7 };
 const char *const sf_plot_colour[SF_PLOT_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                      "#56b4e9", "#e69f00", "#000000"};
 
-/* A gnuplot string; what could end it is replaced. */
-static void quote(char *to, size_t size, const char *from)
+void sf_plot_quote(char *to, size_t size, const char *from)
 {
   snprintf(to, size, "%s", from);
   for (char *c = to; *c; c++)
@@ -42,7 +41,7 @@ static const char *title_of(const sf_reproduction *r, int scene, const char *wha
              r->profile);
   else
     snprintf(text, size, "%s: %s, profile %s", what, r->scene[scene].name, r->profile);
-  quote(name, sizeof name, text);
+  sf_plot_quote(name, sizeof name, text);
   snprintf(text, size, "%s", name);
   return text;
 }
@@ -258,7 +257,7 @@ static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, 
   else
     snprintf(name, sizeof name, "%s-%s", p->name, r->scene[scene].name);
   snprintf(path, sizeof path, "%s/plots/%s.gp", r->dir, name);
-  quote(quoted, sizeof quoted, name);
+  sf_plot_quote(quoted, sizeof quoted, name);
   SF_TRY(sf_writer_open(&writer, path));
   p->write(writer.file, r, scene, quoted);
   ++*count;

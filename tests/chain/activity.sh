@@ -54,12 +54,21 @@ if command -v python3 >/dev/null; then
   sed -E '0,/\(TC [1-9][0-9]*\)/s//(TC 77777)/' "$work/w.saif" >"$work/wrong.saif"
   python3 "$here/../vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
 else
-  echo "python3 is not installed: VCD not counted"
+  echo "the VCD was not counted"; echo "python3: not installed"
 fi
 # Pieces of the waveform make no difference: the window cut in two adds up to it.
 run --saif "$work/a.saif" --window 300,340 && run --saif "$work/b.saif" --window 341,419 || fail "half a window"
 awk 'FNR == 1 { file++ } /\(T0 / { gsub(/[()]/, ""); if (file < 3) t[FNR] += $5; else if (t[FNR] != $5) { print; exit 1 } }' \
   "$work/a.saif" "$work/b.saif" "$work/w.saif" >"$work/out" || fail "two halves are not the whole"
+
+# No room, here for files of more than 2000 KiB: the file and the cause, of the waveform in between and of the file itself.
+full() { # CAUSE OPTIONS...
+  (ulimit -f 2000 && run "${@:2}") && fail "${*:2}: success without room"
+  grep -qF "sf_cosim: cannot write $1: File too large" "$work/err" || fail "${*:2}: the cause is not told"
+}
+full "$work/full.saif.piece.fst" --saif "$work/full.saif"
+full "$work/full.vcd" --vcd "$work/full.vcd" --window 0,1999
+[ -z "$(find "$work" -name 'full*')" ] || fail "left behind: $(ls "$work")"
 
 # Refusals, and nothing left behind.
 run --saif "$work/no.saif" --window 9,3 && fail "a window backwards"

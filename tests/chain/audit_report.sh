@@ -36,9 +36,11 @@ audit --json --twin "$work/decoder.safetensors" | tr -d ' \n\t' >"$work/twin.jso
 [ "$(twin macs_per_sample)" -eq 35968 ] && [ "$(twin samples)" -gt 0 ] || fail "the decoder's synapses"
 [ "$(twin fj)" -eq $(($(twin samples) * 35968 * 4600)) ] || fail "the TensoRF twin's energy"
 
-# The prices stand beside the program, wherever the two are.
+# The prices stand beside the program, wherever the two are; the page's template is inside.
 mkdir -p "$work/moved/bin" && cp "$build/bin/energy_audit" "$work/moved/bin" && cp -r "$build/share" "$work/moved"
-(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null) || fail "moved program"
+(cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q --html "$work/moved.html" >/dev/null) ||
+  fail "moved program"
+grep -q 'id="audit-json"' "$work/moved.html" || fail "the page of a moved program"
 rm -r "$work/moved/share"
 (cd / && "$work/moved/bin/energy_audit" "$work/scene.snn" "$work/data" --rays 20 --rtl-rays 0 -q >/dev/null 2>"$work/err") &&
   fail "no prices, no error"
@@ -52,9 +54,13 @@ for words in 'core = accelerator = recount' '+ neuron updates' 'integer ReLU twi
 done
 
 if ! command -v python3 >/dev/null; then
-  echo "schemas: python3 is not installed, left out"
+  echo "the schemas were left out"; echo "python3: not installed"
 else
-  python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/scene.snn" "$work/data"
-  case $? in 0) ;; 77) echo "schemas: left out" ;; *) fail "schemas" ;; esac
+  "$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 2 --stage2 2 --voxels 16 \
+    --threads 1 -q >/dev/null && "$build/bin/sf_export" "$work/planes.safetensors" -o "$work/planes.snn" >/dev/null || fail "TensoRF scene"
+  for scene in scene planes; do
+    python3 tests/audit_schema.py "$build/bin/energy_audit" "$work/$scene.snn" "$work/data"
+    case $? in 0) ;; 77) echo "schemas: left out" ;; *) fail "schemas of the audit of $scene.snn" ;; esac
+  done
 fi
 finish "reports of energy_audit: all as they should be"

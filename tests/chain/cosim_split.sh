@@ -9,6 +9,7 @@ alive() { ps -o stat= -p "$1" | grep -qv Z; }
 # cosim NAME STATUS ARGS...: JSON without what may differ in NAME.json, message in NAME.err
 cosim() {
   local name=$1 want=$2 got
+  rm -f evidence*
   "$build/faults/sf_cosim" scene.snn data --quiet --json --evidence evidence "${@:3}" 2>"$name.err" >"$name.all"
   got=$?
   grep -Ev '"(seconds|jobs)":' "$name.all" >"$name.json"
@@ -35,13 +36,29 @@ grep -q '"replay_shows_it":[[:space:]]*true' fault1.json || fail "the replay fil
 mkdir elsewhere
 (cd elsewhere && "$build/faults/sf_cosim" --replay ../fault1.replay) 2>replay.err
 [ $? -eq 1 ] || fail "replay: no difference"
-what() { sed -E 's/.*(ray [0-9]+).*(sample [0-9]+: .*), cycle.*/\1 \2/' "$1"; }
+what() { sed -nE '1s/.*(ray [0-9]+).*(sample [0-9]+: .*), cycle.*/\1 \2/p' "$1"; }
 [ "$(what replay.err | sed -E 's/expected.*//')" = "$(what fault1.err | sed -E 's/expected.*//')" ] ||
   fail "replay: '$(cat replay.err)' is not '$(cat fault1.err)'"
-[ -s elsewhere/sf_cosim-difference.fst ] || fail "replay: no waveform"
+[ -s elsewhere/sf_cosim-replay.fst ] && grep -q 'waveform sf_cosim-replay.fst' replay.err || fail "replay: no waveform"
+# Each difference says where its evidence lies and how to replay it; the next one's lies beside it.
+mkdir 'two of them'
+cd 'two of them' || exit 1
+for number in '' -2 -3; do
+  "$build/faults/sf_cosim" ../scene.snn ../data --rays 60 --seed 7 --quiet --evidence ' my own' --plusarg +fault=2 2>told.err
+  [ -s " my own$number.json" ] && [ -s " my own$number.fst" ] || fail "evidence$number: $(ls)"
+  grep -qxF "evidence:  my own$number.json, waveform  my own$number.fst" told.err || fail "evidence$number: $(cat told.err)"
+  line=$(sed -n 's/^replay: *//p' told.err)
+  [ "${line#*sf_cosim }" = "--replay ' my own$number.json'" ] || fail "how to replay it: $line"
+  bash -c "$line" 2>told.replay
+  [ $? -eq 1 ] && [ "$(what told.replay | sed -E 's/expected.*//')" = "$(what told.err | sed -E 's/expected.*//')" ] ||
+    fail "'$line': $(cat told.replay)"
+done
+"$build/faults/sf_cosim" --replay ' my own.json' --evidence ' my own-2' >told.err 2>&1
+[ $? -eq 2 ] && grep -q "would be written over" told.err || fail "a replay over another's evidence: $(cat told.err)"
+cd ..
 # Without the fault there is nothing to be seen.
 sed 's/+fault=3/+fault=0/' fault1.replay >repaired.replay
-"$build/faults/sf_cosim" --replay repaired.replay >replay.out 2>&1 && grep -q 'no difference$' replay.out ||
+"$build/faults/sf_cosim" --replay repaired.replay >replay.out 2>&1 && grep -q 'no difference$' replay.out && grep -q '^waveform: sf_cosim-replay.fst$' replay.out ||
   fail "repaired: $(cat replay.out)"
 "$build/bin/sf_cosim" --replay fault1.replay >replay.out 2>&1 &&
   grep -q 'no difference; the file was written by another program$' replay.out || fail "another program: $(cat replay.out)"
@@ -85,6 +102,20 @@ cosim whole 0 --rays 100000 --block 2 --jobs 3 --limit-samples $limit
 cmp -s part.json whole.json || fail "an interrupted run that was continued differs"
 cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
 grep -q "part: checkpoint of another" other.err || fail "another run's checkpoint: $(cat other.err)"
+
+# ---- a finished run is continued with more rays, also from a last block that was not full; never with fewer ----
+plain() { "$build/bin/sf_cosim" scene.snn data --quiet "$@" 2>&1; }
+cosim grown 0 --rays 17 --block 7 --checkpoint grown.part
+grep -q '"rays":[[:space:]]*17,' grown.json || fail "17 rays: $(cat grown.json)"
+cp grown.part grown.kept
+cosim grown 0 --rays 40 --block 7 --jobs 2 --checkpoint grown.part
+cosim ungrown 0 --rays 40 --block 7
+cmp -s grown.json ungrown.json || fail "a run that was continued with more rays differs: $(diff grown.json ungrown.json | head -n 6)"
+cmp -s grown.part grown.kept && fail "the checkpoint of 40 rays is that of 17"
+cosim shrunk 2 --rays 20 --block 7 --checkpoint grown.part
+grep -q 'grown.part: holds 35 rays, more than --rays 20' shrunk.err || fail "fewer rays: $(cat shrunk.err)"
+plain --rays 1 --block 1 >one.out
+grep -q '^1 ray (' one.out && grep -q 'samples/s by 1 process,' one.out || fail "one of each: $(cat one.out)"
 
 # ---- one process stopped, its parent not: no success ----
 "$build/faults/sf_cosim" scene.snn data --rays 100000 --block 20 --jobs 2 --limit-samples 20000 --quiet --json >lone.json 2>lone.err &

@@ -48,3 +48,15 @@ printf 'Short. %s end.\n' "$(printf 'word %.0s' {1..40})" >long.md
 grep -q 'long.md:1: a sentence of 41 words' said || fail "a long sentence is not named"
 printf '| %s |\n\n    %s\n' "$(printf 'word %.0s' {1..40})" "$(printf 'word %.0s' {1..40})" >table.md
 "$tools/check_prose.py" table.md || fail "tables and code count as sentences"
+
+printf '# A heading, here\n\n[itself](#a-heading-here) and [beside](long.md), `src/fx/plif.c`, `tests/*.c`\n' >links.md
+"$tools/check_links.py" links.md || fail "links that lead somewhere are refused"
+linked() { # LINE PATTERN: a line that leads nowhere, and what is said of it
+  echo "$1" >links.md
+  ! "$tools/check_links.py" links.md 2>said || fail "not seen: $1"
+  grep -q -- "links.md:1: $2" said || { cat said >&2; fail "not named: $1"; }
+}
+linked '[gone](gone.md)' 'gone.md: no such file'
+linked '[gone](long.md#gone)' 'long.md#gone: no heading #gone'
+linked '<img src="gone.png">' 'gone.png: no such file'
+linked 'the neuron is `src/fx/gone.c`' 'src/fx/gone.c: no such file in the source tree'

@@ -2,7 +2,7 @@
 # The vector kit around other RTL than its own: every planted fault caught and located, another neuron passes, a wrong one
 # does not, another top level is named. usage: kit_faults.sh BUILD
 . "$(dirname "$0")/../kit_run.bash" "$@"
-command -v iverilog >/dev/null || { echo "iverilog: not on this machine"; finish "Icarus skipped"; }
+command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 
 # As tests/chain/cosim_faults.sh: the RTL with planted faults, one chosen at run time.
 faulty() { run icarus "${@:2}" -- RTL="$build/faults/rtl" BUILD=faulty ARGS="+fault=$1"; }
@@ -19,7 +19,7 @@ run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong"
 run icarus 1 'nowhere' -- DUT=nowhere
 sed 's/^module sf_top/module my_top/' "$kit/rtl/sf_top.sv" >"$work/my_top.sv"
 touch -d '1 hour ago' "$work/my_top.sv"
-sources="$(grep -v '^sf_top.sv' "$kit/rtl.f" | sed 's|^|rtl/|' | tr '\n' ' ')"
+sources="$(grep '^rtl/' "$kit/rtl.f" | grep -v '/sf_top.sv$' | tr '\n' ' ')"
 run icarus 0 PASS -- SOURCES="$sources $work/my_top.sv" DUT=my_top
 run icarus 1 'my_top' -- SOURCES="$sources" DUT=my_top
 finish "planted faults of the RTL are caught and located through the kit"

@@ -27,7 +27,7 @@ done
 rtl=$build/lanes/rtl
 "$build/bin/sf_export" "$work/32.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
 diff -rq "$work/kit/rtl" "$rtl" >/dev/null 2>&1 || { mkdir -p "$rtl" && rm -r "$rtl" && mv "$work/kit/rtl" "$rtl"; } || exit 1
-sources=$(sed "s|^|$rtl/|" "$work/kit/rtl.f" | tr '\n' ' ')
+sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | tr '\n' ' ')
 quick='OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0' # --dut starts make without MAKEFLAGS; this one gets there
 # run LANES HIDDEN
 run() {
@@ -92,7 +92,7 @@ shows() {
 }
 make_narrow() { MAKEFLAGS='' make -s -j1 -C "$root" B="$build" VERILATED_OPT="$quick" "$@" >"$work/out" 2>"$work/err"; }
 soc='' elf=firmware/sf_firmware.elf
-if [ -e "$build/bin/sf_soc" ] && [ -e "$build/$elf" ]; then soc=sf_soc; else echo "no emulated system, or no firmware: skipped"; fi
+if [ -e "$build/bin/sf_soc" ] && [ -e "$build/$elf" ]; then soc=sf_soc; else echo "no emulated system, or no firmware"; echo "firmware: not installed"; fi
 
 # whole LANES BUILD RTL PROGRAMS: rooms beyond the nets, of a block with so many lanes
 whole() {

@@ -11,7 +11,7 @@ rtl=$work/kit/rtl
 mkdir "$work/overlay"
 cp "$root/tests/dut/serial/sf_plif.svh" "$work/overlay"
 sed 's/^module sf_top/module my_block/' "$rtl/sf_top.sv" >"$work/my_block.sv"
-sources=$(grep -v '^sf_top.sv' "$work/kit/rtl.f" | sed "s|^|$rtl/|" | tr '\n' ' ')
+sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | grep -v '/sf_top.sv$' | tr '\n' ' ')
 
 # run NAME STATUS OPTION...: the report in NAME.json, standard error in NAME.err
 run() {
@@ -42,6 +42,36 @@ run wrong 1 "${my_block[@]}"
 [ "$(field wrong wire)" = membrane ] || fail "the wrong neuron: $(cat "$work/wrong.err")"
 [ "$(field wrong actual)" = $(($(field wrong expected) - 1)) ] || fail "the wrong neuron is not one too low"
 tail -n 1 "$work/wrong.err"
+
+# The line that the difference ends with replays it on that block; told when the block has changed, is another, is gone.
+line=$(sed -n 's/^replay: *//p' "$work/wrong.err")
+# replay STATUS TEXT [COMMAND]
+replay() {
+  (cd "$work" && bash -c "${3:-$line}") >"$work/replay.out" 2>&1
+  [ $? -eq "$1" ] || fail "${3:-$line}: exit status is not $1: $(cat "$work/replay.out")"
+  has replay.out "$2"
+}
+replay 1 "membrane: expected $(field wrong expected), actual $(field wrong actual)"
+grep -q 'changed\|another' "$work/replay.out" && fail "the same block: $(cat "$work/replay.out")"
+sed 's/"sources":.*/"sources": "of before"/' "$work/evidence.json" >"$work/before.json"
+replay 1 "the block's sources have changed since the file was written" "$build/bin/sf_cosim --replay before.json"
+mv "$work/my_block.sv" "$work/kept_block.sv"
+replay 1 "evidence.json: the block that differed: --dut: $work/my_block.sv: No such file"
+mv "$work/kept_block.sv" "$work/my_block.sv"
+
+# The kit's list of files, by the line of docs/kit.md.
+mkdir "$work/my_neuron"
+cp "$root/tests/dut/wrong/sf_plif.svh" "$work/my_neuron"
+documented=$(sed -n 's/^    \(sf_cosim scene.snn data --dut "+incdir.*\)/\1/p' "$root/docs/kit.md")
+[ -n "$documented" ] || fail "docs/kit.md has no line with an include folder"
+replay 1 'neuron' "PATH=$build/bin:\$PATH; $documented --quiet"
+grep -q '^replay: *sf_cosim --replay sf_cosim-difference.json$' "$work/replay.out" || fail "$documented: $(tail -n 4 "$work/replay.out")"
+while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")
+replay 1 'the file is of another block' "$build/bin/sf_cosim --replay evidence.json ${documented#*data }"
+replay 1 'No such file or directory (names in -f kit/rtl.f' "$build/bin/sf_cosim scene.snn data --dut '-f kit/rtl.f'"
+replay 2 '-F names no list' "$build/bin/sf_cosim scene.snn data --dut '-F'"
+printf '// none\n-F list.f # again\n' >"$work/list.f"
+replay 1 'lists within lists' "$build/bin/sf_cosim scene.snn data --dut '-F list.f'"
 
 sed '30s/^/this is no Verilog;/' "$work/my_block.sv" >"$work/broken.sv"
 run broken 1 --dut "+incdir+$rtl $sources $work/broken.sv" --dut-top my_block

@@ -1,12 +1,34 @@
 #!/bin/bash
 # The block as others take it away: registers in every generated form, IP-XACT, FuseSoC, C header, a first simulation.
-# Ends by planting faults in a copy, to see each check fail.   usage: package.sh
+# Ends by planting faults in a copy, to see each check fail.   usage: package.sh BUILD
 set -euo pipefail
+build=$(cd "${1:?usage: package.sh BUILD}" && pwd)
 cd "$(dirname "$0")/../.."
 work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-package-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 fail() { echo "package: $1" >&2; exit 1; }
 cc=${CC:-cc} cxx=${CXX:-c++}
+
+# FuseSoC searches whole trees and takes the last core of a name: only ours may be found, none of a build folder.
+hidden() { # FILE: a folder above it holds FUSESOC_IGNORE
+  local folder=${1%/*}
+  until [ -e "$folder/FUSESOC_IGNORE" ]; do
+    case $folder in */*) folder=${folder%/*} ;; *) return 1 ;; esac
+  done
+}
+lone_core() { # TREE
+  find "$1" -name '*.core' | while read -r core; do
+    [ "$core" = "$1/spikefield.core" ] || hidden "$core" || { echo "FuseSoC finds $core, too"; exit 1; }
+  done
+}
+[ -e "$build/FUSESOC_IGNORE" ] || fail "no FUSESOC_IGNORE in the build folder: FuseSoC finds the cores of variants there"
+lone_core . || fail "more than one core"
+mkdir -p "$work/tree/build/variant"
+cp spikefield.core "$work/tree"
+cp spikefield.core "$work/tree/build/variant"
+lone_core "$work/tree" >/dev/null && fail "a core in a build folder without FUSESOC_IGNORE is not seen"
+touch "$work/tree/build/FUSESOC_IGNORE"
+lone_core "$work/tree" || fail "a core that FuseSoC does not find is seen"
 strict="-Wall -Wextra -Wpedantic -Werror -fsyntax-only"
 
 # The C header alone, for C, C++ and assembler; and every number beside csr.def as the compiler reads it.
@@ -63,7 +85,7 @@ if command -v iverilog >/dev/null; then
   done
   refuses . sf_top WEIGHT_BITS 7 || fail "widths that sf_top is not written for"
 else
-  echo "skipped: iverilog is not installed; the first simulation was not run"
+  echo "the first simulation was not run"; echo "iverilog: not installed"
 fi
 
 command -v python3 >/dev/null || { echo "skipped: python3 is not installed"; exit 77; }

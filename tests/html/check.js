@@ -59,6 +59,18 @@
     });
   }
 
+  // What a table is about is seen whatever part of it is scrolled into view: its title does not move, nor do its rows' names.
+  function table(scroll) {
+    var left = scroll.getBoundingClientRect().left, t = scroll.querySelector('table'), name = scroll.querySelector('tbody th');
+    var title = t.getAttribute('aria-labelledby');
+    if (scroll.querySelector('caption,p')) { bad(t.id + ': its title scrolls away'); }
+    if (title && !document.getElementById(title)) { bad(t.id + ' has no title ' + title); }
+    if (title) { visible(document.getElementById(title), title); }
+    scroll.scrollLeft = scroll.scrollWidth;
+    if (name && name.getBoundingClientRect().left < left - 1) { bad(t.id + ': "' + name.textContent + '" scrolls away'); }
+    scroll.scrollLeft = 0;
+  }
+
   function check() {
     if (PRINT) { print_style(); }
     var page = getComputedStyle(document.body).backgroundColor;
@@ -74,6 +86,7 @@
       visible(s, s.id || 'svg');
       texts(s, page);
     });
+    Array.prototype.forEach.call(document.querySelectorAll('.scroll'), table);
     Array.prototype.forEach.call(document.querySelectorAll('img'), function (i) {
       visible(i, i.alt);
       if (!i.complete || i.naturalWidth === 0) { bad('a picture is broken: ' + i.alt); }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reads our NIR graphs with NIR's own library and simulates them: the spikes of the fixed-point core.
 
-usage: nir.py BUILD     runs BUILD/tests/test_nir
+usage: read_nir.py BUILD     runs BUILD/tests/test_nir
 Exits 0 when equal, 1 when not, 77 (skipped) where the Python modules are not installed.
 """
 import os
@@ -14,7 +14,7 @@ try:
     import numpy as np
     from nir.serialization import read_version
 except ImportError as missing:
-    print(f"nir: skipped: {missing}")
+    print(f"read_nir: skipped: {missing} (make python installs it)")
     sys.exit(77)
 
 def charge(node, v, current, first):
@@ -82,7 +82,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([os.path.join(sys.argv[1], "tests", "test_nir")], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
         if not os.listdir(folder):
-            print("nir: skipped: this build has no HDF5 (libhdf5-dev)")
+            print("read_nir: skipped: this build has no HDF5 (libhdf5-dev)")
             return 77
         samples = [check(folder, mode) for mode in range(3)]
     assert min(samples) >= 12, samples

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Exchanges a safetensors file with the format's own library, in both directions.
 
-usage: safetensors.py BUILD     runs BUILD/tests/test_base
+usage: read_safetensors.py BUILD     runs BUILD/tests/test_base
 Exits 0 when equal, 1 when not, 77 (skipped) where the Python modules are not installed.
 """
 import os
@@ -14,7 +14,7 @@ try:
     from safetensors import safe_open
     from safetensors.numpy import save_file
 except ImportError as missing:
-    print(f"safetensors: skipped: {missing}")
+    print(f"read_safetensors: skipped: {missing} (make python installs it)")
     sys.exit(77)
 
 

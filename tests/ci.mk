@@ -1,0 +1,17 @@
+# What only some tests need: a browser, and readers of our files from PyPI. `make deps check` goes on without; continuous
+# integration has both. Included by the Makefile.
+
+deps-ci: ## install with apt what `make check` needs to leave no test out (Chromium, man), and `make deb`
+	@DEPS="chromium libxml2-utils python3 python3-venv man-db $(DEB_PACKAGES)" tools/deps.sh
+
+# In an environment of its own, which tests/run.sh puts first: nothing is installed on the system.
+REQUIREMENTS := tests/requirements.txt
+python: $B/python/.done ## readers of our files from PyPI, for the tests that compare with them: build/python
+$B/python/.done: $(REQUIREMENTS)
+	$(call say,PIP   $(@D))
+	$Qrm -rf $(@D)
+	$Qpython3 -m venv $(@D) || { echo "python: no environment in $(@D): is python3-venv installed? (make deps-ci)" >&2; exit 1; }
+	$Q$(@D)/bin/python3 -m pip install --quiet --disable-pip-version-check -r $< || { \
+	  rm -rf $(@D); echo "python: the package index cannot be reached, or lacks what $< lists: the tests read_nir and read_safetensors are skipped, and package leaves parts out" >&2; exit 1; }
+	@touch $@
+.PHONY: deps-ci python
