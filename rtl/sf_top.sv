@@ -2,13 +2,15 @@
 // Tap ports are for observation only; TAP = 0 removes them. A tap beat shows, for a spiking layer and step, its spikes,
 // the presynaptic rows it added up and its membranes after reset; for D2 and C3 (step 0) the rows alone.
 `default_nettype none
+`include "sf_refuse.svh"
 
 module sf_top #(
     parameter TAP = 1,
     parameter LANES = sf_arch_pkg::LANES,  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
-    parameter MACS = LANES,         // multipliers of D1 and C1; LANES / MACS parts of a row go one after another
-    parameter NEURONS = 16,         // neuron units
-    parameter STEPS_AT_ONCE = 2     // steps of C2 that are summed up side by side
+    // How much hardware; ENGINE says it. Results and counts of events do not depend on it.
+    parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,  // multipliers: LANES, or a half, a quarter of them
+    parameter NEURONS = sf_arch_pkg::NEURONS,                                // neuron units: a power of two, 4 to MACS
+    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE                     // steps that C2 sums up side by side: 1, 2, 4 or 8
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -101,7 +103,10 @@ module sf_top #(
   assign tap_membrane_o = (24 * TAPS)'(tap_membrane);
 
   sf_csr #(
-      .LANES(LANES)
+      .LANES        (LANES),
+      .MACS         (MACS),
+      .NEURONS      (NEURONS),
+      .STEPS_AT_ONCE(STEPS_AT_ONCE)
   ) u_csr (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
@@ -330,18 +335,22 @@ module sf_top #(
       .counter_o      (counter)
   );
 
+  `SF_REFUSE((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES,
+             "LANES is not 32, 64, 128 or 256, or it is more than the package's")
+  `SF_REFUSE(MACS != LANES && 2 * MACS != LANES && 4 * MACS != LANES, "MACS is not LANES, a half or a quarter of it")
+  `SF_REFUSE(NEURONS < 4 || NEURONS > MACS || NEURONS > 64 || (NEURONS & (NEURONS - 1)) != 0,
+             "NEURONS is not a power of two from 4 to 64, or it is more than MACS")
+  `SF_REFUSE(STEPS_AT_ONCE != 1 && STEPS_AT_ONCE != 2 && STEPS_AT_ONCE != 4 && STEPS_AT_ONCE != 8,
+             "STEPS_AT_ONCE is not 1, 2, 4 or 8")
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
-  initial begin
-    if ((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES
-        || (sf_arch_pkg::LANES != 128 && sf_arch_pkg::LANES != 256) || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
-        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
-        || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
-        || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
-        || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 8 || sf_arch_pkg::LEAK_FRAC > 12
-        || sf_arch_pkg::LOG_FRAC != 12 || sf_arch_pkg::SIGMA_BITS != 28 || sf_arch_pkg::SIGMA_FRAC != 12
-        || sf_arch_pkg::COLOUR_BITS != 20 || sf_arch_pkg::COLOUR_FRAC != 16 || sf_arch_pkg::COUNTER_BITS != 64)
-      $error("arch.def has other sizes than this RTL is written for");
-  end
+  `SF_REFUSE((sf_arch_pkg::LANES != 128 && sf_arch_pkg::LANES != 256) || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
+             || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
+             || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
+             || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
+             || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 8 || sf_arch_pkg::LEAK_FRAC > 12
+             || sf_arch_pkg::LOG_FRAC != 12 || sf_arch_pkg::SIGMA_BITS != 28 || sf_arch_pkg::SIGMA_FRAC != 12
+             || sf_arch_pkg::COLOUR_BITS != 20 || sf_arch_pkg::COLOUR_FRAC != 16 || sf_arch_pkg::COUNTER_BITS != 64,
+             "arch.def has other sizes than this RTL is written for")
 endmodule
 
 `default_nettype wire

@@ -12,7 +12,7 @@ typedef struct sf_engine {
   int steps_at_once; /* steps of C2 that are summed up side by side: 1, 2, 4 or 8 */
 } sf_engine;
 
-static const sf_engine sf_engine_default = {SF_LANES, 16, 2};
+static const sf_engine sf_engine_default = {SF_MACS, SF_NEURONS, SF_STEPS_AT_ONCE};
 
 /* What the engine's time depends on, of one sample: the steps at which each neuron of D1, C1, C2 fired, bit t for step
  * t. */
