@@ -134,10 +134,13 @@ module sf_core #(
   wire [GROUP_BITS-1:0] last_group = layer == C2 ? c2_group_q : layer == C1 ? c1_group_q : d1_group_q;
   wire [PART_BITS-1:0] last_part = layer == C2 ? c2_part_q : layer == C1 ? c1_part_q : d1_part_q;
   wire [PART_BITS-1:0] part = PART_BITS'(32'(group_q) / PART_GROUPS);
-  wire load = run && 32'(group_q) % PART_GROUPS == 0;
+  wire at_part = run && 32'(group_q) % PART_GROUPS == 0;
   wire group_ends = group_q == last_group;
   wire last_step = {1'b0, step_q} == steps_i - 4'd1;
-  wire taken = load && last_step && part == last_part;
+  // The current of D1, and of a decoder's C1, is that of all steps: of a layer of one part it stays where it was loaded to.
+  wire stays = (layer == D1 || (layer == C1 && decodes)) && last_part == {PART_BITS{1'b0}};
+  wire load = at_part && !(stays && step_q != 3'd0);
+  wire taken = load && (last_step || stays) && part == last_part;
   wire begins = run && !active_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin

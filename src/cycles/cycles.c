@@ -234,8 +234,11 @@ static bool tick_neurons(const sf_cycle_model *m, state *s, const state *was)
   const uint32_t layer = n->active ? n->layer : want[2] ? 2 : want[1] ? 1 : 0;
   const bool run = n->active ? n->wait == 0 : want[0] || want[1] || want[2];
   const uint32_t last_group = m->last_group[layer], part = n->group / m->part_groups;
-  const bool load = run && n->group % m->part_groups == 0, group_ends = n->group == last_group;
-  const bool last_step = n->step + 1 == m->steps, taken = load && last_step && part == m->last_part[layer];
+  const bool group_ends = n->group == last_group, last_step = n->step + 1 == m->steps;
+  const bool stays =
+      (layer == 0 || (layer == 1 && m->decodes)) && m->last_part[layer] == 0; /* one current, all steps */
+  const bool load = run && n->group % m->part_groups == 0 && !(stays && n->step);
+  const bool taken = load && (last_step || stays) && part == m->last_part[layer];
   memmove(&to->way[1], &n->way[0], sizeof to->way - sizeof to->way[0]);
   to->way[0] = (turn){run, group_ends, (uint8_t)layer, (uint8_t)n->step, (uint8_t)n->group};
   to->counted = n->way[4 + DEPTH - 2].valid;
