@@ -176,6 +176,41 @@ START_TEST(full_disk_keeps_the_old_file)
 }
 END_TEST
 
+/* A program that is killed while it saves leaves one file, which the next save of the same target takes; programs that
+ * save at once do not write into each other's. */
+START_TEST(what_a_killed_save_left_is_taken)
+{
+  for (int i = 0; i < 3; i++) {
+    const pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (!child) {
+      sf_writer w;
+      if (sf_writer_open(&w, in("a")).code) _exit(1);
+      for (int n = 0; n < 5000; n++) fputs("half", w.file);
+      fflush(w.file);
+      raise(SIGKILL);
+    }
+    int end;
+    ck_assert_int_eq(waitpid(child, &end, 0), child);
+    ck_assert(WIFSIGNALED(end));
+    ck_assert_int_eq(entries(), 1);
+  }
+  sf_writer first, second;
+  ck_good(sf_writer_open(&first, in("a")));
+  ck_good(sf_writer_open(&second, in("a")));
+  ck_assert_str_ne(first.aside, second.aside);
+  fputs("1", first.file), fputs("2", second.file);
+  ck_good(sf_writer_commit(&second));
+  ck_good(sf_writer_commit(&first));
+  ck_assert_int_eq(entries(), 1);
+  char *data;
+  size_t size;
+  ck_good(sf_read_file(in("a"), 100, &data, &size));
+  ck_assert_str_eq(data, "1");
+  free(data);
+}
+END_TEST
+
 START_TEST(writer_abort_and_links)
 {
   sf_writer w;
@@ -722,6 +757,7 @@ static Suite *suite(void)
   tcase_add_test(t, pipes_are_read_up_to_a_limit);
   tcase_add_test(t, unwritable_targets_are_left_alone);
   tcase_add_test(t, full_disk_keeps_the_old_file);
+  tcase_add_test(t, what_a_killed_save_left_is_taken);
   tcase_add_test(t, writer_abort_and_links);
   tcase_add_test(t, folders_with_parents);
   tcase_add_test(t, json_round_trip);

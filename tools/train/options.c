@@ -21,7 +21,7 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
       {"--backbone", 0, SF_ARG_CHOICE, &c->backbone, 0, 0, "ingp|tensorf", "KIND",
        "hash grid, or TensoRF's planes and lines (default ingp)"},
       {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M",
-       "time budget, a quarter for stage I (default: iterations)"},
+       "time to learn, a quarter of it for stage I (default: iterations); loading and evaluation are not counted"},
       {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
       {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II (default 7500)"},
       {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B",
@@ -184,9 +184,10 @@ static sf_status check_effect(train_arguments *a)
                                         "--no-distill",  "--no-scaling",  "--beta",
                                         "--price",       "--target-loss", "--target-saving",
                                         "--objective",   "--search-rate", NULL},
-                           *const iterations[] = {"--stage1", "--stage2", NULL}, *const budget[] = {"--beta", NULL},
-                           *const search[] = {"--target-loss", "--target-saving", "--price",
-                                              "--objective",   "--search-rate",   NULL};
+                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+                           *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
+                                                                                  "--price",       "--objective",
+                                                                                  "--search-rate", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -194,6 +195,7 @@ static sf_status check_effect(train_arguments *a)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, "has no effect on --backbone tensorf"));
   else
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
+  if (a->train.minutes <= 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, minutes, "0 leaves no time to learn"));
   if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
