@@ -271,7 +271,10 @@ static const struct {
     {" \n ", "bad.json:2:2", "empty"},
     {"{\"a\": 1", "bad.json:1:8", "early"},
     {"{\"a\": 1}\n x", "bad.json:2:2", "after the end"},
-    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed"},
+    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed JSON: NaN is not JSON"},
+    {"[1,\n2, -Infinity]", "bad.json:2:4", "-Infinity is not JSON"},
+    {"[1, nan", "bad.json:1:5", "nan is not JSON"},
+    {"[nano]", "bad.json:1:2", "malformed JSON"},
     {"[1,\n 2,,]", "bad.json:2:4", "malformed"},
     {"nul", "bad.json:1:1", "malformed"},
 };

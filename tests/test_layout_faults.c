@@ -129,7 +129,7 @@ START_TEST(the_plan_shows_every_camera)
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   load(&d, "train"), load(&held, "test");
   ck_good(sf_plan_draw(&d, &held, SIZE, &image));
-  ck_assert(image.width == 2 * SIZE && image.height == SIZE);
+  ck_assert(image.width == 2 * SIZE && image.height == SIZE + SF_PLAN_FOOT);
   double most = 0;
   for (int v = 0; v < d.count; v++)
     for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)d.view[v].camera.to_world[4 * i + 3]));

@@ -106,7 +106,13 @@ static sf_status make_page(page_audit *a)
   return sf_page_save(&a->page, o->html);
 }
 
-static sf_status print_report(const page_audit *a, bool page)
+static void print_files(const page_audit *a, bool csv, bool page)
+{
+  if (csv) printf("wrote %s\n", a->opt.csv);
+  if (page) printf("wrote %s\n", a->opt.html);
+}
+
+static sf_status print_report(const page_audit *a, bool csv, bool page)
 {
   if (a->opt.json) {
     cJSON *json = page ? sf_page_json(&a->page) : sf_report_json(&a->audit.report);
@@ -115,6 +121,7 @@ static sf_status print_report(const page_audit *a, bool page)
   }
   sf_report_print(stdout, &a->audit.report);
   if (a->opt.published) printf("\n"), sf_published_print(stdout);
+  print_files(a, csv, page);
   return sf_ok();
 }
 
@@ -154,7 +161,7 @@ static sf_status report(page_audit *a)
 {
   const sf_status *agreement = &a->audit.report.three.agreement;
   const sf_status csv = write_csv(a), page = make_page(a);
-  const sf_status printed = print_report(a, a->opt.html && page.code == SF_OK);
+  const sf_status printed = print_report(a, a->opt.csv && csv.code == SF_OK, a->opt.html && page.code == SF_OK);
   const sf_status *const failed = page.code == SF_E_DIFFERENCE || csv.code == SF_OK ? &page : &csv;
   if (agreement->code != SF_OK)
     return sf_fail(SF_E_DIFFERENCE, "%s: %.150s%s%.150s", a->opt.audit.scene, agreement->message,

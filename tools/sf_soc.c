@@ -248,6 +248,8 @@ static sf_status print_text(const job *j)
   printf("image of %zu bytes; %.1f M instructions, %" PRIu64 " register accesses, %" PRIu64 " clock cycles; %.1f s\n",
          j->image_size, (double)total.instructions * 1e-6, total.reads + total.writes, sf_dut_cycle(j->dut),
          j->seconds);
+  if (j->opt.save_image) printf("wrote %s\n", j->opt.save_image);
+  if (j->opt.png) printf("wrote %s\n", j->opt.png);
   const bool written = fflush(stdout) == 0 && !ferror(stdout);
   return written ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
 }

@@ -158,17 +158,20 @@ static sf_status render_all(job *j)
   SF_TRY(open_studio(j));
   snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
   begin_set(j);
+  char contact[4096 + 16];
   sf_status status = sf_view_set_render(&j->set, &j->crop);
+  const double seconds = sf_seconds() - j->start;
+  if (status.code == SF_OK) status = sf_view_set_contact(&j->set, contact);
   sf_progress_end(&j->progress);
   SF_TRY(status);
   if (j->opt.json) {
     cJSON *json = sf_manifest_report_json(&j->set.manifest);
-    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    sf_view_set_add_run(&j->set, seconds, json);
     return sf_json_print(json, true);
   }
   sf_manifest_report_print(stdout, &j->set.manifest);
-  sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
-  printf("wrote %s\n", j->set.manifest_path);
+  sf_view_set_print_run(stdout, &j->set, seconds);
+  printf("wrote %s and %s\n", j->set.manifest_path, contact);
   return sf_ok();
 }
 
@@ -227,8 +230,9 @@ static sf_status verify(job *j)
   } else {
     sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
   }
-  if (differences > 0)
-    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ; %s", j->opt.verify, differences, j->set.todo, j->first);
+  if (differences > 0) /* each was told above, but in JSON */
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ%s%s", j->opt.verify, differences, j->set.todo,
+                   j->opt.json ? "; " : "", j->opt.json ? j->first : "");
   if (!j->opt.json) printf("OK: %d of %d views are as %s says\n", j->set.todo, j->set.manifest.total, j->opt.verify);
   return sf_ok();
 }
@@ -278,7 +282,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
        "which view of the split, from 0 (default 0; --verify: all)"},
       {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
-       "every view of the split, into the folder -o, with a manifest"},
+       "every view of the split, into the folder -o, with a manifest and a contact sheet"},
       {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
        "render again what the manifest lists and compare"},
       {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},

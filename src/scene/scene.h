@@ -91,8 +91,10 @@ bool sf_dataset_has_warning(const sf_dataset *data, const char *text);
 /* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
  * are not needed any more. */
 sf_status sf_dataset_survey(sf_dataset *data);
-/* Picture of 2 * size x size pixels: from above (x, y) and from the side (x, z). Views of the training split are blue,
- * others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Free the image. */
+/* Picture of 2 * size x (size + SF_PLAN_FOOT) pixels: from above (x, y) and from the side (x, z). Views of the training
+ * split are blue, others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Words
+ * name the panels, and in the foot the colours and a scale. Free the image. */
+enum { SF_PLAN_FOOT = 40 };
 sf_status sf_plan_draw(const sf_dataset *train, const sf_dataset *test, int size, sf_image *image);
 
 /* Ray through pixel position (px, py), (0.5, 0.5) = centre of the first pixel. Unit direction. */

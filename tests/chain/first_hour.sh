@@ -40,4 +40,77 @@ script -qec "stty cols 80 && '$bin/sf_train' data -o wide.safetensors --minutes 
 tr '\r' '\n' <typescript >lines.txt
 grep -q 'stage I .*ETA [0-9]*:[0-9][0-9].*PSNR .*iteration [0-9]* *$' lines.txt || fail "no whole progress line in 80 columns"
 grep -q 'evaluation: view 1 of 2' lines.txt || fail "no progress of the evaluation"
+
+# ---- what was written is said ----
+
+"$bin/sf_export" model.safetensors -o s.snn >/dev/null || fail "no scene"
+says "wrote a.csv" energy_audit s.snn data --rays 10 --rtl-rays 0 --csv a.csv -q
+says "wrote a.html" energy_audit s.snn data --rays 10 --rtl-rays 1 --html a.html -q
+says "wrote s.nir" sf_export s.snn --nir s.nir
+says "wrote cameras.png" sf_data data --png cameras.png
+says "wrote views/manifest.json and views/contact.png" sim_render s.snn data --all -o views -q
+says "2 views rendered by fixed" sim_render s.snn data --all -o again -q
+says "all 2 views are there already: nothing was rendered" sim_render s.snn data --all -o views -q
+cmp -s views/contact.png again/contact.png || fail "another contact sheet"
+rm views/contact.png
+says "contact.png" sim_render s.snn data --all -o views -q
+cmp -s views/contact.png again/contact.png || fail "no contact sheet of what was there"
+# Two pictures of 32 x 32, side by side, as the previews show them; not one colour.
+"$bin/sim_render" s.snn data --view 1 -o one.exr --png one.png -q >/dev/null
+python3 - <<'END' || fail "the contact sheet does not show the views"
+import struct, zlib
+def load(path):
+    data, at, packed = open(path, "rb").read(), 8, b""
+    while at < len(data):
+        n, kind = struct.unpack(">I4s", data[at : at + 8])
+        body = data[at + 8 : at + 8 + n]
+        if kind == b"IHDR":
+            width, height, bits, colour = struct.unpack(">IIBB", body[:10])
+            assert bits == 8 and colour == 6, (bits, colour)
+        if kind == b"IDAT":
+            packed += body
+        at += n + 12
+    raw, rows, before = zlib.decompress(packed), [], bytes(4 * width)
+    for y in range(height):
+        kind, line = raw[y * (4 * width + 1)], bytearray(raw[y * (4 * width + 1) + 1 : (y + 1) * (4 * width + 1)])
+        for i in range(len(line)):
+            a, b, c = line[i - 4] if i > 3 else 0, before[i], before[i - 4] if i > 3 else 0
+            p = a + b - c
+            paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+            line[i] = (line[i] + [0, a, b, (a + b) // 2, paeth][kind]) & 255
+        rows.append([tuple(line[4 * x : 4 * x + 3]) for x in range(width)])
+        before = bytes(line)
+    return rows
+sheet, one = load("views/contact.png"), load("one.png")
+left = 8 + 160 + 8
+assert [row[left : left + 32] for row in sheet[8:40]] == one, "view 1 is not where it should be"
+assert len({pixel for row in one for pixel in row}) > 2
+labels = sheet[8 + 160 : 8 + 160 + 12]
+assert any(pixel != (255, 255, 255) for row in labels for pixel in row[left:]), "no name under view 1"
+END
+
+# ---- what there is, where a name is not known ----
+
+refuses 1 "--tech 7nm: no such file, and no such name; " energy_audit s.snn data --rays 1 --rtl-rays 0 --tech 7nm -q
+grep -q "share/spikefield/tech has: 45nm (or give the path of a file)" err.txt || fail "--tech does not list its names: $(cat err.txt)"
+cp -r data nan && sed -i '0,/\[\[*[-0-9.e]*,/s/\(\[\[*\)[-0-9.e]*,/\1NaN,/' nan/transforms_test.json
+refuses 1 "NaN is not JSON: a number must stand here" sf_data nan
+grep -qE 'nan/transforms_test.json:[0-9]+:[0-9]+: ' err.txt || fail "NaN is not located: $(cat err.txt)"
+
+# ---- shares follow from their columns ----
+
+"$bin/error_budget" --samples 2000 -q >budget.txt || fail "error_budget"
+! grep -q '|' budget.txt || fail "error_budget prints Markdown"
+python3 - <<'END' || fail "error_budget: the share does not follow from its columns"
+import re
+rows = 0
+for line in open("budget.txt"):
+    found = re.match(r".{49}\s*(\S+)\s+(\S+)\s+(\d+) %\s+(\d+) %", line)
+    if found:
+        error, bound, share, nearest = map(float, found.groups())
+        rows += 1
+        assert abs(share - (100 * error / bound if error else 0)) <= 0.6, line
+        assert nearest >= share, line
+assert rows == 20, rows
+END
 finish "first_hour: nothing to trip over"
