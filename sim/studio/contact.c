@@ -9,7 +9,8 @@ static const uint8_t ink[3] = {60, 60, 60};
 
 typedef struct sheet {
   sf_image image;
-  int columns, tile, step; /* step: from tile to tile downwards */
+  int columns, tile, high; /* tiles are tile x high */
+  int step;                /* from tile to tile downwards */
 } sheet;
 
 static uint16_t to_u16(double value)
@@ -17,12 +18,33 @@ static uint16_t to_u16(double value)
   return value > 0 ? (uint16_t)((value < 1 ? value : 1) * 65535 + 0.5) : 0;
 }
 
-static sf_status make_sheet(sheet *s, int views)
+static int least(int a, int b)
 {
+  return a < b ? a : b;
+}
+
+/* The size on the sheet; a small picture is not enlarged. */
+static void shrunk(const sheet *s, int width, int height, int *w, int *h)
+{
+  const int most = width > height ? width : height;
+  const double scale = most > s->tile ? (double)s->tile / most : 1;
+  *w = (int)fmax(1, floor(width * scale)), *h = (int)fmax(1, floor(height * scale));
+}
+
+static sf_status make_sheet(sheet *s, const sf_manifest *set)
+{
+  const int views = set->count;
+  int most = LABELLED;
+  for (int i = 0; i < views; i++) most = (int)fmax(most, fmax(set->view[i].width, set->view[i].height));
   s->columns = (int)ceil(sqrt(views));
-  s->tile = SHEET / s->columns < TILE_MAX ? SHEET / s->columns : TILE_MAX;
+  s->tile = least(SHEET / s->columns, least(TILE_MAX, most));
   if (s->tile < 1) return sf_fail(SF_E_RANGE, "%d views are too many for a contact sheet", views);
-  s->step = s->tile + GAP + (s->tile >= LABELLED ? LABEL : 0);
+  s->high = 1;
+  for (int i = 0, w, h; i < views; i++) {
+    shrunk(s, set->view[i].width, set->view[i].height, &w, &h);
+    s->high = h > s->high ? h : s->high;
+  }
+  s->step = s->high + GAP + (s->tile >= LABELLED ? LABEL : 0);
   s->image.width = s->columns * (s->tile + GAP) + GAP;
   s->image.height = (views + s->columns - 1) / s->columns * s->step + GAP;
   const size_t n = 4 * (size_t)s->image.width * (size_t)s->image.height;
@@ -32,12 +54,12 @@ static sf_status make_sheet(sheet *s, int views)
   return sf_ok();
 }
 
-/* The mean of what falls on each pixel of the tile; a small picture is not enlarged. */
+/* The mean of what falls on each pixel of the tile. */
 static void shrink(sheet *s, int left, int top, const float *const rgb[3], int width, int height)
 {
-  const int most = width > height ? width : height;
-  const double scale = most > s->tile ? (double)s->tile / most : 1;
-  const int w = (int)fmax(1, floor(width * scale)), h = (int)fmax(1, floor(height * scale));
+  int w, h;
+  shrunk(s, width, height, &w, &h);
+  h = least(h, s->high); /* whatever the file holds, it stays in its tile */
   for (int y = 0; y < h; y++)
     for (int x = 0; x < w; x++) {
       double sum[3] = {0};
@@ -75,7 +97,7 @@ static void add_label(sheet *s, int left, int top, const sf_manifest_view *view)
   if (!isnan(view->psnr)) snprintf(psnr, sizeof psnr, " %.1f dB", view->psnr);
   const int letters = room - (int)strlen(psnr), length = (int)strlen(view->name);
   snprintf(text, sizeof text, "%s%s", view->name + (length > letters ? length - letters : 0), psnr);
-  sf_image_text(&s->image, left, top + s->tile + 2, 1, ink, text);
+  sf_image_text(&s->image, left, top + s->high + 2, 1, ink, text);
 }
 
 static sf_status fill_sheet(sheet *s, const sf_view_set *set)
@@ -99,7 +121,7 @@ sf_status sf_view_set_contact(const sf_view_set *set, char path[4096 + 16])
 {
   sheet s;
   snprintf(path, 4096 + 16, "%s/%s", set->folder, SF_CONTACT_NAME);
-  SF_TRY(make_sheet(&s, set->manifest.count));
+  SF_TRY(make_sheet(&s, &set->manifest));
   sf_status status = fill_sheet(&s, set);
   if (status.code == SF_OK) status = sf_image_save_png(&s.image, path);
   sf_image_free(&s.image);

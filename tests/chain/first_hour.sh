@@ -82,10 +82,10 @@ def load(path):
         before = bytes(line)
     return rows
 sheet, one = load("views/contact.png"), load("one.png")
-left = 8 + 160 + 8
+left = 8 + 96 + 8
 assert [row[left : left + 32] for row in sheet[8:40]] == one, "view 1 is not where it should be"
 assert len({pixel for row in one for pixel in row}) > 2
-labels = sheet[8 + 160 : 8 + 160 + 12]
+labels = sheet[8 + 32 : 8 + 32 + 12]
 assert any(pixel != (255, 255, 255) for row in labels for pixel in row[left:]), "no name under view 1"
 END
 
