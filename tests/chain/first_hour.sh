@@ -113,4 +113,18 @@ for line in open("budget.txt"):
         assert nearest >= share, line
 assert rows == 20, rows
 END
+# ---- --help: groups, lines of a terminal, defaults in columns ----
+
+for program in "$bin"/*; do
+  "$program" --help >help.txt || fail "$(basename "$program") --help"
+  grep -E '^( {2,6}(-., )?--| {28})' help.txt | awk 'length > 80' >long.txt
+  [ ! -s long.txt ] || fail "$(basename "$program") --help: lines over 80 columns: $(head -1 long.txt)"
+  options=$(grep -c '^ \{2,6\}\(-., \)\?--' help.txt) groups=$(grep -c '^[A-Z].*:\( .*\)\?$' help.txt)
+  [ "$options" -le 12 ] || [ "$groups" -ge 4 ] || fail "$(basename "$program") --help: $options options in $groups groups"
+done
+"$bin/sf_train" --help >help.txt
+[ "$(grep -n '^A first run:\|^Tuning:  .* ingp  tensorf$\|^Ablations' help.txt | wc -l)" -eq 3 ] || fail "sf_train --help: groups"
+grep -q -- '--samples N  *samples per iteration, about  *16384  *32768$' help.txt || fail "sf_train --help: defaults in columns"
+! grep -q 'default .*tensorf ' help.txt || fail "sf_train --help: defaults of a backbone in brackets"
+
 finish "first_hour: nothing to trip over"
