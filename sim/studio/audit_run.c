@@ -90,7 +90,7 @@ static int has_prices(const struct dirent *entry)
 static sf_status unknown_technology(const char *name, const char *folder)
 {
   struct dirent **entry = NULL;
-  char names[200] = "";
+  char names[100] = "";
   const int n = scandir(folder, &entry, has_prices, alphasort);
   for (int i = 0; i < n; i++) {
     const size_t used = strlen(names);
@@ -99,8 +99,8 @@ static sf_status unknown_technology(const char *name, const char *folder)
     free(entry[i]);
   }
   free(entry);
-  return sf_fail(SF_E_IO, "--tech %.60s: no such file, and no such name; %.150s has: %s (or give the path of a file)",
-                 name, folder, *names ? names : "none");
+  return sf_fail(SF_E_IO, "--tech %.60s: no such file, and no %.200s/%.60s.tech; names there: %s (or give a file)",
+                 name, folder, name, *names ? names : "none");
 }
 
 sf_status sf_audit_technology(sf_technology *technology, const char *name)

@@ -47,6 +47,14 @@ quiet sim_render theirs.snn cube -o out.exr -q
 quiet sim_render own.snn cube -o out.exr -q
 refused "own.snn: learned from data of scale 0.33" sim_render own.snn data -o out2.exr -q
 
+# A record that cannot be.
+for edit in ndc:0:2 bound:1:0; do
+  IFS=: read -r key from to <<<"$edit"
+  sed "s/\"data_$key\":\"$from\"/\"data_$key\":\"$to\"/" ours.safetensors >bad.safetensors
+  refused "bad.safetensors: metadata: data_scale 0.8, " sf_export bad.safetensors -o bad.snn
+  grep -q "data_$key $to[,:]" err.txt || fail "data_$key $to: $(cat err.txt)"
+done
+
 # A file without the record, as older ones are.
 python3 - ours.safetensors old.safetensors <<'END'
 import json, struct, sys
