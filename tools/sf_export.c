@@ -292,6 +292,16 @@ static void set_defaults(options *o)
   if (!o->extra.samples) o->extra.samples = KIT_SAMPLES;
 }
 
+static int run(const sf_cli *cli, int argc, char **argv, options *o)
+{
+  const char *path = NULL;
+  sf_status status = sf_cli_parse(cli, argc, argv, &path);
+  if (status.code == SF_OK) status = check_options(o);
+  set_defaults(o);
+  if (status.code == SF_OK) status = o->output ? export_scene(path, o) : export_from(path, o);
+  return sf_cli_finish(cli, status);
+}
+
 int main(int argc, char **argv)
 {
   options o = {.background = -1, .fit_loss = -1, .extra = {.view = -1}}; /* and 0: not given */
@@ -350,10 +360,5 @@ int main(int argc, char **argv)
                       .options = table,
                       .min_positional = 1,
                       .max_positional = 1};
-  const char *model_path = NULL;
-  sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
-  if (status.code == SF_OK) status = check_options(&o);
-  set_defaults(&o);
-  if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_from(model_path, &o);
-  return sf_cli_finish(&cli, status);
+  return run(&cli, argc, argv, &o);
 }
