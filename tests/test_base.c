@@ -176,6 +176,41 @@ START_TEST(full_disk_keeps_the_old_file)
 }
 END_TEST
 
+/* A program that is killed while it saves leaves one file, which the next save of the same target takes; programs that
+ * save at once do not write into each other's. */
+START_TEST(what_a_killed_save_left_is_taken)
+{
+  for (int i = 0; i < 3; i++) {
+    const pid_t child = fork();
+    ck_assert_int_ge(child, 0);
+    if (!child) {
+      sf_writer w;
+      if (sf_writer_open(&w, in("a")).code) _exit(1);
+      for (int n = 0; n < 5000; n++) fputs("half", w.file);
+      fflush(w.file);
+      raise(SIGKILL);
+    }
+    int end;
+    ck_assert_int_eq(waitpid(child, &end, 0), child);
+    ck_assert(WIFSIGNALED(end));
+    ck_assert_int_eq(entries(), 1);
+  }
+  sf_writer first, second;
+  ck_good(sf_writer_open(&first, in("a")));
+  ck_good(sf_writer_open(&second, in("a")));
+  ck_assert_str_ne(first.aside, second.aside);
+  fputs("1", first.file), fputs("2", second.file);
+  ck_good(sf_writer_commit(&second));
+  ck_good(sf_writer_commit(&first));
+  ck_assert_int_eq(entries(), 1);
+  char *data;
+  size_t size;
+  ck_good(sf_read_file(in("a"), 100, &data, &size));
+  ck_assert_str_eq(data, "1");
+  free(data);
+}
+END_TEST
+
 START_TEST(writer_abort_and_links)
 {
   sf_writer w;
@@ -236,7 +271,10 @@ static const struct {
     {" \n ", "bad.json:2:2", "empty"},
     {"{\"a\": 1", "bad.json:1:8", "early"},
     {"{\"a\": 1}\n x", "bad.json:2:2", "after the end"},
-    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed"},
+    {"{\n\"a\": NaN}", "bad.json:2:6", "malformed JSON: NaN is not JSON"},
+    {"[1,\n2, -Infinity]", "bad.json:2:4", "-Infinity is not JSON"},
+    {"[1, nan", "bad.json:1:5", "nan is not JSON"},
+    {"[nano]", "bad.json:1:2", "malformed JSON"},
     {"[1,\n 2,,]", "bad.json:2:4", "malformed"},
     {"nul", "bad.json:1:1", "malformed"},
 };
@@ -525,7 +563,7 @@ static sf_status parse(values *v, const char **positional, const char *line)
                                {"--mode", 0, SF_ARG_CHOICE, &v->choice, 0, 0, "hybrid|decay|no-decay", NULL, "a mode"},
                                {"--out", 'o', SF_ARG_STRING, &v->text, 0, 0, NULL, "FILE", "a file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2, false};
+  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2, false, NULL};
   return parse_line(&cli, positional, line);
 }
 
@@ -537,7 +575,7 @@ static sf_status parse_paths(const char *line, const char **positional)
                                {"--start", 0, SF_ARG_INPUT, &start, 0, 0, NULL, "FILE", "an input"},
                                {"--word", 0, SF_ARG_STRING, &word, 0, 0, NULL, "WORD", "no file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2, false};
+  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2, false, NULL};
   return parse_line(&cli, positional, line);
 }
 
@@ -620,6 +658,43 @@ START_TEST(cli_help_exits_zero)
   ck_assert_ptr_nonnull(freopen(in("help"), "w", stdout));
   parse(&v, p, "--help");
   exit(9);
+}
+END_TEST
+
+/* Groups in the order of the table, lines of at most 80 columns, defaults under their columns. */
+START_TEST(cli_help_in_groups)
+{
+  static const char wanted[] =
+      "Usage: prog\n\nFirst:\n  -o, --out FILE            a file\n"
+      "      --an-option-with-a-long-name NUMBER\n                            what does not fit beside its name "
+      "stands below, and\n"
+      "                            goes on in the next line\n"
+      "\nSizes:                                                              one      two\n"
+      "      --size N              words of a help that goes on in          16       32\n"
+      "                            the next line\n"
+      "      --both N              the same for both                         7        7\n"
+      "\nHelp:\n  -h, --help                show this text\n      --version             show the version\n";
+  const char *out;
+  int n;
+  const sf_option options[] = {
+      SF_GROUP("First"),
+      {"--out", 'o', SF_ARG_STRING, &out, 0, 0, NULL, "FILE", "a file"},
+      {"--an-option-with-a-long-name", 0, SF_ARG_INT, &n, 0, 0, NULL, "NUMBER",
+       "what does not fit beside its name stands below, and goes on in the next line"},
+      SF_GROUP("Sizes"),
+      {"--size", 0, SF_ARG_INT, &n, 0, 0, NULL, "N", "words of a help that goes on in the next line\t16\t32"},
+      {"--both", 0, SF_ARG_INT, &n, 0, 0, NULL, "N", "the same for both\t7"},
+      {0}};
+  const sf_cli cli = {.program = "prog", .options = options, .columns = "\tone\ttwo"};
+  ck_assert_ptr_nonnull(freopen(in("help"), "w", stdout));
+  sf_cli_help(&cli);
+  fclose(stdout);
+  char *text;
+  size_t size;
+  ck_good(sf_read_file(in("help"), 4000, &text, &size));
+  ck_assert_str_eq(text, wanted);
+  free(text);
+  ck_bad(parse_line(&cli, (const char *[]){NULL}, "Sizes"), SF_E_USAGE, "unexpected", "Sizes"); /* no option */
 }
 END_TEST
 
@@ -722,6 +797,7 @@ static Suite *suite(void)
   tcase_add_test(t, pipes_are_read_up_to_a_limit);
   tcase_add_test(t, unwritable_targets_are_left_alone);
   tcase_add_test(t, full_disk_keeps_the_old_file);
+  tcase_add_test(t, what_a_killed_save_left_is_taken);
   tcase_add_test(t, writer_abort_and_links);
   tcase_add_test(t, folders_with_parents);
   tcase_add_test(t, json_round_trip);
@@ -737,6 +813,7 @@ static Suite *suite(void)
   tcase_add_test(t, cli_values);
   tcase_add_loop_test(t, cli_refused, 0, COUNT(bad_lines));
   tcase_add_test(t, cli_outputs);
+  tcase_add_test(t, cli_help_in_groups);
   tcase_add_test(t, cli_exit_status);
   tcase_add_test(t, cli_full_standard_output_is_an_error);
   tcase_add_test(t, first_signal_asks_to_stop);

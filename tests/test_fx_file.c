@@ -93,7 +93,8 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   ck_assert_mem_eq(a->occupancy, b->occupancy, 64);
   ck_assert(a->step_q24 == b->step_q24 && a->max_samples == b->max_samples && a->trans_stop == b->trans_stop);
   ck_assert_mem_eq(a->background, b->background, sizeof a->background);
-  ck_assert(a->units.model_scale == b->units.model_scale);
+  ck_assert(a->units.model_scale == b->units.model_scale && a->units.data_scale == b->units.data_scale);
+  ck_assert(a->units.data_bound == b->units.data_bound && a->units.data_ndc == b->units.data_ndc);
   ck_assert(a->units.to_box_scale == b->units.to_box_scale && a->units.dir_scale == b->units.dir_scale);
   for (int l = 0; l < FX_LEVELS_MAX; l++) ck_assert(a->units.feature_scale[l] == b->units.feature_scale[l]);
   for (int o = 0; o < 3; o++) ck_assert(a->units.to_box_offset[o] == b->units.to_box_offset[o]);
@@ -106,6 +107,8 @@ START_TEST(round_trip)
     fx_scene scene = fixture_scene(&sizes, seed), again;
     scene.units.to_box_scale = 1.0 / 3, scene.units.dir_scale = 0x1p-11, scene.units.to_box_offset[1] = -1e6 / 7;
     scene.background[2] = 12345, scene.units.model_scale = seed % 2 ? 0.4 : 0;
+    scene.units.data_scale = seed % 3 ? 0.3 : 0, scene.units.data_bound = seed % 3 ? 4 : 0;
+    scene.units.data_ndc = seed % 3 == 2;
     save(&scene);
     const sf_status status = fx_scene_load(&again, path);
     ck_assert_msg(status.code == SF_OK, "%s", status.message);
@@ -240,6 +243,8 @@ START_TEST(metadata_is_checked)
       {"model_scale", "-1", "model_scale"},
       {"model_scale", "inf", "model_scale"},
       {"model_scale", "1", "checksum"},
+      {"data_scale", "0", "data_scale"},
+      {"data_ndc", "nan", "data_ndc"},
   };
   fx_scene scene = small_scene(4);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

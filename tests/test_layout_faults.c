@@ -118,6 +118,53 @@ START_TEST(the_survey_names_what_looks_wrong)
 }
 END_TEST
 
+/* Pixels of a rectangle that are rather red, rather blue, or dark. */
+static void count_colours(const sf_image *image, int x0, int x1, int y0, int y1, int seen[3])
+{
+  for (int y = y0; y < y1; y++)
+    for (int x = x0; x < x1; x++) {
+      const uint16_t *p = image->rgba + 4 * (y * image->width + x);
+      seen[0] += p[0] > 50000 && p[2] < 20000;
+      seen[1] += p[2] > 50000 && p[0] < 20000;
+      seen[2] += p[0] < 20000 && p[2] < 20000;
+    }
+}
+
+/* Words at the top of both panels, the colours and the scale in the foot: its bar is as long as it says. */
+START_TEST(the_plan_has_words_and_a_scale)
+{
+  enum { SIZE = 600 };
+  const layout_rig rig = orbit();
+  sf_dataset d, held;
+  sf_image image;
+  put_colmap("sparse/0", &rig, 0);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  load(&d, "train"), load(&held, "test");
+  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  for (int side = 0; side < 2; side++) {
+    int seen[3] = {0};
+    count_colours(&image, side * SIZE, side * SIZE + 300, 12, 28, seen);
+    ck_assert_int_gt(seen[2], 200);
+  }
+  int left[3] = {0}, right[3] = {0}, longest = 0, run = 0;
+  count_colours(&image, 0, SIZE, SIZE, image.height, left);
+  count_colours(&image, SIZE, 2 * SIZE, SIZE, image.height, right);
+  ck_assert(left[0] > 100 && left[1] > 100 && right[2] > 100);
+  for (int x = SIZE; x < 2 * SIZE; x++) {
+    run = image.rgba[4 * ((SIZE + SF_PLAN_FOOT / 2) * image.width + x)] < 20000 ? run + 1 : 0;
+    longest = run > longest ? run : longest;
+  }
+  double most = 0;
+  for (int s = 0; s < 2; s++)
+    for (int v = 0; v < (s ? held : d).count; v++)
+      for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)(s ? held : d).view[v].camera.to_world[4 * i + 3]));
+  const double length = (longest - 1) * 1.15 * most / (0.5 * SIZE); /* model units */
+  ck_assert_msg(fabs(length - 0.5) < 0.01, "the bar is %g long", length);
+  sf_image_free(&image);
+  sf_dataset_free(&d), sf_dataset_free(&held);
+}
+END_TEST
+
 /* From above and from the side: each camera's own point has its colour, the box's edges are grey. */
 START_TEST(the_plan_shows_every_camera)
 {
@@ -129,7 +176,7 @@ START_TEST(the_plan_shows_every_camera)
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   load(&d, "train"), load(&held, "test");
   ck_good(sf_plan_draw(&d, &held, SIZE, &image));
-  ck_assert(image.width == 2 * SIZE && image.height == SIZE);
+  ck_assert(image.width == 2 * SIZE && image.height == SIZE + SF_PLAN_FOOT);
   double most = 0;
   for (int v = 0; v < d.count; v++)
     for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)d.view[v].camera.to_world[4 * i + 3]));
@@ -406,6 +453,7 @@ static Suite *suite(void)
   tcase_add_test(t, a_mark_before_a_text_is_skipped);
   tcase_add_test(t, the_survey_names_what_looks_wrong);
   tcase_add_test(t, the_plan_shows_every_camera);
+  tcase_add_test(t, the_plan_has_words_and_a_scale);
   tcase_add_test(t, cameras_that_all_look_away_are_refused);
   tcase_add_loop_test(t, cameras_that_turn_their_backs_are_told, 0, 3);
   tcase_add_loop_test(t, mirrored_poses_are_told, 0, 2);

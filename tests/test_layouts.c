@@ -127,6 +127,32 @@ START_TEST(splits_in_other_coordinates_are_refused)
 }
 END_TEST
 
+/* NDC or not, another scale, another bound; what poses are computed from may differ a little. */
+START_TEST(another_scenes_data_is_refused)
+{
+  layout_rig rig = row();
+  sf_dataset d;
+  put_llff(&rig, 0, 4, 40);
+  put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
+  ck_good(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.scale = 0.125f}));
+  ck_assert(d.scale == 0.125f && d.own_scale != d.scale); /* whatever it is read at */
+  const sf_space space = sf_dataset_space(&d);
+  ck_assert(space.ndc == 1 && space.scale == d.own_scale && space.bound == 1);
+  ck_good(sf_space_check(&space, "m", &d));
+  sf_space other = space;
+  other.scale *= 1.005f;
+  ck_good(sf_space_check(&other, "m", &d));
+  other.scale *= 1.02f;
+  ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from data of scale", "poses_bounds.npy: scale");
+  other = space, other.bound = 2;
+  ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "and bound 2", "bound 1: this is another scene's data");
+  other = space, other.ndc = 0;
+  ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from data without NDC rays", "with NDC");
+  ck_good(sf_space_check(&(sf_space){0}, "m", &d));
+  sf_dataset_free(&d);
+}
+END_TEST
+
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
 START_TEST(a_picture_is_found_by_a_long_name)
 {
@@ -462,6 +488,7 @@ static Suite *suite(void)
   tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
   tcase_add_test(t, far_coordinates_lose_nothing);
   tcase_add_test(t, splits_in_other_coordinates_are_refused);
+  tcase_add_test(t, another_scenes_data_is_refused);
   tcase_add_test(t, a_picture_is_found_by_a_long_name);
   tcase_add_test(t, blender_has_the_rays_of_its_poses);
   tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);

@@ -107,7 +107,13 @@ static sf_status make_page(page_audit *a)
   return sf_page_save(&a->page, o->html);
 }
 
-static sf_status print_report(const page_audit *a, bool page)
+static void print_files(const page_audit *a, bool csv, bool page)
+{
+  if (csv) printf("wrote %s\n", a->opt.csv);
+  if (page) printf("wrote %s\n", a->opt.html);
+}
+
+static sf_status print_report(const page_audit *a, bool csv, bool page)
 {
   if (a->opt.json) {
     cJSON *json = page ? sf_page_json(&a->page) : sf_report_json(&a->audit.report);
@@ -116,6 +122,7 @@ static sf_status print_report(const page_audit *a, bool page)
   }
   sf_report_print(stdout, &a->audit.report);
   if (a->opt.published) printf("\n"), sf_published_print(stdout);
+  print_files(a, csv, page);
   return sf_ok();
 }
 
@@ -155,7 +162,7 @@ static sf_status report(page_audit *a)
 {
   const sf_status *agreement = &a->audit.report.three.agreement;
   const sf_status csv = write_csv(a), page = make_page(a);
-  const sf_status printed = print_report(a, a->opt.html && page.code == SF_OK);
+  const sf_status printed = print_report(a, a->opt.csv && csv.code == SF_OK, a->opt.html && page.code == SF_OK);
   const sf_status *const failed = page.code == SF_E_DIFFERENCE || csv.code == SF_OK ? &page : &csv;
   if (agreement->code != SF_OK)
     return sf_fail(SF_E_DIFFERENCE, "%s: %.150s%s%.150s", a->opt.audit.scene, agreement->message,
@@ -296,37 +303,41 @@ static sf_status check_inputs(const options *o)
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 {
   const sf_option table[] = {
+      SF_GROUP("What is counted"),
       {"--views", 0, SF_ARG_INT, &o->audit.views, 1, 1 << 20, NULL, "N", "all pixels of the first N views (default 1)"},
       {"--view", 0, SF_ARG_INT, &o->audit.view, 0, 1 << 20, NULL, "K", "all pixels of view K alone"},
       {"--rays", 0, SF_ARG_U64, &o->audit.rays, 1, 1e9, NULL, "N", "N random rays instead of all pixels"},
-      {"--rtl-rays", 0, SF_ARG_INT, &o->audit.rtl_rays, 0, 1 << 20, NULL, "N",
-       "rays for the accelerator too (default 16)"},
-      {"--recount-rays", 0, SF_ARG_U64, &o->audit.recount_rays, 0, 1e9, NULL, "N",
-       "rays recounted from their spike bitmaps (default 1000)"},
+      {"--split", 0, SF_ARG_STRING, &o->audit.split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--steps", 0, SF_ARG_INT, &o->audit.steps, 1, SF_T_MAX, NULL, "N", "time steps in place of the scene's t_r"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
+      SF_GROUP("Reports"),
+      {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
+      {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
+      {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
+       "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
+      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
+      SF_GROUP("Prices and comparisons"),
       {"--tech", 0, SF_ARG_INPUT, &o->audit.tech, 0, 0, NULL, "FILE", "prices: a file or a name (default 45nm)"},
       {"--twin", 0, SF_ARG_INPUT, &o->audit.twin, 0, 0, NULL, "FILE",
        "float model of a ReLU twin, trained by itself: its own samples"},
-      {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
-      {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
-      {"--split", 0, SF_ARG_STRING, &o->audit.split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 0, 64, NULL, "N",
-       "views of 1/N of the full size, 0 = by the layout (default 0)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the scene's (default 0)"},
-      {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
-      {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
-      {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
-       "float model, for its PSNR in the page (default: model.safetensors beside the scene, if there)"},
       {"--compare", 0, SF_ARG_FLAG, &o->compare, 0, 0, NULL, NULL,
        "A B [DATA]: two reports (.json) or scenes, what changed"},
       {"--tech-b", 0, SF_ARG_INPUT, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
       {"--steps-b", 0, SF_ARG_INT, &o->steps_b, 1, SF_T_MAX, NULL, "N", "time steps of B (default: as A)"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
+      SF_GROUP("Checks and tuning"),
+      {"--rtl-rays", 0, SF_ARG_INT, &o->audit.rtl_rays, 0, 1 << 20, NULL, "N",
+       "rays for the accelerator too (default 16)"},
+      {"--recount-rays", 0, SF_ARG_U64, &o->audit.recount_rays, 0, 1e9, NULL, "N",
+       "rays recounted from their spike bitmaps (default 1000)"},
+      {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
+      {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
+      {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
+       "model units per world unit, 0 = the scene's (default 0)"},
       {"--plusarg", 0, SF_ARG_STRING, &o->audit.plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
-      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
-      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const char *positional[3];
   cli->options = table;

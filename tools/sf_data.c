@@ -239,7 +239,9 @@ static sf_status report(const job *j)
   else
     print_text(j, kinds, n);
   free(kinds);
-  return status.code == SF_OK ? draw_plan(j) : status;
+  if (status.code == SF_OK) status = draw_plan(j);
+  if (status.code == SF_OK && j->png && !j->json) printf("wrote %s\n", j->png);
+  return status;
 }
 
 int main(int argc, char **argv)

@@ -293,10 +293,21 @@ static void set_defaults(options *o)
   if (!o->extra.samples) o->extra.samples = KIT_SAMPLES;
 }
 
+static int run(const sf_cli *cli, int argc, char **argv, options *o)
+{
+  const char *path = NULL;
+  sf_status status = sf_cli_parse(cli, argc, argv, &path);
+  if (status.code == SF_OK) status = check_options(o);
+  set_defaults(o);
+  if (status.code == SF_OK) status = o->output ? export_scene(path, o) : export_from(path, o);
+  return sf_cli_finish(cli, status);
+}
+
 int main(int argc, char **argv)
 {
   options o = {.background = -1, .fit_loss = -1, .extra = {.view = -1}}; /* and 0: not given */
   const sf_option table[] = {
+      SF_GROUP("A scene"),
       {"--output", 'o', SF_ARG_OUTPUT, &o.output, 0, 0, NULL, "SCENE", "scene file to write (.snn)"},
       {"--steps", 0, SF_ARG_INT, &o.steps, 1, SF_T_MAX, NULL, "N",
        "unroll N time steps instead of the model's own t_r"},
@@ -304,15 +315,18 @@ int main(int argc, char **argv)
        "colour behind the scene: white or black (default white)"},
       {"--seed", 0, SF_ARG_U64, &o.extra.seed, 0, 18446744073709551615.0, NULL, "S",
        "seed of the calibration samples, or of the rays and stalls of --vectors and --traces (default 0)"},
+      SF_GROUP("Widths"),
       {"--weight-bits", 0, SF_ARG_INT, &o.widths.weight_bits, 2, SF_WEIGHT_BITS, NULL, "B", "bits of a weight"},
       {"--feature-bits", 0, SF_ARG_INT, &o.widths.feature_bits, 8, SF_INPUT_BITS, NULL, "B",
        "bits of the inputs of D1 and C1"},
       {"--leak-bits", 0, SF_ARG_INT, &o.widths.leak_bits, 4, SF_LEAK_FRAC, NULL, "B", "fraction bits of a leak"},
       {"--grid-bits", 0, SF_ARG_INT, &o.widths.grid_bits, 2, SF_GRID_BITS, NULL, "B", "bits of a grid entry"},
+      SF_GROUP("A smaller scene"),
       {"--fit", 0, SF_ARG_FLAG, &o.fit, 0, 0, NULL, NULL, "leave out what the training views of --data do not need"},
       {"--fit-loss", 0, SF_ARG_DOUBLE, &o.fit_loss, 0, 100, NULL, "DB",
        "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
       {"--fit-rays", 0, SF_ARG_U64, &o.fit_rays, 256, 1e8, NULL, "N", "rays that --fit looks at (default 262144)"},
+      SF_GROUP("For other tools"),
       {"--data", 0, SF_ARG_INPUT, &o.extra.data, 0, 0, NULL, "DATA", "data set for --fit, --vectors and --traces"},
       {"--vectors", 0, SF_ARG_PLACE, &o.extra.vectors, 0, 0, NULL, "DIR",
        "write programming, stimulus, everything expected, RTL and bench of the scene into DIR (docs/kit.md)"},
@@ -326,6 +340,7 @@ int main(int argc, char **argv)
        "test view of the rays of --traces (default: any)"},
       {"--nir", 0, SF_ARG_OUTPUT, &o.extra.nir, 0, 0, NULL, "FILE",
        "write the spiking nets as a NIR graph (HDF5); of a model real numbers, of a scene integers"},
+      SF_GROUP("What is printed"),
       {"--quiet", 'q', SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
       {"--json", 0, SF_ARG_FLAG, &o.json, 0, 0, NULL, NULL, "print the report as JSON"},
       {0}};
@@ -346,10 +361,5 @@ int main(int argc, char **argv)
                       .options = table,
                       .min_positional = 1,
                       .max_positional = 1};
-  const char *model_path = NULL;
-  sf_status status = sf_cli_parse(&cli, argc, argv, &model_path);
-  if (status.code == SF_OK) status = check_options(&o);
-  set_defaults(&o);
-  if (status.code == SF_OK) status = o.output ? export_scene(model_path, &o) : export_from(model_path, &o);
-  return sf_cli_finish(&cli, status);
+  return run(&cli, argc, argv, &o);
 }

@@ -10,14 +10,17 @@ int main(int argc, char **argv)
   int threads = 0;
   bool json = false;
   const sf_option options[] = {
+      SF_GROUP("What to render"),
       {"--view", 0, SF_ARG_INT, &o.view, 0, 1 << 20, NULL, "K", "view of the split, from 0 (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o.split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--every", 0, SF_ARG_INT, &o.every, 1, 64, NULL, "N", "every Nth pixel along both axes (default 1)"},
       {"--steps", 0, SF_ARG_INT, &o.quant.steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the model's t_r)"},
+      SF_GROUP("Widths"),
       {"--weight-bits", 0, SF_ARG_INT, &w->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B", "bits of a weight"},
       {"--feature-bits", 0, SF_ARG_INT, &w->feature_bits, 8, SF_INPUT_BITS, NULL, "B", "bits of inputs of D1 and C1"},
       {"--leak-bits", 0, SF_ARG_INT, &w->leak_bits, 4, SF_LEAK_FRAC, NULL, "B", "fraction bits of a leak"},
       {"--grid-bits", 0, SF_ARG_INT, &w->grid_bits, 2, SF_GRID_BITS, NULL, "B", "bits of a grid entry"},
+      SF_GROUP("Tuning"),
       {"--seed", 0, SF_ARG_U64, &o.quant.seed, 0, 0, NULL, "S", "of the calibration samples (default 0)"},
       {"--threads", 0, SF_ARG_INT, &threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &json, 0, 0, NULL, NULL, "report as JSON"},

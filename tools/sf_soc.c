@@ -250,6 +250,8 @@ static sf_status print_text(const job *j)
   printf("image of %zu bytes; %.1f M instructions, %" PRIu64 " register accesses, %" PRIu64 " clock cycles; %.1f s\n",
          j->image_size, (double)total.instructions * 1e-6, total.reads + total.writes, sf_dut_cycle(j->dut),
          j->seconds);
+  if (j->opt.save_image) printf("wrote %s\n", j->opt.save_image);
+  if (j->opt.png) printf("wrote %s\n", j->opt.png);
   const bool written = fflush(stdout) == 0 && !ferror(stdout);
   return written ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
 }
@@ -288,26 +290,30 @@ static void find_firmware(job *j)
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 {
   const sf_option table[] = {
+      SF_GROUP("What to render"),
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H", "the tile (default: 8x8 in the centre)"},
       {"--split", 0, SF_ARG_CHOICE, &o->split, 0, 0, "test|train", "NAME", "views to take (default test)"},
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
-       "views of 1/N of the full size, 0 = by the layout (default 0)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the scene's (default 0)"},
+      {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "write the firmware's pixels"},
+      SF_GROUP("What is printed"),
+      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
+      SF_GROUP("The system"),
       {"--firmware", 0, SF_ARG_INPUT, &o->firmware, 0, 0, NULL, "ELF",
        "program to run (default: the one built or installed with sf_soc)"},
       {"--image", 0, SF_ARG_INPUT, &o->image, 0, 0, NULL, "FILE", "memory image to load instead of the tile's own"},
       {"--save-image", 0, SF_ARG_OUTPUT, &o->save_image, 0, 0, NULL, "FILE",
        "write the memory image, for other systems"},
-      {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "write the firmware's pixels"},
-      {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of stalls and register contents at power-on (default 1)"},
-      {"--stall", 0, SF_ARG_INT, &o->stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--instructions", 0, SF_ARG_U64, &o->instructions, 1, 0x1p53, NULL, "N",
        "that the program may take (default 10^10)"},
+      SF_GROUP("Tuning"),
+      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
+       "views of 1/N of the full size, 0 = by the layout (default 0)"},
+      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
+       "model units per world unit, 0 = the scene's (default 0)"},
+      {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of stalls and register contents at power-on (default 1)"},
+      {"--stall", 0, SF_ARG_INT, &o->stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
       {"--plusarg", 0, SF_ARG_STRING, &o->plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
-      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
-      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const char *positional[2];
   cli->options = table;

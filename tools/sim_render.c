@@ -161,17 +161,20 @@ static sf_status render_all(job *j)
   SF_TRY(open_studio(j));
   snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
   begin_set(j);
+  char contact[4096 + 16];
   sf_status status = sf_view_set_render(&j->set, &j->crop);
+  const double seconds = sf_seconds() - j->start;
+  if (status.code == SF_OK) status = sf_view_set_contact(&j->set, contact);
   sf_progress_end(&j->progress);
   SF_TRY(status);
   if (j->opt.json) {
     cJSON *json = sf_manifest_report_json(&j->set.manifest);
-    sf_view_set_add_run(&j->set, sf_seconds() - j->start, json);
+    sf_view_set_add_run(&j->set, seconds, json);
     return sf_json_print(json, true);
   }
   sf_manifest_report_print(stdout, &j->set.manifest);
-  sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
-  printf("wrote %s\n", j->set.manifest_path);
+  sf_view_set_print_run(stdout, &j->set, seconds);
+  printf("wrote %s and %s\n", j->set.manifest_path, contact);
   return sf_ok();
 }
 
@@ -230,9 +233,9 @@ static sf_status verify(job *j)
   } else {
     sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
   }
-  if (differences > 0)
-    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d view%s differ; %s", j->opt.verify, differences, j->set.todo,
-                   sf_plural((uint64_t)j->set.todo), j->first);
+  if (differences > 0) /* each was told above, but in JSON */
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d view%s differ%s%s", j->opt.verify, differences, j->set.todo,
+                   sf_plural((uint64_t)j->set.todo), j->opt.json ? "; " : "", j->opt.json ? j->first : "");
   if (!j->opt.json)
     printf("OK: %d of %d view%s as %s says\n", j->set.todo, j->set.manifest.total,
            j->set.manifest.total == 1 ? " is" : "s are", j->opt.verify);
@@ -281,27 +284,32 @@ static sf_status check_modes(options *o)
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 {
   const sf_option table[] = {
-      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
-       "which view of the split, from 0 (default 0; --verify: all)"},
-      {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
-       "every view of the split, into the folder -o, with a manifest"},
-      {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
-       "render again what the manifest lists and compare"},
-      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
+      SF_GROUP("One view"),
       {"--output", 'o', SF_ARG_PLACE, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
       {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
+      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
+       "which view of the split, from 0 (default 0; --verify: all)"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
+      {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
+      SF_GROUP("A set of views"),
+      {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
+       "every view of the split, into the folder -o, with a manifest and a contact sheet"},
+      {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
+       "render again what the manifest lists and compare"},
+      SF_GROUP("How it is computed"),
+      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
       {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "for float (default model.safetensors beside the scene)"},
-      {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default, and most: all processors"},
+      SF_GROUP("Tuning"),
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
        "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, SEED_MAX, NULL, "S", "rtl: random reset values (default 1)"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default, and most: all processors"},
+      SF_GROUP("What is printed"),
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};

@@ -53,7 +53,9 @@ sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot)
   if (shot->data.count == 0) return sf_ok();
   shot->view = &shot->data.view[0];
   shot->window = (sf_window){0, 0, shot->view->camera.width, shot->view->camera.height};
-  if (o->backend == SF_BACKEND_FLOAT && studio->model.config.scale != shot->data.scale)
+  if (o->backend != SF_BACKEND_FLOAT) return sf_ok();
+  SF_TRY(sf_space_check(&studio->model.config.space, studio->model_path, &shot->data));
+  if (studio->model.config.scale != shot->data.scale)
     return sf_fail(SF_E_RANGE, "%s: trained at scale %g, %s is read at %g; give --scale %.9g", studio->model_path,
                    (double)studio->model.config.scale, o->data, (double)shot->data.scale,
                    (double)studio->model.config.scale);

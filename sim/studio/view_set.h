@@ -5,6 +5,7 @@
 #include "golden/manifest.h"
 
 #define SF_MANIFEST_NAME "manifest.json"
+#define SF_CONTACT_NAME "contact.png"
 
 typedef struct sf_view_set {
   sf_studio *studio; /* open */
@@ -21,6 +22,10 @@ typedef struct sf_view_set {
  * manifest is written after every view, so an interruption loses one view at most. A manifest of another origin or
  * with other cameras is refused, SF_E_DIFFERENCE, unless it lists no view. crop: width 0 for whole views. */
 sf_status sf_view_set_render(sf_view_set *set, const sf_window *crop);
+
+/* Writes the contact sheet, folder/contact.png, from the pictures that the manifest lists: at least one. path: where it
+ * lies. */
+sf_status sf_view_set_contact(const sf_view_set *set, char path[4096 + 16]);
 
 /* What became of one view. */
 typedef struct sf_verdict {

@@ -31,6 +31,9 @@ void sf_view_set_add_run(const sf_view_set *set, double seconds, cJSON *json)
 
 void sf_view_set_print_run(FILE *out, const sf_view_set *set, double seconds)
 {
+  if (!set->todo) {
+    fprintf(out, "all %d views are there already: nothing was rendered\n", set->manifest.count);
+    return;
+  }
   fprintf(out, "%d view%s rendered by %s in %.2f s, %.0f pixels/s\n", set->rendered, sf_plural((uint64_t)set->rendered),
           sf_backend_names[set->studio->options.backend], seconds, (double)set->pixels / seconds);
-}

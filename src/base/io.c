@@ -4,6 +4,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -84,22 +85,46 @@ static sf_status resolve_target(sf_writer *writer, const char *path)
   return sf_ok();
 }
 
+/* The file aside has one name per target, so that the next save overwrites what a killed program left. The lock ends
+ * with its program. -1: a program that lives is writing there, or the folder cannot hold such a file. */
+static int open_fixed(sf_writer *writer, int folder)
+{
+  struct stat held, there;
+  snprintf(writer->aside, sizeof writer->aside, "%.*s.%s.sf-new", folder, writer->path, writer->path + folder);
+  const int fd = open(writer->aside, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+  if (fd < 0) return -1;
+  if (!flock(fd, LOCK_EX | LOCK_NB) && !fstat(fd, &held) && S_ISREG(held.st_mode) && held.st_nlink == 1 &&
+      !stat(writer->aside, &there) && there.st_dev == held.st_dev && there.st_ino == held.st_ino && !ftruncate(fd, 0))
+    return fd;
+  close(fd);
+  return -1;
+}
+
+static int open_unique(sf_writer *writer, int folder)
+{
+  int fd = -1;
+  for (unsigned i = 0; fd < 0 && i < 100000; i++) {
+    snprintf(writer->aside, sizeof writer->aside, "%.*s.sf-%ld-%u", folder, writer->path, (long)getpid(), i);
+    fd = open(writer->aside, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0 && errno != EEXIST) break;
+  }
+  return fd;
+}
+
 sf_status sf_writer_open(sf_writer *writer, const char *path)
 {
   writer->file = NULL, writer->aside[0] = 0;
   SF_TRY(resolve_target(writer, path));
   const char *slash = strrchr(writer->path, '/');
-  int folder = slash ? (int)(slash - writer->path) + 1 : 0;
-  int fd = -1;
-  for (unsigned i = 0; fd < 0 && i < 100000; i++) {
-    snprintf(writer->aside, sizeof writer->aside, "%.*s.sf-%ld-%u", folder, writer->path, (long)getpid(), i);
-    fd = open(writer->aside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd < 0 && errno != EEXIST) break;
-  }
-  if (fd >= 0) writer->file = fdopen(fd, "wb");
+  const int folder = slash ? (int)(slash - writer->path) + 1 : 0;
+  int fd = open_fixed(writer, folder);
+  if (fd < 0) fd = open_unique(writer, folder);
+  writer->lock = fd < 0 ? -1 : fcntl(fd, F_DUPFD_CLOEXEC, 0);
+  if (writer->lock >= 0) writer->file = fdopen(fd, "wb");
   if (writer->file) return sf_ok();
   sf_status status = sf_fail(SF_E_IO, "cannot write %s: %s", path, strerror(errno));
-  if (fd >= 0) close(fd), unlink(writer->aside);
+  if (fd >= 0) unlink(writer->aside), close(fd);
+  if (writer->lock >= 0) close(writer->lock);
   writer->aside[0] = 0;
   return status;
 }
@@ -136,20 +161,25 @@ sf_status sf_writer_commit(sf_writer *writer)
   if (!error && fsync(fileno(writer->file)) && errno != EINVAL && errno != EROFS) error = errno;
   if (fclose(writer->file) && !error) error = errno;
   writer->file = NULL;
+  /* Still locked: nobody else may begin to write what is renamed here. */
   if (!error && rename(writer->aside, writer->path)) error = errno;
   if (error) {
     sf_writer_abort(writer);
     return sf_fail(SF_E_IO, "cannot write %s: %s", writer->path, strerror(error));
   }
   writer->aside[0] = 0;
+  close(writer->lock);
   sync_folder(writer->path);
   return sf_ok();
 }
 
 void sf_writer_abort(sf_writer *writer)
 {
+  if (writer->aside[0]) {
+    unlink(writer->aside);
+    close(writer->lock);
+  }
   if (writer->file) fclose(writer->file);
-  if (writer->aside[0]) unlink(writer->aside);
   writer->file = NULL, writer->aside[0] = 0;
 }
 

@@ -12,10 +12,12 @@
  * 256 MiB, and devices. */
 sf_status sf_read_file(const char *path, size_t limit, char **data, size_t *size);
 
-/* Write aside (same folder, unique name), then flush, fsync, check, rename: the target is whole or untouched. */
+/* Write aside, in the same folder, then flush, fsync, check, rename: the target is whole or untouched. The file aside
+ * is .NAME.sf-new; while another program writes the same target, it has a name of its own. */
 typedef struct sf_writer {
   FILE *file;
   char path[4096], aside[4096 + 32];
+  int lock; /* keeps others from the file aside */
 } sf_writer;
 sf_status sf_writer_open(sf_writer *writer, const char *path);
 sf_status sf_writer_commit(sf_writer *writer);

@@ -1,8 +1,10 @@
 #include "base/json.h"
 #include "base/io.h"
 #include "base/text.h"
+#include <ctype.h>
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,6 +29,29 @@ static sf_status fail_at(const char *path, const char *text, const char *at, con
   return sf_fail(SF_E_FORMAT, "%s:%d:%d: %s", path, line, column, problem);
 }
 
+/* Python's json and others write what JSON has no word for. */
+static const char *no_word(const char *at, const char *end)
+{
+  static const char *const word[] = {"NaN",       "nan", "-NaN", "-nan", "Infinity",
+                                     "-Infinity", "inf", "-inf", "Inf",  "-Inf"};
+  for (size_t i = 0; i < sizeof word / sizeof *word; i++) {
+    const size_t n = strlen(word[i]);
+    if ((size_t)(end - at) >= n && !memcmp(at, word[i], n) && (at + n == end || !isalnum((unsigned char)at[n])))
+      return word[i];
+  }
+  return NULL;
+}
+
+static sf_status malformed(const char *path, const char *text, const char *at, const char *end)
+{
+  char problem[100];
+  if (at == end) return fail_at(path, text, at, "malformed JSON: the file ends early");
+  const char *word = no_word(at, end);
+  if (!word) return fail_at(path, text, at, "malformed JSON");
+  snprintf(problem, sizeof problem, "malformed JSON: %s is not JSON: a number must stand here", word);
+  return fail_at(path, text, at, problem);
+}
+
 static sf_status parse(const char *path, const char *text, size_t size, cJSON **json)
 {
   const char *zero = memchr(text, 0, size), *end = text + size, *at = NULL;
@@ -35,7 +60,7 @@ static sf_status parse(const char *path, const char *text, size_t size, cJSON **
   if (blank == size) return fail_at(path, text, end, "malformed JSON: the file is empty");
   *json = cJSON_ParseWithLengthOpts(text, size + 1, &at, 0);
   if (!at || at < text || at > end) at = end;
-  if (!*json) return fail_at(path, text, at, at == end ? "malformed JSON: the file ends early" : "malformed JSON");
+  if (!*json) return malformed(path, text, at, end);
   at += strspn(at, " \t\r\n");
   if (at == end) return sf_ok();
   cJSON_Delete(*json);

@@ -32,8 +32,8 @@ typedef enum {
   SF_BUDGET_BLOCKS
 } sf_budget_id;
 
-/* `bound` is the one of the input with the largest error: some depend on the input (the samples before, the value
- * itself). `ratio` is the largest error over its own bound; above 1 it refutes the derivation. */
+/* `measured` is the largest error, `bound` the one of its input: some depend on the input (the samples before, the
+ * value itself). `ratio` is the most that any input's error has of its own bound; above 1 it refutes the derivation. */
 typedef struct sf_budget_row {
   const char *block, *unit;
   const char *bites; /* where it bites, and which width of arch.def buys less of it */

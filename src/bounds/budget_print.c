@@ -2,13 +2,28 @@
 #include <inttypes.h>
 #include <math.h>
 
+static double share(double measured, double bound)
+{
+  return measured > 0 ? measured / bound : 0;
+}
+
+/* A note for every table with both columns. */
+static void print_note(FILE *out)
+{
+  fprintf(out, "\nshare: the largest error over its bound. nearest: the most that any input has of its own bound.\n");
+}
+
 void sf_budget_print(FILE *out, const sf_budget_row *row, int rows)
 {
-  fprintf(out, "| block | unit | bound | measured | of its bound | inputs | where it bites |\n");
-  fprintf(out, "|---|---|---|---|---|---|---|\n");
-  for (int i = 0; i < rows; i++)
-    fprintf(out, "| %s | %s | %.4g | %.4g | %.0f %% | %s %" PRIu64 " | %s |\n", row[i].block, row[i].unit, row[i].bound,
-            row[i].measured, 100 * row[i].ratio, row[i].exhaustive ? "all" : "random", row[i].inputs, row[i].bites);
+  fprintf(out, "%-31s %-17s %8s %9s %6s %8s  %-15s %s\n", "block", "unit", "error", "bound", "share", "nearest",
+          "inputs", "where it bites");
+  for (int i = 0; i < rows; i++) {
+    char inputs[40];
+    snprintf(inputs, sizeof inputs, "%s %" PRIu64, row[i].exhaustive ? "all" : "random", row[i].inputs);
+    fprintf(out, "%-31s %-17s %8.4g %9.4g %4.0f %% %6.0f %%  %-15s %s\n", row[i].block, row[i].unit, row[i].measured,
+            row[i].bound, 100 * share(row[i].measured, row[i].bound), 100 * row[i].ratio, inputs, row[i].bites);
+  }
+  print_note(out);
 }
 
 cJSON *sf_budget_json(const sf_budget_row *row, int rows)
@@ -20,7 +35,8 @@ cJSON *sf_budget_json(const sf_budget_row *row, int rows)
     cJSON_AddStringToObject(item, "unit", row[i].unit);
     cJSON_AddNumberToObject(item, "bound", row[i].bound);
     cJSON_AddNumberToObject(item, "measured", row[i].measured);
-    cJSON_AddNumberToObject(item, "of_its_bound", row[i].ratio);
+    cJSON_AddNumberToObject(item, "of_its_bound", share(row[i].measured, row[i].bound));
+    cJSON_AddNumberToObject(item, "nearest", row[i].ratio);
     cJSON_AddBoolToObject(item, "exhaustive", row[i].exhaustive);
     sf_json_add_u64(item, "inputs", row[i].inputs);
     cJSON_AddStringToObject(item, "bites", row[i].bites);
@@ -36,21 +52,29 @@ static double percent(uint64_t part, uint64_t whole)
 
 static const int spiking[] = {0, 2, 3}; /* D1, C1, C2 */
 
+static void print_currents(FILE *out, const sf_current_row *row)
+{
+  fprintf(out, "Currents, with weights and inputs rounded: errors in LSB\n\n%-6s %8s %9s %6s %8s %8s %12s\n", "layer",
+          "error", "bound", "share", "nearest", "RMS", "currents");
+  for (int l = 0; l < SF_LAYERS; l++)
+    fprintf(out, "%-6s %8.4g %9.4g %4.0f %% %6.0f %% %8.3g %12" PRIu64 "\n", fx_layer_name(l), row[l].measured,
+            row[l].bound, 100 * share(row[l].measured, row[l].bound), 100 * row[l].ratio, row[l].rms, row[l].currents);
+  print_note(out);
+}
+
 void sf_picture_budget_print(FILE *out, const sf_picture_budget *b)
 {
-  fprintf(out, "| currents: weights and inputs rounded | bound, LSB | measured | of its bound | RMS | currents |\n");
-  fprintf(out, "|---|---|---|---|---|---|\n");
-  for (int l = 0; l < SF_LAYERS; l++)
-    fprintf(out, "| %s | %.4g | %.4g | %.0f %% | %.3g | %" PRIu64 " |\n", fx_layer_name(l), b->current[l].bound,
-            b->current[l].measured, 100 * b->current[l].ratio, b->current[l].rms, b->current[l].currents);
-  fprintf(out, "\n| in double precision | dB to fixed | dB to photograph | gain, dB | flips D1 | C1 | C2 |\n");
-  fprintf(out, "|---|---|---|---|---|---|---|\n");
+  print_currents(out, b->current);
+  fprintf(out,
+          "\nOne block at a time in double precision: dB to the fixed core's picture, dB to the photograph, gain in\n"
+          "dB, spikes that differ in each layer\n\n%-40s %8s %8s %7s %9s %9s %9s\n",
+          "block", "fixed", "photo", "gain", "D1", "C1", "C2");
   for (int i = 0; i < SF_EXACT_ROWS; i++) {
     const sf_exact_row *r = &b->row[i];
-    fprintf(out, "| %s | ", r->block);
-    fprintf(out, isinf(r->psnr) ? "equal" : "%.2f", r->psnr);
-    fprintf(out, " | %.3f | %+.3f |", r->psnr_truth, r->psnr_truth - b->row[0].psnr_truth);
-    for (int s = 0; s < 3; s++) fprintf(out, " %.3f %% |", percent(r->flips[spiking[s]], r->decisions[spiking[s]]));
+    char fixed[24] = "equal";
+    if (!isinf(r->psnr)) snprintf(fixed, sizeof fixed, "%.2f", r->psnr);
+    fprintf(out, "%-40s %8s %8.3f %+7.3f", r->block, fixed, r->psnr_truth, r->psnr_truth - b->row[0].psnr_truth);
+    for (int s = 0; s < 3; s++) fprintf(out, " %7.3f %%", percent(r->flips[spiking[s]], r->decisions[spiking[s]]));
     fprintf(out, "\n");
   }
 }
@@ -74,7 +98,8 @@ cJSON *sf_picture_budget_json(const sf_picture_budget *b)
     cJSON_AddStringToObject(item, "layer", fx_layer_name(l));
     cJSON_AddNumberToObject(item, "bound", b->current[l].bound);
     cJSON_AddNumberToObject(item, "measured", b->current[l].measured);
-    cJSON_AddNumberToObject(item, "of_its_bound", b->current[l].ratio);
+    cJSON_AddNumberToObject(item, "of_its_bound", share(b->current[l].measured, b->current[l].bound));
+    cJSON_AddNumberToObject(item, "nearest", b->current[l].ratio);
     cJSON_AddNumberToObject(item, "rms", b->current[l].rms);
     cJSON_AddItemToArray(currents, item);
   }

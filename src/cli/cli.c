@@ -13,39 +13,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* ---- help ---- */
-
-static void print_option(char letter, const char *name, const char *argument, const char *help)
-{
-  char left[80];
-  int n =
-      letter ? snprintf(left, sizeof left, "  -%c, %s", letter, name) : snprintf(left, sizeof left, "      %s", name);
-  if (argument && n < (int)sizeof left) n += snprintf(left + n, sizeof left - (size_t)n, " %s", argument);
-  if (n <= 27)
-    printf("%-28s%s\n", left, help);
-  else
-    printf("%s\n%28s%s\n", left, "", help);
-}
-
-static void print_help(const sf_cli *cli)
-{
-  printf("Usage: %s\n", cli->usage ? cli->usage : cli->program);
-  if (cli->summary) printf("\n%s\n", cli->summary);
-  printf("\nOptions:\n");
-  for (const sf_option *o = cli->options; o && o->name; o++) {
-    const char *argument = o->type == SF_ARG_FLAG ? NULL
-                           : o->argument          ? o->argument
-                           : o->choices           ? o->choices
-                                                  : "VALUE";
-    print_option(o->letter, o->name, argument, o->help ? o->help : "");
-    if (o->type == SF_ARG_CHOICE && o->argument && o->choices) printf("%28s%s\n", "", o->choices);
-  }
-  print_option('h', "--help", NULL, "show this text");
-  print_option(0, "--version", NULL, "show the version");
-  if (cli->examples)
-    printf("\nExamples:\n%s%s", cli->examples, cli->examples[strlen(cli->examples) - 1] == '\n' ? "" : "\n");
-}
-
 /* ---- values ---- */
 
 /* The whole text must be one number: strto* alone would take leading blanks and trailing text. */
@@ -141,6 +108,7 @@ static sf_status set_value(const sf_option *o, const char *text)
     *(const char **)o->value = text;
     return sf_ok();
   case SF_ARG_FLAG:
+  case SF_ARG_GROUP:
     break;
   }
   *(bool *)o->value = true;
@@ -235,7 +203,7 @@ static sf_status take_option(const sf_cli *cli, int argc, char **argv, int *at)
   const char *word = argv[*at], *value;
   const sf_option *o = find_option(cli, word, &value);
   if (!o) {
-    if (!strcmp(word, "--help") || !strcmp(word, "-h")) answer_and_exit(cli, print_help);
+    if (!strcmp(word, "--help") || !strcmp(word, "-h")) answer_and_exit(cli, sf_cli_help);
     if (!strcmp(word, "--version")) answer_and_exit(cli, print_version);
     if (!strcmp(word, "--completion")) answer_and_exit(cli, sf_cli_print_completion);
     return sf_fail(SF_E_USAGE, "unknown option %.80s", word);

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 /* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or
- * what the program itself opens before it works. */
+ * what the program itself opens before it works. GROUP: no option but a heading of --help, for those behind it. */
 typedef enum {
   SF_ARG_FLAG,
   SF_ARG_INT,
@@ -15,7 +15,8 @@ typedef enum {
   SF_ARG_INPUT,
   SF_ARG_OUTPUT,
   SF_ARG_PLACE,
-  SF_ARG_CHOICE
+  SF_ARG_CHOICE,
+  SF_ARG_GROUP
 } sf_arg_type;
 typedef struct sf_option {
   const char *name; /* "--beta" */
@@ -24,13 +25,18 @@ typedef struct sf_option {
   void *value;                 /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
   double min, max;             /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
   const char *choices;         /* "hybrid|decay|no-decay" */
-  const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)" */
+  const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)"; or "weight of ...\t5e-7\t1e-6": what
+                                  it is without being given, in the columns of sf_cli */
 } sf_option;
+/* clang-format off */
+#define SF_GROUP(title) {title, 0, SF_ARG_GROUP, NULL, 0, 0, NULL, NULL, NULL}
+/* clang-format on */
 typedef struct sf_cli {
   const char *program, *usage, *summary, *examples; /* shown by --help */
   const sf_option *options;                         /* ends with name == NULL */
   int min_positional, max_positional;
-  bool words; /* the positionals are words, not files or folders that are read */
+  bool words;          /* the positionals are words, not files or folders that are read */
+  const char *columns; /* headings of the defaults of groups that have such: "\tingp\ttensorf"; or NULL */
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and exit 0,
@@ -41,6 +47,8 @@ sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **po
 
 /* The completion script for bash. */
 void sf_cli_print_completion(const sf_cli *cli);
+/* The text of --help. */
+void sf_cli_help(const sf_cli *cli);
 
 /* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
  * parsed. */

@@ -71,7 +71,7 @@ cJSON *sf_record_make(const sf_option *options, const char *const *apart)
   cJSON *record = cJSON_CreateObject();
   for (const sf_option *o = options; record && o->name; o++) {
     char key[80], text[TEXT];
-    if (is_apart(apart, o->name)) continue;
+    if (o->type == SF_ARG_GROUP || is_apart(apart, o->name)) continue;
     key_of(o, key);
     write_value(o, text);
     if (cJSON_AddStringToObject(record, key, text)) continue;
@@ -86,6 +86,7 @@ sf_status sf_record_words(const sf_tensors *set, const sf_option *options, const
 {
   for (const sf_option *o = options; o->name; o++) {
     char key[80];
+    if (o->type == SF_ARG_GROUP) continue;
     key_of(o, key);
     const char *value = is_apart(apart, o->name) ? NULL : sf_tensors_meta(set, key);
     if (!value || !*value) continue;

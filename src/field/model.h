@@ -29,6 +29,7 @@ typedef struct sf_config {
   float dt_gamma;     /* steps are distance * dt_gamma, at least the shortest; 0: all are the shortest. 0..1/8 */
   int32_t backbone;   /* sf_backbone_kind */
   sf_tensorf tensorf; /* the planes; levels .. finest_res, lattice, bound and dt_gamma are the hash grid's */
+  sf_space space;     /* of the data that it learned from */
 } sf_config;
 
 /* Occupancy grids, one inside the other: cascade c covers [-2^c, 2^c]^3, the last one the box. */

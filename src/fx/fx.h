@@ -163,6 +163,7 @@ typedef struct fx_steps {
 typedef struct fx_units {
   double to_box_scale, to_box_offset[3];
   double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
+  double data_scale, data_bound, data_ndc; /* sf_space of that data: without --scale, proposed, 0 or 1; 0: unknown */
   double stretch[3];
   double near, far; /* rays begin and end at these distances from their origins, model units */
   double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
@@ -366,7 +367,7 @@ sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char
 sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 
 /* .snn files: safetensors with integer tensors and metadata (format version, scales, t_r). What is 0 in most scenes
- * (the biases, log2_bound, growing steps, model_scale) is in the metadata only where it is not 0. */
+ * (the biases, log2_bound, growing steps, model_scale, data_*) is in the metadata only where it is not 0. */
 sf_status fx_scene_load(fx_scene *scene, const char *path);
 sf_status fx_scene_load_memory(fx_scene *scene, const void *data, size_t size,
                                const char *name);                 /* a file's contents */

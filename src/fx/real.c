@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS, TENSORF_REALS = 5 };
+enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS, TENSORF_REALS = 5, OPTIONAL = 4 };
 
 typedef struct real_field {
   const char *key;
@@ -37,7 +37,8 @@ static const real_field tensorf_reals[TENSORF_REALS] = {
 };
 
 /* Not in the file when 0. */
-static const real_field optional = REAL(model_scale, true);
+static const real_field optional[OPTIONAL] = {REAL(model_scale, true), REAL(data_scale, true), REAL(data_bound, true),
+                                              REAL(data_ndc, true)};
 
 /* Those of the scene's backbone. */
 static int reals_of(const fx_scene *scene)
@@ -74,7 +75,8 @@ static void write_real(cJSON *metadata, const fx_scene *scene, const real_field 
 void fx_reals_write(cJSON *metadata, const fx_scene *scene)
 {
   for (int i = 0; i < reals_of(scene); i++) write_real(metadata, scene, real(i));
-  if (*field_of(scene, &optional) != 0) write_real(metadata, scene, &optional);
+  for (const real_field *o = optional; o < optional + OPTIONAL; o++)
+    if (*field_of(scene, o) != 0) write_real(metadata, scene, o);
 }
 
 static sf_status read_real(const cJSON *metadata, fx_scene *scene, const real_field *field, const char *path)
@@ -91,9 +93,10 @@ static sf_status read_real(const cJSON *metadata, fx_scene *scene, const real_fi
 sf_status fx_reals_read(const cJSON *metadata, fx_scene *scene, const char *path)
 {
   for (int i = 0; i < reals_of(scene); i++) SF_TRY(read_real(metadata, scene, real(i), path));
-  if (cJSON_HasObjectItem(metadata, optional.key)) {
-    SF_TRY(read_real(metadata, scene, &optional, path));
-    SF_TRY(check_real(scene, &optional, path));
+  for (const real_field *o = optional; o < optional + OPTIONAL; o++) {
+    if (!cJSON_HasObjectItem(metadata, o->key)) continue;
+    SF_TRY(read_real(metadata, scene, o, path));
+    SF_TRY(check_real(scene, o, path));
   }
   return fx_reals_check(scene, path);
 }
@@ -108,7 +111,8 @@ static bool is_direction_lsb(double value)
 sf_status fx_reals_check(const fx_scene *scene, const char *path)
 {
   for (int i = 0; i < reals_of(scene); i++) SF_TRY(check_real(scene, real(i), path));
-  if (*field_of(scene, &optional) != 0) SF_TRY(check_real(scene, &optional, path));
+  for (const real_field *o = optional; o < optional + OPTIONAL; o++)
+    if (*field_of(scene, o) != 0) SF_TRY(check_real(scene, o, path));
   if (!is_direction_lsb(scene->units.dir_scale))
     return sf_fail(SF_E_RANGE, "%s: metadata 'dir_scale' is %g, expected a power of two, 2^-%d to 1", path,
                    scene->units.dir_scale, FX_DIR_FRAC_MAX);

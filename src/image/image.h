@@ -24,6 +24,12 @@ sf_status sf_png_encode(const uint8_t *pixel, int width, int height, const uint8
 sf_status sf_image_downscale(sf_image *image, int factor, const char *name);
 void sf_image_free(sf_image *image);
 
+/* Words on a picture, from their top left corner; what lies outside is left out. A dot of a character is size x size
+ * pixels, a character 6 dots wide and 8 high. Others than ASCII are shown as '?'. */
+enum { SF_TEXT_ADVANCE = 6, SF_TEXT_HEIGHT = 8 };
+void sf_image_text(sf_image *image, int x, int y, int size, const uint8_t colour[3], const char *text);
+int sf_image_text_width(const char *text, int size); /* pixels */
+
 /* a, b: [n] of any range with peak 1. */
 double sf_psnr(const float *a, const float *b, size_t n);
 /* Mean SSIM, Wang et al. 2004: 11x11 Gaussian, sigma 1.5, data range 1, valid windows only, mean over channels.

@@ -104,7 +104,8 @@ int64_t sf_grid_level_entries(const fx_grid *grid, int level);
 int64_t sf_grid_zero_unread(fx_scene *scene);
 
 /* sf_dataset_load at the scale that the scene was trained at; where the scene does not tell, as the options say.
- * Options with another scale are refused: SF_E_RANGE. name: the scene's file, for the message. */
+ * Options with another scale are refused, and another scene's data (sf_space_check): SF_E_RANGE. Of a scene that does
+ * not say what data it learned from, another scale or bound is a warning. name: the scene's file, for messages. */
 sf_status sf_fx_dataset_load(sf_dataset *data, const fx_scene *scene, const char *name, const char *dir,
                              const char *split, const sf_dataset_options *options);
 /* A world ray (sf_camera_ray already in model units) to box units and integer spherical harmonics. Non-finite input

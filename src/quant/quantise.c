@@ -118,6 +118,8 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->trans_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
   for (int o = 0; o < 3; o++) scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
   scene->units.model_scale = (double)model->config.scale;
+  scene->units.data_scale = (double)model->config.space.scale;
+  scene->units.data_bound = model->config.space.bound, scene->units.data_ndc = model->config.space.ndc;
 }
 
 static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,

@@ -101,5 +101,4 @@ bool sf_forward_facing(const sf_capture *capture);
 
 /* The views of the split, pictures loaded in parallel. Frames are placed. */
 sf_status sf_views_load(sf_dataset *data, const sf_capture *capture, const sf_dataset_options *options);
-sf_status sf_warn(sf_dataset *data, const char *format, ...) __attribute__((format(printf, 2, 3)));
 #endif

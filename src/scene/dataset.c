@@ -143,6 +143,30 @@ sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test)
                  test->ndc ? "NDC" : "no NDC", train->ndc ? "NDC" : "none");
 }
 
+sf_space sf_dataset_space(const sf_dataset *data)
+{
+  return (sf_space){.scale = data->own_scale, .bound = data->bound, .ndc = data->ndc};
+}
+
+static bool unlike(float a, float b)
+{
+  return !(fabsf(a - b) <= 0.01f * fmaxf(a, b));
+}
+
+sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dataset *data)
+{
+  const sf_space here = sf_dataset_space(data);
+  if (!(learned->scale > 0)) return sf_ok();
+  if (learned->ndc != here.ndc)
+    return sf_fail(SF_E_RANGE, "%s: learned from data %s NDC rays, %s: %s NDC: this is another scene's data", name,
+                   learned->ndc ? "with" : "without", data->list, here.ndc ? "with" : "without");
+  if (!unlike(learned->scale, here.scale) && learned->bound == here.bound) return sf_ok();
+  return sf_fail(SF_E_RANGE,
+                 "%s: learned from data of scale %.4g and bound %d, %s: scale %.4g and bound %d: this is another "
+                 "scene's data",
+                 name, (double)learned->scale, learned->bound, data->list, (double)here.scale, here.bound);
+}
+
 void sf_dataset_free(sf_dataset *data)
 {
   for (int i = 0; data->view && i < data->count; i++) sf_image_free(&data->view[i].image);

@@ -177,6 +177,12 @@ static int ascending(const void *a, const void *b)
 
 /* ---- the ways to place ---- */
 
+static void set_scale(sf_dataset *data, const sf_dataset_options *options, double own)
+{
+  data->own_scale = (float)own;
+  data->scale = options->scale > 0 ? options->scale : data->own_scale;
+}
+
 /* NeRF's recentring, its scale and its NDC: what every view sees lies in [-1, 1]^3. */
 static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options *options)
 {
@@ -205,7 +211,7 @@ static void place_ndc(sf_dataset *data, sf_capture *c, const sf_dataset_options 
       most = fmax(most, (double)data->ndc_focal[i] * fabs(d[i] / d[2]));
     }
   }
-  data->scale = options->scale > 0 ? options->scale : (float)(1 / most);
+  set_scale(data, options, 1 / most);
 }
 
 /* instant-ngp's own words: the middle of its unit cube is the origin, its box the scene box. */
@@ -213,7 +219,7 @@ static void place_cube(sf_dataset *data, sf_capture *c, const sf_dataset_options
 {
   const double grow = c->aabb_scale > 1 ? 1 : 2; /* torch-ngp's units: the unit cube is [-0.5, 0.5]^3 in the box */
   data->bound = c->aabb_scale > 1 ? c->aabb_scale / 2 : 1;
-  data->scale = options->scale > 0 ? options->scale : (float)(grow * c->box_scale);
+  set_scale(data, options, grow * c->box_scale);
   for (int i = 0; i < 3; i++) data->offset[i] = (float)(data->scale / c->box_scale * (c->box_offset[i] - 0.5));
   move_all(data, c, &stay);
 }
@@ -261,7 +267,7 @@ static sf_status place_orbit(sf_dataset *data, sf_capture *c, const sf_dataset_o
   /* An object on nothing fills the box as far as the middle one of its views sees it. */
   double scale = sight->transparent ? 1 / reach[n / 2] : ORBIT / mean;
   if (!(scale < 1e9) || !(scale > 1e-9)) scale = 1; /* all from one point */
-  data->scale = options->scale > 0 ? options->scale : (float)scale;
+  set_scale(data, options, scale);
   data->bound = sight->transparent ? 1 : find_bound(c, (double)data->scale, farthest);
   free(reach);
   return sf_ok();
@@ -365,7 +371,7 @@ sf_status sf_place(sf_dataset *data, sf_capture *capture, const sf_dataset_optio
     return sf_ok();
   }
   if (capture->layout == SF_LAYOUT_BLENDER) {
-    data->scale = options->scale > 0 ? options->scale : (float)BLENDER_SCALE;
+    set_scale(data, options, BLENDER_SCALE);
     move_all(data, capture, &stay);
   } else if (capture->placed) {
     place_cube(data, capture, options);

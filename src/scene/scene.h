@@ -37,6 +37,7 @@ typedef struct sf_dataset {
   int total;       /* in the split, loaded or not */
   int downscale;   /* that was asked for; where the layout has one size, 1 for 0 */
   float scale;     /* model = world * scale + offset, world as the layout's reader turns it */
+  float own_scale; /* what scale would be if the options named none */
   float offset[3]; /* of the origin */
   int32_t bound;   /* proposed half edge of the scene box for INGP, model units: 1, 2, 4, ... 64 */
   /* Forward-facing: model space is NDC (Mildenhall et al. 2020, appendix C) times `scale`; to_world stays in units
@@ -69,17 +70,31 @@ typedef struct sf_dataset_options {
  * a split missing: a warning, total counts those that are there. */
 sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, const sf_dataset_options *options);
 void sf_dataset_free(sf_dataset *data);
+/* In which space the views of a data set lie: what a model keeps of the data that it learned from. */
+typedef struct sf_space {
+  float scale;   /* own_scale; 0: nothing is known */
+  int32_t bound; /* proposed by the data */
+  int32_t ndc;   /* 1: rays are in NDC */
+} sf_space;
+sf_space sf_dataset_space(const sf_dataset *data);
+/* SF_E_RANGE, which names what differs, where views of `data` cannot be of the scene that `name` learned. Scales may
+ * differ by 1 %: they are computed from poses. `learned` without a scale fits everything. */
+sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dataset *data);
+
 /* SF_E_FORMAT unless both splits lie in the same coordinates and box: what one was learned from shows in the other. */
 sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test);
 /* "PROGRAM: warning: ..." for each, but for those of the data that was told before (NULL: none). */
 void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data, const sf_dataset *told);
+sf_status sf_warn(sf_dataset *data, const char *format, ...) __attribute__((format(printf, 2, 3))); /* adds one */
 bool sf_dataset_has_warning(const sf_dataset *data, const char *text);
 
 /* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
  * are not needed any more. */
 sf_status sf_dataset_survey(sf_dataset *data);
-/* Picture of 2 * size x size pixels: from above (x, y) and from the side (x, z). Views of the training split are blue,
- * others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Free the image. */
+/* Picture of 2 * size x (size + SF_PLAN_FOOT) pixels: from above (x, y) and from the side (x, z). Views of the training
+ * split are blue, others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Words
+ * name the panels, and in the foot the colours and a scale. Free the image. */
+enum { SF_PLAN_FOOT = 40 };
 sf_status sf_plan_draw(const sf_dataset *train, const sf_dataset *test, int size, sf_image *image);
 
 /* Ray through pixel position (px, py), (0.5, 0.5) = centre of the first pixel. Unit direction. */

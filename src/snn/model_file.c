@@ -29,7 +29,7 @@ static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value
   return sf_ok();
 }
 
-enum { CONFIG_NUMBERS = 14 }; /* of every model */
+enum { CONFIG_NUMBERS = 14 /* of every model */, SPACE_NUMBERS = 3 };
 
 static void config_numbers(sf_config *c, sf_number f[CONFIG_NUMBERS])
 {
@@ -64,6 +64,26 @@ static sf_status load_numbers(const sf_tensors *set, const sf_number *f, int cou
   return sf_ok();
 }
 
+static void space_numbers(sf_config *c, sf_number f[SPACE_NUMBERS])
+{
+  const sf_number table[SPACE_NUMBERS] = {{"data_scale", .number = &c->space.scale},
+                                          {"data_bound", .integer = &c->space.bound},
+                                          {"data_ndc", .integer = &c->space.ndc}};
+  memcpy(f, table, sizeof table);
+}
+
+/* Of the data that it learned from: files that do not say are read, too. */
+static sf_status load_space(const sf_tensors *set, sf_config *c)
+{
+  sf_number number_of[SPACE_NUMBERS];
+  space_numbers(c, number_of);
+  if (!sf_tensors_meta(set, number_of[0].key)) return sf_ok();
+  SF_TRY(load_numbers(set, number_of, SPACE_NUMBERS));
+  if (c->space.scale > 0 && c->space.bound > 0 && (c->space.ndc == 0 || c->space.ndc == 1)) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: metadata: data_scale %g, data_bound %d, data_ndc %d: expected > 0, > 0, 0 or 1",
+                 set->path, (double)c->space.scale, c->space.bound, c->space.ndc);
+}
+
 static sf_status load_config(const sf_tensors *set, sf_config *c)
 {
   const char *format = sf_tensors_meta(set, "format"), *version = sf_tensors_meta(set, "version");
@@ -88,6 +108,7 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
     SF_TRY(meta_number(set, "dt_gamma", &number));
     c->dt_gamma = (float)number;
   }
+  SF_TRY(load_space(set, c));
   sf_status status = sf_config_check(c);
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
 }
@@ -120,6 +141,9 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   if (m->scales.weight_bits) put_number(meta, "h_shift", SF_H_SHIFT);
   if (c.backbone) put_number(meta, "backbone", c.backbone);
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
+  sf_number space[SPACE_NUMBERS];
+  space_numbers(&c, space);
+  if (c.space.scale > 0) put_numbers(meta, space, SPACE_NUMBERS);
 }
 
 int sf_model_tensors(const sf_model *m, sf_tensor *list)

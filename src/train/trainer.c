@@ -132,6 +132,7 @@ static sf_status create(sf_trainer *t, const char *resume)
   else
     SF_TRY(t->options.start ? copy_model(&t->model, t->options.start) : sf_model_create(&t->model, &t->options.config));
   if (resume) SF_TRY(check_resumed(t, resume));
+  t->model.config.space = sf_dataset_space(t->data);
   if (sf_tuning(t)) SF_TRY(sf_tuning_start(t));
   const sf_config *c = &t->model.config;
   const size_t bytes = t->model.size * sizeof(float);

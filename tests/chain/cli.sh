@@ -178,6 +178,7 @@ number sf_train --beta -1 2 nan NaN inf -inf 1e999 x ''
 number sf_train --steps 0 9 nan
 number sf_train --stage1 -1 nan 3000000000
 number sf_train --minutes -1 nan
+for minutes in --minutes\ 0 -m0; do usage "--minutes 0 leaves no time to learn" sf_train d -o out $minutes; done
 number sf_train --threads -1 nan
 number sf_train --hidden 0 129
 usage hidden sf_train d -o out --hidden 17
@@ -568,7 +569,7 @@ full full.out sf_train "${train[@]}" -o full.out --log log.out
 # Checkpoints along the way may fail, the model may not: 3 of 4 iterations are followed by one.
 (ulimit -f 1; exec timeout -k 5 60 "$BIN/sf_train" "${train[@]}" -o full.out --log log.out --checkpoint-minutes 0 >stdout.txt 2>err </dev/null)
 status=$?
-if [ "$(grep -c 'warning: cannot write full.out.*the run goes on' err)" -eq 3 ]; then passed=$((passed + 1)); else fail "full disk" "no 3 warnings"; fi
+if [ "$(grep -c 'warning: cannot write full.out.*the run goes on' err)" -eq 1 ]; then passed=$((passed + 1)); else fail "full disk" "not told once"; fi
 sed -i '/warning/d' err
 judge "full disk: checkpoints" sf_train 1 full.out
 (ulimit -f 1; exec timeout -k 5 60 "$BIN/sf_scene" simple -o fullscene --size 64 --train 1 --test 1 >stdout.txt 2>err </dev/null)

@@ -38,7 +38,8 @@ OMP_NUM_THREADS=1 expect 0 "4 views rendered by fixed" s1.snn d --all -o one
 OMP_NUM_THREADS=2 expect 0 "4 views rendered by fixed" s1.snn d --all -o two
 check "threads change the set" diff -r one two
 check "manifest lists all views" grep -q '"complete":.*true' one/manifest.json
-check "five files" [ "$(ls one | wc -l)" -eq 5 ]
+check "six files" [ "$(ls one | wc -l)" -eq 6 ]
+check "the contact sheet is written" grep -q "wrote two/manifest.json and two/contact.png" out
 "$BIN/sim_render" s1.snn d --view 2 -o alone.exr >/dev/null
 check "a view alone is the view of the set" cmp -s alone.exr one/view_0002.exr
 expect 0 "OK: 4 of 4 views" s1.snn d --verify one/manifest.json
@@ -61,12 +62,12 @@ expect 1 "float pictures may differ" s1.snn d --verify float/manifest.json
 # ---- again, and interrupted ----
 
 cp one/manifest.json before.json
-expect 0 "0 views rendered" s1.snn d --all -o one
-expect 0 "0 views rendered" s1.snn d --all -o one --downscale 1
+expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one
+expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one --downscale 1
 cp one/view_0001.exr one/view_0003.exr
-expect 0 "1 views rendered" s1.snn d --all -o one
+expect 0 "1 view rendered" s1.snn d --all -o one
 rm one/view_0000.exr
-expect 0 "1 views rendered" s1.snn d --all -o one
+expect 0 "1 view rendered" s1.snn d --all -o one
 check "what was mended is what it was" diff -r one two
 expect 1 "one/manifest.json belongs to another set: scene_sha256 is" s2.snn d --all -o one
 expect 1 "one/manifest.json belongs to another set: t_r is" s1.snn d --all -o one --steps 1
@@ -111,25 +112,29 @@ expect 1 "flipped.snn" flipped.snn d --verify two/manifest.json
 expect 1 "made from the scene with SHA-256" s2.snn d --verify two/manifest.json
 cp -r two forged # the manifest claims the other scene: the pictures tell, to the pixel
 sed -i "s/$(sha256sum <s1.snn | cut -c1-64)/$(sha256sum <s2.snn | cut -c1-64)/" forged/manifest.json
-expect 1 "4 of 4 views differ; view test/r_0: forged/view_0000.exr: plane " s2.snn d --verify forged/manifest.json
-check "the pixel is named" grep -qE 'pixel \([0-9]+, [0-9]+\) is [0-9]+, here it is [0-9]+' err
+expect 1 "4 of 4 views differ" s2.snn d --verify forged/manifest.json
+check "the view is named" grep -q "^view 0 test/r_0: DIFFERS: forged/view_0000.exr: plane " out
+check "the pixel is named" grep -qE 'pixel \([0-9]+, [0-9]+\) is [0-9]+, here it is [0-9]+' out
+check "a difference is told once" [ "$(cat out err | grep -c 'forged/view_0000.exr: plane ')" -eq 1 ]
+expect 1 "4 of 4 views differ; view test/r_0: forged/view_0000.exr: plane " s2.snn d --verify forged/manifest.json --json
 rm forged/*.exr
-expect 1 "1 of 1 views differ; view test/r_1: plane " s2.snn d --verify forged/manifest.json --view 1
-check "without pictures, the hash is named" grep -qE 'plane [a-zA-Z.]+: SHA-256 is [0-9a-f]{64}, here it is' err
+expect 1 "1 of 1 views differ" s2.snn d --verify forged/manifest.json --view 1
+check "without pictures, the hash is named" grep -qE '^view 1 test/r_1: DIFFERS: plane [a-zA-Z.]+: SHA-256 is [0-9a-f]{64}, here it is' out
 
 cp -r two spoilt # a picture with other pixels, a picture cut short, a picture packed otherwise
 "$BIN/sim_render" s1.snn d --view 1 --steps 1 -o spoilt/view_0001.exr >/dev/null
 truncate -s 900 spoilt/view_0002.exr
 mkdir e && cp -r d/test e && cp d/transforms_test.json e/transforms_train.json
 cp d/transforms_test.json e && "$BIN/sim_render" s1.snn e --split train --view 3 -o spoilt/view_0003.exr >/dev/null
-expect 1 "2 of 4 views differ; view test/r_1: spoilt/view_0001.exr: plane " s1.snn d --verify spoilt/manifest.json
+expect 1 "2 of 4 views differ" s1.snn d --verify spoilt/manifest.json
 check "the renderings are right" [ "$(grep -c '^view . test/r_.: OK$' out)" -eq 4 ]
 check "the pixel of the file is named" grep -q 'its file DIFFERS: spoilt/view_0001.exr: plane .*pixel (' out
 check "the cut file is named" grep -q 'its file DIFFERS: spoilt/view_0002.exr' out
 check "other bytes, same planes" grep -q 'note: view_0003.exr is not the file of the manifest' out
 expect 0 "OK: 1 of 4 views" s1.snn d --verify spoilt/manifest.json --view 3
 
-expect 1 "1 of 4 views differ; view test/r_0: camera_sha256 is" s1.snn turned --verify bare/manifest.json
+expect 1 "1 of 4 views differ" s1.snn turned --verify bare/manifest.json
+check "the camera is named" grep -q "^view 0 test/r_0: DIFFERS: camera_sha256 is" out
 cp -r d grey && cp d/test/r_0.png grey/test/r_1.png
 expect 0 "note: PSNR" s1.snn grey --verify bare/manifest.json --view 1
 "$BIN/sf_scene" simple -o fewer --size 12 --train 3 --test 3 >/dev/null

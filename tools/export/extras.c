@@ -86,7 +86,7 @@ void export_extras_print(const export_extras *e, const export_options *o)
     printf("%s: spikes.csv, potentials.csv, samples.csv: %llu spikes in %llu time steps of %llu samples, %d rays\n",
            o->traces, (unsigned long long)e->traces.spikes, (unsigned long long)e->traces.timesteps,
            (unsigned long long)e->traces.samples, e->traces.rays);
-  if (o->nir) printf("%s: NIR graph\n", o->nir);
+  if (o->nir) printf("wrote %s: NIR graph\n", o->nir);
 }
 
 void export_extras_json(cJSON *json, const export_extras *e, const export_options *o)

@@ -12,118 +12,6 @@ static const char *const apart[] = {"--output", "--threads", "--eval-views", "--
                                     "--resume", "--log",     "--summary",    "--json",          "--quiet",
                                     NULL};
 
-sf_cli train_cli(train_arguments *a, sf_option *o)
-{
-  sf_config *c = &a->train.config;
-  sf_train_options *t = &a->train;
-  const sf_option options[] = {
-      {"--output", 'o', SF_ARG_OUTPUT, &a->output, 0, 0, NULL, "FILE", "model to write (default model.safetensors)"},
-      {"--backbone", 0, SF_ARG_CHOICE, &c->backbone, 0, 0, "ingp|tensorf", "KIND",
-       "hash grid, or TensoRF's planes and lines (default ingp)"},
-      {"--minutes", 'm', SF_ARG_DOUBLE, &t->minutes, 0, 1e5, NULL, "M",
-       "time budget, a quarter for stage I (default: iterations)"},
-      {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I (default 2500)"},
-      {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II (default 7500)"},
-      {"--beta", 'b', SF_ARG_DOUBLE, &t->beta, 0, 1, NULL, "B",
-       "quality (small) against energy (large) (default 5e-7)"},
-      {"--price", 0, SF_ARG_CHOICE, &t->price, 0, 0, "exponential|energy", "KIND",
-       "what beta weighs: e^t, as the paper, or what one more step costs here, mJ per frame (default exponential)"},
-      {"--target-loss", 0, SF_ARG_DOUBLE, &t->target_loss, 0, 20, NULL, "DB",
-       "in place of --beta: the fewest steps that are at most so far behind the best number of steps"},
-      {"--target-saving", 0, SF_ARG_DOUBLE, &t->target_saving, 0, 100, NULL, "PERCENT",
-       "in place of --beta: the most steps that save so much of the ReLU twin's energy"},
-      {"--objective", 0, SF_ARG_CHOICE, &t->objective, 0, 0, "prefixes|paper", "KIND",
-       "what is trained while t* is searched: the mean over all numbers of steps, or the paper's M_smooth through all "
-       "T steps (default prefixes)"},
-      {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
-       "how fast the averages of the search forget; what it finds should not hang on it (default 1)"},
-      {"--steps", 'T', SF_ARG_INT, &c->steps, 1, SF_T_MAX, NULL, "T", "time steps unrolled in training (default 8)"},
-      {"--net", 0, SF_ARG_CHOICE, &c->net, 0, 0, "snn|ann", "KIND", "spiking nets or their ReLU twin (default snn)"},
-      {"--input-mode", 0, SF_ARG_CHOICE, &c->mode, 0, 0, "hybrid|decay|no-decay", "MODE",
-       "charging of the neurons (default hybrid)"},
-      {"--seed", 's', SF_ARG_U64, &t->seed, 0, 9e15, NULL, "S", "same seed, same bits, any thread count (default 1)"},
-      {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
-      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N",
-       "samples per iteration, about (default 16384, tensorf 32768)"},
-      {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "tensorf: rays per iteration at most (default 4096)"},
-      {"--voxels", 0, SF_ARG_INT, &t->voxels, 16, 1024, NULL, "N",
-       "tensorf: the finest grid has N^3 voxels (default half the pictures' width, at most 300; NDC: 0.63 of it, "
-       "at most 640)"},
-      {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R",
-       "Adam's rate for the field (default 1e-2, tensorf 2e-2)"},
-      {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R",
-       "Adam's rate for nets and leaks (default 5e-3, tensorf 1e-3)"},
-      {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid (default 16)"},
-      {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries (default 19)"},
-      {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level (default 16)"},
-      {"--finest-res", 0, SF_ARG_INT, &a->finest_res, 2, 32768, NULL, "N",
-       "resolution of the finest level (default a pixel of the pictures, at most 2048 x bound and 32768)"},
-      {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
-       "neurons of a spiking layer, multiple of 16 (default 128)"},
-      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold (default 0.25, tensorf 0.5)"},
-      {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
-       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest (default 1024)"},
-      {"--bound", 0, SF_ARG_INT, &a->bound, 0, 64, NULL, "B",
-       "the box is [-B, B]^3 model units, B = 1, 2, 4, ... 64; 0 = the data's (default 0)"},
-      {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
-       "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0 (default -1)"},
-      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N",
-       "occupancy cells per axis, power of two (default 128)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &a->scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the layout's (default 0)"},
-      {"--downscale", 'd', SF_ARG_INT, &a->downscale, 0, 64, NULL, "F",
-       "images of 1/F of the full size, 0 = by the layout (default 0)"},
-      {"--limit", 0, SF_ARG_INT, &a->limit, 0, 1e6, NULL, "N", "use the first N training views, 0 = all (default 0)"},
-      {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
-       "behind transparent pixels and rays that leave the box; auto: random, but white for tensorf on pictures with "
-       "alpha (default auto)"},
-      {"--no-stage1", 0, SF_ARG_FLAG, &t->no_stage1, 0, 0, NULL, NULL, "ablation: all iterations in stage II"},
-      {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "ablation: without L_extra"},
-      {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "ablation: without L_penalty"},
-      {"--no-budget", 0, SF_ARG_FLAG, &a->no_budget, 0, 0, NULL, NULL, "ablation: without both (L_budg)"},
-      {"--no-distill", 0, SF_ARG_FLAG, &t->no_distill, 0, 0, NULL, NULL, "ablation: without L_distill"},
-      {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "ablation: without max time-step scaling"},
-      {"--fixed-steps", 0, SF_ARG_INT, &t->fixed_steps, 0, SF_T_MAX, NULL, "N",
-       "stage II trains the prefix of N steps alone, t* = N, without L_budg; 0 = t* is learned (default 0)"},
-      {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
-       "start from this trained model, at its t_r, with weights rounded as sf_export does; stage II alone"},
-      {"--weight-bits", 0, SF_ARG_INT, &a->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B",
-       "of --fine-tune: bits of a weight (default 8)"},
-      {"--eval-views", 0, SF_ARG_INT, &a->eval_views, 0, 1e6, NULL, "N",
-       "test views rendered at the end, 0 = all (default 0)"},
-      {"--psnr-prefixes", 0, SF_ARG_INT, &a->prefix_views, 0, 1e6, NULL, "N",
-       "PSNR at every prefix 1..T over N test views, 0 = off (default 0)"},
-      {"--checkpoint-minutes", 0, SF_ARG_DOUBLE, &a->checkpoint_minutes, 0, 1e5, NULL, "M",
-       "time between checkpoints (default 2)"},
-      {"--resume", 'r', SF_ARG_FLAG, &a->resume, 0, 0, NULL, NULL,
-       "continue from the checkpoint at --output, with the options of its run"},
-      {"--log", 0, SF_ARG_PLACE, &a->log, 0, 0, NULL, "FILE",
-       "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
-      {"--summary", 0, SF_ARG_OUTPUT, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"},
-      {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"},
-      {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
-      {0}};
-  memcpy(o, options, sizeof options);
-  return (sf_cli){.program = "sf_train",
-                  .usage = "sf_train DATA [-o model.safetensors] [options]",
-                  .summary =
-                      "Learns a spiking radiance field and, with it, how many time steps the scene needs (PATA).\n"
-                      "DATA is a folder of posed pictures in the Blender, LLFF, COLMAP or instant-ngp layout; sf_data "
-                      "says what is\n"
-                      "understood of it.",
-                  .examples = "  sf_train scene -o model.safetensors --minutes 2\n"
-                              "  sf_train lego -o lego.safetensors --minutes 10 --beta 1e-6\n"
-                              "  sf_train lego -o lego.safetensors --minutes 10 --target-loss 0.1\n"
-                              "  sf_train lego -o lego.safetensors --minutes 10 --target-saving 50\n"
-                              "  sf_train lego -o lego.safetensors --resume\n"
-                              "  sf_train lego -o twin.safetensors --net ann --minutes 10\n"
-                              "  sf_train lego -o vm.safetensors --backbone tensorf --minutes 30\n"
-                              "  sf_train lego -o four.safetensors --fine-tune lego.safetensors --weight-bits 4\n",
-                  .options = o,
-                  .min_positional = 1,
-                  .max_positional = 1};
-}
-
 /* The box, the steps through it and the finest level, but for what was asked for. A level finer than the pixels costs
  * time and learns noise. Without data: what the options alone say. */
 static void set_box(train_arguments *a, const sf_dataset *data)
@@ -184,9 +72,10 @@ static sf_status check_effect(train_arguments *a)
                                         "--no-distill",  "--no-scaling",  "--beta",
                                         "--price",       "--target-loss", "--target-saving",
                                         "--objective",   "--search-rate", NULL},
-                           *const iterations[] = {"--stage1", "--stage2", NULL}, *const budget[] = {"--beta", NULL},
-                           *const search[] = {"--target-loss", "--target-saving", "--price",
-                                              "--objective",   "--search-rate",   NULL};
+                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+                           *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
+                                                                                  "--price",       "--objective",
+                                                                                  "--search-rate", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -194,6 +83,7 @@ static sf_status check_effect(train_arguments *a)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, "has no effect on --backbone tensorf"));
   else
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
+  if (a->train.minutes <= 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, minutes, "0 leaves no time to learn"));
   if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));

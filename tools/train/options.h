@@ -4,7 +4,7 @@
 #include "cli/cli.h"
 #include "train/train.h"
 
-enum { TRAIN_OPTIONS_MAX = 64 };
+enum { TRAIN_OPTIONS_MAX = 80 };
 
 typedef struct train_arguments {
   const char *output, *log, *summary, *fine_tune;

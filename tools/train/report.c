@@ -31,26 +31,26 @@ void train_log_line(FILE *log, const sf_train_stats *s, int steps)
   fprintf(log, "}\n");
 }
 
-void train_smooth(train_recent *r, const sf_train_stats *s, double step)
+void train_smooth(train_recent *r, const sf_train_stats *s)
 {
   const double keep = r->mse > 0 ? 0.95 : 0;
   r->mse = keep * r->mse + (1 - keep) * s->mse;
-  r->loss = keep * r->loss + (1 - keep) * s->loss;
-  r->rate = keep * r->rate + (1 - keep) * s->samples / fmax(step, 1e-9);
 }
 
 void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r)
 {
   const double left = s->progress > 1e-6 ? s->seconds * (1 - s->progress) / s->progress : 0;
-  char worth[48] = "";
-  if (s->search.measured)
-    snprintf(worth, sizeof worth, " (a step is worth %.1e +- %.0e)", s->search.worth, s->search.worth_error);
-  sf_progress_show(p,
-                   "stage %s %5.1f%%  iteration %lld  %.0fk samples/s  loss %.5f  PSNR %.2f dB  t* %.2f%s  firing %.2f "
-                   "%.2f %.2f  ETA %d:%02d",
-                   s->stage == 1 ? "I " : "II", 100 * s->progress, (long long)s->iteration, r->rate / 1e3, r->loss,
-                   psnr_of(r->mse), s->t_star, worth, s->firing[0], s->firing[1], s->firing[2], (int)left / 60,
-                   (int)left % 60);
+  sf_progress_show(p, "stage %s %5.1f%%  ETA %d:%02d  PSNR %.2f dB  t* %.2f  iteration %lld",
+                   s->stage == 1 ? "I " : "II", 100 * s->progress, (int)left / 60, (int)left % 60, psnr_of(r->mse),
+                   s->t_star, (long long)s->iteration);
+}
+
+void train_show_evaluation(sf_progress *p, int done, int all, double seconds)
+{
+  char eta[40] = "";
+  const double left = done ? seconds * (all - done) / done : 0;
+  if (done) snprintf(eta, sizeof eta, "  ETA %d:%02d", (int)left / 60, (int)left % 60);
+  sf_progress_show(p, "evaluation: view %d of %d%s", done + 1, all, eta);
 }
 
 void train_warn(sf_progress *progress, const sf_train_stats *s)

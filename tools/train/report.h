@@ -6,7 +6,7 @@
 
 /* Averages for the eye; the log has the raw values. */
 typedef struct train_recent {
-  double mse, loss, rate;
+  double mse;
 } train_recent;
 
 /* Held-out quality at the end. */
@@ -18,9 +18,10 @@ typedef struct train_quality {
 
 /* steps: T. */
 void train_log_line(FILE *log, const sf_train_stats *s, int steps);
-/* step: seconds of the latest iteration. */
-void train_smooth(train_recent *r, const sf_train_stats *s, double step);
+void train_smooth(train_recent *r, const sf_train_stats *s);
+/* What fits 80 columns: the log has the rest. */
 void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r);
+void train_show_evaluation(sf_progress *p, int done, int all, double seconds);
 void train_warn(sf_progress *progress, const sf_train_stats *s);
 /* To standard output as text or JSON, and to --summary. */
 sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q);

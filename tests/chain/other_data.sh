@@ -1,0 +1,77 @@
+#!/bin/bash
+# A scene with another scene's data is refused by every program that takes both, in one line that names what differs.
+# A scene that does not say what it learned from is taken, with a warning.   usage: other_data.sh BUILD
+export LC_ALL=C OMP_NUM_THREADS=2
+. "$(dirname "$0")/../small_scene.bash" "$@"
+bin=$build/bin
+cd "$work" || exit 1
+
+# The same pictures as instant-ngp would list them: another scale, a larger box.
+cp -r data cube && sed -i 's/^{/{"aabb_scale": 4, /' cube/transforms_t*.json
+train() { # DATA NAME
+  "$bin/sf_train" "$1" -o "$2.safetensors" --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null &&
+    "$bin/sf_export" "$2.safetensors" -o "$2.snn" >/dev/null || fail "no scene $2"
+}
+train data ours
+train cube theirs
+
+refused() { # WHAT PROGRAM ARGUMENTS...: one line that holds WHAT
+  timeout 120 "$bin/$2" "${@:3}" >out.txt 2>err.txt
+  local status=$?
+  [ $status -eq 1 ] || fail "$*: exit status $status, expected 1"
+  [ "$(wc -l <err.txt)" -eq 1 ] || fail "$*: $(wc -l <err.txt) lines on stderr"
+  grep -qF "$1" err.txt || fail "$*: $(head -1 err.txt)"
+}
+other="ours.snn: learned from data of scale 0.8 and bound 1, cube/transforms_test.json: scale 0.33 and bound 2"
+refused "$other" sim_render ours.snn cube -o out.exr -q
+refused "$other" sim_render ours.snn cube -o views --all -q
+refused "$other" sf_cosim ours.snn cube --rays 1 -q
+refused "$other" energy_audit ours.snn cube --rays 10 --rtl-rays 0 -q
+refused "$other" sf_cycles ours.snn cube -q
+refused "$other" error_budget ours.safetensors ours.snn cube --samples 10 --rays 1
+refused "$other" sf_soc ours.snn cube --crop 7,7,2,2
+refused "learned from data of scale 0.8" sf_export ours.safetensors -o out.snn --fit --data cube --fit-rays 256
+refused "learned from data of scale 0.8" sf_point ours.safetensors cube
+refused "ours.safetensors: learned from data of scale 0.8" sf_train cube -o out.safetensors -q --fine-tune ours.safetensors
+refused "theirs.snn: learned from data of scale 0.33 and bound 2" sim_render theirs.snn data -o out.exr -q
+[ ! -e out.exr ] && [ ! -e out.snn ] || fail "something was written"
+
+# With the data that it learned from: not a word, also at a scale and a box of the user's own.
+quiet() { # PROGRAM ARGUMENTS...
+  timeout 120 "$bin/$1" "${@:2}" >out.txt 2>err.txt || fail "$*: $(head -1 err.txt)"
+  [ ! -s err.txt ] || fail "$*: $(head -1 err.txt)"
+}
+quiet sim_render theirs.snn cube -o out.exr -q
+"$bin/sf_train" cube -o own.safetensors --scale 0.2 --bound 1 --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null
+"$bin/sf_export" own.safetensors -o own.snn >/dev/null
+quiet sim_render own.snn cube -o out.exr -q
+refused "own.snn: learned from data of scale 0.33" sim_render own.snn data -o out2.exr -q
+
+# A record that cannot be.
+for edit in ndc:0:2 bound:1:0; do
+  IFS=: read -r key from to <<<"$edit"
+  sed "s/\"data_$key\":\"$from\"/\"data_$key\":\"$to\"/" ours.safetensors >bad.safetensors
+  refused "bad.safetensors: metadata: data_scale 0.8, " sf_export bad.safetensors -o bad.snn
+  grep -q "data_$key $to[,:]" err.txt || fail "data_$key $to: $(cat err.txt)"
+done
+
+# A file without the record, as older ones are.
+python3 - ours.safetensors old.safetensors <<'END'
+import json, struct, sys
+text = open(sys.argv[1], "rb").read()
+n = struct.unpack("<Q", text[:8])[0]
+header = json.loads(text[8 : 8 + n])
+keys = [k for k in header["__metadata__"] if k.startswith("data_")]
+assert len(keys) == 3, keys
+for key in keys:
+    del header["__metadata__"][key]
+header = json.dumps(header).encode()
+header += b" " * (-len(header) % 8)
+open(sys.argv[2], "wb").write(struct.pack("<Q", len(header)) + header + text[8 + n :])
+END
+"$bin/sf_export" old.safetensors -o old.snn >/dev/null || fail "an older model is not exported"
+quiet sim_render old.snn data -o out.exr -q
+"$bin/sim_render" old.snn cube -o out.exr -q >out.txt 2>err.txt || fail "an older scene: $(head -1 err.txt)"
+grep -q "warning: old.snn: trained at scale 0.8 and bound 1, cube/transforms_test.json has scale 0.33 and bound 2" err.txt ||
+  fail "an older scene with other data: no warning"
+finish "other_data: scenes are refused with data that cannot be theirs"
