@@ -37,3 +37,4 @@ void sf_view_set_print_run(FILE *out, const sf_view_set *set, double seconds)
   }
   fprintf(out, "%d view%s rendered by %s in %.2f s, %.0f pixels/s\n", set->rendered, sf_plural((uint64_t)set->rendered),
           sf_backend_names[set->studio->options.backend], seconds, (double)set->pixels / seconds);
+}
