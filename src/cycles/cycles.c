@@ -8,6 +8,8 @@ enum {
   RING = 32,     /* samples inside the block, and the next ones to send; a power of two */
   DEPTH = 6,     /* stages of the neurons (rtl/sf_neurons.sv) */
   DENSITIES = 8, /* rtl/sf_readout.sv */
+  STAGES = 16,
+  STEP_CYCLES = 5, /* of a step's accumulators */
   COLOURS = 3,
   NARROW_BANKS = 4 /* of D2 and C3 (rtl/sf_core.sv) */
 };
@@ -66,8 +68,11 @@ typedef struct reader {
 /* rtl/sf_readout.sv */
 typedef struct readout {
   bool density_taken, colour_taken, density_full, colour_full;
-  bool run, colour, valid[2], is_colour[2], is_last[2], done;
-  uint32_t left, room, count;
+  bool run, colour, busy, done;
+  uint32_t step, slot, room, count;
+  struct {
+    bool valid, colour, last;
+  } stage[STAGES];
 } readout;
 
 /* rtl/sf_stream_out.sv */
@@ -170,7 +175,8 @@ static bool active(const state *s)
   for (int i = 0; i < 4 + DEPTH - 1; i++) busy = busy || s->neuron.way[i].valid;
   for (int i = 0; i < 3; i++) busy = busy || s->read_d2.way[i] || s->read_c3.way[i];
   const readout *r = &s->read;
-  return busy || r->density_taken || r->colour_taken || r->run || r->valid[0] || r->valid[1] || r->done || r->count;
+  for (int i = 0; i < STAGES; i++) busy = busy || r->stage[i].valid;
+  return busy || r->density_taken || r->colour_taken || r->run || r->done || r->count;
 }
 
 static void tick_input(const sf_cycle_model *m, state *s, const state *was, bool done)
@@ -337,36 +343,38 @@ static bool tick_reader(const sf_cycle_model *m, reader *to, const reader *r, bo
   return load;
 }
 
-static void tick_readout(sf_cycle_model *m, state *s, const state *was, bool density_begins, bool colour_begins)
+static void tick_readout(const sf_cycle_model *m, state *s, const state *was, bool density_begins, bool colour_begins,
+                         sf_cycle_totals *totals)
 {
   const readout *r = &was->read;
-  const bool ends = r->run && r->left == 1, free_now = !r->run || ends;
-  const bool working = (r->valid[0] && r->is_colour[0]) || (r->valid[1] && r->is_colour[1]);
-  const bool colour = free_now && r->colour_full && !(r->run && r->colour) && !r->done && !working;
-  const bool density = free_now && !colour && r->density_full && !(r->run && !r->colour);
-  const bool ready = !was->out.full || was->out.second, waits = r->done && (r->count || m->decodes),
-             out = waits && ready;
-  const bool pop = out && !m->decodes, push = r->valid[1] && r->is_last[1] && !r->is_colour[1];
   readout *next = &s->read;
+  const uint32_t last_out = r->colour ? COLOURS - 1 : 0;
+  const bool last = r->slot == last_out && r->step + 1 == m->steps, ends = r->run && last, free_now = !r->run || last;
+  const bool colour = free_now && r->colour_full && !r->busy;
+  const bool density = free_now && !colour && r->density_full && !(r->run && !r->colour);
+  const bool ready = !was->out.full || was->out.second, waits = r->done && (r->count || m->decodes);
+  const bool out = waits && ready, pop = out && !m->decodes, writes = r->stage[STAGES - 1].valid;
+  const bool writes_last = writes && r->stage[STAGES - 1].last, of_colour = r->stage[STAGES - 1].colour;
   const bool density_ends = ends && !r->colour, colour_ends = ends && r->colour;
   next->density_taken = density_begins || (r->density_taken && !density_ends);
   next->colour_taken = colour_begins || (r->colour_taken && !colour_ends);
   next->density_full = (was->read_d2.way[2] && was->read_d2.way_last[2]) || (r->density_full && !density_ends);
   next->colour_full = (was->read_c3.way[2] && was->read_c3.way_last[2]) || (r->colour_full && !colour_ends);
-  next->run = colour || density || (r->run && !ends);
-  if (colour || density)
-    next->colour = colour, next->left = m->steps * (colour ? COLOURS : 1);
-  else
-    next->left = r->left - r->run;
-  next->valid[0] = r->run, next->is_colour[0] = r->colour, next->is_last[0] = ends;
-  next->valid[1] = r->valid[0], next->is_colour[1] = r->is_colour[0], next->is_last[1] = r->is_last[0];
-  if (r->valid[1] && r->is_last[1] && r->is_colour[1])
-    next->done = true;
-  else if (out)
-    next->done = false;
+  memmove(&next->stage[1], &r->stage[0], sizeof r->stage - sizeof r->stage[0]);
+  next->stage[0].valid = r->run && r->slot <= last_out;
+  next->stage[0].colour = r->colour, next->stage[0].last = last;
+  next->run = colour || density || (r->run && !last);
+  if (colour || density) {
+    next->colour = colour, next->step = next->slot = 0;
+  } else if (r->run) {
+    next->slot = r->slot + 1 == STEP_CYCLES ? 0 : r->slot + 1;
+    next->step = r->step + (r->slot + 1 == STEP_CYCLES);
+  }
+  next->busy = colour || (r->busy && !out);
+  next->done = (writes_last && of_colour) || (r->done && !out);
   next->room = r->room + pop - density_begins;
-  next->count = r->count + push - pop;
-  m->totals.samples += out;
+  next->count = r->count + (writes_last && !of_colour) - pop;
+  totals->samples += out;
   if (ready) s->out.full = waits;
   if (was->out.full) s->out.second = !was->out.second;
 }
@@ -393,7 +401,7 @@ static void tick(sf_cycle_model *m)
   tick_spikes(m, s, &was, C3, tick_sums(m, s, &was, C3, c3_load, c3_last));
   s->h_taken += d2_begins;
   s->h_full += was.read_d2.way[2] && was.read_d2.way_last[2];
-  tick_readout(m, s, &was, d2_begins, c3_begins);
+  tick_readout(m, s, &was, d2_begins, c3_begins, &m->totals);
   const bool busy[SF_LAYERS] = {s->mac.busy[0], s->sum[D2].busy, s->mac.busy[1], s->sum[C2].busy, s->sum[C3].busy};
   for (int l = 0; l < SF_LAYERS; l++) m->totals.busy[l] += busy[l];
   m->totals.any_busy += busy[0] || busy[1] || busy[2] || busy[3] || busy[4];
