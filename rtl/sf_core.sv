@@ -185,16 +185,19 @@ module sf_core #(
   wire [24*MACS-1:0] values;
   wire [16*MACS-1:0] c2_sums;
   // The group whose turn it is, of the part that was loaded last.
-  wire [7:0] place = 8'(32'(run_group_q[3*GROUP_BITS+:GROUP_BITS]) % PART_GROUPS);
-  wire [24*NEURONS-1:0] current;
-  genvar l;
-  generate
-    for (l = 0; l < NEURONS; l = l + 1) begin : g_lane
-      wire [15:0] c2_sum = c2_sums[16*(NEURONS*place+l)+:16];
-      wire [23:0] value = values[24*(NEURONS*place+l)+:24];
-      assign current[24*l+:24] = run_layer_q[6+:2] == C2 ? 24'($signed(c2_sum)) <<< sf_arch_pkg::AC_FRAC : value;
+  wire [GROUP_BITS-1:0] place = run_group_q[3*GROUP_BITS+:GROUP_BITS] & GROUP_BITS'(PART_GROUPS - 1);
+  wire of_c2 = run_layer_q[6+:2] == C2;
+  reg [24*NEURONS-1:0] current;
+  always_comb begin
+    current = {(24 * NEURONS) {1'b0}};
+    for (int g = 0; g < PART_GROUPS; g++) begin
+      if (place == GROUP_BITS'(g)) begin
+        for (int n = 0; n < NEURONS; n++)
+          current[24*n+:24] = of_c2 ? 24'($signed(c2_sums[16*(NEURONS*g+n)+:16])) <<< sf_arch_pkg::AC_FRAC
+                            : values[24*(NEURONS*g+n)+:24];
+      end
     end
-  endgenerate
+  end
 
   wire spikes_valid, spikes_last, neurons_idle;
   wire [1:0] spikes_layer;
@@ -584,13 +587,19 @@ module sf_core #(
   end
   reg [179:0] h_q[0:15];  // 15 values by {sample, step}
   wire [179:0] h_sums;
+  genvar l;
   generate
     for (l = 0; l < 15; l = l + 1) begin : g_h
       assign h_sums[12*l+:12] = d2_sums[16*(l+1)+sf_arch_pkg::H_SHIFT+:12];
     end
   endgenerate
-  wire [191:0] h_word = {12'd0, h_q[{h_read_q, h_step}]};
-  assign h = h_word[12*h_index+:12];
+  wire [179:0] h_word = h_q[{h_read_q, h_step}];
+  reg [11:0] h_value;
+  always_comb begin
+    h_value = 12'd0;
+    for (int i = 0; i < 15; i++) if (h_index == 4'(i)) h_value = h_word[12*i+:12];
+  end
+  assign h = h_value;
   always_ff @(posedge clk_i) begin
     read_d2_step_q <= {read_d2_step_q[5:0], next_d2_q};
     read_c3_step_q <= {read_c3_step_q[5:0], next_c3_q};

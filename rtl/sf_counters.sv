@@ -41,9 +41,6 @@ module sf_counters (
     input  wire [ 8:0] index_i,
     output reg  [63:0] counter_o
 );
-  localparam [63:0] NEURON_BYTES = 64'd3;
-  localparam [63:0] INTEGRATOR_BYTES = 64'd4;
-
   // By step, each layer where its events happen. A row of weights is read once, at the first step that it serves; biases
   // are weights that are read, but no operations.
   reg [63:0] d1_mac_q, c1_weight_q;
@@ -71,7 +68,7 @@ module sf_counters (
   wire [3:0] at_narrow = {at_layer == sf_op_pkg::C3, at_step};
   wire [4:0] at_neurons = {at_layer == sf_op_pkg::C2 ? 2'd2 : at_layer == sf_op_pkg::C1 ? 2'd1 : 2'd0, at_step};
   wire [63:0] updates = neurons ? neuron_q[at_neurons] : integrate_q[at_narrow];
-  wire [63:0] state_bytes = updates * (neurons ? NEURON_BYTES : INTEGRATOR_BYTES);
+  wire [63:0] state_bytes = (updates << 2) - (neurons ? updates : 64'd0);  // 3 bytes a membrane, 4 an integrator
   wire [63:0] mac = at_layer == sf_op_pkg::C1 ? c1_mac_q[at_step]
                   : at_layer == sf_op_pkg::D1 && at_step == 3'd0 ? d1_mac_q : 64'd0;
   wire fed = integrating || at_layer == sf_op_pkg::C2;

@@ -54,9 +54,10 @@ module sf_neurons #(
     step_q <= {step_q[3*STAGES-4:0], step_i};
     group_q <= {group_q[GROUP_BITS*(STAGES-1)-1:0], group_i};
     last_q <= {last_q[STAGES-2:0], last_i};
-    k1_q <= mode_i == sf_op_pkg::HYBRID && first ? 13'd1 << sf_arch_pkg::LEAK_FRAC : k_i[13*layer_i+:13];
-    theta4_q <= theta_i[24*layer3+:24];
-    n_out4_q <= n_out_i[9*layer3+:9];
+    k1_q <= mode_i == sf_op_pkg::HYBRID && first ? 13'd1 << sf_arch_pkg::LEAK_FRAC
+          : layer_i[1] ? k_i[38:26] : layer_i[0] ? k_i[25:13] : k_i[12:0];
+    theta4_q <= layer3[1] ? theta_i[71:48] : layer3[0] ? theta_i[47:24] : theta_i[23:0];
+    n_out4_q <= layer3[1] ? n_out_i[26:18] : layer3[0] ? n_out_i[17:9] : n_out_i[8:0];
   end
 
   reg [24*NEURONS-1:0] membrane_q[0:(1<<GROUP_BITS)-1];
