@@ -225,10 +225,13 @@ module sf_sums #(
         if (!rst_ni) begin
           for (int t = 0; t < 16; t++) rows_q[t] <= {ROWS{1'b0}};
         end else begin
-          for (int t = 0; t < 8; t++) begin
-            if (clear_i || release_i) rows_q[{read_q, t[2:0]}] <= {ROWS{1'b0}};
-            if (clear_i) rows_q[{!read_q, t[2:0]}] <= {ROWS{1'b0}};
-            else if (go && picked[t] && !bias_i) rows_q[{write_q, t[2:0]}][index_i] <= 1'b1;
+          if (clear_i || release_i) begin
+            for (int t = 0; t < 8; t++) rows_q[{read_q, t[2:0]}] <= {ROWS{1'b0}};
+          end
+          if (clear_i) begin
+            for (int t = 0; t < 8; t++) rows_q[{!read_q, t[2:0]}] <= {ROWS{1'b0}};
+          end else if (go && !bias_i) begin
+            for (int t = 0; t < 8; t++) if (picked[t]) rows_q[{write_q, t[2:0]}][index_i] <= 1'b1;
           end
         end
       end
