@@ -22,7 +22,7 @@ DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
 PACKAGE = "CABGA381"
 BOARD = "sf_ray_top:TAP=0,MACS=64,NEURONS=8"
 CELLS = {"logic": "TRELLIS_COMB", "flip_flops": "TRELLIS_FF", "multipliers": "MULT18X18D", "block_rams": "DP16KD"}
-BLOCK_RAM_BITS = 18432
+ENGINE = {"MACS": "--macs", "NEURONS": "--neurons", "STEPS_AT_ONCE": "--steps-at-once"}
 # A tool as WebAssembly, with a stack for the long chains of cells that Yosys walks along recursively.
 LAUNCH = """import ctypes, sys, threading, wasmtime
 from wasmtime import _ffi
@@ -287,13 +287,14 @@ def rtl_name(text):
     return name[len("u_dut."):] if name.startswith("u_dut.") else name
 
 
-def cycles_of(arguments):
-    """What the cycle model says of the scene: cycles per sample and per frame."""
+def cycles_of(arguments, build):
+    """What the cycle model says of the scene on this build: cycles per sample and per frame."""
     program = os.path.join(arguments.build, "bin", "sf_cycles")
     if not os.path.exists(program):
         raise Stop(f"{program} is not there: make")
-    done = subprocess.run([program, arguments.scene, arguments.data, "--view", str(arguments.view), "--json", "--quiet"],
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run([program, arguments.scene, arguments.data, "--view", str(arguments.view), "--json", "--quiet",
+                           *[word for name, option in ENGINE.items() if name in build.parameters
+                             for word in (option, build.parameters[name])]], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise Stop((done.stderr.strip().splitlines() or ["sf_cycles failed"])[-1])
     said = json.loads(done.stdout)
@@ -367,7 +368,6 @@ def main():
     if not os.path.exists(os.path.join(root, "rtl", "sf_ray_top.sv")):
         raise Stop(f"{root}/rtl/sf_ray_top.sv is not there")
     builds = [Build(text, "", arguments, root) for text in arguments.modules.split()] or [Build(BOARD, "board", arguments, root)]
-    cycles = cycles_of(arguments) if arguments.scene else None
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
     tools = Tools(folder, say)
     sources = sources_of(root)
@@ -375,7 +375,8 @@ def main():
                    for name in sources + sorted(os.path.join("rtl", n) for n in os.listdir(os.path.join(root, "rtl")) if n.endswith(".svh")))
     results = {}
     for build in builds:
-        measure(build, tools, arguments, root, sources, text, cycles, say)
+        measure(build, tools, arguments, root, sources, text,
+                cycles_of(arguments, build) if arguments.scene else None, say)
         results[build.name] = build.result
         write(os.path.join(folder, "fpga.json"), json.dumps(results, indent=2) + "\n")
         write(os.path.join(folder, "fpga.md"), table_of(results))
