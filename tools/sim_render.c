@@ -234,8 +234,8 @@ static sf_status verify(job *j)
     sf_view_set_print_run(stdout, &j->set, sf_seconds() - j->start);
   }
   if (differences > 0) /* each was told above, but in JSON */
-    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d view%s differ%s%s", j->opt.verify, differences, j->set.todo,
-                   sf_plural((uint64_t)j->set.todo), j->opt.json ? "; " : "", j->opt.json ? j->first : "");
+    return sf_fail(SF_E_DIFFERENCE, "%s: %d of %d views differ%s%s", j->opt.verify, differences, j->set.todo,
+                   j->opt.json ? "; " : "", j->opt.json ? j->first : "");
   if (!j->opt.json)
     printf("OK: %d of %d view%s as %s says\n", j->set.todo, j->set.manifest.total,
            j->set.manifest.total == 1 ? " is" : "s are", j->opt.verify);
