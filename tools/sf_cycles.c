@@ -21,6 +21,7 @@ static const sf_engine builds[BUILDS] = {
 
 typedef struct options {
   sf_engine engine;
+  bool builds;
   const char *scene, *data, *split, *plot;
   int view, downscale, threads;
   double clock;
@@ -99,7 +100,7 @@ static sf_status run_frame(job *j)
       status = each[i];
       for (size_t s = 0; s < row[i].count; s++) {
         sf_cycle_model_add(j->model, &row[i].at[s]);
-        for (int b = 0; b < BUILDS; b++) sf_cycle_model_add(j->other[b], &row[i].at[s]);
+        for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_add(j->other[b], &row[i].at[s]);
         if (j->latency) continue;
         sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net, &j->opt.engine);
         if (!alone) {
@@ -118,7 +119,7 @@ static sf_status run_frame(job *j)
                        sf_cycle_model_totals(j->model)->samples);
   }
   sf_cycle_model_drain(j->model);
-  for (int b = 0; b < BUILDS; b++) sf_cycle_model_drain(j->other[b]);
+  for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_drain(j->other[b]);
   for (int i = 0; i < BAND; i++) free(row[i].at);
   return status;
 }
@@ -168,7 +169,9 @@ static void print_space(const job *j)
     printf("\n  %4d MHz    ", clocks[m]);
     for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(j->model, cores[c], clocks[m]));
   }
-  printf("\n\nother builds            cycles per sample   frames/s at %.0f MHz\n", j->opt.clock);
+  putchar('\n');
+  if (!j->opt.builds) return;
+  printf("\nother builds            cycles per sample   frames/s at %.0f MHz\n", j->opt.clock);
   for (int b = 0; b < BUILDS; b++)
     printf("  %3d MACs, %2d neurons  %18.1f %20.2f\n", builds[b].macs, builds[b].neurons,
            cycles_per_sample(j->other[b]), frames_per_second(j->other[b], 1, j->opt.clock));
@@ -284,7 +287,8 @@ static sf_status print_json(const job *j)
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
   cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j->model, 1, j->opt.clock));
   cJSON *space = cJSON_AddArrayToObject(json, "design_space");
-  for (int b = 0; b < BUILDS; b++) add_points(space, &builds[b], j->other[b]);
+  add_points(space, &j->opt.engine, j->model);
+  for (int b = 0; b < BUILDS && j->opt.builds; b++) add_points(space, &builds[b], j->other[b]);
   return sf_json_print(json, true);
 }
 
@@ -298,7 +302,8 @@ static sf_status make_models(job *j)
     return sf_fail(SF_E_USAGE, "--neurons %d: expected a power of two, at most --macs", e->neurons);
   if (s & (s - 1)) return sf_fail(SF_E_USAGE, "--steps-at-once %d: expected 1, 2, 4 or 8", s);
   bool made = (j->model = sf_cycle_model_create(&j->scene.net, e)) != NULL;
-  for (int b = 0; b < BUILDS; b++) made = (j->other[b] = sf_cycle_model_create(&j->scene.net, &builds[b])) && made;
+  for (int b = 0; b < BUILDS && j->opt.builds; b++)
+    made = (j->other[b] = sf_cycle_model_create(&j->scene.net, &builds[b])) && made;
   return made ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the cycle model");
 }
 
@@ -339,6 +344,8 @@ int main(int argc, char **argv)
       {"--neurons", 0, SF_ARG_INT, &o->engine.neurons, 4, 64, NULL, "N", "neuron units (likewise)"},
       {"--steps-at-once", 0, SF_ARG_INT, &o->engine.steps_at_once, 1, 8, NULL, "N",
        "steps that C2 sums up side by side (likewise)"},
+      {"--builds", 0, SF_ARG_FLAG, &o->builds, 0, 0, NULL, NULL,
+       "also builds of a quarter, a half, all of the lanes at once"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
@@ -353,7 +360,7 @@ int main(int argc, char **argv)
                           "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
                       .examples = "  sf_cycles scene.snn data --view 3\n"
                                   "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
-                                  "  sf_cycles scene.snn data --macs 64 --neurons 8\n"
+                                  "  sf_cycles scene.snn data --builds\n"
                                   "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n",
                       .options = table,
                       .min_positional = 2,
