@@ -176,7 +176,7 @@ def ports_of(build, sources):
     tree = ElementTree.parse(build.path("ports.xml"))
     bits = {kind.get("id"): abs(int(kind.get("left", 0)) - int(kind.get("right", 0))) + 1 for kind in tree.iter("basicdtype")}
     top = next(module for module in tree.iter("module") if module.get("topModule"))
-    return [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.iter("var") if var.get("dir")]
+    return [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.findall("var") if var.get("dir")]
 
 
 def wrapper_of(build, ports):

@@ -42,7 +42,7 @@ verdict() {
   local name=$1 top=$2 files method=$4 parameters=$5 include=$6 set= peek= depth=${4#*:} wire
   files=$(reduced "$top" "$include" $3)
   for p in $parameters; do set+=" -set ${p%=*} ${p#*=}"; done
-  for wire in $(grep -oE 'peek_[a-z_]+' "tests/formal/$top.sv" | sort -u); do
+  for wire in $(grep -oE 'peek_[a-z0-9_]+' "tests/formal/$top.sv" | sort -u); do
     [ "$wire" = peek_ ] || peek+="connect -set $wire u_dut.${wire#peek_}; "
   done
   # One multiplier at most is left of the unit's and the specification's, and is cut: any product that mul_bounds allows.
