@@ -165,8 +165,9 @@ def digest(*parts):
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def ports_of(build, sources):
-    """[(direction, bits, name)] of the module with its parameters, as Verilator sees them."""
+def elaborate(build, sources):
+    """The module with its parameters, as Verilator sees it: [(direction, bits, name)] of its ports, and the names of all
+    modules in it."""
     command = ["verilator", "--xml-only", "--xml-output", "ports.xml", "--Mdir", ".", "-Wno-fatal", "-Wno-lint", "-Irtl", "--unroll-count",
                "256", "--unroll-stmts", "1000000", "--top-module", build.module]
     command += [f"-G{name}={value}" for name, value in build.parameters.items()] + sources
@@ -176,7 +177,8 @@ def ports_of(build, sources):
     tree = ElementTree.parse(build.path("ports.xml"))
     bits = {kind.get("id"): abs(int(kind.get("left", 0)) - int(kind.get("right", 0))) + 1 for kind in tree.iter("basicdtype")}
     top = next(module for module in tree.iter("module") if module.get("topModule"))
-    return [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.findall("var") if var.get("dir")]
+    ports = [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.findall("var") if var.get("dir")]
+    return ports, {module.get("origName") for module in tree.iter("module")}
 
 
 def wrapper_of(build, ports):
@@ -211,13 +213,12 @@ endmodule
 """
 
 
-def synthesise(build, tools, root, sources, key, say):
+def synthesise(build, tools, ports, sources, key, say):
     """Yosys: the wrapper as a netlist of ECP5 cells."""
     netlist = build.path("netlist.json")
     if not kept(netlist, key):
-        build.copy_rtl(root)
         with open(build.path("wrapper.v"), "w", encoding="utf-8") as file:
-            file.write(wrapper_of(build, ports_of(build, sources)))
+            file.write(wrapper_of(build, ports))
         say(f"{build.name}: synthesis")
         started = time.monotonic()
         script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)} wrapper.v; "
@@ -301,10 +302,19 @@ def cycles_of(arguments, build):
     return {"cycles_per_sample": said["cycles_per_sample"], "cycles": said["cycles"], "samples": said["samples"]}
 
 
-def measure(build, tools, arguments, root, sources, text, cycles, say):
+def text_of(root, modules):
+    """The RTL that the modules come from, with packages and what is included."""
+    names = [os.path.join("rtl", folder, name) for folder in ("gen", "") for name in sorted(os.listdir(os.path.join(root, "rtl", folder)))
+             if name.endswith(("_pkg.sv", ".svh")) or name[:-len(".sv")] in modules]
+    return "".join(open(os.path.join(root, name), encoding="utf-8").read() for name in names)
+
+
+def measure(build, tools, arguments, root, sources, cycles, say):
     """Everything of one build into build.result."""
-    key = digest(text, build.module, json.dumps(build.parameters), *PACKAGES, "synth_ecp5 1")
-    netlist = synthesise(build, tools, root, sources, key, say)
+    build.copy_rtl(root)
+    ports, modules = elaborate(build, sources)
+    key = digest(text_of(root, modules), build.module, json.dumps(build.parameters), *PACKAGES, "synth_ecp5 1")
+    netlist = synthesise(build, tools, ports, sources, key, say)
     result = build.result
     result["device"], result["speed"] = DEVICES[arguments.device], arguments.speed
     result.update(count_cells(netlist))
@@ -371,11 +381,9 @@ def main():
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
     tools = Tools(folder, say)
     sources = sources_of(root)
-    text = "".join(open(os.path.join(root, name), encoding="utf-8").read()
-                   for name in sources + sorted(os.path.join("rtl", n) for n in os.listdir(os.path.join(root, "rtl")) if n.endswith(".svh")))
     results = {}
     for build in builds:
-        measure(build, tools, arguments, root, sources, text,
+        measure(build, tools, arguments, root, sources,
                 cycles_of(arguments, build) if arguments.scene else None, say)
         results[build.name] = build.result
         write(os.path.join(folder, "fpga.json"), json.dumps(results, indent=2) + "\n")
