@@ -22,7 +22,7 @@ module sf_sh (
     output wire               last_o
 );
   localparam signed [17:0] UNIT_ONE = 18'sd16384;  // Q.14
-  localparam signed [17:0] ONE = 18'sd32768;  // Q.15
+  localparam signed [17:0] ONE = 18'sd32768, ZERO = 18'sd0;  // Q.15
   localparam [1:0] NONE = 2'd0, PRODUCT = 2'd1, FACTOR = 2'd2, VALUE = 2'd3;
 
   function automatic signed [17:0] axis(input signed [15:0] v);
@@ -34,17 +34,18 @@ module sf_sh (
   reg signed [17:0] x_q, y_q, z_q;
   reg signed [17:0] xx_q, yy_q, zz_q, xy_q, yz_q, xz_q, a_q;  // Q.15; a in Q.16
 
-  // Issue: the operands of a slot. q is chosen one slot before.
+  // Issue: the operands of a slot. q, a difference, is chosen two slots before.
   wire [4:0] pair = slot_q[5:1] - 5'd3;
   wire [3:0] index = pair[3:0];              // of a
-  wire [3:0] value_index = pair[3:0] - 4'd2;  // of dir
+  wire [3:0] next_value = pair[3:0] - 4'd1;  // of the dir of two slots later
   wire odd = slot_q[0];
   wire is_product = slot_q < 6'd6;
   wire is_factor = !is_product && !odd && pair < n_i;
   wire is_value = !is_product && odd && pair >= 5'd2;
   wire last_slot = is_value && pair == n_i + 5'd1;
 
-  reg signed [17:0] coefficient, u, q, q_q, left, right;
+  reg signed [17:0] coefficient, u, minuend, subtrahend, left, right;
+  reg signed [17:0] minuend_q, subtrahend_q, q_q, three_xx_q, three_yy_q, three_zz_q, five_zz_q;
   always_comb begin
     case (index)
       4'd0: {coefficient, u} = {18'sd18487, UNIT_ONE};
@@ -64,18 +65,18 @@ module sf_sh (
       4'd14: {coefficient, u} = {18'sd94720, z_q};
       default: {coefficient, u} = {-18'sd38669, x_q};
     endcase
-    case (value_index)
-      4'd4: q = xy_q;
-      4'd5: q = yz_q;
-      4'd6: q = 18'sd3 * zz_q - ONE;
-      4'd7: q = xz_q;
-      4'd8, 4'd14: q = xx_q - yy_q;
-      4'd9: q = yy_q - 18'sd3 * xx_q;
-      4'd10: q = 18'sd2 * xy_q;
-      4'd11, 4'd13: q = ONE - 18'sd5 * zz_q;
-      4'd12: q = 18'sd5 * zz_q - 18'sd3 * ONE;
-      4'd15: q = xx_q - 18'sd3 * yy_q;
-      default: q = ONE;
+    case (next_value)
+      4'd4: {minuend, subtrahend} = {xy_q, ZERO};
+      4'd5: {minuend, subtrahend} = {yz_q, ZERO};
+      4'd6: {minuend, subtrahend} = {three_zz_q, ONE};
+      4'd7: {minuend, subtrahend} = {xz_q, ZERO};
+      4'd8, 4'd14: {minuend, subtrahend} = {xx_q, yy_q};
+      4'd9: {minuend, subtrahend} = {yy_q, three_xx_q};
+      4'd10: {minuend, subtrahend} = {xy_q <<< 1, ZERO};
+      4'd11, 4'd13: {minuend, subtrahend} = {ONE, five_zz_q};
+      4'd12: {minuend, subtrahend} = {five_zz_q, 18'sd3 * ONE};
+      4'd15: {minuend, subtrahend} = {xx_q, three_yy_q};
+      default: {minuend, subtrahend} = {ONE, ZERO};
     endcase
     case (slot_q)
       6'd0: {left, right} = {x_q, x_q};
@@ -122,6 +123,10 @@ module sf_sh (
   end
 
   always_ff @(posedge clk_i) begin
+    three_xx_q <= (xx_q <<< 1) + xx_q;
+    three_yy_q <= (yy_q <<< 1) + yy_q;
+    three_zz_q <= (zz_q <<< 1) + zz_q;
+    five_zz_q <= (zz_q <<< 2) + zz_q;
     if (ready_o) begin
       slot_q <= 6'd0;
       x_q <= axis(unit_i[15:0]);
@@ -129,7 +134,8 @@ module sf_sh (
       z_q <= axis(unit_i[47:32]);
     end else if (step) begin
       slot_q <= slot_q + 6'd1;
-      q_q <= q;
+      {minuend_q, subtrahend_q} <= {minuend, subtrahend};
+      q_q <= minuend_q - subtrahend_q;
       {left_q, right_q} <= {left, right};
       product_q <= left_q * right_q;
       twice_q <= kind2_q == PRODUCT ? product_q[30:12] : kind2_q == FACTOR ? product_q[31:13] : 19'(value2);
