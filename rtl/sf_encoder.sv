@@ -20,7 +20,7 @@
 
 module sf_encoder #(
     parameter integer LOG2_PORTS = 0,  // 0..3
-    parameter integer LOG2_DEPTH = 4   // of the levels on their way to or from the memory, per port
+    parameter integer LOG2_DEPTH = 5   // of the levels on their way to or from the memory, per port
 ) (
     input  wire        clk_i,
     input  wire        rst_ni,
@@ -70,7 +70,7 @@ module sf_encoder #(
   always_ff @(posedge clk_i) if (dir_ready) dir_q <= s_dir_i;
 
   // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way at
-  // port 0, one more is in sf_grid_cell and one in the packet.
+  // port 0, three more are in sf_grid_cell and one in the packet.
   sf_fifo #(
       .WIDTH     (1),
       .LOG2_DEPTH(LOG2_DEPTH + 1)

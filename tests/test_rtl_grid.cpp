@@ -9,11 +9,37 @@ extern "C" {
 
 enum { CORNERS = FX_GRID_CORNERS };
 
+enum { WEIGHT_LATENCY = 4 };
+
+/* Gives a corner in every cycle and checks the one of WEIGHT_LATENCY cycles before. */
+struct weight_bench {
+  VerilatedContext context;
+  Vsf_grid_weight top{&context};
+  struct corner {
+    int x, y, z, corner;
+    uint32_t weight;
+  } given[WEIGHT_LATENCY] = {};
+  uint64_t cycle = 0;
+
+  ~weight_bench() { top.final(); }
+  void next(const corner &c)
+  {
+    corner &slot = given[cycle % WEIGHT_LATENCY];
+    top.x_i = (uint8_t)c.x, top.y_i = (uint8_t)c.y, top.z_i = (uint8_t)c.z, top.corner_i = (uint8_t)c.corner;
+    top.clk_i = 0, top.eval();
+    if (cycle >= WEIGHT_LATENCY && top.weight_o != slot.weight)
+      ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %u", slot.x, slot.y, slot.z, slot.corner, top.weight_o,
+                   slot.weight);
+    slot = c;
+    top.clk_i = 1, top.eval();
+    cycle++;
+  }
+};
+
 /* Every place in a cell in long runs; every x-y with 16 values of z in short ones. */
 START_TEST(weights_of_every_place)
 {
-  VerilatedContext context;
-  Vsf_grid_weight top(&context);
+  weight_bench b;
   for (int z = _i; z<256; z += unit_length()> 1 ? 1 : 17)
     for (int y = 0; y < 256; y++)
       for (int x = 0; x < 256; x++) {
@@ -21,18 +47,13 @@ START_TEST(weights_of_every_place)
         int32_t weight[CORNERS];
         uint32_t sum = 0;
         fx_grid_weights(g, weight);
-        top.x_i = (uint8_t)x, top.y_i = (uint8_t)y, top.z_i = (uint8_t)z;
         for (int corner = 0; corner < CORNERS; corner++) {
-          top.corner_i = (uint8_t)corner;
-          top.eval();
-          if (top.weight_o != (uint32_t)weight[corner])
-            ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %d", x, y, z, corner, top.weight_o,
-                         weight[corner]);
-          sum += top.weight_o;
+          b.next({x, y, z, corner, (uint32_t)weight[corner]});
+          sum += (uint32_t)weight[corner];
         }
         if (sum != 65536) ck_abort_msg("place (%d, %d, %d): weights sum to %u", x, y, z, sum);
       }
-  top.final();
+  for (int i = 0; i < WEIGHT_LATENCY; i++) b.next({0, 0, 0, 0, 65536});
 }
 END_TEST
 
@@ -244,7 +265,7 @@ END_TEST
  * behind the last answer, sums and queue. */
 START_TEST(a_request_in_every_cycle)
 {
-  enum { BEFORE_AND_BEHIND = 13 };
+  enum { BEFORE_AND_BEHIND = 27 };
   static const int latency[] = {1, 10, 60, 100};
   for (int i = 0; i < 4; i++)
     for (int levels = 1; levels <= 16; levels += 5) {
@@ -261,7 +282,7 @@ END_TEST
 /* While the memory takes nothing, all that fits in before it fills up: one request waits, one index behind it. */
 START_TEST(a_memory_that_begins_late)
 {
-  enum { BEHIND = 3 };
+  enum { BEHIND = 10 };
   for (int levels = 1; levels <= 16; levels += 5) {
     grid_bench b(41);
     const grid_fixture fixture(b.draw, levels, 0);
