@@ -629,16 +629,12 @@ static const hard_case hard_cases[] = {
     {"ray_missing_the_box", HARD_RAY, 5, make_missing, expect_missing},
     {"scene_scales_1e-6_and_1e6", HARD_RAY, 2, make_scale, expect_scale},
 };
-enum { HARD_CASES = sizeof hard_cases / sizeof hard_cases[0] };
+enum { HARD_CASES = COUNT(hard_cases) };
 
 /* One Check case per hard case, so that a failure shows its name; `run` gets the index into hard_cases as _i. */
-static inline void hard_add(Suite *suite, const TTest *run)
+static inline void hard_add(const TTest *run)
 {
-  for (int i = 0; i < HARD_CASES; i++) {
-    TCase *tcase = tcase_create(hard_cases[i].name);
-    tcase_set_timeout(tcase, 60);
-    tcase_add_loop_test(tcase, run, i, i + 1);
-    suite_add_tcase(suite, tcase);
-  }
+  for (int i = 0; i < HARD_CASES; i++) tcase_add_loop_test(ck_new_case(hard_cases[i].name), run, i, i + 1);
 }
+#define HARD_TEST(name) REGISTERED_TEST(name, hard_add(name))
 #endif

@@ -38,7 +38,7 @@ static void expect_layer(const fx_counts *c, int layer, const uint64_t table[SF_
   for (int e = 0; e < SF_EVENTS; e++) expect(c, layer, e, table[e][0], table[e][1]);
 }
 
-START_TEST(recount_equals_counting_by_hand)
+TEST(recount_equals_counting_by_hand)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -59,9 +59,8 @@ START_TEST(recount_equals_counting_by_hand)
   ck_assert_uint_eq(c.samples, 2);
   ck_assert_uint_eq(c.rays, 1);
 }
-END_TEST
 
-START_TEST(recount_sees_every_bit)
+TEST(recount_sees_every_bit)
 {
   fx_net net = small_net();
   net.layer[FX_D1].n_out = net.layer[FX_D2].n_in = SF_LANES;
@@ -78,9 +77,8 @@ START_TEST(recount_sees_every_bit)
     expect(&c, FX_C3, SF_EVENT_SOP, 3, 0);
   }
 }
-END_TEST
 
-START_TEST(ledger_equals_pricing_by_hand)
+TEST(ledger_equals_pricing_by_hand)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -105,9 +103,8 @@ START_TEST(ledger_equals_pricing_by_hand)
   ck_assert_uint_eq(l.ann_fj, 2 * 349600);
   ck_assert_uint_eq(l.ann_hoisted_fj, 2 * 349600 - 12 * 4600);
 }
-END_TEST
 
-START_TEST(nothing_counted_costs_nothing)
+TEST(nothing_counted_costs_nothing)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -118,10 +115,9 @@ START_TEST(nothing_counted_costs_nothing)
   ck_assert_uint_eq(l.ann_fj, 0);
   ck_assert(isnan(sf_saving_percent(0, 0)));
 }
-END_TEST
 
 /* 800 x 800 rays of 1024 samples, 8 steps, every neuron fires: the largest frame. */
-START_TEST(largest_frame_does_not_wrap)
+TEST(largest_frame_does_not_wrap)
 {
   __extension__ typedef unsigned __int128 u128;
   fx_scene scene = fixture_scene(&fixture_ingp, 5);
@@ -144,9 +140,8 @@ START_TEST(largest_frame_does_not_wrap)
   ck_assert_uint_eq(l.h_spikes_fj, samples * ((4096 + 2048) * 4600 + (8 * 128 * 147 + 8 * 1920) * 900));
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(too_large_a_total_is_refused)
+TEST(too_large_a_total_is_refused)
 {
   fx_net net = small_net();
   fx_counts c = {.samples = 1, .rays = 0};
@@ -162,11 +157,10 @@ START_TEST(too_large_a_total_is_refused)
   ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
   ck_assert_uint_eq(sf_energy_ann_fj(&net, UINT64_MAX / 2), UINT64_MAX);
 }
-END_TEST
 
 /* ---- recount against the core ---- */
 
-START_TEST(recount_equals_core_on_random_nets)
+TEST(recount_equals_core_on_random_nets)
 {
   fx_trace *trace = malloc(sizeof *trace);
   uint64_t spikes = 0;
@@ -195,9 +189,8 @@ START_TEST(recount_equals_core_on_random_nets)
   ck_assert_uint_gt(spikes, 1000); /* the nets were not silent */
   free(trace);
 }
-END_TEST
 
-START_TEST(comparison_names_each_planted_difference)
+TEST(comparison_names_each_planted_difference)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < SF_T_MAX; t++)
@@ -213,9 +206,8 @@ START_TEST(comparison_names_each_planted_difference)
         ck_assert_str_eq(status.message, expected);
       }
 }
-END_TEST
 
-START_TEST(comparison_names_the_first_and_ignores_the_rest)
+TEST(comparison_names_the_first_and_ignores_the_rest)
 {
   fx_counts a = {0}, b = {0};
   a.grid_bytes = 1, a.march_steps = 2, a.saturated[3] = 3, a.saturated_features = 4;
@@ -225,7 +217,6 @@ START_TEST(comparison_names_the_first_and_ignores_the_rest)
   b.layer[FX_C2].sop[1] = 7, b.layer[FX_C1].spikes[5] = 8, b.layer[FX_C1].updates[5] = 9;
   ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "spikes of layer C1 at step 5: a 0, b 8");
 }
-END_TEST
 
 /* ---- the measuring loop ---- */
 
@@ -248,7 +239,7 @@ static bool tick(void *user, uint64_t done)
   return done < ((rays *)user)->stop_after;
 }
 
-START_TEST(measure_does_not_depend_on_threads)
+TEST(measure_does_not_depend_on_threads)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -277,9 +268,8 @@ START_TEST(measure_does_not_depend_on_threads)
   sf_measure_free(&one), sf_measure_free(&four);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(tensorf_is_counted_by_the_same_three)
+TEST(tensorf_is_counted_by_the_same_three)
 {
   fx_scene scene = tensorf_scene();
   rays user = {UINT64_MAX, UINT64_MAX};
@@ -309,9 +299,8 @@ START_TEST(tensorf_is_counted_by_the_same_three)
   sf_measure_free(&m);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(checked_rays_are_a_seeded_choice)
+TEST(checked_rays_are_a_seeded_choice)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -346,9 +335,8 @@ START_TEST(checked_rays_are_a_seeded_choice)
   sf_measure_free(&measure);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(measure_reports_the_lowest_failing_ray)
+TEST(measure_reports_the_lowest_failing_ray)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -365,9 +353,8 @@ START_TEST(measure_reports_the_lowest_failing_ray)
   ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_E_STOPPED);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(probe_names_the_sample_of_a_difference)
+TEST(probe_names_the_sample_of_a_difference)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 3);
   fx_trace *trace = malloc(sizeof *trace);
@@ -391,7 +378,6 @@ START_TEST(probe_names_the_sample_of_a_difference)
   free(trace), free(observer);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- the paper ---- */
 
@@ -407,7 +393,7 @@ static const sf_published_row *find_row(const sf_published_row *rows, int n, con
 }
 
 /* Rates worked out by hand from the table's printed digits, to 3 places. */
-START_TEST(published_rates)
+TEST(published_rates)
 {
   static const struct {
     const char *backbone, *data, *reading, *beta;
@@ -431,9 +417,8 @@ START_TEST(published_rates)
   /* A net that prices h at every step cannot cost as little as the paper's third INGP row. */
   ck_assert(find_row(rows, n, "INGP", "Synthetic", "R = 6144", "1e-6")->rate < 0);
 }
-END_TEST
 
-START_TEST(published_residuals)
+TEST(published_residuals)
 {
   sf_published_row rows[SF_PUBLISHED_MAX];
   int n = sf_published_rows(rows), printed = 0;
@@ -484,7 +469,6 @@ START_TEST(published_residuals)
   ck_assert_double_eq_tol(find_row(rows, n, "TensoRF", "LLFF", "R", "5e-9")->samples, 126e6, 0.5e6);
   ck_assert_double_eq_tol(find_row(rows, n, "INGP", "Synthetic", "R", "1e-7")->samples, 7.7e6, 0.05e6);
 }
-END_TEST
 
 /* ---- reports ---- */
 
@@ -495,7 +479,7 @@ static const cJSON *at(const cJSON *json, const char *key)
   return item;
 }
 
-START_TEST(json_keeps_every_digit)
+TEST(json_keeps_every_digit)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -509,10 +493,9 @@ START_TEST(json_keeps_every_digit)
   free(text);
   cJSON_Delete(json), cJSON_Delete(again);
 }
-END_TEST
 
 /* Each ill-formed byte is one replacement. */
-START_TEST(text_from_outside_becomes_utf8)
+TEST(text_from_outside_becomes_utf8)
 {
   static const struct {
     const char *text, *wanted;
@@ -537,9 +520,8 @@ START_TEST(text_from_outside_becomes_utf8)
     cJSON_Delete(json);
   }
 }
-END_TEST
 
-START_TEST(report_json_holds_what_was_counted)
+TEST(report_json_holds_what_was_counted)
 {
   fx_net net = small_net();
   sf_audit_report *r = calloc(1, sizeof *r);
@@ -566,9 +548,8 @@ START_TEST(report_json_holds_what_was_counted)
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
-START_TEST(report_says_that_counts_differ)
+TEST(report_says_that_counts_differ)
 {
   fx_net net = small_net();
   sf_audit_report *r = calloc(1, sizeof *r);
@@ -590,10 +571,9 @@ START_TEST(report_says_that_counts_differ)
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
 /* The first ray of the accelerator can be the one that differs: there is nothing but the difference then. */
-START_TEST(report_says_that_the_first_ray_differs)
+TEST(report_says_that_the_first_ray_differs)
 {
   fx_net net = small_net();
   sf_audit_report *r = calloc(1, sizeof *r);
@@ -613,18 +593,16 @@ START_TEST(report_says_that_the_first_ray_differs)
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
-START_TEST(cycles_of_a_dense_net)
+TEST(cycles_of_a_dense_net)
 {
   fx_net net = {.layer[FX_D1] = {.n_in = 5, .n_out = SF_LANES},
                 .layer[FX_D2] = {.n_in = 1, .n_out = 1}, /* a part of the lanes takes a cycle, too */
                 .layer[FX_C3] = {.n_in = SF_LANES, .n_out = 3}};
   ck_assert_uint_eq(sf_cycles_dense(&net), 5 + 1 + 3);
 }
-END_TEST
 
-START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
+TEST(saturation_is_expected_only_where_the_formats_allow_it)
 {
   fx_net net = small_net();
   char list[64];
@@ -643,9 +621,8 @@ START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
   sf_saturation_census(more, 4, list, 12); /* too short a text is cut between entries */
   ck_assert_uint_lt(strlen(list), 12);
 }
-END_TEST
 
-START_TEST(sha256_of_known_texts)
+TEST(sha256_of_known_texts)
 {
   char hex[65], long_text[1000];
   sf_sha256("", 0, hex);
@@ -658,7 +635,6 @@ START_TEST(sha256_of_known_texts)
   sf_sha256(long_text, 1000, hex);
   ck_assert_str_eq(hex, "41edece42d63e8d9bf515a9ba6932e1c20cbc9f5a5d134645adb5db1b9737ea3");
 }
-END_TEST
 
 /* ---- golden planes ---- */
 
@@ -670,7 +646,7 @@ static fx_pixel some_pixel(uint32_t grey, uint32_t transmittance)
   return p;
 }
 
-START_TEST(golden_planes_hold_the_pixel)
+TEST(golden_planes_hold_the_pixel)
 {
   sf_golden g;
   fx_net net = small_net();
@@ -697,7 +673,6 @@ START_TEST(golden_planes_hold_the_pixel)
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[0], 0);
   sf_golden_free(&g);
 }
-END_TEST
 
 static void remove_in(const char *dir, const char *name)
 {
@@ -706,7 +681,7 @@ static void remove_in(const char *dir, const char *name)
   ck_assert_int_eq(unlink(path), 0);
 }
 
-START_TEST(golden_file_reads_back)
+TEST(golden_file_reads_back)
 {
   const char *tmp = getenv("TMPDIR");
   char dir[200], path[300];
@@ -740,9 +715,8 @@ START_TEST(golden_file_reads_back)
   ck_assert_int_eq(rmdir(dir), 0);
   sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(quality_composites_the_window_over_the_background)
+TEST(quality_composites_the_window_over_the_background)
 {
   enum { W = 20, H = 16 };
   static uint16_t rgba[W * H * 4];
@@ -770,42 +744,4 @@ START_TEST(quality_composites_the_window_over_the_background)
   ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim).code, SF_OK);
   ck_assert(isnan(ssim));
   sf_golden_free(&g);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("audit");
-  TCase *counts = tcase_create("counts"), *measure = tcase_create("measure"), *report = tcase_create("report");
-  tcase_add_test(counts, recount_equals_counting_by_hand);
-  tcase_add_test(counts, recount_sees_every_bit);
-  tcase_add_test(counts, ledger_equals_pricing_by_hand);
-  tcase_add_test(counts, nothing_counted_costs_nothing);
-  tcase_add_test(counts, largest_frame_does_not_wrap);
-  tcase_add_test(counts, too_large_a_total_is_refused);
-  tcase_add_test(counts, recount_equals_core_on_random_nets);
-  tcase_add_test(counts, comparison_names_each_planted_difference);
-  tcase_add_test(counts, comparison_names_the_first_and_ignores_the_rest);
-  tcase_add_test(measure, measure_does_not_depend_on_threads);
-  tcase_add_test(measure, tensorf_is_counted_by_the_same_three);
-  tcase_add_test(measure, checked_rays_are_a_seeded_choice);
-  tcase_add_test(measure, measure_reports_the_lowest_failing_ray);
-  tcase_add_test(measure, probe_names_the_sample_of_a_difference);
-  tcase_add_test(report, published_rates);
-  tcase_add_test(report, published_residuals);
-  tcase_add_test(report, json_keeps_every_digit);
-  tcase_add_test(report, text_from_outside_becomes_utf8);
-  tcase_add_test(report, report_json_holds_what_was_counted);
-  tcase_add_test(report, report_says_that_counts_differ);
-  tcase_add_test(report, report_says_that_the_first_ray_differs);
-  tcase_add_test(report, cycles_of_a_dense_net);
-  tcase_add_test(report, saturation_is_expected_only_where_the_formats_allow_it);
-  tcase_add_test(report, sha256_of_known_texts);
-  tcase_add_test(report, golden_planes_hold_the_pixel);
-  tcase_add_test(report, golden_file_reads_back);
-  tcase_add_test(report, quality_composites_the_window_over_the_background);
-  suite_add_tcase(suite, counts);
-  suite_add_tcase(suite, measure);
-  suite_add_tcase(suite, report);
-  return ck_run(suite);
 }

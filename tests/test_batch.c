@@ -28,7 +28,7 @@ static void check_layout(const sf_batch *b)
 }
 
 /* Where samples leave there may be more blocks, but no more than there is room for. */
-START_TEST(fewer_samples_may_take_more_blocks)
+TEST(fewer_samples_may_take_more_blocks)
 {
   static const int count[] = {384, 128, 2, 510};
   sf_batch b;
@@ -50,7 +50,6 @@ START_TEST(fewer_samples_may_take_more_blocks)
   }
   sf_batch_free(&b);
 }
-END_TEST
 
 static double empty_lanes(const sf_batch *b)
 {
@@ -59,7 +58,7 @@ static double empty_lanes(const sf_batch *b)
   return 1 - used / ((double)b->blocks * SF_BLOCK);
 }
 
-START_TEST(every_ray_is_in_one_bundle)
+TEST(every_ray_is_in_one_bundle)
 {
   sf_batch b;
   ck_good(sf_batch_create(&b, 1 << 14, 8));
@@ -77,11 +76,10 @@ START_TEST(every_ray_is_in_one_bundle)
   check_layout(&b);
   sf_batch_free(&b);
 }
-END_TEST
 
 /* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
  * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. */
-START_TEST(compaction_keeps_what_light_reaches)
+TEST(compaction_keeps_what_light_reaches)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -135,22 +133,10 @@ START_TEST(compaction_keeps_what_light_reaches)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 static void set_up(void)
 {
   make_scene(4);
 }
 
-int main(void)
-{
-  Suite *s = suite_create("batch");
-  TCase *c = tcase_create("batch");
-  tcase_set_timeout(c, 60);
-  tcase_add_unchecked_fixture(c, set_up, remove_folder);
-  tcase_add_test(c, every_ray_is_in_one_bundle);
-  tcase_add_test(c, fewer_samples_may_take_more_blocks);
-  tcase_add_test(c, compaction_keeps_what_light_reaches);
-  suite_add_tcase(s, c);
-  return ck_run_in(s, CK_NOFORK); // OpenMP does not survive a fork
-}
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};

@@ -10,7 +10,7 @@
 enum { SHORT = 200000 };
 
 /* A bound 16 times the largest error seen would say nothing. Sums of currents are exact: their bound is zero. */
-START_TEST(bound_holds_and_bites)
+LOOP_TEST(bound_holds_and_bites, SF_BUDGET_BLOCKS)
 {
   const sf_budget_row row = sf_budget_measure((sf_budget_id)_i, SHORT);
   ck_assert_uint_gt(row.inputs, 0);
@@ -21,7 +21,6 @@ START_TEST(bound_holds_and_bites)
   else
     ck_assert_msg(row.ratio >= 1.0 / 16, "%s: the bound %g is idle, error %g", row.block, row.bound, row.measured);
 }
-END_TEST
 
 enum { SIZE = 40 };
 
@@ -88,7 +87,7 @@ static sf_picture_budget make_picture(sf_model *m)
 /* With no block replaced: the core, bit for bit (checked inside) and without a flip. With all replaced: the float
  * renderer, but for its own rounding in 24 bits (a neuron at its threshold may flip) and that of the grid's scale.
  * What does not reach the spikes flips none. */
-START_TEST(picture_from_fixed_to_float)
+LOOP_TEST(picture_from_fixed_to_float, SF_NODECAY + 1)
 {
   sf_model m = make_model((sf_input_mode)_i);
   const sf_picture_budget b = make_picture(&m);
@@ -108,9 +107,8 @@ START_TEST(picture_from_fixed_to_float)
   ck_assert_double_gt(all->psnr_truth, none->psnr_truth + 10);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(currents_within_their_bounds)
+TEST(currents_within_their_bounds)
 {
   sf_model m = make_model(SF_HYBRID);
   const sf_picture_budget b = make_picture(&m);
@@ -122,16 +120,5 @@ START_TEST(currents_within_their_bounds)
   }
   sf_model_free(&m);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("budget");
-  TCase *cases = tcase_create("blocks");
-  tcase_set_timeout(cases, 120);
-  tcase_add_loop_test(cases, bound_holds_and_bites, 0, SF_BUDGET_BLOCKS);
-  tcase_add_loop_test(cases, picture_from_fixed_to_float, SF_HYBRID, SF_NODECAY + 1);
-  tcase_add_test(cases, currents_within_their_bounds);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* torch-ngp at bound 1: 16 levels, 2^19, 16..2048: 6 119 864 entries, dense up to 59, hashed from 81. */
-START_TEST(layout_is_torch_ngp)
+TEST(layout_is_torch_ngp)
 {
   sf_config c = sf_config_default();
   sf_model m;
@@ -21,10 +21,9 @@ START_TEST(layout_is_torch_ngp)
   ck_assert_uint_eq(m.level[4].stride, 60);
   sf_model_free(&m);
 }
-END_TEST
 
 /* Trilinear weights sum to one: a constant table gives the constant, at faces and corners too. */
-START_TEST(constant_table_gives_constant)
+TEST(constant_table_gives_constant)
 {
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   for (size_t i = 0; i < m.param[SF_P_GRID].size; i++) m.value[i] = 0.75f;
@@ -36,7 +35,6 @@ START_TEST(constant_table_gives_constant)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 static void positions(float *x)
 {
@@ -45,7 +43,7 @@ static void positions(float *x)
   x[1] = x[SF_BLOCK + 1] = x[2 * SF_BLOCK + 1] = 1;
 }
 
-START_TEST(kernels_equal_oracle)
+TEST(kernels_equal_oracle)
 {
   static const char *const isa[] = {"portable", "avx2", "avx512"};
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
@@ -68,10 +66,9 @@ START_TEST(kernels_equal_oracle)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 /* The features are linear in the table, so <d, forward(table)> = <backward(d), table> for any d and table. */
-START_TEST(backward_is_the_adjoint)
+TEST(backward_is_the_adjoint)
 {
   const sf_kernels *k = sf_kernels_select(NULL);
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
@@ -90,10 +87,9 @@ START_TEST(backward_is_the_adjoint)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 /* Orthonormal on the sphere: Monte Carlo over 200 000 directions, standard error below 4 pi / sqrt(n) / 3 = 0.01. */
-START_TEST(harmonics_are_orthonormal)
+TEST(harmonics_are_orthonormal)
 {
   enum { N = 200000 };
   static double product[16][16];
@@ -107,19 +103,4 @@ START_TEST(harmonics_are_orthonormal)
   }
   for (int a = 0; a < 16; a++)
     for (int b = 0; b < 16; b++) ck_assert_double_eq_tol(product[a][b], a == b, 0.03);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("field");
-  TCase *tc = tcase_create("field");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, layout_is_torch_ngp);
-  tcase_add_test(tc, constant_table_gives_constant);
-  tcase_add_test(tc, kernels_equal_oracle);
-  tcase_add_test(tc, backward_is_the_adjoint);
-  tcase_add_test(tc, harmonics_are_orthonormal);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
 }

@@ -97,7 +97,7 @@ static void expect_dropped(const fx_scene *scene, const fx_scene *trimmed)
   ck_assert_int_lt(trimmed->net.layer[FX_C1].n_in, scene->net.layer[FX_C1].n_in - 1);
 }
 
-START_TEST(without_effect_changes_no_bit)
+LOOP_TEST(without_effect_changes_no_bit, 3)
 {
   fx_scene scene = small_scene(11, _i), trimmed;
   spoil(&scene);
@@ -118,10 +118,9 @@ START_TEST(without_effect_changes_no_bit)
   assert_same_pixels(&scene, &trimmed, &rays);
   sf_trim_use_free(&use), sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
 }
-END_TEST
 
 /* A net that never fires keeps one neuron a layer. */
-START_TEST(something_is_left_of_a_silent_net)
+TEST(something_is_left_of_a_silent_net)
 {
   fx_scene scene = small_scene(12, FX_HYBRID), trimmed;
   for (int l = 0; l < SF_LAYERS; l++) memset(scene.net.layer[l].w, 0, (size_t)scene.net.layer[l].n_in * SF_LANES);
@@ -135,7 +134,6 @@ START_TEST(something_is_left_of_a_silent_net)
   assert_same_pixels(&scene, &trimmed, &rays);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
 }
-END_TEST
 
 /* ---- tables ---- */
 
@@ -151,7 +149,7 @@ static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
   }
 }
 
-START_TEST(corners_are_all_that_a_position_reads)
+TEST(corners_are_all_that_a_position_reads)
 {
   fx_scene scene = small_scene(13, FX_HYBRID);
   int8_t *all = malloc(2 * (size_t)scene.grid.entries);
@@ -177,9 +175,8 @@ START_TEST(corners_are_all_that_a_position_reads)
   }
   free(all), fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(unread_entries_are_not_read)
+TEST(unread_entries_are_not_read)
 {
   fx_scene scene = small_scene(14, FX_HYBRID);
   memset(scene.occupancy, 0, 64);
@@ -203,7 +200,6 @@ START_TEST(unread_entries_are_not_read)
   }
   free(all), free(cleared), fx_scene_free(&scene);
 }
-END_TEST
 
 static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
 {
@@ -218,7 +214,7 @@ static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
 }
 
 /* What is used keeps its value in a smaller table, dense levels and hashed ones, unless it meets something used. */
-START_TEST(smaller_tables_keep_what_is_used)
+TEST(smaller_tables_keep_what_is_used)
 {
   fx_scene scene = small_scene(15, FX_HYBRID), small_one;
   int compared = 0;
@@ -247,7 +243,6 @@ START_TEST(smaller_tables_keep_what_is_used)
   ck_assert_int_gt(compared, 200);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- the search ---- */
 
@@ -263,7 +258,7 @@ static sf_status fit(const fx_scene *const *candidate, int candidates, const sf_
   return sf_fit(fitted, &job, report);
 }
 
-START_TEST(no_loss_is_no_difference)
+LOOP_TEST(no_loss_is_no_difference, 3)
 {
   fx_scene scene = small_scene(16, _i), fitted;
   spoil(&scene);
@@ -281,10 +276,9 @@ START_TEST(no_loss_is_no_difference)
   ck_assert_int_eq(r.idle_levels, 1);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted);
 }
-END_TEST
 
 /* Measured here once more, through the file. */
-START_TEST(the_bound_is_kept)
+TEST(the_bound_is_kept)
 {
   fx_scene scene = small_scene(17, FX_HYBRID), fitted, loaded;
   sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
@@ -309,9 +303,8 @@ START_TEST(the_bound_is_kept)
   ck_assert_uint_lt(r.after.bytes, r.before.bytes);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted), fx_scene_free(&loaded);
 }
-END_TEST
 
-START_TEST(threads_do_not_matter)
+TEST(threads_do_not_matter)
 {
   fx_scene scene = small_scene(18, FX_HYBRID), a, b;
   sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
@@ -330,10 +323,9 @@ START_TEST(threads_do_not_matter)
   }
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&a), fx_scene_free(&b);
 }
-END_TEST
 
 /* Of the candidates the last one that is good enough; all is measured against the first. */
-START_TEST(candidates)
+TEST(candidates)
 {
   fx_scene scene = small_scene(19, FX_HYBRID), same = small_scene(19, FX_HYBRID), worse = small_scene(20, FX_HYBRID);
   fx_scene fitted;
@@ -348,7 +340,6 @@ START_TEST(candidates)
   ck_assert_int_eq(r.chosen, 0);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&same), fx_scene_free(&worse), fx_scene_free(&fitted);
 }
-END_TEST
 
 static bool stop_at_once(void *user, const char *what, int done, int total)
 {
@@ -356,7 +347,7 @@ static bool stop_at_once(void *user, const char *what, int done, int total)
   return false;
 }
 
-START_TEST(refusals)
+TEST(refusals)
 {
   fx_scene scene = small_scene(21, FX_HYBRID), fitted;
   sf_fit_rays rays = make_rays(&scene, RAYS, 0);
@@ -388,10 +379,9 @@ START_TEST(refusals)
   ck_bad(sf_fit_rays_draw(&none, &data, scene.background, 10, 0), SF_E_FORMAT, "dir", "r_7");
   sf_fit_rays_free(&rays), fx_scene_free(&scene);
 }
-END_TEST
 
 /* Straight alpha over the background: half of red over white. */
-START_TEST(targets)
+TEST(targets)
 {
   uint16_t rgba[4] = {65535, 0, 0, 32768};
   sf_view view = {.name = "r_0", .camera = {.width = 1, .height = 1, .fx = 1, .fy = 1}, .image = {1, 1, rgba}};
@@ -408,25 +398,11 @@ START_TEST(targets)
   ck_assert_uint_eq(rays.target[13], 0);
   sf_fit_rays_free(&rays);
 }
-END_TEST
+
+int ck_timeout = 120;
 
 int main(void)
 {
   omp_set_num_threads(1); /* many small parallel regions: threads would wait for each other on a busy machine */
-  Suite *suite = suite_create("fit");
-  TCase *tc = tcase_create("fit");
-  tcase_set_timeout(tc, 120);
-  tcase_add_loop_test(tc, without_effect_changes_no_bit, 0, 3);
-  tcase_add_test(tc, something_is_left_of_a_silent_net);
-  tcase_add_test(tc, corners_are_all_that_a_position_reads);
-  tcase_add_test(tc, unread_entries_are_not_read);
-  tcase_add_test(tc, smaller_tables_keep_what_is_used);
-  tcase_add_loop_test(tc, no_loss_is_no_difference, 0, 3);
-  tcase_add_test(tc, the_bound_is_kept);
-  tcase_add_test(tc, threads_do_not_matter);
-  tcase_add_test(tc, candidates);
-  tcase_add_test(tc, refusals);
-  tcase_add_test(tc, targets);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
+  return ck_main();
 }

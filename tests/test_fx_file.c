@@ -99,7 +99,7 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   for (int o = 0; o < 3; o++) ck_assert(a->units.to_box_offset[o] == b->units.to_box_offset[o]);
 }
 
-START_TEST(round_trip)
+TEST(round_trip)
 {
   for (uint64_t seed = 0; seed < 20; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
@@ -115,9 +115,8 @@ START_TEST(round_trip)
     fx_scene_free(&again);
   }
 }
-END_TEST
 
-START_TEST(same_scene_same_bytes)
+TEST(same_scene_same_bytes)
 {
   char *first, *second;
   size_t a, b;
@@ -131,9 +130,8 @@ START_TEST(same_scene_same_bytes)
   free(first), free(second);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(cut_short_anywhere)
+TEST(cut_short_anywhere)
 {
   char *data;
   size_t size;
@@ -148,10 +146,9 @@ START_TEST(cut_short_anywhere)
   free(data);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Any changed byte of the data, and any changed byte of the header, is refused. */
-START_TEST(edited_anywhere)
+TEST(edited_anywhere)
 {
   char *data;
   size_t size;
@@ -175,7 +172,6 @@ START_TEST(edited_anywhere)
   free(data);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Rewrites one metadata string and keeps every tensor. */
 static void edit(const char *key, const char *value)
@@ -188,7 +184,7 @@ static void edit(const char *key, const char *value)
   sf_tensors_free(&set);
 }
 
-START_TEST(metadata_is_checked)
+TEST(metadata_is_checked)
 {
   static const char *const wrong[][3] = {
       {"format", "spikefield-model", "format"},
@@ -249,11 +245,10 @@ START_TEST(metadata_is_checked)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
 /* With the default H_SHIFT every h fits; a build with a smaller one refuses what the 12 bits of h do not hold. */
-START_TEST(largest_h_must_fit)
+TEST(largest_h_must_fit)
 {
   const fixture_sizes sizes = {2, SF_LANES, 5, 9, 24, 40, 3, FX_NODECAY, {0}};
   fx_scene scene = fixture_scene(&sizes, 4);
@@ -266,9 +261,8 @@ START_TEST(largest_h_must_fit)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(decoder_behind_a_grid_is_refused)
+TEST(decoder_behind_a_grid_is_refused)
 {
   static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
   fx_scene scene = small_scene(9);
@@ -277,10 +271,9 @@ START_TEST(decoder_behind_a_grid_is_refused)
   assert_refused("grid.levels is 2, expected 0..0");
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* They would size what is listed level by level. */
-START_TEST(levels_of_a_scene_without_a_grid_are_refused)
+TEST(levels_of_a_scene_without_a_grid_are_refused)
 {
   fx_scene scene = tensorf_scene();
   save(&scene);
@@ -288,7 +281,6 @@ START_TEST(levels_of_a_scene_without_a_grid_are_refused)
   assert_refused("grid.levels is 17, expected 0..0");
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Rewrites with one tensor's first element changed. */
 static void edit_tensor(const char *name, int64_t value)
@@ -303,7 +295,7 @@ static void edit_tensor(const char *name, int64_t value)
   sf_tensors_free(&set);
 }
 
-START_TEST(tensors_are_checked)
+TEST(tensors_are_checked)
 {
   static const struct {
     const char *tensor;
@@ -322,9 +314,8 @@ START_TEST(tensors_are_checked)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(missing_tensor_is_named)
+TEST(missing_tensor_is_named)
 {
   static const char *const names[] = {"grid.table", "occupancy", "density.w1",  "density.w2", "colour.w3",
                                       "colour.w4",  "colour.w5", "grid.offset", "grid.shift"};
@@ -343,9 +334,8 @@ START_TEST(missing_tensor_is_named)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(lanes_beyond_the_layer_are_zero)
+TEST(lanes_beyond_the_layer_are_zero)
 {
   fx_scene scene = small_scene(7);
   scene.net.layer[FX_C1].w[24] = 1;
@@ -354,9 +344,8 @@ START_TEST(lanes_beyond_the_layer_are_zero)
   ck_assert_ptr_nonnull(strstr(status.message, "colour.w3"));
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(a_decoder_alone_is_no_file)
+TEST(a_decoder_alone_is_no_file)
 {
   fx_scene scene = fixture_scene(&fixture_decoder, 9);
   const sf_status status = fx_scene_save(&scene, path);
@@ -365,9 +354,8 @@ START_TEST(a_decoder_alone_is_no_file)
   ck_assert_int_eq(files_in_folder(false), 0);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(unwritable_and_missing)
+TEST(unwritable_and_missing)
 {
   fx_scene scene = small_scene(8);
   snprintf(path, sizeof path, "%s/absent/scene.snn", folder);
@@ -379,28 +367,6 @@ START_TEST(unwritable_and_missing)
   ck_assert_int_eq(files_in_folder(false), 0);
   fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx_file");
-  TCase *files = tcase_create("files");
-  tcase_set_timeout(files, 300);
-  tcase_add_unchecked_fixture(files, make_folder, remove_folder);
-  tcase_add_checked_fixture(files, setup, NULL);
-  tcase_add_test(files, round_trip);
-  tcase_add_test(files, same_scene_same_bytes);
-  tcase_add_test(files, cut_short_anywhere);
-  tcase_add_test(files, edited_anywhere);
-  tcase_add_test(files, metadata_is_checked);
-  tcase_add_test(files, largest_h_must_fit);
-  tcase_add_test(files, decoder_behind_a_grid_is_refused);
-  tcase_add_test(files, levels_of_a_scene_without_a_grid_are_refused);
-  tcase_add_test(files, tensors_are_checked);
-  tcase_add_test(files, missing_tensor_is_named);
-  tcase_add_test(files, lanes_beyond_the_layer_are_zero);
-  tcase_add_test(files, a_decoder_alone_is_no_file);
-  tcase_add_test(files, unwritable_and_missing);
-  suite_add_tcase(suite, files);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = setup, .set_up_all = make_folder, .tear_down_all = remove_folder};

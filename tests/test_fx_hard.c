@@ -38,7 +38,7 @@ static void run_ray(hard *h, const hard_case *c, int variant)
   c->expect(h, &seen, variant);
 }
 
-START_TEST(core)
+HARD_TEST(core)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++) {
@@ -48,12 +48,4 @@ START_TEST(core)
     if (c->kind == HARD_RAY) run_ray(&h, c, variant);
     hard_end(&h);
   }
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("fx_hard");
-  hard_add(suite, core);
-  return ck_run(suite);
 }

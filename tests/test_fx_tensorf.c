@@ -15,7 +15,7 @@
 
 /* ---- units ---- */
 
-START_TEST(softplus_every_input)
+TEST(softplus_every_input)
 {
   uint32_t before = 0;
   double worst = 0, relative = 0;
@@ -37,9 +37,8 @@ START_TEST(softplus_every_input)
   ck_assert_double_gt(worst, 1e-4); /* the bound is no looser than needed: 1.22e-4 at 0 */
   ck_assert_uint_eq(fx_softplus(INT32_MIN / 256), 0);
 }
-END_TEST
 
-START_TEST(softplus_is_as_defined)
+TEST(softplus_is_as_defined)
 {
   for (int32_t y = -(17 << 12); y < 17 << 12; y++) {
     const int32_t m = abs(y), i = m / 256, low = m % 256;
@@ -52,9 +51,8 @@ START_TEST(softplus_is_as_defined)
     ck_assert_uint_eq(fx_softplus(y), (uint32_t)((y > 0 ? (int64_t)y * 256 : 0) + tail));
   }
 }
-END_TEST
 
-START_TEST(sine_every_phase)
+TEST(sine_every_phase)
 {
   double worst = 0;
   for (uint32_t phase = 0; phase < 1 << 16; phase++) {
@@ -70,7 +68,6 @@ START_TEST(sine_every_phase)
   printf("sine: largest error %.3g LSB of Q1.14\n", worst);
   ck_assert_int_eq(fx_sine(16384), 16384);
 }
-END_TEST
 
 /* ---- a scene of random integers ---- */
 
@@ -170,7 +167,7 @@ static double real_product(const fx_factors *f, const int32_t res[3], int pair, 
   return plane * line;
 }
 
-START_TEST(products_within_their_bound)
+TEST(products_within_their_bound)
 {
   static const int32_t sizes[3][3] = {{17, 9, 33}, {7, 1, 5}, {2, 300, 2}};
   double worst = 0;
@@ -196,10 +193,9 @@ START_TEST(products_within_their_bound)
   printf("products: at most %.0f %% of the bound\n", 100 * worst);
   ck_assert_double_gt(worst, 0.5); /* entries alternate between the rails somewhere */
 }
-END_TEST
 
 /* At grid points the products are exact, and so are density and inputs up to their tables. */
-START_TEST(grid_points_are_exact)
+TEST(grid_points_are_exact)
 {
   const int32_t res[3] = {17, 9, 33};
   fx_scene scene = make_scene(res, 5, 2, 4);
@@ -223,9 +219,8 @@ START_TEST(grid_points_are_exact)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(inputs_are_encoded)
+TEST(inputs_are_encoded)
 {
   const int32_t res[3] = {17, 9, 33};
   for (int freqs = 0; freqs <= 4; freqs += 2) {
@@ -268,10 +263,9 @@ START_TEST(inputs_are_encoded)
     fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* Everything at the rails, both ways: sums and scales saturate, none wraps. */
-START_TEST(rails)
+TEST(rails)
 {
   const int32_t res[3] = {4, 4, 4};
   const uint32_t pos[3] = {5000000, 123, (1 << 24) - 1};
@@ -303,7 +297,6 @@ START_TEST(rails)
     fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* ---- rays ---- */
 
@@ -365,7 +358,7 @@ static fx_scene foggy(uint64_t seed)
   return scene;
 }
 
-START_TEST(many_rays_are_rays)
+TEST(many_rays_are_rays)
 {
   for (uint64_t seed = 0; seed < 3; seed++) {
     fx_scene scene = foggy(seed);
@@ -376,7 +369,6 @@ START_TEST(many_rays_are_rays)
     fx_scene_free(&scene);
   }
 }
-END_TEST
 
 typedef struct seen {
   int calls;
@@ -396,7 +388,7 @@ static sf_status see(void *user, const fx_ray *ray, bool first, const int16_t *f
 }
 
 /* A higher threshold: fewer samples reach the decoder, weights and transmittance stay, colour only falls. */
-START_TEST(the_weight_threshold_skips)
+TEST(the_weight_threshold_skips)
 {
   fx_scene scene = foggy(3);
   int before = INT32_MAX, all = 0;
@@ -420,9 +412,8 @@ START_TEST(the_weight_threshold_skips)
   ck_assert_int_eq(before, 0); /* no sample weighs 1 here */
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(empty_and_opaque)
+TEST(empty_and_opaque)
 {
   fx_scene scene = make_scene(few, 5, 2, 7);
   const fx_ray ray = make_ray(3, 1, 100);
@@ -439,7 +430,6 @@ START_TEST(empty_and_opaque)
   ck_assert(counts.march_steps == 100 && counts.field_samples == 0 && counts.rays == 0 && counts.grid_bytes == 0);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- files ---- */
 
@@ -566,7 +556,7 @@ static void check_library(void)
   fx_scene_free(&scene);
 }
 
-START_TEST(files)
+TEST(files)
 {
   snprintf(path, sizeof path, "/tmp/spikefield-vm-XXXXXX");
   const int file = mkstemp(path);
@@ -576,7 +566,6 @@ START_TEST(files)
   check_library();
   unlink(path);
 }
-END_TEST
 
 /* ---- against the float model ---- */
 
@@ -675,15 +664,14 @@ static double picture_psnr(int ndc)
 }
 
 /* 36 dB: what int8 weights and planes leave of a random net, whose membranes lie anywhere about their thresholds. */
-START_TEST(pictures_are_those_of_the_float_model)
+LOOP_TEST(pictures_are_those_of_the_float_model, 2)
 {
   const double psnr = picture_psnr(_i);
   printf("ndc %d: fixed against float %.2f dB\n", _i, psnr);
   ck_assert_double_gt(psnr, 36);
 }
-END_TEST
 
-START_TEST(what_cannot_be_represented_is_refused)
+TEST(what_cannot_be_represented_is_refused)
 {
   sf_model m = smooth_model(0);
   fx_scene scene;
@@ -702,30 +690,5 @@ START_TEST(what_cannot_be_represented_is_refused)
                 status.message);
   sf_model_free(&m);
 }
-END_TEST
 
-int main(void)
-{
-  TCase *units = tcase_create("units"), *field = tcase_create("field"), *rays = tcase_create("rays"),
-        *model = tcase_create("model");
-  tcase_add_test(units, softplus_every_input);
-  tcase_add_test(units, softplus_is_as_defined);
-  tcase_add_test(units, sine_every_phase);
-  tcase_add_test(field, products_within_their_bound);
-  tcase_add_test(field, grid_points_are_exact);
-  tcase_add_test(field, inputs_are_encoded);
-  tcase_add_test(field, rails);
-  tcase_add_test(rays, many_rays_are_rays);
-  tcase_add_test(rays, the_weight_threshold_skips);
-  tcase_add_test(rays, empty_and_opaque);
-  tcase_add_test(rays, files);
-  tcase_add_loop_test(model, pictures_are_those_of_the_float_model, 0, 2);
-  tcase_add_test(model, what_cannot_be_represented_is_refused);
-  Suite *suite = suite_create("fx_tensorf");
-  TCase *cases[] = {units, field, rays, model};
-  for (int i = 0; i < 4; i++) {
-    tcase_set_timeout(cases[i], 120);
-    suite_add_tcase(suite, cases[i]);
-  }
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -238,36 +238,31 @@ static long compare_decoders(const char *name, uint64_t seed)
   return compare_nets(name, seed, true);
 }
 
-START_TEST(nets_equal_portable)
+LOOP_TEST(nets_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_density_nets, samples_wanted());
 }
-END_TEST
 
-START_TEST(decoders_equal_portable)
+LOOP_TEST(decoders_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_decoders, samples_wanted());
 }
-END_TEST
 
-START_TEST(portable_block_equals_single_samples)
+TEST(portable_block_equals_single_samples)
 {
   campaign("portable", compare_density_nets, 500);
   campaign("portable", compare_decoders, 500);
 }
-END_TEST
 
-START_TEST(grid_equals_portable)
+LOOP_TEST(grid_equals_portable, 3)
 {
   campaign(instruction_sets[_i], compare_grid, samples_wanted());
 }
-END_TEST
 
-START_TEST(rays_equal_portable)
+LOOP_TEST(rays_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_rays, samples_wanted());
 }
-END_TEST
 
 /* ---- the hard cases ---- */
 
@@ -302,7 +297,7 @@ static void hard_ray(hard *h, const char *name)
   fx_core_close(core);
 }
 
-START_TEST(hard_cases_equal_portable)
+HARD_TEST(hard_cases_equal_portable)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++)
@@ -315,15 +310,13 @@ START_TEST(hard_cases_equal_portable)
       hard_end(&h);
     }
 }
-END_TEST
 
-START_TEST(portable_waves_equal_single_rays)
+TEST(portable_waves_equal_single_rays)
 {
   campaign("portable", compare_rays, samples_wanted() / 2);
 }
-END_TEST
 
-START_TEST(unknown_kernels_are_refused)
+TEST(unknown_kernels_are_refused)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 1);
   fx_core *core;
@@ -333,10 +326,9 @@ START_TEST(unknown_kernels_are_refused)
   ck_assert_ptr_null(core);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Made in memory, by nobody's reader: the kernels' tables have room for the sizes of arch.def alone. */
-START_TEST(absurd_scenes_are_refused)
+TEST(absurd_scenes_are_refused)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 1), bad = scene;
   fx_core *core;
@@ -351,22 +343,5 @@ START_TEST(absurd_scenes_are_refused)
   ck_assert_int_eq(fx_core_open(&core, &bad, NULL).code, SF_E_FORMAT);
   fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx_vector");
-  TCase *equal = tcase_create("equal");
-  tcase_set_timeout(equal, 0);
-  tcase_add_loop_test(equal, nets_equal_portable, 0, 3);
-  tcase_add_loop_test(equal, decoders_equal_portable, 0, 3);
-  tcase_add_test(equal, portable_block_equals_single_samples);
-  tcase_add_loop_test(equal, grid_equals_portable, 0, 3);
-  tcase_add_loop_test(equal, rays_equal_portable, 0, 3);
-  tcase_add_test(equal, portable_waves_equal_single_rays);
-  tcase_add_test(equal, unknown_kernels_are_refused);
-  tcase_add_test(equal, absurd_scenes_are_refused);
-  suite_add_tcase(suite, equal);
-  hard_add(suite, hard_cases_equal_portable);
-  return ck_run(suite);
-}
+int ck_timeout = 24 * 3600; /* make vector-campaign */

@@ -204,7 +204,7 @@ static faults judge(const char *page, const sf_audit_report *r)
   return f;
 }
 
-START_TEST(a_page_is_whole)
+LOOP_TEST(a_page_is_whole, 4)
 {
   static const int steps[] = {1, 2, 3, 8};
   fixture f = begin(steps[_i], true, false);
@@ -215,10 +215,9 @@ START_TEST(a_page_is_whole)
   ck_assert_ptr_null(strstr(f.text, "DIFFERENT"));
   end(&f);
 }
-END_TEST
 
 /* A decoder has no density network: its layers, figures and numbers are fewer, and they agree. */
-START_TEST(a_page_of_a_decoder)
+TEST(a_page_of_a_decoder)
 {
   fixture f = begin(2, true, false);
   fx_scene_free(&f.scene);
@@ -238,10 +237,9 @@ START_TEST(a_page_of_a_decoder)
   cJSON_Delete(json);
   end(&f);
 }
-END_TEST
 
 /* What the pictures and the counts say of the same view is the same. */
-START_TEST(pictures_agree_with_the_audit)
+TEST(pictures_agree_with_the_audit)
 {
   fixture f = begin(2, true, false);
   finish(&f);
@@ -270,7 +268,6 @@ START_TEST(pictures_agree_with_the_audit)
   ck_assert_ptr_nonnull(strstr(status.message, "C2"));
   end(&f);
 }
-END_TEST
 
 /* A page without some of its figures: what is there is whole. */
 static void check_plain(const char *text)
@@ -286,17 +283,16 @@ static void check_plain(const char *text)
   cJSON_Delete(json);
 }
 
-START_TEST(a_view_without_photograph_or_samples)
+LOOP_TEST(a_view_without_photograph_or_samples, 2)
 {
   fixture f = begin(2, _i == 1, _i == 1);
   finish(&f);
   check_plain(f.text);
   end(&f);
 }
-END_TEST
 
 /* PSNR is infinite after one number of steps, then after all. */
-START_TEST(pictures_equal_to_the_photograph)
+TEST(pictures_equal_to_the_photograph)
 {
   fixture f = begin(2, true, false);
   finish(&f);
@@ -309,9 +305,8 @@ START_TEST(pictures_equal_to_the_photograph)
   }
   end(&f);
 }
-END_TEST
 
-START_TEST(a_difference_is_shown)
+TEST(a_difference_is_shown)
 {
   fixture f = begin(2, true, false);
   finish(&f);
@@ -330,7 +325,6 @@ START_TEST(a_difference_is_shown)
   ck_assert_ptr_null(strstr(f.text, "was left out"));
   end(&f);
 }
-END_TEST
 
 /* ---- planted faults ---- */
 
@@ -361,7 +355,7 @@ static const plant plants[] = {
     {"data-key=\"ledger.hoisted_saving_percent\" value=\"", "data-key=\"ledger.hoisted_saving_percent\" value=\"1"},
 };
 
-START_TEST(planted_faults_are_seen)
+TEST(planted_faults_are_seen)
 {
   fixture f = begin(2, true, false);
   finish(&f);
@@ -376,21 +370,4 @@ START_TEST(planted_faults_are_seen)
     free(page);
   }
   end(&f);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("html");
-  TCase *c = tcase_create("page");
-  tcase_set_timeout(c, 60);
-  tcase_add_loop_test(c, a_page_is_whole, 0, 4);
-  tcase_add_test(c, a_page_of_a_decoder);
-  tcase_add_test(c, pictures_agree_with_the_audit);
-  tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
-  tcase_add_test(c, pictures_equal_to_the_photograph);
-  tcase_add_test(c, a_difference_is_shown);
-  tcase_add_test(c, planted_faults_are_seen);
-  suite_add_tcase(suite, c);
-  return ck_run(suite);
 }

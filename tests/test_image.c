@@ -113,7 +113,7 @@ static void expected_rgba(const kind *k, int x, int y, unsigned out[4])
   if (key) out[3] = 0;
 }
 
-START_TEST(png_kinds)
+LOOP_TEST(png_kinds, COUNT(kinds))
 {
   sf_image image;
   const kind *k = &kinds[_i];
@@ -130,7 +130,6 @@ START_TEST(png_kinds)
   }
   sf_image_free(&image);
 }
-END_TEST
 
 static sf_image noise_image(int width, int height)
 {
@@ -139,7 +138,7 @@ static sf_image noise_image(int width, int height)
   return image;
 }
 
-START_TEST(png_round_trip_rounds_to_nearest)
+TEST(png_round_trip_rounds_to_nearest)
 {
   sf_image a = noise_image(31, 17), b;
   a.rgba[0] = 65535, a.rgba[1] = 128, a.rgba[2] = 129, a.rgba[3] = 0;
@@ -153,7 +152,6 @@ START_TEST(png_round_trip_rounds_to_nearest)
   sf_image_free(&a);
   sf_image_free(&b);
 }
-END_TEST
 
 /* Without the syncing of sf_write_file, which would dominate the loops below. */
 static void put(const char *path, const void *data, size_t n)
@@ -199,21 +197,20 @@ static sf_status load_image(const char *path)
   return s;
 }
 
-START_TEST(png_damage)
+TEST(png_damage)
 {
   sf_image a = noise_image(7, 5);
   ck_good(sf_image_save_png(&a, in("a.png")));
   sf_image_free(&a);
   damage(in("a.png"), SF_E_FORMAT, load_image, true);
 }
-END_TEST
 
 static void put_be(unsigned char *p, uint32_t v)
 {
   for (int i = 0; i < 4; i++) p[i] = (unsigned char)(v >> (24 - 8 * i));
 }
 
-START_TEST(image_faults)
+TEST(image_faults)
 {
   sf_image image;
   ck_bad(sf_image_load(&image, in("none.png")), SF_E_IO, "none.png", "No such file");
@@ -225,10 +222,9 @@ START_TEST(image_faults)
   image = (sf_image){0, 3, NULL};
   ck_bad(sf_image_save_png(&image, in("x.png")), SF_E_RANGE, "x.png", "0 x 3");
 }
-END_TEST
 
 /* A header that promises 40000 x 40000 pixels is refused before memory is asked for, also in a file large enough. */
-START_TEST(absurd_size_is_refused)
+TEST(absurd_size_is_refused)
 {
   unsigned char f[33] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
   sf_image image;
@@ -251,9 +247,8 @@ START_TEST(absurd_size_is_refused)
   ck_bad(sf_image_load(&image, in("big.png")), SF_E_RANGE, "big.png", "40000 x 40000");
   free(file);
 }
-END_TEST
 
-START_TEST(full_disk_leaves_nothing)
+TEST(full_disk_leaves_nothing)
 {
   sf_image a = noise_image(100, 100);
   struct rlimit limit = {10000, 10000};
@@ -270,7 +265,6 @@ START_TEST(full_disk_leaves_nothing)
   free(depth);
   sf_image_free(&a);
 }
-END_TEST
 
 /* ---- JPEG ---- */
 
@@ -321,7 +315,7 @@ static void put_scans(const char *path, int width, int height, const jpeg_scan_i
 }
 
 /* Quality 100 without chroma subsampling: rounding of the transform and the colour change stays within 3 of 255. */
-START_TEST(jpeg_values)
+LOOP_TEST(jpeg_values, 4)
 {
   sf_image image;
   bool grey = _i & 1;
@@ -342,17 +336,15 @@ START_TEST(jpeg_values)
   }
   sf_image_free(&image);
 }
-END_TEST
 
-START_TEST(jpeg_damage)
+LOOP_TEST(jpeg_damage, 2)
 {
   put_jpeg(in("a.jpg"), 24, 16, false, _i);
   damage(in("a.jpg"), SF_E_FORMAT, load_image, false);
 }
-END_TEST
 
 /* Every coefficient in a scan of its own, each bit of it in another one: every scan goes through the whole picture. */
-START_TEST(jpeg_of_many_scans_is_refused)
+TEST(jpeg_of_many_scans_is_refused)
 {
   enum { SCANS = 1 + 63 * 4 };
   jpeg_scan_info scan[SCANS] = {{.comps_in_scan = 1}};
@@ -367,11 +359,10 @@ START_TEST(jpeg_of_many_scans_is_refused)
   put_scans(in("a.jpg"), 8, 8, scan, SCANS);
   ck_bad(sf_image_load(&image, in("a.jpg")), SF_E_FORMAT, "a.jpg", "more than 200 scans");
 }
-END_TEST
 
 /* ---- downscaling ---- */
 
-START_TEST(downscale_weighs_by_alpha)
+TEST(downscale_weighs_by_alpha)
 {
   uint16_t pixels[2][4][4] = {{{100, 0, 0, 65535}, {900, 0, 0, 0}, {7, 8, 9, 0}, {9, 8, 7, 0}},
                               {{400, 0, 0, 32768}, {500, 0, 0, 0}, {7, 8, 9, 0}, {9, 8, 8, 0}}};
@@ -401,7 +392,6 @@ START_TEST(downscale_weighs_by_alpha)
   ck_assert_uint_eq(image.rgba[4], 7);
   sf_image_free(&image);
 }
-END_TEST
 
 /* ---- EXR ---- */
 
@@ -423,7 +413,7 @@ static void exr_channels(sf_exr_channel c[4])
   }
 }
 
-START_TEST(exr_round_trip_is_exact)
+TEST(exr_round_trip_is_exact)
 {
   sf_exr_channel c[4], *back;
   const char *const attributes[] = {"scene", "a \"quoted\" text", "steps", "5", NULL};
@@ -454,9 +444,8 @@ START_TEST(exr_round_trip_is_exact)
   sf_exr_free(back, n);
   for (int i = 0; i < 4; i++) free(c[i].data);
 }
-END_TEST
 
-START_TEST(exr_half_rounds)
+TEST(exr_half_rounds)
 {
   float v[4] = {1.0f + 1.0f / 4096, -70000.0f, 1e-9f, 0.1f};
   sf_exr_channel c = {"H", SF_EXR_HALF, v}, *back;
@@ -470,7 +459,6 @@ START_TEST(exr_half_rounds)
   ck_assert(fabsf(f[3] - 0.1f) <= 0.1f / 2048); /* relative rounding error 2^-11 */
   sf_exr_free(back, n);
 }
-END_TEST
 
 static sf_status load_exr(const char *path)
 {
@@ -484,7 +472,7 @@ static sf_status load_exr(const char *path)
   return s;
 }
 
-START_TEST(exr_damage)
+TEST(exr_damage)
 {
   uint32_t u[20 * 19];
   float f[20 * 19];
@@ -493,9 +481,8 @@ START_TEST(exr_damage)
   ck_good(sf_exr_save(in("a.exr"), 20, 19, c, 2, NULL));
   damage(in("a.exr"), SF_E_FORMAT, load_exr, false);
 }
-END_TEST
 
-START_TEST(exr_refused)
+TEST(exr_refused)
 {
   float f[4] = {0};
   sf_exr_channel twice[2] = {{"A", SF_EXR_FLOAT, f}, {"A", SF_EXR_HALF, f}}, none = {"A", SF_EXR_FLOAT, NULL};
@@ -512,11 +499,10 @@ START_TEST(exr_refused)
   ck_assert_int_eq(entries(), 0);
   ck_bad(load_exr(in("none.exr")), SF_E_IO, "none.exr", "No such file");
 }
-END_TEST
 
 /* ---- PSNR and SSIM ---- */
 
-START_TEST(psnr_known)
+TEST(psnr_known)
 {
   float a[4] = {0, 0.5f, 1, 0.25f}, b[4] = {0.5f, 0.5f, 1, 0.25f};
   ck_assert(isinf(sf_psnr(a, a, 4)));
@@ -524,7 +510,6 @@ START_TEST(psnr_known)
   ck_assert_double_eq_tol(sf_psnr(a, b, 4), 12.041199826559248, 1e-12);
   ck_assert_double_eq_tol(sf_psnr(a, b, 1), 6.020599913279624, 1e-12);
 }
-END_TEST
 
 /* Straight from the definition: a two-dimensional window, two passes, moments about the mean. */
 static double naive_ssim(const float *a, const float *b, int width, int height, int channels)
@@ -557,7 +542,7 @@ static double naive_ssim(const float *a, const float *b, int width, int height, 
   return sum / (double)n;
 }
 
-START_TEST(ssim_equals_the_definition)
+LOOP_TEST(ssim_equals_the_definition, 4)
 {
   static const int sizes[][3] = {{11, 11, 1}, {12, 20, 3}, {33, 17, 3}, {40, 11, 4}};
   int w = sizes[_i][0], h = sizes[_i][1], c = sizes[_i][2], n = w * h * c;
@@ -572,9 +557,8 @@ START_TEST(ssim_equals_the_definition)
   free(a);
   free(b);
 }
-END_TEST
 
-START_TEST(ssim_of_constants)
+TEST(ssim_of_constants)
 {
   enum { N = 15 * 14 };
   float a[N], b[N];
@@ -583,38 +567,5 @@ START_TEST(ssim_of_constants)
   ck_assert_double_eq_tol(sf_ssim(a, b, 15, 14, 1), 0.3751 / 0.6251, 1e-12);
   ck_assert(isnan(sf_ssim(a, b, 10, 14, 1)));
 }
-END_TEST
 
-#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("image");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, png_kinds, 0, COUNT(kinds));
-  tcase_add_test(t, png_round_trip_rounds_to_nearest);
-  tcase_add_test(t, png_damage);
-  tcase_add_test(t, image_faults);
-  tcase_add_test(t, absurd_size_is_refused);
-  tcase_add_test(t, full_disk_leaves_nothing);
-  tcase_add_loop_test(t, jpeg_values, 0, 4);
-  tcase_add_loop_test(t, jpeg_damage, 0, 2);
-  tcase_add_test(t, jpeg_of_many_scans_is_refused);
-  tcase_add_test(t, downscale_weighs_by_alpha);
-  tcase_add_test(t, exr_round_trip_is_exact);
-  tcase_add_test(t, exr_half_rounds);
-  tcase_add_test(t, exr_damage);
-  tcase_add_test(t, exr_refused);
-  tcase_add_test(t, psnr_known);
-  tcase_add_loop_test(t, ssim_equals_the_definition, 0, 4);
-  tcase_add_test(t, ssim_of_constants);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

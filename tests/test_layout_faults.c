@@ -3,7 +3,7 @@
 #include "ck_run.h"
 #include "layout_folder.h"
 
-START_TEST(a_few_missing_pictures_are_passed_over)
+TEST(a_few_missing_pictures_are_passed_over)
 {
   const layout_rig rig = orbit();
   sf_dataset d;
@@ -31,9 +31,8 @@ START_TEST(a_few_missing_pictures_are_passed_over)
   }
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, "images/p01.png", "8 of 14 pictures are missing");
 }
-END_TEST
 
-START_TEST(other_endings_are_found)
+TEST(other_endings_are_found)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -48,10 +47,9 @@ START_TEST(other_endings_are_found)
   ck_assert_int_eq(d.count, 3);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* Two of its files start with UTF-8's mark, as some editors leave it. */
-START_TEST(a_mark_before_a_text_is_skipped)
+TEST(a_mark_before_a_text_is_skipped)
 {
   static layout_file file, marked;
   const layout_rig rig = orbit();
@@ -71,7 +69,6 @@ START_TEST(a_mark_before_a_text_is_skipped)
   same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
-END_TEST
 
 static bool warned(const sf_dataset *d, const char *word, const char *name)
 {
@@ -80,7 +77,7 @@ static bool warned(const sf_dataset *d, const char *word, const char *name)
   return false;
 }
 
-START_TEST(the_survey_names_what_looks_wrong)
+TEST(the_survey_names_what_looks_wrong)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -116,10 +113,9 @@ START_TEST(the_survey_names_what_looks_wrong)
   ck_assert(warned(&d, "far outside", "images/p10.png"));
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* From above and from the side: each camera's own point has its colour, the box's edges are grey. */
-START_TEST(the_plan_shows_every_camera)
+TEST(the_plan_shows_every_camera)
 {
   enum { SIZE = 200 };
   const layout_rig rig = orbit();
@@ -148,9 +144,8 @@ START_TEST(the_plan_shows_every_camera)
   sf_image_free(&image);
   sf_dataset_free(&d), sf_dataset_free(&held);
 }
-END_TEST
 
-START_TEST(cameras_that_all_look_away_are_refused)
+TEST(cameras_that_all_look_away_are_refused)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -163,10 +158,9 @@ START_TEST(cameras_that_all_look_away_are_refused)
   put_json("transforms_train.json", &rig, "", "images", 0, 1);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms_train.json", "no view looks at the scene");
 }
-END_TEST
 
 /* OpenCV's axes, taken for OpenGL's: about the scene, but looking out. A few such views are named one by one. */
-START_TEST(cameras_that_turn_their_backs_are_told)
+LOOP_TEST(cameras_that_turn_their_backs_are_told, 3)
 {
   static const int every[] = {1, 3, 8};
   layout_rig rig = orbit();
@@ -181,9 +175,8 @@ START_TEST(cameras_that_turn_their_backs_are_told)
   ck_assert(warned(&d, "3 of 17", "do not look at the scene") == (_i == 2));
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(mirrored_poses_are_told)
+LOOP_TEST(mirrored_poses_are_told, 2)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -204,10 +197,9 @@ START_TEST(mirrored_poses_are_told)
   put_llff(&rig, 0, 4, 40);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "row 4", "not at right angles");
 }
-END_TEST
 
 /* The one that is used is said to be the smaller; equal ones need no word. */
-START_TEST(a_larger_model_beside_is_told)
+LOOP_TEST(a_larger_model_beside_is_told, 2)
 {
   layout_rig rig = orbit(), part = rig;
   sf_dataset d;
@@ -224,10 +216,9 @@ START_TEST(a_larger_model_beside_is_told)
   ck_assert(warned(&d, "another model is larger", _i ? "sparse/2/images.txt" : "sparse/2/images.bin"));
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* Quaternions of two digits: axes at right angles and of length 1 all the same. */
-START_TEST(rounded_quaternions_are_rotations)
+LOOP_TEST(rounded_quaternions_are_rotations, 2)
 {
   const layout_rig rig = orbit();
   sf_dataset d;
@@ -244,7 +235,6 @@ START_TEST(rounded_quaternions_are_rotations)
       ck_assert_double_eq_tol((double)(m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b]), a == b, 1e-6);
   sf_dataset_free(&d);
 }
-END_TEST
 
 typedef struct bad_npy {
   const char *descr, *order, *shape;
@@ -265,7 +255,7 @@ static const bad_npy bad_npys[] = {
     {"<f8", "False", "(17, 17)", 2312, SF_E_RANGE, "row 0: column 0 of the rotation"},
 };
 
-START_TEST(bad_numpy_files_are_named)
+LOOP_TEST(bad_numpy_files_are_named, COUNT(bad_npys))
 {
   static layout_file file;
   const bad_npy *bad = &bad_npys[_i];
@@ -275,9 +265,8 @@ START_TEST(bad_numpy_files_are_named)
   put("poses_bounds.npy", &file);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, "poses_bounds.npy", bad->problem);
 }
-END_TEST
 
-START_TEST(positions_without_precision_are_named)
+TEST(positions_without_precision_are_named)
 {
   layout_rig rig = row();
   sf_dataset d;
@@ -286,10 +275,9 @@ START_TEST(positions_without_precision_are_named)
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "poses_bounds.npy", "row 5: the position is 3e+38");
 }
-END_TEST
 
 /* Every shorter file is refused by name: none is read beyond its end, none is taken for whole. */
-START_TEST(truncated_files_are_named)
+LOOP_TEST(truncated_files_are_named, 4)
 {
   static const char *const names[] = {"poses_bounds.npy", "sparse/0/cameras.bin", "sparse/0/images.bin",
                                       "sparse/0/points3D.bin"};
@@ -319,9 +307,8 @@ START_TEST(truncated_files_are_named)
   put(names[_i], &file);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, names[_i], "too");
 }
-END_TEST
 
-START_TEST(camera_models_are_refused_by_name)
+LOOP_TEST(camera_models_are_refused_by_name, 4)
 {
   static const layout_lens other[] = {{5, 5, "OPENCV_FISHEYE", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
                                       {5, 6, "FULL_OPENCV", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
@@ -337,7 +324,6 @@ START_TEST(camera_models_are_refused_by_name)
   put_colmap("sparse/0", &rig, 0);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_UNSUPPORTED, "cameras.bin: camera 5", other[_i].name);
 }
-END_TEST
 
 typedef struct bad_text {
   const char *cameras, *images;
@@ -363,7 +349,7 @@ static const bad_text bad_texts[] = {
     {CAMERA, "1 1 0 0 0 0 0 0 1\n\n", SF_E_FORMAT, "images.txt:1", "no name"},
 };
 
-START_TEST(bad_texts_are_named)
+LOOP_TEST(bad_texts_are_named, COUNT(bad_texts))
 {
   const bad_text *bad = &bad_texts[_i];
   const layout_rig rig = orbit();
@@ -374,9 +360,8 @@ START_TEST(bad_texts_are_named)
   ck_good(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, bad->where, bad->problem);
 }
-END_TEST
 
-START_TEST(folders_that_do_not_fit_are_named)
+TEST(folders_that_do_not_fit_are_named)
 {
   const layout_rig rig = row();
   sf_dataset d;
@@ -393,35 +378,5 @@ START_TEST(folders_that_do_not_fit_are_named)
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "images_4/p03.png",
          "16 x 24 pixels, its camera says 64 x 48");
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("layout faults");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_test(t, a_few_missing_pictures_are_passed_over);
-  tcase_add_test(t, other_endings_are_found);
-  tcase_add_test(t, a_mark_before_a_text_is_skipped);
-  tcase_add_test(t, the_survey_names_what_looks_wrong);
-  tcase_add_test(t, the_plan_shows_every_camera);
-  tcase_add_test(t, cameras_that_all_look_away_are_refused);
-  tcase_add_loop_test(t, cameras_that_turn_their_backs_are_told, 0, 3);
-  tcase_add_loop_test(t, mirrored_poses_are_told, 0, 2);
-  tcase_add_loop_test(t, a_larger_model_beside_is_told, 0, 2);
-  tcase_add_loop_test(t, rounded_quaternions_are_rotations, 0, 2);
-  tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
-  tcase_add_test(t, positions_without_precision_are_named);
-  tcase_add_loop_test(t, truncated_files_are_named, 0, 4);
-  tcase_add_loop_test(t, camera_models_are_refused_by_name, 0, 4);
-  tcase_add_loop_test(t, bad_texts_are_named, 0, sizeof bad_texts / sizeof *bad_texts);
-  tcase_add_test(t, folders_that_do_not_fit_are_named);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -4,7 +4,7 @@
 #include "src/scene/capture.h"
 #include <sys/stat.h>
 
-START_TEST(colmap_has_the_rays_of_its_poses)
+LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 {
   const layout_rig rig = orbit(), listed = shuffled(&rig);
   sf_dataset d;
@@ -33,9 +33,8 @@ START_TEST(colmap_has_the_rays_of_its_poses)
   for (int i = 0; i < 3; i++) ck_assert_double_eq_tol(p[i], (double)d.point[15 + i], 1e-6);
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(instant_ngp_has_the_rays_of_its_poses)
+TEST(instant_ngp_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -68,10 +67,9 @@ START_TEST(instant_ngp_has_the_rays_of_its_poses)
   ck_assert_float_eq_tol(b->camera.to_world[3] - a->camera.to_world[3], (float)(0.5 * apart), 1e-6f);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* The training file says where the scene lies, in words or by its poses, for the views of the other file, too. */
-START_TEST(splits_in_two_files_have_the_same_coordinates)
+LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
 {
   static const char *const training[] = {"transforms.json", "transforms_train.json", "transforms_train.json"};
   static const char *const more[] = {"", "\"aabb_scale\":4,", ""};
@@ -90,10 +88,9 @@ START_TEST(splits_in_two_files_have_the_same_coordinates)
   ck_good(sf_dataset_agree(&train, &test));
   sf_dataset_free(&train), sf_dataset_free(&test);
 }
-END_TEST
 
 /* A surveyor's coordinates: the metres that floats lose are taken off before. */
-START_TEST(far_coordinates_lose_nothing)
+TEST(far_coordinates_lose_nothing)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -104,9 +101,8 @@ START_TEST(far_coordinates_lose_nothing)
   same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(splits_in_other_coordinates_are_refused)
+TEST(splits_in_other_coordinates_are_refused)
 {
   const layout_rig rig = row();
   sf_dataset train, test;
@@ -125,10 +121,9 @@ START_TEST(splits_in_other_coordinates_are_refused)
   }
   sf_dataset_free(&train), sf_dataset_free(&test);
 }
-END_TEST
 
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
-START_TEST(a_picture_is_found_by_a_long_name)
+TEST(a_picture_is_found_by_a_long_name)
 {
   char name[5000] = "", path[4096];
   const layout_rig rig = orbit();
@@ -146,10 +141,9 @@ START_TEST(a_picture_is_found_by_a_long_name)
   for (size_t n = strlen(name); n < 4200; n += 2) strcat(name, "./");
   ck_bad(sf_picture_find(path, folder, name), SF_E_IO, folder, "too long");
 }
-END_TEST
 
 /* Nobody writes into the pipe: opening it would wait for ever. */
-START_TEST(a_picture_is_no_pipe)
+TEST(a_picture_is_no_pipe)
 {
   const layout_rig rig = orbit();
   sf_dataset d;
@@ -159,9 +153,8 @@ START_TEST(a_picture_is_no_pipe)
   ck_assert(!unlink(first) && !mkfifo(first, 0600));
   ck_bad(sf_dataset_load(&d, folder, "test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
 }
-END_TEST
 
-START_TEST(an_object_on_nothing_fills_the_box)
+TEST(an_object_on_nothing_fills_the_box)
 {
   const layout_rig rig = orbit();
   sf_dataset d;
@@ -174,10 +167,9 @@ START_TEST(an_object_on_nothing_fills_the_box)
   ck_assert_double_eq_tol(1 / (double)d.scale, 5.0 * 6 / 21, 0.3 * 6 / 21);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* The optical axis is far beside the picture: what it shows counts, not what the camera is turned to. */
-START_TEST(a_crop_looks_where_its_picture_is)
+TEST(a_crop_looks_where_its_picture_is)
 {
   const layout_rig rig = orbit();
   layout_rig crop = rig;
@@ -209,9 +201,8 @@ START_TEST(a_crop_looks_where_its_picture_is)
   put_json("transforms.json", &crop, "\"cx\":100,\"aabb_scale\":1,", "images", 0, 1);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
 }
-END_TEST
 
-START_TEST(blender_has_the_rays_of_its_poses)
+TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -227,11 +218,10 @@ START_TEST(blender_has_the_rays_of_its_poses)
   same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked
  * at from the near plane on. */
-START_TEST(forward_facing_rays_are_ndc)
+LOOP_TEST(forward_facing_rays_are_ndc, 2)
 {
   const layout_rig rig = row();
   sf_dataset d;
@@ -276,10 +266,9 @@ START_TEST(forward_facing_rays_are_ndc)
   }
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* NeRF's recentring: the mean pose becomes the identity; the nearest depth is at 4 / 3. */
-START_TEST(forward_facing_poses_are_recentred)
+TEST(forward_facing_poses_are_recentred)
 {
   const layout_rig rig = row();
   sf_dataset one, other;
@@ -303,9 +292,8 @@ START_TEST(forward_facing_poses_are_recentred)
   ck_assert_double_eq_tol(sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), 1 / (0.75 * 4), 1e-12);
   sf_dataset_free(&one), sf_dataset_free(&other);
 }
-END_TEST
 
-START_TEST(poses_decide_what_faces_forward)
+TEST(poses_decide_what_faces_forward)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -333,10 +321,9 @@ START_TEST(poses_decide_what_faces_forward)
   ck_assert(!d.ndc);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* Both files there: forward-facing poses are read for their depths, others for their lenses; transforms.json always. */
-START_TEST(one_layout_wins_and_says_so)
+TEST(one_layout_wins_and_says_so)
 {
   layout_rig rig = row();
   sf_dataset d;
@@ -359,9 +346,8 @@ START_TEST(one_layout_wins_and_says_so)
   ck_assert(d.layout == SF_LAYOUT_INGP && d.warnings == 1 && strstr(d.warning[0], "transforms.json is used"));
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(pictures_of_the_size_asked_for)
+TEST(pictures_of_the_size_asked_for)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -396,10 +382,9 @@ START_TEST(pictures_of_the_size_asked_for)
   ck_assert(d.view[0].camera.width == 32 && d.downscale == 1);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* In the one size that the camera took: shrunk by the smallest factor that brings them to 1600 pixels. */
-START_TEST(photographs_are_shrunk_unasked)
+TEST(photographs_are_shrunk_unasked)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -424,9 +409,8 @@ START_TEST(photographs_are_shrunk_unasked)
   same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(each_picture_has_its_own_camera)
+LOOP_TEST(each_picture_has_its_own_camera, 2)
 {
   layout_rig rig = orbit();
   sf_dataset d;
@@ -446,36 +430,5 @@ START_TEST(each_picture_has_its_own_camera)
   same_rays(&d, &rig);
   sf_dataset_free(&d);
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("layouts");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, colmap_has_the_rays_of_its_poses, 0, 4);
-  tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
-  tcase_add_test(t, an_object_on_nothing_fills_the_box);
-  tcase_add_test(t, a_crop_looks_where_its_picture_is);
-  tcase_add_test(t, a_picture_is_no_pipe);
-  tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
-  tcase_add_test(t, far_coordinates_lose_nothing);
-  tcase_add_test(t, splits_in_other_coordinates_are_refused);
-  tcase_add_test(t, a_picture_is_found_by_a_long_name);
-  tcase_add_test(t, blender_has_the_rays_of_its_poses);
-  tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);
-  tcase_add_test(t, forward_facing_poses_are_recentred);
-  tcase_add_test(t, poses_decide_what_faces_forward);
-  tcase_add_test(t, one_layout_wins_and_says_so);
-  tcase_add_test(t, pictures_of_the_size_asked_for);
-  tcase_add_test(t, photographs_are_shrunk_unasked);
-  tcase_add_loop_test(t, each_picture_has_its_own_camera, 0, 2);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -53,7 +53,7 @@ static sf_technology plain_technology(void)
 
 /* ---- technology files ---- */
 
-START_TEST(file_is_read)
+TEST(file_is_read)
 {
   const sf_technology t = plain_technology();
   static const struct {
@@ -72,10 +72,9 @@ START_TEST(file_is_read)
   ck_assert_str_eq(t.price[5].text, "1.024 pJ");
   ck_assert_str_eq(t.price[5].source, "made up");
 }
-END_TEST
 
 /* Each mistake, put in place of a line of the plain file, and what the message says behind the path. */
-START_TEST(mistakes_are_named_with_line_and_key)
+TEST(mistakes_are_named_with_line_and_key)
 {
   static const struct {
     const char *line, *instead, *message;
@@ -121,9 +120,8 @@ START_TEST(mistakes_are_named_with_line_and_key)
   sf_technology tech;
   ck_assert_int_eq(sf_technology_load(&tech, path).code, SF_E_IO);
 }
-END_TEST
 
-START_TEST(prices_between_points)
+TEST(prices_between_points)
 {
   sf_technology t = plain_technology();
   bool between = false;
@@ -152,10 +150,9 @@ START_TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_multiply(&t, 6, 6, NULL), 8);
   ck_assert_uint_eq(sf_price_multiply(&t, 4, 4, NULL), 64);
 }
-END_TEST
 
 /* The file that is installed: Horowitz's figure, and what the paper makes of it. */
-START_TEST(installed_prices)
+TEST(installed_prices)
 {
   sf_technology t;
   const sf_status status = sf_technology_load(&t, "share/tech/45nm.tech");
@@ -170,7 +167,6 @@ START_TEST(installed_prices)
   ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, NULL), 297);  /* 200 + 32/960 * 2900 = 296.7 */
   ck_assert_uint_eq(sf_price_byte(&t, 128 * 128, NULL), 1768); /* 10 * sqrt 2 pJ / 8 */
 }
-END_TEST
 
 /* ---- ledgers ---- */
 
@@ -204,7 +200,7 @@ static sf_ledgers *small_ledgers(const sf_technology *tech)
   return l;
 }
 
-START_TEST(paper_ledger_is_the_papers_metric)
+TEST(paper_ledger_is_the_papers_metric)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -223,10 +219,9 @@ START_TEST(paper_ledger_is_the_papers_metric)
   ck_assert(isnan(l->saving[SF_LEDGER_INT]));
   free(l);
 }
-END_TEST
 
 /* Sums are as wide as they get: D1 8 + 11 + 2 bits, C1 8 + 11 + 3; D2 and C2 8 + 2, C3 8 + 3. */
-START_TEST(width_ledger_by_hand)
+TEST(width_ledger_by_hand)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -242,9 +237,8 @@ START_TEST(width_ledger_by_hand)
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 76 * (64 + 32)); /* every synapse once: 1 ray of 1 sample */
   free(l);
 }
-END_TEST
 
-START_TEST(memory_ledger_by_hand)
+TEST(memory_ledger_by_hand)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -263,9 +257,8 @@ START_TEST(memory_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_TABLE], 100 * 10);
   free(l);
 }
-END_TEST
 
-START_TEST(neuron_ledger_by_hand)
+TEST(neuron_ledger_by_hand)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -280,9 +273,8 @@ START_TEST(neuron_ledger_by_hand)
                                                1 * (20 * 16 + 192 + 2 * 20 + 80));
   free(l);
 }
-END_TEST
 
-START_TEST(cells_and_parts_add_up)
+TEST(cells_and_parts_add_up)
 {
   sf_technology tech;
   ck_assert_int_eq(sf_technology_load(&tech, "share/tech/45nm.tech").code, SF_OK);
@@ -314,10 +306,9 @@ START_TEST(cells_and_parts_add_up)
   fx_scene_free(&scene);
   free(l);
 }
-END_TEST
 
 /* At the break-even rate, counts scaled to it cost what the twin costs. */
-START_TEST(break_even_rate_breaks_even)
+TEST(break_even_rate_breaks_even)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -338,9 +329,8 @@ START_TEST(break_even_rate_breaks_even)
   ck_assert_int_eq(l->break_even[SF_SPIKING_LEDGERS].twin, SF_LEDGER_ANN);
   free(l);
 }
-END_TEST
 
-START_TEST(sensitivity_is_the_saving_at_other_prices)
+TEST(sensitivity_is_the_saving_at_other_prices)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -367,10 +357,9 @@ START_TEST(sensitivity_is_the_saving_at_other_prices)
   ck_assert_double_gt(l->sensitivity[0].swing, 1);
   free(l);
 }
-END_TEST
 
 /* A net without density layers: a decoder whose inputs all come with the sample. */
-START_TEST(a_decoder_alone_has_no_density_rows)
+TEST(a_decoder_alone_has_no_density_rows)
 {
   const sf_technology tech = plain_technology();
   fx_net net = {.steps = 1};
@@ -388,9 +377,8 @@ START_TEST(a_decoder_alone_has_no_density_rows)
   ck_assert(isnan(l->break_even[0].rate)); /* no spike */
   free(l);
 }
-END_TEST
 
-START_TEST(too_much_energy_is_refused)
+TEST(too_much_energy_is_refused)
 {
   const sf_technology tech = plain_technology();
   const fx_net net = small_net();
@@ -404,9 +392,8 @@ START_TEST(too_much_energy_is_refused)
   ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_E_RANGE);
   free(l);
 }
-END_TEST
 
-START_TEST(report_and_json_show_every_ledger)
+TEST(report_and_json_show_every_ledger)
 {
   const sf_technology tech = plain_technology();
   sf_ledgers *l = small_ledgers(&tech);
@@ -436,29 +423,5 @@ START_TEST(report_and_json_show_every_ledger)
   cJSON_Delete(json);
   free(text), free(l);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("ledger");
-  TCase *files = tcase_create("technology"), *ledgers = tcase_create("ledgers");
-  tcase_add_checked_fixture(files, make_folder, remove_folder);
-  tcase_add_checked_fixture(ledgers, make_folder, remove_folder);
-  tcase_add_test(files, file_is_read);
-  tcase_add_test(files, mistakes_are_named_with_line_and_key);
-  tcase_add_test(files, prices_between_points);
-  tcase_add_test(files, installed_prices);
-  tcase_add_test(ledgers, paper_ledger_is_the_papers_metric);
-  tcase_add_test(ledgers, width_ledger_by_hand);
-  tcase_add_test(ledgers, memory_ledger_by_hand);
-  tcase_add_test(ledgers, neuron_ledger_by_hand);
-  tcase_add_test(ledgers, cells_and_parts_add_up);
-  tcase_add_test(ledgers, break_even_rate_breaks_even);
-  tcase_add_test(ledgers, sensitivity_is_the_saving_at_other_prices);
-  tcase_add_test(ledgers, a_decoder_alone_has_no_density_rows);
-  tcase_add_test(ledgers, too_much_energy_is_refused);
-  tcase_add_test(ledgers, report_and_json_show_every_ledger);
-  suite_add_tcase(suite, files);
-  suite_add_tcase(suite, ledgers);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -23,7 +23,7 @@ static const double lenses[][4] = {{0.0578421, -0.0805099, -0.000980296, 0.00015
                                    {0.3, 0.1, 0, 0},
                                    {-0.05, 0, 0.02, -0.03}};
 
-START_TEST(a_lens_is_undone_to_1e4_of_a_pixel)
+LOOP_TEST(a_lens_is_undone_to_1e4_of_a_pixel, COUNT(lenses))
 {
   const double *k = lenses[_i];
   const sf_camera c = make_camera(k[0], k[1], k[2], k[3]);
@@ -45,10 +45,9 @@ START_TEST(a_lens_is_undone_to_1e4_of_a_pixel)
       ck_assert_float_eq_tol(pixel[1], (float)y, 1e-4f);
     }
 }
-END_TEST
 
 /* By hand from OpenCV's formula at x = 0.3, y = -0.2: r2 = 0.13. */
-START_TEST(a_lens_bends_as_opencv_says)
+TEST(a_lens_bends_as_opencv_says)
 {
   const sf_camera c = make_camera(0.1, -0.2, 0.01, 0.02);
   double bent[2];
@@ -64,9 +63,8 @@ START_TEST(a_lens_bends_as_opencv_says)
   sf_camera_ray(&down, 197, 80, o, d);
   ck_assert_float_gt(d[1], 0);
 }
-END_TEST
 
-START_TEST(a_lens_that_folds_is_refused)
+TEST(a_lens_that_folds_is_refused)
 {
   const sf_camera folds = make_camera(-1.2, 0, 0, 0), bends = make_camera(-0.2, 0, 0, 0);
   ck_good(sf_lens_check(&bends, "cameras.bin: camera 3"));
@@ -79,11 +77,10 @@ START_TEST(a_lens_that_folds_is_refused)
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "camera 7", "cannot be undone");
 }
-END_TEST
 
 /* The same picture taken through a lens, by COLMAP's models and by instant-ngp's names: a point is seen where the lens
  * says. */
-START_TEST(lenses_come_from_every_layout)
+LOOP_TEST(lenses_come_from_every_layout, 6)
 {
   static const layout_lens kinds[] = {{7, 2, "SIMPLE_RADIAL", WIDTH, HEIGHT, 4, {20, 8, 6, 0.1}},
                                       {7, 3, "RADIAL", WIDTH, HEIGHT, 5, {20, 8, 6, 0.1, -0.05}},
@@ -111,23 +108,5 @@ START_TEST(lenses_come_from_every_layout)
   ck_assert(c->fx == 20 && c->fy == 20 && c->cx == 8 && c->cy == 6);
   sf_dataset_free(&d);
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("lenses");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, a_lens_is_undone_to_1e4_of_a_pixel, 0, sizeof lenses / sizeof *lenses);
-  tcase_add_test(t, a_lens_bends_as_opencv_says);
-  tcase_add_test(t, a_lens_that_folds_is_refused);
-  tcase_add_loop_test(t, lenses_come_from_every_layout, 0, 6);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

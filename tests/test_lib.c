@@ -8,7 +8,7 @@
 
 /* ---- scenes ---- */
 
-START_TEST(info_says_what_the_scene_is)
+TEST(info_says_what_the_scene_is)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_int_eq(info.inputs[l], core.net.layer[l].n_in);
@@ -34,9 +34,8 @@ START_TEST(info_says_what_the_scene_is)
            SPIKEFIELD_VERSION_PATCH);
   ck_assert_str_eq(parts, SPIKEFIELD_VERSION);
 }
-END_TEST
 
-START_TEST(memory_and_file_give_the_same_scene)
+TEST(memory_and_file_give_the_same_scene)
 {
   char *data;
   size_t size;
@@ -56,9 +55,8 @@ START_TEST(memory_and_file_give_the_same_scene)
   spikefield_scene_close(copy);
   free(data);
 }
-END_TEST
 
-START_TEST(damaged_scenes_are_refused)
+TEST(damaged_scenes_are_refused)
 {
   char *data;
   size_t size;
@@ -77,7 +75,6 @@ START_TEST(damaged_scenes_are_refused)
   lib_bad(spikefield_scene_open_memory(&none, data, size, NULL), SPIKEFIELD_E_FORMAT, "memory: ");
   free(data);
 }
-END_TEST
 
 /* A locale whose numbers have a comma: the machine's, else one made for the occasion where localedef can. */
 static bool comma_locale(void)
@@ -92,7 +89,7 @@ static bool comma_locale(void)
   return status == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
 }
 
-START_TEST(the_locale_of_the_host_does_not_matter)
+TEST(the_locale_of_the_host_does_not_matter)
 {
   spikefield_scene *again;
   spikefield_scene_info other;
@@ -108,7 +105,6 @@ START_TEST(the_locale_of_the_host_does_not_matter)
   spikefield_scene_close(again);
   setlocale(LC_ALL, "C");
 }
-END_TEST
 
 /* ---- samples ---- */
 
@@ -119,7 +115,7 @@ static void random_positions(uint32_t *position, uint64_t seed)
   for (uint64_t i = 0; i < 3 * SAMPLES; i++) position[i] = (uint32_t)sf_random_below(seed, 7, i, 1 << 24);
 }
 
-START_TEST(samples_are_those_of_the_core)
+TEST(samples_are_those_of_the_core)
 {
   static spikefield_trace traces[SAMPLES];
   static fx_trace trace;
@@ -158,9 +154,8 @@ START_TEST(samples_are_those_of_the_core)
   ck_assert_uint_gt(spikefield_energy_fj(&counts), 0);
   ck_assert_uint_eq(spikefield_relu_energy_fj(scene, 7), 7 * UINT64_C(4600) * (uint64_t)info.weight_bytes);
 }
-END_TEST
 
-START_TEST(samples_of_a_decoder_are_of_one_ray_too)
+TEST(samples_of_a_decoder_are_of_one_ray_too)
 {
   fx_scene with_decoder = tensorf_scene();
   spikefield_scene *decoder;
@@ -178,9 +173,8 @@ START_TEST(samples_of_a_decoder_are_of_one_ray_too)
   spikefield_scene_close(decoder);
   fx_scene_free(&with_decoder);
 }
-END_TEST
 
-START_TEST(positions_and_directions_are_rounded_once)
+TEST(positions_and_directions_are_rounded_once)
 {
   const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};
   const float outside[][3] = {{1, 0, 0}, {0, -1.0001f, 0}, {0, 0, NAN}, {INFINITY, 0, 0}};
@@ -202,11 +196,10 @@ START_TEST(positions_and_directions_are_rounded_once)
   ck_assert_mem_eq(two, ray.dir, sizeof two);
   lib_bad(spikefield_direction(scene, zero, one), SPIKEFIELD_E_RANGE, "nonzero direction");
 }
-END_TEST
 
 /* ---- refusals ---- */
 
-START_TEST(null_is_refused_by_name)
+TEST(null_is_refused_by_name)
 {
   const spikefield_camera camera = make_camera();
   const float v[3] = {0, 0, 1};
@@ -246,9 +239,8 @@ START_TEST(null_is_refused_by_name)
   lib_good(spikefield_rays(scene, NULL, NULL, NULL, 0, NULL, NULL));
   lib_good(spikefield_samples(scene, NULL, NULL, NULL, 0, NULL, NULL, NULL));
 }
-END_TEST
 
-START_TEST(numbers_out_of_range_are_refused_by_name)
+TEST(numbers_out_of_range_are_refused_by_name)
 {
   int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[64] = {0};
   uint32_t position[6] = {0};
@@ -270,9 +262,8 @@ START_TEST(numbers_out_of_range_are_refused_by_name)
   lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
           "threads is -1");
 }
-END_TEST
 
-START_TEST(cameras_out_of_range_are_refused_by_name)
+TEST(cameras_out_of_range_are_refused_by_name)
 {
   spikefield_pixel pixel;
   static const char *const word[] = {"width is 0", "height is 65537", "fx is 0", "fy is", "cx is", "to_model[7]"};
@@ -287,24 +278,6 @@ START_TEST(cameras_out_of_range_are_refused_by_name)
     lib_bad(spikefield_frame(scene, NULL, &camera, &pixel, NULL), SPIKEFIELD_E_RANGE, word[i]);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("lib");
-  TCase *cases = tcase_create("lib");
-  tcase_set_timeout(cases, 300);
-  tcase_add_checked_fixture(cases, open_fixture, close_fixture);
-  tcase_add_test(cases, info_says_what_the_scene_is);
-  tcase_add_test(cases, memory_and_file_give_the_same_scene);
-  tcase_add_test(cases, damaged_scenes_are_refused);
-  tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
-  tcase_add_test(cases, samples_are_those_of_the_core);
-  tcase_add_test(cases, samples_of_a_decoder_are_of_one_ray_too);
-  tcase_add_test(cases, positions_and_directions_are_rounded_once);
-  tcase_add_test(cases, null_is_refused_by_name);
-  tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
-  tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = open_fixture, .tear_down = close_fixture};

@@ -43,7 +43,7 @@ static sf_manifest_view describe(const sf_golden *g)
 }
 
 /* Made with Python: hashlib.sha256(struct.pack('<...', ...)), in the order that manifest.h states. */
-START_TEST(hashes_are_those_of_another_program)
+TEST(hashes_are_those_of_another_program)
 {
   sf_golden g = some_golden();
   sf_manifest_view v = describe(&g);
@@ -58,9 +58,8 @@ START_TEST(hashes_are_those_of_another_program)
   ck_assert_uint_eq(v.event[SF_EVENT_MAC], 2 * (0 + 1000 + 2000 + 3000 + 4000) + 5 * 3);
   sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(every_bit_of_a_picture_counts)
+TEST(every_bit_of_a_picture_counts)
 {
   sf_golden g = some_golden();
   const sf_manifest_view before = describe(&g);
@@ -81,9 +80,8 @@ START_TEST(every_bit_of_a_picture_counts)
   ck_assert_int_eq(integers, 11);
   sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(every_count_counts)
+TEST(every_count_counts)
 {
   sf_golden g = some_golden();
   const sf_manifest_view before = describe(&g);
@@ -103,9 +101,8 @@ START_TEST(every_count_counts)
   ck_bad(sf_manifest_same_view(&before, &moved, &plane), SF_E_DIFFERENCE, "counts_sha256", "here it is");
   sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(the_camera_is_part_of_the_view)
+TEST(the_camera_is_part_of_the_view)
 {
   sf_golden g = some_golden();
   const sf_manifest_view before = describe(&g);
@@ -121,7 +118,6 @@ START_TEST(the_camera_is_part_of_the_view)
   ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);
   sf_golden_free(&g);
 }
-END_TEST
 
 /* ---- files ---- */
 
@@ -159,7 +155,7 @@ static void assert_same_file(const char *a, const char *b)
   free(x), free(y);
 }
 
-START_TEST(reads_back_what_it_wrote)
+LOOP_TEST(reads_back_what_it_wrote, 2)
 {
   make_folder();
   for (int views = 0; views <= 3; views++) {
@@ -183,9 +179,8 @@ START_TEST(reads_back_what_it_wrote)
   }
   remove_folder();
 }
-END_TEST
 
-START_TEST(the_order_of_the_views_does_not_matter)
+TEST(the_order_of_the_views_does_not_matter)
 {
   make_folder();
   sf_manifest m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
@@ -200,9 +195,8 @@ START_TEST(the_order_of_the_views_does_not_matter)
   sf_manifest_free(&m), sf_manifest_free(&other);
   remove_folder();
 }
-END_TEST
 
-START_TEST(sums_by_hand)
+TEST(sums_by_hand)
 {
   sf_manifest m = some_manifest(false, 3);
   sf_manifest_sum sum;
@@ -217,7 +211,6 @@ START_TEST(sums_by_hand)
   ck_assert(isnan(sum.psnr));
   sf_manifest_free(&m);
 }
-END_TEST
 
 /* ---- every field edited ---- */
 
@@ -279,7 +272,7 @@ static cJSON *inner(cJSON *item, int *number) /* the n-th object */
   return NULL;
 }
 
-START_TEST(every_edit_is_seen)
+LOOP_TEST(every_edit_is_seen, 2)
 {
   make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
@@ -306,9 +299,8 @@ START_TEST(every_edit_is_seen)
   sf_manifest_free(&m);
   remove_folder();
 }
-END_TEST
 
-START_TEST(missing_and_unknown_fields_are_refused)
+LOOP_TEST(missing_and_unknown_fields_are_refused, 2)
 {
   make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
@@ -334,9 +326,8 @@ START_TEST(missing_and_unknown_fields_are_refused)
   sf_manifest_free(&m);
   remove_folder();
 }
-END_TEST
 
-START_TEST(other_files_are_refused)
+TEST(other_files_are_refused)
 {
   make_folder();
   sf_manifest m;
@@ -355,9 +346,8 @@ START_TEST(other_files_are_refused)
   sf_manifest_free(&elsewhere);
   remove_folder();
 }
-END_TEST
 
-START_TEST(origins_differ_by_name)
+TEST(origins_differ_by_name)
 {
   sf_manifest m = some_manifest(true, 0);
   const sf_manifest_origin a = m.origin;
@@ -369,9 +359,8 @@ START_TEST(origins_differ_by_name)
   b.model_sha256[0] = 0, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "model_sha256", "absent");
   sf_manifest_free(&m);
 }
-END_TEST
 
-START_TEST(a_flipped_pixel_is_located)
+TEST(a_flipped_pixel_is_located)
 {
   make_folder();
   sf_golden g;
@@ -397,10 +386,9 @@ START_TEST(a_flipped_pixel_is_located)
   sf_golden_free(&g), sf_golden_free(&small);
   remove_folder();
 }
-END_TEST
 
 /* The header of an EXR is plain text. */
-START_TEST(the_file_says_what_its_distances_are)
+TEST(the_file_says_what_its_distances_are)
 {
   make_folder();
   sf_golden g = some_golden();
@@ -417,26 +405,4 @@ START_TEST(the_file_says_what_its_distances_are)
   }
   sf_golden_free(&g);
   remove_folder();
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("manifest");
-  TCase *t = tcase_create("manifest");
-  tcase_add_test(t, hashes_are_those_of_another_program);
-  tcase_add_test(t, every_bit_of_a_picture_counts);
-  tcase_add_test(t, every_count_counts);
-  tcase_add_test(t, the_camera_is_part_of_the_view);
-  tcase_add_loop_test(t, reads_back_what_it_wrote, 0, 2);
-  tcase_add_test(t, the_order_of_the_views_does_not_matter);
-  tcase_add_test(t, sums_by_hand);
-  tcase_add_loop_test(t, every_edit_is_seen, 0, 2);
-  tcase_add_loop_test(t, missing_and_unknown_fields_are_refused, 0, 2);
-  tcase_add_test(t, other_files_are_refused);
-  tcase_add_test(t, origins_differ_by_name);
-  tcase_add_test(t, a_flipped_pixel_is_located);
-  tcase_add_test(t, the_file_says_what_its_distances_are);
-  suite_add_tcase(suite, t);
-  return ck_run(suite);
 }

@@ -348,7 +348,7 @@ static void ck_scene(const fx_scene *scene, random_source *r, bool extreme)
 }
 
 /* _i: from typical nets to those of all corners. */
-START_TEST(scene_gives_the_spikes_of_the_core)
+LOOP_TEST(scene_gives_the_spikes_of_the_core, 6)
 {
   static random_net n;
   random_source r = {(uint64_t)_i, 0};
@@ -358,9 +358,8 @@ START_TEST(scene_gives_the_spikes_of_the_core)
     ck_scene(&(fx_scene){.net = n.net}, &r, _i > 0);
   }
 }
-END_TEST
 
-START_TEST(biases_and_decoders_too)
+LOOP_TEST(biases_and_decoders_too, 4)
 {
   random_source r = {(uint64_t)_i, 0};
   for (uint64_t seed = 0; seed < GRAPHS; seed++) {
@@ -371,7 +370,6 @@ START_TEST(biases_and_decoders_too)
     fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* ---- the float oracle ---- */
 
@@ -400,7 +398,7 @@ static bool same_as_oracle(graph *g, const sf_net_trace *trace, int steps)
   return true;
 }
 
-START_TEST(model_gives_the_spikes_of_the_oracle)
+LOOP_TEST(model_gives_the_spikes_of_the_oracle, SF_NODECAY + 1)
 {
   enum { STEPS = 5, SAMPLES = 60 };
   static sf_net_trace trace;
@@ -427,9 +425,8 @@ START_TEST(model_gives_the_spikes_of_the_oracle)
   free_graph(&shared);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(tensorf_gives_the_spikes_of_the_oracle)
+LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
 {
   enum { STEPS = 4, SAMPLES = 40 };
   static sf_net_trace trace;
@@ -455,9 +452,8 @@ START_TEST(tensorf_gives_the_spikes_of_the_oracle)
   free_graph(&shared);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(the_relu_twin_is_refused)
+TEST(the_relu_twin_is_refused)
 {
   sf_model m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
@@ -465,9 +461,8 @@ START_TEST(the_relu_twin_is_refused)
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(same_scene_same_bytes)
+TEST(same_scene_same_bytes)
 {
   static random_net n;
   random_source r = {77, 0};
@@ -480,7 +475,6 @@ START_TEST(same_scene_same_bytes)
   ck_assert_int_eq(system(command), 0);
   ck_assert_int_eq(sf_nir_write_scene(in("missing/a.nir"), &scene).code, SF_E_IO);
 }
-END_TEST
 
 /* ---- for tests/chain/nir.py: a scene's graph, inputs, and what the core makes of them ---- */
 
@@ -532,21 +526,13 @@ static int leave_case(const char *where, int mode)
   return !out || fclose(out);
 }
 
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+
 int main(void)
 {
   const char *where = getenv("SF_CROSSCHECK");
   if (where) return leave_case(where, FX_HYBRID) || leave_case(where, FX_DECAY) || leave_case(where, FX_NODECAY);
-  Suite *suite = suite_create("nir");
-  TCase *tcase = tcase_create("nir");
-  tcase_add_checked_fixture(tcase, make_folder, remove_folder);
-  tcase_add_loop_test(tcase, scene_gives_the_spikes_of_the_core, 0, 6);
-  tcase_add_loop_test(tcase, biases_and_decoders_too, 0, 4);
-  tcase_add_loop_test(tcase, model_gives_the_spikes_of_the_oracle, SF_HYBRID, SF_NODECAY + 1);
-  tcase_add_loop_test(tcase, tensorf_gives_the_spikes_of_the_oracle, 0, 2);
-  tcase_add_test(tcase, the_relu_twin_is_refused);
-  tcase_add_test(tcase, same_scene_same_bytes);
-  suite_add_tcase(suite, tcase);
-  return ck_run(suite);
+  return ck_main();
 }
 #else
 int main(void)

@@ -29,7 +29,7 @@ static size_t count_occupied(const sf_trainer *t)
 }
 
 /* Before the first visit of all cells none is empty; that visit leaves no cell as it was. */
-START_TEST(nothing_is_empty_before_it_was_looked_at)
+TEST(nothing_is_empty_before_it_was_looked_at)
 {
   sf_train_options o = small_run();
   o.stage1 = 300;
@@ -47,7 +47,6 @@ START_TEST(nothing_is_empty_before_it_was_looked_at)
   }
   sf_trainer_free(t);
 }
-END_TEST
 
 /* One cell is occupied, all others are taken for empty: an update finds all that touch it, and nothing of another
  * cascade. At the start the density is 1 everywhere, so what was looked at becomes occupied. */
@@ -79,23 +78,12 @@ static void check_neighbours(int bound, int x, int y, int z)
   sf_trainer_free(t);
 }
 
-START_TEST(neighbours_of_what_is_occupied_are_looked_at)
+TEST(neighbours_of_what_is_occupied_are_looked_at)
 {
   check_neighbours(1, 7, 8, 9);
   check_neighbours(1, 0, 0, 0);
   check_neighbours(1, 15, 15, 15);
   check_neighbours(4, 5, 6, 15);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("occupancy");
-  TCase *tc = tcase_create("occupancy");
-  tcase_set_timeout(tc, 60);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, nothing_is_empty_before_it_was_looked_at);
-  tcase_add_test(tc, neighbours_of_what_is_occupied_are_looked_at);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};

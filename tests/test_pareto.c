@@ -22,7 +22,7 @@ static void save(const char *name, const sf_point *point)
   ck_good(sf_write_file(in("centre"), "c\n", 2));
 }
 
-START_TEST(points_come_back)
+TEST(points_come_back)
 {
   sf_point other = centre;
   sf_sweep sweep;
@@ -46,9 +46,8 @@ START_TEST(points_come_back)
   ck_assert(!sf_point_on_axis(&sweep, &sweep.point[0], SF_AXIS_GRID));
   sf_sweep_free(&sweep);
 }
-END_TEST
 
-START_TEST(broken_folders_are_named)
+TEST(broken_folders_are_named)
 {
   static const char *const broken[] = {"{}", "[1]", "{\"name\": 3}",
                                        "{\"name\": \"x\", \"model\": \"m\", \"weight_bits\": 1e9}", "{"};
@@ -63,10 +62,9 @@ START_TEST(broken_folders_are_named)
   ck_assert_int_eq(unlink(in("points/c.json")), 0);
   ck_bad(sf_sweep_load(&sweep, folder), SF_E_FORMAT, "'c'", "missing");
 }
-END_TEST
 
 /* The front by its definition, on random points with many ties. */
-START_TEST(front)
+TEST(front)
 {
   enum { POINTS = 120 };
   static const int costs[] = {SF_POINT_ENERGY, SF_POINT_BYTES, SF_POINT_TRAFFIC};
@@ -94,10 +92,9 @@ START_TEST(front)
   ck_assert_int_gt(marked, 3);
   ck_assert_int_lt(marked, POINTS / 2);
 }
-END_TEST
 
 /* 70.02 mJ and 70.04 mJ are printed alike: neither beats the other by them. */
-START_TEST(what_prints_alike_is_alike)
+TEST(what_prints_alike_is_alike)
 {
   static const int energy = SF_POINT_ENERGY;
   sf_point a = centre, b = centre;
@@ -110,9 +107,8 @@ START_TEST(what_prints_alike_is_alike)
   b.figure[SF_POINT_PSNR_TRUTH] = NAN; /* equal to the picture: nothing is better */
   ck_assert(sf_point_beats(&b, &centre, &(int){SF_POINT_BYTES}, 1));
 }
-END_TEST
 
-START_TEST(files)
+TEST(files)
 {
   sf_point other = centre;
   sf_sweep sweep;
@@ -152,18 +148,5 @@ START_TEST(files)
   free(script);
   sf_sweep_free(&sweep);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("pareto");
-  TCase *cases = tcase_create("pareto");
-  tcase_add_checked_fixture(cases, make_folder, remove_folder);
-  tcase_add_test(cases, points_come_back);
-  tcase_add_test(cases, broken_folders_are_named);
-  tcase_add_test(cases, front);
-  tcase_add_test(cases, what_prints_alike_is_alike);
-  tcase_add_test(cases, files);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

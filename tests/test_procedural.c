@@ -54,7 +54,7 @@ static sf_stage_ray random_ray(uint64_t i)
 }
 
 /* Against marching in steps of 1/1000: the same first crossing; a graze that marching can step over is not counted. */
-START_TEST(hits_equal_marching)
+LOOP_TEST(hits_equal_marching, 4)
 {
   static const double sizes[4][3] = {{0.6, 0, 0}, {0.5, 0.3, 0.7}, {0.4, 0.6, 0}, {0.6, 0.2, 0}};
   const double centre[3] = {0.1, -0.2, 0.15}, step = 1e-3;
@@ -83,9 +83,8 @@ START_TEST(hits_equal_marching)
   }
   ck_assert_int_gt(hits, 500);
 }
-END_TEST
 
-START_TEST(rays_along_axes_hit)
+LOOP_TEST(rays_along_axes_hit, 4)
 {
   const double centre[3] = {0}, size[3] = {0.5, 0.25, 0.5};
   for (int axis = 0; axis < 3; axis++) {
@@ -100,7 +99,6 @@ START_TEST(rays_along_axes_hit)
     if (found) ck_assert_double_eq_tol(hit.t, expected[_i][axis], 1e-12);
   }
 }
-END_TEST
 
 /* ---- procedural scenes ---- */
 
@@ -110,7 +108,7 @@ static void trace(const char *name, float ox, float oy, float oz, float dx, floa
   ck_good(sf_procedural_trace(name, o, d, rgba));
 }
 
-START_TEST(fog_follows_beer_lambert)
+TEST(fog_follows_beer_lambert)
 {
   float c[4];
   /* Through the sphere (radius 0.95, density 0.9) above core, ring and slab, at height 0.8. */
@@ -132,9 +130,8 @@ START_TEST(fog_follows_beer_lambert)
   trace("fog", 0, 3, 0.97f, 0, -1, 0, c);
   ck_assert(c[3] == 0);
 }
-END_TEST
 
-START_TEST(scenes_stay_in_the_box)
+TEST(scenes_stay_in_the_box)
 {
   for (int n = 0; sf_procedural_names[n]; n++) {
     if (!strcmp(sf_procedural_names[n], "plaza")) continue; /* no_ray_ends_in_nothing */
@@ -157,11 +154,10 @@ START_TEST(scenes_stay_in_the_box)
     ck_assert_int_eq(opaque > 1000, strcmp(sf_procedural_names[n], "empty") != 0);
   }
 }
-END_TEST
 
 /* One point of a ball, its normal towards the light, from nine sides: shine makes the colours differ; in the simple
  * scene they are equal. */
-START_TEST(shine_depends_on_the_view)
+TEST(shine_depends_on_the_view)
 {
   static const double centres[2][3] = {{0.38, 0.32, 0.26}, {-0.42, 0.46, 0.88}}, radius[2] = {0.22, 0.06};
   const double n[3] = {0.48, -0.36, 0.80};
@@ -184,10 +180,9 @@ START_TEST(shine_depends_on_the_view)
       ck_assert_float_lt(most - least, 1e-3f); /* the point itself moves by float rounding */
   }
 }
-END_TEST
 
 /* From inside its sky the plaza is opaque in every direction; the sky is seen from the far side of it only. */
-START_TEST(no_ray_ends_in_nothing)
+TEST(no_ray_ends_in_nothing)
 {
   for (uint64_t i = 0; i < 20000; i++) {
     float o[3], d[3], c[4];
@@ -205,16 +200,14 @@ START_TEST(no_ray_ends_in_nothing)
   trace("plaza", 20, 0, 0.5f, -1, 0, 0, c); /* from outside, too */
   ck_assert_float_eq(c[3], 1);
 }
-END_TEST
 
-START_TEST(trace_faults)
+TEST(trace_faults)
 {
   const float o[3] = {0, 0, 3}, d[3] = {0, 0, -1}, none[3] = {0};
   float c[4];
   ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars", "textured, simple, fog, empty, plaza, wires");
   ck_bad(sf_procedural_trace("fog", o, none, c), SF_E_RANGE, "fog", "direction");
 }
-END_TEST
 
 static sf_procedural_options small = {24, 20, 3, 2, 5};
 
@@ -234,7 +227,7 @@ static bool stop_at_two(void *user, int done, int total)
 }
 
 /* Written, loaded, and each pixel equal to the mean of 4 x 4 exact rays. */
-START_TEST(written_scene_is_what_the_rays_see)
+LOOP_TEST(written_scene_is_what_the_rays_see, 5)
 {
   const char *name = sf_procedural_names[_i];
   int last = 0;
@@ -274,7 +267,6 @@ START_TEST(written_scene_is_what_the_rays_see)
   ck_assert_int_eq(d.count, 2);
   sf_dataset_free(&d);
 }
-END_TEST
 
 static void same_file(const char *a, const char *b, bool same)
 {
@@ -287,7 +279,7 @@ static void same_file(const char *a, const char *b, bool same)
   free(q);
 }
 
-START_TEST(seed_decides_and_threads_do_not)
+TEST(seed_decides_and_threads_do_not)
 {
   sf_procedural_options other = small;
   other.seed = 6;
@@ -308,9 +300,8 @@ START_TEST(seed_decides_and_threads_do_not)
   }
   same_file(in("one/train/r_0.png"), in("one/test/r_0.png"), false);
 }
-END_TEST
 
-START_TEST(write_faults)
+TEST(write_faults)
 {
   sf_procedural_options none = small;
   none.test_views = 0;
@@ -325,29 +316,5 @@ START_TEST(write_faults)
   struct stat info;
   ck_assert_int_ne(stat(in("x"), &info), 0);
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("procedural");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, hits_equal_marching, 0, 4);
-  tcase_add_loop_test(t, rays_along_axes_hit, 0, 4);
-  tcase_add_test(t, fog_follows_beer_lambert);
-  tcase_add_test(t, scenes_stay_in_the_box);
-  tcase_add_test(t, no_ray_ends_in_nothing);
-  tcase_add_test(t, shine_depends_on_the_view);
-  tcase_add_test(t, trace_faults);
-  tcase_add_loop_test(t, written_scene_is_what_the_rays_see, 0, 5);
-  tcase_add_test(t, seed_decides_and_threads_do_not);
-  tcase_add_test(t, write_faults);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

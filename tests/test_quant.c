@@ -95,7 +95,7 @@ static double entry_error(const sf_model *m, const fx_scene *scene, int level, d
 
 /* A position rounded to 1/256 of a cell moves the value by at most 3/512 of the largest difference of two entries; then
  * the largest error of an entry, half an LSB of the feature, and what lies beyond its rails. */
-START_TEST(features_against_float)
+TEST(features_against_float)
 {
   sf_model m = make_model(128, 16, SF_HYBRID);
   fx_scene scene;
@@ -122,7 +122,6 @@ START_TEST(features_against_float)
   fx_scene_free(&scene);
   sf_model_free(&m);
 }
-END_TEST
 
 typedef struct tally {
   double current_error[SF_LAYERS], current_energy[SF_LAYERS];
@@ -201,19 +200,18 @@ static void check_model(int hidden, int levels, int mode)
   sf_model_free(&m);
 }
 
-START_TEST(nets_against_float)
+TEST(nets_against_float)
 {
   check_model(128, 16, SF_HYBRID);
   check_model(128, 16, SF_NODECAY);
   check_model(64, 8, SF_DECAY);
   check_model(16, 1, SF_HYBRID);
 }
-END_TEST
 
 /* Every D2 and C3 current through the tables against exp and the logistic function of the current it stands for: the
  * argument is rounded to 2^-13 (and 16 bits of factor: 2^-17 of up to 16) and the table adds 1e-6; half an LSB at the
  * end. */
-START_TEST(output_functions_have_the_right_units)
+TEST(output_functions_have_the_right_units)
 {
   sf_model m = make_model(64, 4, SF_HYBRID);
   fx_scene scene;
@@ -230,10 +228,9 @@ START_TEST(output_functions_have_the_right_units)
   fx_scene_free(&scene);
   sf_model_free(&m);
 }
-END_TEST
 
 /* The fit keeps what it knows to be true of a solvable case: weights that are multiples of a unit come back. */
-START_TEST(fit_recovers_exact_weights)
+TEST(fit_recovers_exact_weights)
 {
   enum { ROWS = 2000, IN = 12, OUT = 5 };
   int16_t *x = malloc(ROWS * IN * sizeof *x);
@@ -259,10 +256,9 @@ START_TEST(fit_recovers_exact_weights)
     for (int o = 0; o < OUT; o++) ck_assert_int_eq(q[i * SF_LANES + o], (int)lround(w[o * IN + i] * lsb[i] / 0.125));
   free(x), free(target);
 }
-END_TEST
 
 /* Spikes of a real layer are correlated; letting rounding errors cancel must pay on samples outside the fit. */
-START_TEST(refinement_lowers_the_held_out_error)
+TEST(refinement_lowers_the_held_out_error)
 {
   sf_model m = make_model(128, 16, SF_HYBRID);
   sf_calibration c;
@@ -284,9 +280,8 @@ START_TEST(refinement_lowers_the_held_out_error)
   sf_calibration_free(&c);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(same_seed_same_bits_any_threads)
+TEST(same_seed_same_bits_any_threads)
 {
   sf_model m = make_model(64, 8, SF_HYBRID);
   fx_scene a, b;
@@ -303,9 +298,8 @@ START_TEST(same_seed_same_bits_any_threads)
   fx_scene_free(&a), fx_scene_free(&b);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(refuses_what_it_cannot_represent)
+TEST(refuses_what_it_cannot_represent)
 {
   static const float bad[] = {NAN, INFINITY, -INFINITY};
   sf_model m = make_model(32, 4, SF_HYBRID);
@@ -339,9 +333,8 @@ START_TEST(refuses_what_it_cannot_represent)
   assert_refused(&m, &(sf_quant_options){.background = {0, NAN, 0}}, SF_E_RANGE, "background[1]");
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(steps_and_leaks)
+TEST(steps_and_leaks)
 {
   sf_model m = make_model(32, 4, SF_DECAY);
   fx_scene scene;
@@ -358,7 +351,6 @@ START_TEST(steps_and_leaks)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 static int largest(const int8_t *value, size_t n)
 {
@@ -425,7 +417,7 @@ static void assert_same_scene(const fx_scene *a, const fx_scene *b)
   }
 }
 
-START_TEST(widths)
+TEST(widths)
 {
   static const struct {
     size_t offset;
@@ -461,12 +453,11 @@ START_TEST(widths)
   fx_scene_free(&whole);
   sf_model_free(&m);
 }
-END_TEST
 
 /* A model whose calibration does not show how wide its inputs get: 128 equal weights, so that h could be 128 * 127 / 8
  * = 2032; a field that is 20 times larger outside the only occupied cell; directions that matter to no neuron, so that
  * no search avoids a fine LSB. */
-START_TEST(narrow_inputs_never_clip)
+TEST(narrow_inputs_never_clip)
 {
   sf_model m = make_model(128, 2, SF_HYBRID);
   fx_scene scene;
@@ -493,10 +484,9 @@ START_TEST(narrow_inputs_never_clip)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 /* Models at the edge of sense still give a scene that passes its check, and scales that a model's file may hold. */
-START_TEST(extreme_models)
+TEST(extreme_models)
 {
   static const float scales[] = {0, 1e-42f, 1e-20f, 1e-4f, 1};
   for (int i = 0; i < 5; i++)
@@ -526,25 +516,5 @@ START_TEST(extreme_models)
       sf_model_free(&m);
     }
 }
-END_TEST
 
-int main(void)
-{
-  setvbuf(stdout, NULL, _IOLBF, 0);
-  Suite *suite = suite_create("quant");
-  TCase *cases = tcase_create("quant");
-  tcase_set_timeout(cases, 300);
-  tcase_add_test(cases, features_against_float);
-  tcase_add_test(cases, nets_against_float);
-  tcase_add_test(cases, output_functions_have_the_right_units);
-  tcase_add_test(cases, fit_recovers_exact_weights);
-  tcase_add_test(cases, refinement_lowers_the_held_out_error);
-  tcase_add_test(cases, same_seed_same_bits_any_threads);
-  tcase_add_test(cases, refuses_what_it_cannot_represent);
-  tcase_add_test(cases, steps_and_leaks);
-  tcase_add_test(cases, widths);
-  tcase_add_test(cases, narrow_inputs_never_clip);
-  tcase_add_test(cases, extreme_models);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

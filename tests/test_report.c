@@ -91,7 +91,7 @@ static void print(void)
 }
 
 /* Sums of these numbers are exact in binary: equality, no bound. */
-START_TEST(averages)
+TEST(averages)
 {
   int count;
   write_run("b", "beta-5e-7", 30.5, 4);
@@ -112,9 +112,8 @@ START_TEST(averages)
   ck_assert_int_eq(verdict(SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_METRIC_PSNR), SF_ORDER_MISSING);
   ck_assert_int_eq(report.problems, 0);
 }
-END_TEST
 
-START_TEST(energies)
+TEST(energies)
 {
   write_run("a", "beta-5e-7", 30, 3);
   write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000); /* 0.04 mJ per sample */
@@ -146,10 +145,9 @@ START_TEST(energies)
   print();
   contains("table.md", "mean of 2 held-out frames of 64 x 48 pixels", true);
 }
-END_TEST
 
 /* Planted: the rendering's count is one fJ off, an audit that disagrees with itself, a file that is no JSON. */
-START_TEST(faults)
+TEST(faults)
 {
   write_run("a", "beta-5e-7", 30, 3);
   write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000);
@@ -174,9 +172,8 @@ START_TEST(faults)
   print();
   contains("table.md", "## Problems", true);
 }
-END_TEST
 
-START_TEST(judgement)
+TEST(judgement)
 {
   static const struct {
     double paper, ours;
@@ -189,10 +186,9 @@ START_TEST(judgement)
   for (size_t i = 0; i < sizeof row / sizeof *row; i++)
     ck_assert_msg(sf_order_judge(row[i].paper, row[i].ours, 0.05, 0.05) == row[i].verdict, "row %zu", i);
 }
-END_TEST
 
 /* Every run in the paper's own numbers: every pair must agree; then one number is moved, and just its pairs turn. */
-START_TEST(order)
+TEST(order)
 {
   sf_order order[SF_ORDERS_MAX];
   for (int i = 0; i < SF_RUNS; i++) {
@@ -230,10 +226,9 @@ START_TEST(order)
   contains("table.md",
            "No pair missing or reversed: beta, ANN, stage I, L_extra, L_penalty, L_budg, fixed steps, learned", true);
 }
-END_TEST
 
 /* A killed training: a line is cut, and after the resume iterations are there again. */
-START_TEST(log_of_a_resumed_run)
+TEST(log_of_a_resumed_run)
 {
   write_run("s", "no-budget", 30, 3);
   write_text("s/no-budget/train.jsonl", "{\"iteration\":16,\"t_star\":7}\n{\"iteration\":32,\"t_star\":6}\n"
@@ -245,9 +240,8 @@ START_TEST(log_of_a_resumed_run)
   ck_assert_int_eq(run->points, 3);
   for (int i = 0; i < 3; i++) ck_assert(run->iteration[i] == at[i] && run->t_star_at[i] == t_star[i]);
 }
-END_TEST
 
-START_TEST(plots_and_json)
+TEST(plots_and_json)
 {
   int count;
   load(); /* nothing at all */
@@ -281,10 +275,9 @@ START_TEST(plots_and_json)
   contains("results.json", "somebody", false);
   contains("results.json", "\"prefix_psnr\":\t[25, 30, 30.5]", true);
 }
-END_TEST
 
 /* Profile scenes: a row for every scene and backbone, below them the paper's for their kinds, each once. */
-START_TEST(pairs)
+TEST(pairs)
 {
   static const struct {
     const char *ann, *spiking, *summary, *kind;
@@ -337,10 +330,9 @@ START_TEST(pairs)
   ck_good(sf_reproduction_load(&report, in("scenes/.")));
   ck_assert_str_eq(report.profile, "scenes");
 }
-END_TEST
 
 /* beta-5e-7 failed before its export: the ANN was rendered with the next. */
-START_TEST(reference_of_the_ann)
+TEST(reference_of_the_ann)
 {
   write_text("a/beta-5e-7/status", "failed: no memory\n");
   write_run("a", "beta-1e-7", 30, 3);
@@ -351,9 +343,8 @@ START_TEST(reference_of_the_ann)
   load();
   ck_assert_double_eq_tol(mean(0, SF_RUN_ANN, SF_METRIC_ENERGY), 20, 1e-9);
 }
-END_TEST
 
-START_TEST(parameters)
+TEST(parameters)
 {
   write_text("a/ann/train.cmd", "sf_train DATA --stage1 4 --seed 1 --net ann --psnr-prefixes 1\n");
   write_text("a/beta-5e-7/train.cmd", "sf_train DATA --stage1 4 --seed 1 --beta 5e-7\n");
@@ -373,9 +364,8 @@ START_TEST(parameters)
   ck_assert_int_eq(report.problems, 1);
   ck_assert_ptr_nonnull(strstr(report.problem[0], "; a, beta-5e-7: 'sf_train DATA --stage1 5"));
 }
-END_TEST
 
-START_TEST(too_many_prefixes)
+TEST(too_many_prefixes)
 {
   write_text("s/ann/train.json",
              "{\"psnr\":30,\"ssim\":0.5,\"t_r\":2,\"seconds\":1,\"prefix_psnr\":[1,2,3,4,5,6,7,8,9]}");
@@ -384,10 +374,9 @@ START_TEST(too_many_prefixes)
   sf_reproduction other;
   ck_bad(sf_reproduction_load(&other, in("nowhere")), SF_E_IO, "nowhere", "folder");
 }
-END_TEST
 
 /* Scenes of any kind are as many as there are: each has its rows. */
-START_TEST(many_scenes)
+TEST(many_scenes)
 {
   char name[32], row[48];
   for (int i = 0; i < 60; i++) {
@@ -402,25 +391,5 @@ START_TEST(many_scenes)
     contains("table.md", row, true);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("report");
-  TCase *tc = tcase_create("report");
-  tcase_add_checked_fixture(tc, setup, teardown);
-  tcase_add_test(tc, averages);
-  tcase_add_test(tc, energies);
-  tcase_add_test(tc, faults);
-  tcase_add_test(tc, judgement);
-  tcase_add_test(tc, order);
-  tcase_add_test(tc, log_of_a_resumed_run);
-  tcase_add_test(tc, plots_and_json);
-  tcase_add_test(tc, pairs);
-  tcase_add_test(tc, reference_of_the_ann);
-  tcase_add_test(tc, parameters);
-  tcase_add_test(tc, too_many_prefixes);
-  tcase_add_test(tc, many_scenes);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = setup, .tear_down = teardown};

@@ -3,7 +3,7 @@
 #include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
-START_TEST(trained_size_nets)
+LOOP_TEST(trained_size_nets, 3)
 {
   random_source r = {(uint64_t)_i + 100, 0};
   random_net_make(&net_of_test, &r, false);
@@ -19,10 +19,9 @@ START_TEST(trained_size_nets)
   ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A net whose time does not hang on the streams: with stalls the model is within a hundredth. */
-START_TEST(stalls_hide_behind_the_engine)
+TEST(stalls_hide_behind_the_engine)
 {
   typical(77);
   fx_counts counts = {0}, actual;
@@ -36,7 +35,6 @@ START_TEST(stalls_hide_behind_the_engine)
   ck_assert_double_eq_tol((double)cycles, model, 0.01 * model);
   sf_dut_close(dut);
 }
-END_TEST
 
 static void check_cycles(uint64_t seed, int n, bool extreme)
 {
@@ -51,20 +49,18 @@ static void check_cycles(uint64_t seed, int n, bool extreme)
 }
 
 /* While the streams never make it wait the model is exact, and so are each layer's busy cycles and the stalls. */
-START_TEST(cycles_are_those_of_the_model)
+LOOP_TEST(cycles_are_those_of_the_model, 6)
 {
   for (uint64_t i = 0; i < 4; i++) check_cycles(5000 + (uint64_t)_i * 4 + i, BATCH, _i > 0);
 }
-END_TEST
 
 /* Between two layers nothing else is at work: a cycle in which the accelerator takes itself for idle is missing. */
-START_TEST(cycles_of_a_sample_alone)
+LOOP_TEST(cycles_of_a_sample_alone, 6)
 {
   for (uint64_t i = 0; i < 8; i++) check_cycles(5100 + (uint64_t)_i * 8 + i, 1, _i > 0);
 }
-END_TEST
 
-START_TEST(extreme_nets)
+LOOP_TEST(extreme_nets, 25)
 {
   for (uint64_t i = 0; i < 16; i++) {
     random_source r = {1000 + (uint64_t)_i * 16 + i, 0};
@@ -72,10 +68,9 @@ START_TEST(extreme_nets)
     check_net(&net_of_test.net, &r, 24, true, (int)draw(&r, 0, 3) * 25);
   }
 }
-END_TEST
 
 /* Every mode with every number of steps, at the ends of the leak. */
-START_TEST(modes_and_steps)
+LOOP_TEST(modes_and_steps, 3)
 {
   static const int32_t leak[] = {0, 1, 2048, 4095, 4096};
   random_source r = {2000 + (uint64_t)_i, 0};
@@ -88,7 +83,6 @@ START_TEST(modes_and_steps)
     check_net(net, &r, 4, true, 10);
   }
 }
-END_TEST
 
 static void tiny_net(random_net *n)
 {
@@ -106,7 +100,7 @@ static void tiny_net(random_net *n)
 }
 
 /* The argument of a table is its bias when the multiplier is 0: both tables over their range, ends included. */
-START_TEST(tables)
+TEST(tables)
 {
   tiny_net(&net_of_test);
   fx_net *net = &net_of_test.net;
@@ -126,11 +120,10 @@ START_TEST(tables)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- streams ---- */
 
-START_TEST(stalls_change_timing_only)
+TEST(stalls_change_timing_only)
 {
   static fx_out reference[BATCH];
   fx_counts first = {0};
@@ -149,10 +142,9 @@ START_TEST(stalls_change_timing_only)
     sf_dut_close(dut);
   }
 }
-END_TEST
 
 /* Nobody takes a result for a long time: input stops being accepted, nothing is lost. */
-START_TEST(long_back_pressure)
+TEST(long_back_pressure)
 {
   typical(43);
   fx_counts counts = {0};
@@ -190,28 +182,4 @@ START_TEST(long_back_pressure)
     beat = !beat;
   }
   sf_dut_close(dut);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("rtl");
-  TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 60);
-  tcase_add_loop_test(nets, trained_size_nets, 0, 3);
-  tcase_add_loop_test(nets, cycles_are_those_of_the_model, 0, 6);
-  tcase_add_loop_test(nets, cycles_of_a_sample_alone, 0, 6);
-  tcase_add_test(nets, stalls_hide_behind_the_engine);
-  tcase_add_loop_test(nets, extreme_nets, 0, 25);
-  tcase_add_loop_test(nets, modes_and_steps, 0, 3);
-  tcase_add_test(nets, tables);
-  tcase_add_test(nets, stalls_change_timing_only);
-  tcase_add_test(nets, long_back_pressure);
-  suite_add_tcase(s, nets);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
 }

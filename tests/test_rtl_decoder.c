@@ -18,7 +18,7 @@ static void check_cycles(const fx_net *net, int n, uint64_t seed)
   sf_dut_close(dut);
 }
 
-START_TEST(trained_size_decoders)
+LOOP_TEST(trained_size_decoders, SIZES)
 {
   random_source r = {300 + (uint64_t)_i, 0};
   random_decoder_make(&net_of_test, &r, inputs_of[_i], false);
@@ -34,9 +34,8 @@ START_TEST(trained_size_decoders)
   ck_assert_uint_eq(counts.layer[FX_D1].updates[0] + counts.layer[FX_D2].special[0] + counts.rays, 0);
   sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(extreme_decoders)
+LOOP_TEST(extreme_decoders, 10)
 {
   for (uint64_t i = 0; i < 16; i++) {
     random_source r = {1000 + (uint64_t)_i * 16 + i, 0};
@@ -44,10 +43,9 @@ START_TEST(extreme_decoders)
     check_net(&net_of_test.net, &r, 24, true, (int)draw(&r, 0, 3) * 25);
   }
 }
-END_TEST
 
 /* Every mode with every number of steps, with each set of biases. */
-START_TEST(modes_steps_and_biases)
+LOOP_TEST(modes_steps_and_biases, 3)
 {
   for (int steps = 1; steps <= SF_T_MAX; steps++)
     for (int biases = 0; biases < 8; biases++) {
@@ -60,9 +58,8 @@ START_TEST(modes_steps_and_biases)
       check_net(net, &r, 4, true, 10);
     }
 }
-END_TEST
 
-START_TEST(cycles_are_those_of_the_model)
+LOOP_TEST(cycles_are_those_of_the_model, 4)
 {
   for (uint64_t i = 0; i < 8; i++) {
     random_source r = {5000 + (uint64_t)_i * 8 + i, 0};
@@ -72,10 +69,9 @@ START_TEST(cycles_are_those_of_the_model)
     check_cycles(&net_of_test.net, BATCH, r.seed);
   }
 }
-END_TEST
 
 /* One row of 150 inputs and one of biases per cycle, sample after sample: no cycle is lost between two of them. */
-START_TEST(a_sample_takes_a_cycle_per_row)
+TEST(a_sample_takes_a_cycle_per_row)
 {
   random_source r = {6000, 0};
   random_decoder_make(&net_of_test, &r, 150, false);
@@ -90,7 +86,6 @@ START_TEST(a_sample_takes_a_cycle_per_row)
   ck_assert_uint_lt(cycles, 151 * BATCH + 250); /* the first packet, the last sample's C2 and C3 */
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- hard cases ---- */
 
@@ -101,7 +96,7 @@ static void fill_row(fx_layer *layer, int row, int8_t w)
 
 /* 0, 1: every weight and bias at the same rail, inputs too; 2, 3: biases alone, the rest is 0: C1 silent or every
  * neuron fires at every step; 4: zero inputs; 5: inputs against the bias. */
-START_TEST(hard_cases)
+LOOP_TEST(hard_cases, 6)
 {
   for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++) {
     random_source r = {7000 + (uint64_t)mode, 0};
@@ -127,7 +122,6 @@ START_TEST(hard_cases)
     if (_i < 2) ck_assert_int_eq(abs(shared.trace[1].current[FX_C1][0][0]), (1 << 23) - !_i);
   }
 }
-END_TEST
 
 /* ---- the same build ---- */
 
@@ -145,7 +139,7 @@ static void next_net(sf_dut *dut, random_source *r, bool decoder)
 }
 
 /* An INGP net, a decoder, and an INGP net again, and so on, in one simulation without a reset of the block. */
-START_TEST(nets_take_turns)
+LOOP_TEST(nets_take_turns, 3)
 {
   random_source r = {8000 + (uint64_t)_i, 0};
   random_net_make(&net_of_test, &r, true);
@@ -153,10 +147,9 @@ START_TEST(nets_take_turns)
   for (int i = 0; i < 7; i++) next_net(dut, &r, i % 2);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* With densities and biases: the direction's row of biases once a ray, C2's and C3's cost no cycle. */
-START_TEST(biases_of_other_nets)
+LOOP_TEST(biases_of_other_nets, 3)
 {
   for (uint64_t i = 0; i < 8; i++) {
     random_source r = {9000 + (uint64_t)_i * 8 + i, 0};
@@ -170,7 +163,6 @@ START_TEST(biases_of_other_nets)
     check_cycles(&net_of_test.net, BATCH, r.seed);
   }
 }
-END_TEST
 
 /* ---- refused ---- */
 
@@ -184,7 +176,7 @@ static uint32_t error_of(sf_dut *dut)
   return dut->bus.read(dut->bus.context, SF_CSR_ERROR);
 }
 
-START_TEST(illegal_programming_is_refused)
+TEST(illegal_programming_is_refused)
 {
   enum { MORE = SF_LANES + 1 };
   static const struct {
@@ -219,10 +211,9 @@ START_TEST(illegal_programming_is_refused)
   same_counts(dut, &counts, r.seed);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* 0: a beat less, 1: a beat more, 2: no tuser, 3: no tuser on the second sample, 4: a value of 13 bits. */
-START_TEST(bad_packets_are_refused)
+LOOP_TEST(bad_packets_are_refused, 5)
 {
   random_source r = {20 + (uint64_t)_i, 0};
   random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
@@ -257,10 +248,9 @@ START_TEST(bad_packets_are_refused)
   same_counts(dut, &counts, r.seed);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Nobody takes a result for a long time: nothing is lost. Soft reset at many moments leaves no trace. */
-START_TEST(soft_reset_at_any_time)
+TEST(soft_reset_at_any_time)
 {
   random_source r = {30, 0};
   random_decoder_make(&net_of_test, &r, 30, false);
@@ -286,24 +276,5 @@ START_TEST(soft_reset_at_any_time)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *s = suite_create("rtl_decoder");
-  TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 120);
-  tcase_add_loop_test(nets, trained_size_decoders, 0, SIZES);
-  tcase_add_loop_test(nets, extreme_decoders, 0, 10);
-  tcase_add_loop_test(nets, modes_steps_and_biases, 0, 3);
-  tcase_add_loop_test(nets, cycles_are_those_of_the_model, 0, 4);
-  tcase_add_test(nets, a_sample_takes_a_cycle_per_row);
-  tcase_add_loop_test(nets, hard_cases, 0, 6);
-  tcase_add_loop_test(nets, nets_take_turns, 0, 3);
-  tcase_add_loop_test(nets, biases_of_other_nets, 0, 3);
-  tcase_add_test(nets, illegal_programming_is_refused);
-  tcase_add_loop_test(nets, bad_packets_are_refused, 0, 5);
-  tcase_add_test(nets, soft_reset_at_any_time);
-  suite_add_tcase(s, nets);
-  return ck_run(s);
-}
+int ck_timeout = 120;

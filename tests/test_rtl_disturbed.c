@@ -71,7 +71,7 @@ static void hard_reset(sf_dut *dut, int cycles)
   ck_assert_uint_eq(get(dut, SF_CSR_STATUS) & (SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE | SF_CSR_STATUS_ERROR), 0);
 }
 
-START_TEST(hard_reset_at_any_time)
+TEST(hard_reset_at_any_time)
 {
   random_source r = {62, 0};
   sf_dut *dut = begin(62);
@@ -85,7 +85,6 @@ START_TEST(hard_reset_at_any_time)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
 static void program_and_start(sf_dut *dut)
 {
@@ -110,7 +109,7 @@ static void has_no_direction(sf_dut *dut)
 }
 
 /* The driver always begins with a soft reset; after a hard one it is not needed, at power-on or in mid-frame. */
-START_TEST(a_hard_reset_is_enough)
+LOOP_TEST(a_hard_reset_is_enough, 2)
 {
   random_source r = {68, (uint64_t)_i << 32};
   sf_dut *dut;
@@ -134,10 +133,9 @@ START_TEST(a_hard_reset_is_enough)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Waits for the phase at the pins, then strikes at once. */
-START_TEST(soft_reset_in_every_phase)
+LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
 {
   random_source r = {63, (uint64_t)_i << 32};
   sf_dut *dut = begin(63);
@@ -160,7 +158,6 @@ START_TEST(soft_reset_in_every_phase)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
 /* What the core counts of the samples from..to-1 that feed_cycle sends. */
 static fx_counts counts_of(uint64_t from, uint64_t to)
@@ -215,7 +212,7 @@ static void send_rest(sf_dut *dut, feed *f, random_source *r)
 }
 
 /* Asked for at any moment, a snapshot is of whole samples, and no event is lost between it and a clear. */
-START_TEST(snapshot_and_clear_at_work)
+LOOP_TEST(snapshot_and_clear_at_work, 8)
 {
   random_source r = {64, (uint64_t)_i << 32};
   sf_dut *dut = begin(64);
@@ -235,11 +232,10 @@ START_TEST(snapshot_and_clear_at_work)
   same_events(&rest, &after);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Streams that trickle, so that every step of every layer has a bubble or back-pressure, with and without membranes at
  * their rails. */
-START_TEST(all_steps_under_stalls)
+LOOP_TEST(all_steps_under_stalls, 3)
 {
   random_source r = {67, (uint64_t)_i << 32};
   for (int saturating = 0; saturating < 2; saturating++) {
@@ -265,7 +261,6 @@ START_TEST(all_steps_under_stalls)
     sf_dut_close(dut);
   }
 }
-END_TEST
 
 /* ---- AXI4-Lite, reads and writes at once ---- */
 
@@ -281,7 +276,7 @@ static void hold_response(const sf_pins_in *in, const sf_pins_out *out, sf_pins_
   *before = *out;
 }
 
-START_TEST(register_accesses_overlap)
+LOOP_TEST(register_accesses_overlap, 4)
 {
   random_source r = {65, (uint64_t)_i << 32};
   sf_dut *dut = begin(65);
@@ -333,10 +328,9 @@ START_TEST(register_accesses_overlap)
   ck_assert_int_gt(answered, 200);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A write of less than a word is refused and changes nothing. */
-START_TEST(part_of_a_word)
+TEST(part_of_a_word)
 {
   sf_dut *dut = begin(66);
   sf_driver_reset(&dut->bus);
@@ -360,21 +354,4 @@ START_TEST(part_of_a_word)
   }
   works(dut);
   sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *s = suite_create("rtl_disturbed");
-  TCase *c = tcase_create("disturbed");
-  tcase_set_timeout(c, 60);
-  tcase_add_test(c, hard_reset_at_any_time);
-  tcase_add_loop_test(c, a_hard_reset_is_enough, 0, 2);
-  tcase_add_loop_test(c, soft_reset_in_every_phase, 0, SF_PHASES);
-  tcase_add_loop_test(c, snapshot_and_clear_at_work, 0, 8);
-  tcase_add_loop_test(c, all_steps_under_stalls, 0, 3);
-  tcase_add_loop_test(c, register_accesses_overlap, 0, 4);
-  tcase_add_test(c, part_of_a_word);
-  suite_add_tcase(s, c);
-  return ck_run(s);
 }

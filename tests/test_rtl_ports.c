@@ -39,7 +39,7 @@ static void expect_error(sf_dut *dut, uint32_t bit)
   ck_assert(!dut->bus_hung);
 }
 
-START_TEST(illegal_programming_is_refused)
+TEST(illegal_programming_is_refused)
 {
   enum { MORE = SF_LANES + 1, LESS = SF_LANES - 1 };
   static const struct {
@@ -81,9 +81,8 @@ START_TEST(illegal_programming_is_refused)
   recovers(dut);
   sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(programming_while_running_is_refused)
+TEST(programming_while_running_is_refused)
 {
   typical(46);
   fx_counts counts = {0};
@@ -103,9 +102,8 @@ START_TEST(programming_while_running_is_refused)
   same_counts(dut, &counts, 46);
   sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(weights_and_addresses_are_checked)
+TEST(weights_and_addresses_are_checked)
 {
   typical(47);
   sf_dut *dut = open_dut(&net_of_test.net, 13, 0);
@@ -157,10 +155,9 @@ START_TEST(weights_and_addresses_are_checked)
   recovers(dut);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Registers read back what was written, from the table that both sides are made of. */
-START_TEST(registers_read_back)
+TEST(registers_read_back)
 {
   typical(48);
   sf_dut *dut = open_dut(&net_of_test.net, 14, 50);
@@ -182,10 +179,9 @@ START_TEST(registers_read_back)
   ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Registers start with random values; a hard reset gives them those of the table. */
-START_TEST(registers_after_reset)
+TEST(registers_after_reset)
 {
   sf_dut *dut;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
@@ -197,9 +193,8 @@ START_TEST(registers_after_reset)
 #undef SF_CSR_FIELD
   sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(counters_clear_and_add_up)
+TEST(counters_clear_and_add_up)
 {
   typical(49);
   fx_counts counts = {0}, zero = {0};
@@ -220,7 +215,6 @@ START_TEST(counters_clear_and_add_up)
   same_counts(dut, &zero, 49);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- packets ---- */
 
@@ -246,7 +240,7 @@ static void send_bad(sf_dut *dut, bad_packet kind)
   dut->in.s_valid = false;
 }
 
-START_TEST(bad_packets_are_refused)
+LOOP_TEST(bad_packets_are_refused, BAD_PACKETS)
 {
   typical(50);
   sf_dut *dut = open_dut(&net_of_test.net, 16, 0);
@@ -264,10 +258,9 @@ START_TEST(bad_packets_are_refused)
   recovers(dut);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Soft reset at many moments of a sample, then everything again from the start. */
-START_TEST(soft_reset_at_any_time)
+TEST(soft_reset_at_any_time)
 {
   typical(51);
   sf_dut *dut = open_dut(&net_of_test.net, 17, 0);
@@ -287,10 +280,9 @@ START_TEST(soft_reset_at_any_time)
   }
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A bad packet in every cycle around a soft reset: one that comes beside it is dropped like any other. */
-START_TEST(bad_packet_beside_a_soft_reset)
+TEST(bad_packet_beside_a_soft_reset)
 {
   typical(52);
   sf_dut *dut = open_dut(&net_of_test.net, 18, 0);
@@ -317,7 +309,6 @@ START_TEST(bad_packet_beside_a_soft_reset)
   ck_assert_int_gt(together, 3);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- driver ---- */
 
@@ -327,7 +318,7 @@ static uint32_t fake_read(void *context, uint32_t offset)
   return offset == SF_CSR_ID ? value[0] : offset == SF_CSR_VERSION ? value[1] : value[2];
 }
 
-START_TEST(driver_refuses_another_device)
+TEST(driver_refuses_another_device)
 {
   uint32_t value[3] = {SF_CSR_ID_RESET, SF_CSR_VERSION_RESET, SF_CSR_CONFIG_RESET};
   const sf_bus bus = {.read = fake_read, .context = value};
@@ -341,7 +332,6 @@ START_TEST(driver_refuses_another_device)
   value[0] = 0;
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_NO_DEVICE);
 }
-END_TEST
 
 static void put_word(uint8_t *block, int index, int32_t value)
 {
@@ -367,7 +357,7 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
 }
 
 /* The firmware's way: from a block of memory through the driver; any cut of the block is refused. */
-START_TEST(net_from_memory)
+LOOP_TEST(net_from_memory, 2)
 {
   static uint8_t block[SF_BLOB_WORDS * 4 + SF_LAYERS * SF_LANES * SF_LANES];
   random_source r = {52, 0};
@@ -386,9 +376,8 @@ START_TEST(net_from_memory)
   ck_assert_int_eq(sf_blob_open(block, size, &net), -1);
   sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(waveform)
+TEST(waveform)
 {
   char folder[] = "/tmp/sf_test_rtl.XXXXXX", path[64];
   ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -406,31 +395,4 @@ START_TEST(waveform)
   snprintf(path, sizeof path, "/nowhere/a.fst");
   const fx_scene scene = {.net = net_of_test.net};
   ck_assert_int_eq(sf_dut_open(&dut, &scene, &(sf_dut_options){.wave = path}).code, SF_E_IO);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("rtl_ports");
-  TCase *ports = tcase_create("ports");
-  tcase_set_timeout(ports, 60);
-  tcase_add_test(ports, illegal_programming_is_refused);
-  tcase_add_test(ports, programming_while_running_is_refused);
-  tcase_add_test(ports, weights_and_addresses_are_checked);
-  tcase_add_test(ports, registers_read_back);
-  tcase_add_test(ports, registers_after_reset);
-  tcase_add_test(ports, counters_clear_and_add_up);
-  tcase_add_loop_test(ports, bad_packets_are_refused, 0, BAD_PACKETS);
-  tcase_add_test(ports, soft_reset_at_any_time);
-  tcase_add_test(ports, bad_packet_beside_a_soft_reset);
-  tcase_add_test(ports, driver_refuses_another_device);
-  tcase_add_loop_test(ports, net_from_memory, 0, 2);
-  tcase_add_test(ports, waveform);
-  suite_add_tcase(s, ports);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
 }

@@ -91,7 +91,7 @@ static void same_counts(sf_ray_dut *rays)
   ck_ok(sf_counts_compare(&shared.counts, "core", &actual, "accelerator"));
 }
 
-START_TEST(random_scenes)
+LOOP_TEST(random_scenes, 12)
 {
   const uint64_t seed = 700 + (uint64_t)_i;
   fixture_sizes sizes = _i ? fixture_random_sizes(seed) : fixture_ingp;
@@ -116,10 +116,9 @@ START_TEST(random_scenes)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Rays that stop at once, each followed by all that lies behind: whole rays of matter are dropped or swallowed. */
-START_TEST(rays_go_on_after_their_end)
+TEST(rays_go_on_after_their_end)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 5);
   fx_counts counts;
@@ -140,10 +139,9 @@ START_TEST(rays_go_on_after_their_end)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Ends and beginnings meet in every way: rays of up to 14 samples, each ended by its second. */
-START_TEST(short_rays_in_a_row)
+TEST(short_rays_in_a_row)
 {
   static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 8);
@@ -162,9 +160,8 @@ START_TEST(short_rays_in_a_row)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(hard_rays)
+HARD_TEST(hard_rays)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; c->kind == HARD_RAY && variant < c->variants; variant++) {
@@ -182,7 +179,6 @@ START_TEST(hard_rays)
     hard_end(&h);
   }
 }
-END_TEST
 
 /* ---- registers and resets ---- */
 
@@ -214,7 +210,7 @@ static void works(sf_ray_dut *rays, uint64_t seed)
   ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
 }
 
-START_TEST(illegal_programming_is_refused)
+TEST(illegal_programming_is_refused)
 {
   static const struct {
     uint32_t offset, value;
@@ -245,7 +241,6 @@ START_TEST(illegal_programming_is_refused)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Between driver and bus: writes of one register go to another, a read of it finds nobody. */
 typedef struct spy {
@@ -268,7 +263,7 @@ static void spy_write(void *context, uint32_t offset, uint32_t value)
   s->real.write(s->real.context, offset == s->offset && s->to ? s->to : offset, value);
 }
 
-START_TEST(what_goes_wrong_at_load_is_told)
+TEST(what_goes_wrong_at_load_is_told)
 {
   static const struct {
     uint32_t offset, to;
@@ -293,10 +288,9 @@ START_TEST(what_goes_wrong_at_load_is_told)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Of a net with four levels and nine direction features. */
-START_TEST(sizes_that_are_not_the_nets_are_refused)
+TEST(sizes_that_are_not_the_nets_are_refused)
 {
   static const struct {
     uint32_t levels, n_dir;
@@ -315,9 +309,8 @@ START_TEST(sizes_that_are_not_the_nets_are_refused)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(registers)
+TEST(registers)
 {
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
                                          SF_CSR_ENCODER_DATA, SF_CSR_RAY_CTRL};
@@ -349,7 +342,6 @@ START_TEST(registers)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Offers beats of the batch for so many cycles and takes every pixel; then gives up. */
 static void cut_off(sf_ray_dut *rays, int cycles)
@@ -369,7 +361,7 @@ static void cut_off(sf_ray_dut *rays, int cycles)
 }
 
 /* At any moment, with the memory owing answers: the next rays are whole. */
-START_TEST(soft_reset_in_mid_ray)
+TEST(soft_reset_in_mid_ray)
 {
   fx_scene scene = small_scene();
   sf_ray_dut *rays = open_rays(&scene, 3, 10);
@@ -384,9 +376,8 @@ START_TEST(soft_reset_in_mid_ray)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(beats_out_of_order_are_refused)
+TEST(beats_out_of_order_are_refused)
 {
   fx_scene scene = small_scene();
   sf_ray_dut *rays = open_rays(&scene, 4, 0);
@@ -409,24 +400,4 @@ START_TEST(beats_out_of_order_are_refused)
   works(rays, 6);
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray");
-  TCase *cases = tcase_create("rays");
-  tcase_set_timeout(cases, 60);
-  tcase_add_loop_test(cases, random_scenes, 0, 12);
-  tcase_add_test(cases, rays_go_on_after_their_end);
-  tcase_add_test(cases, short_rays_in_a_row);
-  tcase_add_test(cases, illegal_programming_is_refused);
-  tcase_add_test(cases, what_goes_wrong_at_load_is_told);
-  tcase_add_test(cases, sizes_that_are_not_the_nets_are_refused);
-  tcase_add_test(cases, registers);
-  tcase_add_test(cases, soft_reset_in_mid_ray);
-  tcase_add_test(cases, beats_out_of_order_are_refused);
-  suite_add_tcase(suite, cases);
-  hard_add(suite, hard_rays);
-  return ck_run(suite);
 }

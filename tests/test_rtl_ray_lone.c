@@ -48,7 +48,7 @@ static sf_ray_sample draw_sample(random_source *s)
 }
 
 /* Nobody takes a pixel for a long time: empty rays and results pile up before the compositor, and none is lost. */
-START_TEST(pixels_that_wait)
+TEST(pixels_that_wait)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   random_source s = {270, 0};
@@ -74,10 +74,9 @@ START_TEST(pixels_that_wait)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Positions beside which one LSB of an axis makes another pixel. */
-START_TEST(every_bit_of_a_position)
+TEST(every_bit_of_a_position)
 {
   static const fixture_sizes sizes = {16, 64, 16, 9, 64, 64, 4, FX_HYBRID, {0}};
   random_source s = {280, 0};
@@ -106,16 +105,4 @@ START_TEST(every_bit_of_a_position)
   for (int axis = 0; axis < 3; axis++) ck_assert_int_eq(found[axis], 3);
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray_lone");
-  TCase *cases = tcase_create("rays");
-  tcase_set_timeout(cases, 60);
-  tcase_add_test(cases, pixels_that_wait);
-  tcase_add_test(cases, every_bit_of_a_position);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
 }

@@ -207,7 +207,7 @@ static void program_legal(sf_dut *dut, registers *r, random_source *s)
     write_both(dut, r, SF_CSR_RAY_BACKGROUND_R + 4 * o, draw(s, 0, 1) ? 1 << 16 : 0, WHOLE);
 }
 
-START_TEST(any_access_in_any_state)
+LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {200 + (uint64_t)_i, 0};
   registers r = {0};
@@ -241,10 +241,9 @@ START_TEST(any_access_in_any_state)
   ck_assert_int_gt(refused, ACCESSES / 20);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* What is not one of the ray registers is sf_top's, and its interrupt comes through. */
-START_TEST(the_other_window)
+TEST(the_other_window)
 {
   registers r = {0};
   sf_dut *dut = begin(210);
@@ -267,11 +266,10 @@ START_TEST(the_other_window)
   read_both(dut, &r, SF_CSR_RAY_BACKGROUND_G);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* The next access is offered while the response of the last one waits, in either window: as many responses as accesses,
  * in their order. */
-START_TEST(accesses_without_a_pause)
+TEST(accesses_without_a_pause)
 {
   static const struct {
     uint32_t offset;
@@ -317,10 +315,9 @@ START_TEST(accesses_without_a_pause)
   ck_assert_int_gt(asked, 400);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* An error that comes while RAY_ERROR is written, in every cycle around it: cleared if it was there, else kept. */
-START_TEST(an_error_beside_its_clearing)
+TEST(an_error_beside_its_clearing)
 {
   int kept = 0, cleared = 0;
   sf_dut *dut = begin(230);
@@ -351,10 +348,9 @@ START_TEST(an_error_beside_its_clearing)
   ck_assert(kept > 5 && cleared > 5);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A sample out of order in every cycle around a soft reset: one that comes beside it is dropped like any other. */
-START_TEST(an_error_beside_a_soft_reset)
+TEST(an_error_beside_a_soft_reset)
 {
   int together = 0;
   sf_dut *dut = begin(231);
@@ -384,7 +380,6 @@ START_TEST(an_error_beside_a_soft_reset)
   ck_assert_int_gt(together, 3);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the encoder's words ---- */
 
@@ -420,7 +415,7 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
 }
 
 /* Writes of the other registers, refused words, what a master shows while it is not valid: nothing of it gets there. */
-START_TEST(the_encoder_is_programmed_by_its_words_alone)
+TEST(the_encoder_is_programmed_by_its_words_alone)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 21);
@@ -452,10 +447,9 @@ START_TEST(the_encoder_is_programmed_by_its_words_alone)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* From the first sample that is taken to the pixel that is taken, whoever works on it. */
-START_TEST(active_until_the_pixel_has_left)
+TEST(active_until_the_pixel_has_left)
 {
   enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
   static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
@@ -482,10 +476,9 @@ START_TEST(active_until_the_pixel_has_left)
   sf_ray_dut_close(rays);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* A response that waits is gone after a reset. */
-START_TEST(a_hard_reset_drops_responses)
+TEST(a_hard_reset_drops_responses)
 {
   sf_dut *dut = begin(260);
   sf_pins_in *in = &dut->in;
@@ -504,22 +497,4 @@ START_TEST(a_hard_reset_drops_responses)
   sf_dut_tick(dut);
   ck_assert(!dut->out.bvalid && !dut->out.rvalid);
   sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray_registers");
-  TCase *cases = tcase_create("registers");
-  tcase_set_timeout(cases, 60);
-  tcase_add_loop_test(cases, any_access_in_any_state, 0, 2);
-  tcase_add_test(cases, the_other_window);
-  tcase_add_test(cases, accesses_without_a_pause);
-  tcase_add_test(cases, an_error_beside_its_clearing);
-  tcase_add_test(cases, an_error_beside_a_soft_reset);
-  tcase_add_test(cases, the_encoder_is_programmed_by_its_words_alone);
-  tcase_add_test(cases, active_until_the_pixel_has_left);
-  tcase_add_test(cases, a_hard_reset_drops_responses);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
 }

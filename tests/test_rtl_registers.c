@@ -126,7 +126,7 @@ static void start_both(sf_dut *dut, registers *r)
   write_both(dut, r, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
 }
 
-START_TEST(the_check_at_start)
+LOOP_TEST(the_check_at_start, 3)
 {
   random_source s = {80 + (uint64_t)_i, 0};
   registers r;
@@ -154,7 +154,6 @@ START_TEST(the_check_at_start)
   ck_assert_int_lt(legal, TRIALS - TRIALS / 20);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- any access in any state ---- */
 
@@ -186,7 +185,7 @@ static void random_weight(sf_dut *dut, registers *r, random_source *s)
   read_both(dut, r, SF_CSR_WEIGHT_ADDRESS);
 }
 
-START_TEST(any_access_in_any_state)
+LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {90 + (uint64_t)_i, 0};
   registers r;
@@ -213,13 +212,12 @@ START_TEST(any_access_in_any_state)
   ck_assert_int_gt(running, ACCESSES / 10);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the bus ---- */
 
 /* The next access is offered while the response of the last one waits: as many responses as accesses, in their order.
  */
-START_TEST(accesses_without_a_pause)
+TEST(accesses_without_a_pause)
 {
   random_source s = {100, 0};
   registers r;
@@ -249,10 +247,9 @@ START_TEST(accesses_without_a_pause)
   ck_assert_int_gt(asked, 200);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Refused weights, other registers, what a master shows while it is not valid: none of it reaches the weights. */
-START_TEST(weights_are_written_by_nothing_else)
+LOOP_TEST(weights_are_written_by_nothing_else, SF_LAYERS)
 {
   typical(105);
   fx_counts counts = {0};
@@ -276,10 +273,9 @@ START_TEST(weights_are_written_by_nothing_else)
   run_batch(dut, &net_of_test.net, 4, &counts, 105);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A row is written into its own place alone: the last one first, and all of them twice. */
-START_TEST(rows_in_any_order)
+TEST(rows_in_any_order)
 {
   typical(106);
   const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
@@ -303,7 +299,6 @@ START_TEST(rows_in_any_order)
   run_batch(dut, &net_of_test.net, 4, &counts, 106);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the window of counters ---- */
 
@@ -326,7 +321,7 @@ static void commands(sf_dut *dut, uint32_t first, uint32_t second)
 }
 
 /* All counters are 0 after power-on, without a command; later the places that no counter has read 0. */
-START_TEST(places_of_the_window)
+LOOP_TEST(places_of_the_window, 2)
 {
   registers r;
   fx_counts counts = {0};
@@ -342,7 +337,6 @@ START_TEST(places_of_the_window)
     if (!has_meaning(i / 64, i / 8 % 8, i % 8)) ck_assert_uint_eq(get(dut, place_offset(i)), 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
 {
@@ -350,7 +344,7 @@ static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
 }
 
 /* Neither events nor a clear change it, and a command that comes during a walk is one of its own. */
-START_TEST(the_window_is_of_the_last_snapshot)
+TEST(the_window_is_of_the_last_snapshot)
 {
   static uint32_t words[2][2 * PLACES];
   static const uint32_t zero[2 * PLACES];
@@ -378,10 +372,9 @@ START_TEST(the_window_is_of_the_last_snapshot)
   ck_assert_mem_eq(words[1], zero, sizeof zero);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A counter that was read and waits to be taken stays what it is, whatever a walk writes meanwhile. */
-START_TEST(a_response_that_waits)
+TEST(a_response_that_waits)
 {
   fx_counts counts = {0};
   typical(111);
@@ -408,10 +401,9 @@ START_TEST(a_response_that_waits)
   ck_assert_uint_eq(get(dut, place_offset(place)), 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* A packet that has begun: the block is active and D1 waits, but a walk is no time of the engine's. */
-START_TEST(a_walk_takes_no_time)
+TEST(a_walk_takes_no_time)
 {
   sf_driver_counters c[2];
   uint64_t at[2];
@@ -434,10 +426,9 @@ START_TEST(a_walk_takes_no_time)
   ck_assert_uint_eq(c[1].busy + c[1].stall_out, 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 /* Samples that come while a walk clears or copies wait for its end, and are counted whole. */
-START_TEST(samples_that_come_during_a_walk)
+TEST(samples_that_come_during_a_walk)
 {
   typical(114);
   sf_dut *dut = open_dut(&net_of_test.net, 114, 0);
@@ -454,24 +445,4 @@ START_TEST(samples_that_come_during_a_walk)
     commands(dut, SF_CSR_CTRL_CLEAR, 0);
   }
   sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_registers");
-  TCase *c = tcase_create("registers");
-  tcase_set_timeout(c, 60);
-  tcase_add_loop_test(c, the_check_at_start, 0, 3);
-  tcase_add_loop_test(c, any_access_in_any_state, 0, 2);
-  tcase_add_test(c, accesses_without_a_pause);
-  tcase_add_loop_test(c, weights_are_written_by_nothing_else, 0, SF_LAYERS);
-  tcase_add_test(c, rows_in_any_order);
-  tcase_add_loop_test(c, places_of_the_window, 0, 2);
-  tcase_add_test(c, the_window_is_of_the_last_snapshot);
-  tcase_add_test(c, a_response_that_waits);
-  tcase_add_test(c, a_walk_takes_no_time);
-  tcase_add_test(c, samples_that_come_during_a_walk);
-  suite_add_tcase(suite, c);
-  return ck_run(suite);
 }

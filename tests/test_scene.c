@@ -17,7 +17,7 @@ static void put_text(const char *path, const char *text)
 
 /* ---- cameras ---- */
 
-START_TEST(rays_follow_opengl_axes)
+TEST(rays_follow_opengl_axes)
 {
   sf_camera c = {
       .width = 4, .height = 2, .fx = 2, .fy = 4, .cx = 2, .cy = 1, .to_world = {1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7}};
@@ -36,10 +36,9 @@ START_TEST(rays_follow_opengl_axes)
   sf_camera_ray(&c, 2, 1, o, d);
   ck_assert(d[0] == -1 && d[1] == 0 && d[2] == 0);
 }
-END_TEST
 
 /* A spacing of the points that the function counts is a pixel of the picture at the middle of the box. */
-START_TEST(points_of_the_box_lie_a_pixel_apart)
+TEST(points_of_the_box_lie_a_pixel_apart)
 {
   sf_view view[2] = {{.camera = {.width = 100,
                                  .height = 100,
@@ -62,7 +61,6 @@ START_TEST(points_of_the_box_lie_a_pixel_apart)
   for (int v = 0; v < 2; v++) view[v].camera.fx = 80, view[v].camera.fy = 80, view[v].camera.to_world[11] = 0;
   ck_assert_int_eq(sf_dataset_pixels(&data, 64), 1 << 20); /* cameras in the middle */
 }
-END_TEST
 
 /* ---- the loader ---- */
 
@@ -85,7 +83,7 @@ static sf_status load(sf_dataset *data, const char *json, const char *split, sf_
   return sf_dataset_load(data, folder, split, &options);
 }
 
-START_TEST(loads_camera_angle)
+TEST(loads_camera_angle)
 {
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
@@ -108,9 +106,8 @@ START_TEST(loads_camera_angle)
   sf_dataset_free(&d);
   ck_assert_ptr_null(d.view);
 }
-END_TEST
 
-START_TEST(options_and_stated_intrinsics)
+TEST(options_and_stated_intrinsics)
 {
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
@@ -139,10 +136,9 @@ START_TEST(options_and_stated_intrinsics)
   ck_assert_float_eq_tol(d.view[1].camera.fy, 4, 1e-6f);
   sf_dataset_free(&d);
 }
-END_TEST
 
 /* Of 16 x 8 where the pictures have half of that: by one number as by both. */
-START_TEST(one_side_states_the_size)
+TEST(one_side_states_the_size)
 {
   static const char *const size[] = {"\"w\":16,\"h\":8", "\"w\":16", "\"h\":8"};
   float scale = 0;
@@ -164,10 +160,9 @@ START_TEST(one_side_states_the_size)
     sf_dataset_free(&d);
   }
 }
-END_TEST
 
 /* Of the picture that states no size, whatever the first states. */
-START_TEST(a_later_size_is_looked_at)
+TEST(a_later_size_is_looked_at)
 {
   sf_dataset d;
   put_picture("a.png", 8, 4, 0);
@@ -179,9 +174,8 @@ START_TEST(a_later_size_is_looked_at)
   ck_assert_ptr_nonnull(strstr(d.warning[0], "not look at the scene"));
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(every_eighth_view_is_held_out)
+TEST(every_eighth_view_is_held_out)
 {
   char json[4000] = "{" ANGLE "\"frames\":[";
   for (int i = 0; i < 17; i++) {
@@ -207,7 +201,6 @@ START_TEST(every_eighth_view_is_held_out)
   sf_dataset d;
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "zero views", "transforms_train.json");
 }
-END_TEST
 
 #define ONE(matrix) "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("a", matrix) "]}"
 static const struct {
@@ -256,7 +249,7 @@ static const struct {
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,1,3],[0,0,1,1]]"), SF_E_RANGE, "frame 1 (a)", "[3][2]"},
 };
 
-START_TEST(a_split_is_walked_view_by_view)
+TEST(a_split_is_walked_view_by_view)
 {
   sf_dataset d;
   put_picture("a.png", 4, 4, 7);
@@ -279,9 +272,8 @@ START_TEST(a_split_is_walked_view_by_view)
   sf_dataset_free(&d);
   ck_bad(load(&d, json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
 }
-END_TEST
 
-START_TEST(faults_name_file_and_frame)
+LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
 {
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
@@ -298,9 +290,8 @@ START_TEST(faults_name_file_and_frame)
          bad_scenes[_i].where, bad_scenes[_i].problem);
   ck_assert_ptr_null(d.view);
 }
-END_TEST
 
-START_TEST(own_sizes_may_differ)
+TEST(own_sizes_may_differ)
 {
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
@@ -312,9 +303,8 @@ START_TEST(own_sizes_may_differ)
   ck_assert_int_eq(d.view[1].camera.height, 6);
   sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(folder_and_option_faults)
+TEST(folder_and_option_faults)
 {
   sf_dataset d;
   ck_bad(sf_dataset_load(&d, in("none"), "train", NULL), SF_E_IO, "/none", "no such folder");
@@ -329,31 +319,5 @@ START_TEST(folder_and_option_faults)
          "not finite");
   ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
 }
-END_TEST
-#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("scene");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_test(t, rays_follow_opengl_axes);
-  tcase_add_test(t, points_of_the_box_lie_a_pixel_apart);
-  tcase_add_test(t, loads_camera_angle);
-  tcase_add_test(t, options_and_stated_intrinsics);
-  tcase_add_test(t, one_side_states_the_size);
-  tcase_add_test(t, a_later_size_is_looked_at);
-  tcase_add_test(t, every_eighth_view_is_held_out);
-  tcase_add_loop_test(t, faults_name_file_and_frame, 0, COUNT(bad_scenes));
-  tcase_add_test(t, a_split_is_walked_view_by_view);
-  tcase_add_test(t, own_sizes_may_differ);
-  tcase_add_test(t, folder_and_option_faults);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -72,7 +72,7 @@ static sf_train_options search_run(void)
   return o;
 }
 
-START_TEST(worth_equals_price)
+TEST(worth_equals_price)
 {
   static const double betas[] = {1e-7, 5e-7, 1e-6};
   const curve c = {1e-3, 1e-4, 0, 0};
@@ -94,7 +94,6 @@ START_TEST(worth_equals_price)
     sf_trainer_free(t);
   }
 }
-END_TEST
 
 /* t* of noisy curves that fall, at a search rate. */
 static double found(const curve *c, double rate, sf_search_report *report)
@@ -109,7 +108,7 @@ static double found(const curve *c, double rate, sf_search_report *report)
   return t_star;
 }
 
-START_TEST(the_rate_decides_nothing)
+TEST(the_rate_decides_nothing)
 {
   const curve c = {1e-3, 1e-4, 0.1, 0.4};
   sf_search_report slow, normal, fast;
@@ -121,17 +120,15 @@ START_TEST(the_rate_decides_nothing)
   ck_assert_double_lt(normal.worth_error, 0.05 * normal.worth);
   ck_assert_double_gt(fast.worth_error, 1.2 * normal.worth_error);
 }
-END_TEST
 
-START_TEST(the_scene_decides)
+TEST(the_scene_decides)
 {
   const curve easy = {1e-4, 1e-5, 0, 0}, hard = {1e-3, 1e-4, 0, 0};
   sf_search_report r;
   ck_assert_double_eq_tol(found(&hard, 1, &r) - found(&easy, 1, &r), log(10), 1e-4);
 }
-END_TEST
 
-START_TEST(ends_of_the_range)
+TEST(ends_of_the_range)
 {
   const curve c = {1e-3, 1e-4, 0.9, 0}, rising = {1e-3, -1e-4, 0, 0}, nothing = {0}; /* however noisy it is */
   static const struct {
@@ -164,9 +161,8 @@ START_TEST(ends_of_the_range)
   ck_assert_int_eq(t->model.t_r, T);
   sf_trainer_free(t);
 }
-END_TEST
 
-START_TEST(what_was_not_reached_is_said)
+TEST(what_was_not_reached_is_said)
 {
   const curve falling = {1e-3, 1e-4, 0, 2}, still = {1e-3, 1e-4, 0, 0};
   sf_train_options o = search_run();
@@ -185,10 +181,9 @@ START_TEST(what_was_not_reached_is_said)
   ck_assert_int_eq(t->model.t_r, T - 1);
   sf_trainer_free(t);
 }
-END_TEST
 
 /* The price of a step is what the ledger says: the step at which it is no longer worth it. */
-START_TEST(energy_as_price)
+TEST(energy_as_price)
 {
   const curve c = {1e-3, 1e-4, 0, 0};
   sf_train_options o = search_run();
@@ -215,9 +210,8 @@ START_TEST(energy_as_price)
     sf_trainer_free(t);
   }
 }
-END_TEST
 
-START_TEST(targets_find_beta)
+TEST(targets_find_beta)
 {
   const curve c = {1e-3, 1e-3, 0, 0}; /* 2e-3, 1.5e-3, 1.25e-3, ... */
   sf_train_options o = search_run();
@@ -253,7 +247,6 @@ START_TEST(targets_find_beta)
   ck_assert_int_eq(t->search.state, SF_SEARCH_MISSED);
   sf_trainer_free(t);
 }
-END_TEST
 
 /* The whole trainer on the textured scene with so much contrast, at a search rate: where t* ends. */
 static double learned(float contrast, double rate)
@@ -279,7 +272,7 @@ static double learned(float contrast, double rate)
 }
 
 /* A search whose rate decides finds the same steps for both, and other ones at another rate. */
-START_TEST(two_scenes_at_one_beta)
+TEST(two_scenes_at_one_beta)
 {
   for (int i = 0; i < 2; i++) {
     const double rate = i ? 3 : 1.0 / 3, easy = learned(0.4f, rate), hard = learned(1, rate);
@@ -287,22 +280,6 @@ START_TEST(two_scenes_at_one_beta)
     ck_assert_msg(lround(hard) > lround(easy), "rate %g: t* = %g and %g", rate, easy, hard);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("search");
-  TCase *tc = tcase_create("search");
-  tcase_set_timeout(tc, 240);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, worth_equals_price);
-  tcase_add_test(tc, the_rate_decides_nothing);
-  tcase_add_test(tc, the_scene_decides);
-  tcase_add_test(tc, ends_of_the_range);
-  tcase_add_test(tc, what_was_not_reached_is_said);
-  tcase_add_test(tc, energy_as_price);
-  tcase_add_test(tc, targets_find_beta);
-  tcase_add_test(tc, two_scenes_at_one_beta);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 240;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};

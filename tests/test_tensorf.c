@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-START_TEST(inputs_are_tensorf)
+TEST(inputs_are_tensorf)
 {
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27, .feature_freqs = 2, .view_freqs = 2}), 150);
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27}), 30);
@@ -15,11 +15,10 @@ START_TEST(inputs_are_tensorf)
   ck_assert_int_eq(m.param[SF_P_APP_PLANE + 1].shape[2], 12);
   sf_model_free(&m);
 }
-END_TEST
 
 /* 2 097 156 voxels in the Blender box are 128^3, 27 000 000 are 300^3; in a box twice as wide along x the voxels stay
  * cubes. */
-START_TEST(resolution_is_tensorf)
+TEST(resolution_is_tensorf)
 {
   static float cube[2][3] = {{-1, -1, -1}, {1, 1, 1}}, wide[2][3] = {{-2, -1, -1}, {2, 1, 1}};
   int32_t r[3];
@@ -30,10 +29,9 @@ START_TEST(resolution_is_tensorf)
   sf_tensorf_resolution(wide, 2e6, r);
   ck_assert(r[0] == 200 && r[1] == 100 && r[2] == 100);
 }
-END_TEST
 
 /* Plane and line that are linear in their coordinates: interpolation gives the products exactly, corners included. */
-START_TEST(interpolation_is_linear)
+TEST(interpolation_is_linear)
 {
   sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_tensorf *f = &m.config.tensorf;
@@ -57,9 +55,8 @@ START_TEST(interpolation_is_linear)
   }
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(activations_by_hand)
+TEST(activations_by_hand)
 {
   sf_tensorf f = {.activation = SF_SOFTPLUS, .shift = -10, .distance_scale = 25};
   ck_assert_float_eq_tol(sf_tensorf_sigma(&f, 10), 25 * 0.6931472f, 1e-5f);
@@ -69,10 +66,9 @@ START_TEST(activations_by_hand)
   ck_assert_float_eq(sf_tensorf_sigma(&f, -1), 0);
   ck_assert_float_eq(sf_tensorf_sigma(&f, 2), 50);
 }
-END_TEST
 
 /* TensoRF's order: features, direction, sines and cosines of the features, of the direction; frequencies fastest. */
-START_TEST(encoding_order)
+TEST(encoding_order)
 {
   const sf_tensorf f = {.features = 2, .feature_freqs = 2, .view_freqs = 1};
   const float features[2] = {0.3f, -0.7f}, direction[3] = {0.6f, 0, -0.8f};
@@ -84,10 +80,9 @@ START_TEST(encoding_order)
   sf_tensorf_encode(&f, features, direction, in);
   for (int i = 0; i < 19; i++) ck_assert_float_eq_tol(in[i], (float)expected[i], 1e-6f);
 }
-END_TEST
 
 /* The twin is a plain network with biases. */
-START_TEST(twin_is_a_network_with_biases)
+TEST(twin_is_a_network_with_biases)
 {
   sf_model m = test_tensorf(SF_NET_ANN, 1, 16, 1);
   float in[30], colour[3];
@@ -112,9 +107,8 @@ START_TEST(twin_is_a_network_with_biases)
   }
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(save_and_load)
+TEST(save_and_load)
 {
   make_folder();
   for (int ndc = 0; ndc < 2; ndc++) {
@@ -143,20 +137,5 @@ START_TEST(save_and_load)
   }
   remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf");
-  TCase *tc = tcase_create("tensorf");
-  tcase_set_timeout(tc, 120);
-  tcase_add_test(tc, inputs_are_tensorf);
-  tcase_add_test(tc, resolution_is_tensorf);
-  tcase_add_test(tc, interpolation_is_linear);
-  tcase_add_test(tc, activations_by_hand);
-  tcase_add_test(tc, encoding_order);
-  tcase_add_test(tc, twin_is_a_network_with_biases);
-  tcase_add_test(tc, save_and_load);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -19,7 +19,7 @@ static void positions(float *x)
 }
 
 /* Bounds: contracted multiply-adds over 3 x 16 components; the activation's fit, 2 ulp. */
-START_TEST(density_equals_oracle)
+TEST(density_equals_oracle)
 {
   float x[3 * N], sigma[N], slope[N];
   positions(x);
@@ -43,10 +43,9 @@ START_TEST(density_equals_oracle)
       sf_model_free(&m);
     }
 }
-END_TEST
 
 /* Small densities keep their relative accuracy: they decide what the alpha mask drops. */
-START_TEST(thin_density_is_accurate)
+TEST(thin_density_is_accurate)
 {
   const sf_kernels *k = sf_kernels_select(NULL);
   float x[3 * N], sigma[N], slope[N];
@@ -60,7 +59,6 @@ START_TEST(thin_density_is_accurate)
   }
   sf_model_free(&m);
 }
-END_TEST
 
 /* The density feature is bilinear in planes and lines: <g, feature(P + P', L)> - <g, feature(P, L)> = <dP, P'>, and so
  * for lines; g = the gradient of the products, or one per sample. */
@@ -99,16 +97,15 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   sf_model_free(&m);
 }
 
-START_TEST(backward_is_the_adjoint)
+TEST(backward_is_the_adjoint)
 {
   for (int i = 0; i < 3; i++)
     for (int ndc = 0; ndc < 2; ndc++)
       for (int appearance = 0; appearance < 2; appearance++) check_adjoint(exact[i], ndc, appearance);
 }
-END_TEST
 
 /* A plane's gradient against central differences, entry by entry: the products' sum is linear in it. */
-START_TEST(field_gradient_is_the_slope)
+TEST(field_gradient_is_the_slope)
 {
   const sf_kernels *k = sf_kernels_select("portable");
   static float x[3 * N], g[N], sigma[N], slope[N];
@@ -140,7 +137,6 @@ START_TEST(field_gradient_is_the_slope)
   free(grad);
   sf_model_free(&m);
 }
-END_TEST
 
 typedef struct rig {
   sf_model model;
@@ -237,7 +233,7 @@ static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int n
   rig_free(&r);
 }
 
-START_TEST(decoder_equals_oracle)
+TEST(decoder_equals_oracle)
 {
   for (int i = 0; i < 3; i++)
     for (int ndc = 0; ndc < 2; ndc++) {
@@ -248,17 +244,15 @@ START_TEST(decoder_equals_oracle)
       compare(exact[i], SF_NET_ANN, SF_HYBRID, ndc, 1, 1e-4f, 0);
     }
 }
-END_TEST
 
 /* The twin rounds every operand to bfloat16: 2^-9 through four layers. */
-START_TEST(bfloat16_decoder_near_oracle)
+TEST(bfloat16_decoder_near_oracle)
 {
   for (int ndc = 0; ndc < 2; ndc++) {
     compare("avx512bf16", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
     compare("amx", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
   }
 }
-END_TEST
 
 static double objective(const rig *r, const float *dcolour)
 {
@@ -314,7 +308,7 @@ static void random_gradient(float *dcolour)
 
 /* The twin is smooth but for its kinks: every third weight, every bias, and the products, against central differences.
  * Bound: float cancellation, as in test_snn.c. */
-START_TEST(twin_gradient_is_the_slope)
+TEST(twin_gradient_is_the_slope)
 {
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   for (int ndc = 0; ndc < 2; ndc++) {
@@ -338,10 +332,9 @@ START_TEST(twin_gradient_is_the_slope)
     rig_free(&r);
   }
 }
-END_TEST
 
 /* Of a spiking decoder the last layer and the integrator are smooth: no spike hangs on them. */
-START_TEST(smooth_parts_of_the_decoder_match_the_slope)
+TEST(smooth_parts_of_the_decoder_match_the_slope)
 {
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *k = sf_kernels_select(NULL);
@@ -360,7 +353,6 @@ START_TEST(smooth_parts_of_the_decoder_match_the_slope)
     rig_free(&r);
   }
 }
-END_TEST
 
 static float distance(const float *a, const float *reference, size_t n)
 {
@@ -373,7 +365,7 @@ static float distance(const float *a, const float *reference, size_t n)
 }
 
 /* The same forward pass, the backward passes compared; bounds as for the nets of INGP (test_snn.c). */
-START_TEST(backward_of_every_isa_agrees)
+TEST(backward_of_every_isa_agrees)
 {
   static const struct {
     const char *isa;
@@ -410,22 +402,5 @@ START_TEST(backward_of_every_isa_agrees)
         rig_free(&b);
       }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf_kernels");
-  TCase *tc = tcase_create("tensorf_kernels");
-  tcase_set_timeout(tc, 120);
-  tcase_add_test(tc, density_equals_oracle);
-  tcase_add_test(tc, thin_density_is_accurate);
-  tcase_add_test(tc, backward_is_the_adjoint);
-  tcase_add_test(tc, field_gradient_is_the_slope);
-  tcase_add_test(tc, decoder_equals_oracle);
-  tcase_add_test(tc, bfloat16_decoder_near_oracle);
-  tcase_add_test(tc, twin_gradient_is_the_slope);
-  tcase_add_test(tc, smooth_parts_of_the_decoder_match_the_slope);
-  tcase_add_test(tc, backward_of_every_isa_agrees);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -53,7 +53,7 @@ static void point(const sf_tensorf *f, int i, float p[3])
 
 /* From n to 2n - 1, 3n - 2 and 4n - 3 points along the axes every old point stays one, and bilinear values stay
  * bilinear: nothing changes. */
-START_TEST(upsampling_keeps_the_field)
+TEST(upsampling_keeps_the_field)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -81,11 +81,10 @@ START_TEST(upsampling_keeps_the_field)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* Shrinking cuts at grid points: the same field inside. Rays have another step then, so that a picture changes by the
  * error of its quadrature alone. */
-START_TEST(shrinking_keeps_what_is_seen)
+TEST(shrinking_keeps_what_is_seen)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -129,11 +128,10 @@ START_TEST(shrinking_keeps_what_is_seen)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* No point whose alpha is above four times the threshold lies in a cell that the mask drops: the mask looks at the
  * corners of cells, and this field changes by less than that between them. Most of the box goes. */
-START_TEST(mask_keeps_what_is_visible)
+TEST(mask_keeps_what_is_visible)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -168,10 +166,9 @@ START_TEST(mask_keeps_what_is_visible)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. */
-START_TEST(schedule_scales_with_the_run)
+TEST(schedule_scales_with_the_run)
 {
   make_scene(4);
   sf_dataset data = load("train");
@@ -193,10 +190,9 @@ START_TEST(schedule_scales_with_the_run)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* The whole way of a short run, spiking: the same bits with one thread and with three. */
-START_TEST(threads_do_not_matter)
+TEST(threads_do_not_matter)
 {
   make_scene(4);
   sf_dataset data = load("train");
@@ -216,10 +212,9 @@ START_TEST(threads_do_not_matter)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* A checkpoint in the middle, after the field has grown, and what follows is the same as without. */
-START_TEST(resume_is_the_same_run)
+TEST(resume_is_the_same_run)
 {
   make_scene(4);
   sf_dataset data = load("train");
@@ -240,10 +235,9 @@ START_TEST(resume_is_the_same_run)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* Biases far below the threshold: neither scaled nor new weights would fire again. */
-START_TEST(a_layer_that_its_biases_silence_comes_back)
+TEST(a_layer_that_its_biases_silence_comes_back)
 {
   make_scene(4);
   sf_dataset data = load("train");
@@ -261,10 +255,9 @@ START_TEST(a_layer_that_its_biases_silence_comes_back)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
-START_TEST(it_learns)
+TEST(it_learns)
 {
   make_scene(8);
   sf_dataset data = load("train");
@@ -283,10 +276,9 @@ START_TEST(it_learns)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* A field that is not finite ends the run with its name; what is refused is not saved. */
-START_TEST(nan_is_found)
+TEST(nan_is_found)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -304,10 +296,9 @@ START_TEST(nan_is_found)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
 /* Blender scenes have TensoRF's box in their units; others, whose unit may be anything, the box of the data. */
-START_TEST(the_box_is_that_of_the_layout)
+TEST(the_box_is_that_of_the_layout)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -343,9 +334,8 @@ START_TEST(the_box_is_that_of_the_layout)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
-START_TEST(rays_that_all_miss_the_box_are_refused)
+TEST(rays_that_all_miss_the_box_are_refused)
 {
   make_scene(2);
   sf_dataset data = load("train");
@@ -358,24 +348,5 @@ START_TEST(rays_that_all_miss_the_box_are_refused)
   sf_dataset_free(&data);
   remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf_train");
-  TCase *tc = tcase_create("tensorf_train");
-  tcase_set_timeout(tc, 300);
-  tcase_add_test(tc, upsampling_keeps_the_field);
-  tcase_add_test(tc, shrinking_keeps_what_is_seen);
-  tcase_add_test(tc, mask_keeps_what_is_visible);
-  tcase_add_test(tc, schedule_scales_with_the_run);
-  tcase_add_test(tc, threads_do_not_matter);
-  tcase_add_test(tc, resume_is_the_same_run);
-  tcase_add_test(tc, a_layer_that_its_biases_silence_comes_back);
-  tcase_add_test(tc, it_learns);
-  tcase_add_test(tc, the_box_is_that_of_the_layout);
-  tcase_add_test(tc, rays_that_all_miss_the_box_are_refused);
-  tcase_add_test(tc, nan_is_found);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

@@ -48,7 +48,7 @@ static sf_three_counts *run(fx_scene *scene, int stall)
   return counts;
 }
 
-START_TEST(hash_grid)
+TEST(hash_grid)
 {
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -65,9 +65,8 @@ START_TEST(hash_grid)
   free(still), free(stalled);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(decoder)
+TEST(decoder)
 {
   fx_scene scene = tensorf_scene();
   sf_three_counts *counts = run(&scene, 20);
@@ -78,7 +77,6 @@ START_TEST(decoder)
   free(counts);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Two rays whose core changes meanwhile, in a way of `changing`. */
 static void check_difference(sf_status (*changing)(void *user, uint64_t index, fx_ray *to), const char *message)
@@ -107,11 +105,10 @@ static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
   return ray(scene, index, to);
 }
 
-START_TEST(the_first_ray_differs)
+TEST(the_first_ray_differs)
 {
   check_difference(ray_of_another_net, "ray 0: sample 0: red: core ");
 }
-END_TEST
 
 /* The core's rays change behind the back of the accelerator that has encoder and compositor; the nets agree. */
 static sf_status ray_on_another_background(void *user, uint64_t index, fx_ray *to)
@@ -128,7 +125,7 @@ static sf_status ray_that_stops_early(void *user, uint64_t index, fx_ray *to)
   return ray(scene, index, to);
 }
 
-START_TEST(a_pixel_differs)
+LOOP_TEST(a_pixel_differs, 2)
 {
   static const struct {
     sf_status (*ray)(void *user, uint64_t index, fx_ray *to);
@@ -137,10 +134,9 @@ START_TEST(a_pixel_differs)
                  {ray_that_stops_early, "ray 0: accelerator: hang at cycle "}};
   check_difference(changed[_i].ray, changed[_i].message);
 }
-END_TEST
 
 /* The accelerator's samples and rays count, too; a decoder has no directions and counts no rays. */
-START_TEST(samples_and_rays_are_compared)
+TEST(samples_and_rays_are_compared)
 {
   fx_counts core = {.samples = 5, .rays = 2}, rtl = core;
   fx_net net = {.layer[FX_D1].n_out = 1};
@@ -151,19 +147,4 @@ START_TEST(samples_and_rays_are_compared)
   ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
   rtl.samples = 4;
   ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "samples: core 5, accelerator 4");
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("three_counts");
-  TCase *all = tcase_create("all");
-  tcase_set_timeout(all, 60);
-  tcase_add_test(all, hash_grid);
-  tcase_add_test(all, decoder);
-  tcase_add_test(all, the_first_ray_differs);
-  tcase_add_loop_test(all, a_pixel_differs, 0, 2);
-  tcase_add_test(all, samples_and_rays_are_compared);
-  suite_add_tcase(suite, all);
-  return ck_run(suite);
 }

@@ -129,7 +129,7 @@ static void ck_traces(const fx_scene *scene, const sf_traces_report *report, int
   fclose(e.spikes), fclose(e.potentials), fclose(samples);
 }
 
-START_TEST(every_spike_and_membrane_is_the_nets)
+LOOP_TEST(every_spike_and_membrane_is_the_nets, FX_NODECAY + 1)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, _i, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -144,9 +144,8 @@ START_TEST(every_spike_and_membrane_is_the_nets)
   }
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(names_of_views_are_quoted)
+TEST(names_of_views_are_quoted)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -162,9 +161,8 @@ START_TEST(names_of_views_are_quoted)
   fclose(samples);
   fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(refusals_leave_nothing)
+TEST(refusals_leave_nothing)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
   fx_scene scene = fixture_scene(&sizes, 3);
@@ -177,16 +175,5 @@ START_TEST(refusals_leave_nothing)
   ck_assert_int_eq(entries(), 0);
   fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("traces");
-  TCase *tcase = tcase_create("traces");
-  tcase_add_checked_fixture(tcase, make_data, remove_folder);
-  tcase_add_loop_test(tcase, every_spike_and_membrane_is_the_nets, FX_HYBRID, FX_NODECAY + 1);
-  tcase_add_test(tcase, names_of_views_are_quoted);
-  tcase_add_test(tcase, refusals_leave_nothing);
-  suite_add_tcase(suite, tcase);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_data, .tear_down = remove_folder};

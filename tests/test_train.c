@@ -33,7 +33,7 @@ static sf_train_options run_in_box(int kind)
   return o;
 }
 
-START_TEST(same_seed_same_bits_any_threads)
+LOOP_TEST(same_seed_same_bits_any_threads, 2)
 {
   sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
@@ -54,7 +54,6 @@ START_TEST(same_seed_same_bits_any_threads)
   sf_trainer_free(c);
   sf_dataset_free(&data);
 }
-END_TEST
 
 static void check_resume(const sf_train_options *o, int before, int after)
 {
@@ -73,7 +72,7 @@ static void check_resume(const sf_train_options *o, int before, int after)
 }
 
 /* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
-START_TEST(the_chosen_steps_are_trained_alone)
+TEST(the_chosen_steps_are_trained_alone)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -96,10 +95,9 @@ START_TEST(the_chosen_steps_are_trained_alone)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* What is rendered has the intervals of the training's second half. */
-START_TEST(the_lattice_settles)
+LOOP_TEST(the_lattice_settles, 2)
 {
   sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
@@ -131,11 +129,10 @@ START_TEST(the_lattice_settles)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* Twice its steps would be no model's: in the first case the lattice would be too coarse, in the second dt_gamma too
  * large. */
-START_TEST(a_lattice_at_its_limit_settles_as_it_is)
+LOOP_TEST(a_lattice_at_its_limit_settles_as_it_is, 2)
 {
   sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
@@ -154,9 +151,8 @@ START_TEST(a_lattice_at_its_limit_settles_as_it_is)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(resume_continues_bit_identically)
+LOOP_TEST(resume_continues_bit_identically, 2)
 {
   sf_train_options o = run_in_box(_i);
   check_resume(&o, 17, 16);
@@ -164,10 +160,9 @@ START_TEST(resume_continues_bit_identically)
   o.samples = 8192;
   check_resume(&o, 6, 30);
 }
-END_TEST
 
 /* With other views, another scale or another box a checkpoint is not resumed; one that does not say its views is. */
-START_TEST(a_checkpoint_is_of_its_data)
+TEST(a_checkpoint_is_of_its_data)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -211,9 +206,8 @@ START_TEST(a_checkpoint_is_of_its_data)
   sf_trainer_free(start(&data, &o, path));
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(saved_model_loads_and_saves_equal)
+TEST(saved_model_loads_and_saves_equal)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -234,10 +228,9 @@ START_TEST(saved_model_loads_and_saves_equal)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* One prefix is trained at a t* that no loss moves: beta and alpha are without effect. */
-START_TEST(fixed_steps_freeze_the_budget)
+TEST(fixed_steps_freeze_the_budget)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -265,9 +258,8 @@ START_TEST(fixed_steps_freeze_the_budget)
     ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(every_prefix_is_evaluated)
+TEST(every_prefix_is_evaluated)
 {
   sf_dataset data = load("train"), test = load("test");
   const sf_train_options o = small_run();
@@ -286,10 +278,9 @@ START_TEST(every_prefix_is_evaluated)
   sf_dataset_free(&data);
   sf_dataset_free(&test);
 }
-END_TEST
 
 /* The model at the end is the mean over the last fortieth of the run: here each of the last 10 of 400 iterations. */
-START_TEST(the_last_iterations_are_averaged)
+TEST(the_last_iterations_are_averaged)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -325,9 +316,8 @@ START_TEST(the_last_iterations_are_averaged)
   sf_trainer_free(resumed);
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(loss_falls_and_both_twins_learn)
+TEST(loss_falls_and_both_twins_learn)
 {
   sf_dataset data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
@@ -351,7 +341,6 @@ START_TEST(loss_falls_and_both_twins_learn)
   }
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* Intervals of a ray: each its own. */
 static const float *intervals(void)
@@ -406,7 +395,7 @@ static void check_plan(sf_loss_plan p)
   free(w.memory);
 }
 
-START_TEST(loss_gradients_are_the_slopes)
+TEST(loss_gradients_are_the_slopes)
 {
   sf_loss_plan one = {
       .steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
@@ -432,10 +421,9 @@ START_TEST(loss_gradients_are_the_slopes)
   paper.d = 0.7;
   check_plan(paper);
 }
-END_TEST
 
 /* Colour, background and target equal: every term but g2 sum log(1 + 2 sigma) is flat. */
-START_TEST(sparsity_by_hand)
+TEST(sparsity_by_hand)
 {
   sf_ray_work w;
   ck_assert_int_eq(sf_ray_work_create(&w, N).code, SF_OK);
@@ -449,10 +437,9 @@ START_TEST(sparsity_by_hand)
   ck_assert_double_eq_tol(sums.regular, 1e-6 * log(7), 1e-8);
   free(w.memory);
 }
-END_TEST
 
 /* Few rays may all pass by a small box: more are drawn. */
-START_TEST(few_rays_that_miss_are_no_fault)
+TEST(few_rays_that_miss_are_no_fault)
 {
   make_scene(4);
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++)
@@ -476,28 +463,6 @@ START_TEST(few_rays_that_miss_are_no_fault)
     }
   remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train");
-  TCase *tc = tcase_create("train");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, remove_folder);
-  tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
-  tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
-  tcase_add_test(tc, a_checkpoint_is_of_its_data);
-  tcase_add_test(tc, saved_model_loads_and_saves_equal);
-  tcase_add_loop_test(tc, the_lattice_settles, 0, 2);
-  tcase_add_loop_test(tc, a_lattice_at_its_limit_settles_as_it_is, 0, 2);
-  tcase_add_test(tc, the_chosen_steps_are_trained_alone);
-  tcase_add_test(tc, fixed_steps_freeze_the_budget);
-  tcase_add_test(tc, every_prefix_is_evaluated);
-  tcase_add_test(tc, the_last_iterations_are_averaged);
-  tcase_add_test(tc, loss_falls_and_both_twins_learn);
-  tcase_add_test(tc, loss_gradients_are_the_slopes);
-  tcase_add_test(tc, sparsity_by_hand);
-  tcase_add_test(tc, few_rays_that_miss_are_no_fault);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};

@@ -56,7 +56,7 @@ static sf_train_options long_run(void)
   return o;
 }
 
-START_TEST(dead_and_saturated_layers_are_reported_and_revived)
+LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, COUNT(faults))
 {
   const struct fault *f = &faults[_i];
   sf_dataset data = load("train");
@@ -82,10 +82,9 @@ START_TEST(dead_and_saturated_layers_are_reported_and_revived)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* The count of silence is part of a checkpoint. */
-START_TEST(resume_while_a_layer_is_dead)
+TEST(resume_while_a_layer_is_dead)
 {
   sf_dataset data = load("train");
   const sf_train_options o = long_run();
@@ -103,9 +102,8 @@ START_TEST(resume_while_a_layer_is_dead)
   sf_trainer_free(part);
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(leaks_stay_in_range)
+TEST(leaks_stay_in_range)
 {
   sf_dataset data = load("train");
   sf_train_options o = small_run();
@@ -122,11 +120,10 @@ START_TEST(leaks_stay_in_range)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
 /* Every tensor: the run stops in the same iteration, and the checkpoint before it stays and goes on. A spiking net
  * could hide a NaN, which crosses no threshold. */
-START_TEST(nan_stops_the_run_and_keeps_the_checkpoint)
+TEST(nan_stops_the_run_and_keeps_the_checkpoint)
 {
   sf_dataset data = load("train");
   const sf_train_options o = small_run();
@@ -154,9 +151,8 @@ START_TEST(nan_stops_the_run_and_keeps_the_checkpoint)
   sf_trainer_free(t);
   sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(diverging_rate_stops_the_run)
+TEST(diverging_rate_stops_the_run)
 {
   sf_dataset data = load("train");
   for (int grid = 0; grid < 2; grid++) {
@@ -173,7 +169,6 @@ START_TEST(diverging_rate_stops_the_run)
   }
   sf_dataset_free(&data);
 }
-END_TEST
 
 static void paint(sf_dataset *data, uint16_t rgb, uint16_t alpha)
 {
@@ -240,31 +235,15 @@ static void hard_case(int which, int net)
   sf_dataset_free(&data);
 }
 
-START_TEST(hard_cases_stay_finite_and_in_range)
+LOOP_TEST(hard_cases_stay_finite_and_in_range, CASES)
 {
   hard_case(_i, SF_NET_SNN);
 }
-END_TEST
 
-START_TEST(hard_scenes_with_the_twin)
+LOOP_TEST(hard_scenes_with_the_twin, SCENES)
 {
   hard_case(_i, SF_NET_ANN);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train_health");
-  TCase *tc = tcase_create("train_health");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, remove_folder);
-  tcase_add_loop_test(tc, dead_and_saturated_layers_are_reported_and_revived, 0, sizeof faults / sizeof *faults);
-  tcase_add_test(tc, resume_while_a_layer_is_dead);
-  tcase_add_test(tc, leaks_stay_in_range);
-  tcase_add_test(tc, nan_stops_the_run_and_keeps_the_checkpoint);
-  tcase_add_test(tc, diverging_rate_stops_the_run);
-  tcase_add_loop_test(tc, hard_cases_stay_finite_and_in_range, 0, CASES);
-  tcase_add_loop_test(tc, hard_scenes_with_the_twin, 0, SCENES);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};

@@ -73,7 +73,7 @@ static int same_integers(const sf_model *m, const fx_scene *scene, const fx_scen
   return moved;
 }
 
-START_TEST(export_reproduces_the_rounded_weights)
+TEST(export_reproduces_the_rounded_weights)
 {
   const sf_train_options o = tuning_run();
   const sf_quant_options as_recorded = {.background = {1, 1, 1}};
@@ -103,9 +103,8 @@ START_TEST(export_reproduces_the_rounded_weights)
   fx_scene_free(&loaded);
   sf_trainer_free(t);
 }
-END_TEST
 
-START_TEST(resume_continues_bit_identically)
+TEST(resume_continues_bit_identically)
 {
   const sf_train_options o = tuning_run();
   sf_trainer *whole = start(&data, &o, NULL), *part = start(&data, &o, NULL);
@@ -121,12 +120,11 @@ START_TEST(resume_continues_bit_identically)
   sf_trainer_free(whole);
   sf_trainer_free(part);
 }
-END_TEST
 
 /* The core on integers against the float nets on what they stand for, inputs on their grids: equal currents at t = 0
  * but for float sums (128 terms: 1e-5 of their size), h rounded down in both. C1's currents are so coarse that some
  * equal the threshold, where a float sum may fall short: such samples, at most 48 of 64, say nothing of C2. */
-START_TEST(float_nets_compute_what_the_core_does)
+TEST(float_nets_compute_what_the_core_does)
 {
   const sf_train_options o = tuning_run();
   const int F = 2 * o.config.levels;
@@ -181,10 +179,9 @@ START_TEST(float_nets_compute_what_the_core_does)
   fx_scene_free(&scene);
   sf_trainer_free(t);
 }
-END_TEST
 
 /* The vector kernels round h as the scalar nets do. */
-START_TEST(kernels_round_h_as_the_oracle)
+TEST(kernels_round_h_as_the_oracle)
 {
   sf_model m = base;
   sf_net_view view = sf_net_view_of(&m);
@@ -210,9 +207,8 @@ START_TEST(kernels_round_h_as_the_oracle)
   free(block);
   free(scratch);
 }
-END_TEST
 
-START_TEST(damaged_scales_are_refused)
+TEST(damaged_scales_are_refused)
 {
   const sf_train_options o = tuning_run();
   sf_trainer *t = start(&data, &o, NULL);
@@ -226,19 +222,6 @@ START_TEST(damaged_scales_are_refused)
   ck_bad(sf_model_load(&m, in("bad.safetensors")), SF_E_RANGE, "scales", "35");
   sf_trainer_free(t);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train_tuning");
-  TCase *tc = tcase_create("train_tuning");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, export_reproduces_the_rounded_weights);
-  tcase_add_test(tc, resume_continues_bit_identically);
-  tcase_add_test(tc, float_nets_compute_what_the_core_does);
-  tcase_add_test(tc, damaged_scales_are_refused);
-  tcase_add_test(tc, kernels_round_h_as_the_oracle); /* last: rounds the base model's weights */
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};

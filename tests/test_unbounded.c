@@ -21,7 +21,7 @@ static sf_config large_config(int bound, int res)
 /* ---- steps ---- */
 
 /* The recurrence in double precision; float adds up to 1024 roundings of 2^-24 of the distance. */
-START_TEST(steps_grow_as_the_formula_says)
+TEST(steps_grow_as_the_formula_says)
 {
   for (int bound = 1; bound <= 64; bound *= 2) {
     const sf_config c = large_config(bound, 128);
@@ -42,9 +42,8 @@ START_TEST(steps_grow_as_the_formula_says)
     ck_assert_int_le(s.count, bound > 1 ? 900 : 1024);
   }
 }
-END_TEST
 
-START_TEST(boxes_that_steps_do_not_cross_are_refused)
+TEST(boxes_that_steps_do_not_cross_are_refused)
 {
   sf_config c = large_config(8, 128);
   c.dt_gamma = 0;
@@ -60,7 +59,6 @@ START_TEST(boxes_that_steps_do_not_cross_are_refused)
   c.bound = 2;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound = 2"));
 }
-END_TEST
 
 /* ---- rays ---- */
 
@@ -113,7 +111,7 @@ static void scatter(sf_model *m, uint64_t trial)
 }
 
 /* Skipping finds the points that testing every point by the direct formula finds, in every cascade. */
-START_TEST(march_equals_testing_every_point)
+TEST(march_equals_testing_every_point)
 {
   for (int bound = 2; bound <= 32; bound *= 4) {
     sf_config c = large_config(bound, 16);
@@ -146,10 +144,9 @@ START_TEST(march_equals_testing_every_point)
     sf_model_free(&m);
   }
 }
-END_TEST
 
 /* Intervals neither overlap nor leave gaps, and stay in the box. */
-START_TEST(rays_are_cut_without_gaps)
+TEST(rays_are_cut_without_gaps)
 {
   const sf_config c = large_config(16, 128);
   sf_steps steps;
@@ -171,7 +168,6 @@ START_TEST(rays_are_cut_without_gaps)
   }
   ck_assert_int_gt(hits, 1000);
 }
-END_TEST
 
 /* ---- in integers ---- */
 
@@ -195,7 +191,7 @@ static void free_pair(sf_model *m, fx_scene *scene)
 
 /* The integer steps against the recurrence in double precision. Lengths are rounded to 2^-16 of a lattice step, which
  * later ones grow with: 1e-4 in all. */
-START_TEST(integer_steps_grow_as_the_formula_says)
+TEST(integer_steps_grow_as_the_formula_says)
 {
   for (int bound = 2; bound <= 64; bound *= 2) {
     sf_model m;
@@ -216,10 +212,9 @@ START_TEST(integer_steps_grow_as_the_formula_says)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 /* The cell that shifts find is that of the direct formula, for points on and beside every face, too. */
-START_TEST(integer_cells_are_those_of_the_formula)
+TEST(integer_cells_are_those_of_the_formula)
 {
   for (int bound = 1; bound <= 64; bound *= 4) {
     const sf_config c = large_config(bound, 16);
@@ -241,12 +236,11 @@ START_TEST(integer_cells_are_those_of_the_formula)
     }
   }
 }
-END_TEST
 
 /* The same points as the float marcher. The lattice step is rounded to Q0.24, so that distances differ by up to
  * 2^-25 / step_q24 of themselves; the table adds 1e-4 of a distance; float itself is good to 2^-22 of the distance to
  * the camera. */
-START_TEST(integer_rays_follow_the_float_march)
+TEST(integer_rays_follow_the_float_march)
 {
   for (int bound = 2; bound <= 16; bound *= 2) {
     sf_model m;
@@ -285,11 +279,10 @@ START_TEST(integer_rays_follow_the_float_march)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 /* Precision alone: points against the line that they should lie on. The step is off by half of 2^-40, as often as there
  * are steps, and the product is cut to 2^-40. */
-START_TEST(positions_are_precise_in_the_largest_boxes)
+TEST(positions_are_precise_in_the_largest_boxes)
 {
   for (int bound = 16; bound <= 64; bound *= 2) {
     sf_model m;
@@ -316,12 +309,11 @@ START_TEST(positions_are_precise_in_the_largest_boxes)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 static const char *const instruction_sets[] = {"portable", "avx2", "avx512vnni", "amx"};
 
 /* Vector kernels and single rays: same pixels and events; and no light is lost or made. */
-START_TEST(many_rays_equal_single_rays)
+LOOP_TEST(many_rays_equal_single_rays, 4)
 {
   enum { RAYS = 96 };
   sf_model m;
@@ -354,10 +346,9 @@ START_TEST(many_rays_equal_single_rays)
   }
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* Fog of one density everywhere: growing intervals take the light that their lengths say. */
-START_TEST(fog_takes_the_light_of_its_depth)
+TEST(fog_takes_the_light_of_its_depth)
 {
   sf_model m;
   fx_scene scene;
@@ -384,9 +375,8 @@ START_TEST(fog_takes_the_light_of_its_depth)
   }
   free_pair(&m, &scene);
 }
-END_TEST
 
-START_TEST(files_keep_the_box)
+TEST(files_keep_the_box)
 {
   sf_model m;
   fx_scene scene, back;
@@ -408,10 +398,9 @@ START_TEST(files_keep_the_box)
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "log2_bound"));
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* What can be fitted has one grid; others are told so. */
-START_TEST(fitting_refuses)
+TEST(fitting_refuses)
 {
   sf_model m;
   fx_scene scene, fitted;
@@ -425,10 +414,9 @@ START_TEST(fitting_refuses)
   ck_assert_ptr_nonnull(strstr(status.message, "x.snn: 3 occupancy grids"));
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* Entries that are zeroed because no occupied cell reads them change no ray. */
-START_TEST(unread_entries_change_no_ray)
+TEST(unread_entries_change_no_ray)
 {
   sf_model m;
   fx_scene scene;
@@ -453,10 +441,9 @@ START_TEST(unread_entries_change_no_ray)
   ck_assert_uint_gt(samples, 100);
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* The export of a model shows what the model shows. */
-START_TEST(fixed_pictures_equal_float_ones)
+TEST(fixed_pictures_equal_float_ones)
 {
   enum { RAYS = 400 };
   static float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
@@ -480,28 +467,4 @@ START_TEST(fixed_pictures_equal_float_ones)
   printf("fixed against float, bound 8: %.1f dB\n", psnr);
   ck_assert_double_gt(psnr, 30); /* flips of spikes of an untrained net; a wrong delta or cell costs 15 dB */
   free_pair(&m, &scene);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("unbounded");
-  TCase *tc = tcase_create("unbounded");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, steps_grow_as_the_formula_says);
-  tcase_add_test(tc, boxes_that_steps_do_not_cross_are_refused);
-  tcase_add_test(tc, march_equals_testing_every_point);
-  tcase_add_test(tc, rays_are_cut_without_gaps);
-  tcase_add_test(tc, integer_steps_grow_as_the_formula_says);
-  tcase_add_test(tc, integer_cells_are_those_of_the_formula);
-  tcase_add_test(tc, integer_rays_follow_the_float_march);
-  tcase_add_test(tc, positions_are_precise_in_the_largest_boxes);
-  tcase_add_loop_test(tc, many_rays_equal_single_rays, 0, 4);
-  tcase_add_test(tc, fog_takes_the_light_of_its_depth);
-  tcase_add_test(tc, files_keep_the_box);
-  tcase_add_test(tc, fitting_refuses);
-  tcase_add_test(tc, unread_entries_change_no_ray);
-  tcase_add_test(tc, fixed_pictures_equal_float_ones);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
 }
