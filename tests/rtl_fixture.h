@@ -34,6 +34,17 @@ static inline sf_dut *open_dut(const fx_net *net, uint64_t seed, int stalls)
   return open_with(&(sf_dut_options){.seed = seed, .stall_percent = stalls}, net);
 }
 
+/* A register of the accelerator. */
+static inline uint32_t get(sf_dut *dut, uint32_t offset)
+{
+  return dut->bus.read(dut->bus.context, offset);
+}
+
+static inline void put(sf_dut *dut, uint32_t offset, uint32_t value)
+{
+  dut->bus.write(dut->bus.context, offset, value);
+}
+
 static inline void draw_batch(batch *b, random_source *r, int n, bool extreme)
 {
   for (int i = 0; i < n; i++) {

@@ -123,26 +123,6 @@ TEST(tables)
 
 /* ---- streams ---- */
 
-TEST(stalls_change_timing_only)
-{
-  static fx_out reference[BATCH];
-  fx_counts first = {0};
-  typical(42);
-  for (int stalls = 0; stalls <= 90; stalls += 45) {
-    fx_counts counts = {0};
-    sf_dut *dut = open_dut(&net_of_test.net, 7 + (uint64_t)stalls, stalls);
-    run_batch(dut, &net_of_test.net, BATCH, &counts, 42);
-    same_counts(dut, &counts, 42);
-    for (int i = 0; i < BATCH; i++) {
-      if (stalls == 0) reference[i] = shared.result[i].out;
-      ck_assert_mem_eq(&reference[i], &shared.result[i].out, sizeof(fx_out));
-    }
-    if (stalls == 0) first = counts;
-    ck_assert_mem_eq(&first, &counts, sizeof counts);
-    sf_dut_close(dut);
-  }
-}
-
 /* Nobody takes a result for a long time: input stops being accepted, nothing is lost. */
 TEST(long_back_pressure)
 {

@@ -164,88 +164,13 @@ LOOP_TEST(biases_of_other_nets, 3)
   }
 }
 
-/* ---- refused ---- */
-
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
+TEST(a_bias_without_a_place_is_refused)
 {
-  dut->bus.write(dut->bus.context, offset, value);
-}
-
-static uint32_t error_of(sf_dut *dut)
-{
-  return dut->bus.read(dut->bus.context, SF_CSR_ERROR);
-}
-
-TEST(illegal_programming_is_refused)
-{
-  enum { MORE = SF_LANES + 1 };
-  static const struct {
-    uint32_t offset, value, error;
-  } bad[] = {{SF_CSR_D1_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D1_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D2_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D2_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 0, SF_CSR_ERROR_SIZE},         {SF_CSR_C1_N_IN, 161, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 512 + 150, SF_CSR_ERROR_SIZE}, {SF_CSR_C1_N_OUT, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C2_N_OUT, MORE, SF_CSR_ERROR_SIZE},     {SF_CSR_C3_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_BIAS, 1u << 11, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 15, SF_CSR_ERROR_SIZE},
-             {SF_CSR_BIAS, 1u << 18, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 31, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_THETA, 0, SF_CSR_ERROR_THETA},       {SF_CSR_C2_K, 4097, SF_CSR_ERROR_LEAK},
-             {SF_CSR_STEPS, 9, SF_CSR_ERROR_STEPS}};
   random_source r = {10, 0};
-  fx_counts counts = {0};
   random_decoder_make(&net_of_test, &r, 150, false);
-  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
   sf_dut *dut = open_dut(&net_of_test.net, 11, 20);
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    sf_driver_reset(&dut->bus);
-    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
-    put(dut, bad[i].offset, bad[i].value);
-    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_REFUSED);
-    ck_assert_uint_eq(error_of(dut) & bad[i].error, bad[i].error);
-  }
-  net_of_test.net.layer[FX_D2].bias = 1; /* the driver has no place for it */
+  net_of_test.net.layer[FX_D2].bias = 1;
   ck_assert_int_ne(sf_dut_load(dut, &net_of_test.net).code, SF_OK);
-  net_of_test.net.layer[FX_D2].bias = 0;
-  ck_ok(sf_dut_load(dut, &net_of_test.net));
-  draw_batch(&shared, &r, 8, false);
-  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
-  same_counts(dut, &counts, r.seed);
-  sf_dut_close(dut);
-}
-
-/* 0: a beat less, 1: a beat more, 2: no tuser, 3: no tuser on the second sample, 4: a value of 13 bits. */
-LOOP_TEST(bad_packets_are_refused, 5)
-{
-  random_source r = {20 + (uint64_t)_i, 0};
-  random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 12, 0);
-  draw_batch(&shared, &r, 8, false);
-  for (int sample = _i == 3 ? 0 : 1; sample < 2; sample++) {
-    uint64_t words[SF_PACKET_MAX + 1] = {0};
-    const int beats = sf_dut_packet(&net_of_test.net, &shared.sample[sample], words) + (_i == 1) - (_i == 0);
-    if (_i == 4) words[39] = (uint64_t)0x0800 << 48;
-    for (int beat = 0; beat < beats;) {
-      dut->in.s_valid = true;
-      dut->in.s_data = words[beat];
-      dut->in.s_user = beat == 0 && _i != 2 && sample <= (_i != 3);
-      dut->in.s_last = beat == beats - 1;
-      sf_dut_tick(dut);
-      beat += dut->out.s_ready;
-    }
-  }
-  dut->in.s_valid = false;
-  int results = 0; /* beats: of the first sample where only the second one is bad */
-  for (int cycle = 0; cycle < 2000; cycle++) {
-    dut->in.m_ready = true;
-    sf_dut_tick(dut);
-    results += dut->out.m_valid;
-  }
-  dut->in.m_ready = false;
-  ck_assert_int_eq(results, _i == 3 ? 2 : 0);
-  ck_assert_uint_eq(error_of(dut), _i == 4 ? SF_CSR_ERROR_VALUE : SF_CSR_ERROR_PACKET);
-  fx_counts counts = {0};
-  ck_ok(sf_dut_load(dut, &net_of_test.net));
-  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
-  same_counts(dut, &counts, r.seed);
   sf_dut_close(dut);
 }
 

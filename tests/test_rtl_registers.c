@@ -8,11 +8,6 @@ enum { TRIALS = 4000, ACCESSES = 6000, PLACES = 512 /* of the window */ };
 
 /* ---- both ---- */
 
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  return dut->bus.read(dut->bus.context, offset);
-}
-
 static void wait_for_walk(sf_dut *dut)
 {
   for (const uint64_t begin = dut->cycle; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS;)
@@ -25,7 +20,10 @@ static void write_both(sf_dut *dut, registers *r, uint32_t offset, uint32_t valu
   const uint32_t error = model_write(r, offset, value);
   ck_assert_msg(!dut->bus_hung && dut->bus_response == (error ? 2 : 0), "%x to %x: response %d, expected errors %x",
                 value, offset, dut->bus_response, error);
+  dut->in.s_valid = !r->running; /* nothing is accepted that comes before a start */
   sf_dut_tick(dut);
+  ck_assert(r->running || !dut->out.s_ready);
+  dut->in.s_valid = false;
   ck_assert_msg(dut->out.irq == ((r->irq_pending & r->irq_enable) != 0), "%x to %x: interrupt %d", value, offset,
                 dut->out.irq);
 }
