@@ -1,15 +1,14 @@
 /* Tests that register themselves: a program's tests are those that its source defines, and its main is in ck_main.c.
  *   TEST(name) { ... }           runs once
  *   LOOP_TEST(name, n) { ... }   runs n times, with _i from 0 to n - 1
- * Each test has a process of its own, so that a crash ends one test. */
+ * Each test has a process of its own, so that a crash ends one test. Beside them the two ways in which a status is
+ * judged. */
 #ifndef SF_TESTS_CK_RUN_H
 #define SF_TESTS_CK_RUN_H
+#include "base/status.h"
 #include <check.h>
 #include <stdbool.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include <string.h>
 
 /* A program that needs other values than these defines the variable. */
 extern int ck_timeout; /* seconds for a test: 60 */
@@ -25,9 +24,8 @@ TCase *ck_case(void);                 /* where TEST and LOOP_TEST register */
 TCase *ck_new_case(const char *name); /* another one of the suite, with the program's options */
 int ck_main(void);                    /* runs the suite; main's result */
 
-#ifdef __cplusplus
-}
-#endif
+/* A variable that TYPE_free frees where its scope ends: OWNED(fx_scene) scene = ...; */
+#define OWNED(type) __attribute__((cleanup(type##_free))) type
 
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 
@@ -47,4 +45,20 @@ int ck_main(void);                    /* runs the suite; main's result */
 
 #define LOOP_TEST(name, n) REGISTERED_TEST(name, tcase_add_loop_test(ck_case(), name, 0, n))
 #define TEST(name) LOOP_TEST(name, 1)
+
+/* Has to succeed; otherwise the test fails with the call's message. */
+#define ck_ok(call)                                                                                                    \
+  do {                                                                                                                 \
+    const sf_status status_ = (call);                                                                                  \
+    ck_assert_msg(status_.code == SF_OK, "%s", status_.message);                                                       \
+  } while (0)
+
+/* Fails with this code, and the message holds both words and stays on one line. */
+static inline void ck_bad(sf_status s, sf_code code, const char *word, const char *other)
+{
+  ck_assert_msg(s.code == code, "code %d instead of %d: '%s'", s.code, code, s.message);
+  ck_assert_msg(strstr(s.message, word), "'%s' does not name '%s'", s.message, word);
+  ck_assert_msg(strstr(s.message, other), "'%s' does not name '%s'", s.message, other);
+  ck_assert_ptr_null(strchr(s.message, '\n'));
+}
 #endif

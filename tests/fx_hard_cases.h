@@ -54,8 +54,7 @@ static inline void hard_begin(hard *h, const hard_case *c, int variant)
   }
   c->make(h, variant);
   if (c->kind == HARD_REFUSED) return;
-  const sf_status status = fx_scene_check(&h->scene, c->name);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_check(&h->scene, c->name));
 }
 
 static inline void hard_end(hard *h)
@@ -495,8 +494,7 @@ static inline void expect_face(const hard *h, const hard_seen *seen, int variant
 
 static inline void hard_aim(hard *h, const float origin[3], const float direction[3])
 {
-  const sf_status status = sf_fx_ray_make(&h->scene, origin, direction, &h->ray);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_fx_ray_make(&h->scene, origin, direction, &h->ray));
 }
 
 static inline void make_parallel(hard *h, int variant)
@@ -594,7 +592,7 @@ static inline void expect_scale(const hard *h, const hard_seen *seen, int varian
   fx_ray plain;
   (void)variant;
   expect_chord(h, seen, 1);
-  ck_assert_int_eq(sf_fx_ray_make(&h->scene, hard_model_origin, d, &plain).code, SF_OK);
+  ck_ok(sf_fx_ray_make(&h->scene, hard_model_origin, d, &plain));
   ck_assert_int_eq(h->ray.count, plain.count);
   for (int a = 0; a < 3; a++) {
     ck_assert_int_le(llabs(h->ray.origin[a] - plain.origin[a]), 3 << 16);

@@ -25,7 +25,7 @@ static inline void put_picture(const char *name, int width, int height, int valu
   sf_image image = {width, height, malloc((size_t)width * (size_t)height * 8)};
   for (int i = 0; i < width * height * 4; i++)
     image.rgba[i] = (uint16_t)((i % 4 < 3 ? value : i < width * 8 ? alpha : 255) * 257);
-  ck_good(sf_image_save_png(&image, in(name)));
+  ck_ok(sf_image_save_png(&image, in(name)));
   sf_image_free(&image);
 }
 
@@ -86,7 +86,7 @@ static inline void put_colmap(const char *dir, const layout_rig *rig, int text)
 {
   static layout_file file;
   char name[100];
-  ck_good(sf_make_dir(in(dir)));
+  ck_ok(sf_make_dir(in(dir)));
   snprintf(name, sizeof name, "%s/cameras.%s", dir, text ? "txt" : "bin");
   layout_cameras(&file, rig, text), put(name, &file);
   snprintf(name, sizeof name, "%s/images.%s", dir, text ? "txt" : "bin");
@@ -98,7 +98,7 @@ static inline void put_colmap(const char *dir, const layout_rig *rig, int text)
 static inline void put_pictures(const char *dir, const layout_rig *rig, int width, int height, int alpha)
 {
   char name[100];
-  ck_good(sf_make_dir(in(dir)));
+  ck_ok(sf_make_dir(in(dir)));
   for (int v = 0; v < rig->views; v++) {
     snprintf(name, sizeof name, "%s/%s", dir, rig->view[v].name);
     put_picture(name, width, height, 10 + v, alpha);
@@ -201,7 +201,7 @@ static inline void same_rays(const sf_dataset *d, const layout_rig *rig)
 
 static inline void load(sf_dataset *d, const char *split)
 {
-  ck_good(sf_dataset_load(d, folder, split, NULL));
+  ck_ok(sf_dataset_load(d, folder, split, NULL));
 }
 
 /* Names ascend, every 8th is held out, and each picture is the one of its pose. */

@@ -27,7 +27,7 @@ static void put(const char *path, const void *data, size_t n)
 
 TEST(status_is_one_line_and_fits)
 {
-  ck_assert_int_eq(sf_ok().code, SF_OK);
+  ck_ok(sf_ok());
   ck_assert_str_eq(sf_ok().message, "");
   sf_status s = sf_fail(SF_E_IO, "a\nb\tc\x1b %d", 7);
   ck_assert_str_eq(s.message, "a b c  7");
@@ -62,15 +62,15 @@ TEST(file_round_trip)
   char *data;
   size_t n;
   const char bytes[] = {1, 0, 2, '\n', (char)255};
-  ck_good(sf_write_file(in("a"), bytes, sizeof bytes));
-  ck_good(sf_read_file(in("a"), 5, &data, &n));
+  ck_ok(sf_write_file(in("a"), bytes, sizeof bytes));
+  ck_ok(sf_read_file(in("a"), 5, &data, &n));
   ck_assert_uint_eq(n, sizeof bytes);
   ck_assert_mem_eq(data, bytes, n);
   ck_assert_int_eq(data[n], 0);
   free(data);
   ck_bad(sf_read_file(in("a"), 4, &data, &n), SF_E_FORMAT, "/a", "limit");
-  ck_good(sf_write_file(in("a"), NULL, 0));
-  ck_good(sf_read_file(in("a"), 0, &data, &n));
+  ck_ok(sf_write_file(in("a"), NULL, 0));
+  ck_ok(sf_read_file(in("a"), 0, &data, &n));
   ck_assert_uint_eq(n, 0);
   free(data);
   ck_assert_int_eq(entries(), 1);
@@ -125,7 +125,7 @@ TEST(pipes_are_read_up_to_a_limit)
   const size_t sizes[] = {0, 1, 4096, 4097, 8194, 99999, 100000};
   size_t n;
   for (int i = 0; i < 7; i++) {
-    ck_good(read_zeros(sizes[i], 100000, &n));
+    ck_ok(read_zeros(sizes[i], 100000, &n));
     ck_assert_uint_eq(n, sizes[i]);
   }
   ck_bad(read_zeros(100001, 100000, &n), SF_E_FORMAT, "/dev/fd/", "limit of 100000 bytes");
@@ -135,7 +135,7 @@ TEST(pipes_are_read_up_to_a_limit)
 TEST(unwritable_targets_are_left_alone)
 {
   ck_bad(sf_write_file(in("none/x"), "1", 1), SF_E_IO, "none/x", "No such file");
-  ck_good(sf_write_file(in("plain"), "1", 1));
+  ck_ok(sf_write_file(in("plain"), "1", 1));
   ck_bad(sf_write_file(in("plain/x"), "1", 1), SF_E_IO, "plain/x", "Not a directory");
   ck_bad(sf_write_file(folder, "1", 1), SF_E_IO, folder, "folder");
   ck_bad(sf_write_file("/dev/full", "1", 1), SF_E_IO, "/dev/full", "regular");
@@ -155,10 +155,10 @@ TEST(full_disk_keeps_the_old_file)
 {
   char *big = calloc(1, 100000), *data;
   size_t n;
-  ck_good(sf_write_file(in("a"), "old", 3));
+  ck_ok(sf_write_file(in("a"), "old", 3));
   limit_file_size(50000);
   ck_bad(sf_write_file(in("a"), big, 100000), SF_E_IO, "/a", "large");
-  ck_good(sf_read_file(in("a"), 10, &data, &n));
+  ck_ok(sf_read_file(in("a"), 10, &data, &n));
   ck_assert_str_eq(data, "old");
   free(data);
   sf_tensor t = {.name = "w", .type = SF_U8, .dims = 1, .shape = {100000}, .data = big};
@@ -170,7 +170,7 @@ TEST(full_disk_keeps_the_old_file)
 TEST(writer_abort_and_links)
 {
   sf_writer w;
-  ck_good(sf_writer_open(&w, in("a")));
+  ck_ok(sf_writer_open(&w, in("a")));
   fputs("half", w.file);
   ck_assert_int_eq(entries(), 1);
   sf_writer_abort(&w);
@@ -178,16 +178,16 @@ TEST(writer_abort_and_links)
   ck_assert_int_eq(entries(), 0);
   ck_bad(sf_writer_commit(&w), SF_E_IO, "/a", "open");
 
-  ck_good(sf_write_file(in("a"), "1", 1));
+  ck_ok(sf_write_file(in("a"), "1", 1));
   ck_assert_int_eq(symlink("a", in("link")), 0);
-  ck_good(sf_write_file(in("link"), "22", 2));
+  ck_ok(sf_write_file(in("link"), "22", 2));
   struct stat info;
   ck_assert_int_eq(lstat(in("link"), &info), 0);
   ck_assert(S_ISLNK(info.st_mode));
   ck_assert_int_eq(stat(in("a"), &info), 0);
   ck_assert_int_eq(info.st_size, 2);
   umask(022);
-  ck_good(sf_write_file(in("b"), "1", 1));
+  ck_ok(sf_write_file(in("b"), "1", 1));
   ck_assert_int_eq(stat(in("b"), &info), 0);
   ck_assert_int_eq(info.st_mode & 0777, 0644);
 }
@@ -195,10 +195,10 @@ TEST(writer_abort_and_links)
 TEST(folders_with_parents)
 {
   struct stat info;
-  ck_good(sf_make_dir(in("x/y//z/")));
+  ck_ok(sf_make_dir(in("x/y//z/")));
   ck_assert(!stat(in("x/y/z"), &info) && S_ISDIR(info.st_mode));
-  ck_good(sf_make_dir(in("x/y")));
-  ck_good(sf_write_file(in("file"), "", 0));
+  ck_ok(sf_make_dir(in("x/y")));
+  ck_ok(sf_write_file(in("file"), "", 0));
   ck_bad(sf_make_dir(in("file")), SF_E_IO, "/file", "Not a directory");
   ck_bad(sf_make_dir(in("file/below")), SF_E_IO, "/file", "Not a directory");
   ck_bad(sf_make_dir(""), SF_E_IO, "empty name", "");
@@ -210,8 +210,8 @@ TEST(json_round_trip)
 {
   cJSON *json = cJSON_CreateObject(), *back;
   cJSON_AddNumberToObject(json, "x", 0.1);
-  ck_good(sf_json_save(json, in("a.json")));
-  ck_good(sf_json_load(in("a.json"), &back));
+  ck_ok(sf_json_save(json, in("a.json")));
+  ck_ok(sf_json_load(in("a.json"), &back));
   ck_assert(cJSON_Compare(json, back, 1));
   cJSON_Delete(json);
   cJSON_Delete(back);
@@ -260,33 +260,33 @@ TEST(tensors_round_trip)
                    {"empty", SF_U8, 3, {4, 0, 2}, nothing}};
   cJSON *meta = cJSON_CreateObject();
   cJSON_AddStringToObject(meta, "version", "1 \"x\"\n");
-  ck_good(sf_tensors_save(t, 5, meta, in("t")));
+  ck_ok(sf_tensors_save(t, 5, meta, in("t")));
   cJSON_Delete(meta);
 
   sf_tensors set;
-  ck_good(sf_tensors_load(&set, in("t")));
+  ck_ok(sf_tensors_load(&set, in("t")));
   ck_assert_int_eq(set.count, 5);
   ck_assert_str_eq(sf_tensors_meta(&set, "version"), "1 \"x\"\n");
   ck_assert_ptr_null(sf_tensors_meta(&set, "other"));
   const sf_tensor *got;
   for (int i = 0; i < 5; i++) {
-    ck_good(sf_tensors_get(&set, t[i].name, t[i].type, t[i].dims, t[i].shape, &got));
+    ck_ok(sf_tensors_get(&set, t[i].name, t[i].type, t[i].dims, t[i].shape, &got));
     size_t n = sf_dtype_size(t[i].type);
     ck_assert_uint_eq((uintptr_t)got->data % n, 0);
     for (int k = 0; k < t[i].dims; k++) n *= (size_t)t[i].shape[k];
     if (n) ck_assert_mem_eq(got->data, t[i].data, n);
   }
   const int64_t any[2] = {-1, 3}, wrong[2] = {3, 2};
-  ck_good(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
+  ck_ok(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
   ck_bad(sf_tensors_get(&set, "m", SF_F32, 2, wrong, &got), SF_E_FORMAT, "expected F32[3,2], found F32[2,3]", "/t");
   ck_bad(sf_tensors_get(&set, "m", SF_I32, 2, any, &got), SF_E_FORMAT, "expected I32[*,3]", "'m'");
   ck_bad(sf_tensors_get(&set, "gone", SF_I32, 2, any, &got), SF_E_FORMAT, "'gone' is missing", "/t");
-  ck_good(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
+  ck_ok(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
   ck_bad(sf_tensor_finite("file", got), SF_E_RANGE, "element 3 is NaN", "file: tensor 'm'");
   ((float *)got->data)[3] = 0;
   ck_bad(sf_tensor_finite("file", got), SF_E_RANGE, "element 4 is infinite", "'m'");
   ((float *)got->data)[4] = 0;
-  ck_good(sf_tensor_finite("file", got));
+  ck_ok(sf_tensor_finite("file", got));
   sf_tensors_free(&set);
 }
 
@@ -296,14 +296,14 @@ TEST(tensors_layout)
   uint8_t b[2] = {5, 6};
   float f[1] = {1};
   sf_tensor t[] = {{"b", SF_U8, 1, {2}, b}, {"a", SF_U8, 1, {1}, b}, {"f", SF_F32, 1, {1}, f}};
-  ck_good(sf_tensors_save(t, 3, NULL, in("t")));
+  ck_ok(sf_tensors_save(t, 3, NULL, in("t")));
   static const char header[] = "{\"f\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[0,4]},"
                                "\"a\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[4,5]},"
                                "\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[5,7]}}";
   char *data;
   size_t n, padded = (sizeof header - 1 + 7) / 8 * 8;
   uint64_t length;
-  ck_good(sf_read_file(in("t"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("t"), 10000, &data, &n));
   memcpy(&length, data, 8);
   ck_assert_uint_eq(length, padded);
   ck_assert_mem_eq(data + 8, header, sizeof header - 1);
@@ -388,11 +388,11 @@ TEST(tensors_survive_damage)
 {
   float f[5] = {1, 2, 3, 4, 5};
   sf_tensor t[] = {{"a", SF_F32, 1, {5}, f}, {"b", SF_U8, 2, {2, 2}, f}};
-  ck_good(sf_tensors_save(t, 2, NULL, in("t")));
+  ck_ok(sf_tensors_save(t, 2, NULL, in("t")));
   char *data;
   size_t n;
   sf_tensors set;
-  ck_good(sf_read_file(in("t"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("t"), 10000, &data, &n));
   for (size_t i = 0; i < n; i++) {
     put(in("bad"), data, i);
     sf_status s = sf_tensors_load(&set, in("bad"));
@@ -423,11 +423,11 @@ TEST(tensors_unaligned_file)
   sf_tensors set;
   const sf_tensor *t;
   const int64_t one = 1;
-  ck_good(sf_tensors_load(&set, in("t")));
-  ck_good(sf_tensors_get(&set, "f", SF_F32, 1, &one, &t));
+  ck_ok(sf_tensors_load(&set, in("t")));
+  ck_ok(sf_tensors_get(&set, "f", SF_F32, 1, &one, &t));
   ck_assert_uint_eq((uintptr_t)t->data % 4, 0);
   ck_assert(*(float *)t->data == 1.0f);
-  ck_good(sf_tensors_get(&set, "b", SF_U8, 1, &one, &t));
+  ck_ok(sf_tensors_get(&set, "b", SF_U8, 1, &one, &t));
   ck_assert_int_eq(*(uint8_t *)t->data, 7);
   sf_tensors_free(&set);
 }
@@ -462,16 +462,16 @@ TEST(tensors_crosscheck)
   sf_tensors set;
   const sf_tensor *t;
   const int64_t shape[2] = {3, 5}, three = 3;
-  ck_good(sf_tensors_load(&set, theirs));
+  ck_ok(sf_tensors_load(&set, theirs));
   ck_assert_int_eq(set.count, 8);
   ck_assert_str_eq(sf_tensors_meta(&set, "version"), "1");
-  ck_good(sf_tensors_get(&set, "f32", SF_F32, 2, shape, &t));
+  ck_ok(sf_tensors_get(&set, "f32", SF_F32, 2, shape, &t));
   for (int i = 0; i < 15; i++) ck_assert(((float *)t->data)[i] == (float)i / 4 - 1);
-  ck_good(sf_tensors_get(&set, "i8", SF_I8, 1, &three, &t));
+  ck_ok(sf_tensors_get(&set, "i8", SF_I8, 1, &three, &t));
   ck_assert_mem_eq(t->data, "\x80\0\x7f", 3);
-  ck_good(sf_tensors_get(&set, "u64", SF_U64, 0, NULL, &t));
+  ck_ok(sf_tensors_get(&set, "u64", SF_U64, 0, NULL, &t));
   ck_assert_uint_eq(*(uint64_t *)t->data, UINT64_MAX);
-  ck_good(sf_tensors_save(set.tensor, set.count, set.metadata, ours));
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, ours));
   sf_tensors_free(&set);
 }
 
@@ -525,7 +525,7 @@ TEST(cli_values)
 {
   values v = {0};
   const char *p[2];
-  ck_good(parse(&v, p, "in -f -n -5 --seed 18446744073709551615 --beta=1e-7 --mode no-decay out -o file"));
+  ck_ok(parse(&v, p, "in -f -n -5 --seed 18446744073709551615 --beta=1e-7 --mode no-decay out -o file"));
   ck_assert(v.flag);
   ck_assert_int_eq(v.number, -5);
   ck_assert_uint_eq(v.seed, UINT64_MAX);
@@ -534,12 +534,12 @@ TEST(cli_values)
   ck_assert_str_eq(v.text, "file");
   ck_assert_str_eq(p[0], "in");
   ck_assert_str_eq(p[1], "out");
-  ck_good(parse(&v, p, "-n10 --seed=0x10 --any -2147483648 -- -in"));
+  ck_ok(parse(&v, p, "-n10 --seed=0x10 --any -2147483648 -- -in"));
   ck_assert_int_eq(v.number, INT32_MIN);
   ck_assert_uint_eq(v.seed, 16);
   ck_assert_str_eq(p[0], "-in");
   ck_assert_ptr_null(p[1]);
-  ck_good(parse(&v, p, "-"));
+  ck_ok(parse(&v, p, "-"));
   ck_assert_str_eq(p[0], "-");
 }
 
@@ -580,13 +580,13 @@ TEST(cli_outputs)
                                      "in --log none/c", "in --word c -o c", "in --start c -o c"};
   const char *p[2];
   ck_assert_int_eq(chdir(folder), 0);
-  ck_good(sf_write_file("a", "a", 1));
+  ck_ok(sf_write_file("a", "a", 1));
   ck_assert_int_eq(symlink("a", "b"), 0);
-  ck_good(sf_make_dir("d"));
+  ck_ok(sf_make_dir("d"));
   for (int i = 0; i < COUNT(lines); i++) ck_bad(parse_paths(lines[i][0], p), SF_E_USAGE, lines[i][1], lines[i][2]);
   for (int i = 0; i < COUNT(unwritable); i++)
     ck_bad(parse_paths(unwritable[i], p), SF_E_IO, "cannot write", strrchr(unwritable[i], ' ') + 1);
-  for (int i = 0; i < COUNT(good); i++) ck_good(parse_paths(good[i], p));
+  for (int i = 0; i < COUNT(good); i++) ck_ok(parse_paths(good[i], p));
   ck_assert_int_eq(entries(), 3);
 }
 
@@ -628,7 +628,7 @@ TEST(cli_exit_status)
   fclose(stderr);
   char *text;
   size_t n;
-  ck_good(sf_read_file(in("err"), 1000, &text, &n));
+  ck_ok(sf_read_file(in("err"), 1000, &text, &n));
   ck_assert_str_eq(text, "prog: u (see prog --help)\nprog: s\nprog: i\nprog: d\n");
   free(text);
 }
@@ -682,7 +682,7 @@ TEST(progress_is_sparse_in_logs)
   fclose(stderr);
   char *text;
   size_t n;
-  ck_good(sf_read_file(in("err"), 1000, &text, &n));
+  ck_ok(sf_read_file(in("err"), 1000, &text, &n));
   ck_assert_str_eq(text, "shown\n");
   free(text);
 }

@@ -32,7 +32,7 @@ TEST(fewer_samples_may_take_more_blocks)
 {
   static const int count[] = {384, 128, 2, 510};
   sf_batch b;
-  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  ck_ok(sf_batch_create(&b, 1 << 14, 8));
   b.rays = 4;
   for (int r = 0; r < 4; r++) b.ray[r].count = count[r];
   sf_batch_pack(&b);
@@ -61,7 +61,7 @@ static double empty_lanes(const sf_batch *b)
 TEST(every_ray_is_in_one_bundle)
 {
   sf_batch b;
-  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  ck_ok(sf_batch_create(&b, 1 << 14, 8));
   for (uint64_t seed = 0; seed < 60; seed++) {
     const uint64_t longest = seed % 4 == 0 ? 1025 : seed % 4 == 1 ? 2 : 40; /* long, nearly empty, usual rays */
     b.rays = 1 + (int)sf_random_below(seed, 1, 0, 2000);
@@ -87,7 +87,7 @@ TEST(compaction_keeps_what_light_reaches)
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
-  ck_good(sf_batch_draw(t));
+  ck_ok(sf_batch_draw(t));
   sf_batch *b = &t->batch;
   const int rays = b->rays;
   for (int i = 0; i < b->blocks * SF_BLOCK; i++) b->delta[i] *= 30; /* light ends, sample by sample */

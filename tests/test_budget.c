@@ -48,8 +48,7 @@ static sf_view make_view(const sf_model *m, uint16_t *rgba)
                         .image = {SIZE, SIZE, rgba}};
   for (int i = 0; i < SIZE * SIZE; i++)
     sf_camera_ray(&view.camera, (float)(i % SIZE) + 0.5f, (float)(i / SIZE) + 0.5f, origin[i], direction[i]);
-  const sf_status status = sf_render_rays(m, origin[0], direction[0], SIZE * SIZE, 3, white, rgb[0], NULL, NULL, NULL);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_render_rays(m, origin[0], direction[0], SIZE * SIZE, 3, white, rgb[0], NULL, NULL, NULL));
   for (int i = 0; i < SIZE * SIZE; i++) {
     for (int o = 0; o < 3; o++) rgba[4 * i + o] = (uint16_t)lrintf(fminf(rgb[i][o], 1) * 65535);
     rgba[4 * i + 3] = 65535;
@@ -65,10 +64,9 @@ static sf_picture_budget make_picture(sf_model *m)
   const sf_dataset data = {.scale = 1};
   const sf_view view = make_view(m, rgba);
   const sf_quant_options options = {.background = {1, 1, 1}, .seed = 1};
-  ck_assert_int_eq(sf_quantise(&scene, m, "model", &options).code, SF_OK);
+  ck_ok(sf_quantise(&scene, m, "model", &options));
   const sf_picture_job job = {m, &scene, &data, &view, "scene", 60, 3, NULL, NULL};
-  const sf_status status = sf_picture_budget_make(&job, &budget);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_picture_budget_make(&job, &budget));
   float *w4 = sf_model_param(m, SF_P_C2);
   const size_t last = m->param[SF_P_C2].size - 1;
   for (size_t i = 0; i <= last / 2; i++) { /* another model's */
@@ -110,7 +108,7 @@ LOOP_TEST(picture_from_fixed_to_float, SF_NODECAY + 1)
 
 TEST(currents_within_their_bounds)
 {
-  sf_model m = make_model(SF_HYBRID);
+  OWNED(sf_model) m = make_model(SF_HYBRID);
   const sf_picture_budget b = make_picture(&m);
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_uint_gt(b.current[l].currents, 1000);
@@ -118,7 +116,6 @@ TEST(currents_within_their_bounds)
                   b.current[l].ratio);
     ck_assert_double_lt(b.current[l].rms, b.current[l].bound);
   }
-  sf_model_free(&m);
 }
 
 int ck_timeout = 120;

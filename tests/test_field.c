@@ -10,8 +10,8 @@
 TEST(layout_is_torch_ngp)
 {
   sf_config c = sf_config_default();
-  sf_model m;
-  ck_assert_int_eq(sf_model_create(&m, &c).code, SF_OK);
+  OWNED(sf_model) m;
+  ck_ok(sf_model_create(&m, &c));
   size_t entries = 0;
   for (int l = 0; l < 16; l++) entries += m.level[l].entries;
   ck_assert_uint_eq(entries, 6119864);
@@ -19,13 +19,12 @@ TEST(layout_is_torch_ngp)
   for (int l = 0; l < 16; l++) dense += m.level[l].stride != 0;
   ck_assert_int_eq(dense, 5);
   ck_assert_uint_eq(m.level[4].stride, 60);
-  sf_model_free(&m);
 }
 
 /* Trilinear weights sum to one: a constant table gives the constant, at faces and corners too. */
 TEST(constant_table_gives_constant)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   for (size_t i = 0; i < m.param[SF_P_GRID].size; i++) m.value[i] = 0.75f;
   for (int i = 0; i < 500; i++) {
     float x[3], f[32];
@@ -33,7 +32,6 @@ TEST(constant_table_gives_constant)
     sf_grid_features(&m, x, f);
     for (int j = 0; j < 8; j++) ck_assert_float_eq_tol(f[j], 0.75f, 1e-6f);
   }
-  sf_model_free(&m);
 }
 
 static void positions(float *x)
@@ -71,7 +69,7 @@ TEST(kernels_equal_oracle)
 TEST(backward_is_the_adjoint)
 {
   const sf_kernels *k = sf_kernels_select(NULL);
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   float x[3 * SF_BLOCK], out[2 * SF_BLOCK], d[2 * SF_BLOCK];
   positions(x);
   for (int i = 0; i < 2 * SF_BLOCK; i++) d[i] = test_random(1u << 26 | i);
@@ -85,7 +83,6 @@ TEST(backward_is_the_adjoint)
     ck_assert_double_eq_tol(left, right, 1e-4);
     free(grad);
   }
-  sf_model_free(&m);
 }
 
 /* Orthonormal on the sphere: Monte Carlo over 200 000 directions, standard error below 4 pi / sqrt(n) / 3 = 0.01. */

@@ -42,7 +42,7 @@ static sf_fit_rays make_rays(const fx_scene *scene, uint64_t count, uint32_t noi
   }
   uint32_t *picture = calloc(count, 3 * sizeof *picture);
   sf_fit_sum sum;
-  ck_good(sf_fit_measure(scene, &rays, 0, count, picture, &sum));
+  ck_ok(sf_fit_measure(scene, &rays, 0, count, picture, &sum));
   for (uint64_t i = 0; i < 3 * count; i++)
     rays.target[i] = (picture[i] + (uint32_t)sf_random_below(3, 0, i, noise + 1)) % 65536;
   free(picture);
@@ -55,10 +55,10 @@ static void assert_same_pixels(const fx_scene *a, const fx_scene *b, const sf_fi
   for (uint64_t i = 0; i < rays->count; i++) {
     fx_ray x, y;
     fx_pixel p, q;
-    ck_good(sf_fx_ray_make(a, rays->origin + 3 * i, rays->direction + 3 * i, &x));
-    ck_good(sf_fx_ray_make(b, rays->origin + 3 * i, rays->direction + 3 * i, &y));
-    ck_good(fx_render_ray(a, &x, NULL, NULL, &p, NULL));
-    ck_good(fx_render_ray(b, &y, NULL, NULL, &q, NULL));
+    ck_ok(sf_fx_ray_make(a, rays->origin + 3 * i, rays->direction + 3 * i, &x));
+    ck_ok(sf_fx_ray_make(b, rays->origin + 3 * i, rays->direction + 3 * i, &y));
+    ck_ok(fx_render_ray(a, &x, NULL, NULL, &p, NULL));
+    ck_ok(fx_render_ray(b, &y, NULL, NULL, &q, NULL));
     ck_assert_msg(!memcmp(&p, &q, sizeof p), "ray %llu differs", (unsigned long long)i);
     samples += p.samples;
   }
@@ -104,16 +104,16 @@ LOOP_TEST(without_effect_changes_no_bit, 3)
   sf_fit_rays rays = make_rays(&scene, RAYS, 0);
   sf_trim_use use;
   sf_trim trim;
-  ck_good(sf_trim_use_create(&use, &scene));
-  ck_good(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
+  ck_ok(sf_trim_use_create(&use, &scene));
+  ck_ok(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
   sf_trim_all(&scene, &trim);
-  ck_good(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
   ck_assert_int_eq(trimmed.grid.entries, scene.grid.entries);
   ck_assert_mem_eq(trimmed.grid.table, scene.grid.table, 2 * (size_t)scene.grid.entries);
   fx_scene_free(&trimmed);
   sf_trim_exact(&scene, &use, &trim);
-  ck_good(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
-  ck_good(fx_scene_check(&trimmed, "exact"));
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
+  ck_ok(fx_scene_check(&trimmed, "exact"));
   expect_dropped(&scene, &trimmed);
   assert_same_pixels(&scene, &trimmed, &rays);
   sf_trim_use_free(&use), sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
@@ -128,7 +128,7 @@ TEST(something_is_left_of_a_silent_net)
   const fx_scene *candidate[] = {&scene};
   const sf_fit_job job = {.candidate = candidate, .widths = widest, .candidates = 1, .rays = &rays, .name = "silent"};
   sf_fit_report report;
-  ck_good(sf_fit(&trimmed, &job, &report));
+  ck_ok(sf_fit(&trimmed, &job, &report));
   for (int l = FX_D1; l <= FX_C2; l++) ck_assert_int_eq(trimmed.net.layer[l].n_out, 1);
   ck_assert_int_eq(trimmed.grid.levels, 1);
   assert_same_pixels(&scene, &trimmed, &rays);
@@ -224,12 +224,12 @@ TEST(smaller_tables_keep_what_is_used)
     sf_trim_use use;
     sf_trim trim;
     random_position(&scene, i, pos);
-    ck_good(sf_trim_use_create(&use, &scene));
+    ck_ok(sf_trim_use_create(&use, &scene));
     sf_trim_use_place(&use, &scene, pos, 1000);
     sf_trim_all(&scene, &trim);
     for (int l = 0; l < scene.grid.levels; l++) trim.log2_size[l] = sf_trim_smaller(&scene, &trim, l);
-    ck_good(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
-    ck_good(fx_scene_check(&small_one, "smaller"));
+    ck_ok(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
+    ck_ok(fx_scene_check(&small_one, "smaller"));
     ck_assert_int_lt(small_one.grid.entries, scene.grid.entries);
     fx_grid_features(&scene.grid, pos, f, NULL);
     fx_grid_features(&small_one.grid, pos, g, NULL);
@@ -265,7 +265,7 @@ LOOP_TEST(no_loss_is_no_difference, 3)
   sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r;
-  ck_good(fit(candidate, 1, &rays, 0, &fitted, &r));
+  ck_ok(fit(candidate, 1, &rays, 0, &fitted, &r));
   expect_dropped(&scene, &fitted);
   assert_same_pixels(&scene, &fitted, &rays);
   ck_assert_uint_eq(r.before.sum.error, r.after.sum.error);
@@ -286,14 +286,14 @@ TEST(the_bound_is_kept)
   const double bound = 0.5;
   sf_fit_report r;
   sf_fit_sum before, after;
-  ck_good(fit(candidate, 1, &rays, bound, &fitted, &r));
+  ck_ok(fit(candidate, 1, &rays, bound, &fitted, &r));
   make_folder();
-  ck_good(fx_scene_save(&fitted, in("fitted.snn")));
-  ck_good(fx_scene_load(&loaded, in("fitted.snn")));
+  ck_ok(fx_scene_save(&fitted, in("fitted.snn")));
+  ck_ok(fx_scene_load(&loaded, in("fitted.snn")));
   remove_folder();
   const uint64_t first = r.first_checked, end = first + r.checked;
-  ck_good(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
-  ck_good(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
+  ck_ok(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
+  ck_ok(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
   ck_assert_uint_eq(before.error, r.before.sum.error);
   ck_assert_uint_eq(after.error, r.after.sum.error);
   ck_assert_mem_eq(&after.counts, &r.after.sum.counts, sizeof after.counts);
@@ -311,9 +311,9 @@ TEST(threads_do_not_matter)
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r, q;
   omp_set_num_threads(1);
-  ck_good(fit(candidate, 1, &rays, 0.3, &a, &r));
+  ck_ok(fit(candidate, 1, &rays, 0.3, &a, &r));
   omp_set_num_threads(3);
-  ck_good(fit(candidate, 1, &rays, 0.3, &b, &q));
+  ck_ok(fit(candidate, 1, &rays, 0.3, &b, &q));
   ck_assert_mem_eq(&r.after.sum, &q.after.sum, sizeof r.after.sum);
   ck_assert_int_eq(a.grid.entries, b.grid.entries);
   ck_assert_mem_eq(a.grid.table, b.grid.table, 2 * (size_t)a.grid.entries);
@@ -332,11 +332,11 @@ TEST(candidates)
   sf_fit_rays rays = make_rays(&scene, RAYS, 3000);
   const fx_scene *candidate[] = {&scene, &same, &worse};
   sf_fit_report r;
-  ck_good(fit(candidate, 3, &rays, 0.1, &fitted, &r));
+  ck_ok(fit(candidate, 3, &rays, 0.1, &fitted, &r));
   ck_assert_int_eq(r.chosen, 1);
   ck_assert_double_le(r.loss_db, 0.1);
   fx_scene_free(&fitted);
-  ck_good(fit(candidate, 3, &rays, 0, &fitted, &r));
+  ck_ok(fit(candidate, 3, &rays, 0, &fitted, &r));
   ck_assert_int_eq(r.chosen, 0);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&same), fx_scene_free(&worse), fx_scene_free(&fitted);
 }
@@ -388,12 +388,12 @@ TEST(targets)
   const sf_dataset data = {.path = "dir", .view = &view, .count = 1};
   const int32_t white[3] = {65536, 65536, 65536}, black[3] = {0};
   sf_fit_rays rays;
-  ck_good(sf_fit_rays_draw(&rays, &data, white, 5, 0));
+  ck_ok(sf_fit_rays_draw(&rays, &data, white, 5, 0));
   ck_assert_uint_eq(rays.target[12], 65535);
   ck_assert_uint_eq(rays.target[13], 32767);
   ck_assert_double_eq(rays.pixels, 1);
   sf_fit_rays_free(&rays);
-  ck_good(sf_fit_rays_draw(&rays, &data, black, 5, 0));
+  ck_ok(sf_fit_rays_draw(&rays, &data, black, 5, 0));
   ck_assert_uint_eq(rays.target[12], 32768);
   ck_assert_uint_eq(rays.target[13], 0);
   sf_fit_rays_free(&rays);

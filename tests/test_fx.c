@@ -218,7 +218,7 @@ TEST(compositing_conserves)
 TEST(grid_reproduces_constants)
 {
   static const int shift[] = {5, 12, 17};
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   for (int value = -127; value <= 127; value += 2) {
     int16_t f[32];
     fx_counts counts = {0};
@@ -233,7 +233,6 @@ TEST(grid_reproduces_constants)
     }
     ck_assert_uint_eq(counts.saturated_features, 40 * 12);
   }
-  fx_scene_free(&scene);
 }
 
 TEST(march_tests_every_point)

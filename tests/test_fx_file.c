@@ -51,8 +51,7 @@ static fx_scene small_scene(uint64_t seed)
 
 static void save(const fx_scene *scene)
 {
-  const sf_status status = fx_scene_save(scene, path);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_save(scene, path));
 }
 
 /* Without the fsync of sf_write_file: some thousand times. */
@@ -103,16 +102,13 @@ TEST(round_trip)
 {
   for (uint64_t seed = 0; seed < 20; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
-    fx_scene scene = fixture_scene(&sizes, seed), again;
+    OWNED(fx_scene) scene = fixture_scene(&sizes, seed), again;
     scene.units.to_box_scale = 1.0 / 3, scene.units.dir_scale = 0x1p-11, scene.units.to_box_offset[1] = -1e6 / 7;
     scene.background[2] = 12345, scene.units.model_scale = seed % 2 ? 0.4 : 0;
     save(&scene);
-    const sf_status status = fx_scene_load(&again, path);
-    ck_assert_msg(status.code == SF_OK, "%s", status.message);
+    ck_ok(fx_scene_load(&again, path));
     assert_equal_scenes(&scene, &again);
     ck_assert_int_eq(files_in_folder(false), 1);
-    fx_scene_free(&scene);
-    fx_scene_free(&again);
   }
 }
 
@@ -120,15 +116,14 @@ TEST(same_scene_same_bytes)
 {
   char *first, *second;
   size_t a, b;
-  fx_scene scene = small_scene(1);
+  OWNED(fx_scene) scene = small_scene(1);
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &first, &a).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &first, &a));
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &second, &b).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &second, &b));
   ck_assert_uint_eq(a, b);
   ck_assert_mem_eq(first, second, a);
   free(first), free(second);
-  fx_scene_free(&scene);
 }
 
 TEST(cut_short_anywhere)
@@ -137,7 +132,7 @@ TEST(cut_short_anywhere)
   size_t size;
   fx_scene scene = small_scene(2), again;
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &data, &size));
   for (size_t keep = 0; keep < size; keep += keep < 4000 ? 13 : 997) {
     put(data, keep);
     const sf_status status = fx_scene_load(&again, path);
@@ -154,7 +149,7 @@ TEST(edited_anywhere)
   size_t size;
   fx_scene scene = small_scene(3), again;
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &data, &size));
   for (uint64_t i = 0; i < 1500; i++) {
     const size_t at =
         i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
@@ -177,10 +172,10 @@ TEST(edited_anywhere)
 static void edit(const char *key, const char *value)
 {
   sf_tensors set;
-  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+  ck_ok(sf_tensors_load(&set, path));
   cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
   if (value) cJSON_AddStringToObject(set.metadata, key, value);
-  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
   sf_tensors_free(&set);
 }
 
@@ -237,13 +232,12 @@ TEST(metadata_is_checked)
       {"model_scale", "inf", "model_scale"},
       {"model_scale", "1", "checksum"},
   };
-  fx_scene scene = small_scene(4);
+  OWNED(fx_scene) scene = small_scene(4);
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
     save(&scene);
     edit(wrong[i][0], wrong[i][1]);
     assert_refused(wrong[i][2]);
   }
-  fx_scene_free(&scene);
 }
 
 /* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
@@ -251,7 +245,7 @@ TEST(metadata_is_checked)
 TEST(largest_h_must_fit)
 {
   const fixture_sizes sizes = {2, SF_LANES, 5, 9, 24, 40, 3, FX_NODECAY, {0}};
-  fx_scene scene = fixture_scene(&sizes, 4);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 4);
   fx_layer *d2 = &scene.net.layer[FX_D2];
   for (int sign = -1; sign <= 1; sign += 2) {
     for (int i = 0; i < d2->n_in; i++) d2->w[i * SF_LANES] = 127, d2->w[i * SF_LANES + 1] = (int8_t)(sign * 127);
@@ -259,39 +253,36 @@ TEST(largest_h_must_fit)
     ck_assert_int_eq(fx_largest_h(d2), most);
     ck_assert_int_eq(fx_scene_check(&scene, "here").code, most < 2048 ? SF_OK : SF_E_RANGE);
   }
-  fx_scene_free(&scene);
 }
 
 TEST(decoder_behind_a_grid_is_refused)
 {
   static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
-  fx_scene scene = small_scene(9);
+  OWNED(fx_scene) scene = small_scene(9);
   save(&scene);
   for (size_t i = 0; i < sizeof none / sizeof *none; i++) edit(none[i], "0");
   assert_refused("grid.levels is 2, expected 0..0");
-  fx_scene_free(&scene);
 }
 
 /* They would size what is listed level by level. */
 TEST(levels_of_a_scene_without_a_grid_are_refused)
 {
-  fx_scene scene = tensorf_scene();
+  OWNED(fx_scene) scene = tensorf_scene();
   save(&scene);
   edit("grid.levels", "17");
   assert_refused("grid.levels is 17, expected 0..0");
-  fx_scene_free(&scene);
 }
 
 /* Rewrites with one tensor's first element changed. */
 static void edit_tensor(const char *name, int64_t value)
 {
   sf_tensors set;
-  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+  ck_ok(sf_tensors_load(&set, path));
   for (int i = 0; i < set.count; i++) {
     if (strcmp(set.tensor[i].name, name)) continue;
     memcpy(set.tensor[i].data, &value, sf_dtype_size(set.tensor[i].type));
   }
-  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
   sf_tensors_free(&set);
 }
 
@@ -305,59 +296,51 @@ TEST(tensors_are_checked)
                {"grid.stride", 601, "stride"},     {"grid.offset", 1, "offset"},          {"grid.shift", 32, "shift"},
                {"grid.scale_q16", 0, "scale_q16"}, {"grid.scale_q16", 1 << 30, "stride"}, {"colour.w5", 1, "checksum"},
                {"occupancy", 77, "checksum"},      {"grid.table", 1, "checksum"}};
-  fx_scene scene = small_scene(5);
+  OWNED(fx_scene) scene = small_scene(5);
   scene.grid.table[0] = 0, scene.occupancy[0] = 0, scene.net.layer[FX_C3].w[0] = 0;
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
     save(&scene);
     edit_tensor(wrong[i].tensor, wrong[i].value);
     assert_refused(wrong[i].place);
   }
-  fx_scene_free(&scene);
 }
 
 TEST(missing_tensor_is_named)
 {
   static const char *const names[] = {"grid.table", "occupancy", "density.w1",  "density.w2", "colour.w3",
                                       "colour.w4",  "colour.w5", "grid.offset", "grid.shift"};
-  fx_scene scene = small_scene(6);
+  OWNED(fx_scene) scene = small_scene(6);
   for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
     sf_tensors set;
     save(&scene);
-    ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+    ck_ok(sf_tensors_load(&set, path));
     int kept = 0;
     for (int i = 0; i < set.count; i++)
       if (strcmp(set.tensor[i].name, names[n])) set.tensor[kept++] = set.tensor[i];
     ck_assert_int_eq(kept, set.count - 1);
-    ck_assert_int_eq(sf_tensors_save(set.tensor, kept, set.metadata, path).code, SF_OK);
+    ck_ok(sf_tensors_save(set.tensor, kept, set.metadata, path));
     sf_tensors_free(&set);
     assert_refused(names[n]);
   }
-  fx_scene_free(&scene);
 }
 
 TEST(lanes_beyond_the_layer_are_zero)
 {
-  fx_scene scene = small_scene(7);
+  OWNED(fx_scene) scene = small_scene(7);
   scene.net.layer[FX_C1].w[24] = 1;
-  const sf_status status = fx_scene_check(&scene, "memory");
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "colour.w3"));
-  fx_scene_free(&scene);
+  ck_bad(fx_scene_check(&scene, "memory"), SF_E_RANGE, "colour.w3", "");
 }
 
 TEST(a_decoder_alone_is_no_file)
 {
-  fx_scene scene = fixture_scene(&fixture_decoder, 9);
-  const sf_status status = fx_scene_save(&scene, path);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert(strstr(status.message, path) && strstr(status.message, "decoder"));
+  OWNED(fx_scene) scene = fixture_scene(&fixture_decoder, 9);
+  ck_bad(fx_scene_save(&scene, path), SF_E_UNSUPPORTED, path, "decoder");
   ck_assert_int_eq(files_in_folder(false), 0);
-  fx_scene_free(&scene);
 }
 
 TEST(unwritable_and_missing)
 {
-  fx_scene scene = small_scene(8);
+  OWNED(fx_scene) scene = small_scene(8);
   snprintf(path, sizeof path, "%s/absent/scene.snn", folder);
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_IO);
   assert_refused("absent");
@@ -365,7 +348,6 @@ TEST(unwritable_and_missing)
   snprintf(path, sizeof path, "%s/scene.snn", folder);
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_RANGE);
   ck_assert_int_eq(files_in_folder(false), 0);
-  fx_scene_free(&scene);
 }
 
 int ck_timeout = 300;

@@ -32,8 +32,8 @@ static void run_ray(hard *h, const hard_case *c, int variant)
 {
   hard_seen seen = {0};
   fx_pixel naive;
-  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &seen.pixel, &seen.counts).code, SF_OK);
-  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, eval_naive, h, &naive, NULL).code, SF_OK);
+  ck_ok(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &seen.pixel, &seen.counts));
+  ck_ok(fx_render_ray(&h->scene, &h->ray, eval_naive, h, &naive, NULL));
   ck_assert_mem_eq(&naive, &seen.pixel, sizeof naive);
   c->expect(h, &seen, variant);
 }

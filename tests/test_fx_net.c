@@ -4,7 +4,7 @@
 
 static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
 {
-  fx_scene scene = fixture_scene(sizes, seed);
+  OWNED(fx_scene) scene = fixture_scene(sizes, seed);
   fx_trace *trace = malloc(sizeof *trace);
   for (uint64_t n = 0; n < 4; n++) {
     int16_t f[32], dir[SF_DIR_MAX];
@@ -13,7 +13,6 @@ static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
     assert_sample(&scene.net, f, dir, trace);
   }
   free(trace);
-  fx_scene_free(&scene);
 }
 
 TEST(net_equals_naive_at_full_size)
@@ -53,7 +52,7 @@ TEST(decoder_current_saturates)
 {
   fixture_sizes sizes = fixture_decoder;
   sizes.n_dir = SF_DIR_MAX, sizes.bias[FX_C1] = 2047;
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   const fx_layer *c1 = &scene.net.layer[FX_C1];
   for (int i = 0; i < fx_layer_rows(c1); i++)
     for (int o = 0; o < SF_LANES; o++) c1->w[i * SF_LANES + o] = o % 2 ? 127 : -127;
@@ -72,14 +71,13 @@ TEST(decoder_current_saturates)
   ck_assert_uint_eq(counts.saturated[FX_C1], SF_LANES);
   ck_assert_uint_eq(counts.rays, 0);
   free(trace);
-  fx_scene_free(&scene);
 }
 
 /* The paper's TensoRF decoder: 150 -> 128 -> 128 -> 3 has 35968 synapses, biases not among them. */
 TEST(decoder_macs_are_the_papers)
 {
   const fixture_sizes sizes = {0, 0, 0, 150, 128, 128, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
-  fx_scene scene = fixture_scene(&sizes, 4);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 4);
   const fx_layer *l = scene.net.layer;
   ck_assert_int_eq(l[FX_C1].n_in * l[FX_C1].n_out + l[FX_C2].n_in * l[FX_C2].n_out + l[FX_C3].n_in * l[FX_C3].n_out,
                    35968);
@@ -94,7 +92,6 @@ TEST(decoder_macs_are_the_papers)
   ck_assert_uint_eq(c.layer[FX_C2].weight[1], 128);
   ck_assert_uint_eq(c.layer[FX_C3].weight[0], 3);
   ck_assert_uint_eq(c.layer[FX_C3].weight[1], 0);
-  fx_scene_free(&scene);
 }
 
 /* The comparison means something only if a part of the neurons fires. */
@@ -123,7 +120,7 @@ TEST(fixture_fires_in_part)
 
 TEST(counts_add_up)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 9);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 9);
   fx_counts all = {0}, parts = {0};
   int32_t base[SF_LANES] = {0};
   for (uint64_t n = 0; n < 20; n++) {
@@ -136,7 +133,6 @@ TEST(counts_add_up)
     fx_counts_add(&parts, &one);
   }
   ck_assert_mem_eq(&all, &parts, sizeof all);
-  fx_scene_free(&scene);
 }
 
 /* ---- rays ---- */
@@ -171,14 +167,14 @@ static fx_ray diagonal_ray(uint64_t index)
 
 TEST(render_equals_naive_evaluation)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 4);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 4);
   for (uint64_t i = 0; i < 12; i++) {
     const fx_ray ray = diagonal_ray(i);
     naive_user user = {.net = &scene.net};
     fx_pixel a, b;
     fx_counts counts = {0}, around = {0};
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &a, &counts).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, eval_naive, &user, &b, &around).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &a, &counts));
+    ck_ok(fx_render_ray(&scene, &ray, eval_naive, &user, &b, &around));
     fx_counts_add(&user.counts, &around);
     ck_assert_mem_eq(&a, &b, sizeof a);
     assert_same_counts(&counts, &user.counts);
@@ -186,7 +182,6 @@ TEST(render_equals_naive_evaluation)
     ck_assert_uint_eq(counts.samples, a.samples);
     ck_assert_uint_eq(a.weight_sum + a.transmittance, 1 << 20);
   }
-  fx_scene_free(&scene);
 }
 
 static sf_status eval_fails(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
@@ -198,14 +193,13 @@ static sf_status eval_fails(void *user, const fx_ray *ray, bool first, const int
 
 TEST(render_hands_on_a_failure)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 4);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 4);
   memset(scene.occupancy, 0xff, 64);
   const fx_ray ray = diagonal_ray(1);
   fx_pixel pixel;
   int calls = 0;
   ck_assert_int_eq(fx_render_ray(&scene, &ray, eval_fails, &calls, &pixel, NULL).code, SF_E_DIFFERENCE);
   ck_assert_int_eq(calls, 3);
-  fx_scene_free(&scene);
 }
 
 int ck_timeout = 300;

@@ -18,7 +18,7 @@ TEST(a_few_missing_pictures_are_passed_over)
   ck_assert_ptr_nonnull(strstr(d.warning[0], "images/p03.png"));
   same_rays(&d, &rig);
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1, .first = 2, .limit = 1}));
+  ck_ok(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1, .first = 2, .limit = 1}));
   ck_assert_str_eq(d.view[0].name, "images/p04.png");
   sf_dataset_free(&d);
   load(&d, "test"); /* is whole */
@@ -53,7 +53,7 @@ TEST(a_mark_before_a_text_is_skipped)
 {
   static layout_file file, marked;
   const layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_colmap("sparse/0", &rig, 1);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   for (int i = 0; i < 2; i++) {
@@ -67,7 +67,6 @@ TEST(a_mark_before_a_text_is_skipped)
   }
   load(&d, "train");
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
 
 static bool warned(const sf_dataset *d, const char *word, const char *name)
@@ -92,7 +91,7 @@ TEST(the_survey_names_what_looks_wrong)
     put_picture(name, WIDTH, HEIGHT, v == 6 ? 20 : 100 + v, 255);
   }
   load(&d, "train");
-  ck_good(sf_dataset_survey(&d));
+  ck_ok(sf_dataset_survey(&d));
   ck_assert(warned(&d, "exposure", "images/p06.png") && warned(&d, "-2.", "1 of 14"));
   ck_assert_int_eq(d.warnings, 1);
   sf_dataset_free(&d);
@@ -104,7 +103,7 @@ TEST(the_survey_names_what_looks_wrong)
   put_colmap("sparse/0", &rig, 0);
   load(&d, "train");
   ck_assert(warned(&d, "do not look at the scene", "images/p05.png"));
-  ck_good(sf_dataset_survey(&d));
+  ck_ok(sf_dataset_survey(&d));
   ck_assert(warned(&d, "factor 2", "images/p02.png"));
   ck_assert(warned(&d, "stretched", "images/p02.png"));
   ck_assert(warned(&d, "optical centre", "images/p02.png"));
@@ -124,7 +123,7 @@ TEST(the_plan_shows_every_camera)
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   load(&d, "train"), load(&held, "test");
-  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  ck_ok(sf_plan_draw(&d, &held, SIZE, &image));
   ck_assert(image.width == 2 * SIZE && image.height == SIZE);
   double most = 0;
   for (int v = 0; v < d.count; v++)
@@ -164,7 +163,7 @@ LOOP_TEST(cameras_that_turn_their_backs_are_told, 3)
 {
   static const int every[] = {1, 3, 8};
   layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   for (int v = 0; v < VIEWS; v += every[_i])
     for (int i = 0; i < 12; i++)
       if (i % 4 == 1 || i % 4 == 2) rig.view[v].to_world[i] *= -1;
@@ -173,7 +172,6 @@ LOOP_TEST(cameras_that_turn_their_backs_are_told, 3)
   load(&d, "train");
   ck_assert(warned(&d, _i ? "6 of 17" : "17 of 17", "turn their backs") == (_i < 2));
   ck_assert(warned(&d, "3 of 17", "do not look at the scene") == (_i == 2));
-  sf_dataset_free(&d);
 }
 
 LOOP_TEST(mirrored_poses_are_told, 2)
@@ -221,19 +219,18 @@ LOOP_TEST(a_larger_model_beside_is_told, 2)
 LOOP_TEST(rounded_quaternions_are_rotations, 2)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_good(sf_write_file(in("sparse/0/cameras.txt"), "1 PINHOLE 16 12 20 20 8 6\n", 26));
+  ck_ok(sf_write_file(in("sparse/0/cameras.txt"), "1 PINHOLE 16 12 20 20 8 6\n", 26));
   const char images[] = "1 0.71 0.71 0 0 0 0 4 1 p00.png\n\n2 0.71 0 0.7 0 0 0 4 1 p01.png\n\n";
-  ck_good(sf_write_file(in("sparse/0/images.txt"), images, sizeof images - 1));
+  ck_ok(sf_write_file(in("sparse/0/images.txt"), images, sizeof images - 1));
   unlink(in("sparse/0/cameras.bin"));
   load(&d, _i ? "train" : "test");
   const float *m = d.view[0].camera.to_world;
   for (int a = 0; a < 3; a++)
     for (int b = 0; b < 3; b++)
       ck_assert_double_eq_tol((double)(m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b]), a == b, 1e-6);
-  sf_dataset_free(&d);
 }
 
 typedef struct bad_npy {
@@ -295,7 +292,7 @@ LOOP_TEST(truncated_files_are_named, 4)
   }
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put(names[_i], &file);
-  ck_good(sf_dataset_load(&d, folder, "train", NULL));
+  ck_ok(sf_dataset_load(&d, folder, "train", NULL));
   sf_dataset_free(&d);
   const size_t whole = file.size;
   for (file.size = 0; file.size < whole; file.size += 1 + file.size / 40) {
@@ -355,9 +352,9 @@ LOOP_TEST(bad_texts_are_named, COUNT(bad_texts))
   const layout_rig rig = orbit();
   sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_good(sf_make_dir(in("sparse/0")));
-  ck_good(sf_write_file(in("sparse/0/cameras.txt"), bad->cameras, strlen(bad->cameras)));
-  ck_good(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
+  ck_ok(sf_make_dir(in("sparse/0")));
+  ck_ok(sf_write_file(in("sparse/0/cameras.txt"), bad->cameras, strlen(bad->cameras)));
+  ck_ok(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, bad->where, bad->problem);
 }
 

@@ -7,7 +7,7 @@
 LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 {
   const layout_rig rig = orbit(), listed = shuffled(&rig);
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_colmap(_i & 2 ? "sparse" : "sparse/0", &listed, _i & 1);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   same_splits(&rig);
@@ -31,7 +31,6 @@ LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
   double p[3];
   to_model(&d, rig.point[5], p);
   for (int i = 0; i < 3; i++) ck_assert_double_eq_tol(p[i], (double)d.point[15 + i], 1e-6);
-  sf_dataset_free(&d);
 }
 
 TEST(instant_ngp_has_the_rays_of_its_poses)
@@ -55,7 +54,7 @@ TEST(instant_ngp_has_the_rays_of_its_poses)
   ck_assert_float_eq_tol(d.offset[0], 0.2f, 1e-6f);
   ck_assert_float_eq_tol(d.offset[2], -0.2f, 1e-6f);
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
+  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
   sf_dataset_free(&d);
   /* half a million units away, in single precision 1/32 */
@@ -85,7 +84,7 @@ LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
   ck_assert_str_eq(train.view[0].name, "images/p03.png");
   ck_assert_str_eq(test.view[1].name, "images/p05.png");
   same_rays(&train, &rig), same_rays(&test, &rig);
-  ck_good(sf_dataset_agree(&train, &test));
+  ck_ok(sf_dataset_agree(&train, &test));
   sf_dataset_free(&train), sf_dataset_free(&test);
 }
 
@@ -93,13 +92,12 @@ LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
 TEST(far_coordinates_lose_nothing)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 512345.25, rig.view[v].to_world[7] += 5412345.5;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "", "images", 0, 1);
   load(&d, "train");
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
 
 TEST(splits_in_other_coordinates_are_refused)
@@ -109,7 +107,7 @@ TEST(splits_in_other_coordinates_are_refused)
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   load(&train, "train"), load(&test, "test");
-  ck_good(sf_dataset_agree(&train, &test));
+  ck_ok(sf_dataset_agree(&train, &test));
   float *const number[] = {&test.scale, &test.offset[2], &test.ndc_near, &test.ndc_focal[1]};
   for (int i = 0; i < 6; i++) {
     const sf_dataset before = test;
@@ -131,11 +129,11 @@ TEST(a_picture_is_found_by_a_long_name)
   strcpy(name, "images/");
   for (int i = 0; i < 300; i++) strcat(name, "./");
   strcat(name, "p00.jpg");
-  ck_good(sf_picture_find(path, folder, name));
+  ck_ok(sf_picture_find(path, folder, name));
   ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
   ck_assert(sf_is_file(path));
   name[strlen(name) - 4] = 0;
-  ck_good(sf_picture_find(path, folder, name));
+  ck_ok(sf_picture_find(path, folder, name));
   ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
   ck_assert(sf_is_file(path));
   for (size_t n = strlen(name); n < 4200; n += 2) strcat(name, "./");
@@ -157,7 +155,7 @@ TEST(a_picture_is_no_pipe)
 TEST(an_object_on_nothing_fills_the_box)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 0); /* the first rows are transparent */
   put_json("transforms.json", &rig, "", "images", 0, 1);
   same_splits(&rig);
@@ -165,7 +163,6 @@ TEST(an_object_on_nothing_fills_the_box)
   ck_assert_int_eq(d.bound, 1);
   /* half the picture's height over the focal length, at the middle distance of 5 to 5.3 */
   ck_assert_double_eq_tol(1 / (double)d.scale, 5.0 * 6 / 21, 0.3 * 6 / 21);
-  sf_dataset_free(&d);
 }
 
 /* The optical axis is far beside the picture: what it shows counts, not what the camera is turned to. */
@@ -205,7 +202,7 @@ TEST(a_crop_looks_where_its_picture_is)
 TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
@@ -216,7 +213,6 @@ TEST(blender_has_the_rays_of_its_poses)
   ck_assert_str_eq(d.list, in("transforms_train.json"));
   ck_assert_int_eq(d.count, VIEWS / 2);
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
 
 /* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked
@@ -224,7 +220,7 @@ TEST(blender_has_the_rays_of_its_poses)
 LOOP_TEST(forward_facing_rays_are_ndc, 2)
 {
   const layout_rig rig = row();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_llff(&rig, _i, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   load(&d, "test");
@@ -264,7 +260,6 @@ LOOP_TEST(forward_facing_rays_are_ndc, 2)
         for (int i = 0; i < 3; i++) ck_assert_double_le(fabs(ndc[i]), 1 + 1e-6);
     }
   }
-  sf_dataset_free(&d);
 }
 
 /* NeRF's recentring: the mean pose becomes the identity; the nearest depth is at 4 / 3. */
@@ -305,7 +300,7 @@ TEST(poses_decide_what_faces_forward)
   sf_dataset_free(&d);
   rig = row(); /* but one of them stands behind the nearest thing */
   put_llff(&rig, 0, 4, 40);
-  ck_good(sf_make_dir(in("sparse/0")));
+  ck_ok(sf_make_dir(in("sparse/0")));
   load(&d, "train");
   ck_assert(d.ndc && d.warnings == 0);
   sf_dataset_free(&d);
@@ -360,7 +355,7 @@ TEST(pictures_of_the_size_asked_for)
   put_pictures("images", &rig, 32, 24, 255), put_pictures("images_2", &rig, 16, 12, 255);
   put_pictures("images_4", &rig, 8, 6, 255);
   for (int i = 0; i < 4; i++) {
-    ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = asked[i].downscale}));
+    ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = asked[i].downscale}));
     ck_assert_int_eq(d.view[0].camera.width, asked[i].width);
     ck_assert_int_eq(strncmp(d.view[0].name,
                              i == 0   ? "images/"
@@ -375,10 +370,10 @@ TEST(pictures_of_the_size_asked_for)
   /* photographs of 4000 pixels are not what anybody means: the first folder not above 1600 */
   rig.lens[0].width = 4000, rig.lens[0].height = 3000;
   put_colmap("sparse/0", &rig, 0);
-  ck_good(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(sf_dataset_load(&d, folder, "test", NULL));
   ck_assert(d.view[0].camera.width == 8 && d.downscale == 0);
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
+  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
   ck_assert(d.view[0].camera.width == 32 && d.downscale == 1);
   sf_dataset_free(&d);
 }
@@ -393,17 +388,17 @@ TEST(photographs_are_shrunk_unasked)
   rig.lens[0].param[2] = 1650, rig.lens[0].param[3] = 20;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, 3301, 40, 255);
-  ck_good(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(sf_dataset_load(&d, folder, "test", NULL));
   ck_assert_int_eq(d.view[0].camera.width, 1100);
   ck_assert_int_eq(d.view[0].camera.height, 13);
   ck_assert_float_eq_tol(d.view[0].camera.fx, 1000, 1e-3f);
   rig.lens[0].width = 3300, rig.lens[0].height = 39; /* what fills whole boxes of 3 x 3 */
   same_rays(&d, &rig);
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1}));
+  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[0].camera.width, 3301);
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
+  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
   ck_assert_int_eq(d.view[0].camera.width, 165);
   rig.lens[0].height = 40;
   same_rays(&d, &rig);
@@ -413,13 +408,13 @@ TEST(photographs_are_shrunk_unasked)
 LOOP_TEST(each_picture_has_its_own_camera, 2)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   rig.lenses = 3;
   rig.lens[1] = (layout_lens){2, 0, "SIMPLE_PINHOLE", 8, 20, 3, {11, 4, 10}};
   rig.lens[2] = (layout_lens){900, 4, "OPENCV", 24, 10, 8, {25, 26, 12, 5, 0, 0, 0, 0}};
   for (int v = 0; v < VIEWS; v++) rig.view[v].lens = rig.lens[v % 3].id;
   put_colmap("sparse/0", &rig, _i);
-  ck_good(sf_make_dir(in("images")));
+  ck_ok(sf_make_dir(in("images")));
   for (int v = 0; v < VIEWS; v++) {
     char name[80];
     snprintf(name, sizeof name, "images/%s", rig.view[v].name);
@@ -428,7 +423,6 @@ LOOP_TEST(each_picture_has_its_own_camera, 2)
   load(&d, "train");
   ck_assert_int_eq(d.count, VIEWS - 3);
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
 
 ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

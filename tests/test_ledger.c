@@ -39,15 +39,14 @@ static void remove_folder(void)
 
 static sf_status load_text(sf_technology *tech, const char *text)
 {
-  ck_assert_int_eq(sf_write_file(path, text, strlen(text)).code, SF_OK);
+  ck_ok(sf_write_file(path, text, strlen(text)));
   return sf_technology_load(tech, path);
 }
 
 static sf_technology plain_technology(void)
 {
   sf_technology tech;
-  sf_status status = load_text(&tech, plain);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(load_text(&tech, plain));
   return tech;
 }
 
@@ -155,8 +154,7 @@ TEST(prices_between_points)
 TEST(installed_prices)
 {
   sf_technology t;
-  const sf_status status = sf_technology_load(&t, "share/tech/45nm.tech");
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_technology_load(&t, "share/tech/45nm.tech"));
   static const uint64_t wanted[] = {SF_MAC_FJ, SF_SOP_FJ, 30, 100, 200, 3100, 10000, 20000, 100000, 1950000};
   ck_assert_int_eq(t.count, 10);
   for (int i = 0; i < t.count; i++) {
@@ -195,8 +193,7 @@ static sf_ledgers *small_ledgers(const sf_technology *tech)
   sf_ledgers *l = malloc(sizeof *l);
   const fx_net net = small_net();
   const fx_counts c = small_counts(&net);
-  const sf_status status = sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l));
   return l;
 }
 
@@ -277,8 +274,8 @@ TEST(neuron_ledger_by_hand)
 TEST(cells_and_parts_add_up)
 {
   sf_technology tech;
-  ck_assert_int_eq(sf_technology_load(&tech, "share/tech/45nm.tech").code, SF_OK);
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  ck_ok(sf_technology_load(&tech, "share/tech/45nm.tech"));
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   sf_ledgers *l = malloc(sizeof *l);
   fx_counts c = {0};
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
@@ -289,7 +286,7 @@ TEST(cells_and_parts_add_up)
   const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
-  ck_assert_int_eq(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l));
   for (int g = 0; g < SF_LEDGERS; g++) {
     uint64_t cells = 0, parts = 0;
     for (int r = 0; r < SF_ROWS; r++)
@@ -303,7 +300,6 @@ TEST(cells_and_parts_add_up)
   ck_assert_uint_eq(l->total[SF_LEDGER_ANN], sf_energy_ann_fj(&scene.net, 9)); /* not hoisted */
   /* The integer twin has the direction's products once per ray: 3 rays, 9 samples. */
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], (9 * 26880 - 6 * 2048) * (uint64_t)300);
-  fx_scene_free(&scene);
   free(l);
 }
 
@@ -368,7 +364,7 @@ TEST(a_decoder_alone_has_no_density_rows)
   for (int i = 0; i < SF_LAYERS; i++) net.layer[i].n_in = size[i][0], net.layer[i].n_out = size[i][1];
   c.layer[FX_C1].mac[0] = c.layer[FX_C1].weight[0] = 2 * 19200;
   sf_ledgers *l = malloc(sizeof *l);
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l));
   ck_assert_uint_eq(l->total[SF_LEDGER_ANN], 2 * 35968 * (uint64_t)4600);
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 2 * 35968 * (uint64_t)96);
   ck_assert_uint_eq(l->total[SF_LEDGER_WIDTH], 2 * 19200 * (uint64_t)(96 + 27));
@@ -387,7 +383,7 @@ TEST(too_much_energy_is_refused)
   const sf_traffic much = {.frame_bytes = UINT64_MAX / 1100};
   ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &much, 1000, l).code, SF_E_RANGE); /* at 1.5 times the price */
   const sf_traffic less = {.frame_bytes = UINT64_MAX / 1600};
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &less, 1000, l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &net, &c, &less, 1000, l));
   c.layer[FX_D2].sop[0] = UINT64_MAX - 1;
   ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_E_RANGE);
   free(l);

@@ -41,7 +41,7 @@ TEST(memory_and_file_give_the_same_scene)
   size_t size;
   spikefield_scene *copy;
   spikefield_scene_info other;
-  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   lib_good(spikefield_scene_open_memory(&copy, data, size, "copy"));
   memset(data, 0, size); /* nothing of the caller is kept */
   lib_good(spikefield_scene_describe(copy, &other));
@@ -63,7 +63,7 @@ TEST(damaged_scenes_are_refused)
   spikefield_scene *none = scene;
   lib_bad(spikefield_scene_open(&none, in("absent")), SPIKEFIELD_E_IO, "absent");
   ck_assert_ptr_null(none);
-  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   static const double part[] = {0, 0.01, 0.5, 0.9999};
   for (int i = 0; i < 4; i++) {
     none = scene;
@@ -157,13 +157,13 @@ TEST(samples_are_those_of_the_core)
 
 TEST(samples_of_a_decoder_are_of_one_ray_too)
 {
-  fx_scene with_decoder = tensorf_scene();
+  OWNED(fx_scene) with_decoder = tensorf_scene();
   spikefield_scene *decoder;
   spikefield_counts counts = {0};
   spikefield_sample sample[3];
   const int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0};
   int16_t feature[3 * SF_DIR_MAX] = {0};
-  ck_good(fx_scene_save(&with_decoder, in("decoder.snn")));
+  ck_ok(fx_scene_save(&with_decoder, in("decoder.snn")));
   lib_good(spikefield_scene_open(&decoder, in("decoder.snn")));
   lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 3, sample, NULL, &counts));
   ck_assert_uint_eq(counts.samples, 3);
@@ -171,7 +171,6 @@ TEST(samples_of_a_decoder_are_of_one_ray_too)
   lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 0, sample, NULL, &counts));
   ck_assert_uint_eq(counts.rays, 1);
   spikefield_scene_close(decoder);
-  fx_scene_free(&with_decoder);
 }
 
 TEST(positions_and_directions_are_rounded_once)
@@ -189,7 +188,7 @@ TEST(positions_and_directions_are_rounded_once)
   int16_t one[SPIKEFIELD_DIRECTIONS], two[SPIKEFIELD_DIRECTIONS];
   const float d[3] = {0.5f, -0.25f, 0.125f}, longer[3] = {4, -2, 1}, zero[3] = {0};
   fx_ray ray;
-  ck_good(sf_fx_ray_make(&core, middle, d, &ray));
+  ck_ok(sf_fx_ray_make(&core, middle, d, &ray));
   lib_good(spikefield_direction(scene, d, one));
   lib_good(spikefield_direction(scene, longer, two));
   ck_assert_mem_eq(one, ray.dir, sizeof one);

@@ -336,7 +336,7 @@ static void same_as_core(graph *g, const fx_net *net, const int16_t *f, const in
 
 static void ck_scene(const fx_scene *scene, random_source *r, bool extreme)
 {
-  ck_good(sf_nir_write_scene(in("scene.nir"), scene));
+  ck_ok(sf_nir_write_scene(in("scene.nir"), scene));
   read_graph(&shared, in("scene.nir"));
   for (int s = 0; s < INPUTS; s++) {
     int16_t f[SF_FEATURE_MAX], dir[SF_DIR_MAX];
@@ -365,9 +365,8 @@ LOOP_TEST(biases_and_decoders_too, 4)
   for (uint64_t seed = 0; seed < GRAPHS; seed++) {
     const uint64_t number = seed + (uint64_t)(_i * GRAPHS);
     const fixture_sizes sizes = seed % 2 ? fixture_random_decoder(number) : fixture_random_sizes(number);
-    fx_scene scene = fixture_scene(&sizes, number);
+    OWNED(fx_scene) scene = fixture_scene(&sizes, number);
     ck_scene(&scene, &r, true);
-    fx_scene_free(&scene);
   }
 }
 
@@ -404,7 +403,7 @@ LOOP_TEST(model_gives_the_spikes_of_the_oracle, SF_NODECAY + 1)
   static sf_net_trace trace;
   sf_model m = test_model(SF_NET_SNN, (sf_input_mode)_i, 64, STEPS, 0.5f);
   m.t_r = STEPS;
-  ck_good(sf_nir_write_model(in("model.nir"), &m));
+  ck_ok(sf_nir_write_model(in("model.nir"), &m));
   read_graph(&shared, in("model.nir"));
   ck_assert(shared.steps == STEPS);
   int certain = 0, fired = 0;
@@ -430,10 +429,10 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
 {
   enum { STEPS = 4, SAMPLES = 40 };
   static sf_net_trace trace;
-  sf_model m = test_tensorf(SF_NET_SNN, _i, 64, STEPS);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, _i, 64, STEPS);
   m.t_r = STEPS;
   const int inputs = sf_tensorf_inputs(&m.config.tensorf);
-  ck_good(sf_nir_write_model(in("tensorf.nir"), &m));
+  ck_ok(sf_nir_write_model(in("tensorf.nir"), &m));
   read_graph(&shared, in("tensorf.nir"));
   ck_assert(find(&shared, "features") < 0 && need(&shared, "inputs")->rows == inputs);
   int certain = 0;
@@ -450,16 +449,14 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
   }
   ck_assert_int_ge(certain, SAMPLES / 2);
   free_graph(&shared);
-  sf_model_free(&m);
 }
 
 TEST(the_relu_twin_is_refused)
 {
-  sf_model m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
+  OWNED(sf_model) m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
-  sf_model_free(&m);
 }
 
 TEST(same_scene_same_bytes)
@@ -468,8 +465,8 @@ TEST(same_scene_same_bytes)
   random_source r = {77, 0};
   random_net_make(&n, &r, false);
   const fx_scene scene = {.net = n.net};
-  ck_good(sf_nir_write_scene(in("a.nir"), &scene));
-  ck_good(sf_nir_write_scene(in("b.nir"), &scene));
+  ck_ok(sf_nir_write_scene(in("a.nir"), &scene));
+  ck_ok(sf_nir_write_scene(in("b.nir"), &scene));
   char command[2 * sizeof folder + 40];
   snprintf(command, sizeof command, "cmp -s '%s/a.nir' '%s/b.nir'", folder, folder);
   ck_assert_int_eq(system(command), 0);

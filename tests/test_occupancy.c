@@ -33,7 +33,7 @@ TEST(nothing_is_empty_before_it_was_looked_at)
 {
   sf_train_options o = small_run();
   o.stage1 = 300;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const size_t cells = sf_config_cells(&t->model.config);
   for (int i = 0; i < 16; i++) {
     steps(t, 1);
@@ -45,7 +45,6 @@ TEST(nothing_is_empty_before_it_was_looked_at)
     steps(t, 1);
     for (size_t i = 0; i < cells; i++) ck_assert_float_lt(t->density[i], 1e8f);
   }
-  sf_trainer_free(t);
 }
 
 /* One cell is occupied, all others are taken for empty: an update finds all that touch it, and nothing of another
@@ -55,14 +54,14 @@ static void check_neighbours(int bound, int x, int y, int z)
   sf_train_options o = small_run();
   sf_config_bound(&o.config, bound);
   o.config.finest_res = 64;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const int res = o.config.occ_res;
   const size_t cells = sf_config_cells(&o.config),
                cell = ((size_t)z * (size_t)res + (size_t)y) * (size_t)res + (size_t)x;
   t->iteration = 32;
   memset(t->model.occupancy, 0, cells / 8);
   t->model.occupancy[cell / 8] = (uint8_t)(1u << cell % 8);
-  ck_good(sf_occupancy_update(t, 2));
+  ck_ok(sf_occupancy_update(t, 2));
   for (int k = z - 1; k <= z + 1; k++)
     for (int j = y - 1; j <= y + 1; j++)
       for (int i = x - 1; i <= x + 1; i++)
@@ -75,7 +74,6 @@ static void check_neighbours(int bound, int x, int y, int z)
   for (int j = y - 1; bound > 1 && j <= y + 1; j++)
     for (int i = x - 1; i <= x + 1; i++) behind += occupied(t, (size_t)res * res * res + (size_t)(j * res + i));
   ck_assert_uint_lt(behind, 5);
-  sf_trainer_free(t);
 }
 
 TEST(neighbours_of_what_is_occupied_are_looked_at)

@@ -15,11 +15,11 @@ static void save(const char *name, const sf_point *point)
 {
   char file[64];
   snprintf(file, sizeof file, "points/%s.json", name);
-  ck_good(sf_make_dir(in("points")));
+  ck_ok(sf_make_dir(in("points")));
   cJSON *json = sf_point_json(point);
-  ck_good(sf_json_save(json, in(file)));
+  ck_ok(sf_json_save(json, in(file)));
   cJSON_Delete(json);
-  ck_good(sf_write_file(in("centre"), "c\n", 2));
+  ck_ok(sf_write_file(in("centre"), "c\n", 2));
 }
 
 TEST(points_come_back)
@@ -30,7 +30,7 @@ TEST(points_come_back)
   other.axis[SF_AXIS_WEIGHT] = 5, other.axis[SF_AXIS_STEPS] = 1;
   other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal images */
   save("c", &centre), save("a", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   ck_assert_int_eq(sweep.count, 2);
   ck_assert_ptr_eq(sweep.centre, &sweep.point[1]);
   ck_assert_mem_eq(sweep.centre->axis, centre.axis, sizeof centre.axis);
@@ -55,7 +55,7 @@ TEST(broken_folders_are_named)
   ck_bad(sf_sweep_load(&sweep, folder), SF_E_IO, "centre", folder);
   save("c", &centre);
   for (int i = 0; i < 5; i++) {
-    ck_good(sf_write_file(in("points/b.json"), broken[i], strlen(broken[i])));
+    ck_ok(sf_write_file(in("points/b.json"), broken[i], strlen(broken[i])));
     ck_bad(sf_sweep_load(&sweep, folder), SF_E_FORMAT, "b.json", folder);
   }
   ck_assert_int_eq(unlink(in("points/b.json")), 0);
@@ -116,7 +116,7 @@ TEST(files)
   int plots;
   other.axis[SF_AXIS_GRID] = 5, other.figure[SF_POINT_BYTES] = 5e5, other.figure[SF_POINT_PSNR_TRUTH] = 29;
   save("c", &centre), save("g5", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   sf_sweep_mark(&sweep);
   FILE *out = fmemopen(text, sizeof text - 1, "w");
   sf_sweep_print(out, &sweep);
@@ -129,21 +129,21 @@ TEST(files)
   sf_sweep_csv(out, &sweep);
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "\nw8,m,1,8,12,5,12,8,3,20,19,2,29,"));
-  ck_good(sf_sweep_plots(&sweep, &plots));
+  ck_ok(sf_sweep_plots(&sweep, &plots));
   ck_assert_int_eq(plots, 4);
   ck_assert_int_eq(access(in("plots/front-bytes.gp"), R_OK), 0);
   sf_sweep_free(&sweep);
   other = centre, other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal to float */
   save("c", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   out = fmemopen(text, sizeof text - 1, "w");
   sf_sweep_print(out, &sweep);
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "| centre | 30.00 | equal |"));
-  ck_good(sf_sweep_plots(&sweep, &plots));
+  ck_ok(sf_sweep_plots(&sweep, &plots));
   char *script;
   size_t size;
-  ck_good(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
+  ck_ok(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
   ck_assert_ptr_null(strstr(script, "nan with lines"));
   free(script);
   sf_sweep_free(&sweep);

@@ -105,7 +105,7 @@ LOOP_TEST(rays_along_axes_hit, 4)
 static void trace(const char *name, float ox, float oy, float oz, float dx, float dy, float dz, float rgba[4])
 {
   const float o[3] = {ox, oy, oz}, d[3] = {dx, dy, dz};
-  ck_good(sf_procedural_trace(name, o, d, rgba));
+  ck_ok(sf_procedural_trace(name, o, d, rgba));
 }
 
 TEST(fog_follows_beer_lambert)
@@ -144,10 +144,10 @@ TEST(scenes_stay_in_the_box)
       int axis = (int)(i % 3), along = (axis + 1) % 3;
       for (unsigned k = 0; k < 3; k++) o[k] = 2.2f * sf_random_float(1, k, i) - 1.1f;
       o[axis] = i % 2 ? 1.101f : -1.101f, o[along] = 3, d[along] = -1;
-      ck_good(sf_procedural_trace(sf_procedural_names[n], o, d, c));
+      ck_ok(sf_procedural_trace(sf_procedural_names[n], o, d, c));
       ck_assert(c[3] == 0);
       o[axis] *= 0.2f;
-      ck_good(sf_procedural_trace(sf_procedural_names[n], o, d, c));
+      ck_ok(sf_procedural_trace(sf_procedural_names[n], o, d, c));
       opaque += c[3] > 0;
       for (int k = 0; k < 4; k++) ck_assert(c[k] >= 0 && c[k] <= 1);
     }
@@ -170,7 +170,7 @@ TEST(shine_depends_on_the_view)
         float p = (float)(centres[shiny][k] + radius[shiny] * n[k]), to = (float)n[k] + away[k];
         o[k] = p + 2 * to, d[k] = -to;
       }
-      ck_good(sf_procedural_trace(shiny ? "textured" : "simple", o, d, c));
+      ck_ok(sf_procedural_trace(shiny ? "textured" : "simple", o, d, c));
       ck_assert(c[3] == 1);
       least = fminf(least, c[2]), most = fmaxf(most, c[2]);
     }
@@ -190,7 +190,7 @@ TEST(no_ray_ends_in_nothing)
       o[k] = 4 * (2 * sf_random_float(1, k, i) - 1);
       d[k] = 2 * sf_random_float(2, k, i) - 1;
     }
-    ck_good(sf_procedural_trace("plaza", o, d, c));
+    ck_ok(sf_procedural_trace("plaza", o, d, c));
     ck_assert_float_eq(c[3], 1);
     for (int k = 0; k < 3; k++) ck_assert(c[k] > 0 && c[k] <= 1);
   }
@@ -232,9 +232,9 @@ LOOP_TEST(written_scene_is_what_the_rays_see, 5)
   const char *name = sf_procedural_names[_i];
   int last = 0;
   sf_dataset d;
-  ck_good(sf_procedural_write(name, in("scene"), &small, count_progress, &last));
+  ck_ok(sf_procedural_write(name, in("scene"), &small, count_progress, &last));
   ck_assert_int_eq(last, 5);
-  ck_good(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = 1}));
+  ck_ok(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_int_eq(d.count, 3);
   for (int v = 0; v < d.count; v++) {
     const sf_camera *camera = &d.view[v].camera;
@@ -248,7 +248,7 @@ LOOP_TEST(written_scene_is_what_the_rays_see, 5)
         for (int k = 0; k < 16; k++) {
           float o[3], r[3], c[4];
           sf_camera_ray(camera, x + (k % 4 + 0.5f) / 4, y + (k / 4 + 0.5f) / 4, o, r);
-          ck_good(sf_procedural_trace(name, o, r, c));
+          ck_ok(sf_procedural_trace(name, o, r, c));
           for (int i = 0; i < 3; i++) sum[i] += c[i] * c[3] / 16;
           sum[3] += c[3] / 16;
         }
@@ -263,7 +263,7 @@ LOOP_TEST(written_scene_is_what_the_rays_see, 5)
     }
   }
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, in("scene"), "test", NULL));
+  ck_ok(sf_dataset_load(&d, in("scene"), "test", NULL));
   ck_assert_int_eq(d.count, 2);
   sf_dataset_free(&d);
 }
@@ -272,8 +272,8 @@ static void same_file(const char *a, const char *b, bool same)
 {
   char *p, *q;
   size_t n, m;
-  ck_good(sf_read_file(a, 1 << 20, &p, &n));
-  ck_good(sf_read_file(b, 1 << 20, &q, &m));
+  ck_ok(sf_read_file(a, 1 << 20, &p, &n));
+  ck_ok(sf_read_file(b, 1 << 20, &q, &m));
   ck_assert_msg((n == m && !memcmp(p, q, n)) == same, "%s and %s are %s", a, b, same ? "different" : "equal");
   free(p);
   free(q);
@@ -284,10 +284,10 @@ TEST(seed_decides_and_threads_do_not)
   sf_procedural_options other = small;
   other.seed = 6;
   omp_set_num_threads(1);
-  ck_good(sf_procedural_write("textured", in("one"), &small, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("one"), &small, NULL, NULL));
   omp_set_num_threads(3);
-  ck_good(sf_procedural_write("textured", in("three"), &small, NULL, NULL));
-  ck_good(sf_procedural_write("textured", in("other"), &other, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("three"), &small, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("other"), &other, NULL, NULL));
   static const char *const files[] = {"transforms_train.json", "transforms_test.json", "train/r_0.png", "train/r_2.png",
                                       "test/r_1.png"};
   for (int i = 0; i < 5; i++) {

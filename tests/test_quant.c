@@ -30,8 +30,7 @@ static sf_model make_model(int hidden, int levels, int mode)
   sf_model m;
   config.hidden = hidden, config.levels = levels, config.mode = mode;
   config.steps = 4, config.log2_hash = 12, config.finest_res = 256, config.occ_res = 16, config.lattice = 256;
-  const sf_status status = sf_model_create(&m, &config);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_model_create(&m, &config));
   fill(&m, SF_P_GRID, 1);
   for (int l = 0; l < levels; l++)
     for (size_t i = 2 * m.level[l].offset; i < 2 * (m.level[l].offset + m.level[l].entries); i++)
@@ -52,8 +51,7 @@ static const sf_quant_options plain = {.background = {1, 1, 1}, .seed = 1};
 
 static void quantise(const sf_model *m, fx_scene *scene, sf_quant_report *report)
 {
-  const sf_status status = sf_quantise_report(scene, m, "model", &plain, report);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_quantise_report(scene, m, "model", &plain, report));
 }
 
 static void assert_refused(const sf_model *m, const sf_quant_options *options, sf_code code, const char *place)
@@ -97,8 +95,8 @@ static double entry_error(const sf_model *m, const fx_scene *scene, int level, d
  * the largest error of an entry, half an LSB of the feature, and what lies beyond its rails. */
 TEST(features_against_float)
 {
-  sf_model m = make_model(128, 16, SF_HYBRID);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(128, 16, SF_HYBRID);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   double entry[16], range[16];
   quantise(&m, &scene, &report);
@@ -119,8 +117,6 @@ TEST(features_against_float)
   }
   printf("features: relative RMS error %.3f %%\n", 100 * report.feature_error);
   ck_assert(report.feature_error < 0.02);
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
 
 typedef struct tally {
@@ -177,8 +173,8 @@ static double deviation(double sum, double square, int n)
  */
 static void check_model(int hidden, int levels, int mode)
 {
-  sf_model m = make_model(hidden, levels, mode);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(hidden, levels, mode);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   tally sum = {0};
   fx_trace *fixed = malloc(sizeof *fixed);
@@ -196,8 +192,6 @@ static void check_model(int hidden, int levels, int mode)
   ck_assert(spread > 0.001 && colour < 0.75 * spread);
   ck_assert(density_spread > 0.001 && density < 0.5 * density_spread);
   free(fixed), free(real);
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
 
 TEST(nets_against_float)
@@ -213,8 +207,8 @@ TEST(nets_against_float)
  * end. */
 TEST(output_functions_have_the_right_units)
 {
-  sf_model m = make_model(64, 4, SF_HYBRID);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(64, 4, SF_HYBRID);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   quantise(&m, &scene, &report);
   const fx_net *net = &scene.net;
@@ -225,8 +219,6 @@ TEST(output_functions_have_the_right_units)
     if (i < 10) ck_assert_double_eq_tol(sigma, exp(i), 2.2e-4 * exp(i) + 0x1p-14 + 1e-9);
     ck_assert_double_eq_tol(colour, 1 / (1 + exp(-j)), fabs(j) < 8 ? 1e-4 : 4e-4);
   }
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
 
 /* The fit keeps what it knows to be true of a solvable case: weights that are multiples of a unit come back. */
@@ -249,7 +241,7 @@ TEST(fit_recovers_exact_weights)
   const sf_fit_data data = {ROWS, IN, OUT, x, target};
   const sf_fit_weights weights = {w, IN, lsb, 1e-9, 127, 0};
   sf_quant_layer result;
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &result).code, SF_OK);
+  ck_ok(sf_fit_layer(&data, &weights, true, q, &result));
   ck_assert_double_eq_tol(result.unit, 0.125, 1e-9);
   ck_assert(result.error < 1e-6 && result.clipped == 0);
   for (int i = 0; i < IN; i++)
@@ -260,9 +252,9 @@ TEST(fit_recovers_exact_weights)
 /* Spikes of a real layer are correlated; letting rounding errors cancel must pay on samples outside the fit. */
 TEST(refinement_lowers_the_held_out_error)
 {
-  sf_model m = make_model(128, 16, SF_HYBRID);
+  OWNED(sf_model) m = make_model(128, 16, SF_HYBRID);
   sf_calibration c;
-  ck_assert_int_eq(sf_calibrate(&c, &m, 3, 5).code, SF_OK);
+  ck_ok(sf_calibrate(&c, &m, 3, 5));
   const int rows = c.samples * 3;
   int16_t *x = malloc((size_t)rows * 128 * sizeof *x);
   int8_t q[128 * SF_LANES];
@@ -272,18 +264,17 @@ TEST(refinement_lowers_the_held_out_error)
   const sf_fit_data data = {rows, 128, 128, x, c.target[FX_C2]};
   const sf_fit_weights weights = {sf_model_param(&m, SF_P_C2), 128, ones, 1e-9, 127, 0};
   sf_quant_layer rounded, refined;
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, false, q, &rounded).code, SF_OK);
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &refined).code, SF_OK);
+  ck_ok(sf_fit_layer(&data, &weights, false, q, &rounded));
+  ck_ok(sf_fit_layer(&data, &weights, true, q, &refined));
   printf("C2 held-out error: rounded %.3f %%, refined %.3f %%\n", 100 * rounded.error, 100 * refined.error);
   ck_assert(refined.error < rounded.error);
   free(x);
   sf_calibration_free(&c);
-  sf_model_free(&m);
 }
 
 TEST(same_seed_same_bits_any_threads)
 {
-  sf_model m = make_model(64, 8, SF_HYBRID);
+  OWNED(sf_model) m = make_model(64, 8, SF_HYBRID);
   fx_scene a, b;
   sf_quant_report report;
   omp_set_num_threads(1);
@@ -296,13 +287,12 @@ TEST(same_seed_same_bits_any_threads)
     ck_assert(a.units.current_scale[l] == b.units.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
   }
   fx_scene_free(&a), fx_scene_free(&b);
-  sf_model_free(&m);
 }
 
 TEST(refuses_what_it_cannot_represent)
 {
   static const float bad[] = {NAN, INFINITY, -INFINITY};
-  sf_model m = make_model(32, 4, SF_HYBRID);
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
   for (int id = 0; id < SF_P_COUNT; id++)
     for (int i = 0; i < 3 && sf_model_has(&m, id); i++) {
       float *value = sf_model_param(&m, id) + m.param[id].size - 1, kept = *value;
@@ -331,17 +321,16 @@ TEST(refuses_what_it_cannot_represent)
   m.t_r = 3;
   assert_refused(&m, &(sf_quant_options){.steps = 5}, SF_E_RANGE, "5 steps");
   assert_refused(&m, &(sf_quant_options){.background = {0, NAN, 0}}, SF_E_RANGE, "background[1]");
-  sf_model_free(&m);
 }
 
 TEST(steps_and_leaks)
 {
-  sf_model m = make_model(32, 4, SF_DECAY);
+  OWNED(sf_model) m = make_model(32, 4, SF_DECAY);
   fx_scene scene;
   float *leak = sf_model_param(&m, SF_P_LEAK);
   leak[0] = 0, leak[1] = 100, leak[2] = -100, leak[3] = 1, leak[4] = -1;
   for (int steps = 0; steps <= 4; steps++) {
-    ck_assert_int_eq(sf_quantise(&scene, &m, "model", &(sf_quant_options){.steps = steps}).code, SF_OK);
+    ck_ok(sf_quantise(&scene, &m, "model", &(sf_quant_options){.steps = steps}));
     ck_assert_int_eq(scene.net.steps, steps ? steps : 3);
     ck_assert_int_eq(scene.net.mode, FX_DECAY);
     static const int32_t k[SF_LAYERS] = {2048, 4096, 0, 2994, 1102};
@@ -349,7 +338,6 @@ TEST(steps_and_leaks)
     ck_assert_int_eq(scene.step_q24, lround(sqrt(3.0) / 256 * 16777216));
     fx_scene_free(&scene);
   }
-  sf_model_free(&m);
 }
 
 static int largest(const int8_t *value, size_t n)
@@ -400,7 +388,7 @@ static void assert_widths_hold(const fx_scene *scene, const sf_quant_widths *w)
     fx_grid_features(&scene->grid, pos, f, &counts);
     for (int i = 0; i < 2 * scene->grid.levels; i++) ck_assert_int_le(abs(f[i]), input_max);
     if (w->feature_bits < SF_INPUT_BITS) ck_assert_uint_eq(counts.saturated_features, 0);
-    ck_assert_int_eq(sf_fx_ray_make(scene, o, d, &ray).code, SF_OK);
+    ck_ok(sf_fx_ray_make(scene, o, d, &ray));
     for (int i = 0; i < FX_SH; i++) ck_assert_int_le(abs(ray.dir[i]), input_max);
   }
 }
@@ -426,7 +414,7 @@ TEST(widths)
                {offsetof(sf_quant_widths, feature_bits), 8, SF_INPUT_BITS},
                {offsetof(sf_quant_widths, leak_bits), 4, SF_LEAK_FRAC},
                {offsetof(sf_quant_widths, grid_bits), 2, SF_GRID_BITS}};
-  sf_model m = make_model(32, 4, SF_HYBRID);
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
   fx_scene whole, scene;
   sf_quant_report report;
   quantise(&m, &whole, &report);
@@ -436,8 +424,7 @@ TEST(widths)
     for (int bits = field[i].low; bits <= field[i].high; bits++) {
       sf_quant_options options = plain;
       *(int *)((char *)&options.widths + field[i].offset) = bits;
-      const sf_status status = sf_quantise_report(&scene, &m, "model", &options, &report);
-      ck_assert_msg(status.code == SF_OK, "%s", status.message);
+      ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
       ck_assert_int_eq(*(int *)((char *)&report.widths + field[i].offset), bits);
       assert_widths_hold(&scene, &report.widths);
       if (bits == field[i].high) assert_same_scene(&whole, &scene);
@@ -447,11 +434,10 @@ TEST(widths)
       assert_refused(&m, &options, SF_E_RANGE, "bits asked for");
     }
   const sf_quant_options narrow = {.background = {1, 1, 1}, .seed = 1, .widths = {4, 8, 4, 4}};
-  ck_assert_int_eq(sf_quantise_report(&scene, &m, "model", &narrow, &report).code, SF_OK);
+  ck_ok(sf_quantise_report(&scene, &m, "model", &narrow, &report));
   assert_widths_hold(&scene, &report.widths);
   fx_scene_free(&scene);
   fx_scene_free(&whole);
-  sf_model_free(&m);
 }
 
 /* A model whose calibration does not show how wide its inputs get: 128 equal weights, so that h could be 128 * 127 / 8
@@ -459,7 +445,7 @@ TEST(widths)
  * no search avoids a fine LSB. */
 TEST(narrow_inputs_never_clip)
 {
-  sf_model m = make_model(128, 2, SF_HYBRID);
+  OWNED(sf_model) m = make_model(128, 2, SF_HYBRID);
   fx_scene scene;
   sf_quant_report report;
   float *w3 = sf_model_param(&m, SF_P_C1), *grid = sf_model_param(&m, SF_P_GRID);
@@ -478,11 +464,10 @@ TEST(narrow_inputs_never_clip)
   fx_scene_free(&scene);
   for (int bits = 8; bits < SF_INPUT_BITS; bits++) {
     const sf_quant_options options = {.seed = 1, .widths.feature_bits = bits};
-    ck_assert_int_eq(sf_quantise_report(&scene, &m, "model", &options, &report).code, SF_OK);
+    ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
     assert_widths_hold(&scene, &report.widths);
     fx_scene_free(&scene);
   }
-  sf_model_free(&m);
 }
 
 /* Models at the edge of sense still give a scene that passes its check, and scales that a model's file may hold. */

@@ -22,8 +22,7 @@ static fx_scene box_scene(int lattice)
 static fx_ray make_ray(const fx_scene *scene, const float o[3], const float d[3])
 {
   fx_ray ray;
-  const sf_status status = sf_fx_ray_make(scene, o, d, &ray);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_fx_ray_make(scene, o, d, &ray));
   for (int32_t n = 0; n < ray.count; n++)
     for (int a = 0; a < 3; a++) {
       const int64_t p = (ray.origin[a] + n * ray.step[a]) >> 16;
@@ -49,7 +48,7 @@ TEST(rays_follow_the_float_lattice)
     for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
     const fx_ray ray = make_ray(&scene, o, d);
     sf_steps steps;
-    ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&steps, &config, 1));
     const sf_lattice real = sf_ray_lattice(&steps, o, d);
     differ += ray.count != real.count;
     ck_assert_int_le(abs(ray.count - real.count), 1);

@@ -61,7 +61,7 @@ TEST(march_equals_testing_every_point)
   sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   int found = 0;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &m.config, 1));
   for (int trial = 0; trial < 2000; trial++) {
     for (int i = 0; i < 64; i++) m.occupancy[i] = (uint8_t)(sf_random_u64(3, trial, i) & sf_random_u64(4, trial, i));
     float o[3], d[3], length = 0;
@@ -110,7 +110,7 @@ TEST(far_cameras_stay_in_the_lattice)
   sf_config config = sf_config_default();
   config.lattice = 1024;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &config, 1));
   for (int i = 0; i < 3; i++) {
     const sf_lattice lattice = sf_ray_lattice(&steps, o[i], d[i]);
     ck_assert_int_gt(lattice.count, 500);
@@ -120,26 +120,25 @@ TEST(far_cameras_stay_in_the_lattice)
 
 TEST(empty_and_missing_rays_show_the_background)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   const float o[12] = {0, 0, 4, 0, 0, 4, 0, 0, 0, 1, 1, 4}, d[12] = {0, 0, -1, 0, 0, 1, 1, 0, 0, 0, 0, -1};
   const float background[3] = {0.25f, 0.5f, 1};
   float rgb[12], alpha[4], samples[4];
   memset(m.occupancy, 0, 64);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples));
   for (int i = 0; i < 12; i++) ck_assert_float_eq(rgb[i], background[i % 3]);
   for (int i = 0; i < 4; i++) ck_assert_float_eq(samples[i], 0);
   memset(m.occupancy, 0xff, 64);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples));
   ck_assert_float_gt(samples[0], 0);
   ck_assert_float_eq(samples[1], 0);
   ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 9, background, rgb, NULL, NULL, NULL).code, SF_E_RANGE);
-  sf_model_free(&m);
 }
 
 /* The packet renderer against a ray composited sample by sample with the oracle. */
 TEST(packets_equal_the_oracle)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 0.4f);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 0.4f);
   enum { RAYS = 40 };
   float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
   const float background[3] = {1, 1, 1};
@@ -153,10 +152,10 @@ TEST(packets_equal_the_oracle)
     }
     for (int a = 0; a < 3; a++) d[3 * r + a] /= sqrtf(length);
   }
-  ck_assert_int_eq(sf_render_rays(&m, o, d, RAYS, 3, background, rgb, NULL, NULL, NULL).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, RAYS, 3, background, rgb, NULL, NULL, NULL));
   int wrong = 0;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &m.config, 1));
   for (int r = 0; r < RAYS; r++) {
     sf_march march = sf_march_begin(&m, &steps, o + 3 * r, d + 3 * r, 0.5f);
     float x[3], transmittance = 1, out[3] = {0};
@@ -174,5 +173,4 @@ TEST(packets_equal_the_oracle)
     wrong += bad;
   }
   ck_assert_msg(wrong <= 2, "%d of %d rays differ", wrong, RAYS); /* a spike at the threshold may flip */
-  sf_model_free(&m);
 }

@@ -13,8 +13,8 @@ static void write_text(const char *path, const char *text)
   snprintf(full, sizeof full, "%s/%s", folder, path);
   snprintf(dir, sizeof dir, "%s", full);
   *strrchr(dir, '/') = 0;
-  ck_good(sf_make_dir(dir));
-  ck_good(sf_write_file(full, text, strlen(text)));
+  ck_ok(sf_make_dir(dir));
+  ck_ok(sf_write_file(full, text, strlen(text)));
 }
 
 static void write_run(const char *scene, const char *run, double psnr, int t_r)
@@ -43,7 +43,7 @@ static void write_audit(const char *scene, const char *run, const char *file, do
 static void load(void)
 {
   sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, folder));
+  ck_ok(sf_reproduction_load(&report, folder));
 }
 
 static void setup(void)
@@ -77,7 +77,7 @@ static void contains(const char *file, const char *text, bool wanted)
 {
   char *data;
   size_t size;
-  ck_good(sf_read_file(in(file), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in(file), 1 << 24, &data, &size));
   ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%s", text, wanted ? "not " : "", file, data);
   free(data);
 }
@@ -86,7 +86,7 @@ static void print(void)
 {
   FILE *out = fopen(in("table.md"), "w");
   ck_assert_ptr_nonnull(out);
-  ck_good(sf_reproduction_print(out, &report));
+  ck_ok(sf_reproduction_print(out, &report));
   ck_assert_int_eq(fclose(out), 0);
 }
 
@@ -247,7 +247,7 @@ TEST(plots_and_json)
   load(); /* nothing at all */
   ck_assert_int_eq(report.count, 0);
   print();
-  ck_good(sf_reproduction_plots(&report, &count));
+  ck_ok(sf_reproduction_plots(&report, &count));
   ck_assert_int_eq(count, 0);
   write_run("it's", "beta-5e-7", 30, 2);
   write_text("it's/beta-5e-7/train.json",
@@ -259,7 +259,7 @@ TEST(plots_and_json)
   ck_assert_int_eq(report.count, 1);
   ck_assert(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 1) == 30);
   ck_assert(isnan(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 3)));
-  ck_good(sf_reproduction_plots(&report, &count));
+  ck_ok(sf_reproduction_plots(&report, &count));
   ck_assert_int_eq(count, 3);
   contains("plots/balance-it's.gp", "\n2.00000 2e-05 1e-06\n", true);
   contains("plots/balance-it's.gp", "plot 3e-05 * exp(x - 2.00000) with lines", true);
@@ -270,7 +270,7 @@ TEST(plots_and_json)
   contains("table.md", "- it's, ann: not run", true);
   cJSON *json = sf_reproduction_json(&report);
   ck_assert_ptr_nonnull(json);
-  ck_good(sf_json_save(json, in("results.json")));
+  ck_ok(sf_json_save(json, in("results.json")));
   cJSON_Delete(json);
   contains("results.json", "somebody", false);
   contains("results.json", "\"prefix_psnr\":\t[25, 30, 30.5]", true);
@@ -300,7 +300,7 @@ TEST(pairs)
       "scenes/a/beta-1e-6/train.json",
       "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
   write_text("scenes/b/beta-1e-7/status", "failed: no memory\n");
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  ck_ok(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
   ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
@@ -319,7 +319,7 @@ TEST(pairs)
   write_text("scenes/b/beta-1e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
   sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  ck_ok(sf_reproduction_load(&report, in("scenes")));
   ck_assert_int_eq(report.problems, 2);
   ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-1e-7/cosim.json: RTL and fixed-point core differ: 1 of 100"));
   ck_assert_ptr_null(strstr(report.problem[0], folder)); /* no path of this machine */
@@ -327,7 +327,7 @@ TEST(pairs)
   ck_assert(!cJSON_HasObjectItem(json, "average") && !cJSON_HasObjectItem(json, "order"));
   cJSON_Delete(json);
   sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes/.")));
+  ck_ok(sf_reproduction_load(&report, in("scenes/.")));
   ck_assert_str_eq(report.profile, "scenes");
 }
 
@@ -384,7 +384,7 @@ TEST(many_scenes)
     write_run(name, "beta-5e-7", 20 + i, 2);
   }
   sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  ck_ok(sf_reproduction_load(&report, in("scenes")));
   print();
   for (int i = 0; i < 60; i++) {
     snprintf(row, sizeof row, "\n| s%02d ", i);

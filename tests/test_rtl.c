@@ -8,7 +8,7 @@ LOOP_TEST(trained_size_nets, 3)
   random_source r = {(uint64_t)_i + 100, 0};
   random_net_make(&net_of_test, &r, false);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
   for (int i = 0; i < 8; i++) {
     draw_batch(&shared, &r, BATCH, false);
     run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
@@ -17,7 +17,6 @@ LOOP_TEST(trained_size_nets, 3)
   ck_assert_uint_gt(counts.layer[FX_D1].spikes[0], 0); /* the case is not an empty one */
   ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0);
   ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
-  sf_dut_close(dut);
 }
 
 /* A net whose time does not hang on the streams: with stalls the model is within a hundredth. */
@@ -27,13 +26,12 @@ TEST(stalls_hide_behind_the_engine)
   fx_counts counts = {0}, actual;
   uint64_t cycles, busy, stalls;
   random_source r = {78, 0};
-  sf_dut *dut = open_dut(&net_of_test.net, 5, 20);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 5, 20);
   draw_batch(&shared, &r, BATCH, false);
   run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
   ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
   const double model = (double)modelled_cycles(&net_of_test.net, BATCH).cycles;
   ck_assert_double_eq_tol((double)cycles, model, 0.01 * model);
-  sf_dut_close(dut);
 }
 
 static void check_cycles(uint64_t seed, int n, bool extreme)
@@ -41,11 +39,10 @@ static void check_cycles(uint64_t seed, int n, bool extreme)
   random_source r = {seed, 0};
   random_net_make(&net_of_test, &r, extreme);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, 0);
   draw_batch(&shared, &r, n, extreme);
   run_batch(dut, &net_of_test.net, n, &counts, r.seed);
   same_cycles(dut, &net_of_test.net, n, r.seed);
-  sf_dut_close(dut);
 }
 
 /* While the streams never make it wait the model is exact, and so are each layer's busy cycles and the stalls. */
@@ -104,7 +101,7 @@ TEST(tables)
 {
   tiny_net(&net_of_test);
   fx_net *net = &net_of_test.net;
-  sf_dut *dut = open_dut(net, 9, 0);
+  OWNED(sf_dut) *dut = open_dut(net, 9, 0);
   static const int32_t ends[] = {-131072, -131071, -57345, -57344, -53249, -53248, -4096, -1,    0,      1,      15,
                                  16,      65535,   65536,  131071, 49152,  49151,  53247, 53248, -32768, -32767, 32767};
   random_source r = {77, 0};
@@ -118,7 +115,6 @@ TEST(tables)
     ck_ok(sf_dut_load(dut, net));
     run_batch(dut, net, 1, &counts, (uint64_t)i);
   }
-  sf_dut_close(dut);
 }
 
 /* ---- streams ---- */

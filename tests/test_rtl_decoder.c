@@ -10,12 +10,11 @@ enum { SIZES = sizeof inputs_of / sizeof *inputs_of };
 static void check_cycles(const fx_net *net, int n, uint64_t seed)
 {
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(net, seed, 0);
+  OWNED(sf_dut) *dut = open_dut(net, seed, 0);
   run_batch(dut, net, n, &counts, seed);
   same_counts(dut, &counts, seed);
   same_cycles(dut, net, n, seed);
   ck_assert_uint_ge(modelled_cycles(net, n).cycles, sf_cycles_least(net, &counts));
-  sf_dut_close(dut);
 }
 
 LOOP_TEST(trained_size_decoders, SIZES)
@@ -23,7 +22,7 @@ LOOP_TEST(trained_size_decoders, SIZES)
   random_source r = {300 + (uint64_t)_i, 0};
   random_decoder_make(&net_of_test, &r, inputs_of[_i], false);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 25);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 25);
   for (int i = 0; i < 4; i++) {
     draw_batch(&shared, &r, BATCH, false);
     run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
@@ -32,7 +31,6 @@ LOOP_TEST(trained_size_decoders, SIZES)
   ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0); /* the case is not an empty one */
   if (inputs_of[_i] > 1) ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
   ck_assert_uint_eq(counts.layer[FX_D1].updates[0] + counts.layer[FX_D2].special[0] + counts.rays, 0);
-  sf_dut_close(dut);
 }
 
 LOOP_TEST(extreme_decoders, 10)
@@ -79,12 +77,11 @@ TEST(a_sample_takes_a_cycle_per_row)
   draw_batch(&shared, &r, BATCH, false);
   fx_counts counts = {0}, actual;
   uint64_t cycles, busy, stalls;
-  sf_dut *dut = open_dut(&net_of_test.net, 1, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 1, 0);
   run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
   ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
   ck_assert_uint_eq(sf_dut_layer_busy(dut)[FX_C1], 151 * BATCH);
   ck_assert_uint_lt(cycles, 151 * BATCH + 250); /* the first packet, the last sample's C2 and C3 */
-  sf_dut_close(dut);
 }
 
 /* ---- hard cases ---- */
@@ -143,9 +140,8 @@ LOOP_TEST(nets_take_turns, 3)
 {
   random_source r = {8000 + (uint64_t)_i, 0};
   random_net_make(&net_of_test, &r, true);
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
   for (int i = 0; i < 7; i++) next_net(dut, &r, i % 2);
-  sf_dut_close(dut);
 }
 
 /* With densities and biases: the direction's row of biases once a ray, C2's and C3's cost no cycle. */
@@ -168,10 +164,9 @@ TEST(a_bias_without_a_place_is_refused)
 {
   random_source r = {10, 0};
   random_decoder_make(&net_of_test, &r, 150, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 11, 20);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 11, 20);
   net_of_test.net.layer[FX_D2].bias = 1;
   ck_assert_int_ne(sf_dut_load(dut, &net_of_test.net).code, SF_OK);
-  sf_dut_close(dut);
 }
 
 /* Nobody takes a result for a long time: nothing is lost. Soft reset at many moments leaves no trace. */
@@ -179,7 +174,7 @@ TEST(soft_reset_at_any_time)
 {
   random_source r = {30, 0};
   random_decoder_make(&net_of_test, &r, 30, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 17, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 17, 0);
   for (int delay = 1; delay < 400; delay += 23) {
     uint64_t words[SF_PACKET_MAX];
     draw_batch(&shared, &r, 4, false);
@@ -199,7 +194,6 @@ TEST(soft_reset_at_any_time)
     run_batch(dut, &net_of_test.net, 4, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
   }
-  sf_dut_close(dut);
 }
 
 int ck_timeout = 120;

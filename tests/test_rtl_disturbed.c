@@ -88,7 +88,7 @@ static void has_no_direction(sf_dut *dut)
 LOOP_TEST(a_hard_reset_is_enough, 2)
 {
   random_source r = {68, (uint64_t)_i << 32};
-  sf_dut *dut;
+  OWNED(sf_dut) * dut;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 68 + (uint64_t)_i}));
   for (int trial = 0; trial < 6; trial++) {
     fx_counts counts = {0};
@@ -107,14 +107,13 @@ LOOP_TEST(a_hard_reset_is_enough, 2)
     has_no_direction(dut);
     hard_reset(dut, 1);
   }
-  sf_dut_close(dut);
 }
 
 /* Waits for the phase at the pins, then strikes at once. */
 LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
 {
   random_source r = {63, (uint64_t)_i << 32};
-  sf_dut *dut = begin(63);
+  OWNED(sf_dut) *dut = begin(63);
   for (int trial = 0; trial < 3; trial++) {
     feed f = {.m_percent = 30};
     int cycle = 0;
@@ -132,7 +131,6 @@ LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
     }
     works(dut);
   }
-  sf_dut_close(dut);
 }
 
 /* What the core counts of the samples from..to-1 that feed_cycle sends. */
@@ -191,7 +189,7 @@ static void send_rest(sf_dut *dut, feed *f, random_source *r)
 LOOP_TEST(snapshot_and_clear_at_work, 8)
 {
   random_source r = {64, (uint64_t)_i << 32};
-  sf_dut *dut = begin(64);
+  OWNED(sf_dut) *dut = begin(64);
   feed f = {.m_percent = 80};
   const bool clear = _i & 1;
   for (int64_t cycle = draw(&r, 400, 1500); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
@@ -206,7 +204,6 @@ LOOP_TEST(snapshot_and_clear_at_work, 8)
   ck_ok(sf_dut_counts(dut, &after, NULL, NULL, NULL));
   const fx_counts rest = counts_of(clear ? actual.samples : 0, (uint64_t)f.sample);
   same_events(&rest, &after);
-  sf_dut_close(dut);
 }
 
 /* Streams that trickle, so that every step of every layer has a bubble or back-pressure, with and without membranes at
@@ -230,11 +227,10 @@ LOOP_TEST(all_steps_under_stalls, 3)
       for (int k = 0; k < SF_FEATURE_MAX; k++) shared.f[i][k] = 2047;
     }
     fx_counts counts = {0};
-    sf_dut *dut = open_dut(net, r.seed, 90);
+    OWNED(sf_dut) *dut = open_dut(net, r.seed, 90);
     run_batch(dut, net, BATCH, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
     ck_assert(!saturating || _i != FX_NODECAY || (counts.saturated[FX_C1] && counts.saturated[FX_C2]));
-    sf_dut_close(dut);
   }
 }
 
@@ -308,7 +304,7 @@ LOOP_TEST(register_accesses_overlap, 4)
 /* A write of less than a word is refused and changes nothing. */
 TEST(part_of_a_word)
 {
-  sf_dut *dut = begin(66);
+  OWNED(sf_dut) *dut = begin(66);
   sf_driver_reset(&dut->bus);
   const uint32_t before = get(dut, SF_CSR_D1_K);
   for (uint8_t strobe = 0; strobe < 15; strobe++) {
@@ -329,5 +325,4 @@ TEST(part_of_a_word)
     ck_assert_uint_eq(get(dut, SF_CSR_D1_K), before);
   }
   works(dut);
-  sf_dut_close(dut);
 }

@@ -31,7 +31,7 @@ static void expect_error(sf_dut *dut, uint32_t bit)
 /* Registers start with random values; a hard reset gives them those of the table. */
 TEST(registers_after_reset)
 {
-  sf_dut *dut;
+  OWNED(sf_dut) * dut;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \
   if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && SF_CSR_##name != SF_CSR_STATUS)                          \
@@ -39,7 +39,6 @@ TEST(registers_after_reset)
 #include "spikefield/csr.def"
 #undef SF_CSR
 #undef SF_CSR_FIELD
-  sf_dut_close(dut);
 }
 
 /* ---- packets ---- */
@@ -79,7 +78,7 @@ LOOP_TEST(bad_packets_are_refused, 2 * BAD_PACKETS - 1)
   random_source r = {50, 0};
   typical(50);
   if (decoder) random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 16, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 16, 0);
   send_bad(dut, kind, decoder);
   int beats = 0; /* of results: no bad sample has one, and more input is swallowed */
   for (int cycle = 0; cycle < 2000; cycle++) {
@@ -93,14 +92,13 @@ LOOP_TEST(bad_packets_are_refused, 2 * BAD_PACKETS - 1)
   ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
   ck_assert(strstr(status.message, kind == WIDE_VALUE ? "VALUE" : "PACKET") != NULL);
   recovers(dut);
-  sf_dut_close(dut);
 }
 
 /* A bad packet in every cycle around a soft reset: one that comes beside it is dropped like any other. */
 TEST(bad_packet_beside_a_soft_reset)
 {
   typical(52);
-  sf_dut *dut = open_dut(&net_of_test.net, 18, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 18, 0);
   sf_pins_in *in = &dut->in;
   int together = 0;
   for (int beat = 0; beat < 6; beat++)
@@ -122,7 +120,6 @@ TEST(bad_packet_beside_a_soft_reset)
       ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
-  sf_dut_close(dut);
 }
 
 /* ---- driver ---- */
@@ -183,13 +180,12 @@ LOOP_TEST(net_from_memory, 2)
   sf_net_blob net;
   for (uint32_t cut = 0; cut < size; cut += 97) ck_assert_int_eq(sf_blob_open(block, cut, &net), -1);
   ck_assert_int_eq(sf_blob_open(block, size, &net), 0);
-  sf_dut *dut = open_dut(&net_of_test.net, 18, 10);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 18, 10);
   ck_assert_int_eq(sf_driver_load(&dut->bus, &net), SF_DRIVER_OK);
   run_batch(dut, &net_of_test.net, 6, &counts, 52);
   same_counts(dut, &counts, 52);
   put_word(block, SF_BLOB_HEADER_WORDS, 1000);
   ck_assert_int_eq(sf_blob_open(block, size, &net), -1);
-  sf_dut_close(dut);
 }
 
 TEST(waveform)

@@ -2,10 +2,9 @@
  * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray/ray.h"
 #include "energy/energy.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_hard_cases.h"
 
 enum { RAYS = 12, SAMPLES_MAX = 1024 };
@@ -95,13 +94,13 @@ LOOP_TEST(random_scenes, 12)
 {
   const uint64_t seed = 700 + (uint64_t)_i;
   fixture_sizes sizes = _i ? fixture_random_sizes(seed) : fixture_ingp;
-  fx_scene scene = fixture_scene(&sizes, seed);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, seed);
   scene.step_q24 = 1 << 20;
   scene.net.exp_in.bias = _i % 3 * 8192 - 4096;
   scene.trans_stop = _i % 2 ? 1048 : 400000;
   scene.max_samples = _i % 4 == 3 ? 3 : 1024;
   for (int o = 0; o < 3; o++) scene.background[o] = 20000 * o;
-  sf_ray_dut *rays = open_rays(&scene, seed, _i % 4 * 25);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, seed, _i % 4 * 25);
   draw_rays(&scene, seed);
   expect_core(&scene, RAYS, false);
   ck_assert_uint_gt(shared.counts.samples, 0);
@@ -113,21 +112,19 @@ LOOP_TEST(random_scenes, 12)
   same_counts(rays);
   expect_core(&scene, RAYS, true);
   run(rays, RAYS);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Rays that stop at once, each followed by all that lies behind: whole rays of matter are dropped or swallowed. */
 TEST(rays_go_on_after_their_end)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   fx_counts counts;
   int sent = 0, needed = 0;
   scene.step_q24 = 1 << 19;
   scene.trans_stop = (1 << 20) - 1; /* any density at all ends a ray */
   scene.net.exp_in.bias = 40000;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays = open_rays(&scene, 6, 30);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 6, 30);
   draw_rays(&scene, 7);
   expect_core(&scene, RAYS, true);
   run(rays, RAYS);
@@ -136,18 +133,16 @@ TEST(rays_go_on_after_their_end)
   ck_assert_int_gt(sent, 10 * needed);
   ck_assert_uint_ge(counts.samples, (uint64_t)needed);
   ck_assert_uint_lt(counts.samples, (uint64_t)sent / 2); /* most of the rest never reached the nets */
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Ends and beginnings meet in every way: rays of up to 14 samples, each ended by its second. */
 TEST(short_rays_in_a_row)
 {
   static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 8);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 8);
   scene.step_q24 = 1 << 19, scene.max_samples = 2;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays = open_rays(&scene, 9, 40);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 9, 40);
   for (uint64_t round = 0; round < 150; round++) {
     draw_rays(&scene, round);
     expect_core(&scene, RAYS, true);
@@ -157,8 +152,6 @@ TEST(short_rays_in_a_row)
     }
     run(rays, RAYS);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 HARD_TEST(hard_rays)
@@ -182,15 +175,6 @@ HARD_TEST(hard_rays)
 
 /* ---- registers and resets ---- */
 
-static uint32_t get(sf_ray_dut *rays, uint32_t offset)
-{
-  return rays->dut->bus.read(rays->dut->bus.context, offset);
-}
-static void put(sf_ray_dut *rays, uint32_t offset, uint32_t value)
-{
-  rays->dut->bus.write(rays->dut->bus.context, offset, value);
-}
-
 static fx_scene small_scene(void)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
@@ -207,7 +191,7 @@ static void works(sf_ray_dut *rays, uint64_t seed)
   expect_core(rays->scene, RAYS, false);
   run(rays, RAYS);
   same_counts(rays);
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
 }
 
 TEST(illegal_programming_is_refused)
@@ -217,16 +201,16 @@ TEST(illegal_programming_is_refused)
   } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},      {SF_CSR_RAY_MAX_SAMPLES, 0},
              {SF_CSR_RAY_MAX_SAMPLES, 1025},      {SF_CSR_RAY_MAX_SAMPLES, 2048},    {SF_CSR_RAY_BACKGROUND_R, 65537},
              {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 1, 20);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 1, 20);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     ck_ok(sf_ray_dut_load(rays));
-    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    put(rays, bad[i].offset, bad[i].value);
-    put(rays, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays->dut, bad[i].offset, bad[i].value);
+    put(rays->dut, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
     ck_assert_uint_eq(rays->dut->bus_response, 2); /* SLVERR */
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
     ck_assert(rays->dut->out.irq);
     rays->dut->in.ray_valid = true; /* nothing is accepted */
     for (int cycle = 0; cycle < 20; cycle++) {
@@ -234,12 +218,10 @@ TEST(illegal_programming_is_refused)
       ck_assert(!rays->dut->out.ray_ready);
     }
     rays->dut->in.ray_valid = false;
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), 0);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), 0);
   }
   works(rays, 1);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Between driver and bus: writes of one register go to another, a read of it finds nobody. */
@@ -273,8 +255,8 @@ TEST(what_goes_wrong_at_load_is_told)
              {SF_CSR_RAY_TRANS_STOP, 0x7fc, "load rays: programming refused: ADDRESS: "},
              {SF_CSR_RAY_BACKGROUND_B, SF_CSR_RAY_MAX_SAMPLES, "load rays: programming refused: VALUE: "},
              {SF_CSR_RAY_ERROR, 0, "load rays: register access not answered at cycle"}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 5, 20);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 5, 20);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const sf_bus real = rays->dut->bus;
     spy s = {rays->dut, real, bad[i].offset, bad[i].to};
@@ -285,8 +267,6 @@ TEST(what_goes_wrong_at_load_is_told)
     ck_assert_msg(strstr(status.message, bad[i].text), "'%s' is not in '%s'", bad[i].text, status.message);
   }
   works(rays, 7);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Of a net with four levels and nine direction features. */
@@ -296,18 +276,16 @@ TEST(sizes_that_are_not_the_nets_are_refused)
     uint32_t levels, n_dir;
   } bad[] = {{0, 9},          {3, 9}, {5, 9}, {16, 9}, {17, 9}, {20, 9},
              {0x80000004, 9}, {4, 0}, {4, 8}, {4, 16}, {4, 25}, {4, 41}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 6, 0);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 6, 0);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const sf_ray_blob blob = {.levels = bad[i].levels, .n_dir = bad[i].n_dir, .max_samples = 1024};
-    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
     ck_assert_str_eq(sf_driver_text(sf_ray_driver_load(&rays->dut->bus, &blob)),
                      "the encoder's levels or directions are not the net's");
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), 0);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), 0);
   }
   works(rays, 8);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 TEST(registers)
@@ -315,32 +293,30 @@ TEST(registers)
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
                                          SF_CSR_ENCODER_DATA, SF_CSR_RAY_CTRL};
   static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, 0x42c, 0x7fc};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 2, 40);
-  ck_assert_uint_eq(get(rays, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
-  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 2, 40);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
+  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
   for (size_t i = 0; i < sizeof programming / sizeof *programming; i++) {
-    put(rays, programming[i], 1);
+    put(rays->dut, programming[i], 1);
     ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
   }
   for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
-    put(rays, nowhere[i], 1);
+    put(rays->dut, nowhere[i], 1);
     ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
   }
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), 0);
-  put(rays, 0x800, 1); /* of nobody: sf_top answers */
-  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), 0);
+  put(rays->dut, 0x800, 1); /* of nobody: sf_top answers */
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
   ck_assert(!rays->dut->bus_hung);
   works(rays, 2);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Offers beats of the batch for so many cycles and takes every pixel; then gives up. */
@@ -363,8 +339,8 @@ static void cut_off(sf_ray_dut *rays, int cycles)
 /* At any moment, with the memory owing answers: the next rays are whole. */
 TEST(soft_reset_in_mid_ray)
 {
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 3, 10);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 3, 10);
   uint64_t owing = 0;
   for (int cycles = 1; cycles < 1200; cycles = cycles * 5 / 4 + 1) {
     works(rays, 3);
@@ -373,14 +349,12 @@ TEST(soft_reset_in_mid_ray)
   }
   works(rays, 4);
   ck_assert_uint_gt(owing, 3);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 TEST(beats_out_of_order_are_refused)
 {
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 4, 0);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 4, 0);
   for (int user = 0; user < 2; user++) {
     works(rays, 5);
     sf_pins_in *in = &rays->dut->in;
@@ -394,10 +368,8 @@ TEST(beats_out_of_order_are_refused)
       ck_assert(rays->dut->out.ray_ready);
     }
     in->ray_valid = false;
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
     ck_assert(rays->dut->out.irq);
   }
   works(rays, 6);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }

@@ -1,9 +1,8 @@
 /* sf_ray_top, ray by ray: rays of one sample at any position, or of none, against the core's parts; pixels that wait.
  */
 #include "ck_run.h"
-#include "sim/ray/ray.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
 
@@ -52,8 +51,8 @@ TEST(pixels_that_wait)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   random_source s = {270, 0};
-  fx_scene scene = fixture_scene(&sizes, 23);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 23);
+  OWNED(sf_ray_dut) * rays;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 270}));
   sf_dut *dut = rays->dut;
   const fx_ray ray = some_ray(&scene);
@@ -71,8 +70,6 @@ TEST(pixels_that_wait)
     ck_ok(sf_ray_dut_run(rays, request, LONE, actual));
     for (int i = 0; i < LONE; i++) same_pixel(&actual[i], &expected[i]);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* Positions beside which one LSB of an axis makes another pixel. */

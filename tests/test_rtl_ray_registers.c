@@ -2,9 +2,8 @@
  * windows behind one bus, and what reaches the encoder. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray/ray.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
 
@@ -94,18 +93,6 @@ static uint32_t model_read(const registers *r, uint32_t offset)
 }
 
 /* ---- both ---- */
-
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  const uint32_t value = dut->bus.read(dut->bus.context, offset);
-  ck_assert_uint_eq(dut->out.rresp, OKAY);
-  return value;
-}
-
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
-{
-  dut->bus.write(dut->bus.context, offset, value);
-}
 
 /* Address and data together, some bytes of the word alone. */
 static void put_bytes(sf_dut *dut, uint32_t offset, uint32_t value, uint8_t strobe)
@@ -211,7 +198,7 @@ LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {200 + (uint64_t)_i, 0};
   registers r = {0};
-  sf_dut *dut = begin(s.seed);
+  OWNED(sf_dut) *dut = begin(s.seed);
   int running = 0, refused = 0;
   for (uint32_t offset = WINDOW; offset < SF_CSR_ENCODER_DATA + 8; offset += 4) read_both(dut, &r, offset);
   for (int i = 0; i < ACCESSES; i++) {
@@ -239,14 +226,13 @@ LOOP_TEST(any_access_in_any_state, 2)
   }
   ck_assert_int_gt(running, ACCESSES / 10);
   ck_assert_int_gt(refused, ACCESSES / 20);
-  sf_dut_close(dut);
 }
 
 /* What is not one of the ray registers is sf_top's, and its interrupt comes through. */
 TEST(the_other_window)
 {
   registers r = {0};
-  sf_dut *dut = begin(210);
+  OWNED(sf_dut) *dut = begin(210);
   write_both(dut, &r, SF_CSR_RAY_BACKGROUND_G, 77, WHOLE);
   ck_assert_uint_eq(get(dut, SF_CSR_ID), SF_CSR_ID_RESET);
   put(dut, SF_CSR_EXP_BIAS, 4321);
@@ -264,7 +250,6 @@ TEST(the_other_window)
   sf_dut_tick(dut);
   ck_assert(dut->out.irq);
   read_both(dut, &r, SF_CSR_RAY_BACKGROUND_G);
-  sf_dut_close(dut);
 }
 
 /* The next access is offered while the response of the last one waits, in either window: as many responses as accesses,
@@ -281,7 +266,7 @@ TEST(accesses_without_a_pause)
                                      {SF_CSR_RAY_TRANS_STOP, 99},
                                      {SF_CSR_VERSION, SF_CSR_VERSION_RESET}};
   random_source s = {220, 0};
-  sf_dut *dut = begin(s.seed);
+  OWNED(sf_dut) *dut = begin(s.seed);
   sf_pins_in *in = &dut->in;
   put(dut, SF_CSR_RAY_MAX_SAMPLES, 333);
   put(dut, SF_CSR_RAY_TRANS_STOP, 99);
@@ -313,14 +298,13 @@ TEST(accesses_without_a_pause)
   }
   ck_assert_int_gt(written, 400);
   ck_assert_int_gt(asked, 400);
-  sf_dut_close(dut);
 }
 
 /* An error that comes while RAY_ERROR is written, in every cycle around it: cleared if it was there, else kept. */
 TEST(an_error_beside_its_clearing)
 {
   int kept = 0, cleared = 0;
-  sf_dut *dut = begin(230);
+  OWNED(sf_dut) *dut = begin(230);
   dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
   random_source s = {230, 0};
@@ -346,14 +330,13 @@ TEST(an_error_beside_its_clearing)
       *(accepted >= written ? &kept : &cleared) += 1;
     }
   ck_assert(kept > 5 && cleared > 5);
-  sf_dut_close(dut);
 }
 
 /* A sample out of order in every cycle around a soft reset: one that comes beside it is dropped like any other. */
 TEST(an_error_beside_a_soft_reset)
 {
   int together = 0;
-  sf_dut *dut = begin(231);
+  OWNED(sf_dut) *dut = begin(231);
   dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
   random_source s = {231, 0};
@@ -378,7 +361,6 @@ TEST(an_error_beside_a_soft_reset)
       ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
-  sf_dut_close(dut);
 }
 
 /* ---- the encoder's words ---- */
@@ -418,10 +400,10 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
 TEST(the_encoder_is_programmed_by_its_words_alone)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 21);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 21);
   scene.step_q24 = 1 << 20;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays;
+  OWNED(sf_ray_dut) * rays;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 240, .stall_percent = 10}));
   sf_dut *dut = rays->dut;
   for (uint32_t word = 0; word < 8 * 4; word++) { /* of the four levels, and at last the three behind them */
@@ -444,8 +426,6 @@ TEST(the_encoder_is_programmed_by_its_words_alone)
     put(dut, SF_CSR_RAY_ERROR, ~0u);
     renders(rays, word);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* From the first sample that is taken to the pixel that is taken, whoever works on it. */
@@ -453,8 +433,8 @@ TEST(active_until_the_pixel_has_left)
 {
   enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
   static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 22);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 22);
+  OWNED(sf_ray_dut) * rays;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 250}));
   sf_dut *dut = rays->dut;
   ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
@@ -473,14 +453,12 @@ TEST(active_until_the_pixel_has_left)
     sf_dut_tick(dut);
     ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
 
 /* A response that waits is gone after a reset. */
 TEST(a_hard_reset_drops_responses)
 {
-  sf_dut *dut = begin(260);
+  OWNED(sf_dut) *dut = begin(260);
   sf_pins_in *in = &dut->in;
   dut->each_cycle = NULL;
   in->wstrb = WHOLE, in->wdata = 0, in->bready = in->rready = false;
@@ -496,5 +474,4 @@ TEST(a_hard_reset_drops_responses)
   in->rst_n = true;
   sf_dut_tick(dut);
   ck_assert(!dut->out.bvalid && !dut->out.rvalid);
-  sf_dut_close(dut);
 }

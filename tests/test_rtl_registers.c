@@ -128,7 +128,7 @@ LOOP_TEST(the_check_at_start, 3)
 {
   random_source s = {80 + (uint64_t)_i, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   int legal = 0;
   for (int i = 0; i < TRIALS; i++) {
     if (i % 25 == 0) {
@@ -150,7 +150,6 @@ LOOP_TEST(the_check_at_start, 3)
   }
   ck_assert_int_gt(legal, TRIALS / 20);
   ck_assert_int_lt(legal, TRIALS - TRIALS / 20);
-  sf_dut_close(dut);
 }
 
 /* ---- any access in any state ---- */
@@ -187,7 +186,7 @@ LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {90 + (uint64_t)_i, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   program_legal(dut, &r, &s);
   int running = 0;
   for (int i = 0; i < ACCESSES; i++) {
@@ -208,7 +207,6 @@ LOOP_TEST(any_access_in_any_state, 2)
     }
   }
   ck_assert_int_gt(running, ACCESSES / 10);
-  sf_dut_close(dut);
 }
 
 /* ---- the bus ---- */
@@ -219,7 +217,7 @@ TEST(accesses_without_a_pause)
 {
   random_source s = {100, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   sf_pins_in *in = &dut->in;
   dut->each_cycle = NULL;
   int written = 0, answered = 0, asked = 0, given = 0;
@@ -243,7 +241,6 @@ TEST(accesses_without_a_pause)
   }
   ck_assert_int_gt(written, 200);
   ck_assert_int_gt(asked, 200);
-  sf_dut_close(dut);
 }
 
 /* Refused weights, other registers, what a master shows while it is not valid: none of it reaches the weights. */
@@ -252,7 +249,7 @@ LOOP_TEST(weights_are_written_by_nothing_else, SF_LAYERS)
   typical(105);
   fx_counts counts = {0};
   const uint32_t first_word = (uint32_t)_i << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB;
-  sf_dut *dut = open_dut(&net_of_test.net, 105, 20);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 105, 20);
   const sf_bus *bus = &dut->bus;
   sf_driver_reset(bus);
   bus->write(bus->context, SF_CSR_WEIGHT_ADDRESS, first_word);
@@ -269,7 +266,6 @@ LOOP_TEST(weights_are_written_by_nothing_else, SF_LAYERS)
   bus->write(bus->context, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
   bus->write(bus->context, SF_CSR_IRQ_PENDING, SF_CSR_IRQ_ENABLE_ERROR);
   run_batch(dut, &net_of_test.net, 4, &counts, 105);
-  sf_dut_close(dut);
 }
 
 /* A row is written into its own place alone: the last one first, and all of them twice. */
@@ -278,7 +274,7 @@ TEST(rows_in_any_order)
   typical(106);
   const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 106, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 106, 0);
   const sf_bus *bus = &dut->bus;
   sf_driver_reset(bus);
   for (int order = 0; order < 2; order++)
@@ -295,7 +291,6 @@ TEST(rows_in_any_order)
       }
   ck_assert_int_eq(sf_driver_start(bus), SF_DRIVER_OK);
   run_batch(dut, &net_of_test.net, 4, &counts, 106);
-  sf_dut_close(dut);
 }
 
 /* ---- the window of counters ---- */
@@ -348,7 +343,7 @@ TEST(the_window_is_of_the_last_snapshot)
   static const uint32_t zero[2 * PLACES];
   fx_counts counts = {0};
   typical(113);
-  sf_dut *dut = open_dut(&net_of_test.net, 113, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 113, 0);
   for (int during = 0; during < 2; during++) {
     run_batch(dut, &net_of_test.net, 3, &counts, 113);
     same_counts(dut, &counts, 113);
@@ -368,7 +363,6 @@ TEST(the_window_is_of_the_last_snapshot)
   commands(dut, SF_CSR_CTRL_CLEAR, SF_CSR_CTRL_SNAPSHOT);
   read_window(dut, words[1]);
   ck_assert_mem_eq(words[1], zero, sizeof zero);
-  sf_dut_close(dut);
 }
 
 /* A counter that was read and waits to be taken stays what it is, whatever a walk writes meanwhile. */
@@ -376,7 +370,7 @@ TEST(a_response_that_waits)
 {
   fx_counts counts = {0};
   typical(111);
-  sf_dut *dut = open_dut(&net_of_test.net, 111, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 111, 0);
   run_batch(dut, &net_of_test.net, 5, &counts, 111);
   commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
   const int place = 7 * 8; /* samples */
@@ -397,7 +391,6 @@ TEST(a_response_that_waits)
   dut->in.rready = true;
   sf_dut_tick(dut);
   ck_assert_uint_eq(get(dut, place_offset(place)), 0);
-  sf_dut_close(dut);
 }
 
 /* A packet that has begun: the block is active and D1 waits, but a walk is no time of the engine's. */
@@ -406,7 +399,7 @@ TEST(a_walk_takes_no_time)
   sf_driver_counters c[2];
   uint64_t at[2];
   typical(112);
-  sf_dut *dut = open_dut(&net_of_test.net, 112, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 112, 0);
   ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING);
   uint64_t words[SF_PACKET_MAX];
   sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
@@ -422,14 +415,13 @@ TEST(a_walk_takes_no_time)
   ck_assert_uint_eq(c[1].cycles - c[0].cycles, at[1] - at[0] - PLACES);
   ck_assert_uint_eq(c[1].stall_in - c[0].stall_in, at[1] - at[0] - PLACES - 1); /* nor is the cycle that waits for it */
   ck_assert_uint_eq(c[1].busy + c[1].stall_out, 0);
-  sf_dut_close(dut);
 }
 
 /* Samples that come while a walk clears or copies wait for its end, and are counted whole. */
 TEST(samples_that_come_during_a_walk)
 {
   typical(114);
-  sf_dut *dut = open_dut(&net_of_test.net, 114, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 114, 0);
   for (int round = 0; round < 6; round++) {
     fx_counts counts = {0};
     run_batch(dut, &net_of_test.net, 3, &counts, 114);
@@ -442,5 +434,4 @@ TEST(samples_that_come_during_a_walk)
     same_counts(dut, &counts, 114);
     commands(dut, SF_CSR_CTRL_CLEAR, 0);
   }
-  sf_dut_close(dut);
 }

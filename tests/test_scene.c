@@ -72,7 +72,7 @@ static void put_picture(const char *name, int width, int height, int value)
 {
   sf_image image = {width, height, malloc((size_t)width * (size_t)height * 8)};
   for (int i = 0; i < width * height * 4; i++) image.rgba[i] = (uint16_t)(value * 257);
-  ck_good(sf_image_save_png(&image, in(name)));
+  ck_ok(sf_image_save_png(&image, in(name)));
   sf_image_free(&image);
 }
 
@@ -88,10 +88,10 @@ TEST(loads_camera_angle)
   sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
-  ck_good(load(&d,
-               "{" ANGLE
-               "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
-               "train", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load(&d,
+             "{" ANGLE
+             "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
+             "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[0].name, "a");
   ck_assert_str_eq(d.view[1].name, "b.png");
@@ -113,24 +113,24 @@ TEST(options_and_stated_intrinsics)
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
   /* stated for 16 x 8, the pictures are half of that; frame b has a field of view of its own */
-  ck_good(load(&d,
-               "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
-                   "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
-               "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
+  ck_ok(load(&d,
+             "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
+                 "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
+             "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
   ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 5.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
   ck_assert(d.view[0].camera.to_world[3] == 0.5f && d.view[0].camera.to_world[11] == 1.5f);
   sf_dataset_free(&d);
-  ck_good(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
+  ck_ok(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
   sf_dataset_free(&d);
-  ck_good(load(&d,
-               "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
-                   "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
-                              "}]}",
-               "test", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load(&d,
+             "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
+                 "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
+                            "}]}",
+             "test", (sf_dataset_options){.downscale = 1}));
   ck_assert(d.view[0].camera.fx == 10.0f && d.view[0].camera.fy == 12.0f);
   ck_assert_float_eq_tol(d.view[1].camera.fx, 4, 1e-6f);
   ck_assert_float_eq_tol(d.view[1].camera.fy, 4, 1e-6f);
@@ -145,34 +145,32 @@ TEST(one_side_states_the_size)
   put_picture("a.png", 8, 4, 0);
   for (int i = 0; i < 3; i++) {
     char json[400];
-    sf_dataset d;
+    OWNED(sf_dataset) d;
     snprintf(json, sizeof json,
              "{%s,\"fl_x\":20,\"cx\":6,\"cy\":5,\"frames\":[" FRAME("a", UNIT) "," FRAME(
                  "a", "[[0,0,1,4],[0,1,0,2],[-1,0,0,0],[0,0,0,1]]") "]}",
              size[i]);
     put_text(in("transforms.json"), json);
-    ck_good(sf_dataset_load(&d, folder, "train", NULL));
+    ck_ok(sf_dataset_load(&d, folder, "train", NULL));
     const sf_camera *c = &d.view[0].camera;
     ck_assert(c->fx == 10 && c->fy == 10 && c->cx == 3 && c->cy == 2.5f);
     if (!i) scale = d.scale;
     ck_assert_float_gt(scale, 1); /* of what is seen: 0.2 of the distance */
     ck_assert(d.scale == scale);
-    sf_dataset_free(&d);
   }
 }
 
 /* Of the picture that states no size, whatever the first states. */
 TEST(a_later_size_is_looked_at)
 {
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_picture("a.png", 8, 4, 0);
   put_text(in("transforms_train.json"),
            "{" ANGLE "\"frames\":[{\"file_path\":\"a\",\"w\":8,\"h\":4,\"cx\":4,\"transform_matrix\":" UNIT
            "},{\"file_path\":\"a\",\"cx\":200,\"transform_matrix\":" UNIT "}]}");
-  ck_good(sf_dataset_load(&d, folder, "train", NULL));
+  ck_ok(sf_dataset_load(&d, folder, "train", NULL));
   ck_assert_int_eq(d.warnings, 1);
   ck_assert_ptr_nonnull(strstr(d.warning[0], "not look at the scene"));
-  sf_dataset_free(&d);
 }
 
 TEST(every_eighth_view_is_held_out)
@@ -186,16 +184,14 @@ TEST(every_eighth_view_is_held_out)
   }
   strcat(json, "]}");
   for (int named = 0; named < 2; named++) {
-    sf_dataset train, test;
+    OWNED(sf_dataset) train, test;
     put_text(in(named ? "transforms_train.json" : "transforms.json"), json);
-    ck_good(sf_dataset_load(&train, folder, "train", NULL));
-    ck_good(sf_dataset_load(&test, folder, "test", NULL));
+    ck_ok(sf_dataset_load(&train, folder, "train", NULL));
+    ck_ok(sf_dataset_load(&test, folder, "test", NULL));
     ck_assert_int_eq(train.count, 14);
     ck_assert_int_eq(test.count, 3);
     for (int i = 0; i < 14; i++) ck_assert_uint_eq(train.view[i].image.rgba[0] / 257, (unsigned)(i + 1 + i / 7));
     for (int i = 0; i < 3; i++) ck_assert_uint_eq(test.view[i].image.rgba[0] / 257, (unsigned)(8 * i));
-    sf_dataset_free(&train);
-    sf_dataset_free(&test);
   }
   put_text(in("transforms_train.json"), "{" ANGLE "\"frames\":[" FRAME("v1", UNIT) "]}");
   sf_dataset d;
@@ -256,17 +252,17 @@ TEST(a_split_is_walked_view_by_view)
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("./a", UNIT) "," FRAME("a.png", UNIT) "]}";
   static const char *const name[] = {"a", "a", "a.png"};
   for (int i = 0; i < 3; i++) {
-    ck_good(load(&d, json, "test", (sf_dataset_options){.first = i, .limit = 1}));
+    ck_ok(load(&d, json, "test", (sf_dataset_options){.first = i, .limit = 1}));
     ck_assert_int_eq(d.count, 1);
     ck_assert_int_eq(d.total, 3);
     ck_assert_str_eq(d.view[0].name, name[i]);
     sf_dataset_free(&d);
   }
-  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 1}));
+  ck_ok(load(&d, json, "test", (sf_dataset_options){.first = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[1].name, "a.png");
   sf_dataset_free(&d);
-  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
+  ck_ok(load(&d, json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
   ck_assert_int_eq(d.count, 0);
   ck_assert_int_eq(d.total, 3);
   sf_dataset_free(&d);
@@ -280,7 +276,7 @@ LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
   put_picture("other.png", 4, 4, 7);
   char *data;
   size_t n;
-  ck_good(sf_read_file(in("a.png"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("a.png"), 10000, &data, &n));
   data[n - 20] = 0;
   FILE *f = fopen(in("cut.png"), "wb");
   fwrite(data, 1, n - 20, f);
@@ -293,15 +289,14 @@ LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
 
 TEST(own_sizes_may_differ)
 {
-  sf_dataset d;
+  OWNED(sf_dataset) d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 6, 7);
-  ck_good(load(&d,
-               "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
-               "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
-               "train", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load(&d,
+             "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
+             "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
+             "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[1].camera.height, 6);
-  sf_dataset_free(&d);
 }
 
 TEST(folder_and_option_faults)

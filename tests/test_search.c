@@ -80,7 +80,7 @@ TEST(worth_equals_price)
   for (int i = 0; i < 3; i++) {
     sf_train_options o = search_run();
     o.beta = betas[i];
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, ratio);
     const sf_search_report r = sf_search_now(t);
     const double expected = log(worth / (o.beta * ratio));
@@ -91,7 +91,6 @@ TEST(worth_equals_price)
     ck_assert_double_lt(r.worth_error, 1e-6 * worth);
     ck_assert_int_eq(r.state, SF_SEARCH_BALANCED);
     ck_assert_double_lt(t->search.at, 0.6); /* it rests, so it stops */
-    sf_trainer_free(t);
   }
 }
 
@@ -138,28 +137,25 @@ TEST(ends_of_the_range)
   for (int i = 0; i < 3; i++) {
     sf_train_options o = search_run();
     o.beta = cases[i].beta;
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, 1);
     ck_assert_int_eq(t->model.t_r, cases[i].steps);
     ck_assert_double_eq(t->model.t_star, cases[i].steps);
     ck_assert_int_eq(t->search.state, SF_SEARCH_AT_END);
-    sf_trainer_free(t);
   }
   const curve *const worthless[] = {&rising, &nothing};
   for (int i = 0; i < 2; i++) {
     sf_train_options o = search_run();
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, worthless[i], 40, 1);
     ck_assert_int_eq(t->model.t_r, 1);
     ck_assert(isfinite(sf_search_now(t).worth) && isfinite(sf_search_now(t).worth_error));
-    sf_trainer_free(t);
   }
   sf_train_options o = search_run();
   o.no_penalty = true;
-  sf_trainer *t = searcher(&o);
+  OWNED(trainer) t = searcher(&o);
   measure(t, &c, 40, 1);
   ck_assert_int_eq(t->model.t_r, T);
-  sf_trainer_free(t);
 }
 
 TEST(what_was_not_reached_is_said)
@@ -218,13 +214,12 @@ TEST(targets_find_beta)
   const double best = error_of(&c, T, 0, 0);
   for (int k = 1; k < T; k++) {
     o.target_loss = 10 * log10(error_of(&c, k, 0, 0) / best) + 1e-6;
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, 1);
     ck_assert_int_eq(t->model.t_r, k);
     const sf_search_report r = sf_search_now(t);
     ck_assert_double_eq_tol(r.beta, slope_of(&c) / exp(k), 1e-6 * r.beta);
     ck_assert_double_eq_tol(r.price, r.worth, 1e-9);
-    sf_trainer_free(t);
   }
   o.target_loss = 0;
   for (int k = 1; k < 3; k++) { /* more would cost more than the twin of so few neurons */
@@ -241,11 +236,10 @@ TEST(targets_find_beta)
     o.target_saving = 0;
   }
   o.target_saving = 99.9;
-  sf_trainer *t = searcher(&o);
+  OWNED(trainer) t = searcher(&o);
   measure(t, &c, 40, 1);
   ck_assert_int_eq(t->model.t_r, 1);
   ck_assert_int_eq(t->search.state, SF_SEARCH_MISSED);
-  sf_trainer_free(t);
 }
 
 /* The whole trainer on the textured scene with so much contrast, at a search rate: where t* ends. */

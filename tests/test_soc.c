@@ -6,7 +6,7 @@
 #include "firmware/sf_tile.h"
 #include "sim/soc/job.h"
 #include "energy/energy.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include <libgen.h>
 #include <stdio.h>
@@ -102,10 +102,7 @@ LOOP_TEST(bad_programs_end_with_a_reason, 17)
   };
   ck_assert_int_eq(COUNT(bad), 17);
   uint32_t exit_status;
-  const sf_status status = run_words(bad[_i].word, 4, false, &exit_status);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_msg(strstr(status.message, bad[_i].reason), "program %d: '%s' is not in '%s'", _i, bad[_i].reason,
-                status.message);
+  ck_bad(run_words(bad[_i].word, 4, false, &exit_status), SF_E_UNSUPPORTED, bad[_i].reason, "");
 }
 
 TEST(a_program_ends_with_its_status)
@@ -271,8 +268,7 @@ LOOP_TEST(a_wrong_device_is_reported, COUNT(wrong_device))
   scenario *s = make_scenario(&fixture_ingp);
   uint32_t exit_status = 99;
   fault = wrong_device[_i].fault, s->offset = wrong_device[_i].offset, s->to = wrong_device[_i].to;
-  const sf_status status = run_firmware(s, &exit_status);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(run_firmware(s, &exit_status));
   ck_assert_uint_eq(exit_status, 1);
   ck_assert_msg(strstr(output, wrong_device[_i].line), "'%s' is not in '%s'", wrong_device[_i].line, output);
   free_scenario(s);
@@ -304,9 +300,7 @@ TEST(a_bus_without_an_answer_ends_the_run)
   scenario *s = make_scenario(&fixture_ingp);
   uint32_t exit_status;
   fault = DEAF, s->offset = SF_CSR_CONFIG;
-  const sf_status status = run_firmware(s, &exit_status);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_msg(strstr(status.message, "read of register 0x008 not answered"), "%s", status.message);
+  ck_bad(run_firmware(s, &exit_status), SF_E_UNSUPPORTED, "read of register 0x008 not answered", "");
   free_scenario(s);
 }
 
@@ -395,9 +389,7 @@ TEST(a_tile_that_is_too_large_is_refused)
 
 static void expect_audit(const scenario *s, const char *text, const char *reason)
 {
-  const sf_status status = sf_soc_compare_audit(&s->counts, s->core, PIXELS, text);
-  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-  ck_assert_msg(strstr(status.message, reason), "'%s' is not in '%s'", reason, status.message);
+  ck_bad(sf_soc_compare_audit(&s->counts, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
 }
 
 TEST(the_comparison_sees_every_change)
@@ -420,9 +412,7 @@ TEST(the_comparison_sees_every_change)
   for (size_t i = 0; i < sizeof s->core[0].colour + 20; i += 4) {
     uint8_t *byte = (uint8_t *)&s->firmware[4] + i;
     *byte ^= 1;
-    const sf_status status = sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH);
-    ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-    ck_assert_msg(strstr(status.message, "pixel 1,1 of the tile"), "%s", status.message);
+    ck_bad(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH), SF_E_DIFFERENCE, "pixel 1,1 of the tile", "");
     *byte ^= 1;
   }
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
@@ -455,7 +445,7 @@ TEST(a_bad_program_file_is_refused)
              {size, 31, 0x7f, "segments is cut short"},
              {60, 0, 0x7f, "segments is cut short"},
              {5000, 0, 0x7f, "is cut short"}};
-  sf_dut *dut;
+  OWNED(sf_dut) * dut;
   sf_soc *soc;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));
@@ -472,7 +462,6 @@ TEST(a_bad_program_file_is_refused)
   }
   ck_assert_int_eq(sf_soc_load_elf(soc, "/nowhere/a.elf").code, SF_E_IO);
   sf_soc_close(soc);
-  sf_dut_close(dut);
   unlink(path);
   rmdir(folder);
 }

@@ -10,10 +10,9 @@ TEST(inputs_are_tensorf)
 {
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27, .feature_freqs = 2, .view_freqs = 2}), 150);
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27}), 30);
-  sf_model m = test_tensorf(SF_NET_SNN, 1, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 1, 16, 2);
   ck_assert_int_eq(sf_tensorf_products(&m.config.tensorf), 72);
   ck_assert_int_eq(m.param[SF_P_APP_PLANE + 1].shape[2], 12);
-  sf_model_free(&m);
 }
 
 /* 2 097 156 voxels in the Blender box are 128^3, 27 000 000 are 300^3; in a box twice as wide along x the voxels stay
@@ -33,7 +32,7 @@ TEST(resolution_is_tensorf)
 /* Plane and line that are linear in their coordinates: interpolation gives the products exactly, corners included. */
 TEST(interpolation_is_linear)
 {
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_tensorf *f = &m.config.tensorf;
   for (int mode = 0; mode < 3; mode++) {
     const sf_param *plane = &m.param[SF_P_DENSITY_PLANE + mode], *line = &m.param[SF_P_DENSITY_LINE + mode];
@@ -53,7 +52,6 @@ TEST(interpolation_is_linear)
         (at[0] + 10 * at[1]) * (1 + at[2]) + (at[0] + 10 * at[2]) * (1 + at[1]) + (at[1] + 10 * at[2]) * (1 + at[0]);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&m, x), expected, 1e-5f * (1 + expected));
   }
-  sf_model_free(&m);
 }
 
 TEST(activations_by_hand)
@@ -84,7 +82,7 @@ TEST(encoding_order)
 /* The twin is a plain network with biases. */
 TEST(twin_is_a_network_with_biases)
 {
-  sf_model m = test_tensorf(SF_NET_ANN, 1, 16, 1);
+  OWNED(sf_model) m = test_tensorf(SF_NET_ANN, 1, 16, 1);
   float in[30], colour[3];
   double h[2][16];
   for (int i = 0; i < 30; i++) in[i] = test_random(77 + i);
@@ -105,7 +103,6 @@ TEST(twin_is_a_network_with_biases)
     for (int i = 0; i < 16; i++) j += w3[o * 16 + i] * h[1][i];
     ck_assert_float_eq_tol(colour[o], (float)(1 / (1 + exp(-j))), 1e-6f);
   }
-  sf_model_free(&m);
 }
 
 TEST(save_and_load)
@@ -116,8 +113,8 @@ TEST(save_and_load)
     m.t_star = 2.25f;
     m.t_r = 2;
     m.occupancy[3] = 0x5a;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
-    ck_good(sf_model_load(&back, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_load(&back, in("model.safetensors")));
     ck_assert_mem_eq(&m.config, &back.config, sizeof m.config);
     ck_assert_uint_eq(m.size, back.size);
     ck_assert_mem_eq(m.value, back.value, m.size * sizeof *m.value);
@@ -125,12 +122,12 @@ TEST(save_and_load)
     ck_assert(back.t_r == 2 && back.t_star == 2.25f);
     sf_model_free(&back);
     m.config.tensorf.density[1] = 3;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
     sf_status status = sf_model_load(&back, in("model.safetensors"));
     ck_assert_int_ne(status.code, SF_OK);
     ck_assert_ptr_nonnull(strstr(status.message, "model.safetensors"));
     m.config.tensorf.density[1] = 8;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
     status = sf_model_load(&back, in("model.safetensors"));
     ck_assert_ptr_nonnull(strstr(status.message, "density_plane.1"));
     sf_model_free(&m);

@@ -27,7 +27,7 @@ TEST(density_equals_oracle)
     for (int ndc = 0; ndc < 2; ndc++) {
       const sf_kernels *k = sf_kernels_select(exact[i]);
       if (!k) continue;
-      sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+      OWNED(sf_model) m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
       if (!ndc) m.config.tensorf.shift = -1; /* both ends of the softplus */
       for (size_t j = 0; !ndc && j < m.param[SF_P_DENSITY_PLANE].size; j++) m.value[j] *= 60;
       const sf_vm_field field = sf_vm_field_of(&m, false);
@@ -40,7 +40,6 @@ TEST(density_equals_oracle)
                     down = sf_tensorf_sigma(&m.config.tensorf, feature - h);
         if (!ndc || fabsf(feature) > h) ck_assert_float_eq_tol(slope[s], (up - down) / (2 * h), 0.05f);
       }
-      sf_model_free(&m);
     }
 }
 
@@ -50,14 +49,13 @@ TEST(thin_density_is_accurate)
   const sf_kernels *k = sf_kernels_select(NULL);
   float x[3 * N], sigma[N], slope[N];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_vm_field field = sf_vm_field_of(&m, false);
   k->vm_density(&field, x, N, sigma, slope);
   for (int s = 0; s < N; s++) {
     const float expected = sf_tensorf_sigma(&m.config.tensorf, sf_tensorf_density_feature(&m, x + 3 * s));
     ck_assert_float_eq_tol(sigma[s], expected, 1e-5f * expected);
   }
-  sf_model_free(&m);
 }
 
 /* The density feature is bilinear in planes and lines: <g, feature(P + P', L)> - <g, feature(P, L)> = <dP, P'>, and so
@@ -68,7 +66,7 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   if (!k) return;
   static float x[3 * N], g[N * SF_DECODER_MAX], product[N * SF_DECODER_MAX];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
   const int first = appearance ? SF_P_APP_PLANE : SF_P_DENSITY_PLANE, ld = 160;
   const sf_vm_field f = sf_vm_field_of(&m, appearance);
   for (int i = 0; i < N * ld; i++) g[i] = test_random(1u << 26 | i);
@@ -94,7 +92,6 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   ck_assert_double_eq_tol(left, planes, 1e-3);
   ck_assert_double_eq_tol(left, lines, 1e-3);
   free(grad);
-  sf_model_free(&m);
 }
 
 TEST(backward_is_the_adjoint)
@@ -110,7 +107,7 @@ TEST(field_gradient_is_the_slope)
   const sf_kernels *k = sf_kernels_select("portable");
   static float x[3 * N], g[N], sigma[N], slope[N];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   m.config.tensorf.shift = 0;
   const sf_vm_field f = sf_vm_field_of(&m, false);
   float *grad = calloc(m.size, sizeof *grad);
@@ -135,7 +132,6 @@ TEST(field_gradient_is_the_slope)
                     m.param[id].name, i - m.param[id].offset, expected, (double)grad[i]);
     }
   free(grad);
-  sf_model_free(&m);
 }
 
 typedef struct rig {

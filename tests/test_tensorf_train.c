@@ -56,9 +56,9 @@ static void point(const sf_tensorf *f, int i, float p[3])
 TEST(upsampling_keeps_the_field)
 {
   make_scene(2);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   enum { N = 300 };
   float before[N], p[N][3], x[3], features[2][SF_APPEARANCE_MAX];
   for (int i = 0; i < N; i++) {
@@ -69,7 +69,7 @@ TEST(upsampling_keeps_the_field)
   sf_tensorf_appearance(&t->model, x, features[0]);
   sf_tensorf finer = t->model.config.tensorf;
   for (int a = 0; a < 3; a++) finer.resolution[a] = (2 + a) * (finer.resolution[a] - 1) + 1;
-  ck_good(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){1.0 / 2, 1.0 / 3, 1.0 / 4}));
+  ck_ok(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){1.0 / 2, 1.0 / 3, 1.0 / 4}));
   for (int i = 0; i < N; i++) {
     to_box(&t->model.config.tensorf, p[i], x);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), before[i], 1e-5f); /* 48 products of 0.01 */
@@ -77,8 +77,6 @@ TEST(upsampling_keeps_the_field)
   sf_tensorf_appearance(&t->model, x, features[1]);
   for (int i = 0; i < 27; i++) ck_assert_float_eq_tol(features[1][i], features[0][i], 1e-5f);
   for (size_t i = 0; i < t->model.size; i++) ck_assert_float_eq(t->moment2[i], 0);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -87,9 +85,9 @@ TEST(upsampling_keeps_the_field)
 TEST(shrinking_keeps_what_is_seen)
 {
   make_scene(2);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
   enum { N = 24 * 24 };
   static float origin[N][3], direction[N][3], rgb[2][N][3], alpha[2][N];
@@ -97,13 +95,13 @@ TEST(shrinking_keeps_what_is_seen)
   for (int i = 0; i < N; i++)
     sf_dataset_ray(&data, &data.view[0], (float)(i % 24) + 0.5f, (float)(i / 24) + 0.5f, origin[i], direction[i]);
   const float step = sf_tensorf_step(&t->model.config.tensorf);
-  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[0][0], NULL, alpha[0], NULL));
-  sf_model whole = {0};
-  ck_good(sf_model_create(&whole, &t->model.config));
+  ck_ok(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[0][0], NULL, alpha[0], NULL));
+  OWNED(sf_model) whole = {0};
+  ck_ok(sf_model_create(&whole, &t->model.config));
   memcpy(whole.value, t->model.value, whole.size * sizeof *whole.value);
-  ck_good(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, false));
   ck_assert_double_lt(t->occupied, 0.5);
-  ck_good(sf_vm_shrink(t));
+  ck_ok(sf_vm_shrink(t));
   const sf_tensorf *f = &t->model.config.tensorf;
   ck_assert_int_lt(f->resolution[0], 16);
   for (int i = 0; i < 300; i++) {
@@ -114,7 +112,7 @@ TEST(shrinking_keeps_what_is_seen)
     const float expected = sf_tensorf_density_feature(&whole, y);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), expected, 1e-4f * (1 + expected));
   }
-  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[1][0], NULL, alpha[1], NULL));
+  ck_ok(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[1][0], NULL, alpha[1], NULL));
   ck_assert_float_eq_tol(sf_tensorf_step(f), step, 1e-5f); /* voxels are as long as before, so the steps are */
   double largest = 0, error = 0;
   for (int i = 0; i < N; i++) {
@@ -123,9 +121,6 @@ TEST(shrinking_keeps_what_is_seen)
   }
   ck_assert_double_gt(largest, 0.99);
   ck_assert_double_lt(error, 0.1); /* at the rim: a sample's place within its interval of half a voxel */
-  sf_model_free(&whole);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -138,7 +133,7 @@ TEST(mask_keeps_what_is_visible)
   const sf_train_options o = small_vm(&data, SF_NET_ANN);
   sf_trainer *t = start(&data, &o, NULL);
   put_ball(&t->model);
-  ck_good(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, false));
   const sf_tensorf *f = &t->model.config.tensorf;
   int visible = 0;
   for (int i = 0; i < 20000; i++) {
@@ -160,7 +155,7 @@ TEST(mask_keeps_what_is_visible)
   ck_assert_double_lt(t->occupied, 0.5);
   const double once = t->occupied;
   memset(t->model.occupancy, 0, 16 * 16 * 16 / 16);
-  ck_good(sf_vm_mask(t, true)); /* a later mask takes no cell back */
+  ck_ok(sf_vm_mask(t, true)); /* a later mask takes no cell back */
   ck_assert_double_lt(t->occupied, once);
   sf_trainer_free(t);
   sf_dataset_free(&data);
@@ -171,10 +166,10 @@ TEST(mask_keeps_what_is_visible)
 TEST(schedule_scales_with_the_run)
 {
   make_scene(4);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_vm(&data, SF_NET_ANN);
   o.stage1 = 60, o.stage2 = 240;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
   for (int i = 0, event = 0; i < 80; i++) {
     steps(t, 1);
@@ -186,8 +181,6 @@ TEST(schedule_scales_with_the_run)
   const double voxels = (double)r[0] * r[1] * r[2];
   ck_assert_double_gt(voxels, 0.75 * 24 * 24 * 24); /* rounded down along each axis */
   ck_assert_double_le(voxels, 24 * 24 * 24);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -195,7 +188,7 @@ TEST(schedule_scales_with_the_run)
 TEST(threads_do_not_matter)
 {
   make_scene(4);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = small_vm(&data, SF_NET_SNN);
   sf_trainer *t[2];
   const int threads = omp_get_max_threads();
@@ -209,7 +202,6 @@ TEST(threads_do_not_matter)
   ck_assert_mem_eq(&t[0]->model.config, &t[1]->model.config, sizeof t[0]->model.config);
   same_model(t[0], t[1]);
   for (int i = 0; i < 2; i++) sf_trainer_free(t[i]);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -217,12 +209,12 @@ TEST(threads_do_not_matter)
 TEST(resume_is_the_same_run)
 {
   make_scene(4);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = small_vm(&data, SF_NET_SNN);
   sf_trainer *a = start(&data, &o, NULL), *b = start(&data, &o, NULL);
   steps(a, 40);
   steps(b, 21);
-  ck_good(sf_trainer_save(b, in("run.safetensors"), true));
+  ck_ok(sf_trainer_save(b, in("run.safetensors"), true));
   sf_trainer_free(b);
   b = start(&data, &o, in("run.safetensors"));
   steps(b, 19);
@@ -232,7 +224,6 @@ TEST(resume_is_the_same_run)
   ck_bad(sf_trainer_create(&none, &data, &other, in("run.safetensors")), SF_E_RANGE, "run.safetensors", "tensorf");
   sf_trainer_free(a);
   sf_trainer_free(b);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -240,19 +231,17 @@ TEST(resume_is_the_same_run)
 TEST(a_layer_that_its_biases_silence_comes_back)
 {
   make_scene(4);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_vm(&data, SF_NET_SNN);
   o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 70);
   for (size_t i = 0; i < t->model.param[SF_P_C1_BIAS].size; i++) sf_model_param(&t->model, SF_P_C1_BIAS)[i] = -20;
   sf_train_stats s = {0};
-  for (int i = 0; i < 200 && !s.event[1]; i++) ck_good(sf_trainer_step(t, &s));
+  for (int i = 0; i < 200 && !s.event[1]; i++) ck_ok(sf_trainer_step(t, &s));
   ck_assert_int_eq(s.event[1], -1);
   s = steps(t, 10);
   ck_assert_double_gt(s.firing[1], 0.01);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -260,20 +249,18 @@ TEST(a_layer_that_its_biases_silence_comes_back)
 TEST(it_learns)
 {
   make_scene(8);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_vm(&data, net);
     o.stage1 = 40, o.stage2 = 110, o.rays = 512;
-    sf_trainer *t = start(&data, &o, NULL);
+    OWNED(trainer) t = start(&data, &o, NULL);
     double psnr, ssim;
     const sf_train_stats first = steps(t, 1), last = steps(t, 149);
-    ck_good(sf_evaluate(sf_trainer_model(t), &data, 2, 0, &psnr, &ssim));
+    ck_ok(sf_evaluate(sf_trainer_model(t), &data, 2, 0, &psnr, &ssim));
     ck_assert_msg(last.mse < 0.3 * first.mse && psnr > 15, "%s: error %g, was %g; %g dB", net ? "twin" : "spiking",
                   last.mse, first.mse, psnr);
     ck_assert_double_gt(last.occupied, 0);
-    sf_trainer_free(t);
   }
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -281,9 +268,9 @@ TEST(it_learns)
 TEST(nan_is_found)
 {
   make_scene(2);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   sf_train_stats s;
   t->model.value[t->model.param[SF_P_DENSITY_LINE].offset] = NAN;
   for (size_t i = 0; i < t->model.param[SF_P_DENSITY_LINE].size; i++)
@@ -292,8 +279,6 @@ TEST(nan_is_found)
   const sf_status status = sf_trainer_save(t, in("bad.safetensors"), true);
   ck_assert_int_ne(status.code, SF_OK);
   ck_assert_ptr_nonnull(strstr(status.message, "density_line.0"));
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
@@ -301,7 +286,7 @@ TEST(nan_is_found)
 TEST(the_box_is_that_of_the_layout)
 {
   make_scene(2);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   sf_config c, plain = sf_tensorf_default(data.scale, 0);
   float *const place = data.view[0].camera.to_world;
   data.count = 1;
@@ -326,26 +311,23 @@ TEST(the_box_is_that_of_the_layout)
     }
     ck_assert(c.tensorf.near == (float)SF_NEAR && c.tensorf.far > 1e5f);
     ck_assert_float_eq(c.tensorf.distance_scale, 18.75f);
-    ck_good(sf_config_check(&c));
+    ck_ok(sf_config_check(&c));
   }
   data.ndc = true;
   c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 1);
   ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
-  sf_dataset_free(&data);
   remove_folder();
 }
 
 TEST(rays_that_all_miss_the_box_are_refused)
 {
   make_scene(2);
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_vm(&data, SF_NET_SNN);
   sf_train_stats stats;
   o.config.tensorf.near = 100, o.config.tensorf.far = 101;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   ck_bad(sf_trainer_step(t, &stats), SF_E_RANGE, "iteration 0: none of", "meets the box");
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
   remove_folder();
 }
 

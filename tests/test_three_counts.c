@@ -35,8 +35,7 @@ static sf_three_counts *run(fx_scene *scene, int stall)
                             .user = scene,
                             .dut = {.seed = 3, .stall_percent = stall}};
   counts->wanted = RAYS;
-  const sf_status status = sf_three_counts_run(&job, counts);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_three_counts_run(&job, counts));
   ck_assert_msg(counts->agreement.code == SF_OK, "%s", counts->agreement.message);
   ck_assert_int_eq(counts->rays, RAYS);
   ck_assert_uint_gt(counts->core.samples, RAYS);
@@ -51,7 +50,7 @@ static sf_three_counts *run(fx_scene *scene, int stall)
 TEST(hash_grid)
 {
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 1 << 19;
   sf_three_counts *still = run(&scene, 0), *stalled = run(&scene, 40);
   ck_assert(!still->no_rtl_traffic);
@@ -63,38 +62,35 @@ TEST(hash_grid)
   ck_assert_mem_eq(&still->rtl_traffic, &stalled->rtl_traffic, sizeof(sf_traffic)); /* stalls change cycles alone */
   ck_assert_uint_gt(stalled->cycles, still->cycles);
   free(still), free(stalled);
-  fx_scene_free(&scene);
 }
 
 TEST(decoder)
 {
-  fx_scene scene = tensorf_scene();
+  OWNED(fx_scene) scene = tensorf_scene();
   sf_three_counts *counts = run(&scene, 20);
   ck_assert(counts->no_rtl_traffic);
   ck_assert_uint_eq(counts->rtl_traffic.table_bytes, 0);
   ck_assert_mem_eq(&counts->core_traffic, &counts->recount_traffic, sizeof(sf_traffic));
   ck_assert_uint_gt(counts->core_traffic.exp_neg, counts->core.samples);
   free(counts);
-  fx_scene_free(&scene);
 }
 
 /* Two rays whose core changes meanwhile, in a way of `changing`. */
 static void check_difference(sf_status (*changing)(void *user, uint64_t index, fx_ray *to), const char *message)
 {
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 1 << 19;
   static const uint64_t index[] = {0, 1};
   const sf_three_job job = {
       .scene = &scene, .index = index, .rays = 2, .ray = changing, .name = name, .user = &scene, .dut = {.seed = 3}};
   sf_three_counts *counts = calloc(1, sizeof *counts);
   counts->wanted = 2;
-  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
+  ck_ok(sf_three_counts_run(&job, counts));
   ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
   ck_assert_msg(strstr(counts->agreement.message, message), "%s", counts->agreement.message);
   ck_assert_int_eq(counts->rays, 1);
   free(counts);
-  fx_scene_free(&scene);
 }
 
 /* The core's net changes behind the accelerator's back: every ray of it differs, already the first. */
@@ -140,11 +136,11 @@ TEST(samples_and_rays_are_compared)
 {
   fx_counts core = {.samples = 5, .rays = 2}, rtl = core;
   fx_net net = {.layer[FX_D1].n_out = 1};
-  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  ck_ok(sf_compare_ray_counts(&net, &core, &rtl));
   rtl.rays = 3;
   ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "rays: core 2, accelerator 3");
   net.layer[FX_D1].n_out = 0;
-  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  ck_ok(sf_compare_ray_counts(&net, &core, &rtl));
   rtl.samples = 4;
   ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "samples: core 5, accelerator 4");
 }

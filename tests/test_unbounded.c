@@ -26,7 +26,7 @@ TEST(steps_grow_as_the_formula_says)
   for (int bound = 1; bound <= 64; bound *= 2) {
     const sf_config c = large_config(bound, 128);
     sf_steps s;
-    ck_assert_int_eq(sf_steps_make(&s, &c, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&s, &c, 1));
     double start = 0;
     const double least = 2 * sqrt(3) / 1024, most = 2 * sqrt(3) * bound / 128;
     for (int n = 0; n < s.count; n++) {
@@ -47,15 +47,13 @@ TEST(boxes_that_steps_do_not_cross_are_refused)
 {
   sf_config c = large_config(8, 128);
   c.dt_gamma = 0;
-  const sf_status status = sf_config_check(&c);
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "dt_gamma"));
+  ck_bad(sf_config_check(&c), SF_E_RANGE, "dt_gamma", "");
   c.lattice = 128; /* 8 * 128 equal steps */
-  ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
+  ck_ok(sf_config_check(&c));
   c.bound = 12;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound"));
   c = sf_tensorf_default(0.8f, 0); /* one occupancy grid, equal steps */
-  ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
+  ck_ok(sf_config_check(&c));
   c.bound = 2;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound = 2"));
 }
@@ -119,8 +117,8 @@ TEST(march_equals_testing_every_point)
     sf_model m;
     sf_steps steps;
     int found = 0, in_cascade[7] = {0};
-    ck_assert_int_eq(sf_model_create(&m, &c).code, SF_OK);
-    ck_assert_int_eq(sf_steps_make(&steps, &c, 1).code, SF_OK);
+    ck_ok(sf_model_create(&m, &c));
+    ck_ok(sf_steps_make(&steps, &c, 1));
     for (uint64_t i = 0; i < 600; i++) {
       float o[3], d[3], x[3], y[3];
       if (i % 20 == 0) scatter(&m, i);
@@ -150,7 +148,7 @@ TEST(rays_are_cut_without_gaps)
 {
   const sf_config c = large_config(16, 128);
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &c, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &c, 1));
   int hits = 0;
   for (uint64_t i = 0; i < 2000; i++) {
     float o[3], d[3];
@@ -176,11 +174,10 @@ static void make_pair(int bound, int res, sf_model *m, fx_scene *scene)
 {
   const sf_config c = large_config(bound, res);
   const sf_quant_options options = {.background = {1, 0.5f, 0}};
-  ck_assert_int_eq(sf_model_create(m, &c).code, SF_OK);
+  ck_ok(sf_model_create(m, &c));
   for (size_t i = 0; i < m->size; i++) m->value[i] = test_random(i);
   scatter(m, (uint64_t)bound);
-  const sf_status status = sf_quantise(scene, m, "model", &options);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_quantise(scene, m, "model", &options));
 }
 
 static void free_pair(sf_model *m, fx_scene *scene)
@@ -249,14 +246,14 @@ TEST(integer_rays_follow_the_float_march)
     int hits = 0, differ = 0;
     double largest = 0;
     make_pair(bound, 64, &m, &scene);
-    ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&steps, &m.config, 1));
     const double exact = ldexp(sqrt(3) / 1024 / bound, 24), drift = fabs(scene.step_q24 / exact - 1) + 1e-4;
     for (uint64_t i = 0; i < 1200; i++) {
       float o[3], d[3], x[3];
       fx_ray ray;
       draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
       const sf_march march = sf_march_begin(&m, &steps, o, d, 0.5f);
-      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_OK);
+      ck_ok(sf_fx_ray_make(&scene, o, d, &ray));
       ck_assert_int_le(abs(ray.count - march.lattice.count), 2);
       differ += ray.count != march.lattice.count;
       hits += ray.count > 0;
@@ -328,15 +325,15 @@ LOOP_TEST(many_rays_equal_single_rays, 4)
   for (uint64_t i = 0; i < RAYS; i++) {
     float o[3], d[3];
     draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray[i]).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o, d, &ray[i]));
   }
   const sf_status status = fx_core_open(&core, &scene, instruction_sets[_i]);
   if (status.code == SF_E_UNSUPPORTED) printf("%s: not on this machine\n", instruction_sets[_i]);
   if (status.code == SF_OK) {
-    ck_assert_int_eq(fx_render_rays(core, ray, RAYS, pixel, NULL, &all).code, SF_OK);
+    ck_ok(fx_render_rays(core, ray, RAYS, pixel, NULL, &all));
     for (int i = 0; i < RAYS; i++) {
       fx_pixel one;
-      ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &sum).code, SF_OK);
+      ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &sum));
       ck_assert_mem_eq(&one, &pixel[i], sizeof one);
       ck_assert_uint_eq(one.weight_sum + one.transmittance, 1u << SF_TRANS_FRAC);
     }
@@ -365,9 +362,9 @@ TEST(fog_takes_the_light_of_its_depth)
       fx_pixel pixel;
       double depth = 0;
       draw_ray((int)(i % 2), i, 8, o, d);
-      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_OK);
+      ck_ok(sf_fx_ray_make(&scene, o, d, &ray));
       for (int n = 0; n < ray.count; n++) depth += ldexp(fx_delta(&scene, n), -24);
-      ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL).code, SF_OK);
+      ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL));
       ck_assert_uint_eq(pixel.samples, (uint32_t)ray.count);
       /* each of up to 700 samples rounds the transmittance to 2^-20, 2^y has 2^-12 */
       ck_assert_double_eq_tol(ldexp(pixel.transmittance, -SF_TRANS_FRAC), exp(-depth * ldexp(1, sigma)), 1e-3);
@@ -382,8 +379,8 @@ TEST(files_keep_the_box)
   fx_scene scene, back;
   make_pair(16, 16, &m, &scene);
   make_folder();
-  ck_good(fx_scene_save(&scene, in("x.snn")));
-  ck_good(fx_scene_load(&back, in("x.snn")));
+  ck_ok(fx_scene_save(&scene, in("x.snn")));
+  ck_ok(fx_scene_load(&back, in("x.snn")));
   ck_assert_int_eq(back.log2_bound, 4);
   ck_assert(back.gamma_q24 == 1 << 17 && back.near_q16 == scene.near_q16 && back.longest_q16 == scene.longest_q16);
   ck_assert_mem_eq(back.occupancy, scene.occupancy, sf_config_cells(&m.config) / 8);
@@ -409,9 +406,7 @@ TEST(fitting_refuses)
   const fx_scene *const candidate[] = {&scene};
   const sf_fit_rays rays = {0};
   const sf_fit_job job = {.candidate = candidate, .candidates = 1, .name = "x.snn", .rays = &rays};
-  const sf_status status = sf_fit(&fitted, &job, &report);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_ptr_nonnull(strstr(status.message, "x.snn: 3 occupancy grids"));
+  ck_bad(sf_fit(&fitted, &job, &report), SF_E_UNSUPPORTED, "x.snn: 3 occupancy grids", "");
   free_pair(&m, &scene);
 }
 
@@ -428,13 +423,13 @@ TEST(unread_entries_change_no_ray)
   for (uint64_t i = 0; i < 200; i++) {
     float o[3], d[3];
     draw_ray((int)(i / 4 % KINDS), i, 8, o, d);
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray[i]).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &before[i], NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o, d, &ray[i]));
+    ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &before[i], NULL));
   }
   ck_assert_int_ge(sf_grid_zero_unread(&scene), 0);
   uint32_t samples = 0;
   for (int i = 0; i < 200; i++) {
-    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &after, NULL).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &after, NULL));
     ck_assert_mem_eq(&after, &before[i], sizeof after);
     samples += after.samples;
   }
@@ -453,13 +448,13 @@ TEST(fixed_pictures_equal_float_ones)
   double squares = 0;
   make_pair(8, 16, &m, &scene);
   for (uint64_t i = 0; i < RAYS; i++) draw_ray((int)(i / 4 % KINDS), i, 8, o + 3 * i, d + 3 * i);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, RAYS, 0, background, rgb, NULL, NULL, NULL).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, RAYS, 0, background, rgb, NULL, NULL, NULL));
   for (int i = 0; i < RAYS; i++) {
     fx_ray ray;
     fx_pixel pixel;
     uint32_t rgba[4];
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o + 3 * i, d + 3 * i, &ray).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o + 3 * i, d + 3 * i, &ray));
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL));
     fx_pixel_rgba(&pixel, rgba);
     for (int c = 0; c < 3; c++) squares += pow(rgba[c] / 65535.0 - fmin((double)rgb[3 * i + c], 1), 2);
   }
