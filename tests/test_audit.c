@@ -271,7 +271,7 @@ TEST(tensorf_is_counted_by_the_same_three)
   OWNED(fx_scene) scene = tensorf_scene();
   rays user = {UINT64_MAX, UINT64_MAX};
   const sf_measure_job job = {&scene, 300, make_ray, tick, &user, 7, UINT64_MAX};
-  sf_measure m;
+  OWNED(sf_measure) m;
   ck_ok(sf_measure_rays(&job, &m));
   assert_same_counts(&m.checked_core, &m.core);
   ck_assert_uint_gt(m.core.samples, 300);
@@ -292,7 +292,6 @@ TEST(tensorf_is_counted_by_the_same_three)
   ck_assert_uint_eq(l.spiking_fj, sf_energy_fj(&m.core));
   ck_assert_uint_eq(l.ann_hoisted_fj, l.ann_fj); /* no direction of a ray to hoist */
   ck_assert_uint_eq(l.h_once_fj, l.spiking_fj);
-  sf_measure_free(&m);
 }
 
 TEST(checked_rays_are_a_seeded_choice)
@@ -301,7 +300,7 @@ TEST(checked_rays_are_a_seeded_choice)
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, 50};
-  sf_measure measure;
+  OWNED(sf_measure) measure;
   uint64_t index[50], again[50], other[50], all[1000], n, differs = 0;
   ck_ok(sf_measure_rays(&job, &measure));
   ck_assert_uint_eq(measure.checked, 50);
@@ -327,7 +326,6 @@ TEST(checked_rays_are_a_seeded_choice)
     largest = index[i] && sf_random_u64(1, 2, index[i]) > largest ? sf_random_u64(1, 2, index[i]) : largest;
   for (uint64_t i = 0; i < n; i++) below += sf_random_u64(1, 2, all[i]) <= largest;
   ck_assert_uint_eq(below, 50);
-  sf_measure_free(&measure);
 }
 
 TEST(measure_reports_the_lowest_failing_ray)
@@ -640,7 +638,7 @@ static fx_pixel some_pixel(uint32_t grey, uint32_t transmittance)
 
 TEST(golden_planes_hold_the_pixel)
 {
-  sf_golden g;
+  OWNED(sf_golden) g;
   fx_net net = small_net();
   fx_counts c = {0};
   sf_recount_sample(&net, small_spikes, true, &c);
@@ -663,7 +661,6 @@ TEST(golden_planes_hold_the_pixel)
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_MACS)[0], 0); /* the neighbour is untouched */
   sf_golden_set(&g, 0, &empty, &cost, 0.25);
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[0], 0);
-  sf_golden_free(&g);
 }
 
 static void remove_in(const char *dir, const char *name)
@@ -680,7 +677,7 @@ TEST(golden_file_reads_back)
   snprintf(dir, sizeof dir, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
   ck_assert_ptr_nonnull(mkdtemp(dir));
   snprintf(path, sizeof path, "%s/g.exr", dir);
-  sf_golden g;
+  OWNED(sf_golden) g;
   const fx_cost cost = {0};
   fx_pixel pixel = some_pixel(12345, 77);
   const char *const attributes[] = {"t_r", "2", NULL};
@@ -704,7 +701,6 @@ TEST(golden_file_reads_back)
   sf_exr_free(channel, n);
   remove_in(dir, "g.exr");
   ck_assert_int_eq(rmdir(dir), 0);
-  sf_golden_free(&g);
 }
 
 TEST(quality_composites_the_window_over_the_background)
@@ -714,7 +710,7 @@ TEST(quality_composites_the_window_over_the_background)
   sf_image picture = {W, H, rgba};
   const float white[3] = {1, 1, 1}, black[3] = {0, 0, 0};
   double psnr, ssim;
-  sf_golden g;
+  OWNED(sf_golden) g;
   for (int i = 0; i < W * H; i++) { /* a grey ramp, half transparent: 0.5 * grey + 0.5 over white */
     rgba[4 * i] = rgba[4 * i + 1] = rgba[4 * i + 2] = (uint16_t)(200 * i), rgba[4 * i + 3] = 32768;
   }
@@ -734,5 +730,4 @@ TEST(quality_composites_the_window_over_the_background)
   g.height = 10;
   ck_ok(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim));
   ck_assert(isnan(ssim));
-  sf_golden_free(&g);
 }

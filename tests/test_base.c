@@ -263,7 +263,7 @@ TEST(tensors_round_trip)
   ck_ok(sf_tensors_save(t, 5, meta, in("t")));
   cJSON_Delete(meta);
 
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   ck_ok(sf_tensors_load(&set, in("t")));
   ck_assert_int_eq(set.count, 5);
   ck_assert_str_eq(sf_tensors_meta(&set, "version"), "1 \"x\"\n");
@@ -287,7 +287,6 @@ TEST(tensors_round_trip)
   ck_bad(sf_tensor_finite("file", got), SF_E_RANGE, "element 4 is infinite", "'m'");
   ((float *)got->data)[4] = 0;
   ck_ok(sf_tensor_finite("file", got));
-  sf_tensors_free(&set);
 }
 
 /* The layout on disk, byte for byte: wide types first, then by name; header padded to 8 bytes. */
@@ -420,7 +419,7 @@ TEST(tensors_unaligned_file)
   memcpy(file + 8, header, n);
   memcpy(file + 8 + n, "\x07\0\0\x80\x3f", 5);
   put(in("t"), file, 8 + n + 5);
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   const sf_tensor *t;
   const int64_t one = 1;
   ck_ok(sf_tensors_load(&set, in("t")));
@@ -429,7 +428,6 @@ TEST(tensors_unaligned_file)
   ck_assert(*(float *)t->data == 1.0f);
   ck_ok(sf_tensors_get(&set, "b", SF_U8, 1, &one, &t));
   ck_assert_int_eq(*(uint8_t *)t->data, 7);
-  sf_tensors_free(&set);
 }
 
 TEST(tensors_not_saved)
@@ -459,7 +457,7 @@ TEST(tensors_crosscheck)
   char theirs[500], ours[500];
   snprintf(theirs, sizeof theirs, "%s/theirs.safetensors", where);
   snprintf(ours, sizeof ours, "%s/ours.safetensors", where);
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   const sf_tensor *t;
   const int64_t shape[2] = {3, 5}, three = 3;
   ck_ok(sf_tensors_load(&set, theirs));
@@ -472,7 +470,6 @@ TEST(tensors_crosscheck)
   ck_ok(sf_tensors_get(&set, "u64", SF_U64, 0, NULL, &t));
   ck_assert_uint_eq(*(uint64_t *)t->data, UINT64_MAX);
   ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, ours));
-  sf_tensors_free(&set);
 }
 
 /* ---- command lines ---- */

@@ -31,7 +31,7 @@ static void check_layout(const sf_batch *b)
 TEST(fewer_samples_may_take_more_blocks)
 {
   static const int count[] = {384, 128, 2, 510};
-  sf_batch b;
+  OWNED(sf_batch) b;
   ck_ok(sf_batch_create(&b, 1 << 14, 8));
   b.rays = 4;
   for (int r = 0; r < 4; r++) b.ray[r].count = count[r];
@@ -48,7 +48,6 @@ TEST(fewer_samples_may_take_more_blocks)
     sf_batch_pack(&b);
     ck_assert_int_le(b.blocks, sf_batch_blocks(samples));
   }
-  sf_batch_free(&b);
 }
 
 static double empty_lanes(const sf_batch *b)
@@ -60,7 +59,7 @@ static double empty_lanes(const sf_batch *b)
 
 TEST(every_ray_is_in_one_bundle)
 {
-  sf_batch b;
+  OWNED(sf_batch) b;
   ck_ok(sf_batch_create(&b, 1 << 14, 8));
   for (uint64_t seed = 0; seed < 60; seed++) {
     const uint64_t longest = seed % 4 == 0 ? 1025 : seed % 4 == 1 ? 2 : 40; /* long, nearly empty, usual rays */
@@ -74,17 +73,15 @@ TEST(every_ray_is_in_one_bundle)
   for (int r = 0; r < b.rays; r++) b.ray[r].count = 0;
   sf_batch_pack(&b);
   check_layout(&b);
-  sf_batch_free(&b);
 }
 
 /* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
  * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. */
 TEST(compaction_keeps_what_light_reaches)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
   o.stage1 = 110;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
   ck_ok(sf_batch_draw(t));
@@ -130,13 +127,11 @@ TEST(compaction_keeps_what_light_reaches)
   ck_assert_int_le(differ, 1); /* float sums of another order at the limit */
   free(expected);
   free(first_x);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
 
 static void set_up(void)
 {
-  make_scene(4);
+  open_scene(4);
 }
 
-ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

@@ -87,7 +87,7 @@ static sf_picture_budget make_picture(sf_model *m)
  * What does not reach the spikes flips none. */
 LOOP_TEST(picture_from_fixed_to_float, SF_NODECAY + 1)
 {
-  sf_model m = make_model((sf_input_mode)_i);
+  OWNED(sf_model) m = make_model((sf_input_mode)_i);
   const sf_picture_budget b = make_picture(&m);
   const sf_exact_row *none = &b.row[0], *all = &b.row[SF_EXACT_ROWS - 1];
   ck_assert_uint_gt(b.samples, 500);
@@ -103,7 +103,6 @@ LOOP_TEST(picture_from_fixed_to_float, SF_NODECAY + 1)
          all->psnr_truth);
   ck_assert_double_gt(all->psnr_truth, 55);
   ck_assert_double_gt(all->psnr_truth, none->psnr_truth + 10);
-  sf_model_free(&m);
 }
 
 TEST(currents_within_their_bounds)

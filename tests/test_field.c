@@ -44,7 +44,7 @@ static void positions(float *x)
 TEST(kernels_equal_oracle)
 {
   static const char *const isa[] = {"portable", "avx2", "avx512"};
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   float x[3 * SF_BLOCK], out[2 * SF_BLOCK];
   positions(x);
   for (int i = 0; i < 3; i++) {
@@ -62,7 +62,6 @@ TEST(kernels_equal_oracle)
       }
     }
   }
-  sf_model_free(&m);
 }
 
 /* The features are linear in the table, so <d, forward(table)> = <backward(d), table> for any d and table. */

@@ -237,7 +237,7 @@ TEST(grid_reproduces_constants)
 
 TEST(march_tests_every_point)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 6);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 6);
   for (uint64_t i = 0; i < 300; i++) {
     fx_ray ray = {.count = (int32_t)fixture_pick(1, 9, i, 0, 300)};
     fx_counts counts = {0};
@@ -262,7 +262,6 @@ TEST(march_tests_every_point)
     ck_assert_int_eq(found, -1);
     ck_assert_uint_eq(counts.march_steps, tested);
   }
-  fx_scene_free(&scene);
 }
 
 int ck_timeout = 300;

@@ -171,12 +171,11 @@ TEST(edited_anywhere)
 /* Rewrites one metadata string and keeps every tensor. */
 static void edit(const char *key, const char *value)
 {
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   ck_ok(sf_tensors_load(&set, path));
   cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
   if (value) cJSON_AddStringToObject(set.metadata, key, value);
   ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
-  sf_tensors_free(&set);
 }
 
 TEST(metadata_is_checked)
@@ -276,14 +275,13 @@ TEST(levels_of_a_scene_without_a_grid_are_refused)
 /* Rewrites with one tensor's first element changed. */
 static void edit_tensor(const char *name, int64_t value)
 {
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   ck_ok(sf_tensors_load(&set, path));
   for (int i = 0; i < set.count; i++) {
     if (strcmp(set.tensor[i].name, name)) continue;
     memcpy(set.tensor[i].data, &value, sf_dtype_size(set.tensor[i].type));
   }
   ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
-  sf_tensors_free(&set);
 }
 
 TEST(tensors_are_checked)

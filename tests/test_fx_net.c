@@ -97,7 +97,7 @@ TEST(decoder_macs_are_the_papers)
 /* The comparison means something only if a part of the neurons fires. */
 TEST(fixture_fires_in_part)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 77);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 77);
   fx_counts c = {0};
   int32_t base[SF_LANES];
   int16_t f[32], dir[FX_SH];
@@ -115,7 +115,6 @@ TEST(fixture_fires_in_part)
       ck_assert_uint_lt(c.layer[l].spikes[t], 50 * SF_LANES * 4 / 5);
     }
   }
-  fx_scene_free(&scene);
 }
 
 TEST(counts_add_up)

@@ -429,12 +429,11 @@ static char path[64];
 
 static void edit(const char *key, const char *value)
 {
-  sf_tensors set;
+  OWNED(sf_tensors) set;
   ck_ok(sf_tensors_load(&set, path));
   cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
   if (value) cJSON_AddStringToObject(set.metadata, key, value);
   ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
-  sf_tensors_free(&set);
 }
 
 static void ck_refused(const char *place)

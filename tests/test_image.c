@@ -115,7 +115,7 @@ static void expected_rgba(const kind *k, int x, int y, unsigned out[4])
 
 LOOP_TEST(png_kinds, COUNT(kinds))
 {
-  sf_image image;
+  OWNED(sf_image) image;
   const kind *k = &kinds[_i];
   put_png(in("a.png"), k);
   ck_ok(sf_image_load(&image, in("a.png")));
@@ -128,7 +128,6 @@ LOOP_TEST(png_kinds, COUNT(kinds))
       for (int c = 0; c < 4; c++) ck_assert_uint_eq(image.rgba[(y * W + x) * 4 + c], e[c]);
     }
   }
-  sf_image_free(&image);
 }
 
 static sf_image noise_image(int width, int height)
@@ -140,7 +139,7 @@ static sf_image noise_image(int width, int height)
 
 TEST(png_round_trip_rounds_to_nearest)
 {
-  sf_image a = noise_image(31, 17), b;
+  OWNED(sf_image) a = noise_image(31, 17), b;
   a.rgba[0] = 65535, a.rgba[1] = 128, a.rgba[2] = 129, a.rgba[3] = 0;
   ck_ok(sf_image_save_png(&a, in("a.png")));
   ck_ok(sf_image_load(&b, in("a.png")));
@@ -149,8 +148,6 @@ TEST(png_round_trip_rounds_to_nearest)
   for (int i = 0; i < 31 * 17 * 4; i++) ck_assert_uint_eq(b.rgba[i], (unsigned)lrint(a.rgba[i] / 257.0) * 257);
   ck_assert_uint_eq(b.rgba[1], 0);
   ck_assert_uint_eq(b.rgba[2], 257);
-  sf_image_free(&a);
-  sf_image_free(&b);
 }
 
 /* Without the syncing of sf_write_file, which would dominate the loops below. */
@@ -250,7 +247,7 @@ TEST(absurd_size_is_refused)
 
 TEST(full_disk_leaves_nothing)
 {
-  sf_image a = noise_image(100, 100);
+  OWNED(sf_image) a = noise_image(100, 100);
   struct rlimit limit = {10000, 10000};
   float *depth = calloc(200 * 200, sizeof *depth);
   for (int i = 0; i < 200 * 200; i++) depth[i] = sf_random_float(1, 1, (uint64_t)i);
@@ -263,7 +260,6 @@ TEST(full_disk_leaves_nothing)
   ck_bad(sf_image_save_png(&a, in("no/a.png")), SF_E_IO, "no/a.png", "No such file");
   ck_bad(sf_exr_save(in("no/a.exr"), 200, 200, &c, 1, NULL), SF_E_IO, "no/a.exr", "No such file");
   free(depth);
-  sf_image_free(&a);
 }
 
 /* ---- JPEG ---- */
@@ -317,7 +313,7 @@ static void put_scans(const char *path, int width, int height, const jpeg_scan_i
 /* Quality 100 without chroma subsampling: rounding of the transform and the colour change stays within 3 of 255. */
 LOOP_TEST(jpeg_values, 4)
 {
-  sf_image image;
+  OWNED(sf_image) image;
   bool grey = _i & 1;
   put_jpeg(in("a.jpg"), 40, 24, grey, _i & 2);
   ck_ok(sf_image_load(&image, in("a.jpg")));
@@ -334,7 +330,6 @@ LOOP_TEST(jpeg_values, 4)
       ck_assert_uint_eq(p[3], 65535);
     }
   }
-  sf_image_free(&image);
 }
 
 LOOP_TEST(jpeg_damage, 2)

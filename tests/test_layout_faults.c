@@ -119,7 +119,7 @@ TEST(the_plan_shows_every_camera)
   enum { SIZE = 200 };
   const layout_rig rig = orbit();
   sf_dataset d, held;
-  sf_image image;
+  OWNED(sf_image) image;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   load(&d, "train"), load(&held, "test");
@@ -140,7 +140,6 @@ TEST(the_plan_shows_every_camera)
       ck_assert_msg(p[0] > 50000 && p[2] < 20000, "camera %d, panel %d: %d %d %d", v, side, p[0], p[1], p[2]);
     }
   }
-  sf_image_free(&image);
   sf_dataset_free(&d), sf_dataset_free(&held);
 }
 

@@ -45,7 +45,7 @@ static sf_manifest_view describe(const sf_golden *g)
 /* Made with Python: hashlib.sha256(struct.pack('<...', ...)), in the order that manifest.h states. */
 TEST(hashes_are_those_of_another_program)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   sf_manifest_view v = describe(&g);
   for (int p = 0; p < SF_PLANES; p++)
     ck_assert_str_eq(v.plane_sha256[p], sf_plane_is_integer((sf_plane)p)
@@ -56,12 +56,11 @@ TEST(hashes_are_those_of_another_program)
   ck_assert_int_eq(v.width, 3);
   ck_assert_int_eq(v.height, 1);
   ck_assert_uint_eq(v.event[SF_EVENT_MAC], 2 * (0 + 1000 + 2000 + 3000 + 4000) + 5 * 3);
-  sf_golden_free(&g);
 }
 
 TEST(every_bit_of_a_picture_counts)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   int plane, integers = 0;
   for (int p = 0; p < SF_PLANES; p++) {
@@ -78,12 +77,11 @@ TEST(every_bit_of_a_picture_counts)
     sf_golden_int(&g, (sf_plane)p)[2] ^= 1u << 31;
   }
   ck_assert_int_eq(integers, 11);
-  sf_golden_free(&g);
 }
 
 TEST(every_count_counts)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   uint64_t *count = (uint64_t *)&g.counts;
   int plane, seen = 0;
@@ -99,12 +97,11 @@ TEST(every_count_counts)
   g.counts.layer[FX_C1].sop[1]++, g.counts.layer[FX_C2].sop[1]--; /* totals agree */
   sf_manifest_view moved = describe(&g);
   ck_bad(sf_manifest_same_view(&before, &moved, &plane), SF_E_DIFFERENCE, "counts_sha256", "here it is");
-  sf_golden_free(&g);
 }
 
 TEST(the_camera_is_part_of_the_view)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   sf_manifest_view after = before;
   sf_camera camera = some_camera();
@@ -116,7 +113,6 @@ TEST(the_camera_is_part_of_the_view)
   camera.to_world[11] = nextafterf(camera.to_world[11], 9);
   ck_ok(sf_manifest_describe(&after, &net, &camera, &g));
   ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);
-  sf_golden_free(&g);
 }
 
 /* ---- files ---- */
@@ -198,7 +194,7 @@ TEST(the_order_of_the_views_does_not_matter)
 
 TEST(sums_by_hand)
 {
-  sf_manifest m = some_manifest(false, 3);
+  OWNED(sf_manifest) m = some_manifest(false, 3);
   sf_manifest_sum sum;
   sf_manifest_sums(&m, &sum);
   ck_assert_uint_eq(sum.samples, 100 + 101 + 102);
@@ -209,7 +205,6 @@ TEST(sums_by_hand)
   m.view[1].psnr = NAN;
   sf_manifest_sums(&m, &sum);
   ck_assert(isnan(sum.psnr));
-  sf_manifest_free(&m);
 }
 
 /* ---- every field edited ---- */
@@ -349,7 +344,7 @@ TEST(other_files_are_refused)
 
 TEST(origins_differ_by_name)
 {
-  sf_manifest m = some_manifest(true, 0);
+  OWNED(sf_manifest) m = some_manifest(true, 0);
   const sf_manifest_origin a = m.origin;
   sf_manifest_origin b = a;
   ck_ok(sf_manifest_same_origin(&a, &b));
@@ -357,7 +352,6 @@ TEST(origins_differ_by_name)
   b.scale = nextafterf(b.scale, 1), ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "scale", "0.8"), b = a;
   b.steps = 3, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "t_r", "3"), b = a;
   b.model_sha256[0] = 0, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "model_sha256", "absent");
-  sf_manifest_free(&m);
 }
 
 TEST(a_flipped_pixel_is_located)
@@ -391,7 +385,7 @@ TEST(a_flipped_pixel_is_located)
 TEST(the_file_says_what_its_distances_are)
 {
   make_folder();
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   for (int ndc = 0; ndc < 2; ndc++) {
     const sf_golden_label label = {
         .net = &net, .scene_sha256 = "0", .view = "a", .split = "test", .downscale = 1, .ndc = ndc};
@@ -403,6 +397,5 @@ TEST(the_file_says_what_its_distances_are)
     ck_assert_int_eq(memmem(bytes, size, "NDC units from the rays' origins", 31) != NULL, ndc);
     free(bytes);
   }
-  sf_golden_free(&g);
   remove_folder();
 }

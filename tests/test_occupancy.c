@@ -2,18 +2,9 @@
 #include "ck_run.h"
 #include "train_fixture.h"
 
-static sf_dataset data;
-
 static void set_up(void)
 {
-  make_scene(4);
-  data = load("train");
-}
-
-static void tear_down(void)
-{
-  sf_dataset_free(&data);
-  remove_folder();
+  open_scene(4);
 }
 
 static bool occupied(const sf_trainer *t, size_t cell)
@@ -84,4 +75,4 @@ TEST(neighbours_of_what_is_occupied_are_looked_at)
   check_neighbours(4, 5, 6, 15);
 }
 
-ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

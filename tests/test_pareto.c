@@ -25,7 +25,7 @@ static void save(const char *name, const sf_point *point)
 TEST(points_come_back)
 {
   sf_point other = centre;
-  sf_sweep sweep;
+  OWNED(sf_sweep) sweep;
   char name[64];
   other.axis[SF_AXIS_WEIGHT] = 5, other.axis[SF_AXIS_STEPS] = 1;
   other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal images */
@@ -44,7 +44,6 @@ TEST(points_come_back)
   sweep.point[0].axis[SF_AXIS_STEPS] = 2;
   ck_assert(sf_point_on_axis(&sweep, &sweep.point[0], SF_AXIS_WEIGHT));
   ck_assert(!sf_point_on_axis(&sweep, &sweep.point[0], SF_AXIS_GRID));
-  sf_sweep_free(&sweep);
 }
 
 TEST(broken_folders_are_named)

@@ -253,7 +253,7 @@ TEST(fit_recovers_exact_weights)
 TEST(refinement_lowers_the_held_out_error)
 {
   OWNED(sf_model) m = make_model(128, 16, SF_HYBRID);
-  sf_calibration c;
+  OWNED(sf_calibration) c;
   ck_ok(sf_calibrate(&c, &m, 3, 5));
   const int rows = c.samples * 3;
   int16_t *x = malloc((size_t)rows * 128 * sizeof *x);
@@ -269,7 +269,6 @@ TEST(refinement_lowers_the_held_out_error)
   printf("C2 held-out error: rounded %.3f %%, refined %.3f %%\n", 100 * rounded.error, 100 * refined.error);
   ck_assert(refined.error < rounded.error);
   free(x);
-  sf_calibration_free(&c);
 }
 
 TEST(same_seed_same_bits_any_threads)

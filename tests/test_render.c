@@ -58,7 +58,7 @@ TEST(backward_is_the_slope)
 /* Skipping empty cells must find the samples that testing every lattice point finds. */
 TEST(march_equals_testing_every_point)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   int found = 0;
   sf_steps steps;
   ck_ok(sf_steps_make(&steps, &m.config, 1));
@@ -94,7 +94,6 @@ TEST(march_equals_testing_every_point)
     ck_assert_int_eq(sf_march_next(&march, next, y), -1);
   }
   ck_assert_int_gt(found, 2000);
-  sf_model_free(&m);
 }
 
 /* Far away a distance has no precision left, and the box seems longer than its diagonal: bit maps of lattice points

@@ -124,7 +124,7 @@ TEST(long_back_pressure)
 {
   typical(43);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 3, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 3, 0);
   uint64_t words[SF_PACKET_MAX];
   int accepted = 0;
   expect_core(&shared, &net_of_test.net, BATCH, &counts);
@@ -157,5 +157,4 @@ TEST(long_back_pressure)
     i += beat;
     beat = !beat;
   }
-  sf_dut_close(dut);
 }

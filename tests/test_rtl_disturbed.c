@@ -251,7 +251,7 @@ static void hold_response(const sf_pins_in *in, const sf_pins_out *out, sf_pins_
 LOOP_TEST(register_accesses_overlap, 4)
 {
   random_source r = {65, (uint64_t)_i << 32};
-  sf_dut *dut = begin(65);
+  OWNED(sf_dut) *dut = begin(65);
   sf_driver_reset(&dut->bus);
   uint32_t value[REGISTERS];
   for (int i = 0; i < REGISTERS; i++) value[i] = get(dut, registers[i]);
@@ -298,7 +298,6 @@ LOOP_TEST(register_accesses_overlap, 4)
   ck_assert_int_gt(writes, 200);
   ck_assert_int_ge(reads, answered);
   ck_assert_int_gt(answered, 200);
-  sf_dut_close(dut);
 }
 
 /* A write of less than a word is refused and changes nothing. */

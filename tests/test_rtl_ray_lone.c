@@ -77,8 +77,8 @@ TEST(every_bit_of_a_position)
 {
   static const fixture_sizes sizes = {16, 64, 16, 9, 64, 64, 4, FX_HYBRID, {0}};
   random_source s = {280, 0};
-  fx_scene scene = fixture_scene(&sizes, 24);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 24);
+  OWNED(sf_ray_dut) * rays;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 280}));
   const fx_ray ray = some_ray(&scene);
   int found[3] = {0};
@@ -100,6 +100,4 @@ TEST(every_bit_of_a_position)
     found[axis]++;
   }
   for (int axis = 0; axis < 3; axis++) ck_assert_int_eq(found[axis], 3);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }

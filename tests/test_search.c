@@ -2,18 +2,9 @@
 #include "ck_run.h"
 #include "train_fixture.h"
 
-static sf_dataset data;
-
 static void set_up(void)
 {
-  make_scene(12);
-  data = load("train");
-}
-
-static void tear_down(void)
-{
-  sf_dataset_free(&data);
-  remove_folder();
+  open_scene(12);
 }
 
 /* A trainer at the start of stage II, with the net's firing of a fifth. */
@@ -276,4 +267,4 @@ TEST(two_scenes_at_one_beta)
 }
 
 int ck_timeout = 240;
-ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

@@ -104,7 +104,7 @@ static void compare_forward(const char *isa, sf_net_kind kind, sf_input_mode mod
 {
   const sf_kernels *kernels = sf_kernels_select(isa);
   if (!kernels) return;
-  rig r = rig_make(kind, mode, 48, 8);
+  OWNED(rig) r = rig_make(kind, mode, 48, 8);
   const int steps = r.model.config.steps;
   drive(&r, gain);
   if (!strcmp(isa, "avx512bf16") || !strcmp(isa, "amx")) { /* weights and inputs that it holds exactly */
@@ -131,7 +131,6 @@ static void compare_forward(const char *isa, sf_net_kind kind, sf_input_mode mod
     ck_assert_msg(wrong <= allowed, "%s: %d of 64 samples differ", kernels->name, wrong);
   }
   if (kind == SF_NET_SNN) ck_assert_msg((firing(&r, 1) < 0.2) == (gain < 1), "firing %g", firing(&r, 1));
-  rig_free(&r);
 }
 
 TEST(kernels_equal_oracle)
@@ -159,20 +158,19 @@ TEST(bfloat16_kernels_near_oracle)
 TEST(density_equals_forward)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
-  rig r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 5);
+  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 5);
   float sigma[SF_BLOCK];
   rig_forward(&r, kernels, 1);
   memcpy(sigma, r.block->sigma[4], sizeof sigma);
   kernels->density(r.net, r.block, 5, r.scratch);
   ck_assert_mem_eq(sigma, r.block->sigma[4], sizeof sigma);
-  rig_free(&r);
 }
 
 /* However few steps are kept for backward: the same prefixes, and those steps' membranes. */
 TEST(kept_steps_are_the_same)
 {
   const sf_kernels *kernels = sf_kernels_training();
-  rig whole = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8), r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8);
+  OWNED(rig) whole = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8), r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8);
   rig_forward(&whole, kernels, 1);
   for (int keep = 0; keep < 8; keep++) {
     rig_prepare(&r, kernels);
@@ -186,8 +184,6 @@ TEST(kept_steps_are_the_same)
       ck_assert_mem_eq(r.block->s3[t], whole.block->s3[t], 48 * sizeof(uint64_t));
     }
   }
-  rig_free(&whole);
-  rig_free(&r);
 }
 
 static void random_output_gradient(float *dsigma, float *dcolour)
@@ -247,7 +243,7 @@ TEST(ann_gradient_is_the_slope)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
-  rig r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
+  OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
   kernels->backward(r.net, r.block, 1, ds, dc, df, r.grad, r.scratch);
@@ -257,7 +253,6 @@ TEST(ann_gradient_is_the_slope)
       ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.3, "%s[%zu]: slope %g, gradient %g",
                     r.model.param[id].name, i, expected, actual);
     }
-  rig_free(&r);
 }
 
 /* The integrators' leaks and the last layers are smooth in a spiking net too: no spike depends on them. */
@@ -266,7 +261,7 @@ TEST(snn_smooth_parts_match_the_slope)
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
   for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    rig r = rig_make(SF_NET_SNN, mode, mode == SF_DECAY ? SF_LANES : 32, 6);
+    OWNED(rig) r = rig_make(SF_NET_SNN, mode, mode == SF_DECAY ? SF_LANES : 32, 6);
     random_output_gradient(ds, dc);
     rig_forward(&r, kernels, 1);
     kernels->backward(r.net, r.block, 6, ds, dc, df, r.grad, r.scratch);
@@ -278,7 +273,6 @@ TEST(snn_smooth_parts_match_the_slope)
       double expected = slope(&r, SF_P_LEAK, leak, 1e-2f, ds, dc);
       ck_assert_double_eq_tol(grad_at(&r, SF_P_LEAK, leak), expected, 0.01 * fabs(expected) + 0.1);
     }
-    rig_free(&r);
   }
 }
 
@@ -290,7 +284,7 @@ static void check_plif_backward(float gain)
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
   enum { T = 6, H = 16 };
-  rig r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
+  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
   drive(&r, gain);
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
@@ -322,7 +316,6 @@ static void check_plif_backward(float gain)
       ck_assert_double_eq_tol(grad_at(&r, SF_P_C2, n * H + m), dw4[n][m],
                               1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
   ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
-  rig_free(&r);
 }
 
 TEST(plif_backward_by_the_equations)
@@ -359,7 +352,7 @@ TEST(backward_of_every_isa_agrees)
       const int steps = kind == SF_NET_ANN ? 1 : 8;
       if (!kernels) continue;
       for (int g = 0; g < 2; g++) {
-        rig a = rig_make(kind, SF_HYBRID, 48, steps), b = rig_make(kind, SF_HYBRID, 48, steps);
+        OWNED(rig) a = rig_make(kind, SF_HYBRID, 48, steps), b = rig_make(kind, SF_HYBRID, 48, steps);
         drive(&a, gains[g]);
         drive(&b, gains[g]);
         rig_forward(&a, portable, 1);
@@ -378,8 +371,6 @@ TEST(backward_of_every_isa_agrees)
         ck_assert_float_le(distance(b.grad->w5, a.grad->w5, 3 * 48), bound);
         if (kind == SF_NET_SNN) ck_assert_float_le(distance(b.grad->leak, a.grad->leak, SF_LAYERS), bound);
         ck_assert_float_le(distance(df[1], df[0], 8 * SF_BLOCK), bound);
-        rig_free(&a);
-        rig_free(&b);
       }
     }
 }

@@ -211,7 +211,7 @@ static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int n
 {
   const sf_kernels *k = sf_kernels_select(isa);
   if (!k) return;
-  rig r = rig_make(kind, mode, ndc, 48, 8, gain);
+  OWNED(rig) r = rig_make(kind, mode, ndc, 48, 8, gain);
   for (int keep = 0; keep < 2; keep++) {
     int wrong = 0;
     rig_forward(&r, k, keep);
@@ -226,7 +226,6 @@ static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int n
     }
     ck_assert_msg(wrong <= allowed, "%s, ndc %d: %d of 64 samples differ", k->name, ndc, wrong);
   }
-  rig_free(&r);
 }
 
 TEST(decoder_equals_oracle)
@@ -308,7 +307,7 @@ TEST(twin_gradient_is_the_slope)
 {
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   for (int ndc = 0; ndc < 2; ndc++) {
-    rig r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
+    OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
     const sf_kernels *k = sf_kernels_select(NULL);
     random_gradient(dc);
     rig_forward(&r, k, 1);
@@ -325,7 +324,6 @@ TEST(twin_gradient_is_the_slope)
       const double expected = slope_at(&r, r.block->product + at, 2e-3f, dc);
       ck_assert_double_eq_tol(r.dproduct[at], expected, 0.02 * fabs(expected) + 2e-3);
     }
-    rig_free(&r);
   }
 }
 
@@ -335,7 +333,7 @@ TEST(smooth_parts_of_the_decoder_match_the_slope)
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *k = sf_kernels_select(NULL);
   for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    rig r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
+    OWNED(rig) r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
     random_gradient(dc);
     rig_forward(&r, k, 1);
     k->decoder_backward(r.words, r.block, 6, dc, r.dproduct, r.grad, r.scratch);
@@ -346,7 +344,6 @@ TEST(smooth_parts_of_the_decoder_match_the_slope)
       }
     const double expected = slope_at(&r, sf_model_param(&r.model, SF_P_LEAK) + 4, 1e-2f, dc);
     ck_assert_double_eq_tol(r.grad->net.leak[4], expected, 0.01 * fabs(expected) + 0.1);
-    rig_free(&r);
   }
 }
 

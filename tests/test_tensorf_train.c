@@ -4,9 +4,14 @@
 #include "train/vm.h"
 #include <omp.h>
 
-static sf_train_options small_vm(const sf_dataset *data, sf_net_kind net)
+static void set_up(void)
 {
-  sf_train_options o = sf_train_defaults_tensorf(data);
+  open_scene(8);
+}
+
+static sf_train_options small_vm(sf_net_kind net)
+{
+  sf_train_options o = sf_train_defaults_tensorf(&data);
   o.config.net = net;
   o.config.steps = net == SF_NET_ANN ? 1 : T;
   o.config.hidden = 32;
@@ -55,9 +60,7 @@ static void point(const sf_tensorf *f, int i, float p[3])
  * bilinear: nothing changes. */
 TEST(upsampling_keeps_the_field)
 {
-  make_scene(2);
-  OWNED(sf_dataset) data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  const sf_train_options o = small_vm(SF_NET_ANN);
   OWNED(trainer) t = start(&data, &o, NULL);
   enum { N = 300 };
   float before[N], p[N][3], x[3], features[2][SF_APPEARANCE_MAX];
@@ -77,16 +80,13 @@ TEST(upsampling_keeps_the_field)
   sf_tensorf_appearance(&t->model, x, features[1]);
   for (int i = 0; i < 27; i++) ck_assert_float_eq_tol(features[1][i], features[0][i], 1e-5f);
   for (size_t i = 0; i < t->model.size; i++) ck_assert_float_eq(t->moment2[i], 0);
-  remove_folder();
 }
 
 /* Shrinking cuts at grid points: the same field inside. Rays have another step then, so that a picture changes by the
  * error of its quadrature alone. */
 TEST(shrinking_keeps_what_is_seen)
 {
-  make_scene(2);
-  OWNED(sf_dataset) data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  const sf_train_options o = small_vm(SF_NET_ANN);
   OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
   enum { N = 24 * 24 };
@@ -121,17 +121,14 @@ TEST(shrinking_keeps_what_is_seen)
   }
   ck_assert_double_gt(largest, 0.99);
   ck_assert_double_lt(error, 0.1); /* at the rim: a sample's place within its interval of half a voxel */
-  remove_folder();
 }
 
 /* No point whose alpha is above four times the threshold lies in a cell that the mask drops: the mask looks at the
  * corners of cells, and this field changes by less than that between them. Most of the box goes. */
 TEST(mask_keeps_what_is_visible)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  const sf_train_options o = small_vm(SF_NET_ANN);
+  OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
   ck_ok(sf_vm_mask(t, false));
   const sf_tensorf *f = &t->model.config.tensorf;
@@ -157,17 +154,12 @@ TEST(mask_keeps_what_is_visible)
   memset(t->model.occupancy, 0, 16 * 16 * 16 / 16);
   ck_ok(sf_vm_mask(t, true)); /* a later mask takes no cell back */
   ck_assert_double_lt(t->occupied, once);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
 
 /* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. */
 TEST(schedule_scales_with_the_run)
 {
-  make_scene(4);
-  OWNED(sf_dataset) data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_train_options o = small_vm(SF_NET_ANN);
   o.stage1 = 60, o.stage2 = 240;
   OWNED(trainer) t = start(&data, &o, NULL);
   static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
@@ -181,15 +173,12 @@ TEST(schedule_scales_with_the_run)
   const double voxels = (double)r[0] * r[1] * r[2];
   ck_assert_double_gt(voxels, 0.75 * 24 * 24 * 24); /* rounded down along each axis */
   ck_assert_double_le(voxels, 24 * 24 * 24);
-  remove_folder();
 }
 
 /* The whole way of a short run, spiking: the same bits with one thread and with three. */
 TEST(threads_do_not_matter)
 {
-  make_scene(4);
-  OWNED(sf_dataset) data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  const sf_train_options o = small_vm(SF_NET_SNN);
   sf_trainer *t[2];
   const int threads = omp_get_max_threads();
   for (int i = 0; i < 2; i++) {
@@ -202,15 +191,12 @@ TEST(threads_do_not_matter)
   ck_assert_mem_eq(&t[0]->model.config, &t[1]->model.config, sizeof t[0]->model.config);
   same_model(t[0], t[1]);
   for (int i = 0; i < 2; i++) sf_trainer_free(t[i]);
-  remove_folder();
 }
 
 /* A checkpoint in the middle, after the field has grown, and what follows is the same as without. */
 TEST(resume_is_the_same_run)
 {
-  make_scene(4);
-  OWNED(sf_dataset) data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  const sf_train_options o = small_vm(SF_NET_SNN);
   sf_trainer *a = start(&data, &o, NULL), *b = start(&data, &o, NULL);
   steps(a, 40);
   steps(b, 21);
@@ -224,15 +210,12 @@ TEST(resume_is_the_same_run)
   ck_bad(sf_trainer_create(&none, &data, &other, in("run.safetensors")), SF_E_RANGE, "run.safetensors", "tensorf");
   sf_trainer_free(a);
   sf_trainer_free(b);
-  remove_folder();
 }
 
 /* Biases far below the threshold: neither scaled nor new weights would fire again. */
 TEST(a_layer_that_its_biases_silence_comes_back)
 {
-  make_scene(4);
-  OWNED(sf_dataset) data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_train_options o = small_vm(SF_NET_SNN);
   o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
   OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 70);
@@ -242,16 +225,13 @@ TEST(a_layer_that_its_biases_silence_comes_back)
   ck_assert_int_eq(s.event[1], -1);
   s = steps(t, 10);
   ck_assert_double_gt(s.firing[1], 0.01);
-  remove_folder();
 }
 
 /* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
 TEST(it_learns)
 {
-  make_scene(8);
-  OWNED(sf_dataset) data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
-    sf_train_options o = small_vm(&data, net);
+    sf_train_options o = small_vm(net);
     o.stage1 = 40, o.stage2 = 110, o.rays = 512;
     OWNED(trainer) t = start(&data, &o, NULL);
     double psnr, ssim;
@@ -261,15 +241,12 @@ TEST(it_learns)
                   last.mse, first.mse, psnr);
     ck_assert_double_gt(last.occupied, 0);
   }
-  remove_folder();
 }
 
 /* A field that is not finite ends the run with its name; what is refused is not saved. */
 TEST(nan_is_found)
 {
-  make_scene(2);
-  OWNED(sf_dataset) data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
+  const sf_train_options o = small_vm(SF_NET_ANN);
   OWNED(trainer) t = start(&data, &o, NULL);
   sf_train_stats s;
   t->model.value[t->model.param[SF_P_DENSITY_LINE].offset] = NAN;
@@ -279,14 +256,11 @@ TEST(nan_is_found)
   const sf_status status = sf_trainer_save(t, in("bad.safetensors"), true);
   ck_assert_int_ne(status.code, SF_OK);
   ck_assert_ptr_nonnull(strstr(status.message, "density_line.0"));
-  remove_folder();
 }
 
 /* Blender scenes have TensoRF's box in their units; others, whose unit may be anything, the box of the data. */
 TEST(the_box_is_that_of_the_layout)
 {
-  make_scene(2);
-  OWNED(sf_dataset) data = load("train");
   sf_config c, plain = sf_tensorf_default(data.scale, 0);
   float *const place = data.view[0].camera.to_world;
   data.count = 1;
@@ -316,19 +290,16 @@ TEST(the_box_is_that_of_the_layout)
   data.ndc = true;
   c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 1);
   ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
-  remove_folder();
 }
 
 TEST(rays_that_all_miss_the_box_are_refused)
 {
-  make_scene(2);
-  OWNED(sf_dataset) data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_train_options o = small_vm(SF_NET_SNN);
   sf_train_stats stats;
   o.config.tensorf.near = 100, o.config.tensorf.far = 101;
   OWNED(trainer) t = start(&data, &o, NULL);
   ck_bad(sf_trainer_step(t, &stats), SF_E_RANGE, "iteration 0: none of", "meets the box");
-  remove_folder();
 }
 
 int ck_timeout = 300;
+ck_options ck_program = {.set_up = set_up, .tear_down = close_scene};

@@ -8,7 +8,7 @@ enum { N = 12 };
 
 static void set_up(void)
 {
-  make_scene(6);
+  open_scene(6);
 }
 
 static void same_file(const char *a, const char *b)
@@ -35,7 +35,6 @@ static sf_train_options run_in_box(int kind)
 
 LOOP_TEST(same_seed_same_bits_any_threads, 2)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = run_in_box(_i);
   omp_set_num_threads(1);
   OWNED(trainer) a = start(&data, &o, NULL);
@@ -53,7 +52,6 @@ LOOP_TEST(same_seed_same_bits_any_threads, 2)
 
 static void check_resume(const sf_train_options *o, int before, int after)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_trainer *whole = start(&data, o, NULL), *part = start(&data, o, NULL);
   steps(whole, before + after);
   steps(part, before);
@@ -69,7 +67,6 @@ static void check_resume(const sf_train_options *o, int before, int after)
 /* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
 TEST(the_chosen_steps_are_trained_alone)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   o.beta = 1e-4;
   OWNED(trainer) t = start(&data, &o, NULL);
@@ -92,7 +89,6 @@ TEST(the_chosen_steps_are_trained_alone)
 /* What is rendered has the intervals of the training's second half. */
 LOOP_TEST(the_lattice_settles, 2)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = run_in_box(_i);
   o.samples = 64; /* few enough for a coarser lattice */
   OWNED(trainer) t = start(&data, &o, NULL);
@@ -125,7 +121,6 @@ LOOP_TEST(the_lattice_settles, 2)
  * large. */
 LOOP_TEST(a_lattice_at_its_limit_settles_as_it_is, 2)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = run_in_box(_i);
   o.samples = 64;
   if (_i)
@@ -197,7 +192,6 @@ TEST(a_checkpoint_is_of_its_data)
 
 TEST(saved_model_loads_and_saves_equal)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 20);
@@ -217,7 +211,6 @@ TEST(saved_model_loads_and_saves_equal)
 /* One prefix is trained at a t* that no loss moves: beta and alpha are without effect. */
 TEST(fixed_steps_freeze_the_budget)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   o.fixed_steps = 3;
   o.beta = 0;
@@ -245,7 +238,7 @@ TEST(fixed_steps_freeze_the_budget)
 
 TEST(every_prefix_is_evaluated)
 {
-  OWNED(sf_dataset) data = load("train"), test = load("test");
+  OWNED(sf_dataset) test = load("test");
   const sf_train_options o = small_run();
   OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 40);
@@ -263,7 +256,6 @@ TEST(every_prefix_is_evaluated)
 /* The model at the end is the mean over the last fortieth of the run: here each of the last 10 of 400 iterations. */
 TEST(the_last_iterations_are_averaged)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   o.stage1 = 100;
   o.stage2 = 300;
@@ -298,7 +290,6 @@ TEST(the_last_iterations_are_averaged)
 
 TEST(loss_falls_and_both_twins_learn)
 {
-  OWNED(sf_dataset) data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_run();
     o.config.net = net;
@@ -418,16 +409,15 @@ TEST(sparsity_by_hand)
 /* Few rays may all pass by a small box: more are drawn. */
 TEST(few_rays_that_miss_are_no_fault)
 {
-  make_scene(4);
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++)
     for (int away = 0; away < 2; away++) {
-      OWNED(sf_dataset) data;
-      ck_ok(
-          sf_dataset_load(&data, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = away ? 40 : 12}));
+      OWNED(sf_dataset) small;
+      ck_ok(sf_dataset_load(&small, in("scene"), "train",
+                            &(sf_dataset_options){.downscale = 1, .scale = away ? 40 : 12}));
       sf_train_options o = small_run();
-      o.samples = 256, o.stage1 = 20, o.stage2 = 20, o.config.net = net, o.config.scale = data.scale;
+      o.samples = 256, o.stage1 = 20, o.stage2 = 20, o.config.net = net, o.config.scale = small.scale;
       if (net == SF_NET_ANN) o.config.steps = 1;
-      OWNED(trainer) t = start(&data, &o, NULL);
+      OWNED(trainer) t = start(&small, &o, NULL);
       sf_train_stats stats = {0};
       sf_status status = sf_ok();
       while (!status.code && stats.stage != 3) status = sf_trainer_step(t, &stats);
@@ -436,8 +426,7 @@ TEST(few_rays_that_miss_are_no_fault)
       else
         ck_ok(status);
     }
-  remove_folder();
 }
 
 int ck_timeout = 180;
-ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

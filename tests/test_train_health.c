@@ -4,7 +4,7 @@
 
 static void set_up(void)
 {
-  make_scene(6);
+  open_scene(6);
 }
 
 typedef struct outcome {
@@ -59,7 +59,6 @@ static sf_train_options long_run(void)
 LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, COUNT(faults))
 {
   const struct fault *f = &faults[_i];
-  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = long_run();
   OWNED(trainer) t = start(&data, &o, NULL);
   ck_assert_int_eq(watch(t, f->layer, 70).event, 0); /* a healthy run is left alone */
@@ -84,7 +83,6 @@ LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, COUNT(faults))
 /* The count of silence is part of a checkpoint. */
 TEST(resume_while_a_layer_is_dead)
 {
-  OWNED(sf_dataset) data = load("train");
   const sf_train_options o = long_run();
   OWNED(trainer) whole = start(&data, &o, NULL);
   plant(whole, &faults[1]);
@@ -101,7 +99,6 @@ TEST(resume_while_a_layer_is_dead)
 
 TEST(leaks_stay_in_range)
 {
-  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   OWNED(trainer) t = start(&data, &o, NULL);
   const float far[SF_LAYERS] = {-50, 50, 1e5f, -1e5f, 80};
@@ -119,7 +116,6 @@ TEST(leaks_stay_in_range)
  * could hide a NaN, which crosses no threshold. */
 TEST(nan_stops_the_run_and_keeps_the_checkpoint)
 {
-  sf_dataset data = load("train");
   const sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 3);
@@ -143,12 +139,10 @@ TEST(nan_stops_the_run_and_keeps_the_checkpoint)
   t = start(&data, &o, in("good.safetensors"));
   ck_assert_int_eq(steps(t, 37).stage, 3);
   sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
 
 TEST(diverging_rate_stops_the_run)
 {
-  OWNED(sf_dataset) data = load("train");
   for (int grid = 0; grid < 2; grid++) {
     const sf_train_options o = small_run();
     OWNED(trainer) t = start(&data, &o, NULL);
@@ -237,4 +231,4 @@ LOOP_TEST(hard_scenes_with_the_twin, SCENES)
 }
 
 int ck_timeout = 180;
-ck_options ck_program = {.set_up_all = set_up, .tear_down_all = remove_folder, .one_process = true};
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

@@ -8,7 +8,6 @@
 enum { BITS = 4, LIMIT = 7 };
 
 static const sf_param_id weights_of[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
-static sf_dataset data;
 static sf_model base; /* trained for a moment, its scales settled */
 
 static void settle(sf_model *m, int bits)
@@ -21,8 +20,7 @@ static void settle(sf_model *m, int bits)
 
 static void set_up(void)
 {
-  make_scene(6);
-  data = load("train");
+  open_scene(6);
   const sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, o.stage1 + o.stage2);
@@ -36,8 +34,7 @@ static void set_up(void)
 static void tear_down(void)
 {
   sf_model_free(&base);
-  sf_dataset_free(&data);
-  remove_folder();
+  close_scene();
 }
 
 static sf_train_options tuning_run(void)

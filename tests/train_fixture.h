@@ -21,6 +21,20 @@ static inline sf_dataset load(const char *split)
   return data;
 }
 
+static sf_dataset data; /* the views that a program's tests train on */
+
+static inline void open_scene(int views)
+{
+  make_scene(views);
+  data = load("train");
+}
+
+static inline void close_scene(void)
+{
+  sf_dataset_free(&data);
+  remove_folder();
+}
+
 static inline sf_train_options small_run(void)
 {
   sf_train_options o = sf_train_defaults();
