@@ -1,5 +1,6 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "base/sha256.h"
 #include "base/text.h"
 #include "cycles/cycles.h"
@@ -10,18 +11,7 @@
 #include <omp.h>
 #include <unistd.h>
 
-/* ---- a net small enough to count by hand: 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3 ---- */
-
-static fx_net small_net(void)
-{
-  fx_net net = {.steps = 2, .mode = FX_HYBRID};
-  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
-  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
-  return net;
-}
-
-typedef uint64_t bitmaps[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
-static const bitmaps small_spikes = {[FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
+/* ---- counts and their price ---- */
 
 static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64_t t1)
 {
@@ -511,12 +501,28 @@ TEST(text_from_outside_becomes_utf8)
   }
 }
 
+static sf_audit_report *small_report(const fx_net *net)
+{
+  sf_audit_report *r = calloc(1, sizeof *r);
+  *r =
+      (sf_audit_report){.scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = net, .rays = 4, .views = 0.5};
+  return r;
+}
+
+static char *printed(const sf_audit_report *r)
+{
+  static char *text; /* the stream keeps its address */
+  static size_t size;
+  FILE *out = open_memstream(&text, &size);
+  sf_report_print(out, r);
+  fclose(out);
+  return text;
+}
+
 TEST(report_json_holds_what_was_counted)
 {
-  fx_net net = small_net();
-  sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   sf_recount_sample(&net, small_spikes, true, &r->measure.core);
   r->measure.recount = r->measure.checked_core = r->measure.core;
   ck_ok(sf_ledger_make(&net, &r->measure.core, &r->ledger));
@@ -541,21 +547,15 @@ TEST(report_json_holds_what_was_counted)
 
 TEST(report_says_that_counts_differ)
 {
-  fx_net net = small_net();
-  sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   r->three.rays = 1, r->three.wanted = 1;
   r->three.core.layer[FX_C3].sop[0] = 5;
   r->three.agreement = sf_counts_compare(&r->three.core, "core", &r->three.rtl, "accelerator");
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
   ck_assert_str_eq(at(json, "difference")->valuestring, "SOP of layer C3 at step 0: core 5, accelerator 0");
-  char *text = NULL;
-  size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
+  char *text = printed(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: SOP of layer C3 at step 0"));
   ck_assert_ptr_nonnull(strstr(text, "not modelled, by any ledger:"));
   free(text), free(r);
@@ -565,19 +565,13 @@ TEST(report_says_that_counts_differ)
 /* The first ray of the accelerator can be the one that differs: there is nothing but the difference then. */
 TEST(report_says_that_the_first_ray_differs)
 {
-  fx_net net = small_net();
-  sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   r->three.wanted = 16;
   r->three.agreement = sf_fail(SF_E_DIFFERENCE, "ray 0: sample 0: red: core 1, accelerator 0");
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
-  char *text = NULL;
-  size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
+  char *text = printed(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: ray 0: sample 0"));
   ck_assert_ptr_null(strstr(text, "nothing to run"));
   free(text), free(r);
@@ -663,20 +657,9 @@ TEST(golden_planes_hold_the_pixel)
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[0], 0);
 }
 
-static void remove_in(const char *dir, const char *name)
-{
-  char path[300];
-  snprintf(path, sizeof path, "%s/%s", dir, name);
-  ck_assert_int_eq(unlink(path), 0);
-}
-
 TEST(golden_file_reads_back)
 {
-  const char *tmp = getenv("TMPDIR");
-  char dir[200], path[300];
-  snprintf(dir, sizeof dir, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(dir));
-  snprintf(path, sizeof path, "%s/g.exr", dir);
+  const char *path = in("g.exr");
   OWNED(sf_golden) g;
   const fx_cost cost = {0};
   fx_pixel pixel = some_pixel(12345, 77);
@@ -699,8 +682,6 @@ TEST(golden_file_reads_back)
   }
   ck_assert_int_eq(found, 2);
   sf_exr_free(channel, n);
-  remove_in(dir, "g.exr");
-  ck_assert_int_eq(rmdir(dir), 0);
 }
 
 TEST(quality_composites_the_window_over_the_background)
@@ -731,3 +712,5 @@ TEST(quality_composites_the_window_over_the_background)
   ck_ok(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim));
   ck_assert(isnan(ssim));
 }
+
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

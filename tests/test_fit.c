@@ -287,10 +287,8 @@ TEST(the_bound_is_kept)
   sf_fit_report r;
   sf_fit_sum before, after;
   ck_ok(fit(candidate, 1, &rays, bound, &fitted, &r));
-  make_folder();
   ck_ok(fx_scene_save(&fitted, in("fitted.snn")));
   ck_ok(fx_scene_load(&loaded, in("fitted.snn")));
-  remove_folder();
   const uint64_t first = r.first_checked, end = first + r.checked;
   ck_ok(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
   ck_ok(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
@@ -400,6 +398,7 @@ TEST(targets)
 }
 
 int ck_timeout = 120;
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
 
 int main(void)
 {

@@ -1,47 +1,9 @@
 /* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
 #include "ck_run.h"
 #include "base/io.h"
+#include "scene_file_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
-#include <dirent.h>
 #include <stdio.h>
-#include <unistd.h>
-
-static char folder[256], path[300];
-
-/* Once, outside the test processes, so that the folder goes even when a test fails. */
-static void make_folder(void)
-{
-  const char *base = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/spikefield-fx-XXXXXX", base && *base ? base : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-}
-
-static int files_in_folder(bool remove_them)
-{
-  int count = 0;
-  DIR *dir = opendir(folder);
-  for (struct dirent *entry; (entry = readdir(dir));) {
-    char name[600];
-    if (entry->d_name[0] == '.' && (!entry->d_name[1] || !strcmp(entry->d_name, ".."))) continue;
-    count++;
-    snprintf(name, sizeof name, "%s/%s", folder, entry->d_name);
-    if (remove_them) unlink(name);
-  }
-  closedir(dir);
-  return count;
-}
-
-static void remove_folder(void)
-{
-  files_in_folder(true);
-  rmdir(folder);
-}
-
-static void setup(void)
-{
-  files_in_folder(true);
-  snprintf(path, sizeof path, "%s/scene.snn", folder);
-}
 
 static fx_scene small_scene(uint64_t seed)
 {
@@ -61,17 +23,6 @@ static void put(const char *data, size_t size)
   ck_assert_ptr_nonnull(file);
   ck_assert_uint_eq(fwrite(data, 1, size, file), size);
   ck_assert_int_eq(fclose(file), 0);
-}
-
-/* Fails to load, the message names the file and `place`, and nothing is left behind. */
-static void assert_refused(const char *place)
-{
-  fx_scene scene;
-  const sf_status status = fx_scene_load(&scene, path);
-  ck_assert_msg(status.code != SF_OK, "loaded in spite of: %s", place);
-  ck_assert_msg(strstr(status.message, path) && strstr(status.message, place), "'%s' does not name '%s'",
-                status.message, place);
-  ck_assert_ptr_null(scene.owner);
 }
 
 static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
@@ -108,7 +59,7 @@ TEST(round_trip)
     save(&scene);
     ck_ok(fx_scene_load(&again, path));
     assert_equal_scenes(&scene, &again);
-    ck_assert_int_eq(files_in_folder(false), 1);
+    ck_assert_int_eq(entries(), 1);
   }
 }
 
@@ -168,16 +119,6 @@ TEST(edited_anywhere)
   fx_scene_free(&scene);
 }
 
-/* Rewrites one metadata string and keeps every tensor. */
-static void edit(const char *key, const char *value)
-{
-  OWNED(sf_tensors) set;
-  ck_ok(sf_tensors_load(&set, path));
-  cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
-  if (value) cJSON_AddStringToObject(set.metadata, key, value);
-  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
-}
-
 TEST(metadata_is_checked)
 {
   static const char *const wrong[][3] = {
@@ -232,14 +173,9 @@ TEST(metadata_is_checked)
       {"model_scale", "1", "checksum"},
   };
   OWNED(fx_scene) scene = small_scene(4);
-  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-    save(&scene);
-    edit(wrong[i][0], wrong[i][1]);
-    assert_refused(wrong[i][2]);
-  }
+  for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
 }
 
-/* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
 /* With the default H_SHIFT every h fits; a build with a smaller one refuses what the 12 bits of h do not hold. */
 TEST(largest_h_must_fit)
 {
@@ -254,6 +190,7 @@ TEST(largest_h_must_fit)
   }
 }
 
+/* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
 TEST(decoder_behind_a_grid_is_refused)
 {
   static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
@@ -333,7 +270,7 @@ TEST(a_decoder_alone_is_no_file)
 {
   OWNED(fx_scene) scene = fixture_scene(&fixture_decoder, 9);
   ck_bad(fx_scene_save(&scene, path), SF_E_UNSUPPORTED, path, "decoder");
-  ck_assert_int_eq(files_in_folder(false), 0);
+  ck_assert_int_eq(entries(), 0);
 }
 
 TEST(unwritable_and_missing)
@@ -345,8 +282,8 @@ TEST(unwritable_and_missing)
   scene.net.steps = 0;
   snprintf(path, sizeof path, "%s/scene.snn", folder);
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_RANGE);
-  ck_assert_int_eq(files_in_folder(false), 0);
+  ck_assert_int_eq(entries(), 0);
 }
 
 int ck_timeout = 300;
-ck_options ck_program = {.set_up = setup, .set_up_all = make_folder, .tear_down_all = remove_folder};
+ck_options ck_program = {.set_up = set_up, .tear_down = remove_folder};

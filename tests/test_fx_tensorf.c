@@ -8,10 +8,10 @@
 #include "src/fx/core.h"
 #include "src/fx/round.h"
 #include "tests/fx_fixture.h"
+#include "tests/scene_file_fixture.h"
 #include "tests/tensorf_fixture.h"
 #include <math.h>
 #include <stdio.h>
-#include <unistd.h>
 
 /* ---- units ---- */
 
@@ -425,27 +425,7 @@ TEST(empty_and_opaque)
 
 /* ---- files ---- */
 
-static char path[64];
-
-static void edit(const char *key, const char *value)
-{
-  OWNED(sf_tensors) set;
-  ck_ok(sf_tensors_load(&set, path));
-  cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
-  if (value) cJSON_AddStringToObject(set.metadata, key, value);
-  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
-}
-
-static void ck_refused(const char *place)
-{
-  fx_scene scene;
-  const sf_status status = fx_scene_load(&scene, path);
-  ck_assert_msg(status.code != SF_OK, "loaded in spite of: %s", place);
-  ck_assert_msg(strstr(status.message, path) && strstr(status.message, place), "'%s' does not name '%s'",
-                status.message, place);
-}
-
-static void check_file(void)
+TEST(files_are_checked)
 {
   static const char *const wrong[][3] = {
       {"backbone", "plenoxels", "backbone"},
@@ -490,18 +470,14 @@ static void check_file(void)
     ck_assert_mem_eq(&a, &b, sizeof a);
   }
   fx_scene_free(&again);
-  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-    ck_ok(fx_scene_save(&scene, path));
-    edit(wrong[i][0], wrong[i][1]);
-    ck_refused(wrong[i][2]);
-  }
+  for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
   scene.tensorf.basis[70] = -128;
   ck_bad(fx_scene_save(&scene, path), SF_E_RANGE, "'basis_mat': element 70", "");
   fx_scene_free(&scene);
 }
 
 /* The library opens such a scene and renders its rays; what needs a hash grid it refuses. */
-static void check_library(void)
+TEST(the_library_renders_it)
 {
   enum { RAYS = 40 };
   float origin[RAYS][3], direction[RAYS][3];
@@ -541,17 +517,6 @@ static void check_library(void)
   const spikefield_status refused = spikefield_features(opened, somewhere, 1, inputs, NULL);
   ck_assert_msg(refused.code == SPIKEFIELD_E_UNSUPPORTED && strstr(refused.message, "TensoRF"), "%s", refused.message);
   spikefield_scene_close(opened);
-}
-
-TEST(files)
-{
-  snprintf(path, sizeof path, "/tmp/spikefield-vm-XXXXXX");
-  const int file = mkstemp(path);
-  ck_assert_int_ge(file, 0);
-  close(file);
-  check_file();
-  check_library();
-  unlink(path);
 }
 
 /* ---- against the float model ---- */
@@ -678,3 +643,4 @@ TEST(what_cannot_be_represented_is_refused)
 }
 
 int ck_timeout = 120;
+ck_options ck_program = {.set_up = set_up, .tear_down = remove_folder};

@@ -1,10 +1,10 @@
 /* Prices and ledgers, against pricing by hand. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "energy/energy.h"
 #include "base/io.h"
-#include "tests/fx_fixture.h"
+#include "tests/audit_fixture.h"
 #include <math.h>
-#include <unistd.h>
 
 /* An adder costs its bits, a multiplier the product of its widths, a byte 10 of memory and 1000 of DRAM. */
 static const char plain[] = "# comment\n"
@@ -21,26 +21,10 @@ static const char plain[] = "# comment\n"
                             "sram.64 80 fJ made up\n"
                             "dram 0.008 nJ made up";
 
-static char folder[200], path[300];
-
-static void make_folder(void)
-{
-  const char *tmp = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-  snprintf(path, sizeof path, "%s/t.tech", folder);
-}
-
-static void remove_folder(void)
-{
-  unlink(path);
-  ck_assert_int_eq(rmdir(folder), 0);
-}
-
 static sf_status load_text(sf_technology *tech, const char *text)
 {
-  ck_ok(sf_write_file(path, text, strlen(text)));
-  return sf_technology_load(tech, path);
+  ck_ok(sf_write_file(in("t.tech"), text, strlen(text)));
+  return sf_technology_load(tech, in("t.tech"));
 }
 
 static sf_technology plain_technology(void)
@@ -72,7 +56,7 @@ TEST(file_is_read)
   ck_assert_str_eq(t.price[5].source, "made up");
 }
 
-/* Each mistake, put in place of a line of the plain file, and what the message says behind the path. */
+/* Each mistake, put in place of a line of the plain file, and what the message says behind the in("t.tech"). */
 TEST(mistakes_are_named_with_line_and_key)
 {
   static const struct {
@@ -111,13 +95,13 @@ TEST(mistakes_are_named_with_line_and_key)
     snprintf(text, sizeof text, "%.*s%s%s", (int)(at - plain), plain, mistakes[i].instead,
              at + strlen(mistakes[i].line));
     const sf_status status = load_text(&tech, text);
-    snprintf(expected, sizeof expected, "%s%s", path, mistakes[i].message);
+    snprintf(expected, sizeof expected, "%s%s", in("t.tech"), mistakes[i].message);
     ck_assert_msg(status.code == SF_E_FORMAT || status.code == SF_E_RANGE, "%s: accepted", mistakes[i].instead);
     ck_assert_msg(!strncmp(status.message, expected, strlen(expected)), "%s\n  expected %s", status.message, expected);
   }
-  unlink(path);
+  unlink(in("t.tech"));
   sf_technology tech;
-  ck_assert_int_eq(sf_technology_load(&tech, path).code, SF_E_IO);
+  ck_assert_int_eq(sf_technology_load(&tech, in("t.tech")).code, SF_E_IO);
 }
 
 TEST(prices_between_points)
@@ -168,21 +152,10 @@ TEST(installed_prices)
 
 /* ---- ledgers ---- */
 
-/* 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3; the counts of one sample, as test_audit.c has them. */
-static fx_net small_net(void)
-{
-  fx_net net = {.steps = 2, .mode = FX_HYBRID};
-  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
-  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
-  return net;
-}
-
 static fx_counts small_counts(const fx_net *net)
 {
-  static const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS] = {
-      [FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
   fx_counts c = {0};
-  sf_recount_sample(net, spikes, true, &c);
+  sf_recount_sample(net, small_spikes, true, &c);
   return c;
 }
 

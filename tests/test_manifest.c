@@ -153,7 +153,6 @@ static void assert_same_file(const char *a, const char *b)
 
 LOOP_TEST(reads_back_what_it_wrote, 2)
 {
-  make_folder();
   for (int views = 0; views <= 3; views++) {
     sf_manifest m = some_manifest(_i, views), back;
     ck_ok(sf_manifest_save(&m, in("a.json")));
@@ -173,12 +172,10 @@ LOOP_TEST(reads_back_what_it_wrote, 2)
     assert_same_file(in("a.json"), in("b.json"));
     sf_manifest_free(&m), sf_manifest_free(&back);
   }
-  remove_folder();
 }
 
 TEST(the_order_of_the_views_does_not_matter)
 {
-  make_folder();
   sf_manifest m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
   static const int order[] = {2, 0, 1, 0};
   for (int i = 0; i < 4; i++) ck_ok(sf_manifest_put(&other, &m.view[order[i]]));
@@ -189,7 +186,6 @@ TEST(the_order_of_the_views_does_not_matter)
   ck_ok(sf_manifest_save(&other, in("b.json")));
   assert_same_file(in("a.json"), in("b.json"));
   sf_manifest_free(&m), sf_manifest_free(&other);
-  remove_folder();
 }
 
 TEST(sums_by_hand)
@@ -269,7 +265,6 @@ static cJSON *inner(cJSON *item, int *number) /* the n-th object */
 
 LOOP_TEST(every_edit_is_seen, 2)
 {
-  make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
   ck_ok(sf_manifest_save(&m, in("m.json")));
   int edits = 0;
@@ -292,12 +287,10 @@ LOOP_TEST(every_edit_is_seen, 2)
   }
   ck_assert_int_gt(edits, _i ? 30 : 70);
   sf_manifest_free(&m);
-  remove_folder();
 }
 
 LOOP_TEST(missing_and_unknown_fields_are_refused, 2)
 {
-  make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
   ck_ok(sf_manifest_save(&m, in("m.json")));
   int objects = 0;
@@ -319,12 +312,10 @@ LOOP_TEST(missing_and_unknown_fields_are_refused, 2)
   }
   ck_assert_int_eq(objects, _i ? 1 + 1 + 2 * 2 : 1 + 1 + 2 * 3); /* root, totals; view, counts, planes */
   sf_manifest_free(&m);
-  remove_folder();
 }
 
 TEST(other_files_are_refused)
 {
-  make_folder();
   sf_manifest m;
   static const char *const text[] = {"", "[]", "{}", "{\"format\": \"spikefield-golden\", \"version\": 2}", "null"};
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
@@ -339,7 +330,6 @@ TEST(other_files_are_refused)
   ck_ok(sf_manifest_save(&elsewhere, in("m.json")));
   ck_bad(sf_manifest_load(&m, in("m.json")), SF_E_FORMAT, "view[0]", "exr");
   sf_manifest_free(&elsewhere);
-  remove_folder();
 }
 
 TEST(origins_differ_by_name)
@@ -356,7 +346,6 @@ TEST(origins_differ_by_name)
 
 TEST(a_flipped_pixel_is_located)
 {
-  make_folder();
   sf_golden g;
   ck_ok(sf_golden_create(&g, 20, 18, SF_PLANES));
   for (size_t i = 0; i < 20 * 18; i++) sf_golden_int(&g, SF_PLANE_FX_G)[i] = (uint32_t)i * 77;
@@ -378,13 +367,11 @@ TEST(a_flipped_pixel_is_located)
   small.planes = SF_PLANES;
   ck_bad(sf_golden_compare_file(&small, in("f.exr"), -1), SF_E_DIFFERENCE, "no integer channel spikes", "f.exr");
   sf_golden_free(&g), sf_golden_free(&small);
-  remove_folder();
 }
 
 /* The header of an EXR is plain text. */
 TEST(the_file_says_what_its_distances_are)
 {
-  make_folder();
   OWNED(sf_golden) g = some_golden();
   for (int ndc = 0; ndc < 2; ndc++) {
     const sf_golden_label label = {
@@ -397,5 +384,6 @@ TEST(the_file_says_what_its_distances_are)
     ck_assert_int_eq(memmem(bytes, size, "NDC units from the rays' origins", 31) != NULL, ndc);
     free(bytes);
   }
-  remove_folder();
 }
+
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

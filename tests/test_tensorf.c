@@ -107,7 +107,6 @@ TEST(twin_is_a_network_with_biases)
 
 TEST(save_and_load)
 {
-  make_folder();
   for (int ndc = 0; ndc < 2; ndc++) {
     sf_model m = test_tensorf(SF_NET_SNN, ndc, 32, 4), back;
     m.t_star = 2.25f;
@@ -132,7 +131,7 @@ TEST(save_and_load)
     ck_assert_ptr_nonnull(strstr(status.message, "density_plane.1"));
     sf_model_free(&m);
   }
-  remove_folder();
 }
 
 int ck_timeout = 120;
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -378,7 +378,6 @@ TEST(files_keep_the_box)
   sf_model m;
   fx_scene scene, back;
   make_pair(16, 16, &m, &scene);
-  make_folder();
   ck_ok(fx_scene_save(&scene, in("x.snn")));
   ck_ok(fx_scene_load(&back, in("x.snn")));
   ck_assert_int_eq(back.log2_bound, 4);
@@ -386,7 +385,6 @@ TEST(files_keep_the_box)
   ck_assert_mem_eq(back.occupancy, scene.occupancy, sf_config_cells(&m.config) / 8);
   ck_assert_mem_eq(back.steps, scene.steps, sizeof *back.steps);
   fx_scene_free(&back);
-  remove_folder();
   scene.longest_q16 = 1;
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "longest_q16"));
   scene.longest_q16 = 1 << 20, scene.gamma_q24 = 1 << 22;
@@ -463,3 +461,5 @@ TEST(fixed_pictures_equal_float_ones)
   ck_assert_double_gt(psnr, 30); /* flips of spikes of an untrained net; a wrong delta or cell costs 15 dB */
   free_pair(&m, &scene);
 }
+
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
