@@ -7,11 +7,10 @@
 LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 {
   const layout_rig rig = orbit(), listed = shuffled(&rig);
-  OWNED(sf_dataset) d;
   put_colmap(_i & 2 ? "sparse" : "sparse/0", &listed, _i & 1);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   same_splits(&rig);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_COLMAP);
   const char *const list[] = {"sparse/0/images.bin", "sparse/0/images.txt", "sparse/images.bin", "sparse/images.txt"};
   ck_assert_str_eq(d.list, in(list[_i]));
@@ -36,35 +35,30 @@ LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 TEST(instant_ngp_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "\"aabb_scale\":4,", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.layout, SF_LAYOUT_INGP);
   ck_assert(d.scale == 0.33f && d.bound == 2 && d.offset[0] == 0);
-  sf_dataset_free(&d);
   /* its own cube: 0.5 p + (0.6, 0.5, 0.4), of which the middle is the origin and the box has half edge 1 */
   put_json("transforms.json", &rig, "\"aabb_scale\":1,\"scale\":0.25,\"offset\":[0.6,0.5,0.4],", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "test");
+  reload("test");
   ck_assert(d.scale == 0.5f && d.bound == 1);
   ck_assert_float_eq_tol(d.offset[0], 0.2f, 1e-6f);
   ck_assert_float_eq_tol(d.offset[2], -0.2f, 1e-6f);
-  sf_dataset_free(&d);
-  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
-  sf_dataset_free(&d);
   /* half a million units away, in single precision 1/32 */
   for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 500000;
   put_json("transforms.json", &rig, "\"aabb_scale\":1,\"scale\":0.25,\"offset\":[-124999.4,0.5,0.4],", "images", 0, 1);
-  load(&d, "test");
+  reload("test");
   const sf_view *a = &d.view[0], *b = &d.view[1];
   const double apart = named(&rig, b->name)->to_world[3] - named(&rig, a->name)->to_world[3];
   ck_assert_float_eq_tol(b->camera.to_world[3] - a->camera.to_world[3], (float)(0.5 * apart), 1e-6f);
-  sf_dataset_free(&d);
 }
 
 /* The training file says where the scene lies, in words or by its poses, for the views of the other file, too. */
@@ -92,11 +86,10 @@ LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
 TEST(far_coordinates_lose_nothing)
 {
   layout_rig rig = orbit();
-  OWNED(sf_dataset) d;
   for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 512345.25, rig.view[v].to_world[7] += 5412345.5;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "train");
+  reload("train");
   same_rays(&d, &rig);
 }
 
@@ -144,22 +137,20 @@ TEST(a_picture_is_found_by_a_long_name)
 TEST(a_picture_is_no_pipe)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 0);
   put_json("transforms.json", &rig, "", "images", 0, 1);
   const char *first = in("images/p00.png");
   ck_assert(!unlink(first) && !mkfifo(first, 0600));
-  ck_bad(sf_dataset_load(&d, folder, "test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
+  ck_bad(reload_as("test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
 }
 
 TEST(an_object_on_nothing_fills_the_box)
 {
   const layout_rig rig = orbit();
-  OWNED(sf_dataset) d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 0); /* the first rows are transparent */
   put_json("transforms.json", &rig, "", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.bound, 1);
   /* half the picture's height over the focal length, at the middle distance of 5 to 5.3 */
   ck_assert_double_eq_tol(1 / (double)d.scale, 5.0 * 6 / 21, 0.3 * 6 / 21);
@@ -170,7 +161,7 @@ TEST(a_crop_looks_where_its_picture_is)
 {
   const layout_rig rig = orbit();
   layout_rig crop = rig;
-  sf_dataset whole, d;
+  sf_dataset whole;
   const double slope = tan(M_PI / 3), angle[2] = {cos(M_PI / 3), sin(M_PI / 3)};
   char more[100];
   crop.lens[0].param[2] -= slope * crop.lens[0].param[0];
@@ -183,32 +174,30 @@ TEST(a_crop_looks_where_its_picture_is)
   put_pictures("images", &rig, WIDTH, HEIGHT, 0);
   put_json("transforms.json", &rig, "", "images", 0, 1), load(&whole, "train");
   snprintf(more, sizeof more, "\"cx\":%.17g,", crop.lens[0].param[2]);
-  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  put_json("transforms.json", &crop, more, "images", 0, 1), reload("train");
   ck_assert_int_eq(d.warnings, 0);
   same_rays(&d, &crop);
   for (int i = 0; i < 12; i++) ck_assert_double_eq_tol(d.world[i], whole.world[i], 1e-9);
   ck_assert_float_eq_tol(d.scale, whole.scale * 2, 1e-5f); /* 60 degrees off: the object is at half the depth */
-  sf_dataset_free(&whole), sf_dataset_free(&d);
+  sf_dataset_free(&whole);
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) crop.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   strcat(more, "\"aabb_scale\":1,");
-  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  put_json("transforms.json", &crop, more, "images", 0, 1), reload("train");
   ck_assert_int_eq(d.warnings, 0);
-  sf_dataset_free(&d);
   put_json("transforms.json", &crop, "\"cx\":100,\"aabb_scale\":1,", "images", 0, 1);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
 }
 
 TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  OWNED(sf_dataset) d;
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms_train.json", &rig, "", "images", 1, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 2);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_BLENDER);
   ck_assert_str_eq(d.list, in("transforms_train.json"));
   ck_assert_int_eq(d.count, VIEWS / 2);
@@ -220,10 +209,9 @@ TEST(blender_has_the_rays_of_its_poses)
 LOOP_TEST(forward_facing_rays_are_ndc, 2)
 {
   const layout_rig rig = row();
-  OWNED(sf_dataset) d;
   put_llff(&rig, _i, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.layout, SF_LAYOUT_LLFF);
   ck_assert_str_eq(d.list, in("poses_bounds.npy"));
   ck_assert(d.ndc && d.bound == 1 && d.ndc_near == 1);
@@ -291,61 +279,50 @@ TEST(forward_facing_poses_are_recentred)
 TEST(poses_decide_what_faces_forward)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0].param[1] = WIDTH / 2.0; /* one focal length */
   put_llff(&rig, 0, 2, 9);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_LLFF && !d.ndc && d.bound > 1);
-  sf_dataset_free(&d);
   rig = row(); /* but one of them stands behind the nearest thing */
   put_llff(&rig, 0, 4, 40);
   ck_ok(sf_make_dir(in("sparse/0")));
-  load(&d, "train");
+  reload("train");
   ck_assert(d.ndc && d.warnings == 0);
-  sf_dataset_free(&d);
   rig.view[3].to_world[3] += 3.5;
   put_llff(&rig, 0, 4, 40);
-  load(&d, "train");
+  reload("train");
   ck_assert(!d.ndc);
-  sf_dataset_free(&d);
   rig = row(); /* or so far aside that it cannot see what the others see */
   rig.view[3].to_world[7] += 1e5;
   put_llff(&rig, 0, 4, 40);
-  load(&d, "train");
+  reload("train");
   ck_assert(!d.ndc);
-  sf_dataset_free(&d);
 }
 
 /* Both files there: forward-facing poses are read for their depths, others for their lenses; transforms.json always. */
 TEST(one_layout_wins_and_says_so)
 {
   layout_rig rig = row();
-  sf_dataset d;
   put_llff(&rig, 0, 4, 40), put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, 4 * WIDTH, 4 * HEIGHT, 255);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_LLFF && d.warnings == 1 && strstr(d.warning[0], "poses_bounds.npy is used"));
-  sf_dataset_free(&d);
   put_llff(&rig, 0, 0.001, 40); /* nothing is behind so near a plane */
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1 && strstr(d.warning[0], "COLMAP model is used"));
-  sf_dataset_free(&d);
   put_picture("images/zz.png", 4 * WIDTH, 4 * HEIGHT, 9, 255); /* that COLMAP did not register */
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1);
-  sf_dataset_free(&d);
   rig.lens[0].param[1] = rig.lens[0].param[0];
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_INGP && d.warnings == 1 && strstr(d.warning[0], "transforms.json is used"));
-  sf_dataset_free(&d);
 }
 
 TEST(pictures_of_the_size_asked_for)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   static const struct {
     int downscale, width;
   } asked[] = {{1, 32}, {2, 16}, {4, 8}, {8, 4}};
@@ -355,7 +332,7 @@ TEST(pictures_of_the_size_asked_for)
   put_pictures("images", &rig, 32, 24, 255), put_pictures("images_2", &rig, 16, 12, 255);
   put_pictures("images_4", &rig, 8, 6, 255);
   for (int i = 0; i < 4; i++) {
-    ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = asked[i].downscale}));
+    ck_ok(reload_as("test", &(sf_dataset_options){.downscale = asked[i].downscale}));
     ck_assert_int_eq(d.view[0].camera.width, asked[i].width);
     ck_assert_int_eq(strncmp(d.view[0].name,
                              i == 0   ? "images/"
@@ -365,50 +342,42 @@ TEST(pictures_of_the_size_asked_for)
                      0);
     ck_assert_float_eq(d.view[0].camera.fx, 20 * (float)asked[i].width / 32);
     same_rays(&d, &rig);
-    sf_dataset_free(&d);
   }
   /* photographs of 4000 pixels are not what anybody means: the first folder not above 1600 */
   rig.lens[0].width = 4000, rig.lens[0].height = 3000;
   put_colmap("sparse/0", &rig, 0);
-  ck_ok(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(reload_as("test", NULL));
   ck_assert(d.view[0].camera.width == 8 && d.downscale == 0);
-  sf_dataset_free(&d);
-  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
   ck_assert(d.view[0].camera.width == 32 && d.downscale == 1);
-  sf_dataset_free(&d);
 }
 
 /* In the one size that the camera took: shrunk by the smallest factor that brings them to 1600 pixels. */
 TEST(photographs_are_shrunk_unasked)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0].width = 3301, rig.lens[0].height = 40;
   rig.lens[0].param[0] = rig.lens[0].param[1] = 3000;
   rig.lens[0].param[2] = 1650, rig.lens[0].param[3] = 20;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, 3301, 40, 255);
-  ck_ok(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(reload_as("test", NULL));
   ck_assert_int_eq(d.view[0].camera.width, 1100);
   ck_assert_int_eq(d.view[0].camera.height, 13);
   ck_assert_float_eq_tol(d.view[0].camera.fx, 1000, 1e-3f);
   rig.lens[0].width = 3300, rig.lens[0].height = 39; /* what fills whole boxes of 3 x 3 */
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
-  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[0].camera.width, 3301);
-  sf_dataset_free(&d);
-  ck_ok(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 20}));
   ck_assert_int_eq(d.view[0].camera.width, 165);
   rig.lens[0].height = 40;
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
 
 LOOP_TEST(each_picture_has_its_own_camera, 2)
 {
   layout_rig rig = orbit();
-  OWNED(sf_dataset) d;
   rig.lenses = 3;
   rig.lens[1] = (layout_lens){2, 0, "SIMPLE_PINHOLE", 8, 20, 3, {11, 4, 10}};
   rig.lens[2] = (layout_lens){900, 4, "OPENCV", 24, 10, 8, {25, 26, 12, 5, 0, 0, 0, 0}};
@@ -420,9 +389,9 @@ LOOP_TEST(each_picture_has_its_own_camera, 2)
     snprintf(name, sizeof name, "images/%s", rig.view[v].name);
     put_picture(name, rig.lens[v % 3].width, rig.lens[v % 3].height, v, 255);
   }
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.count, VIEWS - 3);
   same_rays(&d, &rig);
 }
 
-ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

@@ -71,11 +71,10 @@ TEST(a_lens_that_folds_is_refused)
   ck_bad(sf_lens_check(&folds, "cameras.bin: camera 3"), SF_E_RANGE, "cameras.bin: camera 3",
          "cannot be undone at pixel");
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0] = (layout_lens){7, 2, "SIMPLE_RADIAL", WIDTH, HEIGHT, 4, {8, 8, 6, -1.2}};
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "camera 7", "cannot be undone");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "camera 7", "cannot be undone");
 }
 
 /* The same picture taken through a lens, by COLMAP's models and by instant-ngp's names: a point is seen where the lens
@@ -87,7 +86,6 @@ LOOP_TEST(lenses_come_from_every_layout, 6)
                                       {7, 4, "OPENCV", WIDTH, HEIGHT, 8, {20, 20, 8, 6, 0.1, -0.05, 0.01, 0.02}}};
   static const float wanted[][4] = {{0.1f, 0, 0, 0}, {0.1f, -0.05f, 0, 0}, {0.1f, -0.05f, 0.01f, 0.02f}};
   layout_rig rig = orbit();
-  OWNED(sf_dataset) d;
   rig.lens[0] = kinds[_i % 3];
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   if (_i < 3) {
@@ -100,7 +98,7 @@ LOOP_TEST(lenses_come_from_every_layout, 6)
     rig.lens[0].param[1] = 20;
     put_json("transforms.json", &rig, more, "images", 0, 1);
   }
-  load(&d, "train");
+  reload("train");
   const sf_camera *c = &d.view[0].camera;
   ck_assert_str_eq(d.view[0].lens, kinds[_i % 3].name);
   ck_assert(c->k1 == wanted[_i % 3][0] && c->k2 == wanted[_i % 3][1]);
@@ -108,4 +106,4 @@ LOOP_TEST(lenses_come_from_every_layout, 6)
   ck_assert(c->fx == 20 && c->fy == 20 && c->cx == 8 && c->cy == 6);
 }
 
-ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

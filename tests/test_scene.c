@@ -76,20 +76,21 @@ static void put_picture(const char *name, int width, int height, int value)
   sf_image_free(&image);
 }
 
-static sf_status load(sf_dataset *data, const char *json, const char *split, sf_dataset_options options)
+static sf_dataset d; /* what a test looks at */
+
+static sf_status load(const char *json, const char *split, sf_dataset_options options)
 {
+  sf_dataset_free(&d);
   if (json) put_text(in("transforms_train.json"), json);
   if (json) put_text(in("transforms_test.json"), json);
-  return sf_dataset_load(data, folder, split, &options);
+  return sf_dataset_load(&d, folder, split, &options);
 }
 
 TEST(loads_camera_angle)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
-  ck_ok(load(&d,
-             "{" ANGLE
+  ck_ok(load("{" ANGLE
              "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
              "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.count, 2);
@@ -109,12 +110,10 @@ TEST(loads_camera_angle)
 
 TEST(options_and_stated_intrinsics)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
   /* stated for 16 x 8, the pictures are half of that; frame b has a field of view of its own */
-  ck_ok(load(&d,
-             "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
+  ck_ok(load("{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
                  "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
              "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
@@ -122,19 +121,15 @@ TEST(options_and_stated_intrinsics)
   ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 5.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
   ck_assert(d.view[0].camera.to_world[3] == 0.5f && d.view[0].camera.to_world[11] == 1.5f);
-  sf_dataset_free(&d);
-  ck_ok(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
+  ck_ok(load(NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
-  sf_dataset_free(&d);
-  ck_ok(load(&d,
-             "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
+  ck_ok(load("{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
                  "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
                             "}]}",
              "test", (sf_dataset_options){.downscale = 1}));
   ck_assert(d.view[0].camera.fx == 10.0f && d.view[0].camera.fy == 12.0f);
   ck_assert_float_eq_tol(d.view[1].camera.fx, 4, 1e-6f);
   ck_assert_float_eq_tol(d.view[1].camera.fy, 4, 1e-6f);
-  sf_dataset_free(&d);
 }
 
 /* Of 16 x 8 where the pictures have half of that: by one number as by both. */
@@ -145,7 +140,6 @@ TEST(one_side_states_the_size)
   put_picture("a.png", 8, 4, 0);
   for (int i = 0; i < 3; i++) {
     char json[400];
-    OWNED(sf_dataset) d;
     snprintf(json, sizeof json,
              "{%s,\"fl_x\":20,\"cx\":6,\"cy\":5,\"frames\":[" FRAME("a", UNIT) "," FRAME(
                  "a", "[[0,0,1,4],[0,1,0,2],[-1,0,0,0],[0,0,0,1]]") "]}",
@@ -163,7 +157,6 @@ TEST(one_side_states_the_size)
 /* Of the picture that states no size, whatever the first states. */
 TEST(a_later_size_is_looked_at)
 {
-  OWNED(sf_dataset) d;
   put_picture("a.png", 8, 4, 0);
   put_text(in("transforms_train.json"),
            "{" ANGLE "\"frames\":[{\"file_path\":\"a\",\"w\":8,\"h\":4,\"cx\":4,\"transform_matrix\":" UNIT
@@ -194,7 +187,6 @@ TEST(every_eighth_view_is_held_out)
     for (int i = 0; i < 3; i++) ck_assert_uint_eq(test.view[i].image.rgba[0] / 257, (unsigned)(8 * i));
   }
   put_text(in("transforms_train.json"), "{" ANGLE "\"frames\":[" FRAME("v1", UNIT) "]}");
-  sf_dataset d;
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "zero views", "transforms_train.json");
 }
 
@@ -247,31 +239,26 @@ static const struct {
 
 TEST(a_split_is_walked_view_by_view)
 {
-  sf_dataset d;
   put_picture("a.png", 4, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("./a", UNIT) "," FRAME("a.png", UNIT) "]}";
   static const char *const name[] = {"a", "a", "a.png"};
   for (int i = 0; i < 3; i++) {
-    ck_ok(load(&d, json, "test", (sf_dataset_options){.first = i, .limit = 1}));
+    ck_ok(load(json, "test", (sf_dataset_options){.first = i, .limit = 1}));
     ck_assert_int_eq(d.count, 1);
     ck_assert_int_eq(d.total, 3);
     ck_assert_str_eq(d.view[0].name, name[i]);
-    sf_dataset_free(&d);
   }
-  ck_ok(load(&d, json, "test", (sf_dataset_options){.first = 1}));
+  ck_ok(load(json, "test", (sf_dataset_options){.first = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[1].name, "a.png");
-  sf_dataset_free(&d);
-  ck_ok(load(&d, json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
+  ck_ok(load(json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
   ck_assert_int_eq(d.count, 0);
   ck_assert_int_eq(d.total, 3);
-  sf_dataset_free(&d);
-  ck_bad(load(&d, json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
+  ck_bad(load(json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
 }
 
 LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 4, 7);
   char *data;
@@ -282,18 +269,16 @@ LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
   fwrite(data, 1, n - 20, f);
   fclose(f);
   free(data);
-  ck_bad(load(&d, bad_scenes[_i].json, "train", (sf_dataset_options){.downscale = 1}), bad_scenes[_i].code,
+  ck_bad(load(bad_scenes[_i].json, "train", (sf_dataset_options){.downscale = 1}), bad_scenes[_i].code,
          bad_scenes[_i].where, bad_scenes[_i].problem);
   ck_assert_ptr_null(d.view);
 }
 
 TEST(own_sizes_may_differ)
 {
-  OWNED(sf_dataset) d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 6, 7);
-  ck_ok(load(&d,
-             "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
+  ck_ok(load("{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
              "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
              "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[1].camera.height, 6);
@@ -301,18 +286,23 @@ TEST(own_sizes_may_differ)
 
 TEST(folder_and_option_faults)
 {
-  sf_dataset d;
   ck_bad(sf_dataset_load(&d, in("none"), "train", NULL), SF_E_IO, "/none", "no such folder");
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, folder, "transforms.json");
   ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "transforms_val.json", "no such file");
   put_picture("a.png", 8, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "]}";
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 5}), SF_E_RANGE, "a.png", "8 x 4");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 5}), SF_E_RANGE, "a.png", "8 x 4");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",
          "not finite");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
 }
 
-ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+static void tear_down(void)
+{
+  sf_dataset_free(&d);
+  remove_folder();
+}
+
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};
