@@ -42,4 +42,13 @@ static inline const char *in(const char *name)
   return p;
 }
 
+/* Without the syncing of sf_write_file, which would dominate loops of them. */
+static inline void put_file(const char *path, const void *data, size_t n)
+{
+  unlink(path); /* some file systems sync a file that is cut and written again */
+  FILE *f = fopen(path, "wb");
+  ck_assert_ptr_nonnull(f);
+  ck_assert_uint_eq(fwrite(data, 1, n, f), n);
+  ck_assert_int_eq(fclose(f), 0);
+}
 #endif

@@ -4,7 +4,6 @@
 #include "base/io.h"
 #include "folder_fixture.h"
 #include "base/rng.h"
-#include <dirent.h>
 #include <math.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -13,15 +12,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-static void put(const char *path, const void *data, size_t n)
-{
-  unlink(path); /* some file systems sync a file that is cut and written again */
-  FILE *f = fopen(path, "wb");
-  ck_assert_ptr_nonnull(f);
-  ck_assert_uint_eq(fwrite(data, 1, n, f), n);
-  ck_assert_int_eq(fclose(f), 0);
-}
 
 /* ---- status ---- */
 
@@ -232,7 +222,7 @@ static const struct {
 LOOP_TEST(json_faults_name_line_and_column, COUNT(bad_json))
 {
   cJSON *json;
-  put(in("bad.json"), bad_json[_i].text, strlen(bad_json[_i].text));
+  put_file(in("bad.json"), bad_json[_i].text, strlen(bad_json[_i].text));
   ck_bad(sf_json_load(in("bad.json"), &json), SF_E_FORMAT, bad_json[_i].place, bad_json[_i].problem);
   ck_assert_ptr_null(json);
 }
@@ -240,7 +230,7 @@ LOOP_TEST(json_faults_name_line_and_column, COUNT(bad_json))
 TEST(json_with_a_zero_byte)
 {
   cJSON *json;
-  put(in("bad.json"), "{}\0{}", 5);
+  put_file(in("bad.json"), "{}\0{}", 5);
   ck_bad(sf_json_load(in("bad.json"), &json), SF_E_FORMAT, "bad.json:1:3", "NUL");
 }
 
@@ -318,7 +308,7 @@ static void put_tensors(const char *header, size_t data_bytes)
   uint64_t n = strlen(header);
   memcpy(file, &n, 8);
   memcpy(file + 8, header, n);
-  put(in("bad"), file, 8 + n + data_bytes);
+  put_file(in("bad"), file, 8 + n + data_bytes);
 }
 
 #define W(shape, offsets) "{\"w\":{\"dtype\":\"F32\",\"shape\":" shape ",\"data_offsets\":" offsets "}}"
@@ -373,12 +363,12 @@ TEST(tensors_header_length)
 {
   sf_tensors set;
   uint64_t n = 100000001;
-  put(in("bad"), "1234567", 7);
+  put_file(in("bad"), "1234567", 7);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "too short", "/bad");
-  put(in("bad"), &n, 8);
+  put_file(in("bad"), &n, 8);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "limit", "/bad");
   n = 10;
-  put(in("bad"), &n, 8);
+  put_file(in("bad"), &n, 8);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "cut short", "/bad");
 }
 
@@ -393,7 +383,7 @@ TEST(tensors_survive_damage)
   sf_tensors set;
   ck_ok(sf_read_file(in("t"), 10000, &data, &n));
   for (size_t i = 0; i < n; i++) {
-    put(in("bad"), data, i);
+    put_file(in("bad"), data, i);
     sf_status s = sf_tensors_load(&set, in("bad"));
     ck_assert_msg(s.code == SF_E_FORMAT, "cut to %zu bytes: code %d", i, s.code);
   }
@@ -401,7 +391,7 @@ TEST(tensors_survive_damage)
     char *copy = malloc(n);
     memcpy(copy, data, n);
     copy[sf_random_below(1, 0, i, n)] = (char)sf_random_u64(1, 1, i);
-    put(in("bad"), copy, n);
+    put_file(in("bad"), copy, n);
     if (sf_tensors_load(&set, in("bad")).code == SF_OK) sf_tensors_free(&set);
     free(copy);
   }
@@ -418,7 +408,7 @@ TEST(tensors_unaligned_file)
   memcpy(file, &n, 8);
   memcpy(file + 8, header, n);
   memcpy(file + 8 + n, "\x07\0\0\x80\x3f", 5);
-  put(in("t"), file, 8 + n + 5);
+  put_file(in("t"), file, 8 + n + 5);
   OWNED(sf_tensors) set;
   const sf_tensor *t;
   const int64_t one = 1;

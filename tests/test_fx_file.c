@@ -16,15 +16,6 @@ static void save(const fx_scene *scene)
   ck_ok(fx_scene_save(scene, path));
 }
 
-/* Without the fsync of sf_write_file: some thousand times. */
-static void put(const char *data, size_t size)
-{
-  FILE *file = fopen(path, "wb");
-  ck_assert_ptr_nonnull(file);
-  ck_assert_uint_eq(fwrite(data, 1, size, file), size);
-  ck_assert_int_eq(fclose(file), 0);
-}
-
 static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -85,7 +76,7 @@ TEST(cut_short_anywhere)
   save(&scene);
   ck_ok(sf_read_file(path, 1 << 24, &data, &size));
   for (size_t keep = 0; keep < size; keep += keep < 4000 ? 13 : 997) {
-    put(data, keep);
+    put_file(path, data, keep);
     const sf_status status = fx_scene_load(&again, path);
     ck_assert_msg(status.code != SF_OK && strstr(status.message, path), "%zu of %zu bytes load", keep, size);
   }
@@ -106,7 +97,7 @@ TEST(edited_anywhere)
         i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
     const char kept = data[at];
     data[at] = (char)(kept ^ (1 << fixture_pick(1, 2, i, 0, 7)));
-    put(data, size);
+    put_file(path, data, size);
     const sf_status status = fx_scene_load(&again, path);
     if (status.code == SF_OK) { /* only white space of the header's JSON may differ */
       assert_equal_scenes(&scene, &again);

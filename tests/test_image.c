@@ -4,7 +4,6 @@
 #include "base/io.h"
 #include "folder_fixture.h"
 #include "base/rng.h"
-#include <dirent.h>
 #include <math.h>
 #include <png.h>
 #include <signal.h>
@@ -150,16 +149,6 @@ TEST(png_round_trip_rounds_to_nearest)
   ck_assert_uint_eq(b.rgba[2], 257);
 }
 
-/* Without the syncing of sf_write_file, which would dominate the loops below. */
-static void put(const char *path, const void *data, size_t n)
-{
-  unlink(path); /* some file systems sync a file that is cut and written again */
-  FILE *f = fopen(path, "wb");
-  ck_assert_ptr_nonnull(f);
-  ck_assert_uint_eq(fwrite(data, 1, n, f), n);
-  ck_assert_int_eq(fclose(f), 0);
-}
-
 /* Cut at every length, and one byte wrong at every place: never a crash, and a cut file is always refused. */
 static void damage(const char *path, sf_code code, sf_status (*load)(const char *), bool refuse_flips)
 {
@@ -167,7 +156,7 @@ static void damage(const char *path, sf_code code, sf_status (*load)(const char 
   size_t n;
   ck_ok(sf_read_file(path, 1 << 20, &data, &n));
   for (size_t i = 0; i < n; i++) {
-    put(in("bad"), data, i);
+    put_file(in("bad"), data, i);
     sf_status s = load(in("bad"));
     ck_assert_msg(s.code == code, "cut to %zu of %zu bytes: code %d %s", i, n, s.code, s.message);
     ck_assert_msg(strstr(s.message, "/bad"), "'%s' does not name the file", s.message);
@@ -175,7 +164,7 @@ static void damage(const char *path, sf_code code, sf_status (*load)(const char 
   for (size_t i = 0; i < n; i++) {
     char right = data[i];
     data[i] ^= (char)(1 + sf_random_below(4, 0, i, 255));
-    put(in("bad"), data, n);
+    put_file(in("bad"), data, n);
     data[i] = right;
     sf_status s = load(in("bad"));
     ck_assert_msg(!refuse_flips || s.code != SF_OK, "byte %zu wrong: accepted", i);

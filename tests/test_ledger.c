@@ -27,6 +27,9 @@ static sf_status load_text(sf_technology *tech, const char *text)
   return sf_technology_load(tech, in("t.tech"));
 }
 
+static sf_technology tech; /* the plain one */
+static sf_ledgers *l;      /* of the small net, priced by it */
+
 static sf_technology plain_technology(void)
 {
   sf_technology tech;
@@ -172,8 +175,6 @@ static sf_ledgers *small_ledgers(const sf_technology *tech)
 
 TEST(paper_ledger_is_the_papers_metric)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const fx_net net = small_net();
   const fx_counts c = small_counts(&net);
   ck_assert_uint_eq(l->total[SF_LEDGER_PAPER], sf_energy_fj(&c));
@@ -187,14 +188,11 @@ TEST(paper_ledger_is_the_papers_metric)
   ck_assert_double_eq_tol(l->saving[SF_LEDGER_PAPER], 37.0709, 1e-4);
   ck_assert(!l->interpolated[SF_LEDGER_PAPER]);
   ck_assert(isnan(l->saving[SF_LEDGER_INT]));
-  free(l);
 }
 
 /* Sums are as wide as they get: D1 8 + 11 + 2 bits, C1 8 + 11 + 3; D2 and C2 8 + 2, C3 8 + 3. */
 TEST(width_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_D1][0], 12 * (96 + 21));
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][0], 20 * (96 + 22));
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][1], 8 * (96 + 22));
@@ -205,13 +203,10 @@ TEST(width_ledger_by_hand)
   ck_assert_uint_eq(l->part[SF_LEDGER_WIDTH][SF_PART_SOP], 12 * 10 + 10 * 10 + 18 * 11);
   ck_assert(l->interpolated[SF_LEDGER_WIDTH]);
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 76 * (64 + 32)); /* every synapse once: 1 ray of 1 sample */
-  free(l);
 }
 
 TEST(memory_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const uint64_t *part = l->part[SF_LEDGER_MEMORY], *twin = l->part[SF_LEDGER_INT_MEMORY];
   /* bytes by hand in test_audit.c: weights 12 + 9 + 28 + 10 + 15; state 27 + 12 + 36 + 45 + 36 */
   ck_assert_uint_eq(part[SF_PART_WEIGHT], 74 * 10);
@@ -225,13 +220,10 @@ TEST(memory_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_WEIGHT], 76 * 10);
   ck_assert_uint_eq(twin[SF_PART_STATE], 2 * (3 + 2 + 4 + 5) * 10); /* D1, h, C1, C2 written and read */
   ck_assert_uint_eq(twin[SF_PART_TABLE], 100 * 10);
-  free(l);
 }
 
 TEST(neuron_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const uint64_t *part = l->part[SF_LEDGER_NEURON], *twin = l->part[SF_LEDGER_INT_ALL];
   /* 24 spiking updates, 2 of density (28 bits), 6 of colour (20 bits); leak of 13 bits */
   ck_assert_uint_eq(part[SF_PART_NEURON], 24 * (24 * 13 + 4 * 24) + 2 * (28 * 13 + 2 * 28) + 6 * (20 * 13 + 2 * 20));
@@ -241,7 +233,6 @@ TEST(neuron_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_NEURON], 14 * (32 * 16 + 32));
   ck_assert_uint_eq(twin[SF_PART_SPECIAL], 1 * (32 * 16 + 192 + 2 * 28 + 80) + 3 * (32 * 16 + 192 + 2 * 20 + 80) +
                                                1 * (20 * 16 + 192 + 2 * 20 + 80));
-  free(l);
 }
 
 TEST(cells_and_parts_add_up)
@@ -279,8 +270,6 @@ TEST(cells_and_parts_add_up)
 /* At the break-even rate, counts scaled to it cost what the twin costs. */
 TEST(break_even_rate_breaks_even)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_double_eq_tol(l->rate, 0.5, 1e-12); /* 12 spikes in 24 updates */
   const sf_break_even *paper = &l->break_even[SF_LEDGER_PAPER];
   ck_assert_int_eq(paper->twin, SF_LEDGER_ANN);
@@ -296,13 +285,10 @@ TEST(break_even_rate_breaks_even)
       ck_assert_double_eq_tol(total - spikes + spikes * b->rate / l->rate, twin, 1e-6 * twin);
   }
   ck_assert_int_eq(l->break_even[SF_SPIKING_LEDGERS].twin, SF_LEDGER_ANN);
-  free(l);
 }
 
 TEST(sensitivity_is_the_saving_at_other_prices)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_int_eq(l->sensitivities, 9);
   bool seen[9] = {false};
   for (int i = 0; i < l->sensitivities; i++) {
@@ -324,13 +310,11 @@ TEST(sensitivity_is_the_saving_at_other_prices)
   }
   for (int i = 0; i < 9; i++) ck_assert(seen[i]);
   ck_assert_double_gt(l->sensitivity[0].swing, 1);
-  free(l);
 }
 
 /* A net without density layers: a decoder whose inputs all come with the sample. */
 TEST(a_decoder_alone_has_no_density_rows)
 {
-  const sf_technology tech = plain_technology();
   fx_net net = {.steps = 1};
   fx_counts c = {.samples = 2, .rays = 1};
   static const int size[SF_LAYERS][2] = {{0, 0}, {0, 0}, {150, 128}, {128, 128}, {128, 3}};
@@ -349,7 +333,6 @@ TEST(a_decoder_alone_has_no_density_rows)
 
 TEST(too_much_energy_is_refused)
 {
-  const sf_technology tech = plain_technology();
   const fx_net net = small_net();
   fx_counts c = small_counts(&net);
   sf_ledgers *l = malloc(sizeof *l);
@@ -364,8 +347,6 @@ TEST(too_much_energy_is_refused)
 
 TEST(report_and_json_show_every_ledger)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   char *text = NULL;
   size_t size;
   FILE *out = open_memstream(&text, &size);
@@ -390,7 +371,20 @@ TEST(report_and_json_show_every_ledger)
     ck_assert_double_eq(cJSON_GetArrayItem(c1, 1)->valuedouble, (double)l->cell[g][FX_C1][1]);
   }
   cJSON_Delete(json);
-  free(text), free(l);
+  free(text);
 }
 
-ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+static void set_up(void)
+{
+  make_folder();
+  tech = plain_technology();
+  l = small_ledgers(&tech);
+}
+
+static void tear_down(void)
+{
+  free(l);
+  remove_folder();
+}
+
+ck_options ck_program = {.set_up = set_up, .tear_down = tear_down};

@@ -40,19 +40,18 @@ static void write_audit(const char *scene, const char *run, const char *file, do
   write_text(path, text);
 }
 
-static void load(void)
+static void load_from(const char *path)
 {
   sf_reproduction_free(&report);
-  ck_ok(sf_reproduction_load(&report, folder));
+  ck_ok(sf_reproduction_load(&report, path));
 }
 
-static void setup(void)
+static void load(void)
 {
-  make_folder();
-  report = (sf_reproduction){0};
+  load_from(folder);
 }
 
-static void teardown(void)
+static void tear_down(void)
 {
   sf_reproduction_free(&report);
   remove_folder();
@@ -300,7 +299,7 @@ TEST(pairs)
       "scenes/a/beta-1e-6/train.json",
       "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
   write_text("scenes/b/beta-1e-7/status", "failed: no memory\n");
-  ck_ok(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
   ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
@@ -318,16 +317,14 @@ TEST(pairs)
   contains("table.md", "without stage I", false);
   write_text("scenes/b/beta-1e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
-  sf_reproduction_free(&report);
-  ck_ok(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   ck_assert_int_eq(report.problems, 2);
   ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-1e-7/cosim.json: RTL and fixed-point core differ: 1 of 100"));
   ck_assert_ptr_null(strstr(report.problem[0], folder)); /* no path of this machine */
   cJSON *json = sf_reproduction_json(&report);
   ck_assert(!cJSON_HasObjectItem(json, "average") && !cJSON_HasObjectItem(json, "order"));
   cJSON_Delete(json);
-  sf_reproduction_free(&report);
-  ck_ok(sf_reproduction_load(&report, in("scenes/.")));
+  load_from(in("scenes/."));
   ck_assert_str_eq(report.profile, "scenes");
 }
 
@@ -383,8 +380,7 @@ TEST(many_scenes)
     snprintf(name, sizeof name, "scenes/s%02d", i);
     write_run(name, "beta-5e-7", 20 + i, 2);
   }
-  sf_reproduction_free(&report);
-  ck_ok(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   print();
   for (int i = 0; i < 60; i++) {
     snprintf(row, sizeof row, "\n| s%02d ", i);
@@ -392,4 +388,4 @@ TEST(many_scenes)
   }
 }
 
-ck_options ck_program = {.set_up = setup, .tear_down = teardown};
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

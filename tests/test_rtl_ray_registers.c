@@ -300,34 +300,51 @@ TEST(accesses_without_a_pause)
   ck_assert_int_gt(asked, 400);
 }
 
+/* In which cycle of twelve a sample out of order was taken that is offered in cycle `beat`, and a write that is offered
+ * from cycle `write` on; -1: not at all. */
+typedef struct beside {
+  int accepted, written;
+} beside;
+
+static beside error_beside_write(sf_dut *dut, registers *r, uint32_t offset, uint32_t value, int beat, int write)
+{
+  sf_pins_in *in = &dut->in;
+  beside at = {-1, -1};
+  soft_reset_both(dut, r);
+  write_both(dut, r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
+  in->awaddr = offset, in->wdata = value, in->wstrb = WHOLE, in->bready = true, in->ray_user = false;
+  for (int cycle = 0; cycle < 12; cycle++) {
+    in->ray_valid = cycle == beat;
+    in->awvalid = in->wvalid = at.written < 0 && cycle >= write;
+    sf_dut_tick(dut);
+    if (in->ray_valid && dut->out.ray_ready) at.accepted = cycle;
+    if (in->awvalid && dut->out.awready) at.written = cycle;
+  }
+  in->bready = false;
+  ck_assert_int_ge(at.written, write);
+  return at;
+}
+
+static sf_dut *begin_quietly(uint64_t seed, registers *r)
+{
+  sf_dut *dut = begin(seed);
+  dut->each_cycle = NULL, dut->stall_percent = 0;
+  program_legal(dut, r, &(random_source){seed, 0});
+  return dut;
+}
+
 /* An error that comes while RAY_ERROR is written, in every cycle around it: cleared if it was there, else kept. */
 TEST(an_error_beside_its_clearing)
 {
   int kept = 0, cleared = 0;
-  OWNED(sf_dut) *dut = begin(230);
-  dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
-  random_source s = {230, 0};
-  program_legal(dut, &r, &s);
+  OWNED(sf_dut) *dut = begin_quietly(230, &r);
   for (int beat = 0; beat < 6; beat++)
     for (int write = 0; write < 6; write++) {
-      sf_pins_in *in = &dut->in;
-      int accepted = -1, written = -1;
-      soft_reset_both(dut, &r);
-      write_both(dut, &r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
-      in->awaddr = SF_CSR_RAY_ERROR, in->wdata = 0xf, in->wstrb = WHOLE, in->bready = true, in->ray_user = false;
-      for (int cycle = 0; cycle < 12; cycle++) {
-        in->ray_valid = cycle == beat;
-        in->awvalid = in->wvalid = written < 0 && cycle >= write;
-        sf_dut_tick(dut);
-        if (in->ray_valid && dut->out.ray_ready) accepted = cycle;
-        if (in->awvalid && dut->out.awready) written = cycle;
-      }
-      in->bready = false;
-      ck_assert_int_eq(accepted, beat);
-      ck_assert_int_ge(written, write);
-      ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), accepted >= written ? SF_CSR_RAY_ERROR_ORDER : 0);
-      *(accepted >= written ? &kept : &cleared) += 1;
+      const beside at = error_beside_write(dut, &r, SF_CSR_RAY_ERROR, 0xf, beat, write);
+      ck_assert_int_eq(at.accepted, beat);
+      ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), at.accepted >= at.written ? SF_CSR_RAY_ERROR_ORDER : 0);
+      *(at.accepted >= at.written ? &kept : &cleared) += 1;
     }
   ck_assert(kept > 5 && cleared > 5);
 }
@@ -336,28 +353,12 @@ TEST(an_error_beside_its_clearing)
 TEST(an_error_beside_a_soft_reset)
 {
   int together = 0;
-  OWNED(sf_dut) *dut = begin(231);
-  dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
-  random_source s = {231, 0};
-  program_legal(dut, &r, &s);
+  OWNED(sf_dut) *dut = begin_quietly(231, &r);
   for (int beat = 0; beat < 6; beat++)
     for (int write = 0; write < 6; write++) {
-      sf_pins_in *in = &dut->in;
-      bool written = false;
-      soft_reset_both(dut, &r);
-      write_both(dut, &r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
-      in->awaddr = SF_CSR_CTRL, in->wdata = SF_CSR_CTRL_SOFT_RESET, in->wstrb = WHOLE, in->bready = true;
-      in->ray_user = false;
-      for (int cycle = 0; cycle < 12; cycle++) {
-        in->ray_valid = cycle == beat;
-        in->awvalid = in->wvalid = !written && cycle >= write;
-        sf_dut_tick(dut);
-        together += in->ray_valid && dut->out.ray_ready && in->awvalid && dut->out.awready;
-        written |= in->awvalid && dut->out.awready;
-      }
-      in->bready = false;
-      ck_assert(written);
+      const beside at = error_beside_write(dut, &r, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET, beat, write);
+      together += at.accepted == at.written;
       ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
