@@ -8,6 +8,8 @@
 #include "base/status.h"
 #include <check.h>
 #include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* A program that needs other values than these defines the variable. */

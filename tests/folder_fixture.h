@@ -3,9 +3,6 @@
 #define SF_TESTS_FOLDER_FIXTURE_H
 #include "ck_run.h"
 #include <dirent.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 static char folder[200];

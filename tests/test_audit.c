@@ -9,7 +9,6 @@
 #include "tests/fx_tensorf_fixture.h"
 #include <math.h>
 #include <omp.h>
-#include <unistd.h>
 
 /* ---- counts and their price ---- */
 

@@ -4,8 +4,6 @@
 #include "quant/quant.h"
 #include "tests/float_fixture.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SHORT = 200000 };
 

@@ -3,8 +3,6 @@
 #include "float_fixture.h"
 #include "snn/kernels.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* torch-ngp at bound 1: 16 levels, 2^19, 16..2048: 6 119 864 entries, dense up to 59, hashed from 81. */
 TEST(layout_is_torch_ngp)

@@ -3,7 +3,6 @@
 #include "base/io.h"
 #include "scene_file_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
-#include <stdio.h>
 
 static fx_scene small_scene(uint64_t seed)
 {

@@ -11,7 +11,6 @@
 #include "tests/scene_file_fixture.h"
 #include "tests/tensorf_fixture.h"
 #include <math.h>
-#include <stdio.h>
 
 /* ---- units ---- */
 

@@ -5,7 +5,6 @@
 #include "fx_hard_cases.h"
 #include "src/fx/core.h"
 #include "src/fx/net.h"
-#include <stdio.h>
 
 static const char *const instruction_sets[] = {"avx2", "avx512vnni", "amx"};
 

@@ -7,12 +7,7 @@
 #include <math.h>
 #include <png.h>
 #include <signal.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
-#include <unistd.h>
 #include <jpeglib.h>
 
 /* ---- PNG ---- */

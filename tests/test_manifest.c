@@ -6,7 +6,6 @@
 #include "base/io.h"
 #include "golden/manifest.h"
 #include <math.h>
-#include <stdbool.h>
 
 static const fx_net net = {.steps = 2};
 

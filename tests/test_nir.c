@@ -1,6 +1,5 @@
 /* NIR graphs read back with libhdf5 and simulated as their nodes, edges and metadata say: the spikes, membranes and
  * outputs of the core and of the float oracle. */
-#include <stdio.h>
 #ifdef SF_HDF5
 #include "ck_run.h"
 #include "exchange/exchange.h"

@@ -7,9 +7,6 @@
 #include "src/scene/stage.h"
 #include <math.h>
 #include <omp.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 
 /* ---- shapes ---- */

@@ -6,9 +6,6 @@
 #include "src/quant/internal.h"
 #include <math.h>
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static float normal(uint64_t stream, uint64_t i)
 {

@@ -3,7 +3,6 @@
 #include "quant/quant.h"
 #include "base/rng.h"
 #include <math.h>
-#include <stdlib.h>
 
 static float normal(uint64_t stream, uint64_t i)
 {

@@ -4,7 +4,6 @@
 #include "render/composite.h"
 #include "render/march.h"
 #include <math.h>
-#include <string.h>
 
 enum { N = 24 };
 

@@ -88,7 +88,7 @@ static void has_no_direction(sf_dut *dut)
 LOOP_TEST(a_hard_reset_is_enough, 2)
 {
   random_source r = {68, (uint64_t)_i << 32};
-  OWNED(sf_dut) * dut;
+  OWNED(sf_dut) *dut = NULL;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 68 + (uint64_t)_i}));
   for (int trial = 0; trial < 6; trial++) {
     fx_counts counts = {0};

@@ -2,7 +2,6 @@
 #include "ck_run.h"
 #include "firmware/sf_blob.h"
 #include "tests/rtl_fixture.h"
-#include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -31,7 +30,7 @@ static void expect_error(sf_dut *dut, uint32_t bit)
 /* Registers start with random values; a hard reset gives them those of the table. */
 TEST(registers_after_reset)
 {
-  OWNED(sf_dut) * dut;
+  OWNED(sf_dut) *dut = NULL;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \
   if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && SF_CSR_##name != SF_CSR_STATUS)                          \

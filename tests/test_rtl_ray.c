@@ -27,14 +27,7 @@ static sf_ray_dut *open_rays(const fx_scene *scene, uint64_t seed, int stalls)
 
 static void draw_rays(const fx_scene *scene, uint64_t seed)
 {
-  for (uint64_t i = 0; i < RAYS; i++) {
-    float origin[3], direction[3];
-    for (uint64_t a = 0; a < 3; a++) {
-      origin[a] = 6 * sf_random_float(seed, 1, 3 * i + a) - 3;
-      direction[a] = 1.6f * sf_random_float(seed, 2, 3 * i + a) - 0.8f - origin[a];
-    }
-    ck_ok(sf_fx_ray_make(scene, origin, direction, &shared.ray[i]));
-  }
+  for (uint64_t i = 0; i < RAYS; i++) shared.ray[i] = random_ray(scene, seed, i);
 }
 
 static int whole_march(const fx_scene *scene, const fx_ray *ray)

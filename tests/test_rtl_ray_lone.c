@@ -52,7 +52,7 @@ TEST(pixels_that_wait)
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   random_source s = {270, 0};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 23);
-  OWNED(sf_ray_dut) * rays;
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 270}));
   sf_dut *dut = rays->dut;
   const fx_ray ray = some_ray(&scene);
@@ -78,7 +78,7 @@ TEST(every_bit_of_a_position)
   static const fixture_sizes sizes = {16, 64, 16, 9, 64, 64, 4, FX_HYBRID, {0}};
   random_source s = {280, 0};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 24);
-  OWNED(sf_ray_dut) * rays;
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 280}));
   const fx_ray ray = some_ray(&scene);
   int found[3] = {0};

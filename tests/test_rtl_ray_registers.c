@@ -377,12 +377,7 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
   sf_ray_request request[RAYS];
   uint64_t count = 0;
   for (uint64_t i = 0; i < RAYS; i++) {
-    float origin[3], direction[3];
-    for (uint64_t a = 0; a < 3; a++) {
-      origin[a] = 6 * sf_random_float(seed, 1, 3 * i + a) - 3;
-      direction[a] = 1.6f * sf_random_float(seed, 2, 3 * i + a) - 0.8f - origin[a];
-    }
-    ck_ok(sf_fx_ray_make(scene, origin, direction, &ray[i]));
+    ray[i] = random_ray(scene, seed, i);
     ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
     sf_ray_samples(scene, &ray[i], samples[i], (int)expected.samples);
     request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false};
@@ -404,7 +399,7 @@ TEST(the_encoder_is_programmed_by_its_words_alone)
   OWNED(fx_scene) scene = fixture_scene(&sizes, 21);
   scene.step_q24 = 1 << 20;
   memset(scene.occupancy, 0xff, 64);
-  OWNED(sf_ray_dut) * rays;
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 240, .stall_percent = 10}));
   sf_dut *dut = rays->dut;
   for (uint32_t word = 0; word < 8 * 4; word++) { /* of the four levels, and at last the three behind them */
@@ -435,7 +430,7 @@ TEST(active_until_the_pixel_has_left)
   enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
   static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 22);
-  OWNED(sf_ray_dut) * rays;
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 250}));
   sf_dut *dut = rays->dut;
   ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);

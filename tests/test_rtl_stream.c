@@ -3,8 +3,6 @@
 #include "ck_run.h"
 #include "sim/ray/ray.h"
 #include "base/rng.h"
-#include <stdlib.h>
-#include <string.h>
 
 enum { SAMPLES = 9, STEPS = 3, BEATS_MAX = SAMPLES * SF_LAYERS * STEPS + 1, RESULTS = 2 * SAMPLES };
 

@@ -4,8 +4,6 @@
 #include "folder_fixture.h"
 #include "scene/scene.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static void put_text(const char *path, const char *text)
 {

@@ -4,8 +4,6 @@
 #include "base/memory.h"
 #include "render/view.h"
 #include "snn/plif.h"
-#include <stdlib.h>
-#include <string.h>
 
 /* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its
  * fixed point). */

@@ -9,7 +9,6 @@
 #include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include <libgen.h>
-#include <stdio.h>
 #include <unistd.h>
 
 enum { OUTPUT_MAX = 1 << 14, WIDTH = 3, HEIGHT = 2, PIXELS = WIDTH * HEIGHT, INSTRUCTIONS = 300000000 };
@@ -445,7 +444,7 @@ TEST(a_bad_program_file_is_refused)
              {size, 31, 0x7f, "segments is cut short"},
              {60, 0, 0x7f, "segments is cut short"},
              {5000, 0, 0x7f, "is cut short"}};
-  OWNED(sf_dut) * dut;
+  OWNED(sf_dut) *dut = NULL;
   sf_soc *soc;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));

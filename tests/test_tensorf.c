@@ -4,7 +4,6 @@
 #include "folder_fixture.h"
 #include "snn/plif.h"
 #include <math.h>
-#include <string.h>
 
 TEST(inputs_are_tensorf)
 {

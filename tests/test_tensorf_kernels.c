@@ -4,8 +4,6 @@
 #include "base/memory.h"
 #include "render/view.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static const char *const exact[] = {"portable", "avx2", "avx512"};
 

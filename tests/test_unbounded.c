@@ -8,7 +8,6 @@
 #include "src/fx/march.h"
 #include <check.h>
 #include <math.h>
-#include <string.h>
 
 static sf_config large_config(int bound, int res)
 {
