@@ -89,19 +89,12 @@ static fx_scene make_scene(const int32_t res[3], int components, int freqs, uint
   l[FX_C1].n_in = fx_tensorf_inputs(f), l[FX_C1].bias = 300, l[FX_C2].bias = l[FX_C3].bias = 1;
   l[FX_C1].n_out = l[FX_C2].n_in = 48, l[FX_C2].n_out = l[FX_C3].n_in = 32, l[FX_C3].n_out = 3;
   ck_ok(fx_scene_allocate(&scene, "fixture"));
-  int8_t *all[13] = {f->density.plane[0],
-                     f->density.plane[1],
-                     f->density.plane[2],
-                     f->density.line[0],
-                     f->density.line[1],
-                     f->density.line[2],
-                     f->appearance.plane[0],
-                     f->appearance.plane[1],
-                     f->appearance.plane[2],
-                     f->appearance.line[0],
-                     f->appearance.line[1],
-                     f->appearance.line[2],
-                     f->basis};
+  int8_t *all[13];
+  for (int i = 0; i < 3; i++) {
+    all[i] = f->density.plane[i], all[3 + i] = f->density.line[i];
+    all[6 + i] = f->appearance.plane[i], all[9 + i] = f->appearance.line[i];
+  }
+  all[12] = f->basis;
   for (int k = 0; k < 13; k++) {
     const int8_t *end = k < 12 ? all[k + 1] : (int8_t *)scene.occupancy;
     for (int8_t *at = all[k]; at < end; at++)

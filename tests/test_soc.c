@@ -164,6 +164,19 @@ static void free_scenario(scenario *s)
   free(s);
 }
 
+static scenario *s; /* what a test runs; of fixture_ingp if it asks for no other */
+static uint32_t exit_status = 99;
+
+static void set_up(void)
+{
+  s = make_scenario(&fixture_ingp);
+}
+
+static void tear_down(void)
+{
+  free_scenario(s);
+}
+
 /* BUILD/tests/test_soc -> BUILD/firmware/sf_firmware.elf */
 static void firmware_path(char path[4096])
 {
@@ -176,7 +189,7 @@ static uint32_t bus_read(void *context, uint32_t offset);
 static void bus_write(void *context, uint32_t offset, uint32_t value);
 
 /* The firmware on the system; bus_read and bus_write below stand between. */
-static sf_status run_firmware(scenario *s, uint32_t *exit_status)
+static sf_status run_firmware(void)
 {
   char path[4096];
   sf_soc *soc;
@@ -187,7 +200,7 @@ static sf_status run_firmware(scenario *s, uint32_t *exit_status)
   ck_ok(sf_soc_open(&soc, s->dut, &(sf_soc_options){.instructions = INSTRUCTIONS, .uart = keep_output}));
   ck_ok(sf_soc_load_elf(soc, path));
   memcpy(sf_soc_memory(soc, SF_SOC_IMAGE, s->image_size), s->image, s->image_size);
-  const sf_status status = sf_soc_run(soc, exit_status);
+  const sf_status status = sf_soc_run(soc, &exit_status);
   memcpy(s->firmware, sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE) + sf_soc_image_pixels_at(s->image),
          sizeof s->firmware);
   sf_soc_close(soc);
@@ -222,14 +235,13 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
 
 static void same_as_core(const fixture_sizes *sizes, int stall)
 {
-  scenario *s = make_scenario(sizes);
-  uint32_t exit_status = 99;
+  free_scenario(s);
+  s = make_scenario(sizes);
   s->stall = stall;
-  const sf_status status = run_firmware(s, &exit_status);
+  const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
   ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
-  free_scenario(s);
 }
 
 LOOP_TEST(the_firmware_renders_what_the_core_renders, 3)
@@ -264,13 +276,10 @@ static const struct {
 
 LOOP_TEST(a_wrong_device_is_reported, COUNT(wrong_device))
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
   fault = wrong_device[_i].fault, s->offset = wrong_device[_i].offset, s->to = wrong_device[_i].to;
-  ck_ok(run_firmware(s, &exit_status));
+  ck_ok(run_firmware());
   ck_assert_uint_eq(exit_status, 1);
   ck_assert_msg(strstr(output, wrong_device[_i].line), "'%s' is not in '%s'", wrong_device[_i].line, output);
-  free_scenario(s);
 }
 
 static const struct {
@@ -284,36 +293,27 @@ static const struct {
 
 LOOP_TEST(a_driver_that_writes_wrongly_is_seen, COUNT(wrong_write))
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
   fault = wrong_write[_i].fault, s->offset = wrong_write[_i].offset, s->to = wrong_write[_i].to;
-  const sf_status status = run_firmware(s, &exit_status);
+  const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_assert_int_eq(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH).code, SF_E_DIFFERENCE);
   ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
-  free_scenario(s);
 }
 
 TEST(a_bus_without_an_answer_ends_the_run)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status;
   fault = DEAF, s->offset = SF_CSR_CONFIG;
-  ck_bad(run_firmware(s, &exit_status), SF_E_UNSUPPORTED, "read of register 0x008 not answered", "");
-  free_scenario(s);
+  ck_bad(run_firmware(), SF_E_UNSUPPORTED, "read of register 0x008 not answered", "");
 }
 
 /* ---- images ---- */
 
 TEST(a_damaged_image_is_refused)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
   s->image[s->image_size - 1] ^= 1;
-  ck_ok(run_firmware(s, &exit_status));
+  ck_ok(run_firmware());
   ck_assert_uint_eq(exit_status, 1);
   ck_assert_str_eq(output, "spikefield firmware\nerror: image: damaged: wrong checksum\n");
-  free_scenario(s);
 }
 
 static const char *open_edited(const scenario *s, uint8_t *block, size_t space, int word, uint32_t value)
@@ -331,7 +331,6 @@ static const char *open_edited(const scenario *s, uint8_t *block, size_t space, 
 TEST(an_image_stays_inside_its_memory)
 {
   static const uint32_t extreme[] = {0, 1, 7, 8, 255, 256, 257, 0x7fffffff, 0x80000000, 0xfffffff8, 0xffffffff};
-  scenario *s = make_scenario(&fixture_ingp);
   const size_t space = sf_tile_pixels_at((uint32_t)s->image_size) + sizeof s->core;
   uint8_t *block = malloc(space);
   ck_assert_ptr_null(open_edited(s, block, space, -1, 0));
@@ -348,7 +347,6 @@ TEST(an_image_stays_inside_its_memory)
       ck_assert_msg((why == NULL) == less, "word %d = %u: %s", word, extreme[i], why ? why : "taken");
     }
   free(block);
-  free_scenario(s);
 }
 
 TEST(checksums_are_zlibs)
@@ -360,7 +358,6 @@ TEST(checksums_are_zlibs)
 TEST(a_scene_that_the_firmware_cannot_march_is_refused)
 {
   static fx_steps growing;
-  scenario *s = make_scenario(&fixture_ingp);
   fx_scene scene = s->scene;
   uint8_t *image = NULL;
   size_t size;
@@ -371,17 +368,14 @@ TEST(a_scene_that_the_firmware_cannot_march_is_refused)
   const sf_status cascades = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
   ck_assert_str_eq(cascades.message, "the firmware marches through one box with equal steps; the scene has 3 cascades");
   ck_assert_ptr_null(image);
-  free_scenario(s);
 }
 
 TEST(a_tile_that_is_too_large_is_refused)
 {
-  scenario *s = make_scenario(&fixture_ingp);
   uint8_t *image = NULL;
   size_t size;
   ck_assert_int_eq(sf_soc_image_make(&s->scene, s->ray, 4096, 4096, &image, &size).code, SF_E_RANGE);
   ck_assert_ptr_null(image);
-  free_scenario(s);
 }
 
 /* ---- comparison ---- */
@@ -393,10 +387,8 @@ static void expect_audit(const scenario *s, const char *text, const char *reason
 
 TEST(the_comparison_sees_every_change)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status;
   char text[OUTPUT_MAX];
-  ck_ok(run_firmware(s, &exit_status));
+  ck_ok(run_firmware());
   for (char *at = strstr(output, "audit "); at; at = strstr(at + 1, "audit "))
     for (char *c = at; *c != '\n'; c++) {
       const char was = *c;
@@ -415,7 +407,6 @@ TEST(the_comparison_sees_every_change)
     *byte ^= 1;
   }
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
-  free_scenario(s);
 }
 
 /* ---- programs from files ---- */
@@ -464,3 +455,5 @@ TEST(a_bad_program_file_is_refused)
   unlink(path);
   rmdir(folder);
 }
+
+ck_options ck_program = {.set_up = set_up, .tear_down = tear_down};

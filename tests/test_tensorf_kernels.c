@@ -345,30 +345,16 @@ TEST(smooth_parts_of_the_decoder_match_the_slope)
   }
 }
 
-static float distance(const float *a, const float *reference, size_t n)
-{
-  float worst = 0, scale = 0;
-  for (size_t i = 0; i < n; i++) {
-    worst = fmaxf(worst, fabsf(a[i] - reference[i]));
-    scale = fmaxf(scale, fabsf(reference[i]));
-  }
-  return worst / scale;
-}
-
-/* The same forward pass, the backward passes compared; bounds as for the nets of INGP (test_snn.c). */
+/* The same forward pass, the backward passes compared. */
 TEST(backward_of_every_isa_agrees)
 {
-  static const struct {
-    const char *isa;
-    float bound;
-  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}, {"amx", 1e-2f}};
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *portable = sf_kernels_select("portable");
   random_gradient(dc);
   for (int kind = SF_NET_SNN; kind <= SF_NET_ANN; kind++)
     for (int i = 0; i < 4; i++)
       for (int g = 0; g < 2; g++) {
-        const sf_kernels *k = sf_kernels_select(other[i].isa);
+        const sf_kernels *k = sf_kernels_select(backward_bounds[i].isa);
         if (!k) continue;
         const int steps = kind == SF_NET_ANN ? 1 : 8;
         rig a = rig_make(kind, SF_HYBRID, 0, 48, steps, g ? 3 : 0.3f), b = rig_make(kind, SF_HYBRID, 0, 48, steps, 1);
@@ -385,10 +371,11 @@ TEST(backward_of_every_isa_agrees)
           float *x = malloc(2 * n * sizeof *x);
           for (size_t j = 0; j < n; j++) x[j] = grad_at(&b, id, j), x[n + j] = grad_at(&a, id, j);
           const float far = distance(x, x + n, n);
-          ck_assert_msg(far <= other[i].bound, "%s: %s differs by %g", k->name, a.model.param[id].name, (double)far);
+          ck_assert_msg(far <= backward_bounds[i].bound, "%s: %s differs by %g", k->name, a.model.param[id].name,
+                        (double)far);
           free(x);
         }
-        ck_assert_float_le(distance(b.dproduct, a.dproduct, SF_BLOCK * 144), other[i].bound);
+        ck_assert_float_le(distance(b.dproduct, a.dproduct, SF_BLOCK * 144), backward_bounds[i].bound);
         rig_free(&a);
         rig_free(&b);
       }
