@@ -232,7 +232,7 @@ TEST(measure_does_not_depend_on_threads)
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, UINT64_MAX};
-  sf_measure one, four;
+  OWNED(sf_measure) one, four;
   uint64_t hits = 0;
   omp_set_num_threads(1);
   ck_ok(sf_measure_rays(&job, &one));
@@ -252,7 +252,6 @@ TEST(measure_does_not_depend_on_threads)
   ck_assert_uint_eq(hits, one.core.rays);
   ck_assert_uint_gt(one.core.samples, 1000);
   ck_assert_uint_eq(one.core.samples, one.recount.samples);
-  sf_measure_free(&one), sf_measure_free(&four);
 }
 
 TEST(tensorf_is_counted_by_the_same_three)

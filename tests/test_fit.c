@@ -122,9 +122,9 @@ LOOP_TEST(without_effect_changes_no_bit, 3)
 /* A net that never fires keeps one neuron a layer. */
 TEST(something_is_left_of_a_silent_net)
 {
-  fx_scene scene = small_scene(12, FX_HYBRID), trimmed;
+  OWNED(fx_scene) scene = small_scene(12, FX_HYBRID), trimmed;
   for (int l = 0; l < SF_LAYERS; l++) memset(scene.net.layer[l].w, 0, (size_t)scene.net.layer[l].n_in * SF_LANES);
-  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
   const fx_scene *candidate[] = {&scene};
   const sf_fit_job job = {.candidate = candidate, .widths = widest, .candidates = 1, .rays = &rays, .name = "silent"};
   sf_fit_report report;
@@ -132,7 +132,6 @@ TEST(something_is_left_of_a_silent_net)
   for (int l = FX_D1; l <= FX_C2; l++) ck_assert_int_eq(trimmed.net.layer[l].n_out, 1);
   ck_assert_int_eq(trimmed.grid.levels, 1);
   assert_same_pixels(&scene, &trimmed, &rays);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
 }
 
 /* ---- tables ---- */
@@ -151,7 +150,7 @@ static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
 
 TEST(corners_are_all_that_a_position_reads)
 {
-  fx_scene scene = small_scene(13, FX_HYBRID);
+  OWNED(fx_scene) scene = small_scene(13, FX_HYBRID);
   int8_t *all = malloc(2 * (size_t)scene.grid.entries);
   memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
   for (uint64_t i = 0; i < 200; i++) {
@@ -173,12 +172,12 @@ TEST(corners_are_all_that_a_position_reads)
     fx_grid_features(&scene.grid, pos, g, NULL);
     ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
   }
-  free(all), fx_scene_free(&scene);
+  free(all);
 }
 
 TEST(unread_entries_are_not_read)
 {
-  fx_scene scene = small_scene(14, FX_HYBRID);
+  OWNED(fx_scene) scene = small_scene(14, FX_HYBRID);
   memset(scene.occupancy, 0, 64);
   scene.occupancy[9] = 0x21, scene.occupancy[40] = 0x80;
   int8_t *all = malloc(2 * (size_t)scene.grid.entries);
@@ -198,7 +197,7 @@ TEST(unread_entries_are_not_read)
     fx_grid_features(&scene.grid, pos, g, NULL);
     ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
   }
-  free(all), free(cleared), fx_scene_free(&scene);
+  free(all), free(cleared);
 }
 
 static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
@@ -260,9 +259,9 @@ static sf_status fit(const fx_scene *const *candidate, int candidates, const sf_
 
 LOOP_TEST(no_loss_is_no_difference, 3)
 {
-  fx_scene scene = small_scene(16, _i), fitted;
+  OWNED(fx_scene) scene = small_scene(16, _i), fitted;
   spoil(&scene);
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r;
   ck_ok(fit(candidate, 1, &rays, 0, &fitted, &r));
@@ -274,14 +273,13 @@ LOOP_TEST(no_loss_is_no_difference, 3)
   for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(r.dropped[l], 0);
   ck_assert_int_eq(r.dropped_levels + r.smaller_tables, 0);
   ck_assert_int_eq(r.idle_levels, 1);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted);
 }
 
 /* Measured here once more, through the file. */
 TEST(the_bound_is_kept)
 {
-  fx_scene scene = small_scene(17, FX_HYBRID), fitted, loaded;
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(fx_scene) scene = small_scene(17, FX_HYBRID), fitted, loaded;
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   const double bound = 0.5;
   sf_fit_report r;
@@ -299,13 +297,12 @@ TEST(the_bound_is_kept)
   ck_assert_double_le(r.loss_db, bound);
   ck_assert_uint_lt(r.after.energy_fj, r.before.energy_fj); /* the bound was used for something */
   ck_assert_uint_lt(r.after.bytes, r.before.bytes);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted), fx_scene_free(&loaded);
 }
 
 TEST(threads_do_not_matter)
 {
-  fx_scene scene = small_scene(18, FX_HYBRID), a, b;
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(fx_scene) scene = small_scene(18, FX_HYBRID), a, b;
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r, q;
   omp_set_num_threads(1);
@@ -319,7 +316,6 @@ TEST(threads_do_not_matter)
     ck_assert_int_eq(a.net.layer[l].n_in, b.net.layer[l].n_in);
     ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
   }
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&a), fx_scene_free(&b);
 }
 
 /* Of the candidates the last one that is good enough; all is measured against the first. */

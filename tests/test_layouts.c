@@ -67,7 +67,7 @@ LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
   static const char *const training[] = {"transforms.json", "transforms_train.json", "transforms_train.json"};
   static const char *const more[] = {"", "\"aabb_scale\":4,", ""};
   const layout_rig rig = orbit();
-  sf_dataset train, test;
+  OWNED(sf_dataset) train, test;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json(training[_i], &rig, more[_i], "images", 3, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 5);
@@ -79,7 +79,6 @@ LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
   ck_assert_str_eq(test.view[1].name, "images/p05.png");
   same_rays(&train, &rig), same_rays(&test, &rig);
   ck_ok(sf_dataset_agree(&train, &test));
-  sf_dataset_free(&train), sf_dataset_free(&test);
 }
 
 /* A surveyor's coordinates: the metres that floats lose are taken off before. */
@@ -96,7 +95,7 @@ TEST(far_coordinates_lose_nothing)
 TEST(splits_in_other_coordinates_are_refused)
 {
   const layout_rig rig = row();
-  sf_dataset train, test;
+  OWNED(sf_dataset) train, test;
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   load(&train, "train"), load(&test, "test");
@@ -110,7 +109,6 @@ TEST(splits_in_other_coordinates_are_refused)
     ck_bad(sf_dataset_agree(&train, &test), SF_E_FORMAT, "poses_bounds.npy", "other coordinates");
     test = before;
   }
-  sf_dataset_free(&train), sf_dataset_free(&test);
 }
 
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
@@ -254,7 +252,7 @@ LOOP_TEST(forward_facing_rays_are_ndc, 2)
 TEST(forward_facing_poses_are_recentred)
 {
   const layout_rig rig = row();
-  sf_dataset one, other;
+  OWNED(sf_dataset) one, other;
   double sum[12] = {0};
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
@@ -273,7 +271,6 @@ TEST(forward_facing_poses_are_recentred)
   ck_assert_double_eq_tol(sum[1], 0, 1e-6);
   const double *w = one.world;
   ck_assert_double_eq_tol(sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), 1 / (0.75 * 4), 1e-12);
-  sf_dataset_free(&one), sf_dataset_free(&other);
 }
 
 TEST(poses_decide_what_faces_forward)

@@ -175,7 +175,7 @@ LOOP_TEST(reads_back_what_it_wrote, 2)
 
 TEST(the_order_of_the_views_does_not_matter)
 {
-  sf_manifest m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
+  OWNED(sf_manifest) m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
   static const int order[] = {2, 0, 1, 0};
   for (int i = 0; i < 4; i++) ck_ok(sf_manifest_put(&other, &m.view[order[i]]));
   ck_assert_int_eq(other.count, 3);
@@ -184,7 +184,6 @@ TEST(the_order_of_the_views_does_not_matter)
   ck_ok(sf_manifest_save(&m, in("a.json")));
   ck_ok(sf_manifest_save(&other, in("b.json")));
   assert_same_file(in("a.json"), in("b.json"));
-  sf_manifest_free(&m), sf_manifest_free(&other);
 }
 
 TEST(sums_by_hand)
@@ -345,7 +344,7 @@ TEST(origins_differ_by_name)
 
 TEST(a_flipped_pixel_is_located)
 {
-  sf_golden g;
+  OWNED(sf_golden) g;
   ck_ok(sf_golden_create(&g, 20, 18, SF_PLANES));
   for (size_t i = 0; i < 20 * 18; i++) sf_golden_int(&g, SF_PLANE_FX_G)[i] = (uint32_t)i * 77;
   sf_golden_real(&g, SF_PLANE_Z)[3] = 5; /* floats are not compared */
@@ -358,14 +357,13 @@ TEST(a_flipped_pixel_is_located)
   ck_bad(status, SF_E_DIFFERENCE, "plane fx.G, pixel (11, 17) is 27027, here it is 27026", "g.exr");
   ck_bad(sf_golden_compare_file(&g, in("g.exr"), SF_PLANE_FX_G), SF_E_DIFFERENCE, "(11, 17)", "fx.G");
   ck_ok(sf_golden_compare_file(&g, in("g.exr"), SF_PLANE_FX_R));
-  sf_golden small;
+  OWNED(sf_golden) small;
   ck_ok(sf_golden_create(&small, 20, 17, SF_PLANES));
   ck_bad(sf_golden_compare_file(&small, in("g.exr"), -1), SF_E_DIFFERENCE, "20 x 18", "20 x 17");
   small.planes = SF_FLOAT_PLANES;
   ck_ok(sf_golden_save(&small, in("f.exr"), NULL));
   small.planes = SF_PLANES;
   ck_bad(sf_golden_compare_file(&small, in("f.exr"), -1), SF_E_DIFFERENCE, "no integer channel spikes", "f.exr");
-  sf_golden_free(&g), sf_golden_free(&small);
 }
 
 /* The header of an EXR is plain text. */

@@ -271,7 +271,7 @@ TEST(refinement_lowers_the_held_out_error)
 TEST(same_seed_same_bits_any_threads)
 {
   OWNED(sf_model) m = make_model(64, 8, SF_HYBRID);
-  fx_scene a, b;
+  OWNED(fx_scene) a, b;
   sf_quant_report report;
   omp_set_num_threads(1);
   quantise(&m, &a, &report);
@@ -282,7 +282,6 @@ TEST(same_seed_same_bits_any_threads)
     ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
     ck_assert(a.units.current_scale[l] == b.units.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
   }
-  fx_scene_free(&a), fx_scene_free(&b);
 }
 
 TEST(refuses_what_it_cannot_represent)

@@ -312,8 +312,8 @@ static const char *const instruction_sets[] = {"portable", "avx2", "avx512vnni",
 LOOP_TEST(many_rays_equal_single_rays, 4)
 {
   enum { RAYS = 96 };
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   fx_core *core;
   fx_ray ray[RAYS];
   fx_pixel pixel[RAYS];
@@ -340,14 +340,13 @@ LOOP_TEST(many_rays_equal_single_rays, 4)
     ck_assert_uint_gt(all.samples, 1000);
     fx_core_close(core);
   }
-  free_pair(&m, &scene);
 }
 
 /* Fog of one density everywhere: growing intervals take the light that their lengths say. */
 TEST(fog_takes_the_light_of_its_depth)
 {
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   make_pair(8, 16, &m, &scene);
   memset(scene.occupancy, 0xff, sf_config_cells(&m.config) / 8);
   memset(scene.grid.table, 0, (size_t)scene.grid.entries * 2);
@@ -369,7 +368,6 @@ TEST(fog_takes_the_light_of_its_depth)
       ck_assert_double_eq_tol(ldexp(pixel.transmittance, -SF_TRANS_FRAC), exp(-depth * ldexp(1, sigma)), 1e-3);
     }
   }
-  free_pair(&m, &scene);
 }
 
 TEST(files_keep_the_box)
@@ -410,8 +408,8 @@ TEST(fitting_refuses)
 /* Entries that are zeroed because no occupied cell reads them change no ray. */
 TEST(unread_entries_change_no_ray)
 {
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   make_pair(8, 16, &m, &scene);
   for (size_t i = 0; i < sf_config_cells(&m.config) / 8; i++) /* few cells, each in its own byte */
     scene.occupancy[i] = (uint8_t)(sf_random_below(7, 0, i, 10) == 0);
@@ -431,7 +429,6 @@ TEST(unread_entries_change_no_ray)
     samples += after.samples;
   }
   ck_assert_uint_gt(samples, 100);
-  free_pair(&m, &scene);
 }
 
 /* The export of a model shows what the model shows. */
@@ -439,8 +436,8 @@ TEST(fixed_pictures_equal_float_ones)
 {
   enum { RAYS = 400 };
   static float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   const float background[3] = {1, 0.5f, 0};
   double squares = 0;
   make_pair(8, 16, &m, &scene);
@@ -458,7 +455,6 @@ TEST(fixed_pictures_equal_float_ones)
   const double psnr = -10 * log10(squares / (3.0 * RAYS));
   printf("fixed against float, bound 8: %.1f dB\n", psnr);
   ck_assert_double_gt(psnr, 30); /* flips of spikes of an untrained net; a wrong delta or cell costs 15 dB */
-  free_pair(&m, &scene);
 }
 
 ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
