@@ -169,7 +169,7 @@ all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 
 # Tests
 CHECK_LIBS := $(shell pkg-config --libs check 2>/dev/null)
-$(TESTS:%=$B/tests/%): $B/obj/tests/ck_mark.o
+$(TESTS:%=$B/tests/%): $B/obj/tests/ck_main.o $B/obj/tests/ck_mark.o
 $(TESTS:%=$B/tests/%): CHECK_LIBS += -Wl,--wrap=_mark_point
 $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikefield.a
 	@mkdir -p $(@D)

@@ -5,8 +5,6 @@
 #include "ck_run.h"
 #include "base/rng.h"
 #include "src/fx/unit.h"
-#include <stdlib.h>
-#include <string.h>
 
 typedef struct fixture_sizes {
   int levels, d_hidden, d_out, n_dir, c1, c2, steps, mode; /* levels, d_hidden, d_out = 0: a decoder */

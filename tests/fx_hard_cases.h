@@ -54,8 +54,7 @@ static inline void hard_begin(hard *h, const hard_case *c, int variant)
   }
   c->make(h, variant);
   if (c->kind == HARD_REFUSED) return;
-  const sf_status status = fx_scene_check(&h->scene, c->name);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_check(&h->scene, c->name));
 }
 
 static inline void hard_end(hard *h)
@@ -495,8 +494,7 @@ static inline void expect_face(const hard *h, const hard_seen *seen, int variant
 
 static inline void hard_aim(hard *h, const float origin[3], const float direction[3])
 {
-  const sf_status status = sf_fx_ray_make(&h->scene, origin, direction, &h->ray);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_fx_ray_make(&h->scene, origin, direction, &h->ray));
 }
 
 static inline void make_parallel(hard *h, int variant)
@@ -594,7 +592,7 @@ static inline void expect_scale(const hard *h, const hard_seen *seen, int varian
   fx_ray plain;
   (void)variant;
   expect_chord(h, seen, 1);
-  ck_assert_int_eq(sf_fx_ray_make(&h->scene, hard_model_origin, d, &plain).code, SF_OK);
+  ck_ok(sf_fx_ray_make(&h->scene, hard_model_origin, d, &plain));
   ck_assert_int_eq(h->ray.count, plain.count);
   for (int a = 0; a < 3; a++) {
     ck_assert_int_le(llabs(h->ray.origin[a] - plain.origin[a]), 3 << 16);
@@ -629,16 +627,12 @@ static const hard_case hard_cases[] = {
     {"ray_missing_the_box", HARD_RAY, 5, make_missing, expect_missing},
     {"scene_scales_1e-6_and_1e6", HARD_RAY, 2, make_scale, expect_scale},
 };
-enum { HARD_CASES = sizeof hard_cases / sizeof hard_cases[0] };
+enum { HARD_CASES = COUNT(hard_cases) };
 
 /* One Check case per hard case, so that a failure shows its name; `run` gets the index into hard_cases as _i. */
-static inline void hard_add(Suite *suite, const TTest *run)
+static inline void hard_add(const TTest *run)
 {
-  for (int i = 0; i < HARD_CASES; i++) {
-    TCase *tcase = tcase_create(hard_cases[i].name);
-    tcase_set_timeout(tcase, 60);
-    tcase_add_loop_test(tcase, run, i, i + 1);
-    suite_add_tcase(suite, tcase);
-  }
+  for (int i = 0; i < HARD_CASES; i++) tcase_add_loop_test(ck_new_case(hard_cases[i].name), run, i, i + 1);
 }
+#define HARD_TEST(name) REGISTERED_TEST(name, hard_add(name))
 #endif

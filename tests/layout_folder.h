@@ -25,7 +25,7 @@ static inline void put_picture(const char *name, int width, int height, int valu
   sf_image image = {width, height, malloc((size_t)width * (size_t)height * 8)};
   for (int i = 0; i < width * height * 4; i++)
     image.rgba[i] = (uint16_t)((i % 4 < 3 ? value : i < width * 8 ? alpha : 255) * 257);
-  ck_good(sf_image_save_png(&image, in(name)));
+  ck_ok(sf_image_save_png(&image, in(name)));
   sf_image_free(&image);
 }
 
@@ -86,7 +86,7 @@ static inline void put_colmap(const char *dir, const layout_rig *rig, int text)
 {
   static layout_file file;
   char name[100];
-  ck_good(sf_make_dir(in(dir)));
+  ck_ok(sf_make_dir(in(dir)));
   snprintf(name, sizeof name, "%s/cameras.%s", dir, text ? "txt" : "bin");
   layout_cameras(&file, rig, text), put(name, &file);
   snprintf(name, sizeof name, "%s/images.%s", dir, text ? "txt" : "bin");
@@ -98,7 +98,7 @@ static inline void put_colmap(const char *dir, const layout_rig *rig, int text)
 static inline void put_pictures(const char *dir, const layout_rig *rig, int width, int height, int alpha)
 {
   char name[100];
-  ck_good(sf_make_dir(in(dir)));
+  ck_ok(sf_make_dir(in(dir)));
   for (int v = 0; v < rig->views; v++) {
     snprintf(name, sizeof name, "%s/%s", dir, rig->view[v].name);
     put_picture(name, width, height, 10 + v, alpha);
@@ -199,17 +199,35 @@ static inline void same_rays(const sf_dataset *d, const layout_rig *rig)
   }
 }
 
-static inline void load(sf_dataset *d, const char *split)
+static inline void load(sf_dataset *set, const char *split)
 {
-  ck_good(sf_dataset_load(d, folder, split, NULL));
+  ck_ok(sf_dataset_load(set, folder, split, NULL));
+}
+
+static sf_dataset d; /* what a test looks at */
+
+static inline sf_status reload_as(const char *split, const sf_dataset_options *options)
+{
+  sf_dataset_free(&d);
+  return sf_dataset_load(&d, folder, split, options);
+}
+
+static inline void reload(const char *split)
+{
+  ck_ok(reload_as(split, NULL));
+}
+
+static inline void tear_down(void)
+{
+  sf_dataset_free(&d);
+  remove_folder();
 }
 
 /* Names ascend, every 8th is held out, and each picture is the one of its pose. */
 static inline void same_splits(const layout_rig *rig)
 {
-  sf_dataset d;
   for (int testing = 0; testing < 2; testing++) {
-    load(&d, testing ? "test" : "train");
+    reload(testing ? "test" : "train");
     ck_assert_int_eq(d.count, testing ? (VIEWS + 7) / 8 : VIEWS - (VIEWS + 7) / 8);
     for (int i = 0; i < d.count; i++) {
       const int v = testing ? 8 * i : i + 1 + i / 7;
@@ -217,7 +235,6 @@ static inline void same_splits(const layout_rig *rig)
       ck_assert_uint_eq(d.view[i].image.rgba[4 * WIDTH * HEIGHT - 4] / 257, (unsigned)(10 + v));
     }
     same_rays(&d, rig);
-    sf_dataset_free(&d);
   }
 }
 

@@ -28,7 +28,7 @@ static inline void open_fixture(void)
   core = fixture_scene(&fixture_ingp, 11);
   core.step_q24 = 300000, core.background[1] = 30000;
   core.units.feature_scale[3] = 0.3; /* a number with a point in the file */
-  ck_good(fx_scene_save(&core, in("s.snn")));
+  ck_ok(fx_scene_save(&core, in("s.snn")));
   lib_good(spikefield_scene_open(&scene, in("s.snn")));
   lib_good(spikefield_scene_describe(scene, &info));
 }

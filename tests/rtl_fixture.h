@@ -2,9 +2,8 @@
 #ifndef SF_TESTS_RTL_FIXTURE_H
 #define SF_TESTS_RTL_FIXTURE_H
 #include "sim/compare.h"
-#include "sim/sim.h"
 #include "cycles/cycles.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/random_net.h"
 
 enum { BATCH = 64, RAYS_PER_BATCH = 8 };
@@ -115,11 +114,10 @@ static inline void same_cycles(sf_dut *dut, const fx_net *net, int n, uint64_t s
 static inline void check_net(const fx_net *net, random_source *r, int n, bool extreme, int stalls)
 {
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(net, r->seed, stalls);
+  OWNED(sf_dut) *dut = open_dut(net, r->seed, stalls);
   draw_batch(&shared, r, n, extreme);
   run_batch(dut, net, n, &counts, r->seed);
   same_counts(dut, &counts, r->seed);
-  sf_dut_close(dut);
 }
 
 static inline void typical(uint64_t seed)

@@ -1,5 +1,6 @@
 /* Counts to energy, the recount, comparisons, the published table, the measuring loop and the golden planes. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "base/sha256.h"
 #include "base/text.h"
 #include "cycles/cycles.h"
@@ -8,20 +9,8 @@
 #include "tests/fx_tensorf_fixture.h"
 #include <math.h>
 #include <omp.h>
-#include <unistd.h>
 
-/* ---- a net small enough to count by hand: 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3 ---- */
-
-static fx_net small_net(void)
-{
-  fx_net net = {.steps = 2, .mode = FX_HYBRID};
-  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
-  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
-  return net;
-}
-
-typedef uint64_t bitmaps[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
-static const bitmaps small_spikes = {[FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
+/* ---- counts and their price ---- */
 
 static void expect(const fx_counts *c, int layer, int event, uint64_t t0, uint64_t t1)
 {
@@ -38,7 +27,7 @@ static void expect_layer(const fx_counts *c, int layer, const uint64_t table[SF_
   for (int e = 0; e < SF_EVENTS; e++) expect(c, layer, e, table[e][0], table[e][1]);
 }
 
-START_TEST(recount_equals_counting_by_hand)
+TEST(recount_equals_counting_by_hand)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -59,9 +48,8 @@ START_TEST(recount_equals_counting_by_hand)
   ck_assert_uint_eq(c.samples, 2);
   ck_assert_uint_eq(c.rays, 1);
 }
-END_TEST
 
-START_TEST(recount_sees_every_bit)
+TEST(recount_sees_every_bit)
 {
   fx_net net = small_net();
   net.layer[FX_D1].n_out = net.layer[FX_D2].n_in = SF_LANES;
@@ -78,9 +66,8 @@ START_TEST(recount_sees_every_bit)
     expect(&c, FX_C3, SF_EVENT_SOP, 3, 0);
   }
 }
-END_TEST
 
-START_TEST(ledger_equals_pricing_by_hand)
+TEST(ledger_equals_pricing_by_hand)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -88,7 +75,7 @@ START_TEST(ledger_equals_pricing_by_hand)
   sf_recount_sample(&net, small_spikes, true, &c);
   ck_assert_uint_eq(sf_energy_fj(&c), 40 * 4600 + 40 * 900);
   ck_assert_uint_eq(sf_energy_ann_fj(&net, 1), 76 * 4600);
-  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &c, &l));
   ck_assert_uint_eq(l.mac_fj, 184000);
   ck_assert_uint_eq(l.sop_fj, 36000);
   ck_assert_uint_eq(l.spiking_fj, 220000);
@@ -98,33 +85,31 @@ START_TEST(ledger_equals_pricing_by_hand)
   ck_assert_uint_eq(l.ann_hoisted_fj, 349600);
   ck_assert_double_eq_tol(sf_saving_percent(l.spiking_fj, l.ann_fj), 37.0709, 1e-4); /* 1 - 220 / 349.6 */
   c.layer[FX_D1].spikes[0]++;                                                        /* 13 in 24: 8.67 of 16, rounded */
-  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &c, &l));
   ck_assert_uint_eq(l.h_spikes_fj, 24 * 4600 + (40 + 9) * 900);
   sf_recount_sample(&net, small_spikes, false, &c);
-  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &c, &l));
   ck_assert_uint_eq(l.ann_fj, 2 * 349600);
   ck_assert_uint_eq(l.ann_hoisted_fj, 2 * 349600 - 12 * 4600);
 }
-END_TEST
 
-START_TEST(nothing_counted_costs_nothing)
+TEST(nothing_counted_costs_nothing)
 {
   fx_net net = small_net();
   fx_counts c = {0};
   sf_ledger l;
-  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &c, &l));
   ck_assert_uint_eq(l.spiking_fj, 0);
   ck_assert_uint_eq(l.h_spikes_fj, 0);
   ck_assert_uint_eq(l.ann_fj, 0);
   ck_assert(isnan(sf_saving_percent(0, 0)));
 }
-END_TEST
 
 /* 800 x 800 rays of 1024 samples, 8 steps, every neuron fires: the largest frame. */
-START_TEST(largest_frame_does_not_wrap)
+TEST(largest_frame_does_not_wrap)
 {
   __extension__ typedef unsigned __int128 u128;
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   bitmaps all;
   fx_counts one = {0}, frame = {0};
   sf_ledger l;
@@ -140,20 +125,18 @@ START_TEST(largest_frame_does_not_wrap)
   ck_assert(exact < UINT64_MAX);
   ck_assert_uint_eq(sf_energy_fj(&frame), (uint64_t)exact);
   ck_assert_uint_eq(sf_energy_ann_fj(&scene.net, samples), samples * 26880 * 4600);
-  ck_assert_int_eq(sf_ledger_make(&scene.net, &frame, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&scene.net, &frame, &l));
   ck_assert_uint_eq(l.h_spikes_fj, samples * ((4096 + 2048) * 4600 + (8 * 128 * 147 + 8 * 1920) * 900));
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(too_large_a_total_is_refused)
+TEST(too_large_a_total_is_refused)
 {
   fx_net net = small_net();
   fx_counts c = {.samples = 1, .rays = 0};
   sf_ledger l;
   c.layer[FX_D1].mac[0] = UINT64_MAX / 4600;
   ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX / 4600 * 4600);
-  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &c, &l));
   c.layer[FX_D1].mac[0]++;
   ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX);
   ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
@@ -162,17 +145,16 @@ START_TEST(too_large_a_total_is_refused)
   ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
   ck_assert_uint_eq(sf_energy_ann_fj(&net, UINT64_MAX / 2), UINT64_MAX);
 }
-END_TEST
 
 /* ---- recount against the core ---- */
 
-START_TEST(recount_equals_core_on_random_nets)
+TEST(recount_equals_core_on_random_nets)
 {
   fx_trace *trace = malloc(sizeof *trace);
   uint64_t spikes = 0;
   for (uint64_t seed = 0; seed < 120; seed++) {
     fixture_sizes sizes = fixture_random_sizes(seed);
-    fx_scene scene = fixture_scene(&sizes, seed);
+    OWNED(fx_scene) scene = fixture_scene(&sizes, seed);
     fx_counts core = {0}, recount = {0};
     int16_t f[32], dir[FX_SH];
     int32_t base[SF_LANES];
@@ -190,14 +172,12 @@ START_TEST(recount_equals_core_on_random_nets)
     ck_assert_uint_eq(core.rays, recount.rays);
     ck_assert_uint_eq(sf_energy_fj(&core), sf_energy_fj(&recount));
     spikes += sf_event_total(&core, SF_EVENT_SPIKES);
-    fx_scene_free(&scene);
   }
   ck_assert_uint_gt(spikes, 1000); /* the nets were not silent */
   free(trace);
 }
-END_TEST
 
-START_TEST(comparison_names_each_planted_difference)
+TEST(comparison_names_each_planted_difference)
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < SF_T_MAX; t++)
@@ -213,19 +193,17 @@ START_TEST(comparison_names_each_planted_difference)
         ck_assert_str_eq(status.message, expected);
       }
 }
-END_TEST
 
-START_TEST(comparison_names_the_first_and_ignores_the_rest)
+TEST(comparison_names_the_first_and_ignores_the_rest)
 {
   fx_counts a = {0}, b = {0};
   a.grid_bytes = 1, a.march_steps = 2, a.saturated[3] = 3, a.saturated_features = 4;
-  ck_assert_int_eq(sf_counts_compare(&a, "a", &b, "b").code, SF_OK);
+  ck_ok(sf_counts_compare(&a, "a", &b, "b"));
   b.samples = 6;
   ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "samples: a 0, b 6");
   b.layer[FX_C2].sop[1] = 7, b.layer[FX_C1].spikes[5] = 8, b.layer[FX_C1].updates[5] = 9;
   ck_assert_str_eq(sf_counts_compare(&a, "a", &b, "b").message, "spikes of layer C1 at step 5: a 0, b 8");
 }
-END_TEST
 
 /* ---- the measuring loop ---- */
 
@@ -248,24 +226,24 @@ static bool tick(void *user, uint64_t done)
   return done < ((rays *)user)->stop_after;
 }
 
-START_TEST(measure_does_not_depend_on_threads)
+TEST(measure_does_not_depend_on_threads)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, UINT64_MAX};
-  sf_measure one, four;
+  OWNED(sf_measure) one, four;
   uint64_t hits = 0;
   omp_set_num_threads(1);
-  ck_assert_int_eq(sf_measure_rays(&job, &one).code, SF_OK);
+  ck_ok(sf_measure_rays(&job, &one));
   omp_set_num_threads(4);
-  ck_assert_int_eq(sf_measure_rays(&job, &four).code, SF_OK);
+  ck_ok(sf_measure_rays(&job, &four));
   assert_same_counts(&one.core, &four.core);
   ck_assert_mem_eq(one.hit, four.hit, 1000 / 8);
   assert_same_counts(&one.checked_core, &one.core); /* all rays are checked */
   assert_same_counts(&one.checked_core, &four.checked_core);
   ck_assert_uint_eq(one.checked, one.core.rays);
-  ck_assert_int_eq(sf_counts_compare(&one.core, "core", &one.recount, "recount").code, SF_OK);
+  ck_ok(sf_counts_compare(&one.core, "core", &one.recount, "recount"));
   for (uint64_t i = 0; i < 1000; i++) {
     bool hit = one.hit[i / 8] >> i % 8 & 1;
     ck_assert(!(hit && i % 7 == 3));
@@ -274,19 +252,15 @@ START_TEST(measure_does_not_depend_on_threads)
   ck_assert_uint_eq(hits, one.core.rays);
   ck_assert_uint_gt(one.core.samples, 1000);
   ck_assert_uint_eq(one.core.samples, one.recount.samples);
-  sf_measure_free(&one), sf_measure_free(&four);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(tensorf_is_counted_by_the_same_three)
+TEST(tensorf_is_counted_by_the_same_three)
 {
-  fx_scene scene = tensorf_scene();
+  OWNED(fx_scene) scene = tensorf_scene();
   rays user = {UINT64_MAX, UINT64_MAX};
   const sf_measure_job job = {&scene, 300, make_ray, tick, &user, 7, UINT64_MAX};
-  sf_measure m;
-  const sf_status status = sf_measure_rays(&job, &m);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  OWNED(sf_measure) m;
+  ck_ok(sf_measure_rays(&job, &m));
   assert_same_counts(&m.checked_core, &m.core);
   ck_assert_uint_gt(m.core.samples, 300);
   ck_assert_uint_gt(m.core.field_samples, m.core.samples); /* some weigh too little */
@@ -296,35 +270,32 @@ START_TEST(tensorf_is_counted_by_the_same_three)
                     m.core.samples * (uint64_t)(scene.net.layer[FX_C1].n_in * 40));
   const sf_traffic core = sf_traffic_of(&m.core, 300);
   const sf_traffic recount = sf_traffic_recount(&scene, &m.recount, m.core.field_samples, 300);
-  ck_assert_int_eq(sf_traffic_compare(&core, "core", &recount, "recount").code, SF_OK);
+  ck_ok(sf_traffic_compare(&core, "core", &recount, "recount"));
   ck_assert_uint_eq(core.exp_neg, m.core.field_samples);
   ck_assert_uint_eq(core.table_bytes, 6 * 9 * (m.core.field_samples + m.core.samples)); /* 9 components in each */
   /* planes 9x8, 9x7, 8x7 with their lines 7, 8, 9: density 2, 3, 4 components, appearance 3, 2, 4 */
   ck_assert_uint_eq(sf_table_size(&scene), 5 * (72 + 7) + 5 * (63 + 8) + 8 * (56 + 9));
   sf_ledger l;
-  ck_assert_int_eq(sf_ledger_make(&scene.net, &m.core, &l).code, SF_OK);
+  ck_ok(sf_ledger_make(&scene.net, &m.core, &l));
   ck_assert_uint_eq(l.spiking_fj, sf_energy_fj(&m.core));
   ck_assert_uint_eq(l.ann_hoisted_fj, l.ann_fj); /* no direction of a ray to hoist */
   ck_assert_uint_eq(l.h_once_fj, l.spiking_fj);
-  sf_measure_free(&m);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(checked_rays_are_a_seeded_choice)
+TEST(checked_rays_are_a_seeded_choice)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
   sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, 50};
-  sf_measure measure;
+  OWNED(sf_measure) measure;
   uint64_t index[50], again[50], other[50], all[1000], n, differs = 0;
-  ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_OK);
+  ck_ok(sf_measure_rays(&job, &measure));
   ck_assert_uint_eq(measure.checked, 50);
   ck_assert_uint_eq(measure.recount.rays, 50);
   ck_assert_uint_lt(measure.recount.samples, measure.core.samples);
-  ck_assert_int_eq(sf_counts_compare(&measure.checked_core, "a", &measure.recount, "b").code, SF_OK);
-  ck_assert_int_eq(sf_measure_choose(&measure, 1, 2, 50, index, &n).code, SF_OK);
+  ck_ok(sf_counts_compare(&measure.checked_core, "a", &measure.recount, "b"));
+  ck_ok(sf_measure_choose(&measure, 1, 2, 50, index, &n));
   ck_assert_uint_eq(n, 50);
   sf_measure_choose(&measure, 1, 2, 50, again, &n);
   sf_measure_choose(&measure, 2, 2, 50, other, &n);
@@ -343,15 +314,12 @@ START_TEST(checked_rays_are_a_seeded_choice)
     largest = index[i] && sf_random_u64(1, 2, index[i]) > largest ? sf_random_u64(1, 2, index[i]) : largest;
   for (uint64_t i = 0; i < n; i++) below += sf_random_u64(1, 2, all[i]) <= largest;
   ck_assert_uint_eq(below, 50);
-  sf_measure_free(&measure);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(measure_reports_the_lowest_failing_ray)
+TEST(measure_reports_the_lowest_failing_ray)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {10, UINT64_MAX};
   sf_measure_job job = {&scene, 5000, make_ray, tick, &user, 7, 10};
   sf_measure measure;
@@ -363,13 +331,11 @@ START_TEST(measure_reports_the_lowest_failing_ray)
   }
   user = (rays){UINT64_MAX, 100};
   ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_E_STOPPED);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(probe_names_the_sample_of_a_difference)
+TEST(probe_names_the_sample_of_a_difference)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 3);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 3);
   fx_trace *trace = malloc(sizeof *trace);
   sf_observer *observer = calloc(1, sizeof *observer);
   rays user = {UINT64_MAX, UINT64_MAX};
@@ -381,17 +347,15 @@ START_TEST(probe_names_the_sample_of_a_difference)
   ck_assert_ptr_eq(observer->trace, trace);
   make_ray(&user, 0, &ray);
   fixture_inputs(4, 0, f, 32, 900);
-  ck_assert_int_eq(sf_observer_net(observer, &ray, true, f, &out).code, SF_OK);
-  ck_assert_int_eq(sf_observer_net(observer, &ray, false, f, &out).code, SF_OK);
+  ck_ok(sf_observer_net(observer, &ray, true, f, &out));
+  ck_ok(sf_observer_net(observer, &ray, false, f, &out));
   observer->core.layer[FX_C1].spikes[2]++; /* the fault */
   sf_status status = sf_observer_net(observer, &ray, false, f, &out);
   ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
   ck_assert_msg(strstr(status.message, "sample 2: spikes of layer C1 at step 2: core ") == status.message, "%s",
                 status.message);
   free(trace), free(observer);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- the paper ---- */
 
@@ -407,7 +371,7 @@ static const sf_published_row *find_row(const sf_published_row *rows, int n, con
 }
 
 /* Rates worked out by hand from the table's printed digits, to 3 places. */
-START_TEST(published_rates)
+TEST(published_rates)
 {
   static const struct {
     const char *backbone, *data, *reading, *beta;
@@ -431,9 +395,8 @@ START_TEST(published_rates)
   /* A net that prices h at every step cannot cost as little as the paper's third INGP row. */
   ck_assert(find_row(rows, n, "INGP", "Synthetic", "R = 6144", "1e-6")->rate < 0);
 }
-END_TEST
 
-START_TEST(published_residuals)
+TEST(published_residuals)
 {
   sf_published_row rows[SF_PUBLISHED_MAX];
   int n = sf_published_rows(rows), printed = 0;
@@ -484,7 +447,6 @@ START_TEST(published_residuals)
   ck_assert_double_eq_tol(find_row(rows, n, "TensoRF", "LLFF", "R", "5e-9")->samples, 126e6, 0.5e6);
   ck_assert_double_eq_tol(find_row(rows, n, "INGP", "Synthetic", "R", "1e-7")->samples, 7.7e6, 0.05e6);
 }
-END_TEST
 
 /* ---- reports ---- */
 
@@ -495,7 +457,7 @@ static const cJSON *at(const cJSON *json, const char *key)
   return item;
 }
 
-START_TEST(json_keeps_every_digit)
+TEST(json_keeps_every_digit)
 {
   fx_net net = small_net();
   fx_counts c = {0};
@@ -509,10 +471,9 @@ START_TEST(json_keeps_every_digit)
   free(text);
   cJSON_Delete(json), cJSON_Delete(again);
 }
-END_TEST
 
 /* Each ill-formed byte is one replacement. */
-START_TEST(text_from_outside_becomes_utf8)
+TEST(text_from_outside_becomes_utf8)
 {
   static const struct {
     const char *text, *wanted;
@@ -537,17 +498,32 @@ START_TEST(text_from_outside_becomes_utf8)
     cJSON_Delete(json);
   }
 }
-END_TEST
 
-START_TEST(report_json_holds_what_was_counted)
+static sf_audit_report *small_report(const fx_net *net)
 {
-  fx_net net = small_net();
   sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  *r =
+      (sf_audit_report){.scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = net, .rays = 4, .views = 0.5};
+  return r;
+}
+
+static char *printed(const sf_audit_report *r)
+{
+  static char *text; /* the stream keeps its address */
+  static size_t size;
+  FILE *out = open_memstream(&text, &size);
+  sf_report_print(out, r);
+  fclose(out);
+  return text;
+}
+
+TEST(report_json_holds_what_was_counted)
+{
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   sf_recount_sample(&net, small_spikes, true, &r->measure.core);
   r->measure.recount = r->measure.checked_core = r->measure.core;
-  ck_assert_int_eq(sf_ledger_make(&net, &r->measure.core, &r->ledger).code, SF_OK);
+  ck_ok(sf_ledger_make(&net, &r->measure.core, &r->ledger));
   cJSON *json = sf_report_json(r);
   char *text = cJSON_PrintUnformatted(json);
   cJSON_Delete(json);
@@ -566,65 +542,49 @@ START_TEST(report_json_holds_what_was_counted)
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
-START_TEST(report_says_that_counts_differ)
+TEST(report_says_that_counts_differ)
 {
-  fx_net net = small_net();
-  sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   r->three.rays = 1, r->three.wanted = 1;
   r->three.core.layer[FX_C3].sop[0] = 5;
   r->three.agreement = sf_counts_compare(&r->three.core, "core", &r->three.rtl, "accelerator");
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
   ck_assert_str_eq(at(json, "difference")->valuestring, "SOP of layer C3 at step 0: core 5, accelerator 0");
-  char *text = NULL;
-  size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
+  char *text = printed(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: SOP of layer C3 at step 0"));
   ck_assert_ptr_nonnull(strstr(text, "not modelled, by any ledger:"));
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
 /* The first ray of the accelerator can be the one that differs: there is nothing but the difference then. */
-START_TEST(report_says_that_the_first_ray_differs)
+TEST(report_says_that_the_first_ray_differs)
 {
-  fx_net net = small_net();
-  sf_audit_report *r = calloc(1, sizeof *r);
-  *r = (sf_audit_report){
-      .scene = "s", .data = "d", .split = "test", .sha256 = "0", .net = &net, .rays = 4, .views = 0.5};
+  const fx_net net = small_net();
+  sf_audit_report *r = small_report(&net);
   r->three.wanted = 16;
   r->three.agreement = sf_fail(SF_E_DIFFERENCE, "ray 0: sample 0: red: core 1, accelerator 0");
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
-  char *text = NULL;
-  size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
+  char *text = printed(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: ray 0: sample 0"));
   ck_assert_ptr_null(strstr(text, "nothing to run"));
   free(text), free(r);
   cJSON_Delete(json);
 }
-END_TEST
 
-START_TEST(cycles_of_a_dense_net)
+TEST(cycles_of_a_dense_net)
 {
   fx_net net = {.layer[FX_D1] = {.n_in = 5, .n_out = SF_LANES},
                 .layer[FX_D2] = {.n_in = 1, .n_out = 1}, /* a part of the lanes takes a cycle, too */
                 .layer[FX_C3] = {.n_in = SF_LANES, .n_out = 3}};
   ck_assert_uint_eq(sf_cycles_dense(&net), 5 + 1 + 3);
 }
-END_TEST
 
-START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
+TEST(saturation_is_expected_only_where_the_formats_allow_it)
 {
   fx_net net = small_net();
   char list[64];
@@ -643,9 +603,8 @@ START_TEST(saturation_is_expected_only_where_the_formats_allow_it)
   sf_saturation_census(more, 4, list, 12); /* too short a text is cut between entries */
   ck_assert_uint_lt(strlen(list), 12);
 }
-END_TEST
 
-START_TEST(sha256_of_known_texts)
+TEST(sha256_of_known_texts)
 {
   char hex[65], long_text[1000];
   sf_sha256("", 0, hex);
@@ -658,7 +617,6 @@ START_TEST(sha256_of_known_texts)
   sf_sha256(long_text, 1000, hex);
   ck_assert_str_eq(hex, "41edece42d63e8d9bf515a9ba6932e1c20cbc9f5a5d134645adb5db1b9737ea3");
 }
-END_TEST
 
 /* ---- golden planes ---- */
 
@@ -670,15 +628,15 @@ static fx_pixel some_pixel(uint32_t grey, uint32_t transmittance)
   return p;
 }
 
-START_TEST(golden_planes_hold_the_pixel)
+TEST(golden_planes_hold_the_pixel)
 {
-  sf_golden g;
+  OWNED(sf_golden) g;
   fx_net net = small_net();
   fx_counts c = {0};
   sf_recount_sample(&net, small_spikes, true, &c);
   const fx_cost cost = sf_cost_of(&c);
   fx_pixel pixel = some_pixel(32768, 1 << 18), empty = some_pixel(0, 1 << 20);
-  ck_assert_int_eq(sf_golden_create(&g, 2, 1, SF_PLANES).code, SF_OK);
+  ck_ok(sf_golden_create(&g, 2, 1, SF_PLANES));
   sf_golden_set(&g, 1, &pixel, &cost, 0.25);
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_R)[1], 32768);
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_FX_A)[1], 49152);
@@ -695,35 +653,21 @@ START_TEST(golden_planes_hold_the_pixel)
   ck_assert_uint_eq(sf_golden_int(&g, SF_PLANE_MACS)[0], 0); /* the neighbour is untouched */
   sf_golden_set(&g, 0, &empty, &cost, 0.25);
   ck_assert_float_eq(sf_golden_real(&g, SF_PLANE_Z)[0], 0);
-  sf_golden_free(&g);
-}
-END_TEST
-
-static void remove_in(const char *dir, const char *name)
-{
-  char path[300];
-  snprintf(path, sizeof path, "%s/%s", dir, name);
-  ck_assert_int_eq(unlink(path), 0);
 }
 
-START_TEST(golden_file_reads_back)
+TEST(golden_file_reads_back)
 {
-  const char *tmp = getenv("TMPDIR");
-  char dir[200], path[300];
-  snprintf(dir, sizeof dir, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(dir));
-  snprintf(path, sizeof path, "%s/g.exr", dir);
-  sf_golden g;
+  const char *path = in("g.exr");
+  OWNED(sf_golden) g;
   const fx_cost cost = {0};
   fx_pixel pixel = some_pixel(12345, 77);
   const char *const attributes[] = {"t_r", "2", NULL};
-  ck_assert_int_eq(sf_golden_create(&g, 3, 2, SF_PLANES).code, SF_OK);
+  ck_ok(sf_golden_create(&g, 3, 2, SF_PLANES));
   for (size_t i = 0; i < 6; i++) sf_golden_set(&g, i, &pixel, &cost, 1);
-  sf_status status = sf_golden_save(&g, path, attributes);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_golden_save(&g, path, attributes));
   sf_exr_channel *channel;
   int width, height, n;
-  ck_assert_int_eq(sf_exr_load(path, &width, &height, &channel, &n).code, SF_OK);
+  ck_ok(sf_exr_load(path, &width, &height, &channel, &n));
   ck_assert_int_eq(width, 3);
   ck_assert_int_eq(height, 2);
   ck_assert_int_eq(n, SF_PLANES);
@@ -736,76 +680,35 @@ START_TEST(golden_file_reads_back)
   }
   ck_assert_int_eq(found, 2);
   sf_exr_free(channel, n);
-  remove_in(dir, "g.exr");
-  ck_assert_int_eq(rmdir(dir), 0);
-  sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(quality_composites_the_window_over_the_background)
+TEST(quality_composites_the_window_over_the_background)
 {
   enum { W = 20, H = 16 };
   static uint16_t rgba[W * H * 4];
   sf_image picture = {W, H, rgba};
   const float white[3] = {1, 1, 1}, black[3] = {0, 0, 0};
   double psnr, ssim;
-  sf_golden g;
+  OWNED(sf_golden) g;
   for (int i = 0; i < W * H; i++) { /* a grey ramp, half transparent: 0.5 * grey + 0.5 over white */
     rgba[4 * i] = rgba[4 * i + 1] = rgba[4 * i + 2] = (uint16_t)(200 * i), rgba[4 * i + 3] = 32768;
   }
-  ck_assert_int_eq(sf_golden_create(&g, 12, 11, SF_FLOAT_PLANES).code, SF_OK);
+  ck_ok(sf_golden_create(&g, 12, 11, SF_FLOAT_PLANES));
   for (int y = 0; y < 11; y++)
     for (int x = 0; x < 12; x++)
       for (int c = 0; c < 3; c++) {
         float alpha = 32768.0f / 65535, grey = (float)(200 * ((y + 5) * W + x + 8)) / 65535;
         sf_golden_real(&g, SF_PLANE_R + c)[y * 12 + x] = grey * alpha + (1 - alpha) + 0.01f;
       }
-  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim).code, SF_OK);
+  ck_ok(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim));
   ck_assert_double_eq_tol(psnr, 40, 0.01); /* a constant error of 0.01: 20 log10 100 */
   ck_assert_double_gt(ssim, 0.95);
-  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, black, &psnr, &ssim).code, SF_OK);
+  ck_ok(sf_golden_quality(&g, &picture, 8, 5, black, &psnr, &ssim));
   ck_assert_double_lt(psnr, 10);
   ck_assert_int_eq(sf_golden_quality(&g, &picture, 9, 5, white, &psnr, &ssim).code, SF_E_RANGE);
   g.height = 10;
-  ck_assert_int_eq(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim).code, SF_OK);
+  ck_ok(sf_golden_quality(&g, &picture, 8, 5, white, &psnr, &ssim));
   ck_assert(isnan(ssim));
-  sf_golden_free(&g);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("audit");
-  TCase *counts = tcase_create("counts"), *measure = tcase_create("measure"), *report = tcase_create("report");
-  tcase_add_test(counts, recount_equals_counting_by_hand);
-  tcase_add_test(counts, recount_sees_every_bit);
-  tcase_add_test(counts, ledger_equals_pricing_by_hand);
-  tcase_add_test(counts, nothing_counted_costs_nothing);
-  tcase_add_test(counts, largest_frame_does_not_wrap);
-  tcase_add_test(counts, too_large_a_total_is_refused);
-  tcase_add_test(counts, recount_equals_core_on_random_nets);
-  tcase_add_test(counts, comparison_names_each_planted_difference);
-  tcase_add_test(counts, comparison_names_the_first_and_ignores_the_rest);
-  tcase_add_test(measure, measure_does_not_depend_on_threads);
-  tcase_add_test(measure, tensorf_is_counted_by_the_same_three);
-  tcase_add_test(measure, checked_rays_are_a_seeded_choice);
-  tcase_add_test(measure, measure_reports_the_lowest_failing_ray);
-  tcase_add_test(measure, probe_names_the_sample_of_a_difference);
-  tcase_add_test(report, published_rates);
-  tcase_add_test(report, published_residuals);
-  tcase_add_test(report, json_keeps_every_digit);
-  tcase_add_test(report, text_from_outside_becomes_utf8);
-  tcase_add_test(report, report_json_holds_what_was_counted);
-  tcase_add_test(report, report_says_that_counts_differ);
-  tcase_add_test(report, report_says_that_the_first_ray_differs);
-  tcase_add_test(report, cycles_of_a_dense_net);
-  tcase_add_test(report, saturation_is_expected_only_where_the_formats_allow_it);
-  tcase_add_test(report, sha256_of_known_texts);
-  tcase_add_test(report, golden_planes_hold_the_pixel);
-  tcase_add_test(report, golden_file_reads_back);
-  tcase_add_test(report, quality_composites_the_window_over_the_background);
-  suite_add_tcase(suite, counts);
-  suite_add_tcase(suite, measure);
-  suite_add_tcase(suite, report);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

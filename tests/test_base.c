@@ -4,32 +4,17 @@
 #include "base/io.h"
 #include "folder_fixture.h"
 #include "base/rng.h"
-#include <dirent.h>
 #include <math.h>
 #include <signal.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
-
-#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
-
-static void put(const char *path, const void *data, size_t n)
-{
-  unlink(path); /* some file systems sync a file that is cut and written again */
-  FILE *f = fopen(path, "wb");
-  ck_assert_ptr_nonnull(f);
-  ck_assert_uint_eq(fwrite(data, 1, n, f), n);
-  ck_assert_int_eq(fclose(f), 0);
-}
 
 /* ---- status ---- */
 
-START_TEST(status_is_one_line_and_fits)
+TEST(status_is_one_line_and_fits)
 {
-  ck_assert_int_eq(sf_ok().code, SF_OK);
+  ck_ok(sf_ok());
   ck_assert_str_eq(sf_ok().message, "");
   sf_status s = sf_fail(SF_E_IO, "a\nb\tc\x1b %d", 7);
   ck_assert_str_eq(s.message, "a b c  7");
@@ -41,7 +26,6 @@ START_TEST(status_is_one_line_and_fits)
   ck_assert_uint_eq(strlen(s.message), sizeof s.message - 1);
   ck_assert_str_eq(s.message + sizeof s.message - 4, "...");
 }
-END_TEST
 
 static sf_status fails_first(int *reached)
 {
@@ -51,37 +35,35 @@ static sf_status fails_first(int *reached)
   return sf_ok();
 }
 
-START_TEST(try_returns_the_failure)
+TEST(try_returns_the_failure)
 {
   int reached = 0;
   ck_bad(fails_first(&reached), SF_E_RANGE, "first", "");
   ck_assert_int_eq(reached, 0);
 }
-END_TEST
 
 /* ---- files ---- */
 
-START_TEST(file_round_trip)
+TEST(file_round_trip)
 {
   char *data;
   size_t n;
   const char bytes[] = {1, 0, 2, '\n', (char)255};
-  ck_good(sf_write_file(in("a"), bytes, sizeof bytes));
-  ck_good(sf_read_file(in("a"), 5, &data, &n));
+  ck_ok(sf_write_file(in("a"), bytes, sizeof bytes));
+  ck_ok(sf_read_file(in("a"), 5, &data, &n));
   ck_assert_uint_eq(n, sizeof bytes);
   ck_assert_mem_eq(data, bytes, n);
   ck_assert_int_eq(data[n], 0);
   free(data);
   ck_bad(sf_read_file(in("a"), 4, &data, &n), SF_E_FORMAT, "/a", "limit");
-  ck_good(sf_write_file(in("a"), NULL, 0));
-  ck_good(sf_read_file(in("a"), 0, &data, &n));
+  ck_ok(sf_write_file(in("a"), NULL, 0));
+  ck_ok(sf_read_file(in("a"), 0, &data, &n));
   ck_assert_uint_eq(n, 0);
   free(data);
   ck_assert_int_eq(entries(), 1);
 }
-END_TEST
 
-START_TEST(unreadable_files)
+TEST(unreadable_files)
 {
   char *data;
   size_t n;
@@ -91,7 +73,6 @@ START_TEST(unreadable_files)
   ck_assert_int_eq(symlink("/dev/null", in("link")), 0);
   ck_bad(sf_read_file(in("link"), 100, &data, &n), SF_E_IO, "/link", "it is a device");
 }
-END_TEST
 
 /* A program that writes as many zeros as are taken, at most `total`; path: its pipe, as a shell's <(...) hands it over.
  */
@@ -126,30 +107,28 @@ static sf_status read_zeros(size_t total, size_t limit, size_t *size)
   return status;
 }
 
-START_TEST(pipes_are_read_up_to_a_limit)
+TEST(pipes_are_read_up_to_a_limit)
 {
   const size_t sizes[] = {0, 1, 4096, 4097, 8194, 99999, 100000};
   size_t n;
   for (int i = 0; i < 7; i++) {
-    ck_good(read_zeros(sizes[i], 100000, &n));
+    ck_ok(read_zeros(sizes[i], 100000, &n));
     ck_assert_uint_eq(n, sizes[i]);
   }
   ck_bad(read_zeros(100001, 100000, &n), SF_E_FORMAT, "/dev/fd/", "limit of 100000 bytes");
   ck_bad(read_zeros(SIZE_MAX, (size_t)1 << 34, &n), SF_E_FORMAT, "/dev/fd/", "limit of 268435456 bytes");
 }
-END_TEST
 
-START_TEST(unwritable_targets_are_left_alone)
+TEST(unwritable_targets_are_left_alone)
 {
   ck_bad(sf_write_file(in("none/x"), "1", 1), SF_E_IO, "none/x", "No such file");
-  ck_good(sf_write_file(in("plain"), "1", 1));
+  ck_ok(sf_write_file(in("plain"), "1", 1));
   ck_bad(sf_write_file(in("plain/x"), "1", 1), SF_E_IO, "plain/x", "Not a directory");
   ck_bad(sf_write_file(folder, "1", 1), SF_E_IO, folder, "folder");
   ck_bad(sf_write_file("/dev/full", "1", 1), SF_E_IO, "/dev/full", "regular");
   ck_bad(sf_write_file("", "1", 1), SF_E_IO, "empty name", "");
   ck_assert_int_eq(entries(), 1);
 }
-END_TEST
 
 /* A limit on the size of files behaves as a full disk: writes fail part of the way. */
 static void limit_file_size(rlim_t bytes)
@@ -159,14 +138,14 @@ static void limit_file_size(rlim_t bytes)
   ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &limit), 0);
 }
 
-START_TEST(full_disk_keeps_the_old_file)
+TEST(full_disk_keeps_the_old_file)
 {
   char *big = calloc(1, 100000), *data;
   size_t n;
-  ck_good(sf_write_file(in("a"), "old", 3));
+  ck_ok(sf_write_file(in("a"), "old", 3));
   limit_file_size(50000);
   ck_bad(sf_write_file(in("a"), big, 100000), SF_E_IO, "/a", "large");
-  ck_good(sf_read_file(in("a"), 10, &data, &n));
+  ck_ok(sf_read_file(in("a"), 10, &data, &n));
   ck_assert_str_eq(data, "old");
   free(data);
   sf_tensor t = {.name = "w", .type = SF_U8, .dims = 1, .shape = {100000}, .data = big};
@@ -174,11 +153,10 @@ START_TEST(full_disk_keeps_the_old_file)
   ck_assert_int_eq(entries(), 1);
   free(big);
 }
-END_TEST
 
 /* A program that is killed while it saves leaves one file, which the next save of the same target takes; programs that
  * save at once do not write into each other's. */
-START_TEST(what_a_killed_save_left_is_taken)
+TEST(what_a_killed_save_left_is_taken)
 {
   for (int i = 0; i < 3; i++) {
     const pid_t child = fork();
@@ -196,25 +174,24 @@ START_TEST(what_a_killed_save_left_is_taken)
     ck_assert_int_eq(entries(), 1);
   }
   sf_writer first, second;
-  ck_good(sf_writer_open(&first, in("a")));
-  ck_good(sf_writer_open(&second, in("a")));
+  ck_ok(sf_writer_open(&first, in("a")));
+  ck_ok(sf_writer_open(&second, in("a")));
   ck_assert_str_ne(first.aside, second.aside);
   fputs("1", first.file), fputs("2", second.file);
-  ck_good(sf_writer_commit(&second));
-  ck_good(sf_writer_commit(&first));
+  ck_ok(sf_writer_commit(&second));
+  ck_ok(sf_writer_commit(&first));
   ck_assert_int_eq(entries(), 1);
   char *data;
   size_t size;
-  ck_good(sf_read_file(in("a"), 100, &data, &size));
+  ck_ok(sf_read_file(in("a"), 100, &data, &size));
   ck_assert_str_eq(data, "1");
   free(data);
 }
-END_TEST
 
-START_TEST(writer_abort_and_links)
+TEST(writer_abort_and_links)
 {
   sf_writer w;
-  ck_good(sf_writer_open(&w, in("a")));
+  ck_ok(sf_writer_open(&w, in("a")));
   fputs("half", w.file);
   ck_assert_int_eq(entries(), 1);
   sf_writer_abort(&w);
@@ -222,47 +199,44 @@ START_TEST(writer_abort_and_links)
   ck_assert_int_eq(entries(), 0);
   ck_bad(sf_writer_commit(&w), SF_E_IO, "/a", "open");
 
-  ck_good(sf_write_file(in("a"), "1", 1));
+  ck_ok(sf_write_file(in("a"), "1", 1));
   ck_assert_int_eq(symlink("a", in("link")), 0);
-  ck_good(sf_write_file(in("link"), "22", 2));
+  ck_ok(sf_write_file(in("link"), "22", 2));
   struct stat info;
   ck_assert_int_eq(lstat(in("link"), &info), 0);
   ck_assert(S_ISLNK(info.st_mode));
   ck_assert_int_eq(stat(in("a"), &info), 0);
   ck_assert_int_eq(info.st_size, 2);
   umask(022);
-  ck_good(sf_write_file(in("b"), "1", 1));
+  ck_ok(sf_write_file(in("b"), "1", 1));
   ck_assert_int_eq(stat(in("b"), &info), 0);
   ck_assert_int_eq(info.st_mode & 0777, 0644);
 }
-END_TEST
 
-START_TEST(folders_with_parents)
+TEST(folders_with_parents)
 {
   struct stat info;
-  ck_good(sf_make_dir(in("x/y//z/")));
+  ck_ok(sf_make_dir(in("x/y//z/")));
   ck_assert(!stat(in("x/y/z"), &info) && S_ISDIR(info.st_mode));
-  ck_good(sf_make_dir(in("x/y")));
-  ck_good(sf_write_file(in("file"), "", 0));
+  ck_ok(sf_make_dir(in("x/y")));
+  ck_ok(sf_write_file(in("file"), "", 0));
   ck_bad(sf_make_dir(in("file")), SF_E_IO, "/file", "Not a directory");
   ck_bad(sf_make_dir(in("file/below")), SF_E_IO, "/file", "Not a directory");
   ck_bad(sf_make_dir(""), SF_E_IO, "empty name", "");
 }
-END_TEST
 
 /* ---- JSON ---- */
 
-START_TEST(json_round_trip)
+TEST(json_round_trip)
 {
   cJSON *json = cJSON_CreateObject(), *back;
   cJSON_AddNumberToObject(json, "x", 0.1);
-  ck_good(sf_json_save(json, in("a.json")));
-  ck_good(sf_json_load(in("a.json"), &back));
+  ck_ok(sf_json_save(json, in("a.json")));
+  ck_ok(sf_json_load(in("a.json"), &back));
   ck_assert(cJSON_Compare(json, back, 1));
   cJSON_Delete(json);
   cJSON_Delete(back);
 }
-END_TEST
 
 static const struct {
   const char *text, *place, *problem;
@@ -279,26 +253,24 @@ static const struct {
     {"nul", "bad.json:1:1", "malformed"},
 };
 
-START_TEST(json_faults_name_line_and_column)
+LOOP_TEST(json_faults_name_line_and_column, COUNT(bad_json))
 {
   cJSON *json;
-  put(in("bad.json"), bad_json[_i].text, strlen(bad_json[_i].text));
+  put_file(in("bad.json"), bad_json[_i].text, strlen(bad_json[_i].text));
   ck_bad(sf_json_load(in("bad.json"), &json), SF_E_FORMAT, bad_json[_i].place, bad_json[_i].problem);
   ck_assert_ptr_null(json);
 }
-END_TEST
 
-START_TEST(json_with_a_zero_byte)
+TEST(json_with_a_zero_byte)
 {
   cJSON *json;
-  put(in("bad.json"), "{}\0{}", 5);
+  put_file(in("bad.json"), "{}\0{}", 5);
   ck_bad(sf_json_load(in("bad.json"), &json), SF_E_FORMAT, "bad.json:1:3", "NUL");
 }
-END_TEST
 
 /* ---- safetensors ---- */
 
-START_TEST(tensors_round_trip)
+TEST(tensors_round_trip)
 {
   float f[6] = {1, -2, 3.5f, NAN, INFINITY, 0};
   int8_t b[3] = {-128, 0, 127};
@@ -312,51 +284,49 @@ START_TEST(tensors_round_trip)
                    {"empty", SF_U8, 3, {4, 0, 2}, nothing}};
   cJSON *meta = cJSON_CreateObject();
   cJSON_AddStringToObject(meta, "version", "1 \"x\"\n");
-  ck_good(sf_tensors_save(t, 5, meta, in("t")));
+  ck_ok(sf_tensors_save(t, 5, meta, in("t")));
   cJSON_Delete(meta);
 
-  sf_tensors set;
-  ck_good(sf_tensors_load(&set, in("t")));
+  OWNED(sf_tensors) set;
+  ck_ok(sf_tensors_load(&set, in("t")));
   ck_assert_int_eq(set.count, 5);
   ck_assert_str_eq(sf_tensors_meta(&set, "version"), "1 \"x\"\n");
   ck_assert_ptr_null(sf_tensors_meta(&set, "other"));
   const sf_tensor *got;
   for (int i = 0; i < 5; i++) {
-    ck_good(sf_tensors_get(&set, t[i].name, t[i].type, t[i].dims, t[i].shape, &got));
+    ck_ok(sf_tensors_get(&set, t[i].name, t[i].type, t[i].dims, t[i].shape, &got));
     size_t n = sf_dtype_size(t[i].type);
     ck_assert_uint_eq((uintptr_t)got->data % n, 0);
     for (int k = 0; k < t[i].dims; k++) n *= (size_t)t[i].shape[k];
     if (n) ck_assert_mem_eq(got->data, t[i].data, n);
   }
   const int64_t any[2] = {-1, 3}, wrong[2] = {3, 2};
-  ck_good(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
+  ck_ok(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
   ck_bad(sf_tensors_get(&set, "m", SF_F32, 2, wrong, &got), SF_E_FORMAT, "expected F32[3,2], found F32[2,3]", "/t");
   ck_bad(sf_tensors_get(&set, "m", SF_I32, 2, any, &got), SF_E_FORMAT, "expected I32[*,3]", "'m'");
   ck_bad(sf_tensors_get(&set, "gone", SF_I32, 2, any, &got), SF_E_FORMAT, "'gone' is missing", "/t");
-  ck_good(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
+  ck_ok(sf_tensors_get(&set, "m", SF_F32, 2, any, &got));
   ck_bad(sf_tensor_finite("file", got), SF_E_RANGE, "element 3 is NaN", "file: tensor 'm'");
   ((float *)got->data)[3] = 0;
   ck_bad(sf_tensor_finite("file", got), SF_E_RANGE, "element 4 is infinite", "'m'");
   ((float *)got->data)[4] = 0;
-  ck_good(sf_tensor_finite("file", got));
-  sf_tensors_free(&set);
+  ck_ok(sf_tensor_finite("file", got));
 }
-END_TEST
 
 /* The layout on disk, byte for byte: wide types first, then by name; header padded to 8 bytes. */
-START_TEST(tensors_layout)
+TEST(tensors_layout)
 {
   uint8_t b[2] = {5, 6};
   float f[1] = {1};
   sf_tensor t[] = {{"b", SF_U8, 1, {2}, b}, {"a", SF_U8, 1, {1}, b}, {"f", SF_F32, 1, {1}, f}};
-  ck_good(sf_tensors_save(t, 3, NULL, in("t")));
+  ck_ok(sf_tensors_save(t, 3, NULL, in("t")));
   static const char header[] = "{\"f\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[0,4]},"
                                "\"a\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[4,5]},"
                                "\"b\":{\"dtype\":\"U8\",\"shape\":[2],\"data_offsets\":[5,7]}}";
   char *data;
   size_t n, padded = (sizeof header - 1 + 7) / 8 * 8;
   uint64_t length;
-  ck_good(sf_read_file(in("t"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("t"), 10000, &data, &n));
   memcpy(&length, data, 8);
   ck_assert_uint_eq(length, padded);
   ck_assert_mem_eq(data + 8, header, sizeof header - 1);
@@ -365,7 +335,6 @@ START_TEST(tensors_layout)
   ck_assert_mem_eq(data + 8 + padded, "\0\0\x80\x3f\x05\x05\x06", 7);
   free(data);
 }
-END_TEST
 
 static void put_tensors(const char *header, size_t data_bytes)
 {
@@ -373,7 +342,7 @@ static void put_tensors(const char *header, size_t data_bytes)
   uint64_t n = strlen(header);
   memcpy(file, &n, 8);
   memcpy(file + 8, header, n);
-  put(in("bad"), file, 8 + n + data_bytes);
+  put_file(in("bad"), file, 8 + n + data_bytes);
 }
 
 #define W(shape, offsets) "{\"w\":{\"dtype\":\"F32\",\"shape\":" shape ",\"data_offsets\":" offsets "}}"
@@ -416,41 +385,39 @@ static const struct {
     {"{\"w\":", 0, SF_E_FORMAT, "malformed JSON header", "/bad"},
 };
 
-START_TEST(tensors_refused)
+LOOP_TEST(tensors_refused, COUNT(bad_tensors))
 {
   sf_tensors set;
   put_tensors(bad_tensors[_i].header, bad_tensors[_i].data);
   ck_bad(sf_tensors_load(&set, in("bad")), bad_tensors[_i].code, bad_tensors[_i].problem, bad_tensors[_i].where);
   ck_assert_ptr_null(set.buffer);
 }
-END_TEST
 
-START_TEST(tensors_header_length)
+TEST(tensors_header_length)
 {
   sf_tensors set;
   uint64_t n = 100000001;
-  put(in("bad"), "1234567", 7);
+  put_file(in("bad"), "1234567", 7);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "too short", "/bad");
-  put(in("bad"), &n, 8);
+  put_file(in("bad"), &n, 8);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "limit", "/bad");
   n = 10;
-  put(in("bad"), &n, 8);
+  put_file(in("bad"), &n, 8);
   ck_bad(sf_tensors_load(&set, in("bad")), SF_E_FORMAT, "cut short", "/bad");
 }
-END_TEST
 
 /* Every shorter file and every damaged header byte is refused or read, never a crash; shorter is always refused. */
-START_TEST(tensors_survive_damage)
+TEST(tensors_survive_damage)
 {
   float f[5] = {1, 2, 3, 4, 5};
   sf_tensor t[] = {{"a", SF_F32, 1, {5}, f}, {"b", SF_U8, 2, {2, 2}, f}};
-  ck_good(sf_tensors_save(t, 2, NULL, in("t")));
+  ck_ok(sf_tensors_save(t, 2, NULL, in("t")));
   char *data;
   size_t n;
   sf_tensors set;
-  ck_good(sf_read_file(in("t"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("t"), 10000, &data, &n));
   for (size_t i = 0; i < n; i++) {
-    put(in("bad"), data, i);
+    put_file(in("bad"), data, i);
     sf_status s = sf_tensors_load(&set, in("bad"));
     ck_assert_msg(s.code == SF_E_FORMAT, "cut to %zu bytes: code %d", i, s.code);
   }
@@ -458,16 +425,15 @@ START_TEST(tensors_survive_damage)
     char *copy = malloc(n);
     memcpy(copy, data, n);
     copy[sf_random_below(1, 0, i, n)] = (char)sf_random_u64(1, 1, i);
-    put(in("bad"), copy, n);
+    put_file(in("bad"), copy, n);
     if (sf_tensors_load(&set, in("bad")).code == SF_OK) sf_tensors_free(&set);
     free(copy);
   }
   free(data);
 }
-END_TEST
 
 /* A foreign writer need not pad its header: the data is moved to aligned places. */
-START_TEST(tensors_unaligned_file)
+TEST(tensors_unaligned_file)
 {
   static const char header[] = "{\"b\":{\"dtype\":\"U8\",\"shape\":[1],\"data_offsets\":[0,1]},"
                                "\"f\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[1,5]}}";
@@ -476,21 +442,19 @@ START_TEST(tensors_unaligned_file)
   memcpy(file, &n, 8);
   memcpy(file + 8, header, n);
   memcpy(file + 8 + n, "\x07\0\0\x80\x3f", 5);
-  put(in("t"), file, 8 + n + 5);
-  sf_tensors set;
+  put_file(in("t"), file, 8 + n + 5);
+  OWNED(sf_tensors) set;
   const sf_tensor *t;
   const int64_t one = 1;
-  ck_good(sf_tensors_load(&set, in("t")));
-  ck_good(sf_tensors_get(&set, "f", SF_F32, 1, &one, &t));
+  ck_ok(sf_tensors_load(&set, in("t")));
+  ck_ok(sf_tensors_get(&set, "f", SF_F32, 1, &one, &t));
   ck_assert_uint_eq((uintptr_t)t->data % 4, 0);
   ck_assert(*(float *)t->data == 1.0f);
-  ck_good(sf_tensors_get(&set, "b", SF_U8, 1, &one, &t));
+  ck_ok(sf_tensors_get(&set, "b", SF_U8, 1, &one, &t));
   ck_assert_int_eq(*(uint8_t *)t->data, 7);
-  sf_tensors_free(&set);
 }
-END_TEST
 
-START_TEST(tensors_not_saved)
+TEST(tensors_not_saved)
 {
   float f[1] = {0};
   sf_tensor twice[] = {{"a", SF_F32, 1, {1}, f}, {"a", SF_U8, 1, {1}, f}};
@@ -508,30 +472,28 @@ START_TEST(tensors_not_saved)
   cJSON_Delete(meta);
   ck_assert_int_eq(entries(), 0);
 }
-END_TEST
 
 /* Driven by tests/chain/read_safetensors.py: reads what the format's own library wrote, writes what it will read. */
-START_TEST(tensors_crosscheck)
+REGISTERED_TEST(tensors_crosscheck, if (getenv("SF_CROSSCHECK")) tcase_add_test(ck_case(), tensors_crosscheck))
 {
+  const char *where = getenv("SF_CROSSCHECK");
   char theirs[500], ours[500];
-  snprintf(theirs, sizeof theirs, "%s/theirs.safetensors", getenv("SF_CROSSCHECK"));
-  snprintf(ours, sizeof ours, "%s/ours.safetensors", getenv("SF_CROSSCHECK"));
-  sf_tensors set;
+  snprintf(theirs, sizeof theirs, "%s/theirs.safetensors", where);
+  snprintf(ours, sizeof ours, "%s/ours.safetensors", where);
+  OWNED(sf_tensors) set;
   const sf_tensor *t;
   const int64_t shape[2] = {3, 5}, three = 3;
-  ck_good(sf_tensors_load(&set, theirs));
+  ck_ok(sf_tensors_load(&set, theirs));
   ck_assert_int_eq(set.count, 8);
   ck_assert_str_eq(sf_tensors_meta(&set, "version"), "1");
-  ck_good(sf_tensors_get(&set, "f32", SF_F32, 2, shape, &t));
+  ck_ok(sf_tensors_get(&set, "f32", SF_F32, 2, shape, &t));
   for (int i = 0; i < 15; i++) ck_assert(((float *)t->data)[i] == (float)i / 4 - 1);
-  ck_good(sf_tensors_get(&set, "i8", SF_I8, 1, &three, &t));
+  ck_ok(sf_tensors_get(&set, "i8", SF_I8, 1, &three, &t));
   ck_assert_mem_eq(t->data, "\x80\0\x7f", 3);
-  ck_good(sf_tensors_get(&set, "u64", SF_U64, 0, NULL, &t));
+  ck_ok(sf_tensors_get(&set, "u64", SF_U64, 0, NULL, &t));
   ck_assert_uint_eq(*(uint64_t *)t->data, UINT64_MAX);
-  ck_good(sf_tensors_save(set.tensor, set.count, set.metadata, ours));
-  sf_tensors_free(&set);
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, ours));
 }
-END_TEST
 
 /* ---- command lines ---- */
 
@@ -579,11 +541,11 @@ static sf_status parse_paths(const char *line, const char **positional)
   return parse_line(&cli, positional, line);
 }
 
-START_TEST(cli_values)
+TEST(cli_values)
 {
   values v = {0};
   const char *p[2];
-  ck_good(parse(&v, p, "in -f -n -5 --seed 18446744073709551615 --beta=1e-7 --mode no-decay out -o file"));
+  ck_ok(parse(&v, p, "in -f -n -5 --seed 18446744073709551615 --beta=1e-7 --mode no-decay out -o file"));
   ck_assert(v.flag);
   ck_assert_int_eq(v.number, -5);
   ck_assert_uint_eq(v.seed, UINT64_MAX);
@@ -592,15 +554,14 @@ START_TEST(cli_values)
   ck_assert_str_eq(v.text, "file");
   ck_assert_str_eq(p[0], "in");
   ck_assert_str_eq(p[1], "out");
-  ck_good(parse(&v, p, "-n10 --seed=0x10 --any -2147483648 -- -in"));
+  ck_ok(parse(&v, p, "-n10 --seed=0x10 --any -2147483648 -- -in"));
   ck_assert_int_eq(v.number, INT32_MIN);
   ck_assert_uint_eq(v.seed, 16);
   ck_assert_str_eq(p[0], "-in");
   ck_assert_ptr_null(p[1]);
-  ck_good(parse(&v, p, "-"));
+  ck_ok(parse(&v, p, "-"));
   ck_assert_str_eq(p[0], "-");
 }
-END_TEST
 
 static const struct {
   const char *line, *name, *problem;
@@ -620,16 +581,15 @@ static const struct {
     {"a b c", "'c'", "unexpected argument"},       {"-f", "missing argument", "prog IN"},
 };
 
-START_TEST(cli_refused)
+LOOP_TEST(cli_refused, COUNT(bad_lines))
 {
   values v = {0};
   const char *p[2];
   ck_bad(parse(&v, p, bad_lines[_i].line), SF_E_USAGE, bad_lines[_i].name, bad_lines[_i].problem);
 }
-END_TEST
 
 /* What would be lost at the end is refused at the start; nothing stays behind, and no file is changed. */
-START_TEST(cli_outputs)
+TEST(cli_outputs)
 {
   static const char *const lines[][3] = {
       {"a -o a", "--output", "is the input"},        {"b -o ./a", "--output", "is the input"},
@@ -640,29 +600,38 @@ START_TEST(cli_outputs)
                                      "in --log none/c", "in --word c -o c", "in --start c -o c"};
   const char *p[2];
   ck_assert_int_eq(chdir(folder), 0);
-  ck_good(sf_write_file("a", "a", 1));
+  ck_ok(sf_write_file("a", "a", 1));
   ck_assert_int_eq(symlink("a", "b"), 0);
-  ck_good(sf_make_dir("d"));
+  ck_ok(sf_make_dir("d"));
   for (int i = 0; i < COUNT(lines); i++) ck_bad(parse_paths(lines[i][0], p), SF_E_USAGE, lines[i][1], lines[i][2]);
   for (int i = 0; i < COUNT(unwritable); i++)
     ck_bad(parse_paths(unwritable[i], p), SF_E_IO, "cannot write", strrchr(unwritable[i], ' ') + 1);
-  for (int i = 0; i < COUNT(good); i++) ck_good(parse_paths(good[i], p));
+  for (int i = 0; i < COUNT(good); i++) ck_ok(parse_paths(good[i], p));
   ck_assert_int_eq(entries(), 3);
 }
-END_TEST
 
-START_TEST(cli_help_exits_zero)
+/* How a process ends that does this. */
+static int end_of(void (*act)(void))
+{
+  int status;
+  const pid_t child = fork();
+  if (child == 0) {
+    act();
+    _exit(9);
+  }
+  ck_assert_int_eq(waitpid(child, &status, 0), child);
+  return status;
+}
+
+static void ask_for_help(void)
 {
   values v = {0};
   const char *p[2];
-  ck_assert_ptr_nonnull(freopen(in("help"), "w", stdout));
-  parse(&v, p, "--help");
-  exit(9);
+  if (freopen(in("help"), "w", stdout)) parse(&v, p, "--help");
 }
-END_TEST
 
 /* Groups in the order of the table, lines of at most 80 columns, defaults under their columns. */
-START_TEST(cli_help_in_groups)
+TEST(cli_help_in_groups)
 {
   static const char wanted[] =
       "Usage: prog\n\nFirst:\n  -o, --out FILE            a file\n"
@@ -691,14 +660,18 @@ START_TEST(cli_help_in_groups)
   fclose(stdout);
   char *text;
   size_t size;
-  ck_good(sf_read_file(in("help"), 4000, &text, &size));
+  ck_ok(sf_read_file(in("help"), 4000, &text, &size));
   ck_assert_str_eq(text, wanted);
   free(text);
   ck_bad(parse_line(&cli, (const char *[]){NULL}, "Sizes"), SF_E_USAGE, "unexpected", "Sizes"); /* no option */
 }
-END_TEST
 
-START_TEST(cli_exit_status)
+TEST(cli_help_exits_zero)
+{
+  ck_assert_int_eq(end_of(ask_for_help), 0);
+}
+
+TEST(cli_exit_status)
 {
   const sf_cli cli = {.program = "prog"};
   ck_assert_ptr_nonnull(freopen(in("err"), "w", stderr));
@@ -711,13 +684,12 @@ START_TEST(cli_exit_status)
   fclose(stderr);
   char *text;
   size_t n;
-  ck_good(sf_read_file(in("err"), 1000, &text, &n));
+  ck_ok(sf_read_file(in("err"), 1000, &text, &n));
   ck_assert_str_eq(text, "prog: u (see prog --help)\nprog: s\nprog: i\nprog: d\n");
   free(text);
 }
-END_TEST
 
-START_TEST(cli_full_standard_output_is_an_error)
+TEST(cli_full_standard_output_is_an_error)
 {
   const sf_cli cli = {.program = "prog"};
   ck_assert_ptr_nonnull(freopen("/dev/full", "w", stdout));
@@ -725,26 +697,29 @@ START_TEST(cli_full_standard_output_is_an_error)
   printf("text");
   ck_assert_int_eq(sf_cli_finish(&cli, sf_ok()), 1);
 }
-END_TEST
 
-START_TEST(first_signal_asks_to_stop)
+TEST(first_signal_asks_to_stop)
 {
   sf_cli_catch_signals();
   ck_assert(!sf_cli_interrupted());
   raise(SIGINT);
   ck_assert(sf_cli_interrupted());
 }
-END_TEST
 
-START_TEST(second_signal_kills)
+static void two_signals(void)
 {
   sf_cli_catch_signals();
   raise(SIGTERM);
   raise(SIGTERM);
 }
-END_TEST
 
-START_TEST(progress_is_sparse_in_logs)
+TEST(second_signal_kills)
+{
+  const int status = end_of(two_signals);
+  ck_assert(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+}
+
+TEST(progress_is_sparse_in_logs)
 {
   sf_progress p;
   ck_assert_ptr_nonnull(freopen(in("err"), "w", stderr));
@@ -763,16 +738,15 @@ START_TEST(progress_is_sparse_in_logs)
   fclose(stderr);
   char *text;
   size_t n;
-  ck_good(sf_read_file(in("err"), 1000, &text, &n));
+  ck_ok(sf_read_file(in("err"), 1000, &text, &n));
   ck_assert_str_eq(text, "shown\n");
   free(text);
 }
-END_TEST
 
 /* ---- random numbers ---- */
 
 /* First outputs of SplitMix64 with seed 0 (Vigna's splitmix64.c), which sf_mix64 must mix as. */
-START_TEST(mixing_is_splitmix64)
+TEST(mixing_is_splitmix64)
 {
   ck_assert_uint_eq(sf_mix64(0x9e3779b97f4a7c15u), 0xe220a8397b1dcdafu);
   ck_assert_uint_eq(sf_mix64(2 * 0x9e3779b97f4a7c15u), 0x6e789e6aa1b965f4u);
@@ -782,54 +756,5 @@ START_TEST(mixing_is_splitmix64)
     ck_assert_uint_lt(sf_random_below(3, 2, i, 7), 7);
   }
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("base");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60); /* a pipe of 256 MiB on a busy machine */
-  tcase_add_test(t, status_is_one_line_and_fits);
-  tcase_add_test(t, try_returns_the_failure);
-  tcase_add_test(t, file_round_trip);
-  tcase_add_test(t, unreadable_files);
-  tcase_add_test(t, pipes_are_read_up_to_a_limit);
-  tcase_add_test(t, unwritable_targets_are_left_alone);
-  tcase_add_test(t, full_disk_keeps_the_old_file);
-  tcase_add_test(t, what_a_killed_save_left_is_taken);
-  tcase_add_test(t, writer_abort_and_links);
-  tcase_add_test(t, folders_with_parents);
-  tcase_add_test(t, json_round_trip);
-  tcase_add_loop_test(t, json_faults_name_line_and_column, 0, COUNT(bad_json));
-  tcase_add_test(t, json_with_a_zero_byte);
-  tcase_add_test(t, tensors_round_trip);
-  tcase_add_test(t, tensors_layout);
-  tcase_add_loop_test(t, tensors_refused, 0, COUNT(bad_tensors));
-  tcase_add_test(t, tensors_header_length);
-  tcase_add_test(t, tensors_survive_damage);
-  tcase_add_test(t, tensors_unaligned_file);
-  tcase_add_test(t, tensors_not_saved);
-  tcase_add_test(t, cli_values);
-  tcase_add_loop_test(t, cli_refused, 0, COUNT(bad_lines));
-  tcase_add_test(t, cli_outputs);
-  tcase_add_test(t, cli_help_in_groups);
-  tcase_add_test(t, cli_exit_status);
-  tcase_add_test(t, cli_full_standard_output_is_an_error);
-  tcase_add_test(t, first_signal_asks_to_stop);
-  tcase_add_test(t, progress_is_sparse_in_logs);
-  tcase_add_test(t, mixing_is_splitmix64);
-  if (getenv("SF_CROSSCHECK")) tcase_add_test(t, tensors_crosscheck);
-  suite_add_tcase(s, t);
-  TCase *ends = tcase_create("ends the process");
-  tcase_add_unchecked_fixture(ends, make_folder, remove_folder);
-  tcase_add_exit_test(ends, cli_help_exits_zero, 0);
-  tcase_add_test_raise_signal(ends, second_signal_kills, SIGTERM);
-  suite_add_tcase(s, ends);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -28,11 +28,11 @@ static void check_layout(const sf_batch *b)
 }
 
 /* Where samples leave there may be more blocks, but no more than there is room for. */
-START_TEST(fewer_samples_may_take_more_blocks)
+TEST(fewer_samples_may_take_more_blocks)
 {
   static const int count[] = {384, 128, 2, 510};
-  sf_batch b;
-  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  OWNED(sf_batch) b;
+  ck_ok(sf_batch_create(&b, 1 << 14, 8));
   b.rays = 4;
   for (int r = 0; r < 4; r++) b.ray[r].count = count[r];
   sf_batch_pack(&b);
@@ -48,9 +48,7 @@ START_TEST(fewer_samples_may_take_more_blocks)
     sf_batch_pack(&b);
     ck_assert_int_le(b.blocks, sf_batch_blocks(samples));
   }
-  sf_batch_free(&b);
 }
-END_TEST
 
 static double empty_lanes(const sf_batch *b)
 {
@@ -59,10 +57,10 @@ static double empty_lanes(const sf_batch *b)
   return 1 - used / ((double)b->blocks * SF_BLOCK);
 }
 
-START_TEST(every_ray_is_in_one_bundle)
+TEST(every_ray_is_in_one_bundle)
 {
-  sf_batch b;
-  ck_good(sf_batch_create(&b, 1 << 14, 8));
+  OWNED(sf_batch) b;
+  ck_ok(sf_batch_create(&b, 1 << 14, 8));
   for (uint64_t seed = 0; seed < 60; seed++) {
     const uint64_t longest = seed % 4 == 0 ? 1025 : seed % 4 == 1 ? 2 : 40; /* long, nearly empty, usual rays */
     b.rays = 1 + (int)sf_random_below(seed, 1, 0, 2000);
@@ -75,21 +73,18 @@ START_TEST(every_ray_is_in_one_bundle)
   for (int r = 0; r < b.rays; r++) b.ray[r].count = 0;
   sf_batch_pack(&b);
   check_layout(&b);
-  sf_batch_free(&b);
 }
-END_TEST
 
 /* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
  * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. */
-START_TEST(compaction_keeps_what_light_reaches)
+TEST(compaction_keeps_what_light_reaches)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
   o.stage1 = 110;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
-  ck_good(sf_batch_draw(t));
+  ck_ok(sf_batch_draw(t));
   sf_batch *b = &t->batch;
   const int rays = b->rays;
   for (int i = 0; i < b->blocks * SF_BLOCK; i++) b->delta[i] *= 30; /* light ends, sample by sample */
@@ -132,25 +127,11 @@ START_TEST(compaction_keeps_what_light_reaches)
   ck_assert_int_le(differ, 1); /* float sums of another order at the limit */
   free(expected);
   free(first_x);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 static void set_up(void)
 {
-  make_scene(4);
+  open_scene(4);
 }
 
-int main(void)
-{
-  Suite *s = suite_create("batch");
-  TCase *c = tcase_create("batch");
-  tcase_set_timeout(c, 60);
-  tcase_add_unchecked_fixture(c, set_up, remove_folder);
-  tcase_add_test(c, every_ray_is_in_one_bundle);
-  tcase_add_test(c, fewer_samples_may_take_more_blocks);
-  tcase_add_test(c, compaction_keeps_what_light_reaches);
-  suite_add_tcase(s, c);
-  return ck_run_in(s, CK_NOFORK); // OpenMP does not survive a fork
-}
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

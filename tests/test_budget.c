@@ -4,13 +4,11 @@
 #include "quant/quant.h"
 #include "tests/float_fixture.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SHORT = 200000 };
 
 /* A bound 16 times the largest error seen would say nothing. Sums of currents are exact: their bound is zero. */
-START_TEST(bound_holds_and_bites)
+LOOP_TEST(bound_holds_and_bites, SF_BUDGET_BLOCKS)
 {
   const sf_budget_row row = sf_budget_measure((sf_budget_id)_i, SHORT);
   ck_assert_uint_gt(row.inputs, 0);
@@ -21,7 +19,6 @@ START_TEST(bound_holds_and_bites)
   else
     ck_assert_msg(row.ratio >= 1.0 / 16, "%s: the bound %g is idle, error %g", row.block, row.bound, row.measured);
 }
-END_TEST
 
 enum { SIZE = 40 };
 
@@ -49,8 +46,7 @@ static sf_view make_view(const sf_model *m, uint16_t *rgba)
                         .image = {SIZE, SIZE, rgba}};
   for (int i = 0; i < SIZE * SIZE; i++)
     sf_camera_ray(&view.camera, (float)(i % SIZE) + 0.5f, (float)(i / SIZE) + 0.5f, origin[i], direction[i]);
-  const sf_status status = sf_render_rays(m, origin[0], direction[0], SIZE * SIZE, 3, white, rgb[0], NULL, NULL, NULL);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_render_rays(m, origin[0], direction[0], SIZE * SIZE, 3, white, rgb[0], NULL, NULL, NULL));
   for (int i = 0; i < SIZE * SIZE; i++) {
     for (int o = 0; o < 3; o++) rgba[4 * i + o] = (uint16_t)lrintf(fminf(rgb[i][o], 1) * 65535);
     rgba[4 * i + 3] = 65535;
@@ -66,10 +62,9 @@ static sf_picture_budget make_picture(sf_model *m)
   const sf_dataset data = {.scale = 1};
   const sf_view view = make_view(m, rgba);
   const sf_quant_options options = {.background = {1, 1, 1}, .seed = 1};
-  ck_assert_int_eq(sf_quantise(&scene, m, "model", &options).code, SF_OK);
+  ck_ok(sf_quantise(&scene, m, "model", &options));
   const sf_picture_job job = {m, &scene, &data, &view, "scene", 60, 3, NULL, NULL};
-  const sf_status status = sf_picture_budget_make(&job, &budget);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_picture_budget_make(&job, &budget));
   float *w4 = sf_model_param(m, SF_P_C2);
   const size_t last = m->param[SF_P_C2].size - 1;
   for (size_t i = 0; i <= last / 2; i++) { /* another model's */
@@ -88,9 +83,9 @@ static sf_picture_budget make_picture(sf_model *m)
 /* With no block replaced: the core, bit for bit (checked inside) and without a flip. With all replaced: the float
  * renderer, but for its own rounding in 24 bits (a neuron at its threshold may flip) and that of the grid's scale.
  * What does not reach the spikes flips none. */
-START_TEST(picture_from_fixed_to_float)
+LOOP_TEST(picture_from_fixed_to_float, SF_NODECAY + 1)
 {
-  sf_model m = make_model((sf_input_mode)_i);
+  OWNED(sf_model) m = make_model((sf_input_mode)_i);
   const sf_picture_budget b = make_picture(&m);
   const sf_exact_row *none = &b.row[0], *all = &b.row[SF_EXACT_ROWS - 1];
   ck_assert_uint_gt(b.samples, 500);
@@ -106,13 +101,11 @@ START_TEST(picture_from_fixed_to_float)
          all->psnr_truth);
   ck_assert_double_gt(all->psnr_truth, 55);
   ck_assert_double_gt(all->psnr_truth, none->psnr_truth + 10);
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(currents_within_their_bounds)
+TEST(currents_within_their_bounds)
 {
-  sf_model m = make_model(SF_HYBRID);
+  OWNED(sf_model) m = make_model(SF_HYBRID);
   const sf_picture_budget b = make_picture(&m);
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_uint_gt(b.current[l].currents, 1000);
@@ -120,18 +113,6 @@ START_TEST(currents_within_their_bounds)
                   b.current[l].ratio);
     ck_assert_double_lt(b.current[l].rms, b.current[l].bound);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("budget");
-  TCase *cases = tcase_create("blocks");
-  tcase_set_timeout(cases, 120);
-  tcase_add_loop_test(cases, bound_holds_and_bites, 0, SF_BUDGET_BLOCKS);
-  tcase_add_loop_test(cases, picture_from_fixed_to_float, SF_HYBRID, SF_NODECAY + 1);
-  tcase_add_test(cases, currents_within_their_bounds);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

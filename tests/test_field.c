@@ -3,15 +3,13 @@
 #include "float_fixture.h"
 #include "snn/kernels.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* torch-ngp at bound 1: 16 levels, 2^19, 16..2048: 6 119 864 entries, dense up to 59, hashed from 81. */
-START_TEST(layout_is_torch_ngp)
+TEST(layout_is_torch_ngp)
 {
   sf_config c = sf_config_default();
-  sf_model m;
-  ck_assert_int_eq(sf_model_create(&m, &c).code, SF_OK);
+  OWNED(sf_model) m;
+  ck_ok(sf_model_create(&m, &c));
   size_t entries = 0;
   for (int l = 0; l < 16; l++) entries += m.level[l].entries;
   ck_assert_uint_eq(entries, 6119864);
@@ -19,14 +17,12 @@ START_TEST(layout_is_torch_ngp)
   for (int l = 0; l < 16; l++) dense += m.level[l].stride != 0;
   ck_assert_int_eq(dense, 5);
   ck_assert_uint_eq(m.level[4].stride, 60);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* Trilinear weights sum to one: a constant table gives the constant, at faces and corners too. */
-START_TEST(constant_table_gives_constant)
+TEST(constant_table_gives_constant)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   for (size_t i = 0; i < m.param[SF_P_GRID].size; i++) m.value[i] = 0.75f;
   for (int i = 0; i < 500; i++) {
     float x[3], f[32];
@@ -34,9 +30,7 @@ START_TEST(constant_table_gives_constant)
     sf_grid_features(&m, x, f);
     for (int j = 0; j < 8; j++) ck_assert_float_eq_tol(f[j], 0.75f, 1e-6f);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 static void positions(float *x)
 {
@@ -45,10 +39,10 @@ static void positions(float *x)
   x[1] = x[SF_BLOCK + 1] = x[2 * SF_BLOCK + 1] = 1;
 }
 
-START_TEST(kernels_equal_oracle)
+TEST(kernels_equal_oracle)
 {
   static const char *const isa[] = {"portable", "avx2", "avx512"};
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   float x[3 * SF_BLOCK], out[2 * SF_BLOCK];
   positions(x);
   for (int i = 0; i < 3; i++) {
@@ -66,15 +60,13 @@ START_TEST(kernels_equal_oracle)
       }
     }
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 /* The features are linear in the table, so <d, forward(table)> = <backward(d), table> for any d and table. */
-START_TEST(backward_is_the_adjoint)
+TEST(backward_is_the_adjoint)
 {
   const sf_kernels *k = sf_kernels_select(NULL);
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   float x[3 * SF_BLOCK], out[2 * SF_BLOCK], d[2 * SF_BLOCK];
   positions(x);
   for (int i = 0; i < 2 * SF_BLOCK; i++) d[i] = test_random(1u << 26 | i);
@@ -88,12 +80,10 @@ START_TEST(backward_is_the_adjoint)
     ck_assert_double_eq_tol(left, right, 1e-4);
     free(grad);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 /* Orthonormal on the sphere: Monte Carlo over 200 000 directions, standard error below 4 pi / sqrt(n) / 3 = 0.01. */
-START_TEST(harmonics_are_orthonormal)
+TEST(harmonics_are_orthonormal)
 {
   enum { N = 200000 };
   static double product[16][16];
@@ -107,19 +97,4 @@ START_TEST(harmonics_are_orthonormal)
   }
   for (int a = 0; a < 16; a++)
     for (int b = 0; b < 16; b++) ck_assert_double_eq_tol(product[a][b], a == b, 0.03);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("field");
-  TCase *tc = tcase_create("field");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, layout_is_torch_ngp);
-  tcase_add_test(tc, constant_table_gives_constant);
-  tcase_add_test(tc, kernels_equal_oracle);
-  tcase_add_test(tc, backward_is_the_adjoint);
-  tcase_add_test(tc, harmonics_are_orthonormal);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
 }

@@ -42,7 +42,7 @@ static sf_fit_rays make_rays(const fx_scene *scene, uint64_t count, uint32_t noi
   }
   uint32_t *picture = calloc(count, 3 * sizeof *picture);
   sf_fit_sum sum;
-  ck_good(sf_fit_measure(scene, &rays, 0, count, picture, &sum));
+  ck_ok(sf_fit_measure(scene, &rays, 0, count, picture, &sum));
   for (uint64_t i = 0; i < 3 * count; i++)
     rays.target[i] = (picture[i] + (uint32_t)sf_random_below(3, 0, i, noise + 1)) % 65536;
   free(picture);
@@ -55,10 +55,10 @@ static void assert_same_pixels(const fx_scene *a, const fx_scene *b, const sf_fi
   for (uint64_t i = 0; i < rays->count; i++) {
     fx_ray x, y;
     fx_pixel p, q;
-    ck_good(sf_fx_ray_make(a, rays->origin + 3 * i, rays->direction + 3 * i, &x));
-    ck_good(sf_fx_ray_make(b, rays->origin + 3 * i, rays->direction + 3 * i, &y));
-    ck_good(fx_render_ray(a, &x, NULL, NULL, &p, NULL));
-    ck_good(fx_render_ray(b, &y, NULL, NULL, &q, NULL));
+    ck_ok(sf_fx_ray_make(a, rays->origin + 3 * i, rays->direction + 3 * i, &x));
+    ck_ok(sf_fx_ray_make(b, rays->origin + 3 * i, rays->direction + 3 * i, &y));
+    ck_ok(fx_render_ray(a, &x, NULL, NULL, &p, NULL));
+    ck_ok(fx_render_ray(b, &y, NULL, NULL, &q, NULL));
     ck_assert_msg(!memcmp(&p, &q, sizeof p), "ray %llu differs", (unsigned long long)i);
     samples += p.samples;
   }
@@ -97,45 +97,42 @@ static void expect_dropped(const fx_scene *scene, const fx_scene *trimmed)
   ck_assert_int_lt(trimmed->net.layer[FX_C1].n_in, scene->net.layer[FX_C1].n_in - 1);
 }
 
-START_TEST(without_effect_changes_no_bit)
+LOOP_TEST(without_effect_changes_no_bit, 3)
 {
   fx_scene scene = small_scene(11, _i), trimmed;
   spoil(&scene);
   sf_fit_rays rays = make_rays(&scene, RAYS, 0);
   sf_trim_use use;
   sf_trim trim;
-  ck_good(sf_trim_use_create(&use, &scene));
-  ck_good(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
+  ck_ok(sf_trim_use_create(&use, &scene));
+  ck_ok(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
   sf_trim_all(&scene, &trim);
-  ck_good(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
   ck_assert_int_eq(trimmed.grid.entries, scene.grid.entries);
   ck_assert_mem_eq(trimmed.grid.table, scene.grid.table, 2 * (size_t)scene.grid.entries);
   fx_scene_free(&trimmed);
   sf_trim_exact(&scene, &use, &trim);
-  ck_good(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
-  ck_good(fx_scene_check(&trimmed, "exact"));
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
+  ck_ok(fx_scene_check(&trimmed, "exact"));
   expect_dropped(&scene, &trimmed);
   assert_same_pixels(&scene, &trimmed, &rays);
   sf_trim_use_free(&use), sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
 }
-END_TEST
 
 /* A net that never fires keeps one neuron a layer. */
-START_TEST(something_is_left_of_a_silent_net)
+TEST(something_is_left_of_a_silent_net)
 {
-  fx_scene scene = small_scene(12, FX_HYBRID), trimmed;
+  OWNED(fx_scene) scene = small_scene(12, FX_HYBRID), trimmed;
   for (int l = 0; l < SF_LAYERS; l++) memset(scene.net.layer[l].w, 0, (size_t)scene.net.layer[l].n_in * SF_LANES);
-  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
   const fx_scene *candidate[] = {&scene};
   const sf_fit_job job = {.candidate = candidate, .widths = widest, .candidates = 1, .rays = &rays, .name = "silent"};
   sf_fit_report report;
-  ck_good(sf_fit(&trimmed, &job, &report));
+  ck_ok(sf_fit(&trimmed, &job, &report));
   for (int l = FX_D1; l <= FX_C2; l++) ck_assert_int_eq(trimmed.net.layer[l].n_out, 1);
   ck_assert_int_eq(trimmed.grid.levels, 1);
   assert_same_pixels(&scene, &trimmed, &rays);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
 }
-END_TEST
 
 /* ---- tables ---- */
 
@@ -151,9 +148,9 @@ static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
   }
 }
 
-START_TEST(corners_are_all_that_a_position_reads)
+TEST(corners_are_all_that_a_position_reads)
 {
-  fx_scene scene = small_scene(13, FX_HYBRID);
+  OWNED(fx_scene) scene = small_scene(13, FX_HYBRID);
   int8_t *all = malloc(2 * (size_t)scene.grid.entries);
   memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
   for (uint64_t i = 0; i < 200; i++) {
@@ -175,13 +172,12 @@ START_TEST(corners_are_all_that_a_position_reads)
     fx_grid_features(&scene.grid, pos, g, NULL);
     ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
   }
-  free(all), fx_scene_free(&scene);
+  free(all);
 }
-END_TEST
 
-START_TEST(unread_entries_are_not_read)
+TEST(unread_entries_are_not_read)
 {
-  fx_scene scene = small_scene(14, FX_HYBRID);
+  OWNED(fx_scene) scene = small_scene(14, FX_HYBRID);
   memset(scene.occupancy, 0, 64);
   scene.occupancy[9] = 0x21, scene.occupancy[40] = 0x80;
   int8_t *all = malloc(2 * (size_t)scene.grid.entries);
@@ -201,9 +197,8 @@ START_TEST(unread_entries_are_not_read)
     fx_grid_features(&scene.grid, pos, g, NULL);
     ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
   }
-  free(all), free(cleared), fx_scene_free(&scene);
+  free(all), free(cleared);
 }
-END_TEST
 
 static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
 {
@@ -218,7 +213,7 @@ static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
 }
 
 /* What is used keeps its value in a smaller table, dense levels and hashed ones, unless it meets something used. */
-START_TEST(smaller_tables_keep_what_is_used)
+TEST(smaller_tables_keep_what_is_used)
 {
   fx_scene scene = small_scene(15, FX_HYBRID), small_one;
   int compared = 0;
@@ -228,12 +223,12 @@ START_TEST(smaller_tables_keep_what_is_used)
     sf_trim_use use;
     sf_trim trim;
     random_position(&scene, i, pos);
-    ck_good(sf_trim_use_create(&use, &scene));
+    ck_ok(sf_trim_use_create(&use, &scene));
     sf_trim_use_place(&use, &scene, pos, 1000);
     sf_trim_all(&scene, &trim);
     for (int l = 0; l < scene.grid.levels; l++) trim.log2_size[l] = sf_trim_smaller(&scene, &trim, l);
-    ck_good(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
-    ck_good(fx_scene_check(&small_one, "smaller"));
+    ck_ok(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
+    ck_ok(fx_scene_check(&small_one, "smaller"));
     ck_assert_int_lt(small_one.grid.entries, scene.grid.entries);
     fx_grid_features(&scene.grid, pos, f, NULL);
     fx_grid_features(&small_one.grid, pos, g, NULL);
@@ -247,7 +242,6 @@ START_TEST(smaller_tables_keep_what_is_used)
   ck_assert_int_gt(compared, 200);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- the search ---- */
 
@@ -263,14 +257,14 @@ static sf_status fit(const fx_scene *const *candidate, int candidates, const sf_
   return sf_fit(fitted, &job, report);
 }
 
-START_TEST(no_loss_is_no_difference)
+LOOP_TEST(no_loss_is_no_difference, 3)
 {
-  fx_scene scene = small_scene(16, _i), fitted;
+  OWNED(fx_scene) scene = small_scene(16, _i), fitted;
   spoil(&scene);
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r;
-  ck_good(fit(candidate, 1, &rays, 0, &fitted, &r));
+  ck_ok(fit(candidate, 1, &rays, 0, &fitted, &r));
   expect_dropped(&scene, &fitted);
   assert_same_pixels(&scene, &fitted, &rays);
   ck_assert_uint_eq(r.before.sum.error, r.after.sum.error);
@@ -279,27 +273,23 @@ START_TEST(no_loss_is_no_difference)
   for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(r.dropped[l], 0);
   ck_assert_int_eq(r.dropped_levels + r.smaller_tables, 0);
   ck_assert_int_eq(r.idle_levels, 1);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted);
 }
-END_TEST
 
 /* Measured here once more, through the file. */
-START_TEST(the_bound_is_kept)
+TEST(the_bound_is_kept)
 {
-  fx_scene scene = small_scene(17, FX_HYBRID), fitted, loaded;
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(fx_scene) scene = small_scene(17, FX_HYBRID), fitted, loaded;
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   const double bound = 0.5;
   sf_fit_report r;
   sf_fit_sum before, after;
-  ck_good(fit(candidate, 1, &rays, bound, &fitted, &r));
-  make_folder();
-  ck_good(fx_scene_save(&fitted, in("fitted.snn")));
-  ck_good(fx_scene_load(&loaded, in("fitted.snn")));
-  remove_folder();
+  ck_ok(fit(candidate, 1, &rays, bound, &fitted, &r));
+  ck_ok(fx_scene_save(&fitted, in("fitted.snn")));
+  ck_ok(fx_scene_load(&loaded, in("fitted.snn")));
   const uint64_t first = r.first_checked, end = first + r.checked;
-  ck_good(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
-  ck_good(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
+  ck_ok(sf_fit_measure(&scene, &rays, first, end, NULL, &before));
+  ck_ok(sf_fit_measure(&loaded, &rays, first, end, NULL, &after));
   ck_assert_uint_eq(before.error, r.before.sum.error);
   ck_assert_uint_eq(after.error, r.after.sum.error);
   ck_assert_mem_eq(&after.counts, &r.after.sum.counts, sizeof after.counts);
@@ -307,20 +297,18 @@ START_TEST(the_bound_is_kept)
   ck_assert_double_le(r.loss_db, bound);
   ck_assert_uint_lt(r.after.energy_fj, r.before.energy_fj); /* the bound was used for something */
   ck_assert_uint_lt(r.after.bytes, r.before.bytes);
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&fitted), fx_scene_free(&loaded);
 }
-END_TEST
 
-START_TEST(threads_do_not_matter)
+TEST(threads_do_not_matter)
 {
-  fx_scene scene = small_scene(18, FX_HYBRID), a, b;
-  sf_fit_rays rays = make_rays(&scene, RAYS, 9000);
+  OWNED(fx_scene) scene = small_scene(18, FX_HYBRID), a, b;
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
   const fx_scene *candidate[] = {&scene};
   sf_fit_report r, q;
   omp_set_num_threads(1);
-  ck_good(fit(candidate, 1, &rays, 0.3, &a, &r));
+  ck_ok(fit(candidate, 1, &rays, 0.3, &a, &r));
   omp_set_num_threads(3);
-  ck_good(fit(candidate, 1, &rays, 0.3, &b, &q));
+  ck_ok(fit(candidate, 1, &rays, 0.3, &b, &q));
   ck_assert_mem_eq(&r.after.sum, &q.after.sum, sizeof r.after.sum);
   ck_assert_int_eq(a.grid.entries, b.grid.entries);
   ck_assert_mem_eq(a.grid.table, b.grid.table, 2 * (size_t)a.grid.entries);
@@ -328,27 +316,24 @@ START_TEST(threads_do_not_matter)
     ck_assert_int_eq(a.net.layer[l].n_in, b.net.layer[l].n_in);
     ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
   }
-  sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&a), fx_scene_free(&b);
 }
-END_TEST
 
 /* Of the candidates the last one that is good enough; all is measured against the first. */
-START_TEST(candidates)
+TEST(candidates)
 {
   fx_scene scene = small_scene(19, FX_HYBRID), same = small_scene(19, FX_HYBRID), worse = small_scene(20, FX_HYBRID);
   fx_scene fitted;
   sf_fit_rays rays = make_rays(&scene, RAYS, 3000);
   const fx_scene *candidate[] = {&scene, &same, &worse};
   sf_fit_report r;
-  ck_good(fit(candidate, 3, &rays, 0.1, &fitted, &r));
+  ck_ok(fit(candidate, 3, &rays, 0.1, &fitted, &r));
   ck_assert_int_eq(r.chosen, 1);
   ck_assert_double_le(r.loss_db, 0.1);
   fx_scene_free(&fitted);
-  ck_good(fit(candidate, 3, &rays, 0, &fitted, &r));
+  ck_ok(fit(candidate, 3, &rays, 0, &fitted, &r));
   ck_assert_int_eq(r.chosen, 0);
   sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&same), fx_scene_free(&worse), fx_scene_free(&fitted);
 }
-END_TEST
 
 static bool stop_at_once(void *user, const char *what, int done, int total)
 {
@@ -356,7 +341,7 @@ static bool stop_at_once(void *user, const char *what, int done, int total)
   return false;
 }
 
-START_TEST(refusals)
+TEST(refusals)
 {
   fx_scene scene = small_scene(21, FX_HYBRID), fitted;
   sf_fit_rays rays = make_rays(&scene, RAYS, 0);
@@ -388,45 +373,31 @@ START_TEST(refusals)
   ck_bad(sf_fit_rays_draw(&none, &data, scene.background, 10, 0), SF_E_FORMAT, "dir", "r_7");
   sf_fit_rays_free(&rays), fx_scene_free(&scene);
 }
-END_TEST
 
 /* Straight alpha over the background: half of red over white. */
-START_TEST(targets)
+TEST(targets)
 {
   uint16_t rgba[4] = {65535, 0, 0, 32768};
   sf_view view = {.name = "r_0", .camera = {.width = 1, .height = 1, .fx = 1, .fy = 1}, .image = {1, 1, rgba}};
   const sf_dataset data = {.path = "dir", .view = &view, .count = 1};
   const int32_t white[3] = {65536, 65536, 65536}, black[3] = {0};
   sf_fit_rays rays;
-  ck_good(sf_fit_rays_draw(&rays, &data, white, 5, 0));
+  ck_ok(sf_fit_rays_draw(&rays, &data, white, 5, 0));
   ck_assert_uint_eq(rays.target[12], 65535);
   ck_assert_uint_eq(rays.target[13], 32767);
   ck_assert_double_eq(rays.pixels, 1);
   sf_fit_rays_free(&rays);
-  ck_good(sf_fit_rays_draw(&rays, &data, black, 5, 0));
+  ck_ok(sf_fit_rays_draw(&rays, &data, black, 5, 0));
   ck_assert_uint_eq(rays.target[12], 32768);
   ck_assert_uint_eq(rays.target[13], 0);
   sf_fit_rays_free(&rays);
 }
-END_TEST
+
+int ck_timeout = 120;
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
 
 int main(void)
 {
   omp_set_num_threads(1); /* many small parallel regions: threads would wait for each other on a busy machine */
-  Suite *suite = suite_create("fit");
-  TCase *tc = tcase_create("fit");
-  tcase_set_timeout(tc, 120);
-  tcase_add_loop_test(tc, without_effect_changes_no_bit, 0, 3);
-  tcase_add_test(tc, something_is_left_of_a_silent_net);
-  tcase_add_test(tc, corners_are_all_that_a_position_reads);
-  tcase_add_test(tc, unread_entries_are_not_read);
-  tcase_add_test(tc, smaller_tables_keep_what_is_used);
-  tcase_add_loop_test(tc, no_loss_is_no_difference, 0, 3);
-  tcase_add_test(tc, the_bound_is_kept);
-  tcase_add_test(tc, threads_do_not_matter);
-  tcase_add_test(tc, candidates);
-  tcase_add_test(tc, refusals);
-  tcase_add_test(tc, targets);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
+  return ck_main();
 }

@@ -4,7 +4,7 @@
 #include "tests/fx_fixture.h"
 #include <math.h>
 
-START_TEST(rounding_is_half_up)
+TEST(rounding_is_half_up)
 {
   ck_assert_int_eq(fx_rshift_round(5, 0), 5);
   ck_assert_int_eq(fx_rshift_round(5, 1), 3);
@@ -18,10 +18,9 @@ START_TEST(rounding_is_half_up)
   ck_assert_int_eq(fx_usat(-1, 28), 0);
   ck_assert_int_eq(fx_usat((int64_t)1 << 28, 28), ((int64_t)1 << 28) - 1);
 }
-END_TEST
 
 /* The error over every input is a row of the error budget (test_budget); here are the shape and the ends. */
-START_TEST(exp2_every_input)
+TEST(exp2_every_input)
 {
   uint32_t before = 0;
   for (int32_t y = -131072; y <= 131071; y++) {
@@ -33,10 +32,9 @@ START_TEST(exp2_every_input)
   ck_assert_uint_eq(fx_exp2(0), 4096);
   ck_assert_uint_eq(fx_exp2(-131072), 0);
 }
-END_TEST
 
 /* The definition, bit for bit, with the tables computed afresh. */
-START_TEST(exp2_is_as_defined)
+TEST(exp2_is_as_defined)
 {
   for (int32_t y = -131072; y < 16 * 4096; y++) {
     const int32_t n = (int32_t)floor(y / 4096.0), fraction = y - n * 4096, i = fraction / 16, low = fraction % 16;
@@ -45,9 +43,8 @@ START_TEST(exp2_is_as_defined)
     ck_assert_int_eq(fx_exp2(y), n <= 12 ? naive_round(t, 12 - n) : t << (n - 12));
   }
 }
-END_TEST
 
-START_TEST(sigmoid_is_as_defined)
+TEST(sigmoid_is_as_defined)
 {
   for (int32_t x = -32767; x <= 32767; x++) {
     const int32_t m = abs(x), i = m / 128, low = m % 128;
@@ -58,9 +55,8 @@ START_TEST(sigmoid_is_as_defined)
   }
   ck_assert_uint_eq(fx_sigmoid(-32768), fx_sigmoid(-32767));
 }
-END_TEST
 
-START_TEST(arguments_saturate)
+TEST(arguments_saturate)
 {
   static const int32_t current[] = {-16256, -16255, -1, 0, 1, 2, 16255, 16256};
   for (uint64_t i = 0; i < 40000; i++) {
@@ -72,9 +68,8 @@ START_TEST(arguments_saturate)
     ck_assert_int_eq(fx_sigmoid_argument(c, &without), naive_scale(c, &without, 32768));
   }
 }
-END_TEST
 
-START_TEST(exp_neg_every_input)
+TEST(exp_neg_every_input)
 {
   uint32_t before = 1 << 20;
   for (uint32_t tau = 0; tau <= 32u << 20; tau++) {
@@ -86,9 +81,8 @@ START_TEST(exp_neg_every_input)
   ck_assert_uint_eq(fx_exp_neg((32u << 20) + 1), 0);
   ck_assert_uint_eq(fx_exp_neg(UINT64_MAX), 0);
 }
-END_TEST
 
-START_TEST(sigmoid_every_input)
+TEST(sigmoid_every_input)
 {
   for (int32_t x = -32767; x <= 32767; x++) {
     const uint32_t s = fx_sigmoid(x);
@@ -96,7 +90,6 @@ START_TEST(sigmoid_every_input)
     ck_assert_uint_ge(s, fx_sigmoid(x - 1));
   }
 }
-END_TEST
 
 /* Corners of every argument and a random part: the step equals the equation in 64 bits, the vector form equals
  * the step, and in hybrid and decay mode the membrane stays between v and I. */
@@ -129,7 +122,7 @@ static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int3
   for (int o = 0; o < SF_LANES; o += 37) ck_assert(lane[o] == step.v && membrane[o] == step.membrane);
 }
 
-START_TEST(plif_corners)
+TEST(plif_corners)
 {
   static const int32_t value[] = {-8388608, -8388607, -4097, -4096, -2049, -2048, -2047, -1,      0,
                                   1,        2047,     2048,  2049,  4095,  4096,  4097,  8388606, 8388607};
@@ -141,9 +134,8 @@ START_TEST(plif_corners)
     check_neuron(value[i % VALUES], value[i / VALUES % VALUES], &layer, rest % 3, rest / 3);
   }
 }
-END_TEST
 
-START_TEST(plif_random)
+TEST(plif_random)
 {
   for (uint64_t i = 0; i < 100000; i++) {
     const int bits = (int)fixture_pick(7, 5, i, 1, 23);
@@ -154,9 +146,8 @@ START_TEST(plif_random)
                  &layer, (int32_t)fixture_pick(7, 4, i, 0, 2), i % 3 == 0);
   }
 }
-END_TEST
 
-START_TEST(plif_lanes_are_independent)
+TEST(plif_lanes_are_independent)
 {
   int32_t v[SF_LANES], in[SF_LANES], v_all[SF_LANES];
   const fx_layer layer = {.k = 1234, .theta = 5000};
@@ -175,9 +166,8 @@ START_TEST(plif_lanes_are_independent)
     }
   }
 }
-END_TEST
 
-START_TEST(integrators)
+TEST(integrators)
 {
   for (uint64_t i = 0; i < 200000; i++) {
     fx_net net = {.mode = (int32_t)(i % 3)};
@@ -197,9 +187,8 @@ START_TEST(integrators)
     }
   }
 }
-END_TEST
 
-START_TEST(compositing_conserves)
+TEST(compositing_conserves)
 {
   for (uint64_t ray = 0; ray < 2000; ray++) {
     fx_pixel pixel;
@@ -223,14 +212,13 @@ START_TEST(compositing_conserves)
     ck_assert_uint_eq(rgba[0], 65535);
   }
 }
-END_TEST
 
 /* Shift 17 puts the rounding of odd values on a tie, where a sum of weights one LSB short of 65536 shows; shift 5 puts
  * even +-1 just beyond the rails, on 2048. */
-START_TEST(grid_reproduces_constants)
+TEST(grid_reproduces_constants)
 {
   static const int shift[] = {5, 12, 17};
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   for (int value = -127; value <= 127; value += 2) {
     int16_t f[32];
     fx_counts counts = {0};
@@ -245,13 +233,11 @@ START_TEST(grid_reproduces_constants)
     }
     ck_assert_uint_eq(counts.saturated_features, 40 * 12);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(march_tests_every_point)
+TEST(march_tests_every_point)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 6);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 6);
   for (uint64_t i = 0; i < 300; i++) {
     fx_ray ray = {.count = (int32_t)fixture_pick(1, 9, i, 0, 300)};
     fx_counts counts = {0};
@@ -276,29 +262,6 @@ START_TEST(march_tests_every_point)
     ck_assert_int_eq(found, -1);
     ck_assert_uint_eq(counts.march_steps, tested);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx");
-  TCase *units = tcase_create("units");
-  tcase_set_timeout(units, 300);
-  tcase_add_test(units, rounding_is_half_up);
-  tcase_add_test(units, exp2_every_input);
-  tcase_add_test(units, exp2_is_as_defined);
-  tcase_add_test(units, exp_neg_every_input);
-  tcase_add_test(units, sigmoid_every_input);
-  tcase_add_test(units, sigmoid_is_as_defined);
-  tcase_add_test(units, arguments_saturate);
-  tcase_add_test(units, plif_corners);
-  tcase_add_test(units, plif_random);
-  tcase_add_test(units, plif_lanes_are_independent);
-  tcase_add_test(units, integrators);
-  tcase_add_test(units, compositing_conserves);
-  tcase_add_test(units, grid_reproduces_constants);
-  tcase_add_test(units, march_tests_every_point);
-  suite_add_tcase(suite, units);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

@@ -1,47 +1,8 @@
 /* Scene files: round trip, and every kind of damage refused with a message that names file and place. */
 #include "ck_run.h"
 #include "base/io.h"
+#include "scene_file_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
-#include <dirent.h>
-#include <stdio.h>
-#include <unistd.h>
-
-static char folder[256], path[300];
-
-/* Once, outside the test processes, so that the folder goes even when a test fails. */
-static void make_folder(void)
-{
-  const char *base = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/spikefield-fx-XXXXXX", base && *base ? base : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-}
-
-static int files_in_folder(bool remove_them)
-{
-  int count = 0;
-  DIR *dir = opendir(folder);
-  for (struct dirent *entry; (entry = readdir(dir));) {
-    char name[600];
-    if (entry->d_name[0] == '.' && (!entry->d_name[1] || !strcmp(entry->d_name, ".."))) continue;
-    count++;
-    snprintf(name, sizeof name, "%s/%s", folder, entry->d_name);
-    if (remove_them) unlink(name);
-  }
-  closedir(dir);
-  return count;
-}
-
-static void remove_folder(void)
-{
-  files_in_folder(true);
-  rmdir(folder);
-}
-
-static void setup(void)
-{
-  files_in_folder(true);
-  snprintf(path, sizeof path, "%s/scene.snn", folder);
-}
 
 static fx_scene small_scene(uint64_t seed)
 {
@@ -51,28 +12,7 @@ static fx_scene small_scene(uint64_t seed)
 
 static void save(const fx_scene *scene)
 {
-  const sf_status status = fx_scene_save(scene, path);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
-}
-
-/* Without the fsync of sf_write_file: some thousand times. */
-static void put(const char *data, size_t size)
-{
-  FILE *file = fopen(path, "wb");
-  ck_assert_ptr_nonnull(file);
-  ck_assert_uint_eq(fwrite(data, 1, size, file), size);
-  ck_assert_int_eq(fclose(file), 0);
-}
-
-/* Fails to load, the message names the file and `place`, and nothing is left behind. */
-static void assert_refused(const char *place)
-{
-  fx_scene scene;
-  const sf_status status = fx_scene_load(&scene, path);
-  ck_assert_msg(status.code != SF_OK, "loaded in spite of: %s", place);
-  ck_assert_msg(strstr(status.message, path) && strstr(status.message, place), "'%s' does not name '%s'",
-                status.message, place);
-  ck_assert_ptr_null(scene.owner);
+  ck_ok(fx_scene_save(scene, path));
 }
 
 static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
@@ -100,73 +40,66 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   for (int o = 0; o < 3; o++) ck_assert(a->units.to_box_offset[o] == b->units.to_box_offset[o]);
 }
 
-START_TEST(round_trip)
+TEST(round_trip)
 {
   for (uint64_t seed = 0; seed < 20; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
-    fx_scene scene = fixture_scene(&sizes, seed), again;
+    OWNED(fx_scene) scene = fixture_scene(&sizes, seed), again;
     scene.units.to_box_scale = 1.0 / 3, scene.units.dir_scale = 0x1p-11, scene.units.to_box_offset[1] = -1e6 / 7;
     scene.background[2] = 12345, scene.units.model_scale = seed % 2 ? 0.4 : 0;
     scene.units.data_scale = seed % 3 ? 0.3 : 0, scene.units.data_bound = seed % 3 ? 4 : 0;
     scene.units.data_ndc = seed % 3 == 2;
     save(&scene);
-    const sf_status status = fx_scene_load(&again, path);
-    ck_assert_msg(status.code == SF_OK, "%s", status.message);
+    ck_ok(fx_scene_load(&again, path));
     assert_equal_scenes(&scene, &again);
-    ck_assert_int_eq(files_in_folder(false), 1);
-    fx_scene_free(&scene);
-    fx_scene_free(&again);
+    ck_assert_int_eq(entries(), 1);
   }
 }
-END_TEST
 
-START_TEST(same_scene_same_bytes)
+TEST(same_scene_same_bytes)
 {
   char *first, *second;
   size_t a, b;
-  fx_scene scene = small_scene(1);
+  OWNED(fx_scene) scene = small_scene(1);
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &first, &a).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &first, &a));
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &second, &b).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &second, &b));
   ck_assert_uint_eq(a, b);
   ck_assert_mem_eq(first, second, a);
   free(first), free(second);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(cut_short_anywhere)
+TEST(cut_short_anywhere)
 {
   char *data;
   size_t size;
   fx_scene scene = small_scene(2), again;
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &data, &size));
   for (size_t keep = 0; keep < size; keep += keep < 4000 ? 13 : 997) {
-    put(data, keep);
+    put_file(path, data, keep);
     const sf_status status = fx_scene_load(&again, path);
     ck_assert_msg(status.code != SF_OK && strstr(status.message, path), "%zu of %zu bytes load", keep, size);
   }
   free(data);
   fx_scene_free(&scene);
 }
-END_TEST
 
 /* Any changed byte of the data, and any changed byte of the header, is refused. */
-START_TEST(edited_anywhere)
+TEST(edited_anywhere)
 {
   char *data;
   size_t size;
   fx_scene scene = small_scene(3), again;
   save(&scene);
-  ck_assert_int_eq(sf_read_file(path, 1 << 24, &data, &size).code, SF_OK);
+  ck_ok(sf_read_file(path, 1 << 24, &data, &size));
   for (uint64_t i = 0; i < 1500; i++) {
     const size_t at =
         i < 700 ? (size_t)fixture_pick(1, 0, i, 0, 3500) : (size_t)fixture_pick(1, 1, i, 0, (int64_t)size - 1);
     const char kept = data[at];
     data[at] = (char)(kept ^ (1 << fixture_pick(1, 2, i, 0, 7)));
-    put(data, size);
+    put_file(path, data, size);
     const sf_status status = fx_scene_load(&again, path);
     if (status.code == SF_OK) { /* only white space of the header's JSON may differ */
       assert_equal_scenes(&scene, &again);
@@ -178,20 +111,8 @@ START_TEST(edited_anywhere)
   free(data);
   fx_scene_free(&scene);
 }
-END_TEST
 
-/* Rewrites one metadata string and keeps every tensor. */
-static void edit(const char *key, const char *value)
-{
-  sf_tensors set;
-  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
-  cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
-  if (value) cJSON_AddStringToObject(set.metadata, key, value);
-  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
-  sf_tensors_free(&set);
-}
-
-START_TEST(metadata_is_checked)
+TEST(metadata_is_checked)
 {
   static const char *const wrong[][3] = {
       {"format", "spikefield-model", "format"},
@@ -246,21 +167,15 @@ START_TEST(metadata_is_checked)
       {"data_scale", "0", "data_scale"},
       {"data_ndc", "nan", "data_ndc"},
   };
-  fx_scene scene = small_scene(4);
-  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-    save(&scene);
-    edit(wrong[i][0], wrong[i][1]);
-    assert_refused(wrong[i][2]);
-  }
-  fx_scene_free(&scene);
+  OWNED(fx_scene) scene = small_scene(4);
+  for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
 }
-END_TEST
 
 /* The one parameter that is another, and nothing else of the seven. */
-START_TEST(another_arch_names_its_parameter)
+TEST(another_arch_names_its_parameter)
 {
   char arch[200], wanted[200];
-  fx_scene scene = small_scene(4);
+  OWNED(fx_scene) scene = small_scene(4);
   save(&scene);
   snprintf(arch, sizeof arch, "AC_FRAC=%d LEAK_FRAC=%d H_SHIFT=%d", SF_AC_FRAC, SF_LEAK_FRAC + 1, SF_H_SHIFT);
   snprintf(wanted, sizeof wanted, "metadata 'arch': the scene has LEAK_FRAC=%d, this build LEAK_FRAC=%d",
@@ -271,16 +186,13 @@ START_TEST(another_arch_names_its_parameter)
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_uint_ge(strlen(status.message), strlen(wanted));
   ck_assert_str_eq(status.message + strlen(status.message) - strlen(wanted), wanted); /* the line ends there */
-  fx_scene_free(&scene);
 }
-END_TEST
 
-/* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
 /* With the default H_SHIFT every h fits; a build with a smaller one refuses what the 12 bits of h do not hold. */
-START_TEST(largest_h_must_fit)
+TEST(largest_h_must_fit)
 {
   const fixture_sizes sizes = {2, SF_LANES, 5, 9, 24, 40, 3, FX_NODECAY, {0}};
-  fx_scene scene = fixture_scene(&sizes, 4);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 4);
   fx_layer *d2 = &scene.net.layer[FX_D2];
   for (int sign = -1; sign <= 1; sign += 2) {
     for (int i = 0; i < d2->n_in; i++) d2->w[i * SF_LANES] = 127, d2->w[i * SF_LANES + 1] = (int8_t)(sign * 127);
@@ -288,46 +200,40 @@ START_TEST(largest_h_must_fit)
     ck_assert_int_eq(fx_largest_h(d2), most);
     ck_assert_int_eq(fx_scene_check(&scene, "here").code, most < 2048 ? SF_OK : SF_E_RANGE);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(decoder_behind_a_grid_is_refused)
+/* Such a file passes every check of the nets, and no rule of its sizes says what its grid may be. */
+TEST(decoder_behind_a_grid_is_refused)
 {
   static const char *const none[] = {"D1.n_in", "D1.n_out", "D1.theta", "D2.n_in", "D2.n_out"};
-  fx_scene scene = small_scene(9);
+  OWNED(fx_scene) scene = small_scene(9);
   save(&scene);
   for (size_t i = 0; i < sizeof none / sizeof *none; i++) edit(none[i], "0");
   assert_refused("grid.levels is 2, expected 0..0");
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* They would size what is listed level by level. */
-START_TEST(levels_of_a_scene_without_a_grid_are_refused)
+TEST(levels_of_a_scene_without_a_grid_are_refused)
 {
-  fx_scene scene = tensorf_scene();
+  OWNED(fx_scene) scene = tensorf_scene();
   save(&scene);
   edit("grid.levels", "17");
   assert_refused("grid.levels is 17, expected 0..0");
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Rewrites with one tensor's first element changed. */
 static void edit_tensor(const char *name, int64_t value)
 {
-  sf_tensors set;
-  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+  OWNED(sf_tensors) set;
+  ck_ok(sf_tensors_load(&set, path));
   for (int i = 0; i < set.count; i++) {
     if (strcmp(set.tensor[i].name, name)) continue;
     memcpy(set.tensor[i].data, &value, sf_dtype_size(set.tensor[i].type));
   }
-  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
-  sf_tensors_free(&set);
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, path));
 }
 
-START_TEST(tensors_are_checked)
+TEST(tensors_are_checked)
 {
   static const struct {
     const char *tensor;
@@ -337,95 +243,59 @@ START_TEST(tensors_are_checked)
                {"grid.stride", 601, "stride"},     {"grid.offset", 1, "offset"},          {"grid.shift", 32, "shift"},
                {"grid.scale_q16", 0, "scale_q16"}, {"grid.scale_q16", 1 << 30, "stride"}, {"colour.w5", 1, "checksum"},
                {"occupancy", 77, "checksum"},      {"grid.table", 1, "checksum"}};
-  fx_scene scene = small_scene(5);
+  OWNED(fx_scene) scene = small_scene(5);
   scene.grid.table[0] = 0, scene.occupancy[0] = 0, scene.net.layer[FX_C3].w[0] = 0;
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
     save(&scene);
     edit_tensor(wrong[i].tensor, wrong[i].value);
     assert_refused(wrong[i].place);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(missing_tensor_is_named)
+TEST(missing_tensor_is_named)
 {
   static const char *const names[] = {"grid.table", "occupancy", "density.w1",  "density.w2", "colour.w3",
                                       "colour.w4",  "colour.w5", "grid.offset", "grid.shift"};
-  fx_scene scene = small_scene(6);
+  OWNED(fx_scene) scene = small_scene(6);
   for (size_t n = 0; n < sizeof names / sizeof *names; n++) {
     sf_tensors set;
     save(&scene);
-    ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
+    ck_ok(sf_tensors_load(&set, path));
     int kept = 0;
     for (int i = 0; i < set.count; i++)
       if (strcmp(set.tensor[i].name, names[n])) set.tensor[kept++] = set.tensor[i];
     ck_assert_int_eq(kept, set.count - 1);
-    ck_assert_int_eq(sf_tensors_save(set.tensor, kept, set.metadata, path).code, SF_OK);
+    ck_ok(sf_tensors_save(set.tensor, kept, set.metadata, path));
     sf_tensors_free(&set);
     assert_refused(names[n]);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(lanes_beyond_the_layer_are_zero)
+TEST(lanes_beyond_the_layer_are_zero)
 {
-  fx_scene scene = small_scene(7);
+  OWNED(fx_scene) scene = small_scene(7);
   scene.net.layer[FX_C1].w[24] = 1;
-  const sf_status status = fx_scene_check(&scene, "memory");
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "colour.w3"));
-  fx_scene_free(&scene);
+  ck_bad(fx_scene_check(&scene, "memory"), SF_E_RANGE, "colour.w3", "");
 }
-END_TEST
 
-START_TEST(a_decoder_alone_is_no_file)
+TEST(a_decoder_alone_is_no_file)
 {
-  fx_scene scene = fixture_scene(&fixture_decoder, 9);
-  const sf_status status = fx_scene_save(&scene, path);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert(strstr(status.message, path) && strstr(status.message, "decoder"));
-  ck_assert_int_eq(files_in_folder(false), 0);
-  fx_scene_free(&scene);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_decoder, 9);
+  ck_bad(fx_scene_save(&scene, path), SF_E_UNSUPPORTED, path, "decoder");
+  ck_assert_int_eq(entries(), 0);
 }
-END_TEST
 
-START_TEST(unwritable_and_missing)
+TEST(unwritable_and_missing)
 {
-  fx_scene scene = small_scene(8);
+  OWNED(fx_scene) scene = small_scene(8);
   snprintf(path, sizeof path, "%s/absent/scene.snn", folder);
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_IO);
   assert_refused("absent");
   scene.net.steps = 0;
   snprintf(path, sizeof path, "%s/scene.snn", folder);
   ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_E_RANGE);
-  ck_assert_int_eq(files_in_folder(false), 0);
-  fx_scene_free(&scene);
+  ck_assert_int_eq(entries(), 0);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx_file");
-  TCase *files = tcase_create("files");
-  tcase_set_timeout(files, 300);
-  tcase_add_unchecked_fixture(files, make_folder, remove_folder);
-  tcase_add_checked_fixture(files, setup, NULL);
-  tcase_add_test(files, round_trip);
-  tcase_add_test(files, another_arch_names_its_parameter);
-  tcase_add_test(files, same_scene_same_bytes);
-  tcase_add_test(files, cut_short_anywhere);
-  tcase_add_test(files, edited_anywhere);
-  tcase_add_test(files, metadata_is_checked);
-  tcase_add_test(files, largest_h_must_fit);
-  tcase_add_test(files, decoder_behind_a_grid_is_refused);
-  tcase_add_test(files, levels_of_a_scene_without_a_grid_are_refused);
-  tcase_add_test(files, tensors_are_checked);
-  tcase_add_test(files, missing_tensor_is_named);
-  tcase_add_test(files, lanes_beyond_the_layer_are_zero);
-  tcase_add_test(files, a_decoder_alone_is_no_file);
-  tcase_add_test(files, unwritable_and_missing);
-  suite_add_tcase(suite, files);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = set_up, .tear_down = remove_folder};

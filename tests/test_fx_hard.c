@@ -32,13 +32,13 @@ static void run_ray(hard *h, const hard_case *c, int variant)
 {
   hard_seen seen = {0};
   fx_pixel naive;
-  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &seen.pixel, &seen.counts).code, SF_OK);
-  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, eval_naive, h, &naive, NULL).code, SF_OK);
+  ck_ok(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &seen.pixel, &seen.counts));
+  ck_ok(fx_render_ray(&h->scene, &h->ray, eval_naive, h, &naive, NULL));
   ck_assert_mem_eq(&naive, &seen.pixel, sizeof naive);
   c->expect(h, &seen, variant);
 }
 
-START_TEST(core)
+HARD_TEST(core)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++) {
@@ -48,12 +48,4 @@ START_TEST(core)
     if (c->kind == HARD_RAY) run_ray(&h, c, variant);
     hard_end(&h);
   }
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("fx_hard");
-  hard_add(suite, core);
-  return ck_run(suite);
 }

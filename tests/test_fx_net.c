@@ -4,7 +4,7 @@
 
 static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
 {
-  fx_scene scene = fixture_scene(sizes, seed);
+  OWNED(fx_scene) scene = fixture_scene(sizes, seed);
   fx_trace *trace = malloc(sizeof *trace);
   for (uint64_t n = 0; n < 4; n++) {
     int16_t f[32], dir[SF_DIR_MAX];
@@ -13,10 +13,9 @@ static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
     assert_sample(&scene.net, f, dir, trace);
   }
   free(trace);
-  fx_scene_free(&scene);
 }
 
-START_TEST(net_equals_naive_at_full_size)
+TEST(net_equals_naive_at_full_size)
 {
   for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++)
     for (int steps = 1; steps <= SF_T_MAX; steps++) {
@@ -25,18 +24,16 @@ START_TEST(net_equals_naive_at_full_size)
       check_sizes(&sizes, (uint64_t)(mode * 10 + steps));
     }
 }
-END_TEST
 
-START_TEST(net_equals_naive_at_random_sizes)
+TEST(net_equals_naive_at_random_sizes)
 {
   for (uint64_t seed = 0; seed < 150; seed++) {
     const fixture_sizes sizes = fixture_random_sizes(seed);
     check_sizes(&sizes, seed);
   }
 }
-END_TEST
 
-START_TEST(decoder_equals_naive)
+TEST(decoder_equals_naive)
 {
   for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++)
     for (int steps = 1; steps <= SF_T_MAX; steps++) {
@@ -49,14 +46,13 @@ START_TEST(decoder_equals_naive)
     check_sizes(&sizes, seed);
   }
 }
-END_TEST
 
 /* All weights and inputs at their rails: the exact sum of 160 products needs 27 bits, a membrane has 24. */
-START_TEST(decoder_current_saturates)
+TEST(decoder_current_saturates)
 {
   fixture_sizes sizes = fixture_decoder;
   sizes.n_dir = SF_DIR_MAX, sizes.bias[FX_C1] = 2047;
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   const fx_layer *c1 = &scene.net.layer[FX_C1];
   for (int i = 0; i < fx_layer_rows(c1); i++)
     for (int o = 0; o < SF_LANES; o++) c1->w[i * SF_LANES + o] = o % 2 ? 127 : -127;
@@ -75,15 +71,13 @@ START_TEST(decoder_current_saturates)
   ck_assert_uint_eq(counts.saturated[FX_C1], SF_LANES);
   ck_assert_uint_eq(counts.rays, 0);
   free(trace);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* The paper's TensoRF decoder: 150 -> 128 -> 128 -> 3 has 35968 synapses, biases not among them. */
-START_TEST(decoder_macs_are_the_papers)
+TEST(decoder_macs_are_the_papers)
 {
   const fixture_sizes sizes = {0, 0, 0, 150, 128, 128, 3, FX_HYBRID, {[FX_C1] = 900, [FX_C2] = 1, [FX_C3] = 1}};
-  fx_scene scene = fixture_scene(&sizes, 4);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 4);
   const fx_layer *l = scene.net.layer;
   ck_assert_int_eq(l[FX_C1].n_in * l[FX_C1].n_out + l[FX_C2].n_in * l[FX_C2].n_out + l[FX_C3].n_in * l[FX_C3].n_out,
                    35968);
@@ -99,14 +93,12 @@ START_TEST(decoder_macs_are_the_papers)
   ck_assert_uint_eq(c.layer[FX_C2].weight[1], 0);
   ck_assert_uint_eq(c.layer[FX_C3].weight[0], 3);
   ck_assert_uint_eq(c.layer[FX_C3].weight[1], 0);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* The comparison means something only if a part of the neurons fires. */
-START_TEST(fixture_fires_in_part)
+TEST(fixture_fires_in_part)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 77);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 77);
   fx_counts c = {0};
   int32_t base[SF_LANES];
   int16_t f[32], dir[FX_SH];
@@ -124,13 +116,11 @@ START_TEST(fixture_fires_in_part)
       ck_assert_uint_lt(c.layer[l].spikes[t], 50 * SF_LANES * 4 / 5);
     }
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(counts_add_up)
+TEST(counts_add_up)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 9);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 9);
   fx_counts all = {0}, parts = {0};
   int32_t base[SF_LANES] = {0};
   for (uint64_t n = 0; n < 20; n++) {
@@ -143,9 +133,7 @@ START_TEST(counts_add_up)
     fx_counts_add(&parts, &one);
   }
   ck_assert_mem_eq(&all, &parts, sizeof all);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- rays ---- */
 
@@ -177,16 +165,16 @@ static fx_ray diagonal_ray(uint64_t index)
   return ray;
 }
 
-START_TEST(render_equals_naive_evaluation)
+TEST(render_equals_naive_evaluation)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 4);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 4);
   for (uint64_t i = 0; i < 12; i++) {
     const fx_ray ray = diagonal_ray(i);
     naive_user user = {.net = &scene.net};
     fx_pixel a, b;
     fx_counts counts = {0}, around = {0};
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &a, &counts).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, eval_naive, &user, &b, &around).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &a, &counts));
+    ck_ok(fx_render_ray(&scene, &ray, eval_naive, &user, &b, &around));
     fx_counts_add(&user.counts, &around);
     ck_assert_mem_eq(&a, &b, sizeof a);
     assert_same_counts(&counts, &user.counts);
@@ -194,9 +182,7 @@ START_TEST(render_equals_naive_evaluation)
     ck_assert_uint_eq(counts.samples, a.samples);
     ck_assert_uint_eq(a.weight_sum + a.transmittance, 1 << 20);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
 static sf_status eval_fails(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
@@ -205,33 +191,15 @@ static sf_status eval_fails(void *user, const fx_ray *ray, bool first, const int
   return ++*(int *)user == 3 ? sf_fail(SF_E_DIFFERENCE, "third sample") : sf_ok();
 }
 
-START_TEST(render_hands_on_a_failure)
+TEST(render_hands_on_a_failure)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 4);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 4);
   memset(scene.occupancy, 0xff, 64);
   const fx_ray ray = diagonal_ray(1);
   fx_pixel pixel;
   int calls = 0;
   ck_assert_int_eq(fx_render_ray(&scene, &ray, eval_fails, &calls, &pixel, NULL).code, SF_E_DIFFERENCE);
   ck_assert_int_eq(calls, 3);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx_net");
-  TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 300);
-  tcase_add_test(nets, net_equals_naive_at_full_size);
-  tcase_add_test(nets, net_equals_naive_at_random_sizes);
-  tcase_add_test(nets, decoder_equals_naive);
-  tcase_add_test(nets, decoder_current_saturates);
-  tcase_add_test(nets, decoder_macs_are_the_papers);
-  tcase_add_test(nets, fixture_fires_in_part);
-  tcase_add_test(nets, counts_add_up);
-  tcase_add_test(nets, render_equals_naive_evaluation);
-  tcase_add_test(nets, render_hands_on_a_failure);
-  suite_add_tcase(suite, nets);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

@@ -8,14 +8,13 @@
 #include "src/fx/core.h"
 #include "src/fx/round.h"
 #include "tests/fx_fixture.h"
+#include "tests/scene_file_fixture.h"
 #include "tests/tensorf_fixture.h"
 #include <math.h>
-#include <stdio.h>
-#include <unistd.h>
 
 /* ---- units ---- */
 
-START_TEST(softplus_every_input)
+TEST(softplus_every_input)
 {
   uint32_t before = 0;
   double worst = 0, relative = 0;
@@ -37,9 +36,8 @@ START_TEST(softplus_every_input)
   ck_assert_double_gt(worst, 1e-4); /* the bound is no looser than needed: 1.22e-4 at 0 */
   ck_assert_uint_eq(fx_softplus(INT32_MIN / 256), 0);
 }
-END_TEST
 
-START_TEST(softplus_is_as_defined)
+TEST(softplus_is_as_defined)
 {
   for (int32_t y = -(17 << 12); y < 17 << 12; y++) {
     const int32_t m = abs(y), i = m / 256, low = m % 256;
@@ -52,9 +50,8 @@ START_TEST(softplus_is_as_defined)
     ck_assert_uint_eq(fx_softplus(y), (uint32_t)((y > 0 ? (int64_t)y * 256 : 0) + tail));
   }
 }
-END_TEST
 
-START_TEST(sine_every_phase)
+TEST(sine_every_phase)
 {
   double worst = 0;
   for (uint32_t phase = 0; phase < 1 << 16; phase++) {
@@ -70,7 +67,6 @@ START_TEST(sine_every_phase)
   printf("sine: largest error %.3g LSB of Q1.14\n", worst);
   ck_assert_int_eq(fx_sine(16384), 16384);
 }
-END_TEST
 
 /* ---- a scene of random integers ---- */
 
@@ -92,21 +88,13 @@ static fx_scene make_scene(const int32_t res[3], int components, int freqs, uint
   f->weight_stop = 104;
   l[FX_C1].n_in = fx_tensorf_inputs(f), l[FX_C1].bias = 300, l[FX_C2].bias = l[FX_C3].bias = 1;
   l[FX_C1].n_out = l[FX_C2].n_in = 48, l[FX_C2].n_out = l[FX_C3].n_in = 32, l[FX_C3].n_out = 3;
-  const sf_status status = fx_scene_allocate(&scene, "fixture");
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  int8_t *all[13] = {f->density.plane[0],
-                     f->density.plane[1],
-                     f->density.plane[2],
-                     f->density.line[0],
-                     f->density.line[1],
-                     f->density.line[2],
-                     f->appearance.plane[0],
-                     f->appearance.plane[1],
-                     f->appearance.plane[2],
-                     f->appearance.line[0],
-                     f->appearance.line[1],
-                     f->appearance.line[2],
-                     f->basis};
+  ck_ok(fx_scene_allocate(&scene, "fixture"));
+  int8_t *all[13];
+  for (int i = 0; i < 3; i++) {
+    all[i] = f->density.plane[i], all[3 + i] = f->density.line[i];
+    all[6 + i] = f->appearance.plane[i], all[9 + i] = f->appearance.line[i];
+  }
+  all[12] = f->basis;
   for (int k = 0; k < 13; k++) {
     const int8_t *end = k < 12 ? all[k + 1] : (int8_t *)scene.occupancy;
     for (int8_t *at = all[k]; at < end; at++)
@@ -126,8 +114,7 @@ static fx_scene make_scene(const int32_t res[3], int components, int freqs, uint
 
 static void ck_checked(const fx_scene *scene)
 {
-  const sf_status status = fx_scene_check(scene, "fixture");
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_check(scene, "fixture"));
 }
 
 static void pick_position(uint64_t seed, uint64_t i, uint32_t pos[3])
@@ -170,7 +157,7 @@ static double real_product(const fx_factors *f, const int32_t res[3], int pair, 
   return plane * line;
 }
 
-START_TEST(products_within_their_bound)
+TEST(products_within_their_bound)
 {
   static const int32_t sizes[3][3] = {{17, 9, 33}, {7, 1, 5}, {2, 300, 2}};
   double worst = 0;
@@ -196,13 +183,12 @@ START_TEST(products_within_their_bound)
   printf("products: at most %.0f %% of the bound\n", 100 * worst);
   ck_assert_double_gt(worst, 0.5); /* entries alternate between the rails somewhere */
 }
-END_TEST
 
 /* At grid points the products are exact, and so are density and inputs up to their tables. */
-START_TEST(grid_points_are_exact)
+TEST(grid_points_are_exact)
 {
   const int32_t res[3] = {17, 9, 33};
-  fx_scene scene = make_scene(res, 5, 2, 4);
+  OWNED(fx_scene) scene = make_scene(res, 5, 2, 4);
   const fx_tensorf *f = &scene.tensorf;
   for (uint64_t i = 0; i < 500; i++) {
     uint32_t pos[3];
@@ -221,15 +207,13 @@ START_TEST(grid_points_are_exact)
     const int64_t sigma = naive_round((int64_t)fx_softplus((int32_t)y) * 40000, 15);
     ck_assert_int_eq(fx_tensorf_density(f, pos, NULL), naive_clamp(sigma, 0, (1 << 28) - 1));
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(inputs_are_encoded)
+TEST(inputs_are_encoded)
 {
   const int32_t res[3] = {17, 9, 33};
   for (int freqs = 0; freqs <= 4; freqs += 2) {
-    fx_scene scene = make_scene(res, 5, freqs, 5);
+    OWNED(fx_scene) scene = make_scene(res, 5, freqs, 5);
     fx_tensorf *f = &scene.tensorf;
     const double lsb = 0x1p-9, feature = 40000 * 0x1p-33; /* feature LSB per sum */
     int n = 0;
@@ -265,19 +249,17 @@ START_TEST(inputs_are_encoded)
       }
     }
     ck_assert_int_eq(fx_tensorf_inputs(f), 12 + 24 * freqs);
-    fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* Everything at the rails, both ways: sums and scales saturate, none wraps. */
-START_TEST(rails)
+TEST(rails)
 {
   const int32_t res[3] = {4, 4, 4};
   const uint32_t pos[3] = {5000000, 123, (1 << 24) - 1};
   const int16_t unit[3] = {16384, -16384, 0};
   for (int sign = -1; sign <= 1; sign += 2) {
-    fx_scene scene = make_scene(res, 30, 2, 6);
+    OWNED(fx_scene) scene = make_scene(res, 30, 2, 6);
     fx_tensorf *f = &scene.tensorf;
     int16_t x[SF_DIR_MAX];
     fx_counts counts = {0};
@@ -300,10 +282,8 @@ START_TEST(rails)
     ck_assert_uint_eq(counts.field_samples, 1);
     ck_assert_uint_eq(counts.field_mac, 93 * 7 + 183 * (7 + 9));
     ck_assert_uint_eq(counts.grid_bytes, (93 + 183) * 6);
-    fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* ---- rays ---- */
 
@@ -334,11 +314,11 @@ static void same_rays(const fx_scene *scene, const char *kernels)
   }
   ck_assert_int_eq(status.code, SF_OK);
   for (uint64_t i = 0; i < RAYS; i++) ray[i] = make_ray(3, i, 1 + (int)(i % 7) * 40);
-  ck_assert_int_eq(fx_render_rays(core, ray, RAYS, many, cost, &all).code, SF_OK);
+  ck_ok(fx_render_rays(core, ray, RAYS, many, cost, &all));
   for (int i = 0; i < RAYS; i++) {
     fx_counts counts = {0};
     uint64_t macs = 0;
-    ck_assert_int_eq(fx_render_ray(scene, &ray[i], NULL, NULL, &one, &counts).code, SF_OK);
+    ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &one, &counts));
     ck_assert_mem_eq(&one, &many[i], sizeof one);
     ck_assert_uint_eq(one.weight_sum + one.transmittance, 1 << 20);
     ck_assert_uint_eq(one.samples, counts.samples);
@@ -365,18 +345,16 @@ static fx_scene foggy(uint64_t seed)
   return scene;
 }
 
-START_TEST(many_rays_are_rays)
+TEST(many_rays_are_rays)
 {
   for (uint64_t seed = 0; seed < 3; seed++) {
-    fx_scene scene = foggy(seed);
+    OWNED(fx_scene) scene = foggy(seed);
     scene.tensorf.activation = seed == 2 ? FX_RELU : FX_SOFTPLUS;
     if (seed == 1) scene.max_samples = 7;
     same_rays(&scene, "portable");
     same_rays(&scene, NULL);
-    fx_scene_free(&scene);
   }
 }
-END_TEST
 
 typedef struct seen {
   int calls;
@@ -396,9 +374,9 @@ static sf_status see(void *user, const fx_ray *ray, bool first, const int16_t *f
 }
 
 /* A higher threshold: fewer samples reach the decoder, weights and transmittance stay, colour only falls. */
-START_TEST(the_weight_threshold_skips)
+TEST(the_weight_threshold_skips)
 {
-  fx_scene scene = foggy(3);
+  OWNED(fx_scene) scene = foggy(3);
   int before = INT32_MAX, all = 0;
   for (int stop = 0; stop <= 1 << 20; stop = stop ? 16 * stop : 16) {
     seen s = {0, &scene};
@@ -406,8 +384,8 @@ START_TEST(the_weight_threshold_skips)
     fx_counts counts = {0};
     scene.tensorf.weight_stop = stop < 1 << 20 ? stop : (1 << 20) - 1;
     const fx_ray ray = make_ray(3, 5, 200);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, see, &s, &pixel, &counts).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &open, NULL).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray, see, &s, &pixel, &counts));
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &open, NULL));
     ck_assert_mem_eq(&open, &pixel, sizeof open);
     if (!stop) all = s.calls;
     ck_assert_int_ge((int)counts.field_samples, s.calls);
@@ -418,53 +396,28 @@ START_TEST(the_weight_threshold_skips)
   }
   ck_assert_int_gt(all, 20);
   ck_assert_int_eq(before, 0); /* no sample weighs 1 here */
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(empty_and_opaque)
+TEST(empty_and_opaque)
 {
-  fx_scene scene = make_scene(few, 5, 2, 7);
+  OWNED(fx_scene) scene = make_scene(few, 5, 2, 7);
   const fx_ray ray = make_ray(3, 1, 100);
   fx_pixel pixel;
   fx_counts counts = {0};
   scene.tensorf.density_in = (fx_scale){0, 0, (1 << 23) - 1}, scene.tensorf.sigma_out = (fx_scale){65535, 0, 0};
   ck_checked(&scene);
-  ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts).code, SF_OK);
+  ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts));
   ck_assert(pixel.transmittance == 0 && pixel.samples == 1 && counts.field_samples == 1 && counts.rays == 1);
   memset(scene.occupancy, 0, 64);
   memset(&counts, 0, sizeof counts);
-  ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts).code, SF_OK);
+  ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts));
   ck_assert(pixel.transmittance == 1 << 20 && pixel.samples == 0);
   ck_assert(counts.march_steps == 100 && counts.field_samples == 0 && counts.rays == 0 && counts.grid_bytes == 0);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* ---- files ---- */
 
-static char path[64];
-
-static void edit(const char *key, const char *value)
-{
-  sf_tensors set;
-  ck_assert_int_eq(sf_tensors_load(&set, path).code, SF_OK);
-  cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, key);
-  if (value) cJSON_AddStringToObject(set.metadata, key, value);
-  ck_assert_int_eq(sf_tensors_save(set.tensor, set.count, set.metadata, path).code, SF_OK);
-  sf_tensors_free(&set);
-}
-
-static void ck_refused(const char *place)
-{
-  fx_scene scene;
-  const sf_status status = fx_scene_load(&scene, path);
-  ck_assert_msg(status.code != SF_OK, "loaded in spite of: %s", place);
-  ck_assert_msg(strstr(status.message, path) && strstr(status.message, place), "'%s' does not name '%s'",
-                status.message, place);
-}
-
-static void check_file(void)
+TEST(files_are_checked)
 {
   static const char *const wrong[][3] = {
       {"backbone", "plenoxels", "backbone"},
@@ -498,32 +451,25 @@ static void check_file(void)
   };
   fx_scene scene = foggy(8), again;
   scene.units.stretch[1] = 4 / 3.0, scene.units.near = 0.1;
-  ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_OK);
-  const sf_status status = fx_scene_load(&again, path);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_save(&scene, path));
+  ck_ok(fx_scene_load(&again, path));
   ck_assert(again.units.stretch[1] == 4 / 3.0 && again.units.near == 0.1);
   for (uint64_t i = 0; i < 40; i++) {
     const fx_ray ray = make_ray(4, i, 90);
     fx_pixel a, b;
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &a, NULL).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&again, &ray, NULL, NULL, &b, NULL).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &a, NULL));
+    ck_ok(fx_render_ray(&again, &ray, NULL, NULL, &b, NULL));
     ck_assert_mem_eq(&a, &b, sizeof a);
   }
   fx_scene_free(&again);
-  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-    ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_OK);
-    edit(wrong[i][0], wrong[i][1]);
-    ck_refused(wrong[i][2]);
-  }
+  for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
   scene.tensorf.basis[70] = -128;
-  const sf_status refused = fx_scene_save(&scene, path);
-  ck_assert_msg(refused.code == SF_E_RANGE && strstr(refused.message, "'basis_mat': element 70"), "%s",
-                refused.message);
+  ck_bad(fx_scene_save(&scene, path), SF_E_RANGE, "'basis_mat': element 70", "");
   fx_scene_free(&scene);
 }
 
 /* The library opens such a scene and renders its rays; what needs a hash grid it refuses. */
-static void check_library(void)
+TEST(the_library_renders_it)
 {
   enum { RAYS = 40 };
   float origin[RAYS][3], direction[RAYS][3];
@@ -535,8 +481,8 @@ static void check_library(void)
   int16_t inputs[SF_DIR_MAX] = {0}, harmonics[SPIKEFIELD_DIRECTIONS] = {0};
   spikefield_sample sample;
   uint64_t samples = 0;
-  fx_scene scene = foggy(8);
-  ck_assert_int_eq(fx_scene_save(&scene, path).code, SF_OK);
+  OWNED(fx_scene) scene = foggy(8);
+  ck_ok(fx_scene_save(&scene, path));
   ck_assert_int_eq(spikefield_scene_open(&opened, path).code, SPIKEFIELD_OK);
   ck_assert_int_eq(spikefield_scene_describe(opened, &info).code, SPIKEFIELD_OK);
   ck_assert_int_eq(info.features, fx_tensorf_inputs(&scene.tensorf));
@@ -550,8 +496,8 @@ static void check_library(void)
   for (int i = 0; i < RAYS; i++) {
     fx_ray ray;
     fx_pixel core;
-    ck_assert_int_eq(sf_fx_ray_make(&scene, origin[i], direction[i], &ray).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &core, NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, origin[i], direction[i], &ray));
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &core, NULL));
     ck_assert_mem_eq(core.colour, pixel[i].colour, sizeof core.colour);
     ck_assert(core.transmittance == pixel[i].transmittance && core.samples == pixel[i].samples);
     samples += core.samples;
@@ -563,20 +509,7 @@ static void check_library(void)
   const spikefield_status refused = spikefield_features(opened, somewhere, 1, inputs, NULL);
   ck_assert_msg(refused.code == SPIKEFIELD_E_UNSUPPORTED && strstr(refused.message, "TensoRF"), "%s", refused.message);
   spikefield_scene_close(opened);
-  fx_scene_free(&scene);
 }
-
-START_TEST(files)
-{
-  snprintf(path, sizeof path, "/tmp/spikefield-vm-XXXXXX");
-  const int file = mkstemp(path);
-  ck_assert_int_ge(file, 0);
-  close(file);
-  check_file();
-  check_library();
-  unlink(path);
-}
-END_TEST
 
 /* ---- against the float model ---- */
 
@@ -607,7 +540,7 @@ static sf_model smooth_model(int ndc)
   c.tensorf.shift = ndc ? 0 : -3;
   c.tensorf.distance_scale = ndc ? 1 : 6;
   sf_model larger;
-  ck_assert_int_eq(sf_model_create(&larger, &c).code, SF_OK);
+  ck_ok(sf_model_create(&larger, &c));
   for (int id = SF_P_BASIS; id < SF_P_COUNT; id++)
     memcpy(sf_model_param(&larger, id), sf_model_param(&m, id), larger.param[id].size * sizeof(float));
   smooth(&larger);
@@ -654,8 +587,8 @@ static double picture_psnr(int ndc)
     fx_ray ray;
     fx_pixel pixel;
     uint32_t rgba[4];
-    ck_assert_int_eq(sf_fx_ray_make(&scene, origin[i], direction[i], &ray).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, origin[i], direction[i], &ray));
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL));
     fx_pixel_rgba(&pixel, rgba);
     samples += pixel.samples;
     float_samples += (double)decoded[i];
@@ -675,17 +608,16 @@ static double picture_psnr(int ndc)
 }
 
 /* 36 dB: what int8 weights and planes leave of a random net, whose membranes lie anywhere about their thresholds. */
-START_TEST(pictures_are_those_of_the_float_model)
+LOOP_TEST(pictures_are_those_of_the_float_model, 2)
 {
   const double psnr = picture_psnr(_i);
   printf("ndc %d: fixed against float %.2f dB\n", _i, psnr);
   ck_assert_double_gt(psnr, 36);
 }
-END_TEST
 
-START_TEST(what_cannot_be_represented_is_refused)
+TEST(what_cannot_be_represented_is_refused)
 {
-  sf_model m = smooth_model(0);
+  OWNED(sf_model) m = smooth_model(0);
   fx_scene scene;
   sf_quant_options options = {.seed = 1};
   sf_model_param(&m, SF_P_APP_LINE + 1)[5] = NAN;
@@ -700,32 +632,7 @@ START_TEST(what_cannot_be_represented_is_refused)
   status = sf_quantise(&scene, &m, "m.safetensors", &options);
   ck_assert_msg(status.code == SF_E_UNSUPPORTED && strstr(status.message, "renderModule.mlp.0.weight"), "%s",
                 status.message);
-  sf_model_free(&m);
 }
-END_TEST
 
-int main(void)
-{
-  TCase *units = tcase_create("units"), *field = tcase_create("field"), *rays = tcase_create("rays"),
-        *model = tcase_create("model");
-  tcase_add_test(units, softplus_every_input);
-  tcase_add_test(units, softplus_is_as_defined);
-  tcase_add_test(units, sine_every_phase);
-  tcase_add_test(field, products_within_their_bound);
-  tcase_add_test(field, grid_points_are_exact);
-  tcase_add_test(field, inputs_are_encoded);
-  tcase_add_test(field, rails);
-  tcase_add_test(rays, many_rays_are_rays);
-  tcase_add_test(rays, the_weight_threshold_skips);
-  tcase_add_test(rays, empty_and_opaque);
-  tcase_add_test(rays, files);
-  tcase_add_loop_test(model, pictures_are_those_of_the_float_model, 0, 2);
-  tcase_add_test(model, what_cannot_be_represented_is_refused);
-  Suite *suite = suite_create("fx_tensorf");
-  TCase *cases[] = {units, field, rays, model};
-  for (int i = 0; i < 4; i++) {
-    tcase_set_timeout(cases[i], 120);
-    suite_add_tcase(suite, cases[i]);
-  }
-  return ck_run(suite);
-}
+int ck_timeout = 120;
+ck_options ck_program = {.set_up = set_up, .tear_down = remove_folder};

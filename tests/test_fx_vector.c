@@ -5,7 +5,6 @@
 #include "fx_hard_cases.h"
 #include "src/fx/core.h"
 #include "src/fx/net.h"
-#include <stdio.h>
 
 static const char *const instruction_sets[] = {"avx2", "avx512vnni", "amx"};
 
@@ -48,8 +47,7 @@ static fx_scene random_net_scene(uint64_t seed, bool decodes)
   s.trans_stop = (int32_t)pick(seed, 50, 0, 1 << 19);
   s.max_samples = (int32_t)pick(seed, 51, 1, 80);
   const fx_scene *check = &s;
-  const sf_status status = fx_scene_check(check, "random scene");
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_scene_check(check, "random scene"));
   return s;
 }
 
@@ -61,8 +59,7 @@ static fx_scene random_scene(uint64_t seed)
 static fx_core *open_core(const fx_scene *scene, const char *name)
 {
   fx_core *core;
-  const sf_status status = fx_core_open(&core, scene, name);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(fx_core_open(&core, scene, name));
   ck_assert_str_eq(fx_core_kernels(core), name);
   return core;
 }
@@ -197,11 +194,11 @@ static long compare_rays(const char *name, uint64_t seed)
   fx_cost cost[RAYS];
   fx_counts all = {0}, sum = {0};
   for (uint64_t i = 0; i < RAYS; i++) ray[i] = random_ray(seed, i);
-  ck_assert_int_eq(fx_render_rays(core, ray, RAYS, pixel, cost, &all).code, SF_OK);
+  ck_ok(fx_render_rays(core, ray, RAYS, pixel, cost, &all));
   for (int i = 0; i < RAYS; i++) {
     fx_pixel one;
     fx_counts counts = {0};
-    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &counts).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &counts));
     fx_counts_add(&sum, &counts);
     ck_assert_msg(!memcmp(&one, &pixel[i], sizeof one), "%s, scene %llu: pixel of ray %d", name,
                   (unsigned long long)seed, i);
@@ -238,36 +235,31 @@ static long compare_decoders(const char *name, uint64_t seed)
   return compare_nets(name, seed, true);
 }
 
-START_TEST(nets_equal_portable)
+LOOP_TEST(nets_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_density_nets, samples_wanted());
 }
-END_TEST
 
-START_TEST(decoders_equal_portable)
+LOOP_TEST(decoders_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_decoders, samples_wanted());
 }
-END_TEST
 
-START_TEST(portable_block_equals_single_samples)
+TEST(portable_block_equals_single_samples)
 {
   campaign("portable", compare_density_nets, 500);
   campaign("portable", compare_decoders, 500);
 }
-END_TEST
 
-START_TEST(grid_equals_portable)
+LOOP_TEST(grid_equals_portable, 3)
 {
   campaign(instruction_sets[_i], compare_grid, samples_wanted());
 }
-END_TEST
 
-START_TEST(rays_equal_portable)
+LOOP_TEST(rays_equal_portable, 3)
 {
   campaign(instruction_sets[_i], compare_rays, samples_wanted());
 }
-END_TEST
 
 /* ---- the hard cases ---- */
 
@@ -295,14 +287,14 @@ static void hard_ray(hard *h, const char *name)
   fx_core *core = open_core(&h->scene, name);
   fx_pixel one, wave;
   fx_counts a = {0}, b = {0};
-  ck_assert_int_eq(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &one, &a).code, SF_OK);
-  ck_assert_int_eq(fx_render_rays(core, &h->ray, 1, &wave, NULL, &b).code, SF_OK);
+  ck_ok(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &one, &a));
+  ck_ok(fx_render_rays(core, &h->ray, 1, &wave, NULL, &b));
   ck_assert_mem_eq(&one, &wave, sizeof one);
   assert_same_counts(&a, &b);
   fx_core_close(core);
 }
 
-START_TEST(hard_cases_equal_portable)
+HARD_TEST(hard_cases_equal_portable)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++)
@@ -315,35 +307,27 @@ START_TEST(hard_cases_equal_portable)
       hard_end(&h);
     }
 }
-END_TEST
 
-START_TEST(portable_waves_equal_single_rays)
+TEST(portable_waves_equal_single_rays)
 {
   campaign("portable", compare_rays, samples_wanted() / 2);
 }
-END_TEST
 
-START_TEST(unknown_kernels_are_refused)
+TEST(unknown_kernels_are_refused)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 1);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 1);
   fx_core *core;
-  const sf_status status = fx_core_open(&core, &scene, "mmx");
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_ptr_nonnull(strstr(status.message, "mmx"));
+  ck_bad(fx_core_open(&core, &scene, "mmx"), SF_E_UNSUPPORTED, "mmx", "");
   ck_assert_ptr_null(core);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Made in memory, by nobody's reader: the kernels' tables have room for the sizes of arch.def alone. */
-START_TEST(absurd_scenes_are_refused)
+TEST(absurd_scenes_are_refused)
 {
   fx_scene scene = fixture_scene(&fixture_ingp, 1), bad = scene;
   fx_core *core;
   bad.net.layer[FX_D1].n_in = 1 << 20;
-  sf_status status = fx_core_open(&core, &bad, NULL);
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "scene: D1.n_in is 1048576"));
+  ck_bad(fx_core_open(&core, &bad, NULL), SF_E_RANGE, "scene: D1.n_in is 1048576", "");
   ck_assert_ptr_null(core);
   bad = scene, bad.net.steps = SF_T_MAX + 1;
   ck_assert_int_eq(fx_core_open(&core, &bad, NULL).code, SF_E_RANGE);
@@ -351,22 +335,5 @@ START_TEST(absurd_scenes_are_refused)
   ck_assert_int_eq(fx_core_open(&core, &bad, NULL).code, SF_E_FORMAT);
   fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("fx_vector");
-  TCase *equal = tcase_create("equal");
-  tcase_set_timeout(equal, 0);
-  tcase_add_loop_test(equal, nets_equal_portable, 0, 3);
-  tcase_add_loop_test(equal, decoders_equal_portable, 0, 3);
-  tcase_add_test(equal, portable_block_equals_single_samples);
-  tcase_add_loop_test(equal, grid_equals_portable, 0, 3);
-  tcase_add_loop_test(equal, rays_equal_portable, 0, 3);
-  tcase_add_test(equal, portable_waves_equal_single_rays);
-  tcase_add_test(equal, unknown_kernels_are_refused);
-  tcase_add_test(equal, absurd_scenes_are_refused);
-  suite_add_tcase(suite, equal);
-  hard_add(suite, hard_cases_equal_portable);
-  return ck_run(suite);
-}
+int ck_timeout = 24 * 3600; /* make vector-campaign */

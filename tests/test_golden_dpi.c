@@ -99,7 +99,7 @@ static void same_counters(void *golden, const fx_counts *counts)
   ck_assert_uint_gt(counts->layer[FX_C2].spikes[0], 0);
 }
 
-START_TEST(beats_are_samples_of_the_core)
+TEST(beats_are_samples_of_the_core)
 {
   void *golden = open_golden(), *twin = open_golden();
   fx_counts counts = {0};
@@ -130,9 +130,8 @@ START_TEST(beats_are_samples_of_the_core)
   sf_golden_close(golden);
   sf_golden_close(twin);
 }
-END_TEST
 
-START_TEST(sizes_and_steps)
+TEST(sizes_and_steps)
 {
   void *golden = sf_golden_open(in("s.snn"), core.net.steps == 1 ? 2 : 1);
   ck_assert_int_eq(sf_golden_steps(golden), core.net.steps == 1 ? 2 : 1);
@@ -142,9 +141,8 @@ START_TEST(sizes_and_steps)
   }
   sf_golden_close(golden);
 }
-END_TEST
 
-START_TEST(what_it_refuses)
+TEST(what_it_refuses)
 {
   void *golden = sf_golden_open(in("absent.snn"), 0);
   ck_assert_ptr_nonnull(strstr(sf_golden_error(golden), "absent.snn"));
@@ -179,7 +177,6 @@ START_TEST(what_it_refuses)
   sf_golden_close(NULL);
   ck_assert_str_ne(sf_golden_error(NULL), "");
 }
-END_TEST
 
 static void *run_thread(void *sum)
 {
@@ -192,7 +189,7 @@ static void *run_thread(void *sum)
   return NULL;
 }
 
-START_TEST(handles_do_not_share)
+TEST(handles_do_not_share)
 {
   uint64_t alone = 0, sum[THREADS] = {0};
   pthread_t thread[THREADS];
@@ -202,17 +199,5 @@ START_TEST(handles_do_not_share)
   for (int i = 0; i < THREADS; i++) ck_assert_uint_eq(sum[i], alone);
   ck_assert_uint_ne(alone, 0);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("golden_dpi");
-  TCase *tests = tcase_create("model");
-  tcase_add_checked_fixture(tests, open_fixture, close_fixture);
-  tcase_add_test(tests, beats_are_samples_of_the_core);
-  tcase_add_test(tests, sizes_and_steps);
-  tcase_add_test(tests, what_it_refuses);
-  tcase_add_test(tests, handles_do_not_share);
-  suite_add_tcase(suite, tests);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = open_fixture, .tear_down = close_fixture};

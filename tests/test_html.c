@@ -1,14 +1,13 @@
 /* The HTML report: well-formed, nothing fetched, every figure there with its data, every number the JSON's; and a page
  * with a planted fault is caught. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "page/page.h"
 #include "base/io.h"
 #include "tests/fx_tensorf_fixture.h"
 #include "tests/html_judge.h"
-#include <unistd.h>
 
 typedef struct fixture {
-  char folder[64], path[96];
   fx_scene scene;
   sf_dataset data;
   sf_view view;
@@ -23,11 +22,6 @@ static const char technology[] =
     "name plain\ntitle A plain technology\nfp32_mac 4.6 pJ a <source> & more\n"
     "fp32_add 0.9 pJ s\nint_add.8 0.03 pJ s\nint_add.32 0.1 pJ s\nint_multiply.8 0.2 pJ s\n"
     "int_multiply.32 3.1 pJ s\nsram.8192 10 pJ s\nsram.1048576 100 pJ s\ndram 1.95 nJ s\n";
-
-static void ok(sf_status status)
-{
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
-}
 
 static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
 {
@@ -53,9 +47,8 @@ static void make_report(fixture *f)
 {
   sf_audit_report *r = &f->report;
   sf_technology tech;
-  snprintf(f->path, sizeof f->path, "%s/plain.tech", f->folder);
-  ok(sf_write_file(f->path, technology, sizeof technology - 1));
-  ok(sf_technology_load(&tech, f->path));
+  ck_ok(sf_write_file(in("plain.tech"), technology, sizeof technology - 1));
+  ck_ok(sf_technology_load(&tech, in("plain.tech")));
   *r = (sf_audit_report){.scene = "a/scene.snn",
                          .data = "a/da<ta>&\"x\"",
                          .split = "test",
@@ -65,10 +58,10 @@ static void make_report(fixture *f)
                          .seed = 7,
                          .views = 1};
   const sf_measure_job job = {&f->scene, r->rays, make_ray, NULL, f, 7, UINT64_MAX};
-  ok(sf_measure_rays(&job, &r->measure));
-  ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
+  ck_ok(sf_measure_rays(&job, &r->measure));
+  ck_ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
   r->traffic = sf_traffic_of(&r->measure.core, r->rays);
-  ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
+  ck_ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
   r->three = (sf_three_counts){.rays = (int)r->measure.checked,
                                .core = r->measure.checked_core,
                                .rtl = r->measure.checked_core,
@@ -79,17 +72,15 @@ static void read_page(fixture *f)
 {
   size_t size;
   free(f->text);
-  snprintf(f->path, sizeof f->path, "%s/page.html", f->folder);
-  ok(sf_page_save(&f->page, f->path));
-  ok(sf_read_file(f->path, 1 << 24, &f->text, &size));
+  ck_ok(sf_page_save(&f->page, in("page.html")));
+  ck_ok(sf_read_file(in("page.html"), 1 << 24, &f->text, &size));
   ck_assert_uint_eq(strlen(f->text), size);
 }
 
 static fixture begin(int steps, bool picture, bool empty)
 {
   static const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fixture f = {.folder = "/tmp/sf_html_XXXXXX"};
-  ck_assert_ptr_nonnull(mkdtemp(f.folder));
+  fixture f = {0};
   f.scene = fixture_scene(&sizes, 3);
   f.scene.net.steps = steps;
   f.scene.step_q24 = 600000;
@@ -109,18 +100,12 @@ static void finish(fixture *f)
                       .view = &f->view,
                       .command = "energy_audit 'a<b' --html x&y",
                       .whole = true};
-  ok(sf_page_gather(&f->page));
+  ck_ok(sf_page_gather(&f->page));
   read_page(f);
 }
 
-static void end(fixture *f)
+static void fixture_free(fixture *f)
 {
-  static const char *const file[] = {"plain.tech", "page.html"};
-  for (int i = 0; i < 2; i++) {
-    snprintf(f->path, sizeof f->path, "%s/%s", f->folder, file[i]);
-    unlink(f->path);
-  }
-  rmdir(f->folder);
   free(f->text);
   sf_page_free(&f->page);
   sf_measure_free(&f->report.measure);
@@ -128,23 +113,21 @@ static void end(fixture *f)
   fx_scene_free(&f->scene);
 }
 
-START_TEST(a_page_is_whole)
+LOOP_TEST(a_page_is_whole, 4)
 {
   static const int steps[] = {1, 2, 3, 8};
-  fixture f = begin(steps[_i], true, false);
+  OWNED(fixture) f = begin(steps[_i], true, false);
   finish(&f);
   const faults found = judge(f.text, &f.report);
   ck_assert_msg(found.count == 0, "%d faults: %s", found.count, found.first);
   ck_assert_ptr_null(strstr(f.text, "da<ta>"));
   ck_assert_ptr_null(strstr(f.text, "DIFFERENT"));
-  end(&f);
 }
-END_TEST
 
 /* A decoder has no density network: its layers, figures and numbers are fewer, and they agree. */
-START_TEST(a_page_of_a_decoder)
+TEST(a_page_of_a_decoder)
 {
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   fx_scene_free(&f.scene);
   f.scene = tensorf_scene();
   finish(&f);
@@ -160,9 +143,7 @@ START_TEST(a_page_of_a_decoder)
   ck_assert_ptr_null(strstr(f.text, "fig-readings"));
   ck_assert_ptr_null(strstr(f.text, ">D1<"));
   cJSON_Delete(json);
-  end(&f);
 }
-END_TEST
 
 /* The energies per sample, over all samples, are the energy of the view; their map is not that of the samples. */
 static void check_maps(const fixture *f)
@@ -184,9 +165,9 @@ static void check_maps(const fixture *f)
 }
 
 /* What the pictures and the counts say of the same view is the same. */
-START_TEST(pictures_agree_with_the_audit)
+TEST(pictures_agree_with_the_audit)
 {
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   finish(&f);
   const sf_page *p = &f.page;
   uint64_t samples = 0, spikes = 0, neurons = 0;
@@ -209,12 +190,8 @@ START_TEST(pictures_agree_with_the_audit)
   f.report.measure.core.layer[FX_C2].sop[1]++;
   sf_page_free(&f.page);
   memset(f.page.neuron, 0, sizeof f.page.neuron);
-  const sf_status status = sf_page_gather(&f.page);
-  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-  ck_assert_ptr_nonnull(strstr(status.message, "C2"));
-  end(&f);
+  ck_bad(sf_page_gather(&f.page), SF_E_DIFFERENCE, "C2", "");
 }
-END_TEST
 
 /* A page without some of its figures: what is there is whole. */
 static void check_plain(const char *text)
@@ -230,19 +207,17 @@ static void check_plain(const char *text)
   cJSON_Delete(json);
 }
 
-START_TEST(a_view_without_photograph_or_samples)
+LOOP_TEST(a_view_without_photograph_or_samples, 2)
 {
-  fixture f = begin(2, _i == 1, _i == 1);
+  OWNED(fixture) f = begin(2, _i == 1, _i == 1);
   finish(&f);
   check_plain(f.text);
-  end(&f);
 }
-END_TEST
 
 /* PSNR is infinite after one number of steps, then after all. */
-START_TEST(pictures_equal_to_the_photograph)
+TEST(pictures_equal_to_the_photograph)
 {
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   finish(&f);
   for (int all = 0; all < 2; all++) {
     for (int t = all ? 0 : 2; t < (all ? SF_T_MAX : 3); t++) f.page.prefix[t].psnr = INFINITY;
@@ -251,13 +226,11 @@ START_TEST(pictures_equal_to_the_photograph)
     ck_assert_ptr_null(strstr(f.text, "has no photograph"));
     ck_assert_int_eq(strstr(f.text, "equals the photograph") != NULL, all);
   }
-  end(&f);
 }
-END_TEST
 
-START_TEST(a_difference_is_shown)
+TEST(a_difference_is_shown)
 {
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   finish(&f);
   f.report.three.rtl.layer[FX_C2].sop[1]++;
   f.report.three.agreement = sf_fail(SF_E_DIFFERENCE, "C2 sop step 1: <core> differs");
@@ -272,12 +245,10 @@ START_TEST(a_difference_is_shown)
   read_page(&f);
   ck_assert_ptr_nonnull(strstr(f.text, "the counts differ"));
   ck_assert_ptr_null(strstr(f.text, "was left out"));
-  end(&f);
 }
-END_TEST
 
 /* What a usual audit does not have: a trained twin, random rays, no traffic of the accelerator, a saturated layer. */
-START_TEST(what_is_rare_is_shown)
+TEST(what_is_rare_is_shown)
 {
   static const char *const words[] = {
       "trained by itself takes",
@@ -290,7 +261,7 @@ START_TEST(what_is_rare_is_shown)
       "x&amp;y --model a/m&amp;m.safetensors</pre>",
       "<code>m&amp;m.safetensors</code>",
       "<code>0123abcd</code>"};
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   finish(&f);
   f.report.twin = (sf_twin){"twin.safetensors", 100, 5, 2300000, -3.5};
   f.report.random_rays = true, f.page.whole = false;
@@ -300,11 +271,8 @@ START_TEST(what_is_rare_is_shown)
   snprintf(f.page.model_sha256, sizeof f.page.model_sha256, "0123abcd");
   read_page(&f);
   check_plain(f.text);
-  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-    ck_assert_msg(strstr(f.text, words[i]), "the page does not say: %s", words[i]);
-  end(&f);
+  for (int i = 0; i < COUNT(words); i++) ck_assert_msg(strstr(f.text, words[i]), "the page does not say: %s", words[i]);
 }
-END_TEST
 
 /* ---- planted faults ---- */
 
@@ -337,9 +305,9 @@ static const plant plants[] = {
     {"data-key=\"ledger.hoisted_saving_percent\" value=\"", "data-key=\"ledger.hoisted_saving_percent\" value=\"1"},
 };
 
-START_TEST(planted_faults_are_seen)
+TEST(planted_faults_are_seen)
 {
-  fixture f = begin(2, true, false);
+  OWNED(fixture) f = begin(2, true, false);
   finish(&f);
   for (size_t i = 0; i < sizeof plants / sizeof *plants; i++) {
     const char *at = strstr(f.text, plants[i].from);
@@ -351,23 +319,6 @@ START_TEST(planted_faults_are_seen)
     ck_assert_msg(found.count > 0, "not seen: %s -> %s", plants[i].from, plants[i].to);
     free(page);
   }
-  end(&f);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("html");
-  TCase *c = tcase_create("page");
-  tcase_set_timeout(c, 60);
-  tcase_add_loop_test(c, a_page_is_whole, 0, 4);
-  tcase_add_test(c, a_page_of_a_decoder);
-  tcase_add_test(c, pictures_agree_with_the_audit);
-  tcase_add_loop_test(c, a_view_without_photograph_or_samples, 0, 2);
-  tcase_add_test(c, pictures_equal_to_the_photograph);
-  tcase_add_test(c, a_difference_is_shown);
-  tcase_add_test(c, what_is_rare_is_shown);
-  tcase_add_test(c, planted_faults_are_seen);
-  suite_add_tcase(suite, c);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -5,8 +5,6 @@
 #include "base/rng.h"
 #include <errno.h>
 #include <signal.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -83,33 +81,29 @@ static uint64_t sum_of(uint64_t first, uint64_t end)
   return sum;
 }
 
-START_TEST(same_for_any_number_of_processes)
+TEST(same_for_any_number_of_processes)
 {
   static const int processes[] = {1, 2, 3, 7, 50};
   for (int i = 0; i < 5; i++) {
     task whole = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = NEVER}, early = whole;
     early.stop_at = 17;
-    ck_assert_int_eq(run(&whole, processes[i], 5).code, SF_OK);
+    ck_ok(run(&whole, processes[i], 5));
     ck_assert_uint_eq(whole.sum, sum_of(5, UNITS));
-    ck_assert_int_eq(run(&early, processes[i], 0).code, SF_OK);
+    ck_ok(run(&early, processes[i], 0));
     ck_assert_uint_eq(early.sum, sum_of(0, 18));
   }
 }
-END_TEST
 
-START_TEST(a_process_dies)
+TEST(a_process_dies)
 {
   for (int processes = 1; processes <= 3; processes++) {
     task t = {.stop_at = NEVER, .die_at = 11, .interrupt_at = NEVER};
-    const sf_status status = run(&t, processes, 0);
-    ck_assert_int_eq(status.code, SF_E_IO);
-    ck_assert_msg(strstr(status.message, "unit 11 was ended by signal 9") != NULL, "%s", status.message);
+    ck_bad(run(&t, processes, 0), SF_E_IO, "unit 11 was ended by signal 9", "");
   }
 }
-END_TEST
 
 /* Units begun end early and are taken; none is begun after. */
-START_TEST(interrupted)
+TEST(interrupted)
 {
   sf_cli_catch_signals();
   task t = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = 9};
@@ -118,17 +112,4 @@ START_TEST(interrupted)
   ck_assert_uint_le(t.next, 9 + 3);
   ck_assert_uint_eq(t.cut, t.next - 9);
   ck_assert_uint_eq(t.sum, sum_of(0, t.next));
-}
-END_TEST
-
-int main(void)
-{
-  Suite *s = suite_create("jobs");
-  TCase *c = tcase_create("jobs");
-  tcase_set_timeout(c, 30);
-  tcase_add_test(c, same_for_any_number_of_processes);
-  tcase_add_test(c, a_process_dies);
-  tcase_add_test(c, interrupted);
-  suite_add_tcase(s, c);
-  return ck_run(s);
 }

@@ -3,59 +3,49 @@
 #include "ck_run.h"
 #include "layout_folder.h"
 
-START_TEST(a_few_missing_pictures_are_passed_over)
+TEST(a_few_missing_pictures_are_passed_over)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   unlink(in("images/p03.png")), unlink(in("images/p09.png"));
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.count, 12);
   ck_assert_int_eq(d.total, 12);
   ck_assert_int_eq(d.warnings, 1);
   ck_assert_ptr_nonnull(strstr(d.warning[0], "2 of 14 pictures are missing"));
   ck_assert_ptr_nonnull(strstr(d.warning[0], "images/p03.png"));
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1, .first = 2, .limit = 1}));
+  ck_ok(reload_as("train", &(sf_dataset_options){.downscale = 1, .first = 2, .limit = 1}));
   ck_assert_str_eq(d.view[0].name, "images/p04.png");
-  sf_dataset_free(&d);
-  load(&d, "test"); /* is whole */
+  reload("test"); /* is whole */
   ck_assert(d.count == 3 && d.warnings == 0);
-  sf_dataset_free(&d);
   for (int v = 1; v < 8; v++) {
     char name[40];
     snprintf(name, sizeof name, "images/p%02d.png", v);
     unlink(in(name));
   }
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, "images/p01.png", "8 of 14 pictures are missing");
+  ck_bad(reload_as("train", NULL), SF_E_IO, "images/p01.png", "8 of 14 pictures are missing");
 }
-END_TEST
 
-START_TEST(other_endings_are_found)
+TEST(other_endings_are_found)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   for (int v = 0; v < VIEWS; v++) snprintf(rig.view[v].name, sizeof rig.view[v].name, v % 2 ? "p%02d.JPG" : "p%02d", v);
   put_colmap("sparse/0", &rig, 0);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.count, 3);
-  sf_dataset_free(&d);
   ck_assert_int_eq(rename(in("images/p00.png"), in("images/p00.JPEG")), 0);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.count, 3);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* Two of its files start with UTF-8's mark, as some editors leave it. */
-START_TEST(a_mark_before_a_text_is_skipped)
+TEST(a_mark_before_a_text_is_skipped)
 {
   static layout_file file, marked;
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_colmap("sparse/0", &rig, 1);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   for (int i = 0; i < 2; i++) {
@@ -67,11 +57,9 @@ START_TEST(a_mark_before_a_text_is_skipped)
     layout_text(&marked, "\xef\xbb\xbf"), layout_text(&marked, file.bytes);
     put(i ? "sparse/0/images.txt" : "sparse/0/cameras.txt", &marked);
   }
-  load(&d, "train");
+  reload("train");
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 static bool warned(const sf_dataset *d, const char *word, const char *name)
 {
@@ -80,10 +68,9 @@ static bool warned(const sf_dataset *d, const char *word, const char *name)
   return false;
 }
 
-START_TEST(the_survey_names_what_looks_wrong)
+TEST(the_survey_names_what_looks_wrong)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lenses = 3;
   rig.lens[1] = (layout_lens){8, 1, "PINHOLE", WIDTH, HEIGHT, 4, {60, 20, 1, 6}};
   rig.lens[2] = (layout_lens){9, 1, "PINHOLE", WIDTH, HEIGHT, 4, {2, 2, 8, 6}};
@@ -94,29 +81,26 @@ START_TEST(the_survey_names_what_looks_wrong)
     snprintf(name, sizeof name, "images/%s", rig.view[v].name);
     put_picture(name, WIDTH, HEIGHT, v == 6 ? 20 : 100 + v, 255);
   }
-  load(&d, "train");
-  ck_good(sf_dataset_survey(&d));
+  reload("train");
+  ck_ok(sf_dataset_survey(&d));
   ck_assert(warned(&d, "exposure", "images/p06.png") && warned(&d, "-2.", "1 of 14"));
   ck_assert_int_eq(d.warnings, 1);
-  sf_dataset_free(&d);
   rig.view[2].lens = 8, rig.view[3].lens = 9;
   memcpy(rig.view[12].to_world, rig.view[11].to_world, sizeof rig.view[11].to_world);
   for (int i = 0; i < 3; i++) rig.view[10].to_world[4 * i + 3] += 40 * rig.view[10].to_world[4 * i + 2];
   for (int i = 0; i < 12; i++)
     if (i % 4 == 0 || i % 4 == 2) rig.view[5].to_world[i] *= -1; /* turns its back */
   put_colmap("sparse/0", &rig, 0);
-  load(&d, "train");
+  reload("train");
   ck_assert(warned(&d, "do not look at the scene", "images/p05.png"));
-  ck_good(sf_dataset_survey(&d));
+  ck_ok(sf_dataset_survey(&d));
   ck_assert(warned(&d, "factor 2", "images/p02.png"));
   ck_assert(warned(&d, "stretched", "images/p02.png"));
   ck_assert(warned(&d, "optical centre", "images/p02.png"));
   ck_assert(warned(&d, "field of view: 152 degrees", "images/p03.png"));
   ck_assert(warned(&d, "pose of another", "images/p12.png: that of images/p11.png"));
   ck_assert(warned(&d, "far outside", "images/p10.png"));
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* Pixels of a rectangle that are rather red, rather blue, or dark. */
 static void count_colours(const sf_image *image, int x0, int x1, int y0, int y1, int seen[3])
@@ -131,16 +115,16 @@ static void count_colours(const sf_image *image, int x0, int x1, int y0, int y1,
 }
 
 /* Words at the top of both panels, the colours and the scale in the foot: its bar is as long as it says. */
-START_TEST(the_plan_has_words_and_a_scale)
+TEST(the_plan_has_words_and_a_scale)
 {
   enum { SIZE = 600 };
   const layout_rig rig = orbit();
-  sf_dataset d, held;
-  sf_image image;
+  OWNED(sf_dataset) held;
+  OWNED(sf_image) image;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "train"), load(&held, "test");
-  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  reload("train"), load(&held, "test");
+  ck_ok(sf_plan_draw(&d, &held, SIZE, &image));
   for (int side = 0; side < 2; side++) {
     int seen[3] = {0};
     count_colours(&image, side * SIZE, side * SIZE + 300, 12, 28, seen);
@@ -160,22 +144,19 @@ START_TEST(the_plan_has_words_and_a_scale)
       for (int i = 0; i < 3; i++) most = fmax(most, fabs((double)(s ? held : d).view[v].camera.to_world[4 * i + 3]));
   const double length = (longest - 1) * 1.15 * most / (0.5 * SIZE); /* model units */
   ck_assert_msg(fabs(length - 0.5) < 0.01, "the bar is %g long", length);
-  sf_image_free(&image);
-  sf_dataset_free(&d), sf_dataset_free(&held);
 }
-END_TEST
 
 /* From above and from the side: each camera's own point has its colour, the box's edges are grey. */
-START_TEST(the_plan_shows_every_camera)
+TEST(the_plan_shows_every_camera)
 {
   enum { SIZE = 200 };
   const layout_rig rig = orbit();
-  sf_dataset d, held;
-  sf_image image;
+  sf_dataset held;
+  OWNED(sf_image) image;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "train"), load(&held, "test");
-  ck_good(sf_plan_draw(&d, &held, SIZE, &image));
+  reload("train"), load(&held, "test");
+  ck_ok(sf_plan_draw(&d, &held, SIZE, &image));
   ck_assert(image.width == 2 * SIZE && image.height == SIZE + SF_PLAN_FOOT);
   double most = 0;
   for (int v = 0; v < d.count; v++)
@@ -192,15 +173,12 @@ START_TEST(the_plan_shows_every_camera)
       ck_assert_msg(p[0] > 50000 && p[2] < 20000, "camera %d, panel %d: %d %d %d", v, side, p[0], p[1], p[2]);
     }
   }
-  sf_image_free(&image);
-  sf_dataset_free(&d), sf_dataset_free(&held);
+  sf_dataset_free(&held);
 }
-END_TEST
 
-START_TEST(cameras_that_all_look_away_are_refused)
+TEST(cameras_that_all_look_away_are_refused)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms_train.json", &rig, "", "images", 0,
            1); /* Blender: about the origin; these are about (3, -2, 1) */
@@ -208,90 +186,75 @@ START_TEST(cameras_that_all_look_away_are_refused)
     for (int i = 0; i < 12; i++)
       if (i % 4 == 0 || i % 4 == 2) rig.view[v].to_world[i] *= -1;
   put_json("transforms_train.json", &rig, "", "images", 0, 1);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms_train.json", "no view looks at the scene");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "transforms_train.json", "no view looks at the scene");
 }
-END_TEST
 
 /* OpenCV's axes, taken for OpenGL's: about the scene, but looking out. A few such views are named one by one. */
-START_TEST(cameras_that_turn_their_backs_are_told)
+LOOP_TEST(cameras_that_turn_their_backs_are_told, 3)
 {
   static const int every[] = {1, 3, 8};
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 0; v < VIEWS; v += every[_i])
     for (int i = 0; i < 12; i++)
       if (i % 4 == 1 || i % 4 == 2) rig.view[v].to_world[i] *= -1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "train");
+  reload("train");
   ck_assert(warned(&d, _i ? "6 of 17" : "17 of 17", "turn their backs") == (_i < 2));
   ck_assert(warned(&d, "3 of 17", "do not look at the scene") == (_i == 2));
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(mirrored_poses_are_told)
+LOOP_TEST(mirrored_poses_are_told, 2)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 2; v < VIEWS; v += 3)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i] *= -1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "test");
+  reload("test");
   ck_assert(warned(&d, "5 of 17 poses are mirrored", "images/p02.png"));
-  sf_dataset_free(&d);
   unlink(in("transforms.json"));
   put_llff(&rig, 0, 4, 40);
-  load(&d, "train");
+  reload("train");
   ck_assert(warned(&d, "poses_bounds.npy: 5 of 17 poses are mirrored", "images/p02.png"));
-  sf_dataset_free(&d);
   memcpy(rig.view[4].to_world, rig.view[3].to_world, sizeof rig.view[4].to_world);
   for (int i = 0; i < 3; i++) rig.view[4].to_world[4 * i + 2] = rig.view[4].to_world[4 * i + _i];
   put_llff(&rig, 0, 4, 40);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "row 4", "not at right angles");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "row 4", "not at right angles");
 }
-END_TEST
 
 /* The one that is used is said to be the smaller; equal ones need no word. */
-START_TEST(a_larger_model_beside_is_told)
+LOOP_TEST(a_larger_model_beside_is_told, 2)
 {
   layout_rig rig = orbit(), part = rig;
-  sf_dataset d;
   part.views = 9;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_colmap("sparse/0", &part, _i);
   put_colmap("sparse/1", &part, _i);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.warnings, 0);
-  sf_dataset_free(&d);
   put_colmap("sparse/2", &rig, _i);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.count == 7 && d.warnings == 1);
   ck_assert(warned(&d, "another model is larger", _i ? "sparse/2/images.txt" : "sparse/2/images.bin"));
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* Quaternions of two digits: axes at right angles and of length 1 all the same. */
-START_TEST(rounded_quaternions_are_rotations)
+LOOP_TEST(rounded_quaternions_are_rotations, 2)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_good(sf_write_file(in("sparse/0/cameras.txt"), "1 PINHOLE 16 12 20 20 8 6\n", 26));
+  ck_ok(sf_write_file(in("sparse/0/cameras.txt"), "1 PINHOLE 16 12 20 20 8 6\n", 26));
   const char images[] = "1 0.71 0.71 0 0 0 0 4 1 p00.png\n\n2 0.71 0 0.7 0 0 0 4 1 p01.png\n\n";
-  ck_good(sf_write_file(in("sparse/0/images.txt"), images, sizeof images - 1));
+  ck_ok(sf_write_file(in("sparse/0/images.txt"), images, sizeof images - 1));
   unlink(in("sparse/0/cameras.bin"));
-  load(&d, _i ? "train" : "test");
+  reload(_i ? "train" : "test");
   const float *m = d.view[0].camera.to_world;
   for (int a = 0; a < 3; a++)
     for (int b = 0; b < 3; b++)
       ck_assert_double_eq_tol((double)(m[a] * m[b] + m[4 + a] * m[4 + b] + m[8 + a] * m[8 + b]), a == b, 1e-6);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 typedef struct bad_npy {
   const char *descr, *order, *shape;
@@ -312,37 +275,32 @@ static const bad_npy bad_npys[] = {
     {"<f8", "False", "(17, 17)", 2312, SF_E_RANGE, "row 0: column 0 of the rotation"},
 };
 
-START_TEST(bad_numpy_files_are_named)
+LOOP_TEST(bad_numpy_files_are_named, COUNT(bad_npys))
 {
   static layout_file file;
   const bad_npy *bad = &bad_npys[_i];
-  sf_dataset d;
   layout_npy_header(&file, bad->descr, bad->order, bad->shape);
   for (int i = 0; i < bad->bytes; i++) layout_put(&file, 0, 1);
   put("poses_bounds.npy", &file);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, "poses_bounds.npy", bad->problem);
+  ck_bad(reload_as("train", NULL), bad->code, "poses_bounds.npy", bad->problem);
 }
-END_TEST
 
-START_TEST(positions_without_precision_are_named)
+TEST(positions_without_precision_are_named)
 {
   layout_rig rig = row();
-  sf_dataset d;
   rig.view[5].to_world[7] = 3e38;
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "poses_bounds.npy", "row 5: the position is 3e+38");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "poses_bounds.npy", "row 5: the position is 3e+38");
 }
-END_TEST
 
 /* Every shorter file is refused by name: none is read beyond its end, none is taken for whole. */
-START_TEST(truncated_files_are_named)
+LOOP_TEST(truncated_files_are_named, 4)
 {
   static const char *const names[] = {"poses_bounds.npy", "sparse/0/cameras.bin", "sparse/0/images.bin",
                                       "sparse/0/points3D.bin"};
   static layout_file file;
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.views = 3, rig.points = 4;
   if (_i == 0) {
     layout_npy(&file, &rig, 0, 1, 2);
@@ -354,37 +312,33 @@ START_TEST(truncated_files_are_named)
   }
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put(names[_i], &file);
-  ck_good(sf_dataset_load(&d, folder, "train", NULL));
-  sf_dataset_free(&d);
+  ck_ok(reload_as("train", NULL));
   const size_t whole = file.size;
   for (file.size = 0; file.size < whole; file.size += 1 + file.size / 40) {
     put(names[_i], &file);
-    ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, names[_i], _i ? "cut short" : "");
+    ck_bad(reload_as("train", NULL), SF_E_FORMAT, names[_i], _i ? "cut short" : "");
     ck_assert_ptr_null(d.view);
   }
   file.size = whole + 1;
   put(names[_i], &file);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, names[_i], "too");
+  ck_bad(reload_as("train", NULL), SF_E_FORMAT, names[_i], "too");
 }
-END_TEST
 
-START_TEST(camera_models_are_refused_by_name)
+LOOP_TEST(camera_models_are_refused_by_name, 4)
 {
   static const layout_lens other[] = {{5, 5, "OPENCV_FISHEYE", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
                                       {5, 6, "FULL_OPENCV", WIDTH, HEIGHT, 8, {20, 20, 8, 6}},
                                       {5, 7, "FOV", WIDTH, HEIGHT, 5, {20, 20, 8, 6, 1}},
                                       {5, 10, "THIN_PRISM_FISHEYE", WIDTH, HEIGHT, 8, {20, 20, 8, 6}}};
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[rig.lenses++] = other[_i];
   if (other[_i].params == 8 && other[_i].model > 5) { /* 12 numbers: the rest from a camera behind it */
     rig.lens[rig.lenses++] = other[0];
   }
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_colmap("sparse/0", &rig, 0);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_UNSUPPORTED, "cameras.bin: camera 5", other[_i].name);
+  ck_bad(reload_as("train", NULL), SF_E_UNSUPPORTED, "cameras.bin: camera 5", other[_i].name);
 }
-END_TEST
 
 typedef struct bad_text {
   const char *cameras, *images;
@@ -410,66 +364,31 @@ static const bad_text bad_texts[] = {
     {CAMERA, "1 1 0 0 0 0 0 0 1\n\n", SF_E_FORMAT, "images.txt:1", "no name"},
 };
 
-START_TEST(bad_texts_are_named)
+LOOP_TEST(bad_texts_are_named, COUNT(bad_texts))
 {
   const bad_text *bad = &bad_texts[_i];
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_good(sf_make_dir(in("sparse/0")));
-  ck_good(sf_write_file(in("sparse/0/cameras.txt"), bad->cameras, strlen(bad->cameras)));
-  ck_good(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), bad->code, bad->where, bad->problem);
+  ck_ok(sf_make_dir(in("sparse/0")));
+  ck_ok(sf_write_file(in("sparse/0/cameras.txt"), bad->cameras, strlen(bad->cameras)));
+  ck_ok(sf_write_file(in("sparse/0/images.txt"), bad->images, strlen(bad->images)));
+  ck_bad(reload_as("train", NULL), bad->code, bad->where, bad->problem);
 }
-END_TEST
 
-START_TEST(folders_that_do_not_fit_are_named)
+TEST(folders_that_do_not_fit_are_named)
 {
   const layout_rig rig = row();
-  sf_dataset d;
   put_llff(&rig, 0, 4, 40);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, folder, "no folder images or images_N");
+  ck_bad(reload_as("train", NULL), SF_E_IO, folder, "no folder images or images_N");
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
-  ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "no split val", "train or test");
-  ck_bad(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 2}), SF_E_RANGE, "images_4", "1/2");
-  ck_bad(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.downscale = 1}), SF_E_RANGE, "images_4", "1/1");
+  ck_bad(reload_as("val", NULL), SF_E_IO, "no split val", "train or test");
+  ck_bad(reload_as("train", &(sf_dataset_options){.downscale = 2}), SF_E_RANGE, "images_4", "1/2");
+  ck_bad(reload_as("train", &(sf_dataset_options){.downscale = 1}), SF_E_RANGE, "images_4", "1/1");
   put_picture("images_4/more.png", WIDTH, HEIGHT, 1, 255);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "poses of 17 views", "images_4 holds 18 pictures");
+  ck_bad(reload_as("train", NULL), SF_E_FORMAT, "poses of 17 views", "images_4 holds 18 pictures");
   unlink(in("images_4/more.png"));
   put_picture("images_4/p03.png", WIDTH, 2 * HEIGHT, 1, 255);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_FORMAT, "images_4/p03.png",
-         "16 x 24 pixels, its camera says 64 x 48");
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("layout faults");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_test(t, a_few_missing_pictures_are_passed_over);
-  tcase_add_test(t, other_endings_are_found);
-  tcase_add_test(t, a_mark_before_a_text_is_skipped);
-  tcase_add_test(t, the_survey_names_what_looks_wrong);
-  tcase_add_test(t, the_plan_shows_every_camera);
-  tcase_add_test(t, the_plan_has_words_and_a_scale);
-  tcase_add_test(t, cameras_that_all_look_away_are_refused);
-  tcase_add_loop_test(t, cameras_that_turn_their_backs_are_told, 0, 3);
-  tcase_add_loop_test(t, mirrored_poses_are_told, 0, 2);
-  tcase_add_loop_test(t, a_larger_model_beside_is_told, 0, 2);
-  tcase_add_loop_test(t, rounded_quaternions_are_rotations, 0, 2);
-  tcase_add_loop_test(t, bad_numpy_files_are_named, 0, sizeof bad_npys / sizeof *bad_npys);
-  tcase_add_test(t, positions_without_precision_are_named);
-  tcase_add_loop_test(t, truncated_files_are_named, 0, 4);
-  tcase_add_loop_test(t, camera_models_are_refused_by_name, 0, 4);
-  tcase_add_loop_test(t, bad_texts_are_named, 0, sizeof bad_texts / sizeof *bad_texts);
-  tcase_add_test(t, folders_that_do_not_fit_are_named);
-  suite_add_tcase(s, t);
-  return s;
+  ck_bad(reload_as("train", NULL), SF_E_FORMAT, "images_4/p03.png", "16 x 24 pixels, its camera says 64 x 48");
 }
 
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

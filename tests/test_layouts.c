@@ -4,14 +4,13 @@
 #include "src/scene/capture.h"
 #include <sys/stat.h>
 
-START_TEST(colmap_has_the_rays_of_its_poses)
+LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 {
   const layout_rig rig = orbit(), listed = shuffled(&rig);
-  sf_dataset d;
   put_colmap(_i & 2 ? "sparse" : "sparse/0", &listed, _i & 1);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   same_splits(&rig);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_COLMAP);
   const char *const list[] = {"sparse/0/images.bin", "sparse/0/images.txt", "sparse/images.bin", "sparse/images.txt"};
   ck_assert_str_eq(d.list, in(list[_i]));
@@ -31,52 +30,44 @@ START_TEST(colmap_has_the_rays_of_its_poses)
   double p[3];
   to_model(&d, rig.point[5], p);
   for (int i = 0; i < 3; i++) ck_assert_double_eq_tol(p[i], (double)d.point[15 + i], 1e-6);
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(instant_ngp_has_the_rays_of_its_poses)
+TEST(instant_ngp_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "\"aabb_scale\":4,", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.layout, SF_LAYOUT_INGP);
   ck_assert(d.scale == 0.33f && d.bound == 2 && d.offset[0] == 0);
-  sf_dataset_free(&d);
   /* its own cube: 0.5 p + (0.6, 0.5, 0.4), of which the middle is the origin and the box has half edge 1 */
   put_json("transforms.json", &rig, "\"aabb_scale\":1,\"scale\":0.25,\"offset\":[0.6,0.5,0.4],", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "test");
+  reload("test");
   ck_assert(d.scale == 0.5f && d.bound == 1);
   ck_assert_float_eq_tol(d.offset[0], 0.2f, 1e-6f);
   ck_assert_float_eq_tol(d.offset[2], -0.2f, 1e-6f);
-  sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_float_eq_tol(d.offset[0], 0.4f, 1e-6f); /* the box's middle stays in the origin */
-  sf_dataset_free(&d);
   /* half a million units away, in single precision 1/32 */
   for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 500000;
   put_json("transforms.json", &rig, "\"aabb_scale\":1,\"scale\":0.25,\"offset\":[-124999.4,0.5,0.4],", "images", 0, 1);
-  load(&d, "test");
+  reload("test");
   const sf_view *a = &d.view[0], *b = &d.view[1];
   const double apart = named(&rig, b->name)->to_world[3] - named(&rig, a->name)->to_world[3];
   ck_assert_float_eq_tol(b->camera.to_world[3] - a->camera.to_world[3], (float)(0.5 * apart), 1e-6f);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* The training file says where the scene lies, in words or by its poses, for the views of the other file, too. */
-START_TEST(splits_in_two_files_have_the_same_coordinates)
+LOOP_TEST(splits_in_two_files_have_the_same_coordinates, 3)
 {
   static const char *const training[] = {"transforms.json", "transforms_train.json", "transforms_train.json"};
   static const char *const more[] = {"", "\"aabb_scale\":4,", ""};
   const layout_rig rig = orbit();
-  sf_dataset train, test;
+  OWNED(sf_dataset) train, test;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json(training[_i], &rig, more[_i], "images", 3, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 5);
@@ -87,33 +78,28 @@ START_TEST(splits_in_two_files_have_the_same_coordinates)
   ck_assert_str_eq(train.view[0].name, "images/p03.png");
   ck_assert_str_eq(test.view[1].name, "images/p05.png");
   same_rays(&train, &rig), same_rays(&test, &rig);
-  ck_good(sf_dataset_agree(&train, &test));
-  sf_dataset_free(&train), sf_dataset_free(&test);
+  ck_ok(sf_dataset_agree(&train, &test));
 }
-END_TEST
 
 /* A surveyor's coordinates: the metres that floats lose are taken off before. */
-START_TEST(far_coordinates_lose_nothing)
+TEST(far_coordinates_lose_nothing)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 0; v < VIEWS; v++) rig.view[v].to_world[3] += 512345.25, rig.view[v].to_world[7] += 5412345.5;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "train");
+  reload("train");
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(splits_in_other_coordinates_are_refused)
+TEST(splits_in_other_coordinates_are_refused)
 {
   const layout_rig rig = row();
-  sf_dataset train, test;
+  OWNED(sf_dataset) train, test;
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
   load(&train, "train"), load(&test, "test");
-  ck_good(sf_dataset_agree(&train, &test));
+  ck_ok(sf_dataset_agree(&train, &test));
   float *const number[] = {&test.scale, &test.offset[2], &test.ndc_near, &test.ndc_focal[1]};
   for (int i = 0; i < 6; i++) {
     const sf_dataset before = test;
@@ -123,38 +109,33 @@ START_TEST(splits_in_other_coordinates_are_refused)
     ck_bad(sf_dataset_agree(&train, &test), SF_E_FORMAT, "poses_bounds.npy", "other coordinates");
     test = before;
   }
-  sf_dataset_free(&train), sf_dataset_free(&test);
 }
-END_TEST
 
 /* NDC or not, another scale, another bound; what poses are computed from may differ a little. */
-START_TEST(another_scenes_data_is_refused)
+TEST(another_scenes_data_is_refused)
 {
   layout_rig rig = row();
-  sf_dataset d;
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
-  ck_good(sf_dataset_load(&d, folder, "train", &(sf_dataset_options){.scale = 0.125f}));
+  ck_ok(reload_as("train", &(sf_dataset_options){.scale = 0.125f}));
   ck_assert(d.scale == 0.125f && d.own_scale != d.scale); /* whatever it is read at */
   const sf_space space = sf_dataset_space(&d);
   ck_assert(space.ndc == 1 && space.scale == d.own_scale && space.bound == 1);
-  ck_good(sf_space_check(&space, "m", &d));
+  ck_ok(sf_space_check(&space, "m", &d));
   sf_space other = space;
   other.scale *= 1.005f;
-  ck_good(sf_space_check(&other, "m", &d));
+  ck_ok(sf_space_check(&other, "m", &d));
   other.scale *= 1.02f;
   ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from data of scale", "poses_bounds.npy: scale");
   other = space, other.bound = 2;
   ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "and bound 2", "bound 1: this is another scene's data");
   other = space, other.ndc = 0;
   ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from data without NDC rays", "with NDC");
-  ck_good(sf_space_check(&(sf_space){0}, "m", &d));
-  sf_dataset_free(&d);
+  ck_ok(sf_space_check(&(sf_space){0}, "m", &d));
 }
-END_TEST
 
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */
-START_TEST(a_picture_is_found_by_a_long_name)
+TEST(a_picture_is_found_by_a_long_name)
 {
   char name[5000] = "", path[4096];
   const layout_rig rig = orbit();
@@ -162,52 +143,46 @@ START_TEST(a_picture_is_found_by_a_long_name)
   strcpy(name, "images/");
   for (int i = 0; i < 300; i++) strcat(name, "./");
   strcat(name, "p00.jpg");
-  ck_good(sf_picture_find(path, folder, name));
+  ck_ok(sf_picture_find(path, folder, name));
   ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
   ck_assert(sf_is_file(path));
   name[strlen(name) - 4] = 0;
-  ck_good(sf_picture_find(path, folder, name));
+  ck_ok(sf_picture_find(path, folder, name));
   ck_assert_str_eq(strrchr(path, '/'), "/p00.png");
   ck_assert(sf_is_file(path));
   for (size_t n = strlen(name); n < 4200; n += 2) strcat(name, "./");
   ck_bad(sf_picture_find(path, folder, name), SF_E_IO, folder, "too long");
 }
-END_TEST
 
 /* Nobody writes into the pipe: opening it would wait for ever. */
-START_TEST(a_picture_is_no_pipe)
+TEST(a_picture_is_no_pipe)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 0);
   put_json("transforms.json", &rig, "", "images", 0, 1);
   const char *first = in("images/p00.png");
   ck_assert(!unlink(first) && !mkfifo(first, 0600));
-  ck_bad(sf_dataset_load(&d, folder, "test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
+  ck_bad(reload_as("test", NULL), SF_E_IO, "p00.png", "not a regular file (frame 0 of");
 }
-END_TEST
 
-START_TEST(an_object_on_nothing_fills_the_box)
+TEST(an_object_on_nothing_fills_the_box)
 {
   const layout_rig rig = orbit();
-  sf_dataset d;
   put_pictures("images", &rig, WIDTH, HEIGHT, 0); /* the first rows are transparent */
   put_json("transforms.json", &rig, "", "images", 0, 1);
   same_splits(&rig);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.bound, 1);
   /* half the picture's height over the focal length, at the middle distance of 5 to 5.3 */
   ck_assert_double_eq_tol(1 / (double)d.scale, 5.0 * 6 / 21, 0.3 * 6 / 21);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* The optical axis is far beside the picture: what it shows counts, not what the camera is turned to. */
-START_TEST(a_crop_looks_where_its_picture_is)
+TEST(a_crop_looks_where_its_picture_is)
 {
   const layout_rig rig = orbit();
   layout_rig crop = rig;
-  sf_dataset whole, d;
+  sf_dataset whole;
   const double slope = tan(M_PI / 3), angle[2] = {cos(M_PI / 3), sin(M_PI / 3)};
   char more[100];
   crop.lens[0].param[2] -= slope * crop.lens[0].param[0];
@@ -220,50 +195,44 @@ START_TEST(a_crop_looks_where_its_picture_is)
   put_pictures("images", &rig, WIDTH, HEIGHT, 0);
   put_json("transforms.json", &rig, "", "images", 0, 1), load(&whole, "train");
   snprintf(more, sizeof more, "\"cx\":%.17g,", crop.lens[0].param[2]);
-  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  put_json("transforms.json", &crop, more, "images", 0, 1), reload("train");
   ck_assert_int_eq(d.warnings, 0);
   same_rays(&d, &crop);
   for (int i = 0; i < 12; i++) ck_assert_double_eq_tol(d.world[i], whole.world[i], 1e-9);
   ck_assert_float_eq_tol(d.scale, whole.scale * 2, 1e-5f); /* 60 degrees off: the object is at half the depth */
-  sf_dataset_free(&whole), sf_dataset_free(&d);
+  sf_dataset_free(&whole);
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) crop.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   strcat(more, "\"aabb_scale\":1,");
-  put_json("transforms.json", &crop, more, "images", 0, 1), load(&d, "train");
+  put_json("transforms.json", &crop, more, "images", 0, 1), reload("train");
   ck_assert_int_eq(d.warnings, 0);
-  sf_dataset_free(&d);
   put_json("transforms.json", &crop, "\"cx\":100,\"aabb_scale\":1,", "images", 0, 1);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "transforms.json", "no view looks at the scene");
 }
-END_TEST
 
-START_TEST(blender_has_the_rays_of_its_poses)
+TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   for (int v = 0; v < VIEWS; v++)
     for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms_train.json", &rig, "", "images", 1, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 2);
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.layout, SF_LAYOUT_BLENDER);
   ck_assert_str_eq(d.list, in("transforms_train.json"));
   ck_assert_int_eq(d.count, VIEWS / 2);
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* The point on the rig's ray, brought into NDC by its definition, lies on the ray that is handed out; rays are looked
  * at from the near plane on. */
-START_TEST(forward_facing_rays_are_ndc)
+LOOP_TEST(forward_facing_rays_are_ndc, 2)
 {
   const layout_rig rig = row();
-  sf_dataset d;
   put_llff(&rig, _i, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "test");
+  reload("test");
   ck_assert_int_eq(d.layout, SF_LAYOUT_LLFF);
   ck_assert_str_eq(d.list, in("poses_bounds.npy"));
   ck_assert(d.ndc && d.bound == 1 && d.ndc_near == 1);
@@ -300,15 +269,13 @@ START_TEST(forward_facing_rays_are_ndc)
         for (int i = 0; i < 3; i++) ck_assert_double_le(fabs(ndc[i]), 1 + 1e-6);
     }
   }
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* NeRF's recentring: the mean pose becomes the identity; the nearest depth is at 4 / 3. */
-START_TEST(forward_facing_poses_are_recentred)
+TEST(forward_facing_poses_are_recentred)
 {
   const layout_rig rig = row();
-  sf_dataset one, other;
+  OWNED(sf_dataset) one, other;
   double sum[12] = {0};
   put_llff(&rig, 0, 4, 40);
   put_pictures("images_4", &rig, WIDTH, HEIGHT, 255);
@@ -327,70 +294,55 @@ START_TEST(forward_facing_poses_are_recentred)
   ck_assert_double_eq_tol(sum[1], 0, 1e-6);
   const double *w = one.world;
   ck_assert_double_eq_tol(sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), 1 / (0.75 * 4), 1e-12);
-  sf_dataset_free(&one), sf_dataset_free(&other);
 }
-END_TEST
 
-START_TEST(poses_decide_what_faces_forward)
+TEST(poses_decide_what_faces_forward)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0].param[1] = WIDTH / 2.0; /* one focal length */
   put_llff(&rig, 0, 2, 9);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_LLFF && !d.ndc && d.bound > 1);
-  sf_dataset_free(&d);
   rig = row(); /* but one of them stands behind the nearest thing */
   put_llff(&rig, 0, 4, 40);
-  ck_good(sf_make_dir(in("sparse/0")));
-  load(&d, "train");
+  ck_ok(sf_make_dir(in("sparse/0")));
+  reload("train");
   ck_assert(d.ndc && d.warnings == 0);
-  sf_dataset_free(&d);
   rig.view[3].to_world[3] += 3.5;
   put_llff(&rig, 0, 4, 40);
-  load(&d, "train");
+  reload("train");
   ck_assert(!d.ndc);
-  sf_dataset_free(&d);
   rig = row(); /* or so far aside that it cannot see what the others see */
   rig.view[3].to_world[7] += 1e5;
   put_llff(&rig, 0, 4, 40);
-  load(&d, "train");
+  reload("train");
   ck_assert(!d.ndc);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* Both files there: forward-facing poses are read for their depths, others for their lenses; transforms.json always. */
-START_TEST(one_layout_wins_and_says_so)
+TEST(one_layout_wins_and_says_so)
 {
   layout_rig rig = row();
-  sf_dataset d;
   put_llff(&rig, 0, 4, 40), put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, 4 * WIDTH, 4 * HEIGHT, 255);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_LLFF && d.warnings == 1 && strstr(d.warning[0], "poses_bounds.npy is used"));
-  sf_dataset_free(&d);
   put_llff(&rig, 0, 0.001, 40); /* nothing is behind so near a plane */
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1 && strstr(d.warning[0], "COLMAP model is used"));
-  sf_dataset_free(&d);
   put_picture("images/zz.png", 4 * WIDTH, 4 * HEIGHT, 9, 255); /* that COLMAP did not register */
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_COLMAP && d.warnings == 1);
-  sf_dataset_free(&d);
   rig.lens[0].param[1] = rig.lens[0].param[0];
   put_json("transforms.json", &rig, "", "images", 0, 1);
-  load(&d, "train");
+  reload("train");
   ck_assert(d.layout == SF_LAYOUT_INGP && d.warnings == 1 && strstr(d.warning[0], "transforms.json is used"));
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(pictures_of_the_size_asked_for)
+TEST(pictures_of_the_size_asked_for)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   static const struct {
     int downscale, width;
   } asked[] = {{1, 32}, {2, 16}, {4, 8}, {8, 4}};
@@ -400,7 +352,7 @@ START_TEST(pictures_of_the_size_asked_for)
   put_pictures("images", &rig, 32, 24, 255), put_pictures("images_2", &rig, 16, 12, 255);
   put_pictures("images_4", &rig, 8, 6, 255);
   for (int i = 0; i < 4; i++) {
-    ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = asked[i].downscale}));
+    ck_ok(reload_as("test", &(sf_dataset_options){.downscale = asked[i].downscale}));
     ck_assert_int_eq(d.view[0].camera.width, asked[i].width);
     ck_assert_int_eq(strncmp(d.view[0].name,
                              i == 0   ? "images/"
@@ -410,99 +362,56 @@ START_TEST(pictures_of_the_size_asked_for)
                      0);
     ck_assert_float_eq(d.view[0].camera.fx, 20 * (float)asked[i].width / 32);
     same_rays(&d, &rig);
-    sf_dataset_free(&d);
   }
   /* photographs of 4000 pixels are not what anybody means: the first folder not above 1600 */
   rig.lens[0].width = 4000, rig.lens[0].height = 3000;
   put_colmap("sparse/0", &rig, 0);
-  ck_good(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(reload_as("test", NULL));
   ck_assert(d.view[0].camera.width == 8 && d.downscale == 0);
-  sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1})); /* unless somebody says so */
   ck_assert(d.view[0].camera.width == 32 && d.downscale == 1);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* In the one size that the camera took: shrunk by the smallest factor that brings them to 1600 pixels. */
-START_TEST(photographs_are_shrunk_unasked)
+TEST(photographs_are_shrunk_unasked)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0].width = 3301, rig.lens[0].height = 40;
   rig.lens[0].param[0] = rig.lens[0].param[1] = 3000;
   rig.lens[0].param[2] = 1650, rig.lens[0].param[3] = 20;
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, 3301, 40, 255);
-  ck_good(sf_dataset_load(&d, folder, "test", NULL));
+  ck_ok(reload_as("test", NULL));
   ck_assert_int_eq(d.view[0].camera.width, 1100);
   ck_assert_int_eq(d.view[0].camera.height, 13);
   ck_assert_float_eq_tol(d.view[0].camera.fx, 1000, 1e-3f);
   rig.lens[0].width = 3300, rig.lens[0].height = 39; /* what fills whole boxes of 3 x 3 */
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 1}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[0].camera.width, 3301);
-  sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, folder, "test", &(sf_dataset_options){.downscale = 20}));
+  ck_ok(reload_as("test", &(sf_dataset_options){.downscale = 20}));
   ck_assert_int_eq(d.view[0].camera.width, 165);
   rig.lens[0].height = 40;
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(each_picture_has_its_own_camera)
+LOOP_TEST(each_picture_has_its_own_camera, 2)
 {
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lenses = 3;
   rig.lens[1] = (layout_lens){2, 0, "SIMPLE_PINHOLE", 8, 20, 3, {11, 4, 10}};
   rig.lens[2] = (layout_lens){900, 4, "OPENCV", 24, 10, 8, {25, 26, 12, 5, 0, 0, 0, 0}};
   for (int v = 0; v < VIEWS; v++) rig.view[v].lens = rig.lens[v % 3].id;
   put_colmap("sparse/0", &rig, _i);
-  ck_good(sf_make_dir(in("images")));
+  ck_ok(sf_make_dir(in("images")));
   for (int v = 0; v < VIEWS; v++) {
     char name[80];
     snprintf(name, sizeof name, "images/%s", rig.view[v].name);
     put_picture(name, rig.lens[v % 3].width, rig.lens[v % 3].height, v, 255);
   }
-  load(&d, "train");
+  reload("train");
   ck_assert_int_eq(d.count, VIEWS - 3);
   same_rays(&d, &rig);
-  sf_dataset_free(&d);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("layouts");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, colmap_has_the_rays_of_its_poses, 0, 4);
-  tcase_add_test(t, instant_ngp_has_the_rays_of_its_poses);
-  tcase_add_test(t, an_object_on_nothing_fills_the_box);
-  tcase_add_test(t, a_crop_looks_where_its_picture_is);
-  tcase_add_test(t, a_picture_is_no_pipe);
-  tcase_add_loop_test(t, splits_in_two_files_have_the_same_coordinates, 0, 3);
-  tcase_add_test(t, far_coordinates_lose_nothing);
-  tcase_add_test(t, splits_in_other_coordinates_are_refused);
-  tcase_add_test(t, another_scenes_data_is_refused);
-  tcase_add_test(t, a_picture_is_found_by_a_long_name);
-  tcase_add_test(t, blender_has_the_rays_of_its_poses);
-  tcase_add_loop_test(t, forward_facing_rays_are_ndc, 0, 2);
-  tcase_add_test(t, forward_facing_poses_are_recentred);
-  tcase_add_test(t, poses_decide_what_faces_forward);
-  tcase_add_test(t, one_layout_wins_and_says_so);
-  tcase_add_test(t, pictures_of_the_size_asked_for);
-  tcase_add_test(t, photographs_are_shrunk_unasked);
-  tcase_add_loop_test(t, each_picture_has_its_own_camera, 0, 2);
-  suite_add_tcase(s, t);
-  return s;
 }
 
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

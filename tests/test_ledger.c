@@ -1,10 +1,10 @@
 /* Prices and ledgers, against pricing by hand. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "energy/energy.h"
 #include "base/io.h"
-#include "tests/fx_fixture.h"
+#include "tests/audit_fixture.h"
 #include <math.h>
-#include <unistd.h>
 
 /* An adder costs its bits, a multiplier the product of its widths, a byte 10 of memory and 1000 of DRAM. */
 static const char plain[] = "# comment\n"
@@ -21,39 +21,25 @@ static const char plain[] = "# comment\n"
                             "sram.64 80 fJ made up\n"
                             "dram 0.008 nJ made up";
 
-static char folder[200], path[300];
-
-static void make_folder(void)
-{
-  const char *tmp = getenv("TMPDIR");
-  snprintf(folder, sizeof folder, "%s/spikefield-XXXXXX", tmp ? tmp : "/tmp");
-  ck_assert_ptr_nonnull(mkdtemp(folder));
-  snprintf(path, sizeof path, "%s/t.tech", folder);
-}
-
-static void remove_folder(void)
-{
-  unlink(path);
-  ck_assert_int_eq(rmdir(folder), 0);
-}
-
 static sf_status load_text(sf_technology *tech, const char *text)
 {
-  ck_assert_int_eq(sf_write_file(path, text, strlen(text)).code, SF_OK);
-  return sf_technology_load(tech, path);
+  ck_ok(sf_write_file(in("t.tech"), text, strlen(text)));
+  return sf_technology_load(tech, in("t.tech"));
 }
+
+static sf_technology tech; /* the plain one */
+static sf_ledgers *l;      /* of the small net, priced by it */
 
 static sf_technology plain_technology(void)
 {
   sf_technology tech;
-  sf_status status = load_text(&tech, plain);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(load_text(&tech, plain));
   return tech;
 }
 
 /* ---- technology files ---- */
 
-START_TEST(file_is_read)
+TEST(file_is_read)
 {
   const sf_technology t = plain_technology();
   static const struct {
@@ -72,10 +58,9 @@ START_TEST(file_is_read)
   ck_assert_str_eq(t.price[5].text, "1.024 pJ");
   ck_assert_str_eq(t.price[5].source, "made up");
 }
-END_TEST
 
-/* Each mistake, put in place of a line of the plain file, and what the message says behind the path. */
-START_TEST(mistakes_are_named_with_line_and_key)
+/* Each mistake, put in place of a line of the plain file, and what the message says behind the in("t.tech"). */
+TEST(mistakes_are_named_with_line_and_key)
 {
   static const struct {
     const char *line, *instead, *message;
@@ -113,17 +98,16 @@ START_TEST(mistakes_are_named_with_line_and_key)
     snprintf(text, sizeof text, "%.*s%s%s", (int)(at - plain), plain, mistakes[i].instead,
              at + strlen(mistakes[i].line));
     const sf_status status = load_text(&tech, text);
-    snprintf(expected, sizeof expected, "%s%s", path, mistakes[i].message);
+    snprintf(expected, sizeof expected, "%s%s", in("t.tech"), mistakes[i].message);
     ck_assert_msg(status.code == SF_E_FORMAT || status.code == SF_E_RANGE, "%s: accepted", mistakes[i].instead);
     ck_assert_msg(!strncmp(status.message, expected, strlen(expected)), "%s\n  expected %s", status.message, expected);
   }
-  unlink(path);
+  unlink(in("t.tech"));
   sf_technology tech;
-  ck_assert_int_eq(sf_technology_load(&tech, path).code, SF_E_IO);
+  ck_assert_int_eq(sf_technology_load(&tech, in("t.tech")).code, SF_E_IO);
 }
-END_TEST
 
-START_TEST(prices_between_points)
+TEST(prices_between_points)
 {
   sf_technology t = plain_technology();
   bool between = false;
@@ -152,14 +136,12 @@ START_TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_multiply(&t, 6, 6, NULL), 8);
   ck_assert_uint_eq(sf_price_multiply(&t, 4, 4, NULL), 64);
 }
-END_TEST
 
 /* The file that is installed: Horowitz's figure, and what the paper makes of it. */
-START_TEST(installed_prices)
+TEST(installed_prices)
 {
   sf_technology t;
-  const sf_status status = sf_technology_load(&t, "share/tech/45nm.tech");
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_technology_load(&t, "share/tech/45nm.tech"));
   static const uint64_t wanted[] = {SF_MAC_FJ, SF_SOP_FJ, 30, 100, 200, 3100, 10000, 20000, 100000, 1950000};
   ck_assert_int_eq(t.count, 10);
   for (int i = 0; i < t.count; i++) {
@@ -170,25 +152,13 @@ START_TEST(installed_prices)
   ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, NULL), 297);  /* 200 + 32/960 * 2900 = 296.7 */
   ck_assert_uint_eq(sf_price_byte(&t, 128 * 128, NULL), 1768); /* 10 * sqrt 2 pJ / 8 */
 }
-END_TEST
 
 /* ---- ledgers ---- */
 
-/* 4 -> 3 -> 3 (1 density, 2 h); 3 d + 2 h -> 4 -> 5 -> 3; the counts of one sample, as test_audit.c has them. */
-static fx_net small_net(void)
-{
-  fx_net net = {.steps = 2, .mode = FX_HYBRID};
-  static const int size[SF_LAYERS][2] = {{4, 3}, {3, 3}, {5, 4}, {4, 5}, {5, 3}};
-  for (int l = 0; l < SF_LAYERS; l++) net.layer[l].n_in = size[l][0], net.layer[l].n_out = size[l][1];
-  return net;
-}
-
 static fx_counts small_counts(const fx_net *net)
 {
-  static const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS] = {
-      [FX_D1] = {{0x5}, {0x3}}, [FX_C1] = {{0x0}, {0xa}}, [FX_C2] = {{0x1f}, {0x10}}};
   fx_counts c = {0};
-  sf_recount_sample(net, spikes, true, &c);
+  sf_recount_sample(net, small_spikes, true, &c);
   return c;
 }
 
@@ -199,15 +169,12 @@ static sf_ledgers *small_ledgers(const sf_technology *tech)
   sf_ledgers *l = malloc(sizeof *l);
   const fx_net net = small_net();
   const fx_counts c = small_counts(&net);
-  const sf_status status = sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l));
   return l;
 }
 
-START_TEST(paper_ledger_is_the_papers_metric)
+TEST(paper_ledger_is_the_papers_metric)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const fx_net net = small_net();
   const fx_counts c = small_counts(&net);
   ck_assert_uint_eq(l->total[SF_LEDGER_PAPER], sf_energy_fj(&c));
@@ -221,15 +188,11 @@ START_TEST(paper_ledger_is_the_papers_metric)
   ck_assert_double_eq_tol(l->saving[SF_LEDGER_PAPER], 37.0709, 1e-4);
   ck_assert(!l->interpolated[SF_LEDGER_PAPER]);
   ck_assert(isnan(l->saving[SF_LEDGER_INT]));
-  free(l);
 }
-END_TEST
 
 /* Sums are as wide as they get: D1 8 + 11 + 2 bits, C1 8 + 11 + 3; D2 and C2 8 + 2, C3 8 + 3. */
-START_TEST(width_ledger_by_hand)
+TEST(width_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_D1][0], 12 * (96 + 21));
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][0], 20 * (96 + 22));
   ck_assert_uint_eq(l->cell[SF_LEDGER_WIDTH][FX_C1][1], 8 * (96 + 22));
@@ -240,14 +203,10 @@ START_TEST(width_ledger_by_hand)
   ck_assert_uint_eq(l->part[SF_LEDGER_WIDTH][SF_PART_SOP], 12 * 10 + 10 * 10 + 18 * 11);
   ck_assert(l->interpolated[SF_LEDGER_WIDTH]);
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 76 * (64 + 32)); /* every synapse once: 1 ray of 1 sample */
-  free(l);
 }
-END_TEST
 
-START_TEST(memory_ledger_by_hand)
+TEST(memory_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const uint64_t *part = l->part[SF_LEDGER_MEMORY], *twin = l->part[SF_LEDGER_INT_MEMORY];
   /* bytes by hand in test_audit.c: weights 12 + 9 + 20 + 10 + 15; state 27 + 12 + 36 + 45 + 36 */
   ck_assert_uint_eq(part[SF_PART_WEIGHT], 66 * 10);
@@ -261,14 +220,10 @@ START_TEST(memory_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_WEIGHT], 76 * 10);
   ck_assert_uint_eq(twin[SF_PART_STATE], 2 * (3 + 2 + 4 + 5) * 10); /* D1, h, C1, C2 written and read */
   ck_assert_uint_eq(twin[SF_PART_TABLE], 100 * 10);
-  free(l);
 }
-END_TEST
 
-START_TEST(neuron_ledger_by_hand)
+TEST(neuron_ledger_by_hand)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   const uint64_t *part = l->part[SF_LEDGER_NEURON], *twin = l->part[SF_LEDGER_INT_ALL];
   /* 24 spiking updates, 2 of density (28 bits), 6 of colour (20 bits); leak of 13 bits */
   ck_assert_uint_eq(part[SF_PART_NEURON], 24 * (24 * 13 + 4 * 24) + 2 * (28 * 13 + 2 * 28) + 6 * (20 * 13 + 2 * 20));
@@ -278,15 +233,13 @@ START_TEST(neuron_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_NEURON], 14 * (32 * 16 + 32));
   ck_assert_uint_eq(twin[SF_PART_SPECIAL], 1 * (32 * 16 + 192 + 2 * 28 + 80) + 3 * (32 * 16 + 192 + 2 * 20 + 80) +
                                                1 * (20 * 16 + 192 + 2 * 20 + 80));
-  free(l);
 }
-END_TEST
 
-START_TEST(cells_and_parts_add_up)
+TEST(cells_and_parts_add_up)
 {
   sf_technology tech;
-  ck_assert_int_eq(sf_technology_load(&tech, "share/tech/45nm.tech").code, SF_OK);
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  ck_ok(sf_technology_load(&tech, "share/tech/45nm.tech"));
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   sf_ledgers *l = malloc(sizeof *l);
   fx_counts c = {0};
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
@@ -297,7 +250,7 @@ START_TEST(cells_and_parts_add_up)
   const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
-  ck_assert_int_eq(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l));
   for (int g = 0; g < SF_LEDGERS; g++) {
     uint64_t cells = 0, parts = 0;
     for (int r = 0; r < SF_ROWS; r++)
@@ -311,16 +264,12 @@ START_TEST(cells_and_parts_add_up)
   ck_assert_uint_eq(l->total[SF_LEDGER_ANN], sf_energy_ann_fj(&scene.net, 9)); /* not hoisted */
   /* The integer twin has the direction's products once per ray: 3 rays, 9 samples. */
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], (9 * 26880 - 6 * 2048) * (uint64_t)300);
-  fx_scene_free(&scene);
   free(l);
 }
-END_TEST
 
 /* At the break-even rate, counts scaled to it cost what the twin costs. */
-START_TEST(break_even_rate_breaks_even)
+TEST(break_even_rate_breaks_even)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_double_eq_tol(l->rate, 0.5, 1e-12); /* 12 spikes in 24 updates */
   const sf_break_even *paper = &l->break_even[SF_LEDGER_PAPER];
   ck_assert_int_eq(paper->twin, SF_LEDGER_ANN);
@@ -336,14 +285,10 @@ START_TEST(break_even_rate_breaks_even)
       ck_assert_double_eq_tol(total - spikes + spikes * b->rate / l->rate, twin, 1e-6 * twin);
   }
   ck_assert_int_eq(l->break_even[SF_SPIKING_LEDGERS].twin, SF_LEDGER_ANN);
-  free(l);
 }
-END_TEST
 
-START_TEST(sensitivity_is_the_saving_at_other_prices)
+TEST(sensitivity_is_the_saving_at_other_prices)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   ck_assert_int_eq(l->sensitivities, 9);
   bool seen[9] = {false};
   for (int i = 0; i < l->sensitivities; i++) {
@@ -365,21 +310,18 @@ START_TEST(sensitivity_is_the_saving_at_other_prices)
   }
   for (int i = 0; i < 9; i++) ck_assert(seen[i]);
   ck_assert_double_gt(l->sensitivity[0].swing, 1);
-  free(l);
 }
-END_TEST
 
 /* A net without density layers: a decoder whose inputs all come with the sample. */
-START_TEST(a_decoder_alone_has_no_density_rows)
+TEST(a_decoder_alone_has_no_density_rows)
 {
-  const sf_technology tech = plain_technology();
   fx_net net = {.steps = 1};
   fx_counts c = {.samples = 2, .rays = 1};
   static const int size[SF_LAYERS][2] = {{0, 0}, {0, 0}, {150, 128}, {128, 128}, {128, 3}};
   for (int i = 0; i < SF_LAYERS; i++) net.layer[i].n_in = size[i][0], net.layer[i].n_out = size[i][1];
   c.layer[FX_C1].mac[0] = c.layer[FX_C1].weight[0] = 2 * 19200;
   sf_ledgers *l = malloc(sizeof *l);
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l));
   ck_assert_uint_eq(l->total[SF_LEDGER_ANN], 2 * 35968 * (uint64_t)4600);
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 2 * 35968 * (uint64_t)96);
   ck_assert_uint_eq(l->total[SF_LEDGER_WIDTH], 2 * 19200 * (uint64_t)(96 + 27));
@@ -388,28 +330,23 @@ START_TEST(a_decoder_alone_has_no_density_rows)
   ck_assert(isnan(l->break_even[0].rate)); /* no spike */
   free(l);
 }
-END_TEST
 
-START_TEST(too_much_energy_is_refused)
+TEST(too_much_energy_is_refused)
 {
-  const sf_technology tech = plain_technology();
   const fx_net net = small_net();
   fx_counts c = small_counts(&net);
   sf_ledgers *l = malloc(sizeof *l);
   const sf_traffic much = {.frame_bytes = UINT64_MAX / 1100};
   ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &much, 1000, l).code, SF_E_RANGE); /* at 1.5 times the price */
   const sf_traffic less = {.frame_bytes = UINT64_MAX / 1600};
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &less, 1000, l).code, SF_OK);
+  ck_ok(sf_ledgers_make(&tech, &net, &c, &less, 1000, l));
   c.layer[FX_D2].sop[0] = UINT64_MAX - 1;
   ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_E_RANGE);
   free(l);
 }
-END_TEST
 
-START_TEST(report_and_json_show_every_ledger)
+TEST(report_and_json_show_every_ledger)
 {
-  const sf_technology tech = plain_technology();
-  sf_ledgers *l = small_ledgers(&tech);
   char *text = NULL;
   size_t size;
   FILE *out = open_memstream(&text, &size);
@@ -434,31 +371,20 @@ START_TEST(report_and_json_show_every_ledger)
     ck_assert_double_eq(cJSON_GetArrayItem(c1, 1)->valuedouble, (double)l->cell[g][FX_C1][1]);
   }
   cJSON_Delete(json);
-  free(text), free(l);
+  free(text);
 }
-END_TEST
 
-int main(void)
+static void set_up(void)
 {
-  Suite *suite = suite_create("ledger");
-  TCase *files = tcase_create("technology"), *ledgers = tcase_create("ledgers");
-  tcase_add_checked_fixture(files, make_folder, remove_folder);
-  tcase_add_checked_fixture(ledgers, make_folder, remove_folder);
-  tcase_add_test(files, file_is_read);
-  tcase_add_test(files, mistakes_are_named_with_line_and_key);
-  tcase_add_test(files, prices_between_points);
-  tcase_add_test(files, installed_prices);
-  tcase_add_test(ledgers, paper_ledger_is_the_papers_metric);
-  tcase_add_test(ledgers, width_ledger_by_hand);
-  tcase_add_test(ledgers, memory_ledger_by_hand);
-  tcase_add_test(ledgers, neuron_ledger_by_hand);
-  tcase_add_test(ledgers, cells_and_parts_add_up);
-  tcase_add_test(ledgers, break_even_rate_breaks_even);
-  tcase_add_test(ledgers, sensitivity_is_the_saving_at_other_prices);
-  tcase_add_test(ledgers, a_decoder_alone_has_no_density_rows);
-  tcase_add_test(ledgers, too_much_energy_is_refused);
-  tcase_add_test(ledgers, report_and_json_show_every_ledger);
-  suite_add_tcase(suite, files);
-  suite_add_tcase(suite, ledgers);
-  return ck_run(suite);
+  make_folder();
+  tech = plain_technology();
+  l = small_ledgers(&tech);
 }
+
+static void tear_down(void)
+{
+  free(l);
+  remove_folder();
+}
+
+ck_options ck_program = {.set_up = set_up, .tear_down = tear_down};

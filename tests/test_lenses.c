@@ -23,11 +23,11 @@ static const double lenses[][4] = {{0.0578421, -0.0805099, -0.000980296, 0.00015
                                    {0.3, 0.1, 0, 0},
                                    {-0.05, 0, 0.02, -0.03}};
 
-START_TEST(a_lens_is_undone_to_1e4_of_a_pixel)
+LOOP_TEST(a_lens_is_undone_to_1e4_of_a_pixel, COUNT(lenses))
 {
   const double *k = lenses[_i];
   const sf_camera c = make_camera(k[0], k[1], k[2], k[3]);
-  ck_good(sf_lens_check(&c, "lens"));
+  ck_ok(sf_lens_check(&c, "lens"));
   for (int y = 0; y <= 150; y += 3)
     for (int x = 0; x <= 200; x += 4) {
       const double bent[2] = {(x - 97) / 180.0, (y - 80) / 170.0};
@@ -45,10 +45,9 @@ START_TEST(a_lens_is_undone_to_1e4_of_a_pixel)
       ck_assert_float_eq_tol(pixel[1], (float)y, 1e-4f);
     }
 }
-END_TEST
 
 /* By hand from OpenCV's formula at x = 0.3, y = -0.2: r2 = 0.13. */
-START_TEST(a_lens_bends_as_opencv_says)
+TEST(a_lens_bends_as_opencv_says)
 {
   const sf_camera c = make_camera(0.1, -0.2, 0.01, 0.02);
   double bent[2];
@@ -64,33 +63,29 @@ START_TEST(a_lens_bends_as_opencv_says)
   sf_camera_ray(&down, 197, 80, o, d);
   ck_assert_float_gt(d[1], 0);
 }
-END_TEST
 
-START_TEST(a_lens_that_folds_is_refused)
+TEST(a_lens_that_folds_is_refused)
 {
   const sf_camera folds = make_camera(-1.2, 0, 0, 0), bends = make_camera(-0.2, 0, 0, 0);
-  ck_good(sf_lens_check(&bends, "cameras.bin: camera 3"));
+  ck_ok(sf_lens_check(&bends, "cameras.bin: camera 3"));
   ck_bad(sf_lens_check(&folds, "cameras.bin: camera 3"), SF_E_RANGE, "cameras.bin: camera 3",
          "cannot be undone at pixel");
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0] = (layout_lens){7, 2, "SIMPLE_RADIAL", WIDTH, HEIGHT, 4, {8, 8, 6, -1.2}};
   put_colmap("sparse/0", &rig, 0);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
-  ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "camera 7", "cannot be undone");
+  ck_bad(reload_as("train", NULL), SF_E_RANGE, "camera 7", "cannot be undone");
 }
-END_TEST
 
 /* The same picture taken through a lens, by COLMAP's models and by instant-ngp's names: a point is seen where the lens
  * says. */
-START_TEST(lenses_come_from_every_layout)
+LOOP_TEST(lenses_come_from_every_layout, 6)
 {
   static const layout_lens kinds[] = {{7, 2, "SIMPLE_RADIAL", WIDTH, HEIGHT, 4, {20, 8, 6, 0.1}},
                                       {7, 3, "RADIAL", WIDTH, HEIGHT, 5, {20, 8, 6, 0.1, -0.05}},
                                       {7, 4, "OPENCV", WIDTH, HEIGHT, 8, {20, 20, 8, 6, 0.1, -0.05, 0.01, 0.02}}};
   static const float wanted[][4] = {{0.1f, 0, 0, 0}, {0.1f, -0.05f, 0, 0}, {0.1f, -0.05f, 0.01f, 0.02f}};
   layout_rig rig = orbit();
-  sf_dataset d;
   rig.lens[0] = kinds[_i % 3];
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   if (_i < 3) {
@@ -103,31 +98,12 @@ START_TEST(lenses_come_from_every_layout)
     rig.lens[0].param[1] = 20;
     put_json("transforms.json", &rig, more, "images", 0, 1);
   }
-  load(&d, "train");
+  reload("train");
   const sf_camera *c = &d.view[0].camera;
   ck_assert_str_eq(d.view[0].lens, kinds[_i % 3].name);
   ck_assert(c->k1 == wanted[_i % 3][0] && c->k2 == wanted[_i % 3][1]);
   ck_assert(c->p1 == wanted[_i % 3][2] && c->p2 == wanted[_i % 3][3]);
   ck_assert(c->fx == 20 && c->fy == 20 && c->cx == 8 && c->cy == 6);
-  sf_dataset_free(&d);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("lenses");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, a_lens_is_undone_to_1e4_of_a_pixel, 0, sizeof lenses / sizeof *lenses);
-  tcase_add_test(t, a_lens_bends_as_opencv_says);
-  tcase_add_test(t, a_lens_that_folds_is_refused);
-  tcase_add_loop_test(t, lenses_come_from_every_layout, 0, 6);
-  suite_add_tcase(s, t);
-  return s;
 }
 
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

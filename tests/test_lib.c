@@ -8,7 +8,7 @@
 
 /* ---- scenes ---- */
 
-START_TEST(info_says_what_the_scene_is)
+TEST(info_says_what_the_scene_is)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_int_eq(info.inputs[l], core.net.layer[l].n_in);
@@ -34,15 +34,14 @@ START_TEST(info_says_what_the_scene_is)
            SPIKEFIELD_VERSION_PATCH);
   ck_assert_str_eq(parts, SPIKEFIELD_VERSION);
 }
-END_TEST
 
-START_TEST(memory_and_file_give_the_same_scene)
+TEST(memory_and_file_give_the_same_scene)
 {
   char *data;
   size_t size;
   spikefield_scene *copy;
   spikefield_scene_info other;
-  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   lib_good(spikefield_scene_open_memory(&copy, data, size, "copy"));
   memset(data, 0, size); /* nothing of the caller is kept */
   lib_good(spikefield_scene_describe(copy, &other));
@@ -56,16 +55,15 @@ START_TEST(memory_and_file_give_the_same_scene)
   spikefield_scene_close(copy);
   free(data);
 }
-END_TEST
 
-START_TEST(damaged_scenes_are_refused)
+TEST(damaged_scenes_are_refused)
 {
   char *data;
   size_t size;
   spikefield_scene *none = scene;
   lib_bad(spikefield_scene_open(&none, in("absent")), SPIKEFIELD_E_IO, "absent");
   ck_assert_ptr_null(none);
-  ck_good(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   static const double part[] = {0, 0.01, 0.5, 0.9999};
   for (int i = 0; i < 4; i++) {
     none = scene;
@@ -77,7 +75,6 @@ START_TEST(damaged_scenes_are_refused)
   lib_bad(spikefield_scene_open_memory(&none, data, size, NULL), SPIKEFIELD_E_FORMAT, "memory: ");
   free(data);
 }
-END_TEST
 
 /* A locale whose numbers have a comma: the machine's, else one made for the occasion where localedef can. */
 static bool comma_locale(void)
@@ -92,7 +89,7 @@ static bool comma_locale(void)
   return status == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
 }
 
-START_TEST(the_locale_of_the_host_does_not_matter)
+TEST(the_locale_of_the_host_does_not_matter)
 {
   spikefield_scene *again;
   spikefield_scene_info other;
@@ -108,7 +105,6 @@ START_TEST(the_locale_of_the_host_does_not_matter)
   spikefield_scene_close(again);
   setlocale(LC_ALL, "C");
 }
-END_TEST
 
 /* ---- samples ---- */
 
@@ -119,7 +115,7 @@ static void random_positions(uint32_t *position, uint64_t seed)
   for (uint64_t i = 0; i < 3 * SAMPLES; i++) position[i] = (uint32_t)sf_random_below(seed, 7, i, 1 << 24);
 }
 
-START_TEST(samples_are_those_of_the_core)
+TEST(samples_are_those_of_the_core)
 {
   static spikefield_trace traces[SAMPLES];
   static fx_trace trace;
@@ -158,17 +154,16 @@ START_TEST(samples_are_those_of_the_core)
   ck_assert_uint_gt(spikefield_energy_fj(&counts), 0);
   ck_assert_uint_eq(spikefield_relu_energy_fj(scene, 7), 7 * UINT64_C(4600) * (uint64_t)info.weight_bytes);
 }
-END_TEST
 
-START_TEST(samples_of_a_decoder_are_of_one_ray_too)
+TEST(samples_of_a_decoder_are_of_one_ray_too)
 {
-  fx_scene with_decoder = tensorf_scene();
+  OWNED(fx_scene) with_decoder = tensorf_scene();
   spikefield_scene *decoder;
   spikefield_counts counts = {0};
   spikefield_sample sample[3];
   const int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0};
   int16_t feature[3 * SF_DIR_MAX] = {0};
-  ck_good(fx_scene_save(&with_decoder, in("decoder.snn")));
+  ck_ok(fx_scene_save(&with_decoder, in("decoder.snn")));
   lib_good(spikefield_scene_open(&decoder, in("decoder.snn")));
   lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 3, sample, NULL, &counts));
   ck_assert_uint_eq(counts.samples, 3);
@@ -176,11 +171,9 @@ START_TEST(samples_of_a_decoder_are_of_one_ray_too)
   lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 0, sample, NULL, &counts));
   ck_assert_uint_eq(counts.rays, 1);
   spikefield_scene_close(decoder);
-  fx_scene_free(&with_decoder);
 }
-END_TEST
 
-START_TEST(positions_and_directions_are_rounded_once)
+TEST(positions_and_directions_are_rounded_once)
 {
   const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};
   const float outside[][3] = {{1, 0, 0}, {0, -1.0001f, 0}, {0, 0, NAN}, {INFINITY, 0, 0}};
@@ -195,18 +188,17 @@ START_TEST(positions_and_directions_are_rounded_once)
   int16_t one[SPIKEFIELD_DIRECTIONS], two[SPIKEFIELD_DIRECTIONS];
   const float d[3] = {0.5f, -0.25f, 0.125f}, longer[3] = {4, -2, 1}, zero[3] = {0};
   fx_ray ray;
-  ck_good(sf_fx_ray_make(&core, middle, d, &ray));
+  ck_ok(sf_fx_ray_make(&core, middle, d, &ray));
   lib_good(spikefield_direction(scene, d, one));
   lib_good(spikefield_direction(scene, longer, two));
   ck_assert_mem_eq(one, ray.dir, sizeof one);
   ck_assert_mem_eq(two, ray.dir, sizeof two);
   lib_bad(spikefield_direction(scene, zero, one), SPIKEFIELD_E_RANGE, "nonzero direction");
 }
-END_TEST
 
 /* ---- refusals ---- */
 
-START_TEST(null_is_refused_by_name)
+TEST(null_is_refused_by_name)
 {
   const spikefield_camera camera = make_camera();
   const float v[3] = {0, 0, 1};
@@ -246,9 +238,8 @@ START_TEST(null_is_refused_by_name)
   lib_good(spikefield_rays(scene, NULL, NULL, NULL, 0, NULL, NULL));
   lib_good(spikefield_samples(scene, NULL, NULL, NULL, 0, NULL, NULL, NULL));
 }
-END_TEST
 
-START_TEST(numbers_out_of_range_are_refused_by_name)
+TEST(numbers_out_of_range_are_refused_by_name)
 {
   int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {0}, feature[64] = {0};
   uint32_t position[6] = {0};
@@ -270,9 +261,8 @@ START_TEST(numbers_out_of_range_are_refused_by_name)
   lib_bad(spikefield_rays(scene, &(spikefield_options){.threads = -1}, far, far, 1, pixel, NULL), SPIKEFIELD_E_RANGE,
           "threads is -1");
 }
-END_TEST
 
-START_TEST(cameras_out_of_range_are_refused_by_name)
+TEST(cameras_out_of_range_are_refused_by_name)
 {
   spikefield_pixel pixel;
   static const char *const word[] = {"width is 0", "height is 65537", "fx is 0", "fy is", "cx is", "to_model[7]"};
@@ -287,24 +277,6 @@ START_TEST(cameras_out_of_range_are_refused_by_name)
     lib_bad(spikefield_frame(scene, NULL, &camera, &pixel, NULL), SPIKEFIELD_E_RANGE, word[i]);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("lib");
-  TCase *cases = tcase_create("lib");
-  tcase_set_timeout(cases, 300);
-  tcase_add_checked_fixture(cases, open_fixture, close_fixture);
-  tcase_add_test(cases, info_says_what_the_scene_is);
-  tcase_add_test(cases, memory_and_file_give_the_same_scene);
-  tcase_add_test(cases, damaged_scenes_are_refused);
-  tcase_add_test(cases, the_locale_of_the_host_does_not_matter);
-  tcase_add_test(cases, samples_are_those_of_the_core);
-  tcase_add_test(cases, samples_of_a_decoder_are_of_one_ray_too);
-  tcase_add_test(cases, positions_and_directions_are_rounded_once);
-  tcase_add_test(cases, null_is_refused_by_name);
-  tcase_add_test(cases, numbers_out_of_range_are_refused_by_name);
-  tcase_add_test(cases, cameras_out_of_range_are_refused_by_name);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = open_fixture, .tear_down = close_fixture};

@@ -24,7 +24,7 @@ static void assert_core_pixel(const spikefield_pixel *pixel, const fx_pixel *exp
   ck_assert_uint_eq(pixel->weight_sum + pixel->transmittance, 1u << 20);
 }
 
-START_TEST(frames_are_those_of_the_core)
+TEST(frames_are_those_of_the_core)
 {
   static spikefield_pixel frame[HEIGHT * WIDTH], ray[HEIGHT * WIDTH];
   static float origin[HEIGHT * WIDTH][3], direction[HEIGHT * WIDTH][3];
@@ -39,8 +39,8 @@ START_TEST(frames_are_those_of_the_core)
   for (int i = 0; i < HEIGHT * WIDTH; i++) {
     fx_ray r;
     fx_pixel expected;
-    ck_good(sf_pixel_ray(&core, &data, &twin, i % WIDTH, i / WIDTH, &r));
-    ck_good(fx_render_ray(&core, &r, NULL, NULL, &expected, &wanted));
+    ck_ok(sf_pixel_ray(&core, &data, &twin, i % WIDTH, i / WIDTH, &r));
+    ck_ok(fx_render_ray(&core, &r, NULL, NULL, &expected, &wanted));
     assert_core_pixel(&frame[i], &expected);
     hit += expected.samples > 0;
     sf_camera_ray(&twin.camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, origin[i], direction[i]);
@@ -52,9 +52,8 @@ START_TEST(frames_are_those_of_the_core)
   ck_assert_mem_eq(&of_rays, &wanted, sizeof wanted);
   for (int i = 0; i < HEIGHT * WIDTH; i++) ck_assert(same_pixel(&ray[i], &frame[i]));
 }
-END_TEST
 
-START_TEST(threads_change_no_bit)
+TEST(threads_change_no_bit)
 {
   static spikefield_pixel one[HEIGHT * WIDTH], more[HEIGHT * WIDTH];
   const spikefield_camera camera = make_camera();
@@ -72,10 +71,9 @@ START_TEST(threads_change_no_bit)
   ck_assert_uint_eq(twice.samples, 2 * first.samples);
   ck_assert_uint_eq(twice.layer[SPIKEFIELD_C2].sop[1], 2 * first.layer[SPIKEFIELD_C2].sop[1]);
 }
-END_TEST
 
 /* One scene, several callers at once, each with a team of its own. */
-START_TEST(one_scene_serves_many_threads)
+TEST(one_scene_serves_many_threads)
 {
   static spikefield_pixel frame[4][HEIGHT * WIDTH];
   spikefield_counts counts[4] = {0};
@@ -91,7 +89,6 @@ START_TEST(one_scene_serves_many_threads)
     for (int p = 0; p < HEIGHT * WIDTH; p++) ck_assert(same_pixel(&frame[i][p], &frame[0][p]));
   }
 }
-END_TEST
 
 static bool count_team(void *user, uint64_t done, uint64_t total)
 {
@@ -100,7 +97,7 @@ static bool count_team(void *user, uint64_t done, uint64_t total)
   return true;
 }
 
-START_TEST(no_thread_without_work_is_started)
+TEST(no_thread_without_work_is_started)
 {
   static spikefield_pixel frame[HEIGHT * WIDTH];
   const spikefield_camera camera = make_camera();
@@ -114,7 +111,6 @@ START_TEST(no_thread_without_work_is_started)
   lib_good(spikefield_rays(scene, &options, up, up, 1, frame, NULL));
   ck_assert_int_eq(team, 1);
 }
-END_TEST
 
 typedef struct watcher {
   uint64_t calls, last, stop_at;
@@ -129,7 +125,7 @@ static bool watch(void *user, uint64_t done, uint64_t total)
   return done < w->stop_at;
 }
 
-START_TEST(progress_is_told_and_can_stop)
+TEST(progress_is_told_and_can_stop)
 {
   static spikefield_pixel frame[HEIGHT * WIDTH];
   const spikefield_camera camera = make_camera();
@@ -146,10 +142,9 @@ START_TEST(progress_is_told_and_can_stop)
   ck_assert_uint_eq(w.calls, 1);
   ck_assert_mem_eq(&counts, &before, sizeof counts);
 }
-END_TEST
 
 /* Rays are bad at the end of every block of 256: whoever is first, the first one is reported. */
-START_TEST(the_first_bad_ray_is_named)
+TEST(the_first_bad_ray_is_named)
 {
   enum { RAYS = 1024 };
   static spikefield_pixel pixel[RAYS];
@@ -160,9 +155,8 @@ START_TEST(the_first_bad_ray_is_named)
     lib_bad(spikefield_rays(scene, &options, vector[0], vector[0], RAYS, pixel, NULL), SPIKEFIELD_E_RANGE, "ray 255: ");
   }
 }
-END_TEST
 
-START_TEST(distance_is_that_of_the_golden_image)
+TEST(distance_is_that_of_the_golden_image)
 {
   spikefield_pixel pixel;
   const float origin[3] = {0.3f, -3, 0.2f}, ahead[3] = {0, 1, 0}, away[3] = {0, -1, 0};
@@ -174,7 +168,6 @@ START_TEST(distance_is_that_of_the_golden_image)
   ck_assert(spikefield_pixel_distance(scene, &pixel) == 0);
   ck_assert_uint_eq(pixel.rgba[1], 30000);
 }
-END_TEST
 
 /* ---- taps ---- */
 
@@ -197,7 +190,7 @@ static bool tap_sample(void *user, const spikefield_tap *tap)
   return tap->index < t->stop_at;
 }
 
-START_TEST(taps_show_every_sample_of_a_ray)
+TEST(taps_show_every_sample_of_a_ray)
 {
   const float origin[3] = {0.3f, -3, 0.2f}, direction[3] = {0, 1, 0.1f};
   spikefield_pixel pixel, plain;
@@ -217,22 +210,6 @@ START_TEST(taps_show_every_sample_of_a_ray)
   ck_assert_uint_eq(t.next, 2);
   ck_assert_mem_eq(&counts, &expected, sizeof counts);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("lib_frame");
-  TCase *cases = tcase_create("lib_frame");
-  tcase_set_timeout(cases, 300);
-  tcase_add_checked_fixture(cases, open_fixture, close_fixture);
-  tcase_add_test(cases, frames_are_those_of_the_core);
-  tcase_add_test(cases, threads_change_no_bit);
-  tcase_add_test(cases, one_scene_serves_many_threads);
-  tcase_add_test(cases, no_thread_without_work_is_started);
-  tcase_add_test(cases, progress_is_told_and_can_stop);
-  tcase_add_test(cases, the_first_bad_ray_is_named);
-  tcase_add_test(cases, distance_is_that_of_the_golden_image);
-  tcase_add_test(cases, taps_show_every_sample_of_a_ray);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = open_fixture, .tear_down = close_fixture};

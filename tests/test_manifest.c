@@ -6,7 +6,6 @@
 #include "base/io.h"
 #include "golden/manifest.h"
 #include <math.h>
-#include <stdbool.h>
 
 static const fx_net net = {.steps = 2};
 
@@ -21,7 +20,7 @@ static sf_camera some_camera(void)
 static sf_golden some_golden(void)
 {
   sf_golden g;
-  ck_good(sf_golden_create(&g, 3, 1, SF_PLANES));
+  ck_ok(sf_golden_create(&g, 3, 1, SF_PLANES));
   for (int p = 0; p < SF_PLANES; p++)
     memcpy(g.plane[p], (const uint32_t[3]){1, 0x01020304, UINT32_MAX}, 3 * sizeof(uint32_t));
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -38,14 +37,14 @@ static sf_manifest_view describe(const sf_golden *g)
 {
   sf_manifest_view view = {0};
   sf_camera camera = some_camera();
-  ck_good(sf_manifest_describe(&view, &net, &camera, g));
+  ck_ok(sf_manifest_describe(&view, &net, &camera, g));
   return view;
 }
 
 /* Made with Python: hashlib.sha256(struct.pack('<...', ...)), in the order that manifest.h states. */
-START_TEST(hashes_are_those_of_another_program)
+TEST(hashes_are_those_of_another_program)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   sf_manifest_view v = describe(&g);
   for (int p = 0; p < SF_PLANES; p++)
     ck_assert_str_eq(v.plane_sha256[p], sf_plane_is_integer((sf_plane)p)
@@ -56,13 +55,11 @@ START_TEST(hashes_are_those_of_another_program)
   ck_assert_int_eq(v.width, 3);
   ck_assert_int_eq(v.height, 1);
   ck_assert_uint_eq(v.event[SF_EVENT_MAC], 2 * (0 + 1000 + 2000 + 3000 + 4000) + 5 * 3);
-  sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(every_bit_of_a_picture_counts)
+TEST(every_bit_of_a_picture_counts)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   int plane, integers = 0;
   for (int p = 0; p < SF_PLANES; p++) {
@@ -74,18 +71,16 @@ START_TEST(every_bit_of_a_picture_counts)
       ck_assert_int_eq(plane, p);
       integers++;
     } else {
-      ck_good(status);
+      ck_ok(status);
     }
     sf_golden_int(&g, (sf_plane)p)[2] ^= 1u << 31;
   }
   ck_assert_int_eq(integers, 11);
-  sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(every_count_counts)
+TEST(every_count_counts)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   uint64_t *count = (uint64_t *)&g.counts;
   int plane, seen = 0;
@@ -101,27 +96,23 @@ START_TEST(every_count_counts)
   g.counts.layer[FX_C1].sop[1]++, g.counts.layer[FX_C2].sop[1]--; /* totals agree */
   sf_manifest_view moved = describe(&g);
   ck_bad(sf_manifest_same_view(&before, &moved, &plane), SF_E_DIFFERENCE, "counts_sha256", "here it is");
-  sf_golden_free(&g);
 }
-END_TEST
 
-START_TEST(the_camera_is_part_of_the_view)
+TEST(the_camera_is_part_of_the_view)
 {
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   const sf_manifest_view before = describe(&g);
   sf_manifest_view after = before;
   sf_camera camera = some_camera();
   int plane;
   camera.p2 = 1e-6f;
-  ck_good(sf_manifest_describe(&after, &net, &camera, &g));
+  ck_ok(sf_manifest_describe(&after, &net, &camera, &g));
   ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);
   camera.p2 = 0;
   camera.to_world[11] = nextafterf(camera.to_world[11], 9);
-  ck_good(sf_manifest_describe(&after, &net, &camera, &g));
+  ck_ok(sf_manifest_describe(&after, &net, &camera, &g));
   ck_bad(sf_manifest_same_view(&before, &after, &plane), SF_E_DIFFERENCE, "camera_sha256", after.camera_sha256);
-  sf_golden_free(&g);
 }
-END_TEST
 
 /* ---- files ---- */
 
@@ -141,7 +132,7 @@ static sf_manifest some_manifest(bool is_float, int views)
     snprintf(view.name, sizeof view.name, "test/r_%d", i);
     snprintf(view.exr, sizeof view.exr, "view_%04d.exr", i);
     sf_sha256(view.exr, 5, view.exr_sha256);
-    ck_good(sf_manifest_put(&m, &view));
+    ck_ok(sf_manifest_put(&m, &view));
   }
   g.planes = SF_PLANES;
   sf_golden_free(&g);
@@ -152,59 +143,52 @@ static void assert_same_file(const char *a, const char *b)
 {
   char *x, *y;
   size_t n, k;
-  ck_good(sf_read_file(a, 1 << 20, &x, &n));
-  ck_good(sf_read_file(b, 1 << 20, &y, &k));
+  ck_ok(sf_read_file(a, 1 << 20, &x, &n));
+  ck_ok(sf_read_file(b, 1 << 20, &y, &k));
   ck_assert_uint_eq(n, k);
   ck_assert_mem_eq(x, y, n);
   free(x), free(y);
 }
 
-START_TEST(reads_back_what_it_wrote)
+LOOP_TEST(reads_back_what_it_wrote, 2)
 {
-  make_folder();
   for (int views = 0; views <= 3; views++) {
     sf_manifest m = some_manifest(_i, views), back;
-    ck_good(sf_manifest_save(&m, in("a.json")));
-    ck_good(sf_manifest_load(&back, in("a.json")));
-    ck_good(sf_manifest_same_origin(&m.origin, &back.origin));
+    ck_ok(sf_manifest_save(&m, in("a.json")));
+    ck_ok(sf_manifest_load(&back, in("a.json")));
+    ck_ok(sf_manifest_same_origin(&m.origin, &back.origin));
     ck_assert_int_eq(back.count, views);
     ck_assert_int_eq(back.total, 3);
     for (int i = 0; i < views; i++) {
       int plane;
-      ck_good(sf_manifest_same_view(&m.view[i], &back.view[i], &plane));
+      ck_ok(sf_manifest_same_view(&m.view[i], &back.view[i], &plane));
       ck_assert_str_eq(m.view[i].name, back.view[i].name);
       ck_assert_str_eq(m.view[i].exr, back.view[i].exr);
       ck_assert_str_eq(m.view[i].exr_sha256, back.view[i].exr_sha256);
       ck_assert_double_eq(m.view[i].psnr, back.view[i].psnr);
     }
-    ck_good(sf_manifest_save(&back, in("b.json")));
+    ck_ok(sf_manifest_save(&back, in("b.json")));
     assert_same_file(in("a.json"), in("b.json"));
     sf_manifest_free(&m), sf_manifest_free(&back);
   }
-  remove_folder();
 }
-END_TEST
 
-START_TEST(the_order_of_the_views_does_not_matter)
+TEST(the_order_of_the_views_does_not_matter)
 {
-  make_folder();
-  sf_manifest m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
+  OWNED(sf_manifest) m = some_manifest(false, 3), other = {.origin = m.origin, .total = 3};
   static const int order[] = {2, 0, 1, 0};
-  for (int i = 0; i < 4; i++) ck_good(sf_manifest_put(&other, &m.view[order[i]]));
+  for (int i = 0; i < 4; i++) ck_ok(sf_manifest_put(&other, &m.view[order[i]]));
   ck_assert_int_eq(other.count, 3);
   ck_assert_ptr_null(sf_manifest_find(&other, 3));
   ck_assert_str_eq(sf_manifest_find(&other, 1)->name, "test/r_1");
-  ck_good(sf_manifest_save(&m, in("a.json")));
-  ck_good(sf_manifest_save(&other, in("b.json")));
+  ck_ok(sf_manifest_save(&m, in("a.json")));
+  ck_ok(sf_manifest_save(&other, in("b.json")));
   assert_same_file(in("a.json"), in("b.json"));
-  sf_manifest_free(&m), sf_manifest_free(&other);
-  remove_folder();
 }
-END_TEST
 
-START_TEST(sums_by_hand)
+TEST(sums_by_hand)
 {
-  sf_manifest m = some_manifest(false, 3);
+  OWNED(sf_manifest) m = some_manifest(false, 3);
   sf_manifest_sum sum;
   sf_manifest_sums(&m, &sum);
   ck_assert_uint_eq(sum.samples, 100 + 101 + 102);
@@ -215,9 +199,7 @@ START_TEST(sums_by_hand)
   m.view[1].psnr = NAN;
   sf_manifest_sums(&m, &sum);
   ck_assert(isnan(sum.psnr));
-  sf_manifest_free(&m);
 }
-END_TEST
 
 /* ---- every field edited ---- */
 
@@ -279,16 +261,15 @@ static cJSON *inner(cJSON *item, int *number) /* the n-th object */
   return NULL;
 }
 
-START_TEST(every_edit_is_seen)
+LOOP_TEST(every_edit_is_seen, 2)
 {
-  make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
-  ck_good(sf_manifest_save(&m, in("m.json")));
+  ck_ok(sf_manifest_save(&m, in("m.json")));
   int edits = 0;
   for (;; edits++) {
     cJSON *json;
     int number = edits;
-    ck_good(sf_json_load(in("m.json"), &json));
+    ck_ok(sf_json_load(in("m.json"), &json));
     cJSON *item = leaf(json, &number);
     if (item) {
       edit(item);
@@ -304,22 +285,19 @@ START_TEST(every_edit_is_seen)
   }
   ck_assert_int_gt(edits, _i ? 30 : 70);
   sf_manifest_free(&m);
-  remove_folder();
 }
-END_TEST
 
-START_TEST(missing_and_unknown_fields_are_refused)
+LOOP_TEST(missing_and_unknown_fields_are_refused, 2)
 {
-  make_folder();
   sf_manifest m = some_manifest(_i, 2), edited;
-  ck_good(sf_manifest_save(&m, in("m.json")));
+  ck_ok(sf_manifest_save(&m, in("m.json")));
   int objects = 0;
   for (;; objects++) {
     int field = 0, fields = 1;
     for (; field <= fields; field++) { /* field == fields: an unknown one is added */
       cJSON *json;
       int number = objects;
-      ck_good(sf_json_load(in("m.json"), &json));
+      ck_ok(sf_json_load(in("m.json"), &json));
       cJSON *object = inner(json, &number);
       fields = object ? cJSON_GetArraySize(object) : -1;
       if (object && field < fields) cJSON_DeleteItemFromArray(object, field);
@@ -332,17 +310,14 @@ START_TEST(missing_and_unknown_fields_are_refused)
   }
   ck_assert_int_eq(objects, _i ? 1 + 1 + 2 * 2 : 1 + 1 + 2 * 3); /* root, totals; view, counts, planes */
   sf_manifest_free(&m);
-  remove_folder();
 }
-END_TEST
 
-START_TEST(other_files_are_refused)
+TEST(other_files_are_refused)
 {
-  make_folder();
   sf_manifest m;
   static const char *const text[] = {"", "[]", "{}", "{\"format\": \"spikefield-golden\", \"version\": 2}", "null"};
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
-    ck_good(sf_write_file(in("m.json"), text[i], strlen(text[i])));
+    ck_ok(sf_write_file(in("m.json"), text[i], strlen(text[i])));
     sf_status status = sf_manifest_load(&m, in("m.json"));
     ck_assert(status.code == SF_E_FORMAT || status.code == SF_E_RANGE);
     ck_assert_ptr_nonnull(strstr(status.message, "m.json"));
@@ -350,93 +325,62 @@ START_TEST(other_files_are_refused)
   ck_bad(sf_manifest_load(&m, in("none.json")), SF_E_IO, "none.json", "");
   sf_manifest elsewhere = some_manifest(false, 1); /* a name that leads out of the folder */
   snprintf(elsewhere.view[0].exr, sizeof elsewhere.view[0].exr, "../x.exr");
-  ck_good(sf_manifest_save(&elsewhere, in("m.json")));
+  ck_ok(sf_manifest_save(&elsewhere, in("m.json")));
   ck_bad(sf_manifest_load(&m, in("m.json")), SF_E_FORMAT, "view[0]", "exr");
   sf_manifest_free(&elsewhere);
-  remove_folder();
 }
-END_TEST
 
-START_TEST(origins_differ_by_name)
+TEST(origins_differ_by_name)
 {
-  sf_manifest m = some_manifest(true, 0);
+  OWNED(sf_manifest) m = some_manifest(true, 0);
   const sf_manifest_origin a = m.origin;
   sf_manifest_origin b = a;
-  ck_good(sf_manifest_same_origin(&a, &b));
+  ck_ok(sf_manifest_same_origin(&a, &b));
   b.crop.width = 0, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "crop", "whole view"), b = a;
   b.scale = nextafterf(b.scale, 1), ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "scale", "0.8"), b = a;
   b.steps = 3, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "t_r", "3"), b = a;
   b.model_sha256[0] = 0, ck_bad(sf_manifest_same_origin(&a, &b), SF_E_DIFFERENCE, "model_sha256", "absent");
-  sf_manifest_free(&m);
 }
-END_TEST
 
-START_TEST(a_flipped_pixel_is_located)
+TEST(a_flipped_pixel_is_located)
 {
-  make_folder();
-  sf_golden g;
-  ck_good(sf_golden_create(&g, 20, 18, SF_PLANES));
+  OWNED(sf_golden) g;
+  ck_ok(sf_golden_create(&g, 20, 18, SF_PLANES));
   for (size_t i = 0; i < 20 * 18; i++) sf_golden_int(&g, SF_PLANE_FX_G)[i] = (uint32_t)i * 77;
   sf_golden_real(&g, SF_PLANE_Z)[3] = 5; /* floats are not compared */
-  ck_good(sf_golden_save(&g, in("g.exr"), NULL));
+  ck_ok(sf_golden_save(&g, in("g.exr"), NULL));
   sf_golden_real(&g, SF_PLANE_Z)[3] = 6;
-  ck_good(sf_golden_compare_file(&g, in("g.exr"), -1));
+  ck_ok(sf_golden_compare_file(&g, in("g.exr"), -1));
   sf_golden_int(&g, SF_PLANE_FX_G)[17 * 20 + 11] ^= 1;
   sf_golden_int(&g, SF_PLANE_FX_G)[17 * 20 + 12] ^= 1;
   sf_status status = sf_golden_compare_file(&g, in("g.exr"), -1);
   ck_bad(status, SF_E_DIFFERENCE, "plane fx.G, pixel (11, 17) is 27027, here it is 27026", "g.exr");
   ck_bad(sf_golden_compare_file(&g, in("g.exr"), SF_PLANE_FX_G), SF_E_DIFFERENCE, "(11, 17)", "fx.G");
-  ck_good(sf_golden_compare_file(&g, in("g.exr"), SF_PLANE_FX_R));
-  sf_golden small;
-  ck_good(sf_golden_create(&small, 20, 17, SF_PLANES));
+  ck_ok(sf_golden_compare_file(&g, in("g.exr"), SF_PLANE_FX_R));
+  OWNED(sf_golden) small;
+  ck_ok(sf_golden_create(&small, 20, 17, SF_PLANES));
   ck_bad(sf_golden_compare_file(&small, in("g.exr"), -1), SF_E_DIFFERENCE, "20 x 18", "20 x 17");
   small.planes = SF_FLOAT_PLANES;
-  ck_good(sf_golden_save(&small, in("f.exr"), NULL));
+  ck_ok(sf_golden_save(&small, in("f.exr"), NULL));
   small.planes = SF_PLANES;
   ck_bad(sf_golden_compare_file(&small, in("f.exr"), -1), SF_E_DIFFERENCE, "no integer channel spikes", "f.exr");
-  sf_golden_free(&g), sf_golden_free(&small);
-  remove_folder();
 }
-END_TEST
 
 /* The header of an EXR is plain text. */
-START_TEST(the_file_says_what_its_distances_are)
+TEST(the_file_says_what_its_distances_are)
 {
-  make_folder();
-  sf_golden g = some_golden();
+  OWNED(sf_golden) g = some_golden();
   for (int ndc = 0; ndc < 2; ndc++) {
     const sf_golden_label label = {
         .net = &net, .scene_sha256 = "0", .view = "a", .split = "test", .downscale = 1, .ndc = ndc};
     char *bytes;
     size_t size;
-    ck_good(sf_golden_save_labelled(&g, in("labelled.exr"), &label));
-    ck_good(sf_read_file(in("labelled.exr"), 1 << 20, &bytes, &size));
+    ck_ok(sf_golden_save_labelled(&g, in("labelled.exr"), &label));
+    ck_ok(sf_read_file(in("labelled.exr"), 1 << 20, &bytes, &size));
     ck_assert_int_eq(memmem(bytes, size, "world units of the data set", 27) != NULL, !ndc);
     ck_assert_int_eq(memmem(bytes, size, "NDC units from the rays' origins", 31) != NULL, ndc);
     free(bytes);
   }
-  sf_golden_free(&g);
-  remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("manifest");
-  TCase *t = tcase_create("manifest");
-  tcase_add_test(t, hashes_are_those_of_another_program);
-  tcase_add_test(t, every_bit_of_a_picture_counts);
-  tcase_add_test(t, every_count_counts);
-  tcase_add_test(t, the_camera_is_part_of_the_view);
-  tcase_add_loop_test(t, reads_back_what_it_wrote, 0, 2);
-  tcase_add_test(t, the_order_of_the_views_does_not_matter);
-  tcase_add_test(t, sums_by_hand);
-  tcase_add_loop_test(t, every_edit_is_seen, 0, 2);
-  tcase_add_loop_test(t, missing_and_unknown_fields_are_refused, 0, 2);
-  tcase_add_test(t, other_files_are_refused);
-  tcase_add_test(t, origins_differ_by_name);
-  tcase_add_test(t, a_flipped_pixel_is_located);
-  tcase_add_test(t, the_file_says_what_its_distances_are);
-  suite_add_tcase(suite, t);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -1,6 +1,5 @@
 /* NIR graphs read back with libhdf5 and simulated as their nodes, edges and metadata say: the spikes, membranes and
  * outputs of the core and of the float oracle. */
-#include <stdio.h>
 #ifdef SF_HDF5
 #include "ck_run.h"
 #include "exchange/exchange.h"
@@ -336,7 +335,7 @@ static void same_as_core(graph *g, const fx_net *net, const int16_t *f, const in
 
 static void ck_scene(const fx_scene *scene, random_source *r, bool extreme)
 {
-  ck_good(sf_nir_write_scene(in("scene.nir"), scene));
+  ck_ok(sf_nir_write_scene(in("scene.nir"), scene));
   read_graph(&shared, in("scene.nir"));
   for (int s = 0; s < INPUTS; s++) {
     int16_t f[SF_FEATURE_MAX], dir[SF_DIR_MAX];
@@ -348,7 +347,7 @@ static void ck_scene(const fx_scene *scene, random_source *r, bool extreme)
 }
 
 /* _i: from typical nets to those of all corners. */
-START_TEST(scene_gives_the_spikes_of_the_core)
+LOOP_TEST(scene_gives_the_spikes_of_the_core, 6)
 {
   static random_net n;
   random_source r = {(uint64_t)_i, 0};
@@ -358,20 +357,17 @@ START_TEST(scene_gives_the_spikes_of_the_core)
     ck_scene(&(fx_scene){.net = n.net}, &r, _i > 0);
   }
 }
-END_TEST
 
-START_TEST(biases_and_decoders_too)
+LOOP_TEST(biases_and_decoders_too, 4)
 {
   random_source r = {(uint64_t)_i, 0};
   for (uint64_t seed = 0; seed < GRAPHS; seed++) {
     const uint64_t number = seed + (uint64_t)(_i * GRAPHS);
     const fixture_sizes sizes = seed % 2 ? fixture_random_decoder(number) : fixture_random_sizes(number);
-    fx_scene scene = fixture_scene(&sizes, number);
+    OWNED(fx_scene) scene = fixture_scene(&sizes, number);
     ck_scene(&scene, &r, true);
-    fx_scene_free(&scene);
   }
 }
-END_TEST
 
 /* ---- the float oracle ---- */
 
@@ -400,13 +396,13 @@ static bool same_as_oracle(graph *g, const sf_net_trace *trace, int steps)
   return true;
 }
 
-START_TEST(model_gives_the_spikes_of_the_oracle)
+LOOP_TEST(model_gives_the_spikes_of_the_oracle, SF_NODECAY + 1)
 {
   enum { STEPS = 5, SAMPLES = 60 };
   static sf_net_trace trace;
   sf_model m = test_model(SF_NET_SNN, (sf_input_mode)_i, 64, STEPS, 0.5f);
   m.t_r = STEPS;
-  ck_good(sf_nir_write_model(in("model.nir"), &m));
+  ck_ok(sf_nir_write_model(in("model.nir"), &m));
   read_graph(&shared, in("model.nir"));
   ck_assert(shared.steps == STEPS);
   int certain = 0, fired = 0;
@@ -427,16 +423,15 @@ START_TEST(model_gives_the_spikes_of_the_oracle)
   free_graph(&shared);
   sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(tensorf_gives_the_spikes_of_the_oracle)
+LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
 {
   enum { STEPS = 4, SAMPLES = 40 };
   static sf_net_trace trace;
-  sf_model m = test_tensorf(SF_NET_SNN, _i, 64, STEPS);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, _i, 64, STEPS);
   m.t_r = STEPS;
   const int inputs = sf_tensorf_inputs(&m.config.tensorf);
-  ck_good(sf_nir_write_model(in("tensorf.nir"), &m));
+  ck_ok(sf_nir_write_model(in("tensorf.nir"), &m));
   read_graph(&shared, in("tensorf.nir"));
   ck_assert(find(&shared, "features") < 0 && need(&shared, "inputs")->rows == inputs);
   int certain = 0;
@@ -453,34 +448,29 @@ START_TEST(tensorf_gives_the_spikes_of_the_oracle)
   }
   ck_assert_int_ge(certain, SAMPLES / 2);
   free_graph(&shared);
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(the_relu_twin_is_refused)
+TEST(the_relu_twin_is_refused)
 {
-  sf_model m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
+  OWNED(sf_model) m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(same_scene_same_bytes)
+TEST(same_scene_same_bytes)
 {
   static random_net n;
   random_source r = {77, 0};
   random_net_make(&n, &r, false);
   const fx_scene scene = {.net = n.net};
-  ck_good(sf_nir_write_scene(in("a.nir"), &scene));
-  ck_good(sf_nir_write_scene(in("b.nir"), &scene));
+  ck_ok(sf_nir_write_scene(in("a.nir"), &scene));
+  ck_ok(sf_nir_write_scene(in("b.nir"), &scene));
   char command[2 * sizeof folder + 40];
   snprintf(command, sizeof command, "cmp -s '%s/a.nir' '%s/b.nir'", folder, folder);
   ck_assert_int_eq(system(command), 0);
   ck_assert_int_eq(sf_nir_write_scene(in("missing/a.nir"), &scene).code, SF_E_IO);
 }
-END_TEST
 
 /* ---- for tests/chain/read_nir.py: a scene's graph, inputs, and what the core makes of them ---- */
 
@@ -532,21 +522,13 @@ static int leave_case(const char *where, int mode)
   return !out || fclose(out);
 }
 
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
+
 int main(void)
 {
   const char *where = getenv("SF_CROSSCHECK");
   if (where) return leave_case(where, FX_HYBRID) || leave_case(where, FX_DECAY) || leave_case(where, FX_NODECAY);
-  Suite *suite = suite_create("nir");
-  TCase *tcase = tcase_create("nir");
-  tcase_add_checked_fixture(tcase, make_folder, remove_folder);
-  tcase_add_loop_test(tcase, scene_gives_the_spikes_of_the_core, 0, 6);
-  tcase_add_loop_test(tcase, biases_and_decoders_too, 0, 4);
-  tcase_add_loop_test(tcase, model_gives_the_spikes_of_the_oracle, SF_HYBRID, SF_NODECAY + 1);
-  tcase_add_loop_test(tcase, tensorf_gives_the_spikes_of_the_oracle, 0, 2);
-  tcase_add_test(tcase, the_relu_twin_is_refused);
-  tcase_add_test(tcase, same_scene_same_bytes);
-  suite_add_tcase(suite, tcase);
-  return ck_run(suite);
+  return ck_main();
 }
 #else
 int main(void)

@@ -2,18 +2,9 @@
 #include "ck_run.h"
 #include "train_fixture.h"
 
-static sf_dataset data;
-
 static void set_up(void)
 {
-  make_scene(4);
-  data = load("train");
-}
-
-static void tear_down(void)
-{
-  sf_dataset_free(&data);
-  remove_folder();
+  open_scene(4);
 }
 
 static bool occupied(const sf_trainer *t, size_t cell)
@@ -29,11 +20,11 @@ static size_t count_occupied(const sf_trainer *t)
 }
 
 /* Before the first visit of all cells none is empty; that visit leaves no cell as it was. */
-START_TEST(nothing_is_empty_before_it_was_looked_at)
+TEST(nothing_is_empty_before_it_was_looked_at)
 {
   sf_train_options o = small_run();
   o.stage1 = 300;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const size_t cells = sf_config_cells(&t->model.config);
   for (int i = 0; i < 16; i++) {
     steps(t, 1);
@@ -45,9 +36,7 @@ START_TEST(nothing_is_empty_before_it_was_looked_at)
     steps(t, 1);
     for (size_t i = 0; i < cells; i++) ck_assert_float_lt(t->density[i], 1e8f);
   }
-  sf_trainer_free(t);
 }
-END_TEST
 
 /* One cell is occupied, all others are taken for empty: an update finds all that touch it, and nothing of another
  * cascade. At the start the density is 1 everywhere, so what was looked at becomes occupied. */
@@ -56,14 +45,14 @@ static void check_neighbours(int bound, int x, int y, int z)
   sf_train_options o = small_run();
   sf_config_bound(&o.config, bound);
   o.config.finest_res = 64;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const int res = o.config.occ_res;
   const size_t cells = sf_config_cells(&o.config),
                cell = ((size_t)z * (size_t)res + (size_t)y) * (size_t)res + (size_t)x;
   t->iteration = 32;
   memset(t->model.occupancy, 0, cells / 8);
   t->model.occupancy[cell / 8] = (uint8_t)(1u << cell % 8);
-  ck_good(sf_occupancy_update(t, 2));
+  ck_ok(sf_occupancy_update(t, 2));
   for (int k = z - 1; k <= z + 1; k++)
     for (int j = y - 1; j <= y + 1; j++)
       for (int i = x - 1; i <= x + 1; i++)
@@ -76,26 +65,14 @@ static void check_neighbours(int bound, int x, int y, int z)
   for (int j = y - 1; bound > 1 && j <= y + 1; j++)
     for (int i = x - 1; i <= x + 1; i++) behind += occupied(t, (size_t)res * res * res + (size_t)(j * res + i));
   ck_assert_uint_lt(behind, 5);
-  sf_trainer_free(t);
 }
 
-START_TEST(neighbours_of_what_is_occupied_are_looked_at)
+TEST(neighbours_of_what_is_occupied_are_looked_at)
 {
   check_neighbours(1, 7, 8, 9);
   check_neighbours(1, 0, 0, 0);
   check_neighbours(1, 15, 15, 15);
   check_neighbours(4, 5, 6, 15);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("occupancy");
-  TCase *tc = tcase_create("occupancy");
-  tcase_set_timeout(tc, 60);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, nothing_is_empty_before_it_was_looked_at);
-  tcase_add_test(tc, neighbours_of_what_is_occupied_are_looked_at);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

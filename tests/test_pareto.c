@@ -15,22 +15,22 @@ static void save(const char *name, const sf_point *point)
 {
   char file[64];
   snprintf(file, sizeof file, "points/%s.json", name);
-  ck_good(sf_make_dir(in("points")));
+  ck_ok(sf_make_dir(in("points")));
   cJSON *json = sf_point_json(point);
-  ck_good(sf_json_save(json, in(file)));
+  ck_ok(sf_json_save(json, in(file)));
   cJSON_Delete(json);
-  ck_good(sf_write_file(in("centre"), "c\n", 2));
+  ck_ok(sf_write_file(in("centre"), "c\n", 2));
 }
 
-START_TEST(points_come_back)
+TEST(points_come_back)
 {
   sf_point other = centre;
-  sf_sweep sweep;
+  OWNED(sf_sweep) sweep;
   char name[64];
   other.axis[SF_AXIS_WEIGHT] = 5, other.axis[SF_AXIS_STEPS] = 1;
   other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal images */
   save("c", &centre), save("a", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   ck_assert_int_eq(sweep.count, 2);
   ck_assert_ptr_eq(sweep.centre, &sweep.point[1]);
   ck_assert_mem_eq(sweep.centre->axis, centre.axis, sizeof centre.axis);
@@ -44,11 +44,9 @@ START_TEST(points_come_back)
   sweep.point[0].axis[SF_AXIS_STEPS] = 2;
   ck_assert(sf_point_on_axis(&sweep, &sweep.point[0], SF_AXIS_WEIGHT));
   ck_assert(!sf_point_on_axis(&sweep, &sweep.point[0], SF_AXIS_GRID));
-  sf_sweep_free(&sweep);
 }
-END_TEST
 
-START_TEST(broken_folders_are_named)
+TEST(broken_folders_are_named)
 {
   static const char *const broken[] = {"{}", "[1]", "{\"name\": 3}",
                                        "{\"name\": \"x\", \"model\": \"m\", \"weight_bits\": 1e9}", "{"};
@@ -56,17 +54,16 @@ START_TEST(broken_folders_are_named)
   ck_bad(sf_sweep_load(&sweep, folder), SF_E_IO, "centre", folder);
   save("c", &centre);
   for (int i = 0; i < 5; i++) {
-    ck_good(sf_write_file(in("points/b.json"), broken[i], strlen(broken[i])));
+    ck_ok(sf_write_file(in("points/b.json"), broken[i], strlen(broken[i])));
     ck_bad(sf_sweep_load(&sweep, folder), SF_E_FORMAT, "b.json", folder);
   }
   ck_assert_int_eq(unlink(in("points/b.json")), 0);
   ck_assert_int_eq(unlink(in("points/c.json")), 0);
   ck_bad(sf_sweep_load(&sweep, folder), SF_E_FORMAT, "'c'", "missing");
 }
-END_TEST
 
 /* The front by its definition, on random points with many ties. */
-START_TEST(front)
+TEST(front)
 {
   enum { POINTS = 120 };
   static const int costs[] = {SF_POINT_ENERGY, SF_POINT_BYTES, SF_POINT_TRAFFIC};
@@ -94,10 +91,9 @@ START_TEST(front)
   ck_assert_int_gt(marked, 3);
   ck_assert_int_lt(marked, POINTS / 2);
 }
-END_TEST
 
 /* 70.02 mJ and 70.04 mJ are printed alike: neither beats the other by them. */
-START_TEST(what_prints_alike_is_alike)
+TEST(what_prints_alike_is_alike)
 {
   static const int energy = SF_POINT_ENERGY;
   sf_point a = centre, b = centre;
@@ -110,9 +106,8 @@ START_TEST(what_prints_alike_is_alike)
   b.figure[SF_POINT_PSNR_TRUTH] = NAN; /* equal to the picture: nothing is better */
   ck_assert(sf_point_beats(&b, &centre, &(int){SF_POINT_BYTES}, 1));
 }
-END_TEST
 
-START_TEST(files)
+TEST(files)
 {
   sf_point other = centre;
   sf_sweep sweep;
@@ -120,7 +115,7 @@ START_TEST(files)
   int plots;
   other.axis[SF_AXIS_GRID] = 5, other.figure[SF_POINT_BYTES] = 5e5, other.figure[SF_POINT_PSNR_TRUTH] = 29;
   save("c", &centre), save("g5", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   sf_sweep_mark(&sweep);
   FILE *out = fmemopen(text, sizeof text - 1, "w");
   sf_sweep_print(out, &sweep);
@@ -133,37 +128,24 @@ START_TEST(files)
   sf_sweep_csv(out, &sweep);
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "\nw8,m,1,8,12,5,12,8,3,20,19,2,29,"));
-  ck_good(sf_sweep_plots(&sweep, &plots));
+  ck_ok(sf_sweep_plots(&sweep, &plots));
   ck_assert_int_eq(plots, 4);
   ck_assert_int_eq(access(in("plots/front-bytes.gp"), R_OK), 0);
   sf_sweep_free(&sweep);
   other = centre, other.figure[SF_POINT_PSNR_FLOAT] = INFINITY; /* equal to float */
   save("c", &other);
-  ck_good(sf_sweep_load(&sweep, folder));
+  ck_ok(sf_sweep_load(&sweep, folder));
   out = fmemopen(text, sizeof text - 1, "w");
   sf_sweep_print(out, &sweep);
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "| centre | 30.00 | equal |"));
-  ck_good(sf_sweep_plots(&sweep, &plots));
+  ck_ok(sf_sweep_plots(&sweep, &plots));
   char *script;
   size_t size;
-  ck_good(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
+  ck_ok(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
   ck_assert_ptr_null(strstr(script, "nan with lines"));
   free(script);
   sf_sweep_free(&sweep);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("pareto");
-  TCase *cases = tcase_create("pareto");
-  tcase_add_checked_fixture(cases, make_folder, remove_folder);
-  tcase_add_test(cases, points_come_back);
-  tcase_add_test(cases, broken_folders_are_named);
-  tcase_add_test(cases, front);
-  tcase_add_test(cases, what_prints_alike_is_alike);
-  tcase_add_test(cases, files);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

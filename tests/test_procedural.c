@@ -7,9 +7,6 @@
 #include "src/scene/stage.h"
 #include <math.h>
 #include <omp.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 
 /* ---- shapes ---- */
@@ -54,7 +51,7 @@ static sf_stage_ray random_ray(uint64_t i)
 }
 
 /* Against marching in steps of 1/1000: the same first crossing; a graze that marching can step over is not counted. */
-START_TEST(hits_equal_marching)
+LOOP_TEST(hits_equal_marching, 4)
 {
   static const double sizes[4][3] = {{0.6, 0, 0}, {0.5, 0.3, 0.7}, {0.4, 0.6, 0}, {0.6, 0.2, 0}};
   const double centre[3] = {0.1, -0.2, 0.15}, step = 1e-3;
@@ -83,9 +80,8 @@ START_TEST(hits_equal_marching)
   }
   ck_assert_int_gt(hits, 500);
 }
-END_TEST
 
-START_TEST(rays_along_axes_hit)
+LOOP_TEST(rays_along_axes_hit, 4)
 {
   const double centre[3] = {0}, size[3] = {0.5, 0.25, 0.5};
   for (int axis = 0; axis < 3; axis++) {
@@ -100,17 +96,16 @@ START_TEST(rays_along_axes_hit)
     if (found) ck_assert_double_eq_tol(hit.t, expected[_i][axis], 1e-12);
   }
 }
-END_TEST
 
 /* ---- procedural scenes ---- */
 
 static void trace(const char *name, float ox, float oy, float oz, float dx, float dy, float dz, float rgba[4])
 {
   const float o[3] = {ox, oy, oz}, d[3] = {dx, dy, dz};
-  ck_good(sf_procedural_trace(name, o, d, rgba));
+  ck_ok(sf_procedural_trace(name, o, d, rgba));
 }
 
-START_TEST(fog_follows_beer_lambert)
+TEST(fog_follows_beer_lambert)
 {
   float c[4];
   /* Through the sphere (radius 0.95, density 0.9) above core, ring and slab, at height 0.8. */
@@ -132,9 +127,8 @@ START_TEST(fog_follows_beer_lambert)
   trace("fog", 0, 3, 0.97f, 0, -1, 0, c);
   ck_assert(c[3] == 0);
 }
-END_TEST
 
-START_TEST(scenes_stay_in_the_box)
+TEST(scenes_stay_in_the_box)
 {
   for (int n = 0; sf_procedural_names[n]; n++) {
     if (!strcmp(sf_procedural_names[n], "plaza")) continue; /* no_ray_ends_in_nothing */
@@ -147,21 +141,20 @@ START_TEST(scenes_stay_in_the_box)
       int axis = (int)(i % 3), along = (axis + 1) % 3;
       for (unsigned k = 0; k < 3; k++) o[k] = 2.2f * sf_random_float(1, k, i) - 1.1f;
       o[axis] = i % 2 ? 1.101f : -1.101f, o[along] = 3, d[along] = -1;
-      ck_good(sf_procedural_trace(sf_procedural_names[n], o, d, c));
+      ck_ok(sf_procedural_trace(sf_procedural_names[n], o, d, c));
       ck_assert(c[3] == 0);
       o[axis] *= 0.2f;
-      ck_good(sf_procedural_trace(sf_procedural_names[n], o, d, c));
+      ck_ok(sf_procedural_trace(sf_procedural_names[n], o, d, c));
       opaque += c[3] > 0;
       for (int k = 0; k < 4; k++) ck_assert(c[k] >= 0 && c[k] <= 1);
     }
     ck_assert_int_eq(opaque > 1000, strcmp(sf_procedural_names[n], "empty") != 0);
   }
 }
-END_TEST
 
 /* One point of a ball, its normal towards the light, from nine sides: shine makes the colours differ; in the simple
  * scene they are equal. */
-START_TEST(shine_depends_on_the_view)
+TEST(shine_depends_on_the_view)
 {
   static const double centres[2][3] = {{0.38, 0.32, 0.26}, {-0.42, 0.46, 0.88}}, radius[2] = {0.22, 0.06};
   const double n[3] = {0.48, -0.36, 0.80};
@@ -174,7 +167,7 @@ START_TEST(shine_depends_on_the_view)
         float p = (float)(centres[shiny][k] + radius[shiny] * n[k]), to = (float)n[k] + away[k];
         o[k] = p + 2 * to, d[k] = -to;
       }
-      ck_good(sf_procedural_trace(shiny ? "textured" : "simple", o, d, c));
+      ck_ok(sf_procedural_trace(shiny ? "textured" : "simple", o, d, c));
       ck_assert(c[3] == 1);
       least = fminf(least, c[2]), most = fmaxf(most, c[2]);
     }
@@ -184,10 +177,9 @@ START_TEST(shine_depends_on_the_view)
       ck_assert_float_lt(most - least, 1e-3f); /* the point itself moves by float rounding */
   }
 }
-END_TEST
 
 /* From inside its sky the plaza is opaque in every direction; the sky is seen from the far side of it only. */
-START_TEST(no_ray_ends_in_nothing)
+TEST(no_ray_ends_in_nothing)
 {
   for (uint64_t i = 0; i < 20000; i++) {
     float o[3], d[3], c[4];
@@ -195,7 +187,7 @@ START_TEST(no_ray_ends_in_nothing)
       o[k] = 4 * (2 * sf_random_float(1, k, i) - 1);
       d[k] = 2 * sf_random_float(2, k, i) - 1;
     }
-    ck_good(sf_procedural_trace("plaza", o, d, c));
+    ck_ok(sf_procedural_trace("plaza", o, d, c));
     ck_assert_float_eq(c[3], 1);
     for (int k = 0; k < 3; k++) ck_assert(c[k] > 0 && c[k] <= 1);
   }
@@ -205,16 +197,14 @@ START_TEST(no_ray_ends_in_nothing)
   trace("plaza", 20, 0, 0.5f, -1, 0, 0, c); /* from outside, too */
   ck_assert_float_eq(c[3], 1);
 }
-END_TEST
 
-START_TEST(trace_faults)
+TEST(trace_faults)
 {
   const float o[3] = {0, 0, 3}, d[3] = {0, 0, -1}, none[3] = {0};
   float c[4];
   ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars", "textured, simple, fog, empty, plaza, wires");
   ck_bad(sf_procedural_trace("fog", o, none, c), SF_E_RANGE, "fog", "direction");
 }
-END_TEST
 
 static sf_procedural_options small = {24, 20, 3, 2, 5};
 
@@ -234,14 +224,14 @@ static bool stop_at_two(void *user, int done, int total)
 }
 
 /* Written, loaded, and each pixel equal to the mean of 4 x 4 exact rays. */
-START_TEST(written_scene_is_what_the_rays_see)
+LOOP_TEST(written_scene_is_what_the_rays_see, 5)
 {
   const char *name = sf_procedural_names[_i];
   int last = 0;
   sf_dataset d;
-  ck_good(sf_procedural_write(name, in("scene"), &small, count_progress, &last));
+  ck_ok(sf_procedural_write(name, in("scene"), &small, count_progress, &last));
   ck_assert_int_eq(last, 5);
-  ck_good(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = 1}));
+  ck_ok(sf_dataset_load(&d, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = 1}));
   ck_assert_int_eq(d.count, 3);
   for (int v = 0; v < d.count; v++) {
     const sf_camera *camera = &d.view[v].camera;
@@ -255,7 +245,7 @@ START_TEST(written_scene_is_what_the_rays_see)
         for (int k = 0; k < 16; k++) {
           float o[3], r[3], c[4];
           sf_camera_ray(camera, x + (k % 4 + 0.5f) / 4, y + (k / 4 + 0.5f) / 4, o, r);
-          ck_good(sf_procedural_trace(name, o, r, c));
+          ck_ok(sf_procedural_trace(name, o, r, c));
           for (int i = 0; i < 3; i++) sum[i] += c[i] * c[3] / 16;
           sum[3] += c[3] / 16;
         }
@@ -270,32 +260,31 @@ START_TEST(written_scene_is_what_the_rays_see)
     }
   }
   sf_dataset_free(&d);
-  ck_good(sf_dataset_load(&d, in("scene"), "test", NULL));
+  ck_ok(sf_dataset_load(&d, in("scene"), "test", NULL));
   ck_assert_int_eq(d.count, 2);
   sf_dataset_free(&d);
 }
-END_TEST
 
 static void same_file(const char *a, const char *b, bool same)
 {
   char *p, *q;
   size_t n, m;
-  ck_good(sf_read_file(a, 1 << 20, &p, &n));
-  ck_good(sf_read_file(b, 1 << 20, &q, &m));
+  ck_ok(sf_read_file(a, 1 << 20, &p, &n));
+  ck_ok(sf_read_file(b, 1 << 20, &q, &m));
   ck_assert_msg((n == m && !memcmp(p, q, n)) == same, "%s and %s are %s", a, b, same ? "different" : "equal");
   free(p);
   free(q);
 }
 
-START_TEST(seed_decides_and_threads_do_not)
+TEST(seed_decides_and_threads_do_not)
 {
   sf_procedural_options other = small;
   other.seed = 6;
   omp_set_num_threads(1);
-  ck_good(sf_procedural_write("textured", in("one"), &small, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("one"), &small, NULL, NULL));
   omp_set_num_threads(3);
-  ck_good(sf_procedural_write("textured", in("three"), &small, NULL, NULL));
-  ck_good(sf_procedural_write("textured", in("other"), &other, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("three"), &small, NULL, NULL));
+  ck_ok(sf_procedural_write("textured", in("other"), &other, NULL, NULL));
   static const char *const files[] = {"transforms_train.json", "transforms_test.json", "train/r_0.png", "train/r_2.png",
                                       "test/r_1.png"};
   for (int i = 0; i < 5; i++) {
@@ -308,9 +297,8 @@ START_TEST(seed_decides_and_threads_do_not)
   }
   same_file(in("one/train/r_0.png"), in("one/test/r_0.png"), false);
 }
-END_TEST
 
-START_TEST(write_faults)
+TEST(write_faults)
 {
   sf_procedural_options none = small;
   none.test_views = 0;
@@ -325,29 +313,5 @@ START_TEST(write_faults)
   struct stat info;
   ck_assert_int_ne(stat(in("x"), &info), 0);
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("procedural");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, hits_equal_marching, 0, 4);
-  tcase_add_loop_test(t, rays_along_axes_hit, 0, 4);
-  tcase_add_test(t, fog_follows_beer_lambert);
-  tcase_add_test(t, scenes_stay_in_the_box);
-  tcase_add_test(t, no_ray_ends_in_nothing);
-  tcase_add_test(t, shine_depends_on_the_view);
-  tcase_add_test(t, trace_faults);
-  tcase_add_loop_test(t, written_scene_is_what_the_rays_see, 0, 5);
-  tcase_add_test(t, seed_decides_and_threads_do_not);
-  tcase_add_test(t, write_faults);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

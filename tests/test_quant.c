@@ -6,9 +6,6 @@
 #include "src/quant/internal.h"
 #include <math.h>
 #include <omp.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static float normal(uint64_t stream, uint64_t i)
 {
@@ -30,8 +27,7 @@ static sf_model make_model(int hidden, int levels, int mode)
   sf_model m;
   config.hidden = hidden, config.levels = levels, config.mode = mode;
   config.steps = 4, config.log2_hash = 12, config.finest_res = 256, config.occ_res = 16, config.lattice = 256;
-  const sf_status status = sf_model_create(&m, &config);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_model_create(&m, &config));
   fill(&m, SF_P_GRID, 1);
   for (int l = 0; l < levels; l++)
     for (size_t i = 2 * m.level[l].offset; i < 2 * (m.level[l].offset + m.level[l].entries); i++)
@@ -52,8 +48,7 @@ static const sf_quant_options plain = {.background = {1, 1, 1}, .seed = 1};
 
 static void quantise(const sf_model *m, fx_scene *scene, sf_quant_report *report)
 {
-  const sf_status status = sf_quantise_report(scene, m, "model", &plain, report);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_quantise_report(scene, m, "model", &plain, report));
 }
 
 static void assert_refused(const sf_model *m, const sf_quant_options *options, sf_code code, const char *place)
@@ -95,10 +90,10 @@ static double entry_error(const sf_model *m, const fx_scene *scene, int level, d
 
 /* A position rounded to 1/256 of a cell moves the value by at most 3/512 of the largest difference of two entries; then
  * the largest error of an entry, half an LSB of the feature, and what lies beyond its rails. */
-START_TEST(features_against_float)
+TEST(features_against_float)
 {
-  sf_model m = make_model(128, 16, SF_HYBRID);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(128, 16, SF_HYBRID);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   double entry[16], range[16];
   quantise(&m, &scene, &report);
@@ -119,10 +114,7 @@ START_TEST(features_against_float)
   }
   printf("features: relative RMS error %.3f %%\n", 100 * report.feature_error);
   ck_assert(report.feature_error < 0.02);
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
-END_TEST
 
 typedef struct tally {
   double current_error[SF_LAYERS], current_energy[SF_LAYERS];
@@ -178,8 +170,8 @@ static double deviation(double sum, double square, int n)
  */
 static void check_model(int hidden, int levels, int mode)
 {
-  sf_model m = make_model(hidden, levels, mode);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(hidden, levels, mode);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   tally sum = {0};
   fx_trace *fixed = malloc(sizeof *fixed);
@@ -197,26 +189,23 @@ static void check_model(int hidden, int levels, int mode)
   ck_assert(spread > 0.001 && colour < 0.75 * spread);
   ck_assert(density_spread > 0.001 && density < 0.5 * density_spread);
   free(fixed), free(real);
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
 
-START_TEST(nets_against_float)
+TEST(nets_against_float)
 {
   check_model(128, 16, SF_HYBRID);
   check_model(128, 16, SF_NODECAY);
   check_model(64, 8, SF_DECAY);
   check_model(16, 1, SF_HYBRID);
 }
-END_TEST
 
 /* Every D2 and C3 current through the tables against exp and the logistic function of the current it stands for: the
  * argument is rounded to 2^-13 (and 16 bits of factor: 2^-17 of up to 16) and the table adds 1e-6; half an LSB at the
  * end. */
-START_TEST(output_functions_have_the_right_units)
+TEST(output_functions_have_the_right_units)
 {
-  sf_model m = make_model(64, 4, SF_HYBRID);
-  fx_scene scene;
+  OWNED(sf_model) m = make_model(64, 4, SF_HYBRID);
+  OWNED(fx_scene) scene;
   sf_quant_report report;
   quantise(&m, &scene, &report);
   const fx_net *net = &scene.net;
@@ -227,13 +216,10 @@ START_TEST(output_functions_have_the_right_units)
     if (i < 10) ck_assert_double_eq_tol(sigma, exp(i), 2.2e-4 * exp(i) + 0x1p-14 + 1e-9);
     ck_assert_double_eq_tol(colour, 1 / (1 + exp(-j)), fabs(j) < 8 ? 1e-4 : 4e-4);
   }
-  fx_scene_free(&scene);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* The fit keeps what it knows to be true of a solvable case: weights that are multiples of a unit come back. */
-START_TEST(fit_recovers_exact_weights)
+TEST(fit_recovers_exact_weights)
 {
   enum { ROWS = 2000, IN = 12, OUT = 5 };
   int16_t *x = malloc(ROWS * IN * sizeof *x);
@@ -252,21 +238,20 @@ START_TEST(fit_recovers_exact_weights)
   const sf_fit_data data = {ROWS, IN, OUT, x, target};
   const sf_fit_weights weights = {w, IN, lsb, 1e-9, 127, 0};
   sf_quant_layer result;
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &result).code, SF_OK);
+  ck_ok(sf_fit_layer(&data, &weights, true, q, &result));
   ck_assert_double_eq_tol(result.unit, 0.125, 1e-9);
   ck_assert(result.error < 1e-6 && result.clipped == 0);
   for (int i = 0; i < IN; i++)
     for (int o = 0; o < OUT; o++) ck_assert_int_eq(q[i * SF_LANES + o], (int)lround(w[o * IN + i] * lsb[i] / 0.125));
   free(x), free(target);
 }
-END_TEST
 
 /* Spikes of a real layer are correlated; letting rounding errors cancel must pay on samples outside the fit. */
-START_TEST(refinement_lowers_the_held_out_error)
+TEST(refinement_lowers_the_held_out_error)
 {
-  sf_model m = make_model(128, 16, SF_HYBRID);
-  sf_calibration c;
-  ck_assert_int_eq(sf_calibrate(&c, &m, 3, 5).code, SF_OK);
+  OWNED(sf_model) m = make_model(128, 16, SF_HYBRID);
+  OWNED(sf_calibration) c;
+  ck_ok(sf_calibrate(&c, &m, 3, 5));
   const int rows = c.samples * 3;
   int16_t *x = malloc((size_t)rows * 128 * sizeof *x);
   int8_t q[128 * SF_LANES];
@@ -276,20 +261,17 @@ START_TEST(refinement_lowers_the_held_out_error)
   const sf_fit_data data = {rows, 128, 128, x, c.target[FX_C2]};
   const sf_fit_weights weights = {sf_model_param(&m, SF_P_C2), 128, ones, 1e-9, 127, 0};
   sf_quant_layer rounded, refined;
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, false, q, &rounded).code, SF_OK);
-  ck_assert_int_eq(sf_fit_layer(&data, &weights, true, q, &refined).code, SF_OK);
+  ck_ok(sf_fit_layer(&data, &weights, false, q, &rounded));
+  ck_ok(sf_fit_layer(&data, &weights, true, q, &refined));
   printf("C2 held-out error: rounded %.3f %%, refined %.3f %%\n", 100 * rounded.error, 100 * refined.error);
   ck_assert(refined.error < rounded.error);
   free(x);
-  sf_calibration_free(&c);
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(same_seed_same_bits_any_threads)
+TEST(same_seed_same_bits_any_threads)
 {
-  sf_model m = make_model(64, 8, SF_HYBRID);
-  fx_scene a, b;
+  OWNED(sf_model) m = make_model(64, 8, SF_HYBRID);
+  OWNED(fx_scene) a, b;
   sf_quant_report report;
   omp_set_num_threads(1);
   quantise(&m, &a, &report);
@@ -300,15 +282,12 @@ START_TEST(same_seed_same_bits_any_threads)
     ck_assert_mem_eq(a.net.layer[l].w, b.net.layer[l].w, (size_t)a.net.layer[l].n_in * SF_LANES);
     ck_assert(a.units.current_scale[l] == b.units.current_scale[l] && a.net.layer[l].theta == b.net.layer[l].theta);
   }
-  fx_scene_free(&a), fx_scene_free(&b);
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(refuses_what_it_cannot_represent)
+TEST(refuses_what_it_cannot_represent)
 {
   static const float bad[] = {NAN, INFINITY, -INFINITY};
-  sf_model m = make_model(32, 4, SF_HYBRID);
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
   for (int id = 0; id < SF_P_COUNT; id++)
     for (int i = 0; i < 3 && sf_model_has(&m, id); i++) {
       float *value = sf_model_param(&m, id) + m.param[id].size - 1, kept = *value;
@@ -337,18 +316,16 @@ START_TEST(refuses_what_it_cannot_represent)
   m.t_r = 3;
   assert_refused(&m, &(sf_quant_options){.steps = 5}, SF_E_RANGE, "5 steps");
   assert_refused(&m, &(sf_quant_options){.background = {0, NAN, 0}}, SF_E_RANGE, "background[1]");
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(steps_and_leaks)
+TEST(steps_and_leaks)
 {
-  sf_model m = make_model(32, 4, SF_DECAY);
+  OWNED(sf_model) m = make_model(32, 4, SF_DECAY);
   fx_scene scene;
   float *leak = sf_model_param(&m, SF_P_LEAK);
   leak[0] = 0, leak[1] = 100, leak[2] = -100, leak[3] = 1, leak[4] = -1;
   for (int steps = 0; steps <= 4; steps++) {
-    ck_assert_int_eq(sf_quantise(&scene, &m, "model", &(sf_quant_options){.steps = steps}).code, SF_OK);
+    ck_ok(sf_quantise(&scene, &m, "model", &(sf_quant_options){.steps = steps}));
     ck_assert_int_eq(scene.net.steps, steps ? steps : 3);
     ck_assert_int_eq(scene.net.mode, FX_DECAY);
     static const int32_t k[SF_LAYERS] = {2048, 4096, 0, 2994, 1102};
@@ -356,9 +333,7 @@ START_TEST(steps_and_leaks)
     ck_assert_int_eq(scene.step_q24, lround(sqrt(3.0) / 256 * 16777216));
     fx_scene_free(&scene);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 static int largest(const int8_t *value, size_t n)
 {
@@ -408,7 +383,7 @@ static void assert_widths_hold(const fx_scene *scene, const sf_quant_widths *w)
     fx_grid_features(&scene->grid, pos, f, &counts);
     for (int i = 0; i < 2 * scene->grid.levels; i++) ck_assert_int_le(abs(f[i]), input_max);
     if (w->feature_bits < SF_INPUT_BITS) ck_assert_uint_eq(counts.saturated_features, 0);
-    ck_assert_int_eq(sf_fx_ray_make(scene, o, d, &ray).code, SF_OK);
+    ck_ok(sf_fx_ray_make(scene, o, d, &ray));
     for (int i = 0; i < FX_SH; i++) ck_assert_int_le(abs(ray.dir[i]), input_max);
   }
 }
@@ -425,7 +400,7 @@ static void assert_same_scene(const fx_scene *a, const fx_scene *b)
   }
 }
 
-START_TEST(widths)
+TEST(widths)
 {
   static const struct {
     size_t offset;
@@ -434,7 +409,7 @@ START_TEST(widths)
                {offsetof(sf_quant_widths, feature_bits), 8, SF_INPUT_BITS},
                {offsetof(sf_quant_widths, leak_bits), 4, SF_LEAK_FRAC},
                {offsetof(sf_quant_widths, grid_bits), 2, SF_GRID_BITS}};
-  sf_model m = make_model(32, 4, SF_HYBRID);
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
   fx_scene whole, scene;
   sf_quant_report report;
   quantise(&m, &whole, &report);
@@ -444,8 +419,7 @@ START_TEST(widths)
     for (int bits = field[i].low; bits <= field[i].high; bits++) {
       sf_quant_options options = plain;
       *(int *)((char *)&options.widths + field[i].offset) = bits;
-      const sf_status status = sf_quantise_report(&scene, &m, "model", &options, &report);
-      ck_assert_msg(status.code == SF_OK, "%s", status.message);
+      ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
       ck_assert_int_eq(*(int *)((char *)&report.widths + field[i].offset), bits);
       assert_widths_hold(&scene, &report.widths);
       if (bits == field[i].high) assert_same_scene(&whole, &scene);
@@ -455,20 +429,18 @@ START_TEST(widths)
       assert_refused(&m, &options, SF_E_RANGE, "bits asked for");
     }
   const sf_quant_options narrow = {.background = {1, 1, 1}, .seed = 1, .widths = {4, 8, 4, 4}};
-  ck_assert_int_eq(sf_quantise_report(&scene, &m, "model", &narrow, &report).code, SF_OK);
+  ck_ok(sf_quantise_report(&scene, &m, "model", &narrow, &report));
   assert_widths_hold(&scene, &report.widths);
   fx_scene_free(&scene);
   fx_scene_free(&whole);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* A model whose calibration does not show how wide its inputs get: 128 equal weights, so that h could be 128 * 127 / 8
  * = 2032; a field that is 20 times larger outside the only occupied cell; directions that matter to no neuron, so that
  * no search avoids a fine LSB. */
-START_TEST(narrow_inputs_never_clip)
+TEST(narrow_inputs_never_clip)
 {
-  sf_model m = make_model(128, 2, SF_HYBRID);
+  OWNED(sf_model) m = make_model(128, 2, SF_HYBRID);
   fx_scene scene;
   sf_quant_report report;
   float *w3 = sf_model_param(&m, SF_P_C1), *grid = sf_model_param(&m, SF_P_GRID);
@@ -487,16 +459,14 @@ START_TEST(narrow_inputs_never_clip)
   fx_scene_free(&scene);
   for (int bits = 8; bits < SF_INPUT_BITS; bits++) {
     const sf_quant_options options = {.seed = 1, .widths.feature_bits = bits};
-    ck_assert_int_eq(sf_quantise_report(&scene, &m, "model", &options, &report).code, SF_OK);
+    ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
     assert_widths_hold(&scene, &report.widths);
     fx_scene_free(&scene);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 /* Models at the edge of sense still give a scene that passes its check, and scales that a model's file may hold. */
-START_TEST(extreme_models)
+TEST(extreme_models)
 {
   static const float scales[] = {0, 1e-42f, 1e-20f, 1e-4f, 1};
   for (int i = 0; i < 5; i++)
@@ -526,25 +496,5 @@ START_TEST(extreme_models)
       sf_model_free(&m);
     }
 }
-END_TEST
 
-int main(void)
-{
-  setvbuf(stdout, NULL, _IOLBF, 0);
-  Suite *suite = suite_create("quant");
-  TCase *cases = tcase_create("quant");
-  tcase_set_timeout(cases, 300);
-  tcase_add_test(cases, features_against_float);
-  tcase_add_test(cases, nets_against_float);
-  tcase_add_test(cases, output_functions_have_the_right_units);
-  tcase_add_test(cases, fit_recovers_exact_weights);
-  tcase_add_test(cases, refinement_lowers_the_held_out_error);
-  tcase_add_test(cases, same_seed_same_bits_any_threads);
-  tcase_add_test(cases, refuses_what_it_cannot_represent);
-  tcase_add_test(cases, steps_and_leaks);
-  tcase_add_test(cases, widths);
-  tcase_add_test(cases, narrow_inputs_never_clip);
-  tcase_add_test(cases, extreme_models);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

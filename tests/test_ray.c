@@ -3,7 +3,6 @@
 #include "quant/quant.h"
 #include "base/rng.h"
 #include <math.h>
-#include <stdlib.h>
 
 static float normal(uint64_t stream, uint64_t i)
 {
@@ -22,8 +21,7 @@ static fx_scene box_scene(int lattice)
 static fx_ray make_ray(const fx_scene *scene, const float o[3], const float d[3])
 {
   fx_ray ray;
-  const sf_status status = sf_fx_ray_make(scene, o, d, &ray);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_fx_ray_make(scene, o, d, &ray));
   for (int32_t n = 0; n < ray.count; n++)
     for (int a = 0; a < 3; a++) {
       const int64_t p = (ray.origin[a] + n * ray.step[a]) >> 16;
@@ -34,7 +32,7 @@ static fx_ray make_ray(const fx_scene *scene, const float o[3], const float d[3]
 
 /* Same count (but for a box face within float rounding) and the same points as the float lattice. The step's
  * rounding to Q0.24 drifts by up to 2^-25 per step; float itself is good to some 1e-6 here. */
-START_TEST(rays_follow_the_float_lattice)
+TEST(rays_follow_the_float_lattice)
 {
   int hits = 0, differ = 0;
   for (uint64_t i = 0; i < 6000; i++) {
@@ -49,7 +47,7 @@ START_TEST(rays_follow_the_float_lattice)
     for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
     const fx_ray ray = make_ray(&scene, o, d);
     sf_steps steps;
-    ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&steps, &config, 1));
     const sf_lattice real = sf_ray_lattice(&steps, o, d);
     differ += ray.count != real.count;
     ck_assert_int_le(abs(ray.count - real.count), 1);
@@ -67,9 +65,8 @@ START_TEST(rays_follow_the_float_lattice)
   ck_assert_int_gt(hits, 2000);
   ck_assert_int_le(differ, 6);
 }
-END_TEST
 
-START_TEST(rays_parallel_to_an_axis)
+TEST(rays_parallel_to_an_axis)
 {
   const fx_scene scene = box_scene(256);
   for (int axis = 0; axis < 3; axis++)
@@ -86,9 +83,8 @@ START_TEST(rays_parallel_to_an_axis)
       ck_assert_int_eq(make_ray(&scene, o, d).count, 0);
     }
 }
-END_TEST
 
-START_TEST(rays_through_edges_and_corners)
+TEST(rays_through_edges_and_corners)
 {
   const fx_scene scene = box_scene(1024);
   for (int corner = 0; corner < 8; corner++) {
@@ -102,9 +98,8 @@ START_TEST(rays_through_edges_and_corners)
     ck_assert_int_eq(make_ray(&scene, out, c).count, 0); /* looks away */
   }
 }
-END_TEST
 
-START_TEST(rays_from_inside_start_at_the_near_plane)
+TEST(rays_from_inside_start_at_the_near_plane)
 {
   const fx_scene scene = box_scene(1024);
   const float o[3] = {0}, d[3] = {0, 0, 1};
@@ -115,9 +110,8 @@ START_TEST(rays_from_inside_start_at_the_near_plane)
   const float near_face[3] = {0, 0, 0.9f};
   ck_assert_int_eq(make_ray(&scene, near_face, d).count, 0);
 }
-END_TEST
 
-START_TEST(rays_far_away_and_refused)
+TEST(rays_far_away_and_refused)
 {
   const fx_scene scene = box_scene(1024);
   fx_ray ray;
@@ -145,10 +139,9 @@ START_TEST(rays_far_away_and_refused)
   const float o[3] = {0}, zero[3] = {0};
   ck_assert_int_eq(sf_fx_ray_make(&scene, o, zero, &ray).code, SF_E_RANGE);
 }
-END_TEST
 
 /* Integer harmonics against the float ones, at every LSB. */
-START_TEST(direction_features_within_one_lsb)
+TEST(direction_features_within_one_lsb)
 {
   const float o[3] = {0, 0, 3};
   double worst = 0;
@@ -177,10 +170,9 @@ START_TEST(direction_features_within_one_lsb)
   }
   ck_assert_double_gt(worst, 0.5);
 }
-END_TEST
 
 /* No input leaves the rails: not even three axes at full scale. */
-START_TEST(directions_that_are_none)
+TEST(directions_that_are_none)
 {
   static const int16_t full[3] = {INT16_MIN, INT16_MAX, INT16_MAX}, one[3] = {-FX_UNIT_ONE, FX_UNIT_ONE, FX_UNIT_ONE};
   int16_t a[FX_SH], b[FX_SH];
@@ -194,20 +186,5 @@ START_TEST(directions_that_are_none)
   fx_sh(zero, 0, a);
   for (int n = 0; n < FX_SH; n++) ck_assert_int_eq(a[n], 0); /* 0.28 and -0.32 round to none */
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("ray");
-  TCase *cases = tcase_create("rays");
-  tcase_set_timeout(cases, 300);
-  tcase_add_test(cases, rays_follow_the_float_lattice);
-  tcase_add_test(cases, rays_parallel_to_an_axis);
-  tcase_add_test(cases, rays_through_edges_and_corners);
-  tcase_add_test(cases, rays_from_inside_start_at_the_near_plane);
-  tcase_add_test(cases, rays_far_away_and_refused);
-  tcase_add_test(cases, direction_features_within_one_lsb);
-  tcase_add_test(cases, directions_that_are_none);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 300;

@@ -4,7 +4,6 @@
 #include "render/composite.h"
 #include "render/march.h"
 #include <math.h>
-#include <string.h>
 
 enum { N = 24 };
 
@@ -16,7 +15,7 @@ static const float *growing(float first)
   return delta;
 }
 
-START_TEST(weights_and_transmittance_sum_to_one)
+TEST(weights_and_transmittance_sum_to_one)
 {
   for (int trial = 0; trial < 200; trial++) {
     float sigma[N], weight[N], scale = powf(10, (float)(trial % 8) - 3);
@@ -26,7 +25,6 @@ START_TEST(weights_and_transmittance_sum_to_one)
     ck_assert_double_eq_tol(sum, 1, 1e-5); /* 2 N roundings of 2^-24 */
   }
 }
-END_TEST
 
 static double ray_value(const float *sigma, const float *g, float g_end)
 {
@@ -36,7 +34,7 @@ static double ray_value(const float *sigma, const float *g, float g_end)
   return sum;
 }
 
-START_TEST(backward_is_the_slope)
+TEST(backward_is_the_slope)
 {
   float sigma[N], weight[N], g[N], dsigma[N] = {0};
   for (int s = 0; s < N; s++) {
@@ -55,15 +53,14 @@ START_TEST(backward_is_the_slope)
     ck_assert_double_eq_tol(dsigma[s], (high - low) / (up - down), 2e-5); /* float rounding 1e-7 over a step of 0.04 */
   }
 }
-END_TEST
 
 /* Skipping empty cells must find the samples that testing every lattice point finds. */
-START_TEST(march_equals_testing_every_point)
+TEST(march_equals_testing_every_point)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   int found = 0;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &m.config, 1));
   for (int trial = 0; trial < 2000; trial++) {
     for (int i = 0; i < 64; i++) m.occupancy[i] = (uint8_t)(sf_random_u64(3, trial, i) & sf_random_u64(4, trial, i));
     float o[3], d[3], length = 0;
@@ -96,13 +93,11 @@ START_TEST(march_equals_testing_every_point)
     ck_assert_int_eq(sf_march_next(&march, next, y), -1);
   }
   ck_assert_int_gt(found, 2000);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* Far away a distance has no precision left, and the box seems longer than its diagonal: bit maps of lattice points
  * have room for no more than the lattice. */
-START_TEST(far_cameras_stay_in_the_lattice)
+TEST(far_cameras_stay_in_the_lattice)
 {
   static const float o[3][3] = {{-0x1.0f159p+22f, -0x1.4ef0eap+22f, 0x1.1755ccp+22f},
                                 {0x1.2e2e1ap+22f, -0x1.47fb46p+22f, -0x1.fd98cap+21f},
@@ -113,38 +108,35 @@ START_TEST(far_cameras_stay_in_the_lattice)
   sf_config config = sf_config_default();
   config.lattice = 1024;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &config, 1));
   for (int i = 0; i < 3; i++) {
     const sf_lattice lattice = sf_ray_lattice(&steps, o[i], d[i]);
     ck_assert_int_gt(lattice.count, 500);
     ck_assert_int_le(lattice.count, config.lattice);
   }
 }
-END_TEST
 
-START_TEST(empty_and_missing_rays_show_the_background)
+TEST(empty_and_missing_rays_show_the_background)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 16, 2, 1);
   const float o[12] = {0, 0, 4, 0, 0, 4, 0, 0, 0, 1, 1, 4}, d[12] = {0, 0, -1, 0, 0, 1, 1, 0, 0, 0, 0, -1};
   const float background[3] = {0.25f, 0.5f, 1};
   float rgb[12], alpha[4], samples[4];
   memset(m.occupancy, 0, 64);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples));
   for (int i = 0; i < 12; i++) ck_assert_float_eq(rgb[i], background[i % 3]);
   for (int i = 0; i < 4; i++) ck_assert_float_eq(samples[i], 0);
   memset(m.occupancy, 0xff, 64);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, 4, 0, background, rgb, NULL, alpha, samples));
   ck_assert_float_gt(samples[0], 0);
   ck_assert_float_eq(samples[1], 0);
   ck_assert_int_eq(sf_render_rays(&m, o, d, 4, 9, background, rgb, NULL, NULL, NULL).code, SF_E_RANGE);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* The packet renderer against a ray composited sample by sample with the oracle. */
-START_TEST(packets_equal_the_oracle)
+TEST(packets_equal_the_oracle)
 {
-  sf_model m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 0.4f);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 0.4f);
   enum { RAYS = 40 };
   float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
   const float background[3] = {1, 1, 1};
@@ -158,10 +150,10 @@ START_TEST(packets_equal_the_oracle)
     }
     for (int a = 0; a < 3; a++) d[3 * r + a] /= sqrtf(length);
   }
-  ck_assert_int_eq(sf_render_rays(&m, o, d, RAYS, 3, background, rgb, NULL, NULL, NULL).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, RAYS, 3, background, rgb, NULL, NULL, NULL));
   int wrong = 0;
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &m.config, 1));
   for (int r = 0; r < RAYS; r++) {
     sf_march march = sf_march_begin(&m, &steps, o + 3 * r, d + 3 * r, 0.5f);
     float x[3], transmittance = 1, out[3] = {0};
@@ -179,21 +171,4 @@ START_TEST(packets_equal_the_oracle)
     wrong += bad;
   }
   ck_assert_msg(wrong <= 2, "%d of %d rays differ", wrong, RAYS); /* a spike at the threshold may flip */
-  sf_model_free(&m);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("render");
-  TCase *tc = tcase_create("render");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, weights_and_transmittance_sum_to_one);
-  tcase_add_test(tc, backward_is_the_slope);
-  tcase_add_test(tc, march_equals_testing_every_point);
-  tcase_add_test(tc, far_cameras_stay_in_the_lattice);
-  tcase_add_test(tc, empty_and_missing_rays_show_the_background);
-  tcase_add_test(tc, packets_equal_the_oracle);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
 }

@@ -13,8 +13,8 @@ static void write_text(const char *path, const char *text)
   snprintf(full, sizeof full, "%s/%s", folder, path);
   snprintf(dir, sizeof dir, "%s", full);
   *strrchr(dir, '/') = 0;
-  ck_good(sf_make_dir(dir));
-  ck_good(sf_write_file(full, text, strlen(text)));
+  ck_ok(sf_make_dir(dir));
+  ck_ok(sf_write_file(full, text, strlen(text)));
 }
 
 static void write_run(const char *scene, const char *run, double psnr, int t_r)
@@ -40,19 +40,18 @@ static void write_audit(const char *scene, const char *run, const char *file, do
   write_text(path, text);
 }
 
-static void load(void)
+static void load_from(const char *path)
 {
   sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, folder));
+  ck_ok(sf_reproduction_load(&report, path));
 }
 
-static void setup(void)
+static void load(void)
 {
-  make_folder();
-  report = (sf_reproduction){0};
+  load_from(folder);
 }
 
-static void teardown(void)
+static void tear_down(void)
 {
   sf_reproduction_free(&report);
   remove_folder();
@@ -77,7 +76,7 @@ static void contains(const char *file, const char *text, bool wanted)
 {
   char *data;
   size_t size;
-  ck_good(sf_read_file(in(file), 1 << 24, &data, &size));
+  ck_ok(sf_read_file(in(file), 1 << 24, &data, &size));
   ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%s", text, wanted ? "not " : "", file, data);
   free(data);
 }
@@ -86,12 +85,12 @@ static void print(void)
 {
   FILE *out = fopen(in("table.md"), "w");
   ck_assert_ptr_nonnull(out);
-  ck_good(sf_reproduction_print(out, &report));
+  ck_ok(sf_reproduction_print(out, &report));
   ck_assert_int_eq(fclose(out), 0);
 }
 
 /* Sums of these numbers are exact in binary: equality, no bound. */
-START_TEST(averages)
+TEST(averages)
 {
   int count;
   write_run("b", "beta-5e-7", 30.5, 4);
@@ -112,9 +111,8 @@ START_TEST(averages)
   ck_assert_int_eq(verdict(SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_METRIC_PSNR), SF_ORDER_MISSING);
   ck_assert_int_eq(report.problems, 0);
 }
-END_TEST
 
-START_TEST(energies)
+TEST(energies)
 {
   write_run("a", "beta-5e-7", 30, 3);
   write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000); /* 0.04 mJ per sample */
@@ -146,10 +144,9 @@ START_TEST(energies)
   print();
   contains("table.md", "mean of 2 held-out frames of 64 x 48 pixels", true);
 }
-END_TEST
 
 /* Planted: the rendering's count is one fJ off, an audit that disagrees with itself, a file that is no JSON. */
-START_TEST(faults)
+TEST(faults)
 {
   write_run("a", "beta-5e-7", 30, 3);
   write_audit("a", "beta-5e-7", "audit-0.json", 10, 40, 1000);
@@ -174,9 +171,8 @@ START_TEST(faults)
   print();
   contains("table.md", "## Problems", true);
 }
-END_TEST
 
-START_TEST(judgement)
+TEST(judgement)
 {
   static const struct {
     double paper, ours;
@@ -189,10 +185,9 @@ START_TEST(judgement)
   for (size_t i = 0; i < sizeof row / sizeof *row; i++)
     ck_assert_msg(sf_order_judge(row[i].paper, row[i].ours, 0.05, 0.05) == row[i].verdict, "row %zu", i);
 }
-END_TEST
 
 /* Every run in the paper's own numbers: every pair must agree; then one number is moved, and just its pairs turn. */
-START_TEST(order)
+TEST(order)
 {
   sf_order order[SF_ORDERS_MAX];
   for (int i = 0; i < SF_RUNS; i++) {
@@ -230,10 +225,9 @@ START_TEST(order)
   contains("table.md",
            "No pair missing or reversed: beta, ANN, stage I, L_extra, L_penalty, L_budg, fixed steps, learned", true);
 }
-END_TEST
 
 /* A killed training: a line is cut, and after the resume iterations are there again. */
-START_TEST(log_of_a_resumed_run)
+TEST(log_of_a_resumed_run)
 {
   write_run("s", "no-budget", 30, 3);
   write_text("s/no-budget/train.jsonl", "{\"iteration\":16,\"t_star\":7}\n{\"iteration\":32,\"t_star\":6}\n"
@@ -245,15 +239,14 @@ START_TEST(log_of_a_resumed_run)
   ck_assert_int_eq(run->points, 3);
   for (int i = 0; i < 3; i++) ck_assert(run->iteration[i] == at[i] && run->t_star_at[i] == t_star[i]);
 }
-END_TEST
 
-START_TEST(plots_and_json)
+TEST(plots_and_json)
 {
   int count;
   load(); /* nothing at all */
   ck_assert_int_eq(report.count, 0);
   print();
-  ck_good(sf_reproduction_plots(&report, &count));
+  ck_ok(sf_reproduction_plots(&report, &count));
   ck_assert_int_eq(count, 0);
   write_run("it's", "beta-5e-7", 30, 2);
   write_text("it's/beta-5e-7/train.json",
@@ -265,7 +258,7 @@ START_TEST(plots_and_json)
   ck_assert_int_eq(report.count, 1);
   ck_assert(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 1) == 30);
   ck_assert(isnan(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 3)));
-  ck_good(sf_reproduction_plots(&report, &count));
+  ck_ok(sf_reproduction_plots(&report, &count));
   ck_assert_int_eq(count, 3);
   contains("plots/balance-it's.gp", "\n2.00000 2e-05 1e-06\n", true);
   contains("plots/balance-it's.gp", "plot 3e-05 * exp(x - 2.00000) with lines", true);
@@ -276,15 +269,14 @@ START_TEST(plots_and_json)
   contains("table.md", "- it's, ann: not run", true);
   cJSON *json = sf_reproduction_json(&report);
   ck_assert_ptr_nonnull(json);
-  ck_good(sf_json_save(json, in("results.json")));
+  ck_ok(sf_json_save(json, in("results.json")));
   cJSON_Delete(json);
   contains("results.json", "somebody", false);
   contains("results.json", "\"prefix_psnr\":\t[25, 30, 30.5]", true);
 }
-END_TEST
 
 /* Profile scenes: a row for every scene and backbone, below them the paper's for their kinds, each once. */
-START_TEST(pairs)
+TEST(pairs)
 {
   static const struct {
     const char *ann, *spiking, *summary, *kind;
@@ -307,7 +299,7 @@ START_TEST(pairs)
       "scenes/a/beta-1e-6/train.json",
       "{\"psnr\":24.5,\"ssim\":0.5,\"t_r\":2,\"t_star\":2,\"seconds\":1,\"beta\":1e-6,\"backbone\":\"tensorf\"}");
   write_text("scenes/b/beta-1e-7/status", "failed: no memory\n");
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   ck_assert_int_eq(report.count, 3);
   ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
   ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
@@ -325,22 +317,19 @@ START_TEST(pairs)
   contains("table.md", "without stage I", false);
   write_text("scenes/b/beta-1e-7/cosim.json", "{\"samples\":100,\"differences\":1}");
   write_text("scenes/c/beta-5e-7/cosim.json", "{\"samples\":100}");
-  sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   ck_assert_int_eq(report.problems, 2);
   ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-1e-7/cosim.json: RTL and fixed-point core differ: 1 of 100"));
   ck_assert_ptr_null(strstr(report.problem[0], folder)); /* no path of this machine */
   cJSON *json = sf_reproduction_json(&report);
   ck_assert(!cJSON_HasObjectItem(json, "average") && !cJSON_HasObjectItem(json, "order"));
   cJSON_Delete(json);
-  sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes/.")));
+  load_from(in("scenes/."));
   ck_assert_str_eq(report.profile, "scenes");
 }
-END_TEST
 
 /* beta-5e-7 failed before its export: the ANN was rendered with the next. */
-START_TEST(reference_of_the_ann)
+TEST(reference_of_the_ann)
 {
   write_text("a/beta-5e-7/status", "failed: no memory\n");
   write_run("a", "beta-1e-7", 30, 3);
@@ -351,9 +340,8 @@ START_TEST(reference_of_the_ann)
   load();
   ck_assert_double_eq_tol(mean(0, SF_RUN_ANN, SF_METRIC_ENERGY), 20, 1e-9);
 }
-END_TEST
 
-START_TEST(parameters)
+TEST(parameters)
 {
   write_text("a/ann/train.cmd", "sf_train DATA --stage1 4 --seed 1 --net ann --psnr-prefixes 1\n");
   write_text("a/beta-5e-7/train.cmd", "sf_train DATA --stage1 4 --seed 1 --beta 5e-7\n");
@@ -373,9 +361,8 @@ START_TEST(parameters)
   ck_assert_int_eq(report.problems, 1);
   ck_assert_ptr_nonnull(strstr(report.problem[0], "; a, beta-5e-7: 'sf_train DATA --stage1 5"));
 }
-END_TEST
 
-START_TEST(too_many_prefixes)
+TEST(too_many_prefixes)
 {
   write_text("s/ann/train.json",
              "{\"psnr\":30,\"ssim\":0.5,\"t_r\":2,\"seconds\":1,\"prefix_psnr\":[1,2,3,4,5,6,7,8,9]}");
@@ -384,43 +371,21 @@ START_TEST(too_many_prefixes)
   sf_reproduction other;
   ck_bad(sf_reproduction_load(&other, in("nowhere")), SF_E_IO, "nowhere", "folder");
 }
-END_TEST
 
 /* Scenes of any kind are as many as there are: each has its rows. */
-START_TEST(many_scenes)
+TEST(many_scenes)
 {
   char name[32], row[48];
   for (int i = 0; i < 60; i++) {
     snprintf(name, sizeof name, "scenes/s%02d", i);
     write_run(name, "beta-5e-7", 20 + i, 2);
   }
-  sf_reproduction_free(&report);
-  ck_good(sf_reproduction_load(&report, in("scenes")));
+  load_from(in("scenes"));
   print();
   for (int i = 0; i < 60; i++) {
     snprintf(row, sizeof row, "\n| s%02d ", i);
     contains("table.md", row, true);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("report");
-  TCase *tc = tcase_create("report");
-  tcase_add_checked_fixture(tc, setup, teardown);
-  tcase_add_test(tc, averages);
-  tcase_add_test(tc, energies);
-  tcase_add_test(tc, faults);
-  tcase_add_test(tc, judgement);
-  tcase_add_test(tc, order);
-  tcase_add_test(tc, log_of_a_resumed_run);
-  tcase_add_test(tc, plots_and_json);
-  tcase_add_test(tc, pairs);
-  tcase_add_test(tc, reference_of_the_ann);
-  tcase_add_test(tc, parameters);
-  tcase_add_test(tc, too_many_prefixes);
-  tcase_add_test(tc, many_scenes);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

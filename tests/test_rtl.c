@@ -3,12 +3,12 @@
 #include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
-START_TEST(trained_size_nets)
+LOOP_TEST(trained_size_nets, 3)
 {
   random_source r = {(uint64_t)_i + 100, 0};
   random_net_make(&net_of_test, &r, false);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
   for (int i = 0; i < 8; i++) {
     draw_batch(&shared, &r, BATCH, false);
     run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
@@ -17,54 +17,47 @@ START_TEST(trained_size_nets)
   ck_assert_uint_gt(counts.layer[FX_D1].spikes[0], 0); /* the case is not an empty one */
   ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0);
   ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A net whose time does not hang on the streams: with stalls the model is within a hundredth. */
-START_TEST(stalls_hide_behind_the_engine)
+TEST(stalls_hide_behind_the_engine)
 {
   typical(77);
   fx_counts counts = {0}, actual;
   uint64_t cycles, busy, stalls;
   random_source r = {78, 0};
-  sf_dut *dut = open_dut(&net_of_test.net, 5, 20);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 5, 20);
   draw_batch(&shared, &r, BATCH, false);
   run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
   ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
   const double model = (double)modelled_cycles(&net_of_test.net, BATCH).cycles;
   ck_assert_double_eq_tol((double)cycles, model, 0.01 * model);
-  sf_dut_close(dut);
 }
-END_TEST
 
 static void check_cycles(uint64_t seed, int n, bool extreme)
 {
   random_source r = {seed, 0};
   random_net_make(&net_of_test, &r, extreme);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, 0);
   draw_batch(&shared, &r, n, extreme);
   run_batch(dut, &net_of_test.net, n, &counts, r.seed);
   same_cycles(dut, &net_of_test.net, n, r.seed);
-  sf_dut_close(dut);
 }
 
 /* While the streams never make it wait the model is exact, and so are each layer's busy cycles and the stalls. */
-START_TEST(cycles_are_those_of_the_model)
+LOOP_TEST(cycles_are_those_of_the_model, 6)
 {
   for (uint64_t i = 0; i < 4; i++) check_cycles(5000 + (uint64_t)_i * 4 + i, BATCH, _i > 0);
 }
-END_TEST
 
 /* Between two layers nothing else is at work: a cycle in which the accelerator takes itself for idle is missing. */
-START_TEST(cycles_of_a_sample_alone)
+LOOP_TEST(cycles_of_a_sample_alone, 6)
 {
   for (uint64_t i = 0; i < 8; i++) check_cycles(5100 + (uint64_t)_i * 8 + i, 1, _i > 0);
 }
-END_TEST
 
-START_TEST(extreme_nets)
+LOOP_TEST(extreme_nets, 25)
 {
   for (uint64_t i = 0; i < 16; i++) {
     random_source r = {1000 + (uint64_t)_i * 16 + i, 0};
@@ -72,10 +65,9 @@ START_TEST(extreme_nets)
     check_net(&net_of_test.net, &r, 24, true, (int)draw(&r, 0, 3) * 25);
   }
 }
-END_TEST
 
 /* Every mode with every number of steps, at the ends of the leak. */
-START_TEST(modes_and_steps)
+LOOP_TEST(modes_and_steps, 3)
 {
   static const int32_t leak[] = {0, 1, 2048, 4095, 4096};
   random_source r = {2000 + (uint64_t)_i, 0};
@@ -88,7 +80,6 @@ START_TEST(modes_and_steps)
     check_net(net, &r, 4, true, 10);
   }
 }
-END_TEST
 
 static void tiny_net(random_net *n)
 {
@@ -106,11 +97,11 @@ static void tiny_net(random_net *n)
 }
 
 /* The argument of a table is its bias when the multiplier is 0: both tables over their range, ends included. */
-START_TEST(tables)
+TEST(tables)
 {
   tiny_net(&net_of_test);
   fx_net *net = &net_of_test.net;
-  sf_dut *dut = open_dut(net, 9, 0);
+  OWNED(sf_dut) *dut = open_dut(net, 9, 0);
   static const int32_t ends[] = {-131072, -131071, -57345, -57344, -53249, -53248, -4096, -1,    0,      1,      15,
                                  16,      65535,   65536,  131071, 49152,  49151,  53247, 53248, -32768, -32767, 32767};
   random_source r = {77, 0};
@@ -124,39 +115,16 @@ START_TEST(tables)
     ck_ok(sf_dut_load(dut, net));
     run_batch(dut, net, 1, &counts, (uint64_t)i);
   }
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- streams ---- */
 
-START_TEST(stalls_change_timing_only)
-{
-  static fx_out reference[BATCH];
-  fx_counts first = {0};
-  typical(42);
-  for (int stalls = 0; stalls <= 90; stalls += 45) {
-    fx_counts counts = {0};
-    sf_dut *dut = open_dut(&net_of_test.net, 7 + (uint64_t)stalls, stalls);
-    run_batch(dut, &net_of_test.net, BATCH, &counts, 42);
-    same_counts(dut, &counts, 42);
-    for (int i = 0; i < BATCH; i++) {
-      if (stalls == 0) reference[i] = shared.result[i].out;
-      ck_assert_mem_eq(&reference[i], &shared.result[i].out, sizeof(fx_out));
-    }
-    if (stalls == 0) first = counts;
-    ck_assert_mem_eq(&first, &counts, sizeof counts);
-    sf_dut_close(dut);
-  }
-}
-END_TEST
-
 /* Nobody takes a result for a long time: input stops being accepted, nothing is lost. */
-START_TEST(long_back_pressure)
+TEST(long_back_pressure)
 {
   typical(43);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 3, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 3, 0);
   uint64_t words[SF_PACKET_MAX];
   int accepted = 0;
   expect_core(&shared, &net_of_test.net, BATCH, &counts);
@@ -189,29 +157,4 @@ START_TEST(long_back_pressure)
     i += beat;
     beat = !beat;
   }
-  sf_dut_close(dut);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("rtl");
-  TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 60);
-  tcase_add_loop_test(nets, trained_size_nets, 0, 3);
-  tcase_add_loop_test(nets, cycles_are_those_of_the_model, 0, 6);
-  tcase_add_loop_test(nets, cycles_of_a_sample_alone, 0, 6);
-  tcase_add_test(nets, stalls_hide_behind_the_engine);
-  tcase_add_loop_test(nets, extreme_nets, 0, 25);
-  tcase_add_loop_test(nets, modes_and_steps, 0, 3);
-  tcase_add_test(nets, tables);
-  tcase_add_test(nets, stalls_change_timing_only);
-  tcase_add_test(nets, long_back_pressure);
-  suite_add_tcase(s, nets);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
 }

@@ -36,7 +36,7 @@ struct exp_bench {
 };
 
 /* Every input up to the clamp, then up to the widest that a product of density and distance gives. */
-START_TEST(exp_neg)
+TEST(exp_neg)
 {
   exp_bench b;
   random_draw draw(1);
@@ -46,7 +46,6 @@ START_TEST(exp_neg)
   for (int i = 0; i < 100000 * unit_length(); i++) b.next(wide(draw, 36));
   for (int i = 0; i < EXP_LATENCY; i++) b.next(0);
 }
-END_TEST
 
 /* ---- compositor ---- */
 
@@ -193,7 +192,7 @@ static void random_ray(bench &b, int kind)
   }
 }
 
-START_TEST(random_rays)
+LOOP_TEST(random_rays, 8)
 {
   static const uint32_t stops[] = {0, 1, 1048, 10486, 1 << 19, (1 << 20) - 1};
   static const uint32_t limits[] = {1, 2, 5, 16, 1024};
@@ -206,10 +205,9 @@ START_TEST(random_rays)
   ck_assert_uint_gt(b.stops, 20); /* rays that went on after their pixel */
   ck_assert_uint_gt(b.pixels, 800);
 }
-END_TEST
 
 /* Rays of one sample over all small densities and distances, and every pair of corners. */
-START_TEST(one_sample_rays)
+TEST(one_sample_rays)
 {
   bench b(200, 0);
   b.program(0, 1024);
@@ -228,10 +226,9 @@ START_TEST(one_sample_rays)
     }
   b.drain();
 }
-END_TEST
 
 /* A sample in every SAMPLE_CYCLES cycles, and a pixel PIXEL_CYCLES behind the last. */
-START_TEST(the_pace)
+TEST(the_pace)
 {
   bench b(210, 0);
   b.program(0, 1024);
@@ -248,7 +245,6 @@ START_TEST(the_pace)
     ck_assert_uint_eq(b.u.cycle - b.taken_at, SAMPLE_CYCLES + PIXEL_CYCLES);
   }
 }
-END_TEST
 
 static void long_ray(bench &b, uint32_t sigma, int32_t delta, int n)
 {
@@ -262,7 +258,7 @@ static void long_ray(bench &b, uint32_t sigma, int32_t delta, int n)
 }
 
 /* Nothing is lost where a ray is empty, opaque at once, at its limit, or so thin or dark that rounding takes over. */
-START_TEST(hard_rays)
+TEST(hard_rays)
 {
   bench b(300, 10);
   b.program(0, 1024);
@@ -277,10 +273,9 @@ START_TEST(hard_rays)
   b.drain();
   ck_assert_uint_ge(b.stops, 3);
 }
-END_TEST
 
 /* Reset, soft or hard, in any cycle of a ray: nothing of it is left in the next one. */
-START_TEST(reset_in_mid_ray)
+TEST(reset_in_mid_ray)
 {
   bench b(400, 0);
   for (int wait = 0; wait < 60; wait++)
@@ -306,19 +301,5 @@ START_TEST(reset_in_mid_ray)
       b.drain();
     }
 }
-END_TEST
 
-int main()
-{
-  Suite *suite = suite_create("rtl_composite");
-  TCase *cases = tcase_create("units");
-  tcase_set_timeout(cases, 120);
-  tcase_add_test(cases, exp_neg);
-  tcase_add_loop_test(cases, random_rays, 0, 8);
-  tcase_add_test(cases, one_sample_rays);
-  tcase_add_test(cases, the_pace);
-  tcase_add_test(cases, hard_rays);
-  tcase_add_test(cases, reset_in_mid_ray);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -10,20 +10,19 @@ enum { SIZES = sizeof inputs_of / sizeof *inputs_of };
 static void check_cycles(const fx_net *net, int n, uint64_t seed)
 {
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(net, seed, 0);
+  OWNED(sf_dut) *dut = open_dut(net, seed, 0);
   run_batch(dut, net, n, &counts, seed);
   same_counts(dut, &counts, seed);
   same_cycles(dut, net, n, seed);
   ck_assert_uint_ge(modelled_cycles(net, n).cycles, sf_cycles_least(net, &counts, &sf_engine_default));
-  sf_dut_close(dut);
 }
 
-START_TEST(trained_size_decoders)
+LOOP_TEST(trained_size_decoders, SIZES)
 {
   random_source r = {300 + (uint64_t)_i, 0};
   random_decoder_make(&net_of_test, &r, inputs_of[_i], false);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 25);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 25);
   for (int i = 0; i < 4; i++) {
     draw_batch(&shared, &r, BATCH, false);
     run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
@@ -32,11 +31,9 @@ START_TEST(trained_size_decoders)
   ck_assert_uint_gt(counts.layer[FX_C1].spikes[1], 0); /* the case is not an empty one */
   if (inputs_of[_i] > 1) ck_assert_uint_gt(counts.layer[FX_C2].spikes[1], 0);
   ck_assert_uint_eq(counts.layer[FX_D1].updates[0] + counts.layer[FX_D2].special[0] + counts.rays, 0);
-  sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(extreme_decoders)
+LOOP_TEST(extreme_decoders, 10)
 {
   for (uint64_t i = 0; i < 16; i++) {
     random_source r = {1000 + (uint64_t)_i * 16 + i, 0};
@@ -44,10 +41,9 @@ START_TEST(extreme_decoders)
     check_net(&net_of_test.net, &r, 24, true, (int)draw(&r, 0, 3) * 25);
   }
 }
-END_TEST
 
 /* Every mode with every number of steps, with each set of biases. */
-START_TEST(modes_steps_and_biases)
+LOOP_TEST(modes_steps_and_biases, 3)
 {
   for (int steps = 1; steps <= SF_T_MAX; steps++)
     for (int biases = 0; biases < 8; biases++) {
@@ -60,9 +56,8 @@ START_TEST(modes_steps_and_biases)
       check_net(net, &r, 4, true, 10);
     }
 }
-END_TEST
 
-START_TEST(cycles_are_those_of_the_model)
+LOOP_TEST(cycles_are_those_of_the_model, 4)
 {
   for (uint64_t i = 0; i < 8; i++) {
     random_source r = {5000 + (uint64_t)_i * 8 + i, 0};
@@ -72,11 +67,10 @@ START_TEST(cycles_are_those_of_the_model)
     check_cycles(&net_of_test.net, BATCH, r.seed);
   }
 }
-END_TEST
 
 /* One row of 150 inputs and one of biases per cycle, and one in which the sums move on: no other cycle is lost between
  * two samples. */
-START_TEST(a_sample_takes_a_cycle_per_row)
+TEST(a_sample_takes_a_cycle_per_row)
 {
   random_source r = {6000, 0};
   random_decoder_make(&net_of_test, &r, 150, false);
@@ -84,14 +78,12 @@ START_TEST(a_sample_takes_a_cycle_per_row)
   draw_batch(&shared, &r, BATCH, false);
   fx_counts counts = {0}, actual;
   uint64_t cycles, busy, stalls;
-  sf_dut *dut = open_dut(&net_of_test.net, 1, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 1, 0);
   run_batch(dut, &net_of_test.net, BATCH, &counts, r.seed);
   ck_ok(sf_dut_counts(dut, &actual, &cycles, &busy, &stalls));
   ck_assert_uint_eq(sf_dut_layer_busy(dut)[FX_C1], 151 * BATCH);
   ck_assert_uint_lt(cycles, 152 * BATCH + 250); /* the first packet, the last sample's C2 and C3 */
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- hard cases ---- */
 
@@ -102,7 +94,7 @@ static void fill_row(fx_layer *layer, int row, int8_t w)
 
 /* 0, 1: every weight and bias at the same rail, inputs too; 2, 3: biases alone, the rest is 0: C1 silent or every
  * neuron fires at every step; 4: zero inputs; 5: inputs against the bias. */
-START_TEST(hard_cases)
+LOOP_TEST(hard_cases, 6)
 {
   for (int mode = FX_HYBRID; mode <= FX_NODECAY; mode++) {
     random_source r = {7000 + (uint64_t)mode, 0};
@@ -128,7 +120,6 @@ START_TEST(hard_cases)
     if (_i < 2) ck_assert_int_eq(abs(shared.trace[1].current[FX_C1][0][0]), (1 << 23) - !_i);
   }
 }
-END_TEST
 
 /* ---- the same build ---- */
 
@@ -146,18 +137,16 @@ static void next_net(sf_dut *dut, random_source *r, bool decoder)
 }
 
 /* An INGP net, a decoder, and an INGP net again, and so on, in one simulation without a reset of the block. */
-START_TEST(nets_take_turns)
+LOOP_TEST(nets_take_turns, 3)
 {
   random_source r = {8000 + (uint64_t)_i, 0};
   random_net_make(&net_of_test, &r, true);
-  sf_dut *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, _i * 30);
   for (int i = 0; i < 7; i++) next_net(dut, &r, i % 2);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* With densities and biases: the direction's row of biases once a ray, C2's and C3's cost no cycle. */
-START_TEST(biases_of_other_nets)
+LOOP_TEST(biases_of_other_nets, 3)
 {
   for (uint64_t i = 0; i < 8; i++) {
     random_source r = {9000 + (uint64_t)_i * 8 + i, 0};
@@ -171,101 +160,22 @@ START_TEST(biases_of_other_nets)
     check_cycles(&net_of_test.net, BATCH, r.seed);
   }
 }
-END_TEST
 
-/* ---- refused ---- */
-
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
+TEST(a_bias_without_a_place_is_refused)
 {
-  dut->bus.write(dut->bus.context, offset, value);
-}
-
-static uint32_t error_of(sf_dut *dut)
-{
-  return dut->bus.read(dut->bus.context, SF_CSR_ERROR);
-}
-
-START_TEST(illegal_programming_is_refused)
-{
-  enum { MORE = SF_LANES + 1 };
-  static const struct {
-    uint32_t offset, value, error;
-  } bad[] = {{SF_CSR_D1_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D1_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D2_N_IN, 1, SF_CSR_ERROR_SIZE},         {SF_CSR_D2_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 0, SF_CSR_ERROR_SIZE},         {SF_CSR_C1_N_IN, 161, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 512 + 150, SF_CSR_ERROR_SIZE}, {SF_CSR_C1_N_OUT, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C2_N_OUT, MORE, SF_CSR_ERROR_SIZE},     {SF_CSR_C3_N_OUT, 1, SF_CSR_ERROR_SIZE},
-             {SF_CSR_BIAS, 1u << 11, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 15, SF_CSR_ERROR_SIZE},
-             {SF_CSR_BIAS, 1u << 18, SF_CSR_ERROR_SIZE},     {SF_CSR_BIAS, 1u << 31, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_THETA, 0, SF_CSR_ERROR_THETA},       {SF_CSR_C2_K, 4097, SF_CSR_ERROR_LEAK},
-             {SF_CSR_STEPS, 9, SF_CSR_ERROR_STEPS}};
   random_source r = {10, 0};
-  fx_counts counts = {0};
   random_decoder_make(&net_of_test, &r, 150, false);
-  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
-  sf_dut *dut = open_dut(&net_of_test.net, 11, 20);
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    sf_driver_reset(&dut->bus);
-    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
-    put(dut, bad[i].offset, bad[i].value);
-    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_REFUSED);
-    ck_assert_uint_eq(error_of(dut) & bad[i].error, bad[i].error);
-  }
-  net_of_test.net.layer[FX_D2].bias = 1; /* the driver has no place for it */
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 11, 20);
+  net_of_test.net.layer[FX_D2].bias = 1;
   ck_assert_int_ne(sf_dut_load(dut, &net_of_test.net).code, SF_OK);
-  net_of_test.net.layer[FX_D2].bias = 0;
-  ck_ok(sf_dut_load(dut, &net_of_test.net));
-  draw_batch(&shared, &r, 8, false);
-  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
-  same_counts(dut, &counts, r.seed);
-  sf_dut_close(dut);
 }
-END_TEST
-
-/* 0: a beat less, 1: a beat more, 2: no tuser, 3: no tuser on the second sample, 4: a value of 13 bits. */
-START_TEST(bad_packets_are_refused)
-{
-  random_source r = {20 + (uint64_t)_i, 0};
-  random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 12, 0);
-  draw_batch(&shared, &r, 8, false);
-  for (int sample = _i == 3 ? 0 : 1; sample < 2; sample++) {
-    uint64_t words[SF_PACKET_MAX + 1] = {0};
-    const int beats = sf_dut_packet(&net_of_test.net, &shared.sample[sample], words) + (_i == 1) - (_i == 0);
-    if (_i == 4) words[39] = (uint64_t)0x0800 << 48;
-    for (int beat = 0; beat < beats;) {
-      dut->in.s_valid = true;
-      dut->in.s_data = words[beat];
-      dut->in.s_user = beat == 0 && _i != 2 && sample <= (_i != 3);
-      dut->in.s_last = beat == beats - 1;
-      sf_dut_tick(dut);
-      beat += dut->out.s_ready;
-    }
-  }
-  dut->in.s_valid = false;
-  int results = 0; /* beats: of the first sample where only the second one is bad */
-  for (int cycle = 0; cycle < 2000; cycle++) {
-    dut->in.m_ready = true;
-    sf_dut_tick(dut);
-    results += dut->out.m_valid;
-  }
-  dut->in.m_ready = false;
-  ck_assert_int_eq(results, _i == 3 ? 2 : 0);
-  ck_assert_uint_eq(error_of(dut), _i == 4 ? SF_CSR_ERROR_VALUE : SF_CSR_ERROR_PACKET);
-  fx_counts counts = {0};
-  ck_ok(sf_dut_load(dut, &net_of_test.net));
-  run_batch(dut, &net_of_test.net, 8, &counts, r.seed);
-  same_counts(dut, &counts, r.seed);
-  sf_dut_close(dut);
-}
-END_TEST
 
 /* Nobody takes a result for a long time: nothing is lost. Soft reset at many moments leaves no trace. */
-START_TEST(soft_reset_at_any_time)
+TEST(soft_reset_at_any_time)
 {
   random_source r = {30, 0};
   random_decoder_make(&net_of_test, &r, 30, false);
-  sf_dut *dut = open_dut(&net_of_test.net, 17, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 17, 0);
   for (int delay = 1; delay < 400; delay += 23) {
     uint64_t words[SF_PACKET_MAX];
     draw_batch(&shared, &r, 4, false);
@@ -285,26 +195,6 @@ START_TEST(soft_reset_at_any_time)
     run_batch(dut, &net_of_test.net, 4, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
   }
-  sf_dut_close(dut);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *s = suite_create("rtl_decoder");
-  TCase *nets = tcase_create("nets");
-  tcase_set_timeout(nets, 120);
-  tcase_add_loop_test(nets, trained_size_decoders, 0, SIZES);
-  tcase_add_loop_test(nets, extreme_decoders, 0, 10);
-  tcase_add_loop_test(nets, modes_steps_and_biases, 0, 3);
-  tcase_add_loop_test(nets, cycles_are_those_of_the_model, 0, 4);
-  tcase_add_test(nets, a_sample_takes_a_cycle_per_row);
-  tcase_add_loop_test(nets, hard_cases, 0, 6);
-  tcase_add_loop_test(nets, nets_take_turns, 0, 3);
-  tcase_add_loop_test(nets, biases_of_other_nets, 0, 3);
-  tcase_add_test(nets, illegal_programming_is_refused);
-  tcase_add_loop_test(nets, bad_packets_are_refused, 0, 5);
-  tcase_add_test(nets, soft_reset_at_any_time);
-  suite_add_tcase(s, nets);
-  return ck_run(s);
-}
+int ck_timeout = 120;

@@ -5,15 +5,6 @@
 
 enum { PATIENCE = 4000 };
 
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  return dut->bus.read(dut->bus.context, offset);
-}
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
-{
-  dut->bus.write(dut->bus.context, offset, value);
-}
-
 /* Everything is programmed anew; results and counters are right from the first sample on. */
 static void works(sf_dut *dut)
 {
@@ -71,22 +62,6 @@ static void hard_reset(sf_dut *dut, int cycles)
   ck_assert_uint_eq(get(dut, SF_CSR_STATUS) & (SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE | SF_CSR_STATUS_ERROR), 0);
 }
 
-START_TEST(hard_reset_at_any_time)
-{
-  random_source r = {62, 0};
-  sf_dut *dut = begin(62);
-  for (int trial = 0; trial < 12; trial++) {
-    feed f = {.m_percent = (uint32_t)draw(&r, 0, 1) * 60};
-    typical(60);
-    ck_ok(sf_dut_load(dut, &net_of_test.net));
-    for (int64_t cycle = draw(&r, 1, 700); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
-    hard_reset(dut, 1 + trial % 3);
-    works(dut);
-  }
-  sf_dut_close(dut);
-}
-END_TEST
-
 static void program_and_start(sf_dut *dut)
 {
   const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
@@ -110,10 +85,10 @@ static void has_no_direction(sf_dut *dut)
 }
 
 /* The driver always begins with a soft reset; after a hard one it is not needed, at power-on or in mid-frame. */
-START_TEST(a_hard_reset_is_enough)
+LOOP_TEST(a_hard_reset_is_enough, 2)
 {
   random_source r = {68, (uint64_t)_i << 32};
-  sf_dut *dut;
+  OWNED(sf_dut) *dut = NULL;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 68 + (uint64_t)_i}));
   for (int trial = 0; trial < 6; trial++) {
     fx_counts counts = {0};
@@ -125,22 +100,20 @@ START_TEST(a_hard_reset_is_enough)
     program_and_start(dut);
     run_batch(dut, &net_of_test.net, 6, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
-    feed f = {.m_percent = 60};
+    feed f = {.m_percent = 30 * (uint32_t)(trial % 3)};
     for (int64_t cycle = draw(&r, 1, 700); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
     hard_reset(dut, 1 + trial % 3);
     program_and_start(dut);
     has_no_direction(dut);
     hard_reset(dut, 1);
   }
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* Waits for the phase at the pins, then strikes at once. */
-START_TEST(soft_reset_in_every_phase)
+LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
 {
   random_source r = {63, (uint64_t)_i << 32};
-  sf_dut *dut = begin(63);
+  OWNED(sf_dut) *dut = begin(63);
   for (int trial = 0; trial < 3; trial++) {
     feed f = {.m_percent = 30};
     int cycle = 0;
@@ -158,9 +131,7 @@ START_TEST(soft_reset_in_every_phase)
     }
     works(dut);
   }
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* What the core counts of the samples from..to-1 that feed_cycle sends. */
 static fx_counts counts_of(uint64_t from, uint64_t to)
@@ -215,10 +186,10 @@ static void send_rest(sf_dut *dut, feed *f, random_source *r)
 }
 
 /* Asked for at any moment, a snapshot is of whole samples, and no event is lost between it and a clear. */
-START_TEST(snapshot_and_clear_at_work)
+LOOP_TEST(snapshot_and_clear_at_work, 8)
 {
   random_source r = {64, (uint64_t)_i << 32};
-  sf_dut *dut = begin(64);
+  OWNED(sf_dut) *dut = begin(64);
   feed f = {.m_percent = 80};
   const bool clear = _i & 1;
   for (int64_t cycle = draw(&r, 400, 1500); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
@@ -233,13 +204,11 @@ START_TEST(snapshot_and_clear_at_work)
   ck_ok(sf_dut_counts(dut, &after, NULL, NULL, NULL));
   const fx_counts rest = counts_of(clear ? actual.samples : 0, (uint64_t)f.sample);
   same_events(&rest, &after);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* Streams that trickle, so that every step of every layer has a bubble or back-pressure, with and without membranes at
  * their rails. */
-START_TEST(all_steps_under_stalls)
+LOOP_TEST(all_steps_under_stalls, 3)
 {
   random_source r = {67, (uint64_t)_i << 32};
   for (int saturating = 0; saturating < 2; saturating++) {
@@ -258,14 +227,12 @@ START_TEST(all_steps_under_stalls)
       for (int k = 0; k < SF_FEATURE_MAX; k++) shared.f[i][k] = 2047;
     }
     fx_counts counts = {0};
-    sf_dut *dut = open_dut(net, r.seed, 90);
+    OWNED(sf_dut) *dut = open_dut(net, r.seed, 90);
     run_batch(dut, net, BATCH, &counts, r.seed);
     same_counts(dut, &counts, r.seed);
     ck_assert(!saturating || _i != FX_NODECAY || (counts.saturated[FX_C1] && counts.saturated[FX_C2]));
-    sf_dut_close(dut);
   }
 }
-END_TEST
 
 /* ---- AXI4-Lite, reads and writes at once ---- */
 
@@ -281,10 +248,10 @@ static void hold_response(const sf_pins_in *in, const sf_pins_out *out, sf_pins_
   *before = *out;
 }
 
-START_TEST(register_accesses_overlap)
+LOOP_TEST(register_accesses_overlap, 4)
 {
   random_source r = {65, (uint64_t)_i << 32};
-  sf_dut *dut = begin(65);
+  OWNED(sf_dut) *dut = begin(65);
   sf_driver_reset(&dut->bus);
   uint32_t value[REGISTERS];
   for (int i = 0; i < REGISTERS; i++) value[i] = get(dut, registers[i]);
@@ -331,14 +298,12 @@ START_TEST(register_accesses_overlap)
   ck_assert_int_gt(writes, 200);
   ck_assert_int_ge(reads, answered);
   ck_assert_int_gt(answered, 200);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A write of less than a word is refused and changes nothing. */
-START_TEST(part_of_a_word)
+TEST(part_of_a_word)
 {
-  sf_dut *dut = begin(66);
+  OWNED(sf_dut) *dut = begin(66);
   sf_driver_reset(&dut->bus);
   const uint32_t before = get(dut, SF_CSR_D1_K);
   for (uint8_t strobe = 0; strobe < 15; strobe++) {
@@ -359,22 +324,4 @@ START_TEST(part_of_a_word)
     ck_assert_uint_eq(get(dut, SF_CSR_D1_K), before);
   }
   works(dut);
-  sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *s = suite_create("rtl_disturbed");
-  TCase *c = tcase_create("disturbed");
-  tcase_set_timeout(c, 60);
-  tcase_add_test(c, hard_reset_at_any_time);
-  tcase_add_loop_test(c, a_hard_reset_is_enough, 0, 2);
-  tcase_add_loop_test(c, soft_reset_in_every_phase, 0, SF_PHASES);
-  tcase_add_loop_test(c, snapshot_and_clear_at_work, 0, 8);
-  tcase_add_loop_test(c, all_steps_under_stalls, 0, 3);
-  tcase_add_loop_test(c, register_accesses_overlap, 0, 4);
-  tcase_add_test(c, part_of_a_word);
-  suite_add_tcase(s, c);
-  return ck_run(s);
 }

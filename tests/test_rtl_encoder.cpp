@@ -177,17 +177,15 @@ template <class bench> static void random_scenes(uint64_t seed)
   }
 }
 
-START_TEST(random_scenes_through_one_port)
+LOOP_TEST(random_scenes_through_one_port, 3)
 {
   random_scenes<one_port>((uint64_t)_i + 60);
 }
-END_TEST
 
-START_TEST(random_scenes_through_four_ports)
+LOOP_TEST(random_scenes_through_four_ports, 3)
 {
   random_scenes<four_ports>((uint64_t)_i + 65);
 }
-END_TEST
 
 /* `requests`: of a sample at the busiest port. */
 template <class bench> static void full_speed(int levels, int latency, int first, int requests)
@@ -204,7 +202,7 @@ template <class bench> static void full_speed(int levels, int latency, int first
 }
 
 /* Samples cost their requests alone, even at one sample per ray, for which three rays on their way hide less. */
-START_TEST(a_request_in_every_cycle)
+TEST(a_request_in_every_cycle)
 {
   for (int levels = 8; levels <= 16; levels += 4) {
     for (int latency = 1; latency <= 91; latency += 30) full_speed<one_port>(levels, latency, 10, 8 * levels);
@@ -212,10 +210,9 @@ START_TEST(a_request_in_every_cycle)
   }
   for (int latency = 1; latency <= 91; latency += 30) full_speed<four_ports>(16, latency, 10, 32);
 }
-END_TEST
 
 /* A direction that waits for the harmonics of the one before holds up nothing but a third one. */
-START_TEST(a_direction_that_waits)
+TEST(a_direction_that_waits)
 {
   enum { HARMONICS = 2 * FX_SH + 15 };
   one_port b(75);
@@ -232,7 +229,6 @@ START_TEST(a_direction_that_waits)
   ck_assert_uint_gt(b.u.cycle - begin, HARMONICS / 2);
   b.run(20);
 }
-END_TEST
 
 template <class bench> static void reset_on_the_way()
 {
@@ -250,20 +246,18 @@ template <class bench> static void reset_on_the_way()
   }
 }
 
-START_TEST(reset_on_the_way_through_one_port)
+TEST(reset_on_the_way_through_one_port)
 {
   reset_on_the_way<one_port>();
 }
-END_TEST
 
-START_TEST(reset_on_the_way_through_four_ports)
+TEST(reset_on_the_way_through_four_ports)
 {
   reset_on_the_way<four_ports>();
 }
-END_TEST
 
 /* The levels of a real scene: 16, dense and hashed tables of up to 2^19 entries. */
-START_TEST(sizes_of_a_real_scene)
+TEST(sizes_of_a_real_scene)
 {
   random_draw draw(90);
   grid_fixture fixture(draw, 16, 0);
@@ -287,20 +281,5 @@ START_TEST(sizes_of_a_real_scene)
   b.timing(40, 10, 5, 10);
   b.run(1000 * unit_length());
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("rtl_encoder");
-  TCase *cases = tcase_create("encoder");
-  tcase_set_timeout(cases, 3600);
-  tcase_add_loop_test(cases, random_scenes_through_one_port, 0, 3);
-  tcase_add_loop_test(cases, random_scenes_through_four_ports, 0, 3);
-  tcase_add_test(cases, a_request_in_every_cycle);
-  tcase_add_test(cases, a_direction_that_waits);
-  tcase_add_test(cases, reset_on_the_way_through_one_port);
-  tcase_add_test(cases, reset_on_the_way_through_four_ports);
-  tcase_add_test(cases, sizes_of_a_real_scene);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 3600;

@@ -37,7 +37,7 @@ struct weight_bench {
 };
 
 /* Every place in a cell in long runs; every x-y with 16 values of z in short ones. */
-START_TEST(weights_of_every_place)
+TEST(weights_of_every_place)
 {
   weight_bench b;
   for (int z = _i; z<256; z += unit_length()> 1 ? 1 : 17)
@@ -55,7 +55,6 @@ START_TEST(weights_of_every_place)
       }
   for (int i = 0; i < WEIGHT_LATENCY; i++) b.next({0, 0, 0, 0, 65536});
 }
-END_TEST
 
 /* ---- sf_trilinear ---- */
 
@@ -93,7 +92,7 @@ static cell_of_test draw_cell(random_draw &draw)
 }
 
 /* The cell's data stand at the inputs until its eighth entry, as the queue before it keeps them. */
-START_TEST(sums_of_random_cells)
+LOOP_TEST(sums_of_random_cells, 3)
 {
   unit<Vsf_trilinear> u((uint64_t)_i + 20);
   random_draw draw((uint64_t)_i + 20);
@@ -127,7 +126,6 @@ START_TEST(sums_of_random_cells)
     c = draw_cell(draw);
   }
 }
-END_TEST
 
 /* ---- sf_grid ---- */
 
@@ -247,7 +245,7 @@ private:
 };
 
 /* Grids of all sizes, entries over their range and at the rails, any latency and stalls. */
-START_TEST(random_grids)
+LOOP_TEST(random_grids, 4)
 {
   grid_bench b((uint64_t)_i + 30);
   for (int n = 0; n < 12 * unit_length(); n++) {
@@ -259,11 +257,10 @@ START_TEST(random_grids)
     ck_assert(b.flying.empty() && b.entries.empty() && b.memory.queue.empty());
   }
 }
-END_TEST
 
 /* One request per cycle up to a latency of the requests that may be on their way; before the first, the first cell;
  * behind the last answer, sums and queue. */
-START_TEST(a_request_in_every_cycle)
+TEST(a_request_in_every_cycle)
 {
   enum { BEFORE_AND_BEHIND = 27 };
   static const int latency[] = {1, 10, 60, 100};
@@ -277,10 +274,9 @@ START_TEST(a_request_in_every_cycle)
                     "%d levels, latency %d: %d cycles for %d requests", levels, latency[i], (int)cycles, (int)requests);
     }
 }
-END_TEST
 
 /* While the memory takes nothing, all that fits in before it fills up: one request waits, one index behind it. */
-START_TEST(a_memory_that_begins_late)
+TEST(a_memory_that_begins_late)
 {
   enum { BEHIND = 10 };
   for (int levels = 1; levels <= 16; levels += 5) {
@@ -293,10 +289,9 @@ START_TEST(a_memory_that_begins_late)
     ck_assert_uint_eq(b.u.cycle - begin, 100 + requests + 10 + BEHIND);
   }
 }
-END_TEST
 
 /* The next sample's first index is made while the last request of the one before still waits. */
-START_TEST(an_index_behind_a_request_that_waits)
+TEST(an_index_behind_a_request_that_waits)
 {
   grid_bench b(42);
   const grid_fixture fixture(b.draw, 1, 0);
@@ -310,10 +305,9 @@ START_TEST(an_index_behind_a_request_that_waits)
   ck_assert_uint_eq(b.asked, CORNERS + 1);
   while (b.done < 2) b.cycle(0);
 }
-END_TEST
 
 /* Clear at any moment; the memory goes on answering what it had accepted. */
-START_TEST(reset_on_the_way)
+TEST(reset_on_the_way)
 {
   grid_bench b(50);
   for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
@@ -326,20 +320,5 @@ START_TEST(reset_on_the_way)
     b.run(3);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("rtl_grid");
-  TCase *cases = tcase_create("grid");
-  tcase_set_timeout(cases, 3600);
-  tcase_add_loop_test(cases, weights_of_every_place, 0, 1);
-  tcase_add_loop_test(cases, sums_of_random_cells, 0, 3);
-  tcase_add_loop_test(cases, random_grids, 0, 4);
-  tcase_add_test(cases, a_request_in_every_cycle);
-  tcase_add_test(cases, a_memory_that_begins_late);
-  tcase_add_test(cases, an_index_behind_a_request_that_waits);
-  tcase_add_test(cases, reset_on_the_way);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 3600;

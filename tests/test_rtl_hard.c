@@ -34,7 +34,7 @@ static void run_ray(sf_dut *dut, hard *h, const hard_case *c, int variant)
   c->expect(h, &seen, variant);
 }
 
-START_TEST(accelerator)
+HARD_TEST(accelerator)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; variant < c->variants; variant++) {
@@ -49,12 +49,4 @@ START_TEST(accelerator)
     }
     hard_end(&h);
   }
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_hard");
-  hard_add(suite, accelerator);
-  return ck_run(suite);
 }

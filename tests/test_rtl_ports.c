@@ -1,21 +1,9 @@
-/* The accelerator's ports: illegal programming, bad packets, soft reset, counters, the driver. */
+/* The accelerator's ports: registers after reset, bad packets, the driver. */
 #include "ck_run.h"
 #include "firmware/sf_blob.h"
 #include "tests/rtl_fixture.h"
-#include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-/* ---- registers ---- */
-
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  return dut->bus.read(dut->bus.context, offset);
-}
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
-{
-  dut->bus.write(dut->bus.context, offset, value);
-}
 
 /* After trouble: soft reset and a new load make it work again, with the right results and counts. */
 static void recovers(sf_dut *dut)
@@ -39,155 +27,10 @@ static void expect_error(sf_dut *dut, uint32_t bit)
   ck_assert(!dut->bus_hung);
 }
 
-START_TEST(illegal_programming_is_refused)
-{
-  enum { MORE = SF_LANES + 1, LESS = SF_LANES - 1 };
-  static const struct {
-    uint32_t offset, value, error;
-  } bad[] = {{SF_CSR_STEPS, 0, SF_CSR_ERROR_STEPS},         {SF_CSR_STEPS, 9, SF_CSR_ERROR_STEPS},
-             {SF_CSR_STEPS, 17, SF_CSR_ERROR_STEPS},        {SF_CSR_MODE, 3, SF_CSR_ERROR_MODE},
-             {SF_CSR_MODE, 4, SF_CSR_ERROR_MODE},           {SF_CSR_D1_K, 4097, SF_CSR_ERROR_LEAK},
-             {SF_CSR_D2_K, 1u << 16, SF_CSR_ERROR_LEAK},    {SF_CSR_C1_K, 8191, SF_CSR_ERROR_LEAK},
-             {SF_CSR_C2_K, ~0u, SF_CSR_ERROR_LEAK},         {SF_CSR_C3_K, 4097, SF_CSR_ERROR_LEAK},
-             {SF_CSR_D1_THETA, 0, SF_CSR_ERROR_THETA},      {SF_CSR_C1_THETA, 1u << 23, SF_CSR_ERROR_THETA},
-             {SF_CSR_C2_THETA, ~0u, SF_CSR_ERROR_THETA},    {SF_CSR_D1_N_IN, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D1_N_IN, 33, SF_CSR_ERROR_SIZE},       {SF_CSR_D1_N_IN, 512 + 32, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D1_N_OUT, MORE, SF_CSR_ERROR_SIZE},    {SF_CSR_D1_N_OUT, LESS, SF_CSR_ERROR_SIZE},
-             {SF_CSR_D2_N_OUT, 17, SF_CSR_ERROR_SIZE},      {SF_CSR_D2_N_OUT, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_IN, 32, SF_CSR_ERROR_SIZE},       {SF_CSR_C1_N_IN, 14, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C1_N_OUT, 1, SF_CSR_ERROR_SIZE},       {SF_CSR_C2_N_IN, LESS, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C2_N_OUT, 200, SF_CSR_ERROR_SIZE},     {SF_CSR_C3_N_IN, 0, SF_CSR_ERROR_SIZE},
-             {SF_CSR_C3_N_OUT, 4, SF_CSR_ERROR_SIZE},       {SF_CSR_EXP_MUL, 65536, SF_CSR_ERROR_SCALE},
-             {SF_CSR_EXP_SHIFT, 32, SF_CSR_ERROR_SCALE},    {SF_CSR_SIGMOID_MUL, ~0u, SF_CSR_ERROR_SCALE},
-             {SF_CSR_SIGMOID_SHIFT, 64, SF_CSR_ERROR_SCALE}};
-  typical(45);
-  const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
-  sf_dut *dut = open_dut(&net_of_test.net, 11, 20);
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    sf_driver_reset(&dut->bus);
-    ck_assert_int_eq(sf_driver_program(&dut->bus, &blob), SF_DRIVER_OK);
-    put(dut, bad[i].offset, bad[i].value);
-    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_REFUSED);
-    ck_assert_uint_eq(dut->bus_response, 2); /* SLVERR */
-    expect_error(dut, bad[i].error);
-    ck_assert_uint_eq(get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_RUNNING, 0);
-    dut->in.s_valid = true; /* nothing is accepted */
-    for (int cycle = 0; cycle < 20; cycle++) {
-      sf_dut_tick(dut);
-      ck_assert(!dut->out.s_ready);
-    }
-    dut->in.s_valid = false;
-  }
-  recovers(dut);
-  sf_dut_close(dut);
-}
-END_TEST
-
-START_TEST(programming_while_running_is_refused)
-{
-  typical(46);
-  fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 12, 0);
-  put(dut, SF_CSR_STEPS, 1);
-  expect_error(dut, SF_CSR_ERROR_BUSY);
-  ck_assert_uint_eq(get(dut, SF_CSR_STEPS), (uint32_t)net_of_test.net.steps);
-  put(dut, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
-  put(dut, SF_CSR_WEIGHT_DATA, 0x01020304);
-  expect_error(dut, SF_CSR_ERROR_BUSY);
-  put(dut, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
-  put(dut, SF_CSR_CTRL, SF_CSR_CTRL_START);
-  expect_error(dut, SF_CSR_ERROR_BUSY);
-  put(dut, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
-  put(dut, SF_CSR_IRQ_PENDING, SF_CSR_IRQ_ENABLE_ERROR);
-  run_batch(dut, &net_of_test.net, 8, &counts, 46); /* and it did no harm */
-  same_counts(dut, &counts, 46);
-  sf_dut_close(dut);
-}
-END_TEST
-
-START_TEST(weights_and_addresses_are_checked)
-{
-  typical(47);
-  sf_dut *dut = open_dut(&net_of_test.net, 13, 0);
-  enum { ROW = SF_CSR_WEIGHT_ADDRESS_ROW_LSB, BIAS = SF_BIAS_ROW << ROW, LAYER = SF_CSR_WEIGHT_ADDRESS_LAYER_LSB };
-  enum { LAST = (SF_LANES - 1) << ROW, BEHIND = BIAS + (1 << ROW), TOP = 511 << ROW };
-  enum { NO_ROW = SF_LANES < SF_BIAS_ROW ? SF_LANES << ROW : BEHIND, NO_WORD = SF_LANES < 256 ? SF_LANES / 4 : BIAS };
-  static const uint32_t address[] = {5u << LAYER,
-                                     7u << LAYER | LAST,
-                                     1u << LAYER | 4,
-                                     4u << LAYER | 31,
-                                     32 << ROW,
-                                     BIAS,
-                                     1u << LAYER | BIAS,
-                                     2u << LAYER | 160 << ROW,
-                                     2u << LAYER | BEHIND,
-                                     3u << LAYER | NO_ROW,
-                                     4u << LAYER | TOP,
-                                     NO_WORD,
-                                     1u << 18};
-  static const uint32_t fits[] = {31 << ROW,          1u << LAYER | LAST, 2u << LAYER | 159 << ROW,
-                                  2u << LAYER | BIAS, 3u << LAYER | BIAS, 4u << LAYER | BIAS};
-  for (size_t i = 0; i < sizeof fits / sizeof *fits; i++) {
-    sf_driver_reset(&dut->bus);
-    put(dut, SF_CSR_WEIGHT_ADDRESS, fits[i]);
-    put(dut, SF_CSR_WEIGHT_DATA, 1);
-    ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
-  }
-  for (size_t i = 0; i < sizeof address / sizeof *address; i++) {
-    sf_driver_reset(&dut->bus);
-    put(dut, SF_CSR_WEIGHT_ADDRESS, address[i]);
-    for (int again = 0; again < 2; again++) { /* it does not move on to a word that fits */
-      put(dut, SF_CSR_WEIGHT_DATA, 1);
-      expect_error(dut, SF_CSR_ERROR_WEIGHT);
-    }
-  }
-  for (int byte = 0; byte < 4; byte++) {
-    sf_driver_reset(&dut->bus);
-    put(dut, SF_CSR_WEIGHT_ADDRESS, 0);
-    put(dut, SF_CSR_WEIGHT_DATA, 0x80u << 8 * byte);
-    expect_error(dut, SF_CSR_ERROR_WEIGHT);
-  }
-  static const uint32_t nowhere[] = {SF_CSR_ID, SF_CSR_STATUS, 0x09c, 0x0fc, 0x800, SF_CSR_COUNTERS, 0x1ffc};
-  for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
-    sf_driver_reset(&dut->bus);
-    put(dut, nowhere[i], 1);
-    ck_assert_uint_eq(dut->bus_response, 2);
-    expect_error(dut, SF_CSR_ERROR_ADDRESS);
-  }
-  recovers(dut);
-  sf_dut_close(dut);
-}
-END_TEST
-
-/* Registers read back what was written, from the table that both sides are made of. */
-START_TEST(registers_read_back)
-{
-  typical(48);
-  sf_dut *dut = open_dut(&net_of_test.net, 14, 50);
-  sf_driver_reset(&dut->bus);
-#define SF_CSR(name, offset, access, reset, meaning)                                                                   \
-  if (SF_CSR_##name >= SF_CSR_RAY_CTRL && SF_CSR_##name < SF_CSR_COUNTERS) { /* of sf_ray_top */                       \
-    put(dut, SF_CSR_##name, 1);                                                                                        \
-    ck_assert_uint_eq(get(dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);                                                   \
-    put(dut, SF_CSR_ERROR, SF_CSR_ERROR_ADDRESS);                                                                      \
-  } else if (#access[0] == 'R' && #access[1] == 'W') {                                                                 \
-    const uint32_t value = SF_CSR_##name == SF_CSR_MODE || SF_CSR_##name == SF_CSR_IRQ_ENABLE ? 1 : 7;                 \
-    put(dut, SF_CSR_##name, value);                                                                                    \
-    ck_assert_msg(get(dut, SF_CSR_##name) == value, "%s reads %u", #name, get(dut, SF_CSR_##name));                    \
-  } else if (reset)                                                                                                    \
-    ck_assert_uint_eq(get(dut, SF_CSR_##name), (uint32_t)(reset));
-#include "spikefield/csr.def"
-#undef SF_CSR
-#undef SF_CSR_FIELD
-  ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
-  sf_dut_close(dut);
-}
-END_TEST
-
 /* Registers start with random values; a hard reset gives them those of the table. */
-START_TEST(registers_after_reset)
+TEST(registers_after_reset)
 {
-  sf_dut *dut;
+  OWNED(sf_dut) *dut = NULL;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
 #define SF_CSR(name, offset, access, reset, meaning)                                                                   \
   if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && SF_CSR_##name != SF_CSR_STATUS)                          \
@@ -195,105 +38,66 @@ START_TEST(registers_after_reset)
 #include "spikefield/csr.def"
 #undef SF_CSR
 #undef SF_CSR_FIELD
-  sf_dut_close(dut);
 }
-END_TEST
-
-START_TEST(counters_clear_and_add_up)
-{
-  typical(49);
-  fx_counts counts = {0}, zero = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 15, 30);
-  for (int i = 0; i < 3; i++) {
-    run_batch(dut, &net_of_test.net, 5, &counts, 49);
-    same_counts(dut, &counts, 49);
-  }
-  ck_ok(sf_dut_clear_counts(dut));
-  same_counts(dut, &zero, 49);
-  /* Snapshot and clear in one command, snapshot first. */
-  fx_counts more = {0};
-  run_batch(dut, &net_of_test.net, 2, &more, 49);
-  put(dut, SF_CSR_CTRL, SF_CSR_CTRL_CLEAR | SF_CSR_CTRL_SNAPSHOT);
-  while (get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS) continue;
-  ck_assert_uint_eq(get(dut, SF_CSR_COUNTERS), more.layer[FX_D1].mac[0]);
-  ck_assert_uint_ne(get(dut, SF_CSR_IRQ_PENDING) & SF_CSR_IRQ_ENABLE_COUNTERS, 0);
-  same_counts(dut, &zero, 49);
-  sf_dut_close(dut);
-}
-END_TEST
 
 /* ---- packets ---- */
 
-typedef enum { SHORT, LONG, NO_DIRECTION, WIDE_VALUE, BAD_PACKETS } bad_packet;
+typedef enum { SHORT, LONG, NO_DIRECTION, WIDE_VALUE, NO_SECOND_DIRECTION, BAD_PACKETS } bad_packet;
 
-static void send_bad(sf_dut *dut, bad_packet kind)
+static void send(sf_dut *dut, const uint64_t *words, int beats, bool first)
 {
-  uint64_t words[SF_PACKET_MAX + 1] = {0};
-  sf_dut_sample sample = shared.sample[0];
-  sample.first = kind != NO_DIRECTION;
-  const int beats = sf_dut_packet(&net_of_test.net, &sample, words) + (kind == LONG) - (kind == SHORT);
-  if (kind == WIDE_VALUE) words[2] = 0x0800;
   for (int beat = 0; beat < beats;) {
     dut->in.s_valid = true;
     dut->in.s_data = words[beat];
-    dut->in.s_user = beat == 0 && sample.first;
+    dut->in.s_user = beat == 0 && first;
     dut->in.s_last = beat == beats - 1;
-    const uint64_t before = dut->cycle;
     sf_dut_tick(dut);
-    ck_assert_uint_lt(before, 10000000);
+    ck_assert_uint_lt(dut->cycle, 10000000);
     beat += dut->out.s_ready;
   }
   dut->in.s_valid = false;
 }
 
-START_TEST(bad_packets_are_refused)
+static void send_bad(sf_dut *dut, bad_packet kind, bool decoder)
 {
+  uint64_t words[SF_PACKET_MAX + 1] = {0};
+  sf_dut_sample sample = shared.sample[0];
+  if (kind == NO_SECOND_DIRECTION) send(dut, words, sf_dut_packet(&net_of_test.net, &sample, words), true);
+  sample.first = kind != NO_DIRECTION && kind != NO_SECOND_DIRECTION;
+  const int beats = sf_dut_packet(&net_of_test.net, &sample, words) + (kind == LONG) - (kind == SHORT);
+  if (kind == WIDE_VALUE) words[decoder ? 39 : 2] = decoder ? (uint64_t)0x0800 << 48 : 0x0800;
+  send(dut, words, beats, sample.first);
+}
+
+/* Those of a net with densities, then those of a decoder, which needs a direction with every sample. */
+LOOP_TEST(bad_packets_are_refused, 2 * BAD_PACKETS - 1)
+{
+  const bool decoder = _i >= NO_SECOND_DIRECTION;
+  const bad_packet kind = (bad_packet)(decoder ? _i - NO_SECOND_DIRECTION : _i);
+  random_source r = {50, 0};
   typical(50);
-  sf_dut *dut = open_dut(&net_of_test.net, 16, 0);
-  send_bad(dut, (bad_packet)_i);
-  for (int i = 0; i < 2000; i++) { /* no result comes of it, and more input is swallowed */
+  if (decoder) random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 16, 0);
+  send_bad(dut, kind, decoder);
+  int beats = 0; /* of results: no bad sample has one, and more input is swallowed */
+  for (int cycle = 0; cycle < 2000; cycle++) {
     dut->in.m_ready = true;
     sf_dut_tick(dut);
-    ck_assert(!dut->out.m_valid);
+    beats += dut->out.m_valid;
   }
-  expect_error(dut, _i == WIDE_VALUE ? SF_CSR_ERROR_VALUE : SF_CSR_ERROR_PACKET);
-  typical(50);
+  ck_assert_int_eq(beats, kind == NO_SECOND_DIRECTION ? 2 : 0);
+  expect_error(dut, kind == WIDE_VALUE ? SF_CSR_ERROR_VALUE : SF_CSR_ERROR_PACKET);
   const sf_status status = sf_dut_run(dut, shared.sample, 1, shared.result);
   ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-  ck_assert(strstr(status.message, _i == WIDE_VALUE ? "VALUE" : "PACKET") != NULL);
+  ck_assert(strstr(status.message, kind == WIDE_VALUE ? "VALUE" : "PACKET") != NULL);
   recovers(dut);
-  sf_dut_close(dut);
 }
-END_TEST
-
-/* Soft reset at many moments of a sample, then everything again from the start. */
-START_TEST(soft_reset_at_any_time)
-{
-  typical(51);
-  sf_dut *dut = open_dut(&net_of_test.net, 17, 0);
-  for (int delay = 1; delay < 300; delay += 37) {
-    uint64_t words[SF_PACKET_MAX];
-    typical(51);
-    const int beats = sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
-    for (int cycle = 0, beat = 0; cycle < delay; cycle++) {
-      dut->in.s_valid = beat < beats;
-      dut->in.s_data = words[beat < beats ? beat : 0];
-      dut->in.s_user = beat == 0;
-      dut->in.s_last = beat == beats - 1;
-      sf_dut_tick(dut);
-      if (dut->in.s_valid && dut->out.s_ready) beat++;
-    }
-    recovers(dut);
-  }
-  sf_dut_close(dut);
-}
-END_TEST
 
 /* A bad packet in every cycle around a soft reset: one that comes beside it is dropped like any other. */
-START_TEST(bad_packet_beside_a_soft_reset)
+TEST(bad_packet_beside_a_soft_reset)
 {
   typical(52);
-  sf_dut *dut = open_dut(&net_of_test.net, 18, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 18, 0);
   sf_pins_in *in = &dut->in;
   int together = 0;
   for (int beat = 0; beat < 6; beat++)
@@ -315,9 +119,7 @@ START_TEST(bad_packet_beside_a_soft_reset)
       ck_assert_uint_eq(get(dut, SF_CSR_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- driver ---- */
 
@@ -327,7 +129,7 @@ static uint32_t fake_read(void *context, uint32_t offset)
   return offset == SF_CSR_ID ? value[0] : offset == SF_CSR_VERSION ? value[1] : value[2];
 }
 
-START_TEST(driver_refuses_another_device)
+TEST(driver_refuses_another_device)
 {
   uint32_t value[3] = {SF_CSR_ID_RESET, SF_CSR_VERSION_RESET, SF_CSR_CONFIG_RESET};
   const sf_bus bus = {.read = fake_read, .context = value};
@@ -341,7 +143,6 @@ START_TEST(driver_refuses_another_device)
   value[0] = 0;
   ck_assert_int_eq(sf_driver_probe(&bus), SF_DRIVER_NO_DEVICE);
 }
-END_TEST
 
 static void put_word(uint8_t *block, int index, int32_t value)
 {
@@ -367,7 +168,7 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
 }
 
 /* The firmware's way: from a block of memory through the driver; any cut of the block is refused. */
-START_TEST(net_from_memory)
+LOOP_TEST(net_from_memory, 2)
 {
   static uint8_t block[SF_BLOB_WORDS * 4 + SF_LAYERS * SF_LANES * SF_LANES];
   random_source r = {52, 0};
@@ -378,17 +179,15 @@ START_TEST(net_from_memory)
   sf_net_blob net;
   for (uint32_t cut = 0; cut < size; cut += 97) ck_assert_int_eq(sf_blob_open(block, cut, &net), -1);
   ck_assert_int_eq(sf_blob_open(block, size, &net), 0);
-  sf_dut *dut = open_dut(&net_of_test.net, 18, 10);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 18, 10);
   ck_assert_int_eq(sf_driver_load(&dut->bus, &net), SF_DRIVER_OK);
   run_batch(dut, &net_of_test.net, 6, &counts, 52);
   same_counts(dut, &counts, 52);
   put_word(block, SF_BLOB_HEADER_WORDS, 1000);
   ck_assert_int_eq(sf_blob_open(block, size, &net), -1);
-  sf_dut_close(dut);
 }
-END_TEST
 
-START_TEST(waveform)
+TEST(waveform)
 {
   char folder[] = "/tmp/sf_test_rtl.XXXXXX", path[64];
   ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -406,31 +205,4 @@ START_TEST(waveform)
   snprintf(path, sizeof path, "/nowhere/a.fst");
   const fx_scene scene = {.net = net_of_test.net};
   ck_assert_int_eq(sf_dut_open(&dut, &scene, &(sf_dut_options){.wave = path}).code, SF_E_IO);
-}
-END_TEST
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("rtl_ports");
-  TCase *ports = tcase_create("ports");
-  tcase_set_timeout(ports, 60);
-  tcase_add_test(ports, illegal_programming_is_refused);
-  tcase_add_test(ports, programming_while_running_is_refused);
-  tcase_add_test(ports, weights_and_addresses_are_checked);
-  tcase_add_test(ports, registers_read_back);
-  tcase_add_test(ports, registers_after_reset);
-  tcase_add_test(ports, counters_clear_and_add_up);
-  tcase_add_loop_test(ports, bad_packets_are_refused, 0, BAD_PACKETS);
-  tcase_add_test(ports, soft_reset_at_any_time);
-  tcase_add_test(ports, bad_packet_beside_a_soft_reset);
-  tcase_add_test(ports, driver_refuses_another_device);
-  tcase_add_loop_test(ports, net_from_memory, 0, 2);
-  tcase_add_test(ports, waveform);
-  suite_add_tcase(s, ports);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
 }

@@ -2,10 +2,9 @@
  * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray/ray.h"
 #include "energy/energy.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_hard_cases.h"
 
 enum { RAYS = 12, SAMPLES_MAX = 1024 };
@@ -28,14 +27,7 @@ static sf_ray_dut *open_rays(const fx_scene *scene, uint64_t seed, int stalls)
 
 static void draw_rays(const fx_scene *scene, uint64_t seed)
 {
-  for (uint64_t i = 0; i < RAYS; i++) {
-    float origin[3], direction[3];
-    for (uint64_t a = 0; a < 3; a++) {
-      origin[a] = 6 * sf_random_float(seed, 1, 3 * i + a) - 3;
-      direction[a] = 1.6f * sf_random_float(seed, 2, 3 * i + a) - 0.8f - origin[a];
-    }
-    ck_ok(sf_fx_ray_make(scene, origin, direction, &shared.ray[i]));
-  }
+  for (uint64_t i = 0; i < RAYS; i++) shared.ray[i] = random_ray(scene, seed, i);
 }
 
 static int whole_march(const fx_scene *scene, const fx_ray *ray)
@@ -91,17 +83,17 @@ static void same_counts(sf_ray_dut *rays)
   ck_ok(sf_counts_compare(&shared.counts, "core", &actual, "accelerator"));
 }
 
-START_TEST(random_scenes)
+LOOP_TEST(random_scenes, 12)
 {
   const uint64_t seed = 700 + (uint64_t)_i;
   fixture_sizes sizes = _i ? fixture_random_sizes(seed) : fixture_ingp;
-  fx_scene scene = fixture_scene(&sizes, seed);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, seed);
   scene.step_q24 = 1 << 20;
   scene.net.exp_in.bias = _i % 3 * 8192 - 4096;
   scene.trans_stop = _i % 2 ? 1048 : 400000;
   scene.max_samples = _i % 4 == 3 ? 3 : 1024;
   for (int o = 0; o < 3; o++) scene.background[o] = 20000 * o;
-  sf_ray_dut *rays = open_rays(&scene, seed, _i % 4 * 25);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, seed, _i % 4 * 25);
   draw_rays(&scene, seed);
   expect_core(&scene, RAYS, false);
   ck_assert_uint_gt(shared.counts.samples, 0);
@@ -113,22 +105,19 @@ START_TEST(random_scenes)
   same_counts(rays);
   expect_core(&scene, RAYS, true);
   run(rays, RAYS);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Rays that stop at once, each followed by all that lies behind: whole rays of matter are dropped or swallowed. */
-START_TEST(rays_go_on_after_their_end)
+TEST(rays_go_on_after_their_end)
 {
-  fx_scene scene = fixture_scene(&fixture_ingp, 5);
+  OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 5);
   fx_counts counts;
   int sent = 0, needed = 0;
   scene.step_q24 = 1 << 19;
   scene.trans_stop = (1 << 20) - 1; /* any density at all ends a ray */
   scene.net.exp_in.bias = 40000;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays = open_rays(&scene, 6, 30);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 6, 30);
   draw_rays(&scene, 7);
   expect_core(&scene, RAYS, true);
   run(rays, RAYS);
@@ -137,19 +126,16 @@ START_TEST(rays_go_on_after_their_end)
   ck_assert_int_gt(sent, 10 * needed);
   ck_assert_uint_ge(counts.samples, (uint64_t)needed);
   ck_assert_uint_lt(counts.samples, (uint64_t)sent / 2); /* most of the rest never reached the nets */
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Ends and beginnings meet in every way: rays of up to 14 samples, each ended by its second. */
-START_TEST(short_rays_in_a_row)
+TEST(short_rays_in_a_row)
 {
   static const fixture_sizes sizes = {2, 8, 4, 4, 8, 8, 1, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 8);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 8);
   scene.step_q24 = 1 << 19, scene.max_samples = 2;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays = open_rays(&scene, 9, 40);
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 9, 40);
   for (uint64_t round = 0; round < 150; round++) {
     draw_rays(&scene, round);
     expect_core(&scene, RAYS, true);
@@ -159,12 +145,9 @@ START_TEST(short_rays_in_a_row)
     }
     run(rays, RAYS);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(hard_rays)
+HARD_TEST(hard_rays)
 {
   const hard_case *c = &hard_cases[_i];
   for (int variant = 0; c->kind == HARD_RAY && variant < c->variants; variant++) {
@@ -182,18 +165,8 @@ START_TEST(hard_rays)
     hard_end(&h);
   }
 }
-END_TEST
 
 /* ---- registers and resets ---- */
-
-static uint32_t get(sf_ray_dut *rays, uint32_t offset)
-{
-  return rays->dut->bus.read(rays->dut->bus.context, offset);
-}
-static void put(sf_ray_dut *rays, uint32_t offset, uint32_t value)
-{
-  rays->dut->bus.write(rays->dut->bus.context, offset, value);
-}
 
 static fx_scene small_scene(void)
 {
@@ -211,26 +184,26 @@ static void works(sf_ray_dut *rays, uint64_t seed)
   expect_core(rays->scene, RAYS, false);
   run(rays, RAYS);
   same_counts(rays);
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
 }
 
-START_TEST(illegal_programming_is_refused)
+TEST(illegal_programming_is_refused)
 {
   static const struct {
     uint32_t offset, value;
   } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},      {SF_CSR_RAY_MAX_SAMPLES, 0},
              {SF_CSR_RAY_MAX_SAMPLES, 1025},      {SF_CSR_RAY_MAX_SAMPLES, 2048},    {SF_CSR_RAY_BACKGROUND_R, 65537},
              {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 1, 20);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 1, 20);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     ck_ok(sf_ray_dut_load(rays));
-    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    put(rays, bad[i].offset, bad[i].value);
-    put(rays, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays->dut, bad[i].offset, bad[i].value);
+    put(rays->dut, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
     ck_assert_uint_eq(rays->dut->bus_response, 2); /* SLVERR */
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
     ck_assert(rays->dut->out.irq);
     rays->dut->in.ray_valid = true; /* nothing is accepted */
     for (int cycle = 0; cycle < 20; cycle++) {
@@ -238,14 +211,11 @@ START_TEST(illegal_programming_is_refused)
       ck_assert(!rays->dut->out.ray_ready);
     }
     rays->dut->in.ray_valid = false;
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), 0);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), 0);
   }
   works(rays, 1);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Between driver and bus: writes of one register go to another, a read of it finds nobody. */
 typedef struct spy {
@@ -268,7 +238,7 @@ static void spy_write(void *context, uint32_t offset, uint32_t value)
   s->real.write(s->real.context, offset == s->offset && s->to ? s->to : offset, value);
 }
 
-START_TEST(what_goes_wrong_at_load_is_told)
+TEST(what_goes_wrong_at_load_is_told)
 {
   static const struct {
     uint32_t offset, to;
@@ -278,8 +248,8 @@ START_TEST(what_goes_wrong_at_load_is_told)
              {SF_CSR_RAY_TRANS_STOP, 0x7fc, "load rays: programming refused: ADDRESS: "},
              {SF_CSR_RAY_BACKGROUND_B, SF_CSR_RAY_MAX_SAMPLES, "load rays: programming refused: VALUE: "},
              {SF_CSR_RAY_ERROR, 0, "load rays: register access not answered at cycle"}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 5, 20);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 5, 20);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const sf_bus real = rays->dut->bus;
     spy s = {rays->dut, real, bad[i].offset, bad[i].to};
@@ -290,66 +260,57 @@ START_TEST(what_goes_wrong_at_load_is_told)
     ck_assert_msg(strstr(status.message, bad[i].text), "'%s' is not in '%s'", bad[i].text, status.message);
   }
   works(rays, 7);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Of a net with four levels and nine direction features. */
-START_TEST(sizes_that_are_not_the_nets_are_refused)
+TEST(sizes_that_are_not_the_nets_are_refused)
 {
   static const struct {
     uint32_t levels, n_dir;
   } bad[] = {{0, 9},          {3, 9}, {5, 9}, {16, 9}, {17, 9}, {20, 9},
              {0x80000004, 9}, {4, 0}, {4, 8}, {4, 16}, {4, 25}, {4, 41}};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 6, 0);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 6, 0);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const sf_ray_blob blob = {.levels = bad[i].levels, .n_dir = bad[i].n_dir, .max_samples = 1024};
-    put(rays, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
     ck_assert_str_eq(sf_driver_text(sf_ray_driver_load(&rays->dut->bus, &blob)),
                      "the encoder's levels or directions are not the net's");
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_STATUS), 0);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), 0);
   }
   works(rays, 8);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(registers)
+TEST(registers)
 {
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
                                          SF_CSR_ENCODER_DATA, SF_CSR_RAY_CTRL};
   static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, 0x42c, 0x7fc};
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 2, 40);
-  ck_assert_uint_eq(get(rays, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
-  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 2, 40);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
+  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
   for (size_t i = 0; i < sizeof programming / sizeof *programming; i++) {
-    put(rays, programming[i], 1);
+    put(rays->dut, programming[i], 1);
     ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
   }
   for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
-    put(rays, nowhere[i], 1);
+    put(rays->dut, nowhere[i], 1);
     ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
-    put(rays, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
+    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
   }
-  ck_assert_uint_eq(get(rays, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), 0);
-  put(rays, 0x800, 1); /* of nobody: sf_top answers */
-  ck_assert_uint_eq(get(rays, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), 0);
+  put(rays->dut, 0x800, 1); /* of nobody: sf_top answers */
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
   ck_assert(!rays->dut->bus_hung);
   works(rays, 2);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Offers beats of the batch for so many cycles and takes every pixel; then gives up. */
 static void cut_off(sf_ray_dut *rays, int cycles)
@@ -369,10 +330,10 @@ static void cut_off(sf_ray_dut *rays, int cycles)
 }
 
 /* At any moment, with the memory owing answers: the next rays are whole. */
-START_TEST(soft_reset_in_mid_ray)
+TEST(soft_reset_in_mid_ray)
 {
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 3, 10);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 3, 10);
   uint64_t owing = 0;
   for (int cycles = 1; cycles < 1200; cycles = cycles * 5 / 4 + 1) {
     works(rays, 3);
@@ -381,15 +342,12 @@ START_TEST(soft_reset_in_mid_ray)
   }
   works(rays, 4);
   ck_assert_uint_gt(owing, 3);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(beats_out_of_order_are_refused)
+TEST(beats_out_of_order_are_refused)
 {
-  fx_scene scene = small_scene();
-  sf_ray_dut *rays = open_rays(&scene, 4, 0);
+  OWNED(fx_scene) scene = small_scene();
+  OWNED(sf_ray_dut) *rays = open_rays(&scene, 4, 0);
   for (int user = 0; user < 2; user++) {
     works(rays, 5);
     sf_pins_in *in = &rays->dut->in;
@@ -403,30 +361,8 @@ START_TEST(beats_out_of_order_are_refused)
       ck_assert(rays->dut->out.ray_ready);
     }
     in->ray_valid = false;
-    ck_assert_uint_eq(get(rays, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
     ck_assert(rays->dut->out.irq);
   }
   works(rays, 6);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray");
-  TCase *cases = tcase_create("rays");
-  tcase_set_timeout(cases, 60);
-  tcase_add_loop_test(cases, random_scenes, 0, 12);
-  tcase_add_test(cases, rays_go_on_after_their_end);
-  tcase_add_test(cases, short_rays_in_a_row);
-  tcase_add_test(cases, illegal_programming_is_refused);
-  tcase_add_test(cases, what_goes_wrong_at_load_is_told);
-  tcase_add_test(cases, sizes_that_are_not_the_nets_are_refused);
-  tcase_add_test(cases, registers);
-  tcase_add_test(cases, soft_reset_in_mid_ray);
-  tcase_add_test(cases, beats_out_of_order_are_refused);
-  suite_add_tcase(suite, cases);
-  hard_add(suite, hard_rays);
-  return ck_run(suite);
 }

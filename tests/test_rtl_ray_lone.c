@@ -1,9 +1,8 @@
 /* sf_ray_top, ray by ray: rays of one sample at any position, or of none, against the core's parts; pixels that wait.
  */
 #include "ck_run.h"
-#include "sim/ray/ray.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
 
@@ -48,12 +47,12 @@ static sf_ray_sample draw_sample(random_source *s)
 }
 
 /* Nobody takes a pixel for a long time: empty rays and results pile up before the compositor, and none is lost. */
-START_TEST(pixels_that_wait)
+TEST(pixels_that_wait)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
   random_source s = {270, 0};
-  fx_scene scene = fixture_scene(&sizes, 23);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 23);
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 270}));
   sf_dut *dut = rays->dut;
   const fx_ray ray = some_ray(&scene);
@@ -71,18 +70,15 @@ START_TEST(pixels_that_wait)
     ck_ok(sf_ray_dut_run(rays, request, LONE, actual));
     for (int i = 0; i < LONE; i++) same_pixel(&actual[i], &expected[i]);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Positions beside which one LSB of an axis makes another pixel. */
-START_TEST(every_bit_of_a_position)
+TEST(every_bit_of_a_position)
 {
   static const fixture_sizes sizes = {16, 64, 16, 9, 64, 64, 4, FX_HYBRID, {0}};
   random_source s = {280, 0};
-  fx_scene scene = fixture_scene(&sizes, 24);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 24);
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 280}));
   const fx_ray ray = some_ray(&scene);
   int found[3] = {0};
@@ -104,18 +100,4 @@ START_TEST(every_bit_of_a_position)
     found[axis]++;
   }
   for (int axis = 0; axis < 3; axis++) ck_assert_int_eq(found[axis], 3);
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray_lone");
-  TCase *cases = tcase_create("rays");
-  tcase_set_timeout(cases, 60);
-  tcase_add_test(cases, pixels_that_wait);
-  tcase_add_test(cases, every_bit_of_a_position);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
 }

@@ -2,9 +2,8 @@
  * windows behind one bus, and what reaches the encoder. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
-#include "sim/ray/ray.h"
 #include "quant/quant.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
 
@@ -94,18 +93,6 @@ static uint32_t model_read(const registers *r, uint32_t offset)
 }
 
 /* ---- both ---- */
-
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  const uint32_t value = dut->bus.read(dut->bus.context, offset);
-  ck_assert_uint_eq(dut->out.rresp, OKAY);
-  return value;
-}
-
-static void put(sf_dut *dut, uint32_t offset, uint32_t value)
-{
-  dut->bus.write(dut->bus.context, offset, value);
-}
 
 /* Address and data together, some bytes of the word alone. */
 static void put_bytes(sf_dut *dut, uint32_t offset, uint32_t value, uint8_t strobe)
@@ -207,11 +194,11 @@ static void program_legal(sf_dut *dut, registers *r, random_source *s)
     write_both(dut, r, SF_CSR_RAY_BACKGROUND_R + 4 * o, draw(s, 0, 1) ? 1 << 16 : 0, WHOLE);
 }
 
-START_TEST(any_access_in_any_state)
+LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {200 + (uint64_t)_i, 0};
   registers r = {0};
-  sf_dut *dut = begin(s.seed);
+  OWNED(sf_dut) *dut = begin(s.seed);
   int running = 0, refused = 0;
   for (uint32_t offset = WINDOW; offset < SF_CSR_ENCODER_DATA + 8; offset += 4) read_both(dut, &r, offset);
   for (int i = 0; i < ACCESSES; i++) {
@@ -239,15 +226,13 @@ START_TEST(any_access_in_any_state)
   }
   ck_assert_int_gt(running, ACCESSES / 10);
   ck_assert_int_gt(refused, ACCESSES / 20);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* What is not one of the ray registers is sf_top's, and its interrupt comes through. */
-START_TEST(the_other_window)
+TEST(the_other_window)
 {
   registers r = {0};
-  sf_dut *dut = begin(210);
+  OWNED(sf_dut) *dut = begin(210);
   write_both(dut, &r, SF_CSR_RAY_BACKGROUND_G, 77, WHOLE);
   ck_assert_uint_eq(get(dut, SF_CSR_ID), SF_CSR_ID_RESET);
   put(dut, SF_CSR_EXP_BIAS, 4321);
@@ -265,13 +250,11 @@ START_TEST(the_other_window)
   sf_dut_tick(dut);
   ck_assert(dut->out.irq);
   read_both(dut, &r, SF_CSR_RAY_BACKGROUND_G);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* The next access is offered while the response of the last one waits, in either window: as many responses as accesses,
  * in their order. */
-START_TEST(accesses_without_a_pause)
+TEST(accesses_without_a_pause)
 {
   static const struct {
     uint32_t offset;
@@ -283,7 +266,7 @@ START_TEST(accesses_without_a_pause)
                                      {SF_CSR_RAY_TRANS_STOP, 99},
                                      {SF_CSR_VERSION, SF_CSR_VERSION_RESET}};
   random_source s = {220, 0};
-  sf_dut *dut = begin(s.seed);
+  OWNED(sf_dut) *dut = begin(s.seed);
   sf_pins_in *in = &dut->in;
   put(dut, SF_CSR_RAY_MAX_SAMPLES, 333);
   put(dut, SF_CSR_RAY_TRANS_STOP, 99);
@@ -315,76 +298,71 @@ START_TEST(accesses_without_a_pause)
   }
   ck_assert_int_gt(written, 400);
   ck_assert_int_gt(asked, 400);
-  sf_dut_close(dut);
 }
-END_TEST
+
+/* In which cycle of twelve a sample out of order was taken that is offered in cycle `beat`, and a write that is offered
+ * from cycle `write` on; -1: not at all. */
+typedef struct beside {
+  int accepted, written;
+} beside;
+
+static beside error_beside_write(sf_dut *dut, registers *r, uint32_t offset, uint32_t value, int beat, int write)
+{
+  sf_pins_in *in = &dut->in;
+  beside at = {-1, -1};
+  soft_reset_both(dut, r);
+  write_both(dut, r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
+  in->awaddr = offset, in->wdata = value, in->wstrb = WHOLE, in->bready = true, in->ray_user = false;
+  for (int cycle = 0; cycle < 12; cycle++) {
+    in->ray_valid = cycle == beat;
+    in->awvalid = in->wvalid = at.written < 0 && cycle >= write;
+    sf_dut_tick(dut);
+    if (in->ray_valid && dut->out.ray_ready) at.accepted = cycle;
+    if (in->awvalid && dut->out.awready) at.written = cycle;
+  }
+  in->bready = false;
+  ck_assert_int_ge(at.written, write);
+  return at;
+}
+
+static sf_dut *begin_quietly(uint64_t seed, registers *r)
+{
+  sf_dut *dut = begin(seed);
+  dut->each_cycle = NULL, dut->stall_percent = 0;
+  program_legal(dut, r, &(random_source){seed, 0});
+  return dut;
+}
 
 /* An error that comes while RAY_ERROR is written, in every cycle around it: cleared if it was there, else kept. */
-START_TEST(an_error_beside_its_clearing)
+TEST(an_error_beside_its_clearing)
 {
   int kept = 0, cleared = 0;
-  sf_dut *dut = begin(230);
-  dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
-  random_source s = {230, 0};
-  program_legal(dut, &r, &s);
+  OWNED(sf_dut) *dut = begin_quietly(230, &r);
   for (int beat = 0; beat < 6; beat++)
     for (int write = 0; write < 6; write++) {
-      sf_pins_in *in = &dut->in;
-      int accepted = -1, written = -1;
-      soft_reset_both(dut, &r);
-      write_both(dut, &r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
-      in->awaddr = SF_CSR_RAY_ERROR, in->wdata = 0xf, in->wstrb = WHOLE, in->bready = true, in->ray_user = false;
-      for (int cycle = 0; cycle < 12; cycle++) {
-        in->ray_valid = cycle == beat;
-        in->awvalid = in->wvalid = written < 0 && cycle >= write;
-        sf_dut_tick(dut);
-        if (in->ray_valid && dut->out.ray_ready) accepted = cycle;
-        if (in->awvalid && dut->out.awready) written = cycle;
-      }
-      in->bready = false;
-      ck_assert_int_eq(accepted, beat);
-      ck_assert_int_ge(written, write);
-      ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), accepted >= written ? SF_CSR_RAY_ERROR_ORDER : 0);
-      *(accepted >= written ? &kept : &cleared) += 1;
+      const beside at = error_beside_write(dut, &r, SF_CSR_RAY_ERROR, 0xf, beat, write);
+      ck_assert_int_eq(at.accepted, beat);
+      ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), at.accepted >= at.written ? SF_CSR_RAY_ERROR_ORDER : 0);
+      *(at.accepted >= at.written ? &kept : &cleared) += 1;
     }
   ck_assert(kept > 5 && cleared > 5);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A sample out of order in every cycle around a soft reset: one that comes beside it is dropped like any other. */
-START_TEST(an_error_beside_a_soft_reset)
+TEST(an_error_beside_a_soft_reset)
 {
   int together = 0;
-  sf_dut *dut = begin(231);
-  dut->each_cycle = NULL, dut->stall_percent = 0;
   registers r = {0};
-  random_source s = {231, 0};
-  program_legal(dut, &r, &s);
+  OWNED(sf_dut) *dut = begin_quietly(231, &r);
   for (int beat = 0; beat < 6; beat++)
     for (int write = 0; write < 6; write++) {
-      sf_pins_in *in = &dut->in;
-      bool written = false;
-      soft_reset_both(dut, &r);
-      write_both(dut, &r, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START, WHOLE);
-      in->awaddr = SF_CSR_CTRL, in->wdata = SF_CSR_CTRL_SOFT_RESET, in->wstrb = WHOLE, in->bready = true;
-      in->ray_user = false;
-      for (int cycle = 0; cycle < 12; cycle++) {
-        in->ray_valid = cycle == beat;
-        in->awvalid = in->wvalid = !written && cycle >= write;
-        sf_dut_tick(dut);
-        together += in->ray_valid && dut->out.ray_ready && in->awvalid && dut->out.awready;
-        written |= in->awvalid && dut->out.awready;
-      }
-      in->bready = false;
-      ck_assert(written);
+      const beside at = error_beside_write(dut, &r, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET, beat, write);
+      together += at.accepted == at.written;
       ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the encoder's words ---- */
 
@@ -399,12 +377,7 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
   sf_ray_request request[RAYS];
   uint64_t count = 0;
   for (uint64_t i = 0; i < RAYS; i++) {
-    float origin[3], direction[3];
-    for (uint64_t a = 0; a < 3; a++) {
-      origin[a] = 6 * sf_random_float(seed, 1, 3 * i + a) - 3;
-      direction[a] = 1.6f * sf_random_float(seed, 2, 3 * i + a) - 0.8f - origin[a];
-    }
-    ck_ok(sf_fx_ray_make(scene, origin, direction, &ray[i]));
+    ray[i] = random_ray(scene, seed, i);
     ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
     sf_ray_samples(scene, &ray[i], samples[i], (int)expected.samples);
     request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false};
@@ -420,13 +393,13 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
 }
 
 /* Writes of the other registers, refused words, what a master shows while it is not valid: nothing of it gets there. */
-START_TEST(the_encoder_is_programmed_by_its_words_alone)
+TEST(the_encoder_is_programmed_by_its_words_alone)
 {
   static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 21);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 21);
   scene.step_q24 = 1 << 20;
   memset(scene.occupancy, 0xff, 64);
-  sf_ray_dut *rays;
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 240, .stall_percent = 10}));
   sf_dut *dut = rays->dut;
   for (uint32_t word = 0; word < 8 * 4; word++) { /* of the four levels, and at last the three behind them */
@@ -449,18 +422,15 @@ START_TEST(the_encoder_is_programmed_by_its_words_alone)
     put(dut, SF_CSR_RAY_ERROR, ~0u);
     renders(rays, word);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* From the first sample that is taken to the pixel that is taken, whoever works on it. */
-START_TEST(active_until_the_pixel_has_left)
+TEST(active_until_the_pixel_has_left)
 {
   enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
   static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 22);
-  sf_ray_dut *rays;
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 22);
+  OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 250}));
   sf_dut *dut = rays->dut;
   ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
@@ -479,15 +449,12 @@ START_TEST(active_until_the_pixel_has_left)
     sf_dut_tick(dut);
     ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
   }
-  sf_ray_dut_close(rays);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* A response that waits is gone after a reset. */
-START_TEST(a_hard_reset_drops_responses)
+TEST(a_hard_reset_drops_responses)
 {
-  sf_dut *dut = begin(260);
+  OWNED(sf_dut) *dut = begin(260);
   sf_pins_in *in = &dut->in;
   dut->each_cycle = NULL;
   in->wstrb = WHOLE, in->wdata = 0, in->bready = in->rready = false;
@@ -503,23 +470,4 @@ START_TEST(a_hard_reset_drops_responses)
   in->rst_n = true;
   sf_dut_tick(dut);
   ck_assert(!dut->out.bvalid && !dut->out.rvalid);
-  sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_ray_registers");
-  TCase *cases = tcase_create("registers");
-  tcase_set_timeout(cases, 60);
-  tcase_add_loop_test(cases, any_access_in_any_state, 0, 2);
-  tcase_add_test(cases, the_other_window);
-  tcase_add_test(cases, accesses_without_a_pause);
-  tcase_add_test(cases, an_error_beside_its_clearing);
-  tcase_add_test(cases, an_error_beside_a_soft_reset);
-  tcase_add_test(cases, the_encoder_is_programmed_by_its_words_alone);
-  tcase_add_test(cases, active_until_the_pixel_has_left);
-  tcase_add_test(cases, a_hard_reset_drops_responses);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
 }

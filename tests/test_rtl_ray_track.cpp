@@ -174,7 +174,7 @@ static void random_ray(bench &b)
 
 /* Stalls, and rays that end early in any cycle: what was inside comes out, what comes later is dropped, and the next
  * ray loses nothing. */
-START_TEST(random_rays)
+LOOP_TEST(random_rays, 8)
 {
   bench b(100 + (uint64_t)_i, _i % 4 * 30);
   static const int stop[] = {0, 2, 10, 60};
@@ -188,10 +188,9 @@ START_TEST(random_rays)
   ck_assert_uint_gt(b.stops, 50);
   if (b.compositor_stalls.percent) ck_assert_uint_eq(b.deepest, DEPTH);
 }
-END_TEST
 
 /* Sixteen rays wait inside; a stop of an old one is not that of the ray that is coming in. */
-START_TEST(a_late_stop_hits_nobody)
+TEST(a_late_stop_hits_nobody)
 {
   bench b(200);
   for (int round = 0; round < 200 * unit_length(); round++) {
@@ -213,11 +212,10 @@ START_TEST(a_late_stop_hits_nobody)
     b.drain();
   }
 }
-END_TEST
 
 /* A ray that begins inside another, or that lacks its beginning; an empty one inside another, without a beginning or
  * without an end: one error, then nothing until a clear. */
-START_TEST(wrong_order)
+TEST(wrong_order)
 {
   static const struct {
     bool inside, first, last, empty;
@@ -249,11 +247,10 @@ START_TEST(wrong_order)
       b.drain();
     }
 }
-END_TEST
 
 /* Not enabled: nothing new comes in, what is inside goes on, and a ray that has ended early is swallowed all the same.
  */
-START_TEST(disabled)
+TEST(disabled)
 {
   bench b(400);
   sample s = draw_sample(b.draw);
@@ -274,10 +271,9 @@ START_TEST(disabled)
   b.drain();
   ck_assert_uint_eq(b.dropped, 1);
 }
-END_TEST
 
 /* Clear or reset in any cycle: nothing of the old rays is left. */
-START_TEST(reset_in_mid_ray)
+TEST(reset_in_mid_ray)
 {
   bench b(500, 40);
   b.stop_percent = 20;
@@ -297,18 +293,5 @@ START_TEST(reset_in_mid_ray)
     ck_assert(b.u.top.idle_o);
   }
 }
-END_TEST
 
-int main()
-{
-  Suite *suite = suite_create("rtl_ray_track");
-  TCase *cases = tcase_create("units");
-  tcase_set_timeout(cases, 120);
-  tcase_add_loop_test(cases, random_rays, 0, 8);
-  tcase_add_test(cases, a_late_stop_hits_nobody);
-  tcase_add_test(cases, wrong_order);
-  tcase_add_test(cases, disabled);
-  tcase_add_test(cases, reset_in_mid_ray);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -8,11 +8,6 @@ enum { TRIALS = 4000, ACCESSES = 6000, PLACES = 512 /* of the window */ };
 
 /* ---- both ---- */
 
-static uint32_t get(sf_dut *dut, uint32_t offset)
-{
-  return dut->bus.read(dut->bus.context, offset);
-}
-
 static void wait_for_walk(sf_dut *dut)
 {
   for (const uint64_t begin = dut->cycle; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS;)
@@ -25,7 +20,10 @@ static void write_both(sf_dut *dut, registers *r, uint32_t offset, uint32_t valu
   const uint32_t error = model_write(r, offset, value);
   ck_assert_msg(!dut->bus_hung && dut->bus_response == (error ? 2 : 0), "%x to %x: response %d, expected errors %x",
                 value, offset, dut->bus_response, error);
+  dut->in.s_valid = !r->running; /* nothing is accepted that comes before a start */
   sf_dut_tick(dut);
+  ck_assert(r->running || !dut->out.s_ready);
+  dut->in.s_valid = false;
   ck_assert_msg(dut->out.irq == ((r->irq_pending & r->irq_enable) != 0), "%x to %x: interrupt %d", value, offset,
                 dut->out.irq);
 }
@@ -126,11 +124,11 @@ static void start_both(sf_dut *dut, registers *r)
   write_both(dut, r, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
 }
 
-START_TEST(the_check_at_start)
+LOOP_TEST(the_check_at_start, 3)
 {
   random_source s = {80 + (uint64_t)_i, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   int legal = 0;
   for (int i = 0; i < TRIALS; i++) {
     if (i % 25 == 0) {
@@ -152,9 +150,7 @@ START_TEST(the_check_at_start)
   }
   ck_assert_int_gt(legal, TRIALS / 20);
   ck_assert_int_lt(legal, TRIALS - TRIALS / 20);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- any access in any state ---- */
 
@@ -186,11 +182,11 @@ static void random_weight(sf_dut *dut, registers *r, random_source *s)
   read_both(dut, r, SF_CSR_WEIGHT_ADDRESS);
 }
 
-START_TEST(any_access_in_any_state)
+LOOP_TEST(any_access_in_any_state, 2)
 {
   random_source s = {90 + (uint64_t)_i, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   program_legal(dut, &r, &s);
   int running = 0;
   for (int i = 0; i < ACCESSES; i++) {
@@ -211,19 +207,17 @@ START_TEST(any_access_in_any_state)
     }
   }
   ck_assert_int_gt(running, ACCESSES / 10);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the bus ---- */
 
 /* The next access is offered while the response of the last one waits: as many responses as accesses, in their order.
  */
-START_TEST(accesses_without_a_pause)
+TEST(accesses_without_a_pause)
 {
   random_source s = {100, 0};
   registers r;
-  sf_dut *dut = begin(&r, s.seed);
+  OWNED(sf_dut) *dut = begin(&r, s.seed);
   sf_pins_in *in = &dut->in;
   dut->each_cycle = NULL;
   int written = 0, answered = 0, asked = 0, given = 0;
@@ -247,17 +241,15 @@ START_TEST(accesses_without_a_pause)
   }
   ck_assert_int_gt(written, 200);
   ck_assert_int_gt(asked, 200);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* Refused weights, other registers, what a master shows while it is not valid: none of it reaches the weights. */
-START_TEST(weights_are_written_by_nothing_else)
+LOOP_TEST(weights_are_written_by_nothing_else, SF_LAYERS)
 {
   typical(105);
   fx_counts counts = {0};
   const uint32_t first_word = (uint32_t)_i << SF_CSR_WEIGHT_ADDRESS_LAYER_LSB;
-  sf_dut *dut = open_dut(&net_of_test.net, 105, 20);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 105, 20);
   const sf_bus *bus = &dut->bus;
   sf_driver_reset(bus);
   bus->write(bus->context, SF_CSR_WEIGHT_ADDRESS, first_word);
@@ -274,17 +266,15 @@ START_TEST(weights_are_written_by_nothing_else)
   bus->write(bus->context, SF_CSR_ERROR, SF_CSR_ERROR_BUSY);
   bus->write(bus->context, SF_CSR_IRQ_PENDING, SF_CSR_IRQ_ENABLE_ERROR);
   run_batch(dut, &net_of_test.net, 4, &counts, 105);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A row is written into its own place alone: the last one first, and all of them twice. */
-START_TEST(rows_in_any_order)
+TEST(rows_in_any_order)
 {
   typical(106);
   const sf_net_blob blob = sf_dut_blob(&net_of_test.net);
   fx_counts counts = {0};
-  sf_dut *dut = open_dut(&net_of_test.net, 106, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 106, 0);
   const sf_bus *bus = &dut->bus;
   sf_driver_reset(bus);
   for (int order = 0; order < 2; order++)
@@ -301,9 +291,7 @@ START_TEST(rows_in_any_order)
       }
   ck_assert_int_eq(sf_driver_start(bus), SF_DRIVER_OK);
   run_batch(dut, &net_of_test.net, 4, &counts, 106);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* ---- the window of counters ---- */
 
@@ -326,7 +314,7 @@ static void commands(sf_dut *dut, uint32_t first, uint32_t second)
 }
 
 /* All counters are 0 after power-on, without a command; later the places that no counter has read 0. */
-START_TEST(places_of_the_window)
+LOOP_TEST(places_of_the_window, 2)
 {
   registers r;
   fx_counts counts = {0};
@@ -342,7 +330,6 @@ START_TEST(places_of_the_window)
     if (!has_meaning(i / 64, i / 8 % 8, i % 8)) ck_assert_uint_eq(get(dut, place_offset(i)), 0);
   sf_dut_close(dut);
 }
-END_TEST
 
 static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
 {
@@ -350,13 +337,13 @@ static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
 }
 
 /* Neither events nor a clear change it, and a command that comes during a walk is one of its own. */
-START_TEST(the_window_is_of_the_last_snapshot)
+TEST(the_window_is_of_the_last_snapshot)
 {
   static uint32_t words[2][2 * PLACES];
   static const uint32_t zero[2 * PLACES];
   fx_counts counts = {0};
   typical(113);
-  sf_dut *dut = open_dut(&net_of_test.net, 113, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 113, 0);
   for (int during = 0; during < 2; during++) {
     run_batch(dut, &net_of_test.net, 3, &counts, 113);
     same_counts(dut, &counts, 113);
@@ -376,16 +363,14 @@ START_TEST(the_window_is_of_the_last_snapshot)
   commands(dut, SF_CSR_CTRL_CLEAR, SF_CSR_CTRL_SNAPSHOT);
   read_window(dut, words[1]);
   ck_assert_mem_eq(words[1], zero, sizeof zero);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A counter that was read and waits to be taken stays what it is, whatever a walk writes meanwhile. */
-START_TEST(a_response_that_waits)
+TEST(a_response_that_waits)
 {
   fx_counts counts = {0};
   typical(111);
-  sf_dut *dut = open_dut(&net_of_test.net, 111, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 111, 0);
   run_batch(dut, &net_of_test.net, 5, &counts, 111);
   commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
   const int place = 7 * 8; /* samples */
@@ -406,17 +391,15 @@ START_TEST(a_response_that_waits)
   dut->in.rready = true;
   sf_dut_tick(dut);
   ck_assert_uint_eq(get(dut, place_offset(place)), 0);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* A packet that has begun: the block is active and D1 waits, but a walk is no time of the engine's. */
-START_TEST(a_walk_takes_no_time)
+TEST(a_walk_takes_no_time)
 {
   sf_driver_counters c[2];
   uint64_t at[2];
   typical(112);
-  sf_dut *dut = open_dut(&net_of_test.net, 112, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 112, 0);
   ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING);
   uint64_t words[SF_PACKET_MAX];
   sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
@@ -432,15 +415,13 @@ START_TEST(a_walk_takes_no_time)
   ck_assert_uint_eq(c[1].cycles - c[0].cycles, at[1] - at[0] - PLACES);
   ck_assert_uint_eq(c[1].stall_in - c[0].stall_in, at[1] - at[0] - PLACES - 1); /* nor is the cycle that waits for it */
   ck_assert_uint_eq(c[1].busy + c[1].stall_out, 0);
-  sf_dut_close(dut);
 }
-END_TEST
 
 /* Samples that come while a walk clears or copies wait for its end, and are counted whole. */
-START_TEST(samples_that_come_during_a_walk)
+TEST(samples_that_come_during_a_walk)
 {
   typical(114);
-  sf_dut *dut = open_dut(&net_of_test.net, 114, 0);
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 114, 0);
   for (int round = 0; round < 6; round++) {
     fx_counts counts = {0};
     run_batch(dut, &net_of_test.net, 3, &counts, 114);
@@ -453,25 +434,4 @@ START_TEST(samples_that_come_during_a_walk)
     same_counts(dut, &counts, 114);
     commands(dut, SF_CSR_CTRL_CLEAR, 0);
   }
-  sf_dut_close(dut);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_registers");
-  TCase *c = tcase_create("registers");
-  tcase_set_timeout(c, 60);
-  tcase_add_loop_test(c, the_check_at_start, 0, 3);
-  tcase_add_loop_test(c, any_access_in_any_state, 0, 2);
-  tcase_add_test(c, accesses_without_a_pause);
-  tcase_add_loop_test(c, weights_are_written_by_nothing_else, 0, SF_LAYERS);
-  tcase_add_test(c, rows_in_any_order);
-  tcase_add_loop_test(c, places_of_the_window, 0, 2);
-  tcase_add_test(c, the_window_is_of_the_last_snapshot);
-  tcase_add_test(c, a_response_that_waits);
-  tcase_add_test(c, a_walk_takes_no_time);
-  tcase_add_test(c, samples_that_come_during_a_walk);
-  suite_add_tcase(suite, c);
-  return ck_run(suite);
 }

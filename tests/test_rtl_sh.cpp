@@ -59,7 +59,7 @@ static void one(sh_unit &u, random_draw &draw, int stall, const int16_t v[3], in
 }
 
 /* Each axis over its whole range, the others at ends and in between: all of their values in long runs. */
-START_TEST(axes_over_their_range)
+LOOP_TEST(axes_over_their_range, 3)
 {
   static const int16_t other[] = {0, 1, -1, 16384, -16384, 11585, -9459, INT16_MIN, INT16_MAX};
   const int count = (int)(sizeof other / sizeof *other), stride = unit_length() > 1 ? 1 : 61;
@@ -72,9 +72,8 @@ START_TEST(axes_over_their_range)
     one(u, draw, 0, v, 16, value & 1 ? 11 : (int)draw(0, 11));
   }
 }
-END_TEST
 
-START_TEST(corners)
+TEST(corners)
 {
   static const int16_t axis[] = {0, 1, -1, 16384, -16384, 16385, -16385, INT16_MIN, INT16_MAX, 8192};
   sh_unit u(2);
@@ -85,9 +84,8 @@ START_TEST(corners)
     one(u, draw, 0, v, 16, 11);
   }
 }
-END_TEST
 
-START_TEST(random_directions_and_stalls)
+LOOP_TEST(random_directions_and_stalls, 3)
 {
   sh_unit u((uint64_t)_i + 3);
   random_draw draw((uint64_t)_i + 3);
@@ -98,10 +96,9 @@ START_TEST(random_directions_and_stalls)
     one(u, draw, 1 + 30 * _i, v, (int)draw(1, 16), (int)draw(0, 11));
   }
 }
-END_TEST
 
 /* Clear and reset at every cycle of a direction leave nothing of it behind. */
-START_TEST(reset_on_the_way)
+TEST(reset_on_the_way)
 {
   const int16_t full[3] = {-16384, 16384, 16384}, v[3] = {9459, -9459, 9459};
   sh_unit u(9);
@@ -123,17 +120,5 @@ START_TEST(reset_on_the_way)
     one(u, draw, 0, v, 16, 10);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("rtl_sh");
-  TCase *cases = tcase_create("sh");
-  tcase_set_timeout(cases, 600);
-  tcase_add_loop_test(cases, axes_over_their_range, 0, 3);
-  tcase_add_test(cases, corners);
-  tcase_add_loop_test(cases, random_directions_and_stalls, 0, 3);
-  tcase_add_test(cases, reset_on_the_way);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
-}
+int ck_timeout = 600;

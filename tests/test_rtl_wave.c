@@ -23,34 +23,32 @@ static long write_wave(const char *path)
   return (long)info.st_size;
 }
 
-START_TEST(a_whole_file_passes_and_stays_as_it_is)
+TEST(a_whole_file_passes_and_stays_as_it_is)
 {
   struct stat info;
   const char *path = in("a.fst");
   const long size = write_wave(path);
   ck_assert_int_gt(size, 1000);
-  ck_good(sf_wave_file_check(path));
+  ck_ok(sf_wave_file_check(path));
   ck_assert_int_eq(stat(path, &info), 0);
   ck_assert_int_eq(info.st_size, size);
 }
-END_TEST
 
-START_TEST(a_file_that_is_cut_short_is_named)
+TEST(a_file_that_is_cut_short_is_named)
 {
   const char *path = in("a.fst");
   const long size = write_wave(path);
   const long cuts[] = {0, 5, 9, 300, size / 2, size - 1};
-  for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
+  for (int i = 0; i < COUNT(cuts); i++) {
     write_wave(path);
     ck_assert_int_eq(truncate(path, cuts[i]), 0);
     ck_bad(sf_wave_file_check(path), SF_E_IO, path, "cut short");
   }
   ck_bad(sf_wave_file_check(in("absent.fst")), SF_E_IO, "absent.fst", "No such file");
 }
-END_TEST
 
 /* Its length is written last: a section that was never finished has none. */
-START_TEST(a_section_without_a_length_is_named)
+TEST(a_section_without_a_length_is_named)
 {
   static const char none[8];
   const char *path = in("a.fst");
@@ -62,10 +60,9 @@ START_TEST(a_section_without_a_length_is_named)
   ck_assert_int_eq(fclose(file), 0);
   ck_bad(sf_wave_file_check(path), SF_E_IO, path, "cut short");
 }
-END_TEST
 
 /* No room, here for larger files: the system's words. */
-START_TEST(the_cause_is_the_systems)
+TEST(the_cause_is_the_systems)
 {
   const char *path = in("a.fst");
   const long size = write_wave(path);
@@ -75,17 +72,5 @@ START_TEST(the_cause_is_the_systems)
   ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &room), 0);
   ck_bad(sf_wave_file_check(path), SF_E_IO, path, "File too large");
 }
-END_TEST
 
-int main(void)
-{
-  Suite *s = suite_create("rtl_wave");
-  TCase *c = tcase_create("files");
-  tcase_add_checked_fixture(c, make_folder, remove_folder);
-  tcase_add_test(c, a_whole_file_passes_and_stays_as_it_is);
-  tcase_add_test(c, a_file_that_is_cut_short_is_named);
-  tcase_add_test(c, a_section_without_a_length_is_named);
-  tcase_add_test(c, the_cause_is_the_systems);
-  suite_add_tcase(s, c);
-  return ck_run(s);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

@@ -4,8 +4,6 @@
 #include "folder_fixture.h"
 #include "scene/scene.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static void put_text(const char *path, const char *text)
 {
@@ -17,7 +15,7 @@ static void put_text(const char *path, const char *text)
 
 /* ---- cameras ---- */
 
-START_TEST(rays_follow_opengl_axes)
+TEST(rays_follow_opengl_axes)
 {
   sf_camera c = {
       .width = 4, .height = 2, .fx = 2, .fy = 4, .cx = 2, .cy = 1, .to_world = {1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7}};
@@ -36,10 +34,9 @@ START_TEST(rays_follow_opengl_axes)
   sf_camera_ray(&c, 2, 1, o, d);
   ck_assert(d[0] == -1 && d[1] == 0 && d[2] == 0);
 }
-END_TEST
 
 /* A spacing of the points that the function counts is a pixel of the picture at the middle of the box. */
-START_TEST(points_of_the_box_lie_a_pixel_apart)
+TEST(points_of_the_box_lie_a_pixel_apart)
 {
   sf_view view[2] = {{.camera = {.width = 100,
                                  .height = 100,
@@ -62,7 +59,6 @@ START_TEST(points_of_the_box_lie_a_pixel_apart)
   for (int v = 0; v < 2; v++) view[v].camera.fx = 80, view[v].camera.fy = 80, view[v].camera.to_world[11] = 0;
   ck_assert_int_eq(sf_dataset_pixels(&data, 64), 1 << 20); /* cameras in the middle */
 }
-END_TEST
 
 /* ---- the loader ---- */
 
@@ -74,26 +70,27 @@ static void put_picture(const char *name, int width, int height, int value)
 {
   sf_image image = {width, height, malloc((size_t)width * (size_t)height * 8)};
   for (int i = 0; i < width * height * 4; i++) image.rgba[i] = (uint16_t)(value * 257);
-  ck_good(sf_image_save_png(&image, in(name)));
+  ck_ok(sf_image_save_png(&image, in(name)));
   sf_image_free(&image);
 }
 
-static sf_status load(sf_dataset *data, const char *json, const char *split, sf_dataset_options options)
+static sf_dataset d; /* what a test looks at */
+
+static sf_status load(const char *json, const char *split, sf_dataset_options options)
 {
+  sf_dataset_free(&d);
   if (json) put_text(in("transforms_train.json"), json);
   if (json) put_text(in("transforms_test.json"), json);
-  return sf_dataset_load(data, folder, split, &options);
+  return sf_dataset_load(&d, folder, split, &options);
 }
 
-START_TEST(loads_camera_angle)
+TEST(loads_camera_angle)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
-  ck_good(load(&d,
-               "{" ANGLE
-               "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
-               "train", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load("{" ANGLE
+             "\"frames\":[" FRAME("./a", UNIT) "," FRAME("b.png", "[[2,0,0,1],[0,0,-3,2],[0,1,0,3],[0,0,0,1]]") "]}",
+             "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[0].name, "a");
   ck_assert_str_eq(d.view[1].name, "b.png");
@@ -108,80 +105,66 @@ START_TEST(loads_camera_angle)
   sf_dataset_free(&d);
   ck_assert_ptr_null(d.view);
 }
-END_TEST
 
-START_TEST(options_and_stated_intrinsics)
+TEST(options_and_stated_intrinsics)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("b.png", 8, 4, 9);
   /* stated for 16 x 8, the pictures are half of that; frame b has a field of view of its own */
-  ck_good(load(&d,
-               "{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
-                   "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
-               "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
+  ck_ok(load("{\"fl_x\":10,\"fl_y\":12,\"cx\":7,\"cy\":5,\"w\":16,\"h\":8,\"k1\":0,\"frames\":[" FRAME(
+                 "a", UNIT) ",{\"fl_x\":20,\"file_path\":\"b\",\"transform_matrix\":" UNIT "}]}",
+             "test", (sf_dataset_options){.downscale = 2, .scale = 0.5f}));
   ck_assert(d.view[0].camera.fx == 2.5f && d.view[0].camera.fy == 3.0f);
   ck_assert(d.view[0].camera.cx == 1.75f && d.view[0].camera.cy == 1.25f);
   ck_assert(d.view[1].camera.fx == 5.0f && d.view[1].camera.fy == 5.0f);
   ck_assert(d.view[0].camera.width == 4 && d.view[0].image.height == 2);
   ck_assert(d.view[0].camera.to_world[3] == 0.5f && d.view[0].camera.to_world[11] == 1.5f);
-  sf_dataset_free(&d);
-  ck_good(load(&d, NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
+  ck_ok(load(NULL, "test", (sf_dataset_options){.downscale = 1, .limit = 1}));
   ck_assert_int_eq(d.count, 1);
-  sf_dataset_free(&d);
-  ck_good(load(&d,
-               "{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
-                   "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
-                              "}]}",
-               "test", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load("{\"fl_x\":10,\"fl_y\":12,\"frames\":[" FRAME(
+                 "a", UNIT) ",{\"camera_angle_x\":1.5707963267948966,\"file_path\":\"b\",\"transform_matrix\":" UNIT
+                            "}]}",
+             "test", (sf_dataset_options){.downscale = 1}));
   ck_assert(d.view[0].camera.fx == 10.0f && d.view[0].camera.fy == 12.0f);
   ck_assert_float_eq_tol(d.view[1].camera.fx, 4, 1e-6f);
   ck_assert_float_eq_tol(d.view[1].camera.fy, 4, 1e-6f);
-  sf_dataset_free(&d);
 }
-END_TEST
 
 /* Of 16 x 8 where the pictures have half of that: by one number as by both. */
-START_TEST(one_side_states_the_size)
+TEST(one_side_states_the_size)
 {
   static const char *const size[] = {"\"w\":16,\"h\":8", "\"w\":16", "\"h\":8"};
   float scale = 0;
   put_picture("a.png", 8, 4, 0);
   for (int i = 0; i < 3; i++) {
     char json[400];
-    sf_dataset d;
     snprintf(json, sizeof json,
              "{%s,\"fl_x\":20,\"cx\":6,\"cy\":5,\"frames\":[" FRAME("a", UNIT) "," FRAME(
                  "a", "[[0,0,1,4],[0,1,0,2],[-1,0,0,0],[0,0,0,1]]") "]}",
              size[i]);
     put_text(in("transforms.json"), json);
-    ck_good(sf_dataset_load(&d, folder, "train", NULL));
+    ck_ok(sf_dataset_load(&d, folder, "train", NULL));
     const sf_camera *c = &d.view[0].camera;
     ck_assert(c->fx == 10 && c->fy == 10 && c->cx == 3 && c->cy == 2.5f);
     if (!i) scale = d.scale;
     ck_assert_float_gt(scale, 1); /* of what is seen: 0.2 of the distance */
     ck_assert(d.scale == scale);
-    sf_dataset_free(&d);
   }
 }
-END_TEST
 
 /* Of the picture that states no size, whatever the first states. */
-START_TEST(a_later_size_is_looked_at)
+TEST(a_later_size_is_looked_at)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 0);
   put_text(in("transforms_train.json"),
            "{" ANGLE "\"frames\":[{\"file_path\":\"a\",\"w\":8,\"h\":4,\"cx\":4,\"transform_matrix\":" UNIT
            "},{\"file_path\":\"a\",\"cx\":200,\"transform_matrix\":" UNIT "}]}");
-  ck_good(sf_dataset_load(&d, folder, "train", NULL));
+  ck_ok(sf_dataset_load(&d, folder, "train", NULL));
   ck_assert_int_eq(d.warnings, 1);
   ck_assert_ptr_nonnull(strstr(d.warning[0], "not look at the scene"));
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(every_eighth_view_is_held_out)
+TEST(every_eighth_view_is_held_out)
 {
   char json[4000] = "{" ANGLE "\"frames\":[";
   for (int i = 0; i < 17; i++) {
@@ -192,22 +175,18 @@ START_TEST(every_eighth_view_is_held_out)
   }
   strcat(json, "]}");
   for (int named = 0; named < 2; named++) {
-    sf_dataset train, test;
+    OWNED(sf_dataset) train, test;
     put_text(in(named ? "transforms_train.json" : "transforms.json"), json);
-    ck_good(sf_dataset_load(&train, folder, "train", NULL));
-    ck_good(sf_dataset_load(&test, folder, "test", NULL));
+    ck_ok(sf_dataset_load(&train, folder, "train", NULL));
+    ck_ok(sf_dataset_load(&test, folder, "test", NULL));
     ck_assert_int_eq(train.count, 14);
     ck_assert_int_eq(test.count, 3);
     for (int i = 0; i < 14; i++) ck_assert_uint_eq(train.view[i].image.rgba[0] / 257, (unsigned)(i + 1 + i / 7));
     for (int i = 0; i < 3; i++) ck_assert_uint_eq(test.view[i].image.rgba[0] / 257, (unsigned)(8 * i));
-    sf_dataset_free(&train);
-    sf_dataset_free(&test);
   }
   put_text(in("transforms_train.json"), "{" ANGLE "\"frames\":[" FRAME("v1", UNIT) "]}");
-  sf_dataset d;
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_RANGE, "zero views", "transforms_train.json");
 }
-END_TEST
 
 #define ONE(matrix) "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("a", matrix) "]}"
 static const struct {
@@ -256,104 +235,72 @@ static const struct {
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,1,3],[0,0,1,1]]"), SF_E_RANGE, "frame 1 (a)", "[3][2]"},
 };
 
-START_TEST(a_split_is_walked_view_by_view)
+TEST(a_split_is_walked_view_by_view)
 {
-  sf_dataset d;
   put_picture("a.png", 4, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "," FRAME("./a", UNIT) "," FRAME("a.png", UNIT) "]}";
   static const char *const name[] = {"a", "a", "a.png"};
   for (int i = 0; i < 3; i++) {
-    ck_good(load(&d, json, "test", (sf_dataset_options){.first = i, .limit = 1}));
+    ck_ok(load(json, "test", (sf_dataset_options){.first = i, .limit = 1}));
     ck_assert_int_eq(d.count, 1);
     ck_assert_int_eq(d.total, 3);
     ck_assert_str_eq(d.view[0].name, name[i]);
-    sf_dataset_free(&d);
   }
-  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 1}));
+  ck_ok(load(json, "test", (sf_dataset_options){.first = 1}));
   ck_assert_int_eq(d.count, 2);
   ck_assert_str_eq(d.view[1].name, "a.png");
-  sf_dataset_free(&d);
-  ck_good(load(&d, json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
+  ck_ok(load(json, "test", (sf_dataset_options){.first = 3, .limit = 1}));
   ck_assert_int_eq(d.count, 0);
   ck_assert_int_eq(d.total, 3);
-  sf_dataset_free(&d);
-  ck_bad(load(&d, json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
+  ck_bad(load(json, "test", (sf_dataset_options){.first = -1}), SF_E_RANGE, "-1", folder);
 }
-END_TEST
 
-START_TEST(faults_name_file_and_frame)
+LOOP_TEST(faults_name_file_and_frame, COUNT(bad_scenes))
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 4, 7);
   char *data;
   size_t n;
-  ck_good(sf_read_file(in("a.png"), 10000, &data, &n));
+  ck_ok(sf_read_file(in("a.png"), 10000, &data, &n));
   data[n - 20] = 0;
   FILE *f = fopen(in("cut.png"), "wb");
   fwrite(data, 1, n - 20, f);
   fclose(f);
   free(data);
-  ck_bad(load(&d, bad_scenes[_i].json, "train", (sf_dataset_options){.downscale = 1}), bad_scenes[_i].code,
+  ck_bad(load(bad_scenes[_i].json, "train", (sf_dataset_options){.downscale = 1}), bad_scenes[_i].code,
          bad_scenes[_i].where, bad_scenes[_i].problem);
   ck_assert_ptr_null(d.view);
 }
-END_TEST
 
-START_TEST(own_sizes_may_differ)
+TEST(own_sizes_may_differ)
 {
-  sf_dataset d;
   put_picture("a.png", 8, 4, 7);
   put_picture("other.png", 4, 6, 7);
-  ck_good(load(&d,
-               "{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
-               "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
-               "train", (sf_dataset_options){.downscale = 1}));
+  ck_ok(load("{\"frames\":[{\"w\":8,\"h\":4,\"fl_x\":8,\"file_path\":\"a\",\"transform_matrix\":" UNIT "},"
+             "{\"w\":4,\"h\":6,\"fl_x\":8,\"file_path\":\"other\",\"transform_matrix\":" UNIT "}]}",
+             "train", (sf_dataset_options){.downscale = 1}));
   ck_assert_int_eq(d.view[1].camera.height, 6);
-  sf_dataset_free(&d);
 }
-END_TEST
 
-START_TEST(folder_and_option_faults)
+TEST(folder_and_option_faults)
 {
-  sf_dataset d;
   ck_bad(sf_dataset_load(&d, in("none"), "train", NULL), SF_E_IO, "/none", "no such folder");
   ck_bad(sf_dataset_load(&d, folder, "train", NULL), SF_E_IO, folder, "transforms.json");
   ck_bad(sf_dataset_load(&d, folder, "val", NULL), SF_E_IO, "transforms_val.json", "no such file");
   put_picture("a.png", 8, 4, 7);
   const char *json = "{" ANGLE "\"frames\":[" FRAME("a", UNIT) "]}";
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 5}), SF_E_RANGE, "a.png", "8 x 4");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 5}), SF_E_RANGE, "a.png", "8 x 4");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = NAN}), SF_E_RANGE, "scale", "");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = -1}), SF_E_RANGE, "scale", "");
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = 1, .scale = 3e38f}), SF_E_RANGE, "frame 0 (a)",
          "not finite");
-  ck_bad(load(&d, json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
-}
-END_TEST
-#define COUNT(a) ((int)(sizeof(a) / sizeof *(a)))
-
-static Suite *suite(void)
-{
-  Suite *s = suite_create("scene");
-  TCase *t = tcase_create("all");
-  tcase_add_checked_fixture(t, make_folder, remove_folder);
-  tcase_set_timeout(t, 60);
-  tcase_add_test(t, rays_follow_opengl_axes);
-  tcase_add_test(t, points_of_the_box_lie_a_pixel_apart);
-  tcase_add_test(t, loads_camera_angle);
-  tcase_add_test(t, options_and_stated_intrinsics);
-  tcase_add_test(t, one_side_states_the_size);
-  tcase_add_test(t, a_later_size_is_looked_at);
-  tcase_add_test(t, every_eighth_view_is_held_out);
-  tcase_add_loop_test(t, faults_name_file_and_frame, 0, COUNT(bad_scenes));
-  tcase_add_test(t, a_split_is_walked_view_by_view);
-  tcase_add_test(t, own_sizes_may_differ);
-  tcase_add_test(t, folder_and_option_faults);
-  suite_add_tcase(s, t);
-  return s;
+  ck_bad(load(json, "train", (sf_dataset_options){.downscale = -1}), SF_E_RANGE, "downscale", "");
 }
 
-int main(void)
+static void tear_down(void)
 {
-  return ck_run(suite());
+  sf_dataset_free(&d);
+  remove_folder();
 }
+
+ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

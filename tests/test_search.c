@@ -2,18 +2,9 @@
 #include "ck_run.h"
 #include "train_fixture.h"
 
-static sf_dataset data;
-
 static void set_up(void)
 {
-  make_scene(12);
-  data = load("train");
-}
-
-static void tear_down(void)
-{
-  sf_dataset_free(&data);
-  remove_folder();
+  open_scene(12);
 }
 
 /* A trainer at the start of stage II, with the net's firing of a fifth. */
@@ -72,7 +63,7 @@ static sf_train_options search_run(void)
   return o;
 }
 
-START_TEST(worth_equals_price)
+TEST(worth_equals_price)
 {
   static const double betas[] = {1e-7, 5e-7, 1e-6};
   const curve c = {1e-3, 1e-4, 0, 0};
@@ -80,7 +71,7 @@ START_TEST(worth_equals_price)
   for (int i = 0; i < 3; i++) {
     sf_train_options o = search_run();
     o.beta = betas[i];
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, ratio);
     const sf_search_report r = sf_search_now(t);
     const double expected = log(worth / (o.beta * ratio));
@@ -91,10 +82,8 @@ START_TEST(worth_equals_price)
     ck_assert_double_lt(r.worth_error, 1e-6 * worth);
     ck_assert_int_eq(r.state, SF_SEARCH_BALANCED);
     ck_assert_double_lt(t->search.at, 0.6); /* it rests, so it stops */
-    sf_trainer_free(t);
   }
 }
-END_TEST
 
 /* t* of noisy curves that fall, at a search rate. */
 static double found(const curve *c, double rate, sf_search_report *report)
@@ -109,7 +98,7 @@ static double found(const curve *c, double rate, sf_search_report *report)
   return t_star;
 }
 
-START_TEST(the_rate_decides_nothing)
+TEST(the_rate_decides_nothing)
 {
   const curve c = {1e-3, 1e-4, 0.1, 0.4};
   sf_search_report slow, normal, fast;
@@ -121,17 +110,15 @@ START_TEST(the_rate_decides_nothing)
   ck_assert_double_lt(normal.worth_error, 0.05 * normal.worth);
   ck_assert_double_gt(fast.worth_error, 1.2 * normal.worth_error);
 }
-END_TEST
 
-START_TEST(the_scene_decides)
+TEST(the_scene_decides)
 {
   const curve easy = {1e-4, 1e-5, 0, 0}, hard = {1e-3, 1e-4, 0, 0};
   sf_search_report r;
   ck_assert_double_eq_tol(found(&hard, 1, &r) - found(&easy, 1, &r), log(10), 1e-4);
 }
-END_TEST
 
-START_TEST(ends_of_the_range)
+TEST(ends_of_the_range)
 {
   const curve c = {1e-3, 1e-4, 0.9, 0}, rising = {1e-3, -1e-4, 0, 0}, nothing = {0}; /* however noisy it is */
   static const struct {
@@ -141,32 +128,28 @@ START_TEST(ends_of_the_range)
   for (int i = 0; i < 3; i++) {
     sf_train_options o = search_run();
     o.beta = cases[i].beta;
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, 1);
     ck_assert_int_eq(t->model.t_r, cases[i].steps);
     ck_assert_double_eq(t->model.t_star, cases[i].steps);
     ck_assert_int_eq(t->search.state, SF_SEARCH_AT_END);
-    sf_trainer_free(t);
   }
   const curve *const worthless[] = {&rising, &nothing};
   for (int i = 0; i < 2; i++) {
     sf_train_options o = search_run();
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, worthless[i], 40, 1);
     ck_assert_int_eq(t->model.t_r, 1);
     ck_assert(isfinite(sf_search_now(t).worth) && isfinite(sf_search_now(t).worth_error));
-    sf_trainer_free(t);
   }
   sf_train_options o = search_run();
   o.no_penalty = true;
-  sf_trainer *t = searcher(&o);
+  OWNED(trainer) t = searcher(&o);
   measure(t, &c, 40, 1);
   ck_assert_int_eq(t->model.t_r, T);
-  sf_trainer_free(t);
 }
-END_TEST
 
-START_TEST(what_was_not_reached_is_said)
+TEST(what_was_not_reached_is_said)
 {
   const curve falling = {1e-3, 1e-4, 0, 2}, still = {1e-3, 1e-4, 0, 0};
   sf_train_options o = search_run();
@@ -185,10 +168,9 @@ START_TEST(what_was_not_reached_is_said)
   ck_assert_int_eq(t->model.t_r, T - 1);
   sf_trainer_free(t);
 }
-END_TEST
 
 /* The price of a step is what the ledger says: the step at which it is no longer worth it. */
-START_TEST(energy_as_price)
+TEST(energy_as_price)
 {
   const curve c = {1e-3, 1e-4, 0, 0};
   sf_train_options o = search_run();
@@ -215,22 +197,20 @@ START_TEST(energy_as_price)
     sf_trainer_free(t);
   }
 }
-END_TEST
 
-START_TEST(targets_find_beta)
+TEST(targets_find_beta)
 {
   const curve c = {1e-3, 1e-3, 0, 0}; /* 2e-3, 1.5e-3, 1.25e-3, ... */
   sf_train_options o = search_run();
   const double best = error_of(&c, T, 0, 0);
   for (int k = 1; k < T; k++) {
     o.target_loss = 10 * log10(error_of(&c, k, 0, 0) / best) + 1e-6;
-    sf_trainer *t = searcher(&o);
+    OWNED(trainer) t = searcher(&o);
     measure(t, &c, 40, 1);
     ck_assert_int_eq(t->model.t_r, k);
     const sf_search_report r = sf_search_now(t);
     ck_assert_double_eq_tol(r.beta, slope_of(&c) / exp(k), 1e-6 * r.beta);
     ck_assert_double_eq_tol(r.price, r.worth, 1e-9);
-    sf_trainer_free(t);
   }
   o.target_loss = 0;
   for (int k = 1; k < 3; k++) { /* more would cost more than the twin of so few neurons */
@@ -247,13 +227,11 @@ START_TEST(targets_find_beta)
     o.target_saving = 0;
   }
   o.target_saving = 99.9;
-  sf_trainer *t = searcher(&o);
+  OWNED(trainer) t = searcher(&o);
   measure(t, &c, 40, 1);
   ck_assert_int_eq(t->model.t_r, 1);
   ck_assert_int_eq(t->search.state, SF_SEARCH_MISSED);
-  sf_trainer_free(t);
 }
-END_TEST
 
 /* The whole trainer on the textured scene with so much contrast, at a search rate: where t* ends. */
 static double learned(float contrast, double rate)
@@ -279,7 +257,7 @@ static double learned(float contrast, double rate)
 }
 
 /* A search whose rate decides finds the same steps for both, and other ones at another rate. */
-START_TEST(two_scenes_at_one_beta)
+TEST(two_scenes_at_one_beta)
 {
   for (int i = 0; i < 2; i++) {
     const double rate = i ? 3 : 1.0 / 3, easy = learned(0.4f, rate), hard = learned(1, rate);
@@ -287,22 +265,6 @@ START_TEST(two_scenes_at_one_beta)
     ck_assert_msg(lround(hard) > lround(easy), "rate %g: t* = %g and %g", rate, easy, hard);
   }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("search");
-  TCase *tc = tcase_create("search");
-  tcase_set_timeout(tc, 240);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, worth_equals_price);
-  tcase_add_test(tc, the_rate_decides_nothing);
-  tcase_add_test(tc, the_scene_decides);
-  tcase_add_test(tc, ends_of_the_range);
-  tcase_add_test(tc, what_was_not_reached_is_said);
-  tcase_add_test(tc, energy_as_price);
-  tcase_add_test(tc, targets_find_beta);
-  tcase_add_test(tc, two_scenes_at_one_beta);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 240;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

@@ -4,12 +4,10 @@
 #include "base/memory.h"
 #include "render/view.h"
 #include "snn/plif.h"
-#include <stdlib.h>
-#include <string.h>
 
 /* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its
  * fixed point). */
-START_TEST(plif_by_hand)
+TEST(plif_by_hand)
 {
   ck_assert_float_eq(sf_plif_charge(SF_HYBRID, 0, 0.5f, 0, 0.8f), 0.8f);
   ck_assert_float_eq_tol(sf_plif_charge(SF_HYBRID, 1, 0.5f, 0.8f, 0.8f), 0.8f, 1e-7f);
@@ -17,10 +15,9 @@ START_TEST(plif_by_hand)
   ck_assert_float_eq_tol(sf_plif_charge(SF_DECAY, 1, 0.25f, 0.4f, 0.8f), 0.5f, 1e-7f);
   ck_assert_float_eq_tol(sf_plif_charge(SF_NODECAY, 1, 0.25f, 0.4f, 0.8f), 1.1f, 1e-7f);
 }
-END_TEST
 
 /* The weights that a hybrid prefix gives its steps sum to 1 for every tau > 1: integrating ones gives one. */
-START_TEST(hybrid_prefix_weights_sum_to_one)
+TEST(hybrid_prefix_weights_sum_to_one)
 {
   for (int i = 0; i < 1000; i++) {
     float k = 1e-4f + 0.9998f * sf_random_float(1, 2, i), o = 0;
@@ -30,7 +27,6 @@ START_TEST(hybrid_prefix_weights_sum_to_one)
     }
   }
 }
-END_TEST
 
 typedef struct rig {
   sf_model model;
@@ -106,7 +102,7 @@ static void compare_forward(const char *isa, sf_net_kind kind, sf_input_mode mod
 {
   const sf_kernels *kernels = sf_kernels_select(isa);
   if (!kernels) return;
-  rig r = rig_make(kind, mode, 48, 8);
+  OWNED(rig) r = rig_make(kind, mode, 48, 8);
   const int steps = r.model.config.steps;
   drive(&r, gain);
   if (!strcmp(isa, "avx512bf16") || !strcmp(isa, "amx")) { /* weights and inputs that it holds exactly */
@@ -133,10 +129,9 @@ static void compare_forward(const char *isa, sf_net_kind kind, sf_input_mode mod
     ck_assert_msg(wrong <= allowed, "%s: %d of 64 samples differ", kernels->name, wrong);
   }
   if (kind == SF_NET_SNN) ck_assert_msg((firing(&r, 1) < 0.2) == (gain < 1), "firing %g", firing(&r, 1));
-  rig_free(&r);
 }
 
-START_TEST(kernels_equal_oracle)
+TEST(kernels_equal_oracle)
 {
   static const char *const isa[] = {"portable", "avx2", "avx512"};
   for (int i = 0; i < 3; i++) {
@@ -145,11 +140,10 @@ START_TEST(kernels_equal_oracle)
     compare_forward(isa[i], SF_NET_ANN, SF_HYBRID, 1, 1e-4f, 2);
   }
 }
-END_TEST
 
 /* Weights that bfloat16 holds and spikes are exact; h(t), rounded to 2^-9, moves a membrane across the threshold in
  * more samples. The twin rounds every activation: 2^-9 through four layers. */
-START_TEST(bfloat16_kernels_near_oracle)
+TEST(bfloat16_kernels_near_oracle)
 {
   static const char *const isa[] = {"avx512bf16", "amx"};
   for (int i = 0; i < 2; i++) {
@@ -158,26 +152,23 @@ START_TEST(bfloat16_kernels_near_oracle)
     compare_forward(isa[i], SF_NET_ANN, SF_HYBRID, 1, 3e-2f, 0);
   }
 }
-END_TEST
 
-START_TEST(density_equals_forward)
+TEST(density_equals_forward)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
-  rig r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 5);
+  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 5);
   float sigma[SF_BLOCK];
   rig_forward(&r, kernels, 1);
   memcpy(sigma, r.block->sigma[4], sizeof sigma);
   kernels->density(r.net, r.block, 5, r.scratch);
   ck_assert_mem_eq(sigma, r.block->sigma[4], sizeof sigma);
-  rig_free(&r);
 }
-END_TEST
 
 /* However few steps are kept for backward: the same prefixes, and those steps' membranes. */
-START_TEST(kept_steps_are_the_same)
+TEST(kept_steps_are_the_same)
 {
   const sf_kernels *kernels = sf_kernels_training();
-  rig whole = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8), r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8);
+  OWNED(rig) whole = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8), r = rig_make(SF_NET_SNN, SF_HYBRID, 48, 8);
   rig_forward(&whole, kernels, 1);
   for (int keep = 0; keep < 8; keep++) {
     rig_prepare(&r, kernels);
@@ -191,10 +182,7 @@ START_TEST(kept_steps_are_the_same)
       ck_assert_mem_eq(r.block->s3[t], whole.block->s3[t], 48 * sizeof(uint64_t));
     }
   }
-  rig_free(&whole);
-  rig_free(&r);
 }
-END_TEST
 
 static void random_output_gradient(float *dsigma, float *dcolour)
 {
@@ -249,11 +237,11 @@ static double slope(rig *r, sf_param_id id, size_t i, float h, const float *ds, 
 
 /* The ReLU twin is smooth but for its kinks: every weight's gradient against central differences. Bound: float
  * cancellation in the difference, 2 % + 0.05 of a sum over 64 samples of size ~100. */
-START_TEST(ann_gradient_is_the_slope)
+TEST(ann_gradient_is_the_slope)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
-  rig r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
+  OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
   kernels->backward(r.net, r.block, 1, ds, dc, df, r.grad, r.scratch);
@@ -263,17 +251,15 @@ START_TEST(ann_gradient_is_the_slope)
       ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.3, "%s[%zu]: slope %g, gradient %g",
                     r.model.param[id].name, i, expected, actual);
     }
-  rig_free(&r);
 }
-END_TEST
 
 /* The integrators' leaks and the last layers are smooth in a spiking net too: no spike depends on them. */
-START_TEST(snn_smooth_parts_match_the_slope)
+TEST(snn_smooth_parts_match_the_slope)
 {
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
   for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    rig r = rig_make(SF_NET_SNN, mode, mode == SF_DECAY ? SF_LANES : 32, 6);
+    OWNED(rig) r = rig_make(SF_NET_SNN, mode, mode == SF_DECAY ? SF_LANES : 32, 6);
     random_output_gradient(ds, dc);
     rig_forward(&r, kernels, 1);
     kernels->backward(r.net, r.block, 6, ds, dc, df, r.grad, r.scratch);
@@ -285,10 +271,8 @@ START_TEST(snn_smooth_parts_match_the_slope)
       double expected = slope(&r, SF_P_LEAK, leak, 1e-2f, ds, dc);
       ck_assert_double_eq_tol(grad_at(&r, SF_P_LEAK, leak), expected, 0.01 * fabs(expected) + 0.1);
     }
-    rig_free(&r);
   }
 }
-END_TEST
 
 /* One neuron chain by the equations of the surrogate, written out independently for C3 <- C2 <- constant drive:
  * g_h = (g_s - theta g_v) sd + g_v, g_x = k g_h, g_v(t-1) = (1-k) g_h, g_w = (1-k) sum g_h (h - v). Checks dW4 and the
@@ -298,7 +282,7 @@ static void check_plif_backward(float gain)
   const sf_kernels *kernels = sf_kernels_select(NULL);
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
   enum { T = 6, H = 16 };
-  rig r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
+  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
   drive(&r, gain);
   random_output_gradient(ds, dc);
   rig_forward(&r, kernels, 1);
@@ -330,45 +314,26 @@ static void check_plif_backward(float gain)
       ck_assert_double_eq_tol(grad_at(&r, SF_P_C2, n * H + m), dw4[n][m],
                               1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
   ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
-  rig_free(&r);
 }
 
-START_TEST(plif_backward_by_the_equations)
+TEST(plif_backward_by_the_equations)
 {
   for (int g = 0; g < 2; g++) check_plif_backward(gains[g]);
 }
-END_TEST
 
-/* Largest difference relative to the largest magnitude of the reference. */
-static float distance(const float *a, const float *reference, int n)
+/* The same spikes, only the backward pass is compared. */
+TEST(backward_of_every_isa_agrees)
 {
-  float worst = 0, scale = 0;
-  for (int i = 0; i < n; i++) {
-    worst = fmaxf(worst, fabsf(a[i] - reference[i]));
-    scale = fmaxf(scale, fabsf(reference[i]));
-  }
-  return worst / scale;
-}
-
-/* The same spikes, only the backward pass is compared. Bounds: contracted multiply-adds over 8 steps and 64 lanes; the
- * surrogate's 2^-14 with AVX-512; with
- * bfloat16 operands, a relative rounding of 2^-9 in each of the three products in a row, of random sign. */
-START_TEST(backward_of_every_isa_agrees)
-{
-  static const struct {
-    const char *isa;
-    float bound;
-  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}, {"amx", 1e-2f}};
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[2][32 * SF_BLOCK];
   const sf_kernels *portable = sf_kernels_select("portable");
   random_output_gradient(ds, dc);
   for (int kind = SF_NET_SNN; kind <= SF_NET_ANN; kind++)
     for (int i = 0; i < 4; i++) {
-      const sf_kernels *kernels = sf_kernels_select(other[i].isa);
+      const sf_kernels *kernels = sf_kernels_select(backward_bounds[i].isa);
       const int steps = kind == SF_NET_ANN ? 1 : 8;
       if (!kernels) continue;
       for (int g = 0; g < 2; g++) {
-        rig a = rig_make(kind, SF_HYBRID, 48, steps), b = rig_make(kind, SF_HYBRID, 48, steps);
+        OWNED(rig) a = rig_make(kind, SF_HYBRID, 48, steps), b = rig_make(kind, SF_HYBRID, 48, steps);
         drive(&a, gains[g]);
         drive(&b, gains[g]);
         rig_forward(&a, portable, 1);
@@ -376,7 +341,7 @@ START_TEST(backward_of_every_isa_agrees)
         portable->backward(a.net, a.block, steps, ds, dc, df[0], a.grad, a.scratch);
         rig_prepare(&b, kernels);
         kernels->backward(b.net, b.block, steps, ds, dc, df[1], b.grad, b.scratch);
-        const float bound = other[i].bound;
+        const float bound = backward_bounds[i].bound;
         ck_assert_float_le(distance(b.grad->w1, a.grad->w1, 48 * 16), bound);
         ck_assert_float_le(distance(b.grad->w2, a.grad->w2, 16 * 48), bound);
         for (int r = 0; r < 48; r++) b.grad->w3[32 * r + 16] = a.grad->w3[32 * r + 16]; /* scratch column */
@@ -387,18 +352,15 @@ START_TEST(backward_of_every_isa_agrees)
         ck_assert_float_le(distance(b.grad->w5, a.grad->w5, 3 * 48), bound);
         if (kind == SF_NET_SNN) ck_assert_float_le(distance(b.grad->leak, a.grad->leak, SF_LAYERS), bound);
         ck_assert_float_le(distance(df[1], df[0], 8 * SF_BLOCK), bound);
-        rig_free(&a);
-        rig_free(&b);
       }
     }
 }
-END_TEST
 
 static const char *const every_isa[] = {"portable", "avx2", "avx512", "avx512bf16", "amx"};
 
 /* The first bias-corrected step is lr sign(g); of the second m = 0.045 - 0.05 = -0.005, / 0.19, and v = 0.002475 +
  * 0.0025 = 0.004975, / 0.0199: + 0.1 * 0.0263158 / 0.5. */
-START_TEST(adam_by_hand)
+TEST(adam_by_hand)
 {
   for (int isa = 0; isa < 5; isa++) {
     const sf_kernels *kernels = sf_kernels_select(every_isa[isa]);
@@ -416,11 +378,10 @@ START_TEST(adam_by_hand)
     ck_assert_float_eq_tol(value, 0.9f + 0.1f * 0.0263158f / 0.5f, 1e-6f);
   }
 }
-END_TEST
 
 /* Sixteen at a time with a rest: of 83 every third has a gradient, but none of 16..47; the others keep value and
  * moments. Bound: the rounding of ten operations. With l1 all but zeros have one. */
-START_TEST(adam_of_every_isa_skips_what_has_no_gradient)
+TEST(adam_of_every_isa_skips_what_has_no_gradient)
 {
   enum { N = 83 };
   for (int isa = 0; isa < 5; isa++)
@@ -449,26 +410,4 @@ START_TEST(adam_of_every_isa_skips_what_has_no_gradient)
         ck_assert_double_eq_tol(x[3][i], wanted[2][i], 1e-6);
       }
     }
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("snn");
-  TCase *tc = tcase_create("snn");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, plif_by_hand);
-  tcase_add_test(tc, hybrid_prefix_weights_sum_to_one);
-  tcase_add_test(tc, kernels_equal_oracle);
-  tcase_add_test(tc, bfloat16_kernels_near_oracle);
-  tcase_add_test(tc, density_equals_forward);
-  tcase_add_test(tc, kept_steps_are_the_same);
-  tcase_add_test(tc, ann_gradient_is_the_slope);
-  tcase_add_test(tc, snn_smooth_parts_match_the_slope);
-  tcase_add_test(tc, plif_backward_by_the_equations);
-  tcase_add_test(tc, backward_of_every_isa_agrees);
-  tcase_add_test(tc, adam_by_hand);
-  tcase_add_test(tc, adam_of_every_isa_skips_what_has_no_gradient);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
 }

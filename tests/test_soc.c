@@ -6,10 +6,9 @@
 #include "firmware/sf_tile.h"
 #include "sim/soc/job.h"
 #include "energy/energy.h"
-#include "tests/ck_ok.h"
+#include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include <libgen.h>
-#include <stdio.h>
 #include <unistd.h>
 
 enum { OUTPUT_MAX = 1 << 14, WIDTH = 3, HEIGHT = 2, PIXELS = WIDTH * HEIGHT, INSTRUCTIONS = 300000000 };
@@ -75,7 +74,7 @@ static sf_status run_words(const uint32_t *word, int n, bool stopped, uint32_t *
   return status;
 }
 
-START_TEST(bad_programs_end_with_a_reason)
+LOOP_TEST(bad_programs_end_with_a_reason, 17)
 {
   const struct {
     uint32_t word[4];
@@ -100,16 +99,12 @@ START_TEST(bad_programs_end_with_a_reason)
       {{lui(T0, SF_SOC_STREAM), store(WORD, T1, T0, SF_STREAM_CONTROL), JUMP_BACK}, "sent into a full FIFO"},
       {{lui(T0, SF_SOC_UART), store(WORD, T0, T0, 0), JUMP_BACK}, "endless output"},
   };
+  ck_assert_int_eq(COUNT(bad), 17);
   uint32_t exit_status;
-  const sf_status status = run_words(bad[_i].word, 4, false, &exit_status);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_msg(strstr(status.message, bad[_i].reason), "program %d: '%s' is not in '%s'", _i, bad[_i].reason,
-                status.message);
+  ck_bad(run_words(bad[_i].word, 4, false, &exit_status), SF_E_UNSUPPORTED, bad[_i].reason, "");
 }
-END_TEST
-enum { BAD_PROGRAMS = 17 };
 
-START_TEST(a_program_ends_with_its_status)
+TEST(a_program_ends_with_its_status)
 {
   const uint32_t word[] = {lui(T0, SF_SOC_POWER), addi(T1, 0, 7), store(WORD, T1, T0, 0), JUMP_HERE};
   const uint32_t endless[] = {JUMP_HERE};
@@ -118,7 +113,6 @@ START_TEST(a_program_ends_with_its_status)
   ck_assert_uint_eq(exit_status, 7);
   ck_assert_int_eq(run_words(endless, 1, true, &exit_status).code, SF_E_STOPPED);
 }
-END_TEST
 
 /* ---- the firmware ---- */
 
@@ -170,6 +164,19 @@ static void free_scenario(scenario *s)
   free(s);
 }
 
+static scenario *s; /* what a test runs; of fixture_ingp if it asks for no other */
+static uint32_t exit_status = 99;
+
+static void set_up(void)
+{
+  s = make_scenario(&fixture_ingp);
+}
+
+static void tear_down(void)
+{
+  free_scenario(s);
+}
+
 /* BUILD/tests/test_soc -> BUILD/firmware/sf_firmware.elf */
 static void firmware_path(char path[4096])
 {
@@ -182,7 +189,7 @@ static uint32_t bus_read(void *context, uint32_t offset);
 static void bus_write(void *context, uint32_t offset, uint32_t value);
 
 /* The firmware on the system; bus_read and bus_write below stand between. */
-static sf_status run_firmware(scenario *s, uint32_t *exit_status)
+static sf_status run_firmware(void)
 {
   char path[4096];
   sf_soc *soc;
@@ -193,7 +200,7 @@ static sf_status run_firmware(scenario *s, uint32_t *exit_status)
   ck_ok(sf_soc_open(&soc, s->dut, &(sf_soc_options){.instructions = INSTRUCTIONS, .uart = keep_output}));
   ck_ok(sf_soc_load_elf(soc, path));
   memcpy(sf_soc_memory(soc, SF_SOC_IMAGE, s->image_size), s->image, s->image_size);
-  const sf_status status = sf_soc_run(soc, exit_status);
+  const sf_status status = sf_soc_run(soc, &exit_status);
   memcpy(s->firmware, sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE) + sf_soc_image_pixels_at(s->image),
          sizeof s->firmware);
   sf_soc_close(soc);
@@ -228,108 +235,86 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
 
 static void same_as_core(const fixture_sizes *sizes, int stall)
 {
-  scenario *s = make_scenario(sizes);
-  uint32_t exit_status = 99;
+  free_scenario(s);
+  s = make_scenario(sizes);
   s->stall = stall;
-  const sf_status status = run_firmware(s, &exit_status);
+  const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
   ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
-  free_scenario(s);
 }
 
-START_TEST(the_firmware_renders_what_the_core_renders)
+LOOP_TEST(the_firmware_renders_what_the_core_renders, 3)
 {
   same_as_core(&fixture_ingp, 30 * _i);
 }
-END_TEST
 
-START_TEST(so_it_does_for_other_nets)
+LOOP_TEST(so_it_does_for_other_nets, 3)
 {
   static const fixture_sizes sizes[] = {{5, 77, 16, 3, 33, 128, 1, FX_DECAY, {0}},
                                         {1, 1, 2, 0, 5, 1, 8, FX_NODECAY, {0}},
                                         {3, 128, 1, 16, 128, 40, 3, FX_HYBRID, {0}}};
   same_as_core(&sizes[_i], 20);
 }
-END_TEST
 
 /* Each ends with exit status 1 and the line, or is seen by the comparison. */
-START_TEST(a_wrong_device_is_reported)
-{
-  static const struct {
-    bus_fault fault;
-    uint32_t offset, to;
-    const char *line;
-  } bad[] = {
-      {READ_AS, SF_CSR_ID, 0, "error: probe: no accelerator at this address\n"},
-      {READ_AS, SF_CSR_VERSION, 9 << 16, "error: probe: interface version differs from the driver's\n"},
-      {READ_AS, SF_CSR_CONFIG, 0x08410780, "error: probe: built with other sizes than the driver\n"},
-      {READ_AS, SF_CSR_STATUS, SF_CSR_STATUS_COUNTERS, "error: clear counters: no answer\n"},
-      {REPLACE, SF_CSR_STEPS, 9, "error: load: programming refused: STEPS: "},
-      {REPLACE, SF_CSR_WEIGHT_DATA, 0x80, "error: load: programming refused: WEIGHT: "},
-      {REDIRECT, SF_CSR_MODE, SF_CSR_STATUS, "error: load: programming refused: ADDRESS: "},
-      {LOSE, SF_CSR_CTRL, 0, "error: render: no answer\n"},
-      {REPLACE, SF_CSR_D1_N_IN, 4, "error: render: no answer: PACKET: "},
-  };
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
-  fault = bad[_i].fault, s->offset = bad[_i].offset, s->to = bad[_i].to;
-  const sf_status status = run_firmware(s, &exit_status);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
-  ck_assert_uint_eq(exit_status, 1);
-  ck_assert_msg(strstr(output, bad[_i].line), "'%s' is not in '%s'", bad[_i].line, output);
-  free_scenario(s);
-}
-END_TEST
-enum { WRONG_DEVICES = 9 };
+static const struct {
+  bus_fault fault;
+  uint32_t offset, to;
+  const char *line;
+} wrong_device[] = {
+    {READ_AS, SF_CSR_ID, 0, "error: probe: no accelerator at this address\n"},
+    {READ_AS, SF_CSR_VERSION, 9 << 16, "error: probe: interface version differs from the driver's\n"},
+    {READ_AS, SF_CSR_CONFIG, 0x08410780, "error: probe: built with other sizes than the driver\n"},
+    {READ_AS, SF_CSR_STATUS, SF_CSR_STATUS_COUNTERS, "error: clear counters: no answer\n"},
+    {REPLACE, SF_CSR_STEPS, 9, "error: load: programming refused: STEPS: "},
+    {REPLACE, SF_CSR_WEIGHT_DATA, 0x80, "error: load: programming refused: WEIGHT: "},
+    {REDIRECT, SF_CSR_MODE, SF_CSR_STATUS, "error: load: programming refused: ADDRESS: "},
+    {LOSE, SF_CSR_CTRL, 0, "error: render: no answer\n"},
+    {REPLACE, SF_CSR_D1_N_IN, 4, "error: render: no answer: PACKET: "},
+};
 
-START_TEST(a_driver_that_writes_wrongly_is_seen)
+LOOP_TEST(a_wrong_device_is_reported, COUNT(wrong_device))
 {
-  static const struct {
-    bus_fault fault;
-    uint32_t offset, to;
-  } bad[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
-             {REPLACE, SF_CSR_D1_THETA, 30000},
-             {REPLACE, SF_CSR_STEPS, 3},
-             {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
-             {LOSE, SF_CSR_EXP_BIAS, 0}};
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
-  fault = bad[_i].fault, s->offset = bad[_i].offset, s->to = bad[_i].to;
-  const sf_status status = run_firmware(s, &exit_status);
+  fault = wrong_device[_i].fault, s->offset = wrong_device[_i].offset, s->to = wrong_device[_i].to;
+  ck_ok(run_firmware());
+  ck_assert_uint_eq(exit_status, 1);
+  ck_assert_msg(strstr(output, wrong_device[_i].line), "'%s' is not in '%s'", wrong_device[_i].line, output);
+}
+
+static const struct {
+  bus_fault fault;
+  uint32_t offset, to;
+} wrong_write[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
+                   {REPLACE, SF_CSR_D1_THETA, 30000},
+                   {REPLACE, SF_CSR_STEPS, 3},
+                   {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
+                   {LOSE, SF_CSR_EXP_BIAS, 0}};
+
+LOOP_TEST(a_driver_that_writes_wrongly_is_seen, COUNT(wrong_write))
+{
+  fault = wrong_write[_i].fault, s->offset = wrong_write[_i].offset, s->to = wrong_write[_i].to;
+  const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_assert_int_eq(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH).code, SF_E_DIFFERENCE);
   ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
-  free_scenario(s);
 }
-END_TEST
-enum { WRONG_WRITES = 5 };
 
-START_TEST(a_bus_without_an_answer_ends_the_run)
+TEST(a_bus_without_an_answer_ends_the_run)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status;
   fault = DEAF, s->offset = SF_CSR_CONFIG;
-  const sf_status status = run_firmware(s, &exit_status);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_msg(strstr(status.message, "read of register 0x008 not answered"), "%s", status.message);
-  free_scenario(s);
+  ck_bad(run_firmware(), SF_E_UNSUPPORTED, "read of register 0x008 not answered", "");
 }
-END_TEST
 
 /* ---- images ---- */
 
-START_TEST(a_damaged_image_is_refused)
+TEST(a_damaged_image_is_refused)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status = 99;
   s->image[s->image_size - 1] ^= 1;
-  ck_ok(run_firmware(s, &exit_status));
+  ck_ok(run_firmware());
   ck_assert_uint_eq(exit_status, 1);
   ck_assert_str_eq(output, "spikefield firmware\nerror: image: damaged: wrong checksum\n");
-  free_scenario(s);
 }
-END_TEST
 
 static const char *open_edited(const scenario *s, uint8_t *block, size_t space, int word, uint32_t value)
 {
@@ -343,10 +328,9 @@ static const char *open_edited(const scenario *s, uint8_t *block, size_t space, 
 
 /* Every word of the header takes extreme values, with a right checksum: the parts stay inside or the image is refused.
  * The block ends where memory ends, so that the sanitizer sees every step beyond. */
-START_TEST(an_image_stays_inside_its_memory)
+TEST(an_image_stays_inside_its_memory)
 {
   static const uint32_t extreme[] = {0, 1, 7, 8, 255, 256, 257, 0x7fffffff, 0x80000000, 0xfffffff8, 0xffffffff};
-  scenario *s = make_scenario(&fixture_ingp);
   const size_t space = sf_tile_pixels_at((uint32_t)s->image_size) + sizeof s->core;
   uint8_t *block = malloc(space);
   ck_assert_ptr_null(open_edited(s, block, space, -1, 0));
@@ -363,21 +347,17 @@ START_TEST(an_image_stays_inside_its_memory)
       ck_assert_msg((why == NULL) == less, "word %d = %u: %s", word, extreme[i], why ? why : "taken");
     }
   free(block);
-  free_scenario(s);
 }
-END_TEST
 
-START_TEST(checksums_are_zlibs)
+TEST(checksums_are_zlibs)
 {
   ck_assert_uint_eq(sf_crc32(0, "123456789", 9), 0xcbf43926);
   ck_assert_uint_eq(sf_crc32(sf_crc32(0, "1234", 4), "56789", 5), 0xcbf43926);
 }
-END_TEST
 
-START_TEST(a_scene_that_the_firmware_cannot_march_is_refused)
+TEST(a_scene_that_the_firmware_cannot_march_is_refused)
 {
   static fx_steps growing;
-  scenario *s = make_scenario(&fixture_ingp);
   fx_scene scene = s->scene;
   uint8_t *image = NULL;
   size_t size;
@@ -388,36 +368,27 @@ START_TEST(a_scene_that_the_firmware_cannot_march_is_refused)
   const sf_status cascades = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
   ck_assert_str_eq(cascades.message, "the firmware marches through one box with equal steps; the scene has 3 cascades");
   ck_assert_ptr_null(image);
-  free_scenario(s);
 }
-END_TEST
 
-START_TEST(a_tile_that_is_too_large_is_refused)
+TEST(a_tile_that_is_too_large_is_refused)
 {
-  scenario *s = make_scenario(&fixture_ingp);
   uint8_t *image = NULL;
   size_t size;
   ck_assert_int_eq(sf_soc_image_make(&s->scene, s->ray, 4096, 4096, &image, &size).code, SF_E_RANGE);
   ck_assert_ptr_null(image);
-  free_scenario(s);
 }
-END_TEST
 
 /* ---- comparison ---- */
 
 static void expect_audit(const scenario *s, const char *text, const char *reason)
 {
-  const sf_status status = sf_soc_compare_audit(&s->counts, s->core, PIXELS, text);
-  ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-  ck_assert_msg(strstr(status.message, reason), "'%s' is not in '%s'", reason, status.message);
+  ck_bad(sf_soc_compare_audit(&s->counts, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
 }
 
-START_TEST(the_comparison_sees_every_change)
+TEST(the_comparison_sees_every_change)
 {
-  scenario *s = make_scenario(&fixture_ingp);
-  uint32_t exit_status;
   char text[OUTPUT_MAX];
-  ck_ok(run_firmware(s, &exit_status));
+  ck_ok(run_firmware());
   for (char *at = strstr(output, "audit "); at; at = strstr(at + 1, "audit "))
     for (char *c = at; *c != '\n'; c++) {
       const char was = *c;
@@ -432,19 +403,15 @@ START_TEST(the_comparison_sees_every_change)
   for (size_t i = 0; i < sizeof s->core[0].colour + 20; i += 4) {
     uint8_t *byte = (uint8_t *)&s->firmware[4] + i;
     *byte ^= 1;
-    const sf_status status = sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH);
-    ck_assert_int_eq(status.code, SF_E_DIFFERENCE);
-    ck_assert_msg(strstr(status.message, "pixel 1,1 of the tile"), "%s", status.message);
+    ck_bad(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH), SF_E_DIFFERENCE, "pixel 1,1 of the tile", "");
     *byte ^= 1;
   }
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
-  free_scenario(s);
 }
-END_TEST
 
 /* ---- programs from files ---- */
 
-START_TEST(a_bad_program_file_is_refused)
+TEST(a_bad_program_file_is_refused)
 {
   char folder[] = "/tmp/sf_test_soc.XXXXXX", path[64], firmware[4096], whole[1 << 16];
   ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -468,7 +435,7 @@ START_TEST(a_bad_program_file_is_refused)
              {size, 31, 0x7f, "segments is cut short"},
              {60, 0, 0x7f, "segments is cut short"},
              {5000, 0, 0x7f, "is cut short"}};
-  sf_dut *dut;
+  OWNED(sf_dut) *dut = NULL;
   sf_soc *soc;
   ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));
@@ -485,36 +452,8 @@ START_TEST(a_bad_program_file_is_refused)
   }
   ck_assert_int_eq(sf_soc_load_elf(soc, "/nowhere/a.elf").code, SF_E_IO);
   sf_soc_close(soc);
-  sf_dut_close(dut);
   unlink(path);
   rmdir(folder);
 }
-END_TEST
 
-static Suite *suite(void)
-{
-  Suite *s = suite_create("soc");
-  TCase *t = tcase_create("system");
-  tcase_set_timeout(t, 60);
-  tcase_add_loop_test(t, bad_programs_end_with_a_reason, 0, BAD_PROGRAMS);
-  tcase_add_test(t, a_program_ends_with_its_status);
-  tcase_add_loop_test(t, the_firmware_renders_what_the_core_renders, 0, 3);
-  tcase_add_loop_test(t, so_it_does_for_other_nets, 0, 3);
-  tcase_add_loop_test(t, a_wrong_device_is_reported, 0, WRONG_DEVICES);
-  tcase_add_loop_test(t, a_driver_that_writes_wrongly_is_seen, 0, WRONG_WRITES);
-  tcase_add_test(t, a_bus_without_an_answer_ends_the_run);
-  tcase_add_test(t, a_damaged_image_is_refused);
-  tcase_add_test(t, an_image_stays_inside_its_memory);
-  tcase_add_test(t, checksums_are_zlibs);
-  tcase_add_test(t, a_scene_that_the_firmware_cannot_march_is_refused);
-  tcase_add_test(t, a_tile_that_is_too_large_is_refused);
-  tcase_add_test(t, the_comparison_sees_every_change);
-  tcase_add_test(t, a_bad_program_file_is_refused);
-  suite_add_tcase(s, t);
-  return s;
-}
-
-int main(void)
-{
-  return ck_run(suite());
-}
+ck_options ck_program = {.set_up = set_up, .tear_down = tear_down};

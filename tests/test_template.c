@@ -1,8 +1,6 @@
 /* The filler of the report's template: what it writes, and that it names file, line and cause of what is wrong. */
 #include "ck_run.h"
 #include "base/template.h"
-#include <stdlib.h>
-#include <string.h>
 
 static const char tree[] =
     "{\"n\":3,\"zero\":0,\"none\":null,\"no\":false,\"text\":\"a<b & c\",\"key\":\"two\",\"big\":[],"
@@ -81,7 +79,7 @@ static const struct {
     {"a\n  {{#if n}}\nb\n{{else}}\nc\n  {{/if}}\nd {{#if n}}e{{/if}}\nf\n", "a\nb\nd e\nf\n"},
 };
 
-START_TEST(texts)
+LOOP_TEST(texts, COUNT(good))
 {
   sf_status status;
   char *result = filled(good[_i].text, &status);
@@ -89,7 +87,6 @@ START_TEST(texts)
   ck_assert_str_eq(result, good[_i].result);
   free(result);
 }
-END_TEST
 
 static const struct {
   const char *text, *line, *cause;
@@ -122,7 +119,7 @@ static const struct {
     {"{{#equal n \"3}}{{/equal}}", "line 1", "malformed"},
 };
 
-START_TEST(faults)
+LOOP_TEST(faults, COUNT(bad))
 {
   sf_status status;
   free(filled(bad[_i].text, &status));
@@ -130,10 +127,9 @@ START_TEST(faults)
   ck_assert_msg(strstr(status.message, bad[_i].line) && strstr(status.message, bad[_i].cause), "%s: %s", bad[_i].text,
                 status.message);
 }
-END_TEST
 
 /* What a function reports is what is reported; too deep and too long is said. */
-START_TEST(limits)
+TEST(limits)
 {
   sf_status status;
   char text[2048] = "";
@@ -153,9 +149,8 @@ START_TEST(limits)
   free(filled(text, &status));
   ck_assert_int_eq(status.code, SF_E_FORMAT);
 }
-END_TEST
 
-START_TEST(values_by_path)
+TEST(values_by_path)
 {
   static const char *const nowhere[] = {"nosuch",        "list[2]", "list.name",    "n.m",
                                         "list[0].v[-1]", "[0]x",    "list[0]..name"};
@@ -168,20 +163,6 @@ START_TEST(values_by_path)
   ck_assert_double_eq(sf_json_real(sf_json_at(json, "digits")), 18446744073709551616.0);
   ck_assert_uint_eq(sf_json_u64(sf_json_at(json, "text")), 0);
   ck_assert(sf_json_real(sf_json_at(json, "none")) != sf_json_real(sf_json_at(json, "none")));
-  for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++)
-    ck_assert_msg(!sf_json_at(json, nowhere[i]), "there is a %s", nowhere[i]);
+  for (int i = 0; i < COUNT(nowhere); i++) ck_assert_msg(!sf_json_at(json, nowhere[i]), "there is a %s", nowhere[i]);
   cJSON_Delete(json);
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("template");
-  TCase *c = tcase_create("template");
-  tcase_add_loop_test(c, texts, 0, (int)(sizeof good / sizeof *good));
-  tcase_add_loop_test(c, faults, 0, (int)(sizeof bad / sizeof *bad));
-  tcase_add_test(c, limits);
-  tcase_add_test(c, values_by_path);
-  suite_add_tcase(suite, c);
-  return ck_run(suite);
 }

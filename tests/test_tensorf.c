@@ -4,22 +4,19 @@
 #include "folder_fixture.h"
 #include "snn/plif.h"
 #include <math.h>
-#include <string.h>
 
-START_TEST(inputs_are_tensorf)
+TEST(inputs_are_tensorf)
 {
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27, .feature_freqs = 2, .view_freqs = 2}), 150);
   ck_assert_int_eq(sf_tensorf_inputs(&(sf_tensorf){.features = 27}), 30);
-  sf_model m = test_tensorf(SF_NET_SNN, 1, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 1, 16, 2);
   ck_assert_int_eq(sf_tensorf_products(&m.config.tensorf), 72);
   ck_assert_int_eq(m.param[SF_P_APP_PLANE + 1].shape[2], 12);
-  sf_model_free(&m);
 }
-END_TEST
 
 /* 2 097 156 voxels in the Blender box are 128^3, 27 000 000 are 300^3; in a box twice as wide along x the voxels stay
  * cubes. */
-START_TEST(resolution_is_tensorf)
+TEST(resolution_is_tensorf)
 {
   static float cube[2][3] = {{-1, -1, -1}, {1, 1, 1}}, wide[2][3] = {{-2, -1, -1}, {2, 1, 1}};
   int32_t r[3];
@@ -30,12 +27,11 @@ START_TEST(resolution_is_tensorf)
   sf_tensorf_resolution(wide, 2e6, r);
   ck_assert(r[0] == 200 && r[1] == 100 && r[2] == 100);
 }
-END_TEST
 
 /* Plane and line that are linear in their coordinates: interpolation gives the products exactly, corners included. */
-START_TEST(interpolation_is_linear)
+TEST(interpolation_is_linear)
 {
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_tensorf *f = &m.config.tensorf;
   for (int mode = 0; mode < 3; mode++) {
     const sf_param *plane = &m.param[SF_P_DENSITY_PLANE + mode], *line = &m.param[SF_P_DENSITY_LINE + mode];
@@ -55,11 +51,9 @@ START_TEST(interpolation_is_linear)
         (at[0] + 10 * at[1]) * (1 + at[2]) + (at[0] + 10 * at[2]) * (1 + at[1]) + (at[1] + 10 * at[2]) * (1 + at[0]);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&m, x), expected, 1e-5f * (1 + expected));
   }
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(activations_by_hand)
+TEST(activations_by_hand)
 {
   sf_tensorf f = {.activation = SF_SOFTPLUS, .shift = -10, .distance_scale = 25};
   ck_assert_float_eq_tol(sf_tensorf_sigma(&f, 10), 25 * 0.6931472f, 1e-5f);
@@ -69,10 +63,9 @@ START_TEST(activations_by_hand)
   ck_assert_float_eq(sf_tensorf_sigma(&f, -1), 0);
   ck_assert_float_eq(sf_tensorf_sigma(&f, 2), 50);
 }
-END_TEST
 
 /* TensoRF's order: features, direction, sines and cosines of the features, of the direction; frequencies fastest. */
-START_TEST(encoding_order)
+TEST(encoding_order)
 {
   const sf_tensorf f = {.features = 2, .feature_freqs = 2, .view_freqs = 1};
   const float features[2] = {0.3f, -0.7f}, direction[3] = {0.6f, 0, -0.8f};
@@ -84,12 +77,11 @@ START_TEST(encoding_order)
   sf_tensorf_encode(&f, features, direction, in);
   for (int i = 0; i < 19; i++) ck_assert_float_eq_tol(in[i], (float)expected[i], 1e-6f);
 }
-END_TEST
 
 /* The twin is a plain network with biases. */
-START_TEST(twin_is_a_network_with_biases)
+TEST(twin_is_a_network_with_biases)
 {
-  sf_model m = test_tensorf(SF_NET_ANN, 1, 16, 1);
+  OWNED(sf_model) m = test_tensorf(SF_NET_ANN, 1, 16, 1);
   float in[30], colour[3];
   double h[2][16];
   for (int i = 0; i < 30; i++) in[i] = test_random(77 + i);
@@ -110,20 +102,17 @@ START_TEST(twin_is_a_network_with_biases)
     for (int i = 0; i < 16; i++) j += w3[o * 16 + i] * h[1][i];
     ck_assert_float_eq_tol(colour[o], (float)(1 / (1 + exp(-j))), 1e-6f);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
-START_TEST(save_and_load)
+TEST(save_and_load)
 {
-  make_folder();
   for (int ndc = 0; ndc < 2; ndc++) {
     sf_model m = test_tensorf(SF_NET_SNN, ndc, 32, 4), back;
     m.t_star = 2.25f;
     m.t_r = 2;
     m.occupancy[3] = 0x5a;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
-    ck_good(sf_model_load(&back, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_load(&back, in("model.safetensors")));
     ck_assert_mem_eq(&m.config, &back.config, sizeof m.config);
     ck_assert_uint_eq(m.size, back.size);
     ck_assert_mem_eq(m.value, back.value, m.size * sizeof *m.value);
@@ -131,32 +120,17 @@ START_TEST(save_and_load)
     ck_assert(back.t_r == 2 && back.t_star == 2.25f);
     sf_model_free(&back);
     m.config.tensorf.density[1] = 3;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
     sf_status status = sf_model_load(&back, in("model.safetensors"));
     ck_assert_int_ne(status.code, SF_OK);
     ck_assert_ptr_nonnull(strstr(status.message, "model.safetensors"));
     m.config.tensorf.density[1] = 8;
-    ck_good(sf_model_save(&m, in("model.safetensors")));
+    ck_ok(sf_model_save(&m, in("model.safetensors")));
     status = sf_model_load(&back, in("model.safetensors"));
     ck_assert_ptr_nonnull(strstr(status.message, "density_plane.1"));
     sf_model_free(&m);
   }
-  remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf");
-  TCase *tc = tcase_create("tensorf");
-  tcase_set_timeout(tc, 120);
-  tcase_add_test(tc, inputs_are_tensorf);
-  tcase_add_test(tc, resolution_is_tensorf);
-  tcase_add_test(tc, interpolation_is_linear);
-  tcase_add_test(tc, activations_by_hand);
-  tcase_add_test(tc, encoding_order);
-  tcase_add_test(tc, twin_is_a_network_with_biases);
-  tcase_add_test(tc, save_and_load);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 120;
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

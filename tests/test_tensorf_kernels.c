@@ -4,8 +4,6 @@
 #include "base/memory.h"
 #include "render/view.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 static const char *const exact[] = {"portable", "avx2", "avx512"};
 
@@ -19,7 +17,7 @@ static void positions(float *x)
 }
 
 /* Bounds: contracted multiply-adds over 3 x 16 components; the activation's fit, 2 ulp. */
-START_TEST(density_equals_oracle)
+TEST(density_equals_oracle)
 {
   float x[3 * N], sigma[N], slope[N];
   positions(x);
@@ -27,7 +25,7 @@ START_TEST(density_equals_oracle)
     for (int ndc = 0; ndc < 2; ndc++) {
       const sf_kernels *k = sf_kernels_select(exact[i]);
       if (!k) continue;
-      sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+      OWNED(sf_model) m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
       if (!ndc) m.config.tensorf.shift = -1; /* both ends of the softplus */
       for (size_t j = 0; !ndc && j < m.param[SF_P_DENSITY_PLANE].size; j++) m.value[j] *= 60;
       const sf_vm_field field = sf_vm_field_of(&m, false);
@@ -40,27 +38,23 @@ START_TEST(density_equals_oracle)
                     down = sf_tensorf_sigma(&m.config.tensorf, feature - h);
         if (!ndc || fabsf(feature) > h) ck_assert_float_eq_tol(slope[s], (up - down) / (2 * h), 0.05f);
       }
-      sf_model_free(&m);
     }
 }
-END_TEST
 
 /* Small densities keep their relative accuracy: they decide what the alpha mask drops. */
-START_TEST(thin_density_is_accurate)
+TEST(thin_density_is_accurate)
 {
   const sf_kernels *k = sf_kernels_select(NULL);
   float x[3 * N], sigma[N], slope[N];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   const sf_vm_field field = sf_vm_field_of(&m, false);
   k->vm_density(&field, x, N, sigma, slope);
   for (int s = 0; s < N; s++) {
     const float expected = sf_tensorf_sigma(&m.config.tensorf, sf_tensorf_density_feature(&m, x + 3 * s));
     ck_assert_float_eq_tol(sigma[s], expected, 1e-5f * expected);
   }
-  sf_model_free(&m);
 }
-END_TEST
 
 /* The density feature is bilinear in planes and lines: <g, feature(P + P', L)> - <g, feature(P, L)> = <dP, P'>, and so
  * for lines; g = the gradient of the products, or one per sample. */
@@ -70,7 +64,7 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   if (!k) return;
   static float x[3 * N], g[N * SF_DECODER_MAX], product[N * SF_DECODER_MAX];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, ndc, 16, 2);
   const int first = appearance ? SF_P_APP_PLANE : SF_P_DENSITY_PLANE, ld = 160;
   const sf_vm_field f = sf_vm_field_of(&m, appearance);
   for (int i = 0; i < N * ld; i++) g[i] = test_random(1u << 26 | i);
@@ -96,24 +90,22 @@ static void check_adjoint(const char *isa, int ndc, bool appearance)
   ck_assert_double_eq_tol(left, planes, 1e-3);
   ck_assert_double_eq_tol(left, lines, 1e-3);
   free(grad);
-  sf_model_free(&m);
 }
 
-START_TEST(backward_is_the_adjoint)
+TEST(backward_is_the_adjoint)
 {
   for (int i = 0; i < 3; i++)
     for (int ndc = 0; ndc < 2; ndc++)
       for (int appearance = 0; appearance < 2; appearance++) check_adjoint(exact[i], ndc, appearance);
 }
-END_TEST
 
 /* A plane's gradient against central differences, entry by entry: the products' sum is linear in it. */
-START_TEST(field_gradient_is_the_slope)
+TEST(field_gradient_is_the_slope)
 {
   const sf_kernels *k = sf_kernels_select("portable");
   static float x[3 * N], g[N], sigma[N], slope[N];
   positions(x);
-  sf_model m = test_tensorf(SF_NET_SNN, 0, 16, 2);
+  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
   m.config.tensorf.shift = 0;
   const sf_vm_field f = sf_vm_field_of(&m, false);
   float *grad = calloc(m.size, sizeof *grad);
@@ -138,9 +130,7 @@ START_TEST(field_gradient_is_the_slope)
                     m.param[id].name, i - m.param[id].offset, expected, (double)grad[i]);
     }
   free(grad);
-  sf_model_free(&m);
 }
-END_TEST
 
 typedef struct rig {
   sf_model model;
@@ -219,7 +209,7 @@ static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int n
 {
   const sf_kernels *k = sf_kernels_select(isa);
   if (!k) return;
-  rig r = rig_make(kind, mode, ndc, 48, 8, gain);
+  OWNED(rig) r = rig_make(kind, mode, ndc, 48, 8, gain);
   for (int keep = 0; keep < 2; keep++) {
     int wrong = 0;
     rig_forward(&r, k, keep);
@@ -234,10 +224,9 @@ static void compare(const char *isa, sf_net_kind kind, sf_input_mode mode, int n
     }
     ck_assert_msg(wrong <= allowed, "%s, ndc %d: %d of 64 samples differ", k->name, ndc, wrong);
   }
-  rig_free(&r);
 }
 
-START_TEST(decoder_equals_oracle)
+TEST(decoder_equals_oracle)
 {
   for (int i = 0; i < 3; i++)
     for (int ndc = 0; ndc < 2; ndc++) {
@@ -248,17 +237,15 @@ START_TEST(decoder_equals_oracle)
       compare(exact[i], SF_NET_ANN, SF_HYBRID, ndc, 1, 1e-4f, 0);
     }
 }
-END_TEST
 
 /* The twin rounds every operand to bfloat16: 2^-9 through four layers. */
-START_TEST(bfloat16_decoder_near_oracle)
+TEST(bfloat16_decoder_near_oracle)
 {
   for (int ndc = 0; ndc < 2; ndc++) {
     compare("avx512bf16", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
     compare("amx", SF_NET_ANN, SF_HYBRID, ndc, 1, 3e-2f, 0);
   }
 }
-END_TEST
 
 static double objective(const rig *r, const float *dcolour)
 {
@@ -314,11 +301,11 @@ static void random_gradient(float *dcolour)
 
 /* The twin is smooth but for its kinks: every third weight, every bias, and the products, against central differences.
  * Bound: float cancellation, as in test_snn.c. */
-START_TEST(twin_gradient_is_the_slope)
+TEST(twin_gradient_is_the_slope)
 {
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   for (int ndc = 0; ndc < 2; ndc++) {
-    rig r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
+    OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
     const sf_kernels *k = sf_kernels_select(NULL);
     random_gradient(dc);
     rig_forward(&r, k, 1);
@@ -335,18 +322,16 @@ START_TEST(twin_gradient_is_the_slope)
       const double expected = slope_at(&r, r.block->product + at, 2e-3f, dc);
       ck_assert_double_eq_tol(r.dproduct[at], expected, 0.02 * fabs(expected) + 2e-3);
     }
-    rig_free(&r);
   }
 }
-END_TEST
 
 /* Of a spiking decoder the last layer and the integrator are smooth: no spike hangs on them. */
-START_TEST(smooth_parts_of_the_decoder_match_the_slope)
+TEST(smooth_parts_of_the_decoder_match_the_slope)
 {
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *k = sf_kernels_select(NULL);
   for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    rig r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
+    OWNED(rig) r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
     random_gradient(dc);
     rig_forward(&r, k, 1);
     k->decoder_backward(r.words, r.block, 6, dc, r.dproduct, r.grad, r.scratch);
@@ -357,35 +342,19 @@ START_TEST(smooth_parts_of_the_decoder_match_the_slope)
       }
     const double expected = slope_at(&r, sf_model_param(&r.model, SF_P_LEAK) + 4, 1e-2f, dc);
     ck_assert_double_eq_tol(r.grad->net.leak[4], expected, 0.01 * fabs(expected) + 0.1);
-    rig_free(&r);
   }
 }
-END_TEST
 
-static float distance(const float *a, const float *reference, size_t n)
+/* The same forward pass, the backward passes compared. */
+TEST(backward_of_every_isa_agrees)
 {
-  float worst = 0, scale = 0;
-  for (size_t i = 0; i < n; i++) {
-    worst = fmaxf(worst, fabsf(a[i] - reference[i]));
-    scale = fmaxf(scale, fabsf(reference[i]));
-  }
-  return worst / scale;
-}
-
-/* The same forward pass, the backward passes compared; bounds as for the nets of INGP (test_snn.c). */
-START_TEST(backward_of_every_isa_agrees)
-{
-  static const struct {
-    const char *isa;
-    float bound;
-  } other[] = {{"avx2", 2e-5f}, {"avx512", 1e-4f}, {"avx512bf16", 1e-2f}, {"amx", 1e-2f}};
   static float dc[SF_T_MAX * 3 * SF_BLOCK];
   const sf_kernels *portable = sf_kernels_select("portable");
   random_gradient(dc);
   for (int kind = SF_NET_SNN; kind <= SF_NET_ANN; kind++)
     for (int i = 0; i < 4; i++)
       for (int g = 0; g < 2; g++) {
-        const sf_kernels *k = sf_kernels_select(other[i].isa);
+        const sf_kernels *k = sf_kernels_select(backward_bounds[i].isa);
         if (!k) continue;
         const int steps = kind == SF_NET_ANN ? 1 : 8;
         rig a = rig_make(kind, SF_HYBRID, 0, 48, steps, g ? 3 : 0.3f), b = rig_make(kind, SF_HYBRID, 0, 48, steps, 1);
@@ -402,30 +371,14 @@ START_TEST(backward_of_every_isa_agrees)
           float *x = malloc(2 * n * sizeof *x);
           for (size_t j = 0; j < n; j++) x[j] = grad_at(&b, id, j), x[n + j] = grad_at(&a, id, j);
           const float far = distance(x, x + n, n);
-          ck_assert_msg(far <= other[i].bound, "%s: %s differs by %g", k->name, a.model.param[id].name, (double)far);
+          ck_assert_msg(far <= backward_bounds[i].bound, "%s: %s differs by %g", k->name, a.model.param[id].name,
+                        (double)far);
           free(x);
         }
-        ck_assert_float_le(distance(b.dproduct, a.dproduct, SF_BLOCK * 144), other[i].bound);
+        ck_assert_float_le(distance(b.dproduct, a.dproduct, SF_BLOCK * 144), backward_bounds[i].bound);
         rig_free(&a);
         rig_free(&b);
       }
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf_kernels");
-  TCase *tc = tcase_create("tensorf_kernels");
-  tcase_set_timeout(tc, 120);
-  tcase_add_test(tc, density_equals_oracle);
-  tcase_add_test(tc, thin_density_is_accurate);
-  tcase_add_test(tc, backward_is_the_adjoint);
-  tcase_add_test(tc, field_gradient_is_the_slope);
-  tcase_add_test(tc, decoder_equals_oracle);
-  tcase_add_test(tc, bfloat16_decoder_near_oracle);
-  tcase_add_test(tc, twin_gradient_is_the_slope);
-  tcase_add_test(tc, smooth_parts_of_the_decoder_match_the_slope);
-  tcase_add_test(tc, backward_of_every_isa_agrees);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 120;

@@ -4,9 +4,14 @@
 #include "train/vm.h"
 #include <omp.h>
 
-static sf_train_options small_vm(const sf_dataset *data, sf_net_kind net)
+static void set_up(void)
 {
-  sf_train_options o = sf_train_defaults_tensorf(data);
+  open_scene(8);
+}
+
+static sf_train_options small_vm(sf_net_kind net)
+{
+  sf_train_options o = sf_train_defaults_tensorf(&data);
   o.config.net = net;
   o.config.steps = net == SF_NET_ANN ? 1 : T;
   o.config.hidden = 32;
@@ -53,12 +58,10 @@ static void point(const sf_tensorf *f, int i, float p[3])
 
 /* From n to 2n - 1, 3n - 2 and 4n - 3 points along the axes every old point stays one, and bilinear values stay
  * bilinear: nothing changes. */
-START_TEST(upsampling_keeps_the_field)
+TEST(upsampling_keeps_the_field)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  const sf_train_options o = small_vm(SF_NET_ANN);
+  OWNED(trainer) t = start(&data, &o, NULL);
   enum { N = 300 };
   float before[N], p[N][3], x[3], features[2][SF_APPEARANCE_MAX];
   for (int i = 0; i < N; i++) {
@@ -69,7 +72,7 @@ START_TEST(upsampling_keeps_the_field)
   sf_tensorf_appearance(&t->model, x, features[0]);
   sf_tensorf finer = t->model.config.tensorf;
   for (int a = 0; a < 3; a++) finer.resolution[a] = (2 + a) * (finer.resolution[a] - 1) + 1;
-  ck_good(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){1.0 / 2, 1.0 / 3, 1.0 / 4}));
+  ck_ok(sf_vm_resample(t, &finer, (double[3]){0, 0, 0}, (double[3]){1.0 / 2, 1.0 / 3, 1.0 / 4}));
   for (int i = 0; i < N; i++) {
     to_box(&t->model.config.tensorf, p[i], x);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), before[i], 1e-5f); /* 48 products of 0.01 */
@@ -77,20 +80,14 @@ START_TEST(upsampling_keeps_the_field)
   sf_tensorf_appearance(&t->model, x, features[1]);
   for (int i = 0; i < 27; i++) ck_assert_float_eq_tol(features[1][i], features[0][i], 1e-5f);
   for (size_t i = 0; i < t->model.size; i++) ck_assert_float_eq(t->moment2[i], 0);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* Shrinking cuts at grid points: the same field inside. Rays have another step then, so that a picture changes by the
  * error of its quadrature alone. */
-START_TEST(shrinking_keeps_what_is_seen)
+TEST(shrinking_keeps_what_is_seen)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  const sf_train_options o = small_vm(SF_NET_ANN);
+  OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
   enum { N = 24 * 24 };
   static float origin[N][3], direction[N][3], rgb[2][N][3], alpha[2][N];
@@ -98,13 +95,13 @@ START_TEST(shrinking_keeps_what_is_seen)
   for (int i = 0; i < N; i++)
     sf_dataset_ray(&data, &data.view[0], (float)(i % 24) + 0.5f, (float)(i / 24) + 0.5f, origin[i], direction[i]);
   const float step = sf_tensorf_step(&t->model.config.tensorf);
-  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[0][0], NULL, alpha[0], NULL));
-  sf_model whole = {0};
-  ck_good(sf_model_create(&whole, &t->model.config));
+  ck_ok(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[0][0], NULL, alpha[0], NULL));
+  OWNED(sf_model) whole = {0};
+  ck_ok(sf_model_create(&whole, &t->model.config));
   memcpy(whole.value, t->model.value, whole.size * sizeof *whole.value);
-  ck_good(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, false));
   ck_assert_double_lt(t->occupied, 0.5);
-  ck_good(sf_vm_shrink(t));
+  ck_ok(sf_vm_shrink(t));
   const sf_tensorf *f = &t->model.config.tensorf;
   ck_assert_int_lt(f->resolution[0], 16);
   for (int i = 0; i < 300; i++) {
@@ -115,7 +112,7 @@ START_TEST(shrinking_keeps_what_is_seen)
     const float expected = sf_tensorf_density_feature(&whole, y);
     ck_assert_float_eq_tol(sf_tensorf_density_feature(&t->model, x), expected, 1e-4f * (1 + expected));
   }
-  ck_good(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[1][0], NULL, alpha[1], NULL));
+  ck_ok(sf_render_rays(&t->model, origin[0], direction[0], N, 1, white, rgb[1][0], NULL, alpha[1], NULL));
   ck_assert_float_eq_tol(sf_tensorf_step(f), step, 1e-5f); /* voxels are as long as before, so the steps are */
   double largest = 0, error = 0;
   for (int i = 0; i < N; i++) {
@@ -124,23 +121,16 @@ START_TEST(shrinking_keeps_what_is_seen)
   }
   ck_assert_double_gt(largest, 0.99);
   ck_assert_double_lt(error, 0.1); /* at the rim: a sample's place within its interval of half a voxel */
-  sf_model_free(&whole);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* No point whose alpha is above four times the threshold lies in a cell that the mask drops: the mask looks at the
  * corners of cells, and this field changes by less than that between them. Most of the box goes. */
-START_TEST(mask_keeps_what_is_visible)
+TEST(mask_keeps_what_is_visible)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  const sf_train_options o = small_vm(SF_NET_ANN);
+  OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
-  ck_good(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, false));
   const sf_tensorf *f = &t->model.config.tensorf;
   int visible = 0;
   for (int i = 0; i < 20000; i++) {
@@ -162,22 +152,16 @@ START_TEST(mask_keeps_what_is_visible)
   ck_assert_double_lt(t->occupied, 0.5);
   const double once = t->occupied;
   memset(t->model.occupancy, 0, 16 * 16 * 16 / 16);
-  ck_good(sf_vm_mask(t, true)); /* a later mask takes no cell back */
+  ck_ok(sf_vm_mask(t, true)); /* a later mask takes no cell back */
   ck_assert_double_lt(t->occupied, once);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. */
-START_TEST(schedule_scales_with_the_run)
+TEST(schedule_scales_with_the_run)
 {
-  make_scene(4);
-  sf_dataset data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_ANN);
+  sf_train_options o = small_vm(SF_NET_ANN);
   o.stage1 = 60, o.stage2 = 240;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
   for (int i = 0, event = 0; i < 80; i++) {
     steps(t, 1);
@@ -189,18 +173,12 @@ START_TEST(schedule_scales_with_the_run)
   const double voxels = (double)r[0] * r[1] * r[2];
   ck_assert_double_gt(voxels, 0.75 * 24 * 24 * 24); /* rounded down along each axis */
   ck_assert_double_le(voxels, 24 * 24 * 24);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* The whole way of a short run, spiking: the same bits with one thread and with three. */
-START_TEST(threads_do_not_matter)
+TEST(threads_do_not_matter)
 {
-  make_scene(4);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  const sf_train_options o = small_vm(SF_NET_SNN);
   sf_trainer *t[2];
   const int threads = omp_get_max_threads();
   for (int i = 0; i < 2; i++) {
@@ -213,21 +191,16 @@ START_TEST(threads_do_not_matter)
   ck_assert_mem_eq(&t[0]->model.config, &t[1]->model.config, sizeof t[0]->model.config);
   same_model(t[0], t[1]);
   for (int i = 0; i < 2; i++) sf_trainer_free(t[i]);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* A checkpoint in the middle, after the field has grown, and what follows is the same as without. */
-START_TEST(resume_is_the_same_run)
+TEST(resume_is_the_same_run)
 {
-  make_scene(4);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_SNN);
+  const sf_train_options o = small_vm(SF_NET_SNN);
   sf_trainer *a = start(&data, &o, NULL), *b = start(&data, &o, NULL);
   steps(a, 40);
   steps(b, 21);
-  ck_good(sf_trainer_save(b, in("run.safetensors"), true));
+  ck_ok(sf_trainer_save(b, in("run.safetensors"), true));
   sf_trainer_free(b);
   b = start(&data, &o, in("run.safetensors"));
   steps(b, 19);
@@ -237,61 +210,44 @@ START_TEST(resume_is_the_same_run)
   ck_bad(sf_trainer_create(&none, &data, &other, in("run.safetensors")), SF_E_RANGE, "run.safetensors", "tensorf");
   sf_trainer_free(a);
   sf_trainer_free(b);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* Biases far below the threshold: neither scaled nor new weights would fire again. */
-START_TEST(a_layer_that_its_biases_silence_comes_back)
+TEST(a_layer_that_its_biases_silence_comes_back)
 {
-  make_scene(4);
-  sf_dataset data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_train_options o = small_vm(SF_NET_SNN);
   o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 70);
   for (size_t i = 0; i < t->model.param[SF_P_C1_BIAS].size; i++) sf_model_param(&t->model, SF_P_C1_BIAS)[i] = -20;
   sf_train_stats s = {0};
-  for (int i = 0; i < 200 && !s.event[1]; i++) ck_good(sf_trainer_step(t, &s));
+  for (int i = 0; i < 200 && !s.event[1]; i++) ck_ok(sf_trainer_step(t, &s));
   ck_assert_int_eq(s.event[1], -1);
   s = steps(t, 10);
   ck_assert_double_gt(s.firing[1], 0.01);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
-START_TEST(it_learns)
+TEST(it_learns)
 {
-  make_scene(8);
-  sf_dataset data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
-    sf_train_options o = small_vm(&data, net);
+    sf_train_options o = small_vm(net);
     o.stage1 = 40, o.stage2 = 110, o.rays = 512;
-    sf_trainer *t = start(&data, &o, NULL);
+    OWNED(trainer) t = start(&data, &o, NULL);
     double psnr, ssim;
     const sf_train_stats first = steps(t, 1), last = steps(t, 149);
-    ck_good(sf_evaluate(sf_trainer_model(t), &data, 2, 0, &psnr, &ssim));
+    ck_ok(sf_evaluate(sf_trainer_model(t), &data, 2, 0, &psnr, &ssim));
     ck_assert_msg(last.mse < 0.3 * first.mse && psnr > 15, "%s: error %g, was %g; %g dB", net ? "twin" : "spiking",
                   last.mse, first.mse, psnr);
     ck_assert_double_gt(last.occupied, 0);
-    sf_trainer_free(t);
   }
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* A field that is not finite ends the run with its name; what is refused is not saved. */
-START_TEST(nan_is_found)
+TEST(nan_is_found)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  const sf_train_options o = small_vm(&data, SF_NET_ANN);
-  sf_trainer *t = start(&data, &o, NULL);
+  const sf_train_options o = small_vm(SF_NET_ANN);
+  OWNED(trainer) t = start(&data, &o, NULL);
   sf_train_stats s;
   t->model.value[t->model.param[SF_P_DENSITY_LINE].offset] = NAN;
   for (size_t i = 0; i < t->model.param[SF_P_DENSITY_LINE].size; i++)
@@ -300,17 +256,11 @@ START_TEST(nan_is_found)
   const sf_status status = sf_trainer_save(t, in("bad.safetensors"), true);
   ck_assert_int_ne(status.code, SF_OK);
   ck_assert_ptr_nonnull(strstr(status.message, "density_line.0"));
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
 /* Blender scenes have TensoRF's box in their units; others, whose unit may be anything, the box of the data. */
-START_TEST(the_box_is_that_of_the_layout)
+TEST(the_box_is_that_of_the_layout)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
   sf_config c, plain = sf_tensorf_default(data.scale, 0);
   float *const place = data.view[0].camera.to_world;
   data.count = 1;
@@ -335,47 +285,21 @@ START_TEST(the_box_is_that_of_the_layout)
     }
     ck_assert(c.tensorf.near == (float)SF_NEAR && c.tensorf.far > 1e5f);
     ck_assert_float_eq(c.tensorf.distance_scale, 18.75f);
-    ck_good(sf_config_check(&c));
+    ck_ok(sf_config_check(&c));
   }
   data.ndc = true;
   c = sf_train_defaults_tensorf(&data).config, plain = sf_tensorf_default(data.scale, 1);
   ck_assert_int_eq(memcmp(&c.tensorf, &plain.tensorf, sizeof c.tensorf), 0);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
-START_TEST(rays_that_all_miss_the_box_are_refused)
+TEST(rays_that_all_miss_the_box_are_refused)
 {
-  make_scene(2);
-  sf_dataset data = load("train");
-  sf_train_options o = small_vm(&data, SF_NET_SNN);
+  sf_train_options o = small_vm(SF_NET_SNN);
   sf_train_stats stats;
   o.config.tensorf.near = 100, o.config.tensorf.far = 101;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   ck_bad(sf_trainer_step(t, &stats), SF_E_RANGE, "iteration 0: none of", "meets the box");
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("tensorf_train");
-  TCase *tc = tcase_create("tensorf_train");
-  tcase_set_timeout(tc, 300);
-  tcase_add_test(tc, upsampling_keeps_the_field);
-  tcase_add_test(tc, shrinking_keeps_what_is_seen);
-  tcase_add_test(tc, mask_keeps_what_is_visible);
-  tcase_add_test(tc, schedule_scales_with_the_run);
-  tcase_add_test(tc, threads_do_not_matter);
-  tcase_add_test(tc, resume_is_the_same_run);
-  tcase_add_test(tc, a_layer_that_its_biases_silence_comes_back);
-  tcase_add_test(tc, it_learns);
-  tcase_add_test(tc, the_box_is_that_of_the_layout);
-  tcase_add_test(tc, rays_that_all_miss_the_box_are_refused);
-  tcase_add_test(tc, nan_is_found);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+int ck_timeout = 300;
+ck_options ck_program = {.set_up = set_up, .tear_down = close_scene};

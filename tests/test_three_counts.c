@@ -35,8 +35,7 @@ static sf_three_counts *run(fx_scene *scene, int stall)
                             .user = scene,
                             .dut = {.seed = 3, .stall_percent = stall}};
   counts->wanted = RAYS;
-  const sf_status status = sf_three_counts_run(&job, counts);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_three_counts_run(&job, counts));
   ck_assert_msg(counts->agreement.code == SF_OK, "%s", counts->agreement.message);
   ck_assert_int_eq(counts->rays, RAYS);
   ck_assert_uint_gt(counts->core.samples, RAYS);
@@ -48,10 +47,10 @@ static sf_three_counts *run(fx_scene *scene, int stall)
   return counts;
 }
 
-START_TEST(hash_grid)
+TEST(hash_grid)
 {
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 1 << 19;
   sf_three_counts *still = run(&scene, 0), *stalled = run(&scene, 40);
   ck_assert(!still->no_rtl_traffic);
@@ -63,40 +62,35 @@ START_TEST(hash_grid)
   ck_assert_mem_eq(&still->rtl_traffic, &stalled->rtl_traffic, sizeof(sf_traffic)); /* stalls change cycles alone */
   ck_assert_uint_gt(stalled->cycles, still->cycles);
   free(still), free(stalled);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(decoder)
+TEST(decoder)
 {
-  fx_scene scene = tensorf_scene();
+  OWNED(fx_scene) scene = tensorf_scene();
   sf_three_counts *counts = run(&scene, 20);
   ck_assert(counts->no_rtl_traffic);
   ck_assert_uint_eq(counts->rtl_traffic.table_bytes, 0);
   ck_assert_mem_eq(&counts->core_traffic, &counts->recount_traffic, sizeof(sf_traffic));
   ck_assert_uint_gt(counts->core_traffic.exp_neg, counts->core.samples);
   free(counts);
-  fx_scene_free(&scene);
 }
-END_TEST
 
 /* Two rays whose core changes meanwhile, in a way of `changing`. */
 static void check_difference(sf_status (*changing)(void *user, uint64_t index, fx_ray *to), const char *message)
 {
   const fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 1 << 19;
   static const uint64_t index[] = {0, 1};
   const sf_three_job job = {
       .scene = &scene, .index = index, .rays = 2, .ray = changing, .name = name, .user = &scene, .dut = {.seed = 3}};
   sf_three_counts *counts = calloc(1, sizeof *counts);
   counts->wanted = 2;
-  ck_assert_int_eq(sf_three_counts_run(&job, counts).code, SF_OK);
+  ck_ok(sf_three_counts_run(&job, counts));
   ck_assert_int_eq(counts->agreement.code, SF_E_DIFFERENCE);
   ck_assert_msg(strstr(counts->agreement.message, message), "%s", counts->agreement.message);
   ck_assert_int_eq(counts->rays, 1);
   free(counts);
-  fx_scene_free(&scene);
 }
 
 /* The core's net changes behind the accelerator's back: every ray of it differs, already the first. */
@@ -107,11 +101,10 @@ static sf_status ray_of_another_net(void *user, uint64_t index, fx_ray *to)
   return ray(scene, index, to);
 }
 
-START_TEST(the_first_ray_differs)
+TEST(the_first_ray_differs)
 {
   check_difference(ray_of_another_net, "ray 0: sample 0: red: core ");
 }
-END_TEST
 
 /* The core's rays change behind the back of the accelerator that has encoder and compositor; the nets agree. */
 static sf_status ray_on_another_background(void *user, uint64_t index, fx_ray *to)
@@ -128,7 +121,7 @@ static sf_status ray_that_stops_early(void *user, uint64_t index, fx_ray *to)
   return ray(scene, index, to);
 }
 
-START_TEST(a_pixel_differs)
+LOOP_TEST(a_pixel_differs, 2)
 {
   static const struct {
     sf_status (*ray)(void *user, uint64_t index, fx_ray *to);
@@ -137,33 +130,17 @@ START_TEST(a_pixel_differs)
                  {ray_that_stops_early, "ray 0: accelerator: hang at cycle "}};
   check_difference(changed[_i].ray, changed[_i].message);
 }
-END_TEST
 
 /* The accelerator's samples and rays count, too; a decoder has no directions and counts no rays. */
-START_TEST(samples_and_rays_are_compared)
+TEST(samples_and_rays_are_compared)
 {
   fx_counts core = {.samples = 5, .rays = 2}, rtl = core;
   fx_net net = {.layer[FX_D1].n_out = 1};
-  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  ck_ok(sf_compare_ray_counts(&net, &core, &rtl));
   rtl.rays = 3;
   ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "rays: core 2, accelerator 3");
   net.layer[FX_D1].n_out = 0;
-  ck_assert_int_eq(sf_compare_ray_counts(&net, &core, &rtl).code, SF_OK);
+  ck_ok(sf_compare_ray_counts(&net, &core, &rtl));
   rtl.samples = 4;
   ck_assert_str_eq(sf_compare_ray_counts(&net, &core, &rtl).message, "samples: core 5, accelerator 4");
-}
-END_TEST
-
-int main(void)
-{
-  Suite *suite = suite_create("three_counts");
-  TCase *all = tcase_create("all");
-  tcase_set_timeout(all, 60);
-  tcase_add_test(all, hash_grid);
-  tcase_add_test(all, decoder);
-  tcase_add_test(all, the_first_ray_differs);
-  tcase_add_loop_test(all, a_pixel_differs, 0, 2);
-  tcase_add_test(all, samples_and_rays_are_compared);
-  suite_add_tcase(suite, all);
-  return ck_run(suite);
 }

@@ -116,8 +116,8 @@ static void ck_traces(const fx_scene *scene, const sf_traces_report *report, int
     fx_ray ray;
     fx_pixel pixel;
     fx_counts counts = {0};
-    ck_good(sf_pixel_ray(scene, &data, &view[v], x, y, &ray));
-    ck_good(fx_render_ray(scene, &ray, expect, &e, &pixel, &counts));
+    ck_ok(sf_pixel_ray(scene, &data, &view[v], x, y, &ray));
+    ck_ok(fx_render_ray(scene, &ray, expect, &e, &pixel, &counts));
     rays++;
   }
   ck_assert_ptr_null(fgets(line, LINE, e.spikes));
@@ -129,45 +129,40 @@ static void ck_traces(const fx_scene *scene, const sf_traces_report *report, int
   fclose(e.spikes), fclose(e.potentials), fclose(samples);
 }
 
-START_TEST(every_spike_and_membrane_is_the_nets)
+LOOP_TEST(every_spike_and_membrane_is_the_nets, FX_NODECAY + 1)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, _i, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 500000; /* some 30 samples along a ray */
   sf_traces_report report;
   for (int only = -1; only < VIEWS; only++) {
-    ck_good(
-        sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = only, .rays = RAYS, .seed = 5}, &report));
+    ck_ok(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = only, .rays = RAYS, .seed = 5}, &report));
     ck_assert_int_gt(report.rays, 3);
     ck_assert_uint_gt(report.spikes, 100);
     ck_traces(&scene, &report, only);
   }
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(names_of_views_are_quoted)
+TEST(names_of_views_are_quoted)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   scene.step_q24 = 500000;
   sf_traces_report report;
   char line[LINE];
   strcpy(view[0].name, "r,\"0");
-  ck_good(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = 0, .rays = RAYS, .seed = 5}, &report));
+  ck_ok(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = 0, .rays = RAYS, .seed = 5}, &report));
   FILE *samples = open_file("samples.csv");
   next_line(samples, line);
   next_line(samples, line);
   ck_assert_msg(strstr(line, ",\"r,\"\"0\",") != NULL, "%s", line);
   fclose(samples);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-START_TEST(refusals_leave_nothing)
+TEST(refusals_leave_nothing)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, FX_HYBRID, {0}};
-  fx_scene scene = fixture_scene(&sizes, 3);
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   sf_traces_report report;
   ck_bad(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = VIEWS, .rays = 1}, &report), SF_E_USAGE,
          "view 2", "has 2");
@@ -175,18 +170,6 @@ START_TEST(refusals_leave_nothing)
   ck_bad(sf_traces_write(folder, &scene, &data, &(sf_traces_options){.view = -1, .rays = 3}, &report), SF_E_FORMAT,
          "made", "none of 3 rays");
   ck_assert_int_eq(entries(), 0);
-  fx_scene_free(&scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("traces");
-  TCase *tcase = tcase_create("traces");
-  tcase_add_checked_fixture(tcase, make_data, remove_folder);
-  tcase_add_loop_test(tcase, every_spike_and_membrane_is_the_nets, FX_HYBRID, FX_NODECAY + 1);
-  tcase_add_test(tcase, names_of_views_are_quoted);
-  tcase_add_test(tcase, refusals_leave_nothing);
-  suite_add_tcase(suite, tcase);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_data, .tear_down = remove_folder};

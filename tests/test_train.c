@@ -8,15 +8,15 @@ enum { N = 12 };
 
 static void set_up(void)
 {
-  make_scene(6);
+  open_scene(6);
 }
 
 static void same_file(const char *a, const char *b)
 {
   char *x, *y;
   size_t nx, ny;
-  ck_assert_int_eq(sf_read_file(a, 1u << 30, &x, &nx).code, SF_OK);
-  ck_assert_int_eq(sf_read_file(b, 1u << 30, &y, &ny).code, SF_OK);
+  ck_ok(sf_read_file(a, 1u << 30, &x, &nx));
+  ck_ok(sf_read_file(b, 1u << 30, &y, &ny));
   ck_assert_uint_eq(nx, ny);
   ck_assert_int_eq(memcmp(x, y, nx), 0);
   free(x);
@@ -33,52 +33,43 @@ static sf_train_options run_in_box(int kind)
   return o;
 }
 
-START_TEST(same_seed_same_bits_any_threads)
+LOOP_TEST(same_seed_same_bits_any_threads, 2)
 {
-  sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
   omp_set_num_threads(1);
-  sf_trainer *a = start(&data, &o, NULL);
+  OWNED(trainer) a = start(&data, &o, NULL);
   steps(a, 40);
   omp_set_num_threads(3);
-  sf_trainer *b = start(&data, &o, NULL);
+  OWNED(trainer) b = start(&data, &o, NULL);
   steps(b, 40);
   same_model(a, b);
   ck_assert_int_eq(a->stage, 3);
   o.seed = 2;
-  sf_trainer *c = start(&data, &o, NULL);
+  OWNED(trainer) c = start(&data, &o, NULL);
   steps(c, 40);
   ck_assert_int_ne(memcmp(a->model.value, c->model.value, a->model.size * sizeof(float)), 0);
-  sf_trainer_free(a);
-  sf_trainer_free(b);
-  sf_trainer_free(c);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 static void check_resume(const sf_train_options *o, int before, int after)
 {
-  sf_dataset data = load("train");
   sf_trainer *whole = start(&data, o, NULL), *part = start(&data, o, NULL);
   steps(whole, before + after);
   steps(part, before);
-  ck_assert_int_eq(sf_trainer_save(part, in("a.safetensors"), true).code, SF_OK);
+  ck_ok(sf_trainer_save(part, in("a.safetensors"), true));
   sf_trainer_free(part);
   part = start(&data, o, in("a.safetensors"));
   steps(part, after);
   same_model(whole, part);
   sf_trainer_free(whole);
   sf_trainer_free(part);
-  sf_dataset_free(&data);
 }
 
 /* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
-START_TEST(the_chosen_steps_are_trained_alone)
+TEST(the_chosen_steps_are_trained_alone)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
   o.beta = 1e-4;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const int search = o.stage1 + o.stage2 / 2;
   sf_train_stats s = steps(t, search);
   const double chosen = s.t_star;
@@ -93,18 +84,14 @@ START_TEST(the_chosen_steps_are_trained_alone)
     ck_assert_int_eq(s.search.measured, before.measured);
     ck_assert_int_eq(s.search.state, before.state);
   }
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 /* What is rendered has the intervals of the training's second half. */
-START_TEST(the_lattice_settles)
+LOOP_TEST(the_lattice_settles, 2)
 {
-  sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
   o.samples = 64; /* few enough for a coarser lattice */
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const int first = o.stage1, last = o.stage1 + o.stage2;
   sf_train_stats s = steps(t, first);
   ck_assert_int_gt(t->stride, 1);
@@ -126,37 +113,30 @@ START_TEST(the_lattice_settles)
   }
   ck_assert_int_lt(seen, o.config.lattice);
   sf_steps rendered;
-  ck_good(sf_steps_make(&rendered, &t->model.config, 1));
+  ck_ok(sf_steps_make(&rendered, &t->model.config, 1));
   ck_assert_int_eq(memcmp(&rendered, &t->intervals, sizeof rendered), 0);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 /* Twice its steps would be no model's: in the first case the lattice would be too coarse, in the second dt_gamma too
  * large. */
-START_TEST(a_lattice_at_its_limit_settles_as_it_is)
+LOOP_TEST(a_lattice_at_its_limit_settles_as_it_is, 2)
 {
-  sf_dataset data = load("train");
   sf_train_options o = run_in_box(_i);
   o.samples = 64;
   if (_i)
     o.config.dt_gamma = 0.75f * SF_GAMMA_MAX;
   else
     o.config.lattice = 2 * SF_LATTICE_MIN - 1;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, o.stage1);
   ck_assert_int_gt(t->stride, 1);
   steps(t, o.stage2);
   ck_assert_int_eq(t->stride, 1);
   ck_assert_int_eq(t->model.config.lattice, o.config.lattice);
   ck_assert_float_eq(t->model.config.dt_gamma, o.config.dt_gamma);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(resume_continues_bit_identically)
+LOOP_TEST(resume_continues_bit_identically, 2)
 {
   sf_train_options o = run_in_box(_i);
   check_resume(&o, 17, 16);
@@ -164,12 +144,11 @@ START_TEST(resume_continues_bit_identically)
   o.samples = 8192;
   check_resume(&o, 6, 30);
 }
-END_TEST
 
 /* With other views, another scale or another box a checkpoint is not resumed; one that does not say its views is. */
-START_TEST(a_checkpoint_is_of_its_data)
+TEST(a_checkpoint_is_of_its_data)
 {
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   char *text;
@@ -179,10 +158,10 @@ START_TEST(a_checkpoint_is_of_its_data)
   cJSON *record = cJSON_CreateObject();
   cJSON_AddStringToObject(record, "option.beta", "0.5");
   t->options.record = record;
-  ck_good(sf_trainer_save(t, path, true));
+  ck_ok(sf_trainer_save(t, path, true));
   sf_trainer_free(t);
   sf_tensors set;
-  ck_good(sf_tensors_load(&set, path));
+  ck_ok(sf_tensors_load(&set, path));
   ck_assert_str_eq(sf_tensors_meta(&set, "option.beta"), "0.5");
   sf_tensors_free(&set);
   cJSON_Delete(record);
@@ -203,43 +182,35 @@ START_TEST(a_checkpoint_is_of_its_data)
   o.config.bound = 2;
   ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "'bound' is 1, here it is 2");
   o.config.bound = 1;
-  ck_good(sf_read_file(path, 1 << 24, &text, &size));
+  ck_ok(sf_read_file(path, 1 << 24, &text, &size));
   *strstr(text + 8, "train.views") = 'T';
-  ck_good(sf_write_file(path, text, size));
+  ck_ok(sf_write_file(path, text, size));
   free(text);
   data.view[0].camera.fx += 0.1f;
   sf_trainer_free(start(&data, &o, path));
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(saved_model_loads_and_saves_equal)
+TEST(saved_model_loads_and_saves_equal)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 20);
-  ck_assert_int_eq(sf_trainer_save(t, in("a.safetensors"), false).code, SF_OK);
-  ck_assert_int_eq(sf_trainer_save(t, in("b.safetensors"), false).code, SF_OK);
+  ck_ok(sf_trainer_save(t, in("a.safetensors"), false));
+  ck_ok(sf_trainer_save(t, in("b.safetensors"), false));
   same_file(in("a.safetensors"), in("b.safetensors"));
   sf_model m;
-  sf_status status = sf_model_load(&m, in("a.safetensors"));
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_model_load(&m, in("a.safetensors")));
   for (int i = 0; i < SF_P_COUNT; i++) /* alignment gaps between parameters are not saved */
     ck_assert_int_eq(memcmp(sf_model_param(&m, i), sf_model_param(&t->model, i), m.param[i].size * sizeof(float)), 0);
   ck_assert_int_eq(m.t_r, t->model.t_r);
   sf_model_free(&m);
   sf_trainer *resumed;
   ck_assert_int_eq(sf_trainer_create(&resumed, &data, &o, in("a.safetensors")).code, SF_E_FORMAT); /* no Adam inside */
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 /* One prefix is trained at a t* that no loss moves: beta and alpha are without effect. */
-START_TEST(fixed_steps_freeze_the_budget)
+TEST(fixed_steps_freeze_the_budget)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
   o.fixed_steps = 3;
   o.beta = 0;
@@ -263,40 +234,33 @@ START_TEST(fixed_steps_freeze_the_budget)
   check_resume(&o, 20, 10);
   for (o.fixed_steps = -1; o.fixed_steps <= T + 1; o.fixed_steps += T + 2)
     ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(every_prefix_is_evaluated)
+TEST(every_prefix_is_evaluated)
 {
-  sf_dataset data = load("train"), test = load("test");
+  OWNED(sf_dataset) test = load("test");
   const sf_train_options o = small_run();
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 40);
   double prefix[T], psnr, ssim;
-  ck_good(sf_evaluate_prefixes(&t->model, &test, 1, prefix));
+  ck_ok(sf_evaluate_prefixes(&t->model, &test, 1, prefix));
   for (int i = 0; i < T; i++) {
-    ck_good(sf_evaluate(&t->model, &test, 1, i + 1, &psnr, &ssim));
+    ck_ok(sf_evaluate(&t->model, &test, 1, i + 1, &psnr, &ssim));
     ck_assert_double_eq(prefix[i], psnr);
     if (i) ck_assert_double_ne(prefix[i], prefix[i - 1]);
   }
-  ck_good(sf_evaluate(&t->model, &test, 0, 0, &psnr, &ssim));
+  ck_ok(sf_evaluate(&t->model, &test, 0, 0, &psnr, &ssim));
   ck_assert_double_eq(prefix[t->model.t_r - 1], psnr);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
-  sf_dataset_free(&test);
 }
-END_TEST
 
 /* The model at the end is the mean over the last fortieth of the run: here each of the last 10 of 400 iterations. */
-START_TEST(the_last_iterations_are_averaged)
+TEST(the_last_iterations_are_averaged)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
   o.stage1 = 100;
   o.stage2 = 300;
   o.samples = 256;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 390);
   ck_assert_int_eq(t->averaged, 0);
   double *sum = calloc(t->model.size, sizeof *sum);
@@ -305,7 +269,7 @@ START_TEST(the_last_iterations_are_averaged)
     ck_assert_int_eq(t->averaged, i + 1);
     for (size_t p = 0; p < t->model.size; p++) sum[p] += t->model.value[p] / 10.0;
   }
-  ck_good(sf_trainer_save(t, in("before.safetensors"), true));
+  ck_ok(sf_trainer_save(t, in("before.safetensors"), true));
   float *before = calloc(t->model.size, sizeof *before);
   memcpy(before, t->model.value, t->model.size * sizeof *before);
   ck_assert_int_eq(steps(t, 1).stage, 3);
@@ -321,37 +285,30 @@ START_TEST(the_last_iterations_are_averaged)
   same_model(t, resumed);
   free(sum);
   free(before);
-  sf_trainer_free(t);
   sf_trainer_free(resumed);
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(loss_falls_and_both_twins_learn)
+TEST(loss_falls_and_both_twins_learn)
 {
-  sf_dataset data = load("train");
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_run();
     o.config.net = net;
     if (net == SF_NET_ANN) o.config.steps = 1;
     o.stage1 = 150;
     o.stage2 = 150;
-    sf_trainer *t = start(&data, &o, NULL);
+    OWNED(trainer) t = start(&data, &o, NULL);
     sf_train_stats stats;
     double first = 0, last = 0;
     for (int i = 0; i < 300; i++) {
-      ck_assert_int_eq(sf_trainer_step(t, &stats).code, SF_OK);
+      ck_ok(sf_trainer_step(t, &stats));
       if (i < 10) first += stats.mse;
       if (i >= 290) last += stats.mse;
     }
     ck_assert_double_lt(last, 0.5 * first);
     ck_assert_double_ge(stats.t_star, 1);
     ck_assert_double_le(stats.t_star, o.config.steps);
-    sf_trainer_free(t);
   }
-  sf_dataset_free(&data);
 }
-END_TEST
 
 /* Intervals of a ray: each its own. */
 static const float *intervals(void)
@@ -374,7 +331,7 @@ static double ray_loss(const sf_loss_plan *p, const sf_ray *ray, sf_ray_work *w)
 static void check_plan(sf_loss_plan p)
 {
   sf_ray_work w;
-  ck_assert_int_eq(sf_ray_work_create(&w, N).code, SF_OK);
+  ck_ok(sf_ray_work_create(&w, N));
   sf_ray ray = {.target = {0.9f, 0.3f, 0.5f}, .background = {0.2f, 0.7f, 0.4f}, .count = N};
   for (int t = 0; t < T; t++)
     for (int s = 0; s < N; s++) {
@@ -406,7 +363,7 @@ static void check_plan(sf_loss_plan p)
   free(w.memory);
 }
 
-START_TEST(loss_gradients_are_the_slopes)
+TEST(loss_gradients_are_the_slopes)
 {
   sf_loss_plan one = {
       .steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 1, .k_sigma = 0.4f, .k_colour = 0.6f};
@@ -432,13 +389,12 @@ START_TEST(loss_gradients_are_the_slopes)
   paper.d = 0.7;
   check_plan(paper);
 }
-END_TEST
 
 /* Colour, background and target equal: every term but g2 sum log(1 + 2 sigma) is flat. */
-START_TEST(sparsity_by_hand)
+TEST(sparsity_by_hand)
 {
   sf_ray_work w;
-  ck_assert_int_eq(sf_ray_work_create(&w, N).code, SF_OK);
+  ck_ok(sf_ray_work_create(&w, N));
   const sf_ray ray = {.target = {0.5f, 0.5f, 0.5f}, .background = {0.5f, 0.5f, 0.5f}, .count = 1};
   w.sigma[T - 1][0] = 3;
   for (int c = 0; c < 3; c++) w.colour[T - 1][c] = 0.5f;
@@ -449,55 +405,28 @@ START_TEST(sparsity_by_hand)
   ck_assert_double_eq_tol(sums.regular, 1e-6 * log(7), 1e-8);
   free(w.memory);
 }
-END_TEST
 
 /* Few rays may all pass by a small box: more are drawn. */
-START_TEST(few_rays_that_miss_are_no_fault)
+TEST(few_rays_that_miss_are_no_fault)
 {
-  make_scene(4);
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++)
     for (int away = 0; away < 2; away++) {
-      sf_dataset data;
-      ck_good(
-          sf_dataset_load(&data, in("scene"), "train", &(sf_dataset_options){.downscale = 1, .scale = away ? 40 : 12}));
+      OWNED(sf_dataset) small;
+      ck_ok(sf_dataset_load(&small, in("scene"), "train",
+                            &(sf_dataset_options){.downscale = 1, .scale = away ? 40 : 12}));
       sf_train_options o = small_run();
-      o.samples = 256, o.stage1 = 20, o.stage2 = 20, o.config.net = net, o.config.scale = data.scale;
+      o.samples = 256, o.stage1 = 20, o.stage2 = 20, o.config.net = net, o.config.scale = small.scale;
       if (net == SF_NET_ANN) o.config.steps = 1;
-      sf_trainer *t = start(&data, &o, NULL);
+      OWNED(trainer) t = start(&small, &o, NULL);
       sf_train_stats stats = {0};
       sf_status status = sf_ok();
       while (!status.code && stats.stage != 3) status = sf_trainer_step(t, &stats);
       if (away)
         ck_bad(status, SF_E_RANGE, "none of 32768 rays", "meets the box");
       else
-        ck_good(status);
-      sf_trainer_free(t);
-      sf_dataset_free(&data);
+        ck_ok(status);
     }
-  remove_folder();
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train");
-  TCase *tc = tcase_create("train");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, remove_folder);
-  tcase_add_loop_test(tc, same_seed_same_bits_any_threads, 0, 2);
-  tcase_add_loop_test(tc, resume_continues_bit_identically, 0, 2);
-  tcase_add_test(tc, a_checkpoint_is_of_its_data);
-  tcase_add_test(tc, saved_model_loads_and_saves_equal);
-  tcase_add_loop_test(tc, the_lattice_settles, 0, 2);
-  tcase_add_loop_test(tc, a_lattice_at_its_limit_settles_as_it_is, 0, 2);
-  tcase_add_test(tc, the_chosen_steps_are_trained_alone);
-  tcase_add_test(tc, fixed_steps_freeze_the_budget);
-  tcase_add_test(tc, every_prefix_is_evaluated);
-  tcase_add_test(tc, the_last_iterations_are_averaged);
-  tcase_add_test(tc, loss_falls_and_both_twins_learn);
-  tcase_add_test(tc, loss_gradients_are_the_slopes);
-  tcase_add_test(tc, sparsity_by_hand);
-  tcase_add_test(tc, few_rays_that_miss_are_no_fault);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

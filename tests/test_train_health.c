@@ -4,7 +4,7 @@
 
 static void set_up(void)
 {
-  make_scene(6);
+  open_scene(6);
 }
 
 typedef struct outcome {
@@ -19,7 +19,7 @@ static outcome watch(sf_trainer *t, int layer, int most)
   outcome o = {0};
   double mse[20] = {0};
   for (int i = 0; i < most && !o.event; i++) {
-    ck_good(sf_trainer_step(t, &o.stats));
+    ck_ok(sf_trainer_step(t, &o.stats));
     o.event = o.stats.event[layer];
     mse[i % 20] = o.stats.mse / 20;
   }
@@ -56,12 +56,11 @@ static sf_train_options long_run(void)
   return o;
 }
 
-START_TEST(dead_and_saturated_layers_are_reported_and_revived)
+LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, COUNT(faults))
 {
   const struct fault *f = &faults[_i];
-  sf_dataset data = load("train");
   const sf_train_options o = long_run();
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   ck_assert_int_eq(watch(t, f->layer, 70).event, 0); /* a healthy run is left alone */
   plant(t, f);
   const outcome ill = watch(t, f->layer, 130);
@@ -79,37 +78,29 @@ START_TEST(dead_and_saturated_layers_are_reported_and_revived)
   ck_assert_double_lt(well.stats.firing[f->layer], 0.9);
   ck_assert_int_lt(well.stats.quiet[f->layer], o.config.hidden);
   ck_assert_msg(well.mse < 0.9 * ill.mse, "error %g with the layer dead, %g with it back", ill.mse, well.mse);
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
 /* The count of silence is part of a checkpoint. */
-START_TEST(resume_while_a_layer_is_dead)
+TEST(resume_while_a_layer_is_dead)
 {
-  sf_dataset data = load("train");
   const sf_train_options o = long_run();
-  sf_trainer *whole = start(&data, &o, NULL);
+  OWNED(trainer) whole = start(&data, &o, NULL);
   plant(whole, &faults[1]);
   steps(whole, 100);
-  ck_good(sf_trainer_save(whole, in("a.safetensors"), true));
+  ck_ok(sf_trainer_save(whole, in("a.safetensors"), true));
   sf_trainer *part = start(&data, &o, in("a.safetensors"));
   ck_assert_int_eq(watch(whole, 2, 40).event, -1);
   ck_assert_int_eq(watch(part, 2, 40).event, -1);
   steps(whole, 10);
   steps(part, 10);
   same_model(whole, part);
-  sf_trainer_free(whole);
   sf_trainer_free(part);
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(leaks_stay_in_range)
+TEST(leaks_stay_in_range)
 {
-  sf_dataset data = load("train");
   sf_train_options o = small_run();
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   const float far[SF_LAYERS] = {-50, 50, 1e5f, -1e5f, 80};
   memcpy(sf_model_param(&t->model, SF_P_LEAK), far, sizeof far);
   const sf_train_stats s = steps(t, 1);
@@ -118,21 +109,17 @@ START_TEST(leaks_stay_in_range)
     ck_assert_double_le(s.tau[l], 1000.1);
   }
   steps(t, 39);
-  ck_good(sf_trainer_save(t, in("leaks.safetensors"), true));
-  sf_trainer_free(t);
-  sf_dataset_free(&data);
+  ck_ok(sf_trainer_save(t, in("leaks.safetensors"), true));
 }
-END_TEST
 
 /* Every tensor: the run stops in the same iteration, and the checkpoint before it stays and goes on. A spiking net
  * could hide a NaN, which crosses no threshold. */
-START_TEST(nan_stops_the_run_and_keeps_the_checkpoint)
+TEST(nan_stops_the_run_and_keeps_the_checkpoint)
 {
-  sf_dataset data = load("train");
   const sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, 3);
-  ck_good(sf_trainer_save(t, in("good.safetensors"), true));
+  ck_ok(sf_trainer_save(t, in("good.safetensors"), true));
   sf_trainer_free(t);
   for (int i = 0; i < 2 * SF_P_COUNT; i++) {
     const int id = i / 2;
@@ -152,16 +139,13 @@ START_TEST(nan_stops_the_run_and_keeps_the_checkpoint)
   t = start(&data, &o, in("good.safetensors"));
   ck_assert_int_eq(steps(t, 37).stage, 3);
   sf_trainer_free(t);
-  sf_dataset_free(&data);
 }
-END_TEST
 
-START_TEST(diverging_rate_stops_the_run)
+TEST(diverging_rate_stops_the_run)
 {
-  sf_dataset data = load("train");
   for (int grid = 0; grid < 2; grid++) {
     const sf_train_options o = small_run();
-    sf_trainer *t = start(&data, &o, NULL);
+    OWNED(trainer) t = start(&data, &o, NULL);
     steps(t, 3);
     *(grid ? &t->options.lr_grid : &t->options.lr_net) = 1e30;
     sf_train_stats stats;
@@ -169,11 +153,8 @@ START_TEST(diverging_rate_stops_the_run)
     for (int i = 0; i < 2 && !status.code; i++) status = sf_trainer_step(t, &stats);
     ck_bad(status, SF_E_RANGE, grid ? "iteration 4" : "iteration 3", grid ? "grid.table" : "density.w1");
     if (!grid) ck_bad(sf_trainer_save(t, in("bad.safetensors"), true), SF_E_RANGE, "density.w1", "diverged");
-    sf_trainer_free(t);
   }
-  sf_dataset_free(&data);
 }
-END_TEST
 
 static void paint(sf_dataset *data, uint16_t rgb, uint16_t alpha)
 {
@@ -213,7 +194,7 @@ static void harden(int which, sf_dataset *data, sf_train_options *o)
 
 static void hard_case(int which, int net)
 {
-  sf_dataset data = load("train");
+  OWNED(sf_dataset) data = load("train");
   const int views = data.count;
   sf_train_options o = small_run();
   o.stage1 = 30;
@@ -234,37 +215,20 @@ static void hard_case(int which, int net)
   }
   ck_assert_msg(last < first, "error %g at first, %g at last", first / 10, last / 10);
   if (which == BETA) ck_assert_int_eq(t->model.t_r, 1);
-  ck_good(sf_trainer_save(t, in("hard.safetensors"), false));
+  ck_ok(sf_trainer_save(t, in("hard.safetensors"), false));
   sf_trainer_free(t);
   data.count = views;
-  sf_dataset_free(&data);
 }
 
-START_TEST(hard_cases_stay_finite_and_in_range)
+LOOP_TEST(hard_cases_stay_finite_and_in_range, CASES)
 {
   hard_case(_i, SF_NET_SNN);
 }
-END_TEST
 
-START_TEST(hard_scenes_with_the_twin)
+LOOP_TEST(hard_scenes_with_the_twin, SCENES)
 {
   hard_case(_i, SF_NET_ANN);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train_health");
-  TCase *tc = tcase_create("train_health");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, remove_folder);
-  tcase_add_loop_test(tc, dead_and_saturated_layers_are_reported_and_revived, 0, sizeof faults / sizeof *faults);
-  tcase_add_test(tc, resume_while_a_layer_is_dead);
-  tcase_add_test(tc, leaks_stay_in_range);
-  tcase_add_test(tc, nan_stops_the_run_and_keeps_the_checkpoint);
-  tcase_add_test(tc, diverging_rate_stops_the_run);
-  tcase_add_loop_test(tc, hard_cases_stay_finite_and_in_range, 0, CASES);
-  tcase_add_loop_test(tc, hard_scenes_with_the_twin, 0, SCENES);
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

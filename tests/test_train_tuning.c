@@ -8,28 +8,25 @@
 enum { BITS = 4, LIMIT = 7 };
 
 static const sf_param_id weights_of[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
-static sf_dataset data;
 static sf_model base; /* trained for a moment, its scales settled */
 
 static void settle(sf_model *m, int bits)
 {
-  fx_scene scene;
+  OWNED(fx_scene) scene;
   sf_quant_report report;
-  ck_good(sf_quantise_report(&scene, m, "base", &(sf_quant_options){.widths.weight_bits = bits}, &report));
+  ck_ok(sf_quantise_report(&scene, m, "base", &(sf_quant_options){.widths.weight_bits = bits}, &report));
   m->scales = report.scales;
-  fx_scene_free(&scene);
 }
 
 static void set_up(void)
 {
-  make_scene(6);
-  data = load("train");
+  open_scene(6);
   const sf_train_options o = small_run();
   sf_trainer *t = start(&data, &o, NULL);
   steps(t, o.stage1 + o.stage2);
-  ck_good(sf_trainer_save(t, in("base.safetensors"), false));
+  ck_ok(sf_trainer_save(t, in("base.safetensors"), false));
   sf_trainer_free(t);
-  ck_good(sf_model_load(&base, in("base.safetensors")));
+  ck_ok(sf_model_load(&base, in("base.safetensors")));
   ck_assert_int_eq(base.scales.weight_bits, 0);
   settle(&base, BITS);
 }
@@ -37,8 +34,7 @@ static void set_up(void)
 static void tear_down(void)
 {
   sf_model_free(&base);
-  sf_dataset_free(&data);
-  remove_folder();
+  close_scene();
 }
 
 static sf_train_options tuning_run(void)
@@ -73,45 +69,39 @@ static int same_integers(const sf_model *m, const fx_scene *scene, const fx_scen
   return moved;
 }
 
-START_TEST(export_reproduces_the_rounded_weights)
+TEST(export_reproduces_the_rounded_weights)
 {
   const sf_train_options o = tuning_run();
   const sf_quant_options as_recorded = {.background = {1, 1, 1}};
-  sf_trainer *t = start(&data, &o, NULL);
-  fx_scene before, after, loaded;
-  sf_model m;
-  ck_good(sf_quantise(&before, &base, "base", &as_recorded));
+  OWNED(trainer) t = start(&data, &o, NULL);
+  OWNED(fx_scene) before, after, loaded;
+  OWNED(sf_model) m;
+  ck_ok(sf_quantise(&before, &base, "base", &as_recorded));
   const sf_train_stats stats = steps(t, o.stage2);
   ck_assert_int_eq(stats.stage, 3);
   ck_assert_int_eq(stats.t_r, base.t_r);
   ck_assert_int_eq(memcmp(t->model.occupancy, base.occupancy, 16 * 16 * 16 / 8), 0);
-  ck_good(sf_quantise(&after, &t->model, "tuned", &as_recorded));
+  ck_ok(sf_quantise(&after, &t->model, "tuned", &as_recorded));
   ck_assert_int_gt(same_integers(&t->model, &after, &before), 50); /* of 3664 weights: it has learned */
-  ck_good(sf_trainer_save(t, in("tuned.safetensors"), false));
-  ck_good(sf_model_load(&m, in("tuned.safetensors")));
+  ck_ok(sf_trainer_save(t, in("tuned.safetensors"), false));
+  ck_ok(sf_model_load(&m, in("tuned.safetensors")));
   ck_assert_int_eq(memcmp(&m.scales, &base.scales, sizeof m.scales), 0);
-  ck_good(sf_quantise(&loaded, &m, "tuned", &as_recorded));
+  ck_ok(sf_quantise(&loaded, &m, "tuned", &as_recorded));
   ck_assert_int_eq(same_integers(&m, &loaded, &after), 0);
   for (int l = 0; l < base.config.levels; l++) {
     ck_assert_double_eq(loaded.units.feature_scale[l], base.scales.lsb.feature[l]);
     ck_assert_int_eq(loaded.grid.shift[l], before.grid.shift[l]);
   }
   ck_assert_double_eq(loaded.units.dir_scale, base.scales.lsb.direction);
-  sf_model_free(&m);
-  fx_scene_free(&before);
-  fx_scene_free(&after);
-  fx_scene_free(&loaded);
-  sf_trainer_free(t);
 }
-END_TEST
 
-START_TEST(resume_continues_bit_identically)
+TEST(resume_continues_bit_identically)
 {
   const sf_train_options o = tuning_run();
   sf_trainer *whole = start(&data, &o, NULL), *part = start(&data, &o, NULL);
   steps(whole, o.stage2);
   steps(part, 17);
-  ck_good(sf_trainer_save(part, in("part.safetensors"), true));
+  ck_ok(sf_trainer_save(part, in("part.safetensors"), true));
   sf_trainer_free(part);
   sf_train_options again = o;
   again.start = NULL;
@@ -121,21 +111,20 @@ START_TEST(resume_continues_bit_identically)
   sf_trainer_free(whole);
   sf_trainer_free(part);
 }
-END_TEST
 
 /* The core on integers against the float nets on what they stand for, inputs on their grids: equal currents at t = 0
  * but for float sums (128 terms: 1e-5 of their size), h rounded down in both. C1's currents are so coarse that some
  * equal the threshold, where a float sum may fall short: such samples, at most 48 of 64, say nothing of C2. */
-START_TEST(float_nets_compute_what_the_core_does)
+TEST(float_nets_compute_what_the_core_does)
 {
   const sf_train_options o = tuning_run();
   const int F = 2 * o.config.levels;
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, o.stage2);
   const sf_model *m = &t->model;
   const sf_scales *s = &m->scales;
-  fx_scene scene;
-  ck_good(sf_quantise(&scene, m, "tuned", &(sf_quant_options){0}));
+  OWNED(fx_scene) scene;
+  ck_ok(sf_quantise(&scene, m, "tuned", &(sf_quant_options){0}));
   fx_trace *fixed = calloc(1, sizeof *fixed);
   sf_net_trace *real = calloc(1, sizeof *real);
   int spikes = 0, rounded = 0;
@@ -178,13 +167,10 @@ START_TEST(float_nets_compute_what_the_core_does)
   ck_assert_int_gt(rounded, 100);
   free(fixed);
   free(real);
-  fx_scene_free(&scene);
-  sf_trainer_free(t);
 }
-END_TEST
 
 /* The vector kernels round h as the scalar nets do. */
-START_TEST(kernels_round_h_as_the_oracle)
+TEST(kernels_round_h_as_the_oracle)
 {
   sf_model m = base;
   sf_net_view view = sf_net_view_of(&m);
@@ -210,35 +196,20 @@ START_TEST(kernels_round_h_as_the_oracle)
   free(block);
   free(scratch);
 }
-END_TEST
 
-START_TEST(damaged_scales_are_refused)
+TEST(damaged_scales_are_refused)
 {
   const sf_train_options o = tuning_run();
-  sf_trainer *t = start(&data, &o, NULL);
+  OWNED(trainer) t = start(&data, &o, NULL);
   sf_model m;
   t->model.scales.weight_bits = 9;
-  ck_good(sf_trainer_save(t, in("bad.safetensors"), false));
+  ck_ok(sf_trainer_save(t, in("bad.safetensors"), false));
   ck_bad(sf_model_load(&m, in("bad.safetensors")), SF_E_RANGE, "weight_bits", "9");
   t->model.scales.weight_bits = BITS;
   t->model.scales.lsb.current[2] = 0;
-  ck_good(sf_trainer_save(t, in("bad.safetensors"), false));
+  ck_ok(sf_trainer_save(t, in("bad.safetensors"), false));
   ck_bad(sf_model_load(&m, in("bad.safetensors")), SF_E_RANGE, "scales", "35");
-  sf_trainer_free(t);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("train_tuning");
-  TCase *tc = tcase_create("train_tuning");
-  tcase_set_timeout(tc, 180);
-  tcase_add_unchecked_fixture(tc, set_up, tear_down);
-  tcase_add_test(tc, export_reproduces_the_rounded_weights);
-  tcase_add_test(tc, resume_continues_bit_identically);
-  tcase_add_test(tc, float_nets_compute_what_the_core_does);
-  tcase_add_test(tc, damaged_scales_are_refused);
-  tcase_add_test(tc, kernels_round_h_as_the_oracle); /* last: rounds the base model's weights */
-  suite_add_tcase(suite, tc);
-  return ck_run_in(suite, CK_NOFORK); // OpenMP does not survive a fork
-}
+int ck_timeout = 180;
+ck_options ck_program = {.set_up_all = set_up, .tear_down_all = tear_down, .one_process = true};

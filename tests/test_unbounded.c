@@ -8,7 +8,6 @@
 #include "src/fx/march.h"
 #include <check.h>
 #include <math.h>
-#include <string.h>
 
 static sf_config large_config(int bound, int res)
 {
@@ -21,12 +20,12 @@ static sf_config large_config(int bound, int res)
 /* ---- steps ---- */
 
 /* The recurrence in double precision; float adds up to 1024 roundings of 2^-24 of the distance. */
-START_TEST(steps_grow_as_the_formula_says)
+TEST(steps_grow_as_the_formula_says)
 {
   for (int bound = 1; bound <= 64; bound *= 2) {
     const sf_config c = large_config(bound, 128);
     sf_steps s;
-    ck_assert_int_eq(sf_steps_make(&s, &c, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&s, &c, 1));
     double start = 0;
     const double least = 2 * sqrt(3) / 1024, most = 2 * sqrt(3) * bound / 128;
     for (int n = 0; n < s.count; n++) {
@@ -42,25 +41,21 @@ START_TEST(steps_grow_as_the_formula_says)
     ck_assert_int_le(s.count, bound > 1 ? 900 : 1024);
   }
 }
-END_TEST
 
-START_TEST(boxes_that_steps_do_not_cross_are_refused)
+TEST(boxes_that_steps_do_not_cross_are_refused)
 {
   sf_config c = large_config(8, 128);
   c.dt_gamma = 0;
-  const sf_status status = sf_config_check(&c);
-  ck_assert_int_eq(status.code, SF_E_RANGE);
-  ck_assert_ptr_nonnull(strstr(status.message, "dt_gamma"));
+  ck_bad(sf_config_check(&c), SF_E_RANGE, "dt_gamma", "");
   c.lattice = 128; /* 8 * 128 equal steps */
-  ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
+  ck_ok(sf_config_check(&c));
   c.bound = 12;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound"));
   c = sf_tensorf_default(0.8f, 0); /* one occupancy grid, equal steps */
-  ck_assert_int_eq(sf_config_check(&c).code, SF_OK);
+  ck_ok(sf_config_check(&c));
   c.bound = 2;
   ck_assert_ptr_nonnull(strstr(sf_config_check(&c).message, "bound = 2"));
 }
-END_TEST
 
 /* ---- rays ---- */
 
@@ -113,7 +108,7 @@ static void scatter(sf_model *m, uint64_t trial)
 }
 
 /* Skipping finds the points that testing every point by the direct formula finds, in every cascade. */
-START_TEST(march_equals_testing_every_point)
+TEST(march_equals_testing_every_point)
 {
   for (int bound = 2; bound <= 32; bound *= 4) {
     sf_config c = large_config(bound, 16);
@@ -121,8 +116,8 @@ START_TEST(march_equals_testing_every_point)
     sf_model m;
     sf_steps steps;
     int found = 0, in_cascade[7] = {0};
-    ck_assert_int_eq(sf_model_create(&m, &c).code, SF_OK);
-    ck_assert_int_eq(sf_steps_make(&steps, &c, 1).code, SF_OK);
+    ck_ok(sf_model_create(&m, &c));
+    ck_ok(sf_steps_make(&steps, &c, 1));
     for (uint64_t i = 0; i < 600; i++) {
       float o[3], d[3], x[3], y[3];
       if (i % 20 == 0) scatter(&m, i);
@@ -146,14 +141,13 @@ START_TEST(march_equals_testing_every_point)
     sf_model_free(&m);
   }
 }
-END_TEST
 
 /* Intervals neither overlap nor leave gaps, and stay in the box. */
-START_TEST(rays_are_cut_without_gaps)
+TEST(rays_are_cut_without_gaps)
 {
   const sf_config c = large_config(16, 128);
   sf_steps steps;
-  ck_assert_int_eq(sf_steps_make(&steps, &c, 1).code, SF_OK);
+  ck_ok(sf_steps_make(&steps, &c, 1));
   int hits = 0;
   for (uint64_t i = 0; i < 2000; i++) {
     float o[3], d[3];
@@ -171,7 +165,6 @@ START_TEST(rays_are_cut_without_gaps)
   }
   ck_assert_int_gt(hits, 1000);
 }
-END_TEST
 
 /* ---- in integers ---- */
 
@@ -180,11 +173,10 @@ static void make_pair(int bound, int res, sf_model *m, fx_scene *scene)
 {
   const sf_config c = large_config(bound, res);
   const sf_quant_options options = {.background = {1, 0.5f, 0}};
-  ck_assert_int_eq(sf_model_create(m, &c).code, SF_OK);
+  ck_ok(sf_model_create(m, &c));
   for (size_t i = 0; i < m->size; i++) m->value[i] = test_random(i);
   scatter(m, (uint64_t)bound);
-  const sf_status status = sf_quantise(scene, m, "model", &options);
-  ck_assert_msg(status.code == SF_OK, "%s", status.message);
+  ck_ok(sf_quantise(scene, m, "model", &options));
 }
 
 static void free_pair(sf_model *m, fx_scene *scene)
@@ -195,7 +187,7 @@ static void free_pair(sf_model *m, fx_scene *scene)
 
 /* The integer steps against the recurrence in double precision. Lengths are rounded to 2^-16 of a lattice step, which
  * later ones grow with: 1e-4 in all. */
-START_TEST(integer_steps_grow_as_the_formula_says)
+TEST(integer_steps_grow_as_the_formula_says)
 {
   for (int bound = 2; bound <= 64; bound *= 2) {
     sf_model m;
@@ -216,10 +208,9 @@ START_TEST(integer_steps_grow_as_the_formula_says)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 /* The cell that shifts find is that of the direct formula, for points on and beside every face, too. */
-START_TEST(integer_cells_are_those_of_the_formula)
+TEST(integer_cells_are_those_of_the_formula)
 {
   for (int bound = 1; bound <= 64; bound *= 4) {
     const sf_config c = large_config(bound, 16);
@@ -241,12 +232,11 @@ START_TEST(integer_cells_are_those_of_the_formula)
     }
   }
 }
-END_TEST
 
 /* The same points as the float marcher. The lattice step is rounded to Q0.24, so that distances differ by up to
  * 2^-25 / step_q24 of themselves; the table adds 1e-4 of a distance; float itself is good to 2^-22 of the distance to
  * the camera. */
-START_TEST(integer_rays_follow_the_float_march)
+TEST(integer_rays_follow_the_float_march)
 {
   for (int bound = 2; bound <= 16; bound *= 2) {
     sf_model m;
@@ -255,14 +245,14 @@ START_TEST(integer_rays_follow_the_float_march)
     int hits = 0, differ = 0;
     double largest = 0;
     make_pair(bound, 64, &m, &scene);
-    ck_assert_int_eq(sf_steps_make(&steps, &m.config, 1).code, SF_OK);
+    ck_ok(sf_steps_make(&steps, &m.config, 1));
     const double exact = ldexp(sqrt(3) / 1024 / bound, 24), drift = fabs(scene.step_q24 / exact - 1) + 1e-4;
     for (uint64_t i = 0; i < 1200; i++) {
       float o[3], d[3], x[3];
       fx_ray ray;
       draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
       const sf_march march = sf_march_begin(&m, &steps, o, d, 0.5f);
-      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_OK);
+      ck_ok(sf_fx_ray_make(&scene, o, d, &ray));
       ck_assert_int_le(abs(ray.count - march.lattice.count), 2);
       differ += ray.count != march.lattice.count;
       hits += ray.count > 0;
@@ -285,11 +275,10 @@ START_TEST(integer_rays_follow_the_float_march)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 /* Precision alone: points against the line that they should lie on. The step is off by half of 2^-40, as often as there
  * are steps, and the product is cut to 2^-40. */
-START_TEST(positions_are_precise_in_the_largest_boxes)
+TEST(positions_are_precise_in_the_largest_boxes)
 {
   for (int bound = 16; bound <= 64; bound *= 2) {
     sf_model m;
@@ -316,16 +305,15 @@ START_TEST(positions_are_precise_in_the_largest_boxes)
     free_pair(&m, &scene);
   }
 }
-END_TEST
 
 static const char *const instruction_sets[] = {"portable", "avx2", "avx512vnni", "amx"};
 
 /* Vector kernels and single rays: same pixels and events; and no light is lost or made. */
-START_TEST(many_rays_equal_single_rays)
+LOOP_TEST(many_rays_equal_single_rays, 4)
 {
   enum { RAYS = 96 };
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   fx_core *core;
   fx_ray ray[RAYS];
   fx_pixel pixel[RAYS];
@@ -336,15 +324,15 @@ START_TEST(many_rays_equal_single_rays)
   for (uint64_t i = 0; i < RAYS; i++) {
     float o[3], d[3];
     draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray[i]).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o, d, &ray[i]));
   }
   const sf_status status = fx_core_open(&core, &scene, instruction_sets[_i]);
   if (status.code == SF_E_UNSUPPORTED) printf("%s: not on this machine\n", instruction_sets[_i]);
   if (status.code == SF_OK) {
-    ck_assert_int_eq(fx_render_rays(core, ray, RAYS, pixel, NULL, &all).code, SF_OK);
+    ck_ok(fx_render_rays(core, ray, RAYS, pixel, NULL, &all));
     for (int i = 0; i < RAYS; i++) {
       fx_pixel one;
-      ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &sum).code, SF_OK);
+      ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &one, &sum));
       ck_assert_mem_eq(&one, &pixel[i], sizeof one);
       ck_assert_uint_eq(one.weight_sum + one.transmittance, 1u << SF_TRANS_FRAC);
     }
@@ -352,15 +340,13 @@ START_TEST(many_rays_equal_single_rays)
     ck_assert_uint_gt(all.samples, 1000);
     fx_core_close(core);
   }
-  free_pair(&m, &scene);
 }
-END_TEST
 
 /* Fog of one density everywhere: growing intervals take the light that their lengths say. */
-START_TEST(fog_takes_the_light_of_its_depth)
+TEST(fog_takes_the_light_of_its_depth)
 {
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   make_pair(8, 16, &m, &scene);
   memset(scene.occupancy, 0xff, sf_config_cells(&m.config) / 8);
   memset(scene.grid.table, 0, (size_t)scene.grid.entries * 2);
@@ -374,32 +360,28 @@ START_TEST(fog_takes_the_light_of_its_depth)
       fx_pixel pixel;
       double depth = 0;
       draw_ray((int)(i % 2), i, 8, o, d);
-      ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray).code, SF_OK);
+      ck_ok(sf_fx_ray_make(&scene, o, d, &ray));
       for (int n = 0; n < ray.count; n++) depth += ldexp(fx_delta(&scene, n), -24);
-      ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL).code, SF_OK);
+      ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL));
       ck_assert_uint_eq(pixel.samples, (uint32_t)ray.count);
       /* each of up to 700 samples rounds the transmittance to 2^-20, 2^y has 2^-12 */
       ck_assert_double_eq_tol(ldexp(pixel.transmittance, -SF_TRANS_FRAC), exp(-depth * ldexp(1, sigma)), 1e-3);
     }
   }
-  free_pair(&m, &scene);
 }
-END_TEST
 
-START_TEST(files_keep_the_box)
+TEST(files_keep_the_box)
 {
   sf_model m;
   fx_scene scene, back;
   make_pair(16, 16, &m, &scene);
-  make_folder();
-  ck_good(fx_scene_save(&scene, in("x.snn")));
-  ck_good(fx_scene_load(&back, in("x.snn")));
+  ck_ok(fx_scene_save(&scene, in("x.snn")));
+  ck_ok(fx_scene_load(&back, in("x.snn")));
   ck_assert_int_eq(back.log2_bound, 4);
   ck_assert(back.gamma_q24 == 1 << 17 && back.near_q16 == scene.near_q16 && back.longest_q16 == scene.longest_q16);
   ck_assert_mem_eq(back.occupancy, scene.occupancy, sf_config_cells(&m.config) / 8);
   ck_assert_mem_eq(back.steps, scene.steps, sizeof *back.steps);
   fx_scene_free(&back);
-  remove_folder();
   scene.longest_q16 = 1;
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "longest_q16"));
   scene.longest_q16 = 1 << 20, scene.gamma_q24 = 1 << 22;
@@ -408,10 +390,9 @@ START_TEST(files_keep_the_box)
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "log2_bound"));
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* What can be fitted has one grid; others are told so. */
-START_TEST(fitting_refuses)
+TEST(fitting_refuses)
 {
   sf_model m;
   fx_scene scene, fitted;
@@ -420,18 +401,15 @@ START_TEST(fitting_refuses)
   const fx_scene *const candidate[] = {&scene};
   const sf_fit_rays rays = {0};
   const sf_fit_job job = {.candidate = candidate, .candidates = 1, .name = "x.snn", .rays = &rays};
-  const sf_status status = sf_fit(&fitted, &job, &report);
-  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
-  ck_assert_ptr_nonnull(strstr(status.message, "x.snn: 3 occupancy grids"));
+  ck_bad(sf_fit(&fitted, &job, &report), SF_E_UNSUPPORTED, "x.snn: 3 occupancy grids", "");
   free_pair(&m, &scene);
 }
-END_TEST
 
 /* Entries that are zeroed because no occupied cell reads them change no ray. */
-START_TEST(unread_entries_change_no_ray)
+TEST(unread_entries_change_no_ray)
 {
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   make_pair(8, 16, &m, &scene);
   for (size_t i = 0; i < sf_config_cells(&m.config) / 8; i++) /* few cells, each in its own byte */
     scene.occupancy[i] = (uint8_t)(sf_random_below(7, 0, i, 10) == 0);
@@ -440,68 +418,43 @@ START_TEST(unread_entries_change_no_ray)
   for (uint64_t i = 0; i < 200; i++) {
     float o[3], d[3];
     draw_ray((int)(i / 4 % KINDS), i, 8, o, d);
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o, d, &ray[i]).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &before[i], NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o, d, &ray[i]));
+    ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &before[i], NULL));
   }
   ck_assert_int_ge(sf_grid_zero_unread(&scene), 0);
   uint32_t samples = 0;
   for (int i = 0; i < 200; i++) {
-    ck_assert_int_eq(fx_render_ray(&scene, &ray[i], NULL, NULL, &after, NULL).code, SF_OK);
+    ck_ok(fx_render_ray(&scene, &ray[i], NULL, NULL, &after, NULL));
     ck_assert_mem_eq(&after, &before[i], sizeof after);
     samples += after.samples;
   }
   ck_assert_uint_gt(samples, 100);
-  free_pair(&m, &scene);
 }
-END_TEST
 
 /* The export of a model shows what the model shows. */
-START_TEST(fixed_pictures_equal_float_ones)
+TEST(fixed_pictures_equal_float_ones)
 {
   enum { RAYS = 400 };
   static float o[3 * RAYS], d[3 * RAYS], rgb[3 * RAYS];
-  sf_model m;
-  fx_scene scene;
+  OWNED(sf_model) m;
+  OWNED(fx_scene) scene;
   const float background[3] = {1, 0.5f, 0};
   double squares = 0;
   make_pair(8, 16, &m, &scene);
   for (uint64_t i = 0; i < RAYS; i++) draw_ray((int)(i / 4 % KINDS), i, 8, o + 3 * i, d + 3 * i);
-  ck_assert_int_eq(sf_render_rays(&m, o, d, RAYS, 0, background, rgb, NULL, NULL, NULL).code, SF_OK);
+  ck_ok(sf_render_rays(&m, o, d, RAYS, 0, background, rgb, NULL, NULL, NULL));
   for (int i = 0; i < RAYS; i++) {
     fx_ray ray;
     fx_pixel pixel;
     uint32_t rgba[4];
-    ck_assert_int_eq(sf_fx_ray_make(&scene, o + 3 * i, d + 3 * i, &ray).code, SF_OK);
-    ck_assert_int_eq(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL).code, SF_OK);
+    ck_ok(sf_fx_ray_make(&scene, o + 3 * i, d + 3 * i, &ray));
+    ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, NULL));
     fx_pixel_rgba(&pixel, rgba);
     for (int c = 0; c < 3; c++) squares += pow(rgba[c] / 65535.0 - fmin((double)rgb[3 * i + c], 1), 2);
   }
   const double psnr = -10 * log10(squares / (3.0 * RAYS));
   printf("fixed against float, bound 8: %.1f dB\n", psnr);
   ck_assert_double_gt(psnr, 30); /* flips of spikes of an untrained net; a wrong delta or cell costs 15 dB */
-  free_pair(&m, &scene);
 }
-END_TEST
 
-int main(void)
-{
-  Suite *suite = suite_create("unbounded");
-  TCase *tc = tcase_create("unbounded");
-  tcase_set_timeout(tc, 60);
-  tcase_add_test(tc, steps_grow_as_the_formula_says);
-  tcase_add_test(tc, boxes_that_steps_do_not_cross_are_refused);
-  tcase_add_test(tc, march_equals_testing_every_point);
-  tcase_add_test(tc, rays_are_cut_without_gaps);
-  tcase_add_test(tc, integer_steps_grow_as_the_formula_says);
-  tcase_add_test(tc, integer_cells_are_those_of_the_formula);
-  tcase_add_test(tc, integer_rays_follow_the_float_march);
-  tcase_add_test(tc, positions_are_precise_in_the_largest_boxes);
-  tcase_add_loop_test(tc, many_rays_equal_single_rays, 0, 4);
-  tcase_add_test(tc, fog_takes_the_light_of_its_depth);
-  tcase_add_test(tc, files_keep_the_box);
-  tcase_add_test(tc, fitting_refuses);
-  tcase_add_test(tc, unread_entries_change_no_ray);
-  tcase_add_test(tc, fixed_pictures_equal_float_ones);
-  suite_add_tcase(suite, tc);
-  return ck_run(suite);
-}
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

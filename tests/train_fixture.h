@@ -11,14 +11,28 @@ static inline void make_scene(int views)
 {
   make_folder();
   const sf_procedural_options o = {.width = 24, .height = 24, .train_views = views, .test_views = 1, .seed = 1};
-  ck_good(sf_procedural_write("simple", in("scene"), &o, NULL, NULL));
+  ck_ok(sf_procedural_write("simple", in("scene"), &o, NULL, NULL));
 }
 
 static inline sf_dataset load(const char *split)
 {
   sf_dataset data;
-  ck_good(sf_dataset_load(&data, in("scene"), split, &(sf_dataset_options){.downscale = 1}));
+  ck_ok(sf_dataset_load(&data, in("scene"), split, &(sf_dataset_options){.downscale = 1}));
   return data;
+}
+
+static sf_dataset data; /* the views that a program's tests train on */
+
+static inline void open_scene(int views)
+{
+  make_scene(views);
+  data = load("train");
+}
+
+static inline void close_scene(void)
+{
+  sf_dataset_free(&data);
+  remove_folder();
 }
 
 static inline sf_train_options small_run(void)
@@ -37,10 +51,17 @@ static inline sf_train_options small_run(void)
   return o;
 }
 
+typedef sf_trainer *trainer; /* OWNED(trainer) */
+
+static inline void trainer_free(trainer *t)
+{
+  sf_trainer_free(*t);
+}
+
 static inline sf_trainer *start(const sf_dataset *data, const sf_train_options *o, const char *resume)
 {
   sf_trainer *t;
-  ck_good(sf_trainer_create(&t, data, o, resume));
+  ck_ok(sf_trainer_create(&t, data, o, resume));
   return t;
 }
 
@@ -48,7 +69,7 @@ static inline sf_trainer *start(const sf_dataset *data, const sf_train_options *
 static inline sf_train_stats steps(sf_trainer *t, int n)
 {
   sf_train_stats stats = {0};
-  for (int i = 0; i < n; i++) ck_good(sf_trainer_step(t, &stats));
+  for (int i = 0; i < n; i++) ck_ok(sf_trainer_step(t, &stats));
   return stats;
 }
 

@@ -1,20 +1,8 @@
 #!/bin/bash
 # make pareto on a tiny model of its own: points against sim_render; a variant build; interrupted and continued equals
 # uninterrupted; a point that fails; other parameters start again.   usage: pareto.sh BUILD
-set -u
-export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} OPT=-O0 CFLAGS=-g0
-programs=$(cd "${1:?usage: pareto.sh BUILD}/bin" && pwd) || exit 2
-script=$(cd "$(dirname "$0")/../../tools" && pwd)/pareto.sh
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_pareto.XXXXXX") || exit 1
-pid=
-trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-fail() {
-  echo "FAILED: $1"
-  [ -e "$work/out" ] && tail -n 12 "$work/out" | cut -c -200
-  exit 1
-}
-build() { mkdir -p "$work/$1/bin" && ln -s "$programs"/* "$work/$1/bin/"; }
+. "$(dirname "$0")/../tool_run.bash" pareto "$@"
+export OPT=-O0 CFLAGS=-g0
 # point LINE: a stand-in in build `part`, always the same program, runs LINE and goes on as sf_point.
 point() {
   echo "$1" >"$work/line"
@@ -22,15 +10,8 @@ point() {
   printf '%s\n' '#!/bin/bash' ". '$work/line'" "exec '$programs/sf_point' \"\$@\"" >"$work/part/bin/sf_point"
   chmod +x "$work/part/bin/sf_point"
 }
-pareto() { # NAME STATUS OPTIONS...: output in $work/out
-  local name=$1 wanted=$2 got
-  shift 2
-  "$script" "$work/$name" --profile smoke "$@" >"$work/out" 2>&1
-  got=$?
-  [ $got -eq "$wanted" ] || fail "$name $*: exit status $got, expected $wanted"
-}
+pareto() { run_tool "$@"; }
 points() { echo "$work/$1/pareto/smoke/points"; }
-count() { grep -c "$1" "$work/out"; }
 number() { sed -nE "s/.*\"$2\":[[:space:]]*(-?[0-9.e+-]+).*/\1/p" "$1" | head -n 1; }
 facts() { (cd "$(points "$1")" && grep -v '"samples_per_second"' ./*.json); }
 

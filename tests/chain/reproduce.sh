@@ -1,37 +1,15 @@
 #!/bin/bash
 # make reproduce on a tiny scene of its own: all runs; interrupted in the middle and continued equals uninterrupted; a
 # run that fails; what is run again and what is not.   usage: reproduce.sh BUILD
-set -u
-export LC_ALL=C OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
-programs=$(cd "${1:?usage: reproduce.sh BUILD}/bin" && pwd) || exit 2
-script=$(cd "$(dirname "$0")/../../tools" && pwd)/reproduce.sh
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_reproduce.XXXXXX") || exit 1
-pid=
-trap '[ -z "$pid" ] || kill -TERM "$pid" 2>/dev/null; wait; rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-fail() {
-  echo "FAILED: $1"
-  [ -e "$work/out" ] && tail -n 12 "$work/out" | cut -c -200
-  exit 1
-}
-
-build() { mkdir -p "$work/$1/bin" && ln -s "$programs"/* "$work/$1/bin/"; }
+. "$(dirname "$0")/../tool_run.bash" reproduce "$@"
 # trainer LINE: a stand-in in build `part` that runs LINE, notes its arguments and goes on as sf_train.
 trainer() {
   rm "$work/part/bin/sf_train"
   printf '%s\n' '#!/bin/bash' "$1" "echo \"\$*\" >>'$work/calls'" "exec '$programs/sf_train' \"\$@\"" >"$work/part/bin/sf_train"
   chmod +x "$work/part/bin/sf_train"
 }
-# reproduce NAME STATUS OPTIONS...: output in $work/out
-reproduce() {
-  local name=$1 wanted=$2 got
-  shift 2
-  "$script" "$work/$name" --profile smoke "$@" >"$work/out" 2>&1
-  got=$?
-  [ $got -eq "$wanted" ] || fail "$name: exit status $got, expected $wanted"
-}
+reproduce() { run_tool "$@"; }
 runs() { echo "$work/$1/reproduce/smoke/textured"; }
-count() { grep -c "$1" "$work/out"; }
 times() { (cd "$(runs "$1")" && stat -c '%n %y' ./*/train.json ./*/fixed-0.json 2>/dev/null | sort); }
 # What a run found, less its times.
 facts() { grep -v '"seconds"\|"samples_per_second"' "$work/$1/reproduce/smoke/results.json"; }

@@ -27,7 +27,7 @@ COMMA := ,
 SPACE := $(subst ,, )
 mutants_of = $(foreach m,$(MUTATED_$1),$m:$(subst $(SPACE),$(COMMA),$(strip $(or $(MUTANT_CHECKERS_$m),$(MUTANT_CHECKERS_$1)))))
 mutant_programs = $(sort $(foreach m,$(MUTATED_$1),$(or $(MUTANT_CHECKERS_$m),$(MUTANT_CHECKERS_$1))))
-MUTANT_OBJ := $B/obj/tests/mutate/mutant.o $B/obj/tests/mutate/first_failure.o
+MUTANT_OBJ := $B/obj/tests/ck_main.o $B/obj/tests/mutate/mutant.o $B/obj/tests/mutate/first_failure.o
 # The first check that fails ends a checker.
 MUTANT_LDFLAGS := -Wl,--wrap=_ck_assert_failed
 define mutants_rule
