@@ -88,7 +88,8 @@ module sums_once (
       .look_o     (look)
   );
   wire peek_fresh_q, peek_part_q, peek_write_q, peek_read_q, peek_moved_q, peek_go;
-  wire [1:0] peek_full_q;
+  wire [1:0] peek_full_q, peek_load_q;
+  wire [2:0] peek_load1_step_q, peek_load2_step_q;
   wire [7:0] peek_left_q;
   wire [15:0] peek_begun_low_q, peek_begun_high_q;
 
@@ -139,14 +140,15 @@ module sums_once (
   wire [15:0] high = peek_begun_high_q[{watched[0], step}] ? high1 : 16'd0;
 
   // ---- what was asked for: three cycles later, and until the next load's comes
-  reg [2:0] load_q = 3'd0, wanted_q = 3'd0;
+  reg [1:0] load_q = 2'd0, wanted_q = 2'd0, slot_q;
   reg known_q = 1'b0;
   reg [15:0] wanted1_q, wanted2_q, wanted3_q;
   reg row_q = 1'b0, bias_row_q = 1'b0;
   reg [7:0] fired_q;
   always @(posedge clk_i) begin
-    load_q <= rst_n_q && !clear_i ? {load_q[1:0], load_i} : 3'd0;
-    wanted_q <= {wanted_q[1:0], load_i && load_step_i == step && load_part_i == watched[0]};
+    load_q <= rst_n_q && !clear_i ? {load_q[0], load_i} : 2'd0;
+    wanted_q <= {wanted_q[0], load_i && load_step_i == step && load_part_i == watched[0]};
+    slot_q <= {slot_q[0], read_q};
     wanted1_q <= read_q ? high_q : low_q;
     wanted2_q <= wanted1_q;
     if (load_q[1]) {known_q, wanted3_q} <= {wanted_q[1], wanted2_q};
@@ -163,7 +165,7 @@ module sums_once (
     assume (!load_i || full);        // sf_core
     assume (!release_i || load_i);   // with the last load
     assume (!waits_q || (valid_i && {bias_i, last_i, index_i, fired_i} == waited_q));  // sf_spikes
-    if (!rst_n_q) at_reset : assert ({write_q, read_q, full_q, waits_q, worked_q, load_q, known_q, row_q, bias_row_q} == 12'd0);
+    if (!rst_n_q) at_reset : assert ({write_q, read_q, full_q, waits_q, worked_q, load_q, known_q, row_q, bias_row_q} == 11'd0);
     else begin
       counts : assert ({1'b0, peek_full_q[0]} + {1'b0, peek_full_q[1]} == full_q && full == (full_q != 2'd0) && full_q != 2'd3);
       in_order : assert (peek_write_q == write_q && peek_read_q == read_q && write_q == (read_q ^ full_q[0]));
@@ -176,6 +178,11 @@ module sums_once (
       row_at_hand : assert (peek_fresh_q
                     || hit1 == ({waited_q[11] ? 3'd4 : {1'b0, waited_q[9:8]}, peek_part_q} == watched));
       exactly_once : assert (low == low_q + {15'd0, here_done && !write_q} && high == high_q + {15'd0, here_done && write_q});
+      loads : assert (peek_load_q == load_q && (!load_q[0] || !op1) && (!load_q[1] || !op2));
+      load_begun : assert (!load_q[0] || !wanted_q[0] || (peek_load1_step_q == step && place1 == {slot_q[0], low_place[2:0]}
+                   && wanted1_q == (!begun1 ? 16'd0 : slot_q[0] ? high2 : low2)));
+      load_read : assert (!load_q[1] || !wanted_q[1] || (peek_load2_step_q == step && place2 == {slot_q[1], low_place[2:0]}
+                  && wanted2_q == (!begun2 ? 16'd0 : slot_q[1] ? bank[31:16] : bank[15:0])));
       loaded : assert (!known_q || sums == wanted3_q);
       row_read_once : assert (row == row_q && bias_row == bias_row_q && (!row || fired == fired_q));
       idle_is_idle : assert (!idle || (full_q == 2'd0 && !worked_q && !row && !bias_row && !busy));
