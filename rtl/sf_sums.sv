@@ -72,6 +72,7 @@ module sf_sums #(
   genvar b, k;
   generate
     for (b = 0; b < BANKS; b = b + 1) begin : g_pick
+      wire [8/BANKS-1:0] here;
       for (k = 0; k < 8 / BANKS; k = k + 1) begin : g_step
         wire taken;
         if (k == 0) begin : g_first
@@ -79,7 +80,8 @@ module sf_sums #(
         end else begin : g_later
           assign taken = g_step[k-1].taken || steps[b+(k-1)*BANKS];
         end
-        assign picked[b+k*BANKS] = steps[b+k*BANKS] && !taken;
+        assign here[k] = steps[b+k*BANKS] && !taken;
+        assign picked[b+k*BANKS] = here[k];
       end
       reg [2:0] which;
       always_comb begin
@@ -87,7 +89,7 @@ module sf_sums #(
         for (int s = 0; s < 8 / BANKS; s++) if (picked[b+s*BANKS]) which = which | 3'(b + s * BANKS);
       end
       assign step[3*b+:3] = which;
-      assign op[b] = go && |(picked & {(8 / BANKS) {BANKS'(1) << b}});
+      assign op[b] = go && |here;
     end
   endgenerate
   wire [7:0] left = steps & ~picked;

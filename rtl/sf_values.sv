@@ -1,7 +1,7 @@
 // D1 and C1, the layers fed by values: one array of MACS multipliers with a sum per step. A row of weights is read once,
 // held, and multiplied by a value per cycle: by a feature, a constant input of C1, or h of each step in turn.
 // The constant inputs of C1 (a ray's direction, biases) are summed up once per ray and begin the sums of its samples; those
-// of a decoder once per sample, for all steps. Mirror: src/fx/net.c, src/fx/current.c
+// of a decoder once per sample, for all steps. Mirror: src/fx/current.c, src/fx/net.c
 // Width: of 32 rows |sum| <= 32 * 2048 * 127 < 2^23, of a decoder's 161 < 2^26; a current has 24 bits.
 `default_nettype none
 

@@ -103,7 +103,7 @@ synthesise() { # MODULE LANES RESULT
   local map="synth_xilinx -family xc7 -flatten -noiopad -top $1"
   # shellcheck disable=SC2086
   if ! nice -n 10 yosys -q -l "$log" -p "read_verilog -sv -defer -Irtl $(echo $packages $sources)
-      hierarchy -check -top $1 $parameters; rename -top $1; setattr -set ram_style \"block\" *sf_wmem*/m:*
+      hierarchy -check -top $1 $parameters; rename -top $1; setattr -set ram_style \"block\" *sf_rows*/m:*
       $map -run begin:coarse; stat; $map -run coarse:
       delete t:FD* t:LD* t:RAMB*; ltp -noff" >/dev/null 2>"$log.err"; then
     die 1 "$1, $2 lanes: $(grep -h ERROR "$log" | head -n 1 | cut -c1-200), see $log"

@@ -62,7 +62,11 @@ verdict() {
   script+=" hierarchy -check -top $top; proc; flatten; $peek opt; memory; async2sync; opt -full; dffunmap"
   if [ "${method%:*}" = induct ] || [ "${method%:*}" = step ]; then
     local cut=
-    case $top in composite_conserves | exp_neg_one) cut="cutpoint t:\$mul; opt -full;" ;; esac
+    case $top in
+      composite_conserves | exp_neg_one) cut="cutpoint t:\$mul; opt -full;" ;;
+      # The two multipliers are the specification's, too, and are cut: a third would be another product.
+      plif_spec) cut="wreduce; opt_merge; opt_clean; select -assert-max 2 t:\$mul; cutpoint t:\$mul; opt -full;" ;;
+    esac
     # -seq 1: nothing is asserted in the cycle of the reset
     timeout "$limit" yosys -Q -T -p "$script; $cut sat -tempinduct -seq 1 -maxsteps $depth -prove-asserts -set-assumes -show-inputs" \
       >"$build/$name.log" 2>&1
