@@ -29,12 +29,12 @@ module sf_exp_neg (
   // 2, 3: y = -round(tau log2 e), Q.20. The sum is in 2^-25; -floor(s) = ~floor(s - 1) takes one from it.
   reg signed [23:0] part2_q;
   reg [29:0] times46_2_q;
-  wire signed [31:0] below = 32'(part2_q) + $signed({2'd0, times46_2_q});
-  reg signed [25:0] y3_q;
+  wire signed [29:0] below = 30'(part2_q) + $signed(times46_2_q);
+  reg [24:0] y3_q;  // modulo 2^25
   always_ff @(posedge clk_i) begin
     part2_q <= $signed({2'd0, high1_q}) + $signed({8'd0, low1_q[33:18]}) - 24'sd16;
     times46_2_q <= {thrice1_q, 4'd0} - {5'd0, tau1_q, 1'b0};
-    y3_q <= ~below[30:5];
+    y3_q <= ~below[29:5];
   end
 
   // 4: the ends of the piece of the table
@@ -84,7 +84,7 @@ module sf_exp_neg (
     zero8_q <= zero_q[6];
     e_o <= zero8_q ? 21'd0 : rounded[21:1];
   end
-  wire unused_ok = &{1'b0, y3_q[25], below[31], below[4:0], low1_q[17:0], high4_q[25:17], t[14:0], rounded[22], rounded[0]};
+  wire unused_ok = &{1'b0, below[4:0], low1_q[17:0], high4_q[25:17], t[14:0], rounded[22], rounded[0]};
 endmodule
 
 `default_nettype wire

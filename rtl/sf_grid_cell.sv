@@ -171,7 +171,7 @@ module sf_grid_cell (
       y1_o <= y_sum_q + across;
       z0_o <= z_sum_q;
       z1_o <= z_sum_q + up;
-      mask_o <= (32'd1 << log2_size_q[before_level_q]) - 32'd1;
+      mask_o <= ~(32'hffffffff << log2_size_q[before_level_q]);
       offset_o <= offset_q[before_level_q];
       place_o <= {place_z_q, place_y_q, place_x_q};
       shift_o <= shift_q[before_level_q];
