@@ -1,5 +1,5 @@
 // Layer fed by spikes: of every sample, the sum of a step has the row of each neuron that fired at it, and the biases,
-// exactly once and nothing else; a neuron's row is read once, whatever its steps; samples are loaded complete and in order,
+// exactly once and nothing else (counted modulo 16); a neuron's row is read once, whatever its steps; samples are loaded complete and in order,
 // and none is added to that is full. Sample, step, row and part looked at are any; the row of weights is 1 there and 0 in
 // all others (sf_rows below), so that its sum counts how often it was added.
 `default_nettype none
@@ -45,9 +45,9 @@ module sums_once (
   always @(posedge clk_i) rst_n_q <= 1'b1;
 
   wire next, full, row, bias_row, busy, idle;
-  wire [15:0] sums;
+  wire [3:0] sums;
   wire [7:0] fired;
-  wire [87:0] look;
+  wire [39:0] look;
   wire [63:0] peek_row, peek_row2_q;
   sf_sums #(
       .ROWS     (4),
@@ -96,18 +96,18 @@ module sums_once (
   // ---- what was handed over: the number of times that the watched row belongs into the sum, of both samples
   reg write_q = 1'b0, read_q = 1'b0;
   reg [1:0] full_q = 2'd0;
-  reg [15:0] low_q, high_q;
+  reg [3:0] low_q, high_q;
   wire here = (bias_i ? 3'd4 : {1'b0, index_i}) == watched[3:1] && fired_i[step];
   always @(posedge clk_i) begin
     if (!rst_n_q || clear_i) begin
       {write_q, read_q, full_q} <= 4'd0;
-      {high_q, low_q} <= 32'd0;
+      {high_q, low_q} <= 8'd0;
     end else begin
       full_q <= full_q + {1'b0, next && last_i} - {1'b0, release_i};
       if (next && last_i) write_q <= !write_q;
       if (release_i) read_q <= !read_q;
-      low_q <= release_i && !read_q ? 16'd0 : low_q + {15'd0, next && here && !write_q};
-      high_q <= release_i && read_q ? 16'd0 : high_q + {15'd0, next && here && write_q};
+      low_q <= release_i && !read_q ? 4'd0 : low_q + {3'd0, next && here && !write_q};
+      high_q <= release_i && read_q ? 4'd0 : high_q + {3'd0, next && here && write_q};
     end
   end
 
@@ -122,27 +122,27 @@ module sums_once (
   wire here_done = here && valid_i && (peek_part_q > watched[0] || (peek_part_q == watched[0] && !peek_fresh_q && !peek_left_q[step]));
 
   // ---- what the sums are when all that is on its way has come
-  wire [43:0] bank = step[0] ? look[87:44] : look[43:0];
-  wire op1 = bank[43];
-  wire op2 = bank[42];
-  wire begun1 = bank[41];
-  wire begun2 = bank[40];
-  wire [3:0] place1 = bank[39:36];
-  wire [3:0] place2 = bank[35:32];
+  wire [19:0] bank = step[0] ? look[39:20] : look[19:0];
+  wire op1 = bank[19];
+  wire op2 = bank[18];
+  wire begun1 = bank[17];
+  wire begun2 = bank[16];
+  wire [3:0] place1 = bank[15:12];
+  wire [3:0] place2 = bank[11:8];
   wire hit1 = peek_moved_q ? peek_row[0] : peek_row2_q[0];
   wire [3:0] low_place = {1'b0, step[2:1], watched[0]};
   wire [3:0] high_place = {1'b1, step[2:1], watched[0]};
-  wire [15:0] low2 = op2 && place2 == low_place ? (begun2 ? bank[15:0] : 16'd0) + {15'd0, peek_row2_q[0]} : bank[15:0];
-  wire [15:0] low1 = op1 && place1 == low_place ? (begun1 ? low2 : 16'd0) + {15'd0, hit1} : low2;
-  wire [15:0] high2 = op2 && place2 == high_place ? (begun2 ? bank[31:16] : 16'd0) + {15'd0, peek_row2_q[0]} : bank[31:16];
-  wire [15:0] high1 = op1 && place1 == high_place ? (begun1 ? high2 : 16'd0) + {15'd0, hit1} : high2;
-  wire [15:0] low = peek_begun_low_q[{watched[0], step}] ? low1 : 16'd0;
-  wire [15:0] high = peek_begun_high_q[{watched[0], step}] ? high1 : 16'd0;
+  wire [3:0] low2 = op2 && place2 == low_place ? (begun2 ? bank[3:0] : 4'd0) + {3'd0, peek_row2_q[0]} : bank[3:0];
+  wire [3:0] low1 = op1 && place1 == low_place ? (begun1 ? low2 : 4'd0) + {3'd0, hit1} : low2;
+  wire [3:0] high2 = op2 && place2 == high_place ? (begun2 ? bank[7:4] : 4'd0) + {3'd0, peek_row2_q[0]} : bank[7:4];
+  wire [3:0] high1 = op1 && place1 == high_place ? (begun1 ? high2 : 4'd0) + {3'd0, hit1} : high2;
+  wire [3:0] low = peek_begun_low_q[{watched[0], step}] ? low1 : 4'd0;
+  wire [3:0] high = peek_begun_high_q[{watched[0], step}] ? high1 : 4'd0;
 
   // ---- what was asked for: three cycles later, and until the next load's comes
   reg [1:0] load_q = 2'd0, wanted_q = 2'd0, slot_q;
   reg known_q = 1'b0;
-  reg [15:0] wanted1_q, wanted2_q, wanted3_q;
+  reg [3:0] wanted1_q, wanted2_q, wanted3_q;
   reg row_q = 1'b0, bias_row_q = 1'b0;
   reg [7:0] fired_q;
   always @(posedge clk_i) begin
@@ -177,12 +177,12 @@ module sums_once (
       steps_left : assert (peek_fresh_q || (peek_left_q != 8'd0 && (peek_left_q & ~waited_q[7:0]) == 8'd0));
       row_at_hand : assert (peek_fresh_q
                     || hit1 == ({waited_q[11] ? 3'd4 : {1'b0, waited_q[9:8]}, peek_part_q} == watched));
-      exactly_once : assert (low == low_q + {15'd0, here_done && !write_q} && high == high_q + {15'd0, here_done && write_q});
+      exactly_once : assert (low == low_q + {3'd0, here_done && !write_q} && high == high_q + {3'd0, here_done && write_q});
       loads : assert (peek_load_q == load_q && (!load_q[0] || !op1) && (!load_q[1] || !op2));
       load_begun : assert (!load_q[0] || !wanted_q[0] || (peek_load1_step_q == step && place1 == {slot_q[0], low_place[2:0]}
-                   && wanted1_q == (!begun1 ? 16'd0 : slot_q[0] ? high2 : low2)));
+                   && wanted1_q == (!begun1 ? 4'd0 : slot_q[0] ? high2 : low2)));
       load_read : assert (!load_q[1] || !wanted_q[1] || (peek_load2_step_q == step && place2 == {slot_q[1], low_place[2:0]}
-                  && wanted2_q == (!begun2 ? 16'd0 : slot_q[1] ? bank[31:16] : bank[15:0])));
+                  && wanted2_q == (!begun2 ? 4'd0 : slot_q[1] ? bank[7:4] : bank[3:0])));
       loaded : assert (!known_q || sums == wanted3_q);
       row_read_once : assert (row == row_q && bias_row == bias_row_q && (!row || fired == fired_q));
       idle_is_idle : assert (!idle || (full_q == 2'd0 && !worked_q && !row && !bias_row && !busy));
