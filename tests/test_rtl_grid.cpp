@@ -306,6 +306,24 @@ TEST(an_index_behind_a_request_that_waits)
   while (b.done < 2) b.cycle(0);
 }
 
+/* A sample that comes while the one before is at work waits for the end of its slots, or until its cell has left. */
+START_TEST(when_the_next_sample_is_taken)
+{
+  static const uint64_t SLOTS = 8, LEFT = 14;
+  for (uint64_t gap = 1; gap <= LEFT + SLOTS; gap++) {
+    grid_bench b(43);
+    const grid_fixture fixture(b.draw, 1, 0);
+    b.load(&fixture, 10, 0, 0);
+    while (b.accepted < 1) b.cycle(1);
+    const uint64_t begin = b.u.cycle;
+    while (b.u.cycle - begin < gap - 1) b.cycle(0);
+    while (b.accepted < 2) b.cycle(1);
+    ck_assert_uint_eq(b.u.cycle - begin, gap <= SLOTS ? SLOTS : gap <= LEFT ? LEFT : gap);
+    while (b.done < 2) b.cycle(0);
+  }
+}
+END_TEST
+
 /* Clear at any moment; the memory goes on answering what it had accepted. */
 TEST(reset_on_the_way)
 {
@@ -321,4 +339,19 @@ TEST(reset_on_the_way)
   }
 }
 
-int ck_timeout = 3600;
+int main(void)
+{
+  Suite *suite = suite_create("rtl_grid");
+  TCase *cases = tcase_create("grid");
+  tcase_set_timeout(cases, 3600);
+  tcase_add_loop_test(cases, weights_of_every_place, 0, 1);
+  tcase_add_loop_test(cases, sums_of_random_cells, 0, 3);
+  tcase_add_loop_test(cases, random_grids, 0, 4);
+  tcase_add_test(cases, a_request_in_every_cycle);
+  tcase_add_test(cases, a_memory_that_begins_late);
+  tcase_add_test(cases, an_index_behind_a_request_that_waits);
+  tcase_add_test(cases, when_the_next_sample_is_taken);
+  tcase_add_test(cases, reset_on_the_way);
+  suite_add_tcase(suite, cases);
+  return ck_run(suite);
+}
