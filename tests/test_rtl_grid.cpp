@@ -307,7 +307,7 @@ TEST(an_index_behind_a_request_that_waits)
 }
 
 /* A sample that comes while the one before is at work waits for the end of its slots, or until its cell has left. */
-START_TEST(when_the_next_sample_is_taken)
+TEST(when_the_next_sample_is_taken)
 {
   static const uint64_t SLOTS = 8, LEFT = 14;
   for (uint64_t gap = 1; gap <= LEFT + SLOTS; gap++) {
@@ -322,7 +322,6 @@ START_TEST(when_the_next_sample_is_taken)
     while (b.done < 2) b.cycle(0);
   }
 }
-END_TEST
 
 /* Clear at any moment; the memory goes on answering what it had accepted. */
 TEST(reset_on_the_way)
@@ -337,21 +336,4 @@ TEST(reset_on_the_way)
     if (delay % 3 == 1) b.clear(false);
     b.run(3);
   }
-}
-
-int main(void)
-{
-  Suite *suite = suite_create("rtl_grid");
-  TCase *cases = tcase_create("grid");
-  tcase_set_timeout(cases, 3600);
-  tcase_add_loop_test(cases, weights_of_every_place, 0, 1);
-  tcase_add_loop_test(cases, sums_of_random_cells, 0, 3);
-  tcase_add_loop_test(cases, random_grids, 0, 4);
-  tcase_add_test(cases, a_request_in_every_cycle);
-  tcase_add_test(cases, a_memory_that_begins_late);
-  tcase_add_test(cases, an_index_behind_a_request_that_waits);
-  tcase_add_test(cases, when_the_next_sample_is_taken);
-  tcase_add_test(cases, reset_on_the_way);
-  suite_add_tcase(suite, cases);
-  return ck_run(suite);
 }
