@@ -295,20 +295,22 @@ START_TEST(a_memory_that_begins_late)
 }
 END_TEST
 
-/* The next sample's first index is made while the last request of the one before still waits. */
-START_TEST(an_index_behind_a_request_that_waits)
+/* The next sample's first index is on its way while the last requests of the one before still wait: one, or two. */
+START_TEST(an_index_behind_requests_that_wait)
 {
-  grid_bench b(42);
-  const grid_fixture fixture(b.draw, 1, 0);
-  b.load(&fixture, 10, 0, 0);
-  b.ask_most = CORNERS - 1;
-  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
-  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
-  ck_assert_uint_eq(b.asked, CORNERS - 1);
-  b.ask_most = UINT64_MAX;
-  b.cycle(0), b.cycle(0);
-  ck_assert_uint_eq(b.asked, CORNERS + 1);
-  while (b.done < 2) b.cycle(0);
+  for (uint64_t waiting = 1; waiting <= 2; waiting++) {
+    grid_bench b(42);
+    const grid_fixture fixture(b.draw, 1, 0);
+    b.load(&fixture, 10, 0, 0);
+    b.ask_most = CORNERS - waiting;
+    for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
+    for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
+    ck_assert_uint_eq(b.asked, CORNERS - waiting);
+    b.ask_most = UINT64_MAX;
+    for (uint64_t i = 0; i <= waiting; i++) b.cycle(0);
+    ck_assert_uint_eq(b.asked, CORNERS + 1);
+    while (b.done < 2) b.cycle(0);
+  }
 }
 END_TEST
 
@@ -356,7 +358,7 @@ int main(void)
   tcase_add_loop_test(cases, random_grids, 0, 4);
   tcase_add_test(cases, a_request_in_every_cycle);
   tcase_add_test(cases, a_memory_that_begins_late);
-  tcase_add_test(cases, an_index_behind_a_request_that_waits);
+  tcase_add_test(cases, an_index_behind_requests_that_wait);
   tcase_add_test(cases, when_the_next_sample_is_taken);
   tcase_add_test(cases, reset_on_the_way);
   suite_add_tcase(suite, cases);
