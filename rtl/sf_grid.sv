@@ -91,11 +91,9 @@ module sf_grid #(
     if (!rst_ni) begin
       {work_q, pair_valid_q, index_valid_q, request_q} <= 4'd0;
       reserved_q <= '0;
-      room_q <= 1'b1;
     end else if (clear_i) begin
       {work_q, pair_valid_q, index_valid_q, request_q} <= 4'd0;
       reserved_q <= '0;
-      room_q <= 1'b1;
     end else begin
       if (load) work_q <= 1'b1;
       else if (work_end) work_q <= 1'b0;
@@ -103,9 +101,11 @@ module sf_grid #(
       if (index_ready) index_valid_q <= pair_valid_q;
       if (request_ready) request_q <= index_valid_q;
       reserved_q <= reserved;
-      room_q <= !reserved[LOG2_DEPTH];
     end
   end
+
+  // No cell comes in the first cycle after a reset or a clear, in which this may still be of before.
+  always_ff @(posedge clk_i) room_q <= !reserved[LOG2_DEPTH];
 
   always_ff @(posedge clk_i) begin
     if (load) begin
