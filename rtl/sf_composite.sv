@@ -5,7 +5,8 @@
 // does, when its transmittance is at most trans_stop_i or it has max_samples_i samples: its pixel leaves, stop_o tells
 // that no more of its samples are needed, and those that still come are swallowed without an effect. With empty_i the
 // ray has no sample and its pixel is the background.
-// One multiplier of 28 x 25 bits, shared: 12 cycles per sample and 5 more per pixel.
+// One multiplier of 28 x 25 bits, four of the device's, shared: operands, partial products and sum have a register each.
+// 21 cycles per sample and 7 more per pixel. What a sample adds to the pixel arrives while the next one begins.
 `default_nettype none
 
 module sf_composite (
@@ -37,35 +38,27 @@ module sf_composite (
     output wire [ 20:0] transmittance_o,
     output wire [ 10:0] samples_o
 );
-  `include "sf_round.svh"
-
   localparam [20:0] ONE = 21'd1 << 20;
-  localparam [5:0] TAU_SHIFT = 6'd16;  // SIGMA_FRAC + DELTA_FRAC - TRANS_FRAC
-  localparam [4:0] TRANS_FRAC = 5'd20;
 
-  // A product that one of these asks for is in product_q during the next.
-  localparam [4:0] IDLE = 5'd0;
-  localparam [4:0] TAU = 5'd1;  // sigma * delta, then two cycles of sf_exp_neg
-  localparam [4:0] ATTENUATE = 5'd4;  // transmittance * exp(-tau)
-  localparam [4:0] WEIGH = 5'd5;  // the new transmittance; what was lost is the weight
-  localparam [4:0] RED = 5'd6;  // weight * colour
-  localparam [4:0] GREEN = 5'd7;
-  localparam [4:0] BLUE = 5'd8;
-  localparam [4:0] NEAR = 5'd9;  // weight * distance, in two halves
-  localparam [4:0] FAR = 5'd10;
-  localparam [4:0] DECIDE = 5'd11;
-  localparam [4:0] BACK_RED = 5'd12;  // transmittance * background
-  localparam [4:0] BACK_GREEN = 5'd13;
-  localparam [4:0] BACK_BLUE = 5'd14;
-  localparam [4:0] FINISH = 5'd15;
-  localparam [4:0] PIXEL = 5'd16;
+  // The state counts the cycles since the sample was taken. The product that one of these asks for is in product_q three
+  // cycles later.
+  localparam [4:0] IDLE = 5'd0;  // sigma * delta of the sample that is taken, then nine cycles of sf_exp_neg
+  localparam [4:0] ATTENUATE = 5'd12;  // transmittance * exp(-tau)
+  localparam [4:0] WEIGH = 5'd15;  // the new transmittance; what was lost is the weight
+  localparam [4:0] RED = 5'd16;  // weight * colour
+  localparam [4:0] GREEN = 5'd17;
+  localparam [4:0] BLUE = 5'd18;
+  localparam [4:0] NEAR = 5'd19;  // weight * distance, in two halves
+  localparam [4:0] FAR = 5'd20;  // and whether the ray ends here
+  localparam [4:0] BACK_RED = 5'd21;  // transmittance * background
+  localparam [4:0] BACK_GREEN = 5'd22;
+  localparam [4:0] BACK_BLUE = 5'd23;
+  localparam [4:0] PIXEL = 5'd27;
   reg [4:0] state_q;
   reg open_q;  // a ray that has not stopped
 
   reg last_q;
-  reg [27:0] sigma_q;
   reg [59:0] colour_q;
-  reg [24:0] delta_q;
   reg [43:0] distance_q;
 
   reg [39:0] red_q, green_q, blue_q;
@@ -79,12 +72,13 @@ module sf_composite (
   wire take = valid_i && ready_o;
   wire begins = take && (first_i || empty_i);
   wire ignored = take && !begins && !open_q;
-  wire stops = transmittance_q <= {1'b0, trans_stop_i} || samples_q >= max_samples_i;
-  assign stop_o = state_q == DECIDE && stops && !last_q;
+  reg stops_q;
+  always_ff @(posedge clk_i) stops_q <= transmittance_q <= {1'b0, trans_stop_i} || samples_q >= max_samples_i;
+  assign stop_o = state_q == FAR && stops_q && !last_q;
 
   // ---- the multiplier
   wire of_transmittance = state_q == ATTENUATE || state_q >= BACK_RED;
-  wire [27:0] a = state_q == TAU ? sigma_q : {7'd0, of_transmittance ? transmittance_q : weight_q};
+  wire [27:0] a = state_q == IDLE ? sigma_i : {7'd0, of_transmittance ? transmittance_q : weight_q};
   wire [20:0] e;
   wire [24:0] exp_tau = {4'd0, e};
   wire [24:0] red = {5'd0, colour_q[19:0]};
@@ -98,7 +92,7 @@ module sf_composite (
   reg [24:0] b;
   always_comb begin
     case (state_q)
-      TAU: b = delta_q;
+      IDLE: b = delta_i;
       ATTENUATE: b = exp_tau;
       RED: b = red;
       GREEN: b = green;
@@ -110,33 +104,67 @@ module sf_composite (
       default: b = back_blue;
     endcase
   end
+  reg [27:0] a_q;
+  reg [24:0] b_q;
+  reg [35:0] low_q;
+  reg [27:0] cross_q;
+  reg [24:0] other_cross_q;
+  reg [16:0] high_q;
   reg [52:0] product_q;
-  always_ff @(posedge clk_i) product_q <= 53'(a) * 53'(b);
+  reg [1:0] of_tau_q;  // half an LSB of tau with its product
+  wire [28:0] crosses = {1'b0, cross_q} + {4'd0, other_cross_q};
+  always_ff @(posedge clk_i) begin
+    a_q <= a;
+    b_q <= b;
+    low_q <= 36'(a_q[17:0]) * 36'(b_q[17:0]);
+    cross_q <= 28'(a_q[27:18]) * 28'(b_q[17:0]);
+    other_cross_q <= 25'(a_q[17:0]) * 25'(b_q[24:18]);
+    high_q <= 17'(a_q[27:18]) * 17'(b_q[24:18]);
+    of_tau_q <= {of_tau_q[0], state_q == IDLE};
+    product_q <= {high_q, low_q} + {6'd0, crosses, 2'd0, of_tau_q[1], 15'd0};
+  end
 
-  wire [63:0] tau = sf_rshift_round_wide({11'd0, product_q}, TAU_SHIFT);
   sf_exp_neg u_exp_neg (
       .clk_i(clk_i),
-      .tau_i(tau[36:0]),
+      .tau_i(product_q[52:16]),
       .e_o  (e)
   );
-  wire [47:0] attenuated = sf_rshift_round(product_q[47:0], TRANS_FRAC);
-  wire [20:0] after = attenuated[20:0];  // <= transmittance_q, since exp(-tau) <= 1
+  // Half an LSB more rounds half up. It is <= transmittance_q, since exp(-tau) <= 1.
+  wire [20:0] after = product_q[40:20] + {20'd0, product_q[19]};
+  wire [20:0] lost = transmittance_q - product_q[40:20] - {20'd0, product_q[19]};
+
+  // What the products are added to.
+  localparam [2:0] NOTHING = 3'd0, TO_RED = 3'd1, TO_GREEN = 3'd2, TO_BLUE = 3'd3, TO_NEAR = 3'd4, TO_FAR = 3'd5;
+  reg [2:0] to, to1_q, to2_q, to3_q;
+  always_comb begin
+    case (state_q)
+      RED, BACK_RED: to = TO_RED;
+      GREEN, BACK_GREEN: to = TO_GREEN;
+      BLUE, BACK_BLUE: to = TO_BLUE;
+      NEAR: to = TO_NEAR;
+      FAR: to = TO_FAR;
+      default: to = NOTHING;
+    endcase
+  end
 
   // ---- sequence
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q <= IDLE;
       open_q <= 1'b0;
+      {to1_q, to2_q, to3_q} <= {3{NOTHING}};
     end else if (clear_i) begin
       state_q <= IDLE;
       open_q <= 1'b0;
+      {to1_q, to2_q, to3_q} <= {3{NOTHING}};
     end else begin
+      {to1_q, to2_q, to3_q} <= {to, to1_q, to2_q};
       case (state_q)
         IDLE: if (take && !ignored) begin
-          state_q <= empty_i ? BACK_RED : TAU;
+          state_q <= empty_i ? BACK_RED : 5'd1;
           open_q <= 1'b1;
         end
-        DECIDE: state_q <= stops || last_q ? BACK_RED : IDLE;
+        FAR: state_q <= stops_q || last_q ? BACK_RED : IDLE;
         PIXEL: if (ready_i) begin
           state_q <= IDLE;
           open_q <= 1'b0;
@@ -149,9 +177,7 @@ module sf_composite (
   always_ff @(posedge clk_i) begin
     if (take) begin
       last_q <= last_i;
-      sigma_q <= sigma_i;
       colour_q <= colour_i;
-      delta_q <= delta_i;
       distance_q <= distance_i;
     end
     if (begins) begin
@@ -161,19 +187,19 @@ module sf_composite (
       {red_q, green_q, blue_q} <= 120'd0;
       depth_q <= 64'd0;
     end else begin
-      case (state_q)
-        WEIGH: begin
-          transmittance_q <= after;
-          weight_q <= transmittance_q - after;
-          samples_q <= samples_q + 11'd1;
-        end
-        RED: weight_sum_q <= weight_sum_q + weight_q;
-        // Weights and the transmittance left sum to 2^20, so a colour stays below 2^40 and the depth below 2^64.
-        GREEN, BACK_GREEN: red_q <= red_q + product_q[39:0];
-        BLUE, BACK_BLUE: green_q <= green_q + product_q[39:0];
-        NEAR, FINISH: blue_q <= blue_q + product_q[39:0];
-        FAR: depth_q <= depth_q + {11'd0, product_q};
-        DECIDE: depth_q <= depth_q + {product_q[41:0], 22'd0};
+      if (state_q == WEIGH) begin
+        transmittance_q <= after;
+        weight_q <= lost;
+        samples_q <= samples_q + 11'd1;
+      end
+      if (state_q == RED) weight_sum_q <= weight_sum_q + weight_q;
+      // Weights and the transmittance left sum to 2^20, so a colour stays below 2^40 and the depth below 2^64.
+      case (to3_q)
+        TO_RED: red_q <= red_q + product_q[39:0];
+        TO_GREEN: green_q <= green_q + product_q[39:0];
+        TO_BLUE: blue_q <= blue_q + product_q[39:0];
+        TO_NEAR: depth_q <= depth_q + {11'd0, product_q};
+        TO_FAR: depth_q <= depth_q + {product_q[41:0], 22'd0};
         default: ;
       endcase
     end
@@ -184,7 +210,6 @@ module sf_composite (
   assign weight_sum_o = weight_sum_q;
   assign transmittance_o = transmittance_q;
   assign samples_o = samples_q;
-  wire unused_ok = &{1'b0, tau[63:37], attenuated[47:21]};
 endmodule
 
 `default_nettype wire

@@ -1,15 +1,18 @@
-// Layer engine: D1, D2, C1, C2 and C3 work at the same time, each on a sample of its own; the spiking layers share one
-// array of neurons. Mirror: src/fx/net.c
+// Layer engine: D1, D2, C1, C2 and C3 work at the same time, each on a sample of its own. D1 and C1 share one array of
+// multipliers (sf_values), the spiking layers one set of neuron units (sf_neurons). Mirror: src/fx/net.c
 //
-//   D1 -> neurons -> store -> D2 -> h -> C1 -> neurons -> queue -> C2 -> neurons -> store -> C3
+//   D1 -> neurons -> spikes -> D2 -> h -> C1 -> neurons -> spikes -> C2 -> neurons -> spikes -> C3
 //
-// A layer hands its current over and begins the next sum while the neurons are at work on the last one. Cycles without
-// stalls: src/cycles/cycles.c
+// A layer's sums of a sample wait, complete, until the neurons take them; the neurons do all steps of a layer's sample
+// before they turn to another. Cycles without stalls: src/cycles/cycles.c
 `default_nettype none
 
 module sf_core #(
     parameter TAP = 1,
-    parameter LANES = 128
+    parameter LANES = 128,
+    parameter MACS = 128,
+    parameter NEURONS = 16,
+    parameter STEPS_AT_ONCE = 2
 ) (
     input  wire                clk_i,
     input  wire                rst_ni,
@@ -37,26 +40,35 @@ module sf_core #(
     input  wire         [11:0] feature_i,
     output wire         [ 7:0] dir_index_o,
     input  wire         [11:0] dir_i,
-    // currents of D2 and C3, one cycle after they were taken: {step, output}, 16 bits each
+    // currents of D2 and C3 for the readout, a step per cycle. Once begun, all steps of a sample come.
     input  wire                density_ready_i,
+    output wire                density_begin_o,
     output wire                density_valid_o,
-    output wire       [2047:0] density_o,
+    output wire         [ 2:0] density_step_o,
+    output wire                density_last_o,
+    output wire         [15:0] density_o,
     input  wire                colour_ready_i,
+    output wire                colour_begin_o,
     output wire                colour_valid_o,
-    output wire       [2047:0] colour_o,
+    output wire         [ 2:0] colour_step_o,
+    output wire                colour_last_o,
+    output wire         [47:0] colour_o,
     // events, in the cycle in which they happen
-    output wire                d1_row_o,
+    output wire                d1_row_o,           // a row of weights is read
     output wire                c1_row_o,
     output wire                c1_bias_row_o,
+    output wire                c1_products_o,      // a row is multiplied, at this step
     output wire         [ 2:0] c1_step_o,
-    output wire         [ 1:0] c2_rows_o,
-    output wire         [ 2:0] c2_step_o,
-    output wire         [15:0] d2_fired_o,         // two presynaptic neurons: the steps at which each fired
-    output wire         [15:0] c3_fired_o,
+    output wire         [ 2:0] fed_row_o,          // C3, C2, D2: a row is read,
+    output wire         [23:0] fed_fired_o,        // and the steps at which its neuron fired, 8 bits each
+    output wire         [ 2:0] fed_bias_o,
+    output wire         [ 4:0] busy_o,             // a layer works, in the order of the layers
     output wire                ray_o,
-    output wire         [ 2:0] spikes_valid_o,     // C2, C1, D1: a step of the layer's neurons
-    output wire         [ 2:0] spikes_step_o,
-    output wire         [ 8:0] spikes_count_o,
+    output wire                neurons_valid_o,    // a group of neurons has made a step
+    output wire         [ 1:0] neurons_layer_o,    // 0: D1, 1: C1, 2: C2
+    output wire         [ 2:0] neurons_step_o,
+    output wire                neurons_last_o,     // the layer's last group
+    output wire         [ 8:0] neurons_fired_o,
     output wire                stall_o,            // a layer waits for the readout
     // tap
     output wire                tap_valid_o,
@@ -66,12 +78,23 @@ module sf_core #(
     output wire [   LANES-1:0] tap_rows_o,
     output wire [24*LANES-1:0] tap_membrane_o
 );
-  localparam BITS = $clog2(LANES) - 1;  // of a row within a bank
+  localparam INDEX_BITS = $clog2(LANES);
   localparam WORD_BITS = $clog2(LANES / 4);
-  localparam QUEUE = 4;                 // steps between C1 and C2
+  localparam GROUPS = LANES / NEURONS;
+  localparam GROUP_BITS = GROUPS > 1 ? $clog2(GROUPS) : 1;
+  localparam PARTS = LANES / MACS;
+  localparam PART_BITS = PARTS > 1 ? $clog2(PARTS) : 1;
+  localparam PART_GROUPS = MACS / NEURONS;
+  localparam DEPTH = 6;  // of the neurons: cycles between two steps of a group
+  localparam [1:0] D1 = 2'd0;
+  localparam [1:0] C1 = 2'd1;
+  localparam [1:0] C2 = 2'd2;
 
   // Sizes; sf_csr has checked that they are consistent.
-  wire decodes = n_out_i[8:0] == 9'd0;  // no D1 and D2: C1 takes its inputs from the buffer
+  wire [8:0] d1_out = n_out_i[8:0];
+  wire [8:0] c1_out = n_out_i[26:18];
+  wire [8:0] c2_out = n_out_i[35:27];
+  wire decodes = d1_out == 9'd0;  // no D1 and D2: C1 takes its inputs from the buffer
   wire [7:0] n_h = decodes ? 8'd0 : n_out_i[16:9] - 8'd1;
   wire [7:0] n_dir = n_in_i[25:18] - n_h;
   wire bias_we = we_i && wrow_i == 9'(sf_arch_pkg::BIAS_ROW);
@@ -80,406 +103,597 @@ module sf_core #(
   wire unused_ok = &{1'b0, wrow_i, wword_i, n_out_i[44:36], n_out_i[17], n_in_i[44:26], n_in_i[17:6], n_h[7:5], theta_i[119:96], theta_i[47:24],
                      k_i[64:52], k_i[25:13]};
 
-  // ---- neurons: what waits for its turn. The layer nearest to the output goes first.
-  reg [2:0] reserved_q;  // by {C2, C1, D1}: the current will be replaced, or is not worked off yet
-  reg [2:0] pending_q;   // the current is there
-  reg [2:0] d1_step_q, c1_step_q, c2_step_q;
-  wire [2:0] fire_next, fire_valid;
-  wire [2:0] wanted;
-  wire [2:0] fire;
-  wire take_d2, take_c3;
-  wire ready_d2, ready_c3;
-  wire space_d2, space_c3;   // of the stores
-  reg [2:0] queue_room_q;    // places in the queue that are not promised
-  wire d1_ends = {1'b0, d1_step_q} == steps_i - 4'd1;
-  wire c1_ends = {1'b0, c1_step_q} == steps_i - 4'd1;
-  wire c2_ends = {1'b0, c2_step_q} == steps_i - 4'd1;
+  // The last group and the last part of each spiking layer, in registers: sizes do not change at work.
+  wire [8:0] d1_last = d1_out - 9'd1;
+  wire [8:0] c1_last = c1_out - 9'd1;
+  wire [8:0] c2_last = c2_out - 9'd1;
+  reg [GROUP_BITS-1:0] d1_group_q, c1_group_q, c2_group_q;
+  reg [PART_BITS-1:0] d1_part_q, c1_part_q, c2_part_q;
+  always_ff @(posedge clk_i) begin
+    d1_group_q <= GROUP_BITS'(d1_last >> $clog2(NEURONS));
+    c1_group_q <= GROUP_BITS'(c1_last >> $clog2(NEURONS));
+    c2_group_q <= GROUP_BITS'(c2_last >> $clog2(NEURONS));
+    d1_part_q <= PART_BITS'(d1_last >> $clog2(MACS));
+    c1_part_q <= PART_BITS'(c1_last >> $clog2(MACS));
+    c2_part_q <= PART_BITS'(c2_last >> $clog2(MACS));
+  end
 
-  assign wanted[2] = pending_q[2] && (c2_step_q != 3'd0 || space_c3);
-  assign wanted[1] = pending_q[1] && queue_room_q != 3'd0;
-  assign wanted[0] = pending_q[0] && (d1_step_q != 3'd0 || space_d2);
-  wire h_room;
-  wire wanted_c3 = ready_c3 && colour_ready_i;
-  wire wanted_d2 = ready_d2 && density_ready_i && h_room;
-  assign take_c3 = wanted_c3 && !clear_i;
-  assign fire[2] = wanted[2] && !wanted_c3 && !clear_i;
-  assign fire[1] = wanted[1] && !wanted_c3 && !wanted[2] && !clear_i;
-  assign take_d2 = wanted_d2 && !wanted_c3 && !wanted[2] && !wanted[1] && !clear_i;
-  assign fire[0] = wanted[0] && !wanted_c3 && !wanted[2] && !wanted[1] && !wanted_d2 && !clear_i;
-  wire [2:0] fire_step = fire[2] ? c2_step_q : fire[1] ? c1_step_q : d1_step_q;
-  // D1's current serves all steps, and a decoder's of C1.
-  wire [2:0] fire_ends = {fire[2], fire[1] && (!decodes || c1_ends), fire[0] && d1_ends};
+  // ---- whose neurons step. The layer nearest to the output goes first.
+  wire d1_full, c1_full, c2_full, space_d2, space_c2, space_c3;
+  reg active_q;
+  reg [1:0] layer_q;
+  reg [2:0] step_q;
+  reg [GROUP_BITS-1:0] group_q;
+  reg [2:0] wait_q;       // cycles until the next step may begin
+  reg released_q;         // the last load of C2's sums is on its way
+  wire want_c2 = c2_full && !released_q && space_c3;
+  wire want_c1 = c1_full && space_c2;
+  wire want_d1 = d1_full && space_d2;
+  wire [1:0] layer = active_q ? layer_q : want_c2 ? C2 : want_c1 ? C1 : D1;
+  wire run = active_q ? wait_q == 3'd0 : want_c2 || want_c1 || want_d1;
+  wire [GROUP_BITS-1:0] last_group = layer == C2 ? c2_group_q : layer == C1 ? c1_group_q : d1_group_q;
+  wire [PART_BITS-1:0] last_part = layer == C2 ? c2_part_q : layer == C1 ? c1_part_q : d1_part_q;
+  wire [PART_BITS-1:0] part = PART_BITS'(32'(group_q) / PART_GROUPS);
+  wire at_part = run && 32'(group_q) % PART_GROUPS == 0;
+  wire group_ends = group_q == last_group;
+  wire last_step = {1'b0, step_q} == steps_i - 4'd1;
+  // The current of D1, and of a decoder's C1, is that of all steps: of a layer of one part it stays where it was loaded to.
+  wire stays = (layer == D1 || (layer == C1 && decodes)) && last_part == {PART_BITS{1'b0}};
+  wire load = at_part && !(stays && step_q != 3'd0);
+  wire taken = load && (last_step || stays) && part == last_part;
+  wire begins = run && !active_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {reserved_q, pending_q, d1_step_q, c1_step_q, c2_step_q} <= 15'd0;
+      {active_q, layer_q, step_q, wait_q, released_q} <= 10'd0;
+      group_q <= {GROUP_BITS{1'b0}};
     end else if (clear_i) begin
-      {reserved_q, pending_q, d1_step_q, c1_step_q, c2_step_q} <= 15'd0;
+      {active_q, layer_q, step_q, wait_q, released_q} <= 10'd0;
+      group_q <= {GROUP_BITS{1'b0}};
     end else begin
-      reserved_q <= (reserved_q & ~fire_ends) | fire_next;
-      pending_q <= (pending_q & ~fire_ends) | fire_valid;
-      if (fire[0]) d1_step_q <= d1_ends ? 3'd0 : d1_step_q + 3'd1;
-      if (fire[1]) c1_step_q <= c1_ends ? 3'd0 : c1_step_q + 3'd1;
-      if (fire[2]) c2_step_q <= c2_ends ? 3'd0 : c2_step_q + 3'd1;
+      released_q <= taken && layer == C2;
+      if (run) begin
+        active_q <= !(group_ends && last_step);
+        layer_q <= layer;
+        group_q <= group_ends ? {GROUP_BITS{1'b0}} : group_q + 1'b1;
+        if (group_ends) step_q <= last_step ? 3'd0 : step_q + 3'd1;
+        if (group_ends && !last_step && 32'(last_group) < DEPTH - 1) wait_q <= 3'(DEPTH - 1 - 32'(last_group));
+      end else if (wait_q != 3'd0) wait_q <= wait_q - 3'd1;
     end
   end
 
-  wire [2:0] spikes_valid, spikes_step;
-  wire [LANES-1:0] spikes;
-  wire [24*LANES-1:0] d1_current, c1_current;
-  wire [16*LANES-1:0] c2_current;
-  sf_neurons #(
-      .LANES(LANES),
-      .TAP  (TAP)
-  ) u_neurons (
-      .clk_i         (clk_i),
-      .rst_ni        (rst_ni),
-      .clear_i       (clear_i),
-      .mode_i        (mode_i),
-      .k_i           ({k_i[51:26], k_i[12:0]}),
-      .theta_i       ({theta_i[95:48], theta_i[23:0]}),
-      .n_out_i       ({n_out_i[35:18], n_out_i[8:0]}),
-      .fire_i        (fire),
-      .step_i        (fire_step),
-      .d1_i          (d1_current),
-      .c1_i          (c1_current),
-      .c2_i          (c2_current),
-      .valid_o       (spikes_valid),
-      .step_o        (spikes_step),
-      .spikes_o      (spikes),
-      .count_o       (spikes_count_o),
-      .tap_membrane_o(tap_membrane_o)
-  );
+  // ---- from a group's turn to its currents: four cycles
+  reg [3:0] run_q, last_q;
+  reg load_q;
+  reg [7:0] run_layer_q;
+  reg [11:0] run_step_q;
+  reg [4*GROUP_BITS-1:0] run_group_q;
+  reg [PART_BITS-1:0] load_part_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) {run_q, load_q} <= 5'd0;
+    else if (clear_i) {run_q, load_q} <= 5'd0;
+    else {run_q, load_q} <= {run_q[2:0], run, load};
+  end
+  always_ff @(posedge clk_i) begin
+    last_q <= {last_q[2:0], group_ends};
+    run_layer_q <= {run_layer_q[5:0], layer};
+    run_step_q <= {run_step_q[8:0], step_q};
+    run_group_q <= {run_group_q[3*GROUP_BITS-1:0], group_q};
+    load_part_q <= part;
+  end
 
-  // ---- D1
-  wire dir_we, first_we, first_in, d1_idle, d1_done;
-  wire [3:0] d1_dir_index;
-  wire [11:0] dir_in;
-  wire wd1 = we_i && wlayer_i == sf_op_pkg::D1;
-  sf_d1 #(
-      .LANES(LANES)
-  ) u_d1 (
+  wire [24*MACS-1:0] values;
+  wire [16*MACS-1:0] c2_sums;
+  // The group whose turn it is, of the part that was loaded last.
+  wire [GROUP_BITS-1:0] place = run_group_q[3*GROUP_BITS+:GROUP_BITS] & GROUP_BITS'(PART_GROUPS - 1);
+  wire of_c2 = run_layer_q[6+:2] == C2;
+  reg [24*NEURONS-1:0] current;
+  always_comb begin
+    current = {(24 * NEURONS) {1'b0}};
+    for (int g = 0; g < PART_GROUPS; g++) begin
+      if (place == GROUP_BITS'(g)) begin
+        for (int n = 0; n < NEURONS; n++)
+          current[24*n+:24] = of_c2 ? 24'($signed(c2_sums[16*(NEURONS*g+n)+:16])) <<< sf_arch_pkg::AC_FRAC
+                            : values[24*(NEURONS*g+n)+:24];
+      end
+    end
+  end
+
+  wire spikes_valid, spikes_last, neurons_idle;
+  wire [1:0] spikes_layer;
+  wire [2:0] spikes_step;
+  wire [GROUP_BITS-1:0] spikes_group;
+  wire [NEURONS-1:0] spikes;
+  wire [24*NEURONS-1:0] membrane;
+  sf_neurons #(
+      .NEURONS   (NEURONS),
+      .GROUP_BITS(GROUP_BITS)
+  ) u_neurons (
+      .clk_i     (clk_i),
+      .rst_ni    (rst_ni),
+      .clear_i   (clear_i),
+      .mode_i    (mode_i),
+      .k_i       ({k_i[51:26], k_i[12:0]}),
+      .theta_i   ({theta_i[95:48], theta_i[23:0]}),
+      .n_out_i   ({n_out_i[35:18], n_out_i[8:0]}),
+      .valid_i   (run_q[3]),
+      .layer_i   (run_layer_q[6+:2]),
+      .step_i    (run_step_q[9+:3]),
+      .group_i   (run_group_q[3*GROUP_BITS+:GROUP_BITS]),
+      .last_i    (last_q[3]),
+      .current_i (current),
+      .valid_o   (spikes_valid),
+      .layer_o   (spikes_layer),
+      .step_o    (spikes_step),
+      .group_o   (spikes_group),
+      .last_o    (spikes_last),
+      .spikes_o  (spikes),
+      .membrane_o(membrane),
+      .idle_o    (neurons_idle)
+  );
+  reg neurons_valid_q, neurons_last_q;
+  reg [1:0] neurons_layer_q;
+  reg [2:0] neurons_step_q;
+  reg [8:0] neurons_fired_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) neurons_valid_q <= 1'b0;
+    else neurons_valid_q <= spikes_valid;
+  end
+  always_ff @(posedge clk_i) begin
+    neurons_last_q <= spikes_last;
+    neurons_layer_q <= spikes_layer;
+    neurons_step_q <= spikes_step;
+    neurons_fired_q <= 9'($countones(spikes));
+  end
+  assign neurons_valid_o = neurons_valid_q;
+  assign neurons_last_o = neurons_last_q;
+  assign neurons_layer_o = neurons_layer_q;
+  assign neurons_step_o = neurons_step_q;
+  assign neurons_fired_o = neurons_fired_q;
+
+  // ---- D1 and C1. Directions and marks of a ray's first sample wait for C1; at most 10 samples are between the two.
+  reg [11:0] dir_q[0:255];
+  reg [15:0] mark_q;
+  reg [3:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
+  wire dir_we, values_done, h_done, values_idle;
+  wire [1:0] values_busy;
+  wire d1_done = values_done && !decodes;
+  reg [1:0] h_taken_q, h_full_q;  // samples of h: promised, complete
+  reg h_write_q, h_read_q;
+  wire [2:0] h_step;
+  wire [3:0] h_index;
+  wire [11:0] h;
+  sf_values #(
+      .LANES    (LANES),
+      .MACS     (MACS),
+      .PART_BITS(PART_BITS)
+  ) u_values (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (clear_i),
-      .hold_i         (hold_i),
+      .decodes_i      (decodes),
       .n_feature_i    (n_in_i[5:0]),
-      .n_dir_i        (n_dir[4:0]),
-      .we_i           (wd1),
-      .wrow_i         (wrow_i[4:0]),
+      .n_dir_i        (n_dir),
+      .bias_i         (bias_i[10:0]),
+      .n_h_i          (n_h[4:0]),
+      .steps_i        (steps_i),
+      .d1_part_i      (d1_part_q),
+      .c1_part_i      (c1_part_q),
+      .d1_we_i        (we_i && wlayer_i == sf_op_pkg::D1),
+      .c1_we_i        (we_i && wlayer_i == sf_op_pkg::C1),
+      .wrow_i         (wrow_i),
       .wword_i        (word),
       .wdata_i        (wdata_i),
-      .sample_valid_i (sample_valid_i && !decodes),
-      .sample_first_i (sample_first_i),
-      .sample_done_o  (d1_done),
+      .valid_i        (sample_valid_i && !hold_i),
+      .first_i        (sample_first_i),
+      .done_o         (values_done),
       .feature_index_o(feature_index_o),
       .feature_i      (feature_i),
-      .dir_i          (dir_i),
       .dir_we_o       (dir_we),
-      .dir_index_o    (d1_dir_index),
-      .dir_o          (dir_in),
-      .first_we_o     (first_we),
-      .first_o        (first_in),
-      .fire_free_i    (!reserved_q[0]),
-      .fire_next_o    (fire_next[0]),
-      .fire_valid_o   (fire_valid[0]),
-      .current_o      (d1_current),
-      .row_o          (d1_row_o),
-      .idle_o         (d1_idle)
+      .dir_index_o    (dir_index_o),
+      .dir_i          (dir_i),
+      .h_valid_i      (h_full_q != 2'd0),
+      .h_first_i      (mark_q[mark_read_q]),
+      .h_done_o       (h_done),
+      .h_step_o       (h_step),
+      .h_index_o      (h_index),
+      .h_i            (h),
+      .h_dir_i        (dir_q[{ray_read_q, dir_index_o[3:0]}]),
+      .d1_full_o      (d1_full),
+      .c1_full_o      (c1_full),
+      .d1_taken_i     (taken && layer == D1),
+      .c1_taken_i     (taken && layer == C1),
+      .load_i         (load && layer != C2),
+      .load_c1_i      (layer == C1),
+      .load_step_i    (step_q),
+      .load_part_i    (part),
+      .current_o      (values),
+      .d1_row_o       (d1_row_o),
+      .c1_row_o       (c1_row_o),
+      .c1_bias_row_o  (c1_bias_row_o),
+      .c1_products_o  (c1_products_o),
+      .c1_step_o      (c1_step_o),
+      .ray_o          (ray_o),
+      .busy_o         (values_busy),
+      .idle_o         (values_idle)
   );
-
-  // Directions and ray marks from D1 to C1. At most 6 samples are between the two.
-  reg [11:0] dir_q[0:127];
-  reg [7:0] mark_q;
-  reg [2:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
-  wire c1_done, ray_done;
-  wire [7:0] c1_dir_index;
-  assign dir_index_o = decodes ? c1_dir_index : {4'd0, d1_dir_index};
-  assign sample_done_o = decodes ? c1_done : d1_done;
+  assign sample_done_o = values_done;
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 12'd0;
-    else if (clear_i) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 12'd0;
+    if (!rst_ni) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 16'd0;
+    else if (clear_i) {mark_write_q, mark_read_q, ray_write_q, ray_read_q} <= 16'd0;
     else begin
-      if (first_we) mark_write_q <= mark_write_q + 3'd1;
-      if (first_we && first_in) ray_write_q <= ray_write_q + 3'd1;
-      if (c1_done) mark_read_q <= mark_read_q + 3'd1;
-      if (ray_done) ray_read_q <= ray_read_q + 3'd1;
+      if (d1_done) mark_write_q <= mark_write_q + 4'd1;
+      if (d1_done && sample_first_i) ray_write_q <= ray_write_q + 4'd1;
+      if (h_done) mark_read_q <= mark_read_q + 4'd1;
+      if (ray_o) ray_read_q <= ray_read_q + 4'd1;
     end
   end
   always_ff @(posedge clk_i) begin
-    if (first_we) mark_q[mark_write_q] <= first_in;
-    if (dir_we) dir_q[{ray_write_q, d1_dir_index}] <= dir_in;
+    if (d1_done) mark_q[mark_write_q] <= sample_first_i;
+    if (dir_we) dir_q[{ray_write_q, dir_index_o[3:0]}] <= dir_i;
   end
 
   // ---- D2
-  wire d2_valid, d2_release, d2_idle, store2_idle;
-  wire [LANES-1:0] d2_any, d2_even, d2_odd, d2_rows;
-  wire [7:0] d2_even_fired, d2_odd_fired;
-  sf_store #(
-      .LANES(LANES)
-  ) u_store_d2 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .steps_i     (steps_i),
-      .take_i      (fire[0] && d1_step_q == 3'd0),
-      .space_o     (space_d2),
-      .we_i        (spikes_valid[0]),
-      .wstep_i     (spikes_step),
-      .wspikes_i   (spikes),
-      .valid_o     (d2_valid),
-      .any_o       (d2_any),
-      .even_mask_i (d2_even),
-      .odd_mask_i  (d2_odd),
-      .even_fired_o(d2_even_fired),
-      .odd_fired_o (d2_odd_fired),
-      .release_i   (d2_release),
-      .idle_o      (store2_idle)
+  wire d2_full, load_d2, last_d2, busy_d2, idle_d2, spikes_idle_d2;
+  wire [2:0] step_d2;
+  wire d2_item, d2_item_bias, d2_item_last, d2_next;
+  wire [INDEX_BITS-1:0] d2_index;
+  wire [7:0] d2_fired;
+  wire [LANES-1:0] d2_rows;
+  wire [255:0] d2_sums;
+  sf_spikes #(
+      .NEURONS   (NEURONS),
+      .INDEX_BITS(INDEX_BITS),
+      .GROUP_BITS(GROUP_BITS)
+  ) u_spikes_d2 (
+      .clk_i    (clk_i),
+      .rst_ni   (rst_ni),
+      .clear_i  (clear_i),
+      .bias_i   (1'b0),
+      .steps_i  (steps_i),
+      .group_i  (d1_group_q),
+      .take_i   (begins && layer == D1),
+      .space_o  (space_d2),
+      .we_i     (spikes_valid && spikes_layer == D1),
+      .wstep_i  (spikes_step),
+      .wgroup_i (spikes_group),
+      .wspikes_i(spikes),
+      .valid_o  (d2_item),
+      .bias_o   (d2_item_bias),
+      .index_o  (d2_index),
+      .fired_o  (d2_fired),
+      .last_o   (d2_item_last),
+      .next_i   (d2_next),
+      .idle_o   (spikes_idle_d2)
   );
-  sf_split #(
-      .LANES(LANES),
-      .BITS (BITS),
-      .TAP  (TAP)
+  sf_sums #(
+      .ROWS     (LANES),
+      .ROW_BITS (INDEX_BITS),
+      .OUTS     (16),
+      .ADDERS   (16),
+      .PART_BITS(1),
+      .BANKS    (4),
+      .TAP      (TAP)
   ) u_d2 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .bias_i      (1'b0),
-      .we_i        (row_we && wlayer_i == sf_op_pkg::D2),
-      .bias_we_i   (1'b0),
-      .wrow_i      (wrow_i[BITS:0]),
-      .wword_i     (wword_i[1:0]),
-      .wdata_i     (wdata_i),
-      .valid_i     (d2_valid),
-      .any_i       (d2_any),
-      .even_mask_o (d2_even),
-      .odd_mask_o  (d2_odd),
-      .even_fired_i(d2_even_fired),
-      .odd_fired_i (d2_odd_fired),
-      .release_o   (d2_release),
-      .valid_o     (ready_d2),
-      .take_i      (take_d2),
-      .current_o   (density_o),
-      .even_fired_o(d2_fired_o[7:0]),
-      .odd_fired_o (d2_fired_o[15:8]),
-      .idle_o      (d2_idle),
-      .tap_rows_o  (d2_rows)
+      .clk_i      (clk_i),
+      .rst_ni     (rst_ni),
+      .clear_i    (clear_i),
+      .part_i     (1'b0),
+      .we_i       (row_we && wlayer_i == sf_op_pkg::D2),
+      .bias_we_i  (1'b0),
+      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
+      .wword_i    (word[1:0]),
+      .wdata_i    (wdata_i),
+      .valid_i    (d2_item),
+      .bias_i     (d2_item_bias),
+      .index_i    (d2_index),
+      .fired_i    (d2_fired),
+      .last_i     (d2_item_last),
+      .next_o     (d2_next),
+      .full_o     (d2_full),
+      .load_i     (load_d2),
+      .load_step_i(step_d2),
+      .load_part_i(1'b0),
+      .release_i  (last_d2),
+      .sums_o     (d2_sums),
+      .row_o      (fed_row_o[0]),
+      .bias_row_o (fed_bias_o[0]),
+      .fired_o    (fed_fired_o[0+:8]),
+      .busy_o     (busy_d2),
+      .idle_o     (idle_d2),
+      .tap_rows_o (d2_rows)
   );
-
-  // D2's currents of two samples. h = current >>> H_SHIFT: 16384 >> 3 fits 12 bits; with a smaller H_SHIFT the scene's
-  // weights see to it.
-  reg [2047:0] h_q[0:1];
-  reg [1:0] h_full_q;
-  reg h_write_q, h_read_q, take_d2_q, take_c3_q;
-  wire [6:0] h_index;
-  wire [6:0] h_lane = h_index + 7'd1;  // output 0 is the density
-  wire [11:0] h = h_q[h_read_q][16*h_lane+sf_arch_pkg::H_SHIFT+:12];
-  assign h_room = !h_full_q[h_write_q] && !take_d2_q;
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      h_full_q <= 2'd0;
-      {h_write_q, h_read_q, take_d2_q, take_c3_q} <= 4'd0;
-    end else if (clear_i) begin
-      h_full_q <= 2'd0;
-      {h_write_q, h_read_q, take_d2_q, take_c3_q} <= 4'd0;
-    end else begin
-      take_d2_q <= take_d2;
-      take_c3_q <= take_c3;
-      if (take_d2_q) begin
-        h_full_q[h_write_q] <= 1'b1;
-        h_write_q <= !h_write_q;
-      end
-      if (c1_done) begin
-        h_full_q[h_read_q] <= 1'b0;
-        h_read_q <= !h_read_q;
-      end
-    end
-  end
-  always_ff @(posedge clk_i) begin
-    if (take_d2_q) h_q[h_write_q] <= density_o;
-  end
-  assign density_valid_o = take_d2_q;
-  assign colour_valid_o = take_c3_q;
-
-  // ---- C1
-  wire c1_idle;
-  sf_c1 #(
-      .LANES(LANES)
-  ) u_c1 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .decodes_i   (decodes),
-      .n_dir_i     (n_dir),
-      .bias_i      (bias_i[10:0]),
-      .n_h_i       (n_h[4:0]),
-      .steps_i     (steps_i),
-      .we_i        (we_i && wlayer_i == sf_op_pkg::C1),
-      .wrow_i      (wrow_i),
-      .wword_i     (word),
-      .wdata_i     (wdata_i),
-      .valid_i     (decodes ? sample_valid_i && !hold_i : h_full_q[h_read_q]),
-      .first_i     (mark_q[mark_read_q]),
-      .done_o      (c1_done),
-      .dir_index_o (c1_dir_index),
-      .dir_i       (decodes ? dir_i : dir_q[{ray_read_q, c1_dir_index[3:0]}]),
-      .h_index_o   (h_index),
-      .h_i         (h),
-      .fire_free_i (!reserved_q[1]),
-      .fire_next_o (fire_next[1]),
-      .fire_valid_o(fire_valid[1]),
-      .current_o   (c1_current),
-      .row_o       (c1_row_o),
-      .bias_row_o  (c1_bias_row_o),
-      .row_step_o  (c1_step_o),
-      .ray_o       (ray_o),
-      .idle_o      (c1_idle)
-  );
-  assign ray_done = ray_o;
-
-  // Spikes of C1, step by step, to C2.
-  reg [LANES-1:0] queue_q[0:QUEUE-1];
-  reg [2:0] queue_step_q[0:QUEUE-1];
-  reg [2:0] queue_count_q;
-  reg [1:0] queue_write_q, queue_read_q;
-  wire c2_done;
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {queue_count_q, queue_write_q, queue_read_q, queue_room_q} <= {7'd0, 3'(QUEUE)};
-    else if (clear_i) {queue_count_q, queue_write_q, queue_read_q, queue_room_q} <= {7'd0, 3'(QUEUE)};
-    else begin
-      queue_count_q <= queue_count_q + {2'd0, spikes_valid[1]} - {2'd0, c2_done};
-      queue_room_q <= queue_room_q + {2'd0, c2_done} - {2'd0, fire[1]};
-      if (spikes_valid[1]) queue_write_q <= queue_write_q + 2'd1;
-      if (c2_done) queue_read_q <= queue_read_q + 2'd1;
-    end
-  end
-  always_ff @(posedge clk_i) begin
-    if (spikes_valid[1]) begin
-      queue_q[queue_write_q] <= spikes;
-      queue_step_q[queue_write_q] <= spikes_step;
-    end
-  end
 
   // ---- C2
-  wire c2_idle;
+  wire load_c2, last_c2, busy_c2, idle_c2, spikes_idle_c2;
+  wire [2:0] step_c2;
+  wire c2_item, c2_item_bias, c2_item_last, c2_next;
+  wire [INDEX_BITS-1:0] c2_index;
+  wire [7:0] c2_fired;
   wire [LANES-1:0] c2_rows;
-  sf_c2 #(
-      .LANES(LANES),
-      .BITS (BITS),
-      .TAP  (TAP)
-  ) u_c2 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .bias_i      (bias_i[11]),
-      .we_i        (row_we && wlayer_i == sf_op_pkg::C2),
-      .bias_we_i   (bias_we && wlayer_i == sf_op_pkg::C2),
-      .wrow_i      (wrow_i[BITS:0]),
-      .wword_i     (word),
-      .wdata_i     (wdata_i),
-      .valid_i     (queue_count_q != 3'd0),
-      .spikes_i    (queue_q[queue_read_q]),
-      .step_i      (queue_step_q[queue_read_q]),
-      .done_o      (c2_done),
-      .fire_free_i (!reserved_q[2]),
-      .fire_next_o (fire_next[2]),
-      .fire_valid_o(fire_valid[2]),
-      .current_o   (c2_current),
-      .rows_o      (c2_rows_o),
-      .rows_step_o (c2_step_o),
-      .idle_o      (c2_idle),
-      .tap_rows_o  (c2_rows)
+
+  sf_spikes #(
+      .NEURONS   (NEURONS),
+      .INDEX_BITS(INDEX_BITS),
+      .GROUP_BITS(GROUP_BITS)
+  ) u_spikes_c2 (
+      .clk_i    (clk_i),
+      .rst_ni   (rst_ni),
+      .clear_i  (clear_i),
+      .bias_i   (bias_i[11]),
+      .steps_i  (steps_i),
+      .group_i  (c1_group_q),
+      .take_i   (begins && layer == C1),
+      .space_o  (space_c2),
+      .we_i     (spikes_valid && spikes_layer == C1),
+      .wstep_i  (spikes_step),
+      .wgroup_i (spikes_group),
+      .wspikes_i(spikes),
+      .valid_o  (c2_item),
+      .bias_o   (c2_item_bias),
+      .index_o  (c2_index),
+      .fired_o  (c2_fired),
+      .last_o   (c2_item_last),
+      .next_i   (c2_next),
+      .idle_o   (spikes_idle_c2)
   );
+  sf_sums #(
+      .ROWS     (LANES),
+      .ROW_BITS (INDEX_BITS),
+      .OUTS     (LANES),
+      .ADDERS   (MACS),
+      .PART_BITS(PART_BITS),
+      .BANKS    (STEPS_AT_ONCE),
+      .TAP      (TAP)
+  ) u_c2 (
+      .clk_i      (clk_i),
+      .rst_ni     (rst_ni),
+      .clear_i    (clear_i),
+      .part_i     (c2_part_q),
+      .we_i       (row_we && wlayer_i == sf_op_pkg::C2),
+      .bias_we_i  (bias_we && wlayer_i == sf_op_pkg::C2),
+      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
+      .wword_i    (word),
+      .wdata_i    (wdata_i),
+      .valid_i    (c2_item),
+      .bias_i     (c2_item_bias),
+      .index_i    (c2_index),
+      .fired_i    (c2_fired),
+      .last_i     (c2_item_last),
+      .next_o     (c2_next),
+      .full_o     (c2_full),
+      .load_i     (load_c2),
+      .load_step_i(step_c2),
+      .load_part_i(load_part_q),
+      .release_i  (last_c2),
+      .sums_o     (c2_sums),
+      .row_o      (fed_row_o[1]),
+      .bias_row_o (fed_bias_o[1]),
+      .fired_o    (fed_fired_o[8+:8]),
+      .busy_o     (busy_c2),
+      .idle_o     (idle_c2),
+      .tap_rows_o (c2_rows)
+  );
+  assign load_c2 = load_q && run_layer_q[1:0] == C2;
+  assign step_c2 = run_step_q[2:0];
+  assign last_c2 = released_q;
 
   // ---- C3
-  wire c3_valid, c3_release, c3_idle, store3_idle;
-  wire [LANES-1:0] c3_any, c3_even, c3_odd, c3_rows;
-  wire [7:0] c3_even_fired, c3_odd_fired;
-  sf_store #(
-      .LANES(LANES)
-  ) u_store_c3 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .steps_i     (steps_i),
-      .take_i      (fire[2] && c2_step_q == 3'd0),
-      .space_o     (space_c3),
-      .we_i        (spikes_valid[2]),
-      .wstep_i     (spikes_step),
-      .wspikes_i   (spikes),
-      .valid_o     (c3_valid),
-      .any_o       (c3_any),
-      .even_mask_i (c3_even),
-      .odd_mask_i  (c3_odd),
-      .even_fired_o(c3_even_fired),
-      .odd_fired_o (c3_odd_fired),
-      .release_i   (c3_release),
-      .idle_o      (store3_idle)
+  wire c3_full, load_c3, last_c3, busy_c3, idle_c3, spikes_idle_c3;
+  wire [2:0] step_c3;
+  wire c3_item, c3_item_bias, c3_item_last, c3_next;
+  wire [INDEX_BITS-1:0] c3_index;
+  wire [7:0] c3_fired;
+  wire [LANES-1:0] c3_rows;
+  wire [255:0] c3_sums;
+  sf_spikes #(
+      .NEURONS   (NEURONS),
+      .INDEX_BITS(INDEX_BITS),
+      .GROUP_BITS(GROUP_BITS)
+  ) u_spikes_c3 (
+      .clk_i    (clk_i),
+      .rst_ni   (rst_ni),
+      .clear_i  (clear_i),
+      .bias_i   (bias_i[12]),
+      .steps_i  (steps_i),
+      .group_i  (c2_group_q),
+      .take_i   (begins && layer == C2),
+      .space_o  (space_c3),
+      .we_i     (spikes_valid && spikes_layer == C2),
+      .wstep_i  (spikes_step),
+      .wgroup_i (spikes_group),
+      .wspikes_i(spikes),
+      .valid_o  (c3_item),
+      .bias_o   (c3_item_bias),
+      .index_o  (c3_index),
+      .fired_o  (c3_fired),
+      .last_o   (c3_item_last),
+      .next_i   (c3_next),
+      .idle_o   (spikes_idle_c3)
   );
-  sf_split #(
-      .LANES(LANES),
-      .BITS (BITS),
-      .TAP  (TAP)
+  sf_sums #(
+      .ROWS     (LANES),
+      .ROW_BITS (INDEX_BITS),
+      .OUTS     (16),
+      .ADDERS   (16),
+      .PART_BITS(1),
+      .BANKS    (4),
+      .TAP      (TAP)
   ) u_c3 (
-      .clk_i       (clk_i),
-      .rst_ni      (rst_ni),
-      .clear_i     (clear_i),
-      .bias_i      (bias_i[12]),
-      .we_i        (row_we && wlayer_i == sf_op_pkg::C3),
-      .bias_we_i   (bias_we && wlayer_i == sf_op_pkg::C3),
-      .wrow_i      (wrow_i[BITS:0]),
-      .wword_i     (wword_i[1:0]),
-      .wdata_i     (wdata_i),
-      .valid_i     (c3_valid),
-      .any_i       (c3_any),
-      .even_mask_o (c3_even),
-      .odd_mask_o  (c3_odd),
-      .even_fired_i(c3_even_fired),
-      .odd_fired_i (c3_odd_fired),
-      .release_o   (c3_release),
-      .valid_o     (ready_c3),
-      .take_i      (take_c3),
-      .current_o   (colour_o),
-      .even_fired_o(c3_fired_o[7:0]),
-      .odd_fired_o (c3_fired_o[15:8]),
-      .idle_o      (c3_idle),
-      .tap_rows_o  (c3_rows)
+      .clk_i      (clk_i),
+      .rst_ni     (rst_ni),
+      .clear_i    (clear_i),
+      .part_i     (1'b0),
+      .we_i       (row_we && wlayer_i == sf_op_pkg::C3),
+      .bias_we_i  (bias_we && wlayer_i == sf_op_pkg::C3),
+      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
+      .wword_i    (word[1:0]),
+      .wdata_i    (wdata_i),
+      .valid_i    (c3_item),
+      .bias_i     (c3_item_bias),
+      .index_i    (c3_index),
+      .fired_i    (c3_fired),
+      .last_i     (c3_item_last),
+      .next_o     (c3_next),
+      .full_o     (c3_full),
+      .load_i     (load_c3),
+      .load_step_i(step_c3),
+      .load_part_i(1'b0),
+      .release_i  (last_c3),
+      .sums_o     (c3_sums),
+      .row_o      (fed_row_o[2]),
+      .bias_row_o (fed_bias_o[2]),
+      .fired_o    (fed_fired_o[16+:8]),
+      .busy_o     (busy_c3),
+      .idle_o     (idle_c3),
+      .tap_rows_o (c3_rows)
   );
 
-  assign spikes_valid_o = spikes_valid;
-  assign spikes_step_o = spikes_step;
-  assign stall_o = (ready_c3 && !colour_ready_i) || (ready_d2 && !density_ready_i);
-  assign idle_o = d1_idle && d2_idle && c1_idle && c2_idle && c3_idle && store2_idle && store3_idle
-      && reserved_q == 3'd0 && spikes_valid == 3'd0 && queue_count_q == 3'd0 && h_full_q == 2'd0
-      && !take_d2_q && !take_c3_q;
+  // ---- D2's sums, a step per cycle: the density to the readout, the others as h to C1. h = current >>> H_SHIFT: 16384 >> 3
+  // fits 12 bits; with a smaller H_SHIFT the scene's weights see to it.
+  reg [2:0] read_d2_q, read_c3_q;  // a step's sums are there in three cycles, in two, in one
+  reg [8:0] read_d2_step_q, read_c3_step_q;
+  reg [2:0] read_d2_last_q, read_c3_last_q;
+  reg reading_d2_q, reading_c3_q;
+  reg [2:0] next_d2_q, next_c3_q;
+  wire d2_begins = !reading_d2_q && d2_full && density_ready_i && !h_taken_q[1];
+  wire c3_begins = !reading_c3_q && c3_full && colour_ready_i;
+  assign load_d2 = d2_begins || reading_d2_q;
+  assign load_c3 = c3_begins || reading_c3_q;
+  assign step_d2 = next_d2_q;
+  assign step_c3 = next_c3_q;
+  assign last_d2 = load_d2 && {1'b0, next_d2_q} == steps_i - 4'd1;
+  assign last_c3 = load_c3 && {1'b0, next_c3_q} == steps_i - 4'd1;
+  wire h_complete = read_d2_q[2] && read_d2_last_q[2];
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) begin
+      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 14'd0;
+      {h_taken_q, h_full_q, h_write_q, h_read_q} <= 6'd0;
+    end else if (clear_i) begin
+      {reading_d2_q, reading_c3_q, next_d2_q, next_c3_q, read_d2_q, read_c3_q} <= 14'd0;
+      {h_taken_q, h_full_q, h_write_q, h_read_q} <= 6'd0;
+    end else begin
+      reading_d2_q <= load_d2 && !last_d2;
+      reading_c3_q <= load_c3 && !last_c3;
+      if (load_d2) next_d2_q <= last_d2 ? 3'd0 : next_d2_q + 3'd1;
+      if (load_c3) next_c3_q <= last_c3 ? 3'd0 : next_c3_q + 3'd1;
+      read_d2_q <= {read_d2_q[1:0], load_d2};
+      read_c3_q <= {read_c3_q[1:0], load_c3};
+      h_taken_q <= h_taken_q + {1'b0, d2_begins} - {1'b0, h_done};
+      h_full_q <= h_full_q + {1'b0, h_complete} - {1'b0, h_done};
+      if (h_complete) h_write_q <= !h_write_q;
+      if (h_done) h_read_q <= !h_read_q;
+    end
+  end
+  reg [179:0] h_q[0:15];  // 15 values by {sample, step}
+  wire [179:0] h_sums;
+  genvar l;
+  generate
+    for (l = 0; l < 15; l = l + 1) begin : g_h
+      assign h_sums[12*l+:12] = d2_sums[16*(l+1)+sf_arch_pkg::H_SHIFT+:12];
+    end
+  endgenerate
+  wire [179:0] h_word = h_q[{h_read_q, h_step}];
+  reg [11:0] h_value;
+  always_comb begin
+    h_value = 12'd0;
+    for (int i = 0; i < 15; i++) if (h_index == 4'(i)) h_value = h_word[12*i+:12];
+  end
+  assign h = h_value;
+  always_ff @(posedge clk_i) begin
+    read_d2_step_q <= {read_d2_step_q[5:0], next_d2_q};
+    read_c3_step_q <= {read_c3_step_q[5:0], next_c3_q};
+    read_d2_last_q <= {read_d2_last_q[1:0], last_d2};
+    read_c3_last_q <= {read_c3_last_q[1:0], last_c3};
+    if (read_d2_q[2]) h_q[{h_write_q, read_d2_step_q[8:6]}] <= h_sums;
+  end
+  assign density_begin_o = d2_begins;
+  assign density_valid_o = read_d2_q[2];
+  assign density_step_o = read_d2_step_q[8:6];
+  assign density_last_o = read_d2_last_q[2];
+  assign density_o = d2_sums[15:0];
+  assign colour_begin_o = c3_begins;
+  assign colour_valid_o = read_c3_q[2];
+  assign colour_step_o = read_c3_step_q[8:6];
+  assign colour_last_o = read_c3_last_q[2];
+  assign colour_o = c3_sums[47:0];
+  assign busy_o = {busy_c3, busy_c2, values_busy[1], busy_d2, values_busy[0]};
 
-  // Tap: one beat per spiking layer and step, one per sample of D2 and C3; never two in a cycle.
+  wire unused_sums_ok = &{1'b0, d2_sums, c3_sums};
+
+  assign stall_o = (c3_full && !reading_c3_q && !colour_ready_i) || (d2_full && !reading_d2_q && !density_ready_i);
+  assign idle_o = values_idle && idle_d2 && idle_c2 && idle_c3 && spikes_idle_d2 && spikes_idle_c2 && spikes_idle_c3
+      && !active_q && run_q == 4'd0 && neurons_idle && !neurons_valid_q && h_taken_q == 2'd0 && read_d2_q == 3'd0
+      && read_c3_q == 3'd0;
+
+  // Tap: one beat per spiking layer and step, one per sample of D2 and C3, which wait for a cycle without another.
   generate
     if (TAP != 0) begin : g_tap
-      reg valid_q;
-      reg [2:0] layer_q, step_q;
+      reg [LANES-1:0] spikes_all_q, d2_all_q, c3_all_q;
+      reg [24*LANES-1:0] membrane_all_q;
+      reg valid_q, beat_q;
+      reg [2:0] tap_layer_q, beat_layer_q;
+      reg [2:0] tap_step_q, beat_step_q;
       reg [LANES-1:0] spikes_q, rows_q;
+      reg [24*LANES-1:0] membrane_q;
+      // rows behind the steps of C2 on their way through the neurons; behind the samples of D2 and C3
+      reg [LANES-1:0] c2_rows_q[0:15], d2_rows_q[0:15], c3_rows_q[0:15];
+      reg [3:0] c2_write_q, c2_read_q, d2_write_q, d2_read_q, c3_write_q, c3_read_q;
+      reg c2_loaded_q;
+      wire send_d2 = !beat_q && d2_read_q != d2_write_q;
+      wire send_c3 = !beat_q && !send_d2 && c3_read_q != c3_write_q;
       always_ff @(posedge clk_i or negedge rst_ni) begin
-        if (!rst_ni) valid_q <= 1'b0;
-        else valid_q <= (spikes_valid != 3'd0 || take_d2_q || take_c3_q) && !clear_i;
+        if (!rst_ni) begin
+          {valid_q, beat_q, c2_loaded_q} <= 3'd0;
+          {c2_write_q, c2_read_q, d2_write_q, d2_read_q, c3_write_q, c3_read_q} <= 24'd0;
+        end else if (clear_i) begin
+          {valid_q, beat_q, c2_loaded_q} <= 3'd0;
+          {c2_write_q, c2_read_q, d2_write_q, d2_read_q, c3_write_q, c3_read_q} <= 24'd0;
+        end else begin
+          c2_loaded_q <= load_c2 && load_part_q == {PART_BITS{1'b0}};
+          if (c2_loaded_q) c2_write_q <= c2_write_q + 4'd1;
+          beat_q <= spikes_valid && spikes_last;
+          if (beat_q && beat_layer_q == sf_op_pkg::C2) c2_read_q <= c2_read_q + 4'd1;
+          if (read_d2_q[1] && read_d2_last_q[1]) d2_write_q <= d2_write_q + 4'd1;
+          if (read_c3_q[1] && read_c3_last_q[1]) c3_write_q <= c3_write_q + 4'd1;
+          if (send_d2) d2_read_q <= d2_read_q + 4'd1;
+          if (send_c3) c3_read_q <= c3_read_q + 4'd1;
+          valid_q <= beat_q || send_d2 || send_c3;
+        end
       end
       always_ff @(posedge clk_i) begin
-        layer_q <= take_c3_q ? sf_op_pkg::C3 : take_d2_q ? sf_op_pkg::D2 : spikes_valid[2] ? sf_op_pkg::C2
-                 : spikes_valid[1] ? sf_op_pkg::C1 : sf_op_pkg::D1;
-        step_q <= take_c3_q || take_d2_q ? 3'd0 : spikes_step;
-        spikes_q <= take_c3_q || take_d2_q ? {LANES{1'b0}} : spikes;
-        rows_q <= take_c3_q ? c3_rows : take_d2_q ? d2_rows : spikes_valid[2] ? c2_rows : {LANES{1'b0}};
+        if (c2_loaded_q) c2_rows_q[c2_write_q] <= c2_rows;
+        if (read_d2_q[0]) d2_all_q <= read_d2_step_q[2:0] == 3'd0 ? d2_rows : d2_all_q | d2_rows;
+        if (read_c3_q[0]) c3_all_q <= read_c3_step_q[2:0] == 3'd0 ? c3_rows : c3_all_q | c3_rows;
+        if (read_d2_q[1]) d2_rows_q[d2_write_q] <= d2_all_q;
+        if (read_c3_q[1]) c3_rows_q[c3_write_q] <= c3_all_q;
+        if (spikes_valid) begin
+          if (spikes_group == {GROUP_BITS{1'b0}}) begin
+            spikes_all_q <= LANES'(spikes);
+          end else spikes_all_q[NEURONS*spikes_group+:NEURONS] <= spikes;
+          membrane_all_q[24*NEURONS*spikes_group+:24*NEURONS] <= membrane;
+        end
+        beat_layer_q <= spikes_layer == C2 ? sf_op_pkg::C2 : spikes_layer == C1 ? sf_op_pkg::C1 : sf_op_pkg::D1;
+        beat_step_q <= spikes_step;
+        tap_layer_q <= beat_q ? beat_layer_q : send_d2 ? sf_op_pkg::D2 : sf_op_pkg::C3;
+        tap_step_q <= beat_q ? beat_step_q : 3'd0;
+        spikes_q <= beat_q ? spikes_all_q : {LANES{1'b0}};
+        if (beat_q) membrane_q <= membrane_all_q;
+        rows_q <= send_d2 ? d2_rows_q[d2_read_q] : send_c3 ? c3_rows_q[c3_read_q]
+                : beat_layer_q == sf_op_pkg::C2 ? c2_rows_q[c2_read_q] : {LANES{1'b0}};
       end
       assign tap_valid_o = valid_q;
-      assign tap_layer_o = layer_q;
-      assign tap_step_o = step_q;
+      assign tap_layer_o = tap_layer_q;
+      assign tap_step_o = tap_step_q;
       assign tap_spikes_o = spikes_q;
       assign tap_rows_o = rows_q;
+      assign tap_membrane_o = membrane_q;
     end else begin : g_no_tap
       assign {tap_valid_o, tap_layer_o, tap_step_o} = 7'd0;
       assign tap_spikes_o = {LANES{1'b0}};
       assign tap_rows_o = {LANES{1'b0}};
-      wire unused_tap_ok = &{1'b0, c2_rows, d2_rows, c3_rows};
+      assign tap_membrane_o = {(24 * LANES) {1'b0}};
+      wire unused_tap_ok = &{1'b0, membrane, c2_rows, d2_rows, c3_rows};
     end
   endgenerate
 endmodule

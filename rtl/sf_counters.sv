@@ -9,18 +9,20 @@ module sf_counters (
     // engine (sf_core)
     input  wire [44:0] n_out_i,
     input  wire        d1_row_i,
-    input  wire [ 1:0] bias_i,           // C3, C2
     input  wire        c1_row_i,
     input  wire        c1_bias_row_i,
+    input  wire        c1_products_i,
     input  wire [ 2:0] c1_step_i,
-    input  wire [ 1:0] c2_rows_i,
-    input  wire [ 2:0] c2_step_i,
-    input  wire [15:0] d2_fired_i,
-    input  wire [15:0] c3_fired_i,
+    input  wire [ 2:0] fed_row_i,        // C3, C2, D2
+    input  wire [23:0] fed_fired_i,
+    input  wire [ 2:0] fed_bias_i,
+    input  wire [ 4:0] busy_i,
     input  wire        ray_i,
-    input  wire [ 2:0] spikes_valid_i,
-    input  wire [ 2:0] spikes_step_i,
-    input  wire [ 8:0] spikes_count_i,
+    input  wire        neurons_valid_i,
+    input  wire [ 1:0] neurons_layer_i,
+    input  wire [ 2:0] neurons_step_i,
+    input  wire        neurons_last_i,
+    input  wire [ 8:0] neurons_fired_i,
     // readout
     input  wire        update_i,
     input  wire        update_colour_i,
@@ -39,18 +41,14 @@ module sf_counters (
     input  wire [ 8:0] index_i,
     output reg  [63:0] counter_o
 );
-  localparam [63:0] NEURON_BYTES = 64'd3;
-  localparam [63:0] INTEGRATOR_BYTES = 64'd4;
-
-  // By step, each layer where its events happen. A row of weights is read for each of its events. Biases are weights
-  // that are read, but no events: a row of C2 for every step of its neurons, a row of C3 for its first integration.
-  reg [63:0] d1_mac_q, c1_bias_q;
+  // By step, each layer where its events happen. A row of weights is read once, at the first step that it serves; biases
+  // are weights that are read, but no operations.
+  reg [63:0] d1_mac_q, c1_weight_q;
   reg [63:0] c1_mac_q[0:7];
-  reg [63:0] c2_sop_q[0:7];
-  // By {C3 else D2, step}; a row that serves several steps was read at the first of them.
-  reg [63:0] split_sop_q[0:15];
-  reg [63:0] split_weight_q[0:15];
-  reg [63:0] integrate_q[0:15];
+  // By {layer of {C3, C2, D2}, step}
+  reg [63:0] sop_q[0:31];
+  reg [63:0] weight_q[0:31];
+  reg [63:0] integrate_q[0:15];  // by {C3 else D2, step}
   // By {layer of {C2, C1, D1}, step}; the state bytes of an update are 3 each.
   reg [63:0] spikes_q[0:31];
   reg [63:0] neuron_q[0:31];
@@ -70,13 +68,12 @@ module sf_counters (
   wire [3:0] at_narrow = {at_layer == sf_op_pkg::C3, at_step};
   wire [4:0] at_neurons = {at_layer == sf_op_pkg::C2 ? 2'd2 : at_layer == sf_op_pkg::C1 ? 2'd1 : 2'd0, at_step};
   wire [63:0] updates = neurons ? neuron_q[at_neurons] : integrate_q[at_narrow];
-  wire [63:0] state_bytes = updates * (neurons ? NEURON_BYTES : INTEGRATOR_BYTES);
+  wire [63:0] state_bytes = (updates << 2) - (neurons ? updates : 64'd0);  // 3 bytes a membrane, 4 an integrator
   wire [63:0] mac = at_layer == sf_op_pkg::C1 ? c1_mac_q[at_step]
                   : at_layer == sf_op_pkg::D1 && at_step == 3'd0 ? d1_mac_q : 64'd0;
-  wire [63:0] add = at_layer == sf_op_pkg::C2 ? c2_sop_q[at_step] : 64'd0;
-  wire bias_c2 = bias_i[0] && at_layer == sf_op_pkg::C2;
-  wire bias_c3 = bias_i[1] && at_layer == sf_op_pkg::C3 && at_step == 3'd0;
-  wire [63:0] biases = bias_c2 || bias_c3 ? updates : at_layer == sf_op_pkg::C1 && at_step == 3'd0 ? c1_bias_q : 64'd0;
+  wire fed = integrating || at_layer == sf_op_pkg::C2;
+  wire [4:0] at_fed = {at_layer == sf_op_pkg::C3 ? 2'd2 : at_layer == sf_op_pkg::C2 ? 2'd1 : 2'd0, at_step};
+  wire [63:0] weight = fed ? weight_q[at_fed] : at_step != 3'd0 ? 64'd0 : at_layer == sf_op_pkg::C1 ? c1_weight_q : d1_mac_q;
   reg [63:0] global_value, place_value;
   always_comb begin
     case (at_step)
@@ -90,10 +87,10 @@ module sf_counters (
     endcase
     case (event_w)
       3'd0: place_value = mac;
-      3'd1: place_value = integrating ? split_sop_q[at_narrow] : add;
+      3'd1: place_value = fed ? sop_q[at_fed] : 64'd0;
       3'd2: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
       3'd3: place_value = updates;
-      3'd4: place_value = biases + (integrating ? split_weight_q[at_narrow] : mac + add);
+      3'd4: place_value = weight;
       3'd5: place_value = at_step == 3'd0 ? 64'd0 : state_bytes;
       3'd6: place_value = state_bytes;
       default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
@@ -139,52 +136,50 @@ module sf_counters (
   wire [63:0] n_c1 = {55'd0, n_out_i[26:18]};
   wire [63:0] n_c2 = {55'd0, n_out_i[35:27]};
   wire [63:0] n_c3 = {55'd0, n_out_i[44:36]};
-  wire [4:0] neurons_here = {spikes_valid_i[2] ? 2'd2 : spikes_valid_i[1] ? 2'd1 : 2'd0, spikes_step_i};
-  wire [63:0] n_neurons = spikes_valid_i[2] ? n_c2 : spikes_valid_i[1] ? n_c1 : n_d1;
+  wire [4:0] neurons_here = {neurons_layer_i, neurons_step_i};
+  wire [63:0] n_neurons = neurons_layer_i[1] ? n_c2 : neurons_layer_i[0] ? n_c1 : n_d1;
   wire [3:0] update_here = {update_colour_i, update_step_i};
-  wire [15:0] d2_first = {d2_fired_i[15:8] & (~d2_fired_i[15:8] + 8'd1), d2_fired_i[7:0] & (~d2_fired_i[7:0] + 8'd1)};
-  wire [15:0] c3_first = {c3_fired_i[15:8] & (~c3_fired_i[15:8] + 8'd1), c3_fired_i[7:0] & (~c3_fired_i[7:0] + 8'd1)};
-  wire [4:0] busy = {|c3_fired_i, |c2_rows_i, c1_row_i || c1_bias_row_i, |d2_fired_i, d1_row_i};
+  wire [191:0] n_fed = {n_c3, n_c2, n_d2};
 
   always_ff @(posedge clk_i) begin
     if (wipe && at_layer == sf_op_pkg::D1) d1_mac_q <= 64'd0;
     else if (d1_row_i) d1_mac_q <= d1_mac_q + n_d1;
-    if (wipe && at_layer == sf_op_pkg::C1 && at_step == 3'd0) c1_bias_q <= 64'd0;
-    else if (c1_bias_row_i) c1_bias_q <= c1_bias_q + n_c1;
+    if (wipe && at_layer == sf_op_pkg::C1 && at_step == 3'd0) c1_weight_q <= 64'd0;
+    else if (c1_row_i || c1_bias_row_i) c1_weight_q <= c1_weight_q + n_c1;
     if (wipe && at_layer == sf_op_pkg::C1) c1_mac_q[at_step] <= 64'd0;
-    else if (c1_row_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
-    if (wipe && at_layer == sf_op_pkg::C2) c2_sop_q[at_step] <= 64'd0;
-    else if (c2_rows_i != 2'd0)
-      c2_sop_q[c2_step_i] <= c2_sop_q[c2_step_i] + (c2_rows_i[1] ? n_c2 << 1 : n_c2);
+    else if (c1_products_i) c1_mac_q[c1_step_i] <= c1_mac_q[c1_step_i] + n_c1;
     if (wipe) begin
       if (neurons) begin
         spikes_q[at_neurons] <= 64'd0;
         neuron_q[at_neurons] <= 64'd0;
       end
-    end else if (spikes_valid_i != 3'd0) begin
-      spikes_q[neurons_here] <= spikes_q[neurons_here] + {55'd0, spikes_count_i};
-      neuron_q[neurons_here] <= neuron_q[neurons_here] + n_neurons;
+    end else if (neurons_valid_i) begin
+      spikes_q[neurons_here] <= spikes_q[neurons_here] + {55'd0, neurons_fired_i};
+      if (neurons_last_i) neuron_q[neurons_here] <= neuron_q[neurons_here] + n_neurons;
     end
     if (wipe && integrating) integrate_q[at_narrow] <= 64'd0;
     else if (update_i) integrate_q[update_here] <= integrate_q[update_here] + 64'd1;
-    if (wipe) begin
-      if (integrating) begin
-        split_sop_q[at_narrow] <= 64'd0;
-        split_weight_q[at_narrow] <= 64'd0;
-      end
-    end else begin
-      for (int t = 0; t < 8; t++) begin
-        if (d2_fired_i[t] || d2_fired_i[8+t])
-          split_sop_q[t] <= split_sop_q[t] + (d2_fired_i[t] && d2_fired_i[8+t] ? n_d2 << 1 : n_d2);
-        if (d2_first[t] || d2_first[8+t])
-          split_weight_q[t] <= split_weight_q[t] + (d2_first[t] && d2_first[8+t] ? n_d2 << 1 : n_d2);
-        if (c3_fired_i[t] || c3_fired_i[8+t])
-          split_sop_q[8+t] <= split_sop_q[8+t] + (c3_fired_i[t] && c3_fired_i[8+t] ? n_c3 << 1 : n_c3);
-        if (c3_first[t] || c3_first[8+t])
-          split_weight_q[8+t] <= split_weight_q[8+t] + (c3_first[t] && c3_first[8+t] ? n_c3 << 1 : n_c3);
+  end
+  genvar f, t;
+  generate
+    for (f = 0; f < 3; f = f + 1) begin : g_fed
+      wire [7:0] fired = fed_row_i[f] ? fed_fired_i[8*f+:8] : 8'd0;
+      for (t = 0; t < 8; t = t + 1) begin : g_step
+        wire first = fired[t] && (t == 0 || (fired & ((8'd1 << t) - 8'd1)) == 8'd0);
+        always_ff @(posedge clk_i) begin
+          if (wipe) begin
+            if (fed && at_fed == 5'(8 * f + t)) begin
+              sop_q[8*f+t] <= 64'd0;
+              weight_q[8*f+t] <= 64'd0;
+            end
+          end else begin
+            if (fired[t]) sop_q[8*f+t] <= sop_q[8*f+t] + n_fed[64*f+:64];
+            if (first || (t == 0 && fed_bias_i[f])) weight_q[8*f+t] <= weight_q[8*f+t] + n_fed[64*f+:64];
+          end
+        end
       end
     end
-  end
+  endgenerate
 
   always_ff @(posedge clk_i) begin
     if (wipe && walk_last) begin
@@ -194,8 +189,8 @@ module sf_counters (
       if (sample_i) sample_q <= sample_q + 64'd1;
       if (ray_i) ray_q <= ray_q + 64'd1;
       if (active_i && !walk_q) cycle_q <= cycle_q + 64'd1;
-      if (busy != 5'd0) busy_q <= busy_q + 64'd1;
-      for (int l = 0; l < 5; l++) if (busy[l]) layer_busy_q[l] <= layer_busy_q[l] + 64'd1;
+      if (busy_i != 5'd0) busy_q <= busy_q + 64'd1;
+      for (int l = 0; l < 5; l++) if (busy_i[l]) layer_busy_q[l] <= layer_busy_q[l] + 64'd1;
       if (stall_in_i && !walk_q) stall_in_q <= stall_in_q + 64'd1;
       if (stall_out_i) stall_out_q <= stall_out_q + 64'd1;
     end

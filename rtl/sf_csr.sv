@@ -2,7 +2,10 @@
 `default_nettype none
 
 module sf_csr #(
-    parameter LANES = sf_arch_pkg::LANES
+    parameter LANES = sf_arch_pkg::LANES,
+    parameter MACS = sf_arch_pkg::MACS,
+    parameter NEURONS = sf_arch_pkg::NEURONS,
+    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE
 ) (
     input  wire         clk_i,
     input  wire         rst_ni,
@@ -253,6 +256,7 @@ module sf_csr #(
       sf_csr_pkg::ID: rdata_d = sf_csr_pkg::ID_RESET;
       sf_csr_pkg::VERSION: rdata_d = sf_csr_pkg::VERSION_RESET;
       sf_csr_pkg::CONFIG: rdata_d = {sf_csr_pkg::CONFIG_RESET[31:8], 8'(LANES - 1)};
+      sf_csr_pkg::ENGINE: rdata_d = {13'd0, 3'(STEPS_AT_ONCE - 1), 8'(NEURONS - 1), 8'(MACS - 1)};
       sf_csr_pkg::STATUS: rdata_d = {28'd0, |error_q, counters_busy_i, active_i, running_q};
       sf_csr_pkg::ERROR: rdata_d = {21'd0, error_q};
       sf_csr_pkg::IRQ_ENABLE: rdata_d = {30'd0, irq_enable_q};

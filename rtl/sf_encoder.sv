@@ -20,7 +20,7 @@
 
 module sf_encoder #(
     parameter integer LOG2_PORTS = 0,  // 0..3
-    parameter integer LOG2_DEPTH = 4   // of the levels on their way to or from the memory, per port
+    parameter integer LOG2_DEPTH = 5   // of the levels on their way to or from the memory, per port
 ) (
     input  wire        clk_i,
     input  wire        rst_ni,
@@ -70,7 +70,7 @@ module sf_encoder #(
   always_ff @(posedge clk_i) if (dir_ready) dir_q <= s_dir_i;
 
   // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way at
-  // port 0, one more is in sf_grid_cell and one in the packet.
+  // port 0, three more are in sf_grid_cell and one in the packet.
   sf_fifo #(
       .WIDTH     (1),
       .LOG2_DEPTH(LOG2_DEPTH + 1)
@@ -163,7 +163,7 @@ module sf_encoder #(
   // Beats of four values: harmonics come one by one, features in pairs; unused places are 0.
   reg full_q, user_q, last_q, begun_q, dir_done_q;
   reg [1:0] at_q;  // place of the next value
-  reg [63:0] beat_q;
+  reg signed [11:0] place_q[0:3];
   wire room = !full_q || m_axis_tready_i;
   wire in_dir = tag_first && n_dir_q != 5'd0 && !dir_done_q;
   assign value_ready = tag_valid && in_dir && room;
@@ -173,10 +173,6 @@ module sf_encoder #(
   wire dir_end = take_value && value_last;
   assign packet_end = take_pair && pair_last;
   wire beat_end = dir_end || packet_end || (take_value && at_q == 2'd3) || (take_pair && at_q[1]);
-
-  wire [31:0] pair_values = {{4{pair[23]}}, pair[23:12], {4{pair[11]}}, pair[11:0]};
-  wire [63:0] kept = at_q == 2'd0 ? 64'd0 : beat_q;
-  wire [63:0] added = take_value ? {48'd0, {4{value[11]}}, value} << {at_q, 4'd0} : {32'd0, pair_values} << {at_q, 4'd0};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -195,16 +191,23 @@ module sf_encoder #(
     end
   end
 
+  integer i;
   always_ff @(posedge clk_i) begin
+    for (i = 0; i < 4; i = i + 1) begin
+      if (take_value ? at_q == 2'(i) : take_pair && at_q[1] == i[1]) begin
+        place_q[i] <= in_dir ? value : i[0] ? pair[23:12] : pair[11:0];
+      end else if ((take_value || take_pair) && at_q == 2'd0) begin
+        place_q[i] <= 12'sd0;
+      end
+    end
     if (take_value || take_pair) begin
-      beat_q <= kept | added;
       user_q <= tag_first && !begun_q;
       last_q <= packet_end;
     end
   end
 
   assign m_axis_tvalid_o = full_q;
-  assign m_axis_tdata_o = beat_q;
+  assign m_axis_tdata_o = {16'(place_q[3]), 16'(place_q[2]), 16'(place_q[1]), 16'(place_q[0])};
   assign m_axis_tuser_o = user_q;
   assign m_axis_tlast_o = last_q;
 endmodule

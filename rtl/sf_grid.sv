@@ -64,53 +64,69 @@ module sf_grid #(
       .last_o      (cell_last)
   );
 
-  // A level at work, corner by corner: index, then address.
+  // A level at work, corner by corner: x with y, then index, then address.
   reg [COUNT-1:0] reserved_q;  // levels between their first request and the output
-  reg work_q, index_valid_q, request_q;
+  reg room_q;
+  reg work_q, pair_valid_q, index_valid_q, request_q;
   reg [2:0] corner_q;
-  reg dense_q;
-  reg [15:0] x_q;
-  reg [31:0] y0_q, y1_q, z0_q, z1_q, mask_q, offset_q, index_q, index_offset_q, addr_q;
+  reg dense_q, pair_dense_q;
+  reg [15:0] x0_q;
+  reg [16:0] x1_q;
+  reg [31:0] y0_q, y1_q, z0_q, z1_q, mask_q, offset_q;
+  reg [31:0] pair_q, pair_z_q, pair_mask_q, pair_offset_q, index_q, index_offset_q, addr_q;
   wire request_ready = !request_q || (mem_req_valid_o && mem_req_ready_i);
   wire index_ready = !index_valid_q || request_ready;
-  wire work_end = work_q && index_ready && corner_q == 3'd7;
+  wire pair_ready = !pair_valid_q || index_ready;
+  wire work_end = work_q && pair_ready && corner_q == 3'd7;
   wire load = cell_valid && cell_ready;
-  assign cell_ready = (!work_q || work_end) && !reserved_q[LOG2_DEPTH];
+  wire leaves = m_valid_o && m_ready_i;
+  wire [COUNT-1:0] reserved = load == leaves ? reserved_q : load ? reserved_q + 1'b1 : reserved_q - 1'b1;
+  assign cell_ready = (!work_q || work_end) && room_q;
 
-  wire [31:0] corner_x = {16'd0, x_q} + {31'd0, corner_q[0]};
+  wire [31:0] corner_x = {15'd0, corner_q[0] ? x1_q : {1'b0, x0_q}};
   wire [31:0] corner_y = corner_q[1] ? y1_q : y0_q;
   wire [31:0] corner_z = corner_q[2] ? z1_q : z0_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {work_q, index_valid_q, request_q} <= 3'd0;
+      {work_q, pair_valid_q, index_valid_q, request_q} <= 4'd0;
       reserved_q <= '0;
     end else if (clear_i) begin
-      {work_q, index_valid_q, request_q} <= 3'd0;
+      {work_q, pair_valid_q, index_valid_q, request_q} <= 4'd0;
       reserved_q <= '0;
     end else begin
       if (load) work_q <= 1'b1;
       else if (work_end) work_q <= 1'b0;
-      if (index_ready) index_valid_q <= work_q;
+      if (pair_ready) pair_valid_q <= work_q;
+      if (index_ready) index_valid_q <= pair_valid_q;
       if (request_ready) request_q <= index_valid_q;
-      if (load != (m_valid_o && m_ready_i)) reserved_q <= load ? reserved_q + 1'b1 : reserved_q - 1'b1;
+      reserved_q <= reserved;
     end
   end
+
+  // No cell comes in the first cycle after a reset or a clear, in which this may still be of before.
+  always_ff @(posedge clk_i) room_q <= !reserved[LOG2_DEPTH];
 
   always_ff @(posedge clk_i) begin
     if (load) begin
       corner_q <= 3'd0;
       dense_q <= cell_dense;
-      x_q <= cell_x;
+      x0_q <= cell_x;
+      x1_q <= {1'b0, cell_x} + 17'd1;
       {y0_q, y1_q} <= {cell_y0, cell_y1};
       {z0_q, z1_q} <= {cell_z0, cell_z1};
       {mask_q, offset_q} <= {cell_mask, cell_offset};
-    end else if (work_q && index_ready) begin
+    end else if (work_q && pair_ready) begin
       corner_q <= corner_q + 3'd1;
     end
+    if (pair_ready) begin
+      pair_q <= dense_q ? corner_x + corner_y : corner_x ^ corner_y;
+      pair_z_q <= corner_z;
+      {pair_dense_q, pair_mask_q, pair_offset_q} <= {dense_q, mask_q, offset_q};
+    end
     if (index_ready) begin
-      index_q <= dense_q ? corner_x + corner_y + corner_z : (corner_x ^ corner_y ^ corner_z) & mask_q;
-      index_offset_q <= offset_q;
+      index_q <= pair_dense_q ? pair_q + pair_z_q : (pair_q ^ pair_z_q) & pair_mask_q;
+      index_offset_q <= pair_offset_q;
     end
     if (request_ready) addr_q <= index_q + index_offset_q;
   end

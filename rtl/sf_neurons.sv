@@ -1,91 +1,99 @@
-// The neurons: LANES units shared by the spiking layers D1, C1 and C2, one step of one layer per cycle. Membranes are
-// rows of a memory, one per layer. Mirror: src/fx/plif.c
+// The neurons: NEURONS pipelined units that the spiking layers D1, C1 and C2 share. A group of neurons of one layer takes
+// one step per cycle; its next step begins DEPTH cycles later at the earliest. Membranes of the layer at work lie in a
+// small memory beside the units. Mirror: src/fx/plif.c
 `default_nettype none
 
 module sf_neurons #(
-    parameter LANES = 128,
-    parameter TAP = 1
+    parameter NEURONS = 16,
+    parameter GROUP_BITS = 3
 ) (
-    input  wire                clk_i,
-    input  wire                rst_ni,
-    input  wire                clear_i,
-    input  wire         [ 1:0] mode_i,
-    input  wire         [38:0] k_i,        // of D1, C1, C2
-    input  wire         [71:0] theta_i,
-    input  wire         [26:0] n_out_i,
-    // one of them steps, or none
-    input  wire         [ 2:0] fire_i,     // C2, C1, D1
-    input  wire         [ 2:0] step_i,
-    input  wire [24*LANES-1:0] d1_i,       // currents
-    input  wire [24*LANES-1:0] c1_i,
-    input  wire [16*LANES-1:0] c2_i,
-    // in the next cycle
-    output wire         [ 2:0] valid_o,
-    output wire         [ 2:0] step_o,
-    output wire [   LANES-1:0] spikes_o,
-    output wire         [ 8:0] count_o,
-    // tap, in the cycle after that: membranes after reset
-    output wire [24*LANES-1:0] tap_membrane_o
+    input  wire                  clk_i,
+    input  wire                  rst_ni,
+    input  wire                  clear_i,
+    input  wire [           1:0] mode_i,
+    input  wire [          38:0] k_i,         // of D1, C1, C2
+    input  wire [          71:0] theta_i,
+    input  wire [          26:0] n_out_i,
+    // a group's step
+    input  wire                  valid_i,
+    input  wire [           1:0] layer_i,     // 0: D1, 1: C1, 2: C2
+    input  wire [           2:0] step_i,
+    input  wire [GROUP_BITS-1:0] group_i,
+    input  wire                  last_i,      // the layer's last group
+    input  wire [24*NEURONS-1:0] current_i,
+    // DEPTH - 1 cycles later: its spikes and membranes after reset
+    output wire                  valid_o,
+    output wire [           1:0] layer_o,
+    output wire [           2:0] step_o,
+    output wire [GROUP_BITS-1:0] group_o,
+    output wire                  last_o,
+    output wire [   NEURONS-1:0] spikes_o,
+    output wire [24*NEURONS-1:0] membrane_o,
+    output wire                  idle_o
 );
-  `include "sf_round.svh"
-  `include "sf_plif.svh"
+  localparam STAGES = 5;
 
-  reg [2:0] valid_q, step_q;
-  reg [LANES-1:0] fired_q, lanes_q;
-  reg [24*LANES-1:0] state_q[0:2];
-  reg [24*LANES-1:0] state;  // names for a whole row within one operation, not registers
-  reg [LANES-1:0] fired;
-  reg [24:0] neuron;
-  wire [1:0] which = fire_i[2] ? 2'd2 : fire_i[1] ? 2'd1 : 2'd0;
-  wire [12:0] k = k_i[13*which+:13];
-  wire signed [23:0] theta = theta_i[24*which+:24];
-  wire [8:0] n_out = n_out_i[9*which+:9];
+  // What goes along with a group, stage by stage.
+  reg [STAGES-1:0] valid_q;
+  reg [2*STAGES-1:0] layer_q;
+  reg [3*STAGES-1:0] step_q;
+  reg [GROUP_BITS*STAGES-1:0] group_q;
+  reg [STAGES-1:0] last_q;
+  reg [12:0] k1_q;
+  reg signed [23:0] theta4_q;
+  reg [8:0] n_out4_q;
+  wire nodecay = mode_i == sf_op_pkg::NODECAY;
   wire first = step_i == 3'd0;
-
-  always_ff @(posedge clk_i) begin
-    if (fire_i != 3'd0) begin
-      state = state_q[which];
-      if (fire_i[2]) begin
-        for (int l = 0; l < LANES; l++) begin
-          neuron = sf_plif_step(state[24*l+:24], 24'($signed(c2_i[16*l+:16])) <<< sf_arch_pkg::AC_FRAC, k, theta, mode_i,
-                                first);
-          fired[l] = neuron[24];
-          state[24*l+:24] = neuron[23:0];
-        end
-      end else begin
-        for (int l = 0; l < LANES; l++) begin
-          neuron = sf_plif_step(state[24*l+:24], fire_i[1] ? c1_i[24*l+:24] : d1_i[24*l+:24], k, theta, mode_i, first);
-          fired[l] = neuron[24];
-          state[24*l+:24] = neuron[23:0];
-        end
-      end
-      state_q[which] <= state;
-      fired_q <= fired;
-      lanes_q <= ~(~{LANES{1'b0}} << n_out);  // lanes that the layer has
-    end
-    step_q <= step_i;
-  end
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) valid_q <= 3'd0;
-    else valid_q <= clear_i ? 3'd0 : fire_i;
+    if (!rst_ni) valid_q <= {STAGES{1'b0}};
+    else valid_q <= clear_i ? {STAGES{1'b0}} : {valid_q[STAGES-2:0], valid_i};
+  end
+  wire [1:0] layer3 = layer_q[4+:2];
+  always_ff @(posedge clk_i) begin
+    layer_q <= {layer_q[2*STAGES-3:0], layer_i};
+    step_q <= {step_q[3*STAGES-4:0], step_i};
+    group_q <= {group_q[GROUP_BITS*(STAGES-1)-1:0], group_i};
+    last_q <= {last_q[STAGES-2:0], last_i};
+    k1_q <= mode_i == sf_op_pkg::HYBRID && first ? 13'd1 << sf_arch_pkg::LEAK_FRAC
+          : layer_i[1] ? k_i[38:26] : layer_i[0] ? k_i[25:13] : k_i[12:0];
+    theta4_q <= layer3[1] ? theta_i[71:48] : layer3[0] ? theta_i[47:24] : theta_i[23:0];
+    n_out4_q <= layer3[1] ? n_out_i[26:18] : layer3[0] ? n_out_i[17:9] : n_out_i[8:0];
   end
 
-  assign valid_o = valid_q;
-  assign step_o = step_q;
-  assign spikes_o = fired_q & lanes_q;
-  assign count_o = 9'($countones(spikes_o));
+  reg [24*NEURONS-1:0] membrane_q[0:(1<<GROUP_BITS)-1];
+  wire [24*NEURONS-1:0] state = membrane_q[group_i];
+  wire [NEURONS-1:0] fired;
+  reg [NEURONS-1:0] exists_q;  // neurons that the layer has
+  always_ff @(posedge clk_i) begin
+    if (valid_o) membrane_q[group_o] <= membrane_o;
+    for (int u = 0; u < NEURONS; u++)
+      exists_q[u] <= 9'(32'(group_q[GROUP_BITS*(STAGES-2)+:GROUP_BITS]) * NEURONS + u) < n_out4_q;
+  end
 
+  genvar u;
   generate
-    if (TAP != 0) begin : g_tap
-      reg [24*LANES-1:0] membrane_q;
-      always_ff @(posedge clk_i) begin
-        if (valid_q != 3'd0) membrane_q <= state_q[valid_q[2] ? 2'd2 : valid_q[1] ? 2'd1 : 2'd0];
-      end
-      assign tap_membrane_o = membrane_q;
-    end else begin : g_no_tap
-      assign tap_membrane_o = {(24 * LANES) {1'b0}};
+    for (u = 0; u < NEURONS; u = u + 1) begin : g_unit
+      sf_plif u_plif (
+          .clk_i    (clk_i),
+          .v_i      (state[24*u+:24]),
+          .current_i(current_i[24*u+:24]),
+          .k_i      (k1_q),
+          .theta_i  (theta4_q),
+          .nodecay_i(nodecay),
+          .first_i  (first),
+          .v_o      (membrane_o[24*u+:24]),
+          .spike_o  (fired[u])
+      );
     end
   endgenerate
+
+  assign valid_o = valid_q[STAGES-1];
+  assign layer_o = layer_q[2*(STAGES-1)+:2];
+  assign step_o = step_q[3*(STAGES-1)+:3];
+  assign group_o = group_q[GROUP_BITS*(STAGES-1)+:GROUP_BITS];
+  assign last_o = last_q[STAGES-1];
+  assign spikes_o = fired & exists_q;
+  assign idle_o = valid_q == {STAGES{1'b0}};
 endmodule
 
 `default_nettype wire

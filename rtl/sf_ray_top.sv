@@ -15,7 +15,10 @@
 
 module sf_ray_top #(
     parameter TAP = 1,
-    parameter LANES = sf_arch_pkg::LANES  // as sf_top's
+    parameter LANES = sf_arch_pkg::LANES,  // these as sf_top's
+    parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,
+    parameter NEURONS = sf_arch_pkg::NEURONS,
+    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -188,8 +191,11 @@ module sf_ray_top #(
   wire result_valid, result_ready, result_last;
   wire [63:0] result;
   sf_top #(
-      .TAP  (TAP),
-      .LANES(LANES)
+      .TAP          (TAP),
+      .LANES        (LANES),
+      .MACS         (MACS),
+      .NEURONS      (NEURONS),
+      .STEPS_AT_ONCE(STEPS_AT_ONCE)
   ) u_nets (
       .clk_i           (clk_i),
       .rst_ni          (rst_ni),

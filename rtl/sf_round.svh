@@ -6,11 +6,6 @@ function automatic signed [47:0] sf_rshift_round(input signed [47:0] x, input [4
   sf_rshift_round = n == 5'd0 ? x : (x + (48'sd1 <<< (n - 5'd1))) >>> n;
 endfunction
 
-// The same for the few products beyond 48 bits.
-function automatic signed [63:0] sf_rshift_round_wide(input signed [63:0] x, input [5:0] n);
-  sf_rshift_round_wide = n == 6'd0 ? x : (x + (64'sd1 <<< (n - 6'd1))) >>> n;
-endfunction
-
 // Clamp to a signed number of `bits` bits.
 function automatic signed [47:0] sf_sat(input signed [47:0] x, input [5:0] bits);
   reg signed [47:0] high;

@@ -1,20 +1,41 @@
-// A current to the argument of a table. Mirror: src/fx/integrate.c (fx_exp2_argument, fx_sigmoid_argument)
+// A current to the argument of a table, in five stages: the argument is there five cycles later. `colour_i` goes along and
+// chooses the table. Mirror: src/fx/integrate.c (fx_exp2_argument, fx_sigmoid_argument)
 `default_nettype none
 
 module sf_scale (
+    input  wire               clk_i,
     input  wire signed [15:0] current_i,
-    input  wire        [15:0] mul_i,
-    input  wire        [ 4:0] shift_i,
-    input  wire signed [31:0] bias_i,
-    input  wire               colour_i,  // sat to s16, else s18
-    output wire signed [17:0] y_o
+    input  wire               colour_i,   // the sigmoid's scale and 16 bits, else the exponential's and 18
+    input  wire        [15:0] exp_mul_i,
+    input  wire        [ 4:0] exp_shift_i,
+    input  wire signed [31:0] exp_bias_i,
+    input  wire        [15:0] sigmoid_mul_i,
+    input  wire        [ 4:0] sigmoid_shift_i,
+    input  wire signed [31:0] sigmoid_bias_i,
+    output reg  signed [17:0] y_o
 );
-  `include "sf_round.svh"
+  reg [3:0] colour_q;
+  always_ff @(posedge clk_i) colour_q <= {colour_q[2:0], colour_i};
 
-  wire signed [47:0] product = 48'(current_i) * $signed({32'd0, mul_i});
-  wire signed [47:0] y = sf_sat(sf_rshift_round(product, shift_i) + 48'(bias_i), colour_i ? 6'd16 : 6'd18);
-  assign y_o = y[17:0];
-  wire unused_ok = &{1'b0, y[47:18]};
+  // 1: product; 2: and half of what is shifted away; 3: shift; 4: and bias; 5: saturate
+  wire [15:0] mul = colour_i ? sigmoid_mul_i : exp_mul_i;
+  wire [4:0] shift1 = colour_q[0] ? sigmoid_shift_i : exp_shift_i;
+  wire [4:0] shift2 = colour_q[1] ? sigmoid_shift_i : exp_shift_i;
+  reg signed [32:0] product_q;
+  reg signed [33:0] rounded_q, shifted_q;
+  reg signed [34:0] sum_q;
+  wire [31:0] half = (32'd1 << shift1) >> 1;
+  wire [18:0] above = sum_q[34:16] ^ {19{sum_q[34]}};  // bits that a number of 17 bits has not
+  wire over = colour_q[3] ? |above || sum_q[15] != sum_q[34] : |above[18:1];
+  always_ff @(posedge clk_i) begin
+    product_q <= current_i * $signed({1'b0, mul});
+    rounded_q <= 34'(product_q) + $signed({2'd0, half});
+    shifted_q <= rounded_q >>> shift2;
+    sum_q <= 35'(shifted_q) + (colour_q[2] ? 35'(sigmoid_bias_i) : 35'(exp_bias_i));
+    y_o <= !over ? sum_q[17:0]
+         : colour_q[3] ? (sum_q[34] ? 18'h38000 : 18'h07fff)
+         : (sum_q[34] ? 18'h20000 : 18'h1ffff);
+  end
 endmodule
 
 `default_nettype wire

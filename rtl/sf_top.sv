@@ -2,10 +2,15 @@
 // Tap ports are for observation only; TAP = 0 removes them. A tap beat shows, for a spiking layer and step, its spikes,
 // the presynaptic rows it added up and its membranes after reset; for D2 and C3 (step 0) the rows alone.
 `default_nettype none
+`include "sf_refuse.svh"
 
 module sf_top #(
     parameter TAP = 1,
-    parameter LANES = sf_arch_pkg::LANES  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
+    parameter LANES = sf_arch_pkg::LANES,  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
+    // How much hardware; ENGINE says it. Results and counts of events do not depend on it.
+    parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,  // multipliers: LANES, or a half, a quarter of them
+    parameter NEURONS = sf_arch_pkg::NEURONS,                                // neuron units: a power of two, 4 to MACS
+    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE                     // steps that C2 sums up side by side: 1, 2, 4 or 8
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -72,12 +77,17 @@ module sf_top #(
   wire [11:0] feature, dir;
   wire hold, core_idle, readout_idle, stall_out;
   wire density_ready, density_valid, colour_ready, colour_valid;
-  wire [2047:0] density_current, colour_current;
-  wire d1_row, c1_row, c1_bias_row, ray;
-  wire [1:0] c2_rows;
-  wire [2:0] c1_step, c2_step, spikes_valid, spikes_step, update_step;
-  wire [15:0] d2_fired, c3_fired;
-  wire [8:0] spikes_count;
+  wire density_begin, density_last, colour_begin, colour_last;
+  wire [2:0] density_step, colour_step;
+  wire [15:0] density_current;
+  wire [47:0] colour_current;
+  wire d1_row, c1_row, c1_bias_row, c1_products, ray;
+  wire [2:0] c1_step, fed_row, fed_bias, neurons_step, update_step;
+  wire [23:0] fed_fired;
+  wire [4:0] busy;
+  wire neurons_valid, neurons_last;
+  wire [1:0] neurons_layer;
+  wire [8:0] neurons_fired;
   wire update, update_colour;
   wire result_valid, result_ready;
   wire [27:0] sigma;
@@ -93,7 +103,10 @@ module sf_top #(
   assign tap_membrane_o = (24 * TAPS)'(tap_membrane);
 
   sf_csr #(
-      .LANES(LANES)
+      .LANES        (LANES),
+      .MACS         (MACS),
+      .NEURONS      (NEURONS),
+      .STEPS_AT_ONCE(STEPS_AT_ONCE)
   ) u_csr (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
@@ -170,8 +183,11 @@ module sf_top #(
   );
 
   sf_core #(
-      .TAP  (TAP),
-      .LANES(LANES)
+      .TAP          (TAP),
+      .LANES        (LANES),
+      .MACS         (MACS),
+      .NEURONS      (NEURONS),
+      .STEPS_AT_ONCE(STEPS_AT_ONCE)
   ) u_core (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
@@ -198,23 +214,32 @@ module sf_top #(
       .dir_index_o    (dir_index),
       .dir_i          (dir),
       .density_ready_i(density_ready),
+      .density_begin_o(density_begin),
       .density_valid_o(density_valid),
+      .density_step_o (density_step),
+      .density_last_o (density_last),
       .density_o      (density_current),
       .colour_ready_i (colour_ready),
+      .colour_begin_o (colour_begin),
       .colour_valid_o (colour_valid),
+      .colour_step_o  (colour_step),
+      .colour_last_o  (colour_last),
       .colour_o       (colour_current),
       .d1_row_o       (d1_row),
       .c1_row_o       (c1_row),
       .c1_bias_row_o  (c1_bias_row),
+      .c1_products_o  (c1_products),
       .c1_step_o      (c1_step),
-      .c2_rows_o      (c2_rows),
-      .c2_step_o      (c2_step),
-      .d2_fired_o     (d2_fired),
-      .c3_fired_o     (c3_fired),
+      .fed_row_o      (fed_row),
+      .fed_fired_o    (fed_fired),
+      .fed_bias_o     (fed_bias),
+      .busy_o         (busy),
       .ray_o          (ray),
-      .spikes_valid_o (spikes_valid),
-      .spikes_step_o  (spikes_step),
-      .spikes_count_o (spikes_count),
+      .neurons_valid_o(neurons_valid),
+      .neurons_layer_o(neurons_layer),
+      .neurons_step_o (neurons_step),
+      .neurons_last_o (neurons_last),
+      .neurons_fired_o(neurons_fired),
       .stall_o        (stall_out),
       .tap_valid_o    (tap_valid_o),
       .tap_layer_o    (tap_layer_o),
@@ -230,10 +255,16 @@ module sf_top #(
       .clear_i        (soft_reset),
       .decodes_i      (decodes),
       .density_ready_o(density_ready),
+      .density_begin_i(density_begin),
       .density_valid_i(density_valid),
+      .density_step_i (density_step),
+      .density_last_i (density_last),
       .density_i      (density_current),
       .colour_ready_o (colour_ready),
+      .colour_begin_i (colour_begin),
       .colour_valid_i (colour_valid),
+      .colour_step_i  (colour_step),
+      .colour_last_i  (colour_last),
       .colour_i       (colour_current),
       .idle_o         (readout_idle),
       .mode_i         (mode),
@@ -274,18 +305,20 @@ module sf_top #(
       .rst_ni         (rst_ni),
       .n_out_i        (n_out),
       .d1_row_i       (d1_row),
-      .bias_i         (bias[12:11]),
       .c1_row_i       (c1_row),
       .c1_bias_row_i  (c1_bias_row),
+      .c1_products_i  (c1_products),
       .c1_step_i      (c1_step),
-      .c2_rows_i      (c2_rows),
-      .c2_step_i      (c2_step),
-      .d2_fired_i     (d2_fired),
-      .c3_fired_i     (c3_fired),
+      .fed_row_i      (fed_row),
+      .fed_fired_i    (fed_fired),
+      .fed_bias_i     (fed_bias),
+      .busy_i         (busy),
       .ray_i          (ray),
-      .spikes_valid_i (spikes_valid),
-      .spikes_step_i  (spikes_step),
-      .spikes_count_i (spikes_count),
+      .neurons_valid_i(neurons_valid),
+      .neurons_layer_i(neurons_layer),
+      .neurons_step_i (neurons_step),
+      .neurons_last_i (neurons_last),
+      .neurons_fired_i(neurons_fired),
       .update_i       (update),
       .update_colour_i(update_colour),
       .update_step_i  (update_step),
@@ -302,18 +335,22 @@ module sf_top #(
       .counter_o      (counter)
   );
 
+  `SF_REFUSE((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES,
+             "LANES is not 32, 64, 128 or 256, or it is more than the package's")
+  `SF_REFUSE(MACS != LANES && 2 * MACS != LANES && 4 * MACS != LANES, "MACS is not LANES, a half or a quarter of it")
+  `SF_REFUSE(NEURONS < 4 || NEURONS > MACS || NEURONS > 64 || (NEURONS & (NEURONS - 1)) != 0,
+             "NEURONS is not a power of two from 4 to 64, or it is more than MACS")
+  `SF_REFUSE(STEPS_AT_ONCE != 1 && STEPS_AT_ONCE != 2 && STEPS_AT_ONCE != 4 && STEPS_AT_ONCE != 8,
+             "STEPS_AT_ONCE is not 1, 2, 4 or 8")
   // The modules are written for these sizes; another change in arch.def must not go unnoticed.
-  initial begin
-    if ((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES
-        || (sf_arch_pkg::LANES != 128 && sf_arch_pkg::LANES != 256) || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
-        || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
-        || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
-        || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
-        || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 8 || sf_arch_pkg::LEAK_FRAC > 12
-        || sf_arch_pkg::LOG_FRAC != 12 || sf_arch_pkg::SIGMA_BITS != 28 || sf_arch_pkg::SIGMA_FRAC != 12
-        || sf_arch_pkg::COLOUR_BITS != 20 || sf_arch_pkg::COLOUR_FRAC != 16 || sf_arch_pkg::COUNTER_BITS != 64)
-      $error("arch.def has other sizes than this RTL is written for");
-  end
+  `SF_REFUSE((sf_arch_pkg::LANES != 128 && sf_arch_pkg::LANES != 256) || sf_arch_pkg::T_MAX != 8 || sf_arch_pkg::OUT_MAX != 16
+             || sf_arch_pkg::FEATURE_MAX != 32 || sf_arch_pkg::DIR_MAX != 160 || sf_arch_pkg::BIAS_ROW != 256 || sf_arch_pkg::LAYERS != 5
+             || sf_arch_pkg::WEIGHT_BITS != 8 || sf_arch_pkg::INPUT_BITS != 12
+             || sf_arch_pkg::H_SHIFT < 0 || sf_arch_pkg::H_SHIFT > 4 || sf_arch_pkg::MEMBRANE_BITS != 24
+             || sf_arch_pkg::AC_FRAC < 0 || sf_arch_pkg::AC_FRAC > 8 || sf_arch_pkg::LEAK_FRAC < 8 || sf_arch_pkg::LEAK_FRAC > 12
+             || sf_arch_pkg::LOG_FRAC != 12 || sf_arch_pkg::SIGMA_BITS != 28 || sf_arch_pkg::SIGMA_FRAC != 12
+             || sf_arch_pkg::COLOUR_BITS != 20 || sf_arch_pkg::COLOUR_FRAC != 16 || sf_arch_pkg::COUNTER_BITS != 64,
+             "arch.def has other sizes than this RTL is written for")
 endmodule
 
 `default_nettype wire

@@ -180,7 +180,7 @@ static inline void naive_synapses(naive_net *n, int l, int t, const bool *spike,
   const fx_layer *layer = &n->net->layer[l];
   for (int o = 0; o < layer->n_out; o++) current[o] = 0;
   for (int i = 0; i < layer->n_in; i++) {
-    const bool read = spike[i] && (l == FX_C2 || !n->ever[l][i]);
+    const bool read = spike[i] && !n->ever[l][i];
     for (int o = 0; o < layer->n_out; o++) {
       if (spike[i]) current[o] += layer->w[i * SF_LANES + o], n->counts->layer[l].sop[t]++;
       n->counts->layer[l].weight[t] += read;
@@ -189,7 +189,7 @@ static inline void naive_synapses(naive_net *n, int l, int t, const bool *spike,
   }
   for (int o = 0; layer->bias && o < layer->n_out; o++) {
     current[o] += layer->w[layer->n_in * SF_LANES + o];
-    n->counts->layer[l].weight[t] += l == FX_C2 || t == 0;
+    n->counts->layer[l].weight[t] += t == 0;
   }
 }
 
@@ -200,7 +200,7 @@ static inline void naive_products(naive_net *n, int l, int t, int row, const int
     for (int o = 0; o < layer->n_out; o++) {
       current[o] += x[i] * layer->w[(row + i) * SF_LANES + o];
       n->counts->layer[l].mac[t]++;
-      n->counts->layer[l].weight[t]++;
+      n->counts->layer[l].weight[t] += t == 0; /* the row is held for the later steps */
     }
 }
 

@@ -150,6 +150,7 @@ static inline uint32_t model_read(registers *r, uint32_t offset)
   } all[] = {{SF_CSR_ID, SF_CSR_ID_RESET},
              {SF_CSR_VERSION, SF_CSR_VERSION_RESET},
              {SF_CSR_CONFIG, SF_CSR_CONFIG_RESET},
+             {SF_CSR_ENGINE, SF_CSR_ENGINE_RESET},
              {SF_CSR_STATUS, (r->running ? SF_CSR_STATUS_RUNNING : 0) | (r->error ? SF_CSR_STATUS_ERROR : 0)},
              {SF_CSR_ERROR, r->error},
              {SF_CSR_IRQ_ENABLE, r->irq_enable},

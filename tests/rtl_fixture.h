@@ -84,7 +84,7 @@ static inline void run_batch(sf_dut *dut, const fx_net *net, int n, fx_counts *c
 /* What the cycle model says of the first n samples of the batch that was run. */
 static inline sf_cycle_totals modelled_cycles(const fx_net *net, int n)
 {
-  sf_cycle_model *model = sf_cycle_model_create(net);
+  sf_cycle_model *model = sf_cycle_model_create(net, &sf_engine_default);
   ck_assert_ptr_nonnull(model);
   for (int i = 0; i < n; i++) {
     const sf_cycle_sample shape = sf_cycle_sample_make(net, &shared.trace[i], shared.sample[i].first);

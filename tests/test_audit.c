@@ -34,7 +34,7 @@ TEST(recount_equals_counting_by_hand)
   /* mac, sop, spikes, updates, weight, state_r, state_w, special at steps 0 and 1 */
   static const uint64_t d1[SF_EVENTS][2] = {{12, 0}, {0, 0}, {2, 2}, {3, 3}, {12, 0}, {0, 9}, {9, 9}, {0, 0}};
   static const uint64_t d2[SF_EVENTS][2] = {{0, 0}, {6, 6}, {0, 0}, {1, 1}, {6, 3}, {0, 4}, {4, 4}, {1, 1}};
-  static const uint64_t c1[SF_EVENTS][2] = {{20, 8}, {0, 0}, {0, 2}, {4, 4}, {20, 8}, {0, 12}, {12, 12}, {0, 0}};
+  static const uint64_t c1[SF_EVENTS][2] = {{20, 8}, {0, 0}, {0, 2}, {4, 4}, {20, 0}, {0, 12}, {12, 12}, {0, 0}};
   static const uint64_t c2[SF_EVENTS][2] = {{0, 0}, {0, 10}, {5, 1}, {5, 5}, {0, 10}, {0, 15}, {15, 15}, {0, 0}};
   static const uint64_t c3[SF_EVENTS][2] = {{0, 0}, {15, 3}, {0, 0}, {3, 3}, {15, 0}, {0, 12}, {12, 12}, {3, 3}};
   sf_recount_sample(&net, small_spikes, true, &c);

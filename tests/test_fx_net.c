@@ -89,7 +89,8 @@ TEST(decoder_macs_are_the_papers)
   ck_assert_uint_eq(c.layer[FX_C1].mac[0], 150 * 128);
   ck_assert_uint_eq(c.layer[FX_C1].weight[0], 151 * 128);
   ck_assert_uint_eq(c.layer[FX_C2].sop[0], 0);
-  ck_assert_uint_eq(c.layer[FX_C2].weight[1], 128);
+  ck_assert_uint_eq(c.layer[FX_C2].weight[0], 128);
+  ck_assert_uint_eq(c.layer[FX_C2].weight[1], 0);
   ck_assert_uint_eq(c.layer[FX_C3].weight[0], 3);
   ck_assert_uint_eq(c.layer[FX_C3].weight[1], 0);
 }

@@ -17,7 +17,7 @@ static uint64_t wide(random_draw &draw, int bits)
 
 /* ---- exp(-tau) ---- */
 
-enum { EXP_LATENCY = 2, TAU_MAX = 32 << SF_TRANS_FRAC };
+enum { EXP_LATENCY = 9, TAU_MAX = 32 << SF_TRANS_FRAC };
 
 struct exp_bench {
   unit<Vsf_exp_neg> u{1};
@@ -49,7 +49,7 @@ TEST(exp_neg)
 
 /* ---- compositor ---- */
 
-enum { PATIENCE = 10000, RAY_MAX = 40, STOP_LATENCY = 11, SAMPLE_CYCLES };
+enum { PATIENCE = 10000, RAY_MAX = 40, STOP_LATENCY = 20, SAMPLE_CYCLES, PIXEL_CYCLES = 7 };
 
 struct sample {
   fx_out out = {};
@@ -227,7 +227,7 @@ TEST(one_sample_rays)
   b.drain();
 }
 
-/* A sample in every SAMPLE_CYCLES cycles, and a pixel five cycles behind the last. */
+/* A sample in every SAMPLE_CYCLES cycles, and a pixel PIXEL_CYCLES behind the last. */
 TEST(the_pace)
 {
   bench b(210, 0);
@@ -242,7 +242,7 @@ TEST(the_pace)
       if (i) ck_assert_uint_eq(b.taken_at - before, SAMPLE_CYCLES);
     }
     b.drain();
-    ck_assert_uint_eq(b.u.cycle - b.taken_at, SAMPLE_CYCLES + 5);
+    ck_assert_uint_eq(b.u.cycle - b.taken_at, SAMPLE_CYCLES + PIXEL_CYCLES);
   }
 }
 

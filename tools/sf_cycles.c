@@ -2,6 +2,7 @@
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "cycles/cycles.h"
+#include "base/text.h"
 #include "quant/quant.h"
 #include "base/io.h"
 #include "report/plot.h"
@@ -12,9 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAND = 16 }; /* rows of pixels between two looks at the model */
+enum { BAND = 16 /* rows of pixels between two looks at the model */, BUILDS = 3 };
+
+/* Builds of the design space: a quarter, a half, all of the lanes at once. */
+static const sf_engine builds[BUILDS] = {
+    {SF_LANES / 4, SF_LANES / 32, 2}, {SF_LANES / 2, SF_LANES / 16, 2}, {SF_LANES, SF_LANES / 8, 2}};
 
 typedef struct options {
+  sf_engine engine;
+  bool builds;
   const char *scene, *data, *split, *plot;
   int view, downscale, threads;
   double clock;
@@ -30,8 +37,9 @@ typedef struct job {
   options opt;
   fx_scene scene;
   sf_dataset data;
-  sf_cycle_model *model;
-  uint64_t rays, latency; /* latency: of one sample in an empty engine, the first of the frame */
+  sf_cycle_model *model;         /* of the build that was asked for */
+  sf_cycle_model *other[BUILDS]; /* of the design space */
+  uint64_t rays, latency;        /* latency: of one sample in an empty engine, the first of the frame */
   sf_progress progress;
 } job;
 
@@ -92,8 +100,9 @@ static sf_status run_frame(job *j)
       status = each[i];
       for (size_t s = 0; s < row[i].count; s++) {
         sf_cycle_model_add(j->model, &row[i].at[s]);
+        for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_add(j->other[b], &row[i].at[s]);
         if (j->latency) continue;
-        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net);
+        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net, &j->opt.engine);
         if (!alone) {
           status = sf_fail(SF_E_MEMORY, "no memory for the cycle model");
           break;
@@ -110,6 +119,7 @@ static sf_status run_frame(job *j)
                        sf_cycle_model_totals(j->model)->samples);
   }
   sf_cycle_model_drain(j->model);
+  for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_drain(j->other[b]);
   for (int i = 0; i < BAND; i++) free(row[i].at);
   return status;
 }
@@ -136,74 +146,56 @@ static bool has_layer(const job *j, int layer)
 
 /* ---- design space ---- */
 
-/* A row of weights is added in one cycle however many lanes there are, so lanes decide which nets run and how many of
- * the lanes have work, and cores and clock the time. */
-static const int all_lanes[] = {32, 64, 128, 256}, cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
+static const int cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-static int widest(const fx_net *net)
+static double frames_per_second(const sf_cycle_model *model, int count, double mhz)
 {
-  int most = 0;
-  for (int l = 0; l < SF_LAYERS; l++)
-    if (fx_layer_fires(l) && net->layer[l].n_out > most) most = net->layer[l].n_out;
-  return most;
-}
-
-/* Lanes of D1, C1 and C2 that add, of all they have, over all cycles. */
-static double lanes_at_work(const job *j, int lanes)
-{
-  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
-  const fx_net *net = &j->scene.net;
-  double work = 0, all = 0;
-  for (int s = 0; s < FX_SPIKING; s++) {
-    const int l = fx_spiking_layers[s];
-    if (!net->layer[l].n_out) continue;
-    work += (double)t->busy[l] * net->layer[l].n_out;
-    all += (double)t->cycles * lanes;
-  }
-  return all > 0 ? work / all : 0;
-}
-
-static double frames_per_second(const job *j, int count, double mhz)
-{
-  const uint64_t cycles = sf_cycle_model_totals(j->model)->cycles;
+  const uint64_t cycles = sf_cycle_model_totals(model)->cycles;
   return cycles ? 1e6 * mhz * count / (double)cycles : 0;
+}
+
+static double cycles_per_sample(const sf_cycle_model *model)
+{
+  const sf_cycle_totals *t = sf_cycle_model_totals(model);
+  return ratio(t->cycles, t->samples);
 }
 
 static void print_space(const job *j)
 {
-  const int least = widest(&j->scene.net);
-  for (size_t i = 0; i < COUNT(all_lanes); i++) {
-    if (all_lanes[i] < least) {
-      printf("\n%d lanes: the net has layers of %d neurons and is refused\n", all_lanes[i], least);
-      continue;
-    }
-    printf("\n%d lanes, %.1f %% of them at work\nframes/s      ", all_lanes[i], 100 * lanes_at_work(j, all_lanes[i]));
-    for (size_t c = 0; c < COUNT(cores); c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
-    for (size_t m = 0; m < COUNT(clocks); m++) {
-      printf("\n  %4d MHz    ", clocks[m]);
-      for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(j, cores[c], clocks[m]));
-    }
-    printf("\n");
+  printf("\nframes/s      ");
+  for (size_t c = 0; c < COUNT(cores); c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
+  for (size_t m = 0; m < COUNT(clocks); m++) {
+    printf("\n  %4d MHz    ", clocks[m]);
+    for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(j->model, cores[c], clocks[m]));
   }
+  putchar('\n');
+  if (!j->opt.builds) return;
+  printf("\nother builds            cycles per sample   frames/s at %.0f MHz\n", j->opt.clock);
+  for (int b = 0; b < BUILDS; b++)
+    printf("  %3d MACs, %2d neurons  %18.1f %20.2f\n", builds[b].macs, builds[b].neurons,
+           cycles_per_sample(j->other[b]), frames_per_second(j->other[b], 1, j->opt.clock));
 }
 
-static void add_space(const job *j, cJSON *json)
+static void add_engine(cJSON *json, const sf_engine *engine)
 {
-  cJSON *space = cJSON_AddArrayToObject(json, "design_space");
-  for (size_t i = 0; i < COUNT(all_lanes); i++) {
-    const bool fits = all_lanes[i] >= widest(&j->scene.net);
-    for (size_t c = 0; c < COUNT(cores) && fits; c++)
-      for (size_t m = 0; m < COUNT(clocks); m++) {
-        cJSON *point = cJSON_CreateObject();
-        cJSON_AddNumberToObject(point, "lanes", all_lanes[i]);
-        cJSON_AddNumberToObject(point, "lanes_at_work", lanes_at_work(j, all_lanes[i]));
-        cJSON_AddNumberToObject(point, "cores", cores[c]);
-        cJSON_AddNumberToObject(point, "clock_mhz", clocks[m]);
-        cJSON_AddNumberToObject(point, "frames_per_second", frames_per_second(j, cores[c], clocks[m]));
-        cJSON_AddItemToArray(space, point);
-      }
-  }
+  cJSON_AddNumberToObject(json, "macs", engine->macs);
+  cJSON_AddNumberToObject(json, "neurons", engine->neurons);
+  cJSON_AddNumberToObject(json, "steps_at_once", engine->steps_at_once);
+}
+
+static void add_points(cJSON *space, const sf_engine *engine, const sf_cycle_model *model)
+{
+  for (size_t c = 0; c < COUNT(cores); c++)
+    for (size_t m = 0; m < COUNT(clocks); m++) {
+      cJSON *point = cJSON_CreateObject();
+      add_engine(point, engine);
+      cJSON_AddNumberToObject(point, "cycles_per_sample", cycles_per_sample(model));
+      cJSON_AddNumberToObject(point, "cores", cores[c]);
+      cJSON_AddNumberToObject(point, "clock_mhz", clocks[m]);
+      cJSON_AddNumberToObject(point, "frames_per_second", frames_per_second(model, cores[c], clocks[m]));
+      cJSON_AddItemToArray(space, point);
+    }
 }
 
 /* ---- plot ---- */
@@ -232,7 +224,7 @@ static void put_plot(FILE *out, const job *j, const char *name)
   fprintf(out, ")\n$frames << EOD\n");
   for (size_t m = 0; m < COUNT(clocks); m++) {
     fprintf(out, "%d", clocks[m]);
-    for (size_t c = 0; c < COUNT(cores); c++) fprintf(out, " %.6g", frames_per_second(j, cores[c], clocks[m]));
+    for (size_t c = 0; c < COUNT(cores); c++) fprintf(out, " %.6g", frames_per_second(j->model, cores[c], clocks[m]));
     putc('\n', out);
   }
   fprintf(out, "EOD\nplot ");
@@ -264,6 +256,8 @@ static void print_text(const job *j)
          t->samples, j->scene.net.steps);
   printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: %" PRIu64 ")\n",
          t->cycles, ratio(t->cycles, t->samples), sf_cycles_dense(&j->scene.net));
+  printf("a build of %d MACs, %d neuron units, %d step%s of C2 at once\n", j->opt.engine.macs, j->opt.engine.neurons,
+         j->opt.engine.steps_at_once, sf_plural((uint64_t)j->opt.engine.steps_at_once));
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
   for (int l = 0; l < SF_LAYERS; l++)
     if (has_layer(j, l)) printf(" %s %.1f %%", fx_layer_name(l), 100 * ratio(t->busy[l], t->cycles));
@@ -279,6 +273,7 @@ static sf_status print_json(const job *j)
 {
   const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
   cJSON *json = cJSON_CreateObject();
+  add_engine(json, &j->opt.engine);
   sf_json_add_u64(json, "rays", j->rays);
   sf_json_add_u64(json, "samples", t->samples);
   sf_json_add_u64(json, "cycles", t->cycles);
@@ -290,9 +285,26 @@ static sf_status print_json(const job *j)
   for (int l = 0; l < SF_LAYERS; l++)
     if (has_layer(j, l)) cJSON_AddNumberToObject(busy, fx_layer_name(l), ratio(t->busy[l], t->cycles));
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
-  cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j, 1, j->opt.clock));
-  add_space(j, json);
+  cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j->model, 1, j->opt.clock));
+  cJSON *space = cJSON_AddArrayToObject(json, "design_space");
+  add_points(space, &j->opt.engine, j->model);
+  for (int b = 0; b < BUILDS && j->opt.builds; b++) add_points(space, &builds[b], j->other[b]);
   return sf_json_print(json, true);
+}
+
+static sf_status make_models(job *j)
+{
+  const sf_engine *e = &j->opt.engine;
+  const int parts = SF_LANES / e->macs, s = e->steps_at_once;
+  if (e->macs * parts != SF_LANES || (parts != 1 && parts != 2 && parts != 4))
+    return sf_fail(SF_E_USAGE, "--macs %d: expected %d, %d or %d", e->macs, SF_LANES, SF_LANES / 2, SF_LANES / 4);
+  if (e->neurons > e->macs || (e->neurons & (e->neurons - 1)))
+    return sf_fail(SF_E_USAGE, "--neurons %d: expected a power of two, at most --macs", e->neurons);
+  if (s & (s - 1)) return sf_fail(SF_E_USAGE, "--steps-at-once %d: expected 1, 2, 4 or 8", s);
+  bool made = (j->model = sf_cycle_model_create(&j->scene.net, e)) != NULL;
+  for (int b = 0; b < BUILDS && j->opt.builds; b++)
+    made = (j->other[b] = sf_cycle_model_create(&j->scene.net, &builds[b])) && made;
+  return made ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the cycle model");
 }
 
 static sf_status run(job *j)
@@ -306,8 +318,7 @@ static sf_status run(job *j)
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has fewer %s views", j->opt.view, j->opt.data,
                    j->opt.split);
-  j->model = sf_cycle_model_create(&j->scene.net);
-  if (!j->model) return sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+  SF_TRY(make_models(j));
   sf_progress_begin(&j->progress, j->opt.quiet);
   const sf_status status = run_frame(j);
   sf_progress_end(&j->progress);
@@ -320,7 +331,7 @@ static sf_status run(job *j)
 
 int main(int argc, char **argv)
 {
-  job j = {.opt = {.split = "test", .clock = 200}};
+  job j = {.opt = {.split = "test", .clock = 200, .engine = sf_engine_default}};
   options *o = &j.opt;
   const sf_option table[] = {
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
@@ -328,6 +339,13 @@ int main(int argc, char **argv)
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
        "a view of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--clock", 0, SF_ARG_DOUBLE, &o->clock, 1, 1e5, NULL, "MHZ", "for the last line and --json (default 200)"},
+      {"--macs", 0, SF_ARG_INT, &o->engine.macs, 1, SF_LANES, NULL, "N",
+       "multipliers of D1 and C1 (default: of this build's RTL)"},
+      {"--neurons", 0, SF_ARG_INT, &o->engine.neurons, 4, 64, NULL, "N", "neuron units (likewise)"},
+      {"--steps-at-once", 0, SF_ARG_INT, &o->engine.steps_at_once, 1, 8, NULL, "N",
+       "steps that C2 sums up side by side (likewise)"},
+      {"--builds", 0, SF_ARG_FLAG, &o->builds, 0, 0, NULL, NULL,
+       "also builds of a quarter, a half, all of the lanes at once"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
@@ -342,6 +360,7 @@ int main(int argc, char **argv)
                           "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
                       .examples = "  sf_cycles scene.snn data --view 3\n"
                                   "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
+                                  "  sf_cycles scene.snn data --builds\n"
                                   "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n",
                       .options = table,
                       .min_positional = 2,
@@ -352,6 +371,7 @@ int main(int argc, char **argv)
   if (status.code == SF_OK && o->threads) omp_set_num_threads(o->threads);
   if (status.code == SF_OK) status = run(&j);
   sf_cycle_model_free(j.model);
+  for (int b = 0; b < BUILDS; b++) sf_cycle_model_free(j.other[b]);
   sf_dataset_free(&j.data);
   fx_scene_free(&j.scene);
   if (status.code == SF_OK && fflush(stdout)) status = sf_fail(SF_E_IO, "standard output: the report was not written");

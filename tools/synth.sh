@@ -55,6 +55,7 @@ cd "$root"
 packages=$(ls rtl/gen/*_pkg.sv rtl/*_pkg.sv)
 sources=$(ls -rS rtl/*.sv rtl/gen/*.sv | grep -v '_pkg\.sv$')
 built_for=$(sed -nE 's/.*\bLANES = ([0-9]+);.*/\1/p' rtl/gen/sf_arch_pkg.sv)
+macs=$(sed -nE 's/.*\bMACS = ([0-9]+);.*/\1/p' rtl/gen/sf_arch_pkg.sv)
 [ -n "$built_for" ] || die 1 "rtl/gen/sf_arch_pkg.sv: no LANES"
 for n in $lanes; do [[ $n =~ ^[1-9][0-9]{0,3}$ ]] || die 2 "--lanes: '$n' is no number of lanes"; done
 [ -n "$lanes" ] || [ -z "$report" ] || lanes=$(for run in "$out"/runs/*-*[0-9]; do echo "${run##*-}"; done | grep -x '[0-9]*' | sort -nu)
@@ -99,11 +100,12 @@ exists_for() { # MODULE LANES
 synthesise() { # MODULE LANES RESULT
   local log=$3.log parameters='' started=$SECONDS
   if grep -qE '^ *parameter +(integer +|int +)?LANES\b' "rtl/$1.sv"; then parameters="-chparam LANES $2"; fi
+  if grep -qE '^ *parameter +(integer +|int +)?MACS\b' "rtl/$1.sv"; then parameters+=" -chparam MACS $(($2 < macs ? $2 : macs))"; fi
   if [[ $1 = sf_top || $1 = sf_ray_top ]]; then parameters+=" -chparam TAP 0"; fi
   local map="synth_xilinx -family xc7 -flatten -noiopad -top $1"
   # shellcheck disable=SC2086
   if ! nice -n 10 yosys -q -l "$log" -p "read_verilog -sv -defer -Irtl $(echo $packages $sources)
-      hierarchy -check -top $1 $parameters; rename -top $1; setattr -set ram_style \"block\" *sf_wmem*/m:*
+      hierarchy -check -top $1 $parameters; rename -top $1; setattr -set ram_style \"block\" *sf_rows*/m:*
       $map -run begin:coarse; stat; $map -run coarse:
       delete t:FD* t:LD* t:RAMB*; ltp -noff" >/dev/null 2>"$log.err"; then
     die 1 "$1, $2 lanes: $(grep -h ERROR "$log" | head -n 1 | cut -c1-200), see $log"

@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00030000
+#define SF_REG_VERSION_RESET 0x00040000
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
@@ -180,7 +180,7 @@
 /* 4 signed weights, the lowest output neuron in bits 7:0, WO */
 #define SF_REG_WEIGHT_DATA 0x0094
 
-/* layers whose biases count: row 256 of their weights, an input that is always active; a snapshot adds those of C2 and C3 by its value then: take it before a net with other biases is loaded, RW */
+/* layers whose biases count: row 256 of their weights, an input that is always active, RW */
 #define SF_REG_BIAS 0x0098
 #define SF_REG_BIAS_C1_MASK 0x000007ff /* value of that input, 1..2047; 0: none */
 #define SF_REG_BIAS_C1_SHIFT 0
@@ -188,6 +188,16 @@
 #define SF_REG_BIAS_C2_SHIFT 16
 #define SF_REG_BIAS_C3_MASK 0x00020000 /* it is a spike at every step */
 #define SF_REG_BIAS_C3_SHIFT 17
+
+/* how much hardware this block was built with; results and counts do not depend on it, cycles do, RO */
+#define SF_REG_ENGINE 0x009c
+#define SF_REG_ENGINE_RESET 0x00010f7f
+#define SF_REG_ENGINE_MACS_MASK 0x000000ff /* multipliers of D1 and C1, less 1 */
+#define SF_REG_ENGINE_MACS_SHIFT 0
+#define SF_REG_ENGINE_NEURONS_MASK 0x0000ff00 /* neuron units, less 1 */
+#define SF_REG_ENGINE_NEURONS_SHIFT 8
+#define SF_REG_ENGINE_STEPS_AT_ONCE_MASK 0x00070000 /* steps that C2 sums up side by side, less 1 */
+#define SF_REG_ENGINE_STEPS_AT_ONCE_SHIFT 16
 
 /* commands of the ray stream, WO */
 #define SF_REG_RAY_CTRL 0x0400

@@ -5,11 +5,20 @@
 #define SF_CYCLES_CYCLES_H
 #include "fx/fx.h"
 
-/* What the engine's time depends on, of one sample: pairs of weight rows, that is the larger of the numbers of even and
- * of odd neurons that fired; for D2 and C3 at any step, for C2 at each. 0..LANES/2. */
+/* How much hardware a build of the accelerator has (parameters of rtl/sf_top.sv). Results do not depend on it. */
+typedef struct sf_engine {
+  int macs;          /* multipliers of D1 and C1, and lanes that are worked on at once */
+  int neurons;       /* neuron units, at most macs */
+  int steps_at_once; /* steps of C2 that are summed up side by side: 1, 2, 4 or 8 */
+} sf_engine;
+
+static const sf_engine sf_engine_default = {SF_MACS, SF_NEURONS, SF_STEPS_AT_ONCE};
+
+/* What the engine's time depends on, of one sample: the steps at which each neuron of D1, C1, C2 fired, bit t for step
+ * t. */
 typedef struct sf_cycle_sample {
   bool first; /* of a new ray: brings a direction */
-  uint8_t d2, c3, c2[SF_T_MAX];
+  uint8_t fired[FX_SPIKING][SF_LANES];
 } sf_cycle_sample;
 
 typedef struct sf_cycle_totals {
@@ -22,8 +31,8 @@ typedef struct sf_cycle_totals {
 
 typedef struct sf_cycle_model sf_cycle_model;
 
-/* For nets of these sizes. NULL when out of memory. */
-sf_cycle_model *sf_cycle_model_create(const fx_net *net);
+/* For nets of these sizes, on a build of this size. NULL when out of memory. */
+sf_cycle_model *sf_cycle_model_create(const fx_net *net, const sf_engine *engine);
 /* trace: of fx_net_sample on the net. */
 sf_cycle_sample sf_cycle_sample_make(const fx_net *net, const fx_trace *trace, bool first);
 /* The sample follows the ones before without a gap. */
@@ -33,9 +42,8 @@ void sf_cycle_model_drain(sf_cycle_model *model);
 const sf_cycle_totals *sf_cycle_model_totals(const sf_cycle_model *model);
 void sf_cycle_model_free(sf_cycle_model *model);
 
-/* From sums alone: what the busiest layer needs for its rows. The model's cycles are about a tenth more, because even
- * and odd neurons do not fire in pairs and the busiest layer changes from sample to sample. */
-uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts);
+/* From sums alone: what the multipliers of D1 and C1, or the busiest layer fed by spikes, need for their rows. */
+uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts, const sf_engine *engine);
 /* Of a dense net of the same sizes: every weight of a sample once, SF_LANES a cycle. */
 uint64_t sf_cycles_dense(const fx_net *net);
 #endif

@@ -19,29 +19,34 @@ static void count_state(fx_layer_counts *c, int t, uint64_t neurons, uint64_t by
   if (t > 0) c->state_r[t] += neurons * bytes;
 }
 
+/* A row of weights is held for as long as it has products to give: it is read once, at the first step. */
 static void count_mac(fx_layer_counts *c, int t, int n_in, int n_out)
 {
   uint64_t products = (uint64_t)n_in * (uint64_t)n_out;
   c->mac[t] += products;
-  c->weight[t] += products;
+  if (t == 0) c->weight[t] += products;
 }
 
-/* D2, C3 keep what a row added for the later steps: a weight row is read when its neuron fires for the first time. */
-static void count_output_layer(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE_WORDS],
-                               uint64_t seen[SF_SPIKE_WORDS], uint64_t n_out, uint64_t integrators)
+/* A row of a layer fed by spikes is read when its neuron fires for the first time in the sample. */
+static void count_synapses(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE_WORDS], uint64_t seen[SF_SPIKE_WORDS],
+                           uint64_t n_out)
 {
   uint64_t new_rows[SF_SPIKE_WORDS];
   for (int word = 0; word < SF_SPIKE_WORDS; word++) new_rows[word] = in[word] & ~seen[word], seen[word] |= in[word];
   c->sop[t] += fired(in) * n_out;
   c->weight[t] += fired(new_rows) * n_out;
+}
+
+static void count_integrators(fx_layer_counts *c, int t, uint64_t integrators)
+{
   c->special[t] += integrators;
   count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
 }
 
 /* A row of biases is read, but it is no MAC and no SOP. */
-static void count_bias(fx_layer_counts *c, int t, const fx_layer *layer)
+static void count_bias(fx_layer_counts *c, const fx_layer *layer)
 {
-  if (layer->bias) c->weight[t] += (uint64_t)layer->n_out;
+  if (layer->bias) c->weight[0] += (uint64_t)layer->n_out;
 }
 
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
@@ -49,7 +54,7 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
 {
   const fx_layer *size = net->layer;
   fx_layer_counts *c = counts->layer;
-  uint64_t seen_d1[SF_SPIKE_WORDS] = {0}, seen_c2[SF_SPIKE_WORDS] = {0};
+  uint64_t seen[FX_SPIKING][SF_SPIKE_WORDS] = {0};
   const bool per_sample = fx_net_constants_per_sample(net);
 
   counts->samples++;
@@ -57,21 +62,22 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
   count_mac(&c[FX_D1], 0, size[FX_D1].n_in, size[FX_D1].n_out);
   if (first_of_ray || per_sample) {
     count_mac(&c[FX_C1], 0, fx_net_constants(net), size[FX_C1].n_out);
-    count_bias(&c[FX_C1], 0, &size[FX_C1]);
+    count_bias(&c[FX_C1], &size[FX_C1]);
   }
-  count_bias(&c[FX_C3], 0, &size[FX_C3]);
+  count_bias(&c[FX_C2], &size[FX_C2]);
+  count_bias(&c[FX_C3], &size[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
     for (int s = 0; s < FX_SPIKING; s++) {
       const int l = fx_spiking_layers[s];
       c[l].spikes[t] += fired(spikes[l][t]);
       count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
     }
-    count_output_layer(&c[FX_D2], t, spikes[FX_D1][t], seen_d1, (uint64_t)size[FX_D2].n_out, size[FX_D2].n_out > 0);
-    count_bias(&c[FX_C2], t, &size[FX_C2]);
     count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
-    uint64_t c2_sop = fired(spikes[FX_C1][t]) * (uint64_t)size[FX_C2].n_out;
-    c[FX_C2].sop[t] += c2_sop;
-    c[FX_C2].weight[t] += c2_sop;
-    count_output_layer(&c[FX_C3], t, spikes[FX_C2][t], seen_c2, (uint64_t)size[FX_C3].n_out, 3);
+    for (int s = 0; s < FX_SPIKING; s++) {
+      const int fed = fx_spiking_layers[s] + 1; /* the layer behind */
+      count_synapses(&c[fed], t, spikes[fx_spiking_layers[s]][t], seen[s], (uint64_t)size[fed].n_out);
+    }
+    count_integrators(&c[FX_D2], t, size[FX_D2].n_out > 0);
+    count_integrators(&c[FX_C3], t, 3);
   }
 }

@@ -25,7 +25,7 @@ void sf_fit_describe(const fx_scene *scene, const sf_quant_widths *widths, const
   for (int64_t i = 0; i < bytes; i++) state->cells += __builtin_popcount(scene->occupancy[i]);
   state->widths = *widths;
   state->bytes = (uint64_t)sf_packed_bytes(scene, widths);
-  state->cycles = sf_cycles_least(&scene->net, &sum->counts);
+  state->cycles = sf_cycles_least(&scene->net, &sum->counts, &sf_engine_default);
   state->energy_fj = sf_energy_fj(&sum->counts);
   state->sum = *sum;
   state->psnr = psnr(sum->error, rays);

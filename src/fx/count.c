@@ -56,10 +56,11 @@ void fx_count_rays(fx_counts *counts, const fx_net *net, uint64_t rays)
   if (!fx_net_constants_per_sample(net)) count_constants(counts, net, rays);
 }
 
+/* A row of weights is held for as long as it has products to give: it is read once, at the first step. */
 static void count_products(fx_layer_counts *c, int t, uint64_t macs)
 {
   c->mac[t] += macs;
-  c->weight[t] += macs;
+  if (t == 0) c->weight[t] += macs;
 }
 
 static void count_updates(fx_layer_counts *c, int t, uint64_t updates, uint64_t bytes)
@@ -69,7 +70,7 @@ static void count_updates(fx_layer_counts *c, int t, uint64_t updates, uint64_t 
   if (t > 0) c->state_r[t] += updates * bytes;
 }
 
-/* A layer fed by spikes. C2 reads a row for every spike; D2 and C3 keep a row's currents: one read per sample. */
+/* A layer fed by spikes reads the row of a neuron once per sample: at the first step at which it fires. */
 static void count_synapses(fx_layer_counts *c, const fx_layer *layer, int t, uint64_t spikes, uint64_t rows_read)
 {
   c->sop[t] += spikes * (uint64_t)layer->n_out;
@@ -85,15 +86,15 @@ void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firi
   counts->samples += n;
   count_products(&c[FX_D1], 0, n * feature_macs(net));
   if (fx_net_constants_per_sample(net)) count_constants(counts, net, n);
+  c[FX_C2].weight[0] += n * bias_bytes(&layer[FX_C2]);
   c[FX_C3].weight[0] += n * bias_bytes(&layer[FX_C3]);
   for (int t = 0; t < net->steps; t++) {
     c[FX_D1].spikes[t] += firing->spikes[D1][t];
     c[FX_C1].spikes[t] += firing->spikes[C1][t];
     c[FX_C2].spikes[t] += firing->spikes[C2][t];
     count_products(&c[FX_C1], t, n * h_macs(net));
-    c[FX_C2].weight[t] += n * bias_bytes(&layer[FX_C2]);
     count_synapses(&c[FX_D2], &layer[FX_D2], t, firing->spikes[D1][t], firing->fresh[D1][t]);
-    count_synapses(&c[FX_C2], &layer[FX_C2], t, firing->spikes[C1][t], firing->spikes[C1][t]);
+    count_synapses(&c[FX_C2], &layer[FX_C2], t, firing->spikes[C1][t], firing->fresh[C1][t]);
     count_synapses(&c[FX_C3], &layer[FX_C3], t, firing->spikes[C2][t], firing->fresh[C2][t]);
     count_updates(&c[FX_D1], t, n * (uint64_t)layer[FX_D1].n_out, MEMBRANE_BYTES);
     count_updates(&c[FX_C1], t, n * (uint64_t)layer[FX_C1].n_out, MEMBRANE_BYTES);

@@ -1,5 +1,5 @@
 /* Currents, event-driven: one weight row per nonzero value or firing neuron, nothing for silent ones.
- * Mirror: rtl/sf_mac.sv (values), rtl/sf_c2.sv and rtl/sf_split.sv (spikes)
+ * Mirror: rtl/sf_values.sv (values), rtl/sf_sums.sv (spikes)
  *
  * Sums are exact in any order. Rows are handled 16 lanes at a time and loops have a constant trip count, so that
  * the compiler keeps the accumulators of a strip in registers. */

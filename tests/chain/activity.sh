@@ -67,7 +67,7 @@ full() { # CAUSE OPTIONS...
   grep -qF "sf_cosim: cannot write $1: File too large" "$work/err" || fail "${*:2}: the cause is not told"
 }
 full "$work/full.saif.piece.fst" --saif "$work/full.saif"
-full "$work/full.vcd" --vcd "$work/full.vcd" --window 0,1999
+full "$work/full.vcd" --vcd "$work/full.vcd" --window 0,799
 [ -z "$(find "$work" -name 'full*')" ] || fail "left behind: $(ls "$work")"
 
 # Refusals, and nothing left behind.

@@ -20,7 +20,7 @@ grep -q 'D[12]' tensorf.txt && fail "TensoRF has neither D1 nor D2: $(grep 'D[12
 mkdir plots
 "$build/bin/sf_cycles" scene.snn data --quiet --plot plots/frames.gp >plot.txt 2>plot.err || fail "--plot: $(cat plot.err)"
 grep -q 'plots/frames.gp' plot.err || fail "--plot says nothing: $(cat plot.err)"
-table=$(sed -n '/^128 lanes/,/^$/p' hash.txt | awk '/MHz/ { print $1, $3, $4, $5, $6 }')
+table=$(sed -n '/^frames\/s/,/^$/p' hash.txt | awk '/MHz/ { print $1, $3, $4, $5, $6 }')
 [ "$(awk '/^EOD/ { on = 0 } on { printf "%d %.2f %.2f %.2f %.2f\n", $1, $2, $3, $4, $5 } /<< EOD/ { on = 1 }' plots/frames.gp)" = "$table" ] &&
   [ "$(wc -l <<<"$table")" -eq 4 ] || fail "plots/frames.gp is not the table: $table"
 "$build/bin/sf_cycles" scene.snn data --plot frames.svg 2>plot.err

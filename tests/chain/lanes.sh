@@ -112,8 +112,8 @@ whole() {
     shows '^PASS 4 samples' "$lanes lanes: kit in $simulator" env -u MAKEFLAGS make -s -C "$here/kit" LANES="$lanes" OPT=-O0 $simulator
   done
   if command -v yosys >/dev/null; then
-    shows "^\| .sf_pick. \| $lanes \|" "$lanes lanes: synthesis" "$root/tools/synth.sh" "$build/lanes/$lanes" \
-      --rtl "$rtl" --lanes "$lanes" --modules sf_pick
+    shows "^\| .sf_csr. \| $lanes \|" "$lanes lanes: synthesis" "$root/tools/synth.sh" "$build/lanes/$lanes" \
+      --rtl "$rtl" --lanes "$lanes" --modules sf_csr
   fi
 }
 for lanes in 32 64; do

@@ -9,9 +9,9 @@ trap 'rm -rf "$work" "${built[@]}"' EXIT
 "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
 rtl=$work/kit/rtl
 mkdir "$work/overlay"
-cp "$root/tests/dut/serial/sf_plif.svh" "$work/overlay"
+cp "$root/tests/dut/serial/sf_plif.sv" "$work/overlay"
 sed 's/^module sf_top/module my_block/' "$rtl/sf_top.sv" >"$work/my_block.sv"
-sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | grep -v '/sf_top.sv$' | tr '\n' ' ')
+sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | sed "s|.*/sf_plif.sv$|$work/overlay/sf_plif.sv|; /\/sf_top.sv$/d" | tr '\n' ' ')
 
 # run NAME STATUS OPTION...: the report in NAME.json, standard error in NAME.err
 run() {
@@ -34,10 +34,10 @@ run again 0 "${my_block[@]}"
 # Its activity has the nets of what it shares with ours: arrays over lanes, too.
 saif() { "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 2 --quiet --saif "$work/$1.saif" "${@:2}" >/dev/null; }
 saif own && saif other "${my_block[@]}" || fail "a SAIF file"
-own=$(grep -c '(acc_q' "$work/own.saif") other=$(grep -c '(acc_q' "$work/other.saif")
-[ "$own" -ge 1000 ] && [ "$own" -eq "$other" ] || fail "$own bits of acc_q, of the other block $other"
+own=$(grep -c '(current_q' "$work/own.saif") other=$(grep -c '(current_q' "$work/other.saif")
+[ "$own" -ge 1000 ] && [ "$own" -eq "$other" ] || fail "$own bits of current_q, of the other block $other"
 
-cp "$root/tests/dut/wrong/sf_plif.svh" "$work/overlay"
+cp "$root/tests/dut/wrong/sf_plif.sv" "$work/overlay"
 run wrong 1 "${my_block[@]}"
 [ "$(field wrong wire)" = membrane ] || fail "the wrong neuron: $(cat "$work/wrong.err")"
 [ "$(field wrong actual)" = $(($(field wrong expected) - 1)) ] || fail "the wrong neuron is not one too low"
@@ -61,9 +61,10 @@ mv "$work/kept_block.sv" "$work/my_block.sv"
 
 # The kit's list of files, by the line of docs/kit.md.
 mkdir "$work/my_neuron"
-cp "$root/tests/dut/wrong/sf_plif.svh" "$work/my_neuron"
-documented=$(sed -n 's/^    \(sf_cosim scene.snn data --dut "+incdir.*\)/\1/p' "$root/docs/kit.md")
-[ -n "$documented" ] || fail "docs/kit.md has no line with an include folder"
+cp "$root/tests/dut/wrong/sf_plif.sv" "$work/my_neuron"
+listed=$(sed -n 's/^    \(sed .* >kit\/my.f\)$/\1/p' "$root/docs/kit.md")
+documented=$(sed -n 's/^    \(sf_cosim scene.snn data --dut "-F kit\/my.f.*\)/\1/p' "$root/docs/kit.md")
+[ -n "$documented" ] && (cd "$work" && bash -c "$listed") && [ -s "$work/kit/my.f" ] || fail "docs/kit.md has no line with a list of one's own"
 replay 1 'neuron' "PATH=$build/bin:\$PATH; $documented --quiet"
 grep -q '^replay: *sf_cosim --replay sf_cosim-difference.json$' "$work/replay.out" || fail "$documented: $(tail -n 4 "$work/replay.out")"
 while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")

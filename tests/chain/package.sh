@@ -116,7 +116,7 @@ planted $xml "0,/<ipxact:master\/>/s//<ipxact:slave\/>/" "contradicts a slave"
 planted $xml "/<ipxact:file>/{N;/sf_csr\.sv/{N;N;d}}" "spikefield.xml: rtl/sf_csr.sv is missing"
 planted spikefield.core "/rtl\/sf_scale.sv/d" "spikefield.core: rtl/sf_scale.sv is missing"
 planted spikefield.core "s/rtl\/sf_scale.sv/rtl\/sf_scales.sv/" "rtl/sf_scales.sv is not there"
-planted spikefield.core "/sf_csr_pkg/d; s/^(      - rtl\/sf_wmem.sv)/\1\n      - rtl\/gen\/sf_csr_pkg.sv/" \
+planted spikefield.core "/sf_csr_pkg/d; s/^(      - rtl\/sf_values.sv)/\1\n      - rtl\/gen\/sf_csr_pkg.sv/" \
   "does not stand before"
 planted rtl/gen/sf_csr.rdl "s/ROW\[14:6\]/ROW[13:6]/" "WEIGHT_ADDRESS is"
 planted rtl/gen/sf_csr.rdl "s/mementries = 512/mementries = 511/" "COUNTERS is (4096, 511"

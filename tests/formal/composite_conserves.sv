@@ -1,6 +1,6 @@
 // Compositor: of every ray, ended by its last sample or early, the weights its samples were given and the transmittance
 // left add up to 1.0 exactly; transmittance never rises; one pixel per ray; samples after an early stop have no effect.
-// The multiplier is cut: any product, but transmittance * exp(-tau) at most the transmittance.
+// The multiplier is cut: any product of each of its parts, but transmittance * exp(-tau) at most the transmittance.
 `default_nettype none
 
 module composite_conserves (
@@ -18,7 +18,7 @@ module composite_conserves (
     input wire         ready_i
 );
   localparam [20:0] ONE = 21'd1 << sf_arch_pkg::TRANS_FRAC;
-  localparam [4:0] IDLE = 5'd0, WEIGH = 5'd5, RED = 5'd6, FAR = 5'd10, DECIDE = 5'd11, BACK_RED = 5'd12, PIXEL = 5'd16;
+  localparam [4:0] IDLE = 5'd0, WEIGH = 5'd15, RED = 5'd16, FAR = 5'd20, BACK_RED = 5'd21, PIXEL = 5'd27;
   (* anyconst *) wire [19:0] trans_stop;
   (* anyconst *) wire [10:0] max_samples;
   reg rst_n_q = 1'b0;
@@ -75,7 +75,7 @@ module composite_conserves (
       if (begins) ray_q <= 1'b1;
       else if (valid && ready_i) ray_q <= 1'b0;
       if (take) ended_q <= (begins || ray_q) && (empty_i || last_i);
-      else if (peek_state_q == DECIDE && early) ended_q <= 1'b1;
+      else if (peek_state_q == FAR && early) ended_q <= 1'b1;
       else if (valid && ready_i) ended_q <= 1'b0;
     end
     if (begins) begin
@@ -107,7 +107,7 @@ module composite_conserves (
       room : assert (peek_state_q == IDLE || peek_state_q > WEIGH || {1'b0, samples} < most);
       another_may_come : assert (!ray_q || peek_state_q != IDLE || !early);
       pixel_when_ended : assert (valid == (peek_state_q == PIXEL) && (!valid || (ray_q && ended_q)));
-      stops_early : assert (stop == (peek_state_q == DECIDE && early && !peek_last_q));
+      stops_early : assert (stop == (peek_state_q == FAR && early && !peek_last_q));
       idle_without_a_ray : assert (idle == (!ray_q));
     end
   end

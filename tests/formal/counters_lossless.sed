@@ -6,14 +6,15 @@ s/counter_o <= window_q\[index_i\]/counter_o <= window_q/
 s/\[63:0\]/[3:0]/g
 s/64'd/4'd/g
 s/384'd0/24'd0/
-s/\{55'd0, (n_out_i\[[0-9:]*\]|spikes_count_i)\}/4'(\1)/
+s/n_fed\[64\*f\+:64\]/n_fed[4*f+:4]/
+s/\{55'd0, (n_out_i\[[0-9:]*\]|neurons_fired_i)\}/4'(\1)/
 s/^    output reg  (.*counter_o)/    input  wire [ 8:0] watched_i,\n    output wire [ 3:0] value_o,\n    output wire [ 3:0] window_o,\n    output reg  \1/
 /wire \[2:0\] event_w = /,/^  assign hold_o/ {
   /^  assign hold_o/! H
   /^  assign hold_o/ {
     x
     s/place_q/watched_i/g
-    s/(event_w|at_layer|at_step|at_narrow|at_neurons|integrating|neurons|updates|state_bytes|mac|add|bias_c2|bias_c3|biases|global_value|place_value)\b/w_\1/g
+    s/(event_w|at_layer|at_step|at_narrow|at_neurons|integrating|neurons|fed|at_fed|updates|state_bytes|mac|weight|global_value|place_value)\b/w_\1/g
     s/(d1_|c1_)w_(mac_q)/\1\2/g
     s/$/\n  assign value_o = w_place_value;\n  assign window_o = window_q;\n/
     p

@@ -10,15 +10,18 @@ module counters_lossless (
     input wire        d1_row_i,
     input wire        c1_row_i,
     input wire        c1_bias_row_i,
+    input wire        c1_products_i,
     input wire [ 2:0] c1_step_i,
-    input wire [ 1:0] c2_rows_i,
-    input wire [ 2:0] c2_step_i,
-    input wire [15:0] d2_fired_i,
-    input wire [15:0] c3_fired_i,
+    input wire [ 2:0] fed_row_i,
+    input wire [23:0] fed_fired_i,
+    input wire [ 2:0] fed_bias_i,
+    input wire [ 4:0] busy_i,
     input wire        ray_i,
-    input wire [ 2:0] spikes_valid_i,
-    input wire [ 2:0] spikes_step_i,
-    input wire [ 8:0] spikes_count_i,
+    input wire        neurons_valid_i,
+    input wire [ 1:0] neurons_layer_i,
+    input wire [ 2:0] neurons_step_i,
+    input wire        neurons_last_i,
+    input wire [ 8:0] neurons_fired_i,
     input wire        update_i,
     input wire        update_colour_i,
     input wire [ 2:0] update_step_i,
@@ -32,7 +35,6 @@ module counters_lossless (
     input wire [ 8:0] index_i
 );
   (* anyconst *) wire [8:0] watched;
-  (* anyconst *) wire [1:0] bias;
   wire [2:0] kind = watched[8:6];
   wire [2:0] layer = watched[5:3];
   wire [2:0] step = watched[2:0];
@@ -46,18 +48,20 @@ module counters_lossless (
       .rst_ni         (rst_n_q),
       .n_out_i        (n_out_i),
       .d1_row_i       (d1_row_i),
-      .bias_i         (bias),
       .c1_row_i       (c1_row_i),
       .c1_bias_row_i  (c1_bias_row_i),
+      .c1_products_i  (c1_products_i),
       .c1_step_i      (c1_step_i),
-      .c2_rows_i      (c2_rows_i),
-      .c2_step_i      (c2_step_i),
-      .d2_fired_i     (d2_fired_i),
-      .c3_fired_i     (c3_fired_i),
+      .fed_row_i      (fed_row_i),
+      .fed_fired_i    (fed_fired_i),
+      .fed_bias_i     (fed_bias_i),
+      .busy_i         (busy_i),
       .ray_i          (ray_i),
-      .spikes_valid_i (spikes_valid_i),
-      .spikes_step_i  (spikes_step_i),
-      .spikes_count_i (spikes_count_i),
+      .neurons_valid_i(neurons_valid_i),
+      .neurons_layer_i(neurons_layer_i),
+      .neurons_step_i (neurons_step_i),
+      .neurons_last_i (neurons_last_i),
+      .neurons_fired_i(neurons_fired_i),
       .update_i       (update_i),
       .update_colour_i(update_colour_i),
       .update_step_i  (update_step_i),
@@ -83,21 +87,19 @@ module counters_lossless (
   wire neurons = layer == 3'd0 || layer == 3'd2 || layer == 3'd3;
   wire [3:0] n = layer == 3'd0 ? n_out_i[3:0] : layer == 3'd1 ? n_out_i[12:9] : layer == 3'd2 ? n_out_i[21:18]
                : layer == 3'd3 ? n_out_i[30:27] : n_out_i[39:36];
-  wire [15:0] fired = layer == 3'd1 ? d2_fired_i : c3_fired_i;
+  wire [1:0] source = layer == 3'd1 ? 2'd0 : layer == 3'd3 ? 2'd1 : 2'd2;  // of {C3, C2, D2}
+  wire fed = fed_row_i[source] && fed_fired_i[{source, step}];
   wire [7:0] earlier = (8'd1 << step) - 8'd1;
-  wire [1:0] here = {fired[{1'b1, step}], fired[{1'b0, step}]};
-  wire [1:0] first_here = here & {(fired[15:8] & earlier) == 8'd0, (fired[7:0] & earlier) == 8'd0};
-  wire fires = spikes_step_i == step && (layer == 3'd0 ? spikes_valid_i[0] : layer == 3'd2 ? spikes_valid_i[1] : spikes_valid_i[2]);
+  wire first = fed && (fed_fired_i[8*source+:8] & earlier) == 8'd0;
+  wire acts = neurons_valid_i && neurons_step_i == step
+            && neurons_layer_i == (layer == 3'd0 ? 2'd0 : layer == 3'd2 ? 2'd1 : 2'd2);
   wire updates = update_i && update_step_i == step && update_colour_i == (layer == 3'd4);
-  wire [3:0] mac = (layer == 3'd0 && step == 3'd0 && d1_row_i) || (layer == 3'd2 && c1_row_i && c1_step_i == step) ? n : 4'd0;
-  wire [3:0] rows = layer == 3'd3 && c2_step_i == step ? (c2_rows_i[1] ? n + n : c2_rows_i[0] ? n : 4'd0) : 4'd0;
-  wire [3:0] sop = (here[0] ? n : 4'd0) + (here[1] ? n : 4'd0);
-  wire [3:0] read = (first_here[0] ? n : 4'd0) + (first_here[1] ? n : 4'd0);
-  wire [3:0] update = neurons ? (fires ? n : 4'd0) : {3'd0, updates};
+  wire mac = (layer == 3'd0 && step == 3'd0 && d1_row_i) || (layer == 3'd2 && c1_products_i && c1_step_i == step);
+  wire sop = (layer == 3'd1 || layer == 3'd3 || layer == 3'd4) && fed;
+  wire read = layer == 3'd0 ? mac : layer == 3'd2 ? step == 3'd0 && (c1_row_i || c1_bias_row_i)
+            : first || (step == 3'd0 && fed_bias_i[source]);
+  wire [3:0] update = neurons ? (acts && neurons_last_i ? n : 4'd0) : {3'd0, updates};
   wire [3:0] bytes = neurons ? update + update + update : update << 2;
-  wire [3:0] biases = layer == 3'd2 ? (step == 3'd0 && c1_bias_row_i ? n : 4'd0) : layer == 3'd3 && bias[0] ? update
-                    : layer == 3'd4 && step == 3'd0 && bias[1] ? update : 4'd0;
-  wire [4:0] works = {|c3_fired_i, |c2_rows_i, c1_row_i || c1_bias_row_i, |d2_fired_i, d1_row_i};
   reg walking_q = 1'b0;
   reg [3:0] share;
   always @* begin
@@ -108,19 +110,19 @@ module counters_lossless (
           3'd0: share = {3'd0, sample_i};
           3'd1: share = {3'd0, ray_i};
           3'd2: share = {3'd0, active_i && !walking_q};  // a walk's own cycles are no work
-          3'd3: share = {3'd0, works != 5'd0};
+          3'd3: share = {3'd0, busy_i != 5'd0};
           3'd4: share = {3'd0, stall_in_i && !walking_q};
           3'd5: share = {3'd0, stall_out_i};
           default: share = 4'd0;
         endcase
-      if (kind == 3'd1 && step <= 3'd4) share = {3'd0, works[step]};
+      if (kind == 3'd1 && step <= 3'd4) share = {3'd0, busy_i[step]};
     end else if (layer <= 3'd4)
       case (kind)
-        3'd0: share = mac;
-        3'd1: share = neurons ? rows : sop;
-        3'd2: share = neurons && fires ? spikes_count_i[3:0] : 4'd0;
+        3'd0: share = mac ? n : 4'd0;
+        3'd1: share = sop ? n : 4'd0;
+        3'd2: share = neurons && acts ? neurons_fired_i[3:0] : 4'd0;
         3'd3: share = update;
-        3'd4: share = biases + (neurons ? mac + rows : read);
+        3'd4: share = read ? n : 4'd0;
         3'd5: share = step == 3'd0 ? 4'd0 : bytes;
         3'd6: share = bytes;
         default: share = neurons ? 4'd0 : update;
@@ -157,13 +159,11 @@ module counters_lossless (
 
   wire [8:0] wiped_at = {3'd7, layer, step};
   wire passed = walking_q && place_q > watched;
-  wire events = d1_row_i || c1_row_i || c1_bias_row_i || c2_rows_i != 2'd0 || d2_fired_i != 16'd0 || c3_fired_i != 16'd0 || ray_i
-              || spikes_valid_i != 3'd0 || update_i || sample_i || stall_out_i;
+  wire events = d1_row_i || c1_row_i || c1_bias_row_i || c1_products_i || fed_row_i != 3'd0 || fed_bias_i != 3'd0 || busy_i != 5'd0
+              || ray_i || neurons_valid_i || update_i || sample_i || stall_out_i;
   always @* begin
     assume (!quiet_i || !events);   // sf_core, sf_readout: idle
-    assume (!held_q || quiet_i);    // sf_d1 begins no sample
-    assume ((spikes_valid_i & (spikes_valid_i - 3'd1)) == 3'd0);  // one array of neurons
-    assume (c2_rows_i != 2'd3);     // none, one or two
+    assume (!held_q || quiet_i);    // sf_core begins no sample
     if (!rst_n_q) begin
       at_reset : assert ({clear_q, snapshot_q, walking_q, known_q, shown_known_q, place_q} == {5'b10000, 9'd0});
     end else begin

@@ -21,7 +21,9 @@ TOKEN = re.compile(r"\d+'\(|\d+'s?[bdh][0-9a-fA-F_]+|'0|[A-Za-z_$][\w$]*(?:::\w+
 SWAP = {"&&": "||", "||": "&&", "&": "|", "|": "&", "+": "-", "-": "+", "==": "!=", "!=": "==", "<": "<=", "<=": "<",
         ">": ">=", ">=": ">"}
 CLOSE = {"(": ")", "[": "]", "{": "}"}
+BLANK = re.compile(r"//[^\n]*|/\*.*?\*/|`SF_REFUSE\(.*?\"\)|`[^\n]*", re.S)
 ROUNDS = 8
+LANES = ("LANES", "MACS", "ADDERS", "NEURONS")
 INPUT = re.compile(r"\binput\s+wire\s*(?:signed\s*)?(?:\[[^\]]*\])?\s*(\w+)")
 
 
@@ -45,8 +47,8 @@ class Module:
     def __init__(self, name, text, inputs, lanes):
         self.name, self.inputs, self.lanes = name, inputs, lanes
         self.source = text
-        # Comments become blanks, so that places stay what they are.
-        self.text = re.sub(r"//[^\n]*|/\*.*?\*/|`[^\n]*", lambda m: re.sub(r"[^\n]", " ", m[0]), text, flags=re.S)
+        # Comments and checks of parameters become blanks, so that places stay what they are.
+        self.text = re.sub(BLANK, lambda m: re.sub(r"[^\n]", " ", m[0]), text)
         self.tokens = [(m[0], m.start(), m.end()) for m in TOKEN.finditer(self.text)]
         self.bits, self.vectors, self.memories, self.signed = set(), set(), set(), set()
         self.declared()
@@ -112,7 +114,7 @@ class Module:
             elif t[i] == "for":
                 head, i = t[i:self.match(i + 1)], self.match(i + 1)
                 limit = head[head.index("<") + 1]
-                if limit == "LANES" or (limit.isdigit() and int(limit) > ROUNDS):
+                if limit in LANES or (limit.isdigit() and int(limit) > ROUNDS):
                     yield self.block(i), None
             elif t[i] == "if":
                 end = self.match(i + 1)
@@ -171,10 +173,12 @@ class Module:
             yield whole, f"if ({condition}) never", "1'b0"
         if kind == "<=":
             yield whole, f"{left} keeps its value", left
-        constant_end = 0  # behind the range of a part of a vector, or the count of a replication
+        constant_end = 0  # behind the range of a part of a vector, the count of a replication, a name in another block
         for i in range(first, end):
             if t[i] == "[" and t[self.until(i + 1, (":", "]"))] == ":":
                 constant_end = max(constant_end, self.match(i))
+            if t[i] == "[" and t[self.match(i)] == ".":
+                constant_end = max(constant_end, self.match(i) + 2)
             if t[i] == "{":
                 constant_end = max(constant_end, self.count_end(i))
             if i < constant_end:

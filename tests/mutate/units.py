@@ -21,7 +21,7 @@ import netlist
 
 Unit = collections.namedtuple("Unit", "module sources checker domain")
 CHUNK = 400
-SAMPLE = ("sf_first", "sf_stream_out")
+SAMPLE = ("sf_sigmoid", "sf_stream_out")
 
 
 def table():
