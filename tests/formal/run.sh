@@ -50,9 +50,7 @@ verdict() {
     $files; ${set:+chparam$set $top;} "
   script=${script//$'\n'/ }
   if [ "$method" = prove ]; then
-    local narrow="wreduce; opt -full -fine;"
-    [ "$top" = integrate_spec ] && narrow= # its product loses unlike many bits at the top on the two sides
-    timeout "$limit" yosys -Q -T -p "$script prep -flatten -top $top; opt -full; $narrow opt_merge; opt_clean; select -assert-max 1 t:\$mul; cutpoint t:\$mul
+    timeout "$limit" yosys -Q -T -p "$script prep -flatten -top $top; opt -full; wreduce; opt -full -fine; opt_merge; opt_clean; select -assert-max 1 t:\$mul; cutpoint t:\$mul
       sat -prove-asserts -set-assumes -show-inputs" >"$build/$name.log" 2>&1
     grep -q 'no model found: SUCCESS' "$build/$name.log" && { echo proved; return; }
     grep -q 'model found: FAIL' "$build/$name.log" && { echo refuted; return; }
@@ -65,7 +63,7 @@ verdict() {
     case $top in
       composite_conserves | exp_neg_one) cut="cutpoint t:\$mul; opt -full;" ;;
       # The two multipliers are the specification's, too, and are cut: a third would be another product.
-      plif_spec) cut="wreduce; opt_merge; opt_clean; select -assert-max 2 t:\$mul; cutpoint t:\$mul; opt -full;" ;;
+      plif_spec | integrate_spec) cut="wreduce; opt_merge; opt_clean; select -assert-max 2 t:\$mul; cutpoint t:\$mul; opt -full;" ;;
     esac
     # -seq 1: nothing is asserted in the cycle of the reset
     timeout "$limit" yosys -Q -T -p "$script; $cut sat -tempinduct -seq 1 -maxsteps $depth -prove-asserts -set-assumes -show-inputs" \

@@ -82,50 +82,66 @@ static bool trial(int i)
 }
 enum { ALL = TRIALS };
 #elif defined UNIT_sf_integrate
-static bool trial(int)
+/* A step a cycle, its output four clocks later; the mode stays for a while, as at work. */
+static bool trial(int i)
 {
+  enum { RUN = 1000, LATER = 3 };
+  static uint32_t want[8];
   const bool colour = draw(0, 1), first = draw(0, 3) == 0;
   const int64_t max = ((int64_t)1 << (colour ? SF_COLOUR_BITS : SF_SIGMA_BITS)) - 1;
   const uint32_t acc = corner(0, max), in = corner(0, max);
-  const int32_t k = corner(0, FX_LEAK_ONE), mode = draw(0, 2);
+  const int32_t k = corner(0, FX_LEAK_ONE), other = draw(0, FX_LEAK_ONE), mode = i / RUN % 3;
   uint64_t saturated = 0;
-  top.acc_i = acc, top.in_i = in, top.k_i = k, top.mode_i = mode, top.first_i = first, top.colour_i = colour;
-  top.eval();
-  return differs(top.acc_o, (colour ? fx_integrate_colour : fx_integrate_density)(acc, in, k, mode, first, &saturated));
+  top.acc_i = acc, top.in_i = in, top.mode_i = mode, top.first_i = first, top.colour_i = colour;
+  top.k_density_i = colour ? other : k, top.k_colour_i = colour ? k : other;
+  want[i & 7] = (colour ? fx_integrate_colour : fx_integrate_density)(acc, in, k, mode, first, &saturated);
+  top.clk_i = 0, top.eval();
+  top.clk_i = 1, top.eval();
+  return i % RUN >= LATER && differs(top.acc_o, want[(i - LATER) & 7]);
 }
 enum { ALL = TRIALS };
 #elif defined UNIT_sf_scale
-static bool trial(int)
+/* A current a cycle, of either table; its argument five clocks later. The scales stay for a while, as at work. */
+static bool trial(int i)
 {
-  const int32_t current = corner(-32768, 32767), reach = draw(0, 1) ? 140000 : 35000;
-  const fx_scale scale = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
-                          (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
+  enum { RUN = 50, LATER = 4 };
+  static int32_t want[8];
+  static fx_scale scale[2];
+  if (i % RUN == 0)
+    for (fx_scale &s : scale) {
+      const int32_t reach = draw(0, 1) ? 140000 : 35000;
+      s = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
+           (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
+    }
+  const int32_t current = corner(-32768, 32767);
   const bool colour = draw(0, 1);
-  top.current_i = current & 0xffff, top.mul_i = scale.mul, top.shift_i = scale.shift, top.bias_i = scale.bias;
-  top.colour_i = colour;
-  top.eval();
-  const int32_t want = colour ? fx_sigmoid_argument(current, &scale) : fx_exp2_argument(current, &scale);
-  return differs(top.y_o, want & 0x3ffff);
+  top.current_i = current & 0xffff, top.colour_i = colour;
+  top.exp_mul_i = scale[0].mul, top.exp_shift_i = scale[0].shift, top.exp_bias_i = scale[0].bias;
+  top.sigmoid_mul_i = scale[1].mul, top.sigmoid_shift_i = scale[1].shift, top.sigmoid_bias_i = scale[1].bias;
+  want[i & 7] = colour ? fx_sigmoid_argument(current, &scale[1]) : fx_exp2_argument(current, &scale[0]);
+  top.clk_i = 0, top.eval();
+  top.clk_i = 1, top.eval();
+  return i % RUN >= LATER && differs(top.y_o, want[(i - LATER) & 7] & 0x3ffff);
 }
 enum { ALL = TRIALS };
 #elif defined UNIT_sf_exp2
+enum { LATER = 5, INPUTS = 1 << 18, ALL = INPUTS + LATER };
 static bool trial(int i)
 {
-  const int32_t y = i - (1 << 17);
-  top.y_i = y & 0x3ffff;
-  top.eval();
-  return differs(top.e_o, fx_exp2(y));
+  top.y_i = (i - (1 << 17)) & 0x3ffff;
+  top.clk_i = 0, top.eval();
+  top.clk_i = 1, top.eval();
+  return i >= LATER && differs(top.e_o, fx_exp2(i - LATER - (1 << 17)));
 }
-enum { ALL = 1 << 18 };
 #elif defined UNIT_sf_sigmoid
+enum { LATER = 5, INPUTS = 1 << 16, ALL = INPUTS + LATER };
 static bool trial(int i)
 {
-  const int32_t x = i - (1 << 15);
-  top.x_i = x & 0xffff;
-  top.eval();
-  return differs(top.s_o, fx_sigmoid(x));
+  top.x_i = (i - (1 << 15)) & 0xffff;
+  top.clk_i = 0, top.eval();
+  top.clk_i = 1, top.eval();
+  return i >= LATER && differs(top.s_o, fx_sigmoid(i - LATER - (1 << 15)));
 }
-enum { ALL = 1 << 16 };
 #endif
 
 int main(void)
