@@ -1,5 +1,6 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
 #include "energy/energy.h"
+#include "report/plot.h"
 #include "cli/cli.h"
 #include "base/clock.h"
 #include "page/page.h"
@@ -15,7 +16,7 @@
 typedef struct options {
   sf_audit_options audit;
   int threads, steps_b;
-  const char *csv, *html, *model, *tech_b, *other;
+  const char *csv, *html, *model, *tech_b, *other, *plot;
   const char *command; /* of the page: the whole command line */
   bool json, published, quiet, compare;
 } options;
@@ -223,6 +224,7 @@ static sf_status compare(const options *opt)
   if (status.code == SF_OK) status = side(&other, &b);
   if (status.code == SF_OK) status = sf_audits_compare(a, opt->audit.scene, b, other.audit.scene, &comparison);
   cJSON_Delete(a), cJSON_Delete(b);
+  if (status.code == SF_OK && opt->plot) status = sf_plot_comparison(opt->plot, comparison);
   SF_TRY(status);
   if (opt->json) return sf_json_print(comparison, true);
   sf_comparison_print(stdout, comparison);
@@ -284,8 +286,8 @@ static sf_status check_arguments(options *o, const sf_cli *cli, const char *cons
   if (o->model && !o->html) return sf_fail(SF_E_USAGE, "--model goes with --html");
   if (o->compare) return parse_comparison(o, positional);
   if (positional[2]) return sf_fail(SF_E_USAGE, "unexpected argument %s; usage: %s", positional[2], cli->usage);
-  if (o->tech_b || o->steps_b)
-    return sf_fail(SF_E_USAGE, "%s goes with --compare", o->tech_b ? "--tech-b" : "--steps-b");
+  if (o->tech_b || o->steps_b || o->plot)
+    return sf_fail(SF_E_USAGE, "%s goes with --compare", o->tech_b ? "--tech-b" : o->steps_b ? "--steps-b" : "--plot");
   if (o->audit.scene && !o->audit.data) return sf_fail(SF_E_USAGE, "missing argument DATA; usage: %s", cli->usage);
   if (!o->audit.scene && !o->published) return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage);
   return sf_ok();
@@ -325,6 +327,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
        "A B [DATA]: two reports (.json) or scenes, what changed"},
       {"--tech-b", 0, SF_ARG_INPUT, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
       {"--steps-b", 0, SF_ARG_INT, &o->steps_b, 1, SF_T_MAX, NULL, "N", "time steps of B (default: as A)"},
+      {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
+       "of a comparison: gnuplot script of energies by kind; gnuplot writes NAME.svg"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
       SF_GROUP("Checks and tuning"),
       {"--rtl-rays", 0, SF_ARG_INT, &o->audit.rtl_rays, 0, 1 << 20, NULL, "N",
@@ -360,7 +364,7 @@ int main(int argc, char **argv)
                 .examples = "  energy_audit scene.snn data --views 2 --json\n"
                             "  energy_audit scene.snn data --view 0 --html report.html\n"
                             "  energy_audit scene.snn data --tech my.tech --csv counts.csv\n"
-                            "  energy_audit --compare a.json b.json\n"
+                            "  energy_audit --compare a.json b.json --plot change.gp && gnuplot change.gp\n"
                             "  energy_audit --compare scene.snn scene.snn data --steps 2 --steps-b 1\n"
                             "  energy_audit --published\n",
                 .min_positional = 0,

@@ -200,17 +200,6 @@ static void add_points(cJSON *space, const sf_engine *engine, const sf_cycle_mod
 
 /* ---- plot ---- */
 
-/* The script that draws NAME.svg is NAME.gp. */
-static sf_status plot_name(const char *path, char name[256])
-{
-  const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
-  const size_t length = strlen(file);
-  if (length < 4 || length > 250 || strcmp(file + length - 3, ".gp") != 0 || strpbrk(file, "'\\\n"))
-    return sf_fail(SF_E_USAGE, "--plot %s: expected NAME.gp, a gnuplot script that writes NAME.svg", path);
-  snprintf(name, 256, "%.*s", (int)(length - 3), file);
-  return sf_ok();
-}
-
 static void put_plot(FILE *out, const job *j, const char *name)
 {
   char text[400], title[400];
@@ -238,7 +227,7 @@ static sf_status write_plot(const job *j)
 {
   char name[256];
   sf_writer writer;
-  SF_TRY(plot_name(j->opt.plot, name));
+  SF_TRY(sf_plot_name(j->opt.plot, name));
   SF_TRY(sf_writer_open(&writer, j->opt.plot));
   put_plot(writer.file, j, name);
   SF_TRY(sf_writer_commit(&writer));
@@ -310,7 +299,7 @@ static sf_status make_models(job *j)
 static sf_status run(job *j)
 {
   char name[256];
-  if (j->opt.plot) SF_TRY(plot_name(j->opt.plot, name));
+  if (j->opt.plot) SF_TRY(sf_plot_name(j->opt.plot, name));
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
   const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, j->opt.scene, j->opt.data, j->opt.split, &how));

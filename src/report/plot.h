@@ -1,6 +1,8 @@
 /* What plots share: gnuplot scripts. */
 #ifndef SF_REPORT_PLOT_H
 #define SF_REPORT_PLOT_H
+#include "base/status.h"
+#include <cjson/cJSON.h>
 #include <stddef.h>
 #include <stdio.h>
 
@@ -9,6 +11,12 @@
 void sf_plot_head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key);
 /* Text of a title between single quotes: what could end it is replaced. */
 void sf_plot_quote(char *to, size_t size, const char *from);
+/* The name in a script's path, .../NAME.gp, which draws NAME.svg; SF_E_USAGE, "--plot PATH: expected NAME.gp", of
+ * another. */
+sf_status sf_plot_name(const char *path, char name[256]);
+/* Writes the script at path that draws two audits side by side (sf_audits_compare): energy of the ledger with neuron
+ * updates by kind, mJ per view. SF_E_USAGE as above, SF_E_IO. */
+sf_status sf_plot_comparison(const char *path, const cJSON *comparison);
 enum { SF_PLOT_COLOURS = 7 };
 extern const char *const sf_plot_colour[SF_PLOT_COLOURS];
 #endif

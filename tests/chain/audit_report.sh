@@ -16,6 +16,14 @@ grep -q 'price of sram.8192 *10 pJ -> 5 pJ' "$work/other.txt" || fail "the compa
 grep -q 'events per view, by relative change: none' "$work/other.txt" || fail "a price changes events"
 grep -Eq '^paper .*\+0.00%' "$work/other.txt" || fail "a memory price changes the paper's metric"
 grep -Eq '^  weight bytes .* -[0-9.]+%$' "$work/other.txt" || fail "a memory price does not change the weights' energy"
+"$build/bin/energy_audit" --compare "$work/a.json" "$work/c.json" --plot "$work/change.gp" >/dev/null 2>"$work/err" || fail "--plot: $(cat "$work/err")"
+grep -q "change.gp" "$work/err" || fail "--plot says nothing"
+[ "$(sed -n 's/^"weight bytes" //p' "$work/change.gp" | awk '{ print ($2 < $1) }')" = 1 ] || fail "the plot: $(cat "$work/change.gp")"
+if command -v gnuplot >/dev/null; then
+  (cd "$work" && gnuplot change.gp) >"$work/err" 2>&1 && grep -q 'weight bytes' "$work/change.svg" || fail "gnuplot: $(cat "$work/err")"
+fi
+"$build/bin/energy_audit" --compare "$work/a.json" "$work/c.json" --plot "$work/change.svg" >/dev/null 2>"$work/err"
+[ $? -eq 2 ] && grep -q 'expected NAME.gp' "$work/err" || fail "--plot change.svg: $(cat "$work/err")"
 sed -i 's/^dram .*/dram 2 pj typing error/' "$work/own.tech"
 audit --tech "$work/own.tech" >"$work/out" 2>"$work/err" && fail "a broken technology file is accepted"
 line=$(grep -n '^dram' "$work/own.tech" | cut -d: -f1)
