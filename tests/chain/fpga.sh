@@ -52,7 +52,7 @@ endmodule
 `default_nettype wire
 SOURCE
 
-mkdir -p "$build/fpga"
+mkdir -p "$build/fpga/venv"
 ln -s "$(realpath "$build")/bin" "$work/bin"
 ln -s "$(realpath "$build")/fpga/venv" "$work/fpga/venv" # the environment is made once
 fpga() { python3 tools/fpga.py "$work" --rtl "$work/tree" "$@" 2>"$work/said.log"; }
