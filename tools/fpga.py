@@ -71,6 +71,7 @@ def parse_arguments():
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the placement (default 1)")
     parser.add_argument("--rtl", default=os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."), metavar="DIR",
                         help="folder that holds rtl/ (default: the project's)")
+    parser.add_argument("--venv", metavar="DIR", help="environment of the tools (default BUILD/fpga/venv)")
     parser.add_argument("--synthesis", action="store_true", help="stop after synthesis: resources without placement or f_max")
     parser.add_argument("--json", action="store_true", help="print the JSON instead of the tables")
     parser.add_argument("--quiet", action="store_true", help="no progress")
@@ -84,7 +85,7 @@ class Tools:
     """Yosys and nextpnr in the environment of the target."""
 
     def __init__(self, folder, say):
-        self.folder = os.path.join(folder, "venv")
+        self.folder = os.path.abspath(folder)
         self.say = say
         stamp = os.path.join(self.folder, "packages.txt")
         wanted = "\n".join(PACKAGES)
@@ -379,7 +380,7 @@ def main():
         raise Stop(f"{root}/rtl/sf_ray_top.sv is not there")
     builds = [Build(text, "", arguments, root) for text in arguments.modules.split()] or [Build(BOARD, "board", arguments, root)]
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
-    tools = Tools(folder, say)
+    tools = Tools(arguments.venv or os.path.join(folder, "venv"), say)
     sources = sources_of(root)
     results = {}
     for build in builds:

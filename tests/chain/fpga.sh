@@ -52,10 +52,8 @@ endmodule
 `default_nettype wire
 SOURCE
 
-mkdir -p "$build/fpga/venv"
 ln -s "$(realpath "$build")/bin" "$work/bin"
-ln -s "$(realpath "$build")/fpga/venv" "$work/fpga/venv" # the environment is made once
-fpga() { python3 tools/fpga.py "$work" --rtl "$work/tree" "$@" 2>"$work/said.log"; }
+fpga() { python3 tools/fpga.py "$work" --venv "$build/fpga/venv" --rtl "$work/tree" "$@" 2>"$work/said.log"; }
 field() { # BUILD EXPRESSION OF r
   python3 -c 'import json, sys; r = json.load(open(sys.argv[1]))[sys.argv[2]]; v = eval(sys.argv[3]); print(*(v if isinstance(v, tuple) else [v]))' "$work/fpga/fpga.json" "$1" "$2"
 }
