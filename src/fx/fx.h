@@ -226,8 +226,9 @@ typedef struct fx_ray {
 typedef union fx_layer_counts {
   uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
   struct {
-#define SF_EVENT(id, name, title) uint64_t name[SF_T_MAX];
-#include "spikefield/event.def"
+#define SF_EVENT_MEMBER(id, name, title, unit, fj) uint64_t name[SF_T_MAX];
+    SF_EVENT_TABLE(SF_EVENT_MEMBER)
+#undef SF_EVENT_MEMBER
   }; /* the same by name */
 } fx_layer_counts;
 
