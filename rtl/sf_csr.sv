@@ -186,11 +186,8 @@ module sf_csr #(
       || c2_in != c1_out || c2_out == 9'd0 || c2_out > 9'(LANES) || c3_in != c2_out || c3_out != 9'd3;
   wire bad_steps = steps_q == 4'd0 || steps_q > 4'd8;
   localparam [12:0] LEAK_ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
-  reg bad_leak;
-  always_comb begin
-    bad_leak = 1'b0;
-    for (int l = 0; l < LAYERS; l++) if (k_q[l] > LEAK_ONE) bad_leak = 1'b1;
-  end
+  wire bad_leak = k_q[sf_op_pkg::D1] > LEAK_ONE || k_q[sf_op_pkg::D2] > LEAK_ONE || k_q[sf_op_pkg::C1] > LEAK_ONE
+      || k_q[sf_op_pkg::C2] > LEAK_ONE || k_q[sf_op_pkg::C3] > LEAK_ONE;
   wire bad_theta = (!decodes && theta_q[sf_op_pkg::D1] == 24'd0) || theta_q[sf_op_pkg::C1] == 24'd0
       || theta_q[sf_op_pkg::C2] == 24'd0;
   wire bad_mode = mode_q == 2'd3;
@@ -314,20 +311,10 @@ module sf_csr #(
   wire read = arvalid_i && !read_q && !rvalid_q;
   wire [12:0] rtable_offset = ra_q - sf_csr_pkg::D1_N_IN;
   wire [31:0] bias_r = {13'd0, bias_q[13:11], 5'd0, bias_q[10:0]};
-  reg [31:0] table_r;
-  always_comb begin
-    table_r = 32'd0;
-    for (int i = 0; i < LAYERS; i++) begin
-      if (rtable_offset[6:4] == 3'(i)) begin
-        case (ra_q[3:2])
-          2'd0: table_r = {23'd0, n_in_q[i]};
-          2'd1: table_r = {23'd0, n_out_q[i]};
-          2'd2: table_r = {19'd0, k_q[i]};
-          default: table_r = {8'd0, theta_q[i]};
-        endcase
-      end
-    end
-  end
+  wire [2:0] rlayer = rtable_offset[6:4];
+  wire [31:0] table_r = ra_q[3:2] == 2'd0 ? {23'd0, n_in_q[rlayer]}
+                      : ra_q[3:2] == 2'd1 ? {23'd0, n_out_q[rlayer]}
+                      : ra_q[3:2] == 2'd2 ? {19'd0, k_q[rlayer]} : {8'd0, theta_q[rlayer]};
   reg [31:0] rdata_d;
   always_comb begin
     case (ra_q)
