@@ -156,6 +156,13 @@ fpga: $(RTL_READY) $(if $(SCENE),$B/bin/sf_cycles) ## place and route for an ECP
 	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(if $(SCENE),--scene "$(SCENE)" --data "$(DATA)") $(FPGA)
 .PHONY: fpga
 
+asic-energy: $(RTL_READY) $B/bin/sf_cosim ## what a MAC, a SOP and a neuron update cost in standard cells (LIBERTY=, NAME=, NODE=, SCENE= DATA=): build/asic, prices for --tech
+	@python3 tools/asic_energy.py $B --rtl $(RTL_ROOT) $(if $(LIBERTY),--liberty "$(LIBERTY)") $(if $(NAME),--name "$(NAME)") \
+	  $(if $(NODE),--node $(NODE)) --scene "$(SCENE)" --data "$(DATA)" $(ASIC_ENERGY)
+deps-asic: ## install with apt the cells that asic-energy takes by default (qflow-tech-osu018)
+	@DEPS="python3 yosys iverilog qflow-tech-osu018" tools/deps.sh
+.PHONY: asic-energy deps-asic
+
 # Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
 define lanes_rule
 $(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)
