@@ -156,7 +156,13 @@ fpga: $(RTL_READY) $(if $(SCENE),$B/bin/sf_cycles) ## place and route for an ECP
 	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(if $(SCENE),--scene "$(SCENE)" --data "$(DATA)") $(FPGA)
 .PHONY: fpga
 
-asic-energy: $(RTL_READY) $B/bin/sf_cosim ## what a MAC, a SOP and a neuron update cost in standard cells (LIBERTY=, NAME=, NODE=, SCENE= DATA=): build/asic, prices for --tech
+# The field's cache gets the look-ups of a scene.
+$B/asic/lookups: $B/obj/tools/asic/lookups.o $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+
+asic-energy: $(RTL_READY) $B/bin/sf_cosim $B/asic/lookups ## what a MAC, a SOP and a neuron update cost in standard cells (LIBERTY=, NAME=, NODE=, SCENE= DATA=): build/asic, prices for --tech
 	@python3 tools/asic_energy.py $B --rtl $(RTL_ROOT) $(if $(LIBERTY),--liberty "$(LIBERTY)") $(if $(NAME),--name "$(NAME)") \
 	  $(if $(NODE),--node $(NODE)) --scene "$(SCENE)" --data "$(DATA)" $(ASIC_ENERGY)
 deps-asic: ## install with apt the cells that asic-energy takes by default (qflow-tech-osu018)

@@ -11,6 +11,7 @@ import glob
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -130,11 +131,28 @@ class Work:
         if not self.arguments.quiet:
             print("asic-energy: " + text, file=sys.stderr, flush=True)
 
+    def sources(self):
+        return sources_of(self.root)
+
+    def files_of(self, module):
+        """Files of a module and of all that it names, in order of their names."""
+        files = {os.path.splitext(os.path.basename(name))[0]: os.path.join(self.root, name) for name in self.sources()}
+        found, left = set(), [module]
+        while left:
+            name = left.pop()
+            if name in found or name not in files:
+                continue
+            found.add(name)
+            with open(files[name], encoding="utf-8") as file:
+                left += re.findall(r"\b(?:sf|asic)_\w+", file.read())
+        return sorted(files[name] for name in found)
+
     def key(self, piece):
-        recipe = [text_of(path) for path in sorted(glob.glob(os.path.join(HERE, "asic", "*.*"))) if not path.endswith("tech.py")]
-        rtl = [text_of(os.path.join(self.root, name)) for name in sources_of(self.root)]
+        """Of all that a block's result comes from: steps of this tool, the RTL that it uses, library, scene, options."""
+        recipe = [text_of(path) for path in sorted(glob.glob(os.path.join(HERE, "asic", "*.py"))) if not path.endswith(("tech.py", "pieces.py"))]
+        rtl = [text_of(path) for path in self.files_of(piece.module)]
         a = self.arguments
-        return digest(*recipe, *rtl, hashlib.sha256(self.library.text.encode()).hexdigest(), text_of(self.scene), piece.name, str(a.cycles),
+        return digest(*recipe, *rtl, hashlib.sha256(self.library.text.encode()).hexdigest(), text_of(self.scene), piece.words(), str(a.cycles),
                       str(a.clock), a.gating, *self.skipped, self.tools["yosys"], self.tools["iverilog"])
 
 
@@ -154,8 +172,8 @@ def synthesise(work, piece):
     os.makedirs(folder)
     os.symlink(os.path.join(work.root, "rtl"), os.path.join(folder, "rtl"))
     started = time.monotonic()
-    netlist.synthesise(piece, sources_of(work.root), work.library, folder, work.period, work.arguments.gating == "on", work.skipped)
-    made = netlist.Netlist(os.path.join(folder, "netlist.json"), piece.module, work.library)
+    netlist.synthesise(piece, work.sources(), work.library, folder, work.period, work.arguments.gating == "on", work.skipped)
+    made = netlist.Netlist(os.path.join(folder, "netlist.json"), piece, work.library)
     made.propagate()
     work.say(f"{piece.name}: {len(made.instances)} cells, {time.monotonic() - started:.0f} s")
     return made
@@ -180,6 +198,7 @@ def record_scene(work, wanted):
 def measure(work, piece, made, values):
     """Runs the netlist and sums up what it cost."""
     started = time.monotonic()
+    piece.prepare(work, os.path.join(work.folder, piece.name))
     taken = piece.record(made, values, round(piece.share * work.arguments.cycles))
     events, active, cycles = pieces.counted_events(taken)
     if events == 0:
@@ -201,9 +220,9 @@ def measure(work, piece, made, values):
 def main():
     arguments = parse_arguments()
     work = Work(arguments)
-    chosen = [piece for piece in pieces.all_pieces() if not arguments.blocks or piece.name in arguments.blocks.split()]
+    chosen = [piece for piece in pieces.all_pieces(work.root) if not arguments.blocks or piece.name in arguments.blocks.split()]
     if not chosen:
-        raise Stop(f"--blocks: none of '{arguments.blocks}' is one of {', '.join(piece.name for piece in pieces.all_pieces())}", 2)
+        raise Stop(f"--blocks: none of '{arguments.blocks}' is one of {', '.join(piece.name for piece in pieces.all_pieces(work.root))}", 2)
     work.say(f"{work.library.name}: {len(work.library.cells)} cells, {work.library.voltage:g} V" +
              (f"; {work.tools['sta']} is there, but energies are added up here, edge by edge" if work.tools["sta"] else ""))
     results, left, keys = {}, [], {piece.name: work.key(piece) for piece in chosen}
@@ -215,8 +234,8 @@ def main():
         else:
             left.append(piece)
     made = [(piece, synthesise(work, piece)) for piece in left]
-    if made:
-        values = record_scene(work, {name for piece, one in made for name in piece.wanted(one)})
+    wanted = {name for piece, one in made for name in piece.wanted(one)}
+    values = record_scene(work, wanted) if wanted else {}
     for piece, one in made:
         result = measure(work, piece, one, values)
         result["key"] = keys[piece.name]

@@ -9,7 +9,7 @@ import os
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools"))
-from asic import bench, energy, liberty, netlist, record  # noqa: E402
+from asic import bench, energy, liberty, netlist, pieces, record  # noqa: E402
 
 A, B, CLK, N1, N2, Q = 2, 3, 4, 5, 6, 7
 # Eight cycles: b rises (n2 falls), q falls; a rises (n1 falls, n2 rises), q rises; b falls; a falls (n1 rises).
@@ -42,7 +42,7 @@ def by_hand():
 def main():
     library, folder = liberty.Library(sys.argv[1]), sys.argv[2]
     write_netlist(os.path.join(folder, "netlist.json"))
-    made = netlist.Netlist(os.path.join(folder, "netlist.json"), "probe", library)
+    made = netlist.Netlist(os.path.join(folder, "netlist.json"), pieces.Piece("probe", "probe", "", []), library)
     made.propagate()
 
     def stream(first, text):

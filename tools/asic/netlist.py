@@ -13,8 +13,9 @@ GATE_FANOUT = 32  # registers behind one clock gate
 WIRE_PITCHES = 4.0     # length of wire for each pin that a net drives, in widths of the mean cell
 WIRE_FF_PER_UM = 0.2   # of minimum-width wire, neighbours included
 INPUT_SLEW_PS = 100.0  # of the block's inputs and of its clock
-# For area, which is what a slow clock asks for; no net drives more than 16 pins. ABC's own script makes every cell larger.
-MAPPING = ("strash", "scorr", "dc2", "&get -n", "&dch -f", "&nf", "&put", "buffer -c -N 16", "topo", "dnsize -D {D}", "stime -p")
+# Cells as small as the clock allows, {D} of it for logic; no net drives more than 16 pins. ABC's own script is for speed.
+MAPPING = ("strash", "scorr", "dc2", "&get -n", "&dch -f", "&nf", "&put", "buffer -c -N 16", "topo", "upsize -D {D}", "dnsize -D {D}", "stime -p")
+LOGIC = 0.6  # of the clock's period; the rest is for wires and registers, which ABC does not see
 TIMING = ("cell_rise", "cell_fall", "rise_transition", "fall_transition")
 
 
@@ -94,12 +95,40 @@ endmodule
     return text
 
 
+# A memory with a registered read port becomes a box: its address and data are loads, what it reads comes from the recording.
+MEMORY_BOX = """(* blackbox *)
+module sf_memory (input clk, input re, input [ABITS-1:0] raddr, output [WIDTH-1:0] rdata, input we, input [ABITS-1:0] waddr, input [WIDTH-1:0] wdata);
+  parameter ABITS = 1; parameter WIDTH = 1; parameter SIZE = 1;
+endmodule
+"""
+MEMORY_MAP = """(* techmap_celltype = "$mem_v2" *)
+module memory_box (RD_CLK, RD_EN, RD_ARST, RD_SRST, RD_ADDR, RD_DATA, WR_CLK, WR_EN, WR_ADDR, WR_DATA);
+  parameter MEMID = ""; parameter SIZE = 0; parameter OFFSET = 0; parameter ABITS = 1; parameter WIDTH = 1; parameter INIT = 0;
+  parameter RD_PORTS = 1; parameter RD_CLK_ENABLE = 1; parameter RD_CLK_POLARITY = 1; parameter RD_TRANSPARENCY_MASK = 0;
+  parameter RD_COLLISION_X_MASK = 0; parameter RD_WIDE_CONTINUATION = 0; parameter RD_CE_OVER_SRST = 0; parameter RD_ARST_VALUE = 0;
+  parameter RD_SRST_VALUE = 0; parameter RD_INIT_VALUE = 0; parameter WR_PORTS = 1; parameter WR_CLK_ENABLE = 1; parameter WR_CLK_POLARITY = 1;
+  parameter WR_PRIORITY_MASK = 0; parameter WR_WIDE_CONTINUATION = 0;
+  input [RD_PORTS-1:0] RD_CLK, RD_EN, RD_ARST, RD_SRST;
+  input [RD_PORTS*ABITS-1:0] RD_ADDR;
+  output [RD_PORTS*WIDTH-1:0] RD_DATA;
+  input [WR_PORTS-1:0] WR_CLK;
+  input [WR_PORTS*WIDTH-1:0] WR_EN, WR_DATA;
+  input [WR_PORTS*ABITS-1:0] WR_ADDR;
+  wire _TECHMAP_FAIL_ = RD_PORTS != 1 || WR_PORTS != 1 || !RD_CLK_ENABLE;
+  sf_memory #(.ABITS(ABITS), .WIDTH(WIDTH), .SIZE(SIZE)) _TECHMAP_REPLACE_ (.clk(RD_CLK), .re(RD_EN), .raddr(RD_ADDR), .rdata(RD_DATA),
+      .we(WR_EN[0]), .waddr(WR_ADDR), .wdata(WR_DATA));
+endmodule
+"""
+
+
 def script_of(piece, sources, liberty, period_ps, gating):
     parameters = " ".join(f"-chparam {name} {value}" for name, value in piece.parameters.items())
-    lines = [f"read_liberty -lib -ignore_miss_func {liberty}", f"read_verilog -sv -defer -Irtl {' '.join(sources)}",
+    lines = [f"read_liberty -lib -ignore_miss_func {liberty}"] + ["read_verilog -sv memory_box.v"] * bool(piece.memories)
+    lines += [f"read_verilog -sv -defer -Irtl {' '.join(sources)}",
              f"hierarchy -check -top {piece.module} {parameters}", f"rename -top {piece.module}"]
     lines += [f"blackbox *{box}*" for box in piece.boxes]
-    lines += [f"synth -top {piece.module} -flatten -run begin:fine", "opt -fast -full -nosdff", "memory_map", "opt -undriven -fine -nosdff"]
+    lines += [f"synth -top {piece.module} -flatten -run begin:fine"] + ["techmap -map memory.v"] * bool(piece.memories)
+    lines += ["opt -fast -full -nosdff", "memory_map", "opt -undriven -fine -nosdff"]
     if gating:
         lines += ["techmap -map gate.v", "opt -nodffe -nosdff"]
     lines += ["techmap", "opt -fast -nodffe -nosdff", f"dfflibmap -liberty {liberty}",
@@ -116,8 +145,11 @@ def synthesise(piece, sources, library, folder, period_ps, gating, skipped):
     inverter = smallest([Cell(library, name) for name in names], 1, [1, 0])
     if inverter is None:
         raise NetlistError(f"{library.path}: the library has no inverter")
+    for name, text in (("memory_box.v", MEMORY_BOX), ("memory.v", MEMORY_MAP)):
+        with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+            file.write(text)
     with open(os.path.join(folder, "map.abc"), "w", encoding="utf-8") as file:
-        file.write("\n".join(MAPPING).replace("{D}", str(period_ps)) + "\n")
+        file.write("\n".join(MAPPING).replace("{D}", str(round(LOGIC * period_ps))) + "\n")
     with open(os.path.join(folder, "abc.constr"), "w", encoding="utf-8") as file:
         file.write(f"set_driving_cell {inverter.name}\nset_load {4 * inverter.capacitance(inverter.inputs[0]):.3f} [all_outputs]\n")
     if gating:
@@ -144,9 +176,9 @@ class Instance:
 class Netlist:
     """Instances, nets, and what stands for memories: boxes, whose outputs are inputs of the netlist."""
 
-    def __init__(self, path, module, library):
+    def __init__(self, path, piece, library):
         with open(path, encoding="utf-8") as file:
-            top = json.load(file)["modules"][module]
+            top = json.load(file)["modules"][piece.module]
         self.library, self.cells, self.instances = library, {}, []
         self.inputs = {name: port["bits"] for name, port in top["ports"].items() if port["direction"] == "input"}
         self.outputs = {name: port["bits"] for name, port in top["ports"].items() if port["direction"] == "output"}
@@ -164,6 +196,9 @@ class Netlist:
         for kind in self.cells.values():
             if not any(kind.powers(pin) for pin in kind.pins):
                 library.fail(kind.group, f"cell '{kind.name}' has no tables of internal power")
+        missing = [name for name in piece.memories if not any(box.startswith(name + ".") for box in self.boxes)]
+        if missing:
+            raise NetlistError(f"{path}: the memory '{missing[0]}' is no memory with a registered read port")
         self.connect()
 
     def connect(self):

@@ -1,4 +1,7 @@
 """What is measured: blocks of the RTL, the place of their recorded operands, and what counts as an event of them."""
+import os
+
+from asic import cache
 from asic.bench import WARM_UP
 from asic.record import Record, number, to_bits
 
@@ -12,8 +15,13 @@ class Piece:
     def __init__(self, name, module, scope, events, parameters=None, boxes=(), ports=None, idle=(), lanes=1):
         self.name, self.module, self.scope, self.events = name, module, scope, events
         self.parameters, self.boxes, self.ports, self.idle, self.lanes = parameters or {}, boxes, ports or {}, idle, lanes
+        self.memories = []  # of the block, which stay outside
         self.cut = {}  # input -> bits that are 0 instead of recorded, from the lowest on; then no output is compared
         self.clock, self.share = "clk_i", 1.0 if lanes == 1 else 0.5  # of the recorded cycles that are run
+
+    def words(self):
+        """All that makes the block what it is, for the key of what is kept."""
+        return repr(sorted((name, value) for name, value in vars(self).items() if not callable(value) and name != "taken"))
 
     def wanted(self, netlist):
         """Recorded nets that the block needs."""
@@ -25,6 +33,9 @@ class Piece:
 
     def place(self, name):
         return self.ports.get(name) or f"{self.scope}.{name}"
+
+    def prepare(self, work, folder):
+        """What has to be done before `record`."""
 
     def record(self, netlist, values, cycles):
         events = [sum(values[name][c].count("1") for name in self.events) for c in range(cycles)]
@@ -58,6 +69,24 @@ class Arithmetic(Piece):
         return Record({"a_i": a, "b_i": b}, {"y_o": y}, [1] * len(at), len(at))
 
 
+class Tags(Piece):
+    """A bank of the field cache's tags, with its list in a memory outside; operands from a simulation of the cache."""
+
+    def __init__(self):
+        super().__init__("tags", "sf_cache_tags", "", [], {"SETS": 256, "WAYS": 4, "LINE_BITS": 27}, idle=("go_i", "empty_i"))
+        self.memories = ["list_q"]
+
+    def wanted(self, netlist):
+        return []
+
+    def prepare(self, work, folder):
+        lookups = os.path.join(work.build, "asic", "lookups")
+        self.taken = cache.record(lookups, work.scene, work.data, work.root, work.sources(), folder, work.arguments.cycles)
+
+    def record(self, netlist, values, cycles):
+        return self.taken
+
+
 def array(lanes):
     return Piece(f"values{lanes}", "sf_values", VALUES, [VALUES + ".op3_q"], {"LANES": lanes, "MACS": lanes}, ["sf_rows"],
                  {"u_weights.row_o": VALUES + ".row"}, ("valid_i", "h_valid_i", "load_i", "d1_taken_i", "c1_taken_i"), lanes)
@@ -80,8 +109,9 @@ WEIGHT, VALUE = (VALUES + ".row2_q", 0, 7), (VALUES + ".value2_q", 4, 11)
 PRODUCT, SUM, SUM_LOW = (VALUES + ".product3_q", 0, 19), (VALUES + ".from_row", 0, 26), (VALUES + ".from_row", 0, 7)
 
 
-def all_pieces():
-    return [array(8), array(12), twin_array(8), adders(8), adders(12),
+def all_pieces(root):
+    """Of this RTL: one without a cache has no tags."""
+    return ([Tags()] if os.path.exists(os.path.join(root, "rtl", "sf_cache_tags.sv")) else []) + [array(8), array(12), twin_array(8), adders(8), adders(12),
             Piece("neuron", "sf_plif", NEURON + ".g_unit[0].u_plif", [NEURON + ".valid_i"]),
             Piece("scale", "sf_scale", READOUT + ".u_scale", [READOUT + ".update_o"]),
             Piece("exp2", "sf_exp2", READOUT + ".u_exp2", [READOUT + ".update_o"]),

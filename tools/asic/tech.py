@@ -56,6 +56,7 @@ def priced(blocks, full):
     add("neuron_update", "leak, compare, reset: sf_plif", ["neuron"], lambda b: per_event(b[0]))
     add("integrator_update", "leaky integrator: sf_integrate", ["integrate"], lambda b: per_event(b[0]))
     add("special", "argument and both tables: sf_scale, sf_exp2, sf_sigmoid", ["scale", "exp2", "sigmoid"], lambda b: sum(per_event(one) for one in b))
+    add("tag_lookup", "tags of a line, 4 ways: a bank of sf_cache_tags without its memory", ["tags"], lambda b: per_event(b[0]))
     for width in (8, 32):
         add(f"int_add.{width}", f"addition alone, {width} bits", [f"add{width}"], lambda b: per_event(b[0]))
     for width in (8, 32):
