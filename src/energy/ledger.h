@@ -35,6 +35,7 @@ typedef enum {
   SF_PRICE_NEURON,                  /* neuron_update: leak, compare, reset */
   SF_PRICE_INTEGRATOR,              /* integrator_update: of D2 and C3 */
   SF_PRICE_SPECIAL,                 /* special: one special function */
+  SF_PRICE_TAG_LOOKUP,              /* tag_lookup: tags of a line of the field's cache */
   SF_PRICE_KEYS
 } sf_price_family;
 

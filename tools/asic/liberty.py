@@ -129,7 +129,7 @@ LEAKAGE_UNITS = {"mW": 1e6, "uW": 1e3, "nW": 1.0, "pW": 1e-3}  # in nW
 class Library:
     """A parsed library in ps, V, fF, fJ and nW."""
 
-    def __init__(self, path):
+    def __init__(self, path, power=True):
         self.path = path
         self.text = read_text(path)
         self.top = Parser(path, self.text).library()
@@ -140,7 +140,7 @@ class Library:
         self.units()
         self.voltage = self.operating_point()
         self.templates = {group.title: group for group in self.top.all("lu_table_template", "power_lut_template")}
-        if not any(pin.all("internal_power") for cell in self.cells.values() for pin in cell.all("pin")):
+        if power and not any(pin.all("internal_power") for cell in self.cells.values() for pin in cell.all("pin")):
             self.fail(self.top, "no cell has tables of internal power ('internal_power'): energies cannot be taken from this library")
 
     def fail(self, group, what, attribute=None):

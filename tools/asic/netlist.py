@@ -136,33 +136,39 @@ def script_of(piece, sources, liberty, period_ps, gating):
     return "\n".join(lines) + "\n"
 
 
-def synthesise(piece, sources, library, folder, period_ps, gating, skipped):
-    """Writes folder/netlist.json; sources are absolute, the RTL's root is linked into the folder."""
-    liberty = os.path.join(folder, "cells.lib")
-    with open(liberty, "w", encoding="utf-8") as file:
-        file.write(reduced_text(library, skipped))
+def write_library(library, folder, period_ps, gating, skipped):
+    """What Yosys and ABC need beside the RTL: cells, memories as boxes, gated clocks, the mapping. Returns the cells' names."""
     names = [name for name, cell in library.cells.items() if cell.get("dont_use") != "true" and not any(re.search(p, name) for p in skipped)]
     inverter = smallest([Cell(library, name) for name in names], 1, [1, 0])
     if inverter is None:
         raise NetlistError(f"{library.path}: the library has no inverter")
-    for name, text in (("memory_box.v", MEMORY_BOX), ("memory.v", MEMORY_MAP)):
+    texts = {"cells.lib": reduced_text(library, skipped), "memory_box.v": MEMORY_BOX, "memory.v": MEMORY_MAP,
+             "map.abc": "\n".join(MAPPING).replace("{D}", str(round(LOGIC * period_ps))) + "\n",
+             "abc.constr": f"set_driving_cell {inverter.name}\nset_load {4 * inverter.capacitance(inverter.inputs[0]):.3f} [all_outputs]\n"}
+    if gating:
+        texts["gate.v"] = gating_map(clock_gate(library, names)[0])
+    for name, text in texts.items():
         with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
             file.write(text)
-    with open(os.path.join(folder, "map.abc"), "w", encoding="utf-8") as file:
-        file.write("\n".join(MAPPING).replace("{D}", str(round(LOGIC * period_ps))) + "\n")
-    with open(os.path.join(folder, "abc.constr"), "w", encoding="utf-8") as file:
-        file.write(f"set_driving_cell {inverter.name}\nset_load {4 * inverter.capacitance(inverter.inputs[0]):.3f} [all_outputs]\n")
-    if gating:
-        with open(os.path.join(folder, "gate.v"), "w", encoding="utf-8") as file:
-            file.write(gating_map(clock_gate(library, names)[0]))
-    with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:
-        file.write(script_of(piece, sources, "cells.lib", period_ps, gating))
+    return names
+
+
+def run_yosys(name, folder):
+    """Runs folder/synth.ys; raises NetlistError with the tool's own words."""
     done = subprocess.run(["nice", "-n", "10", "yosys", "-q", "-l", "yosys.log", "synth.ys"], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         with open(os.path.join(folder, "yosys.log"), encoding="utf-8", errors="replace") as log:
             errors = [line.strip() for line in log if re.match(r"ABC: (Error|Library .* cannot)", line)]
         errors += [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line] or (done.stderr or done.stdout).splitlines()[-1:]
-        raise NetlistError(f"yosys: {piece.name}: {' '.join(errors[:1])}, see {folder}/yosys.log")
+        raise NetlistError(f"yosys: {name}: {' '.join(errors[:1])}, see {folder}/yosys.log")
+
+
+def synthesise(piece, sources, library, folder, period_ps, gating, skipped):
+    """Writes folder/netlist.json; sources are absolute, the RTL's root is linked into the folder."""
+    write_library(library, folder, period_ps, gating, skipped)
+    with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:
+        file.write(script_of(piece, sources, "cells.lib", period_ps, gating))
+    run_yosys(piece.name, folder)
 
 
 class Instance:

@@ -135,7 +135,7 @@ def file_of(report):
              f"# {report['tools']['yosys']}; {report['tools']['iverilog']}.",
              f"# Clock {report['clock_mhz']:g} MHz, clock gating {'on' if report['gating'] else 'off'}. How each price comes about: docs/energy.md.",
              f"name   {report['name']}",
-             f"title  {library['name']}, {node:g} nm, {library['voltage']:g} V, {library['temperature']:g} C: operations from netlists, memories published and scaled",
+             f"title  {library['name']}, {node:g} nm, {library['voltage']:g} V, {library['temperature']:g} C: operations from netlists",
              "", "# operations of this hardware"]
     for price in report["prices"]:
         source = (f"netlist: {price['what']}; {price['events_per_cycle']:.2f} events, {price['toggles_per_net_and_cycle']:.2f} toggles per net a cycle; "
