@@ -153,6 +153,25 @@ TEST(installed_prices)
   ck_assert_uint_eq(sf_price_byte(&t, 128 * 128, NULL), 1768); /* 10 * sqrt 2 pJ / 8 */
 }
 
+/* Prices of netlists: an operation costs more than its arithmetic alone, a MAC of 12 bits more than one of 8. */
+TEST(installed_prices_from_netlists)
+{
+  static const char *const files[] = {"share/tech/sky130.tech", "share/tech/osu018.tech"};
+  for (int i = 0; i < 2; i++) {
+    sf_technology t;
+    uint64_t fj[SF_PRICE_KEYS];
+    ck_ok(sf_technology_load(&t, files[i]));
+    for (int f = SF_PRICE_MAC; f < SF_PRICE_KEYS; f++)
+      ck_assert_msg(sf_price_measured(&t, f, &fj[f]), "%s: family %d is missing", files[i], f);
+    ck_assert_uint_gt(fj[SF_PRICE_MAC], fj[SF_PRICE_TWIN_MAC]);
+    ck_assert_uint_gt(fj[SF_PRICE_TWIN_MAC], sf_price_multiply(&t, 8, 8, NULL) + sf_price_add(&t, 32, NULL));
+    ck_assert_uint_gt(fj[SF_PRICE_SOP], sf_price_add(&t, 16, NULL));
+    ck_assert_uint_gt(fj[SF_PRICE_MAC], 3 * fj[SF_PRICE_SOP]);
+    for (int p = 0; p < t.count; p++)
+      ck_assert(strstr(t.price[p].source, "netlist: ") || strstr(t.price[p].source, "Horowitz"));
+  }
+}
+
 /* ---- ledgers ---- */
 
 static fx_counts small_counts(const fx_net *net)
