@@ -1,7 +1,7 @@
 /* Events to energy. Integer femtojoules, so energies are compared for equality, never with a tolerance. */
 #ifndef SF_ENERGY_ENERGY_H
 #define SF_ENERGY_ENERGY_H
-#include "fx/fx.h"
+#include "fx/memory.h"
 #include "image/image.h"
 #include "energy/ledger.h"
 #include "scene/scene.h"
@@ -22,6 +22,28 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
  * a spike in a lane that the layer does not have is a difference to be seen, not one to be masked away. */
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
                        fx_counts *counts);
+
+/* The same of memory: positions at which the field is read, and spike bitmaps, in the order of a list of rays. */
+typedef struct sf_cache_slot {
+  uint64_t line, time; /* of its last use; 0: empty */
+} sf_cache_slot;
+typedef struct sf_memory_recount {
+  const fx_scene *scene;
+  fx_cache_shape shape;
+  fx_memory_counts counts;
+  sf_cache_slot *slot; /* owned */
+  uint64_t slots, clock, tile, samples;
+  bool begun, fired[FX_SPIKING][64 * SF_SPIKE_WORDS];
+} sf_memory_recount;
+sf_status sf_memory_recount_open(sf_memory_recount *m, const fx_scene *scene, const fx_cache_shape *shape);
+void sf_memory_recount_close(sf_memory_recount *m);
+void sf_memory_recount_begin(sf_memory_recount *m);              /* a list */
+void sf_memory_recount_ray(sf_memory_recount *m, uint64_t tile); /* as fx_memory_ray */
+void sf_memory_recount_read(sf_memory_recount *m, fx_read what, const uint32_t pos[3]);
+void sf_memory_recount_sample(sf_memory_recount *m, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]);
+/* SF_E_DIFFERENCE names the first count that differs. */
+sf_status sf_memory_compare(const fx_memory_counts *a, const char *a_name, const fx_memory_counts *b,
+                            const char *b_name);
 
 /* Equality of two counts over the layers' events and samples (not rays/grid/march/saturation). On a difference names
  * event, layer, step and both values. */
