@@ -57,10 +57,11 @@ static void make_report(fixture *f)
                          .rays = WIDTH * HEIGHT,
                          .seed = 7,
                          .views = 1};
-  const sf_measure_job job = {&f->scene, r->rays, make_ray, NULL, f, 7, UINT64_MAX};
+  const sf_measure_job job = {
+      .scene = &f->scene, .rays = r->rays, .ray = make_ray, .user = f, .seed = 7, .check = UINT64_MAX};
   ck_ok(sf_measure_rays(&job, &r->measure));
   ck_ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
-  r->traffic = sf_traffic_of(&r->measure.core, r->rays);
+  r->traffic = sf_traffic_of(&f->scene, &r->measure.core, &r->measure.memory, r->rays);
   ck_ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
   r->three = (sf_three_counts){.rays = (int)r->measure.checked,
                                .core = r->measure.checked_core,

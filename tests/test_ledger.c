@@ -247,7 +247,7 @@ TEST(cells_and_parts_add_up)
     (&spikes[0][0][0])[i] = sf_random_u64(1, 2, i) & sf_random_u64(1, 3, i);
   for (int i = 0; i < 9; i++)
     sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])spikes, i % 3 == 0, &c);
-  const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
+  const sf_traffic traffic = sf_traffic_recount(&scene, &c, &(fx_memory_counts){0}, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
   ck_ok(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l));

@@ -27,7 +27,8 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
               sf_event_total(&s->recount, e), false);
   const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
   for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
-    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e], s->no_rtl_traffic);
+    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e],
+              s->no_rtl_traffic || e >= SF_TRAFFIC_AT_PORTS);
   print_row(out, "paper ledger, fJ", sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount), false);
   fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
           s->stalls);
@@ -108,18 +109,19 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   sf_limits_print(out);
 }
 
-static cJSON *traffic_json(const sf_traffic *traffic)
+/* The first `events` of them. */
+static cJSON *traffic_json(const sf_traffic *traffic, int events)
 {
   cJSON *json = cJSON_CreateObject();
-  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++) sf_json_add_u64(json, sf_traffic_events[e].name, traffic->event[e]);
+  for (int e = 0; e < events; e++) sf_json_add_u64(json, sf_traffic_events[e].name, traffic->event[e]);
   return json;
 }
 
-static cJSON *count_json(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic)
+static cJSON *count_json(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic, int events)
 {
   cJSON *json = sf_counts_json(net, counts);
   if (traffic)
-    cJSON_AddItemToObject(json, "traffic", traffic_json(traffic));
+    cJSON_AddItemToObject(json, "traffic", traffic_json(traffic, events));
   else
     cJSON_AddNullToObject(json, "traffic");
   return json;
@@ -136,9 +138,10 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
   sf_json_add_u64(json, "core_fj", sf_energy_fj(&s->core));
   sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
   sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
-  cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic));
-  cJSON_AddItemToObject(json, "rtl", count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic));
-  cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic));
+  cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic, SF_TRAFFIC_EVENTS));
+  cJSON_AddItemToObject(json, "rtl",
+                        count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic, SF_TRAFFIC_AT_PORTS));
+  cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic, SF_TRAFFIC_EVENTS));
   return json;
 }
 
@@ -239,7 +242,7 @@ cJSON *sf_report_json(const sf_audit_report *r)
   add_energy(json, r);
   cJSON_AddItemToObject(json, "ledgers", sf_ledgers_json(&r->ledgers, r->views));
   add_twin(json, r);
-  cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic));
+  cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic, SF_TRAFFIC_EVENTS));
   add_saturation(json, r);
   add_agreement(json, r);
   cJSON_AddItemToObject(json, "rtl_subset", three_json(&r->three, r->net));

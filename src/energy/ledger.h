@@ -54,13 +54,31 @@ enum { SF_ROW_FIELD = SF_LAYERS, SF_ROW_RAY, SF_ROWS };
 extern const char *const sf_row_names[SF_ROWS]; /* "D1" .. "C3", "field" (grid or planes), "ray" (exp(-x), frame) */
 
 /* What is outside the nets: all of it at step 0 of its row. */
-typedef enum { SF_TRAFFIC_TABLE, SF_TRAFFIC_EXP_NEG, SF_TRAFFIC_FRAME, SF_TRAFFIC_EVENTS } sf_traffic_id;
+typedef enum {
+  SF_TRAFFIC_TABLE,
+  SF_TRAFFIC_EXP_NEG,
+  SF_TRAFFIC_FRAME,
+  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator's ports, too */
+  SF_TRAFFIC_LOOKUP = SF_TRAFFIC_AT_PORTS,
+  SF_TRAFFIC_MISS,
+  SF_TRAFFIC_PRODUCT,
+  SF_TRAFFIC_PLACE,
+  SF_TRAFFIC_SPECIAL,
+  SF_TRAFFIC_HARMONICS,
+  SF_TRAFFIC_EVENTS
+} sf_traffic_id;
 typedef union sf_traffic {
   uint64_t event[SF_TRAFFIC_EVENTS]; /* by sf_traffic_id */
   struct {
-    uint64_t table_bytes; /* row field: hash-grid or plane bytes read */
+    uint64_t table_bytes; /* row field: hash-grid or plane bytes that a sample uses */
     uint64_t exp_neg;     /* row ray: exp(-x), one per composited sample */
     uint64_t frame_bytes; /* row ray: bytes of pixels written, SF_PIXEL_BYTES each */
+    uint64_t lookups;     /* row field: of its cache, and those that missed */
+    uint64_t misses;
+    uint64_t products;  /* row field: of entries and weights; of TensoRF field_mac */
+    uint64_t places;    /* row field: cells of grid levels found, or places in planes and lines */
+    uint64_t special;   /* row field: TensoRF's activations, sines and cosines */
+    uint64_t harmonics; /* row ray: directions whose harmonics were computed */
   };
 } sf_traffic;
 enum { SF_PIXEL_BYTES = 48 }; /* an fx_pixel, as the accelerator writes it */
