@@ -42,13 +42,14 @@ uint64_t fx_cache_look_up(fx_cache *cache, const uint32_t *line, int n);
 int fx_grid_lines(const fx_grid *grid, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM]);
 int fx_tensorf_lines(const fx_tensorf *field, bool appearance, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM]);
 
-/* What the vector kernels make lines of, level by level: places[level] = hashed ? (x ^ y * my ^ z * mz) & mask
- *                                                                               : x + y * my + z * mz, then + offset.
- */
+/* What the vector kernels make lines of: an entry is (x ^ y * my ^ z * mz) & mask of a hashed level, x + y * my + z *
+ * mz of a dense one, + offset. By level, then by pair of a level, which adds my or 0, mz or 0. Beyond the levels 0. */
+enum { FX_LEVEL_PAIRS = 4, FX_PAIRS_MAX = FX_LEVELS_MAX * FX_LEVEL_PAIRS };
 typedef struct fx_places {
   const fx_grid *grid;
-  int32_t scale[FX_LEVELS_MAX], my[FX_LEVELS_MAX], mz[FX_LEVELS_MAX], mask[FX_LEVELS_MAX], offset[FX_LEVELS_MAX];
-  int32_t hashed[FX_LEVELS_MAX]; /* -1 or 0 */
+  int32_t scale[FX_LEVELS_MAX], my[FX_LEVELS_MAX], mz[FX_LEVELS_MAX];
+  int32_t add_y[FX_PAIRS_MAX], add_z[FX_PAIRS_MAX], mask[FX_PAIRS_MAX], offset[FX_PAIRS_MAX];
+  int32_t hashed[FX_PAIRS_MAX]; /* -1 or 0 */
 } fx_places;
 void fx_places_fill(fx_places *places, const fx_grid *grid);
 #endif

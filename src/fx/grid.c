@@ -110,8 +110,13 @@ void fx_places_fill(fx_places *places, const fx_grid *grid)
     places->scale[l] = grid->scale_q16[l];
     places->my[l] = stride ? stride : (int32_t)HASH_Y;
     places->mz[l] = stride ? stride * stride : (int32_t)HASH_Z;
-    places->mask[l] = stride ? -1 : (int32_t)((1u << grid->log2_size[l]) - 1);
-    places->hashed[l] = stride ? 0 : -1;
-    places->offset[l] = (int32_t)grid->offset[l];
+    for (int pair = 0; pair < FX_LEVEL_PAIRS; pair++) {
+      const int at = l * FX_LEVEL_PAIRS + pair;
+      places->add_y[at] = pair & 1 ? places->my[l] : 0;
+      places->add_z[at] = pair & 2 ? places->mz[l] : 0;
+      places->mask[at] = stride ? -1 : (int32_t)((1u << grid->log2_size[l]) - 1);
+      places->hashed[at] = stride ? 0 : -1;
+      places->offset[at] = (int32_t)grid->offset[l];
+    }
   }
 }

@@ -64,8 +64,10 @@ void fx_memory_sample(fx_memory *memory, uint64_t run, const fx_fired *fired)
   memory->in_group++;
   for (int s = 0; s < FX_SPIKING; s++)
     for (int w = 0; w < SF_SPIKE_WORDS; w++) {
-      memory->counts.rows[s] += (uint64_t)__builtin_popcountll(fired->neurons[s][w] & ~memory->seen.neurons[s][w]);
-      memory->seen.neurons[s][w] |= fired->neurons[s][w];
+      const uint64_t first = fired->neurons[s][w] & ~memory->seen.neurons[s][w];
+      if (!first) continue;
+      memory->counts.rows[s] += (uint64_t)__builtin_popcountll(first);
+      memory->seen.neurons[s][w] |= first;
     }
 }
 
