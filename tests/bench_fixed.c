@@ -176,7 +176,8 @@ static sf_status audit_frame(frame *f, const sf_technology *tech, const fx_count
   if (!status.code) status = three.agreement;
   if (!status.code) {
     const sf_traffic traffic = sf_traffic_of(&f->scene, &measure.core, &measure.memory, FRAME * FRAME);
-    status = sf_ledgers_make(tech, &f->scene.net, &measure.core, &traffic, sf_table_size(&f->scene), ledgers);
+    const sf_counted counted = {&f->scene, &measure.core, &measure.memory, &traffic, sf_cache_built};
+    status = sf_ledgers_make(tech, &counted, ledgers);
   }
   *seconds = sf_seconds() - start;
   if (!status.code && memcmp(&measure.core, counts, sizeof *counts))

@@ -62,7 +62,9 @@ static void make_report(fixture *f)
   ck_ok(sf_measure_rays(&job, &r->measure));
   ck_ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
   r->traffic = sf_traffic_of(&f->scene, &r->measure.core, &r->measure.memory, r->rays);
-  ck_ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
+  r->cache = sf_cache_built;
+  const sf_counted counted = {&f->scene, &r->measure.core, &r->measure.memory, &r->traffic, r->cache};
+  ck_ok(sf_ledgers_make(&tech, &counted, &r->ledgers));
   r->three = (sf_three_counts){.rays = (int)r->measure.checked,
                                .core = r->measure.checked_core,
                                .rtl = r->measure.checked_core,
@@ -287,7 +289,7 @@ static const plant plants[] = {
     {"data-key=\"samples\" value", "data-key=\"rays\" value"},
     {"data-key=\"ledgers.list[1].parts_fj.mac\"", "data-was=\"ledgers\""},
     {"data-key=\"page.layer_fj[0][0]\" data-value=\"", "data-key=\"page.layer_fj[0][0]\" data-value=\"9"},
-    {"<data data-key=\"ledgers.list[7].total_fj\" value=\"", "<data data-was=\""},
+    {"<data data-key=\"ledgers.list[8].total_fj\" value=\"", "<data data-was=\""},
     {"</header>", ""},
     {"</figure>", ""},
     {"</td>", "<td>"},

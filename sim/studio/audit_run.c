@@ -210,8 +210,10 @@ sf_status sf_audit_count(sf_audit *a)
   SF_TRY(status);
   const fx_counts *counts = &r->measure.core;
   SF_TRY(sf_ledger_make(&a->scene.net, counts, &r->ledger));
+  if (a->scene.backbone == FX_INGP) r->entries = counts->grid_bytes / FX_GRID_FEATURES;
   r->traffic = sf_traffic_of(&a->scene, counts, &r->measure.memory, r->rays);
-  SF_TRY(sf_ledgers_make(&a->technology, &a->scene.net, counts, &r->traffic, sf_table_size(&a->scene), &r->ledgers));
+  const sf_counted counted = {&a->scene, counts, &r->measure.memory, &r->traffic, r->cache};
+  SF_TRY(sf_ledgers_make(&a->technology, &counted, &r->ledgers));
   SF_TRY(count_twin(a));
   return run_rtl(a);
 }

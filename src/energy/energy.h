@@ -210,6 +210,7 @@ typedef struct sf_audit_report {
   double views, seconds;
   bool random_rays;
   fx_cache_shape cache; /* of the field */
+  uint64_t entries;     /* of a hash grid that the samples read; 0 of TensoRF */
   sf_measure measure;
   sf_three_counts three;
   sf_ledger ledger; /* the paper's metric and its readings, at 4.6 and 0.9 pJ */
@@ -219,7 +220,9 @@ typedef struct sf_audit_report {
 } sf_audit_report;
 void sf_report_print(FILE *out, const sf_audit_report *report);
 /* By share/schema/energy_audit.schema.json; "format" is SF_AUDIT_FORMAT. */
-#define SF_AUDIT_FORMAT "spikefield-audit-1"
+#define SF_AUDIT_FORMAT "spikefield-audit-2"
+/* Reports before it: memories priced by the byte, no cache, no arithmetic of field and ray. --compare reads them. */
+#define SF_AUDIT_FORMAT_1 "spikefield-audit-1"
 cJSON *sf_report_json(const sf_audit_report *report);
 /* One row per layer and step, then field and ray: events, fJ of every spiking ledger. */
 void sf_report_csv(FILE *out, const sf_audit_report *report);
