@@ -181,7 +181,10 @@ sf_unit_price sf_unit_price_of(const sf_technology *technology, const sf_counted
 /* Accesses of 64 bits that a row of a layer's weights takes; bytes of the memory that holds them all. */
 uint64_t sf_row_accesses(const fx_layer *layer);
 uint64_t sf_weights_size(const fx_layer *layer);
-bool sf_ledger_is_twin(int ledger);
+static inline bool sf_ledger_is_twin(int ledger)
+{
+  return ledger >= SF_SPIKING_LEDGERS;
+}
 
 /* All of it. SF_E_RANGE when an energy does not fit in 64 bits. */
 sf_status sf_ledgers_make(const sf_technology *technology, const sf_counted *counted, sf_ledgers *ledgers);

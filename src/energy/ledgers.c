@@ -36,11 +36,6 @@ const sf_ledger_text sf_ledger_texts[SF_LEDGERS] = {
      -1},
     {"ann_int_shared", "ReLU twin, shared", "and everything, but 16 samples share a read of a row of weights", -1}};
 
-bool sf_ledger_is_twin(int ledger)
-{
-  return ledger >= SF_SPIKING_LEDGERS;
-}
-
 static bool shares_rows(int ledger)
 {
   return ledger == SF_LEDGER_SHARED || ledger == SF_LEDGER_INT_SHARED;
