@@ -247,9 +247,10 @@ static sf_status check_effect(const options *o, const sf_cli *cli, int argc, cha
 {
   static const char *const b[] = {"--tech-b", "--steps-b", NULL}, *const tech[] = {"--tech", NULL},
                            *const steps[] = {"--steps", NULL}, *const rtl[] = {"--stall", "--plusarg", NULL};
-  static const char *const counting[] = {
-      "--views", "--view",  "--rays",      "--rtl-rays", "--recount-rays", "--steps", "--tech", "--twin",  "--seed",
-      "--stall", "--split", "--downscale", "--scale",    "--plusarg",      "--csv",   "--html", "--model", NULL};
+  static const char *const counting[] = {"--views", "--view",      "--rays",        "--rtl-rays",   "--recount-rays",
+                                         "--steps", "--tech",      "--twin",        "--seed",       "--stall",
+                                         "--split", "--downscale", "--scale",       "--plusarg",    "--csv",
+                                         "--html",  "--model",     "--cache-bytes", "--cache-ways", NULL};
   const bool a_counts = o->audit.scene && !(o->compare && is_report(o->audit.scene));
   const bool b_counts = o->compare && o->other && !is_report(o->other);
   if (o->compare && !b_counts) SF_TRY(sf_cli_refuse(cli, argc, argv, b, "has no effect: B is a report"));
@@ -330,6 +331,10 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
        "of a comparison: gnuplot script of energies by kind; gnuplot writes NAME.svg"},
       {"--published", 0, SF_ARG_FLAG, &o->published, 0, 0, NULL, NULL, "recompute the paper's energy tables"},
+      {"--cache-bytes", 0, SF_ARG_INT, &o->audit.cache.bytes, FX_CACHE_BYTES_MIN, FX_CACHE_BYTES_MAX, NULL, "N",
+       "of the field's cache, a power of two (default as built)"},
+      {"--cache-ways", 0, SF_ARG_INT, &o->audit.cache.ways, 1, FX_WAYS_MAX, NULL, "N",
+       "of the field's cache: 1, 2, 4 or 8 (default as built)"},
       SF_GROUP("Checks and tuning"),
       {"--rtl-rays", 0, SF_ARG_INT, &o->audit.rtl_rays, 0, 1 << 20, NULL, "N",
        "rays that the accelerator renders, too (default 16)"},

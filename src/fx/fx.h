@@ -335,9 +335,20 @@ void fx_pixel_rgba(const fx_pixel *pixel, uint32_t rgba[4]);
  * ray. */
 typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
+/* What fx_render_watched tells of: the field is read at a position. Of a sample of TensoRF first the density, then the
+ * appearance where the sample is decoded. */
+typedef enum { FX_READ_GRID, FX_READ_DENSITY, FX_READ_APPEARANCE } fx_read;
+typedef struct fx_watch {
+  void (*read)(void *user, fx_read what, const uint32_t pos[3]);
+  void *user;
+} fx_watch;
+
 /* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */
 sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
                         fx_counts *counts);
+/* The same; watch may be NULL. The field is read before eval is called for the sample. */
+sf_status fx_render_watched(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, const fx_watch *watch,
+                            fx_pixel *pixel, fx_counts *counts);
 
 /* ---- many rays at once ---- */
 
