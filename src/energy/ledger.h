@@ -113,6 +113,10 @@ typedef enum {
 extern const char *const sf_part_names[SF_PARTS];  /* "mac", "sop", "weight", ... */
 extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight bytes", ... */
 
+/* What the technology measured of an event of a row, if anything: the twin has a MAC of its own, and its ReLU is priced
+ * by widths. False: the price is the one of the widths. */
+bool sf_operation_measured(const sf_technology *technology, bool twin, int row, int part, uint64_t *fj);
+
 /* fJ of one event of a row, the same at all steps, and how it comes about. */
 typedef struct sf_unit_price {
   uint64_t fj;

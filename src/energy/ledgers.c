@@ -134,24 +134,6 @@ static uint64_t neuron_fj(const sf_technology *tech, int l, bool *interpolated)
   return sf_price_multiply(tech, bits, K_BITS, interpolated) + adds(tech, spiking ? 4 : 2, bits, interpolated);
 }
 
-/* What the technology measured of this operation, if anything: the twin has a MAC of its own, and its ReLU is priced by
- * widths. */
-static bool measured_fj(const sf_technology *tech, bool twin, int l, int part, uint64_t *fj)
-{
-  switch (part) {
-  case SF_PART_MAC:
-    return sf_price_measured(tech, twin ? SF_PRICE_TWIN_MAC : SF_PRICE_MAC, fj);
-  case SF_PART_SOP:
-    return sf_price_measured(tech, SF_PRICE_SOP, fj);
-  case SF_PART_NEURON:
-    return !twin && sf_price_measured(tech, fx_layer_fires(l) ? SF_PRICE_NEURON : SF_PRICE_INTEGRATOR, fj);
-  case SF_PART_SPECIAL:
-    return sf_price_measured(tech, SF_PRICE_SPECIAL, fj);
-  default:
-    return false;
-  }
-}
-
 static uint64_t integer_fj(const sf_technology *tech, const fx_net *net, int ledger, int l, int part,
                            bool *interpolated)
 {
@@ -159,7 +141,7 @@ static uint64_t integer_fj(const sf_technology *tech, const fx_net *net, int led
   const bool twin = is_twin(ledger);
   const int result_bits = l == FX_D2 ? SF_SIGMA_BITS : SF_COLOUR_BITS;
   uint64_t measured;
-  if (measured_fj(tech, twin, l, part, &measured)) return measured;
+  if (sf_operation_measured(tech, twin, l, part, &measured)) return measured;
   switch (part) {
   case SF_PART_MAC:
     if (twin)
@@ -190,7 +172,8 @@ static uint64_t outside_fj(const sf_technology *tech, int row, int part, uint64_
   if (row == SF_ROW_FIELD && part == SF_PART_TABLE) return sf_price_byte(tech, table_size, interpolated);
   if (row == SF_ROW_RAY && part == SF_PART_FRAME) return sf_price_byte(tech, UINT64_MAX, interpolated);
   uint64_t measured;
-  if (row == SF_ROW_RAY && part == SF_PART_SPECIAL && measured_fj(tech, false, row, part, &measured)) return measured;
+  if (row == SF_ROW_RAY && part == SF_PART_SPECIAL && sf_operation_measured(tech, false, row, part, &measured))
+    return measured;
   if (row == SF_ROW_RAY && part == SF_PART_SPECIAL) return special_fj(tech, SF_TRANS_FRAC, SF_TRANS_FRAC, interpolated);
   return 0;
 }

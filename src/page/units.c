@@ -39,7 +39,11 @@ static void basis(FILE *out, const sf_page *page, int row, int part)
   const fx_net *net = page->report->net;
   const sf_technology *t = &page->report->ledgers.technology;
   char text[HTML_NUMBER];
-  if (part == SF_PART_FRAME) {
+  uint64_t measured;
+  if (sf_operation_measured(t, false, row, part, &measured)) {
+    fprintf(out, "measured from a netlist%s",
+            part == SF_PART_NEURON ? "; twin: 32 \xc3\x97 16 bits and an addition of 32" : "");
+  } else if (part == SF_PART_FRAME) {
     fprintf(out, "DRAM");
   } else if (part == SF_PART_TABLE) {
     memory(out, t, sf_table_size(page->scene));
