@@ -74,8 +74,8 @@ module sf_ray_top #(
   wire [31:0] ray_rdata;
   wire write_ray = s_axil_awaddr_i[12:10] == 3'd1;
   wire read_ray = s_axil_araddr_i[12:10] == 3'd1;
-  wire write_now = s_axil_awvalid_i && s_axil_wvalid_i && !net_bvalid && !ray_bvalid;
-  wire read_now = s_axil_arvalid_i && !net_rvalid && !ray_rvalid;
+  wire write_now = s_axil_awvalid_i && s_axil_wvalid_i && !net_writes_q && !net_bvalid && !ray_bvalid;
+  wire read_now = s_axil_arvalid_i && !net_reads_q && !net_rvalid && !ray_rvalid;
   assign s_axil_awready_o = write_ray ? ray_wready : net_awready;
   assign s_axil_wready_o = write_ray ? ray_wready : net_wready;
   assign s_axil_bvalid_o = net_bvalid || ray_bvalid;
@@ -85,8 +85,19 @@ module sf_ray_top #(
   assign s_axil_rdata_o = ray_rvalid ? ray_rdata : net_rdata;
   assign s_axil_rresp_o = ray_rvalid ? 2'd0 : net_rresp;
   assign irq_o = net_irq || ray_irq;
-  wire soft_reset = write_now && net_awready && {s_axil_awaddr_i[12:2], 2'b00} == sf_csr_pkg::CTRL
-      && s_axil_wstrb_i == 4'hf && s_axil_wdata_i[sf_csr_pkg::CTRL_SOFT_RESET];
+  // sf_csr answers some cycles after it has taken a request, and resets two cycles after it has taken the command.
+  reg net_writes_q, net_reads_q;
+  reg [1:0] reset_q;
+  wire soft_reset = reset_q[1];
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) {net_writes_q, net_reads_q, reset_q} <= 4'd0;
+    else begin
+      net_writes_q <= net_awready || (net_writes_q && !net_bvalid);
+      net_reads_q <= net_arready || (net_reads_q && !net_rvalid);
+      reset_q <= {reset_q[0], net_awready && {s_axil_awaddr_i[12:2], 2'b00} == sf_csr_pkg::CTRL
+          && s_axil_wstrb_i == 4'hf && s_axil_wdata_i[sf_csr_pkg::CTRL_SOFT_RESET]};
+    end
+  end
 
   wire cfg_we, running, error_order, active;
   wire [7:0] cfg_addr;

@@ -156,6 +156,22 @@ fpga: $(RTL_READY) $(if $(SCENE),$B/bin/sf_cycles) ## place and route for an ECP
 	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(if $(SCENE),--scene "$(SCENE)" --data "$(DATA)") $(FPGA)
 .PHONY: fpga
 
+# The field's cache gets the look-ups of a scene.
+$B/asic/lookups: $B/obj/tools/asic/lookups.o $B/libspikefield.a
+	@mkdir -p $(@D)
+	$(call say,LD    $@)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+
+asic-energy: $(RTL_READY) $B/bin/sf_cosim $B/asic/lookups ## what a MAC, a SOP and a neuron update cost in standard cells (LIBERTY=, NAME=, NODE=, SCENE= DATA=): build/asic, prices for --tech
+	@python3 tools/asic_energy.py $B --rtl $(RTL_ROOT) $(if $(LIBERTY),--liberty "$(LIBERTY)") $(if $(NAME),--name "$(NAME)") \
+	  $(if $(NODE),--node $(NODE)) --scene "$(SCENE)" --data "$(DATA)" $(ASIC_ENERGY)
+asic: $(RTL_READY) ## netlist of standard cells: area, longest path of each module, hand-over (LIBERTY=, MODULES=, MHZ=): build/asic
+	@python3 tools/asic_netlist.py $B --rtl $(RTL_ROOT) $(if $(LIBERTY),--liberty "$(LIBERTY)") $(if $(NAME),--name "$(NAME)") \
+	  $(if $(MODULES),--modules "$(MODULES)") $(if $(MHZ),--clock $(MHZ)) $(ASIC)
+deps-asic: ## install with apt what asic and asic-energy take by default (opensta, qflow-tech-osu018)
+	@DEPS="python3 yosys iverilog opensta qflow-tech-osu018" tools/deps.sh
+.PHONY: asic-energy asic deps-asic
+
 # Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
 define lanes_rule
 $(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)

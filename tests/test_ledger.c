@@ -169,6 +169,25 @@ TEST(installed_prices)
   ck_assert_uint_eq(sf_price_access(&t, 128 * 128, NULL), 14142); /* 10 * sqrt 2 pJ */
 }
 
+/* Prices of netlists: an operation costs more than its arithmetic alone, a MAC of 12 bits more than one of 8. */
+TEST(installed_prices_from_netlists)
+{
+  static const char *const files[] = {"share/tech/sky130.tech", "share/tech/osu018.tech"};
+  for (int i = 0; i < 2; i++) {
+    sf_technology t;
+    uint64_t fj[SF_PRICE_KEYS];
+    ck_ok(sf_technology_load(&t, files[i]));
+    for (int f = SF_PRICE_MAC; f < SF_PRICE_KEYS; f++)
+      ck_assert_msg(sf_price_measured(&t, f, &fj[f]), "%s: family %d is missing", files[i], f);
+    ck_assert_uint_gt(fj[SF_PRICE_MAC], fj[SF_PRICE_TWIN_MAC]);
+    ck_assert_uint_gt(fj[SF_PRICE_TWIN_MAC], sf_price_multiply(&t, 8, 8, NULL) + sf_price_add(&t, 32, NULL));
+    ck_assert_uint_gt(fj[SF_PRICE_SOP], sf_price_add(&t, 16, NULL));
+    ck_assert_uint_gt(fj[SF_PRICE_MAC], 3 * fj[SF_PRICE_SOP]);
+    for (int p = 0; p < t.count; p++)
+      ck_assert(strstr(t.price[p].source, "netlist: ") || strstr(t.price[p].source, "Horowitz"));
+  }
+}
+
 /* ---- ledgers ---- */
 
 static fx_counts small_counts(const fx_net *net)
@@ -325,6 +344,33 @@ TEST(groups_share_rows)
   ck_assert_uint_eq(cell[FX_C3][0], 9 * 80);
   ck_assert_uint_eq(l->part[SF_LEDGER_INT_SHARED][SF_PART_WEIGHT], (3 * (4 + 3 + 2 + 4 + 5) + 2 * 3) * 80);
   free(l);
+}
+
+/* Prices that were measured stand in place of those of the widths: each operation has its own, the twin's ReLU none. */
+TEST(measured_operations_by_hand)
+{
+  char text[1024];
+  sf_technology measured;
+  snprintf(text, sizeof text, "%s\n%s", plain,
+           "mac 5 pJ made up\ntwin_mac 4 pJ made up\nsop 700 fJ made up\nneuron_update 9 pJ made up\n"
+           "integrator_update 8 pJ made up\nspecial 30 pJ made up\n");
+  ck_ok(load_text(&measured, text));
+  ck_assert_int_eq(measured.count, 16);
+  sf_ledgers *m = small_ledgers(&measured);
+  const uint64_t *part = m->part[SF_LEDGER_NEURON], *twin = m->part[SF_LEDGER_INT_ALL];
+  ck_assert_uint_eq(part[SF_PART_MAC], 40 * 5000);
+  ck_assert_uint_eq(part[SF_PART_SOP], 40 * 700);
+  ck_assert_uint_eq(part[SF_PART_NEURON], 24 * 9000 + 8 * 8000);
+  ck_assert_uint_eq(part[SF_PART_SPECIAL], 9 * 30000);
+  ck_assert_uint_eq(twin[SF_PART_MAC], 76 * 4000);
+  ck_assert_uint_eq(twin[SF_PART_NEURON], l->part[SF_LEDGER_INT_ALL][SF_PART_NEURON]);
+  ck_assert_uint_eq(twin[SF_PART_SPECIAL], 5 * 30000);
+  ck_assert(!m->interpolated[SF_LEDGER_WIDTH]);
+  for (int p = SF_PART_WEIGHT; p <= SF_PART_FRAME; p++) ck_assert_uint_eq(part[p], l->part[SF_LEDGER_NEURON][p]);
+  ck_assert_uint_eq(m->total[SF_LEDGER_PAPER], l->total[SF_LEDGER_PAPER]);
+  free(m);
+  snprintf(text, sizeof text, "%s\nsop.8 700 fJ made up\n", plain);
+  ck_bad(load_text(&measured, text), SF_E_FORMAT, "key 'sop.8' takes no '.8'", "");
 }
 
 TEST(cells_and_parts_add_up)

@@ -259,7 +259,17 @@
 #define SF_REG_ENCODER_WORDS 256
 #define SF_REG_ENCODER_BITS 32
 
-/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
+/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events, from 0 on: mac sop spikes updates weight state_r state_w special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
 #define SF_REG_COUNTERS_WORDS 512
 #define SF_REG_COUNTERS_BITS 64
+
+/* Events of the counters */
+#define SF_REG_EVENT_MAC 0 /* MAC */
+#define SF_REG_EVENT_SOP 1 /* SOP */
+#define SF_REG_EVENT_SPIKES 2 /* spikes */
+#define SF_REG_EVENT_UPDATES 3 /* neuron updates */
+#define SF_REG_EVENT_WEIGHT 4 /* weight bytes read */
+#define SF_REG_EVENT_STATE_R 5 /* state bytes read */
+#define SF_REG_EVENT_STATE_W 6 /* state bytes written */
+#define SF_REG_EVENT_SPECIAL 7 /* special functions */
 #endif

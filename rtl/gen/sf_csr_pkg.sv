@@ -105,4 +105,12 @@ package sf_csr_pkg;
   localparam integer ENCODER_BITS = 32;
   localparam integer COUNTERS_WORDS = 512;
   localparam integer COUNTERS_BITS = 64;
+  localparam [2:0] EVENT_MAC = 3'd0;  // MAC
+  localparam [2:0] EVENT_SOP = 3'd1;  // SOP
+  localparam [2:0] EVENT_SPIKES = 3'd2;  // spikes
+  localparam [2:0] EVENT_UPDATES = 3'd3;  // neuron updates
+  localparam [2:0] EVENT_WEIGHT = 3'd4;  // weight bytes read
+  localparam [2:0] EVENT_STATE_R = 3'd5;  // state bytes read
+  localparam [2:0] EVENT_STATE_W = 3'd6;  // state bytes written
+  localparam [2:0] EVENT_SPECIAL = 3'd7;  // special functions
 endpackage

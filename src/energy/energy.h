@@ -8,9 +8,7 @@
 #include "base/json.h"
 #include <stdio.h>
 
-enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply-add, fp32 add, 45 nm (Horowitz 2014) */
-
-/* Paper ledger: MAC * 4600 + SOP * 900, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
+/* Paper ledger: MAC * SF_MAC_FJ + SOP * SF_SOP_FJ, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
 uint64_t sf_energy_fj(const fx_counts *counts);
 uint64_t sf_cost_fj(const fx_cost *cost); /* the same of one ray */
 fx_cost sf_cost_of(const fx_counts *counts);

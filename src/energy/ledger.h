@@ -27,7 +27,17 @@ typedef enum {
   SF_PRICE_SRAM,         /* sram.BYTES: power law of the size; a smaller memory costs what the smallest costs */
   SF_PRICE_DRAM,         /* dram: of whatever is larger than the largest sram */
   SF_PRICE_REGISTER,     /* register: a register file, per access of 32 bits; may be left out */
-  SF_PRICE_FAMILIES
+  SF_PRICE_FAMILIES,
+  /* Measured operations of this hardware, registers and clock included. A technology may have them; where it does, they
+   * stand in place of what the widths would say. */
+  SF_PRICE_MAC = SF_PRICE_FAMILIES, /* mac: of the spiking net */
+  SF_PRICE_TWIN_MAC,                /* twin_mac: of the integer twin */
+  SF_PRICE_SOP,                     /* sop */
+  SF_PRICE_NEURON,                  /* neuron_update: leak, compare, reset */
+  SF_PRICE_INTEGRATOR,              /* integrator_update: of D2 and C3 */
+  SF_PRICE_SPECIAL,                 /* special: one special function */
+  SF_PRICE_TAG_LOOKUP,              /* tag_lookup: tags of a line of the field's cache */
+  SF_PRICE_KEYS
 } sf_price_family;
 
 enum { SF_PRICES_MAX = 48 };
@@ -50,6 +60,8 @@ int sf_sum_bits(const fx_layer *layer, bool of_products);
 uint64_t sf_price_access(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
 /* So many bits of a register file; a file without its price: of the smallest sram, *interpolated. */
 uint64_t sf_price_register(const sf_technology *technology, int bits, bool *interpolated);
+/* The price of a family of one price that a technology may leave out; false where it does. */
+bool sf_price_measured(const sf_technology *technology, sf_price_family family, uint64_t *fj);
 
 /* ---- events of the ledgers ---- */
 

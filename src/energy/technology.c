@@ -8,8 +8,9 @@
 enum { FILE_LIMIT = 1 << 20, WIDTH_MAX = 256, REGISTER_BITS = 32, ACCESS_BITS = 64 };
 static const uint64_t FJ_MAX = 1000000000000; /* 1 mJ: far above any access, and products stay far below 2^63 */
 
-static const char *const families[SF_PRICE_FAMILIES] = {"fp32_mac", "fp32_add", "int_add", "int_multiply",
-                                                        "sram",     "dram",     "register"};
+static const char *const families[SF_PRICE_KEYS] = {
+    "fp32_mac", "fp32_add", "int_add", "int_multiply",  "sram",              "dram",    "register",
+    "mac",      "twin_mac", "sop",     "neuron_update", "integrator_update", "special", "tag_lookup"};
 
 static bool has_points(int family)
 {
@@ -25,7 +26,7 @@ typedef struct reader {
 
 static int family_of(const char *key)
 {
-  for (int f = 0; f < SF_PRICE_FAMILIES; f++) {
+  for (int f = 0; f < SF_PRICE_KEYS; f++) {
     const size_t n = strlen(families[f]);
     if (strncmp(key, families[f], n)) continue;
     if (key[n] == 0 || key[n] == '.') return f;
@@ -271,10 +272,20 @@ uint64_t sf_price_access(const sf_technology *technology, uint64_t memory_bytes,
   return round_positive(access);
 }
 
+bool sf_price_measured(const sf_technology *technology, sf_price_family family, uint64_t *fj)
+{
+  for (int i = 0; i < technology->count; i++)
+    if (family_of(technology->price[i].key) == (int)family) {
+      *fj = technology->price[i].fj;
+      return true;
+    }
+  return false;
+}
+
 uint64_t sf_price_register(const sf_technology *technology, int bits, bool *interpolated)
 {
-  const sf_price *last = &technology->price[technology->count - 1]; /* by family */
-  if (family_of(last->key) == SF_PRICE_REGISTER) return round_positive((double)last->fj * bits / REGISTER_BITS);
+  uint64_t fj;
+  if (sf_price_measured(technology, SF_PRICE_REGISTER, &fj)) return round_positive((double)fj * bits / REGISTER_BITS);
   note(interpolated, true);
   return round_positive((double)sf_price_access(technology, 1, NULL) * bits / ACCESS_BITS);
 }

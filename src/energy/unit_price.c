@@ -138,10 +138,30 @@ static uint64_t composite_fj(const pricing *p)
 
 /* ---- units ---- */
 
+/* What the technology measured of an operation of this hardware, if anything: the twin has a MAC of its own, and its ReLU
+ * is priced by widths. */
+static bool measured_fj(const sf_technology *tech, bool twin, int l, int part, uint64_t *fj)
+{
+  switch (part) {
+  case SF_PART_MAC:
+    return sf_price_measured(tech, twin ? SF_PRICE_TWIN_MAC : SF_PRICE_MAC, fj);
+  case SF_PART_SOP:
+    return sf_price_measured(tech, SF_PRICE_SOP, fj);
+  case SF_PART_NEURON:
+    return !twin && sf_price_measured(tech, fx_layer_fires(l) ? SF_PRICE_NEURON : SF_PRICE_INTEGRATOR, fj);
+  case SF_PART_SPECIAL:
+    return sf_price_measured(tech, SF_PRICE_SPECIAL, fj);
+  default:
+    return false;
+  }
+}
+
 static uint64_t layer_fj(const pricing *p, const fx_net *net, int ledger, int l, int part)
 {
   const fx_layer *layer = &net->layer[l];
   const bool twin = sf_ledger_is_twin(ledger);
+  uint64_t measured;
+  if (measured_fj(p->tech, twin, l, part, &measured)) return measured;
   switch (part) {
   case SF_PART_MAC:
     if (twin) return products(p, 1, ACTIVATION_BITS, SF_WEIGHT_BITS) + adds(p, 1, TWIN_SUM_BITS);
@@ -167,14 +187,18 @@ static uint64_t field_fj(const pricing *p, const sf_counted *counted, int part)
 {
   const bool grid = counted->scene->backbone == FX_INGP;
   const uint64_t cache = (uint64_t)counted->cache.bytes, words = 8 * FX_LINE / WORD;
+  uint64_t tags, special;
   switch (part) {
   case SF_PART_LOOKUP:
-    return sf_price_access(p->tech, cache, p->interpolated);
+    if (!sf_price_measured(p->tech, SF_PRICE_TAG_LOOKUP, &tags)) tags = 0;
+    return tags + sf_price_access(p->tech, cache, p->interpolated);
   case SF_PART_FILL:
     return words *
            (sf_price_access(p->tech, UINT64_MAX, p->interpolated) + sf_price_access(p->tech, cache, p->interpolated));
   case SF_PART_SPECIAL:
-    return grid ? 0 : special_fj(p, FIELD_SUM_BITS, FIELD_SUM_BITS);
+    if (grid) return 0;
+    if (sf_price_measured(p->tech, SF_PRICE_SPECIAL, &special)) return special;
+    return special_fj(p, FIELD_SUM_BITS, FIELD_SUM_BITS);
   case SF_PART_PRODUCT:
     return products(p, 1, CORNER_BITS, ENTRY_BITS) + adds(p, 1, FIELD_SUM_BITS);
   case SF_PART_PLACE:
@@ -186,10 +210,12 @@ static uint64_t field_fj(const pricing *p, const sf_counted *counted, int part)
 
 static uint64_t ray_fj(const pricing *p, const sf_counted *counted, int part)
 {
+  uint64_t special;
   switch (part) {
   case SF_PART_FRAME:
     return sf_price_access(p->tech, UINT64_MAX, p->interpolated);
   case SF_PART_SPECIAL:
+    if (sf_price_measured(p->tech, SF_PRICE_SPECIAL, &special)) return special;
     return special_fj(p, SF_TRANS_FRAC, SF_TRANS_FRAC);
   case SF_PART_PRODUCT:
     return composite_fj(p);
