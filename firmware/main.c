@@ -7,8 +7,6 @@
 #include "firmware/sf_tile.h"
 #include "firmware/sf_uart.h"
 
-enum { MAC_FJ = 4600, SOP_FJ = 900 }; /* as spikefield/audit.h */
-
 typedef struct eval {
   sf_stream stream;
   sf_driver_code code;
@@ -75,18 +73,18 @@ static uint64_t total(const sf_driver_counters *counters, int event, int layer)
 
 static void print_audit(const sf_driver_counters *counters, uint32_t rgba_crc)
 {
-  static const char *const layer[SF_LAYERS] = {"D1", "D2", "C1", "C2", "C3"};
   static const char *const event[SF_EVENTS] = {
-#define SF_EVENT(id, name, title) " " #name " ",
-#include "spikefield/event.def"
+#define EVENT(id, name, title, unit, fj) " " #name " ",
+      SF_EVENT_TABLE(EVENT)
+#undef EVENT
   };
   uint64_t energy = 0;
   for (int l = 0; l < SF_LAYERS; l++) {
     sf_uart_text("audit ");
-    sf_uart_text(layer[l]);
+    sf_uart_text(fx_layer_name(l));
     for (int e = 0; e < SF_EVENTS; e++) sf_uart_number(event[e], total(counters, e, l));
     sf_uart_text("\n");
-    energy += total(counters, SF_EVENT_MAC, l) * MAC_FJ + total(counters, SF_EVENT_SOP, l) * SOP_FJ;
+    energy += total(counters, SF_EVENT_MAC, l) * SF_MAC_FJ + total(counters, SF_EVENT_SOP, l) * SF_SOP_FJ;
   }
   sf_uart_number("audit samples ", counters->samples);
   sf_uart_number(" rays ", counters->rays);

@@ -25,11 +25,23 @@ module sf_core #(
     input  wire         [ 8:0] wrow_i,
     input  wire         [ 5:0] wword_i,
     input  wire         [31:0] wdata_i,
-    input  wire         [44:0] n_in_i,             // 9 bits a layer, D1 in the lowest
-    input  wire         [44:0] n_out_i,
-    input  wire         [64:0] k_i,
-    input  wire        [119:0] theta_i,
-    input  wire         [12:0] bias_i,             // C3, C2, value of C1's
+    // sizes and properties of the layers, as sf_csr has checked them
+    input  wire         [ 5:0] d1_in_i,
+    input  wire                decodes_i,          // no D1 and D2, C1 takes its inputs from the buffer
+    input  wire         [ 8:0] d1_out_i,
+    input  wire         [ 7:0] n_dir_i,            // constant inputs of C1
+    input  wire         [ 4:0] n_h_i,
+    input  wire         [ 8:0] c1_out_i,
+    input  wire         [ 8:0] c2_out_i,
+    input  wire         [12:0] d1_k_i,
+    input  wire         [12:0] c1_k_i,
+    input  wire         [12:0] c2_k_i,
+    input  wire         [23:0] d1_theta_i,
+    input  wire         [23:0] c1_theta_i,
+    input  wire         [23:0] c2_theta_i,
+    input  wire         [10:0] c1_bias_i,
+    input  wire                c2_bias_i,
+    input  wire                c3_bias_i,
     input  wire         [ 1:0] mode_i,
     input  wire         [ 3:0] steps_i,
     // inputs of a sample
@@ -59,9 +71,14 @@ module sf_core #(
     output wire                c1_bias_row_o,
     output wire                c1_products_o,      // a row is multiplied, at this step
     output wire         [ 2:0] c1_step_o,
-    output wire         [ 2:0] fed_row_o,          // C3, C2, D2: a row is read,
-    output wire         [23:0] fed_fired_o,        // and the steps at which its neuron fired, 8 bits each
-    output wire         [ 2:0] fed_bias_o,
+    output wire                d2_row_o,           // a row is read,
+    output wire         [ 7:0] d2_fired_o,         // and the steps at which its neuron fired
+    output wire                c2_row_o,
+    output wire         [ 7:0] c2_fired_o,
+    output wire                c2_bias_row_o,
+    output wire                c3_row_o,
+    output wire         [ 7:0] c3_fired_o,
+    output wire                c3_bias_row_o,
     output wire         [ 4:0] busy_o,             // a layer works, in the order of the layers
     output wire                ray_o,
     output wire                neurons_valid_o,    // a group of neurons has made a step
@@ -78,7 +95,6 @@ module sf_core #(
     output wire [   LANES-1:0] tap_rows_o,
     output wire [24*LANES-1:0] tap_membrane_o
 );
-  localparam INDEX_BITS = $clog2(LANES);
   localparam WORD_BITS = $clog2(LANES / 4);
   localparam GROUPS = LANES / NEURONS;
   localparam GROUP_BITS = GROUPS > 1 ? $clog2(GROUPS) : 1;
@@ -90,23 +106,12 @@ module sf_core #(
   localparam [1:0] C1 = 2'd1;
   localparam [1:0] C2 = 2'd2;
 
-  // Sizes; sf_csr has checked that they are consistent.
-  wire [8:0] d1_out = n_out_i[8:0];
-  wire [8:0] c1_out = n_out_i[26:18];
-  wire [8:0] c2_out = n_out_i[35:27];
-  wire decodes = d1_out == 9'd0;  // no D1 and D2: C1 takes its inputs from the buffer
-  wire [7:0] n_h = decodes ? 8'd0 : n_out_i[16:9] - 8'd1;
-  wire [7:0] n_dir = n_in_i[25:18] - n_h;
-  wire bias_we = we_i && wrow_i == 9'(sf_arch_pkg::BIAS_ROW);
-  wire row_we = we_i && !bias_we;
   wire [WORD_BITS-1:0] word = wword_i[WORD_BITS-1:0];
-  wire unused_ok = &{1'b0, wrow_i, wword_i, n_out_i[44:36], n_out_i[17], n_in_i[44:26], n_in_i[17:6], n_h[7:5], theta_i[119:96], theta_i[47:24],
-                     k_i[64:52], k_i[25:13]};
 
   // The last group and the last part of each spiking layer, in registers: sizes do not change at work.
-  wire [8:0] d1_last = d1_out - 9'd1;
-  wire [8:0] c1_last = c1_out - 9'd1;
-  wire [8:0] c2_last = c2_out - 9'd1;
+  wire [8:0] d1_last = d1_out_i - 9'd1;
+  wire [8:0] c1_last = c1_out_i - 9'd1;
+  wire [8:0] c2_last = c2_out_i - 9'd1;
   reg [GROUP_BITS-1:0] d1_group_q, c1_group_q, c2_group_q;
   reg [PART_BITS-1:0] d1_part_q, c1_part_q, c2_part_q;
   always_ff @(posedge clk_i) begin
@@ -138,7 +143,7 @@ module sf_core #(
   wire group_ends = group_q == last_group;
   wire last_step = {1'b0, step_q} == steps_i - 4'd1;
   // The current of D1, and of a decoder's C1, is that of all steps: of a layer of one part it stays where it was loaded to.
-  wire stays = (layer == D1 || (layer == C1 && decodes)) && last_part == {PART_BITS{1'b0}};
+  wire stays = (layer == D1 || (layer == C1 && decodes_i)) && last_part == {PART_BITS{1'b0}};
   wire load = at_part && !(stays && step_q != 3'd0);
   wire taken = load && (last_step || stays) && part == last_part;
   wire begins = run && !active_q;
@@ -213,9 +218,15 @@ module sf_core #(
       .rst_ni    (rst_ni),
       .clear_i   (clear_i),
       .mode_i    (mode_i),
-      .k_i       ({k_i[51:26], k_i[12:0]}),
-      .theta_i   ({theta_i[95:48], theta_i[23:0]}),
-      .n_out_i   ({n_out_i[35:18], n_out_i[8:0]}),
+      .d1_k_i    (d1_k_i),
+      .c1_k_i    (c1_k_i),
+      .c2_k_i    (c2_k_i),
+      .d1_theta_i(d1_theta_i),
+      .c1_theta_i(c1_theta_i),
+      .c2_theta_i(c2_theta_i),
+      .d1_out_i  (d1_out_i),
+      .c1_out_i  (c1_out_i),
+      .c2_out_i  (c2_out_i),
       .valid_i   (run_q[3]),
       .layer_i   (run_layer_q[6+:2]),
       .step_i    (run_step_q[9+:3]),
@@ -257,7 +268,7 @@ module sf_core #(
   reg [3:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
   wire dir_we, values_done, h_done, values_idle;
   wire [1:0] values_busy;
-  wire d1_done = values_done && !decodes;
+  wire d1_done = values_done && !decodes_i;
   reg [1:0] h_taken_q, h_full_q;  // samples of h: promised, complete
   reg h_write_q, h_read_q;
   wire [2:0] h_step;
@@ -271,11 +282,11 @@ module sf_core #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (clear_i),
-      .decodes_i      (decodes),
-      .n_feature_i    (n_in_i[5:0]),
-      .n_dir_i        (n_dir),
-      .bias_i         (bias_i[10:0]),
-      .n_h_i          (n_h[4:0]),
+      .decodes_i      (decodes_i),
+      .n_feature_i    (d1_in_i),
+      .n_dir_i        (n_dir_i),
+      .bias_i         (c1_bias_i),
+      .n_h_i          (n_h_i),
       .steps_i        (steps_i),
       .d1_part_i      (d1_part_q),
       .c1_part_i      (c1_part_q),
@@ -333,220 +344,143 @@ module sf_core #(
     if (dir_we) dir_q[{ray_write_q, dir_index_o[3:0]}] <= dir_i;
   end
 
-  // ---- D2
-  wire d2_full, load_d2, last_d2, busy_d2, idle_d2, spikes_idle_d2;
+  // ---- D2, C2, C3
+  wire d2_full, load_d2, last_d2, busy_d2, idle_d2;
   wire [2:0] step_d2;
-  wire d2_item, d2_item_bias, d2_item_last, d2_next;
-  wire [INDEX_BITS-1:0] d2_index;
-  wire [7:0] d2_fired;
   wire [LANES-1:0] d2_rows;
   wire [255:0] d2_sums;
-  sf_spikes #(
+  wire unused_d2_bias;
+  sf_fed #(
+      .LANES     (LANES),
       .NEURONS   (NEURONS),
-      .INDEX_BITS(INDEX_BITS),
-      .GROUP_BITS(GROUP_BITS)
-  ) u_spikes_d2 (
-      .clk_i    (clk_i),
-      .rst_ni   (rst_ni),
-      .clear_i  (clear_i),
-      .bias_i   (1'b0),
-      .steps_i  (steps_i),
-      .group_i  (d1_group_q),
-      .take_i   (begins && layer == D1),
-      .space_o  (space_d2),
-      .we_i     (spikes_valid && spikes_layer == D1),
-      .wstep_i  (spikes_step),
-      .wgroup_i (spikes_group),
-      .wspikes_i(spikes),
-      .valid_o  (d2_item),
-      .bias_o   (d2_item_bias),
-      .index_o  (d2_index),
-      .fired_o  (d2_fired),
-      .last_o   (d2_item_last),
-      .next_i   (d2_next),
-      .idle_o   (spikes_idle_d2)
-  );
-  sf_sums #(
-      .ROWS     (LANES),
-      .ROW_BITS (INDEX_BITS),
-      .OUTS     (16),
-      .ADDERS   (16),
-      .PART_BITS(1),
-      .BANKS    (4),
-      .TAP      (TAP)
+      .GROUP_BITS(GROUP_BITS),
+      .OUTS      (16),
+      .ADDERS    (16),
+      .PART_BITS (1),
+      .BANKS     (4),
+      .TAP       (TAP)
   ) u_d2 (
-      .clk_i      (clk_i),
-      .rst_ni     (rst_ni),
-      .clear_i    (clear_i),
-      .part_i     (1'b0),
-      .we_i       (row_we && wlayer_i == sf_op_pkg::D2),
-      .bias_we_i  (1'b0),
-      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
-      .wword_i    (word[1:0]),
-      .wdata_i    (wdata_i),
-      .valid_i    (d2_item),
-      .bias_i     (d2_item_bias),
-      .index_i    (d2_index),
-      .fired_i    (d2_fired),
-      .last_i     (d2_item_last),
-      .next_o     (d2_next),
-      .full_o     (d2_full),
-      .load_i     (load_d2),
-      .load_step_i(step_d2),
-      .load_part_i(1'b0),
-      .release_i  (last_d2),
-      .sums_o     (d2_sums),
-      .row_o      (fed_row_o[0]),
-      .bias_row_o (fed_bias_o[0]),
-      .fired_o    (fed_fired_o[0+:8]),
-      .busy_o     (busy_d2),
-      .idle_o     (idle_d2),
-      .tap_rows_o (d2_rows)
+      .clk_i         (clk_i),
+      .rst_ni        (rst_ni),
+      .clear_i       (clear_i),
+      .has_bias_i    (1'b0),
+      .steps_i       (steps_i),
+      .last_group_i  (d1_group_q),
+      .last_part_i   (1'b0),
+      .we_i          (we_i && wlayer_i == sf_op_pkg::D2),
+      .wrow_i        (wrow_i),
+      .wword_i       (word[1:0]),
+      .wdata_i       (wdata_i),
+      .take_i        (begins && layer == D1),
+      .space_o       (space_d2),
+      .spikes_valid_i(spikes_valid && spikes_layer == D1),
+      .spikes_step_i (spikes_step),
+      .spikes_group_i(spikes_group),
+      .spikes_i      (spikes),
+      .full_o        (d2_full),
+      .load_i        (load_d2),
+      .load_step_i   (step_d2),
+      .load_part_i   (1'b0),
+      .release_i     (last_d2),
+      .sums_o        (d2_sums),
+      .row_o         (d2_row_o),
+      .fired_o       (d2_fired_o),
+      .bias_row_o    (unused_d2_bias),
+      .busy_o        (busy_d2),
+      .idle_o        (idle_d2),
+      .tap_rows_o    (d2_rows)
   );
 
-  // ---- C2
-  wire load_c2, last_c2, busy_c2, idle_c2, spikes_idle_c2;
+  wire load_c2, last_c2, busy_c2, idle_c2;
   wire [2:0] step_c2;
-  wire c2_item, c2_item_bias, c2_item_last, c2_next;
-  wire [INDEX_BITS-1:0] c2_index;
-  wire [7:0] c2_fired;
   wire [LANES-1:0] c2_rows;
-
-  sf_spikes #(
+  sf_fed #(
+      .LANES     (LANES),
       .NEURONS   (NEURONS),
-      .INDEX_BITS(INDEX_BITS),
-      .GROUP_BITS(GROUP_BITS)
-  ) u_spikes_c2 (
-      .clk_i    (clk_i),
-      .rst_ni   (rst_ni),
-      .clear_i  (clear_i),
-      .bias_i   (bias_i[11]),
-      .steps_i  (steps_i),
-      .group_i  (c1_group_q),
-      .take_i   (begins && layer == C1),
-      .space_o  (space_c2),
-      .we_i     (spikes_valid && spikes_layer == C1),
-      .wstep_i  (spikes_step),
-      .wgroup_i (spikes_group),
-      .wspikes_i(spikes),
-      .valid_o  (c2_item),
-      .bias_o   (c2_item_bias),
-      .index_o  (c2_index),
-      .fired_o  (c2_fired),
-      .last_o   (c2_item_last),
-      .next_i   (c2_next),
-      .idle_o   (spikes_idle_c2)
-  );
-  sf_sums #(
-      .ROWS     (LANES),
-      .ROW_BITS (INDEX_BITS),
-      .OUTS     (LANES),
-      .ADDERS   (MACS),
-      .PART_BITS(PART_BITS),
-      .BANKS    (STEPS_AT_ONCE),
-      .TAP      (TAP)
+      .GROUP_BITS(GROUP_BITS),
+      .OUTS      (LANES),
+      .ADDERS    (MACS),
+      .PART_BITS (PART_BITS),
+      .BANKS     (STEPS_AT_ONCE),
+      .TAP       (TAP)
   ) u_c2 (
-      .clk_i      (clk_i),
-      .rst_ni     (rst_ni),
-      .clear_i    (clear_i),
-      .part_i     (c2_part_q),
-      .we_i       (row_we && wlayer_i == sf_op_pkg::C2),
-      .bias_we_i  (bias_we && wlayer_i == sf_op_pkg::C2),
-      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
-      .wword_i    (word),
-      .wdata_i    (wdata_i),
-      .valid_i    (c2_item),
-      .bias_i     (c2_item_bias),
-      .index_i    (c2_index),
-      .fired_i    (c2_fired),
-      .last_i     (c2_item_last),
-      .next_o     (c2_next),
-      .full_o     (c2_full),
-      .load_i     (load_c2),
-      .load_step_i(step_c2),
-      .load_part_i(load_part_q),
-      .release_i  (last_c2),
-      .sums_o     (c2_sums),
-      .row_o      (fed_row_o[1]),
-      .bias_row_o (fed_bias_o[1]),
-      .fired_o    (fed_fired_o[8+:8]),
-      .busy_o     (busy_c2),
-      .idle_o     (idle_c2),
-      .tap_rows_o (c2_rows)
+      .clk_i         (clk_i),
+      .rst_ni        (rst_ni),
+      .clear_i       (clear_i),
+      .has_bias_i    (c2_bias_i),
+      .steps_i       (steps_i),
+      .last_group_i  (c1_group_q),
+      .last_part_i   (c2_part_q),
+      .we_i          (we_i && wlayer_i == sf_op_pkg::C2),
+      .wrow_i        (wrow_i),
+      .wword_i       (word),
+      .wdata_i       (wdata_i),
+      .take_i        (begins && layer == C1),
+      .space_o       (space_c2),
+      .spikes_valid_i(spikes_valid && spikes_layer == C1),
+      .spikes_step_i (spikes_step),
+      .spikes_group_i(spikes_group),
+      .spikes_i      (spikes),
+      .full_o        (c2_full),
+      .load_i        (load_c2),
+      .load_step_i   (step_c2),
+      .load_part_i   (load_part_q),
+      .release_i     (last_c2),
+      .sums_o        (c2_sums),
+      .row_o         (c2_row_o),
+      .fired_o       (c2_fired_o),
+      .bias_row_o    (c2_bias_row_o),
+      .busy_o        (busy_c2),
+      .idle_o        (idle_c2),
+      .tap_rows_o    (c2_rows)
   );
   assign load_c2 = load_q && run_layer_q[1:0] == C2;
   assign step_c2 = run_step_q[2:0];
   assign last_c2 = released_q;
 
-  // ---- C3
-  wire c3_full, load_c3, last_c3, busy_c3, idle_c3, spikes_idle_c3;
+  wire c3_full, load_c3, last_c3, busy_c3, idle_c3;
   wire [2:0] step_c3;
-  wire c3_item, c3_item_bias, c3_item_last, c3_next;
-  wire [INDEX_BITS-1:0] c3_index;
-  wire [7:0] c3_fired;
   wire [LANES-1:0] c3_rows;
   wire [255:0] c3_sums;
-  sf_spikes #(
+  sf_fed #(
+      .LANES     (LANES),
       .NEURONS   (NEURONS),
-      .INDEX_BITS(INDEX_BITS),
-      .GROUP_BITS(GROUP_BITS)
-  ) u_spikes_c3 (
-      .clk_i    (clk_i),
-      .rst_ni   (rst_ni),
-      .clear_i  (clear_i),
-      .bias_i   (bias_i[12]),
-      .steps_i  (steps_i),
-      .group_i  (c2_group_q),
-      .take_i   (begins && layer == C2),
-      .space_o  (space_c3),
-      .we_i     (spikes_valid && spikes_layer == C2),
-      .wstep_i  (spikes_step),
-      .wgroup_i (spikes_group),
-      .wspikes_i(spikes),
-      .valid_o  (c3_item),
-      .bias_o   (c3_item_bias),
-      .index_o  (c3_index),
-      .fired_o  (c3_fired),
-      .last_o   (c3_item_last),
-      .next_i   (c3_next),
-      .idle_o   (spikes_idle_c3)
-  );
-  sf_sums #(
-      .ROWS     (LANES),
-      .ROW_BITS (INDEX_BITS),
-      .OUTS     (16),
-      .ADDERS   (16),
-      .PART_BITS(1),
-      .BANKS    (4),
-      .TAP      (TAP)
+      .GROUP_BITS(GROUP_BITS),
+      .OUTS      (16),
+      .ADDERS    (16),
+      .PART_BITS (1),
+      .BANKS     (4),
+      .TAP       (TAP)
   ) u_c3 (
-      .clk_i      (clk_i),
-      .rst_ni     (rst_ni),
-      .clear_i    (clear_i),
-      .part_i     (1'b0),
-      .we_i       (row_we && wlayer_i == sf_op_pkg::C3),
-      .bias_we_i  (bias_we && wlayer_i == sf_op_pkg::C3),
-      .wrow_i     (wrow_i[INDEX_BITS-1:0]),
-      .wword_i    (word[1:0]),
-      .wdata_i    (wdata_i),
-      .valid_i    (c3_item),
-      .bias_i     (c3_item_bias),
-      .index_i    (c3_index),
-      .fired_i    (c3_fired),
-      .last_i     (c3_item_last),
-      .next_o     (c3_next),
-      .full_o     (c3_full),
-      .load_i     (load_c3),
-      .load_step_i(step_c3),
-      .load_part_i(1'b0),
-      .release_i  (last_c3),
-      .sums_o     (c3_sums),
-      .row_o      (fed_row_o[2]),
-      .bias_row_o (fed_bias_o[2]),
-      .fired_o    (fed_fired_o[16+:8]),
-      .busy_o     (busy_c3),
-      .idle_o     (idle_c3),
-      .tap_rows_o (c3_rows)
+      .clk_i         (clk_i),
+      .rst_ni        (rst_ni),
+      .clear_i       (clear_i),
+      .has_bias_i    (c3_bias_i),
+      .steps_i       (steps_i),
+      .last_group_i  (c2_group_q),
+      .last_part_i   (1'b0),
+      .we_i          (we_i && wlayer_i == sf_op_pkg::C3),
+      .wrow_i        (wrow_i),
+      .wword_i       (word[1:0]),
+      .wdata_i       (wdata_i),
+      .take_i        (begins && layer == C2),
+      .space_o       (space_c3),
+      .spikes_valid_i(spikes_valid && spikes_layer == C2),
+      .spikes_step_i (spikes_step),
+      .spikes_group_i(spikes_group),
+      .spikes_i      (spikes),
+      .full_o        (c3_full),
+      .load_i        (load_c3),
+      .load_step_i   (step_c3),
+      .load_part_i   (1'b0),
+      .release_i     (last_c3),
+      .sums_o        (c3_sums),
+      .row_o         (c3_row_o),
+      .fired_o       (c3_fired_o),
+      .bias_row_o    (c3_bias_row_o),
+      .busy_o        (busy_c3),
+      .idle_o        (idle_c3),
+      .tap_rows_o    (c3_rows)
   );
 
   // ---- D2's sums, a step per cycle: the density to the readout, the others as h to C1. h = current >>> H_SHIFT: 16384 >> 3
@@ -619,11 +553,10 @@ module sf_core #(
   assign colour_o = c3_sums[47:0];
   assign busy_o = {busy_c3, busy_c2, values_busy[1], busy_d2, values_busy[0]};
 
-  wire unused_sums_ok = &{1'b0, d2_sums, c3_sums};
+  wire unused_ok = &{1'b0, wword_i, d2_sums, c3_sums, unused_d2_bias};
 
   assign stall_o = (c3_full && !reading_c3_q && !colour_ready_i) || (d2_full && !reading_d2_q && !density_ready_i);
-  assign idle_o = values_idle && idle_d2 && idle_c2 && idle_c3 && spikes_idle_d2 && spikes_idle_c2 && spikes_idle_c3
-      && !active_q && run_q == 4'd0 && neurons_idle && !neurons_valid_q && h_taken_q == 2'd0 && read_d2_q == 3'd0
+  assign idle_o = values_idle && idle_d2 && idle_c2 && idle_c3 && !active_q && run_q == 4'd0 && neurons_idle && !neurons_valid_q && h_taken_q == 2'd0 && read_d2_q == 3'd0
       && read_c3_q == 3'd0;
 
   // Tap: one beat per spiking layer and step, one per sample of D2 and C3, which wait for a cycle without another.

@@ -7,15 +7,24 @@ module sf_counters (
     input  wire        clk_i,
     input  wire        rst_ni,
     // engine (sf_core)
-    input  wire [44:0] n_out_i,
+    input  wire [ 8:0] d1_out_i,         // neurons of a layer
+    input  wire [ 8:0] d2_out_i,
+    input  wire [ 8:0] c1_out_i,
+    input  wire [ 8:0] c2_out_i,
+    input  wire [ 8:0] c3_out_i,
     input  wire        d1_row_i,
     input  wire        c1_row_i,
     input  wire        c1_bias_row_i,
     input  wire        c1_products_i,
     input  wire [ 2:0] c1_step_i,
-    input  wire [ 2:0] fed_row_i,        // C3, C2, D2
-    input  wire [23:0] fed_fired_i,
-    input  wire [ 2:0] fed_bias_i,
+    input  wire        d2_row_i,
+    input  wire [ 7:0] d2_fired_i,
+    input  wire        c2_row_i,
+    input  wire [ 7:0] c2_fired_i,
+    input  wire        c2_bias_row_i,
+    input  wire        c3_row_i,
+    input  wire [ 7:0] c3_fired_i,
+    input  wire        c3_bias_row_i,
     input  wire [ 4:0] busy_i,
     input  wire        ray_i,
     input  wire        neurons_valid_i,
@@ -45,20 +54,23 @@ module sf_counters (
   // are weights that are read, but no operations.
   reg [63:0] d1_mac_q, c1_weight_q;
   reg [63:0] c1_mac_q[0:7];
-  // By {layer of {C3, C2, D2}, step}
+  // By {layer of D2, C2, C3, step}
   reg [63:0] sop_q[0:31];
   reg [63:0] weight_q[0:31];
   reg [63:0] integrate_q[0:15];  // by {C3 else D2, step}
-  // By {layer of {C2, C1, D1}, step}; the state bytes of an update are 3 each.
+  // By {layer of D1, C1, C2, step}
   reg [63:0] spikes_q[0:31];
   reg [63:0] neuron_q[0:31];
   reg [63:0] sample_q, ray_q, cycle_q, busy_q, stall_in_q, stall_out_q;
   reg [63:0] layer_busy_q[0:4];
-  reg [63:0] window_q[0:511];
+  (* no_rw_check *) reg [63:0] window_q[0:511];  // a word that is read while it is written may be either
 
   // ---- walk
   reg clear_wanted_q, snapshot_wanted_q, walk_q, walk_clear_q, walk_snapshot_q;
   reg [8:0] place_q;
+  reg write_q, threefold_q, fourfold_q;  // the place before this one, on its way to the window
+  reg [8:0] write_place_q;
+  reg [63:0] value_q;
   wire walk_last = &place_q;
   wire [2:0] event_w = place_q[8:6];
   wire [2:0] at_layer = place_q[5:3];
@@ -68,12 +80,12 @@ module sf_counters (
   wire [3:0] at_narrow = {at_layer == sf_op_pkg::C3, at_step};
   wire [4:0] at_neurons = {at_layer == sf_op_pkg::C2 ? 2'd2 : at_layer == sf_op_pkg::C1 ? 2'd1 : 2'd0, at_step};
   wire [63:0] updates = neurons ? neuron_q[at_neurons] : integrate_q[at_narrow];
-  wire [63:0] state_bytes = (updates << 2) - (neurons ? updates : 64'd0);  // 3 bytes a membrane, 4 an integrator
   wire [63:0] mac = at_layer == sf_op_pkg::C1 ? c1_mac_q[at_step]
                   : at_layer == sf_op_pkg::D1 && at_step == 3'd0 ? d1_mac_q : 64'd0;
   wire fed = integrating || at_layer == sf_op_pkg::C2;
   wire [4:0] at_fed = {at_layer == sf_op_pkg::C3 ? 2'd2 : at_layer == sf_op_pkg::C2 ? 2'd1 : 2'd0, at_step};
   wire [63:0] weight = fed ? weight_q[at_fed] : at_step != 3'd0 ? 64'd0 : at_layer == sf_op_pkg::C1 ? c1_weight_q : d1_mac_q;
+  wire is_state = event_w == 3'd5 || event_w == 3'd6;
   reg [63:0] global_value, place_value;
   always_comb begin
     case (at_step)
@@ -91,8 +103,8 @@ module sf_counters (
       3'd2: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
       3'd3: place_value = updates;
       3'd4: place_value = weight;
-      3'd5: place_value = at_step == 3'd0 ? 64'd0 : state_bytes;
-      3'd6: place_value = state_bytes;
+      3'd5: place_value = at_step == 3'd0 ? 64'd0 : updates;
+      3'd6: place_value = updates;
       default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
     endcase
     if (!integrating && !neurons) begin
@@ -102,8 +114,12 @@ module sf_counters (
     end
   end
 
+  // State bytes are 3 a membrane, 4 an integrator.
+  wire threefold = is_state && neurons;
+  wire fourfold = is_state && integrating;
+
   assign hold_o = clear_wanted_q || snapshot_wanted_q || walk_q;
-  assign busy_o = hold_o;
+  assign busy_o = hold_o || write_q;
 
   // Commands that come during a walk belong to the next one.
   wire walk_begin = (clear_wanted_q || snapshot_wanted_q) && !walk_q && quiet_i;
@@ -111,7 +127,7 @@ module sf_counters (
     if (!rst_ni) begin
       clear_wanted_q <= 1'b1;  // the memories hold anything at power-on
       snapshot_wanted_q <= 1'b0;
-      {walk_q, walk_clear_q, walk_snapshot_q} <= 3'd0;
+      {walk_q, walk_clear_q, walk_snapshot_q, write_q} <= 4'd0;
       place_q <= 9'd0;
     end else begin
       clear_wanted_q <= clear_i || (clear_wanted_q && !walk_begin);
@@ -122,24 +138,33 @@ module sf_counters (
         walk_snapshot_q <= snapshot_wanted_q;
       end else if (walk_q && walk_last) walk_q <= 1'b0;
       if (walk_q) place_q <= place_q + 9'd1;
+      write_q <= walk_q && walk_snapshot_q;
     end
   end
   wire wipe = walk_q && walk_clear_q && event_w == 3'd7;  // the last of the walk, so a snapshot has read every event
+  wire [63:0] written = fourfold_q ? value_q << 2 : threefold_q ? (value_q << 1) + value_q : value_q;
   always_ff @(posedge clk_i) begin
-    if (walk_q && walk_snapshot_q) window_q[place_q] <= place_value;
+    write_place_q <= place_q;
+    {threefold_q, fourfold_q} <= {threefold, fourfold};
+    value_q <= place_value;
+    if (write_q) window_q[write_place_q] <= written;
     counter_o <= window_q[index_i];
   end
 
   // ---- events
-  wire [63:0] n_d1 = {55'd0, n_out_i[8:0]};
-  wire [63:0] n_d2 = {55'd0, n_out_i[17:9]};
-  wire [63:0] n_c1 = {55'd0, n_out_i[26:18]};
-  wire [63:0] n_c2 = {55'd0, n_out_i[35:27]};
-  wire [63:0] n_c3 = {55'd0, n_out_i[44:36]};
+  wire [63:0] n_d1 = {55'd0, d1_out_i};
+  wire [63:0] n_d2 = {55'd0, d2_out_i};
+  wire [63:0] n_c1 = {55'd0, c1_out_i};
+  wire [63:0] n_c2 = {55'd0, c2_out_i};
+  wire [63:0] n_c3 = {55'd0, c3_out_i};
   wire [4:0] neurons_here = {neurons_layer_i, neurons_step_i};
   wire [63:0] n_neurons = neurons_layer_i[1] ? n_c2 : neurons_layer_i[0] ? n_c1 : n_d1;
   wire [3:0] update_here = {update_colour_i, update_step_i};
+  // Layers that spikes feed, D2 in the lowest place
   wire [191:0] n_fed = {n_c3, n_c2, n_d2};
+  wire [2:0] fed_row = {c3_row_i, c2_row_i, d2_row_i};
+  wire [23:0] fed_fired = {c3_fired_i, c2_fired_i, d2_fired_i};
+  wire [2:0] fed_bias = {c3_bias_row_i, c2_bias_row_i, 1'b0};
 
   always_ff @(posedge clk_i) begin
     if (wipe && at_layer == sf_op_pkg::D1) d1_mac_q <= 64'd0;
@@ -163,7 +188,7 @@ module sf_counters (
   genvar f, t;
   generate
     for (f = 0; f < 3; f = f + 1) begin : g_fed
-      wire [7:0] fired = fed_row_i[f] ? fed_fired_i[8*f+:8] : 8'd0;
+      wire [7:0] fired = fed_row[f] ? fed_fired[8*f+:8] : 8'd0;
       for (t = 0; t < 8; t = t + 1) begin : g_step
         wire first = fired[t] && (t == 0 || (fired & ((8'd1 << t) - 8'd1)) == 8'd0);
         always_ff @(posedge clk_i) begin
@@ -174,7 +199,7 @@ module sf_counters (
             end
           end else begin
             if (fired[t]) sop_q[8*f+t] <= sop_q[8*f+t] + n_fed[64*f+:64];
-            if (first || (t == 0 && fed_bias_i[f])) weight_q[8*f+t] <= weight_q[8*f+t] + n_fed[64*f+:64];
+            if (first || (t == 0 && fed_bias[f])) weight_q[8*f+t] <= weight_q[8*f+t] + n_fed[64*f+:64];
           end
         end
       end

@@ -11,9 +11,15 @@ module sf_neurons #(
     input  wire                  rst_ni,
     input  wire                  clear_i,
     input  wire [           1:0] mode_i,
-    input  wire [          38:0] k_i,         // of D1, C1, C2
-    input  wire [          71:0] theta_i,
-    input  wire [          26:0] n_out_i,
+    input  wire [          12:0] d1_k_i,
+    input  wire [          12:0] c1_k_i,
+    input  wire [          12:0] c2_k_i,
+    input  wire [          23:0] d1_theta_i,
+    input  wire [          23:0] c1_theta_i,
+    input  wire [          23:0] c2_theta_i,
+    input  wire [           8:0] d1_out_i,    // neurons of the layer
+    input  wire [           8:0] c1_out_i,
+    input  wire [           8:0] c2_out_i,
     // a group's step
     input  wire                  valid_i,
     input  wire [           1:0] layer_i,     // 0: D1, 1: C1, 2: C2
@@ -55,9 +61,9 @@ module sf_neurons #(
     group_q <= {group_q[GROUP_BITS*(STAGES-1)-1:0], group_i};
     last_q <= {last_q[STAGES-2:0], last_i};
     k1_q <= mode_i == sf_op_pkg::HYBRID && first ? 13'd1 << sf_arch_pkg::LEAK_FRAC
-          : layer_i[1] ? k_i[38:26] : layer_i[0] ? k_i[25:13] : k_i[12:0];
-    theta4_q <= layer3[1] ? theta_i[71:48] : layer3[0] ? theta_i[47:24] : theta_i[23:0];
-    n_out4_q <= layer3[1] ? n_out_i[26:18] : layer3[0] ? n_out_i[17:9] : n_out_i[8:0];
+          : layer_i[1] ? c2_k_i : layer_i[0] ? c1_k_i : d1_k_i;
+    theta4_q <= layer3[1] ? c2_theta_i : layer3[0] ? c1_theta_i : d1_theta_i;
+    n_out4_q <= layer3[1] ? c2_out_i : layer3[0] ? c1_out_i : d1_out_i;
   end
 
   reg [24*NEURONS-1:0] membrane_q[0:(1<<GROUP_BITS)-1];

@@ -1,5 +1,6 @@
 // Rows of weights: what one presynaptic neuron sends out. Words of 32 bits side by side, each a memory of its own, so that
-// tools make block RAMs of them without waste. A row is read one cycle later and stays until the next is read.
+// tools make block RAMs of them without waste. A row is read one cycle later and stays until the next is read. Nothing is
+// read while it is written: tools need not guard against that (no_rw_check, of Yosys).
 `default_nettype none
 
 module sf_rows #(
@@ -21,7 +22,7 @@ module sf_rows #(
   generate
     for (w = 0; w < WORDS; w = w + 1) begin : g_word
       // verilator tracing_off
-      reg [31:0] mem_q[0:ROWS-1];
+      (* no_rw_check *) reg [31:0] mem_q[0:ROWS-1];
       // verilator tracing_on
       reg [31:0] word_q;
       always_ff @(posedge clk_i) begin

@@ -58,10 +58,11 @@ module sf_top #(
   wire [15:0] exp_mul, sigmoid_mul;
   wire [4:0] exp_shift, sigmoid_shift;
   wire [31:0] exp_bias, sigmoid_bias;
-  wire [44:0] n_in, n_out;
-  wire [64:0] k;
-  wire [119:0] theta;
-  wire [12:0] bias;
+  wire [8:0] d1_in, c1_in, d1_out, d2_out, c1_out, c2_out, c3_out;
+  wire [12:0] d1_k, d2_k, c1_k, c2_k, c3_k;
+  wire [23:0] d1_theta, c1_theta, c2_theta;
+  wire [10:0] c1_bias;
+  wire c2_bias, c3_bias;
   wire we;
   wire [2:0] wlayer;
   wire [8:0] wrow;
@@ -82,8 +83,9 @@ module sf_top #(
   wire [15:0] density_current;
   wire [47:0] colour_current;
   wire d1_row, c1_row, c1_bias_row, c1_products, ray;
-  wire [2:0] c1_step, fed_row, fed_bias, neurons_step, update_step;
-  wire [23:0] fed_fired;
+  wire [2:0] c1_step, neurons_step, update_step;
+  wire d2_row, c2_row, c2_bias_row, c3_row, c3_bias_row;
+  wire [7:0] d2_fired, c2_fired, c3_fired;
   wire [4:0] busy;
   wire neurons_valid, neurons_last;
   wire [1:0] neurons_layer;
@@ -93,8 +95,19 @@ module sf_top #(
   wire [27:0] sigma;
   wire [59:0] colour;
   wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
-  wire decodes = n_out[8:0] == 9'd0;
-  wire [7:0] n_dir = decodes ? n_in[25:18] : n_in[25:18] - (n_out[16:9] - 8'd1);
+
+  // What follows from the programming, in registers: it does not change while samples are inside.
+  reg decodes_q;
+  reg [7:0] n_dir_q;  // constant inputs of C1
+  reg [4:0] n_h_q;
+  wire [8:0] h = d1_out == 9'd0 ? 9'd0 : d2_out - 9'd1;
+  wire [8:0] directions = c1_in - h;
+  always_ff @(posedge clk_i) begin
+    decodes_q <= d1_out == 9'd0;
+    n_dir_q <= directions[7:0];
+    n_h_q <= h[4:0];
+  end
+  wire unused_ok = &{1'b0, d1_in[8:6], directions[8], h[8:5]};
 
   wire [LANES-1:0] tap_spikes, tap_rows;
   wire [24*LANES-1:0] tap_membrane;
@@ -136,11 +149,24 @@ module sf_top #(
       .sigmoid_mul_o  (sigmoid_mul),
       .sigmoid_shift_o(sigmoid_shift),
       .sigmoid_bias_o (sigmoid_bias),
-      .n_in_o         (n_in),
-      .n_out_o        (n_out),
-      .k_o            (k),
-      .theta_o        (theta),
-      .bias_o         (bias),
+      .d1_in_o        (d1_in),
+      .c1_in_o        (c1_in),
+      .d1_out_o       (d1_out),
+      .d2_out_o       (d2_out),
+      .c1_out_o       (c1_out),
+      .c2_out_o       (c2_out),
+      .c3_out_o       (c3_out),
+      .d1_k_o         (d1_k),
+      .d2_k_o         (d2_k),
+      .c1_k_o         (c1_k),
+      .c2_k_o         (c2_k),
+      .c3_k_o         (c3_k),
+      .d1_theta_o     (d1_theta),
+      .c1_theta_o     (c1_theta),
+      .c2_theta_o     (c2_theta),
+      .c1_bias_o      (c1_bias),
+      .c2_bias_o      (c2_bias),
+      .c3_bias_o      (c3_bias),
       .we_o           (we),
       .wlayer_o       (wlayer),
       .wrow_o         (wrow),
@@ -163,8 +189,8 @@ module sf_top #(
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
       .enable_i       (running),
-      .n_feature_i    (n_in[5:0]),
-      .n_dir_i        (n_dir),
+      .n_feature_i    (d1_in[5:0]),
+      .n_dir_i        (n_dir_q),
       .tvalid_i       (s_axis_tvalid_i),
       .tready_o       (s_axis_tready_o),
       .tdata_i        (s_axis_tdata_i),
@@ -199,11 +225,22 @@ module sf_top #(
       .wrow_i         (wrow),
       .wword_i        (wword),
       .wdata_i        (wweights),
-      .n_in_i         (n_in),
-      .n_out_i        (n_out),
-      .k_i            (k),
-      .theta_i        (theta),
-      .bias_i         (bias),
+      .d1_in_i        (d1_in[5:0]),
+      .decodes_i      (decodes_q),
+      .d1_out_i       (d1_out),
+      .n_dir_i        (n_dir_q),
+      .n_h_i          (n_h_q),
+      .c1_out_i       (c1_out),
+      .c2_out_i       (c2_out),
+      .d1_k_i         (d1_k),
+      .c1_k_i         (c1_k),
+      .c2_k_i         (c2_k),
+      .d1_theta_i     (d1_theta),
+      .c1_theta_i     (c1_theta),
+      .c2_theta_i     (c2_theta),
+      .c1_bias_i      (c1_bias),
+      .c2_bias_i      (c2_bias),
+      .c3_bias_i      (c3_bias),
       .mode_i         (mode),
       .steps_i        (steps),
       .sample_valid_i (sample_valid),
@@ -230,9 +267,14 @@ module sf_top #(
       .c1_bias_row_o  (c1_bias_row),
       .c1_products_o  (c1_products),
       .c1_step_o      (c1_step),
-      .fed_row_o      (fed_row),
-      .fed_fired_o    (fed_fired),
-      .fed_bias_o     (fed_bias),
+      .d2_row_o       (d2_row),
+      .d2_fired_o     (d2_fired),
+      .c2_row_o       (c2_row),
+      .c2_fired_o     (c2_fired),
+      .c2_bias_row_o  (c2_bias_row),
+      .c3_row_o       (c3_row),
+      .c3_fired_o     (c3_fired),
+      .c3_bias_row_o  (c3_bias_row),
       .busy_o         (busy),
       .ray_o          (ray),
       .neurons_valid_o(neurons_valid),
@@ -253,7 +295,7 @@ module sf_top #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
-      .decodes_i      (decodes),
+      .decodes_i      (decodes_q),
       .density_ready_o(density_ready),
       .density_begin_i(density_begin),
       .density_valid_i(density_valid),
@@ -269,8 +311,8 @@ module sf_top #(
       .idle_o         (readout_idle),
       .mode_i         (mode),
       .steps_i        (steps),
-      .k_density_i    (k[25:13]),
-      .k_colour_i     (k[64:52]),
+      .k_density_i    (d2_k),
+      .k_colour_i     (c3_k),
       .exp_mul_i      (exp_mul),
       .exp_shift_i    (exp_shift),
       .exp_bias_i     (exp_bias),
@@ -303,15 +345,24 @@ module sf_top #(
   sf_counters u_counters (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
-      .n_out_i        (n_out),
+      .d1_out_i       (d1_out),
+      .d2_out_i       (d2_out),
+      .c1_out_i       (c1_out),
+      .c2_out_i       (c2_out),
+      .c3_out_i       (c3_out),
       .d1_row_i       (d1_row),
       .c1_row_i       (c1_row),
       .c1_bias_row_i  (c1_bias_row),
       .c1_products_i  (c1_products),
       .c1_step_i      (c1_step),
-      .fed_row_i      (fed_row),
-      .fed_fired_i    (fed_fired),
-      .fed_bias_i     (fed_bias),
+      .d2_row_i       (d2_row),
+      .d2_fired_i     (d2_fired),
+      .c2_row_i       (c2_row),
+      .c2_fired_i     (c2_fired),
+      .c2_bias_row_i  (c2_bias_row),
+      .c3_row_i       (c3_row),
+      .c3_fired_i     (c3_fired),
+      .c3_bias_row_i  (c3_bias_row),
       .busy_i         (busy),
       .ray_i          (ray),
       .neurons_valid_i(neurons_valid),

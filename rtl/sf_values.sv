@@ -83,34 +83,69 @@ module sf_values #(
   localparam [1:0] CONSTANTS = 2'd2;
   localparam [1:0] STATES = 2'd3;
 
+  // ---- what follows from the sizes, in registers: they do not change at work. A sum without rows takes a turn, too.
+  reg has_bias_q, has_constants_q, has_h_q, bias_first_q;
+  reg [2:0] last_step_q;
+  reg [7:0] d1_turns_q, ray_turns_q, constant_turns_q, state_turns_q;  // D1's without and with a direction to pass on, C1's
+  reg d1_one_q, ray_one_q, constant_one_q, state_one_q;                // it is a single one
+  reg [7:0] state_row_q;                                               // of h in the memory
+  wire [7:0] n_feature = {2'd0, n_feature_i};
+  wire [7:0] n_constant = n_dir_i + {7'd0, bias_i != 11'd0};
+  wire [7:0] ray_turns = n_dir_i > n_feature ? n_dir_i : n_feature;
+  always_ff @(posedge clk_i) begin
+    has_bias_q <= bias_i != 11'd0;
+    has_constants_q <= n_constant != 8'd0;
+    has_h_q <= n_h_i != 5'd0;
+    bias_first_q <= bias_i != 11'd0 && n_dir_i == 8'd0;
+    last_step_q <= 3'(steps_i - 4'd1);
+    d1_turns_q <= n_feature == 8'd0 ? 8'd1 : n_feature;
+    ray_turns_q <= ray_turns == 8'd0 ? 8'd1 : ray_turns;
+    constant_turns_q <= n_constant == 8'd0 ? 8'd1 : n_constant;
+    state_turns_q <= n_h_i == 5'd0 ? 8'd1 : {3'd0, n_h_i};
+    d1_one_q <= n_feature < 8'd2;
+    ray_one_q <= ray_turns < 8'd2;
+    constant_one_q <= n_constant < 8'd2;
+    state_one_q <= n_h_i < 5'd2;
+    state_row_q <= 8'(C1_ROWS) + n_dir_i;
+  end
+
   // ---- what is at work: a row, a part of it, a step
   reg [1:0] job_q;
-  reg [7:0] row_q;
+  reg [7:0] row_q, left_q, at_q;  // left: turns; at: the row in the memory
+  reg one_left_q, at_bias_q;
   reg [PART_BITS-1:0] part_q;
   reg [2:0] step_q;
   reg d1_full_q, c1_full_q;
-  wire has_bias = bias_i != 11'd0;
+  wire works = job_q != NONE;
   wire c1_begins = (decodes_i ? valid_i : h_valid_i) && !c1_full_q;
-  wire [1:0] job = job_q != NONE ? job_q
+  wire [1:0] job = works ? job_q
                  : c1_begins ? (decodes_i || h_first_i ? CONSTANTS : STATES)
                  : valid_i && !decodes_i && !d1_full_q ? FEATURES : NONE;
   wire go = job != NONE && !load_i;
   // The direction is passed on beside the rows of D1; it may be longer than they are.
-  wire [7:0] n_dir = first_i ? n_dir_i : 8'd0;
-  wire [7:0] n_feature = {2'd0, n_feature_i};
-  wire [7:0] rows = job == FEATURES ? n_feature : job == CONSTANTS ? n_dir_i + {7'd0, has_bias} : {3'd0, n_h_i};
-  wire is_row = row_q < rows;  // a sum without rows takes a cycle, too
-  wire last_row = row_q + 8'd1 >= rows && (job != FEATURES || row_q + 8'd1 >= n_dir);
+  wire [7:0] turns = works ? left_q
+                   : job == FEATURES ? (first_i ? ray_turns_q : d1_turns_q)
+                   : job == CONSTANTS ? constant_turns_q : state_turns_q;
+  wire last_row = works ? one_left_q
+                : job == FEATURES ? (first_i ? ray_one_q : d1_one_q)
+                : job == CONSTANTS ? constant_one_q : state_one_q;
+  wire is_row = job == FEATURES ? row_q < n_feature : job == CONSTANTS ? has_constants_q : has_h_q;
+  wire at_bias = job == CONSTANTS && (works ? at_bias_q : bias_first_q);
+  wire [7:0] place = works ? at_q
+                   : job == FEATURES ? 8'd0
+                   : job == STATES ? state_row_q
+                   : bias_first_q ? 8'(BIASES) : 8'(C1_ROWS);
+  wire bias_next = job == CONSTANTS && has_bias_q && turns == 8'd2;
   wire last_part = part_q == (job == FEATURES ? d1_part_i : c1_part_i);
-  wire last_step = job != STATES || {1'b0, step_q} == steps_i - 4'd1;
-  wire last = last_row && last_part && last_step;
+  wire last_step = job != STATES || step_q == last_step_q;
+  wire last_of_row = last_part && last_step;
+  wire last = last_row && last_of_row;
   wire ends = go && last && (job != CONSTANTS || decodes_i);
-  wire at_bias = job == CONSTANTS && row_q == n_dir_i && has_bias;
   wire first_part = part_q == {PART_BITS{1'b0}};
 
   assign feature_index_o = row_q[4:0];
   assign dir_index_o = row_q;
-  assign dir_we_o = go && job == FEATURES && first_part && row_q < n_dir;
+  assign dir_we_o = go && job == FEATURES && first_part && first_i && row_q < n_dir_i;
   assign h_index_o = row_q[3:0];
   assign h_step_o = step_q;
   assign done_o = ends && job != STATES;
@@ -134,12 +169,23 @@ module sf_values #(
         job_q <= !last ? job : job == CONSTANTS && !decodes_i ? STATES : NONE;
         step_q <= last_step ? 3'd0 : step_q + 3'd1;
         if (last_step) part_q <= last_part ? {PART_BITS{1'b0}} : part_q + 1'b1;
-        if (last_step && last_part) row_q <= last_row ? 8'd0 : row_q + 8'd1;
+        if (last_of_row) row_q <= last_row ? 8'd0 : row_q + 8'd1;
       end
       if (ends && job == FEATURES) d1_full_q <= 1'b1;
       else if (d1_taken_i) d1_full_q <= 1'b0;
       if (ends && job != FEATURES) c1_full_q <= 1'b1;
       else if (c1_taken_i) c1_full_q <= 1'b0;
+    end
+  end
+
+  // After the constants of a ray come the states.
+  wire to_states = last && job == CONSTANTS;
+  always_ff @(posedge clk_i) begin
+    if (go) begin
+      left_q <= to_states ? state_turns_q : last_of_row ? turns - 8'd1 : turns;
+      one_left_q <= to_states ? state_one_q : last_of_row ? turns == 8'd2 : last_row;
+      at_q <= to_states ? state_row_q : !last_of_row ? place : bias_next ? 8'(BIASES) : place + 8'd1;
+      at_bias_q <= last_of_row ? bias_next : at_bias;
     end
   end
 
@@ -150,9 +196,6 @@ module sf_values #(
   wire zero = job != STATES && row_q == 8'd0;
   wire [3:0] from = load_i ? load_slot : job == STATES && row_q == 8'd0 ? BASE : slot;
   wire [PART_BITS-1:0] part = load_i ? load_part_i : part_q;
-  wire [7:0] place = job == FEATURES ? row_q
-                   : at_bias ? 8'(BIASES)
-                   : 8'(C1_ROWS) + row_q + (job == STATES ? n_dir_i : 8'd0);
   wire [8*MACS-1:0] row;
   wire [7:0] wplace = d1_we_i ? {3'd0, wrow_i[4:0]}
                     : wrow_i == 9'(sf_arch_pkg::BIAS_ROW) ? 8'(BIASES) : 8'(C1_ROWS) + wrow_i[7:0];

@@ -100,7 +100,7 @@ $B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/li
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 # Planted miscounts in the C core, the vector core and the recount: SF_FAULT=N chooses one at run time.
 C_FAULTS := $(sort $(wildcard tests/faults/c/*.patch))
-C_FAULTY := src/fx/count.c src/fx/rays.c src/energy/recount.c
+C_FAULTY := src/fx/count.c src/fx/memory.c src/fx/rays.c src/energy/recount.c
 $B/faults/c/.patched: $(C_FAULTY) $(C_FAULTS)
 	$(call say,PATCH $(@D))
 	$Qrm -rf $(@D) && mkdir -p $(@D) && cp --parents $(C_FAULTY) $(@D)

@@ -35,27 +35,46 @@ def check_sums(report):
         assert sum(ledger["parts_fj"].values()) == ledger["total_fj"], ledger["key"]
         assert sum(sum(row["fj"]) for row in ledger["rows"]) == ledger["total_fj"], ledger["key"]
         assert all(len(row["fj"]) == steps for row in ledger["rows"][:5])
-    paper, twin = report["ledgers"]["list"][0], report["ledgers"]["list"][4]
+    paper, twin = report["ledgers"]["list"][0], report["ledgers"]["list"][5]
     assert paper["total_fj"] == report["energy_spiking_fj"] == report["ledger"]["spiking_fj"]
     assert twin["total_fj"] == report["energy_ann_fj"]
+    check_accesses(report)
     for name, total in report["counts"]["total"].items():
         assert sum(sum(layer[name]) for layer in report["counts"]["layers"]) == total, name
+
+
+def check_accesses(report):
+    """What is read costs its accesses, in net and twin alike."""
+    traffic, ledgers = report["counts"]["traffic"], {l["key"]: l for l in report["ledgers"]["list"]}
+    units = ledgers["neuron"]["rows"][5]["unit_fj"]
+    for key in ["memory", "neuron", "shared", "ann_int_memory", "ann_int_all", "ann_int_shared"]:
+        parts = ledgers[key]["parts_fj"]
+        assert parts["lookup"] == traffic["lookups"] * units["lookup"], key
+        assert parts["fill"] == traffic["misses"] * units["fill"], key
+    assert 0 < traffic["misses"] < traffic["lookups"]
+    for net, twin in [("neuron", "ann_int_all"), ("shared", "ann_int_shared")]:
+        for part in ["lookup", "fill", "frame", "product", "place"]:
+            assert ledgers[net]["parts_fj"][part] == ledgers[twin]["parts_fj"][part], part
+    for alone, shared in [("neuron", "shared"), ("ann_int_all", "ann_int_shared")]:
+        less = ledgers[alone]["total_fj"] - ledgers[shared]["total_fj"]
+        assert less == ledgers[alone]["parts_fj"]["weight"] - ledgers[shared]["parts_fj"]["weight"] > 0
 
 
 def check_csv(report, path):
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 5 * report["t_r"] + 2
-    for ledger in report["ledgers"]["list"][:4]:
+    for ledger in report["ledgers"]["list"][:5]:
         assert sum(int(row[ledger["key"] + "_fj"]) for row in rows) == ledger["total_fj"], ledger["key"]
     for layer in report["counts"]["layers"]:
         for name in report["counts"]["total"]:
             mine = [int(row[name]) for row in rows if row["layer"] == layer["name"]]
             assert mine == layer[name], (layer["name"], name)
     traffic = report["counts"]["traffic"]
-    assert sum(int(row["table_bytes"]) for row in rows) == traffic["table_bytes"]
-    assert sum(int(row["frame_bytes"]) for row in rows) == traffic["frame_bytes"]
+    for name in ["table_bytes", "frame_bytes", "lookups", "misses", "products", "places", "harmonics"]:
+        assert sum(int(row[name]) for row in rows) == traffic[name], name
     assert int(rows[-1]["special"]) == traffic["exp_neg"]
+    assert int(rows[-2]["special"]) == traffic["field_special"]
 
 
 def refuses(validator, report, change):
@@ -102,4 +121,33 @@ for ledger in comparison["ledgers"]:
     cells = comparison["energies_mj_per_view"][ledger["key"]]["cells"]
     change = ledger["b_mj_per_view"] - ledger["a_mj_per_view"]
     assert abs(sum(cell["change"] for cell in cells) - change) < 1e-9 * ledger["a_mj_per_view"], ledger["key"]
+
+def as_scheme_1(report):
+    """A report as before: memories by the byte, no cache, eight ledgers."""
+    old = copy.deepcopy(report)
+    old["format"] = "spikefield-audit-1"
+    del old["cache"], old["shared"]
+    old["ledgers"]["list"] = [l for l in old["ledgers"]["list"] if "shared" not in l["key"]]
+    for ledger in old["ledgers"]["list"]:
+        parts = ledger["parts_fj"]
+        parts["table"] = parts.pop("lookup") + parts.pop("fill")
+        del parts["product"], parts["place"]
+    return old
+
+
+with tempfile.TemporaryDirectory() as folder:
+    for name, side in [("new", report), ("old", as_scheme_1(report))]:
+        with open(f"{folder}/{name}.json", "w", encoding="utf-8") as file:
+            json.dump(side, file)
+    across = json.loads(output("--compare", f"{folder}/old.json", f"{folder}/new.json", "--json"))
+    schema("energy_audit_compare").validate(across)
+    assert {l["key"] for l in across["ledgers"]} == {"paper", "width", "ann_fp32", "ann_int"}
+    refused = {l["key"]: l["why"] for l in across["not_comparable"]}
+    assert set(refused) == {"memory", "neuron", "ann_int_memory", "ann_int_all", "shared", "ann_int_shared"}
+    assert refused["shared"] == "A does not have it" and "by the byte" in refused["memory"]
+    text = output("--compare", f"{folder}/old.json", f"{folder}/new.json")
+    assert "not compared: everything (one report prices memories by the byte" in text
+    both_old = json.loads(output("--compare", f"{folder}/old.json", f"{folder}/old.json", "--json"))
+    assert len(both_old["ledgers"]) == 8 and not both_old["not_comparable"]
+
 print("reports, tables and comparison agree with their schemas and with themselves")

@@ -126,14 +126,25 @@ static double render_twin(const frame *f, uint64_t *taken)
 
 /* ---- the audit of the frame ---- */
 
+_Static_assert(FRAME % FX_TILE == 0, "whole tiles");
 enum { RTL_RAYS = 16, RECOUNT_RAYS = 1000 }; /* the defaults of energy_audit */
 
+/* Tile by tile. */
 static sf_status frame_ray(void *user, uint64_t index, fx_ray *ray)
 {
+  enum { TILES = FRAME / FX_TILE, PIXELS = FX_TILE * FX_TILE };
   const frame *f = user;
+  const uint64_t tile = index / PIXELS, pixel = index % PIXELS;
+  const uint64_t x = tile % TILES * FX_TILE + pixel % FX_TILE, y = tile / TILES * FX_TILE + pixel / FX_TILE;
   float origin[3], direction[3];
-  sf_camera_ray(&f->camera, (float)(index % FRAME) + 0.5f, (float)(index / FRAME) + 0.5f, origin, direction);
+  sf_camera_ray(&f->camera, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
   return sf_fx_ray_make(&f->scene, origin, direction, ray);
+}
+
+static uint64_t frame_tile(void *user, uint64_t index)
+{
+  (void)user;
+  return index / (FX_TILE * FX_TILE);
 }
 
 static void frame_ray_name(void *user, uint64_t index, char *text, size_t size)
@@ -150,7 +161,13 @@ static sf_status audit_frame(frame *f, const sf_technology *tech, const fx_count
   sf_measure measure;
   sf_three_counts three = {.wanted = RTL_RAYS};
   sf_ledgers *ledgers = calloc(1, sizeof *ledgers);
-  const sf_measure_job job = {&f->scene, FRAME * FRAME, frame_ray, NULL, f, 1, RECOUNT_RAYS};
+  const sf_measure_job job = {.scene = &f->scene,
+                              .rays = FRAME * FRAME,
+                              .ray = frame_ray,
+                              .user = f,
+                              .seed = 1,
+                              .check = RECOUNT_RAYS,
+                              .tile = frame_tile};
   sf_three_job rtl = {.scene = &f->scene, .index = index, .ray = frame_ray, .name = frame_ray_name, .user = f};
   const double start = sf_seconds();
   sf_status status = ledgers ? sf_measure_rays(&job, &measure) : sf_fail(SF_E_MEMORY, "bench: out of memory");
@@ -158,8 +175,9 @@ static sf_status audit_frame(frame *f, const sf_technology *tech, const fx_count
   if (!status.code) rtl.rays = (int)n, status = sf_three_counts_run(&rtl, &three);
   if (!status.code) status = three.agreement;
   if (!status.code) {
-    const sf_traffic traffic = sf_traffic_of(&measure.core, FRAME * FRAME);
-    status = sf_ledgers_make(tech, &f->scene.net, &measure.core, &traffic, sf_table_size(&f->scene), ledgers);
+    const sf_traffic traffic = sf_traffic_of(&f->scene, &measure.core, &measure.memory, FRAME * FRAME);
+    const sf_counted counted = {&f->scene, &measure.core, &measure.memory, &traffic, sf_cache_built};
+    status = sf_ledgers_make(tech, &counted, ledgers);
   }
   *seconds = sf_seconds() - start;
   if (!status.code && memcmp(&measure.core, counts, sizeof *counts))

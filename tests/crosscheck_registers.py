@@ -85,6 +85,8 @@ def read_source():
 
 
 REGISTERS, MEMORIES = read_source()
+EVENTS = re.findall(r"^  X\(([A-Z_]+), (\w+), (\"[^\"]*\"), (\"[^\"]*\"), \d+\)", text_of("include/spikefield/event.def"), re.M)
+assert len(EVENTS) == MEMORIES["COUNTERS"]["words"] // 64, "event.def was not understood"
 WINDOWS = {name for name, m in MEMORIES.items() if "address" not in m}
 
 
@@ -115,7 +117,9 @@ def check_package():
     text = text_of("rtl/gen/sf_csr_pkg.sv")
     got = {m[0]: int(m[1], 16) for m in re.findall(r"localparam \[[0-9:]+\] (\w+) = \d+'h([0-9a-f]+);", text)}
     got.update({m[0]: int(m[1]) for m in re.findall(r"localparam integer (\w+) = (\d+);", text)})
+    got.update({m[0]: int(m[1]) for m in re.findall(r"localparam \[2:0\] (\w+) = 3'd(\d);", text)})
     expected = {name: r["offset"] for name, r in REGISTERS.items()}
+    expected.update({f"EVENT_{event[0]}": number for number, event in enumerate(EVENTS)})
     for name, r in REGISTERS.items():
         if r["reset"]:
             expected[name + "_RESET"] = r["reset"]
@@ -129,6 +133,7 @@ def check_header():
     text = text_of("rtl/gen/sf_csr.h")
     got = {m[0]: int(m[1], 0) for m in re.findall(r"#define SF_REG_(\w+) (0x[0-9a-f]+|\d+)\b", text)}
     expected = {name: r["offset"] for name, r in REGISTERS.items()}
+    expected.update({f"EVENT_{event[0]}": number for number, event in enumerate(EVENTS)})
     for name, r in REGISTERS.items():
         if r["reset"]:
             expected[name + "_RESET"] = r["reset"]
@@ -144,10 +149,14 @@ def check_markdown():
     rows = [[c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]]
             for line in text_of("docs/registers.md").splitlines() if line.startswith("|")]
     for row in rows:
-        if len(row) not in (3, 5):
+        if len(row) not in (3, 4, 5):
             fault(f"registers.md: a row has {len(row)} cells: {row}")
     got = {r[1]: (int(r[0], 16), r[2], int(r[3], 16)) for r in rows if re.match(r"0x", r[0])}
     same("registers.md", got, {n: (r["offset"], r["access"], r["reset"]) for n, r in REGISTERS.items()})
+    got = [r for r in rows if len(r) == 4 and r[0].isdigit()]
+    expected = [[str(number), event[1], event[2].strip('"'), event[3].strip('"')] for number, event in enumerate(EVENTS)]
+    if got != expected:
+        fault(f"registers.md: events {got}, event.def has {expected}")
     got = {r[0]: (int(r[1]), int(r[2])) for r in rows if len(r) == 5 and r[0] in MEMORIES}
     same("registers.md", got, {n: (m["words"], m["bits"]) for n, m in MEMORIES.items()})
 

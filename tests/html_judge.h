@@ -57,7 +57,7 @@ static inline void check_figures(faults *f, const char *page, const sf_audit_rep
   check_element(f, page, "svg", "svg-quality", "<circle", SF_T_MAX);
   check_element(f, page, "table", "table-prices", "<tr>", r->ledgers.technology.count + 1);
   check_element(f, page, "table", "table-units", "<tr>", 20);
-  check_element(f, page, "table", "table-three", "equal", SF_EVENTS + 4);
+  check_element(f, page, "table", "table-three", "equal", SF_EVENTS + SF_TRAFFIC_EVENTS + 1);
   check_element(f, page, "ul", "not-modelled", "<li>", 3);
   check_element(f, page, "ul", "criticism", "<li>", 3);
   check_element(f, page, "pre", "command", "energy_audit", 1);
@@ -70,8 +70,9 @@ static inline void check_head(faults *f, const char *page)
                                      "energy_ann_fj",
                                      "energy_saving_percent",
                                      "ledgers.list[3].total_fj",
-                                     "ledgers.list[7].total_fj",
+                                     "ledgers.list[8].total_fj",
                                      "ledgers.list[3].saving_percent",
+                                     "ledgers.list[4].saving_percent",
                                      "ledgers.list[1].saving_percent",
                                      "ledger.hoisted_saving_percent",
                                      "rays",

@@ -226,12 +226,60 @@ static bool tick(void *user, uint64_t done)
   return done < ((rays *)user)->stop_after;
 }
 
+/* Tiles of 37 rays. */
+static uint64_t ray_tile(void *user, uint64_t index)
+{
+  (void)user;
+  return index / 37;
+}
+
+static uint64_t one_tile(void *user, uint64_t index)
+{
+  (void)user, (void)index;
+  return 5;
+}
+
+/* However many rays a tile has, threads share out whole ones. */
+TEST(memory_does_not_depend_on_threads)
+{
+  fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
+  rays user = {UINT64_MAX, UINT64_MAX};
+  uint64_t (*const tile[])(void *user, uint64_t index) = {ray_tile, one_tile, NULL};
+  uint64_t misses = 0;
+  for (int i = 0; i < COUNT(tile); i++) {
+    sf_measure_job job = {.scene = &scene,
+                          .rays = 5000,
+                          .ray = make_ray,
+                          .tick = tick,
+                          .user = &user,
+                          .seed = 7,
+                          .check = 700,
+                          .cache = {1024, 2},
+                          .tile = tile[i]};
+    OWNED(sf_measure) one, four;
+    omp_set_num_threads(1);
+    ck_ok(sf_measure_rays(&job, &one));
+    omp_set_num_threads(4);
+    ck_ok(sf_measure_rays(&job, &four));
+    ck_assert_mem_eq(&one.memory, &four.memory, sizeof one.memory);
+    ck_assert_mem_eq(&one.checked_memory, &four.checked_memory, sizeof one.checked_memory);
+    assert_same_counts(&one.core, &four.core);
+    ck_assert_mem_eq(one.hit, four.hit, 5000 / 8);
+    ck_assert_uint_gt(one.memory.misses, one.memory.lookups / 100);
+    ck_assert_uint_lt(one.memory.misses, one.memory.lookups);
+    ck_assert_uint_ne(one.memory.misses, misses); /* tiles matter */
+    misses = one.memory.misses;
+  }
+}
+
 TEST(measure_does_not_depend_on_threads)
 {
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
-  sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, UINT64_MAX};
+  sf_measure_job job = {
+      .scene = &scene, .rays = 1000, .ray = make_ray, .tick = tick, .user = &user, .seed = 7, .check = UINT64_MAX};
   OWNED(sf_measure) one, four;
   uint64_t hits = 0;
   omp_set_num_threads(1);
@@ -244,6 +292,7 @@ TEST(measure_does_not_depend_on_threads)
   assert_same_counts(&one.checked_core, &four.checked_core);
   ck_assert_uint_eq(one.checked, one.core.rays);
   ck_ok(sf_counts_compare(&one.core, "core", &one.recount, "recount"));
+  ck_assert_mem_eq(&one.checked_memory, &one.memory, sizeof one.memory);
   for (uint64_t i = 0; i < 1000; i++) {
     bool hit = one.hit[i / 8] >> i % 8 & 1;
     ck_assert(!(hit && i % 7 == 3));
@@ -258,7 +307,8 @@ TEST(tensorf_is_counted_by_the_same_three)
 {
   OWNED(fx_scene) scene = tensorf_scene();
   rays user = {UINT64_MAX, UINT64_MAX};
-  const sf_measure_job job = {&scene, 300, make_ray, tick, &user, 7, UINT64_MAX};
+  const sf_measure_job job = {
+      .scene = &scene, .rays = 300, .ray = make_ray, .tick = tick, .user = &user, .seed = 7, .check = UINT64_MAX};
   OWNED(sf_measure) m;
   ck_ok(sf_measure_rays(&job, &m));
   assert_same_counts(&m.checked_core, &m.core);
@@ -268,9 +318,9 @@ TEST(tensorf_is_counted_by_the_same_three)
   ck_assert_uint_gt(sf_event_total(&m.core, SF_EVENT_SPIKES), 0);
   ck_assert_uint_eq(sf_event_total(&m.core, SF_EVENT_MAC),
                     m.core.samples * (uint64_t)(scene.net.layer[FX_C1].n_in * 40));
-  const sf_traffic core = sf_traffic_of(&m.core, 300);
-  const sf_traffic recount = sf_traffic_recount(&scene, &m.recount, m.core.field_samples, 300);
-  ck_ok(sf_traffic_compare(&core, "core", &recount, "recount"));
+  const sf_traffic core = sf_traffic_of(&scene, &m.core, &m.memory, 300);
+  const sf_traffic recount = sf_traffic_recount(&scene, &m.recount, &m.checked_memory, m.core.field_samples, 300);
+  ck_ok(sf_traffic_compare(&core, "core", &recount, "recount", SF_TRAFFIC_EVENTS));
   ck_assert_uint_eq(core.exp_neg, m.core.field_samples);
   ck_assert_uint_eq(core.table_bytes, 6 * 9 * (m.core.field_samples + m.core.samples)); /* 9 components in each */
   /* planes 9x8, 9x7, 8x7 with their lines 7, 8, 9: density 2, 3, 4 components, appearance 3, 2, 4 */
@@ -287,7 +337,8 @@ TEST(checked_rays_are_a_seeded_choice)
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {UINT64_MAX, UINT64_MAX};
-  sf_measure_job job = {&scene, 1000, make_ray, tick, &user, 7, 50};
+  sf_measure_job job = {
+      .scene = &scene, .rays = 1000, .ray = make_ray, .tick = tick, .user = &user, .seed = 7, .check = 50};
   OWNED(sf_measure) measure;
   uint64_t index[50], again[50], other[50], all[1000], n, differs = 0;
   ck_ok(sf_measure_rays(&job, &measure));
@@ -321,7 +372,8 @@ TEST(measure_reports_the_lowest_failing_ray)
   fixture_sizes sizes = {4, 32, 16, 16, 32, 32, 3, FX_HYBRID, {0}};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   rays user = {10, UINT64_MAX};
-  sf_measure_job job = {&scene, 5000, make_ray, tick, &user, 7, 10};
+  sf_measure_job job = {
+      .scene = &scene, .rays = 5000, .ray = make_ray, .tick = tick, .user = &user, .seed = 7, .check = 10};
   sf_measure measure;
   omp_set_num_threads(4);
   for (int repeat = 0; repeat < 5; repeat++) {

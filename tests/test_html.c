@@ -57,11 +57,14 @@ static void make_report(fixture *f)
                          .rays = WIDTH * HEIGHT,
                          .seed = 7,
                          .views = 1};
-  const sf_measure_job job = {&f->scene, r->rays, make_ray, NULL, f, 7, UINT64_MAX};
+  const sf_measure_job job = {
+      .scene = &f->scene, .rays = r->rays, .ray = make_ray, .user = f, .seed = 7, .check = UINT64_MAX};
   ck_ok(sf_measure_rays(&job, &r->measure));
   ck_ok(sf_ledger_make(&f->scene.net, &r->measure.core, &r->ledger));
-  r->traffic = sf_traffic_of(&r->measure.core, r->rays);
-  ck_ok(sf_ledgers_make(&tech, &f->scene.net, &r->measure.core, &r->traffic, sf_table_size(&f->scene), &r->ledgers));
+  r->traffic = sf_traffic_of(&f->scene, &r->measure.core, &r->measure.memory, r->rays);
+  r->cache = sf_cache_built;
+  const sf_counted counted = {&f->scene, &r->measure.core, &r->measure.memory, &r->traffic, r->cache};
+  ck_ok(sf_ledgers_make(&tech, &counted, &r->ledgers));
   r->three = (sf_three_counts){.rays = (int)r->measure.checked,
                                .core = r->measure.checked_core,
                                .rtl = r->measure.checked_core,
@@ -286,7 +289,7 @@ static const plant plants[] = {
     {"data-key=\"samples\" value", "data-key=\"rays\" value"},
     {"data-key=\"ledgers.list[1].parts_fj.mac\"", "data-was=\"ledgers\""},
     {"data-key=\"page.layer_fj[0][0]\" data-value=\"", "data-key=\"page.layer_fj[0][0]\" data-value=\"9"},
-    {"<data data-key=\"ledgers.list[7].total_fj\" value=\"", "<data data-was=\""},
+    {"<data data-key=\"ledgers.list[8].total_fj\" value=\"", "<data data-was=\""},
     {"</header>", ""},
     {"</figure>", ""},
     {"</td>", "<td>"},

@@ -3,6 +3,7 @@
 #include "layout_folder.h"
 #include "src/scene/capture.h"
 #include <sys/stat.h>
+#include <unistd.h>
 
 LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
 {
@@ -132,6 +133,70 @@ TEST(another_scenes_data_is_refused)
   other = space, other.ndc = 0;
   ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from data without NDC rays", "with NDC");
   ck_ok(sf_space_check(&(sf_space){0}, "m", &d));
+  other = space, other.poses ^= 1;
+  ck_bad(sf_space_check(&other, "m", &d), SF_E_RANGE, "m: learned from a list of 17 views",
+         "lists 17 and their poses differ");
+  other.poses = 0; /* of an older file */
+  ck_ok(sf_space_check(&other, "m", &d));
+}
+
+static sf_space space_of(const char *split, const sf_dataset_options *options)
+{
+  ck_ok(reload_as(split, options));
+  return sf_dataset_space(&d);
+}
+
+/* The list that names the training views tells a scene, whatever is loaded of it and how; the test views' does not. */
+TEST(poses_of_the_training_list_tell_the_scene)
+{
+  layout_rig rig = orbit();
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms_train.json", &rig, "", "images", 1, 2);
+  put_json("transforms_test.json", &rig, "", "images", 0, 2);
+  const sf_space train = space_of("train", NULL);
+  ck_assert(train.poses > 0 && train.views == VIEWS / 2);
+  const sf_dataset_options part = {.scale = 0.125f, .limit = 1, .first = 1, .cameras_only = true};
+  ck_assert_int_eq(space_of("train", &part).poses, train.poses);
+  ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
+  put_json("transforms_test.json", &rig, "", "images", 0, 4);
+  ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
+  for (int v = 1; v < VIEWS; v += 2)
+    for (int i = 3; i < 12; i += 4) {
+      const double before = rig.view[v].to_world[i];
+      rig.view[v].to_world[i] += 1e-3;
+      put_json("transforms_train.json", &rig, "", "images", 1, 2);
+      ck_assert_int_ne(space_of("test", NULL).poses, train.poses);
+      rig.view[v].to_world[i] = before + 1e-9;
+    }
+  put_json("transforms_train.json", &rig, "", "images", 1, 2);
+  ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
+  rig.view[3].to_world[1] += 0.05;
+  put_json("transforms_train.json", &rig, "", "images", 1, 2);
+  ck_assert_int_ne(space_of("test", NULL).poses, train.poses);
+  ck_assert_int_eq(unlink(in("transforms_train.json")), 0);
+  const sf_space unknown = space_of("test", NULL);
+  ck_assert(unknown.poses == 0 && unknown.views == 0);
+  ck_ok(sf_space_check(&train, "m", &d));
+}
+
+/* Both splits are of the one list. */
+LOOP_TEST(one_list_has_one_hash, 2)
+{
+  layout_rig rig = _i ? row() : orbit();
+  put_pictures(_i ? "images_4" : "images", &rig, WIDTH, HEIGHT, 255);
+  if (_i)
+    put_llff(&rig, 0, 4, 40);
+  else
+    put_colmap("sparse/0", &rig, 0);
+  const sf_space train = space_of("train", NULL);
+  ck_assert(train.poses > 0 && train.views == VIEWS);
+  ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
+  rig.view[3].to_world[11] += 0.01;
+  if (_i)
+    put_llff(&rig, 0, 4, 40);
+  else
+    put_colmap("sparse/0", &rig, 0);
+  ck_assert_int_ne(space_of("test", NULL).poses, train.poses);
 }
 
 /* Whatever its length, and none is cut: "dir/./././p00" with another ending, and too long a name. */

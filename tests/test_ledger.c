@@ -6,7 +6,8 @@
 #include "tests/audit_fixture.h"
 #include <math.h>
 
-/* An adder costs its bits, a multiplier the product of its widths, a byte 10 of memory and 1000 of DRAM. */
+/* An adder costs its bits, a multiplier the product of its widths, a register file its bits, an access 80 of memory and
+ * 8000 of DRAM. */
 static const char plain[] = "# comment\n"
                             "name plain\n"
                             "title  A plain technology  \n"
@@ -19,7 +20,8 @@ static const char plain[] = "# comment\n"
                             "int_multiply.32 1.024 pJ made up\r\n"
                             "sram.16384 80 fJ made up\n"
                             "sram.64 80 fJ made up\n"
-                            "dram 0.008 nJ made up";
+                            "dram 0.008 nJ made up\n"
+                            "register 32 fJ made up";
 
 static sf_status load_text(sf_technology *tech, const char *text)
 {
@@ -45,12 +47,12 @@ TEST(file_is_read)
   static const struct {
     const char *key;
     uint64_t fj;
-  } wanted[] = {{"fp32_mac", 4600}, {"fp32_add", 900},      {"int_add.8", 8},
-                {"int_add.32", 32}, {"int_multiply.8", 64}, {"int_multiply.32", 1024},
-                {"sram.64", 80},    {"sram.16384", 80},     {"dram", 8000}};
+  } wanted[] = {{"fp32_mac", 4600},     {"fp32_add", 900},         {"int_add.8", 8}, {"int_add.32", 32},
+                {"int_multiply.8", 64}, {"int_multiply.32", 1024}, {"sram.64", 80},  {"sram.16384", 80},
+                {"dram", 8000},         {"register", 32}};
   ck_assert_str_eq(t.name, "plain");
   ck_assert_str_eq(t.title, "A plain technology");
-  ck_assert_int_eq(t.count, 9);
+  ck_assert_int_eq(t.count, 10);
   for (int i = 0; i < t.count; i++) { /* in order of family and point, whatever the file's */
     ck_assert_str_eq(t.price[i].key, wanted[i].key);
     ck_assert_uint_eq(t.price[i].fj, wanted[i].fj);
@@ -115,10 +117,11 @@ TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_add(&t, 32, &between), 32);
   ck_assert_uint_eq(sf_price_multiply(&t, 8, 8, &between), 64);
   ck_assert_uint_eq(sf_price_multiply(&t, 64, 16, &between), 1024);
-  ck_assert_uint_eq(sf_price_byte(&t, 64, &between), 10);
-  ck_assert_uint_eq(sf_price_byte(&t, 3, &between), 10); /* smaller than the smallest: its price */
-  ck_assert_uint_eq(sf_price_byte(&t, 16384, &between), 10);
-  ck_assert_uint_eq(sf_price_byte(&t, 16385, &between), 1000);
+  ck_assert_uint_eq(sf_price_access(&t, 64, &between), 80);
+  ck_assert_uint_eq(sf_price_access(&t, 3, &between), 80); /* smaller than the smallest: its price */
+  ck_assert_uint_eq(sf_price_access(&t, 16384, &between), 80);
+  ck_assert_uint_eq(sf_price_access(&t, 16385, &between), 8000);
+  ck_assert_uint_eq(sf_price_register(&t, 24, &between), 24);
   ck_assert(!between);
   ck_assert_uint_eq(sf_price_add(&t, 15, &between), 15);
   ck_assert(between);
@@ -128,7 +131,7 @@ TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_add(&t, 40, NULL), 40); /* beyond the last: the same line */
   ck_assert_uint_eq(sf_price_add(&t, 2, NULL), 2);
   t.price[7].fj = 5120; /* 64 times the price for 256 times the size: the power 3/4 */
-  ck_assert_uint_eq(sf_price_byte(&t, 1024, NULL), 80);
+  ck_assert_uint_eq(sf_price_access(&t, 1024, NULL), 640);
   t.price[2].fj = 40; /* 40 at 8 bits, 32 at 32: where the line falls to nothing, the price of the last point */
   ck_assert_uint_eq(sf_price_add(&t, 120, NULL), 3);
   ck_assert_uint_eq(sf_price_add(&t, 200, NULL), 32);
@@ -137,20 +140,33 @@ TEST(prices_between_points)
   ck_assert_uint_eq(sf_price_multiply(&t, 4, 4, NULL), 64);
 }
 
+/* A file of before has none: an eighth of the smallest memory's access is 8 bits. */
+TEST(register_files_may_have_no_price)
+{
+  char text[2000];
+  sf_technology t;
+  bool between = false;
+  snprintf(text, sizeof text, "%.*s", (int)(strstr(plain, "register") - plain), plain);
+  ck_ok(load_text(&t, text));
+  ck_assert_int_eq(t.count, 9);
+  ck_assert_uint_eq(sf_price_register(&t, 24, &between), 30);
+  ck_assert(between);
+}
+
 /* The file that is installed: Horowitz's figure, and what the paper makes of it. */
 TEST(installed_prices)
 {
   sf_technology t;
   ck_ok(sf_technology_load(&t, "share/tech/45nm.tech"));
-  static const uint64_t wanted[] = {SF_MAC_FJ, SF_SOP_FJ, 30, 100, 200, 3100, 10000, 20000, 100000, 1950000};
-  ck_assert_int_eq(t.count, 10);
+  static const uint64_t wanted[] = {SF_MAC_FJ, SF_SOP_FJ, 30, 100, 200, 3100, 10000, 20000, 100000, 1950000, 1000};
+  ck_assert_int_eq(t.count, 11);
   for (int i = 0; i < t.count; i++) {
     ck_assert_uint_eq(t.price[i].fj, wanted[i]);
     ck_assert_ptr_nonnull(strstr(t.price[i].source, "Horowitz"));
   }
-  ck_assert_uint_eq(sf_price_add(&t, 15, NULL), 50);           /* 30 + 7/24 * 70 = 50.4 */
-  ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, NULL), 297);  /* 200 + 32/960 * 2900 = 296.7 */
-  ck_assert_uint_eq(sf_price_byte(&t, 128 * 128, NULL), 1768); /* 10 * sqrt 2 pJ / 8 */
+  ck_assert_uint_eq(sf_price_add(&t, 15, NULL), 50);              /* 30 + 7/24 * 70 = 50.4 */
+  ck_assert_uint_eq(sf_price_multiply(&t, 12, 8, NULL), 297);     /* 200 + 32/960 * 2900 = 296.7 */
+  ck_assert_uint_eq(sf_price_access(&t, 128 * 128, NULL), 14142); /* 10 * sqrt 2 pJ */
 }
 
 /* Prices of netlists: an operation costs more than its arithmetic alone, a MAC of 12 bits more than one of 8. */
@@ -181,14 +197,32 @@ static fx_counts small_counts(const fx_net *net)
   return c;
 }
 
-static const sf_traffic small_traffic = {.table_bytes = 100, .exp_neg = 1, .frame_bytes = 48};
+static const sf_traffic small_traffic = {.table_bytes = 100,
+                                         .exp_neg = 1,
+                                         .frame_bytes = 48,
+                                         .lookups = 10,
+                                         .misses = 4,
+                                         .products = 50,
+                                         .places = 5,
+                                         .special = 0,
+                                         .harmonics = 1};
+static const fx_memory_counts small_memory = {.lookups = 10, .misses = 4, .groups = 1, .rows = {1, 2, 4}};
+
+/* What is counted is priced with a cache of 8192 bytes. */
+static sf_status make_ledgers(const sf_technology *tech, const fx_net *net, const fx_counts *counts,
+                              const sf_traffic *traffic, sf_ledgers *l)
+{
+  const fx_scene scene = {.backbone = FX_INGP, .net = *net};
+  const sf_counted counted = {&scene, counts, &small_memory, traffic, {8192, 4}};
+  return sf_ledgers_make(tech, &counted, l);
+}
 
 static sf_ledgers *small_ledgers(const sf_technology *tech)
 {
   sf_ledgers *l = malloc(sizeof *l);
   const fx_net net = small_net();
   const fx_counts c = small_counts(&net);
-  ck_ok(sf_ledgers_make(tech, &net, &c, &small_traffic, 1000, l));
+  ck_ok(make_ledgers(tech, &net, &c, &small_traffic, l));
   return l;
 }
 
@@ -227,18 +261,32 @@ TEST(width_ledger_by_hand)
 TEST(memory_ledger_by_hand)
 {
   const uint64_t *part = l->part[SF_LEDGER_MEMORY], *twin = l->part[SF_LEDGER_INT_MEMORY];
-  /* bytes by hand in test_audit.c: weights 12 + 9 + 20 + 10 + 15; state 27 + 12 + 36 + 45 + 36 */
-  ck_assert_uint_eq(part[SF_PART_WEIGHT], 66 * 10);
-  ck_assert_uint_eq(part[SF_PART_STATE], 156 * 10);
-  ck_assert_uint_eq(part[SF_PART_TABLE], 100 * 10);
-  ck_assert_uint_eq(part[SF_PART_FRAME], 48 * 1000);
+  /* rows, an access each: 4 of D1, 3 of D2, 5 of C1, 2 of C2, 5 of C3 */
+  ck_assert_uint_eq(part[SF_PART_WEIGHT], (4 + 3 + 5 + 2 + 5) * 80);
+  /* written at both steps, read at the second: 12 membranes, 1 density, 3 colours */
+  ck_assert_uint_eq(part[SF_PART_STATE], 3 * (12 * 24 + 28 + 3 * 20));
+  ck_assert_uint_eq(part[SF_PART_LOOKUP], 10 * 80);
+  ck_assert_uint_eq(part[SF_PART_FILL], 4 * (2 * 8000 + 2 * 80));
+  ck_assert_uint_eq(part[SF_PART_FRAME], 6 * 8000);
   ck_assert_uint_eq(part[SF_PART_NEURON], 0);
+  ck_assert_uint_eq(part[SF_PART_PRODUCT], 0);
   ck_assert_uint_eq(part[SF_PART_MAC], l->part[SF_LEDGER_WIDTH][SF_PART_MAC]);
-  ck_assert_uint_eq(l->cell[SF_LEDGER_MEMORY][SF_ROW_FIELD][0], 1000);
+  ck_assert_uint_eq(l->cell[SF_LEDGER_MEMORY][SF_ROW_FIELD][0], 800 + 64640);
   ck_assert_uint_eq(l->cell[SF_LEDGER_MEMORY][SF_ROW_RAY][0], 48000);
-  ck_assert_uint_eq(twin[SF_PART_WEIGHT], 76 * 10);
-  ck_assert_uint_eq(twin[SF_PART_STATE], 2 * (3 + 2 + 4 + 5) * 10); /* D1, h, C1, C2 written and read */
-  ck_assert_uint_eq(twin[SF_PART_TABLE], 100 * 10);
+  ck_assert_uint_eq(twin[SF_PART_WEIGHT], (4 + 3 + 5 + 4 + 5) * 80);
+  ck_assert_uint_eq(twin[SF_PART_STATE], 2 * (3 + 2 + 4 + 5) * 8); /* D1, h, C1, C2 written and read */
+  ck_assert_uint_eq(twin[SF_PART_LOOKUP], part[SF_PART_LOOKUP]);
+  ck_assert_uint_eq(twin[SF_PART_FILL], part[SF_PART_FILL]);
+  ck_assert_uint_eq(twin[SF_PART_FRAME], part[SF_PART_FRAME]);
+}
+
+/* Rows of 64 bits or less are an access, of 65 two, and so on; what holds them all chooses its price. */
+TEST(rows_are_accesses)
+{
+  const fx_layer wide = {.n_in = 10, .n_out = 17}, narrow = {.n_in = 10, .n_out = 8};
+  ck_assert_uint_eq(sf_row_accesses(&wide), 3);
+  ck_assert_uint_eq(sf_row_accesses(&narrow), 1);
+  ck_assert_uint_eq(sf_weights_size(&wide), 170);
 }
 
 TEST(neuron_ledger_by_hand)
@@ -247,11 +295,55 @@ TEST(neuron_ledger_by_hand)
   /* 24 spiking updates, 2 of density (28 bits), 6 of colour (20 bits); leak of 13 bits */
   ck_assert_uint_eq(part[SF_PART_NEURON], 24 * (24 * 13 + 4 * 24) + 2 * (28 * 13 + 2 * 28) + 6 * (20 * 13 + 2 * 20));
   /* argument x 16 bits, 16 x 12 bits, two sums, two entries of 4 bytes */
-  ck_assert_uint_eq(part[SF_PART_SPECIAL], 2 * (10 * 16 + 192 + 2 * 28 + 80) + 6 * (11 * 16 + 192 + 2 * 20 + 80) +
-                                               1 * (20 * 16 + 192 + 2 * 20 + 80));
+  ck_assert_uint_eq(part[SF_PART_SPECIAL], 2 * (10 * 16 + 192 + 2 * 28 + 160) + 6 * (11 * 16 + 192 + 2 * 20 + 160) +
+                                               1 * (20 * 16 + 192 + 2 * 20 + 160));
   ck_assert_uint_eq(twin[SF_PART_NEURON], 14 * (32 * 16 + 32));
-  ck_assert_uint_eq(twin[SF_PART_SPECIAL], 1 * (32 * 16 + 192 + 2 * 28 + 80) + 3 * (32 * 16 + 192 + 2 * 20 + 80) +
-                                               1 * (20 * 16 + 192 + 2 * 20 + 80));
+  ck_assert_uint_eq(twin[SF_PART_SPECIAL], 1 * (32 * 16 + 192 + 2 * 28 + 160) + 3 * (32 * 16 + 192 + 2 * 20 + 160) +
+                                               1 * (20 * 16 + 192 + 2 * 20 + 160));
+  /* entries of 8 bits times corners of 17; a sample composited */
+  ck_assert_uint_eq(part[SF_PART_PRODUCT],
+                    50 * (17 * 8 + 24) + 1 * (28 * 24 + 21 * 21 + 3 * 21 * 20 + 21 * 32 + 4 * 41 + 2 * 21));
+  /* levels found; 16 harmonics of two products each */
+  ck_assert_uint_eq(part[SF_PART_PLACE],
+                    5 * (3 * 24 * 32 + 3 * 32 + 4 * 9 * 9 + 4 * 17 * 9 + 4 * 17 + 2 * 12 * 32 + 8 * 32) +
+                        1 * (6 * 16 * 16 + 9 * 18 + 32 * 18 * 18));
+  ck_assert_uint_eq(twin[SF_PART_PRODUCT], part[SF_PART_PRODUCT]);
+  ck_assert_uint_eq(twin[SF_PART_PLACE], part[SF_PART_PLACE]);
+}
+
+/* Rows alone differ: values need all of D1's 4 and of h's 2 once for the group, and the direction's 3 once. */
+TEST(shared_ledger_by_hand)
+{
+  const uint64_t *part = l->part[SF_LEDGER_SHARED], *twin = l->part[SF_LEDGER_INT_SHARED];
+  ck_assert_uint_eq(part[SF_PART_WEIGHT], (4 + 1 + (2 + 3) + 2 + 4) * 80);
+  ck_assert_uint_eq(twin[SF_PART_WEIGHT], (4 + 3 + (2 + 3) + 4 + 5) * 80);
+  for (int p = 0; p < SF_PARTS; p++) {
+    if (p == SF_PART_WEIGHT) continue;
+    ck_assert_uint_eq(part[p], l->part[SF_LEDGER_NEURON][p]);
+    ck_assert_uint_eq(twin[p], l->part[SF_LEDGER_INT_ALL][p]);
+  }
+}
+
+/* Of many samples each group reads once, of biases too; of rays each 16. */
+TEST(groups_share_rows)
+{
+  fx_net net = small_net();
+  net.layer[FX_C1].bias = 5, net.layer[FX_C2].bias = 1;
+  const fx_counts c = {.samples = 40, .rays = 17};
+  const fx_memory_counts memory = {.groups = 3, .rows = {7, 8, 9}};
+  const sf_traffic none = {.event = {0}};
+  const fx_scene scene = {.backbone = FX_INGP, .net = net};
+  const sf_counted counted = {&scene, &c, &memory, &none, {8192, 4}};
+  sf_ledgers *l = malloc(sizeof *l);
+  ck_ok(sf_ledgers_make(&tech, &counted, l));
+  const uint64_t(*cell)[SF_T_MAX] = (const uint64_t(*)[SF_T_MAX])l->cell[SF_LEDGER_SHARED];
+  ck_assert_uint_eq(cell[FX_D1][0], 3 * 4 * 80);
+  ck_assert_uint_eq(cell[FX_D2][0], 7 * 80);
+  ck_assert_uint_eq(cell[FX_C1][0], (3 * 2 + 2 * 3 + 2) * 80); /* h; directions of two times 16 rays, and the biases */
+  ck_assert_uint_eq(cell[FX_C2][0], (8 + 3) * 80);
+  ck_assert_uint_eq(cell[FX_C3][0], 9 * 80);
+  ck_assert_uint_eq(l->part[SF_LEDGER_INT_SHARED][SF_PART_WEIGHT], (3 * (4 + 3 + 2 + 4 + 5) + 2 * 3) * 80);
+  free(l);
 }
 
 /* Prices that were measured stand in place of those of the widths: each operation has its own, the twin's ReLU none. */
@@ -263,7 +355,7 @@ TEST(measured_operations_by_hand)
            "mac 5 pJ made up\ntwin_mac 4 pJ made up\nsop 700 fJ made up\nneuron_update 9 pJ made up\n"
            "integrator_update 8 pJ made up\nspecial 30 pJ made up\n");
   ck_ok(load_text(&measured, text));
-  ck_assert_int_eq(measured.count, 15);
+  ck_assert_int_eq(measured.count, 16);
   sf_ledgers *m = small_ledgers(&measured);
   const uint64_t *part = m->part[SF_LEDGER_NEURON], *twin = m->part[SF_LEDGER_INT_ALL];
   ck_assert_uint_eq(part[SF_PART_MAC], 40 * 5000);
@@ -295,10 +387,12 @@ TEST(cells_and_parts_add_up)
     (&spikes[0][0][0])[i] = sf_random_u64(1, 2, i) & sf_random_u64(1, 3, i);
   for (int i = 0; i < 9; i++)
     sf_recount_sample(&scene.net, (const uint64_t(*)[SF_T_MAX][SF_SPIKE_WORDS])spikes, i % 3 == 0, &c);
-  const sf_traffic traffic = sf_traffic_recount(&scene, &c, 0, 4);
+  const sf_traffic traffic = sf_traffic_recount(&scene, &c, &(fx_memory_counts){0}, 0, 4);
   ck_assert_uint_eq(traffic.table_bytes, 9 * 16 * 8 * 2);
   ck_assert_uint_eq(traffic.frame_bytes, 4 * 48);
-  ck_ok(sf_ledgers_make(&tech, &scene.net, &c, &traffic, sf_table_size(&scene), l));
+  const fx_memory_counts memory = {.groups = 1};
+  const sf_counted counted = {&scene, &c, &memory, &traffic, sf_cache_built};
+  ck_ok(sf_ledgers_make(&tech, &counted, l));
   for (int g = 0; g < SF_LEDGERS; g++) {
     uint64_t cells = 0, parts = 0;
     for (int r = 0; r < SF_ROWS; r++)
@@ -326,19 +420,19 @@ TEST(break_even_rate_breaks_even)
     const sf_break_even *b = &l->break_even[i];
     const double total = (double)l->total[b->ledger], twin = (double)l->total[b->twin];
     double spikes = (double)l->part[b->ledger][SF_PART_SOP];
-    if (b->ledger >= SF_LEDGER_MEMORY) spikes += (9 + 10 + 15) * 10; /* weights that spikes read */
+    if (b->ledger >= SF_LEDGER_MEMORY) spikes += (3 + 2 + 5) * 80; /* rows that spikes read */
     if (twin < total - spikes)
       ck_assert(isnan(b->rate));
     else
       ck_assert_double_eq_tol(total - spikes + spikes * b->rate / l->rate, twin, 1e-6 * twin);
   }
-  ck_assert_int_eq(l->break_even[SF_SPIKING_LEDGERS].twin, SF_LEDGER_ANN);
+  ck_assert_int_eq(l->break_even[SF_OWN_BREAK_EVENS].twin, SF_LEDGER_ANN);
 }
 
 TEST(sensitivity_is_the_saving_at_other_prices)
 {
-  ck_assert_int_eq(l->sensitivities, 9);
-  bool seen[9] = {false};
+  ck_assert_int_eq(l->sensitivities, 10);
+  bool seen[10] = {false};
   for (int i = 0; i < l->sensitivities; i++) {
     const sf_sensitivity *s = &l->sensitivity[i];
     double largest = 0;
@@ -356,7 +450,7 @@ TEST(sensitivity_is_the_saving_at_other_prices)
     ck_assert_double_eq(s->swing, largest);
     if (i > 0) ck_assert_double_le(s->swing, l->sensitivity[i - 1].swing);
   }
-  for (int i = 0; i < 9; i++) ck_assert(seen[i]);
+  for (int i = 0; i < 10; i++) ck_assert(seen[i]);
   ck_assert_double_gt(l->sensitivity[0].swing, 1);
 }
 
@@ -369,7 +463,7 @@ TEST(a_decoder_alone_has_no_density_rows)
   for (int i = 0; i < SF_LAYERS; i++) net.layer[i].n_in = size[i][0], net.layer[i].n_out = size[i][1];
   c.layer[FX_C1].mac[0] = c.layer[FX_C1].weight[0] = 2 * 19200;
   sf_ledgers *l = malloc(sizeof *l);
-  ck_ok(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l));
+  ck_ok(make_ledgers(&tech, &net, &c, &small_traffic, l));
   ck_assert_uint_eq(l->total[SF_LEDGER_ANN], 2 * 35968 * (uint64_t)4600);
   ck_assert_uint_eq(l->total[SF_LEDGER_INT], 2 * 35968 * (uint64_t)96);
   ck_assert_uint_eq(l->total[SF_LEDGER_WIDTH], 2 * 19200 * (uint64_t)(96 + 27));
@@ -385,11 +479,11 @@ TEST(too_much_energy_is_refused)
   fx_counts c = small_counts(&net);
   sf_ledgers *l = malloc(sizeof *l);
   const sf_traffic much = {.frame_bytes = UINT64_MAX / 1100};
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &much, 1000, l).code, SF_E_RANGE); /* at 1.5 times the price */
+  ck_assert_int_eq(make_ledgers(&tech, &net, &c, &much, l).code, SF_E_RANGE); /* at 1.5 times the price */
   const sf_traffic less = {.frame_bytes = UINT64_MAX / 1600};
-  ck_ok(sf_ledgers_make(&tech, &net, &c, &less, 1000, l));
+  ck_ok(make_ledgers(&tech, &net, &c, &less, l));
   c.layer[FX_D2].sop[0] = UINT64_MAX - 1;
-  ck_assert_int_eq(sf_ledgers_make(&tech, &net, &c, &small_traffic, 1000, l).code, SF_E_RANGE);
+  ck_assert_int_eq(make_ledgers(&tech, &net, &c, &small_traffic, l).code, SF_E_RANGE);
   free(l);
 }
 

@@ -57,8 +57,14 @@ TEST(hash_grid)
   ck_assert_uint_eq(still->rtl_traffic.table_bytes, still->core.samples * 4 * 8 * 2);
   ck_assert_uint_eq(still->rtl_traffic.exp_neg, still->core.samples);
   ck_assert_uint_eq(still->rtl_traffic.frame_bytes, RAYS * SF_PIXEL_BYTES);
-  ck_assert_mem_eq(&still->rtl_traffic, &still->recount_traffic, sizeof(sf_traffic));
-  ck_assert_mem_eq(&still->rtl_traffic, &still->core_traffic, sizeof(sf_traffic));
+  ck_assert_mem_eq(&still->core_traffic, &still->recount_traffic, sizeof(sf_traffic));
+  for (int e = 0; e < SF_TRAFFIC_AT_PORTS; e++)
+    ck_assert_uint_eq(still->rtl_traffic.event[e], still->core_traffic.event[e]);
+  ck_assert_uint_eq(still->core_traffic.lookups, still->core_memory.lookups);
+  ck_assert_uint_gt(still->core_traffic.lookups, still->core.samples * 4 * 4); /* four pairs a level at least */
+  ck_assert_uint_gt(still->core_traffic.misses, 0);
+  ck_assert_uint_gt(still->core_memory.groups, 0);
+  ck_assert_mem_eq(&still->core_memory, &still->recount_memory, sizeof(fx_memory_counts));
   ck_assert_mem_eq(&still->rtl_traffic, &stalled->rtl_traffic, sizeof(sf_traffic)); /* stalls change cycles alone */
   ck_assert_uint_gt(stalled->cycles, still->cycles);
   free(still), free(stalled);

@@ -4,6 +4,8 @@ package sf_arch_pkg;
   localparam integer MACS = 128;  // multipliers of D1 and C1; neurons that a row of weights is worked on for at once
   localparam integer NEURONS = 16;  // neuron units
   localparam integer STEPS_AT_ONCE = 2;  // steps that C2 sums up side by side
+  localparam integer CACHE_BYTES = 32768;  // the field's cache: a power of two, 1024 to 65536
+  localparam integer CACHE_WAYS = 4;  // its lines per set: 1, 2, 4 or 8
   localparam integer T_MAX = 8;  // time steps of one unrolling
   localparam integer OUT_MAX = 16;  // neurons of an integrating output layer
   localparam integer FEATURE_MAX = 32;  // features per sample: inputs of the first density layer

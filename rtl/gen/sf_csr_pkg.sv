@@ -3,7 +3,7 @@ package sf_csr_pkg;
   localparam [12:0] ID = 13'h0000;
   localparam [31:0] ID_RESET = 32'h53464c44;
   localparam [12:0] VERSION = 13'h0004;
-  localparam [31:0] VERSION_RESET = 32'h00040000;
+  localparam [31:0] VERSION_RESET = 32'h00050000;
   localparam [12:0] CONFIG = 13'h0008;
   localparam [31:0] CONFIG_RESET = 32'h5041087f;
   localparam [12:0] CTRL = 13'h000c;
@@ -55,6 +55,17 @@ package sf_csr_pkg;
   localparam [12:0] RAY_BACKGROUND_B = 13'h0420;
   localparam [12:0] ENCODER_ADDRESS = 13'h0424;
   localparam [12:0] ENCODER_DATA = 13'h0428;
+  localparam [12:0] FIELD_BASE = 13'h042c;
+  localparam [12:0] FIELD_CACHE = 13'h0430;
+  localparam [31:0] FIELD_CACHE_RESET = 32'h04008000;
+  localparam [12:0] FIELD_LOOKUPS = 13'h0434;
+  localparam [12:0] FIELD_LOOKUPS_HIGH = 13'h0438;
+  localparam [12:0] FIELD_MISSES = 13'h043c;
+  localparam [12:0] FIELD_MISSES_HIGH = 13'h0440;
+  localparam [12:0] FIELD_FILLS = 13'h0444;
+  localparam [12:0] FIELD_FILLS_HIGH = 13'h0448;
+  localparam [12:0] FIELD_STALLS = 13'h044c;
+  localparam [12:0] FIELD_STALLS_HIGH = 13'h0450;
   localparam [12:0] COUNTERS = 13'h1000;
   localparam integer CONFIG_LANES = 0;
   localparam integer CONFIG_T_MAX = 8;
@@ -92,6 +103,7 @@ package sf_csr_pkg;
   localparam integer ENGINE_NEURONS = 8;
   localparam integer ENGINE_STEPS_AT_ONCE = 16;
   localparam integer RAY_CTRL_START = 0;
+  localparam integer RAY_CTRL_CLEAR = 1;
   localparam integer RAY_STATUS_RUNNING = 0;
   localparam integer RAY_STATUS_ACTIVE = 1;
   localparam integer RAY_STATUS_ERROR = 2;
@@ -99,10 +111,21 @@ package sf_csr_pkg;
   localparam integer RAY_ERROR_BUSY = 1;
   localparam integer RAY_ERROR_ADDRESS = 2;
   localparam integer RAY_ERROR_ORDER = 3;
+  localparam integer RAY_ERROR_MEMORY = 4;
+  localparam integer FIELD_CACHE_BYTES = 0;
+  localparam integer FIELD_CACHE_WAYS = 24;
   localparam integer WEIGHTS_WORDS = 163840;
   localparam integer WEIGHTS_BITS = 32;
   localparam integer ENCODER_WORDS = 256;
   localparam integer ENCODER_BITS = 32;
   localparam integer COUNTERS_WORDS = 512;
   localparam integer COUNTERS_BITS = 64;
+  localparam [2:0] EVENT_MAC = 3'd0;  // MAC
+  localparam [2:0] EVENT_SOP = 3'd1;  // SOP
+  localparam [2:0] EVENT_SPIKES = 3'd2;  // spikes
+  localparam [2:0] EVENT_UPDATES = 3'd3;  // neuron updates
+  localparam [2:0] EVENT_WEIGHT = 3'd4;  // weight bytes read
+  localparam [2:0] EVENT_STATE_R = 3'd5;  // state bytes read
+  localparam [2:0] EVENT_STATE_W = 3'd6;  // state bytes written
+  localparam [2:0] EVENT_SPECIAL = 3'd7;  // special functions
 endpackage

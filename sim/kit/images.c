@@ -186,6 +186,16 @@ static void put_sizes(FILE *file, const fx_net *net, const char *name, bool outp
   fprintf(file, ";  // 16 bits a layer: C3 C2 C1 D2 D1\n");
 }
 
+/* event_name(e), for messages. */
+static void put_event_names(FILE *file)
+{
+  fputs("function automatic [127:0] event_name(input [2:0] e);\n  case (e)\n", file);
+#define EVENT(id, name, title, unit, fj) fprintf(file, "    %d: event_name = \"" #name "\";\n", SF_EVENT_##id);
+  SF_EVENT_TABLE(EVENT)
+#undef EVENT
+  fputs("  endcase\nendfunction\n", file);
+}
+
 static sf_status write_parameters(sf_kit_output *output, const fx_net *net, const sf_kit_options *o,
                                   const sf_kit_report *report)
 {
@@ -194,7 +204,7 @@ static sf_status write_parameters(sf_kit_output *output, const fx_net *net, cons
   for (int l = 0; l < SF_LAYERS; l++) rows += fx_layer_rows(&net->layer[l]);
   SF_TRY(sf_kit_begin(output, &file, "sf_kit_params.svh"));
   FILE *f = file.writer.file;
-  fprintf(f, "// Sizes of this kit and the registers its bench uses.\n");
+  fprintf(f, "// Sizes of this kit, the registers its bench uses and the names of the counters.\n");
   fprintf(f, "localparam integer SAMPLES = %d;\nlocalparam integer STEPS = %d;\n", report->samples, net->steps);
   fprintf(f, "localparam integer BEATS = %d;\nlocalparam integer WRITES = %d;\n", report->beats, report->writes);
   fprintf(f, "localparam integer WEIGHT_ROWS = %d;\nlocalparam [31:0] SEED = 32'h%08" PRIx32 ";\n", rows,
@@ -212,6 +222,7 @@ static sf_status write_parameters(sf_kit_output *output, const fx_net *net, cons
 #include "spikefield/csr.def"
 #undef SF_CSR
   fprintf(f, "localparam [31:0] STATUS_COUNTERS = 32'h%08x;\n", (unsigned)SF_CSR_STATUS_COUNTERS);
+  put_event_names(f);
   fprintf(f, "localparam [31:0] CTRL_SNAPSHOT = 32'h%08x;\n", (unsigned)SF_CSR_CTRL_SNAPSHOT);
   return sf_kit_end(output, &file);
 }

@@ -328,19 +328,7 @@ module sf_kit_tb;
     end
   endtask
 
-  // ---- counters: 0 mac, 1 sop, 2 spikes, 3 updates, 4 weight, 5 state_r, 6 state_w, 7 special
-  function automatic [127:0] event_name(input integer e);
-    case (e)
-      0: event_name = "mac";
-      1: event_name = "sop";
-      2: event_name = "spikes";
-      3: event_name = "updates";
-      4: event_name = "weight";
-      5: event_name = "state_r";
-      6: event_name = "state_w";
-      default: event_name = "special";
-    endcase
-  endfunction
+  // ---- counters
   reg [8:0] counter_at = 9'd0;
   task compare_counter(input [63:0] actual);
     if (actual !== counters[counter_at]) begin

@@ -12,6 +12,8 @@ typedef struct run {
   sf_dut *dut;
   sf_ray_dut *rays; /* NULL: it has no encoder for the scene's field */
   sf_observer core;
+  fx_memory memory;
+  sf_memory_recount lines;
   sf_dut_result result;
   bool check_counters; /* after every sample: only to find the sample of a difference, it is slow */
   sf_ray_sample sample[SAMPLES_MAX];
@@ -82,43 +84,54 @@ static sf_status name_ray(const run *r, uint64_t index, sf_status status)
   return sf_fail(status.code, "%s: %s", name, status.message);
 }
 
-static sf_status net_ray(run *r, const fx_ray *ray, fx_pixel *pixel)
+static uint64_t tile_of(const run *r, uint64_t index)
 {
-  sf_observer_begin(&r->core);
-  return fx_render_ray(r->job->scene, ray, rtl_net, r, pixel, &r->core.core);
+  return r->job->tile ? r->job->tile(r->job->user, index) : index;
+}
+
+static sf_status net_ray(run *r, uint64_t index, const fx_ray *ray, fx_pixel *pixel)
+{
+  return sf_observer_ray(&r->core, r->job->scene, ray, tile_of(r, index), rtl_net, r, pixel);
 }
 
 /* The counters differ although outputs and spikes agree: again, with the counters read at every sample. */
-static sf_status find_counter_sample(run *r, const fx_ray *ray, sf_status difference)
+static sf_status find_counter_sample(run *r, uint64_t index, const fx_ray *ray, sf_status difference)
 {
   fx_pixel pixel;
   r->check_counters = true;
   SF_TRY(sf_dut_clear_counts(r->dut));
-  const sf_status status = net_ray(r, ray, &pixel);
+  const sf_status status = net_ray(r, index, ray, &pixel);
   return status.code == SF_E_DIFFERENCE ? status : difference;
 }
 
 /* The samples that the core took through the accelerator with encoder and compositor: its pixel, what it reads, what
  * it writes. */
-static sf_status ray_traffic(run *r, const fx_ray *ray, const fx_pixel *core)
+static sf_status ray_traffic(run *r, uint64_t index, const fx_ray *ray, const fx_pixel *core)
 {
-  const sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);
-  const uint64_t asked = r->rays->memory.asked;
+  sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);
+  sf_field_counters field;
   fx_pixel pixel;
+  request.new_tile = sf_ray_dut_new_tile(r->rays, tile_of(r, index));
   SF_TRY(sf_ray_dut_run(r->rays, &request, 1, &pixel));
   SF_TRY(sf_compare_pixel(core, &pixel, sf_dut_cycle(r->rays->dut)));
-  r->sum->rtl_traffic.table_bytes += (r->rays->memory.asked - asked) * sizeof *r->rays->memory.data;
+  SF_TRY(sf_ray_dut_field(r->rays, &field));
+  r->sum->rtl_traffic.lookups = field.lookups, r->sum->rtl_traffic.misses = field.misses;
+  r->sum->rtl_traffic.table_bytes += pixel.samples * fx_grid_bytes(&r->job->scene->grid);
   r->sum->rtl_traffic.exp_neg += pixel.samples;
   r->sum->rtl_traffic.frame_bytes += sizeof pixel;
   return sf_ok();
 }
 
-static sf_status compare_all(const sf_three_counts *s)
+/* A cache of another shape than the block's is the core's and the recount's alone. */
+static sf_status compare_all(const sf_three_counts *s, const fx_cache_shape *cache)
 {
+  const bool built = cache->bytes == sf_cache_built.bytes && cache->ways == sf_cache_built.ways;
+  const int events = built ? SF_TRAFFIC_AT_PORTS : SF_TRAFFIC_LOOKUP;
   SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
-  SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount"));
+  SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount", SF_TRAFFIC_EVENTS));
+  SF_TRY(sf_memory_compare(&s->core_memory, "core", &s->recount_memory, "recount"));
   if (s->no_rtl_traffic) return sf_ok();
-  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator");
+  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", events);
 }
 
 static sf_status one_ray(run *r, uint64_t index)
@@ -128,19 +141,21 @@ static sf_status one_ray(run *r, uint64_t index)
   fx_pixel pixel;
   SF_TRY(r->job->ray(r->job->user, index, &ray));
   s->rays++;
-  const sf_status ran = net_ray(r, &ray, &pixel); /* broken off by a difference: what was counted until then */
+  const sf_status ran = net_ray(r, index, &ray, &pixel); /* broken off by a difference: what was counted until then */
   if (ran.code != SF_OK && ran.code != SF_E_DIFFERENCE) return ran;
   fx_counts_add(&s->core, &r->core.core);
   fx_counts_add(&s->recount, &r->core.recount);
-  s->core_traffic = sf_traffic_of(&s->core, (uint64_t)s->rays);
-  s->recount_traffic = sf_traffic_recount(r->job->scene, &s->recount, s->core.field_samples, (uint64_t)s->rays);
+  s->core_memory = r->memory.counts, s->recount_memory = r->lines.counts;
+  s->core_traffic = sf_traffic_of(r->job->scene, &s->core, &s->core_memory, (uint64_t)s->rays);
+  s->recount_traffic =
+      sf_traffic_recount(r->job->scene, &s->recount, &s->recount_memory, s->core.field_samples, (uint64_t)s->rays);
   const sf_status read = sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls);
   if (ran.code != SF_OK) return name_ray(r, index, ran);
   SF_TRY(read);
-  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, &ray, &pixel)));
+  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, index, &ray, &pixel)));
   const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
-  if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, &ray, status));
-  return name_ray(r, index, compare_all(s));
+  if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, index, &ray, status));
+  return name_ray(r, index, compare_all(s, &r->memory.cache.shape));
 }
 
 static sf_status all_rays(run *r)
@@ -157,6 +172,9 @@ static sf_status all_rays(run *r)
 static sf_status open_and_run(run *r)
 {
   const fx_scene *scene = r->job->scene;
+  const fx_cache_shape *cache = r->job->cache.bytes ? &r->job->cache : &sf_cache_built;
+  SF_TRY(fx_memory_open(&r->memory, scene, cache));
+  SF_TRY(sf_memory_recount_open(&r->lines, scene, cache));
   SF_TRY(sf_dut_open(&r->dut, scene, &r->job->dut));
   r->sum->no_rtl_traffic = scene->backbone != FX_INGP; /* of which it has no encoder */
   if (!r->sum->no_rtl_traffic) SF_TRY(sf_ray_dut_open(&r->rays, scene, &r->job->dut));
@@ -172,7 +190,9 @@ sf_status sf_three_counts_run(const sf_three_job *job, sf_three_counts *counts)
   sf_status status = sf_fail(SF_E_MEMORY, "no memory for the three counts");
   if (r && trace) {
     r->job = job, r->sum = counts, r->core.net = &job->scene->net, r->core.trace = trace;
+    r->core.memory = &r->memory, r->core.lines = &r->lines;
     status = open_and_run(r);
+    fx_memory_close(&r->memory), sf_memory_recount_close(&r->lines);
     sf_ray_dut_close(r->rays);
     if (r->dut) sf_dut_close(r->dut);
   }

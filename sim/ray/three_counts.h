@@ -13,6 +13,8 @@ typedef struct sf_three_job {
   bool (*tick)(void *user, int done);                                /* false stops; may be NULL */
   void *user;
   sf_dut_options dut;
+  fx_cache_shape cache;                         /* as in sf_measure_job */
+  uint64_t (*tile)(void *user, uint64_t index); /* as in sf_measure_job */
 } sf_three_job;
 
 /* Counts must hold what `wanted` says; everything else is set. Each sample goes through core and accelerator: outputs,

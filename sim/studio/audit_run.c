@@ -18,14 +18,27 @@ typedef struct place {
 
 /* ---- rays ---- */
 
+static uint64_t smaller(uint64_t a, uint64_t b)
+{
+  return a < b ? a : b;
+}
+
+/* Pixels tile by tile: tiles from left to right and top to bottom, and pixels within a tile likewise. */
+static place pixel_place(const sf_camera *camera, int view, uint64_t pixel)
+{
+  const uint64_t width = (uint64_t)camera->width, height = (uint64_t)camera->height;
+  const uint64_t top = pixel / (width * FX_TILE) * FX_TILE, high = smaller(height - top, FX_TILE);
+  const uint64_t left = (pixel - top * width) / (high * FX_TILE) * FX_TILE, wide = smaller(width - left, FX_TILE);
+  const uint64_t at = pixel - top * width - left * high;
+  return (place){view, (int)(left + at % wide), (int)(top + at / wide)};
+}
+
 static place ray_place(const sf_audit *a, uint64_t index)
 {
   const sf_camera *camera = &a->data.view[0].camera;
   if (a->opt.rays == 0) {
-    uint64_t pixel = index % a->pixels;
-    int first = a->opt.view >= 0 ? a->opt.view : 0;
-    return (place){first + (int)(index / a->pixels), (int)(pixel % (uint64_t)camera->width),
-                   (int)(pixel / (uint64_t)camera->width)};
+    const int first = a->opt.view >= 0 ? a->opt.view : 0;
+    return pixel_place(camera, first + (int)(index / a->pixels), index % a->pixels);
   }
   uint64_t seed = a->opt.seed;
   int view = a->opt.view >= 0 ? a->opt.view : (int)sf_random_below(seed, STREAM_VIEW, index, (uint64_t)a->data.count);
@@ -38,6 +51,12 @@ static sf_status make_ray(void *user, uint64_t index, fx_ray *ray)
   const sf_audit *a = user;
   place p = ray_place(a, index);
   return sf_pixel_ray(&a->scene, &a->data, &a->data.view[p.view], p.x, p.y, ray);
+}
+
+static uint64_t ray_tile(void *user, uint64_t index)
+{
+  const place p = ray_place(user, index);
+  return (uint64_t)p.view << 40 | (uint64_t)(p.y / FX_TILE) << 20 | (uint64_t)(p.x / FX_TILE);
 }
 
 static bool tick(const sf_audit *a, const char *what, uint64_t done, uint64_t total)
@@ -147,7 +166,9 @@ static sf_status run_rtl(sf_audit *a)
                             .name = name_ray,
                             .tick = rtl_tick,
                             .user = a,
-                            .dut = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg}};
+                            .dut = {.seed = a->opt.seed, .stall_percent = a->opt.stall, .plusarg = a->opt.plusarg},
+                            .cache = a->opt.cache,
+                            .tile = ray_tile};
   if (status.code == SF_OK) status = sf_three_counts_run(&job, three);
   free(index);
   return status;
@@ -182,14 +203,17 @@ static sf_status count_twin(sf_audit *a)
 sf_status sf_audit_count(sf_audit *a)
 {
   sf_audit_report *r = &a->report;
-  const sf_measure_job job = {&a->scene, r->rays, make_ray, core_tick, a, a->opt.seed, a->opt.recount_rays};
+  const sf_measure_job job = {&a->scene,           r->rays,      make_ray, core_tick, a, a->opt.seed,
+                              a->opt.recount_rays, a->opt.cache, ray_tile};
   const sf_status status = sf_measure_rays(&job, &r->measure);
   if (status.code == SF_E_DIFFERENCE) return sf_fail(status.code, "%s: %s", a->opt.scene, status.message);
   SF_TRY(status);
   const fx_counts *counts = &r->measure.core;
   SF_TRY(sf_ledger_make(&a->scene.net, counts, &r->ledger));
-  r->traffic = sf_traffic_of(counts, r->rays);
-  SF_TRY(sf_ledgers_make(&a->technology, &a->scene.net, counts, &r->traffic, sf_table_size(&a->scene), &r->ledgers));
+  if (a->scene.backbone == FX_INGP) r->entries = counts->grid_bytes / FX_GRID_FEATURES;
+  r->traffic = sf_traffic_of(&a->scene, counts, &r->measure.memory, r->rays);
+  const sf_counted counted = {&a->scene, counts, &r->measure.memory, &r->traffic, r->cache};
+  SF_TRY(sf_ledgers_make(&a->technology, &counted, &r->ledgers));
   SF_TRY(count_twin(a));
   return run_rtl(a);
 }
@@ -197,6 +221,10 @@ sf_status sf_audit_count(sf_audit *a)
 sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options)
 {
   *audit = (sf_audit){.opt = *options};
+  if (!audit->opt.cache.bytes) audit->opt.cache.bytes = sf_cache_built.bytes;
+  if (!audit->opt.cache.ways) audit->opt.cache.ways = sf_cache_built.ways;
+  SF_TRY(fx_cache_check(&audit->opt.cache));
+  audit->report.cache = audit->opt.cache;
   SF_TRY(sf_audit_technology(&audit->technology, audit->opt.tech));
   return load(audit);
 }

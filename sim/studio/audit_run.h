@@ -13,8 +13,9 @@ typedef struct sf_audit_options {
   uint64_t seed, recount_rays;
   int rtl_rays, stall;
   const char *plusarg;
-  const char *tech; /* a file, or the name of one beside the program: ../share/spikefield/tech/NAME.tech */
-  const char *twin; /* float model of a ReLU twin, or NULL */
+  fx_cache_shape cache; /* of the field; zeros: as built */
+  const char *tech;     /* a file, or the name of one beside the program: ../share/spikefield/tech/NAME.tech */
+  const char *twin;     /* float model of a ReLU twin, or NULL */
   bool (*tick)(void *user, const char *what, uint64_t done, uint64_t total); /* rays; false stops */
   void *user;
 } sf_audit_options;

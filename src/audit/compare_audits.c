@@ -7,20 +7,26 @@
 typedef struct side {
   const cJSON *json, *technology, *ledgers, *layers;
   const char *name;
+  int scheme; /* of the prices: 1 by the byte, 2 by the access */
   double views;
 } side;
 
-/* All ledgers of this version, in their order. */
+static bool is_ledger(const cJSON *ledger)
+{
+  return cJSON_IsString(sf_json_get(ledger, "key")) && cJSON_IsString(sf_json_get(ledger, "title")) &&
+         cJSON_IsNumber(sf_json_get(ledger, "mj_per_view")) && cJSON_IsObject(sf_json_get(ledger, "parts_fj")) &&
+         cJSON_GetArraySize(sf_json_get(ledger, "rows")) == SF_ROWS;
+}
+
+/* All of its scheme, in any order. */
 static bool has_ledgers(const cJSON *list)
 {
-  if (cJSON_GetArraySize(list) != SF_LEDGERS) return false;
-  for (int g = 0; g < SF_LEDGERS; g++) {
-    const cJSON *ledger = cJSON_GetArrayItem(list, g);
-    if (!sf_json_says(ledger, "key", sf_ledger_texts[g].key) || !cJSON_IsNumber(sf_json_get(ledger, "mj_per_view")) ||
-        !cJSON_IsObject(sf_json_get(ledger, "parts_fj")) || cJSON_GetArraySize(sf_json_get(ledger, "rows")) != SF_ROWS)
-      return false;
+  const cJSON *ledger;
+  cJSON_ArrayForEach(ledger, list)
+  {
+    if (!is_ledger(ledger)) return false;
   }
-  return true;
+  return cJSON_GetArraySize(list) > 0;
 }
 
 static sf_status open_side(const cJSON *json, const char *name, side *s)
@@ -31,12 +37,67 @@ static sf_status open_side(const cJSON *json, const char *name, side *s)
               .technology = sf_json_get(ledgers, "technology"),
               .ledgers = sf_json_get(ledgers, "list")};
   s->layers = sf_json_get(sf_json_get(json, "counts"), "layers");
-  if (!sf_json_says(json, "format", SF_AUDIT_FORMAT) || !cJSON_IsNumber(views) || !(views->valuedouble > 0) ||
-      !has_ledgers(s->ledgers) || cJSON_GetArraySize(s->layers) != SF_LAYERS ||
-      !cJSON_IsArray(sf_json_get(s->technology, "prices")))
-    return sf_fail(SF_E_FORMAT, "%s: not a report of energy_audit --json, format %s", name, SF_AUDIT_FORMAT);
+  s->scheme = sf_json_says(json, "format", SF_AUDIT_FORMAT) ? 2 : sf_json_says(json, "format", SF_AUDIT_FORMAT_1);
+  if (!s->scheme || !cJSON_IsNumber(views) || !(views->valuedouble > 0) || !has_ledgers(s->ledgers) ||
+      cJSON_GetArraySize(s->layers) != SF_LAYERS || !cJSON_IsArray(sf_json_get(s->technology, "prices")))
+    return sf_fail(SF_E_FORMAT, "%s: not a report of energy_audit --json, format %s or %s", name, SF_AUDIT_FORMAT,
+                   SF_AUDIT_FORMAT_1);
   s->views = views->valuedouble;
   return sf_ok();
+}
+
+/* ---- ledgers of both ---- */
+
+static const cJSON *find_ledger(const side *s, const char *key)
+{
+  const cJSON *ledger;
+  cJSON_ArrayForEach(ledger, s->ledgers)
+  {
+    if (sf_json_says(ledger, "key", key)) return ledger;
+  }
+  return NULL;
+}
+
+/* The same events at the same kinds of prices in every scheme. */
+static bool is_arithmetic(const char *key)
+{
+  static const char *const keys[] = {"paper", "width", "ann_fp32", "ann_int"};
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+    if (!strcmp(keys[i], key)) return true;
+  return false;
+}
+
+/* NULL: the ledger can be compared. */
+static const char *obstacle(const side *a, const side *b, const char *key)
+{
+  if (!find_ledger(a, key)) return "A does not have it";
+  if (!find_ledger(b, key)) return "B does not have it";
+  if (a->scheme == b->scheme || is_arithmetic(key)) return NULL;
+  return "one report prices memories by the byte, without the field's cache and arithmetic; the other by the access";
+}
+
+static void add_obstacles(cJSON *list, const side *of, const side *a, const side *b)
+{
+  const cJSON *ledger;
+  cJSON_ArrayForEach(ledger, of->ledgers)
+  {
+    const char *key = sf_json_text(ledger, "key"), *why = obstacle(a, b, key);
+    if (!why || (of == b && find_ledger(a, key))) continue;
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "key", key);
+    cJSON_AddStringToObject(item, "title", sf_json_text(ledger, "title"));
+    cJSON_AddStringToObject(item, "why", why);
+    cJSON_AddItemToArray(list, item);
+  }
+}
+
+/* Ledgers that stand in one report alone, or mean something else there. */
+static cJSON *not_comparable(const side *a, const side *b)
+{
+  cJSON *list = cJSON_CreateArray();
+  add_obstacles(list, a, a, b);
+  add_obstacles(list, b, a, b);
+  return list;
 }
 
 /* ---- settings ---- */
@@ -77,10 +138,14 @@ static void add_prices(cJSON *list, const side *of, const side *a, const side *b
 
 static cJSON *settings(const side *a, const side *b)
 {
-  static const char *const keys[] = {"scene", "scene_sha256", "data", "split", "t_r", "views", "seed", "samples"};
+  static const char *const keys[] = {"scene", "scene_sha256", "data",    "split", "t_r",
+                                     "views", "seed",         "samples", "format"};
   cJSON *list = cJSON_CreateArray();
   for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
     add_setting(list, keys[i], sf_json_get(a->json, keys[i]), sf_json_get(b->json, keys[i]));
+  const cJSON *x = sf_json_get(a->json, "cache"), *y = sf_json_get(b->json, "cache");
+  add_setting(list, "cache bytes", sf_json_get(x, "bytes"), sf_json_get(y, "bytes"));
+  add_setting(list, "cache ways", sf_json_get(x, "ways"), sf_json_get(y, "ways"));
   add_setting(list, "technology", sf_json_get(a->technology, "title"), sf_json_get(b->technology, "title"));
   add_prices(list, a, a, b);
   add_prices(list, b, a, b);
@@ -151,11 +216,16 @@ static double sum_of(const cJSON *list)
 static cJSON *ledger_totals(const side *a, const side *b)
 {
   cJSON *list = cJSON_CreateArray();
-  for (int g = 0; g < SF_LEDGERS; g++) {
-    const cJSON *x = cJSON_GetArrayItem(a->ledgers, g), *y = cJSON_GetArrayItem(b->ledgers, g);
+  const cJSON *x;
+  cJSON_ArrayForEach(x, a->ledgers)
+  {
+    const char *key = sf_json_text(x, "key");
+    if (obstacle(a, b, key)) continue;
+    const cJSON *y = find_ledger(b, key);
     const double from = sf_json_number(x, "mj_per_view"), to = sf_json_number(y, "mj_per_view");
     cJSON *item = cJSON_CreateObject();
-    cJSON_AddStringToObject(item, "key", sf_ledger_texts[g].key);
+    cJSON_AddStringToObject(item, "key", key);
+    cJSON_AddStringToObject(item, "title", sf_json_text(x, "title"));
     cJSON_AddNumberToObject(item, "a_mj_per_view", from);
     cJSON_AddNumberToObject(item, "b_mj_per_view", to);
     add_percent(item, from, to);
@@ -167,33 +237,48 @@ static cJSON *ledger_totals(const side *a, const side *b)
   return list;
 }
 
+/* The title of a part of the energy, in the words of its report. */
+static const char *part_title(const side *s, const char *part)
+{
+  const cJSON *title = sf_json_get(sf_json_get(sf_json_get(s->json, "titles"), "parts"), part);
+  return cJSON_IsString(title) ? title->valuestring : part;
+}
+
 /* Of one ledger: by what the energy is spent on, then by row and step. mJ per view. */
-static cJSON *ledger_parts(const side *a, const side *b, int ledger)
+static cJSON *ledger_parts(const side *a, const side *b, const char *key)
 {
   changes list = {.count = 0};
-  const cJSON *x = sf_json_get(cJSON_GetArrayItem(a->ledgers, ledger), "parts_fj");
-  const cJSON *y = sf_json_get(cJSON_GetArrayItem(b->ledgers, ledger), "parts_fj");
-  for (int p = 0; p < SF_PARTS; p++)
-    add_change(&list, sf_part_titles[p], sf_json_number(x, sf_part_names[p]) * 1e-12 / a->views,
-               sf_json_number(y, sf_part_names[p]) * 1e-12 / b->views, false);
+  const cJSON *x = sf_json_get(find_ledger(a, key), "parts_fj"), *y = sf_json_get(find_ledger(b, key), "parts_fj");
+  const cJSON *part;
+  cJSON_ArrayForEach(part, x)
+  {
+    const double other = sf_json_get(y, part->string) ? sf_json_number(y, part->string) : 0;
+    add_change(&list, part_title(a, part->string), part->valuedouble * 1e-12 / a->views, other * 1e-12 / b->views,
+               false);
+  }
+  cJSON_ArrayForEach(part, y)
+  {
+    if (!sf_json_get(x, part->string))
+      add_change(&list, part_title(b, part->string), 0, part->valuedouble * 1e-12 / b->views, false);
+  }
   return changes_json(&list);
 }
 
-static double cell(const side *s, int ledger, int row, int step)
+static double cell(const side *s, const char *key, int row, int step)
 {
-  const cJSON *rows = sf_json_get(cJSON_GetArrayItem(s->ledgers, ledger), "rows");
+  const cJSON *rows = sf_json_get(find_ledger(s, key), "rows");
   const cJSON *item = cJSON_GetArrayItem(sf_json_get(cJSON_GetArrayItem(rows, row), "fj"), step);
   return cJSON_IsNumber(item) ? item->valuedouble * 1e-12 / s->views : 0;
 }
 
-static cJSON *ledger_cells(const side *a, const side *b, int ledger)
+static cJSON *ledger_cells(const side *a, const side *b, const char *key)
 {
   changes list = {.count = 0};
   for (int r = 0; r < SF_ROWS; r++)
     for (int t = 0; t < SF_T_MAX; t++) {
       char name[64];
       snprintf(name, sizeof name, r < SF_LAYERS ? "%s, step %d" : "%s", sf_row_names[r], t);
-      add_change(&list, name, cell(a, ledger, r, t), cell(b, ledger, r, t), false);
+      add_change(&list, name, cell(a, key, r, t), cell(b, key, r, t), false);
     }
   return changes_json(&list);
 }
@@ -201,12 +286,29 @@ static cJSON *ledger_cells(const side *a, const side *b, int ledger)
 static cJSON *energies(const side *a, const side *b)
 {
   cJSON *json = cJSON_CreateObject();
-  for (int g = 0; g < SF_LEDGERS; g++) {
-    cJSON *ledger = cJSON_AddObjectToObject(json, sf_ledger_texts[g].key);
-    cJSON_AddItemToObject(ledger, "parts", ledger_parts(a, b, g));
-    cJSON_AddItemToObject(ledger, "cells", ledger_cells(a, b, g));
+  const cJSON *x;
+  cJSON_ArrayForEach(x, a->ledgers)
+  {
+    const char *key = sf_json_text(x, "key");
+    if (obstacle(a, b, key)) continue;
+    cJSON *ledger = cJSON_AddObjectToObject(json, key);
+    cJSON_AddItemToObject(ledger, "parts", ledger_parts(a, b, key));
+    cJSON_AddItemToObject(ledger, "cells", ledger_cells(a, b, key));
   }
   return json;
+}
+
+/* What both counted. */
+static void add_traffic(changes *list, const side *a, const side *b)
+{
+  const cJSON *x = sf_json_get(sf_json_get(a->json, "counts"), "traffic");
+  const cJSON *y = sf_json_get(sf_json_get(b->json, "counts"), "traffic");
+  for (int e = SF_TRAFFIC_LOOKUP; e < SF_TRAFFIC_EVENTS; e++) {
+    const char *name = sf_traffic_events[e].name;
+    if (sf_json_get(x, name) && sf_json_get(y, name))
+      add_change(list, sf_traffic_events[e].title, sf_json_number(x, name) / a->views,
+                 sf_json_number(y, name) / b->views, true);
+  }
 }
 
 /* Events per view, all steps, and firing rates. */
@@ -228,6 +330,7 @@ static cJSON *events(const side *a, const side *b)
              true);
   add_change(&list, sf_traffic_events[SF_TRAFFIC_TABLE].title, sf_json_number(x, "grid_bytes") / a->views,
              sf_json_number(y, "grid_bytes") / b->views, true);
+  add_traffic(&list, a, b);
   return changes_json(&list);
 }
 
@@ -242,74 +345,9 @@ sf_status sf_audits_compare(const cJSON *a, const char *a_name, const cJSON *b, 
   sf_json_add_text(json, "b", b_name);
   cJSON_AddItemToObject(json, "settings", settings(&x, &y));
   cJSON_AddItemToObject(json, "ledgers", ledger_totals(&x, &y));
+  cJSON_AddItemToObject(json, "not_comparable", not_comparable(&x, &y));
   cJSON_AddItemToObject(json, "energies_mj_per_view", energies(&x, &y));
   cJSON_AddItemToObject(json, "events_per_view", events(&x, &y));
   *comparison = json;
   return sf_ok();
-}
-
-/* ---- text ---- */
-
-static void print_value(FILE *out, const cJSON *value)
-{
-  if (cJSON_IsString(value))
-    fprintf(out, "%s", value->valuestring);
-  else if (cJSON_IsNumber(value))
-    fprintf(out, "%.10g", value->valuedouble);
-  else
-    fprintf(out, "-");
-}
-
-static void print_percent(FILE *out, const cJSON *item, const char *key)
-{
-  const double percent = sf_json_number(item, key);
-  if (isnan(percent))
-    fprintf(out, " %10s", "-");
-  else
-    fprintf(out, " %+9.2f%%", percent);
-}
-
-static void print_changes(FILE *out, const cJSON *list, const char *title, int most)
-{
-  const int count = cJSON_GetArraySize(list);
-  fprintf(out, "%s%s\n", title, count ? "" : ": none");
-  for (int i = 0; i < count && i < most; i++) {
-    const cJSON *item = cJSON_GetArrayItem(list, i);
-    fprintf(out, "  %-28s %14.6g %14.6g %+14.6g", sf_json_get(item, "name")->valuestring, sf_json_number(item, "a"),
-            sf_json_number(item, "b"), sf_json_number(item, "change"));
-    print_percent(out, item, "change_percent");
-    fprintf(out, "\n");
-  }
-  if (count > most) fprintf(out, "  and %d smaller ones\n", count - most);
-}
-
-void sf_comparison_print(FILE *out, const cJSON *comparison)
-{
-  enum { MOST = 16 };
-  const cJSON *item;
-  fprintf(out, "A: %s\nB: %s\n", sf_json_get(comparison, "a")->valuestring, sf_json_get(comparison, "b")->valuestring);
-  cJSON_ArrayForEach(item, sf_json_get(comparison, "settings"))
-  {
-    fprintf(out, "  %-24s ", sf_json_get(item, "name")->valuestring);
-    print_value(out, sf_json_get(item, "a"));
-    fprintf(out, " -> ");
-    print_value(out, sf_json_get(item, "b"));
-    fprintf(out, "\n");
-  }
-  fprintf(out, "\n%-21s %14s %14s %10s   %s\n", "mJ per view", "A", "B", "change", "saving of A and of B");
-  for (int g = 0; g < SF_LEDGERS; g++) {
-    item = cJSON_GetArrayItem(sf_json_get(comparison, "ledgers"), g);
-    fprintf(out, "%-21s %14.6g %14.6g", sf_ledger_texts[g].title, sf_json_number(item, "a_mj_per_view"),
-            sf_json_number(item, "b_mj_per_view"));
-    print_percent(out, item, "change_percent");
-    print_percent(out, item, "a_saving_percent");
-    print_percent(out, item, "b_saving_percent");
-    fprintf(out, "\n");
-  }
-  const cJSON *full =
-      sf_json_get(sf_json_get(comparison, "energies_mj_per_view"), sf_ledger_texts[SF_LEDGER_NEURON].key);
-  fprintf(out, "\nWhat changed, largest first: A, B, change\n");
-  print_changes(out, sf_json_get(full, "parts"), "energy of the ledger with neuron updates by kind, mJ per view", MOST);
-  print_changes(out, sf_json_get(full, "cells"), "the same by layer and step", MOST);
-  print_changes(out, sf_json_get(comparison, "events_per_view"), "events per view, by relative change", MOST);
 }

@@ -5,7 +5,7 @@
 
 static void print_row(FILE *out, const char *title, uint64_t x, uint64_t y, uint64_t z, bool no_rtl)
 {
-  fprintf(out, "  %-22s %16" PRIu64, title, x);
+  fprintf(out, "  %-30s %16" PRIu64, title, x);
   if (no_rtl)
     fprintf(out, " %16s", "-");
   else
@@ -21,13 +21,14 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
   }
   fprintf(out, "three counts of %" PRIu64 " samples of %d rays (seed %" PRIu64 "), layers and steps added up here:\n",
           s->core.samples, s->rays, seed);
-  fprintf(out, "  %-22s %16s %16s %16s\n", "event", "core", "accelerator", "recount");
+  fprintf(out, "  %-30s %16s %16s %16s\n", "event", "core", "accelerator", "recount");
   for (int e = 0; e < SF_EVENTS; e++)
     print_row(out, sf_events[e].title, sf_event_total(&s->core, e), sf_event_total(&s->rtl, e),
               sf_event_total(&s->recount, e), false);
   const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
   for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
-    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e], s->no_rtl_traffic);
+    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e],
+              s->no_rtl_traffic || e >= SF_TRAFFIC_AT_PORTS);
   print_row(out, "paper ledger, fJ", sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount), false);
   fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
           s->stalls);
@@ -64,16 +65,45 @@ static const char *less(double saving)
   return saving < 0 ? "more" : "less";
 }
 
+/* What becomes of the saving where samples share weights, said plainly. */
+static void print_shared(FILE *out, const sf_ledgers *l)
+{
+  const double alone = l->saving[SF_LEDGER_NEURON], shared = l->saving[SF_LEDGER_SHARED];
+  fprintf(out, "Where %d samples share each read of weights, in both nets, it is %.2f%% %s", FX_SHARED, fabs(shared),
+          less(shared));
+  fprintf(out, "%s.\n", alone > 0 && shared <= 0 ? ": THE SAVING VANISHES" : "");
+}
+
 static void print_result(FILE *out, const sf_audit_report *r)
 {
   const sf_ledgers *l = &r->ledgers;
   const double paper = l->saving[SF_LEDGER_PAPER], all = l->saving[SF_LEDGER_NEURON];
   if (isnan(paper) || isnan(all)) return;
   fprintf(out,
-          "In the paper's metric it is estimated at %.6g mJ per view, %.2f%% %s than the twin; with memory and neuron "
-          "updates\n%.6g mJ, %.2f%% %s than an integer twin.\n\n",
+          "In the paper's metric it is estimated at %.6g mJ per view, %.2f%% %s than the twin; with everything priced "
+          "that is\ncounted %.6g mJ, %.2f%% %s than an integer twin with the same memory system.\n",
           (double)l->total[SF_LEDGER_PAPER] * 1e-12 / r->views, fabs(paper), less(paper),
           (double)l->total[SF_LEDGER_NEURON] * 1e-12 / r->views, fabs(all), less(all));
+  print_shared(out, l);
+  fprintf(out, "\n");
+}
+
+static void print_cache(FILE *out, const sf_audit_report *r)
+{
+  const sf_traffic *t = &r->traffic;
+  const fx_memory_counts *m = &r->measure.memory;
+  fprintf(out,
+          "field's cache, %d bytes, %d ways, emptied for each tile of %d x %d pixels: %" PRIu64 " look-ups, %" PRIu64
+          " lines missed (%.4f per look-up)\n",
+          r->cache.bytes, r->cache.ways, FX_TILE, FX_TILE, t->lookups, t->misses,
+          t->lookups ? (double)t->misses / (double)t->lookups : 0);
+  if (r->entries)
+    fprintf(out, "  per entry read: %.4f look-ups, %.4f misses\n", (double)t->lookups / (double)r->entries,
+            (double)t->misses / (double)r->entries);
+  fprintf(out,
+          "groups of %d samples that share weights: %" PRIu64 "; rows of D2, C2, C3 that they read: %" PRIu64
+          ", %" PRIu64 ", %" PRIu64 "\n\n",
+          FX_SHARED, m->groups, m->rows[0], m->rows[1], m->rows[2]);
 }
 
 void sf_report_print(FILE *out, const sf_audit_report *r)
@@ -87,6 +117,7 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   fprintf(out, "%" PRIu64 " samples, %.2f per ray, t_r = %d, %.1f s\n\n", c->samples,
           (double)c->samples / (double)r->rays, r->net->steps, r->seconds);
   sf_counts_print(out, r->net, c);
+  print_cache(out, r);
   sf_saturation_census(r->measure.core.saturated_samples, c->saturated_features, census, sizeof census);
   fprintf(out, "saturation: %s\n", census);
   if (sf_saturation_unexpected(r->net, r->measure.core.saturated_samples, unexpected, sizeof unexpected))
@@ -108,20 +139,32 @@ void sf_report_print(FILE *out, const sf_audit_report *r)
   sf_limits_print(out);
 }
 
-static cJSON *traffic_json(const sf_traffic *traffic)
+/* The first `events` of them. */
+static cJSON *traffic_json(const sf_traffic *traffic, int events)
 {
   cJSON *json = cJSON_CreateObject();
-  for (int e = 0; e < SF_TRAFFIC_EVENTS; e++) sf_json_add_u64(json, sf_traffic_events[e].name, traffic->event[e]);
+  for (int e = 0; e < events; e++) sf_json_add_u64(json, sf_traffic_events[e].name, traffic->event[e]);
   return json;
 }
 
-static cJSON *count_json(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic)
+static cJSON *count_json(const fx_net *net, const fx_counts *counts, const sf_traffic *traffic, int events)
 {
   cJSON *json = sf_counts_json(net, counts);
   if (traffic)
-    cJSON_AddItemToObject(json, "traffic", traffic_json(traffic));
+    cJSON_AddItemToObject(json, "traffic", traffic_json(traffic, events));
   else
     cJSON_AddNullToObject(json, "traffic");
+  return json;
+}
+
+/* What samples share, of all rays. */
+static cJSON *shared_json(const fx_memory_counts *memory)
+{
+  cJSON *json = cJSON_CreateObject(), *rows = cJSON_CreateObject();
+  cJSON_AddNumberToObject(json, "samples", FX_SHARED);
+  sf_json_add_u64(json, "groups", memory->groups);
+  for (int s = 0; s < FX_SPIKING; s++) sf_json_add_u64(rows, fx_layer_name(fx_spiking_layers[s] + 1), memory->rows[s]);
+  cJSON_AddItemToObject(json, "rows", rows);
   return json;
 }
 
@@ -136,9 +179,10 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
   sf_json_add_u64(json, "core_fj", sf_energy_fj(&s->core));
   sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
   sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
-  cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic));
-  cJSON_AddItemToObject(json, "rtl", count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic));
-  cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic));
+  cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic, SF_TRAFFIC_EVENTS));
+  cJSON_AddItemToObject(json, "rtl",
+                        count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic, SF_TRAFFIC_AT_PORTS));
+  cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic, SF_TRAFFIC_EVENTS));
   return json;
 }
 
@@ -155,6 +199,11 @@ static void add_origin(cJSON *json, const sf_audit_report *r)
   cJSON_AddBoolToObject(json, "random_rays", r->random_rays);
   cJSON_AddNumberToObject(json, "views", r->views);
   sf_json_add_u64(json, "samples", r->measure.core.samples);
+  cJSON *cache = cJSON_AddObjectToObject(json, "cache");
+  cJSON_AddNumberToObject(cache, "bytes", r->cache.bytes);
+  cJSON_AddNumberToObject(cache, "ways", r->cache.ways);
+  cJSON_AddNumberToObject(cache, "line_bytes", FX_LINE);
+  cJSON_AddNumberToObject(cache, "tile", FX_TILE);
   cJSON_AddNumberToObject(json, "samples_per_ray", (double)r->measure.core.samples / (double)r->rays);
 }
 
@@ -239,7 +288,8 @@ cJSON *sf_report_json(const sf_audit_report *r)
   add_energy(json, r);
   cJSON_AddItemToObject(json, "ledgers", sf_ledgers_json(&r->ledgers, r->views));
   add_twin(json, r);
-  cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic));
+  cJSON_AddItemToObject(json, "counts", count_json(r->net, &r->measure.core, &r->traffic, SF_TRAFFIC_EVENTS));
+  cJSON_AddItemToObject(json, "shared", shared_json(&r->measure.memory));
   add_saturation(json, r);
   add_agreement(json, r);
   cJSON_AddItemToObject(json, "rtl_subset", three_json(&r->three, r->net));
@@ -247,6 +297,18 @@ cJSON *sf_report_json(const sf_audit_report *r)
   cJSON_AddItemToObject(json, "titles", titles_json());
   cJSON_AddNumberToObject(json, "seconds", r->seconds);
   return json;
+}
+
+/* Columns for what is outside the nets; the special functions stand in the column of the layers'. */
+static const int csv_traffic[] = {SF_TRAFFIC_TABLE, SF_TRAFFIC_LOOKUP,    SF_TRAFFIC_MISS, SF_TRAFFIC_PRODUCT,
+                                  SF_TRAFFIC_PLACE, SF_TRAFFIC_HARMONICS, SF_TRAFFIC_FRAME};
+
+static void csv_events(FILE *out, const sf_traffic *traffic, int row)
+{
+  for (size_t i = 0; i < sizeof csv_traffic / sizeof *csv_traffic; i++) {
+    const int e = csv_traffic[i], of = e == SF_TRAFFIC_HARMONICS || e == SF_TRAFFIC_FRAME ? SF_ROW_RAY : SF_ROW_FIELD;
+    fprintf(out, ",%" PRIu64, traffic && row == of ? traffic->event[e] : 0);
+  }
 }
 
 static void csv_energies(FILE *out, const sf_ledgers *l, int row, int t)
@@ -259,18 +321,21 @@ void sf_report_csv(FILE *out, const sf_audit_report *r)
 {
   fprintf(out, "layer,step,n_in,n_out");
   for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%s", sf_events[e].name);
-  fprintf(out, ",%s,%s", sf_traffic_events[SF_TRAFFIC_TABLE].name, sf_traffic_events[SF_TRAFFIC_FRAME].name);
+  for (size_t i = 0; i < sizeof csv_traffic / sizeof *csv_traffic; i++)
+    fprintf(out, ",%s", sf_traffic_events[csv_traffic[i]].name);
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) fprintf(out, ",%s_fj", sf_ledger_texts[g].key);
   fprintf(out, "\n");
   for (int l = 0; l < SF_LAYERS; l++)
     for (int t = 0; t < r->net->steps; t++) {
       fprintf(out, "%s,%d,%d,%d", fx_layer_name(l), t, r->net->layer[l].n_in, r->net->layer[l].n_out);
       for (int e = 0; e < SF_EVENTS; e++) fprintf(out, ",%" PRIu64, r->measure.core.layer[l].event[e][t]);
-      fprintf(out, ",0,0");
+      csv_events(out, NULL, SF_LAYERS);
       csv_energies(out, &r->ledgers, l, t);
     }
-  fprintf(out, "field,0,0,0,0,0,0,0,0,0,0,0,%" PRIu64 ",0", r->traffic.table_bytes);
+  fprintf(out, "field,0,0,0,0,0,0,0,0,0,0,%" PRIu64, r->traffic.special);
+  csv_events(out, &r->traffic, SF_ROW_FIELD);
   csv_energies(out, &r->ledgers, SF_ROW_FIELD, 0);
-  fprintf(out, "ray,0,0,0,0,0,0,0,0,0,0,%" PRIu64 ",0,%" PRIu64, r->traffic.exp_neg, r->traffic.frame_bytes);
+  fprintf(out, "ray,0,0,0,0,0,0,0,0,0,0,%" PRIu64, r->traffic.exp_neg);
+  csv_events(out, &r->traffic, SF_ROW_RAY);
   csv_energies(out, &r->ledgers, SF_ROW_RAY, 0);
 }

@@ -22,11 +22,12 @@ typedef struct sf_option {
   const char *name; /* "--beta" */
   char letter;      /* 'o' for -o, or 0 */
   sf_arg_type type;
-  void *value;                 /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
-  double min, max;             /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
-  const char *choices;         /* "hybrid|decay|no-decay" */
-  const char *argument, *help; /* "B", "weight of the budget loss (default 5e-7)"; or "weight of ...\t5e-7\t1e-6": what
-                                  it is without being given, in the columns of sf_cli */
+  void *value;         /* bool*, int*, uint64_t*, double*, const char**; CHOICE: int* index into choices */
+  double min, max;     /* INT, U64, DOUBLE: inclusive, min == max: no limit; NaN and Inf are always refused */
+  const char *choices; /* "hybrid|decay|no-decay" */
+  const char *argument,
+      *help; /* "B", "weight of the budget loss (default 5e-7)"; or "weight of ...\tpixel\t#": what
+                it is without being given, in the columns of sf_cli; "#": the number in its defaults */
 } sf_option;
 /* clang-format off */
 #define SF_GROUP(title) {title, 0, SF_ARG_GROUP, NULL, 0, 0, NULL, NULL, NULL}
@@ -35,8 +36,9 @@ typedef struct sf_cli {
   const char *program, *usage, *summary, *examples; /* shown by --help */
   const sf_option *options;                         /* ends with name == NULL */
   int min_positional, max_positional;
-  bool words;          /* the positionals are words, not files or folders that are read */
-  const char *columns; /* headings of the defaults of groups that have such: "\tingp\ttensorf"; or NULL */
+  bool words;                       /* the positionals are words, not files or folders that are read */
+  const char *columns;              /* headings of the defaults of groups that have such: "\tingp\ttensorf"; or NULL */
+  const sf_option *const *defaults; /* of each column the same options with its defaults as values; or NULL */
 } sf_cli;
 
 /* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and exit 0,

@@ -3,8 +3,9 @@
 #include <math.h>
 
 const sf_event sf_events[SF_EVENTS] = {
-#define SF_EVENT(id, name, title) {#name, title},
-#include "spikefield/event.def"
+#define EVENT(id, name, title, unit, fj) {#name, title},
+    SF_EVENT_TABLE(EVENT)
+#undef EVENT
 };
 
 static uint64_t layer_total(const fx_layer_counts *layer, int event)

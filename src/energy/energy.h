@@ -1,16 +1,14 @@
 /* Events to energy. Integer femtojoules, so energies are compared for equality, never with a tolerance. */
 #ifndef SF_ENERGY_ENERGY_H
 #define SF_ENERGY_ENERGY_H
-#include "fx/fx.h"
+#include "fx/memory.h"
 #include "image/image.h"
 #include "energy/ledger.h"
 #include "scene/scene.h"
 #include "base/json.h"
 #include <stdio.h>
 
-enum { SF_MAC_FJ = 4600, SF_SOP_FJ = 900 }; /* the paper's prices: fp32 multiply-add, fp32 add, 45 nm (Horowitz 2014) */
-
-/* Paper ledger: MAC * 4600 + SOP * 900, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
+/* Paper ledger: MAC * SF_MAC_FJ + SOP * SF_SOP_FJ, nothing else. UINT64_MAX stands for "does not fit in 64 bits". */
 uint64_t sf_energy_fj(const fx_counts *counts);
 uint64_t sf_cost_fj(const fx_cost *cost); /* the same of one ray */
 fx_cost sf_cost_of(const fx_counts *counts);
@@ -22,6 +20,28 @@ uint64_t sf_energy_ann_fj(const fx_net *net, uint64_t samples);
  * a spike in a lane that the layer does not have is a difference to be seen, not one to be masked away. */
 void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS], bool first_of_ray,
                        fx_counts *counts);
+
+/* The same of memory: positions at which the field is read, and spike bitmaps, in the order of a list of rays. */
+typedef struct sf_cache_slot {
+  uint64_t line, time; /* of its last use; 0: empty */
+} sf_cache_slot;
+typedef struct sf_memory_recount {
+  const fx_scene *scene;
+  fx_cache_shape shape;
+  fx_memory_counts counts;
+  sf_cache_slot *slot; /* owned */
+  uint64_t slots, clock, tile, samples;
+  bool begun, fired[FX_SPIKING][64 * SF_SPIKE_WORDS];
+} sf_memory_recount;
+sf_status sf_memory_recount_open(sf_memory_recount *m, const fx_scene *scene, const fx_cache_shape *shape);
+void sf_memory_recount_close(sf_memory_recount *m);
+void sf_memory_recount_begin(sf_memory_recount *m);              /* a list */
+void sf_memory_recount_ray(sf_memory_recount *m, uint64_t tile); /* as fx_memory_ray */
+void sf_memory_recount_read(sf_memory_recount *m, fx_read what, const uint32_t pos[3]);
+void sf_memory_recount_sample(sf_memory_recount *m, const uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]);
+/* SF_E_DIFFERENCE names the first count that differs. */
+sf_status sf_memory_compare(const fx_memory_counts *a, const char *a_name, const fx_memory_counts *b,
+                            const char *b_name);
 
 /* Equality of two counts over the layers' events and samples (not rays/grid/march/saturation). On a difference names
  * event, layer, step and both values. */
@@ -66,19 +86,23 @@ void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 typedef struct sf_three_counts {
   int wanted, rays; /* rays asked for; rays run */
   fx_counts core, rtl, recount;
-  sf_traffic core_traffic, rtl_traffic, recount_traffic;
+  sf_traffic core_traffic, rtl_traffic, recount_traffic; /* rtl: SF_TRAFFIC_AT_PORTS of them */
+  fx_memory_counts core_memory, recount_memory;          /* rays: a list */
   uint64_t cycles, busy, stalls;
   bool no_rtl_traffic; /* the accelerator has no encoder for this scene's field */
   sf_status agreement; /* SF_E_DIFFERENCE names the first difference */
 } sf_three_counts;
 
 /* Traffic of these counts and so many pixels, as the core counted it. */
-sf_traffic sf_traffic_of(const fx_counts *counts, uint64_t pixels);
+sf_traffic sf_traffic_of(const fx_scene *scene, const fx_counts *counts, const fx_memory_counts *memory,
+                         uint64_t pixels);
 /* The same from the number of recounted samples and the shape of the field alone. field_samples: positions at which
  * TensoRF's density was asked, which leave no spikes; not looked at for INGP. */
-sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, uint64_t field_samples, uint64_t pixels);
-/* SF_E_DIFFERENCE names the first event that differs. */
-sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name);
+sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, const fx_memory_counts *memory,
+                              uint64_t field_samples, uint64_t pixels);
+/* SF_E_DIFFERENCE names the first of the first `events` that differs. */
+sf_status sf_traffic_compare(const sf_traffic *a, const char *a_name, const sf_traffic *b, const char *b_name,
+                             int events);
 /* Bytes of the field's tables: what chooses the price of a read. */
 uint64_t sf_table_size(const fx_scene *scene);
 
@@ -110,9 +134,14 @@ typedef struct sf_observer {
   fx_counts core;    /* (a) */
   fx_counts recount; /* (c), from trace */
   uint64_t sample;   /* of this ray, from 0; sf_observer_begin resets it */
+  fx_memory *memory; /* both or none: (a) and (c) of what is asked of memory, over all rays */
+  sf_memory_recount *lines;
   int32_t base[SF_LANES];
 } sf_observer;
-void sf_observer_begin(sf_observer *observer); /* clears everything but net and trace */
+void sf_observer_begin(sf_observer *observer); /* clears everything but net, trace, memory and lines */
+/* sf_observer_begin, then the ray under observation of memory and lines. eval: sf_observer_net, or calls it. */
+sf_status sf_observer_ray(sf_observer *observer, const fx_scene *scene, const fx_ray *ray, uint64_t tile,
+                          fx_net_fn eval, void *user, fx_pixel *pixel);
 /* fx_net_fn; user is the sf_observer. Pass &observer->core to fx_render_ray too: it counts grid and march there. */
 sf_status sf_observer_net(void *observer, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
@@ -127,15 +156,21 @@ typedef struct sf_measure_job {
   bool (*tick)(void *user, uint64_t done); /* from one thread at a time, now and then; false stops. May be NULL */
   void *user;
   uint64_t seed;
-  uint64_t check; /* at most so many rays, seeded, of those with samples are also counted by the portable core and
-                     recounted from its spike bitmaps; UINT64_MAX: all */
+  uint64_t check;       /* at most so many rays, seeded, of those with samples are also counted by the portable core and
+                           recounted from its spike bitmaps; UINT64_MAX: all */
+  fx_cache_shape cache; /* of the field; zeros: sf_cache_built */
+  uint64_t (*tile)(void *user, uint64_t index); /* of a ray, see fx_memory_ray; NULL: each ray has its own */
 } sf_measure_job;
+/* The cache that the accelerator has here: CACHE_BYTES and CACHE_WAYS of arch.def. */
+static const fx_cache_shape sf_cache_built = {SF_CACHE_BYTES, SF_CACHE_WAYS};
 typedef struct sf_measure {
   fx_counts core; /* all rays, vector core */
   uint64_t rays;  /* all, with or without samples */
   uint8_t *hit;   /* bit i: ray i has samples; owned, sf_measure_free */
   uint64_t checked;
   fx_counts checked_core, recount; /* of the checked rays: portable core = vector core, recount */
+  fx_memory_counts memory;         /* of all rays, as a list */
+  fx_memory_counts checked_memory; /* of the checked rays, as a list: vector core = portable core = recount */
 } sf_measure;
 /* Of the checked rays, portable core and recount are compared sample by sample: a difference names ray, sample, layer,
  * step and event; the sums of the vector core are compared with theirs: a difference names ray, layer, step, event. */
@@ -172,6 +207,8 @@ typedef struct sf_audit_report {
   uint64_t rays, seed;
   double views, seconds;
   bool random_rays;
+  fx_cache_shape cache; /* of the field */
+  uint64_t entries;     /* of a hash grid that the samples read; 0 of TensoRF */
   sf_measure measure;
   sf_three_counts three;
   sf_ledger ledger; /* the paper's metric and its readings, at 4.6 and 0.9 pJ */
@@ -181,7 +218,9 @@ typedef struct sf_audit_report {
 } sf_audit_report;
 void sf_report_print(FILE *out, const sf_audit_report *report);
 /* By share/schema/energy_audit.schema.json; "format" is SF_AUDIT_FORMAT. */
-#define SF_AUDIT_FORMAT "spikefield-audit-1"
+#define SF_AUDIT_FORMAT "spikefield-audit-2"
+/* Reports before it: memories priced by the byte, no cache, no arithmetic of field and ray. --compare reads them. */
+#define SF_AUDIT_FORMAT_1 "spikefield-audit-1"
 cJSON *sf_report_json(const sf_audit_report *report);
 /* One row per layer and step, then field and ray: events, fJ of every spiking ledger. */
 void sf_report_csv(FILE *out, const sf_audit_report *report);

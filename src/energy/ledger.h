@@ -2,7 +2,7 @@
  * femtojoules; UINT64_MAX never stands in a ledger (sf_ledgers_make refuses what does not fit in 64 bits). */
 #ifndef SF_ENERGY_LEDGER_H
 #define SF_ENERGY_LEDGER_H
-#include "fx/fx.h"
+#include "fx/memory.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
 
@@ -26,6 +26,7 @@ typedef enum {
   SF_PRICE_INT_MULTIPLY, /* int_multiply.BITS: BITS x BITS; linear in the product of the two widths */
   SF_PRICE_SRAM,         /* sram.BYTES: power law of the size; a smaller memory costs what the smallest costs */
   SF_PRICE_DRAM,         /* dram: of whatever is larger than the largest sram */
+  SF_PRICE_REGISTER,     /* register: a register file, per access of 32 bits; may be left out */
   SF_PRICE_FAMILIES,
   /* Measured operations of this hardware, registers and clock included. A technology may have them; where it does, they
    * stand in place of what the widths would say. */
@@ -49,14 +50,17 @@ typedef struct sf_technology {
 
 /* Reads a technology file: docs/energy.md says how to write one. Errors name file, line and key. */
 sf_status sf_technology_load(sf_technology *technology, const char *path);
-/* In fJ, rounded to the nearest; of a byte an eighth of an access. *interpolated (may be NULL) becomes true where no
+/* In fJ, rounded to the nearest. *interpolated (may be NULL) becomes true where no
  * price of the file is for exactly this; it never becomes false. */
 uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);
 uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bits, bool *interpolated);
 /* Bits of the sum of a layer's inputs: of products of an input and a weight, or of weights alone. */
 int sf_sum_bits(const fx_layer *layer, bool of_products);
-uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
-/* The measured price of a family from SF_PRICE_MAC on; false where the technology has none. */
+/* 64 bits of a memory of so many bytes; UINT64_MAX: DRAM. */
+uint64_t sf_price_access(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated);
+/* So many bits of a register file; a file without its price: of the smallest sram, *interpolated. */
+uint64_t sf_price_register(const sf_technology *technology, int bits, bool *interpolated);
+/* The price of a family of one price that a technology may leave out; false where it does. */
 bool sf_price_measured(const sf_technology *technology, sf_price_family family, uint64_t *fj);
 
 /* ---- events of the ledgers ---- */
@@ -66,13 +70,31 @@ enum { SF_ROW_FIELD = SF_LAYERS, SF_ROW_RAY, SF_ROWS };
 extern const char *const sf_row_names[SF_ROWS]; /* "D1" .. "C3", "field" (grid or planes), "ray" (exp(-x), frame) */
 
 /* What is outside the nets: all of it at step 0 of its row. */
-typedef enum { SF_TRAFFIC_TABLE, SF_TRAFFIC_EXP_NEG, SF_TRAFFIC_FRAME, SF_TRAFFIC_EVENTS } sf_traffic_id;
+typedef enum {
+  SF_TRAFFIC_TABLE,
+  SF_TRAFFIC_EXP_NEG,
+  SF_TRAFFIC_FRAME,
+  SF_TRAFFIC_LOOKUP,
+  SF_TRAFFIC_MISS,
+  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator, too */
+  SF_TRAFFIC_PRODUCT = SF_TRAFFIC_AT_PORTS,
+  SF_TRAFFIC_PLACE,
+  SF_TRAFFIC_SPECIAL,
+  SF_TRAFFIC_HARMONICS,
+  SF_TRAFFIC_EVENTS
+} sf_traffic_id;
 typedef union sf_traffic {
   uint64_t event[SF_TRAFFIC_EVENTS]; /* by sf_traffic_id */
   struct {
-    uint64_t table_bytes; /* row field: hash-grid or plane bytes read */
+    uint64_t table_bytes; /* row field: hash-grid or plane bytes that a sample uses */
     uint64_t exp_neg;     /* row ray: exp(-x), one per composited sample */
     uint64_t frame_bytes; /* row ray: bytes of pixels written, SF_PIXEL_BYTES each */
+    uint64_t lookups;     /* row field: of its cache, and those that missed */
+    uint64_t misses;
+    uint64_t products;  /* row field: of entries and weights; of TensoRF field_mac */
+    uint64_t places;    /* row field: cells of grid levels found, or places in planes and lines */
+    uint64_t special;   /* row field: TensoRF's activations, sines and cosines */
+    uint64_t harmonics; /* row ray: directions whose harmonics were computed */
   };
 } sf_traffic;
 enum { SF_PIXEL_BYTES = 48 }; /* an fx_pixel, as the accelerator writes it */
@@ -82,12 +104,14 @@ enum { SF_PIXEL_BYTES = 48 }; /* an fx_pixel, as the accelerator writes it */
 typedef enum {
   SF_LEDGER_PAPER,      /* MAC and SOP at fp32 prices, nothing else */
   SF_LEDGER_WIDTH,      /* MAC and SOP at integer prices for the widths of arch.def */
-  SF_LEDGER_MEMORY,     /* + weight, state, table and frame bytes */
-  SF_LEDGER_NEURON,     /* + leak, compare, reset and special functions */
+  SF_LEDGER_MEMORY,     /* + accesses of weight rows, membranes, field and frame */
+  SF_LEDGER_NEURON,     /* + neurons, special functions, arithmetic of field and ray: everything that is counted */
+  SF_LEDGER_SHARED,     /* the same where FX_SHARED samples share a read of weights */
   SF_LEDGER_ANN,        /* ReLU twin of the same sizes on the same samples: fp32 MACs (baseline of the paper) */
   SF_LEDGER_INT,        /* the bit-matched integer twin: int8 x int8 + int32 add (baseline of WIDTH) */
-  SF_LEDGER_INT_MEMORY, /* + weight, activation, table and frame bytes (baseline of MEMORY) */
-  SF_LEDGER_INT_ALL,    /* + ReLU and special functions (baseline of NEURON) */
+  SF_LEDGER_INT_MEMORY, /* + accesses of weight rows, activations, field and frame (baseline of MEMORY) */
+  SF_LEDGER_INT_ALL,    /* + ReLU, special functions, arithmetic of field and ray (baseline of NEURON) */
+  SF_LEDGER_INT_SHARED, /* the same where FX_SHARED samples share a read of weights (baseline of SHARED) */
   SF_LEDGERS
 } sf_ledger_id;
 enum { SF_SPIKING_LEDGERS = SF_LEDGER_ANN };
@@ -102,16 +126,19 @@ extern const sf_ledger_text sf_ledger_texts[SF_LEDGERS];
 typedef enum {
   SF_PART_MAC,
   SF_PART_SOP,
-  SF_PART_WEIGHT,  /* weight bytes */
-  SF_PART_STATE,   /* membranes; activations of the twin */
-  SF_PART_TABLE,   /* grid or plane bytes */
-  SF_PART_FRAME,   /* pixel bytes */
+  SF_PART_WEIGHT,  /* rows of weights read */
+  SF_PART_STATE,   /* membranes in register files; activations of the twin */
+  SF_PART_LOOKUP,  /* look-ups in the field's cache */
+  SF_PART_FILL,    /* lines that it reads from DRAM */
+  SF_PART_FRAME,   /* pixels, words of 64 bits to DRAM */
   SF_PART_NEURON,  /* leak, compare, reset; ReLU of the twin */
-  SF_PART_SPECIAL, /* exp, sigmoid, exp(-x) */
+  SF_PART_SPECIAL, /* exp, sigmoid, exp(-x); TensoRF's activation, sines */
+  SF_PART_PRODUCT, /* products of the field; of a ray compositing, per sample */
+  SF_PART_PLACE,   /* places in the field; of a ray its harmonics */
   SF_PARTS
 } sf_part_id;
 extern const char *const sf_part_names[SF_PARTS];  /* "mac", "sop", "weight", ... */
-extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight bytes", ... */
+extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight rows", ... */
 
 /* What the technology measured of an event of a row, if anything: the twin has a MAC of its own, and its ReLU is priced
  * by widths. False: the price is the one of the widths. */
@@ -128,7 +155,10 @@ typedef struct sf_break_even {
   int ledger, twin; /* sf_ledger_id */
   double rate;      /* 0..1 and above; NAN: dearer than the twin even without a spike, or nothing depends on spikes */
 } sf_break_even;
-enum { SF_BREAK_EVENS = SF_SPIKING_LEDGERS + 1 }; /* each against its own baseline, NEURON against the fp32 twin too */
+enum {
+  SF_OWN_BREAK_EVENS = SF_LEDGER_NEURON + 1
+};                                                /* up to NEURON: rows that samples share do not scale with the rate */
+enum { SF_BREAK_EVENS = SF_OWN_BREAK_EVENS + 1 }; /* each against its own baseline, NEURON against the fp32 twin too */
 
 /* One price halved and raised by half: the savings that come out, percent. */
 typedef struct sf_sensitivity {
@@ -153,10 +183,27 @@ typedef struct sf_ledgers {
   sf_sensitivity sensitivity[SF_PRICES_MAX]; /* largest swing first */
 } sf_ledgers;
 
-/* All of it. SF_E_RANGE when an energy does not fit in 64 bits. table_bytes of memory: what the grid's (or planes')
- * tables take; it chooses their price. */
-sf_status sf_ledgers_make(const sf_technology *technology, const fx_net *net, const fx_counts *counts,
-                          const sf_traffic *traffic, uint64_t table_size, sf_ledgers *ledgers);
+/* What is priced. */
+typedef struct sf_counted {
+  const fx_scene *scene; /* its sizes */
+  const fx_counts *counts;
+  const fx_memory_counts *memory;
+  const sf_traffic *traffic;
+  fx_cache_shape cache;
+} sf_counted;
+/* fJ of one event of a row in a ledger. */
+sf_unit_price sf_unit_price_of(const sf_technology *technology, const sf_counted *counted, int ledger, int row,
+                               int part);
+/* Accesses of 64 bits that a row of a layer's weights takes; bytes of the memory that holds them all. */
+uint64_t sf_row_accesses(const fx_layer *layer);
+uint64_t sf_weights_size(const fx_layer *layer);
+static inline bool sf_ledger_is_twin(int ledger)
+{
+  return ledger >= SF_SPIKING_LEDGERS;
+}
+
+/* All of it. SF_E_RANGE when an energy does not fit in 64 bits. */
+sf_status sf_ledgers_make(const sf_technology *technology, const sf_counted *counted, sf_ledgers *ledgers);
 
 /* Terminal: the ledgers as a table, savings, break-even rates, sensitivity. views: whole views that the counts cover.
  */

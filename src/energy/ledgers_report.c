@@ -18,7 +18,7 @@ static void print_percent(FILE *out, double percent)
 
 static void print_table(FILE *out, const sf_ledgers *l, double views)
 {
-  fprintf(out, "What it costs under four sets of assumptions, each beside a ReLU twin priced in the same way (%s):\n",
+  fprintf(out, "What it costs under five sets of assumptions, each beside a ReLU twin priced in the same way (%s):\n",
           l->technology.title);
   fprintf(out, "  %-17s %13s   %-21s %13s %9s\n", "ledger", "mJ per view", "twin", "mJ per view", "saving");
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
@@ -36,12 +36,12 @@ static void print_table(FILE *out, const sf_ledgers *l, double views)
 
 static void print_parts(FILE *out, const sf_ledgers *l, double views)
 {
-  fprintf(out, "\nWhat the energy of the last ledger goes into, mJ per view:\n  %-19s %13s %9s %19s\n", "",
+  fprintf(out, "\nWhat the energy of the ledger with everything goes into, mJ per view:\n  %-23s %13s %9s %19s\n", "",
           "spiking net", "share", "ReLU twin, all");
   for (int p = 0; p < SF_PARTS; p++) {
     const uint64_t a = l->part[SF_LEDGER_NEURON][p], b = l->part[SF_LEDGER_INT_ALL][p];
     const uint64_t all = l->total[SF_LEDGER_NEURON];
-    fprintf(out, "  %-19s %13.6g %8.2f%% %19.6g\n", sf_part_titles[p], mj(a, views),
+    fprintf(out, "  %-23s %13.6g %8.2f%% %19.6g\n", sf_part_titles[p], mj(a, views),
             all ? 100 * (double)a / (double)all : 0, mj(b, views));
   }
 }
@@ -49,7 +49,7 @@ static void print_parts(FILE *out, const sf_ledgers *l, double views)
 static void print_break_even(FILE *out, const sf_ledgers *l)
 {
   fprintf(out, "\nFiring rate at which the spiking net costs what its twin does (measured: %.2f%%):\n", 100 * l->rate);
-  for (int i = 0; i < SF_SPIKING_LEDGERS; i++) {
+  for (int i = 0; i < SF_OWN_BREAK_EVENS; i++) {
     const sf_break_even *b = &l->break_even[i];
     fprintf(out, "  %-17s against %-21s ", sf_ledger_texts[b->ledger].title, sf_ledger_texts[b->twin].title);
     if (isnan(b->rate))

@@ -3,17 +3,14 @@
 #include <math.h>
 
 const char *const sf_not_modelled[] = {
-    "arithmetic of the field (interpolation of its entries) and the spherical harmonics of the direction",
-    "marching, the occupancy test and the products of compositing (of which exp(-x) alone is priced)",
-    "spike bitmaps, queues and buffers between units; caches: a byte costs what a byte of the memory that holds it "
-    "costs",
+    "marching and the occupancy test, which the host does",
+    "spike bitmaps, sums while they grow, queues and buffers between units; rows of DRAM that a burst opens",
     "control, clock tree, interconnect, stalls and leakage power",
     "transfers to and from the accelerator but for the pixels; training",
     "zeros: ReLU's zeros are not skipped in the twin, as spikes that do not come are in the spiking net",
-    "reuse of weights over samples: they are fetched anew for every sample in both networks (the direction's of C1 "
-    "once "
-    "per ray where the net computes them so); with reuse the weight bytes shrink, and so does the saving that they "
-    "bring in the ledgers with memory",
+    "reuse of weights over samples but for the ledgers where 16 share: elsewhere rows are read anew for every sample "
+    "in "
+    "both nets (the direction's of C1 once per ray where the net computes them so)",
     NULL};
 
 const char *const sf_criticism[] = {
@@ -22,9 +19,7 @@ const char *const sf_criticism[] = {
     "pJ: see the width-correct ledger",
     "in the paper ledger memory traffic is left out, and on real hardware it dominates: see the ledger with memory",
     "in the paper ledger neuron updates are left out, although every neuron is updated at every step whether it fires "
-    "or not: see the "
-    "ledger "
-    "with neuron updates",
+    "or not: see the ledger with everything",
     "the first, real-valued layers are priced as MACs here; a reading that leaves them out flatters the spiking net",
     "in the paper ledger the twin multiplies the direction of a ray by its weights at every sample, the spiking net "
     "once per ray; a twin that does so once per ray too (a hoisted twin) is beside it, and the integer twins all do",

@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILE_LIMIT = 1 << 20, WIDTH_MAX = 256 };
+enum { FILE_LIMIT = 1 << 20, WIDTH_MAX = 256, REGISTER_BITS = 32, ACCESS_BITS = 64 };
 static const uint64_t FJ_MAX = 1000000000000; /* 1 mJ: far above any access, and products stay far below 2^63 */
 
 static const char *const families[SF_PRICE_KEYS] = {
-    "fp32_mac", "fp32_add", "int_add",       "int_multiply",      "sram",    "dram",      "mac",
-    "twin_mac", "sop",      "neuron_update", "integrator_update", "special", "tag_lookup"};
+    "fp32_mac", "fp32_add", "int_add", "int_multiply",  "sram",              "dram",    "register",
+    "mac",      "twin_mac", "sop",     "neuron_update", "integrator_update", "special", "tag_lookup"};
 
 static bool has_points(int family)
 {
@@ -176,7 +176,7 @@ static sf_status check(const sf_technology *t, const char *path)
   if (!t->title[0]) return sf_fail(SF_E_FORMAT, "%s: key 'title' is missing", path);
   for (int f = 0; f < SF_PRICE_FAMILIES; f++) {
     const int n = points(t, f);
-    if (n == 0) return sf_fail(SF_E_FORMAT, "%s: key '%s' is missing", path, families[f]);
+    if (n == 0 && f != SF_PRICE_REGISTER) return sf_fail(SF_E_FORMAT, "%s: key '%s' is missing", path, families[f]);
     if (has_points(f) && n < 2)
       return sf_fail(SF_E_FORMAT, "%s: key '%s' needs two points to interpolate between", path, families[f]);
   }
@@ -254,7 +254,7 @@ uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bi
   return on_line(a, low, b, high, cells);
 }
 
-uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated)
+uint64_t sf_price_access(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated)
 {
   const sf_price *first, *a, *b, *last, *dram;
   neighbours(technology, SF_PRICE_SRAM, 0, &first, &a);
@@ -269,7 +269,7 @@ uint64_t sf_price_byte(const sf_technology *technology, uint64_t memory_bytes, b
     const double share = log((double)memory_bytes / a->at) / log((double)b->at / a->at);
     access = a->fj && b->fj ? (double)a->fj * pow((double)b->fj / (double)a->fj, share) : 0;
   }
-  return round_positive(access / 8);
+  return round_positive(access);
 }
 
 bool sf_price_measured(const sf_technology *technology, sf_price_family family, uint64_t *fj)
@@ -280,4 +280,12 @@ bool sf_price_measured(const sf_technology *technology, sf_price_family family, 
       return true;
     }
   return false;
+}
+
+uint64_t sf_price_register(const sf_technology *technology, int bits, bool *interpolated)
+{
+  uint64_t fj;
+  if (sf_price_measured(technology, SF_PRICE_REGISTER, &fj)) return round_positive((double)fj * bits / REGISTER_BITS);
+  note(interpolated, true);
+  return round_positive((double)sf_price_access(technology, 1, NULL) * bits / ACCESS_BITS);
 }

@@ -3,6 +3,7 @@
  * sample by sample, and every other build gives the same bits. */
 #ifndef SF_FX_CORE_H
 #define SF_FX_CORE_H
+#include "src/fx/cache.h"
 #include "src/fx/count.h"
 #include "src/fx/scene.h"
 
@@ -72,6 +73,20 @@ static inline void fx_block_count(fx_block *b, int steps)
   }
 }
 
+/* The neurons of D1, C1, C2 that fired at any step of a sample. */
+typedef struct fx_fired {
+  uint64_t neurons[FX_SPIKING][SF_SPIKE_WORDS];
+} fx_fired;
+
+static inline fx_fired fx_block_fired(const fx_block *b, int i, int steps)
+{
+  fx_fired fired = {0};
+  for (int s = 0; s < FX_SPIKING; s++)
+    for (int t = 0; t < steps; t++)
+      for (int w = 0; w < SF_SPIKE_WORDS; w++) fired.neurons[s][w] |= b->spikes[s][t][i][w];
+  return fired;
+}
+
 /* Working memory of one thread: what all steps of a block's layer need at once. Membranes stay in registers. */
 typedef struct fx_scratch {
   _Alignas(64) int16_t d2_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
@@ -95,6 +110,9 @@ typedef struct fx_kernels {
   /* The first lattice point >= n whose cell is occupied, or ray->count. */
   int32_t (*march)(const fx_scene *scene, const fx_ray *ray, int32_t n);
   const fx_vm *vm; /* of a TensoRF scene */
+  /* fx_grid_lines and fx_cache_look_up. */
+  int (*lines)(const fx_places *places, const uint32_t pos[3], uint32_t list[FX_LOOKUPS_ROOM]);
+  uint64_t (*look_up)(fx_cache *cache, const uint32_t *line, int n);
 } fx_kernels;
 
 struct fx_core {
@@ -108,10 +126,6 @@ int32_t fx_core_march(const fx_core *core, const fx_ray *ray, int32_t n, uint32_
 
 /* Adds sample i's saturations to counts and its events to cost (may be NULL). */
 void fx_block_account(const fx_core *core, const fx_block *b, int i, fx_counts *counts, fx_cost *cost);
-
-/* fx_render_rays of a TensoRF scene: rays_tensorf.c. */
-sf_status fx_render_tensorf(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
-                            fx_counts *counts);
 
 /* "portable", "avx2", "avx512vnni", "amx", or NULL for the best of this CPU; NULL when CPU or build lacks it. */
 const fx_kernels *fx_kernels_select(const char *name);

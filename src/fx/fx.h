@@ -164,6 +164,7 @@ typedef struct fx_units {
   double to_box_scale, to_box_offset[3];
   double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
   double data_scale, data_bound, data_ndc; /* sf_space of that data: without --scale, proposed, 0 or 1; 0: unknown */
+  double data_views, data_poses;           /* the same; 0: unknown */
   double stretch[3];
   double near, far; /* rays begin and end at these distances from their origins, model units */
   double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */
@@ -226,8 +227,9 @@ typedef struct fx_ray {
 typedef union fx_layer_counts {
   uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
   struct {
-#define SF_EVENT(id, name, title) uint64_t name[SF_T_MAX];
-#include "spikefield/event.def"
+#define SF_EVENT_MEMBER(id, name, title, unit, fj) uint64_t name[SF_T_MAX];
+    SF_EVENT_TABLE(SF_EVENT_MEMBER)
+#undef SF_EVENT_MEMBER
   }; /* the same by name */
 } fx_layer_counts;
 
@@ -333,9 +335,20 @@ void fx_pixel_rgba(const fx_pixel *pixel, uint32_t rgba[4]);
  * ray. */
 typedef sf_status (*fx_net_fn)(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 
+/* What fx_render_watched tells of: the field is read at a position. Of a sample of TensoRF first the density, then the
+ * appearance where the sample is decoded. */
+typedef enum { FX_READ_GRID, FX_READ_DENSITY, FX_READ_APPEARANCE } fx_read;
+typedef struct fx_watch {
+  void (*read)(void *user, fx_read what, const uint32_t pos[3]);
+  void *user;
+} fx_watch;
+
 /* One ray: march, features, nets, compositing. eval NULL: fx_net_sample. Background included. */
 sf_status fx_render_ray(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, fx_pixel *pixel,
                         fx_counts *counts);
+/* The same; watch may be NULL. The field is read before eval is called for the sample. */
+sf_status fx_render_watched(const fx_scene *scene, const fx_ray *ray, fx_net_fn eval, void *user, const fx_watch *watch,
+                            fx_pixel *pixel, fx_counts *counts);
 
 /* ---- many rays at once ---- */
 

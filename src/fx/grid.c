@@ -9,11 +9,14 @@
  *          reproduced exactly.
  *   f    = sat12(rshift_round(sum of entry * w, shift)), |sum| <= 128 * 2^16 */
 #include "src/fx/unit.h"
+#include "src/fx/cache.h"
 #include "src/fx/scene.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
 
 enum { CELL_FRAC = 8, SCALE_FRAC = 16, CORNERS = FX_GRID_CORNERS };
+#define HASH_Y 2654435761u
+#define HASH_Z 805459861u
 
 typedef struct cell {
   uint32_t base[3];
@@ -50,7 +53,7 @@ static uint32_t entry_index(const fx_grid *grid, int level, const uint32_t *base
   const uint32_t x = base[0] + (corner & 1), y = base[1] + (corner >> 1 & 1), z = base[2] + (corner >> 2);
   const uint32_t stride = (uint32_t)grid->stride[level];
   if (stride) return x + stride * (y + stride * z);
-  return (x ^ y * 2654435761u ^ z * 805459861u) & ((1u << grid->log2_size[level]) - 1);
+  return (x ^ y * HASH_Y ^ z * HASH_Z) & ((1u << grid->log2_size[level]) - 1);
 }
 
 static int16_t feature(int32_t sum, int shift, uint64_t *saturated)
@@ -83,4 +86,37 @@ void fx_grid_features(const fx_grid *grid, const uint32_t *pos, int16_t *f, fx_c
 uint64_t fx_grid_bytes(const fx_grid *grid)
 {
   return (uint64_t)grid->levels * CORNERS * FX_GRID_FEATURES;
+}
+
+int fx_grid_lines(const fx_grid *grid, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM])
+{
+  int n = 0;
+  for (int level = 0; level < grid->levels; level++) {
+    const cell c = find_cell(pos, grid->scale_q16[level]);
+    for (int corner = 0; corner < CORNERS; corner++) {
+      const int64_t entry = grid->offset[level] + entry_index(grid, level, c.base, corner);
+      const uint32_t asked = (uint32_t)(entry / FX_LINE_ENTRIES);
+      if (corner % 2 == 0 || asked != line[n - 1]) line[n++] = asked;
+    }
+  }
+  return n;
+}
+
+void fx_places_fill(fx_places *places, const fx_grid *grid)
+{
+  *places = (fx_places){.grid = grid};
+  for (int l = 0; l < grid->levels; l++) {
+    const int32_t stride = grid->stride[l];
+    places->scale[l] = grid->scale_q16[l];
+    places->my[l] = stride ? stride : (int32_t)HASH_Y;
+    places->mz[l] = stride ? stride * stride : (int32_t)HASH_Z;
+    for (int pair = 0; pair < FX_LEVEL_PAIRS; pair++) {
+      const int at = l * FX_LEVEL_PAIRS + pair;
+      places->add_y[at] = pair & 1 ? places->my[l] : 0;
+      places->add_z[at] = pair & 2 ? places->mz[l] : 0;
+      places->mask[at] = stride ? -1 : (int32_t)((1u << grid->log2_size[l]) - 1);
+      places->hashed[at] = stride ? 0 : -1;
+      places->offset[at] = (int32_t)grid->offset[l];
+    }
+  }
 }

@@ -43,7 +43,12 @@ static int32_t march(const fx_scene *scene, const fx_ray *ray, int32_t n)
   return found < 0 ? ray->count : found;
 }
 
-static const fx_kernels portable = {"portable", 16, nets, features, march, &fx_vm_portable};
+static int lines(const fx_places *places, const uint32_t pos[3], uint32_t list[FX_LOOKUPS_ROOM])
+{
+  return fx_grid_lines(places->grid, pos, list);
+}
+
+static const fx_kernels portable = {"portable", 16, nets, features, march, &fx_vm_portable, lines, fx_cache_look_up};
 
 const fx_kernels *fx_kernels_select(const char *name)
 {

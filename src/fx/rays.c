@@ -1,7 +1,7 @@
 /* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that
  * has ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
-#include "src/fx/core.h"
 #include "src/fx/march.h"
+#include "src/fx/memory.h"
 #include "src/fx/scene.h"
 #include "base/memory.h"
 #include <stdlib.h>
@@ -25,6 +25,7 @@ typedef struct wave {
   fx_cost *costs;
   fx_firing firing;
   fx_counts counts; /* but for the nets' events, which follow from firing and rays */
+  fx_log *log;      /* NULL: nobody asks */
 } wave;
 
 /* Moves slot i to the next occupied point from n on; false at the end of the ray. */
@@ -86,6 +87,7 @@ static void round_of_samples(wave *w)
   core->kernels->nets(core, b, &w->scratch);
   fx_firing_sum(&w->firing, &b->firing);
   for (int i = 0; i < b->n; i++) {
+    if (w->log) fx_log_sample(w->log, b, i, core->scene->net.steps, (uint32_t)w->slot[i].ray);
     fx_block_account(core, b, i, &w->counts, w->costs ? &w->costs[w->slot[i].ray] : NULL);
     ended[i] = !composite(w, i) || !advance(w, i, w->slot[i].at + 1);
   }
@@ -104,20 +106,45 @@ static void add_counts(const wave *w, fx_counts *counts)
   fx_counts_add(counts, &sum);
 }
 
+/* log: NULL, or gets every sample. */
+static sf_status render(const fx_core *core, fx_log *log, const fx_ray *rays, size_t n, fx_pixel *pixels,
+                        fx_cost *costs, fx_counts *counts)
+{
+  sf_status status = sf_ok();
+  wave *w = sf_aligned_alloc(sizeof *w);
+  if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
+  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs, w->log = log;
+  for (int i = 0; i < FX_BLOCK; i++) w->slot[i].base = w->base[i];
+  if (costs) memset(costs, 0, n * sizeof *costs);
+  for (size_t next = 0; (next < n || w->block.n > 0) && status.code == SF_OK;) {
+    while (next < n && w->block.n < FX_BLOCK) begin_ray(w, next++);
+    if (log) status = fx_log_reserve(log);
+    if (w->block.n > 0 && status.code == SF_OK) round_of_samples(w);
+  }
+  if (counts && status.code == SF_OK) add_counts(w, counts);
+  free(w);
+  return status;
+}
+
 sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
                          fx_counts *counts)
 {
-  if (core->scene->backbone == FX_TENSORF) return fx_render_tensorf(core, rays, n, pixels, costs, counts);
-  wave *w = sf_aligned_alloc(sizeof *w);
-  if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
-  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
-  for (int i = 0; i < FX_BLOCK; i++) w->slot[i].base = w->base[i];
-  if (costs) memset(costs, 0, n * sizeof *costs);
-  for (size_t next = 0; next < n || w->block.n > 0;) {
-    while (next < n && w->block.n < FX_BLOCK) begin_ray(w, next++);
-    if (w->block.n > 0) round_of_samples(w);
+  if (core->scene->backbone == FX_TENSORF) return fx_render_tensorf(core, NULL, NULL, rays, n, pixels, costs, counts);
+  return render(core, NULL, rays, n, pixels, costs, counts);
+}
+
+enum { PIECE = 2048 }; /* rays whose samples are logged at a time */
+
+sf_status fx_render_list(const fx_core *core, fx_memory *memory, const uint64_t *tile, const fx_ray *rays, size_t n,
+                         fx_pixel *pixels, fx_cost *costs, fx_counts *counts)
+{
+  memory->kernels = core->kernels;
+  if (core->scene->backbone == FX_TENSORF) return fx_render_tensorf(core, memory, tile, rays, n, pixels, costs, counts);
+  for (size_t first = 0; first < n; first += PIECE) {
+    const size_t rest = n - first < PIECE ? n - first : PIECE;
+    memory->log.count = 0;
+    SF_TRY(render(core, &memory->log, rays + first, rest, pixels + first, costs ? costs + first : NULL, counts));
+    SF_TRY(fx_memory_replay(memory, tile + first, pixels + first, rest));
   }
-  if (counts) add_counts(w, counts);
-  free(w);
   return sf_ok();
 }

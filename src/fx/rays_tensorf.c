@@ -1,7 +1,7 @@
 /* Many rays of a TensoRF scene. Densities alone decide where a ray ends and which of its samples are decoded, so a ray
  * is marched to its end at once; its samples wait for the decoder until a block is full, whosever they are. Colours are
  * sums of integers: their order does not matter. */
-#include "src/fx/core.h"
+#include "src/fx/memory.h"
 #include "src/fx/scene.h"
 #include "base/memory.h"
 #include <stdlib.h>
@@ -10,6 +10,7 @@
 
 typedef struct waiting {
   size_t ray;
+  uint64_t run; /* of the ray; without memory 0 */
   uint32_t weight;
 } waiting;
 
@@ -22,8 +23,22 @@ typedef struct wave {
   fx_pixel *pixels;
   fx_cost *costs;
   fx_firing firing;
-  fx_counts counts; /* but for the nets' events, which follow from firing */
+  fx_counts counts;  /* but for the nets' events, which follow from firing */
+  fx_memory *memory; /* NULL: nobody asks */
+  uint64_t run;      /* of the ray that is marched */
 } wave;
+
+static void share_rows(wave *w, int i)
+{
+  if (!w->memory) return;
+  const fx_fired fired = fx_block_fired(&w->block, i, w->core->scene->net.steps);
+  fx_memory_sample(w->memory, w->sample[i].run, &fired);
+}
+
+static void ask(wave *w, fx_read what, const uint32_t pos[3])
+{
+  if (w->memory) fx_memory_read(w->memory, what, pos);
+}
 
 static void decode(wave *w)
 {
@@ -34,6 +49,7 @@ static void decode(wave *w)
     const waiting *s = &w->sample[i];
     fx_block_account(w->core, b, i, &w->counts, w->costs ? &w->costs[s->ray] : NULL);
     fx_composite_colour(&w->pixels[s->ray], s->weight, b->out[i].colour);
+    share_rows(w, i);
   }
   b->n = 0;
 }
@@ -42,8 +58,9 @@ static void enqueue(wave *w, size_t ray, const uint32_t pos[3], uint32_t weight)
 {
   const fx_scene *scene = w->core->scene;
   fx_block *b = &w->block;
+  ask(w, FX_READ_APPEARANCE, pos);
   fx_vm_encode(&scene->tensorf, w->core->kernels->vm, pos, w->rays[ray].unit, b->constant[b->n], &w->counts);
-  w->sample[b->n++] = (waiting){ray, weight};
+  w->sample[b->n++] = (waiting){ray, w->run, weight};
   if (b->n == FX_BLOCK) decode(w);
 }
 
@@ -57,6 +74,7 @@ static void march(wave *w, size_t index)
   fx_composite_begin(pixel);
   for (int32_t n = fx_core_march(w->core, ray, 0, pos, &w->counts); n >= 0;
        n = fx_core_march(w->core, ray, n + 1, pos, &w->counts)) {
+    ask(w, FX_READ_DENSITY, pos);
     const uint32_t weight = fx_tensorf_weight(scene, w->core->kernels->vm, ray, n, pos, pixel, &w->counts);
     if (weight) enqueue(w, index, pos, weight), decoded++;
     if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) break;
@@ -65,14 +83,17 @@ static void march(wave *w, size_t index)
   w->counts.rays += decoded > 0;
 }
 
-sf_status fx_render_tensorf(const fx_core *core, const fx_ray *rays, size_t n, fx_pixel *pixels, fx_cost *costs,
-                            fx_counts *counts)
+sf_status fx_render_tensorf(const fx_core *core, fx_memory *memory, const uint64_t *tile, const fx_ray *rays, size_t n,
+                            fx_pixel *pixels, fx_cost *costs, fx_counts *counts)
 {
   wave *w = sf_aligned_alloc(sizeof *w);
   if (!w) return sf_fail(SF_E_MEMORY, "no memory for a block of %d samples", FX_BLOCK);
-  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs;
+  w->core = core, w->rays = rays, w->pixels = pixels, w->costs = costs, w->memory = memory;
   if (costs) memset(costs, 0, n * sizeof *costs);
-  for (size_t i = 0; i < n; i++) march(w, i);
+  for (size_t i = 0; i < n; i++) {
+    if (memory) w->run = fx_memory_ray(memory, tile[i]);
+    march(w, i);
+  }
   if (w->block.n > 0) decode(w);
   if (counts) {
     fx_count_firing(&w->counts, &core->scene->net, &w->firing);

@@ -18,8 +18,8 @@ _Static_assert(sizeof(spikefield_status) == sizeof(sf_status), "sf_status and sp
   _Static_assert(offsetof(type, member) == offsetof(core, member) &&                                                   \
                      sizeof(((type *)0)->member) == sizeof(((core *)0)->member),                                       \
                  #type "." #member " differs from the core's")
-#define SF_EVENT(id, name, title) SAME(spikefield_layer_counts, fx_layer_counts, name);
-#include "spikefield/event.def"
+#define SAME_EVENT(id, name, title, unit, fj) SAME(spikefield_layer_counts, fx_layer_counts, name);
+SF_EVENT_TABLE(SAME_EVENT)
 SAME(spikefield_counts, fx_counts, layer);
 SAME(spikefield_counts, fx_counts, samples);
 SAME(spikefield_counts, fx_counts, rays);

@@ -40,18 +40,27 @@ static void basis(FILE *out, const sf_page *page, int row, int part)
   const sf_technology *t = &page->report->ledgers.technology;
   char text[HTML_NUMBER];
   uint64_t measured;
-  if (sf_operation_measured(t, false, row, part, &measured)) {
+  if (sf_operation_measured(t, false, row, part, &measured) && (row < SF_LAYERS || part == SF_PART_SPECIAL)) {
     fprintf(out, "measured from a netlist%s",
             part == SF_PART_NEURON ? "; twin: 32 \xc3\x97 16 bits and an addition of 32" : "");
   } else if (part == SF_PART_FRAME) {
-    fprintf(out, "DRAM");
-  } else if (part == SF_PART_TABLE) {
-    memory(out, t, sf_table_size(page->scene));
+    fprintf(out, "64 bits to DRAM");
+  } else if (part == SF_PART_LOOKUP) {
+    memory(out, t, (uint64_t)page->report->cache.bytes);
+    if (sf_price_measured(t, SF_PRICE_TAG_LOOKUP, &measured)) fprintf(out, "; tags measured from a netlist");
+  } else if (part == SF_PART_FILL) {
+    fprintf(out, "%d words of 64 bits from DRAM into the cache; tables of %s bytes", FX_LINE / 8,
+            html_count(text, sf_table_size(page->scene)));
   } else if (part == SF_PART_WEIGHT) {
-    memory(out, t, (uint64_t)net->layer[row].n_in * (uint64_t)net->layer[row].n_out);
+    fprintf(out, "%s words of 64 bits; ", html_count(text, sf_row_accesses(&net->layer[row])));
+    memory(out, t, sf_weights_size(&net->layer[row]));
   } else if (part == SF_PART_STATE) {
-    memory(out, t, 4 * (uint64_t)net->layer[row].n_out);
-    fprintf(out, "; twin %s", html_count(text, (uint64_t)net->layer[row].n_out));
+    fprintf(out, "register file, %d bits; twin 8", fx_layer_table[row].state_bits);
+  } else if (part == SF_PART_PRODUCT) {
+    fprintf(out,
+            row == SF_ROW_RAY ? "compositing of a sample: six products, six sums" : "17 \xc3\x97 8 bits, sum of 24");
+  } else if (part == SF_PART_PLACE) {
+    fprintf(out, row == SF_ROW_RAY ? "16 harmonics: 38 products, 9 sums" : "cell, weights and addresses");
   } else {
     width_basis(out, net, row, part);
   }

@@ -23,10 +23,20 @@ static sf_status check_unrecorded(const fx_scene *scene, const char *name, sf_da
                  name, (double)scale, bound, data->list, (double)data->own_scale, data->bound);
 }
 
+/* A file may hold any number. */
+static int32_t whole(double number)
+{
+  return number >= 1 && number <= 1e9 ? (int32_t)number : 0;
+}
+
 static sf_status check_space(const fx_scene *scene, const char *name, sf_dataset *data)
 {
   const fx_units *units = &scene->units;
-  const sf_space learned = {(float)units->data_scale, (int32_t)units->data_bound, (int32_t)units->data_ndc};
+  const sf_space learned = {.scale = (float)units->data_scale,
+                            .bound = whole(units->data_bound),
+                            .ndc = whole(units->data_ndc),
+                            .views = whole(units->data_views),
+                            .poses = whole(units->data_poses)};
   return learned.scale > 0 ? sf_space_check(&learned, name, data) : check_unrecorded(scene, name, data);
 }
 

@@ -120,6 +120,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->units.model_scale = (double)model->config.scale;
   scene->units.data_scale = (double)model->config.space.scale;
   scene->units.data_bound = model->config.space.bound, scene->units.data_ndc = model->config.space.ndc;
+  scene->units.data_views = model->config.space.views, scene->units.data_poses = model->config.space.poses;
 }
 
 static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,

@@ -24,7 +24,8 @@ sf_status sf_plot_comparison(const char *path, const cJSON *comparison)
   char name[256], a[128], b[128];
   SF_TRY(sf_plot_name(path, name));
   const cJSON *ledgers = sf_json_get(comparison, "energies_mj_per_view"), *last = NULL, *item;
-  cJSON_ArrayForEach(item, ledgers) last = item; /* the ledger with everything */
+  cJSON_ArrayForEach(item, ledgers) last = item;
+  if (sf_json_get(ledgers, "neuron")) last = sf_json_get(ledgers, "neuron"); /* the ledger with everything */
   sf_writer writer;
   SF_TRY(sf_writer_open(&writer, path));
   FILE *out = writer.file;

@@ -29,6 +29,8 @@ typedef struct sf_capture {
   enum { SF_ALL_VIEWS, SF_ALL_BUT_HELD_OUT, SF_ONLY_HELD_OUT } part; /* of the frames, which are the split */
   sf_frame *frame;                                                   /* [count], owned */
   int count;
+  int32_t poses;      /* hash of the poses of the list that names the training views; 0: unknown */
+  int listed;         /* in that list */
   int first;          /* those before are not of the split: they say where the scene lies, and the others do not */
   int shrink;         /* the pictures, once loaded, by a box filter; 0: each to at most SF_LONG_SIDE */
   double (*point)[3]; /* [points] sparse points or NULL, owned */
@@ -44,6 +46,9 @@ static inline int sf_capture_guides(const sf_capture *capture)
 {
   return capture->first ? capture->first : capture->count;
 }
+
+/* Notes the first `count` frames as the list that names the training views. */
+void sf_capture_note_poses(sf_capture *capture, int count);
 
 /* One reader per layout. `split` as in sf_dataset_load; on failure the caller frees what is there. */
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);

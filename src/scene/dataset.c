@@ -56,6 +56,20 @@ static sf_status read_poses(sf_dataset *data, sf_capture *c, const sf_dataset_op
   return sf_colmap_read(c, data->path, options);
 }
 
+/* Poses in steps of 1/4096: what another compiler makes of them is the same. FNV-1a, folded to 1..10^9. */
+void sf_capture_note_poses(sf_capture *c, int count)
+{
+  uint64_t hash = UINT64_C(0xcbf29ce484222325);
+  for (int f = 0; f < count; f++)
+    for (int i = 0; i < 12; i++) {
+      const double place = fmin(fmax(c->frame[f].to_world[i] * 4096, -1e15), 1e15);
+      uint64_t word = (uint64_t)llrint(place);
+      for (int byte = 0; byte < 8; byte++, word >>= 8) hash = (hash ^ (word & 255)) * UINT64_C(0x100000001b3);
+    }
+  c->listed = count;
+  c->poses = count ? 1 + (int32_t)(hash % 1000000000) : 0;
+}
+
 static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split, const sf_dataset_options *options)
 {
   const char *dir = data->path;
@@ -76,6 +90,7 @@ static sf_status read_capture(sf_dataset *data, sf_capture *c, const char *split
     return sf_fail(SF_E_IO, "%s: no split %.40s: expected train or test", dir, split);
   const int part = c->part;
   SF_TRY(read_poses(data, c, options));
+  sf_capture_note_poses(c, c->count);
   c->part = part;
   return sf_ok();
 }
@@ -109,6 +124,7 @@ static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const 
 {
   SF_TRY(read_capture(data, c, split, options));
   memcpy(data->list, c->list, sizeof data->list);
+  data->listed = c->listed, data->poses = c->poses;
   if (c->layout == SF_LAYOUT_COLMAP) SF_TRY(sf_colmap_check_others(data));
   const sf_sight sight = look(data, c);
   SF_TRY(sf_place(data, c, options, &sight));
@@ -145,7 +161,19 @@ sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test)
 
 sf_space sf_dataset_space(const sf_dataset *data)
 {
-  return (sf_space){.scale = data->own_scale, .bound = data->bound, .ndc = data->ndc};
+  return (sf_space){
+      .scale = data->own_scale, .bound = data->bound, .ndc = data->ndc, .views = data->listed, .poses = data->poses};
+}
+
+/* Where space and box are alike, the cameras tell two scenes apart. */
+static sf_status check_poses(const sf_space *learned, const char *name, const sf_dataset *data)
+{
+  if (!learned->poses || !data->poses || learned->poses == data->poses) return sf_ok();
+  return sf_fail(
+      SF_E_RANGE,
+      "%s: learned from a list of %d views, %s lists %d and their poses differ: this is another scene's data, or its "
+      "cameras have changed (further views: transforms_test.json alone in a folder)",
+      name, learned->views, data->path, data->listed);
 }
 
 static bool unlike(float a, float b)
@@ -160,7 +188,7 @@ sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dat
   if (learned->ndc != here.ndc)
     return sf_fail(SF_E_RANGE, "%s: learned from data %s NDC rays, %s: %s NDC: this is another scene's data", name,
                    learned->ndc ? "with" : "without", data->list, here.ndc ? "with" : "without");
-  if (!unlike(learned->scale, here.scale) && learned->bound == here.bound) return sf_ok();
+  if (!unlike(learned->scale, here.scale) && learned->bound == here.bound) return check_poses(learned, name, data);
   return sf_fail(SF_E_RANGE,
                  "%s: learned from data of scale %.4g and bound %d, %s: scale %.4g and bound %d: this is another "
                  "scene's data",

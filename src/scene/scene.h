@@ -45,6 +45,8 @@ typedef struct sf_dataset {
   bool ndc;
   float ndc_near;
   float ndc_focal[2]; /* focal length over half the picture, along x and y */
+  int listed;         /* views in the list that names the training views, held-out ones too; 0: there is none */
+  int32_t poses;      /* hash of their poses, whatever is loaded; 0: unknown */
   double world[12];   /* row-major 3x4: the layout's own coordinates (OpenGL camera axes) to world */
   float *point;       /* [points][3] sparse points, model units (not where ndc); NULL: none are known */
   int points;
@@ -72,13 +74,14 @@ sf_status sf_dataset_load(sf_dataset *data, const char *dir, const char *split, 
 void sf_dataset_free(sf_dataset *data);
 /* In which space the views of a data set lie: what a model keeps of the data that it learned from. */
 typedef struct sf_space {
-  float scale;   /* own_scale; 0: nothing is known */
-  int32_t bound; /* proposed by the data */
-  int32_t ndc;   /* 1: rays are in NDC */
+  float scale;          /* own_scale; 0: nothing is known */
+  int32_t bound;        /* proposed by the data */
+  int32_t ndc;          /* 1: rays are in NDC */
+  int32_t views, poses; /* listed, and hash of their poses; 0: nothing is known */
 } sf_space;
 sf_space sf_dataset_space(const sf_dataset *data);
 /* SF_E_RANGE, which names what differs, where views of `data` cannot be of the scene that `name` learned. Scales may
- * differ by 1 %: they are computed from poses. `learned` without a scale fits everything. */
+ * differ by 1 %: they are computed from poses. `learned` without a scale fits everything, without poses any poses. */
 sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dataset *data);
 
 /* SF_E_FORMAT unless both splits lie in the same coordinates and box: what one was learned from shows in the other. */

@@ -94,6 +94,15 @@ static sf_status read_list(sf_capture *c, const char *path, bool box, bool frame
   return status;
 }
 
+/* The training views' list where another one is asked for: it may be faulty, and nobody is told then. */
+static void note_poses(sf_capture *c, const char *training)
+{
+  sf_capture other = {0};
+  if (read_list(&other, training, false, true).code == SF_OK) sf_capture_note_poses(&other, other.count);
+  c->poses = other.poses, c->listed = other.listed;
+  free(other.frame);
+}
+
 /* The training views' file alone decides where the scene lies: all splits have the same coordinates. */
 sf_status sf_transforms_read(sf_capture *c, const char *dir, const char *split)
 {
@@ -101,10 +110,14 @@ sf_status sf_transforms_read(sf_capture *c, const char *dir, const char *split)
   SF_TRY(find_list(c, dir, split, c->list));
   const int part = c->part;
   c->layout = SF_LAYOUT_BLENDER;
-  if (find_list(c, dir, "train", training).code != SF_OK) strcpy(training, c->list);
+  const bool known = find_list(c, dir, "train", training).code == SF_OK;
+  if (!known) strcpy(training, c->list);
   c->part = part;
   const bool same = !strcmp(training, c->list);
   SF_TRY(read_list(c, training, true, same));
   c->first = same ? 0 : c->count;
-  return same ? sf_ok() : read_list(c, c->list, false, true);
+  if (known && same) sf_capture_note_poses(c, c->count);
+  if (same) return sf_ok();
+  note_poses(c, training);
+  return read_list(c, c->list, false, true);
 }

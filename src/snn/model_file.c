@@ -29,7 +29,7 @@ static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value
   return sf_ok();
 }
 
-enum { CONFIG_NUMBERS = 14 /* of every model */, SPACE_NUMBERS = 3 };
+enum { CONFIG_NUMBERS = 14 /* of every model */, SPACE_NUMBERS = 5, SPACE_POSES = 3 /* those from here on */ };
 
 static void config_numbers(sf_config *c, sf_number f[CONFIG_NUMBERS])
 {
@@ -68,7 +68,9 @@ static void space_numbers(sf_config *c, sf_number f[SPACE_NUMBERS])
 {
   const sf_number table[SPACE_NUMBERS] = {{"data_scale", .number = &c->space.scale},
                                           {"data_bound", .integer = &c->space.bound},
-                                          {"data_ndc", .integer = &c->space.ndc}};
+                                          {"data_ndc", .integer = &c->space.ndc},
+                                          {"data_views", .integer = &c->space.views},
+                                          {"data_poses", .integer = &c->space.poses}};
   memcpy(f, table, sizeof table);
 }
 
@@ -78,7 +80,11 @@ static sf_status load_space(const sf_tensors *set, sf_config *c)
   sf_number number_of[SPACE_NUMBERS];
   space_numbers(c, number_of);
   if (!sf_tensors_meta(set, number_of[0].key)) return sf_ok();
-  SF_TRY(load_numbers(set, number_of, SPACE_NUMBERS));
+  const bool poses = sf_tensors_meta(set, number_of[SPACE_POSES].key);
+  SF_TRY(load_numbers(set, number_of, poses ? SPACE_NUMBERS : SPACE_POSES));
+  if (poses && (c->space.views < 1 || c->space.poses < 1))
+    return sf_fail(SF_E_RANGE, "%s: metadata: data_views %d, data_poses %d: expected > 0", set->path, c->space.views,
+                   c->space.poses);
   if (c->space.scale > 0 && c->space.bound > 0 && (c->space.ndc == 0 || c->space.ndc == 1)) return sf_ok();
   return sf_fail(SF_E_RANGE, "%s: metadata: data_scale %g, data_bound %d, data_ndc %d: expected > 0, > 0, 0 or 1",
                  set->path, (double)c->space.scale, c->space.bound, c->space.ndc);
@@ -143,7 +149,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
   sf_number space[SPACE_NUMBERS];
   space_numbers(&c, space);
-  if (c.space.scale > 0) put_numbers(meta, space, SPACE_NUMBERS);
+  if (c.space.scale > 0) put_numbers(meta, space, c.space.poses ? SPACE_NUMBERS : SPACE_POSES);
 }
 
 int sf_model_tensors(const sf_model *m, sf_tensor *list)

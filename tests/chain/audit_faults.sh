@@ -36,4 +36,7 @@ expect 6 1 'ray [0-9]+, MAC of layer D1 at step 0: vector core [0-9]+, portable 
 # The accelerator's global counters: a sample, a ray too many.
 expect 7 1 'ray [0-9]+ \(view .*samples: core [0-9]+, accelerator [0-9]+$'
 expect 8 1 'ray [0-9]+ \(view .*rays: core [0-9]+, accelerator [0-9]+$'
-finish "6 planted miscounts caught and located, none without a fault"
+# The field's cache: the portable core asks once too often, the vector core misses once too often.
+expect 11 1 'ray [0-9]+, sample 0: field look-ups: core [0-9]+, recount [0-9]+$'
+expect 12 1 'ray [0-9]+, field lines missed: vector core [0-9]+, portable core [0-9]+$'
+finish "8 planted miscounts caught and located, none without a fault"

@@ -15,12 +15,12 @@ audit --json --tech "$work/own.tech" >"$work/c.json" || fail "audit with other p
 grep -q 'price of sram.8192 *10 pJ -> 5 pJ' "$work/other.txt" || fail "the comparison does not name the price"
 grep -q 'events per view, by relative change: none' "$work/other.txt" || fail "a price changes events"
 grep -Eq '^paper .*\+0.00%' "$work/other.txt" || fail "a memory price changes the paper's metric"
-grep -Eq '^  weight bytes .* -[0-9.]+%$' "$work/other.txt" || fail "a memory price does not change the weights' energy"
+grep -Eq '^  weight rows .* -[0-9.]+%$' "$work/other.txt" || fail "a memory price does not change the weights' energy"
 "$build/bin/energy_audit" --compare "$work/a.json" "$work/c.json" --plot "$work/change.gp" >/dev/null 2>"$work/err" || fail "--plot: $(cat "$work/err")"
 grep -q "change.gp" "$work/err" || fail "--plot says nothing"
-[ "$(sed -n 's/^"weight bytes" //p' "$work/change.gp" | awk '{ print ($2 < $1) }')" = 1 ] || fail "the plot: $(cat "$work/change.gp")"
+[ "$(sed -n 's/^"weight rows" //p' "$work/change.gp" | awk '{ print ($2 < $1) }')" = 1 ] || fail "the plot: $(cat "$work/change.gp")"
 if command -v gnuplot >/dev/null; then
-  (cd "$work" && gnuplot change.gp) >"$work/err" 2>&1 && grep -q 'weight bytes' "$work/change.svg" || fail "gnuplot: $(cat "$work/err")"
+  (cd "$work" && gnuplot change.gp) >"$work/err" 2>&1 && grep -q 'weight rows' "$work/change.svg" || fail "gnuplot: $(cat "$work/err")"
 fi
 "$build/bin/energy_audit" --compare "$work/a.json" "$work/c.json" --plot "$work/change.svg" >/dev/null 2>"$work/err"
 [ $? -eq 2 ] && grep -q 'expected NAME.gp' "$work/err" || fail "--plot change.svg: $(cat "$work/err")"
@@ -29,6 +29,18 @@ audit --tech "$work/own.tech" >"$work/out" 2>"$work/err" && fail "a broken techn
 line=$(grep -n '^dram' "$work/own.tech" | cut -d: -f1)
 grep -qF "own.tech:$line: key 'dram': unit 'pj'" "$work/err" || fail "not named: $(cat "$work/err")"
 [ ! -s "$work/out" ] || fail "output in spite of an error"
+
+# Another cache: other misses, the same look-ups; what no build has is refused.
+audit --json --cache-bytes 1024 --cache-ways 1 >"$work/d.json" || fail "audit with another cache"
+"$build/bin/energy_audit" --compare "$work/a.json" "$work/d.json" >"$work/cache.txt" || fail "comparison"
+grep -q 'cache bytes *32768 -> 1024' "$work/cache.txt" && grep -q 'cache ways *4 -> 1' "$work/cache.txt" ||
+  fail "the comparison does not name the cache"
+grep -q '^  field lines missed .*+' "$work/cache.txt" || fail "a smaller cache misses no more: $(cat "$work/cache.txt")"
+grep -q '^  field look-ups .*change' "$work/cache.txt" && fail "another cache has other look-ups"
+for wrong in '--cache-bytes 3000' '--cache-ways 3'; do
+  audit $wrong >"$work/out" 2>"$work/err" && fail "$wrong is accepted"
+  grep -q 'cache of 3.* expected' "$work/err" || fail "$wrong: $(cat "$work/err")"
+done
 
 # A twin of its own: every synapse an fp32 MAC, once for each of the samples that it takes.
 "$build/bin/sf_train" "$work/data" -o "$work/twin.safetensors" --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 \
@@ -56,7 +68,7 @@ grep -qF "moved/share/spikefield/tech/45nm.tech" "$work/err" || fail "the missin
 
 # The text: every ledger, the limits, the agreement.
 audit >"$work/text" || fail "text"
-for words in 'core = accelerator = recount' '+ neuron updates' 'integer ReLU twin' 'not modelled' 'known criticism' \
+for words in 'core = accelerator = recount' 'everything' 'Where 16 samples share each read of weights' 'field look-ups' 'integer ReLU twin' 'not modelled' 'known criticism' \
   'Firing rate at which' 'Horowitz' 'largest first'; do
   grep -qF -e "$words" "$work/text" || fail "the report does not say '$words'"
 done

@@ -81,7 +81,7 @@ check "a refusal changes nothing" diff -r one two
 
 # Views enough for the signal to come in the middle, whatever the speed.
 views=400
-"$BIN/sf_scene" simple -o many --size 8 --train 1 --test $views >/dev/null
+"$BIN/sf_scene" simple -o many --size 8 --train 1 --test $views >/dev/null && cp d/transforms_train.json many
 expect 0 "$views views rendered" s1.snn many --all -o whole
 "$BIN/sim_render" s1.snn many --all -o cut -q >out 2>err &
 pid=$!
@@ -124,8 +124,8 @@ check "without pictures, the hash is named" grep -qE '^view 1 test/r_1: DIFFERS:
 cp -r two spoilt # a picture with other pixels, a picture cut short, a picture packed otherwise
 "$BIN/sim_render" s1.snn d --view 1 --steps 1 -o spoilt/view_0001.exr >/dev/null
 truncate -s 900 spoilt/view_0002.exr
-mkdir e && cp -r d/test e && cp d/transforms_test.json e/transforms_train.json
-cp d/transforms_test.json e && "$BIN/sim_render" s1.snn e --split train --view 3 -o spoilt/view_0003.exr >/dev/null
+mkdir e && cp -r d/test e && cp d/transforms_test.json e/transforms_other.json
+cp d/transforms_t*.json e && "$BIN/sim_render" s1.snn e --split other --view 3 -o spoilt/view_0003.exr >/dev/null
 expect 1 "2 of 4 views differ" s1.snn d --verify spoilt/manifest.json
 check "the renderings are right" [ "$(grep -c '^view . test/r_.: OK$' out)" -eq 4 ]
 check "the pixel of the file is named" grep -q 'its file DIFFERS: spoilt/view_0001.exr: plane .*pixel (' out

@@ -36,6 +36,28 @@ refused "ours.safetensors: learned from data of scale 0.8" sf_train cube -o out.
 refused "theirs.snn: learned from data of scale 0.33 and bound 2" sim_render theirs.snn data -o out.exr -q
 [ ! -e out.exr ] && [ ! -e out.snn ] || fail "something was written"
 
+# Another scene of the same scale and box, and the same scene with a camera moved: told by the poses.
+"$bin/sf_scene" simple -o twin --size 16 --train 2 --test 1 --seed 7 >/dev/null || fail "no twin"
+cp -r data moved
+python3 - moved/transforms_train.json <<'END'
+import json, sys
+text = json.load(open(sys.argv[1]))
+text["frames"][0]["transform_matrix"][0][3] += 0.01
+json.dump(text, open(sys.argv[1], "w"))
+END
+views=$(grep -o '"transform_matrix"' data/transforms_train.json | wc -l)
+for folder in twin moved; do
+  listed=$(grep -o '"transform_matrix"' $folder/transforms_train.json | wc -l)
+  other="ours.snn: learned from a list of $views views, $folder lists $listed and their poses differ"
+  refused "$other" sim_render ours.snn $folder -o out.exr -q
+  refused "$other" sf_cosim ours.snn $folder --rays 1 -q
+  refused "$other" energy_audit ours.snn $folder --rays 10 --rtl-rays 0 -q
+  refused "$other" sf_soc ours.snn $folder --crop 7,7,2,2
+  refused "ours.safetensors: learned from a list of $views views" sf_train $folder -o out.safetensors -q --fine-tune ours.safetensors
+  refused "learned from a list of $views views" sf_export ours.safetensors -o out.snn --fit --data $folder --fit-rays 256
+done
+[ ! -e out.exr ] && [ ! -e out.snn ] || fail "something was written"
+
 # With the data that it learned from: not a word, also at a scale and a box of the user's own.
 quiet() { # PROGRAM ARGUMENTS...
   timeout 120 "$bin/$1" "${@:2}" >out.txt 2>err.txt || fail "$*: $(head -1 err.txt)"
@@ -48,11 +70,12 @@ quiet sim_render own.snn cube -o out.exr -q
 refused "own.snn: learned from data of scale 0.33" sim_render own.snn data -o out2.exr -q
 
 # A record that cannot be.
-for edit in ndc:0:2 bound:1:0; do
+poses=$(grep -ao '"data_poses":"[0-9]*"' ours.safetensors | tr -dc 0-9)
+for edit in ndc:0:2 bound:1:0 poses:$poses:${poses//?/0}; do
   IFS=: read -r key from to <<<"$edit"
   sed "s/\"data_$key\":\"$from\"/\"data_$key\":\"$to\"/" ours.safetensors >bad.safetensors
-  refused "bad.safetensors: metadata: data_scale 0.8, " sf_export bad.safetensors -o bad.snn
-  grep -q "data_$key $to[,:]" err.txt || fail "data_$key $to: $(cat err.txt)"
+  refused "bad.safetensors: metadata: data_" sf_export bad.safetensors -o bad.snn
+  grep -q "data_$key $((10#$to))[,:]" err.txt || fail "data_$key $to: $(cat err.txt)"
 done
 
 # A file without the record, as older ones are.
@@ -62,7 +85,7 @@ text = open(sys.argv[1], "rb").read()
 n = struct.unpack("<Q", text[:8])[0]
 header = json.loads(text[8 : 8 + n])
 keys = [k for k in header["__metadata__"] if k.startswith("data_")]
-assert len(keys) == 3, keys
+assert len(keys) == 5, keys
 for key in keys:
     del header["__metadata__"][key]
 header = json.dumps(header).encode()

@@ -50,6 +50,8 @@ cat >"$work/header.c" <<'SOURCE'
   _Static_assert(SF_REG_##name##_WORDS == (words) && SF_REG_##name##_BITS == (bits), #name);
 #define SF_CSR_MEMORY(name, address, data, words, bits, meaning) SF_CSR_WINDOW(name, words, bits, meaning)
 #include "spikefield/csr.def"
+#define EVENT(id, name, title, unit, fj) _Static_assert(SF_REG_EVENT_##id == SF_EVENT_##id, #id);
+SF_EVENT_TABLE(EVENT)
 _Static_assert(SF_REG_ID_RESET == SF_CSR_ID_RESET && SF_REG_CONFIG_RESET == SF_CSR_CONFIG_RESET, "contents after reset");
 SOURCE
 # shellcheck disable=SC2086

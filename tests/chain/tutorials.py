@@ -2,6 +2,8 @@
 """Runs the commands of the tutorials as a reader types them, in a folder of their own, and holds the pages to what they show.
 
 usage: tutorials.py BUILD [PAGE.md ...]     Default: every docs/tutorial-*.md and docs/first-hour.md.
+       tutorials.py --print BUILD [PAGE.md ...]     Puts today's numbers into the outputs of the pages (make outputs).
+           Default: the tutorials, and the pages that show outputs of the demo's scene in BUILD/demo.
 
 A ```sh block runs in the shell of the blocks before it and has to succeed. The ```text block behind it shows lines of its
 output, in order: any number stands for any other, and a line that ends with ... shows only its beginning. Comments say more
@@ -23,6 +25,7 @@ import time
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", ".."))
 PAGES = ["docs/tutorial-rtl.md", "docs/tutorial-training.md", "docs/tutorial-energy.md", "docs/first-hour.md"]
+DEMO_PAGES = ["docs/kit.md", "docs/firmware.md", "docs/activity.md"]
 NUMBER = r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 KINDS = ("skip", "needs", "short", "exit", "range", "makes")
 LIMIT = 900  # seconds a page: ends what hangs, even on a busy machine
@@ -83,12 +86,13 @@ def shortened(block):
     return text
 
 
-def script(todo, logs):
+def script(todo, logs, in_full):
     """One shell for all blocks of a page; N.log is the output of block N, N.status and N.folder are there when it is through."""
     lines = []
     for n, block in enumerate(todo):
         status = (block.note("exit") or ["0"])[0]
-        lines += [f"exec >{logs}/{n}.log 2>&1", "set -e" if status == "0" else "set +e", shortened(block),
+        lines += [f"exec >{logs}/{n}.log 2>&1", "set -e" if status == "0" else "set +e",
+                  "\n".join(block.commands) if in_full else shortened(block),
                   f"echo $? >{logs}/{n}.status", f"pwd >{logs}/{n}.folder"]
     return "\n".join(lines)
 
@@ -155,13 +159,20 @@ def check(block, n, logs):
     return wrong + [f"    {line}" for line in output[-30:] if wrong]
 
 
-def house(build, work):
-    """The source tree as a reader sees it, with a build folder whose contents are those of BUILD."""
-    for name in ("docs", "rtl", "share", "tests", "tools"):
+def house(build, work, whole):
+    """The source tree as a reader sees it, with a build folder whose contents are those of BUILD: what the tutorials need, or
+    the whole of it with a copy of the demo."""
+    sources, built = ("docs", "rtl", "share", "tests", "tools"), ("bin", "share")
+    if whole:
+        sources = [name for name in os.listdir(ROOT) if name not in ("build", ".git")]
+        built = [name for name in os.listdir(build) if name not in ("demo", "tutorial")]
+    for name in sources:
         os.symlink(os.path.join(ROOT, name), os.path.join(work, name))
     os.mkdir(os.path.join(work, "build"))
-    for name in ("bin", "share"):
+    for name in built:
         os.symlink(os.path.join(build, name), os.path.join(work, "build", name))
+    if whole and os.path.isdir(os.path.join(build, "demo")):
+        shutil.copytree(os.path.join(build, "demo"), os.path.join(work, "build", "demo"))
 
 
 def end(shell):
@@ -180,17 +191,43 @@ def forget_blocks(logs):
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def run(page, build):
-    """Runs a page; what is wrong with it."""
+def today(shown, output):
+    """The line of the page with the numbers of the line of output that it shows, and what is left of the output."""
+    text = shown.strip()
+    dots = re.search(r" ?\.\.\.$", text)
+    parts = re.split(f"({NUMBER}|\\s+)", text[:dots.start()] if dots else text)
+    pattern = "".join(r"\s+" if part.isspace() else NUMBER if n % 2 else re.escape(part) for n, part in enumerate(parts))
+    for n, line in enumerate(output):
+        found = re.match(pattern if dots else f"{pattern}$", line.strip())
+        if text not in ("", "...") and found:
+            indent = shown[:len(shown) - len(shown.lstrip())]
+            return indent + found[0] + (dots[0] if dots else ""), output[n + 1:]
+    return shown, output
+
+
+def reprint(page, todo, logs):
+    """Writes the page again with the outputs of this run."""
+    with open(os.path.join(ROOT, page), encoding="utf-8") as file:
+        lines = file.read().split("\n")
+    for n, block in enumerate(todo):
+        output = re.split(r"[\r\n]", read(f"{logs}/{n}.log"))
+        for number, line in block.shown:
+            lines[number - 1], output = today(line, output)
+    with open(os.path.join(ROOT, page), "w", encoding="utf-8") as file:
+        file.write("\n".join(lines))
+
+
+def run(page, build, write):
+    """Runs a page, and writes it again if nothing is wrong with it; what is wrong with it."""
     todo = [block for block in blocks(page) if not left_out(block)]
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     with tempfile.TemporaryDirectory(prefix="sf_tutorial.") as top:
         work, logs = os.path.join(top, "spikefield"), os.path.join(top, "logs")
         os.mkdir(work)
         os.mkdir(logs)
-        house(build, work)
+        house(build, work, write)
         started = time.monotonic()
-        shell = subprocess.Popen(["bash", "-c", script(todo, logs)], cwd=work, env=environment, stdin=subprocess.DEVNULL,
+        shell = subprocess.Popen(["bash", "-c", script(todo, logs, write)], cwd=work, env=environment, stdin=subprocess.DEVNULL,
                                  start_new_session=True)
         wrong = []
         try:
@@ -203,17 +240,21 @@ def run(page, build):
             if wrong:
                 break
             wrong = check(block, n, logs)
+        if write and not wrong:
+            reprint(page, todo, logs)
         forget_blocks(logs)
     print(f"{page}: {len(todo)} blocks, {time.monotonic() - started:.0f} s", flush=True)
     return wrong
 
 
 def main():
-    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
+    write = sys.argv[1:2] == ["--print"]
+    arguments = sys.argv[2:] if write else sys.argv[1:]
+    if not arguments or arguments[0].startswith("-"):
         sys.exit(__doc__)
     wrong = []
-    for page in sys.argv[2:] or PAGES:
-        wrong += run(page, os.path.abspath(sys.argv[1]))
+    for page in arguments[1:] or (PAGES[:3] + DEMO_PAGES if write else PAGES):
+        wrong += run(page, os.path.abspath(arguments[0]), write)
     print(*wrong, sep="\n", end="\n" if wrong else "")
     sys.exit(len(wrong) > 0)
 

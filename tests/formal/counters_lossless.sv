@@ -6,15 +6,24 @@
 
 module counters_lossless (
     input wire        clk_i,
-    input wire [44:0] n_out_i,
+    input wire [ 8:0] d1_out_i,
+    input wire [ 8:0] d2_out_i,
+    input wire [ 8:0] c1_out_i,
+    input wire [ 8:0] c2_out_i,
+    input wire [ 8:0] c3_out_i,
     input wire        d1_row_i,
     input wire        c1_row_i,
     input wire        c1_bias_row_i,
     input wire        c1_products_i,
     input wire [ 2:0] c1_step_i,
-    input wire [ 2:0] fed_row_i,
-    input wire [23:0] fed_fired_i,
-    input wire [ 2:0] fed_bias_i,
+    input wire        d2_row_i,
+    input wire [ 7:0] d2_fired_i,
+    input wire        c2_row_i,
+    input wire [ 7:0] c2_fired_i,
+    input wire        c2_bias_row_i,
+    input wire        c3_row_i,
+    input wire [ 7:0] c3_fired_i,
+    input wire        c3_bias_row_i,
     input wire [ 4:0] busy_i,
     input wire        ray_i,
     input wire        neurons_valid_i,
@@ -42,19 +51,28 @@ module counters_lossless (
   always @(posedge clk_i) rst_n_q <= 1'b1;
 
   wire hold, busy;
-  wire [3:0] value, window, counter;
+  wire [3:0] value, written, window, counter;
   sf_counters u_dut (
       .clk_i          (clk_i),
       .rst_ni         (rst_n_q),
-      .n_out_i        (n_out_i),
+      .d1_out_i       (d1_out_i),
+      .d2_out_i       (d2_out_i),
+      .c1_out_i       (c1_out_i),
+      .c2_out_i       (c2_out_i),
+      .c3_out_i       (c3_out_i),
       .d1_row_i       (d1_row_i),
       .c1_row_i       (c1_row_i),
       .c1_bias_row_i  (c1_bias_row_i),
       .c1_products_i  (c1_products_i),
       .c1_step_i      (c1_step_i),
-      .fed_row_i      (fed_row_i),
-      .fed_fired_i    (fed_fired_i),
-      .fed_bias_i     (fed_bias_i),
+      .d2_row_i       (d2_row_i),
+      .d2_fired_i     (d2_fired_i),
+      .c2_row_i       (c2_row_i),
+      .c2_fired_i     (c2_fired_i),
+      .c2_bias_row_i  (c2_bias_row_i),
+      .c3_row_i       (c3_row_i),
+      .c3_fired_i     (c3_fired_i),
+      .c3_bias_row_i  (c3_bias_row_i),
       .busy_i         (busy_i),
       .ray_i          (ray_i),
       .neurons_valid_i(neurons_valid_i),
@@ -78,26 +96,29 @@ module counters_lossless (
       .watched_i      (watched),
       .value_o        (value),
       .window_o       (window),
+      .written_o      (written),
       .counter_o      (counter)
   );
-  wire peek_walk_q, peek_clear_wanted_q, peek_snapshot_wanted_q, peek_walk_clear_q, peek_walk_snapshot_q;
-  wire [8:0] peek_place_q;
+  wire peek_write_q, peek_walk_q, peek_clear_wanted_q, peek_snapshot_wanted_q, peek_walk_clear_q, peek_walk_snapshot_q;
+  wire [8:0] peek_place_q, peek_write_place_q;
 
   // ---- what one cycle adds to the place
   wire neurons = layer == 3'd0 || layer == 3'd2 || layer == 3'd3;
-  wire [3:0] n = layer == 3'd0 ? n_out_i[3:0] : layer == 3'd1 ? n_out_i[12:9] : layer == 3'd2 ? n_out_i[21:18]
-               : layer == 3'd3 ? n_out_i[30:27] : n_out_i[39:36];
-  wire [1:0] source = layer == 3'd1 ? 2'd0 : layer == 3'd3 ? 2'd1 : 2'd2;  // of {C3, C2, D2}
-  wire fed = fed_row_i[source] && fed_fired_i[{source, step}];
+  wire [3:0] n = layer == 3'd0 ? d1_out_i[3:0] : layer == 3'd1 ? d2_out_i[3:0] : layer == 3'd2 ? c1_out_i[3:0]
+               : layer == 3'd3 ? c2_out_i[3:0] : c3_out_i[3:0];
+  wire [7:0] fired = layer == 3'd1 ? d2_fired_i : layer == 3'd3 ? c2_fired_i : c3_fired_i;
+  wire row = layer == 3'd1 ? d2_row_i : layer == 3'd3 ? c2_row_i : c3_row_i;
+  wire bias_row = layer == 3'd1 ? 1'b0 : layer == 3'd3 ? c2_bias_row_i : c3_bias_row_i;
+  wire fed = row && fired[step];
   wire [7:0] earlier = (8'd1 << step) - 8'd1;
-  wire first = fed && (fed_fired_i[8*source+:8] & earlier) == 8'd0;
+  wire first = fed && (fired & earlier) == 8'd0;
   wire acts = neurons_valid_i && neurons_step_i == step
             && neurons_layer_i == (layer == 3'd0 ? 2'd0 : layer == 3'd2 ? 2'd1 : 2'd2);
   wire updates = update_i && update_step_i == step && update_colour_i == (layer == 3'd4);
   wire mac = (layer == 3'd0 && step == 3'd0 && d1_row_i) || (layer == 3'd2 && c1_products_i && c1_step_i == step);
   wire sop = (layer == 3'd1 || layer == 3'd3 || layer == 3'd4) && fed;
   wire read = layer == 3'd0 ? mac : layer == 3'd2 ? step == 3'd0 && (c1_row_i || c1_bias_row_i)
-            : first || (step == 3'd0 && fed_bias_i[source]);
+            : first || (step == 3'd0 && bias_row);
   wire [3:0] update = neurons ? (acts && neurons_last_i ? n : 4'd0) : {3'd0, updates};
   wire [3:0] bytes = neurons ? update + update + update : update << 2;
   reg walking_q = 1'b0;
@@ -159,7 +180,10 @@ module counters_lossless (
 
   wire [8:0] wiped_at = {3'd7, layer, step};
   wire passed = walking_q && place_q > watched;
-  wire events = d1_row_i || c1_row_i || c1_bias_row_i || c1_products_i || fed_row_i != 3'd0 || fed_bias_i != 3'd0 || busy_i != 5'd0
+  // A value that was read waits a cycle before it is in the window.
+  wire waits = peek_write_q && peek_write_place_q == watched;
+  wire [3:0] seen = waits ? written : window;
+  wire events = d1_row_i || c1_row_i || c1_bias_row_i || c1_products_i || d2_row_i || c2_row_i || c2_bias_row_i || c3_row_i || c3_bias_row_i || busy_i != 5'd0
               || ray_i || neurons_valid_i || update_i || sample_i || stall_out_i;
   always @* begin
     assume (!quiet_i || !events);   // sf_core, sf_readout: idle
@@ -170,7 +194,7 @@ module counters_lossless (
       every_command : assert (peek_clear_wanted_q == clear_q && peek_snapshot_wanted_q == snapshot_q);
       walks : assert (peek_walk_q == walking_q && peek_place_q == place_q && (walking_q || place_q == 9'd0));
       walks_as_wanted : assert (!walking_q || (peek_walk_clear_q == clears_q && peek_walk_snapshot_q == shows_q));
-      holds : assert (hold == (clear_q || snapshot_q || walking_q) && busy == hold);
+      holds : assert (hold == (clear_q || snapshot_q || walking_q) && busy == (hold || peek_write_q));
       only_when_quiet : assert (!walking_q || (held_q && quiet_i));
       frozen : assert (!walking_q || total_q == (clears_q ? 4'd0 : removed_q));
       counts : assert (walking_q || !known_q || value == total_q);
@@ -179,7 +203,9 @@ module counters_lossless (
       cleared : assert (!walking_q || !clears_q || layer == 3'd7 || place_q <= wiped_at || value == 4'd0);
       all_or_nothing : assert (!walking_q || !known_q || value == removed_q || (value == 4'd0 && clears_q && place_q[8:6] == 3'd7));
       clears_together : assert (!walking_q || layer != 3'd7 || !known_q || value == removed_q);
-      snapshot : assert (passed && shows_q ? !known_q || window == removed_q : !shown_known_q || window == shown_q);
+      snapshot : assert (passed && shows_q ? !known_q || seen == removed_q : !shown_known_q || seen == shown_q);
+      writes : assert (walking_q ? peek_write_q == (shows_q && place_q != 9'd0) : !peek_write_q || peek_write_place_q == 9'd511);
+      follows : assert (!walking_q || !peek_write_q || peek_write_place_q == place_q - 9'd1);
       reads : assert (!looked_q || counter == window_q);
     end
   end

@@ -1,6 +1,6 @@
 // The register block as an AXI4-Lite slave, whatever its master and the rest of the block do: responses wait unchanged
-// for their ready, every request is answered exactly once, in the cycle after it was taken; a request is taken at once
-// unless the last response still waits; nothing happens but by an accepted write.
+// for their ready; every request is answered exactly once, a write in the third cycle after it was taken, a read in the
+// second; a request is taken at once unless the one before it is still open; nothing happens but by an accepted write.
 `default_nettype none
 
 module csr_axil (
@@ -57,8 +57,10 @@ module csr_axil (
       .counter_i      (counter_i)
   );
 
-  // Requests taken and not yet answered.
+  // Requests taken and not yet answered, and for how many cycles, 4 and more alike.
   reg write_open_q = 1'b0, read_open_q = 1'b0;
+  reg [2:0] write_age_q = 3'd0, read_age_q = 3'd0;
+  wire peek_taken_q, peek_done_q, peek_read_q;
   reg b_waits_q = 1'b0, r_waits_q = 1'b0;
   reg [1:0] bresp_q, rresp_q;
   reg [31:0] rdata_q;
@@ -68,6 +70,8 @@ module csr_axil (
     if (rst_n_q) begin
       write_open_q <= write_taken || (write_open_q && !(bvalid && bready_i));
       read_open_q <= read_taken || (read_open_q && !(rvalid && rready_i));
+      write_age_q <= write_taken ? 3'd1 : write_age_q == 3'd0 || write_age_q == 3'd4 ? write_age_q : write_age_q + 3'd1;
+      read_age_q <= read_taken ? 3'd1 : read_age_q == 3'd0 || read_age_q == 3'd4 ? read_age_q : read_age_q + 3'd1;
       b_waits_q <= bvalid && !bready_i;
       r_waits_q <= rvalid && !rready_i;
     end
@@ -78,8 +82,12 @@ module csr_axil (
 
   always @* begin
     if (rst_n_q) begin
-      write_answered_once : assert (bvalid == write_open_q);
-      read_answered_once : assert (rvalid == read_open_q);
+      write_answered_once : assert (bvalid == (write_open_q && write_age_q >= 3'd3));
+      read_answered_once : assert (rvalid == (read_open_q && read_age_q >= 3'd2));
+      stages : assert (peek_taken_q == (write_open_q && write_age_q == 3'd1) && peek_done_q == (write_open_q && write_age_q == 3'd2)
+                       && peek_read_q == (read_open_q && read_age_q == 3'd1));
+      young_is_open : assert ((write_open_q || write_age_q == 3'd0 || write_age_q >= 3'd3) && (read_open_q || read_age_q == 3'd0 || read_age_q >= 3'd2));
+      ages : assert (write_age_q <= 3'd4 && read_age_q <= 3'd4 && (!write_open_q || write_age_q != 3'd0) && (!read_open_q || read_age_q != 3'd0));
       one_write_at_a_time : assert (!(write_taken && write_open_q));
       one_read_at_a_time : assert (!(read_taken && read_open_q));
       address_with_data : assert (!(awvalid_i && awready) == !(wvalid_i && wready));
@@ -88,7 +96,8 @@ module csr_axil (
       bresp_waits : assert (!b_waits_q || (bvalid && bresp == bresp_q));
       rdata_waits : assert (!r_waits_q || (rvalid && rdata == rdata_q && rresp == rresp_q));
       response_is_okay_or_slverr : assert (!bvalid || bresp == 2'd0 || bresp == 2'd2);
-      commands_by_write_only : assert (write_taken || !(we || soft_reset || clear || snapshot));
+      commands_by_write_only : assert ((write_open_q && write_age_q == 3'd2) || !(soft_reset || clear || snapshot));
+      weights_by_write_only : assert (write_age_q == 3'd3 || !we);
     end
   end
 endmodule

@@ -1,5 +1,6 @@
 /* The registers for those who read (Markdown), who write RTL (SystemVerilog) and who write drivers (C). */
 #include "tools/gen/gen.h"
+#include "base/event.h"
 #include <inttypes.h>
 #include <string.h>
 
@@ -17,6 +18,10 @@ void gen_write_sv_package(FILE *out, const gen_sources *sources)
   for (int i = 0; i < gen_memory_count; i++)
     fprintf(out, "  localparam integer %s_WORDS = %" PRIu32 ";\n  localparam integer %s_BITS = %d;\n",
             gen_memories[i].name, gen_memories[i].words, gen_memories[i].name, gen_memories[i].bits);
+#define EVENT(id, name, title, unit, fj)                                                                               \
+  fprintf(out, "  localparam [2:0] EVENT_" #id " = 3'd%d;  // %s\n", SF_EVENT_##id, title);
+  SF_EVENT_TABLE(EVENT)
+#undef EVENT
   fprintf(out, "endpackage\n");
 }
 
@@ -58,6 +63,16 @@ static void write_memory_table(FILE *out)
   }
 }
 
+static void write_event_table(FILE *out)
+{
+  fprintf(
+      out,
+      "\n## Events\n\nFrom `include/spikefield/event.def`.\n\n| number | name | counts | unit |\n|---|---|---|---|\n");
+#define EVENT(id, name, title, unit, fj) fprintf(out, "| %d | " #name " | %s | %s |\n", SF_EVENT_##id, title, unit);
+  SF_EVENT_TABLE(EVENT)
+#undef EVENT
+}
+
 void gen_write_markdown(FILE *out, const gen_sources *sources)
 {
   (void)sources;
@@ -74,6 +89,7 @@ void gen_write_markdown(FILE *out, const gen_sources *sources)
     fprintf(out, " |\n");
   }
   write_memory_table(out);
+  write_event_table(out);
   fprintf(out, "\n## Fields\n");
   for (int i = 0; i < gen_register_count; i++) write_field_table(out, &gen_registers[i]);
 }
@@ -109,5 +125,10 @@ void gen_write_c_header(FILE *out, const gen_sources *sources)
     fprintf(out, "\n/* %s: %s */\n#define SF_REG_%s_WORDS %" PRIu32 "\n#define SF_REG_%s_BITS %d\n", m->name,
             m->meaning, m->name, m->words, m->name, m->bits);
   }
+  fprintf(out, "\n/* Events of the counters */\n");
+#define EVENT(id, name, title, unit, fj)                                                                               \
+  fprintf(out, "#define SF_REG_EVENT_" #id " %d /* %s */\n", SF_EVENT_##id, title);
+  SF_EVENT_TABLE(EVENT)
+#undef EVENT
   fprintf(out, "#endif\n");
 }

@@ -144,11 +144,17 @@ static sf_status restore(train_arguments *a, const char **path)
   return status;
 }
 
+/* The hash grid's; with data TensoRF's. */
+static void set_field_defaults(train_arguments *a, const sf_dataset *data)
+{
+  a->train = data ? sf_train_defaults_tensorf(data) : sf_train_defaults();
+  a->theta = (double)a->train.config.theta[0];
+}
+
 /* TensoRF's defaults depend on the data: the options once more, on top of them. */
 static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *data)
 {
-  a->train = sf_train_defaults_tensorf(data);
-  a->theta = (double)a->train.config.theta[0];
+  set_field_defaults(a, data);
   const char *path[1];
   SF_TRY(parse(a, path));
   SF_TRY(finish_options(a));
@@ -181,17 +187,17 @@ sf_status train_settle(train_arguments *a, const sf_dataset *data)
   return sf_ok();
 }
 
+void train_option_defaults(train_arguments *a, const sf_dataset *data)
+{
+  *a = (train_arguments){.output = "model.safetensors", .checkpoint_minutes = 2, .gamma = -1};
+  set_field_defaults(a, data);
+}
+
 void train_defaults(train_arguments *a, int argc, char **argv)
 {
-  *a = (train_arguments){.output = "model.safetensors",
-                         .train = sf_train_defaults(),
-                         .checkpoint_minutes = 2,
-                         .gamma = -1,
-                         .argc = argc,
-                         .argv = argv,
-                         .before = {argv[0]},
-                         .words = 1};
-  a->theta = (double)a->train.config.theta[0];
+  train_option_defaults(a, NULL);
+  a->argc = argc, a->argv = argv;
+  a->before[0] = argv[0], a->words = 1;
 }
 
 void train_arguments_free(train_arguments *a)

@@ -20,6 +20,8 @@ typedef struct train_arguments {
   char log_path[4096]; /* where no --log is given */
 } train_arguments;
 
+/* What the options are without being given: with the hash grid, or with TensoRF's planes on data. */
+void train_option_defaults(train_arguments *a, const sf_dataset *data);
 void train_defaults(train_arguments *a, int argc, char **argv);
 void train_arguments_free(train_arguments *a);
 /* options: TRAIN_OPTIONS_MAX, filled. */

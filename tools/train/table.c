@@ -1,8 +1,10 @@
 /* The options of sf_train, group by group: what a first run needs, tuning, ablations last. */
 #include "tools/train/options.h"
+#include "field/field.h"
 #include <string.h>
 
-/* Behind the help stand the defaults of the two backbones, ingp and tensorf; one alone is both's. */
+/* Behind the help stand the defaults of the two backbones, ingp and tensorf; one alone is both's; # is what
+ * train_defaults says. */
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
 static sf_option *add(sf_option *to, const sf_option *list, size_t count)
@@ -91,15 +93,15 @@ static sf_option *tuning(train_arguments *a, sf_option *o)
   sf_train_options *t = &a->train;
   const sf_option list[] = {
       SF_GROUP("Tuning"),
-      {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I\t2500"},
-      {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II\t7500"},
-      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N", "samples per iteration, about\t16384\t32768"},
-      {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "rays per iteration at most\t-\t4096"},
-      {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R", "Adam's rate for the field\t1e-2\t2e-2"},
-      {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks\t5e-3\t1e-3"},
-      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold\t0.25\t0.5"},
+      {"--stage1", 0, SF_ARG_INT, &t->stage1, 0, 1e8, NULL, "N", "iterations of stage I\t#"},
+      {"--stage2", 0, SF_ARG_INT, &t->stage2, 0, 1e8, NULL, "N", "iterations of stage II\t#"},
+      {"--samples", 0, SF_ARG_INT, &t->samples, 256, 1 << 22, NULL, "N", "samples per iteration, about\t#"},
+      {"--rays", 0, SF_ARG_INT, &t->rays, 64, 1 << 15, NULL, "N", "rays per iteration at most\t-\t#"},
+      {"--lr-grid", 0, SF_ARG_DOUBLE, &t->lr_grid, 1e-8, 10, NULL, "R", "Adam's rate for the field\t#"},
+      {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks\t#"},
+      {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold\t#"},
       {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
-       "how fast the averages of the search forget; what it finds should not hang on it\t1"}};
+       "how fast the averages of the search forget; what it finds should not hang on it\t#"}};
   return add(o, list, COUNT(list));
 }
 
@@ -108,18 +110,17 @@ static sf_option *sizes(train_arguments *a, sf_option *o)
   sf_config *c = &a->train.config;
   const sf_option list[] = {
       SF_GROUP("Sizes"),
-      {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N",
-       "neurons of a spiking layer, multiple of 16\t128"},
-      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N", "occupancy cells per axis, power of two\t128"},
-      {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid\t16\t-"},
-      {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries\t19\t-"},
-      {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level\t16\t-"},
+      {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N", "neurons of a spiking layer, multiple of 16\t#"},
+      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N", "occupancy cells per axis, power of two\t#"},
+      {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid\t#\t-"},
+      {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries\t#\t-"},
+      {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level\t#\t-"},
       {"--finest-res", 0, SF_ARG_INT, &a->finest_res, 2, 32768, NULL, "N",
        "resolution of the finest level; else a pixel of the pictures, at most 2048 x bound and 32768\tpixel\t-"},
       {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
-       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest\t1024\t-"},
+       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest\t#\t-"},
       {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
-       "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0\t-1\t-"},
+       "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0\t#\t-"},
       {"--voxels", 0, SF_ARG_INT, &a->train.voxels, 16, 1024, NULL, "N",
        "the finest grid has N^3 voxels; else half the pictures' width, at most 300; NDC: 0.63 of it, at most 640\t-"
        "\tpixels"}};
@@ -149,12 +150,29 @@ static sf_option *ablations(train_arguments *a, sf_option *o)
   return add(o, list, COUNT(list));
 }
 
-sf_cli train_cli(train_arguments *a, sf_option *o)
+static void fill(train_arguments *a, sf_option *o)
 {
   sf_option *end = first_run(a, o);
   end = files(a, data_and_box(a, energy(a, end)));
   end = ablations(a, sizes(a, tuning(a, end)));
   *end = (sf_option){0};
+}
+
+static const sf_option *const *columns(void)
+{
+  static train_arguments of[SF_FIELDS];
+  static sf_option list[SF_FIELDS][TRAIN_OPTIONS_MAX];
+  static const sf_option *const column[SF_FIELDS] = {list[SF_INGP], list[SF_TENSORF]};
+  const sf_dataset none = {.layout = SF_LAYOUT_BLENDER, .scale = 1, .bound = 1};
+  train_option_defaults(&of[SF_INGP], NULL);
+  train_option_defaults(&of[SF_TENSORF], &none);
+  for (int i = 0; i < SF_FIELDS; i++) fill(&of[i], list[i]);
+  return column;
+}
+
+sf_cli train_cli(train_arguments *a, sf_option *o)
+{
+  fill(a, o);
   return (sf_cli){.program = "sf_train",
                   .usage = "sf_train DATA [-o model.safetensors] [options]",
                   .summary = "Learns a spiking radiance field and, with it, how many time steps the scene\n"
@@ -171,5 +189,6 @@ sf_cli train_cli(train_arguments *a, sf_option *o)
                   .options = o,
                   .min_positional = 1,
                   .max_positional = 1,
-                  .columns = "\tingp\ttensorf"};
+                  .columns = "\tingp\ttensorf",
+                  .defaults = columns()};
 }
