@@ -226,6 +226,7 @@ module sf_top #(
       .wword_i        (wword),
       .wdata_i        (wweights),
       .d1_in_i        (d1_in[5:0]),
+      .decodes_i      (decodes_q),
       .d1_out_i       (d1_out),
       .n_dir_i        (n_dir_q),
       .n_h_i          (n_h_q),

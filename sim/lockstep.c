@@ -120,10 +120,12 @@ static sf_status resume(sf_lockstep *l)
   const bool ours = size == sizeof c && !memcmp(data, l->identity, sizeof l->identity);
   if (ours) memcpy(&c, data, sizeof c);
   free(data);
-  if (!ours) return sf_fail(SF_E_FORMAT, "%s: checkpoint of another program, scene, data set or other options", path);
+  if (!ours)
+    return sf_fail(SF_E_FORMAT, "%s: this checkpoint is of another program, scene or data set, or of other options",
+                   path);
   const sf_lockstep_state *from = c.of == l->options.rays ? &c.now : &c.whole;
   if (from->rays > (uint64_t)l->options.rays)
-    return sf_fail(SF_E_USAGE, "%s: holds %" PRIu64 " rays, more than --rays %d; a checkpoint goes on, not back", path,
+    return sf_fail(SF_E_USAGE, "%s: %" PRIu64 " rays are finished, more than --rays %d; give as many or more", path,
                    from->rays, l->options.rays);
   l->whole = c.whole;
   l->blocks = from->blocks, l->rays = from->rays, l->sum = from->sum;
@@ -213,7 +215,8 @@ static sf_status reserve(sf_lockstep *l, char path[4096])
     if (file >= 0) return close(file), sf_ok();
     if (errno != EEXIST) return sf_fail(SF_E_IO, "cannot write %s: %s", path, strerror(errno));
   }
-  return sf_fail(SF_E_IO, "%.100s: no name is left for the evidence", l->options.evidence);
+  return sf_fail(SF_E_IO, "%.100s: every name for the evidence is taken; remove old files or give another --evidence",
+                 l->options.evidence);
 }
 
 static sf_status write_replay(sf_lockstep *l, const sf_status *status)

@@ -52,7 +52,8 @@ static sf_status find_build(request *r)
 static sf_status append(char *text, size_t *used, size_t size, const char *more)
 {
   const size_t length = strlen(more);
-  if (*used + length + 2 > size) return sf_fail(SF_E_RANGE, "--dut: more than %d letters of files", WORDS_MAX);
+  if (*used + length + 2 > size)
+    return sf_fail(SF_E_RANGE, "--dut: the list of files is longer than %d characters", WORDS_MAX);
   memcpy(text + *used, more, length);
   text[*used + length] = ' ';
   text[*used + length + 1] = '\0';
@@ -66,7 +67,8 @@ static sf_status absolute(const request *r, const char *prefix, const char *path
   const bool below = r->base && path[0] != '/';
   snprintf(from, sizeof from, "%s%s%s", below ? r->base : "", below ? "/" : "", path);
   if (!realpath(from, full)) return sf_fail(SF_E_IO, "--dut: %s: %s", from, strerror(errno));
-  if (strpbrk(full, " \t'\"$#:\\")) return sf_fail(SF_E_USAGE, "--dut: %s: make takes no such letter in a path", full);
+  if (strpbrk(full, " \t'\"$#:\\"))
+    return sf_fail(SF_E_USAGE, "--dut: %s: make cannot handle a path with a space, a quote or one of $ # : \\", full);
   if (snprintf(to, PATH_LENGTH, "%s%s", prefix, full) < PATH_LENGTH) return sf_ok();
   return sf_fail(SF_E_RANGE, "--dut: %s: the path is too long", path);
 }
@@ -105,7 +107,8 @@ static sf_status add_word(request *r, const char *word)
     return append(r->words, &r->words_used, sizeof r->words, full);
   }
   if (word[0] == '-' || word[0] == '+') {
-    if (strpbrk(word, "'\"$#\\;&|<>`()")) return sf_fail(SF_E_USAGE, "--dut: %s: make takes no such letter", word);
+    if (strpbrk(word, "'\"$#\\;&|<>`()"))
+      return sf_fail(SF_E_USAGE, "--dut: %s: make cannot handle a quote or one of $ # \\ ; & | < > ` ( )", word);
     SF_TRY(append(r->key, &r->key_used, sizeof r->key, word));
     return append(r->words, &r->words_used, sizeof r->words, word);
   }

@@ -312,7 +312,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--rays", 0, SF_ARG_U64, &o->audit.rays, 1, 1e9, NULL, "N", "N random rays instead of all pixels"},
       {"--split", 0, SF_ARG_STRING, &o->audit.split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--steps", 0, SF_ARG_INT, &o->audit.steps, 1, SF_T_MAX, NULL, "N", "time steps in place of the scene's t_r"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       SF_GROUP("Reports"),
       {"--html", 0, SF_ARG_OUTPUT, &o->html, 0, 0, NULL, "FILE", "write the report as one self-contained page"},
       {"--csv", 0, SF_ARG_OUTPUT, &o->csv, 0, 0, NULL, "FILE", "write the counts per layer and step"},
@@ -323,9 +323,9 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       SF_GROUP("Prices and comparisons"),
       {"--tech", 0, SF_ARG_INPUT, &o->audit.tech, 0, 0, NULL, "FILE", "prices: a file or a name (default 45nm)"},
       {"--twin", 0, SF_ARG_INPUT, &o->audit.twin, 0, 0, NULL, "FILE",
-       "float model of a ReLU twin, trained by itself: its own samples"},
+       "compare with this float model of a ReLU twin that was trained by itself, on its own samples"},
       {"--compare", 0, SF_ARG_FLAG, &o->compare, 0, 0, NULL, NULL,
-       "A B [DATA]: two reports (.json) or scenes, what changed"},
+       "say what changed between two reports (.json) or scenes: --compare A B [DATA]"},
       {"--tech-b", 0, SF_ARG_INPUT, &o->tech_b, 0, 0, NULL, "FILE", "prices of B (default: those of A)"},
       {"--steps-b", 0, SF_ARG_INT, &o->steps_b, 1, SF_T_MAX, NULL, "N", "time steps of B (default: as A)"},
       {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
@@ -337,16 +337,17 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
        "of the field's cache: 1, 2, 4 or 8 (default as built)"},
       SF_GROUP("Checks and tuning"),
       {"--rtl-rays", 0, SF_ARG_INT, &o->audit.rtl_rays, 0, 1 << 20, NULL, "N",
-       "rays for the accelerator too (default 16)"},
+       "rays that the accelerator renders, too (default 16)"},
       {"--recount-rays", 0, SF_ARG_U64, &o->audit.recount_rays, 0, 1e9, NULL, "N",
        "rays recounted from their spike bitmaps (default 1000)"},
-      {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "of the random choices (default 1)"},
-      {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT", "bubbles and back-pressure (default 0)"},
+      {"--seed", 0, SF_ARG_U64, &o->audit.seed, 0, 0, NULL, "S", "seed of the random choices (default 1)"},
+      {"--stall", 0, SF_ARG_INT, &o->audit.stall, 0, 90, NULL, "PERCENT",
+       "percent of cycles with a bubble or back-pressure (default 0)"},
       {"--downscale", 0, SF_ARG_INT, &o->audit.downscale, 0, 64, NULL, "N",
        "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->audit.scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
-      {"--plusarg", 0, SF_ARG_STRING, &o->audit.plusarg, 0, 0, NULL, "TEXT", "passed to the simulation"},
+      {"--plusarg", 0, SF_ARG_STRING, &o->audit.plusarg, 0, 0, NULL, "TEXT", "hand TEXT to the simulation"},
       {0}};
   const char *positional[3];
   cli->options = table;
@@ -361,19 +362,20 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
 
 int main(int argc, char **argv)
 {
-  sf_cli cli = {.program = "energy_audit",
-                .usage = "energy_audit scene.snn DATA [options]",
-                .summary =
-                    "Counts every operation of a scene in the fixed-point core, in the accelerator and again from the\n"
-                    "spike bitmaps; prices the counts and the scene's ANN twin. Exit status 1 if any count differs.",
-                .examples = "  energy_audit scene.snn data --views 2 --json\n"
-                            "  energy_audit scene.snn data --view 0 --html report.html\n"
-                            "  energy_audit scene.snn data --tech my.tech --csv counts.csv\n"
-                            "  energy_audit --compare a.json b.json --plot change.gp && gnuplot change.gp\n"
-                            "  energy_audit --compare scene.snn scene.snn data --steps 2 --steps-b 1\n"
-                            "  energy_audit --published\n",
-                .min_positional = 0,
-                .max_positional = 3};
+  sf_cli cli = {
+      .program = "energy_audit",
+      .usage = "energy_audit scene.snn DATA [options]",
+      .summary =
+          "Counts every operation of a scene in the fixed-point core, in the accelerator and again from the\n"
+          "spike bitmaps; prices the counts and those of the scene's ReLU twin. Exit status 1 if any\ncount differs.",
+      .examples = "  energy_audit scene.snn data --views 2 --json\n"
+                  "  energy_audit scene.snn data --view 0 --html report.html\n"
+                  "  energy_audit scene.snn data --tech my.tech --csv counts.csv\n"
+                  "  energy_audit --compare a.json b.json --plot change.gp && gnuplot change.gp\n"
+                  "  energy_audit --compare scene.snn scene.snn data --steps 2 --steps-b 1\n"
+                  "  energy_audit --published\n",
+      .min_positional = 0,
+      .max_positional = 3};
   options opt = {
       .audit = {
           .view = -1, .rtl_rays = RTL_RAYS, .recount_rays = RECOUNT_RAYS, .tech = "45nm", .split = "test", .seed = 1}};

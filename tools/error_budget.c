@@ -100,9 +100,9 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   const sf_option table[] = {
       SF_GROUP("What is measured"),
       {"--samples", 0, SF_ARG_U64, &o->samples, 1, 1e10, NULL, "N",
-       "inputs of a block too large to try all (default 1e6)"},
+       "inputs to try of a block that has too many to try all (default 1e6)"},
       {"--rays", 0, SF_ARG_U64, &o->rays, 1, 1e6, NULL, "N", "random rays of the view (default 1000)"},
-      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "view (default 0)"},
+      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       SF_GROUP("What is printed"),
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
@@ -112,8 +112,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
        "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the scene's (default 0)"},
-      {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "of the choice of rays (default 1)"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--seed", 0, SF_ARG_U64, &o->seed, 0, 0, NULL, "S", "seed of the random rays (default 1)"},
+      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {0}};
   const char *positional[3];
   cli->options = table;

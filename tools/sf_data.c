@@ -250,10 +250,11 @@ int main(int argc, char **argv)
   const sf_option options[] = {
       {"--png", 0, SF_ARG_OUTPUT, &j.png, 0, 0, NULL, "FILE",
        "picture of the cameras from above and from the side: blue to learn from, red held out"},
-      {"--downscale", 0, SF_ARG_INT, &j.downscale, 0, 64, NULL, "N", "as the other programs (default 0)"},
+      {"--downscale", 0, SF_ARG_INT, &j.downscale, 0, 64, NULL, "N",
+       "read pictures of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--scale", 0, SF_ARG_DOUBLE, &j.scale, 0, 1e6, NULL, "S",
        "model units per world unit, 0 = the layout's (default 0)"},
-      {"--threads", 0, SF_ARG_INT, &j.threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--threads", 0, SF_ARG_INT, &j.threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {"--json", 0, SF_ARG_FLAG, &j.json, 0, 0, NULL, NULL, "all of it as JSON, every pose included"},
       {0}};
   const sf_cli cli = {

@@ -348,9 +348,8 @@ int main(int argc, char **argv)
                       .usage = "sf_export MODEL -o SCENE [--vectors DIR] [options]\n       sf_export SCENE --vectors "
                                "DIR --data DATA [options]\n       sf_export SCENE --traces DIR --data DATA [options]\n"
                                "       sf_export MODEL|SCENE --nir FILE",
-                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core, "
-                                 "the accelerator and the firmware; writes vectors, traces and graphs for other "
-                                 "tools.",
+                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core,\n"
+                                 "the accelerator and the firmware. Writes vectors, traces and graphs for other tools.",
                       .examples = "  sf_export model.safetensors -o scene.snn\n"
                                   "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
                                   "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"

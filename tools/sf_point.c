@@ -21,8 +21,8 @@ int main(int argc, char **argv)
       {"--leak-bits", 0, SF_ARG_INT, &w->leak_bits, 4, SF_LEAK_FRAC, NULL, "B", "fraction bits of a leak"},
       {"--grid-bits", 0, SF_ARG_INT, &w->grid_bits, 2, SF_GRID_BITS, NULL, "B", "bits of a grid entry"},
       SF_GROUP("Tuning"),
-      {"--seed", 0, SF_ARG_U64, &o.quant.seed, 0, 0, NULL, "S", "of the calibration samples (default 0)"},
-      {"--threads", 0, SF_ARG_INT, &threads, 1, 1024, NULL, "N", "default: all processors"},
+      {"--seed", 0, SF_ARG_U64, &o.quant.seed, 0, 0, NULL, "S", "seed of the calibration samples (default 0)"},
+      {"--threads", 0, SF_ARG_INT, &threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {"--json", 0, SF_ARG_FLAG, &json, 0, 0, NULL, NULL, "report as JSON"},
       {0}};
   const sf_cli cli = {

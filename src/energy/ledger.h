@@ -76,10 +76,10 @@ typedef enum {
   SF_TRAFFIC_TABLE,
   SF_TRAFFIC_EXP_NEG,
   SF_TRAFFIC_FRAME,
-  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator's ports, too */
-  SF_TRAFFIC_LOOKUP = SF_TRAFFIC_AT_PORTS,
+  SF_TRAFFIC_LOOKUP,
   SF_TRAFFIC_MISS,
-  SF_TRAFFIC_PRODUCT,
+  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator, too */
+  SF_TRAFFIC_PRODUCT = SF_TRAFFIC_AT_PORTS,
   SF_TRAFFIC_PLACE,
   SF_TRAFFIC_SPECIAL,
   SF_TRAFFIC_HARMONICS,

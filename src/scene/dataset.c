@@ -171,8 +171,8 @@ static sf_status check_poses(const sf_space *learned, const char *name, const sf
   if (!learned->poses || !data->poses || learned->poses == data->poses) return sf_ok();
   return sf_fail(
       SF_E_RANGE,
-      "%s: learned from a list of %d views, %s lists %d and their poses differ: this is another scene's data, "
-      "or its cameras have changed",
+      "%s: learned from a list of %d views, %s lists %d and their poses differ: this is another scene's data, or its "
+      "cameras have changed (further views: transforms_test.json alone in a folder)",
       name, learned->views, data->path, data->listed);
 }
 

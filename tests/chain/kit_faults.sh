@@ -15,7 +15,9 @@ faulty 13 1 'answered before it was asked'
 faulty 14 1 'no sign of life'
 # Another neuron of the same behaviour, and a wrong one: older files than what was built, in the same folder.
 run icarus 0 PASS -- OVERLAY="$PWD/tests/dut/serial"
-run icarus 1 'neuron' -- OVERLAY="$PWD/tests/dut/wrong"
+mkdir "$work/wrong"
+sed -f tests/dut/wrong.sed tests/dut/serial/sf_plif.sv >"$work/wrong/sf_plif.sv"
+run icarus 1 'neuron' -- OVERLAY="$work/wrong"
 run icarus 1 'nowhere' -- DUT=nowhere
 sed 's/^module sf_top/module my_top/' "$kit/rtl/sf_top.sv" >"$work/my_top.sv"
 touch -d '1 hour ago' "$work/my_top.sv"

@@ -37,7 +37,8 @@ saif own && saif other "${my_block[@]}" || fail "a SAIF file"
 own=$(grep -c '(current_q' "$work/own.saif") other=$(grep -c '(current_q' "$work/other.saif")
 [ "$own" -ge 1000 ] && [ "$own" -eq "$other" ] || fail "$own bits of current_q, of the other block $other"
 
-cp "$root/tests/dut/wrong/sf_plif.sv" "$work/overlay"
+wrong() { sed -f "$root/tests/dut/wrong.sed" "$root/tests/dut/serial/sf_plif.sv"; }
+wrong >"$work/overlay/sf_plif.sv"
 run wrong 1 "${my_block[@]}"
 [ "$(field wrong wire)" = membrane ] || fail "the wrong neuron: $(cat "$work/wrong.err")"
 [ "$(field wrong actual)" = $(($(field wrong expected) - 1)) ] || fail "the wrong neuron is not one too low"
@@ -60,11 +61,11 @@ replay 1 "evidence.json: the block that differed: --dut: $work/my_block.sv: No s
 mv "$work/kept_block.sv" "$work/my_block.sv"
 
 # The kit's list of files, by the line of docs/kit.md.
-mkdir "$work/my_neuron"
-cp "$root/tests/dut/wrong/sf_plif.sv" "$work/my_neuron"
-listed=$(sed -n 's/^    \(sed .* >kit\/my.f\)$/\1/p' "$root/docs/kit.md")
-documented=$(sed -n 's/^    \(sf_cosim scene.snn data --dut "-F kit\/my.f.*\)/\1/p' "$root/docs/kit.md")
-[ -n "$documented" ] && (cd "$work" && bash -c "$listed") && [ -s "$work/kit/my.f" ] || fail "docs/kit.md has no line with a list of one's own"
+mkdir "$work/wrong"
+wrong >"$work/wrong/sf_plif.sv"
+listed=$(sed -n 's/^\(sed .* >kit\/wrong.f\)$/\1/p' "$root/docs/kit.md")
+documented=$(sed -n 's/^sf_cosim [^ ]* [^ ]* \(.*--dut "-F kit\/wrong.f"\)$/sf_cosim scene.snn data \1/p' "$root/docs/kit.md")
+[ -n "$documented" ] && (cd "$work" && bash -c "$listed") && [ -s "$work/kit/wrong.f" ] || fail "docs/kit.md has no line with a list of one's own"
 replay 1 'neuron' "PATH=$build/bin:\$PATH; $documented --quiet"
 grep -q '^replay: *sf_cosim --replay sf_cosim-difference.json$' "$work/replay.out" || fail "$documented: $(tail -n 4 "$work/replay.out")"
 while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/replay.out")
