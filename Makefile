@@ -81,7 +81,7 @@ CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
 # Those that drive the Verilated accelerator.
-DUT_TESTS := bench test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
+DUT_TESTS := bench bench_field test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 

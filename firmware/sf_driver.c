@@ -29,6 +29,8 @@ const char *sf_driver_text(sf_driver_code code)
     return "no answer";
   case SF_DRIVER_MISFIT:
     return "the encoder's levels or directions are not the net's";
+  case SF_DRIVER_CACHE:
+    return "the field's cache has another size or other ways than the program asks for";
   }
   return "unknown code";
 }

@@ -53,7 +53,8 @@ typedef enum {
   SF_DRIVER_CONFIG,    /* built with other sizes than this driver */
   SF_DRIVER_REFUSED,   /* the ERROR register says why */
   SF_DRIVER_TIMEOUT,   /* the block did not answer; a soft reset recovers it */
-  SF_DRIVER_MISFIT     /* the encoder's sizes are not the net's; nothing was written */
+  SF_DRIVER_MISFIT,    /* the encoder's sizes are not the net's; nothing was written */
+  SF_DRIVER_CACHE      /* the field's cache is not the one that the program asks for; nothing was written */
 } sf_driver_code;
 const char *sf_driver_text(sf_driver_code code);
 /* First bit of an ERROR register as text, "no error" for 0. */

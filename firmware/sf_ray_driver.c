@@ -31,6 +31,14 @@ static bool fits(const sf_bus *bus, const sf_ray_blob *rays)
          rays->n_dir <= SF_RAY_DIR_MAX && rays->n_dir == get(bus, SF_CSR_C1_N_IN) - h;
 }
 
+static bool has_cache(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  const uint32_t cache = get(bus, SF_CSR_FIELD_CACHE);
+  const uint32_t bytes = (cache & SF_CSR_FIELD_CACHE_BYTES) >> SF_CSR_FIELD_CACHE_BYTES_LSB;
+  const uint32_t ways = (cache & SF_CSR_FIELD_CACHE_WAYS) >> SF_CSR_FIELD_CACHE_WAYS_LSB;
+  return (!rays->cache_bytes || rays->cache_bytes == bytes) && (!rays->cache_ways || rays->cache_ways == ways);
+}
+
 static void program_level(const sf_bus *bus, uint32_t index, const sf_ray_level_blob *level)
 {
   put(bus, SF_CSR_ENCODER_ADDRESS, index * LEVEL_WORDS);
@@ -53,12 +61,39 @@ static void program_encoder(const sf_bus *bus, const sf_ray_blob *rays)
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays)
 {
   if (!fits(bus, rays)) return SF_DRIVER_MISFIT;
+  if (!has_cache(bus, rays)) return SF_DRIVER_CACHE;
   program_encoder(bus, rays);
   put(bus, SF_CSR_RAY_TRANS_STOP, rays->trans_stop);
   put(bus, SF_CSR_RAY_MAX_SAMPLES, rays->max_samples);
   put(bus, SF_CSR_RAY_BACKGROUND_R, rays->background[0]);
   put(bus, SF_CSR_RAY_BACKGROUND_G, rays->background[1]);
   put(bus, SF_CSR_RAY_BACKGROUND_B, rays->background[2]);
+  put(bus, SF_CSR_FIELD_BASE, rays->table);
   put(bus, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
   return get(bus, SF_CSR_RAY_ERROR) ? SF_DRIVER_REFUSED : SF_DRIVER_OK;
+}
+
+/* Both halves of a counter that may go on counting: the high one did not change while the low one was read. */
+static uint64_t counter(const sf_bus *bus, uint32_t low_half)
+{
+  uint32_t high = get(bus, low_half + 4), before, low;
+  do {
+    before = high;
+    low = get(bus, low_half);
+    high = get(bus, low_half + 4);
+  } while (high != before);
+  return (uint64_t)high << 32 | low;
+}
+
+void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters)
+{
+  counters->lookups = counter(bus, SF_CSR_FIELD_LOOKUPS);
+  counters->misses = counter(bus, SF_CSR_FIELD_MISSES);
+  counters->fills = counter(bus, SF_CSR_FIELD_FILLS);
+  counters->stalls = counter(bus, SF_CSR_FIELD_STALLS);
+}
+
+void sf_ray_driver_clear(const sf_bus *bus)
+{
+  put(bus, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_CLEAR);
 }

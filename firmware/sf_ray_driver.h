@@ -17,11 +17,20 @@ typedef struct sf_ray_blob {
   uint32_t levels, n_dir, dir_frac; /* LSB of the direction features: 2^-dir_frac */
   sf_ray_level_blob level[SF_RAY_LEVELS_MAX];
   uint32_t trans_stop, max_samples, background[3];
+  uint32_t table;                   /* address of the grid's table in the block's memory, a multiple of 16 */
+  uint32_t cache_bytes, cache_ways; /* of the field's cache that the program counts on; 0: any */
 } sf_ray_blob;
 
+/* Of the field, since the reset or sf_ray_driver_clear. Those of a ray that was cut off are a part of it. */
+typedef struct sf_field_counters {
+  uint64_t lookups, misses, fills, stalls; /* stalls: cycles, see FIELD_STALLS */
+} sf_field_counters;
+
 /* After sf_driver_load, whose soft reset has stopped the rays: programming and start. SF_DRIVER_REFUSED: RAY_ERROR;
- * SF_DRIVER_MISFIT: levels or n_dir, which the block does not check. */
+ * SF_DRIVER_MISFIT: levels or n_dir, which the block does not check; SF_DRIVER_CACHE: it has another cache. */
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays);
+void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters);
+void sf_ray_driver_clear(const sf_bus *bus);
 /* First bit of a RAY_ERROR register as text, "no error" for 0. */
 const char *sf_ray_driver_error_text(uint32_t error);
 #endif

@@ -27,7 +27,8 @@ module sf_core #(
     input  wire         [31:0] wdata_i,
     // sizes and properties of the layers, as sf_csr has checked them
     input  wire         [ 5:0] d1_in_i,
-    input  wire         [ 8:0] d1_out_i,           // 0: no D1 and D2, C1 takes its inputs from the buffer
+    input  wire                decodes_i,          // no D1 and D2, C1 takes its inputs from the buffer
+    input  wire         [ 8:0] d1_out_i,
     input  wire         [ 7:0] n_dir_i,            // constant inputs of C1
     input  wire         [ 4:0] n_h_i,
     input  wire         [ 8:0] c1_out_i,
@@ -105,7 +106,6 @@ module sf_core #(
   localparam [1:0] C1 = 2'd1;
   localparam [1:0] C2 = 2'd2;
 
-  wire decodes = d1_out_i == 9'd0;
   wire [WORD_BITS-1:0] word = wword_i[WORD_BITS-1:0];
 
   // The last group and the last part of each spiking layer, in registers: sizes do not change at work.
@@ -143,7 +143,7 @@ module sf_core #(
   wire group_ends = group_q == last_group;
   wire last_step = {1'b0, step_q} == steps_i - 4'd1;
   // The current of D1, and of a decoder's C1, is that of all steps: of a layer of one part it stays where it was loaded to.
-  wire stays = (layer == D1 || (layer == C1 && decodes)) && last_part == {PART_BITS{1'b0}};
+  wire stays = (layer == D1 || (layer == C1 && decodes_i)) && last_part == {PART_BITS{1'b0}};
   wire load = at_part && !(stays && step_q != 3'd0);
   wire taken = load && (last_step || stays) && part == last_part;
   wire begins = run && !active_q;
@@ -268,7 +268,7 @@ module sf_core #(
   reg [3:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
   wire dir_we, values_done, h_done, values_idle;
   wire [1:0] values_busy;
-  wire d1_done = values_done && !decodes;
+  wire d1_done = values_done && !decodes_i;
   reg [1:0] h_taken_q, h_full_q;  // samples of h: promised, complete
   reg h_write_q, h_read_q;
   wire [2:0] h_step;
@@ -282,7 +282,7 @@ module sf_core #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (clear_i),
-      .decodes_i      (decodes),
+      .decodes_i      (decodes_i),
       .n_feature_i    (d1_in_i),
       .n_dir_i        (n_dir_i),
       .bias_i         (c1_bias_i),

@@ -13,14 +13,14 @@
 //   0x81         number of direction features, 0..16                                  C1.n_in - (D2.n_out - 1)
 //   0x82         frac, 0..11: their LSB is 2^-frac                                    -log2(dir_scale)
 //
-// Memory ports: an address is an entry, two signed bytes (feature 0 in bits 7:0); see sf_grid. With 2^LOG2_PORTS of them,
-// port p reads the levels l with l mod 2^LOG2_PORTS = p, and a sample takes so many times fewer cycles. Three rays can be on their
-// way when the samples are the first of theirs: one at the output, one in sf_sh, one waiting.
+// Memory port: an entry is two signed bytes (feature 0 in bits 7:0), the table begins at base_i; see sf_cache. Three rays can
+// be on their way when the samples are the first of theirs: one at the output, one in sf_sh, one waiting.
 `default_nettype none
 
 module sf_encoder #(
-    parameter integer LOG2_PORTS = 0,  // 0..3
-    parameter integer LOG2_DEPTH = 5   // of the levels on their way to or from the memory, per port
+    parameter integer CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,  // as sf_cache's
+    parameter integer CACHE_WAYS = sf_arch_pkg::CACHE_WAYS,
+    parameter integer LOG2_DEPTH = 5  // of the levels on their way to or from the memory
 ) (
     input  wire        clk_i,
     input  wire        rst_ni,
@@ -31,13 +31,23 @@ module sf_encoder #(
     input  wire        s_valid_i,
     output wire        s_ready_o,
     input  wire        s_first_i,         // of a new ray: s_dir_i is its direction
+    input  wire        s_tile_i,          // of a new tile: the cache is emptied before it
     input  wire [71:0] s_pos_i,           // {z, y, x}, Q0.24
     input  wire [47:0] s_dir_i,           // {z, y, x}, signed Q1.14
-    output wire [(1<<LOG2_PORTS)-1:0]    mem_req_valid_o,
-    input  wire [(1<<LOG2_PORTS)-1:0]    mem_req_ready_i,
-    output wire [(32<<LOG2_PORTS)-1:0]   mem_req_addr_o,
-    input  wire [(1<<LOG2_PORTS)-1:0]    mem_rsp_valid_i,
-    input  wire [(16<<LOG2_PORTS)-1:0]   mem_rsp_data_i,
+    // the grid's memory, AXI4
+    input  wire [31:0] base_i,            // of the table, a multiple of 16
+    output wire        m_axi_arvalid_o,
+    input  wire        m_axi_arready_i,
+    output wire [31:0] m_axi_araddr_o,
+    input  wire        m_axi_rvalid_i,
+    input  wire [63:0] m_axi_rdata_i,
+    input  wire [ 1:0] m_axi_rresp_i,
+    // events of the field
+    output wire [ 1:0] lookups_o,
+    output wire [ 1:0] misses_o,
+    output wire        filled_o,
+    output wire        waits_o,           // a look-up waits for its line, and the packet's end for it
+    output wire        error_o,
     output wire        m_axis_tvalid_o,
     input  wire        m_axis_tready_i,
     output wire [63:0] m_axis_tdata_o,
@@ -52,15 +62,13 @@ module sf_encoder #(
     if (cfg_we_i && cfg_addr_i == 8'h82) frac_q <= cfg_data_i[3:0];
   end
 
-  // A sample goes to the grids of all ports that have a level, its direction to the register before sf_sh.
-  localparam integer PORTS = 1 << LOG2_PORTS;
-  wire [PORTS-1:0] grid_ready;  // one without a level always is
-  wire sh_ready, tag_valid, tag_first, packet_end;
+  // A sample goes to the grid, its direction to the register before sf_sh.
+  wire grid_ready, sh_ready, tag_valid, tag_first, packet_end;
   reg dir_valid_q;
   reg [47:0] dir_q;
   wire directed = s_first_i && n_dir_q != 5'd0;
   wire dir_ready = !dir_valid_q || sh_ready;
-  assign s_ready_o = &grid_ready && (!directed || dir_ready);
+  assign s_ready_o = grid_ready && (!directed || dir_ready);
   wire accept = s_valid_i && s_ready_o;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) dir_valid_q <= 1'b0;
@@ -69,8 +77,8 @@ module sf_encoder #(
   end
   always_ff @(posedge clk_i) if (dir_ready) dir_q <= s_dir_i;
 
-  // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way at
-  // port 0, three more are in sf_grid_cell and one in the packet.
+  // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way,
+  // three more are in sf_grid_cell and one in the packet.
   sf_fifo #(
       .WIDTH     (1),
       .LOG2_DEPTH(LOG2_DEPTH + 1)
@@ -85,63 +93,64 @@ module sf_encoder #(
       .data_o (tag_first)
   );
 
-  wire pair_ready;
-  wire [PORTS-1:0] pairs_valid;
-  wire [24*PORTS-1:0] pairs;
-  reg [3:0] level_q;  // of the next pair of features
-  localparam [3:0] MASK = 4'(PORTS - 1);
-  genvar p;
-  generate
-    for (p = 0; p < PORTS; p = p + 1) begin : gen_port
-      localparam [3:0] PORT = 4'(p);
-      wire used = {1'b0, last_level_q} + 5'd1 > {1'b0, PORT};
-      wire [3:0] last_level = (last_level_q - PORT) >> LOG2_PORTS;
-      wire [3:0] cfg_level = cfg_addr_i[6:3] >> LOG2_PORTS;
-      wire unused_last;
-      sf_grid #(
-          .LOG2_DEPTH(LOG2_DEPTH)
-      ) u_grid (
-          .clk_i          (clk_i),
-          .rst_ni         (rst_ni),
-          .clear_i        (clear_i),
-          .cfg_we_i       (cfg_we_i && !cfg_addr_i[7] && (cfg_addr_i[6:3] & MASK) == PORT),
-          .cfg_addr_i     ({cfg_level, cfg_addr_i[2:0]}),
-          .cfg_data_i     (cfg_data_i),
-          .last_level_i   (last_level),
-          .s_valid_i      (accept && used),
-          .s_ready_o      (grid_ready[p]),
-          .s_pos_i        (s_pos_i),
-          .mem_req_valid_o(mem_req_valid_o[p]),
-          .mem_req_ready_i(mem_req_ready_i[p]),
-          .mem_req_addr_o (mem_req_addr_o[32*p+:32]),
-          .mem_rsp_valid_i(mem_rsp_valid_i[p]),
-          .mem_rsp_data_i (mem_rsp_data_i[16*p+:16]),
-          .m_valid_o      (pairs_valid[p]),
-          .m_ready_i      (pair_ready && (level_q & MASK) == PORT),
-          .m_features_o   (pairs[24*p+:24]),
-          .m_last_o       (unused_last)
-      );
-      wire unused_ok = &{1'b0, unused_last};
-    end
-  endgenerate
-  reg pair_valid;
-  reg [23:0] pair;
-  always_comb begin
-    pair_valid = 1'b0;
-    pair = 24'd0;
-    for (int i = 0; i < PORTS; i++) begin
-      if ((level_q & MASK) == 4'(i)) begin
-        pair_valid = pairs_valid[i];
-        pair = pairs[24*i+:24];
-      end
-    end
-  end
-  wire pair_last = level_q == last_level_q;
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) level_q <= 4'd0;
-    else if (clear_i) level_q <= 4'd0;
-    else if (pair_ready && pair_valid) level_q <= pair_last ? 4'd0 : level_q + 4'd1;
-  end
+  wire features_ready, features_valid, features_last;
+  wire [23:0] features;
+  wire pair_valid, pair_ready, pair_tile, entries_valid, waits;
+  wire [31:0] pair_entry0, pair_entry1, entries;
+  sf_grid #(
+      .LOG2_DEPTH(LOG2_DEPTH)
+  ) u_grid (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (clear_i),
+      .cfg_we_i       (cfg_we_i && !cfg_addr_i[7]),
+      .cfg_addr_i     (cfg_addr_i[6:0]),
+      .cfg_data_i     (cfg_data_i),
+      .last_level_i   (last_level_q),
+      .s_valid_i      (accept),
+      .s_ready_o      (grid_ready),
+      .s_tile_i       (s_tile_i),
+      .s_pos_i        (s_pos_i),
+      .pair_valid_o   (pair_valid),
+      .pair_ready_i   (pair_ready),
+      .pair_tile_o    (pair_tile),
+      .pair_entry0_o  (pair_entry0),
+      .pair_entry1_o  (pair_entry1),
+      .entries_valid_i(entries_valid),
+      .entries_i      (entries),
+      .m_valid_o      (features_valid),
+      .m_ready_i      (features_ready),
+      .m_features_o   (features),
+      .m_last_o       (features_last)
+  );
+  sf_cache #(
+      .CACHE_BYTES(CACHE_BYTES),
+      .CACHE_WAYS (CACHE_WAYS)
+  ) u_cache (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (clear_i),
+      .base_i         (base_i),
+      .s_valid_i      (pair_valid),
+      .s_ready_o      (pair_ready),
+      .s_empty_i      (pair_tile),
+      .s_entry0_i     (pair_entry0),
+      .s_entry1_i     (pair_entry1),
+      .m_valid_o      (entries_valid),
+      .m_entries_o    (entries),
+      .lookups_o      (lookups_o),
+      .misses_o       (misses_o),
+      .filled_o       (filled_o),
+      .waits_o        (waits),
+      .error_o        (error_o),
+      .m_axi_arvalid_o(m_axi_arvalid_o),
+      .m_axi_arready_i(m_axi_arready_i),
+      .m_axi_araddr_o (m_axi_araddr_o),
+      .m_axi_rvalid_i (m_axi_rvalid_i),
+      .m_axi_rdata_i  (m_axi_rdata_i),
+      .m_axi_rresp_i  (m_axi_rresp_i)
+  );
+  assign waits_o = waits && features_ready && !features_valid && m_axis_tready_i;
 
   wire value_valid, value_ready, value_last;
   wire signed [11:0] value;
@@ -167,11 +176,11 @@ module sf_encoder #(
   wire room = !full_q || m_axis_tready_i;
   wire in_dir = tag_first && n_dir_q != 5'd0 && !dir_done_q;
   assign value_ready = tag_valid && in_dir && room;
-  assign pair_ready = tag_valid && !in_dir && room;
+  assign features_ready = tag_valid && !in_dir && room;
   wire take_value = value_ready && value_valid;
-  wire take_pair = pair_ready && pair_valid;
+  wire take_pair = features_ready && features_valid;
   wire dir_end = take_value && value_last;
-  assign packet_end = take_pair && pair_last;
+  assign packet_end = take_pair && features_last;
   wire beat_end = dir_end || packet_end || (take_value && at_q == 2'd3) || (take_pair && at_q[1]);
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -195,7 +204,7 @@ module sf_encoder #(
   always_ff @(posedge clk_i) begin
     for (i = 0; i < 4; i = i + 1) begin
       if (take_value ? at_q == 2'(i) : take_pair && at_q[1] == i[1]) begin
-        place_q[i] <= in_dir ? value : i[0] ? pair[23:12] : pair[11:0];
+        place_q[i] <= in_dir ? value : i[0] ? features[23:12] : features[11:0];
       end else if ((take_value || take_pair) && at_q == 2'd0) begin
         place_q[i] <= 12'sd0;
       end

@@ -7,18 +7,25 @@
 //   191:128 distance            lattice steps from the camera, U28.16
 //   239:192 direction x, y, z   signed Q1.14, read on the first sample
 //   240 empty                   with tuser and tlast: a ray without a sample; its pixel is the background
+//   241 new tile                with tuser: the field's cache is emptied before this ray
 // m_axis: one beat per ray, in the order of the rays: fx_pixel as it lies in memory (little-endian).
-// mem: an entry of the grid is two signed bytes. Answers in the order of the requests, any number of cycles later, and
-// without back-pressure. A soft reset may withdraw a request, and the answers that the memory owes then are discarded;
-// rst_ni must reset the memory's port too.
+// m_axi: an AXI4 read master for the grid's table, two signed bytes per entry from FIELD_BASE on. A burst is a line of the
+// cache: 16 bytes, aligned, so none crosses 4 KiB. One ID; answers in order, any number of cycles later; rready is always
+// high. A soft reset drops the answers that the memory owes; rst_ni must reset the memory's port too.
 `default_nettype none
 
 module sf_ray_top #(
+`ifdef SF_NO_TAP
+    parameter TAP = 0,
+`else
     parameter TAP = 1,
+`endif
     parameter LANES = sf_arch_pkg::LANES,  // these as sf_top's
     parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,
     parameter NEURONS = sf_arch_pkg::NEURONS,
-    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE
+    parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE,
+    parameter CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,  // these as sf_cache's
+    parameter CACHE_WAYS = sf_arch_pkg::CACHE_WAYS
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -50,20 +57,30 @@ module sf_ray_top #(
     output wire          m_axis_tvalid_o,
     input  wire          m_axis_tready_i,
     output wire [ 383:0] m_axis_tdata_o,
-    // grid entries
-    output wire          mem_req_valid_o,
-    input  wire          mem_req_ready_i,
-    output wire [  31:0] mem_req_addr_o,
-    input  wire          mem_rsp_valid_i,
-    input  wire [  15:0] mem_rsp_data_i,
-    output wire          irq_o,
+    // the grid's memory
+    output wire          m_axi_arvalid_o,
+    input  wire          m_axi_arready_i,
+    output wire [  31:0] m_axi_araddr_o,
+    output wire [   7:0] m_axi_arlen_o,
+    output wire [   2:0] m_axi_arsize_o,
+    output wire [   1:0] m_axi_arburst_o,
+    output wire [   2:0] m_axi_arprot_o,
+    input  wire          m_axi_rvalid_i,
+    output wire          m_axi_rready_o,
+    input  wire [  63:0] m_axi_rdata_i,
+    input  wire [   1:0] m_axi_rresp_i,
+    input  wire          m_axi_rlast_i,
+    output wire          irq_o
+`ifndef SF_NO_TAP
     // tap of sf_top
+    ,
     output wire          tap_valid_o,
     output wire [   2:0] tap_layer_o,
     output wire [   2:0] tap_step_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_spikes_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_rows_o,
     output wire [24*sf_arch_pkg::LANES-1:0] tap_membrane_o
+`endif
 );
   // ---- registers: 0x400..0x7ff are the rays'
   wire net_awready, net_wready, net_bvalid, net_arready, net_rvalid, net_irq;
@@ -105,7 +122,13 @@ module sf_ray_top #(
   wire [19:0] trans_stop;
   wire [10:0] max_samples;
   wire [50:0] background;
-  sf_ray_csr u_csr (
+  wire [31:0] base;
+  wire [1:0] lookups, misses;
+  wire filled, waits, error_memory;
+  sf_ray_csr #(
+      .CACHE_BYTES(CACHE_BYTES),
+      .CACHE_WAYS (CACHE_WAYS)
+  ) u_csr (
       .clk_i        (clk_i),
       .rst_ni       (rst_ni),
       .wvalid_i     (write_now && write_ray),
@@ -129,14 +152,20 @@ module sf_ray_top #(
       .trans_stop_o (trans_stop),
       .max_samples_o(max_samples),
       .background_o (background),
+      .base_o       (base),
       .running_o    (running),
       .soft_reset_i (soft_reset),
       .active_i     (active),
-      .error_order_i(error_order)
+      .error_order_i(error_order),
+      .error_memory_i(error_memory),
+      .lookups_i    (lookups),
+      .misses_i     (misses),
+      .filled_i     (filled),
+      .waits_i      (waits)
   );
 
   // ---- samples
-  wire encode_valid, encode_ready, encode_first;
+  wire encode_valid, encode_ready, encode_first, encode_tile;
   wire [71:0] encode_pos;
   wire [47:0] encode_dir;
   wire sample_valid, sample_take, sample_first, sample_last, sample_empty, stop, track_idle, composite_idle;
@@ -152,6 +181,7 @@ module sf_ray_top #(
       .first_i       (s_axis_tuser_i),
       .last_i        (s_axis_tlast_i),
       .empty_i       (s_axis_tdata_i[240]),
+      .tile_i        (s_axis_tdata_i[241]),
       .pos_i         ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
       .dir_i         (s_axis_tdata_i[239:192]),
       .delta_i       (s_axis_tdata_i[120:96]),
@@ -160,6 +190,7 @@ module sf_ray_top #(
       .encode_valid_o(encode_valid),
       .encode_ready_i(encode_ready),
       .encode_first_o(encode_first),
+      .encode_tile_o (encode_tile),
       .encode_pos_o  (encode_pos),
       .encode_dir_o  (encode_dir),
       .valid_o       (sample_valid),
@@ -175,7 +206,10 @@ module sf_ray_top #(
 
   wire feature_valid, feature_ready, feature_user, feature_last;
   wire [63:0] feature_data;
-  sf_encoder u_encoder (
+  sf_encoder #(
+      .CACHE_BYTES(CACHE_BYTES),
+      .CACHE_WAYS (CACHE_WAYS)
+  ) u_encoder (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
@@ -185,19 +219,34 @@ module sf_ray_top #(
       .s_valid_i      (encode_valid),
       .s_ready_o      (encode_ready),
       .s_first_i      (encode_first),
+      .s_tile_i       (encode_tile),
       .s_pos_i        (encode_pos),
       .s_dir_i        (encode_dir),
-      .mem_req_valid_o(mem_req_valid_o),
-      .mem_req_ready_i(mem_req_ready_i),
-      .mem_req_addr_o (mem_req_addr_o),
-      .mem_rsp_valid_i(mem_rsp_valid_i),
-      .mem_rsp_data_i (mem_rsp_data_i),
+      .base_i         (base),
+      .m_axi_arvalid_o(m_axi_arvalid_o),
+      .m_axi_arready_i(m_axi_arready_i),
+      .m_axi_araddr_o (m_axi_araddr_o),
+      .m_axi_rvalid_i (m_axi_rvalid_i),
+      .m_axi_rdata_i  (m_axi_rdata_i),
+      .m_axi_rresp_i  (m_axi_rresp_i),
+      .lookups_o      (lookups),
+      .misses_o       (misses),
+      .filled_o       (filled),
+      .waits_o        (waits),
+      .error_o        (error_memory),
       .m_axis_tvalid_o(feature_valid),
       .m_axis_tready_i(feature_ready),
       .m_axis_tdata_o (feature_data),
       .m_axis_tuser_o (feature_user),
       .m_axis_tlast_o (feature_last)
   );
+
+  // Two beats of eight bytes, incrementing; data, unprivileged, secure
+  assign m_axi_arlen_o = 8'd1;
+  assign m_axi_arsize_o = 3'd3;
+  assign m_axi_arburst_o = 2'd1;
+  assign m_axi_arprot_o = 3'd0;
+  assign m_axi_rready_o = 1'b1;
 
   wire result_valid, result_ready, result_last;
   wire [63:0] result;
@@ -236,13 +285,16 @@ module sf_ray_top #(
       .m_axis_tready_i (result_ready),
       .m_axis_tdata_o  (result),
       .m_axis_tlast_o  (result_last),
-      .irq_o           (net_irq),
+      .irq_o           (net_irq)
+`ifndef SF_NO_TAP
+      ,
       .tap_valid_o     (tap_valid_o),
       .tap_layer_o     (tap_layer_o),
       .tap_step_o      (tap_step_o),
       .tap_spikes_o    (tap_spikes_o),
       .tap_rows_o      (tap_rows_o),
       .tap_membrane_o  (tap_membrane_o)
+`endif
   );
 
   // ---- results: the first beat waits here for the second
@@ -291,7 +343,7 @@ module sf_ray_top #(
     if (sf_arch_pkg::POS_FRAC != 24 || sf_arch_pkg::DELTA_FRAC != 24 || sf_arch_pkg::TRANS_FRAC != 20)
       $error("arch.def has other widths than this RTL is written for");
   end
-  wire unused_ok = &{1'b0, s_axis_tdata_i[255:241], s_axis_tdata_i[191:172], s_axis_tdata_i[127:121],
+  wire unused_ok = &{1'b0, m_axi_rlast_i, s_axis_tdata_i[255:242], s_axis_tdata_i[191:172], s_axis_tdata_i[127:121],
                      s_axis_tdata_i[95:88], s_axis_tdata_i[63:56], s_axis_tdata_i[31:24], first_beat_q[63:52],
                      first_beat_q[31:28]};
 endmodule

@@ -14,6 +14,7 @@ module sf_ray_track (
     input  wire        first_i,
     input  wire        last_i,
     input  wire        empty_i,         // a ray without samples: no position, no density
+    input  wire        tile_i,          // the first ray of a tile
     input  wire [71:0] pos_i,
     input  wire [47:0] dir_i,
     input  wire [24:0] delta_i,
@@ -23,6 +24,7 @@ module sf_ray_track (
     output wire        encode_valid_o,
     input  wire        encode_ready_i,
     output wire        encode_first_o,
+    output wire        encode_tile_o,   // the first sample since a ray of a new tile began
     output wire [71:0] encode_pos_o,
     output wire [47:0] encode_dir_o,
     // to the compositor, with the result of the sample
@@ -46,7 +48,7 @@ module sf_ray_track (
   wire bad = inside_q ? first_i || empty_i : !first_i || (empty_i && !last_i);
 
   // ---- input: one sample waits for the encoder
-  reg pending_q, first_q;
+  reg pending_q, first_q, tile_q;
   reg [71:0] pos_q;
   reg [47:0] dir_q;
   reg [4:0] write_q, read_q;
@@ -61,10 +63,10 @@ module sf_ray_track (
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {inside_q, drop_q, broken_q, pending_q} <= 4'd0;
+      {inside_q, drop_q, broken_q, pending_q, tile_q} <= 5'd0;
       {ray_q, write_q, read_q} <= 15'd0;
     end else if (clear_i) begin
-      {inside_q, drop_q, broken_q, pending_q} <= 4'd0;
+      {inside_q, drop_q, broken_q, pending_q, tile_q} <= 5'd0;
       {ray_q, write_q, read_q} <= 15'd0;
     end else begin
       if (error_order_o) broken_q <= 1'b1;
@@ -73,6 +75,8 @@ module sf_ray_track (
       drop_q <= !(accept && first_i) && (stop_here || drop_q);
       if (accept && !empty_i) pending_q <= 1'b1;
       else if (encode_ready_i) pending_q <= 1'b0;
+      if (accept && first_i && tile_i) tile_q <= 1'b1;
+      else if (pending_q && encode_ready_i) tile_q <= 1'b0;
       if (accept) write_q <= write_q + 5'd1;
       if (take_i) read_q <= read_q + 5'd1;
     end
@@ -86,6 +90,7 @@ module sf_ray_track (
   end
   assign encode_valid_o = pending_q;
   assign encode_first_o = first_q;
+  assign encode_tile_o = tile_q;
   assign encode_pos_o = pos_q;
   assign encode_dir_o = dir_q;
 

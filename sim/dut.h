@@ -11,6 +11,7 @@ typedef struct sf_dut_options {
   const char *wave;    /* FST file to write, or NULL */
   int wave_from;       /* it begins when sample wave_from of a run is due at the input */
   const char *plusarg; /* passed to the simulation, or NULL */
+  int memory_latency;  /* of sf_ray_top's memory, in cycles; 0: at random for each line */
 } sf_dut_options;
 
 typedef struct sf_dut_sample {

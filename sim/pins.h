@@ -20,8 +20,9 @@ typedef struct sf_pins_in {
   bool ray_valid, ray_user, ray_last;
   uint64_t ray_data[4];
   bool pixel_ready;
-  bool mem_ready, mem_answer;
-  uint16_t mem_data;
+  bool ar_ready, r_valid, r_last;
+  uint8_t r_resp;
+  uint64_t r_data;
 } sf_pins_in;
 
 /* As sampled just before the rising edge, with the inputs of the same cycle applied. */
@@ -36,9 +37,10 @@ typedef struct sf_pins_out {
   uint8_t tap_layer, tap_step;
   uint64_t tap_spikes[SF_SPIKE_WORDS], tap_rows[SF_SPIKE_WORDS];
   uint32_t tap_membrane[SF_LANES * SF_MEMBRANE_BITS / 32]; /* packed */
-  bool ray_ready, pixel_valid, mem_request;
+  bool ray_ready, pixel_valid, ar_valid, r_ready;
   uint64_t pixel_data[6];
-  uint32_t mem_address;
+  uint32_t ar_address;
+  uint8_t ar_len, ar_size, ar_burst;
   bool finished; /* the block has called $finish: another cycle may end this process */
 } sf_pins_out;
 

@@ -63,7 +63,7 @@ endef
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/bench
+RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/bench tests/bench_field
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
 
@@ -139,6 +139,7 @@ LANES_BUILT := $(if $(findstring LANES=256,$(ARCH_DEFINES)),32 64 128 256,32 64 
 lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
 	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
+	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_ray_top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi

@@ -2,12 +2,19 @@
 # UNITS_<test> are the modules that tests/<test>.cpp drives; UNIT_TOP_<unit> and UNIT_PARAMETERS_<unit> name variants.
 UNITS_test_rtl_sh := sf_sh
 UNITS_test_rtl_grid := sf_grid sf_grid_weight sf_trilinear
-UNITS_test_rtl_encoder := sf_encoder sf_encoder_4
-UNIT_TOP_sf_encoder_4 := sf_encoder
-UNIT_PARAMETERS_sf_encoder_4 := -GLOG2_PORTS=2
+UNITS_test_rtl_cache := sf_cache sf_cache_1 sf_cache_2 sf_cache_8
+UNIT_TOP_sf_cache_1 := sf_cache
+UNIT_PARAMETERS_sf_cache_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
+UNIT_TOP_sf_cache_2 := sf_cache
+UNIT_PARAMETERS_sf_cache_2 := -GCACHE_BYTES=4096 -GCACHE_WAYS=2 -GLOG2_LOOKUPS=4 -GLOG2_LINES=2
+UNIT_TOP_sf_cache_8 := sf_cache
+UNIT_PARAMETERS_sf_cache_8 := -GCACHE_BYTES=2048 -GCACHE_WAYS=8
+UNITS_test_rtl_encoder := sf_encoder sf_encoder_1
+UNIT_TOP_sf_encoder_1 := sf_encoder
+UNIT_PARAMETERS_sf_encoder_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNITS_test_rtl_ray_track := sf_ray_track
-UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_encoder test_rtl_composite test_rtl_ray_track
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track
 TESTS += $(UNIT_TESTS)
 
 LINT_TOPS := sf_ray_top

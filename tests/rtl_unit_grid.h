@@ -1,14 +1,14 @@
-/* For the benches of sf_grid and sf_encoder: grids of every kind of level, positions on faces and ends, a memory that
- * answers in order after any time. C++. */
+/* For the benches of sf_grid and sf_encoder: grids of every kind of level, positions on faces and ends, something that
+ * answers pairs of entries in order after any time. C++. */
 #ifndef SF_TESTS_RTL_UNIT_GRID_H
 #define SF_TESTS_RTL_UNIT_GRID_H
-#include "tests/rtl_unit.h"
+#include "tests/rtl_unit_axi.h"
 #include <deque>
 #include <vector>
 
 enum { GRID_LOG2_MAX = 14, GRID_STRIDE_MAX = 24 };
 
-struct grid_fixture {
+struct grid_fixture : entry_source {
   fx_grid grid = {};
   std::vector<int8_t> table;
 
@@ -36,11 +36,12 @@ struct grid_fixture {
     return (uint32_t)(index + (uint64_t)grid.offset[level]);
   }
 
-  uint16_t word(uint32_t entry) const
+  uint16_t entry(uint64_t index) const override
   {
-    ck_assert_uint_lt(entry, (uint64_t)grid.entries);
-    return (uint16_t)((uint8_t)table[2 * entry] | (uint8_t)table[2 * entry + 1] << 8);
+    ck_assert_uint_lt(index, entries());
+    return (uint16_t)((uint8_t)table[2 * index] | (uint8_t)table[2 * index + 1] << 8);
   }
+  uint64_t entries() const override { return (uint64_t)grid.entries; }
 
   /* Anywhere, at both ends, or within 2 LSB of where a level steps to the next 1/256 of a cell or to the next cell. */
   uint32_t coordinate(random_draw &draw) const
@@ -59,6 +60,7 @@ private:
   void add_level(random_draw &draw, int l)
   {
     const bool dense = draw.percent(40);
+    if (draw.percent(30)) grid.entries += draw(0, 40); /* nobody says that levels follow one another, or are aligned */
     grid.offset[l] = grid.entries;
     grid.shift[l] = (int32_t)(draw.percent(20) ? draw(0, 31) : draw(9, 14));
     if (dense) {
@@ -76,40 +78,40 @@ private:
   }
 };
 
-/* Answers in order; each request waits at least `latency` cycles, at most that and `spread`. */
-struct table_memory {
+/* Answers in order; each pair waits at least `latency` cycles, at most that and `spread`. */
+struct pair_memory {
   const grid_fixture *table;
   int latency, spread, stall;
   struct request {
-    uint32_t entry;
+    uint32_t entry0, entry1;
     uint64_t due;
   };
   std::deque<request> queue;
 
   bool ready = false, answers = false; /* in this cycle */
-  uint16_t word = 0;
+  uint32_t word = 0;
 
   void drive(random_draw &draw, uint64_t cycle)
   {
     ready = !draw.percent(stall);
     answers = !queue.empty() && queue.front().due <= cycle;
-    word = answers ? table->word(queue.front().entry) : (uint16_t)draw(0, 65535);
+    word = (uint32_t)draw(0, UINT32_MAX - 1);
+    if (answers) word = (uint32_t)table->entry(queue.front().entry1) << 16 | table->entry(queue.front().entry0);
   }
-  /* After settling: what the clock edge will do. True when a request was taken. */
-  bool sample(random_draw &draw, uint64_t cycle, bool valid, uint32_t entry)
+  /* After settling: what the clock edge will do. True when a pair was taken. */
+  bool sample(random_draw &draw, uint64_t cycle, bool valid, uint32_t entry0, uint32_t entry1)
   {
     if (answers) queue.pop_front();
     if (!valid || !ready) return false;
-    queue.push_back({entry, cycle + (uint64_t)(latency + draw(0, spread))});
+    queue.push_back({entry0, entry1, cycle + (uint64_t)(latency + draw(0, spread))});
     return true;
   }
 };
 
-/* One cycle of the write port; the memory port rests. */
+/* One cycle of the write port, while nothing is on its way. */
 template <class module> static void configure(unit<module> &u, int address, int64_t value)
 {
   u.top.cfg_we_i = 1, u.top.cfg_addr_i = (uint8_t)address, u.top.cfg_data_i = (uint32_t)value;
-  u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = 0;
   u.edge();
   u.top.cfg_we_i = 0;
 }

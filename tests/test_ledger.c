@@ -368,6 +368,8 @@ TEST(measured_operations_by_hand)
   ck_assert(!m->interpolated[SF_LEDGER_WIDTH]);
   for (int p = SF_PART_WEIGHT; p <= SF_PART_FRAME; p++) ck_assert_uint_eq(part[p], l->part[SF_LEDGER_NEURON][p]);
   ck_assert_uint_eq(m->total[SF_LEDGER_PAPER], l->total[SF_LEDGER_PAPER]);
+  for (int g = 0; g < SF_LEDGERS; g++) /* no ray has a MAC */
+    ck_assert_uint_eq(m->unit[g][SF_ROW_RAY][SF_PART_MAC].fj, l->unit[g][SF_ROW_RAY][SF_PART_MAC].fj);
   free(m);
   snprintf(text, sizeof text, "%s\nsop.8 700 fJ made up\n", plain);
   ck_bad(load_text(&measured, text), SF_E_FORMAT, "key 'sop.8' takes no '.8'", "");

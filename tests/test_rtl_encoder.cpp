@@ -1,6 +1,6 @@
 /* sf_encoder against fx_grid_features and fx_sh, as the packets that the engine takes. */
 #include "Vsf_encoder.h"
-#include "Vsf_encoder_4.h"
+#include "Vsf_encoder_1.h"
 #include "tests/rtl_unit_grid.h"
 
 enum { VALUES = 4 }; /* of a beat */
@@ -19,37 +19,35 @@ static void add_beats(std::deque<beat> &beats, const int16_t *value, int n, bool
   }
 }
 
-/* Slices of the memory ports: one of a number, or of a wide one. */
-static uint32_t slice(const uint32_t &all, int)
-{
-  return all;
-}
-template <class words> static uint32_t slice(const words &all, int port)
-{
-  return all[port];
-}
-
-template <class module, int ports> struct encoder_bench {
+template <class module, int bytes, int ways> struct encoder_bench {
   unit<module> u;
   random_draw draw;
   const grid_fixture *table = nullptr;
-  table_memory memory[ports] = {};
+  axi_memory memory;
+  cache_model model{bytes, ways};
+  field_events events;
   int stall = 0, n_dir = 0, frac = 0, first_percent = 0;
   std::deque<beat> expected, next; /* of accepted samples; of the one on offer */
+  uint32_t next_pos[3];
+  int tile_percent = 5;
+  int64_t known = 1; /* positions that come again and again, but for fresh_percent of the samples */
+  int fresh_percent = 100;
+  static const uint64_t known_seed = 7;
   int accepted = 0, done = 0;
   bool in_ray = false, waits_for_valid = false; /* waits_for_valid: a sink that is ready for a beat that it sees */
   sink_stalls sink;
-  held output, request[ports];
+  held output;
 
   explicit encoder_bench(uint64_t seed) : u(seed), draw(seed)
   {
-    u.top.s_valid_i = u.top.m_axis_tready_i = u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = u.top.cfg_we_i = 0;
+    u.top.s_valid_i = u.top.m_axis_tready_i = u.top.m_axi_arready_i = u.top.m_axi_rvalid_i = u.top.cfg_we_i = 0;
+    u.top.base_i = memory.base = (uint32_t)draw(0, 1 << 20) * LINE_BYTES;
     u.reset();
   }
   void load(const grid_fixture *fixture, int directions, int lsb)
   {
-    for (table_memory &m : memory) m.table = fixture;
-    table = fixture, n_dir = directions, frac = lsb, in_ray = false;
+    memory.source = table = fixture, n_dir = directions, frac = lsb, in_ray = false;
+    u.top.m_axi_arready_i = u.top.m_axi_rvalid_i = 0; /* the memory rests */
     configure_levels(u, fixture->grid);
     configure(u, 0x80, fixture->grid.levels);
     configure(u, 0x81, n_dir < FX_SH ? n_dir : draw(FX_SH, 31)); /* no more than there are */
@@ -57,7 +55,7 @@ template <class module, int ports> struct encoder_bench {
   }
   void timing(int latency, int spread, int stalls, int first)
   {
-    for (table_memory &m : memory) m.latency = latency, m.spread = spread, m.stall = stalls;
+    memory.latency = latency, memory.spread = spread, memory.stall = stalls;
     stall = sink.percent = stalls, sink.until = 0, first_percent = first;
   }
   void clear(bool hard)
@@ -69,28 +67,25 @@ template <class module, int ports> struct encoder_bench {
     expected.clear(), in_ray = false;
     forget_offers();
     accepted = done;
-    for (table_memory &m : memory) {
-      if (hard) m.queue.clear();
-      for (table_memory::request &r : m.queue) r.entry = 0; /* answers to nobody, perhaps from a larger table */
-    }
+    memory.clear(hard), model.empty();
+    for (int i = 0; i < 3; i++) cycle(0); /* events of before are still on their way to the outputs */
+    events = field_events(), memory.asked = 0, model.lookups = model.misses = 0;
   }
   void cycle(int more)
   {
     if (!u.top.s_valid_i && more > 0 && !draw.percent(stall)) offer();
     u.top.m_axis_tready_i = waits_for_valid ? 0 : !sink(draw, u.cycle);
     show_anything(u, draw, 0x83);
-    drive_memory();
+    memory.drive(u, draw);
     u.settle();
     if (waits_for_valid) u.top.m_axis_tready_i = u.top.m_axis_tvalid_o, u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
-    for (int p = 0; p < ports; p++) {
-      const bool valid = u.top.mem_req_valid_o >> p & 1;
-      request[p].check(valid, memory[p].ready, slice(u.top.mem_req_addr_o, p));
-      memory[p].sample(draw, u.cycle, valid, slice(u.top.mem_req_addr_o, p));
-    }
+    memory.sample(u, draw);
+    events.sample(u);
     output.check(u.top.m_axis_tvalid_o, u.top.m_axis_tready_i, u.top.m_axis_tdata_o);
     if (taken && !quiet) {
       expected.insert(expected.end(), next.begin(), next.end());
+      look_up();
       accepted++;
     }
     if (u.top.m_axis_tvalid_o && u.top.m_axis_tready_i && !quiet) take();
@@ -108,41 +103,44 @@ template <class module, int ports> struct encoder_bench {
     return u.cycle - begin;
   }
 
-  bool idle() const
+  bool idle() const { return expected.empty() && memory.queue.empty(); }
+  void same_counts()
   {
-    bool none = expected.empty();
-    for (const table_memory &m : memory) none = none && m.queue.empty();
-    return none;
+    ck_assert_msg(events.lookups == model.lookups && events.misses == model.misses,
+                  "%llu look-ups, %llu misses; expected %llu, %llu", (unsigned long long)events.lookups,
+                  (unsigned long long)events.misses, (unsigned long long)model.lookups,
+                  (unsigned long long)model.misses);
+    ck_assert_uint_eq(events.fills, events.misses);
+    ck_assert_uint_eq(memory.asked, events.misses);
   }
 
 private:
-  void forget_offers()
+  void forget_offers() { output = held(); }
+  void look_up()
   {
-    output = held();
-    for (held &r : request) r = held();
-  }
-  void drive_memory()
-  {
-    uint64_t ready = 0, answers = 0, words = 0;
-    for (int p = 0; p < ports; p++) {
-      memory[p].drive(draw, u.cycle);
-      ready |= (uint64_t)memory[p].ready << p, answers |= (uint64_t)memory[p].answers << p;
-      words |= (uint64_t)memory[p].word << 16 * p;
-    }
-    u.top.mem_req_ready_i = (uint8_t)ready, u.top.mem_rsp_valid_i = (uint8_t)answers, u.top.mem_rsp_data_i = words;
+    if (u.top.s_tile_i) model.empty();
+    for (int l = 0; l < table->grid.levels; l++)
+      for (int corner = 0; corner < FX_GRID_CORNERS; corner += 2)
+        model.pair(table->entry(next_pos, l, corner), table->entry(next_pos, l, corner + 1));
   }
   void offer()
   {
     uint32_t pos[3];
     int16_t f[2 * FX_LEVELS_MAX], v[3], dir[FX_SH];
     const bool first = !in_ray || draw.percent(first_percent);
-    for (int a = 0; a < 3; a++) pos[a] = table->coordinate(draw), v[a] = (int16_t)draw(-17000, 17000);
+    const bool fresh = draw.percent(fresh_percent);
+    const uint64_t place = (uint64_t)draw(0, known - 1);
+    for (uint64_t a = 0; a < 3; a++)
+      pos[a] = fresh ? table->coordinate(draw) : (uint32_t)sf_random_below(known_seed, a, place, 1 << SF_POS_FRAC);
+    for (int a = 0; a < 3; a++) v[a] = (int16_t)draw(-17000, 17000);
     fx_grid_features(&table->grid, pos, f, nullptr);
     fx_sh(v, frac, dir);
     next.clear();
     if (first) add_beats(next, dir, n_dir, true, false);
     add_beats(next, f, 2 * table->grid.levels, first && n_dir == 0, true);
+    std::copy_n(pos, 3, next_pos);
     set_position(u.top.s_pos_i, pos);
+    u.top.s_tile_i = draw.percent(tile_percent);
     u.top.s_dir_i = (uint64_t)(uint16_t)v[2] << 32 | (uint64_t)(uint16_t)v[1] << 16 | (uint16_t)v[0];
     u.top.s_first_i = first, u.top.s_valid_i = 1, in_ray = true;
   }
@@ -160,8 +158,8 @@ private:
   }
 };
 
-typedef encoder_bench<Vsf_encoder, 1> one_port;
-typedef encoder_bench<Vsf_encoder_4, 4> four_ports;
+typedef encoder_bench<Vsf_encoder, 32768, 4> usual;
+typedef encoder_bench<Vsf_encoder_1, 1024, 1> small;
 
 template <class bench> static void random_scenes(uint64_t seed)
 {
@@ -174,48 +172,78 @@ template <class bench> static void random_scenes(uint64_t seed)
     b.run(100);
     for (int i = 0; i < 20; i++) b.cycle(0); /* and no beat more */
     ck_assert(b.idle());
+    b.same_counts();
+    b.clear(false); /* another table follows */
   }
 }
 
-LOOP_TEST(random_scenes_through_one_port, 3)
+LOOP_TEST(random_scenes_through_the_usual_cache, 3)
 {
-  random_scenes<one_port>((uint64_t)_i + 60);
+  random_scenes<usual>((uint64_t)_i + 60);
 }
 
-LOOP_TEST(random_scenes_through_four_ports, 3)
+LOOP_TEST(random_scenes_through_a_small_one, 3)
 {
-  random_scenes<four_ports>((uint64_t)_i + 65);
+  random_scenes<small>((uint64_t)_i + 65);
 }
 
-/* `requests`: of a sample at the busiest port. */
-template <class bench> static void full_speed(int levels, int latency, int first, int requests)
+/* The levels of a real scene: dense and hashed tables of up to 2^19 entries. */
+static void real_sizes(grid_fixture &fixture)
 {
-  const int samples = 60;
-  bench b(70);
-  const grid_fixture fixture(b.draw, levels, 0);
+  fx_grid &grid = fixture.grid;
+  grid.entries = 0;
+  for (int l = 0; l < grid.levels; l++) {
+    double res = 16;
+    for (int i = 0; i < l; i++) res *= 1.3819;
+    const int64_t stride = (int64_t)res + 3;
+    const bool dense = stride * stride * stride <= 1 << 19;
+    grid.scale_q16[l] = (int32_t)((res - 1) * 65536);
+    grid.stride[l] = dense ? (int32_t)stride : 0, grid.log2_size[l] = 19;
+    grid.offset[l] = grid.entries, grid.shift[l] = 12;
+    grid.entries += dense ? stride * stride * stride : 1 << 19;
+  }
+  fixture.table.resize((size_t)grid.entries * 2);
+  for (size_t i = 0; i < fixture.table.size(); i++) fixture.table[i] = (int8_t)(i * 2654435761u >> 24);
+  grid.table = fixture.table.data();
+}
+
+/* Positions that the cache knows, and now and then one that it does not. */
+static void full_speed(int levels, int latency, int first, int fresh)
+{
+  const int samples = 200, pairs = samples * levels * FX_GRID_CORNERS / 2;
+  usual b(70);
+  grid_fixture fixture(b.draw, levels, 0);
+  real_sizes(fixture);
   b.load(&fixture, 16, 6);
   b.timing(latency, 0, 0, first);
-  const int cycles = (int)b.run(samples);
-  ck_assert_msg(cycles <= samples * requests + latency + 80,
-                "%d levels, latency %d, %d %% first: %d cycles for %d requests", levels, latency, first, cycles,
-                samples * requests);
+  b.tile_percent = 0;
+  b.known = 8, b.fresh_percent = 0;
+  b.run(40);
+  b.fresh_percent = fresh;
+  const uint64_t misses = b.events.misses;
+  const int cycles = (int)b.run(samples), missed = (int)(b.events.misses - misses);
+  /* A line costs the two cycles of its beats at most; a pair whose set is in use waits three. */
+  ck_assert_msg(cycles <= pairs + pairs / 50 + 2 * missed + latency + 80,
+                "%d levels, latency %d, %d %% first: %d cycles for %d pairs, %d lines", levels, latency, first, cycles,
+                pairs, missed);
 }
 
-/* Samples cost their requests alone, even at one sample per ray, for which three rays on their way hide less. */
-TEST(a_request_in_every_cycle)
+/* Samples cost a cycle per pair, even at one sample per ray, for which three rays on their way hide less. */
+TEST(a_pair_in_every_cycle)
 {
-  for (int levels = 8; levels <= 16; levels += 4) {
-    for (int latency = 1; latency <= 91; latency += 30) full_speed<one_port>(levels, latency, 10, 8 * levels);
-    for (int latency = 1; latency <= 61; latency += 30) full_speed<one_port>(levels, latency, 100, 8 * levels);
-  }
-  for (int latency = 1; latency <= 91; latency += 30) full_speed<four_ports>(16, latency, 10, 32);
+  for (int levels = 12; levels <= 16; levels += 4)
+    for (int latency = 1; latency <= 76; latency += 25) {
+      full_speed(levels, latency, 10, 0);
+      full_speed(levels, latency, 10, 3);
+    }
+  full_speed(16, 31, 100, 0);
 }
 
 /* A direction that waits for the harmonics of the one before holds up nothing but a third one. */
 TEST(a_direction_that_waits)
 {
   enum { HARMONICS = 2 * FX_SH + 15 };
-  one_port b(75);
+  usual b(75);
   const grid_fixture fixture(b.draw, 1, 0);
   b.load(&fixture, FX_SH, 6);
   b.timing(1, 0, 0, 100);
@@ -246,40 +274,26 @@ template <class bench> static void reset_on_the_way()
   }
 }
 
-TEST(reset_on_the_way_through_one_port)
+TEST(reset_on_the_way_with_the_usual_cache)
 {
-  reset_on_the_way<one_port>();
+  reset_on_the_way<usual>();
 }
 
-TEST(reset_on_the_way_through_four_ports)
+TEST(reset_on_the_way_with_a_small_one)
 {
-  reset_on_the_way<four_ports>();
+  reset_on_the_way<small>();
 }
 
-/* The levels of a real scene: 16, dense and hashed tables of up to 2^19 entries. */
 TEST(sizes_of_a_real_scene)
 {
   random_draw draw(90);
   grid_fixture fixture(draw, 16, 0);
-  fx_grid &grid = fixture.grid;
-  grid.entries = 0;
-  for (int l = 0; l < 16; l++) {
-    double res = 16;
-    for (int i = 0; i < l; i++) res *= 1.3819;
-    const int64_t stride = (int64_t)res + 3;
-    const bool dense = stride * stride * stride <= 1 << 19;
-    grid.scale_q16[l] = (int32_t)((res - 1) * 65536);
-    grid.stride[l] = dense ? (int32_t)stride : 0, grid.log2_size[l] = 19;
-    grid.offset[l] = grid.entries, grid.shift[l] = 12;
-    grid.entries += dense ? stride * stride * stride : 1 << 19;
-  }
-  fixture.table.resize((size_t)grid.entries * 2);
-  for (size_t i = 0; i < fixture.table.size(); i++) fixture.table[i] = (int8_t)(i * 2654435761u >> 24);
-  grid.table = fixture.table.data();
-  four_ports b(90);
+  real_sizes(fixture);
+  small b(90);
   b.load(&fixture, 16, 6);
   b.timing(40, 10, 5, 10);
   b.run(1000 * unit_length());
+  b.same_counts();
 }
 
 int ck_timeout = 3600;

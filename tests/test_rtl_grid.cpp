@@ -9,28 +9,28 @@ extern "C" {
 
 enum { CORNERS = FX_GRID_CORNERS };
 
-enum { WEIGHT_LATENCY = 4 };
+enum { PAIRS = CORNERS / 2, WEIGHT_LATENCY = 4 };
 
-/* Gives a corner in every cycle and checks the one of WEIGHT_LATENCY cycles before. */
+/* Gives a pair of corners in every cycle and checks the one of WEIGHT_LATENCY cycles before. */
 struct weight_bench {
   VerilatedContext context;
   Vsf_grid_weight top{&context};
-  struct corner {
-    int x, y, z, corner;
-    uint32_t weight;
+  struct pair {
+    int x, y, z, pair;
+    uint32_t weight[2];
   } given[WEIGHT_LATENCY] = {};
   uint64_t cycle = 0;
 
   ~weight_bench() { top.final(); }
-  void next(const corner &c)
+  void next(const pair &p)
   {
-    corner &slot = given[cycle % WEIGHT_LATENCY];
-    top.x_i = (uint8_t)c.x, top.y_i = (uint8_t)c.y, top.z_i = (uint8_t)c.z, top.corner_i = (uint8_t)c.corner;
+    pair &slot = given[cycle % WEIGHT_LATENCY];
+    top.x_i = (uint8_t)p.x, top.y_i = (uint8_t)p.y, top.z_i = (uint8_t)p.z, top.pair_i = (uint8_t)p.pair;
     top.clk_i = 0, top.eval();
-    if (cycle >= WEIGHT_LATENCY && top.weight_o != slot.weight)
-      ck_abort_msg("place (%d, %d, %d) corner %d: %u, expected %u", slot.x, slot.y, slot.z, slot.corner, top.weight_o,
-                   slot.weight);
-    slot = c;
+    if (cycle >= WEIGHT_LATENCY && (top.weight0_o != slot.weight[0] || top.weight1_o != slot.weight[1]))
+      ck_abort_msg("place (%d, %d, %d) pair %d: %u, %u, expected %u, %u", slot.x, slot.y, slot.z, slot.pair,
+                   top.weight0_o, top.weight1_o, slot.weight[0], slot.weight[1]);
+    slot = p;
     top.clk_i = 1, top.eval();
     cycle++;
   }
@@ -47,13 +47,13 @@ TEST(weights_of_every_place)
         int32_t weight[CORNERS];
         uint32_t sum = 0;
         fx_grid_weights(g, weight);
-        for (int corner = 0; corner < CORNERS; corner++) {
-          b.next({x, y, z, corner, (uint32_t)weight[corner]});
-          sum += (uint32_t)weight[corner];
+        for (int pair = 0; pair < PAIRS; pair++) {
+          b.next({x, y, z, pair, {(uint32_t)weight[2 * pair], (uint32_t)weight[2 * pair + 1]}});
+          sum += (uint32_t)weight[2 * pair] + (uint32_t)weight[2 * pair + 1];
         }
         if (sum != 65536) ck_abort_msg("place (%d, %d, %d): weights sum to %u", x, y, z, sum);
       }
-  for (int i = 0; i < WEIGHT_LATENCY; i++) b.next({0, 0, 0, 0, 65536});
+  for (int i = 0; i < WEIGHT_LATENCY; i++) b.next({0, 0, 0, 0, {65536, 0}});
 }
 
 /* ---- sf_trilinear ---- */
@@ -91,7 +91,7 @@ static cell_of_test draw_cell(random_draw &draw)
   return c;
 }
 
-/* The cell's data stand at the inputs until its eighth entry, as the queue before it keeps them. */
+/* The cell's data stand at the inputs until its fourth pair, as the queue before it keeps them. */
 LOOP_TEST(sums_of_random_cells, 3)
 {
   unit<Vsf_trilinear> u((uint64_t)_i + 20);
@@ -100,13 +100,14 @@ LOOP_TEST(sums_of_random_cells, 3)
   u.top.valid_i = 0;
   u.reset();
   cell_of_test c = draw_cell(draw);
-  for (int corner = 0, cells = 0; cells < 20000 * unit_length();) {
+  for (int pair = 0, cells = 0; cells < 20000 * unit_length();) {
     u.top.valid_i = !draw.percent(40 * _i);
     u.top.place_i = (uint32_t)(c.g[0] | c.g[1] << 8 | c.g[2] << 16);
-    u.top.entry_i = (uint16_t)((uint8_t)c.entry[corner][0] | (uint8_t)c.entry[corner][1] << 8);
+    u.top.entries_i = 0;
+    for (int i = 0; i < 4; i++) u.top.entries_i |= (uint32_t)(uint8_t)c.entry[2 * pair + i / 2][i % 2] << 8 * i;
     u.top.shift_i = (uint8_t)c.shift, u.top.last_i = c.last;
     u.settle();
-    ck_assert_int_eq(u.top.pop_o, u.top.valid_i && corner == CORNERS - 1);
+    ck_assert_int_eq(u.top.pop_o, u.top.valid_i && pair == PAIRS - 1);
     if (u.top.valid_o) {
       ck_assert(!sent.empty());
       for (int i = 0; i < 2; i++) {
@@ -119,7 +120,7 @@ LOOP_TEST(sums_of_random_cells, 3)
       cells++;
     }
     const bool end = u.top.pop_o;
-    corner = (corner + u.top.valid_i) % CORNERS;
+    pair = (pair + u.top.valid_i) % PAIRS;
     u.edge();
     if (!end) continue;
     sent.push_back(c);
@@ -133,17 +134,20 @@ struct grid_bench {
   unit<Vsf_grid> u;
   random_draw draw;
   const grid_fixture *table = nullptr;
-  table_memory memory = {};
+  pair_memory memory = {};
   int stall = 0;
   struct sample {
     uint32_t pos[3];
     int16_t f[2 * FX_LEVELS_MAX];
   };
-  std::deque<sample> flying;    /* accepted; not all of its features have come */
-  std::deque<uint32_t> entries; /* that must be asked for */
-  size_t owed = 0;              /* answers to requests of before a clear: until they have come, nothing is asked */
-  uint64_t memory_begins = 0;   /* cycle before which the memory takes nothing */
-  uint64_t asked = 0, ask_most = UINT64_MAX; /* requests that it has taken, that it takes */
+  std::deque<sample> flying; /* accepted; not all of its features have come */
+  struct pair {
+    uint32_t entry[2];
+    bool tile;
+  };
+  std::deque<pair> pairs;                    /* that must be asked for */
+  uint64_t memory_begins = 0;                /* cycle before which the memory takes nothing */
+  uint64_t asked = 0, ask_most = UINT64_MAX; /* pairs that it has taken, that it takes */
   sample next;
   int level = 0, accepted = 0, done = 0;
   sink_stalls sink;
@@ -151,13 +155,14 @@ struct grid_bench {
 
   explicit grid_bench(uint64_t seed) : u(seed), draw(seed)
   {
-    u.top.s_valid_i = u.top.m_ready_i = u.top.mem_req_ready_i = u.top.mem_rsp_valid_i = u.top.cfg_we_i = 0;
+    u.top.s_valid_i = u.top.m_ready_i = u.top.pair_ready_i = u.top.entries_valid_i = u.top.cfg_we_i = 0;
     u.reset();
   }
   void load(const grid_fixture *fixture, int latency, int spread, int stalls)
   {
     table = fixture, stall = sink.percent = stalls, sink.until = 0;
     memory.table = fixture, memory.latency = latency, memory.spread = spread, memory.stall = stalls;
+    u.top.pair_ready_i = u.top.entries_valid_i = 0;
     configure_levels(u, table->grid);
     u.top.last_level_i = (uint8_t)(table->grid.levels - 1);
   }
@@ -167,10 +172,8 @@ struct grid_bench {
     u.top.rst_ni = !hard, u.top.clear_i = !hard;
     cycle(0);
     u.top.rst_ni = 1, u.top.clear_i = 0, u.top.s_valid_i = 0;
-    flying.clear(), entries.clear();
+    flying.clear(), pairs.clear(), memory.queue.clear();
     output = request = held(), level = 0, accepted = done;
-    if (hard) memory.queue.clear();
-    owed = memory.queue.size();
   }
   /* Offers samples while `more`. */
   void cycle(int more)
@@ -179,20 +182,19 @@ struct grid_bench {
       for (int a = 0; a < 3; a++) next.pos[a] = table->coordinate(draw);
       fx_grid_features(&table->grid, next.pos, next.f, nullptr);
       set_position(u.top.s_pos_i, next.pos);
+      u.top.s_tile_i = draw.percent(30);
       u.top.s_valid_i = 1;
     }
     u.top.m_ready_i = !sink(draw, u.cycle);
     memory.drive(draw, u.cycle);
     if (u.cycle < memory_begins || asked == ask_most) memory.ready = false;
     show_anything(u, draw, 0x7f);
-    u.top.mem_req_ready_i = memory.ready, u.top.mem_rsp_valid_i = memory.answers, u.top.mem_rsp_data_i = memory.word;
+    u.top.pair_ready_i = memory.ready, u.top.entries_valid_i = memory.answers, u.top.entries_i = memory.word;
     u.settle();
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
-    request.check(u.top.mem_req_valid_o, u.top.mem_req_ready_i, u.top.mem_req_addr_o);
-    const uint32_t entry = u.top.mem_req_addr_o;
-    if (owed) ck_assert(!u.top.mem_req_valid_o);
-    owed -= owed && memory.answers;
-    if (memory.sample(draw, u.cycle, u.top.mem_req_valid_o, entry) && u.top.rst_ni) ask(entry);
+    const pair asks = {{u.top.pair_entry0_o, u.top.pair_entry1_o}, (bool)u.top.pair_tile_o};
+    request.check(u.top.pair_valid_o, memory.ready, (uint64_t)asks.entry[1] << 32 | asks.entry[0]);
+    if (memory.sample(draw, u.cycle, u.top.pair_valid_o, asks.entry[0], asks.entry[1]) && !quiet) ask(asks);
     output.check(u.top.m_valid_o, u.top.m_ready_i, u.top.m_features_o << 1 | u.top.m_last_o);
     if (u.top.m_valid_o && u.top.m_ready_i && !quiet) take();
     if (taken && !quiet) accept();
@@ -216,14 +218,18 @@ private:
     flying.push_back(next);
     accepted++;
     for (int l = 0; l < table->grid.levels; l++)
-      for (int corner = 0; corner < CORNERS; corner++) entries.push_back(table->entry(next.pos, l, corner));
+      for (int i = 0; i < PAIRS; i++)
+        pairs.push_back({{table->entry(next.pos, l, 2 * i), table->entry(next.pos, l, 2 * i + 1)},
+                         u.top.s_tile_i && l == 0 && i == 0});
   }
-  void ask(uint32_t entry)
+  void ask(const pair &got)
   {
-    ck_assert(!entries.empty());
-    ck_assert_msg(entry == entries.front(), "entry %u asked for, expected %u (%zu before the end)", entry,
-                  entries.front(), entries.size());
-    entries.pop_front();
+    ck_assert(!pairs.empty());
+    const pair &p = pairs.front();
+    ck_assert_msg(got.entry[0] == p.entry[0] && got.entry[1] == p.entry[1] && got.tile == p.tile,
+                  "pair %u, %u (tile %d) asked for, expected %u, %u (%d), %zu before the end", got.entry[0],
+                  got.entry[1], got.tile, p.entry[0], p.entry[1], p.tile, pairs.size());
+    pairs.pop_front();
     asked++;
   }
   void take()
@@ -254,11 +260,11 @@ LOOP_TEST(random_grids, 4)
     const int stall = n % 3 == 0 ? 0 : n % 3 == 1 ? 20 : 70;
     b.load(&fixture, (int)b.draw(1, 60), (int)b.draw(0, 3) * 40, stall);
     b.run(120);
-    ck_assert(b.flying.empty() && b.entries.empty() && b.memory.queue.empty());
+    ck_assert(b.flying.empty() && b.pairs.empty() && b.memory.queue.empty());
   }
 }
 
-/* One request per cycle up to a latency of the requests that may be on their way; before the first, the first cell;
+/* One pair per cycle up to a latency of the pairs that may be on their way; before the first, the first cell;
  * behind the last answer, sums and queue. */
 TEST(a_request_in_every_cycle)
 {
@@ -269,22 +275,22 @@ TEST(a_request_in_every_cycle)
       grid_bench b(40);
       const grid_fixture fixture(b.draw, levels, 0);
       b.load(&fixture, latency[i], 0, 0);
-      const uint64_t samples = 50, requests = samples * (uint64_t)levels * CORNERS, cycles = b.run((int)samples);
+      const uint64_t samples = 50, requests = samples * (uint64_t)levels * PAIRS, cycles = b.run((int)samples);
       ck_assert_msg(cycles == requests + (uint64_t)latency[i] + BEFORE_AND_BEHIND,
                     "%d levels, latency %d: %d cycles for %d requests", levels, latency[i], (int)cycles, (int)requests);
     }
 }
 
-/* While the memory takes nothing, all that fits in before it fills up: one request waits, one index behind it. */
+/* While the memory takes nothing, all that fits in before it fills up: one pair waits, one index behind it. */
 TEST(a_memory_that_begins_late)
 {
-  enum { BEHIND = 10 };
+  enum { BEHIND = 11 };
   for (int levels = 1; levels <= 16; levels += 5) {
     grid_bench b(41);
     const grid_fixture fixture(b.draw, levels, 0);
     b.load(&fixture, 10, 0, 0);
     b.memory_begins = b.u.cycle + 100;
-    const uint64_t begin = b.u.cycle, requests = 20 * (uint64_t)levels * CORNERS;
+    const uint64_t begin = b.u.cycle, requests = 20 * (uint64_t)levels * PAIRS;
     b.run(20);
     ck_assert_uint_eq(b.u.cycle - begin, 100 + requests + 10 + BEHIND);
   }
@@ -297,21 +303,21 @@ TEST(an_index_behind_requests_that_wait)
     grid_bench b(42);
     const grid_fixture fixture(b.draw, 1, 0);
     b.load(&fixture, 10, 0, 0);
-    b.ask_most = CORNERS - waiting;
+    b.ask_most = PAIRS - waiting;
     for (int i = 0; i < 60; i++) b.cycle(b.accepted == 0);
     for (int i = 0; i < 60; i++) b.cycle(b.accepted == 1);
-    ck_assert_uint_eq(b.asked, CORNERS - waiting);
+    ck_assert_uint_eq(b.asked, PAIRS - waiting);
     b.ask_most = UINT64_MAX;
     for (uint64_t i = 0; i <= waiting; i++) b.cycle(0);
-    ck_assert_uint_eq(b.asked, CORNERS + 1);
+    ck_assert_uint_eq(b.asked, PAIRS + 1);
     while (b.done < 2) b.cycle(0);
   }
 }
 
-/* A sample that comes while the one before is at work waits for the end of its slots, or until its cell has left. */
+/* A sample that comes while the one before is at work waits for the end of a level's slots, until its cell has left. */
 TEST(when_the_next_sample_is_taken)
 {
-  static const uint64_t SLOTS = 8, LEFT = 14;
+  static const uint64_t SLOTS = 4, LEFT = 12;
   for (uint64_t gap = 1; gap <= LEFT + SLOTS; gap++) {
     grid_bench b(43);
     const grid_fixture fixture(b.draw, 1, 0);
@@ -320,7 +326,7 @@ TEST(when_the_next_sample_is_taken)
     const uint64_t begin = b.u.cycle;
     while (b.u.cycle - begin < gap - 1) b.cycle(0);
     while (b.accepted < 2) b.cycle(1);
-    ck_assert_uint_eq(b.u.cycle - begin, gap <= SLOTS ? SLOTS : gap <= LEFT ? LEFT : gap);
+    ck_assert_uint_eq(b.u.cycle - begin, gap <= LEFT ? (gap + SLOTS - 1) / SLOTS * SLOTS : gap);
     while (b.done < 2) b.cycle(0);
   }
 }
@@ -331,7 +337,6 @@ TEST(reset_on_the_way)
   grid_bench b(50);
   for (int delay = 0; delay < 400; delay += 1 + delay / 60) {
     const grid_fixture fixture(b.draw, (int)b.draw(1, 16), 0);
-    for (table_memory::request &r : b.memory.queue) r.entry = 0;
     b.load(&fixture, (int)b.draw(1, 90), 20, (int)b.draw(0, 1) * 30);
     for (int i = 0; i < delay; i++) b.cycle(1);
     b.clear(delay % 3 == 0);

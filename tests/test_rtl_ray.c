@@ -47,7 +47,7 @@ static void expect_core(const fx_scene *scene, int n, bool whole)
     ck_ok(fx_render_ray(scene, ray, NULL, NULL, &shared.expected[i], &shared.counts));
     const int samples = whole ? whole_march(scene, ray) : (int)shared.expected[i].samples;
     sf_ray_samples(scene, ray, shared.sample[i], samples);
-    shared.request[i] = (sf_ray_request){ray, shared.sample[i], samples, false};
+    shared.request[i] = (sf_ray_request){ray, shared.sample[i], samples, false, i == 0};
   }
 }
 
@@ -191,9 +191,11 @@ TEST(illegal_programming_is_refused)
 {
   static const struct {
     uint32_t offset, value;
-  } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},      {SF_CSR_RAY_MAX_SAMPLES, 0},
-             {SF_CSR_RAY_MAX_SAMPLES, 1025},      {SF_CSR_RAY_MAX_SAMPLES, 2048},    {SF_CSR_RAY_BACKGROUND_R, 65537},
-             {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17}};
+  } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},
+             {SF_CSR_RAY_MAX_SAMPLES, 0},         {SF_CSR_RAY_MAX_SAMPLES, 1025},
+             {SF_CSR_RAY_MAX_SAMPLES, 2048},      {SF_CSR_RAY_BACKGROUND_R, 65537},
+             {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17},
+             {SF_CSR_FIELD_BASE, 0x10008},        {SF_CSR_FIELD_BASE, 1}};
   OWNED(fx_scene) scene = small_scene();
   OWNED(sf_ray_dut) *rays = open_rays(&scene, 1, 20);
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -284,8 +286,8 @@ TEST(sizes_that_are_not_the_nets_are_refused)
 TEST(registers)
 {
   static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
-                                         SF_CSR_ENCODER_DATA, SF_CSR_RAY_CTRL};
-  static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, 0x42c, 0x7fc};
+                                         SF_CSR_ENCODER_DATA,   SF_CSR_FIELD_BASE,       SF_CSR_RAY_CTRL};
+  static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, SF_CSR_FIELD_CACHE, SF_CSR_FIELD_STALLS_HIGH, 0x454, 0x7fc};
   OWNED(fx_scene) scene = small_scene();
   OWNED(sf_ray_dut) *rays = open_rays(&scene, 2, 40);
   ck_assert_uint_eq(get(rays->dut, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
@@ -323,6 +325,7 @@ static void cut_off(sf_ray_dut *rays, int cycles)
     dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
     dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
     dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
+    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time: there is something to ask the memory for */
     sf_dut_tick(dut);
     at += dut->out.ray_ready;
   }

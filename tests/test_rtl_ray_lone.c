@@ -63,7 +63,7 @@ TEST(pixels_that_wait)
     for (int i = 0; i < LONE; i++) {
       const bool empty = draw(&s, 0, 1);
       sample[i] = draw_sample(&s);
-      request[i] = (sf_ray_request){&ray, &sample[i], !empty, false};
+      request[i] = (sf_ray_request){&ray, &sample[i], !empty, false, i % 3 == 0};
       lone_ray(&scene, &ray, empty ? NULL : &sample[i], &expected[i]);
     }
     dut->stall_percent = round % 2 ? 0 : 99; /* of the sink as of the source: a pixel waits for hundreds of cycles */
@@ -95,7 +95,7 @@ TEST(every_bit_of_a_position)
     lone_ray(&scene, &ray, &sample, &expected);
     lone_ray(&scene, &ray, &beside, &other);
     if (memcmp(expected.colour, other.colour, sizeof other.colour) == 0) continue;
-    ck_ok(sf_ray_dut_run(rays, &(sf_ray_request){&ray, &sample, 1, false}, 1, &actual));
+    ck_ok(sf_ray_dut_run(rays, &(sf_ray_request){&ray, &sample, 1, false, true}, 1, &actual));
     same_pixel(&actual, &expected);
     found[axis]++;
   }

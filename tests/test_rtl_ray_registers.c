@@ -1,8 +1,8 @@
 /* The registers of sf_ray_top against a model of csr.def: what reads back, what is refused and how, the interrupt, both
  * windows behind one bus, and what reaches the encoder. */
 #include "ck_run.h"
-#include "firmware/sf_ray_driver.h"
 #include "quant/quant.h"
+#include "sim/ray/ray.h"
 #include "tests/dut_fixture.h"
 #include "tests/fx_fixture.h"
 #include "tests/random_net.h"
@@ -15,14 +15,14 @@ enum { WINDOW = 0x400, WINDOW_END = 0x800 };
 /* As they read. A value that does not fit is kept as an illegal one, so that the check at start sees it. */
 typedef struct registers {
   bool running, broken; /* broken: input is discarded until the soft reset */
-  uint32_t error, irq_enable, trans_stop, max_samples, background[3], address;
+  uint32_t error, irq_enable, trans_stop, max_samples, background[3], address, base;
 } registers;
 
 static bool bad_value(const registers *r)
 {
   bool bad = r->trans_stop >= 1 << 20 || r->max_samples < 1 || r->max_samples > 1024;
   for (int o = 0; o < 3; o++) bad |= r->background[o] > 1 << 16;
-  return bad;
+  return bad || r->base % SF_LINE_BYTES;
 }
 
 static void store(registers *r, uint32_t offset, uint32_t value)
@@ -35,6 +35,8 @@ static void store(registers *r, uint32_t offset, uint32_t value)
     r->address = value & 0xff;
   } else if (offset == SF_CSR_ENCODER_DATA) {
     r->address = (r->address + 1) & 0xff;
+  } else if (offset == SF_CSR_FIELD_BASE) {
+    r->base = value;
   } else {
     r->background[(offset - SF_CSR_RAY_BACKGROUND_R) / 4] = value >> 17 ? (1 << 18) - 1 : value;
   }
@@ -44,7 +46,7 @@ static void store(registers *r, uint32_t offset, uint32_t value)
 static uint32_t model_write(registers *r, uint32_t offset, uint32_t value, uint8_t strobe)
 {
   uint32_t error = 0;
-  const bool programming = offset >= SF_CSR_RAY_TRANS_STOP && offset <= SF_CSR_ENCODER_DATA;
+  const bool programming = offset >= SF_CSR_RAY_TRANS_STOP && offset <= SF_CSR_FIELD_BASE;
   if (strobe != WHOLE) {
     error = SF_CSR_RAY_ERROR_ADDRESS;
   } else if (programming) {
@@ -60,7 +62,7 @@ static uint32_t model_write(registers *r, uint32_t offset, uint32_t value, uint8
   } else if (offset == SF_CSR_RAY_ERROR) {
     r->error &= ~value;
   } else if (offset == SF_CSR_RAY_IRQ_ENABLE) {
-    r->irq_enable = value & 0xf;
+    r->irq_enable = value & 0x1f;
   } else {
     error = SF_CSR_RAY_ERROR_ADDRESS;
   }
@@ -87,6 +89,10 @@ static uint32_t model_read(const registers *r, uint32_t offset)
     return r->background[(offset - SF_CSR_RAY_BACKGROUND_R) / 4];
   case SF_CSR_ENCODER_ADDRESS:
     return r->address;
+  case SF_CSR_FIELD_BASE:
+    return r->base;
+  case SF_CSR_FIELD_CACHE:
+    return SF_CSR_FIELD_CACHE_RESET;
   default:
     return 0;
   }
@@ -145,13 +151,12 @@ static void soft_reset_both(sf_dut *dut, registers *r)
 static void show_anything(void *context)
 {
   sf_dut *dut = context;
-  static const uint32_t shown[] = {
-      SF_CSR_CTRL, SF_CSR_RAY_CTRL, SF_CSR_RAY_ERROR, SF_CSR_RAY_TRANS_STOP, SF_CSR_ENCODER_DATA, SF_CSR_RAY_IRQ_ENABLE,
-      0x42c};
+  static const uint32_t shown[] = {SF_CSR_CTRL,         SF_CSR_RAY_CTRL,       SF_CSR_RAY_ERROR,  SF_CSR_RAY_TRANS_STOP,
+                                   SF_CSR_ENCODER_DATA, SF_CSR_RAY_IRQ_ENABLE, SF_CSR_FIELD_BASE, 0x454};
   random_source s = {7, dut->cycle * 5};
-  if (!dut->in.awvalid) dut->in.awaddr = shown[draw(&s, 0, 6)];
+  if (!dut->in.awvalid) dut->in.awaddr = shown[draw(&s, 0, 7)];
   if (!dut->in.wvalid) dut->in.wdata = draw(&s, 0, 1) ? (uint32_t)draw(&s, 0, 15) : UINT32_MAX;
-  if (!dut->in.arvalid) dut->in.araddr = shown[draw(&s, 0, 6)];
+  if (!dut->in.arvalid) dut->in.araddr = shown[draw(&s, 0, 7)];
   dut->in.ray_user = draw(&s, 0, 1);
 }
 
@@ -190,6 +195,7 @@ static void program_legal(sf_dut *dut, registers *r, random_source *s)
 {
   write_both(dut, r, SF_CSR_RAY_TRANS_STOP, draw(s, 0, 1) ? (1 << 20) - 1 : 0, WHOLE);
   write_both(dut, r, SF_CSR_RAY_MAX_SAMPLES, draw(s, 0, 1) ? 1024 : 1, WHOLE);
+  write_both(dut, r, SF_CSR_FIELD_BASE, draw(s, 0, 1) ? UINT32_MAX - 15 : 16, WHOLE);
   for (uint32_t o = 0; o < 3; o++)
     write_both(dut, r, SF_CSR_RAY_BACKGROUND_R + 4 * o, draw(s, 0, 1) ? 1 << 16 : 0, WHOLE);
 }
@@ -200,10 +206,10 @@ LOOP_TEST(any_access_in_any_state, 2)
   registers r = {0};
   OWNED(sf_dut) *dut = begin(s.seed);
   int running = 0, refused = 0;
-  for (uint32_t offset = WINDOW; offset < SF_CSR_ENCODER_DATA + 8; offset += 4) read_both(dut, &r, offset);
+  for (uint32_t offset = WINDOW; offset < SF_CSR_FIELD_STALLS_HIGH + 8; offset += 4) read_both(dut, &r, offset);
   for (int i = 0; i < ACCESSES; i++) {
     const int64_t kind = draw(&s, 0, 99);
-    const uint32_t offset = WINDOW + 4 * (uint32_t)(draw(&s, 0, 9) ? draw(&s, 0, 11) : draw(&s, 0, 255));
+    const uint32_t offset = WINDOW + 4 * (uint32_t)(draw(&s, 0, 9) ? draw(&s, 0, 21) : draw(&s, 0, 255));
     const uint8_t strobe = draw(&s, 0, 9) ? WHOLE : (uint8_t)draw(&s, 0, 14);
     running += r.running;
     if (kind < 30) {
@@ -380,7 +386,7 @@ static void renders(sf_ray_dut *rays, uint64_t seed)
     ray[i] = random_ray(scene, seed, i);
     ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
     sf_ray_samples(scene, &ray[i], samples[i], (int)expected.samples);
-    request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false};
+    request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false, i == 0};
     count += expected.samples;
   }
   ck_assert_uint_gt(count, 0);

@@ -8,6 +8,7 @@ enum { DEPTH = 16, POS_WORDS = 3 };
 
 struct sample {
   bool first = false, last = false, empty = false;
+  bool tile = false; /* counts on the first sample alone */
   uint32_t pos[POS_WORDS] = {};
   uint64_t dir = 0, distance = 0;
   uint32_t delta = 0;
@@ -25,6 +26,7 @@ static sample draw_sample(random_draw &draw)
   sample s;
   for (int i = 0; i < POS_WORDS; i++) s.pos[i] = (uint32_t)wide(draw, i == 2 ? 8 : 32);
   s.dir = wide(draw, 48), s.distance = wide(draw, 44), s.delta = (uint32_t)wide(draw, 25);
+  s.tile = draw.percent(30);
   return s;
 }
 
@@ -34,8 +36,8 @@ struct bench {
   sink_stalls encoder_stalls, compositor_stalls;
   std::deque<sample> encoder, compositor;                             /* what must still come out */
   bool inside = false, drop = false, broken = false, in_hand = false; /* in_hand: the encoder has not taken the last */
-  bool taken_any = false;
-  uint64_t ray = 0, composed = 0; /* of the last sample in, of the last one out */
+  bool taken_any = false, new_tile = false;                           /* new_tile: since the last position */
+  uint64_t ray = 0, composed = 0;                                     /* of the last sample in, of the last one out */
   int stop_percent = 0;
   uint64_t accepted = 0, dropped = 0, stops = 0, deepest = 0;
 
@@ -49,7 +51,7 @@ struct bench {
   void forget()
   {
     encoder.clear(), compositor.clear();
-    inside = drop = broken = in_hand = taken_any = false;
+    inside = drop = broken = in_hand = taken_any = new_tile = false;
     ray = 0;
   }
 
@@ -57,6 +59,7 @@ struct bench {
   {
     u.top.valid_i = 1;
     u.top.first_i = s.first, u.top.last_i = s.last, u.top.empty_i = s.empty;
+    u.top.tile_i = s.tile;
     for (int i = 0; i < POS_WORDS; i++) u.top.pos_i[i] = s.pos[i];
     u.top.dir_i = s.dir, u.top.delta_i = s.delta, u.top.distance_i = s.distance;
   }
@@ -66,6 +69,7 @@ struct bench {
     if (encoder.empty()) ck_abort_msg("a position that nobody sent, cycle %llu", (unsigned long long)u.cycle);
     const sample &e = encoder.front();
     ck_assert_uint_eq(u.top.encode_first_o, e.first);
+    ck_assert_uint_eq(u.top.encode_tile_o, e.tile);
     for (int i = 0; i < POS_WORDS; i++) ck_assert_uint_eq(u.top.encode_pos_o[i], e.pos[i]);
     if (e.first) ck_assert_uint_eq(u.top.encode_dir_o, e.dir);
     encoder.pop_front();
@@ -105,7 +109,9 @@ struct bench {
     sample in = s;
     ray += s.first, in.ray = ray, inside = !s.last;
     compositor.push_back(in);
-    if (!s.empty) encoder.push_back(in), in_hand = true;
+    new_tile = new_tile || (s.first && s.tile);
+    in.tile = new_tile;
+    if (!s.empty) encoder.push_back(in), in_hand = true, new_tile = false;
     accepted++;
     if (compositor.size() > deepest) deepest = compositor.size();
   }

@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00040000
+#define SF_REG_VERSION_RESET 0x00050000
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
@@ -203,6 +203,8 @@
 #define SF_REG_RAY_CTRL 0x0400
 #define SF_REG_RAY_CTRL_START_MASK 0x00000001 /* check the compositor's programming and accept rays */
 #define SF_REG_RAY_CTRL_START_SHIFT 0
+#define SF_REG_RAY_CTRL_CLEAR_MASK 0x00000002 /* FIELD_LOOKUPS to FIELD_STALLS become 0 */
+#define SF_REG_RAY_CTRL_CLEAR_SHIFT 1
 
 /* state of the ray stream, RO */
 #define SF_REG_RAY_STATUS 0x0404
@@ -215,7 +217,7 @@
 
 /* what was refused; a soft reset clears it, W1C */
 #define SF_REG_RAY_ERROR 0x0408
-#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES or a background out of range */
+#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES, a background or FIELD_BASE out of range */
 #define SF_REG_RAY_ERROR_VALUE_SHIFT 0
 #define SF_REG_RAY_ERROR_BUSY_MASK 0x00000002 /* start or a write to the programming while running */
 #define SF_REG_RAY_ERROR_BUSY_SHIFT 1
@@ -223,6 +225,8 @@
 #define SF_REG_RAY_ERROR_ADDRESS_SHIFT 2
 #define SF_REG_RAY_ERROR_ORDER_MASK 0x00000008 /* tuser on a sample inside a ray, or none on its first one; an empty ray without tuser or tlast; input is discarded until soft reset */
 #define SF_REG_RAY_ERROR_ORDER_SHIFT 3
+#define SF_REG_RAY_ERROR_MEMORY_MASK 0x00000010 /* the grid's memory answered with an error; pixels since then may be wrong */
+#define SF_REG_RAY_ERROR_MEMORY_SHIFT 4
 
 /* the interrupt is also any bit of RAY_ERROR that is enabled here, RW */
 #define SF_REG_RAY_IRQ_ENABLE 0x040c
@@ -247,6 +251,41 @@
 
 /* a word of the encoder's programming, WO */
 #define SF_REG_ENCODER_DATA 0x0428
+
+/* address of the grid's table in its memory, a multiple of 16, RW */
+#define SF_REG_FIELD_BASE 0x042c
+
+/* the field's cache of this build: lines of 16 bytes; results do not depend on it, counts of FIELD_* do, RO */
+#define SF_REG_FIELD_CACHE 0x0430
+#define SF_REG_FIELD_CACHE_RESET 0x04008000
+#define SF_REG_FIELD_CACHE_BYTES_MASK 0x0001ffff /* size */
+#define SF_REG_FIELD_CACHE_BYTES_SHIFT 0
+#define SF_REG_FIELD_CACHE_WAYS_MASK 0x0f000000 /* lines per set */
+#define SF_REG_FIELD_CACHE_WAYS_SHIFT 24
+
+/* look-ups of lines since RAY_CTRL.CLEAR, low half; both halves are read while no ray is inside, or high, low, high until high stays, RO */
+#define SF_REG_FIELD_LOOKUPS 0x0434
+
+/* high half, RO */
+#define SF_REG_FIELD_LOOKUPS_HIGH 0x0438
+
+/* look-ups that did not find their line, low half, RO */
+#define SF_REG_FIELD_MISSES 0x043c
+
+/* high half, RO */
+#define SF_REG_FIELD_MISSES_HIGH 0x0440
+
+/* lines that came from the memory for a look-up, low half, RO */
+#define SF_REG_FIELD_FILLS 0x0444
+
+/* high half, RO */
+#define SF_REG_FIELD_FILLS_HIGH 0x0448
+
+/* cycles in which the nets' input has room, the encoder has no features for it, and a look-up waits for its line from the memory; low half, RO */
+#define SF_REG_FIELD_STALLS 0x044c
+
+/* high half, RO */
+#define SF_REG_FIELD_STALLS_HIGH 0x0450
 
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000

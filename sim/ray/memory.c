@@ -1,40 +1,77 @@
 #include "sim/ray/ray.h"
 #include "base/rng.h"
 
-enum { STREAM_REQUEST = 32, STREAM_ANSWER, STREAM_LATENCY, LATENCY_MAX = 24 };
+enum { STREAM_REQUEST = 32, STREAM_ANSWER, STREAM_LATENCY, STREAM_BASE, LATENCY_MAX = 24 };
+enum { BEAT_BYTES = 8, BEATS = 2, SIZE_8_BYTES = 3, INCREMENTING = 1, BOUNDARY = 4096, BASE_LOW = 1 << 28 };
 
-/* An entry beyond the table is counted and read as 0. */
-static uint16_t read_entry(sf_memory *m, uint32_t address)
+uint32_t sf_memory_base(uint64_t seed)
 {
-  if (address >= (uint64_t)m->grid->entries) {
-    m->outside++;
-    return 0;
-  }
-  const int8_t *entry = m->grid->table + (uint64_t)address * FX_GRID_FEATURES;
-  return (uint16_t)((unsigned)(uint8_t)entry[1] << 8 | (uint8_t)entry[0]);
+  return BASE_LOW + (uint32_t)sf_random_below(seed, STREAM_BASE, 0, BASE_LOW / SF_LINE_BYTES) * SF_LINE_BYTES;
+}
+
+/* ---- AXI's rules, and this block's ---- */
+
+static const char *broken_rule(const sf_memory *m)
+{
+  const sf_pins_out *out = &m->dut->out;
+  if (m->waits && (!out->ar_valid || out->ar_address != m->waiting)) return "a request of the memory changed or went";
+  if (m->dut->in.r_valid && !out->r_ready) return "no room for an answer that was asked for";
+  if (!out->ar_valid) return NULL;
+  if (out->ar_len != BEATS - 1 || out->ar_size != SIZE_8_BYTES || out->ar_burst != INCREMENTING)
+    return "a burst that is not two beats of eight bytes";
+  if (out->ar_address % SF_LINE_BYTES) return "a burst that is not aligned to a line";
+  if (out->ar_address % BOUNDARY + BEATS * BEAT_BYTES > BOUNDARY) return "a burst across 4 KiB";
+  return NULL;
+}
+
+static void watch(sf_memory *m)
+{
+  const char *what = broken_rule(m);
+  if (what && !m->fault) m->fault = what;
+  m->waits = m->dut->in.rst_n && m->dut->out.ar_valid && !m->dut->in.ar_ready;
+  m->waiting = m->dut->out.ar_address;
+}
+
+/* ---- contents ---- */
+
+/* What lies beyond the table in its last line reads as 0. */
+static uint64_t read_beat(const sf_memory *m, uint32_t address)
+{
+  const uint64_t at = (uint32_t)(address - m->base), end = (uint64_t)m->grid->entries * FX_GRID_FEATURES;
+  uint64_t value = 0;
+  for (uint64_t i = 0; i < BEAT_BYTES && at + i < end; i++) value |= (uint64_t)(uint8_t)m->grid->table[at + i] << 8 * i;
+  return value;
 }
 
 static void take(sf_memory *m)
 {
   const sf_dut *dut = m->dut;
-  m->answered += dut->in.mem_answer;
-  if (!dut->in.mem_ready || !dut->out.mem_request) return;
+  if (dut->in.r_valid) {
+    m->answered += dut->in.r_last;
+    m->second = !dut->in.r_last;
+  }
+  if (!dut->in.ar_ready || !dut->out.ar_valid) return;
   const uint64_t tail = m->asked++ % SF_MEMORY_QUEUE;
-  m->data[tail] = read_entry(m, dut->out.mem_address);
-  m->due[tail] = dut->cycle + sf_random_below(dut->seed, STREAM_LATENCY, dut->cycle, LATENCY_MAX);
+  const uint64_t latency =
+      m->latency ? (uint64_t)m->latency : sf_random_below(dut->seed, STREAM_LATENCY, dut->cycle, LATENCY_MAX);
+  m->address[tail] = dut->out.ar_address;
+  m->due[tail] = dut->cycle + latency;
+  m->outside += (uint32_t)(dut->out.ar_address - m->base) >= (uint64_t)m->grid->entries * FX_GRID_FEATURES;
 }
 
 static void offer(sf_memory *m)
 {
   sf_dut *dut = m->dut;
   const uint64_t waiting = m->asked - m->answered, head = m->answered % SF_MEMORY_QUEUE;
-  dut->in.mem_ready = waiting < SF_MEMORY_QUEUE && !sf_dut_stalls(dut, STREAM_REQUEST);
-  dut->in.mem_answer = waiting > 0 && m->due[head] <= dut->cycle && !sf_dut_stalls(dut, STREAM_ANSWER);
-  dut->in.mem_data = m->data[head];
+  dut->in.ar_ready = waiting < SF_MEMORY_QUEUE && !sf_dut_stalls(dut, STREAM_REQUEST);
+  dut->in.r_valid = waiting > 0 && m->due[head] <= dut->cycle && !sf_dut_stalls(dut, STREAM_ANSWER);
+  dut->in.r_last = dut->in.r_valid && m->second;
+  dut->in.r_data = dut->in.r_valid ? read_beat(m, m->address[head] + (m->second ? BEAT_BYTES : 0)) : 0;
 }
 
 void sf_memory_cycle(void *memory)
 {
+  watch(memory);
   take(memory);
   offer(memory);
 }

@@ -1,5 +1,4 @@
 #include "sim/ray/ray.h"
-#include "firmware/sf_ray_driver.h"
 #include "quant/quant.h"
 #include <inttypes.h>
 #include <stdlib.h>
@@ -8,14 +7,15 @@
 enum { PATIENCE = 200000, QUIET = 16, STREAM_RAYS = 40, STREAM_PIXELS };
 static const sf_error_source ray_error = {SF_CSR_RAY_ERROR, sf_ray_driver_error_text};
 
-static sf_ray_blob blob_of(const fx_scene *scene)
+static sf_ray_blob blob_of(const fx_scene *scene, uint32_t base)
 {
   const fx_grid *grid = &scene->grid;
   sf_ray_blob blob = {.levels = (uint32_t)grid->levels,
                       .n_dir = (uint32_t)fx_net_constants(&scene->net),
                       .dir_frac = (uint32_t)sf_fx_dir_frac(scene),
                       .trans_stop = (uint32_t)scene->trans_stop,
-                      .max_samples = (uint32_t)scene->max_samples};
+                      .max_samples = (uint32_t)scene->max_samples,
+                      .table = base};
   for (int l = 0; l < grid->levels; l++)
     blob.level[l] =
         (sf_ray_level_blob){(uint32_t)grid->scale_q16[l], (uint32_t)grid->stride[l], (uint32_t)grid->log2_size[l],
@@ -27,7 +27,8 @@ static sf_ray_blob blob_of(const fx_scene *scene)
 sf_status sf_ray_dut_load(sf_ray_dut *rays)
 {
   sf_dut *dut = rays->dut;
-  const sf_ray_blob blob = blob_of(rays->scene);
+  rays->in_tile = false;
+  const sf_ray_blob blob = blob_of(rays->scene, rays->memory.base);
   SF_TRY(sf_dut_load(dut, &rays->scene->net));
   const sf_driver_code code = sf_ray_driver_load(sf_dut_driver_bus(dut), &blob);
   if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);
@@ -42,7 +43,10 @@ sf_status sf_ray_dut_open(sf_ray_dut **out, const fx_scene *scene, const sf_dut_
   rays->scene = scene;
   sf_status status = sf_dut_open_pins(&rays->dut, options, sf_pins_open_rays);
   if (status.code == SF_OK) {
-    rays->memory = (sf_memory){.dut = rays->dut, .grid = &scene->grid};
+    rays->memory = (sf_memory){.dut = rays->dut,
+                               .grid = &scene->grid,
+                               .base = sf_memory_base(options->seed),
+                               .latency = options->memory_latency};
     rays->dut->each_cycle = sf_memory_cycle, rays->dut->each_cycle_context = &rays->memory;
     status = sf_ray_dut_load(rays);
   }
@@ -75,7 +79,35 @@ sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const
   const bool stops =
       core->transmittance <= (uint32_t)scene->trans_stop || core->samples >= (uint32_t)scene->max_samples;
   sf_ray_samples(scene, ray, sample, (int)core->samples);
-  return (sf_ray_request){ray, sample, (int)core->samples, stops};
+  return (sf_ray_request){ray, sample, (int)core->samples, stops, false};
+}
+
+bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile)
+{
+  const bool same = rays->in_tile && rays->tile == tile;
+  rays->in_tile = true, rays->tile = tile;
+  return !same;
+}
+
+sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field)
+{
+  sf_ray_driver_field(sf_dut_driver_bus(rays->dut), field);
+  return sf_dut_driver_status(rays->dut, SF_DRIVER_OK, "counters of the field", &ray_error);
+}
+
+sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl)
+{
+  const struct {
+    const char *name;
+    uint64_t core, rtl;
+  } count[] = {{"look-ups of the field", core->lookups, rtl->lookups},
+               {"field lines missed", core->misses, rtl->misses},
+               {"field lines filled", core->misses, rtl->fills}};
+  for (size_t i = 0; i < sizeof count / sizeof *count; i++)
+    if (count[i].core != count[i].rtl)
+      return sf_fail(SF_E_DIFFERENCE, "%s: core %" PRIu64 ", accelerator %" PRIu64, count[i].name, count[i].core,
+                     count[i].rtl);
+  return sf_ok();
 }
 
 typedef struct run {
@@ -94,15 +126,16 @@ static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
   const int16_t *d = request->ray->unit;
   memset(in->ray_data, 0, sizeof in->ray_data);
   in->ray_user = at == 0, in->ray_last = at >= request->n - !request->stops;
+  if (at == 0 && request->new_tile) in->ray_data[3] = (uint64_t)1 << 49;
   if (request->n == 0) {
-    in->ray_data[3] = (uint64_t)1 << 48;
+    in->ray_data[3] |= (uint64_t)1 << 48;
     return;
   }
   const sf_ray_sample *s = &request->sample[at < request->n ? at : 0]; /* beyond the last: dropped, whatever it is */
   in->ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
   in->ray_data[1] = (uint64_t)(uint32_t)s->delta_q24 << 32 | s->pos[2];
   in->ray_data[2] = s->distance_q16;
-  if (at == 0) in->ray_data[3] = (uint64_t)(uint16_t)d[2] << 32 | (uint64_t)(uint16_t)d[1] << 16 | (uint16_t)d[0];
+  if (at == 0) in->ray_data[3] |= (uint64_t)(uint16_t)d[2] << 32 | (uint64_t)(uint16_t)d[1] << 16 | (uint16_t)d[0];
 }
 
 static void offer(run *r)
@@ -177,6 +210,7 @@ static sf_status step(run *r)
   accept_input(r);
   SF_TRY(accept_pixel(r));
   if (dut->out.irq) return trouble(r, "interrupt");
+  if (r->memory->fault) return trouble(r, r->memory->fault);
   if (r->memory->outside) return trouble(r, "grid entry beyond the table");
   return dut->cycle - r->progress > PATIENCE ? trouble(r, "hang") : sf_ok();
 }

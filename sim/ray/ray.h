@@ -2,6 +2,8 @@
  * bus are those of sim/sim.h. */
 #ifndef SF_SIM_RAY_RAY_H
 #define SF_SIM_RAY_RAY_H
+#include "firmware/sf_ray_driver.h"
+#include "fx/memory.h"
 #include "sim/sim.h"
 
 typedef struct sf_ray_sample {
@@ -10,33 +12,43 @@ typedef struct sf_ray_sample {
   uint64_t distance_q16; /* below 2^44 */
 } sf_ray_sample;
 
-/* The samples of one ray, n >= 0. The hardware may stop before the last one, by the core's own rule. stops: it has to
- * stop at the last one, which is not marked as such; once its pixel has come, one more that is ends the ray. */
+/* new_tile: the first ray of a tile, before which the field's cache is emptied. The samples of one ray, n >= 0. The
+ * hardware may stop before the last one, by the core's own rule. stops: it has to stop at the last one, which is not
+ * marked as such; once its pixel has come, one more that is ends the ray. */
 typedef struct sf_ray_request {
   const fx_ray *ray;
   const sf_ray_sample *sample;
   int n;
-  bool stops;
+  bool stops, new_tile;
 } sf_ray_request;
 
-/* The grid's memory: answers in order, each after a random number of cycles. */
-enum { SF_MEMORY_QUEUE = 64 };
+/* The grid's memory behind AXI4: lines in the order of the requests, each after a random number of cycles. */
+enum { SF_MEMORY_QUEUE = 64, SF_LINE_BYTES = 16 };
 typedef struct sf_memory {
   sf_dut *dut;
   const fx_grid *grid;
-  uint64_t asked, answered;      /* requests taken, answers given */
+  uint32_t base;                 /* address of its table */
+  int latency;                   /* from a request to its first beat, in cycles; 0: at random */
+  uint64_t asked, answered;      /* requests taken, lines given */
   uint64_t outside;              /* requests beyond the table */
+  const char *fault;             /* the first rule of AXI that the block broke; NULL: none */
   uint64_t due[SF_MEMORY_QUEUE]; /* ring: earliest cycle of the answer */
-  uint16_t data[SF_MEMORY_QUEUE];
+  uint32_t address[SF_MEMORY_QUEUE];
+  bool second, waits; /* a line's second beat is next; a request was shown and not taken */
+  uint32_t waiting;
 } sf_memory;
 
-/* The dut's each_cycle, with the memory as its context: takes a request, gives an answer. */
+/* Somewhere, so that an address is not an offset. */
+uint32_t sf_memory_base(uint64_t seed);
+/* The dut's each_cycle, with the memory as its context: watches the rules, takes a request, gives a beat. */
 void sf_memory_cycle(void *memory);
 
 typedef struct sf_ray_dut {
   sf_dut *dut;
   const fx_scene *scene; /* kept: its grid is the memory's contents */
   sf_memory memory;
+  bool in_tile; /* a ray of `tile` was the last */
+  uint64_t tile;
 } sf_ray_dut;
 /* Programmed and started. The scene must outlive it. */
 sf_status sf_ray_dut_open(sf_ray_dut **rays, const fx_scene *scene, const sf_dut_options *options);
@@ -45,9 +57,14 @@ sf_status sf_ray_dut_load(sf_ray_dut *rays);
 /* Streams n rays in and n pixels out. A hang is an error that names the cycle. */
 sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
 void sf_ray_dut_close(sf_ray_dut *rays);
+/* The field's counters since the block was opened, against those of the core for the same rays. */
+sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field);
+sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl);
 
 /* The first n samples of the ray's march. */
 void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
 /* Those that the core took for its pixel: the counters become the core's. */
 sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
+/* Rays are in tiles: true where this one's is another than the last one's. */
+bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile);
 #endif

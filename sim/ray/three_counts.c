@@ -84,10 +84,14 @@ static sf_status name_ray(const run *r, uint64_t index, sf_status status)
   return sf_fail(status.code, "%s: %s", name, status.message);
 }
 
+static uint64_t tile_of(const run *r, uint64_t index)
+{
+  return r->job->tile ? r->job->tile(r->job->user, index) : index;
+}
+
 static sf_status net_ray(run *r, uint64_t index, const fx_ray *ray, fx_pixel *pixel)
 {
-  const uint64_t tile = r->job->tile ? r->job->tile(r->job->user, index) : index;
-  return sf_observer_ray(&r->core, r->job->scene, ray, tile, rtl_net, r, pixel);
+  return sf_observer_ray(&r->core, r->job->scene, ray, tile_of(r, index), rtl_net, r, pixel);
 }
 
 /* The counters differ although outputs and spikes agree: again, with the counters read at every sample. */
@@ -102,26 +106,32 @@ static sf_status find_counter_sample(run *r, uint64_t index, const fx_ray *ray, 
 
 /* The samples that the core took through the accelerator with encoder and compositor: its pixel, what it reads, what
  * it writes. */
-static sf_status ray_traffic(run *r, const fx_ray *ray, const fx_pixel *core)
+static sf_status ray_traffic(run *r, uint64_t index, const fx_ray *ray, const fx_pixel *core)
 {
-  const sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);
-  const uint64_t asked = r->rays->memory.asked;
+  sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);
+  sf_field_counters field;
   fx_pixel pixel;
+  request.new_tile = sf_ray_dut_new_tile(r->rays, tile_of(r, index));
   SF_TRY(sf_ray_dut_run(r->rays, &request, 1, &pixel));
   SF_TRY(sf_compare_pixel(core, &pixel, sf_dut_cycle(r->rays->dut)));
-  r->sum->rtl_traffic.table_bytes += (r->rays->memory.asked - asked) * sizeof *r->rays->memory.data;
+  SF_TRY(sf_ray_dut_field(r->rays, &field));
+  r->sum->rtl_traffic.lookups = field.lookups, r->sum->rtl_traffic.misses = field.misses;
+  r->sum->rtl_traffic.table_bytes += pixel.samples * fx_grid_bytes(&r->job->scene->grid);
   r->sum->rtl_traffic.exp_neg += pixel.samples;
   r->sum->rtl_traffic.frame_bytes += sizeof pixel;
   return sf_ok();
 }
 
-static sf_status compare_all(const sf_three_counts *s)
+/* A cache of another shape than the block's is the core's and the recount's alone. */
+static sf_status compare_all(const sf_three_counts *s, const fx_cache_shape *cache)
 {
+  const bool built = cache->bytes == sf_cache_built.bytes && cache->ways == sf_cache_built.ways;
+  const int events = built ? SF_TRAFFIC_AT_PORTS : SF_TRAFFIC_LOOKUP;
   SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
   SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount", SF_TRAFFIC_EVENTS));
   SF_TRY(sf_memory_compare(&s->core_memory, "core", &s->recount_memory, "recount"));
   if (s->no_rtl_traffic) return sf_ok();
-  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", SF_TRAFFIC_AT_PORTS);
+  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", events);
 }
 
 static sf_status one_ray(run *r, uint64_t index)
@@ -142,10 +152,10 @@ static sf_status one_ray(run *r, uint64_t index)
   const sf_status read = sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls);
   if (ran.code != SF_OK) return name_ray(r, index, ran);
   SF_TRY(read);
-  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, &ray, &pixel)));
+  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, index, &ray, &pixel)));
   const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
   if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, index, &ray, status));
-  return name_ray(r, index, compare_all(s));
+  return name_ray(r, index, compare_all(s, &r->memory.cache.shape));
 }
 
 static sf_status all_rays(run *r)

@@ -7,28 +7,36 @@ enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */
 typedef struct rtl_eval {
   sf_ray_dut *rays;
   sf_dut *dut; /* not NULL: the decoder alone */
+  fx_memory memory;
+  sf_memory_recount lines;
   sf_observer core;
   sf_ray_sample sample[SAMPLES_MAX];
 } rtl_eval;
 
-static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, fx_pixel *pixel, fx_counts *rtl)
+static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, uint64_t tile, rtl_eval *e, fx_pixel *pixel,
+                         fx_counts *rtl)
 {
   sf_dut *dut = e->rays->dut;
+  sf_field_counters field;
   fx_pixel core;
   uint64_t cycles, busy, stalls;
-  sf_observer_begin(&e->core);
-  SF_TRY(fx_render_ray(scene, ray, sf_observer_net, &e->core, &core, &e->core.core));
-  const sf_ray_request request = sf_ray_request_as(scene, ray, &core, e->sample);
+  SF_TRY(sf_observer_ray(&e->core, scene, ray, tile, sf_observer_net, &e->core, &core));
+  sf_ray_request request = sf_ray_request_as(scene, ray, &core, e->sample);
+  request.new_tile = sf_ray_dut_new_tile(e->rays, tile);
   SF_TRY(sf_dut_clear_counts(dut));
   SF_TRY(sf_ray_dut_run(e->rays, &request, 1, pixel));
   SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(dut)));
   SF_TRY(sf_dut_counts(dut, rtl, &cycles, &busy, &stalls));
-  return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
+  SF_TRY(sf_compare_ray_counts(e->core.net, &e->core.core, rtl));
+  SF_TRY(sf_ray_dut_field(e->rays, &field));
+  return sf_compare_field(&e->memory.counts, &field);
 }
 
 /* The core's samples, the accelerator's colours. */
-static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, rtl_eval *e, fx_pixel *pixel, fx_counts *rtl)
+static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, uint64_t tile, rtl_eval *e, fx_pixel *pixel,
+                             fx_counts *rtl)
 {
+  (void)tile;
   fx_pixel core;
   uint64_t cycles, busy, stalls;
   sf_observer_begin(&e->core);
@@ -45,8 +53,10 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   fx_ray ray;
   fx_pixel pixel;
   fx_counts rtl = {0}, counts;
-  SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, job->window.x + x, job->window.y + y, &ray));
-  SF_TRY((e->dut ? run_decoder : run_ray)(job->scene, &ray, e, &pixel, &rtl));
+  const int across = job->window.x + x, down = job->window.y + y;
+  const uint64_t tile = (uint64_t)(down / FX_TILE) << 32 | (uint64_t)(across / FX_TILE);
+  SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, across, down, &ray));
+  SF_TRY((e->dut ? run_decoder : run_ray)(job->scene, &ray, tile, e, &pixel, &rtl));
   counts = e->core.core;
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
   const fx_cost cost = sf_cost_of(&counts);
@@ -55,24 +65,50 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   return sf_ok();
 }
 
+static sf_status named_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, sf_golden *golden)
+{
+  const sf_status status = rtl_pixel(job, e, x, y, golden);
+  if (status.code == SF_E_DIFFERENCE)
+    return sf_fail(status.code, "pixel (%d, %d) of view %s, %s", job->window.x + x, job->window.y + y, job->view->name,
+                   status.message);
+  SF_TRY(status);
+  return job->tick && !job->tick(job->user, 1) ? sf_golden_stopped(job) : sf_ok();
+}
+
+/* From `at` to where the view's next tile begins. */
+static int tile_end(int origin, int at, int end)
+{
+  const int next = at + FX_TILE - (origin + at) % FX_TILE;
+  return next < end ? next : end;
+}
+
+/* Tiles of the view, as far as they are in the window, from left to right and top to bottom. */
 static sf_status all_pixels(const sf_golden_job *job, rtl_eval *e, sf_golden *golden)
 {
-  for (int y = 0; y < job->window.height; y++)
-    for (int x = 0; x < job->window.width; x++) {
-      sf_status status = rtl_pixel(job, e, x, y, golden);
-      if (status.code == SF_E_DIFFERENCE)
-        return sf_fail(status.code, "pixel (%d, %d) of view %s, %s", job->window.x + x, job->window.y + y,
-                       job->view->name, status.message);
-      SF_TRY(status);
-      if (job->tick && !job->tick(job->user, 1)) return sf_golden_stopped(job);
+  const sf_window *w = &job->window;
+  for (int top = 0, below; top < w->height; top = below) {
+    below = tile_end(w->y, top, w->height);
+    for (int left = 0, beside; left < w->width; left = beside) {
+      beside = tile_end(w->x, left, w->width);
+      for (int y = top; y < below; y++)
+        for (int x = left; x < beside; x++) SF_TRY(named_pixel(job, e, x, y, golden));
     }
+  }
   return sf_ok();
 }
 
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden)
 {
-  rtl_eval e = {.rays = rays, .core = {.net = &job->scene->net}};
-  return all_pixels(job, &e, golden);
+  rtl_eval e = {.rays = rays, .core = {.net = &job->scene->net, .memory = &e.memory, .lines = &e.lines}};
+  sf_status status = fx_memory_open(&e.memory, job->scene, &sf_cache_built);
+  if (status.code == SF_OK) status = sf_memory_recount_open(&e.lines, job->scene, &sf_cache_built);
+  if (status.code == SF_OK) {
+    rays->in_tile = false;
+    sf_ray_driver_clear(sf_dut_driver_bus(rays->dut));
+    status = all_pixels(job, &e, golden);
+  }
+  fx_memory_close(&e.memory), sf_memory_recount_close(&e.lines);
+  return status;
 }
 
 sf_status sf_golden_decoder(const sf_golden_job *job, sf_dut *dut, sf_golden *golden)

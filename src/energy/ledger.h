@@ -50,6 +50,8 @@ typedef struct sf_technology {
 
 /* Reads a technology file: docs/energy.md says how to write one. Errors name file, line and key. */
 sf_status sf_technology_load(sf_technology *technology, const char *path);
+/* Reads a file, or the one of that name beside the program: ../share/spikefield/tech/NAME.tech. */
+sf_status sf_technology_find(sf_technology *technology, const char *name);
 /* In fJ, rounded to the nearest. *interpolated (may be NULL) becomes true where no
  * price of the file is for exactly this; it never becomes false. */
 uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);
@@ -74,10 +76,10 @@ typedef enum {
   SF_TRAFFIC_TABLE,
   SF_TRAFFIC_EXP_NEG,
   SF_TRAFFIC_FRAME,
-  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator's ports, too */
-  SF_TRAFFIC_LOOKUP = SF_TRAFFIC_AT_PORTS,
+  SF_TRAFFIC_LOOKUP,
   SF_TRAFFIC_MISS,
-  SF_TRAFFIC_PRODUCT,
+  SF_TRAFFIC_AT_PORTS, /* the ones before are seen at the accelerator, too */
+  SF_TRAFFIC_PRODUCT = SF_TRAFFIC_AT_PORTS,
   SF_TRAFFIC_PLACE,
   SF_TRAFFIC_SPECIAL,
   SF_TRAFFIC_HARMONICS,
@@ -139,6 +141,10 @@ typedef enum {
 } sf_part_id;
 extern const char *const sf_part_names[SF_PARTS];  /* "mac", "sop", "weight", ... */
 extern const char *const sf_part_titles[SF_PARTS]; /* "MAC", "SOP", "weight rows", ... */
+
+/* What the technology measured of an event of a row, if anything: the twin has a MAC of its own, and its ReLU is priced
+ * by widths. False: the price is the one of the widths. */
+bool sf_operation_measured(const sf_technology *technology, bool twin, int row, int part, uint64_t *fj);
 
 /* fJ of one event of a row, the same at all steps, and how it comes about. */
 typedef struct sf_unit_price {

@@ -9,8 +9,8 @@ enum { FILE_LIMIT = 1 << 20, WIDTH_MAX = 256, REGISTER_BITS = 32, ACCESS_BITS = 
 static const uint64_t FJ_MAX = 1000000000000; /* 1 mJ: far above any access, and products stay far below 2^63 */
 
 static const char *const families[SF_PRICE_KEYS] = {
-    "fp32_mac", "fp32_add", "int_add", "int_multiply",  "sram",              "dram",    "register",
-    "mac",      "twin_mac", "sop",     "neuron_update", "integrator_update", "special", "tag_lookup"};
+    "fp32_mac", "fp32_add", "int_add",       "int_multiply",      "sram",    "dram",      "register", "mac",
+    "twin_mac", "sop",      "neuron_update", "integrator_update", "special", "tag_lookup"};
 
 static bool has_points(int family)
 {

@@ -138,30 +138,12 @@ static uint64_t composite_fj(const pricing *p)
 
 /* ---- units ---- */
 
-/* What the technology measured of an operation of this hardware, if anything: the twin has a MAC of its own, and its ReLU
- * is priced by widths. */
-static bool measured_fj(const sf_technology *tech, bool twin, int l, int part, uint64_t *fj)
-{
-  switch (part) {
-  case SF_PART_MAC:
-    return sf_price_measured(tech, twin ? SF_PRICE_TWIN_MAC : SF_PRICE_MAC, fj);
-  case SF_PART_SOP:
-    return sf_price_measured(tech, SF_PRICE_SOP, fj);
-  case SF_PART_NEURON:
-    return !twin && sf_price_measured(tech, fx_layer_fires(l) ? SF_PRICE_NEURON : SF_PRICE_INTEGRATOR, fj);
-  case SF_PART_SPECIAL:
-    return sf_price_measured(tech, SF_PRICE_SPECIAL, fj);
-  default:
-    return false;
-  }
-}
-
 static uint64_t layer_fj(const pricing *p, const fx_net *net, int ledger, int l, int part)
 {
   const fx_layer *layer = &net->layer[l];
   const bool twin = sf_ledger_is_twin(ledger);
   uint64_t measured;
-  if (measured_fj(p->tech, twin, l, part, &measured)) return measured;
+  if (sf_operation_measured(p->tech, twin, l, part, &measured)) return measured;
   switch (part) {
   case SF_PART_MAC:
     if (twin) return products(p, 1, ACTIVATION_BITS, SF_WEIGHT_BITS) + adds(p, 1, TWIN_SUM_BITS);

@@ -39,10 +39,15 @@ static void basis(FILE *out, const sf_page *page, int row, int part)
   const fx_net *net = page->report->net;
   const sf_technology *t = &page->report->ledgers.technology;
   char text[HTML_NUMBER];
-  if (part == SF_PART_FRAME) {
+  uint64_t measured;
+  if (sf_operation_measured(t, false, row, part, &measured) && (row < SF_LAYERS || part == SF_PART_SPECIAL)) {
+    fprintf(out, "measured from a netlist%s",
+            part == SF_PART_NEURON ? "; twin: 32 \xc3\x97 16 bits and an addition of 32" : "");
+  } else if (part == SF_PART_FRAME) {
     fprintf(out, "64 bits to DRAM");
   } else if (part == SF_PART_LOOKUP) {
     memory(out, t, (uint64_t)page->report->cache.bytes);
+    if (sf_price_measured(t, SF_PRICE_TAG_LOOKUP, &measured)) fprintf(out, "; tags measured from a netlist");
   } else if (part == SF_PART_FILL) {
     fprintf(out, "%d words of 64 bits from DRAM into the cache; tables of %s bytes", FX_LINE / 8,
             html_count(text, sf_table_size(page->scene)));

@@ -2,10 +2,10 @@
 import os
 import re
 
-PUBLISHED = {"fp32_mac": (4600, "FP multiply 32 bit 3.7 + FP add 32 bit 0.9"), "fp32_add": (900, "FP add 32 bit"), "sram.8192": (10000, "cache 8 KB, 64 bit"),
-             "sram.32768": (20000, "cache 32 KB, 64 bit"), "sram.1048576": (100000, "cache 1 MB, 64 bit")}
-DRAM_FJ = 1950000
-BASE_NM, BASE_V = 45.0, 0.9
+BASE_NM, BASE_V = 45.0, 0.9  # of the published prices
+PUBLISHED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "share", "tech", "45nm.tech")
+MEASURED = ("int_add.", "int_multiply.")  # what stands there and is measured here
+UNITS = {"fJ": 1, "pJ": 1000, "nJ": 1000000}
 PAPER = {"mac": 4.6, "sop": 0.9}
 FULL = {"values": "MACS", "sums": "LANES"}  # how many lanes share the control of a whole engine: in sf_arch_pkg
 
@@ -127,6 +127,13 @@ def amount(fj):
     return f"{fj / 1000:.3f}".rstrip("0").rstrip(".") + " pJ"
 
 
+def published():
+    """[(key, fJ, source)] of the prices that stay published."""
+    with open(PUBLISHED, encoding="utf-8") as file:
+        rows = [line.split(None, 3) for line in file if line.strip() and not line.startswith(("#", "name", "title"))]
+    return [(key, round(float(value) * UNITS[unit]), source.strip()) for key, value, unit, source in rows if not key.startswith(MEASURED)]
+
+
 def file_of(report):
     """The technology file. Published prices go with the feature size and the square of the voltage: C V^2."""
     library, node = report["library"], report["node_nm"]
@@ -141,8 +148,10 @@ def file_of(report):
         source = (f"netlist: {price['what']}; {price['events_per_cycle']:.2f} events, {price['toggles_per_net_and_cycle']:.2f} toggles per net a cycle; "
                   f"idle {price['idle_fj_per_cycle']:.0f} fJ a cycle")
         lines.append(f"{price['key']:<17} {amount(price['fj']):<12} {source}")
-    lines += ["", f"# published for 45 nm, 0.9 V (M. Horowitz, ISSCC 2014, fig. 1.1.9), times {node:g}/45 and ({library['voltage']:g}/0.9)^2 = {scale:.4g}"]
-    for key, (fj, source) in PUBLISHED.items():
-        lines.append(f"{key:<17} {amount(round(fj * scale)):<12} Horowitz 2014: {source}, {amount(fj)} at 45 nm, 0.9 V; scaled to {node:g} nm, {library['voltage']:g} V")
-    lines.append(f"{'dram':<17} {DRAM_FJ / 1e6:g} nJ      Horowitz 2014: DRAM 1.3-2.6 nJ, the middle of the range; a chip of its own, not scaled")
+    lines += ["", f"# published for {BASE_NM:g} nm and {BASE_V:g} V, times {node:g}/{BASE_NM:g} and ({library['voltage']:g}/{BASE_V:g})^2 = {scale:.4g}"]
+    for key, fj, source in published():
+        if key == "dram":
+            lines.append(f"{key:<17} {fj / 1e6:g} nJ      {source}; a chip of its own, not scaled")
+        else:
+            lines.append(f"{key:<17} {amount(round(fj * scale)):<12} {source}; {amount(fj)} at {BASE_NM:g} nm, scaled")
     return "\n".join(lines) + "\n"
