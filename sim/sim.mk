@@ -95,6 +95,15 @@ $B/faults/.patched: $(RTL_READY) $(FAULTS)
 	$Qfor p in $(FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
 	@touch $@
 $(eval $(call verilated_rule,$B/faults/verilated,$B/faults,$B/faults/.patched))
+# Those of the ray stream, in a copy of their own.
+RAY_FAULTS := $(sort $(wildcard tests/faults/ray/*.patch))
+$B/faults/ray/.patched: $(RTL_READY) $(RAY_FAULTS)
+	$(call say,PATCH $(@D)/rtl)
+	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r $(RTL_ROOT)/rtl $(@D)/rtl
+	$Qfor p in $(RAY_FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
+	@touch $@
+$(eval $(call verilated_top_rule,$B/faults/ray/verilated,$B/faults/ray,$B/faults/ray/.patched,sf_ray_top,pins_ray))
+FAULTY_RAY_LIBS := $B/faults/ray/verilated/pins_ray.o $B/faults/ray/verilated/Vsf_ray_top__ALL.a
 $B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
@@ -110,7 +119,7 @@ $(C_FAULTY:%.c=$B/faults/c/%.o): $B/faults/c/%.o: $B/faults/c/.patched
 	$(call say,CC    $@)
 	$Q$(CC) $(CFLAGS_ALL) -MMD -MP -c $(@:.o=.c) -o $@
 -include $(C_FAULTY:%.c=$B/faults/c/%.d)
-$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
+$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(FAULTY_RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
