@@ -182,10 +182,12 @@ deps-asic: ## install with apt what asic and asic-energy take by default (openst
 	@DEPS="python3 yosys iverilog opensta qflow-tech-osu018" tools/deps.sh
 .PHONY: asic-energy asic deps-asic
 
-# Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
+# Programs of rays around a block with fewer lanes and another cache than the package's: $B/lanes/N/sim_render and sf_soc.
+CACHE_32 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
+CACHE_64 := -GCACHE_BYTES=8192 -GCACHE_WAYS=2
 define lanes_rule
 $(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)
-$B/lanes/$1/ray/Vsf_ray_top.mk: VERILATOR_FLAGS += -GLANES=$1
+$B/lanes/$1/ray/Vsf_ray_top.mk: VERILATOR_FLAGS += -GLANES=$1 $$(CACHE_$1)
 $B/lanes/$1/%: $B/obj/tools/%.o $B/lanes/$1/ray/pins_ray.o $B/lanes/$1/ray/Vsf_ray_top__ALL.a $(DUT_LIBS) $B/libspikefield.a
 	$$(call say,LD    $$@)
 	$$Q$$(CXX) -fopenmp $(SAN) -o $$@ $$^ $(DUT_LDLIBS) $(UNICORN_LIBS) $$(LIBS)

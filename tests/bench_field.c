@@ -65,7 +65,8 @@ static sf_status open_frame(frame *f, const char *scene, const char *data, int v
   SF_TRY(fx_scene_need_grid(&f->scene, scene, "bench_field"));
   SF_TRY(sf_fx_dataset_load(&f->data, &f->scene, scene, data, "test", &how));
   if (f->data.count == 0) return sf_fail(SF_E_RANGE, "%s: no view %d", data, view);
-  SF_TRY(fx_memory_open(&f->memory, &f->scene, &sf_cache_built));
+  const fx_cache_shape built = {SF_CACHE_BYTES, SF_CACHE_WAYS};
+  SF_TRY(fx_memory_open(&f->memory, &f->scene, &built));
   const sf_camera *camera = &f->data.view[0].camera;
   const size_t pixels = (size_t)camera->width * (size_t)camera->height;
   f->ray = calloc(pixels, sizeof *f->ray), f->tile = calloc(pixels, sizeof *f->tile);
