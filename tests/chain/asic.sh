@@ -96,6 +96,28 @@ status=0
 asic "${tiny[@]}" --clock 2000 >"$work/table.md" || status=$?
 [ $status -eq 0 ] || fail "0.075 ns do not meet 2 GHz"
 
+# One net into 8 parts with 4 NANDs each: 96 fF, of which a buffer takes 24. The netlist still computes the same.
+cat >"$work/tree/rtl/sf_leaf.sv" <<'SOURCE'
+module sf_leaf (input wire a_i, input wire [3:0] b_i, output wire [3:0] y_o);
+  assign y_o = ~({4{a_i}} & b_i);
+endmodule
+SOURCE
+cat >"$work/tree/rtl/sf_fan.sv" <<'SOURCE'
+module sf_fan (input wire a_i, input wire [31:0] b_i, output wire [31:0] y_o);
+  genvar i;
+  generate
+    for (i = 0; i < 8; i = i + 1) begin : g_leaf
+      sf_leaf u_leaf (.a_i(a_i), .b_i(b_i[4*i+:4]), .y_o(y_o[4*i+:4]));
+    end
+  endgenerate
+endmodule
+SOURCE
+asic --liberty tests/asic/tiny.lib --modules sf_fan >/dev/null || fail "a net into 8 parts"
+[ "$(grep -c "BUF between_" "$work/asic/tiny/netlist/sf_fan/netlist.v")" -eq 4 ] || fail "a heavy net has $(grep -c "BUF between_" "$work/asic/tiny/netlist/sf_fan/netlist.v") buffers, not 4"
+yosys -q -p "read_verilog -sv $work/tree/rtl/sf_leaf.sv $work/tree/rtl/sf_fan.sv; prep -flatten -top sf_fan; design -stash gold
+  read_liberty tests/asic/tiny.lib; read_verilog $work/asic/tiny/netlist/sf_fan/netlist.v; prep -flatten -top sf_fan; design -stash gate
+  design -copy-from gold -as gold sf_fan; design -copy-from gate -as gate sf_fan; equiv_make gold gate both; hierarchy -top both; equiv_simple; equiv_status -assert" >"$work/equal.log" 2>&1 || fail "the netlist with buffers computes something else"
+
 refused() { # STATUS TEXT OPTIONS...
   local status=0
   asic "${@:3}" >/dev/null || status=$?

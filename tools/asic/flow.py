@@ -4,7 +4,7 @@ import os
 import re
 import subprocess
 
-from asic import netlist
+from asic import netlist, repair
 from asic.cells import Cell
 
 BOX_BITS = 2048  # memories with a registered read port and at least so many bits are boxes
@@ -39,7 +39,7 @@ def script_of(module, sources, tap, period_ps, gating):
     lines += ["techmap -map gate.v", "opt -nodffe -nosdff"] * gating
     lines += ["techmap", "opt -fast -nodffe -nosdff", "dfflibmap -liberty cells.lib",
               f"abc -liberty cells.lib -constr abc.constr -script map.abc -D {period_ps}", "opt_clean -purge", "setundef -zero", "splitnets", "autoname",
-              "write_json netlist.json", "write_verilog -noattr -noexpr -nohex -nodec -simple-lhs netlist.v"]
+              "write_json netlist.json"]
     return "\n".join(lines) + "\n"
 
 
@@ -51,6 +51,10 @@ def synthesise(module, parameters, sources, library, folder, period_ps, gating, 
     with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:
         file.write(script_of(module, with_parameters(module, parameters, sources, folder), parameters.get("TAP") != "0", period_ps, gating))
     netlist.run_yosys(module, folder)
+    repair.repair_file(os.path.join(folder, "netlist.json"), library, names)
+    with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:
+        file.write("read_json netlist.json\nwrite_verilog -noattr -noexpr -nohex -nodec -simple-lhs netlist.v\n")
+    netlist.run_yosys(module, folder, "write.log")
     with open(os.path.join(folder, "netlist.v"), encoding="utf-8") as file:
         text = file.read()
     text = re.sub(r"\bsf_memory #\((.*?)\n\s*\) ", memory_kind, text, flags=re.S)

@@ -153,14 +153,14 @@ def write_library(library, folder, period_ps, gating, skipped):
     return names
 
 
-def run_yosys(name, folder):
+def run_yosys(name, folder, log="yosys.log"):
     """Runs folder/synth.ys; raises NetlistError with the tool's own words."""
-    done = subprocess.run(["nice", "-n", "10", "yosys", "-q", "-l", "yosys.log", "synth.ys"], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(["nice", "-n", "10", "yosys", "-q", "-l", log, "synth.ys"], cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        with open(os.path.join(folder, "yosys.log"), encoding="utf-8", errors="replace") as log:
-            errors = [line.strip() for line in log if re.match(r"ABC: (Error|Library .* cannot)", line)]
+        with open(os.path.join(folder, log), encoding="utf-8", errors="replace") as file:
+            errors = [line.strip() for line in file if re.match(r"ABC: (Error|Library .* cannot)", line)]
         errors += [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line] or (done.stderr or done.stdout).splitlines()[-1:]
-        raise NetlistError(f"yosys: {name}: {' '.join(errors[:1])}, see {folder}/yosys.log")
+        raise NetlistError(f"yosys: {name}: {' '.join(errors[:1])}, see {folder}/{log}")
 
 
 def synthesise(piece, sources, library, folder, period_ps, gating, skipped):
