@@ -109,7 +109,8 @@ module sf_cache #(
 
   wire p_x = !(p_split && p_second_q);
   wire p_x1 = !p_split || p_second_q;
-  wire bank0 = p0_q[3], bank1 = p1_q[3];
+  wire bank0 = p0_q[3];
+  wire bank1 = p1_q[3];
   wire [1:0] p_used = {(p_x && bank0) || (p_x1 && bank1), (p_x && !bank0) || (p_x1 && !bank1)};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
