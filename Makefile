@@ -81,7 +81,7 @@ CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
 # Those that drive the Verilated accelerator.
-DUT_TESTS := bench test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
+DUT_TESTS := bench bench_field test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
@@ -157,7 +157,7 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
-$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
+$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
 
 # Prices of technologies, found beside the program.
 TECHS := $(wildcard share/tech/*.tech)
@@ -251,8 +251,11 @@ reproduce-report: all ## table and plots of the runs that are there
 pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
 	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
 
-outputs: all ## puts today's numbers into the outputs that docs/ shows, after make demo on an idle machine (PAGES="docs/kit.md ...")
-	@tests/chain/tutorials.py --print $B $(PAGES)
+outputs: all ## puts today's numbers into the outputs that docs/ shows, after make demo on an idle machine (OUTPUTS="docs/kit.md ...")
+	@tests/chain/tutorials.py --print $B $(OUTPUTS)
+
+speed-error: all ## speed against error after make demo: steps, widths, fits, arithmetic, training time (PROFILE=quick, full, smoke; DATA=): build/speed-error
+	@tools/speed_error.py $B --profile $(PROFILE) $(if $(filter-out file,$(origin DATA)),--data "$(DATA)")
 
 quality: all ## what short runs of eight scenes learn, spiking and twin, beside the last table kept (SCENES=, QUALITY="--keep"): build/quality
 	@tools/quality.sh $B --scenes "$(SCENES)" $(QUALITY)
@@ -281,6 +284,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

@@ -31,11 +31,17 @@ static bool fits(const sf_bus *bus, const sf_ray_blob *rays)
          rays->n_dir <= SF_RAY_DIR_MAX && rays->n_dir == get(bus, SF_CSR_C1_N_IN) - h;
 }
 
-static bool has_cache(const sf_bus *bus, const sf_ray_blob *rays)
+void sf_ray_driver_cache(const sf_bus *bus, uint32_t *bytes, uint32_t *ways)
 {
   const uint32_t cache = get(bus, SF_CSR_FIELD_CACHE);
-  const uint32_t bytes = (cache & SF_CSR_FIELD_CACHE_BYTES) >> SF_CSR_FIELD_CACHE_BYTES_LSB;
-  const uint32_t ways = (cache & SF_CSR_FIELD_CACHE_WAYS) >> SF_CSR_FIELD_CACHE_WAYS_LSB;
+  *bytes = (cache & SF_CSR_FIELD_CACHE_BYTES) >> SF_CSR_FIELD_CACHE_BYTES_LSB;
+  *ways = (cache & SF_CSR_FIELD_CACHE_WAYS) >> SF_CSR_FIELD_CACHE_WAYS_LSB;
+}
+
+static bool has_cache(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  uint32_t bytes, ways;
+  sf_ray_driver_cache(bus, &bytes, &ways);
   return (!rays->cache_bytes || rays->cache_bytes == bytes) && (!rays->cache_ways || rays->cache_ways == ways);
 }
 

@@ -29,6 +29,7 @@ typedef struct sf_field_counters {
 /* After sf_driver_load, whose soft reset has stopped the rays: programming and start. SF_DRIVER_REFUSED: RAY_ERROR;
  * SF_DRIVER_MISFIT: levels or n_dir, which the block does not check; SF_DRIVER_CACHE: it has another cache. */
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays);
+void sf_ray_driver_cache(const sf_bus *bus, uint32_t *bytes, uint32_t *ways); /* of the field, in this build */
 void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters);
 void sf_ray_driver_clear(const sf_bus *bus);
 /* First bit of a RAY_ERROR register as text, "no error" for 0. */

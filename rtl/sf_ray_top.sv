@@ -15,7 +15,11 @@
 `default_nettype none
 
 module sf_ray_top #(
+`ifdef SF_NO_TAP
+    parameter TAP = 0,
+`else
     parameter TAP = 1,
+`endif
     parameter LANES = sf_arch_pkg::LANES,  // these as sf_top's
     parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,
     parameter NEURONS = sf_arch_pkg::NEURONS,
@@ -66,14 +70,17 @@ module sf_ray_top #(
     input  wire [  63:0] m_axi_rdata_i,
     input  wire [   1:0] m_axi_rresp_i,
     input  wire          m_axi_rlast_i,
-    output wire          irq_o,
+    output wire          irq_o
+`ifndef SF_NO_TAP
     // tap of sf_top
+    ,
     output wire          tap_valid_o,
     output wire [   2:0] tap_layer_o,
     output wire [   2:0] tap_step_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_spikes_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_rows_o,
     output wire [24*sf_arch_pkg::LANES-1:0] tap_membrane_o
+`endif
 );
   // ---- registers: 0x400..0x7ff are the rays'
   wire net_awready, net_wready, net_bvalid, net_arready, net_rvalid, net_irq;
@@ -278,13 +285,16 @@ module sf_ray_top #(
       .m_axis_tready_i (result_ready),
       .m_axis_tdata_o  (result),
       .m_axis_tlast_o  (result_last),
-      .irq_o           (net_irq),
+      .irq_o           (net_irq)
+`ifndef SF_NO_TAP
+      ,
       .tap_valid_o     (tap_valid_o),
       .tap_layer_o     (tap_layer_o),
       .tap_step_o      (tap_step_o),
       .tap_spikes_o    (tap_spikes_o),
       .tap_rows_o      (tap_rows_o),
       .tap_membrane_o  (tap_membrane_o)
+`endif
   );
 
   // ---- results: the first beat waits here for the second

@@ -1,11 +1,16 @@
 // The accelerator: AXI4-Lite registers, AXI4-Stream samples in and results out, one clock, one interrupt.
-// Tap ports are for observation only; TAP = 0 removes them. A tap beat shows, for a spiking layer and step, its spikes,
-// the presynaptic rows it added up and its membranes after reset; for D2 and C3 (step 0) the rows alone.
+// Tap ports are for observation only; TAP = 0 ties them off, and with the macro SF_NO_TAP they are not there. A tap beat shows,
+// for a spiking layer and step, its spikes, the presynaptic rows it added up and its membranes after reset; for D2 and C3
+// (step 0) the rows alone.
 `default_nettype none
 `include "sf_refuse.svh"
 
 module sf_top #(
+`ifdef SF_NO_TAP
+    parameter TAP = 0,
+`else
     parameter TAP = 1,
+`endif
     parameter LANES = sf_arch_pkg::LANES,  // neurons of the widest layer: 32, 64, 128 or 256, at most the package's; CONFIG says it
     // How much hardware; ENGINE says it. Results and counts of events do not depend on it.
     parameter MACS = LANES < sf_arch_pkg::MACS ? LANES : sf_arch_pkg::MACS,  // multipliers: LANES, or a half, a quarter of them
@@ -43,16 +48,18 @@ module sf_top #(
     input  wire          m_axis_tready_i,
     output wire [  63:0] m_axis_tdata_o,
     output wire          m_axis_tlast_o,
-    output wire          irq_o,
+    output wire          irq_o
+`ifndef SF_NO_TAP
     // tap
+    ,
     output wire          tap_valid_o,
     output wire [   2:0] tap_layer_o,
     output wire [   2:0] tap_step_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_spikes_o,
     output wire [   sf_arch_pkg::LANES-1:0] tap_rows_o,
     output wire [24*sf_arch_pkg::LANES-1:0] tap_membrane_o
+`endif
 );
-  localparam TAPS = sf_arch_pkg::LANES;  // the tap's ports are as wide as the widest block's
   wire [1:0] mode;
   wire [3:0] steps;
   wire [15:0] exp_mul, sigmoid_mul;
@@ -111,9 +118,17 @@ module sf_top #(
 
   wire [LANES-1:0] tap_spikes, tap_rows;
   wire [24*LANES-1:0] tap_membrane;
+  wire tap_valid;
+  wire [2:0] tap_layer, tap_step;
+`ifdef SF_NO_TAP
+  wire unused_tap_ok = &{1'b0, tap_valid, tap_layer, tap_step, tap_spikes, tap_rows, tap_membrane};
+`else
+  localparam TAPS = sf_arch_pkg::LANES;  // the tap's ports are as wide as the widest block's
+  assign {tap_valid_o, tap_layer_o, tap_step_o} = {tap_valid, tap_layer, tap_step};
   assign tap_spikes_o = TAPS'(tap_spikes);
   assign tap_rows_o = TAPS'(tap_rows);
   assign tap_membrane_o = (24 * TAPS)'(tap_membrane);
+`endif
 
   sf_csr #(
       .LANES        (LANES),
@@ -283,9 +298,9 @@ module sf_top #(
       .neurons_last_o (neurons_last),
       .neurons_fired_o(neurons_fired),
       .stall_o        (stall_out),
-      .tap_valid_o    (tap_valid_o),
-      .tap_layer_o    (tap_layer_o),
-      .tap_step_o     (tap_step_o),
+      .tap_valid_o    (tap_valid),
+      .tap_layer_o    (tap_layer),
+      .tap_step_o     (tap_step),
       .tap_spikes_o   (tap_spikes),
       .tap_rows_o     (tap_rows),
       .tap_membrane_o (tap_membrane)

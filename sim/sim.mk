@@ -63,7 +63,7 @@ endef
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/bench
+RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/bench tests/bench_field
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
 
@@ -95,6 +95,15 @@ $B/faults/.patched: $(RTL_READY) $(FAULTS)
 	$Qfor p in $(FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
 	@touch $@
 $(eval $(call verilated_rule,$B/faults/verilated,$B/faults,$B/faults/.patched))
+# Those of the ray stream, in a copy of their own.
+RAY_FAULTS := $(sort $(wildcard tests/faults/ray/*.patch))
+$B/faults/ray/.patched: $(RTL_READY) $(RAY_FAULTS)
+	$(call say,PATCH $(@D)/rtl)
+	$Qrm -rf $(@D)/rtl && mkdir -p $(@D) && cp -r $(RTL_ROOT)/rtl $(@D)/rtl
+	$Qfor p in $(RAY_FAULTS); do patch -s -p1 -d $(@D) <$$p || exit 1; done
+	@touch $@
+$(eval $(call verilated_top_rule,$B/faults/ray/verilated,$B/faults/ray,$B/faults/ray/.patched,sf_ray_top,pins_ray))
+FAULTY_RAY_LIBS := $B/faults/ray/verilated/pins_ray.o $B/faults/ray/verilated/Vsf_ray_top__ALL.a
 $B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
@@ -110,7 +119,7 @@ $(C_FAULTY:%.c=$B/faults/c/%.o): $B/faults/c/%.o: $B/faults/c/.patched
 	$(call say,CC    $@)
 	$Q$(CC) $(CFLAGS_ALL) -MMD -MP -c $(@:.o=.c) -o $@
 -include $(C_FAULTY:%.c=$B/faults/c/%.d)
-$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
+$B/faults/energy_audit: $B/obj/tools/energy_audit.o $(C_FAULTY:%.c=$B/faults/c/%.o) $(FAULTY_RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 $B/faults/make_scene: $B/obj/tests/faults/make_scene.o $B/libspikefield.a
@@ -139,6 +148,7 @@ LANES_BUILT := $(if $(findstring LANES=256,$(ARCH_DEFINES)),32 64 128 256,32 64 
 lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
 	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
+	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_ray_top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
@@ -172,10 +182,12 @@ deps-asic: ## install with apt what asic and asic-energy take by default (openst
 	@DEPS="python3 yosys iverilog opensta qflow-tech-osu018" tools/deps.sh
 .PHONY: asic-energy asic deps-asic
 
-# Programs of rays around a block with fewer lanes than the package's: $B/lanes/N/sim_render and sf_soc.
+# Programs of rays around a block with fewer lanes and another cache than the package's: $B/lanes/N/sim_render and sf_soc.
+CACHE_32 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
+CACHE_64 := -GCACHE_BYTES=8192 -GCACHE_WAYS=2
 define lanes_rule
 $(call verilated_top_rule,$B/lanes/$1/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray)
-$B/lanes/$1/ray/Vsf_ray_top.mk: VERILATOR_FLAGS += -GLANES=$1
+$B/lanes/$1/ray/Vsf_ray_top.mk: VERILATOR_FLAGS += -GLANES=$1 $$(CACHE_$1)
 $B/lanes/$1/%: $B/obj/tools/%.o $B/lanes/$1/ray/pins_ray.o $B/lanes/$1/ray/Vsf_ray_top__ALL.a $(DUT_LIBS) $B/libspikefield.a
 	$$(call say,LD    $$@)
 	$$Q$$(CXX) -fopenmp $(SAN) -o $$@ $$^ $(DUT_LDLIBS) $(UNICORN_LIBS) $$(LIBS)

@@ -66,6 +66,7 @@ static void make_report(fixture *f)
   const sf_counted counted = {&f->scene, &r->measure.core, &r->measure.memory, &r->traffic, r->cache};
   ck_ok(sf_ledgers_make(&tech, &counted, &r->ledgers));
   r->three = (sf_three_counts){.rays = (int)r->measure.checked,
+                               .rtl_events = SF_TRAFFIC_AT_PORTS,
                                .core = r->measure.checked_core,
                                .rtl = r->measure.checked_core,
                                .recount = r->measure.recount};

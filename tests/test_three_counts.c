@@ -60,6 +60,7 @@ TEST(hash_grid)
   ck_assert_mem_eq(&still->core_traffic, &still->recount_traffic, sizeof(sf_traffic));
   for (int e = 0; e < SF_TRAFFIC_AT_PORTS; e++)
     ck_assert_uint_eq(still->rtl_traffic.event[e], still->core_traffic.event[e]);
+  ck_assert_int_eq(still->rtl_events, SF_TRAFFIC_AT_PORTS);
   ck_assert_uint_eq(still->core_traffic.lookups, still->core_memory.lookups);
   ck_assert_uint_gt(still->core_traffic.lookups, still->core.samples * 4 * 4); /* four pairs a level at least */
   ck_assert_uint_gt(still->core_traffic.misses, 0);

@@ -300,7 +300,7 @@ static sf_status check_inputs(const options *o)
   sf_technology technology;
   if (o->model) SF_TRY(sf_readable(o->model));
   if (o->audit.twin) SF_TRY(sf_readable(o->audit.twin));
-  return o->tech_b ? sf_audit_technology(&technology, o->tech_b) : sf_ok();
+  return o->tech_b ? sf_technology_find(&technology, o->tech_b) : sf_ok();
 }
 
 static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)

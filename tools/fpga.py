@@ -131,6 +131,8 @@ class Build:
         self.name = name or re.sub(r"[^A-Za-z0-9_]+", "-", text)
         self.folder = os.path.join(os.path.abspath(arguments.build), "fpga", self.name)
         self.result = {"module": self.module, "parameters": self.parameters}
+        # A build without the tap has no ports for it.
+        self.defines = ["SF_NO_TAP"] if self.parameters.get("TAP") == "0" else []
         os.makedirs(self.folder, exist_ok=True)
 
     def copy_rtl(self, root):
@@ -171,7 +173,8 @@ def elaborate(build, sources):
     modules in it."""
     command = ["verilator", "--xml-only", "--xml-output", "ports.xml", "--Mdir", ".", "-Wno-fatal", "-Wno-lint", "-Irtl", "--unroll-count",
                "256", "--unroll-stmts", "1000000", "--top-module", build.module]
-    command += [f"-G{name}={value}" for name, value in build.parameters.items()] + sources
+    command += [f"-G{name}={value}" for name, value in build.parameters.items()]
+    command += [f"+define+{name}" for name in build.defines] + sources
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=build.folder)
     if done.returncode != 0:
         raise Stop("verilator: " + next((line for line in done.stderr.splitlines() if "Error" in line), done.stderr[-200:]))
@@ -222,7 +225,8 @@ def synthesise(build, tools, ports, sources, key, say):
             file.write(wrapper_of(build, ports))
         say(f"{build.name}: synthesis")
         started = time.monotonic()
-        script = (f"read_verilog -sv -defer -Irtl {' '.join(sources)} wrapper.v; "
+        defines = "".join(f"-D {name} " for name in build.defines)
+        script = (f"read_verilog -sv -defer {defines}-Irtl {' '.join(sources)} wrapper.v; "
                   f"synth_ecp5 -top fpga_wrapper -json netlist.json; stat -json")
         tools.run("yosys", ["-p", script], build.path("yosys.log"), build.folder)
         say(f"{build.name}: synthesis took {time.monotonic() - started:.0f} s")

@@ -257,23 +257,23 @@ static sf_status run(options *o, const char *scene, const char *data)
   return status;
 }
 
-int main(int argc, char **argv)
+enum { OPTIONS_MAX = 32 };
+
+static sf_option *runs(options *o, sf_option *list)
 {
-  options o = {.run = {.rays = 200, .seed = 1, .stall_percent = 20}, .activity = {.last = UINT64_MAX}};
-  sf_lockstep_options *r = &o.run;
-  const char *positional[2];
+  sf_lockstep_options *r = &o->run;
   const sf_option table[] = {
       SF_GROUP("A first run"),
       {"--rays", 0, SF_ARG_INT, &r->rays, 1, 1e9, NULL, "N", "random rays over the views (default 200)"},
       {"--seed", 0, SF_ARG_U64, &r->seed, 0, 0x1p53, NULL, "S",
        "seed of rays, stalls and register contents at power-on (default 1)"},
-      {"--split", 0, SF_ARG_CHOICE, &o.split, 0, 0, "test|train", NULL, "which views the rays are of (default test)"},
+      {"--split", 0, SF_ARG_CHOICE, &o->split, 0, 0, "test|train", NULL, "which views the rays are of (default test)"},
       {"--stalls", 0, SF_ARG_INT, &r->stall_percent, 0, 90, NULL, "P",
        "percent of cycles with a bubble or back-pressure (default 20)"},
       {"--limit-samples", 0, SF_ARG_U64, &r->limit, 0, 0x1p53, NULL, "N",
        "stop after N samples; the unit of work (--block) that has begun is finished"},
-      {"--json", 0, SF_ARG_FLAG, &o.json, 0, 0, NULL, NULL, "print one JSON object"},
-      {"--quiet", 'q', SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
+      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "print one JSON object"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       SF_GROUP("Long runs"),
       {"--jobs", 0, SF_ARG_INT, &r->jobs, 1, SF_JOBS_MAX, NULL, "N",
        "processes; the result does not depend on it (default 1)"},
@@ -284,27 +284,42 @@ int main(int argc, char **argv)
       SF_GROUP("A difference and its evidence"),
       {"--evidence", 0, SF_ARG_STRING, &r->evidence, 0, 0, NULL, "PREFIX",
        "write a difference to PREFIX.json and PREFIX.fst, the next one to PREFIX-2 (default sf_cosim-difference)"},
-      {"--replay", 0, SF_ARG_INPUT, &o.replay, 0, 0, NULL, "FILE",
+      {"--replay", 0, SF_ARG_INPUT, &o->replay, 0, 0, NULL, "FILE",
        "run the samples of a difference again, from its .json and on the block that differed; writes PREFIX.fst "
        "(default sf_cosim-replay)"},
-      {"--junit", 0, SF_ARG_OUTPUT, &o.junit, 0, 0, NULL, "FILE", "the result as JUnit XML"},
+      {"--junit", 0, SF_ARG_OUTPUT, &o->junit, 0, 0, NULL, "FILE", "the result as JUnit XML"}};
+  return sf_cli_add(list, table, sizeof table / sizeof *table);
+}
+
+static sf_option *activity_and_blocks(options *o, sf_option *list)
+{
+  const sf_option table[] = {
       SF_GROUP("Switching activity"),
-      {"--saif", 0, SF_ARG_OUTPUT, &o.activity.saif, 0, 0, NULL, "FILE",
+      {"--saif", 0, SF_ARG_OUTPUT, &o->activity.saif, 0, 0, NULL, "FILE",
        "stream all samples through one accelerator and write how often each net switched (docs/activity.md)"},
-      {"--vcd", 0, SF_ARG_OUTPUT, &o.activity.vcd, 0, 0, NULL, "FILE",
+      {"--vcd", 0, SF_ARG_OUTPUT, &o->activity.vcd, 0, 0, NULL, "FILE",
        "stream them likewise and write every change of every net"},
-      {"--window", 0, SF_ARG_STRING, &o.window, 0, 0, NULL, "FIRST,LAST",
+      {"--window", 0, SF_ARG_STRING, &o->window, 0, 0, NULL, "FIRST,LAST",
        "cycles that --saif and --vcd cover (default all)"},
-      {"--depth", 0, SF_ARG_INT, &o.activity.depth, 0, 64, NULL, "N",
+      {"--depth", 0, SF_ARG_INT, &o->activity.depth, 0, 64, NULL, "N",
        "levels of the hierarchy for --saif and --vcd, the top is 1 (default 0: all)"},
-      {"--clock", 0, SF_ARG_DOUBLE, &o.activity.clock_mhz, 0.1, 1e5, NULL, "MHZ", "clock of their times (default 200)"},
+      {"--clock", 0, SF_ARG_DOUBLE, &o->activity.clock_mhz, 0.1, 1e5, NULL, "MHZ",
+       "clock of their times (default 200)"},
       SF_GROUP("Planted faults, other blocks"),
-      {"--plusarg", 0, SF_ARG_STRING, &r->plusarg, 0, 0, NULL, "ARG",
+      {"--plusarg", 0, SF_ARG_STRING, &o->run.plusarg, 0, 0, NULL, "ARG",
        "hand ARG to the simulation, such as +fault=1 in a build with planted faults; at most 63 characters"},
-      {"--dut", 0, SF_ARG_STRING, &o.dut, 0, 0, NULL, "FILES",
+      {"--dut", 0, SF_ARG_STRING, &o->dut, 0, 0, NULL, "FILES",
        "another block with the ports of rtl/sf_top.sv: Verilog sources, options of Verilator, -F LIST (docs/kit.md)"},
-      {"--dut-top", 0, SF_ARG_STRING, &o.dut_top, 0, 0, NULL, "NAME", "its module (default sf_top)"},
-      {0}};
+      {"--dut-top", 0, SF_ARG_STRING, &o->dut_top, 0, 0, NULL, "NAME", "its module (default sf_top)"}};
+  return sf_cli_add(list, table, sizeof table / sizeof *table);
+}
+
+int main(int argc, char **argv)
+{
+  options o = {.run = {.rays = 200, .seed = 1, .stall_percent = 20}, .activity = {.last = UINT64_MAX}};
+  const char *positional[2];
+  sf_option table[OPTIONS_MAX];
+  *activity_and_blocks(&o, runs(&o, table)) = (sf_option){0};
   const sf_cli cli = {.program = "sf_cosim",
                       .usage = "sf_cosim SCENE.snn DATA [options]\n       sf_cosim --replay FILE",
                       .summary = "Run the Verilog accelerator and the fixed-point core on the same samples and compare "

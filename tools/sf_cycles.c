@@ -1,7 +1,7 @@
 /* sf_cycles: how long the accelerator takes for a frame, from the cycle model. */
 #include "energy/energy.h"
 #include "cli/cli.h"
-#include "cycles/cycles.h"
+#include "cycles/explore.h"
 #include "base/text.h"
 #include "quant/quant.h"
 #include "base/io.h"
@@ -21,17 +21,12 @@ static const sf_engine builds[BUILDS] = {
 
 typedef struct options {
   sf_engine engine;
-  bool builds;
-  const char *scene, *data, *split, *plot;
+  bool builds, explore;
+  const char *scene, *data, *split, *plot, *tech;
   int view, downscale, threads;
   double clock;
   bool json, quiet;
 } options;
-
-typedef struct shapes {
-  sf_cycle_sample *at;
-  size_t count, room;
-} shapes;
 
 typedef struct job {
   options opt;
@@ -45,51 +40,22 @@ typedef struct job {
 
 /* ---- samples of a row of pixels ---- */
 
-typedef struct tap {
-  const fx_net *net;
-  shapes *to;
-  int32_t base[SF_LANES];
-  fx_trace trace;
-} tap;
-
-static sf_status take(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+static sf_status trace_row(const job *j, int y, sf_cycle_record *row)
 {
-  tap *t = user;
-  fx_net_next(t->net, ray->dir, first, f, t->base, out, &t->trace, NULL);
-  if (t->to->count == t->to->room) {
-    const size_t room = t->to->room ? 2 * t->to->room : 4096;
-    sf_cycle_sample *larger = realloc(t->to->at, room * sizeof *larger);
-    if (!larger) return sf_fail(SF_E_MEMORY, "no memory for the samples of a row");
-    t->to->at = larger, t->to->room = room;
-  }
-  t->to->at[t->to->count++] = sf_cycle_sample_make(t->net, &t->trace, first);
-  return sf_ok();
-}
-
-static sf_status trace_row(const job *j, int y, shapes *row)
-{
-  const sf_camera *camera = &j->data.view[0].camera;
-  tap *t = malloc(sizeof *t);
-  if (!t) return sf_fail(SF_E_MEMORY, "no memory for a row");
-  t->net = &j->scene.net, t->to = row;
+  const sf_view *view = &j->data.view[0];
   sf_status status = sf_ok();
-  for (int x = 0; x < camera->width && status.code == SF_OK; x++) {
-    float origin[3], direction[3];
+  for (int x = 0; x < view->camera.width && status.code == SF_OK; x++) {
     fx_ray ray;
-    fx_pixel pixel;
-    fx_counts counts = {0};
-    sf_dataset_ray(&j->data, &j->data.view[0], (float)x + 0.5f, (float)y + 0.5f, origin, direction);
-    status = sf_fx_ray_make(&j->scene, origin, direction, &ray);
-    if (status.code == SF_OK) status = fx_render_ray(&j->scene, &ray, take, t, &pixel, &counts);
+    status = sf_pixel_ray(&j->scene, &j->data, view, x, y, &ray);
+    if (status.code == SF_OK) status = sf_cycle_record_ray(row, &j->scene, &ray);
   }
-  free(t);
   return status;
 }
 
 static sf_status run_frame(job *j)
 {
   const int height = j->data.view[0].camera.height;
-  shapes row[BAND] = {0};
+  sf_cycle_record row[BAND] = {{.at = NULL}};
   sf_status status = sf_ok();
   for (int y = 0; y < height && status.code == SF_OK; y += BAND) {
     const int n = height - y < BAND ? height - y : BAND;
@@ -120,7 +86,7 @@ static sf_status run_frame(job *j)
   }
   sf_cycle_model_drain(j->model);
   for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_drain(j->other[b]);
-  for (int i = 0; i < BAND; i++) free(row[i].at);
+  for (int i = 0; i < BAND; i++) sf_cycle_record_free(&row[i]);
   return status;
 }
 
@@ -296,6 +262,43 @@ static sf_status make_models(job *j)
   return made ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the cycle model");
 }
 
+/* ---- other builds, in time and energy ---- */
+
+static bool explore_tick(void *user, const char *what, int done, int total)
+{
+  job *j = user;
+  if (sf_progress_due(&j->progress)) sf_progress_show(&j->progress, "%s: %d of %d", what, done, total);
+  return !sf_cli_interrupted();
+}
+
+static sf_status show_explored(const job *j, const sf_explore *e)
+{
+  if (j->opt.plot) SF_TRY(sf_plot_explored(j->opt.plot, e, j->opt.clock));
+  if (j->opt.json) return sf_json_print(sf_explore_json(e, j->opt.clock), true);
+  printf("%s, view %d, t_r = %d: ", j->opt.data, j->opt.view, j->scene.net.steps);
+  sf_explore_print(stdout, e, j->opt.clock);
+  return sf_ok();
+}
+
+static sf_status explore(job *j)
+{
+  sf_technology technology;
+  sf_explore *e;
+  SF_TRY(sf_technology_find(&technology, j->opt.tech ? j->opt.tech : "45nm"));
+  const sf_explore_job how = {.scene = &j->scene,
+                              .data = &j->data,
+                              .view = &j->data.view[0],
+                              .technology = &technology,
+                              .tick = explore_tick,
+                              .user = j};
+  sf_progress_begin(&j->progress, j->opt.quiet);
+  sf_status status = sf_explore_run(&how, &e);
+  sf_progress_end(&j->progress);
+  if (status.code == SF_OK) status = show_explored(j, e);
+  free(e);
+  return status;
+}
+
 static sf_status run(job *j)
 {
   char name[256];
@@ -307,6 +310,7 @@ static sf_status run(job *j)
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has fewer %s views", j->opt.view, j->opt.data,
                    j->opt.split);
+  if (j->opt.explore) return explore(j);
   SF_TRY(make_models(j));
   sf_progress_begin(&j->progress, j->opt.quiet);
   const sf_status status = run_frame(j);
@@ -316,6 +320,15 @@ static sf_status run(job *j)
   if (j->opt.json) return print_json(j);
   print_text(j);
   return sf_ok();
+}
+
+/* Options that nothing would read. */
+static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
+{
+  static const char *const one[] = {"--macs", "--neurons", "--steps-at-once", "--builds", NULL}, *const tech[] = {
+                                                                                                     "--tech", NULL};
+  if (!o->explore) return sf_cli_refuse(cli, argc, argv, tech, "has no effect: it goes with --explore");
+  return sf_cli_refuse(cli, argc, argv, one, "has no effect beside --explore, which takes all");
 }
 
 int main(int argc, char **argv)
@@ -335,10 +348,14 @@ int main(int argc, char **argv)
        "steps that C2 sums up side by side (likewise)"},
       {"--builds", 0, SF_ARG_FLAG, &o->builds, 0, 0, NULL, NULL,
        "also print builds that work on a quarter, a half or all of the lanes at once"},
+      {"--explore", 0, SF_ARG_FLAG, &o->explore, 0, 0, NULL, NULL,
+       "time against energy over MACs, neuron units, steps at once and caches: the Pareto front"},
+      {"--tech", 0, SF_ARG_INPUT, &o->tech, 0, 0, NULL, "FILE",
+       "of --explore: prices, a file or a name (default 45nm)"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
-       "gnuplot script of frames per second over clock and cores; gnuplot writes NAME.svg"},
+       "gnuplot script of frames per second, or of what was explored; gnuplot writes NAME.svg"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const sf_cli cli = {.program = "sf_cycles",
@@ -350,13 +367,15 @@ int main(int argc, char **argv)
                       .examples = "  sf_cycles scene.snn data --view 3\n"
                                   "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
                                   "  sf_cycles scene.snn data --builds\n"
-                                  "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n",
+                                  "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n"
+                                  "  sf_cycles scene.snn data --explore --plot builds.gp\n",
                       .options = table,
                       .min_positional = 2,
                       .max_positional = 2};
   const char *positional[2] = {NULL, NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
   o->scene = positional[0], o->data = positional[1];
+  if (status.code == SF_OK) status = check_effect(o, &cli, argc, argv);
   if (status.code == SF_OK && o->threads) omp_set_num_threads(o->threads);
   if (status.code == SF_OK) status = run(&j);
   sf_cycle_model_free(j.model);

@@ -17,7 +17,7 @@ typedef struct options {
   int view, backend, downscale, steps, threads;
   uint64_t seed;
   double scale;
-  const char *scene, *data, *output, *png, *model, *split, *crop, *verify;
+  const char *scene, *data, *output, *png, *model, *split, *crop, *verify, *kernels;
   bool all, json, quiet;
 } options;
 
@@ -62,6 +62,7 @@ static sf_status open_studio(job *j)
 {
   const options *o = &j->opt;
   const sf_studio_options how = {.backend = (sf_backend)o->backend,
+                                 .kernels = o->kernels,
                                  .scene = o->scene,
                                  .data = o->data,
                                  .split = o->split,
@@ -259,6 +260,7 @@ static sf_status check_backend(options *o)
 {
   SF_TRY(refuse(o->model && o->backend != SF_BACKEND_FLOAT, "--model", "needs --backend float"));
   SF_TRY(refuse(o->seed != NO_SEED && o->backend != SF_BACKEND_RTL, "--seed", "needs --backend rtl"));
+  SF_TRY(refuse(o->kernels && o->backend != SF_BACKEND_FIXED, "--kernels", "needs --backend fixed"));
   if (o->seed == NO_SEED) o->seed = SEED;
   return sf_ok();
 }
@@ -302,6 +304,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
       {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "for float (default model.safetensors beside the scene)"},
+      {"--kernels", 0, SF_ARG_STRING, &o->kernels, 0, 0, NULL, "NAME",
+       "instructions of fixed: portable, avx2, avx512vnni or amx (default: the fastest here); the result is the same"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N",
        "threads, at most one a processor (default: all processors)"},
       SF_GROUP("Tuning"),

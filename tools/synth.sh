@@ -98,13 +98,13 @@ exists_for() { # MODULE LANES
 
 # Weights are meant for block RAM; without the attribute yosys weighs a memory of few rows as LUT RAM.
 synthesise() { # MODULE LANES RESULT
-  local log=$3.log parameters='' started=$SECONDS
+  local log=$3.log parameters='' defines='' started=$SECONDS
   if grep -qE '^ *parameter +(integer +|int +)?LANES\b' "rtl/$1.sv"; then parameters="-chparam LANES $2"; fi
   if grep -qE '^ *parameter +(integer +|int +)?MACS\b' "rtl/$1.sv"; then parameters+=" -chparam MACS $(($2 < macs ? $2 : macs))"; fi
-  if [[ $1 = sf_top || $1 = sf_ray_top ]]; then parameters+=" -chparam TAP 0"; fi
+  if [[ $1 = sf_top || $1 = sf_ray_top ]]; then defines="-D SF_NO_TAP"; fi
   local map="synth_xilinx -family xc7 -flatten -noiopad -top $1"
   # shellcheck disable=SC2086
-  if ! nice -n 10 yosys -q -l "$log" -p "read_verilog -sv -defer -Irtl $(echo $packages $sources)
+  if ! nice -n 10 yosys -q -l "$log" -p "read_verilog -sv -defer $defines -Irtl $(echo $packages $sources)
       hierarchy -check -top $1 $parameters; rename -top $1; setattr -set ram_style \"block\" *sf_rows*/m:*
       $map -run begin:coarse; stat; $map -run coarse:
       delete t:FD* t:LD* t:RAMB*; ltp -noff" >/dev/null 2>"$log.err"; then

@@ -89,6 +89,13 @@ bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile)
   return !same;
 }
 
+fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays)
+{
+  uint32_t bytes, ways;
+  sf_ray_driver_cache(sf_dut_driver_bus(rays->dut), &bytes, &ways);
+  return (fx_cache_shape){(int32_t)bytes, (int32_t)ways};
+}
+
 sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field)
 {
   sf_ray_driver_field(sf_dut_driver_bus(rays->dut), field);

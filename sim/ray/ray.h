@@ -57,6 +57,8 @@ sf_status sf_ray_dut_load(sf_ray_dut *rays);
 /* Streams n rays in and n pixels out. A hang is an error that names the cycle. */
 sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
 void sf_ray_dut_close(sf_ray_dut *rays);
+/* Of the field, as the block says: a build may have another one than the package's. */
+fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays);
 /* The field's counters since the block was opened, against those of the core for the same rays. */
 sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field);
 sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl);

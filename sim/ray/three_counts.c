@@ -122,16 +122,13 @@ static sf_status ray_traffic(run *r, uint64_t index, const fx_ray *ray, const fx
   return sf_ok();
 }
 
-/* A cache of another shape than the block's is the core's and the recount's alone. */
-static sf_status compare_all(const sf_three_counts *s, const fx_cache_shape *cache)
+static sf_status compare_all(const sf_three_counts *s)
 {
-  const bool built = cache->bytes == sf_cache_built.bytes && cache->ways == sf_cache_built.ways;
-  const int events = built ? SF_TRAFFIC_AT_PORTS : SF_TRAFFIC_LOOKUP;
   SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
   SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount", SF_TRAFFIC_EVENTS));
   SF_TRY(sf_memory_compare(&s->core_memory, "core", &s->recount_memory, "recount"));
   if (s->no_rtl_traffic) return sf_ok();
-  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", events);
+  return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", s->rtl_events);
 }
 
 static sf_status one_ray(run *r, uint64_t index)
@@ -155,7 +152,7 @@ static sf_status one_ray(run *r, uint64_t index)
   if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, index, &ray, &pixel)));
   const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
   if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, index, &ray, status));
-  return name_ray(r, index, compare_all(s, &r->memory.cache.shape));
+  return name_ray(r, index, compare_all(s));
 }
 
 static sf_status all_rays(run *r)
@@ -173,6 +170,8 @@ static sf_status open_and_run(run *r)
 {
   const fx_scene *scene = r->job->scene;
   const fx_cache_shape *cache = r->job->cache.bytes ? &r->job->cache : &sf_cache_built;
+  const bool built = cache->bytes == sf_cache_built.bytes && cache->ways == sf_cache_built.ways;
+  r->sum->rtl_events = built ? SF_TRAFFIC_AT_PORTS : SF_TRAFFIC_LOOKUP; /* another cache is the core's alone */
   SF_TRY(fx_memory_open(&r->memory, scene, cache));
   SF_TRY(sf_memory_recount_open(&r->lines, scene, cache));
   SF_TRY(sf_dut_open(&r->dut, scene, &r->job->dut));
@@ -183,7 +182,7 @@ static sf_status open_and_run(run *r)
 
 sf_status sf_three_counts_run(const sf_three_job *job, sf_three_counts *counts)
 {
-  *counts = (sf_three_counts){.wanted = counts->wanted, .agreement = sf_ok()};
+  *counts = (sf_three_counts){.wanted = counts->wanted, .rtl_events = SF_TRAFFIC_AT_PORTS, .agreement = sf_ok()};
   if (job->rays == 0) return sf_ok();
   run *r = calloc(1, sizeof *r);
   fx_trace *trace = calloc(1, sizeof *trace);

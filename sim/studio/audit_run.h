@@ -30,8 +30,6 @@ typedef struct sf_audit {
   sf_audit_report report;
 } sf_audit;
 
-/* Reads a file, or the one of that name beside the program: ../share/spikefield/tech/NAME.tech. */
-sf_status sf_audit_technology(sf_technology *technology, const char *name);
 /* Reads the files. Close it whether this fails or not. */
 sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options);
 /* Counts and prices: fills the report. Three counts that differ are in report.three.agreement, not a failure. */

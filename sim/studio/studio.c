@@ -68,6 +68,7 @@ static sf_status render(const sf_studio *studio, sf_shot *shot)
                              .data = &shot->data,
                              .view = shot->view,
                              .window = shot->window,
+                             .kernels = studio->options.kernels,
                              .tick = studio->tick,
                              .user = studio->user};
   if (studio->options.backend == SF_BACKEND_FLOAT) return sf_golden_float(&job, &studio->model, &shot->golden);

@@ -10,11 +10,12 @@ extern const char *const sf_backend_names[]; /* "float", "fixed", "rtl" */
 typedef struct sf_studio_options {
   sf_backend backend;
   const char *scene, *data, *split;
-  const char *model; /* float: NULL = model.safetensors beside the scene */
-  int steps;         /* 0 = the scene's t_r */
-  int downscale;     /* as sf_dataset_options */
-  float scale;       /* model units per world unit, 0 = the scene's */
-  uint64_t seed;     /* rtl: of the random reset values */
+  const char *model;   /* float: NULL = model.safetensors beside the scene */
+  const char *kernels; /* fixed: as sf_golden_job */
+  int steps;           /* 0 = the scene's t_r */
+  int downscale;       /* as sf_dataset_options */
+  float scale;         /* model units per world unit, 0 = the scene's */
+  uint64_t seed;       /* rtl: of the random reset values */
 } sf_studio_options;
 
 typedef struct sf_studio {

@@ -100,8 +100,9 @@ static sf_status all_pixels(const sf_golden_job *job, rtl_eval *e, sf_golden *go
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden)
 {
   rtl_eval e = {.rays = rays, .core = {.net = &job->scene->net, .memory = &e.memory, .lines = &e.lines}};
-  sf_status status = fx_memory_open(&e.memory, job->scene, &sf_cache_built);
-  if (status.code == SF_OK) status = sf_memory_recount_open(&e.lines, job->scene, &sf_cache_built);
+  const fx_cache_shape cache = sf_ray_dut_cache(rays);
+  sf_status status = fx_memory_open(&e.memory, job->scene, &cache);
+  if (status.code == SF_OK) status = sf_memory_recount_open(&e.lines, job->scene, &cache);
   if (status.code == SF_OK) {
     rays->in_tile = false;
     sf_ray_driver_clear(sf_dut_driver_bus(rays->dut));

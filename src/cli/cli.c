@@ -219,6 +219,12 @@ static sf_status take_option(const sf_cli *cli, int argc, char **argv, int *at)
   return set_value(o, value);
 }
 
+sf_option *sf_cli_add(sf_option *to, const sf_option *list, size_t count)
+{
+  memcpy(to, list, count * sizeof *list);
+  return to + count;
+}
+
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional)
 {
   signal(SIGXFSZ, SIG_IGN); /* a limit on file sizes becomes a write error that can be reported and cleaned up */

@@ -3,6 +3,7 @@
 #define SF_CLI_CLI_H
 #include "base/status.h"
 #include <stdbool.h>
+#include <stddef.h>
 
 /* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or
  * what the program itself opens before it works. GROUP: no option but a heading of --help, for those behind it. */
@@ -46,6 +47,9 @@ typedef struct sf_cli {
  * or PLACE that is the same file as another file of the line is one. SF_E_IO: an OUTPUT that cannot be written. Options
  * may follow positionals; --name=value works. Ignores SIGXFSZ, so that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
+
+/* Copies options to `to`; returns the place behind them. So a table may be made in parts. */
+sf_option *sf_cli_add(sf_option *to, const sf_option *list, size_t count);
 
 /* The completion script for bash. */
 void sf_cli_print_completion(const sf_cli *cli);

@@ -42,6 +42,15 @@ void sf_cycle_model_drain(sf_cycle_model *model);
 const sf_cycle_totals *sf_cycle_model_totals(const sf_cycle_model *model);
 void sf_cycle_model_free(sf_cycle_model *model);
 
+/* Samples of rays, one ray behind the other; zero it first. */
+typedef struct sf_cycle_record {
+  sf_cycle_sample *at;
+  size_t count, room;
+} sf_cycle_record;
+/* The ray through the portable core; its samples are added. */
+sf_status sf_cycle_record_ray(sf_cycle_record *record, const fx_scene *scene, const fx_ray *ray);
+void sf_cycle_record_free(sf_cycle_record *record);
+
 /* From sums alone: what the multipliers of D1 and C1, or the busiest layer fed by spikes, need for their rows. */
 uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts, const sf_engine *engine);
 /* Of a dense net of the same sizes: every weight of a sample once, SF_LANES a cycle. */

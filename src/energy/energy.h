@@ -86,8 +86,10 @@ void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 typedef struct sf_three_counts {
   int wanted, rays; /* rays asked for; rays run */
   fx_counts core, rtl, recount;
-  sf_traffic core_traffic, rtl_traffic, recount_traffic; /* rtl: SF_TRAFFIC_AT_PORTS of them */
-  fx_memory_counts core_memory, recount_memory;          /* rays: a list */
+  sf_traffic core_traffic, rtl_traffic, recount_traffic;
+  int rtl_events; /* of the traffic that the accelerator sees: SF_TRAFFIC_AT_PORTS, or fewer with another cache than it
+                     has */
+  fx_memory_counts core_memory, recount_memory; /* rays: a list */
   uint64_t cycles, busy, stalls;
   bool no_rtl_traffic; /* the accelerator has no encoder for this scene's field */
   sf_status agreement; /* SF_E_DIFFERENCE names the first difference */

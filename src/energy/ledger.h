@@ -50,6 +50,8 @@ typedef struct sf_technology {
 
 /* Reads a technology file: docs/energy.md says how to write one. Errors name file, line and key. */
 sf_status sf_technology_load(sf_technology *technology, const char *path);
+/* Reads a file, or the one of that name beside the program: ../share/spikefield/tech/NAME.tech. */
+sf_status sf_technology_find(sf_technology *technology, const char *name);
 /* In fJ, rounded to the nearest. *interpolated (may be NULL) becomes true where no
  * price of the file is for exactly this; it never becomes false. */
 uint64_t sf_price_add(const sf_technology *technology, int bits, bool *interpolated);

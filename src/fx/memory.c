@@ -48,6 +48,7 @@ void fx_memory_read(fx_memory *memory, fx_read what, const uint32_t pos[3])
 {
   uint32_t line[FX_LOOKUPS_ROOM];
   const int n = lines_of(memory, what, pos, line);
+  if (memory->see) memory->see(memory->user, line, n);
   memory->counts.lookups += (uint64_t)n;
   memory->counts.misses +=
       memory->kernels ? memory->kernels->look_up(&memory->cache, line, n) : fx_cache_look_up(&memory->cache, line, n);

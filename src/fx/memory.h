@@ -37,7 +37,9 @@ typedef struct fx_memory {
   uint64_t run; /* runs of rays of one tile so far; 0: no ray yet */
   uint64_t sharing_run, in_group;
   fx_fired seen;
-  fx_log log; /* of a hash grid */
+  fx_log log;                                           /* of a hash grid */
+  void (*see)(void *user, const uint32_t *line, int n); /* NULL, or told of every look-up, position by position */
+  void *user;
 } fx_memory;
 
 /* The scene must outlive it. shape: fx_cache_check. */

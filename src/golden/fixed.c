@@ -73,7 +73,7 @@ static sf_status render_window(const picture *p)
 sf_status sf_golden_fixed(const sf_golden_job *job, sf_golden *golden)
 {
   picture p = {.job = job, .golden = golden, .step_length = sf_golden_step_length(job)};
-  SF_TRY(fx_core_open(&p.core, job->scene, NULL));
+  SF_TRY(fx_core_open(&p.core, job->scene, job->kernels));
   const sf_status status = render_window(&p);
   fx_core_close(p.core);
   return status;

@@ -68,6 +68,7 @@ typedef struct sf_golden_job {
   const sf_dataset *data;
   const sf_view *view; /* of data */
   sf_window window;
+  const char *kernels;                     /* of the fixed-point core, as fx_core_open; NULL: the fastest */
   bool (*tick)(void *user, size_t pixels); /* so many more are done; from one thread at a time; false stops. Or NULL */
   void *user;
 } sf_golden_job;

@@ -17,6 +17,10 @@ sf_status sf_plot_name(const char *path, char name[256]);
 /* Writes the script at path that draws two audits side by side (sf_audits_compare): energy of the ledger with neuron
  * updates by kind, mJ per view. SF_E_USAGE as above, SF_E_IO. */
 sf_status sf_plot_comparison(const char *path, const cJSON *comparison);
+/* Writes the script at path that draws energy over time of all builds, the front, this build and the board's. Errors as
+ * above. */
+typedef struct sf_explore sf_explore;
+sf_status sf_plot_explored(const char *path, const sf_explore *explore, double clock_mhz);
 enum { SF_PLOT_COLOURS = 7 };
 extern const char *const sf_plot_colour[SF_PLOT_COLOURS];
 #endif

@@ -133,3 +133,17 @@ sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shar
     return sf_fail(SF_E_FORMAT, "%s: no field of view: neither fl_x nor camera_angle_x is given", where);
   return parse_matrix(frame->to_world, json, where);
 }
+
+/* Poses in steps of 1/4096: what another compiler makes of them is the same. FNV-1a, folded to 1..10^9. */
+void sf_capture_note_poses(sf_capture *c, int count)
+{
+  uint64_t hash = UINT64_C(0xcbf29ce484222325);
+  for (int f = 0; f < count; f++)
+    for (int i = 0; i < 12; i++) {
+      const double place = fmin(fmax(c->frame[f].to_world[i] * 4096, -1e15), 1e15);
+      uint64_t word = (uint64_t)llrint(place);
+      for (int byte = 0; byte < 8; byte++, word >>= 8) hash = (hash ^ (word & 255)) * UINT64_C(0x100000001b3);
+    }
+  c->listed = count;
+  c->poses = count ? 1 + (int32_t)(hash % 1000000000) : 0;
+}

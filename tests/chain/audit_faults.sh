@@ -39,4 +39,9 @@ expect 8 1 'ray [0-9]+ \(view .*rays: core [0-9]+, accelerator [0-9]+$'
 # The field's cache: the portable core asks once too often, the vector core misses once too often.
 expect 11 1 'ray [0-9]+, sample 0: field look-ups: core [0-9]+, recount [0-9]+$'
 expect 12 1 'ray [0-9]+, field lines missed: vector core [0-9]+, portable core [0-9]+$'
-finish "8 planted miscounts caught and located, none without a fault"
+# The accelerator's cache: its counter of misses is one too high.
+expect 13 1 'ray [0-9]+ \(view .*field lines missed: core [0-9]+, accelerator [0-9]+$'
+core=$(sed -E 's/.*core ([0-9]+), accelerator ([0-9]+)$/\1/' "$work/13.err")
+rtl=$(sed -E 's/.*core ([0-9]+), accelerator ([0-9]+)$/\2/' "$work/13.err")
+[ "$rtl" -eq $((core + 1)) ] || fail "fault 13: the counter is not one too high"
+finish "9 planted miscounts caught and located, none without a fault"

@@ -31,4 +31,30 @@ if command -v gnuplot >/dev/null; then
 else
   echo "gnuplot: not on this machine"
 fi
+# --explore: this build's point is what the audit and the cycle model say, and so is another cache.
+number() { sed -E -n "s/^\\s*\"$1\":\\s*([0-9.e+-]+),?$/\\1/p" "$2" | head -n 1; } # of a report, by its key
+"$build/bin/sf_cycles" scene.snn data --quiet --explore --plot plots/builds.gp --json >explore.json 2>explore.err || fail "--explore: $(cat explore.err)"
+# point BYTES WAYS MACS NEURONS STEPS KEY
+point() {
+  tr -d ' \t\n' <explore.json | grep -oE '\{"macs":[^}]*\}' |
+    grep "\"macs\":$3,\"neurons\":$4,\"steps_at_once\":$5,.*\"cache_bytes\":$1,\"cache_ways\":$2," | sed -E "s/.*\"$6\":([^,}]*).*/\1/"
+}
+for cache in '32768 4' '1024 1' '8192 2'; do
+  read -r bytes ways <<<"$cache"
+  "$build/bin/energy_audit" scene.snn data --view 0 --rtl-rays 0 --recount-rays 1 --cache-bytes "$bytes" --cache-ways "$ways" --quiet --json |
+    tr -d ' \t\n' >audit.json || fail "audit"
+  wanted=$(sed -E 's/.*"key":"neuron"[^{]*"mj_per_view":([^,]*),.*/\1/' audit.json)
+  got=$(point "$bytes" "$ways" 128 16 2 mj_per_frame)
+  awk -v a="$wanted" -v b="$got" 'BEGIN { exit !(a > 0 && (a - b) ^ 2 <= (1e-9 * a) ^ 2) }' || fail "cache $cache: $got mJ, the audit says $wanted"
+done
+wanted=$(number cycles hash.json) got=$(point 32768 4 128 16 2 cycles)
+awk -v a="$wanted" -v b="$got" 'BEGIN { exit !((a - b) ^ 2 < (0.02 * a) ^ 2) }' || fail "explore: $got cycles, the model says $wanted"
+[ "$(grep -c '"this_build":.*true' explore.json)" -eq 1 ] && [ "$(grep -c '"board":.*true' explore.json)" -eq 1 ] || fail "this build, the board"
+[ "$(grep -c '"front":.*true' explore.json)" -ge 1 ] && grep -q 'Pareto front' plots/builds.gp && grep -q 'builds.gp' explore.err || fail "the front"
+"$build/bin/sf_cycles" scene.snn data --quiet --explore --threads 1 --json >one.json && cmp -s explore.json one.json || fail "--explore depends on threads"
+"$build/bin/sf_cycles" scene.snn data --quiet --explore >explore.txt && grep -q 'Pareto front' explore.txt && grep -q "the board's" explore.txt ||
+  fail "--explore as text"
+"$build/bin/sf_cycles" vm.snn data --quiet --explore >explore.txt || fail "--explore of TensoRF"
+"$build/bin/sf_cycles" scene.snn data --tech 45nm >explore.txt 2>plot.err
+[ $? -eq 2 ] && grep -q 'goes with --explore' plot.err || fail "--tech alone: $(cat plot.err)"
 finish "sf_cycles names the layers that there are, and its plot shows its table"

@@ -11,12 +11,13 @@ mutate: $B/libspikefield.a $(UNIT_RUNTIME) ## mutate the RTL's modules and count
 # MUTANT_CHECKERS_GROUP: programs in that folder, in the order in which they run.
 MUTATED_engine := sf_core sf_fed sf_values sf_sums sf_spikes sf_neurons sf_rows sf_counters sf_readout sf_csr sf_top
 MUTATED_lanes := sf_values sf_sums sf_spikes sf_neurons
-MUTATED_ray := sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo sf_sh sf_encoder sf_exp_neg sf_composite sf_ray_track \
-  sf_ray_csr sf_ray_top
+MUTATED_ray := sf_cache sf_cache_tags sf_fetch sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo sf_sh sf_encoder \
+  sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top
 MUTATE_lanes := --lanes
 MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
 MUTANT_CHECKERS_lanes := test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
-MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray_lone test_rtl_ray
+MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray_lone test_rtl_ray_field test_rtl_ray
+$(foreach m,sf_cache sf_cache_tags sf_fetch,$(eval MUTANT_CHECKERS_$m := test_rtl_cache test_rtl_encoder test_rtl_ray_field))
 $(foreach m,sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo,$(eval MUTANT_CHECKERS_$m := test_rtl_grid test_rtl_encoder))
 MUTANT_CHECKERS_sf_sh := test_rtl_sh test_rtl_encoder
 MUTANT_CHECKERS_sf_encoder := test_rtl_encoder test_rtl_ray

@@ -61,6 +61,25 @@ class Module:
                 (self.memories if range_behind else self.vectors if m[2] else self.bits).add(name)
                 if m[1]:
                     self.signed.add(name)
+        for i, token in enumerate(self.tokens):
+            if token[0] in ("wire", "reg"):
+                self.given(i + 1)
+
+    def given(self, i):
+        """The names of a declaration `wire [1:0] a = x, b = y;` of which token i is the first behind `wire`."""
+        signed = self.tokens[i][0] == "signed"
+        i += signed
+        vector = self.tokens[i][0] == "["
+        i = self.match(i) if vector else i
+        while self.tokens[i + 1][0] == "=":
+            name = self.tokens[i][0]
+            (self.vectors if vector else self.bits).add(name)
+            if signed:
+                self.signed.add(name)
+            i = self.until(i + 2, (",", ";"))
+            if self.tokens[i][0] == ";":
+                break
+            i += 1
 
     def match(self, i):
         """Token behind the bracket that closes token i."""
@@ -135,7 +154,7 @@ class Module:
             elif t[i] in "[{" or (t[i] == "(" and t[i - 1] == "case"):
                 i = self.match(i)
             elif t[i] in ("=", "<="):
-                end = self.until(i + 1, (";",))
+                end = self.until(i + 1, (",", ";"))
                 first = i - 1  # of what is given: a name with brackets behind it, or braces
                 while t[first] in ("]", "}"):
                     depth = 0

@@ -31,9 +31,10 @@ def with_parameters(module, parameters, sources, folder):
     return [module + ".sv" if name == source else name for name in sources]
 
 
-def script_of(module, sources, period_ps, gating):
+def script_of(module, sources, tap, period_ps, gating):
+    define = "" if tap else "-D SF_NO_TAP "  # a build without the tap has no ports for it
     lines = ["read_liberty -lib -ignore_miss_func cells.lib", "read_verilog -sv memory_box.v",
-             f"read_verilog -sv -defer -Irtl {' '.join(sources)}", f"hierarchy -check -top {module}",
+             f"read_verilog -sv -defer {define}-Irtl {' '.join(sources)}", f"hierarchy -check -top {module}",
              f"synth -top {module} -run begin:fine", "techmap -map memory.v", "opt -fast -full -nosdff", "memory_map", "opt -undriven -fine -nosdff"]
     lines += ["techmap -map gate.v", "opt -nodffe -nosdff"] * gating
     lines += ["techmap", "opt -fast -nodffe -nosdff", "dfflibmap -liberty cells.lib",
@@ -48,7 +49,7 @@ def synthesise(module, parameters, sources, library, folder, period_ps, gating, 
     with open(os.path.join(folder, "memory.v"), "w", encoding="utf-8") as file:
         file.write(netlist.MEMORY_MAP.replace("!RD_CLK_ENABLE;", f"!RD_CLK_ENABLE || SIZE * WIDTH < {BOX_BITS};"))
     with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:
-        file.write(script_of(module, with_parameters(module, parameters, sources, folder), period_ps, gating))
+        file.write(script_of(module, with_parameters(module, parameters, sources, folder), parameters.get("TAP") != "0", period_ps, gating))
     netlist.run_yosys(module, folder)
     repair.repair_file(os.path.join(folder, "netlist.json"), library, names)
     with open(os.path.join(folder, "synth.ys"), "w", encoding="utf-8") as file:

@@ -144,17 +144,10 @@ static sf_status restore(train_arguments *a, const char **path)
   return status;
 }
 
-/* The hash grid's; with data TensoRF's. */
-static void set_field_defaults(train_arguments *a, const sf_dataset *data)
-{
-  a->train = data ? sf_train_defaults_tensorf(data) : sf_train_defaults();
-  a->theta = (double)a->train.config.theta[0];
-}
-
 /* TensoRF's defaults depend on the data: the options once more, on top of them. */
 static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *data)
 {
-  set_field_defaults(a, data);
+  train_field_defaults(a, data);
   const char *path[1];
   SF_TRY(parse(a, path));
   SF_TRY(finish_options(a));
@@ -185,12 +178,6 @@ sf_status train_settle(train_arguments *a, const sf_dataset *data)
   if (has_planes(a)) SF_TRY(take_tensorf_defaults(a, data));
   settle_space(a, data);
   return sf_ok();
-}
-
-void train_option_defaults(train_arguments *a, const sf_dataset *data)
-{
-  *a = (train_arguments){.output = "model.safetensors", .checkpoint_minutes = 2, .gamma = -1};
-  set_field_defaults(a, data);
 }
 
 void train_defaults(train_arguments *a, int argc, char **argv)

@@ -22,6 +22,7 @@ typedef struct train_arguments {
 
 /* What the options are without being given: with the hash grid, or with TensoRF's planes on data. */
 void train_option_defaults(train_arguments *a, const sf_dataset *data);
+void train_field_defaults(train_arguments *a, const sf_dataset *data); /* only those that depend on the field */
 void train_defaults(train_arguments *a, int argc, char **argv);
 void train_arguments_free(train_arguments *a);
 /* options: TRAIN_OPTIONS_MAX, filled. */

@@ -1,17 +1,10 @@
 /* The options of sf_train, group by group: what a first run needs, tuning, ablations last. */
 #include "tools/train/options.h"
 #include "field/field.h"
-#include <string.h>
 
 /* Behind the help stand the defaults of the two backbones, ingp and tensorf; one alone is both's; # is what
  * train_defaults says. */
 #define COUNT(list) (sizeof(list) / sizeof *(list))
-
-static sf_option *add(sf_option *to, const sf_option *list, size_t count)
-{
-  memcpy(to, list, count * sizeof *list);
-  return to + count;
-}
 
 static sf_option *first_run(train_arguments *a, sf_option *o)
 {
@@ -30,7 +23,7 @@ static sf_option *first_run(train_arguments *a, sf_option *o)
        "same seed, same bits, any thread count (default 1)"},
       {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
       {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *energy(train_arguments *a, sf_option *o)
@@ -52,7 +45,7 @@ static sf_option *energy(train_arguments *a, sf_option *o)
        "start from this trained model, at its t_r, with weights rounded as sf_export does; stage II alone"},
       {"--weight-bits", 0, SF_ARG_INT, &a->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B",
        "of --fine-tune: bits of a weight (default 8)"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *data_and_box(train_arguments *a, sf_option *o)
@@ -69,7 +62,7 @@ static sf_option *data_and_box(train_arguments *a, sf_option *o)
       {"--background", 0, SF_ARG_CHOICE, &a->background, 0, 0, "auto|random|white|black", "KIND",
        "behind transparent pixels and rays that leave the box; auto: random, but white for tensorf on pictures with "
        "alpha (default auto)"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *files(train_arguments *a, sf_option *o)
@@ -85,7 +78,7 @@ static sf_option *files(train_arguments *a, sf_option *o)
       {"--log", 0, SF_ARG_PLACE, &a->log, 0, 0, NULL, "FILE",
        "JSON lines, one per 16 iterations (default OUTPUT.jsonl)"},
       {"--summary", 0, SF_ARG_OUTPUT, &a->summary, 0, 0, NULL, "FILE", "write the closing summary there as JSON, too"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *tuning(train_arguments *a, sf_option *o)
@@ -102,7 +95,7 @@ static sf_option *tuning(train_arguments *a, sf_option *o)
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold\t#"},
       {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
        "how fast the averages of the search forget; what it finds should not hang on it\t#"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *sizes(train_arguments *a, sf_option *o)
@@ -124,7 +117,7 @@ static sf_option *sizes(train_arguments *a, sf_option *o)
       {"--voxels", 0, SF_ARG_INT, &a->train.voxels, 16, 1024, NULL, "N",
        "the finest grid has N^3 voxels; else half the pictures' width, at most 300; NDC: 0.63 of it, at most 640\t-"
        "\tpixels"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static sf_option *ablations(train_arguments *a, sf_option *o)
@@ -147,7 +140,7 @@ static sf_option *ablations(train_arguments *a, sf_option *o)
       {"--no-budget", 0, SF_ARG_FLAG, &a->no_budget, 0, 0, NULL, NULL, "without both (L_budg)"},
       {"--no-distill", 0, SF_ARG_FLAG, &t->no_distill, 0, 0, NULL, NULL, "without L_distill"},
       {"--no-scaling", 0, SF_ARG_FLAG, &t->no_scaling, 0, 0, NULL, NULL, "without max time-step scaling"}};
-  return add(o, list, COUNT(list));
+  return sf_cli_add(o, list, COUNT(list));
 }
 
 static void fill(train_arguments *a, sf_option *o)

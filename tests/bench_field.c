@@ -1,0 +1,137 @@
+/* What the field costs a frame in cycles: the rays of a view, tile by tile, through sf_ray_top with a memory of given
+ * latencies. Every pixel and the field's counts are compared with the core's.
+ * usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]]    EVERY: takes every so-many-th tile */
+#include "energy/energy.h"
+#include "quant/quant.h"
+#include "sim/compare.h"
+#include "sim/ray/ray.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct frame {
+  fx_scene scene;
+  sf_dataset data;
+  fx_memory memory;
+  fx_ray *ray;
+  fx_pixel *core, *rtl;
+  uint64_t *tile;
+  sf_ray_request *request;
+  sf_ray_sample *sample;
+  int rays;
+  uint64_t samples;
+} frame;
+
+static void read_field(void *user, fx_read what, const uint32_t pos[3])
+{
+  fx_memory_read(user, what, pos);
+}
+
+/* Two passes: pixels of the core, then samples of rays that end where the core's did. */
+static sf_status core_rays(frame *f)
+{
+  const fx_watch watch = {read_field, &f->memory};
+  fx_counts counts = {0};
+  for (int i = 0; i < f->rays; i++) {
+    fx_memory_ray(&f->memory, f->tile[i]);
+    SF_TRY(fx_render_watched(&f->scene, &f->ray[i], NULL, NULL, &watch, &f->core[i], &counts));
+  }
+  f->samples = counts.samples;
+  f->sample = calloc(f->samples + 1, sizeof *f->sample);
+  if (!f->sample) return sf_fail(SF_E_MEMORY, "no memory for %" PRIu64 " samples", f->samples);
+  for (int i = 0, at = 0; i < f->rays; at += (int)f->core[i++].samples) {
+    const int n = (int)f->core[i].samples;
+    sf_ray_samples(&f->scene, &f->ray[i], f->sample + at, n);
+    f->request[i] = (sf_ray_request){&f->ray[i], f->sample + at, n, false, i == 0 || f->tile[i] != f->tile[i - 1]};
+  }
+  return sf_ok();
+}
+
+static sf_status tile_rays(frame *f, int left, int top)
+{
+  const sf_view *view = &f->data.view[0];
+  for (int y = top; y < top + FX_TILE && y < view->camera.height; y++)
+    for (int x = left; x < left + FX_TILE && x < view->camera.width; x++, f->rays++) {
+      f->tile[f->rays] = (uint64_t)top << 32 | (uint64_t)left;
+      SF_TRY(sf_pixel_ray(&f->scene, &f->data, view, x, y, &f->ray[f->rays]));
+    }
+  return sf_ok();
+}
+
+static sf_status open_frame(frame *f, const char *scene, const char *data, int view, int every)
+{
+  const sf_dataset_options how = {.first = view, .limit = 1};
+  SF_TRY(fx_scene_load(&f->scene, scene));
+  SF_TRY(fx_scene_need_grid(&f->scene, scene, "bench_field"));
+  SF_TRY(sf_fx_dataset_load(&f->data, &f->scene, scene, data, "test", &how));
+  if (f->data.count == 0) return sf_fail(SF_E_RANGE, "%s: no view %d", data, view);
+  const fx_cache_shape built = {SF_CACHE_BYTES, SF_CACHE_WAYS};
+  SF_TRY(fx_memory_open(&f->memory, &f->scene, &built));
+  const sf_camera *camera = &f->data.view[0].camera;
+  const size_t pixels = (size_t)camera->width * (size_t)camera->height;
+  f->ray = calloc(pixels, sizeof *f->ray), f->tile = calloc(pixels, sizeof *f->tile);
+  f->core = calloc(pixels, sizeof *f->core), f->rtl = calloc(pixels, sizeof *f->rtl);
+  f->request = calloc(pixels, sizeof *f->request);
+  if (!f->ray || !f->tile || !f->core || !f->rtl || !f->request) return sf_fail(SF_E_MEMORY, "no memory for a frame");
+  for (int top = 0, n = 0; top < camera->height; top += FX_TILE)
+    for (int left = 0; left < camera->width; left += FX_TILE)
+      if (n++ % every == 0) SF_TRY(tile_rays(f, left, top));
+  return core_rays(f);
+}
+
+static void close_frame(frame *f)
+{
+  free(f->ray), free(f->tile), free(f->core), free(f->rtl), free(f->request), free(f->sample);
+  fx_memory_close(&f->memory);
+  sf_dataset_free(&f->data);
+  fx_scene_free(&f->scene);
+}
+
+static sf_status measure(frame *f, int latency)
+{
+  sf_ray_dut *rays = NULL;
+  sf_field_counters field;
+  fx_counts counts;
+  uint64_t cycles, busy, starved;
+  SF_TRY(sf_ray_dut_open(&rays, &f->scene, &(sf_dut_options){.seed = 1, .memory_latency = latency}));
+  const uint64_t begin = sf_dut_cycle(rays->dut);
+  sf_status status = sf_ray_dut_run(rays, f->request, f->rays, f->rtl);
+  const uint64_t end = sf_dut_cycle(rays->dut);
+  for (int i = 0; i < f->rays && status.code == SF_OK; i++) status = sf_compare_pixel(&f->core[i], &f->rtl[i], end);
+  if (status.code == SF_OK) status = sf_ray_dut_field(rays, &field);
+  if (status.code == SF_OK) status = sf_compare_field(&f->memory.counts, &field);
+  if (status.code == SF_OK) status = sf_dut_counts(rays->dut, &counts, &cycles, &busy, &starved);
+  sf_ray_dut_close(rays);
+  SF_TRY(status);
+  const double frame = (double)(end - begin), samples = (double)counts.samples;
+  printf("%7d %12.0f %14.2f %12.2f %% %14.4f %10.4f\n", latency, frame, frame / samples,
+         100 * (double)field.stalls / frame, (double)field.lookups / (samples * f->scene.grid.levels * 8),
+         (double)field.misses / (samples * f->scene.grid.levels * 8));
+  return fflush(stdout) ? sf_fail(SF_E_IO, "standard output") : sf_ok();
+}
+
+static sf_status run(frame *f, int argc, char **argv)
+{
+  static const int usual[] = {1, 16, 32, 64, 128};
+  const int given = argc > 5 ? argc - 5 : 0, n = given ? given : (int)(sizeof usual / sizeof *usual);
+  SF_TRY(
+      open_frame(f, argv[1], argv[2], argc > 3 ? atoi(argv[3]) : 0, argc > 4 && atoi(argv[4]) > 0 ? atoi(argv[4]) : 1));
+  printf("%d rays, %" PRIu64 " samples, cache of %d bytes, %d ways\n", f->rays, f->samples, SF_CACHE_BYTES,
+         SF_CACHE_WAYS);
+  printf("latency       cycles  cycles/sample  field stalls  look-ups/entry  misses/entry\n");
+  for (int i = 0; i < n; i++) SF_TRY(measure(f, given ? atoi(argv[5 + i]) : usual[i]));
+  return sf_ok();
+}
+
+int main(int argc, char **argv)
+{
+  frame f = {0};
+  if (argc < 3) {
+    fprintf(stderr, "usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]]\n");
+    return 2;
+  }
+  const sf_status status = run(&f, argc, argv);
+  if (status.code != SF_OK) fprintf(stderr, "bench_field: %s\n", status.message);
+  close_frame(&f);
+  return status.code == SF_OK ? 0 : 1;
+}
