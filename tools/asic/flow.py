@@ -23,7 +23,7 @@ def with_parameters(module, parameters, sources, folder):
     with open(os.path.join(folder, source), encoding="utf-8") as file:
         text = file.read()
     for name, value in parameters.items():
-        text, found = re.subn(rf"(\bparameter\s+(?:integer\s+|int\s+)?{re.escape(name)}\s*=\s*)[^,/\n)]+", rf"\g<1>{value}", text, count=1)
+        text, found = re.subn(rf"(\bparameter\s+(?:integer\s+|int\s+)?{re.escape(name)}\s*=\s*)[^,/\n)]+", rf"\g<1>{value}", text)
         if not found:
             raise FlowError(f"{source}: the module has no parameter {name}")
     with open(os.path.join(folder, module + ".sv"), "w", encoding="utf-8") as file:
