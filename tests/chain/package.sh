@@ -131,6 +131,6 @@ if command -v iverilog >/dev/null; then
   look_of() { first_look "$1" || { cat "$work/out" >"$work/said"; cat "$work/said"; return 1; }; }
   refuses_of() { refuses "$1" sf_ray_top TRANS_FRAC 16; }
   planted rtl/sf_ray_top.sv "s/ \|\| sf_arch_pkg::TRANS_FRAC != 20//" "sf_ray_top takes TRANS_FRAC" refuses_of
-  planted rtl/sf_csr.sv "s/& ~wdata_i\[10:0\]/\& wdata_i[10:0]/" "expected" look_of
+  planted rtl/sf_csr.sv "s/& ~wdata_q\[10:0\]/\& wdata_q[10:0]/" "expected" look_of
 fi
 echo "package: $seen planted faults seen"
