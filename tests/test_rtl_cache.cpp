@@ -6,7 +6,7 @@
 #include "Vsf_cache_8.h"
 #include "tests/rtl_unit_axi.h"
 
-enum { ROOM = 400 }; /* pairs on their way, at most */
+enum { ROOM = 400 /* pairs on their way, at most */, PATIENCE = 20000 /* cycles for a pair */ };
 
 struct hashed_entries : entry_source {
   uint64_t n = 1 << 20;
@@ -85,9 +85,10 @@ template <class module, int bytes, int ways> struct cache_bench {
   uint64_t run(uint64_t pairs)
   {
     const uint64_t end = accepted + pairs, begin = u.cycle;
-    while (done < end) {
+    for (uint64_t last = begin, was = done; done < end; was = done) {
       cycle(accepted < end);
-      ck_assert_uint_lt(u.cycle - begin, pairs * 4000 + 100000);
+      if (done != was) last = u.cycle;
+      ck_assert_msg(u.cycle - last < PATIENCE, "pair %llu does not come", (unsigned long long)done);
     }
     return u.cycle - begin;
   }
