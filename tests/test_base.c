@@ -525,7 +525,7 @@ static sf_status parse(values *v, const char **positional, const char *line)
                                {"--mode", 0, SF_ARG_CHOICE, &v->choice, 0, 0, "hybrid|decay|no-decay", NULL, "a mode"},
                                {"--out", 'o', SF_ARG_STRING, &v->text, 0, 0, NULL, "FILE", "a file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2, false, NULL};
+  const sf_cli cli = {"prog", "prog IN [OUT] [options]", "Does it.", NULL, options, 1, 2, false, NULL, NULL};
   return parse_line(&cli, positional, line);
 }
 
@@ -537,7 +537,7 @@ static sf_status parse_paths(const char *line, const char **positional)
                                {"--start", 0, SF_ARG_INPUT, &start, 0, 0, NULL, "FILE", "an input"},
                                {"--word", 0, SF_ARG_STRING, &word, 0, 0, NULL, "WORD", "no file"},
                                {0}};
-  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2, false, NULL};
+  const sf_cli cli = {"prog", "prog IN", "Does it.", NULL, options, 1, 2, false, NULL, NULL};
   return parse_line(&cli, positional, line);
 }
 
