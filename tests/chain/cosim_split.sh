@@ -102,7 +102,7 @@ cosim part 0 --rays 100000 --block 2 --jobs 2 --limit-samples $limit --checkpoin
 cosim whole 0 --rays 100000 --block 2 --jobs 3 --limit-samples $limit
 cmp -s part.json whole.json || fail "an interrupted run that was continued differs"
 cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
-grep -q "part: checkpoint of another" other.err || fail "another run's checkpoint: $(cat other.err)"
+grep -q "part: this checkpoint is of another" other.err || fail "another run's checkpoint: $(cat other.err)"
 
 # ---- a finished run is continued with more rays, also from a last block that was not full; never with fewer ----
 plain() { "$build/bin/sf_cosim" scene.snn data --quiet "$@" 2>&1; }
@@ -114,7 +114,7 @@ cosim ungrown 0 --rays 40 --block 7
 cmp -s grown.json ungrown.json || fail "a run that was continued with more rays differs: $(diff grown.json ungrown.json | head -n 6)"
 cmp -s grown.part grown.kept && fail "the checkpoint of 40 rays is that of 17"
 cosim shrunk 2 --rays 20 --block 7 --checkpoint grown.part
-grep -q 'grown.part: holds 35 rays, more than --rays 20' shrunk.err || fail "fewer rays: $(cat shrunk.err)"
+grep -q 'grown.part: 35 rays are finished, more than --rays 20' shrunk.err || fail "fewer rays: $(cat shrunk.err)"
 plain --rays 1 --block 1 >one.out
 grep -q '^1 ray (' one.out && grep -q 'samples/s by 1 process,' one.out || fail "one of each: $(cat one.out)"
 

@@ -92,7 +92,7 @@ END
 # ---- what there is, where a name is not known ----
 
 refuses 1 "--tech 7nm: no such file, and no " energy_audit s.snn data --rays 1 --rtl-rays 0 --tech 7nm -q
-grep -q "share/spikefield/tech/7nm.tech; names there: 45nm (or give a file)" err.txt || fail "--tech does not list its names: $(cat err.txt)"
+grep -q "share/spikefield/tech/7nm.tech; names there: 45nm, osu018, sky130 (or give a file)" err.txt || fail "--tech does not list its names: $(cat err.txt)"
 cp -r data nan && sed -i '0,/\[\[*[-0-9.e]*,/s/\(\[\[*\)[-0-9.e]*,/\1NaN,/' nan/transforms_test.json
 refuses 1 "NaN is not JSON: a number must stand here" sf_data nan
 grep -qE 'nan/transforms_test.json:[0-9]+:[0-9]+: ' err.txt || fail "NaN is not located: $(cat err.txt)"
