@@ -73,9 +73,10 @@ sf_traffic sf_traffic_recount(const fx_scene *scene, const fx_counts *recount, c
     t.places = field_samples + samples;
     t.special = field_samples + samples * waves(field);
   } else {
-    t.places = samples * (uint64_t)scene->grid.levels;
-    t.table_bytes = t.places * CORNERS * entry;
-    t.products = t.places * CORNERS * FX_GRID_FEATURES;
+    const uint64_t places = samples * (uint64_t)scene->grid.levels;
+    t.places = places;
+    t.table_bytes = places * CORNERS * entry;
+    t.products = places * CORNERS * FX_GRID_FEATURES;
     t.exp_neg = samples;
     t.harmonics = recount->rays;
   }

@@ -1,6 +1,7 @@
 /* The core's types and the public ones: equal layouts, which the compiler proves; copied, so that neither header needs
  * the other. */
 #include "energy/energy.h"
+#include "spikefield/event.def"
 #include "src/lib/internal.h"
 #include <string.h>
 
