@@ -8,7 +8,6 @@ recorded from a scene, and has to compute what the RTL did. Every edge of every 
 library's own tables."""
 import argparse
 import glob
-import hashlib
 import json
 import os
 import re
@@ -17,20 +16,11 @@ import subprocess
 import sys
 import time
 
-from asic import bench, energy, liberty, netlist, pieces, record, tech
+from asic import bench, defaults, energy, liberty, netlist, pieces, record, tech
+from hdl_flow import Stop, digest, hash_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-DEFAULT = "/usr/share/qflow/tech/osu018/osu018_stdcells.lib"
-SKIPPED = ["lpflow", "probe", "sparecell", "dly"]  # of sky130: cells for more than one supply, for probing, for delay
 CLOCK = "sf_top.clk_i"
-
-
-class Stop(Exception):
-    """An error that a user can act on, and the exit status."""
-
-    def __init__(self, message, status=1):
-        super().__init__(message)
-        self.status = status
 
 
 def parse_arguments():
@@ -46,7 +36,7 @@ def parse_arguments():
   tools/asic_energy.py build --liberty my.lib --name mine --node 65 --cycles 4000
   build/bin/energy_audit build/demo/scene.snn build/demo/scene --tech build/asic/osu018/osu018.tech""")
     parser.add_argument("build", help="build folder: bin/sf_cosim records the operands")
-    parser.add_argument("--liberty", default=DEFAULT, metavar="FILE", help=f"cells: .lib or .lib.gz (default {DEFAULT})")
+    parser.add_argument("--liberty", default=defaults.LIBERTY, metavar="FILE", help=f"cells: .lib or .lib.gz (default {defaults.LIBERTY})")
     parser.add_argument("--name", metavar="NAME", help="of the technology (default: the library's)")
     parser.add_argument("--node", type=float, metavar="NM", help="feature size, to which published memory prices are scaled (default: 180 of "
                         "osu018, 130 of sky130)")
@@ -55,7 +45,7 @@ def parse_arguments():
     parser.add_argument("--cycles", type=int, default=1500, metavar="N", help="cycles to record, from a stream's first on (default 1500)")
     parser.add_argument("--clock", type=float, default=50, metavar="MHZ", help="clock of the netlists (default 50)")
     parser.add_argument("--gating", choices=["on", "off"], default="on", help="registers with an enable: a gated clock, or a multiplexer (default on)")
-    parser.add_argument("--skip", action="append", metavar="PATTERN", help=f"cells that are not used (default {' '.join(SKIPPED)})")
+    parser.add_argument("--skip", action="append", metavar="PATTERN", help=f"cells that are not used (default {' '.join(defaults.SKIPPED)})")
     parser.add_argument("--blocks", default="", metavar="\"NAME...\"", help="these alone, without a technology file")
     parser.add_argument("--rtl", default=os.path.join(HERE, ".."), metavar="DIR", help="folder that holds rtl/ (default: the project's)")
     parser.add_argument("--json", action="store_true", help="print the JSON instead of the tables")
@@ -70,34 +60,11 @@ def parse_arguments():
     return arguments
 
 
-def digest(*parts):
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
-
-
-def text_of(path):
-    with open(path, "rb") as file:
-        return hashlib.sha256(file.read()).hexdigest()
-
-
-def sources_of(root):
-    """RTL files, packages first, then the wrappers of this tool."""
-    listed = [os.path.join("rtl", "gen", name) for name in sorted(os.listdir(os.path.join(root, "rtl", "gen"))) if name.endswith(".sv")]
-    listed += [os.path.join("rtl", name) for name in sorted(os.listdir(os.path.join(root, "rtl"))) if name.endswith(".sv")]
-    listed.sort(key=lambda name: not name.endswith("_pkg.sv"))
-    return listed + sorted(glob.glob(os.path.join(HERE, "asic", "*.sv")))
-
-
 def version_of(tool, *options):
     if not shutil.which(tool):
         raise Stop(f"{tool} is not installed (make deps)", 77)
     done = subprocess.run([tool, *options], capture_output=True, text=True, check=False)
     return (done.stdout + done.stderr).splitlines()[0].strip()
-
-
-def write(path, text):
-    with open(path + ".aside", "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(path + ".aside", path)
 
 
 class Work:
@@ -108,16 +75,14 @@ class Work:
         self.root = os.path.abspath(arguments.rtl)
         self.build = os.path.abspath(arguments.build)
         self.started = time.monotonic()
-        self.skipped = arguments.skip or SKIPPED
+        self.skipped = arguments.skip or defaults.SKIPPED
         self.period = round(1e6 / arguments.clock)
         self.scene = os.path.abspath(arguments.scene or os.path.join(self.build, "demo", "scene.snn"))
         self.data = os.path.abspath(arguments.data or os.path.join(self.build, "demo", "scene"))
         self.tools = {"yosys": version_of("yosys", "-V"), "iverilog": version_of("iverilog", "-V"), "sta": shutil.which("sta")}
         if not os.path.exists(os.path.join(self.root, "rtl", "sf_top.sv")):
             raise Stop(f"{self.root}/rtl/sf_top.sv is not there")
-        if not os.path.exists(arguments.liberty):
-            missing, own = f"{arguments.liberty}: not there", arguments.liberty == DEFAULT
-            raise Stop(missing + ("; it is in Debian's package qflow-tech-osu018 (make deps-asic)" if own else ""), 77 if own else 1)
+        defaults.must_exist(arguments.liberty)
         if not os.path.exists(self.scene):
             raise Stop(f"{self.scene}: not there; make demo makes it, or name another with SCENE= and DATA=")
         self.library = liberty.Library(arguments.liberty)
@@ -132,7 +97,8 @@ class Work:
             print("asic-energy: " + text, file=sys.stderr, flush=True)
 
     def sources(self):
-        return sources_of(self.root)
+        """RTL files, packages first, then the wrappers of this tool."""
+        return sources_of(self.root) + sorted(glob.glob(os.path.join(HERE, "asic", "*.sv")))
 
     def files_of(self, module):
         """Files of a module and of all that it names, in order of their names."""
@@ -149,10 +115,10 @@ class Work:
 
     def key(self, piece):
         """Of all that a block's result comes from: steps of this tool, the RTL that it uses, library, scene, options."""
-        recipe = [text_of(path) for path in sorted(glob.glob(os.path.join(HERE, "asic", "*.py"))) if not path.endswith(("tech.py", "pieces.py"))]
-        rtl = [text_of(path) for path in self.files_of(piece.module)]
+        recipe = [hash_of(path) for path in sorted(glob.glob(os.path.join(HERE, "asic", "*.py"))) if not path.endswith(("tech.py", "pieces.py"))]
+        rtl = [hash_of(path) for path in self.files_of(piece.module)]
         a = self.arguments
-        return digest(*recipe, *rtl, hashlib.sha256(self.library.text.encode()).hexdigest(), text_of(self.scene), piece.words(), str(a.cycles),
+        return digest(*recipe, *rtl, digest(self.library.text), hash_of(self.scene), piece.words(), str(a.cycles),
                       str(a.clock), a.gating, *self.skipped, self.tools["yosys"], self.tools["iverilog"])
 
 
@@ -252,14 +218,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (liberty.LibertyError, netlist.NetlistError, bench.BenchError, record.RecordError) as error:
-        print("asic-energy: " + str(error), file=sys.stderr)
-        sys.exit(1)
-    except Stop as stop:
-        print("asic-energy: " + str(stop), file=sys.stderr)
-        sys.exit(stop.status)
-    except KeyboardInterrupt:
-        print("asic-energy: interrupted; what is finished is kept", file=sys.stderr)
-        sys.exit(130)
+    run("asic-energy", main, (liberty.LibertyError, netlist.NetlistError, bench.BenchError, record.RecordError))

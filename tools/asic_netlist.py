@@ -4,7 +4,6 @@
 usage: asic_netlist.py BUILD [options]      `make asic` calls it; --help has examples"""
 import argparse
 import glob
-import hashlib
 import json
 import os
 import re
@@ -13,20 +12,11 @@ import subprocess
 import sys
 import time
 
-from asic import flow, liberty, netlist, tech
+from asic import defaults, flow, liberty, netlist, tech
+from hdl_flow import Stop, digest, hash_of, module_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-DEFAULT = "/usr/share/qflow/tech/osu018/osu018_stdcells.lib"
-SKIPPED = ["lpflow", "probe", "sparecell", "dly"]
 TOP = "sf_ray_top:TAP=0,MACS=64,NEURONS=8"
-
-
-class Stop(Exception):
-    """An error that a user can act on, and the exit status."""
-
-    def __init__(self, message, status=1):
-        super().__init__(message)
-        self.status = status
 
 
 def parse_arguments():
@@ -40,13 +30,13 @@ def parse_arguments():
   make asic LIBERTY=../shared/data/liberty/sky130hd_tt.lib.gz MODULES="sf_core:TAP=0" MHZ=100
   tools/asic_netlist.py build --modules "sf_plif sf_readout" --json""")
     parser.add_argument("build", help="build folder")
-    parser.add_argument("--liberty", default=DEFAULT, metavar="FILE", help=f"cells: .lib or .lib.gz (default {DEFAULT})")
+    parser.add_argument("--liberty", default=defaults.LIBERTY, metavar="FILE", help=f"cells: .lib or .lib.gz (default {defaults.LIBERTY})")
     parser.add_argument("--name", metavar="NAME", help="of the technology (default: the library's)")
     parser.add_argument("--modules", default=TOP, metavar="\"NAME[:PARAMETER=N,...] ...\"", help=f"build these (default {TOP})")
     parser.add_argument("--clock", type=float, default=50, metavar="MHZ", help="the clock that is aimed at (default 50)")
     parser.add_argument("--gating", choices=["on", "off", "auto"], default="auto",
                         help="registers with an enable: a gated clock, or a multiplexer (default: gated where the library has a cell for it)")
-    parser.add_argument("--skip", action="append", metavar="PATTERN", help=f"cells that are not used (default {' '.join(SKIPPED)})")
+    parser.add_argument("--skip", action="append", metavar="PATTERN", help=f"cells that are not used (default {' '.join(defaults.SKIPPED)})")
     parser.add_argument("--saif", metavar="FILE", help="activity for the handover (sf_cosim --saif)")
     parser.add_argument("--rtl", default=os.path.join(HERE, ".."), metavar="DIR", help="folder that holds rtl/ (default: the project's)")
     parser.add_argument("--json", action="store_true", help="print the JSON instead of the tables")
@@ -59,22 +49,6 @@ def parse_arguments():
     return arguments
 
 
-def write(path, text):
-    with open(path + ".aside", "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(path + ".aside", path)
-
-
-def hash_of(path):
-    with open(path, "rb") as file:
-        return hashlib.sha256(file.read()).hexdigest()
-
-
-def sources_of(root):
-    listed = [os.path.join(folder, name) for folder in ("rtl/gen", "rtl") for name in sorted(os.listdir(os.path.join(root, folder))) if name.endswith(".sv")]
-    return sorted(listed, key=lambda name: not name.endswith("_pkg.sv"))
-
-
 class Work:
     """Library, folders, options."""
 
@@ -83,15 +57,13 @@ class Work:
         for tool in ("yosys", "sta"):
             if not shutil.which(tool):
                 raise Stop(f"{tool} is not installed (make deps-asic)", 77)
-        if not os.path.exists(arguments.liberty):
-            own = arguments.liberty == DEFAULT
-            raise Stop(f"{arguments.liberty}: not there" + ("; it is in Debian's package qflow-tech-osu018 (make deps-asic)" if own else ""), 77 if own else 1)
+        defaults.must_exist(arguments.liberty)
         self.library = liberty.Library(arguments.liberty, power=False)
         if not any(cell.get("area") and float(cell.get("area")) > 0 for cell in self.library.cells.values()):
             self.library.fail(self.library.top, "no cell has an area")
         self.name = arguments.name or tech.name_of(self.library.name)
         self.period_ps = round(1e6 / arguments.clock)
-        self.skipped = arguments.skip or SKIPPED
+        self.skipped = arguments.skip or defaults.SKIPPED
         own_gate = any(cell.get("clock_gating_integrated_cell") == "latch_posedge" for cell in self.library.cells.values())
         self.gating = arguments.gating == "on" or (arguments.gating == "auto" and own_gate)
         versions = [subprocess.run(command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL).stdout.splitlines()[:1]
@@ -105,8 +77,7 @@ class Work:
     def key(self, text):
         recipe = [hash_of(path) for path in sorted(glob.glob(os.path.join(HERE, "asic", "*.py")) + [os.path.abspath(__file__)])]
         rtl = [hash_of(os.path.join(self.root, name)) for name in sources_of(self.root)]
-        return hashlib.sha256("\0".join([*recipe, *rtl, hash_of(self.arguments.liberty), text, str(self.period_ps), str(self.gating), *self.skipped,
-                                         *self.versions]).encode()).hexdigest()
+        return digest(*recipe, *rtl, hash_of(self.arguments.liberty), text, str(self.period_ps), str(self.gating), *self.skipped, *self.versions)
 
 
 class Build:
@@ -114,12 +85,7 @@ class Build:
 
     def __init__(self, work, text):
         self.text = text
-        self.module, _, parameters = text.partition(":")
-        self.parameters = dict(part.split("=", 1) for part in parameters.split(",") if "=" in part)
-        if parameters and len(self.parameters) != len(parameters.split(",")):
-            raise Stop(f"--modules: '{text}' is not NAME:PARAMETER=N,...", 2)
-        if not os.path.exists(os.path.join(work.root, "rtl", self.module + ".sv")):
-            raise Stop(f"rtl/{self.module}.sv is not there")
+        self.module, self.parameters = module_of(text, work.root)
         self.folder = os.path.join(os.path.abspath(work.arguments.build), "asic", work.name, "netlist", re.sub(r"[^A-Za-z0-9_]+", "-", text))
 
 
@@ -222,14 +188,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except (liberty.LibertyError, netlist.NetlistError, flow.FlowError) as error:
-        print("asic: " + str(error), file=sys.stderr)
-        sys.exit(1)
-    except Stop as stop:
-        print("asic: " + str(stop), file=sys.stderr)
-        sys.exit(stop.status)
-    except KeyboardInterrupt:
-        print("asic: interrupted; what is finished is kept", file=sys.stderr)
-        sys.exit(130)
+    run("asic", main, (liberty.LibertyError, netlist.NetlistError, flow.FlowError))

