@@ -92,6 +92,13 @@ template <class module, int bytes, int ways> struct cache_bench {
     }
     return u.cycle - begin;
   }
+  /* A pair by itself. */
+  void one(uint32_t entry0, uint32_t entry1)
+  {
+    next = {entry0, entry1};
+    u.top.s_entry0_i = entry0, u.top.s_entry1_i = entry1, u.top.s_empty_i = 0, u.top.s_valid_i = 1;
+    run(1);
+  }
   void timing(int latency, int spread, int stalls, int empty, int local)
   {
     memory.latency = latency, memory.spread = spread, memory.stall = stall = stalls;
@@ -216,6 +223,29 @@ TEST(a_pair_in_every_cycle)
     const uint64_t cycles = b.u.cycle - begin, most = PAIRS + (uint64_t)latency + BEFORE_AND_BEHIND;
     ck_assert_msg(cycles <= most + together / 8 * SET_IN_USE, "latency %d: %d cycles for %d pairs", latency,
                   (int)cycles, PAIRS);
+    b.same_counts();
+  }
+}
+
+/* Nothing is waited for while nothing is asked; a line that is missing is waited for as much longer as its memory is
+ * slower, and one that is there is not. */
+TEST(a_line_that_is_waited_for)
+{
+  enum { FASTEST = 20, SLOWER = 30, STAGES = 12 };
+  uint64_t before = 0;
+  for (int latency = FASTEST; latency <= FASTEST + 2 * SLOWER; latency += SLOWER) {
+    usual b(70);
+    b.timing(latency, 0, 0, 0, 0);
+    for (int i = 0; i < 1000; i++) b.cycle(false);
+    ck_assert_uint_eq(b.events.stalls, 0);
+    b.one(4321, 4322);
+    const uint64_t stalls = b.events.stalls;
+    ck_assert_msg(stalls <= (uint64_t)latency && stalls + STAGES >= (uint64_t)latency, "latency %d: %llu stalls",
+                  latency, (unsigned long long)stalls);
+    if (before) ck_assert_uint_eq(stalls, before + SLOWER);
+    before = stalls;
+    b.one(4322, 4321);
+    ck_assert_uint_eq(b.events.stalls, stalls);
     b.same_counts();
   }
 }
