@@ -1,6 +1,6 @@
 // Lines of 16 bytes from a memory behind an AXI4 read port: asked for one by one, they come in the order of the requests.
 // Bursts of two beats of 64 bits, one ID. Room for a line is reserved before it is asked for, so the read channel never
-// has to wait.
+// has to wait; it is free again the cycle after the line was popped. The line on offer stands in a register.
 // After a clear the memory still answers what was asked of it, and a request on offer stays, as AXI demands. Those lines are
 // dropped, and nothing is asked before the last of them has come.
 `default_nettype none
@@ -28,7 +28,7 @@ module sf_fetch #(
     input  wire [ 63:0] m_axi_rdata_i,
     input  wire [  1:0] m_axi_rresp_i
 );
-  reg ask_q, second_q;
+  reg ask_q, second_q, pop_q;
   reg [27:0] address_q;
   reg [63:0] first_half_q;
   reg [LOG2_LINES:0] reserved_q, owed_q, stale_q;
@@ -41,7 +41,7 @@ module sf_fetch #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {ask_q, second_q} <= 2'd0;
+      {ask_q, second_q, pop_q} <= 3'd0;
       reserved_q <= '0;
       owed_q <= '0;
       stale_q <= '0;
@@ -49,11 +49,12 @@ module sf_fetch #(
       ask_q <= take || (ask_q && !m_axi_arready_i);
       if (m_axi_rvalid_i) second_q <= !second_q;
       owed_q <= owed;
+      pop_q <= pop_i && !clear_i;
       if (clear_i) begin
         reserved_q <= '0;
         stale_q <= owed;
       end else begin
-        reserved_q <= reserved_q + {{LOG2_LINES{1'b0}}, take} - {{LOG2_LINES{1'b0}}, pop_i};
+        reserved_q <= reserved_q + {{LOG2_LINES{1'b0}}, take} - {{LOG2_LINES{1'b0}}, pop_q};
         if (draining && end_of_line) stale_q <= stale_q - 1'b1;
       end
     end
@@ -63,6 +64,18 @@ module sf_fetch #(
     if (m_axi_rvalid_i) first_half_q <= m_axi_rdata_i;
   end
 
+  wire line_valid;
+  wire [127:0] line;
+  reg valid_q;
+  reg [127:0] data_q;
+  wire line_take = line_valid && (!valid_q || pop_i);
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) valid_q <= 1'b0;
+    else valid_q <= !clear_i && (line_take || (valid_q && !pop_i));
+  end
+  always_ff @(posedge clk_i) if (line_take) data_q <= line;
+  assign valid_o = valid_q;
+  assign data_o = data_q;
   sf_fifo #(
       .WIDTH     (128),
       .LOG2_DEPTH(LOG2_LINES)
@@ -72,9 +85,9 @@ module sf_fetch #(
       .clear_i(clear_i),
       .push_i (push),
       .data_i ({m_axi_rdata_i, first_half_q}),
-      .valid_o(valid_o),
-      .pop_i  (pop_i),
-      .data_o (data_o)
+      .valid_o(line_valid),
+      .pop_i  (line_take),
+      .data_o (line)
   );
   assign filled_o = push;
   assign error_o = m_axi_rvalid_i && m_axi_rresp_i != 2'd0;
