@@ -13,8 +13,9 @@
 //   0x81         number of direction features, 0..16                                  C1.n_in - (D2.n_out - 1)
 //   0x82         frac, 0..11: their LSB is 2^-frac                                    -log2(dir_scale)
 //
-// Memory port: an entry is two signed bytes (feature 0 in bits 7:0), the table begins at base_i; see sf_cache. Three rays can
-// be on their way when the samples are the first of theirs: one at the output, one in sf_sh, one waiting.
+// Memory port: an entry is two signed bytes (feature 0 in bits 7:0), the table begins at base_i; see sf_cache. Four rays can
+// be on their way when the samples are the first of theirs: one at the output, one in sf_sh, one waiting for it, and one at
+// the input. A sample is taken every second cycle at most; a level alone takes four.
 `default_nettype none
 
 module sf_encoder #(
@@ -62,20 +63,34 @@ module sf_encoder #(
     if (cfg_we_i && cfg_addr_i == 8'h82) frac_q <= cfg_data_i[3:0];
   end
 
-  // A sample goes to the grid, its direction to the register before sf_sh.
+  // A sample waits in a register at the input, so that who hands it over need not know who is ready behind it.
+  reg held_q, first_q, tile_q;
+  reg [71:0] pos_q;
+  reg [47:0] unit_q;
+  wire accept;
+  assign s_ready_o = !held_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) held_q <= 1'b0;
+    else if (clear_i) held_q <= 1'b0;
+    else held_q <= held_q ? !accept : s_valid_i;
+  end
+  always_ff @(posedge clk_i) begin
+    if (!held_q) {first_q, tile_q, pos_q, unit_q} <= {s_first_i, s_tile_i, s_pos_i, s_dir_i};
+  end
+
+  // It goes to the grid, its direction to the register before sf_sh.
   wire grid_ready, sh_ready, tag_valid, tag_first, packet_end;
   reg dir_valid_q;
   reg [47:0] dir_q;
-  wire directed = s_first_i && n_dir_q != 5'd0;
+  wire directed = first_q && n_dir_q != 5'd0;
   wire dir_ready = !dir_valid_q || sh_ready;
-  assign s_ready_o = grid_ready && (!directed || dir_ready);
-  wire accept = s_valid_i && s_ready_o;
+  assign accept = held_q && grid_ready && (!directed || dir_ready);
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) dir_valid_q <= 1'b0;
     else if (clear_i) dir_valid_q <= 1'b0;
     else if (dir_ready) dir_valid_q <= accept && directed;
   end
-  always_ff @(posedge clk_i) if (dir_ready) dir_q <= s_dir_i;
+  always_ff @(posedge clk_i) if (dir_ready) dir_q <= unit_q;
 
   // The first of a ray are told apart behind the grid. At most 2^LOG2_DEPTH samples have levels on their way,
   // three more are in sf_grid_cell and one in the packet.
@@ -87,7 +102,7 @@ module sf_encoder #(
       .rst_ni (rst_ni),
       .clear_i(clear_i),
       .push_i (accept),
-      .data_i (s_first_i),
+      .data_i (first_q),
       .valid_o(tag_valid),
       .pop_i  (packet_end),
       .data_o (tag_first)
@@ -109,8 +124,8 @@ module sf_encoder #(
       .last_level_i   (last_level_q),
       .s_valid_i      (accept),
       .s_ready_o      (grid_ready),
-      .s_tile_i       (s_tile_i),
-      .s_pos_i        (s_pos_i),
+      .s_tile_i       (tile_q),
+      .s_pos_i        (pos_q),
       .pair_valid_o   (pair_valid),
       .pair_ready_i   (pair_ready),
       .pair_tile_o    (pair_tile),

@@ -228,7 +228,7 @@ static void full_speed(int levels, int latency, int first, int fresh)
                 pairs, missed);
 }
 
-/* Samples cost a cycle per pair, even at one sample per ray, for which three rays on their way hide less. */
+/* Samples cost a cycle per pair, even at one sample per ray, for which four rays on their way hide less. */
 TEST(a_pair_in_every_cycle)
 {
   for (int levels = 12; levels <= 16; levels += 4)
@@ -239,7 +239,7 @@ TEST(a_pair_in_every_cycle)
   full_speed(16, 31, 100, 0);
 }
 
-/* A direction that waits for the harmonics of the one before holds up nothing but a third one. */
+/* A direction that waits for the harmonics of the one before holds up nothing but a third one, in the register at the input. */
 TEST(a_direction_that_waits)
 {
   enum { HARMONICS = 2 * FX_SH + 15 };
@@ -253,7 +253,7 @@ TEST(a_direction_that_waits)
   while (b.accepted < 4) b.cycle(1); /* two more samples of the second */
   ck_assert_uint_lt(b.u.cycle - begin, 20);
   b.timing(1, 0, 0, 100);
-  while (b.accepted < 5) b.cycle(1);
+  while (b.accepted < 6) b.cycle(1);
   ck_assert_uint_gt(b.u.cycle - begin, HARMONICS / 2);
   b.run(20);
 }
