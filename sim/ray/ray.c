@@ -128,12 +128,14 @@ typedef struct run {
   uint64_t waiting[6];
 } run;
 
+/* Direction and tile are those of the first beat. In later ones the accelerator ignores the bits: they are set to the
+ * contrary. */
 static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
 {
   const int16_t *d = request->ray->unit;
   memset(in->ray_data, 0, sizeof in->ray_data);
   in->ray_user = at == 0, in->ray_last = at >= request->n - !request->stops;
-  if (at == 0 && request->new_tile) in->ray_data[3] = (uint64_t)1 << 49;
+  if (request->new_tile) in->ray_data[3] = (uint64_t)1 << 49;
   if (request->n == 0) {
     in->ray_data[3] |= (uint64_t)1 << 48;
     return;
@@ -142,7 +144,8 @@ static void set_beat(sf_pins_in *in, const sf_ray_request *request, int at)
   in->ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
   in->ray_data[1] = (uint64_t)(uint32_t)s->delta_q24 << 32 | s->pos[2];
   in->ray_data[2] = s->distance_q16;
-  if (at == 0) in->ray_data[3] |= (uint64_t)(uint16_t)d[2] << 32 | (uint64_t)(uint16_t)d[1] << 16 | (uint16_t)d[0];
+  in->ray_data[3] |= (uint64_t)(uint16_t)d[2] << 32 | (uint64_t)(uint16_t)d[1] << 16 | (uint16_t)d[0];
+  if (at > 0) in->ray_data[3] ^= (((uint64_t)1 << 48) - 1) | (uint64_t)1 << 49;
 }
 
 static void offer(run *r)
