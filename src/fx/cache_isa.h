@@ -2,7 +2,7 @@
  * those of fx_grid_lines, the misses those of fx_cache_look_up. */
 #ifndef SF_FX_CACHE_ISA_H
 #define SF_FX_CACHE_ISA_H
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/grid_isa.h"
 
 enum { LINE_SHIFT = 3, GROUP_LEVELS = WIDTH / FX_LEVEL_PAIRS };

@@ -1,5 +1,8 @@
 #include "src/fx/round.h"
-#include "src/fx/scene.h"
+#include "src/fx/check.h"
+#include "src/fx/check_tensorf.h"
+#include "src/fx/range.h"
+#include "src/fx/real.h"
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
 

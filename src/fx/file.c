@@ -1,5 +1,7 @@
 /* .snn: a safetensors file of integer tensors; scalars are metadata strings. */
 #include "base/io.h"
+#include "src/fx/arrays.h"
+#include "src/fx/real.h"
 #include "src/fx/scene.h"
 #include <inttypes.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
  * even, as the hash of x is x itself. */
 #ifndef SF_FX_GRID_ISA_H
 #define SF_FX_GRID_ISA_H
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
 

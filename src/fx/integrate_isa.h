@@ -1,7 +1,7 @@
 /* Activations and integrators, one sample to a lane; the arithmetic is that of exp2.c, sigmoid.c and integrate.c. */
 #ifndef SF_FX_INTEGRATE_ISA_H
 #define SF_FX_INTEGRATE_ISA_H
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
 

@@ -1,5 +1,5 @@
 /* Choice of the instruction set at run time, and the portable kernels: the oracle, sample by sample. */
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/net.h"
 #include "base/amx.h"
 #include <string.h>

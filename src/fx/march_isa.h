@@ -2,7 +2,7 @@
  */
 #ifndef SF_FX_MARCH_ISA_H
 #define SF_FX_MARCH_ISA_H
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/march.h"
 #include "src/fx/vec_isa.h"
 

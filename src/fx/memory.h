@@ -4,7 +4,7 @@
 #ifndef SF_FX_MEMORY_H
 #define SF_FX_MEMORY_H
 #include "src/fx/cache.h"
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 
 enum { FX_TILE = 16 /* pixels on a side */, FX_SHARED = 16 /* samples of a group */ };
 

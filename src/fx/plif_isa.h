@@ -6,7 +6,7 @@
  * split at bit 16, holds both parts, and one 16-bit dot product adds h * 2k + l' * 1 to the membrane. |d| < 2^25. */
 #ifndef SF_FX_PLIF_ISA_H
 #define SF_FX_PLIF_ISA_H
-#include "src/fx/core.h"
+#include "src/fx/kernels.h"
 #include "src/fx/unit.h"
 #include "src/fx/vec_isa.h"
 

@@ -1,5 +1,6 @@
 /* Many rays: in each round the next sample of up to FX_BLOCK rays goes through grid and nets together, and a ray that
  * has ended makes room for the next. So no ray ever takes a sample that fx_render_ray would not. */
+#include "src/fx/core.h"
 #include "src/fx/march.h"
 #include "src/fx/memory.h"
 #include "src/fx/scene.h"

@@ -1,8 +1,9 @@
 /* Many rays of a TensoRF scene. Densities alone decide where a ray ends and which of its samples are decoded, so a ray
  * is marched to its end at once; its samples wait for the decoder until a block is full, whosever they are. Colours are
  * sums of integers: their order does not matter. */
+#include "src/fx/core.h"
 #include "src/fx/memory.h"
-#include "src/fx/scene.h"
+#include "src/fx/tensorf.h"
 #include "base/memory.h"
 #include <stdlib.h>
 #include <string.h>

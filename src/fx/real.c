@@ -1,6 +1,6 @@
 /* The one file of src/fx that may handle floating-point: a scene carries a few real numbers (units and the placement
  * of the box) for quant/ and for reports. They pass through here as text; no arithmetic of the core sees them. */
-#include "src/fx/scene.h"
+#include "src/fx/real.h"
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdio.h>

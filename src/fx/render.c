@@ -1,5 +1,5 @@
 /* One ray, sample by sample: the oracle of rays.c and rays_tensorf.c. */
-#include "src/fx/scene.h"
+#include "src/fx/tensorf.h"
 #include "src/fx/unit.h"
 #include "src/fx/nofloat.h"
 

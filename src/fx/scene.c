@@ -1,3 +1,5 @@
+#include "src/fx/arrays.h"
+#include "src/fx/check.h"
 #include "src/fx/scene.h"
 #include "src/fx/march.h"
 #include <stdlib.h>

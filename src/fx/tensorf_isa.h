@@ -2,7 +2,7 @@
  * loops over components, and sums of integers do not depend on their order. Widths and equations: tensorf.c. */
 #ifndef SF_FX_TENSORF_ISA_H
 #define SF_FX_TENSORF_ISA_H
-#include "src/fx/scene.h"
+#include "src/fx/tensorf.h"
 
 enum { VM_FRAC = 8, VM_ONE = 1 << VM_FRAC, VM_PRODUCT_SHIFT = 15 };
 

@@ -1,5 +1,5 @@
 #include "src/quant/internal.h"
-#include "fx/scene.h"
+#include "fx/tensorf.h"
 #include "render/composite.h"
 #include <math.h>
 #include <string.h>
