@@ -41,56 +41,63 @@ module sf_ray_track (
   // As many samples as encoder, nets and streams hold between them, and a few more: a full store only stalls the input.
   localparam integer DEPTH = 16;
 
+  // ---- input: a beat waits in a register, so that its sender need not know who has room behind it
+  reg held_q, first_q, last_q, empty_q, in_tile_q;
+  reg [71:0] pos_q;
+  reg [47:0] dir_q;
+  reg [24:0] delta_q;
+  reg [43:0] distance_q;
+  wire taken;
+  assign ready_o = enable_i && !held_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) held_q <= 1'b0;
+    else if (clear_i) held_q <= 1'b0;
+    else held_q <= held_q ? !taken : valid_i && ready_o;
+  end
+  always_ff @(posedge clk_i) begin
+    if (!held_q) begin
+      {first_q, last_q, empty_q, in_tile_q} <= {first_i, last_i, empty_i, tile_i};
+      {pos_q, dir_q, delta_q, distance_q} <= {pos_i, dir_i, delta_i, distance_i};
+    end
+  end
+
   reg inside_q;   // the next sample belongs to the same ray as the last one
   reg drop_q;     // and is not needed
   reg broken_q;
+  reg tile_q;     // a tile has begun, and the encoder has none of its samples yet
   reg [4:0] ray_q, composed_q;  // rays are told apart by their number: fewer than 32 are inside
-  wire bad = inside_q ? first_i || empty_i : !first_i || (empty_i && !last_i);
-
-  // ---- input: one sample waits for the encoder
-  reg pending_q, first_q, tile_q;
-  reg [71:0] pos_q;
-  reg [47:0] dir_q;
+  wire bad = inside_q ? first_q || empty_q : !first_q || (empty_q && !last_q);
   reg [4:0] write_q, read_q;
   wire full = write_q - read_q == 5'(DEPTH);
-  wire drop = broken_q || (inside_q && drop_q);
-  assign ready_o = drop || (enable_i && !pending_q && !full);
-  wire beat = valid_i && ready_o && !broken_q;
+  wire drop = inside_q && drop_q;
+  wire room = !full && encode_ready_i;
+  assign taken = broken_q || drop || room;
+  wire beat = held_q && !broken_q && (drop || room);
   assign error_order_o = beat && bad;
   wire accept = beat && !bad && !drop;
-  wire [4:0] ray = first_i ? ray_q + 5'd1 : ray_q;
+  wire [4:0] ray = first_q ? ray_q + 5'd1 : ray_q;
   wire stop_here = stop_i && composed_q == ray_q;
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {inside_q, drop_q, broken_q, pending_q, tile_q} <= 5'd0;
+      {inside_q, drop_q, broken_q, tile_q} <= 4'd0;
       {ray_q, write_q, read_q} <= 15'd0;
     end else if (clear_i) begin
-      {inside_q, drop_q, broken_q, pending_q, tile_q} <= 5'd0;
+      {inside_q, drop_q, broken_q, tile_q} <= 4'd0;
       {ray_q, write_q, read_q} <= 15'd0;
     end else begin
       if (error_order_o) broken_q <= 1'b1;
-      if (beat && !bad) inside_q <= !last_i;
-      if (accept && first_i) ray_q <= ray;
-      drop_q <= !(accept && first_i) && (stop_here || drop_q);
-      if (accept && !empty_i) pending_q <= 1'b1;
-      else if (encode_ready_i) pending_q <= 1'b0;
-      if (accept && first_i && tile_i) tile_q <= 1'b1;
-      else if (pending_q && encode_ready_i) tile_q <= 1'b0;
+      if (beat && !bad) inside_q <= !last_q;
+      if (accept && first_q) ray_q <= ray;
+      drop_q <= !(accept && first_q) && (stop_here || drop_q);
+      if (accept) tile_q <= encode_tile_o && empty_q;
       if (accept) write_q <= write_q + 5'd1;
       if (take_i) read_q <= read_q + 5'd1;
     end
   end
-  always_ff @(posedge clk_i) begin
-    if (accept) begin
-      first_q <= first_i;
-      pos_q <= pos_i;
-      dir_q <= dir_i;
-    end
-  end
-  assign encode_valid_o = pending_q;
+  assign encode_valid_o = accept && !empty_q;
   assign encode_first_o = first_q;
-  assign encode_tile_o = tile_q;
+  assign encode_tile_o = tile_q || (first_q && in_tile_q);
   assign encode_pos_o = pos_q;
   assign encode_dir_o = dir_q;
 
@@ -99,12 +106,12 @@ module sf_ray_track (
   wire [76:0] head = store[read_q[3:0]];
   wire [4:0] head_ray;
   always_ff @(posedge clk_i) begin
-    if (accept) store[write_q[3:0]] <= {ray, empty_i, last_i, first_i, distance_i, delta_i};
+    if (accept) store[write_q[3:0]] <= {ray, empty_q, last_q, first_q, distance_q, delta_q};
     if (take_i) composed_q <= head_ray;
   end
   assign valid_o = write_q != read_q;
   assign {head_ray, empty_o, last_o, first_o, distance_o, delta_o} = head;
-  assign idle_o = !valid_o && !pending_q;
+  assign idle_o = !valid_o && !held_q;
 endmodule
 
 `default_nettype wire
