@@ -47,8 +47,8 @@ module sf_ray_track (
   reg [47:0] dir_q;
   reg [24:0] delta_q;
   reg [43:0] distance_q;
-  wire taken;
-  assign ready_o = enable_i && !held_q;
+  wire taken, swallows;
+  assign ready_o = !held_q && (enable_i || swallows);
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) held_q <= 1'b0;
     else if (clear_i) held_q <= 1'b0;
@@ -71,7 +71,8 @@ module sf_ray_track (
   wire full = write_q - read_q == 5'(DEPTH);
   wire drop = inside_q && drop_q;
   wire room = !full && encode_ready_i;
-  assign taken = broken_q || drop || room;
+  assign swallows = broken_q || drop;
+  assign taken = swallows || room;
   wire beat = held_q && !broken_q && (drop || room);
   assign error_order_o = beat && bad;
   wire accept = beat && !bad && !drop;
@@ -111,7 +112,7 @@ module sf_ray_track (
   end
   assign valid_o = write_q != read_q;
   assign {head_ray, empty_o, last_o, first_o, distance_o, delta_o} = head;
-  assign idle_o = !valid_o && !held_q;
+  assign idle_o = !valid_o && (!held_q || broken_q);
 endmodule
 
 `default_nettype wire

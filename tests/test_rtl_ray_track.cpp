@@ -34,10 +34,10 @@ struct bench {
   unit<Vsf_ray_track> u;
   random_draw draw;
   sink_stalls encoder_stalls, compositor_stalls;
-  std::deque<sample> encoder, compositor;                             /* what must still come out */
-  bool inside = false, drop = false, broken = false, in_hand = false; /* in_hand: the encoder has not taken the last */
-  bool taken_any = false, new_tile = false;                           /* new_tile: since the last position */
-  uint64_t ray = 0, composed = 0;                                     /* of the last sample in, of the last one out */
+  std::deque<sample> held, compositor; /* at the input, one at most; what must still come out */
+  bool inside = false, drop = false, broken = false;
+  bool taken_any = false, new_tile = false; /* new_tile: since the last position */
+  uint64_t ray = 0, composed = 0;           /* of the last sample in, of the last one out */
   int stop_percent = 0;
   uint64_t accepted = 0, dropped = 0, stops = 0, deepest = 0;
 
@@ -50,8 +50,8 @@ struct bench {
 
   void forget()
   {
-    encoder.clear(), compositor.clear();
-    inside = drop = broken = in_hand = taken_any = new_tile = false;
+    held.clear(), compositor.clear();
+    inside = drop = broken = taken_any = new_tile = false;
     ray = 0;
   }
 
@@ -64,16 +64,12 @@ struct bench {
     u.top.dir_i = s.dir, u.top.delta_i = s.delta, u.top.distance_i = s.distance;
   }
 
-  void same_encoder()
+  void same_encoder(const sample &e)
   {
-    if (encoder.empty()) ck_abort_msg("a position that nobody sent, cycle %llu", (unsigned long long)u.cycle);
-    const sample &e = encoder.front();
     ck_assert_uint_eq(u.top.encode_first_o, e.first);
-    ck_assert_uint_eq(u.top.encode_tile_o, e.tile);
+    ck_assert_uint_eq(u.top.encode_tile_o, new_tile || (e.first && e.tile));
     for (int i = 0; i < POS_WORDS; i++) ck_assert_uint_eq(u.top.encode_pos_o[i], e.pos[i]);
     if (e.first) ck_assert_uint_eq(u.top.encode_dir_o, e.dir);
-    encoder.pop_front();
-    in_hand = false;
   }
 
   void same_compositor()
@@ -86,11 +82,7 @@ struct bench {
     ck_assert_uint_eq(u.top.distance_o, e.distance);
   }
 
-  /* Must be ready: swallowing, or enabled with room here and the encoder's register free. */
-  bool must_be_ready() const
-  {
-    return broken || (inside && drop) || (u.top.enable_i && !in_hand && compositor.size() < DEPTH);
-  }
+  bool swallows() const { return broken || (inside && drop); }
 
   /* The order is wrong: a ray that begins inside another or not at all; an empty one is a ray of its own. */
   bool wrong(const sample &s) const { return s.first == inside || (s.empty && !(s.first && s.last)); }
@@ -110,8 +102,7 @@ struct bench {
     ray += s.first, in.ray = ray, inside = !s.last;
     compositor.push_back(in);
     new_tile = new_tile || (s.first && s.tile);
-    in.tile = new_tile;
-    if (!s.empty) encoder.push_back(in), in_hand = true, new_tile = false;
+    if (!s.empty) new_tile = false;
     accepted++;
     if (compositor.size() > deepest) deepest = compositor.size();
   }
@@ -119,24 +110,25 @@ struct bench {
   /* True when the sample that is offered, if any, is taken. */
   bool cycle(const sample *s = nullptr)
   {
-    const bool was_broken = broken, was_in_hand = in_hand;
     u.top.encode_ready_i = !encoder_stalls(draw, u.cycle);
     const bool take = !compositor.empty() && !compositor_stalls(draw, u.cycle);
     u.top.take_i = take;
     u.top.stop_i = taken_any && draw.percent(stop_percent);
     u.settle();
-    ck_assert_uint_eq(u.top.ready_o, must_be_ready());
+    const bool moves = !held.empty() && (swallows() || (u.top.encode_ready_i && compositor.size() < DEPTH));
+    const bool in = moves && !swallows() && !wrong(held.front());
+    ck_assert_uint_eq(u.top.ready_o, held.empty() && (u.top.enable_i || swallows()));
     ck_assert_uint_eq(u.top.valid_o, !compositor.empty());
-    ck_assert_uint_eq(u.top.encode_valid_o, was_in_hand);
-    ck_assert_uint_eq(u.top.idle_o, compositor.empty() && !was_in_hand);
+    ck_assert_uint_eq(u.top.encode_valid_o, in && !held.front().empty);
+    ck_assert_uint_eq(u.top.idle_o, compositor.empty() && (held.empty() || broken));
+    ck_assert_uint_eq(u.top.error_order_o, moves && !broken && wrong(held.front()));
     if (u.top.valid_o) same_compositor();
-    const bool given = s && u.top.ready_o;
-    ck_assert_uint_eq(u.top.error_order_o, given && !was_broken && wrong(*s));
-    const bool stop_here = u.top.stop_i && composed == ray;
+    if (u.top.encode_valid_o) same_encoder(held.front());
+    const bool stop_here = u.top.stop_i && composed == ray, given = s && u.top.ready_o;
     stops += stop_here && inside;
-    if (was_in_hand && u.top.encode_ready_i) same_encoder();
     const uint64_t before = ray;
-    if (given) enter(*s);
+    if (moves) enter(held.front()), held.pop_front();
+    if (given) held.push_back(*s);
     drop = ray == before && (drop || stop_here);
     if (take) composed = compositor.front().ray, taken_any = true, compositor.pop_front();
     u.edge();
@@ -154,12 +146,12 @@ struct bench {
 
   void drain()
   {
-    for (int i = 0; !u.top.idle_o || !compositor.empty(); i++) {
+    for (int i = 0; !held.empty() || !compositor.empty(); i++) {
       if (i == 5000) ck_abort_msg("not idle at cycle %llu", (unsigned long long)u.cycle);
       cycle();
-      u.settle();
     }
-    ck_assert(encoder.empty());
+    u.settle();
+    ck_assert(u.top.idle_o);
   }
 };
 
@@ -237,6 +229,7 @@ TEST(wrong_order)
       if (wrong[kind].inside) b.give(s);
       s.first = wrong[kind].first, s.last = wrong[kind].last, s.empty = wrong[kind].empty;
       b.give(s);
+      while (!b.held.empty()) b.cycle();
       ck_assert(b.broken);
       b.u.top.enable_i = 0; /* nothing holds up what is swallowed */
       for (int i = 0; i < 100; i++) {
@@ -282,18 +275,19 @@ TEST(disabled)
 TEST(reset_in_mid_ray)
 {
   bench b(500, 40);
+  bool open = false;
   b.stop_percent = 20;
   for (int round = 0; round < 300; round++) {
     for (int i = (int)b.draw(0, 9); i > 0; i--) {
       sample s = draw_sample(b.draw);
-      s.first = !b.inside, s.last = b.draw.percent(30);
+      s.first = !open, s.last = b.draw.percent(30), open = !s.last;
       b.give(s);
     }
     const bool hard = b.draw.percent(50);
     CData &signal = hard ? b.u.top.rst_ni : b.u.top.clear_i;
     signal = !hard;
     b.u.edge();
-    signal = hard;
+    signal = hard, open = false;
     b.forget();
     b.u.settle();
     ck_assert(b.u.top.idle_o);
