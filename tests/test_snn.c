@@ -321,7 +321,56 @@ TEST(plif_backward_by_the_equations)
   for (int g = 0; g < 2; g++) check_plif_backward(gains[g]);
 }
 
-/* The same spikes, only the backward pass is compared. */
+/* What spiking layer 0..2 costs by its firing alone, by the equations: a neuron that fires at no other step than t has
+ * da/ds(t) = 1. Checks the gradient of the layer's own weights; the last lanes hold no samples. */
+static void check_charge(int layer)
+{
+  enum { T = 5, H = 16, LANES = 41 };
+  static const int id[3] = {SF_P_D1, SF_P_C1, SF_P_C2}, columns[3] = {8, 31, H}, inputs[3] = {8, 16, H};
+  static const float zero[SF_T_MAX * 3 * SF_BLOCK];
+  static float df[32 * SF_BLOCK];
+  const sf_kernels *kernels = sf_kernels_select(NULL);
+  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
+  for (int i = 0; i < 3; i++) r.model.config.theta[i] = 0.25f;
+  rig_forward(&r, kernels, 1);
+  r.block->lanes = LANES;
+  r.net->view.charge[layer] = 0.7f;
+  kernels->backward(r.net, r.block, T, zero, zero, df, r.grad, r.scratch);
+  double sum[H][H] = {{0}};
+  int charged = 0, free_of_it = 0;
+  const double theta = 0.25, k = r.net->view.k[(const int[]){0, 2, 3}[layer]];
+  for (int l = 0; l < LANES; l++)
+    for (int n = 0; n < H; n++) {
+      double h[T], gv = 0;
+      int steps = 0;
+      for (int t = 0; t < T; t++) {
+        h[t] = (layer == 0 ? r.block->m1[t] : layer == 1 ? r.block->m3[t] : r.block->m4[t])[n * SF_BLOCK + l];
+        steps += h[t] >= theta;
+      }
+      for (int t = T - 1; t >= 0; t--) {
+        const double gs = steps == (h[t] >= theta) ? 0.7f : 0, sg = 1 / (1 + exp(-SF_SURROGATE_ALPHA * (h[t] - theta)));
+        const double gh = (gs - theta * gv) * SF_SURROGATE_ALPHA * sg * (1 - sg) + gv;
+        for (int i = 0; i < inputs[layer]; i++)
+          sum[n][i] += (t ? k : 1) * gh *
+                       (layer == 0   ? (double)r.block->f[i * SF_BLOCK + l]
+                        : layer == 1 ? (double)r.block->sh[i * SF_BLOCK + l]
+                                     : r.block->m3[t][i * SF_BLOCK + l] >= theta);
+        gv = (1 - k) * gh;
+        *(gs > 0 ? &charged : &free_of_it) += 1;
+      }
+    }
+  ck_assert(charged > 50 && free_of_it > 50);
+  for (int n = 0; n < H; n++)
+    for (int i = 0; i < inputs[layer]; i++)
+      ck_assert_double_eq_tol(grad_at(&r, id[layer], n * columns[layer] + i), sum[n][i], 1e-3 + 1e-4 * fabs(sum[n][i]));
+}
+
+TEST(charge_by_the_equations)
+{
+  for (int layer = 0; layer < 3; layer++) check_charge(layer);
+}
+
+/* The same spikes, only the backward pass is compared; in the second round firing is charged, too. */
 TEST(backward_of_every_isa_agrees)
 {
   static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[2][32 * SF_BLOCK];
@@ -338,8 +387,10 @@ TEST(backward_of_every_isa_agrees)
         drive(&b, gains[g]);
         rig_forward(&a, portable, 1);
         memcpy(b.block, a.block, sizeof *a.block);
-        portable->backward(a.net, a.block, steps, ds, dc, df[0], a.grad, a.scratch);
+        a.block->lanes = b.block->lanes = 50;
         rig_prepare(&b, kernels);
+        for (int l = 0; l < 3; l++) a.net->view.charge[l] = b.net->view.charge[l] = g ? 0.2f * (float)(l + 1) : 0;
+        portable->backward(a.net, a.block, steps, ds, dc, df[0], a.grad, a.scratch);
         kernels->backward(b.net, b.block, steps, ds, dc, df[1], b.grad, b.scratch);
         const float bound = backward_bounds[i].bound;
         ck_assert_float_le(distance(b.grad->w1, a.grad->w1, 48 * 16), bound);

@@ -236,6 +236,32 @@ TEST(fixed_steps_freeze_the_budget)
     ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
 }
 
+/* Firing costs: fewer rows are read than by the same run without, and a resumed run has the same bits. */
+TEST(charged_neurons_fire_less)
+{
+  double reads[2], error[2];
+  for (int on = 0; on < 2; on++) {
+    sf_train_options o = small_run();
+    o.fixed_steps = 3;
+    o.stage1 = 50, o.stage2 = 200;
+    o.charge = on ? 1 : 0;
+    OWNED(trainer) t = start(&data, &o, NULL);
+    sf_train_stats stats = {0};
+    reads[on] = error[on] = 0;
+    for (int i = 0; i < 250; i++) {
+      ck_ok(sf_trainer_step(t, &stats));
+      if (i >= 230) reads[on] += stats.row_reads, error[on] += stats.mse;
+    }
+    ck_assert_int_eq(t->charge.reads > 0, on);
+  }
+  ck_assert_double_lt(reads[1], 0.95 * reads[0]);
+  ck_assert_double_gt(error[1], 0.9 * error[0]);
+  sf_train_options o = small_run();
+  o.fixed_steps = 2;
+  o.charge = 0.5;
+  check_resume(&o, 20, 13);
+}
+
 TEST(every_prefix_is_evaluated)
 {
   OWNED(sf_dataset) test = load("test");

@@ -40,9 +40,12 @@ static inline vf surrogate(vf x)
 /* Backward of fire at step t. g: gradient of the activation in, of the current out; carry: gradient of the membrane
  * after reset, in and out; leak[B]: sum of g_h * dh/dw per lane. dh/dw = k(1-k)(x - v) = (1-k)(h - v) where the input
  * decays, -k(1-k) v where it does not; the part of v, which this step leaves to the next, is added here, where h is at
- * hand: carry = (1-k) g_h(t+1). */
+ * hand: carry = (1-k) g_h(t+1).
+ * fired: see count_fired; NULL: firing is not charged. A neuron that fires at any of T steps, a = 1 - prod (1 - s(u)),
+ * costs charge: da/ds(t) is 1 where it fires at no other step, else 0. */
 static inline void fire_backward(const sf_net_view *net, int layer, float k, int t, int rows, const float *restrict h,
-                                 float *restrict g, float *restrict carry, float *restrict leak)
+                                 const float *restrict fired, float *restrict g, float *restrict carry,
+                                 float *restrict leak)
 {
   if (net->relu) {
     for (int i = 0; i < rows * B; i++) g[i] = h[i] > 0 ? g[i] : 0;
@@ -52,14 +55,16 @@ static inline void fire_backward(const sf_net_view *net, int layer, float k, int
   const float keep = 1.0f - k, gain = net->mode == SF_NODECAY || hybrid_first ? 1.0f : k;
   const float with_h = net->mode == SF_NODECAY || hybrid_first ? 0.0f : keep;
   const float with_v = net->mode == SF_NODECAY ? -k : -1.0f;
-  const vf theta = (vf){0} + net->theta[layer];
+  const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
   for (int l = 0; l < B; l += VL) {
     vf sum_h = {0}, sum_v = {0};
     for (int r = 0; r < rows; r++) {
       const int i = r * B + l;
       const vf x = *(const vf *)(h + i), gv = *(const vf *)(carry + i);
       const vf v = x - (vf)((x >= theta) & (vi)theta);
-      const vf gh = (*(const vf *)(g + i) - theta * gv) * surrogate(x - theta) + gv;
+      vf gs = *(const vf *)(g + i);
+      if (fired) gs += (vf)((*(const vf *)(fired + i) == (vf)((x >= theta) & (vi)one)) & (vi)charge);
+      const vf gh = (gs - theta * gv) * surrogate(x - theta) + gv;
       *(vf *)(carry + i) = keep * gh;
       *(vf *)(g + i) = gain * gh;
       sum_h += gh * x;
@@ -67,6 +72,32 @@ static inline void fire_backward(const sf_net_view *net, int layer, float k, int
     }
     *(vf *)(leak + l) += with_h * sum_h + with_v * sum_v;
   }
+}
+
+/* Counts the steps at which each neuron of spiking layers `first`..2 fires; where no sample is, one that no membrane
+ * reaches. */
+static void count_fired(const sf_net_view *net, const sf_block *x, int first, int steps, sf_net_scratch *w)
+{
+  for (int layer = first; layer < 3; layer++)
+    for (int r = 0; r < net->hidden; r++) {
+      float *to = w->fired[layer] + r * B;
+      for (int l = 0; l < B; l++) to[l] = l < x->lanes ? 0.0f : 2.0f;
+      for (int t = 0; t < steps; t++) {
+        const float *h = (layer == 0 ? x->m1[t] : layer == 1 ? x->m3[t] : x->m4[t]) + r * B;
+        for (int l = 0; l < B; l++) to[l] += h[l] >= net->theta[layer] ? 1.0f : 0.0f;
+      }
+    }
+}
+
+static bool charged(const sf_net_view *net)
+{
+  return !net->relu && (net->charge[0] > 0 || net->charge[1] > 0 || net->charge[2] > 0);
+}
+
+/* For backward_out. */
+static const float *fired(const sf_net_view *net, int layer, const sf_net_scratch *w)
+{
+  return charged(net) ? w->fired[layer] : NULL;
 }
 
 /* Backward of integrate at step t: g is the gradient of o(t) (its carry included), returns the gradient of e in de and
@@ -93,8 +124,9 @@ static void add_to(float *restrict sum, const float *restrict x, int n)
   for (int i = 0; i < n; i++) sum[i] += x[i];
 }
 
-/* What layer_backward leaves behind; NULL = not wanted. */
+/* What layer_backward leaves behind; NULL = not wanted. fired: what it reads, as fire_backward. */
 typedef struct backward_out {
+  const float *fired;
   float *carry, *leak, *sum; /* sum: currents' gradient added up over the steps */
   float *all;                /* currents' gradient [hidden][B] */
   word *rows, *lanes;        /* currents' gradient as operands */
@@ -109,7 +141,8 @@ static void layer_backward(const sf_net_view *net, int index, float k, int t, co
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
-    fire_backward(net, index, k, t, n, h + m * B, tile, out.carry + m * B, out.leak);
+    fire_backward(net, index, k, t, n, h + m * B, out.fired ? out.fired + m * B : NULL, tile, out.carry + m * B,
+                  out.leak);
     if (out.sum) add_to(out.sum + m * B, tile, n * B);
     if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
     if (out.rows) pack_rows(tile, n, out.rows + m / PAIR * B);
@@ -151,7 +184,8 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   pack_rows(gj, 4, small);
   const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
   layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
-                 (backward_out){w->g4, w->leak[3], sum, events ? floats(w->lanes) : NULL, rows, events ? NULL : lanes});
+                 (backward_out){fired(net, 2, w), w->g4, w->leak[3], sum, events ? floats(w->lanes) : NULL, rows,
+                                events ? NULL : lanes});
   if (events) {
     transpose(lanes, hidden, B, words(w->t), hidden);
     event_outer(grad->w4t, hidden, x->s3[t], floats(w->t));
@@ -169,7 +203,7 @@ static void colour_backward(const sf_net_words *n, const sf_block *x, int t, flo
   word *rows = words(w->rows), *lanes = words(w->lanes), *rows3 = words(w->spikes);
   colour_output_backward(n, x, t, gcolour, gj, NULL, grad, w);
   layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, rows, x->m3[t],
-                 (backward_out){w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
+                 (backward_out){fired(net, 1, w), w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
   gemm(operands(n->w3ht), hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);
   pack_lanes(x->i[t], SF_DENSITY_OUT, rows);
   transpose(rows, SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
@@ -209,6 +243,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
   memset(w->sum1, 0, plane);
   memset(w->sum3, 0, plane);
   memset(w->leak, 0, sizeof w->leak);
+  if (charged(net)) count_fired(net, x, 0, steps, w);
   for (int t = steps - 1; t >= 0; t--) {
     float gi[SF_DENSITY_OUT * B], ge[B], e[B];
     word small[SF_DENSITY_OUT * B];
@@ -225,7 +260,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
     add_outer(grad->w2, hidden, small, SF_DENSITY_OUT, activations(net, 0, x->m1[t], w), hidden);
     pack_rows(gi, SF_DENSITY_OUT, small);
     layer_backward(net, 0, net->k[0], t, n->w2t, SF_DENSITY_OUT / PAIR, small, x->m1[t],
-                   (backward_out){w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
+                   (backward_out){fired(net, 0, w), w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
   }
   constant_backward(n, x, df, grad, w);
   tiles_end();

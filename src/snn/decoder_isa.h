@@ -189,13 +189,14 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   memset(w->sum1, 0, plane);
   memset(w->sum3, 0, plane);
   memset(w->leak, 0, sizeof w->leak);
+  if (charged(v)) count_fired(v, &d->net, 1, steps, w);
   for (int t = steps - 1; t >= 0; t--) {
     float gj[4 * B];
     add_to(gcolour, dcolour + t * 3 * B, 3 * B);
     colour_output_backward(net, &d->net, t, gcolour, gj, w->sum1, &grad->net, w);
     add_to(gsum, gj, 4 * B);
     layer_backward(v, 1, v->k[2], t, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[t],
-                   (backward_out){w->g3, w->leak[2], w->sum3, NULL, NULL, NULL});
+                   (backward_out){fired(v, 1, w), w->g3, w->leak[2], w->sum3, NULL, NULL, NULL});
   }
   decoder_inputs_backward(n, d, dproduct, grad, w);
   tiles_end();

@@ -15,7 +15,9 @@ typedef struct sf_net_view {
   const float *w1, *w2, *w3, *w4, *w5;
   float k[SF_LAYERS]; /* D1, density integrator, C1, C2, colour integrator */
   float theta[3];
-  float h_step; /* h is rounded down to its multiples; 0: it is not */
+  float h_step;    /* h is rounded down to its multiples; 0: it is not */
+  float charge[3]; /* of backward: what a sample costs more for each neuron of D1, C1, C2 that fires at any step; all 0:
+                      nothing */
   int hidden, features, mode, relu;
 } sf_net_view;
 
@@ -41,6 +43,7 @@ typedef struct sf_net_grad {
 
 /* What the forward pass of one block leaves: prefix outputs, and the membranes before fire for backward. */
 typedef struct sf_block {
+  int lanes; /* that hold samples: the others are not charged */
   float f[2 * 16 * SF_BLOCK], sh[SF_DIR_FEATURES * SF_BLOCK];
   float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][4 * SF_BLOCK];
   float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */
@@ -96,6 +99,7 @@ typedef struct sf_net_scratch {
   float g1[SF_LANES * SF_BLOCK], g3[SF_LANES * SF_BLOCK], g4[SF_LANES * SF_BLOCK]; /* carries of the membranes */
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
+  float fired[3][SF_LANES * SF_BLOCK]; /* steps at which neurons of D1, C1, C2 fire, where they are charged */
 } sf_net_scratch;
 
 typedef struct sf_adam {

@@ -45,7 +45,8 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 46, VM_FIELDS = 3, FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS };
+enum { STATE_FIELDS = 46, VM_FIELDS = 3, CHARGE_FIELDS = 2 };
+enum { FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS + CHARGE_FIELDS };
 static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
 {
   const state_field table[STATE_FIELDS] = {
@@ -102,6 +103,10 @@ static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
   memcpy(f, table, sizeof table);
   int n = STATE_FIELDS;
   for (int i = 0; i < SF_T_MAX; i++) f[n++] = (state_field){prefix[i], .number = &t->search.prefix[i]};
+  if (t->options.charge > 0) {
+    f[n++] = (state_field){"train.charge_error", .number = &t->charge.error};
+    f[n++] = (state_field){"train.charge_reads", .number = &t->charge.reads};
+  }
   if (!t->vm) return n;
   f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
   f[n++] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
@@ -142,6 +147,7 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
   sf_model_describe(&t->model, meta);
   put(meta, "beta", t->options.beta);
+  if (t->options.charge > 0) put(meta, "charge", t->options.charge);
   put(meta, "seed", (double)t->options.seed);
   if (with_optimiser) {
     const cJSON *item;

@@ -1,5 +1,6 @@
 /* One iteration's samples: bundles of rays in groups, added in order. What a bundle computes is the backbone's. */
 #include "train/internal.h"
+#include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,6 +45,22 @@ static int at_threshold(const float *membrane, int rows, int lanes, float theta)
   return count;
 }
 
+/* Neurons of spiking layer 0..2 that reached theta at any step. */
+static int at_any_step(const sf_block *b, int layer, int steps, int rows, int lanes, float theta)
+{
+  int count = 0;
+  for (int r = 0; r < rows; r++) {
+    float most[SF_BLOCK];
+    for (int l = 0; l < SF_BLOCK; l++) most[l] = -INFINITY;
+    for (int s = 0; s < steps; s++) {
+      const float *m = (layer == 0 ? b->m1[s] : layer == 1 ? b->m3[s] : b->m4[s]) + r * SF_BLOCK;
+      for (int l = 0; l < SF_BLOCK; l++) most[l] = most[l] > m[l] ? most[l] : m[l];
+    }
+    for (int l = 0; l < lanes; l++) count += most[l] >= theta;
+  }
+  return count;
+}
+
 void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *b, int lanes, sf_group *g)
 {
   const sf_config *c = &t->model.config;
@@ -51,7 +68,9 @@ void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *
     const float *const membrane[3] = {b->m1[s], b->m3[s], b->m4[s]};
     for (int l = first; l < 3; l++) g->spikes[l] += at_threshold(membrane[l], c->hidden, lanes, c->theta[l]);
   }
+  for (int l = first; l < 3; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
   g->neurons += (double)steps * c->hidden * lanes;
+  g->lanes += lanes;
 }
 
 static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
@@ -96,9 +115,10 @@ static void add_groups(float *const part[GROUPS], size_t n)
 
 void sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
 {
-  double spikes[3] = {0}, neurons = 0;
+  double spikes[3] = {0}, fired[3] = {0}, neurons = 0, lanes = 0;
   float *part[GROUPS];
   t->backbone->prepare(t, plan);
+  sf_charge_begin(t, plan);
   run_bundles(t, plan);
   for (int g = 0; g < GROUPS; g++) part[g] = t->group[g].grad;
   add_groups(part, t->backbone->grad_bytes / sizeof(float));
@@ -106,8 +126,13 @@ void sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean
   for (int n = 0; n < GROUPS; n++) {
     const sf_group *g = &t->group[n];
     add_sums(mean, &g->sums, plan->inverse_rays);
-    for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l];
-    neurons += g->neurons;
+    for (int l = 0; l < 3; l++) spikes[l] += g->spikes[l], fired[l] += g->fired[l];
+    neurons += g->neurons, lanes += g->lanes;
   }
-  for (int l = 0; l < 3; l++) firing[l] = neurons > 0 ? spikes[l] / neurons : 0;
+  const double counted = lanes * t->model.config.hidden;
+  for (int l = 0; l < 3; l++) {
+    firing[l] = neurons > 0 ? spikes[l] / neurons : 0;
+    fired[l] = counted > 0 ? fired[l] / counted : 0;
+  }
+  sf_charge_measured(t, fired);
 }

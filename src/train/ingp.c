@@ -97,6 +97,7 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   const int lanes = load_directions(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &block[b]);
+    block[b].lanes = sf_block_lanes(lanes, b);
     t->kernels->forward(net, &block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));

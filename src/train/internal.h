@@ -62,6 +62,7 @@ typedef struct sf_loss_plan {
   double d;               /* t^ - t_f */
   float inverse_rays;
   float extra;   /* weight of L_extra, 0 = off */
+  float charge;  /* of reads of weights, 0 = off */
   float distill; /* weight of L_distill */
   float k_sigma, k_colour;
 } sf_loss_plan;
@@ -93,6 +94,7 @@ typedef struct sf_group {
   void *grad; /* sf_backbone.grad_bytes, floats */
   sf_loss_sums sums;
   double spikes[3], neurons; /* of the first block of each bundle */
+  double fired[3], lanes;    /* there: neurons that fired at any step, samples */
   bool wild;                 /* a gradient of the field that is not finite, or far too large */
 } sf_group;
 
@@ -123,6 +125,11 @@ typedef struct sf_search {
   double at;                                            /* share of the search at the last measurement */
   double mark, mark_at, moved; /* t* of a quarter of the search ago, where that was, and how far it moved in one */
 } sf_search;
+
+/* Of --charge (charge.c): averages over its recent iterations. */
+typedef struct sf_charge {
+  double error, reads; /* squared error of what is trained; reads of weights per sample. 0: nothing measured yet */
+} sf_charge;
 
 struct sf_vm; /* vm.h */
 struct sf_probes;
@@ -159,7 +166,7 @@ struct sf_trainer {
   const sf_dataset *data;
   const sf_kernels *kernels;
   sf_model model;
-  sf_net_words *net;               /* of the current parameters, for the kernels */
+  sf_net_words *net;               /* of the current parameters, for the kernels; TensoRF: part of vm */
   float *grad, *moment1, *moment2; /* [model.size] */
   float *rounded;                  /* in fine-tuning: parameters with rounded weights, [model.size], else NULL */
   float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
@@ -174,7 +181,9 @@ struct sf_trainer {
   int stage, rays, stride;
   double seconds, progress, stage_progress, last_step; /* last_step: seconds of the last iteration */
   sf_search search;
-  double firing[3];       /* spikes per neuron and step of D1, C1, C2, last iteration */
+  double firing[3]; /* spikes per neuron and step of D1, C1, C2, last iteration */
+  double row_reads; /* of a sample, last iteration */
+  sf_charge charge;
   double occupied, epoch; /* epoch: passes over the training pixels in this stage */
   sf_health health;
   int64_t samples; /* through the nets, over the run */
@@ -189,6 +198,13 @@ sf_search_report sf_search_now(const sf_trainer *trainer);
 /* Of a frame at so many steps by the firing that was measured, mJ; and what that saves of the twin's, as a share. */
 double sf_search_energy(const sf_trainer *trainer, double steps);
 double sf_search_saving(const sf_trainer *trainer, double steps);
+
+/* Before the backward pass: what a neuron that fires at any step is charged with. */
+void sf_charge_begin(sf_trainer *trainer, const sf_loss_plan *plan);
+/* After it: any[3], shares of D1, C1, C2 that fired at any step. */
+void sf_charge_measured(sf_trainer *trainer, const double any[3]);
+/* After an iteration whose plan charges. */
+void sf_charge_update(sf_trainer *trainer, double error);
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);
@@ -264,6 +280,12 @@ sf_status sf_parameters_check(const sf_trainer *trainer);
 /* After an iteration: takes a snapshot when one is due; at the end of the run the mean becomes the model. */
 sf_status sf_average_update(sf_trainer *trainer, double progress_before);
 sf_status sf_average_reserve(sf_trainer *trainer);
+/* Lanes of block `index` that hold samples, where a bundle has so many. */
+static inline int sf_block_lanes(int lanes, int index)
+{
+  const int left = lanes - index * SF_BLOCK;
+  return left < 0 ? 0 : left < SF_BLOCK ? left : SF_BLOCK;
+}
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
 /* Adds the spikes of spiking layers `first`..2 in the first `lanes` lanes of a block. */

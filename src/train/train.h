@@ -23,10 +23,11 @@ typedef struct sf_train_options {
   sf_step_price price;
   double target_loss;   /* dB: t* is the fewest steps that lose at most this; 0 = beta decides */
   double target_saving; /* percent of the ReLU twin's energy: t* is the most steps that save it; 0 = beta decides */
-  double search_rate;   /* how fast the search's averages forget, 1 = default; the result should not hang on it */
-  double alpha;         /* weight of L_extra */
-  int stage1, stage2;   /* iterations; ignored when minutes > 0 */
-  double minutes;       /* time budget of both stages, a quarter for stage I; 0 = iterations */
+  double charge; /* once t* is found: by how many percent the error may grow for one percent fewer reads of weights */
+  double search_rate; /* how fast the search's averages forget, 1 = default; the result should not hang on it */
+  double alpha;       /* weight of L_extra */
+  int stage1, stage2; /* iterations; ignored when minutes > 0 */
+  double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;
   int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
@@ -82,6 +83,7 @@ typedef struct sf_train_stats {
   sf_search_report search;
   double tau[SF_LAYERS];
   double firing[3];  /* spikes per neuron and step of D1, C1, C2 */
+  double row_reads;  /* 8 bytes of weights that the accelerator reads for a sample of the iteration */
   int rays, samples; /* of the iteration */
   int lattice;       /* its shortest step is 2 sqrt(3) / lattice model units; hash grids */
   double occupied;   /* share of occupied cells */

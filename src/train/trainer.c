@@ -239,6 +239,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const bool learned = searching(t);
+  if (final_part(t) && t->model.config.net != SF_NET_ANN) p.charge = (float)t->options.charge;
   if (!learned || scaled(t)) {
     const int wanted = t->stage == 1 || learned ? T : t->model.t_r;
     train_one(&p, scaled(t) && wanted > 2 ? 2 : wanted);
@@ -327,6 +328,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
                       .t_r = t->model.t_r,
                       .search = sf_search_now(t),
                       .firing = {t->firing[0], t->firing[1], t->firing[2]},
+                      .row_reads = t->row_reads,
                       .rays = t->batch.rays,
                       .samples = t->batch.samples,
                       .lattice = t->model.config.lattice / t->stride,
@@ -377,6 +379,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   t->backbone->update(t);
   sf_health_leaks(t);
   SF_TRY(sf_parameters_check(t));
+  if (plan.charge > 0) sf_charge_update(t, mean.prefix[plan.steps - 1]);
   if (plan.full)
     sf_search_update(t, &mean, mean.prefix[plan.steps - 1] / fmax(mse, 1e-12), fmin(t->stage_progress / search, 1));
   int event[3];

@@ -15,6 +15,7 @@ static sf_status create(sf_trainer *t)
   vm->decoder = sf_aligned_alloc(sizeof *vm->decoder);
   vm->ray = calloc(RAYS_MAX, sizeof *vm->ray);
   if (!vm->decoder || !vm->ray) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  t->net = &vm->decoder->net;
   for (int i = 0; i < t->workers; i++) /* the density is the same at every prefix */
     for (int step = 1; step < SF_T_MAX; step++) {
       t->worker[i].ray.sigma[step] = t->worker[i].ray.sigma[0];

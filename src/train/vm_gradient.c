@@ -70,6 +70,7 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,
                             block[b].product, products);
+    block[b].net.lanes = sf_block_lanes(lanes, b);
     t->kernels->decoder_forward(vm->decoder, &block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));

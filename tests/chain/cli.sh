@@ -211,6 +211,7 @@ usage --objective sf_train d -o out --objective none
 usage "beside a target" sf_train d -o out --target-loss 0.1 --beta 1e-6
 usage "number of steps is fixed" sf_train d -o out --price energy --fixed-steps 2
 usage "number of steps is fixed" sf_train d -o out --target-saving 50 --net ann
+usage "--charge has no effect on --net ann" sf_train d -o out --net ann --charge 0.2
 usage "exclude each other" sf_train d -o out --target-loss 0.1 --target-saving 50
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan

@@ -76,6 +76,7 @@ static sf_status check_effect(train_arguments *a)
                            *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};
+  static const char *const spiking[] = {"--charge", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -89,6 +90,8 @@ static sf_status check_effect(train_arguments *a)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
   if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, search, "has no effect where the number of steps is fixed"));
+  if (a->train.config.net == SF_NET_ANN)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, spiking, "has no effect on --net ann"));
   if (!a->fine_tune) return sf_ok();
   SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, grid, fine_tune));
   return sf_cli_refuse(&cli, a->argc, a->argv, settled, fine_tune);

@@ -110,6 +110,8 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   if (sf_field_of(c)->lattice) cJSON_AddNumberToObject(json, "lattice", c->lattice);
   cJSON_AddItemToObject(json, "tau", cJSON_CreateDoubleArray(s->tau, SF_LAYERS));
   cJSON_AddItemToObject(json, "firing", cJSON_CreateDoubleArray(s->firing, 3));
+  cJSON_AddNumberToObject(json, "charge", a->train.charge);
+  cJSON_AddNumberToObject(json, "row_reads", s->row_reads);
   cJSON_AddItemToObject(json, "quiet", cJSON_CreateIntArray(s->quiet, 3));
   cJSON_AddItemToObject(json, "revived", cJSON_CreateIntArray(s->revived, 3));
   cJSON_AddNumberToObject(json, "psnr", q->psnr);
@@ -143,6 +145,7 @@ static void print_text(const train_arguments *a, const sf_config *c, const sf_tr
   if (!isnan(q->ssim)) printf(", SSIM %.4f", q->ssim);
   printf(" over %d views\n", q->views);
   print_search(a, s);
+  if (a->train.charge > 0) printf("%s: %.0f reads of weights per sample, 8 bytes each\n", a->output, s->row_reads);
   if (sf_field_of(c)->lattice)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
            c->dt_gamma > 0 ? " near the camera" : "");

@@ -39,6 +39,10 @@ static sf_option *energy(train_arguments *a, sf_option *o)
        "in place of --beta: the most steps that save so much of the ReLU twin's energy"},
       {"--price", 0, SF_ARG_CHOICE, &t->price, 0, 0, "exponential|energy", "KIND",
        "what beta weighs: e^t, as the paper, or what one more step costs here, mJ per frame (default exponential)"},
+      {"--charge", 0, SF_ARG_DOUBLE, &t->charge, 0, 10, NULL, "C",
+       "once the steps are found, neurons learn to fire less: the error may grow by C percent for each percent of "
+       "fewer "
+       "reads of weights; 0.2 is a good start (default 0)"},
       {"--steps", 'T', SF_ARG_INT, &t->config.steps, 1, SF_T_MAX, NULL, "T",
        "time steps unrolled in training (default 8)"},
       {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
