@@ -1,6 +1,6 @@
 // Lines of 16 bytes from a memory behind an AXI4 read port: asked for one by one, they come in the order of the requests.
 // Bursts of two beats of 64 bits, one ID. Room for a line is reserved before it is asked for, so the read channel never
-// has to wait; it is free again the cycle after the line was popped. The line on offer stands in a register.
+// has to wait; it is free again two cycles after the line was popped. The line on offer and ready_o stand in registers.
 // After a clear the memory still answers what was asked of it, and a request on offer stays, as AXI demands. Those lines are
 // dropped, and nothing is asked before the last of them has come.
 `default_nettype none
@@ -28,25 +28,26 @@ module sf_fetch #(
     input  wire [ 63:0] m_axi_rdata_i,
     input  wire [  1:0] m_axi_rresp_i
 );
-  reg ask_q, second_q, pop_q;
+  reg ask_q, second_q, pop_q, ready_q;
   reg [27:0] address_q;
   reg [63:0] first_half_q;
   reg [LOG2_LINES:0] reserved_q, owed_q, stale_q;
   wire draining = stale_q != '0;
-  assign ready_o = !ask_q && !reserved_q[LOG2_LINES] && !draining;
-  wire take = ask_i && ready_o && !clear_i;
+  assign ready_o = ready_q;
+  wire take = ask_i && ready_q && !clear_i;
   wire end_of_line = m_axi_rvalid_i && second_q;
   wire push = end_of_line && !draining;
   wire [LOG2_LINES:0] owed = owed_q + {{LOG2_LINES{1'b0}}, take} - {{LOG2_LINES{1'b0}}, end_of_line};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {ask_q, second_q, pop_q} <= 3'd0;
+      {ask_q, second_q, pop_q, ready_q} <= 4'd0;
       reserved_q <= '0;
       owed_q <= '0;
       stale_q <= '0;
     end else begin
       ask_q <= take || (ask_q && !m_axi_arready_i);
+      ready_q <= !take && !(ask_q && !m_axi_arready_i) && !reserved_q[LOG2_LINES] && !draining && !clear_i;
       if (m_axi_rvalid_i) second_q <= !second_q;
       owed_q <= owed;
       pop_q <= pop_i && !clear_i;
