@@ -49,6 +49,21 @@ static sf_fit_rays make_rays(const fx_scene *scene, uint64_t count, uint32_t noi
   return rays;
 }
 
+/* Two of them, of whatever rays there are. */
+static sf_fit_rays tiles_of(const sf_fit_rays *rays)
+{
+  sf_fit_rays tiles = *rays;
+  tiles.count = 2 * FX_TILE * FX_TILE;
+  return tiles;
+}
+
+static const sf_technology *prices(void)
+{
+  static sf_technology technology;
+  if (!technology.count) ck_ok(sf_technology_load(&technology, "share/tech/45nm.tech"));
+  return &technology;
+}
+
 static void assert_same_pixels(const fx_scene *a, const fx_scene *b, const sf_fit_rays *rays)
 {
   uint64_t samples = 0;
@@ -126,7 +141,14 @@ TEST(something_is_left_of_a_silent_net)
   for (int l = 0; l < SF_LAYERS; l++) memset(scene.net.layer[l].w, 0, (size_t)scene.net.layer[l].n_in * SF_LANES);
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
   const fx_scene *candidate[] = {&scene};
-  const sf_fit_job job = {.candidate = candidate, .widths = widest, .candidates = 1, .rays = &rays, .name = "silent"};
+  const sf_fit_rays tiles = tiles_of(&rays);
+  const sf_fit_job job = {.candidate = candidate,
+                          .widths = widest,
+                          .candidates = 1,
+                          .rays = &rays,
+                          .tiles = &tiles,
+                          .technology = prices(),
+                          .name = "silent"};
   sf_fit_report report;
   ck_ok(sf_fit(&trimmed, &job, &report));
   for (int l = FX_D1; l <= FX_C2; l++) ck_assert_int_eq(trimmed.net.layer[l].n_out, 1);
@@ -224,7 +246,7 @@ TEST(smaller_tables_keep_what_is_used)
     sf_trim trim;
     random_position(&scene, i, pos);
     ck_ok(sf_trim_use_create(&use, &scene));
-    sf_trim_use_place(&use, &scene, pos, 1000);
+    sf_trim_use_place(&use, &scene, pos, 0, 1000);
     sf_trim_all(&scene, &trim);
     for (int l = 0; l < scene.grid.levels; l++) trim.log2_size[l] = sf_trim_smaller(&scene, &trim, l);
     ck_ok(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
@@ -248,13 +270,119 @@ TEST(smaller_tables_keep_what_is_used)
 static sf_status fit(const fx_scene *const *candidate, int candidates, const sf_fit_rays *rays, double loss,
                      fx_scene *fitted, sf_fit_report *report)
 {
+  const sf_fit_rays tiles = tiles_of(rays);
   const sf_fit_job job = {.candidate = candidate,
                           .widths = widest,
                           .candidates = candidates,
                           .rays = rays,
+                          .tiles = &tiles,
+                          .technology = prices(),
                           .loss_db = loss,
                           .name = "out.snn"};
   return sf_fit(fitted, &job, report);
+}
+
+static void watch_read(void *user, fx_read what, const uint32_t pos[3])
+{
+  fx_memory_read(user, what, pos);
+}
+
+/* The field's lines missed by the tiles' rays, one by one through the portable core. */
+static uint64_t misses_of(const fx_scene *scene, const sf_fit_rays *tiles, const fx_cache_shape *shape,
+                          uint64_t *samples)
+{
+  fx_memory memory;
+  ck_ok(fx_memory_open(&memory, scene, shape));
+  const fx_watch watch = {watch_read, &memory};
+  fx_counts counts = {0};
+  for (uint64_t i = 0; i < tiles->count; i++) {
+    fx_ray ray;
+    fx_pixel pixel;
+    ck_ok(sf_fx_ray_make(scene, tiles->origin + 3 * i, tiles->direction + 3 * i, &ray));
+    fx_memory_ray(&memory, i / (FX_TILE * FX_TILE));
+    ck_ok(fx_render_watched(scene, &ray, NULL, NULL, &watch, &pixel, &counts));
+  }
+  const uint64_t misses = memory.counts.misses;
+  *samples = counts.samples;
+  fx_memory_close(&memory);
+  return misses;
+}
+
+/* Misses and energy of every size are those of the audit's counts; the smallest that is nearly the best is chosen. */
+TEST(the_cache_that_a_scene_needs)
+{
+  OWNED(fx_scene) scene = small_scene(31, FX_HYBRID), fitted;
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
+  const sf_fit_rays tiles = tiles_of(&rays);
+  const fx_scene *candidate[] = {&scene};
+  sf_fit_report r;
+  ck_ok(fit(candidate, 1, &rays, 0.1, &fitted, &r));
+  uint64_t least = UINT64_MAX, samples;
+  for (int i = 0; i < SF_FIT_CACHES; i++) {
+    const double misses = (double)misses_of(&fitted, &tiles, &r.cache[i].shape, &samples);
+    ck_assert_double_eq_tol(r.cache[i].misses * r.after.lookups * (double)samples, misses, 1e-6 * misses);
+    if (i > 0) ck_assert_double_le(r.cache[i].misses, r.cache[i - 1].misses);
+    least = r.cache[i].energy_fj < least ? r.cache[i].energy_fj : least;
+    if (r.cache[i].shape.bytes != sf_cache_built.bytes) continue;
+    ck_assert_uint_eq(r.cache[i].energy_fj, r.after.energy_fj);
+    ck_assert_double_eq_tol(r.after.misses * (double)samples, misses, 1e-6 * misses);
+  }
+  for (int i = 0; i < r.cache_chosen; i++) ck_assert_double_gt((double)r.cache[i].energy_fj, 1.01 * (double)least);
+  ck_assert_double_le((double)r.cache[r.cache_chosen].energy_fj, 1.01 * (double)least);
+}
+
+static fx_scene large_box(uint64_t seed)
+{
+  fixture_sizes sizes = small;
+  fx_scene scene = {.log2_bound = 2, .gamma_q24 = 1 << 20, .near_q16 = 20 << 16, .longest_q16 = 16 << 16};
+  fixture_set_sizes(&scene, &sizes);
+  scene.step_q24 = 150000;
+  ck_ok(fx_scene_allocate(&scene, "box"));
+  fixture_fill(&scene, &sizes, seed);
+  scene.step_q24 = 150000;
+  for (int i = 0; i < 3 * 64; i++) scene.occupancy[i] = (uint8_t)fixture_pick(seed, 32, (uint64_t)i, 0, 255);
+  scene.net.exp_in = (fx_scale){20000, 15, 8192};
+  for (int l = 0; l < SF_LAYERS; l++) scene.net.layer[l].theta = scene.net.layer[l].theta ? 20000 : 0;
+  ck_ok(fx_scene_check(&scene, "box"));
+  return scene;
+}
+
+/* Every sample of the rays lies in an occupied cell, in two cascades at least. */
+static void samples_in_cells(const fx_scene *scene, const sf_fit_rays *rays)
+{
+  const int64_t cells = (int64_t)scene->occ_res * scene->occ_res * scene->occ_res;
+  int in[3] = {0};
+  for (uint64_t i = 0; i < rays->count; i++) {
+    fx_ray ray;
+    uint32_t pos[3];
+    ck_ok(sf_fx_ray_make(scene, rays->origin + 3 * i, rays->direction + 3 * i, &ray));
+    for (int32_t n = fx_march_next(scene, &ray, 0, pos, NULL); n >= 0;
+         n = fx_march_next(scene, &ray, n + 1, pos, NULL)) {
+      const int64_t cell = fx_march_cell(scene, &ray, n);
+      ck_assert(scene->occupancy[cell >> 3] >> (cell & 7) & 1);
+      in[cell / cells]++;
+    }
+  }
+  ck_assert((in[0] > 100) + (in[1] > 100) + (in[2] > 100) >= 2);
+}
+
+/* A box of three cascades with growing steps. */
+TEST(a_large_box_is_fitted)
+{
+  OWNED(fx_scene) scene = large_box(33), fitted;
+  spoil(&scene);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
+  samples_in_cells(&scene, &rays);
+  const fx_scene *candidate[] = {&scene};
+  sf_fit_report r;
+  ck_ok(fit(candidate, 1, &rays, 0, &fitted, &r));
+  assert_same_pixels(&scene, &fitted, &rays);
+  ck_assert_uint_lt(r.after.bytes, r.before.bytes);
+  OWNED(fx_scene) smaller = {0};
+  ck_ok(fit(candidate, 1, &rays, 0.5, &smaller, &r));
+  ck_assert_double_le(r.loss_db, 0.5);
+  ck_assert_int_eq(smaller.log2_bound, 2);
+  ck_assert_int_lt(r.after.cells, r.before.cells);
 }
 
 LOOP_TEST(no_loss_is_no_difference, 3)
@@ -359,10 +487,13 @@ TEST(refusals)
   ck_bad(fit(candidate, 1, &rays, 0.1, &fitted, &r), SF_E_RANGE, "out.snn", "no ray of the data set meets");
   scene.occupancy = seen;
   ck_assert_ptr_null(fitted.owner);
+  const sf_fit_rays tiles = tiles_of(&rays);
   sf_fit_job job = {.candidate = candidate,
                     .widths = widest,
                     .candidates = 1,
                     .rays = &rays,
+                    .tiles = &tiles,
+                    .technology = prices(),
                     .name = "out.snn",
                     .tick = stop_at_once};
   ck_bad(sf_fit(&fitted, &job, &r), SF_E_STOPPED, "out.snn", "stopped");

@@ -214,7 +214,9 @@ static sf_status make_ledgers(const sf_technology *tech, const fx_net *net, cons
 {
   const fx_scene scene = {.backbone = FX_INGP, .net = *net};
   const sf_counted counted = {&scene, counts, &small_memory, traffic, {8192, 4}};
-  return sf_ledgers_make(tech, &counted, l);
+  SF_TRY(sf_ledgers_make(tech, &counted, l));
+  ck_assert_uint_eq(sf_ledger_everything_fj(tech, &counted), l->total[SF_LEDGER_NEURON]);
+  return sf_ok();
 }
 
 static sf_ledgers *small_ledgers(const sf_technology *tech)

@@ -18,12 +18,13 @@ typedef struct options {
   export_options extra;
   int steps, background;
   uint64_t fit_rays;
+  const char *tech;
   double fit_loss;
   sf_quant_widths widths;
   bool json, fit, quiet;
 } options;
 
-enum { FIT_RAYS = 262144, KIT_SAMPLES = 48 };
+enum { FIT_RAYS = 262144, FIT_TILES = 24, KIT_SAMPLES = 48 };
 static const double FIT_LOSS = 0.05;
 
 static sf_status file_size(const char *path, long long *size)
@@ -84,7 +85,8 @@ static sf_status quantise_narrower(const sf_model *model, const char *path, cons
 }
 
 /* The fitted scene and what its quantisation cost take the first place. */
-static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const options *o, sf_fit_report *report)
+static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const sf_fit_rays *tiles,
+                             const sf_technology *technology, const options *o, sf_fit_report *report)
 {
   fitting progress = {.begun = sf_seconds()};
   const fx_scene *candidate[CANDIDATES];
@@ -94,6 +96,8 @@ static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const optio
                           .widths = widths,
                           .candidates = c->count,
                           .rays = rays,
+                          .tiles = tiles,
+                          .technology = technology,
                           .loss_db = o->fit_loss,
                           .name = o->output,
                           .tick = fit_tick,
@@ -115,15 +119,17 @@ static sf_status fit_scene(const sf_model *model, const char *path, candidates *
                            sf_fit_report *report)
 {
   sf_dataset data;
-  sf_fit_rays rays;
+  sf_fit_rays rays, tiles = {0};
+  sf_technology technology;
+  SF_TRY(sf_technology_find(&technology, o->tech ? o->tech : "45nm"));
   SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], o->output, o->extra.data, "train", &(sf_dataset_options){0}));
   sf_dataset_warn(stderr, "sf_export", &data, NULL);
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
+  if (status.code == SF_OK) status = sf_fit_tiles_draw(&tiles, &data, FIT_TILES, o->extra.seed);
   sf_dataset_free(&data);
-  if (status.code != SF_OK) return status;
-  status = quantise_narrower(model, path, o, c);
-  if (status.code == SF_OK) status = fit_to_rays(c, &rays, o, report);
-  sf_fit_rays_free(&rays);
+  if (status.code == SF_OK) status = quantise_narrower(model, path, o, c);
+  if (status.code == SF_OK) status = fit_to_rays(c, &rays, &tiles, &technology, o, report);
+  sf_fit_rays_free(&rays), sf_fit_rays_free(&tiles);
   return status;
 }
 
@@ -224,11 +230,6 @@ static sf_status check_fit(const sf_config *config, const char *path)
 {
   if (sf_field_decoded(sf_field_of(config)))
     return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
-  if (config->bound > 1 || config->dt_gamma > 0)
-    return sf_fail(
-        SF_E_UNSUPPORTED,
-        "%s: --fit: for boxes of bound 1 with equal steps only, this one has bound %d and steps that grow by %g", path,
-        config->bound, (double)config->dt_gamma);
   return sf_ok();
 }
 
@@ -264,6 +265,7 @@ static sf_status check_use(const options *o)
   SF_TRY(only(o->widths.grid_bits, "--grid-bits", o->output, output));
   SF_TRY(only(o->fit_loss >= 0, "--fit-loss", o->fit, "--fit"));
   SF_TRY(only(o->fit_rays, "--fit-rays", o->fit, "--fit"));
+  SF_TRY(only(o->tech, "--tech", o->fit, "--fit"));
   SF_TRY(only(e->data, "--data", o->fit || e->vectors || e->traces, "--fit, --vectors or --traces"));
   SF_TRY(only(e->seed, "--seed", o->output || e->vectors || e->traces, "--output (-o), --vectors or --traces"));
   SF_TRY(only(e->samples, "--samples", e->vectors, "--vectors"));
@@ -326,6 +328,8 @@ int main(int argc, char **argv)
       {"--fit-loss", 0, SF_ARG_DOUBLE, &o.fit_loss, 0, 100, NULL, "DB",
        "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
       {"--fit-rays", 0, SF_ARG_U64, &o.fit_rays, 256, 1e8, NULL, "N", "rays that --fit looks at (default 262144)"},
+      {"--tech", 0, SF_ARG_INPUT, &o.tech, 0, 0, NULL, "FILE",
+       "prices that say what --fit saves: a file or a name (default 45nm)"},
       SF_GROUP("For other tools"),
       {"--data", 0, SF_ARG_INPUT, &o.extra.data, 0, 0, NULL, "DATA", "data set for --fit, --vectors and --traces"},
       {"--vectors", 0, SF_ARG_PLACE, &o.extra.vectors, 0, 0, NULL, "DIR",

@@ -29,6 +29,11 @@ typedef struct measured {
   uint64_t error, energy, bytes;
 } measured;
 
+/* What a sample reads of the field, on the tiles. */
+typedef struct field {
+  double lookups, misses;
+} field;
+
 typedef struct search {
   const sf_fit_job *job;
   const fx_scene *scene; /* the chosen candidate */
@@ -37,6 +42,7 @@ typedef struct search {
   sf_trim trim;                 /* what stays, so far */
   sf_fit_sum reference;         /* on the checking rays */
   measured check, rank_now;     /* the trim so far on the checking and on the ranking rays */
+  field field_now;              /* of the trim so far */
   sf_fit_rays rank;             /* rays with the pictures of the trim so far as targets */
   uint32_t *picture;            /* [rank_end][3] */
   uint64_t rank_end, check_end; /* rays 0..rank_end-1 rank, then come those that check */
@@ -105,8 +111,7 @@ static void list_cut(search *s, cut_kind kind, int layer, int index)
 static void list_cells(search *s)
 {
   bool there[SF_CELL_CLASSES] = {false};
-  const int64_t cells = (int64_t)s->scene->occ_res * s->scene->occ_res * s->scene->occ_res;
-  for (int64_t cell = 0; cell < cells; cell++) there[sf_cell_class(&s->use, cell)] = true;
+  for (int64_t cell = 0; cell < s->use.cells; cell++) there[sf_cell_class(&s->use, cell)] = true;
   for (int c = 1; c < SF_CELL_CLASSES; c++) /* class 0 is as good as opaque, or unseen */
     if (there[c]) list_cut(s, CUT_CELLS, 0, c);
 }
@@ -147,21 +152,52 @@ static sf_status measure(const search *s, const fx_scene *scene, const sf_fit_ra
   return sf_ok();
 }
 
+static double per_sample(uint64_t n, const fx_counts *counts)
+{
+  return counts->samples ? (double)n / (double)counts->samples : 0;
+}
+
+static sf_status measure_field(const search *s, const fx_scene *scene, field *f)
+{
+  sf_fit_field whole;
+  uint64_t misses;
+  SF_TRY(tick(s, NULL, 0, 0));
+  SF_TRY(sf_fit_measure_field(scene, s->job->tiles, &sf_cache_built, 1, &whole, &misses));
+  *f = (field){per_sample(whole.lookups, &whole.counts), per_sample(misses, &whole.counts)};
+  return sf_ok();
+}
+
+/* Everything that the audit counts: rays one by one for the nets, tiles for the field. */
+static uint64_t energy_of(const search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
+                          const field *f, const fx_cache_shape *cache)
+{
+  const double samples = (double)counts->samples;
+  const fx_memory_counts memory = {.lookups = (uint64_t)(f->lookups * samples),
+                                   .misses = (uint64_t)(f->misses * samples)};
+  const sf_traffic traffic = sf_traffic_of(scene, counts, &memory, rays);
+  const sf_counted counted = {scene, counts, &memory, &traffic, *cache};
+  return sf_ledger_everything_fj(s->job->technology, &counted);
+}
+
+/* new_field: measured with the trim, and left there; NULL: the one of the trim so far holds. */
 static sf_status measure_trim(const search *s, const sf_trim *trim, const sf_fit_rays *rays, uint64_t begin,
-                              uint64_t end, uint32_t *picture, measured *m)
+                              uint64_t end, uint32_t *picture, field *new_field, measured *m)
 {
   fx_scene trial;
   sf_fit_sum sum;
   SF_TRY(sf_trim_apply(s->scene, trim, &s->use, s->job->name, &trial));
-  const sf_status status = measure(s, &trial, rays, begin, end, picture, &sum);
-  *m = (measured){sum.error, sf_energy_fj(&sum.counts), (uint64_t)sf_packed_bytes(&trial, s->widths)};
+  sf_status status = measure(s, &trial, rays, begin, end, picture, &sum);
+  if (status.code == SF_OK && new_field) status = measure_field(s, &trial, new_field);
+  *m = (measured){
+      sum.error, energy_of(s, &trial, &sum.counts, end - begin, new_field ? new_field : &s->field_now, &sf_cache_built),
+      (uint64_t)sf_packed_bytes(&trial, s->widths)};
   fx_scene_free(&trial);
   return status;
 }
 
-static sf_status check_trim(const search *s, const sf_trim *trim, measured *m)
+static sf_status check_trim(const search *s, const sf_trim *trim, field *f, measured *m)
 {
-  return measure_trim(s, trim, s->job->rays, s->rank_end, s->check_end, NULL, m);
+  return measure_trim(s, trim, s->job->rays, s->rank_end, s->check_end, NULL, f, m);
 }
 
 /* The error of the reference, scaled to the ranking rays: those are too few to say it themselves. */
@@ -179,10 +215,11 @@ static sf_status rank_cut(const search *s, const sf_trim *trim, cut *c)
 {
   const measured *now = large(c) ? &s->check : &s->rank_now;
   measured m;
+  field f;
   if (large(c))
-    SF_TRY(check_trim(s, trim, &m));
+    SF_TRY(check_trim(s, trim, &f, &m));
   else
-    SF_TRY(measure_trim(s, trim, &s->rank, 0, s->rank_end, NULL, &m));
+    SF_TRY(measure_trim(s, trim, &s->rank, 0, s->rank_end, NULL, NULL, &m));
   c->loss = large(c) ? ratio(m.error, now->error) - 1 : (double)m.error / rank_error(s);
   c->saving = 2 - ratio(m.energy, now->energy) - ratio(m.bytes, now->bytes);
   return sf_ok();
@@ -236,13 +273,14 @@ static sf_status take_cuts(search *s, double limit, int begin, int end)
 {
   sf_trim trial = s->trim;
   measured m;
+  field f;
   if (begin == end || s->checks == CHECKS_MAX) return sf_ok();
   SF_TRY(tick(s, "checking", begin, end));
   for (int i = begin; i < end; i++) apply_cut(s, &trial, &s->cuts[i]);
-  SF_TRY(check_trim(s, &trial, &m));
+  SF_TRY(check_trim(s, &trial, &f, &m));
   s->checks++;
   if ((double)m.error <= limit) {
-    s->trim = trial, s->check = m;
+    s->trim = trial, s->check = m, s->field_now = f;
     return sf_ok();
   }
   if (end - begin == 1) return sf_ok();
@@ -252,12 +290,14 @@ static sf_status take_cuts(search *s, double limit, int begin, int end)
 
 static sf_status search_rounds(search *s)
 {
-  SF_TRY(check_trim(s, &s->trim, &s->check));
+  field f;
+  SF_TRY(check_trim(s, &s->trim, &f, &s->check));
+  s->field_now = f;
   list_cuts(s);
   for (int round = 0; round < ROUNDS; round++) {
     const double limit = error_allowed(s, allowance[round]), room = limit / (double)s->check.error - 1;
     if (!(room > 0)) continue;
-    SF_TRY(measure_trim(s, &s->trim, s->job->rays, 0, s->rank_end, s->picture, &s->rank_now));
+    SF_TRY(measure_trim(s, &s->trim, s->job->rays, 0, s->rank_end, s->picture, NULL, &s->rank_now));
     SF_TRY(rank_cuts(s, round));
     s->checks = 0;
     SF_TRY(take_cuts(s, limit, 0, cuts_in_reach(s, room)));
@@ -298,6 +338,49 @@ static sf_status choose_candidate(search *s, int *chosen)
   return sf_ok();
 }
 
+static sf_status describe(const search *s, const fx_scene *scene, const sf_quant_widths *widths, const sf_fit_sum *sum,
+                          sf_fit_state *state)
+{
+  const uint64_t checked = s->check_end - s->rank_end;
+  field f;
+  SF_TRY(measure_field(s, scene, &f));
+  sf_fit_describe(scene, widths, sum, checked, state);
+  state->lookups = f.lookups, state->misses = f.misses;
+  state->energy_fj = energy_of(s, scene, &sum->counts, checked, &f, &sf_cache_built);
+  return sf_ok();
+}
+
+/* A cache is as good as another that saves no more than this. */
+static const double NEARLY = 1.01;
+
+/* The cache that the fitted scene needs: the smallest that is nearly as good as the best. A small one misses more, a
+ * large one costs more per look-up. */
+static sf_status choose_cache(const search *s, const fx_scene *scene, const sf_fit_sum *sum, sf_fit_report *r)
+{
+  fx_cache_shape shape[SF_FIT_CACHES];
+  sf_fit_field whole;
+  uint64_t misses[SF_FIT_CACHES];
+  for (int i = 0; i < SF_FIT_CACHES; i++) shape[i] = (fx_cache_shape){FX_CACHE_BYTES_MIN << i, sf_cache_built.ways};
+  SF_TRY(tick(s, "cache", 0, SF_FIT_CACHES));
+  SF_TRY(sf_fit_measure_field(scene, s->job->tiles, shape, SF_FIT_CACHES, &whole, misses));
+  uint64_t least = UINT64_MAX;
+  for (int i = 0; i < SF_FIT_CACHES; i++) {
+    const field f = {per_sample(whole.lookups, &whole.counts), per_sample(misses[i], &whole.counts)};
+    r->cache[i] = (sf_fit_cache){shape[i], whole.lookups ? (double)misses[i] / (double)whole.lookups : 0,
+                                 energy_of(s, scene, &sum->counts, s->check_end - s->rank_end, &f, &shape[i])};
+    least = r->cache[i].energy_fj < least ? r->cache[i].energy_fj : least;
+  }
+  for (r->cache_chosen = 0; (double)r->cache[r->cache_chosen].energy_fj > NEARLY * (double)least;) r->cache_chosen++;
+  return sf_ok();
+}
+
+static sf_status describe_both(const search *s, const fx_scene *fitted, const sf_fit_sum *sum, sf_fit_report *report)
+{
+  SF_TRY(describe(s, s->job->candidate[0], &s->job->widths[0], &s->reference, &report->before));
+  SF_TRY(describe(s, fitted, s->widths, sum, &report->after));
+  return choose_cache(s, fitted, sum, report);
+}
+
 static sf_status finish(search *s, const sf_trim *exact, fx_scene *fitted, sf_fit_report *report)
 {
   const uint64_t checked = s->check_end - s->rank_end;
@@ -307,6 +390,7 @@ static sf_status finish(search *s, const sf_trim *exact, fx_scene *fitted, sf_fi
                          ? sf_fail(SF_E_MEMORY, "%s: no memory to look for unread entries", s->job->name)
                          : fx_scene_check(fitted, s->job->name);
   if (status.code == SF_OK) status = measure(s, fitted, s->job->rays, s->rank_end, s->check_end, NULL, &sum);
+  if (status.code == SF_OK) status = describe_both(s, fitted, &sum, report);
   if (status.code != SF_OK) {
     fx_scene_free(fitted);
     return status;
@@ -314,8 +398,6 @@ static sf_status finish(search *s, const sf_trim *exact, fx_scene *fitted, sf_fi
   report->observed = s->job->rays->count, report->pixels = s->job->rays->pixels;
   report->first_checked = s->rank_end, report->checked = checked;
   report->bound_db = s->job->loss_db;
-  sf_fit_describe(s->job->candidate[0], &s->job->widths[0], &s->reference, checked, &report->before);
-  sf_fit_describe(fitted, s->widths, &sum, checked, &report->after);
   report->loss_db = 10 * log10(ratio(sum.error, s->reference.error));
   count_dropped(s, exact, report);
   return sf_ok();
@@ -361,9 +443,6 @@ sf_status sf_fit(fx_scene *fitted, const sf_fit_job *job, sf_fit_report *report)
   memset(fitted, 0, sizeof *fitted);
   memset(report, 0, sizeof *report);
   SF_TRY(fx_scene_need_grid(job->candidate[0], job->name, "fit"));
-  if (job->candidate[0]->log2_bound || job->candidate[0]->steps)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: %d occupancy grids and growing steps: only a box with one grid can be fitted",
-                   job->name, job->candidate[0]->log2_bound + 1);
   if (!(job->loss_db >= 0 && job->loss_db <= 100))
     return sf_fail(SF_E_RANGE, "%s: a loss of %g dB was asked for, expected 0..100", job->name, job->loss_db);
   if (count < 2 * RANK_MIN)

@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STREAM_VIEW = 201, STREAM_X, STREAM_Y, BLOCK = 256, FEW = 512, OPAQUE = 65535 };
+enum { STREAM_VIEW = 201, STREAM_X, STREAM_Y, STREAM_TILE, BLOCK = 256, FEW = 512, OPAQUE = 65535 };
+enum { TILE_RAYS = FX_TILE * FX_TILE };
 
 /* ---- rays ---- */
 
@@ -53,6 +54,40 @@ sf_status sf_fit_rays_draw(sf_fit_rays *rays, const sf_dataset *data, const int3
     return sf_fail(SF_E_MEMORY, "fit: no memory for %llu rays", (unsigned long long)count);
   }
   for (uint64_t i = 0; i < count; i++) draw_ray(rays, data, background, i, seed);
+  return sf_ok();
+}
+
+static int inside(int at, int size)
+{
+  return at < size ? at : size - 1;
+}
+
+static void draw_tile(sf_fit_rays *rays, const sf_dataset *data, uint64_t tile, uint64_t seed)
+{
+  const sf_view *view = &data->view[sf_random_below(seed, STREAM_TILE, 3 * tile, (uint64_t)data->count)];
+  const int width = view->camera.width, height = view->camera.height;
+  const uint64_t across = (uint64_t)(width + FX_TILE - 1) / FX_TILE, down = (uint64_t)(height + FX_TILE - 1) / FX_TILE;
+  const int left = FX_TILE * (int)sf_random_below(seed, STREAM_TILE, 3 * tile + 1, across);
+  const int top = FX_TILE * (int)sf_random_below(seed, STREAM_TILE, 3 * tile + 2, down);
+  for (int i = 0; i < TILE_RAYS; i++) {
+    const size_t at = 3 * (tile * TILE_RAYS + (uint64_t)i);
+    const int x = inside(left + i % FX_TILE, width), y = inside(top + i / FX_TILE, height);
+    sf_dataset_ray(data, view, (float)x + 0.5f, (float)y + 0.5f, rays->origin + at, rays->direction + at);
+  }
+}
+
+sf_status sf_fit_tiles_draw(sf_fit_rays *rays, const sf_dataset *data, uint64_t tiles, uint64_t seed)
+{
+  memset(rays, 0, sizeof *rays);
+  if (data->count < 1) return sf_fail(SF_E_FORMAT, "%s: no training views", data->path);
+  rays->count = tiles * TILE_RAYS;
+  rays->origin = calloc(rays->count, 3 * sizeof(float));
+  rays->direction = calloc(rays->count, 3 * sizeof(float));
+  if (!rays->origin || !rays->direction) {
+    sf_fit_rays_free(rays);
+    return sf_fail(SF_E_MEMORY, "fit: no memory for %llu tiles", (unsigned long long)tiles);
+  }
+  for (uint64_t i = 0; i < tiles; i++) draw_tile(rays, data, i, seed);
   return sf_ok();
 }
 
@@ -121,6 +156,64 @@ sf_status sf_fit_measure(const fx_scene *scene, const sf_fit_rays *rays, uint64_
   return all;
 }
 
+/* ---- field ---- */
+
+static sf_status measure_tile(const fx_core *core, const fx_scene *scene, const sf_fit_rays *rays, uint64_t first,
+                              const fx_cache_shape *shape, fx_memory_counts *memory, fx_counts *counts)
+{
+  fx_ray ray[TILE_RAYS];
+  fx_pixel pixel[TILE_RAYS];
+  const uint64_t tile[TILE_RAYS] = {0};
+  fx_memory cache;
+  SF_TRY(fx_memory_open(&cache, scene, shape));
+  sf_status status = sf_ok();
+  for (uint64_t i = 0; i < TILE_RAYS && status.code == SF_OK; i++) status = make_ray(scene, rays, first + i, &ray[i]);
+  fx_memory_begin(&cache);
+  if (status.code == SF_OK) status = fx_render_list(core, &cache, tile, ray, TILE_RAYS, pixel, NULL, counts);
+  fx_memory_counts_add(memory, &cache.counts);
+  fx_memory_close(&cache);
+  return status;
+}
+
+/* All tiles with one cache. */
+static sf_status measure_tiles(const fx_core *core, const fx_scene *scene, const sf_fit_rays *tiles,
+                               const fx_cache_shape *shape, fx_memory_counts *memory, fx_counts *counts)
+{
+  sf_status all = sf_ok();
+#pragma omp parallel
+  {
+    fx_memory_counts part = {0};
+    fx_counts part_counts = {0};
+#pragma omp for schedule(dynamic)
+    for (uint64_t first = 0; first < tiles->count; first += TILE_RAYS) {
+      const sf_status status = measure_tile(core, scene, tiles, first, shape, &part, &part_counts);
+      if (status.code != SF_OK) keep_first(&all, &status);
+    }
+#pragma omp critical(sf_fit_merge)
+    {
+      fx_memory_counts_add(memory, &part);
+      fx_counts_add(counts, &part_counts);
+    }
+  }
+  return all;
+}
+
+sf_status sf_fit_measure_field(const fx_scene *scene, const sf_fit_rays *tiles, const fx_cache_shape *shapes, int n,
+                               sf_fit_field *field, uint64_t *misses)
+{
+  fx_core *core;
+  SF_TRY(fx_core_open(&core, scene, NULL));
+  sf_status status = sf_ok();
+  for (int i = 0; i < n && status.code == SF_OK; i++) {
+    fx_memory_counts memory = {0};
+    memset(field, 0, sizeof *field);
+    status = measure_tiles(core, scene, tiles, &shapes[i], &memory, &field->counts);
+    field->lookups = memory.lookups, misses[i] = memory.misses;
+  }
+  fx_core_close(core);
+  return status;
+}
+
 /* ---- use ---- */
 
 /* fx_render_ray, with a look at the position, features, spikes and weight of every sample. */
@@ -142,7 +235,7 @@ static sf_status observe_ray(const fx_scene *scene, const sf_fit_rays *rays, uin
     fx_net_sample(&scene->net, f, base, &out, trace, NULL);
     fx_composite_add(&pixel, &out, fx_delta(scene, n), 0);
     sf_trim_use_net(use, &scene->net, f, trace);
-    if (places) sf_trim_use_place(use, scene, pos, before - pixel.transmittance);
+    if (places) sf_trim_use_place(use, scene, pos, fx_march_cell(scene, &ray, n), before - pixel.transmittance);
     if (pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples) break;
   }
   return sf_ok();

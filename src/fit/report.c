@@ -43,6 +43,17 @@ static void print_sizes(FILE *out, const sf_fit_state *b, const sf_fit_state *a)
   line(out, "bytes to hold", (double)b->bytes, (double)a->bytes);
 }
 
+static void print_caches(FILE *out, const sf_fit_report *r, double frames)
+{
+  const sf_fit_cache *best = &r->cache[r->cache_chosen];
+  fprintf(out, "cache of the field, %d ways:", best->shape.ways);
+  for (int i = 0; i < SF_FIT_CACHES; i++)
+    fprintf(out, "%s %d KB %.4g mJ", i ? "," : "", r->cache[i].shape.bytes / 1024,
+            (double)r->cache[i].energy_fj * 1e-12 / frames);
+  fprintf(out, "\n  this scene needs %d KB (%.4f of its look-ups miss): CACHE_BYTES = %d\n", best->shape.bytes / 1024,
+          best->misses, best->shape.bytes);
+}
+
 void sf_fit_print(FILE *out, const sf_fit_report *r)
 {
   const sf_fit_state *b = &r->before, *a = &r->after;
@@ -58,9 +69,26 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
   line(out, "SOPs per frame", (double)sf_event_total(&b->sum.counts, SF_EVENT_SOP) / frames,
        (double)sf_event_total(&a->sum.counts, SF_EVENT_SOP) / frames);
   line(out, "cycles per frame, at least", (double)b->cycles / frames, (double)a->cycles / frames);
+  line(out, "lines missed per sample", b->misses, a->misses);
   line(out, "energy per frame, mJ", (double)b->energy_fj * 1e-12 / frames, (double)a->energy_fj * 1e-12 / frames);
   fprintf(out, "  transmittance to stop at     %15.3g %15.3g\n", ldexp(b->trans_stop, -SF_TRANS_FRAC),
           ldexp(a->trans_stop, -SF_TRANS_FRAC));
+  print_caches(out, r, frames);
+}
+
+static cJSON *caches_json(const sf_fit_report *r)
+{
+  cJSON *list = cJSON_CreateArray();
+  for (int i = 0; i < SF_FIT_CACHES; i++) {
+    cJSON *json = cJSON_CreateObject();
+    cJSON_AddNumberToObject(json, "bytes", r->cache[i].shape.bytes);
+    cJSON_AddNumberToObject(json, "ways", r->cache[i].shape.ways);
+    cJSON_AddNumberToObject(json, "misses_per_lookup", r->cache[i].misses);
+    sf_json_add_u64(json, "energy_fj", r->cache[i].energy_fj);
+    cJSON_AddBoolToObject(json, "chosen", i == r->cache_chosen);
+    cJSON_AddItemToArray(list, json);
+  }
+  return list;
 }
 
 static cJSON *layers_json(const int *value)
@@ -98,6 +126,8 @@ static cJSON *state_json(const sf_fit_state *s)
   sf_json_add_u64(json, "sop", sf_event_total(&s->sum.counts, SF_EVENT_SOP));
   sf_json_add_u64(json, "cycles", s->cycles);
   sf_json_add_u64(json, "energy_fj", s->energy_fj);
+  cJSON_AddNumberToObject(json, "lookups_per_sample", s->lookups);
+  cJSON_AddNumberToObject(json, "misses_per_sample", s->misses);
   return json;
 }
 
@@ -115,6 +145,7 @@ cJSON *sf_fit_json(const sf_fit_report *r)
   cJSON_AddNumberToObject(json, "levels_without_effect", r->idle_levels);
   cJSON_AddNumberToObject(json, "levels_dropped", r->dropped_levels);
   cJSON_AddNumberToObject(json, "tables_smaller", r->smaller_tables);
+  cJSON_AddItemToObject(json, "caches", caches_json(r));
   cJSON_AddItemToObject(json, "before", state_json(&r->before));
   cJSON_AddItemToObject(json, "after", state_json(&r->after));
   return json;

@@ -13,7 +13,7 @@ static double psnr(uint64_t error, uint64_t rays)
 void sf_fit_describe(const fx_scene *scene, const sf_quant_widths *widths, const sf_fit_sum *sum, uint64_t rays,
                      sf_fit_state *state)
 {
-  const int64_t bytes = (int64_t)scene->occ_res * scene->occ_res * scene->occ_res / 8;
+  const int64_t bytes = (int64_t)(scene->log2_bound + 1) * scene->occ_res * scene->occ_res * scene->occ_res / 8;
   memset(state, 0, sizeof *state);
   for (int l = 0; l < SF_LAYERS; l++)
     state->n_in[l] = scene->net.layer[l].n_in, state->n_out[l] = scene->net.layer[l].n_out;
@@ -26,7 +26,6 @@ void sf_fit_describe(const fx_scene *scene, const sf_quant_widths *widths, const
   state->widths = *widths;
   state->bytes = (uint64_t)sf_packed_bytes(scene, widths);
   state->cycles = sf_cycles_least(&scene->net, &sum->counts, &sf_engine_default);
-  state->energy_fj = sf_energy_fj(&sum->counts);
   state->sum = *sum;
   state->psnr = psnr(sum->error, rays);
 }

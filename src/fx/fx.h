@@ -312,6 +312,8 @@ static inline uint64_t fx_distance(const fx_scene *scene, const fx_ray *ray, int
 
 /* Next lattice point >= n whose cell is occupied, or -1. Writes its position. */
 int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint32_t *pos, fx_counts *counts);
+/* The cell of the occupancy grids, all cascades one behind the other, that point n of the ray looks in. */
+int64_t fx_march_cell(const fx_scene *scene, const fx_ray *ray, int32_t n);
 
 /* Compositing of one ray, front to back. Conservation: weight_sum + transmittance == 1 << TRANS_FRAC, always. */
 typedef struct fx_pixel {

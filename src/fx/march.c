@@ -23,6 +23,13 @@ void fx_steps_fill(const fx_scene *scene, fx_steps *steps)
   }
 }
 
+int64_t fx_march_cell(const fx_scene *scene, const fx_ray *ray, int32_t n)
+{
+  int64_t p[3];
+  for (int axis = 0; axis < 3; axis++) p[axis] = fx_ray_at(scene, ray, n, axis);
+  return fx_cell(scene, p, scene->steps ? scene->steps->cascade[n] : 0);
+}
+
 /* Tests every lattice point from n on, one after the other; march_steps is the number tested. */
 int32_t fx_march_next(const fx_scene *scene, const fx_ray *ray, int32_t n, uint32_t *pos, fx_counts *counts)
 {

@@ -72,13 +72,14 @@ typedef struct sf_trim_use {
   uint64_t fired[SF_LAYERS][SF_LANES]; /* spikes; of D2: outputs h that were not 0 */
   uint64_t feature[SF_FEATURE_MAX];    /* samples in which the feature was not 0 */
   uint64_t *entry;            /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
+  int64_t cells;              /* of all cascades */
   uint64_t *visits, *weight2; /* [cells] samples; sum of their squared compositing weights, Q.40 */
 } sf_trim_use;
 sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene);
 void sf_trim_use_free(sf_trim_use *use);
 /* One sample, from many threads at once; weight: what it contributed to its ray, Q.TRANS_FRAC. */
 void sf_trim_use_net(sf_trim_use *use, const fx_net *net, const int16_t *f, const fx_trace *trace);
-void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], uint32_t weight);
+void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], int64_t cell, uint32_t weight);
 
 /* Mean squared weight of a cell's samples by octave, as if one more had been seen whole (Laplace's rule of
  * succession): few samples are no proof that a cell is empty. 0: 1.0 or no samples. */

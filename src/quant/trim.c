@@ -6,7 +6,7 @@
 
 static int64_t cells_of(const fx_scene *scene)
 {
-  return (int64_t)scene->occ_res * scene->occ_res * scene->occ_res;
+  return (int64_t)(scene->log2_bound + 1) * scene->occ_res * scene->occ_res * scene->occ_res;
 }
 
 static int directions_of(const fx_net *net)
@@ -20,6 +20,7 @@ sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene)
 {
   const size_t entries = (size_t)scene->grid.entries, cells = (size_t)cells_of(scene);
   memset(use, 0, sizeof *use);
+  use->cells = (int64_t)cells;
   use->entry = calloc(entries, sizeof *use->entry);
   use->visits = calloc(cells, sizeof *use->visits);
   use->weight2 = calloc(cells, sizeof *use->weight2);
@@ -69,10 +70,8 @@ void sf_trim_use_net(sf_trim_use *use, const fx_net *net, const int16_t *f, cons
     if (f[i]) add(&use->feature[i], 1);
 }
 
-void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], uint32_t weight)
+void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], int64_t cell, uint32_t weight)
 {
-  const int drop = SF_POS_FRAC - __builtin_ctz((unsigned)scene->occ_res);
-  const int64_t res = scene->occ_res, cell = ((pos[2] >> drop) * res + (pos[1] >> drop)) * res + (pos[0] >> drop);
   use_entries(use, &scene->grid, pos, weight);
   add(&use->visits[cell], 1);
   add(&use->weight2[cell], (uint64_t)weight * weight);

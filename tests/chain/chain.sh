@@ -23,17 +23,10 @@ check_scene() { # name, train options
   cmp "$dir/fixed.exr" "$dir/rtl.exr" || fail "${dir##*/}: the RTL's image differs from the fixed-point core's"
   "$bin/sf_cosim" "$dir/s.snn" "$dir" --rays 30 --seed 7 --stalls 20 --json >"$dir/cosim.json" || fail "${dir##*/}: co-simulation"
   grep -Eq '"differences":[[:space:]]*0,' "$dir/cosim.json" || fail "${dir##*/}: differences"
-  if [ "${dir##*/}" = plaza ]; then # only boxes with one grid can be fitted, and no data is read to say so
-    if "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir/none" --fit-rays 512 --quiet 2>"$dir/fit.err"; then
-      fail "plaza: fitted"
-    fi
-    grep -q 'm.safetensors: --fit: for boxes of bound 1' "$dir/fit.err" || fail "plaza: the refusal of a fit does not say why"
-  else
-    "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet --json >"$dir/fit.json"
-    "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 20 --seed 8 --stalls 20 --json >"$dir/fit-cosim.json" ||
-      fail "${dir##*/}: co-simulation of the fitted scene"
-    grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "${dir##*/}: the fitted scene differs in the RTL"
-  fi
+  "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --quiet --json >"$dir/fit.json"
+  "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 20 --seed 8 --stalls 20 --json >"$dir/fit-cosim.json" ||
+    fail "${dir##*/}: co-simulation of the fitted scene"
+  grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "${dir##*/}: the fitted scene differs in the RTL"
   "$bin/energy_audit" "$dir/s.snn" "$dir" --rays 100 --json >"$dir/audit.json" || fail "${dir##*/}: audit"
   echo "${dir##*/}: ok"
 }
