@@ -260,8 +260,9 @@ speed-error: all ## speed against error after make demo: steps, widths, fits, ar
 quality: all ## what short runs of eight scenes learn, spiking and twin, beside the last table kept (SCENES=, QUALITY="--keep"): build/quality
 	@tools/quality.sh $B --scenes "$(SCENES)" $(QUALITY)
 
-bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json
-	@models=$$(tests/bench_models.sh $B "$(SCENES)") && mapfile -t model <<<"$$models" && $B/tests/bench $B/bench.json "$${model[@]}"
+bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilings and naive versions, text and build/bench.json (ONLY=nets, grid, adam, iteration, fixed or rtl: one part)
+	@models=$(if $(filter-out fixed,$(ONLY)),,$$(tests/bench_models.sh $B "$(SCENES)")) && mapfile -t model <<<"$$models" && \
+	  $B/tests/bench $(ONLY:%=--only %) $B/bench.json $${models:+"$${model[@]}"}
 
 $B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig bench_tensorf)
 

@@ -392,28 +392,48 @@ static sf_status bench_iteration(cJSON *json, const ceilings *c)
   return status;
 }
 
+static const char *const parts[] = {"nets", "grid", "adam", "iteration", "fixed", "rtl", NULL};
+
+/* --only PART in front of the other arguments; NULL: all. Exits on what is not understood. */
+static const char *only_part(int *argc, char ***argv)
+{
+  if (*argc < 2 || (*argv)[1][0] != '-') return NULL;
+  const bool only = !strcmp((*argv)[1], "--only") && *argc > 2;
+  for (int i = 0; only && parts[i]; i++)
+    if (!strcmp((*argv)[2], parts[i])) {
+      *argc -= 2, *argv += 2;
+      return parts[i];
+    }
+  const bool help = !strcmp((*argv)[1], "--help") || !strcmp((*argv)[1], "-h");
+  fprintf(help ? stdout : stderr,
+          "usage: bench [--only nets|grid|adam|iteration|fixed|rtl] [FILE.json [SCENE.snn TWIN.safetensors DATA]]\n"
+          "`make bench` starts it, `make bench ONLY=rtl` one part\n");
+  exit(help ? 0 : 2);
+}
+
 int main(int argc, char **argv)
 {
-  if (argc > 1 && argv[1][0] == '-') {
-    puts("usage: bench [FILE.json [SCENE.snn TWIN.safetensors DATA]]    `make bench` starts it");
-    return argv[1][1] == '-' && argv[1][2] == 'h' ? 0 : 2;
-  }
+  const char *only = only_part(&argc, &argv);
+#define WANTED(part) (!only || !strcmp(only, part))
   cJSON *json = cJSON_CreateObject();
   const char *kernels = sf_kernels_training()->name;
-  const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni")
-                      : fx_kernels_select("avx2")     ? peak("avx2-int8")
-                                                      : NAN;
-  const ceilings c = {peak(kernels), dot8, fx_kernels_select("amx") ? peak("amx-int8") : dot8, bandwidth(),
-                      random_reads()};
-  printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",
-         omp_get_max_threads(), kernels, c.fma * 1e-9, c.bytes * 1e-9, c.reads * 1e-9);
-  bench_nets(json, &c);
-  bench_grid(json, &c);
-  bench_adam(json, &c);
-  sf_status status = bench_iteration(json, &c);
-  if (!status.code)
-    status = bench_fixed(json, &c, argc > 4 ? argv[2] : NULL, argc > 4 ? argv[3] : NULL, argc > 4 ? argv[4] : NULL);
-  if (!status.code) status = bench_rtl(json);
+  sf_status status = sf_ok();
+  if (!only || strcmp(only, "rtl")) {
+    const double dot8 = fx_kernels_select("avx512vnni") ? peak("avx512vnni")
+                        : fx_kernels_select("avx2")     ? peak("avx2-int8")
+                                                        : NAN;
+    const ceilings c = {peak(kernels), dot8, fx_kernels_select("amx") ? peak("amx-int8") : dot8, bandwidth(),
+                        random_reads()};
+    printf("%d threads, kernels %s: %.0f G multiply-adds/s, %.1f GB/s read, %.2f G random reads/s of 4 MiB\n",
+           omp_get_max_threads(), kernels, c.fma * 1e-9, c.bytes * 1e-9, c.reads * 1e-9);
+    if (WANTED("nets")) bench_nets(json, &c);
+    if (WANTED("grid")) bench_grid(json, &c);
+    if (WANTED("adam")) bench_adam(json, &c);
+    if (WANTED("iteration")) status = bench_iteration(json, &c);
+    if (!status.code && WANTED("fixed"))
+      status = bench_fixed(json, &c, argc > 4 ? argv[2] : NULL, argc > 4 ? argv[3] : NULL, argc > 4 ? argv[4] : NULL);
+  }
+  if (!status.code && WANTED("rtl")) status = bench_rtl(json);
   if (!status.code && argc > 1) status = sf_json_save(json, argv[1]);
   cJSON_Delete(json);
   if (status.code) fprintf(stderr, "bench: %s\n", status.message);
