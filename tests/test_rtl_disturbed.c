@@ -133,6 +133,30 @@ LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
   }
 }
 
+/* In every cycle of some samples: nothing of them comes out afterwards, and the net that is there goes on. */
+TEST(soft_reset_in_every_cycle)
+{
+  enum { CYCLES = 420, SILENCE = 50 };
+  random_source r = {64, 0};
+  OWNED(sf_dut) *dut = begin(64);
+  dut->stall_percent = 0;
+  for (int delay = 0; delay < CYCLES; delay++) {
+    feed f = {.m_percent = 100};
+    fx_counts counts = {0};
+    for (int cycle = 0; cycle < delay; cycle++) feed_cycle(dut, &f, &r);
+    dut->in.s_valid = dut->in.m_ready = false;
+    sf_driver_reset(&dut->bus);
+    dut->in.m_ready = true;
+    for (int i = 0; i < SILENCE; i++) {
+      sf_dut_tick(dut);
+      ck_assert_msg(!dut->out.m_valid && !dut->out.tap_valid, "%d cycles on: something comes out", delay);
+    }
+    dut->in.m_ready = false;
+    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_OK);
+    run_batch(dut, &net_of_test.net, 2, &counts, 64);
+  }
+}
+
 /* What the core counts of the samples from..to-1 that feed_cycle sends. */
 static fx_counts counts_of(uint64_t from, uint64_t to)
 {
