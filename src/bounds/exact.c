@@ -69,12 +69,30 @@ static void set_scalars(sf_exact *e)
     e->theta[l] =
         real ? ldexp(theta[l] / e->scene->units.current_scale[l], frac_of(l)) : (double)e->scene->net.layer[l].theta;
   }
-  e->step = sf_exact_is(e, SF_EXACT_LATTICE) ? ldexp(sqrt(3.0) / config->lattice, SF_DELTA_FRAC) : e->scene->step_q24;
+}
+
+/* Model units to Q0.24 of the box. */
+static double of_box(const sf_exact *e, double length)
+{
+  return ldexp(length / (2 * e->model->config.bound), SF_DELTA_FRAC);
+}
+
+double sf_exact_length(const sf_exact *e, int32_t n)
+{
+  if (!e->steps.growing) return ldexp(sqrt(3.0) / (e->model->config.lattice * e->model->config.bound), SF_DELTA_FRAC);
+  return of_box(e, e->steps.length[n]);
+}
+
+double sf_exact_distance(const sf_exact *e, int32_t n)
+{
+  if (!e->steps.growing) return n * sf_exact_length(e, n);
+  return of_box(e, e->steps.start[n] + 0.5 * (e->steps.length[n] - e->steps.length[0]));
 }
 
 sf_status sf_exact_open(sf_exact *e, const fx_scene *scene, const sf_model *model, uint32_t mask)
 {
   *e = (sf_exact){.scene = scene, .model = model, .mask = mask};
+  SF_TRY(sf_steps_make(&e->steps, &model->config, 1));
   double *block = calloc((size_t)SF_LAYERS * SF_LANES * SF_LANES, sizeof *block);
   if (!block) return sf_fail(SF_E_MEMORY, "no memory for the weights in double precision");
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -235,9 +253,10 @@ void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_
   }
 }
 
-double sf_exact_behind(const sf_exact *e, double transmittance, double sigma)
+double sf_exact_behind(const sf_exact *e, int32_t n, double transmittance, double sigma)
 {
-  const double tau = ldexp(sigma * e->step, SF_TRANS_FRAC - SF_SIGMA_FRAC - SF_DELTA_FRAC); /* LSB of Q.20 */
+  const double length = sf_exact_is(e, SF_EXACT_LATTICE) ? sf_exact_length(e, n) : fx_delta(e->scene, n);
+  const double tau = ldexp(sigma * length, SF_TRANS_FRAC - SF_SIGMA_FRAC - SF_DELTA_FRAC); /* LSB of Q.20 */
   if (sf_exact_is(e, SF_EXACT_COMPOSITE)) return transmittance * exp(-ldexp(tau, -SF_TRANS_FRAC));
   return round_half_up(ldexp(transmittance * fx_exp_neg((uint64_t)round_half_up(tau)), -SF_TRANS_FRAC));
 }

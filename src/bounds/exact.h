@@ -1,4 +1,4 @@
-/* Inside src/audit: the fixed-point core once more in double precision, where each block can be the fixed one or the
+/* Inside src/bounds: the fixed-point core once more in double precision, where each block can be the fixed one or the
  * one of real numbers. All values are in LSB of the fixed formats; with no block exact every bit is the core's. */
 #ifndef SF_BOUNDS_EXACT_H
 #define SF_BOUNDS_EXACT_H
@@ -17,9 +17,10 @@ static inline int64_t sf_exact_entry(const fx_grid *grid, int level, const uint3
 typedef struct sf_exact {
   const fx_scene *scene;
   const sf_model *model;
-  uint32_t mask;                               /* bit per sf_exact_id */
-  double k[SF_LAYERS], theta[SF_LAYERS], step; /* U1.12; membrane LSB; Q0.24 */
-  double *w[SF_LAYERS];                        /* [n_in][SF_LANES], owned */
+  uint32_t mask;                         /* bit per sf_exact_id */
+  double k[SF_LAYERS], theta[SF_LAYERS]; /* U1.12; membrane LSB */
+  sf_steps steps;                        /* of the float model's rays */
+  double *w[SF_LAYERS];                  /* [n_in][SF_LANES], owned */
 } sf_exact;
 
 typedef struct sf_exact_out {
@@ -42,6 +43,10 @@ void sf_exact_features(const sf_exact *exact, const double pos[3], double *f);
 /* dir[n_dir] in LSB of the direction features, base[SF_LANES] the direction's current into C1. */
 void sf_exact_direction(const sf_exact *exact, const double *dir, double *base);
 void sf_exact_sample(const sf_exact *exact, const double *f, const double *base, sf_exact_out *out);
-/* Transmittance (LSB of Q.20) behind a sample. */
-double sf_exact_behind(const sf_exact *exact, double transmittance, double sigma);
+/* Transmittance (LSB of Q.20) behind sample n of a ray. */
+double sf_exact_behind(const sf_exact *exact, int32_t n, double transmittance, double sigma);
+/* Where the middle of interval n lies behind that of interval 0, and how long it is, Q0.24 of the box: of the float
+ * model, whatever the blocks. */
+double sf_exact_distance(const sf_exact *exact, int32_t n);
+double sf_exact_length(const sf_exact *exact, int32_t n);
 #endif

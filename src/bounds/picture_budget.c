@@ -2,6 +2,7 @@
 #include "energy/energy.h"
 #include "base/rng.h"
 #include "bounds/exact.h"
+#include "src/fx/march.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,19 +76,20 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
 static void position(const tracer *t, int32_t n, uint32_t core[3], double pos[3])
 {
   for (int a = 0; a < 3; a++) {
-    core[a] = (uint32_t)((t->ray.origin[a] + n * t->ray.step[a]) >> 16);
+    core[a] = (uint32_t)(fx_ray_at(t->exact->scene, &t->ray, n, a) >> (FX_RAY_FRAC - SF_POS_FRAC));
     pos[a] = core[a];
     if (!sf_exact_is(t->exact, SF_EXACT_LATTICE)) continue;
-    const double at = ldexp((double)t->ray.origin[a], -16) + n * t->unit[a] * t->exact->step;
+    const double at =
+        ldexp((double)t->ray.origin[a], SF_POS_FRAC - FX_RAY_FRAC) + t->unit[a] * sf_exact_distance(t->exact, n);
     pos[a] = fmin(fmax(at, 0), 16777215);
   }
 }
 
-static bool occupied(const fx_scene *scene, const double pos[3])
+static bool occupied(const fx_scene *scene, const double pos[3], int32_t n)
 {
-  size_t cell = 0;
-  for (int a = 2; a >= 0; a--) cell = cell * (size_t)scene->occ_res + (size_t)ldexp(pos[a] * scene->occ_res, -24);
-  return scene->occupancy[cell / 8] >> cell % 8 & 1;
+  int64_t p[3];
+  for (int a = 0; a < 3; a++) p[a] = (int64_t)ldexp(pos[a], FX_RAY_FRAC - SF_POS_FRAC);
+  return fx_occupied(scene, p, n);
 }
 
 /* One current of the core against float weights and inputs; x real and xq as the core has it. */
@@ -180,9 +182,9 @@ static void march(tracer *t, ray_result *r, double colour[3])
     double pos[3];
     sf_exact_out out;
     position(t, n, core, pos);
-    if (!occupied(scene, pos)) continue;
+    if (!occupied(scene, pos, n)) continue;
     evaluate(t, core, pos, &out, r);
-    const double behind = sf_exact_behind(t->exact, transmittance, out.sigma);
+    const double behind = sf_exact_behind(t->exact, n, transmittance, out.sigma);
     for (int o = 0; o < 3; o++) colour[o] += (transmittance - behind) * out.colour[o];
     transmittance = behind;
     r->samples++;
@@ -298,9 +300,6 @@ sf_status sf_picture_budget_check(const sf_picture_job *job)
                     l[FX_D2].n_out == SF_DENSITY_OUT && l[FX_C1].n_in == SF_DIR_FEATURES + SF_GEO_FEATURES &&
                     l[FX_C1].n_out == c->hidden && l[FX_C2].n_out == c->hidden &&
                     2 * job->scene->grid.entries == (int64_t)job->model->param[SF_P_GRID].size;
-  if (job->scene->log2_bound || job->scene->steps)
-    return sf_fail(SF_E_UNSUPPORTED, "%s: %d occupancy grids and growing steps: the budget is of boxes with one grid",
-                   job->name, job->scene->log2_bound + 1);
   if (!same)
     return sf_fail(SF_E_UNSUPPORTED, "%s: its sizes are not those of the model it is compared with", job->name);
   for (int i = 0; i < SF_LAYERS; i++)

@@ -36,6 +36,9 @@ check_scene simple --input-mode no-decay --steps 4
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_scene empty --steps 2
 check_scene plaza --steps 3 --bound 8
+"$bin/error_budget" "$work/plaza/m.safetensors" "$work/plaza/s.snn" "$work/plaza" --rays 20 --samples 1000 --quiet >"$work/budget.txt" ||
+  fail "plaza: error budget"
+grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza: the error budget's core is not the core"
 
 # TensoRF: field and compositing in the core, its decoder in the RTL; what needs a hash grid says so.
 check_tensorf() {
