@@ -2,7 +2,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { CRC_FROM = offsetof(sf_tile_header, width) };
+enum { CRC_FROM = offsetof(sf_tile_header, width), LOG2_BOUND_MAX = 6 };
 
 uint32_t sf_crc32(uint32_t crc, const void *data, uint32_t size)
 {
@@ -59,9 +59,11 @@ static bool scene_fits(const sf_tile_header *h)
 {
   const uint64_t res = h->occ_res;
   if (res < 2 || res > 256 || (res & (res - 1)) != 0 || h->levels < 1 || h->levels > FX_LEVELS_MAX) return false;
+  if (h->log2_bound > LOG2_BOUND_MAX || (h->steps && !inside(h, h->steps, sizeof(fx_steps)))) return false;
   for (uint32_t level = 0; level < h->levels; level++)
     if (!level_fits(h, level)) return false;
-  return inside(h, h->table, (uint64_t)h->entries * FX_GRID_FEATURES) && inside(h, h->occupancy, res * res * res / 8);
+  return inside(h, h->table, (uint64_t)h->entries * FX_GRID_FEATURES) &&
+         inside(h, h->occupancy, (h->log2_bound + 1) * (res * res * res / 8));
 }
 
 static fx_grid grid_of(const sf_tile_header *h, uint8_t *block)
@@ -81,7 +83,9 @@ static void point_into(const sf_tile_header *h, uint8_t *block, sf_tile *tile)
 {
   tile->scene = (fx_scene){.grid = grid_of(h, block),
                            .occ_res = (int32_t)h->occ_res,
+                           .log2_bound = (int32_t)h->log2_bound,
                            .occupancy = block + h->occupancy,
+                           .steps = h->steps ? (fx_steps *)(block + h->steps) : NULL,
                            .step_q24 = h->step_q24,
                            .max_samples = h->max_samples,
                            .trans_stop = h->trans_stop,

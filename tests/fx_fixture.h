@@ -118,6 +118,21 @@ static inline fx_scene fixture_scene(const fixture_sizes *sizes, uint64_t seed)
   return scene;
 }
 
+/* In a box of cascades 0..log2_bound with growing steps; the shortest is `step_q24`. */
+static inline fx_scene fixture_box(const fixture_sizes *sizes, uint64_t seed, int log2_bound, int32_t step_q24)
+{
+  fx_scene scene = {.log2_bound = log2_bound, .gamma_q24 = 1 << 20, .near_q16 = 20 << 16, .longest_q16 = 16 << 16};
+  fixture_set_sizes(&scene, sizes);
+  scene.step_q24 = step_q24;
+  ck_ok(fx_scene_allocate(&scene, "box"));
+  fixture_fill(&scene, sizes, seed);
+  scene.step_q24 = step_q24;
+  for (int i = 0; i < 64 * (log2_bound + 1); i++)
+    scene.occupancy[i] = (uint8_t)fixture_pick(seed, 32, (uint64_t)i, 0, 255);
+  ck_ok(fx_scene_check(&scene, "box"));
+  return scene;
+}
+
 static inline void fixture_inputs(uint64_t seed, uint64_t index, int16_t *f, int n, int limit)
 {
   for (int i = 0; i < n; i++) f[i] = (int16_t)fixture_pick(seed, 40, index * 256 + (uint64_t)i, -limit, limit);

@@ -333,17 +333,9 @@ TEST(the_cache_that_a_scene_needs)
 
 static fx_scene large_box(uint64_t seed)
 {
-  fixture_sizes sizes = small;
-  fx_scene scene = {.log2_bound = 2, .gamma_q24 = 1 << 20, .near_q16 = 20 << 16, .longest_q16 = 16 << 16};
-  fixture_set_sizes(&scene, &sizes);
-  scene.step_q24 = 150000;
-  ck_ok(fx_scene_allocate(&scene, "box"));
-  fixture_fill(&scene, &sizes, seed);
-  scene.step_q24 = 150000;
-  for (int i = 0; i < 3 * 64; i++) scene.occupancy[i] = (uint8_t)fixture_pick(seed, 32, (uint64_t)i, 0, 255);
+  fx_scene scene = fixture_box(&small, seed, 2, 150000);
   scene.net.exp_in = (fx_scale){20000, 15, 8192};
   for (int l = 0; l < SF_LAYERS; l++) scene.net.layer[l].theta = scene.net.layer[l].theta ? 20000 : 0;
-  ck_ok(fx_scene_check(&scene, "box"));
   return scene;
 }
 

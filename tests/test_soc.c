@@ -145,16 +145,22 @@ static void make_rays(scenario *s)
   }
 }
 
-static scenario *make_scenario(const fixture_sizes *sizes)
+static scenario *make_scenario_of(fx_scene scene)
 {
   scenario *s = calloc(1, sizeof *s);
-  s->scene = fixture_scene(sizes, 5);
-  memset(s->scene.occupancy, 0xf7, 64);
+  s->scene = scene;
   make_rays(s);
   for (int i = 0; i < PIXELS; i++) ck_ok(fx_render_ray(&s->scene, &s->ray[i], NULL, NULL, &s->core[i], &s->counts));
   ck_assert_uint_gt(s->counts.samples, 20);
   ck_ok(sf_soc_image_make(&s->scene, s->ray, WIDTH, HEIGHT, &s->image, &s->image_size));
   return s;
+}
+
+static scenario *make_scenario(const fixture_sizes *sizes)
+{
+  fx_scene scene = fixture_scene(sizes, 5);
+  memset(scene.occupancy, 0xf7, 64);
+  return make_scenario_of(scene);
 }
 
 static void free_scenario(scenario *s)
@@ -233,10 +239,10 @@ static void bus_write(void *context, uint32_t offset, uint32_t value)
   s->real.write(s->real.context, offset, value);
 }
 
-static void same_as_core(const fixture_sizes *sizes, int stall)
+static void same_as_core(scenario *other, int stall)
 {
   free_scenario(s);
-  s = make_scenario(sizes);
+  s = other;
   s->stall = stall;
   const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
@@ -246,7 +252,7 @@ static void same_as_core(const fixture_sizes *sizes, int stall)
 
 LOOP_TEST(the_firmware_renders_what_the_core_renders, 3)
 {
-  same_as_core(&fixture_ingp, 30 * _i);
+  same_as_core(make_scenario(&fixture_ingp), 30 * _i);
 }
 
 LOOP_TEST(so_it_does_for_other_nets, 3)
@@ -254,7 +260,16 @@ LOOP_TEST(so_it_does_for_other_nets, 3)
   static const fixture_sizes sizes[] = {{5, 77, 16, 3, 33, 128, 1, FX_DECAY, {0}},
                                         {1, 1, 2, 0, 5, 1, 8, FX_NODECAY, {0}},
                                         {3, 128, 1, 16, 128, 40, 3, FX_HYBRID, {0}}};
-  same_as_core(&sizes[_i], 20);
+  same_as_core(make_scenario(&sizes[_i]), 20);
+}
+
+/* Three cascades and growing steps. */
+TEST(and_in_a_large_box)
+{
+  static const fixture_sizes sizes = {5, 77, 16, 3, 33, 128, 2, FX_HYBRID, {0}};
+  fx_scene scene = fixture_box(&sizes, 6, 2, 150000);
+  memset(scene.occupancy, 0xf7, 3 * 64);
+  same_as_core(make_scenario_of(scene), 20);
 }
 
 /* Each ends with exit status 1 and the line, or is seen by the comparison. */
@@ -337,12 +352,13 @@ TEST(an_image_stays_inside_its_memory)
   ck_assert_str_eq(open_edited(s, block, space - 1, -1, 0), "the tile does not fit");
   ck_assert_str_eq(open_edited(s, block, space, 0, 1), "none in memory");
   ck_assert_str_eq(open_edited(s, block, space, 1, SF_TILE_VERSION + 1), "of another version than this firmware's");
-  for (int word = 4; word < 14; word++) /* width .. occ_res */
+  for (int word = 4; word < 16; word++) /* width .. steps */
     for (size_t i = 0; i < sizeof extreme / sizeof *extreme; i++) {
       uint32_t now;
       memcpy(&now, s->image + 4 * word, 4);
       if (extreme[i] == now || (word == 7 && extreme[i] > now && extreme[i] < s->image_size)) continue;
-      const bool less = word <= 5 && extreme[i] == 1; /* a smaller tile is one, too */
+      /* A smaller tile is one, too, and the image is long enough for another cascade. */
+      const bool less = (word <= 5 || word == 14) && extreme[i] == 1;
       const char *why = open_edited(s, block, space, word, extreme[i]);
       ck_assert_msg((why == NULL) == less, "word %d = %u: %s", word, extreme[i], why ? why : "taken");
     }
@@ -353,21 +369,6 @@ TEST(checksums_are_zlibs)
 {
   ck_assert_uint_eq(sf_crc32(0, "123456789", 9), 0xcbf43926);
   ck_assert_uint_eq(sf_crc32(sf_crc32(0, "1234", 4), "56789", 5), 0xcbf43926);
-}
-
-TEST(a_scene_that_the_firmware_cannot_march_is_refused)
-{
-  static fx_steps growing;
-  fx_scene scene = s->scene;
-  uint8_t *image = NULL;
-  size_t size;
-  scene.steps = &growing;
-  const sf_status grows = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
-  ck_assert_str_eq(grows.message, "the firmware marches through one box with equal steps; the scene has growing steps");
-  scene.log2_bound = 2;
-  const sf_status cascades = sf_soc_image_make(&scene, s->ray, WIDTH, HEIGHT, &image, &size);
-  ck_assert_str_eq(cascades.message, "the firmware marches through one box with equal steps; the scene has 3 cascades");
-  ck_assert_ptr_null(image);
 }
 
 TEST(a_tile_that_is_too_large_is_refused)

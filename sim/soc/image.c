@@ -6,7 +6,7 @@
 #include <string.h>
 
 typedef struct plan {
-  size_t net, table, occupancy, rays, end;
+  size_t net, table, occupancy, steps, rays, end;
 } plan;
 
 static size_t aligned(size_t at)
@@ -24,7 +24,7 @@ static size_t net_bytes(const fx_net *net)
 static size_t occupancy_bytes(const fx_scene *scene)
 {
   const size_t res = (size_t)scene->occ_res;
-  return res * res * res / 8;
+  return (size_t)(scene->log2_bound + 1) * (res * res * res / 8);
 }
 
 static plan make_plan(const fx_scene *scene, size_t rays)
@@ -32,7 +32,8 @@ static plan make_plan(const fx_scene *scene, size_t rays)
   plan p = {.net = aligned(sizeof(sf_tile_header))};
   p.table = aligned(p.net + net_bytes(&scene->net));
   p.occupancy = aligned(p.table + (size_t)scene->grid.entries * FX_GRID_FEATURES);
-  p.rays = aligned(p.occupancy + occupancy_bytes(scene));
+  p.steps = aligned(p.occupancy + occupancy_bytes(scene));
+  p.rays = aligned(p.steps + (scene->steps ? sizeof *scene->steps : 0));
   p.end = p.rays + rays * sizeof(fx_ray);
   return p;
 }
@@ -76,6 +77,8 @@ static sf_tile_header make_header(const fx_scene *scene, const plan *p, int widt
                       .levels = (uint32_t)scene->grid.levels,
                       .entries = (uint32_t)scene->grid.entries,
                       .occ_res = (uint32_t)scene->occ_res,
+                      .log2_bound = (uint32_t)scene->log2_bound,
+                      .steps = scene->steps ? (uint32_t)p->steps : 0,
                       .step_q24 = scene->step_q24,
                       .max_samples = scene->max_samples,
                       .trans_stop = scene->trans_stop};
@@ -94,10 +97,6 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
                             size_t *size)
 {
   const size_t n = (size_t)width * (size_t)height;
-  static const char marches[] = "the firmware marches through one box with equal steps";
-  if (scene->log2_bound)
-    return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has %d cascades", marches, scene->log2_bound + 1);
-  if (scene->steps) return sf_fail(SF_E_UNSUPPORTED, "%s; the scene has growing steps", marches);
   const plan p = make_plan(scene, n);
   if (p.end + 8 + n * sizeof(fx_pixel) > SF_SOC_IMAGE_SPACE)
     return sf_fail(SF_E_RANGE, "scene and tile of %d x %d pixels take %zu bytes, the system's memory has %u", width,
@@ -109,6 +108,7 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
   put_net(bytes + p.net, &scene->net);
   memcpy(bytes + p.table, scene->grid.table, (size_t)scene->grid.entries * FX_GRID_FEATURES);
   memcpy(bytes + p.occupancy, scene->occupancy, occupancy_bytes(scene));
+  if (scene->steps) memcpy(bytes + p.steps, scene->steps, sizeof *scene->steps);
   memcpy(bytes + p.rays, rays, n * sizeof *rays);
   const size_t from = offsetof(sf_tile_header, crc) + sizeof head.crc;
   head.crc = sf_crc32(0, bytes + from, (uint32_t)(p.end - from));
