@@ -220,8 +220,10 @@ static void full_speed(int levels, int latency, int first, int fresh)
   b.known = 8, b.fresh_percent = 0;
   b.run(40);
   b.fresh_percent = fresh;
-  const uint64_t misses = b.events.misses;
+  const uint64_t misses = b.events.misses, stalls = b.events.stalls;
   const int cycles = (int)b.run(samples), missed = (int)(b.events.misses - misses);
+  ck_assert_msg(b.events.stalls - stalls <= (uint64_t)(missed * (latency + 8)), "latency %d: %d lines, %d stalls",
+                latency, missed, (int)(b.events.stalls - stalls));
   /* A line costs the two cycles of its beats at most; a pair whose set is in use waits three. */
   ck_assert_msg(cycles <= pairs + pairs / 50 + 2 * missed + latency + 80,
                 "%d levels, latency %d, %d %% first: %d cycles for %d pairs, %d lines", levels, latency, first, cycles,
@@ -239,7 +241,8 @@ TEST(a_pair_in_every_cycle)
   full_speed(16, 31, 100, 0);
 }
 
-/* A direction that waits for the harmonics of the one before holds up nothing but a third one, in the register at the input. */
+/* A direction that waits for the harmonics of the one before holds up nothing but a third one, in the register at the
+ * input. */
 TEST(a_direction_that_waits)
 {
   enum { HARMONICS = 2 * FX_SH + 15 };
