@@ -288,7 +288,34 @@ TEST(the_search_is_not_charged)
   ck_assert_int_ne(memcmp(off->model.value, on->model.value, off->model.size * sizeof(float)), 0);
 }
 
-/* ---- counts ---- */
+/* ---- prices and counts ---- */
+
+/* Rows of D2, C2, C3 have 16, 32 and 3 weights: 2, 4 and 1 reads of 8 bytes. Every sample reads the rows of 8 features
+ * for D1 and of 15 values of h for C1, 4 reads each. L = C M ln R: a read more in each of n samples costs C M / R,
+ * a neuron of one sample an n-th of it. */
+TEST(price_by_hand)
+{
+  const double all[3] = {1, 1, 1}, some[3] = {0.5, 0.25, 0}, none[3] = {0};
+  const sf_train_options o = small_run();
+  OWNED(trainer) t = start(&data, &o, NULL);
+  sf_charge_measured(t, none);
+  ck_assert_double_eq_tol(t->row_reads, 8 * 4 + 15 * 4, 1e-9);
+  sf_charge_measured(t, all);
+  ck_assert_double_eq_tol(t->row_reads, 8 * 4 + 15 * 4 + 32 * (2 + 4 + 1), 1e-9);
+  sf_charge_measured(t, some);
+  ck_assert_double_eq_tol(t->row_reads, 8 * 4 + 15 * 4 + 16 * 2 + 8 * 4, 1e-9);
+  t->charge = (sf_charge){.error = 0.01, .reads = 200};
+  t->batch.samples = 500;
+  static const double reads[3] = {2, 4, 1};
+  sf_charge_begin(t, &(sf_loss_plan){.charge = 0.5f});
+  for (int l = 0; l < 3; l++)
+    ck_assert_double_eq_tol(t->net->view.charge[l], 0.5 * 0.01 / (200 * 500) * reads[l], 1e-6 * 5e-8);
+  sf_charge_update(t, 0.02);
+  ck_assert_double_eq_tol(t->charge.error, 0.98 * 0.01 + 0.02 * 0.02, 1e-9);
+  ck_assert_double_eq_tol(t->charge.reads, 0.98 * 200 + 0.02 * (8 * 4 + 15 * 4 + 16 * 2 + 8 * 4), 1e-9);
+  sf_charge_begin(t, &(sf_loss_plan){.charge = 0});
+  for (int l = 0; l < 3; l++) ck_assert_float_eq(t->net->view.charge[l], 0);
+}
 
 /* Neurons of the scalar nets that fire at any step. A current within rounding of the threshold may fire in one and not
  * in the other. */
