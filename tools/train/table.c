@@ -41,8 +41,7 @@ static sf_option *energy(train_arguments *a, sf_option *o)
        "what beta weighs: e^t, as the paper, or what one more step costs here, mJ per frame (default exponential)"},
       {"--charge", 0, SF_ARG_DOUBLE, &t->charge, 0, 10, NULL, "C",
        "once the steps are found, neurons learn to fire less: the error may grow by C percent for each percent of "
-       "fewer "
-       "reads of weights; 0.2 is a good start (default 0)"},
+       "fewer reads of weights; 0.2 is a good start (default 0)"},
       {"--steps", 'T', SF_ARG_INT, &t->config.steps, 1, SF_T_MAX, NULL, "T",
        "time steps unrolled in training (default 8)"},
       {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
