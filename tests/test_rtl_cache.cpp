@@ -92,12 +92,12 @@ template <class module, int bytes, int ways> struct cache_bench {
     }
     return u.cycle - begin;
   }
-  /* A pair by itself. */
-  void one(uint32_t entry0, uint32_t entry1)
+  /* A pair by itself; its cycles. */
+  uint64_t one(uint32_t entry0, uint32_t entry1, bool empty = false)
   {
     next = {entry0, entry1};
-    u.top.s_entry0_i = entry0, u.top.s_entry1_i = entry1, u.top.s_empty_i = 0, u.top.s_valid_i = 1;
-    run(1);
+    u.top.s_entry0_i = entry0, u.top.s_entry1_i = entry1, u.top.s_empty_i = empty, u.top.s_valid_i = 1;
+    return run(1);
   }
   void timing(int latency, int spread, int stalls, int empty, int local)
   {
@@ -248,6 +248,24 @@ TEST(a_line_that_is_waited_for)
     ck_assert_uint_eq(b.events.stalls, stalls);
     b.same_counts();
   }
+}
+
+/* A cycle for each set of a bank, once; nothing where the cache is empty still. */
+TEST(emptying_costs_one_walk)
+{
+  enum { WALK = 32768 / 32 / 4, MORE = 4 };
+  usual b(72);
+  b.timing(1, 0, 0, 0, 0);
+  for (int i = 0; i < 1000; i++) b.cycle(false);
+  const uint64_t blank = b.one(80, 81, true), miss = b.one(8000, 8001);
+  ck_assert_msg(blank <= miss + MORE, "empty still: %d cycles, a miss %d", (int)blank, (int)miss);
+  for (uint32_t i = 2; i < 6; i++) {
+    const uint64_t cycles = b.one(8000 * i, 8000 * i + 1, true);
+    ck_assert_msg(cycles >= miss + WALK && cycles <= miss + WALK + MORE, "%d cycles, a miss %d", (int)cycles,
+                  (int)miss);
+    b.one(8000 * i, 8000 * i + 1);
+  }
+  b.same_counts();
 }
 
 int ck_timeout = 3600;
