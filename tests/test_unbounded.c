@@ -3,7 +3,7 @@
 #include "folder_fixture.h"
 #include "fx_fixture.h"
 #include "render/march.h"
-#include "fit/fit.h"
+#include "quant/quant.h"
 #include "quant/quant.h"
 #include "src/fx/march.h"
 #include <check.h>
@@ -388,20 +388,6 @@ TEST(files_keep_the_box)
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "gamma_q24"));
   scene.gamma_q24 = 1 << 17, scene.log2_bound = 7;
   ck_assert_ptr_nonnull(strstr(fx_scene_check(&scene, "x").message, "log2_bound"));
-  free_pair(&m, &scene);
-}
-
-/* What can be fitted has one grid; others are told so. */
-TEST(fitting_refuses)
-{
-  sf_model m;
-  fx_scene scene, fitted;
-  sf_fit_report report;
-  make_pair(4, 16, &m, &scene);
-  const fx_scene *const candidate[] = {&scene};
-  const sf_fit_rays rays = {0};
-  const sf_fit_job job = {.candidate = candidate, .candidates = 1, .name = "x.snn", .rays = &rays};
-  ck_bad(sf_fit(&fitted, &job, &report), SF_E_UNSUPPORTED, "x.snn: 3 occupancy grids", "");
   free_pair(&m, &scene);
 }
 
