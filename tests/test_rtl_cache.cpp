@@ -6,7 +6,11 @@
 #include "Vsf_cache_8.h"
 #include "tests/rtl_unit_axi.h"
 
-enum { ROOM = 400 /* pairs on their way, at most */, PATIENCE = 20000 /* cycles for a pair */ };
+enum {
+  LINES = 32 /* that there is room for */,
+  ROOM = 400 /* pairs on their way, at most */,
+  PATIENCE = 20000 /* cycles for a pair */
+};
 
 struct hashed_entries : entry_source {
   uint64_t n = 1 << 20;
@@ -28,6 +32,7 @@ template <class module, int bytes, int ways> struct cache_bench {
   pair next = {};
   int stall = 0, empty_percent = 0, locality = 0;
   uint64_t accepted = 0, done = 0, at = 0;
+  size_t most = 0; /* lines on their way */
 
   explicit cache_bench(uint64_t seed) : u(seed), draw(seed)
   {
@@ -72,6 +77,7 @@ template <class module, int bytes, int ways> struct cache_bench {
     const bool quiet = !u.top.rst_ni || u.top.clear_i, taken = u.top.s_valid_i && u.top.s_ready_o;
     memory.sample(u, draw);
     events.sample(u);
+    most = std::max(most, memory.queue.size());
     if (u.top.m_valid_o && !quiet) take();
     if (taken && !quiet) {
       if (u.top.s_empty_i) model.empty();
@@ -265,6 +271,16 @@ TEST(emptying_costs_one_walk)
                   (int)miss);
     b.one(8000 * i, 8000 * i + 1);
   }
+  b.same_counts();
+}
+
+/* No line is asked for that has no room. */
+TEST(as_many_lines_as_there_is_room_for)
+{
+  usual b(73);
+  b.timing(400, 0, 0, 0, 0);
+  b.run(400);
+  ck_assert_uint_eq(b.most, LINES);
   b.same_counts();
 }
 
