@@ -83,6 +83,8 @@ typedef struct spikefield_status {
 
 /* The version of the library that runs, "MAJOR.MINOR.PATCH"; SPIKEFIELD_VERSION is the one compiled against. */
 SPIKEFIELD_API const char *spikefield_version(void);
+/* SPIKEFIELD_LANES of the library that runs: what the shapes below depend on. */
+SPIKEFIELD_API int32_t spikefield_lanes(void);
 
 /* ---- scenes ---- */
 
@@ -171,6 +173,24 @@ typedef struct spikefield_trace {
   int32_t membrane[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES];
   int32_t current[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES]; /* exact sums */
 } spikefield_trace;
+
+/* What the accelerator shows of a sample at a layer and step: its ports tap_*, bits as in a trace. Neurons that the
+ * layer does not have are 0. */
+typedef struct spikefield_shown {
+  uint64_t spikes[SPIKEFIELD_LANES / 64]; /* D1, C1, C2 */
+  uint64_t rows[SPIKEFIELD_LANES / 64];   /* presynaptic neurons added up: C2 at the step, D2 and C3 at any step */
+  int32_t membrane[SPIKEFIELD_LANES];     /* D1, C1, C2: after firing and reset */
+} spikefield_shown;
+/* `options` are those of the call that gave the trace. */
+SPIKEFIELD_API spikefield_status spikefield_trace_shown(const spikefield_scene *scene,
+                                                        const spikefield_options *options,
+                                                        const spikefield_trace *trace, int32_t layer, int32_t step,
+                                                        spikefield_shown *shown);
+
+/* What its window of counters reads after these events, at (event * 8 + layer) * 8 + step (docs/registers.md). Cycles
+ * and stalls, which are time and no events, are 0. */
+enum { SPIKEFIELD_COUNTERS = 512 };
+SPIKEFIELD_API void spikefield_counter_window(const spikefield_counts *counts, uint64_t window[SPIKEFIELD_COUNTERS]);
 
 /* A point in model units to box units, Q0.24. E_RANGE outside the box. */
 SPIKEFIELD_API spikefield_status spikefield_position(const spikefield_scene *scene, const float model[3],

@@ -9,6 +9,7 @@ _Static_assert((int)SPIKEFIELD_LAYERS == (int)SF_LAYERS, "arch.def and spikefiel
 _Static_assert((int)SPIKEFIELD_STEPS_MAX == (int)SF_T_MAX, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_LANES == (int)SF_LANES, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_FEATURES_MAX == (int)SF_FEATURE_MAX, "arch.def and spikefield.h differ");
+_Static_assert((int)SPIKEFIELD_COUNTERS == 64 * (int)SF_EVENTS, "event.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_DIRECTIONS == (int)FX_SH, "arch.def and spikefield.h differ");
 _Static_assert(SPIKEFIELD_INPUT_MAX == (1 << (SF_INPUT_BITS - 1)) - 1, "arch.def and spikefield.h differ");
 _Static_assert((int)SPIKEFIELD_E_STOPPED == (int)SF_E_STOPPED && (int)SPIKEFIELD_E_USAGE == (int)SF_E_USAGE,
@@ -40,6 +41,11 @@ _Static_assert(sizeof(spikefield_trace) == sizeof(fx_trace), "spikefield_trace d
 const char *spikefield_version(void)
 {
   return SPIKEFIELD_VERSION;
+}
+
+int32_t spikefield_lanes(void)
+{
+  return SPIKEFIELD_LANES;
 }
 
 spikefield_status lib_status(sf_status status)

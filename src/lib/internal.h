@@ -22,4 +22,11 @@ sf_status lib_view(const spikefield_scene *scene, const spikefield_options *opti
 void lib_add_counts(spikefield_counts *sum, const fx_counts *more); /* sum may be NULL */
 void lib_pixel(spikefield_pixel *to, const fx_pixel *from);
 void lib_sample(spikefield_sample *to, const fx_out *from);
+
+/* Of a trace: rows that a layer added up (D2, C2, C3), a membrane after reset. Of counts: a place of the window. */
+typedef const uint64_t (*lib_spikes)[SF_T_MAX][SF_SPIKE_WORDS];
+typedef const int32_t (*lib_membranes)[SF_T_MAX][SF_LANES];
+void lib_rows(const fx_net *net, lib_spikes spikes, int layer, int step, uint64_t rows[SF_SPIKE_WORDS]);
+int32_t lib_membrane(const fx_net *net, lib_spikes spikes, lib_membranes membrane, int layer, int step, int neuron);
+uint64_t lib_counter(const fx_counts *counts, int at);
 #endif

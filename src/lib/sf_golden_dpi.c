@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BEAT_VALUES = 4, PACKET_VALUES = SF_DIR_MAX + SF_FEATURE_MAX, GLOBAL_LAYER = 7 };
+enum { BEAT_VALUES = 4, PACKET_VALUES = SF_DIR_MAX + SF_FEATURE_MAX };
 
 typedef struct golden {
   spikefield_scene *owner;
@@ -197,21 +197,16 @@ void sf_golden_rows(void *handle, int layer, int step, uint32_t rows[SF_GOLDEN_W
 {
   const golden *g = sampled_at(handle, layer, step);
   uint64_t any[SF_SPIKE_WORDS] = {0};
-  if (g && fx_layer_reads_spikes(layer)) {
-    const int presynaptic = fx_layer_table[layer].spikes_of;
-    const int from = fx_layer_fires(layer) ? step : 0, to = fx_layer_fires(layer) ? step + 1 : g->scene.net.steps;
-    for (int t = from; t < to; t++)
-      for (int word = 0; word < SF_SPIKE_WORDS; word++) any[word] |= g->trace.spikes[presynaptic][t][word];
-  }
+  if (g) lib_rows(&g->scene.net, (lib_spikes)g->trace.spikes, layer, step, any);
   put_bits(any, rows);
 }
 
 int sf_golden_membrane(void *handle, int layer, int step, int neuron)
 {
   const golden *g = sampled_at(handle, layer, step);
-  if (!g || neuron < 0 || neuron >= g->scene.net.layer[layer].n_out) return 0;
-  const bool fired = g->trace.spikes[layer][step][neuron / 64] >> (neuron % 64) & 1;
-  return g->trace.membrane[layer][step][neuron] - (fired ? g->scene.net.layer[layer].theta : 0);
+  return g ? lib_membrane(&g->scene.net, (lib_spikes)g->trace.spikes, (lib_membranes)g->trace.membrane, layer, step,
+                          neuron)
+           : 0;
 }
 
 int sf_golden_current(void *handle, int layer, int step, int neuron)
@@ -225,11 +220,7 @@ int sf_golden_current(void *handle, int layer, int step, int neuron)
 uint64_t sf_golden_counter(void *handle, int at)
 {
   const golden *g = handle;
-  const int event = at / 64, layer = at / 8 % 8, step = at % 8;
-  if (!g || at < 0 || event >= SF_EVENTS) return 0;
-  if (layer == GLOBAL_LAYER && event == 0) return step == 0 ? g->counts.samples : step == 1 ? g->counts.rays : 0;
-  if (layer >= SF_LAYERS) return 0;
-  return g->counts.layer[layer].event[event][step];
+  return g ? lib_counter(&g->counts, at) : 0;
 }
 
 void sf_golden_clear_counters(void *handle)

@@ -1,0 +1,96 @@
+// The block under test between buses that cocotbext-axi knows by name, with a clock of its own: the simulator makes the
+// clock, and cocotb is called only at edges that somebody waits for. SF_DUT names the block: ports of sf_top.
+`timescale 1ns / 1ps
+`ifndef SF_DUT
+`define SF_DUT sf_top
+`endif
+
+module sf_cocotb_top;
+  localparam integer LANES = sf_arch_pkg::LANES;
+
+  reg clk /*verilator public_flat_rw*/ = 1'b0;
+  reg rst_n /*verilator public_flat_rw*/ = 1'b0;
+  always #5 clk = !clk;
+
+  reg s_axil_awvalid /*verilator public_flat_rw*/ = 1'b0;
+  reg [12:0] s_axil_awaddr /*verilator public_flat_rw*/ = 13'd0;
+  wire s_axil_awready /*verilator public_flat_rd*/;
+  reg s_axil_wvalid /*verilator public_flat_rw*/ = 1'b0;
+  reg [31:0] s_axil_wdata /*verilator public_flat_rw*/ = 32'd0;
+  reg [3:0] s_axil_wstrb /*verilator public_flat_rw*/ = 4'd0;
+  wire s_axil_wready /*verilator public_flat_rd*/;
+  wire s_axil_bvalid /*verilator public_flat_rd*/;
+  wire [1:0] s_axil_bresp /*verilator public_flat_rd*/;
+  reg s_axil_bready /*verilator public_flat_rw*/ = 1'b0;
+  reg s_axil_arvalid /*verilator public_flat_rw*/ = 1'b0;
+  reg [12:0] s_axil_araddr /*verilator public_flat_rw*/ = 13'd0;
+  wire s_axil_arready /*verilator public_flat_rd*/;
+  wire s_axil_rvalid /*verilator public_flat_rd*/;
+  wire [31:0] s_axil_rdata /*verilator public_flat_rd*/;
+  wire [1:0] s_axil_rresp /*verilator public_flat_rd*/;
+  reg s_axil_rready /*verilator public_flat_rw*/ = 1'b0;
+
+  reg s_axis_tvalid /*verilator public_flat_rw*/ = 1'b0;
+  wire s_axis_tready /*verilator public_flat_rd*/;
+  reg [63:0] s_axis_tdata /*verilator public_flat_rw*/ = 64'd0;
+  reg s_axis_tuser /*verilator public_flat_rw*/ = 1'b0;
+  reg s_axis_tlast /*verilator public_flat_rw*/ = 1'b0;
+
+  wire m_axis_tvalid /*verilator public_flat_rd*/;
+  reg m_axis_tready /*verilator public_flat_rw*/ = 1'b0;
+  wire [63:0] m_axis_tdata /*verilator public_flat_rd*/;
+  wire m_axis_tlast /*verilator public_flat_rd*/;
+  wire irq /*verilator public_flat_rd*/;
+
+  wire tap_valid;
+  wire [2:0] tap_layer, tap_step;
+  wire [LANES-1:0] tap_spikes, tap_rows;
+  wire [24*LANES-1:0] tap_membrane;
+
+  `SF_DUT u_dut (
+      .clk_i           (clk),
+      .rst_ni          (rst_n),
+      .s_axil_awvalid_i(s_axil_awvalid),
+      .s_axil_awready_o(s_axil_awready),
+      .s_axil_awaddr_i (s_axil_awaddr),
+      .s_axil_wvalid_i (s_axil_wvalid),
+      .s_axil_wready_o (s_axil_wready),
+      .s_axil_wdata_i  (s_axil_wdata),
+      .s_axil_wstrb_i  (s_axil_wstrb),
+      .s_axil_bvalid_o (s_axil_bvalid),
+      .s_axil_bready_i (s_axil_bready),
+      .s_axil_bresp_o  (s_axil_bresp),
+      .s_axil_arvalid_i(s_axil_arvalid),
+      .s_axil_arready_o(s_axil_arready),
+      .s_axil_araddr_i (s_axil_araddr),
+      .s_axil_rvalid_o (s_axil_rvalid),
+      .s_axil_rready_i (s_axil_rready),
+      .s_axil_rdata_o  (s_axil_rdata),
+      .s_axil_rresp_o  (s_axil_rresp),
+      .s_axis_tvalid_i (s_axis_tvalid),
+      .s_axis_tready_o (s_axis_tready),
+      .s_axis_tdata_i  (s_axis_tdata),
+      .s_axis_tuser_i  (s_axis_tuser),
+      .s_axis_tlast_i  (s_axis_tlast),
+      .m_axis_tvalid_o (m_axis_tvalid),
+      .m_axis_tready_i (m_axis_tready),
+      .m_axis_tdata_o  (m_axis_tdata),
+      .m_axis_tlast_o  (m_axis_tlast),
+      .irq_o           (irq),
+      .tap_valid_o     (tap_valid),
+      .tap_layer_o     (tap_layer),
+      .tap_step_o      (tap_step),
+      .tap_spikes_o    (tap_spikes),
+      .tap_rows_o      (tap_rows),
+      .tap_membrane_o  (tap_membrane)
+  );
+
+  // A tap beat, held until the next one: {layer, step, spikes, rows, membranes}. tap_beat changes with each.
+  reg tap_beat /*verilator public_flat_rd*/ = 1'b0;
+  reg [5+26*LANES:0] tap /*verilator public_flat_rd*/;
+  always @(posedge clk)
+    if (tap_valid) begin
+      tap <= {tap_layer, tap_step, tap_spikes, tap_rows, tap_membrane};
+      tap_beat <= !tap_beat;
+    end
+endmodule
