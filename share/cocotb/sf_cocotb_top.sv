@@ -1,6 +1,9 @@
-// The block under test between buses that cocotbext-axi knows by name, with a clock of its own: the simulator makes the
-// clock, and cocotb is called only at edges that somebody waits for. SF_DUT names the block: ports of sf_top.
-`timescale 1ns / 1ps
+// The block under test between buses that cocotbext-axi knows by name. The simulator makes the clock. SF_DUT names the
+// block: ports of sf_top.
+//
+// A cycle of 10 ns: cocotb sees the edge of clk at 0 and reads what the block shows before its own edge at 1. What
+// cocotb writes reaches the block at 2. So no simulator's order of events at one time matters.
+`timescale 1ns / 1ns
 `ifndef SF_DUT
 `define SF_DUT sf_top
 `endif
@@ -10,7 +13,6 @@ module sf_cocotb_top;
 
   reg clk /*verilator public_flat_rw*/ = 1'b0;
   reg rst_n /*verilator public_flat_rw*/ = 1'b0;
-  always #5 clk = !clk;
 
   reg s_axil_awvalid /*verilator public_flat_rw*/ = 1'b0;
   reg [12:0] s_axil_awaddr /*verilator public_flat_rw*/ = 13'd0;
@@ -47,33 +49,69 @@ module sf_cocotb_top;
   wire [LANES-1:0] tap_spikes, tap_rows;
   wire [24*LANES-1:0] tap_membrane;
 
+  wire rst_n_q;
+  wire s_axil_awvalid_q;
+  wire [12:0] s_axil_awaddr_q;
+  wire s_axil_wvalid_q;
+  wire [31:0] s_axil_wdata_q;
+  wire [3:0] s_axil_wstrb_q;
+  wire s_axil_bready_q;
+  wire s_axil_arvalid_q;
+  wire [12:0] s_axil_araddr_q;
+  wire s_axil_rready_q;
+  wire s_axis_tvalid_q;
+  wire [63:0] s_axis_tdata_q;
+  wire s_axis_tuser_q;
+  wire s_axis_tlast_q;
+  wire m_axis_tready_q;
+  reg [135:0] held = 136'd0;
+  assign {
+      rst_n_q, s_axil_awvalid_q, s_axil_awaddr_q, s_axil_wvalid_q, s_axil_wdata_q, s_axil_wstrb_q,
+      s_axil_bready_q, s_axil_arvalid_q, s_axil_araddr_q, s_axil_rready_q, s_axis_tvalid_q, s_axis_tdata_q,
+      s_axis_tuser_q, s_axis_tlast_q, m_axis_tready_q
+  } = held;
+
+  reg dut_clk = 1'b0;
+  always begin
+    clk = 1'b1;
+    #1 dut_clk = 1'b1;
+    #1 held = {
+      rst_n, s_axil_awvalid, s_axil_awaddr, s_axil_wvalid, s_axil_wdata, s_axil_wstrb, s_axil_bready,
+      s_axil_arvalid, s_axil_araddr, s_axil_rready, s_axis_tvalid, s_axis_tdata, s_axis_tuser, s_axis_tlast,
+      m_axis_tready
+    };
+    #3 clk = 1'b0;
+    #1 dut_clk = 1'b0;
+    #4;
+  end
+
   `SF_DUT u_dut (
-      .clk_i           (clk),
-      .rst_ni          (rst_n),
-      .s_axil_awvalid_i(s_axil_awvalid),
+      .clk_i           (dut_clk),
+      .rst_ni          (rst_n_q),
+      .s_axil_awvalid_i(s_axil_awvalid_q),
       .s_axil_awready_o(s_axil_awready),
-      .s_axil_awaddr_i (s_axil_awaddr),
-      .s_axil_wvalid_i (s_axil_wvalid),
+      .s_axil_awaddr_i (s_axil_awaddr_q),
+      .s_axil_wvalid_i (s_axil_wvalid_q),
       .s_axil_wready_o (s_axil_wready),
-      .s_axil_wdata_i  (s_axil_wdata),
-      .s_axil_wstrb_i  (s_axil_wstrb),
+      .s_axil_wdata_i  (s_axil_wdata_q),
+      .s_axil_wstrb_i  (s_axil_wstrb_q),
       .s_axil_bvalid_o (s_axil_bvalid),
-      .s_axil_bready_i (s_axil_bready),
+      .s_axil_bready_i (s_axil_bready_q),
       .s_axil_bresp_o  (s_axil_bresp),
-      .s_axil_arvalid_i(s_axil_arvalid),
+      .s_axil_arvalid_i(s_axil_arvalid_q),
       .s_axil_arready_o(s_axil_arready),
-      .s_axil_araddr_i (s_axil_araddr),
+      .s_axil_araddr_i (s_axil_araddr_q),
       .s_axil_rvalid_o (s_axil_rvalid),
-      .s_axil_rready_i (s_axil_rready),
+      .s_axil_rready_i (s_axil_rready_q),
       .s_axil_rdata_o  (s_axil_rdata),
       .s_axil_rresp_o  (s_axil_rresp),
-      .s_axis_tvalid_i (s_axis_tvalid),
+      .s_axis_tvalid_i (s_axis_tvalid_q),
       .s_axis_tready_o (s_axis_tready),
-      .s_axis_tdata_i  (s_axis_tdata),
-      .s_axis_tuser_i  (s_axis_tuser),
-      .s_axis_tlast_i  (s_axis_tlast),
+      .s_axis_tdata_i  (s_axis_tdata_q),
+      .s_axis_tuser_i  (s_axis_tuser_q),
+      .s_axis_tlast_i  (s_axis_tlast_q),
       .m_axis_tvalid_o (m_axis_tvalid),
-      .m_axis_tready_i (m_axis_tready),
+      .m_axis_tready_i (m_axis_tready_q),
       .m_axis_tdata_o  (m_axis_tdata),
       .m_axis_tlast_o  (m_axis_tlast),
       .irq_o           (irq),
@@ -85,12 +123,28 @@ module sf_cocotb_top;
       .tap_membrane_o  (tap_membrane)
   );
 
-  // A tap beat, held until the next one: {layer, step, spikes, rows, membranes}. tap_beat changes with each.
+  // A result that waits has to stay as it is.
+  reg unstable /*verilator public_flat_rd*/ = 1'b0;
+  reg waits = 1'b0, waiting_last;
+  reg [63:0] waiting_data;
+  always @(posedge dut_clk) begin
+    waits <= rst_n_q && m_axis_tvalid && !m_axis_tready_q;
+    waiting_data <= m_axis_tdata;
+    waiting_last <= m_axis_tlast;
+    if (waits && (!m_axis_tvalid || m_axis_tdata != waiting_data || m_axis_tlast != waiting_last)) unstable <= 1'b1;
+  end
+
+  // A tap beat, held until the next one: {layer, step, spikes, rows}, and the membranes in four parts, because Verilator
+  // gives 2048 bits at most of a signal. tap_beat changes with each beat.
+  localparam integer PART = 6 * LANES;
   reg tap_beat /*verilator public_flat_rd*/ = 1'b0;
-  reg [5+26*LANES:0] tap /*verilator public_flat_rd*/;
-  always @(posedge clk)
+  reg [5+2*LANES:0] tap /*verilator public_flat_rd*/;
+  reg [PART-1:0] tap_membrane_0 /*verilator public_flat_rd*/, tap_membrane_1 /*verilator public_flat_rd*/;
+  reg [PART-1:0] tap_membrane_2 /*verilator public_flat_rd*/, tap_membrane_3 /*verilator public_flat_rd*/;
+  always @(posedge dut_clk)
     if (tap_valid) begin
-      tap <= {tap_layer, tap_step, tap_spikes, tap_rows, tap_membrane};
+      tap <= {tap_layer, tap_step, tap_spikes, tap_rows};
+      {tap_membrane_3, tap_membrane_2, tap_membrane_1, tap_membrane_0} <= tap_membrane;
       tap_beat <= !tap_beat;
     end
 endmodule

@@ -1,0 +1,275 @@
+"""The bench inside the simulator: programs the block, streams a kit's rays, compares with libspikefield.
+
+sf_cocotb.py starts it; the variable SF_COCOTB names a JSON file with kit, scene, steps, seed, stalls, tap and counters.
+A ray is one test: its results, spikes, rows and membranes, and with "each" every counter. Test "counters" compares the
+sum of all rays."""
+import json
+import logging
+import os
+import random
+
+import cocotb
+import numpy as np
+from cocotb.triggers import ClockCycles, Edge, RisingEdge, with_timeout
+from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp, AxiStreamBus, AxiStreamFrame, AxiStreamSink, AxiStreamSource
+
+import spikefield
+from spikefield import LANES, LAYERS
+
+CSR = {"CTRL": 0x00C, "STATUS": 0x010, "ERROR": 0x014, "COUNTERS": 0x1000}
+START, SOFT_RESET, CLEAR, SNAPSHOT = 1, 2, 4, 8
+STATUS_COUNTERS = 4
+GLOBAL_LAYER, GLOBAL_TIMES = 7, (2, 3, 4, 5)  # cycles, busy and stalls are time: the library counts events
+PATIENCE_NS = 1_000_000  # 100000 cycles without a result
+QUIET = 200  # cycles after the last result: nothing more may come
+VALUES = 4  # of 16 bits a beat
+SPIKING = ("D1", "C1", "C2")
+
+config = json.load(open(os.environ["SF_COCOTB"], encoding="utf-8"))
+scene = spikefield.Scene(config["scene"])
+STEPS = scene.info.steps
+DECODES = scene.info.grid_levels == 0
+expected_total = spikefield.Counts()
+for noisy in ("cocotb.sf_cocotb_top", "cocotb.sf_cocotb_top.s_axil", "cocotb.scheduler"):
+    logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def kit_lines(name):
+    with open(os.path.join(config["kit"], name), encoding="ascii") as lines:
+        return [int(line, 16) for line in lines]
+
+
+def packets():
+    """The kit's stimulus: a list of values (int16), one for each packet."""
+    found, values = [], []
+    for beat in kit_lines("stimulus.hex"):
+        values.append(beat & (1 << 64) - 1)
+        if beat >> 64 & 1:
+            found.append(np.array(values, "<u8").view("<i2"))
+            values = []
+    return found
+
+
+def rays():
+    """(name, packets) of each ray of the kit."""
+    with open(os.path.join(config["kit"], "manifest.json"), encoding="utf-8") as file:
+        listed = json.load(file)["rays"]
+    stream, at = packets(), 0
+    for number, ray in enumerate(listed):
+        view = "".join(c if c.isalnum() else "_" for c in ray["view"])
+        yield f"ray_{number:04d}_{view}_{ray['x']}_{ray['y']}", stream[at:at + ray["samples"]]
+        at += ray["samples"]
+
+
+def split(packed):
+    """harmonics [16] and features [n, features] of a ray's packets; what pads a beat is left out."""
+    directions = 0 if DECODES else scene.info.directions
+    beats = -(-directions // VALUES)
+    harmonics = np.zeros(16, np.int16)
+    harmonics[:directions] = packed[0][:directions]
+    rest = [packed[0][beats * VALUES:]] + packed[1:]
+    return harmonics, np.array([values[:scene.info.features] for values in rest], np.int16)
+
+
+def pauses(*what):
+    """Random bubbles of a channel, by the seed and its name."""
+    chance = random.Random(repr((config["seed"], what)))
+    while True:
+        yield chance.random() * 100 < config["stalls"]
+
+
+class Block:
+    """The buses of the block, for one test."""
+
+    def __init__(self, dut, name):
+        self.dut, self.name, self.tap = dut, name, {layer: [] for layer in range(len(LAYERS))}
+        self.bus = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "s_axil"), dut.clk)
+        self.source = AxiStreamSource(AxiStreamBus.from_prefix(dut, "s_axis"), dut.clk, byte_lanes=1)
+        self.sink = AxiStreamSink(AxiStreamBus.from_prefix(dut, "m_axis"), dut.clk, byte_lanes=1)
+        self.sink.pause = True
+        if config["stalls"]:
+            write, read = self.bus.write_if, self.bus.read_if
+            for channel in ("aw", "w", "b"):
+                getattr(write, channel + "_channel").set_pause_generator(pauses(name, channel))
+            for channel in ("ar", "r"):
+                getattr(read, channel + "_channel").set_pause_generator(pauses(name, channel))
+
+    def stream(self):
+        self.sink.pause = False
+        if config["stalls"]:
+            self.source.set_pause_generator(pauses(self.name, "s_axis"))
+            self.sink.set_pause_generator(pauses(self.name, "m_axis"))
+        if config["tap"]:
+            cocotb.start_soon(self._watch_tap())
+
+    async def _watch_tap(self):
+        """Tap beats by layer: (step, spikes, rows, membranes), integers but the step."""
+        dut, lanes, change = self.dut, (1 << LANES) - 1, Edge(self.dut.tap_beat)
+        parts = [getattr(dut, f"tap_membrane_{i}") for i in (3, 2, 1, 0)]
+        while True:
+            await change
+            tap = dut.tap.value.integer
+            layer = tap >> 2 * LANES + 3
+            spiking = layer < len(LAYERS) and LAYERS[layer] in SPIKING
+            membranes = int("".join(part.value.binstr for part in parts), 2) if spiking else 0
+            self.tap.setdefault(layer, []).append((tap >> 2 * LANES & 7, tap >> LANES & lanes, tap & lanes, membranes))
+
+    async def write(self, offset, value):
+        answer = await with_timeout(self.bus.write(offset, value.to_bytes(4, "little")), PATIENCE_NS, "ns")
+        assert answer.resp == AxiResp.OKAY, f"register {offset:03x}: response {int(answer.resp)} to a write"
+
+    async def read(self, offset, words=1):
+        answer = await with_timeout(self.bus.read(offset, 4 * words), PATIENCE_NS, "ns")
+        assert answer.resp == AxiResp.OKAY, f"register {offset:03x}: response {int(answer.resp)} to a read"
+        return answer.data
+
+    async def counters_done(self):
+        while int.from_bytes(await self.read(CSR["STATUS"]), "little") & STATUS_COUNTERS:
+            pass
+
+    async def window(self):
+        """uint64 [512], as of now."""
+        await self.write(CSR["CTRL"], SNAPSHOT)
+        await self.counters_done()
+        return np.frombuffer(await self.read(CSR["COUNTERS"], 2 * spikefield.COUNTERS), "<u8")
+
+
+def lane_bits(words):
+    return int.from_bytes(np.asarray(words, "<u8").tobytes(), "little")
+
+
+def packed_membranes(membrane):
+    """LANES x 24 bits, lane 0 lowest, as the tap has them."""
+    low = np.ascontiguousarray(membrane.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3])
+    return int.from_bytes(low.tobytes(), "little")
+
+
+def first_neuron(expected, actual, bits):
+    """(neuron, its expected value, its actual value) of the first difference."""
+    neuron = ((expected ^ actual) & -(expected ^ actual)).bit_length() - 1
+    neuron //= bits
+    sign = 1 << bits - 1 if bits > 1 else 0
+    both = [value >> bits * neuron & (1 << bits) - 1 for value in (expected, actual)]
+    return (neuron, *((value ^ sign) - sign for value in both))
+
+
+def compare_tap(layer, step, shown, beat, where):
+    name = f"{where} layer {LAYERS[layer]} step {step}"
+    actual_step, spikes, rows, membranes = beat
+    assert actual_step == step, f"{name}: the tap shows step {actual_step}"
+    parts = [("row", lane_bits(shown["rows"]), rows, 1)] if LAYERS[layer] in ("D2", "C2", "C3") else []
+    if LAYERS[layer] in SPIKING:
+        parts.append(("spike", lane_bits(shown["spikes"]), spikes, 1))
+        parts.append(("membrane", packed_membranes(shown["membrane"]), membranes, 24))
+    for what, expected, actual, bits in parts:
+        if expected != actual:
+            neuron, wanted, got = first_neuron(expected, actual, bits)
+            raise AssertionError(f"{name} neuron {neuron} {what}: expected {wanted}, actual {got}")
+
+
+def compare_taps(block, traces):
+    for layer, name in enumerate(LAYERS):
+        steps = 0 if scene.info.outputs[layer] == 0 else STEPS if name in SPIKING else 1
+        beats = block.tap[layer]
+        for at, trace in enumerate(traces):
+            for step in range(steps):
+                place = at * steps + step
+                assert place < len(beats), f"sample {at} layer {name} step {step}: no tap beat"
+                compare_tap(layer, step, scene.shown(trace, layer, step), beats[place], f"sample {at}")
+        assert len(beats) == len(traces) * steps, f"layer {name}: {len(beats)} tap beats of {len(traces)} samples"
+
+
+def compare_result(at, frame, sample):
+    beats = frame.tdata
+    assert len(beats) == 2, f"sample {at}: a result of {len(beats)} beats, expected 2"
+    low = (1 << 32) - 1
+    actual = [beats[0] & low, beats[0] >> 32, beats[1] & low, beats[1] >> 32]
+    expected = [int(sample["density"]), *map(int, sample["colour"])]
+    for name, wanted, got in zip(("density", "colour 0", "colour 1", "colour 2"), expected, actual):
+        assert wanted == got, f"sample {at} {name}: expected {wanted}, actual {got}"
+
+
+def compare_window(actual, counts):
+    expected = counts.window()
+    for at in np.flatnonzero(actual != expected):
+        event, layer, step = at // 64, at // 8 % 8, at % 8
+        if layer == GLOBAL_LAYER and (event == 1 or step in GLOBAL_TIMES):
+            continue
+        where = f"layer {LAYERS[layer]} step {step} {spikefield.EVENTS[event]}" if layer < len(LAYERS) else f"place {at}"
+        if layer == GLOBAL_LAYER and event == 0 and step < 2:
+            where = ("samples", "rays")[step]
+        raise AssertionError(f"counter {where}: expected {expected[at]}, actual {actual[at]}")
+
+
+async def stream_ray(block, packed):
+    """A ray in, its results and tap beats out, all compared; its counts."""
+    counts = spikefield.Counts()
+    harmonics, features = split(packed)
+    out, traces = scene.samples(harmonics, features, counts=counts, traces=True)
+    expected_total.__iadd__(counts)
+    block.stream()
+    for at, values in enumerate(packed):
+        beats = [int(beat) for beat in values.view("<u8")]
+        user = [int(at == 0 or DECODES)] + [0] * (len(beats) - 1)
+        block.source.send_nowait(AxiStreamFrame(beats, tuser=user))
+    for at, sample in enumerate(out):
+        frame = await with_timeout(block.sink.recv(compact=False), PATIENCE_NS, "ns")
+        compare_result(at, frame, sample)
+    await ClockCycles(block.dut.clk, QUIET)
+    assert block.sink.empty() and not block.sink.active, f"a result after the last of {len(out)} samples"
+    assert not block.dut.unstable.value, "a result changed before it was taken"
+    assert not block.dut.irq.value, "interrupt"
+    if config["tap"]:
+        compare_taps(block, traces)
+    return counts
+
+
+def ray_test(name, packed):
+    async def one(dut):
+        block = Block(dut, name)
+        await RisingEdge(dut.clk)
+        if config["failed"]:  # the ray before may have left samples inside
+            await block.write(CSR["CTRL"], SOFT_RESET)
+            await block.write(CSR["CTRL"], START)
+        if config["counters"] == "each":
+            await block.write(CSR["CTRL"], CLEAR)
+            await block.counters_done()
+        config["failed"] = True
+        counts = await stream_ray(block, packed)
+        if config["counters"] == "each":
+            compare_window(await block.window(), counts)
+        config["failed"] = False
+        config["compared"] += len(packed)
+    one.__name__ = one.__qualname__ = name
+    return cocotb.test()(one)
+
+
+@cocotb.test()
+async def program(dut):
+    """Reset, and what the driver writes; every answer is OKAY and nothing is refused."""
+    block = Block(dut, "program")
+    dut.rst_n.value = 0
+    await ClockCycles(dut.clk, 4)
+    dut.rst_n.value = 1
+    await ClockCycles(dut.clk, 4)
+    for write in kit_lines("program.hex"):
+        await block.write(write >> 32, write & 0xFFFFFFFF)
+    await block.counters_done()
+    error = int.from_bytes(await block.read(CSR["ERROR"]), "little")
+    assert error == 0, f"ERROR is {error:#x} after the programming"
+
+
+config.update(failed=False, compared=0)
+for ray_name, ray_packets in rays():
+    globals()[ray_name] = ray_test(ray_name, ray_packets)
+
+
+@cocotb.test()
+async def counters(dut):
+    """Every counter of all rays together, or that of the last one."""
+    assert config["compared"], "no ray was compared"
+    if config["counters"] == "end":
+        assert config["compared"] == expected_total.samples, "rays have failed: their events are not all counted"
+        compare_window(await Block(dut, "counters").window(), expected_total)
+    with open(config["summary"], "w", encoding="utf-8") as file:
+        json.dump({"samples": config["compared"]}, file)
