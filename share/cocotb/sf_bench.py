@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import random
+import time
 
 import cocotb
 import numpy as np
@@ -21,11 +22,12 @@ START, SOFT_RESET, CLEAR, SNAPSHOT = 1, 2, 4, 8
 STATUS_COUNTERS = 4
 GLOBAL_LAYER, GLOBAL_TIMES = 7, (2, 3, 4, 5)  # cycles, busy and stalls are time: the library counts events
 PATIENCE_NS = 1_000_000  # 100000 cycles without a result
-QUIET = 200  # cycles after the last result: nothing more may come
+QUIET = 64  # cycles after the last result: nothing more may come
 VALUES = 4  # of 16 bits a beat
 SPIKING = ("D1", "C1", "C2")
 
-config = json.load(open(os.environ["SF_COCOTB"], encoding="utf-8"))
+with open(os.environ["SF_COCOTB"], encoding="utf-8") as given:
+    config = json.load(given)
 scene = spikefield.Scene(config["scene"])
 STEPS = scene.info.steps
 DECODES = scene.info.grid_levels == 0
@@ -87,14 +89,18 @@ class Block:
         self.source = AxiStreamSource(AxiStreamBus.from_prefix(dut, "s_axis"), dut.clk, byte_lanes=1)
         self.sink = AxiStreamSink(AxiStreamBus.from_prefix(dut, "m_axis"), dut.clk, byte_lanes=1)
         self.sink.pause = True
-        if config["stalls"]:
-            write, read = self.bus.write_if, self.bus.read_if
-            for channel in ("aw", "w", "b"):
-                getattr(write, channel + "_channel").set_pause_generator(pauses(name, channel))
-            for channel in ("ar", "r"):
-                getattr(read, channel + "_channel").set_pause_generator(pauses(name, channel))
+        self.stall_bus(True)
+
+    def stall_bus(self, on):
+        """Bubbles on the registers' channels, which cost time in every cycle: only while registers are in use."""
+        write, read = self.bus.write_if, self.bus.read_if
+        for name in ("aw", "w", "b", "ar", "r"):
+            channel = getattr(read if "r" in name else write, name + "_channel")
+            channel.set_pause_generator(pauses(self.name, name) if on and config["stalls"] else None)
+            channel.pause = False
 
     def stream(self):
+        self.stall_bus(False)
         self.sink.pause = False
         if config["stalls"]:
             self.source.set_pause_generator(pauses(self.name, "s_axis"))
@@ -226,6 +232,7 @@ async def stream_ray(block, packed):
 
 def ray_test(name, packed):
     async def one(dut):
+        start = time.monotonic()
         block = Block(dut, name)
         await RisingEdge(dut.clk)
         if config["failed"]:  # the ray before may have left samples inside
@@ -236,10 +243,12 @@ def ray_test(name, packed):
             await block.counters_done()
         config["failed"] = True
         counts = await stream_ray(block, packed)
+        block.stall_bus(True)
         if config["counters"] == "each":
             compare_window(await block.window(), counts)
         config["failed"] = False
         config["compared"] += len(packed)
+        config["seconds"] += time.monotonic() - start
     one.__name__ = one.__qualname__ = name
     return cocotb.test()(one)
 
@@ -259,7 +268,7 @@ async def program(dut):
     assert error == 0, f"ERROR is {error:#x} after the programming"
 
 
-config.update(failed=False, compared=0)
+config.update(failed=False, compared=0, seconds=0.0)
 for ray_name, ray_packets in rays():
     globals()[ray_name] = ray_test(ray_name, ray_packets)
 
@@ -268,8 +277,10 @@ for ray_name, ray_packets in rays():
 async def counters(dut):
     """Every counter of all rays together, or that of the last one."""
     assert config["compared"], "no ray was compared"
+    start = time.monotonic()
     if config["counters"] == "end":
         assert config["compared"] == expected_total.samples, "rays have failed: their events are not all counted"
         compare_window(await Block(dut, "counters").window(), expected_total)
+        config["seconds"] += time.monotonic() - start
     with open(config["summary"], "w", encoding="utf-8") as file:
-        json.dump({"samples": config["compared"]}, file)
+        json.dump({"samples": config["compared"], "seconds": config["seconds"]}, file)
