@@ -6,12 +6,14 @@ deps-ci: ## install with apt what `make check` needs to leave no test out (Chrom
 
 # In an environment of its own, which tests/run.sh puts first: nothing is installed on the system.
 REQUIREMENTS := tests/requirements.txt
-python: $B/python/.done ## readers of our files from PyPI, for the tests that compare with them: build/python
+python: $B/python/.done $B/cocotb/.done ## from PyPI: readers of our files, for the tests that compare with them, and what the cocotb bench needs: build/python, build/cocotb
 $B/python/.done: $(REQUIREMENTS)
+$B/cocotb/.done: share/cocotb/requirements.txt
+$B/python/.done $B/cocotb/.done:
 	$(call say,PIP   $(@D))
 	$Qrm -rf $(@D)
 	$Qpython3 -m venv $(@D) || { echo "python: no environment in $(@D): is python3-venv installed? (make deps-ci)" >&2; exit 1; }
 	$Q$(@D)/bin/python3 -m pip install --quiet --disable-pip-version-check -r $< || { \
-	  rm -rf $(@D); echo "python: the package index cannot be reached, or lacks what $< lists: the tests read_nir and read_safetensors are skipped, and package leaves parts out" >&2; exit 1; }
+	  rm -rf $(@D); echo "python: the package index cannot be reached, or lacks what $< lists: the tests read_nir, read_safetensors and cocotb are skipped, and package leaves parts out" >&2; exit 1; }
 	@touch $@
 .PHONY: deps-ci python

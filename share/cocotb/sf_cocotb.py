@@ -24,6 +24,8 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+TREE = os.path.dirname(os.path.dirname(HERE))  # this file's, in share/cocotb
+PREFIX = os.path.dirname(TREE)  # where it is installed, in share/spikefield/cocotb
 TOP = "sf_cocotb_top"
 NEEDED = {"cocotb": "cocotb", "cocotbext.axi": "cocotbext-axi", "numpy": "numpy"}
 
@@ -50,9 +52,8 @@ def check_environment():
     beside = os.path.join(os.path.dirname(HERE), "python")  # the source tree, or what was installed
     if not is_there("spikefield") and os.path.isdir(os.path.join(beside, "spikefield")):
         sys.path.append(beside)
-    root = os.path.dirname(os.path.dirname(HERE))
-    built = glob.glob(os.path.join(root, "build", "lib", "libspikefield.so.*"))
-    built += glob.glob(os.path.join(os.path.dirname(root), "lib", "libspikefield.so"))
+    built = glob.glob(os.path.join(TREE, "build", "lib", "libspikefield.so.*"))
+    built += glob.glob(os.path.join(PREFIX, "lib", "libspikefield.so"))
     if "SPIKEFIELD_LIBRARY" not in os.environ and built:
         os.environ["SPIKEFIELD_LIBRARY"] = built[0]
     try:
@@ -63,8 +64,7 @@ def check_environment():
 
 def find_export(named):
     """sf_export: the named one, that of the tree or PREFIX this file lies in, that of PATH."""
-    root = os.path.dirname(os.path.dirname(HERE))
-    near = [os.path.join(root, "build", "bin", "sf_export"), os.path.join(os.path.dirname(root), "bin", "sf_export")]
+    near = [os.path.join(TREE, "build", "bin", "sf_export"), os.path.join(PREFIX, "bin", "sf_export")]
     for program in [named] if named else near + ["sf_export"]:
         found = shutil.which(program)
         if found:
@@ -222,7 +222,7 @@ def run(options, folder, command, kit):
         json.dump(config, file)
     start = time.monotonic()
     with open(options.log, "w", encoding="utf-8") as log:
-        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, env=environment(path, results), cwd=folder)
+        subprocess.run(command + options.plusarg, stdout=log, stderr=subprocess.STDOUT, env=environment(path, results), cwd=folder)
     if not os.path.exists(results):
         with open(options.log, encoding="utf-8", errors="replace") as log:
             raise Trouble(f"the simulation left no results, see {options.log}\n" + "".join(log.readlines()[-5:]).rstrip())
@@ -249,6 +249,7 @@ def arguments():
     parser.add_argument("--no-tap", action="store_true", help="the block shows no tap beats: compare results and counters")
     parser.add_argument("--dut", help="another block: sources in compilation order, +incdir+, -I, -D, -F LIST, -f LIST")
     parser.add_argument("--dut-top", default="sf_top", help="its module (sf_top)")
+    parser.add_argument("--plusarg", action="append", default=[], metavar="+NAME=VALUE", help="for the simulation; any number of them")
     parser.add_argument("--export", help="sf_export, where it is not found by itself")
     parser.add_argument("-o", default="sf_cocotb", metavar="DIR", help="what is built, results.xml, run.log (sf_cocotb)")
     return parser.parse_args()

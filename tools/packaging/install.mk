@@ -30,11 +30,14 @@ INSTALL_LIB := 644:$(PUBLIC_HEADER):$(INCLUDEDIR)/spikefield/spikefield.h \
   644:src/lib/sf_golden_dpi.sv:$(DATADIR)/spikefield/sf_golden_dpi.sv \
   644:$B/lib/libspikefield.a:$(LIBDIR)/libspikefield.a \
   755:$B/lib/$(SHARED):$(LIBDIR)/$(SHARED) 755:$B/lib/$(DPI):$(LIBDIR)/$(DPI) \
-  644:docs/example.c:$(DOCDIR)/example.c
+  644:docs/example.c:$(DOCDIR)/example.c \
+  $(foreach f,$(patsubst share/%,%,$(wildcard share/python/spikefield/*.py)),644:share/$f:$(DATADIR)/spikefield/$f)
 INSTALL_LINKS := $(LIBDIR)/$(SONAME) $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc
 INSTALL_PROGRAMS := $(foreach p,$(PROGRAMS),755:$B/bin/$p:$(BINDIR)/$p) \
   $(foreach p,$(PROGRAMS),644:$B/completions/$p:$(DATADIR)/bash-completion/completions/$p) \
   $(foreach f,$(patsubst share/%,%,$(wildcard share/tech/*.tech share/schema/*.json)),644:share/$f:$(DATADIR)/spikefield/$f) \
+  $(foreach f,$(filter-out cocotb/sf_cocotb.py,$(patsubst share/%,%,$(wildcard share/cocotb/*.*))),644:share/$f:$(DATADIR)/spikefield/$f) \
+  755:share/cocotb/sf_cocotb.py:$(DATADIR)/spikefield/cocotb/sf_cocotb.py \
   644:$B/share/spikefield/VERSION:$(DATADIR)/spikefield/VERSION
 INSTALL_MAN := $(foreach p,$(PROGRAMS),644:$B/man/$p.1:$(MANDIR)/man1/$p.1)
 # sf_soc looks for it from where it stands.
@@ -65,10 +68,15 @@ install: installable ## programs, manual pages, completions, data and the C libr
 
 uninstall: ## remove what install put below PREFIX
 	$Qrm -f $(addprefix $(DESTDIR),$(INSTALLED))
-	$Qrmdir $(addprefix $(DESTDIR),$(INCLUDEDIR)/spikefield $(addprefix $(DATADIR)/spikefield,/tech /schema /) $(DOCDIR) \
+	$Qrm -rf $(addprefix $(DESTDIR)$(DATADIR)/spikefield,/cocotb/__pycache__ /python/spikefield/__pycache__)
+	$Qrmdir $(addprefix $(DESTDIR),$(INCLUDEDIR)/spikefield $(addprefix $(DATADIR)/spikefield,/tech /schema /cocotb /python/spikefield /python /) $(DOCDIR) \
 	  $(abspath $(BINDIR)/../lib/spikefield)) 2>/dev/null || true
 
 .PHONY: man installable install install-lib uninstall
+
+wheel: lib ## a wheel of the Python package with the library inside: build/wheel (docs/python.md)
+	$Qpython3 tools/packaging/wheel.py share/python/spikefield $B/lib/$(SHARED) $(LIB_VERSION) $B/wheel
+.PHONY: wheel
 
 DEB_PACKAGES := build-essential debhelper help2man lintian
 deb: ## Debian packages of programs and library that lintian accepts: build/deb
