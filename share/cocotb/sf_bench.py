@@ -11,6 +11,7 @@ import time
 
 import cocotb
 import numpy as np
+from cocotb.result import SimTimeoutError
 from cocotb.triggers import ClockCycles, Edge, RisingEdge, with_timeout
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp, AxiStreamBus, AxiStreamFrame, AxiStreamSink, AxiStreamSource
 
@@ -31,7 +32,6 @@ with open(os.environ["SF_COCOTB"], encoding="utf-8") as given:
 scene = spikefield.Scene(config["scene"])
 STEPS = scene.info.steps
 DECODES = scene.info.grid_levels == 0
-expected_total = spikefield.Counts()
 for noisy in ("cocotb.sf_cocotb_top", "cocotb.sf_cocotb_top.s_axil", "cocotb.scheduler"):
     logging.getLogger(noisy).setLevel(logging.WARNING)
 
@@ -80,6 +80,23 @@ def pauses(*what):
         yield chance.random() * 100 < config["stalls"]
 
 
+async def patiently(what, trouble):
+    try:
+        return await with_timeout(what, PATIENCE_NS, "ns")
+    except SimTimeoutError:
+        raise AssertionError(f"{trouble} within {PATIENCE_NS // 10} cycles") from None
+
+
+def shy_pauses(valid, *what):
+    """As pauses; and now and then not ready before a beat was seen, as a consumer may be."""
+    chance, stall = random.Random(repr((config["seed"], "shy", what))), pauses(*what)
+    while True:
+        if chance.random() * 100 < config["stalls"]:
+            while not valid.value:
+                yield True
+        yield next(stall)
+
+
 class Block:
     """The buses of the block, for one test."""
 
@@ -104,7 +121,7 @@ class Block:
         self.sink.pause = False
         if config["stalls"]:
             self.source.set_pause_generator(pauses(self.name, "s_axis"))
-            self.sink.set_pause_generator(pauses(self.name, "m_axis"))
+            self.sink.set_pause_generator(shy_pauses(self.dut.m_axis_tvalid, self.name, "m_axis"))
         if config["tap"]:
             cocotb.start_soon(self._watch_tap())
 
@@ -121,13 +138,18 @@ class Block:
             self.tap.setdefault(layer, []).append((tap >> 2 * LANES & 7, tap >> LANES & lanes, tap & lanes, membranes))
 
     async def write(self, offset, value):
-        answer = await with_timeout(self.bus.write(offset, value.to_bytes(4, "little")), PATIENCE_NS, "ns")
+        answer = await patiently(self.bus.write(offset, value.to_bytes(4, "little")), f"register {offset:03x}: no answer to a write")
+        self.check_order()
         assert answer.resp == AxiResp.OKAY, f"register {offset:03x}: response {int(answer.resp)} to a write"
 
     async def read(self, offset, words=1):
-        answer = await with_timeout(self.bus.read(offset, 4 * words), PATIENCE_NS, "ns")
+        answer = await patiently(self.bus.read(offset, 4 * words), f"register {offset:03x}: no answer to a read")
+        self.check_order()
         assert answer.resp == AxiResp.OKAY, f"register {offset:03x}: response {int(answer.resp)} to a read"
         return answer.data
+
+    def check_order(self):
+        assert not self.dut.early.value, "a register answered before it was asked"
 
     async def counters_done(self):
         while int.from_bytes(await self.read(CSR["STATUS"]), "little") & STATUS_COUNTERS:
@@ -173,16 +195,22 @@ def compare_tap(layer, step, shown, beat, where):
             raise AssertionError(f"{name} neuron {neuron} {what}: expected {wanted}, actual {got}")
 
 
+def tap_beats(layer):
+    """Of a sample: one for each step of a spiking layer, one of the others; none of a layer that a decoder lacks."""
+    return 0 if scene.info.outputs[layer] == 0 else STEPS if LAYERS[layer] in SPIKING else 1
+
+
 def compare_taps(block, traces):
-    for layer, name in enumerate(LAYERS):
-        steps = 0 if scene.info.outputs[layer] == 0 else STEPS if name in SPIKING else 1
-        beats = block.tap[layer]
-        for at, trace in enumerate(traces):
-            for step in range(steps):
-                place = at * steps + step
-                assert place < len(beats), f"sample {at} layer {name} step {step}: no tap beat"
-                compare_tap(layer, step, scene.shown(trace, layer, step), beats[place], f"sample {at}")
-        assert len(beats) == len(traces) * steps, f"layer {name}: {len(beats)} tap beats of {len(traces)} samples"
+    """By sample, then layer, then step: the first difference is the cause of the others."""
+    places = [(layer, step) for layer in range(len(LAYERS)) for step in range(tap_beats(layer))]
+    for at, trace in enumerate(traces):
+        for layer, step in places:
+            place = at * tap_beats(layer) + step
+            assert place < len(block.tap[layer]), f"sample {at} layer {LAYERS[layer]} step {step}: no tap beat"
+            compare_tap(layer, step, scene.shown(trace, layer, step), block.tap[layer][place], f"sample {at}")
+    for layer, beats in block.tap.items():
+        wanted = len(traces) * tap_beats(layer) if layer < len(LAYERS) else 0
+        assert len(beats) == wanted, f"layer {layer}: {len(beats)} tap beats of {len(traces)} samples, expected {wanted}"
 
 
 def compare_result(at, frame, sample):
@@ -212,21 +240,21 @@ async def stream_ray(block, packed):
     counts = spikefield.Counts()
     harmonics, features = split(packed)
     out, traces = scene.samples(harmonics, features, counts=counts, traces=True)
-    expected_total.__iadd__(counts)
+    config["expected"] += counts
     block.stream()
     for at, values in enumerate(packed):
         beats = [int(beat) for beat in values.view("<u8")]
         user = [int(at == 0 or DECODES)] + [0] * (len(beats) - 1)
         block.source.send_nowait(AxiStreamFrame(beats, tuser=user))
-    for at, sample in enumerate(out):
-        frame = await with_timeout(block.sink.recv(compact=False), PATIENCE_NS, "ns")
-        compare_result(at, frame, sample)
+    frames = [await patiently(block.sink.recv(compact=False), f"sample {at}: no result") for at in range(len(out))]
     await ClockCycles(block.dut.clk, QUIET)
+    if config["tap"]:
+        compare_taps(block, traces)
+    for at, (frame, sample) in enumerate(zip(frames, out)):
+        compare_result(at, frame, sample)
     assert block.sink.empty() and not block.sink.active, f"a result after the last of {len(out)} samples"
     assert not block.dut.unstable.value, "a result changed before it was taken"
     assert not block.dut.irq.value, "interrupt"
-    if config["tap"]:
-        compare_taps(block, traces)
     return counts
 
 
@@ -268,7 +296,7 @@ async def program(dut):
     assert error == 0, f"ERROR is {error:#x} after the programming"
 
 
-config.update(failed=False, compared=0, seconds=0.0)
+config.update(failed=False, compared=0, seconds=0.0, expected=spikefield.Counts())
 for ray_name, ray_packets in rays():
     globals()[ray_name] = ray_test(ray_name, ray_packets)
 
@@ -279,8 +307,8 @@ async def counters(dut):
     assert config["compared"], "no ray was compared"
     start = time.monotonic()
     if config["counters"] == "end":
-        assert config["compared"] == expected_total.samples, "rays have failed: their events are not all counted"
-        compare_window(await Block(dut, "counters").window(), expected_total)
+        assert config["compared"] == config["expected"].samples, "rays have failed: their events are not all counted"
+        compare_window(await Block(dut, "counters").window(), config["expected"])
         config["seconds"] += time.monotonic() - start
     with open(config["summary"], "w", encoding="utf-8") as file:
         json.dump({"samples": config["compared"], "seconds": config["seconds"]}, file)

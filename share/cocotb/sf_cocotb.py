@@ -16,6 +16,7 @@ import hashlib
 import importlib.util
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -206,7 +207,7 @@ def reason(case, log):
     """The exception that cocotb printed for the case."""
     with open(log, encoding="utf-8", errors="replace") as file:
         text = file.read().split(f"{case.get('name')} failed", 1)
-    said = [line.strip() for line in text[-1].splitlines() if "Error" in line or "Exception" in line] if len(text) > 1 else []
+    said = re.findall(r"^ *([\w.]*(?:Error|Exception)\b(?:: .*)?)$", text[1] if len(text) > 1 else "", re.M)
     return said[0] if said else f"see {log}"
 
 
