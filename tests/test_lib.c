@@ -155,6 +155,57 @@ TEST(samples_are_those_of_the_core)
   ck_assert_uint_eq(spikefield_relu_energy_fj(scene, 7), 7 * UINT64_C(4600) * (uint64_t)info.weight_bytes);
 }
 
+TEST(the_tap_shows_rows_and_membranes_after_reset)
+{
+  static spikefield_trace trace[SAMPLES];
+  uint32_t position[3 * SAMPLES];
+  const int16_t harmonics[SPIKEFIELD_DIRECTIONS] = {100, -50};
+  spikefield_sample sample[SAMPLES];
+  spikefield_shown shown;
+  int fired_at_all = 0;
+  random_positions(position, 2);
+  lib_good(spikefield_samples_at(scene, NULL, harmonics, position, SAMPLES, sample, trace, NULL));
+  for (int i = 0; i < SAMPLES * info.steps; i++) {
+    const spikefield_trace *of = &trace[i / info.steps];
+    const int t = i % info.steps;
+    for (int l = FX_D1; l <= FX_C2; l += l == FX_D1 ? 2 : 1) {
+      lib_good(spikefield_trace_shown(scene, NULL, of, l, t, &shown));
+      ck_assert_mem_eq(shown.spikes, of->spikes[l][t], sizeof shown.spikes);
+      for (int n = 0; n < info.outputs[l]; n++) {
+        const int fired = of->spikes[l][t][n / 64] >> (n % 64) & 1;
+        ck_assert_int_eq(shown.membrane[n], of->membrane[l][t][n] - fired * info.theta[l]);
+        fired_at_all += fired;
+      }
+    }
+    ck_assert_mem_eq(shown.rows, of->spikes[FX_C1][t], sizeof shown.rows);
+    lib_good(spikefield_trace_shown(scene, NULL, of, FX_D2, 0, &shown));
+    for (int word = 0; word < SPIKEFIELD_LANES / 64; word++)
+      ck_assert_uint_eq(of->spikes[FX_D1][t][word] & ~shown.rows[word], 0);
+    ck_assert_int_eq(shown.membrane[0], 0);
+  }
+  ck_assert_int_gt(fired_at_all, 0);
+  lib_bad(spikefield_trace_shown(scene, NULL, NULL, 0, 0, &shown), SPIKEFIELD_E_USAGE, "trace is NULL");
+  lib_bad(spikefield_trace_shown(scene, NULL, trace, 5, 0, &shown), SPIKEFIELD_E_RANGE, "layer is 5, expected 0..4");
+  lib_bad(spikefield_trace_shown(scene, NULL, trace, 0, -1, &shown), SPIKEFIELD_E_RANGE, "step is -1");
+}
+
+TEST(the_window_of_counters_has_every_event_at_its_place)
+{
+  spikefield_counts counts = {.samples = 7, .rays = 3};
+  uint64_t window[SPIKEFIELD_COUNTERS], sum = 0;
+  counts.layer[SPIKEFIELD_C2].sop[2] = 11;
+  counts.layer[SPIKEFIELD_C3].special[7] = 13;
+  spikefield_counter_window(&counts, window);
+  ck_assert_uint_eq(window[(1 * 8 + 3) * 8 + 2], 11);
+  ck_assert_uint_eq(window[(7 * 8 + 4) * 8 + 7], 13);
+  ck_assert_uint_eq(window[7 * 8], 7);
+  ck_assert_uint_eq(window[7 * 8 + 1], 3);
+  for (int at = 0; at < SPIKEFIELD_COUNTERS; at++) sum += window[at];
+  ck_assert_uint_eq(sum, 7 + 3 + 11 + 13);
+  spikefield_counter_window(NULL, window);
+  ck_assert_int_eq(spikefield_lanes(), SF_LANES);
+}
+
 TEST(samples_of_a_decoder_are_of_one_ray_too)
 {
   OWNED(fx_scene) with_decoder = tensorf_scene();

@@ -151,12 +151,16 @@ module sf_cocotb_top;
   reg early /*verilator public_flat_rd*/ = 1'b0;
   reg [7:0] aw_open = 8'd0, w_open = 8'd0, ar_open = 8'd0;
   wire b_taken = s_axil_bvalid && s_axil_bready_q;
-  always @(posedge dut_clk) begin
-    if ((s_axil_bvalid && (aw_open == 8'd0 || w_open == 8'd0)) || (s_axil_rvalid && ar_open == 8'd0)) early <= 1'b1;
-    aw_open <= aw_open + {7'd0, s_axil_awvalid_q && s_axil_awready} - {7'd0, b_taken};
-    w_open <= w_open + {7'd0, s_axil_wvalid_q && s_axil_wready} - {7'd0, b_taken};
-    ar_open <= ar_open + {7'd0, s_axil_arvalid_q && s_axil_arready} - {7'd0, s_axil_rvalid && s_axil_rready_q};
-  end
+  always @(posedge dut_clk)
+    if (!rst_n_q) begin
+      early <= 1'b0;
+      {aw_open, w_open, ar_open} <= 24'd0;
+    end else begin
+      if ((s_axil_bvalid && (aw_open == 8'd0 || w_open == 8'd0)) || (s_axil_rvalid && ar_open == 8'd0)) early <= 1'b1;
+      aw_open <= aw_open + {7'd0, s_axil_awvalid_q && s_axil_awready} - {7'd0, b_taken};
+      w_open <= w_open + {7'd0, s_axil_wvalid_q && s_axil_wready} - {7'd0, b_taken};
+      ar_open <= ar_open + {7'd0, s_axil_arvalid_q && s_axil_arready} - {7'd0, s_axil_rvalid && s_axil_rready_q};
+    end
 
   // A tap beat, held until the next one: {layer, step, spikes, rows}, and the membranes in four parts, because Verilator
   // gives 2048 bits at most of a signal. tap_beat changes with each beat.
