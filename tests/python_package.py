@@ -60,7 +60,7 @@ class Kit(unittest.TestCase):
             self.assertEqual([int(sample["density"]) | colour[0] << 32, colour[1] | colour[2] << 32], wanted[2 * at:2 * at + 2])
 
     def test_counters(self):
-        self.assertEqual(self.counts.window().tolist(), kit("expected_counters.hex"))
+        self.assertEqual(self.scene.window(self.counts).tolist(), kit("expected_counters.hex"))
 
     def test_taps(self):
         steps = self.scene.info.steps

@@ -195,14 +195,14 @@ TEST(the_window_of_counters_has_every_event_at_its_place)
   uint64_t window[SPIKEFIELD_COUNTERS], sum = 0;
   counts.layer[SPIKEFIELD_C2].sop[2] = 11;
   counts.layer[SPIKEFIELD_C3].special[7] = 13;
-  spikefield_counter_window(&counts, window);
+  spikefield_counter_window(scene, &counts, window);
   ck_assert_uint_eq(window[(1 * 8 + 3) * 8 + 2], 11);
   ck_assert_uint_eq(window[(7 * 8 + 4) * 8 + 7], 13);
   ck_assert_uint_eq(window[7 * 8], 7);
   ck_assert_uint_eq(window[7 * 8 + 1], 3);
   for (int at = 0; at < SPIKEFIELD_COUNTERS; at++) sum += window[at];
   ck_assert_uint_eq(sum, 7 + 3 + 11 + 13);
-  spikefield_counter_window(NULL, window);
+  spikefield_counter_window(scene, NULL, window);
   ck_assert_int_eq(spikefield_lanes(), SF_LANES);
 }
 
@@ -221,6 +221,10 @@ TEST(samples_of_a_decoder_are_of_one_ray_too)
   ck_assert_uint_eq(counts.rays, 1);
   lib_good(spikefield_samples(decoder, NULL, harmonics, feature, 0, sample, NULL, &counts));
   ck_assert_uint_eq(counts.rays, 1);
+  uint64_t window[SPIKEFIELD_COUNTERS];
+  spikefield_counter_window(decoder, &counts, window);
+  ck_assert_uint_eq(window[7 * 8], 3);
+  ck_assert_uint_eq(window[7 * 8 + 1], 0);
   spikefield_scene_close(decoder);
 }
 

@@ -188,9 +188,11 @@ SPIKEFIELD_API spikefield_status spikefield_trace_shown(const spikefield_scene *
                                                         spikefield_shown *shown);
 
 /* What its window of counters reads after these events, at (event * 8 + layer) * 8 + step (docs/registers.md). Cycles
- * and stalls, which are time and no events, are 0. */
+ * and stalls, which are time and no events, are 0; so are the rays of a TensoRF scene, counted where its field is.
+ * Without a scene or counts the window stays as it is. */
 enum { SPIKEFIELD_COUNTERS = 512 };
-SPIKEFIELD_API void spikefield_counter_window(const spikefield_counts *counts, uint64_t window[SPIKEFIELD_COUNTERS]);
+SPIKEFIELD_API void spikefield_counter_window(const spikefield_scene *scene, const spikefield_counts *counts,
+                                              uint64_t window[SPIKEFIELD_COUNTERS]);
 
 /* A point in model units to box units, Q0.24. E_RANGE outside the box. */
 SPIKEFIELD_API spikefield_status spikefield_position(const spikefield_scene *scene, const float model[3],

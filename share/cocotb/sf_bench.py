@@ -224,7 +224,7 @@ def compare_result(at, frame, sample):
 
 
 def compare_window(actual, counts):
-    expected = counts.window()
+    expected = scene.window(counts)
     for at in np.flatnonzero(actual != expected):
         event, layer, step = at // 64, at // 8 % 8, at % 8
         if layer == GLOBAL_LAYER and (event == 1 or step in GLOBAL_TIMES):

@@ -55,10 +55,12 @@ spikefield_status spikefield_trace_shown(const spikefield_scene *scene, const sp
   return lib_status(shown(scene, options, trace, layer, step, to));
 }
 
-void spikefield_counter_window(const spikefield_counts *counts, uint64_t window[SPIKEFIELD_COUNTERS])
+void spikefield_counter_window(const spikefield_scene *scene, const spikefield_counts *counts,
+                               uint64_t window[SPIKEFIELD_COUNTERS])
 {
   fx_counts copy;
-  if (!counts || !window) return;
+  if (!scene || !counts || !window) return;
   memcpy(&copy, counts, sizeof copy);
+  if (fx_net_constants_per_sample(&scene->fx.net)) copy.rays = 0;
   for (int at = 0; at < SPIKEFIELD_COUNTERS; at++) window[at] = lib_counter(&copy, at);
 }

@@ -87,12 +87,6 @@ class Counts:
         """4600 fJ per MAC, 900 fJ per SOP."""
         return _lib.spikefield_energy_fj(_address(self.raw))
 
-    def window(self):
-        """uint64 [512]: what the accelerator's window of counters reads, at (event * 8 + layer) * 8 + step."""
-        window = np.zeros(COUNTERS, np.uint64)
-        _lib.spikefield_counter_window(_address(self.raw), _address(window))
-        return window
-
 
 class Scene:
     """A .snn file. Arguments that calls share: steps, time steps 1..8 (0: the scene's); threads (0: all); counts, a
@@ -127,6 +121,12 @@ class Scene:
     def relu_energy_fj(self, samples):
         """Of the ReLU twin: the same layers, every synapse a MAC."""
         return _lib.spikefield_relu_energy_fj(self._scene, samples)
+
+    def window(self, counts):
+        """uint64 [512]: what the accelerator's window of counters reads, at (event * 8 + layer) * 8 + step."""
+        window = np.zeros(COUNTERS, np.uint64)
+        _lib.spikefield_counter_window(self._scene, _raw(counts), _address(window))
+        return window
 
     def position(self, model):
         """A point in model units, [3] -> box units Q0.24, uint32 [3]."""

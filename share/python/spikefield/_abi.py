@@ -81,7 +81,7 @@ _FUNCTIONS = {
     "samples": (Status, [_S, POINTER(Options), _A, _A, c_size_t, _A, _A, _A]),
     "samples_at": (Status, [_S, POINTER(Options), _A, _A, c_size_t, _A, _A, _A]),
     "trace_shown": (Status, [_S, POINTER(Options), _A, c_int32, c_int32, _A]),
-    "counter_window": (None, [_A, _A]),
+    "counter_window": (None, [_S, _A, _A]),
     "pixel_distance": (c_double, [_S, _A]),
     "rays": (Status, [_S, POINTER(Options), _A, _A, c_size_t, _A, _A]),
     "frame": (Status, [_S, POINTER(Options), POINTER(Camera), _A, _A]),
