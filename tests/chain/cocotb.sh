@@ -54,6 +54,7 @@ faulty 12 1 'FAIL counters: .*register 1000: response 2 to a read'
 faulty 13 1 'FAIL program: .*a register answered before it was asked'
 faulty 14 1 'FAIL ray_.*: no result within 100000 cycles'
 faulty 15 1 'FAIL ray_.*sample 0 layer D1 step 0: no tap beat'
+bench 0 'PASS 24 samples' -- --samples 24 --dut "-F $work/faulty.f" --plusarg +fault=15 --no-tap -o "$work/faulty"
 bench 0 'PASS 48 samples' -- --dut "-F $work/faulty.f" --counters each -o "$work/faulty"
 bench 1 'FAIL counters: .*counter layer C1 step 2 spikes: expected' -- --dut "-F $work/faulty.f" --plusarg +fault=3 -o "$work/faulty"
 
