@@ -28,9 +28,11 @@ const char *sf_driver_text(sf_driver_code code)
   case SF_DRIVER_TIMEOUT:
     return "no answer";
   case SF_DRIVER_MISFIT:
-    return "the encoder's levels or directions are not the net's";
+    return "the field's levels, directions or features are not the net's inputs";
   case SF_DRIVER_CACHE:
     return "the field's cache has another size or other ways than the program asks for";
+  case SF_DRIVER_FIELD:
+    return "this build of the accelerator has not the scene's kind of field (hash grid, or planes and lines)";
   }
   return "unknown code";
 }

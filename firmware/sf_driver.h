@@ -54,7 +54,8 @@ typedef enum {
   SF_DRIVER_REFUSED,   /* the ERROR register says why */
   SF_DRIVER_TIMEOUT,   /* the block did not answer; a soft reset recovers it */
   SF_DRIVER_MISFIT,    /* the encoder's sizes are not the net's; nothing was written */
-  SF_DRIVER_CACHE      /* the field's cache is not the one that the program asks for; nothing was written */
+  SF_DRIVER_CACHE,     /* the field's cache is not the one that the program asks for; nothing was written */
+  SF_DRIVER_FIELD      /* this build has not the scene's kind of field; nothing was written */
 } sf_driver_code;
 const char *sf_driver_text(sf_driver_code code);
 /* First bit of an ERROR register as text, "no error" for 0. */

@@ -2,6 +2,8 @@
 #include <stdbool.h>
 
 enum { LEVEL_WORDS = 8 }; /* of the encoder's programming; five are used */
+/* See rtl/sf_planes.sv. */
+enum { PLANES = 0x100, PLANES_SCALES = 0x110, PLANES_ARRAYS = 0x120, BASIS = 0x800, PAIR_ROWS = 64 };
 
 static uint32_t get(const sf_bus *bus, uint32_t offset)
 {
@@ -64,11 +66,75 @@ static void program_encoder(const sf_bus *bus, const sf_ray_blob *rays)
   put(bus, SF_CSR_ENCODER_DATA, rays->dir_frac);
 }
 
-sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays)
+static uint32_t inputs(const sf_planes_blob *planes)
 {
-  if (!fits(bus, rays)) return SF_DRIVER_MISFIT;
-  if (!has_cache(bus, rays)) return SF_DRIVER_CACHE;
+  return planes->features * (1 + 2 * planes->feature_freqs) + 3 * (1 + 2 * planes->view_freqs);
+}
+
+static bool planes_fit(const sf_bus *bus, const sf_planes_blob *planes)
+{
+  for (int pair = 0; pair < 3; pair++)
+    if (planes->components[pair] < 1 || planes->components[pair] > PAIR_ROWS) return false;
+  return get(bus, SF_CSR_D1_N_IN) == 0 && inputs(planes) == get(bus, SF_CSR_C1_N_IN);
+}
+
+static uint32_t four(const int8_t *value)
+{
+  return (uint8_t)value[0] | (uint32_t)(uint8_t)value[1] << 8 | (uint32_t)(uint8_t)value[2] << 16 |
+         (uint32_t)(uint8_t)value[3] << 24;
+}
+
+/* Rows of components that a pair's last line has room for are multiplied, too: by 0. */
+static void program_basis(const sf_bus *bus, const sf_planes_blob *planes)
+{
+  const int8_t *row = planes->basis;
+  for (uint32_t pair = 0; pair < 3; pair++) {
+    put(bus, SF_CSR_ENCODER_ADDRESS, BASIS + pair * PAIR_ROWS * SF_PLANES_FEATURES / 4);
+    for (uint32_t c = 0; c < planes->components[pair]; c++, row += SF_PLANES_FEATURES)
+      for (uint32_t f = 0; f < SF_PLANES_FEATURES; f += 4) put(bus, SF_CSR_ENCODER_DATA, four(row + f));
+  }
+}
+
+static void program_planes(const sf_bus *bus, const sf_planes_blob *planes)
+{
+  put(bus, SF_CSR_ENCODER_ADDRESS, PLANES);
+  put(bus, SF_CSR_ENCODER_DATA, 1);
+  for (int axis = 0; axis < 3; axis++) put(bus, SF_CSR_ENCODER_DATA, planes->res[axis]);
+  put(bus, SF_CSR_ENCODER_DATA, planes->relu);
+  put(bus, SF_CSR_ENCODER_DATA, planes->weight_stop);
+  put(bus, SF_CSR_ENCODER_DATA, planes->features);
+  put(bus, SF_CSR_ENCODER_DATA, planes->feature_freqs);
+  put(bus, SF_CSR_ENCODER_DATA, planes->view_freqs);
+  put(bus, SF_CSR_ENCODER_DATA, planes->frac);
+  put(bus, SF_CSR_ENCODER_ADDRESS, PLANES_SCALES);
+  for (int i = 0; i < SF_PLANES_SCALES; i++) {
+    put(bus, SF_CSR_ENCODER_DATA, planes->scale[i].mul);
+    put(bus, SF_CSR_ENCODER_DATA, planes->scale[i].shift);
+  }
+  put(bus, SF_CSR_ENCODER_DATA, (uint32_t)planes->bias);
+  for (uint32_t i = 0; i < SF_PLANES_ARRAYS; i++) {
+    put(bus, SF_CSR_ENCODER_ADDRESS, PLANES_ARRAYS + 4 * i);
+    put(bus, SF_CSR_ENCODER_DATA, planes->array[i].plane);
+    put(bus, SF_CSR_ENCODER_DATA, planes->array[i].line);
+    put(bus, SF_CSR_ENCODER_DATA, planes->array[i].point_lines);
+  }
+  program_basis(bus, planes);
+}
+
+static void program_grid(const sf_bus *bus, const sf_ray_blob *rays)
+{
+  put(bus, SF_CSR_ENCODER_ADDRESS, PLANES);
+  put(bus, SF_CSR_ENCODER_DATA, 0);
   program_encoder(bus, rays);
+}
+
+sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays, const sf_planes_blob *planes)
+{
+  const uint32_t kind = planes ? SF_CSR_FIELD_KINDS_PLANES : SF_CSR_FIELD_KINDS_GRID;
+  if (!(get(bus, SF_CSR_FIELD_KINDS) & kind)) return SF_DRIVER_FIELD;
+  if (planes ? !planes_fit(bus, planes) : !fits(bus, rays)) return SF_DRIVER_MISFIT;
+  if (!has_cache(bus, rays)) return SF_DRIVER_CACHE;
+  planes ? program_planes(bus, planes) : program_grid(bus, rays);
   put(bus, SF_CSR_RAY_TRANS_STOP, rays->trans_stop);
   put(bus, SF_CSR_RAY_MAX_SAMPLES, rays->max_samples);
   put(bus, SF_CSR_RAY_BACKGROUND_R, rays->background[0]);

@@ -21,14 +21,33 @@ typedef struct sf_ray_blob {
   uint32_t cache_bytes, cache_ways; /* of the field's cache that the program counts on; 0: any */
 } sf_ray_blob;
 
+/* TensoRF's field, whose planes and lines lie in the block's memory from `table` on. */
+enum { SF_PLANES_SCALES = 4, SF_PLANES_ARRAYS = 6, SF_PLANES_FEATURES = 32 };
+typedef struct sf_planes_scale_blob {
+  uint32_t mul, shift;
+} sf_planes_scale_blob;
+typedef struct sf_planes_array_blob {
+  uint32_t plane, line, point_lines; /* first lines of 16 bytes, and lines of a point */
+} sf_planes_array_blob;
+typedef struct sf_planes_blob {
+  uint32_t res[3], relu, weight_stop, features, feature_freqs, view_freqs, frac;
+  sf_planes_scale_blob scale[SF_PLANES_SCALES]; /* density_in, sigma_out, feature_in, phase_in */
+  int32_t bias;                                 /* of density_in */
+  sf_planes_array_blob array[SF_PLANES_ARRAYS]; /* pairs of the density, then of the appearance */
+  uint32_t components[3];                       /* of the appearance's pairs */
+  const int8_t *basis;                          /* [sum of components][SF_PLANES_FEATURES] */
+} sf_planes_blob;
+
 /* Of the field, since the reset or sf_ray_driver_clear. Those of a ray that was cut off are a part of it. */
 typedef struct sf_field_counters {
   uint64_t lookups, misses, fills, stalls; /* stalls: cycles, see FIELD_STALLS */
 } sf_field_counters;
 
-/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. SF_DRIVER_REFUSED: RAY_ERROR;
- * SF_DRIVER_MISFIT: levels or n_dir, which the block does not check; SF_DRIVER_CACHE: it has another cache. */
-sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays);
+/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. planes: NULL for a hash grid; else
+ * levels and directions of rays are not read. SF_DRIVER_REFUSED: RAY_ERROR; SF_DRIVER_MISFIT: levels, n_dir, or the
+ * decoder's inputs, which the block does not check; SF_DRIVER_CACHE: it has another cache; SF_DRIVER_FIELD: it has not
+ * this kind of field. */
+sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays, const sf_planes_blob *planes);
 void sf_ray_driver_cache(const sf_bus *bus, uint32_t *bytes, uint32_t *ways); /* of the field, in this build */
 void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters);
 void sf_ray_driver_clear(const sf_bus *bus);

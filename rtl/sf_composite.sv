@@ -27,6 +27,10 @@ module sf_composite (
     input  wire [ 59:0] colour_i,        // 3 x U4.16
     input  wire [ 24:0] delta_i,         // Q1.24 box edges
     input  wire [ 43:0] distance_i,      // lattice steps, U28.16
+    // or samples whose weights are known: sigma_i and delta_i are not read, and last_i is that of where the ray stops
+    input  wire         weighed_i,
+    input  wire [ 20:0] weight_i,        // Q.20
+    input  wire         decoded_i,       // else without a colour
     output wire         stop_o,
     output wire         idle_o,
     // pixels
@@ -74,7 +78,8 @@ module sf_composite (
   wire ignored = take && !begins && !open_q;
   reg stops_q;
   always_ff @(posedge clk_i) stops_q <= transmittance_q <= {1'b0, trans_stop_i} || samples_q >= max_samples_i;
-  assign stop_o = state_q == FAR && stops_q && !last_q;
+  wire ends = last_q || (stops_q && !weighed_i);
+  assign stop_o = state_q == FAR && ends && !last_q;
 
   // ---- the multiplier
   wire of_transmittance = state_q == ATTENUATE || state_q >= BACK_RED;
@@ -104,34 +109,23 @@ module sf_composite (
       default: b = back_blue;
     endcase
   end
-  reg [27:0] a_q;
-  reg [24:0] b_q;
-  reg [35:0] low_q;
-  reg [27:0] cross_q;
-  reg [24:0] other_cross_q;
-  reg [16:0] high_q;
-  reg [52:0] product_q;
-  reg [1:0] of_tau_q;  // half an LSB of tau with its product
-  wire [28:0] crosses = {1'b0, cross_q} + {4'd0, other_cross_q};
-  always_ff @(posedge clk_i) begin
-    a_q <= a;
-    b_q <= b;
-    low_q <= 36'(a_q[17:0]) * 36'(b_q[17:0]);
-    cross_q <= 28'(a_q[27:18]) * 28'(b_q[17:0]);
-    other_cross_q <= 25'(a_q[17:0]) * 25'(b_q[24:18]);
-    high_q <= 17'(a_q[27:18]) * 17'(b_q[24:18]);
-    of_tau_q <= {of_tau_q[0], state_q == IDLE};
-    product_q <= {high_q, low_q} + {6'd0, crosses, 2'd0, of_tau_q[1], 15'd0};
-  end
+  wire [52:0] product;
+  sf_mul_28x25 u_mul (
+      .clk_i    (clk_i),
+      .a_i      (a),
+      .b_i      (b),
+      .of_tau_i (state_q == IDLE),
+      .product_o(product)
+  );
 
   sf_exp_neg u_exp_neg (
       .clk_i(clk_i),
-      .tau_i(product_q[52:16]),
+      .tau_i(product[52:16]),
       .e_o  (e)
   );
   // Half an LSB more rounds half up. It is <= transmittance_q, since exp(-tau) <= 1.
-  wire [20:0] after = product_q[40:20] + {20'd0, product_q[19]};
-  wire [20:0] lost = transmittance_q - product_q[40:20] - {20'd0, product_q[19]};
+  wire [20:0] after = product[40:20] + {20'd0, product[19]};
+  wire [20:0] lost = transmittance_q - product[40:20] - {20'd0, product[19]};
 
   // What the products are added to.
   localparam [2:0] NOTHING = 3'd0, TO_RED = 3'd1, TO_GREEN = 3'd2, TO_BLUE = 3'd3, TO_NEAR = 3'd4, TO_FAR = 3'd5;
@@ -161,10 +155,10 @@ module sf_composite (
       {to1_q, to2_q, to3_q} <= {to, to1_q, to2_q};
       case (state_q)
         IDLE: if (take && !ignored) begin
-          state_q <= empty_i ? BACK_RED : 5'd1;
+          state_q <= empty_i ? BACK_RED : !weighed_i ? 5'd1 : decoded_i ? RED : NEAR;
           open_q <= 1'b1;
         end
-        FAR: state_q <= stops_q || last_q ? BACK_RED : IDLE;
+        FAR: state_q <= ends ? BACK_RED : IDLE;
         PIXEL: if (ready_i) begin
           state_q <= IDLE;
           open_q <= 1'b0;
@@ -180,26 +174,30 @@ module sf_composite (
       colour_q <= colour_i;
       distance_q <= distance_i;
     end
+    if (take && weighed_i) weight_q <= weight_i;
     if (begins) begin
-      transmittance_q <= ONE;
+      transmittance_q <= weighed_i && !empty_i ? ONE - weight_i : ONE;
       weight_sum_q <= 21'd0;
-      samples_q <= 11'd0;
+      samples_q <= {10'd0, weighed_i && !empty_i && decoded_i};
       {red_q, green_q, blue_q} <= 120'd0;
       depth_q <= 64'd0;
     end else begin
-      if (state_q == WEIGH) begin
+      if (take && weighed_i) begin
+        transmittance_q <= transmittance_q - weight_i;
+        samples_q <= samples_q + {10'd0, decoded_i};
+      end else if (state_q == WEIGH) begin
         transmittance_q <= after;
         weight_q <= lost;
         samples_q <= samples_q + 11'd1;
       end
-      if (state_q == RED) weight_sum_q <= weight_sum_q + weight_q;
+      if (state_q == NEAR) weight_sum_q <= weight_sum_q + weight_q;
       // Weights and the transmittance left sum to 2^20, so a colour stays below 2^40 and the depth below 2^64.
       case (to3_q)
-        TO_RED: red_q <= red_q + product_q[39:0];
-        TO_GREEN: green_q <= green_q + product_q[39:0];
-        TO_BLUE: blue_q <= blue_q + product_q[39:0];
-        TO_NEAR: depth_q <= depth_q + {11'd0, product_q};
-        TO_FAR: depth_q <= depth_q + {product_q[41:0], 22'd0};
+        TO_RED: red_q <= red_q + product[39:0];
+        TO_GREEN: green_q <= green_q + product[39:0];
+        TO_BLUE: blue_q <= blue_q + product[39:0];
+        TO_NEAR: depth_q <= depth_q + {11'd0, product};
+        TO_FAR: depth_q <= depth_q + {product[41:0], 22'd0};
         default: ;
       endcase
     end

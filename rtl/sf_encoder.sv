@@ -43,6 +43,15 @@ module sf_encoder #(
     input  wire        m_axi_rvalid_i,
     input  wire [63:0] m_axi_rdata_i,
     input  wire [ 1:0] m_axi_rresp_i,
+    // lines of another field, in place of the grid's pairs
+    input  wire        planes_i,
+    input  wire        line_valid_i,
+    output wire        line_ready_o,
+    input  wire        line_empty_i,      // the cache is emptied before it
+    input  wire [27:0] line_i,
+    output wire        line_valid_o,
+    output wire [127:0] line_o,
+    input  wire        line_room_i,       // who takes them waits for a line, not for room behind it
     // events of the field
     output wire [ 1:0] lookups_o,
     output wire [ 1:0] misses_o,
@@ -112,6 +121,9 @@ module sf_encoder #(
   wire [23:0] features;
   wire pair_valid, pair_ready, pair_tile, entries_valid, waits;
   wire [31:0] pair_entry0, pair_entry1, entries;
+  wire [31:0] line_entry = {1'b0, line_i, 3'd0};
+  assign line_ready_o = pair_ready && planes_i;
+  assign line_valid_o = entries_valid && planes_i;
   sf_grid #(
       .LOG2_DEPTH(LOG2_DEPTH)
   ) u_grid (
@@ -127,11 +139,11 @@ module sf_encoder #(
       .s_tile_i       (tile_q),
       .s_pos_i        (pos_q),
       .pair_valid_o   (pair_valid),
-      .pair_ready_i   (pair_ready),
+      .pair_ready_i   (pair_ready && !planes_i),
       .pair_tile_o    (pair_tile),
       .pair_entry0_o  (pair_entry0),
       .pair_entry1_o  (pair_entry1),
-      .entries_valid_i(entries_valid),
+      .entries_valid_i(entries_valid && !planes_i),
       .entries_i      (entries),
       .m_valid_o      (features_valid),
       .m_ready_i      (features_ready),
@@ -146,13 +158,14 @@ module sf_encoder #(
       .rst_ni         (rst_ni),
       .clear_i        (clear_i),
       .base_i         (base_i),
-      .s_valid_i      (pair_valid),
+      .s_valid_i      (planes_i ? line_valid_i : pair_valid),
       .s_ready_o      (pair_ready),
-      .s_empty_i      (pair_tile),
-      .s_entry0_i     (pair_entry0),
-      .s_entry1_i     (pair_entry1),
+      .s_empty_i      (planes_i ? line_empty_i : pair_tile),
+      .s_entry0_i     (planes_i ? line_entry : pair_entry0),
+      .s_entry1_i     (planes_i ? line_entry : pair_entry1),
       .m_valid_o      (entries_valid),
       .m_entries_o    (entries),
+      .m_line_o       (line_o),
       .lookups_o      (lookups_o),
       .misses_o       (misses_o),
       .filled_o       (filled_o),
@@ -165,7 +178,7 @@ module sf_encoder #(
       .m_axi_rdata_i  (m_axi_rdata_i),
       .m_axi_rresp_i  (m_axi_rresp_i)
   );
-  assign waits_o = waits && features_ready && !features_valid && m_axis_tready_i;
+  assign waits_o = waits && (planes_i ? line_room_i : features_ready && !features_valid && m_axis_tready_i);
 
   wire value_valid, value_ready, value_last;
   wire signed [11:0] value;

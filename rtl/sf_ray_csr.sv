@@ -4,7 +4,8 @@
 
 module sf_ray_csr #(
     parameter integer CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,
-    parameter integer CACHE_WAYS = sf_arch_pkg::CACHE_WAYS
+    parameter integer CACHE_WAYS = sf_arch_pkg::CACHE_WAYS,
+    parameter integer PLANES = 1
 ) (
     input  wire        clk_i,
     input  wire        rst_ni,
@@ -26,7 +27,7 @@ module sf_ray_csr #(
     output wire        irq_o,
     // programming
     output wire        cfg_we_o,
-    output wire [ 7:0] cfg_addr_o,
+    output wire [11:0] cfg_addr_o,
     output wire [31:0] cfg_data_o,
     output wire [19:0] trans_stop_o,
     output wire [10:0] max_samples_o,
@@ -37,6 +38,7 @@ module sf_ray_csr #(
     input  wire        soft_reset_i,
     input  wire        active_i,
     input  wire        error_order_i,
+    input  wire        bad_field_i,    // the field's programming does not fit
     // events of the field
     input  wire        error_memory_i,
     input  wire [ 1:0] lookups_i,
@@ -55,7 +57,7 @@ module sf_ray_csr #(
   reg [20:0] trans_stop_q;
   reg [10:0] max_samples_q;
   reg [17:0] red_q, green_q, blue_q;
-  reg [7:0] encoder_address_q;
+  reg [11:0] encoder_address_q;
   reg [31:0] base_q;
 
   // ---- write channel
@@ -75,7 +77,7 @@ module sf_ray_csr #(
   wire clear = word_write && to_ctrl && wdata_i[sf_csr_pkg::RAY_CTRL_CLEAR];
 
   wire bad_value = trans_stop_q[20] || max_samples_q == 11'd0 || max_samples_q > 11'd1024 || red_q > 18'd65536
-      || green_q > 18'd65536 || blue_q > 18'd65536 || base_q[3:0] != 4'd0;
+      || green_q > 18'd65536 || blue_q > 18'd65536 || base_q[3:0] != 4'd0 || bad_field_i;
   wire bad_start = start && !running_q && bad_value;
   wire bad_busy = word_write && running_q && (to_config || start);
   wire bad_address = write && (!(to_config || to_ctrl || to_error || to_irq_enable) || wstrb_i != 4'hf);
@@ -92,7 +94,7 @@ module sf_ray_csr #(
       trans_stop_q <= 21'd0;
       max_samples_q <= 11'd0;
       {red_q, green_q, blue_q} <= 54'd0;
-      encoder_address_q <= 8'd0;
+      encoder_address_q <= 12'd0;
       base_q <= 32'd0;
     end else begin
       if (soft_reset_i) running_q <= 1'b0;
@@ -110,9 +112,9 @@ module sf_ray_csr #(
           sf_csr_pkg::RAY_BACKGROUND_R: red_q <= colour_w;
           sf_csr_pkg::RAY_BACKGROUND_G: green_q <= colour_w;
           sf_csr_pkg::RAY_BACKGROUND_B: blue_q <= colour_w;
-          sf_csr_pkg::ENCODER_ADDRESS: encoder_address_q <= wdata_i[7:0];
+          sf_csr_pkg::ENCODER_ADDRESS: encoder_address_q <= wdata_i[11:0];
           sf_csr_pkg::FIELD_BASE: base_q <= wdata_i;
-          default: encoder_address_q <= encoder_address_q + 8'd1;  // ENCODER_DATA
+          default: encoder_address_q <= encoder_address_q + 12'd1;  // ENCODER_DATA
         endcase
       end
     end
@@ -162,9 +164,10 @@ module sf_ray_csr #(
       sf_csr_pkg::RAY_BACKGROUND_R: rdata_d = {14'd0, red_q};
       sf_csr_pkg::RAY_BACKGROUND_G: rdata_d = {14'd0, green_q};
       sf_csr_pkg::RAY_BACKGROUND_B: rdata_d = {14'd0, blue_q};
-      sf_csr_pkg::ENCODER_ADDRESS: rdata_d = {24'd0, encoder_address_q};
+      sf_csr_pkg::ENCODER_ADDRESS: rdata_d = {20'd0, encoder_address_q};
       sf_csr_pkg::FIELD_BASE: rdata_d = base_q;
       sf_csr_pkg::FIELD_CACHE: rdata_d = CACHE;
+      sf_csr_pkg::FIELD_KINDS: rdata_d = PLANES != 0 ? 32'd3 : 32'd1;
       sf_csr_pkg::FIELD_LOOKUPS: rdata_d = lookups_low;
       sf_csr_pkg::FIELD_LOOKUPS_HIGH: rdata_d = lookups_high;
       sf_csr_pkg::FIELD_MISSES: rdata_d = misses_low;

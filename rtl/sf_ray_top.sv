@@ -25,7 +25,8 @@ module sf_ray_top #(
     parameter NEURONS = sf_arch_pkg::NEURONS,
     parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE,
     parameter CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,  // these as sf_cache's
-    parameter CACHE_WAYS = sf_arch_pkg::CACHE_WAYS
+    parameter CACHE_WAYS = sf_arch_pkg::CACHE_WAYS,
+    parameter PLANES = 1                   // TensoRF's field, too
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -117,7 +118,7 @@ module sf_ray_top #(
   end
 
   wire cfg_we, running, error_order, active;
-  wire [7:0] cfg_addr;
+  wire [11:0] cfg_addr;
   wire [31:0] cfg_data;
   wire [19:0] trans_stop;
   wire [10:0] max_samples;
@@ -125,9 +126,11 @@ module sf_ray_top #(
   wire [31:0] base;
   wire [1:0] lookups, misses;
   wire filled, waits, error_memory;
+  wire planes, bad_field;  // the scene's field is that of TensoRF
   sf_ray_csr #(
       .CACHE_BYTES(CACHE_BYTES),
-      .CACHE_WAYS (CACHE_WAYS)
+      .CACHE_WAYS (CACHE_WAYS),
+      .PLANES     (PLANES)
   ) u_csr (
       .clk_i        (clk_i),
       .rst_ni       (rst_ni),
@@ -156,7 +159,8 @@ module sf_ray_top #(
       .running_o    (running),
       .soft_reset_i (soft_reset),
       .active_i     (active),
-      .error_order_i(error_order),
+      .error_order_i(planes ? planes_order : error_order),
+      .bad_field_i  (bad_field),
       .error_memory_i(error_memory),
       .lookups_i    (lookups),
       .misses_i     (misses),
@@ -168,6 +172,8 @@ module sf_ray_top #(
   wire encode_valid, encode_ready, encode_first, encode_tile;
   wire [71:0] encode_pos;
   wire [47:0] encode_dir;
+  wire track_ready, planes_ready, planes_order;
+  assign s_axis_tready_o = planes ? planes_ready : track_ready;
   wire sample_valid, sample_take, sample_first, sample_last, sample_empty, stop, track_idle, composite_idle;
   wire [24:0] delta;
   wire [43:0] distance;
@@ -176,8 +182,8 @@ module sf_ray_top #(
       .rst_ni        (rst_ni),
       .clear_i       (soft_reset),
       .enable_i      (running),
-      .valid_i       (s_axis_tvalid_i),
-      .ready_o       (s_axis_tready_o),
+      .valid_i       (s_axis_tvalid_i && !planes),
+      .ready_o       (track_ready),
       .first_i       (s_axis_tuser_i),
       .last_i        (s_axis_tlast_i),
       .empty_i       (s_axis_tdata_i[240]),
@@ -194,7 +200,7 @@ module sf_ray_top #(
       .encode_pos_o  (encode_pos),
       .encode_dir_o  (encode_dir),
       .valid_o       (sample_valid),
-      .take_i        (sample_take),
+      .take_i        (sample_take && !planes),
       .first_o       (sample_first),
       .last_o        (sample_last),
       .empty_o       (sample_empty),
@@ -206,6 +212,14 @@ module sf_ray_top #(
 
   wire feature_valid, feature_ready, feature_user, feature_last;
   wire [63:0] feature_data;
+  wire line_valid, line_ready, line_empty, line_comes;
+  wire [27:0] line;
+  wire [127:0] line_entries;
+  wire wave_valid, wave_user, wave_last;
+  wire [63:0] wave_data;
+  wire item_valid, item_first, item_last, item_empty, item_decoded, planes_idle;
+  wire [20:0] item_weight;
+  wire [43:0] item_distance;
   sf_encoder #(
       .CACHE_BYTES(CACHE_BYTES),
       .CACHE_WAYS (CACHE_WAYS)
@@ -213,8 +227,8 @@ module sf_ray_top #(
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
       .clear_i        (soft_reset),
-      .cfg_we_i       (cfg_we),
-      .cfg_addr_i     (cfg_addr),
+      .cfg_we_i       (cfg_we && cfg_addr[11:8] == 4'd0),
+      .cfg_addr_i     (cfg_addr[7:0]),
       .cfg_data_i     (cfg_data),
       .s_valid_i      (encode_valid),
       .s_ready_o      (encode_ready),
@@ -229,17 +243,86 @@ module sf_ray_top #(
       .m_axi_rvalid_i (m_axi_rvalid_i),
       .m_axi_rdata_i  (m_axi_rdata_i),
       .m_axi_rresp_i  (m_axi_rresp_i),
+      .planes_i       (planes),
+      .line_valid_i   (line_valid),
+      .line_ready_o   (line_ready),
+      .line_empty_i   (line_empty),
+      .line_i         (line),
+      .line_valid_o   (line_comes),
+      .line_o         (line_entries),
+      .line_room_i    (feature_ready && !wave_valid),
       .lookups_o      (lookups),
       .misses_o       (misses),
       .filled_o       (filled),
       .waits_o        (waits),
       .error_o        (error_memory),
       .m_axis_tvalid_o(feature_valid),
-      .m_axis_tready_i(feature_ready),
+      .m_axis_tready_i(feature_ready && !planes),
       .m_axis_tdata_o (feature_data),
       .m_axis_tuser_o (feature_user),
       .m_axis_tlast_o (feature_last)
   );
+
+  generate
+    if (PLANES != 0) begin : g_planes
+      sf_planes u_planes (
+          .clk_i          (clk_i),
+          .rst_ni         (rst_ni),
+          .clear_i        (soft_reset),
+          .enable_i       (running),
+          .cfg_we_i       (cfg_we),
+          .cfg_addr_i     (cfg_addr),
+          .cfg_data_i     (cfg_data),
+          .used_o         (planes),
+          .bad_o          (bad_field),
+          .trans_stop_i   (trans_stop),
+          .max_samples_i  (max_samples),
+          .s_valid_i      (s_axis_tvalid_i && planes),
+          .s_ready_o      (planes_ready),
+          .s_first_i      (s_axis_tuser_i),
+          .s_last_i       (s_axis_tlast_i),
+          .s_empty_i      (s_axis_tdata_i[240]),
+          .s_tile_i       (s_axis_tdata_i[241]),
+          .s_pos_i        ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
+          .s_dir_i        (s_axis_tdata_i[239:192]),
+          .s_delta_i      (s_axis_tdata_i[120:96]),
+          .s_distance_i   (s_axis_tdata_i[171:128]),
+          .error_order_o  (planes_order),
+          .line_valid_o   (line_valid),
+          .line_ready_i   (line_ready),
+          .line_empty_o   (line_empty),
+          .line_o         (line),
+          .entries_valid_i(line_comes),
+          .entries_i      (line_entries),
+          .m_axis_tvalid_o(wave_valid),
+          .m_axis_tready_i(feature_ready && planes),
+          .m_axis_tdata_o (wave_data),
+          .m_axis_tuser_o (wave_user),
+          .m_axis_tlast_o (wave_last),
+          .valid_o        (item_valid),
+          .take_i         (sample_take && planes),
+          .first_o        (item_first),
+          .last_o         (item_last),
+          .empty_o        (item_empty),
+          .decoded_o      (item_decoded),
+          .weight_o       (item_weight),
+          .distance_o     (item_distance),
+          .idle_o         (planes_idle)
+      );
+    end else begin : g_no_planes
+      reg asked_q;  // for what is not there
+      always_ff @(posedge clk_i or negedge rst_ni) begin
+        if (!rst_ni) asked_q <= 1'b0;
+        else if (cfg_we && cfg_addr == 12'h100) asked_q <= cfg_data[0];
+      end
+      assign bad_field = asked_q;
+      assign {planes, planes_ready, planes_order, planes_idle} = 4'b0001;
+      assign {line_valid, line_empty, line} = 30'd0;
+      assign {wave_valid, wave_data, wave_user, wave_last} = 67'd0;
+      assign {item_valid, item_first, item_last, item_empty, item_decoded, item_weight, item_distance} = 70'd0;
+      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries};
+    end
+  endgenerate
 
   // Two beats of eight bytes, incrementing; data, unprivileged, secure
   assign m_axi_arlen_o = 8'd1;
@@ -276,11 +359,11 @@ module sf_ray_top #(
       .s_axil_rready_i (s_axil_rready_i),
       .s_axil_rdata_o  (net_rdata),
       .s_axil_rresp_o  (net_rresp),
-      .s_axis_tvalid_i (feature_valid),
+      .s_axis_tvalid_i (planes ? wave_valid : feature_valid),
       .s_axis_tready_o (feature_ready),
-      .s_axis_tdata_i  (feature_data),
-      .s_axis_tuser_i  (feature_user),
-      .s_axis_tlast_i  (feature_last),
+      .s_axis_tdata_i  (planes ? wave_data : feature_data),
+      .s_axis_tuser_i  (planes ? wave_user : feature_user),
+      .s_axis_tlast_i  (planes ? wave_last : feature_last),
       .m_axis_tvalid_o (result_valid),
       .m_axis_tready_i (result_ready),
       .m_axis_tdata_o  (result),
@@ -300,9 +383,10 @@ module sf_ray_top #(
   // ---- results: the first beat waits here for the second
   reg [63:0] first_beat_q;
   wire composite_ready;
-  wire composite_valid = sample_valid && (sample_empty || (result_valid && result_last));
+  wire coloured = planes ? item_decoded : !sample_empty;
+  wire composite_valid = (planes ? item_valid : sample_valid) && (!coloured || (result_valid && result_last));
   assign sample_take = composite_valid && composite_ready;
-  assign result_ready = !result_last || (sample_take && !sample_empty);
+  assign result_ready = !result_last || (sample_take && coloured);
   always_ff @(posedge clk_i) if (result_valid && !result_last) first_beat_q <= result;
 
   wire [119:0] colour;
@@ -318,13 +402,16 @@ module sf_ray_top #(
       .background_i   (background),
       .valid_i        (composite_valid),
       .ready_o        (composite_ready),
-      .first_i        (sample_first),
-      .last_i         (sample_last),
-      .empty_i        (sample_empty),
+      .first_i        (planes ? item_first : sample_first),
+      .last_i         (planes ? item_last : sample_last),
+      .empty_i        (planes ? item_empty : sample_empty),
       .sigma_i        (first_beat_q[27:0]),
       .colour_i       ({result[51:32], result[19:0], first_beat_q[51:32]}),
       .delta_i        (delta),
-      .distance_i     (distance),
+      .distance_i     (planes ? item_distance : distance),
+      .weighed_i      (planes),
+      .weight_i       (item_weight),
+      .decoded_i      (item_decoded),
       .stop_o         (stop),
       .idle_o         (composite_idle),
       .valid_o        (m_axis_tvalid_o),
@@ -337,7 +424,7 @@ module sf_ray_top #(
   );
   assign m_axis_tdata_o = {53'd0, samples, 11'd0, transmittance, 11'd0, weight_sum, depth, 24'd0, colour[119:80], 24'd0,
                            colour[79:40], 24'd0, colour[39:0]};
-  assign active = !track_idle || !composite_idle;
+  assign active = !track_idle || !planes_idle || !composite_idle;
   // See sf_top: marching and compositing are written for these widths.
   initial begin
     if (sf_arch_pkg::POS_FRAC != 24 || sf_arch_pkg::DELTA_FRAC != 24 || sf_arch_pkg::TRANS_FRAC != 20)

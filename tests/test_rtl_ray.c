@@ -276,8 +276,8 @@ TEST(sizes_that_are_not_the_nets_are_refused)
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const sf_ray_blob blob = {.levels = bad[i].levels, .n_dir = bad[i].n_dir, .max_samples = 1024};
     put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    ck_assert_str_eq(sf_driver_text(sf_ray_driver_load(&rays->dut->bus, &blob)),
-                     "the encoder's levels or directions are not the net's");
+    ck_assert_str_eq(sf_driver_text(sf_ray_driver_load(&rays->dut->bus, &blob, NULL)),
+                     "the field's levels, directions or features are not the net's inputs");
     ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), 0);
   }
   works(rays, 8);

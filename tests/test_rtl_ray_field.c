@@ -124,7 +124,7 @@ TEST(a_cache_that_the_build_lacks)
                               .cache_bytes = want[i].bytes,
                               .cache_ways = want[i].ways};
     put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    const sf_driver_code code = sf_ray_driver_load(bus, &blob);
+    const sf_driver_code code = sf_ray_driver_load(bus, &blob, NULL);
     ck_assert_int_eq(code, want[i].there ? SF_DRIVER_OK : SF_DRIVER_CACHE);
     ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), want[i].there ? SF_CSR_RAY_STATUS_RUNNING : 0);
   }
@@ -171,11 +171,10 @@ TEST(rules_of_the_memory_port)
              {"two beats", {.ar_valid = true, .ar_size = 2}, {.ar_valid = true}},
              {"two beats", {.ar_valid = true, .ar_burst = 2}, {.ar_valid = true}},
              {"aligned", {.ar_valid = true, .ar_address = 8}, {.ar_valid = true}}};
-  int8_t table[64] = {0};
-  const fx_grid grid = {.entries = 32, .table = table};
+  const uint8_t table[64] = {0};
   for (int i = 0; i < COUNT(bad); i++) {
     sf_dut dut = {.in.rst_n = true};
-    sf_memory memory = {.dut = &dut, .grid = &grid};
+    sf_memory memory = {.dut = &dut, .contents = table, .bytes = sizeof table};
     for (int cycle = 0; cycle < 2; cycle++) {
       dut.out = cycle ? bad[i].second : bad[i].first;
       if (!dut.out.ar_len) dut.out.ar_len = 1;
@@ -192,10 +191,9 @@ TEST(rules_of_the_memory_port)
 /* Lines inside, at the end, and beyond a table of 32 entries. */
 TEST(requests_beyond_the_table)
 {
-  int8_t table[64] = {0};
-  const fx_grid grid = {.entries = 30, .table = table};
+  const uint8_t table[64] = {0};
   sf_dut dut = {.in.rst_n = true};
-  sf_memory memory = {.dut = &dut, .grid = &grid, .base = 4096};
+  sf_memory memory = {.dut = &dut, .contents = table, .bytes = 60, .base = 4096};
   static const uint32_t address[] = {4096, 4096 + 48, 4096 + 64, 4096 - 16};
   for (int i = 0; i < COUNT(address); i++) {
     dut.out = (sf_pins_out){

@@ -23,6 +23,12 @@ static const int32_t exp2_table[257] = {
 static const int32_t sigmoid_table[257] = {
 #include "fx/tables/sigmoid.inc"
 };
+static const int32_t sine_table[257] = {
+#include "fx/tables/sine.inc"
+};
+static const int32_t softplus_table[257] = {
+#include "fx/tables/softplus.inc"
+};
 
 enum { ARCH_ROWS = sizeof arch / sizeof *arch, SOURCES_MAX = 256 };
 
@@ -58,12 +64,23 @@ static void write_sigmoid(FILE *out, const gen_sources *sources)
   (void)sources;
   write_rom(out, "sigmoid", 16, sigmoid_table);
 }
+static void write_sine(FILE *out, const gen_sources *sources)
+{
+  (void)sources;
+  write_rom(out, "sine", 17, sine_table);
+}
+static void write_softplus(FILE *out, const gen_sources *sources)
+{
+  (void)sources;
+  write_rom(out, "softplus", 24, softplus_table);
+}
 
 static const struct {
   const char *path;
   void (*write)(FILE *out, const gen_sources *sources);
 } outputs[] = {{"rtl/gen/sf_arch_pkg.sv", write_arch},       {"rtl/gen/sf_csr_pkg.sv", gen_write_sv_package},
                {"rtl/gen/sf_rom_exp2.sv", write_exp2},       {"rtl/gen/sf_rom_sigmoid.sv", write_sigmoid},
+               {"rtl/gen/sf_rom_sine.sv", write_sine},       {"rtl/gen/sf_rom_softplus.sv", write_softplus},
                {"rtl/gen/sf_csr.h", gen_write_c_header},     {"rtl/gen/sf_csr.rdl", gen_write_systemrdl},
                {"rtl/gen/spikefield.xml", gen_write_ipxact}, {"spikefield.core", gen_write_fusesoc},
                {"docs/registers.md", gen_write_markdown}};

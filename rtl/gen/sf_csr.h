@@ -217,7 +217,7 @@
 
 /* what was refused; a soft reset clears it, W1C */
 #define SF_REG_RAY_ERROR 0x0408
-#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES, a background or FIELD_BASE out of range */
+#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES, a background, FIELD_BASE or the programming of the planes out of range, or planes that this build has not */
 #define SF_REG_RAY_ERROR_VALUE_SHIFT 0
 #define SF_REG_RAY_ERROR_BUSY_MASK 0x00000002 /* start or a write to the programming while running */
 #define SF_REG_RAY_ERROR_BUSY_SHIFT 1
@@ -246,7 +246,7 @@
 /* blue, RW */
 #define SF_REG_RAY_BACKGROUND_B 0x0420
 
-/* where ENCODER_DATA goes, modulo 256; counts up by one word at each write of it, RW */
+/* where ENCODER_DATA goes, modulo 4096; counts up by one word at each write of it, RW */
 #define SF_REG_ENCODER_ADDRESS 0x0424
 
 /* a word of the encoder's programming, WO */
@@ -287,6 +287,14 @@
 /* high half, RO */
 #define SF_REG_FIELD_STALLS_HIGH 0x0450
 
+/* fields that this build has, RO */
+#define SF_REG_FIELD_KINDS 0x0454
+#define SF_REG_FIELD_KINDS_RESET 0x00000003
+#define SF_REG_FIELD_KINDS_GRID_MASK 0x00000001 /* the hash grid */
+#define SF_REG_FIELD_KINDS_GRID_SHIFT 0
+#define SF_REG_FIELD_KINDS_PLANES_MASK 0x00000002 /* planes and lines of TensoRF */
+#define SF_REG_FIELD_KINDS_PLANES_SHIFT 1
+
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000
 
@@ -294,8 +302,8 @@
 #define SF_REG_WEIGHTS_WORDS 163840
 #define SF_REG_WEIGHTS_BITS 32
 
-/* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this */
-#define SF_REG_ENCODER_WORDS 256
+/* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this; from 256 on TensoRF's field: see rtl/sf_planes.sv */
+#define SF_REG_ENCODER_WORDS 4096
 #define SF_REG_ENCODER_BITS 32
 
 /* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events, from 0 on: mac sop spikes updates weight state_r state_w special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */

@@ -1,5 +1,6 @@
 #include "sim/ray/ray.h"
 #include "base/rng.h"
+#include <stdlib.h>
 
 enum { STREAM_REQUEST = 32, STREAM_ANSWER, STREAM_LATENCY, STREAM_BASE, LATENCY_MAX = 24 };
 enum { BEAT_BYTES = 8, BEATS = 2, SIZE_8_BYTES = 3, INCREMENTING = 1, BOUNDARY = 4096, BASE_LOW = 1 << 28 };
@@ -7,6 +8,19 @@ enum { BEAT_BYTES = 8, BEATS = 2, SIZE_8_BYTES = 3, INCREMENTING = 1, BOUNDARY =
 uint32_t sf_memory_base(uint64_t seed)
 {
   return BASE_LOW + (uint32_t)sf_random_below(seed, STREAM_BASE, 0, BASE_LOW / SF_LINE_BYTES) * SF_LINE_BYTES;
+}
+
+sf_status sf_memory_fill(sf_memory *m, const fx_scene *scene)
+{
+  const fx_grid *grid = &scene->grid;
+  fx_factor_place place[2 * FX_PAIRS];
+  m->contents = (const uint8_t *)grid->table, m->bytes = (uint64_t)grid->entries * FX_GRID_FEATURES;
+  if (scene->backbone == FX_INGP) return sf_ok();
+  m->bytes = (uint64_t)fx_tensorf_places(&scene->tensorf, place) * SF_LINE_BYTES;
+  m->contents = m->planes = malloc(m->bytes);
+  if (!m->planes) return sf_fail(SF_E_MEMORY, "no memory for the accelerator's planes");
+  fx_tensorf_memory(&scene->tensorf, m->planes);
+  return sf_ok();
 }
 
 /* ---- AXI's rules, and this block's ---- */
@@ -37,9 +51,9 @@ static void watch(sf_memory *m)
 /* What lies beyond the table in its last line reads as 0. */
 static uint64_t read_beat(const sf_memory *m, uint32_t address)
 {
-  const uint64_t at = (uint32_t)(address - m->base), end = (uint64_t)m->grid->entries * FX_GRID_FEATURES;
+  const uint64_t at = (uint32_t)(address - m->base), end = m->bytes;
   uint64_t value = 0;
-  for (uint64_t i = 0; i < BEAT_BYTES && at + i < end; i++) value |= (uint64_t)(uint8_t)m->grid->table[at + i] << 8 * i;
+  for (uint64_t i = 0; i < BEAT_BYTES && at + i < end; i++) value |= (uint64_t)m->contents[at + i] << 8 * i;
   return value;
 }
 
@@ -56,7 +70,7 @@ static void take(sf_memory *m)
       m->latency ? (uint64_t)m->latency : sf_random_below(dut->seed, STREAM_LATENCY, dut->cycle, LATENCY_MAX);
   m->address[tail] = dut->out.ar_address;
   m->due[tail] = dut->cycle + latency;
-  m->outside += (uint32_t)(dut->out.ar_address - m->base) >= (uint64_t)m->grid->entries * FX_GRID_FEATURES;
+  m->outside += (uint32_t)(dut->out.ar_address - m->base) >= m->bytes;
 }
 
 static void offer(sf_memory *m)

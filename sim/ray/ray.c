@@ -1,4 +1,5 @@
 #include "sim/ray/ray.h"
+#include "fx/tensorf.h"
 #include "quant/quant.h"
 #include <inttypes.h>
 #include <stdlib.h>
@@ -24,13 +25,40 @@ static sf_ray_blob blob_of(const fx_scene *scene, uint32_t base)
   return blob;
 }
 
+static sf_planes_blob planes_of(const fx_tensorf *field)
+{
+  const fx_scale *scale[SF_PLANES_SCALES] = {&field->density_in, &field->sigma_out, &field->feature_in,
+                                             &field->phase_in};
+  fx_factor_place place[2 * FX_PAIRS];
+  sf_planes_blob blob = {.relu = field->activation == FX_RELU,
+                         .weight_stop = (uint32_t)field->weight_stop,
+                         .features = (uint32_t)field->features,
+                         .feature_freqs = (uint32_t)field->feature_freqs,
+                         .view_freqs = (uint32_t)field->view_freqs,
+                         .frac = (uint32_t)field->encoding_frac,
+                         .bias = field->density_in.bias,
+                         .basis = field->basis};
+  fx_tensorf_places(field, place);
+  for (int i = 0; i < SF_PLANES_SCALES; i++)
+    blob.scale[i] = (sf_planes_scale_blob){(uint32_t)scale[i]->mul, (uint32_t)scale[i]->shift};
+  for (int i = 0; i < SF_PLANES_ARRAYS; i++)
+    blob.array[i] = (sf_planes_array_blob){place[i].plane, place[i].line, place[i].point_lines};
+  for (int axis = 0; axis < 3; axis++) {
+    blob.res[axis] = (uint32_t)field->res[axis];
+    blob.components[axis] = (uint32_t)field->appearance.components[axis];
+  }
+  return blob;
+}
+
 sf_status sf_ray_dut_load(sf_ray_dut *rays)
 {
   sf_dut *dut = rays->dut;
   rays->in_tile = false;
   const sf_ray_blob blob = blob_of(rays->scene, rays->memory.base);
   SF_TRY(sf_dut_load(dut, &rays->scene->net));
-  const sf_driver_code code = sf_ray_driver_load(sf_dut_driver_bus(dut), &blob);
+  const sf_planes_blob planes = planes_of(&rays->scene->tensorf);
+  const bool tensorf = rays->scene->backbone == FX_TENSORF;
+  const sf_driver_code code = sf_ray_driver_load(sf_dut_driver_bus(dut), &blob, tensorf ? &planes : NULL);
   if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);
   return sf_dut_driver_status(dut, code, "load rays", &ray_error);
 }
@@ -44,11 +72,11 @@ sf_status sf_ray_dut_open(sf_ray_dut **out, const fx_scene *scene, const sf_dut_
   sf_status status = sf_dut_open_pins(&rays->dut, options, sf_pins_open_rays);
   if (status.code == SF_OK) {
     rays->memory = (sf_memory){.dut = rays->dut,
-                               .grid = &scene->grid,
                                .base = sf_memory_base(options->seed),
                                .latency = options->memory_latency};
+    status = sf_memory_fill(&rays->memory, scene);
     rays->dut->each_cycle = sf_memory_cycle, rays->dut->each_cycle_context = &rays->memory;
-    status = sf_ray_dut_load(rays);
+    if (status.code == SF_OK) status = sf_ray_dut_load(rays);
   }
   if (status.code == SF_OK)
     *out = rays;
@@ -61,6 +89,7 @@ void sf_ray_dut_close(sf_ray_dut *rays)
 {
   if (!rays) return;
   sf_dut_close(rays->dut);
+  free(rays->memory.planes);
   free(rays);
 }
 
@@ -74,12 +103,29 @@ void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sam
   }
 }
 
+/* Samples of TensoRF's that the core read the density of. */
+static int densities(const fx_scene *scene, const fx_ray *ray)
+{
+  fx_pixel pixel;
+  uint32_t pos[3];
+  int n = 0;
+  fx_composite_begin(&pixel);
+  for (int32_t at = fx_march_next(scene, ray, 0, pos, NULL); at >= 0 && n < SF_RAY_SAMPLES_MAX;
+       at = fx_march_next(scene, ray, at + 1, pos, NULL)) {
+    pixel.samples += fx_tensorf_weight(scene, &fx_vm_portable, ray, at, pos, &pixel, NULL) > 0;
+    n++;
+    if (pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples) break;
+  }
+  return n;
+}
+
 sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample)
 {
   const bool stops =
       core->transmittance <= (uint32_t)scene->trans_stop || core->samples >= (uint32_t)scene->max_samples;
-  sf_ray_samples(scene, ray, sample, (int)core->samples);
-  return (sf_ray_request){ray, sample, (int)core->samples, stops, false};
+  const int n = scene->backbone == FX_INGP ? (int)core->samples : densities(scene, ray);
+  sf_ray_samples(scene, ray, sample, n);
+  return (sf_ray_request){ray, sample, n, stops, false};
 }
 
 bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile)
@@ -221,7 +267,7 @@ static sf_status step(run *r)
   SF_TRY(accept_pixel(r));
   if (dut->out.irq) return trouble(r, "interrupt");
   if (r->memory->fault) return trouble(r, r->memory->fault);
-  if (r->memory->outside) return trouble(r, "grid entry beyond the table");
+  if (r->memory->outside) return trouble(r, "line beyond the field");
   return dut->cycle - r->progress > PATIENCE ? trouble(r, "hang") : sf_ok();
 }
 

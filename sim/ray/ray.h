@@ -1,4 +1,4 @@
-/* sf_ray_top, Verilated: rays in, pixels out, with the grid in a memory that answers late. Registers, counters and
+/* sf_ray_top, Verilated: rays in, pixels out, with the field in a memory that answers late. Registers, counters and
  * bus are those of sim/sim.h. */
 #ifndef SF_SIM_RAY_RAY_H
 #define SF_SIM_RAY_RAY_H
@@ -22,15 +22,17 @@ typedef struct sf_ray_request {
   bool stops, new_tile;
 } sf_ray_request;
 
-/* The grid's memory behind AXI4: lines in the order of the requests, each after a random number of cycles. */
+/* The field's memory behind AXI4: lines in the order of the requests, each after a random number of cycles. */
 enum { SF_MEMORY_QUEUE = 64, SF_LINE_BYTES = 16 };
 typedef struct sf_memory {
   sf_dut *dut;
-  const fx_grid *grid;
-  uint32_t base;                 /* address of its table */
+  const uint8_t *contents;       /* of the field: a hash grid's table, or lines of planes */
+  uint64_t bytes;
+  uint8_t *planes;               /* contents of a TensoRF scene; else NULL */
+  uint32_t base;                 /* address of the contents */
   int latency;                   /* from a request to its first beat, in cycles; 0: at random */
   uint64_t asked, answered;      /* requests taken, lines given */
-  uint64_t outside;              /* requests beyond the table */
+  uint64_t outside;              /* requests beyond the contents */
   const char *fault;             /* the first rule of AXI that the block broke; NULL: none */
   uint64_t due[SF_MEMORY_QUEUE]; /* ring: earliest cycle of the answer */
   uint32_t address[SF_MEMORY_QUEUE];
@@ -40,6 +42,8 @@ typedef struct sf_memory {
 
 /* Somewhere, so that an address is not an offset. */
 uint32_t sf_memory_base(uint64_t seed);
+/* Contents of the scene's field; those of a hash grid stay where they are. sf_ray_dut_close frees the planes. */
+sf_status sf_memory_fill(sf_memory *memory, const fx_scene *scene);
 /* The dut's each_cycle, with the memory as its context: watches the rules, takes a request, gives a beat. */
 void sf_memory_cycle(void *memory);
 
@@ -63,9 +67,11 @@ fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays);
 sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field);
 sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl);
 
+/* A ray's lattice points at most, and those of TensoRF before its decoded samples are enough. */
+enum { SF_RAY_SAMPLES_MAX = 4096 };
 /* The first n samples of the ray's march. */
 void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
-/* Those that the core took for its pixel: the counters become the core's. */
+/* Those that the core took for its pixel: the counters become the core's. sample[SF_RAY_SAMPLES_MAX] */
 sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
 /* Rays are in tiles: true where this one's is another than the last one's. */
 bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile);

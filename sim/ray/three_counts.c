@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */
-
 typedef struct run {
   const sf_three_job *job;
   sf_three_counts *sum;
@@ -16,7 +14,7 @@ typedef struct run {
   sf_memory_recount lines;
   sf_dut_result result;
   bool check_counters; /* after every sample: only to find the sample of a difference, it is slow */
-  sf_ray_sample sample[SAMPLES_MAX];
+  sf_ray_sample sample[SF_RAY_SAMPLES_MAX];
 } run;
 
 /* ---- one sample: outputs, spikes ---- */

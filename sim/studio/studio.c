@@ -31,14 +31,12 @@ sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options)
   if (options->backend == SF_BACKEND_FLOAT) return open_model(studio);
   if (options->backend == SF_BACKEND_FIXED) return sf_ok();
   const sf_dut_options how = {.seed = options->seed};
-  if (studio->scene.backbone == FX_TENSORF) return sf_dut_open(&studio->dut, &studio->scene, &how);
   return sf_ray_dut_open(&studio->rays, &studio->scene, &how);
 }
 
 void sf_studio_close(sf_studio *studio)
 {
   sf_ray_dut_close(studio->rays);
-  sf_dut_close(studio->dut);
   sf_model_free(&studio->model);
   fx_scene_free(&studio->scene);
   *studio = (sf_studio){0};
@@ -73,8 +71,7 @@ static sf_status render(const sf_studio *studio, sf_shot *shot)
                              .user = studio->user};
   if (studio->options.backend == SF_BACKEND_FLOAT) return sf_golden_float(&job, &studio->model, &shot->golden);
   if (studio->options.backend == SF_BACKEND_FIXED) return sf_golden_fixed(&job, &shot->golden);
-  sf_status status = studio->dut ? sf_golden_decoder(&job, studio->dut, &shot->golden)
-                                 : sf_golden_rtl(&job, studio->rays, &shot->golden);
+  const sf_status status = sf_golden_rtl(&job, studio->rays, &shot->golden);
   if (status.code != SF_E_DIFFERENCE) return status;
   return sf_fail(status.code, "%s: %s", studio->options.scene, status.message);
 }

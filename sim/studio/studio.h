@@ -25,7 +25,6 @@ typedef struct sf_studio {
   char model_path[4096];                   /* float */
   sf_model model;                          /* float */
   sf_ray_dut *rays;                        /* rtl */
-  sf_dut *dut;                             /* rtl, TensoRF: the decoder alone */
   bool (*tick)(void *user, size_t pixels); /* as sf_golden_job; set by the caller, or NULL */
   void *user;
 } sf_studio;
@@ -54,6 +53,4 @@ sf_status sf_window_parse(const char *text, sf_window *window);
 /* The accelerator makes the pixels from the positions of their samples; the core walks along so that a difference is
  * reported at its first pixel, and for what the accelerator does not do or count: marching, saturation, grid bytes. */
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden);
-/* Of a TensoRF scene: field and compositing are the core's, the accelerator decodes. */
-sf_status sf_golden_decoder(const sf_golden_job *job, sf_dut *dut, sf_golden *golden);
 #endif

@@ -2,15 +2,12 @@
 #include "sim/studio/studio.h"
 #include <string.h>
 
-enum { SAMPLES_MAX = 1024 }; /* fx_scene.max_samples */
-
 typedef struct rtl_eval {
   sf_ray_dut *rays;
-  sf_dut *dut; /* not NULL: the decoder alone */
   fx_memory memory;
   sf_memory_recount lines;
   sf_observer core;
-  sf_ray_sample sample[SAMPLES_MAX];
+  sf_ray_sample sample[SF_RAY_SAMPLES_MAX];
 } rtl_eval;
 
 static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, uint64_t tile, rtl_eval *e, fx_pixel *pixel,
@@ -32,22 +29,6 @@ static sf_status run_ray(const fx_scene *scene, const fx_ray *ray, uint64_t tile
   return sf_compare_field(&e->memory.counts, &field);
 }
 
-/* The core's samples, the accelerator's colours. */
-static sf_status run_decoder(const fx_scene *scene, const fx_ray *ray, uint64_t tile, rtl_eval *e, fx_pixel *pixel,
-                             fx_counts *rtl)
-{
-  (void)tile;
-  fx_pixel core;
-  uint64_t cycles, busy, stalls;
-  sf_observer_begin(&e->core);
-  SF_TRY(fx_render_ray(scene, ray, sf_observer_net, &e->core, &core, &e->core.core));
-  SF_TRY(sf_dut_clear_counts(e->dut));
-  SF_TRY(fx_render_ray(scene, ray, sf_dut_net, e->dut, pixel, NULL));
-  SF_TRY(sf_compare_pixel(&core, pixel, sf_dut_cycle(e->dut)));
-  SF_TRY(sf_dut_counts(e->dut, rtl, &cycles, &busy, &stalls));
-  return sf_compare_ray_counts(e->core.net, &e->core.core, rtl);
-}
-
 static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, sf_golden *golden)
 {
   fx_ray ray;
@@ -56,7 +37,7 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   const int across = job->window.x + x, down = job->window.y + y;
   const uint64_t tile = (uint64_t)(down / FX_TILE) << 32 | (uint64_t)(across / FX_TILE);
   SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, across, down, &ray));
-  SF_TRY((e->dut ? run_decoder : run_ray)(job->scene, &ray, tile, e, &pixel, &rtl));
+  SF_TRY(run_ray(job->scene, &ray, tile, e, &pixel, &rtl));
   counts = e->core.core;
   memcpy(counts.layer, rtl.layer, sizeof counts.layer);
   const fx_cost cost = sf_cost_of(&counts);
@@ -110,10 +91,4 @@ sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *g
   }
   fx_memory_close(&e.memory), sf_memory_recount_close(&e.lines);
   return status;
-}
-
-sf_status sf_golden_decoder(const sf_golden_job *job, sf_dut *dut, sf_golden *golden)
-{
-  rtl_eval e = {.dut = dut, .core = {.net = &job->scene->net}};
-  return all_pixels(job, &e, golden);
 }

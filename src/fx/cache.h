@@ -42,6 +42,14 @@ uint64_t fx_cache_look_up(fx_cache *cache, const uint32_t *line, int n);
 int fx_grid_lines(const fx_grid *grid, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM]);
 int fx_tensorf_lines(const fx_tensorf *field, bool appearance, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM]);
 
+/* TensoRF's planes and lines in the memory: the first line of each array, and how many a point has, 1..4. The pairs of
+ * the density, then of the appearance. Returns the number of lines of all. */
+typedef struct fx_factor_place {
+  uint32_t plane, line, point_lines;
+} fx_factor_place;
+uint32_t fx_tensorf_places(const fx_tensorf *field, fx_factor_place place[2 * FX_PAIRS]);
+void fx_tensorf_memory(const fx_tensorf *field, uint8_t *memory); /* FX_LINE bytes for each of these lines */
+
 /* What the vector kernels make lines of: an entry is (x ^ y * my ^ z * mz) & mask of a hashed level, x + y * my + z *
  * mz of a dense one, + offset. By level, then by pair of a level, which adds my or 0, mz or 0. Beyond the levels 0. */
 enum { FX_LEVEL_PAIRS = 4, FX_PAIRS_MAX = FX_LEVELS_MAX * FX_LEVEL_PAIRS };

@@ -15,7 +15,6 @@
  *             k = 0 first), then of each axis of the direction: TensoRF's order
  *
  * All sums are of integers, so their order does not matter. */
-#include "src/fx/cache.h"
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/tensorf_isa.h"
@@ -129,55 +128,4 @@ void fx_vm_encode(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3
 int fx_tensorf_inputs(const fx_tensorf *field)
 {
   return field->features * (1 + 2 * field->feature_freqs) + 3 * (1 + 2 * field->view_freqs);
-}
-
-/* ---- lines of the cache ---- */
-
-static uint32_t lines_of_point(const fx_factors *factors, int pair)
-{
-  return (uint32_t)((factors->components[pair] + FX_LINE - 1) / FX_LINE);
-}
-
-/* Lines of a point follow one another, and points as in memory. */
-static int ask(uint32_t *line, uint32_t first, uint32_t point, uint32_t lines)
-{
-  for (uint32_t i = 0; i < lines; i++) line[i] = first + point * lines + i;
-  return (int)lines;
-}
-
-/* Asks for the points of one pair; *first: its first line, moved to that of the next pair. */
-static int pair_lines(const fx_factors *factors, int pair, const int32_t res[3], const vm_place *p, uint32_t *first,
-                      uint32_t *line)
-{
-  const int u = fx_pair_axes[pair][0], v = fx_pair_axes[pair][1], w = fx_pair_axes[pair][2];
-  const uint32_t lines = lines_of_point(factors, pair), width = (uint32_t)res[u];
-  const int32_t x[2] = {p->at[u], p->next[u]}, y[2] = {p->at[v], p->next[v]}, z[2] = {p->at[w], p->next[w]};
-  int n = 0;
-  for (int j = 0; j < 1 + (p->g[v] != 0); j++)
-    for (int i = 0; i < 1 + (p->g[u] != 0); i++)
-      n += ask(line + n, *first, (uint32_t)y[j] * width + (uint32_t)x[i], lines);
-  *first += (uint32_t)res[v] * width * lines;
-  for (int k = 0; k < 1 + (p->g[w] != 0); k++) n += ask(line + n, *first, (uint32_t)z[k], lines);
-  *first += (uint32_t)res[w] * lines;
-  return n;
-}
-
-static uint32_t lines_of(const fx_factors *factors, const int32_t res[3])
-{
-  uint32_t lines = 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) {
-    const int *axes = fx_pair_axes[pair];
-    lines += lines_of_point(factors, pair) * ((uint32_t)res[axes[0]] * (uint32_t)res[axes[1]] + (uint32_t)res[axes[2]]);
-  }
-  return lines;
-}
-
-int fx_tensorf_lines(const fx_tensorf *field, bool appearance, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM])
-{
-  const fx_factors *factors = appearance ? &field->appearance : &field->density;
-  const vm_place p = vm_find(field->res, pos);
-  uint32_t first = appearance ? lines_of(&field->density, field->res) : 0;
-  int n = 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) n += pair_lines(factors, pair, field->res, &p, &first, line + n);
-  return n;
 }
