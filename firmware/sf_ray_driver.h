@@ -43,10 +43,10 @@ typedef struct sf_field_counters {
   uint64_t lookups, misses, fills, stalls; /* stalls: cycles, see FIELD_STALLS */
 } sf_field_counters;
 
-/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. planes: NULL for a hash grid; else
- * levels and directions of rays are not read. SF_DRIVER_REFUSED: RAY_ERROR; SF_DRIVER_MISFIT: levels, n_dir, or the
- * decoder's inputs, which the block does not check; SF_DRIVER_CACHE: it has another cache; SF_DRIVER_FIELD: it has not
- * this kind of field. */
+/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. planes: NULL for a hash grid;
+ * else levels and directions of rays are not read. SF_DRIVER_REFUSED: RAY_ERROR; SF_DRIVER_MISFIT: levels, n_dir, or
+ * the decoder's inputs, which the block does not check; SF_DRIVER_CACHE: it has another cache; SF_DRIVER_FIELD: it has
+ * not this kind of field. */
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays, const sf_planes_blob *planes);
 void sf_ray_driver_cache(const sf_bus *bus, uint32_t *bytes, uint32_t *ways); /* of the field, in this build */
 void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters);

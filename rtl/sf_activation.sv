@@ -7,7 +7,7 @@
 
 module sf_activation (
     input  wire               clk_i,
-    input  wire signed [37:0] sum_i,      // of products, Q.16 of their LSB
+    input  wire signed [38:0] sum_i,      // of products, Q.16 of their LSB
     input  wire               relu_i,     // else softplus
     input  wire        [15:0] in_mul_i,   // sum to argument, Q.12
     input  wire        [ 5:0] in_shift_i,
@@ -16,9 +16,9 @@ module sf_activation (
     input  wire        [ 5:0] out_shift_i,
     output reg         [27:0] sigma_o     // U16.12 per box edge, 16 cycles later
 );
-  wire signed [55:0] scaled4;
+  wire signed [56:0] scaled4;
   sf_rescale #(
-      .IN(38)
+      .IN(39)
   ) u_in (
       .clk_i  (clk_i),
       .sum_i  (sum_i),
@@ -27,11 +27,11 @@ module sf_activation (
       .bias_i (in_bias_i),
       .y_o    (scaled4)
   );
-  wire fits4 = scaled4[55:23] == {33{scaled4[55]}};
+  wire fits4 = scaled4[56:23] == {34{scaled4[56]}};
   reg signed [23:0] y5_q, y6_q;
   reg [23:0] m6_q;
   always_ff @(posedge clk_i) begin
-    y5_q <= fits4 ? scaled4[23:0] : scaled4[55] ? 24'h800000 : 24'h7fffff;
+    y5_q <= fits4 ? scaled4[23:0] : scaled4[56] ? 24'h800000 : 24'h7fffff;
     m6_q <= y5_q[23] ? ~y5_q + 24'd1 : y5_q;
     y6_q <= y5_q;
   end

@@ -239,7 +239,7 @@ module sf_planes (
   // ---- density: 16 products to 4 sums, to one, to the sum of the sample
   reg signed [32:0] quarter_q[0:3];
   reg signed [34:0] block_q;
-  reg signed [37:0] sum_q;
+  reg signed [38:0] sum_q;
   reg [1:0] density_q, density_end_q;  // a block in quarter_q and in block_q
   reg fresh_q;                         // sum_q is of a sample that has ended
   reg [16:0] sum_end_q;                // on its way through sf_activation
@@ -251,7 +251,7 @@ module sf_planes (
     end
     block_q <= 35'(quarter_q[0]) + 35'(quarter_q[1]) + 35'(quarter_q[2]) + 35'(quarter_q[3]);
     density_end_q <= {density_end_q[0], mix_end};
-    if (density_q[1]) sum_q <= (fresh_q ? 38'sd0 : sum_q) + 38'(block_q);
+    if (density_q[1]) sum_q <= (fresh_q ? 39'sd0 : sum_q) + 39'(block_q);
   end
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin

@@ -2,7 +2,7 @@
 `default_nettype none
 
 module sf_rescale #(
-    parameter integer IN = 38
+    parameter integer IN = 39
 ) (
     input  wire                  clk_i,
     input  wire signed [ IN-1:0] sum_i,

@@ -14,7 +14,8 @@ UNIT_TOP_sf_encoder_1 := sf_encoder
 UNIT_PARAMETERS_sf_encoder_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNITS_test_rtl_ray_track := sf_ray_track
-UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track
+UNITS_test_rtl_planes := sf_activation sf_waves
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track test_rtl_planes
 TESTS += $(UNIT_TESTS)
 
 LINT_TOPS := sf_ray_top

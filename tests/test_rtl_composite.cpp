@@ -72,6 +72,7 @@ struct bench {
   bench(uint64_t seed, int stall_percent) : u(seed), draw(seed), stall(stall_percent)
   {
     u.top.valid_i = 0, u.top.ready_i = 0;
+    u.top.weighed_i = u.top.decoded_i = 0, u.top.weight_i = 0;
     u.reset();
   }
 

@@ -32,9 +32,9 @@ static void store(registers *r, uint32_t offset, uint32_t value)
   } else if (offset == SF_CSR_RAY_MAX_SAMPLES) {
     r->max_samples = value >> 11 ? 0 : value;
   } else if (offset == SF_CSR_ENCODER_ADDRESS) {
-    r->address = value & 0xff;
+    r->address = value & 0xfff;
   } else if (offset == SF_CSR_ENCODER_DATA) {
-    r->address = (r->address + 1) & 0xff;
+    r->address = (r->address + 1) & 0xfff;
   } else if (offset == SF_CSR_FIELD_BASE) {
     r->base = value;
   } else {
@@ -93,6 +93,8 @@ static uint32_t model_read(const registers *r, uint32_t offset)
     return r->base;
   case SF_CSR_FIELD_CACHE:
     return SF_CSR_FIELD_CACHE_RESET;
+  case SF_CSR_FIELD_KINDS:
+    return SF_CSR_FIELD_KINDS_RESET;
   default:
     return 0;
   }

@@ -71,9 +71,8 @@ sf_status sf_ray_dut_open(sf_ray_dut **out, const fx_scene *scene, const sf_dut_
   rays->scene = scene;
   sf_status status = sf_dut_open_pins(&rays->dut, options, sf_pins_open_rays);
   if (status.code == SF_OK) {
-    rays->memory = (sf_memory){.dut = rays->dut,
-                               .base = sf_memory_base(options->seed),
-                               .latency = options->memory_latency};
+    rays->memory =
+        (sf_memory){.dut = rays->dut, .base = sf_memory_base(options->seed), .latency = options->memory_latency};
     status = sf_memory_fill(&rays->memory, scene);
     rays->dut->each_cycle = sf_memory_cycle, rays->dut->each_cycle_context = &rays->memory;
     if (status.code == SF_OK) status = sf_ray_dut_load(rays);

@@ -26,7 +26,7 @@ typedef struct sf_ray_request {
 enum { SF_MEMORY_QUEUE = 64, SF_LINE_BYTES = 16 };
 typedef struct sf_memory {
   sf_dut *dut;
-  const uint8_t *contents;       /* of the field: a hash grid's table, or lines of planes */
+  const uint8_t *contents; /* of the field: a hash grid's table, or lines of planes */
   uint64_t bytes;
   uint8_t *planes;               /* contents of a TensoRF scene; else NULL */
   uint32_t base;                 /* address of the contents */

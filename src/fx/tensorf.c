@@ -5,7 +5,7 @@
  *   plane     P = rshift_round(sum of entry * weight, 8), Q.8: the four weights (256 - g or g) * (256 - h or h) are
  *             exact and sum to 65536; |P| <= 127 * 2^8
  *   line      L = entry * (256 - g) + next * g, Q.8, exact; |L| <= 127 * 2^8
- *   density   sum of P * L over all components, exact in Q.16: 3 * 64 products below 2^30, so s38
+ *   density   sum of P * L over all components, exact in Q.16: 3 * 64 products below 2^30, so s39
  *             y = sat24(rshift_round(sum * mul, shift) + bias)
  *             sigma = usat28(rshift_round(activation(y) * mul, shift))
  *   features  x = rshift_round(P * L, 15) per component, s16: |x| <= 32258

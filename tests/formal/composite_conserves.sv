@@ -18,7 +18,7 @@ module composite_conserves (
     input wire         ready_i
 );
   localparam [20:0] ONE = 21'd1 << sf_arch_pkg::TRANS_FRAC;
-  localparam [4:0] IDLE = 5'd0, WEIGH = 5'd15, RED = 5'd16, FAR = 5'd20, BACK_RED = 5'd21, PIXEL = 5'd27;
+  localparam [4:0] IDLE = 5'd0, WEIGH = 5'd15, RED = 5'd16, NEAR = 5'd19, FAR = 5'd20, BACK_RED = 5'd21, PIXEL = 5'd27;
   (* anyconst *) wire [19:0] trans_stop;
   (* anyconst *) wire [10:0] max_samples;
   reg rst_n_q = 1'b0;
@@ -45,6 +45,9 @@ module composite_conserves (
       .colour_i       (colour_i),
       .delta_i        (delta_i),
       .distance_i     (distance_i),
+      .weighed_i      (1'b0),
+      .weight_i       (21'd0),
+      .decoded_i      (1'b0),
       .stop_o         (stop),
       .idle_o         (idle),
       .valid_o        (valid),
@@ -58,7 +61,7 @@ module composite_conserves (
   wire [4:0] peek_state_q;
   wire peek_open_q, peek_last_q;
   wire [20:0] peek_weight_q;
-  wire [52:0] peek_product_q;
+  wire [52:0] peek_product;
   wire [27:0] peek_a;
 
   // The ray as its samples tell it: what it has lost at each of them.
@@ -82,16 +85,16 @@ module composite_conserves (
       count_q <= 11'd0;
       given_q <= 21'd0;
     end else if (peek_state_q == WEIGH) count_q <= count_q + 11'd1;
-    else if (peek_state_q == RED) given_q <= given_q + peek_a[20:0];
+    else if (peek_state_q == NEAR) given_q <= given_q + peek_a[20:0];
     before_q <= transmittance;
   end
 
   wire [22:0] kept = {2'd0, weight_sum} + {2'd0, transmittance};
-  wire [22:0] in_hand = peek_state_q == RED ? {2'd0, peek_weight_q} : 23'd0;
+  wire [22:0] in_hand = peek_state_q >= RED && peek_state_q <= NEAR ? {2'd0, peek_weight_q} : 23'd0;
   wire [11:0] most = max_samples == 11'd0 ? 12'd1 : {1'b0, max_samples};
   always @* begin
     // exp_neg_one and mul_steps
-    assume (peek_state_q != WEIGH || peek_product_q <= {32'd0, transmittance} << sf_arch_pkg::TRANS_FRAC);
+    assume (peek_state_q != WEIGH || peek_product <= {32'd0, transmittance} << sf_arch_pkg::TRANS_FRAC);
     assume (!(take && ray_q && (first_i || empty_i)));  // sf_split: a ray ends before the next one begins
     if (rst_n_q) begin
       states : assert (peek_state_q <= PIXEL && ready == (peek_state_q == IDLE));

@@ -1,0 +1,369 @@
+/* TensoRF's field in sf_ray_top against the fixed-point core, bit for bit: sample positions in; pixels, the nets'
+ * counters and the field's look-ups and misses out. Fields of random sizes, entries and scales, their extremes more
+ * often than chance would; stalls, slow memories, tiles, rays that go on after their end, resets, illegal programming.
+ */
+#include "ck_run.h"
+#include "energy/energy.h"
+#include "firmware/sf_ray_driver.h"
+#include "quant/quant.h"
+#include "src/fx/tensorf.h"
+#include "tests/dut_fixture.h"
+#include "tests/fx_fixture.h"
+#include "tests/random_net.h"
+
+enum { RAYS = 8 };
+
+static fx_ray ray[RAYS];
+static uint64_t tile[RAYS];
+static sf_ray_sample sample[RAYS][SF_RAY_SAMPLES_MAX];
+static sf_ray_request request[RAYS];
+static fx_pixel expected[RAYS], actual[RAYS];
+static fx_counts counts;
+static fx_memory memory;
+
+/* ---- random fields ---- */
+
+static void draw_sizes(random_source *r, fx_tensorf *f)
+{
+  static const int32_t corner[] = {1, 2, 15, 16, 17, 32, 33, 48, 63, 64};
+  for (int i = 0; i < FX_PAIRS; i++) {
+    f->res[i] = (int32_t)(draw(r, 0, 5) ? draw(r, 1, 40) : draw(r, 1, 2));
+    f->density.components[i] = draw(r, 0, 1) ? corner[draw(r, 0, 9)] : (int32_t)draw(r, 1, 16);
+    f->appearance.components[i] = draw(r, 0, 1) ? corner[draw(r, 0, 9)] : (int32_t)draw(r, 1, 64);
+  }
+  do {
+    f->features = (int32_t)(draw(r, 0, 3) ? draw(r, 1, FX_APPEARANCE_MAX) : draw(r, 0, 1) ? 1 : 27);
+    f->feature_freqs = (int32_t)draw(r, 0, FX_FREQS_MAX), f->view_freqs = (int32_t)draw(r, 0, FX_FREQS_MAX);
+  } while (fx_tensorf_inputs(f) > SF_DIR_MAX);
+  f->encoding_frac = (int32_t)draw(r, 0, 11);
+  f->activation = draw(r, 0, 2) ? FX_SOFTPLUS : FX_RELU;
+}
+
+/* kind 0 uniform, 1 and 2 a rail, 3 small */
+static void draw_entries(random_source *r, int8_t *entry, int64_t n)
+{
+  const int64_t kind = draw(r, 0, 5);
+  for (int64_t i = 0; i < n; i++)
+    entry[i] = (int8_t)(kind == 1 ? 127 : kind == 2 ? -127 : kind == 3 ? draw(r, -3, 3) : draw(r, -127, 127));
+}
+
+static void draw_factors(random_source *r, const fx_tensorf *f, fx_factors *factors)
+{
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const int *axes = fx_pair_axes[pair];
+    draw_entries(r, factors->plane[pair], (int64_t)f->res[axes[0]] * f->res[axes[1]] * factors->components[pair]);
+    draw_entries(r, factors->line[pair], (int64_t)f->res[axes[2]] * factors->components[pair]);
+  }
+}
+
+/* The products' sum is about 2^22 times the root of the components. tame: densities as in a scene, so that rays are
+ * long. */
+static void draw_scales(random_source *r, fx_tensorf *f, bool tame)
+{
+  const int64_t bias = 1 << (FX_ACTIVATION_BITS - 1);
+  f->density_in = (fx_scale){(int32_t)draw(r, 30000, 65535), (int32_t)draw(r, 30, 33), (int32_t)draw(r, -20000, 4000)};
+  f->sigma_out = (fx_scale){(int32_t)draw(r, 1000, 65535), (int32_t)draw(r, 20, 22), 0};
+  f->feature_in = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, 25, 36), 0};
+  f->phase_in = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, 16, 34), 0};
+  f->weight_stop = (int32_t)(draw(r, 0, 3) ? draw(r, 0, 3000) : draw(r, 0, FX_TRANS_ONE - 1));
+  if (tame) return;
+  f->density_in = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, 0, 40), (int32_t)draw(r, -bias, bias - 1)};
+  f->sigma_out = (fx_scale){(int32_t)draw(r, 0, 65535), (int32_t)draw(r, 0, 40), 0};
+  f->feature_in.shift = (int32_t)draw(r, 0, 40), f->phase_in.shift = (int32_t)draw(r, 0, 40);
+}
+
+/* components: of every pair, between two points per axis; 0: sizes at random. */
+static fx_scene make_planes(uint64_t seed, bool tame, int components)
+{
+  random_source r = {seed, 0};
+  fx_scene scene = {.backbone = FX_TENSORF, .occ_res = 8};
+  fx_tensorf *f = &scene.tensorf;
+  fx_layer *l = scene.net.layer;
+  draw_sizes(&r, f);
+  for (int i = 0; components && i < FX_PAIRS; i++)
+    f->res[i] = 2, f->density.components[i] = f->appearance.components[i] = components;
+  draw_scales(&r, f, tame);
+  l[FX_C1].n_in = fx_tensorf_inputs(f), l[FX_C1].n_out = l[FX_C2].n_in = (int)draw(&r, 1, SF_LANES);
+  l[FX_C2].n_out = l[FX_C3].n_in = (int)draw(&r, 1, SF_LANES), l[FX_C3].n_out = 3;
+  draw_biases(&r, &scene.net);
+  ck_ok(fx_scene_allocate(&scene, "planes"));
+  draw_factors(&r, f, &f->density), draw_factors(&r, f, &f->appearance);
+  draw_entries(&r, f->basis, (int64_t)fx_factors_components(&f->appearance) * FX_APPEARANCE_MAX);
+  for (int id = FX_C1; id <= FX_C3; id++) {
+    draw_weights(&r, &l[id], 0);
+    l[id].k = draw_leak(&r), l[id].theta = id == FX_C3 ? 0 : draw_theta(&r, id == FX_C1 ? 300000 : 100000);
+  }
+  scene.net.mode = (int32_t)draw(&r, 0, 2), scene.net.steps = (int32_t)draw(&r, 1, SF_T_MAX);
+  scene.net.sigmoid_in = (fx_scale){50000, 13, 0};
+  scene.step_q24 = (int32_t)draw(&r, 1 << 18, 1 << 20);
+  scene.max_samples = draw(&r, 0, 3) ? 1024 : (int32_t)draw(&r, 1, 3);
+  scene.trans_stop = draw(&r, 0, 3) ? 1048 : 400000;
+  for (int o = 0; o < 3; o++) scene.background[o] = (int32_t)draw(&r, 0, 65536), scene.units.stretch[o] = 1;
+  for (int i = 0; i < 64; i++) scene.occupancy[i] = (uint8_t)draw(&r, 0, 255);
+  scene.units.to_box_scale = 0.5, scene.units.dir_scale = 1, scene.units.far = 100;
+  for (int o = 0; o < 3; o++) scene.units.to_box_offset[o] = 0.5;
+  ck_ok(fx_scene_check(&scene, "planes"));
+  return scene;
+}
+
+static fx_scene random_planes(uint64_t seed, bool tame)
+{
+  return make_planes(seed, tame, 0);
+}
+
+/* ---- the core's rays, and the accelerator's ---- */
+
+static void core_reads(void *user, fx_read what, const uint32_t pos[3])
+{
+  fx_memory_read(user, what, pos);
+}
+
+static void expect_core(const fx_scene *scene, uint64_t seed)
+{
+  const fx_watch watch = {core_reads, &memory};
+  memset(&counts, 0, sizeof counts);
+  ck_ok(fx_memory_open(&memory, scene, &(fx_cache_shape){SF_CACHE_BYTES, SF_CACHE_WAYS}));
+  for (uint64_t i = 0; i < RAYS; i++) {
+    ray[i] = random_ray(scene, seed, i);
+    if (i % 5 == 4) ray[i].count = 0; /* misses the box */
+    tile[i] = i == 0 ? 7 : tile[i - 1] + (i * seed % 3 == 0);
+    fx_memory_ray(&memory, tile[i]);
+    ck_ok(fx_render_watched(scene, &ray[i], NULL, NULL, &watch, &expected[i], &counts));
+    request[i] = sf_ray_request_as(scene, &ray[i], &expected[i], sample[i]);
+  }
+  fx_memory_close(&memory);
+}
+
+static void same_pixels(void)
+{
+  for (int i = 0; i < RAYS; i++) {
+    const fx_pixel *e = &expected[i], *a = &actual[i];
+    ck_assert_uint_eq(a->transmittance, e->transmittance);
+    ck_assert_uint_eq(a->weight_sum, e->weight_sum);
+    ck_assert_uint_eq(a->depth, e->depth);
+    ck_assert_uint_eq(a->samples, e->samples);
+    for (int o = 0; o < 3; o++) ck_assert_uint_eq(a->colour[o], e->colour[o]);
+  }
+}
+
+static void run(sf_ray_dut *rays)
+{
+  for (int i = 0; i < RAYS; i++) request[i].new_tile = sf_ray_dut_new_tile(rays, tile[i]);
+  ck_ok(sf_ray_dut_run(rays, request, RAYS, actual));
+  same_pixels();
+}
+
+static void same_counts(sf_ray_dut *rays)
+{
+  fx_counts nets;
+  sf_field_counters field;
+  ck_ok(sf_dut_counts(rays->dut, &nets, NULL, NULL, NULL));
+  ck_ok(sf_counts_compare(&counts, "core", &nets, "accelerator"));
+  ck_ok(sf_ray_dut_field(rays, &field));
+  ck_ok(sf_compare_field(&memory.counts, &field));
+  ck_assert_uint_eq(rays->memory.asked, field.fills);
+}
+
+/* All rays of the march in place of those that the core took: the accelerator has to find their end. */
+static void send_all(const fx_scene *scene)
+{
+  for (int i = 0; i < RAYS; i++) {
+    uint32_t pos[3];
+    int n = 0;
+    for (int32_t at = -1; (at = fx_march_next(scene, &ray[i], at + 1, pos, NULL)) >= 0;) n++;
+    ck_assert_int_le(n, SF_RAY_SAMPLES_MAX);
+    sf_ray_samples(scene, &ray[i], sample[i], n);
+    request[i] = (sf_ray_request){&ray[i], sample[i], n, false, false};
+  }
+}
+
+LOOP_TEST(random_fields, 40)
+{
+  const uint64_t seed = 2000 + (uint64_t)_i;
+  const sf_dut_options options = {.seed = seed, .stall_percent = _i % 4 * 25, .memory_latency = _i % 3 * 40};
+  OWNED(fx_scene) scene = random_planes(seed, _i % 3 > 0);
+  OWNED(sf_ray_dut) *rays = NULL;
+  expect_core(&scene, seed);
+  ck_assert_uint_gt(memory.counts.lookups, 0);
+  ck_ok(sf_ray_dut_open(&rays, &scene, &options));
+  run(rays);
+  same_counts(rays);
+  send_all(&scene);
+  run(rays);
+}
+
+/* Every product at its rail, of as many components as there can be: the widest sums. */
+LOOP_TEST(largest_sums, 4)
+{
+  const uint64_t seed = 2900 + (uint64_t)_i;
+  OWNED(fx_scene) scene = make_planes(seed, true, FX_COMPONENTS_MAX);
+  OWNED(sf_ray_dut) *rays = NULL;
+  fx_tensorf *f = &scene.tensorf;
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
+    const size_t n = FX_COMPONENTS_MAX * 4, m = FX_COMPONENTS_MAX * 2;
+    memset(f->density.plane[pair], 127, n), memset(f->appearance.plane[pair], 127, n);
+    memset(f->density.line[pair], _i & 1 ? -127 : 127, m), memset(f->appearance.line[pair], _i & 2 ? -127 : 127, m);
+  }
+  memset(f->basis, _i & 2 ? 127 : -127, 3 * FX_COMPONENTS_MAX * FX_APPEARANCE_MAX);
+  f->density_in = (fx_scale){100, 24, _i & 1 ? 1220000 : -1220000}, f->sigma_out = (fx_scale){40000, 20, 0};
+  f->weight_stop = 0;
+  expect_core(&scene, seed);
+  ck_assert_uint_gt(counts.samples, 0);
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = seed}));
+  run(rays);
+  same_counts(rays);
+}
+
+/* ---- resets, order, programming ---- */
+
+static fx_scene long_rays(uint64_t seed)
+{
+  for (;; seed += 100) {
+    fx_scene scene = random_planes(seed, true);
+    scene.trans_stop = 1, scene.max_samples = 1024, scene.tensorf.weight_stop = 20;
+    memset(scene.occupancy, 0xff, 64);
+    expect_core(&scene, seed);
+    if (counts.samples > 40) return scene; /* decoded ones */
+    fx_scene_free(&scene);
+  }
+}
+
+static void works(sf_ray_dut *rays)
+{
+  rays->dut->in.ray_valid = rays->dut->in.pixel_ready = false;
+  ck_ok(sf_ray_dut_load(rays));
+  ck_ok(sf_dut_clear_counts(rays->dut));
+  sf_ray_driver_clear(&rays->dut->bus);
+  rays->memory.asked = rays->memory.answered = 0;
+  expect_core(rays->scene, 3);
+  run(rays);
+  same_counts(rays);
+}
+
+/* Beats of the first ray for so many cycles, and then no more. */
+static void cut_off(sf_ray_dut *rays, int cycles)
+{
+  sf_dut *dut = rays->dut;
+  for (int at = 0; cycles-- > 0;) {
+    const sf_ray_sample *s = &sample[0][at % request[0].n];
+    dut->in.ray_valid = true, dut->in.pixel_ready = true;
+    dut->in.ray_user = at % request[0].n == 0, dut->in.ray_last = at % request[0].n == request[0].n - 1;
+    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
+    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
+    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time */
+    sf_dut_tick(dut);
+    at += dut->out.ray_ready;
+  }
+}
+
+TEST(soft_reset_in_mid_ray)
+{
+  OWNED(fx_scene) scene = long_rays(3100);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 4, .stall_percent = 10}));
+  for (int cycles = 1; cycles < 4000; cycles = cycles * 9 / 8 + 1) {
+    cut_off(rays, cycles);
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    works(rays);
+  }
+}
+
+TEST(beats_out_of_order_are_refused)
+{
+  OWNED(fx_scene) scene = long_rays(3200);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 5}));
+  for (int user = 0; user < 2; user++) {
+    works(rays);
+    sf_pins_in *in = &rays->dut->in;
+    for (int beat = 0; beat <= user; beat++) { /* no first sample; then two of them */
+      in->ray_valid = true, in->ray_user = user, in->ray_last = false;
+      do sf_dut_tick(rays->dut);
+      while (!rays->dut->out.ray_ready);
+    }
+    for (int i = 0; i < 400; i++) sf_dut_tick(rays->dut); /* the rest is discarded */
+    in->ray_valid = false;
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
+    ck_assert(rays->dut->out.irq);
+  }
+  works(rays);
+}
+
+/* Words of the planes' programming: rtl/sf_planes.sv. */
+TEST(sizes_that_do_not_fit_are_refused)
+{
+  static const struct {
+    uint32_t word, value;
+    bool fits;
+  } programming[] = {{0x101, 0, false},      {0x101, 2049, false}, {0x101, 2048, true},   {0x102, 0, false},
+                     {0x102, 4097, false},   {0x103, 0, false},    {0x103, ~0u, false},   {0x105, 1 << 20, false},
+                     {0x105, 1048575, true}, {0x106, 0, false},    {0x106, 33, false},    {0x106, 32, true},
+                     {0x107, 5, false},      {0x107, 4, true},     {0x108, 5, false},     {0x108, 4, true},
+                     {0x109, 12, false},     {0x109, 11, true},    {0x110, 65536, false}, {0x110, 65535, true},
+                     {0x111, 41, false},     {0x111, 40, true},    {0x112, 65536, false}, {0x113, 41, false},
+                     {0x114, 65536, false},  {0x115, 41, false},   {0x116, 65536, false}, {0x117, 64, false},
+                     {0x122, 0, false},      {0x122, 5, false},    {0x122, 4, true},      {0x126, 5, false},
+                     {0x12a, 0, false},      {0x12e, 5, false},    {0x132, 0, false},     {0x136, 8, false}};
+  OWNED(fx_scene) scene = long_rays(3300);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 6}));
+  for (int i = 0; i < COUNT(programming); i++) {
+    ck_ok(sf_ray_dut_load(rays));
+    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    put(rays->dut, SF_CSR_ENCODER_ADDRESS, programming[i].word);
+    put(rays->dut, SF_CSR_ENCODER_DATA, programming[i].value);
+    put(rays->dut, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
+    const uint32_t error = programming[i].fits ? 0 : SF_CSR_RAY_ERROR_VALUE;
+    ck_assert_msg(get(rays->dut, SF_CSR_RAY_ERROR) == error, "word %x, %u", programming[i].word, programming[i].value);
+    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, !error);
+  }
+  works(rays);
+}
+
+/* A hash grid after planes, and planes after it, in one accelerator. */
+TEST(from_one_field_to_the_other)
+{
+  OWNED(fx_scene) planes = long_rays(3400);
+  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
+  OWNED(fx_scene) grid = fixture_scene(&sizes, 21);
+  OWNED(sf_ray_dut) *rays = NULL;
+  grid.step_q24 = 1 << 20;
+  ck_ok(sf_ray_dut_open(&rays, &planes, &(sf_dut_options){.seed = 7, .stall_percent = 20}));
+  for (int i = 0; i < 4; i++) {
+    const fx_scene *scene = i % 2 ? &grid : &planes;
+    free(rays->memory.planes);
+    rays->scene = scene, rays->memory.planes = NULL;
+    ck_ok(sf_memory_fill(&rays->memory, scene));
+    works(rays);
+  }
+}
+
+static uint32_t without_planes(void *context, uint32_t offset)
+{
+  const sf_bus *real = context;
+  const uint32_t value = real->read(real->context, offset);
+  return offset == SF_CSR_FIELD_KINDS ? value & ~(uint32_t)SF_CSR_FIELD_KINDS_PLANES : value;
+}
+static void write_through(void *context, uint32_t offset, uint32_t value)
+{
+  const sf_bus *real = context;
+  real->write(real->context, offset, value);
+}
+
+TEST(the_driver_refuses_what_a_build_lacks)
+{
+  OWNED(fx_scene) scene = long_rays(3500);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 8}));
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_FIELD_KINDS), SF_CSR_FIELD_KINDS_GRID | SF_CSR_FIELD_KINDS_PLANES);
+  sf_bus real = rays->dut->bus;
+  rays->dut->bus = (sf_bus){without_planes, write_through, &real};
+  const sf_status status = sf_ray_dut_load(rays);
+  rays->dut->bus = real;
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_msg(strstr(status.message, "has not the scene's kind of field"), "%s", status.message);
+  scene.tensorf.features++; /* more inputs than the decoder has */
+  ck_assert(strstr(sf_ray_dut_load(rays).message, "are not the net's inputs"));
+  scene.tensorf.features--;
+  works(rays);
+}
