@@ -269,7 +269,7 @@ TEST(what_is_rare_is_shown)
   finish(&f);
   f.report.twin = (sf_twin){"twin.safetensors", 100, 5, 2300000, -3.5};
   f.report.random_rays = true, f.page.whole = false;
-  f.report.three.no_rtl_traffic = true;
+  f.report.three.rtl_events = SF_TRAFFIC_LOOKUP;
   f.report.measure.core.saturated_samples[FX_C1] = 3;
   f.page.model = "a/m&m.safetensors";
   snprintf(f.page.model_sha256, sizeof f.page.model_sha256, "0123abcd");

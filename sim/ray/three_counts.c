@@ -113,9 +113,11 @@ static sf_status ray_traffic(run *r, uint64_t index, const fx_ray *ray, const fx
   SF_TRY(sf_ray_dut_run(r->rays, &request, 1, &pixel));
   SF_TRY(sf_compare_pixel(core, &pixel, sf_dut_cycle(r->rays->dut)));
   SF_TRY(sf_ray_dut_field(r->rays, &field));
+  const fx_counts taken = {.samples = pixel.samples};
+  const sf_traffic seen = sf_traffic_recount(r->job->scene, &taken, &(fx_memory_counts){0}, (uint64_t)request.n, 1);
   r->sum->rtl_traffic.lookups = field.lookups, r->sum->rtl_traffic.misses = field.misses;
-  r->sum->rtl_traffic.table_bytes += pixel.samples * fx_grid_bytes(&r->job->scene->grid);
-  r->sum->rtl_traffic.exp_neg += pixel.samples;
+  r->sum->rtl_traffic.table_bytes += seen.table_bytes;
+  r->sum->rtl_traffic.exp_neg += seen.exp_neg;
   r->sum->rtl_traffic.frame_bytes += sizeof pixel;
   return sf_ok();
 }
@@ -125,7 +127,6 @@ static sf_status compare_all(const sf_three_counts *s)
   SF_TRY(sf_counts_compare(&s->core, "core", &s->recount, "recount"));
   SF_TRY(sf_traffic_compare(&s->core_traffic, "core", &s->recount_traffic, "recount", SF_TRAFFIC_EVENTS));
   SF_TRY(sf_memory_compare(&s->core_memory, "core", &s->recount_memory, "recount"));
-  if (s->no_rtl_traffic) return sf_ok();
   return sf_traffic_compare(&s->core_traffic, "core", &s->rtl_traffic, "accelerator", s->rtl_events);
 }
 
@@ -147,7 +148,7 @@ static sf_status one_ray(run *r, uint64_t index)
   const sf_status read = sf_dut_counts(r->dut, &s->rtl, &s->cycles, &s->busy, &s->stalls);
   if (ran.code != SF_OK) return name_ray(r, index, ran);
   SF_TRY(read);
-  if (r->rays) SF_TRY(name_ray(r, index, ray_traffic(r, index, &ray, &pixel)));
+  SF_TRY(name_ray(r, index, ray_traffic(r, index, &ray, &pixel)));
   const sf_status status = sf_compare_ray_counts(r->core.net, &s->core, &s->rtl);
   if (status.code == SF_E_DIFFERENCE) return name_ray(r, index, find_counter_sample(r, index, &ray, status));
   return name_ray(r, index, compare_all(s));
@@ -173,8 +174,7 @@ static sf_status open_and_run(run *r)
   SF_TRY(fx_memory_open(&r->memory, scene, cache));
   SF_TRY(sf_memory_recount_open(&r->lines, scene, cache));
   SF_TRY(sf_dut_open(&r->dut, scene, &r->job->dut));
-  r->sum->no_rtl_traffic = scene->backbone != FX_INGP; /* of which it has no encoder */
-  if (!r->sum->no_rtl_traffic) SF_TRY(sf_ray_dut_open(&r->rays, scene, &r->job->dut));
+  SF_TRY(sf_ray_dut_open(&r->rays, scene, &r->job->dut));
   return all_rays(r);
 }
 

@@ -27,8 +27,7 @@ static void print_three(FILE *out, const sf_three_counts *s, uint64_t seed)
               sf_event_total(&s->recount, e), false);
   const sf_traffic *x = &s->core_traffic, *y = &s->rtl_traffic, *z = &s->recount_traffic;
   for (int e = 0; e < SF_TRAFFIC_EVENTS; e++)
-    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e],
-              s->no_rtl_traffic || e >= s->rtl_events);
+    print_row(out, sf_traffic_events[e].title, x->event[e], y->event[e], z->event[e], e >= s->rtl_events);
   print_row(out, "paper ledger, fJ", sf_energy_fj(&s->core), sf_energy_fj(&s->rtl), sf_energy_fj(&s->recount), false);
   fprintf(out, "  accelerator: %" PRIu64 " cycles, %" PRIu64 " busy, %" PRIu64 " stalled\n", s->cycles, s->busy,
           s->stalls);
@@ -180,8 +179,7 @@ static cJSON *three_json(const sf_three_counts *s, const fx_net *net)
   sf_json_add_u64(json, "rtl_fj", sf_energy_fj(&s->rtl));
   sf_json_add_u64(json, "recount_fj", sf_energy_fj(&s->recount));
   cJSON_AddItemToObject(json, "core", count_json(net, &s->core, &s->core_traffic, SF_TRAFFIC_EVENTS));
-  cJSON_AddItemToObject(json, "rtl",
-                        count_json(net, &s->rtl, s->no_rtl_traffic ? NULL : &s->rtl_traffic, s->rtl_events));
+  cJSON_AddItemToObject(json, "rtl", count_json(net, &s->rtl, &s->rtl_traffic, s->rtl_events));
   cJSON_AddItemToObject(json, "recount", count_json(net, &s->recount, &s->recount_traffic, SF_TRAFFIC_EVENTS));
   return json;
 }

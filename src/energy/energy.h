@@ -91,7 +91,6 @@ typedef struct sf_three_counts {
                      has */
   fx_memory_counts core_memory, recount_memory; /* rays: a list */
   uint64_t cycles, busy, stalls;
-  bool no_rtl_traffic; /* the accelerator has no encoder for this scene's field */
   sf_status agreement; /* SF_E_DIFFERENCE names the first difference */
 } sf_three_counts;
 
