@@ -91,7 +91,10 @@ module sf_planes_reads #(
     scaled_q[1] <= 35'(pos_q[47:24]) * 35'(last_y) + half;
     scaled_q[2] <= 35'(pos_q[71:48]) * 35'(last_z) + half;
     if (state_q == ROUND) begin
-      for (axis = 0; axis < 3; axis = axis + 1) {at_q[axis], g_q[axis]} <= scaled_q[axis][34:16];
+      for (axis = 0; axis < 3; axis = axis + 1) begin
+        at_q[axis] <= scaled_q[axis][34:24];
+        g_q[axis] <= scaled_q[axis][23:16];
+      end
       {pair_q, line_q, far_q, beside_q, of_line_q} <= 7'd0;
     end else if (issue) begin
       line_q <= point_end ? 2'd0 : line_q + 2'd1;

@@ -50,10 +50,12 @@ module sf_waves (
   wire last_beat;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {scale_q, into_q, bank_full_q} <= 4'd0;
+      {scale_q, into_q} <= 2'b00;
+      bank_full_q <= 2'b00;
       {next_q, going_q} <= 11'd0;
     end else if (clear_i) begin
-      {scale_q, into_q, bank_full_q} <= 4'd0;
+      {scale_q, into_q} <= 2'b00;
+      bank_full_q <= 2'b00;
       {next_q, going_q} <= 11'd0;
     end else begin
       scale_q <= begins || (scale_q && !issue_end);

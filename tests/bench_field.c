@@ -19,7 +19,8 @@ typedef struct frame {
   sf_ray_request *request;
   sf_ray_sample *sample;
   int rays;
-  uint64_t samples;
+  size_t samples; /* in sample: read from the field by a hash grid, and TensoRF's densities */
+  uint64_t decoded;
 } frame;
 
 static void read_field(void *user, fx_read what, const uint32_t pos[3])
@@ -36,13 +37,13 @@ static sf_status core_rays(frame *f)
     fx_memory_ray(&f->memory, f->tile[i]);
     SF_TRY(fx_render_watched(&f->scene, &f->ray[i], NULL, NULL, &watch, &f->core[i], &counts));
   }
-  f->samples = counts.samples;
-  f->sample = calloc(f->samples + 1, sizeof *f->sample);
-  if (!f->sample) return sf_fail(SF_E_MEMORY, "no memory for %" PRIu64 " samples", f->samples);
-  for (int i = 0, at = 0; i < f->rays; at += (int)f->core[i++].samples) {
-    const int n = (int)f->core[i].samples;
-    sf_ray_samples(&f->scene, &f->ray[i], f->sample + at, n);
-    f->request[i] = (sf_ray_request){&f->ray[i], f->sample + at, n, false, i == 0 || f->tile[i] != f->tile[i - 1]};
+  f->decoded = counts.samples;
+  f->samples = f->scene.backbone == FX_INGP ? counts.samples : counts.field_samples;
+  f->sample = calloc(f->samples + SF_RAY_SAMPLES_MAX, sizeof *f->sample);
+  if (!f->sample) return sf_fail(SF_E_MEMORY, "no memory for %zu samples", f->samples);
+  for (size_t i = 0, at = 0; i < (size_t)f->rays; at += (size_t)f->request[i++].n) {
+    f->request[i] = sf_ray_request_as(&f->scene, &f->ray[i], &f->core[i], f->sample + at);
+    f->request[i].stops = false, f->request[i].new_tile = i == 0 || f->tile[i] != f->tile[i - 1];
   }
   return sf_ok();
 }
@@ -62,7 +63,6 @@ static sf_status open_frame(frame *f, const char *scene, const char *data, int v
 {
   const sf_dataset_options how = {.first = view, .limit = 1};
   SF_TRY(fx_scene_load(&f->scene, scene));
-  SF_TRY(fx_scene_need_grid(&f->scene, scene, "bench_field"));
   SF_TRY(sf_fx_dataset_load(&f->data, &f->scene, scene, data, "test", &how));
   if (f->data.count == 0) return sf_fail(SF_E_RANGE, "%s: no view %d", data, view);
   const fx_cache_shape built = {SF_CACHE_BYTES, SF_CACHE_WAYS};
@@ -103,10 +103,10 @@ static sf_status measure(frame *f, int latency)
   if (status.code == SF_OK) status = sf_dut_counts(rays->dut, &counts, &cycles, &busy, &starved);
   sf_ray_dut_close(rays);
   SF_TRY(status);
-  const double frame = (double)(end - begin), samples = (double)counts.samples;
-  printf("%7d %12.0f %14.2f %12.2f %% %14.4f %10.4f\n", latency, frame, frame / samples,
-         100 * (double)field.stalls / frame, (double)field.lookups / (samples * f->scene.grid.levels * 8),
-         (double)field.misses / (samples * f->scene.grid.levels * 8));
+  const double frame = (double)(end - begin), samples = (double)f->samples;
+  printf("%7d %12.0f %14.2f %14.2f %12.2f %% %15.2f %13.2f\n", latency, frame, frame / samples,
+         frame / (double)counts.samples, 100 * (double)field.stalls / frame, (double)field.lookups / samples,
+         (double)field.misses / samples);
   return fflush(stdout) ? sf_fail(SF_E_IO, "standard output") : sf_ok();
 }
 
@@ -116,9 +116,9 @@ static sf_status run(frame *f, int argc, char **argv)
   const int given = argc > 5 ? argc - 5 : 0, n = given ? given : (int)(sizeof usual / sizeof *usual);
   SF_TRY(
       open_frame(f, argv[1], argv[2], argc > 3 ? atoi(argv[3]) : 0, argc > 4 && atoi(argv[4]) > 0 ? atoi(argv[4]) : 1));
-  printf("%d rays, %" PRIu64 " samples, cache of %d bytes, %d ways\n", f->rays, f->samples, SF_CACHE_BYTES,
-         SF_CACHE_WAYS);
-  printf("latency       cycles  cycles/sample  field stalls  look-ups/entry  misses/entry\n");
+  printf("%d rays, %zu samples, %" PRIu64 " of them through the nets, cache of %d bytes, %d ways\n", f->rays,
+         f->samples, f->decoded, SF_CACHE_BYTES, SF_CACHE_WAYS);
+  printf("latency       cycles  cycles/sample  of the nets    field stalls  look-ups/sample  misses/sample\n");
   for (int i = 0; i < n; i++) SF_TRY(measure(f, given ? atoi(argv[5 + i]) : usual[i]));
   return sf_ok();
 }

@@ -16,7 +16,7 @@ from asic import defaults, flow, liberty, netlist, tech
 from hdl_flow import Stop, digest, hash_of, module_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-TOP = "sf_ray_top:TAP=0,MACS=64,NEURONS=8"
+TOP = "sf_ray_top:TAP=0,MACS=64,NEURONS=8,PLANES=0"
 
 
 def parse_arguments():

