@@ -1,5 +1,5 @@
-// The sum of a density's products to the density, one in every cycle. Mirror: src/fx/tensorf.c (fx_tensorf_activate) and
-// src/fx/softplus.c
+// The sum of a density's products to the density, one in every cycle.
+// Mirror: src/fx/softplus.c; src/fx/tensorf.c (fx_tensorf_activate)
 //
 // 1 to 4: scaled; 5: 24 bits; 6: |y|; 7: table; 8: fall; 9: its product; 10: from the table; 11: and max(y, 0); 12 to 15:
 // scaled; 16: 28 bits

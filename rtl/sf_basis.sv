@@ -1,5 +1,5 @@
-// Sums of a sample's features: products of its components, in 16 bits, times the rows of the basis matrix. Mirror:
-// src/fx/tensorf_isa.h (vm_products, vm_features)
+// Sums of a sample's features: products of its components, in 16 bits, times the rows of the basis matrix.
+// Mirror: src/fx/tensorf_isa.h (vm_products, vm_features)
 //
 // A component in a cycle, for all 32 features. Row 64 pair + 16 block + i of the memory is that of component i of a block;
 // components that are not there are 0.

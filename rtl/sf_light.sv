@@ -1,5 +1,5 @@
-// Samples of rays to weights, where densities alone decide which samples are decoded and where a ray ends. Mirror:
-// src/fx/render.c (fx_tensorf_weight, render_tensorf)
+// Samples of rays to weights, where densities alone decide which samples are decoded and where a ray ends.
+// Mirror: src/fx/render.c (fx_tensorf_weight, render_tensorf)
 //
 // One sample after the other: its density is asked for, its weight follows 17 cycles after that, and then, if it has one,
 // its appearance: the order in which the core reads the field. The rest of a ray that has ended is dropped.

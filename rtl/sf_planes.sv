@@ -1,5 +1,5 @@
-// TensoRF's field: samples of rays to their weights and, where they have one, to packets of the decoder. Mirror:
-// src/fx/tensorf.c and src/fx/rays_tensorf.c
+// TensoRF's field: samples of rays to their weights and, where they have one, to packets of the decoder.
+// Mirror: src/fx/tensorf.c; src/fx/rays_tensorf.c
 //
 // Programming, as sf_encoder's:
 //   cfg_addr_i   cfg_data_i                                                             in fx_scene

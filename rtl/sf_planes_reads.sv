@@ -1,5 +1,5 @@
-// The lines of planes and lines that a position reads, in order, and how much of each it takes. Mirror: src/fx/tensorf.c
-// (fx_tensorf_lines, vm_find)
+// The lines of planes and lines that a position reads, in order, and how much of each it takes.
+// Mirror: src/fx/tensorf_lines.c (fx_tensorf_lines); src/fx/tensorf_place.h (vm_find)
 //
 // A point of a plane or a line has 16 components in a line of the memory, so ceil(components / 16) lines. Order: pair by
 // pair (0,1,2), (0,2,1), (1,2,0) of axes (u, v, w): the points (u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1) of the

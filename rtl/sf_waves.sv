@@ -1,5 +1,6 @@
 // Sums of features and a direction to the packet of a decoder: features, direction, sines and cosines of 1, 2, 4 ... times
-// each feature, then of the direction. Mirror: src/fx/tensorf.c (fx_vm_encode, waves) and src/fx/sine.c
+// each feature, then of the direction.
+// Mirror: src/fx/sine.c; src/fx/tensorf.c (fx_vm_encode, waves)
 //
 // Two halves, each at work on a sample of its own. Scaling takes two cycles per feature: the feature, then its phase.
 // The other half makes one value in every cycle and puts four into a beat.

@@ -4,7 +4,8 @@
  *
  *   q = phase within its half turn, folded at the quarter: 0..2^14;  i = q >> 6;  low = q & 63
  *   p = S[i] + (((S[i+1] - S[i]) * low + 32) >> 6)          Q.16 (rise < 2^9, product < 2^15)
- *   result = +- rshift_round(p, 2)                          Q1.14; minus in the second half turn */
+ *   result = +- rshift_round(p, 2)                          Q1.14; minus in the second half turn
+ * Mirror: rtl/sf_waves.sv */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"

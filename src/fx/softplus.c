@@ -5,7 +5,8 @@
  *
  *   m = |y|, Q.12;  i = m >> 8;  low = m & 255
  *   t = L[i] + (((L[i+1] - L[i]) * low + 128) >> 8)         Q.24 (fall < 2^19, product < 2^27); 0 from m = 16 on
- *   result = (max(y, 0) << 8) + rshift_round(t, 4)          Q.20, < 2^32 */
+ *   result = (max(y, 0) << 8) + rshift_round(t, 4)          Q.20, < 2^32
+ * Mirror: rtl/sf_activation.sv */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"

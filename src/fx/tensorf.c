@@ -14,7 +14,8 @@
  *   inputs    features, direction, sin and cos of 2^k times each feature (all sines, then all cosines; value by value,
  *             k = 0 first), then of each axis of the direction: TensoRF's order
  *
- * All sums are of integers, so their order does not matter. */
+ * All sums are of integers, so their order does not matter.
+ * Mirror: rtl/sf_planes.sv */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/tensorf_isa.h"
