@@ -1,8 +1,9 @@
 // Samples of rays to weights, where densities alone decide which samples are decoded and where a ray ends.
 // Mirror: src/fx/render.c (fx_tensorf_weight, render_tensorf)
 //
-// One sample after the other: its density is asked for, its weight follows 17 cycles after that, and then, if it has one,
-// its appearance: the order in which the core reads the field. The rest of a ray that has ended is dropped.
+// Densities run ahead: of each ray the next AHEAD of them are read before a sample's weight is looked at and, if it has
+// one, its appearance is read. That is the core's order (src/fx/cache.h). Densities become exp(-density * length) as they
+// come; the light that is left is multiplied by one after the other. The rest of a ray that has ended is dropped.
 `default_nettype none
 
 module sf_light (
@@ -46,7 +47,9 @@ module sf_light (
     output wire [43:0] distance_o,
     output wire        idle_o
 );
-  localparam integer LOG2_ITEMS = 5;
+  localparam integer AHEAD = 3;  // FX_AHEAD
+  localparam integer LOG2_ITEMS = 5, LOG2_AHEAD = 2;
+  localparam integer EXP_CYCLES = 12;  // product and exponential
 
   // ---- input: a beat waits in a register
   reg held_q, first_q, last_q, empty_q, in_tile_q;
@@ -71,94 +74,159 @@ module sf_light (
     end
   end
 
-  // ---- a sample at a time
-  localparam [2:0] IDLE = 3'd0, DENSITY = 3'd1, WAIT = 3'd2, WEIGH = 3'd3, KEEP = 3'd4, APPEARANCE = 3'd5;
-  reg [2:0] state_q;
-  reg [4:0] at_q;  // cycles in WEIGH
+  // ---- turns: a density while the ray has more and fewer than AHEAD are on their way behind the oldest; else the oldest
+  localparam [1:0] IDLE = 2'd0, MULTIPLY = 2'd1, DECIDE = 2'd2, APPEARANCE = 2'd3;
+  reg [1:0] state_q;       // of the oldest
+  reg [1:0] at_q;          // cycles in MULTIPLY
+  reg [2:0] waiting_q;     // samples whose density was asked for
   reg room_q;
+  wire unfinished = inside_q && !drop_q;
+  wire density_turn = unfinished ? waiting_q <= 3'(AHEAD) : waiting_q == 3'd0;
   wire bad = inside_q ? first_q || empty_q : !first_q || (empty_q && !last_q);
-  wire begin_sample = state_q == IDLE && held_q && !swallows && !bad && room_q;
-  assign error_order_o = state_q == IDLE && held_q && !broken_q && bad;
-  wire keep = (begin_sample && empty_q) || state_q == KEEP;
-  wire decoded, ends;
-  wire sample_end = (state_q == KEEP && !decoded) || (state_q == APPEARANCE && read_ready_i);
-  assign taken = (state_q == IDLE && held_q && swallows) || (begin_sample && empty_q) || sample_end;
-  assign read_valid_o = state_q == DENSITY || state_q == APPEARANCE;
+  wire good = held_q && !swallows && !bad && density_turn;
+  wire keep_empty = good && empty_q && room_q;
+  wire ask = good && !empty_q;
+  wire asked = ask && read_ready_i && state_q != APPEARANCE;
+  assign error_order_o = held_q && !broken_q && bad && (drop_q || density_turn);
+  assign taken = (held_q && swallows) || keep_empty || asked;
+
+  wire ended, decoded, e_valid;
+  wire decide = state_q == DECIDE && !density_turn && room_q;
+  wire keep = decide && !ended;
+  wire goes = (decide && (ended || !decoded)) || (state_q == APPEARANCE && read_ready_i);
+  assign read_valid_o = ask || state_q == APPEARANCE;
   assign read_appearance_o = state_q == APPEARANCE;
-  assign read_tile_o = state_q == DENSITY && tile_q;
-  assign read_pos_o = pos_q;
+  assign read_tile_o = state_q != APPEARANCE && (tile_q || (first_q && in_tile_q));
   assign read_dir_o = ray_dir_q;
-  wire [4:0] last_cycle = 5'd16;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q <= IDLE;
-      at_q <= 5'd0;
+      at_q <= 2'd0;
+      waiting_q <= 3'd0;
       {inside_q, drop_q, broken_q, tile_q} <= 4'd0;
     end else if (clear_i) begin
       state_q <= IDLE;
-      at_q <= 5'd0;
+      at_q <= 2'd0;
+      waiting_q <= 3'd0;
       {inside_q, drop_q, broken_q, tile_q} <= 4'd0;
     end else begin
       if (error_order_o) broken_q <= 1'b1;
       case (state_q)
-        IDLE: if (begin_sample && !empty_q) state_q <= DENSITY;
-        DENSITY: if (read_ready_i) state_q <= WAIT;
-        WAIT: if (sigma_valid_i) state_q <= WEIGH;
-        WEIGH: if (at_q == last_cycle) state_q <= KEEP;
-        KEEP: state_q <= decoded ? APPEARANCE : IDLE;
+        IDLE: if (e_valid) state_q <= MULTIPLY;
+        MULTIPLY: if (at_q == 2'd3) state_q <= DECIDE;
+        DECIDE: if (decide) state_q <= ended || !decoded ? IDLE : APPEARANCE;
         default: if (read_ready_i) state_q <= IDLE;
       endcase
-      at_q <= state_q == WEIGH ? at_q + 5'd1 : 5'd0;
-      if (begin_sample && first_q) tile_q <= tile_q || in_tile_q;
-      else if (state_q == DENSITY && read_ready_i) tile_q <= 1'b0;
+      at_q <= state_q == MULTIPLY ? at_q + 2'd1 : 2'd0;
+      if (asked != goes) waiting_q <= asked ? waiting_q + 3'd1 : waiting_q - 3'd1;
+      if (keep_empty) tile_q <= tile_q || in_tile_q;
+      else if (asked) tile_q <= 1'b0;
       if (taken && !broken_q) inside_q <= !last_q;
-      if (begin_sample) drop_q <= 1'b0;
-      else if (state_q == KEEP && ends) drop_q <= 1'b1;
+      if ((asked || keep_empty) && first_q) drop_q <= 1'b0;
+      else if (keep && ends) drop_q <= 1'b1;
     end
   end
-  always_ff @(posedge clk_i) if (begin_sample && first_q) ray_dir_q <= dir_q;
+  always_ff @(posedge clk_i) if (asked && first_q) ray_dir_q <= dir_q;
 
-  // ---- density times length, its exponential times the light that is left
-  reg [20:0] transmittance_q, weight_q;
-  reg [10:0] samples_q;
-  reg [27:0] sigma_q;
-  wire [52:0] product;
-  wire [20:0] e;
-  wire attenuate = at_q == 5'd12;
-  sf_mul_28x25 u_mul (
+  // ---- what waits for a weight; what waits for a density
+  wire head_valid, head_first, head_last, length_valid;
+  wire [71:0] head_pos;
+  wire [43:0] head_distance;
+  wire [24:0] length;
+  sf_fifo #(
+      .WIDTH     (118),
+      .LOG2_DEPTH(LOG2_AHEAD)
+  ) u_waiting (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (asked),
+      .data_i ({first_q, last_q, pos_q, distance_q}),
+      .valid_o(head_valid),
+      .pop_i  (goes),
+      .data_o ({head_first, head_last, head_pos, head_distance})
+  );
+  sf_fifo #(
+      .WIDTH     (25),
+      .LOG2_DEPTH(LOG2_AHEAD)
+  ) u_lengths (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (asked),
+      .data_i (delta_q),
+      .valid_o(length_valid),
+      .pop_i  (sigma_valid_i),
+      .data_o (length)
+  );
+  assign read_pos_o = state_q == APPEARANCE ? head_pos : pos_q;
+
+  // ---- exp(-density * length)
+  wire [52:0] depth;
+  wire [20:0] e_now, e;
+  reg [EXP_CYCLES-1:0] coming_q;
+  sf_mul_28x25 u_depth (
       .clk_i    (clk_i),
-      .a_i      (attenuate ? {7'd0, transmittance_q} : sigma_q),
-      .b_i      (attenuate ? {4'd0, e} : delta_q),
-      .of_tau_i (at_q == 5'd0),
-      .product_o(product)
+      .a_i      (sigma_i),
+      .b_i      (length),
+      .of_tau_i (1'b1),
+      .product_o(depth)
   );
   sf_exp_neg u_exp_neg (
       .clk_i(clk_i),
-      .tau_i(product[52:16]),
-      .e_o  (e)
+      .tau_i(depth[52:16]),
+      .e_o  (e_now)
   );
-  reg decoded_q, ends_q;
-  wire [20:0] lost = transmittance_q - product[40:20] - {20'd0, product[19]};
-  wire [20:0] left = transmittance_q - weight_q;
-  wire [10:0] more = samples_q + {10'd0, weight_q > {1'b0, weight_stop_i}};
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) coming_q <= '0;
+    else if (clear_i) coming_q <= '0;
+    else coming_q <= {coming_q[EXP_CYCLES-2:0], sigma_valid_i};
+  end
+  sf_fifo #(
+      .WIDTH     (21),
+      .LOG2_DEPTH(LOG2_AHEAD)
+  ) u_exps (
+      .clk_i  (clk_i),
+      .rst_ni (rst_ni),
+      .clear_i(clear_i),
+      .push_i (coming_q[EXP_CYCLES-1]),
+      .data_i (e_now),
+      .valid_o(e_valid),
+      .pop_i  (goes),
+      .data_o (e)
+  );
+
+  // ---- the light that is left, and what this sample takes of it
+  reg [20:0] transmittance_q, weight_q;
+  reg [10:0] samples_q;
+  reg ended_q;  // the ray, at a sample before this one
+  wire [20:0] full = head_first ? 21'd1 << 20 : transmittance_q;
+  wire [10:0] fewer = head_first ? 11'd0 : samples_q;
+  wire [52:0] product;
+  sf_mul_28x25 u_left (
+      .clk_i    (clk_i),
+      .a_i      ({7'd0, full}),
+      .b_i      ({4'd0, e}),
+      .of_tau_i (1'b0),
+      .product_o(product)
+  );
+  wire [20:0] lost = full - product[40:20] - {20'd0, product[19]};
+  wire [20:0] left = full - weight_q;
+  assign decoded = weight_q > {1'b0, weight_stop_i};
+  wire [10:0] more = fewer + {10'd0, decoded};
+  wire ends = left <= {1'b0, trans_stop_i} || more >= max_samples_i;
+  assign ended = ended_q && !head_first;
   always_ff @(posedge clk_i) begin
-    if (sigma_valid_i) sigma_q <= sigma_i;
-    if (at_q == 5'd15) weight_q <= lost;
-    if (at_q == 5'd16) begin
+    if (at_q == 2'd3) weight_q <= lost;
+    if (keep) begin
       transmittance_q <= left;
       samples_q <= more;
-      decoded_q <= weight_q > {1'b0, weight_stop_i};
-      ends_q <= left <= {1'b0, trans_stop_i} || more >= max_samples_i;
-    end
-    if (begin_sample && first_q) begin
-      transmittance_q <= 21'd1 << 20;
-      samples_q <= 11'd0;
+      ended_q <= ends;
     end
   end
-  assign decoded = decoded_q;
-  assign ends = ends_q;
 
   // ---- to the compositor
+  wire push = keep || keep_empty;
   reg [LOG2_ITEMS:0] items_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
@@ -168,8 +236,8 @@ module sf_light (
       items_q <= '0;
       room_q <= 1'b0;
     end else begin
-      if (keep != take_i) items_q <= keep ? items_q + 1'b1 : items_q - 1'b1;
-      room_q <= items_q < (LOG2_ITEMS + 1)'((1 << LOG2_ITEMS) - 1) && !keep;
+      if (push != take_i) items_q <= push ? items_q + 1'b1 : items_q - 1'b1;
+      room_q <= items_q < (LOG2_ITEMS + 1)'((1 << LOG2_ITEMS) - 1) && !push;
     end
   end
   sf_fifo #(
@@ -179,14 +247,14 @@ module sf_light (
       .clk_i  (clk_i),
       .rst_ni (rst_ni),
       .clear_i(clear_i),
-      .push_i (keep),
-      .data_i ({first_q, last_q || (ends && !empty_q), empty_q, decoded && !empty_q, weight_q, distance_q}),
+      .push_i (push),
+      .data_i (keep_empty ? {3'b111, 1'b0, 21'd0, 44'd0} : {head_first, head_last || ends, 1'b0, decoded, weight_q, head_distance}),
       .valid_o(valid_o),
       .pop_i  (take_i),
       .data_o ({first_o, last_o, empty_o, decoded_o, weight_o, distance_o})
   );
-  assign idle_o = !valid_o && state_q == IDLE && (!held_q || broken_q);
-  wire unused_ok = &{1'b0, product[15:0]};
+  assign idle_o = !valid_o && waiting_q == 3'd0 && (!held_q || broken_q);
+  wire unused_ok = &{1'b0, product[52:41], product[18:0], depth[15:0], head_valid, length_valid};
 endmodule
 
 `default_nettype wire

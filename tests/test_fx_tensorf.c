@@ -407,7 +407,8 @@ TEST(empty_and_opaque)
   scene.tensorf.density_in = (fx_scale){0, 0, (1 << 23) - 1}, scene.tensorf.sigma_out = (fx_scale){65535, 0, 0};
   ck_checked(&scene);
   ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts));
-  ck_assert(pixel.transmittance == 0 && pixel.samples == 1 && counts.field_samples == 1 && counts.rays == 1);
+  ck_assert(pixel.transmittance == 0 && pixel.samples == 1 && counts.rays == 1);
+  ck_assert_uint_eq(counts.field_samples, 1 + FX_AHEAD); /* read before it is known that the first is enough */
   memset(scene.occupancy, 0, 64);
   memset(&counts, 0, sizeof counts);
   ck_ok(fx_render_ray(&scene, &ray, NULL, NULL, &pixel, &counts));

@@ -102,27 +102,35 @@ void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sam
   }
 }
 
-/* Samples of TensoRF's that the core read the density of. */
-static int densities(const fx_scene *scene, const fx_ray *ray)
+/* Samples of TensoRF's up to where the ray ends, and *behind: those behind it whose density is read as well. */
+static int densities(const fx_scene *scene, const fx_ray *ray, int *behind)
 {
   fx_pixel pixel;
   uint32_t pos[3];
   int n = 0;
+  bool ended = false;
+  *behind = 0;
   fx_composite_begin(&pixel);
-  for (int32_t at = fx_march_next(scene, ray, 0, pos, NULL); at >= 0 && n < SF_RAY_SAMPLES_MAX;
+  for (int32_t at = fx_march_next(scene, ray, 0, pos, NULL);
+       at >= 0 && n + *behind < SF_RAY_SAMPLES_MAX && *behind < FX_AHEAD;
        at = fx_march_next(scene, ray, at + 1, pos, NULL)) {
+    if (ended) {
+      ++*behind;
+      continue;
+    }
     pixel.samples += fx_tensorf_weight(scene, &fx_vm_portable, ray, at, pos, &pixel, NULL) > 0;
     n++;
-    if (pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples) break;
+    ended = pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples;
   }
   return n;
 }
 
 sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample)
 {
-  const bool stops =
-      core->transmittance <= (uint32_t)scene->trans_stop || core->samples >= (uint32_t)scene->max_samples;
-  const int n = scene->backbone == FX_INGP ? (int)core->samples : densities(scene, ray);
+  const bool ends = core->transmittance <= (uint32_t)scene->trans_stop || core->samples >= (uint32_t)scene->max_samples;
+  int behind = FX_AHEAD;
+  const int n = scene->backbone == FX_INGP ? (int)core->samples : densities(scene, ray, &behind) + behind;
+  const bool stops = ends && behind == FX_AHEAD; /* a ray of fewer samples ends with its last one */
   sf_ray_samples(scene, ray, sample, n);
   return (sf_ray_request){ray, sample, n, stops, false};
 }

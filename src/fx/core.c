@@ -102,7 +102,7 @@ const char *fx_core_kernels(const fx_core *core)
 int32_t fx_core_march(const fx_core *core, const fx_ray *ray, int32_t n, uint32_t pos[3], fx_counts *counts)
 {
   const int32_t found = core->kernels->march(core->scene, ray, n);
-  if (n < ray->count) counts->march_steps += (uint64_t)(found - n + (found < ray->count));
+  if (counts && n < ray->count) counts->march_steps += (uint64_t)(found - n + (found < ray->count));
   if (found >= ray->count) return -1;
   for (int axis = 0; axis < 3; axis++)
     pos[axis] = (uint32_t)(fx_ray_at(core->scene, ray, found, axis) >> (FX_RAY_FRAC - SF_POS_FRAC));

@@ -59,10 +59,41 @@ static void enqueue(wave *w, size_t ray, const uint32_t pos[3], uint32_t weight)
 {
   const fx_scene *scene = w->core->scene;
   fx_block *b = &w->block;
-  ask(w, FX_READ_APPEARANCE, pos);
   fx_vm_encode(&scene->tensorf, w->core->kernels->vm, pos, w->rays[ray].unit, b->constant[b->n], &w->counts);
   w->sample[b->n++] = (waiting){ray, w->run, weight};
   if (b->n == FX_BLOCK) decode(w);
+}
+
+/* Positions whose densities were read, and whose appearances were not: see cache.h. */
+typedef struct window {
+  uint32_t pos[FX_AHEAD + 1][3];
+  bool decoded[FX_AHEAD + 1];
+  unsigned first, last; /* those between wait */
+} window;
+
+static void read_oldest(wave *w, window *late)
+{
+  const unsigned i = late->first++ % (FX_AHEAD + 1);
+  if (late->decoded[i]) ask(w, FX_READ_APPEARANCE, late->pos[i]);
+}
+
+static void read_density(wave *w, window *late, const uint32_t pos[3])
+{
+  if (late->last - late->first > FX_AHEAD) read_oldest(w, late);
+  const unsigned i = late->last++ % (FX_AHEAD + 1);
+  ask(w, FX_READ_DENSITY, pos);
+  memcpy(late->pos[i], pos, sizeof late->pos[i]);
+  late->decoded[i] = false;
+}
+
+/* Densities that are read before it is known that the ray ends at n. */
+static void read_behind(wave *w, window *late, const fx_ray *ray, int32_t n)
+{
+  uint32_t pos[3];
+  for (int i = 0; i < FX_AHEAD && (n = fx_core_march(w->core, ray, n + 1, pos, NULL)) >= 0; i++) {
+    fx_tensorf_count_density(&w->core->scene->tensorf, &w->counts);
+    read_density(w, late, pos);
+  }
 }
 
 static void march(wave *w, size_t index)
@@ -70,16 +101,22 @@ static void march(wave *w, size_t index)
   const fx_scene *scene = w->core->scene;
   const fx_ray *ray = &w->rays[index];
   fx_pixel *pixel = &w->pixels[index];
+  window late = {.first = 0};
   int32_t decoded = 0;
   uint32_t pos[3];
   fx_composite_begin(pixel);
   for (int32_t n = fx_core_march(w->core, ray, 0, pos, &w->counts); n >= 0;
        n = fx_core_march(w->core, ray, n + 1, pos, &w->counts)) {
-    ask(w, FX_READ_DENSITY, pos);
+    read_density(w, &late, pos);
     const uint32_t weight = fx_tensorf_weight(scene, w->core->kernels->vm, ray, n, pos, pixel, &w->counts);
+    late.decoded[(late.last - 1) % (FX_AHEAD + 1)] = weight > 0;
     if (weight) enqueue(w, index, pos, weight), decoded++;
-    if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) break;
+    if (pixel->transmittance <= (uint32_t)scene->trans_stop || decoded >= scene->max_samples) {
+      read_behind(w, &late, ray, n);
+      break;
+    }
   }
+  while (late.first != late.last) read_oldest(w, &late);
   fx_composite_end(pixel, scene->background);
   w->counts.rays += decoded > 0;
 }

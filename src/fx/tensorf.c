@@ -60,12 +60,16 @@ uint32_t fx_tensorf_activate(const fx_tensorf *field, int64_t sum)
   return (uint32_t)fx_usat(scaled(activated, &field->sigma_out), SF_SIGMA_BITS);
 }
 
+void fx_tensorf_count_density(const fx_tensorf *field, fx_counts *counts)
+{
+  if (!counts) return;
+  counts->field_samples++;
+  count_field(counts, &field->density, 0);
+}
+
 uint32_t fx_vm_sigma(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3], fx_counts *counts)
 {
-  if (counts) {
-    counts->field_samples++;
-    count_field(counts, &field->density, 0);
-  }
+  fx_tensorf_count_density(field, counts);
   return fx_tensorf_activate(field, vm->density(field, pos));
 }
 

@@ -16,6 +16,7 @@ extern const fx_vm fx_vm_portable;
 uint32_t fx_vm_sigma(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3], fx_counts *counts);
 void fx_vm_encode(const fx_tensorf *field, const fx_vm *vm, const uint32_t pos[3], const int16_t unit[3], int16_t *x,
                   fx_counts *counts);
+void fx_tensorf_count_density(const fx_tensorf *field, fx_counts *counts); /* of one position; counts may be NULL */
 /* Sum of the density's products to density: see fx_tensorf. */
 uint32_t fx_tensorf_activate(const fx_tensorf *field, int64_t sum);
 
