@@ -64,7 +64,7 @@ struct bench {
   random_draw draw;
   int stall;
   int32_t background[3] = {};
-  std::deque<fx_pixel> expected; /* pixels that have not come yet */
+  std::deque<fx_pixel> expected;                                    /* pixels that have not come yet */
   uint64_t pixels = 0, stops = 0, stops_expected = 0, taken_at = 0; /* taken_at: cycle of the last sample */
   fx_pixel now = {};
   bool open = false;

@@ -7,9 +7,9 @@
  *              (its place in the table of all levels) / FX_LINE_ENTRIES.
  *   TensoRF    pair by pair: points (u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1) of the plane, then both of the line.
  *              A line holds components of one point: a point of n has ceil(n / FX_LINE), one look-up each. A point that
- *              has no weight (the position is on its neighbour) is not asked for. Before the appearance of a sample come
- *              the densities of the FX_AHEAD samples of its ray behind it, or as many as there are: also of those behind
- *              the sample where the ray ends. So a weight has time to follow from its density. */
+ *              has no weight (the position is on its neighbour) is not asked for. Before the appearance of a sample
+ * come the densities of the FX_AHEAD samples of its ray behind it, or as many as there are: also of those behind the
+ * sample where the ray ends. So a weight has time to follow from its density. */
 #ifndef SF_FX_CACHE_H
 #define SF_FX_CACHE_H
 #include "fx/fx.h"
