@@ -1,0 +1,28 @@
+#!/bin/bash
+# tools/netlist_check.py on one module, in ECP5 cells and in standard cells: the kit's vectors with 0 differences, planted errors
+# found and located; a netlist that differs; kept runs; a memory and two products in the models of our own; errors.   usage: netlist.sh BUILD
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+for tool in python3 yosys iverilog; do
+  command -v $tool >/dev/null || { echo "skipped: $tool is not installed (make deps)"; exit 77; }
+done
+build=$(cd "${1:?usage: netlist.sh BUILD}" && pwd)
+work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-netlist-XXXXXX")
+trap 'rm -rf "$work"' EXIT
+fail() { echo "netlist: $1" >&2; tail -n 3 "$work"/said.log "$work"/table.md 2>/dev/null >&2 || true; exit 1; }
+
+ln -s "$build/bin" "$work/bin"
+check() { python3 tools/netlist_check.py "$work" --debian --simulator icarus --samples 24 --modules sf_plif "$@" >"$work/table.md" 2>"$work/said.log"; }
+expect() { # TEXT EXPRESSION OF r, THE FIRST RESULT
+  python3 -c 'import json, sys; r = next(iter(json.load(open(sys.argv[1])).values())); sys.exit(not eval(sys.argv[2]))' "$work/netlist/netlist.json" "$2" || fail "$1"
+}
+
+# The kit's verdict, and an inverted register found with its sample, layer, step, neuron and signal.
+for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1"; do
+  # shellcheck disable=SC2086
+  check --cells $cells || fail "$cells: the netlist of a neuron unit"
+  expect "$cells: not 24 samples" 'r["passed"] and r["samples"] == 24 and r["said"].startswith("PASS 24 samples")'
+  expect "$cells: no cells" 'r["counts"]["cells"] > 500 and r["counts"]["registers"] >= 200'
+  expect "$cells: planted errors" 'len(r["planted"]) >= 1 and all(e["found"] for e in r["planted"])'
+  expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
+done
