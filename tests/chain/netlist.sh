@@ -26,3 +26,23 @@ for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1";
   expect "$cells: planted errors" 'len(r["planted"]) >= 1 and all(e["found"] for e in r["planted"])'
   expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
 done
+
+# The second time nothing is mapped.
+check --cells ecp5 --plant 0
+grep -q "in ecp5: the netlist is kept" "$work/said.log" || fail "a finished netlist was made again"
+sed -i 's/ LUT4 #/ NOT_A_CELL #/' "$work/netlist/ecp5/sf_plif/netlist.v"
+! check --cells ecp5 --plant 0 || fail "a netlist of an unknown cell passed"
+
+# What is wrong is named.
+refused() { # TEXT OPTIONS...
+  local text=$1
+  shift
+  ! check "$@" || fail "not refused: $*"
+  grep -q "$text" "$work/said.log" || fail "'$text' is not said of $*"
+  [ "$(wc -l <"$work/said.log")" -le 3 ] || fail "more than a line about $*"
+}
+head -c 300 tests/asic/tiny.lib >"$work/cut.lib"
+refused "cut.lib" --cells liberty --liberty "$work/cut.lib"
+refused "nowhere.lib" --cells liberty --liberty "$work/nowhere.lib"
+refused "no_such" --cells ecp5 --modules no_such
+echo "netlist: ok"
