@@ -178,9 +178,12 @@ asic-energy: $(RTL_READY) $B/bin/sf_cosim $B/asic/lookups ## what a MAC, a SOP a
 asic: $(RTL_READY) ## netlist of standard cells: area, longest path of each module, hand-over (LIBERTY=, MODULES=, MHZ=): build/asic
 	@python3 tools/asic_netlist.py $B --rtl $(RTL_ROOT) $(if $(LIBERTY),--liberty "$(LIBERTY)") $(if $(NAME),--name "$(NAME)") \
 	  $(if $(MODULES),--modules "$(MODULES)") $(if $(MHZ),--clock $(MHZ)) $(ASIC)
+netlist-check: $B/bin/sf_export $B/bin/sf_train $B/bin/sf_scene $B/bin/sf_cosim $(RTL_READY) ## the vector kit through a mapped netlist, and planted errors (CELLS="ecp5 liberty", MODULES=, LIBERTY=): build/netlist
+	@python3 tools/netlist_check.py $B --rtl $(RTL_ROOT) --debian --modules "$(or $(MODULES),sf_plif)" $(if $(CELLS),--cells "$(CELLS)") \
+	  $(if $(LIBERTY),--liberty "$(LIBERTY)") $(NETLIST)
 deps-asic: ## install with apt what asic and asic-energy take by default (opensta, qflow-tech-osu018)
 	@DEPS="python3 yosys iverilog opensta qflow-tech-osu018" tools/deps.sh
-.PHONY: asic-energy asic deps-asic
+.PHONY: asic-energy asic netlist-check deps-asic
 
 # Programs of rays around a block with fewer lanes and another cache than the package's: $B/lanes/N/sim_render and sf_soc.
 CACHE_32 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1

@@ -29,14 +29,14 @@ def parse_arguments():
         "membranes, rows and counters with the fixed-point core. Then plants errors in the netlist, which must be found.\n"
         "Writes BUILD/netlist/netlist.json, netlist.md and a folder per netlist. A finished mapping is kept.",
         epilog=f"""examples:
-  make netlist-check                                        a small block in ECP5 cells and in Debian's osu018
+  make netlist-check                                        a neuron unit in ECP5 cells and in Debian's osu018
   make netlist-check CELLS=ecp5 MODULES="sf_plif sf_readout"       some modules, the rest of the block as RTL
   make netlist-check LIBERTY=../shared/data/liberty/sky130hd_tt.lib.gz CELLS=liberty
   tools/netlist_check.py build --cells ecp5 --scene scene.snn --data data --modules "sf_top:TAP=0" --json""")
     parser.add_argument("build", help="build folder")
     parser.add_argument("--cells", default="ecp5 liberty", metavar="\"ecp5 liberty\"", help="what to map to (default both)")
     parser.add_argument("--modules", default=SMALL, metavar="\"NAME[:PARAMETER=N,...] ...\"",
-                        help=f"netlists of these; around one that is not {TOP} stands the block as RTL (default {SMALL})")
+                        help=f"netlists of these; around one that is not {TOP} stands the block as RTL (default {SMALL}; make netlist-check: sf_plif)")
     parser.add_argument("--block", default=SMALL.partition(":")[2], metavar="PARAMETER=N,...", help="the block around a module (default that of the small one)")
     parser.add_argument("--liberty", default=defaults.LIBERTY, metavar="FILE", help=f"standard cells: .lib or .lib.gz (default {defaults.LIBERTY})")
     parser.add_argument("--models", metavar="FILE", help="Verilog models of the standard cells (default: the functions in the liberty file)")
