@@ -38,10 +38,10 @@ static sf_status measure_blocks(budget *b)
   return sf_ok();
 }
 
-static bool tick(void *user, int row)
+static bool tick(void *user, int done, int rows)
 {
   budget *b = user;
-  sf_progress_show(&b->progress, "picture %d of %d", row + 1, SF_EXACT_ROWS);
+  sf_progress_show(&b->progress, "picture %d of %d", done + 1, rows);
   return !sf_cli_interrupted();
 }
 
@@ -52,7 +52,6 @@ static sf_status load_picture(budget *b)
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .limit = o->view + 1};
   SF_TRY(sf_model_load(&b->model, o->model));
   SF_TRY(fx_scene_load(&b->scene, o->scene));
-  SF_TRY(fx_scene_need_grid(&b->scene, o->scene, "error budget of a picture"));
   SF_TRY(sf_fx_dataset_load(&b->data, &b->scene, o->scene, o->data, o->split, &how));
   sf_dataset_warn(stderr, "error_budget", &b->data, NULL);
   if (o->view >= b->data.count)
