@@ -14,7 +14,23 @@ typedef enum {
   SF_BUDGET_GRID,
   SF_BUDGET_FEATURE,
   SF_BUDGET_DIRECTION,
+  SF_BUDGET_PLACE,
+  SF_BUDGET_PLANE,
+  SF_BUDGET_LINE,
+  SF_BUDGET_SUM,
+  SF_BUDGET_ACTIVATION_ARGUMENT,
+  SF_BUDGET_SOFTPLUS,
+  SF_BUDGET_RELU,
+  SF_BUDGET_ACTIVATED,
+  SF_BUDGET_PRODUCT,
+  SF_BUDGET_BASIS,
+  SF_BUDGET_APPEARANCE,
+  SF_BUDGET_SINE,
+  SF_BUDGET_FEATURE_WAVES,
+  SF_BUDGET_AXES,
+  SF_BUDGET_DIRECTION_WAVES,
   SF_BUDGET_CURRENT,
+  SF_BUDGET_DECODER_CURRENT,
   SF_BUDGET_H,
   SF_BUDGET_CHARGE,
   SF_BUDGET_MEMBRANE,
@@ -27,6 +43,8 @@ typedef enum {
   SF_BUDGET_INTEGRATORS,
   SF_BUDGET_EXP_NEG,
   SF_BUDGET_ALPHA,
+  SF_BUDGET_WEIGHT,
+  SF_BUDGET_UNDECODED,
   SF_BUDGET_TRANSMITTANCE,
   SF_BUDGET_PIXEL,
   SF_BUDGET_BLOCKS
@@ -40,10 +58,15 @@ typedef struct sf_budget_row {
   bool exhaustive;   /* over every input that can make a difference */
   double bound, measured, ratio;
   uint64_t inputs;
+  double plant;
 } sf_budget_row;
 
+/* Has a field (fx_backbone) the block? */
+bool sf_budget_has(int32_t backbone, sf_budget_id id);
 /* Measures one block: exhaustively, or over `samples` random and adversarial inputs. Deterministic. */
 sf_budget_row sf_budget_measure(sf_budget_id id, uint64_t samples);
+/* The same with a fault: `plant` units more in everything that the fixed block yields. */
+sf_budget_row sf_budget_measure_planted(sf_budget_id id, uint64_t samples, double plant);
 void sf_budget_print(FILE *out, const sf_budget_row *row, int rows);
 cJSON *sf_budget_json(const sf_budget_row *row, int rows);
 
