@@ -203,4 +203,4 @@ LOOP_TEST(currents_within_their_bounds, CASES)
   }
 }
 
-int ck_timeout = 120;
+int ck_timeout = 300; /* a picture of 150 inputs takes seconds, and more under a sanitizer */
