@@ -42,7 +42,7 @@ grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza:
 
 # TensoRF: field and compositing in the core, its decoder in the RTL; what needs a hash grid says so.
 check_tensorf() {
-  local dir=$work/vm refused
+  local dir=$work/vm
   "$bin/sf_scene" textured -o "$dir" --size 40 --train 10 --test 2 >/dev/null
   "$bin/sf_train" "$dir" -o "$dir/m.safetensors" --backbone tensorf --stage1 20 --stage2 60 --samples 2048 --rays 256 \
     --voxels 20 --steps 3 --occ-res 32 --quiet
