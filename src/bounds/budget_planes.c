@@ -30,6 +30,7 @@ static void fill(int8_t *to, int width, int height, int components, int kind, ui
 void budget_make_planes(small_planes *s, int components, int kind)
 {
   fx_tensorf *f = &s->field;
+  memset(s, 0, sizeof *s);
   *f = (fx_tensorf){.res = {40, 19, 1},
                     .features = SMALL_FEATURES,
                     .feature_freqs = SMALL_FREQS,

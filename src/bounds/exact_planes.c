@@ -204,29 +204,35 @@ double sf_exact_planes_sigma(const sf_exact *e, const double pos[3])
 
 /* ---- inputs of the decoder ---- */
 
-/* x[2 * freqs * n]: sines of 2^k times value i, then cosines, in LSB; angles in radians, or phases in turns, Q.16. */
-static void waves(const fx_tensorf *field, const double *angle, const double *phase, int n, int freqs, double *x)
+/* x[2 * freqs * n]: sines of 2^k times value i, then cosines, in LSB. Angles in radians. */
+static void real_waves(const fx_tensorf *field, const double *angle, int n, int freqs, double *x)
 {
-  for (int i = 0; i < n * freqs; i++)
-    for (int cosine = 0; cosine < 2; cosine++) {
-      double *to = &x[cosine * n * freqs + i];
-      const int k = i % freqs;
-      if (angle) {
-        const double real = ldexp(angle[i / freqs], k);
-        *to = ldexp(cosine ? cos(real) : sin(real), field->encoding_frac);
-        continue;
-      }
-      const uint32_t turns = ((uint32_t)(int64_t)phase[i / freqs] << k) + (cosine ? 1u << (FX_PHASE_BITS - 2) : 0);
-      const double rounded = sf_exact_round(ldexp(fx_sine(turns), field->encoding_frac - FX_UNIT_FRAC));
-      *to = sf_exact_clamp(rounded, -FX_INPUT_MAX, FX_INPUT_MAX);
-    }
+  for (int i = 0; i < n * freqs; i++) {
+    const double at = ldexp(angle[i / freqs], i % freqs);
+    x[i] = ldexp(sin(at), field->encoding_frac), x[n * freqs + i] = ldexp(cos(at), field->encoding_frac);
+  }
+}
+
+static double encoded(const fx_tensorf *field, uint32_t phase)
+{
+  const double rounded = sf_exact_round(ldexp(fx_sine(phase), field->encoding_frac - FX_UNIT_FRAC));
+  return sf_exact_clamp(rounded, -FX_INPUT_MAX, FX_INPUT_MAX);
+}
+
+/* The core's, of rounded phases in turns, Q.16. */
+static void fixed_waves(const fx_tensorf *field, const double *phase, int n, int freqs, double *x)
+{
+  for (int i = 0; i < n * freqs; i++) {
+    const uint32_t at = (uint32_t)(int64_t)phase[i / freqs] << i % freqs;
+    x[i] = encoded(field, at), x[n * freqs + i] = encoded(field, at + (1u << (FX_PHASE_BITS - 2)));
+  }
 }
 
 int sf_exact_planes_direction(const sf_exact *e, const double unit[3], double *direction)
 {
   const fx_tensorf *field = &e->scene->tensorf;
   for (int axis = 0; axis < 3; axis++) direction[axis] = ldexp(unit[axis], field->encoding_frac);
-  waves(field, unit, NULL, 3, field->view_freqs, direction + 3);
+  real_waves(field, unit, 3, field->view_freqs, direction + 3);
   return 3 + 6 * field->view_freqs;
 }
 
@@ -260,6 +266,9 @@ void sf_exact_planes_inputs(const sf_exact *e, const double pos[3], const double
     phase[f] = sf_exact_round(ldexp(sum[f] * field->phase_in.mul, -field->phase_in.shift));
   }
   for (int i = 0; i < 3; i++) x[n + i] = direction[i];
-  waves(field, sf_exact_is(e, SF_EXACT_WAVES) ? angle : NULL, phase, n, freqs, x + n + 3);
+  if (sf_exact_is(e, SF_EXACT_WAVES))
+    real_waves(field, angle, n, freqs, x + n + 3);
+  else
+    fixed_waves(field, phase, n, freqs, x + n + 3);
   for (int i = 0; i < 6 * field->view_freqs; i++) x[n + 3 + 2 * n * freqs + i] = direction[3 + i];
 }
