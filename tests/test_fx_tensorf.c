@@ -514,42 +514,6 @@ TEST(the_library_renders_it)
 
 /* ---- against the float model ---- */
 
-/* Smooth blobs: what training makes is smooth, too. */
-static void smooth(sf_model *m)
-{
-  for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) {
-    const sf_param *p = &m->param[id];
-    const int at = id - SF_P_DENSITY_PLANE, n = (int)p->shape[p->dims - 1], width = (int)p->shape[p->dims - 2],
-              height = p->dims == 3 ? (int)p->shape[0] : 1;
-    float *value = sf_model_param(m, id);
-    for (int c = 0; c < n; c++) {
-      const float u = 3 * test_random((uint64_t)(at * 997 + c)), v = 3 * test_random((uint64_t)(at * 991 + c + 500)),
-                  phase = 3 * test_random((uint64_t)(at * 983 + c + 900)), size = id < SF_P_APP_PLANE ? 1.6f : 1;
-      for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++)
-          value[(y * width + x) * n + c] =
-              size * cosf(u * (float)x / (float)width * 3 + v * (float)y / (float)height * 3 + phase);
-    }
-  }
-}
-
-static sf_model smooth_model(int ndc)
-{
-  sf_model m = test_tensorf(SF_NET_SNN, ndc, 64, 4);
-  sf_config c = m.config;
-  for (int i = 0; i < 3; i++) c.tensorf.resolution[i] = 24 + 4 * i;
-  c.tensorf.shift = ndc ? 0 : -3;
-  c.tensorf.distance_scale = ndc ? 1 : 6;
-  sf_model larger;
-  ck_ok(sf_model_create(&larger, &c));
-  for (int id = SF_P_BASIS; id < SF_P_COUNT; id++)
-    memcpy(sf_model_param(&larger, id), sf_model_param(&m, id), larger.param[id].size * sizeof(float));
-  smooth(&larger);
-  larger.t_r = 3;
-  sf_model_free(&m);
-  return larger;
-}
-
 enum { SIDE = 24, PIXELS = SIDE * SIDE };
 
 static void pixel_ray(int pixel, int ndc, float origin[3], float direction[3])
@@ -570,7 +534,7 @@ static double picture_psnr(int ndc)
 {
   static float origin[PIXELS][3], direction[PIXELS][3], rgb[PIXELS][3], decoded[PIXELS];
   const float white[3] = {1, 1, 1};
-  sf_model m = smooth_model(ndc);
+  sf_model m = test_smooth_tensorf(ndc);
   fx_scene scene;
   sf_quant_report report;
   const sf_quant_options options = {.background = {1, 1, 1}, .seed = 1};
@@ -618,7 +582,7 @@ LOOP_TEST(pictures_are_those_of_the_float_model, 2)
 
 TEST(what_cannot_be_represented_is_refused)
 {
-  OWNED(sf_model) m = smooth_model(0);
+  OWNED(sf_model) m = test_smooth_tensorf(0);
   fx_scene scene;
   sf_quant_options options = {.seed = 1};
   sf_model_param(&m, SF_P_APP_LINE + 1)[5] = NAN;

@@ -5,9 +5,10 @@
 #include "bounds/bounds.h"
 #include <math.h>
 
+/* A bound of 0 allows no error. */
 static inline void budget_add(sf_budget_row *row, double error, double bound)
 {
-  const double size = fabs(error), ratio = size == 0 ? 0 : size / bound;
+  const double size = fabs(error + row->plant), ratio = size == 0 ? 0 : size / bound;
   if (row->inputs == 0 || size > row->measured) row->measured = size, row->bound = bound;
   row->ratio = fmax(row->ratio, ratio);
   row->inputs++;
@@ -36,6 +37,24 @@ void sf_budget_integrate_density(sf_budget_row *row, uint64_t samples);
 void sf_budget_integrate_colour(sf_budget_row *row, uint64_t samples);
 void sf_budget_membranes(sf_budget_row *row, uint64_t samples);
 void sf_budget_integrators(sf_budget_row *row, uint64_t samples);
+void sf_budget_decoder_currents(sf_budget_row *row, uint64_t samples);
+void sf_budget_place(sf_budget_row *row, uint64_t samples);
+void sf_budget_plane(sf_budget_row *row, uint64_t samples);
+void sf_budget_line(sf_budget_row *row, uint64_t samples);
+void sf_budget_product(sf_budget_row *row, uint64_t samples);
+void sf_budget_density_sum(sf_budget_row *row, uint64_t samples);
+void sf_budget_activation_argument(sf_budget_row *row, uint64_t samples);
+void sf_budget_softplus(sf_budget_row *row, uint64_t samples);
+void sf_budget_relu(sf_budget_row *row, uint64_t samples);
+void sf_budget_activated(sf_budget_row *row, uint64_t samples);
+void sf_budget_weight(sf_budget_row *row, uint64_t samples);
+void sf_budget_undecoded(sf_budget_row *row, uint64_t samples);
+void sf_budget_basis(sf_budget_row *row, uint64_t samples);
+void sf_budget_appearance(sf_budget_row *row, uint64_t samples);
+void sf_budget_sine(sf_budget_row *row, uint64_t samples);
+void sf_budget_feature_waves(sf_budget_row *row, uint64_t samples);
+void sf_budget_axes(sf_budget_row *row, uint64_t samples);
+void sf_budget_direction_waves(sf_budget_row *row, uint64_t samples);
 void sf_budget_argument(sf_budget_row *row, uint64_t samples);
 void sf_budget_exp2_low(sf_budget_row *row, uint64_t samples);
 void sf_budget_exp2_high(sf_budget_row *row, uint64_t samples);

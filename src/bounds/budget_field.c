@@ -12,24 +12,38 @@ typedef struct real_ray {
 } real_ray;
 
 /* The lattice in real numbers, clipped to the box behind the near plane. */
-static real_ray clip(const float o[3], const float d[3], double step)
+static real_ray clip(const fx_units *units, double near, const float o[3], const float d[3], double step)
 {
   const double length = sqrt((double)d[0] * d[0] + (double)d[1] * d[1] + (double)d[2] * d[2]);
-  real_ray r = {.step = step, .first = 0.2};
+  real_ray r = {.step = step, .first = near};
   for (int a = 0; a < 3; a++) {
-    r.origin[a] = o[a] * 0.5 + 0.5, r.direction[a] = d[a] / length * 0.5;
+    r.origin[a] = (o[a] * 0.5 + 0.5) * units->stretch[a], r.direction[a] = d[a] / length * 0.5 * units->stretch[a];
     r.first = fmax(r.first, fmin(-r.origin[a] / r.direction[a], (1 - r.origin[a]) / r.direction[a]));
   }
   r.first += step / 2;
   return r;
 }
 
+/* Every other ray is one of TensoRF: in a box of unequal edges, behind any near plane. */
+static fx_scene ray_scene(uint64_t i, double *near)
+{
+  fx_scene scene = {.units.to_box_scale = 0.5, .units.to_box_offset = {0.5, 0.5, 0.5}, .units.dir_scale = 0x1p-10};
+  const bool vm = i >> 1 & 1;
+  scene.backbone = vm ? FX_TENSORF : FX_INGP;
+  for (uint64_t a = 0; a < 3; a++)
+    scene.units.stretch[a] = vm && a != i % 3 ? ldexp((double)budget_pick(8 + a, i, 256, 1024), -8) : 1;
+  *near = vm ? ldexp((double)budget_pick(8, i, 0, 512), -8) : 0.2;
+  scene.units.near = *near, scene.units.far = 1e3;
+  return scene;
+}
+
 /* ideal: against the lattice whose step is not rounded to Q0.24. */
 static void ray(sf_budget_row *row, uint64_t i, bool ideal)
 {
   const int lattice = i % 2 ? 1024 : (int)budget_pick(1, i, 16, 1024);
-  fx_scene scene = {.units.to_box_scale = 0.5, .units.to_box_offset = {0.5, 0.5, 0.5}, .units.dir_scale = 0x1p-10};
   const double step = sqrt(3.0) / lattice; /* box units */
+  double near;
+  fx_scene scene = ray_scene(i, &near);
   scene.step_q24 = (int32_t)nearbyint(ldexp(step, SF_DELTA_FRAC));
   float o[3], d[3];
   for (uint64_t a = 0; a < 3; a++) {
@@ -38,14 +52,15 @@ static void ray(sf_budget_row *row, uint64_t i, bool ideal)
   }
   fx_ray fixed;
   if (sf_fx_ray_make(&scene, o, d, &fixed).code != SF_OK || fixed.count == 0) return;
-  const real_ray real = clip(o, d, 2 * (ideal ? step : ldexp(scene.step_q24, -SF_DELTA_FRAC)));
+  const real_ray real = clip(&scene.units, near, o, d, 2 * (ideal ? step : ldexp(scene.step_q24, -SF_DELTA_FRAC)));
   const double skipped = nearbyint(fixed.first_q16 / 65536.0 - real.first / real.step); /* points cut off in front */
   for (int32_t n = 0; n < fixed.count; n += n < 8 || n >= fixed.count - 8 ? 1 : 7)
     for (int a = 0; a < 3; a++) {
       const int64_t at = (fixed.origin[a] + n * fixed.step[a]) >> 16;
       const double exact = real.origin[a] + real.direction[a] * (real.first + (n + skipped) * real.step);
       const double bound = 1 + (n + 1 + skipped) * 0x1p-17 + 0x1p-10;
-      budget_add(row, (double)at - ldexp(exact, SF_POS_FRAC), ideal ? bound + (n + 1 + skipped) / 2 : bound);
+      const double drift = (n + 1 + skipped) / 2 * scene.units.stretch[a];
+      budget_add(row, (double)at - ldexp(exact, SF_POS_FRAC), ideal ? bound + drift : bound);
     }
 }
 

@@ -1,6 +1,7 @@
 /* Error budget: tables, and from density and colour to pixels. Derivations: docs/fixed-point.md. */
 #include "quant/quant.h"
 #include "bounds/budget_blocks.h"
+#include "src/fx/tensorf.h"
 #include "src/fx/unit.h"
 #include <string.h>
 
@@ -57,7 +58,72 @@ void sf_budget_exp_neg(sf_budget_row *row, uint64_t samples)
     budget_add(row, fx_exp_neg(tau) - FX_TRANS_ONE * exp(-ldexp(tau, -SF_TRANS_FRAC)), EXP_NEG_BOUND);
 }
 
+/* ---- the density of TensoRF ---- */
+
+/* Seen through ReLU and a scale of 1: shifted up, so that a negative argument is seen, too. */
+void sf_budget_activation_argument(sf_budget_row *row, uint64_t samples)
+{
+  const int32_t up = 1 << 22;
+  fx_tensorf field = {.activation = FX_RELU, .sigma_out = {1, FX_ACTIVATION_FRAC - SF_LOG_FRAC, 0}};
+  for (uint64_t i = 0; row->inputs < samples; i++) {
+    const int64_t limit = ((int64_t)1 << budget_pick(62, i, 1, 31)) - 1;
+    const int64_t sum = budget_pick(63, i, -limit, limit) * (i % 2 ? 1 : 127);
+    field.density_in = (fx_scale){(int32_t)budget_pick(64, i, 0, 65535), (int32_t)budget_pick(65, i, 0, 40), up};
+    const double exact = ldexp((double)sum * field.density_in.mul, -field.density_in.shift);
+    if (fabs(exact) < up - 1) budget_add(row, (double)fx_tensorf_activate(&field, sum) - up - exact, 0.5);
+  }
+}
+
+/* Interpolated between values 1/16 apart, convex: the second derivative s (1 - s) is largest at the end nearer to 0.
+ * Table and product are rounded to 2^-24, the result to 2^-20; from 16 on the tail is left out. */
+static double softplus_bound(double x)
+{
+  const double near = floor(fabs(x) * 16) / 16, s = 1 / (1 + exp(-near));
+  const double tail = near < 16 ? 0 : exp(-near);
+  return ldexp(s * (1 - s) / 2048 + tail, FX_ACTIVATION_FRAC) + 1.0 / 16 + 0.5;
+}
+
+void sf_budget_softplus(sf_budget_row *row, uint64_t samples)
+{
+  (void)samples;
+  for (int32_t y = -(17 << SF_LOG_FRAC); y < 17 << SF_LOG_FRAC; y++) {
+    const double x = ldexp(y, -SF_LOG_FRAC), exact = fmax(x, 0) + log1p(exp(-fabs(x)));
+    budget_add(row, fx_softplus(y) - ldexp(exact, FX_ACTIVATION_FRAC), softplus_bound(x));
+  }
+}
+
+void sf_budget_relu(sf_budget_row *row, uint64_t samples)
+{
+  (void)samples;
+  for (int32_t y = -(1 << (FX_ACTIVATION_BITS - 1)); y < 1 << (FX_ACTIVATION_BITS - 1); y++)
+    budget_add(row, fx_relu(y) - ldexp(fmax(y, 0), FX_ACTIVATION_FRAC - SF_LOG_FRAC), 0);
+}
+
+void sf_budget_activated(sf_budget_row *row, uint64_t samples)
+{
+  fx_tensorf field = {.activation = FX_SOFTPLUS, .density_in = {1, 0, 0}};
+  for (uint64_t i = 0; row->inputs < samples; i++) {
+    const int64_t limit = (int64_t)1 << budget_pick(66, i, 10, FX_ACTIVATION_BITS - 1);
+    const int32_t y = (int32_t)budget_pick(67, i, -limit, limit - 1);
+    field.sigma_out = (fx_scale){(int32_t)budget_pick(68, i, 0, 65535), (int32_t)budget_pick(69, i, 0, 40), 0};
+    const double exact = ldexp((double)fx_softplus(y) * field.sigma_out.mul, -field.sigma_out.shift);
+    if (exact < ldexp(1, SF_SIGMA_BITS) - 1) budget_add(row, fx_tensorf_activate(&field, y) - exact, 0.5);
+  }
+}
+
 /* ---- compositing ---- */
+
+void sf_budget_weight(sf_budget_row *row, uint64_t samples)
+{
+  for (uint64_t i = 0; row->inputs < samples; i++) {
+    const uint32_t sigma = (uint32_t)budget_pick(74, i, 0, ((int64_t)1 << budget_pick(75, i, 1, SF_SIGMA_BITS)) - 1);
+    const int32_t delta = (int32_t)budget_pick(76, i, 1, (int64_t)1 << budget_pick(77, i, 1, SF_DELTA_FRAC));
+    fx_pixel pixel = {.transmittance = i % 2 ? FX_TRANS_ONE : (uint32_t)budget_pick(78, i, 0, FX_TRANS_ONE)};
+    const double left = pixel.transmittance, tau = ldexp(sigma, -SF_SIGMA_FRAC) * ldexp(delta, -SF_DELTA_FRAC);
+    budget_add(row, fx_composite_weight(&pixel, sigma, delta, 0) + left * expm1(-tau),
+               ldexp(left, -SF_TRANS_FRAC) * (EXP_NEG_BOUND + 0.5) + 0.5);
+  }
+}
 
 void sf_budget_alpha(sf_budget_row *row, uint64_t samples)
 {

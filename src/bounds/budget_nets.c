@@ -6,23 +6,26 @@
 
 /* ---- nets ---- */
 
+enum { ROWS = (SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES) + 1 /* the bias */ };
+
 typedef struct small_net {
   fx_net net;
-  int8_t w[SF_LAYERS][SF_LANES * SF_LANES];
+  int8_t w[SF_LAYERS][ROWS * SF_LANES];
 } small_net;
 
 /* theta about the size of the currents, so that a part fires; i counts weights at the rails too. */
-static void make_net(small_net *n, uint64_t i)
+static void make_net(small_net *n, uint64_t i, bool decoder)
 {
-  static const int32_t in[SF_LAYERS] = {32, SF_LANES, 31, SF_LANES, SF_LANES};
-  static const int32_t out[SF_LAYERS] = {SF_LANES, 16, SF_LANES, SF_LANES, 3};
+  const int32_t in[SF_LAYERS] = {32, SF_LANES, decoder ? SF_DIR_MAX : 31, SF_LANES, SF_LANES};
+  const int32_t out[SF_LAYERS] = {SF_LANES, 16, SF_LANES, SF_LANES, 3};
+  const int32_t bias[SF_LAYERS] = {0, 0, (int32_t)budget_pick(29, i, 1, FX_INPUT_MAX), 1, 1};
   static const int32_t theta[SF_LAYERS] = {300000, 0, 200000, 60000, 0};
   const int64_t limit = i % 4 == 3 ? 126 : 1;
   memset(n, 0, sizeof *n);
-  for (int l = 0; l < SF_LAYERS; l++) {
-    n->net.layer[l] =
-        (fx_layer){in[l], out[l], (int32_t)budget_pick(30, i * 8 + (uint64_t)l, 0, FX_LEAK_ONE), theta[l], 0, n->w[l]};
-    for (int r = 0; r < in[l]; r++)
+  for (int l = decoder ? FX_C1 : FX_D1; l < SF_LAYERS; l++) {
+    const int32_t k = (int32_t)budget_pick(30, i * 8 + (uint64_t)l, 0, FX_LEAK_ONE);
+    n->net.layer[l] = (fx_layer){in[l], out[l], k, theta[l], decoder ? bias[l] : 0, n->w[l]};
+    for (int r = 0; r < fx_layer_rows(&n->net.layer[l]); r++)
       for (int o = 0; o < out[l]; o++) {
         const int64_t any = budget_pick(31 + (uint64_t)l, i << 14 | (uint64_t)(r * SF_LANES + o), -127, 127);
         n->w[l][r * SF_LANES + o] = (int8_t)(limit > 1 ? (any < 0 ? -127 : 127) : any);
@@ -33,46 +36,61 @@ static void make_net(small_net *n, uint64_t i)
   n->net.exp_in = n->net.sigmoid_in = (fx_scale){40000, 14, 0};
 }
 
-/* The sums that the layers hand on, against sums in double (exact to 2^53) over the spikes that fell. */
+/* Input i of a layer at step t; the last one is the bias'. */
+static double input_of(const fx_net *net, int l, int t, int i, const int16_t *f, const int16_t *dir,
+                       const fx_trace *trace)
+{
+  const int before = l == FX_D2 ? FX_D1 : l - 1, constants = fx_net_constants(net);
+  if (i == net->layer[l].n_in) return net->layer[l].bias;
+  if (l == FX_D1) return f[i];
+  if (l != FX_C1) return (double)(trace->spikes[before][t][i / 64] >> i % 64 & 1);
+  if (fx_net_decodes(net)) return f[i];
+  return i < constants ? dir[i] : floor(ldexp(trace->current[FX_D2][t][1 + i - constants], -SF_H_SHIFT));
+}
+
+/* The sums that the layers hand on, against sums in double (exact to 2^53) over the spikes that fell. No error is
+ * allowed; beyond the 24 bits of a membrane C1's is at their end. */
 static void check_currents(sf_budget_row *row, const fx_net *net, const int16_t *f, const int16_t *dir,
                            const fx_trace *trace)
 {
   for (int t = 0; t < net->steps; t++)
-    for (int l = 0; l < SF_LAYERS; l++) {
+    for (int l = fx_net_first_layer(net); l < SF_LAYERS; l++) {
       const fx_layer *layer = &net->layer[l];
-      const int before = l == FX_D2 ? FX_D1 : l - 1;
-      for (int o = 0; o < layer->n_out; o++) {
-        double sum = 0;
-        for (int i = 0; i < layer->n_in; i++) {
-          const int h = i - FX_SH;
-          const double x = l == FX_D1   ? f[i]
-                           : l != FX_C1 ? (double)(trace->spikes[before][t][i / 64] >> i % 64 & 1)
-                           : h < 0      ? dir[i]
-                                        : floor(ldexp(trace->current[FX_D2][t][1 + h], -SF_H_SHIFT));
-          sum += x * layer->w[i * SF_LANES + o];
-        }
-        budget_add(row, trace->current[l][t][o] - sum, 0x1p-1022); /* none is allowed: any error is over its bound */
+      double sum[SF_LANES] = {0};
+      for (int i = 0; i < fx_layer_rows(layer); i++) {
+        const double x = input_of(net, l, t, i, f, dir, trace);
+        for (int o = 0; o < layer->n_out; o++) sum[o] += x * layer->w[i * SF_LANES + o];
       }
+      for (int o = 0; o < layer->n_out; o++)
+        budget_add(row, trace->current[l][t][o] - fmin(fmax(sum[o], -FX_MEMBRANE_MAX - 1), FX_MEMBRANE_MAX), 0);
     }
 }
 
-void sf_budget_currents(sf_budget_row *row, uint64_t samples)
+static void currents(sf_budget_row *row, uint64_t samples, bool decoder)
 {
   small_net n;
   fx_trace trace;
   for (uint64_t i = 0; row->inputs < samples; i++) {
-    int16_t f[SF_FEATURE_MAX], dir[FX_SH];
+    int16_t f[SF_DIR_MAX], dir[FX_SH];
     int32_t base[SF_LANES];
     fx_out out;
-    make_net(&n, i);
-    for (uint64_t j = 0; j < SF_FEATURE_MAX; j++)
-      f[j] = (int16_t)(i % 5 ? budget_pick(40, i << 6 | j, -FX_INPUT_MAX, FX_INPUT_MAX) : FX_INPUT_MAX);
+    make_net(&n, i, decoder);
+    for (uint64_t j = 0; j < (decoder ? SF_DIR_MAX : SF_FEATURE_MAX); j++)
+      f[j] = (int16_t)(i % 5 ? budget_pick(40, i << (decoder ? 8 : 6) | j, -FX_INPUT_MAX, FX_INPUT_MAX) : FX_INPUT_MAX);
     for (uint64_t j = 0; j < FX_SH; j++) dir[j] = (int16_t)budget_pick(41, i << 6 | j, -FX_INPUT_MAX, FX_INPUT_MAX);
-    fx_net_direction(&n.net, dir, base, NULL);
-    fx_net_sample(&n.net, f, base, &out, &trace, NULL);
+    fx_net_next(&n.net, dir, true, f, base, &out, &trace, NULL);
     check_currents(row, &n.net, f, dir, &trace);
   }
-  row->bound = 0;
+}
+
+void sf_budget_currents(sf_budget_row *row, uint64_t samples)
+{
+  currents(row, samples, false);
+}
+
+void sf_budget_decoder_currents(sf_budget_row *row, uint64_t samples)
+{
+  currents(row, samples, true);
 }
 
 /* Every current of D2 (all spikes but one of weight 127 and one of the rest), seen through C1 with a weight of 1. */
@@ -84,7 +102,7 @@ void sf_budget_h_floor(sf_budget_row *row, uint64_t samples)
   const int16_t f[SF_FEATURE_MAX] = {1}, dir[FX_SH] = {0};
   int32_t base[SF_LANES];
   fx_out out;
-  make_net(&n, 0);
+  make_net(&n, 0, false);
   memset(n.w, 0, sizeof n.w);
   n.net.steps = 1, n.net.mode = FX_HYBRID;
   n.net.layer[FX_D1].theta = 1;

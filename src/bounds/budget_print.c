@@ -50,16 +50,34 @@ static double percent(uint64_t part, uint64_t whole)
   return whole ? 100 * (double)part / (double)whole : 0;
 }
 
-static const int spiking[] = {0, 2, 3}; /* D1, C1, C2 */
-
 static void print_currents(FILE *out, const sf_current_row *row)
 {
   fprintf(out, "Currents, with weights and inputs rounded: errors in LSB\n\n%-6s %8s %9s %6s %8s %8s %12s\n", "layer",
           "error", "bound", "share", "nearest", "RMS", "currents");
-  for (int l = 0; l < SF_LAYERS; l++)
+  for (int l = 0; l < SF_LAYERS; l++) {
+    if (!row[l].currents) continue;
     fprintf(out, "%-6s %8.4g %9.4g %4.0f %% %6.0f %% %8.3g %12" PRIu64 "\n", fx_layer_name(l), row[l].measured,
             row[l].bound, 100 * share(row[l].measured, row[l].bound), 100 * row[l].ratio, row[l].rms, row[l].currents);
+  }
   print_note(out);
+}
+
+/* A layer of the net, or one that it does not have. */
+static bool decides(const sf_picture_budget *b, int spiking)
+{
+  return b->row[0].decisions[fx_spiking_layers[spiking]] > 0;
+}
+
+static void print_row(FILE *out, const sf_picture_budget *b, const sf_exact_row *r)
+{
+  char fixed[24] = "equal";
+  if (!isinf(r->psnr)) snprintf(fixed, sizeof fixed, "%.2f", r->psnr);
+  fprintf(out, "%-36s %8s %8.3f %+7.3f", r->block, fixed, r->psnr_truth, r->psnr_truth - b->row[0].psnr_truth);
+  for (int s = 0; s < FX_SPIKING; s++) {
+    const int l = fx_spiking_layers[s];
+    if (decides(b, s)) fprintf(out, " %7.3f %%", percent(r->flips[l], r->decisions[l]));
+  }
+  fprintf(out, " %7.3f %%\n", percent(r->sample_flips, r->points));
 }
 
 void sf_picture_budget_print(FILE *out, const sf_picture_budget *b)
@@ -67,16 +85,14 @@ void sf_picture_budget_print(FILE *out, const sf_picture_budget *b)
   print_currents(out, b->current);
   fprintf(out,
           "\nOne block at a time in double precision: dB to the fixed core's picture, dB to the photograph, gain in\n"
-          "dB, spikes that differ in each layer\n\n%-40s %8s %8s %7s %9s %9s %9s\n",
-          "block", "fixed", "photo", "gain", "D1", "C1", "C2");
-  for (int i = 0; i < SF_EXACT_ROWS; i++) {
-    const sf_exact_row *r = &b->row[i];
-    char fixed[24] = "equal";
-    if (!isinf(r->psnr)) snprintf(fixed, sizeof fixed, "%.2f", r->psnr);
-    fprintf(out, "%-40s %8s %8.3f %+7.3f", r->block, fixed, r->psnr_truth, r->psnr_truth - b->row[0].psnr_truth);
-    for (int s = 0; s < 3; s++) fprintf(out, " %7.3f %%", percent(r->flips[spiking[s]], r->decisions[spiking[s]]));
-    fprintf(out, "\n");
-  }
+          "dB, spikes that differ in each layer, samples that the net sees here or in the core alone\n\n"
+          "%-36s %8s %8s %7s",
+          "block", "fixed", "photo", "gain");
+  for (int s = 0; s < FX_SPIKING; s++)
+    if (decides(b, s)) fprintf(out, " %9s", fx_layer_name(fx_spiking_layers[s]));
+  fprintf(out, " %9s\n", "samples");
+  for (int i = 0; i < SF_EXACT_ROWS; i++)
+    if (b->row[i].block) print_row(out, b, &b->row[i]);
 }
 
 static void add_finite(cJSON *object, const char *key, double value)
@@ -87,32 +103,41 @@ static void add_finite(cJSON *object, const char *key, double value)
     cJSON_AddNullToObject(object, key);
 }
 
+static void add_currents(cJSON *currents, const sf_current_row *row)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    if (!row[l].currents) continue;
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "layer", fx_layer_name(l));
+    cJSON_AddNumberToObject(item, "bound", row[l].bound);
+    cJSON_AddNumberToObject(item, "measured", row[l].measured);
+    cJSON_AddNumberToObject(item, "of_its_bound", share(row[l].measured, row[l].bound));
+    cJSON_AddNumberToObject(item, "nearest", row[l].ratio);
+    cJSON_AddNumberToObject(item, "rms", row[l].rms);
+    cJSON_AddItemToArray(currents, item);
+  }
+}
+
 cJSON *sf_picture_budget_json(const sf_picture_budget *b)
 {
   cJSON *json = cJSON_CreateObject();
   sf_json_add_u64(json, "rays", b->rays);
   sf_json_add_u64(json, "samples", b->samples);
-  cJSON *currents = cJSON_AddArrayToObject(json, "currents"), *rows = cJSON_AddArrayToObject(json, "blocks");
-  for (int l = 0; l < SF_LAYERS; l++) {
-    cJSON *item = cJSON_CreateObject();
-    cJSON_AddStringToObject(item, "layer", fx_layer_name(l));
-    cJSON_AddNumberToObject(item, "bound", b->current[l].bound);
-    cJSON_AddNumberToObject(item, "measured", b->current[l].measured);
-    cJSON_AddNumberToObject(item, "of_its_bound", share(b->current[l].measured, b->current[l].bound));
-    cJSON_AddNumberToObject(item, "nearest", b->current[l].ratio);
-    cJSON_AddNumberToObject(item, "rms", b->current[l].rms);
-    cJSON_AddItemToArray(currents, item);
-  }
+  add_currents(cJSON_AddArrayToObject(json, "currents"), b->current);
+  cJSON *rows = cJSON_AddArrayToObject(json, "blocks");
   for (int i = 0; i < SF_EXACT_ROWS; i++) {
     const sf_exact_row *r = &b->row[i];
+    if (!r->block) continue;
     cJSON *item = cJSON_CreateObject();
     cJSON_AddStringToObject(item, "block", r->block);
     add_finite(item, "psnr", r->psnr);
     add_finite(item, "psnr_photograph", r->psnr_truth);
-    for (int s = 0; s < 3; s++) {
+    for (int s = 0; s < FX_SPIKING; s++) {
       const char *const key[] = {"flips_D1", "flips_C1", "flips_C2"};
-      cJSON_AddNumberToObject(item, key[s], percent(r->flips[spiking[s]], r->decisions[spiking[s]]) / 100);
+      const int l = fx_spiking_layers[s];
+      if (decides(b, s)) cJSON_AddNumberToObject(item, key[s], percent(r->flips[l], r->decisions[l]) / 100);
     }
+    cJSON_AddNumberToObject(item, "flips_samples", percent(r->sample_flips, r->points) / 100);
     cJSON_AddItemToArray(rows, item);
   }
   return json;

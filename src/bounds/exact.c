@@ -1,37 +1,34 @@
+/* The nets, compositing, and one choice of blocks. */
 #include "bounds/exact.h"
+#include "render/composite.h"
 #include "src/fx/unit.h"
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static double round_half_up(double x)
-{
-  return floor(x + 0.5);
-}
-
-static double clamp(double x, double low, double high)
-{
-  return fmin(fmax(x, low), high);
-}
+enum { INPUTS_MAX = SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES, ROWS_MAX = INPUTS_MAX + 1 /* the bias */ };
 
 static int frac_of(int layer)
 {
   return layer == FX_C2 ? SF_AC_FRAC : 0;
 }
 
-/* Value of one LSB of input i of a layer. */
+/* Value of one LSB of input i of a layer; the one behind all others is the bias'. */
 static double input_lsb(const fx_scene *scene, int layer, int i)
 {
+  if (i == scene->net.layer[layer].n_in) return 1.0 / scene->net.layer[layer].bias;
   if (layer == FX_D1) return scene->units.feature_scale[i / FX_GRID_FEATURES];
   if (layer != FX_C1) return 1;
+  if (scene->backbone == FX_TENSORF)
+    return i < scene->tensorf.features ? scene->units.feature_scale[0] : scene->units.dir_scale;
   return i < SF_DIR_FEATURES ? scene->units.dir_scale : ldexp(scene->units.current_scale[FX_D2], SF_H_SHIFT);
 }
 
 /* A weight of the model in the units of the scene's. */
 static double real_weight(const fx_scene *scene, const sf_model *model, int l, int o, int i)
 {
-  static const sf_param_id id[SF_LAYERS] = {SF_P_D1, SF_P_D2, SF_P_C1, SF_P_C2, SF_P_C3};
-  const double w = sf_model_param(model, id[l])[o * scene->net.layer[l].n_in + i];
+  const int n_in = scene->net.layer[l].n_in;
+  const double w =
+      i == n_in ? sf_model_param(model, sf_layer_bias[l])[o] : sf_model_param(model, sf_layer_weights[l])[o * n_in + i];
   return w * input_lsb(scene, l, i) / scene->units.current_scale[l];
 }
 
@@ -39,7 +36,7 @@ static void set_weights(sf_exact *e, int l)
 {
   const fx_layer *layer = &e->scene->net.layer[l];
   const bool real = sf_exact_is(e, (sf_exact_id)(SF_EXACT_D1 + l));
-  for (int i = 0; i < layer->n_in; i++)
+  for (int i = 0; i < fx_layer_rows(layer); i++)
     for (int o = 0; o < layer->n_out; o++)
       e->w[l][i * SF_LANES + o] = real ? real_weight(e->scene, e->model, l, o, i) : layer->w[i * SF_LANES + o];
 }
@@ -48,11 +45,11 @@ bool sf_exact_resembles(const fx_scene *scene, const sf_model *model, int l)
 {
   const fx_layer *layer = &scene->net.layer[l];
   double all = 0, apart = 0, limit = 0;
-  for (int i = 0; i < layer->n_in; i++)
+  for (int i = 0; i < fx_layer_rows(layer); i++)
     for (int o = 0; o < layer->n_out; o++) limit = fmax(limit, abs(layer->w[i * SF_LANES + o]));
-  for (int i = 0; i < layer->n_in; i++)
+  for (int i = 0; i < fx_layer_rows(layer); i++)
     for (int o = 0; o < layer->n_out; o++) {
-      const double w = clamp(real_weight(scene, model, l, o, i), -limit, limit);
+      const double w = sf_exact_clamp(real_weight(scene, model, l, o, i), -limit, limit);
       all += w * w, apart += pow(w - layer->w[i * SF_LANES + o], 2);
     }
   return apart <= all / 4;
@@ -65,6 +62,7 @@ static void set_scalars(sf_exact *e)
   const double theta[SF_LAYERS] = {config->theta[0], 0, config->theta[1], config->theta[2], 0};
   for (int l = 0; l < SF_LAYERS; l++) {
     const bool real = sf_exact_is(e, SF_EXACT_LEAK);
+    if (e->scene->net.layer[l].n_out == 0) continue;
     e->k[l] = real ? ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC) : e->scene->net.layer[l].k;
     e->theta[l] =
         real ? ldexp(theta[l] / e->scene->units.current_scale[l], frac_of(l)) : (double)e->scene->net.layer[l].theta;
@@ -79,6 +77,8 @@ static double of_box(const sf_exact *e, double length)
 
 double sf_exact_length(const sf_exact *e, int32_t n)
 {
+  if (e->planes)
+    return ldexp((double)sf_tensorf_step(&e->model->config.tensorf) * e->scene->units.to_box_scale, SF_DELTA_FRAC);
   if (!e->steps.growing) return ldexp(sqrt(3.0) / (e->model->config.lattice * e->model->config.bound), SF_DELTA_FRAC);
   return of_box(e, e->steps.length[n]);
 }
@@ -93,63 +93,25 @@ sf_status sf_exact_open(sf_exact *e, const fx_scene *scene, const sf_model *mode
 {
   *e = (sf_exact){.scene = scene, .model = model, .mask = mask};
   SF_TRY(sf_steps_make(&e->steps, &model->config, 1));
-  double *block = calloc((size_t)SF_LAYERS * SF_LANES * SF_LANES, sizeof *block);
+  double *block = calloc((size_t)SF_LAYERS * ROWS_MAX * SF_LANES, sizeof *block);
   if (!block) return sf_fail(SF_E_MEMORY, "no memory for the weights in double precision");
   for (int l = 0; l < SF_LAYERS; l++) {
-    e->w[l] = block + (size_t)l * SF_LANES * SF_LANES;
+    e->w[l] = block + (size_t)l * ROWS_MAX * SF_LANES;
     set_weights(e, l);
   }
   set_scalars(e);
-  return sf_ok();
+  e->weight_stop = sf_exact_is(e, SF_EXACT_DECODE)      ? 0
+                   : sf_exact_is(e, SF_EXACT_COMPOSITE) ? ldexp((double)sf_opaque, SF_TRANS_FRAC)
+                                                        : scene->tensorf.weight_stop;
+  const sf_status status = scene->backbone == FX_TENSORF ? sf_exact_planes_open(e) : sf_ok();
+  if (status.code != SF_OK) sf_exact_close(e);
+  return status;
 }
 
 void sf_exact_close(sf_exact *e)
 {
   free(e->w[0]);
-}
-
-/* ---- grid ---- */
-
-static void corner_weights(bool exact, const double g[3], double weight[8])
-{
-  for (uint32_t xy = 0; xy < 4; xy++) {
-    const double w = (xy & 1 ? g[0] : 256 - g[0]) * (xy & 2 ? g[1] : 256 - g[1]), upper = w * g[2] / 256;
-    weight[xy + 4] = exact ? upper : round_half_up(upper);
-    weight[xy] = w - weight[xy + 4];
-  }
-}
-
-static double entry_value(const sf_exact *e, int level, int64_t entry, int which)
-{
-  const fx_scene *s = e->scene;
-  const size_t i = (size_t)entry * FX_GRID_FEATURES + (size_t)which;
-  if (!sf_exact_is(e, SF_EXACT_ENTRIES)) return s->grid.table[i];
-  return (double)sf_model_param(e->model, SF_P_GRID)[i] /
-         ldexp(s->units.feature_scale[level], 16 - s->grid.shift[level]);
-}
-
-void sf_exact_features(const sf_exact *e, const double pos[3], double *f)
-{
-  const fx_grid *grid = &e->scene->grid;
-  const bool exact = sf_exact_is(e, SF_EXACT_POSITION);
-  for (int level = 0; level < grid->levels; level++) {
-    uint32_t base[3];
-    double g[3], weight[8], sum[FX_GRID_FEATURES] = {0};
-    for (int a = 0; a < 3; a++) {
-      const double product = ldexp(pos[a] * grid->scale_q16[level], -32); /* 1/256 of a cell */
-      const double p = (exact ? product : round_half_up(product)) + 128;
-      base[a] = (uint32_t)floor(p / 256), g[a] = p - 256.0 * base[a];
-    }
-    corner_weights(exact, g, weight);
-    for (uint32_t corner = 0; corner < 8; corner++) {
-      const int64_t entry = sf_exact_entry(grid, level, base, corner);
-      for (int i = 0; i < FX_GRID_FEATURES; i++) sum[i] += weight[corner] * entry_value(e, level, entry, i);
-    }
-    for (int i = 0; i < FX_GRID_FEATURES; i++) {
-      const double value = ldexp(sum[i], -grid->shift[level]);
-      f[level * FX_GRID_FEATURES + i] = exact ? value : clamp(round_half_up(value), -FX_INPUT_MAX, FX_INPUT_MAX);
-    }
-  }
+  sf_exact_planes_close(e);
 }
 
 /* ---- nets ---- */
@@ -162,17 +124,23 @@ static double charge(const sf_exact *e, double v, double in, double k, int t, bo
   const double product = ldexp(d * k, -SF_LEAK_FRAC);
   /* no-decay subtracts the rounded product of v, which is not the rounded product of -v */
   const double leak = exact                              ? product
-                      : e->scene->net.mode == FX_NODECAY ? -round_half_up(-product)
-                                                         : round_half_up(product);
+                      : e->scene->net.mode == FX_NODECAY ? -sf_exact_round(-product)
+                                                         : sf_exact_round(product);
   return old + leak + (e->scene->net.mode == FX_NODECAY ? in : 0);
+}
+
+static double to_membrane(double x)
+{
+  return sf_exact_clamp(x, -FX_MEMBRANE_MAX - 1, FX_MEMBRANE_MAX);
 }
 
 static void fire(const sf_exact *e, int l, int t, double *v, const double *current, sf_exact_out *out)
 {
   const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE);
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
-    const double u = charge(e, v[o], ldexp(current[o], frac_of(l)), e->k[l], t, exact);
-    const double kept = exact ? u : clamp(u, -FX_MEMBRANE_MAX - 1, FX_MEMBRANE_MAX);
+    const double in = ldexp(current[o], frac_of(l)), held = exact ? in : to_membrane(in);
+    const double u = charge(e, v[o], held, e->k[l], t, exact);
+    const double kept = exact ? u : to_membrane(u);
     const bool spike = kept >= e->theta[l];
     v[o] = kept - (spike ? e->theta[l] : 0);
     out->spikes[l][t][o / 64] |= (uint64_t)spike << o % 64;
@@ -185,9 +153,16 @@ static void add_row(const sf_exact *e, int l, int i, double x, double *current)
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) current[o] += x * w[o];
 }
 
+static void add_bias(const sf_exact *e, int l, double *current)
+{
+  const fx_layer *layer = &e->scene->net.layer[l];
+  if (layer->bias) add_row(e, l, layer->n_in, layer->bias, current);
+}
+
 static void add_spikes(const sf_exact *e, int l, const uint64_t spikes[SF_SPIKE_WORDS], double *current)
 {
   memset(current, 0, SF_LANES * sizeof *current);
+  add_bias(e, l, current);
   for (int i = 0; i < e->scene->net.layer[l].n_in; i++)
     if (spikes[i / 64] >> i % 64 & 1) add_row(e, l, i, 1, current);
 }
@@ -195,7 +170,7 @@ static void add_spikes(const sf_exact *e, int l, const uint64_t spikes[SF_SPIKE_
 static double table_argument(double current, const fx_scale *scale, int bits)
 {
   const double high = ldexp(1, bits - 1);
-  return clamp(round_half_up(ldexp(current * scale->mul, -scale->shift)) + scale->bias, -high, high - 1);
+  return sf_exact_clamp(sf_exact_round(ldexp(current * scale->mul, -scale->shift)) + scale->bias, -high, high - 1);
 }
 
 static double density(const sf_exact *e, double current)
@@ -217,33 +192,41 @@ static double integrate(const sf_exact *e, double acc, double in, int l, int t, 
 {
   const bool exact = sf_exact_is(e, SF_EXACT_INTEGRATOR);
   const double next = charge(e, acc, in, e->k[l], t, exact);
-  return exact ? next : clamp(next, 0, ldexp(1, bits) - 1);
+  return exact ? next : sf_exact_clamp(next, 0, ldexp(1, bits) - 1);
 }
 
-void sf_exact_direction(const sf_exact *e, const double *dir, double *base)
+void sf_exact_direction(const sf_exact *e, const double *x, double *base)
 {
-  const int n_dir = fx_net_constants(&e->scene->net);
+  const int n = fx_net_constants(&e->scene->net);
   memset(base, 0, SF_LANES * sizeof *base);
-  for (int i = 0; i < n_dir; i++) add_row(e, FX_C1, i, dir[i], base);
+  add_bias(e, FX_C1, base);
+  for (int i = 0; i < n; i++) add_row(e, FX_C1, i, x[i], base);
+}
+
+/* D1 and D2 at step t; the inputs h of C1 are added to `current`. */
+static void density_step(const sf_exact *e, int t, double *v, const double *d1, double *current, sf_exact_out *out)
+{
+  const fx_net *net = &e->scene->net;
+  double d2[SF_LANES];
+  fire(e, FX_D1, t, v, d1, out);
+  add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
+  out->sigma = integrate(e, out->sigma, density(e, d2[0]), FX_D2, t, SF_SIGMA_BITS);
+  for (int j = 0; j < fx_net_h(net); j++) {
+    const double h = ldexp(d2[1 + j], -SF_H_SHIFT);
+    const bool real = sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits;
+    add_row(e, FX_C1, fx_net_constants(net) + j, real ? h : floor(h), current);
+  }
 }
 
 void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_exact_out *out)
 {
   const fx_net *net = &e->scene->net;
-  const int n_h = fx_net_h(net), n_dir = fx_net_constants(net);
   double d1[SF_LANES] = {0}, current[SF_LANES], v[3][SF_LANES] = {{0}};
   memset(out, 0, sizeof *out);
   for (int i = 0; i < net->layer[FX_D1].n_in; i++) add_row(e, FX_D1, i, f[i], d1);
   for (int t = 0; t < net->steps; t++) {
-    double d2[SF_LANES];
-    fire(e, FX_D1, t, v[0], d1, out);
-    add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
-    out->sigma = integrate(e, out->sigma, density(e, d2[0]), FX_D2, t, SF_SIGMA_BITS);
     memcpy(current, base, sizeof current);
-    for (int j = 0; j < n_h; j++) {
-      const double h = ldexp(d2[1 + j], -SF_H_SHIFT);
-      add_row(e, FX_C1, n_dir + j, sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits ? h : floor(h), current);
-    }
+    if (!fx_net_decodes(net)) density_step(e, t, v[0], d1, current, out);
     fire(e, FX_C1, t, v[1], current, out);
     add_spikes(e, FX_C2, out->spikes[FX_C1][t], current);
     fire(e, FX_C2, t, v[2], current, out);
@@ -258,5 +241,5 @@ double sf_exact_behind(const sf_exact *e, int32_t n, double transmittance, doubl
   const double length = sf_exact_is(e, SF_EXACT_LATTICE) ? sf_exact_length(e, n) : fx_delta(e->scene, n);
   const double tau = ldexp(sigma * length, SF_TRANS_FRAC - SF_SIGMA_FRAC - SF_DELTA_FRAC); /* LSB of Q.20 */
   if (sf_exact_is(e, SF_EXACT_COMPOSITE)) return transmittance * exp(-ldexp(tau, -SF_TRANS_FRAC));
-  return round_half_up(ldexp(transmittance * fx_exp_neg((uint64_t)round_half_up(tau)), -SF_TRANS_FRAC));
+  return sf_exact_round(ldexp(transmittance * fx_exp_neg((uint64_t)sf_exact_round(tau)), -SF_TRANS_FRAC));
 }

@@ -15,9 +15,6 @@ fail() { echo "every_tool: $1" >&2; failures=$((failures + 1)); }
 refusals='tensorf fit hash grid only
 tensorf-box fit hash grid only
 tensorf-ndc fit hash grid only
-tensorf error_budget hash grid only
-tensorf-box error_budget hash grid only
-tensorf-ndc error_budget hash grid only
 tensorf sf_soc hash grid
 tensorf-box sf_soc hash grid
 tensorf-ndc sf_soc hash grid

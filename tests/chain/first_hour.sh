@@ -111,7 +111,7 @@ for line in open("budget.txt"):
         rows += 1
         assert abs(share - (100 * error / bound if error else 0)) <= 0.6, line
         assert nearest >= share, line
-assert rows == 20, rows
+assert rows == 38, rows
 END
 # ---- --help: groups, lines of a terminal, defaults in columns ----
 
