@@ -61,7 +61,7 @@ static sf_status begin(tracer *t, const sf_picture_job *job, uint64_t i)
   sf_dataset_ray(job->data, job->view, (float)x + 0.5f, (float)y + 0.5f, origin, direction);
   SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, x, y, &t->ray));
   sf_sh4(direction, sh);
-  sf_scales_round_direction(&job->model->scales, sh); /* as a fine-tuned model sees them */
+  sf_scales_round_direction(&job->model->scales, sh, SF_DIR_FEATURES); /* as a fine-tuned model sees them */
   for (int a = 0; a < 3; a++) t->unit[a] = direction[a];
   for (int j = 0; j < SF_DIR_FEATURES; j++) {
     t->dir[j] = sh[j] / job->scene->units.dir_scale;

@@ -75,14 +75,15 @@ static void update_part(sf_trainer *t, const sf_adam *adam, const sf_param *p)
 void sf_vm_update(sf_trainer *t)
 {
   const bool ndc = t->model.config.tensorf.ndc;
-  const double from = t->vm->fresh_at, fade = pow(0.1, (t->progress - from) / fmax(1 - from, 1e-3));
+  const double from = t->vm->fresh_at,
+               fade = (sf_tuning(t) ? sf_tuning_rate : 1) * pow(0.1, (t->progress - from) / fmax(1 - from, 1e-3));
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-8, t->iteration - t->vm->fresh + 1, 0};
   scatter(t);
   for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) {
     const sf_param *p = &t->model.param[id];
     const bool plane = p->dims == 3, density = id < SF_P_APP_PLANE;
     if (ndc && plane) add_variation(p, tv_weight * fade, t->model.value + p->offset, t->grad + p->offset);
-    adam.l1 = !ndc && density ? (float)((t->vm->event ? l1_rest : l1_first) / (double)p->size) : 0;
+    adam.l1 = !ndc && density ? (float)((t->vm->event || sf_tuning(t) ? l1_rest : l1_first) / (double)p->size) : 0;
     update_part(t, &adam, p);
   }
   adam.lr = t->options.lr_net * fade;
