@@ -7,7 +7,7 @@
 #include "train_fixture.h"
 #include <omp.h>
 
-enum { BITS = 4, GRID_BITS = 5, LEAK_BITS = 6, TUNING = 40 };
+enum { BITS = 4, GRID_BITS = 5, LEAK_BITS = 6, TUNING = 80 };
 
 static sf_model base, narrow; /* trained for a moment; scales settled: weights alone, and every width */
 

@@ -65,21 +65,14 @@ static sf_status check_effect(train_arguments *a)
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--backbone",      "--net",
-                                        "--steps",         "--input-mode",
-                                        "--hidden",        "--theta",
-                                        "--occ-res",       "--fixed-steps",
-                                        "--stage1",        "--no-stage1",
-                                        "--no-extra",      "--no-penalty",
-                                        "--no-budget",     "--no-distill",
-                                        "--no-scaling",    "--beta",
-                                        "--price",         "--target-loss",
-                                        "--target-saving", "--objective",
-                                        "--search-rate",   NULL},
-                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
-                           *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
-                                                                                  "--price",       "--objective",
-                                                                                  "--search-rate", NULL};
+  static const char *const
+      settled[] = {"--backbone",    "--net",           "--steps",       "--input-mode",  "--hidden",    "--theta",
+                   "--occ-res",     "--voxels",        "--fixed-steps", "--stage1",      "--no-stage1", "--no-extra",
+                   "--no-penalty",  "--no-budget",     "--no-distill",  "--no-scaling",  "--beta",      "--price",
+                   "--target-loss", "--target-saving", "--objective",   "--search-rate", NULL},
+      *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+      *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving", "--price",
+                                                             "--objective",   "--search-rate",   NULL};
   static const char *const spiking[] = {"--charge", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
