@@ -3,7 +3,9 @@
 #include "base/io.h"
 #include "quant/quant.h"
 #include "render/vm_ray.h"
+#include "snn/plif.h"
 #include "sweep/sweep.h"
+#include "train/vm.h"
 #include "train_fixture.h"
 #include <omp.h>
 
@@ -162,6 +164,35 @@ TEST(export_reproduces_the_rounded_numbers)
     sf_model_param(&m, SF_P_C2_BIAS)[3] += m.scales.lsb.current[3]; /* and what is not so is seen */
     sf_model_param(&m, SF_P_BASIS)[5] *= 1.001f;
     ck_assert_int_ge(wrong_weights(&m, &after), 1);
+  }
+}
+
+/* While it trains: what the kernels read are numbers that the exporter would write. */
+TEST(forward_pass_sees_rounded_numbers)
+{
+  const sf_model *const from[2] = {&base, &narrow};
+  for (int i = 0; i < 2; i++) {
+    const sf_train_options o = tuning_run(from[i]);
+    OWNED(trainer) t = start(&data, &o, NULL);
+    OWNED(fx_scene) scene;
+    steps(t, 8);
+    sf_model seen = sf_tuning_nets(t);
+    const sf_decoder_view *view = &t->vm->decoder->view;
+    ck_assert_ptr_eq(view->basis, sf_model_param(&seen, SF_P_BASIS));
+    ck_assert_ptr_eq(view->b1, sf_model_param(&seen, SF_P_C1_BIAS));
+    ck_assert_ptr_eq(view->net.w5, sf_model_param(&seen, SF_P_C3));
+    ck_assert_ptr_eq(t->vm->density.line[2], sf_model_param(i ? &seen : &t->model, SF_P_DENSITY_LINE + 2));
+    ck_assert_ptr_eq(t->vm->appearance.plane[1], sf_model_param(i ? &seen : &t->model, SF_P_APP_PLANE + 1));
+    if (!i) memcpy(seen.value, t->model.value, seen.param[SF_P_BASIS].offset * sizeof *seen.value);
+    ck_ok(sf_quantise(&scene, &seen, "seen", &(sf_quant_options){0}));
+    ck_assert_int_eq(wrong_weights(&seen, &scene), 0);
+    if (i) ck_assert_int_eq(wrong_entries(&seen, &scene), 0);
+    ck_assert_int_eq(memcmp(view->net.k + 2,
+                            (float[3]){sf_sigmoid(sf_model_param(&seen, SF_P_LEAK)[2]),
+                                       sf_sigmoid(sf_model_param(&seen, SF_P_LEAK)[3]),
+                                       sf_sigmoid(sf_model_param(&seen, SF_P_LEAK)[4])},
+                            3 * sizeof(float)),
+                     0);
   }
 }
 
