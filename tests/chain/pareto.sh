@@ -107,7 +107,7 @@ done
 pareto part 1 --model "$work/nowhere" --data "$work"
 [ "$(count nowhere)" -eq 1 ] || fail "the missing model is not named"
 # A TensoRF model: widths that it has, and words for planes.
-"$programs/sf_train" "$data" -o "$work/planes.safetensors" --backbone tensorf --voxels 20 --rays 128 --samples 512 --stage1 20 --stage2 20 \
+"$programs/sf_train" "$data" -o "$work/planes.safetensors" --backbone tensorf --voxels 20 --rays 128 --samples 512 --stage1 10 --stage2 10 \
   --steps 2 --occ-res 16 --hidden 32 --eval-views 1 --quiet >/dev/null || fail "the TensoRF model was not trained"
 build planes
 echo "TRANS_FRAC=20" >"$work/planes/arch"
@@ -129,7 +129,8 @@ if command -v gnuplot >/dev/null; then
     grep -q '</svg>' "$sweep/plots/$plot.svg" || fail "TensoRF: $plot.svg is not whole"
   done
 fi
-pareto planes 1 --variants none --model "$work/planes.safetensors $data/tiny.safetensors" --data "$data"
+cp "$work/whole/pareto/smoke/points/tiny.json" "$sweep/points/"
+pareto planes 1 --report
 [ "$(count 'fields of different kinds')" -eq 1 ] || fail "a hash grid in a sweep of planes"
 "$programs/sf_point" "$work/planes.safetensors" "$data" --feature-bits 9 >"$work/out" 2>&1 && fail "TensoRF: --feature-bits is taken"
 [ "$(count 'those of a TensoRF scene have 12')" -eq 1 ] || fail "TensoRF: --feature-bits: not said why"
