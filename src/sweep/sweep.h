@@ -53,7 +53,7 @@ typedef struct sf_point {
   char name[128], model[128]; /* "w8-f12-...", file name of the model */
   int backbone;               /* sf_backbone_kind */
   int axis[SF_AXES];          /* 0: the model has none */
-  int steps_max; /* the model's T */
+  int steps_max;              /* the model's T */
   double figure[SF_POINT_FIGURES];
   bool front; /* see sf_sweep_mark */
 } sf_point;
