@@ -55,7 +55,7 @@ static int same_integers(const sf_model *m, const fx_scene *scene, const fx_scen
     for (int in = 0; in < p->shape[1]; in++)
       for (int out = 0; out < p->shape[0]; out++) {
         const int at = in * SF_LANES + out, q = scene->net.layer[l].w[at];
-        const double step = m->scales.lsb.current[l] / sf_scales_input(&m->scales, l, in);
+        const double step = m->scales.lsb.current[l] / sf_scales_input(m, l, in);
         ck_assert_int_le(abs(q), LIMIT);
         ck_assert_float_eq(m->value[p->offset + (size_t)(out * p->shape[1] + in)], (float)(q * step));
         moved += q != other->net.layer[l].w[at];
@@ -139,7 +139,7 @@ TEST(float_nets_compute_what_the_core_does)
       ff[i] = f[i] * s->lsb.feature[i / 2];
     }
     for (int i = 0; i < SF_DIR_FEATURES; i++) sh[i] = sf_random_float(7, 2, (uint64_t)(n * 16 + i)) - 0.5f;
-    sf_scales_round_direction(s, sh);
+    sf_scales_round_direction(s, sh, SF_DIR_FEATURES);
     for (int i = 0; i < SF_DIR_FEATURES; i++) d[i] = (int16_t)lroundf(sh[i] / s->lsb.direction);
     fx_net_direction(&scene.net, d, c1, NULL);
     fx_net_sample(&scene.net, f, c1, &out, fixed, NULL);

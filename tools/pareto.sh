@@ -5,8 +5,8 @@ set -u
 export LC_ALL=C
 usage="usage: pareto.sh BUILD [options]
   --profile NAME    quick (default), full (more pixels, more of the grid), smoke (a tiny model of its own, seconds)
-  --model 'FILE...' trained models; the first is swept, the others (other table sizes: sf_train --log2-hash) are points at
-                    the widest widths. Default: the demo's, made when it is missing
+  --model 'FILE...' trained models; the first is swept, the others (other table sizes: sf_train --log2-hash; of TensoRF
+                    other planes: --voxels) are points at the widest widths. Default: the demo's, made when it is missing
   --data FOLDER     its scene in the Blender layout; default: the demo's
   --view K          held-out view (default 0)
   --every N         every Nth pixel of it along both axes (quick 4, full 2)
@@ -175,6 +175,10 @@ point "$first" ""
 echo "$name" >"$out/centre"
 t_r=$(number "$out/points/$name.json" t)
 steps_max=$(number "$out/points/$name.json" T)
+# Widths that a decoder does not have: its inputs have one, and there is no h.
+if grep -q '"backbone":[[:space:]]*"tensorf"' "$out/points/$name.json"; then
+  features="" variants=${variants/ H_SHIFT=1/}
+fi
 
 plan=()
 add() { plan+=("$*"); } # FILE|VARIANT|OPTIONS

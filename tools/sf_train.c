@@ -207,15 +207,12 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
 /* The model to fine-tune, with the scales that sf_export would choose for it. */
 static sf_status load_start(const train_arguments *a, const sf_dataset *data, sf_model *model)
 {
-  const sf_quant_options how = {.widths.weight_bits = a->weight_bits ? a->weight_bits : SF_WEIGHT_BITS};
+  const sf_quant_options how = {.widths = {.weight_bits = a->weight_bits ? a->weight_bits : SF_WEIGHT_BITS,
+                                           .leak_bits = a->leak_bits ? a->leak_bits : SF_LEAK_FRAC,
+                                           .grid_bits = a->grid_bits ? a->grid_bits : SF_GRID_BITS}};
   sf_quant_report report;
   fx_scene scene;
   SF_TRY(sf_model_load(model, a->fine_tune));
-  if (sf_model_decodes(model)) {
-    sf_model_free(model);
-    return sf_fail(SF_E_UNSUPPORTED, "%s: --fine-tune knows the hash grid's nets only, the model is of tensorf",
-                   a->fine_tune);
-  }
   sf_status status = sf_quantise_report(&scene, model, a->fine_tune, &how, &report);
   if (!status.code) {
     fx_scene_free(&scene);

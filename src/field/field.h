@@ -17,6 +17,7 @@ typedef struct sf_field {
   bool lattice;     /* rays have the configuration's lattice; without: steps of the field's own */
   /* Names of the net's tensors in files, layers D1 D2 C1 C2 C3; NULL: the net behind this field has none. */
   const char *weights[SF_LAYERS], *bias[SF_LAYERS];
+  int scales; /* of the numbers in sf_lsb those that its models settle: so many, from the first on */
   sf_status (*check)(const sf_config *config);
   int (*inputs)(const sf_config *config); /* what a sample brings to the first layer of its net */
   /* Names, shapes and dims of the field's own parameters; levels. */

@@ -49,6 +49,7 @@ static int numbers(sf_config *config, sf_number number[SF_NUMBERS_MAX])
 const sf_field sf_field_grid = {.name = "ingp",
                                 .lattice = true,
                                 .weights = {"density.w1", "density.w2", "colour.w3", "colour.w4", "colour.w5"},
+                                .scales = offsetof(struct sf_lsb, bias) / sizeof(float),
                                 .check = check,
                                 .inputs = inputs,
                                 .lay_out = lay_out,

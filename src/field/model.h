@@ -87,15 +87,26 @@ typedef struct sf_grid_level {
 } sf_grid_level;
 
 /* What the exporter rounds to, once it is settled; fine-tuning learns weights for it. */
+enum { SF_GRID_BITS = 8, SF_PRODUCTS_MAX = 3 * SF_COMPONENTS_MAX };
+/* The basis matrix reads products of a plane's and a line's integers in so much finer steps. */
+enum { SF_PRODUCT_SHIFT = 1 };
 typedef struct sf_scales {
   int32_t weight_bits;            /* weights within +-(2^(weight_bits-1) - 1), 2..SF_WEIGHT_BITS; 0: not settled */
+  int32_t grid_bits;              /* entries of the field alike, 2..SF_GRID_BITS */
+  int32_t leak_bits;              /* fraction bits of k, 4..SF_LEAK_FRAC */
   struct sf_lsb {                 /* values of one LSB, > 0 */
-    float entry[16], feature[16]; /* grid entries and features of a level */
-    float direction;              /* spherical harmonics */
+    float entry[16], feature[16]; /* grid entries and features of a level; TensoRF: feature[0] */
+    float direction;              /* spherical harmonics, or a decoder's directions and encodings */
     float current[SF_LAYERS];     /* currents: weight = integer * current / LSB of its input */
+    /* TensoRF alone: C1's input that is always one; what the basis matrix gives; of the density (0) and the appearance
+     * (1) each component's plane, and its product with the line. */
+    float bias, basis, plane[2][SF_PRODUCTS_MAX], product[2][SF_PRODUCTS_MAX];
   } lsb;
 } sf_scales;
 enum { SF_SCALES = sizeof(struct sf_lsb) / sizeof(float) };
+
+/* Largest logit of a leak in training, ln 999: tau within 1.001 .. 1000. */
+#define SF_LEAK_LIMIT 6.9067548f
 
 typedef struct sf_model {
   sf_config config;

@@ -80,6 +80,7 @@ const sf_field sf_field_planes = {
     .name = "tensorf",
     .weights = {NULL, NULL, "renderModule.mlp.0.weight", "renderModule.mlp.2.weight", "renderModule.mlp.4.weight"},
     .bias = {NULL, NULL, "renderModule.mlp.0.bias", "renderModule.mlp.2.bias", "renderModule.mlp.4.bias"},
+    .scales = SF_SCALES,
     .check = check,
     .inputs = inputs,
     .lay_out = lay_out,

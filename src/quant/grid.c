@@ -116,26 +116,6 @@ static void sample(const sf_model *model, const float x[3], const float directio
   sf_net_sample(model, f, constant, steps, sigma, colour, trace);
 }
 
-/* ---- what fine-tuning keeps to ---- */
-
-static sf_scales scales_of(const fx_scene *scene, int weight_bits)
-{
-  sf_scales s = {.weight_bits = weight_bits, .lsb.direction = (float)scene->units.dir_scale};
-  for (int l = 0; l < FX_LEVELS_MAX; l++) s.lsb.entry[l] = s.lsb.feature[l] = 1;
-  for (int l = 0; l < scene->grid.levels; l++) {
-    s.lsb.feature[l] = (float)scene->units.feature_scale[l];
-    s.lsb.entry[l] = ldexpf(s.lsb.feature[l], 16 - scene->grid.shift[l]);
-  }
-  for (int l = 0; l < SF_LAYERS; l++) s.lsb.current[l] = (float)scene->units.current_scale[l];
-  return s;
-}
-
-static void describe(const fx_scene *scene, const sf_model *model, sf_quant_report *report)
-{
-  report->unused_tuning = sf_settled_scales(model, &report->widths) ? 0 : model->scales.weight_bits;
-  report->scales = scales_of(scene, report->widths.weight_bits);
-}
-
 const sf_field_quantiser sf_grid_quantiser = {.direction_stream = STREAM_DIRECTION,
                                               .tried = DIRECTION_TRIED,
                                               .coarsest = DIRECTION_COARSEST,
@@ -145,5 +125,4 @@ const sf_field_quantiser sf_grid_quantiser = {.direction_stream = STREAM_DIRECTI
                                               .set_scalars = set_scalars,
                                               .draw = draw,
                                               .sample = sample,
-                                              .quantise = sf_quantise_grid,
-                                              .describe = describe};
+                                              .quantise = sf_quantise_grid};

@@ -22,8 +22,8 @@ typedef struct sf_field_quantiser {
   uint64_t direction_stream; /* of sf_random */
   int tried, coarsest; /* LSBs 2^n of directions and encodings: finer ones than `tried` all compete, coarser ones up to
                           `coarsest` while they help */
-  int (*features)(const sf_model *model); /* that a position has */
-  sf_status (*check)(const sf_model *model, const char *name);
+  int (*features)(const sf_model *model);                      /* that a position has */
+  sf_status (*check)(const sf_model *model, const char *name); /* NULL: nothing to refuse */
   /* Sizes of the field in the scene, before it is allocated; then the place of the box and the steps in it. */
   sf_status (*set_sizes)(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_widths *widths);
   void (*set_scalars)(fx_scene *scene, const sf_model *model);
@@ -31,13 +31,11 @@ typedef struct sf_field_quantiser {
   sf_status (*draw)(sf_calibration *calibration, const sf_model *model, uint64_t seed);
   void (*sample)(const sf_model *model, const float x[3], const float direction[3], int steps, float *f,
                  float *constant, sf_net_trace *trace);
-  /* The field's numbers, and units.feature_scale. */
+  /* The field's numbers, and units.feature_scale; in report->scales what only the field knows. */
   sf_status (*quantise)(fx_scene *scene, const sf_model *model, const char *name, const sf_calibration *calibration,
                         sf_quant_report *report);
   /* The LSBs that C1's inputs got, of features and of encodings; NULL: no C1 input is the field's own. */
   void (*set_inputs)(fx_scene *scene, double feature, double encoding);
-  /* Scales for fine-tuning; NULL: it cannot be. */
-  void (*describe)(const fx_scene *scene, const sf_model *model, sf_quant_report *report);
 } sf_field_quantiser;
 extern const sf_field_quantiser sf_grid_quantiser, sf_tensorf_quantiser;
 
@@ -67,7 +65,7 @@ typedef struct sf_fit_weights {
 static inline const sf_scales *sf_settled_scales(const sf_model *model, const sf_quant_widths *widths)
 {
   const bool same = model->scales.weight_bits && model->scales.weight_bits == widths->weight_bits &&
-                    widths->feature_bits == SF_INPUT_BITS && widths->grid_bits == SF_GRID_BITS;
+                    widths->feature_bits == SF_INPUT_BITS && widths->grid_bits == model->scales.grid_bits;
   return same ? &model->scales : NULL;
 }
 

@@ -173,7 +173,10 @@ static void colour_inputs(const context *c, const input_format *f, int16_t *x, d
   fx_layer *to = &c->scene->net.layer[FX_C1];
   const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, per_sample = cal->per_sample[FX_C1];
   for (int i = 0; i < to->n_in; i++) lsb[i] = lsb_of(c, f, i);
-  if (to->bias) to->bias = bias_input(c, lsb), lsb[to->n_in] = 1.0 / to->bias;
+  if (to->bias) {
+    to->bias = c->settled ? (int32_t)lround(1 / (double)c->settled->lsb.bias) : bias_input(c, lsb);
+    lsb[to->n_in] = 1.0 / to->bias;
+  }
   for (int row = 0; row < rows_of(cal, FX_C1); row++) {
     const float *constant = cal->constant + (size_t)(row / per_sample) * (size_t)n;
     const float *current = h ? cal->target[FX_D2] + (size_t)row * (size_t)(h + 1) : NULL;

@@ -194,6 +194,8 @@ sf_status sf_quantise_grid(fx_scene *scene, const sf_model *model, const char *n
     choose_scales(scene, value, calibration, &format, scale);
     report->grid_clipped = fill_all(scene, value, scale, &format);
   }
+  for (int l = 0; l < scene->grid.levels; l++)
+    report->scales.lsb.entry[l] = ldexpf((float)scene->units.feature_scale[l], PRODUCT_FRAC - scene->grid.shift[l]);
   report->feature_error = relative_error(scene, calibration);
   return sf_ok();
 }

@@ -5,16 +5,15 @@
 #include "snn/model.h"
 #include "scene/scene.h"
 
-/* Bits of what a scene holds; 0 = the widest, which is what the core takes. A narrower scene runs on the unchanged
- * core, and hardware of these widths computes the same bits: nothing that it would have to clip can occur (see
- * fx_grid_features: a feature is a convex combination of entries; the sums of D2's columns bound h; harmonics are below
- * 3/4). */
-enum { SF_GRID_BITS = 8 };
+/* Bits of what a scene holds; 0 = those that the model was fine-tuned for, else the widest, which is what the core
+ * takes. A narrower scene runs on the unchanged core, and hardware of these widths computes the same bits: nothing that
+ * it would have to clip can occur (see fx_grid_features: a feature is a convex combination of entries; the sums of D2's
+ * columns bound h; harmonics are below 3/4). */
 typedef struct sf_quant_widths {
-  int weight_bits;  /* 2..SF_WEIGHT_BITS: |w| < 2^(bits-1); 0 = those that the model was fine-tuned for, if it was */
-  int feature_bits; /* 8..SF_INPUT_BITS: inputs of D1 and C1 (f, d, h), |x| < 2^(bits-1) */
+  int weight_bits;  /* 2..SF_WEIGHT_BITS: |w| < 2^(bits-1) */
+  int feature_bits; /* 8..SF_INPUT_BITS: inputs of D1 and C1 (f, d, h), |x| < 2^(bits-1); hash grids alone */
   int leak_bits;    /* 4..SF_LEAK_FRAC: fraction bits of k; the others are 0 */
-  int grid_bits;    /* 2..SF_GRID_BITS: grid entries, |e| < 2^(bits-1) */
+  int grid_bits;    /* 2..SF_GRID_BITS: entries of a grid, of planes and lines, |e| < 2^(bits-1) */
 } sf_quant_widths;
 
 typedef struct sf_quant_options {
@@ -38,12 +37,12 @@ typedef struct sf_quant_layer {
 } sf_quant_layer;
 typedef struct sf_quant_report {
   sf_quant_layer layer[SF_LAYERS];
-  double feature_error;   /* as above, for the grid features */
-  int64_t grid_clipped;   /* grid entries beyond the largest that grid_bits hold */
+  double feature_error;   /* as above, for the field's features */
+  int64_t grid_clipped;   /* entries of the field beyond the largest that grid_bits hold */
   int32_t samples;        /* calibration samples */
   sf_quant_widths widths; /* as used: no zeros */
   sf_scales scales;       /* as chosen, or the model's own if it was fine-tuned for these widths */
-  int32_t unused_tuning;  /* bits of the weights that it was fine-tuned for at other widths than these; else 0 */
+  sf_quant_widths unused; /* that it was fine-tuned for, where those above are others; else zeros */
   int64_t packed_bytes;   /* sf_packed_bytes */
 } sf_quant_report;
 sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,

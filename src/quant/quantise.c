@@ -36,7 +36,7 @@ static sf_status check_sizes(const sf_model *model, const char *name)
   if (hidden < 1 || hidden > SF_LANES)
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': %d neurons, the accelerator has %d", name,
                    model->param[sf_layer_weights[first]].name, hidden, SF_LANES);
-  return field->check(model, name);
+  return field->check ? field->check(model, name) : sf_ok();
 }
 
 static sf_status check_model(const sf_model *model, const char *name, const sf_quant_options *options)
@@ -67,6 +67,13 @@ static sf_status resolve_width(int *bits, int low, int high, const char *what, c
   if (*bits == 0) *bits = high;
   if (*bits >= low && *bits <= high) return sf_ok();
   return sf_fail(SF_E_RANGE, "%s: %d bits asked for %s, expected %d..%d", name, *bits, what, low, high);
+}
+
+static void take_tuned(sf_quant_widths *widths, const sf_scales *tuned)
+{
+  if (widths->weight_bits == 0) widths->weight_bits = tuned->weight_bits;
+  if (widths->grid_bits == 0) widths->grid_bits = tuned->grid_bits;
+  if (widths->leak_bits == 0) widths->leak_bits = tuned->leak_bits;
 }
 
 static sf_status resolve_widths(sf_quant_widths *widths, const char *name)
@@ -123,6 +130,23 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->units.data_views = model->config.space.views, scene->units.data_poses = model->config.space.poses;
 }
 
+/* What fine-tuning keeps to, beside what the field has said. */
+static void describe(const fx_scene *scene, const sf_model *model, sf_quant_report *report)
+{
+  const sf_quant_widths *w = &report->widths;
+  sf_scales *s = &report->scales;
+  s->weight_bits = w->weight_bits, s->grid_bits = w->grid_bits, s->leak_bits = w->leak_bits;
+  s->lsb.direction = (float)scene->units.dir_scale;
+  for (int l = 0; l < (sf_model_decodes(model) ? 1 : scene->grid.levels); l++)
+    s->lsb.feature[l] = (float)scene->units.feature_scale[l];
+  for (int l = 0; l < SF_LAYERS; l++)
+    if (scene->net.layer[l].n_out) s->lsb.current[l] = (float)scene->units.current_scale[l];
+  if (scene->net.layer[FX_C1].bias) s->lsb.bias = 1 / (float)scene->net.layer[FX_C1].bias;
+  if (!sf_settled_scales(model, w) && model->scales.weight_bits)
+    report->unused =
+        (sf_quant_widths){model->scales.weight_bits, SF_INPUT_BITS, model->scales.leak_bits, model->scales.grid_bits};
+}
+
 static sf_status quantise(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_options *options,
                           sf_calibration *calibration, sf_quant_report *report)
 {
@@ -138,7 +162,7 @@ static sf_status quantise(fx_scene *scene, const sf_model *model, const char *na
   report->samples = calibration->samples;
   SF_TRY(field->quantise(scene, model, name, calibration, report));
   SF_TRY(sf_quantise_layers(scene, model, name, calibration, report));
-  if (field->describe) field->describe(scene, model, report);
+  describe(scene, model, report);
   return fx_scene_check(scene, name);
 }
 
@@ -148,8 +172,9 @@ sf_status sf_quantise_report(fx_scene *scene, const sf_model *model, const char 
   sf_calibration calibration = {0};
   memset(scene, 0, sizeof *scene);
   memset(report, 0, sizeof *report);
+  sf_scales_clear(&report->scales);
   report->widths = options->widths;
-  if (report->widths.weight_bits == 0) report->widths.weight_bits = model->scales.weight_bits;
+  if (model->scales.weight_bits) take_tuned(&report->widths, &model->scales);
   SF_TRY(check_model(model, name, options));
   SF_TRY(resolve_widths(&report->widths, name));
   const sf_status status = quantise(scene, model, name, options, &calibration, report);

@@ -15,12 +15,6 @@ static int features(const sf_model *model)
   return model->config.tensorf.features;
 }
 
-static sf_status check(const sf_model *model, const char *name)
-{
-  if (!model->scales.weight_bits) return sf_ok();
-  return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'weight_bits': a TensoRF model cannot be fine-tuned", name);
-}
-
 static sf_status set_sizes(fx_scene *scene, const sf_model *model, const char *name, const sf_quant_widths *widths)
 {
   const sf_tensorf *from = &model->config.tensorf;
@@ -125,7 +119,6 @@ const sf_field_quantiser sf_tensorf_quantiser = {.direction_stream = STREAM_DIRE
                                                  .tried = ENCODING_TRIED,
                                                  .coarsest = ENCODING_COARSEST,
                                                  .features = features,
-                                                 .check = check,
                                                  .set_sizes = set_sizes,
                                                  .set_scalars = set_scalars,
                                                  .draw = draw,

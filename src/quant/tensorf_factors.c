@@ -9,8 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, BASIS_FRAC = 15, PHASE_FRAC = 16, ACTIVATION_FRAC = 20 };
+enum { UNITS = 16, SHIFT_MAX = 40, PRODUCT_FRAC = 16, PHASE_FRAC = 16, ACTIVATION_FRAC = 20 };
 static const double UNIT_STEP = 0.85, TWO_PI = 6.283185307179586;
+static const double SMALLEST = 1e-12; /* LSB on file: a component of zeros has none */
 
 typedef struct component {
   double plane_max, plane_rms, line_max, line_rms;
@@ -71,6 +72,12 @@ static double plane_lsb(const component *m, double unit, int limit)
   return low > high ? sqrt(low * high) : fmin(fmax(balanced, low), high);
 }
 
+static void keep_lsb(sf_scales *to, int appearance, int component, double plane, double product)
+{
+  to->lsb.plane[appearance][component] = (float)fmax(plane, SMALLEST);
+  to->lsb.product[appearance][component] = (float)fmax(product, SMALLEST * SMALLEST);
+}
+
 /* ---- density ---- */
 
 typedef struct density {
@@ -78,6 +85,8 @@ typedef struct density {
   const sf_model *model;
   const char *name;
   const sf_calibration *calibration;
+  const sf_scales *settled; /* NULL: to be found */
+  sf_scales *chosen;
   component component[FX_PAIRS][SF_COMPONENTS_MAX];
   int limit;
 } density;
@@ -106,10 +115,12 @@ static double widest_unit(density *d)
 static int64_t round_density(const density *d, double unit)
 {
   int64_t clipped = 0;
-  for (int pair = 0; pair < FX_PAIRS; pair++) {
+  for (int pair = 0, n = 0; pair < FX_PAIRS; pair++) {
     const factor plane = density_factor(d, pair, false), line = density_factor(d, pair, true);
-    for (int c = 0; c < plane.components; c++) {
-      const double p = plane_lsb(&d->component[pair][c], unit, d->limit);
+    for (int c = 0; c < plane.components; c++, n++) {
+      const double p =
+          d->settled ? (double)d->settled->lsb.plane[0][n] : plane_lsb(&d->component[pair][c], unit, d->limit);
+      keep_lsb(d->chosen, 0, n, p, unit);
       clipped += round_component(&plane, c, p, d->limit) + round_component(&line, c, unit / p, d->limit);
     }
   }
@@ -149,9 +160,9 @@ static double opacity_error(const density *d)
 
 static sf_status quantise_density(density *d, sf_quant_report *report)
 {
-  const double widest = widest_unit(d);
+  const double widest = d->settled ? (double)d->settled->lsb.product[0][0] : widest_unit(d);
   double unit = widest, best = widest, best_error = INFINITY;
-  for (int i = 0; i < UNITS; i++, unit *= UNIT_STEP) {
+  for (int i = 0; i < UNITS && !d->settled; i++, unit *= UNIT_STEP) {
     round_density(d, unit);
     SF_TRY(set_density_scales(d, unit));
     const double error = opacity_error(d);
@@ -165,7 +176,8 @@ static sf_status quantise_density(density *d, sf_quant_report *report)
 /* ---- appearance ---- */
 
 /* Value of one LSB of every product as the basis matrix gets it. */
-static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, int limit, double *lsb)
+static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, const sf_scales *settled, int limit,
+                                   sf_scales *chosen, double *lsb)
 {
   const fx_factors *to = &scene->tensorf.appearance;
   int64_t clipped = 0;
@@ -175,9 +187,11 @@ static int64_t quantise_appearance(fx_scene *scene, const sf_model *model, int l
                  line = factor_of(model, SF_P_APP_LINE + pair, to->line[pair]);
     for (int c = 0; c < plane.components; c++) {
       const component m = measure_component(&plane, &line, c);
-      const double p = m.plane_max / limit, l = m.line_max / limit;
+      const double p = settled ? (double)settled->lsb.plane[1][n] : m.plane_max / limit;
+      const double l = settled ? (double)settled->lsb.product[1][n] / p : m.line_max / limit;
       clipped += round_component(&plane, c, p, limit) + round_component(&line, c, l, limit);
-      lsb[n++] = ldexp(p * l, BASIS_FRAC - PRODUCT_FRAC);
+      keep_lsb(chosen, 1, n, p, p * l);
+      lsb[n++] = ldexp(p * l, -SF_PRODUCT_SHIFT);
     }
   }
   return clipped;
@@ -202,9 +216,10 @@ static sf_status set_feature_scales(fx_scene *scene, const sf_model *model, cons
                  model->param[SF_P_BASIS].name);
 }
 
-/* Fits the basis matrix to the features that the float field has where the integer products are these. */
+/* Fits the basis matrix to the features that the float field has where the integer products are these. settled: its
+ * unit, or 0. */
 static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_calibration *c, const double *lsb,
-                           int limit, sf_quant_layer *result)
+                           double settled, int limit, sf_quant_layer *result)
 {
   const fx_tensorf *field = &scene->tensorf;
   const int n = sf_tensorf_products(&model->config.tensorf);
@@ -214,8 +229,12 @@ static sf_status fit_basis(fx_scene *scene, const sf_model *model, const sf_cali
   if (status.code == SF_OK) {
     for (int i = 0; i < c->samples; i++) fx_tensorf_products(field, c->pos + (size_t)i * 3, x + (size_t)i * (size_t)n);
     const sf_fit_data data = {c->samples, n, field->features, x, c->f};
-    const sf_fit_weights weights = {
-        .w = sf_model_param(model, SF_P_BASIS), .stride = n, .lsb = lsb, .unit_min = 1e-30, .weight_max = limit};
+    const sf_fit_weights weights = {.w = sf_model_param(model, SF_P_BASIS),
+                                    .stride = n,
+                                    .lsb = lsb,
+                                    .unit_min = 1e-30,
+                                    .weight_max = limit,
+                                    .unit = settled};
     status = sf_fit_layer(&data, &weights, true, q, result);
   }
   for (int i = 0; i < n && status.code == SF_OK; i++)
@@ -228,14 +247,25 @@ sf_status sf_quantise_factors(fx_scene *scene, const sf_model *model, const char
                               const sf_calibration *calibration, sf_quant_report *report)
 {
   const int limit = sf_symmetric_max(report->widths.grid_bits);
-  density d = {.scene = scene, .model = model, .name = name, .calibration = calibration, .limit = limit};
-  double lsb[FX_PAIRS * SF_COMPONENTS_MAX];
+  const sf_scales *settled = sf_settled_scales(model, &report->widths);
+  sf_scales *chosen = &report->scales;
+  density d = {.scene = scene,
+               .model = model,
+               .name = name,
+               .calibration = calibration,
+               .settled = settled,
+               .chosen = chosen,
+               .limit = limit};
+  double lsb[SF_PRODUCTS_MAX];
   sf_quant_layer basis;
   SF_TRY(quantise_density(&d, report));
-  report->grid_clipped += quantise_appearance(scene, model, limit, lsb);
-  SF_TRY(fit_basis(scene, model, calibration, lsb, sf_symmetric_max(report->widths.weight_bits), &basis));
+  report->grid_clipped += quantise_appearance(scene, model, settled, limit, chosen, lsb);
+  SF_TRY(fit_basis(scene, model, calibration, lsb, settled ? (double)settled->lsb.basis : 0,
+                   sf_symmetric_max(report->widths.weight_bits), &basis));
   report->feature_error = basis.error;
+  chosen->lsb.basis = (float)basis.unit;
   const double room = 1.1; /* between the calibration points are larger ones */
   return set_feature_scales(scene, model, name, basis.unit,
-                            largest_feature(calibration) * room / sf_symmetric_max(SF_INPUT_BITS));
+                            settled ? (double)settled->lsb.feature[0]
+                                    : largest_feature(calibration) * room / sf_symmetric_max(SF_INPUT_BITS));
 }

@@ -133,7 +133,7 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
         const float *o = origin + 3 * (first + i), *d = direction + 3 * (first + i);
         w->ray[i] = (ray_state){.march = sf_march_begin(model, &w->intervals, o, d, 0.5f), .transmittance = 1};
         sf_sh4(d, w->ray[i].sh);
-        sf_scales_round_direction(&model->scales, w->ray[i].sh);
+        sf_scales_round_direction(&model->scales, w->ray[i].sh, SF_DIR_FEATURES);
       }
       render_packet(w, n);
       for (int i = 0; i < n; i++) {

@@ -54,7 +54,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
 {
   const sf_tensorf *f = &w->model->config.tensorf;
   const sf_march march = sf_march_begin(w->model, &w->intervals, origin, direction, 0.5f);
-  const sf_vm_direction encoded = sf_vm_encode_direction(f, direction);
+  const sf_vm_direction encoded = sf_vm_encode_direction(w->model, direction);
   float behind, far = 0;
   int decoded = 0;
   const int n = sf_vm_ray(w->kernels, &w->density, &march, w->samples, &behind);

@@ -36,6 +36,8 @@ sf_decoder_view sf_decoder_view_of(const sf_model *m)
                        .features = f->features,
                        .feature_freqs = f->feature_freqs,
                        .columns = sf_tensorf_products(f),
+                       .feature_step = sf_scales_feature_step(&m->scales),
+                       .encoding_step = sf_scales_direction_step(&m->scales),
                        .products = (sf_tensorf_products(f) + 15) / 16 * 16};
   for (int i = 0; i < SF_LAYERS; i++) v.net.k[i] = sf_sigmoid(sf_model_param(m, SF_P_LEAK)[i]);
   memcpy(v.net.theta, m->config.theta, sizeof v.net.theta);

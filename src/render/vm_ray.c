@@ -29,12 +29,13 @@ int sf_vm_ray(const sf_kernels *k, const sf_vm_field *density, const sf_march *m
   return count;
 }
 
-sf_vm_direction sf_vm_encode_direction(const sf_tensorf *field, const float direction[3])
+sf_vm_direction sf_vm_encode_direction(const sf_model *model, const float direction[3])
 {
   sf_vm_direction d = {0};
-  sf_tensorf alone = *field;
+  sf_tensorf alone = model->config.tensorf;
   alone.features = 0;
   sf_tensorf_encode(&alone, d.value, direction, d.value);
+  sf_scales_round_direction(&model->scales, d.value, 3 + 6 * alone.view_freqs);
   return d;
 }
 

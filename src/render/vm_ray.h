@@ -18,11 +18,12 @@ typedef struct sf_vm_samples {
 int sf_vm_ray(const sf_kernels *kernels, const sf_vm_field *density, const sf_march *march, sf_vm_samples samples,
               float *transmittance);
 
-/* What the decoder's inputs have of a direction, once per ray: the direction and its encodings. */
+/* What the decoder's inputs have of a direction, once per ray: the direction and its encodings, as the scales round
+ * them. */
 typedef struct sf_vm_direction {
   float value[3 + 6 * SF_FREQS_MAX];
 } sf_vm_direction;
-sf_vm_direction sf_vm_encode_direction(const sf_tensorf *field, const float direction[3]);
+sf_vm_direction sf_vm_encode_direction(const sf_model *model, const float direction[3]);
 /* into the rows of `in` [inputs][SF_BLOCK] at `lane`. */
 void sf_vm_put_direction(const sf_tensorf *field, const sf_vm_direction *direction, float *in, int lane);
 #endif

@@ -102,6 +102,16 @@ static void encode_backward(const sf_decoder_view *v, float *in, float *din)
     }
 }
 
+/* Features, and their encodings: those of the direction come rounded. The backward pass takes them for exact. */
+static void round_inputs(const sf_decoder_view *v, float *in)
+{
+  float *encoding = sine_row(v, in, 0, 0);
+  if (!(v->feature_step > 0)) return;
+  for (int i = 0; i < v->features * B; i++) in[i] = sf_round_input(in[i], v->feature_step);
+  for (int i = 0; i < 2 * v->features * v->feature_freqs * B; i++)
+    encoding[i] = sf_round_input(encoding[i], v->encoding_step);
+}
+
 /* Products to features, encodings and the current that is constant over the steps. */
 static void decoder_inputs(const sf_decoder_words *n, sf_decoder_block *x, sf_net_scratch *w)
 {
@@ -113,6 +123,7 @@ static void decoder_inputs(const sf_decoder_words *n, sf_decoder_block *x, sf_ne
   gemm(operands(n->basis), v->products / PAIR, features, v->products / PAIR, words(w->rows), B, B, NULL, 0, out, B);
   memcpy(x->in, out, (size_t)v->features * B * sizeof *out);
   encode_features(v, x->in);
+  round_inputs(v, x->in);
   for (int l = 0; l < B; l++) x->in[v->inputs * B + l] = 1;
   memset(x->in + (v->inputs + 1) * B, 0, (size_t)(rows - v->inputs - 1) * B * sizeof *x->in);
   constant_current(&n->net, n->w1, rows, x->in, words(w->rows), w->sum3);

@@ -57,6 +57,7 @@ typedef struct sf_decoder_view {
   sf_net_view net;
   const float *w1, *b1, *b2, *b3, *basis;
   int inputs, features, feature_freqs, columns, products;
+  float feature_step, encoding_step; /* to whose multiples C1's inputs are rounded; 0: they are not */
 } sf_decoder_view;
 
 typedef struct sf_decoder_words {

@@ -12,13 +12,21 @@ sf_status sf_model_save(const sf_model *model, const char *path);
 void sf_model_describe(const sf_model *model, cJSON *metadata);
 int sf_model_tensors(const sf_model *model, sf_tensor *list);
 
+/* All LSBs 1. */
+void sf_scales_clear(sf_scales *scales);
 /* Value of one LSB of input `input` of layer D1 D2 C1 C2 C3 (1 for spikes). */
-double sf_scales_input(const sf_scales *scales, int layer, int input);
-/* The five weight matrices of model->value rounded to its settled scales, into value (laid out alike, may be the same).
- */
+double sf_scales_input(const sf_model *model, int layer, int input);
+/* Weights, biases, basis matrix and leaks of model->value rounded to its settled scales, into value (laid out alike,
+ * may be the same); the field's entries where they are narrow, else value keeps what it has of them. */
 void sf_scales_round(const sf_model *model, float *value);
-/* Spherical harmonics to multiples of their LSB, as the accelerator gets them; as they are while nothing is settled. */
-void sf_scales_round_direction(const sf_scales *scales, float sh[SF_DIR_FEATURES]);
+/* Entries are narrower than the core's: they are rounded as weights are. */
+bool sf_scales_narrow_field(const sf_scales *scales);
+/* Spherical harmonics, or a decoder's direction and encodings, to multiples of their LSB, as the accelerator gets them;
+ * as they are while nothing is settled. */
+void sf_scales_round_direction(const sf_scales *scales, float *value, int count);
+/* Steps of a decoder's features, and of its other inputs; 0: they are as they are. */
+float sf_scales_feature_step(const sf_scales *scales);
+float sf_scales_direction_step(const sf_scales *scales);
 /* Step to whose multiples h is rounded down once the scales are settled, as the accelerator does; 0: h is not. */
 float sf_scales_h_step(const sf_scales *scales);
 

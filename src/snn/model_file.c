@@ -144,7 +144,11 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   put_number(meta, "t_star", m->t_star);
   put_number(meta, "t_r", m->t_r);
   put_number(meta, "weight_bits", m->scales.weight_bits);
-  if (m->scales.weight_bits) put_number(meta, "h_shift", SF_H_SHIFT);
+  if (m->scales.weight_bits) {
+    put_number(meta, "h_shift", SF_H_SHIFT);
+    put_number(meta, "grid_bits", m->scales.grid_bits);
+    put_number(meta, "leak_bits", m->scales.leak_bits);
+  }
   if (c.backbone) put_number(meta, "backbone", c.backbone);
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
   sf_number space[SPACE_NUMBERS];
@@ -162,7 +166,8 @@ int sf_model_tensors(const sf_model *m, sf_tensor *list)
     memcpy(list[n++].shape, p->shape, sizeof p->shape);
   }
   list[n++] = (sf_tensor){"occupancy", SF_U8, 1, {(int64_t)(sf_config_cells(&m->config) / 8)}, m->occupancy};
-  if (m->scales.weight_bits) list[n++] = (sf_tensor){"scales", SF_F32, 1, {SF_SCALES}, (void *)&m->scales.lsb};
+  if (m->scales.weight_bits)
+    list[n++] = (sf_tensor){"scales", SF_F32, 1, {sf_field_of(&m->config)->scales}, (void *)&m->scales.lsb};
   return n;
 }
 
@@ -178,25 +183,35 @@ sf_status sf_model_save(const sf_model *m, const char *path)
   return status;
 }
 
-/* Only a fine-tuned model has any. */
-static sf_status load_scales(sf_scales *s, const sf_tensors *set)
+/* A width that files of before it could be fine-tuned for do not name: then it is the widest. */
+static sf_status load_width(int32_t *bits, const sf_tensors *set, const char *key, int low, int high)
 {
-  const int64_t shape[1] = {SF_SCALES};
+  *bits = high;
+  if (sf_tensors_meta(set, key)) SF_TRY(meta_int(set, key, bits));
+  if (*bits >= low && *bits <= high) return sf_ok();
+  return sf_fail(SF_E_RANGE, "%s: metadata key '%s' is %d, expected %d..%d", set->path, key, *bits, low, high);
+}
+
+/* Only a fine-tuned model has any. */
+static sf_status load_scales(sf_scales *s, const sf_tensors *set, int count)
+{
+  const int64_t shape[1] = {count};
   const sf_tensor *t;
   if (!sf_tensors_meta(set, "weight_bits")) return sf_ok();
   SF_TRY(meta_int(set, "weight_bits", &s->weight_bits));
   if (s->weight_bits == 0) return sf_ok();
-  if (s->weight_bits < 2 || s->weight_bits > SF_WEIGHT_BITS)
-    return sf_fail(SF_E_RANGE, "%s: metadata key 'weight_bits' is %d, expected 2..%d", set->path, s->weight_bits,
-                   SF_WEIGHT_BITS);
+  SF_TRY(load_width(&s->weight_bits, set, "weight_bits", 2, SF_WEIGHT_BITS));
+  SF_TRY(load_width(&s->grid_bits, set, "grid_bits", 2, SF_GRID_BITS));
+  SF_TRY(load_width(&s->leak_bits, set, "leak_bits", 4, SF_LEAK_FRAC));
   int32_t h_shift = 3; /* of files that do not say */
   if (sf_tensors_meta(set, "h_shift")) SF_TRY(meta_int(set, "h_shift", &h_shift));
   if (h_shift != SF_H_SHIFT)
     return sf_fail(SF_E_UNSUPPORTED, "%s: fine-tuned for h = current >> %d, this build has H_SHIFT = %d", set->path,
                    h_shift, SF_H_SHIFT);
   SF_TRY(sf_tensors_get(set, "scales", SF_F32, 1, shape, &t));
-  memcpy(&s->lsb, t->data, sizeof s->lsb);
-  for (int i = 0; i < SF_SCALES; i++) {
+  sf_scales_clear(s);
+  memcpy(&s->lsb, t->data, (size_t)count * sizeof(float));
+  for (int i = 0; i < count; i++) {
     const float lsb = ((const float *)t->data)[i];
     if (!(lsb > 1e-30f && lsb < 1e30f))
       return sf_fail(SF_E_RANGE, "%s: tensor 'scales': element %d is %g, expected a positive number", set->path, i,
@@ -233,7 +248,7 @@ static sf_status load_budget(sf_model *m, const sf_tensors *set)
     return sf_fail(SF_E_RANGE, "%s: t_r = %d, t_star = %g outside 1..T = %d", set->path, m->t_r, t_star,
                    m->config.steps);
   m->t_star = (float)t_star;
-  return load_scales(&m->scales, set);
+  return load_scales(&m->scales, set, sf_field_of(&m->config)->scales);
 }
 
 sf_status sf_model_load(sf_model *m, const char *path)

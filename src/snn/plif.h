@@ -22,6 +22,15 @@ static inline float sf_round_h(float h, float step)
   return step * floorf(h / step + 0.5f / (1 << SF_H_SHIFT));
 }
 
+/* A real-valued input as the accelerator sees it, a multiple of step in SF_INPUT_BITS; step 0: as it is. Adding and
+ * taking away 1.5 2^23 rounds to the nearest integer, ties to even, in every lane of a vector. */
+static inline float sf_round_input(float x, float step)
+{
+  const float limit = (1 << (SF_INPUT_BITS - 1)) - 1, q = step > 0 ? x / step : 0;
+  const float within = q > limit ? limit : q < -limit ? -limit : q;
+  return step > 0 ? step * ((within + 12582912.0f) - 12582912.0f) : x;
+}
+
 static inline float sf_sigmoid(float x)
 {
   return 1.0f / (1.0f + expf(-x));

@@ -8,15 +8,15 @@
 #include <string.h>
 
 const sf_axis sf_axes[SF_AXES] = {
-    [SF_AXIS_WEIGHT] = {"weight_bits", "weights, bits", "w"},
-    [SF_AXIS_FEATURE] = {"feature_bits", "inputs f d h, bits", "f"},
-    [SF_AXIS_GRID] = {"grid_bits", "grid entries, bits", "g"},
-    [SF_AXIS_LEAK] = {"leak_bits", "leak, fraction bits", "k"},
-    [SF_AXIS_AC_FRAC] = {"ac_frac", "C2 membrane, fraction bits", "m"},
-    [SF_AXIS_H_SHIFT] = {"h_shift", "h = current >> n", "h"},
-    [SF_AXIS_TRANS_FRAC] = {"trans_frac", "transmittance, fraction bits", "a"},
-    [SF_AXIS_TABLE] = {"log2_hash", "hash table, log2 entries", "n"},
-    [SF_AXIS_STEPS] = {"t", "time steps", "t"},
+    [SF_AXIS_WEIGHT] = {"weight_bits", "w", {"weights, bits", "weights and basis matrix, bits"}},
+    [SF_AXIS_FEATURE] = {"feature_bits", "f", {"inputs f d h, bits", NULL}},
+    [SF_AXIS_GRID] = {"grid_bits", "g", {"grid entries, bits", "entries of planes and lines, bits"}},
+    [SF_AXIS_LEAK] = {"leak_bits", "k", {"leak, fraction bits", "leak, fraction bits"}},
+    [SF_AXIS_AC_FRAC] = {"ac_frac", "m", {"C2 membrane, fraction bits", "C2 membrane, fraction bits"}},
+    [SF_AXIS_H_SHIFT] = {"h_shift", "h", {"h = current >> n", NULL}},
+    [SF_AXIS_TRANS_FRAC] = {"trans_frac", "a", {"transmittance, fraction bits", "transmittance, fraction bits"}},
+    [SF_AXIS_TABLE] = {"field_size", "n", {"hash table, log2 entries", "planes, points along the longest axis"}},
+    [SF_AXIS_STEPS] = {"t", "t", {"time steps", "time steps"}},
 };
 
 const sf_point_figure sf_point_figures[SF_POINT_FIGURES] = {
@@ -183,7 +183,7 @@ static int signed_bits(int64_t largest)
 static int state_bits(const bench *b, int layer)
 {
   const sf_quant_widths *w = &b->report.widths;
-  const int64_t rows = (int64_t)b->scene.net.layer[layer].n_in * ((1 << (w->weight_bits - 1)) - 1);
+  const int64_t rows = (int64_t)fx_layer_rows(&b->scene.net.layer[layer]) * ((1 << (w->weight_bits - 1)) - 1);
   return !fx_layer_fires(layer)         ? fx_layer_table[layer].state_bits
          : fx_layer_reads_spikes(layer) ? signed_bits(rows << SF_AC_FRAC)
                                         : signed_bits(rows * ((1 << (w->feature_bits - 1)) - 1));
@@ -205,22 +205,33 @@ static double traffic_bits(const bench *b)
 
 /* ---- figures ---- */
 
+static int field_size(const sf_config *c)
+{
+  const int32_t *points = c->tensorf.resolution;
+  int most = 0;
+  for (int i = 0; i < 3; i++) most = points[i] > most ? points[i] : most;
+  return c->backbone == SF_TENSORF ? most : c->log2_hash;
+}
+
 static void set_axes(const bench *b, sf_point *point)
 {
   const sf_quant_widths *w = &b->report.widths;
   const int axis[SF_AXES] = {[SF_AXIS_WEIGHT] = w->weight_bits,    [SF_AXIS_FEATURE] = w->feature_bits,
                              [SF_AXIS_GRID] = w->grid_bits,        [SF_AXIS_LEAK] = w->leak_bits,
                              [SF_AXIS_AC_FRAC] = SF_AC_FRAC,       [SF_AXIS_H_SHIFT] = SF_H_SHIFT,
-                             [SF_AXIS_TRANS_FRAC] = SF_TRANS_FRAC, [SF_AXIS_TABLE] = b->model.config.log2_hash,
+                             [SF_AXIS_TRANS_FRAC] = SF_TRANS_FRAC, [SF_AXIS_TABLE] = field_size(&b->model.config),
                              [SF_AXIS_STEPS] = b->scene.net.steps};
   const char *slash = strrchr(b->options->model, '/');
   size_t used = 0;
-  memcpy(point->axis, axis, sizeof axis);
+  point->backbone = b->model.config.backbone;
   point->steps_max = b->model.config.steps;
   snprintf(point->model, sizeof point->model, "%s", slash ? slash + 1 : b->options->model);
-  for (int i = 0; i < SF_AXES; i++)
+  for (int i = 0; i < SF_AXES; i++) {
+    if (!sf_axes[i].title[point->backbone]) continue;
+    point->axis[i] = axis[i];
     used += (size_t)snprintf(point->name + used, sizeof point->name - used, "%s%s%d", i ? "-" : "", sf_axes[i].letter,
                              axis[i]);
+  }
 }
 
 static double largest_error(const float *a, const float *b, size_t n)
@@ -291,7 +302,9 @@ cJSON *sf_point_json(const sf_point *point)
   cJSON_AddStringToObject(json, "name", point->name);
   cJSON_AddStringToObject(json, "model", point->model);
   cJSON_AddNumberToObject(json, "T", point->steps_max);
-  for (int i = 0; i < SF_AXES; i++) cJSON_AddNumberToObject(json, sf_axes[i].name, point->axis[i]);
+  cJSON_AddStringToObject(json, "backbone", sf_field_of(&(sf_config){.backbone = point->backbone})->name);
+  for (int i = 0; i < SF_AXES; i++)
+    if (sf_axes[i].title[point->backbone]) cJSON_AddNumberToObject(json, sf_axes[i].name, point->axis[i]);
   for (int i = 0; i < SF_POINT_FIGURES; i++) {
     if (isfinite(point->figure[i]))
       cJSON_AddNumberToObject(json, sf_point_figures[i].name, point->figure[i]);
@@ -304,8 +317,11 @@ cJSON *sf_point_json(const sf_point *point)
 void sf_point_print(FILE *out, const sf_point *point)
 {
   fprintf(out, "%s, %s\n", point->name, point->model);
-  for (int i = 0; i < SF_AXES; i++) fprintf(out, "  %-30s %d\n", sf_axes[i].title, point->axis[i]);
+  for (int i = 0; i < SF_AXES; i++) {
+    const char *title = sf_axes[i].title[point->backbone];
+    if (title) fprintf(out, "  %-37s %d\n", title, point->axis[i]);
+  }
   for (int i = 0; i < SF_POINT_FIGURES; i++)
-    fprintf(out, "  %-30s ", sf_point_figures[i].title), fprintf(out, sf_point_figures[i].format, point->figure[i]),
+    fprintf(out, "  %-37s ", sf_point_figures[i].title), fprintf(out, sf_point_figures[i].format, point->figure[i]),
         fputc('\n', out);
 }

@@ -13,13 +13,26 @@ enum { POINTS_MAX = 65536, NAME_MAX_BYTES = 256, TEXT_MAX = 4096 };
 
 /* ---- loading ---- */
 
+static sf_status read_backbone(const cJSON *json, const char *path, int *backbone)
+{
+  char name[16];
+  SF_TRY(sf_json_need_text(json, path, "backbone", name, sizeof name));
+  for (*backbone = 0; *backbone < SF_FIELDS; ++*backbone)
+    if (!strcmp(name, sf_field_of(&(sf_config){.backbone = *backbone})->name)) return sf_ok();
+  return sf_fail(SF_E_FORMAT, "%s: backbone '%s' is unknown", path, name);
+}
+
 static sf_status read_point(const cJSON *json, const char *path, sf_point *point)
 {
   SF_TRY(sf_json_need_text(json, path, "name", point->name, sizeof point->name));
   SF_TRY(sf_json_need_text(json, path, "model", point->model, sizeof point->model));
+  SF_TRY(read_backbone(json, path, &point->backbone));
   for (int i = 0; i < SF_AXES; i++) {
+    if (!sf_axes[i].title[point->backbone]) continue;
     const double value = sf_json_number(json, sf_axes[i].name);
-    if (!(value >= 0 && value <= 64)) return sf_fail(SF_E_FORMAT, "%s: no number '%s' in 0..64", path, sf_axes[i].name);
+    const int most = i == SF_AXIS_TABLE ? 4096 : 64;
+    if (!(value >= 0 && value <= most))
+      return sf_fail(SF_E_FORMAT, "%s: no number '%s' in 0..%d", path, sf_axes[i].name, most);
     point->axis[i] = (int)value;
   }
   for (int i = 0; i < SF_POINT_FIGURES; i++) {
@@ -75,6 +88,10 @@ static sf_status load(sf_sweep *sweep, const char *centre)
   SF_TRY(status);
   if (at < 0) return sf_fail(SF_E_FORMAT, "%s: the point '%s' that the sweep goes around is missing", path, centre);
   sweep->centre = &sweep->point[at];
+  for (int i = 0; i < sweep->count; i++)
+    if (sweep->point[i].backbone != sweep->centre->backbone)
+      return sf_fail(SF_E_UNSUPPORTED, "%s: %s and %s have fields of different kinds: they share no widths", path,
+                     sweep->centre->model, sweep->point[i].model);
   return sf_ok();
 }
 
@@ -219,7 +236,7 @@ static void print_axis(FILE *out, const sf_sweep *sweep, int axis, const sf_poin
     if (in_table(sweep, &sweep->point[i], axis)) list[n++] = &sweep->point[i];
   if (n < 2) return;
   qsort(list, (size_t)n, sizeof *list, by_axis);
-  fprintf(out, "\n## %s\n\n", sf_axes[axis].title);
+  fprintf(out, "\n## %s\n\n", sf_axes[axis].title[sweep->centre->backbone]);
   print_head(out, "point");
   for (int i = 0; i < n; i++) {
     char name[128];
@@ -254,11 +271,14 @@ void sf_sweep_print(FILE *out, const sf_sweep *sweep)
   fprintf(out, "# Widths: one parameter at a time, then the front\n\nModel %s, centre %s.\n", sweep->centre->model,
           sweep->centre->name);
   fprintf(out, "Points are named by what tells them from the centre:\n\n");
+  const int backbone = sweep->centre->backbone;
   for (int i = 0; i < SF_AXES; i++)
-    fprintf(out, "- %s: %s, %d\n", sf_axes[i].letter, sf_axes[i].title, sweep->centre->axis[i]);
+    if (sf_axes[i].title[backbone])
+      fprintf(out, "- %s: %s, %d\n", sf_axes[i].letter, sf_axes[i].title[backbone], sweep->centre->axis[i]);
   fprintf(out, "\npicture, float: PSNR against the picture and against the float field at the same steps.\n");
   fprintf(out, "lost: what float has more against the picture; error: the largest in a channel.\n");
-  fprintf(out, "Energy (paper ledger) and bits moved (weights, grid entries, states) are per frame.\n");
+  fprintf(out, "Energy (paper ledger) and bits moved (weights, %s, states) are per frame.\n",
+          backbone == SF_TENSORF ? "entries of planes and lines" : "grid entries");
   fprintf(out, "RTL cells and cycles per width: not available.\n");
   for (int axis = 0; axis < SF_AXES; axis++) print_axis(out, sweep, axis, list);
   print_front(out, sweep, list);
@@ -277,7 +297,11 @@ void sf_sweep_csv(FILE *out, const sf_sweep *sweep)
     fputc(',', out);
     sf_csv_text(out, point->model);
     fprintf(out, ",%d", point->front);
-    for (int i = 0; i < SF_AXES; i++) fprintf(out, ",%d", point->axis[i]);
+    for (int i = 0; i < SF_AXES; i++)
+      if (sf_axes[i].title[point->backbone])
+        fprintf(out, ",%d", point->axis[i]);
+      else
+        fputc(',', out);
     for (int i = 0; i < SF_POINT_FIGURES; i++) fprintf(out, ",%.9g", point->figure[i]);
     fprintf(out, ",not available,not available\n");
   }

@@ -2,6 +2,7 @@
  * sweep is a folder of points, and its report names those that no other beats. */
 #ifndef SF_SWEEP_SWEEP_H
 #define SF_SWEEP_SWEEP_H
+#include "field/field.h"
 #include "quant/quant.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
@@ -15,12 +16,13 @@ typedef enum {
   SF_AXIS_AC_FRAC,
   SF_AXIS_H_SHIFT,
   SF_AXIS_TRANS_FRAC,
-  SF_AXIS_TABLE, /* log2 of the entries of a hashed level: of the model, a smaller table is another training */
+  SF_AXIS_TABLE, /* the field's size: log2 of a hashed level's entries, points of planes; another is another training */
   SF_AXIS_STEPS,
   SF_AXES
 } sf_axis_id;
 typedef struct sf_axis {
-  const char *name, *title, *letter; /* "weight_bits", "weights, bits", "w" */
+  const char *name, *letter;    /* "weight_bits", "w" */
+  const char *title[SF_FIELDS]; /* "weights, bits", by sf_backbone_kind; NULL: such models have none */
 } sf_axis;
 extern const sf_axis sf_axes[SF_AXES];
 
@@ -49,8 +51,9 @@ extern const sf_point_figure sf_point_figures[SF_POINT_FIGURES];
 
 typedef struct sf_point {
   char name[128], model[128]; /* "w8-f12-...", file name of the model */
-  int axis[SF_AXES];
-  int steps_max; /* the model's T */
+  int backbone;               /* sf_backbone_kind */
+  int axis[SF_AXES];          /* 0: the model has none */
+  int steps_max;              /* the model's T */
   double figure[SF_POINT_FIGURES];
   bool front; /* see sf_sweep_mark */
 } sf_point;

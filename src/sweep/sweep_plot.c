@@ -34,7 +34,7 @@ static void plot_widths(FILE *out, const sf_sweep *sweep, const char *name)
       fprintf(out,
               "$axis%d using 1:2 smooth unique with linespoints linecolor '%s' linewidth 2 pointtype 7 pointsize 0.7 "
               "title '%s', ",
-              axis, sf_plot_colour[lines++ % SF_PLOT_COLOURS], sf_axes[axis].title);
+              axis, sf_plot_colour[lines++ % SF_PLOT_COLOURS], sf_axes[axis].title[sweep->centre->backbone]);
   if (isnan(centre))
     fprintf(out, "NaN notitle\n");
   else

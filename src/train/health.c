@@ -11,16 +11,14 @@ static const double dead = 1e-4, saturated = 0.95; /* spikes per neuron and step
 
 static const int spiking[3] = {0, 2, 3}; /* D1, C1, C2 among the layers */
 
-/* tau within 1.001 .. 1000: at both ends k is still 4 units of the hardware's 12 bits away from 0 and 1, where a
- * neuron would forget or ignore its input, and where the logit's gradient k (1-k) no longer brings it back. */
-static const float logit_limit = 6.9067548f; /* ln 999 */
-
+/* At both ends k is still 4 units of the hardware's 12 bits away from 0 and 1, where a neuron would forget or ignore
+ * its input, and where the logit's gradient k (1-k) no longer brings it back. */
 void sf_health_leaks(sf_trainer *t)
 {
   float *leak = sf_model_param(&t->model, SF_P_LEAK);
   for (int l = 0; l < SF_LAYERS; l++) {
-    if (leak[l] > logit_limit) leak[l] = logit_limit; /* not fminf: a NaN must stay one, to be found */
-    if (leak[l] < -logit_limit) leak[l] = -logit_limit;
+    if (leak[l] > SF_LEAK_LIMIT) leak[l] = SF_LEAK_LIMIT; /* not fminf: a NaN must stay one, to be found */
+    if (leak[l] < -SF_LEAK_LIMIT) leak[l] = -SF_LEAK_LIMIT;
   }
 }
 

@@ -6,8 +6,6 @@
 
 enum { OCCUPANCY_EVERY = 16 };
 
-static const double tuning_rate = 0.1; /* of the learning rates */
-
 static sf_status create(sf_trainer *t)
 {
   t->rays = 1024;
@@ -78,7 +76,7 @@ static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_work
     const sf_ray *ray = &batch->ray[r];
     float sh[SF_DIR_FEATURES];
     sf_sh4(ray->direction, sh);
-    sf_scales_round_direction(&t->model.scales, sh);
+    sf_scales_round_direction(&t->model.scales, sh, SF_DIR_FEATURES);
     for (lane = ray->first; lane < ray->first + ray->count; lane++)
       for (int i = 0; i < SF_DIR_FEATURES; i++)
         ((sf_block *)w->block)[lane / SF_BLOCK].sh[i * SF_BLOCK + lane % SF_BLOCK] = sh[i];
@@ -117,7 +115,8 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
 static void encode(sf_trainer *t)
 {
   const int levels = t->model.config.levels, parts = 8;
-  const float *table = sf_model_param(&t->model, SF_P_GRID);
+  const sf_model seen = sf_tuning_field(t);
+  const float *table = sf_model_param(&seen, SF_P_GRID);
 #pragma omp parallel for schedule(dynamic, 1) collapse(2)
   for (int level = 0; level < levels; level++)
     for (int part = 0; part < parts; part++)
@@ -191,7 +190,7 @@ static sf_status check(const sf_trainer *t)
 
 static void update(sf_trainer *t)
 {
-  const double fade = (sf_tuning(t) ? tuning_rate : 1) * pow(0.3, t->progress);
+  const double fade = (sf_tuning(t) ? sf_tuning_rate : 1) * pow(0.3, t->progress);
   sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-15, t->iteration + 1, 0};
   grid_gradient(t, &adam);
   adam.lr = t->options.lr_net * fade;

@@ -168,7 +168,7 @@ struct sf_trainer {
   sf_model model;
   sf_net_words *net;               /* of the current parameters, for the kernels; TensoRF: part of vm */
   float *grad, *moment1, *moment2; /* [model.size] */
-  float *rounded;                  /* in fine-tuning: parameters with rounded weights, [model.size], else NULL */
+  float *rounded;                  /* in fine-tuning: what sf_scales_round rounds, [model.size], else NULL */
   float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
   int averaged;
   float *density;     /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
@@ -242,8 +242,14 @@ static inline bool sf_tuning(const sf_trainer *t)
 {
   return t->model.scales.weight_bits > 0;
 }
+static const double sf_tuning_rate = 0.1; /* of the learning rates */
 /* Settles what fine-tuning does not learn. */
 sf_status sf_tuning_start(sf_trainer *trainer);
+/* Before an iteration: brings what is rounded up to the parameters. */
+void sf_tuning_round(sf_trainer *trainer);
+/* The model as the forward pass sees it, its nets or its field alone. */
+sf_model sf_tuning_nets(const sf_trainer *trainer);
+sf_model sf_tuning_field(const sf_trainer *trainer);
 /* Brings trainer->net up to the parameters. */
 void sf_train_prepare(sf_trainer *trainer);
 

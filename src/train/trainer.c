@@ -360,6 +360,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   if (t->stage == 3) return sf_fail(SF_E_RANGE, "train: this run is finished");
   const double start = sf_seconds();
   const int stage = t->stage;
+  sf_tuning_round(t);
   SF_TRY(t->backbone->begin(t, occupancy_steps(t)));
   SF_TRY(t->backbone->draw(t));
   SF_TRY(check_samples(t));

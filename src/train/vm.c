@@ -6,10 +6,8 @@
 
 static sf_status create(sf_trainer *t)
 {
-  if (t->model.scales.weight_bits)
-    return sf_fail(SF_E_UNSUPPORTED, "train: fine-tuning for few bits knows the hash grid's nets only");
   t->rays = 1024 < t->options.rays ? 1024 : t->options.rays;
-  t->stride = 4; /* as for the hash grid: while nothing is known to be empty */
+  t->stride = sf_tuning(t) ? 1 : 4; /* as for the hash grid: while nothing is known to be empty */
   sf_vm *vm = t->vm = calloc(1, sizeof *vm);
   if (!vm) return sf_fail(SF_E_MEMORY, "train: no memory");
   vm->decoder = sf_aligned_alloc(sizeof *vm->decoder);
@@ -63,7 +61,7 @@ static void init(sf_trainer *t)
 static sf_status begin(sf_trainer *t, int steps)
 {
   (void)steps; /* the density has none */
-  return sf_vm_grow(t);
+  return sf_tuning(t) ? sf_ok() : sf_vm_grow(t);
 }
 
 static sf_status check(const sf_trainer *t)

@@ -87,8 +87,9 @@ sf_status sf_vm_draw(sf_trainer *t)
   sf_vm *vm = t->vm;
   const uint64_t base = (uint64_t)t->iteration * RAYS_MAX;
   sf_status status[GROUPS] = {{0}};
-  vm->density = sf_vm_field_of(&t->model, false);
-  vm->appearance = sf_vm_field_of(&t->model, true);
+  const sf_model seen = sf_tuning_field(t);
+  vm->density = sf_vm_field_of(&seen, false);
+  vm->appearance = sf_vm_field_of(&seen, true);
   b->rays = t->rays;
   SF_TRY(sf_steps_make(&t->intervals, &t->model.config, t->stride));
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)

@@ -10,7 +10,7 @@ static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_work
   int lane = 0;
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     const sf_ray *ray = &t->batch.ray[r];
-    const sf_vm_direction d = sf_vm_encode_direction(f, ray->direction);
+    const sf_vm_direction d = sf_vm_encode_direction(&t->model, ray->direction);
     for (lane = ray->first; lane < ray->first + ray->count; lane++)
       sf_vm_put_direction(f, &d, ((sf_decoder_block *)w->block)[lane / SF_BLOCK].in, lane % SF_BLOCK);
   }
@@ -94,7 +94,8 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
 void sf_vm_prepare(sf_trainer *t, const sf_loss_plan *plan)
 {
   (void)plan;
-  const sf_decoder_view view = sf_decoder_view_of(&t->model);
+  const sf_model seen = sf_tuning_nets(t);
+  const sf_decoder_view view = sf_decoder_view_of(&seen);
   t->kernels->decoder_prepare(&view, t->vm->decoder);
   sf_batch_adapt(t);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 
 static const double l1_first = 8e-5, l1_rest = 4e-5; /* of the density, before and after the first mask */
+static const double tuning_nets = 0.5;               /* of the nets' rate: as much as of the hash grid's nets */
 static const double tv_weight = 1e-2;                /* of both fields, forward-facing scenes; decays with the rate */
 
 /* At most 16 components of one mode of one field. */
@@ -76,16 +77,21 @@ void sf_vm_update(sf_trainer *t)
 {
   const bool ndc = t->model.config.tensorf.ndc;
   const double from = t->vm->fresh_at, fade = pow(0.1, (t->progress - from) / fmax(1 - from, 1e-3));
-  sf_adam adam = {t->options.lr_grid * fade, 0.9, 0.99, 1e-8, t->iteration - t->vm->fresh + 1, 0};
+  sf_adam adam = {t->options.lr_grid * fade * (sf_tuning(t) ? sf_tuning_rate : 1),
+                  0.9,
+                  0.99,
+                  1e-8,
+                  t->iteration - t->vm->fresh + 1,
+                  0};
   scatter(t);
   for (int id = SF_P_DENSITY_PLANE; id < SF_P_BASIS; id++) {
     const sf_param *p = &t->model.param[id];
     const bool plane = p->dims == 3, density = id < SF_P_APP_PLANE;
     if (ndc && plane) add_variation(p, tv_weight * fade, t->model.value + p->offset, t->grad + p->offset);
-    adam.l1 = !ndc && density ? (float)((t->vm->event ? l1_rest : l1_first) / (double)p->size) : 0;
+    adam.l1 = !ndc && density ? (float)((t->vm->event || sf_tuning(t) ? l1_rest : l1_first) / (double)p->size) : 0;
     update_part(t, &adam, p);
   }
-  adam.lr = t->options.lr_net * fade;
+  adam.lr = t->options.lr_net * fade * (sf_tuning(t) ? tuning_nets : 1);
   adam.l1 = 0;
   const size_t nets = t->model.param[SF_P_BASIS].offset;
   t->kernels->adam(&adam, t->model.size - nets, t->model.value + nets, t->grad + nets, t->moment1 + nets,

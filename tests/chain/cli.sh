@@ -108,6 +108,12 @@ good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --voxels 16 --rays 64 --samples 256 --threads 1
+good sf_train d -o vm-tuned.safetensors --fine-tune vm.safetensors --weight-bits 4 --grid-bits 5 --leak-bits 6 --stage2 2 --samples 256 --threads 1
+good sf_export vm-tuned.safetensors -o vm-tuned.snn
+if ! grep -q "at 4-bit weights, 12-bit features, 6-bit leaks, 5-bit grid entries" stdout.txt; then fail "vm-tuned.safetensors" "is not exported with its own widths"; fi
+if grep -q "scales are not used" stdout.txt; then fail "vm-tuned.safetensors" "a note about widths that are its own"; fi
+good sf_export vm-tuned.safetensors -o vm-tuned.snn --grid-bits 8
+if ! grep -q "fine-tuned for 4-bit weights, 12-bit features and 5-bit grid entries; those scales are not used" stdout.txt; then fail "vm-tuned.safetensors" "no note about widths that are not its own"; fi
 good energy_audit s.snn d --rays 20 --rtl-rays 0 --twin twin.safetensors
 good energy_audit s.snn d --rays 20 --rtl-rays 0 --recount-rays 0 --json
 if grep -q '"core_equals_recount":.null' stdout.txt; then passed=$((passed + 1)); else fail "a recount of nothing" "is equal"; fi
@@ -188,7 +194,10 @@ number sf_train --backbone nerf
 number sf_train --voxels 8 2000 nan
 number sf_train --rays 1 nan
 usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
-data "vm.safetensors: --fine-tune knows" sf_train d -o out --fine-tune vm.safetensors
+for option in --backbone\ tensorf --voxels\ 32 --hidden\ 32; do
+  usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune vm.safetensors $option
+done
+usage "--levels has no effect on --backbone tensorf" sf_train d -o out --fine-tune vm.safetensors --levels 4
 for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3 --no-stage1 --no-distill --beta\ 1 --price\ energy --target-loss\ 1 --objective\ paper; do
   usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune model.safetensors $option
 done
@@ -215,7 +224,10 @@ usage "--charge has no effect on --net ann" sf_train d -o out --net ann --charge
 usage "exclude each other" sf_train d -o out --target-loss 0.1 --target-saving 50
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan
-usage --fine-tune sf_train d -o out --weight-bits 4
+number sf_train --leak-bits 3 13 nan
+number sf_train --grid-bits 1 9 nan
+for width in weight leak grid; do usage "--$width-bits needs --fine-tune" sf_train d -o out --$width-bits 4; done
+usage feature-bits sf_train d -o out --fine-tune model.safetensors --feature-bits 9
 data scale sf_train d -o out --fine-tune model.safetensors --scale 0.3
 usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan

@@ -17,10 +17,7 @@ tensorf-box fit hash grid only
 tensorf-ndc fit hash grid only
 tensorf sf_soc hash grid
 tensorf-box sf_soc hash grid
-tensorf-ndc sf_soc hash grid
-tensorf fine-tune hash grid
-tensorf-box fine-tune hash grid
-tensorf-ndc fine-tune hash grid'
+tensorf-ndc sf_soc hash grid'
 
 "$bin/sf_scene" textured -o object --size 40 --train 9 --test 2 --quiet >/dev/null
 "$bin/sf_scene" plaza -o place --size 40 --train 9 --test 2 --quiet >/dev/null

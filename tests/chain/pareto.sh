@@ -106,6 +106,36 @@ for bad in "--profile fast" "--every x" "--every 0" "--variants some" "--nosuch 
 done
 pareto part 1 --model "$work/nowhere" --data "$work"
 [ "$(count nowhere)" -eq 1 ] || fail "the missing model is not named"
+# A TensoRF model: widths that it has, and words for planes.
+"$programs/sf_train" "$data" -o "$work/planes.safetensors" --backbone tensorf --voxels 20 --rays 128 --samples 512 --stage1 10 --stage2 10 \
+  --steps 2 --occ-res 16 --hidden 32 --eval-views 1 --quiet >/dev/null || fail "the TensoRF model was not trained"
+build planes
+echo "TRANS_FRAC=20" >"$work/planes/arch"
+mkdir "$work/planes/pareto" && ln -s "$work/whole/pareto/variant" "$work/planes/pareto/" # built above
+pareto planes 0 --model "$work/planes.safetensors" --data "$data"
+sweep=$work/planes/pareto/smoke
+[ "$(count '^\[.* dB, elapsed')" -eq 9 ] || fail "TensoRF: not 9 points"
+[ "$(wc -l <"$sweep/points.csv")" -eq 10 ] || fail "TensoRF: points.csv has not 9 rows"
+[ -z "$(find "$sweep/points" -name '*feature*' -o -name '*H_SHIFT*')" ] || fail "TensoRF: points of widths that it has not"
+for line in '^## entries of planes and lines, bits' '^## weights and basis matrix, bits' '^- n: planes, points along the longest axis, [12]' \
+  '(weights, entries of planes and lines, states)' '^| w4 g4 |'; do
+  grep -q "$line" "$sweep/table.md" || fail "TensoRF: no '$line' in table.md"
+done
+grep -Eq 'hash|grid|inputs|current >>' "$sweep/table.md" && fail "TensoRF: words of a hash grid in table.md"
+grep -Eq 'grid entries|inputs f|current >>' "$sweep"/plots/*.gp && fail "TensoRF: words of a hash grid in a plot"
+grep -q "title 'entries of planes and lines, bits'" "$sweep/plots/widths.gp" || fail "TensoRF: planes have no line in widths.gp"
+if command -v gnuplot >/dev/null; then
+  for plot in widths front-energy front-bytes front-traffic; do
+    grep -q '</svg>' "$sweep/plots/$plot.svg" || fail "TensoRF: $plot.svg is not whole"
+  done
+fi
+cp "$work/whole/pareto/smoke/points/tiny.json" "$sweep/points/"
+pareto planes 1 --report
+[ "$(count 'fields of different kinds')" -eq 1 ] || fail "a hash grid in a sweep of planes"
+"$programs/sf_point" "$work/planes.safetensors" "$data" --feature-bits 9 >"$work/out" 2>&1 && fail "TensoRF: --feature-bits is taken"
+[ "$(count 'those of a TensoRF scene have 12')" -eq 1 ] || fail "TensoRF: --feature-bits: not said why"
+echo "TensoRF: its own widths"
+
 mkdir "$work/a" "$work/b"
 cp "$data/tiny.safetensors" "$work/a/t.safetensors"
 cp "$data/tiny.safetensors" "$work/b/t.safetensors"

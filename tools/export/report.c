@@ -28,10 +28,11 @@ void export_report_print(const fx_scene *scene, const sf_quant_report *report, b
   printf("packed: %lld bytes at %d-bit weights, %d-bit features, %d-bit leaks, %d-bit grid entries\n",
          (long long)report->packed_bytes, report->widths.weight_bits, report->widths.feature_bits,
          report->widths.leak_bits, report->widths.grid_bits);
-  if (report->unused_tuning)
+  const sf_quant_widths *unused = &report->unused;
+  if (unused->weight_bits)
     printf("note: fine-tuned for %d-bit weights, %d-bit features and %d-bit grid entries; those scales are not used "
            "here\n",
-           report->unused_tuning, SF_INPUT_BITS, SF_GRID_BITS);
+           unused->weight_bits, unused->feature_bits, unused->grid_bits);
   if (!fit) printf("error: RMS of the layer's currents against float, %d calibration samples\n", report->samples);
 }
 

@@ -65,17 +65,14 @@ static sf_status check_effect(train_arguments *a)
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--net",         "--steps",       "--input-mode",
-                                        "--hidden",      "--theta",       "--occ-res",
-                                        "--fixed-steps", "--stage1",      "--no-stage1",
-                                        "--no-extra",    "--no-penalty",  "--no-budget",
-                                        "--no-distill",  "--no-scaling",  "--beta",
-                                        "--price",       "--target-loss", "--target-saving",
-                                        "--objective",   "--search-rate", NULL},
-                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
-                           *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
-                                                                                  "--price",       "--objective",
-                                                                                  "--search-rate", NULL};
+  static const char *const
+      settled[] = {"--backbone",    "--net",           "--steps",       "--input-mode",  "--hidden",    "--theta",
+                   "--occ-res",     "--voxels",        "--fixed-steps", "--stage1",      "--no-stage1", "--no-extra",
+                   "--no-penalty",  "--no-budget",     "--no-distill",  "--no-scaling",  "--beta",      "--price",
+                   "--target-loss", "--target-saving", "--objective",   "--search-rate", NULL},
+      *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+      *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving", "--price",
+                                                             "--objective",   "--search-rate",   NULL};
   static const char *const spiking[] = {"--charge", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
@@ -109,8 +106,8 @@ static sf_status finish_options(train_arguments *a)
     return sf_fail(SF_E_USAGE, "--fixed-steps %d is more than T = %d", a->train.fixed_steps, c->steps);
   if (a->train.target_loss > 0 && a->train.target_saving > 0)
     return sf_fail(SF_E_USAGE, "--target-loss and --target-saving exclude each other");
-  if (a->weight_bits && !a->fine_tune) return sf_fail(SF_E_USAGE, "--weight-bits needs --fine-tune MODEL");
-  if (a->fine_tune && has_planes(a)) return sf_fail(SF_E_USAGE, "--fine-tune knows the hash grid's nets only");
+  const char *width = a->weight_bits ? "weight" : a->leak_bits ? "leak" : a->grid_bits ? "grid" : NULL;
+  if (width && !a->fine_tune) return sf_fail(SF_E_USAGE, "--%s-bits needs --fine-tune MODEL", width);
   return sf_ok();
 }
 
@@ -147,6 +144,18 @@ static sf_status restore(train_arguments *a, const char **path)
   return status;
 }
 
+/* A model to fine-tune has its field: it decides which options and defaults there are. */
+static sf_status take_backbone(train_arguments *a)
+{
+  sf_tensors set;
+  SF_TRY(sf_tensors_load(&set, a->fine_tune));
+  const char *text = sf_tensors_meta(&set, "backbone");
+  const long backbone = text ? strtol(text, NULL, 10) : SF_INGP;
+  if (backbone >= 0 && backbone < SF_FIELDS) a->train.config.backbone = (int32_t)backbone; /* else loading says it */
+  sf_tensors_free(&set);
+  return sf_ok();
+}
+
 /* TensoRF's defaults depend on the data: the options once more, on top of them. */
 static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *data)
 {
@@ -160,6 +169,10 @@ static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *dat
 sf_status train_parse(train_arguments *a, const char **path)
 {
   SF_TRY(parse(a, path));
+  if (a->fine_tune && !a->resume) {
+    SF_TRY(take_backbone(a));
+    SF_TRY(parse(a, path));
+  }
   if (!a->log) {
     snprintf(a->log_path, sizeof a->log_path, "%s.jsonl", a->output), a->log = a->log_path;
     SF_TRY(parse(a, path)); /* it is an output, too */

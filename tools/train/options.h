@@ -10,7 +10,8 @@ typedef struct train_arguments {
   const char *output, *log, *summary, *fine_tune;
   sf_train_options train;
   double scale, theta, checkpoint_minutes, gamma;
-  int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits;
+  int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits, leak_bits,
+      grid_bits;
   bool resume, quiet, json, no_budget;
   int argc;
   char **argv;

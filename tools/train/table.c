@@ -45,9 +45,13 @@ static sf_option *energy(train_arguments *a, sf_option *o)
       {"--steps", 'T', SF_ARG_INT, &t->config.steps, 1, SF_T_MAX, NULL, "T",
        "time steps unrolled in training (default 8)"},
       {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
-       "start from this trained model, at its t_r, with weights rounded as sf_export does; stage II alone"},
+       "start from this trained model, at its t_r, with its numbers rounded as sf_export does; stage II alone"},
       {"--weight-bits", 0, SF_ARG_INT, &a->weight_bits, 2, SF_WEIGHT_BITS, NULL, "B",
-       "of --fine-tune: bits of a weight (default 8)"}};
+       "of --fine-tune: bits of a weight (default 8)"},
+      {"--leak-bits", 0, SF_ARG_INT, &a->leak_bits, 4, SF_LEAK_FRAC, NULL, "B",
+       "of --fine-tune: fraction bits of a leak (default 12)"},
+      {"--grid-bits", 0, SF_ARG_INT, &a->grid_bits, 2, SF_GRID_BITS, NULL, "B",
+       "of --fine-tune: bits of an entry of the grid, or of planes and lines (default 8)"}};
   return sf_cli_add(o, list, COUNT(list));
 }
 
