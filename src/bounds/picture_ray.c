@@ -56,7 +56,7 @@ static void grid_direction(picture_tracer *t, const float direction[3])
 {
   float sh[SF_DIR_FEATURES];
   sf_sh4(direction, sh);
-  sf_scales_round_direction(&t->exact->model->scales, sh); /* as a fine-tuned model sees them */
+  sf_scales_round_direction(&t->exact->model->scales, sh, SF_DIR_FEATURES); /* as a fine-tuned model sees them */
   for (int j = 0; j < SF_DIR_FEATURES; j++) {
     t->real_dir[j] = sh[j] / t->exact->scene->units.dir_scale;
     t->dir[j] = sf_exact_is(t->exact, SF_EXACT_DIRECTION) ? t->real_dir[j] : t->ray.dir[j];
