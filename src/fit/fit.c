@@ -59,8 +59,8 @@ static double per_sample(uint64_t n, const fx_counts *counts)
   return counts->samples ? (double)n / (double)counts->samples : 0;
 }
 
-static sf_status describe(const sf_search *s, const fx_scene *scene, const sf_quant_widths *widths, const sf_fit_sum *sum,
-                          sf_fit_state *state)
+static sf_status describe(const sf_search *s, const fx_scene *scene, const sf_quant_widths *widths,
+                          const sf_fit_sum *sum, sf_fit_state *state)
 {
   const uint64_t checked = s->check_end - s->rank_end;
   sf_field_cost f;

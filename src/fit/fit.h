@@ -44,9 +44,10 @@ sf_status sf_fit_observe(const fx_scene *scene, const sf_fit_rays *rays, uint64_
                          sf_trim_use *use);
 
 typedef struct sf_fit_job {
-  const fx_scene *const *candidate; /* of any field: quantisations of one model; [0] is the reference, then narrower and narrower */
-  const sf_quant_widths *widths;    /* [candidates], no zeros */
-  int candidates;                   /* the last one that loses at most half of loss_db is trimmed */
+  const fx_scene *const
+      *candidate; /* of any field: quantisations of one model; [0] is the reference, then narrower and narrower */
+  const sf_quant_widths *widths; /* [candidates], no zeros */
+  int candidates;                /* the last one that loses at most half of loss_db is trimmed */
   const sf_fit_rays *rays, *tiles;
   const sf_technology *technology; /* its prices, everything counted, say what a cut saves */
   double loss_db;                  /* >= 0; 0: only what changes no bit on the rays */
@@ -66,7 +67,7 @@ typedef struct sf_fit_state {
   double box[3], distance; /* edges of the box, distance of samples, model units */
   sf_quant_widths widths;
   int64_t entries, zero_entries, cells; /* of planes and lines: numbers */
-  uint64_t bytes;             /* the field, weights, occupancy: what a memory has to hold */
+  uint64_t bytes;                       /* the field, weights, occupancy: what a memory has to hold */
   uint64_t cycles, energy_fj; /* of sum; energy: everything that the audit counts, with the cache that is built */
   double lookups, misses;     /* of the field, per sample of the nets */
   sf_fit_sum sum;

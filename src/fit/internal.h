@@ -17,7 +17,7 @@ extern const int sf_cut_kind_count;
 
 typedef struct sf_cut {
   int kind, place;
-  bool ranked; /* possible, and measured in this round */
+  bool ranked;         /* possible, and measured in this round */
   double loss, saving; /* relative: of the squared error; of energy plus of bytes */
 } sf_cut;
 

@@ -236,8 +236,7 @@ static bool observe_grid(const observer *o, int32_t n, const uint32_t pos[3], in
   fx_net_sample(&scene->net, f, base, &out, o->trace, NULL);
   fx_composite_add(pixel, &out, fx_delta(scene, n), 0);
   sf_trim_use_net(o->use, &scene->net, f, o->trace);
-  if (o->places)
-    sf_trim_use_place(o->use, scene, pos, fx_march_cell(scene, o->ray, n), before - pixel->transmittance);
+  if (o->places) sf_trim_use_place(o->use, scene, pos, fx_march_cell(scene, o->ray, n), before - pixel->transmittance);
   return pixel->samples >= (uint32_t)scene->max_samples;
 }
 

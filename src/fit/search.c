@@ -210,4 +210,3 @@ sf_status sf_search_rounds(sf_search *s)
   }
   return sf_ok();
 }
-

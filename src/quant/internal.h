@@ -138,9 +138,9 @@ static inline const fx_factors *sf_factors_of(const fx_tensorf *field, int which
 {
   return which == SF_OF_DENSITY ? &field->density : &field->appearance;
 }
-/* The trim's box: its place and what is measured in its longest edge; the cells of result, which are the scene's, in it;
- * the field in it, on the trim's points and with everything else. The last field is kept in `use`: of the many cuts that
- * are tried few change it. */
+/* The trim's box: its place and what is measured in its longest edge; the cells of result, which are the scene's, in
+ * it; the field in it, on the trim's points and with everything else. The last field is kept in `use`: of the many cuts
+ * that are tried few change it. */
 void sf_planes_set_box(const fx_scene *scene, const sf_trim_planes *p, fx_scene *result);
 sf_status sf_planes_crop(const fx_scene *scene, const sf_trim_planes *p, const char *name, fx_scene *result);
 sf_status sf_planes_shape(const fx_scene *scene, const sf_trim_planes *p, sf_trim_use *use, const char *name,

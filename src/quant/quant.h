@@ -82,10 +82,10 @@ typedef struct sf_trim {
 
 /* What the samples of a set of rays used. Counts of samples x steps but where it says otherwise. */
 typedef struct sf_trim_use {
-  uint64_t samples, steps;             /* through the nets; samples x steps */
-  uint64_t fired[SF_LAYERS][SF_LANES]; /* spikes; of D2: outputs h that were not 0 */
-  uint64_t feature[SF_FEATURE_MAX];    /* samples in which the feature was not 0 */
-  int64_t input[SF_DIR_MAX];           /* of a decoder: sum over the samples */
+  uint64_t samples, steps;                                     /* through the nets; samples x steps */
+  uint64_t fired[SF_LAYERS][SF_LANES];                         /* spikes; of D2: outputs h that were not 0 */
+  uint64_t feature[SF_FEATURE_MAX];                            /* samples in which the feature was not 0 */
+  int64_t input[SF_DIR_MAX];                                   /* of a decoder: sum over the samples */
   uint64_t component[SF_FACTORS][FX_PAIRS][FX_COMPONENTS_MAX]; /* samples to which its product gave something */
   uint64_t power[SF_FACTORS][FX_PAIRS][FX_COMPONENTS_MAX];     /* sum of weight and squared product */
   uint64_t *entry;            /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
@@ -129,8 +129,8 @@ bool sf_trim_points(sf_trim *trim, int axis, int parts);
 bool sf_trim_box(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim);
 bool sf_trim_line(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim, sf_factors_id which, int pair);
 
-/* Zeroes the entries of the field, or all components of points of planes and lines, that no position in an occupied cell
- * reads: no ray sees a difference. SF_E_MEMORY. */
+/* Zeroes the entries of the field, or all components of points of planes and lines, that no position in an occupied
+ * cell reads: no ray sees a difference. SF_E_MEMORY. */
 sf_status sf_trim_zero_unread(fx_scene *scene, const char *name);
 
 /* sf_dataset_load at the scale that the scene was trained at; where the scene does not tell, as the options say.

@@ -1,5 +1,5 @@
-/* The box and the points of TensoRF's planes and lines: a smaller box begins and ends at points of the scene; fewer points
- * are those of the nearest field (resample.c). Points that no occupied cell reads. */
+/* The box and the points of TensoRF's planes and lines: a smaller box begins and ends at points of the scene; fewer
+ * points are those of the nearest field (resample.c). Points that no occupied cell reads. */
 #include "src/fx/tensorf_place.h"
 #include "src/quant/internal.h"
 #include <math.h>
@@ -98,8 +98,7 @@ sf_status sf_planes_crop(const fx_scene *scene, const sf_trim_planes *p, const c
     memset(result->occupancy, 0, bytes);
   }
   for (int64_t cell = 0; room && cell < (int64_t)bytes * 8; cell++) {
-    const int64_t from =
-        ((int64_t)at[2][cell / res / res] * res + at[1][cell / res % res]) * res + at[0][cell % res];
+    const int64_t from = ((int64_t)at[2][cell / res / res] * res + at[1][cell / res % res]) * res + at[0][cell % res];
     if (old[from >> 3] >> (from & 7) & 1) result->occupancy[cell >> 3] |= (uint8_t)(1u << (cell & 7));
   }
   free(old), free(at[0]), free(at[1]), free(at[2]);
