@@ -53,7 +53,7 @@ static void print_planes(FILE *out, const sf_fit_state *b, const sf_fit_state *a
   line(out, "appearance components", b->components[SF_OF_APPEARANCE], a->components[SF_OF_APPEARANCE]);
   for (int i = 0; i < 3; i++) line(out, axis[i], b->points[i], a->points[i]);
   line(out, "volume of the box", volume(b->box), volume(a->box));
-  line(out, "distance of samples", b->distance, a->distance);
+  line(out, "samples per unit of a ray", 1 / b->distance, 1 / a->distance);
   line(out, "entries of planes and lines", (double)b->entries, (double)a->entries);
   line(out, "entries not zero", (double)(b->entries - b->zero_entries), (double)(a->entries - a->zero_entries));
   line(out, "features", b->features, a->features);

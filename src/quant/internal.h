@@ -148,7 +148,12 @@ sf_status sf_planes_shape(const fx_scene *scene, const sf_trim_planes *p, sf_tri
 int64_t sf_planes_zero_unread(fx_scene *scene);
 
 /* Whether a row of weights has one that is not 0, in columns that stay. */
-bool sf_row_matters(const fx_layer *layer, int row, const bool *column);
+static inline bool sf_row_matters(const fx_layer *layer, int row, const bool *column)
+{
+  for (int o = 0; o < layer->n_out; o++)
+    if (column[o] && layer->w[(size_t)row * SF_LANES + (size_t)o]) return true;
+  return false;
+}
 static inline int sf_count_kept(const bool *kept, int n)
 {
   int sum = 0;

@@ -100,13 +100,6 @@ void sf_trim_all(const fx_scene *scene, sf_trim *trim)
   trimmer_of(scene)->all(scene, trim);
 }
 
-bool sf_row_matters(const fx_layer *layer, int row, const bool *column)
-{
-  for (int o = 0; o < layer->n_out; o++)
-    if (column[o] && layer->w[(size_t)row * SF_LANES + (size_t)o]) return true;
-  return false;
-}
-
 int sf_trim_least(const sf_trim *trim, int layer)
 {
   return layer == FX_D2 && trim->directions == 0 ? 2 : 1;

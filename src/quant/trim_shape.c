@@ -172,9 +172,10 @@ static sf_status make_shape(const fx_scene *scene, const sf_trim_planes *p, cons
 {
   sf_taps taps[3] = {{0}};
   *shaped = *scene;
+  shaped->owner = NULL;
   memcpy(shaped->tensorf.res, p->points, sizeof p->points);
   sf_status status = fx_scene_allocate(shaped, name);
-  if (status.code != SF_OK) return status;
+  if (status.code != SF_OK) return status; /* no owner: the next trim tries again */
   float *room = malloc(3 * largest_plane(&scene->tensorf) * sizeof *room);
   if (!room) status = sf_fail(SF_E_MEMORY, "%s: no memory for fewer points", name);
   for (int axis = 0; axis < 3 && status.code == SF_OK; axis++)
