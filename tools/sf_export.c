@@ -2,7 +2,6 @@
  * of a scene for any simulator, its traces and graphs for other tools. */
 #include "cli/cli.h"
 #include "base/clock.h"
-#include "field/field.h"
 #include "fit/fit.h"
 #include "quant/quant.h"
 #include "tools/export/extras.h"
@@ -77,7 +76,9 @@ static sf_status quantise_narrower(const sf_model *model, const char *path, cons
   const sf_quant_widths *w = &o->widths;
   const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
   for (int i = 1; i < CANDIDATES && o->fit_loss > 0 && !asked; i++) {
-    const sf_status status = quantise(model, path, o, &narrower[i - 1], c);
+    sf_quant_widths widths = narrower[i - 1];
+    if (sf_model_decodes(model)) widths.feature_bits = SF_INPUT_BITS; /* a decoder's inputs have no other width */
+    const sf_status status = quantise(model, path, o, &widths, c);
     if (status.code == SF_E_UNSUPPORTED) break; /* too narrow for this model */
     SF_TRY(status);
   }
@@ -226,21 +227,13 @@ static sf_status export_model(const sf_model *model, const char *path, const opt
   return status;
 }
 
-static sf_status check_fit(const sf_config *config, const char *path)
-{
-  if (sf_field_decoded(sf_field_of(config)))
-    return sf_fail(SF_E_UNSUPPORTED, "%s: --fit: for models with a hash grid only, this is a TensoRF model", path);
-  return sf_ok();
-}
-
 static sf_status export_scene(const char *path, const options *o)
 {
   sf_model model;
   if (o->fit) sf_cli_catch_signals();
   SF_TRY(sf_model_load(&model, path));
   candidates *c = calloc(1, sizeof *c);
-  sf_status status = o->fit ? check_fit(&model.config, path) : sf_ok();
-  if (status.code == SF_OK) status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
+  const sf_status status = c ? export_model(&model, path, o, c) : sf_fail(SF_E_MEMORY, "no memory");
   for (int i = 0; c && i < CANDIDATES; i++) fx_scene_free(&c->scene[i]);
   free(c);
   sf_model_free(&model);

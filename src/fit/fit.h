@@ -44,9 +44,10 @@ sf_status sf_fit_observe(const fx_scene *scene, const sf_fit_rays *rays, uint64_
                          sf_trim_use *use);
 
 typedef struct sf_fit_job {
-  const fx_scene *const *candidate; /* quantisations of one model; [0] is the reference, then narrower and narrower */
-  const sf_quant_widths *widths;    /* [candidates], no zeros */
-  int candidates;                   /* the last one that loses at most half of loss_db is trimmed */
+  const fx_scene *const
+      *candidate; /* of any field: quantisations of one model; [0] is the reference, then narrower and narrower */
+  const sf_quant_widths *widths; /* [candidates], no zeros */
+  int candidates;                /* the last one that loses at most half of loss_db is trimmed */
   const sf_fit_rays *rays, *tiles;
   const sf_technology *technology; /* its prices, everything counted, say what a cut saves */
   double loss_db;                  /* >= 0; 0: only what changes no bit on the rays */
@@ -59,12 +60,16 @@ typedef struct sf_fit_job {
 /* A scene's sizes, and what the checking rays cost and lose. */
 typedef struct sf_fit_state {
   int32_t n_in[SF_LAYERS], n_out[SF_LAYERS];
+  bool planes; /* TensoRF's; else a hash grid */
   int32_t levels, directions, steps, trans_stop;
+  int32_t components[SF_FACTORS]; /* of all pairs */
+  int32_t features, feature_freqs, view_freqs, points[3], weight_stop;
+  double box[3], distance; /* edges of the box, distance of samples, model units */
   sf_quant_widths widths;
-  int64_t entries, zero_entries, cells;
-  uint64_t bytes;             /* grid tables, weights, occupancy: what a memory has to hold */
+  int64_t entries, zero_entries, cells; /* of planes and lines: numbers */
+  uint64_t bytes;                       /* the field, weights, occupancy: what a memory has to hold */
   uint64_t cycles, energy_fj; /* of sum; energy: everything that the audit counts, with the cache that is built */
-  double lookups, misses;     /* of the field, per sample */
+  double lookups, misses;     /* of the field, per sample of the nets */
   sf_fit_sum sum;
   double psnr; /* dB against the pictures */
 } sf_fit_state;
@@ -88,6 +93,7 @@ typedef struct sf_fit_report {
   sf_fit_state before, after;
   int silent[SF_LAYERS], dropped[SF_LAYERS]; /* neurons without effect on the observed rays; further ones, at a loss */
   int idle_levels, dropped_levels, smaller_tables;
+  int idle_components[SF_FACTORS], dropped_components[SF_FACTORS];
   sf_fit_cache cache[SF_FIT_CACHES];
   int cache_chosen; /* the smallest within a hundredth of the least energy */
 } sf_fit_report;

@@ -216,27 +216,64 @@ sf_status sf_fit_measure_field(const fx_scene *scene, const sf_fit_rays *tiles, 
 
 /* ---- use ---- */
 
-/* fx_render_ray, with a look at the position, features, spikes and weight of every sample. */
+/* What a sample of a ray is seen by. */
+typedef struct observer {
+  const fx_scene *scene;
+  const fx_ray *ray;
+  bool places;
+  fx_trace *trace;
+  sf_trim_use *use;
+} observer;
+
+/* Both: fx_render_ray, with a look at what every sample uses. n: the lattice point; true: the ray ends. */
+static bool observe_grid(const observer *o, int32_t n, const uint32_t pos[3], int32_t *base, fx_pixel *pixel)
+{
+  const fx_scene *scene = o->scene;
+  int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
+  fx_out out;
+  const uint32_t before = pixel->transmittance;
+  fx_grid_features(&scene->grid, pos, f, NULL);
+  fx_net_sample(&scene->net, f, base, &out, o->trace, NULL);
+  fx_composite_add(pixel, &out, fx_delta(scene, n), 0);
+  sf_trim_use_net(o->use, &scene->net, f, o->trace);
+  if (o->places) sf_trim_use_place(o->use, scene, pos, fx_march_cell(scene, o->ray, n), before - pixel->transmittance);
+  return pixel->samples >= (uint32_t)scene->max_samples;
+}
+
+static bool observe_planes(const observer *o, int32_t n, const uint32_t pos[3], int32_t *base, fx_pixel *pixel)
+{
+  const fx_scene *scene = o->scene;
+  int16_t x[SF_DIR_MAX];
+  fx_out out;
+  const uint32_t sigma = fx_tensorf_density(&scene->tensorf, pos, NULL);
+  const uint32_t weight = fx_composite_weight(pixel, sigma, fx_delta(scene, n), 0);
+  sf_trim_use_factors(o->use, &scene->tensorf, SF_OF_DENSITY, pos, weight);
+  if (o->places) sf_trim_use_place(o->use, scene, pos, fx_march_cell(scene, o->ray, n), weight);
+  if (weight <= (uint32_t)scene->tensorf.weight_stop) return false;
+  sf_trim_use_factors(o->use, &scene->tensorf, SF_OF_APPEARANCE, pos, weight);
+  fx_tensorf_encode(&scene->tensorf, pos, o->ray->unit, x, NULL);
+  fx_net_direction(&scene->net, x, base, NULL);
+  fx_net_sample(&scene->net, NULL, base, &out, o->trace, NULL);
+  fx_composite_colour(pixel, weight, out.colour);
+  sf_trim_use_net(o->use, &scene->net, x, o->trace);
+  return pixel->samples >= (uint32_t)scene->max_samples;
+}
+
 static sf_status observe_ray(const fx_scene *scene, const sf_fit_rays *rays, uint64_t i, bool places, fx_trace *trace,
                              sf_trim_use *use)
 {
+  const bool planes = scene->backbone == FX_TENSORF;
   fx_ray ray;
+  const observer o = {scene, &ray, places, trace, use};
   fx_pixel pixel;
   int32_t base[SF_LANES];
   uint32_t pos[3];
   SF_TRY(make_ray(scene, rays, i, &ray));
   fx_composite_begin(&pixel);
-  fx_net_direction(&scene->net, ray.dir, base, NULL);
+  if (!planes) fx_net_direction(&scene->net, ray.dir, base, NULL);
   for (int32_t n = fx_march_next(scene, &ray, 0, pos, NULL); n >= 0; n = fx_march_next(scene, &ray, n + 1, pos, NULL)) {
-    int16_t f[FX_LEVELS_MAX * FX_GRID_FEATURES];
-    fx_out out;
-    const uint32_t before = pixel.transmittance;
-    fx_grid_features(&scene->grid, pos, f, NULL);
-    fx_net_sample(&scene->net, f, base, &out, trace, NULL);
-    fx_composite_add(&pixel, &out, fx_delta(scene, n), 0);
-    sf_trim_use_net(use, &scene->net, f, trace);
-    if (places) sf_trim_use_place(use, scene, pos, fx_march_cell(scene, &ray, n), before - pixel.transmittance);
-    if (pixel.transmittance <= (uint32_t)scene->trans_stop || pixel.samples >= (uint32_t)scene->max_samples) break;
+    const bool full = planes ? observe_planes(&o, n, pos, base, &pixel) : observe_grid(&o, n, pos, base, &pixel);
+    if (full || pixel.transmittance <= (uint32_t)scene->trans_stop) break;
   }
   return sf_ok();
 }

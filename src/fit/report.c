@@ -20,25 +20,61 @@ static void print_dropped(FILE *out, const sf_fit_report *r)
           " rays (D1 %d, C1 %d, C2 %d, h %d), further ones (D1 %d, C1 %d, C2 %d, h %d),\n",
           r->observed, r->silent[FX_D1], r->silent[FX_C1], r->silent[FX_C2], r->silent[FX_D2], r->dropped[FX_D1],
           r->dropped[FX_C1], r->dropped[FX_C2], r->dropped[FX_D2]);
-  fprintf(out, "  levels without effect %d, further levels %d, smaller tables %d; unread grid entries are zero\n",
-          r->idle_levels, r->dropped_levels, r->smaller_tables);
+  if (r->before.planes)
+    fprintf(out,
+            "  components without effect (density %d, appearance %d), further ones (density %d, appearance %d); "
+            "unread points are zero\n",
+            r->idle_components[SF_OF_DENSITY], r->idle_components[SF_OF_APPEARANCE],
+            r->dropped_components[SF_OF_DENSITY], r->dropped_components[SF_OF_APPEARANCE]);
+  else
+    fprintf(out, "  levels without effect %d, further levels %d, smaller tables %d; unread grid entries are zero\n",
+            r->idle_levels, r->dropped_levels, r->smaller_tables);
+}
+
+static void print_grid(FILE *out, const sf_fit_state *b, const sf_fit_state *a)
+{
+  line(out, "D1 neurons", b->n_out[FX_D1], a->n_out[FX_D1]);
+  line(out, "D2 outputs", b->n_out[FX_D2], a->n_out[FX_D2]);
+  line(out, "spherical harmonics", b->directions, a->directions);
+  line(out, "grid levels", b->levels, a->levels);
+  line(out, "grid entries", (double)b->entries, (double)a->entries);
+  line(out, "grid entries not zero", (double)(b->entries - b->zero_entries), (double)(a->entries - a->zero_entries));
+}
+
+static double volume(const double box[3])
+{
+  return box[0] * box[1] * box[2];
+}
+
+static void print_planes(FILE *out, const sf_fit_state *b, const sf_fit_state *a)
+{
+  static const char *const axis[] = {"points along x", "points along y", "points along z"};
+  line(out, "density components", b->components[SF_OF_DENSITY], a->components[SF_OF_DENSITY]);
+  line(out, "appearance components", b->components[SF_OF_APPEARANCE], a->components[SF_OF_APPEARANCE]);
+  for (int i = 0; i < 3; i++) line(out, axis[i], b->points[i], a->points[i]);
+  line(out, "volume of the box", volume(b->box), volume(a->box));
+  line(out, "samples per unit of a ray", 1 / b->distance, 1 / a->distance);
+  line(out, "entries of planes and lines", (double)b->entries, (double)a->entries);
+  line(out, "entries not zero", (double)(b->entries - b->zero_entries), (double)(a->entries - a->zero_entries));
+  line(out, "features", b->features, a->features);
+  line(out, "sines of a feature", b->feature_freqs, a->feature_freqs);
+  line(out, "sines of the direction", b->view_freqs, a->view_freqs);
+  line(out, "inputs of the decoder", b->n_in[FX_C1], a->n_in[FX_C1]);
 }
 
 static void print_sizes(FILE *out, const sf_fit_state *b, const sf_fit_state *a)
 {
-  line(out, "D1 neurons", b->n_out[FX_D1], a->n_out[FX_D1]);
-  line(out, "D2 outputs", b->n_out[FX_D2], a->n_out[FX_D2]);
+  if (b->planes)
+    print_planes(out, b, a);
+  else
+    print_grid(out, b, a);
   line(out, "C1 neurons", b->n_out[FX_C1], a->n_out[FX_C1]);
   line(out, "C2 neurons", b->n_out[FX_C2], a->n_out[FX_C2]);
-  line(out, "spherical harmonics", b->directions, a->directions);
   line(out, "time steps", b->steps, a->steps);
   line(out, "bits of a weight", b->widths.weight_bits, a->widths.weight_bits);
   line(out, "bits of an input", b->widths.feature_bits, a->widths.feature_bits);
   line(out, "bits of a leak", b->widths.leak_bits, a->widths.leak_bits);
-  line(out, "bits of a grid entry", b->widths.grid_bits, a->widths.grid_bits);
-  line(out, "grid levels", b->levels, a->levels);
-  line(out, "grid entries", (double)b->entries, (double)a->entries);
-  line(out, "grid entries not zero", (double)(b->entries - b->zero_entries), (double)(a->entries - a->zero_entries));
+  line(out, "bits of an entry", b->widths.grid_bits, a->widths.grid_bits);
   line(out, "occupied cells", (double)b->cells, (double)a->cells);
   line(out, "bytes to hold", (double)b->bytes, (double)a->bytes);
 }
@@ -63,6 +99,9 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
   print_dropped(out, r);
   fprintf(out, "  %-28s %15s %15s %10s\n", "", "before", "after", "saved");
   print_sizes(out, b, a);
+  if (b->planes)
+    line(out, "densities per frame", (double)b->sum.counts.field_samples / frames,
+         (double)a->sum.counts.field_samples / frames);
   line(out, "samples per frame", (double)b->sum.counts.samples / frames, (double)a->sum.counts.samples / frames);
   line(out, "MACs per frame", (double)sf_event_total(&b->sum.counts, SF_EVENT_MAC) / frames,
        (double)sf_event_total(&a->sum.counts, SF_EVENT_MAC) / frames);
@@ -73,6 +112,9 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
   line(out, "energy per frame, mJ", (double)b->energy_fj * 1e-12 / frames, (double)a->energy_fj * 1e-12 / frames);
   fprintf(out, "  transmittance to stop at     %15.3g %15.3g\n", ldexp(b->trans_stop, -SF_TRANS_FRAC),
           ldexp(a->trans_stop, -SF_TRANS_FRAC));
+  if (b->planes)
+    fprintf(out, "  weight of a sample to decode %15.3g %15.3g\n", ldexp(b->weight_stop, -SF_TRANS_FRAC),
+            ldexp(a->weight_stop, -SF_TRANS_FRAC));
   print_caches(out, r, frames);
 }
 
@@ -106,6 +148,28 @@ static void add_real(cJSON *json, const char *key, double value)
     cJSON_AddNullToObject(json, key);
 }
 
+static void add_planes(cJSON *json, const sf_fit_state *s)
+{
+  cJSON_AddNumberToObject(json, "density_components", s->components[SF_OF_DENSITY]);
+  cJSON_AddNumberToObject(json, "appearance_components", s->components[SF_OF_APPEARANCE]);
+  cJSON_AddItemToObject(json, "points", cJSON_CreateIntArray(s->points, 3));
+  cJSON_AddItemToObject(json, "box", cJSON_CreateDoubleArray(s->box, 3));
+  cJSON_AddNumberToObject(json, "distance", s->distance);
+  cJSON_AddNumberToObject(json, "entries", (double)s->entries);
+  cJSON_AddNumberToObject(json, "features", s->features);
+  cJSON_AddNumberToObject(json, "feature_freqs", s->feature_freqs);
+  cJSON_AddNumberToObject(json, "view_freqs", s->view_freqs);
+  cJSON_AddNumberToObject(json, "weight_stop", s->weight_stop);
+  sf_json_add_u64(json, "densities", s->sum.counts.field_samples);
+}
+
+static void add_grid(cJSON *json, const sf_fit_state *s)
+{
+  cJSON_AddNumberToObject(json, "directions", s->directions);
+  cJSON_AddNumberToObject(json, "levels", s->levels);
+  cJSON_AddNumberToObject(json, "grid_entries", (double)s->entries);
+}
+
 /* Counts are those of the checking rays. */
 static cJSON *state_json(const sf_fit_state *s)
 {
@@ -113,10 +177,11 @@ static cJSON *state_json(const sf_fit_state *s)
   add_real(json, "psnr", s->psnr);
   cJSON_AddItemToObject(json, "n_in", cJSON_CreateIntArray(s->n_in, SF_LAYERS));
   cJSON_AddItemToObject(json, "n_out", cJSON_CreateIntArray(s->n_out, SF_LAYERS));
-  cJSON_AddNumberToObject(json, "directions", s->directions);
+  if (s->planes)
+    add_planes(json, s);
+  else
+    add_grid(json, s);
   cJSON_AddNumberToObject(json, "steps", s->steps);
-  cJSON_AddNumberToObject(json, "levels", s->levels);
-  cJSON_AddNumberToObject(json, "grid_entries", (double)s->entries);
   cJSON_AddNumberToObject(json, "zero_entries", (double)s->zero_entries);
   cJSON_AddNumberToObject(json, "occupied_cells", (double)s->cells);
   cJSON_AddNumberToObject(json, "trans_stop", s->trans_stop);
@@ -142,9 +207,14 @@ cJSON *sf_fit_json(const sf_fit_report *r)
   cJSON_AddNumberToObject(json, "candidate", r->chosen);
   cJSON_AddItemToObject(json, "neurons_without_effect", layers_json(r->silent));
   cJSON_AddItemToObject(json, "neurons_dropped", layers_json(r->dropped));
-  cJSON_AddNumberToObject(json, "levels_without_effect", r->idle_levels);
-  cJSON_AddNumberToObject(json, "levels_dropped", r->dropped_levels);
-  cJSON_AddNumberToObject(json, "tables_smaller", r->smaller_tables);
+  if (r->before.planes) {
+    cJSON_AddItemToObject(json, "components_without_effect", cJSON_CreateIntArray(r->idle_components, SF_FACTORS));
+    cJSON_AddItemToObject(json, "components_dropped", cJSON_CreateIntArray(r->dropped_components, SF_FACTORS));
+  } else {
+    cJSON_AddNumberToObject(json, "levels_without_effect", r->idle_levels);
+    cJSON_AddNumberToObject(json, "levels_dropped", r->dropped_levels);
+    cJSON_AddNumberToObject(json, "tables_smaller", r->smaller_tables);
+  }
   cJSON_AddItemToObject(json, "caches", caches_json(r));
   cJSON_AddItemToObject(json, "before", state_json(&r->before));
   cJSON_AddItemToObject(json, "after", state_json(&r->after));

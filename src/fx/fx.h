@@ -294,6 +294,8 @@ int fx_tensorf_inputs(const fx_tensorf *field);
 int64_t fx_tensorf_bytes(const fx_tensorf *field); /* planes, lines and basis matrix */
 /* What the basis matrix multiplies, for its fit: x[appearance components], Q.1 of the LSB of a product; how many. */
 int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t *x);
+/* The products whose sum is the density's, Q.16 of their LSB: product[density components]; how many. */
+int fx_tensorf_density_products(const fx_tensorf *field, const uint32_t pos[3], int32_t *product);
 
 /* Position of lattice point n on an axis, Q24.40; the length of its interval in box edges, Q0.24; its distance from the
  * camera in lattice steps, Q16.16. */

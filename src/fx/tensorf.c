@@ -83,6 +83,15 @@ int fx_tensorf_products(const fx_tensorf *field, const uint32_t pos[3], int16_t 
   return vm_products(field, pos, x);
 }
 
+int fx_tensorf_density_products(const fx_tensorf *field, const uint32_t pos[3], int32_t *product)
+{
+  const vm_place p = vm_find(field->res, pos);
+  int n = 0;
+  for (int pair = 0; pair < FX_PAIRS; n += field->density.components[pair++])
+    vm_pair(&field->density, pair, field->res, &p, product + n);
+  return n;
+}
+
 /* value in Q1.14 to the LSB of the encodings; 1.0 at the finest LSB is one too many for int12. */
 static int16_t encoded(const fx_tensorf *field, int32_t value)
 {

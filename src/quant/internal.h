@@ -113,4 +113,61 @@ sf_corners sf_grid_corners(const fx_grid *grid, int level, const uint32_t low[3]
 int64_t sf_grid_entry(const fx_grid *grid, int level, uint32_t x, uint32_t y, uint32_t z);
 /* Copies a level into table `to` of 2^log2_size hashed entries (log2_size < 0: as it is). */
 void sf_grid_copy_level(const fx_grid *grid, int level, int log2_size, const uint64_t *use, int8_t *to, double *sum);
+void sf_grid_use_entries(sf_trim_use *use, const fx_grid *grid, const uint32_t pos[3], uint32_t weight);
+/* Zeroes entries that no occupied cell reads; how many are zero then, or -1 without memory. */
+int64_t sf_grid_zero_unread(fx_scene *scene);
+
+/* What is particular to a field when a scene is trimmed; nets, time steps and occupancy are one for all. */
+typedef struct sf_field_trimmer {
+  sf_status (*use_create)(sf_trim_use *use, const fx_scene *scene);
+  void (*all)(const fx_scene *scene, sf_trim *trim);
+  void (*exact)(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim); /* neurons are settled */
+  /* Of the inputs of the first layer those that stay. */
+  void (*inputs)(const fx_scene *scene, const sf_trim *trim, bool *row);
+  void (*set_sizes)(const fx_scene *scene, const sf_trim *trim, fx_scene *result);
+  /* The field's numbers; result->occupancy holds the cells that stay, in the scene's box. */
+  sf_status (*fill)(const fx_scene *scene, const sf_trim *trim, sf_trim_use *use, const char *name, fx_scene *result);
+  int64_t (*zero_unread)(fx_scene *scene); /* returns how many entries are zero then, or -1 without memory */
+} sf_field_trimmer;
+extern const sf_field_trimmer sf_grid_trimmer, sf_planes_trimmer;
+
+enum { SF_STRIDE_ONE = 1 << 16 };
+static inline const fx_factors *sf_factors_of(const fx_tensorf *field, int which)
+{
+  return which == SF_OF_DENSITY ? &field->density : &field->appearance;
+}
+/* The trim's box: its place and what is measured in its longest edge; the cells of result, which are the scene's, in
+ * it; the field in it, on the trim's points and with everything else. The last field is kept in `use`: of the many cuts
+ * that are tried few change it. */
+void sf_planes_set_box(const fx_scene *scene, const sf_trim_planes *p, fx_scene *result);
+sf_status sf_planes_crop(const fx_scene *scene, const sf_trim_planes *p, const char *name, fx_scene *result);
+sf_status sf_planes_shape(const fx_scene *scene, const sf_trim_planes *p, sf_trim_use *use, const char *name,
+                          const fx_tensorf **field);
+int64_t sf_planes_zero_unread(fx_scene *scene);
+
+/* Whether a row of weights has one that is not 0, in columns that stay. */
+static inline bool sf_row_matters(const fx_layer *layer, int row, const bool *column)
+{
+  for (int o = 0; o < layer->n_out; o++)
+    if (column[o] && layer->w[(size_t)row * SF_LANES + (size_t)o]) return true;
+  return false;
+}
+static inline int sf_count_kept(const bool *kept, int n)
+{
+  int sum = 0;
+  for (int i = 0; i < n; i++) sum += kept[i];
+  return sum;
+}
+
+/* The function that is linear between n_from points low..high of from[rows][n_from][n], as the nearest one (least
+ * squares) that is linear between n_to points: to[rows][n_to][n]. Taps are the matrix that does it. */
+typedef struct sf_taps {
+  int n_to, width;
+  int *first;    /* [n_to] of the points that a new one is made of */
+  float *weight; /* [n_to][width] */
+} sf_taps;
+sf_status sf_taps_make(sf_taps *taps, int low, int high, int n_to);
+void sf_taps_free(sf_taps *taps);
+/* An old axis of n_from points; what they have, n numbers, lies side by side. */
+void sf_taps_apply(const sf_taps *taps, const float *from, size_t rows, size_t n_from, size_t n, float *to);
 #endif

@@ -54,31 +54,53 @@ int64_t sf_packed_bytes(const fx_scene *scene, const sf_quant_widths *widths);
 /* ---- trimming: a scene without the parts that it does not need ---- */
 
 enum { SF_CELL_CLASSES = 16 };
+typedef enum { SF_OF_DENSITY, SF_OF_APPEARANCE, SF_FACTORS } sf_factors_id; /* of TensoRF's planes and lines */
 
-/* Which parts of a scene stay. All steps, thresholds and weights keep their meaning, so the result is an ordinary
+/* Of TensoRF's field. low, high: grid points of the scene at the ends of the box; from one to the other there are
+ * `points` on an axis. */
+typedef struct sf_trim_planes {
+  bool component[SF_FACTORS][FX_PAIRS][FX_COMPONENTS_MAX];
+  bool feature[FX_APPEARANCE_MAX]; /* with its sines and cosines */
+  int32_t feature_freqs, view_freqs;
+  int32_t low[3], high[3], points[3];
+  int32_t stride_q16; /* distance of samples in the scene's, 65536 = as it is */
+  int32_t weight_stop;
+} sf_trim_planes;
+
+/* Which parts of a scene stay. All time steps, thresholds and weights keep their meaning, so the result is an ordinary
  * scene. */
 typedef struct sf_trim {
   bool neuron[SF_LAYERS][SF_LANES]; /* D1, C1, C2; of D2 the outputs: [0] is the density and always stays */
   bool level[FX_LEVELS_MAX];        /* of the grid, with their two features */
   int32_t log2_size[FX_LEVELS_MAX]; /* -1: the level's table as it is; else hashed into this many entries */
   int32_t directions;               /* leading spherical harmonics, >= 1 unless the scene has none */
-  int32_t steps, trans_stop;        /* as in fx_net, fx_scene */
-  bool cells[SF_CELL_CLASSES];      /* occupancy cells by class (sf_cell_class): all of a class stay or go */
+  sf_trim_planes planes;
+  int32_t steps, trans_stop;   /* as in fx_net, fx_scene */
+  bool cells[SF_CELL_CLASSES]; /* occupancy cells by class (sf_cell_class): all of a class stay or go */
 } sf_trim;
 
-/* What the samples of a set of rays used. Counts of samples x steps but `entry`, `visits`, `weight2`. */
+/* What the samples of a set of rays used. Counts of samples x steps but where it says otherwise. */
 typedef struct sf_trim_use {
-  uint64_t fired[SF_LAYERS][SF_LANES]; /* spikes; of D2: outputs h that were not 0 */
-  uint64_t feature[SF_FEATURE_MAX];    /* samples in which the feature was not 0 */
+  uint64_t samples, steps;                                     /* through the nets; samples x steps */
+  uint64_t fired[SF_LAYERS][SF_LANES];                         /* spikes; of D2: outputs h that were not 0 */
+  uint64_t feature[SF_FEATURE_MAX];                            /* samples in which the feature was not 0 */
+  int64_t input[SF_DIR_MAX];                                   /* of a decoder: sum over the samples */
+  uint64_t component[SF_FACTORS][FX_PAIRS][FX_COMPONENTS_MAX]; /* samples to which its product gave something */
+  uint64_t power[SF_FACTORS][FX_PAIRS][FX_COMPONENTS_MAX];     /* sum of weight and squared product */
   uint64_t *entry;            /* [entries] sum over the samples that read the entry of compositing weight + 1 LSB */
   int64_t cells;              /* of all cascades */
   uint64_t *visits, *weight2; /* [cells] samples; sum of their squared compositing weights, Q.40 */
+  fx_scene *shaped;           /* sf_trim_apply's own: the planes last resampled, and for which box and points */
+  sf_trim_planes shape;
 } sf_trim_use;
 sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene);
 void sf_trim_use_free(sf_trim_use *use);
-/* One sample, from many threads at once; weight: what it contributed to its ray, Q.TRANS_FRAC. */
+/* One sample, from many threads at once. net: f[fx_net_inputs] and what they caused; place: weight is what it
+ * contributed to its ray, Q.TRANS_FRAC; factors: the products at a position. */
 void sf_trim_use_net(sf_trim_use *use, const fx_net *net, const int16_t *f, const fx_trace *trace);
 void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t pos[3], int64_t cell, uint32_t weight);
+void sf_trim_use_factors(sf_trim_use *use, const fx_tensorf *field, sf_factors_id which, const uint32_t pos[3],
+                         uint32_t weight);
 
 /* Mean squared weight of a cell's samples by octave, as if one more had been seen whole (Laplace's rule of
  * succession): few samples are no proof that a cell is empty. 0: 1.0 or no samples. */
@@ -87,10 +109,11 @@ int sf_cell_class(const sf_trim_use *use, int64_t cell);
 /* Everything stays. */
 void sf_trim_all(const fx_scene *scene, sf_trim *trim);
 /* Then without what changes nothing on the rays of `use`: neurons that never fired or have no weights to what stays,
- * harmonics and levels likewise. At least one neuron of a layer and one level stay. */
+ * harmonics, levels, components, features and sines likewise. At least one of each kind stays. */
 void sf_trim_exact(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim);
-/* A scene of its own (fx_scene_free). Entries that meet in a smaller table are averaged by their use. */
-sf_status sf_trim_apply(const fx_scene *scene, const sf_trim *trim, const sf_trim_use *use, const char *name,
+/* A scene of its own (fx_scene_free). Entries that meet in a smaller table are averaged by their use. Where a layer has
+ * a bias, what goes of its inputs leaves its mean there. */
+sf_status sf_trim_apply(const fx_scene *scene, const sf_trim *trim, sf_trim_use *use, const char *name,
                         fx_scene *result);
 
 /* Outputs that must stay in a layer: one, and one h where C1 has no other input. */
@@ -99,9 +122,15 @@ int sf_trim_least(const sf_trim *trim, int layer);
 int sf_trim_smaller(const fx_scene *scene, const sf_trim *trim, int level);
 int64_t sf_grid_level_entries(const fx_grid *grid, int level);
 
-/* Zeroes the entries that no position in an occupied cell reads: no ray sees a difference. Returns how many entries
- * are zero then, or -1 without memory. */
-int64_t sf_grid_zero_unread(fx_scene *scene);
+/* Of planes; each says whether anything went. Of `parts` parts of an axis' points one goes; the box down to the cells
+ * that stay; the least used components of a pair, as many as fill its last line of memory. */
+bool sf_trim_points(sf_trim *trim, int axis, int parts);
+bool sf_trim_box(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim);
+bool sf_trim_line(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim, sf_factors_id which, int pair);
+
+/* Zeroes the entries of the field, or all components of points of planes and lines, that no position in an occupied
+ * cell reads: no ray sees a difference. SF_E_MEMORY. */
+sf_status sf_trim_zero_unread(fx_scene *scene, const char *name);
 
 /* sf_dataset_load at the scale that the scene was trained at; where the scene does not tell, as the options say.
  * Options with another scale are refused, and another scene's data (sf_space_check): SF_E_RANGE. Of a scene that does

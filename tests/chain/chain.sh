@@ -61,10 +61,20 @@ check_tensorf() {
   "$bin/error_budget" "$dir/m.safetensors" "$dir/s.snn" "$dir" --rays 20 --samples 1000 --quiet >"$dir/budget.txt" ||
     fail "tensorf: error budget"
   grep -q '^weight test: every sample decoded' "$dir/budget.txt" || fail "tensorf: the error budget has no weight test"
-  if "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" 2>"$dir/refused.err" >/dev/null; then
-    fail "tensorf: sf_export --fit is not refused"
-  fi
-  grep -q 'hash grid only' "$dir/refused.err" || fail "tensorf: $(cat "$dir/refused.err")"
+  "$bin/sf_export" "$dir/m.safetensors" -o "$dir/fit.snn" --fit --data "$dir" --fit-rays 512 --fit-loss 0.2 --quiet --json >"$dir/fit.json"
+  python3 - "$dir/fit.json" <<'PYTHON' || fail "tensorf: fit"
+import json, sys
+fit = json.load(open(sys.argv[1]))["fit"]
+before, after = fit["before"], fit["after"]
+assert fit["loss_db"] <= fit["bound_db"] == 0.2
+assert after["bytes"] < before["bytes"] and after["energy_fj"] < before["energy_fj"] and after["entries"] < before["entries"]
+PYTHON
+  "$bin/sim_render" "$dir/fit.snn" "$dir" --view 1 --backend fixed --crop 16,16,8,8 -o "$dir/fixed.exr" >/dev/null
+  "$bin/sim_render" "$dir/fit.snn" "$dir" --view 1 --backend rtl --crop 16,16,8,8 -o "$dir/rtl.exr" >/dev/null
+  cmp "$dir/fixed.exr" "$dir/rtl.exr" || fail "tensorf: the fitted scene's image differs in the RTL"
+  "$bin/sf_cosim" "$dir/fit.snn" "$dir" --rays 12 --seed 8 --json >"$dir/fit-cosim.json" || fail "tensorf: co-simulation of the fitted scene"
+  grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "tensorf: the fitted scene differs in the RTL"
+  "$bin/energy_audit" "$dir/fit.snn" "$dir" --rays 100 --json >"$dir/audit.json" || fail "tensorf: audit of the fitted scene"
   echo "tensorf: ok"
 }
 check_tensorf
