@@ -64,7 +64,7 @@ static sf_status run_words(const uint32_t *word, int n, bool stopped, uint32_t *
   sf_dut *dut;
   sf_soc *soc;
   const sf_soc_options options = {.instructions = 4000000, .uart = keep_output, .tick = stopped ? stop_at_once : NULL};
-  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open_dut(&dut, false, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &options));
   memcpy(sf_soc_memory(soc, SF_SOC_RAM, (uint64_t)n * 4), word, (size_t)n * 4);
   sf_soc_begin_at(soc, SF_SOC_RAM);
@@ -247,7 +247,7 @@ static void same_as_core(scenario *other, int stall)
   const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
-  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
+  ck_ok(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output));
 }
 
 LOOP_TEST(the_firmware_renders_what_the_core_renders, 3)
@@ -312,7 +312,7 @@ LOOP_TEST(a_driver_that_writes_wrongly_is_seen, COUNT(wrong_write))
   const sf_status status = run_firmware();
   ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
   ck_assert_int_eq(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH).code, SF_E_DIFFERENCE);
-  ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+  ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
 }
 
 TEST(a_bus_without_an_answer_ends_the_run)
@@ -383,7 +383,7 @@ TEST(a_tile_that_is_too_large_is_refused)
 
 static void expect_audit(const scenario *s, const char *text, const char *reason)
 {
-  ck_bad(sf_soc_compare_audit(&s->counts, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
+  ck_bad(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
 }
 
 TEST(the_comparison_sees_every_change)
@@ -394,10 +394,10 @@ TEST(the_comparison_sees_every_change)
     for (char *c = at; *c != '\n'; c++) {
       const char was = *c;
       *c = was == '1' ? '2' : '1';
-      ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+      ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
       *c = was;
     }
-  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
+  ck_ok(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output));
   expect_audit(s, "", "firmware \"nothing\"");
   snprintf(text, sizeof text, "%.16000saudit more\n", output);
   expect_audit(s, text, "one line too many: \"audit more\"");
@@ -438,7 +438,7 @@ TEST(a_bad_program_file_is_refused)
              {5000, 0, 0x7f, "is cut short"}};
   OWNED(sf_dut) *dut = NULL;
   sf_soc *soc;
-  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open_dut(&dut, false, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const char was = whole[bad[i].at];
