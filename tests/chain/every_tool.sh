@@ -18,9 +18,6 @@ tensorf-ndc fit hash grid only
 tensorf error_budget hash grid only
 tensorf-box error_budget hash grid only
 tensorf-ndc error_budget hash grid only
-tensorf sf_soc hash grid
-tensorf-box sf_soc hash grid
-tensorf-ndc sf_soc hash grid
 tensorf fine-tune hash grid
 tensorf-box fine-tune hash grid
 tensorf-ndc fine-tune hash grid'
