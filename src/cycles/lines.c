@@ -89,28 +89,47 @@ static uint64_t fetch(lines *l, uint64_t at)
   return later(l->second_beat + 2, l->misses ? l->pop[(l->misses - 1) % LINES_RING] + 1 : 0);
 }
 
+/* Room that is counted a cycle late: a line that goes right behind another one is let in where that one was. left: the
+ * one before; freed: when places became free, `room` of which there are. */
+static uint64_t enter_room(const lines *l, uint64_t at, uint64_t left, const uint64_t freed[LINES_RING], uint64_t room)
+{
+  if (l->count && left + 1 == at && (l->count <= room || ago(l, freed, room + 1) + 2 <= at)) return at;
+  return l->count < room ? at : later(at, ago(l, freed, room) + 2);
+}
+
+/* From the place of its point to the pairs. */
+static uint64_t leave_reads(lines *l, uint64_t ready)
+{
+  l->issued = pipe_enter(&l->reads, ready);
+  const uint64_t reached = pipe_reach(&l->reads, l->issued);
+  const uint64_t at = l->count < PAIRS ? reached : later(reached, ago(l, l->taken, PAIRS) + 1);
+  const uint64_t left = enter_room(l, at, l->reads.left[(l->reads.count - 1) % PIPE_MAX], l->came, READS_ROOM);
+  pipe_leave(&l->reads, reached, left);
+  return left;
+}
+
+static uint64_t leave_tags(lines *l, bool miss)
+{
+  const uint64_t reached = pipe_reach(&l->tags, l->tag_entered), before = l->tags.left[(l->tags.count - 1) % PIPE_MAX];
+  uint64_t left = enter_room(l, reached, before, l->queued, QUEUE);
+  if (miss) left = later(left, fetch_ready(l));
+  pipe_leave(&l->tags, reached, left);
+  return left;
+}
+
 uint64_t lines_next(lines *l, uint32_t line, uint64_t ready, bool empty)
 {
   const uint64_t i = l->count % LINES_RING;
-  l->issued = pipe_enter(&l->reads, ready);
-  const uint64_t reached = pipe_reach(&l->reads, l->issued);
-  uint64_t left =
-      later(reached, later(ago(l, l->taken, PAIRS) + 1, l->count >= READS_ROOM ? ago(l, l->came, READS_ROOM) + 2 : 0));
-  if (l->count < PAIRS) left = reached;
-  pipe_leave(&l->reads, reached, left);
-  l->taken[i] = later(left + 1, l->pair_left);
+  l->taken[i] = later(leave_reads(l, ready) + 1, l->pair_left);
   l->pair_left = leave_pairs(l, l->taken[i], empty);
   if (empty) fx_cache_empty(&l->cache);
   l->tag_entered = enter_tags(l, line, l->pair_left + 1);
   const bool miss = fx_cache_look_up(&l->cache, &line, 1);
-  const uint64_t tagged = pipe_reach(&l->tags, l->tag_entered);
-  const uint64_t room = l->count >= QUEUE ? ago(l, l->queued, QUEUE) + 2 : 0;
-  const uint64_t tag_left = later(later(tagged, room), miss ? fetch_ready(l) : 0);
-  pipe_leave(&l->tags, tagged, tag_left);
-  const uint64_t head = later(tag_left + 3, l->head_left + 1);
-  l->head_left = miss ? later(head, fetch(l, tag_left)) : head;
+  const uint64_t tagged = leave_tags(l, miss);
+  l->queued[i] = l->count ? later(tagged + 1, l->head - 1) : tagged + 1;
+  l->head = later(tagged + 3, l->head_left + 1);
+  l->head_left = miss ? later(l->head, fetch(l, tagged)) : l->head;
   if (miss) l->pop[l->misses++ % LINES_RING] = l->head_left;
-  l->queued[i] = later(tag_left + 1, head - 2);
   l->came[i] = l->head_left + 3;
   l->line[i] = line;
   l->count++;

@@ -20,7 +20,7 @@ typedef struct lines {
   uint64_t count, misses;
   uint64_t pop[LINES_RING]; /* of lines from the memory */
   pipe reads, tags;
-  uint64_t issued, pair_left, tag_entered, head_left, asked, second_beat;
+  uint64_t issued, pair_left, tag_entered, head, head_left, asked, second_beat;
   bool blank; /* nothing was looked up since the cache was emptied */
 } lines;
 

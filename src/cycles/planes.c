@@ -100,10 +100,12 @@ static uint64_t taken_at(sf_planes_model *m, uint64_t number)
   return m->items[number % RING_READS].taken;
 }
 
-/* There is room for one more from this cycle on. */
+/* There is room for one more from this cycle on, which is counted a cycle late. */
 static uint64_t room_for_item(sf_planes_model *m)
 {
-  return m->pushed < ITEMS ? 0 : taken_at(m, m->pushed - ITEMS) + 2;
+  if (m->pushed == 0) return 0;
+  const uint64_t behind = m->items[(m->pushed - 1) % RING_READS].pushed + 2;
+  return m->pushed < ITEMS ? behind : later(behind, taken_at(m, m->pushed - ITEMS) + 2);
 }
 
 static void push_item(sf_planes_model *m, item next)
