@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BUILDS = 3 };
+enum { BUILDS = 3, MEMORY_LATENCY = 16 };
 
 /* Builds of the design space: a quarter, a half, all of the lanes at once. */
 static const sf_engine builds[BUILDS] = {
@@ -296,6 +296,10 @@ static sf_status run(job *j)
   char name[256];
   if (j->opt.plot) SF_TRY(sf_plot_name(j->opt.plot, name));
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
+  if (j->opt.latency && j->scene.backbone == FX_INGP)
+    return sf_fail(SF_E_USAGE, "--latency has no effect: %.200s has a hash grid, whose field is not modelled",
+                   j->opt.scene);
+  if (!j->opt.latency) j->opt.latency = MEMORY_LATENCY;
   const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, j->opt.scene, j->opt.data, j->opt.split, &how));
   sf_dataset_warn(stderr, "sf_cycles", &j->data, NULL);
@@ -325,7 +329,7 @@ static sf_status check_effect(const options *o, const sf_cli *cli, int argc, cha
 
 int main(int argc, char **argv)
 {
-  job j = {.opt = {.split = "test", .clock = 200, .latency = 16, .engine = sf_engine_default}};
+  job j = {.opt = {.split = "test", .clock = 200, .engine = sf_engine_default}};
   options *o = &j.opt;
   const sf_option table[] = {
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K", "which view of the split, from 0 (default 0)"},
