@@ -374,8 +374,8 @@ int main(int argc, char **argv)
       .summary =
           "Runs the firmware on an emulated RV32IM system with the Verilated accelerator: it renders a tile and\n"
           "prints the audit over its UART. The accelerator computes the nets of a scene with a hash grid, and makes\n"
-          "pixels of positions for one of TensoRF. Pixels and audit are compared with the fixed-point core. Exit status 1\n"
-          "on a difference, and when the firmware fails, traps or does not end.",
+          "pixels of positions for one of TensoRF. Pixels and audit are compared with the fixed-point core. Exit\n"
+          "status 1 on a difference, and when the firmware fails, traps or does not end.",
       .examples = "  sf_soc scene.snn data --view 3 --crop 40,40,16,16 --png tile.png\n"
                   "  sf_soc scene.snn data --stall 20 --json\n"
                   "  sf_soc scene.snn data --save-image tile.img\n"

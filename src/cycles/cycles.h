@@ -1,7 +1,7 @@
 /* Cycle model of the accelerator: the control of rtl/sf_core.sv and its neighbours with counts in place of bitmaps, so
  * that whole frames get latency, frames per second and utilisation. Equal to the RTL's cycle counter when the streams
- * never make it wait (tests/test_rtl.c). It begins where features come in: the encoder of a hash grid, its cache and its
- * memory are not in it, and tests/bench_field.c measures what they add to a frame. Of TensoRF planes.h has them. */
+ * never make it wait (tests/test_rtl.c). It begins where features come in: the encoder of a hash grid, its cache and
+ * its memory are not in it, and tests/bench_field.c measures what they add to a frame. Of TensoRF planes.h has them. */
 #ifndef SF_CYCLES_CYCLES_H
 #define SF_CYCLES_CYCLES_H
 #include "fx/fx.h"
