@@ -70,7 +70,7 @@ HDF5_CFLAGS := $(if $(HDF5_LIBS),-DSF_HDF5 $(patsubst -I%,-isystem %,$(shell pkg
 RISCV ?= riscv64-unknown-elf-
 UNICORN_LIBS := $(shell pkg-config --libs unicorn 2>/dev/null)
 SOC_MISSING := $(strip $(if $(UNICORN_LIBS),,libunicorn-dev) $(if $(shell command -v $(RISCV)gcc),,$(RISCV)gcc))
-NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc)
+NO_SOC := $(if $(UNICORN_LIBS),,sf_soc) $(if $(SOC_MISSING),test_soc test_soc_planes)
 TOOLS := $(filter-out $(NO_SOC),$(patsubst tools/%.c,%,$(wildcard tools/*.c)))
 TESTS := $(filter-out $(NO_SOC),$(patsubst tests/%.c,%,$(wildcard tests/test_*.c)))
 # Scripts that try whole programs; they take longest, so they begin.
@@ -81,7 +81,7 @@ CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
 # Those that drive the Verilated accelerator.
-DUT_TESTS := bench bench_field test_jobs test_three_counts $(filter test_rtl% test_soc,$(TESTS))
+DUT_TESTS := bench bench_field test_jobs test_three_counts $(filter test_rtl% test_soc%,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 

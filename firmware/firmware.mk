@@ -32,7 +32,7 @@ endif
 ifeq ($(SOC_MISSING),)
 $B/bin/sf_soc: | $(FIRMWARE)
 endif
-$B/bin/sf_soc $B/tests/test_soc: DUT_LDLIBS += $(UNICORN_LIBS)
+$B/bin/sf_soc $B/tests/test_soc $B/tests/test_soc_planes: DUT_LDLIBS += $(UNICORN_LIBS)
 
 FIRMWARE_RUN ?= $B/demo/scene.snn $B/demo/scene
 ifeq ($(SOC_MISSING),)

@@ -1,7 +1,9 @@
 /* Renders a tile: takes scene and rays from the image in memory, programs the accelerator, walks every ray with the
- * fixed-point core's own marching, grid and compositing (src/fx) while the accelerator computes the nets, leaves the
- * pixels behind the image and prints the audit: the accelerator's counters, their energy, a checksum of the picture.
+ * fixed-point core's own marching (src/fx), leaves the pixels behind the image and prints the audit: the accelerator's
+ * counters, their energy, a checksum of the picture. In a scene with a hash grid the core's grid and compositing run
+ * here, and the accelerator computes the nets; in one of TensoRF it makes pixels of positions.
  * Whatever goes wrong is one line that begins with "error: ", and exit status 1. */
+#include "firmware/sf_ray_stream.h"
 #include "firmware/sf_soc.h"
 #include "firmware/sf_stream.h"
 #include "firmware/sf_tile.h"
@@ -24,6 +26,7 @@ static void mmio_write(void *context, uint32_t offset, uint32_t value)
 
 static const sf_bus accelerator = {mmio_read, mmio_write, (void *)SF_SOC_ACCELERATOR};
 static const sf_bus stream = {mmio_read, mmio_write, (void *)SF_SOC_STREAM};
+static const sf_bus rays = {mmio_read, mmio_write, (void *)SF_SOC_RAYS};
 
 static int fail(const char *what, const char *why, const char *detail)
 {
@@ -36,12 +39,29 @@ static int fail(const char *what, const char *why, const char *detail)
   return 1;
 }
 
-/* A device that was found has an ERROR register to say more. */
-static int fail_driver(const char *what, sf_driver_code code)
+/* A device that was found has ERROR registers to say more. */
+static int fail_driver(const sf_tile *tile, const char *what, sf_driver_code code)
 {
   const bool found = code == SF_DRIVER_REFUSED || code == SF_DRIVER_TIMEOUT;
   const uint32_t error = found ? accelerator.read(accelerator.context, SF_CSR_ERROR) : 0;
-  return fail(what, sf_driver_text(code), error ? sf_driver_error_text(error) : NULL);
+  const uint32_t of_rays = found && tile->lines ? accelerator.read(accelerator.context, SF_CSR_RAY_ERROR) : 0;
+  return fail(what, sf_driver_text(code),
+              error     ? sf_driver_error_text(error)
+              : of_rays ? sf_ray_driver_error_text(of_rays)
+                        : NULL);
+}
+
+/* The planes stay where they are in the image. */
+static sf_driver_code load_planes(const sf_tile *tile)
+{
+  const fx_scene *scene = &tile->scene;
+  sf_ray_blob blob = {.trans_stop = (uint32_t)scene->trans_stop,
+                      .max_samples = (uint32_t)scene->max_samples,
+                      .table = (uint32_t)(uintptr_t)tile->lines};
+  for (int o = 0; o < 3; o++) blob.background[o] = (uint32_t)scene->background[o];
+  const sf_driver_code code = sf_ray_driver_load(&accelerator, &blob, &tile->planes);
+  if (code == SF_DRIVER_OK) sf_ray_driver_clear(&accelerator);
+  return code;
 }
 
 /* fx_net_fn: the accelerator in the place of fx_net_sample. */
@@ -56,7 +76,15 @@ static sf_status accelerate(void *user, const fx_ray *ray, bool first, const int
   return status;
 }
 
-static sf_driver_code render(const sf_tile *tile)
+static sf_driver_code render_rays(const sf_tile *tile)
+{
+  sf_driver_code code = SF_DRIVER_OK;
+  for (uint32_t i = 0; i < tile->width * tile->height && code == SF_DRIVER_OK; i++)
+    code = sf_ray_stream_pixel(&rays, &tile->scene, &tile->rays[i], i == 0, &tile->pixels[i]);
+  return code;
+}
+
+static sf_driver_code render_samples(const sf_tile *tile)
 {
   eval e = {.stream = sf_stream_for(&stream, &tile->net)};
   for (uint32_t i = 0; i < tile->width * tile->height; i++)
@@ -71,7 +99,23 @@ static uint64_t total(const sf_driver_counters *counters, int event, int layer)
   return sum;
 }
 
-static void print_audit(const sf_driver_counters *counters, uint32_t rgba_crc)
+static void print_field(void)
+{
+  sf_field_counters field;
+  sf_ray_driver_field(&accelerator, &field);
+  sf_uart_number("\naudit lookups ", field.lookups);
+  sf_uart_number(" misses ", field.misses);
+}
+
+/* A decoder cannot tell where a ray begins. */
+static uint64_t rays_with_samples(const sf_tile *tile)
+{
+  uint64_t n = 0;
+  for (uint32_t i = 0; i < tile->width * tile->height; i++) n += tile->pixels[i].samples > 0;
+  return n;
+}
+
+static void print_audit(const sf_tile *tile, const sf_driver_counters *counters)
 {
   static const char *const event[SF_EVENTS] = {
 #define EVENT(id, name, title, unit, fj) " " #name " ",
@@ -87,9 +131,10 @@ static void print_audit(const sf_driver_counters *counters, uint32_t rgba_crc)
     energy += total(counters, SF_EVENT_MAC, l) * SF_MAC_FJ + total(counters, SF_EVENT_SOP, l) * SF_SOP_FJ;
   }
   sf_uart_number("audit samples ", counters->samples);
-  sf_uart_number(" rays ", counters->rays);
+  sf_uart_number(" rays ", tile->lines ? rays_with_samples(tile) : counters->rays);
+  if (tile->lines) print_field();
   sf_uart_number("\naudit energy_fj ", energy);
-  sf_uart_hex("\naudit rgba_crc ", rgba_crc);
+  sf_uart_hex("\naudit rgba_crc ", sf_rgba_crc(tile->pixels, tile->width * tile->height));
   sf_uart_number("\ncycles ", counters->cycles);
   sf_uart_number(" busy ", counters->busy);
   sf_uart_text("\n");
@@ -100,8 +145,8 @@ static void print_tile(const sf_tile *tile)
   sf_uart_number("tile ", tile->width);
   sf_uart_number(" x ", tile->height);
   sf_uart_number(" pixels, ", (uint64_t)tile->net.steps);
-  sf_uart_number(" time steps, ", (uint64_t)tile->net.layer[0].n_in);
-  sf_uart_text(" features\n");
+  sf_uart_number(" time steps, ", tile->lines ? tile->planes.features : (uint64_t)tile->net.layer[0].n_in);
+  sf_uart_text(tile->lines ? " features of planes\n" : " features\n");
 }
 
 int main(void)
@@ -113,16 +158,18 @@ int main(void)
   if (why) return fail("image", why, NULL);
   print_tile(&tile);
   sf_driver_code code = sf_driver_probe(&accelerator);
-  if (code != SF_DRIVER_OK) return fail_driver("probe", code);
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "probe", code);
   code = sf_driver_load(&accelerator, &tile.net);
-  if (code != SF_DRIVER_OK) return fail_driver("load", code);
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "load", code);
+  if (tile.lines) code = load_planes(&tile);
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "load planes", code);
   code = sf_driver_clear(&accelerator);
-  if (code != SF_DRIVER_OK) return fail_driver("clear counters", code);
-  code = render(&tile);
-  if (code != SF_DRIVER_OK) return fail_driver("render", code);
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "clear counters", code);
+  code = (tile.lines ? render_rays : render_samples)(&tile);
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "render", code);
   code = sf_driver_read_counters(&accelerator, &counters);
-  if (code != SF_DRIVER_OK) return fail_driver("read counters", code);
-  print_audit(&counters, sf_rgba_crc(tile.pixels, tile.width * tile.height));
+  if (code != SF_DRIVER_OK) return fail_driver(&tile, "read counters", code);
+  print_audit(&tile, &counters);
   sf_uart_text("done\n");
   return 0;
 }

@@ -29,6 +29,7 @@ typedef struct sf_planes_scale_blob {
 typedef struct sf_planes_array_blob {
   uint32_t plane, line, point_lines; /* first lines of 16 bytes, and lines of a point */
 } sf_planes_array_blob;
+enum { SF_PLANES_WORDS = 39 }; /* of 32 bits, before the basis: the same ones in every program */
 typedef struct sf_planes_blob {
   uint32_t res[3], relu, weight_stop, features, feature_freqs, view_freqs, frac;
   sf_planes_scale_blob scale[SF_PLANES_SCALES]; /* density_in, sigma_out, feature_in, phase_in */

@@ -2,7 +2,7 @@
 #include "firmware/sf_soc.h"
 #include <stddef.h>
 
-enum { POLLS_MAX = 100000, VALUES = 4, RESULT_BEATS = 2 };
+enum { VALUES = 4, RESULT_BEATS = 2 };
 
 static uint32_t get(const sf_stream *stream, uint32_t offset)
 {
@@ -25,11 +25,17 @@ static uint32_t pair(const int16_t *value, int n)
   return (n > 0 ? (uint16_t)value[0] : 0u) | (n > 1 ? (uint32_t)(uint16_t)value[1] << 16 : 0u);
 }
 
+sf_driver_code sf_stream_await(const sf_bus *bus, uint32_t offset, uint32_t state, uint32_t *status)
+{
+  for (int32_t i = 0; i < SF_STREAM_POLLS; i++)
+    if ((*status = bus->read(bus->context, offset)) & state) return SF_DRIVER_OK;
+  return SF_DRIVER_TIMEOUT;
+}
+
 static sf_driver_code await(const sf_stream *stream, uint32_t state)
 {
-  for (int32_t i = 0; i < POLLS_MAX; i++)
-    if (get(stream, SF_STREAM_STATUS) & state) return SF_DRIVER_OK;
-  return SF_DRIVER_TIMEOUT;
+  uint32_t status;
+  return sf_stream_await(&stream->bus, SF_STREAM_STATUS, state, &status);
 }
 
 /* n values as beats of four, the last one filled with zeros. */

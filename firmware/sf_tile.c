@@ -1,8 +1,10 @@
 #include "firmware/sf_tile.h"
+#include "fx/cache.h"
+#include "fx/tensorf.h"
 #include <stdbool.h>
-#include <stddef.h>
+#include <string.h>
 
-enum { CRC_FROM = offsetof(sf_tile_header, width), LOG2_BOUND_MAX = 6 };
+enum { CRC_FROM = offsetof(sf_tile_header, width), LOG2_BOUND_MAX = 6, PLANES_BYTES = SF_PLANES_WORDS * 4 };
 
 uint32_t sf_crc32(uint32_t crc, const void *data, uint32_t size)
 {
@@ -55,15 +57,60 @@ static bool level_fits(const sf_tile_header *h, uint32_t level)
   return h->offset[level] <= h->entries && size <= h->entries - h->offset[level];
 }
 
-static bool scene_fits(const sf_tile_header *h)
+static bool grid_fits(const sf_tile_header *h)
 {
-  const uint64_t res = h->occ_res;
-  if (res < 2 || res > 256 || (res & (res - 1)) != 0 || h->levels < 1 || h->levels > FX_LEVELS_MAX) return false;
-  if (h->log2_bound > LOG2_BOUND_MAX || (h->steps && !inside(h, h->steps, sizeof(fx_steps)))) return false;
+  if (h->levels < 1 || h->levels > FX_LEVELS_MAX) return false;
   for (uint32_t level = 0; level < h->levels; level++)
     if (!level_fits(h, level)) return false;
-  return inside(h, h->table, (uint64_t)h->entries * FX_GRID_FEATURES) &&
-         inside(h, h->occupancy, (h->log2_bound + 1) * (res * res * res / 8));
+  return !h->lines && inside(h, h->table, (uint64_t)h->entries * FX_GRID_FEATURES);
+}
+
+static sf_planes_blob planes_of(const sf_tile_header *h, const uint8_t *block)
+{
+  sf_planes_blob planes;
+  memcpy(&planes, block + h->planes, PLANES_BYTES);
+  planes.basis = (const int8_t *)block + h->planes + PLANES_BYTES;
+  return planes;
+}
+
+/* So many points from a line of the memory on. */
+static bool points_fit(const sf_tile_header *h, uint64_t line, uint64_t points, uint64_t point_lines)
+{
+  return inside(h, h->lines, (line + points * point_lines) * FX_LINE);
+}
+
+static bool planes_fit(const sf_tile_header *h, const uint8_t *block)
+{
+  if (h->levels || h->entries || h->table || h->lines % FX_LINE || !inside(h, h->planes, PLANES_BYTES)) return false;
+  const sf_planes_blob planes = planes_of(h, block);
+  uint64_t rows = 0;
+  for (int axis = 0; axis < 3; axis++) {
+    if (planes.res[axis] < 1 || planes.res[axis] > FX_TENSORF_RES_MAX) return false;
+    if (planes.components[axis] > FX_COMPONENTS_MAX) return false;
+    rows += planes.components[axis];
+  }
+  for (int i = 0; i < SF_PLANES_ARRAYS; i++) {
+    const sf_planes_array_blob *array = &planes.array[i];
+    const int *axes = fx_pair_axes[i % FX_PAIRS];
+    const uint64_t points = (uint64_t)planes.res[axes[0]] * planes.res[axes[1]], n = array->point_lines;
+    if (n > FX_COMPONENTS_MAX / FX_LINE || !points_fit(h, array->plane, points, n)) return false;
+    if (!points_fit(h, array->line, planes.res[axes[2]], n)) return false;
+  }
+  return inside(h, h->planes, PLANES_BYTES + rows * SF_PLANES_FEATURES);
+}
+
+static bool space_fits(const sf_tile_header *h)
+{
+  const uint64_t res = h->occ_res;
+  if (res < 2 || res > 256 || (res & (res - 1)) != 0 || h->log2_bound > LOG2_BOUND_MAX) return false;
+  if (h->steps && !inside(h, h->steps, sizeof(fx_steps))) return false;
+  return inside(h, h->occupancy, (h->log2_bound + 1) * (res * res * res / 8));
+}
+
+/* Of what the header says: a grid's features are the net's, planes come before a net without densities. */
+static bool net_fits(const sf_tile_header *h, const sf_net_blob *net)
+{
+  return net->layer[0].n_in == (int32_t)h->levels * FX_GRID_FEATURES && (net->layer[0].n_out == 0) == (h->planes != 0);
 }
 
 static fx_grid grid_of(const sf_tile_header *h, uint8_t *block)
@@ -81,7 +128,8 @@ static fx_grid grid_of(const sf_tile_header *h, uint8_t *block)
 
 static void point_into(const sf_tile_header *h, uint8_t *block, sf_tile *tile)
 {
-  tile->scene = (fx_scene){.grid = grid_of(h, block),
+  tile->scene = (fx_scene){.backbone = h->planes ? FX_TENSORF : FX_INGP,
+                           .grid = grid_of(h, block),
                            .occ_res = (int32_t)h->occ_res,
                            .log2_bound = (int32_t)h->log2_bound,
                            .occupancy = block + h->occupancy,
@@ -90,6 +138,8 @@ static void point_into(const sf_tile_header *h, uint8_t *block, sf_tile *tile)
                            .max_samples = h->max_samples,
                            .trans_stop = h->trans_stop,
                            .background = {h->background[0], h->background[1], h->background[2]}};
+  if (h->planes) tile->planes = planes_of(h, block);
+  tile->lines = h->planes ? block + h->lines : NULL;
   tile->rays = (const fx_ray *)(block + h->rays);
   tile->width = h->width, tile->height = h->height;
   tile->pixels = (fx_pixel *)(block + sf_tile_pixels_at(h->bytes));
@@ -103,10 +153,10 @@ const char *sf_tile_open(uint8_t *block, uint32_t space, sf_tile *tile)
   if (h->bytes < sizeof *h || h->bytes > space) return "cut short, or larger than the memory";
   if (sf_crc32(0, block + CRC_FROM, h->bytes - CRC_FROM) != h->crc) return "damaged: wrong checksum";
   if (!tile_fits(h, space)) return "the tile does not fit";
-  if (!scene_fits(h)) return "grid or occupancy do not fit";
+  if (!space_fits(h) || !(h->planes ? planes_fit(h, block) : grid_fits(h))) return "field or occupancy do not fit";
   if (!inside(h, h->net, h->net_bytes) || sf_blob_open(block + h->net, h->net_bytes, &tile->net))
     return "the net is not whole";
-  if (tile->net.layer[0].n_in != (int32_t)h->levels * FX_GRID_FEATURES) return "net and grid differ";
+  if (!net_fits(h, &tile->net)) return "net and field differ";
   point_into(h, block, tile);
   return NULL;
 }

@@ -1,12 +1,16 @@
 /* The image: a scene and a tile of rays as one block of memory, all that the firmware needs to make pixels.
- * Little-endian; the header, then in any order, each 8-byte aligned: the net (sf_blob.h), the grid's table, the
- * occupancy bitmaps of all cascades, one fx_ray per pixel, row by row; where steps grow, an fx_steps. */
+ * Little-endian; the header, then in any order, each 8-byte aligned: the net (sf_blob.h), the field, the occupancy
+ * bitmaps of all cascades, one fx_ray per pixel, row by row; where steps grow, an fx_steps. The field: a hash grid's
+ * table; or of TensoRF the words of sf_planes_blob with its basis matrix behind them, and the lines that the
+ * accelerator reads (fx_tensorf_memory), 16-byte aligned. */
 #ifndef SF_FIRMWARE_SF_TILE_H
 #define SF_FIRMWARE_SF_TILE_H
 #include "firmware/sf_blob.h"
+#include "firmware/sf_ray_driver.h"
 #include "fx/fx.h"
+#include <stddef.h>
 
-enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 3, SF_TILE_SIDE_MAX = 4096 };
+enum { SF_TILE_MAGIC = 0x4d494653 /* "SFIM" */, SF_TILE_VERSION = 4, SF_TILE_SIDE_MAX = 4096 };
 
 typedef struct sf_tile_header {
   uint32_t magic, version;
@@ -16,6 +20,7 @@ typedef struct sf_tile_header {
   uint32_t net, net_bytes, table, occupancy, rays; /* where each part begins, from the image's first byte */
   uint32_t levels, entries, occ_res;               /* from here on: as in fx_scene and fx_grid */
   uint32_t log2_bound, steps;                      /* steps: where they begin; 0: they are equal */
+  uint32_t planes, lines;                          /* where they begin; 0: a hash grid. Else no levels and entries */
   int32_t step_q24, max_samples, trans_stop, background[3];
   int32_t scale_q16[FX_LEVELS_MAX], stride[FX_LEVELS_MAX], log2_size[FX_LEVELS_MAX], shift[FX_LEVELS_MAX];
   uint32_t offset[FX_LEVELS_MAX];
@@ -24,12 +29,15 @@ typedef struct sf_tile_header {
 /* The same bytes for the host that writes them and the processor that reads them. */
 _Static_assert(sizeof(sf_tile_header) % 8 == 0, "the first part begins aligned");
 _Static_assert(sizeof(fx_ray) == 96 && sizeof(fx_pixel) == 48, "layout of rays and pixels");
+_Static_assert(offsetof(sf_planes_blob, components) == (SF_PLANES_WORDS - 3) * 4, "words of the planes");
 _Static_assert(sizeof(fx_steps) == 8 + FX_STEPS_MAX * 13 && FX_STEPS_MAX % 8 == 0, "layout of steps");
 
 /* An image, opened. */
 typedef struct sf_tile {
   sf_net_blob net;
-  fx_scene scene; /* its net has no weights: they are in `net` */
+  sf_planes_blob planes; /* of TensoRF */
+  const uint8_t *lines;  /* NULL: a hash grid */
+  fx_scene scene;        /* its net and planes are empty: they are in `net` and `planes` */
   const fx_ray *rays;
   uint32_t width, height;
   fx_pixel *pixels; /* [height][width], in the memory behind the image */

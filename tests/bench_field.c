@@ -1,6 +1,9 @@
 /* What the field costs a frame in cycles: the rays of a view, tile by tile, through sf_ray_top with a memory of given
- * latencies. Every pixel and the field's counts are compared with the core's.
- * usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]]    EVERY: takes every so-many-th tile */
+ * latencies. Every pixel, every event and the field's counts are compared with the core's; of TensoRF also the cycles
+ * with those of the cycle model. usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]] [seed=S] [stall=PERCENT]
+ * EVERY: takes every so-many-th tile. LATENCY 0: at random for each line. With stalls the streams make the block wait,
+ * so its cycles are not the model's. */
+#include "cycles/planes.h"
 #include "energy/energy.h"
 #include "quant/quant.h"
 #include "sim/compare.h"
@@ -20,7 +23,8 @@ typedef struct frame {
   sf_ray_sample *sample;
   int rays;
   size_t samples; /* in sample: read from the field by a hash grid, and TensoRF's densities */
-  uint64_t decoded;
+  fx_counts counts;
+  sf_dut_options dut;
 } frame;
 
 static void read_field(void *user, fx_read what, const uint32_t pos[3])
@@ -32,13 +36,11 @@ static void read_field(void *user, fx_read what, const uint32_t pos[3])
 static sf_status core_rays(frame *f)
 {
   const fx_watch watch = {read_field, &f->memory};
-  fx_counts counts = {0};
   for (int i = 0; i < f->rays; i++) {
     fx_memory_ray(&f->memory, f->tile[i]);
-    SF_TRY(fx_render_watched(&f->scene, &f->ray[i], NULL, NULL, &watch, &f->core[i], &counts));
+    SF_TRY(fx_render_watched(&f->scene, &f->ray[i], NULL, NULL, &watch, &f->core[i], &f->counts));
   }
-  f->decoded = counts.samples;
-  f->samples = f->scene.backbone == FX_INGP ? counts.samples : counts.field_samples;
+  f->samples = f->scene.backbone == FX_INGP ? f->counts.samples : f->counts.field_samples;
   f->sample = calloc(f->samples + SF_RAY_SAMPLES_MAX, sizeof *f->sample);
   if (!f->sample) return sf_fail(SF_E_MEMORY, "no memory for %zu samples", f->samples);
   for (size_t i = 0, at = 0; i < (size_t)f->rays; at += (size_t)f->request[i++].n) {
@@ -87,24 +89,50 @@ static void close_frame(frame *f)
   fx_scene_free(&f->scene);
 }
 
+/* What the cycle model says of the same rays; 0 of a hash grid, whose field is not in it. */
+static sf_status model_cycles(const frame *f, int latency, uint64_t *cycles)
+{
+  const fx_cache_shape cache = {SF_CACHE_BYTES, SF_CACHE_WAYS};
+  sf_planes_model *model = NULL;
+  *cycles = 0;
+  if (f->scene.backbone == FX_INGP) return sf_ok();
+  sf_status status = sf_planes_model_open(&model, &f->scene, &sf_engine_default, &cache, latency);
+  for (int i = 0; i < f->rays && status.code == SF_OK; i++) {
+    sf_planes_record record = {.at = NULL};
+    status = sf_planes_record_ray(&record, &f->scene, &f->ray[i]);
+    if (status.code == SF_OK) sf_planes_model_add(model, &record, f->request[i].new_tile);
+    sf_planes_record_free(&record);
+  }
+  if (status.code == SF_OK) sf_planes_model_drain(model);
+  if (status.code == SF_OK) *cycles = sf_planes_model_totals(model)->cycles;
+  sf_planes_model_close(model);
+  return status;
+}
+
 static sf_status measure(frame *f, int latency)
 {
   sf_ray_dut *rays = NULL;
   sf_field_counters field;
   fx_counts counts;
-  uint64_t cycles, busy, starved;
-  SF_TRY(sf_ray_dut_open(&rays, &f->scene, &(sf_dut_options){.seed = 1, .memory_latency = latency}));
-  const uint64_t begin = sf_dut_cycle(rays->dut);
-  sf_status status = sf_ray_dut_run(rays, f->request, f->rays, f->rtl);
+  uint64_t cycles, busy, starved, modelled;
+  f->dut.memory_latency = latency;
+  SF_TRY(sf_ray_dut_open(&rays, &f->scene, &f->dut));
+  const uint64_t before = sf_dut_cycle(rays->dut);
+  sf_status status = sf_ray_dut_run(rays, f->request, 0, f->rtl);
+  const uint64_t begin =
+      2 * sf_dut_cycle(rays->dut) - before; /* what the harness waits around a run is not the frame's */
+  if (status.code == SF_OK) status = sf_ray_dut_run(rays, f->request, f->rays, f->rtl);
   const uint64_t end = sf_dut_cycle(rays->dut);
+  if (status.code == SF_OK) status = model_cycles(f, latency, &modelled);
   for (int i = 0; i < f->rays && status.code == SF_OK; i++) status = sf_compare_pixel(&f->core[i], &f->rtl[i], end);
   if (status.code == SF_OK) status = sf_ray_dut_field(rays, &field);
   if (status.code == SF_OK) status = sf_compare_field(&f->memory.counts, &field);
   if (status.code == SF_OK) status = sf_dut_counts(rays->dut, &counts, &cycles, &busy, &starved);
+  if (status.code == SF_OK) status = sf_compare_ray_counts(&f->scene.net, &f->counts, &counts);
   sf_ray_dut_close(rays);
   SF_TRY(status);
   const double frame = (double)(end - begin), samples = (double)f->samples;
-  printf("%7d %12.0f %14.2f %14.2f %12.2f %% %15.2f %13.2f\n", latency, frame, frame / samples,
+  printf("%7d %12.0f %12" PRIu64 " %14.2f %14.2f %12.2f %% %15.2f %13.2f\n", latency, frame, modelled, frame / samples,
          frame / (double)counts.samples, 100 * (double)field.stalls / frame, (double)field.lookups / samples,
          (double)field.misses / samples);
   return fflush(stdout) ? sf_fail(SF_E_IO, "standard output") : sf_ok();
@@ -117,17 +145,33 @@ static sf_status run(frame *f, int argc, char **argv)
   SF_TRY(
       open_frame(f, argv[1], argv[2], argc > 3 ? atoi(argv[3]) : 0, argc > 4 && atoi(argv[4]) > 0 ? atoi(argv[4]) : 1));
   printf("%d rays, %zu samples, %" PRIu64 " of them through the nets, cache of %d bytes, %d ways\n", f->rays,
-         f->samples, f->decoded, SF_CACHE_BYTES, SF_CACHE_WAYS);
-  printf("latency       cycles  cycles/sample  of the nets    field stalls  look-ups/sample  misses/sample\n");
+         f->samples, f->counts.samples, SF_CACHE_BYTES, SF_CACHE_WAYS);
+  printf("latency       cycles    the model  cycles/sample  of the nets    field stalls  look-ups/sample  "
+         "misses/sample\n");
   for (int i = 0; i < n; i++) SF_TRY(measure(f, given ? atoi(argv[5 + i]) : usual[i]));
   return sf_ok();
 }
 
+/* Takes the words with a name out of the arguments. */
+static int take_named(frame *f, int argc, char **argv)
+{
+  int n = 0;
+  for (int i = 0; i < argc; i++)
+    if (!strncmp(argv[i], "seed=", 5))
+      f->dut.seed = strtoull(argv[i] + 5, NULL, 10);
+    else if (!strncmp(argv[i], "stall=", 6))
+      f->dut.stall_percent = atoi(argv[i] + 6);
+    else
+      argv[n++] = argv[i];
+  return n;
+}
+
 int main(int argc, char **argv)
 {
-  frame f = {0};
+  frame f = {.dut = {.seed = 1}};
+  argc = take_named(&f, argc, argv);
   if (argc < 3) {
-    fprintf(stderr, "usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]]\n");
+    fprintf(stderr, "usage: bench_field SCENE DATA [VIEW [EVERY [LATENCY...]]] [seed=S] [stall=PERCENT]\n");
     return 2;
   }
   const sf_status status = run(&f, argc, argv);

@@ -1,27 +1,6 @@
 /* The emulated system: programs by hand that misbehave, the firmware against the core, and the firmware with an
  * accelerator, a bus or an image that is not as it should be. */
-#include "ck_run.h"
-#include "sim/soc/soc.h"
-#include "firmware/sf_soc.h"
-#include "firmware/sf_tile.h"
-#include "sim/soc/job.h"
-#include "energy/energy.h"
-#include "tests/dut_fixture.h"
-#include "tests/fx_fixture.h"
-#include <libgen.h>
-#include <unistd.h>
-
-enum { OUTPUT_MAX = 1 << 14, WIDTH = 3, HEIGHT = 2, PIXELS = WIDTH * HEIGHT, INSTRUCTIONS = 300000000 };
-static char output[OUTPUT_MAX]; /* each test runs in a process of its own */
-static size_t output_size;
-
-static bool keep_output(void *user, char c)
-{
-  (void)user;
-  if (output_size + 1 >= OUTPUT_MAX) return false;
-  output[output_size++] = c;
-  return true;
-}
+#include "tests/soc_fixture.h"
 
 /* ---- programs by hand ---- */
 
@@ -64,7 +43,7 @@ static sf_status run_words(const uint32_t *word, int n, bool stopped, uint32_t *
   sf_dut *dut;
   sf_soc *soc;
   const sf_soc_options options = {.instructions = 4000000, .uart = keep_output, .tick = stopped ? stop_at_once : NULL};
-  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open_dut(&dut, false, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &options));
   memcpy(sf_soc_memory(soc, SF_SOC_RAM, (uint64_t)n * 4), word, (size_t)n * 4);
   sf_soc_begin_at(soc, SF_SOC_RAM);
@@ -114,47 +93,7 @@ TEST(a_program_ends_with_its_status)
   ck_assert_int_eq(run_words(endless, 1, true, &exit_status).code, SF_E_STOPPED);
 }
 
-/* ---- the firmware ---- */
-
-typedef struct scenario {
-  fx_scene scene;
-  fx_ray ray[PIXELS];
-  fx_pixel core[PIXELS], firmware[PIXELS];
-  fx_counts counts;
-  uint8_t *image;
-  size_t image_size;
-  sf_dut *dut;
-  sf_bus real; /* the accelerator's own bus, behind the one that a test puts before it */
-  uint32_t offset, from, to;
-  int stall;
-} scenario;
-
-/* Short rays from in front of the box through it; the last one misses. */
-static void make_rays(scenario *s)
-{
-  for (int i = 0; i < PIXELS; i++) {
-    fx_ray *ray = &s->ray[i];
-    const int64_t one = (int64_t)1 << 40;
-    for (int axis = 0; axis < 3; axis++) {
-      ray->origin[axis] = one / 100 * fixture_pick(7, 50, (uint64_t)(3 * i + axis), 10, 60);
-      ray->step[axis] = one / 1000 * fixture_pick(7, 51, (uint64_t)(3 * i + axis), 2, 20);
-    }
-    fixture_inputs(7, (uint64_t)i, ray->dir, FX_SH, 700);
-    ray->count = i == PIXELS - 1 ? 0 : 6 + i;
-    ray->first_q16 = 1000 * i;
-  }
-}
-
-static scenario *make_scenario_of(fx_scene scene)
-{
-  scenario *s = calloc(1, sizeof *s);
-  s->scene = scene;
-  make_rays(s);
-  for (int i = 0; i < PIXELS; i++) ck_ok(fx_render_ray(&s->scene, &s->ray[i], NULL, NULL, &s->core[i], &s->counts));
-  ck_assert_uint_gt(s->counts.samples, 20);
-  ck_ok(sf_soc_image_make(&s->scene, s->ray, WIDTH, HEIGHT, &s->image, &s->image_size));
-  return s;
-}
+/* ---- the firmware, of fixture_ingp if a test asks for no other ---- */
 
 static scenario *make_scenario(const fixture_sizes *sizes)
 {
@@ -162,16 +101,6 @@ static scenario *make_scenario(const fixture_sizes *sizes)
   memset(scene.occupancy, 0xf7, 64);
   return make_scenario_of(scene);
 }
-
-static void free_scenario(scenario *s)
-{
-  fx_scene_free(&s->scene);
-  free(s->image);
-  free(s);
-}
-
-static scenario *s; /* what a test runs; of fixture_ingp if it asks for no other */
-static uint32_t exit_status = 99;
 
 static void set_up(void)
 {
@@ -181,73 +110,6 @@ static void set_up(void)
 static void tear_down(void)
 {
   free_scenario(s);
-}
-
-/* BUILD/tests/test_soc -> BUILD/firmware/sf_firmware.elf */
-static void firmware_path(char path[4096])
-{
-  char self[4000] = "";
-  ck_assert_int_gt(readlink("/proc/self/exe", self, sizeof self - 1), 0);
-  snprintf(path, 4096, "%s/../firmware/sf_firmware.elf", dirname(self));
-}
-
-static uint32_t bus_read(void *context, uint32_t offset);
-static void bus_write(void *context, uint32_t offset, uint32_t value);
-
-/* The firmware on the system; bus_read and bus_write below stand between. */
-static sf_status run_firmware(void)
-{
-  char path[4096];
-  sf_soc *soc;
-  firmware_path(path);
-  ck_ok(sf_dut_open_bare(&s->dut, &(sf_dut_options){.seed = 9, .stall_percent = s->stall}));
-  s->real = s->dut->bus;
-  s->dut->bus = (sf_bus){bus_read, bus_write, s};
-  ck_ok(sf_soc_open(&soc, s->dut, &(sf_soc_options){.instructions = INSTRUCTIONS, .uart = keep_output}));
-  ck_ok(sf_soc_load_elf(soc, path));
-  memcpy(sf_soc_memory(soc, SF_SOC_IMAGE, s->image_size), s->image, s->image_size);
-  const sf_status status = sf_soc_run(soc, &exit_status);
-  memcpy(s->firmware, sf_soc_memory(soc, SF_SOC_IMAGE, SF_SOC_IMAGE_SPACE) + sf_soc_image_pixels_at(s->image),
-         sizeof s->firmware);
-  sf_soc_close(soc);
-  sf_dut_close(s->dut);
-  return status;
-}
-
-/* What a test does to one register: reads of `offset` give `to`; writes go to `to` instead (REDIRECT), or write `to`
- * instead of their value (REPLACE), or are lost (LOSE), once or always. */
-typedef enum { HONEST, READ_AS, REDIRECT, REPLACE, LOSE_ONE, LOSE, DEAF } bus_fault;
-static bus_fault fault;
-static int lost;
-
-static uint32_t bus_read(void *context, uint32_t offset)
-{
-  scenario *s = context;
-  if (fault == READ_AS && offset == s->offset) return s->to;
-  if (fault == DEAF && offset == s->offset) s->dut->bus_hung = true;
-  return s->real.read(s->real.context, offset);
-}
-
-static void bus_write(void *context, uint32_t offset, uint32_t value)
-{
-  scenario *s = context;
-  if (offset == s->offset) {
-    if (fault == REDIRECT) offset = s->to;
-    if (fault == REPLACE) value = s->to;
-    if (fault == LOSE || (fault == LOSE_ONE && lost++ == 100)) return;
-  }
-  s->real.write(s->real.context, offset, value);
-}
-
-static void same_as_core(scenario *other, int stall)
-{
-  free_scenario(s);
-  s = other;
-  s->stall = stall;
-  const sf_status status = run_firmware();
-  ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
-  ck_ok(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH));
-  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
 }
 
 LOOP_TEST(the_firmware_renders_what_the_core_renders, 3)
@@ -291,10 +153,7 @@ static const struct {
 
 LOOP_TEST(a_wrong_device_is_reported, COUNT(wrong_device))
 {
-  fault = wrong_device[_i].fault, s->offset = wrong_device[_i].offset, s->to = wrong_device[_i].to;
-  ck_ok(run_firmware());
-  ck_assert_uint_eq(exit_status, 1);
-  ck_assert_msg(strstr(output, wrong_device[_i].line), "'%s' is not in '%s'", wrong_device[_i].line, output);
+  expect_line(wrong_device[_i].fault, wrong_device[_i].offset, wrong_device[_i].to, wrong_device[_i].line);
 }
 
 static const struct {
@@ -303,16 +162,12 @@ static const struct {
 } wrong_write[] = {{REDIRECT, SF_CSR_D1_K, SF_CSR_D2_K},
                    {REPLACE, SF_CSR_D1_THETA, 30000},
                    {REPLACE, SF_CSR_STEPS, 3},
-                   {LOSE_ONE, SF_CSR_WEIGHT_DATA, 0},
+                   {LOSE_ONE, SF_CSR_WEIGHT_DATA, 100},
                    {LOSE, SF_CSR_EXP_BIAS, 0}};
 
 LOOP_TEST(a_driver_that_writes_wrongly_is_seen, COUNT(wrong_write))
 {
-  fault = wrong_write[_i].fault, s->offset = wrong_write[_i].offset, s->to = wrong_write[_i].to;
-  const sf_status status = run_firmware();
-  ck_assert_msg(status.code == SF_OK && exit_status == 0, "%s\n%s", status.message, output);
-  ck_assert_int_eq(sf_soc_compare_pixels(s->core, s->firmware, PIXELS, WIDTH).code, SF_E_DIFFERENCE);
-  ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+  expect_difference(wrong_write[_i].fault, wrong_write[_i].offset, wrong_write[_i].to);
 }
 
 TEST(a_bus_without_an_answer_ends_the_run)
@@ -331,16 +186,6 @@ TEST(a_damaged_image_is_refused)
   ck_assert_str_eq(output, "spikefield firmware\nerror: image: damaged: wrong checksum\n");
 }
 
-static const char *open_edited(const scenario *s, uint8_t *block, size_t space, int word, uint32_t value)
-{
-  sf_tile tile;
-  sf_tile_header *h = (sf_tile_header *)block;
-  memcpy(block, s->image, s->image_size);
-  if (word >= 0) memcpy(block + 4 * word, &value, 4);
-  h->crc = sf_crc32(0, &h->width, (uint32_t)(s->image_size - offsetof(sf_tile_header, width)));
-  return sf_tile_open(block, (uint32_t)space, &tile);
-}
-
 /* Every word of the header takes extreme values, with a right checksum: the parts stay inside or the image is refused.
  * The block ends where memory ends, so that the sanitizer sees every step beyond. */
 TEST(an_image_stays_inside_its_memory)
@@ -352,7 +197,7 @@ TEST(an_image_stays_inside_its_memory)
   ck_assert_str_eq(open_edited(s, block, space - 1, -1, 0), "the tile does not fit");
   ck_assert_str_eq(open_edited(s, block, space, 0, 1), "none in memory");
   ck_assert_str_eq(open_edited(s, block, space, 1, SF_TILE_VERSION + 1), "of another version than this firmware's");
-  for (int word = 4; word < 16; word++) /* width .. steps */
+  for (int word = 4; word < 18; word++) /* width .. lines */
     for (size_t i = 0; i < sizeof extreme / sizeof *extreme; i++) {
       uint32_t now;
       memcpy(&now, s->image + 4 * word, 4);
@@ -383,7 +228,7 @@ TEST(a_tile_that_is_too_large_is_refused)
 
 static void expect_audit(const scenario *s, const char *text, const char *reason)
 {
-  ck_bad(sf_soc_compare_audit(&s->counts, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
+  ck_bad(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, text), SF_E_DIFFERENCE, reason, "");
 }
 
 TEST(the_comparison_sees_every_change)
@@ -394,10 +239,10 @@ TEST(the_comparison_sees_every_change)
     for (char *c = at; *c != '\n'; c++) {
       const char was = *c;
       *c = was == '1' ? '2' : '1';
-      ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
+      ck_assert_int_eq(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output).code, SF_E_DIFFERENCE);
       *c = was;
     }
-  ck_ok(sf_soc_compare_audit(&s->counts, s->core, PIXELS, output));
+  ck_ok(sf_soc_compare_audit(&s->counts, s->field, s->core, PIXELS, output));
   expect_audit(s, "", "firmware \"nothing\"");
   snprintf(text, sizeof text, "%.16000saudit more\n", output);
   expect_audit(s, text, "one line too many: \"audit more\"");
@@ -438,7 +283,7 @@ TEST(a_bad_program_file_is_refused)
              {5000, 0, 0x7f, "is cut short"}};
   OWNED(sf_dut) *dut = NULL;
   sf_soc *soc;
-  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 3}));
+  ck_ok(sf_soc_open_dut(&dut, false, &(sf_dut_options){.seed = 3}));
   ck_ok(sf_soc_open(&soc, dut, &(sf_soc_options){0}));
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     const char was = whole[bad[i].at];

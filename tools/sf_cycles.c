@@ -2,6 +2,7 @@
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "cycles/explore.h"
+#include "cycles/frame.h"
 #include "base/text.h"
 #include "quant/quant.h"
 #include "base/io.h"
@@ -13,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAND = 16 /* rows of pixels between two looks at the model */, BUILDS = 3 };
+enum { BUILDS = 3, MEMORY_LATENCY = 16 };
 
 /* Builds of the design space: a quarter, a half, all of the lanes at once. */
 static const sf_engine builds[BUILDS] = {
@@ -23,7 +24,7 @@ typedef struct options {
   sf_engine engine;
   bool builds, explore;
   const char *scene, *data, *split, *plot, *tech;
-  int view, downscale, threads;
+  int view, downscale, threads, latency;
   double clock;
   bool json, quiet;
 } options;
@@ -32,62 +33,33 @@ typedef struct job {
   options opt;
   fx_scene scene;
   sf_dataset data;
-  sf_cycle_model *model;         /* of the build that was asked for */
-  sf_cycle_model *other[BUILDS]; /* of the design space */
-  uint64_t rays, latency;        /* latency: of one sample in an empty engine, the first of the frame */
+  sf_machine machine[1 + BUILDS]; /* the build that was asked for, and those of the design space */
+  uint64_t rays, latency;         /* latency: of one sample in an empty engine, the first of the frame */
   sf_progress progress;
 } job;
 
-/* ---- samples of a row of pixels ---- */
+/* ---- the frame ---- */
 
-static sf_status trace_row(const job *j, int y, sf_cycle_record *row)
+static void frame_tick(void *user, int rows)
 {
-  const sf_view *view = &j->data.view[0];
-  sf_status status = sf_ok();
-  for (int x = 0; x < view->camera.width && status.code == SF_OK; x++) {
-    fx_ray ray;
-    status = sf_pixel_ray(&j->scene, &j->data, view, x, y, &ray);
-    if (status.code == SF_OK) status = sf_cycle_record_ray(row, &j->scene, &ray);
-  }
-  return status;
+  job *j = user;
+  if (sf_progress_due(&j->progress))
+    sf_progress_show(&j->progress, "row %d of %d, %" PRIu64 " samples", rows, j->data.view[0].camera.height,
+                     sf_machine_totals(&j->machine[0]).samples);
 }
 
 static sf_status run_frame(job *j)
 {
-  const int height = j->data.view[0].camera.height;
-  sf_cycle_record row[BAND] = {{.at = NULL}};
-  sf_status status = sf_ok();
-  for (int y = 0; y < height && status.code == SF_OK; y += BAND) {
-    const int n = height - y < BAND ? height - y : BAND;
-    sf_status each[BAND];
-#pragma omp parallel for schedule(dynamic)
-    for (int i = 0; i < n; i++) row[i].count = 0, each[i] = trace_row(j, y + i, &row[i]);
-    for (int i = 0; i < n && status.code == SF_OK; i++) {
-      status = each[i];
-      for (size_t s = 0; s < row[i].count; s++) {
-        sf_cycle_model_add(j->model, &row[i].at[s]);
-        for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_add(j->other[b], &row[i].at[s]);
-        if (j->latency) continue;
-        sf_cycle_model *alone = sf_cycle_model_create(&j->scene.net, &j->opt.engine);
-        if (!alone) {
-          status = sf_fail(SF_E_MEMORY, "no memory for the cycle model");
-          break;
-        }
-        sf_cycle_model_add(alone, &row[i].at[s]);
-        sf_cycle_model_drain(alone);
-        j->latency = sf_cycle_model_totals(alone)->cycles;
-        sf_cycle_model_free(alone);
-      }
-    }
-    j->rays += (uint64_t)n * (uint64_t)j->data.view[0].camera.width;
-    if (sf_progress_due(&j->progress))
-      sf_progress_show(&j->progress, "row %d of %d, %" PRIu64 " samples", y + n, height,
-                       sf_cycle_model_totals(j->model)->samples);
-  }
-  sf_cycle_model_drain(j->model);
-  for (int b = 0; b < BUILDS && j->opt.builds; b++) sf_cycle_model_drain(j->other[b]);
-  for (int i = 0; i < BAND; i++) sf_cycle_record_free(&row[i]);
-  return status;
+  const sf_camera *camera = &j->data.view[0].camera;
+  const sf_frame_job frame = {.scene = &j->scene,
+                              .data = &j->data,
+                              .view = &j->data.view[0],
+                              .machine = j->machine,
+                              .machines = 1 + (j->opt.builds ? BUILDS : 0),
+                              .tick = frame_tick,
+                              .user = j};
+  j->rays = (uint64_t)camera->width * (uint64_t)camera->height;
+  return sf_frame_run(&frame, &j->opt.engine, &j->latency);
 }
 
 /* ---- report ---- */
@@ -115,16 +87,16 @@ static bool has_layer(const job *j, int layer)
 static const int cores[] = {1, 2, 4, 8}, clocks[] = {50, 100, 200, 400};
 #define COUNT(array) (sizeof(array) / sizeof *(array))
 
-static double frames_per_second(const sf_cycle_model *model, int count, double mhz)
+static double frames_per_second(const sf_machine *machine, int count, double mhz)
 {
-  const uint64_t cycles = sf_cycle_model_totals(model)->cycles;
+  const uint64_t cycles = sf_machine_totals(machine).cycles;
   return cycles ? 1e6 * mhz * count / (double)cycles : 0;
 }
 
-static double cycles_per_sample(const sf_cycle_model *model)
+static double cycles_per_sample(const sf_machine *machine)
 {
-  const sf_cycle_totals *t = sf_cycle_model_totals(model);
-  return ratio(t->cycles, t->samples);
+  const sf_cycle_totals t = sf_machine_totals(machine);
+  return ratio(t.cycles, t.samples);
 }
 
 static void print_space(const job *j)
@@ -133,14 +105,14 @@ static void print_space(const job *j)
   for (size_t c = 0; c < COUNT(cores); c++) printf("%6d core%s", cores[c], cores[c] > 1 ? "s" : " ");
   for (size_t m = 0; m < COUNT(clocks); m++) {
     printf("\n  %4d MHz    ", clocks[m]);
-    for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(j->model, cores[c], clocks[m]));
+    for (size_t c = 0; c < COUNT(cores); c++) printf("%12.2f", frames_per_second(&j->machine[0], cores[c], clocks[m]));
   }
   putchar('\n');
   if (!j->opt.builds) return;
   printf("\nother builds            cycles per sample   frames/s at %.0f MHz\n", j->opt.clock);
   for (int b = 0; b < BUILDS; b++)
     printf("  %3d MACs, %2d neurons  %18.1f %20.2f\n", builds[b].macs, builds[b].neurons,
-           cycles_per_sample(j->other[b]), frames_per_second(j->other[b], 1, j->opt.clock));
+           cycles_per_sample(&j->machine[1 + b]), frames_per_second(&j->machine[1 + b], 1, j->opt.clock));
 }
 
 static void add_engine(cJSON *json, const sf_engine *engine)
@@ -150,16 +122,16 @@ static void add_engine(cJSON *json, const sf_engine *engine)
   cJSON_AddNumberToObject(json, "steps_at_once", engine->steps_at_once);
 }
 
-static void add_points(cJSON *space, const sf_engine *engine, const sf_cycle_model *model)
+static void add_points(cJSON *space, const sf_engine *engine, const sf_machine *machine)
 {
   for (size_t c = 0; c < COUNT(cores); c++)
     for (size_t m = 0; m < COUNT(clocks); m++) {
       cJSON *point = cJSON_CreateObject();
       add_engine(point, engine);
-      cJSON_AddNumberToObject(point, "cycles_per_sample", cycles_per_sample(model));
+      cJSON_AddNumberToObject(point, "cycles_per_sample", cycles_per_sample(machine));
       cJSON_AddNumberToObject(point, "cores", cores[c]);
       cJSON_AddNumberToObject(point, "clock_mhz", clocks[m]);
-      cJSON_AddNumberToObject(point, "frames_per_second", frames_per_second(model, cores[c], clocks[m]));
+      cJSON_AddNumberToObject(point, "frames_per_second", frames_per_second(machine, cores[c], clocks[m]));
       cJSON_AddItemToArray(space, point);
     }
 }
@@ -169,7 +141,7 @@ static void add_points(cJSON *space, const sf_engine *engine, const sf_cycle_mod
 static void put_plot(FILE *out, const job *j, const char *name)
 {
   char text[400], title[400];
-  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  const sf_cycle_totals total = sf_machine_totals(&j->machine[0]), *t = &total;
   snprintf(text, sizeof text, "Frames per second: %.200s, view %d, t_r = %d, %.1f cycles per sample", j->opt.data,
            j->opt.view, j->scene.net.steps, ratio(t->cycles, t->samples));
   sf_plot_quote(title, sizeof title, text);
@@ -179,7 +151,8 @@ static void put_plot(FILE *out, const job *j, const char *name)
   fprintf(out, ")\n$frames << EOD\n");
   for (size_t m = 0; m < COUNT(clocks); m++) {
     fprintf(out, "%d", clocks[m]);
-    for (size_t c = 0; c < COUNT(cores); c++) fprintf(out, " %.6g", frames_per_second(j->model, cores[c], clocks[m]));
+    for (size_t c = 0; c < COUNT(cores); c++)
+      fprintf(out, " %.6g", frames_per_second(&j->machine[0], cores[c], clocks[m]));
     putc('\n', out);
   }
   fprintf(out, "EOD\nplot ");
@@ -203,14 +176,32 @@ static sf_status write_plot(const job *j)
 
 /* ---- output ---- */
 
+static void print_planes(const job *j, const sf_planes_totals *p)
+{
+  printf("%" PRIu64
+         " densities of the field, %.2f cycles each; %.2f look-ups and %.2f misses each, of a memory that answers "
+         "after %d cycle%s\n",
+         p->densities, ratio(p->cycles, p->densities), ratio(p->lookups, p->densities), ratio(p->misses, p->densities),
+         j->opt.latency, sf_plural((uint64_t)j->opt.latency));
+}
+
+static void add_planes(cJSON *json, const job *j, const sf_planes_totals *p)
+{
+  sf_json_add_u64(json, "densities", p->densities);
+  sf_json_add_u64(json, "lookups", p->lookups);
+  sf_json_add_u64(json, "misses", p->misses);
+  cJSON_AddNumberToObject(json, "memory_latency", j->opt.latency);
+}
+
 static void print_text(const job *j)
 {
-  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  const sf_cycle_totals total = sf_machine_totals(&j->machine[0]), *t = &total;
   const int most = busiest(t);
   printf("%s, view %d: %" PRIu64 " rays, %" PRIu64 " samples, t_r = %d\n", j->opt.data, j->opt.view, j->rays,
          t->samples, j->scene.net.steps);
   printf("%" PRIu64 " cycles, %.1f per sample (a dense ReLU net of the same sizes on these lanes: %" PRIu64 ")\n",
          t->cycles, ratio(t->cycles, t->samples), sf_cycles_dense(&j->scene.net));
+  if (j->machine[0].planes) print_planes(j, sf_planes_model_totals(j->machine[0].planes));
   printf("a build of %d MACs, %d neuron units, %d step%s of C2 at once\n", j->opt.engine.macs, j->opt.engine.neurons,
          j->opt.engine.steps_at_once, sf_plural((uint64_t)j->opt.engine.steps_at_once));
   printf("latency of a sample alone: %" PRIu64 " cycles\nutilisation:", j->latency);
@@ -226,7 +217,7 @@ static void print_text(const job *j)
 
 static sf_status print_json(const job *j)
 {
-  const sf_cycle_totals *t = sf_cycle_model_totals(j->model);
+  const sf_cycle_totals total = sf_machine_totals(&j->machine[0]), *t = &total;
   cJSON *json = cJSON_CreateObject();
   add_engine(json, &j->opt.engine);
   sf_json_add_u64(json, "rays", j->rays);
@@ -234,16 +225,17 @@ static sf_status print_json(const job *j)
   sf_json_add_u64(json, "cycles", t->cycles);
   cJSON_AddNumberToObject(json, "cycles_per_sample", ratio(t->cycles, t->samples));
   sf_json_add_u64(json, "latency", j->latency);
+  if (j->machine[0].planes) add_planes(json, j, sf_planes_model_totals(j->machine[0].planes));
   sf_json_add_u64(json, "waits", t->waits);
   sf_json_add_u64(json, "stalls", t->stalls);
   cJSON *busy = cJSON_AddObjectToObject(json, "utilisation");
   for (int l = 0; l < SF_LAYERS; l++)
     if (has_layer(j, l)) cJSON_AddNumberToObject(busy, fx_layer_name(l), ratio(t->busy[l], t->cycles));
   cJSON_AddNumberToObject(json, "clock_mhz", j->opt.clock);
-  cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(j->model, 1, j->opt.clock));
+  cJSON_AddNumberToObject(json, "frames_per_second", frames_per_second(&j->machine[0], 1, j->opt.clock));
   cJSON *space = cJSON_AddArrayToObject(json, "design_space");
-  add_points(space, &j->opt.engine, j->model);
-  for (int b = 0; b < BUILDS && j->opt.builds; b++) add_points(space, &builds[b], j->other[b]);
+  add_points(space, &j->opt.engine, &j->machine[0]);
+  for (int b = 0; b < BUILDS && j->opt.builds; b++) add_points(space, &builds[b], &j->machine[1 + b]);
   return sf_json_print(json, true);
 }
 
@@ -256,10 +248,10 @@ static sf_status make_models(job *j)
   if (e->neurons > e->macs || (e->neurons & (e->neurons - 1)))
     return sf_fail(SF_E_USAGE, "--neurons %d: expected a power of two, at most --macs", e->neurons);
   if (s & (s - 1)) return sf_fail(SF_E_USAGE, "--steps-at-once %d: expected 1, 2, 4 or 8", s);
-  bool made = (j->model = sf_cycle_model_create(&j->scene.net, e)) != NULL;
+  SF_TRY(sf_machine_open(&j->machine[0], &j->scene, e, j->opt.latency));
   for (int b = 0; b < BUILDS && j->opt.builds; b++)
-    made = (j->other[b] = sf_cycle_model_create(&j->scene.net, &builds[b])) && made;
-  return made ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the cycle model");
+    SF_TRY(sf_machine_open(&j->machine[1 + b], &j->scene, &builds[b], j->opt.latency));
+  return sf_ok();
 }
 
 /* ---- other builds, in time and energy ---- */
@@ -304,6 +296,10 @@ static sf_status run(job *j)
   char name[256];
   if (j->opt.plot) SF_TRY(sf_plot_name(j->opt.plot, name));
   SF_TRY(fx_scene_load(&j->scene, j->opt.scene));
+  if (j->opt.latency && j->scene.backbone == FX_INGP)
+    return sf_fail(SF_E_USAGE, "--latency has no effect: %.200s has a hash grid, whose field is not modelled",
+                   j->opt.scene);
+  if (!j->opt.latency) j->opt.latency = MEMORY_LATENCY;
   const sf_dataset_options how = {.downscale = j->opt.downscale, .first = j->opt.view, .limit = 1};
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, j->opt.scene, j->opt.data, j->opt.split, &how));
   sf_dataset_warn(stderr, "sf_cycles", &j->data, NULL);
@@ -325,8 +321,8 @@ static sf_status run(job *j)
 /* Options that nothing would read. */
 static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
 {
-  static const char *const one[] = {"--macs", "--neurons", "--steps-at-once", "--builds", NULL}, *const tech[] = {
-                                                                                                     "--tech", NULL};
+  static const char *const one[] = {"--macs", "--neurons", "--steps-at-once", "--builds", "--latency", NULL},
+                           *const tech[] = {"--tech", NULL};
   if (!o->explore) return sf_cli_refuse(cli, argc, argv, tech, "has no effect: it goes with --explore");
   return sf_cli_refuse(cli, argc, argv, one, "has no effect beside --explore, which takes all");
 }
@@ -346,6 +342,8 @@ int main(int argc, char **argv)
       {"--neurons", 0, SF_ARG_INT, &o->engine.neurons, 4, 64, NULL, "N", "neuron units (likewise)"},
       {"--steps-at-once", 0, SF_ARG_INT, &o->engine.steps_at_once, 1, 8, NULL, "N",
        "steps that C2 sums up side by side (likewise)"},
+      {"--latency", 0, SF_ARG_INT, &o->latency, 1, 10000, NULL, "CYCLES",
+       "of TensoRF's memory, from a request to its first beat (default 16)"},
       {"--builds", 0, SF_ARG_FLAG, &o->builds, 0, 0, NULL, NULL,
        "also print builds that work on a quarter, a half or all of the lanes at once"},
       {"--explore", 0, SF_ARG_FLAG, &o->explore, 0, 0, NULL, NULL,
@@ -358,28 +356,31 @@ int main(int argc, char **argv)
        "gnuplot script of frames per second, or of what was explored; gnuplot writes NAME.svg"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
-  const sf_cli cli = {.program = "sf_cycles",
-                      .usage = "sf_cycles SCENE.snn DATA [options]",
-                      .summary =
-                          "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the "
-                          "cycle model: its\n"
-                          "control with spike counts in place of bitmaps, exact while the streams never make it wait.",
-                      .examples = "  sf_cycles scene.snn data --view 3\n"
-                                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
-                                  "  sf_cycles scene.snn data --builds\n"
-                                  "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n"
-                                  "  sf_cycles scene.snn data --explore --plot builds.gp\n",
-                      .options = table,
-                      .min_positional = 2,
-                      .max_positional = 2};
+  const sf_cli cli = {
+      .program = "sf_cycles",
+      .usage = "sf_cycles SCENE.snn DATA [options]",
+      .summary = "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the "
+                 "cycle model: its\n"
+                 "control with spike counts in place of bitmaps, exact while the streams never make it wait. It "
+                 "begins where the\n"
+                 "features of a hash grid come in; of TensoRF it has all from positions to pixels, with the field's "
+                 "cache and memory.",
+      .examples = "  sf_cycles scene.snn data --view 3\n"
+                  "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
+                  "  sf_cycles scene.snn data --builds\n"
+                  "  sf_cycles tensorf.snn data --latency 64\n"
+                  "  sf_cycles scene.snn data --plot frames.gp && gnuplot frames.gp\n"
+                  "  sf_cycles scene.snn data --explore --plot builds.gp\n",
+      .options = table,
+      .min_positional = 2,
+      .max_positional = 2};
   const char *positional[2] = {NULL, NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
   o->scene = positional[0], o->data = positional[1];
   if (status.code == SF_OK) status = check_effect(o, &cli, argc, argv);
   if (status.code == SF_OK && o->threads) omp_set_num_threads(o->threads);
   if (status.code == SF_OK) status = run(&j);
-  sf_cycle_model_free(j.model);
-  for (int b = 0; b < BUILDS; b++) sf_cycle_model_free(j.other[b]);
+  for (int b = 0; b < 1 + BUILDS; b++) sf_machine_close(&j.machine[b]);
   sf_dataset_free(&j.data);
   fx_scene_free(&j.scene);
   if (status.code == SF_OK && fflush(stdout)) status = sf_fail(SF_E_IO, "standard output: the report was not written");

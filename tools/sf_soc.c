@@ -1,6 +1,7 @@
 /* sf_soc: the firmware renders a tile on an emulated system-on-chip with the Verilated accelerator. */
 #include "sim/plusarg.h"
 #include "sim/soc/soc.h"
+#include "firmware/sf_ray_driver.h"
 #include "firmware/sf_soc.h"
 #include "sim/soc/job.h"
 #include "cli/cli.h"
@@ -37,6 +38,7 @@ typedef struct job {
   fx_pixel *pixels;
   fx_cost *costs;
   fx_counts counts;
+  fx_memory field; /* of TensoRF: its cache, which is the accelerator's */
   /* the system */
   uint8_t *image;
   size_t image_size;
@@ -48,6 +50,20 @@ typedef struct job {
   double begun, seconds;
   sf_progress progress;
 } job;
+
+/* The accelerator is sf_ray_top. */
+static bool takes_rays(const job *j)
+{
+  return j->scene.backbone == FX_TENSORF;
+}
+
+static sf_status open_accelerator(job *j)
+{
+  const options *o = &j->opt;
+  const sf_dut_options dut = {.seed = o->seed, .stall_percent = o->stall, .plusarg = o->plusarg};
+  SF_TRY(sf_plusarg_check(o->plusarg));
+  return sf_soc_open_dut(&j->dut, takes_rays(j), &dut);
+}
 
 /* ---- the tile ---- */
 
@@ -74,13 +90,32 @@ static sf_status load(job *j)
   const options *o = &j->opt;
   const sf_dataset_options how = {.downscale = o->downscale, .scale = (float)o->scale, .first = o->view, .limit = 1};
   SF_TRY(fx_scene_load(&j->scene, o->scene));
-  SF_TRY(fx_scene_need_grid(&j->scene, o->scene, "firmware rays"));
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, o->scene, o->data, split_name[o->split], &how));
   sf_dataset_warn(stderr, "sf_soc", &j->data, NULL);
   if (j->data.count == 0)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->data.total,
                    split_name[o->split]);
   return choose_tile(j);
+}
+
+/* The firmware's rays are one list of one tile. */
+static sf_status render_list(job *j, size_t n)
+{
+  fx_core *core;
+  uint32_t bytes = SF_CACHE_BYTES, ways = SF_CACHE_WAYS;
+  if (takes_rays(j)) sf_ray_driver_cache(sf_dut_driver_bus(j->dut), &bytes, &ways);
+  const fx_cache_shape cache = {(int32_t)bytes, (int32_t)ways};
+  SF_TRY(fx_memory_open(&j->field, &j->scene, &cache));
+  fx_memory_begin(&j->field);
+  uint64_t *tile = calloc(n, sizeof *tile);
+  if (!tile) return sf_fail(SF_E_MEMORY, "no memory for %zu pixels", n);
+  sf_status status = fx_core_open(&core, &j->scene, NULL);
+  if (status.code == SF_OK) {
+    status = fx_render_list(core, &j->field, tile, j->rays, n, j->pixels, j->costs, &j->counts);
+    fx_core_close(core);
+  }
+  free(tile);
+  return status;
 }
 
 /* What the firmware must find: the same rays through the fixed-point core. */
@@ -94,11 +129,7 @@ static sf_status run_core(job *j)
     const int x = j->tile.x + (int)(i % (size_t)j->tile.width), y = j->tile.y + (int)(i / (size_t)j->tile.width);
     SF_TRY(sf_pixel_ray(&j->scene, &j->data, &j->data.view[0], x, y, &j->rays[i]));
   }
-  fx_core *core;
-  SF_TRY(fx_core_open(&core, &j->scene, NULL));
-  const sf_status status = fx_render_rays(core, j->rays, n, j->pixels, j->costs, &j->counts);
-  fx_core_close(core);
-  return status;
+  return render_list(j, n);
 }
 
 static sf_status make_image(job *j)
@@ -139,12 +170,10 @@ static bool tick(void *user, uint64_t instructions)
 static sf_status build(job *j)
 {
   const options *o = &j->opt;
-  const sf_dut_options dut = {.seed = o->seed, .stall_percent = o->stall, .plusarg = o->plusarg};
-  const sf_soc_options soc = {.instructions = o->instructions, .uart = uart, .tick = tick, .user = j};
-  SF_TRY(sf_plusarg_check(o->plusarg));
+  const sf_soc_options soc = {
+      .rays = takes_rays(j), .instructions = o->instructions, .uart = uart, .tick = tick, .user = j};
   j->output = calloc(1, OUTPUT_MAX);
   if (!j->output) return sf_fail(SF_E_MEMORY, "no memory for the firmware's output");
-  SF_TRY(sf_dut_open_bare(&j->dut, &dut));
   SF_TRY(sf_soc_open(&j->soc, j->dut, &soc));
   SF_TRY(sf_soc_load_elf(j->soc, j->firmware));
   memcpy(sf_soc_memory(j->soc, SF_SOC_IMAGE, j->image_size), j->image, j->image_size);
@@ -188,7 +217,7 @@ static sf_status compare(job *j)
 {
   SF_TRY(find_pixels(j));
   SF_TRY(sf_soc_compare_pixels(j->pixels, j->made, pixels_of(j), j->tile.width));
-  return sf_soc_compare_audit(&j->counts, j->pixels, pixels_of(j), j->output);
+  return sf_soc_compare_audit(&j->counts, takes_rays(j) ? &j->field.counts : NULL, j->pixels, pixels_of(j), j->output);
 }
 
 /* ---- reports ---- */
@@ -261,6 +290,7 @@ static sf_status print_text(const job *j)
 static sf_status work(job *j)
 {
   SF_TRY(load(j));
+  SF_TRY(open_accelerator(j));
   SF_TRY(run_core(j));
   SF_TRY(make_image(j));
   SF_TRY(build(j));
@@ -331,6 +361,7 @@ static void release(job *j)
   sf_dut_close(j->dut);
   free(j->output), free(j->image), free(j->costs), free(j->pixels), free(j->rays);
   sf_dataset_free(&j->data);
+  fx_memory_close(&j->field);
   fx_scene_free(&j->scene);
   free(j);
 }
@@ -342,8 +373,9 @@ int main(int argc, char **argv)
       .usage = "sf_soc scene.snn DATA [--view K] [--crop X,Y,W,H] [options]",
       .summary =
           "Runs the firmware on an emulated RV32IM system with the Verilated accelerator: it renders a tile and\n"
-          "prints the audit over its UART. Pixels and audit are compared with the fixed-point core. Exit status 1\n"
-          "on a difference, and when the firmware fails, traps or does not end.",
+          "prints the audit over its UART. The accelerator computes the nets of a scene with a hash grid, and makes\n"
+          "pixels of positions for one of TensoRF. Pixels and audit are compared with the fixed-point core. Exit\n"
+          "status 1 on a difference, and when the firmware fails, traps or does not end.",
       .examples = "  sf_soc scene.snn data --view 3 --crop 40,40,16,16 --png tile.png\n"
                   "  sf_soc scene.snn data --stall 20 --json\n"
                   "  sf_soc scene.snn data --save-image tile.img\n"

@@ -25,7 +25,7 @@ static sf_ray_blob blob_of(const fx_scene *scene, uint32_t base)
   return blob;
 }
 
-static sf_planes_blob planes_of(const fx_tensorf *field)
+sf_planes_blob sf_ray_planes(const fx_tensorf *field)
 {
   const fx_scale *scale[SF_PLANES_SCALES] = {&field->density_in, &field->sigma_out, &field->feature_in,
                                              &field->phase_in};
@@ -56,7 +56,7 @@ sf_status sf_ray_dut_load(sf_ray_dut *rays)
   rays->in_tile = false;
   const sf_ray_blob blob = blob_of(rays->scene, rays->memory.base);
   SF_TRY(sf_dut_load(dut, &rays->scene->net));
-  const sf_planes_blob planes = planes_of(&rays->scene->tensorf);
+  const sf_planes_blob planes = sf_ray_planes(&rays->scene->tensorf);
   const bool tensorf = rays->scene->backbone == FX_TENSORF;
   const sf_driver_code code = sf_ray_driver_load(sf_dut_driver_bus(dut), &blob, tensorf ? &planes : NULL);
   if (code == SF_DRIVER_OK) dut->bus.write(dut->bus.context, SF_CSR_RAY_IRQ_ENABLE, ~0u);

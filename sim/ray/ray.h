@@ -42,6 +42,8 @@ typedef struct sf_memory {
 
 /* Somewhere, so that an address is not an offset. */
 uint32_t sf_memory_base(uint64_t seed);
+/* Programming of a TensoRF scene's planes, whose basis matrix stays the field's. */
+sf_planes_blob sf_ray_planes(const fx_tensorf *field);
 /* Contents of the scene's field; those of a hash grid stay where they are. sf_ray_dut_close frees the planes. */
 sf_status sf_memory_fill(sf_memory *memory, const fx_scene *scene);
 /* The dut's each_cycle, with the memory as its context: watches the rules, takes a request, gives a beat. */

@@ -4,7 +4,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-enum { FIELDS = 7, AUDIT_LINES = SF_LAYERS + 3, LINE_MAX = 256 };
+enum { FIELDS = 7, TOTALS = SF_LAYERS, FIELD, ENERGY, CHECKSUM, AUDIT_LINES, LINE_MAX = 256 };
 static const char audit_prefix[] = "audit ";
 
 /* ---- pixels ---- */
@@ -43,13 +43,15 @@ static void layer_line(const fx_counts *counts, int layer, char line[LINE_MAX])
   }
 }
 
-static void expected_line(const fx_counts *counts, uint32_t crc, int number, char line[LINE_MAX])
+static void expected_line(const fx_counts *counts, const fx_memory_counts *field, uint32_t crc, int number,
+                          char line[LINE_MAX])
 {
-  enum { TOTALS = SF_LAYERS, ENERGY };
   if (number < SF_LAYERS)
     layer_line(counts, number, line);
   else if (number == TOTALS)
     snprintf(line, LINE_MAX, "%ssamples %" PRIu64 " rays %" PRIu64, audit_prefix, counts->samples, counts->rays);
+  else if (number == FIELD)
+    snprintf(line, LINE_MAX, "%slookups %" PRIu64 " misses %" PRIu64, audit_prefix, field->lookups, field->misses);
   else if (number == ENERGY)
     snprintf(line, LINE_MAX, "%senergy_fj %" PRIu64, audit_prefix, sf_energy_fj(counts));
   else
@@ -68,12 +70,14 @@ static void next_line(const char **output, char line[LINE_MAX])
   }
 }
 
-sf_status sf_soc_compare_audit(const fx_counts *core, const fx_pixel *pixels, size_t n, const char *output)
+sf_status sf_soc_compare_audit(const fx_counts *core, const fx_memory_counts *field, const fx_pixel *pixels, size_t n,
+                               const char *output)
 {
   const uint32_t crc = sf_rgba_crc(pixels, (uint32_t)n);
   char expected[LINE_MAX] = "nothing", actual[LINE_MAX];
   for (int i = 0; i < AUDIT_LINES; i++) {
-    expected_line(core, crc, i, expected);
+    if (i == FIELD && !field) continue;
+    expected_line(core, field, crc, i, expected);
     next_line(&output, actual);
     if (strcmp(expected, actual) != 0)
       return sf_fail(SF_E_DIFFERENCE, "core \"%s\", firmware \"%s\"", expected, actual);

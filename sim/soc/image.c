@@ -2,16 +2,24 @@
 #include "sim/soc/job.h"
 #include "firmware/sf_soc.h"
 #include "firmware/sf_tile.h"
+#include "fx/cache.h"
+#include "fx/tensorf.h"
+#include "sim/ray/ray.h"
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct plan {
-  size_t net, table, occupancy, steps, rays, end;
+  size_t net, table, planes, lines, occupancy, steps, rays, end; /* table, or planes and lines */
 } plan;
 
 static size_t aligned(size_t at)
 {
   return (at + 7) / 8 * 8;
+}
+
+static size_t line_aligned(size_t at)
+{
+  return (at + SF_LINE_BYTES - 1) / SF_LINE_BYTES * SF_LINE_BYTES;
 }
 
 static size_t net_bytes(const fx_net *net)
@@ -27,11 +35,29 @@ static size_t occupancy_bytes(const fx_scene *scene)
   return (size_t)(scene->log2_bound + 1) * (res * res * res / 8);
 }
 
+static size_t basis_bytes(const fx_tensorf *field)
+{
+  return (size_t)fx_factors_components(&field->appearance) * SF_PLANES_FEATURES;
+}
+
+static size_t lines_bytes(const fx_tensorf *field)
+{
+  fx_factor_place place[2 * FX_PAIRS];
+  return (size_t)fx_tensorf_places(field, place) * SF_LINE_BYTES;
+}
+
 static plan make_plan(const fx_scene *scene, size_t rays)
 {
   plan p = {.net = aligned(sizeof(sf_tile_header))};
-  p.table = aligned(p.net + net_bytes(&scene->net));
-  p.occupancy = aligned(p.table + (size_t)scene->grid.entries * FX_GRID_FEATURES);
+  const size_t field = aligned(p.net + net_bytes(&scene->net));
+  if (scene->backbone == FX_INGP) {
+    p.table = field;
+    p.occupancy = aligned(p.table + (size_t)scene->grid.entries * FX_GRID_FEATURES);
+  } else {
+    p.planes = field;
+    p.lines = line_aligned(p.planes + SF_PLANES_WORDS * 4 + basis_bytes(&scene->tensorf));
+    p.occupancy = aligned(p.lines + lines_bytes(&scene->tensorf));
+  }
   p.steps = aligned(p.occupancy + occupancy_bytes(scene));
   p.rays = aligned(p.steps + (scene->steps ? sizeof *scene->steps : 0));
   p.end = p.rays + rays * sizeof(fx_ray);
@@ -62,6 +88,18 @@ static void put_net(uint8_t *to, const fx_net *net)
   }
 }
 
+static void put_field(uint8_t *bytes, const plan *p, const fx_scene *scene)
+{
+  if (scene->backbone == FX_INGP) {
+    memcpy(bytes + p->table, scene->grid.table, (size_t)scene->grid.entries * FX_GRID_FEATURES);
+    return;
+  }
+  const sf_planes_blob planes = sf_ray_planes(&scene->tensorf);
+  memcpy(bytes + p->planes, &planes, SF_PLANES_WORDS * 4);
+  memcpy(bytes + p->planes + SF_PLANES_WORDS * 4, planes.basis, basis_bytes(&scene->tensorf));
+  fx_tensorf_memory(&scene->tensorf, bytes + p->lines);
+}
+
 static sf_tile_header make_header(const fx_scene *scene, const plan *p, int width, int height)
 {
   sf_tile_header h = {.magic = SF_TILE_MAGIC,
@@ -72,6 +110,8 @@ static sf_tile_header make_header(const fx_scene *scene, const plan *p, int widt
                       .net = (uint32_t)p->net,
                       .net_bytes = (uint32_t)net_bytes(&scene->net),
                       .table = (uint32_t)p->table,
+                      .planes = (uint32_t)p->planes,
+                      .lines = (uint32_t)p->lines,
                       .occupancy = (uint32_t)p->occupancy,
                       .rays = (uint32_t)p->rays,
                       .levels = (uint32_t)scene->grid.levels,
@@ -106,7 +146,7 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
   sf_tile_header head = make_header(scene, &p, width, height);
   memcpy(bytes, &head, sizeof head);
   put_net(bytes + p.net, &scene->net);
-  memcpy(bytes + p.table, scene->grid.table, (size_t)scene->grid.entries * FX_GRID_FEATURES);
+  put_field(bytes, &p, scene);
   memcpy(bytes + p.occupancy, scene->occupancy, occupancy_bytes(scene));
   if (scene->steps) memcpy(bytes + p.steps, scene->steps, sizeof *scene->steps);
   memcpy(bytes + p.rays, rays, n * sizeof *rays);

@@ -1,7 +1,7 @@
 /* A tile for the firmware: its image in memory, and what it must print and leave behind. */
 #ifndef SF_SIM_SOC_JOB_H
 #define SF_SIM_SOC_JOB_H
-#include "fx/fx.h"
+#include "fx/memory.h"
 
 /* Header, scene and rays[height][width] as firmware/sf_tile.h says. *image is malloc'ed. The scene passes
  * fx_scene_check. SF_E_RANGE when image and pixels do not fit in the system's memory. */
@@ -15,6 +15,8 @@ size_t sf_soc_image_pixels_at(const uint8_t *image);
 sf_status sf_soc_compare_pixels(const fx_pixel *core, const fx_pixel *firmware, size_t n, int width);
 
 /* Every line of the firmware's output that begins with "audit " against what it must be for these counts and pixels:
- * events per layer, samples, rays, energy in fJ, checksum. SF_E_DIFFERENCE quotes both lines. */
-sf_status sf_soc_compare_audit(const fx_counts *core, const fx_pixel *pixels, size_t n, const char *output);
+ * events per layer, samples, rays, energy in fJ, checksum; with `field`, of TensoRF, also its look-ups and misses.
+ * SF_E_DIFFERENCE quotes both lines. */
+sf_status sf_soc_compare_audit(const fx_counts *core, const fx_memory_counts *field, const fx_pixel *pixels, size_t n,
+                               const char *output);
 #endif

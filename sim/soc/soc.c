@@ -51,8 +51,17 @@ static bool whole_word(sf_soc *soc, const char *device, uint64_t offset, unsigne
   return false;
 }
 
+/* What sf_ray_top does to the memory while its clock runs. */
+static void check_memory(sf_soc *soc)
+{
+  const sf_memory *m = &soc->stream.memory;
+  const char *what = m->fault ? m->fault : m->outside ? "a line beyond the memory" : NULL;
+  if (what) stop(soc, sf_fail(SF_E_UNSUPPORTED, "accelerator: %s at cycle %" PRIu64, what, soc->dut->cycle));
+}
+
 static void check_answered(sf_soc *soc, const char *what, uint64_t offset)
 {
+  check_memory(soc);
   if (!soc->dut->bus_hung) return;
   stop(soc, sf_fail(SF_E_UNSUPPORTED, "accelerator: %s of register 0x%03" PRIx64 " not answered at cycle %" PRIu64,
                     what, offset, soc->dut->cycle));
@@ -81,6 +90,7 @@ static void accelerator_write(uc_engine *uc, uint64_t offset, unsigned size, uin
 
 static void check_stream(sf_soc *soc, uint64_t offset)
 {
+  check_memory(soc);
   if (soc->stream.fault) blame(soc, "stream FIFOs, offset 0x%02" PRIx64 ": %s", offset, soc->stream.fault);
 }
 
@@ -185,7 +195,7 @@ static uc_err map_devices(sf_soc *soc)
     uc_cb_mmio_read_t read;
     uc_cb_mmio_write_t write;
   } device[] = {{SF_SOC_ACCELERATOR, SF_SOC_ACCELERATOR_SIZE, accelerator_read, accelerator_write},
-                {SF_SOC_STREAM, SF_SOC_PAGE, stream_read, stream_write},
+                {soc->options.rays ? SF_SOC_RAYS : SF_SOC_STREAM, SF_SOC_PAGE, stream_read, stream_write},
                 {SF_SOC_UART, SF_SOC_PAGE, nothing_to_read, uart_write},
                 {SF_SOC_POWER, SF_SOC_PAGE, nothing_to_read, power_write}};
   uc_err err = UC_ERR_OK;
@@ -216,11 +226,17 @@ static sf_status build(sf_soc *soc)
   void *ram = mmap(NULL, SF_SOC_RAM_SIZE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (ram == MAP_FAILED) return sf_fail(SF_E_MEMORY, "no memory for the processor's %d MiB", SF_SOC_RAM_SIZE >> 20);
   soc->ram = ram;
+  soc->stream.memory = (sf_memory){.dut = soc->dut, .contents = soc->ram, .bytes = SF_SOC_RAM_SIZE, .base = SF_SOC_RAM};
   uc_err err = uc_open(UC_ARCH_RISCV, UC_MODE_RISCV32, &soc->uc);
   if (err == UC_ERR_OK) err = map_memory(soc);
   if (err == UC_ERR_OK) err = map_devices(soc);
   if (err == UC_ERR_OK) err = add_hooks(soc);
   return err == UC_ERR_OK ? sf_ok() : sf_fail(SF_E_UNSUPPORTED, "Unicorn: %s", uc_strerror(err));
+}
+
+sf_status sf_soc_open_dut(sf_dut **dut, bool rays, const sf_dut_options *options)
+{
+  return sf_dut_open_pins(dut, options, rays ? sf_pins_open_rays : sf_pins_open);
 }
 
 sf_status sf_soc_open(sf_soc **soc_out, sf_dut *dut, const sf_soc_options *options)
@@ -231,7 +247,7 @@ sf_status sf_soc_open(sf_soc **soc_out, sf_dut *dut, const sf_soc_options *optio
   soc->options = *options;
   soc->dut = dut;
   dut->bus_fault.what = NULL;
-  sf_soc_stream_attach(&soc->stream, dut);
+  sf_soc_stream_attach(&soc->stream, dut, options->rays);
   const sf_status status = build(soc);
   if (status.code == SF_OK)
     *soc_out = soc;

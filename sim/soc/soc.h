@@ -1,12 +1,13 @@
 /* The reference system-on-chip of firmware/sf_soc.h: an RV32IM processor emulated by Unicorn, its memory, a UART, a
- * power register, and the Verilated accelerator behind its AXI4-Lite port and the stream FIFOs. The accelerator's clock
- * runs while the processor accesses it and stands still meanwhile: results and event counts are those of hardware,
- * times are not. */
+ * power register, and the Verilated accelerator, sf_top or sf_ray_top, behind its AXI4-Lite port and stream FIFOs. The
+ * accelerator's clock runs while the processor accesses it and stands still meanwhile: results and event counts are
+ * those of hardware, times are not. */
 #ifndef SF_SIM_SOC_SOC_H
 #define SF_SIM_SOC_SOC_H
 #include "sim/sim.h"
 
 typedef struct sf_soc_options {
+  bool rays;                               /* the accelerator is sf_ray_top, which reads the system's memory */
   uint64_t instructions;                   /* that the program may take, about; 0 = no limit */
   bool (*uart)(void *user, char c);        /* false: the program says too much, which ends it. Or NULL */
   bool (*tick)(void *user, uint64_t done); /* after every 2^20 instructions or so; false stops. Or NULL */
@@ -18,7 +19,9 @@ typedef struct sf_soc_totals {
 } sf_soc_totals;
 
 typedef struct sf_soc sf_soc;
-/* dut: from sf_dut_open_bare, borrowed, not to be used by others until the system is closed. */
+/* The accelerator that a scene's field needs: sf_top for a hash grid, sf_ray_top for TensoRF; nothing programmed. */
+sf_status sf_soc_open_dut(sf_dut **dut, bool rays, const sf_dut_options *options);
+/* dut: from sf_soc_open_dut, borrowed, not to be used by others until the system is closed. */
 sf_status sf_soc_open(sf_soc **soc, sf_dut *dut, const sf_soc_options *options);
 void sf_soc_close(sf_soc *soc); /* NULL is fine */
 

@@ -64,7 +64,14 @@ static void tick_input(const sf_cycle_model *m, state *s, const state *was, bool
   const input *in = &was->in;
   s->in.full -= done;
   if (in->full == 2 || in->sent == was->added) return;
-  const uint32_t n_dir = m->decodes || sample(m, in->sent)->first ? m->n_dir : 0;
+  const sf_cycle_sample *next = sample(m, in->sent);
+  if (next->last_beat) {
+    s->in.begun = m->clock >= next->first_beat && m->clock < next->last_beat;
+    s->in.full += m->clock == next->last_beat;
+    s->in.sent += m->clock == next->last_beat;
+    return;
+  }
+  const uint32_t n_dir = m->decodes || next->first ? m->n_dir : 0;
   const uint32_t beats = (n_dir + 3) / 4 + (m->n_feature + 3) / 4;
   s->in.begun = in->beat + 1 < beats;
   s->in.beat = s->in.begun ? in->beat + 1 : 0;
@@ -74,7 +81,7 @@ static void tick_input(const sf_cycle_model *m, state *s, const state *was, bool
 }
 
 static void tick_readout(const sf_cycle_model *m, state *s, const state *was, bool density_begins, bool colour_begins,
-                         sf_cycle_totals *totals)
+                         bool taken, sf_cycle_totals *totals)
 {
   const readout *r = &was->read;
   readout *next = &s->read;
@@ -82,7 +89,7 @@ static void tick_readout(const sf_cycle_model *m, state *s, const state *was, bo
   const bool last = r->slot == last_out && r->step + 1 == m->steps, ends = r->run && last, free_now = !r->run || last;
   const bool colour = free_now && r->colour_full && !r->busy;
   const bool density = free_now && !colour && r->density_full && !(r->run && !r->colour);
-  const bool ready = !was->out.full || was->out.second, waits = r->done && (r->count || m->decodes);
+  const bool ready = !was->out.full || (was->out.second && taken), waits = r->done && (r->count || m->decodes);
   const bool out = waits && ready, pop = out && !m->decodes, writes = r->stage[STAGES - 1].valid;
   const bool writes_last = writes && r->stage[STAGES - 1].last, of_colour = r->stage[STAGES - 1].colour;
   const bool density_ends = ends && !r->colour, colour_ends = ends && r->colour;
@@ -106,10 +113,10 @@ static void tick_readout(const sf_cycle_model *m, state *s, const state *was, bo
   next->count = r->count + (writes_last && !of_colour) - pop;
   totals->samples += out;
   if (ready) s->out.full = waits;
-  if (was->out.full) s->out.second = !was->out.second;
+  if (was->out.full && taken) s->out.second = !was->out.second;
 }
 
-static void tick(sf_cycle_model *m)
+void sf_tick(sf_cycle_model *m)
 {
   const state was = m->now;
   state *s = &m->now;
@@ -131,21 +138,28 @@ static void tick(sf_cycle_model *m)
   sf_tick_fed(m, s, &was, C3, c3_load, c3_last);
   s->h_taken += d2_begins;
   s->h_full += was.read_d2.way[2] && was.read_d2.way_last[2];
-  tick_readout(m, s, &was, d2_begins, c3_begins, &m->totals);
+  const bool taken = !was.out.second || !m->takes || m->takes(m->user, m->clock);
+  tick_readout(m, s, &was, d2_begins, c3_begins, taken, &m->totals);
   const bool busy[SF_LAYERS] = {s->mac.busy[0], s->sum[D2].busy, s->mac.busy[1], s->sum[C2].busy, s->sum[C3].busy};
   for (int l = 0; l < SF_LAYERS; l++) m->totals.busy[l] += busy[l];
   m->totals.any_busy += busy[0] || busy[1] || busy[2] || busy[3] || busy[4];
+  m->clock++;
+}
+
+bool sf_idle(const sf_cycle_model *m)
+{
+  return m->now.in.sent == m->now.added && !active(&m->now);
 }
 
 void sf_cycle_model_add(sf_cycle_model *model, const sf_cycle_sample *next)
 {
   model->ring[model->now.added++ % RING] = *next;
-  while (model->now.added - model->now.in.sent > 2) tick(model);
+  while (model->now.added - model->now.in.sent > 2) sf_tick(model);
 }
 
 void sf_cycle_model_drain(sf_cycle_model *model)
 {
-  while (model->now.in.sent != model->now.added || active(&model->now)) tick(model);
+  while (!sf_idle(model)) sf_tick(model);
 }
 
 uint64_t sf_cycles_least(const fx_net *net, const fx_counts *counts, const sf_engine *engine)

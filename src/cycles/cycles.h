@@ -1,7 +1,7 @@
 /* Cycle model of the accelerator: the control of rtl/sf_core.sv and its neighbours with counts in place of bitmaps, so
  * that whole frames get latency, frames per second and utilisation. Equal to the RTL's cycle counter when the streams
- * never make it wait (tests/test_rtl.c). It begins where features come in: the encoder, the field's cache and their
- * memory are not in it; tests/bench_field.c measures what they add to a frame. */
+ * never make it wait (tests/test_rtl.c). It begins where features come in: the encoder of a hash grid, its cache and
+ * its memory are not in it, and tests/bench_field.c measures what they add to a frame. Of TensoRF planes.h has them. */
 #ifndef SF_CYCLES_CYCLES_H
 #define SF_CYCLES_CYCLES_H
 #include "fx/fx.h"
@@ -18,7 +18,8 @@ static const sf_engine sf_engine_default = {SF_MACS, SF_NEURONS, SF_STEPS_AT_ONC
 /* What the engine's time depends on, of one sample: the steps at which each neuron of D1, C1, C2 fired, bit t for step
  * t. */
 typedef struct sf_cycle_sample {
-  bool first; /* of a new ray: brings a direction */
+  bool first;                     /* of a new ray: brings a direction */
+  uint64_t first_beat, last_beat; /* clock cycles at which its packet comes; 0: without a gap behind the one before */
   uint8_t fired[FX_SPIKING][SF_LANES];
 } sf_cycle_sample;
 
@@ -50,6 +51,8 @@ typedef struct sf_cycle_record {
 } sf_cycle_record;
 /* The ray through the portable core; its samples are added. */
 sf_status sf_cycle_record_ray(sf_cycle_record *record, const fx_scene *scene, const fx_ray *ray);
+/* A sample with the trace of fx_net_sample. */
+sf_status sf_cycle_record_add(sf_cycle_record *record, const fx_net *net, const fx_trace *trace, bool first);
 void sf_cycle_record_free(sf_cycle_record *record);
 
 /* From sums alone: what the multipliers of D1 and C1, or the busiest layer fed by spikes, need for their rows. */

@@ -95,7 +95,14 @@ typedef struct state {
   output out;
 } state;
 
+/* What stands around the engine, where it has a clock of its own (planes.h): whether the second beat of a result is
+ * taken at this cycle. NULL: at once. */
+typedef bool (*taker)(void *user, uint64_t clock);
+
 struct sf_cycle_model {
+  uint64_t clock;
+  taker takes;
+  void *user;
   uint32_t n_feature, n_dir, n_h, steps, neurons;
   uint32_t last_group[FX_SPIKING], last_part[FX_SPIKING], part_groups;
   uint32_t banks[FED], parts[FED]; /* parts: the last one */
@@ -121,6 +128,10 @@ bool sf_tick_neurons(const sf_cycle_model *m, state *s, const state *was);
 void sf_tick_fed(const sf_cycle_model *m, state *s, const state *was, int l, bool load, bool release);
 /* True where a step is loaded; *last: the sample's last. */
 bool sf_tick_reader(const sf_cycle_model *m, reader *to, const reader *r, bool begins, bool *last);
+/* A clock edge of all. */
+void sf_tick(sf_cycle_model *m);
+/* Nothing is at work in engine, input and output. */
+bool sf_idle(const sf_cycle_model *m);
 /* Nothing is at work in the engine. */
 bool sf_engine_idle(const state *s);
 #endif

@@ -5,6 +5,7 @@ cd "$work" || exit 1
 "$build/bin/sf_train" data -o vm.safetensors --backbone tensorf --stage1 5 --stage2 10 --samples 512 --rays 64 --voxels 16 \
   --steps 3 --occ-res 16 --quiet >/dev/null && "$build/bin/sf_export" vm.safetensors -o vm.snn >/dev/null || exit 1
 
+number() { sed -E -n "s/^\\s*\"$1\":\\s*([0-9.e+-]+),?$/\\1/p" "$2" | head -n 1; } # of a report, by its key
 # layers NAME SCENE WANTED...: in the text and in the JSON
 layers() {
   "$build/bin/sf_cycles" "$2" data --quiet >"$1.txt" && "$build/bin/sf_cycles" "$2" data --quiet --json >"$1.json" || fail "$1"
@@ -15,6 +16,20 @@ layers() {
 layers hash scene.snn 'D1 D2 C1 C2 C3'
 layers tensorf vm.snn 'C1 C2 C3'
 grep -q 'D[12]' tensorf.txt && fail "TensoRF has neither D1 nor D2: $(grep 'D[12]' tensorf.txt)"
+
+# TensoRF is modelled from positions on: a slower memory takes longer for the same work. Other builds are as fast at most.
+"$build/bin/sf_cycles" vm.snn data --quiet --latency 1 --builds --json >fast.json && "$build/bin/sf_cycles" vm.snn data --quiet --latency 100 --json >slow.json ||
+  fail "--latency"
+fast=$(number cycles fast.json) slow=$(number cycles slow.json)
+[ "$fast" -gt 1000 ] && [ "$slow" -gt "$fast" ] || fail "latencies: $fast and $slow cycles"
+for count in densities lookups misses samples; do
+  [ "$(number $count fast.json)" -gt 0 ] && [ "$(number $count fast.json)" = "$(number $count slow.json)" ] || fail "$count depends on the memory"
+done
+[ "$(number cycles fast.json)" -ge "$(number lookups fast.json)" ] || fail "more than a look-up a cycle"
+grep -q 'densities of the field, ' tensorf.txt && grep -q 'answers after 16 cycles' tensorf.txt || fail "the field in the text"
+"$build/bin/sf_cycles" vm.snn data --quiet --threads 1 --latency 1 --builds --json >one.json && cmp -s fast.json one.json || fail "cycles depend on threads"
+"$build/bin/sf_cycles" scene.snn data --latency 10 >plot.txt 2>plot.err
+[ $? -eq 2 ] && grep -q 'has a hash grid' plot.err || fail "--latency of a hash grid: $(cat plot.err)"
 
 # The plot has the numbers of the table: 4 clocks by 4 counts of cores.
 mkdir plots
@@ -32,7 +47,6 @@ else
   echo "gnuplot: not on this machine"
 fi
 # --explore: this build's point is what the audit and the cycle model say, and so is another cache.
-number() { sed -E -n "s/^\\s*\"$1\":\\s*([0-9.e+-]+),?$/\\1/p" "$2" | head -n 1; } # of a report, by its key
 "$build/bin/sf_cycles" scene.snn data --quiet --explore --plot plots/builds.gp --json >explore.json 2>explore.err || fail "--explore: $(cat explore.err)"
 # point BYTES WAYS MACS NEURONS STEPS KEY
 point() {

@@ -69,6 +69,22 @@ run 1 'error: image: damaged' scene.snn data --image bad.img
 run 1 'core' scene.snn data --view 1 --crop 0,0,32,32 --image tile.img # of a smaller tile
 run 1 'core' scene.snn data --view 0 --crop 14,15,4,3 --image tile.img # the image of another view
 
+# TensoRF: the accelerator makes the pixels.
+"$build/bin/sf_train" data -o planes.safetensors --backbone tensorf --voxels 24 --samples 512 --rays 256 --stage1 20 --stage2 30 --steps 2 \
+  --occ-res 16 --eval-views 1 --quiet >/dev/null && "$build/bin/sf_export" planes.safetensors -o planes.snn >/dev/null || exit 1
+run 0 '' planes.snn data --view 1 --crop 14,15,4,3 --stall 25 --png planes.png --save-image planes.img --json
+check "look-ups of the planes are printed" grep -q '"audit lookups [1-9][0-9]* misses [1-9]' out
+"$build/bin/sim_render" planes.snn data --view 1 --crop 14,15,4,3 -o host.exr --png host.png --quiet >/dev/null || exit 1
+check "the firmware's picture of planes is the host's" cmp -s planes.png host.png
+run 0 '' planes.snn data --view 1 --crop 14,15,4,3 --image planes.img
+run 1 'core' planes.snn data --view 0 --crop 14,15,4,3 --image planes.img
+size=$(wc -c <planes.img)
+cp planes.img bad.img
+printf '\377' | dd of=bad.img bs=1 seek=$((size / 2)) conv=notrunc status=none
+run 1 'exit status 1: error: image: damaged: wrong checksum' planes.snn data --view 1 --crop 14,15,4,3 --image bad.img
+run 1 'where there is nothing' planes.snn data --view 1 --crop 14,15,4,3 --image tile.img # of a hash grid
+run 1 'error: load planes: ' scene.snn data --view 1 --crop 14,15,4,3 --image planes.img
+
 # Programs that are none, or do not end in time.
 run 1 'no end after' scene.snn data --instructions 5000
 run 1 'tile.img: not an ELF file' scene.snn data --firmware tile.img
