@@ -131,6 +131,13 @@ typedef struct sf_field_trimmer {
 } sf_field_trimmer;
 extern const sf_field_trimmer sf_grid_trimmer, sf_planes_trimmer;
 
+static inline int64_t sf_cells_of(const fx_scene *scene)
+{
+  return (int64_t)(scene->log2_bound + 1) * scene->occ_res * scene->occ_res * scene->occ_res;
+}
+/* The scene's cells that stay, in occupancy. */
+void sf_trim_cells(const fx_scene *scene, const sf_trim *trim, const sf_trim_use *use, uint8_t *occupancy);
+
 enum { SF_STRIDE_ONE = 1 << 16 };
 static inline const fx_factors *sf_factors_of(const fx_tensorf *field, int which)
 {

@@ -14,16 +14,11 @@ static const sf_field_trimmer *trimmer_of(const fx_scene *scene)
   return scene->backbone == FX_TENSORF ? &sf_planes_trimmer : &sf_grid_trimmer;
 }
 
-static int64_t cells_of(const fx_scene *scene)
-{
-  return (int64_t)(scene->log2_bound + 1) * scene->occ_res * scene->occ_res * scene->occ_res;
-}
-
 /* ---- use ---- */
 
 sf_status sf_trim_use_create(sf_trim_use *use, const fx_scene *scene)
 {
-  const size_t cells = (size_t)cells_of(scene);
+  const size_t cells = (size_t)sf_cells_of(scene);
   memset(use, 0, sizeof *use);
   use->cells = (int64_t)cells;
   use->visits = calloc(cells, sizeof *use->visits);
@@ -76,15 +71,6 @@ void sf_trim_use_place(sf_trim_use *use, const fx_scene *scene, const uint32_t p
   if (use->entry) sf_grid_use_entries(use, &scene->grid, pos, weight);
   add(&use->visits[cell], 1);
   add(&use->weight2[cell], (uint64_t)weight * weight);
-}
-
-int sf_cell_class(const sf_trim_use *use, int64_t cell)
-{
-  const uint64_t one = (uint64_t)1 << 2 * SF_TRANS_FRAC;
-  if (!use->visits[cell]) return 0;
-  const uint64_t mean = (use->weight2[cell] + one) / (use->visits[cell] + 1);
-  const int octave = 2 * SF_TRANS_FRAC - (63 - __builtin_clzll(mean));
-  return octave < SF_CELL_CLASSES ? octave : SF_CELL_CLASSES - 1;
 }
 
 /* ---- what stays ---- */
@@ -218,14 +204,6 @@ static void fill_nets(const fx_scene *scene, const sf_trim *trim, const sf_trim_
   }
 }
 
-static void fill_occupancy(const fx_scene *scene, const sf_trim *trim, const sf_trim_use *use, fx_scene *result)
-{
-  memcpy(result->occupancy, scene->occupancy, (size_t)cells_of(scene) / 8);
-  for (int64_t cell = 0; cell < cells_of(scene); cell++)
-    if (scene->occupancy[cell >> 3] >> (cell & 7) & 1 && !trim->cells[sf_cell_class(use, cell)])
-      result->occupancy[cell >> 3] &= (uint8_t) ~(1u << (cell & 7));
-}
-
 sf_status sf_trim_apply(const fx_scene *scene, const sf_trim *trim, sf_trim_use *use, const char *name,
                         fx_scene *result)
 {
@@ -235,7 +213,7 @@ sf_status sf_trim_apply(const fx_scene *scene, const sf_trim *trim, sf_trim_use 
   sf_status status = fx_scene_allocate(result, name);
   if (status.code == SF_OK) {
     fill_nets(scene, trim, use, result);
-    fill_occupancy(scene, trim, use, result);
+    sf_trim_cells(scene, trim, use, result->occupancy);
     status = trimmer_of(scene)->fill(scene, trim, use, name, result);
     if (status.code != SF_OK) fx_scene_free(result);
   }
