@@ -92,6 +92,7 @@ static sf_status end(sf_crew *crew, const sf_status *status)
     const sf_status parted = part(t, i);
     if (kept.code == SF_OK) kept = parted;
   }
+  atomic_store(&t->ranks->enough, false); /* of this deal alone */
   free(t);
   return kept;
 }
@@ -158,6 +159,7 @@ sf_status sf_ranks_serve(sf_ranks *r, const sf_deal *deal)
       sf_ranks_nap();
   }
   sf_hand_close(hand); /* after its unit, whose result nobody waits for */
+  atomic_store(&r->enough, false); /* of this deal alone */
   (void)sf_ranks_send(r, 0, SF_TAG_BYE, NULL, 0);
   return status;
 }
