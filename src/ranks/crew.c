@@ -158,7 +158,7 @@ sf_status sf_ranks_serve(sf_ranks *r, const sf_deal *deal)
     else
       sf_ranks_nap();
   }
-  sf_hand_close(hand); /* after its unit, whose result nobody waits for */
+  sf_hand_close(hand);             /* after its unit, whose result nobody waits for */
   atomic_store(&r->enough, false); /* of this deal alone */
   (void)sf_ranks_send(r, 0, SF_TAG_BYE, NULL, 0);
   return status;

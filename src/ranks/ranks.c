@@ -30,6 +30,11 @@ int sf_ranks_size(const sf_ranks *r)
   return r ? r->size : 1;
 }
 
+bool sf_ranks_lost(const sf_ranks *r)
+{
+  return r && r->broken;
+}
+
 bool sf_ranks_stop(const sf_ranks *r)
 {
   return r && (atomic_load(&r->enough) || r->options.interrupted());

@@ -28,8 +28,9 @@ typedef struct sf_ranks_options {
 sf_status sf_ranks_open(sf_ranks **ranks, const sf_ranks_options *options);
 /* Waits for all ranks, unless one of them is lost. */
 void sf_ranks_close(sf_ranks *ranks);
-int sf_ranks_rank(const sf_ranks *ranks); /* 0 of a program that is alone; NULL is alone and without processes */
-int sf_ranks_size(const sf_ranks *ranks); /* 1 of a program that is alone */
+int sf_ranks_rank(const sf_ranks *ranks);  /* 0 of a program that is alone; NULL is alone and without processes */
+int sf_ranks_size(const sf_ranks *ranks);  /* 1 of a program that is alone */
+bool sf_ranks_lost(const sf_ranks *ranks); /* one of them does not answer any more: nothing can be done together */
 /* Before sf_ranks_open, by the launcher's word: how many it started, 1 without it. */
 int sf_ranks_launched(void);
 /* Whether this process is to tell what became of the program: rank 0, or one that it does not answer any more. */
