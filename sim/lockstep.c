@@ -21,6 +21,7 @@ typedef struct block {
   sf_cosim_totals sum;
   sf_status status;
   sf_cosim_place place;
+  char wire[sizeof((sf_lockstep *)0)->wire]; /* of place, which points to it where it is read */
   sf_replay replay;
 } block;
 
@@ -62,12 +63,14 @@ static void run_block(void *user, uint64_t unit, void *result)
                                   .stall_percent = l->options.stall_percent,
                                   .plusarg = l->options.plusarg};
   sf_cosim *cosim;
-  b->status = sf_cosim_open(&cosim, &l->fx, &options);
+  b->status = sf_ranks_named(l->ranks, sf_cosim_open(&cosim, &l->fx, &options));
   if (b->status.code != SF_OK) return;
   b->status = run_rays(l, cosim, unit, b);
   b->sum = *sf_cosim_sum(cosim);
   b->place = *sf_cosim_where(cosim);
   if (b->place.found) sf_cosim_replay(cosim, &b->replay);
+  if (b->place.what.wire) snprintf(b->wire, sizeof b->wire, "%s", b->place.what.wire);
+  b->place.what.wire = NULL;
   sf_cosim_close(cosim);
 }
 
@@ -153,6 +156,8 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   if (b->status.code == SF_E_STOPPED) return sf_ranks_stop(l->ranks); /* else this process alone was stopped */
   if (b->status.code != SF_OK) l->trouble = b->status;
   l->place = b->place;
+  memcpy(l->wire, b->wire, sizeof l->wire);
+  if (l->wire[0]) l->place.what.wire = l->wire;
   l->replay = b->replay;
   if (b->status.code != SF_OK) return false;
   l->blocks++;

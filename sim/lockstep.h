@@ -34,6 +34,7 @@ typedef struct sf_lockstep {
   sf_cosim_totals sum;
   uint64_t energy_core_fj, energy_rtl_fj;
   sf_cosim_place place;    /* found: the first difference */
+  char wire[64];           /* of it; place points here */
   sf_replay replay;        /* of it */
   char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
   bool replays;            /* the samples of the replay file show it */

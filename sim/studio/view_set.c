@@ -79,6 +79,7 @@ static void render_view(void *user, uint64_t unit, void *result)
   if (to->status.code == SF_OK) to->status = sf_set_render(r->set, &shot, &to->view);
   if (to->status.code == SF_OK) to->status = keep_picture(r->set, &shot, &to->view);
   sf_shot_free(&shot);
+  to->status = sf_ranks_named(r->set->ranks, to->status);
 }
 
 static sf_status keep(sf_view_set *set, const sf_manifest_view *view)

@@ -99,6 +99,7 @@ static void verify_unit(void *user, uint64_t unit, void *result)
   to->pixels = (uint64_t)shot.golden.width * (uint64_t)shot.golden.height;
   to->seen = sees(r->set, to->verdict.view);
   to->verdict.view = NULL; /* a pointer of this rank */
+  to->status = sf_ranks_named(r->set->ranks, to->status);
   sf_shot_free(&shot);
 }
 

@@ -45,6 +45,14 @@ void sf_ranks_name(const sf_ranks *r, int rank, char *text, size_t size)
   snprintf(text, size, "rank %d%s%s", rank, r->host && r->host[rank][0] ? " on " : "", r->host ? r->host[rank] : "");
 }
 
+sf_status sf_ranks_named(const sf_ranks *r, sf_status status)
+{
+  char host[64] = "";
+  if (!sf_ranks_rank(r) || (status.code != SF_E_IO && status.code != SF_E_MEMORY)) return status;
+  gethostname(host, sizeof host - 1);
+  return sf_fail(status.code, "rank %d on %s: %.300s", r->rank, host, status.message);
+}
+
 /* MPI's own waiting takes a whole processor. */
 void sf_ranks_nap(void)
 {

@@ -36,6 +36,9 @@ int sf_ranks_launched(void);
 /* Whether this process is to tell what became of the program: rank 0, or one that it does not answer any more. */
 bool sf_ranks_talks(const sf_ranks *ranks);
 
+/* A failure of work on a unit, for rank 0 to tell: of the system of another rank, it names that rank. */
+sf_status sf_ranks_named(const sf_ranks *ranks, sf_status status);
+
 /* The functions below are called by every rank, in the same order. */
 
 /* SF_OK where it is that on every rank; else every rank gets the failure of the first that has one, which is named
@@ -50,7 +53,7 @@ sf_status sf_ranks_gather(sf_ranks *ranks, const void *mine, size_t size, void *
 
 typedef struct sf_deal {
   uint64_t first, end; /* units first .. end - 1; read on rank 0 alone */
-  size_t result_size;  /* bytes; without pointers, but for those to constants of the program */
+  size_t result_size;  /* bytes; without pointers, also to constants: each rank has them elsewhere */
   /* Anywhere: fills *result, which is zeroed. In a thread of its own on ranks, where it may be parallel. May poll
    * sf_ranks_stop and end early. */
   void (*work)(void *user, uint64_t unit, void *result);
