@@ -1,6 +1,5 @@
 #include "sim/lockstep.h"
 #include "base/sha256.h"
-#include "sim/jobs.h"
 #include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/clock.h"
@@ -22,6 +21,7 @@ typedef struct block {
   sf_cosim_totals sum;
   sf_status status;
   sf_cosim_place place;
+  char wire[sizeof((sf_lockstep *)0)->wire]; /* of place, which points to it where it is read */
   sf_replay replay;
 } block;
 
@@ -31,7 +31,7 @@ typedef struct checkpoint {
   sf_lockstep_state now, whole; /* now: for a run of as many rays */
 } checkpoint;
 
-/* ---- one block, in a process of its own ---- */
+/* ---- one block, wherever it is dealt to ---- */
 
 static sf_status run_ray(const sf_lockstep *l, sf_cosim *cosim, uint64_t number)
 {
@@ -49,7 +49,7 @@ static sf_status run_rays(const sf_lockstep *l, sf_cosim *cosim, uint64_t unit, 
   for (uint64_t ray = from; ray < end && !stopped; ray++) {
     SF_TRY(run_ray(l, cosim, ray));
     b->rays++;
-    stopped = sf_cli_interrupted();
+    stopped = sf_ranks_stop(l->ranks);
   }
   SF_TRY(sf_cosim_finish(cosim));
   return stopped ? sf_fail(SF_E_STOPPED, "stopped") : sf_ok();
@@ -63,12 +63,14 @@ static void run_block(void *user, uint64_t unit, void *result)
                                   .stall_percent = l->options.stall_percent,
                                   .plusarg = l->options.plusarg};
   sf_cosim *cosim;
-  b->status = sf_cosim_open(&cosim, &l->fx, &options);
+  b->status = sf_ranks_named(l->ranks, sf_cosim_open(&cosim, &l->fx, &options));
   if (b->status.code != SF_OK) return;
   b->status = run_rays(l, cosim, unit, b);
   b->sum = *sf_cosim_sum(cosim);
   b->place = *sf_cosim_where(cosim);
   if (b->place.found) sf_cosim_replay(cosim, &b->replay);
+  if (b->place.what.wire) snprintf(b->wire, sizeof b->wire, "%s", b->place.what.wire);
+  b->place.what.wire = NULL;
   sf_cosim_close(cosim);
 }
 
@@ -151,9 +153,11 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   }
   l->rays += b->rays;
   sf_cosim_totals_add(&l->sum, &b->sum);
-  if (b->status.code == SF_E_STOPPED) return sf_cli_interrupted(); /* else this process alone was stopped */
+  if (b->status.code == SF_E_STOPPED) return sf_ranks_stop(l->ranks); /* else this process alone was stopped */
   if (b->status.code != SF_OK) l->trouble = b->status;
   l->place = b->place;
+  memcpy(l->wire, b->wire, sizeof l->wire);
+  if (l->wire[0]) l->place.what.wire = l->wire;
   l->replay = b->replay;
   if (b->status.code != SF_OK) return false;
   l->blocks++;
@@ -171,18 +175,17 @@ static void tick(void *user)
 
 static sf_status run_blocks(sf_lockstep *l)
 {
-  const uint64_t per = (uint64_t)l->options.block;
-  const sf_jobs jobs = {.processes = l->options.jobs,
-                        .first = l->blocks,
-                        .end = ((uint64_t)l->options.rays + per - 1) / per,
+  const uint64_t per = (uint64_t)l->options.block, begun = l->blocks;
+  const sf_deal deal = {.first = begun,
+                        .end = enough(l) ? begun : ((uint64_t)l->options.rays + per - 1) / per,
                         .result_size = sizeof(block),
                         .work = run_block,
                         .take = take_block,
                         .tick = tick,
                         .user = l};
   l->saved = sf_seconds();
-  if (l->blocks >= jobs.end || enough(l)) return sf_ok();
-  const sf_status status = sf_jobs_run(&jobs);
+  const sf_status status = sf_ranks_deal(l->ranks, &deal);
+  if (sf_ranks_rank(l->ranks) || begun >= deal.end) return status;
   SF_TRY(l->trouble);
   if (!l->partial) SF_TRY(save(l));
   return l->partial && status.code == SF_OK ? sf_fail(SF_E_STOPPED, "stopped") : status;
@@ -252,15 +255,16 @@ static sf_status write_evidence(sf_lockstep *l, const sf_status *difference)
   return status;
 }
 
-static sf_status stopped(const sf_lockstep *l)
+/* `by` begins with "stopped", too, and may name a rank that is lost. */
+static sf_status stopped(const sf_lockstep *l, const sf_status *by)
 {
   char kept[4200] = "";
   if (l->options.checkpoint)
     snprintf(kept, sizeof kept, "; %s holds %" PRIu64 " ray%s, the same command goes on from there",
              l->options.checkpoint, l->kept, sf_plural(l->kept));
-  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d ray%s, %" PRIu64 " sample%s equal%s", l->rays,
+  return sf_fail(SF_E_STOPPED, "stopped after %" PRIu64 " of %d ray%s, %" PRIu64 " sample%s equal%s%s", l->rays,
                  l->options.rays, sf_plural((uint64_t)l->options.rays), l->sum.samples, sf_plural(l->sum.samples),
-                 kept);
+                 by->message + strlen("stopped"), kept);
 }
 
 /* A difference stays one where its evidence cannot be written. */
@@ -275,11 +279,14 @@ static sf_status difference(sf_lockstep *l, const sf_status *found)
 
 sf_status sf_lockstep_run(sf_lockstep *l)
 {
-  SF_TRY(resume(l));
+  const bool first = sf_ranks_rank(l->ranks) == 0;
+  SF_TRY(sf_ranks_same(l->ranks, "scene or data set", l->identity));
+  SF_TRY(sf_ranks_agree(l->ranks, first ? resume(l) : sf_ok()));
   const sf_status status = run_blocks(l);
+  if (!first) return status;
   l->complete = status.code == SF_OK;
   const sf_status energy = compare_energy(l);
-  if (status.code == SF_E_STOPPED) return stopped(l);
+  if (status.code == SF_E_STOPPED) return stopped(l, &status);
   if (status.code == SF_OK) return energy;
   return l->place.found ? difference(l, &status) : status;
 }

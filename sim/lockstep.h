@@ -1,9 +1,10 @@
-/* A whole co-simulation: random rays of a data set, cut into blocks that are worked on by several processes. Everything
- * depends on the block alone, which is a fresh accelerator with a seed of its own: totals and the first difference
- * do not depend on the number of processes. */
+/* A whole co-simulation: random rays of a data set, cut into blocks that are dealt out to processes or ranks.
+ * Everything depends on the block alone, which is a fresh accelerator with a seed of its own: totals and the first
+ * difference do not depend on how many they are. */
 #ifndef SF_SIM_LOCKSTEP_H
 #define SF_SIM_LOCKSTEP_H
 #include "sim/cosim.h"
+#include "ranks/ranks.h"
 #include "scene/scene.h"
 #include <stdio.h>
 
@@ -11,7 +12,7 @@ typedef struct sf_lockstep_options {
   const char *scene, *data;
   const char *split;                    /* "test", "train" */
   uint64_t seed, limit;                 /* limit: no block begins after this many samples; 0 = none */
-  int rays, block, stall_percent, jobs; /* block: rays per block */
+  int rays, block, stall_percent, jobs; /* block: rays per block; jobs: processes or ranks, for reports */
   const char *plusarg;                  /* NULL or text */
   const char *checkpoint; /* file of the finished blocks: begun anew where it is missing, continued where it is there;
                              or NULL */
@@ -33,12 +34,14 @@ typedef struct sf_lockstep {
   sf_cosim_totals sum;
   uint64_t energy_core_fj, energy_rtl_fj;
   sf_cosim_place place;    /* found: the first difference */
+  char wire[64];           /* of it; place points here */
   sf_replay replay;        /* of it */
   char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
   bool replays;            /* the samples of the replay file show it */
   bool partial;            /* the last blocks were interrupted; no checkpoint is written of them */
   bool complete;           /* every ray, or the limit */
   uint64_t resumed;        /* samples that the checkpoint brought along */
+  sf_ranks *ranks;         /* who does the work; set by the caller, NULL: this process */
   void (*tick)(void *user, const struct sf_lockstep *lockstep); /* several times a second; or NULL */
   void *user;
   double saved;            /* time of the last checkpoint */
@@ -51,8 +54,9 @@ typedef struct sf_lockstep {
 } sf_lockstep;
 
 sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);
-/* SF_E_DIFFERENCE: `place` says where, and the evidence is written unless `unwritten` says why not. SF_E_STOPPED:
- * interrupted, the totals are of what was compared until then. */
+/* On every rank; rank 0 alone has totals, checkpoint and evidence. SF_E_DIFFERENCE: `place` says where, and the
+ * evidence is written unless `unwritten` says why not. SF_E_STOPPED: interrupted, the totals are of what was compared
+ * until then. */
 sf_status sf_lockstep_run(sf_lockstep *lockstep);
 /* View and pixel of a ray. */
 typedef struct sf_lockstep_pixel {

@@ -1,7 +1,7 @@
 /* All caches at once, against one after the other. */
 #include "ck_run.h"
 #include "base/rng.h"
-#include "cycles/ranks.h"
+#include "cycles/places.h"
 
 enum { LINES = 20000 };
 
@@ -22,19 +22,19 @@ TEST(ranks_are_all_caches)
     for (int ways = 1; ways <= FX_WAYS_MAX; ways *= 2) {
       const fx_cache_shape shape = {bytes, ways};
       fx_cache cache;
-      sf_ranks ranks;
+      sf_places places;
       ck_ok(fx_cache_open(&cache, &shape));
-      ck_ok(sf_ranks_open(&ranks, cache.sets));
+      ck_ok(sf_places_open(&places, cache.sets));
       uint64_t misses = 0;
       for (int tile = 0; tile < 2; tile++) {
-        fx_cache_empty(&cache), sf_ranks_empty(&ranks);
+        fx_cache_empty(&cache), sf_places_empty(&places);
         misses += fx_cache_look_up(&cache, line + tile * LINES / 2, LINES / 2);
-        sf_ranks_look_up(&ranks, line + tile * LINES / 2, LINES / 2);
+        sf_places_look_up(&places, line + tile * LINES / 2, LINES / 2);
       }
-      ck_assert_uint_eq(ranks.asked, LINES);
-      ck_assert_uint_eq(sf_ranks_misses(&ranks, ways), misses);
+      ck_assert_uint_eq(places.asked, LINES);
+      ck_assert_uint_eq(sf_places_misses(&places, ways), misses);
       ck_assert_uint_gt(misses, 0);
       ck_assert_uint_lt(misses, LINES);
-      fx_cache_close(&cache), sf_ranks_close(&ranks);
+      fx_cache_close(&cache), sf_places_close(&places);
     }
 }

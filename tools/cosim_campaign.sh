@@ -1,6 +1,7 @@
 #!/bin/bash
 # Co-simulates SAMPLES samples, shared by the SEEDS, with stalls; JSON and JUnit XML in BUILD/cosim.
 # usage: cosim_campaign.sh BUILD SCENE DATA SAMPLES "SEEDS" [STALLS]
+# LAUNCH: in place of JOBS processes here, ranks: "mpirun -n 8", "srun --mpi=pmix -n 64".
 # Interrupted, the same command goes on. A seed that is finished is not run again while program, scene and options are the same.
 set -u
 if [ $# -lt 5 ]; then
@@ -9,8 +10,9 @@ if [ $# -lt 5 ]; then
 fi
 build=$1 scene=$2 data=$3 samples=$4 seeds=$5 stalls=${6:-20}
 out=$build/cosim
-jobs=${JOBS:-$(nproc)}
 program=$build/bin/sf_cosim
+read -ra launch <<<"${LAUNCH:-}"
+[ ${#launch[@]} -gt 0 ] && processes=() || processes=(--jobs "${JOBS:-$(nproc)}")
 case $samples in *[!0-9]*) echo "cosim_campaign: SAMPLES '$samples' is not a whole number" >&2; exit 2 ;; esac
 read -ra seed <<<"$seeds"
 [ ${#seed[@]} -gt 0 ] && [ "${samples:-0}" -gt 0 ] || { echo "cosim_campaign: SAMPLES or SEEDS is empty" >&2; exit 2; }
@@ -28,9 +30,11 @@ for s in "${seed[@]}"; do
     printf '%s' "$key" >"$out/seed-$s.key"
   fi
   [ -e "$out/seed-$s.done" ] && { echo "seed $s: done before"; continue; }
-  "$program" "$scene" "$data" --rays 1000000000 --limit-samples "$each" --seed "$s" --stalls "$stalls" --jobs "$jobs" \
+  "${launch[@]}" "$program" "$scene" "$data" --rays 1000000000 --limit-samples "$each" --seed "$s" --stalls "$stalls" "${processes[@]}" \
     --checkpoint "$out/seed-$s.part" --evidence "$out/seed-$s-difference" --junit "$out/seed-$s.xml" --json >"$out/seed-$s.json"
   status=$?
+  # A launcher may have a status of its own for it.
+  [ $status -ne 0 ] && [ "$(field "$out/seed-$s.json" complete) $(field "$out/seed-$s.json" differences)" = "false 0" ] && status=130
   [ $status -eq 130 ] && { echo "stopped; the same command goes on"; exit 130; }
   if [ $status -ne 0 ]; then
     failed=$((failed + 1))

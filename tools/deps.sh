@@ -3,7 +3,7 @@
 # DEPS: other packages instead, as `make deps-fuzz` names them.
 set -eu
 packages="${DEPS:-git gcc g++ make pkg-config patch libopenexr-dev libpng-dev libjpeg-dev libcjson-dev libhdf5-dev zlib1g-dev check libsubunit-dev
-verilator clang iverilog yosys z3 bc gcc-riscv64-unknown-elf libunicorn-dev clang-format cppcheck gnuplot-nox help2man python3-jsonschema procps util-linux}"
+verilator clang iverilog yosys z3 bc gcc-riscv64-unknown-elf libunicorn-dev libopenmpi-dev openmpi-bin clang-format cppcheck gnuplot-nox help2man python3-jsonschema procps util-linux}"
 missing=
 for package in $packages; do
   state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)

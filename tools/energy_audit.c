@@ -1,7 +1,7 @@
 /* energy_audit: every operation of a scene, counted three times, and its price. */
 #include "energy/energy.h"
 #include "report/plot.h"
-#include "cli/cli.h"
+#include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include "page/page.h"
 #include "base/io.h"
@@ -134,8 +134,8 @@ static sf_status run(page_audit *a)
   const double begin = sf_seconds();
   sf_audit_options how = a->opt.audit;
   how.tick = tick, how.user = a;
-  SF_TRY(sf_audit_open(&a->audit, &how));
-  sf_dataset_warn(stderr, "energy_audit", &a->audit.data, NULL);
+  SF_TRY(sf_ranks_agree(how.ranks, sf_audit_open(&a->audit, &how)));
+  if (!sf_ranks_rank(how.ranks)) sf_dataset_warn(stderr, "energy_audit", &a->audit.data, NULL);
   sf_progress_begin(&a->progress, a->opt.quiet);
   const sf_status status = sf_audit_count(&a->audit);
   sf_progress_end(&a->progress);
@@ -176,7 +176,7 @@ static sf_status audit_scene(const options *opt)
   page_audit *a;
   SF_TRY(open_audit(&a, opt));
   sf_status status = run(a);
-  if (status.code == SF_OK) status = report(a);
+  if (status.code == SF_OK && !sf_ranks_rank(opt->audit.ranks)) status = report(a);
   close_audit(a);
   return status;
 }
@@ -208,9 +208,9 @@ static sf_status side(const options *opt, cJSON **json)
   SF_TRY(open_audit(&a, opt));
   sf_status status = run(a);
   if (status.code == SF_OK) status = a->audit.report.three.agreement;
-  if (status.code == SF_OK) status = report_as_read(a, json);
+  if (status.code == SF_OK && !sf_ranks_rank(opt->audit.ranks)) status = report_as_read(a, json);
   close_audit(a);
-  return status;
+  return sf_ranks_lost(opt->audit.ranks) ? status : sf_ranks_agree(opt->audit.ranks, status);
 }
 
 static sf_status compare(const options *opt)
@@ -222,6 +222,7 @@ static sf_status compare(const options *opt)
   if (opt->steps_b) other.audit.steps = opt->steps_b;
   sf_status status = side(opt, &a);
   if (status.code == SF_OK) status = side(&other, &b);
+  if (sf_ranks_rank(opt->audit.ranks)) return status;
   if (status.code == SF_OK) status = sf_audits_compare(a, opt->audit.scene, b, other.audit.scene, &comparison);
   cJSON_Delete(a), cJSON_Delete(b);
   if (status.code == SF_OK && opt->plot) status = sf_plot_comparison(opt->plot, comparison);
@@ -237,6 +238,7 @@ static sf_status work(const options *opt)
   SF_TRY(sf_plusarg_check(opt->audit.plusarg));
   if (opt->compare) return compare(opt);
   if (opt->audit.scene) return audit_scene(opt);
+  if (sf_ranks_rank(opt->audit.ranks)) return sf_ok();
   if (opt->json) return sf_json_print(sf_published_json(), true);
   sf_published_print(stdout);
   return sf_ok();
@@ -370,6 +372,7 @@ int main(int argc, char **argv)
           "spike bitmaps; prices the counts and those of the scene's ReLU twin. Exit status 1 if any\ncount differs.",
       .examples = "  energy_audit scene.snn data --views 2 --json\n"
                   "  energy_audit scene.snn data --view 0 --html report.html\n"
+                  "  mpirun -n 8 energy_audit scene.snn data --views 200 --json\n"
                   "  energy_audit scene.snn data --tech my.tech --csv counts.csv\n"
                   "  energy_audit --compare a.json b.json --plot change.gp && gnuplot change.gp\n"
                   "  energy_audit --compare scene.snn scene.snn data --steps 2 --steps-b 1\n"
@@ -385,8 +388,11 @@ int main(int argc, char **argv)
     opt.command = command ? command : cli.program;
     if (opt.threads) omp_set_num_threads(opt.threads);
     sf_cli_catch_signals();
-    status = work(&opt);
+    const sf_ranks_options how = {.interrupted = sf_cli_interrupted, .argc = argc, .argv = argv};
+    status = sf_ranks_open(&opt.audit.ranks, &how);
+    opt.quiet |= sf_ranks_rank(opt.audit.ranks) > 0;
+    if (status.code == SF_OK) status = work(&opt);
     free(command);
   }
-  return sf_cli_finish(&cli, status);
+  return sf_cli_finish_ranks(&cli, opt.audit.ranks, status);
 }

@@ -1,11 +1,10 @@
 /* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
 #include "sim/activity/activity.h"
-#include "sim/jobs.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
 #include "sim/plusarg.h"
 #include "energy/energy.h"
-#include "cli/cli.h"
+#include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include "base/io.h"
 #include "base/text.h"
@@ -16,6 +15,7 @@
 
 typedef struct options {
   sf_lockstep_options run;
+  sf_ranks *ranks;
   int split;
   bool json, quiet;
   const char *replay, *junit, *dut, *dut_top, *window;
@@ -61,20 +61,22 @@ static sf_status load(const options *o, sf_lockstep *l)
 {
   SF_TRY(sf_lockstep_load(l, &o->run));
   SF_TRY(sf_plusarg_check(o->run.plusarg));
-  sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
+  if (sf_ranks_rank(o->ranks) == 0) sf_dataset_warn(stderr, "sf_cosim", &l->data, NULL);
   return sf_ok();
 }
 
 static sf_status simulate(options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
-  SF_TRY(load(o, l));
+  SF_TRY(sf_ranks_agree(o->ranks, load(o, l)));
+  l->ranks = o->ranks;
   l->tick = show;
   l->user = &d;
   sf_progress_begin(&d.progress, o->quiet);
   sf_status status = sf_lockstep_run(l);
   sf_progress_end(&d.progress);
   l->user = NULL;
+  if (sf_ranks_rank(o->ranks)) return status;
   snprintf(o->evidence, sizeof o->evidence, "%s", l->evidence);
   o->replays = l->replays;
   if (status.code == SF_OK && l->sum.samples == 0)
@@ -229,6 +231,9 @@ static sf_status settle(options *o)
   if (activity && (o->junit || r->checkpoint || r->limit || r->jobs || r->block || r->evidence))
     return sf_fail(SF_E_USAGE, "--saif and --vcd take no --junit, --checkpoint, --limit-samples, --jobs, --block or "
                                "--evidence: their samples go through one accelerator");
+  if (sf_ranks_launched() > 1 && (r->jobs || o->dut || o->replay || activity))
+    return sf_fail(SF_E_USAGE, "--jobs, --dut, --replay, --saif and --vcd are for a program that no launcher started: "
+                               "mpirun and srun say how many ranks there are");
   if (o->dut_top && !o->dut) return sf_fail(SF_E_USAGE, "--dut-top belongs to --dut");
   SF_TRY(check_evidence(r->evidence));
   if (!r->jobs) r->jobs = 1;
@@ -276,7 +281,7 @@ static sf_option *runs(options *o, sf_option *list)
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       SF_GROUP("Long runs"),
       {"--jobs", 0, SF_ARG_INT, &r->jobs, 1, SF_JOBS_MAX, NULL, "N",
-       "processes; the result does not depend on it (default 1)"},
+       "processes; the result does not depend on it (default 1); mpirun and srun bring their own (docs/scale.md)"},
       {"--block", 0, SF_ARG_INT, &r->block, 1, 1e9, NULL, "N",
        "rays per unit of work, each on a freshly powered accelerator (default 256)"},
       {"--checkpoint", 0, SF_ARG_OUTPUT, &r->checkpoint, 0, 0, NULL, "FILE",
@@ -327,6 +332,7 @@ int main(int argc, char **argv)
                       .examples =
                           "  sf_cosim scene.snn data --rays 200 --seed 1\n"
                           "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
+                          "  mpirun -n 8 sf_cosim scene.snn data --rays 1000000 --checkpoint run.part\n"
                           "  sf_cosim --replay sf_cosim-difference.json\n"
                           "  sf_cosim scene.snn data --rays 200 --stalls 0 --saif run.saif --depth 3\n"
                           "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n"
@@ -344,8 +350,13 @@ int main(int argc, char **argv)
   if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
   if (status.code == SF_OK && o.replay) status = sf_other_dut_replay(o.replay, argv);
   sf_cli_catch_signals();
+  if (status.code == SF_OK) {
+    const sf_ranks_options how = {sf_cli_interrupted, o.run.jobs, argc, argv};
+    status = sf_ranks_open(&o.ranks, &how);
+    if (sf_ranks_size(o.ranks) > 1) o.run.jobs = sf_ranks_size(o.ranks);
+  }
   if (status.code == SF_OK) status = run(&o, positional[0], positional[1]);
-  const int code = sf_cli_finish(&cli, status);
-  if (status.code == SF_E_DIFFERENCE) say_evidence(stderr, &o, argv[0]);
+  const int code = sf_cli_finish_ranks(&cli, o.ranks, status);
+  if (code == 1 && status.code == SF_E_DIFFERENCE) say_evidence(stderr, &o, argv[0]);
   return code;
 }

@@ -1,6 +1,6 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
 #include "sim/studio/view_set.h"
-#include "cli/cli.h"
+#include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include "base/io.h"
 #include "base/text.h"
@@ -24,8 +24,10 @@ typedef struct options {
 typedef struct job {
   options opt;
   sf_window crop; /* width 0: not given */
+  sf_ranks *ranks;
   sf_studio studio;
   sf_progress progress;
+  bool warned;
   size_t done, all; /* pixels of this run; all is an estimate while views are ahead */
   double start;
   /* one view */
@@ -89,9 +91,11 @@ static sf_status load_view(job *j)
 
 /* ---- progress ---- */
 
+/* Pixels of this process. Of several ranks, rank 0 counts views instead. */
 static bool tick(void *user, size_t pixels)
 {
   job *j = user;
+  if (sf_ranks_size(j->ranks) > 1) return !sf_ranks_stop(j->ranks);
   j->done += pixels;
   if (sf_progress_due(&j->progress)) {
     double all = (double)j->all, done = (double)j->done, elapsed = sf_seconds() - j->start;
@@ -105,11 +109,22 @@ static bool tick(void *user, size_t pixels)
   return !sf_cli_interrupted();
 }
 
+static void tick_views(void *user)
+{
+  job *j = user;
+  const sf_view_set *set = &j->set;
+  if (sf_progress_due(&j->progress))
+    sf_progress_show(&j->progress, "%s: %d of %d views by %d ranks", sf_backend_names[j->opt.backend], set->rendered,
+                     set->todo, sf_ranks_size(j->ranks));
+}
+
 /* Views ahead are taken to be of this view's size. */
 static void begin_view(void *user, const sf_shot *shot)
 {
   job *j = user;
-  if (!j->set.rendered) sf_dataset_warn(stderr, "sim_render", &shot->data, NULL); /* the same for every view */
+  if (!j->warned && !sf_ranks_rank(j->ranks)) sf_dataset_warn(stderr, "sim_render", &shot->data, NULL);
+  j->warned = true; /* the same for every view */
+  if (sf_ranks_size(j->ranks) > 1) return;
   size_t pixels = (size_t)shot->window.width * (size_t)shot->window.height;
   j->all = j->done + pixels * (size_t)(j->set.todo - j->set.rendered);
 }
@@ -153,21 +168,24 @@ static sf_status render_one(job *j)
 
 static void begin_set(job *j)
 {
-  j->set.studio = &j->studio, j->set.begin = begin_view, j->set.user = j;
+  j->set.studio = &j->studio, j->set.ranks = j->ranks;
+  j->set.begin = begin_view, j->set.tick = tick_views, j->set.user = j;
   begin_run(j);
 }
 
 static sf_status render_all(job *j)
 {
-  SF_TRY(open_studio(j));
+  SF_TRY(sf_ranks_agree(j->ranks, open_studio(j)));
   snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
   begin_set(j);
   char contact[4096 + 16];
   sf_status status = sf_view_set_render(&j->set, &j->crop);
   const double seconds = sf_seconds() - j->start;
-  if (status.code == SF_OK) status = sf_view_set_contact(&j->set, contact);
+  const bool first = sf_ranks_rank(j->ranks) == 0;
+  if (status.code == SF_OK && first) status = sf_view_set_contact(&j->set, contact);
   sf_progress_end(&j->progress);
   SF_TRY(status);
+  if (!first) return status;
   if (j->opt.json) {
     cJSON *json = sf_manifest_report_json(&j->set.manifest);
     sf_view_set_add_run(&j->set, seconds, json);
@@ -216,13 +234,14 @@ static sf_status load_manifest(job *j)
 static sf_status verify(job *j)
 {
   int differences = 0;
-  SF_TRY(load_manifest(j));
-  SF_TRY(open_studio(j));
+  SF_TRY(sf_ranks_agree(j->ranks, load_manifest(j)));
+  SF_TRY(sf_ranks_agree(j->ranks, open_studio(j)));
   j->verdicts = cJSON_CreateArray();
   begin_set(j);
   sf_status status = sf_view_set_verify(&j->set, j->opt.view, report_verdict, &differences);
   sf_progress_end(&j->progress);
   SF_TRY(status);
+  if (sf_ranks_rank(j->ranks)) return status;
   if (j->opt.json) {
     cJSON *json = cJSON_CreateObject();
     cJSON_AddBoolToObject(json, "ok", differences == 0);
@@ -245,11 +264,6 @@ static sf_status verify(job *j)
 
 /* ---- program ---- */
 
-static sf_status work(job *j)
-{
-  return j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
-}
-
 static sf_status refuse(bool given, const char *option, const char *reason)
 {
   return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
@@ -268,6 +282,7 @@ static sf_status check_backend(options *o)
 static sf_status check_modes(options *o)
 {
   SF_TRY(check_backend(o));
+  SF_TRY(refuse(!o->all && !o->verify && sf_ranks_launched() > 1, "--all", "or --verify has to be given to ranks"));
   if (o->verify) return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
   if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
   if (o->all) {
@@ -296,7 +311,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       SF_GROUP("A set of views"),
       {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
-       "every view of the split, into the folder -o, with a manifest and a contact sheet"},
+       "every view of the split, into the folder -o, with a manifest and a contact sheet; also as ranks of mpirun or "
+       "srun (docs/scale.md)"},
       {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
        "render again what the manifest lists and compare"},
       SF_GROUP("How it is computed"),
@@ -355,6 +371,7 @@ int main(int argc, char **argv)
       .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
                   "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
                   "  sim_render scene.snn data --all -o golden\n"
+                  "  mpirun -n 8 sim_render scene.snn data --all -o golden\n"
                   "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
                   "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
                   "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
@@ -368,12 +385,16 @@ int main(int argc, char **argv)
   if (status.code == SF_OK) {
     set_threads(j->opt.threads);
     sf_cli_catch_signals();
-    status = work(j);
+    const sf_ranks_options how = {.interrupted = sf_cli_interrupted, .argc = argc, .argv = argv};
+    status = sf_ranks_open(&j->ranks, &how);
+    j->opt.quiet |= sf_ranks_rank(j->ranks) > 0;
   }
+  if (status.code == SF_OK) status = j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
   cJSON_Delete(j->verdicts);
   sf_view_set_free(&j->set);
   sf_shot_free(&j->shot);
   sf_studio_close(&j->studio);
+  sf_ranks *ranks = j->ranks;
   free(j);
-  return sf_cli_finish(&cli, status);
+  return sf_cli_finish_ranks(&cli, ranks, status);
 }

@@ -161,14 +161,26 @@ static sf_status count_twin(sf_audit *a)
 
 /* ---- all of it ---- */
 
+static sf_status same_rays(const sf_audit *a)
+{
+  char cameras[65] = "";
+  const sf_space space = sf_dataset_space(&a->data);
+  snprintf(cameras, sizeof cameras, "%d %d %d %x", a->data.count, a->data.downscale, space.views,
+           (unsigned)space.poses);
+  SF_TRY(sf_ranks_same(a->opt.ranks, "scene", a->hash));
+  return sf_ranks_same(a->opt.ranks, "data set", cameras);
+}
+
 sf_status sf_audit_count(sf_audit *a)
 {
   sf_audit_report *r = &a->report;
-  const sf_measure_job job = {&a->scene,           r->rays,      make_ray, core_tick, a, a->opt.seed,
-                              a->opt.recount_rays, a->opt.cache, ray_tile};
+  const sf_measure_job job = {&a->scene,           r->rays,      make_ray, core_tick,   a, a->opt.seed,
+                              a->opt.recount_rays, a->opt.cache, ray_tile, a->opt.ranks};
+  SF_TRY(same_rays(a));
   const sf_status status = sf_measure_rays(&job, &r->measure);
   if (status.code == SF_E_DIFFERENCE) return sf_fail(status.code, "%s: %s", a->opt.scene, status.message);
   SF_TRY(status);
+  if (sf_ranks_rank(a->opt.ranks)) return status;
   const fx_counts *counts = &r->measure.core;
   SF_TRY(sf_ledger_make(&a->scene.net, counts, &r->ledger));
   if (a->scene.backbone == FX_INGP) r->entries = counts->grid_bytes / FX_GRID_FEATURES;

@@ -16,6 +16,7 @@ typedef struct sf_audit_options {
   fx_cache_shape cache; /* of the field; zeros: as built */
   const char *tech;     /* a file, or the name of one beside the program: ../share/spikefield/tech/NAME.tech */
   const char *twin;     /* float model of a ReLU twin, or NULL */
+  sf_ranks *ranks;      /* who counts; NULL: this process */
   bool (*tick)(void *user, const char *what, uint64_t done, uint64_t total); /* rays; false stops */
   void *user;
 } sf_audit_options;
@@ -32,7 +33,8 @@ typedef struct sf_audit {
 
 /* Reads the files. Close it whether this fails or not. */
 sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options);
-/* Counts and prices: fills the report. Three counts that differ are in report.three.agreement, not a failure. */
+/* On every rank; rank 0 alone prices, and runs the accelerator. Counts and prices: fills the report. Three counts that
+ * differ are in report.three.agreement, not a failure. */
 sf_status sf_audit_count(sf_audit *audit);
 void sf_audit_close(sf_audit *audit);
 #endif

@@ -1,8 +1,7 @@
-#include "sim/studio/view_set.h"
+#include "sim/studio/internal.h"
 #include "base/sha256.h"
 #include "base/io.h"
 #include "base/text.h"
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -12,7 +11,7 @@ void sf_view_set_free(sf_view_set *set)
   sf_manifest_free(&set->manifest);
 }
 
-static void picture_path(const sf_view_set *set, const char *name, char path[4096 + 80])
+void sf_set_path(const sf_view_set *set, const char *name, char path[4096 + 80])
 {
   snprintf(path, 4096 + 80, "%s/%s", set->folder, name);
 }
@@ -31,13 +30,11 @@ static sf_status place_window(const sf_view_set *set, sf_shot *shot)
   return sf_ok();
 }
 
-static sf_status render_loaded(sf_view_set *set, sf_shot *shot, sf_manifest_view *view)
+sf_status sf_set_render(sf_view_set *set, sf_shot *shot, sf_manifest_view *view)
 {
   SF_TRY(place_window(set, shot));
   if (set->begin) set->begin(set->user, shot);
   SF_TRY(sf_shot_render(set->studio, shot));
-  set->rendered++;
-  set->pixels += (uint64_t)shot->window.width * (uint64_t)shot->window.height;
   *view = (sf_manifest_view){.index = shot->index, .psnr = shot->psnr, .ssim = shot->ssim};
   snprintf(view->name, sizeof view->name, "%s", shot->view->name);
   return sf_manifest_describe(view, &set->studio->scene.net, &shot->view->camera, &shot->golden);
@@ -45,31 +42,72 @@ static sf_status render_loaded(sf_view_set *set, sf_shot *shot, sf_manifest_view
 
 /* ---- rendering ---- */
 
-static bool finished(const sf_view_set *set, int index)
+static bool is_there(const sf_view_set *set, const sf_manifest_view *view)
 {
   char path[4096 + 80], hash[65];
-  const sf_manifest_view *view = sf_manifest_find(&set->manifest, index);
-  if (!view) return false;
-  picture_path(set, view->exr, path);
+  sf_set_path(set, view->exr, path);
   return sf_sha256_file(path, hash).code == SF_OK && !strcmp(hash, view->exr_sha256);
 }
 
-static sf_status keep(sf_view_set *set, const sf_shot *shot, sf_manifest_view *view)
+static bool finished(const sf_view_set *set, int index)
+{
+  const sf_manifest_view *view = sf_manifest_find(&set->manifest, index);
+  return view && is_there(set, view);
+}
+
+typedef struct rendered {
+  sf_status status;
+  sf_manifest_view view;
+} rendered;
+
+static sf_status keep_picture(const sf_view_set *set, const sf_shot *shot, sf_manifest_view *view)
 {
   char path[4096 + 80];
   snprintf(view->exr, sizeof view->exr, "view_%04d.exr", view->index);
-  picture_path(set, view->exr, path);
+  sf_set_path(set, view->exr, path);
   SF_TRY(sf_shot_save(set->studio, shot, path));
-  SF_TRY(sf_sha256_file(path, view->exr_sha256));
+  return sf_sha256_file(path, view->exr_sha256);
+}
+
+/* Wherever it is dealt to. */
+static void render_view(void *user, uint64_t unit, void *result)
+{
+  const sf_set_run *r = user;
+  rendered *to = result;
+  sf_shot shot;
+  to->status = sf_shot_load(r->set->studio, r->index[unit], &shot);
+  if (to->status.code == SF_OK) to->status = sf_set_render(r->set, &shot, &to->view);
+  if (to->status.code == SF_OK) to->status = keep_picture(r->set, &shot, &to->view);
+  sf_shot_free(&shot);
+  to->status = sf_ranks_named(r->set->ranks, to->status);
+}
+
+static sf_status keep(sf_view_set *set, const sf_manifest_view *view)
+{
+  if (sf_ranks_size(set->ranks) > 1 && !is_there(set, view))
+    return sf_fail(SF_E_IO, "%s/%s: a rank has written it, rank 0 does not find it: all have to see this folder",
+                   set->folder, view->exr);
+  set->rendered++;
+  set->pixels += (uint64_t)view->width * (uint64_t)view->height;
   SF_TRY(sf_manifest_put(&set->manifest, view));
   return sf_manifest_save(&set->manifest, set->manifest_path);
 }
 
-static sf_status render_view(sf_view_set *set, sf_shot *shot)
+static bool take_view(void *user, uint64_t unit, const void *result)
 {
-  sf_manifest_view view;
-  SF_TRY(render_loaded(set, shot, &view));
-  return keep(set, shot, &view);
+  sf_set_run *r = user;
+  const rendered *from = result;
+  (void)unit;
+  r->ended = from->status;
+  if (r->ended.code == SF_E_STOPPED) return sf_ranks_stop(r->set->ranks); /* else its rank alone was stopped */
+  if (r->ended.code == SF_OK) r->ended = keep(r->set, &from->view);
+  return r->ended.code == SF_OK;
+}
+
+void sf_set_tick(void *user)
+{
+  const sf_set_run *r = user;
+  if (r->set->tick) r->set->tick(r->set->user);
 }
 
 /* The first view tells the scale, the number of views and whether the window can be inside. */
@@ -126,130 +164,77 @@ static sf_status resume(sf_view_set *set)
   return sf_fail(status.code, "%s belongs to another set: %s", set->manifest_path, status.message);
 }
 
-static sf_status render_missing(sf_view_set *set, const bool *done)
+const char *sf_set_lost(const sf_status *dealt)
 {
-  for (int i = 0; i < set->manifest.total; i++) {
-    sf_shot shot;
-    if (done[i]) continue;
-    sf_status status = sf_shot_load(set->studio, i, &shot);
-    if (status.code == SF_OK) status = render_view(set, &shot);
-    sf_shot_free(&shot);
-    if (status.code == SF_E_STOPPED)
-      return sf_fail(status.code, "stopped; %s holds %d of %d view%s, the same command goes on", set->folder,
-                     set->manifest.count, set->manifest.total, sf_plural((uint64_t)set->manifest.total));
-    SF_TRY(status);
+  return dealt->code == SF_E_STOPPED ? dealt->message + strlen("stopped") : "";
+}
+
+static sf_status render_missing(sf_view_set *set, const bool *done, int *index)
+{
+  sf_set_run r = {.set = set, .index = index, .ended = sf_ok()};
+  const sf_manifest *m = &set->manifest;
+  for (int i = 0; i < m->total; i++)
+    if (!done[i]) index[set->todo++] = i;
+  const sf_deal deal = {.end = (uint64_t)set->todo,
+                        .result_size = sizeof(rendered),
+                        .work = render_view,
+                        .take = take_view,
+                        .any_order = true, /* the manifest sorts them */
+                        .tick = sf_set_tick,
+                        .user = &r};
+  const sf_status dealt = sf_ranks_deal(set->ranks, &deal);
+  if (dealt.code != SF_E_STOPPED && r.ended.code != SF_E_STOPPED) return r.ended.code == SF_OK ? dealt : r.ended;
+  return sf_fail(SF_E_STOPPED, "stopped; %s holds %d of %d view%s%s, the same command goes on", set->folder, m->count,
+                 m->total, sf_plural((uint64_t)m->total), sf_set_lost(&dealt));
+}
+
+/* Rank 0 alone reads and writes the manifest. */
+static sf_status begin_set(sf_view_set *set)
+{
+  if (sf_ranks_rank(set->ranks)) return sf_ok();
+  SF_TRY(sf_make_dir(set->folder));
+  SF_TRY(resume(set));
+  return sf_manifest_save(&set->manifest, set->manifest_path);
+}
+
+sf_status sf_set_same(const sf_view_set *set)
+{
+  sf_shot shot;
+  char cameras[65] = "";
+  sf_status status = sf_shot_load(set->studio, 0, &shot);
+  if (status.code == SF_OK) {
+    const sf_space space = sf_dataset_space(&shot.data);
+    snprintf(cameras, sizeof cameras, "%d %d %d %x", shot.data.total, shot.data.downscale, space.views,
+             (unsigned)space.poses);
   }
-  return sf_ok();
+  sf_shot_free(&shot);
+  SF_TRY(sf_ranks_agree(set->ranks, status));
+  SF_TRY(sf_ranks_same(set->ranks, "scene", set->studio->scene_sha256));
+  return sf_ranks_same(set->ranks, "data set", cameras);
+}
+
+static sf_status render_set(sf_view_set *set, bool *done, int *index)
+{
+  const int total = set->manifest.total;
+  for (int i = 0; i < total && !sf_ranks_rank(set->ranks); i++) done[i] = finished(set, i);
+  SF_TRY(sf_ranks_broadcast(set->ranks, done, (size_t)total * sizeof *done));
+  return render_missing(set, done, index);
 }
 
 sf_status sf_view_set_render(sf_view_set *set, const sf_window *crop)
 {
   snprintf(set->manifest_path, sizeof set->manifest_path, "%s/%s", set->folder, SF_MANIFEST_NAME);
-  SF_TRY(take_origin(set, crop));
-  SF_TRY(sf_make_dir(set->folder));
-  SF_TRY(resume(set));
-  SF_TRY(sf_manifest_save(&set->manifest, set->manifest_path));
-  bool *done = calloc((size_t)set->manifest.total, sizeof *done);
-  if (!done)
-    return sf_fail(SF_E_MEMORY, "no memory for %d view%s", set->manifest.total,
-                   sf_plural((uint64_t)set->manifest.total));
-  for (int i = 0; i < set->manifest.total; i++) set->todo += !(done[i] = finished(set, i));
-  sf_status status = render_missing(set, done);
-  free(done);
+  if (sf_ranks_size(set->ranks) > 1) SF_TRY(sf_set_same(set));
+  SF_TRY(sf_ranks_agree(set->ranks, take_origin(set, crop)));
+  SF_TRY(sf_ranks_same(set->ranks, "model", set->manifest.origin.model_sha256));
+  SF_TRY(sf_ranks_agree(set->ranks, begin_set(set)));
+  const size_t total = (size_t)set->manifest.total;
+  bool *done = calloc(total, sizeof *done);
+  int *index = calloc(total, sizeof *index);
+  sf_status status = sf_ok();
+  if (!done || !index) status = sf_fail(SF_E_MEMORY, "no memory for %zu view%s", total, sf_plural(total));
+  status = sf_ranks_agree(set->ranks, status);
+  if (status.code == SF_OK) status = render_set(set, done, index);
+  free(done), free(index);
   return status;
-}
-
-/* ---- verification ---- */
-
-/* The picture differs from the manifest. The EXR, while it is the one that belongs there, knows the pixel. */
-static void locate(const sf_view_set *set, const sf_shot *shot, int plane, sf_verdict *verdict)
-{
-  char path[4096 + 80], hash[65];
-  picture_path(set, verdict->view->exr, path);
-  if (plane < 0 || sf_sha256_file(path, hash).code != SF_OK || strcmp(hash, verdict->view->exr_sha256) != 0) return;
-  sf_status pixel = sf_golden_compare_file(&shot->golden, path, plane);
-  if (pixel.code == SF_E_DIFFERENCE) verdict->picture = pixel;
-}
-
-static void check_file(const sf_view_set *set, const sf_shot *shot, sf_verdict *verdict)
-{
-  char path[4096 + 80], hash[65];
-  picture_path(set, verdict->view->exr, path);
-  if (access(path, F_OK)) return;
-  verdict->file = sf_sha256_file(path, hash);
-  if (verdict->file.code != SF_OK || !strcmp(hash, verdict->view->exr_sha256)) return;
-  verdict->file = sf_golden_compare_file(&shot->golden, path, -1);
-  if (verdict->file.code == SF_OK)
-    snprintf(verdict->note, sizeof verdict->note, "%s is not the file of the manifest, its integer planes are the same",
-             verdict->view->exr);
-}
-
-/* Pictures of the data set only judge a rendering; they are not part of it. */
-static void check_quality(const sf_manifest_view *here, sf_verdict *verdict)
-{
-  const sf_manifest_view *view = verdict->view;
-  bool same = (fabs(view->psnr - here->psnr) <= 0.001 || (isnan(view->psnr) && !isfinite(here->psnr))) &&
-              (fabs(view->ssim - here->ssim) <= 0.001 || (isnan(view->ssim) && isnan(here->ssim)));
-  if (same || verdict->note[0]) return;
-  snprintf(verdict->note, sizeof verdict->note,
-           "PSNR %.4f dB, SSIM %.4f, in the manifest %.4f dB, %.4f: another picture to compare with", here->psnr,
-           here->ssim, view->psnr, view->ssim);
-}
-
-static sf_status verify_view(sf_view_set *set, sf_shot *shot, sf_verdict *verdict)
-{
-  sf_manifest_view here;
-  int plane = -1;
-  if (!shot->view) {
-    verdict->picture = sf_fail(SF_E_DIFFERENCE, "%s has %d view%s", set->studio->options.data, shot->data.total,
-                               sf_plural((uint64_t)shot->data.total));
-    return sf_ok();
-  }
-  if (strcmp(shot->view->name, verdict->view->name) != 0) {
-    verdict->picture = sf_fail(SF_E_DIFFERENCE, "name is %s, here it is %s", verdict->view->name, shot->view->name);
-    return sf_ok();
-  }
-  SF_TRY(render_loaded(set, shot, &here));
-  verdict->picture = sf_manifest_same_view(verdict->view, &here, &plane);
-  if (verdict->picture.code != SF_OK) locate(set, shot, plane, verdict);
-  check_file(set, shot, verdict);
-  if (verdict->picture.code == SF_OK) check_quality(&here, verdict);
-  return sf_ok();
-}
-
-static sf_status check_total(const sf_view_set *set)
-{
-  sf_shot shot;
-  SF_TRY(sf_shot_load(set->studio, set->manifest.total, &shot));
-  int total = shot.data.total;
-  sf_shot_free(&shot);
-  if (total == set->manifest.total) return sf_ok();
-  return sf_fail(SF_E_DIFFERENCE, "%s: views is %d, %s has %d %s views", set->manifest_path, set->manifest.total,
-                 set->studio->options.data, total, set->manifest.origin.split);
-}
-
-sf_status sf_view_set_verify(sf_view_set *set, int only, void (*report)(void *user, const sf_verdict *verdict),
-                             int *differences)
-{
-  const sf_manifest *m = &set->manifest;
-  *differences = 0;
-  if (strcmp(m->origin.scene_sha256, set->studio->scene_sha256) != 0)
-    return sf_fail(SF_E_DIFFERENCE, "%s: made from the scene with SHA-256 %s, %s has %s", set->manifest_path,
-                   m->origin.scene_sha256, set->studio->options.scene, set->studio->scene_sha256);
-  SF_TRY(check_total(set));
-  set->todo = only >= 0 ? 1 : m->count;
-  for (int i = 0; i < m->count; i++) {
-    sf_verdict verdict = {.view = &m->view[i]};
-    sf_shot shot;
-    if (only >= 0 && m->view[i].index != only) continue;
-    sf_status status = sf_shot_load(set->studio, m->view[i].index, &shot);
-    if (status.code == SF_OK) status = verify_view(set, &shot, &verdict);
-    sf_shot_free(&shot);
-    if (status.code == SF_E_STOPPED)
-      return sf_fail(status.code, "stopped after %d view%s", set->rendered, sf_plural((uint64_t)set->rendered));
-    SF_TRY(status);
-    *differences += verdict.picture.code != SF_OK || verdict.file.code != SF_OK;
-    report(set->user, &verdict);
-  }
-  return sf_ok();
 }

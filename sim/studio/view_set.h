@@ -1,8 +1,10 @@
-/* All views of a split: rendered into a folder with a manifest, or rendered again and compared with one. */
+/* All views of a split: rendered into a folder with a manifest, or rendered again and compared with one. Views are
+ * dealt out to ranks; rank 0 alone has the manifest and reports. Every rank has to see the folder. */
 #ifndef SF_SIM_VIEW_SET_H
 #define SF_SIM_VIEW_SET_H
 #include "sim/studio/studio.h"
 #include "golden/manifest.h"
+#include "ranks/ranks.h"
 
 #define SF_MANIFEST_NAME "manifest.json"
 #define SF_CONTACT_NAME "contact.png"
@@ -12,9 +14,11 @@ typedef struct sf_view_set {
   char folder[4096]; /* of manifest and pictures */
   char manifest_path[4096 + 16];
   sf_manifest manifest;
-  void (*begin)(void *user, const sf_shot *shot); /* before each view that is rendered; or NULL */
+  sf_ranks *ranks;                                /* who renders; NULL: this process */
+  void (*begin)(void *user, const sf_shot *shot); /* before each view that is rendered here; or NULL */
+  void (*tick)(void *user);                       /* on rank 0 of several, several times a second; or NULL */
   void *user;
-  int todo, rendered; /* views of this run; todo is known before the first begin */
+  int todo, rendered; /* views of this run, on all ranks; todo is known before the first begin */
   uint64_t pixels;    /* of them */
 } sf_view_set;
 

@@ -1,5 +1,5 @@
 #include "cycles/explore.h"
-#include "cycles/ranks.h"
+#include "cycles/places.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,7 +26,7 @@ typedef struct run {
   int recorded;              /* tiles */
   fx_counts counts;
   fx_memory_counts memory;
-  sf_ranks ranks[SETS];
+  sf_places places[SETS];
   int engines;
   sf_engine engine[ENGINES_MAX];
   double engine_cycles[ENGINES_MAX]; /* per sample */
@@ -78,7 +78,7 @@ static int tile_rays(run *r, int i, fx_ray ray[PIXELS])
 typedef struct worker {
   fx_memory memory;
   fx_counts counts;
-  sf_ranks ranks[SETS];
+  sf_places places[SETS];
   fx_ray ray[PIXELS];
   uint64_t tile[PIXELS]; /* all 0 */
   fx_pixel pixel[PIXELS];
@@ -88,14 +88,14 @@ typedef struct worker {
 static void see_lines(void *user, const uint32_t *line, int n)
 {
   worker *w = user;
-  for (int i = 0; i < SETS; i++) sf_ranks_look_up(&w->ranks[i], line, n);
+  for (int i = 0; i < SETS; i++) sf_places_look_up(&w->places[i], line, n);
 }
 
 static sf_status open_worker(worker **worker_, const run *r)
 {
   worker *w = *worker_ = calloc(1, sizeof *w);
   if (!w) return sf_fail(SF_E_MEMORY, "no memory for a tile");
-  for (int i = 0; i < SETS; i++) SF_TRY(sf_ranks_open(&w->ranks[i], (uint32_t)SETS_MIN << i));
+  for (int i = 0; i < SETS; i++) SF_TRY(sf_places_open(&w->places[i], (uint32_t)SETS_MIN << i));
   SF_TRY(fx_memory_open(&w->memory, r->job->scene, &sf_cache_built));
   w->memory.see = see_lines, w->memory.user = w;
   return sf_ok();
@@ -110,12 +110,12 @@ static void close_worker(worker *w, run *r)
     fx_memory_counts_add(&r->memory, &w->memory.counts);
     r->to->rays += w->rays;
     for (int i = 0; i < SETS; i++) {
-      r->ranks[i].asked += w->ranks[i].asked;
-      for (int at = 0; at < FX_WAYS_MAX; at++) r->ranks[i].hits[at] += w->ranks[i].hits[at];
+      r->places[i].asked += w->places[i].asked;
+      for (int at = 0; at < FX_WAYS_MAX; at++) r->places[i].hits[at] += w->places[i].hits[at];
     }
   }
   fx_memory_close(&w->memory);
-  for (int i = 0; i < SETS; i++) sf_ranks_close(&w->ranks[i]);
+  for (int i = 0; i < SETS; i++) sf_places_close(&w->places[i]);
   free(w);
 }
 
@@ -123,7 +123,7 @@ static void count_tile(run *r, worker *w, int i)
 {
   const int n = tile_rays(r, i, w->ray);
   if (n == 0) return;
-  for (int s = 0; s < SETS; s++) sf_ranks_empty(&w->ranks[s]);
+  for (int s = 0; s < SETS; s++) sf_places_empty(&w->places[s]);
   fx_memory_begin(&w->memory);
   note(r, fx_render_list(r->core, &w->memory, w->tile, w->ray, (size_t)n, w->pixel, NULL, &w->counts));
   w->rays += (uint64_t)n;
@@ -142,7 +142,7 @@ static sf_status count_tiles(run *r)
       if (opened.code == SF_OK && goes_on(r)) count_tile(r, w, i), progress(r, "tiles", r->recorded);
     close_worker(w, r);
   }
-  for (int i = 0; i < SETS; i++) r->ranks[i].sets = (uint32_t)SETS_MIN << i;
+  for (int i = 0; i < SETS; i++) r->places[i].sets = (uint32_t)SETS_MIN << i;
   return r->failed;
 }
 
@@ -150,8 +150,8 @@ static uint64_t misses_of(const run *r, const fx_cache_shape *cache)
 {
   const uint32_t sets = (uint32_t)(cache->bytes / (FX_LINE * cache->ways));
   int i = 0;
-  while (r->ranks[i].sets != sets) i++;
-  return sf_ranks_misses(&r->ranks[i], cache->ways);
+  while (r->places[i].sets != sets) i++;
+  return sf_places_misses(&r->places[i], cache->ways);
 }
 
 /* ---- the cycle model ---- */

@@ -4,6 +4,7 @@
 #include "fx/memory.h"
 #include "image/image.h"
 #include "energy/ledger.h"
+#include "ranks/ranks.h"
 #include "scene/scene.h"
 #include "base/json.h"
 #include <stdio.h>
@@ -161,6 +162,7 @@ typedef struct sf_measure_job {
                            recounted from its spike bitmaps; UINT64_MAX: all */
   fx_cache_shape cache; /* of the field; zeros: sf_cache_built */
   uint64_t (*tile)(void *user, uint64_t index); /* of a ray, see fx_memory_ray; NULL: each ray has its own */
+  sf_ranks *ranks; /* who counts, or NULL; the callbacks give the same on each, and rank 0 alone gets the sums */
 } sf_measure_job;
 /* The cache that the accelerator has here: CACHE_BYTES and CACHE_WAYS of arch.def. */
 static const fx_cache_shape sf_cache_built = {SF_CACHE_BYTES, SF_CACHE_WAYS};

@@ -1,8 +1,9 @@
-/* Units of work over processes: order, early end, lost processes, interruption; no process stays behind. */
+/* Units of work over processes, and in the program itself: order, early end, lost processes, interruption; no process
+ * stays behind. Ranks of mpirun are in tests/chain/ranks.sh. */
 #include "ck_run.h"
-#include "sim/jobs.h"
-#include "cli/cli.h"
 #include "base/rng.h"
+#include "cli/cli.h"
+#include "ranks/ranks.h"
 #include <errno.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -19,7 +20,8 @@ typedef struct answer {
 
 typedef struct task {
   uint64_t stop_at, die_at, interrupt_at; /* units */
-  uint64_t next, sum, cut;                /* seen by take */
+  bool any_order;
+  uint64_t next, sum, cut; /* seen by take */
 } task;
 
 static uint64_t value_of(uint64_t unit)
@@ -49,7 +51,8 @@ static bool take(void *user, uint64_t unit, const void *result)
 {
   task *t = user;
   const answer *a = result;
-  ck_assert_uint_eq(unit, t->next++);
+  if (!t->any_order) ck_assert_uint_eq(unit, t->next);
+  t->next++;
   ck_assert_uint_eq(a->unit, unit);
   ck_assert_int_eq(a->bulk[sizeof a->bulk - 1], (char)unit);
   t->sum += a->value;
@@ -60,15 +63,20 @@ static bool take(void *user, uint64_t unit, const void *result)
 
 static sf_status run(task *t, int processes, uint64_t first)
 {
-  const sf_jobs jobs = {.processes = processes,
-                        .first = first,
+  const sf_deal deal = {.first = first,
                         .end = UNITS,
                         .result_size = sizeof(answer),
                         .work = work,
                         .take = take,
+                        .any_order = t->any_order,
                         .user = t};
+  const sf_ranks_options how = {.interrupted = sf_cli_interrupted, .processes = processes};
+  sf_ranks *ranks;
   t->next = first;
-  const sf_status status = sf_jobs_run(&jobs);
+  ck_ok(sf_ranks_open(&ranks, &how));
+  ck_assert_int_eq(sf_ranks_size(ranks), 1);
+  const sf_status status = sf_ranks_deal(ranks, &deal);
+  sf_ranks_close(ranks);
   ck_assert_int_eq(waitpid(-1, NULL, WNOHANG), -1); /* no child is left, not even a dead one */
   ck_assert_int_eq(errno, ECHILD);
   return status;
@@ -83,8 +91,8 @@ static uint64_t sum_of(uint64_t first, uint64_t end)
 
 TEST(same_for_any_number_of_processes)
 {
-  static const int processes[] = {1, 2, 3, 7, 50};
-  for (int i = 0; i < 5; i++) {
+  static const int processes[] = {0, 1, 2, 3, 7, 50};
+  for (int i = 0; i < COUNT(processes); i++) {
     task whole = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = NEVER}, early = whole;
     early.stop_at = 17;
     ck_ok(run(&whole, processes[i], 5));
@@ -92,6 +100,41 @@ TEST(same_for_any_number_of_processes)
     ck_ok(run(&early, processes[i], 0));
     ck_assert_uint_eq(early.sum, sum_of(0, 18));
   }
+}
+
+/* A slow unit keeps none of those behind it waiting. */
+TEST(in_any_order)
+{
+  for (int processes = 0; processes <= 3; processes++) {
+    task t = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = NEVER, .any_order = true};
+    ck_ok(run(&t, processes, 3));
+    ck_assert_uint_eq(t.next, UNITS);
+    ck_assert_uint_eq(t.sum, sum_of(3, UNITS));
+  }
+}
+
+/* A rank that is told so by its launcher and cannot be one says it. */
+TEST(launchers)
+{
+  static const struct {
+    const char *size, *rank;
+  } by[] = {{"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"}, {"SLURM_STEP_NUM_TASKS", "SLURM_PROCID"}};
+  const sf_ranks_options how = {.interrupted = sf_cli_interrupted};
+  for (int i = 0; i < COUNT(by); i++) {
+    ck_assert_int_eq(sf_ranks_launched(), 1);
+    setenv(by[i].size, "3", 1), setenv(by[i].rank, "2", 1);
+    ck_assert_int_eq(sf_ranks_launched(), 3);
+    ck_assert(!sf_ranks_talks(NULL));
+    setenv(by[i].rank, "0", 1);
+    ck_assert(sf_ranks_talks(NULL));
+    setenv(by[i].size, "1", 1);
+    ck_assert_int_eq(sf_ranks_launched(), 1);
+    unsetenv(by[i].size), unsetenv(by[i].rank);
+  }
+  sf_ranks *ranks;
+  setenv("SLURM_STEP_NUM_TASKS", "3", 1), setenv("SLURM_PROCID", "2", 1), unsetenv("PMIX_RANK"), unsetenv("PMI_RANK");
+  ck_bad(sf_ranks_open(&ranks, &how), SF_E_UNSUPPORTED, "3 tasks", "--mpi=pmix");
+  sf_ranks_close(ranks);
 }
 
 TEST(a_process_dies)
@@ -112,4 +155,13 @@ TEST(interrupted)
   ck_assert_uint_le(t.next, 9 + 3);
   ck_assert_uint_eq(t.cut, t.next - 9);
   ck_assert_uint_eq(t.sum, sum_of(0, t.next));
+}
+
+TEST(interrupted_alone)
+{
+  sf_cli_catch_signals();
+  task t = {.stop_at = NEVER, .die_at = NEVER, .interrupt_at = 9};
+  ck_assert_int_eq(run(&t, 0, 0).code, SF_E_STOPPED);
+  ck_assert_uint_eq(t.next, 9);
+  ck_assert_uint_eq(t.sum, sum_of(0, 9));
 }

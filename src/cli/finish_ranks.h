@@ -1,0 +1,9 @@
+/* The end of a program that may be one of many. */
+#ifndef SF_CLI_FINISH_RANKS_H
+#define SF_CLI_FINISH_RANKS_H
+#include "cli/cli.h"
+#include "ranks/ranks.h"
+
+/* As sf_cli_finish on rank 0; the others have nothing to tell and end with 0. Closes the ranks, which may be NULL. */
+int sf_cli_finish_ranks(const sf_cli *cli, sf_ranks *ranks, sf_status status);
+#endif
