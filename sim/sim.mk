@@ -6,6 +6,8 @@ VERILATOR_ROOT := $(shell $(VERILATOR) --getenv VERILATOR_ROOT 2>/dev/null)
 RTL_PKG := rtl/gen/sf_arch_pkg.sv rtl/gen/sf_csr_pkg.sv rtl/sf_op_pkg.sv
 RTL_MODULES := $(filter-out $(RTL_PKG),$(wildcard rtl/gen/*.sv rtl/*.sv))
 RTL := $(RTL_PKG) $(RTL_MODULES)
+# What a board has around the accelerator, but for its own top.
+RTL_BOARD := $(wildcard rtl/board/*.sv)
 RTL_ALL := $(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt
 # A build with ARCH has a copy of rtl/ with packages of its own widths.
 RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
@@ -29,7 +31,7 @@ VERILATED_SIMD := -march=native $(if $(findstring clang,$(VERILATED_CXX)),,-ftre
 VERILATED_SIMD := $(shell $(VERILATED_CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/studio/*.c sim/soc/*.c))
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/board/*.c sim/studio/*.c sim/soc/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
