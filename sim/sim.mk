@@ -88,6 +88,7 @@ $(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
 $(eval $(call verilated_top_rule,$B/verilated/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray))
 
 include sim/unit.mk
+include sim/board.mk
 
 # Planted faults: a patched copy of rtl/; +fault=N chooses one at run time, +fault=0 none.
 FAULTS := $(sort $(wildcard tests/faults/*.patch))

@@ -1,5 +1,5 @@
-/* A serial line at the pins of a Verilated module: bytes to bits and back, cycle by cycle, and what may happen to bytes on
- * the way. C++. */
+/* A serial line at the pins of a Verilated module: bytes to bits and back, cycle by cycle, and what may happen to bytes
+ * on the way. C++. */
 #ifndef SF_TESTS_SERIAL_LINE_H
 #define SF_TESTS_SERIAL_LINE_H
 #include "tests/rtl_unit.h"

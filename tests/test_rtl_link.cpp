@@ -1,5 +1,5 @@
-/* sf_link behind a serial line, against the host's own side of it (sim/board/link.c) in a thread: what reaches registers,
- * memory and rays is what the host sent, once and in order, whatever happens to bytes on the way. */
+/* sf_link behind a serial line, against the host's own side of it (sim/board/link.c) in a thread: what reaches
+ * registers, memory and rays is what the host sent, once and in order, whatever happens to bytes on the way. */
 #include "Vsf_link.h"
 #include "Vsf_link_slow.h"
 #include "tests/serial_line.h"
@@ -102,7 +102,10 @@ struct host {
   sf_status status = sf_ok();
   explicit host(uint64_t seed) : draw(seed) {}
 
-  uint32_t word() { return draw.percent(30) ? (draw.percent(50) ? 0xc0dbdcddu : 0xc0c0dbdbu) : (uint32_t)draw(0, 0xffffffff); }
+  uint32_t word()
+  {
+    return draw.percent(30) ? (draw.percent(50) ? 0xc0dbdcddu : 0xc0c0dbdbu) : (uint32_t)draw(0, 0xffffffff);
+  }
   sf_status write()
   {
     sf_frame f = {};
@@ -126,7 +129,8 @@ struct host {
   }
   sf_status read()
   {
-    const uint32_t count = (uint32_t)draw(1, draw.percent(10) ? SF_LINK_READ_MAX : 20), first = (uint32_t)draw(0, REGISTERS - 1 - count);
+    const uint32_t count = (uint32_t)draw(1, draw.percent(10) ? SF_LINK_READ_MAX : 20),
+                   first = (uint32_t)draw(0, REGISTERS - 1 - count);
     sf_frame f = {};
     f.command = SF_LINK_READ, f.words = 2, f.word[0] = 4 * first, f.word[1] = count;
     SF_TRY(sf_link_call(&link, &f));
@@ -152,7 +156,8 @@ struct host {
   {
     const uint64_t low = (uint64_t)word() << 32 | word();
     to[0] = (uint32_t)low, to[1] = (uint32_t)(low >> 32);
-    for (uint32_t i = 2; i < 8; i++) to[i] = (i * 0x01010101u & 0x3fffffff) | (i == 7 ? (uint32_t)user << 30 | (uint32_t)last << 31 : 0);
+    for (uint32_t i = 2; i < 8; i++)
+      to[i] = (i * 0x01010101u & 0x3fffffff) | (i == 7 ? (uint32_t)user << 30 | (uint32_t)last << 31 : 0);
     sum = (user ? 0 : sum) + low;
     if (last) pixels.push_back(sum);
     sent.push_back({SF_LINK_STREAM, (uint32_t)user << 1 | last, low});
@@ -169,7 +174,9 @@ struct host {
     }
     while (given < beats || pixels.size() > 40) {
       f.command = SF_LINK_STREAM, f.words = 1 + 8 * (beats - given);
-      f.word[0] = 4u << 16 | (uint32_t)(pixels.empty() || given < beats ? 0 : draw(0, (int64_t)std::min<size_t>(pixels.size(), 42)));
+      f.word[0] =
+          4u << 16 |
+          (uint32_t)(pixels.empty() || given < beats ? 0 : draw(0, (int64_t)std::min<size_t>(pixels.size(), 42)));
       memcpy(f.word + 1, all.word + 8 * given, 32 * (beats - given));
       SF_TRY(sf_link_call(&link, &f));
       given += f.word[1] & 0xffff;
@@ -191,10 +198,17 @@ struct host {
   {
     status = sf_link_greet(&link);
     for (int i = 0; i < STEPS && status.code == SF_OK; i++) switch (draw(0, 3)) {
-      case 0: status = write(); break;
-      case 1: status = read(); break;
-      case 2: status = memory(); break;
-      default: status = stream();
+      case 0:
+        status = write();
+        break;
+      case 1:
+        status = read();
+        break;
+      case 2:
+        status = memory();
+        break;
+      default:
+        status = stream();
       }
   }
 };
@@ -212,8 +226,8 @@ template <class module> struct link_bench {
   std::deque<uint8_t> to_host;
   int socket_of_board;
   explicit link_bench(uint64_t seed, double cycles)
-      : top((context.randReset(2), context.randSeed((int)(seed % 0x7fffffff) + 1), &context)), draw(seed + 1), around(top, draw),
-        to_board(cycles), from_board(cycles), out(seed + 2), in(seed + 3)
+      : top((context.randReset(2), context.randSeed((int)(seed % 0x7fffffff) + 1), &context)), draw(seed + 1),
+        around(top, draw), to_board(cycles), from_board(cycles), out(seed + 2), in(seed + 3)
   {
   }
   void reset()
@@ -270,8 +284,9 @@ static void same(const arrivals &sent, const arrivals &seen, size_t extra)
 {
   for (size_t i = 0; i < seen.size(); i++) {
     ck_assert_msg(i < sent.size(), "arrival %zu of kind %d, which nobody sent", i, seen[i].kind);
-    ck_assert_msg(sent[i] == seen[i], "arrival %zu: kind %d at %x is %llx, sent kind %d at %x %llx", i, seen[i].kind, seen[i].at,
-                  (unsigned long long)seen[i].value, sent[i].kind, sent[i].at, (unsigned long long)sent[i].value);
+    ck_assert_msg(sent[i] == seen[i], "arrival %zu: kind %d at %x is %llx, sent kind %d at %x %llx", i, seen[i].kind,
+                  seen[i].at, (unsigned long long)seen[i].value, sent[i].kind, sent[i].at,
+                  (unsigned long long)sent[i].value);
   }
   ck_assert_msg(seen.size() + extra >= sent.size(), "%zu of %zu arrivals", seen.size(), sent.size());
 }

@@ -13,7 +13,8 @@ const char *sf_wrong_text(sf_wrong wrong)
                                      "the board was reset",
                                      "out of order",
                                      "a command that the board does not know"};
-  return (unsigned)wrong < sizeof text / sizeof *text ? text[wrong] : "refused for a reason that this program does not know";
+  return (unsigned)wrong < sizeof text / sizeof *text ? text[wrong]
+                                                      : "refused for a reason that this program does not know";
 }
 
 /* ---- to the line ---- */

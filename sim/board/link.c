@@ -30,7 +30,8 @@ static sf_status set_line(sf_link *l)
   line.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
   cfsetispeed(&line, B3000000), cfsetospeed(&line, B3000000);
   if (tcsetattr(l->file, TCSANOW, &line)) return sf_fail(SF_E_IO, "%s: no serial port of 3 Mbaud", l->port);
-  /* An FTDI chip keeps short answers back for 16 ms unless it is told not to; where it cannot be told, all is slower. */
+  /* An FTDI chip keeps short answers back for 16 ms unless it is told not to; where it cannot be told, all is slower.
+   */
   struct serial_struct serial;
   if (!ioctl(l->file, TIOCGSERIAL, &serial)) {
     serial.flags |= ASYNC_LOW_LATENCY;
@@ -140,7 +141,8 @@ static sf_status give_up(const sf_link *l, heard last, sf_wrong wrong)
 static sf_status answered(const sf_link *l, const sf_frame *answer)
 {
   if (answer->word[0] == 0) return sf_ok();
-  if (answer->word[0] == STATUS_SILENT) return sf_fail(SF_E_IO, "%s: a register of the accelerator does not answer", l->port);
+  if (answer->word[0] == STATUS_SILENT)
+    return sf_fail(SF_E_IO, "%s: a register of the accelerator does not answer", l->port);
   return sf_fail(SF_E_IO, "%s: the board refuses a command: %s", l->port,
                  answer->word[0] == STATUS_SIZE ? "its size" : "an unknown status");
 }
@@ -149,7 +151,8 @@ static sf_status answered(const sf_link *l, const sf_frame *answer)
 static void drain(sf_link *l)
 {
   uint8_t byte[READ_BYTES];
-  while (read(l->file, byte, sizeof byte) > 0) {}
+  while (read(l->file, byte, sizeof byte) > 0) {
+  }
   l->reader = (sf_frame_reader){.count = 0};
 }
 
