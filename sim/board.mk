@@ -20,3 +20,8 @@ $B/board/sf_board: $B/board/sf_board.o $B/board/sim/Vsf_board__ALL.a $(UNIT_RUNT
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
 board-sim: $B/board/sf_board ## a Verilated board behind a pseudo-terminal: build/board/sf_board LINK
 .PHONY: board-sim
+
+BOARD ?= ulx3s
+board: $(RTL_READY) ## the bitstream of a board (BOARD=ulx3s, BOARD_FLOW="--seed 2"; tools from PyPI), about 45 minutes: build/board
+	@python3 tools/board.py $B --rtl $(RTL_ROOT) --board $(BOARD) $(BOARD_FLOW)
+.PHONY: board

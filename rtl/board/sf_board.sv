@@ -5,7 +5,7 @@
 module sf_board #(
     parameter integer CLOCK_HZ = 50000000,
     parameter integer BAUD = 3000000,
-    parameter integer BANKS = 8,     // of 32 KiB of the field's memory
+    parameter integer BANKS = 4,     // of 32 KiB of the field's memory
     parameter integer MACS = 64,     // these as sf_ray_top's
     parameter integer NEURONS = 8
 ) (

@@ -20,7 +20,7 @@
 module sf_link #(
     parameter integer CLOCK_HZ = 50000000,
     parameter integer BAUD = 3000000,
-    parameter integer MEMORY_BYTES = 262144
+    parameter integer MEMORY_BYTES = 131072
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,

@@ -18,7 +18,7 @@ module sf_link_rx (
     output wire [31:0] header_o,
     input  wire        release_i,
     input  wire [ 8:0] address_i,  // of the payload's words, from 1 on
-    output wire [31:0] word_o      // a cycle later
+    output wire [31:0] word_o      // two cycles later
 );
   localparam [7:0] END = 8'hc0, ESC = 8'hdb, ESC_END = 8'hdc, ESC_ESC = 8'hdd;
   localparam [2:0] WRONG_BYTE = 3'd1, WRONG_LONG = 3'd2, WRONG_LENGTH = 3'd3, WRONG_CRC = 3'd4;
@@ -26,7 +26,7 @@ module sf_link_rx (
 
   reg frame_q, skip_q, escaped_q, broken_q, long_q, store_q;
   reg [2:0] wrong_q;
-  reg [31:0] header_q, word_q, read_q;
+  reg [31:0] header_q, word_q, read_q, out_q;
   reg [9:0] words_q;  // whole ones
   reg [1:0] bytes_q;  // of the next one
   (* no_rw_check *) reg [31:0] frame_mem_q[0:511];
@@ -89,11 +89,12 @@ module sf_link_rx (
     if (store_q) frame_mem_q[words_q[8:0]] <= word_q;
     if (store_q && words_q == '0) header_q <= word_q;
     read_q <= frame_mem_q[address_i];
+    out_q <= read_q;
   end
   assign frame_o = frame_q;
   assign wrong_o = wrong_q;
   assign header_o = header_q;
-  assign word_o = read_q;
+  assign word_o = out_q;
   wire unused_ok = &{1'b0, crc_busy};
 endmodule
 
