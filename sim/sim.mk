@@ -8,6 +8,7 @@ RTL_MODULES := $(filter-out $(RTL_PKG),$(wildcard rtl/gen/*.sv rtl/*.sv))
 RTL := $(RTL_PKG) $(RTL_MODULES)
 # What a board has around the accelerator, but for its own top.
 RTL_BOARD := $(wildcard rtl/board/*.sv)
+BOARD_TOPS := $(patsubst rtl/board/%/,%,$(wildcard rtl/board/*/))
 RTL_ALL := $(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt
 # A build with ARCH has a copy of rtl/ with packages of its own widths.
 RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
@@ -159,6 +160,11 @@ lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys 
 	  $(VERILATOR) --lint-only --top-module $$top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; \
 	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -Irtl -s $$top -t null $(RTL) || exit 1; \
 	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
+	done
+	@cd $(RTL_ROOT) && for top in $(BOARD_TOPS); do files="$(RTL) $(RTL_BOARD) rtl/board/$$top/$$top.sv $(CURDIR)/tests/board/vendor.sv"; \
+	  $(VERILATOR) --lint-only --top-module $$top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $$files || exit 1; \
+	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -DSF_NO_TAP -Irtl -s $$top -t null $$files || exit 1; \
+	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -DSF_NO_TAP -Irtl $$files; hierarchy -check -top $$top" >/dev/null || exit 1; \
 	done
 
 synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="32 64", MODULES=, SYNTH=--top): build/synth

@@ -40,6 +40,8 @@ def parse_arguments():
 def read_board(path, name):
     """What board.json says. Raises Stop with file and field."""
     file = os.path.join(path, "board.json")
+    if os.path.exists(os.path.join(path, "vivado.tcl")) and not os.path.exists(file):
+        raise Stop(f"{name} is for Vivado: vivado -mode batch -source rtl/board/{name}/vivado.tcl", 2)
     try:
         board = json.load(open(file, encoding="utf-8"))
     except OSError as error:
@@ -122,7 +124,7 @@ def describe(board, report):
     for name, kind in CELLS.items():
         used = report["utilization"].get(kind, {"used": 0, "available": 0})
         result[name], result[name + "_available"] = used["used"], used["available"]
-    clocks = [clock["achieved"] for clock in report["fmax"].values() if clock["constraint"] >= board["mhz"]]
+    clocks = [clock["achieved"] for clock in report["fmax"].values() if clock["constraint"] > 0.99 * board["mhz"]]
     result["f_max_mhz"] = round(min(clocks, default=0), 2)
     result["critical_path"] = critical_path(report)
     return result

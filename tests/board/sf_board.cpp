@@ -1,13 +1,13 @@
 /* A board of which there is none: rtl/board/sf_board.sv, Verilated, behind a pseudo-terminal, with what may happen to
  * bytes on a line and with boards that are not as they should be.
  *
- * usage: sf_board LINK [--noise N] [--seed S] [--defect WORD] [--version V] [--mute N] [--idle SECONDS]
+ * usage: sf_board LINK [--noise N] [--seed S] [--defect N] [--version V] [--mute N] [--idle SECONDS]
  *   LINK        a name for the pseudo-terminal: sim_render --backend board --port LINK
  *   --noise     of 100 000 bytes in each direction so many are lost, doubled, changed, or come from nowhere
- *   --defect    this word of eight bytes of the field's memory has a bit that is always the contrary
+ *   --defect    every N-th word of eight bytes of the field's memory has a bit that is always the contrary
  *   --version   what register VERSION holds
  *   --mute      after so many commands the board answers no more
- *   --idle      ends when no byte has come for so long (default 120) */
+ *   --idle      ends when no byte has come for so long (default 600) */
 #include "Vsf_board.h"
 #include "tests/serial_line.h"
 extern "C" {
@@ -26,7 +26,7 @@ enum { CYCLES_A_BIT = 4 /* sim/board.mk */, CYCLES_A_TURN = 400, SETTLE = 40 };
 
 struct options {
   const char *link = nullptr;
-  long noise = 0, seed = 1, defect = -1, version = -1, mute = -1, idle = 120;
+  long noise = 0, seed = 1, defect = -1, version = -1, mute = -1, idle = 600;
 };
 
 static options parse(int argc, char **argv)
@@ -45,8 +45,7 @@ static options parse(int argc, char **argv)
     good = good && known;
   }
   if (!good)
-    fprintf(stderr,
-            "usage: sf_board LINK [--noise N] [--seed S] [--defect WORD] [--version V] [--mute N] [--idle S]\n");
+    fprintf(stderr, "usage: sf_board LINK [--noise N] [--seed S] [--defect N] [--version V] [--mute N] [--idle S]\n");
   if (!good) exit(2);
   o.link = argv[1];
   return o;
@@ -70,9 +69,9 @@ struct unsound {
   {
     commands++;
     if (f.command == SF_LINK_READ) asked = f.word[0];
-    if (f.command != SF_LINK_MEMORY || o.defect < (long)f.word[0]) return;
-    const uint32_t at = 1 + 2 * (uint32_t)(o.defect - f.word[0]);
-    if (at < f.words) f.word[at] ^= 1 << 6;
+    if (f.command != SF_LINK_MEMORY || o.defect < 1) return;
+    for (uint32_t at = 1; at < f.words; at += 2)
+      if ((f.word[0] + at / 2) % (uint32_t)o.defect == 0) f.word[at] ^= 1 << 6;
   }
   void answer(sf_frame &f) const
   {

@@ -15,7 +15,7 @@ module ulx3s (
   localparam integer ALIVE = 25;
 
   // 25 MHz / 1 x 24 = 600 MHz / 12 = 50 MHz: the feedback is CLKOP, so that CLKFB_DIV = 2 gives twice the input.
-  wire clock, locked;
+  wire clock, locked, inner;
   (* FREQUENCY_PIN_CLKI = "25", FREQUENCY_PIN_CLKOP = "50" *)
   EHXPLLL #(
       .PLLRST_ENA     ("DISABLED"),
@@ -39,7 +39,7 @@ module ulx3s (
       .CLKI        (clk_25mhz),
       .CLKOP       (clock),
       .CLKFB       (clock),
-      .CLKINTFB    (),
+      .CLKINTFB    (inner),
       .PHASESEL0   (1'b0),
       .PHASESEL1   (1'b0),
       .PHASEDIR    (1'b1),
@@ -75,6 +75,7 @@ module ulx3s (
       .lamps_o(lamps)
   );
   assign led = {!reset_q[3], 2'd0, lamps_q, alive_q[ALIVE-1]};
+  wire unused_ok = &{1'b0, inner};
   assign wifi_gpio0 = 1'b1;  // low would make the ESP32 take over the board
 endmodule
 
