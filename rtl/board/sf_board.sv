@@ -6,8 +6,8 @@ module sf_board #(
     parameter integer CLOCK_HZ = 50000000,
     parameter integer BAUD = 3000000,
     parameter integer BANKS = 4,     // of 32 KiB of the field's memory
-    parameter integer MACS = 64,     // these as sf_ray_top's
-    parameter integer NEURONS = 8
+    parameter integer MACS = 32,     // these as sf_ray_top's
+    parameter integer NEURONS = 4
 ) (
     input  wire       clk_i,
     input  wire       rst_ni,
