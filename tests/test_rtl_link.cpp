@@ -366,3 +366,5 @@ TEST(reset_between_commands)
   ck_bad(after, SF_E_IO, "bench", "was reset");
   ck_assert_uint_eq(bench.around.log.size(), writes);
 }
+
+int ck_timeout = 600;

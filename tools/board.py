@@ -109,7 +109,7 @@ class Flow:
         self.step("place and route", "nextpnr_ecp5",
                   [f"--{board['device']}", "--package", board["package"], "--speed", board["speed"], "--json", "netlist.json",
                    "--lpf", f"rtl/board/{name}/{board['pins']}", "--seed", str(self.arguments.seed), "--report", "timing.json",
-                   "--textcfg", "routed.config", "--router", "router2", "--timing-allow-fail"], "timing.json", key)
+                   "--textcfg", "routed.config", "--timing-allow-fail"], "timing.json", key)
         return json.load(open(self.path("timing.json"), encoding="utf-8")), key
 
     def pack(self, key):
