@@ -179,7 +179,7 @@ module sf_sums #(
         else {op1_q, op2_q} <= {op[b], op1_q};
       end
       always_ff @(posedge clk_i) begin
-        place1_q <= PLACE_BITS'({half, at} >> $clog2(BANKS)) * PLACE_BITS'(PARTS) + PLACE_BITS'(part);
+        place1_q <= PLACE_BITS'(4'({half, at} >> $clog2(BANKS))) * PLACE_BITS'(PARTS) + PLACE_BITS'(part);
         begun1_q <= load_i ? begun_load[load_step_i] : begun_part[step[3*b+:3]];
         {place2_q, begun2_q} <= {place1_q, begun1_q};
       end

@@ -108,12 +108,7 @@ sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64
 {
   sf_driver_counters read;
   SF_TRY(driver_status(dut, sf_driver_read_counters(sf_dut_driver_bus(dut), &read), "read counters"));
-  memset(counts, 0, sizeof *counts);
-  for (int l = 0; l < SF_LAYERS; l++)
-    for (int e = 0; e < SF_EVENTS; e++)
-      memcpy(counts->layer[l].event[e], read.event[e][l], sizeof counts->layer[l].event[e]);
-  counts->samples = read.samples;
-  counts->rays = read.rays;
+  sf_dut_counts_of(&read, counts);
   if (cycles) *cycles = read.cycles;
   if (busy) *busy = read.busy;
   if (stalls) *stalls = read.stall_in + read.stall_out;

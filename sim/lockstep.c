@@ -191,7 +191,7 @@ static sf_status run_blocks(sf_lockstep *l)
   return l->partial && status.code == SF_OK ? sf_fail(SF_E_STOPPED, "stopped") : status;
 }
 
-static sf_status compare_energy(sf_lockstep *l)
+sf_status sf_lockstep_energy(sf_lockstep *l)
 {
   l->energy_core_fj = sf_energy_fj(&l->sum.core);
   l->energy_rtl_fj = sf_energy_fj(&l->sum.rtl);
@@ -285,7 +285,7 @@ sf_status sf_lockstep_run(sf_lockstep *l)
   const sf_status status = run_blocks(l);
   if (!first) return status;
   l->complete = status.code == SF_OK;
-  const sf_status energy = compare_energy(l);
+  const sf_status energy = sf_lockstep_energy(l);
   if (status.code == SF_E_STOPPED) return stopped(l, &status);
   if (status.code == SF_OK) return energy;
   return l->place.found ? difference(l, &status) : status;

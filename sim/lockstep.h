@@ -14,6 +14,7 @@ typedef struct sf_lockstep_options {
   uint64_t seed, limit;                 /* limit: no block begins after this many samples; 0 = none */
   int rays, block, stall_percent, jobs; /* block: rays per block; jobs: processes or ranks, for reports */
   const char *plusarg;                  /* NULL or text */
+  const char *port;                     /* of a board in place of the Verilated accelerator; or NULL */
   const char *checkpoint; /* file of the finished blocks: begun anew where it is missing, continued where it is there;
                              or NULL */
   const char *evidence;   /* of a difference: EVIDENCE.json to replay, EVIDENCE.fst; EVIDENCE-2 where these are there */
@@ -64,6 +65,8 @@ typedef struct sf_lockstep_pixel {
 } sf_lockstep_pixel;
 enum { SF_LOCKSTEP_STREAM = 4 }; /* of random numbers: the first that picking leaves free */
 sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *lockstep, uint64_t ray);
+/* Sets both energies from the sums: equal counts have equal energy. */
+sf_status sf_lockstep_energy(sf_lockstep *lockstep);
 void sf_lockstep_free(sf_lockstep *lockstep);
 
 /* ---- reports ---- */

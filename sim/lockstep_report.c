@@ -102,6 +102,7 @@ cJSON *sf_lockstep_json(const sf_lockstep *l, const sf_status *status, double se
   sf_json_add_u64(json, "energy_fj", l->energy_rtl_fj);
   sf_json_add_u64(json, "energy_core_fj", l->energy_core_fj);
   cJSON_AddNumberToObject(json, "jobs", l->options.jobs);
+  if (l->options.port) sf_json_add_text(json, "port", l->options.port);
   cJSON_AddNumberToObject(json, "seconds", seconds);
   return json;
 }
@@ -114,12 +115,18 @@ void sf_lockstep_print(FILE *out, const sf_lockstep *l, double seconds)
           "%" PRIu64 " ray%s (%" PRIu64 " with samples), %" PRIu64 " sample%s, %" PRIu64 " spike%s: 0 differences\n",
           l->rays, sf_plural(l->rays), sum->core.rays, sum->samples, sf_plural(sum->samples), sum->spikes,
           sf_plural(sum->spikes));
-  fprintf(out, "compared: outputs, spikes, membranes and rows per layer and step, every counter, energy\n");
+  fprintf(out, "compared: %s, every counter, energy\n",
+          l->options.port ? "pixels" : "outputs, spikes, membranes and rows per layer and step");
   fprintf(out, "%" PRIu64 " cycles, %.1f per sample, utilisation of the busiest layer %.1f %%, stalled %.1f %%\n",
           sum->cycles, ratio(sum->cycles, sum->samples), 100 * ratio(busiest(sum), sum->cycles),
           100 * ratio(sum->stalls, sum->cycles));
   fprintf(out, "energy %" PRIu64 " fJ by the core, %" PRIu64 " fJ by the accelerator\n", l->energy_core_fj,
           l->energy_rtl_fj);
+  if (l->options.port) {
+    fprintf(out, "%.1f s, %.0f samples/s by the board at %s, seed %" PRIu64 "\n", seconds, speed, l->options.port,
+            l->options.seed);
+    return;
+  }
   fprintf(out, "%.1f s, %.0f samples/s by %d process%s, seed %" PRIu64 ", stalls %d %%\n", seconds, speed,
           l->options.jobs, l->options.jobs == 1 ? "" : "es", l->options.seed, l->options.stall_percent);
 }

@@ -1,5 +1,6 @@
-/* A net and its samples in the accelerator's words. Needs no model of the accelerator. */
+/* A net, its samples and its counters in the accelerator's words. Needs no model of the accelerator. */
 #include "sim/sim.h"
+#include <string.h>
 
 enum { VALUES = 4 };
 
@@ -34,4 +35,14 @@ int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *word
 {
   const int beats = sample->first ? pack_all(words, sample->ray->dir, fx_net_harmonics(net)) : 0;
   return beats + pack_all(words + beats, sample->f, fx_net_inputs(net));
+}
+
+void sf_dut_counts_of(const sf_driver_counters *read, fx_counts *counts)
+{
+  memset(counts, 0, sizeof *counts);
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (int e = 0; e < SF_EVENTS; e++)
+      memcpy(counts->layer[l].event[e], read->event[e][l], sizeof counts->layer[l].event[e]);
+  counts->samples = read->samples;
+  counts->rays = read->rays;
 }

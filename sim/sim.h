@@ -58,4 +58,6 @@ sf_status sf_dut_driver_status(sf_dut *dut, sf_driver_code code, const char *wha
 /* Packet of a sample: beats of 4 values. words[SF_PACKET_MAX]; returns the number of beats. */
 enum { SF_PACKET_MAX = (SF_DIR_MAX + SF_FEATURE_MAX) / 4 };
 int sf_dut_packet(const fx_net *net, const sf_dut_sample *sample, uint64_t *words);
+/* Of what the driver reads. */
+void sf_dut_counts_of(const sf_driver_counters *read, fx_counts *counts);
 #endif

@@ -6,6 +6,9 @@ VERILATOR_ROOT := $(shell $(VERILATOR) --getenv VERILATOR_ROOT 2>/dev/null)
 RTL_PKG := rtl/gen/sf_arch_pkg.sv rtl/gen/sf_csr_pkg.sv rtl/sf_op_pkg.sv
 RTL_MODULES := $(filter-out $(RTL_PKG),$(wildcard rtl/gen/*.sv rtl/*.sv))
 RTL := $(RTL_PKG) $(RTL_MODULES)
+# What a board has around the accelerator, but for its own top.
+RTL_BOARD := $(wildcard rtl/board/*.sv)
+BOARD_TOPS := $(patsubst rtl/board/%/,%,$(wildcard rtl/board/*/))
 RTL_ALL := $(RTL) $(wildcard rtl/*.svh) rtl/lint.vlt
 # A build with ARCH has a copy of rtl/ with packages of its own widths.
 RTL_ROOT := $(if $(ARCH_INCLUDE),$B/variant,.)
@@ -29,7 +32,7 @@ VERILATED_SIMD := -march=native $(if $(findstring clang,$(VERILATED_CXX)),,-ftre
 VERILATED_SIMD := $(shell $(VERILATED_CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/studio/*.c sim/soc/*.c))
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/board/*.c sim/studio/*.c sim/soc/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
@@ -86,6 +89,7 @@ $(eval $(call verilated_rule,$B/verilated,$(RTL_ROOT),$(RTL_READY)))
 $(eval $(call verilated_top_rule,$B/verilated/ray,$(RTL_ROOT),$(RTL_READY),sf_ray_top,pins_ray))
 
 include sim/unit.mk
+include sim/board.mk
 
 # Planted faults: a patched copy of rtl/; +fault=N chooses one at run time, +fault=0 none.
 FAULTS := $(sort $(wildcard tests/faults/*.patch))
@@ -156,6 +160,11 @@ lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys 
 	  $(VERILATOR) --lint-only --top-module $$top -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; \
 	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -Irtl -s $$top -t null $(RTL) || exit 1; \
 	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -Irtl $(RTL); hierarchy -check -top $$top" >/dev/null || exit 1; \
+	done
+	@cd $(RTL_ROOT) && for top in $(BOARD_TOPS); do files="$(RTL) $(RTL_BOARD) rtl/board/$$top/$$top.sv $(CURDIR)/tests/board/vendor.sv"; \
+	  $(VERILATOR) --lint-only --top-module $$top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $$files || exit 1; \
+	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -DSF_NO_TAP -Irtl -s $$top -t null $$files || exit 1; \
+	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -DSF_NO_TAP -Irtl $$files; hierarchy -check -top $$top" >/dev/null || exit 1; \
 	done
 
 synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="32 64", MODULES=, SYNTH=--top): build/synth

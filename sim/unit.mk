@@ -15,7 +15,15 @@ UNIT_PARAMETERS_sf_encoder_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNITS_test_rtl_ray_track := sf_ray_track
 UNITS_test_rtl_planes := sf_activation sf_waves
-UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track test_rtl_planes
+UNITS_test_rtl_link := sf_link sf_link_slow
+UNIT_TOP_sf_link_slow := sf_link
+UNIT_PARAMETERS_sf_link := -GCLOCK_HZ=40000000 -GBAUD=10000000 -GMEMORY_BYTES=1024 +define+SF_NO_TAP
+UNIT_PARAMETERS_sf_link_slow := -GMEMORY_BYTES=1024 +define+SF_NO_TAP
+UNIT_RTL_sf_link := $(RTL_BOARD)
+UNIT_RTL_sf_link_slow := $(RTL_BOARD)
+UNIT_OBJ_test_rtl_link := $B/obj/sim/board/frame.o $B/obj/sim/board/link.o $B/verilated/libsfdut.a
+UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track test_rtl_planes \
+  test_rtl_link
 TESTS += $(UNIT_TESTS)
 
 LINT_TOPS := sf_ray_top
@@ -25,11 +33,11 @@ UNIT_RUNTIME := $(addprefix $B/verilated/runtime/,verilated.o verilated_threads.
 
 # $1 unit, $2 folder of the units, $3 folder that holds rtl/, $4 prerequisites
 define unit_rule
-$2/$1/V$1.mk: $4
+$2/$1/V$1.mk: $4 $(UNIT_RTL_$1)
 	@mkdir -p $2/$1
 	$$(call say,VERI  $2/$1)
 	$$Qcd $3 && $$(VERILATOR) $$(UNIT_FLAGS) --prefix V$1 --top-module $(or $(UNIT_TOP_$1),$1) \
-	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $2/$1) rtl/lint.vlt $$(RTL)
+	  $(UNIT_PARAMETERS_$1) -Irtl --Mdir $$(abspath $2/$1) rtl/lint.vlt $$(RTL) $(UNIT_RTL_$1)
 $2/$1/V$1__ALL.a: $2/$1/V$1.mk
 	$$Q$$(MAKE) -s -C $2/$1 -f V$1.mk $$(VERILATED_OPT) CXX=$$(VERILATED_CXX) V$1__ALL.a >/dev/null
 	@touch $$@
@@ -44,7 +52,7 @@ $3/$1.o: tests/$1.cpp $(foreach u,$(UNITS_$1),$3/$u/V$u.mk)
 	$$Q$$(CXX) -std=c++17 -O2 -g -Wall -Wextra $(if $(CI),-Werror) $$(ARCH_INCLUDE) -Iinclude -Isrc -I. -isystem $$(VERILATOR_ROOT)/include \
 	  -isystem $$(VERILATOR_ROOT)/include/vltstd $(foreach u,$(UNITS_$1),-isystem $3/$u) -MMD -MP -c $$< -o $$@
 -include $3/$1.d
-$2/$1: $3/$1.o $(foreach u,$(UNITS_$1),$3/$u/V$u__ALL.a) $(filter %.o,$4) $(UNIT_RUNTIME) $B/libspikefield.a
+$2/$1: $3/$1.o $(foreach u,$(UNITS_$1),$3/$u/V$u__ALL.a) $(filter %.o,$4) $(UNIT_RUNTIME) $(UNIT_OBJ_$1) $B/libspikefield.a
 	@mkdir -p $$(@D)
 	$$(call say,LD    $$@)
 	$$Q$$(CXX) -fopenmp $$(SAN) $(filter-out %.o,$4) -o $$@ $$^ $$(DUT_LDLIBS) $$(CHECK_LIBS) $$(LIBS)

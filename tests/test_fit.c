@@ -441,6 +441,65 @@ TEST(targets)
   sf_fit_rays_free(&rays);
 }
 
+/* ---- a grid for so many bytes ---- */
+
+static sf_status to_bytes(const fx_scene *scene, const sf_fit_rays *rays, uint64_t bytes, double loss,
+                          fx_scene *smaller, sf_fit_tables *report)
+{
+  const fx_scene *candidate[] = {scene};
+  const sf_fit_job job = {
+      .candidate = candidate, .widths = widest, .candidates = 1, .rays = rays, .loss_db = loss, .name = "scene.snn"};
+  return sf_fit_to_bytes(smaller, &job, bytes, report);
+}
+
+static uint64_t grid_bytes(const fx_scene *scene)
+{
+  return 2 * (uint64_t)scene->grid.entries;
+}
+
+/* A level that says nothing is the cheapest to leave out, whatever its size. */
+LOOP_TEST(what_loses_nothing_goes_first, 3)
+{
+  fx_scene scene = small_scene(70, FX_HYBRID), smaller;
+  const int64_t first = scene.grid.offset[_i], entries = sf_grid_level_entries(&scene.grid, _i);
+  memset(scene.grid.table + 2 * first, 0, 2 * (size_t)entries);
+  sf_fit_rays rays = make_rays(&scene, RAYS, 500);
+  sf_fit_tables report;
+  ck_ok(to_bytes(&scene, &rays, grid_bytes(&scene), 0, &smaller, &report));
+  ck_assert_uint_eq(grid_bytes(&smaller), grid_bytes(&scene)); /* it has room as it is */
+  fx_scene_free(&smaller);
+  ck_ok(to_bytes(&scene, &rays, grid_bytes(&scene) - 2 * (uint64_t)entries, 0, &smaller, &report));
+  ck_assert_uint_eq(grid_bytes(&smaller), report.bytes_after);
+  ck_assert_uint_le(report.bytes_after, report.bound);
+  assert_same_pixels(&scene, &smaller, &rays);
+  ck_assert(report.loss_db == 0);
+  fx_scene_free(&smaller), fx_scene_free(&scene);
+  sf_fit_rays_free(&rays);
+}
+
+TEST(bytes_and_loss_are_kept)
+{
+  fx_scene scene = small_scene(71, FX_HYBRID), smaller;
+  sf_fit_rays rays = make_rays(&scene, RAYS, 500);
+  sf_fit_tables report;
+  double last = 0;
+  for (uint64_t bytes = grid_bytes(&scene) / 2; bytes >= 64; bytes /= 4) {
+    ck_ok(to_bytes(&scene, &rays, bytes, INFINITY, &smaller, &report));
+    ck_assert_uint_eq(grid_bytes(&smaller), report.bytes_after);
+    ck_assert_uint_le(grid_bytes(&smaller), bytes);
+    ck_assert_msg(report.loss_db >= last, "%g dB for %d bytes, %g dB for more", report.loss_db, (int)bytes, last);
+    last = report.loss_db;
+    fx_scene_free(&smaller);
+  }
+  ck_assert(last > 0.1);
+  ck_bad(to_bytes(&scene, &rays, 64, last / 100, &smaller, &report), SF_E_RANGE, "more than --fit-loss",
+         "the smallest within it that was found has");
+  ck_bad(to_bytes(&scene, &rays, 1, INFINITY, &smaller, &report), SF_E_RANGE, "scene.snn",
+         "the grid cannot take fewer than 2 bytes");
+  fx_scene_free(&scene);
+  sf_fit_rays_free(&rays);
+}
+
 int ck_timeout = 120;
 ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
 

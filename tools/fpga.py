@@ -38,7 +38,7 @@ def deep():
 wasmtime.Config = deep
 threading.stack_size(1 << 30)
 tool = sys.argv.pop(1)
-module = __import__("yowasp_" + tool)
+module = __import__("yowasp_" + {"ecppack": "nextpnr_ecp5"}.get(tool, tool))
 sys.exit(getattr(module, "run_" + tool)(sys.argv[1:]))"""
 CLOCK, RESET = "clk_i", "rst_ni"
 

@@ -1,5 +1,8 @@
-/* Lockstep co-simulation: the Verilated accelerator against the fixed-point core on rays of a data set. */
+/* Lockstep co-simulation: the Verilated accelerator, or one on a board, against the fixed-point core on rays of a data
+ * set. */
 #include "sim/activity/activity.h"
+#include "sim/board/board.h"
+#include "sim/board/lockstep.h"
 #include "sim/lockstep.h"
 #include "sim/other_dut.h"
 #include "sim/plusarg.h"
@@ -16,7 +19,8 @@
 typedef struct options {
   sf_lockstep_options run;
   sf_ranks *ranks;
-  int split;
+  int split, backend; /* backend: 0 rtl, 1 board */
+  double patience;
   bool json, quiet;
   const char *replay, *junit, *dut, *dut_top, *window;
   sf_activity_options activity;
@@ -72,11 +76,13 @@ static sf_status simulate(options *o, sf_lockstep *l)
   l->ranks = o->ranks;
   l->tick = show;
   l->user = &d;
+  char faults[400] = "";
   sf_progress_begin(&d.progress, o->quiet);
-  sf_status status = sf_lockstep_run(l);
+  sf_status status = o->backend ? sf_board_lockstep_run(l, o->patience, faults) : sf_lockstep_run(l);
   sf_progress_end(&d.progress);
   l->user = NULL;
   if (sf_ranks_rank(o->ranks)) return status;
+  if (faults[0]) fprintf(stderr, "sf_cosim: %s: sent again: %s\n", o->run.port, faults);
   snprintf(o->evidence, sizeof o->evidence, "%s", l->evidence);
   o->replays = l->replays;
   if (status.code == SF_OK && l->sum.samples == 0)
@@ -221,10 +227,20 @@ static sf_status check_evidence(const char *prefix)
   return sf_writable(path);
 }
 
+static sf_status check_board(const options *o)
+{
+  if (o->backend && !o->run.port) return sf_fail(SF_E_USAGE, "--backend board needs --port, such as /dev/ttyUSB0");
+  if (!o->backend && (o->run.port || o->patience > 0))
+    return sf_fail(SF_E_USAGE, "--port and --timeout belong to --backend board");
+  return sf_ok();
+}
+
 /* Options that would have no effect are refused; those that were not given get their defaults. */
 static sf_status settle(options *o)
 {
   sf_lockstep_options *r = &o->run;
+  SF_TRY(check_board(o));
+  if (!(o->patience > 0)) o->patience = SF_BOARD_PATIENCE;
   const bool activity = o->activity.saif || o->activity.vcd;
   if (!activity && (o->window || o->activity.depth || o->activity.clock_mhz))
     return sf_fail(SF_E_USAGE, "--window, --depth and --clock belong to --saif or --vcd");
@@ -277,6 +293,11 @@ static sf_option *runs(options *o, sf_option *list)
        "percent of cycles with a bubble or back-pressure (default 20)"},
       {"--limit-samples", 0, SF_ARG_U64, &r->limit, 0, 0x1p53, NULL, "N",
        "stop after N samples; the unit of work (--block) that has begun is finished"},
+      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "rtl|board", "B",
+       "the Verilated accelerator (default), or one on a board: pixels and counters (docs/board.md)"},
+      {"--port", 0, SF_ARG_STRING, &r->port, 0, 0, NULL, "DEVICE", "board: its serial port, such as /dev/ttyUSB0"},
+      {"--timeout", 0, SF_ARG_DOUBLE, &o->patience, 0.01, 600, NULL, "S",
+       "board: seconds without a byte until a command is sent again (default 1)"},
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "print one JSON object"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       SF_GROUP("Long runs"),
@@ -334,16 +355,22 @@ int main(int argc, char **argv)
                           "  sf_cosim scene.snn data --rays 100000 --jobs 8 --checkpoint run.part --json\n"
                           "  mpirun -n 8 sf_cosim scene.snn data --rays 1000000 --checkpoint run.part\n"
                           "  sf_cosim --replay sf_cosim-difference.json\n"
+                          "  sf_cosim scene.snn data --backend board --port /dev/ttyUSB0\n"
                           "  sf_cosim scene.snn data --rays 200 --stalls 0 --saif run.saif --depth 3\n"
                           "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n"
                           "  sf_cosim scene.snn data --dut \"-F kit/rtl.f\"\n",
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};
-  static const char *const named_by_replay[] = {
-      "--rays",  "--seed", "--split", "--stalls", "--limit-samples", "--json",  "--jobs",    "--block", "--checkpoint",
-      "--junit", "--saif", "--vcd",   "--window", "--depth",         "--clock", "--plusarg", NULL};
+  static const char *const named_by_replay[] = {"--rays",    "--seed",    "--split",  "--stalls",     "--limit-samples",
+                                                "--json",    "--jobs",    "--block",  "--checkpoint", "--junit",
+                                                "--saif",    "--vcd",     "--window", "--depth",      "--clock",
+                                                "--plusarg", "--backend", "--port",   "--timeout",    NULL};
+  static const char *const of_simulation[] = {"--stalls",  "--jobs", "--block", "--checkpoint", "--evidence",
+                                              "--plusarg", "--dut",  "--saif",  "--vcd",        NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);
+  if (status.code == SF_OK && o.backend)
+    status = sf_cli_refuse(&cli, argc, argv, of_simulation, "has no effect beside --backend board");
   if (status.code == SF_OK && o.replay)
     status = sf_cli_refuse(&cli, argc, argv, named_by_replay, "has no effect beside --replay: its file is the run");
   if (status.code == SF_OK) status = settle(&o);

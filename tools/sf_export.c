@@ -7,6 +7,7 @@
 #include "tools/export/extras.h"
 #include "tools/export/report.h"
 #include <cjson/cJSON.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,9 +17,10 @@ typedef struct options {
   const char *output;
   export_options extra;
   int steps, background;
-  uint64_t fit_rays;
+  uint64_t fit_rays, fit_bytes;
   const char *tech;
   double fit_loss;
+  bool loss_given;
   sf_quant_widths widths;
   bool json, fit, quiet;
 } options;
@@ -75,13 +77,32 @@ static sf_status quantise_narrower(const sf_model *model, const char *path, cons
 {
   const sf_quant_widths *w = &o->widths;
   const bool asked = w->weight_bits || w->feature_bits || w->leak_bits || w->grid_bits || model->scales.weight_bits;
-  for (int i = 1; i < CANDIDATES && o->fit_loss > 0 && !asked; i++) {
+  for (int i = 1; i < CANDIDATES && o->fit_loss > 0 && !asked && !o->fit_bytes; i++) {
     sf_quant_widths widths = narrower[i - 1];
     if (sf_model_decodes(model)) widths.feature_bits = SF_INPUT_BITS; /* a decoder's inputs have no other width */
     const sf_status status = quantise(model, path, o, &widths, c);
     if (status.code == SF_E_UNSUPPORTED) break; /* too narrow for this model */
     SF_TRY(status);
   }
+  return sf_ok();
+}
+
+/* The grid first, where it has to fit a memory. What it may not lose any more is left for the rest: --fit-loss is for
+ * both where it was given. */
+static sf_status fit_both(candidates *c, const sf_fit_job *job, const options *o, fx_scene *fitted,
+                          sf_fit_report *report)
+{
+  if (!o->fit_bytes) return sf_fit(fitted, job, report);
+  sf_fit_job smaller = *job;
+  fx_scene small;
+  sf_fit_tables tables;
+  smaller.loss_db = o->loss_given ? o->fit_loss : INFINITY;
+  SF_TRY(sf_fit_to_bytes(&small, &smaller, o->fit_bytes, &tables));
+  fx_scene_free(&c->scene[0]);
+  c->scene[0] = small;
+  smaller.loss_db = o->loss_given ? fmax(o->fit_loss - fmax(tables.loss_db, 0), 0) : o->fit_loss;
+  SF_TRY(sf_fit(fitted, &smaller, report));
+  report->tables = tables;
   return sf_ok();
 }
 
@@ -105,7 +126,7 @@ static sf_status fit_to_rays(candidates *c, const sf_fit_rays *rays, const sf_fi
                           .user = &progress};
   fx_scene fitted;
   sf_progress_begin(&progress.progress, o->quiet);
-  const sf_status status = sf_fit(&fitted, &job, report);
+  const sf_status status = fit_both(c, &job, o, &fitted, report);
   sf_progress_end(&progress.progress);
   if (status.code != SF_OK) return status;
   fx_scene_free(&c->scene[0]);
@@ -257,6 +278,7 @@ static sf_status check_use(const options *o)
   SF_TRY(only(o->widths.leak_bits, "--leak-bits", o->output, output));
   SF_TRY(only(o->widths.grid_bits, "--grid-bits", o->output, output));
   SF_TRY(only(o->fit_loss >= 0, "--fit-loss", o->fit, "--fit"));
+  SF_TRY(only(o->fit_bytes, "--fit-bytes", o->fit, "--fit"));
   SF_TRY(only(o->fit_rays, "--fit-rays", o->fit, "--fit"));
   SF_TRY(only(o->tech, "--tech", o->fit, "--fit"));
   SF_TRY(only(e->data, "--data", o->fit || e->vectors || e->traces, "--fit, --vectors or --traces"));
@@ -283,7 +305,8 @@ static sf_status check_options(const options *o)
 static void set_defaults(options *o)
 {
   if (o->background < 0) o->background = 0;
-  if (o->fit_loss < 0) o->fit_loss = FIT_LOSS;
+  o->loss_given = o->fit_loss >= 0;
+  if (!o->loss_given) o->fit_loss = FIT_LOSS;
   if (!o->fit_rays) o->fit_rays = FIT_RAYS;
   if (!o->extra.samples) o->extra.samples = KIT_SAMPLES;
 }
@@ -321,6 +344,9 @@ int main(int argc, char **argv)
       {"--fit", 0, SF_ARG_FLAG, &o.fit, 0, 0, NULL, NULL, "leave out what the training views of --data do not need"},
       {"--fit-loss", 0, SF_ARG_DOUBLE, &o.fit_loss, 0, 100, NULL, "DB",
        "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
+      {"--fit-bytes", 0, SF_ARG_U64, &o.fit_bytes, 1, 1e12, NULL, "N",
+       "the grid's tables may take N bytes, two for each entry, as in a board's memory: halve tables and leave out "
+       "levels, with the least loss, then fit the rest; --fit-loss is of both, or of the rest where it is not given"},
       {"--fit-rays", 0, SF_ARG_U64, &o.fit_rays, 256, 1e8, NULL, "N", "rays that --fit looks at (default 262144)"},
       {"--tech", 0, SF_ARG_INPUT, &o.tech, 0, 0, NULL, "FILE",
        "prices that say what --fit saves: a file or a name (default 45nm)"},
@@ -352,6 +378,7 @@ int main(int argc, char **argv)
                                   "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
                                   "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
                                   "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
+                                  "  sf_export model.safetensors -o board.snn --fit --data lego --fit-bytes 262144\n"
                                   "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n"
                                   "  sf_export scene.snn --traces traces --data lego --view 0 --rays 20\n"
                                   "  sf_export scene.snn --nir scene.nir\n",

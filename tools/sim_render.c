@@ -1,4 +1,5 @@
-/* sim_render: views of a scene through the float field, the fixed-point core or the accelerator. */
+/* sim_render: views of a scene through the float field, the fixed-point core or the accelerator, simulated or on a
+ * board. */
 #include "sim/studio/view_set.h"
 #include "cli/finish_ranks.h"
 #include "base/clock.h"
@@ -17,7 +18,8 @@ typedef struct options {
   int view, backend, downscale, steps, threads;
   uint64_t seed;
   double scale;
-  const char *scene, *data, *output, *png, *model, *split, *crop, *verify, *kernels;
+  double patience;
+  const char *scene, *data, *output, *png, *model, *split, *crop, *verify, *kernels, *port;
   bool all, json, quiet;
 } options;
 
@@ -72,7 +74,9 @@ static sf_status open_studio(job *j)
                                  .steps = o->steps,
                                  .downscale = o->downscale,
                                  .scale = (float)o->scale,
-                                 .seed = o->seed};
+                                 .seed = o->seed,
+                                 .port = o->port,
+                                 .patience = o->patience};
   return sf_studio_open(&j->studio, &how);
 }
 
@@ -264,6 +268,15 @@ static sf_status verify(job *j)
 
 /* ---- program ---- */
 
+static sf_status work(job *j)
+{
+  char faults[400] = "";
+  const sf_status status = j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
+  if (j->studio.board) sf_link_faults_text(&j->studio.board->link, faults);
+  if (faults[0]) fprintf(stderr, "sim_render: %s: sent again: %s\n", j->opt.port, faults);
+  return status;
+}
+
 static sf_status refuse(bool given, const char *option, const char *reason)
 {
   return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
@@ -275,6 +288,10 @@ static sf_status check_backend(options *o)
   SF_TRY(refuse(o->model && o->backend != SF_BACKEND_FLOAT, "--model", "needs --backend float"));
   SF_TRY(refuse(o->seed != NO_SEED && o->backend != SF_BACKEND_RTL, "--seed", "needs --backend rtl"));
   SF_TRY(refuse(o->kernels && o->backend != SF_BACKEND_FIXED, "--kernels", "needs --backend fixed"));
+  SF_TRY(refuse(o->port && o->backend != SF_BACKEND_BOARD, "--port", "needs --backend board"));
+  SF_TRY(refuse(o->patience > 0 && o->backend != SF_BACKEND_BOARD, "--timeout", "needs --backend board"));
+  SF_TRY(refuse(!o->port && o->backend == SF_BACKEND_BOARD, "--backend board", "needs --port, such as /dev/ttyUSB0"));
+  if (!(o->patience > 0)) o->patience = SF_BOARD_PATIENCE;
   if (o->seed == NO_SEED) o->seed = SEED;
   return sf_ok();
 }
@@ -316,10 +333,13 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
        "render again what the manifest lists and compare"},
       SF_GROUP("How it is computed"),
-      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl", "B", "arithmetic (default fixed):"},
+      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl|board", "B", "arithmetic (default fixed):"},
       {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
       {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
        "for float (default model.safetensors beside the scene)"},
+      {"--port", 0, SF_ARG_STRING, &o->port, 0, 0, NULL, "DEVICE", "board: its serial port, such as /dev/ttyUSB0"},
+      {"--timeout", 0, SF_ARG_DOUBLE, &o->patience, 0.01, 600, NULL, "S",
+       "board: seconds without a byte until a command is sent again (default 1)"},
       {"--kernels", 0, SF_ARG_STRING, &o->kernels, 0, 0, NULL, "NAME",
        "instructions of fixed: portable, avx2, avx512vnni or amx (default: the fastest here); the result is the same"},
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N",
@@ -362,14 +382,18 @@ int main(int argc, char **argv)
       .program = "sim_render",
       .usage = "sim_render scene.snn DATA [--view K] -o golden.exr | --all -o DIR | --verify MANIFEST [options]",
       .summary =
-          "Renders views through the float field, the fixed-point core or the Verilog accelerator.\n"
+          "Renders views through the float field, the fixed-point core or the Verilog accelerator, simulated (rtl) or "
+          "on a "
+          "board.\n"
           "EXR channels: R G B A, Z (mean distance, world units; forward-facing data: NDC), samples;\n"
-          "fixed and rtl also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T fx.Zhi "
+          "fixed, rtl and board also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T "
+          "fx.Zhi "
           "fx.Zlo.\n"
           "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
           "equal on any machine (src/golden/manifest.h). --verify names the first difference, exit status 1.",
       .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
                   "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
+                  "  sim_render scene.snn data --backend board --port /dev/ttyUSB0 -o board.exr\n"
                   "  sim_render scene.snn data --all -o golden\n"
                   "  mpirun -n 8 sim_render scene.snn data --all -o golden\n"
                   "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
@@ -389,7 +413,7 @@ int main(int argc, char **argv)
     status = sf_ranks_open(&j->ranks, &how);
     j->opt.quiet |= sf_ranks_rank(j->ranks) > 0;
   }
-  if (status.code == SF_OK) status = j->opt.verify ? verify(j) : j->opt.all ? render_all(j) : render_one(j);
+  if (status.code == SF_OK) status = work(j);
   cJSON_Delete(j->verdicts);
   sf_view_set_free(&j->set);
   sf_shot_free(&j->shot);

@@ -2,25 +2,8 @@
  * bus are those of sim/sim.h. */
 #ifndef SF_SIM_RAY_RAY_H
 #define SF_SIM_RAY_RAY_H
-#include "firmware/sf_ray_driver.h"
-#include "fx/memory.h"
+#include "sim/ray/request.h"
 #include "sim/sim.h"
-
-typedef struct sf_ray_sample {
-  uint32_t pos[3]; /* Q0.24 */
-  int32_t delta_q24;
-  uint64_t distance_q16; /* below 2^44 */
-} sf_ray_sample;
-
-/* new_tile: the first ray of a tile, before which the field's cache is emptied. The samples of one ray, n >= 0. The
- * hardware may stop before the last one, by the core's own rule. stops: it has to stop at the last one, which is not
- * marked as such; once its pixel has come, one more that is ends the ray. */
-typedef struct sf_ray_request {
-  const fx_ray *ray;
-  const sf_ray_sample *sample;
-  int n;
-  bool stops, new_tile;
-} sf_ray_request;
 
 /* The field's memory behind AXI4: lines in the order of the requests, each after a random number of cycles. */
 enum { SF_MEMORY_QUEUE = 64, SF_LINE_BYTES = 16 };
@@ -42,8 +25,6 @@ typedef struct sf_memory {
 
 /* Somewhere, so that an address is not an offset. */
 uint32_t sf_memory_base(uint64_t seed);
-/* Programming of a TensoRF scene's planes, whose basis matrix stays the field's. */
-sf_planes_blob sf_ray_planes(const fx_tensorf *field);
 /* Contents of the scene's field; those of a hash grid stay where they are. sf_ray_dut_close frees the planes. */
 sf_status sf_memory_fill(sf_memory *memory, const fx_scene *scene);
 /* The dut's each_cycle, with the memory as its context: watches the rules, takes a request, gives a beat. */
@@ -67,14 +48,6 @@ void sf_ray_dut_close(sf_ray_dut *rays);
 fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays);
 /* The field's counters since the block was opened, against those of the core for the same rays. */
 sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field);
-sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl);
-
-/* A ray's lattice points at most, and those of TensoRF before its decoded samples are enough. */
-enum { SF_RAY_SAMPLES_MAX = 4096 };
-/* The first n samples of the ray's march. */
-void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
-/* Those that the core took for its pixel: the counters become the core's. sample[SF_RAY_SAMPLES_MAX] */
-sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
 /* Rays are in tiles: true where this one's is another than the last one's. */
 bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile);
 #endif

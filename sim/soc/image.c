@@ -94,7 +94,7 @@ static void put_field(uint8_t *bytes, const plan *p, const fx_scene *scene)
     memcpy(bytes + p->table, scene->grid.table, (size_t)scene->grid.entries * FX_GRID_FEATURES);
     return;
   }
-  const sf_planes_blob planes = sf_ray_planes(&scene->tensorf);
+  const sf_planes_blob planes = sf_ray_planes_of(&scene->tensorf);
   memcpy(bytes + p->planes, &planes, SF_PLANES_WORDS * 4);
   memcpy(bytes + p->planes + SF_PLANES_WORDS * 4, planes.basis, basis_bytes(&scene->tensorf));
   fx_tensorf_memory(&scene->tensorf, bytes + p->lines);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const sf_backend_names[] = {"float", "fixed", "rtl"};
+const char *const sf_backend_names[] = {"float", "fixed", "rtl", "board"};
 
 static sf_status open_model(sf_studio *studio)
 {
@@ -30,6 +30,8 @@ sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options)
   if (options->steps) studio->scene.net.steps = options->steps;
   if (options->backend == SF_BACKEND_FLOAT) return open_model(studio);
   if (options->backend == SF_BACKEND_FIXED) return sf_ok();
+  if (options->backend == SF_BACKEND_BOARD)
+    return sf_board_open(&studio->board, options->port, options->patience, &studio->scene, options->scene);
   const sf_dut_options how = {.seed = options->seed};
   return sf_ray_dut_open(&studio->rays, &studio->scene, &how);
 }
@@ -37,6 +39,7 @@ sf_status sf_studio_open(sf_studio *studio, const sf_studio_options *options)
 void sf_studio_close(sf_studio *studio)
 {
   sf_ray_dut_close(studio->rays);
+  sf_board_close(studio->board);
   sf_model_free(&studio->model);
   fx_scene_free(&studio->scene);
   *studio = (sf_studio){0};
@@ -71,7 +74,8 @@ static sf_status render(const sf_studio *studio, sf_shot *shot)
                              .user = studio->user};
   if (studio->options.backend == SF_BACKEND_FLOAT) return sf_golden_float(&job, &studio->model, &shot->golden);
   if (studio->options.backend == SF_BACKEND_FIXED) return sf_golden_fixed(&job, &shot->golden);
-  const sf_status status = sf_golden_rtl(&job, studio->rays, &shot->golden);
+  const sf_status status = studio->board ? sf_golden_board(&job, studio->board, &shot->golden)
+                                         : sf_golden_rtl(&job, studio->rays, &shot->golden);
   if (status.code != SF_E_DIFFERENCE) return status;
   return sf_fail(status.code, "%s: %s", studio->options.scene, status.message);
 }

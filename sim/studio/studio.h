@@ -1,11 +1,12 @@
-/* Where pictures are made: one scene, one data set, one of three backends. Views are loaded one at a time. */
+/* Where pictures are made: one scene, one data set, one of four backends. Views are loaded one at a time. */
 #ifndef SF_SIM_STUDIO_H
 #define SF_SIM_STUDIO_H
+#include "sim/board/board.h"
 #include "sim/ray/ray.h"
 #include "golden/golden.h"
 
-typedef enum { SF_BACKEND_FLOAT, SF_BACKEND_FIXED, SF_BACKEND_RTL } sf_backend;
-extern const char *const sf_backend_names[]; /* "float", "fixed", "rtl" */
+typedef enum { SF_BACKEND_FLOAT, SF_BACKEND_FIXED, SF_BACKEND_RTL, SF_BACKEND_BOARD } sf_backend;
+extern const char *const sf_backend_names[]; /* "float", "fixed", "rtl", "board" */
 
 typedef struct sf_studio_options {
   sf_backend backend;
@@ -16,6 +17,8 @@ typedef struct sf_studio_options {
   int downscale;       /* as sf_dataset_options */
   float scale;         /* model units per world unit, 0 = the scene's */
   uint64_t seed;       /* rtl: of the random reset values */
+  const char *port;    /* board: its serial port */
+  double patience;     /* board: see sf_board_open */
 } sf_studio_options;
 
 typedef struct sf_studio {
@@ -25,6 +28,7 @@ typedef struct sf_studio {
   char model_path[4096];                   /* float */
   sf_model model;                          /* float */
   sf_ray_dut *rays;                        /* rtl */
+  sf_board *board;                         /* board */
   bool (*tick)(void *user, size_t pixels); /* as sf_golden_job; set by the caller, or NULL */
   void *user;
 } sf_studio;
@@ -53,4 +57,14 @@ sf_status sf_window_parse(const char *text, sf_window *window);
 /* The accelerator makes the pixels from the positions of their samples; the core walks along so that a difference is
  * reported at its first pixel, and for what the accelerator does not do or count: marching, saturation, grid bytes. */
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden);
+/* The same from a board, tile by tile: pixels are the board's; counters are compared as sums of a tile's rays, so
+ * events of single pixels are the core's. */
+sf_status sf_golden_board(const sf_golden_job *job, sf_board *board, sf_golden *golden);
+
+/* Of both: tiles of the view, as far as they are in the window, from left to right and top to bottom. tile: place of
+ * its first pixel in the window, and its size there. */
+typedef sf_status (*sf_tile_fn)(const sf_golden_job *job, const sf_window *tile, void *user, sf_golden *golden);
+sf_status sf_each_tile(const sf_golden_job *job, sf_tile_fn work, void *user, sf_golden *golden);
+/* The number of the tile that a pixel of the view is in. */
+uint64_t sf_tile_number(int across, int down);
 #endif

@@ -35,7 +35,7 @@ static sf_status rtl_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y, 
   fx_pixel pixel;
   fx_counts rtl = {0}, counts;
   const int across = job->window.x + x, down = job->window.y + y;
-  const uint64_t tile = (uint64_t)(down / FX_TILE) << 32 | (uint64_t)(across / FX_TILE);
+  const uint64_t tile = sf_tile_number(across, down);
   SF_TRY(sf_pixel_ray(job->scene, job->data, job->view, across, down, &ray));
   SF_TRY(run_ray(job->scene, &ray, tile, e, &pixel, &rtl));
   counts = e->core.core;
@@ -56,25 +56,10 @@ static sf_status named_pixel(const sf_golden_job *job, rtl_eval *e, int x, int y
   return job->tick && !job->tick(job->user, 1) ? sf_golden_stopped(job) : sf_ok();
 }
 
-/* From `at` to where the view's next tile begins. */
-static int tile_end(int origin, int at, int end)
+static sf_status pixels_of_tile(const sf_golden_job *job, const sf_window *tile, void *user, sf_golden *golden)
 {
-  const int next = at + FX_TILE - (origin + at) % FX_TILE;
-  return next < end ? next : end;
-}
-
-/* Tiles of the view, as far as they are in the window, from left to right and top to bottom. */
-static sf_status all_pixels(const sf_golden_job *job, rtl_eval *e, sf_golden *golden)
-{
-  const sf_window *w = &job->window;
-  for (int top = 0, below; top < w->height; top = below) {
-    below = tile_end(w->y, top, w->height);
-    for (int left = 0, beside; left < w->width; left = beside) {
-      beside = tile_end(w->x, left, w->width);
-      for (int y = top; y < below; y++)
-        for (int x = left; x < beside; x++) SF_TRY(named_pixel(job, e, x, y, golden));
-    }
-  }
+  for (int y = tile->y; y < tile->y + tile->height; y++)
+    for (int x = tile->x; x < tile->x + tile->width; x++) SF_TRY(named_pixel(job, user, x, y, golden));
   return sf_ok();
 }
 
@@ -87,7 +72,7 @@ sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *g
   if (status.code == SF_OK) {
     rays->in_tile = false;
     sf_ray_driver_clear(sf_dut_driver_bus(rays->dut));
-    status = all_pixels(job, &e, golden);
+    status = sf_each_tile(job, pixels_of_tile, &e, golden);
   }
   fx_memory_close(&e.memory), sf_memory_recount_close(&e.lines);
   return status;

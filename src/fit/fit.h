@@ -57,6 +57,18 @@ typedef struct sf_fit_job {
   void *user;
 } sf_fit_job;
 
+/* Before the fit: the grid of candidate[0], smaller, so that its tables take at most `bytes` in a memory (two for each
+ * entry), with the least loss that the search finds. */
+typedef struct sf_fit_tables {
+  uint64_t bound, bytes_before, bytes_after, checked; /* checked: rays that the loss was measured on */
+  int dropped, smaller, rounds;                       /* levels; tables */
+  double psnr_before, psnr_after, loss_db;
+} sf_fit_tables;
+/* job->loss_db: how much it may lose. SF_E_RANGE, with the best that it reached, where that is not enough. */
+sf_status sf_fit_to_bytes(fx_scene *small, const sf_fit_job *job, uint64_t bytes, sf_fit_tables *report);
+void sf_fit_tables_print(FILE *out, const sf_fit_tables *report);
+cJSON *sf_fit_tables_json(const sf_fit_tables *report);
+
 /* A scene's sizes, and what the checking rays cost and lose. */
 typedef struct sf_fit_state {
   int32_t n_in[SF_LAYERS], n_out[SF_LAYERS];
@@ -87,6 +99,7 @@ typedef struct sf_fit_cache {
 
 typedef struct sf_fit_report {
   int chosen;                                /* candidate */
+  sf_fit_tables tables;                      /* of sf_fit_to_bytes, set by its caller; bound 0: none */
   uint64_t observed, first_checked, checked; /* rays whose use was observed; those that the loss was measured on */
   double pixels;                             /* of a frame */
   double bound_db, loss_db; /* loss_db: reference against result, negative where the result is better */

@@ -94,6 +94,7 @@ void sf_fit_print(FILE *out, const sf_fit_report *r)
 {
   const sf_fit_state *b = &r->before, *a = &r->after;
   const double frames = (double)r->checked / r->pixels;
+  if (r->tables.bound) sf_fit_tables_print(out, &r->tables);
   fprintf(out, "fit: PSNR %.3f -> %.3f dB on %" PRIu64 " rays of the training views: loses %.4f dB, allowed %g dB\n",
           b->psnr, a->psnr, r->checked, r->loss_db, r->bound_db);
   print_dropped(out, r);
@@ -205,6 +206,7 @@ cJSON *sf_fit_json(const sf_fit_report *r)
   cJSON_AddNumberToObject(json, "bound_db", r->bound_db);
   add_real(json, "loss_db", r->loss_db);
   cJSON_AddNumberToObject(json, "candidate", r->chosen);
+  if (r->tables.bound) cJSON_AddItemToObject(json, "grid_for_bytes", sf_fit_tables_json(&r->tables));
   cJSON_AddItemToObject(json, "neurons_without_effect", layers_json(r->silent));
   cJSON_AddItemToObject(json, "neurons_dropped", layers_json(r->dropped));
   if (r->before.planes) {

@@ -233,6 +233,7 @@ usage --fixed-steps sf_train d -o out --net ann --fixed-steps 2
 number sf_export --steps 0 9 -1 nan
 number sf_export --fit-loss -1 nan inf 101 ''
 number sf_export --fit-rays 0 255 -1 nan
+number sf_export --fit-bytes 0 -1 nan x
 usage --data sf_export model.safetensors -o out --fit
 usage --data sf_export s.snn --vectors out
 usage --data sf_export model.safetensors -o out --vectors kit
@@ -243,6 +244,7 @@ while read -r option value; do
 done <<'END'
 --fit-loss 0.1
 --fit-rays 256
+--fit-bytes 4096
 --data d
 --samples 4
 --rays 4
@@ -270,6 +272,18 @@ absent out "traces of no view"
 usage "--model needs --backend float" sim_render s.snn d -o out --model model.safetensors
 usage "--model needs --backend float" sim_render s.snn d --verify none.json --model model.safetensors
 usage "--seed needs --backend rtl" sim_render s.snn d -o out --seed 1
+usage "--port needs --backend board" sim_render s.snn d -o out --port tty
+usage "--timeout needs --backend board" sim_render s.snn d -o out --timeout 2
+usage "--backend board needs --port" sim_render s.snn d -o out --backend board
+usage "--backend board needs --port" sf_cosim s.snn d --backend board
+usage "belong to --backend board" sf_cosim s.snn d --port tty
+for option in --stalls\ 3 --jobs\ 2 --block\ 5 --checkpoint\ out --evidence\ out --plusarg=+fault=1 --saif\ out; do
+  usage "has no effect beside --backend board" sf_cosim s.snn d --backend board --port tty $option
+done
+number sim_render --timeout 0 -1 nan
+data "no board there" sim_render s.snn d -o out --backend board --port notty
+absent out "a picture without a board"
+data "no board there" sf_cosim s.snn d --backend board --port notty
 number sf_cosim --rays -1 nan inf x
 number sf_cosim --jobs -1 0 257 x
 number sf_cosim --block 0 x

@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""The bitstream of a board: rtl/board/NAME, its top, pins and clock, around the accelerator.
+
+usage: board.py BUILD [options]     `make board` calls it; --help has examples
+
+Yosys, nextpnr and ecppack come from PyPI (packages yowasp-*) into BUILD/fpga/venv, as for `make fpga`. A finished step is kept
+until the RTL, a tool or the recipe changes."""
+import argparse
+import json
+import os
+import shutil
+import sys
+import time
+
+from fpga import CELLS, DEVICES, PACKAGES, Tools, critical_path, keep, kept
+from hdl_flow import Stop, digest, run, sources_of, write
+
+WANTED = {"name": str, "top": str, "device": str, "package": str, "speed": str, "mhz": (int, float), "pins": str, "load": str}
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        prog="board.py", formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Synthesise, place and route the accelerator for a board, check its clock, and pack the bitstream:\n"
+        "BUILD/board/NAME/NAME.bit. Ends with status 1 where the clock is too fast for what was routed.",
+        epilog="""examples:
+  make board                          the bitstream for a ULX3S: about 45 minutes
+  make board BOARD_FLOW="--seed 2"    another placement
+  make board BOARD=mine               of rtl/board/mine""")
+    root = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
+    parser.add_argument("build", help="build folder")
+    parser.add_argument("--board", default="ulx3s", metavar="NAME", help="folder below rtl/board (default ulx3s)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the placement (default 1)")
+    parser.add_argument("--rtl", default=root, metavar="DIR", help="folder that holds rtl/ (default: the project's)")
+    parser.add_argument("--venv", metavar="DIR", help="environment of the tools (default BUILD/fpga/venv)")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    return parser.parse_args()
+
+
+def read_board(path, name):
+    """What board.json says. Raises Stop with file and field."""
+    file = os.path.join(path, "board.json")
+    if os.path.exists(os.path.join(path, "vivado.tcl")) and not os.path.exists(file):
+        raise Stop(f"{name} is for Vivado: vivado -mode batch -source rtl/board/{name}/vivado.tcl", 2)
+    try:
+        board = json.load(open(file, encoding="utf-8"))
+    except OSError as error:
+        raise Stop(f"there is no board {name}: {file}: {error.strerror}", 2) from None
+    except ValueError as error:
+        raise Stop(f"{file}: {error}") from None
+    for field, kind in WANTED.items():
+        if not isinstance(board.get(field), kind):
+            raise Stop(f"{file}: {field} is missing or of another kind")
+    if board["device"] not in DEVICES:
+        raise Stop(f"{file}: device is {board['device']}, expected one of {', '.join(DEVICES)}")
+    for source in (board["pins"], board["top"] + ".sv"):
+        if not os.path.exists(os.path.join(path, source)):
+            raise Stop(f"{os.path.join(path, source)} is not there")
+    return board
+
+
+def sources_of_board(root, name):
+    """The RTL with what every board has and this board's own; packages first."""
+    folders = ["rtl/board", f"rtl/board/{name}"]
+    own = [os.path.join(folder, file) for folder in folders for file in sorted(os.listdir(os.path.join(root, folder)))
+           if file.endswith(".sv")]
+    return sources_of(root) + own
+
+
+def text_of_tree(root):
+    """All of rtl/, for the key of what is kept."""
+    names = sorted(os.path.join(folder, name) for folder, _, files in os.walk(os.path.join(root, "rtl")) for name in files)
+    return "".join(open(name, encoding="utf-8").read() for name in names)
+
+
+class Flow:
+    """The steps, each kept beside its result."""
+
+    def __init__(self, arguments, board, say):
+        self.arguments, self.board, self.say = arguments, board, say
+        self.root = os.path.abspath(arguments.rtl)
+        self.folder = os.path.join(os.path.abspath(arguments.build), "board", arguments.board)
+        os.makedirs(self.folder, exist_ok=True)
+        self.tools = Tools(arguments.venv or os.path.join(arguments.build, "fpga", "venv"), say)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def step(self, what, tool, words, result, key):
+        """Runs a tool unless its result is kept."""
+        if kept(self.path(result), key):
+            return
+        self.say(f"{self.arguments.board}: {what}")
+        started = time.monotonic()
+        self.tools.run(tool, words, self.path(tool + ".log"), self.folder)
+        self.say(f"{self.arguments.board}: {what} took {time.monotonic() - started:.0f} s")
+        keep(self.path(result), key)
+
+    def run(self):
+        board, name = self.board, self.arguments.board
+        # The tools, which run as WebAssembly, see the folder that they work in and no other.
+        shutil.rmtree(self.path("rtl"), ignore_errors=True)
+        shutil.copytree(os.path.join(self.root, "rtl"), self.path("rtl"))
+        key = digest(text_of_tree(self.root), board["top"], *PACKAGES, "board 1")
+        script = (f"read_verilog -sv -defer -D SF_NO_TAP -Irtl {' '.join(sources_of_board(self.root, name))}; "
+                  f"synth_ecp5 -top {board['top']} -json netlist.json")
+        self.step("synthesis", "yosys", ["-p", script], "netlist.json", key)
+        key = digest(key, json.dumps(board), str(self.arguments.seed), "board nextpnr 1")
+        self.step("place and route", "nextpnr_ecp5",
+                  [f"--{board['device']}", "--package", board["package"], "--speed", board["speed"], "--json", "netlist.json",
+                   "--lpf", f"rtl/board/{name}/{board['pins']}", "--seed", str(self.arguments.seed), "--report", "timing.json",
+                   "--textcfg", "routed.config", "--timing-allow-fail"], "timing.json", key)
+        return json.load(open(self.path("timing.json"), encoding="utf-8")), key
+
+    def pack(self, key):
+        name = self.arguments.board + ".bit"
+        self.step("bitstream", "ecppack", ["--compress", "--input", "routed.config", "--bit", name], name, key)
+        return self.path(name)
+
+
+def describe(board, report):
+    """What it costs and how fast it is: ({}, f_max of the board's clock)."""
+    result = {"board": board["name"], "device": DEVICES[board["device"]] + "-" + board["speed"], "mhz": board["mhz"]}
+    for name, kind in CELLS.items():
+        used = report["utilization"].get(kind, {"used": 0, "available": 0})
+        result[name], result[name + "_available"] = used["used"], used["available"]
+    clocks = [clock["achieved"] for clock in report["fmax"].values() if clock["constraint"] > 0.99 * board["mhz"]]
+    result["f_max_mhz"] = round(min(clocks, default=0), 2)
+    result["critical_path"] = critical_path(report)
+    return result
+
+
+def print_result(result):
+    print(f"{result['board']} ({result['device']}): " +
+          ", ".join(f"{result[name]} of {result[name + '_available']} {name.replace('_', ' ')}" for name in CELLS))
+    path = result["critical_path"]
+    if path:
+        print(f"longest path {path['ns']} ns, {path['wire_ns']} ns of it on wires: {', '.join(path['names'])}")
+    print(f"clock {result['mhz']} MHz, {result['f_max_mhz']} MHz after routing")
+
+
+def main():
+    arguments = parse_arguments()
+
+    def say(text):
+        if not arguments.quiet:
+            print("board: " + text, file=sys.stderr, flush=True)
+    board = read_board(os.path.join(os.path.abspath(arguments.rtl), "rtl", "board", arguments.board), arguments.board)
+    flow = Flow(arguments, board, say)
+    report, key = flow.run()
+    result = describe(board, report)
+    write(flow.path("board.json"), json.dumps(result, indent=2) + "\n")
+    print_result(result)
+    if result["f_max_mhz"] < board["mhz"]:
+        raise Stop(f"{board['name']}: {result['f_max_mhz']} MHz after routing, its clock has {board['mhz']} MHz: no bitstream was made; "
+                   "another --seed may do")
+    bitstream = flow.pack(key)
+    print(f"{bitstream}\nput it on the board: {board['load']} {os.path.relpath(bitstream)}")
+    return 0
+
+
+if __name__ == "__main__":
+    run("board", main)
