@@ -65,7 +65,7 @@ static double mean(int scene, int run, int metric)
 static sf_order_verdict verdict(int a, int b, int metric)
 {
   sf_order order[SF_ORDERS_MAX];
-  const int n = sf_reproduction_order(&report, order);
+  const int n = sf_reproduction_order(&report, 0, order);
   for (int i = 0; i < n; i++)
     if (order[i].a == a && order[i].b == b && order[i].metric == metric) return order[i].verdict;
   ck_abort_msg("no such pair");
@@ -77,7 +77,8 @@ static void contains(const char *file, const char *text, bool wanted)
   char *data;
   size_t size;
   ck_ok(sf_read_file(in(file), 1 << 24, &data, &size));
-  ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%s", text, wanted ? "not " : "", file, data);
+  ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%.3000s", text, wanted ? "not " : "", file,
+                data);
   free(data);
 }
 
@@ -138,11 +139,13 @@ TEST(energies)
   ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_5E7, SF_RUN_ANN), 75, 1e-9);
   ck_assert_double_eq_tol(sf_reproduction_prefix_energy(&report, 0, SF_RUN_BETA_5E7, 1), 7, 1e-9);
   ck_assert(isnan(sf_reproduction_prefix_energy(&report, 0, SF_RUN_BETA_5E7, 0)));
+  ck_assert_double_eq_tol(mean(0, SF_RUN_BETA_5E7, SF_METRIC_SAVING), 75, 1e-9);
+  ck_assert_double_eq_tol(mean(0, SF_RUN_BETA_5E7, SF_METRIC_EXCESS), 1e-3 - pow(10, -3.1), 1e-15);
   ck_assert_int_eq(report.scene[0].run[SF_RUN_BETA_5E7].audits, 2);
   ck_assert_int_eq(report.scene[0].run[SF_RUN_BETA_5E7].width, 64);
   ck_assert_int_eq(report.problems, 0);
   print();
-  contains("table.md", "mean of 2 held-out frames of 64 x 48 pixels", true);
+  contains("table.md", "2 audited frames of 64 x 48", true);
 }
 
 /* Planted: the rendering's count is one fJ off, an audit that disagrees with itself, a file that is no JSON. */
@@ -192,16 +195,17 @@ TEST(order)
   sf_order order[SF_ORDERS_MAX];
   for (int i = 0; i < SF_RUNS; i++) {
     const sf_run_kind *k = &sf_run_kinds[i];
-    const double mj = k->paper[SF_METRIC_ENERGY];
-    write_run("s", k->name, k->paper[SF_METRIC_PSNR], 1);
+    const double mj = sf_paper_value(0, i, SF_METRIC_ENERGY), psnr = sf_paper_value(0, i, SF_METRIC_PSNR);
+    if (isnan(psnr)) continue; /* of the other field */
+    write_run("s", k->name, psnr, 1);
     if (!isnan(mj) && i != SF_RUN_ANN) write_audit("s", k->name, "audit-0.json", mj, 955.27, 1000);
   }
   write_text("s/beta-5e-7/scene.snn", "");
   write_text("s/ann/float-0.json", "{\"psnr\":31,\"samples\":1000}");
   load();
   for (int i = 0; i < SF_RUNS; i++)
-    report.scene[0].run[i].value[SF_METRIC_STEPS] = sf_run_kinds[i].paper[SF_METRIC_STEPS];
-  const int n = sf_reproduction_order(&report, order);
+    report.scene[0].of[0].run[i].value[SF_METRIC_STEPS] = sf_paper_value(0, i, SF_METRIC_STEPS);
+  const int n = sf_reproduction_order(&report, 0, order);
   for (int i = 0; i < n; i++) {
     ck_assert_msg(order[i].verdict == SF_ORDER_YES, "%s: pair %d is '%s'", order[i].group, i,
                   sf_order_names[order[i].verdict]);
@@ -209,8 +213,8 @@ TEST(order)
   }
   ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_1E7, SF_RUN_ANN), 32.65, 0.005); /* printed */
   ck_assert_double_eq_tol(sf_reproduction_saving(&report, -1, SF_RUN_BETA_1E6, SF_RUN_ANN), 57.57, 0.005);
-  report.scene[0].run[SF_RUN_DECAY].value[SF_METRIC_PSNR] = 32.5;
-  sf_reproduction_order(&report, order);
+  report.scene[0].of[0].run[SF_RUN_DECAY].value[SF_METRIC_PSNR] = 32.5;
+  sf_reproduction_order(&report, 0, order);
   int turned = 0;
   for (int i = 0; i < n; i++)
     if (order[i].verdict == SF_ORDER_NO) {
@@ -218,7 +222,7 @@ TEST(order)
       turned++;
     }
   ck_assert_int_eq(turned, 2);
-  report.scene[0].run[SF_RUN_NO_EXTRA].value[SF_METRIC_STEPS] = 3.625;
+  report.scene[0].of[0].run[SF_RUN_NO_EXTRA].value[SF_METRIC_STEPS] = 3.625;
   ck_assert_int_eq(verdict(SF_RUN_BETA_5E7, SF_RUN_NO_EXTRA, SF_METRIC_STEPS), SF_ORDER_TIE);
   print();
   contains("table.md", "22 yes, 1 tie, 2 no, 0 not run.", true);
@@ -301,8 +305,8 @@ TEST(pairs)
   write_text("scenes/b/beta-1e-7/status", "failed: no memory\n");
   load_from(in("scenes"));
   ck_assert_int_eq(report.count, 3);
-  ck_assert_ptr_eq(sf_reproduction_group(&report.scene[1]), &sf_paper_groups[3]);
-  ck_assert_ptr_null(sf_reproduction_group(&report.scene[2]));
+  ck_assert_int_eq(report.scene[1].group, 3);
+  ck_assert_int_eq(report.scene[2].group, SF_PAPER_GROUPS);
   print();
   contains(
       "table.md",
@@ -322,7 +326,7 @@ TEST(pairs)
   ck_assert_ptr_nonnull(strstr(report.problem[0], "b/beta-1e-7/cosim.json: RTL and fixed-point core differ: 1 of 100"));
   ck_assert_ptr_null(strstr(report.problem[0], folder)); /* no path of this machine */
   cJSON *json = sf_reproduction_json(&report);
-  ck_assert(!cJSON_HasObjectItem(json, "average") && !cJSON_HasObjectItem(json, "order"));
+  ck_assert(!cJSON_HasObjectItem(json, "groups") && !cJSON_HasObjectItem(json, "tie_tolerance"));
   cJSON_Delete(json);
   load_from(in("scenes/."));
   ck_assert_str_eq(report.profile, "scenes");
@@ -370,6 +374,112 @@ TEST(too_many_prefixes)
   ck_assert_int_eq(report.problems, 1);
   sf_reproduction other;
   ck_bad(sf_reproduction_load(&other, in("nowhere")), SF_E_IO, "nowhere", "folder");
+}
+
+/* Three seeds of one scene, with these differences between two runs; a second scene has one seed. */
+static sf_order_verdict with_seeds(double first, double second, double third)
+{
+  static const char *const place[] = {"s", "s/seed-2", "s/seed-3"};
+  const double psnr[] = {30, 30.5, 31}, difference[] = {first, second, third};
+  for (int i = 0; i < 3; i++) {
+    write_run(place[i], "beta-5e-7", psnr[i], 3);
+    write_run(place[i], "beta-1e-7", psnr[i] + difference[i], 4);
+  }
+  load();
+  return verdict(SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_METRIC_PSNR);
+}
+
+TEST(seeds)
+{
+  sf_order order[SF_ORDERS_MAX];
+  ck_assert_int_eq(with_seeds(0.25, 0.125, 0.25), SF_ORDER_YES);
+  ck_assert_int_eq(report.count, 1);
+  ck_assert_int_eq(report.scene[0].seeds, 3);
+  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 30.5);
+  ck_assert(sf_reproduction_spread(&report, 0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 0.5);
+  ck_assert(sf_reproduction_spread(&report, -1, SF_RUN_BETA_5E7, SF_METRIC_STEPS) == 0);
+  sf_reproduction_order(&report, 0, order);
+  ck_assert_int_eq(order[0].pairs, 3);
+  /* 0.25, 0.125, 0.25 are off their mean by 1/24, 1/12, 1/24: variance 1/192. */
+  ck_assert_double_eq_tol(order[0].error, sqrt(1.0 / 192 / 3), 1e-12);
+  ck_assert_int_eq(order[2].verdict, SF_ORDER_YES); /* steps: one more with every seed */
+  print();
+  contains("table.md", "| 30.50 +- 0.50 | 32.21 |", true);
+  contains("table.md", "s; seed 7; 2 views", true);
+  ck_assert_int_eq(with_seeds(0.5, -0.25, 0.25), SF_ORDER_TIE); /* mean 0.17, two standard errors 0.44 */
+  ck_assert_int_eq(with_seeds(0.03125, 0.03125, 0.03125), SF_ORDER_YES);
+  ck_assert_int_eq(with_seeds(-0.25, -0.125, -0.25), SF_ORDER_NO);
+  /* Scenes weigh the same, whatever their seeds. */
+  write_run("t", "beta-5e-7", 28, 2);
+  load();
+  ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 29.25);
+  ck_assert_double_eq_tol(sf_reproduction_spread(&report, -1, SF_RUN_BETA_5E7, SF_METRIC_PSNR), sqrt(0.125), 1e-12);
+  write_run("s/seed-4", "beta-1e-6", 20, 2);
+  write_text("s/seed-4/beta-1e-7/status", "failed: no memory\n");
+  write_run("alone/seed-2", "beta-5e-7", 20, 2);
+  write_text("s/seed-x/status", "done\n");
+  load();
+  ck_assert_int_eq(report.count, 3);
+  ck_assert(mean(1, SF_RUN_BETA_1E6, SF_METRIC_PSNR) == 20);
+  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 20);
+  print();
+  contains("table.md", "- s, seed 4, beta-1e-7: failed: no memory", true);
+}
+
+/* A run of a scene with its field, its data and its search. */
+static void write_kind(const char *scene, const char *run, double psnr, const char *kind)
+{
+  char path[128], text[400];
+  write_run(scene, run, psnr, 3);
+  snprintf(path, sizeof path, "%s/%s/train.json", scene, run);
+  snprintf(text, sizeof text,
+           "{\"psnr\":%.17g,\"ssim\":0.5,\"t_r\":3,\"t_star\":2.5,\"seconds\":1,\"seed\":1,\"views\":25,\"width\":400,"
+           "\"height\":300,\"search\":{\"state\":\"balanced\",\"worth\":2e-5,\"worth_error\":1e-6,\"price\":1e-5},%s}",
+           psnr, kind);
+  write_text(path, text);
+}
+
+/* Every field and set of scenes has tables of its own beside the paper's values for it; scenes of no set have none. */
+TEST(groups)
+{
+  static const char planes[] = "\"backbone\":\"tensorf\",\"layout\":\"blender\"",
+                    grid[] = "\"backbone\":\"ingp\",\"layout\":\"ingp\"";
+  int count;
+  write_kind("paper/lego-tensorf", "ann", 33, planes);
+  write_kind("paper/lego-tensorf", "beta-5e-9", 32.75, planes);
+  write_kind("paper/lego-tensorf", "beta-5e-8", 32.5, planes);
+  write_kind("paper/lego-tensorf", "beta-5e-7", 32, planes);
+  write_kind("paper/fox-ingp", "ann", 25, grid);
+  write_kind("paper/fox-ingp", "beta-1e-7", 24, grid);
+  load_from(in("paper"));
+  ck_assert_int_eq(report.problems, 0);
+  ck_assert_int_eq(report.scene[1].group, 2);
+  ck_ok(sf_reproduction_csv(&report, &count));
+  print();
+  contains("table.md", "## Averages over the scenes: TensoRF, Synthetic", true);
+  contains("table.md", "| beta = 5e-8        |   32.50 | 33.04 |", true);
+  contains("table.md", "hash grid, Synthetic\n", false); /* no such scene */
+  contains("table.md", "without stage I", false);
+  contains("table.md", "scenes of none of the paper's sets", true);
+  contains("table.md", "lego; seed 1; 25 views of 400 x 300", true);
+  contains("paper/tables/models-spiking-blender.csv", "\nSpiking-NeRF,30.41,-,256,as printed\n", true);
+  contains("paper/tables/models-spiking-blender.csv", "\n\"here: TensoRF, beta = 5e-9\",32.75,0.500,3,lego;", true);
+  contains("paper/tables/models-ordinary-blender.csv", "\nBiRF,32.64,-,-,as printed\n", true);
+  contains("table.md", "Here: lego (TensoRF, 400 x 300). Not here: chair drums ficus hotdog materials mic ship.", true);
+  contains("table.md", "Plenoxels", false);
+  contains("table.md", "|      2.000 |      0.100 |      1.000 |          2.00 | balanced |", true);
+  ck_assert_int_eq(count, 8);
+  contains("paper/tables/order-tensorf-blender.csv", "\nbeta,beta = 5e-9,beta = 5e-8,PSNR dB,0.06,0.25,-,1,1,yes\n",
+           true);
+  contains("paper/tables/quality-tensorf-blender.csv", "\nbeta = 5e-8,32.50,33.04,0.5000,0.960,3.000,3.875,-,815.20,",
+           true);
+  cJSON *json = sf_reproduction_json(&report);
+  ck_assert_ptr_nonnull(json);
+  const cJSON *groups = sf_json_get(json, "groups");
+  ck_assert_int_eq(cJSON_GetArraySize(groups), 2);
+  ck_assert(sf_json_real(sf_json_at(json, "groups[0].average.beta-5e-9.paper.psnr")) == 33.10);
+  ck_assert_int_eq(cJSON_GetArraySize(sf_json_get(json, "tables")), 8);
+  cJSON_Delete(json);
 }
 
 /* Scenes of any kind are as many as there are: each has its rows. */
