@@ -121,6 +121,7 @@ $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 # The report's texts lie in the program.
 $B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+$B/obj/src/report/texts.o: src/report/reproduction.html
 
 $(CURDIR)/$B/%: $B/% ;
 

@@ -1,94 +1,6 @@
 /* The report of `make reproduce` from folders made by hand: averages, energies, the paper's order, what is missing. */
-#include "ck_run.h"
-#include "folder_fixture.h"
-#include "base/io.h"
-#include "report/report.h"
+#include "report_fixture.h"
 #include <math.h>
-
-static sf_reproduction report;
-
-static void write_text(const char *path, const char *text)
-{
-  char full[600], dir[600];
-  snprintf(full, sizeof full, "%s/%s", folder, path);
-  snprintf(dir, sizeof dir, "%s", full);
-  *strrchr(dir, '/') = 0;
-  ck_ok(sf_make_dir(dir));
-  ck_ok(sf_write_file(full, text, strlen(text)));
-}
-
-static void write_run(const char *scene, const char *run, double psnr, int t_r)
-{
-  char path[128], text[400];
-  snprintf(path, sizeof path, "%s/%s/train.json", scene, run);
-  snprintf(text, sizeof text,
-           "{\"model\":\"/home/somebody/m\",\"psnr\":%.17g,\"ssim\":0.5,\"t_r\":%d,\"t_star\":%d.25,\"seconds\":3600,"
-           "\"iterations\":90,\"seed\":7,\"views\":2}",
-           psnr, t_r, t_r);
-  write_text(path, text);
-  snprintf(path, sizeof path, "%s/%s/status", scene, run);
-  write_text(path, "done\n");
-}
-
-/* Energies in mJ. */
-static void write_audit(const char *scene, const char *run, const char *file, double spiking, double twin, int samples)
-{
-  char path[128], text[300];
-  snprintf(path, sizeof path, "%s/%s/%s", scene, run, file);
-  snprintf(text, sizeof text, "{\"energy_spiking_fj\":%.0f,\"energy_ann_fj\":%.0f,\"samples\":%d}", spiking * 1e12,
-           twin * 1e12, samples);
-  write_text(path, text);
-}
-
-static void load_from(const char *path)
-{
-  sf_reproduction_free(&report);
-  ck_ok(sf_reproduction_load(&report, path));
-}
-
-static void load(void)
-{
-  load_from(folder);
-}
-
-static void tear_down(void)
-{
-  sf_reproduction_free(&report);
-  remove_folder();
-}
-
-static double mean(int scene, int run, int metric)
-{
-  return sf_reproduction_mean(&report, scene, run, metric, NULL);
-}
-
-static sf_order_verdict verdict(int a, int b, int metric)
-{
-  sf_order order[SF_ORDERS_MAX];
-  const int n = sf_reproduction_order(&report, 0, order);
-  for (int i = 0; i < n; i++)
-    if (order[i].a == a && order[i].b == b && order[i].metric == metric) return order[i].verdict;
-  ck_abort_msg("no such pair");
-  return SF_ORDER_MISSING;
-}
-
-static void contains(const char *file, const char *text, bool wanted)
-{
-  char *data;
-  size_t size;
-  ck_ok(sf_read_file(in(file), 1 << 24, &data, &size));
-  ck_assert_msg((strstr(data, text) != NULL) == wanted, "'%s' is %sin %s:\n%.3000s", text, wanted ? "not " : "", file,
-                data);
-  free(data);
-}
-
-static void print(void)
-{
-  FILE *out = fopen(in("table.md"), "w");
-  ck_assert_ptr_nonnull(out);
-  ck_ok(sf_reproduction_print(out, &report));
-  ck_assert_int_eq(fclose(out), 0);
-}
 
 /* Sums of these numbers are exact in binary: equality, no bound. */
 TEST(averages)
@@ -234,14 +146,17 @@ TEST(order)
 TEST(log_of_a_resumed_run)
 {
   write_run("s", "no-budget", 30, 3);
-  write_text("s/no-budget/train.jsonl", "{\"iteration\":16,\"t_star\":7}\n{\"iteration\":32,\"t_star\":6}\n"
-                                        "{\"iteration\":48,\"t_s{\"iteration\":32,\"t_star\":5}\n"
-                                        "{\"iteration\":32,\"t_star\":5.5}\n{\"iteration\":48,\"t_star\":4}\n");
+  write_text("s/no-budget/train.jsonl",
+             "{\"iteration\":16,\"t_star\":7}\n{\"iteration\":32,\"t_star\":6}\n"
+             "{\"iteration\":48,\"t_s{\"iteration\":32,\"t_star\":5}\n"
+             "{\"iteration\":32,\"t_star\":5.5}\n{\"iteration\":48,\"t_star\":4,\"firing\":[0.25,0.5]}\n");
   load();
   const sf_run *run = &report.scene[0].run[SF_RUN_NO_BUDGET];
   const double at[] = {16, 32, 48}, t_star[] = {7, 5.5, 4};
   ck_assert_int_eq(run->points, 3);
   for (int i = 0; i < 3; i++) ck_assert(run->iteration[i] == at[i] && run->t_star_at[i] == t_star[i]);
+  ck_assert(run->firing[2][0] == 0.25 && run->firing[2][1] == 0.5 && isnan(run->firing[2][2]));
+  ck_assert(isnan(run->firing[1][0]));
 }
 
 TEST(plots_and_json)
@@ -263,7 +178,8 @@ TEST(plots_and_json)
   ck_assert(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 1) == 30);
   ck_assert(isnan(sf_reproduction_prefix(&report, 0, SF_RUN_BETA_5E7, 3)));
   ck_ok(sf_reproduction_plots(&report, &count));
-  ck_assert_int_eq(count, 3);
+  ck_assert_int_eq(count, 4);
+  contains("plots/psnr-t_r.gp", "\n2 30 it_s\n", true);
   contains("plots/balance-it's.gp", "\n2.00000 2e-05 1e-06\n", true);
   contains("plots/balance-it's.gp", "plot 3e-05 * exp(x - 2.00000) with lines", true);
   contains("plots/psnr-steps.gp", "\n2 30\n", true);
@@ -374,112 +290,6 @@ TEST(too_many_prefixes)
   ck_assert_int_eq(report.problems, 1);
   sf_reproduction other;
   ck_bad(sf_reproduction_load(&other, in("nowhere")), SF_E_IO, "nowhere", "folder");
-}
-
-/* Three seeds of one scene, with these differences between two runs; a second scene has one seed. */
-static sf_order_verdict with_seeds(double first, double second, double third)
-{
-  static const char *const place[] = {"s", "s/seed-2", "s/seed-3"};
-  const double psnr[] = {30, 30.5, 31}, difference[] = {first, second, third};
-  for (int i = 0; i < 3; i++) {
-    write_run(place[i], "beta-5e-7", psnr[i], 3);
-    write_run(place[i], "beta-1e-7", psnr[i] + difference[i], 4);
-  }
-  load();
-  return verdict(SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_METRIC_PSNR);
-}
-
-TEST(seeds)
-{
-  sf_order order[SF_ORDERS_MAX];
-  ck_assert_int_eq(with_seeds(0.25, 0.125, 0.25), SF_ORDER_YES);
-  ck_assert_int_eq(report.count, 1);
-  ck_assert_int_eq(report.scene[0].seeds, 3);
-  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 30.5);
-  ck_assert(sf_reproduction_spread(&report, 0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 0.5);
-  ck_assert(sf_reproduction_spread(&report, -1, SF_RUN_BETA_5E7, SF_METRIC_STEPS) == 0);
-  sf_reproduction_order(&report, 0, order);
-  ck_assert_int_eq(order[0].pairs, 3);
-  /* 0.25, 0.125, 0.25 are off their mean by 1/24, 1/12, 1/24: variance 1/192. */
-  ck_assert_double_eq_tol(order[0].error, sqrt(1.0 / 192 / 3), 1e-12);
-  ck_assert_int_eq(order[2].verdict, SF_ORDER_YES); /* steps: one more with every seed */
-  print();
-  contains("table.md", "| 30.50 +- 0.50 | 32.21 |", true);
-  contains("table.md", "s; seed 7; 2 views", true);
-  ck_assert_int_eq(with_seeds(0.5, -0.25, 0.25), SF_ORDER_TIE); /* mean 0.17, two standard errors 0.44 */
-  ck_assert_int_eq(with_seeds(0.03125, 0.03125, 0.03125), SF_ORDER_YES);
-  ck_assert_int_eq(with_seeds(-0.25, -0.125, -0.25), SF_ORDER_NO);
-  /* Scenes weigh the same, whatever their seeds. */
-  write_run("t", "beta-5e-7", 28, 2);
-  load();
-  ck_assert(mean(-1, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 29.25);
-  ck_assert_double_eq_tol(sf_reproduction_spread(&report, -1, SF_RUN_BETA_5E7, SF_METRIC_PSNR), sqrt(0.125), 1e-12);
-  write_run("s/seed-4", "beta-1e-6", 20, 2);
-  write_text("s/seed-4/beta-1e-7/status", "failed: no memory\n");
-  write_run("alone/seed-2", "beta-5e-7", 20, 2);
-  write_text("s/seed-x/status", "done\n");
-  load();
-  ck_assert_int_eq(report.count, 3);
-  ck_assert(mean(1, SF_RUN_BETA_1E6, SF_METRIC_PSNR) == 20);
-  ck_assert(mean(0, SF_RUN_BETA_5E7, SF_METRIC_PSNR) == 20);
-  print();
-  contains("table.md", "- s, seed 4, beta-1e-7: failed: no memory", true);
-}
-
-/* A run of a scene with its field, its data and its search. */
-static void write_kind(const char *scene, const char *run, double psnr, const char *kind)
-{
-  char path[128], text[400];
-  write_run(scene, run, psnr, 3);
-  snprintf(path, sizeof path, "%s/%s/train.json", scene, run);
-  snprintf(text, sizeof text,
-           "{\"psnr\":%.17g,\"ssim\":0.5,\"t_r\":3,\"t_star\":2.5,\"seconds\":1,\"seed\":1,\"views\":25,\"width\":400,"
-           "\"height\":300,\"search\":{\"state\":\"balanced\",\"worth\":2e-5,\"worth_error\":1e-6,\"price\":1e-5},%s}",
-           psnr, kind);
-  write_text(path, text);
-}
-
-/* Every field and set of scenes has tables of its own beside the paper's values for it; scenes of no set have none. */
-TEST(groups)
-{
-  static const char planes[] = "\"backbone\":\"tensorf\",\"layout\":\"blender\"",
-                    grid[] = "\"backbone\":\"ingp\",\"layout\":\"ingp\"";
-  int count;
-  write_kind("paper/lego-tensorf", "ann", 33, planes);
-  write_kind("paper/lego-tensorf", "beta-5e-9", 32.75, planes);
-  write_kind("paper/lego-tensorf", "beta-5e-8", 32.5, planes);
-  write_kind("paper/lego-tensorf", "beta-5e-7", 32, planes);
-  write_kind("paper/fox-ingp", "ann", 25, grid);
-  write_kind("paper/fox-ingp", "beta-1e-7", 24, grid);
-  load_from(in("paper"));
-  ck_assert_int_eq(report.problems, 0);
-  ck_assert_int_eq(report.scene[1].group, 2);
-  ck_ok(sf_reproduction_csv(&report, &count));
-  print();
-  contains("table.md", "## Averages over the scenes: TensoRF, Synthetic", true);
-  contains("table.md", "| beta = 5e-8        |   32.50 | 33.04 |", true);
-  contains("table.md", "hash grid, Synthetic\n", false); /* no such scene */
-  contains("table.md", "without stage I", false);
-  contains("table.md", "scenes of none of the paper's sets", true);
-  contains("table.md", "lego; seed 1; 25 views of 400 x 300", true);
-  contains("paper/tables/models-spiking-blender.csv", "\nSpiking-NeRF,30.41,-,256,as printed\n", true);
-  contains("paper/tables/models-spiking-blender.csv", "\n\"here: TensoRF, beta = 5e-9\",32.75,0.500,3,lego;", true);
-  contains("paper/tables/models-ordinary-blender.csv", "\nBiRF,32.64,-,-,as printed\n", true);
-  contains("table.md", "Here: lego (TensoRF, 400 x 300). Not here: chair drums ficus hotdog materials mic ship.", true);
-  contains("table.md", "Plenoxels", false);
-  contains("table.md", "|      2.000 |      0.100 |      1.000 |          2.00 | balanced |", true);
-  ck_assert_int_eq(count, 8);
-  contains("paper/tables/order-tensorf-blender.csv", "\nbeta,beta = 5e-9,beta = 5e-8,PSNR dB,0.06,0.25,-,1,1,yes\n",
-           true);
-  contains("paper/tables/quality-tensorf-blender.csv", "\nbeta = 5e-8,32.50,33.04,0.5000,0.960,3.000,3.875,-,815.20,",
-           true);
-  cJSON *json = sf_reproduction_json(&report);
-  ck_assert_ptr_nonnull(json);
-  const cJSON *groups = sf_json_get(json, "groups");
-  ck_assert_int_eq(cJSON_GetArraySize(groups), 2);
-  ck_assert(sf_json_real(sf_json_at(json, "groups[0].average.beta-5e-9.paper.psnr")) == 33.10);
-  ck_assert_int_eq(cJSON_GetArraySize(sf_json_get(json, "tables")), 8);
-  cJSON_Delete(json);
 }
 
 /* Scenes of any kind are as many as there are: each has its rows. */

@@ -129,7 +129,9 @@ report() {
   rm -f "$out"/plots/*.gp "$out"/plots/*.svg "$out"/tables/*.csv
   "$bin/sf_report" "$out"
   local status=$?
-  [ -e "$out/table.md" ] && { plots || status=1; }
+  [ -e "$out/table.md" ] || return $status
+  plots || status=1
+  "$bin/sf_report" "$out" --page || status=1
   return $status
 }
 

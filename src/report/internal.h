@@ -25,6 +25,20 @@ void sf_report_add_pairs(sf_grids *tables, const sf_reproduction *r);
 void sf_report_add_balance(sf_grids *tables, const sf_reproduction *r); /* worth and price of a step */
 void sf_report_add_models(sf_grids *tables, const sf_reproduction *r);  /* spiking and ordinary models */
 
+/* The name of the i-th plot of chosen scenes; empty: there is none of them. False: there are no more. */
+bool sf_report_plot(const sf_reproduction *r, int scenes, int i, char name[300]);
+
+extern const char sf_report_page_text[]; /* reproduction.html */
+
+/* One picture of a scene beside the truth, of JSON {"file", "truth", "crop": [x, y, side]}: whole, magnified, its
+ * errors. */
+sf_status sf_report_put_picture(FILE *out, const sf_reproduction *r, const cJSON *cell);
+sf_status sf_report_put_crop(FILE *out, const sf_reproduction *r, const cJSON *cell);
+sf_status sf_report_put_error(FILE *out, const sf_reproduction *r, const cJSON *cell);
+/* The pictures that there are: a list of {"name", "view", "cells"}. NULL: no memory. A picture that cannot be read or
+ * has another size than the truth is left out. */
+cJSON *sf_report_pictures(const sf_reproduction *r);
+
 /* Runs of other parameters than the first one's are a problem. */
 sf_status sf_report_compare_parameters(sf_reproduction *r);
 /* Numbers over the seeds, and what is computed from several runs; the group of every scene. */

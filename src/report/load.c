@@ -113,7 +113,7 @@ static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_
 
 static void free_run(sf_run *run)
 {
-  free(run->iteration), free(run->t_star_at);
+  free(run->iteration), free(run->t_star_at), free(run->firing);
   free(run->status), free(run->train_command), free(run->eval_command), free(run->version);
   cJSON_Delete(run->summary);
 }

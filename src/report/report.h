@@ -78,6 +78,7 @@ typedef struct sf_run {
   double cosim_samples, cosim_differences;               /* in lockstep with the RTL; NaN: not run */
   int points;                                            /* t* over iterations, rising */
   double *iteration, *t_star_at;                         /* owned */
+  double (*firing)[3];                                   /* rates of the spiking layers there, NaN: none; owned */
   char *status, *train_command, *eval_command, *version; /* text of the run's files or NULL, owned */
   cJSON *summary;                                        /* of the trainer, or NULL, owned */
 } sf_run;
@@ -157,4 +158,8 @@ sf_status sf_reproduction_csv(const sf_reproduction *r, int *count);
 cJSON *sf_reproduction_json(const sf_reproduction *r); /* NULL: no memory */
 /* DIR/plots/NAME.gp: self-contained gnuplot scripts that write DIR/plots/NAME.svg. *count: how many. */
 sf_status sf_reproduction_plots(const sf_reproduction *r, int *count);
+
+/* DIR/report.html, one page that needs nothing beside it: tables; of every scene the truth, the twin and each budget
+ * with a magnified part and a map of the errors; the pictures that gnuplot made of the plots. */
+sf_status sf_reproduction_page(const sf_reproduction *r);
 #endif
