@@ -133,6 +133,7 @@ $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 # The report's texts lie in the program.
 $B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+$B/obj/src/report/texts.o: src/report/reproduction.html
 
 $(CURDIR)/$B/%: $B/% ;
 
@@ -254,8 +255,9 @@ report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/r
 REPORT ?= $B/demo/report.html
 
 PROFILE ?= quick
-reproduce: all ## the runs of the paper's tables on SCENES: build/reproduce/PROFILE (quick, full, smoke; scenes: any layout, both backbones, MINUTES=15)
-	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(if $(filter scenes,$(PROFILE)),--minutes $(MINUTES)) $(REPRODUCE)
+reproduce: all ## the runs of the paper's tables on SCENES: build/reproduce/PROFILE (quick, smoke; paper: full length, any layout, SEEDS="1 2 3"; scenes: MINUTES=15)
+	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(if $(filter scenes,$(PROFILE)),--minutes $(MINUTES)) \
+	  $(if $(filter-out file,$(origin SEEDS)),--seeds "$(SEEDS)") $(REPRODUCE)
 
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report

@@ -4,13 +4,17 @@
 set -u
 export LC_ALL=C
 usage="usage: reproduce.sh BUILD [options]
-  --profile NAME       quick (default), full, smoke (a procedural scene of its own, seconds); scenes: every scene with the
-                       backbones that the paper trains on its kind, twin and spiking, a time budget each
-  --scenes FOLDER      a scene in the Blender layout, or a folder of scenes; profile scenes: any layout
-  --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; full, scenes: all)
+  --profile NAME       quick (default); smoke (a procedural scene of its own, seconds); paper (10 000 + 30 000 iterations: every
+                       scene with the backbones and budgets that the paper gives its kind, and the ablations, for days); scenes:
+                       every scene with its backbones, twin and spiking, a time budget each
+  --scenes FOLDER      a scene in the Blender layout, or a folder of scenes; profiles scenes and paper: any layout
+  --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; paper, scenes: all)
+  --seeds 'N...'       one run each, means and spreads in the tables (the seed of --seed)
+  --seed-runs WHICH    runs of the further seeds: all, or learned (twin and budgets alone)
   --minutes M          scenes: training budget of a run (15)
-  --backbones 'B...'   scenes: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
-  --betas 'B...'       scenes: budgets of the spiking runs, of 1e-7, 5e-7 and 1e-6 (5e-7)
+  --backbones 'B...'   scenes, paper: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
+  --betas 'B...'       scenes, paper: budgets of the spiking runs, of 5e-9, 5e-8, 1e-7, 5e-7 and 1e-6 (scenes: 5e-7)
+  --probe N            paper: iterations that are timed before the first run of a kind (64; 0: none)
   --report             no runs: tables and plots of what is there
   --stage1 N, --stage2 N, --samples N, --steps T, --seed S, --downscale F    for sf_train, every run
   --train 'OPTIONS'    further options of sf_train, every run
@@ -21,7 +25,7 @@ usage="usage: reproduce.sh BUILD [options]
   --audit-downscale F  these frames of 1/F of the full size (0 = by the layout, as --downscale)
   --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
   --cosim-rays N       rays of every scene through RTL and fixed-point core in lockstep
-Results: BUILD/reproduce/PROFILE/{table.md,results.json,plots/}; runs in SCENE/RUN/ beside them."
+Results: BUILD/reproduce/PROFILE/{table.md,results.json,report.html,tables/,plots/}; runs in SCENE/RUN/ and SCENE/seed-N/RUN/."
 
 die() { echo "reproduce: $1" >&2; exit "${2:-2}"; }
 [ $# -ge 1 ] || die "missing argument BUILD (see reproduce.sh --help)"
@@ -36,13 +40,14 @@ profile=quick
 for ((i = 1; i <= $#; i++)); do
   if [ "${!i}" = --profile ]; then j=$((i + 1)); profile=${!j:-}; fi
 done
-declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=0 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0)
+declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=0 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0 [probe]=0)
 case $profile in
   quick)
     set+=([stage1]=400 [stage2]=1200 [eval-views]=8 [prefix-views]=1 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
     ;;
-  full)
+  paper)
     set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=0)
+    set+=([samples]=0 [probe]=64)
     ;;
   smoke)
     set+=([stage1]=30 [stage2]=40 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=0)
@@ -53,9 +58,9 @@ case $profile in
     set+=([minutes]=15 [eval-views]=0 [prefix-views]=0 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=0)
     set+=([samples]=0 [cosim-rays]=400)
     ;;
-  *) die "--profile '$profile' is unknown: expected quick, full, scenes or smoke" ;;
+  *) die "--profile '$profile' is unknown: expected quick, paper, scenes or smoke" ;;
 esac
-scenes="" only="" report_only="" chosen="" betas=""
+scenes="" only="" report_only="" chosen="" betas="" seeds="" seed_runs=all
 while [ $# -gt 0 ]; do
   name=${1#--}
   case $1 in
@@ -68,18 +73,30 @@ while [ $# -gt 0 ]; do
     --scenes) scenes=$2 ;;
     --only) only=$2 ;;
     --train) set[train]="${set[train]}${set[train]:+ }$2" ;;
-    --minutes | --backbones | --betas)
+    --minutes)
       [ "$profile" = scenes ] || die "$1 belongs to --profile scenes"
-      if [ "$1" = --minutes ]; then
-        [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
-        set[minutes]=$2
-      elif [ "$1" = --betas ]; then
-        [[ $2 =~ ^((1e-7|5e-7|1e-6)( |$))+$ ]] || die "--betas '$2' is unknown: expected some of 1e-7, 5e-7, 1e-6"
+      [[ $2 =~ ^[0-9]{1,5}(\.[0-9]{1,3})?$ && ! $2 =~ ^[0.]*$ ]] || die "--minutes '$2' is not a number above 0"
+      set[minutes]=$2 ;;
+    --backbones | --betas)
+      [[ $profile =~ ^(scenes|paper)$ ]] || die "$1 belongs to --profile scenes or paper"
+      if [ "$1" = --betas ]; then
+        [[ $2 =~ ^((5e-9|5e-8|1e-7|5e-7|1e-6)( |$))+$ ]] ||
+          die "--betas '$2' is unknown: expected some of 5e-9, 5e-8, 1e-7, 5e-7, 1e-6"
         betas=$2
       else
         [[ $2 =~ ^((ingp|tensorf)( |$))+$ ]] || die "--backbones '$2' is unknown: expected ingp, tensorf or both"
         chosen=$2
       fi ;;
+    --seeds)
+      [[ $2 =~ ^([1-9][0-9]{0,8}( |$))*$ ]] || die "--seeds '$2' are not whole numbers from 1"
+      seeds=$2 ;;
+    --seed-runs)
+      [[ $2 =~ ^(learned|all)$ ]] || die "--seed-runs '$2' is unknown: expected learned or all"
+      seed_runs=$2 ;;
+    --probe)
+      [ "$profile" = paper ] || die "$1 belongs to --profile paper"
+      [[ $2 =~ ^[0-9]{1,9}$ ]] || die "--probe '$2' is not a whole number"
+      set[probe]=$((10#$2)) ;;
     --prefix-runs)
       [[ $2 =~ ^(learned|all)$ ]] || die "--prefix-runs '$2' is unknown: expected learned or all"
       set[$name]=$2 ;;
@@ -109,10 +126,12 @@ done
 
 report() {
   [ -d "$out" ] || die "$out: no runs yet (make reproduce PROFILE=$profile SCENES=folder)" 1
-  rm -f "$out"/plots/*.gp "$out"/plots/*.svg
+  rm -f "$out"/plots/*.gp "$out"/plots/*.svg "$out"/tables/*.csv
   "$bin/sf_report" "$out"
   local status=$?
-  [ -e "$out/table.md" ] && { plots || status=1; }
+  [ -e "$out/table.md" ] || return $status
+  plots || status=1
+  "$bin/sf_report" "$out" --page || status=1
   return $status
 }
 
@@ -130,7 +149,9 @@ is_scene() {
   done
   return 1
 }
-is_wanted() { if [ "$profile" = scenes ]; then is_scene "$1"; else is_blender "$1"; fi; }
+# Profiles whose scenes have several backbones, and any layout.
+by_layout() { [ "$profile" = scenes ] || [ "$profile" = paper ]; }
+is_wanted() { if by_layout; then is_scene "$1"; else is_blender "$1"; fi; }
 is_blender() { [ -e "$1/transforms_train.json" ] && [ -e "$1/transforms_test.json" ]; }
 paths=()
 mkdir -p "$out" || exit 1
@@ -163,7 +184,7 @@ else
       done
     fi
   fi
-  [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene $([ "$profile" = scenes ] || echo "with transforms_train.json and transforms_test.json ")there" 1
+  [ ${#paths[@]} -gt 0 ] || die "$scenes: no scene $(by_layout || echo "with transforms_train.json and transforms_test.json ")there" 1
 fi
 declare -A path_of=() # a scene's results are in a folder of its name
 for data in "${paths[@]}"; do
@@ -176,7 +197,7 @@ done
 child="" stop=""
 trap on_signal INT TERM HUP
 
-# ---- all runs of a scene ----
+# ---- what is run ----
 
 # What sf_data understands of the scene: its layout, its number of held-out views.
 look_at_data() {
@@ -185,6 +206,84 @@ look_at_data() {
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
   frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')
 }
+
+# The backbones that the paper trains on data of this kind; profiles of one backbone: none is named.
+backbones_of() {
+  by_layout || { echo -; return; }
+  case ${chosen:-$1} in
+    blender) echo ingp tensorf ;;
+    llff) echo tensorf ;;
+    colmap | ingp) echo ingp ;;
+    *) echo "${chosen:-ingp}" ;;
+  esac
+}
+
+# The budgets of a backbone, the reference of ablations first.
+betas_of() {
+  if [ -n "$betas" ]; then
+    echo "$betas"
+  elif [ "$profile" = scenes ]; then
+    echo 5e-7
+  elif [ "$1" = tensorf ]; then
+    echo 5e-7 5e-8 5e-9
+  else
+    echo 5e-7 1e-7 1e-6
+  fi
+}
+
+ablations="mode-hybrid mode-decay mode-no-decay no-stage1 no-extra no-penalty no-budget fixed-t-minus-1 fixed-t fixed-t-plus-1"
+# BACKBONE LAYOUT SEED: names of runs.
+runs_of() (
+  # shellcheck disable=SC2046 # words
+  set -- "$1" "$2" "$3" $(betas_of "$1")
+  echo -n "beta-$4 ann"
+  for beta in "${@:5}"; do echo -n " beta-$beta"; done
+  [ "$3" = "${set[seed]}" ] || [ "$seed_runs" = all ] || return 0
+  [ "$profile" != scenes ] || return 0
+  [ "$profile" != paper ] || [ "$1 $2" = "ingp blender" ] || return 0
+  echo " $ablations"
+)
+
+# One unit of the plan is a scene with a backbone and a seed.
+unit_data=() unit_frames=() unit_scene=() unit_backbone=() unit_seed=() unit_runs=()
+# By scene and backbone: runs to do, finished ones, their seconds, seconds that a probe says of one.
+declare -A left=() finished=() spent=() probed=()
+plan_unit() { # BACKBONE LAYOUT SEED
+  local scene=${data##*/} key run runs
+  [ "$1" = - ] || scene=$scene-$1
+  key=$scene
+  [ "$3" = "${set[seed]}" ] || scene=$scene/seed-$3
+  runs=$(runs_of "$@")
+  unit_data+=("$data") unit_frames+=("$frames") unit_scene+=("$scene") unit_backbone+=("$1") unit_seed+=("$3")
+  unit_runs+=("$runs")
+  for run in $runs; do
+    total=$((total + 1))
+    if [ "$(cat "$out/$scene/$run/status" 2>/dev/null)" = "done" ]; then
+      finished[$key]=$((${finished[$key]:-0} + 1))
+      spent[$key]=$((${spent[$key]:-0} + $(cat "$out/$scene/$run/wall" 2>/dev/null || echo 0)))
+    else
+      left[$key]=$((${left[$key]:-0} + 1))
+    fi
+  done
+}
+
+# The first seed of every scene comes first.
+plan() {
+  local backbone seed i
+  for i in "${!paths[@]}"; do
+    data=${paths[i]}
+    look_at_data
+    layouts+=("$layout") frames_of+=("$frames")
+  done
+  for seed in ${seeds:-${set[seed]}}; do
+    for i in "${!paths[@]}"; do
+      data=${paths[i]} frames=${frames_of[i]}
+      for backbone in $(backbones_of "${layouts[i]}"); do plan_unit "$backbone" "${layouts[i]}" "$seed"; done
+    done
+  done
+}
+
+# ---- all runs of a unit ----
 
 # Which held-out views are audited: spread evenly over the split.
 choose_views() {
@@ -195,84 +294,72 @@ choose_views() {
   for ((i = 0; i < n; i++)); do views="$views${views:+ }$((i * frames / n))"; done
 }
 
-# The options that all runs of a scene share.
-prepare_scene() {
+# The options that all runs of a unit share: before and behind a run's own.
+prepare_unit() {
   data_id=$(cd "$data" && pwd -P && {
     cat transforms*.json poses_bounds.npy {,colmap/}sparse/{,0/}{cameras,images,points3D}.{bin,txt} 2>/dev/null
     find -L . -type f -regextype egrep -iregex '.*\.(png|jpe?g)' -printf '%p %s\n' | sort
   } | cksum)
   choose_views
-  if [ "$profile" = scenes ]; then
-    common="--minutes ${set[minutes]}"
-  else
-    common="--stage1 ${set[stage1]} --stage2 ${set[stage2]}"
-  fi
-  common="$common --steps ${set[steps]} --seed ${set[seed]}"
+  common="--steps ${set[steps]}"
   [ "${set[samples]}" -eq 0 ] || common="$common --samples ${set[samples]}"
-  common="$common --downscale ${set[downscale]} --eval-views ${set[eval-views]}${set[train]:+ ${set[train]}}"
+  common="$common --downscale ${set[downscale]}${set[train]:+ ${set[train]}}"
+  behind="--seed $seed"
+  [ "$backbone" = - ] || behind="$behind --backbone $backbone"
+  timed="$common"
+  if [ "$profile" = scenes ]; then
+    common="--minutes ${set[minutes]} $common"
+  else
+    common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} $common"
+  fi
+  common="$common --eval-views ${set[eval-views]}"
 }
 
-one_scene() {
-  scene=${data##*/}
-  prepare_scene
-  local prefixes="--psnr-prefixes ${set[prefix-views]}"
-  prefixes_rest=
-  [ "${set[prefix-runs]}" = learned ] || prefixes_rest=$prefixes
+start_run() { # NAME
+  local prefixes="--psnr-prefixes ${set[prefix-views]}" rest=
+  [ "$profile" != scenes ] || prefixes=
+  [ "${set[prefix-runs]}" = learned ] || rest=$prefixes
+  t_r=$(number "$out/$scene/beta-5e-7/train.json" t_r)
   # shellcheck disable=SC2086
-  {
-    one_run beta-5e-7 --beta 5e-7 $prefixes
-    t_r=$(number "$out/$scene/beta-5e-7/train.json" t_r)
-    one_run ann --net ann $prefixes
-    one_run beta-1e-7 --beta 1e-7 $prefixes
-    one_run beta-1e-6 --beta 1e-6 $prefixes
-    for mode in hybrid decay no-decay; do
-      one_run "mode-$mode" --beta 5e-7 --input-mode $mode --fixed-steps "${set[steps]}" $prefixes_rest
-    done
-    for part in stage1 extra penalty budget; do one_run "no-$part" --beta 5e-7 "--no-$part" $prefixes_rest; done
-    fixed_run fixed-t-minus-1 $((${t_r:-0} - 1))
-    fixed_run fixed-t "${t_r:-0}"
-    fixed_run fixed-t-plus-1 $((${t_r:-0} + 1))
-  }
-}
-
-# Profile scenes: the backbones that the paper trains on data of this kind.
-backbones_of() {
-  case ${chosen:-$1} in
-    blender) echo ingp tensorf ;;
-    llff) echo tensorf ;;
-    colmap | ingp) echo ingp ;;
-    *) echo "${chosen:-ingp}" ;;
+  case $1 in
+    ann) one_run ann --net ann $prefixes ;;
+    beta-*) one_run "$1" --beta "${1#beta-}" $prefixes ;;
+    mode-*) one_run "$1" --beta 5e-7 --input-mode "${1#mode-}" --fixed-steps "${set[steps]}" $rest ;;
+    no-*) one_run "$1" --beta 5e-7 "--$1" $rest ;;
+    fixed-t-minus-1) fixed_run "$1" $((${t_r:-0} - 1)) $rest ;;
+    fixed-t) fixed_run "$1" "${t_r:-0}" $rest ;;
+    fixed-t-plus-1) fixed_run "$1" $((${t_r:-0} + 1)) $rest ;;
   esac
 }
 
-one_backbone() {
-  scene=${data##*/}-$1
-  prepare_scene
-  common="$common --backbone $1"
-  for beta in ${betas:-5e-7}; do one_run "beta-$beta" --beta "$beta"; done
-  one_run ann --net ann
+one_unit() { # ITS NUMBER
+  local run
+  data=${unit_data[$1]} frames=${unit_frames[$1]} scene=${unit_scene[$1]} backbone=${unit_backbone[$1]} seed=${unit_seed[$1]}
+  prepare_unit
+  for run in ${unit_runs[$1]}; do start_run "$run"; done
 }
 
-started=$SECONDS done_seconds=0 done_runs=0 index=0 failures=0 ticker_pid=""
-total=$((14 * ${#paths[@]}))
+# Before the first run: how long a run of each kind will train.
+probe_all() {
+  local i key seconds=0
+  for i in "${!unit_scene[@]}"; do
+    key=${unit_scene[i]%%/*}
+    [ -z "$stop" ] && [ -z "${probed[$key]:-}${finished[$key]:-}" ] && [ "${left[$key]:-0}" -gt 0 ] || continue
+    data=${unit_data[i]} frames=${unit_frames[i]} scene=$key backbone=${unit_backbone[i]} seed=${unit_seed[i]}
+    prepare_unit
+    probe
+  done
+  [ -z "$stop" ] || return 0
+  for key in "${!left[@]}"; do seconds=$((seconds + ${left[$key]} * ${probed[$key]:-0})); done
+  [ $seconds -eq 0 ] || echo "reproduce: $total runs, about $(clock $seconds) of training"
+}
+
+started=$SECONDS index=0 failures=0 ticker_pid="" total=0
 version=$("$bin/sf_train" --version)
 layouts=() frames_of=()
-for data in "${paths[@]}"; do
-  look_at_data
-  layouts+=("$layout") frames_of+=("$frames")
-done
-if [ "$profile" = scenes ]; then
-  total=0
-  for layout in "${layouts[@]}"; do total=$((total + (1 + $(wc -w <<<"${betas:-5e-7}")) * $(backbones_of "$layout" | wc -w))); done
-fi
-for i in "${!paths[@]}"; do
-  data=${paths[i]} frames=${frames_of[i]}
-  if [ "$profile" != scenes ]; then
-    [ -n "$stop" ] || one_scene
-  else
-    for backbone in $(backbones_of "${layouts[i]}"); do [ -n "$stop" ] || one_backbone "$backbone"; done
-  fi
-done
+plan
+[ "${set[probe]}" -eq 0 ] || probe_all
+for i in "${!unit_scene[@]}"; do [ -n "$stop" ] || one_unit "$i"; done
 if [ -n "$stop" ]; then
   echo "reproduce: stopped; nothing is lost: the same command goes on (make reproduce-report shows what is there)" >&2
   exit 130

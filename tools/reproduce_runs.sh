@@ -1,7 +1,7 @@
 # shellcheck shell=bash disable=SC2154
 # One run of `make reproduce`: training, export, renderings, audits, and what is printed about it. Sourced by
-# reproduce.sh, whose variables it reads: set[], bin, out, data, data_id, scene, views, common, version, total; and by
-# pareto.sh for run, output, keep, number, clock and plots.
+# reproduce.sh, whose variables it reads: set[], bin, out, data, data_id, scene, views, common, behind, timed, version, total, left[],
+# finished[], spent[], probed[]; and by pareto.sh for run, output, keep, number, clock and plots.
 
 # ---- one program at a time, stopped by SIGINT, SIGTERM or SIGHUP ----
 # A trap that is pending when bash expands a command substitution breaks its parser. So this shell expands at most one in
@@ -52,24 +52,35 @@ plots() {
 
 clock() { printf '%d:%02d:%02d' $(($1 / 3600)) $(($1 / 60 % 60)) $(($1 % 60)); }
 
-# ETA from the mean wall time of the runs that are finished, in this call or before; in the very first run from its
-# iterations ($1).
-eta() {
-  local left run_seconds
-  if [ "$done_runs" -gt 0 ]; then
-    run_seconds=$((done_seconds / done_runs))
+# Seconds of a run of a scene with a backbone ($1): the mean of those that are finished, in this call or before; the probe's; the
+# mean of all; the time budget; in the very first run from its iterations ($2).
+run_seconds() (
+  runs=0 seconds=0
+  for key in "${!finished[@]}"; do runs=$((runs + ${finished[$key]})) seconds=$((seconds + ${spent[$key]})); done
+  if [ "${finished[$1]:-0}" -gt 0 ]; then
+    echo $((${spent[$1]} / ${finished[$1]}))
+  elif [ -n "${probed[$1]:-}" ]; then
+    echo "${probed[$1]}"
+  elif [ $runs -gt 0 ]; then
+    echo $((seconds / runs))
   elif [ "$profile" = scenes ]; then
-    run_seconds=${set[minutes]%.*}
-    run_seconds=$((60 * ${run_seconds:-0} + 30))
-  elif [ "${1:-0}" -gt 0 ]; then
-    run_seconds=$(((SECONDS - run_started) * (set[stage1] + set[stage2]) / $1))
-  else
-    echo "ETA -"
-    return
+    minutes=${set[minutes]%.*}
+    echo $((60 * ${minutes:-0} + 30))
+  elif [ "${2:-0}" -gt 0 ]; then
+    echo $(((SECONDS - run_started) * (set[stage1] + set[stage2]) / $2))
   fi
-  left=$((run_seconds * (total - index + 1) - (SECONDS - run_started)))
-  echo "ETA $(clock $((left > 0 ? left : 0)))"
-}
+)
+
+eta() (
+  seconds=$((run_started - SECONDS))
+  for key in "${!left[@]}"; do
+    [ "${left[$key]}" -gt 0 ] || continue
+    one=$(run_seconds "$key" "${1:-}")
+    [ -n "$one" ] || { echo "ETA -"; return; }
+    seconds=$((seconds + ${left[$key]} * one))
+  done
+  echo "ETA $(clock $((seconds > 0 ? seconds : 0)))"
+)
 # WHAT [ITERATION]
 say() (
   printf '[%*d/%d] %-28s %s, elapsed %s, %s\n' ${#total} "$index" "$total" "$scene $name" "$1" "$(clock $((SECONDS - started)))" "$(eta "${2:-}")"
@@ -134,6 +145,25 @@ train() {
   return $code
 }
 
+# Times iterations of the scene with its backbone, all time steps unrolled; the log is kept, so that a call that goes on has it.
+probe() {
+  local log=$out/$scene/probe.jsonl rate
+  mkdir -p "$out/$scene" || return
+  if ! keep "$out/$scene/probe.cmd" "sf_train DATA $timed $behind; ${set[probe]}; $data_id"; then rm -f "$log"; fi
+  if [ ! -s "$log" ]; then
+    # shellcheck disable=SC2086
+    run "$bin/sf_train" "$data" $timed --stage1 $((set[probe] / 4)) --stage2 $((set[probe] - set[probe] / 4)) --no-scaling --eval-views 1 \
+      --beta 5e-7 $behind --quiet -o "$out/$scene/probe.safetensors" --log "$log.part" >"$out/$scene/probe.log" 2>&1 &&
+      mv "$log.part" "$log"
+    rm -f "$out/$scene"/probe.safetensors "$log.part"
+  fi
+  rate=$(sed -nE 's/^\{"iteration":([0-9]+),.*"seconds":([0-9.]+),.*/\1 \2/p' "$log" 2>/dev/null |
+    awk 'NR == 1 { n = $1; s = $2 } END { if ($1 > n) printf "%.4f", ($2 - s) / ($1 - n) }')
+  [ -n "$rate" ] || return 0
+  probed[$scene]=$(awk -v r="$rate" -v n=$((set[stage1] + set[stage2])) 'BEGIN { printf "%d", r * n + 1 }')
+  echo "$scene: $rate s an iteration, as a probe of ${set[probe]} says: about $(clock "${probed[$scene]}") of training a run"
+}
+
 render() { # FILE SCENE VIEW ARGUMENTS...
   local file=$1 snn=$2 view=$3
   shift 3
@@ -151,7 +181,7 @@ audit() { # FILE SCENE VIEW
 
 evaluate_ann() {
   local view reference="" beta
-  for beta in 1e-6 1e-7 5e-7; do
+  for beta in 5e-9 5e-8 1e-6 1e-7 5e-7; do
     [ -s "$out/$scene/beta-$beta/scene.snn" ] && reference=$out/$scene/beta-$beta/scene.snn
   done
   if [ -z "$reference" ]; then
@@ -159,7 +189,8 @@ evaluate_ann() {
     return 1
   fi
   for view in $views; do
-    render "$dir/float-$view.json" "$reference" "$view" --backend float --model "$dir/model.safetensors" --steps 1 || return
+    render "$dir/float-$view.json" "$reference" "$view" --backend float --model "$dir/model.safetensors" --steps 1 \
+      --png "$dir/frame-$view.png" --truth "$dir/truth-$view.png" || return
   done
 }
 
@@ -168,14 +199,15 @@ evaluate_snn() {
   output "$dir/export.json" "$bin/sf_export" "$dir/model.safetensors" -o "$dir/scene.snn" --json || return
   for view in $views; do
     render "$dir/fixed-$view.json" "$dir/scene.snn" "$view" --backend fixed --png "$dir/frame-$view.png" || return
-    render "$dir/float-$view.json" "$dir/scene.snn" "$view" --backend float --model "$dir/model.safetensors" || return
+    render "$dir/float-$view.json" "$dir/scene.snn" "$view" --backend float --model "$dir/model.safetensors" \
+      --truth "$dir/truth-$view.png" || return
     audit "$dir/audit-$view.json" "$dir/scene.snn" "$view" || return
   done
   if [ "${set[cosim-rays]}" -gt 0 ]; then
     output "$dir/cosim.json" "$bin/sf_cosim" "$dir/scene.snn" "$data" --rays "${set[cosim-rays]}" --seed "${set[seed]}" \
       --evidence "$dir/cosim-difference" --json --quiet || return
   fi
-  [ "$profile" != scenes ] && [ "$name" = beta-5e-7 ] || return 0 # prefixes: for the plots
+  [ "$profile" != scenes ] && [ "$name" = beta-5e-7 ] && [[ $scene != */* ]] || return 0 # prefixes: for the plots
   rm -f "$dir"/prefix-*.part "$dir/prefix.snn" # of a run that was stopped: the scene may be of other steps
   for ((t = 1; t <= set[steps]; t++)); do
     for view in $views; do
@@ -210,7 +242,7 @@ prepare() {
   evaluation="sim_render, energy_audit: views $views, --downscale ${set[audit-downscale]} --rtl-rays ${set[rtl-rays]} --seed ${set[seed]}"
   [ "${set[cosim-rays]}" -eq 0 ] || evaluation="$evaluation; sf_cosim --rays ${set[cosim-rays]}"
   if ! keep "$dir/eval.cmd" "$evaluation"; then
-    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir/cosim.json" "$dir"/frame-*.png
+    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir/cosim.json" "$dir"/{frame,truth}-*.png
     [ "$(cat "$dir/status" 2>/dev/null)" != "done" ] || rm -f "$dir/status"
   fi
 }
@@ -219,13 +251,12 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   name=$1
   shift
   dir=$out/$scene/$name
-  train_options="$common${*:+ $*}"
+  train_options="$common${*:+ $*} $behind" key=${scene%%/*}
   index=$((index + 1)) run_started=$SECONDS
   local code before
   [ -z "$stop" ] || return
   prepare || { failures=$((failures + 1)); return; }
   if [ "$(cat "$dir/status" 2>/dev/null)" = "done" ]; then
-    done_runs=$((done_runs + 1)) done_seconds=$((done_seconds + $(cat "$dir/wall" 2>/dev/null || echo 0)))
     say "finished before"
     return
   fi
@@ -240,11 +271,12 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
     say "stopped, will go on from here"
   elif [ $code -eq 0 ]; then
     echo "done" >"$dir/status"
-    done_runs=$((done_runs + 1)) done_seconds=$((done_seconds + $(cat "$dir/wall")))
+    left[$key]=$((${left[$key]:-0} - 1)) finished[$key]=$((${finished[$key]:-0} + 1))
+    spent[$key]=$((${spent[$key]:-0} + $(cat "$dir/wall")))
     say_done
   else
     echo "failed: $(last_line "$dir/log")" >"$dir/status"
-    failures=$((failures + 1))
+    failures=$((failures + 1)) left[$key]=$((${left[$key]:-0} - 1))
     say "FAILED ($code): $(last_line "$dir/log")"
   fi
 }
@@ -260,21 +292,23 @@ say_done() (
 figures() { printf 'PSNR %.2f dB, %s steps, %d s' "$(number "$dir/train.json" psnr)" "$(number "$dir/train.json" t_r)" "$(cat "$dir/wall")"; }
 
 skip_run() { # NAME WHY
-  name=$1 dir=$out/$scene/$1 index=$((index + 1)) run_started=$SECONDS
+  name=$1 dir=$out/$scene/$1 key=${scene%%/*} index=$((index + 1)) run_started=$SECONDS
   [ -z "$stop" ] || return
   rm -rf "$dir"
   mkdir -p "$dir"
   echo "skipped: $2" >"$dir/status"
+  left[$key]=$((${left[$key]:-0} - 1))
   say "skipped: $2"
 }
 
-fixed_run() { # NAME STEPS
+fixed_run() { # NAME STEPS OPTIONS...
+  local name=$1 steps=$2
+  shift 2
   if [ -z "$t_r" ]; then
-    skip_run "$1" "beta-5e-7 failed, its t_r is not known"
-  elif [ "$2" -lt 1 ] || [ "$2" -gt "${set[steps]}" ]; then
-    skip_run "$1" "$2 steps are outside 1..${set[steps]}"
+    skip_run "$name" "beta-5e-7 failed, its t_r is not known"
+  elif [ "$steps" -lt 1 ] || [ "$steps" -gt "${set[steps]}" ]; then
+    skip_run "$name" "$steps steps are outside 1..${set[steps]}"
   else
-    # shellcheck disable=SC2086
-    one_run "$1" --beta 5e-7 --fixed-steps "$2" $prefixes_rest
+    one_run "$name" --beta 5e-7 --fixed-steps "$steps" "$@"
   fi
 }

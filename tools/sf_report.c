@@ -29,34 +29,46 @@ static sf_status write_json(const sf_reproduction *r)
 
 static sf_status report(const sf_reproduction *r, bool quiet)
 {
-  int plots;
+  int plots, tables;
   if (r->count == 0) return sf_fail(SF_E_FORMAT, "%s: no folder SCENE/RUN of make reproduce", r->dir);
   SF_TRY(write_table(r));
   SF_TRY(write_json(r));
+  SF_TRY(sf_reproduction_csv(r, &tables));
   SF_TRY(sf_reproduction_plots(r, &plots));
   if (!quiet) {
     SF_TRY(sf_reproduction_print(stdout, r));
-    printf("wrote %s/table.md, results.json and %d scripts in plots/\n", r->dir, plots);
+    printf("wrote %s/table.md, results.json, %d files in tables/ and %d scripts in plots/\n", r->dir, tables, plots);
   }
   if (!r->problems) return sf_ok();
   return sf_fail(SF_E_FORMAT, "%.200s: %.300s%s", r->dir, r->problem[0],
                  r->problems > 1 ? " (and others, see table.md)" : "");
 }
 
+static sf_status write_page(const sf_reproduction *r, bool quiet)
+{
+  if (r->count == 0) return sf_fail(SF_E_FORMAT, "%s: no folder SCENE/RUN of make reproduce", r->dir);
+  SF_TRY(sf_reproduction_page(r));
+  if (!quiet) printf("page: %s/report.html\n", r->dir);
+  return sf_ok();
+}
+
 int main(int argc, char **argv)
 {
-  bool quiet = false;
+  bool quiet = false, page = false;
   const sf_option options[] = {
-      {"--quiet", 'q', SF_ARG_FLAG, &quiet, 0, 0, NULL, NULL, "write the files, print nothing"}, {0}};
+      {"--page", 0, SF_ARG_FLAG, &page, 0, 0, NULL, NULL, "DIR/report.html alone, with the plots that gnuplot drew"},
+      {"--quiet", 'q', SF_ARG_FLAG, &quiet, 0, 0, NULL, NULL, "write the files, print nothing"},
+      {0}};
   const sf_cli cli = {
       .program = "sf_report",
-      .usage = "sf_report DIR [--quiet]",
-      .summary = "Gathers DIR/SCENE/RUN/ of `make reproduce` into DIR/table.md (printed, too), DIR/results.json\n"
-                 "and DIR/plots/*.gp, beside the values of the paper. Missing runs appear as '-'. Exit status 1\n"
+      .usage = "sf_report DIR [--page] [--quiet]",
+      .summary = "Gathers DIR/SCENE/RUN/ of `make reproduce` into DIR/table.md (printed, too), DIR/results.json,\n"
+                 "DIR/tables/*.csv and DIR/plots/*.gp, beside the values of the paper. Missing runs appear as '-'. "
+                 "Exit status 1\n"
                  "when a file is unreadable or two counts of one frame differ; the report is written all the same.\n"
                  "Where there is no run nothing is written.",
       .examples = "  sf_report build/reproduce/quick\n"
-                  "  sf_report build/reproduce/full --quiet\n",
+                  "  sf_report build/reproduce/paper --quiet\n",
       .options = options,
       .min_positional = 1,
       .max_positional = 1};
@@ -64,7 +76,7 @@ int main(int argc, char **argv)
   sf_reproduction r = {0};
   sf_status status = sf_cli_parse(&cli, argc, argv, &dir);
   if (!status.code) status = sf_reproduction_load(&r, dir);
-  if (!status.code) status = report(&r, quiet);
+  if (!status.code) status = page ? write_page(&r, quiet) : report(&r, quiet);
   sf_reproduction_free(&r);
   return sf_cli_finish(&cli, status);
 }

@@ -124,6 +124,7 @@ static sf_status evaluate_views(const sf_model *model, const sf_dataset *test, c
     if (whole) {
       status = sf_evaluate(model, &one, 1, 0, &psnr, &ssim);
       q->views = done + 1;
+      q->width = one.view->camera.width, q->height = one.view->camera.height;
       q->psnr += (psnr - q->psnr) / q->views;
       if (!isnan(ssim)) ssims += ssim, compared++;
       q->ssim = compared ? ssims / compared : NAN;

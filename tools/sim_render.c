@@ -19,7 +19,7 @@ typedef struct options {
   uint64_t seed;
   double scale;
   double patience;
-  const char *scene, *data, *output, *png, *model, *split, *crop, *verify, *kernels, *port;
+  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port;
   bool all, json, quiet;
 } options;
 
@@ -163,6 +163,7 @@ static sf_status render_one(job *j)
   fill_report(j, sf_seconds() - j->start);
   SF_TRY(sf_shot_save(&j->studio, &j->shot, j->opt.output));
   if (j->opt.png) SF_TRY(sf_golden_save_png(&j->shot.golden, j->opt.png));
+  if (j->opt.truth) SF_TRY(sf_shot_save_truth(&j->studio, &j->shot, j->opt.truth));
   if (j->opt.json) return sf_json_print(sf_render_report_json(&j->report), true);
   sf_render_report_print(stdout, &j->report);
   return sf_ok();
@@ -305,6 +306,7 @@ static sf_status check_modes(options *o)
   if (o->all) {
     SF_TRY(refuse(o->view >= 0, "--view", "does not go with --all"));
     SF_TRY(refuse(o->png, "--png", "does not go with --all"));
+    SF_TRY(refuse(o->truth, "--truth", "does not go with --all"));
     SF_TRY(
         refuse(o->backend == SF_BACKEND_RTL && !o->crop, "--all --backend rtl", "needs --crop: whole views take days"));
   }
@@ -321,6 +323,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       SF_GROUP("One view"),
       {"--output", 'o', SF_ARG_PLACE, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
       {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
+      {"--truth", 0, SF_ARG_OUTPUT, &o->truth, 0, 0, NULL, "FILE", "also the view's own picture, PNG"},
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
        "which view of the split, from 0 (default 0; --verify: all)"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
@@ -355,8 +358,8 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
-  static const char *const of_manifest[] = {"--all",   "--output",    "--png",   "--crop", "--steps",
-                                            "--split", "--downscale", "--scale", NULL};
+  static const char *const of_manifest[] = {"--all",   "--output", "--png",       "--truth", "--crop",
+                                            "--steps", "--split",  "--downscale", "--scale", NULL};
   const char *positional[2];
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);

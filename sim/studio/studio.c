@@ -80,11 +80,24 @@ static sf_status render(const sf_studio *studio, sf_shot *shot)
   return sf_fail(status.code, "%s: %s", studio->options.scene, status.message);
 }
 
+static void background_of(const sf_studio *studio, float background[3])
+{
+  for (int c = 0; c < 3; c++) background[c] = (float)studio->scene.background[c] / 65536;
+}
+
+sf_status sf_shot_save_truth(const sf_studio *studio, const sf_shot *shot, const char *path)
+{
+  float background[3];
+  background_of(studio, background);
+  if (!shot->view->image.rgba) return sf_fail(SF_E_FORMAT, "%s: view %s has no picture", path, shot->view->name);
+  return sf_golden_save_truth(&shot->golden, &shot->view->image, shot->window.x, shot->window.y, background, path);
+}
+
 sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot)
 {
   int planes = studio->options.backend == SF_BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
   float background[3];
-  for (int c = 0; c < 3; c++) background[c] = (float)studio->scene.background[c] / 65536;
+  background_of(studio, background);
   sf_golden_free(&shot->golden);
   SF_TRY(sf_golden_create(&shot->golden, shot->window.width, shot->window.height, planes));
   SF_TRY(render(studio, shot));

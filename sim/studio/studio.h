@@ -49,6 +49,8 @@ typedef struct sf_shot {
 sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot);
 sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
+/* The data set's picture of a rendered shot, PNG. SF_E_FORMAT: it has none. */
+sf_status sf_shot_save_truth(const sf_studio *studio, const sf_shot *shot, const char *path);
 void sf_shot_free(sf_shot *shot);
 
 /* The argument of --crop: "X,Y,WIDTH,HEIGHT" with at least one pixel. SF_E_USAGE. */

@@ -127,6 +127,31 @@ static void interleave(const sf_golden *golden, const sf_image *picture, int x0,
     }
 }
 
+/* Opaque, from interleaved RGB. */
+static sf_status save_rgb(const float *rgb, int width, int height, const char *path)
+{
+  const size_t n = (size_t)width * (size_t)height;
+  sf_image image = {width, height, malloc(n * 4 * sizeof(uint16_t))};
+  if (!image.rgba) return sf_fail(SF_E_MEMORY, "%s: no memory for the picture", path);
+  for (size_t i = 0; i < n; i++)
+    for (size_t c = 0; c < 4; c++) image.rgba[4 * i + c] = c < 3 ? to_u16(rgb[3 * i + c]) : 65535;
+  const sf_status status = sf_image_save_png(&image, path);
+  free(image.rgba);
+  return status;
+}
+
+sf_status sf_golden_save_truth(const sf_golden *golden, const sf_image *picture, int x, int y,
+                               const float background[3], const char *path)
+{
+  const size_t n = (size_t)golden->width * (size_t)golden->height * 3;
+  float *pair = malloc(2 * n * sizeof *pair);
+  if (!pair) return sf_fail(SF_E_MEMORY, "%s: no memory for the picture", path);
+  interleave(golden, picture, x, y, background, pair, pair + n);
+  const sf_status status = save_rgb(pair + n, golden->width, golden->height, path);
+  free(pair);
+  return status;
+}
+
 sf_status sf_golden_quality(const sf_golden *golden, const sf_image *picture, int x, int y, const float background[3],
                             double *psnr, double *ssim)
 {

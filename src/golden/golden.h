@@ -94,6 +94,11 @@ sf_status sf_golden_save_labelled(const sf_golden *golden, const char *path, con
 /* R G B, opaque. */
 sf_status sf_golden_save_png(const sf_golden *golden, const char *path);
 
+/* The window of a picture that a rendering is compared with, composited: what sf_golden_quality takes, which checks it.
+ */
+sf_status sf_golden_save_truth(const sf_golden *golden, const sf_image *picture, int x, int y,
+                               const float background[3], const char *path);
+
 /* Against the window at (x, y) of a picture composited over background[3]. SSIM is NaN when a side is below 11. */
 sf_status sf_golden_quality(const sf_golden *golden, const sf_image *picture, int x, int y, const float background[3],
                             double *psnr, double *ssim);

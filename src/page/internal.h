@@ -1,5 +1,5 @@
-/* What the parts of the page share: the template's functions. They read the numbers that they show from the page's JSON
- * and say where they are from; text between tags is escaped. */
+/* What the parts of the page share, with the page of make reproduce: the template's functions. They read the numbers
+ * that they show from the page's JSON and say where they are from; text between tags is escaped. */
 #ifndef SF_PAGE_INTERNAL_H
 #define SF_PAGE_INTERNAL_H
 #include "base/text.h"
@@ -30,6 +30,7 @@ const char *html_percent(char text[HTML_NUMBER], double percent);
 const char *html_unit(double top_fj, double *scale);
 /* All digits, as in the JSON; 0 of null. */
 void html_put_exact(FILE *out, const cJSON *node);
+void html_base64(FILE *out, const uint8_t *data, size_t size);
 /* <img> with the picture inside. alt is escaped. */
 sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, const uint8_t *palette, int colours,
                        const char *alt);

@@ -69,7 +69,7 @@ void html_put_exact(FILE *out, const cJSON *node)
     fprintf(out, "%.17g", isfinite(real) ? real : 0);
 }
 
-static void base64(FILE *out, const uint8_t *data, size_t size)
+void html_base64(FILE *out, const uint8_t *data, size_t size)
 {
   static const char letter[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   for (size_t i = 0; i < size; i += 3) {
@@ -90,7 +90,7 @@ sf_status html_put_png(FILE *out, const uint8_t *pixel, int width, int height, c
   fprintf(out, "<img width=\"%d\" height=\"%d\"%s alt=\"", width, height, width <= 320 ? " class=\"coarse\"" : "");
   sf_xml_escape(out, alt);
   fprintf(out, "\" src=\"data:image/png;base64,");
-  base64(out, data, size);
+  html_base64(out, data, size);
   fprintf(out, "\"/>\n");
   free(data);
   return sf_ok();

@@ -181,7 +181,7 @@ sf_status sf_report_load_frames(sf_reproduction *r, const char *dir, const char 
 
 /* ---- the log ---- */
 
-static sf_status add_point(sf_run *run, int *room, double iteration, double t_star)
+static sf_status add_point(sf_run *run, int *room, double iteration, double t_star, const cJSON *firing)
 {
   while (run->points > 0 && run->iteration[run->points - 1] >= iteration) run->points--;
   if (run->points == *room) {
@@ -190,7 +190,13 @@ static sf_status add_point(sf_run *run, int *room, double iteration, double t_st
     if (x) run->iteration = x;
     double *y = realloc(run->t_star_at, (size_t)*room * sizeof *y);
     if (y) run->t_star_at = y;
-    if (!x || !y) return sf_fail(SF_E_MEMORY, "no memory for the points of a log");
+    void *z = realloc(run->firing, (size_t)*room * sizeof *run->firing);
+    if (z) run->firing = z;
+    if (!x || !y || !z) return sf_fail(SF_E_MEMORY, "no memory for the points of a log");
+  }
+  for (int l = 0; l < 3; l++) {
+    const cJSON *rate = cJSON_GetArrayItem(firing, l);
+    run->firing[run->points][l] = cJSON_IsNumber(rate) ? rate->valuedouble : NAN;
   }
   run->iteration[run->points] = iteration, run->t_star_at[run->points++] = t_star;
   return sf_ok();
@@ -209,8 +215,8 @@ sf_status sf_report_load_log(const char *path, sf_run *run)
     if (next) *next++ = 0;
     cJSON *json = cJSON_Parse(line);
     const double x = sf_json_number(json, "iteration"), y = sf_json_number(json, "t_star");
+    if (!isnan(x) && !isnan(y)) status = add_point(run, &room, x, y, sf_json_get(json, "firing"));
     cJSON_Delete(json);
-    if (!isnan(x) && !isnan(y)) status = add_point(run, &room, x, y);
   }
   free(text);
   return status;

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { TEXT_LIMIT = 1 << 20, SCENES_LIMIT = 4096 };
+enum { TEXT_LIMIT = 1 << 20, SCENES_LIMIT = 4096, SEEDS_LIMIT = 1000 };
 
 /* ---- one run ---- */
 
@@ -61,6 +61,10 @@ static sf_status read_summary(sf_reproduction *r, const char *dir, bool ann, sf_
     if (isnan(run->value[field[i].metric]) && !(field[i].metric == SF_METRIC_SSIM && none)) /* tiny views have none */
       SF_TRY(sf_report_problem(r, "%s: no finite number '%s'", path, field[i].key));
   }
+  const cJSON *search = sf_json_get(run->summary, "search");
+  run->value[SF_METRIC_WORTH] = sf_json_number(search, "worth");
+  run->value[SF_METRIC_WORTH_ERROR] = sf_json_number(search, "worth_error");
+  run->value[SF_METRIC_PRICE] = sf_json_number(search, "price");
   run->t_star = sf_json_number(run->summary, "t_star");
   if (ann) run->value[SF_METRIC_STEPS] = run->t_star = NAN;
   return read_prefixes(r, path, run);
@@ -85,7 +89,7 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
 
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
-  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6};
+  static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6, SF_RUN_BETA_5E8, SF_RUN_BETA_5E9};
   char dir[4096 + 320], reference[4096 + 320], log[4096 + 384], exported[4096 + 384];
   for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
   for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;
@@ -109,7 +113,7 @@ static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_
 
 static void free_run(sf_run *run)
 {
-  free(run->iteration), free(run->t_star_at);
+  free(run->iteration), free(run->t_star_at), free(run->firing);
   free(run->status), free(run->train_command), free(run->eval_command), free(run->version);
   cJSON_Delete(run->summary);
 }
@@ -131,68 +135,77 @@ static bool is_scene(const char *dir)
   return false;
 }
 
+static sf_status load_seed(sf_reproduction *r, sf_report_scene *scene, const char *dir, int seed)
+{
+  sf_seed_runs *list = realloc(scene->of, (size_t)(scene->seeds + 1) * sizeof *list);
+  if (!list) return sf_report_no_memory(r);
+  scene->of = list;
+  sf_seed_runs *runs = &list[scene->seeds++];
+  memset(runs, 0, sizeof *runs);
+  runs->seed = seed;
+  for (int i = 0; i < SF_RUNS; i++) SF_TRY(load_run(r, dir, i, &runs->run[i]));
+  return sf_ok();
+}
+
+/* The number in "seed-N"; 0: another name. */
+static int seed_of(const char *name)
+{
+  char *end;
+  if (strncmp(name, "seed-", 5) != 0 || name[5] < '0' || name[5] > '9') return 0;
+  const long seed = strtol(name + 5, &end, 10);
+  return *end || seed > 1 << 30 ? 0 : (int)seed;
+}
+
+static int is_seed(const struct dirent *entry)
+{
+  return seed_of(entry->d_name) > 0;
+}
+
+static int compare_seeds(const struct dirent **a, const struct dirent **b)
+{
+  return seed_of((*a)->d_name) - seed_of((*b)->d_name);
+}
+
+static sf_status load_seeds(sf_reproduction *r, sf_report_scene *scene, const char *dir)
+{
+  char path[4096 + 320];
+  struct dirent **entry;
+  SF_TRY(load_seed(r, scene, dir, 0));
+  const int n = scandir(dir, &entry, is_seed, compare_seeds);
+  sf_status status = n > SEEDS_LIMIT ? sf_fail(SF_E_RANGE, "%s: more than %d seeds", dir, SEEDS_LIMIT) : sf_ok();
+  for (int i = 0; i < n; i++) {
+    snprintf(path, sizeof path, "%s/seed-%d", dir, seed_of(entry[i]->d_name));
+    if (!status.code && is_scene(path)) status = load_seed(r, scene, path, seed_of(entry[i]->d_name));
+    free(entry[i]);
+  }
+  if (n >= 0) free(entry);
+  return status;
+}
+
+static bool has_seeds(const char *dir)
+{
+  struct dirent **entry;
+  const int n = scandir(dir, &entry, is_seed, NULL);
+  for (int i = 0; i < n; i++) free(entry[i]);
+  if (n >= 0) free(entry);
+  return n > 0;
+}
+
 static sf_status load_scene(sf_reproduction *r, const char *name)
 {
   char dir[4096 + 260];
   snprintf(dir, sizeof dir, "%s/%s", r->dir, name);
-  if (name[0] == '.' || !is_scene(dir)) return sf_ok();
+  if (name[0] == '.' || !(is_scene(dir) || has_seeds(dir))) return sf_ok();
   sf_report_scene *list = realloc(r->scene, (size_t)(r->count + 1) * sizeof *list);
   if (!list) return sf_report_no_memory(r);
   r->scene = list;
   sf_report_scene *scene = &list[r->count++];
   memset(scene, 0, sizeof *scene);
   snprintf(scene->name, sizeof scene->name, "%s", name);
-  for (int i = 0; i < SF_RUNS; i++) SF_TRY(load_run(r, dir, i, &scene->run[i]));
-  return sf_ok();
+  return load_seeds(r, scene, dir);
 }
 
-/* ---- one set of parameters ---- */
-
-/* Its own options are last in a run's command; reproduce.sh begins them with one of these. */
-static size_t common_length(const char *command)
-{
-  const char *end = NULL;
-  for (const char *at = command; (at = strchr(at, ' ')); at++)
-    if (!strncmp(at, " --beta ", 8) || !strncmp(at, " --net ", 7)) end = at;
-  return end ? (size_t)(end - command) : strlen(command);
-}
-
-static bool same_training(const sf_run *a, const sf_run *b)
-{
-  const size_t n = common_length(a->train_command);
-  return n == common_length(b->train_command) && !strncmp(a->train_command, b->train_command, n);
-}
-
-/* Other scenes may have other views. */
-static bool same_evaluation(const sf_run *a, const sf_run *b, bool same_scene)
-{
-  const char *x = a->eval_command, *y = b->eval_command;
-  if (!x || !y) return true;
-  const char *p = strstr(x, ", --"), *q = strstr(y, ", --");
-  return same_scene || !p || !q ? !strcmp(x, y) : !strcmp(p, q);
-}
-
-/* Scenes of any kind have rows of their own, each with its minutes. */
-static sf_status compare_parameters(sf_reproduction *r)
-{
-  const sf_run *first = NULL;
-  int scene = 0, id = 0;
-  for (int s = 0; s < r->count; s++) {
-    if (sf_report_is_pairs(r)) first = NULL;
-    for (int i = 0; i < SF_RUNS; i++) {
-      const sf_run *run = &r->scene[s].run[i];
-      if (!run->train_command) continue;
-      if (!first) first = run, scene = s, id = i;
-      const bool trained = same_training(first, run);
-      if (trained && same_evaluation(first, run, s == scene)) continue;
-      return sf_report_problem(r, "runs of different parameters: %s, %s: '%s'; %s, %s: '%s'", r->scene[scene].name,
-                               sf_run_kinds[id].name, trained ? first->eval_command : first->train_command,
-                               r->scene[s].name, sf_run_kinds[i].name,
-                               trained ? run->eval_command : run->train_command);
-    }
-  }
-  return sf_ok();
-}
+/* ---- all of them ---- */
 
 static const char *last_part(const char *path)
 {
@@ -220,15 +233,19 @@ sf_status sf_reproduction_load(sf_reproduction *r, const char *dir)
     free(entry[i]);
   }
   free(entry);
-  if (!status.code) status = compare_parameters(r);
+  if (!status.code) status = sf_report_compare_parameters(r);
+  if (!status.code) sf_report_pool(r);
   if (status.code) sf_reproduction_free(r);
   return status;
 }
 
 void sf_reproduction_free(sf_reproduction *r)
 {
-  for (int s = 0; s < r->count; s++)
-    for (int i = 0; i < SF_RUNS; i++) free_run(&r->scene[s].run[i]);
+  for (int s = 0; s < r->count; s++) {
+    for (int k = 0; k < r->scene[s].seeds; k++)
+      for (int i = 0; i < SF_RUNS; i++) free_run(&r->scene[s].of[k].run[i]);
+    free(r->scene[s].of);
+  }
   for (int i = 0; i < r->problems; i++) free(r->problem[i]);
   free(r->scene), free(r->problem);
   *r = (sf_reproduction){0};

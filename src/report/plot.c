@@ -6,41 +6,25 @@
 
 enum { POINTS_MAX = 600 }; /* of a curve over iterations: more than the picture has pixels for */
 
-static const int betas[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_RUN_BETA_1E6};
-enum { BETAS = 3 };
-static const int learned[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7,   SF_RUN_BETA_1E6, SF_RUN_NO_STAGE1,
-                              SF_RUN_NO_EXTRA, SF_RUN_NO_PENALTY, SF_RUN_NO_BUDGET};
-enum { LEARNED = 7 };
-const char *const sf_plot_colour[SF_PLOT_COLOURS] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                     "#56b4e9", "#e69f00", "#000000"};
-
-void sf_plot_quote(char *to, size_t size, const char *from)
-{
-  snprintf(to, size, "%s", from);
-  for (char *c = to; *c; c++)
-    if (*c == '\'' || *c == '\n' || *c == '\\') *c = '_';
-}
-
-void sf_plot_head(FILE *out, const char *name, const char *title, const char *x, const char *y, const char *key)
-{
-  fprintf(out,
-          "# gnuplot %s.gp writes %s.svg\n"
-          "set terminal svg size 1060,600 noenhanced background '#ffffff' font 'DejaVu Sans,15' linewidth 1.5\n"
-          "set output '%s.svg'\n"
-          "set encoding utf8\n"
-          "set title '%s'\nset xlabel '%s'\nset ylabel '%s'\n"
-          "set key %s\nset grid linecolor '#dddddd' linetype 1\nset border 3\nset tics nomirror\n",
-          name, name, name, title, x, y, key);
-}
-
-static const char *title_of(const sf_reproduction *r, int scene, const char *what, char *text, size_t size)
+/* Of both fields; a scene has those of its own. */
+static const int betas[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_RUN_BETA_5E9, SF_RUN_BETA_5E8};
+enum { BETAS = 5 };
+static const int learned[] = {SF_RUN_BETA_1E7,  SF_RUN_BETA_5E7, SF_RUN_BETA_1E6,   SF_RUN_BETA_5E9, SF_RUN_BETA_5E8,
+                              SF_RUN_NO_STAGE1, SF_RUN_NO_EXTRA, SF_RUN_NO_PENALTY, SF_RUN_NO_BUDGET};
+enum { LEARNED = 9 };
+/* A scene, or how many are averaged. */
+static const char *title_of(const sf_reproduction *r, int scenes, const char *what, char *text, size_t size)
 {
   char name[256];
-  if (scene < 0)
-    snprintf(text, size, "%s: average of %d %s, profile %s", what, r->count, r->count == 1 ? "scene" : "scenes",
-             r->profile);
+  int count = 0;
+  for (int s = 0; s < r->count; s++) count += sf_reproduction_chosen(r, s, scenes);
+  if (scenes >= 0)
+    snprintf(text, size, "%s: %s, profile %s", what, r->scene[scenes].name, r->profile);
+  else if (scenes == SF_SCENES_ALL)
+    snprintf(text, size, "%s: average of %d %s, profile %s", what, count, count == 1 ? "scene" : "scenes", r->profile);
   else
-    snprintf(text, size, "%s: %s, profile %s", what, r->scene[scene].name, r->profile);
+    snprintf(text, size, "%s: %s, %s, average of %d %s", what, sf_report_field(SF_SCENES_OF - scenes),
+             sf_paper_groups[SF_SCENES_OF - scenes].data, count, count == 1 ? "scene" : "scenes");
   sf_plot_quote(name, sizeof name, text);
   snprintf(text, size, "%s", name);
   return text;
@@ -113,10 +97,10 @@ static double psnr_at_t_r(const sf_reproduction *r, int scene, int run)
 {
   double sum = 0;
   int n = 0;
-  for (int s = scene < 0 ? 0 : scene; s < (scene < 0 ? r->count : scene + 1); s++) {
+  for (int s = 0; s < r->count; s++) {
     const sf_run *one = &r->scene[s].run[run];
     const double t_r = one->value[SF_METRIC_STEPS];
-    if (!(t_r >= 1 && t_r <= one->prefixes)) continue;
+    if (!sf_reproduction_chosen(r, s, scene) || !(t_r >= 1 && t_r <= one->prefixes)) continue;
     sum += one->prefix_psnr[(int)t_r - 1], n++;
   }
   return n ? sum / n : sf_reproduction_mean(r, scene, run, SF_METRIC_PSNR, NULL);
@@ -147,18 +131,20 @@ static void plot_energy(FILE *out, const sf_reproduction *r, int scene, const ch
     fprintf(out, "$prefix using 1:2 with linespoints linecolor '#999999' pointtype 7 pointsize 0.6 title 'beta = 5e-7, "
                  "t = 1, 2, ...', $prefix using 1:2:3 with labels offset 0,-1 notitle, ");
   for (int i = 0; i < BETAS; i++)
-    fprintf(out, "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.8 title '%s', ", i,
-            sf_plot_colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
+    if (!isnan(sf_reproduction_mean(r, scene, betas[i], SF_METRIC_ENERGY, NULL)))
+      fprintf(out, "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.8 title '%s', ", i,
+              sf_plot_colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title);
   fprintf(out, "$ann using 1:2 with points linecolor '#000000' pointtype 2 pointsize 1.8 title 'ANN (ReLU twin)'\n");
 }
 
 static bool has_energy(const sf_reproduction *r, int scene)
 {
-  static const int shown[] = {SF_RUN_BETA_1E7, SF_RUN_BETA_5E7, SF_RUN_BETA_1E6, SF_RUN_ANN};
-  for (int i = 0; i < 4; i++)
-    if (!isnan(sf_reproduction_mean(r, scene, shown[i], SF_METRIC_ENERGY, NULL)) &&
-        !isnan(sf_reproduction_mean(r, scene, shown[i], SF_METRIC_PSNR, NULL)))
+  for (int i = 0; i <= BETAS; i++) {
+    const int run = i < BETAS ? betas[i] : SF_RUN_ANN;
+    if (!isnan(sf_reproduction_mean(r, scene, run, SF_METRIC_ENERGY, NULL)) &&
+        !isnan(sf_reproduction_mean(r, scene, run, SF_METRIC_PSNR, NULL)))
       return true;
+  }
   return false;
 }
 
@@ -182,7 +168,7 @@ static void plot_t_star(FILE *out, const sf_reproduction *r, int scene, const ch
   for (int i = 0; i < LEARNED; i++)
     if (r->scene[scene].run[learned[i]].points > 0)
       fprintf(out, "$t%d using 1:2 with lines linecolor '%s' linewidth 2 dashtype %d title '%s', ", i,
-              sf_plot_colour[i], i < BETAS ? 1 : i - BETAS + 2, sf_run_kinds[learned[i]].title);
+              sf_plot_colour[i % SF_PLOT_COLOURS], i < BETAS ? 1 : i - BETAS + 2, sf_run_kinds[learned[i]].title);
   fprintf(out, "NaN notitle\n");
 }
 
@@ -234,28 +220,135 @@ static void plot_balance(FILE *out, const sf_reproduction *r, int scene, const c
   fprintf(out, "NaN notitle\n");
 }
 
+/* ---- PSNR against t_r over scenes ---- */
+
+/* A point per scene and seed. */
+static void plot_t_r(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  char text[320], title[320];
+  snprintf(text, sizeof text, "PSNR against t_r: every scene and seed, profile %.200s", r->profile);
+  sf_plot_quote(title, sizeof title, text);
+  sf_plot_head(out, name, title, "t_r, time steps", "PSNR, dB (float, held-out views)", "outside right top");
+  fprintf(out, "set xrange [0.7:%d.3]\nset xtics 1\nset offsets 0, 0, graph 0.08, graph 0.08\n", SF_T_MAX);
+  for (int i = 0; i < BETAS; i++) {
+    fprintf(out, "$beta%d << EOD\n", i);
+    for (int s = 0; s < r->count; s++)
+      for (int k = 0; k < r->scene[s].seeds; k++) {
+        const double *value = r->scene[s].of[k].run[betas[i]].value;
+        char quoted[256];
+        sf_plot_quote(quoted, sizeof quoted, r->scene[s].name);
+        for (char *c = quoted; *c; c++)
+          if (*c == ' ' || *c == '"') *c = '_';
+        if (!isnan(value[SF_METRIC_STEPS] + value[SF_METRIC_PSNR]))
+          fprintf(out, "%.6g %.6g %s\n", value[SF_METRIC_STEPS], value[SF_METRIC_PSNR], quoted);
+      }
+    fprintf(out, "EOD\n");
+  }
+  fprintf(out, "plot ");
+  for (int i = 0; i < BETAS; i++)
+    if (!isnan(sf_reproduction_mean(r, scene, betas[i], SF_METRIC_STEPS, NULL)))
+      fprintf(out,
+              "$beta%d using 1:2 with points linecolor '%s' pointtype %d pointsize 1.5 title '%s', $beta%d using 1:2:3 "
+              "with labels offset 0,0.9 font ',10' textcolor '#777777' notitle, ",
+              i, sf_plot_colour[i], 5 + 2 * i, sf_run_kinds[betas[i]].title, i);
+  fprintf(out, "NaN notitle\n");
+}
+
+static bool has_t_r(const sf_reproduction *r, int scene)
+{
+  for (int i = 0; i < BETAS; i++)
+    if (!isnan(sf_reproduction_mean(r, scene, betas[i], SF_METRIC_STEPS, NULL))) return true;
+  return false;
+}
+
+/* ---- firing rates over training ---- */
+
+static bool fires(const sf_run *run, int layer)
+{
+  for (int p = 0; p < run->points; p++)
+    if (run->firing[p][layer] > 0) return true;
+  return false;
+}
+
+static bool has_firing(const sf_reproduction *r, int scene)
+{
+  for (int i = 0; i < BETAS * 3; i++)
+    if (fires(&r->scene[scene].run[betas[i / 3]], i % 3)) return true;
+  return false;
+}
+
+/* A colour is a budget, a dash is a layer. A field without a density net has two spiking layers. */
+static void plot_firing(FILE *out, const sf_reproduction *r, int scene, const char *name)
+{
+  static const char *const layer[] = {"D1", "C1", "C2"};
+  char title[640];
+  title_of(r, scene, "Firing rates over training", title, sizeof title);
+  sf_plot_head(out, name, title, "iteration", "spikes per neuron and step", "outside right top");
+  fprintf(out, "set xrange [0:*]\nset yrange [0:*]\n");
+  for (int i = 0; i < BETAS; i++) {
+    const sf_run *run = &r->scene[scene].run[betas[i]];
+    const int stride = run->points / POINTS_MAX + 1;
+    fprintf(out, "$f%d << EOD\n", i);
+    for (int p = 0; p < run->points; p += stride) {
+      fprintf(out, "%.0f", run->iteration[p]);
+      for (int l = 0; l < 3; l++) fprintf(out, " %.5f", run->firing[p][l]);
+      fprintf(out, "\n");
+    }
+    fprintf(out, "EOD\n");
+  }
+  fprintf(out, "plot ");
+  for (int i = 0; i < BETAS * 3; i++)
+    if (fires(&r->scene[scene].run[betas[i / 3]], i % 3))
+      fprintf(out, "$f%d using 1:%d with lines linecolor '%s' dashtype %d title '%s, %s', ", i / 3, i % 3 + 2,
+              sf_plot_colour[i / 3], i % 3 + 1, sf_run_kinds[betas[i / 3]].title, layer[i % 3]);
+  fprintf(out, "NaN notitle\n");
+}
+
 /* ---- files ---- */
 
 typedef struct plot {
   const char *name;
   bool (*has_data)(const sf_reproduction *r, int scene); /* gnuplot refuses an empty picture */
   void (*write)(FILE *out, const sf_reproduction *r, int scene, const char *name);
-  bool averaged; /* also over all scenes */
+  bool overall, averaged, single; /* of all scenes; of those of a field and a set; of every scene */
 } plot;
 
-static const plot plots[] = {{"psnr-steps", has_steps, plot_steps, true},
-                             {"psnr-energy", has_energy, plot_energy, true},
-                             {"t-star", has_t_star, plot_t_star, false},
-                             {"balance", has_balance, plot_balance, false}};
+static const plot plots[] = {{"psnr-t_r", has_t_r, plot_t_r, true, false, false},
+                             {"psnr-steps", has_steps, plot_steps, false, true, true},
+                             {"psnr-energy", has_energy, plot_energy, false, true, true},
+                             {"t-star", has_t_star, plot_t_star, false, false, true},
+                             {"firing", has_firing, plot_firing, false, false, true},
+                             {"balance", has_balance, plot_balance, false, false, true}};
+
+static void plot_name(const sf_reproduction *r, const plot *p, int scenes, char name[300])
+{
+  if (scenes >= 0)
+    snprintf(name, 300, "%s-%s", p->name, r->scene[scenes].name);
+  else if (scenes == SF_SCENES_ALL)
+    snprintf(name, 300, "%s", p->name);
+  else
+    snprintf(name, 300, "%s-%s-%s", p->name, sf_paper_groups[SF_SCENES_OF - scenes].backbone,
+             sf_paper_groups[SF_SCENES_OF - scenes].layout ? sf_paper_groups[SF_SCENES_OF - scenes].layout : "other");
+}
+
+/* Averages over scenes of one field and set: where all are, they are those of all. */
+static bool is_wanted(const sf_reproduction *r, const plot *p, int scenes)
+{
+  int chosen = 0, alike = 0;
+  for (int s = 0; s < r->count; s++) {
+    chosen += sf_reproduction_chosen(r, s, scenes);
+    alike += r->scene[s].group == r->scene[0].group;
+  }
+  if (scenes >= 0) return p->single;
+  if (scenes == SF_SCENES_ALL) return p->overall || (p->averaged && alike == r->count);
+  return p->averaged && chosen && alike < r->count;
+}
 
 static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, int *count)
 {
   char name[300], quoted[300], path[4096 + 320];
   sf_writer writer;
-  if (scene < 0)
-    snprintf(name, sizeof name, "%s", p->name);
-  else
-    snprintf(name, sizeof name, "%s-%s", p->name, r->scene[scene].name);
+  plot_name(r, p, scene, name);
   snprintf(path, sizeof path, "%s/plots/%s.gp", r->dir, name);
   sf_plot_quote(quoted, sizeof quoted, name);
   SF_TRY(sf_writer_open(&writer, path));
@@ -264,15 +357,22 @@ static sf_status write_plot(const sf_reproduction *r, const plot *p, int scene, 
   return sf_writer_commit(&writer);
 }
 
+bool sf_report_plot(const sf_reproduction *r, int scenes, int i, char name[300])
+{
+  if (i < 0 || i >= (int)(sizeof plots / sizeof *plots)) return false;
+  *name = 0;
+  if (is_wanted(r, &plots[i], scenes) && plots[i].has_data(r, scenes)) plot_name(r, &plots[i], scenes, name);
+  return true;
+}
+
 sf_status sf_reproduction_plots(const sf_reproduction *r, int *count)
 {
-  char dir[4096 + 16];
+  char dir[4096 + 16], name[300];
   *count = 0;
   snprintf(dir, sizeof dir, "%s/plots", r->dir);
   SF_TRY(sf_make_dir(dir));
-  for (int scene = -1; scene < r->count; scene++)
-    for (size_t i = 0; i < sizeof plots / sizeof *plots; i++)
-      if ((scene >= 0 || plots[i].averaged) && plots[i].has_data(r, scene))
-        SF_TRY(write_plot(r, &plots[i], scene, count));
+  for (int scenes = sf_scenes_of(SF_GROUPS - 1); scenes < r->count; scenes++)
+    for (int i = 0; sf_report_plot(r, scenes, i, name); i++)
+      if (*name) SF_TRY(write_plot(r, &plots[i], scenes, count));
   return sf_ok();
 }

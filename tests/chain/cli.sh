@@ -95,7 +95,7 @@ if ! grep -q "scales are not used" stdout.txt; then fail "tuned.safetensors" "no
 good sf_export model.safetensors -o s.snn
 good sf_export model.safetensors -o fit.snn --fit --fit-loss 0 --data d --fit-rays 256 --json
 good sf_cosim fit.snn d --rays 1 --seed 1
-good sim_render s.snn d -o g.exr --png g.png
+good sim_render s.snn d -o g.exr --png g.png --truth t.png
 good sim_render s.snn d -o f.exr --backend float
 good sim_render s.snn d -o train --all --split train
 # Threads that the address space has no room for are not asked for.
@@ -122,7 +122,7 @@ good error_budget model.safetensors s.snn d --samples 100 --rays 4 --json
 good sf_cosim s.snn d --rays 1 --seed 1 -q
 good sf_cycles s.snn d --view 1 --clock 100 --json
 if cmp -s r.exr x.exr; then passed=$((passed + 1)); else fail "rtl = fixed" "r.exr and x.exr differ"; fi
-for f in model.safetensors s.snn g.exr g.png f.exr a.csv; do
+for f in model.safetensors s.snn g.exr g.png t.png f.exr a.csv; do
   if [ -s $f ]; then passed=$((passed + 1)); else fail "good runs" "$f is missing"; fi
 done
 # Cameras that look past the box at the layout's scale and stand in it at the scale that the scene was trained at.
@@ -309,6 +309,7 @@ usage DATA error_budget model.safetensors s.snn
 usage nosuch sf_scene nosuch -o out
 usage -o sim_render s.snn d
 usage "--png is for previews" sim_render s.snn d -o x.png
+usage --truth sim_render s.snn d --all -o set --truth t.png
 usage --output sf_export model.safetensors
 usage --views energy_audit s.snn d --view 0 --views 1
 usage --compare energy_audit --compare s.snn

@@ -117,8 +117,36 @@ done
 grep -q 'Problems\|without a result' "$table" && fail "profile scenes: a run is missing or broken"
 echo "scenes: two backbones"
 
+# Profile paper at a tiny length: the planes with two of their budgets, a second seed of the learned runs; a probe that is kept.
+paper() {
+  "$script" "$work/part" --profile paper --scenes "$data" --backbones tensorf --betas '5e-7 5e-8' --seeds "$1" --stage1 4 --stage2 12 \
+    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --train '--hidden 32' >"$work/out" 2>&1 ||
+    fail "profile paper: exit status $?"
+}
+out=$work/part/reproduce/paper
+paper 1
+[ "$(count '^\[.* dB, ')" -eq 3 ] || fail "profile paper: not 3 runs"
+[ "$(count '^textured-tensorf: .* s an iteration, as a probe of 32 says')" -eq 1 ] || fail "profile paper: no estimate"
+[ "$(count '^reproduce: 3 runs, about ')" -eq 1 ] || fail "profile paper: no estimate of all"
+cp "$out/textured-tensorf/probe.jsonl" "$work/before"
+paper '1 2'
+[ "$(count 'finished before')" -eq 3 ] || fail "profile paper: the first seed was repeated"
+[ "$(count '^\[.*textured-tensorf/seed-2 .* dB, ')" -eq 3 ] || fail "profile paper: no second seed"
+cmp -s "$out/textured-tensorf/probe.jsonl" "$work/before" || fail "profile paper: probed again"
+for seed in 1 2; do
+  run=$out/textured-tensorf
+  [ $seed -eq 1 ] || run=$run/seed-2
+  grep -Eq "\"seed\":[[:space:]]*$seed,$" "$run/ann/train.json" || fail "profile paper: another seed than $seed"
+  [ -s "$run/ann/frame-0.png" ] && [ -s "$run/beta-5e-8/truth-0.png" ] || fail "profile paper: no pictures"
+done
+cmp -s "$out/textured-tensorf/ann/model.safetensors" "$run/ann/model.safetensors" && fail "profile paper: two seeds are one"
+grep -Eq '^\| beta = 5e-8 +\| +[0-9.]+ \+- [0-9.]+ \| 33.04 \|.* seeds 1 2; 1 view of 32 x 32; 1 audited frame of 32 x 32 \|$' "$out/table.md" ||
+  { cat "$out/table.md"; fail "profile paper: no row of beta = 5e-8"; }
+grep -q '^TensoRF,33.14,0.963,-,as printed' "$out/tables/models-ordinary-blender.csv" || fail "profile paper: no ordinary models"
+echo "paper: two seeds"
+
 for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some" "--minutes 3" \
-  "--profile scenes --betas 2" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x"; do
+  "--profile scenes --betas 2" "--betas 5e-7" "--probe 3" "--seeds x" "--seeds 0" "--seed-runs some" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x"; do
   # shellcheck disable=SC2086
   reproduce part 2 $bad
   [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"

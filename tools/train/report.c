@@ -117,6 +117,8 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   cJSON_AddNumberToObject(json, "psnr", q->psnr);
   cJSON_AddNumberToObject(json, "ssim", q->ssim);
   cJSON_AddNumberToObject(json, "views", q->views);
+  cJSON_AddNumberToObject(json, "width", q->width);
+  cJSON_AddNumberToObject(json, "height", q->height);
   if (q->prefixes) cJSON_AddItemToObject(json, "prefix_psnr", cJSON_CreateDoubleArray(q->prefix, q->prefixes));
   return json;
 }

@@ -13,6 +13,7 @@ typedef struct train_recent {
 typedef struct train_quality {
   double psnr, ssim, prefix[SF_T_MAX];
   int views, prefixes;
+  int width, height;  /* of the last view */
   const char *layout; /* of the data */
 } train_quality;
 

@@ -1,0 +1,99 @@
+/* What is computed from several runs: numbers over the seeds of a run, savings and errors beside the twin, groups. */
+#include "report/internal.h"
+#include "base/json.h"
+#include <math.h>
+#include <string.h>
+
+/* ---- beside the twin ---- */
+
+static double squared_error(double psnr)
+{
+  return pow(10, -psnr / 10);
+}
+
+static void beside_twin(sf_run run[SF_RUNS])
+{
+  const double *twin = run[SF_RUN_ANN].value;
+  for (int i = SF_RUN_ANN + 1; i < SF_RUNS; i++) {
+    double *v = run[i].value;
+    v[SF_METRIC_SAVING] = 100 * (1 - v[SF_METRIC_ENERGY] / twin[SF_METRIC_ENERGY]);
+    v[SF_METRIC_EXCESS] = squared_error(v[SF_METRIC_PSNR]) - squared_error(twin[SF_METRIC_PSNR]);
+  }
+}
+
+/* ---- means over the seeds ---- */
+
+typedef struct mean {
+  double sum;
+  int count;
+} mean;
+
+static void add(mean *m, double value)
+{
+  if (!isnan(value)) m->sum += value, m->count++;
+}
+
+static double mean_of(const mean *m)
+{
+  return m->count ? m->sum / m->count : NAN;
+}
+
+static void pool_prefixes(const sf_report_scene *scene, int id, sf_run *run)
+{
+  for (int t = 0; t < SF_T_MAX; t++) {
+    mean psnr = {0}, energy = {0};
+    for (int k = 0; k < scene->seeds; k++) {
+      const sf_run *one = &scene->of[k].run[id];
+      if (t < one->prefixes) add(&psnr, one->prefix_psnr[t]);
+      add(&energy, one->prefix_energy[t]);
+    }
+    if (psnr.count) run->prefix_psnr[t] = mean_of(&psnr), run->prefixes = t + 1;
+    run->prefix_energy[t] = mean_of(&energy);
+  }
+}
+
+static void pool_run(sf_report_scene *scene, int id)
+{
+  int first = 0;
+  while (first < scene->seeds - 1 && !scene->of[first].run[id].summary) first++;
+  if (!scene->of[first].run[id].summary) first = 0;
+  sf_run *run = &scene->run[id];
+  *run = scene->of[first].run[id];
+  if (scene->seeds == 1) return;
+  mean t_star = {0};
+  for (int m = 0; m < SF_METRICS; m++) {
+    mean value = {0};
+    for (int k = 0; k < scene->seeds; k++) add(&value, scene->of[k].run[id].value[m]);
+    run->value[m] = mean_of(&value);
+  }
+  for (int k = 0; k < scene->seeds; k++) add(&t_star, scene->of[k].run[id].t_star);
+  run->t_star = mean_of(&t_star);
+  pool_prefixes(scene, id, run);
+}
+
+/* ---- groups ---- */
+
+/* Data and field; runs that do not say it are of the first group, as all of profile quick are. */
+static int group_of(const sf_report_scene *scene)
+{
+  const cJSON *summary = NULL;
+  for (int run = SF_RUN_ANN; run < SF_RUNS && !summary; run++)
+    if (sf_json_text(scene->run[run].summary, "backbone")) summary = scene->run[run].summary;
+  if (!summary) return 0;
+  for (int i = 0; i < SF_GROUPS; i++) {
+    const sf_paper_group *g = &sf_paper_groups[i];
+    if (sf_json_says(summary, "backbone", g->backbone) && (!g->layout || sf_json_says(summary, "layout", g->layout)))
+      return i;
+  }
+  return SF_PAPER_GROUPS;
+}
+
+void sf_report_pool(sf_reproduction *r)
+{
+  for (int s = 0; s < r->count; s++) {
+    sf_report_scene *scene = &r->scene[s];
+    for (int k = 0; k < scene->seeds; k++) beside_twin(scene->of[k].run);
+    for (int i = 0; i < SF_RUNS; i++) pool_run(scene, i);
+    scene->group = group_of(scene);
+  }
+}
