@@ -1,7 +1,7 @@
 /* Cycle model of the accelerator from positions to pixels, for TensoRF's field: the control of rtl/sf_planes.sv and
- * what stands around it, with the engine of cycles.h behind it. Equal to the RTL's clock when every line is found in
- * the cache; with lines that come from a memory it is close (tests/test_rtl_ray_cycles.c). The host sends the samples
- * that the core reads, and takes every pixel at once. */
+ * what stands around it, as the clock cycles of events, with the engine of cycles.h behind it. Equal to the RTL's clock
+ * while the memory's latency is constant, the host sends the samples that the core reads without a gap, and each pixel
+ * is taken at once (tests/test_rtl_ray_cycles.c). */
 #ifndef SF_CYCLES_PLANES_H
 #define SF_CYCLES_PLANES_H
 #include "cycles/cycles.h"
