@@ -197,7 +197,7 @@ $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
-check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults installable $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
+check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults board-sim installable $B/tests/exr_to_ppm ## every test, lint, co-simulation, planted faults, generated files
 	@tests/run.sh $B $(CHAIN_TESTS) $(TESTS)
 
 SAMPLES ?= 10000000
