@@ -80,6 +80,10 @@ TEST(groups)
   write_kind("paper/lego-tensorf", "beta-5e-7", 32, planes);
   write_kind("paper/fox-ingp", "ann", 25, grid);
   write_kind("paper/fox-ingp", "beta-1e-7", 24, grid);
+  write_text(
+      "paper/fox-ingp/ann/convert.json",
+      "{\"rays\":500,\"twin\":{\"psnr\":25.5},\"converted\":[{\"steps\":4,\"psnr\":20,\"of_twin_percent\":30.25},"
+      "{\"steps\":256,\"psnr\":25.25,\"of_twin_percent\":812}]}");
   load_from(in("paper"));
   ck_assert_int_eq(report.problems, 0);
   ck_assert_int_eq(report.scene[1].group, 2);
@@ -97,7 +101,9 @@ TEST(groups)
   contains("table.md", "Here: lego (TensoRF, 400 x 300). Not here: chair drums ficus hotdog materials mic ship.", true);
   contains("table.md", "Plenoxels", false);
   contains("table.md", "|      2.000 |      0.100 |      1.000 |          2.00 | balanced |", true);
-  ck_assert_int_eq(count, 8);
+  ck_assert_int_eq(count, 9);
+  contains("paper/tables/converted.csv",
+           "\nfox-ingp,256,25.25,25.50,-0.25,812.0,seed 1; 500 random rays of held-out views\n", true);
   contains("paper/tables/order-tensorf-blender.csv", "\nbeta,beta = 5e-9,beta = 5e-8,PSNR dB,0.06,0.25,-,1,1,yes\n",
            true);
   contains("paper/tables/quality-tensorf-blender.csv", "\nbeta = 5e-8,32.50,33.04,0.5000,0.960,3.000,3.875,-,815.20,",
@@ -111,7 +117,7 @@ TEST(groups)
   const cJSON *groups = sf_json_get(json, "groups");
   ck_assert_int_eq(cJSON_GetArraySize(groups), 2);
   ck_assert(sf_json_real(sf_json_at(json, "groups[0].average.beta-5e-9.paper.psnr")) == 33.10);
-  ck_assert_int_eq(cJSON_GetArraySize(sf_json_get(json, "tables")), 8);
+  ck_assert_int_eq(cJSON_GetArraySize(sf_json_get(json, "tables")), 9);
   cJSON_Delete(json);
 }
 

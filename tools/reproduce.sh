@@ -24,6 +24,7 @@ usage="usage: reproduce.sh BUILD [options]
   --audit-views N      held-out frames for the fixed-point core and the energy audit, spread over the split
   --audit-downscale F  these frames of 1/F of the full size (0 = by the layout, as --downscale)
   --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
+  --convert-rays N     rays on which the twin of a hash grid is measured as integrate-and-fire neurons (0 = none)
   --cosim-rays N       rays of every scene through RTL and fixed-point core in lockstep
 Results: BUILD/reproduce/PROFILE/{table.md,results.json,report.html,tables/,plots/}; runs in SCENE/RUN/ and SCENE/seed-N/RUN/."
 
@@ -40,18 +41,19 @@ profile=quick
 for ((i = 1; i <= $#; i++)); do
   if [ "${!i}" = --profile ]; then j=$((i + 1)); profile=${!j:-}; fi
 done
-declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=0 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0 [probe]=0)
+declare -A set=([seed]=1 [steps]=8 [samples]=16384 [downscale]=0 [train]="" [rtl-rays]=4 [cosim-rays]=0 [minutes]=0 [probe]=0 [convert-rays]=0)
 case $profile in
   quick)
     set+=([stage1]=400 [stage2]=1200 [eval-views]=8 [prefix-views]=1 [prefix-runs]=learned [audit-views]=1 [audit-downscale]=2)
+    set+=([convert-rays]=500)
     ;;
   paper)
     set+=([stage1]=10000 [stage2]=30000 [eval-views]=0 [prefix-views]=16 [prefix-runs]=all [audit-views]=8 [audit-downscale]=0)
-    set+=([samples]=0 [probe]=64)
+    set+=([samples]=0 [probe]=64 [convert-rays]=2000)
     ;;
   smoke)
     set+=([stage1]=30 [stage2]=40 [eval-views]=1 [prefix-views]=1 [prefix-runs]=all [audit-views]=1 [audit-downscale]=0)
-    set+=([samples]=512 [rtl-rays]=0)
+    set+=([samples]=512 [rtl-rays]=0 [convert-rays]=20)
     set+=([train]="--levels 4 --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32")
     ;;
   scenes)
@@ -105,7 +107,7 @@ while [ $# -gt 0 ]; do
       [[ $2 =~ ^[0-9]{1,9}$ ]] || die "$1 '$2' is not a whole number"
       set[$name]=$((10#$2)) ;;
     --samples | --steps | --seed | --downscale | --eval-views | --prefix-views | --audit-views | \
-      --audit-downscale | --rtl-rays | --cosim-rays)
+      --audit-downscale | --rtl-rays | --cosim-rays | --convert-rays)
       [[ $2 =~ ^[0-9]{1,9}$ ]] || die "$1 '$2' is not a whole number"
       set[$name]=$((10#$2)) ;;
     *) die "unknown option $1 (see reproduce.sh --help)" ;;
@@ -115,7 +117,7 @@ done
 for name in audit-views steps; do [ "${set[$name]}" -ge 1 ] || die "--$name starts at 1"; done
 [ "${set[steps]}" -le 8 ] || die "--steps ${set[steps]} is out of range: 1..8"
 out=$build/reproduce/$profile
-for program in sf_train sf_export sim_render energy_audit sf_report sf_scene; do
+for program in sf_train sf_convert sf_export sim_render energy_audit sf_report sf_scene; do
   [ -x "$bin/$program" ] || die "$bin/$program is missing: run make first" 1
 done
 

@@ -192,6 +192,9 @@ evaluate_ann() {
     render "$dir/float-$view.json" "$reference" "$view" --backend float --model "$dir/model.safetensors" --steps 1 \
       --png "$dir/frame-$view.png" --truth "$dir/truth-$view.png" || return
   done
+  [ "${set[convert-rays]}" -gt 0 ] && [ "$backbone" != tensorf ] || return 0
+  output "$dir/convert.json" "$bin/sf_convert" "$dir/model.safetensors" "$data" --rays "${set[convert-rays]}" --seed "${set[seed]}" \
+    --downscale "${set[downscale]}" --json
 }
 
 evaluate_snn() {
@@ -240,9 +243,10 @@ prepare() {
     keep "$dir/version" "$version"
   fi
   evaluation="sim_render, energy_audit: views $views, --downscale ${set[audit-downscale]} --rtl-rays ${set[rtl-rays]} --seed ${set[seed]}"
+  [ "${set[convert-rays]}" -eq 0 ] || evaluation="$evaluation; sf_convert --rays ${set[convert-rays]}"
   [ "${set[cosim-rays]}" -eq 0 ] || evaluation="$evaluation; sf_cosim --rays ${set[cosim-rays]}"
   if ! keep "$dir/eval.cmd" "$evaluation"; then
-    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir/cosim.json" "$dir"/{frame,truth}-*.png
+    rm -f "$dir"/{fixed,float,audit,prefix}-*.json "$dir"/{cosim,convert}.json "$dir"/{frame,truth}-*.png
     [ "$(cat "$dir/status" 2>/dev/null)" != "done" ] || rm -f "$dir/status"
   fi
 }

@@ -90,7 +90,7 @@ static sf_status read_cosim(sf_reproduction *r, const char *dir, sf_run *run)
 static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_run *run)
 {
   static const int spiking[] = {SF_RUN_BETA_5E7, SF_RUN_BETA_1E7, SF_RUN_BETA_1E6, SF_RUN_BETA_5E8, SF_RUN_BETA_5E9};
-  char dir[4096 + 320], reference[4096 + 320], log[4096 + 384], exported[4096 + 384];
+  char dir[4096 + 320], reference[4096 + 320], log[4096 + 384], exported[4096 + 384], converted[4096 + 384];
   for (int m = 0; m < SF_METRICS; m++) run->value[m] = NAN;
   for (int t = 0; t < SF_T_MAX; t++) run->prefix_energy[t] = NAN;
   run->t_star = NAN;
@@ -101,12 +101,14 @@ static sf_status load_run(sf_reproduction *r, const char *scene_dir, int id, sf_
     if (access(exported, F_OK) == 0) break;
   }
   snprintf(log, sizeof log, "%s/train.jsonl", dir);
+  snprintf(converted, sizeof converted, "%s/convert.json", dir);
   SF_TRY(read_text(r, dir, "status", &run->status));
   SF_TRY(read_text(r, dir, "train.cmd", &run->train_command));
   SF_TRY(read_text(r, dir, "eval.cmd", &run->eval_command));
   SF_TRY(read_text(r, dir, "version", &run->version));
   SF_TRY(read_summary(r, dir, id == SF_RUN_ANN, run));
   SF_TRY(read_cosim(r, dir, run));
+  SF_TRY(sf_report_read_json(r, converted, &run->converted));
   SF_TRY(sf_report_load_log(log, run));
   return sf_report_load_frames(r, dir, reference, id == SF_RUN_ANN, run);
 }
@@ -115,15 +117,10 @@ static void free_run(sf_run *run)
 {
   free(run->iteration), free(run->t_star_at), free(run->firing);
   free(run->status), free(run->train_command), free(run->eval_command), free(run->version);
-  cJSON_Delete(run->summary);
+  cJSON_Delete(run->summary), cJSON_Delete(run->converted);
 }
 
 /* ---- scenes ---- */
-
-bool sf_report_is_pairs(const sf_reproduction *r)
-{
-  return strcmp(r->profile, "scenes") == 0;
-}
 
 static bool is_scene(const char *dir)
 {

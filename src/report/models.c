@@ -35,7 +35,7 @@ void sf_report_add_balance(sf_grids *t, const sf_reproduction *r)
       if (isnan(r->scene[s].run[i].value[SF_METRIC_WORTH])) continue;
       if (!any) {
         sf_grid_begin(t, 2, "balance", "What one more step is worth, and what it costs");
-        t->grid[t->count - 1].text_last = true;
+        if (t->count) t->grid[t->count - 1].text_last = true;
         for (size_t c = 0; c < sizeof head / sizeof *head; c++) sf_grid_cell(t, "%s", head[c]);
       }
       any = true;
@@ -46,6 +46,45 @@ void sf_report_add_balance(sf_grids *t, const sf_reproduction *r)
                  "worth: squared error that one more step at t* takes away, on the rays of the search; error: its "
                  "standard error; price: beta exp(t*) and the\nratio of the errors (docs/model.md). t* settles where "
                  "both are equal.");
+}
+
+/* ---- the twin converted ---- */
+
+enum { CONVERTED = 64 }; /* numbers of steps that are shown */
+
+static void converted_rows(sf_grids *t, const sf_reproduction *r, int s)
+{
+  const cJSON *json = r->scene[s].run[SF_RUN_ANN].converted, *point;
+  const double twin = sf_json_number(sf_json_get(json, "twin"), "psnr");
+  int rows = 0;
+  cJSON_ArrayForEach(point, sf_json_get(json, "converted"))
+  {
+    const double db = sf_json_number(point, "psnr");
+    if (rows++ == CONVERTED) break;
+    sf_grid_row(t);
+    sf_grid_cell(t, "%s", r->scene[s].name), sf_grid_number(t, 0, sf_json_number(point, "steps"));
+    sf_grid_number(t, 2, db), sf_grid_number(t, 2, twin), sf_grid_number(t, 2, db - twin);
+    sf_grid_number(t, 1, sf_json_number(point, "of_twin_percent"));
+    sf_grid_cell(t, "seed %.0f; %.0f random rays of held-out views",
+                 sf_report_number(r->scene[s].run[SF_RUN_ANN].summary, "seed"), sf_report_number(json, "rays"));
+  }
+}
+
+void sf_report_add_converted(sf_grids *t, const sf_reproduction *r)
+{
+  static const char *const head[] = {"scene",      "steps", "PSNR dB", "twin dB", "difference", "energy, % of twin",
+                                     "measured on"};
+  bool any = false;
+  for (int s = 0; s < r->count; s++) any |= r->scene[s].run[SF_RUN_ANN].converted != NULL;
+  if (!any) return;
+  sf_grid_begin(t, 1, "converted", "The ReLU twin as integrate-and-fire neurons, without training");
+  if (t->count) t->grid[t->count - 1].text_last = true;
+  for (size_t i = 0; i < sizeof head / sizeof *head; i++) sf_grid_cell(t, "%s", head[i]);
+  for (int s = 0; s < r->count; s++) converted_rows(t, r, s);
+  sf_grid_note(
+      t,
+      "Thresholds balanced on the training views, as Spiking-NeRF has them. Energy: paper ledger, on the samples of\n"
+      "its own rays; the products of h(t) are MACs at every step, as in the trained nets.");
 }
 
 /* ---- other models ---- */
@@ -193,7 +232,7 @@ static void add_models(sf_grids *t, const sf_reproduction *r, const sf_paper_gro
   snprintf(title, sizeof title, "%s models: %s", spiking ? "Spike-based" : "Ordinary", g->data);
   snprintf(name, sizeof name, "models-%s-%s", spiking ? "spiking" : "ordinary", g->layout);
   sf_grid_begin(t, 1, name, title);
-  t->grid[t->count - 1].text_last = true;
+  if (t->count) t->grid[t->count - 1].text_last = true;
   for (size_t i = 0; i < sizeof head / sizeof *head; i++) sf_grid_cell(t, "%s", head[i]);
   for (size_t i = 0; i < sizeof models / sizeof *models; i++) {
     const model *m = &models[i];

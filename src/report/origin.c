@@ -7,6 +7,11 @@
 
 enum { NAMED = 4, SEEDS_NAMED = 8 };
 
+bool sf_report_is_pairs(const sf_reproduction *r)
+{
+  return strcmp(r->profile, "scenes") == 0;
+}
+
 double sf_report_number(const cJSON *json, const char *key)
 {
   const double number = sf_json_number(json, key);

@@ -81,6 +81,7 @@ typedef struct sf_run {
   double (*firing)[3];                                   /* rates of the spiking layers there, NaN: none; owned */
   char *status, *train_command, *eval_command, *version; /* text of the run's files or NULL, owned */
   cJSON *summary;                                        /* of the trainer, or NULL, owned */
+  cJSON *converted;                                      /* of sf_convert, of the ANN, or NULL, owned */
 } sf_run;
 
 typedef struct sf_seed_runs {

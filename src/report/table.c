@@ -65,7 +65,7 @@ static void method_head(sf_grids *t, bool paper)
     if (paper && column[i].paper) sf_grid_cell(t, "paper");
   }
   sf_grid_cell(t, "measured on");
-  t->grid[t->count - 1].text_last = true;
+  if (t->count) t->grid[t->count - 1].text_last = true;
 }
 
 /* One number of a run, its spread over the seeds, and the paper's where group is not negative. */
@@ -304,6 +304,7 @@ sf_status sf_report_tables(const sf_reproduction *r, sf_grids *t)
   }
   sf_report_add_balance(t, r);
   sf_report_add_models(t, r);
+  sf_report_add_converted(t, r);
   for (int s = 0; s < r->count; s++) add_scene(t, r, s);
   return t->status;
 }

@@ -107,6 +107,7 @@ good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_convert twin.safetensors d --rays 5 --json
 good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --voxels 16 --rays 64 --samples 256 --threads 1
 good sf_train d -o vm-tuned.safetensors --fine-tune vm.safetensors --weight-bits 4 --grid-bits 5 --leak-bits 6 --stage2 2 --samples 256 --threads 1
 good sf_export vm-tuned.safetensors -o vm-tuned.snn
@@ -311,6 +312,8 @@ usage -o sim_render s.snn d
 usage "--png is for previews" sim_render s.snn d -o x.png
 usage --truth sim_render s.snn d --all -o set --truth t.png
 usage --output sf_export model.safetensors
+usage "no ReLU twin" sf_convert model.safetensors d
+usage --percentile sf_convert model.safetensors d --percentile 0
 usage --views energy_audit s.snn d --view 0 --views 1
 usage --compare energy_audit --compare s.snn
 usage DATA energy_audit --compare s.snn s.snn

@@ -19,8 +19,14 @@ reproduce whole 0
 [ "$(count '^\[.* dB, ')" -eq 14 ] || fail "not 14 runs"
 [ -s "$work/whole/reproduce/smoke/table.md" ] || fail "no table.md"
 grep -q 'Problems\|without a result' "$work/whole/reproduce/smoke/table.md" && fail "a run is missing or broken"
+page=$work/whole/reproduce/smoke/report.html
+python3 -c 'import sys, xml.etree.ElementTree as xml; xml.parse(sys.argv[1])' "$page" || fail "the page is no XML"
+[ "$(grep -c '<div class="plate"><img ' "$page")" -eq 14 ] || fail "not truth, twin and three budgets, each with a part, four with errors"
+grep -Eq '^textured,256,[0-9.]+,[0-9.]+,-?[0-9.]+,[0-9.]+,seed 1; 20 random rays' "$work/whole/reproduce/smoke/tables/converted.csv" ||
+  fail "the twin was not converted"
 if command -v gnuplot >/dev/null; then
-  for plot in psnr-steps psnr-energy psnr-steps-textured psnr-energy-textured t-star-textured; do
+  [ "$(grep -c 'data:image/svg+xml;base64,' "$page")" -eq 8 ] || fail "the page has not 8 plots"
+  for plot in psnr-t_r psnr-steps psnr-energy psnr-steps-textured psnr-energy-textured t-star-textured firing-textured; do
     grep -q '</svg>' "$work/whole/reproduce/smoke/plots/$plot.svg" || fail "$plot.svg is not whole"
   done
 else
@@ -120,7 +126,7 @@ echo "scenes: two backbones"
 # Profile paper at a tiny length: the planes with two of their budgets, a second seed of the learned runs; a probe that is kept.
 paper() {
   "$script" "$work/part" --profile paper --scenes "$data" --backbones tensorf --betas '5e-7 5e-8' --seeds "$1" --stage1 4 --stage2 12 \
-    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --train '--hidden 32' >"$work/out" 2>&1 ||
+    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --steps 2 --train '--hidden 32 --voxels 24' >"$work/out" 2>&1 ||
     fail "profile paper: exit status $?"
 }
 out=$work/part/reproduce/paper

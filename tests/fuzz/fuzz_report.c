@@ -12,7 +12,7 @@ static void make_run(const char *folder, int scene, sf_run_id run, const int slo
   static const char *const file[] = {"status",          "train.cmd",    "eval.cmd",     "version",
                                      "train.json",      "train.jsonl",  "cosim.json",   "audit-0.json",
                                      "audit-1.json",    "fixed-0.json", "float-0.json", "prefix-1-0.json",
-                                     "prefix-2-0.json", "float-1.json"};
+                                     "prefix-2-0.json", "float-1.json", "convert.json"};
   char dir[400], path[440], input[40];
   snprintf(dir, sizeof dir, "%s/scene%d/%s", folder, scene, sf_run_kinds[run].name);
   FUZZ_EXPECT(fuzz_good(sf_make_dir(dir)));
