@@ -52,7 +52,7 @@ static uint64_t bytes_of(const shrink *s, const sf_trim *trim)
 
 /* ---- loss ---- */
 
-static sf_status error_of(const shrink *s, const sf_trim *trim, uint64_t *error)
+static sf_status error_of(shrink *s, const sf_trim *trim, uint64_t *error)
 {
   fx_scene trial;
   *error = 0;
