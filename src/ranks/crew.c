@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* mpirun kills what is left a second after it asked all to end: rank 0 has to have written what there is by then. */
-static const double DEALER_PATIENCE = 0.5, SERVANT_PATIENCE = 5;
+static const double DEALER_PATIENCE = 0.5, SERVANT_PATIENCE = 3;
 
 typedef struct team {
   sf_crew crew; /* first: the crew is the team */

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 /* An interrupted rank waits so long for an answer of another. */
-static const double PATIENCE = 5;
+static const double PATIENCE = 3;
 
 int sf_ranks_launched(void)
 {

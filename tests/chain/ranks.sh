@@ -6,6 +6,7 @@ command -v mpirun >/dev/null || { echo "skipped: mpirun is not installed (openmp
 cd "$work" || exit 1
 export LC_ALL=C OMP_NUM_THREADS=1 OMP_WAIT_POLICY=passive
 [ "$(id -u)" -ne 0 ] || export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+export OMPI_MCA_odls_base_sigkill_timeout=8 # a crowded machine needs longer than the second that mpirun gives
 bin=$build/bin
 
 # job RANKS COMMAND...: a rank that stays behind would be a failure, too
