@@ -167,9 +167,14 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   return l->trouble.code == SF_OK && !enough(l);
 }
 
+/* A launcher may not give the time to wait for the blocks at work: what is finished is kept at once. */
 static void tick(void *user)
 {
-  const sf_lockstep *l = user;
+  sf_lockstep *l = user;
+  if (!l->stopping && !l->partial && l->trouble.code == SF_OK && sf_ranks_stop(l->ranks)) {
+    l->stopping = true;
+    l->trouble = save(l);
+  }
   if (l->tick) l->tick(l->user, l);
 }
 

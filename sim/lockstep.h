@@ -40,6 +40,7 @@ typedef struct sf_lockstep {
   char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
   bool replays;            /* the samples of the replay file show it */
   bool partial;            /* the last blocks were interrupted; no checkpoint is written of them */
+  bool stopping;           /* interrupted, and kept in the checkpoint what was finished then */
   bool complete;           /* every ray, or the limit */
   uint64_t resumed;        /* samples that the checkpoint brought along */
   sf_ranks *ranks;         /* who does the work; set by the caller, NULL: this process */

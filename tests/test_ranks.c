@@ -132,7 +132,7 @@ TEST(launchers)
     unsetenv(by[i].size), unsetenv(by[i].rank);
   }
   sf_ranks *ranks;
-  setenv("SLURM_STEP_NUM_TASKS", "3", 1), setenv("SLURM_PROCID", "2", 1), unsetenv("PMIX_RANK"), unsetenv("PMI_RANK");
+  setenv("SLURM_STEP_NUM_TASKS", "3", 1), setenv("SLURM_PROCID", "2", 1), unsetenv("PMIX_RANK");
   ck_bad(sf_ranks_open(&ranks, &how), SF_E_UNSUPPORTED, "3 tasks", "--mpi=pmix");
   sf_ranks_close(ranks);
 }

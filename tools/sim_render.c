@@ -186,11 +186,10 @@ static sf_status render_all(job *j)
   char contact[4096 + 16];
   sf_status status = sf_view_set_render(&j->set, &j->crop);
   const double seconds = sf_seconds() - j->start;
-  const bool first = sf_ranks_rank(j->ranks) == 0;
-  if (status.code == SF_OK && first) status = sf_view_set_contact(&j->set, contact);
+  if (sf_ranks_rank(j->ranks)) return status;
+  if (status.code == SF_OK) status = sf_view_set_contact(&j->set, contact);
   sf_progress_end(&j->progress);
   SF_TRY(status);
-  if (!first) return status;
   if (j->opt.json) {
     cJSON *json = sf_manifest_report_json(&j->set.manifest);
     sf_view_set_add_run(&j->set, seconds, json);
@@ -239,8 +238,8 @@ static sf_status load_manifest(job *j)
 static sf_status verify(job *j)
 {
   int differences = 0;
-  SF_TRY(sf_ranks_agree(j->ranks, load_manifest(j)));
-  SF_TRY(sf_ranks_agree(j->ranks, open_studio(j)));
+  const sf_status loaded = load_manifest(j);
+  SF_TRY(sf_ranks_agree(j->ranks, loaded.code == SF_OK ? open_studio(j) : loaded));
   j->verdicts = cJSON_CreateArray();
   begin_set(j);
   sf_status status = sf_view_set_verify(&j->set, j->opt.view, report_verdict, &differences);

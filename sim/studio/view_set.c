@@ -2,6 +2,7 @@
 #include "base/sha256.h"
 #include "base/io.h"
 #include "base/text.h"
+#include "snn/kernels.h"
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -210,6 +211,8 @@ sf_status sf_set_same(const sf_view_set *set)
   sf_shot_free(&shot);
   SF_TRY(sf_ranks_agree(set->ranks, status));
   SF_TRY(sf_ranks_same(set->ranks, "scene", set->studio->scene_sha256));
+  if (set->studio->options.backend == SF_BACKEND_FLOAT) /* which rounds otherwise with others */
+    SF_TRY(sf_ranks_same(set->ranks, "set of vector instructions", sf_kernels_select(NULL)->name));
   return sf_ranks_same(set->ranks, "data set", cameras);
 }
 

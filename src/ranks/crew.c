@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* mpirun kills what is left a second after it asked all to end: rank 0 has to have written what there is by then. */
-static const double DEALER_PATIENCE = 0.5, SERVANT_PATIENCE = 5;
+static const double DEALER_PATIENCE = 0.5, SERVANT_PATIENCE = 3;
 
 typedef struct team {
   sf_crew crew; /* first: the crew is the team */
@@ -13,6 +13,12 @@ typedef struct team {
   const sf_deal *deal;
   sf_hand *hand; /* of rank 0 */
 } team;
+
+/* What became of the deal, and whether rank 0 leaves without waiting for anybody. */
+typedef struct farewell {
+  sf_status status;
+  bool broken;
+} farewell;
 
 /* On every rank: nobody deals or serves unless all can. */
 static sf_status begin(sf_ranks *r, const sf_deal *deal, sf_hand **hand)
@@ -80,13 +86,26 @@ static sf_status part(team *t, int rank)
   }
 }
 
+/* Also to ranks that may be lost: whoever hears it ends without waiting for the others. */
+static void dismiss(team *t, const farewell *last)
+{
+  for (int i = 1; i < t->crew.count; i++) {
+    if (!t->ranks->broken) {
+      (void)sf_ranks_send(t->ranks, i, SF_TAG_DISMISS, last, sizeof *last);
+      continue;
+    }
+    sf_link_send(t->ranks->link, i, SF_TAG_DISMISS, last, sizeof *last);
+    for (int naps = 0; naps < 20 && !sf_link_sent(t->ranks->link); naps++) sf_ranks_nap();
+  }
+}
+
 static sf_status end(sf_crew *crew, const sf_status *status)
 {
   sf_status kept = *status;
   team *t = (team *)crew;
+  const farewell last = {kept, t->ranks->broken};
   atomic_store(&t->ranks->enough, true);
-  for (int i = 1; i < crew->count && !t->ranks->broken; i++)
-    (void)sf_ranks_send(t->ranks, i, SF_TAG_DISMISS, &kept, sizeof kept);
+  dismiss(t, &last);
   sf_hand_close(t->hand);
   for (int i = 1; i < crew->count && !t->ranks->broken; i++) {
     const sf_status parted = part(t, i);
@@ -127,9 +146,10 @@ static bool obey(sf_ranks *r, sf_hand *hand, sf_status *status)
   if (tag != SF_TAG_STOP) *status = sf_fail(SF_E_FORMAT, "message %d in the middle of a deal", tag);
   if (tag == SF_TAG_STOP) return (void)sf_ranks_receive(r, 0, tag, NULL, 0), false;
   if (tag != SF_TAG_DISMISS) return true;
-  sf_status said;
-  const sf_status received = sf_ranks_receive(r, 0, tag, &said, sizeof said);
-  *status = received.code == SF_OK ? said : received;
+  farewell last;
+  const sf_status received = sf_ranks_receive(r, 0, tag, &last, sizeof last);
+  *status = received.code == SF_OK ? last.status : received;
+  r->broken |= received.code == SF_OK && last.broken;
   return true;
 }
 
@@ -138,7 +158,7 @@ static bool forsaken(sf_ranks *r, double *since)
 {
   if (!r->options.interrupted()) return false;
   if (*since == 0) *since = sf_seconds();
-  r->broken = sf_seconds() - *since > SERVANT_PATIENCE;
+  r->broken = r->deserted = sf_seconds() - *since > SERVANT_PATIENCE;
   return r->broken;
 }
 

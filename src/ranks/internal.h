@@ -12,7 +12,8 @@ struct sf_ranks {
   sf_link *link;    /* NULL: alone */
   char (*host)[64]; /* [size] on rank 0 */
   atomic_bool enough;
-  bool broken; /* a rank does not answer */
+  bool broken;   /* a rank does not answer: nothing can be done together any more */
+  bool deserted; /* it is rank 0 that does not answer */
 };
 
 /* Those who work on units: forked processes, or the ranks of a job. */

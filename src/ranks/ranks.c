@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 /* An interrupted rank waits so long for an answer of another. */
-static const double PATIENCE = 5;
+static const double PATIENCE = 3;
 
 int sf_ranks_launched(void)
 {
@@ -17,7 +17,7 @@ int sf_ranks_launched(void)
 
 bool sf_ranks_talks(const sf_ranks *r)
 {
-  return (r && r->broken) || sf_link_launched().rank <= 0;
+  return (r && r->deserted) || sf_link_launched().rank <= 0;
 }
 
 int sf_ranks_rank(const sf_ranks *r)
@@ -56,7 +56,7 @@ sf_status sf_ranks_named(const sf_ranks *r, sf_status status)
 /* MPI's own waiting takes a whole processor. */
 void sf_ranks_nap(void)
 {
-  const struct timespec t = {.tv_nsec = 500000};
+  const struct timespec t = {.tv_nsec = 1000000};
   nanosleep(&t, NULL);
 }
 
@@ -68,7 +68,7 @@ static sf_status silent(sf_ranks *r, int rank, double *since)
   if (r->broken || !r->options.interrupted()) return sf_ok();
   if (*since == 0) *since = sf_seconds();
   if (sf_seconds() - *since < PATIENCE) return sf_ok();
-  r->broken = true;
+  r->broken = true, r->deserted = r->rank > 0;
   sf_ranks_name(r, rank, name, sizeof name);
   return sf_fail(SF_E_STOPPED, "stopped; %s does not answer", name);
 }

@@ -52,6 +52,8 @@ same fault4.replay fault0.replay "planted fault"
 for how in "-KILL 2" "-KILL 0" "-INT job"; do
   read -r signal victim <<<"$how"
   rm -f part
+  # From its request to end until it kills mpirun gives a second, which on a crowded machine may be too short to be told.
+  [ "$victim" = job ] && export OMPI_MCA_odls_base_sigkill_timeout=3 || unset OMPI_MCA_odls_base_sigkill_timeout
   mpirun --oversubscribe -n 3 "$build/faults/sf_cosim" scene.snn data --rays 100000 --block 2 --quiet --json --checkpoint part >cut.json 2>cut.err &
   parent=$!
   await part
