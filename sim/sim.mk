@@ -164,7 +164,7 @@ lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys 
 	@cd $(RTL_ROOT) && for top in $(BOARD_TOPS); do files="$(RTL) $(RTL_BOARD) rtl/board/$$top/$$top.sv $(CURDIR)/tests/board/vendor.sv"; \
 	  $(VERILATOR) --lint-only --top-module $$top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $$files || exit 1; \
 	  ! command -v iverilog >/dev/null || iverilog -g2012 -Wall -Wno-timescale -DSF_NO_TAP -Irtl -s $$top -t null $$files || exit 1; \
-	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -p "read_verilog -sv -defer -DSF_NO_TAP -Irtl $$files; hierarchy -check -top $$top" >/dev/null || exit 1; \
+	  ! command -v yosys >/dev/null || yosys -q -w "Replacing memory" -w "Replacing floating point" -p "read_verilog -sv -defer -DSF_NO_TAP -Irtl $$files; hierarchy -check -top $$top" >/dev/null || exit 1; \
 	done
 
 synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="32 64", MODULES=, SYNTH=--top): build/synth
