@@ -46,7 +46,7 @@ static int wait_for(sf_crew *crew, int ms)
     int rank, tag;
     size_t size;
     if (sf_hand_done(t->hand)) return 0;
-    if (sf_link_probe(t->ranks->link, -1, &rank, &tag, &size)) return rank;
+    if (sf_mpi_link_probe(t->ranks->link, -1, &rank, &tag, &size)) return rank;
     if (sf_seconds() >= end) return -1;
   }
 }
@@ -80,7 +80,7 @@ static sf_status part(team *t, int rank)
     SF_TRY(sf_ranks_wait(t->ranks, rank, &tag, &size));
     void *unwanted = malloc(size + 1);
     if (!unwanted) return sf_fail(SF_E_MEMORY, "no memory for a result");
-    sf_link_receive(t->ranks->link, rank, tag, unwanted, size);
+    sf_mpi_link_receive(t->ranks->link, rank, tag, unwanted, size);
     free(unwanted);
     if (tag == SF_TAG_BYE) return sf_ok();
   }
@@ -94,8 +94,8 @@ static void dismiss(team *t, const farewell *last)
       (void)sf_ranks_send(t->ranks, i, SF_TAG_DISMISS, last, sizeof *last);
       continue;
     }
-    sf_link_send(t->ranks->link, i, SF_TAG_DISMISS, last, sizeof *last);
-    for (int naps = 0; naps < 20 && !sf_link_sent(t->ranks->link); naps++) sf_ranks_nap();
+    sf_mpi_link_send(t->ranks->link, i, SF_TAG_DISMISS, last, sizeof *last);
+    for (int naps = 0; naps < 20 && !sf_mpi_link_sent(t->ranks->link); naps++) sf_ranks_nap();
   }
 }
 
@@ -136,7 +136,7 @@ static bool obey(sf_ranks *r, sf_hand *hand, sf_status *status)
   int from, tag;
   size_t size;
   uint64_t unit;
-  if (!sf_link_probe(r->link, 0, &from, &tag, &size)) return false;
+  if (!sf_mpi_link_probe(r->link, 0, &from, &tag, &size)) return false;
   if (tag == SF_TAG_UNIT) {
     const sf_status given = sf_ranks_receive(r, 0, tag, &unit, sizeof unit);
     if (given.code == SF_OK) sf_hand_give(hand, unit);

@@ -1,6 +1,6 @@
 #ifndef SF_RANKS_INTERNAL_H
 #define SF_RANKS_INTERNAL_H
-#include "ranks/link.h"
+#include "ranks/mpi_link.h"
 #include "ranks/ranks.h"
 #include <stdatomic.h>
 
@@ -9,8 +9,8 @@ enum { SF_TAG_DATA = 1, SF_TAG_UNIT, SF_TAG_STOP, SF_TAG_DISMISS, SF_TAG_RESULT,
 struct sf_ranks {
   sf_ranks_options options;
   int rank, size;
-  sf_link *link;    /* NULL: alone */
-  char (*host)[64]; /* [size] on rank 0 */
+  sf_mpi_link *link; /* NULL: alone */
+  char (*host)[64];  /* [size] on rank 0 */
   atomic_bool enough;
   bool broken;   /* a rank does not answer: nothing can be done together any more */
   bool deserted; /* it is rank 0 that does not answer */

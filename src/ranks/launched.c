@@ -1,4 +1,4 @@
-#include "ranks/link.h"
+#include "ranks/mpi_link.h"
 #include <stdlib.h>
 
 /* -1: not there, or no number. */
@@ -14,7 +14,7 @@ static int number(const char *name)
 /* mpirun of Open MPI; srun, whose tasks talk to each other where it brings PMIx along; another MPI's mpirun, which
  * cannot serve but has to be noticed. A script that srun or mpirun started hands its place on to what it starts.
  */
-sf_launched sf_link_launched(void)
+sf_launched sf_mpi_link_launched(void)
 {
   const int ompi = number("OMPI_COMM_WORLD_SIZE"), tasks = number("SLURM_STEP_NUM_TASKS"), pmi = number("PMI_SIZE");
   if (ompi > 0) return (sf_launched){ompi, number("OMPI_COMM_WORLD_RANK"), true};

@@ -1,13 +1,13 @@
 /* Open MPI behind the link, loaded when a launcher started this process. SF_MPI: the name of its library, by the build;
  * without it there is none. */
-#include "ranks/link.h"
+#include "ranks/mpi_link.h"
 #ifdef SF_MPI
 #include <dlfcn.h>
 #include <mpi.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct sf_link {
+struct sf_mpi_link {
   __typeof__(&MPI_Init_thread) init;
   __typeof__(&MPI_Comm_rank) rank;
   __typeof__(&MPI_Comm_size) size;
@@ -27,7 +27,7 @@ typedef struct symbol {
   void *place; /* a pointer to be filled */
 } symbol;
 
-static sf_status load(sf_link *l)
+static sf_status load(sf_mpi_link *l)
 {
   const symbol symbols[] = {{"MPI_Init_thread", &l->init},  {"MPI_Comm_rank", &l->rank},
                             {"MPI_Comm_size", &l->size},    {"MPI_Iprobe", &l->probe},
@@ -49,7 +49,7 @@ static sf_status load(sf_link *l)
 }
 
 /* Only the thread that opens the link uses it. Errors of MPI end the job: its default. */
-static sf_status begin(sf_link *l, const sf_launched *launched)
+static sf_status begin(sf_mpi_link *l, const sf_launched *launched)
 {
   int provided, size, rank;
   SF_TRY(load(l));
@@ -63,7 +63,7 @@ static sf_status begin(sf_link *l, const sf_launched *launched)
                  launched->rank, launched->size, rank, size);
 }
 
-sf_status sf_link_open(sf_link **link, const sf_launched *launched)
+sf_status sf_mpi_link_open(sf_mpi_link **link, const sf_launched *launched)
 {
   *link = calloc(1, sizeof **link);
   if (!*link) return sf_fail(SF_E_MEMORY, "out of memory");
@@ -74,13 +74,13 @@ sf_status sf_link_open(sf_link **link, const sf_launched *launched)
   return status;
 }
 
-void sf_link_close(sf_link *l)
+void sf_mpi_link_close(sf_mpi_link *l)
 {
   if (l) l->finalize();
   free(l);
 }
 
-bool sf_link_probe(sf_link *l, int from, int *rank, int *tag, size_t *size)
+bool sf_mpi_link_probe(sf_mpi_link *l, int from, int *rank, int *tag, size_t *size)
 {
   MPI_Status status;
   int there, bytes;
@@ -91,17 +91,17 @@ bool sf_link_probe(sf_link *l, int from, int *rank, int *tag, size_t *size)
   return true;
 }
 
-void sf_link_receive(sf_link *l, int from, int tag, void *data, size_t size)
+void sf_mpi_link_receive(sf_mpi_link *l, int from, int tag, void *data, size_t size)
 {
   l->receive(data, (int)size, l->byte, from, tag, l->world, MPI_STATUS_IGNORE);
 }
 
-void sf_link_send(sf_link *l, int to, int tag, const void *data, size_t size)
+void sf_mpi_link_send(sf_mpi_link *l, int to, int tag, const void *data, size_t size)
 {
   l->send(data, (int)size, l->byte, to, tag, l->world, &l->sending);
 }
 
-bool sf_link_sent(sf_link *l)
+bool sf_mpi_link_sent(sf_mpi_link *l)
 {
   int done;
   l->test(&l->sending, &done, MPI_STATUS_IGNORE);
@@ -110,7 +110,7 @@ bool sf_link_sent(sf_link *l)
 
 #else
 
-sf_status sf_link_open(sf_link **link, const sf_launched *launched)
+sf_status sf_mpi_link_open(sf_mpi_link **link, const sf_launched *launched)
 {
   *link = NULL;
   return sf_fail(
@@ -119,28 +119,28 @@ sf_status sf_link_open(sf_link **link, const sf_launched *launched)
       launched->size);
 }
 
-void sf_link_close(sf_link *link)
+void sf_mpi_link_close(sf_mpi_link *link)
 {
   (void)link;
 }
 
-bool sf_link_probe(sf_link *link, int from, int *rank, int *tag, size_t *size)
+bool sf_mpi_link_probe(sf_mpi_link *link, int from, int *rank, int *tag, size_t *size)
 {
   (void)link, (void)from, (void)rank, (void)tag, (void)size;
   return false;
 }
 
-void sf_link_receive(sf_link *link, int from, int tag, void *data, size_t size)
+void sf_mpi_link_receive(sf_mpi_link *link, int from, int tag, void *data, size_t size)
 {
   (void)link, (void)from, (void)tag, (void)data, (void)size;
 }
 
-void sf_link_send(sf_link *link, int to, int tag, const void *data, size_t size)
+void sf_mpi_link_send(sf_mpi_link *link, int to, int tag, const void *data, size_t size)
 {
   (void)link, (void)to, (void)tag, (void)data, (void)size;
 }
 
-bool sf_link_sent(sf_link *link)
+bool sf_mpi_link_sent(sf_mpi_link *link)
 {
   (void)link;
   return true;

@@ -12,12 +12,12 @@ static const double PATIENCE = 3;
 
 int sf_ranks_launched(void)
 {
-  return sf_link_launched().size;
+  return sf_mpi_link_launched().size;
 }
 
 bool sf_ranks_talks(const sf_ranks *r)
 {
-  return (r && r->deserted) || sf_link_launched().rank <= 0;
+  return (r && r->deserted) || sf_mpi_link_launched().rank <= 0;
 }
 
 int sf_ranks_rank(const sf_ranks *r)
@@ -77,7 +77,7 @@ sf_status sf_ranks_wait(sf_ranks *r, int from, int *tag, size_t *size)
 {
   int rank;
   for (double since = 0; !r->broken; sf_ranks_nap()) {
-    if (sf_link_probe(r->link, from, &rank, tag, size)) return sf_ok();
+    if (sf_mpi_link_probe(r->link, from, &rank, tag, size)) return sf_ok();
     SF_TRY(silent(r, from, &since));
   }
   return sf_fail(SF_E_STOPPED, "stopped");
@@ -91,7 +91,7 @@ sf_status sf_ranks_receive(sf_ranks *r, int from, int tag, void *data, size_t si
   if (there != tag || bytes != size)
     return sf_fail(SF_E_FORMAT, "rank %d sent message %d of %zu bytes, expected %d of %zu", from, there, bytes, tag,
                    size);
-  sf_link_receive(r->link, from, tag, data, size);
+  sf_mpi_link_receive(r->link, from, tag, data, size);
   return sf_ok();
 }
 
@@ -99,8 +99,8 @@ sf_status sf_ranks_send(sf_ranks *r, int to, int tag, const void *data, size_t s
 {
   double since = 0;
   if (r->broken) return sf_fail(SF_E_STOPPED, "stopped");
-  sf_link_send(r->link, to, tag, data, size);
-  while (!sf_link_sent(r->link)) {
+  sf_mpi_link_send(r->link, to, tag, data, size);
+  while (!sf_mpi_link_sent(r->link)) {
     SF_TRY(silent(r, to, &since));
     sf_ranks_nap();
   }
@@ -209,7 +209,7 @@ static sf_status meet(sf_ranks *r)
 
 sf_status sf_ranks_open(sf_ranks **ranks, const sf_ranks_options *options)
 {
-  const sf_launched launched = sf_link_launched();
+  const sf_launched launched = sf_mpi_link_launched();
   sf_ranks *r = *ranks = calloc(1, sizeof *r);
   if (!r) return sf_fail(SF_E_MEMORY, "out of memory");
   r->options = *options, r->size = 1;
@@ -218,7 +218,7 @@ sf_status sf_ranks_open(sf_ranks **ranks, const sf_ranks_options *options)
   if (!launched.messages)
     return sf_fail(SF_E_UNSUPPORTED, "srun started %d tasks that cannot talk to each other: srun --mpi=pmix",
                    launched.size);
-  SF_TRY(sf_link_open(&r->link, &launched));
+  SF_TRY(sf_mpi_link_open(&r->link, &launched));
   r->size = launched.size;
   return meet(r);
 }
@@ -229,7 +229,7 @@ void sf_ranks_close(sf_ranks *r)
   if (!r) return;
   /* Rank 0 may have much to write still: the others wait for it as for all messages. A link whose other end is lost
    * would wait for ever. */
-  if (r->link && sf_ranks_broadcast(r, &done, 1).code == SF_OK) sf_link_close(r->link);
+  if (r->link && sf_ranks_broadcast(r, &done, 1).code == SF_OK) sf_mpi_link_close(r->link);
   free(r->host);
   free(r);
 }
