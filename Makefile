@@ -204,6 +204,9 @@ SAMPLES ?= 10000000
 vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAMPLES (10 M) random samples, and as many for the grid and in rays
 	SF_FX_SAMPLES=$(SAMPLES) $B/tests/test_fx_vector
 
+gradient-check: $B/tests/test_gradient ## every gradient of the trainer against slopes in double precision, over SEEDS ("1 2 3"), eight directions a tensor
+	@for seed in $(SEEDS); do SF_GRADIENT_SEED=$$seed SF_GRADIENT_DIRECTIONS=8 $< || exit 1; done
+
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan $(SAME_ARCH) OPT=-O2 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
@@ -299,6 +302,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign gradient-check cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

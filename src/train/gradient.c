@@ -1,4 +1,6 @@
 /* One iteration's samples: bundles of rays in groups, added in order. What a bundle computes is the backbone's. */
+#include "field/field.h"
+#include "snn/plif.h"
 #include "train/internal.h"
 #include <math.h>
 #include <omp.h>
@@ -135,4 +137,24 @@ void sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean
     fired[l] = counted > 0 ? fired[l] / counted : 0;
   }
   sf_charge_measured(t, fired);
+}
+
+double sf_gradient_leaks(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *sums)
+{
+  if (p->extra == 0) return 0;
+  static const int integrator[2] = {1, 4}, spiking[3] = {0, 2, 3};
+  const double from_tail[2] = {sums->g_sigma_leak, sums->g_colour_leak};
+  float *leak = sf_model_param(&t->model, SF_P_LEAK), *grad = t->grad + (leak - t->model.value);
+  double value = 0;
+  for (int i = 0; i < 2; i++) {
+    const float k = sf_sigmoid(leak[integrator[i]]);
+    grad[integrator[i]] += (float)(from_tail[i] * k * (1 - k));
+  }
+  for (int i = 0; i < 3; i++) {
+    if (!sf_model_has(&t->model, sf_layer_weights[spiking[i]])) continue;
+    const double inverse = exp(-(double)leak[spiking[i]]), tau = fmin(1 + inverse, 30.0); /* e^tau stays finite */
+    value += exp(tau);
+    grad[spiking[i]] -= (float)(p->extra * exp(tau) * inverse);
+  }
+  return value;
 }

@@ -250,27 +250,6 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   return p;
 }
 
-/* L_extra's part in the leaks: the integrators' decay factors, and e^tau of the neurons. */
-static double leak_terms(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *sums)
-{
-  if (p->extra == 0) return 0;
-  static const int integrator[2] = {1, 4}, spiking[3] = {0, 2, 3};
-  const double from_tail[2] = {sums->g_sigma_leak, sums->g_colour_leak};
-  float *leak = sf_model_param(&t->model, SF_P_LEAK), *grad = t->grad + (leak - t->model.value);
-  double value = 0;
-  for (int i = 0; i < 2; i++) {
-    const float k = sf_sigmoid(leak[integrator[i]]);
-    grad[integrator[i]] += (float)(from_tail[i] * k * (1 - k));
-  }
-  for (int i = 0; i < 3; i++) {
-    if (!sf_model_has(&t->model, sf_layer_weights[spiking[i]])) continue;
-    const double inverse = exp(-(double)leak[spiking[i]]), tau = fmin(1 + inverse, 30.0); /* e^tau stays finite */
-    value += exp(tau);
-    grad[spiking[i]] -= (float)(p->extra * exp(tau) * inverse);
-  }
-  return value;
-}
-
 /* With bounded gradients Adam's squares stay finite, and with them every step: |update| is a few times the rate. */
 static sf_status check_gradient(const sf_trainer *t, double loss)
 {
@@ -367,7 +346,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
   sf_gradient_run(t, &plan, &mean, t->firing);
-  const double e_tau = leak_terms(t, &plan, &mean);
+  const double e_tau = sf_gradient_leaks(t, &plan, &mean);
   double mse = 0;
   for (int i = 0; i < plan.steps; i++) mse += plan.weight[i] * mean.prefix[i];
   double loss = mse + mean.regular;
