@@ -62,18 +62,20 @@ typedef struct rig {
   sf_kernels kernels;
   oracle o;
   double variation; /* weight of the planes' total variation */
+  double firing;    /* of C1, last plan */
   int moved;        /* directions whose slope is no rounding */
 } rig;
 
 /* A trainer that has learned for a moment, so that every layer fires; from now on its parameters stay. */
-static void rig_start(rig *r, sf_train_options *options, int iterations)
+/* gain: of C1, C2 and their biases: a young net fires little there. */
+static void rig_start(rig *r, sf_train_options *options, int iterations, float gain)
 {
   options->seed += seed;
   *r = (rig){.t = start(&data, options, NULL)};
   r->t->kernels = sf_kernels_select("portable");
   steps(r->t, iterations);
-  const sf_param *c2 = &r->t->model.param[SF_P_C2]; /* in a young net it is silent */
-  for (size_t i = 0; i < c2->size; i++) r->t->model.value[c2->offset + i] *= 2;
+  for (int id = SF_P_C1; id <= SF_P_C2; id++)
+    for (size_t i = 0; i < r->t->model.param[id].size; i++) sf_model_param(&r->t->model, id)[i] *= gain;
   r->kernels = *r->t->kernels;
   r->kernels.adam = capture;
   r->t->kernels = &r->kernels;
@@ -158,6 +160,7 @@ static void check_plan(rig *r, const char *what, sf_loss_plan p)
   p.k_sigma = sf_model_decodes(&t->model) ? 0 : sf_sigmoid(leaks[1]);
   p.k_colour = sf_sigmoid(leaks[4]);
   sf_gradient_run(t, &p, &mean, firing);
+  r->firing = firing[1];
   const double e_tau = sf_gradient_leaks(t, &p, &mean);
   t->backbone->update(t);
   r->o.plan = &p;
@@ -222,12 +225,18 @@ static sf_train_options grid_run(int mode)
   return o;
 }
 
+/* Rows of C2 are added up for spikes where C1 fires little, else multiplied. */
+static const float gains[3] = {1, 4, 12};
 LOOP_TEST(terms_of_the_grid, 3)
 {
   sf_train_options o = grid_run(_i);
   rig r;
-  rig_start(&r, &o, 20);
+  rig_start(&r, &o, 20, gains[_i]);
+  for (int n = 0; n < o.config.hidden && _i == 2; n++) /* the first harmonic is a constant */
+    sf_model_param(&r.t->model, SF_P_C1)[n * (SF_DIR_FEATURES + SF_GEO_FEATURES)] += 4;
   check_terms(&r);
+  if (_i == 0) ck_assert_double_lt(r.firing, 0.25); /* rows, forward and backward */
+  if (_i == 2) ck_assert_double_gt(r.firing, 0.45); /* products, forward and backward */
   rig_end(&r);
 }
 
@@ -260,7 +269,7 @@ LOOP_TEST(terms_of_the_planes, 3)
   sf_train_options o = planes_run(_i);
   o.config.tensorf.activation = _i == SF_DECAY ? SF_RELU : SF_SOFTPLUS;
   rig r;
-  rig_start(&r, &o, 6);
+  rig_start(&r, &o, 6, 2);
   check_terms(&r);
   rig_end(&r);
 }
@@ -270,7 +279,7 @@ TEST(variation_of_the_planes)
 {
   sf_train_options o = planes_run(SF_HYBRID);
   rig r;
-  rig_start(&r, &o, 6);
+  rig_start(&r, &o, 6, 2);
   const double fresh = r.t->vm->fresh_at;
   r.variation = 1e-2 * pow(0.1, (r.t->progress - fresh) / (1 - fresh));
   r.t->model.config.tensorf.ndc = 1;
@@ -284,7 +293,7 @@ LOOP_TEST(the_twins, 2)
   o.config.net = SF_NET_ANN;
   o.config.steps = 1;
   rig r;
-  rig_start(&r, &o, 6);
+  rig_start(&r, &o, 6, 2);
   sf_loss_plan p = {.steps = 1, .weight = {1}};
   check_plan(&r, "squared error", p);
   p.regular_at = 1;
@@ -308,7 +317,7 @@ TEST(rounded_weights)
   base.scales = report.scales;
   o.start = &base;
   rig r;
-  rig_start(&r, &o, 2);
+  rig_start(&r, &o, 2, 1);
   sf_train_prepare(r.t);
   r.o.rounded = calloc(r.t->model.size, sizeof *r.o.rounded);
   for (size_t i = 0; i < r.t->model.size; i++) r.o.rounded[i] = r.t->model.value[i];

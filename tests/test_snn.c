@@ -1,4 +1,5 @@
-/* Spiking nets: equations by hand, oracle against kernels, gradients against finite differences. */
+/* Spiking nets: equations by hand, oracle against kernels, backward passes against each other
+ * (test_gradient.c proves them). */
 #include "ck_run.h"
 #include "float_fixture.h"
 #include "base/memory.h"
@@ -190,184 +191,11 @@ static void random_output_gradient(float *dsigma, float *dcolour)
   for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dcolour[i] = test_random(1u << 25 | i);
 }
 
-static double objective(const rig *r, const float *dsigma, const float *dcolour, int steps)
+/* C2's gradient, in both of its parts. */
+static void whole_w4(const rig *r, int hidden)
 {
-  double sum = 0;
-  for (int t = 0; t < steps; t++)
-    for (int l = 0; l < SF_BLOCK; l++) {
-      sum += dsigma[t * SF_BLOCK + l] * (double)r->block->sigma[t][l];
-      for (int c = 0; c < 3; c++)
-        sum += dcolour[(t * 3 + c) * SF_BLOCK + l] * (double)r->block->colour[t][c * SF_BLOCK + l];
-    }
-  return sum;
-}
-
-static float grad_at(const rig *r, sf_param_id id, size_t i)
-{
-  const int hidden = r->model.config.hidden;
-  switch (id) {
-  case SF_P_D1:
-    return r->grad->w1[i / 8 * 16 + i % 8];
-  case SF_P_D2:
-    return r->grad->w2[i];
-  case SF_P_C1:
-    return r->grad->w3[i / 31 * 32 + i % 31 + (i % 31 >= 16)];
-  case SF_P_C2:
-    return r->grad->w4[i] + r->grad->w4t[i % hidden * hidden + i / hidden];
-  case SF_P_C3:
-    return r->grad->w5[i];
-  default:
-    return hidden ? r->grad->leak[i] : 0;
-  }
-}
-
-static double slope(rig *r, sf_param_id id, size_t i, float h, const float *ds, const float *dc)
-{
-  const sf_kernels *kernels = sf_kernels_select("portable");
-  float *at = sf_model_param(&r->model, id) + i, old = *at;
-  double value[2];
-  for (int side = 0; side < 2; side++) {
-    *at = old + (side ? h : -h);
-    rig_forward(r, kernels, 1);
-    value[side] = objective(r, ds, dc, r->model.config.steps);
-  }
-  *at = old;
-  return (value[1] - value[0]) / (2 * h);
-}
-
-/* The ReLU twin is smooth but for its kinks: every weight's gradient against central differences. Bound: float
- * cancellation in the difference, 2 % + 0.05 of a sum over 64 samples of size ~100. */
-TEST(ann_gradient_is_the_slope)
-{
-  const sf_kernels *kernels = sf_kernels_select(NULL);
-  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
-  OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, 16, 1);
-  random_output_gradient(ds, dc);
-  rig_forward(&r, kernels, 1);
-  kernels->backward(r.net, r.block, 1, ds, dc, df, r.grad, r.scratch);
-  for (int id = SF_P_D1; id <= SF_P_C3; id++)
-    for (size_t i = 0; i < r.model.param[id].size; i += 3) {
-      double expected = slope(&r, id, i, 2e-3f, ds, dc), actual = grad_at(&r, id, i);
-      ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.3, "%s[%zu]: slope %g, gradient %g",
-                    r.model.param[id].name, i, expected, actual);
-    }
-}
-
-/* The integrators' leaks and the last layers are smooth in a spiking net too: no spike depends on them. */
-TEST(snn_smooth_parts_match_the_slope)
-{
-  const sf_kernels *kernels = sf_kernels_select(NULL);
-  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
-  for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    OWNED(rig) r = rig_make(SF_NET_SNN, mode, mode == SF_DECAY ? SF_LANES : 32, 6);
-    random_output_gradient(ds, dc);
-    rig_forward(&r, kernels, 1);
-    kernels->backward(r.net, r.block, 6, ds, dc, df, r.grad, r.scratch);
-    for (size_t i = 0; i < r.model.param[SF_P_C3].size; i += r.model.param[SF_P_C3].size / 19) {
-      double expected = slope(&r, SF_P_C3, i, 1e-2f, ds, dc);
-      ck_assert_double_eq_tol(grad_at(&r, SF_P_C3, i), expected, 0.01 * fabs(expected) + 0.05);
-    }
-    for (int leak = 1; leak <= 4; leak += 3) {
-      double expected = slope(&r, SF_P_LEAK, leak, 1e-2f, ds, dc);
-      ck_assert_double_eq_tol(grad_at(&r, SF_P_LEAK, leak), expected, 0.01 * fabs(expected) + 0.1);
-    }
-  }
-}
-
-/* One neuron chain by the equations of the surrogate, written out independently for C3 <- C2 <- constant drive:
- * g_h = (g_s - theta g_v) sd + g_v, g_x = k g_h, g_v(t-1) = (1-k) g_h, g_w = (1-k) sum g_h (h - v). Checks dW4 and the
- * leak of C2 with W5 as read-out, in double. */
-static void check_plif_backward(float gain)
-{
-  const sf_kernels *kernels = sf_kernels_select(NULL);
-  static float ds[SF_T_MAX * SF_BLOCK], dc[SF_T_MAX * 3 * SF_BLOCK], df[32 * SF_BLOCK];
-  enum { T = 6, H = 16 };
-  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
-  drive(&r, gain);
-  random_output_gradient(ds, dc);
-  rig_forward(&r, kernels, 1);
-  kernels->backward(r.net, r.block, T, ds, dc, df, r.grad, r.scratch);
-  const float *w5 = sf_model_param(&r.model, SF_P_C3);
-  double dw4[H][H] = {{0}}, dleak = 0;
-  const double k = r.net->view.k[3], kc = r.net->view.k[4];
-  for (int l = 0; l < SF_BLOCK; l++)
-    for (int n = 0; n < H; n++) {
-      double gv = 0, go[3] = {0};
-      for (int t = T - 1; t >= 0; t--) {
-        double gs = 0;
-        for (int c = 0; c < 3; c++) {
-          const double j = r.block->j[t][c * SF_BLOCK + l], s = 1 / (1 + exp(-j));
-          go[c] += dc[(t * 3 + c) * SF_BLOCK + l];
-          gs += w5[c * H + n] * go[c] * (t ? kc : 1) * s * (1 - s);
-          go[c] *= 1 - kc;
-        }
-        const double h = r.block->m4[t][n * SF_BLOCK + l], sg = 1 / (1 + exp(-SF_SURROGATE_ALPHA * (h - 1)));
-        const double gh = (gs - gv) * SF_SURROGATE_ALPHA * sg * (1 - sg) + gv;
-        const double before = t ? r.block->m4[t - 1][n * SF_BLOCK + l] : 0, v = before - (before >= 1);
-        if (t) dleak += (1 - k) * gh * (h - v);
-        for (int m = 0; m < H; m++) dw4[n][m] += (t ? k : 1) * gh * (r.block->m3[t][m * SF_BLOCK + l] >= 1);
-        gv = (1 - k) * gh;
-      }
-    }
-  for (int n = 0; n < H; n++)
-    for (int m = 0; m < H; m++)
-      ck_assert_double_eq_tol(grad_at(&r, SF_P_C2, n * H + m), dw4[n][m],
-                              1e-3 + 1e-4 * fabs(dw4[n][m])); /* 384 float additions */
-  ck_assert_double_eq_tol(r.grad->leak[3], dleak, 1e-2 + 1e-3 * fabs(dleak));
-}
-
-TEST(plif_backward_by_the_equations)
-{
-  for (int g = 0; g < 2; g++) check_plif_backward(gains[g]);
-}
-
-/* What spiking layer 0..2 costs by its firing alone, by the equations: a neuron that fires at no other step than t has
- * da/ds(t) = 1. Checks the gradient of the layer's own weights; the last lanes hold no samples. */
-static void check_charge(int layer)
-{
-  enum { T = 5, H = 16, LANES = 41 };
-  static const int id[3] = {SF_P_D1, SF_P_C1, SF_P_C2}, columns[3] = {8, 31, H}, inputs[3] = {8, 16, H};
-  static const float zero[SF_T_MAX * 3 * SF_BLOCK];
-  static float df[32 * SF_BLOCK];
-  const sf_kernels *kernels = sf_kernels_select(NULL);
-  OWNED(rig) r = rig_make(SF_NET_SNN, SF_HYBRID, H, T);
-  for (int i = 0; i < 3; i++) r.model.config.theta[i] = 0.25f;
-  rig_forward(&r, kernels, 1);
-  r.block->lanes = LANES;
-  r.net->view.charge[layer] = 0.7f;
-  kernels->backward(r.net, r.block, T, zero, zero, df, r.grad, r.scratch);
-  double sum[H][H] = {{0}};
-  int charged = 0, free_of_it = 0;
-  const double theta = 0.25, k = r.net->view.k[(const int[]){0, 2, 3}[layer]];
-  for (int l = 0; l < LANES; l++)
-    for (int n = 0; n < H; n++) {
-      double h[T], gv = 0;
-      int steps = 0;
-      for (int t = 0; t < T; t++) {
-        h[t] = (layer == 0 ? r.block->m1[t] : layer == 1 ? r.block->m3[t] : r.block->m4[t])[n * SF_BLOCK + l];
-        steps += h[t] >= theta;
-      }
-      for (int t = T - 1; t >= 0; t--) {
-        const double gs = steps == (h[t] >= theta) ? 0.7f : 0, sg = 1 / (1 + exp(-SF_SURROGATE_ALPHA * (h[t] - theta)));
-        const double gh = (gs - theta * gv) * SF_SURROGATE_ALPHA * sg * (1 - sg) + gv;
-        for (int i = 0; i < inputs[layer]; i++)
-          sum[n][i] += (t ? k : 1) * gh *
-                       (layer == 0   ? (double)r.block->f[i * SF_BLOCK + l]
-                        : layer == 1 ? (double)r.block->sh[i * SF_BLOCK + l]
-                                     : r.block->m3[t][i * SF_BLOCK + l] >= theta);
-        gv = (1 - k) * gh;
-        *(gs > 0 ? &charged : &free_of_it) += 1;
-      }
-    }
-  ck_assert(charged > 50 && free_of_it > 50);
-  for (int n = 0; n < H; n++)
-    for (int i = 0; i < inputs[layer]; i++)
-      ck_assert_double_eq_tol(grad_at(&r, id[layer], n * columns[layer] + i), sum[n][i], 1e-3 + 1e-4 * fabs(sum[n][i]));
-}
-
-TEST(charge_by_the_equations)
-{
-  for (int layer = 0; layer < 3; layer++) check_charge(layer);
+  for (int n = 0; n < hidden; n++)
+    for (int m = 0; m < hidden; m++) r->grad->w4[n * hidden + m] += r->grad->w4t[m * hidden + n];
 }
 
 /* The same spikes, only the backward pass is compared; in the second round firing is charged, too. */
@@ -397,8 +225,7 @@ TEST(backward_of_every_isa_agrees)
         ck_assert_float_le(distance(b.grad->w2, a.grad->w2, 16 * 48), bound);
         for (int r = 0; r < 48; r++) b.grad->w3[32 * r + 16] = a.grad->w3[32 * r + 16]; /* scratch column */
         ck_assert_float_le(distance(b.grad->w3, a.grad->w3, 48 * 32), bound);
-        for (int w = 0; w < 48 * 48; w++)
-          a.grad->w4[w] = grad_at(&a, SF_P_C2, w), b.grad->w4[w] = grad_at(&b, SF_P_C2, w);
+        whole_w4(&a, 48), whole_w4(&b, 48);
         ck_assert_float_le(distance(b.grad->w4, a.grad->w4, 48 * 48), bound);
         ck_assert_float_le(distance(b.grad->w5, a.grad->w5, 3 * 48), bound);
         if (kind == SF_NET_SNN) ck_assert_float_le(distance(b.grad->leak, a.grad->leak, SF_LAYERS), bound);
