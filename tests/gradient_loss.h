@@ -101,7 +101,7 @@ static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
   float sh[SF_DIR_FEATURES];
   dual sum = 0, feature[2 * 16];
   sf_sh4(from->direction, sh);
-  sf_scales_round_direction(&o->t->model.scales, sh);
+  sf_scales_round_direction(&o->t->model.scales, sh, SF_DIR_FEATURES);
   ray->count = from->count;
   for (int s = 0; s < ray->count; s++) {
     const int lane = from->lane + s;

@@ -318,7 +318,7 @@ TEST(rounded_weights)
   o.start = &base;
   rig r;
   rig_start(&r, &o, 2, 1);
-  sf_train_prepare(r.t);
+  sf_tuning_round(r.t);
   r.o.rounded = calloc(r.t->model.size, sizeof *r.o.rounded);
   for (size_t i = 0; i < r.t->model.size; i++) r.o.rounded[i] = r.t->model.value[i];
   for (int l = 0; l < SF_LAYERS; l++) {

@@ -192,7 +192,7 @@ static cJSON *scene_json(const sf_reproduction *r, const sf_report_scene *scene,
                          const sf_image *truth)
 {
   char file[640];
-  cJSON *json = cJSON_CreateObject(), *cell;
+  cJSON *json = cJSON_CreateObject();
   beside b = {truth, calloc((size_t)truth->width * (size_t)truth->height, sizeof *b.error),
               cJSON_AddArrayToObject(json, "cells")};
   if (!b.error || !b.cells) {
@@ -208,8 +208,8 @@ static cJSON *scene_json(const sf_reproduction *r, const sf_report_scene *scene,
     add_picture(r, &b, sf_run_kinds[run].title, file, path);
   }
   const part crop = worst_part(b.error, truth->width, truth->height);
-  cJSON_ArrayForEach(cell, b.cells)
-      cJSON_AddItemToObject(cell, "crop", cJSON_CreateIntArray((const int[]){crop.x, crop.y, crop.side}, 3));
+  for (cJSON *cell = b.cells->child; cell; cell = cell->next)
+    cJSON_AddItemToObject(cell, "crop", cJSON_CreateIntArray((const int[]){crop.x, crop.y, crop.side}, 3));
   free(b.error);
   return json;
 }
