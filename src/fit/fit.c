@@ -43,12 +43,12 @@ static sf_status choose_candidate(sf_search *s, int *chosen)
   const sf_fit_job *job = s->job;
   *chosen = 0;
   s->scene = job->candidate[0], s->widths = &job->widths[0];
-  SF_TRY(sf_search_measure(s, s->scene, job->rays, s->rank_end, s->check_end, NULL, &s->reference));
+  SF_TRY(sf_fit_search_measure(s, s->scene, job->rays, s->rank_end, s->check_end, NULL, &s->reference));
   for (int i = 1; i < job->candidates && job->loss_db > 0; i++) {
     sf_fit_sum sum;
-    SF_TRY(sf_search_tick(s, "widths", i, job->candidates));
-    SF_TRY(sf_search_measure(s, job->candidate[i], job->rays, s->rank_end, s->check_end, NULL, &sum));
-    if ((double)sum.error > sf_search_allowed(s, 0.5)) break;
+    SF_TRY(sf_fit_search_tick(s, "widths", i, job->candidates));
+    SF_TRY(sf_fit_search_measure(s, job->candidate[i], job->rays, s->rank_end, s->check_end, NULL, &sum));
+    if ((double)sum.error > sf_fit_search_allowed(s, 0.5)) break;
     s->scene = job->candidate[i], s->widths = &job->widths[i], *chosen = i;
   }
   return sf_ok();
@@ -65,11 +65,11 @@ static sf_status describe(const sf_search *s, const fx_scene *scene, const sf_qu
   const uint64_t checked = s->check_end - s->rank_end;
   sf_field_cost f;
   sf_fit_field whole;
-  SF_TRY(sf_search_field(s, scene, &f, &whole));
+  SF_TRY(sf_fit_search_field(s, scene, &f, &whole));
   sf_fit_describe(scene, widths, sum, checked, state);
   const double bytes = per_sample(whole.counts.grid_bytes, &whole.counts);
   state->lookups = f.lookups * bytes, state->misses = f.misses * bytes;
-  state->energy_fj = sf_search_energy(s, scene, &sum->counts, checked, &f, &sf_cache_built);
+  state->energy_fj = sf_fit_search_energy(s, scene, &sum->counts, checked, &f, &sf_cache_built);
   return sf_ok();
 }
 
@@ -84,13 +84,14 @@ static sf_status choose_cache(const sf_search *s, const fx_scene *scene, const s
   sf_fit_field whole;
   uint64_t misses[SF_FIT_CACHES];
   for (int i = 0; i < SF_FIT_CACHES; i++) shape[i] = (fx_cache_shape){FX_CACHE_BYTES_MIN << i, sf_cache_built.ways};
-  SF_TRY(sf_search_tick(s, "cache", 0, SF_FIT_CACHES));
+  SF_TRY(sf_fit_search_tick(s, "cache", 0, SF_FIT_CACHES));
   SF_TRY(sf_fit_measure_field(scene, s->job->tiles, shape, SF_FIT_CACHES, &whole, misses));
   uint64_t least = UINT64_MAX;
   for (int i = 0; i < SF_FIT_CACHES; i++) {
     const sf_field_cost f = sf_field_cost_of(&whole, misses[i]);
-    r->cache[i] = (sf_fit_cache){shape[i], whole.lookups ? (double)misses[i] / (double)whole.lookups : 0,
-                                 sf_search_energy(s, scene, &sum->counts, s->check_end - s->rank_end, &f, &shape[i])};
+    r->cache[i] =
+        (sf_fit_cache){shape[i], whole.lookups ? (double)misses[i] / (double)whole.lookups : 0,
+                       sf_fit_search_energy(s, scene, &sum->counts, s->check_end - s->rank_end, &f, &shape[i])};
     least = r->cache[i].energy_fj < least ? r->cache[i].energy_fj : least;
   }
   for (r->cache_chosen = 0; (double)r->cache[r->cache_chosen].energy_fj > NEARLY * (double)least;) r->cache_chosen++;
@@ -111,7 +112,8 @@ static sf_status finish(sf_search *s, const sf_trim *exact, fx_scene *fitted, sf
   SF_TRY(sf_trim_apply(s->scene, &s->trim, &s->use, s->job->name, fitted));
   sf_status status = sf_trim_zero_unread(fitted, s->job->name);
   if (status.code == SF_OK) status = fx_scene_check(fitted, s->job->name);
-  if (status.code == SF_OK) status = sf_search_measure(s, fitted, s->job->rays, s->rank_end, s->check_end, NULL, &sum);
+  if (status.code == SF_OK)
+    status = sf_fit_search_measure(s, fitted, s->job->rays, s->rank_end, s->check_end, NULL, &sum);
   if (status.code == SF_OK) status = describe_both(s, fitted, &sum, report);
   if (status.code != SF_OK) {
     fx_scene_free(fitted);
@@ -138,7 +140,7 @@ static sf_status observe(sf_search *s)
   for (uint64_t begin = 0; begin < count;) {
     const uint64_t stop = begin < s->check_end ? s->check_end : count;
     const uint64_t end = begin + CHUNK < stop ? begin + CHUNK : stop;
-    SF_TRY(sf_search_tick(s, "observing ray", (int)begin, (int)count));
+    SF_TRY(sf_fit_search_tick(s, "observing ray", (int)begin, (int)count));
     SF_TRY(sf_fit_observe(s->scene, s->job->rays, begin, end, begin >= s->check_end, &s->use));
     begin = end;
   }
@@ -155,7 +157,7 @@ static sf_status run(sf_search *s, fx_scene *fitted, sf_fit_report *report)
   sf_trim_all(s->scene, &s->trim);
   sf_trim_exact(s->scene, &s->use, &s->trim);
   const sf_trim exact = s->trim;
-  if (s->job->loss_db > 0) SF_TRY(sf_search_rounds(s));
+  if (s->job->loss_db > 0) SF_TRY(sf_fit_search_rounds(s));
   return finish(s, &exact, fitted, report);
 }
 

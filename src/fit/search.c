@@ -34,20 +34,20 @@ static sf_status list_cuts(sf_search *s)
 
 /* ---- measuring ---- */
 
-sf_status sf_search_tick(const sf_search *s, const char *what, int done, int total)
+sf_status sf_fit_search_tick(const sf_search *s, const char *what, int done, int total)
 {
   if (!s->job->tick || s->job->tick(s->job->user, what, done, total)) return sf_ok();
   return sf_fail(SF_E_STOPPED, "%s: stopped while fitting", s->job->name);
 }
 
-sf_status sf_search_measure(const sf_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
-                            uint64_t end, uint32_t *picture, sf_fit_sum *sum)
+sf_status sf_fit_search_measure(const sf_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
+                                uint64_t end, uint32_t *picture, sf_fit_sum *sum)
 {
   memset(sum, 0, sizeof *sum);
   for (uint64_t at = begin, next; at < end; at = next) {
     sf_fit_sum part;
     next = at + CHUNK < end ? at + CHUNK : end;
-    SF_TRY(sf_search_tick(s, NULL, 0, 0));
+    SF_TRY(sf_fit_search_tick(s, NULL, 0, 0));
     SF_TRY(sf_fit_measure(scene, rays, at, next, picture ? picture + 3 * (at - begin) : NULL, &part));
     sum->error += part.error;
     fx_counts_add(&sum->counts, &part.counts);
@@ -61,17 +61,17 @@ sf_field_cost sf_field_cost_of(const sf_fit_field *field, uint64_t misses)
   return bytes > 0 ? (sf_field_cost){(double)field->lookups / bytes, (double)misses / bytes} : (sf_field_cost){0, 0};
 }
 
-sf_status sf_search_field(const sf_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole)
+sf_status sf_fit_search_field(const sf_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole)
 {
   uint64_t misses;
-  SF_TRY(sf_search_tick(s, NULL, 0, 0));
+  SF_TRY(sf_fit_search_tick(s, NULL, 0, 0));
   SF_TRY(sf_fit_measure_field(scene, s->job->tiles, &sf_cache_built, 1, whole, &misses));
   *cost = sf_field_cost_of(whole, misses);
   return sf_ok();
 }
 
-uint64_t sf_search_energy(const sf_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
-                          const sf_field_cost *field, const fx_cache_shape *cache)
+uint64_t sf_fit_search_energy(const sf_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
+                              const sf_field_cost *field, const fx_cache_shape *cache)
 {
   const double bytes = (double)counts->grid_bytes;
   const fx_memory_counts memory = {.lookups = (uint64_t)(field->lookups * bytes),
@@ -89,11 +89,11 @@ static sf_status measure_trim(sf_search *s, const sf_trim *trim, const sf_fit_ra
   sf_fit_sum sum;
   sf_fit_field whole;
   SF_TRY(sf_trim_apply(s->scene, trim, &s->use, s->job->name, &trial));
-  sf_status status = sf_search_measure(s, &trial, rays, begin, end, picture, &sum);
-  if (status.code == SF_OK && new_field) status = sf_search_field(s, &trial, new_field, &whole);
+  sf_status status = sf_fit_search_measure(s, &trial, rays, begin, end, picture, &sum);
+  if (status.code == SF_OK && new_field) status = sf_fit_search_field(s, &trial, new_field, &whole);
   if (status.code == SF_OK) {
     const sf_field_cost *field = new_field ? new_field : &s->field_now;
-    *m = (sf_measured){sum.error, sf_search_energy(s, &trial, &sum.counts, end - begin, field, &sf_cache_built),
+    *m = (sf_measured){sum.error, sf_fit_search_energy(s, &trial, &sum.counts, end - begin, field, &sf_cache_built),
                        (uint64_t)sf_packed_bytes(&trial, s->widths)};
   }
   fx_scene_free(&trial);
@@ -135,7 +135,7 @@ static int by_price(const void *a, const void *b)
   return (left > right) - (left < right);
 }
 
-double sf_search_allowed(const sf_search *s, double share)
+double sf_fit_search_allowed(const sf_search *s, double share)
 {
   return (double)s->reference.error * pow(10, share * s->job->loss_db / 10);
 }
@@ -144,7 +144,7 @@ double sf_search_allowed(const sf_search *s, double share)
  * by price. */
 static sf_status rank_cuts(sf_search *s, int round)
 {
-  const double whole = sf_search_allowed(s, 1) / (double)s->reference.error - 1;
+  const double whole = sf_fit_search_allowed(s, 1) / (double)s->reference.error - 1;
   int left = 0;
   char what[32];
   snprintf(what, sizeof what, "round %d of %d", round + 1, ROUNDS);
@@ -152,7 +152,7 @@ static sf_status rank_cuts(sf_search *s, int round)
   for (int i = 0; i < s->count; i++) {
     sf_trim trial = s->trim;
     sf_cut c = s->cuts[i];
-    SF_TRY(sf_search_tick(s, what, i, s->count));
+    SF_TRY(sf_fit_search_tick(s, what, i, s->count));
     c.ranked = apply_cut(s, &trial, &c);
     if (c.ranked) SF_TRY(rank_cut(s, &trial, &c));
     if (c.ranked && (c.saving <= 0 || c.loss > HOPELESS * whole)) continue;
@@ -181,7 +181,7 @@ static sf_status take_cuts(sf_search *s, double limit, int begin, int end)
   sf_measured m;
   sf_field_cost f;
   if (begin == end || s->checks == CHECKS_MAX) return sf_ok();
-  SF_TRY(sf_search_tick(s, "checking", begin, end));
+  SF_TRY(sf_fit_search_tick(s, "checking", begin, end));
   for (int i = begin; i < end; i++) apply_cut(s, &trial, &s->cuts[i]);
   SF_TRY(check_trim(s, &trial, &f, &m));
   s->checks++;
@@ -194,14 +194,14 @@ static sf_status take_cuts(sf_search *s, double limit, int begin, int end)
   return take_cuts(s, limit, (begin + end) / 2, end);
 }
 
-sf_status sf_search_rounds(sf_search *s)
+sf_status sf_fit_search_rounds(sf_search *s)
 {
   sf_field_cost f;
   SF_TRY(check_trim(s, &s->trim, &f, &s->check));
   s->field_now = f;
   SF_TRY(list_cuts(s));
   for (int round = 0; round < ROUNDS; round++) {
-    const double limit = sf_search_allowed(s, allowance[round]), room = limit / (double)s->check.error - 1;
+    const double limit = sf_fit_search_allowed(s, allowance[round]), room = limit / (double)s->check.error - 1;
     if (!(room > 0)) continue;
     SF_TRY(measure_trim(s, &s->trim, s->job->rays, 0, s->rank_end, s->picture, NULL, &s->rank_now));
     SF_TRY(rank_cuts(s, round));

@@ -235,8 +235,8 @@ void sf_workers_free(sf_trainer *trainer);
 /* Forward, losses and backward of the batch, bundle by bundle: adds the nets' gradient to trainer->grad and leaves what
  * the field's needs. mean: losses per ray. */
 void sf_gradient_run(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
-/* L_extra's part in the leaks: adds to trainer->grad what the integrators' decay factors get from `sums`, and the slope of
- * the neurons' e^tau; returns the sum of e^tau. */
+/* L_extra's part in the leaks: adds to trainer->grad what the integrators' decay factors get from `sums`, and the slope
+ * of the neurons' e^tau; returns the sum of e^tau. */
 double sf_gradient_leaks(sf_trainer *trainer, const sf_loss_plan *plan, const sf_loss_sums *sums);
 sf_status sf_init_parameters(sf_trainer *trainer);
 

@@ -11,7 +11,7 @@ FUZZ_SAN := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recov
 FUZZ_WITH := $(patsubst %,$B/obj/%.o,firmware/sf_blob firmware/sf_driver firmware/sf_tile)
 FUZZ_REPLAYS := $(FUZZ_TARGETS:%=$B/tests/fuzz/%) $B/tests/fuzz/seeds
 
-$B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/obj/sim/soc/image.o $(FUZZ_WITH) $B/libspikefield.a
+$B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/obj/sim/soc/image.o $B/obj/sim/ray/request.o $(FUZZ_WITH) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)
