@@ -54,9 +54,9 @@ make_wide() {
   MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 VERILATED_OPT="$quick" \
     VERILATED_OBJ="$(printf "$build/verilated/runtime/%s.o " verilated verilated_fst_c verilated_threads)" "$@" >"$work/out" 2>"$work/err"
 }
-needed='$(filter-out %_isa.c,$(foreach room,base cli image scene field snn fx quant energy,$(wildcard src/$(room)/*.c)))'
+needed='$(filter-out %_isa.c,$(foreach room,base ranks cli image scene field snn fx quant energy,$(wildcard src/$(room)/*.c)))'
 needed+=' src/render/view.c'
-harness='$(filter-out sim/soc/% sim/studio/view_set% sim/ray/three_counts% sim/studio/audit_run%,$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/studio/*.c sim/soc/*.c))'
+harness='$(filter-out sim/soc/% sim/studio/view_set% sim/ray/three_counts% sim/studio/audit_run%,$(wildcard sim/*.c sim/board/*.c sim/activity/*.c sim/ray/*.c sim/studio/*.c sim/soc/*.c))'
 make_wide LIB_SRC="$needed" SIM_SRC="$harness" "$wide/bin/sf_cosim" "$wide/faults/make_scene" "$wide/tests/test_fx_vector" "$wide/tests/test_snn" || fail "256 lanes: no build"
 "$wide/faults/make_scene" "$work/256.snn" || fail "256 lanes: no scene"
 "$wide/bin/sf_cosim" "$work/256.snn" "$work/data" --rays 30 --limit-samples 500 --seed 1 --quiet --json \
