@@ -14,7 +14,7 @@ static int kept(const bool *flag, int n)
 
 /* ---- report ---- */
 
-static void count_dropped(const sf_search *s, const sf_trim *exact, sf_fit_report *r)
+static void count_dropped(const sf_fit_search *s, const sf_trim *exact, sf_fit_report *r)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
     const int n = s->scene->net.layer[l].n_out, after = kept(exact->neuron[l], n);
@@ -38,7 +38,7 @@ static void count_dropped(const sf_search *s, const sf_trim *exact, sf_fit_repor
 
 /* ---- all of it ---- */
 
-static sf_status choose_candidate(sf_search *s, int *chosen)
+static sf_status choose_candidate(sf_fit_search *s, int *chosen)
 {
   const sf_fit_job *job = s->job;
   *chosen = 0;
@@ -59,7 +59,7 @@ static double per_sample(uint64_t n, const fx_counts *counts)
   return counts->samples ? (double)n / (double)counts->samples : 0;
 }
 
-static sf_status describe(const sf_search *s, const fx_scene *scene, const sf_quant_widths *widths,
+static sf_status describe(const sf_fit_search *s, const fx_scene *scene, const sf_quant_widths *widths,
                           const sf_fit_sum *sum, sf_fit_state *state)
 {
   const uint64_t checked = s->check_end - s->rank_end;
@@ -78,7 +78,7 @@ static const double NEARLY = 1.01;
 
 /* The cache that the fitted scene needs: the smallest that is nearly as good as the best. A small one misses more, a
  * large one costs more per look-up. */
-static sf_status choose_cache(const sf_search *s, const fx_scene *scene, const sf_fit_sum *sum, sf_fit_report *r)
+static sf_status choose_cache(const sf_fit_search *s, const fx_scene *scene, const sf_fit_sum *sum, sf_fit_report *r)
 {
   fx_cache_shape shape[SF_FIT_CACHES];
   sf_fit_field whole;
@@ -98,14 +98,15 @@ static sf_status choose_cache(const sf_search *s, const fx_scene *scene, const s
   return sf_ok();
 }
 
-static sf_status describe_both(const sf_search *s, const fx_scene *fitted, const sf_fit_sum *sum, sf_fit_report *report)
+static sf_status describe_both(const sf_fit_search *s, const fx_scene *fitted, const sf_fit_sum *sum,
+                               sf_fit_report *report)
 {
   SF_TRY(describe(s, s->job->candidate[0], &s->job->widths[0], &s->reference, &report->before));
   SF_TRY(describe(s, fitted, s->widths, sum, &report->after));
   return choose_cache(s, fitted, sum, report);
 }
 
-static sf_status finish(sf_search *s, const sf_trim *exact, fx_scene *fitted, sf_fit_report *report)
+static sf_status finish(sf_fit_search *s, const sf_trim *exact, fx_scene *fitted, sf_fit_report *report)
 {
   const uint64_t checked = s->check_end - s->rank_end;
   sf_fit_sum sum;
@@ -133,7 +134,7 @@ static uint64_t larger(uint64_t a, uint64_t b)
 }
 
 /* Rays that rank and check tell nothing about places, so that what leaving places out loses is measured on them. */
-static sf_status observe(sf_search *s)
+static sf_status observe(sf_fit_search *s)
 {
   const uint64_t count = s->job->rays->count;
   SF_TRY(sf_trim_use_create(&s->use, s->scene));
@@ -147,7 +148,7 @@ static sf_status observe(sf_search *s)
   return sf_ok();
 }
 
-static sf_status run(sf_search *s, fx_scene *fitted, sf_fit_report *report)
+static sf_status run(sf_fit_search *s, fx_scene *fitted, sf_fit_report *report)
 {
   SF_TRY(choose_candidate(s, &report->chosen));
   if (!s->reference.counts.samples)
@@ -171,7 +172,7 @@ sf_status sf_fit(fx_scene *fitted, const sf_fit_job *job, sf_fit_report *report)
   if (count < 2 * RANK_MIN)
     return sf_fail(SF_E_RANGE, "%s: %llu rays to fit on, expected at least %d", job->name, (unsigned long long)count,
                    2 * RANK_MIN);
-  sf_search *s = calloc(1, sizeof *s);
+  sf_fit_search *s = calloc(1, sizeof *s);
   if (!s) return sf_fail(SF_E_MEMORY, "%s: no memory to fit", job->name);
   s->job = job;
   s->rank = *job->rays;

@@ -32,7 +32,7 @@ typedef struct sf_field_cost {
   double lookups, misses;
 } sf_field_cost;
 
-typedef struct sf_search {
+typedef struct sf_fit_search {
   const sf_fit_job *job;
   const fx_scene *scene; /* the chosen candidate */
   const sf_quant_widths *widths;
@@ -46,21 +46,21 @@ typedef struct sf_search {
   uint64_t rank_end, check_end;    /* rays 0..rank_end-1 rank, then come those that check */
   sf_cut *cuts;                    /* [room] */
   int room, count, ranked, checks; /* ranked: the first of cuts */
-} sf_search;
+} sf_fit_search;
 
-sf_status sf_fit_search_tick(const sf_search *s, const char *what, int done, int total);
+sf_status sf_fit_search_tick(const sf_fit_search *s, const char *what, int done, int total);
 /* sf_fit_measure in pieces, so that an interruption is heard. */
-sf_status sf_fit_search_measure(const sf_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
+sf_status sf_fit_search_measure(const sf_fit_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
                                 uint64_t end, uint32_t *picture, sf_fit_sum *sum);
-sf_status sf_fit_search_field(const sf_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole);
+sf_status sf_fit_search_field(const sf_fit_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole);
 sf_field_cost sf_field_cost_of(const sf_fit_field *field, uint64_t misses);
 /* Everything that the audit counts: rays one by one for the nets, tiles for the field. */
-uint64_t sf_fit_search_energy(const sf_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
+uint64_t sf_fit_search_energy(const sf_fit_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
                               const sf_field_cost *field, const fx_cache_shape *cache);
 /* The error on the checking rays that a share of the bound allows. */
-double sf_fit_search_allowed(const sf_search *s, double share);
+double sf_fit_search_allowed(const sf_fit_search *s, double share);
 /* From the trim that changes nothing to the smallest within the bound. */
-sf_status sf_fit_search_rounds(sf_search *s);
+sf_status sf_fit_search_rounds(sf_fit_search *s);
 
 static inline double sf_fit_ratio(uint64_t a, uint64_t b)
 {

@@ -16,12 +16,12 @@ enum { ROUNDS = sizeof allowance / sizeof allowance[0] };
 
 /* ---- cuts ---- */
 
-static bool apply_cut(const sf_search *s, sf_trim *trim, const sf_cut *c)
+static bool apply_cut(const sf_fit_search *s, sf_trim *trim, const sf_cut *c)
 {
   return sf_cut_kinds[c->kind].apply(s->scene, &s->use, trim, c->place);
 }
 
-static sf_status list_cuts(sf_search *s)
+static sf_status list_cuts(sf_fit_search *s)
 {
   for (int kind = 0; kind < sf_cut_kind_count; kind++) s->room += sf_cut_kinds[kind].places(s->scene);
   s->cuts = calloc((size_t)s->room, sizeof *s->cuts);
@@ -34,13 +34,13 @@ static sf_status list_cuts(sf_search *s)
 
 /* ---- measuring ---- */
 
-sf_status sf_fit_search_tick(const sf_search *s, const char *what, int done, int total)
+sf_status sf_fit_search_tick(const sf_fit_search *s, const char *what, int done, int total)
 {
   if (!s->job->tick || s->job->tick(s->job->user, what, done, total)) return sf_ok();
   return sf_fail(SF_E_STOPPED, "%s: stopped while fitting", s->job->name);
 }
 
-sf_status sf_fit_search_measure(const sf_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
+sf_status sf_fit_search_measure(const sf_fit_search *s, const fx_scene *scene, const sf_fit_rays *rays, uint64_t begin,
                                 uint64_t end, uint32_t *picture, sf_fit_sum *sum)
 {
   memset(sum, 0, sizeof *sum);
@@ -61,7 +61,7 @@ sf_field_cost sf_field_cost_of(const sf_fit_field *field, uint64_t misses)
   return bytes > 0 ? (sf_field_cost){(double)field->lookups / bytes, (double)misses / bytes} : (sf_field_cost){0, 0};
 }
 
-sf_status sf_fit_search_field(const sf_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole)
+sf_status sf_fit_search_field(const sf_fit_search *s, const fx_scene *scene, sf_field_cost *cost, sf_fit_field *whole)
 {
   uint64_t misses;
   SF_TRY(sf_fit_search_tick(s, NULL, 0, 0));
@@ -70,7 +70,7 @@ sf_status sf_fit_search_field(const sf_search *s, const fx_scene *scene, sf_fiel
   return sf_ok();
 }
 
-uint64_t sf_fit_search_energy(const sf_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
+uint64_t sf_fit_search_energy(const sf_fit_search *s, const fx_scene *scene, const fx_counts *counts, uint64_t rays,
                               const sf_field_cost *field, const fx_cache_shape *cache)
 {
   const double bytes = (double)counts->grid_bytes;
@@ -82,8 +82,8 @@ uint64_t sf_fit_search_energy(const sf_search *s, const fx_scene *scene, const f
 }
 
 /* new_field: measured with the trim, and left there; NULL: the one of the trim so far holds. */
-static sf_status measure_trim(sf_search *s, const sf_trim *trim, const sf_fit_rays *rays, uint64_t begin, uint64_t end,
-                              uint32_t *picture, sf_field_cost *new_field, sf_measured *m)
+static sf_status measure_trim(sf_fit_search *s, const sf_trim *trim, const sf_fit_rays *rays, uint64_t begin,
+                              uint64_t end, uint32_t *picture, sf_field_cost *new_field, sf_measured *m)
 {
   fx_scene trial;
   sf_fit_sum sum;
@@ -100,18 +100,18 @@ static sf_status measure_trim(sf_search *s, const sf_trim *trim, const sf_fit_ra
   return status;
 }
 
-static sf_status check_trim(sf_search *s, const sf_trim *trim, sf_field_cost *f, sf_measured *m)
+static sf_status check_trim(sf_fit_search *s, const sf_trim *trim, sf_field_cost *f, sf_measured *m)
 {
   return measure_trim(s, trim, s->job->rays, s->rank_end, s->check_end, NULL, f, m);
 }
 
 /* The error of the reference, scaled to the ranking rays: those are too few to say it themselves. */
-static double rank_error(const sf_search *s)
+static double rank_error(const sf_fit_search *s)
 {
   return (double)s->reference.error * (double)s->rank_end / (double)(s->check_end - s->rank_end);
 }
 
-static sf_status rank_cut(sf_search *s, const sf_trim *trim, sf_cut *c)
+static sf_status rank_cut(sf_fit_search *s, const sf_trim *trim, sf_cut *c)
 {
   const bool large = sf_cut_kinds[c->kind].large;
   const sf_measured *now = large ? &s->check : &s->rank_now;
@@ -135,14 +135,14 @@ static int by_price(const void *a, const void *b)
   return (left > right) - (left < right);
 }
 
-double sf_fit_search_allowed(const sf_search *s, double share)
+double sf_fit_search_allowed(const sf_fit_search *s, double share)
 {
   return (double)s->reference.error * pow(10, share * s->job->loss_db / 10);
 }
 
 /* Measures every cut that is possible, forgets the hopeless ones and those that save nothing, and puts the rest first,
  * by price. */
-static sf_status rank_cuts(sf_search *s, int round)
+static sf_status rank_cuts(sf_fit_search *s, int round)
 {
   const double whole = sf_fit_search_allowed(s, 1) / (double)s->reference.error - 1;
   int left = 0;
@@ -165,7 +165,7 @@ static sf_status rank_cuts(sf_search *s, int round)
 }
 
 /* Cuts worth a try: those beyond the room by the sum of the single changes wait for the next round. */
-static int cuts_in_reach(const sf_search *s, double room)
+static int cuts_in_reach(const sf_fit_search *s, double room)
 {
   double sum = 0;
   int n = 0;
@@ -175,7 +175,7 @@ static int cuts_in_reach(const sf_search *s, double room)
 
 /* All of the cuts where they stay within the limit, else each half on its own. The trim is only ever one that was
  * measured. */
-static sf_status take_cuts(sf_search *s, double limit, int begin, int end)
+static sf_status take_cuts(sf_fit_search *s, double limit, int begin, int end)
 {
   sf_trim trial = s->trim;
   sf_measured m;
@@ -194,7 +194,7 @@ static sf_status take_cuts(sf_search *s, double limit, int begin, int end)
   return take_cuts(s, limit, (begin + end) / 2, end);
 }
 
-sf_status sf_fit_search_rounds(sf_search *s)
+sf_status sf_fit_search_rounds(sf_fit_search *s)
 {
   sf_field_cost f;
   SF_TRY(check_trim(s, &s->trim, &f, &s->check));
