@@ -22,12 +22,9 @@ module integrate_spec #(
 
   wire [27:0] acc;
   sf_integrate u_dut (
-      .clk_i      (clk_i),
-      .acc_i      (acc_i),
-      .in_i       (in_i),
+      .*,
       .first_i    (FIRST),
       .mode_i     (MODE),
-      .colour_i   (colour_i),
       .k_density_i(k_i),
       .k_colour_i (k_i),
       .acc_o      (acc)

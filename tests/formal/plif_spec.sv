@@ -22,11 +22,7 @@ module plif_spec #(
   wire signed [23:0] v;
   wire spike;
   sf_plif u_dut (
-      .clk_i    (clk_i),
-      .v_i      (v_i),
-      .current_i(current_i),
-      .k_i      (k_i),
-      .theta_i  (theta_i),
+      .*,
       .nodecay_i(NODECAY),
       .first_i  (FIRST),
       .v_o      (v),

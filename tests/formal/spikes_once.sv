@@ -31,15 +31,12 @@ module spikes_once (
       .INDEX_BITS(3),
       .GROUP_BITS(1)
   ) u_dut (
-      .clk_i    (clk_i),
+      .*,
       .rst_ni   (rst_n_q),
-      .clear_i  (clear_i),
       .bias_i   (bias),
       .steps_i  (steps),
       .group_i  (group),
-      .take_i   (take_i),
       .space_o  (space),
-      .we_i     (we_i),
       .wstep_i  (step_q),
       .wgroup_i (group_q),
       .wspikes_i(spikes_i),
@@ -48,7 +45,6 @@ module spikes_once (
       .index_o  (index),
       .fired_o  (fired),
       .last_o   (last),
-      .next_i   (next_i),
       .idle_o   (idle),
       .look_i   (watched),
       .look_o   (look)

@@ -26,20 +26,13 @@ module stream_in_packets (
   wire tready, valid, first, empty, error_packet, error_value;
   wire [11:0] feature, dir;
   sf_stream_in u_dut (
-      .clk_i          (clk_i),
+      .*,
       .rst_ni         (rst_n_q),
-      .clear_i        (clear_i),
-      .enable_i       (enable_i),
       .n_feature_i    (n_feature),
       .n_dir_i        (n_dir),
-      .tvalid_i       (tvalid_i),
       .tready_o       (tready),
-      .tdata_i        (tdata_i),
-      .tuser_i        (tuser_i),
-      .tlast_i        (tlast_i),
       .valid_o        (valid),
       .first_o        (first),
-      .done_i         (done_i),
       .feature_index_i(feature_index),
       .feature_o      (feature),
       .dir_index_i    (dir_index),

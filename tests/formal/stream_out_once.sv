@@ -16,15 +16,10 @@ module stream_out_once (
   wire ready, tvalid, tlast;
   wire [63:0] tdata;
   sf_stream_out u_dut (
-      .clk_i   (clk_i),
+      .*,
       .rst_ni  (rst_n_q),
-      .clear_i (clear_i),
-      .valid_i (valid_i),
       .ready_o (ready),
-      .sigma_i (sigma_i),
-      .colour_i(colour_i),
       .tvalid_o(tvalid),
-      .tready_i(tready_i),
       .tdata_o (tdata),
       .tlast_o (tlast)
   );
