@@ -28,6 +28,50 @@ static inline void put(sf_dut *dut, uint32_t offset, uint32_t value)
 {
   dut->bus.write(dut->bus.context, offset, value);
 }
+
+enum { PLACES = 512 /* of the window of counters: a cycle for each of them */ };
+
+static inline void wait_for_walk(sf_dut *dut)
+{
+  for (const uint64_t begin = dut->cycle; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS;)
+    ck_assert_uint_lt(dut->cycle, begin + 4 * PLACES);
+}
+
+/* Beats of a ray, again and again, for so many cycles; every pixel is taken. */
+static inline void cut_off(sf_dut *dut, const sf_ray_request *q, int cycles)
+{
+  for (int at = 0; cycles-- > 0;) {
+    const sf_ray_sample *s = &q->sample[at % q->n];
+    dut->in.ray_valid = true, dut->in.pixel_ready = true;
+    dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
+    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
+    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
+    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time: there is something to ask the memory for */
+    sf_dut_tick(dut);
+    at += dut->out.ray_ready;
+  }
+  dut->in.ray_valid = dut->in.pixel_ready = false;
+}
+
+/* No first sample, or two of them; then what is discarded: how many of so many cycles take a beat. */
+static inline int beats_out_of_order(sf_dut *dut, bool user, int cycles)
+{
+  int discarded = 0;
+  for (int beat = 0; beat <= user; beat++) {
+    dut->in.ray_valid = true, dut->in.ray_user = user, dut->in.ray_last = false;
+    do sf_dut_tick(dut);
+    while (!dut->out.ray_ready);
+  }
+  for (int i = 0; i < cycles; i++) {
+    sf_dut_tick(dut);
+    discarded += dut->out.ray_ready;
+  }
+  dut->in.ray_valid = false;
+  ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
+  ck_assert(dut->out.irq);
+  return discarded;
+}
+
 /* Ray i of a seed: from anywhere near the box towards its middle. */
 static inline fx_ray random_ray(const fx_scene *scene, uint64_t seed, uint64_t i)
 {

@@ -4,7 +4,7 @@
 #include "src/fx/tensorf.h"
 #include "tests/fit_fixture.h"
 
-enum { RAYS = 600, FEATURES = 5, FEATURE_FREQS = 2, VIEW_FREQS = 1, C1 = 40, C2 = 30, RES = 8 };
+enum { FEATURES = 5, FEATURE_FREQS = 2, VIEW_FREQS = 1, C1 = 40, C2 = 30, RES = 8 };
 
 static inline int8_t pick(uint64_t seed, uint64_t stream, uint64_t i, int limit)
 {

@@ -122,6 +122,13 @@ static inline uint32_t programmed(registers *r, uint32_t offset, uint32_t value)
   return 0;
 }
 
+static inline uint32_t model_refuse(registers *r, uint32_t error)
+{
+  r->error |= error;
+  if (error) r->irq_pending |= SF_CSR_IRQ_ENABLE_ERROR;
+  return error;
+}
+
 /* The bits of ERROR that a write sets. */
 static inline uint32_t model_write(registers *r, uint32_t offset, uint32_t value)
 {
@@ -138,9 +145,7 @@ static inline uint32_t model_write(registers *r, uint32_t offset, uint32_t value
     error = SF_CSR_ERROR_ADDRESS;
   else
     error = r->running ? SF_CSR_ERROR_BUSY : programmed(r, offset, value);
-  r->error |= error;
-  if (error) r->irq_pending |= SF_CSR_IRQ_ENABLE_ERROR;
-  return error;
+  return model_refuse(r, error);
 }
 
 static inline uint32_t model_read(registers *r, uint32_t offset)

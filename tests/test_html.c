@@ -77,7 +77,7 @@ static void read_page(fixture *f)
   size_t size;
   free(f->text);
   ck_ok(sf_page_save(&f->page, in("page.html")));
-  ck_ok(sf_read_file(in("page.html"), 1 << 24, &f->text, &size));
+  f->text = read_whole(in("page.html"), &size);
   ck_assert_uint_eq(strlen(f->text), size);
 }
 

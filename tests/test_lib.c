@@ -37,11 +37,10 @@ TEST(info_says_what_the_scene_is)
 
 TEST(memory_and_file_give_the_same_scene)
 {
-  char *data;
   size_t size;
+  char *data = read_whole(in("s.snn"), &size);
   spikefield_scene *copy;
   spikefield_scene_info other;
-  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   lib_good(spikefield_scene_open_memory(&copy, data, size, "copy"));
   memset(data, 0, size); /* nothing of the caller is kept */
   lib_good(spikefield_scene_describe(copy, &other));
@@ -58,12 +57,11 @@ TEST(memory_and_file_give_the_same_scene)
 
 TEST(damaged_scenes_are_refused)
 {
-  char *data;
   size_t size;
+  char *data = read_whole(in("s.snn"), &size);
   spikefield_scene *none = scene;
   lib_bad(spikefield_scene_open(&none, in("absent")), SPIKEFIELD_E_IO, "absent");
   ck_assert_ptr_null(none);
-  ck_ok(sf_read_file(in("s.snn"), 1 << 24, &data, &size));
   static const double part[] = {0, 0.01, 0.5, 0.9999};
   for (int i = 0; i < 4; i++) {
     none = scene;

@@ -139,17 +139,6 @@ static sf_manifest some_manifest(bool is_float, int views)
   return m;
 }
 
-static void assert_same_file(const char *a, const char *b)
-{
-  char *x, *y;
-  size_t n, k;
-  ck_ok(sf_read_file(a, 1 << 20, &x, &n));
-  ck_ok(sf_read_file(b, 1 << 20, &y, &k));
-  ck_assert_uint_eq(n, k);
-  ck_assert_mem_eq(x, y, n);
-  free(x), free(y);
-}
-
 LOOP_TEST(reads_back_what_it_wrote, 2)
 {
   for (int views = 0; views <= 3; views++) {
@@ -168,7 +157,7 @@ LOOP_TEST(reads_back_what_it_wrote, 2)
       ck_assert_double_eq(m.view[i].psnr, back.view[i].psnr);
     }
     ck_ok(sf_manifest_save(&back, in("b.json")));
-    assert_same_file(in("a.json"), in("b.json"));
+    ck_assert(same_files(in("a.json"), in("b.json")));
     sf_manifest_free(&m), sf_manifest_free(&back);
   }
 }
@@ -183,7 +172,7 @@ TEST(the_order_of_the_views_does_not_matter)
   ck_assert_str_eq(sf_manifest_find(&other, 1)->name, "test/r_1");
   ck_ok(sf_manifest_save(&m, in("a.json")));
   ck_ok(sf_manifest_save(&other, in("b.json")));
-  assert_same_file(in("a.json"), in("b.json"));
+  ck_assert(same_files(in("a.json"), in("b.json")));
 }
 
 TEST(sums_by_hand)
@@ -373,10 +362,9 @@ TEST(the_file_says_what_its_distances_are)
   for (int ndc = 0; ndc < 2; ndc++) {
     const sf_golden_label label = {
         .net = &net, .scene_sha256 = "0", .view = "a", .split = "test", .downscale = 1, .ndc = ndc};
-    char *bytes;
     size_t size;
     ck_ok(sf_golden_save_labelled(&g, in("labelled.exr"), &label));
-    ck_ok(sf_read_file(in("labelled.exr"), 1 << 20, &bytes, &size));
+    char *bytes = read_whole(in("labelled.exr"), &size);
     ck_assert_int_eq(memmem(bytes, size, "world units of the data set", 27) != NULL, !ndc);
     ck_assert_int_eq(memmem(bytes, size, "NDC units from the rays' origins", 31) != NULL, ndc);
     free(bytes);

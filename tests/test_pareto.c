@@ -140,9 +140,8 @@ TEST(files)
   fclose(out);
   ck_assert_ptr_nonnull(strstr(text, "| centre | 30.00 | equal |"));
   ck_ok(sf_sweep_plots(&sweep, &plots));
-  char *script;
   size_t size;
-  ck_ok(sf_read_file(in("plots/widths.gp"), 1 << 20, &script, &size));
+  char *script = read_whole(in("plots/widths.gp"), &size);
   ck_assert_ptr_null(strstr(script, "nan with lines"));
   free(script);
   sf_sweep_free(&sweep);

@@ -1,5 +1,5 @@
-/* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, register accesses
- * that overlap. Afterwards it works as if nothing had been. */
+/* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, stalls. Afterwards it
+ * works as if nothing had been. */
 #include "ck_run.h"
 #include "tests/rtl_fixture.h"
 
@@ -196,7 +196,7 @@ static void same_events(const fx_counts *expected, const fx_counts *actual)
                 d.step, d.wire, (long long)d.expected, (long long)d.actual);
 }
 
-static void wait_for_walk(sf_dut *dut)
+static void end_of_walk(sf_dut *dut)
 {
   dut->in.m_ready = true; /* or the sample at work could not end */
   for (int i = 0; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS; i++) ck_assert_int_lt(i, PATIENCE);
@@ -219,7 +219,7 @@ LOOP_TEST(snapshot_and_clear_at_work, 8)
   for (int64_t cycle = draw(&r, 400, 1500); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
   while (dut->in.s_valid) feed_cycle(dut, &f, &r); /* a beat that was offered may not be taken back */
   put(dut, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT | (clear ? SF_CSR_CTRL_CLEAR : 0));
-  wait_for_walk(dut);
+  end_of_walk(dut);
   const fx_counts actual = read_window(dut), expected = counts_of(0, actual.samples);
   ck_assert_uint_gt(actual.samples, 0);
   same_events(&expected, &actual);
@@ -256,96 +256,4 @@ LOOP_TEST(all_steps_under_stalls, 3)
     same_counts(dut, &counts, r.seed);
     ck_assert(!saturating || _i != FX_NODECAY || (counts.saturated[FX_C1] && counts.saturated[FX_C2]));
   }
-}
-
-/* ---- AXI4-Lite, reads and writes at once ---- */
-
-enum { REGISTERS = 4 };
-static const uint32_t registers[REGISTERS] = {SF_CSR_D1_K, SF_CSR_C2_THETA, SF_CSR_EXP_BIAS, SF_CSR_STEPS};
-
-static void hold_response(const sf_pins_in *in, const sf_pins_out *out, sf_pins_out *before, bool *waiting)
-{
-  if (waiting[0]) ck_assert(out->bvalid && out->bresp == before->bresp);
-  if (waiting[1]) ck_assert(out->rvalid && out->rdata == before->rdata && out->rresp == before->rresp);
-  waiting[0] = out->bvalid && !in->bready;
-  waiting[1] = out->rvalid && !in->rready;
-  *before = *out;
-}
-
-LOOP_TEST(register_accesses_overlap, 4)
-{
-  random_source r = {65, (uint64_t)_i << 32};
-  OWNED(sf_dut) *dut = begin(65);
-  sf_driver_reset(&dut->bus);
-  uint32_t value[REGISTERS];
-  for (int i = 0; i < REGISTERS; i++) value[i] = get(dut, registers[i]);
-  bool addressed = false, given = false, asked = false, waiting[2] = {false, false};
-  int w = 0, q = 0, writes = 0, reads = 0, answered = 0;
-  uint32_t old = 0; /* of the register that is being written: a read meanwhile may see either */
-  sf_pins_out before = dut->out;
-  sf_pins_in *in = &dut->in;
-  in->wstrb = 0xf;
-  old = value[0], in->awaddr = registers[0], in->wdata = (uint32_t)draw(&r, 0, 4);
-  for (int cycle = 0; cycle < 3000; cycle++) {
-    in->awvalid = !addressed && (in->awvalid || draw(&r, 0, 2) == 0);
-    in->wvalid = !given && (in->wvalid || draw(&r, 0, 2) == 0);
-    in->bready = draw(&r, 0, 1);
-    if (!in->arvalid && !asked && draw(&r, 0, 1)) q = (int)draw(&r, 0, REGISTERS - 1), in->arvalid = true;
-    in->araddr = registers[q];
-    in->rready = draw(&r, 0, 1);
-    sf_dut_tick(dut);
-    hold_response(in, &dut->out, &before, waiting);
-    ck_assert(!dut->out.bvalid || (addressed && given));
-    if (in->awvalid && dut->out.awready) addressed = true, in->awvalid = false;
-    if (in->wvalid && dut->out.wready) given = true, in->wvalid = false;
-    if (in->arvalid && dut->out.arready) asked = true, in->arvalid = false, reads++;
-    if (dut->out.rvalid && in->rready) {
-      ck_assert(asked);
-      ck_assert_msg(dut->out.rdata == value[q] || (q == w && dut->out.rdata == in->wdata) ||
-                        (q == w && dut->out.rdata == old),
-                    "register %x reads %u, expected %u", registers[q], dut->out.rdata, value[q]);
-      asked = false;
-      answered++;
-    }
-    if (!dut->out.bvalid || !in->bready) continue;
-    ck_assert_uint_eq(dut->out.bresp, 0);
-    value[w] = in->wdata;
-    addressed = given = false;
-    writes++;
-    if (asked || in->arvalid) continue; /* the next write is of the same register, until no read is on its way */
-    w = (int)draw(&r, 0, REGISTERS - 1);
-    old = value[w];
-    in->awaddr = registers[w];
-    in->wdata = (uint32_t)draw(&r, 0, 4095);
-    if (w == 3) in->wdata &= 7;
-  }
-  ck_assert_int_gt(writes, 200);
-  ck_assert_int_ge(reads, answered);
-  ck_assert_int_gt(answered, 200);
-}
-
-/* A write of less than a word is refused and changes nothing. */
-TEST(part_of_a_word)
-{
-  OWNED(sf_dut) *dut = begin(66);
-  sf_driver_reset(&dut->bus);
-  const uint32_t before = get(dut, SF_CSR_D1_K);
-  for (uint8_t strobe = 0; strobe < 15; strobe++) {
-    put(dut, SF_CSR_ERROR, ~0u);
-    dut->in.awaddr = SF_CSR_D1_K, dut->in.wdata = ~before & 0xfff, dut->in.wstrb = strobe;
-    dut->in.awvalid = dut->in.wvalid = dut->in.bready = true;
-    bool answered = false;
-    for (int i = 0; i < 20 && !answered; i++) {
-      sf_dut_tick(dut);
-      if (dut->out.awready) dut->in.awvalid = false;
-      if (dut->out.wready) dut->in.wvalid = false;
-      answered = dut->out.bvalid;
-    }
-    dut->in.bready = false;
-    ck_assert(answered);
-    ck_assert_uint_eq(dut->out.bresp, 2); /* SLVERR */
-    ck_assert_uint_eq(get(dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
-    ck_assert_uint_eq(get(dut, SF_CSR_D1_K), before);
-  }
-  works(dut);
 }

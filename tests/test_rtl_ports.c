@@ -1,4 +1,4 @@
-/* The accelerator's ports: registers after reset, bad packets, the driver. */
+/* The accelerator's ports: bad packets, the driver. */
 #include "ck_run.h"
 #include "firmware/sf_blob.h"
 #include "tests/rtl_fixture.h"
@@ -25,19 +25,6 @@ static void expect_error(sf_dut *dut, uint32_t bit)
   ck_assert_uint_eq(get(dut, SF_CSR_IRQ_PENDING) & SF_CSR_IRQ_ENABLE_ERROR, SF_CSR_IRQ_ENABLE_ERROR);
   ck_assert(dut->out.irq);
   ck_assert(!dut->bus_hung);
-}
-
-/* Registers start with random values; a hard reset gives them those of the table. */
-TEST(registers_after_reset)
-{
-  OWNED(sf_dut) *dut = NULL;
-  ck_ok(sf_dut_open_bare(&dut, &(sf_dut_options){.seed = 15}));
-#define SF_CSR(name, offset, access, reset, meaning)                                                                   \
-  if (SF_CSR_##name < SF_CSR_RAY_CTRL && #access[0] == 'R' && SF_CSR_##name != SF_CSR_STATUS)                          \
-    ck_assert_msg(get(dut, SF_CSR_##name) == (uint32_t)(reset), "%s reads %u", #name, get(dut, SF_CSR_##name));
-#include "spikefield/csr.def"
-#undef SF_CSR
-#undef SF_CSR_FIELD
 }
 
 /* ---- packets ---- */

@@ -1,5 +1,5 @@
 /* sf_ray_top against the fixed-point core, bit for bit: sample positions in, pixels and counters out. Random scenes and
- * streams, the hard cases of rays, rays that go on after their end, resets, illegal programming. */
+ * streams, the hard cases of rays, rays that go on after their end, resets, wrong sizes. */
 #include "ck_run.h"
 #include "firmware/sf_ray_driver.h"
 #include "energy/energy.h"
@@ -187,38 +187,6 @@ static void works(sf_ray_dut *rays, uint64_t seed)
   ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS), SF_CSR_RAY_STATUS_RUNNING);
 }
 
-TEST(illegal_programming_is_refused)
-{
-  static const struct {
-    uint32_t offset, value;
-  } bad[] = {{SF_CSR_RAY_TRANS_STOP, 1 << 20},    {SF_CSR_RAY_TRANS_STOP, ~0u},
-             {SF_CSR_RAY_MAX_SAMPLES, 0},         {SF_CSR_RAY_MAX_SAMPLES, 1025},
-             {SF_CSR_RAY_MAX_SAMPLES, 2048},      {SF_CSR_RAY_BACKGROUND_R, 65537},
-             {SF_CSR_RAY_BACKGROUND_G, 1u << 31}, {SF_CSR_RAY_BACKGROUND_B, 1 << 17},
-             {SF_CSR_FIELD_BASE, 0x10008},        {SF_CSR_FIELD_BASE, 1}};
-  OWNED(fx_scene) scene = small_scene();
-  OWNED(sf_ray_dut) *rays = open_rays(&scene, 1, 20);
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    ck_ok(sf_ray_dut_load(rays));
-    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    put(rays->dut, bad[i].offset, bad[i].value);
-    put(rays->dut, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
-    ck_assert_uint_eq(rays->dut->bus_response, 2); /* SLVERR */
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, 0);
-    ck_assert(rays->dut->out.irq);
-    rays->dut->in.ray_valid = true; /* nothing is accepted */
-    for (int cycle = 0; cycle < 20; cycle++) {
-      sf_dut_tick(rays->dut);
-      ck_assert(!rays->dut->out.ray_ready);
-    }
-    rays->dut->in.ray_valid = false;
-    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_VALUE);
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), 0);
-  }
-  works(rays, 1);
-}
-
 /* Between driver and bus: writes of one register go to another, a read of it finds nobody. */
 typedef struct spy {
   sf_dut *dut;
@@ -283,55 +251,6 @@ TEST(sizes_that_are_not_the_nets_are_refused)
   works(rays, 8);
 }
 
-TEST(registers)
-{
-  static const uint32_t programming[] = {SF_CSR_RAY_TRANS_STOP, SF_CSR_RAY_BACKGROUND_B, SF_CSR_ENCODER_ADDRESS,
-                                         SF_CSR_ENCODER_DATA,   SF_CSR_FIELD_BASE,       SF_CSR_RAY_CTRL};
-  static const uint32_t nowhere[] = {SF_CSR_RAY_STATUS, SF_CSR_FIELD_CACHE, SF_CSR_FIELD_STALLS_HIGH, 0x454, 0x7fc};
-  OWNED(fx_scene) scene = small_scene();
-  OWNED(sf_ray_dut) *rays = open_rays(&scene, 2, 40);
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_ID), SF_CSR_ID_RESET); /* the rest of the window is sf_top's */
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_MAX_SAMPLES), (uint32_t)scene.max_samples);
-  for (uint32_t o = 0; o < 3; o++) ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_BACKGROUND_R + 4 * o), 65536);
-  for (size_t i = 0; i < sizeof programming / sizeof *programming; i++) {
-    put(rays->dut, programming[i], 1);
-    ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_BUSY);
-    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_BUSY);
-  }
-  for (size_t i = 0; i < sizeof nowhere / sizeof *nowhere; i++) {
-    put(rays->dut, nowhere[i], 1);
-    ck_assert_uint_eq(rays->dut->bus_response, 2);
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ADDRESS);
-    put(rays->dut, SF_CSR_RAY_ERROR, SF_CSR_RAY_ERROR_ADDRESS);
-  }
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_TRANS_STOP), (uint32_t)scene.trans_stop);
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), 0);
-  put(rays->dut, 0x800, 1); /* of nobody: sf_top answers */
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_ERROR), SF_CSR_ERROR_ADDRESS);
-  ck_assert(!rays->dut->bus_hung);
-  works(rays, 2);
-}
-
-/* Offers beats of the batch for so many cycles and takes every pixel; then gives up. */
-static void cut_off(sf_ray_dut *rays, int cycles)
-{
-  sf_dut *dut = rays->dut;
-  const sf_ray_request *q = &shared.request[0];
-  for (int at = 0; cycles-- > 0;) {
-    const sf_ray_sample *s = &q->sample[at % q->n];
-    dut->in.ray_valid = true, dut->in.pixel_ready = true;
-    dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
-    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
-    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
-    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time: there is something to ask the memory for */
-    sf_dut_tick(dut);
-    at += dut->out.ray_ready;
-  }
-  dut->in.ray_valid = dut->in.pixel_ready = false;
-}
-
 /* At any moment, with the memory owing answers: the next rays are whole. */
 TEST(soft_reset_in_mid_ray)
 {
@@ -340,7 +259,7 @@ TEST(soft_reset_in_mid_ray)
   uint64_t owing = 0;
   for (int cycles = 1; cycles < 1200; cycles = cycles * 5 / 4 + 1) {
     works(rays, 3);
-    cut_off(rays, cycles);
+    cut_off(rays->dut, &shared.request[0], cycles);
     owing += rays->memory.asked != rays->memory.answered;
   }
   works(rays, 4);
@@ -353,21 +272,7 @@ TEST(beats_out_of_order_are_refused)
   OWNED(sf_ray_dut) *rays = open_rays(&scene, 4, 0);
   for (int user = 0; user < 2; user++) {
     works(rays, 5);
-    sf_pins_in *in = &rays->dut->in;
-    for (int beat = 0; beat <= user; beat++) { /* no first sample; then two of them */
-      in->ray_valid = true, in->ray_user = user, in->ray_last = false;
-      do sf_dut_tick(rays->dut);
-      while (!rays->dut->out.ray_ready);
-    }
-    int discarded = 0;
-    for (int i = 0; i < 50; i++) { /* the rest, a beat every second cycle: nothing waits for it */
-      sf_dut_tick(rays->dut);
-      discarded += rays->dut->out.ray_ready;
-    }
-    ck_assert_int_eq(discarded, 25);
-    in->ray_valid = false;
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
-    ck_assert(rays->dut->out.irq);
+    ck_assert_int_eq(beats_out_of_order(rays->dut, user, 50), 25); /* every second cycle: nothing waits for it */
   }
   works(rays, 6);
 }

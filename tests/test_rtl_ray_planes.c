@@ -149,29 +149,13 @@ static void works(sf_ray_dut *rays)
   same_counts(rays);
 }
 
-/* Beats of the first ray for so many cycles, and then no more. */
-static void cut_off(sf_ray_dut *rays, int cycles)
-{
-  sf_dut *dut = rays->dut;
-  for (int at = 0; cycles-- > 0;) {
-    const sf_ray_sample *s = &sample[0][at % request[0].n];
-    dut->in.ray_valid = true, dut->in.pixel_ready = true;
-    dut->in.ray_user = at % request[0].n == 0, dut->in.ray_last = at % request[0].n == request[0].n - 1;
-    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
-    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
-    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time */
-    sf_dut_tick(dut);
-    at += dut->out.ray_ready;
-  }
-}
-
 TEST(soft_reset_in_mid_ray)
 {
   OWNED(fx_scene) scene = long_rays(3100);
   OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 4, .stall_percent = 10}));
   for (int cycles = 1; cycles < 4000; cycles = cycles * 9 / 8 + 1) {
-    cut_off(rays, cycles);
+    cut_off(rays->dut, &request[0], cycles);
     put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
     works(rays);
   }
@@ -184,16 +168,7 @@ TEST(beats_out_of_order_are_refused)
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 5}));
   for (int user = 0; user < 2; user++) {
     works(rays);
-    sf_pins_in *in = &rays->dut->in;
-    for (int beat = 0; beat <= user; beat++) { /* no first sample; then two of them */
-      in->ray_valid = true, in->ray_user = user, in->ray_last = false;
-      do sf_dut_tick(rays->dut);
-      while (!rays->dut->out.ray_ready);
-    }
-    for (int i = 0; i < 400; i++) sf_dut_tick(rays->dut); /* the rest is discarded */
-    in->ray_valid = false;
-    ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_ORDER);
-    ck_assert(rays->dut->out.irq);
+    beats_out_of_order(rays->dut, user, 400);
   }
   works(rays);
 }

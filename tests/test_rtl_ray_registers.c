@@ -3,11 +3,9 @@
 #include "ck_run.h"
 #include "quant/quant.h"
 #include "sim/ray/ray.h"
-#include "tests/dut_fixture.h"
-#include "tests/fx_fixture.h"
-#include "tests/random_net.h"
+#include "tests/register_bus.h"
 
-enum { ACCESSES = 8000, RAYS = 4, SAMPLES_MAX = 1024, OKAY = 0, SLVERR = 2, WHOLE = 0xf };
+enum { ACCESSES = 8000 };
 enum { WINDOW = 0x400, WINDOW_END = 0x800 };
 
 /* ---- the model ---- */
@@ -102,24 +100,12 @@ static uint32_t model_read(const registers *r, uint32_t offset)
 
 /* ---- both ---- */
 
-/* Address and data together, some bytes of the word alone. */
-static void put_bytes(sf_dut *dut, uint32_t offset, uint32_t value, uint8_t strobe)
-{
-  sf_pins_in *in = &dut->in;
-  in->awaddr = offset, in->wdata = value, in->wstrb = strobe;
-  in->awvalid = in->wvalid = true, in->bready = false;
-  do sf_dut_tick(dut);
-  while (!dut->out.awready);
-  in->awvalid = in->wvalid = false, in->bready = true;
-  do sf_dut_tick(dut);
-  while (!dut->out.bvalid);
-  in->bready = false;
-  dut->bus_response = dut->out.bresp;
-}
-
 static void same_interrupt(sf_dut *dut, const registers *r)
 {
+  dut->in.ray_valid = !r->running; /* nothing is accepted that comes before a start */
   sf_dut_tick(dut);
+  ck_assert(r->running || !dut->out.ray_ready);
+  dut->in.ray_valid = false;
   ck_assert_int_eq(dut->out.irq, (r->error & r->irq_enable) != 0);
 }
 
@@ -149,34 +135,12 @@ static void soft_reset_both(sf_dut *dut, registers *r)
   same_interrupt(dut, r);
 }
 
-/* A master may show anything while it is not valid: addresses, values and bytes of other accesses. */
-static void show_anything(void *context)
-{
-  sf_dut *dut = context;
-  static const uint32_t shown[] = {SF_CSR_CTRL,         SF_CSR_RAY_CTRL,       SF_CSR_RAY_ERROR,  SF_CSR_RAY_TRANS_STOP,
-                                   SF_CSR_ENCODER_DATA, SF_CSR_RAY_IRQ_ENABLE, SF_CSR_FIELD_BASE, 0x454};
-  random_source s = {7, dut->cycle * 5};
-  if (!dut->in.awvalid) dut->in.awaddr = shown[draw(&s, 0, 7)];
-  if (!dut->in.wvalid) dut->in.wdata = draw(&s, 0, 1) ? (uint32_t)draw(&s, 0, 15) : UINT32_MAX;
-  if (!dut->in.arvalid) dut->in.araddr = shown[draw(&s, 0, 7)];
-  dut->in.ray_user = draw(&s, 0, 1);
-}
-
 static sf_dut *begin(uint64_t seed)
 {
   sf_dut *dut;
   ck_ok(sf_dut_open_pins(&dut, &(sf_dut_options){.seed = seed, .stall_percent = 20}, sf_pins_open_rays));
-  dut->each_cycle = show_anything, dut->each_cycle_context = dut;
+  dut->each_cycle = show_any_access, dut->each_cycle_context = dut;
   return dut;
-}
-
-static uint32_t near_a_limit(random_source *s, uint32_t now)
-{
-  static const uint32_t limit[] = {0, 1, 16, 1024, 2048, 1 << 16, 1 << 17, 1 << 18, 1 << 20, 1 << 21, 1u << 31};
-  const uint32_t beside = (uint32_t)draw(s, -1, 1);
-  if (draw(s, 0, 3) == 0) return now + beside;
-  if (draw(s, 0, 7) == 0) return 1u << draw(s, 0, 31) | (uint32_t)draw(s, 0, 1);
-  return limit[draw(s, 0, sizeof limit / sizeof *limit - 1)] + beside;
 }
 
 /* A sample that belongs to no ray. */
@@ -206,6 +170,7 @@ static void program_legal(sf_dut *dut, registers *r, random_source *s)
 
 LOOP_TEST(any_access_in_any_state, 2)
 {
+  static const uint32_t limit[] = {0, 1, 16, 1024, 2048, 1 << 16, 1 << 17, 1 << 18, 1 << 20, 1 << 21, 1u << 31};
   random_source s = {200 + (uint64_t)_i, 0};
   registers r = {0};
   OWNED(sf_dut) *dut = begin(s.seed);
@@ -214,7 +179,7 @@ LOOP_TEST(any_access_in_any_state, 2)
   for (int i = 0; i < ACCESSES; i++) {
     const int64_t kind = draw(&s, 0, 99);
     const uint32_t offset = WINDOW + 4 * (uint32_t)(draw(&s, 0, 9) ? draw(&s, 0, 21) : draw(&s, 0, 255));
-    const uint8_t strobe = draw(&s, 0, 9) ? WHOLE : (uint8_t)draw(&s, 0, 14);
+    const uint8_t strobe = draw_strobe(&s);
     running += r.running;
     if (kind < 30) {
       read_both(dut, &r, offset);
@@ -228,7 +193,7 @@ LOOP_TEST(any_access_in_any_state, 2)
       program_legal(dut, &r, &s);
     } else {
       const uint32_t before = r.error;
-      write_both(dut, &r, offset, near_a_limit(&s, model_read(&r, offset)), strobe);
+      write_both(dut, &r, offset, near_a_limit(&s, model_read(&r, offset), limit, COUNT(limit)), strobe);
       refused += r.error != before;
       read_both(dut, &r, offset);
     }
@@ -262,52 +227,17 @@ TEST(the_other_window)
   read_both(dut, &r, SF_CSR_RAY_BACKGROUND_G);
 }
 
-/* The next access is offered while the response of the last one waits, in either window: as many responses as accesses,
- * in their order. */
+/* In either window. */
 TEST(accesses_without_a_pause)
 {
-  static const struct {
-    uint32_t offset;
-    int response;
-  } write[] = {
-      {SF_CSR_EXP_BIAS, OKAY}, {SF_CSR_RAY_STATUS, SLVERR}, {SF_CSR_ID, SLVERR}, {SF_CSR_RAY_IRQ_ENABLE, OKAY}};
-  static const uint32_t read[][2] = {{SF_CSR_ID, SF_CSR_ID_RESET},
-                                     {SF_CSR_RAY_MAX_SAMPLES, 333},
-                                     {SF_CSR_RAY_TRANS_STOP, 99},
-                                     {SF_CSR_VERSION, SF_CSR_VERSION_RESET}};
+  static const accesses both_windows = {
+      {{SF_CSR_EXP_BIAS, OKAY}, {SF_CSR_RAY_STATUS, SLVERR}, {SF_CSR_ID, SLVERR}, {SF_CSR_RAY_IRQ_ENABLE, OKAY}},
+      {{SF_CSR_ID, SF_CSR_ID_RESET}, {SF_CSR_RAY_MAX_SAMPLES, 333}, {SF_CSR_RAY_TRANS_STOP, 99}, {SF_CSR_EXP_BIAS, 0}}};
   random_source s = {220, 0};
   OWNED(sf_dut) *dut = begin(s.seed);
-  sf_pins_in *in = &dut->in;
   put(dut, SF_CSR_RAY_MAX_SAMPLES, 333);
   put(dut, SF_CSR_RAY_TRANS_STOP, 99);
-  dut->each_cycle = NULL;
-  int written = 0, answered = 0, asked = 0, given = 0;
-  in->wstrb = WHOLE, in->wdata = 0;
-  for (int cycle = 0; cycle < 4000; cycle++) {
-    const bool both = draw(&s, 0, 1); /* address and data at once, or one of them early */
-    in->awvalid = both || draw(&s, 0, 1), in->wvalid = both || draw(&s, 0, 1);
-    in->arvalid = draw(&s, 0, 3) > 0;
-    in->awaddr = write[written % 4].offset;
-    in->araddr = read[asked % 4][0];
-    in->bready = draw(&s, 0, 2) == 0;
-    in->rready = draw(&s, 0, 2) == 0;
-    sf_dut_tick(dut);
-    if (dut->out.bvalid) ck_assert_int_eq(dut->out.bresp, write[answered % 4].response);
-    if (dut->out.rvalid) {
-      ck_assert_uint_eq(dut->out.rdata, read[given % 4][1]);
-      ck_assert_uint_eq(dut->out.rresp, OKAY);
-    }
-    answered += dut->out.bvalid && in->bready;
-    given += dut->out.rvalid && in->rready;
-    const bool taken = dut->out.awready && in->awvalid;
-    ck_assert(taken == (dut->out.wready && in->wvalid));
-    written += taken;
-    asked += dut->out.arready && in->arvalid;
-    ck_assert(written >= answered && written <= answered + 1);
-    ck_assert(asked >= given && asked <= given + 1);
-  }
-  ck_assert_int_gt(written, 400);
-  ck_assert_int_gt(asked, 400);
+  access_without_a_pause(dut, &s, &both_windows);
 }
 
 /* In which cycle of twelve a sample out of order was taken that is offered in cycle `beat`, and a write that is offered
@@ -373,93 +303,6 @@ TEST(an_error_beside_a_soft_reset)
       ck_assert_uint_eq(get(dut, SF_CSR_RAY_ERROR), 0);
     }
   ck_assert_int_gt(together, 3);
-}
-
-/* ---- the encoder's words ---- */
-
-static sf_ray_sample samples[RAYS][SAMPLES_MAX];
-
-static void renders(sf_ray_dut *rays, uint64_t seed)
-{
-  const fx_scene *scene = rays->scene;
-  fx_ray ray[RAYS];
-  fx_pixel expected, actual[RAYS];
-  fx_counts counts = {0};
-  sf_ray_request request[RAYS];
-  uint64_t count = 0;
-  for (uint64_t i = 0; i < RAYS; i++) {
-    ray[i] = random_ray(scene, seed, i);
-    ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
-    sf_ray_samples(scene, &ray[i], samples[i], (int)expected.samples);
-    request[i] = (sf_ray_request){&ray[i], samples[i], (int)expected.samples, false, i == 0};
-    count += expected.samples;
-  }
-  ck_assert_uint_gt(count, 0);
-  ck_ok(sf_ray_dut_run(rays, request, RAYS, actual));
-  for (int i = 0; i < RAYS; i++) {
-    ck_ok(fx_render_ray(scene, &ray[i], NULL, NULL, &expected, &counts));
-    ck_assert_mem_eq(actual[i].colour, expected.colour, sizeof expected.colour);
-    ck_assert_uint_eq(actual[i].depth, expected.depth);
-  }
-}
-
-/* Writes of the other registers, refused words, what a master shows while it is not valid: nothing of it gets there. */
-TEST(the_encoder_is_programmed_by_its_words_alone)
-{
-  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  OWNED(fx_scene) scene = fixture_scene(&sizes, 21);
-  scene.step_q24 = 1 << 20;
-  memset(scene.occupancy, 0xff, 64);
-  OWNED(sf_ray_dut) *rays = NULL;
-  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 240, .stall_percent = 10}));
-  sf_dut *dut = rays->dut;
-  for (uint32_t word = 0; word < 8 * 4; word++) { /* of the four levels, and at last the three behind them */
-    const uint32_t address = word < 8 * 4 - 3 ? word : 0x80 + word - (8 * 4 - 3);
-    put(dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
-    put(dut, SF_CSR_ENCODER_ADDRESS, address);
-    for (uint32_t o = 0; o < 3; o++) put(dut, SF_CSR_RAY_BACKGROUND_R + 4 * o, (uint32_t)scene.background[o]);
-    put(dut, SF_CSR_RAY_MAX_SAMPLES, (uint32_t)scene.max_samples);
-    put(dut, SF_CSR_RAY_TRANS_STOP, (uint32_t)scene.trans_stop);
-    put_bytes(dut, SF_CSR_ENCODER_DATA, 1, 7);
-    put(dut, SF_CSR_RAY_ERROR, ~0u);
-    dut->each_cycle = show_anything, dut->each_cycle_context = dut;
-    for (int i = 0; i < 40; i++) sf_dut_tick(dut);
-    dut->each_cycle = sf_memory_cycle, dut->each_cycle_context = &rays->memory;
-    ck_assert_uint_eq(get(dut, SF_CSR_ENCODER_ADDRESS), address);
-    ck_assert_int_eq(sf_driver_start(&dut->bus), SF_DRIVER_OK);
-    put(dut, SF_CSR_RAY_CTRL, SF_CSR_RAY_CTRL_START);
-    put(dut, SF_CSR_ENCODER_DATA, 1); /* while it runs */
-    ck_assert_int_eq(dut->bus_response, SLVERR);
-    put(dut, SF_CSR_RAY_ERROR, ~0u);
-    renders(rays, word);
-  }
-}
-
-/* From the first sample that is taken to the pixel that is taken, whoever works on it. */
-TEST(active_until_the_pixel_has_left)
-{
-  enum { IDLE = SF_CSR_RAY_STATUS_RUNNING, BUSY = IDLE | SF_CSR_RAY_STATUS_ACTIVE };
-  static const fixture_sizes sizes = {16, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
-  OWNED(fx_scene) scene = fixture_scene(&sizes, 22);
-  OWNED(sf_ray_dut) *rays = NULL;
-  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 250}));
-  sf_dut *dut = rays->dut;
-  ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
-  for (int empty = 0; empty < 2; empty++) {
-    dut->in.ray_valid = dut->in.ray_user = dut->in.ray_last = true, dut->in.pixel_ready = false;
-    memset(dut->in.ray_data, 0, sizeof dut->in.ray_data);
-    dut->in.ray_data[3] = (uint64_t)empty << 48;
-    sf_dut_tick(dut);
-    ck_assert(dut->out.ray_ready);
-    dut->in.ray_valid = false;
-    int polls = 0;
-    for (; !dut->out.pixel_valid; polls++) ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), BUSY);
-    ck_assert_int_gt(polls, empty ? 0 : 20);
-    for (int i = 0; i < 20; i++) ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), BUSY);
-    dut->in.pixel_ready = true;
-    sf_dut_tick(dut);
-    ck_assert_uint_eq(get(dut, SF_CSR_RAY_STATUS), IDLE);
-  }
 }
 
 /* A response that waits is gone after a reset. */

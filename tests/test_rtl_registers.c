@@ -1,31 +1,35 @@
-/* The registers against a model of csr.def: what reads back, what is refused and how, the interrupt; the bus and the
- * window of counters. */
+/* The registers against a model of csr.def: what reads back, what is refused and how, the interrupt, the bus. */
 #include "ck_run.h"
+#include "tests/register_bus.h"
 #include "tests/register_model.h"
 #include "tests/rtl_fixture.h"
 
-enum { TRIALS = 4000, ACCESSES = 6000, PLACES = 512 /* of the window */ };
+enum { TRIALS = 4000, ACCESSES = 6000 };
 
 /* ---- both ---- */
 
-static void wait_for_walk(sf_dut *dut)
-{
-  for (const uint64_t begin = dut->cycle; get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS;)
-    ck_assert_uint_lt(dut->cycle, begin + 4 * PLACES);
-}
+static const uint32_t limit[] = {0, 1, 3, 8, 15, 16, 32, 128, 160, 256, 512, 4096, 8192, 1 << 16, 1 << 23, 1u << 31};
 
-static void write_both(sf_dut *dut, registers *r, uint32_t offset, uint32_t value)
+static void write_bytes(sf_dut *dut, registers *r, uint32_t offset, uint32_t value, uint8_t strobe)
 {
-  dut->bus.write(dut->bus.context, offset, value);
-  const uint32_t error = model_write(r, offset, value);
-  ck_assert_msg(!dut->bus_hung && dut->bus_response == (error ? 2 : 0), "%x to %x: response %d, expected errors %x",
-                value, offset, dut->bus_response, error);
+  if (strobe == WHOLE)
+    put(dut, offset, value);
+  else
+    put_bytes(dut, offset, value, strobe);
+  const uint32_t error = strobe == WHOLE ? model_write(r, offset, value) : model_refuse(r, SF_CSR_ERROR_ADDRESS);
+  ck_assert_msg(!dut->bus_hung && dut->bus_response == (error ? SLVERR : OKAY),
+                "%x to %x, bytes %x: response %d, expected errors %x", value, offset, strobe, dut->bus_response, error);
   dut->in.s_valid = !r->running; /* nothing is accepted that comes before a start */
   sf_dut_tick(dut);
   ck_assert(r->running || !dut->out.s_ready);
   dut->in.s_valid = false;
   ck_assert_msg(dut->out.irq == ((r->irq_pending & r->irq_enable) != 0), "%x to %x: interrupt %d", value, offset,
                 dut->out.irq);
+}
+
+static void write_both(sf_dut *dut, registers *r, uint32_t offset, uint32_t value)
+{
+  write_bytes(dut, r, offset, value, WHOLE);
 }
 
 static void read_both(sf_dut *dut, registers *r, uint32_t offset)
@@ -54,16 +58,6 @@ static sf_dut *begin(registers *r, uint64_t seed)
   dut->each_cycle = show_anything, dut->each_cycle_context = dut;
   for (uint32_t offset = 0; offset <= SF_CSR_BIAS; offset += 4) read_both(dut, r, offset);
   return dut;
-}
-
-/* A value at or beside a limit of some register, or beside the value that is there. */
-static uint32_t near_a_limit(random_source *s, uint32_t now)
-{
-  static const uint32_t limit[] = {0, 1, 3, 8, 15, 16, 32, 128, 160, 256, 512, 4096, 8192, 1 << 16, 1 << 23, 1u << 31};
-  const uint32_t beside = (uint32_t)draw(s, -1, 1);
-  if (draw(s, 0, 3) == 0) return now + beside;
-  if (draw(s, 0, 7) == 0) return now | 1u << draw(s, 0, 31);
-  return limit[draw(s, 0, sizeof limit / sizeof *limit - 1)] + beside;
 }
 
 /* ---- the check at start ---- */
@@ -139,7 +133,7 @@ LOOP_TEST(the_check_at_start, 3)
     const registers before = r;
     uint32_t offset = SF_CSR_MODE + 4 * (uint32_t)draw(&s, 0, (SF_CSR_C3_THETA - SF_CSR_MODE) / 4);
     if (draw(&s, 0, 15) == 0) offset = SF_CSR_BIAS;
-    const uint32_t value = near_a_limit(&s, model_read(&r, offset)), other = partner(offset);
+    const uint32_t value = near_a_limit(&s, model_read(&r, offset), limit, COUNT(limit)), other = partner(offset);
     write_both(dut, &r, offset, value);
     if (other && draw(&s, 0, 2)) write_both(dut, &r, other, value);
     legal += start_errors(&r) == 0;
@@ -202,7 +196,7 @@ LOOP_TEST(any_access_in_any_state, 2)
     } else if (kind < 62) {
       if (!r.running) program_legal(dut, &r, &s);
     } else if (offset != SF_CSR_CTRL) {
-      write_both(dut, &r, offset, near_a_limit(&s, model_read(&r, offset)));
+      write_bytes(dut, &r, offset, near_a_limit(&s, model_read(&r, offset), limit, COUNT(limit)), draw_strobe(&s));
       if (offset < SF_CSR_COUNTERS) read_both(dut, &r, offset);
     }
   }
@@ -211,36 +205,18 @@ LOOP_TEST(any_access_in_any_state, 2)
 
 /* ---- the bus ---- */
 
-/* The next access is offered while the response of the last one waits: as many responses as accesses, in their order.
- */
 TEST(accesses_without_a_pause)
 {
+  static const accesses window = {{{SF_CSR_EXP_BIAS, OKAY}, {SF_CSR_ID, SLVERR}, {SF_CSR_D1_K, OKAY}, {0x7fc, SLVERR}},
+                                  {{SF_CSR_ID, SF_CSR_ID_RESET},
+                                   {SF_CSR_VERSION, SF_CSR_VERSION_RESET},
+                                   {SF_CSR_C2_THETA, 99},
+                                   {SF_CSR_EXP_BIAS, 0}}};
   random_source s = {100, 0};
   registers r;
   OWNED(sf_dut) *dut = begin(&r, s.seed);
-  sf_pins_in *in = &dut->in;
-  dut->each_cycle = NULL;
-  int written = 0, answered = 0, asked = 0, given = 0;
-  in->wstrb = 0xf;
-  for (int cycle = 0; cycle < 2000; cycle++) {
-    in->awvalid = in->wvalid = in->arvalid = true;
-    in->awaddr = written % 3 ? SF_CSR_EXP_BIAS : SF_CSR_ID; /* every third is refused */
-    in->wdata = (uint32_t)written;
-    in->araddr = asked % 3 ? SF_CSR_ID : SF_CSR_VERSION;
-    in->bready = draw(&s, 0, 2) == 0;
-    in->rready = draw(&s, 0, 2) == 0;
-    sf_dut_tick(dut);
-    if (dut->out.bvalid && in->bready) ck_assert_uint_eq(dut->out.bresp, answered++ % 3 ? 0 : 2);
-    if (dut->out.rvalid && in->rready)
-      ck_assert_uint_eq(dut->out.rdata, given++ % 3 ? SF_CSR_ID_RESET : SF_CSR_VERSION_RESET);
-    ck_assert(dut->out.awready == dut->out.wready);
-    written += dut->out.awready;
-    asked += dut->out.arready;
-    ck_assert_int_le(written - answered, 1);
-    ck_assert_int_le(asked - given, 1);
-  }
-  ck_assert_int_gt(written, 200);
-  ck_assert_int_gt(asked, 200);
+  put(dut, SF_CSR_C2_THETA, 99);
+  access_without_a_pause(dut, &s, &window);
 }
 
 /* Refused weights, other registers, what a master shows while it is not valid: none of it reaches the weights. */
@@ -291,147 +267,4 @@ TEST(rows_in_any_order)
       }
   ck_assert_int_eq(sf_driver_start(bus), SF_DRIVER_OK);
   run_batch(dut, &net_of_test.net, 4, &counts, 106);
-}
-
-/* ---- the window of counters ---- */
-
-static bool has_meaning(int event, int layer, int step)
-{
-  return layer < SF_LAYERS || (layer == 7 && ((event == 0 && step < 6) || (event == 1 && step < SF_LAYERS)));
-}
-
-static uint32_t place_offset(int place)
-{
-  return SF_CSR_COUNTERS + 8 * (uint32_t)place;
-}
-
-/* second: during the walk of the first one; 0: none. */
-static void commands(sf_dut *dut, uint32_t first, uint32_t second)
-{
-  dut->bus.write(dut->bus.context, SF_CSR_CTRL, first);
-  if (second) dut->bus.write(dut->bus.context, SF_CSR_CTRL, second);
-  wait_for_walk(dut);
-}
-
-/* All counters are 0 after power-on, without a command; later the places that no counter has read 0. */
-LOOP_TEST(places_of_the_window, 2)
-{
-  registers r;
-  fx_counts counts = {0};
-  sf_dut *dut = begin(&r, 110 + (uint64_t)_i);
-  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
-  for (uint32_t word = 0; word < 2 * PLACES; word++) ck_assert_uint_eq(get(dut, SF_CSR_COUNTERS + 4 * word), 0);
-  typical(110);
-  dut->each_cycle = NULL;
-  ck_ok(sf_dut_load(dut, &net_of_test.net));
-  run_batch(dut, &net_of_test.net, 4, &counts, 110);
-  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
-  for (int i = 0; i < PLACES; i++)
-    if (!has_meaning(i / 64, i / 8 % 8, i % 8)) ck_assert_uint_eq(get(dut, place_offset(i)), 0);
-  sf_dut_close(dut);
-}
-
-static void read_window(sf_dut *dut, uint32_t words[2 * PLACES])
-{
-  for (uint32_t i = 0; i < 2 * PLACES; i++) words[i] = get(dut, SF_CSR_COUNTERS + 4 * i);
-}
-
-/* Neither events nor a clear change it, and a command that comes during a walk is one of its own. */
-TEST(the_window_is_of_the_last_snapshot)
-{
-  static uint32_t words[2][2 * PLACES];
-  static const uint32_t zero[2 * PLACES];
-  fx_counts counts = {0};
-  typical(113);
-  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 113, 0);
-  for (int during = 0; during < 2; during++) {
-    run_batch(dut, &net_of_test.net, 3, &counts, 113);
-    same_counts(dut, &counts, 113);
-    read_window(dut, words[0]);
-    if (during) {
-      commands(dut, SF_CSR_CTRL_SNAPSHOT, SF_CSR_CTRL_CLEAR);
-    } else {
-      run_batch(dut, &net_of_test.net, 2, &counts, 113);
-      read_window(dut, words[1]);
-      ck_assert_mem_eq(words[0], words[1], sizeof words[0]);
-      commands(dut, SF_CSR_CTRL_CLEAR, 0);
-    }
-    read_window(dut, words[1]);
-    ck_assert_mem_eq(words[0], words[1], sizeof words[0]);
-    counts = (fx_counts){0};
-  }
-  commands(dut, SF_CSR_CTRL_CLEAR, SF_CSR_CTRL_SNAPSHOT);
-  read_window(dut, words[1]);
-  ck_assert_mem_eq(words[1], zero, sizeof zero);
-}
-
-/* A counter that was read and waits to be taken stays what it is, whatever a walk writes meanwhile. */
-TEST(a_response_that_waits)
-{
-  fx_counts counts = {0};
-  typical(111);
-  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 111, 0);
-  run_batch(dut, &net_of_test.net, 5, &counts, 111);
-  commands(dut, SF_CSR_CTRL_SNAPSHOT, 0);
-  const int place = 7 * 8; /* samples */
-  dut->in.araddr = place_offset(place), dut->in.arvalid = true, dut->in.rready = false;
-  sf_dut_tick(dut);
-  ck_assert(dut->out.arready);
-  dut->in.arvalid = false;
-  dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_CLEAR);
-  for (int walk = 0; walk < 2; walk++) {
-    for (int i = 0; i < PLACES + 10; i++) {
-      dut->in.araddr = place_offset(i % PLACES);
-      sf_dut_tick(dut);
-      ck_assert(dut->out.rvalid);
-      ck_assert_uint_eq(dut->out.rdata, 5);
-    }
-    dut->bus.write(dut->bus.context, SF_CSR_CTRL, SF_CSR_CTRL_SNAPSHOT);
-  }
-  dut->in.rready = true;
-  sf_dut_tick(dut);
-  ck_assert_uint_eq(get(dut, place_offset(place)), 0);
-}
-
-/* A packet that has begun: the block is active and D1 waits, but a walk is no time of the engine's. */
-TEST(a_walk_takes_no_time)
-{
-  sf_driver_counters c[2];
-  uint64_t at[2];
-  typical(112);
-  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 112, 0);
-  ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING);
-  uint64_t words[SF_PACKET_MAX];
-  sf_dut_packet(&net_of_test.net, &shared.sample[0], words);
-  dut->in.s_valid = dut->in.s_user = true, dut->in.s_data = words[0], dut->in.s_last = false;
-  sf_dut_tick(dut);
-  ck_assert(dut->out.s_ready);
-  dut->in.s_valid = false;
-  ck_assert_uint_eq(get(dut, SF_CSR_STATUS), SF_CSR_STATUS_RUNNING | SF_CSR_STATUS_ACTIVE);
-  for (int i = 0; i < 2; i++) {
-    at[i] = dut->cycle;
-    ck_assert_int_eq(sf_driver_read_counters(&dut->bus, &c[i]), SF_DRIVER_OK);
-  }
-  ck_assert_uint_eq(c[1].cycles - c[0].cycles, at[1] - at[0] - PLACES);
-  ck_assert_uint_eq(c[1].stall_in - c[0].stall_in, at[1] - at[0] - PLACES - 1); /* nor is the cycle that waits for it */
-  ck_assert_uint_eq(c[1].busy + c[1].stall_out, 0);
-}
-
-/* Samples that come while a walk clears or copies wait for its end, and are counted whole. */
-TEST(samples_that_come_during_a_walk)
-{
-  typical(114);
-  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, 114, 0);
-  for (int round = 0; round < 6; round++) {
-    fx_counts counts = {0};
-    run_batch(dut, &net_of_test.net, 3, &counts, 114);
-    dut->bus.write(dut->bus.context, SF_CSR_CTRL,
-                   round % 2 ? SF_CSR_CTRL_CLEAR | SF_CSR_CTRL_SNAPSHOT : SF_CSR_CTRL_CLEAR);
-    for (int i = 0; i < 100 * round; i++) sf_dut_tick(dut);
-    ck_assert_uint_ne(get(dut, SF_CSR_STATUS) & SF_CSR_STATUS_COUNTERS, 0);
-    counts = (fx_counts){0};
-    run_batch(dut, &net_of_test.net, 2, &counts, 114);
-    same_counts(dut, &counts, 114);
-    commands(dut, SF_CSR_CTRL_CLEAR, 0);
-  }
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Exchanges a safetensors file with the format's own library, in both directions.
 
-usage: read_safetensors.py BUILD     runs BUILD/tests/test_base
+usage: read_safetensors.py BUILD     runs BUILD/tests/test_tensors
 Exits 0 when equal, 1 when not, 77 (skipped) where the Python modules are not installed.
 """
 import os
@@ -38,7 +38,7 @@ def main():
     expected, metadata = tensors(), {"version": "1", "text": 'a "quoted"\nline, \u00e9'}
     with tempfile.TemporaryDirectory() as folder:
         save_file(expected, os.path.join(folder, "theirs.safetensors"), metadata=metadata)
-        subprocess.run([os.path.join(sys.argv[1], "tests", "test_base")], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
+        subprocess.run([os.path.join(sys.argv[1], "tests", "test_tensors")], env={**os.environ, "SF_CROSSCHECK": folder}, check=True)
         with safe_open(os.path.join(folder, "ours.safetensors"), "np") as ours:
             assert ours.metadata() == metadata, ours.metadata()
             assert set(ours.keys()) == set(expected), ours.keys()

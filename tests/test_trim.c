@@ -1,0 +1,134 @@
+/* Trimming grids: what is left out without effect changes no bit, entries that nothing reads are found, smaller tables
+ * keep what is used. */
+#include "ck_run.h"
+#include "src/quant/internal.h"
+#include "tests/fit_grid_fixture.h"
+
+LOOP_TEST(without_effect_changes_no_bit, 3)
+{
+  fx_scene scene = small_scene(11, _i), trimmed;
+  spoil(&scene);
+  sf_fit_rays rays = make_rays(&scene, RAYS, 0);
+  sf_trim_use use;
+  sf_trim trim;
+  ck_ok(sf_trim_use_create(&use, &scene));
+  ck_ok(sf_fit_observe(&scene, &rays, 0, RAYS, true, &use));
+  sf_trim_all(&scene, &trim);
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "all", &trimmed));
+  ck_assert_int_eq(trimmed.grid.entries, scene.grid.entries);
+  ck_assert_mem_eq(trimmed.grid.table, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  fx_scene_free(&trimmed);
+  sf_trim_exact(&scene, &use, &trim);
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "exact", &trimmed));
+  ck_ok(fx_scene_check(&trimmed, "exact"));
+  expect_dropped(&scene, &trimmed);
+  assert_same_pixels(&scene, &trimmed, &rays);
+  sf_trim_use_free(&use), sf_fit_rays_free(&rays), fx_scene_free(&scene), fx_scene_free(&trimmed);
+}
+
+static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
+{
+  const uint32_t side = (1u << SF_POS_FRAC) / (uint32_t)scene->occ_res, res = (uint32_t)scene->occ_res;
+  uint32_t cell = (uint32_t)sf_random_below(8, 0, i, (uint64_t)res * res * res);
+  while (!(scene->occupancy[cell >> 3] >> (cell & 7) & 1)) cell = (cell + 1) % (res * res * res);
+  const uint32_t corner[3] = {cell % res, cell / res % res, cell / res / res};
+  for (uint64_t a = 0; a < 3; a++) { /* the faces of the cell, too */
+    const uint64_t inside = sf_random_below(9, a, i, side + side / 4);
+    pos[a] = corner[a] * side + (uint32_t)(inside < side ? inside : i & 1 ? side - 1 : 0);
+  }
+}
+
+TEST(corners_are_all_that_a_position_reads)
+{
+  OWNED(fx_scene) scene = small_scene(13, FX_HYBRID);
+  int8_t *all = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  for (uint64_t i = 0; i < 200; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    random_position(&scene, i, pos);
+    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    memset(scene.grid.table, 0, 2 * (size_t)scene.grid.entries);
+    for (int l = 0; l < scene.grid.levels; l++) {
+      const sf_corners c = sf_grid_corners(&scene.grid, l, pos, pos);
+      for (int n = 0; n < 8; n++) {
+        ck_assert_uint_eq(c.last[n % 3], c.base[n % 3] + 1);
+        const int64_t e =
+            sf_grid_entry(&scene.grid, l, c.base[0] + (n & 1), c.base[1] + (n >> 1 & 1), c.base[2] + (n >> 2));
+        memcpy(scene.grid.table + 2 * e, all + 2 * e, 2);
+      }
+    }
+    fx_grid_features(&scene.grid, pos, g, NULL);
+    ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
+  }
+  free(all);
+}
+
+TEST(unread_entries_are_not_read)
+{
+  OWNED(fx_scene) scene = small_scene(14, FX_HYBRID);
+  memset(scene.occupancy, 0, 64);
+  scene.occupancy[9] = 0x21, scene.occupancy[40] = 0x80;
+  int8_t *all = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(all, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  const int64_t zero = sf_grid_zero_unread(&scene);
+  ck_assert_int_gt(zero, scene.grid.entries / 4);
+  ck_assert_int_lt(zero, scene.grid.entries);
+  int8_t *cleared = malloc(2 * (size_t)scene.grid.entries);
+  memcpy(cleared, scene.grid.table, 2 * (size_t)scene.grid.entries);
+  for (uint64_t i = 0; i < 2000; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    random_position(&scene, i, pos);
+    memcpy(scene.grid.table, cleared, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, g, NULL);
+    ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
+  }
+  free(all), free(cleared);
+}
+
+static bool corners_apart(const fx_grid *grid, int level, const uint32_t pos[3])
+{
+  const sf_corners c = sf_grid_corners(grid, level, pos, pos);
+  int64_t entry[8];
+  for (int n = 0; n < 8; n++) {
+    entry[n] = sf_grid_entry(grid, level, c.base[0] + (n & 1), c.base[1] + (n >> 1 & 1), c.base[2] + (n >> 2));
+    for (int m = 0; m < n; m++)
+      if (entry[m] == entry[n]) return false;
+  }
+  return true;
+}
+
+/* What is used keeps its value in a smaller table, dense levels and hashed ones, unless it meets something used. */
+TEST(smaller_tables_keep_what_is_used)
+{
+  fx_scene scene = small_scene(15, FX_HYBRID), small_one;
+  int compared = 0;
+  for (uint64_t i = 0; i < 60; i++) {
+    int16_t f[32], g[32];
+    uint32_t pos[3];
+    sf_trim_use use;
+    sf_trim trim;
+    random_position(&scene, i, pos);
+    ck_ok(sf_trim_use_create(&use, &scene));
+    sf_trim_use_place(&use, &scene, pos, 0, 1000);
+    sf_trim_all(&scene, &trim);
+    for (int l = 0; l < scene.grid.levels; l++) trim.log2_size[l] = sf_trim_smaller(&scene, &trim, l);
+    ck_ok(sf_trim_apply(&scene, &trim, &use, "smaller", &small_one));
+    ck_ok(fx_scene_check(&small_one, "smaller"));
+    ck_assert_int_lt(small_one.grid.entries, scene.grid.entries);
+    fx_grid_features(&scene.grid, pos, f, NULL);
+    fx_grid_features(&small_one.grid, pos, g, NULL);
+    for (int l = 0; l < scene.grid.levels; l++) {
+      if (!corners_apart(&small_one.grid, l, pos)) continue;
+      compared++;
+      ck_assert_mem_eq(f + 2 * l, g + 2 * l, 2 * sizeof *f);
+    }
+    sf_trim_use_free(&use), fx_scene_free(&small_one);
+  }
+  ck_assert_int_gt(compared, 200);
+  fx_scene_free(&scene);
+}
