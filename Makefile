@@ -269,7 +269,7 @@ pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CS
 	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
 
 outputs: all ## puts today's numbers into the outputs that docs/ shows, after make demo on an idle machine (OUTPUTS="docs/kit.md ...")
-	@tests/chain/tutorials.py --print $B $(OUTPUTS)
+	@tests/tutorials.py --print $B $(OUTPUTS)
 
 speed-error: all ## speed against error after make demo: steps, widths, fits, arithmetic, training time (PROFILE=quick, full, smoke; DATA=): build/speed-error
 	@tools/speed_error.py $B --profile $(PROFILE) $(if $(filter-out file,$(origin DATA)),--data "$(DATA)")

@@ -1,6 +1,6 @@
 # Line, toggle and functional coverage of the RTL, in a build of its own. Included by the Makefile.
 COVER := $B/coverage
-COVER_TESTS := test_rtl test_rtl_registers test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_disturbed
+COVER_TESTS := test_rtl test_rtl_registers test_rtl_counters test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_disturbed
 coverage: ## line, toggle and functional coverage of the RTL: table, holes, build/coverage/lcov.info (about 15 minutes)
 	@mkdir -p $(COVER)/points
 	@$(MAKE) B=$(COVER) $(SAME_ARCH) COVERAGE=$(COVER)/points coverage-run

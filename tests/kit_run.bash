@@ -19,3 +19,10 @@ run() {
   done
   grep -E '^(PASS|DIFFERENCE)' "$work/log"
 }
+
+# flip FILE LINE: one wrong bit
+flip() {
+  cp "$kit/$1" "$work/kept"
+  awk -v at="$2" 'NR == at { digit = substr($0, length($0)); $0 = substr($0, 1, length($0) - 1) \
+    substr("1032547698badcfe", index("0123456789abcdef", digit), 1) } { print }' "$work/kept" >"$kit/$1"
+}

@@ -26,34 +26,6 @@ TEST(weights_and_transmittance_sum_to_one)
   }
 }
 
-static double ray_value(const float *sigma, const float *g, float g_end)
-{
-  float weight[N];
-  double sum = g_end * (double)sf_composite_weights(N, sigma, growing(0.05f), weight);
-  for (int s = 0; s < N; s++) sum += (double)g[s] * weight[s];
-  return sum;
-}
-
-TEST(backward_is_the_slope)
-{
-  float sigma[N], weight[N], g[N], dsigma[N] = {0};
-  for (int s = 0; s < N; s++) {
-    sigma[s] = 4 * sf_random_float(2, 1, s);
-    g[s] = test_random(s);
-  }
-  float end = sf_composite_weights(N, sigma, growing(0.05f), weight);
-  sf_composite_backward(N, weight, end, growing(0.05f), g, 0.7f, dsigma);
-  for (int s = 0; s < N; s++) {
-    float at = sigma[s], up, down;
-    sigma[s] = up = at + 0.02f;
-    double high = ray_value(sigma, g, 0.7f);
-    sigma[s] = down = at - 0.02f;
-    double low = ray_value(sigma, g, 0.7f);
-    sigma[s] = at;
-    ck_assert_double_eq_tol(dsigma[s], (high - low) / (up - down), 2e-5); /* float rounding 1e-7 over a step of 0.04 */
-  }
-}
-
 /* Skipping empty cells must find the samples that testing every lattice point finds. */
 TEST(march_equals_testing_every_point)
 {

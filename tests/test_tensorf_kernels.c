@@ -99,39 +99,6 @@ TEST(backward_is_the_adjoint)
       for (int appearance = 0; appearance < 2; appearance++) check_adjoint(exact[i], ndc, appearance);
 }
 
-/* A plane's gradient against central differences, entry by entry: the products' sum is linear in it. */
-TEST(field_gradient_is_the_slope)
-{
-  const sf_kernels *k = sf_kernels_select("portable");
-  static float x[3 * N], g[N], sigma[N], slope[N];
-  positions(x);
-  OWNED(sf_model) m = test_tensorf(SF_NET_SNN, 0, 16, 2);
-  m.config.tensorf.shift = 0;
-  const sf_vm_field f = sf_vm_field_of(&m, false);
-  float *grad = calloc(m.size, sizeof *grad);
-  k->vm_density(&f, x, N, sigma, slope);
-  for (int s = 0; s < N; s++) g[s] = test_random(900 + s) * slope[s];
-  for (int mode = 0; mode < 3; mode++)
-    k->vm_backward(&f, mode, 0, 16, x, N, g, 0, grad + m.param[SF_P_DENSITY_PLANE + mode].offset,
-                   grad + m.param[SF_P_DENSITY_LINE + mode].offset);
-  for (int id = SF_P_DENSITY_PLANE; id < SF_P_APP_PLANE; id++)
-    for (size_t i = m.param[id].offset; i < m.param[id].offset + m.param[id].size; i += 23) {
-      const float old = m.value[i], h = 1e-2f;
-      double value[2] = {0};
-      for (int side = 0; side < 2; side++) {
-        m.value[i] = old + (side ? h : -h);
-        k->vm_density(&f, x, N, sigma, slope);
-        for (int s = 0; s < N; s++) value[side] += test_random(900 + s) * (double)sigma[s];
-      }
-      m.value[i] = old;
-      const double expected = (value[1] - value[0]) / (2 * h);
-      /* softplus bends by h^2 / 8, its sum over the samples has 1e-7 * 30 * 128 of rounding over 2 h */
-      ck_assert_msg(fabs(expected - grad[i]) <= 0.01 * fabs(expected) + 0.05, "%s[%zu]: slope %g, gradient %g",
-                    m.param[id].name, i - m.param[id].offset, expected, (double)grad[i]);
-    }
-  free(grad);
-}
-
 typedef struct rig {
   sf_model model;
   sf_decoder_words *words;
@@ -247,27 +214,6 @@ TEST(bfloat16_decoder_near_oracle)
   }
 }
 
-static double objective(const rig *r, const float *dcolour)
-{
-  double sum = 0;
-  for (int i = 0; i < r->model.config.steps; i++)
-    for (int l = 0; l < 3 * SF_BLOCK; l++) sum += dcolour[i * 3 * SF_BLOCK + l] * (double)r->block->net.colour[i][l];
-  return sum;
-}
-
-static double slope_at(rig *r, float *at, float h, const float *dcolour)
-{
-  const float old = *at;
-  double value[2];
-  for (int side = 0; side < 2; side++) {
-    *at = old + (side ? h : -h);
-    rig_forward(r, sf_kernels_select("portable"), 1);
-    value[side] = objective(r, dcolour);
-  }
-  *at = old;
-  return (value[1] - value[0]) / (2 * h);
-}
-
 /* Where the kernels put the gradient of entry i. */
 static float grad_at(const rig *r, int id, size_t i)
 {
@@ -297,52 +243,6 @@ static float grad_at(const rig *r, int id, size_t i)
 static void random_gradient(float *dcolour)
 {
   for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dcolour[i] = test_random(1u << 25 | i);
-}
-
-/* The twin is smooth but for its kinks: every third weight, every bias, and the products, against central differences.
- * Bound: float cancellation, as in test_snn.c. */
-TEST(twin_gradient_is_the_slope)
-{
-  static float dc[SF_T_MAX * 3 * SF_BLOCK];
-  for (int ndc = 0; ndc < 2; ndc++) {
-    OWNED(rig) r = rig_make(SF_NET_ANN, SF_HYBRID, ndc, 16, 1, 0.5f);
-    const sf_kernels *k = sf_kernels_select(NULL);
-    random_gradient(dc);
-    rig_forward(&r, k, 1);
-    k->decoder_backward(r.words, r.block, 1, dc, r.dproduct, r.grad, r.scratch);
-    for (int id = SF_P_BASIS; id <= SF_P_C3_BIAS; id++)
-      for (size_t i = 0; i < r.model.param[id].size; i += r.model.param[id].dims == 2 ? 11 : 1) {
-        const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 2e-3f, dc), actual = grad_at(&r, id, i);
-        ck_assert_msg(fabs(expected - actual) <= 0.02 * fabs(expected) + 0.1, "ndc %d: %s[%zu]: slope %g, gradient %g",
-                      ndc, r.model.param[id].name, i, expected, actual);
-      }
-    const int all = sf_tensorf_products(&r.model.config.tensorf), ld = (all + 15) / 16 * 16;
-    for (int i = 0; i < SF_BLOCK; i += 3) {
-      const int at = i * ld + i * 7 % all;
-      const double expected = slope_at(&r, r.block->product + at, 2e-3f, dc);
-      ck_assert_double_eq_tol(r.dproduct[at], expected, 0.02 * fabs(expected) + 2e-3);
-    }
-  }
-}
-
-/* Of a spiking decoder the last layer and the integrator are smooth: no spike hangs on them. */
-TEST(smooth_parts_of_the_decoder_match_the_slope)
-{
-  static float dc[SF_T_MAX * 3 * SF_BLOCK];
-  const sf_kernels *k = sf_kernels_select(NULL);
-  for (int mode = SF_HYBRID; mode <= SF_NODECAY; mode++) {
-    OWNED(rig) r = rig_make(SF_NET_SNN, mode, 0, 32, 6, 1);
-    random_gradient(dc);
-    rig_forward(&r, k, 1);
-    k->decoder_backward(r.words, r.block, 6, dc, r.dproduct, r.grad, r.scratch);
-    for (int id = SF_P_C3; id <= SF_P_C3_BIAS; id++)
-      for (size_t i = 0; i < r.model.param[id].size; i += 2) {
-        const double expected = slope_at(&r, sf_model_param(&r.model, id) + i, 1e-2f, dc);
-        ck_assert_double_eq_tol(grad_at(&r, id, i), expected, 0.01 * fabs(expected) + 0.05);
-      }
-    const double expected = slope_at(&r, sf_model_param(&r.model, SF_P_LEAK) + 4, 1e-2f, dc);
-    ck_assert_double_eq_tol(r.grad->net.leak[4], expected, 0.01 * fabs(expected) + 0.1);
-  }
 }
 
 /* The same forward pass, the backward passes compared; in the second round firing is charged, too. */

@@ -15,9 +15,9 @@ MUTATED_ray := sf_cache sf_cache_tags sf_fetch sf_grid sf_grid_cell sf_grid_weig
   sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top sf_planes sf_planes_reads sf_planes_mix sf_basis sf_activation sf_waves \
   sf_light sf_rescale sf_mul_28x25
 MUTATE_lanes := --lanes
-MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
+MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_counters test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
 MUTANT_CHECKERS_lanes := test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
-MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray_lone test_rtl_ray_field test_rtl_ray test_rtl_ray_planes
+MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray_program test_rtl_ray_lone test_rtl_ray_field test_rtl_ray test_rtl_ray_planes
 $(foreach m,sf_cache sf_cache_tags sf_fetch,$(eval MUTANT_CHECKERS_$m := test_rtl_cache test_rtl_encoder test_rtl_ray_field))
 $(foreach m,sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo,$(eval MUTANT_CHECKERS_$m := test_rtl_grid test_rtl_encoder))
 MUTANT_CHECKERS_sf_sh := test_rtl_sh test_rtl_encoder

@@ -23,7 +23,7 @@ import sys
 import tempfile
 import time
 
-ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", ".."))
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), ".."))
 PAGES = ["docs/tutorial-rtl.md", "docs/tutorial-training.md", "docs/tutorial-energy.md", "docs/first-hour.md"]
 DEMO_PAGES = ["docs/kit.md", "docs/firmware.md", "docs/activity.md"]
 NUMBER = r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
