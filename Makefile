@@ -281,7 +281,7 @@ bench: all $B/tests/bench ## speed of trainer and fixed-point core beside ceilin
 	@models=$(if $(filter-out fixed,$(ONLY)),,$$(tests/bench_models.sh $B "$(SCENES)")) && mapfile -t model <<<"$$models" && \
 	  $B/tests/bench $(ONLY:%=--only %) $B/bench.json $${models:+"$${model[@]}"}
 
-$B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_fixed bench_rtl bench_rig bench_tensorf)
+$B/tests/bench: $(patsubst %,$B/obj/tests/%.o,bench_ceilings bench_fixed bench_rtl bench_rig bench_tensorf)
 
 vectors: $B/bin/sf_export ## vector kit of the demo's scene after make demo (or SCENE=, DATA=), run in Icarus and Verilator: build/vectors
 	@$B/bin/sf_export $(or $(SCENE),$B/demo/scene.snn) --data $(or $(DATA),$B/demo/scene) --vectors $B/vectors --seed 1

@@ -14,6 +14,9 @@ typedef struct ceilings {
   double reads; /* of a random place of a table of 4 MiB */
 } ceilings;
 
+/* kernels: the name of the training kernels. */
+ceilings ceilings_measure(const char *kernels);
+
 /* One line and one entry of the JSON. ceiling, naive: NAN = none. Where the unit is seconds, less is better. */
 void put(cJSON *json, const char *name, double value, const char *unit, double ceiling, double naive);
 

@@ -20,7 +20,7 @@ fail() {
 
 # run PROGRAM ARGS...: leaves $status, files stdout.txt and err.
 run() {
-  timeout -k 5 60 "$BIN/$1" "${@:2}" >stdout.txt 2>err </dev/null
+  timeout -k 5 300 "$BIN/$1" "${@:2}" >stdout.txt 2>err </dev/null
   status=$?
 }
 

@@ -126,5 +126,13 @@ struct field_events {
     lookups += u.top.lookups_o, misses += u.top.misses_o, fills += u.top.filled_o, stalls += u.top.waits_o;
     errors += u.top.error_o;
   }
+  void same(const cache_model &model, const axi_memory &memory) const
+  {
+    ck_assert_msg(lookups == model.lookups && misses == model.misses, "%llu look-ups, %llu misses; expected %llu, %llu",
+                  (unsigned long long)lookups, (unsigned long long)misses, (unsigned long long)model.lookups,
+                  (unsigned long long)model.misses);
+    ck_assert_uint_eq(fills, misses);
+    ck_assert_uint_eq(memory.asked, misses);
+  }
 };
 #endif

@@ -114,12 +114,7 @@ template <class module, int bytes, int ways> struct cache_bench {
   {
     for (int i = 0; i < 20; i++) cycle(false);
     ck_assert(flying.empty() && memory.queue.empty());
-    ck_assert_msg(events.lookups == model.lookups && events.misses == model.misses,
-                  "%llu look-ups, %llu misses; expected %llu, %llu", (unsigned long long)events.lookups,
-                  (unsigned long long)events.misses, (unsigned long long)model.lookups,
-                  (unsigned long long)model.misses);
-    ck_assert_uint_eq(events.fills, events.misses);
-    ck_assert_uint_eq(memory.asked, events.misses);
+    events.same(model, memory);
     ck_assert_uint_eq(events.errors, memory.errors);
   }
   void clear(bool hard)

@@ -1,5 +1,5 @@
-/* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, stalls. Afterwards it
- * works as if nothing had been. */
+/* The accelerator disturbed at work: reset in mid-frame by pin and by register, snapshot and clear, stalls. Afterwards
+ * it works as if nothing had been. */
 #include "ck_run.h"
 #include "tests/rtl_fixture.h"
 

@@ -105,15 +105,7 @@ template <class module, int bytes, int ways> struct encoder_bench {
   }
 
   bool idle() const { return expected.empty() && memory.queue.empty(); }
-  void same_counts()
-  {
-    ck_assert_msg(events.lookups == model.lookups && events.misses == model.misses,
-                  "%llu look-ups, %llu misses; expected %llu, %llu", (unsigned long long)events.lookups,
-                  (unsigned long long)events.misses, (unsigned long long)model.lookups,
-                  (unsigned long long)model.misses);
-    ck_assert_uint_eq(events.fills, events.misses);
-    ck_assert_uint_eq(memory.asked, events.misses);
-  }
+  void same_counts() { events.same(model, memory); }
 
 private:
   void forget_offers() { output = held(); }

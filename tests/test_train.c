@@ -36,20 +36,6 @@ LOOP_TEST(same_seed_same_bits_any_threads, 2)
   ck_assert_int_ne(memcmp(a->model.value, c->model.value, a->model.size * sizeof(float)), 0);
 }
 
-static void check_resume(const sf_train_options *o, int before, int after)
-{
-  sf_trainer *whole = start(&data, o, NULL), *part = start(&data, o, NULL);
-  steps(whole, before + after);
-  steps(part, before);
-  ck_ok(sf_trainer_save(part, in("a.safetensors"), true));
-  sf_trainer_free(part);
-  part = start(&data, o, in("a.safetensors"));
-  steps(part, after);
-  same_model(whole, part);
-  sf_trainer_free(whole);
-  sf_trainer_free(part);
-}
-
 /* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
 TEST(the_chosen_steps_are_trained_alone)
 {
@@ -125,10 +111,10 @@ LOOP_TEST(a_lattice_at_its_limit_settles_as_it_is, 2)
 LOOP_TEST(resume_continues_bit_identically, 2)
 {
   sf_train_options o = run_in_box(_i);
-  check_resume(&o, 17, 16);
+  ck_resume(&o, &o, 17, 16);
   o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume */
   o.samples = 8192;
-  check_resume(&o, 6, 30);
+  ck_resume(&o, &o, 6, 30);
 }
 
 /* With other views, another scale or another box a checkpoint is not resumed; one that does not say its views is. */
@@ -217,7 +203,7 @@ TEST(fixed_steps_freeze_the_budget)
   same_model(a, b);
   sf_trainer_free(a);
   sf_trainer_free(b);
-  check_resume(&o, 20, 10);
+  ck_resume(&o, &o, 20, 10);
   for (o.fixed_steps = -1; o.fixed_steps <= T + 1; o.fixed_steps += T + 2)
     ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
 }
@@ -245,7 +231,7 @@ TEST(charged_neurons_fire_less)
   sf_train_options o = small_run();
   o.fixed_steps = 2;
   o.charge = 0.5;
-  check_resume(&o, 20, 13);
+  ck_resume(&o, &o, 20, 13);
 }
 
 TEST(every_prefix_is_evaluated)

@@ -82,4 +82,25 @@ static inline void same_model(const sf_trainer *a, const sf_trainer *b)
   ck_assert_int_eq(memcmp(&a->health, &b->health, sizeof a->health), 0);
   ck_assert_int_eq(a->samples, b->samples);
 }
+
+/* Its model, as it is now, is not loaded again. */
+static inline void ck_refused(sf_trainer *t, const char *word, const char *other)
+{
+  sf_model m;
+  ck_ok(sf_trainer_save(t, in("bad.safetensors"), false));
+  ck_bad(sf_model_load(&m, in("bad.safetensors")), SF_E_RANGE, word, other);
+}
+
+/* A checkpoint after some iterations, and what follows is the same as without. again: the options that resume it. */
+static inline void ck_resume(const sf_train_options *o, const sf_train_options *again, int before, int after)
+{
+  OWNED(trainer) whole = start(&data, o, NULL), part = start(&data, o, NULL);
+  steps(whole, before + after);
+  steps(part, before);
+  ck_ok(sf_trainer_save(part, in("part.safetensors"), true));
+  sf_trainer_free(part);
+  part = start(&data, again, in("part.safetensors"));
+  steps(part, after);
+  same_model(whole, part);
+}
 #endif

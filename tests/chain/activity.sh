@@ -1,23 +1,9 @@
 #!/bin/bash
 # SAIF and VCD of a co-simulated run: what must hold of any run, what the harness knows of this one, and every bit of both
 # files against each other, counted by a program of its own.   usage: activity.sh BUILD
-set -u
+. "$(dirname "$0")/../chain.bash" "$@"
 export LC_ALL=C
-build=$(cd "${1:?usage: activity.sh BUILD}" && pwd) || exit 2
-here=$(cd "$(dirname "$0")" && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_activity.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-failed=0
-fail() {
-  echo "FAILED: $1"
-  tail -n 5 "$work/out" "$work/err" 2>/dev/null
-  failed=1
-}
-"$build/bin/sf_scene" textured -o "$work/data" --size 24 --train 8 --test 2 >/dev/null || exit 1
-"$build/bin/sf_train" "$work/data" -o "$work/m.safetensors" --stage1 20 --stage2 40 --samples 512 --levels 4 \
-  --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden 32 --steps 3 --quiet >/dev/null &&
-  "$build/bin/sf_export" "$work/m.safetensors" -o "$work/m.snn" --steps 3 >/dev/null || exit 1
+learn m 32 --steps 3
 # run OPTIONS...
 run() {
   "$build/bin/sf_cosim" "$work/m.snn" "$work/data" --rays 100 --quiet --json "$@" >"$work/out" 2>"$work/err"
@@ -49,10 +35,10 @@ run --saif "$work/one.saif" --depth 1 || fail "--depth 1"
 run --saif "$work/w.saif" --vcd "$work/w.vcd" --window 300,419 || fail "a window"
 [ "$(number cycles)" = 120 ] || fail "a window of 120 cycles has $(number cycles)"
 if command -v python3 >/dev/null; then
-  python3 "$here/../vcd_activity.py" "$work/w.vcd" "$work/w.saif" >"$work/out" 2>&1 && cat "$work/out" || fail "VCD and SAIF differ"
+  python3 "$root/tests/vcd_activity.py" "$work/w.vcd" "$work/w.saif" >"$work/out" 2>&1 && cat "$work/out" || fail "VCD and SAIF differ"
   # One toggle more, of one bit: seen.
   sed -E '0,/\(TC [1-9][0-9]*\)/s//(TC 77777)/' "$work/w.saif" >"$work/wrong.saif"
-  python3 "$here/../vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
+  python3 "$root/tests/vcd_activity.py" "$work/w.vcd" "$work/wrong.saif" >"$work/out" 2>&1 && fail "a wrong SAIF file passes"
 else
   echo "the VCD was not counted"; echo "python3: not installed"
 fi
@@ -77,4 +63,4 @@ run --saif "$work/no.saif" --window 9000000,9000001 && fail "a window behind the
 grep -q 'but the stream has' "$work/err" || fail "a window behind the end is not explained"
 [ ! -e "$work/no.saif" ] || fail "a file of a refused run"
 [ -z "$(find "$work" -name '*.fst' -o -name '*.sf-*')" ] || fail "left behind: $(ls "$work")"
-exit $failed
+finish "SAIF and VCD agree"

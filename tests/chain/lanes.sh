@@ -4,25 +4,10 @@
 # comparison needs). What is built here runs a few hundred samples, so it is compiled for a quick build.
 # --whole: goes on to rays, firmware, the vector kit in both simulators and synthesis, of each number of lanes.
 # usage: lanes.sh BUILD [--whole]
-set -u
+. "$(dirname "$0")/../chain.bash" "$@"
 export LC_ALL=C
-build=$(cd "${1:?usage: lanes.sh BUILD [--whole]}" && pwd) || exit 2
-root=$(cd "$(dirname "$0")/../.." && pwd)
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_lanes.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-failed=0
-fail() {
-  echo "FAILED: $1"
-  tail -n 5 "$work/out" "$work/err" 2>/dev/null
-  failed=1
-}
-"$build/bin/sf_scene" textured -o "$work/data" --size 24 --train 8 --test 2 >/dev/null || exit 1
-for hidden in 32 64; do
-  "$build/bin/sf_train" "$work/data" -o "$work/$hidden.safetensors" --stage1 20 --stage2 40 --samples 512 --levels 4 \
-    --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden $hidden --steps 3 --quiet >/dev/null &&
-    "$build/bin/sf_export" "$work/$hidden.safetensors" -o "$work/$hidden.snn" >/dev/null || exit 1
-done
+learn 32 32
+learn 64 64
 # The RTL of this build, in the order of the kit; kept in its place while it stays the same, and so are builds of it.
 rtl=$build/lanes/rtl
 "$build/bin/sf_export" "$work/32.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
@@ -78,7 +63,7 @@ refuses() {
 refuses "$build/bin/sf_cosim" "$work/256.snn" 256 128
 refuses "$wide/bin/sf_cosim" "$work/32.snn" 128 256
 tail -n 1 "$work/err"
-[ "${2:-}" = --whole ] || exit $failed
+[ "${2:-}" = --whole ] || exit $((failures > 0))
 
 # shows PATTERN WHAT PROGRAM ARGS...: it ends well and prints a line with the pattern
 shows() {
@@ -123,4 +108,4 @@ for lanes in 32 64; do
 done
 make_wide "$wide/bin/sim_render" "$wide/bin/sf_export" ${soc:+"$wide/bin/$soc" "$wide/$elf"} || { fail "256 lanes: no build"; exit 1; }
 whole 256 "$wide" "$wide/variant" "$wide/bin"
-exit $failed
+exit $((failures > 0))

@@ -1,20 +1,12 @@
 #!/bin/bash
 # Impossible parameters of the RTL: Verilator, Yosys and Icarus end with an error that names the parameter.
 # usage: parameters.sh BUILD
-set -u
+. "$(dirname "$0")/../chain.bash" "$@"
 export LC_ALL=C
-: "${1:?usage: parameters.sh BUILD}"
-cd "$(dirname "$0")/../.." || exit 1
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_parameters.XXXXXX") || exit 1
-trap 'rm -rf "$work"' EXIT
-failed=0 cases=0
+cd "$root" || exit 1
+cases=0
 packages=$(ls rtl/gen/*_pkg.sv rtl/*_pkg.sv | tr '\n' ' ')
 sources=$packages$(ls rtl/gen/*.sv rtl/*.sv | grep -v _pkg | tr '\n' ' ')
-fail() {
-  echo "FAILED: $1"
-  tail -n 3 "$work/log"
-  failed=1
-}
 # refused TOOL MODULE PARAMETER VALUE TEXT: the last command failed and said why
 refused() {
   local status=$? what="$1: $2 with $3 = $4"
@@ -45,4 +37,4 @@ sf_top NEURONS 12 NEURONS is not a power of two from 4 to 64
 sf_top STEPS_AT_ONCE 3 STEPS_AT_ONCE is not 1, 2, 4 or 8
 END
 echo "$cases refusals of impossible parameters"
-exit $failed
+exit $((failures > 0))

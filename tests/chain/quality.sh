@@ -1,44 +1,38 @@
 #!/bin/bash
 # make quality on one scene and a few iterations: the table, what is kept, what is compared, what is refused.
-set -u
-build=$1
-here=$(cd "$(dirname "$0")/../.." && pwd)
-dir=$(mktemp -d)
-trap 'rm -rf "$dir"' EXIT
-failed=0
-fail() { echo "FAILED: $1" >&2; failed=1; }
-short=(--only simple --seeds "1 2" --stage1 20 --stage2 60 --samples 512 --out "$dir/q")
+. "$(dirname "$0")/../chain.bash" "$@"
+short=(--only simple --seeds "1 2" --stage1 20 --stage2 60 --samples 512 --out "$work/q")
 
 # Pictures of 32 pixels where the script would make some of 200.
-mkdir -p "$dir/b/quality-data"
-ln -s "$(cd "$build" && pwd)/bin" "$dir/b/bin"
-"$build/bin/sf_scene" simple -o "$dir/b/quality-data/simple" --size 32 --train 8 --test 2 -q || fail "no scene"
-touch "$dir/b/quality-data/simple/complete"
+mkdir -p "$work/b/quality-data"
+ln -s "$build/bin" "$work/b/bin"
+"$build/bin/sf_scene" simple -o "$work/b/quality-data/simple" --size 32 --train 8 --test 2 -q || fail "no scene"
+touch "$work/b/quality-data/simple/complete"
 
-run() { "$here/tools/quality.sh" "$dir/b" "$@" >"$dir/out" 2>"$dir/err"; }
-row() { grep '^| simple |' "$dir/out"; }
+run() { "$root/tools/quality.sh" "$work/b" "$@" >"$work/out" 2>"$work/err"; }
+row() { grep '^| simple |' "$work/out"; }
 
-run "${short[@]}" --keep || fail "a short measurement: $(cat "$dir/err")"
-row | grep -qE '^\| simple \| [0-9.]+ \+- [0-9.]+ \| [0-9.]+ \+- ' || fail "no row of simple with two seeds: $(cat "$dir/out")"
+run "${short[@]}" --keep || fail "a short measurement: $(cat "$work/err")"
+row | grep -qE '^\| simple \| [0-9.]+ \+- [0-9.]+ \| [0-9.]+ \+- ' || fail "no row of simple with two seeds: $(cat "$work/out")"
 row | grep -q '(' && fail "compared with nothing"
-[ -s "$dir/q/kept.json" ] || fail "--keep kept nothing"
+[ -s "$work/q/kept.json" ] || fail "--keep kept nothing"
 for key in psnr twin_psnr excess_mse t_star t_r worth price lost_cells; do
-  grep -q "\"$key\"" "$dir/q/quality.json" || fail "quality.json has no $key"
+  grep -q "\"$key\"" "$work/q/quality.json" || fail "quality.json has no $key"
 done
 
-touch -d '2001-01-01' "$dir/q/simple/snn-1/train.jsonl"
-run "${short[@]}" || fail "the second call: $(cat "$dir/err")"
-[ "$(date -r "$dir/q/simple/snn-1/train.jsonl" +%Y)" = 2001 ] || fail "a finished run ran again"
+touch -d '2001-01-01' "$work/q/simple/snn-1/train.jsonl"
+run "${short[@]}" || fail "the second call: $(cat "$work/err")"
+[ "$(date -r "$work/q/simple/snn-1/train.jsonl" +%Y)" = 2001 ] || fail "a finished run ran again"
 [ "$(row | grep -o '(' | wc -l)" -ge 8 ] || fail "the kept table is not compared: $(row)"
-run "${short[@]}" --train "--beta 1" || fail "other options: $(cat "$dir/err")"
-[ "$(date -r "$dir/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of other options was kept"
+run "${short[@]}" --train "--beta 1" || fail "other options: $(cat "$work/err")"
+[ "$(date -r "$work/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of other options was kept"
 row | cut -d'|' -f6 | grep -q ' 1.00 ' || fail "beta = 1 does not learn one step: $(row)"
 
 # The share of lost cells: none of itself.
-for seed in 1 2; do cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/ann-2/model.safetensors"; done
-cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-1/model.safetensors"
-cp "$dir/q/simple/ann-1/model.safetensors" "$dir/q/simple/snn-2/model.safetensors"
-lost() { "$build/bin/sf_quality" "$dir/q" | grep '^| simple' | cut -d'|' -f10; }
+for seed in 1 2; do cp "$work/q/simple/ann-1/model.safetensors" "$work/q/simple/ann-2/model.safetensors"; done
+cp "$work/q/simple/ann-1/model.safetensors" "$work/q/simple/snn-1/model.safetensors"
+cp "$work/q/simple/ann-1/model.safetensors" "$work/q/simple/snn-2/model.safetensors"
+lost() { "$build/bin/sf_quality" "$work/q" | grep '^| simple' | cut -d'|' -f10; }
 lost | grep -q ' 0.000 +- 0.000 ' || fail "a model has lost cells of itself"
 
 # occupancy MODEL OCTAL...: fills equal parts of the model's occupancy grid, one byte value (in octal) each.
@@ -54,17 +48,17 @@ occupancy() {
 }
 # Both twins have all cells of the first half and four of eight in the second: 6 parts of 8. Spiking models: the first one lacks
 # the first quarter, 2 of 6. The second one lacks half of the first half and all that the twins share in the second, 4 of 6.
-occupancy "$dir/q/simple/ann-1/model.safetensors" 377
-occupancy "$dir/q/simple/ann-2/model.safetensors" 377 017
-occupancy "$dir/q/simple/snn-1/model.safetensors" 000 377 377 377
-occupancy "$dir/q/simple/snn-2/model.safetensors" 360
+occupancy "$work/q/simple/ann-1/model.safetensors" 377
+occupancy "$work/q/simple/ann-2/model.safetensors" 377 017
+occupancy "$work/q/simple/snn-1/model.safetensors" 000 377 377 377
+occupancy "$work/q/simple/snn-2/model.safetensors" 360
 lost | grep -q ' 0.500 +- ' || fail "the share of lost cells is not (2/6 + 4/6) / 2: $(lost)"
-grep -A9 '"lost_cells"' "$dir/q/quality.json" | grep -q '0\.333' || fail "the least share of lost cells is not 2/6"
+grep -A9 '"lost_cells"' "$work/q/quality.json" | grep -q '0\.333' || fail "the least share of lost cells is not 2/6"
 
-run --only mars; [ $? -eq 2 ] && grep -q "scene 'mars' is unknown" "$dir/err" || fail "an unknown scene: $(cat "$dir/err")"
+run --only mars; [ $? -eq 2 ] && grep -q "scene 'mars' is unknown" "$work/err" || fail "an unknown scene: $(cat "$work/err")"
 run --seeds x; [ $? -eq 2 ] || fail "--seeds x"
-run --only mic; [ $? -eq 1 ] && grep -q 'no scene is left' "$dir/err" || fail "no scene there: $(cat "$dir/err")"
-mkdir "$dir/none"
-"$build/bin/sf_quality" "$dir/none" >"$dir/out" 2>"$dir/err"; [ $? -eq 1 ] && grep -q 'no finished run' "$dir/err" || fail "an empty folder"
-[ ! -e "$dir/none/quality.json" ] || fail "a table of nothing was written"
-exit $failed
+run --only mic; [ $? -eq 1 ] && grep -q 'no scene is left' "$work/err" || fail "no scene there: $(cat "$work/err")"
+mkdir "$work/none"
+"$build/bin/sf_quality" "$work/none" >"$work/out" 2>"$work/err"; [ $? -eq 1 ] && grep -q 'no finished run' "$work/err" || fail "an empty folder"
+[ ! -e "$work/none/quality.json" ] || fail "a table of nothing was written"
+exit $((failures > 0))

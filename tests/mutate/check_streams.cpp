@@ -1,26 +1,8 @@
 /* sf_stream_in or sf_stream_out, cycle by cycle against a model: random sizes, stalls, bubbles, bad packets, clears in
  * any cycle. Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
-extern "C" {
-#include "base/rng.h"
-}
-#include <cstdint>
-#include <cstdio>
+#include "tests/mutate/unit.h"
 #include <cstdlib>
 #include <deque>
-#define HEADER_OF(name) HEADER_TEXT(V##name.h)
-#define HEADER_TEXT(text) #text
-#define HEADER(name) HEADER_OF(name)
-#define MODEL_OF(name) V##name
-#define MODEL(name) MODEL_OF(name)
-#include HEADER(UNIT)
-
-static MODEL(UNIT) top;
-static uint64_t drawn;
-
-static int64_t draw(int64_t low, int64_t high)
-{
-  return low + (int64_t)sf_random_below(1, 0, drawn++, (uint64_t)(high - low + 1));
-}
 
 static bool percent(int p)
 {

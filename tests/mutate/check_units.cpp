@@ -1,25 +1,11 @@
 /* One unit against its C mirror: small inputs exhausted, large ones at their corners and at random.
  * Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
+#include "tests/mutate/unit.h"
 extern "C" {
-#include "base/rng.h"
 #include "src/fx/unit.h"
 }
-#include <cstdio>
-#define HEADER_OF(name) HEADER_TEXT(V##name.h)
-#define HEADER_TEXT(text) #text
-#define HEADER(name) HEADER_OF(name)
-#define MODEL_OF(name) V##name
-#define MODEL(name) MODEL_OF(name)
-#include HEADER(UNIT)
 
-static MODEL(UNIT) top;
-static uint64_t drawn;
 enum { TRIALS = 400000 };
-
-static int64_t draw(int64_t low, int64_t high)
-{
-  return low + (int64_t)sf_random_below(1, 0, drawn++, (uint64_t)(high - low + 1));
-}
 
 /* Mostly anything, often near an end, near 0 or of few bits. */
 static int64_t corner(int64_t low, int64_t high)

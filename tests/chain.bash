@@ -1,0 +1,26 @@
+# For scripts of tests/chain:   . chain.bash BUILD
+# Gives build, root (of the source), work (a folder that goes at the end), fail, finish, and learn, which makes a scene.
+set -u
+build=$(cd "${1:?usage: $0 BUILD}" && pwd) || exit 2
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd) || exit 2
+work=$(mktemp -d "${TMPDIR:-/tmp}/sf_chain.XXXXXX") || exit 1
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  tail -n 4 "$work"/{out,err,log} 2>/dev/null
+  failures=$((failures + 1))
+}
+finish() { # TEXT: the last line of a script where nothing failed
+  [ $failures -eq 0 ] && echo "$1"
+  exit $((failures > 0))
+}
+
+# learn NAME HIDDEN EXPORT-OPTIONS...: a small model in NAME.safetensors and its export in NAME.snn, of pictures in data/
+learn() {
+  [ -e "$work/data" ] || "$build/bin/sf_scene" textured -o "$work/data" --size 24 --train 8 --test 2 >/dev/null || exit 1
+  "$build/bin/sf_train" "$work/data" -o "$work/$1.safetensors" --stage1 20 --stage2 40 --samples 512 --levels 4 \
+    --log2-hash 10 --finest-res 32 --lattice 64 --occ-res 16 --hidden "$2" --steps 3 --quiet >/dev/null &&
+    "$build/bin/sf_export" "$work/$1.safetensors" -o "$work/$1.snn" "${@:3}" >/dev/null || exit 1
+}
