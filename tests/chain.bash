@@ -5,6 +5,7 @@ build=$(cd "${1:?usage: $0 BUILD}" && pwd) || exit 2
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd) || exit 2
 work=$(mktemp -d "${TMPDIR:-/tmp}/sf_chain.XXXXXX") || exit 1
 trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
 failures=0
 
 fail() {

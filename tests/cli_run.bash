@@ -2,21 +2,11 @@
 # Exit status 2 for usage and 1 for data, exactly one line on stderr that names the option or the file, no partial output,
 # never a crash. Gives BIN, TOOLS, a folder of its own with a data set d, model.safetensors and s.snn, and the shortest right
 # command line of each program; run, judge, usage, data, good, absent, check, number, poke, size_of and finish.
-set -u
-BIN=$(cd "${1:?usage: $0 BUILD}/bin" && pwd) || exit 2
-TOOLS=$(cd "$(dirname "${BASH_SOURCE[0]}")/../tools" && pwd) || exit 2
+. "$(dirname "${BASH_SOURCE[0]}")/chain.bash" "$@"
 export LC_ALL=C OMP_NUM_THREADS=2
-WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-cli-XXXXXX") || exit 2
-trap 'rm -rf "$WORK"' EXIT
-trap 'exit 130' INT TERM
-cd "$WORK" || exit 2
-passed=0 failed=0
-
-fail() {
-  failed=$((failed + 1))
-  echo "FAILED $1: $2"
-  sed 's/^/    stderr: /' err 2>/dev/null | head -3
-}
+BIN=$build/bin TOOLS=$root/tools
+cd "$work" || exit 2
+passed=0
 
 # run PROGRAM ARGS...: leaves $status, files stdout.txt and err.
 run() {
@@ -64,8 +54,8 @@ absent() { # FILE LABEL
   rm -rf "$1"
 }
 finish() {
-  echo "$passed passed, $failed failed"
-  [ "$failed" -eq 0 ]
+  echo "$passed passed, $failures failed"
+  [ "$failures" -eq 0 ]
 }
 
 # poke FILE OFFSET OCTAL: one byte.

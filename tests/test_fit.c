@@ -230,7 +230,7 @@ LOOP_TEST(what_loses_nothing_goes_first, 3)
   fx_scene scene = small_scene(70, FX_HYBRID), smaller;
   const int64_t first = scene.grid.offset[_i], entries = sf_grid_level_entries(&scene.grid, _i);
   memset(scene.grid.table + 2 * first, 0, 2 * (size_t)entries);
-  sf_fit_rays rays = make_rays(&scene, RAYS, 500);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 500);
   sf_fit_tables report;
   ck_ok(to_bytes(&scene, &rays, grid_bytes(&scene), 0, &smaller, &report));
   ck_assert_uint_eq(grid_bytes(&smaller), grid_bytes(&scene)); /* it has room as it is */
@@ -241,13 +241,12 @@ LOOP_TEST(what_loses_nothing_goes_first, 3)
   assert_same_pixels(&scene, &smaller, &rays);
   ck_assert(report.loss_db == 0);
   fx_scene_free(&smaller), fx_scene_free(&scene);
-  sf_fit_rays_free(&rays);
 }
 
 TEST(bytes_and_loss_are_kept)
 {
   fx_scene scene = small_scene(71, FX_HYBRID), smaller;
-  sf_fit_rays rays = make_rays(&scene, RAYS, 500);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 500);
   sf_fit_tables report;
   double last = 0;
   for (uint64_t bytes = grid_bytes(&scene) / 2; bytes >= 64; bytes /= 4) {
@@ -264,7 +263,6 @@ TEST(bytes_and_loss_are_kept)
   ck_bad(to_bytes(&scene, &rays, 1, INFINITY, &smaller, &report), SF_E_RANGE, "scene.snn",
          "the grid cannot take fewer than 2 bytes");
   fx_scene_free(&scene);
-  sf_fit_rays_free(&rays);
 }
 
 int ck_timeout = 120;

@@ -133,7 +133,7 @@ LOOP_TEST(model_gives_the_spikes_of_the_oracle, SF_NODECAY + 1)
 {
   enum { STEPS = 5, SAMPLES = 60 };
   static sf_net_trace trace;
-  sf_model m = test_model(SF_NET_SNN, (sf_input_mode)_i, 64, STEPS, 0.5f);
+  OWNED(sf_model) m = test_model(SF_NET_SNN, (sf_input_mode)_i, 64, STEPS, 0.5f);
   m.t_r = STEPS;
   ck_ok(sf_nir_write_model(in("model.nir"), &m));
   read_graph(&shared, in("model.nir"));
@@ -154,7 +154,6 @@ LOOP_TEST(model_gives_the_spikes_of_the_oracle, SF_NODECAY + 1)
   ck_assert_int_ge(certain, SAMPLES / 2);
   ck_assert_int_gt(fired, 0);
   free_graph(&shared);
-  sf_model_free(&m);
 }
 
 LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)

@@ -25,7 +25,7 @@ TEST(without_effect_changes_no_bit)
   OWNED(fx_scene) scene = planes_scene(1), small, all;
   spoil(&scene);
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  sf_trim_use use = observed(&scene, &rays);
+  OWNED(sf_trim_use) use = observed(&scene, &rays);
   sf_trim trim;
   sf_trim_all(&scene, &trim);
   all = trimmed(&scene, &trim, &use);
@@ -35,7 +35,6 @@ TEST(without_effect_changes_no_bit)
   small = trimmed(&scene, &trim, &use);
   expect_dropped(&small);
   assert_same_pixels(&scene, &small, &rays);
-  sf_trim_use_free(&use);
 }
 
 /* ---- what stays is what it was ---- */
@@ -106,7 +105,7 @@ TEST(the_mean_of_what_goes_stays)
   c1->w[c1->n_in * SF_LANES + 11] = 127;
   for (int o = 0; o < C2; o++) c2->w[11 * SF_LANES + o] = (int8_t)(o - 15), c2->w[C1 * SF_LANES + o] /= 2;
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  sf_trim_use use = observed(&scene, &rays);
+  OWNED(sf_trim_use) use = observed(&scene, &rays);
   ck_assert_uint_eq(use.fired[FX_C1][11], use.steps);
   sf_trim trim;
   sf_trim_all(&scene, &trim);
@@ -114,7 +113,6 @@ TEST(the_mean_of_what_goes_stays)
   small = trimmed(&scene, &trim, &use);
   ck_assert_int_eq(small.net.layer[FX_C1].n_out, C1 - 1);
   assert_same_pixels(&scene, &small, &rays);
-  sf_trim_use_free(&use);
 }
 
 /* The least used ones go, and never the last line. */
@@ -206,7 +204,7 @@ TEST(a_smaller_box)
 {
   OWNED(fx_scene) scene = planes_scene(6), small;
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  sf_trim_use use = observed(&scene, &rays);
+  OWNED(sf_trim_use) use = observed(&scene, &rays);
   sf_trim trim;
   sf_trim_all(&scene, &trim);
   ck_assert(sf_trim_box(&scene, &use, &trim));
@@ -231,7 +229,6 @@ TEST(a_smaller_box)
   ck_assert_int_gt(seen, 20);
   ck_assert_double_eq_tol(ldexp(small.step_q24, -24) / small.units.to_box_scale,
                           ldexp(scene.step_q24, -24) / scene.units.to_box_scale, 1e-5);
-  sf_trim_use_free(&use);
 }
 
 static double difference(const fx_scene *a, const fx_scene *b, const sf_fit_rays *rays)
@@ -256,7 +253,7 @@ TEST(pictures_of_a_smaller_box)
   for (int z = 2; z < 6; z++)
     for (int y = 2; y < 6; y++) scene.occupancy[z * RES + y] = 0x3c; /* x 2..5: no corner of a cell is cut off */
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  sf_trim_use use = observed(&scene, &rays);
+  OWNED(sf_trim_use) use = observed(&scene, &rays);
   sf_trim trim;
   sf_trim_all(&scene, &trim);
   ck_assert(sf_trim_box(&scene, &use, &trim));
@@ -265,14 +262,13 @@ TEST(pictures_of_a_smaller_box)
   small.units.to_box_offset[1] += 0.02;
   ck_assert_double_gt(difference(&scene, &small, &rays), 4 * near);
   ck_assert_double_lt(near, 0.01);
-  sf_trim_use_free(&use);
 }
 
 TEST(fewer_samples)
 {
   OWNED(fx_scene) scene = planes_scene(8), small;
   OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  sf_trim_use use = observed(&scene, &rays);
+  OWNED(sf_trim_use) use = observed(&scene, &rays);
   sf_fit_sum before, after;
   sf_trim trim;
   sf_trim_all(&scene, &trim);
@@ -282,7 +278,6 @@ TEST(fewer_samples)
   ck_ok(sf_fit_measure(&scene, &rays, 0, RAYS, NULL, &before));
   ck_ok(sf_fit_measure(&small, &rays, 0, RAYS, NULL, &after));
   ck_assert_uint_lt(after.counts.field_samples, before.counts.field_samples * 6 / 10);
-  sf_trim_use_free(&use);
 }
 
 TEST(unread_points_are_not_read)

@@ -1,25 +1,15 @@
 #!/bin/bash
 # sf_soc from the command line: the firmware's tile and audit are those of the host, an image can be kept and loaded, and
 # everything that can go wrong is one line and an exit status.   usage: firmware.sh BUILD
-set -u
-build=$(cd "${1:?usage: firmware.sh BUILD}" && pwd) || exit 2
+. "$(dirname "$0")/../chain.bash" "$@"
 export LC_ALL=C OMP_NUM_THREADS=1
 for needed in "$build/bin/sf_soc" "$build/firmware/sf_firmware.elf"; do
   [ -e "$needed" ] && continue
   echo "no ${needed#"$build"/}: libunicorn-dev and gcc-riscv64-unknown-elf are needed"
   exit 77
 done
-work=$(mktemp -d "${TMPDIR:-/tmp}/sf_firmware.XXXXXX") || exit 2
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
 cd "$work" || exit 2
-failed=0 passed=0
-
-fail() {
-  failed=$((failed + 1))
-  echo "FAILED: $*"
-  head -3 err
-}
+passed=0
 
 # run STATUS PATTERN ARGS...: exit status; with a status but 0, one line on stderr that has the pattern.
 run() {
@@ -117,5 +107,5 @@ kill -TERM $!
 wait $!
 check "interrupted" [ $? -eq 130 ]
 check "and says so" grep -q 'stopped after' err
-echo "$passed passed, $failed failed"
-[ $failed -eq 0 ]
+echo "$passed passed, $failures failed"
+[ $failures -eq 0 ]

@@ -1,13 +1,10 @@
 #!/bin/bash
 # Whole sets of golden images: sim_render --all and --verify. Same manifest and pictures for any number of threads, core
 # or accelerator, interrupted or not; every kind of difference is found and named.   usage: golden_set.sh BUILD
-set -u
-BIN=$(cd "${1:?usage: golden_set.sh BUILD}/bin" && pwd) || exit 2
+. "$(dirname "$0")/../chain.bash" "$@"
 export LC_ALL=C OMP_NUM_THREADS=2
-WORK=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-set-XXXXXX") || exit 2
-trap 'rm -rf "$WORK"' EXIT
-trap 'exit 130' INT TERM
-cd "$WORK" || exit 2
+BIN=$build/bin
+cd "$work" || exit 2
 passed=0 failed=0
 
 check() { # LABEL COMMAND...
