@@ -5,16 +5,7 @@
 // number that comes once more gets the same answer once more and does nothing, so a host that heard no answer asks again. A
 // frame that was damaged, or is not the next, does nothing: its answer is the command 0xee with, in place of a number, why.
 // HELLO alone is always obeyed: its number begins the count. It drops samples and pixels that an earlier host left.
-//
-//   command     payload                              answer; its first word is always a status: 0, 1 size, 2 no answer
-//   1 HELLO     a word                               the same word, LINK, bytes of the memory, Hz, words of a payload
-//   2 WRITE     { count 31:16, register 15:0, count words }...   31:16 refused, 15:0 written; the first that was refused
-//   3 READ      register, count                      31:16 refused; the registers from there on
-//   4 MEMORY    first word of eight bytes, words     -
-//   5 STREAM    31:16 patience, 1024 cycles; 15:0 pixels to wait for; beats of eight words
-//               31:16 pixels, 15:0 beats taken; 31 patience was at its end, 0 interrupt; pixels of twelve words
-//
-// A beat is sf_ray_top's, with tuser in bit 254 and tlast in bit 255.
+// Frames and their numbers are here, the commands in sf_link_commands.
 `default_nettype none
 
 module sf_link #(
@@ -61,21 +52,16 @@ module sf_link #(
     output wire          busy_o,
     output wire          damaged_o
 );
-  localparam [7:0] HELLO = 1, WRITE = 2, READ = 3, MEMORY = 4, STREAM = 5, REFUSAL = 8'hee;
+  localparam [7:0] REFUSAL = 8'hee;
   localparam [7:0] WRONG_GREETING = 5, WRONG_ORDER = 6, WRONG_COMMAND = 7;
-  localparam [31:0] LINK = 32'h5346_0001;  // "SF", the version of this protocol
-  localparam [31:0] OK = 0, SIZE = 1, SILENT = 2;
-  localparam integer PAYLOAD = 508;  // words, of a frame in either direction
-  localparam integer PIXEL_WORDS = 12, PIXELS = 42;  // of the queue; an answer has room for as many
-  localparam integer MEMORY_WORDS = MEMORY_BYTES / 8;
 
   // ---- bytes and frames
   wire byte_valid, byte_broken, frame, release_frame, send, sending, tx_valid, tx_ready;
   wire [7:0] byte_data, tx_data;
   wire [2:0] wrong;
   wire [31:0] header, word, answer_header;
+  wire [8:0] address;
   reg [31:0] answer_word_q;
-  reg [8:0] at_q;
   wire [8:0] answer_address;
   sf_uart_rx #(
       .CLOCK_HZ(CLOCK_HZ),
@@ -98,7 +84,7 @@ module sf_link #(
       .wrong_o  (wrong),
       .header_o (header),
       .release_i(release_frame),
-      .address_i(at_q),
+      .address_i(address),
       .word_o   (word)
   );
   sf_link_tx u_tx (
@@ -125,370 +111,56 @@ module sf_link #(
       .tx_o   (tx_o)
   );
 
-  // ---- the command at work
-  localparam [4:0] S_IDLE = 0, S_JUDGE = 1, S_FETCH = 2, S_HELLO = 3, S_SEGMENT = 4, S_WRITE = 5, S_WRITING = 6, S_READ_FROM = 7,
-      S_READ_COUNT = 8, S_READ = 9, S_READING = 10, S_MEMORY = 11, S_MEMORY_LOW = 12, S_MEMORY_HIGH = 13, S_STREAM = 14, S_ROOM = 15,
-      S_BEAT = 16, S_PIXELS = 17, S_COUNT = 18, S_EXTRA = 19, S_PIXEL = 20, S_COPY = 21, S_STATUS = 22, S_SEND = 23, S_SENDING = 24,
-      S_REFUSE = 25;
-  reg [4:0] state_q, after_q;  // after_q: what follows a word of the frame
-  reg [1:0] wait_q;
-  reg greeted_q, kept_q;       // kept_q: there is an answer that can be given again
-  reg [7:0] number_q, command_q, refusal_q;
-  reg [15:0] words_q;          // of the payload: left
-  reg [15:0] answer_words_q;   // of the answer
-  reg [31:0] status_q, extra_q;
-  reg [15:0] count_q, done_q, refused_q;
-  reg [12:0] register_q;
-  reg [12:0] patience_q;       // cycles until a register is given up
-
-  // the answer
-  reg answer_we_q;
-  reg [8:0] answer_at_q;
-  reg [31:0] answer_data_q;
+  // ---- the answer
+  wire answer_we;
+  wire [8:0] answer_at;
+  wire [31:0] answer_data;
+  wire [15:0] answer_words;
   (* no_rw_check *) reg [31:0] answer_mem_q[0:511];
   always_ff @(posedge clk_i) begin
-    if (answer_we_q) answer_mem_q[answer_at_q] <= answer_data_q;
+    if (answer_we) answer_mem_q[answer_at] <= answer_data;
     answer_word_q <= answer_mem_q[answer_address];
   end
 
-  // registers
-  reg awvalid_q, wvalid_q, arvalid_q;
-  reg [31:0] value_q;
-  assign m_axil_awvalid_o = awvalid_q;
-  assign m_axil_awaddr_o = register_q;
-  assign m_axil_wvalid_o = wvalid_q;
-  assign m_axil_wdata_o = value_q;
-  assign m_axil_bready_o = state_q == S_WRITING;
-  assign m_axil_arvalid_o = arvalid_q;
-  assign m_axil_araddr_o = register_q;
-  assign m_axil_rready_o = state_q == S_READING;
-
-  // the memory
-  reg [31:0] index_q;
-  reg memory_we_q;
-  assign memory_we_o = memory_we_q;
-  assign memory_address_o = index_q[14:0];
-  assign memory_data_o = {answer_data_q, value_q};
-
-  // samples of rays
-  reg beat_valid_q;
-  reg [255:0] beat_q;
-  reg [2:0] beat_word_q;
-  assign m_axis_tvalid_o = beat_valid_q;
-  assign m_axis_tdata_o = {2'd0, beat_q[253:0]};
-  assign m_axis_tuser_o = beat_q[254];
-  assign m_axis_tlast_o = beat_q[255];
-
-  // pixels
-  wire forget = state_q == S_HELLO;
-  reg [3:0] pixel_word_q, copied_q;
-  reg [5:0] pixels_q;
-  reg [8:0] in_q, out_q;
-  reg queue_we_q, pixel_ready_q;
-  reg [8:0] queue_at_q;
-  reg [31:0] queue_data_q, queue_word_q;
-  (* no_rw_check *) reg [31:0] queue_mem_q[0:511];
-  localparam [8:0] RING_LAST = 9'(PIXELS * PIXEL_WORDS - 1);
-  wire full = pixels_q == PIXELS[5:0];
-  wire pixel_store = s_axis_tvalid_i && !pixel_ready_q && !full;
-  wire pixel_stored = pixel_store && pixel_word_q == 4'd11;
-  wire copy = state_q == S_COPY && wait_q == 2'd0;
-  wire copied = copy && copied_q == 4'd11;
-  assign s_axis_tready_o = pixel_ready_q;
-  always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) begin
-      {queue_we_q, pixel_ready_q} <= 2'd0;
-      pixel_word_q <= '0;
-      pixels_q <= '0;
-      in_q <= '0;
-      out_q <= '0;
-    end else begin
-      queue_we_q <= pixel_store;
-      pixel_ready_q <= pixel_stored;
-      if (pixel_store) begin
-        pixel_word_q <= pixel_stored ? '0 : pixel_word_q + 1'b1;
-        in_q <= in_q == RING_LAST ? '0 : in_q + 1'b1;
-      end
-      if (copy) out_q <= out_q == RING_LAST ? '0 : out_q + 1'b1;
-      if (pixel_stored != copied) pixels_q <= pixel_stored ? pixels_q + 1'b1 : pixels_q - 1'b1;
-      if (forget) begin
-        {queue_we_q, pixel_ready_q} <= 2'd0;
-        pixel_word_q <= '0;
-        pixels_q <= '0;
-        in_q <= '0;
-        out_q <= '0;
-      end
-    end
-  end
-  always_ff @(posedge clk_i) begin
-    queue_at_q <= in_q;
-    queue_data_q <= s_axis_tdata_i[32*pixel_word_q+:32];
-    if (queue_we_q) queue_mem_q[queue_at_q] <= queue_data_q;
-    queue_word_q <= queue_mem_q[out_q];
-  end
-
-  // how long a stream may stand still
-  reg [15:0] limit_q;
-  reg [25:0] still_q;
-  reg [5:0] seen_q;
-  wire tired = still_q[25:10] == limit_q;
-
-  wire [15:0] payload = header[31:16];
+  // ---- the frame at work
+  localparam [2:0] S_IDLE = 0, S_JUDGE = 1, S_WORK = 2, S_SEND = 3, S_SENDING = 4, S_REFUSE = 5;
+  reg [2:0] state_q;
+  reg [1:0] wait_q;
+  reg greeted_q, kept_q;  // kept_q: there is an answer that can be given again
+  reg [7:0] number_q, command_q, refusal_q;
+  wire known, greeting, done;
   wire [7:0] number = header[7:0];
-  wire [7:0] command = header[15:8];
-  wire known = command >= HELLO && command <= STREAM && payload != 16'd0 && payload <= PAYLOAD[15:0];
-  wire again = greeted_q && kept_q && number == number_q && command != HELLO;
-  wire in_order = command == HELLO || (greeted_q && number == number_q + 8'd1);
+  wire again = greeted_q && kept_q && number == number_q && !greeting;
+  wire in_order = greeting || (greeted_q && number == number_q + 8'd1);
+  wire sound = wrong == 3'd0 && known;
+  wire start = state_q == S_JUDGE && sound && !again && in_order;
   assign release_frame = (state_q == S_SENDING || state_q == S_REFUSE) && !sending && wait_q == 2'd0;
   assign send = (state_q == S_SEND || state_q == S_REFUSE) && wait_q == 2'd3;
-  assign answer_header = state_q == S_REFUSE ? {16'd0, REFUSAL, refusal_q} : {answer_words_q, 8'h80 | command_q, number_q};
+  assign answer_header = state_q == S_REFUSE ? {16'd0, REFUSAL, refusal_q} : {answer_words, 8'h80 | command_q, number_q};
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
       state_q <= S_IDLE;
-      after_q <= S_IDLE;
-      {greeted_q, kept_q, awvalid_q, wvalid_q, arvalid_q, memory_we_q, beat_valid_q, answer_we_q} <= 8'd0;
+      {greeted_q, kept_q} <= 2'd0;
       {number_q, command_q, refusal_q} <= '0;
       wait_q <= '0;
     end else begin
-      memory_we_q <= 1'b0;
-      answer_we_q <= 1'b0;
       if (wait_q != 2'd0) wait_q <= wait_q - 1'b1;
-      if (m_axis_tready_i) beat_valid_q <= 1'b0;
-      if (m_axil_awready_i) awvalid_q <= 1'b0;
-      if (m_axil_wready_i) wvalid_q <= 1'b0;
-      if (m_axil_arready_i) arvalid_q <= 1'b0;
-      patience_q <= patience_q - 1'b1;
-      still_q <= still_q + 1'b1;
-      seen_q <= pixels_q;
-      if (seen_q != pixels_q || (beat_valid_q && m_axis_tready_i)) still_q <= '0;
-
       case (state_q)
-        S_IDLE: begin
-          at_q <= 9'd1;
-          words_q <= payload;
-          if (frame) state_q <= S_JUDGE;
-        end
+        S_IDLE: if (frame) state_q <= S_JUDGE;
         S_JUDGE: begin
-          status_q <= OK;
-          {count_q, done_q, refused_q, extra_q} <= '0;
-          answer_at_q <= '0;
           wait_q <= 2'd3;
           refusal_q <= wrong != 3'd0 ? {5'd0, wrong} : !known ? WRONG_COMMAND : !greeted_q ? WRONG_GREETING : WRONG_ORDER;
-          if (wrong != 3'd0 || !known) state_q <= S_REFUSE;
-          else if (again) state_q <= S_SEND;
-          else if (!in_order) state_q <= S_REFUSE;
-          else begin
+          state_q <= start ? S_WORK : sound && again ? S_SEND : S_REFUSE;
+          if (start) begin
             number_q <= number;
-            command_q <= command;
+            command_q <= header[15:8];
             kept_q <= 1'b0;
-            answer_words_q <= 16'd1;
-            state_q <= S_FETCH;
-            case (command)
-              HELLO: after_q <= S_HELLO;
-              WRITE: after_q <= S_SEGMENT;
-              READ: after_q <= S_READ_FROM;
-              MEMORY: after_q <= S_MEMORY;
-              default: after_q <= S_STREAM;
-            endcase
+            if (greeting) greeted_q <= 1'b1;
           end
         end
-        // the next word of the payload
-        S_FETCH:
-        if (wait_q <= 2'd1) begin
-          state_q <= after_q;
-          at_q <= at_q + 1'b1;
-          words_q <= words_q - 1'b1;
-        end
-
-        S_HELLO: begin
-          greeted_q <= 1'b1;
-          beat_valid_q <= 1'b0;
-          done_q <= done_q + 1'b1;
-          answer_we_q <= 1'b1;
-          answer_at_q <= answer_at_q + 1'b1;
-          answer_words_q <= 16'd6;
-          case (done_q[2:0])
-            3'd0: answer_data_q <= word;
-            3'd1: answer_data_q <= LINK;
-            3'd2: answer_data_q <= MEMORY_BYTES;
-            3'd3: answer_data_q <= CLOCK_HZ;
-            default: answer_data_q <= PAYLOAD;
-          endcase
-          if (done_q == 16'd4) state_q <= S_STATUS;
-        end
-
-        S_SEGMENT: begin
-          register_q <= word[12:0];
-          count_q <= word[31:16];
-          after_q <= S_WRITE;
-          wait_q <= 2'd2;
-          state_q <= S_FETCH;
-          if (word[31:16] == 16'd0 || word[31:16] > words_q || word[15:13] != '0) begin
-            status_q <= SIZE;
-            state_q <= S_COUNT;
-          end
-        end
-        S_WRITE: begin
-          value_q <= word;
-          {awvalid_q, wvalid_q} <= 2'b11;
-          count_q <= count_q - 1'b1;
-          patience_q <= '1;
-          state_q <= S_WRITING;
-        end
-        S_WRITING: begin
-          if (m_axil_bvalid_i) begin
-            done_q <= done_q + 1'b1;
-            if (m_axil_bresp_i != 2'd0) begin
-              refused_q <= refused_q + 1'b1;
-              if (refused_q == '0) extra_q <= {19'd0, register_q};
-            end
-            wait_q <= 2'd2;
-            after_q <= count_q == '0 ? S_SEGMENT : S_WRITE;
-            state_q <= words_q == '0 ? S_COUNT : S_FETCH;
-          end else if (patience_q == '0) begin
-            status_q <= SILENT;
-            state_q <= S_COUNT;
-          end
-        end
-
-        S_READ_FROM: begin
-          register_q <= word[12:0];
-          wait_q <= 2'd2;
-          after_q <= S_READ_COUNT;
-          state_q <= S_FETCH;
-          if (words_q != 16'd1) begin
-            status_q <= SIZE;
-            state_q <= S_STATUS;
-          end
-        end
-        S_READ_COUNT: begin
-          count_q <= word[15:0];
-          answer_at_q <= 9'd1;
-          answer_words_q <= 16'd2 + word[15:0];
-          state_q <= S_READ;
-          if (word == '0 || word > PAYLOAD - 2) begin
-            status_q <= SIZE;
-            answer_words_q <= 16'd1;
-            state_q <= S_STATUS;
-          end
-        end
-        S_READ: begin
-          arvalid_q <= 1'b1;
-          count_q <= count_q - 1'b1;
-          patience_q <= '1;
-          state_q <= S_READING;
-        end
-        S_READING: begin
-          if (m_axil_rvalid_i) begin
-            if (m_axil_rresp_i != 2'd0) refused_q <= refused_q + 1'b1;
-            answer_we_q <= 1'b1;
-            answer_at_q <= answer_at_q + 1'b1;
-            answer_data_q <= m_axil_rdata_i;
-            register_q <= register_q + 13'd4;
-            state_q <= count_q == '0 ? S_COUNT : S_READ;
-          end else if (patience_q == '0) begin
-            status_q <= SILENT;
-            answer_words_q <= 16'd1;
-            state_q <= S_STATUS;
-          end
-        end
-
-        S_MEMORY: begin
-          index_q <= word - 1'b1;
-          wait_q <= 2'd2;
-          after_q <= S_MEMORY_LOW;
-          state_q <= S_FETCH;
-          if (words_q == '0 || words_q[0] || word >= MEMORY_WORDS || word + {17'd0, words_q[15:1]} > MEMORY_WORDS) begin
-            status_q <= SIZE;
-            state_q <= S_STATUS;
-          end
-        end
-        S_MEMORY_LOW: begin
-          value_q <= word;
-          wait_q <= 2'd2;
-          after_q <= S_MEMORY_HIGH;
-          state_q <= S_FETCH;
-        end
-        S_MEMORY_HIGH: begin
-          answer_data_q <= word;
-          index_q <= index_q + 1'b1;
-          memory_we_q <= 1'b1;
-          wait_q <= 2'd2;
-          after_q <= S_MEMORY_LOW;
-          state_q <= words_q == '0 ? S_STATUS : S_FETCH;
-        end
-
-        S_STREAM: begin
-          limit_q <= word[31:16];
-          count_q <= word[15:0];
-          still_q <= '0;
-          beat_word_q <= '0;
-          state_q <= words_q == '0 ? S_PIXELS : S_ROOM;
-          if (words_q[2:0] != '0 || word[15:0] > PIXELS[15:0]) begin
-            status_q <= SIZE;
-            state_q <= S_STATUS;
-          end
-        end
-        S_ROOM: begin
-          after_q <= S_BEAT;
-          wait_q <= 2'd2;
-          if (!beat_valid_q) state_q <= S_FETCH;
-          else if (tired || full) state_q <= S_PIXELS;
-        end
-        S_BEAT: begin
-          beat_word_q <= beat_word_q + 1'b1;
-          wait_q <= 2'd2;
-          state_q <= S_FETCH;
-          if (beat_word_q == 3'd7) begin
-            beat_valid_q <= 1'b1;
-            done_q <= done_q + 1'b1;
-            state_q <= words_q == '0 ? S_PIXELS : S_ROOM;
-          end
-        end
-        S_PIXELS:  // as many as are asked for, or all that there is patience for
-        if ({10'd0, pixels_q} >= count_q || tired) begin
-          extra_q <= {{10'd0, pixels_q} < count_q || (words_q != '0 && !full), 30'd0, irq_i};
-          count_q <= {10'd0, pixels_q};
-          refused_q <= {10'd0, pixels_q};  // in the answer's upper half
-          state_q <= S_COUNT;
-        end
-
-        // what was done, for commands that say it
-        S_COUNT: begin
-          answer_we_q <= 1'b1;
-          answer_at_q <= 9'd1;
-          answer_data_q <= {refused_q, done_q};
-          state_q <= command_q == READ ? S_STATUS : S_EXTRA;
-        end
-        S_EXTRA: begin
-          answer_we_q <= 1'b1;
-          answer_at_q <= 9'd2;
-          answer_data_q <= extra_q;
-          answer_words_q <= 16'd3;
-          state_q <= command_q == STREAM && status_q == OK ? S_PIXEL : S_STATUS;
-        end
-        S_PIXEL: begin
-          copied_q <= '0;
-          wait_q <= 2'd2;
-          count_q <= count_q - 1'b1;
-          state_q <= count_q == '0 ? S_STATUS : S_COPY;
-        end
-        S_COPY:
-        if (copy) begin
-          answer_we_q <= 1'b1;
-          answer_at_q <= answer_at_q + 1'b1;
-          answer_data_q <= queue_word_q;
-          answer_words_q <= answer_words_q + 1'b1;
-          copied_q <= copied_q + 1'b1;
-          wait_q <= 2'd2;
-          if (copied) state_q <= S_PIXEL;
-        end
-
-        S_STATUS: begin
-          answer_we_q <= 1'b1;
-          answer_at_q <= '0;
-          answer_data_q <= status_q;
+        S_WORK:
+        if (done) begin
           kept_q <= 1'b1;
           wait_q <= 2'd3;
           state_q <= S_SEND;
@@ -504,12 +176,57 @@ module sf_link #(
       endcase
     end
   end
-  // Words come in the order of a beat's bytes.
-  always_ff @(posedge clk_i) if (state_q == S_BEAT) beat_q <= {word, beat_q[255:32]};
+
+  sf_link_commands #(
+      .CLOCK_HZ    (CLOCK_HZ),
+      .MEMORY_BYTES(MEMORY_BYTES)
+  ) u_commands (
+      .clk_i           (clk_i),
+      .rst_ni          (rst_ni),
+      .command_i       (header[15:8]),
+      .payload_i       (header[31:16]),
+      .known_o         (known),
+      .greeting_o      (greeting),
+      .start_i         (start),
+      .done_o          (done),
+      .address_o       (address),
+      .word_i          (word),
+      .answer_we_o     (answer_we),
+      .answer_at_o     (answer_at),
+      .answer_data_o   (answer_data),
+      .answer_words_o  (answer_words),
+      .m_axil_awvalid_o(m_axil_awvalid_o),
+      .m_axil_awready_i(m_axil_awready_i),
+      .m_axil_awaddr_o (m_axil_awaddr_o),
+      .m_axil_wvalid_o (m_axil_wvalid_o),
+      .m_axil_wready_i (m_axil_wready_i),
+      .m_axil_wdata_o  (m_axil_wdata_o),
+      .m_axil_bvalid_i (m_axil_bvalid_i),
+      .m_axil_bready_o (m_axil_bready_o),
+      .m_axil_bresp_i  (m_axil_bresp_i),
+      .m_axil_arvalid_o(m_axil_arvalid_o),
+      .m_axil_arready_i(m_axil_arready_i),
+      .m_axil_araddr_o (m_axil_araddr_o),
+      .m_axil_rvalid_i (m_axil_rvalid_i),
+      .m_axil_rready_o (m_axil_rready_o),
+      .m_axil_rdata_i  (m_axil_rdata_i),
+      .m_axil_rresp_i  (m_axil_rresp_i),
+      .memory_we_o     (memory_we_o),
+      .memory_address_o(memory_address_o),
+      .memory_data_o   (memory_data_o),
+      .m_axis_tvalid_o (m_axis_tvalid_o),
+      .m_axis_tready_i (m_axis_tready_i),
+      .m_axis_tdata_o  (m_axis_tdata_o),
+      .m_axis_tuser_o  (m_axis_tuser_o),
+      .m_axis_tlast_o  (m_axis_tlast_o),
+      .s_axis_tvalid_i (s_axis_tvalid_i),
+      .s_axis_tready_o (s_axis_tready_o),
+      .s_axis_tdata_i  (s_axis_tdata_i),
+      .irq_i           (irq_i)
+  );
 
   assign busy_o = state_q != S_IDLE;
   assign damaged_o = state_q == S_REFUSE;
-  wire unused_ok = &{1'b0, index_q[31:15]};
 endmodule
 
 `default_nettype wire

@@ -1,5 +1,5 @@
 /* A board at the other end of a serial line: commands and their answers. A frame that was lost or damaged on the way is
- * sent again, and the board does nothing twice. Mirror: rtl/board/sf_link.sv */
+ * sent again, and the board does nothing twice. Mirror: rtl/board/sf_link.sv, rtl/board/sf_link_commands.sv */
 #ifndef SF_SIM_BOARD_LINK_H
 #define SF_SIM_BOARD_LINK_H
 #include "base/status.h"

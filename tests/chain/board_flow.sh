@@ -30,9 +30,9 @@ planted "vivado.tcl: .*missing close-brac" 's/write_bitstream -force \[/write_bi
 # ---- Yosys, nextpnr, ecppack
 own=$work/tree/rtl/board/small
 mkdir -p "$own"
-sed -E 's/module ulx3s/module small/; /^  wire \[3:0\] lamps;/,/^  assign led/d; /^  wire unused_ok/d' rtl/board/ulx3s/ulx3s.sv |
-  sed '/^  assign wifi_gpio0/i\  reg [15:0] sum_q;\n  always_ff @(posedge clock) if (reset_q[3]) sum_q <= sum_q * sum_q + {15'"'"'d0, ftdi_txd};\n  assign led = sum_q[15:8];\n  assign ftdi_rxd = alive_q[ALIVE-1];' >"$own/small.sv"
-grep -q 'assign led = sum_q' "$own/small.sv" || fail "ulx3s.sv is not what this test makes a small board of"
+sed -E 's/module ulx3s/module small/; /^  wire \[3:0\] lamps;/d; s/\.lamps_i\(lamps\)/.lamps_i(sum_q[3:0])/; /^  sf_board #/,/\);/d; /^  wire unused_ok/d' rtl/board/ulx3s/ulx3s.sv |
+  sed '/^  sf_board_start/i\  reg [15:0] sum_q;\n  always_ff @(posedge clock) if (reset_n) sum_q <= sum_q * sum_q + {15'"'"'d0, ftdi_txd};\n  assign ftdi_rxd = sum_q[15];' >"$own/small.sv"
+grep -q 'lamps_i(sum_q' "$own/small.sv" && grep -q 'assign ftdi_rxd = sum_q' "$own/small.sv" || fail "ulx3s.sv is not what this test makes a small board of"
 cp rtl/board/ulx3s/ulx3s.lpf "$own/"
 describe() { printf '{"name": "a small board", "top": "small", "device": "%s", "package": "CABGA381", "speed": "6", "mhz": %s, "pins": "ulx3s.lpf", "load": "load it"}' "$1" "$2" >"$own/board.json"; }
 board() { python3 tools/board.py "$work" --venv "$build/fpga/venv" --rtl "$work/tree" --board "$@" >"$work/out.log" 2>"$work/said.log"; }

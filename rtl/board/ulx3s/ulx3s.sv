@@ -1,6 +1,5 @@
 // ULX3S with an LFE5U-85F: 25 MHz in, 50 MHz from the PLL, reset while it has not locked or while button PWR is pressed, the
-// host behind the board's FT231X. Lamps, from 0: the board is alive; sample or pixel waiting, command at work, damaged frame,
-// interrupt; 7: reset.
+// host behind the board's FT231X.
 `default_nettype none
 
 module ulx3s (
@@ -12,7 +11,6 @@ module ulx3s (
     output wire       wifi_gpio0
 );
   localparam integer CLOCK_HZ = 50000000;
-  localparam integer ALIVE = 25;
 
   // 25 MHz / 1 x 24 = 600 MHz / 12 = 50 MHz: the feedback is CLKOP, so that CLKFB_DIV = 2 gives twice the input.
   wire clock, locked, inner;
@@ -50,31 +48,25 @@ module ulx3s (
       .LOCK        (locked)
   );
 
-  // Reset comes at once and goes with the clock, some cycles after the cause has gone.
-  wire well = locked && btn[0];
-  reg [3:0] reset_q;
-  always_ff @(posedge clock or negedge well) begin
-    if (!well) reset_q <= 4'd0;
-    else reset_q <= {reset_q[2:0], 1'b1};
-  end
-
-  reg [ALIVE-1:0] alive_q;
-  always_ff @(posedge clock) alive_q <= alive_q + 1'b1;
-
+  wire reset_n;
   wire [3:0] lamps;
-  reg [3:0] lamps_q;
-  always_ff @(posedge clock) lamps_q <= lamps;
+  sf_board_start u_start (
+      .clk_i  (clock),
+      .well_i (locked && btn[0]),
+      .rst_no (reset_n),
+      .lamps_i(lamps),
+      .led_o  (led)
+  );
   sf_board #(
       .CLOCK_HZ(CLOCK_HZ),
       .BAUD    (3000000)
   ) u_board (
       .clk_i  (clock),
-      .rst_ni (reset_q[3]),
+      .rst_ni (reset_n),
       .rx_i   (ftdi_txd),
       .tx_o   (ftdi_rxd),
       .lamps_o(lamps)
   );
-  assign led = {!reset_q[3], 2'd0, lamps_q, alive_q[ALIVE-1]};
   wire unused_ok = &{1'b0, inner};
   assign wifi_gpio0 = 1'b1;  // low would make the ESP32 take over the board
 endmodule
