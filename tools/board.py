@@ -12,6 +12,7 @@ import shutil
 import sys
 import time
 
+import xilinx
 from fpga import CELLS, DEVICES, PACKAGES, Tools, critical_path, keep, kept
 from hdl_flow import Stop, digest, run, sources_of, write
 
@@ -26,6 +27,7 @@ def parse_arguments():
         epilog="""examples:
   make board                          the bitstream for a ULX3S: about 45 minutes
   make board BOARD_FLOW="--seed 2"    another placement
+  make board BOARD=nexys_video        of a board for Vivado: what it needs, by Yosys
   make board BOARD=mine               of rtl/board/mine""")
     root = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
     parser.add_argument("build", help="build folder")
@@ -38,10 +40,10 @@ def parse_arguments():
 
 
 def read_board(path, name):
-    """What board.json says. Raises Stop with file and field."""
+    """What board.json says; None for a board of Vivado's. Raises Stop with file and field."""
     file = os.path.join(path, "board.json")
     if os.path.exists(os.path.join(path, "vivado.tcl")) and not os.path.exists(file):
-        raise Stop(f"{name} is for Vivado: vivado -mode batch -source rtl/board/{name}/vivado.tcl", 2)
+        return None
     try:
         board = json.load(open(file, encoding="utf-8"))
     except OSError as error:
@@ -96,12 +98,16 @@ class Flow:
         self.say(f"{self.arguments.board}: {what} took {time.monotonic() - started:.0f} s")
         keep(self.path(result), key)
 
-    def run(self):
-        board, name = self.board, self.arguments.board
+    def begin(self):
+        """The RTL beside the results; its key."""
         # The tools, which run as WebAssembly, see the folder that they work in and no other.
         shutil.rmtree(self.path("rtl"), ignore_errors=True)
         shutil.copytree(os.path.join(self.root, "rtl"), self.path("rtl"))
-        key = digest(text_of_tree(self.root), board["top"], *PACKAGES, "board 1")
+        return digest(text_of_tree(self.root), *PACKAGES, "board 1")
+
+    def run(self):
+        board, name = self.board, self.arguments.board
+        key = digest(self.begin(), board["top"])
         script = (f"read_verilog -sv -defer -D SF_NO_TAP -Irtl {' '.join(sources_of_board(self.root, name))}; "
                   f"synth_ecp5 -top {board['top']} -json netlist.json")
         self.step("synthesis", "yosys", ["-p", script], "netlist.json", key)
@@ -147,6 +153,11 @@ def main():
             print("board: " + text, file=sys.stderr, flush=True)
     board = read_board(os.path.join(os.path.abspath(arguments.rtl), "rtl", "board", arguments.board), arguments.board)
     flow = Flow(arguments, board, say)
+    if not board:
+        name = arguments.board
+        print(xilinx.resources(flow, name, sources_of_board(flow.root, name), flow.begin()), end="")
+        print(f"from Yosys; the bitstream is Vivado's: vivado -mode batch -source rtl/board/{name}/vivado.tcl")
+        return 0
     report, key = flow.run()
     result = describe(board, report)
     write(flow.path("board.json"), json.dumps(result, indent=2) + "\n")

@@ -22,7 +22,8 @@ extern "C" {
 #include <unistd.h>
 #include <vector>
 
-enum { CYCLES_A_BIT = 4 /* sim/board.mk */, CYCLES_A_TURN = 400, SETTLE = 40 };
+enum { CLOCK_HZ = 50000000, CYCLES_A_TURN = 400, SETTLE = 40 };
+static const double CYCLES_A_BIT = (double)CLOCK_HZ / SF_BOARD_BAUD; /* sim/board.mk */
 
 struct options {
   const char *link = nullptr;
@@ -104,7 +105,7 @@ struct board {
   unsound fault;
   sf_frame_reader commands = {}, answers = {};
   std::deque<uint8_t> to_host;
-  uint64_t cycles = 0;
+  uint64_t cycles = 0, bytes_to = 0, bytes_from = 0;
   explicit board(const options &o)
       : top((context.randReset(2), context.randSeed((int)(o.seed % 0x7fffffff) + 1), &context)),
         out((uint64_t)o.seed + 1), in((uint64_t)o.seed + 2), fault(o)
@@ -122,6 +123,7 @@ struct board {
     cycles++;
     const int byte = top.rst_ni ? from_board.take(top.tx_o) : -1;
     if (byte < 0) return;
+    bytes_from++;
     std::vector<uint8_t> bytes;
     fault.pass((uint8_t)byte, false, answers, bytes);
     for (uint8_t b : bytes) in.pass(b, to_host);
@@ -132,6 +134,7 @@ struct board {
     std::deque<uint8_t> noisy;
     for (ssize_t i = 0; i < n; i++) out.pass(bytes[i], noisy);
     for (uint8_t b : noisy) fault.pass(b, true, commands, passed);
+    bytes_to += passed.size();
     to_board.waiting.insert(to_board.waiting.end(), passed.begin(), passed.end());
   }
   bool idle() const { return to_board.idle() && from_board.idle() && !(top.lamps_o & 2); }
@@ -189,10 +192,11 @@ int main(int argc, char **argv)
   serve(b, terminal, o.idle);
   unlink(o.link);
   fprintf(stderr,
-          "sf_board: %llu cycles; to the board %llu bytes lost, %llu doubled, %llu changed, %llu from nowhere; back "
+          "sf_board: %llu cycles, %llu bytes to the board and %llu back at %d baud; to the board %llu bytes lost, %llu doubled, %llu changed, %llu from nowhere; back "
           "%llu, %llu, "
           "%llu, %llu\n",
-          (unsigned long long)b.cycles, (unsigned long long)b.out.done[0], (unsigned long long)b.out.done[1],
+          (unsigned long long)b.cycles, (unsigned long long)b.bytes_to, (unsigned long long)b.bytes_from,
+          SF_BOARD_BAUD, (unsigned long long)b.out.done[0], (unsigned long long)b.out.done[1],
           (unsigned long long)b.out.done[2], (unsigned long long)b.out.done[3], (unsigned long long)b.in.done[0],
           (unsigned long long)b.in.done[1], (unsigned long long)b.in.done[2], (unsigned long long)b.in.done[3]);
   return 0;

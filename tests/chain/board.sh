@@ -79,10 +79,14 @@ refuses "tty: no serial port" "a file for a port"
 "$build/bin/sf_export" model.safetensors -o large.snn >/dev/null || fail "no scene"
 begin
 scene=large.snn refuses "large.snn: its grid takes [0-9]* bytes, the board has 131072: room for the first [0-9]* of 16 levels; a scene that fits: sf_export MODEL -o SMALL.snn --fit --data DATA --fit-bytes 131072$" "a large scene"
-"$build/bin/sf_export" model.safetensors -o small.snn --fit --data data --fit-bytes 131072 --fit-rays 256 --quiet >fit.log 2>&1 || fail "--fit-bytes: $(cat fit.log)"
-grep -q "grid: [0-9]* -> [0-9]* bytes, at most 131072 were asked for" fit.log || fail "--fit-bytes says: $(cat fit.log)"
-scene=small.snn render small.exr || fail "a small scene: $(cat said.log)"
-"$build/bin/sim_render" small.snn data --crop 10,10,5,4 --quiet -o small-fixed.exr >/dev/null
-cmp -s small.exr small-fixed.exr || fail "the picture of a fitted scene is not the core's"
 end
+picture() { "$root/tools/board_picture.sh" "$build" model.safetensors data --board "$1" --downscale 1 --crop 10,10,5,4 --fit-rays 256 --out picture >said.log 2>&1; }
+picture "$build/board/sf_board" || fail "the picture of a fitted scene: $(cat said.log)"
+grep -q "grid: [0-9]* -> [0-9]* bytes, at most 131072 were asked for" picture/fit.log || fail "--fit-bytes: $(cat picture/fit.log)"
+cmp -s picture/board.exr picture/fixed.exr || fail "the picture of a fitted scene is not the core's"
+says "^5 x 4 pixels, [0-9]* samples: .*byte for byte$" "a fitted scene"
+says "^over the line at 12.50 Mbaud: [0-9]* bytes to the board, [0-9]* back" "a fitted scene"
+printf '#!/bin/sh\nexec %s "$@" --version 0x40002\n' "$build/board/sf_board" >another && chmod +x another
+! picture ./another && [ ! -e picture/board.exr ] || fail "a board of another version gives a picture"
+says "picture/tty: the board's accelerator has version 4.2" "a picture from a board of another version"
 finish "board: pictures and counters equal over a pseudo-terminal; noise, defects, wrong boards and scenes are named"

@@ -56,7 +56,28 @@ describe 85k 350
 refused 1 "a small board: [0-9.]* MHz after routing, its clock has 350 MHz: no bitstream was made" small
 [ ! -e "$work/board/small/small.bit" ] || fail "there is a bitstream that is too slow"
 refused 2 "there is no board nothing: .*board.json: No such file" nothing
-refused 2 "nexys_video is for Vivado: vivado -mode batch -source rtl/board/nexys_video/vivado.tcl" nexys_video
+
+# A board for Vivado: what it needs. Three flip-flops and a multiplier twice, in a module that is there twice.
+other=$work/tree/rtl/board/other
+mkdir -p "$other"
+sed 's/nexys_video/other/g' rtl/board/nexys_video/vivado.tcl >"$other/vivado.tcl"
+cat >"$other/other.sv" <<'SOURCE'
+module other_part (input wire clk_i, input wire signed [15:0] a_i, output reg signed [31:0] b_o);
+  always_ff @(posedge clk_i) b_o <= a_i * a_i;
+endmodule
+module other (input wire clk_i, input wire [15:0] a_i, output wire [63:0] b_o, output reg [2:0] c_o);
+  always_ff @(posedge clk_i) c_o <= {c_o[1:0], ^a_i};
+  other_part u_one (.clk_i(clk_i), .a_i(a_i), .b_o(b_o[31:0]));
+  other_part u_two (.clk_i(clk_i), .a_i(~a_i), .b_o(b_o[63:32]));
+endmodule
+SOURCE
+board other || fail "the table of a board for Vivado"
+expect() { python3 -c 'import json, sys; m = json.load(open(sys.argv[1]))["modules"]; sys.exit(not eval(sys.argv[2]))' "$work/board/other/resources.json" "$1" || fail "not so: $1"; }
+expect 'm["other"]["DSP48E1"] == 2 and m["other"]["FF"] == 3 and m["other_part"]["instances"] == 2 and m["other_part"]["DSP48E1"] == 2'
+grep -q '^| `other` | 1 | .* 2 (0 %) |' "$work/out.log" || fail "the table of a board for Vivado lacks its top"
+grep -q "the bitstream is Vivado's: vivado -mode batch -source rtl/board/other/vivado.tcl" "$work/out.log" || fail "Vivado's command is not said"
+sed -i 's/xc7a200t/xc7z010t/' "$other/vivado.tcl"
+refused 1 "vivado.tcl: no .set part. of xc7a200t" other
 describe 99k 50
 refused 1 "board.json: device is 99k, expected one of 25k, 45k, 85k" small
 echo "board_flow: a bitstream, a clock that is not met, and planted faults of both flows are as expected"
