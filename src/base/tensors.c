@@ -226,7 +226,8 @@ static sf_status read_header(sf_tensors *set, const char *path, size_t size)
   if (size < 8) return sf_fail(SF_E_FORMAT, "%s: %zu bytes, too short for a safetensors file", path, size);
   memcpy(&length, set->buffer, 8);
   if (length > HEADER_LIMIT)
-    return sf_fail(SF_E_FORMAT, "%s: header of %ju bytes, the limit is %u", path, (uintmax_t)length, HEADER_LIMIT);
+    return sf_fail(SF_E_FORMAT, "%s: not a model or a scene: its header has %ju bytes, the limit is %u", path,
+                   (uintmax_t)length, HEADER_LIMIT);
   if (length > size - 8)
     return sf_fail(SF_E_FORMAT, "%s: cut short: header of %ju bytes, %zu in the file", path, (uintmax_t)length,
                    size - 8);

@@ -241,8 +241,10 @@ sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **po
       positional[count++] = argv[i];
     }
   }
-  if (count < cli->min_positional)
-    return sf_fail(SF_E_USAGE, "missing argument; usage: %s", cli->usage ? cli->usage : cli->program);
+  if (count < cli->min_positional) {
+    const char *usage = cli->usage ? cli->usage : cli->program;
+    return sf_fail(SF_E_USAGE, "missing argument; usage: %.*s", (int)strcspn(usage, "\n"), usage);
+  }
   return check_outputs(cli, positional);
 }
 

@@ -6,6 +6,8 @@ good sf_scene simple -o simple --size 4 --train 1 --test 1
 good sf_data d --png cameras.png
 good sf_data d --json
 usage "missing argument" sf_data
+usage "usage: sf_export MODEL -o SCENE [--vectors DIR] [options] (see sf_export --help)" sf_export # the first form alone
+data "d/transforms_train.json: not a model or a scene" sf_export d/transforms_train.json -o out
 data "no such folder" sf_data absent
 data "cannot write" sf_data d --png absent/cameras.png
 # A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level.
