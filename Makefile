@@ -170,6 +170,7 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
+$B/bin/sim_render: $B/obj/tools/render/options.o
 $B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
 
 # Prices of technologies, found beside the program.

@@ -85,7 +85,7 @@ module sf_counters (
   wire fed = integrating || at_layer == sf_op_pkg::C2;
   wire [4:0] at_fed = {at_layer == sf_op_pkg::C3 ? 2'd2 : at_layer == sf_op_pkg::C2 ? 2'd1 : 2'd0, at_step};
   wire [63:0] weight = fed ? weight_q[at_fed] : at_step != 3'd0 ? 64'd0 : at_layer == sf_op_pkg::C1 ? c1_weight_q : d1_mac_q;
-  wire is_state = event_w == 3'd5 || event_w == 3'd6;
+  wire is_state = event_w == sf_csr_pkg::EVENT_STATE_R || event_w == sf_csr_pkg::EVENT_STATE_W;
   reg [63:0] global_value, place_value;
   always_comb begin
     case (at_step)
@@ -98,19 +98,19 @@ module sf_counters (
       default: global_value = 64'd0;
     endcase
     case (event_w)
-      3'd0: place_value = mac;
-      3'd1: place_value = fed ? sop_q[at_fed] : 64'd0;
-      3'd2: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
-      3'd3: place_value = updates;
-      3'd4: place_value = weight;
-      3'd5: place_value = at_step == 3'd0 ? 64'd0 : updates;
-      3'd6: place_value = updates;
+      sf_csr_pkg::EVENT_MAC: place_value = mac;
+      sf_csr_pkg::EVENT_SOP: place_value = fed ? sop_q[at_fed] : 64'd0;
+      sf_csr_pkg::EVENT_SPIKES: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
+      sf_csr_pkg::EVENT_UPDATES: place_value = updates;
+      sf_csr_pkg::EVENT_WEIGHT: place_value = weight;
+      sf_csr_pkg::EVENT_STATE_R: place_value = at_step == 3'd0 ? 64'd0 : updates;
+      sf_csr_pkg::EVENT_STATE_W: place_value = updates;
       default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
     endcase
     if (!integrating && !neurons) begin
       place_value = 64'd0;
-      if (at_layer == 3'd7 && event_w == 3'd0) place_value = global_value;
-      if (at_layer == 3'd7 && event_w == 3'd1 && at_step <= sf_op_pkg::C3) place_value = layer_busy_q[at_step];
+      if (at_layer == 3'd7 && event_w == sf_csr_pkg::EVENT_MAC) place_value = global_value;
+      if (at_layer == 3'd7 && event_w == sf_csr_pkg::EVENT_SOP && at_step <= sf_op_pkg::C3) place_value = layer_busy_q[at_step];
     end
   end
 
@@ -141,7 +141,8 @@ module sf_counters (
       write_q <= walk_q && walk_snapshot_q;
     end
   end
-  wire wipe = walk_q && walk_clear_q && event_w == 3'd7;  // the last of the walk, so a snapshot has read every event
+  // At the last event of the walk, so a snapshot has read every event.
+  wire wipe = walk_q && walk_clear_q && event_w == sf_csr_pkg::EVENT_SPECIAL;
   wire [63:0] written = fourfold_q ? value_q << 2 : threefold_q ? (value_q << 1) + value_q : value_q;
   always_ff @(posedge clk_i) begin
     write_place_q <= place_q;

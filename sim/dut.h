@@ -44,8 +44,6 @@ sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_
                             sf_dut_trace *trace);
 /* After a run: some cycles in which nothing more may come. */
 sf_status sf_dut_quiet(sf_dut *dut);
-/* fx_net_fn for fx_render_ray; user is the sf_dut. */
-sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out);
 /* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the
  * hardware has them). */
 sf_status sf_dut_counts(sf_dut *dut, fx_counts *counts, uint64_t *cycles, uint64_t *busy, uint64_t *stalls);

@@ -202,12 +202,3 @@ int sf_dut_received(const sf_dut *dut)
 {
   return dut->received;
 }
-
-sf_status sf_dut_net(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
-{
-  const sf_dut_sample sample = {.ray = ray, .first = first, .f = f};
-  sf_dut_result result;
-  SF_TRY(sf_dut_run(dut, &sample, 1, &result));
-  *out = result.out;
-  return sf_ok();
-}

@@ -23,12 +23,22 @@ static void run_net(sf_dut *dut, hard *h, const hard_case *c, int variant)
   }
 }
 
+/* fx_net_fn for fx_render_ray; dut: the sf_dut. */
+static sf_status net_of_dut(void *dut, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
+{
+  const sf_dut_sample sample = {.ray = ray, .first = first, .f = f};
+  sf_dut_result result;
+  SF_TRY(sf_dut_run(dut, &sample, 1, &result));
+  *out = result.out;
+  return sf_ok();
+}
+
 static void run_ray(sf_dut *dut, hard *h, const hard_case *c, int variant)
 {
   hard_seen seen = {0};
   fx_pixel core;
   ck_ok(fx_render_ray(&h->scene, &h->ray, NULL, NULL, &core, &seen.counts));
-  ck_ok(fx_render_ray(&h->scene, &h->ray, sf_dut_net, dut, &seen.pixel, NULL));
+  ck_ok(fx_render_ray(&h->scene, &h->ray, net_of_dut, dut, &seen.pixel, NULL));
   same_counts(dut, &seen.counts, (uint64_t)variant);
   ck_assert_mem_eq(&core, &seen.pixel, sizeof core);
   c->expect(h, &seen, variant);

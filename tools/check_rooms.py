@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The order of the house: a file includes and calls only what stands above it in README.md's map, and no files call each
-other in a circle.
+"""The order of the house: a file includes and calls only what stands above it in README.md's map, and no files include or
+call each other in a circle.
 
 usage: check_rooms.py BUILD     after a build: what calls what is read from BUILD/obj. Exit status 1 names every violation.
 
@@ -107,12 +107,14 @@ def main():
         a, b = room_of(source, rooms), room_of(other, rooms)
         return a is not None and b is not None and rooms[a] < rooms[b]
 
-    for source, other in included(sources):
+    includes = sorted(set(included(sources)))
+    for source, other in includes:
         if below(source, other):
             faults.append(f"{source}: includes {other}, which stands below it in README.md's map")
     for (source, other), names in sorted(calls.items()):
         if below(source, other):
             faults.append(f"{source}: calls {', '.join(names)} of {other}, which stands below it in README.md's map")
+    faults += [f"a circle of includes: {', '.join(group)}" for group in circles(includes)]
     for group in circles(calls):
         faults.append(f"a circle of calls: {', '.join(group)}")
         faults += [f"  {a} -> {b}: {', '.join(names)}" for (a, b), names in sorted(calls.items()) if a in group and b in group]

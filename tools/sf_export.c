@@ -311,14 +311,31 @@ static void set_defaults(options *o)
   if (!o->extra.samples) o->extra.samples = KIT_SAMPLES;
 }
 
-static int run(const sf_cli *cli, int argc, char **argv, options *o)
+static int run(const sf_option *table, int argc, char **argv, options *o)
 {
+  const sf_cli cli = {.program = "sf_export",
+                      .usage = "sf_export MODEL -o SCENE [--vectors DIR] [options]\n       sf_export SCENE --vectors "
+                               "DIR --data DATA [options]\n       sf_export SCENE --traces DIR --data DATA [options]\n"
+                               "       sf_export MODEL|SCENE --nir FILE",
+                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core,\n"
+                                 "the accelerator and the firmware. Writes vectors, traces and graphs for other tools.",
+                      .examples = "  sf_export model.safetensors -o scene.snn\n"
+                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
+                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
+                                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
+                                  "  sf_export model.safetensors -o board.snn --fit --data lego --fit-bytes 262144\n"
+                                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n"
+                                  "  sf_export scene.snn --traces traces --data lego --view 0 --rays 20\n"
+                                  "  sf_export scene.snn --nir scene.nir\n",
+                      .options = table,
+                      .min_positional = 1,
+                      .max_positional = 1};
   const char *path = NULL;
-  sf_status status = sf_cli_parse(cli, argc, argv, &path);
+  sf_status status = sf_cli_parse(&cli, argc, argv, &path);
   if (status.code == SF_OK) status = check_options(o);
   set_defaults(o);
   if (status.code == SF_OK) status = o->output ? export_scene(path, o) : export_from(path, o);
-  return sf_cli_finish(cli, status);
+  return sf_cli_finish(&cli, status);
 }
 
 int main(int argc, char **argv)
@@ -368,22 +385,5 @@ int main(int argc, char **argv)
       {"--quiet", 'q', SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
       {"--json", 0, SF_ARG_FLAG, &o.json, 0, 0, NULL, NULL, "print the report as JSON"},
       {0}};
-  const sf_cli cli = {.program = "sf_export",
-                      .usage = "sf_export MODEL -o SCENE [--vectors DIR] [options]\n       sf_export SCENE --vectors "
-                               "DIR --data DATA [options]\n       sf_export SCENE --traces DIR --data DATA [options]\n"
-                               "       sf_export MODEL|SCENE --nir FILE",
-                      .summary = "Quantises a trained model (model.safetensors) to integers for the fixed-point core,\n"
-                                 "the accelerator and the firmware. Writes vectors, traces and graphs for other tools.",
-                      .examples = "  sf_export model.safetensors -o scene.snn\n"
-                                  "  sf_export model.safetensors -o short.snn --steps 2 --background black\n"
-                                  "  sf_export model.safetensors -o small.snn --weight-bits 6 --grid-bits 6\n"
-                                  "  sf_export model.safetensors -o small.snn --fit --data lego --fit-loss 0.05\n"
-                                  "  sf_export model.safetensors -o board.snn --fit --data lego --fit-bytes 262144\n"
-                                  "  sf_export scene.snn --vectors kit --data lego --samples 48 --seed 1\n"
-                                  "  sf_export scene.snn --traces traces --data lego --view 0 --rays 20\n"
-                                  "  sf_export scene.snn --nir scene.nir\n",
-                      .options = table,
-                      .min_positional = 1,
-                      .max_positional = 1};
-  return run(&cli, argc, argv, &o);
+  return run(table, argc, argv, &o);
 }

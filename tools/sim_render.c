@@ -1,6 +1,7 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator, simulated or on a
  * board. */
 #include "sim/studio/view_set.h"
+#include "tools/render/options.h"
 #include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include "base/io.h"
@@ -8,23 +9,11 @@
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-enum { RTL_CROP = 16, SEED = 1 };
-static const uint64_t NO_SEED = UINT64_MAX; /* not given */
-static const double SEED_MAX = 1e19;
-
-typedef struct options {
-  int view, backend, downscale, steps, threads;
-  uint64_t seed;
-  double scale;
-  double patience;
-  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port;
-  bool all, json, quiet;
-} options;
+enum { RTL_CROP = 16 };
 
 typedef struct job {
-  options opt;
+  render_options opt;
   sf_window crop; /* width 0: not given */
   sf_ranks *ranks;
   sf_studio studio;
@@ -64,7 +53,7 @@ static sf_status choose_crop(job *j)
 
 static sf_status open_studio(job *j)
 {
-  const options *o = &j->opt;
+  const render_options *o = &j->opt;
   const sf_studio_options how = {.backend = (sf_backend)o->backend,
                                  .kernels = o->kernels,
                                  .scene = o->scene,
@@ -82,7 +71,7 @@ static sf_status open_studio(job *j)
 
 static sf_status load_view(job *j)
 {
-  const options *o = &j->opt;
+  const render_options *o = &j->opt;
   SF_TRY(open_studio(j));
   SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
   sf_dataset_warn(stderr, "sim_render", &j->shot.data, NULL);
@@ -217,7 +206,7 @@ static void report_verdict(void *user, const sf_verdict *v)
 /* Everything that decides a picture comes from the manifest. */
 static sf_status load_manifest(job *j)
 {
-  options *o = &j->opt;
+  render_options *o = &j->opt;
   const sf_manifest_origin *origin = &j->set.manifest.origin;
   const char *slash = strrchr(o->verify, '/');
   SF_TRY(sf_manifest_load(&j->set.manifest, o->verify));
@@ -277,99 +266,6 @@ static sf_status work(job *j)
   return status;
 }
 
-static sf_status refuse(bool given, const char *option, const char *reason)
-{
-  return given ? sf_fail(SF_E_USAGE, "%s %s", option, reason) : sf_ok();
-}
-
-/* Options that only one backend reads. */
-static sf_status check_backend(options *o)
-{
-  SF_TRY(refuse(o->model && o->backend != SF_BACKEND_FLOAT, "--model", "needs --backend float"));
-  SF_TRY(refuse(o->seed != NO_SEED && o->backend != SF_BACKEND_RTL, "--seed", "needs --backend rtl"));
-  SF_TRY(refuse(o->kernels && o->backend != SF_BACKEND_FIXED, "--kernels", "needs --backend fixed"));
-  SF_TRY(refuse(o->port && o->backend != SF_BACKEND_BOARD, "--port", "needs --backend board"));
-  SF_TRY(refuse(o->patience > 0 && o->backend != SF_BACKEND_BOARD, "--timeout", "needs --backend board"));
-  SF_TRY(refuse(!o->port && o->backend == SF_BACKEND_BOARD, "--backend board", "needs --port, such as /dev/ttyUSB0"));
-  if (!(o->patience > 0)) o->patience = SF_BOARD_PATIENCE;
-  if (o->seed == NO_SEED) o->seed = SEED;
-  return sf_ok();
-}
-
-static sf_status check_modes(options *o)
-{
-  SF_TRY(check_backend(o));
-  SF_TRY(refuse(!o->all && !o->verify && sf_ranks_launched() > 1, "--all", "or --verify has to be given to ranks"));
-  if (o->verify) return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
-  if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
-  if (o->all) {
-    SF_TRY(refuse(o->view >= 0, "--view", "does not go with --all"));
-    SF_TRY(refuse(o->png, "--png", "does not go with --all"));
-    SF_TRY(refuse(o->truth, "--truth", "does not go with --all"));
-    SF_TRY(
-        refuse(o->backend == SF_BACKEND_RTL && !o->crop, "--all --backend rtl", "needs --crop: whole views take days"));
-  }
-  const char *dot = strrchr(o->output, '.');
-  if (!o->all) SF_TRY(refuse(dot && !strcasecmp(dot, ".png"), o->output, "would hold an EXR: --png is for previews"));
-  if (!o->split) o->split = "test";
-  if (o->view < 0) o->view = 0;
-  return sf_ok();
-}
-
-static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
-{
-  const sf_option table[] = {
-      SF_GROUP("One view"),
-      {"--output", 'o', SF_ARG_PLACE, &o->output, 0, 0, NULL, "FILE", "EXR to write; with --all: folder"},
-      {"--png", 0, SF_ARG_OUTPUT, &o->png, 0, 0, NULL, "FILE", "also a PNG preview"},
-      {"--truth", 0, SF_ARG_OUTPUT, &o->truth, 0, 0, NULL, "FILE", "also the view's own picture, PNG"},
-      {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
-       "which view of the split, from 0 (default 0; --verify: all)"},
-      {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
-       "only this window (rtl default: 16x16 in the centre)"},
-      {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
-      SF_GROUP("A set of views"),
-      {"--all", 0, SF_ARG_FLAG, &o->all, 0, 0, NULL, NULL,
-       "every view of the split, into the folder -o, with a manifest and a contact sheet; also as ranks of mpirun or "
-       "srun (docs/scale.md)"},
-      {"--verify", 0, SF_ARG_INPUT, &o->verify, 0, 0, NULL, "MANIFEST",
-       "render again what the manifest lists and compare"},
-      SF_GROUP("How it is computed"),
-      {"--backend", 0, SF_ARG_CHOICE, &o->backend, 0, 0, "float|fixed|rtl|board", "B", "arithmetic (default fixed):"},
-      {"--steps", 0, SF_ARG_INT, &o->steps, 1, SF_T_MAX, NULL, "N", "time steps (default: the scene's t_r)"},
-      {"--model", 0, SF_ARG_INPUT, &o->model, 0, 0, NULL, "FILE",
-       "for float (default model.safetensors beside the scene)"},
-      {"--port", 0, SF_ARG_STRING, &o->port, 0, 0, NULL, "DEVICE", "board: its serial port, such as /dev/ttyUSB0"},
-      {"--timeout", 0, SF_ARG_DOUBLE, &o->patience, 0.01, 600, NULL, "S",
-       "board: seconds without a byte until a command is sent again (default 1)"},
-      {"--kernels", 0, SF_ARG_STRING, &o->kernels, 0, 0, NULL, "NAME",
-       "instructions of fixed: portable, avx2, avx512vnni or amx (default: the fastest here); the result is the same"},
-      {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N",
-       "threads, at most one a processor (default: all processors)"},
-      SF_GROUP("Tuning"),
-      {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
-       "views of 1/N of the full size, 0 = by the layout (default 0)"},
-      {"--scale", 0, SF_ARG_DOUBLE, &o->scale, 0, 1e6, NULL, "S",
-       "model units per world unit, 0 = the scene's (default 0)"},
-      {"--seed", 0, SF_ARG_U64, &o->seed, 0, SEED_MAX, NULL, "S",
-       "rtl: seed of the registers' contents at power-on (default 1)"},
-      SF_GROUP("What is printed"),
-      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
-      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
-      {0}};
-  static const char *const of_manifest[] = {"--all",   "--output", "--png",       "--truth", "--crop",
-                                            "--steps", "--split",  "--downscale", "--scale", NULL};
-  const char *positional[2];
-  cli->options = table;
-  sf_status status = sf_cli_parse(cli, argc, argv, positional);
-  if (status.code == SF_OK && o->verify)
-    status = sf_cli_refuse(cli, argc, argv, of_manifest, "does not go with --verify: the manifest decides");
-  cli->options = NULL;
-  SF_TRY(status);
-  o->scene = positional[0], o->data = positional[1];
-  return check_modes(o);
-}
-
 /* 0: as many as there are. More than the processors would have nothing to do, and one that the system refuses would end
  * the program. */
 static void set_threads(int threads)
@@ -380,33 +276,10 @@ static void set_threads(int threads)
 
 int main(int argc, char **argv)
 {
-  sf_cli cli = {
-      .program = "sim_render",
-      .usage = "sim_render scene.snn DATA [--view K] -o golden.exr | --all -o DIR | --verify MANIFEST [options]",
-      .summary =
-          "Renders views through the float field, the fixed-point core or the Verilog accelerator, simulated (rtl) or "
-          "on a "
-          "board.\n"
-          "EXR channels: R G B A, Z (mean distance, world units; forward-facing data: NDC), samples;\n"
-          "fixed, rtl and board also spikes, sops, macs, energy_fJ and the raw integers fx.R fx.G fx.B fx.A fx.T "
-          "fx.Zhi "
-          "fx.Zlo.\n"
-          "--all renders a whole split and goes on where it was interrupted; DIR/manifest.json holds what must be\n"
-          "equal on any machine (src/golden/manifest.h). --verify names the first difference, exit status 1.",
-      .examples = "  sim_render scene.snn data --view 3 -o golden.exr --png preview.png\n"
-                  "  sim_render scene.snn data --backend rtl --crop 40,40,16,16 -o rtl.exr\n"
-                  "  sim_render scene.snn data --backend board --port /dev/ttyUSB0 -o board.exr\n"
-                  "  sim_render scene.snn data --all -o golden\n"
-                  "  mpirun -n 8 sim_render scene.snn data --all -o golden\n"
-                  "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
-                  "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
-                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
-      .min_positional = 2,
-      .max_positional = 2};
+  sf_cli cli = render_cli();
   job *j = calloc(1, sizeof *j);
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
-  j->opt = (options){.view = -1, .backend = SF_BACKEND_FIXED, .seed = NO_SEED};
-  sf_status status = parse(argc, argv, &j->opt, &cli);
+  sf_status status = render_parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK && j->opt.crop) status = sf_window_parse(j->opt.crop, &j->crop);
   if (status.code == SF_OK) {
     set_threads(j->opt.threads);

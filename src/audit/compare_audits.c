@@ -277,7 +277,7 @@ static cJSON *ledger_cells(const side *a, const side *b, const char *key)
   for (int r = 0; r < SF_ROWS; r++)
     for (int t = 0; t < SF_T_MAX; t++) {
       char name[64];
-      snprintf(name, sizeof name, r < SF_LAYERS ? "%s, step %d" : "%s", sf_row_names[r], t);
+      snprintf(name, sizeof name, r < SF_LAYERS ? "%s, step %d" : "%s", sf_row_name(r), t);
       add_change(&list, name, cell(a, key, r, t), cell(b, key, r, t), false);
     }
   return changes_json(&list);

@@ -75,8 +75,7 @@ cJSON *sf_ledger_json(const sf_ledger *ledger);
 void sf_counts_print(FILE *out, const fx_net *net, const fx_counts *counts);
 /* views: how many views the counts cover (a fraction for a sample of rays), for the figures per view. */
 void sf_ledger_print(FILE *out, const sf_ledger *ledger, double views);
-extern const char *const sf_not_modelled[]; /* NULL-terminated; every report lists them */
-extern const char *const sf_criticism[];    /* NULL-terminated; what the metric is criticised for */
+/* What is not modelled, and what the metric is criticised for: in every report. */
 void sf_limits_print(FILE *out);
 void sf_limits_json(cJSON *object); /* adds "not_modelled" and "criticism" */
 

@@ -69,7 +69,7 @@ bool sf_price_measured(const sf_technology *technology, sf_price_family family, 
 
 /* Rows: the layers, then what happens once per sample or pixel outside of them. */
 enum { SF_ROW_FIELD = SF_LAYERS, SF_ROW_RAY, SF_ROWS };
-extern const char *const sf_row_names[SF_ROWS]; /* "D1" .. "C3", "field" (grid or planes), "ray" (exp(-x), frame) */
+const char *sf_row_name(int row); /* a layer's, "field" (grid or planes), "ray" (exp(-x), frame) */
 
 /* What is outside the nets: all of it at step 0 of its row. */
 typedef enum {

@@ -6,7 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const sf_row_names[SF_ROWS] = {"D1", "D2", "C1", "C2", "C3", "field", "ray"};
+const char *sf_row_name(int row)
+{
+  return row < SF_LAYERS ? fx_layer_name(row) : row == SF_ROW_FIELD ? "field" : "ray";
+}
+
 const char *const sf_part_names[SF_PARTS] = {"mac",   "sop",    "weight",  "state",   "lookup", "fill",
                                              "frame", "neuron", "special", "product", "place"};
 const char *const sf_part_titles[SF_PARTS] = {"MAC",

@@ -165,7 +165,7 @@ static cJSON *ledger_json(const sf_ledgers *l, int ledger, double views)
   cJSON *rows = cJSON_AddArrayToObject(json, "rows");
   for (int r = 0; r < SF_ROWS; r++) {
     cJSON *row = cJSON_CreateObject();
-    cJSON_AddStringToObject(row, "name", sf_row_names[r]);
+    cJSON_AddStringToObject(row, "name", sf_row_name(r));
     cJSON_AddItemToObject(row, "fj", cells_json(l, ledger, r));
     add_units(row, l, ledger, r);
     cJSON_AddItemToArray(rows, row);

@@ -2,7 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 
-const char *const sf_not_modelled[] = {
+static const char *const not_modelled[] = {
     "marching and the occupancy test, which the host does",
     "spike bitmaps, sums while they grow, queues and buffers between units; rows of DRAM that a burst opens",
     "control, clock tree, interconnect, stalls and leakage power",
@@ -13,7 +13,7 @@ const char *const sf_not_modelled[] = {
     "both nets (the direction's of C1 once per ray where the net computes them so)",
     NULL};
 
-const char *const sf_criticism[] = {
+static const char *const criticism[] = {
     "in the paper ledger 4.6 pJ is an fp32 multiply and add, 0.9 pJ an fp32 add (45 nm); a fixed-point add of these "
     "widths costs 0.03-0.1 "
     "pJ: see the width-correct ledger",
@@ -160,9 +160,9 @@ cJSON *sf_ledger_json(const sf_ledger *l)
 void sf_limits_print(FILE *out)
 {
   fprintf(out, "not modelled, by any ledger:\n");
-  for (int i = 0; sf_not_modelled[i]; i++) fprintf(out, "  - %s\n", sf_not_modelled[i]);
+  for (int i = 0; not_modelled[i]; i++) fprintf(out, "  - %s\n", not_modelled[i]);
   fprintf(out, "known criticism of the paper's metric:\n");
-  for (int i = 0; sf_criticism[i]; i++) fprintf(out, "  - %s\n", sf_criticism[i]);
+  for (int i = 0; criticism[i]; i++) fprintf(out, "  - %s\n", criticism[i]);
 }
 
 static void add_list(cJSON *object, const char *key, const char *const *text)
@@ -173,6 +173,6 @@ static void add_list(cJSON *object, const char *key, const char *const *text)
 
 void sf_limits_json(cJSON *object)
 {
-  add_list(object, "not_modelled", sf_not_modelled);
-  add_list(object, "criticism", sf_criticism);
+  add_list(object, "not_modelled", not_modelled);
+  add_list(object, "criticism", criticism);
 }

@@ -15,12 +15,12 @@ static sf_status check_inputs(const fx_net *net, const char *path)
   const fx_layer *l = net->layer;
   const bool decodes = fx_net_decodes(net);
   const int n_h = l[FX_D2].n_out - 1;
-  SF_TRY(in_range(path, "D1", "n_in", l[FX_D1].n_in, decodes ? 0 : 2, decodes ? 0 : SF_FEATURE_MAX));
-  SF_TRY(in_range(path, "D1", "n_out", l[FX_D1].n_out, 0, SF_LANES));
-  SF_TRY(in_range(path, "D2", "n_in", l[FX_D2].n_in, l[FX_D1].n_out, l[FX_D1].n_out));
-  SF_TRY(in_range(path, "D2", "n_out", l[FX_D2].n_out, !decodes, decodes ? 0 : SF_OUT_MAX));
-  if (decodes) return in_range(path, "C1", "n_in", l[FX_C1].n_in, 1, SF_DIR_MAX);
-  return in_range(path, "C1", "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + FX_SH);
+  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_in", l[FX_D1].n_in, decodes ? 0 : 2, decodes ? 0 : SF_FEATURE_MAX));
+  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_out", l[FX_D1].n_out, 0, SF_LANES));
+  SF_TRY(in_range(path, fx_layer_name(FX_D2), "n_in", l[FX_D2].n_in, l[FX_D1].n_out, l[FX_D1].n_out));
+  SF_TRY(in_range(path, fx_layer_name(FX_D2), "n_out", l[FX_D2].n_out, !decodes, decodes ? 0 : SF_OUT_MAX));
+  if (decodes) return in_range(path, fx_layer_name(FX_C1), "n_in", l[FX_C1].n_in, 1, SF_DIR_MAX);
+  return in_range(path, fx_layer_name(FX_C1), "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + FX_SH);
 }
 
 static sf_status check_chain(const fx_net *net, const char *path)
@@ -29,11 +29,11 @@ static sf_status check_chain(const fx_net *net, const char *path)
   const fx_layer *l = net->layer;
   SF_TRY(check_inputs(net, path));
   for (int id = 0; id < SF_LAYERS; id++) SF_TRY(in_range(path, fx_layer_name(id), "bias", l[id].bias, 0, bias_max[id]));
-  SF_TRY(in_range(path, "C1", "n_out", l[FX_C1].n_out, 1, SF_LANES));
-  SF_TRY(in_range(path, "C2", "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
-  SF_TRY(in_range(path, "C2", "n_out", l[FX_C2].n_out, 1, SF_LANES));
-  SF_TRY(in_range(path, "C3", "n_in", l[FX_C3].n_in, l[FX_C2].n_out, l[FX_C2].n_out));
-  return in_range(path, "C3", "n_out", l[FX_C3].n_out, 3, 3);
+  SF_TRY(in_range(path, fx_layer_name(FX_C1), "n_out", l[FX_C1].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, fx_layer_name(FX_C2), "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
+  SF_TRY(in_range(path, fx_layer_name(FX_C2), "n_out", l[FX_C2].n_out, 1, SF_LANES));
+  SF_TRY(in_range(path, fx_layer_name(FX_C3), "n_in", l[FX_C3].n_in, l[FX_C2].n_out, l[FX_C2].n_out));
+  return in_range(path, fx_layer_name(FX_C3), "n_out", l[FX_C3].n_out, 3, 3);
 }
 
 /* The farthest cell corner of a dense level must lie inside it; a level must end before the next one begins. */
@@ -59,7 +59,8 @@ static sf_status check_level(const fx_grid *grid, int i, const char *path)
 static sf_status check_grid(const fx_grid *grid, int n_feature, const char *path)
 {
   SF_TRY(in_range(path, "grid", "levels", grid->levels, 1, FX_LEVELS_MAX));
-  SF_TRY(in_range(path, "D1", "n_in", n_feature, grid->levels * FX_GRID_FEATURES, grid->levels * FX_GRID_FEATURES));
+  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_in", n_feature, grid->levels * FX_GRID_FEATURES,
+                  grid->levels * FX_GRID_FEATURES));
   SF_TRY(in_range(path, "grid", "entries", grid->entries, 1, ENTRIES_MAX));
   SF_TRY(in_range(path, "grid.level00", "offset", grid->offset[0], 0, 0));
   for (int i = 0; i < grid->levels; i++) SF_TRY(check_level(grid, i, path));
@@ -75,7 +76,7 @@ static sf_status check_field(const fx_scene *scene, const char *path)
     return check_grid(&scene->grid, layer[FX_D1].n_in, path);
   SF_TRY(in_range(path, "grid", "levels", scene->grid.levels, 0, 0));
   if (scene->backbone == FX_INGP) return sf_ok();
-  SF_TRY(in_range(path, "D1", "n_out", layer[FX_D1].n_out, 0, 0));
+  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_out", layer[FX_D1].n_out, 0, 0));
   return fx_check_tensorf_sizes(&scene->tensorf, layer[FX_C1].n_in, path);
 }
 
@@ -156,7 +157,7 @@ static sf_status check_net(const fx_net *net, const char *path)
   SF_TRY(check_scale(&net->exp_in, "exp_in", -bias, bias - 1, path));
   SF_TRY(check_scale(&net->sigmoid_in, "sigmoid_in", 0, 0, path));
   for (int id = 0; id < SF_LAYERS; id++) SF_TRY(check_layer(&net->layer[id], id, path));
-  return in_range(path, "D2", "largest h", fx_largest_h(&net->layer[FX_D2]), 0, FX_INPUT_MAX);
+  return in_range(path, fx_layer_name(FX_D2), "largest h", fx_largest_h(&net->layer[FX_D2]), 0, FX_INPUT_MAX);
 }
 
 sf_status fx_scene_check(const fx_scene *scene, const char *path)

@@ -43,7 +43,7 @@ sf_status fx_check_tensorf_sizes(const fx_tensorf *field, int inputs, const char
   SF_TRY(in_range(path, "tensorf", "feature_freqs", field->feature_freqs, 0, FX_FREQS_MAX));
   SF_TRY(in_range(path, "tensorf", "view_freqs", field->view_freqs, 0, FX_FREQS_MAX));
   const int needed = fx_tensorf_inputs(field);
-  SF_TRY(in_range(path, "C1", "n_in", inputs, needed, needed));
+  SF_TRY(in_range(path, fx_layer_name(FX_C1), "n_in", inputs, needed, needed));
   return in_range(path, "tensorf", "bytes of planes and lines", fx_tensorf_bytes(field), 1, FIELD_BYTES_MAX);
 }
 

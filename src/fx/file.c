@@ -20,22 +20,21 @@ typedef struct int_field {
   size_t offset;
 } int_field;
 
-#define LAYER(name, id)                                                                                                \
-  {name ".n_in", offsetof(fx_scene, net.layer[id].n_in)}, {name ".n_out", offsetof(fx_scene, net.layer[id].n_out)},    \
-      {name ".k", offsetof(fx_scene, net.layer[id].k)},                                                                \
+#define OF_LAYER(id, member)                                                                                           \
   {                                                                                                                    \
-    name ".theta", offsetof(fx_scene, net.layer[id].theta)                                                             \
+#id "." #member, offsetof(fx_scene, net.layer[FX_##id].member)                                                     \
   }
+#define LAYER(id) OF_LAYER(id, n_in), OF_LAYER(id, n_out), OF_LAYER(id, k), OF_LAYER(id, theta)
 #define FIELD(field)                                                                                                   \
   {                                                                                                                    \
 #field, offsetof(fx_scene, field)                                                                                  \
   }
 static const int_field ints[] = {
-    LAYER("D1", FX_D1),
-    LAYER("D2", FX_D2),
-    LAYER("C1", FX_C1),
-    LAYER("C2", FX_C2),
-    LAYER("C3", FX_C3),
+    LAYER(D1),
+    LAYER(D2),
+    LAYER(C1),
+    LAYER(C2),
+    LAYER(C3),
     {"t_r", offsetof(fx_scene, net.steps)},
     {"exp_in.mul", offsetof(fx_scene, net.exp_in.mul)},
     {"exp_in.shift", offsetof(fx_scene, net.exp_in.shift)},
@@ -56,13 +55,8 @@ enum { INTS = sizeof ints / sizeof ints[0] };
 
 /* Not in the file when 0. */
 static const int_field optional[] = {
-    {"C1.bias", offsetof(fx_scene, net.layer[FX_C1].bias)},
-    {"C2.bias", offsetof(fx_scene, net.layer[FX_C2].bias)},
-    {"C3.bias", offsetof(fx_scene, net.layer[FX_C3].bias)},
-    FIELD(log2_bound),
-    FIELD(gamma_q24),
-    FIELD(near_q16),
-    FIELD(longest_q16),
+    OF_LAYER(C1, bias), OF_LAYER(C2, bias), OF_LAYER(C3, bias), FIELD(log2_bound),
+    FIELD(gamma_q24),   FIELD(near_q16),    FIELD(longest_q16),
 };
 enum { OPTIONAL = sizeof optional / sizeof optional[0] };
 

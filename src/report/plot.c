@@ -1,6 +1,7 @@
 /* Gnuplot scripts with their data inside. */
 #include "report/internal.h"
 #include "base/io.h"
+#include "fx/layers.h"
 #include <math.h>
 #include <string.h>
 
@@ -280,7 +281,6 @@ static bool has_firing(const sf_reproduction *r, int scene)
 /* A colour is a budget, a dash is a layer. A field without a density net has two spiking layers. */
 static void plot_firing(FILE *out, const sf_reproduction *r, int scene, const char *name)
 {
-  static const char *const layer[] = {"D1", "C1", "C2"};
   char title[640];
   title_of(r, scene, "Firing rates over training", title, sizeof title);
   sf_plot_head(out, name, title, "iteration", "spikes per neuron and step", "outside right top");
@@ -300,7 +300,8 @@ static void plot_firing(FILE *out, const sf_reproduction *r, int scene, const ch
   for (int i = 0; i < BETAS * 3; i++)
     if (fires(&r->scene[scene].run[betas[i / 3]], i % 3))
       fprintf(out, "$f%d using 1:%d with lines linecolor '%s' dashtype %d title '%s, %s', ", i / 3, i % 3 + 2,
-              sf_plot_colour[i / 3], i % 3 + 1, sf_run_kinds[betas[i / 3]].title, layer[i % 3]);
+              sf_plot_colour[i / 3], i % 3 + 1, sf_run_kinds[betas[i / 3]].title,
+              fx_layer_name(fx_spiking_layers[i % 3]));
   fprintf(out, "NaN notitle\n");
 }
 

@@ -4,16 +4,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-static sf_status reserve(sf_batch *b, int blocks, int features)
+static void free_blocks(sf_batch *b)
 {
-  if (blocks <= b->block_capacity) return sf_ok();
-  const int capacity = blocks + blocks / 4;
   free(b->x);
   free(b->spare_x);
   free(b->delta);
   free(b->spare_delta);
   free(b->f);
   free(b->df);
+}
+
+static sf_status reserve(sf_batch *b, int blocks, int features)
+{
+  if (blocks <= b->block_capacity) return sf_ok();
+  const int capacity = blocks + blocks / 4;
+  free_blocks(b);
   const size_t n = (size_t)capacity * SF_BLOCK * sizeof(float);
   b->x = sf_aligned_alloc(3 * n);
   b->spare_x = sf_aligned_alloc(3 * n);
@@ -40,12 +45,7 @@ void sf_batch_free(sf_batch *b)
   free(b->ray);
   free(b->bundle);
   free(b->hit);
-  free(b->x);
-  free(b->spare_x);
-  free(b->delta);
-  free(b->spare_delta);
-  free(b->f);
-  free(b->df);
+  free_blocks(b);
 }
 
 void sf_batch_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)

@@ -47,6 +47,25 @@ typedef struct state_field {
 
 enum { STATE_FIELDS = 46, VM_FIELDS = 3, CHARGE_FIELDS = 2 };
 enum { FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS + CHARGE_FIELDS };
+/* Those of every prefix, and of what only some trainers have. */
+static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS])
+{
+  static const char *const prefix[] = {"train.search_m1", "train.search_m2", "train.search_m3", "train.search_m4",
+                                       "train.search_m5", "train.search_m6", "train.search_m7", "train.search_m8"};
+  _Static_assert(SF_T_MAX <= sizeof prefix / sizeof *prefix, "a name per prefix");
+  int n = 0;
+  for (int i = 0; i < SF_T_MAX; i++) f[n++] = (state_field){prefix[i], .number = &t->search.prefix[i]};
+  if (t->options.charge > 0) {
+    f[n++] = (state_field){"train.charge_error", .number = &t->charge.error};
+    f[n++] = (state_field){"train.charge_reads", .number = &t->charge.reads};
+  }
+  if (!t->vm) return n;
+  f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
+  f[n++] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
+  f[n++] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
+  return n;
+}
+
 static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
 {
   const state_field table[STATE_FIELDS] = {
@@ -97,21 +116,8 @@ static int state_table(sf_trainer *t, state_field f[FIELDS_MAX])
       {"train.quiet_c1", .small = &t->health.quiet[1]},
       {"train.quiet_c2", .small = &t->health.quiet[2]},
   };
-  static const char *const prefix[] = {"train.search_m1", "train.search_m2", "train.search_m3", "train.search_m4",
-                                       "train.search_m5", "train.search_m6", "train.search_m7", "train.search_m8"};
-  _Static_assert(SF_T_MAX <= sizeof prefix / sizeof *prefix, "a name per prefix");
   memcpy(f, table, sizeof table);
-  int n = STATE_FIELDS;
-  for (int i = 0; i < SF_T_MAX; i++) f[n++] = (state_field){prefix[i], .number = &t->search.prefix[i]};
-  if (t->options.charge > 0) {
-    f[n++] = (state_field){"train.charge_error", .number = &t->charge.error};
-    f[n++] = (state_field){"train.charge_reads", .number = &t->charge.reads};
-  }
-  if (!t->vm) return n;
-  f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
-  f[n++] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
-  f[n++] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
-  return n;
+  return STATE_FIELDS + further_fields(t, f + STATE_FIELDS);
 }
 
 static int list_tensors(const sf_trainer *t, bool with_optimiser, sf_tensor *list)

@@ -40,6 +40,10 @@ printf 'int low(void);\nint other(void) { return low(); }\n' >src/low/other.c
 printf 'int other(void);\nint low(void) { return other(); }\n' >src/low/low.c
 expect 'a circle of calls: src/low/low.c, src/low/other.c'
 house
+printf '#ifndef O\n#define O\n#include "low/low.h"\n#endif\n' >src/low/other.h
+printf '#ifndef L\n#define L\n#include "low/other.h"\nint low(void);\n#endif\n' >src/low/low.h
+expect 'a circle of includes: src/low/low.h, src/low/other.h'
+house
 mkdir -p src/shed build/obj/src/shed && echo 'int shed;' >src/shed/shed.c
 expect "src/shed/shed.c: in no room"
 
