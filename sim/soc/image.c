@@ -3,6 +3,7 @@
 #include "firmware/sf_soc.h"
 #include "firmware/sf_tile.h"
 #include "fx/cache.h"
+#include "fx/scene.h"
 #include "fx/tensorf.h"
 #include "sim/ray/ray.h"
 #include <stdlib.h>
@@ -29,12 +30,6 @@ static size_t net_bytes(const fx_net *net)
   return SF_BLOB_WORDS * 4 + rows * SF_LANES;
 }
 
-static size_t occupancy_bytes(const fx_scene *scene)
-{
-  const size_t res = (size_t)scene->occ_res;
-  return (size_t)(scene->log2_bound + 1) * (res * res * res / 8);
-}
-
 static size_t basis_bytes(const fx_tensorf *field)
 {
   return (size_t)fx_factors_components(&field->appearance) * SF_PLANES_FEATURES;
@@ -58,7 +53,7 @@ static plan make_plan(const fx_scene *scene, size_t rays)
     p.lines = line_aligned(p.planes + SF_PLANES_WORDS * 4 + basis_bytes(&scene->tensorf));
     p.occupancy = aligned(p.lines + lines_bytes(&scene->tensorf));
   }
-  p.steps = aligned(p.occupancy + occupancy_bytes(scene));
+  p.steps = aligned(p.occupancy + fx_occupancy_bytes(scene));
   p.rays = aligned(p.steps + (scene->steps ? sizeof *scene->steps : 0));
   p.end = p.rays + rays * sizeof(fx_ray);
   return p;
@@ -147,7 +142,7 @@ sf_status sf_soc_image_make(const fx_scene *scene, const fx_ray *rays, int width
   memcpy(bytes, &head, sizeof head);
   put_net(bytes + p.net, &scene->net);
   put_field(bytes, &p, scene);
-  memcpy(bytes + p.occupancy, scene->occupancy, occupancy_bytes(scene));
+  memcpy(bytes + p.occupancy, scene->occupancy, fx_occupancy_bytes(scene));
   if (scene->steps) memcpy(bytes + p.steps, scene->steps, sizeof *scene->steps);
   memcpy(bytes + p.rays, rays, n * sizeof *rays);
   const size_t from = offsetof(sf_tile_header, crc) + sizeof head.crc;

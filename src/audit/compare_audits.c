@@ -182,10 +182,7 @@ static int larger(const void *a, const void *b)
 
 static void add_percent(cJSON *json, double a, double b)
 {
-  if (a != 0)
-    cJSON_AddNumberToObject(json, "change_percent", 100 * (b / a - 1));
-  else
-    cJSON_AddNullToObject(json, "change_percent");
+  sf_json_add_real(json, "change_percent", 100 * (b / a - 1));
 }
 
 static cJSON *changes_json(changes *list)

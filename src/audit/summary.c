@@ -207,13 +207,9 @@ static void add_origin(cJSON *json, const sf_audit_report *r)
 
 static void add_energy(cJSON *json, const sf_audit_report *r)
 {
-  double saving = sf_saving_percent(r->ledger.spiking_fj, r->ledger.ann_fj);
   sf_json_add_u64(json, "energy_spiking_fj", r->ledger.spiking_fj);
   sf_json_add_u64(json, "energy_ann_fj", r->ledger.ann_fj);
-  if (isnan(saving))
-    cJSON_AddNullToObject(json, "energy_saving_percent");
-  else
-    cJSON_AddNumberToObject(json, "energy_saving_percent", saving);
+  sf_json_add_real(json, "energy_saving_percent", sf_saving_percent(r->ledger.spiking_fj, r->ledger.ann_fj));
   cJSON_AddNumberToObject(json, "energy_spiking_mj_per_view", (double)r->ledger.spiking_fj * 1e-12 / r->views);
   cJSON_AddNumberToObject(json, "energy_ann_mj_per_view", (double)r->ledger.ann_fj * 1e-12 / r->views);
   cJSON_AddItemToObject(json, "ledger", sf_ledger_json(&r->ledger));
@@ -227,10 +223,7 @@ static void add_twin(cJSON *json, const sf_audit_report *r)
   sf_json_add_u64(twin, "samples", r->twin.samples);
   sf_json_add_u64(twin, "macs_per_sample", r->twin.macs);
   sf_json_add_u64(twin, "fj", r->twin.fj);
-  if (isnan(r->twin.saving_percent))
-    cJSON_AddNullToObject(twin, "saving_percent");
-  else
-    cJSON_AddNumberToObject(twin, "saving_percent", r->twin.saving_percent);
+  sf_json_add_real(twin, "saving_percent", r->twin.saving_percent);
 }
 
 static void add_saturation(cJSON *json, const sf_audit_report *r)

@@ -7,4 +7,10 @@ enum {
 #undef SF_ARCH
   SF_SPIKE_WORDS = SF_LANES / 64 /* of a layer's bitmap: neuron n is bit n % 64 of word n / 64 */
 };
+
+/* The largest value of a symmetric signed number of `bits` bits. */
+static inline int sf_symmetric_max(int bits)
+{
+  return (1 << (bits - 1)) - 1;
+}
 #endif

@@ -52,6 +52,7 @@ sf_status sf_tensors_load(sf_tensors *set, const char *path);
 /* The same of a file's contents; they are copied. `name` stands for the path in messages. */
 sf_status sf_tensors_load_memory(sf_tensors *set, const void *data, size_t size, const char *name);
 sf_status sf_tensors_save(const sf_tensor *tensor, int count, const cJSON *metadata, const char *path);
+void sf_tensors_put_number(cJSON *metadata, const char *key, double value); /* as the text that reads back the same */
 void sf_tensors_free(sf_tensors *set);
 /* Finds `name` with exactly this type and shape (shape[i] < 0 matches any size); the message names file and tensor. */
 sf_status sf_tensors_get(const sf_tensors *set, const char *name, sf_dtype type, int dims, const int64_t *shape,

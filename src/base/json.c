@@ -190,6 +190,14 @@ void sf_json_add_u64(cJSON *object, const char *key, uint64_t value)
   cJSON_AddRawToObject(object, key, digits);
 }
 
+void sf_json_add_real(cJSON *object, const char *key, double value)
+{
+  if (isfinite(value))
+    cJSON_AddNumberToObject(object, key, value);
+  else
+    cJSON_AddNullToObject(object, key);
+}
+
 void sf_json_add_text(cJSON *object, const char *key, const char *text)
 {
   char *whole = malloc(strlen(text) * strlen(sf_utf8_replacement) + 1), *to = whole;

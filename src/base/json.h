@@ -33,6 +33,8 @@ sf_status sf_json_need_text(const cJSON *object, const char *where, const char *
 
 /* Integers keep all their digits: cJSON numbers are doubles. */
 void sf_json_add_u64(cJSON *object, const char *key, uint64_t value);
+/* null where the value is no finite number. */
+void sf_json_add_real(cJSON *object, const char *key, double value);
 /* Text from outside, as a path or a view's name: what is no UTF-8 becomes U+FFFD. */
 void sf_json_add_text(cJSON *object, const char *key, const char *text);
 #endif

@@ -124,3 +124,10 @@ sf_status sf_tensors_save(const sf_tensor *tensor, int count, const cJSON *metad
   free(bytes);
   return status;
 }
+
+void sf_tensors_put_number(cJSON *metadata, const char *key, double value)
+{
+  char text[40];
+  snprintf(text, sizeof text, "%.17g", value);
+  cJSON_AddStringToObject(metadata, key, text);
+}

@@ -95,14 +95,6 @@ void sf_picture_budget_print(FILE *out, const sf_picture_budget *b)
     if (b->row[i].block) print_row(out, b, &b->row[i]);
 }
 
-static void add_finite(cJSON *object, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(object, key, value);
-  else
-    cJSON_AddNullToObject(object, key);
-}
-
 static void add_currents(cJSON *currents, const sf_current_row *row)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
@@ -130,8 +122,8 @@ cJSON *sf_picture_budget_json(const sf_picture_budget *b)
     if (!r->block) continue;
     cJSON *item = cJSON_CreateObject();
     cJSON_AddStringToObject(item, "block", r->block);
-    add_finite(item, "psnr", r->psnr);
-    add_finite(item, "psnr_photograph", r->psnr_truth);
+    sf_json_add_real(item, "psnr", r->psnr);
+    sf_json_add_real(item, "psnr_photograph", r->psnr_truth);
     for (int s = 0; s < FX_SPIKING; s++) {
       const char *const key[] = {"flips_D1", "flips_C1", "flips_C2"};
       const int l = fx_spiking_layers[s];

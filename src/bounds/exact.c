@@ -7,11 +7,6 @@
 
 enum { INPUTS_MAX = SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES, ROWS_MAX = INPUTS_MAX + 1 /* the bias */ };
 
-static int frac_of(int layer)
-{
-  return layer == FX_C2 ? SF_AC_FRAC : 0;
-}
-
 /* Value of one LSB of input i of a layer; the one behind all others is the bias'. */
 static double input_lsb(const fx_scene *scene, int layer, int i)
 {
@@ -64,8 +59,8 @@ static void set_scalars(sf_exact *e)
     const bool real = sf_exact_is(e, SF_EXACT_LEAK);
     if (e->scene->net.layer[l].n_out == 0) continue;
     e->k[l] = real ? ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC) : e->scene->net.layer[l].k;
-    e->theta[l] =
-        real ? ldexp(theta[l] / e->scene->units.current_scale[l], frac_of(l)) : (double)e->scene->net.layer[l].theta;
+    e->theta[l] = real ? ldexp(theta[l] / e->scene->units.current_scale[l], fx_layer_frac(l))
+                       : (double)e->scene->net.layer[l].theta;
   }
 }
 
@@ -138,7 +133,7 @@ static void fire(const sf_exact *e, int l, int t, double *v, const double *curre
 {
   const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE);
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
-    const double in = ldexp(current[o], frac_of(l)), held = exact ? in : to_membrane(in);
+    const double in = ldexp(current[o], fx_layer_frac(l)), held = exact ? in : to_membrane(in);
     const double u = charge(e, v[o], held, e->k[l], t, exact);
     const double kept = exact ? u : to_membrane(u);
     const bool spike = kept >= e->theta[l];

@@ -101,14 +101,6 @@ void sf_ledgers_print(FILE *out, const sf_ledgers *ledgers, double views)
 
 /* ---- JSON ---- */
 
-static void add_number(cJSON *object, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(object, key, value);
-  else
-    cJSON_AddNullToObject(object, key);
-}
-
 static cJSON *technology_json(const sf_technology *t)
 {
   cJSON *json = cJSON_CreateObject();
@@ -158,7 +150,7 @@ static cJSON *ledger_json(const sf_ledgers *l, int ledger, double views)
     cJSON_AddStringToObject(json, "baseline", sf_ledger_texts[text->baseline].key);
   else
     cJSON_AddNullToObject(json, "baseline");
-  add_number(json, "saving_percent", l->saving[ledger]);
+  sf_json_add_real(json, "saving_percent", l->saving[ledger]);
   cJSON_AddBoolToObject(json, "interpolated", l->interpolated[ledger]);
   cJSON *parts = cJSON_AddObjectToObject(json, "parts_fj");
   for (int p = 0; p < SF_PARTS; p++) sf_json_add_u64(parts, sf_part_names[p], l->part[ledger][p]);
@@ -180,7 +172,7 @@ static cJSON *break_even_json(const sf_ledgers *l)
     cJSON *item = cJSON_CreateObject();
     cJSON_AddStringToObject(item, "ledger", sf_ledger_texts[l->break_even[i].ledger].key);
     cJSON_AddStringToObject(item, "twin", sf_ledger_texts[l->break_even[i].twin].key);
-    add_number(item, "firing_rate", l->break_even[i].rate);
+    sf_json_add_real(item, "firing_rate", l->break_even[i].rate);
     cJSON_AddItemToArray(list, item);
   }
   return list;
@@ -198,8 +190,8 @@ static cJSON *sensitivity_json(const sf_ledgers *l)
     cJSON *savings = cJSON_AddObjectToObject(item, "saving_percent");
     for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
       cJSON *pair = cJSON_AddObjectToObject(savings, sf_ledger_texts[g].key);
-      add_number(pair, "less", s->less[g]);
-      add_number(pair, "more", s->more[g]);
+      sf_json_add_real(pair, "less", s->less[g]);
+      sf_json_add_real(pair, "more", s->more[g]);
     }
     cJSON_AddItemToArray(list, item);
   }

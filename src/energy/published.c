@@ -179,14 +179,6 @@ void sf_published_print(FILE *out)
   }
 }
 
-static void add_number(cJSON *object, const char *key, double value)
-{
-  if (isnan(value))
-    cJSON_AddNullToObject(object, key);
-  else
-    cJSON_AddNumberToObject(object, key, value);
-}
-
 cJSON *sf_published_json(void)
 {
   sf_published_row rows[SF_PUBLISHED_MAX];
@@ -199,21 +191,21 @@ cJSON *sf_published_json(void)
     cJSON_AddStringToObject(row, "data", p->data);
     cJSON_AddStringToObject(row, "reading", p->reading);
     cJSON_AddStringToObject(row, "method", p->beta ? p->beta : "ANN");
-    add_number(row, "steps", p->beta ? p->steps : NAN);
-    add_number(row, "macs", p->macs);
-    add_number(row, "real_macs", p->real_macs);
-    add_number(row, "samples", p->samples);
-    add_number(row, "rate", p->rate);
-    add_number(row, "mean_rate", p->mean_rate);
-    add_number(row, "published_mj", p->published_mj);
-    add_number(row, "recomputed_mj", p->recomputed_mj);
-    add_number(row, "residual_percent", p->residual_percent);
-    add_number(row, "first_rate", p->first_rate);
-    add_number(row, "later_rate", p->later_rate);
-    add_number(row, "two_rates_mj", p->two_rates_mj);
-    add_number(row, "two_rates_residual_percent", p->two_rates_residual_percent);
-    add_number(row, "saving_percent", p->saving_percent);
-    add_number(row, "published_saving_percent", p->published_saving_percent);
+    sf_json_add_real(row, "steps", p->beta ? p->steps : NAN);
+    sf_json_add_real(row, "macs", p->macs);
+    sf_json_add_real(row, "real_macs", p->real_macs);
+    sf_json_add_real(row, "samples", p->samples);
+    sf_json_add_real(row, "rate", p->rate);
+    sf_json_add_real(row, "mean_rate", p->mean_rate);
+    sf_json_add_real(row, "published_mj", p->published_mj);
+    sf_json_add_real(row, "recomputed_mj", p->recomputed_mj);
+    sf_json_add_real(row, "residual_percent", p->residual_percent);
+    sf_json_add_real(row, "first_rate", p->first_rate);
+    sf_json_add_real(row, "later_rate", p->later_rate);
+    sf_json_add_real(row, "two_rates_mj", p->two_rates_mj);
+    sf_json_add_real(row, "two_rates_residual_percent", p->two_rates_residual_percent);
+    sf_json_add_real(row, "saving_percent", p->saving_percent);
+    sf_json_add_real(row, "published_saving_percent", p->published_saving_percent);
     cJSON_AddItemToArray(list, row);
   }
   return list;

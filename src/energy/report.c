@@ -131,11 +131,7 @@ void sf_ledger_print(FILE *out, const sf_ledger *l, double views)
 
 static void add_saving(cJSON *json, const char *key, uint64_t spiking_fj, uint64_t ann_fj)
 {
-  double saving = sf_saving_percent(spiking_fj, ann_fj);
-  if (isnan(saving))
-    cJSON_AddNullToObject(json, key);
-  else
-    cJSON_AddNumberToObject(json, key, saving);
+  sf_json_add_real(json, key, sf_saving_percent(spiking_fj, ann_fj));
 }
 
 cJSON *sf_ledger_json(const sf_ledger *l)

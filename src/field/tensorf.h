@@ -1,6 +1,5 @@
 /* The TensoRF backbone (Chen et al. 2022, VM decomposition): density and appearance of a point from three planes and
- * three lines, and a spiking colour decoder. What is particular to it; the model itself is an sf_model of backbone
- * SF_TENSORF.
+ * three lines, and a spiking colour decoder. What is particular to it; the model itself is an sf_model.
  *
  * A point x in [0,1]^3 of the field's box lies at x_a (resolution_a - 1) between the grid points of axis a, as
  * grid_sample with align_corners. Mode m has a plane over two axes and a line along the third:

@@ -8,16 +8,9 @@ static bool is_grid(const fx_scene *scene)
   return scene->backbone == FX_INGP;
 }
 
-static int kept(const bool *flag, int n)
-{
-  int sum = 0;
-  for (int i = 0; i < n; i++) sum += flag[i];
-  return sum;
-}
-
 static bool drop(bool *flag, int n, int at, int least)
 {
-  if (!flag[at] || kept(flag, n) <= least) return false;
+  if (!flag[at] || sf_count_kept(flag, n) <= least) return false;
   flag[at] = false;
   return true;
 }

@@ -5,34 +5,27 @@
 
 enum { RANK_SHARE = 256, RANK_MIN = 128, CHECK_SHARE = 4, CHECK_MIN = 2048, CHUNK = 8192 };
 
-static int kept(const bool *flag, int n)
-{
-  int sum = 0;
-  for (int i = 0; i < n; i++) sum += flag[i];
-  return sum;
-}
-
 /* ---- report ---- */
 
 static void count_dropped(const sf_fit_search *s, const sf_trim *exact, sf_fit_report *r)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
-    const int n = s->scene->net.layer[l].n_out, after = kept(exact->neuron[l], n);
+    const int n = s->scene->net.layer[l].n_out, after = sf_count_kept(exact->neuron[l], n);
     r->silent[l] = n - after;
-    r->dropped[l] = after - kept(s->trim.neuron[l], n);
+    r->dropped[l] = after - sf_count_kept(s->trim.neuron[l], n);
   }
-  const int levels = s->scene->grid.levels, left = kept(exact->level, levels);
+  const int levels = s->scene->grid.levels, left = sf_count_kept(exact->level, levels);
   r->idle_levels = levels - left;
-  r->dropped_levels = left - kept(s->trim.level, levels);
+  r->dropped_levels = left - sf_count_kept(s->trim.level, levels);
   for (int l = 0; l < levels; l++) r->smaller_tables += s->trim.level[l] && s->trim.log2_size[l] >= 0;
   for (int which = 0; which < SF_FACTORS; which++)
     for (int pair = 0; pair < FX_PAIRS; pair++) {
       const sf_trim_planes *first = &exact->planes, *last = &s->trim.planes;
       const fx_tensorf *field = &s->scene->tensorf;
       const int all = (which == SF_OF_DENSITY ? &field->density : &field->appearance)->components[pair];
-      const int useful = kept(first->component[which][pair], all);
+      const int useful = sf_count_kept(first->component[which][pair], all);
       r->idle_components[which] += all - useful;
-      r->dropped_components[which] += useful - kept(last->component[which][pair], all);
+      r->dropped_components[which] += useful - sf_count_kept(last->component[which][pair], all);
     }
 }
 

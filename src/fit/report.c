@@ -141,14 +141,6 @@ static cJSON *layers_json(const int *value)
   return json;
 }
 
-static void add_real(cJSON *json, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(json, key, value);
-  else
-    cJSON_AddNullToObject(json, key);
-}
-
 static void add_planes(cJSON *json, const sf_fit_state *s)
 {
   cJSON_AddNumberToObject(json, "density_components", s->components[SF_OF_DENSITY]);
@@ -175,7 +167,7 @@ static void add_grid(cJSON *json, const sf_fit_state *s)
 static cJSON *state_json(const sf_fit_state *s)
 {
   cJSON *json = cJSON_CreateObject();
-  add_real(json, "psnr", s->psnr);
+  sf_json_add_real(json, "psnr", s->psnr);
   cJSON_AddItemToObject(json, "n_in", cJSON_CreateIntArray(s->n_in, SF_LAYERS));
   cJSON_AddItemToObject(json, "n_out", cJSON_CreateIntArray(s->n_out, SF_LAYERS));
   if (s->planes)
@@ -204,7 +196,7 @@ cJSON *sf_fit_json(const sf_fit_report *r)
   sf_json_add_u64(json, "checked_rays", r->checked);
   cJSON_AddNumberToObject(json, "frames", (double)r->checked / r->pixels);
   cJSON_AddNumberToObject(json, "bound_db", r->bound_db);
-  add_real(json, "loss_db", r->loss_db);
+  sf_json_add_real(json, "loss_db", r->loss_db);
   cJSON_AddNumberToObject(json, "candidate", r->chosen);
   if (r->tables.bound) cJSON_AddItemToObject(json, "grid_for_bytes", sf_fit_tables_json(&r->tables));
   cJSON_AddItemToObject(json, "neurons_without_effect", layers_json(r->silent));

@@ -9,18 +9,28 @@
 enum { ENTRIES_MAX = 1 << 28, HASH_BITS_MAX = 27, OCCUPANCY_MAX = 256, SAMPLES_MAX = 1024 };
 enum { BOUND_LOG2_MAX = 6, GAMMA_MAX = 1 << 21, NEAR_MAX = 1 << 30 };
 
+static sf_status inputs(const fx_layer *layer, int id, const char *path, int low, int high)
+{
+  return in_range(path, fx_layer_name(id), "n_in", layer[id].n_in, low, high);
+}
+
+static sf_status outputs(const fx_layer *layer, int id, const char *path, int low, int high)
+{
+  return in_range(path, fx_layer_name(id), "n_out", layer[id].n_out, low, high);
+}
+
 /* A decoder has no D1 and D2; the inputs of C1 are as many as the sum of its current has bits for. */
 static sf_status check_inputs(const fx_net *net, const char *path)
 {
   const fx_layer *l = net->layer;
   const bool decodes = fx_net_decodes(net);
   const int n_h = l[FX_D2].n_out - 1;
-  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_in", l[FX_D1].n_in, decodes ? 0 : 2, decodes ? 0 : SF_FEATURE_MAX));
-  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_out", l[FX_D1].n_out, 0, SF_LANES));
-  SF_TRY(in_range(path, fx_layer_name(FX_D2), "n_in", l[FX_D2].n_in, l[FX_D1].n_out, l[FX_D1].n_out));
-  SF_TRY(in_range(path, fx_layer_name(FX_D2), "n_out", l[FX_D2].n_out, !decodes, decodes ? 0 : SF_OUT_MAX));
-  if (decodes) return in_range(path, fx_layer_name(FX_C1), "n_in", l[FX_C1].n_in, 1, SF_DIR_MAX);
-  return in_range(path, fx_layer_name(FX_C1), "n_in", l[FX_C1].n_in, n_h > 0 ? n_h : 1, n_h + FX_SH);
+  SF_TRY(inputs(l, FX_D1, path, decodes ? 0 : 2, decodes ? 0 : SF_FEATURE_MAX));
+  SF_TRY(outputs(l, FX_D1, path, 0, SF_LANES));
+  SF_TRY(inputs(l, FX_D2, path, l[FX_D1].n_out, l[FX_D1].n_out));
+  SF_TRY(outputs(l, FX_D2, path, !decodes, decodes ? 0 : SF_OUT_MAX));
+  if (decodes) return inputs(l, FX_C1, path, 1, SF_DIR_MAX);
+  return inputs(l, FX_C1, path, n_h > 0 ? n_h : 1, n_h + FX_SH);
 }
 
 static sf_status check_chain(const fx_net *net, const char *path)
@@ -29,11 +39,11 @@ static sf_status check_chain(const fx_net *net, const char *path)
   const fx_layer *l = net->layer;
   SF_TRY(check_inputs(net, path));
   for (int id = 0; id < SF_LAYERS; id++) SF_TRY(in_range(path, fx_layer_name(id), "bias", l[id].bias, 0, bias_max[id]));
-  SF_TRY(in_range(path, fx_layer_name(FX_C1), "n_out", l[FX_C1].n_out, 1, SF_LANES));
-  SF_TRY(in_range(path, fx_layer_name(FX_C2), "n_in", l[FX_C2].n_in, l[FX_C1].n_out, l[FX_C1].n_out));
-  SF_TRY(in_range(path, fx_layer_name(FX_C2), "n_out", l[FX_C2].n_out, 1, SF_LANES));
-  SF_TRY(in_range(path, fx_layer_name(FX_C3), "n_in", l[FX_C3].n_in, l[FX_C2].n_out, l[FX_C2].n_out));
-  return in_range(path, fx_layer_name(FX_C3), "n_out", l[FX_C3].n_out, 3, 3);
+  SF_TRY(outputs(l, FX_C1, path, 1, SF_LANES));
+  SF_TRY(inputs(l, FX_C2, path, l[FX_C1].n_out, l[FX_C1].n_out));
+  SF_TRY(outputs(l, FX_C2, path, 1, SF_LANES));
+  SF_TRY(inputs(l, FX_C3, path, l[FX_C2].n_out, l[FX_C2].n_out));
+  return outputs(l, FX_C3, path, 3, 3);
 }
 
 /* The farthest cell corner of a dense level must lie inside it; a level must end before the next one begins. */
@@ -76,7 +86,7 @@ static sf_status check_field(const fx_scene *scene, const char *path)
     return check_grid(&scene->grid, layer[FX_D1].n_in, path);
   SF_TRY(in_range(path, "grid", "levels", scene->grid.levels, 0, 0));
   if (scene->backbone == FX_INGP) return sf_ok();
-  SF_TRY(in_range(path, fx_layer_name(FX_D1), "n_out", layer[FX_D1].n_out, 0, 0));
+  SF_TRY(outputs(layer, FX_D1, path, 0, 0));
   return fx_check_tensorf_sizes(&scene->tensorf, layer[FX_C1].n_in, path);
 }
 

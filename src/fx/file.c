@@ -236,7 +236,7 @@ sf_status fx_scene_save(const fx_scene *scene, const char *path)
   sf_tensor tensor[TENSORS];
   fx_scene copy = *scene;
   SF_TRY(fx_scene_check(scene, path));
-  if (scene->backbone == FX_INGP && fx_net_decodes(&scene->net))
+  if (scene->backbone == FX_INGP && !scene->grid.levels)
     return sf_fail(SF_E_UNSUPPORTED, "%s: a decoder behind no field is no scene that a file can hold", path);
   int count = list_levels(tensor, &copy);
   count += list_bulk(tensor + count, &copy);

@@ -8,7 +8,7 @@
  *   C2  spikes  -> 128   AC, spiking
  *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour
  *
- * A decoder is a net of the last three layers: D1 and D2 have no inputs and no outputs (fx_net_decodes), and all of
+ * A decoder is a net of the last three layers: D1 and D2 have no inputs and no outputs, and all of
  * C1's inputs, up to SF_DIR_MAX, are constant ones that come anew with every sample. It has no density: sigma is 0.
  */
 #ifndef SF_FX_FX_H

@@ -1,4 +1,4 @@
-/* Inside src/fx: bytes of a scene's field and occupancy. */
+/* Bytes of a scene's field and occupancy. */
 #ifndef SF_FX_SCENE_H
 #define SF_FX_SCENE_H
 #include "fx/fx.h"

@@ -3,14 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-static void add_number(cJSON *object, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(object, key, value);
-  else
-    cJSON_AddNullToObject(object, key);
-}
-
 cJSON *sf_manifest_report_json(const sf_manifest *manifest)
 {
   sf_manifest_sum sum;
@@ -20,8 +12,8 @@ cJSON *sf_manifest_report_json(const sf_manifest *manifest)
   cJSON_AddNumberToObject(json, "views", manifest->total);
   cJSON_AddNumberToObject(json, "finished", manifest->count);
   cJSON_AddNumberToObject(json, "t_r", manifest->origin.steps);
-  add_number(json, "psnr", sum.psnr);
-  add_number(json, "ssim", sum.ssim);
+  sf_json_add_real(json, "psnr", sum.psnr);
+  sf_json_add_real(json, "ssim", sum.ssim);
   sf_json_add_u64(json, "samples", sum.samples);
   sf_json_add_u64(json, "rays", sum.rays);
   for (int e = 0; e < SF_EVENTS && !is_float; e++) sf_json_add_u64(json, sf_events[e].name, sum.event[e]);
@@ -34,8 +26,8 @@ cJSON *sf_manifest_report_json(const sf_manifest *manifest)
     cJSON_AddNumberToObject(view, "index", v->index);
     cJSON_AddStringToObject(view, "name", v->name);
     cJSON_AddStringToObject(view, "exr", v->exr);
-    add_number(view, "psnr", v->psnr);
-    add_number(view, "ssim", v->ssim);
+    sf_json_add_real(view, "psnr", v->psnr);
+    sf_json_add_real(view, "ssim", v->ssim);
     sf_json_add_u64(view, "samples", v->samples);
     if (!is_float) sf_json_add_u64(view, "energy_fj", sf_manifest_energy_fj(v));
   }

@@ -2,14 +2,6 @@
 #include <inttypes.h>
 #include <math.h>
 
-static void add_number(cJSON *object, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(object, key, value);
-  else
-    cJSON_AddNullToObject(object, key);
-}
-
 static void add_events(cJSON *json, const sf_render_report *r)
 {
   char unexpected[64];
@@ -32,12 +24,12 @@ cJSON *sf_render_report_json(const sf_render_report *r)
   sf_json_add_text(json, "view", r->view);
   cJSON_AddNumberToObject(json, "t_r", r->net->steps);
   cJSON_AddItemToObject(json, "crop", cJSON_CreateIntArray((const int[4]){c->x, c->y, c->width, c->height}, 4));
-  add_number(json, "psnr", r->psnr);
-  add_number(json, "ssim", r->ssim);
+  sf_json_add_real(json, "psnr", r->psnr);
+  sf_json_add_real(json, "ssim", r->ssim);
   sf_json_add_u64(json, "samples", r->golden->counts.samples);
   sf_json_add_u64(json, "rays", r->golden->counts.rays);
   if (r->events) add_events(json, r);
-  add_number(json, "seconds", r->seconds);
+  sf_json_add_real(json, "seconds", r->seconds);
   sf_json_add_text(json, "exr", r->exr);
   if (r->png) sf_json_add_text(json, "png", r->png);
   return json;

@@ -1,5 +1,6 @@
 /* Opening, closing and describing a scene. */
 #include "src/lib/internal.h"
+#include "fx/scene.h"
 #include <locale.h>
 #include <stdlib.h>
 #include <string.h>
@@ -94,8 +95,7 @@ static sf_status describe(const spikefield_scene *scene, spikefield_scene_info *
   describe_net(&fx->net, info);
   info->grid_levels = fx->grid.levels, info->grid_entries = fx->grid.entries;
   info->grid_bytes = fx->backbone == FX_TENSORF ? fx_tensorf_bytes(&fx->tensorf) : fx->grid.entries * FX_GRID_FEATURES;
-  info->occupancy_res = fx->occ_res,
-  info->occupancy_bytes = (int64_t)(fx->log2_bound + 1) * fx->occ_res * fx->occ_res * fx->occ_res / 8;
+  info->occupancy_res = fx->occ_res, info->occupancy_bytes = (int64_t)fx_occupancy_bytes(fx);
   info->max_samples = fx->max_samples, info->step_q24 = fx->step_q24;
   memcpy(info->background_q16, fx->background, sizeof info->background_q16);
   info->to_box_scale = fx->units.to_box_scale, info->direction_lsb = fx->units.dir_scale;

@@ -33,7 +33,7 @@ static sf_status allocate(sf_calibration *c, const sizes *s)
     const size_t rows = samples * (size_t)c->per_sample[l];
     if (!rows) continue;
     ok = (c->target[l] = calloc(rows, s->n_out[l] * sizeof(float))) != NULL;
-    if (ok && l != FX_D2 && l != FX_C3) ok = (c->spikes[l] = calloc(samples * (size_t)c->steps, s->n_out[l])) != NULL;
+    if (ok && fx_layer_fires(l)) ok = (c->spikes[l] = calloc(samples * (size_t)c->steps, s->n_out[l])) != NULL;
   }
   return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "quantiser: no memory for %d calibration samples", c->samples);
 }

@@ -69,12 +69,6 @@ static inline const sf_scales *sf_settled_scales(const sf_model *model, const sf
   return same ? &model->scales : NULL;
 }
 
-/* The largest value of a symmetric signed number of `bits` bits. */
-static inline int sf_symmetric_max(int bits)
-{
-  return (1 << (bits - 1)) - 1;
-}
-
 /* factor = mul / 2^shift with 16 significant bits where a shifter of at most shift_max allows; false when factor is too
  * large. */
 bool sf_quant_scale(double factor, int shift_max, int bias, fx_scale *scale);
@@ -158,12 +152,6 @@ static inline bool sf_row_matters(const fx_layer *layer, int row, const bool *co
   for (int o = 0; o < layer->n_out; o++)
     if (column[o] && layer->w[(size_t)row * SF_LANES + (size_t)o]) return true;
   return false;
-}
-static inline int sf_count_kept(const bool *kept, int n)
-{
-  int sum = 0;
-  for (int i = 0; i < n; i++) sum += kept[i];
-  return sum;
 }
 
 /* The function that is linear between n_from points low..high of from[rows][n_from][n], as the nearest one (least

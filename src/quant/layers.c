@@ -24,11 +24,6 @@ typedef struct input_format {
   double feature, constant, h;
 } input_format;
 
-static int frac_of(int layer)
-{
-  return layer == FX_C2 ? SF_AC_FRAC : 0;
-}
-
 static double theta_of(const sf_model *model, int layer)
 {
   for (int s = 0; s < FX_SPIKING; s++)
@@ -41,7 +36,7 @@ static double theta_of(const sf_model *model, int layer)
 static double smallest_unit(const sf_model *model, int layer)
 {
   const double theta = theta_of(model, layer);
-  return theta > 0 ? ldexp(theta, frac_of(layer)) / MEMBRANE_LIMIT : 1e-12;
+  return theta > 0 ? ldexp(theta, fx_layer_frac(layer)) / MEMBRANE_LIMIT : 1e-12;
 }
 
 static int rows_of(const sf_calibration *c, int layer)
@@ -90,7 +85,7 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
 
 static sf_status set_theta(const context *c, int layer, double unit)
 {
-  const double exact = ldexp(theta_of(c->model, layer) / unit, frac_of(layer)), rounded = nearbyint(exact);
+  const double exact = ldexp(theta_of(c->model, layer) / unit, fx_layer_frac(layer)), rounded = nearbyint(exact);
   if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d",
                    c->name, tensor_of(c, layer), theta_of(c->model, layer), exact, MEMBRANE_LIMIT);

@@ -78,6 +78,12 @@ typedef struct sf_trim {
   int32_t steps, trans_stop;   /* as in fx_net, fx_scene */
   bool cells[SF_CELL_CLASSES]; /* occupancy cells by class (sf_cell_class): all of a class stay or go */
 } sf_trim;
+static inline int sf_count_kept(const bool *kept, int n)
+{
+  int sum = 0;
+  for (int i = 0; i < n; i++) sum += kept[i];
+  return sum;
+}
 
 /* What the samples of a set of rays used. Counts of samples x steps but where it says otherwise. */
 typedef struct sf_trim_use {

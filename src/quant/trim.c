@@ -7,8 +7,6 @@
 
 enum { ROWS_MAX = SF_DIR_MAX > SF_LANES ? SF_DIR_MAX : SF_LANES };
 
-static const int feeder[SF_LAYERS] = {[FX_D2] = FX_D1, [FX_C2] = FX_C1, [FX_C3] = FX_C2};
-
 static const sf_field_trimmer *trimmer_of(const fx_scene *scene)
 {
   return scene->backbone == FX_TENSORF ? &sf_planes_trimmer : &sf_grid_trimmer;
@@ -60,7 +58,7 @@ void sf_trim_use_net(sf_trim_use *use, const fx_net *net, const int16_t *f, cons
   use_neurons(use, net, trace);
   for (int i = 0; i < net->layer[FX_D1].n_in; i++)
     if (f[i]) add(&use->feature[i], 1);
-  for (int i = 0; fx_net_decodes(net) && i < net->layer[FX_C1].n_in; i++) {
+  for (int i = 0; fx_net_constants_per_sample(net) && i < net->layer[FX_C1].n_in; i++) {
 #pragma omp atomic
     use->input[i] += f[i];
   }
@@ -130,7 +128,7 @@ static void keep_rows(const fx_scene *scene, const sf_trim *trim, int layer, boo
     return;
   }
   for (int i = 0; i < n_in; i++)
-    row[i] = layer != FX_C1  ? trim->neuron[feeder[layer]][i]
+    row[i] = layer != FX_C1  ? trim->neuron[fx_layer_table[layer].spikes_of][i]
              : i < constants ? i < trim->directions
                              : trim->neuron[FX_D2][i - constants + 1];
 }
@@ -151,7 +149,7 @@ static void pack_weights(const fx_layer *from, fx_layer *to, const bool *row, co
 static double mean_input(const sf_trim_use *use, int layer, int i)
 {
   return layer == FX_C1 ? (double)use->input[i] / (double)use->samples
-                        : (double)use->fired[feeder[layer]][i] / (double)use->steps;
+                        : (double)use->fired[fx_layer_table[layer].spikes_of][i] / (double)use->steps;
 }
 
 static int largest_weight(const fx_layer *layer)

@@ -1,23 +1,6 @@
 /* Averages over scenes, and their spread over seeds. */
-#include "report/report.h"
+#include "report/internal.h"
 #include <math.h>
-
-typedef struct mean {
-  double sum;
-  int count;
-} mean;
-
-static void add(mean *m, double value)
-{
-  if (isnan(value)) return;
-  m->sum += value;
-  m->count++;
-}
-
-static double mean_of(const mean *m)
-{
-  return m->count ? m->sum / m->count : NAN;
-}
 
 bool sf_reproduction_chosen(const sf_reproduction *r, int s, int scenes)
 {
@@ -26,33 +9,33 @@ bool sf_reproduction_chosen(const sf_reproduction *r, int s, int scenes)
 
 double sf_reproduction_mean(const sf_reproduction *r, int scenes, int run, int metric, int *count)
 {
-  mean m = {0};
+  sf_mean m = {0};
   for (int s = 0; s < r->count; s++)
-    if (sf_reproduction_chosen(r, s, scenes)) add(&m, r->scene[s].run[run].value[metric]);
+    if (sf_reproduction_chosen(r, s, scenes)) sf_mean_add(&m, r->scene[s].run[run].value[metric]);
   if (count) *count = m.count;
-  return mean_of(&m);
+  return sf_mean_of(&m);
 }
 
 /* Of one scene's seeds; NaN: fewer than two. */
 static double variance(const sf_report_scene *scene, int run, int metric)
 {
-  mean m = {0}, squares = {0};
-  for (int k = 0; k < scene->seeds; k++) add(&m, scene->of[k].run[run].value[metric]);
+  sf_mean m = {0}, squares = {0};
+  for (int k = 0; k < scene->seeds; k++) sf_mean_add(&m, scene->of[k].run[run].value[metric]);
   for (int k = 0; k < scene->seeds; k++) {
-    const double off = scene->of[k].run[run].value[metric] - mean_of(&m);
-    add(&squares, off * off);
+    const double off = scene->of[k].run[run].value[metric] - sf_mean_of(&m);
+    sf_mean_add(&squares, off * off);
   }
   return squares.count > 1 ? squares.sum / (squares.count - 1) : NAN;
 }
 
 double sf_reproduction_spread(const sf_reproduction *r, int scenes, int run, int metric)
 {
-  mean m = {0};
+  sf_mean m = {0};
   int count;
   for (int s = 0; s < r->count; s++)
-    if (sf_reproduction_chosen(r, s, scenes)) add(&m, variance(&r->scene[s], run, metric));
+    if (sf_reproduction_chosen(r, s, scenes)) sf_mean_add(&m, variance(&r->scene[s], run, metric));
   sf_reproduction_mean(r, scenes, run, metric, &count);
-  return sqrt(mean_of(&m) / count);
+  return sqrt(sf_mean_of(&m) / count);
 }
 
 double sf_reproduction_saving(const sf_reproduction *r, int scenes, int run, int other)
@@ -71,18 +54,18 @@ double sf_reproduction_saving(const sf_reproduction *r, int scenes, int run, int
 
 double sf_reproduction_prefix(const sf_reproduction *r, int scenes, int run, int step)
 {
-  mean m = {0};
+  sf_mean m = {0};
   for (int s = 0; s < r->count; s++) {
     const sf_run *one = &r->scene[s].run[run];
-    if (sf_reproduction_chosen(r, s, scenes) && step < one->prefixes) add(&m, one->prefix_psnr[step]);
+    if (sf_reproduction_chosen(r, s, scenes) && step < one->prefixes) sf_mean_add(&m, one->prefix_psnr[step]);
   }
-  return mean_of(&m);
+  return sf_mean_of(&m);
 }
 
 double sf_reproduction_prefix_energy(const sf_reproduction *r, int scenes, int run, int step)
 {
-  mean m = {0};
+  sf_mean m = {0};
   for (int s = 0; s < r->count; s++)
-    if (sf_reproduction_chosen(r, s, scenes)) add(&m, r->scene[s].run[run].prefix_energy[step]);
-  return mean_of(&m);
+    if (sf_reproduction_chosen(r, s, scenes)) sf_mean_add(&m, r->scene[s].run[run].prefix_energy[step]);
+  return sf_mean_of(&m);
 }

@@ -4,6 +4,25 @@
 #include "report/grid.h"
 #include "report/plot.h"
 #include "report/report.h"
+#include <math.h>
+
+/* Of what is no NaN; NaN of nothing. */
+typedef struct sf_mean {
+  double sum;
+  int count;
+} sf_mean;
+static inline void sf_mean_add(sf_mean *m, double value)
+{
+  if (!isnan(value)) m->sum += value, m->count++;
+}
+static inline double sf_mean_of(const sf_mean *m)
+{
+  return m->count ? m->sum / m->count : NAN;
+}
+static inline double sf_squared_error(double psnr)
+{
+  return pow(10, -psnr / 10);
+}
 
 /* Profile scenes: twin and spiking runs alone, on scenes of any kind. */
 bool sf_report_is_pairs(const sf_reproduction *r);

@@ -6,49 +6,29 @@
 
 /* ---- beside the twin ---- */
 
-static double squared_error(double psnr)
-{
-  return pow(10, -psnr / 10);
-}
-
 static void beside_twin(sf_run run[SF_RUNS])
 {
   const double *twin = run[SF_RUN_ANN].value;
   for (int i = SF_RUN_ANN + 1; i < SF_RUNS; i++) {
     double *v = run[i].value;
     v[SF_METRIC_SAVING] = 100 * (1 - v[SF_METRIC_ENERGY] / twin[SF_METRIC_ENERGY]);
-    v[SF_METRIC_EXCESS] = squared_error(v[SF_METRIC_PSNR]) - squared_error(twin[SF_METRIC_PSNR]);
+    v[SF_METRIC_EXCESS] = sf_squared_error(v[SF_METRIC_PSNR]) - sf_squared_error(twin[SF_METRIC_PSNR]);
   }
 }
 
 /* ---- means over the seeds ---- */
 
-typedef struct mean {
-  double sum;
-  int count;
-} mean;
-
-static void add(mean *m, double value)
-{
-  if (!isnan(value)) m->sum += value, m->count++;
-}
-
-static double mean_of(const mean *m)
-{
-  return m->count ? m->sum / m->count : NAN;
-}
-
 static void pool_prefixes(const sf_report_scene *scene, int id, sf_run *run)
 {
   for (int t = 0; t < SF_T_MAX; t++) {
-    mean psnr = {0}, energy = {0};
+    sf_mean psnr = {0}, energy = {0};
     for (int k = 0; k < scene->seeds; k++) {
       const sf_run *one = &scene->of[k].run[id];
-      if (t < one->prefixes) add(&psnr, one->prefix_psnr[t]);
-      add(&energy, one->prefix_energy[t]);
+      if (t < one->prefixes) sf_mean_add(&psnr, one->prefix_psnr[t]);
+      sf_mean_add(&energy, one->prefix_energy[t]);
     }
-    if (psnr.count) run->prefix_psnr[t] = mean_of(&psnr), run->prefixes = t + 1;
-    run->prefix_energy[t] = mean_of(&energy);
+    if (psnr.count) run->prefix_psnr[t] = sf_mean_of(&psnr), run->prefixes = t + 1;
+    run->prefix_energy[t] = sf_mean_of(&energy);
   }
 }
 
@@ -60,14 +40,14 @@ static void pool_run(sf_report_scene *scene, int id)
   sf_run *run = &scene->run[id];
   *run = scene->of[first].run[id];
   if (scene->seeds == 1) return;
-  mean t_star = {0};
+  sf_mean t_star = {0};
   for (int m = 0; m < SF_METRICS; m++) {
-    mean value = {0};
-    for (int k = 0; k < scene->seeds; k++) add(&value, scene->of[k].run[id].value[m]);
-    run->value[m] = mean_of(&value);
+    sf_mean value = {0};
+    for (int k = 0; k < scene->seeds; k++) sf_mean_add(&value, scene->of[k].run[id].value[m]);
+    run->value[m] = sf_mean_of(&value);
   }
-  for (int k = 0; k < scene->seeds; k++) add(&t_star, scene->of[k].run[id].t_star);
-  run->t_star = mean_of(&t_star);
+  for (int k = 0; k < scene->seeds; k++) sf_mean_add(&t_star, scene->of[k].run[id].t_star);
+  run->t_star = sf_mean_of(&t_star);
   pool_prefixes(scene, id, run);
 }
 

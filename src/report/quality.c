@@ -77,11 +77,6 @@ static void add_state(sf_quality_scene *scene, const cJSON *search)
   snprintf(scene->states + used, sizeof scene->states - used, "%s%s", used ? ", " : "", state);
 }
 
-static double squared_error(double psnr)
-{
-  return pow(10, -psnr / 10);
-}
-
 /* One seed's numbers; NaN where a run is missing. */
 static sf_status load_seed(const char *dir, const char *seed, const cells *twin, sf_quality_scene *scene,
                            double value[SF_QUALITIES])
@@ -98,7 +93,7 @@ static sf_status load_seed(const char *dir, const char *seed, const cells *twin,
     const cJSON *search = sf_json_get(run[0], "search");
     value[SF_QUALITY_PSNR] = sf_json_number(run[0], "psnr");
     value[SF_QUALITY_TWIN] = sf_json_number(run[1], "psnr");
-    value[SF_QUALITY_EXCESS] = squared_error(value[SF_QUALITY_PSNR]) - squared_error(value[SF_QUALITY_TWIN]);
+    value[SF_QUALITY_EXCESS] = sf_squared_error(value[SF_QUALITY_PSNR]) - sf_squared_error(value[SF_QUALITY_TWIN]);
     value[SF_QUALITY_T_STAR] = sf_json_number(run[0], "t_star");
     value[SF_QUALITY_STEPS] = sf_json_number(run[0], "t_r");
     value[SF_QUALITY_WORTH] = sf_json_number(search, "worth");

@@ -20,14 +20,6 @@ static const char *const metric_key[SF_METRICS] = {"psnr",
                                                    "worth_error",
                                                    "price"};
 
-static void add_number(cJSON *object, const char *key, double value)
-{
-  if (isfinite(value))
-    cJSON_AddNumberToObject(object, key, value);
-  else
-    cJSON_AddNullToObject(object, key);
-}
-
 static void add_text(cJSON *object, const char *key, const char *text)
 {
   if (text)
@@ -48,7 +40,7 @@ static cJSON *paper_json(int group, int run)
   cJSON *json = cJSON_CreateObject();
   for (int m = 0; m < SF_METRICS; m++)
     if (m <= SF_METRIC_ENERGY || m == SF_METRIC_SAVING || m == SF_METRIC_EXCESS)
-      add_number(json, metric_key[m], sf_paper_value(group, run, m));
+      sf_json_add_real(json, metric_key[m], sf_paper_value(group, run, m));
   return json;
 }
 
@@ -57,14 +49,15 @@ static cJSON *numbers_json(const sf_reproduction *r, int scenes, int run)
 {
   cJSON *json = cJSON_CreateObject(), *spread = NULL;
   for (int m = 0; m < SF_METRICS; m++)
-    if (m != SF_METRIC_SAVING) add_number(json, metric_key[m], sf_reproduction_mean(r, scenes, run, m, NULL));
-  add_number(json, "saving_percent", run == SF_RUN_ANN ? NAN : sf_reproduction_saving(r, scenes, run, SF_RUN_ANN));
-  add_number(json, "saving_of_twin_percent", sf_reproduction_saving(r, scenes, run, SF_SAVING_TWIN));
+    if (m != SF_METRIC_SAVING) sf_json_add_real(json, metric_key[m], sf_reproduction_mean(r, scenes, run, m, NULL));
+  sf_json_add_real(json, "saving_percent",
+                   run == SF_RUN_ANN ? NAN : sf_reproduction_saving(r, scenes, run, SF_RUN_ANN));
+  sf_json_add_real(json, "saving_of_twin_percent", sf_reproduction_saving(r, scenes, run, SF_SAVING_TWIN));
   for (int m = 0; m < SF_METRICS; m++) {
     const double value = sf_reproduction_spread(r, scenes, run, m);
     if (isnan(value)) continue;
     if (!spread) spread = cJSON_AddObjectToObject(json, "spread");
-    add_number(spread, metric_key[m], value);
+    sf_json_add_real(spread, metric_key[m], value);
   }
   return json;
 }
@@ -76,9 +69,9 @@ static cJSON *seeds_json(const sf_report_scene *scene, int id)
     const sf_run *run = &scene->of[k].run[id];
     if (!run->summary) continue;
     cJSON *json = cJSON_CreateObject();
-    add_number(json, "seed", sf_json_number(run->summary, "seed"));
-    for (int m = 0; m < SF_METRICS; m++) add_number(json, metric_key[m], run->value[m]);
-    add_number(json, "t_star", run->t_star);
+    sf_json_add_real(json, "seed", sf_json_number(run->summary, "seed"));
+    for (int m = 0; m < SF_METRICS; m++) sf_json_add_real(json, metric_key[m], run->value[m]);
+    sf_json_add_real(json, "t_star", run->t_star);
     cJSON_AddItemToArray(list, json);
   }
   return list;
@@ -90,9 +83,9 @@ static cJSON *run_json(const sf_reproduction *r, int scene, int id)
   cJSON *json = numbers_json(r, scene, id);
   add_text(json, "status", run->status ? run->status : "not run");
   cJSON_AddItemToObject(json, "seeds", seeds_json(&r->scene[scene], id));
-  add_number(json, "t_star", run->t_star);
-  add_number(json, "cosim_samples", run->cosim_samples);
-  add_number(json, "cosim_differences", run->cosim_differences);
+  sf_json_add_real(json, "t_star", run->t_star);
+  sf_json_add_real(json, "cosim_samples", run->cosim_samples);
+  sf_json_add_real(json, "cosim_differences", run->cosim_differences);
   cJSON_AddNumberToObject(json, "audited_frames", run->audits);
   cJSON_AddNumberToObject(json, "frame_width", run->width);
   cJSON_AddNumberToObject(json, "frame_height", run->height);
@@ -138,9 +131,9 @@ static cJSON *order_json(const sf_order *o)
   cJSON_AddStringToObject(json, "first", sf_run_kinds[o->a].name);
   cJSON_AddStringToObject(json, "second", sf_run_kinds[o->b].name);
   cJSON_AddStringToObject(json, "metric", metric_key[o->metric]);
-  add_number(json, "paper_difference", o->paper);
-  add_number(json, "difference", o->ours);
-  add_number(json, "standard_error", o->error);
+  sf_json_add_real(json, "paper_difference", o->paper);
+  sf_json_add_real(json, "difference", o->ours);
+  sf_json_add_real(json, "standard_error", o->error);
   cJSON_AddNumberToObject(json, "scenes", o->scenes);
   cJSON_AddNumberToObject(json, "pairs", o->pairs);
   cJSON_AddStringToObject(json, "same_order", sf_order_names[o->verdict]);

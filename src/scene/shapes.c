@@ -1,11 +1,7 @@
 /* Exact ray intersections, in each shape's own axes. */
 #include "src/scene/stage.h"
+#include "src/scene/vec.h"
 #include <math.h>
-
-static double dot(const double a[3], const double b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3], const double size[3], double yaw,
                     double tilt)
@@ -20,7 +16,7 @@ void sf_shape_place(sf_shape *shape, sf_shape_kind kind, const double centre[3],
     shape->bound = size[0];
     break;
   case SF_BOX:
-    shape->bound = sqrt(dot(size, size));
+    shape->bound = sqrt(vec_dot(size, size));
     break;
   case SF_CYLINDER:
     shape->bound = hypot(size[0], size[1]);
@@ -35,7 +31,7 @@ bool sf_shape_near(const sf_shape *shape, const sf_stage_ray *ray, double spread
 {
   double to[3];
   for (int i = 0; i < 3; i++) to[i] = shape->centre[i] - ray->origin[i];
-  double along = dot(to, ray->direction), away2 = dot(to, to) - along * along;
+  double along = vec_dot(to, ray->direction), away2 = vec_dot(to, to) - along * along;
   double reach = shape->bound + spread * (fmax(along, 0) + shape->bound);
   return along > -shape->bound && away2 <= reach * reach;
 }
@@ -60,7 +56,7 @@ static double point(const local_ray *ray, double t, double p[3])
 
 static bool sphere_span(const local_ray *ray, double radius, double *enter, double *leave)
 {
-  double b = dot(ray->o, ray->d), c = dot(ray->o, ray->o) - radius * radius, disc = b * b - c;
+  double b = vec_dot(ray->o, ray->d), c = vec_dot(ray->o, ray->o) - radius * radius, disc = b * b - c;
   if (disc <= 0) return false;
   double root = sqrt(disc);
   *enter = -b - root, *leave = -b + root;
@@ -221,7 +217,7 @@ static bool hit_torus(const local_ray *ray, const double size[3], double *t, dou
   double middle = (enter + leave) / 2;
   point(ray, middle, p);
   const double *d = ray->d;
-  double b = dot(p, d), k = dot(p, p) + r2 - size[1] * size[1];
+  double b = vec_dot(p, d), k = vec_dot(p, p) + r2 - size[1] * size[1];
   double c[5] = {k * k - 4 * r2 * (p[0] * p[0] + p[1] * p[1]), 4 * b * k - 8 * r2 * (p[0] * d[0] + p[1] * d[1]),
                  4 * b * b + 2 * k - 4 * r2 * (d[0] * d[0] + d[1] * d[1]), 4 * b, 1};
   double root[4];
@@ -242,8 +238,8 @@ static void to_local(const sf_shape *shape, const sf_stage_ray *ray, local_ray *
   double from[3];
   for (int i = 0; i < 3; i++) from[i] = ray->origin[i] - shape->centre[i];
   for (int i = 0; i < 3; i++) {
-    local->o[i] = dot(shape->axes + 3 * i, from);
-    local->d[i] = dot(shape->axes + 3 * i, ray->direction);
+    local->o[i] = vec_dot(shape->axes + 3 * i, from);
+    local->d[i] = vec_dot(shape->axes + 3 * i, ray->direction);
   }
 }
 

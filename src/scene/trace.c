@@ -1,5 +1,6 @@
 /* Shading and exact fog along one ray. */
 #include "src/scene/stage.h"
+#include "src/scene/vec.h"
 #include <math.h>
 #include <stddef.h>
 
@@ -9,11 +10,6 @@ static const double light[3] = {0.48, -0.36, 0.80}; /* towards the key light, ex
 #define GROUND 0.20
 #define SURFACE_GAP 1e-6 /* a shadow ray starts off its own surface */
 
-static double dot(const double a[3], const double b[3])
-{
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
 {
   static const double white[3] = {0.94, 0.93, 0.90};
@@ -21,7 +17,7 @@ static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
   const double *p = hit->local;
   switch (m->pattern) {
   case SF_CHECKER:
-    if (dot(hit->normal, shape->axes + 6) < 0.5) return m->colour[2];
+    if (vec_dot(hit->normal, shape->axes + 6) < 0.5) return m->colour[2];
     return m->colour[((long)floor(p[0] / m->period) + (long)floor(p[1] / m->period)) & 1];
   case SF_STRIPES:
     return m->colour[(long)floor(p[0] / m->period) & 1];
@@ -87,12 +83,12 @@ static void shade(const sf_stage *stage, const sf_shape *shape, const sf_stage_r
     half[i] = light[i] - ray->direction[i];
     length += half[i] * half[i];
   }
-  double facing = dot(n, light);
+  double facing = vec_dot(n, light);
   double key = facing > 0 ? light_arriving(stage, at, n) : 0;
   double diffuse = GROUND + (SKY - GROUND) * (0.5 + 0.5 * n[2]) + KEY * key * fmax(facing, 0);
   double shine = 0;
   if (key > 0 && shape->material->shine > 0) {
-    shine = fmax(dot(n, half) / sqrt(length), 0);
+    shine = fmax(vec_dot(n, half) / sqrt(length), 0);
     for (int i = 0; i < shape->material->sharpness; i++) shine *= shine;
     shine *= shape->material->shine * key;
   }

@@ -119,16 +119,10 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
 }
 
-static void put_number(cJSON *meta, const char *key, double value)
-{
-  char text[40];
-  snprintf(text, sizeof text, "%.17g", value);
-  cJSON_AddStringToObject(meta, key, text);
-}
-
 static void put_numbers(cJSON *meta, const sf_number *f, int count)
 {
-  for (int i = 0; i < count; i++) put_number(meta, f[i].key, f[i].integer ? *f[i].integer : (double)*f[i].number);
+  for (int i = 0; i < count; i++)
+    sf_tensors_put_number(meta, f[i].key, f[i].integer ? *f[i].integer : (double)*f[i].number);
 }
 
 void sf_model_describe(const sf_model *m, cJSON *meta)
@@ -139,17 +133,17 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   cJSON_AddStringToObject(meta, "version", "1");
   config_numbers(&c, number_of);
   put_numbers(meta, number_of, CONFIG_NUMBERS);
-  put_number(meta, "bound", c.bound);
-  put_number(meta, "dt_gamma", c.dt_gamma);
-  put_number(meta, "t_star", m->t_star);
-  put_number(meta, "t_r", m->t_r);
-  put_number(meta, "weight_bits", m->scales.weight_bits);
+  sf_tensors_put_number(meta, "bound", c.bound);
+  sf_tensors_put_number(meta, "dt_gamma", c.dt_gamma);
+  sf_tensors_put_number(meta, "t_star", m->t_star);
+  sf_tensors_put_number(meta, "t_r", m->t_r);
+  sf_tensors_put_number(meta, "weight_bits", m->scales.weight_bits);
   if (m->scales.weight_bits) {
-    put_number(meta, "h_shift", SF_H_SHIFT);
-    put_number(meta, "grid_bits", m->scales.grid_bits);
-    put_number(meta, "leak_bits", m->scales.leak_bits);
+    sf_tensors_put_number(meta, "h_shift", SF_H_SHIFT);
+    sf_tensors_put_number(meta, "grid_bits", m->scales.grid_bits);
+    sf_tensors_put_number(meta, "leak_bits", m->scales.leak_bits);
   }
-  if (c.backbone) put_number(meta, "backbone", c.backbone);
+  if (c.backbone) sf_tensors_put_number(meta, "backbone", c.backbone);
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
   sf_number space[SPACE_NUMBERS];
   space_numbers(&c, space);

@@ -22,11 +22,6 @@ bool sf_scales_narrow_field(const sf_scales *s)
   return s->weight_bits && s->grid_bits < SF_GRID_BITS;
 }
 
-static double limit_of(int bits)
-{
-  return (1 << (bits - 1)) - 1;
-}
-
 static float rounded(float value, double step, double limit)
 {
   return (float)(step * fmax(-limit, fmin(limit, nearbyint(value / step))));
@@ -37,7 +32,7 @@ static void round_layer(const sf_model *m, int layer, float *value)
 {
   const sf_scales *s = &m->scales;
   const sf_param *p = &m->param[sf_layer_weights[layer]];
-  const double limit = limit_of(s->weight_bits);
+  const double limit = sf_symmetric_max(s->weight_bits);
   for (int64_t in = 0; in < p->shape[1]; in++) {
     const double step = s->lsb.current[layer] / sf_scales_input(m, layer, (int)in);
     for (int64_t out = 0; out < p->shape[0]; out++) {
@@ -57,7 +52,8 @@ static void round_basis(const sf_model *m, float *value)
   const size_t columns = (size_t)p->shape[1];
   for (size_t i = 0; i < p->size; i++) {
     const double lsb = ldexp(m->scales.lsb.product[1][i % columns], -SF_PRODUCT_SHIFT);
-    value[p->offset + i] = rounded(m->value[p->offset + i], m->scales.lsb.basis / lsb, limit_of(m->scales.weight_bits));
+    value[p->offset + i] =
+        rounded(m->value[p->offset + i], m->scales.lsb.basis / lsb, sf_symmetric_max(m->scales.weight_bits));
   }
 }
 
@@ -79,7 +75,7 @@ static void round_levels(const sf_model *m, float *value)
   for (int l = 0; l < m->config.levels; l++) {
     const size_t first = table + 2 * m->level[l].offset;
     for (size_t i = first; i < first + 2 * (size_t)m->level[l].entries; i++)
-      value[i] = rounded(m->value[i], m->scales.lsb.entry[l], limit_of(m->scales.grid_bits));
+      value[i] = rounded(m->value[i], m->scales.lsb.entry[l], sf_symmetric_max(m->scales.grid_bits));
   }
 }
 
@@ -98,7 +94,7 @@ static void round_factor(const sf_model *m, int id, int first, float *value)
   for (int64_t i = 0; i < points; i++)
     for (int64_t c = 0; c < n; c++) {
       const size_t at = p->offset + (size_t)(i * n + c);
-      value[at] = rounded(m->value[at], step[c], limit_of(m->scales.grid_bits));
+      value[at] = rounded(m->value[at], step[c], sf_symmetric_max(m->scales.grid_bits));
     }
 }
 

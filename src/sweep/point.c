@@ -305,12 +305,7 @@ cJSON *sf_point_json(const sf_point *point)
   cJSON_AddStringToObject(json, "backbone", sf_field_of(&(sf_config){.backbone = point->backbone})->name);
   for (int i = 0; i < SF_AXES; i++)
     if (sf_axes[i].title[point->backbone]) cJSON_AddNumberToObject(json, sf_axes[i].name, point->axis[i]);
-  for (int i = 0; i < SF_POINT_FIGURES; i++) {
-    if (isfinite(point->figure[i]))
-      cJSON_AddNumberToObject(json, sf_point_figures[i].name, point->figure[i]);
-    else
-      cJSON_AddNullToObject(json, sf_point_figures[i].name);
-  }
+  for (int i = 0; i < SF_POINT_FIGURES; i++) sf_json_add_real(json, sf_point_figures[i].name, point->figure[i]);
   return json;
 }
 

@@ -277,8 +277,9 @@ void sf_sweep_print(FILE *out, const sf_sweep *sweep)
       fprintf(out, "- %s: %s, %d\n", sf_axes[i].letter, sf_axes[i].title[backbone], sweep->centre->axis[i]);
   fprintf(out, "\npicture, float: PSNR against the picture and against the float field at the same steps.\n");
   fprintf(out, "lost: what float has more against the picture; error: the largest in a channel.\n");
-  fprintf(out, "Energy (paper ledger) and bits moved (weights, %s, states) are per frame.\n",
-          backbone == SF_TENSORF ? "entries of planes and lines" : "grid entries");
+  const char *entries = sf_axes[SF_AXIS_GRID].title[backbone]; /* "grid entries, bits" */
+  fprintf(out, "Energy (paper ledger) and bits moved (weights, %.*s, states) are per frame.\n",
+          (int)strcspn(entries, ","), entries);
   fprintf(out, "RTL cells and cycles per width: not available.\n");
   for (int axis = 0; axis < SF_AXES; axis++) print_axis(out, sweep, axis, list);
   print_front(out, sweep, list);

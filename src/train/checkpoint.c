@@ -9,13 +9,6 @@
 
 enum { TENSORS_MAX = 4 * SF_P_COUNT + 3 };
 
-static void put(cJSON *meta, const char *key, double value)
-{
-  char text[40];
-  snprintf(text, sizeof text, "%.17g", value);
-  cJSON_AddStringToObject(meta, key, text);
-}
-
 /* FNV-1a. */
 static uint64_t mix(uint64_t hash, const void *data, size_t bytes)
 {
@@ -152,9 +145,9 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   cJSON *meta = cJSON_CreateObject();
   if (!meta) return sf_fail(SF_E_MEMORY, "%s: no memory for metadata", path);
   sf_model_describe(&t->model, meta);
-  put(meta, "beta", t->options.beta);
-  if (t->options.charge > 0) put(meta, "charge", t->options.charge);
-  put(meta, "seed", (double)t->options.seed);
+  sf_tensors_put_number(meta, "beta", t->options.beta);
+  if (t->options.charge > 0) sf_tensors_put_number(meta, "charge", t->options.charge);
+  sf_tensors_put_number(meta, "seed", (double)t->options.seed);
   if (with_optimiser) {
     const cJSON *item;
     char views[17];
@@ -167,10 +160,10 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
     state_field field[FIELDS_MAX];
     const int fields = state_table((sf_trainer *)t, field);
     for (int i = 0; i < fields; i++)
-      put(meta, field[i].key,
-          field[i].number    ? *field[i].number
-          : field[i].integer ? (double)*field[i].integer
-                             : *field[i].small);
+      sf_tensors_put_number(meta, field[i].key,
+                            field[i].number    ? *field[i].number
+                            : field[i].integer ? (double)*field[i].integer
+                                               : *field[i].small);
   }
   sf_status status = sf_tensors_save(list, n, meta, path);
   cJSON_Delete(meta);

@@ -162,11 +162,13 @@ static const sf_option *const *columns(void)
 {
   static train_arguments of[SF_FIELDS];
   static sf_option list[SF_FIELDS][TRAIN_OPTIONS_MAX];
-  static const sf_option *const column[SF_FIELDS] = {list[SF_INGP], list[SF_TENSORF]};
+  static const sf_option *column[SF_FIELDS];
   const sf_dataset none = {.layout = SF_LAYOUT_BLENDER, .scale = 1, .bound = 1};
-  train_option_defaults(&of[SF_INGP], NULL);
-  train_option_defaults(&of[SF_TENSORF], &none);
-  for (int i = 0; i < SF_FIELDS; i++) fill(&of[i], list[i]);
+  for (int i = 0; i < SF_FIELDS; i++) {
+    train_option_defaults(&of[i], i == SF_TENSORF ? &none : NULL);
+    fill(&of[i], list[i]);
+    column[i] = list[i];
+  }
   return column;
 }
 
