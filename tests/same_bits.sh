@@ -29,13 +29,13 @@ chain() {
   shift 2
   run "$name.train" sf_train "$data" -o "$name.safetensors" "${small[@]}" "$@" --psnr-prefixes 1 --json
   run "$name.export" sf_export "$name.safetensors" -o "$name.snn" --json
-  run "$name.float" sim_render "$name.snn" "$data" --backend float --model "$name.safetensors" -o "$name.float.exr" --json
-  run "$name.fixed" sim_render "$name.snn" "$data" --backend fixed -o "$name.fixed.exr" --png "$name.png" --json
-  run "$name.rtl" sim_render "$name.snn" "$data" --backend rtl --crop 18,18,6,6 -o "$name.rtl.exr" --json
+  run "$name.float" sim_render "$name.snn" "$data" --backend float --model "$name.safetensors" -o "$name.float.exr" --quiet --json
+  run "$name.fixed" sim_render "$name.snn" "$data" --backend fixed -o "$name.fixed.exr" --png "$name.png" --quiet --json
+  run "$name.rtl" sim_render "$name.snn" "$data" --backend rtl --crop 18,18,6,6 -o "$name.rtl.exr" --quiet --json
   run "$name.cosim" sf_cosim "$name.snn" "$data" --rays 12 --seed 3 --stalls 20 --json
   run "$name.cycles" sf_cycles "$name.snn" "$data" --downscale 2 --json
   run "$name.audit" energy_audit "$name.snn" "$data" --rays 60 --csv "$name.csv" --html "$name.html" --model "$name.safetensors" --json
-  run "$name.budget" error_budget "$name.safetensors" "$name.snn" "$data" --rays 40 --samples 1000 --json
+  run "$name.budget" error_budget "$name.safetensors" "$name.snn" "$data" --rays 40 --samples 1000 --quiet --json
   run "$name.point" sf_point "$name.safetensors" "$data" --every 8 --weight-bits 6 --json
   run "$name.nir" sf_export "$name.safetensors" --nir "$name.nir" --json
   run "$name.kit" sf_export "$name.snn" --vectors "$name.kit" --data "$data" --samples 6 --rays 50
@@ -61,7 +61,7 @@ run tuned sf_train textured -o tuned.safetensors --stage2 40 --samples 2048 --th
 run fit sf_export snn.safetensors -o fit.snn --fit --data textured --fit-rays 512 --quiet --json
 run golden sim_render snn.snn textured --all --crop 16,16,8,8 -o golden --quiet --json
 # Without what the clock decides, where the programs lie, and copies of the RTL's text.
-sed -i "s|$bin/||g" ./*.txt ./*.html
+sed -i "s|$bin/||g; s|${bin%/bin}/||g" ./*.txt ./*.html
 rm -rf ./*.kit/rtl ./*.kit/manifest.json
 sed -E -i 's/"([a-z_]*seconds|[a-z_]*per_second)":[[:space:]]*[0-9.e+-]+,?//g; s/ in [0-9.]+ m?s\>//; s/[0-9.]+ [kM]?[a-z]+\/s//g' ./*.txt ./*.jsonl ./*.html
 
