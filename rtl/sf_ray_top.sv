@@ -213,8 +213,8 @@ module sf_ray_top #(
   wire feature_valid, feature_ready, feature_user, feature_last;
   wire [63:0] feature_data;
   wire line_valid, line_ready, line_empty, line_comes;
-  wire [27:0] line;
-  wire [127:0] line_entries;
+  wire [27:0] line0, line1;
+  wire [127:0] line_entries0, line_entries1;
   wire wave_valid, wave_user, wave_last;
   wire [63:0] wave_data;
   wire item_valid, item_first, item_last, item_empty, item_decoded, planes_idle;
@@ -247,9 +247,11 @@ module sf_ray_top #(
       .line_valid_i   (line_valid),
       .line_ready_o   (line_ready),
       .line_empty_i   (line_empty),
-      .line_i         (line),
+      .line0_i        (line0),
+      .line1_i        (line1),
       .line_valid_o   (line_comes),
-      .line_o         (line_entries),
+      .line0_o        (line_entries0),
+      .line1_o        (line_entries1),
       .line_room_i    (feature_ready && !wave_valid),
       .lookups_o      (lookups),
       .misses_o       (misses),
@@ -291,9 +293,11 @@ module sf_ray_top #(
           .line_valid_o   (line_valid),
           .line_ready_i   (line_ready),
           .line_empty_o   (line_empty),
-          .line_o         (line),
+          .line0_o        (line0),
+          .line1_o        (line1),
           .entries_valid_i(line_comes),
-          .entries_i      (line_entries),
+          .entries0_i     (line_entries0),
+          .entries1_i     (line_entries1),
           .m_axis_tvalid_o(wave_valid),
           .m_axis_tready_i(feature_ready && planes),
           .m_axis_tdata_o (wave_data),
@@ -317,10 +321,10 @@ module sf_ray_top #(
       end
       assign bad_field = asked_q;
       assign {planes, planes_ready, planes_order, planes_idle} = 4'b0001;
-      assign {line_valid, line_empty, line} = 30'd0;
+      assign {line_valid, line_empty, line0, line1} = 58'd0;
       assign {wave_valid, wave_data, wave_user, wave_last} = 67'd0;
       assign {item_valid, item_first, item_last, item_empty, item_decoded, item_weight, item_distance} = 70'd0;
-      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries};
+      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries0, line_entries1};
     end
   endgenerate
 
