@@ -6,7 +6,7 @@
 `default_nettype none
 
 module sf_basis #(
-    parameter integer LOG2_BLOCKS = 5  // room for blocks: those of two samples
+    parameter integer LOG2_BLOCKS = 6  // room for blocks: those of five samples, at most 12 each
 ) (
     input  wire         clk_i,
     input  wire         rst_ni,

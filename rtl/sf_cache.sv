@@ -35,7 +35,8 @@ module sf_cache #(
     // their contents out, in order
     output wire        m_valid_o,
     output wire [31:0] m_entries_o,       // {of x + 1, of x}
-    output wire [127:0] m_line_o,         // the line of x + 1
+    output wire [127:0] m_line0_o,        // the line of x
+    output wire [127:0] m_line1_o,        // and of x + 1
     // events
     output wire [ 1:0] lookups_o,
     output wire [ 1:0] misses_o,
@@ -306,7 +307,7 @@ module sf_cache #(
   reg [FOR_ENTRIES-1:0] r_q, e_q;
   reg [127:0] e_even_q, e_odd_q;
   reg [15:0] m0_q, m1_q;
-  reg [127:0] m_line_q;
+  reg [127:0] m_line0_q, m_line1_q;
   wire e_has0, e_has1, e_bank0, e_bank1;
   wire [2:0] e_place0, e_place1;
   assign {e_has1, e_has0, e_bank1, e_bank0, e_place1, e_place0} = e_q;
@@ -326,11 +327,13 @@ module sf_cache #(
     e_odd_q <= r_stored_q[1] ? fill_q : read_odd_q;
     if (e_valid_q && e_has0) m0_q <= e_line0[16*e_place0+:16];
     if (e_valid_q && e_has1) m1_q <= e_line1[16*e_place1+:16];
-    m_line_q <= e_line1;
+    if (e_has0) m_line0_q <= e_line0;
+    m_line1_q <= e_line1;
   end
   assign m_valid_o = m_valid_q;
   assign m_entries_o = {m1_q, m0_q};
-  assign m_line_o = m_line_q;
+  assign m_line0_o = m_line0_q;
+  assign m_line1_o = m_line1_q;
 
   // ---- events
   reg [1:0] lookups_q, misses_q;

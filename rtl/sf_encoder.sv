@@ -48,9 +48,11 @@ module sf_encoder #(
     input  wire        line_valid_i,
     output wire        line_ready_o,
     input  wire        line_empty_i,      // the cache is emptied before it
-    input  wire [27:0] line_i,
+    input  wire [27:0] line0_i,
+    input  wire [27:0] line1_i,
     output wire        line_valid_o,
-    output wire [127:0] line_o,
+    output wire [127:0] line0_o,
+    output wire [127:0] line1_o,
     input  wire        line_room_i,       // who takes them waits for a line, not for room behind it
     // events of the field
     output wire [ 1:0] lookups_o,
@@ -121,7 +123,6 @@ module sf_encoder #(
   wire [23:0] features;
   wire pair_valid, pair_ready, pair_tile, entries_valid, waits;
   wire [31:0] pair_entry0, pair_entry1, entries;
-  wire [31:0] line_entry = {1'b0, line_i, 3'd0};
   assign line_ready_o = pair_ready && planes_i;
   assign line_valid_o = entries_valid && planes_i;
   sf_grid #(
@@ -161,11 +162,12 @@ module sf_encoder #(
       .s_valid_i      (planes_i ? line_valid_i : pair_valid),
       .s_ready_o      (pair_ready),
       .s_empty_i      (planes_i ? line_empty_i : pair_tile),
-      .s_entry0_i     (planes_i ? line_entry : pair_entry0),
-      .s_entry1_i     (planes_i ? line_entry : pair_entry1),
+      .s_entry0_i     (planes_i ? {1'b0, line0_i, 3'd0} : pair_entry0),
+      .s_entry1_i     (planes_i ? {1'b0, line1_i, 3'd0} : pair_entry1),
       .m_valid_o      (entries_valid),
       .m_entries_o    (entries),
-      .m_line_o       (line_o),
+      .m_line0_o      (line0_o),
+      .m_line1_o      (line1_o),
       .lookups_o      (lookups_o),
       .misses_o       (misses_o),
       .filled_o       (filled_o),

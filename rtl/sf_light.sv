@@ -47,8 +47,8 @@ module sf_light (
     output wire [43:0] distance_o,
     output wire        idle_o
 );
-  localparam integer AHEAD = 3;  // FX_AHEAD
-  localparam integer LOG2_ITEMS = 5, LOG2_AHEAD = 2;
+  localparam integer AHEAD = 5;  // FX_AHEAD
+  localparam integer LOG2_ITEMS = 6, LOG2_AHEAD = 3;
   localparam integer EXP_CYCLES = 12;  // product and exponential
 
   // ---- input: a beat waits in a register

@@ -43,13 +43,15 @@ module sf_planes (
     input  wire [24:0] s_delta_i,
     input  wire [43:0] s_distance_i,
     output wire        error_order_o,
-    // lines of the cache
+    // lines of the cache, one or two at a time
     output wire        line_valid_o,
     input  wire        line_ready_i,
     output wire        line_empty_o,
-    output wire [27:0] line_o,
+    output wire [27:0] line0_o,
+    output wire [27:0] line1_o,
     input  wire        entries_valid_i,
-    input  wire [127:0] entries_i,
+    input  wire [127:0] entries0_i,
+    input  wire [127:0] entries1_i,
     // packets of the decoder
     output wire        m_axis_tvalid_o,
     input  wire        m_axis_tready_i,
@@ -170,20 +172,21 @@ module sf_planes (
       .idle_o           (light_idle)
   );
 
-  // ---- planes and lines. Two appearances have room behind them.
+  // ---- planes and lines. Some appearances have room behind them: their blocks wait in sf_basis.
+  localparam [2:0] APPEARANCES = 3'd5;
   wire reads_ready, sums_ready, sums_valid;
-  reg [1:0] appearances_q;
-  wire room = !read_appearance || appearances_q != 2'd2;
+  reg [2:0] appearances_q;
+  wire room = !read_appearance || appearances_q != APPEARANCES;
   assign read_ready = reads_ready && room;
   wire begins = read_valid && read_ready && read_appearance;
   wire leaves = sums_valid && sums_ready;
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) appearances_q <= 2'd0;
-    else if (clear_i) appearances_q <= 2'd0;
-    else if (begins != leaves) appearances_q <= begins ? appearances_q + 2'd1 : appearances_q - 2'd1;
+    if (!rst_ni) appearances_q <= 3'd0;
+    else if (clear_i) appearances_q <= 3'd0;
+    else if (begins != leaves) appearances_q <= begins ? appearances_q + 3'd1 : appearances_q - 3'd1;
   end
 
-  wire [16:0] weight;
+  wire [16:0] weight0, weight1;
   wire of_line, first, last, appearance, read_end, mix_valid, mix_appearance, mix_end;
   wire [1:0] block, pair, mix_block, mix_pair;
   wire [495:0] products;
@@ -203,9 +206,11 @@ module sf_planes (
       .line_valid_o  (line_valid_o),
       .line_ready_i  (line_ready_i),
       .line_empty_o  (line_empty_o),
-      .line_o        (line_o),
+      .line0_o       (line0_o),
+      .line1_o       (line1_o),
       .pop_i         (entries_valid_i),
-      .weight_o      (weight),
+      .weight0_o     (weight0),
+      .weight1_o     (weight1),
       .of_line_o     (of_line),
       .first_o       (first),
       .last_o        (last),
@@ -219,8 +224,10 @@ module sf_planes (
       .rst_ni      (rst_ni),
       .clear_i     (clear_i),
       .valid_i     (entries_valid_i),
-      .entries_i   (entries_i),
-      .weight_i    (weight),
+      .entries0_i  (entries0_i),
+      .entries1_i  (entries1_i),
+      .weight0_i   (weight0),
+      .weight1_i   (weight1),
       .of_line_i   (of_line),
       .first_i     (first),
       .last_i      (last),
@@ -308,7 +315,7 @@ module sf_planes (
   wire [47:0] dir, turn;
   sf_fifo #(
       .WIDTH     (96),
-      .LOG2_DEPTH(2)
+      .LOG2_DEPTH(3)
   ) u_dirs (
       .clk_i  (clk_i),
       .rst_ni (rst_ni),

@@ -2,8 +2,9 @@
 // Mirror: src/fx/tensorf_lines.c (fx_tensorf_lines); src/fx/tensorf_place.h (vm_find)
 //
 // A point of a plane or a line has 16 components in a line of the memory, so ceil(components / 16) lines. Order: pair by
-// pair (0,1,2), (0,2,1), (1,2,0) of axes (u, v, w): the points (u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1) of the
-// plane, then w and w + 1 of the line; a neighbour without weight is left out. A line is asked for in every cycle.
+// pair (0,1,2), (0,2,1), (1,2,0) of axes (u, v, w): the points (u, v) and (u + 1, v) line by line, (u, v + 1) and
+// (u + 1, v + 1), then w and w + 1 of the line; a neighbour without weight is left out. Where points have 1 or 3 lines, those
+// of two neighbours lie in the two banks of the cache: both are asked for in one cycle. Else it is a line in every cycle.
 //
 //   P  Q           the position times res - 1, rounded: point and 8 bits of place per axis
 //   1              x, y and the line within the point; 2: y * width, weight; 3: point; 4: times lines of a point; 5: line
@@ -30,10 +31,12 @@ module sf_planes_reads #(
     output wire         line_valid_o,
     input  wire         line_ready_i,
     output wire         line_empty_o,
-    output wire [ 27:0] line_o,
-    // of the line that has come
+    output wire [ 27:0] line0_o,
+    output wire [ 27:0] line1_o,          // of the neighbour; the same as line0_o without one
+    // of the lines that have come
     input  wire         pop_i,
-    output wire [ 16:0] weight_o,         // of a plane's point Q.16, of a line's Q.8
+    output wire [ 16:0] weight0_o,        // of a plane's point Q.16, of a line's Q.8
+    output wire [ 16:0] weight1_o,        // 0 without a neighbour
     output wire         of_line_o,        // else of a plane
     output wire         first_o,          // of its block of 16 components
     output wire         last_o,           // the block is whole
@@ -60,8 +63,10 @@ module sf_planes_reads #(
   wire [1:0] x_axis = of_line_q ? w : u;
   wire [2:0] of = {1'b0, pair_q} + (appearance_q ? 3'd3 : 3'd0);
   wire [1:0] last_line = point_lines_i[2*of+:2];
-  wire point_end = line_q == last_line;
-  wire row_end = point_end && (beside_q || g_q[x_axis] == 8'd0);
+  wire alone = g_q[x_axis] == 8'd0;
+  wire both = !alone && !last_line[0];  // points of 1 or 3 lines
+  wire block_end = alone || both || beside_q;
+  wire row_end = block_end && line_q == last_line;
   wire part_end = row_end && (of_line_q || far_q || g_q[v] == 8'd0);
   wire pair_end = part_end && of_line_q;
   wire run_end = pair_end && pair_q == 2'd2;
@@ -97,8 +102,8 @@ module sf_planes_reads #(
       end
       {pair_q, line_q, far_q, beside_q, of_line_q} <= 7'd0;
     end else if (issue) begin
-      line_q <= point_end ? 2'd0 : line_q + 2'd1;
-      if (point_end) beside_q <= !row_end;
+      beside_q <= !block_end;
+      if (block_end) line_q <= row_end ? 2'd0 : line_q + 2'd1;
       if (row_end) far_q <= !part_end;
       if (part_end) of_line_q <= !of_line_q;
       if (pair_end) pair_q <= pair_q + 2'd1;
@@ -111,14 +116,16 @@ module sf_planes_reads #(
   reg [4:0] empty_q;
   reg begun_q;  // the first line of the position has been issued
   reg [TAG-1:0] tag1_q, tag2_q, tag3_q, tag4_q, tag5_q;
-  reg [2:0] of1_q, of2_q, of3_q, of4_q;
+  reg [2:0] of1_q, of2_q, of3_q;
+  reg [1:0] lines4_q;
   reg [10:0] x1_q, y1_q, x2_q;
   reg [11:0] width1_q;
-  reg [8:0] a1_q, b1_q;
-  reg [16:0] weight2_q, weight3_q, weight4_q, weight5_q;
+  reg [8:0] a1_q, beside1_q, b1_q;
+  reg [33:0] weights2_q, weights3_q, weights4_q, weights5_q;  // of both lines
+  reg both1_q, both2_q, both3_q, both4_q;
   reg [22:0] row2_q, point3_q;
   reg [24:0] times4_q;
-  reg [27:0] first4_q, line5_q;
+  reg [27:0] first4_q, line5_q, beside5_q;
   wire [8:0] one = 9'd256;
   wire [7:0] g = g_q[x_axis];
   wire [7:0] h = g_q[v];
@@ -139,24 +146,27 @@ module sf_planes_reads #(
       y1_q <= at_q[v] + {10'd0, far_q};
       width1_q <= res_i[12*u+:12];
       a1_q <= beside_q ? {1'b0, g} : one - {1'b0, g};
+      beside1_q <= both ? {1'b0, g} : 9'd0;
+      both1_q <= both;
       b1_q <= of_line_q ? 9'd1 : far_q ? {1'b0, h} : one - {1'b0, h};
-      tag1_q <= {run_end, appearance_q, pair_q, line_q, of_line_q && (beside_q || g == 8'd0), !far_q && !beside_q, of_line_q};
+      tag1_q <= {run_end, appearance_q, pair_q, line_q, of_line_q && block_end, !far_q && !beside_q, of_line_q};
       of1_q <= of;
       // 2
       row2_q <= tag1_q[0] ? 23'd0 : 23'(y1_q) * 23'(width1_q);
       x2_q <= x1_q;
-      weight2_q <= 17'(a1_q) * 17'(b1_q);
-      {tag2_q, of2_q} <= {tag1_q, of1_q};
+      weights2_q <= {17'(beside1_q) * 17'(b1_q), 17'(a1_q) * 17'(b1_q)};
+      {tag2_q, of2_q, both2_q} <= {tag1_q, of1_q, both1_q};
       // 3
       point3_q <= row2_q + {12'd0, x2_q};
-      {tag3_q, of3_q, weight3_q} <= {tag2_q, of2_q, weight2_q};
+      {tag3_q, of3_q, weights3_q, both3_q} <= {tag2_q, of2_q, weights2_q, both2_q};
       // 4
       times4_q <= (lines3[0] ^ lines3[1] ? point3 << 1 : lines3 == 2'd3 ? point3 << 2 : point3) + (lines3 == 2'd2 ? point3 : 25'd0);
-      first4_q <= tag3_q[0] ? line_first_i[28*of3_q+:28] : plane_first_i[28*of3_q+:28];
-      {tag4_q, of4_q, weight4_q} <= {tag3_q, of3_q, weight3_q};
+      first4_q <= (tag3_q[0] ? line_first_i[28*of3_q+:28] : plane_first_i[28*of3_q+:28]) + {26'd0, tag3_q[4:3]};
+      {tag4_q, lines4_q, weights4_q, both4_q} <= {tag3_q, lines3, weights3_q, both3_q};
       // 5
-      line5_q <= first4_q + {3'd0, times4_q} + {26'd0, tag4_q[4:3]};
-      {tag5_q, weight5_q} <= {tag4_q, weight4_q};
+      line5_q <= first4_q + {3'd0, times4_q};
+      beside5_q <= first4_q + {3'd0, times4_q} + (both4_q ? {26'd0, lines4_q} + 28'd1 : 28'd0);
+      {tag5_q, weights5_q} <= {tag4_q, weights4_q};
     end
   end
 
@@ -165,7 +175,8 @@ module sf_planes_reads #(
   reg room_q;
   assign line_valid_o = valid_q[4] && room_q;
   assign line_empty_o = empty_q[4];
-  assign line_o = line5_q;
+  assign line0_o = line5_q;
+  assign line1_o = beside5_q;
   wire leaves = line_valid_o && line_ready_i;
   assign move = !valid_q[4] || leaves;
   always_ff @(posedge clk_i or negedge rst_ni) begin
@@ -182,19 +193,19 @@ module sf_planes_reads #(
   end
   wire tag_valid;
   sf_fifo #(
-      .WIDTH     (TAG + 17),
+      .WIDTH     (TAG + 34),
       .LOG2_DEPTH(LOG2_LINES)
   ) u_tags (
       .clk_i  (clk_i),
       .rst_ni (rst_ni),
       .clear_i(clear_i),
       .push_i (leaves),
-      .data_i ({tag5_q, weight5_q}),
+      .data_i ({tag5_q, weights5_q}),
       .valid_o(tag_valid),
       .pop_i  (pop_i),
-      .data_o ({end_o, appearance_o, pair_o, block_o, last_o, first_o, of_line_o, weight_o})
+      .data_o ({end_o, appearance_o, pair_o, block_o, last_o, first_o, of_line_o, weight1_o, weight0_o})
   );
-  wire unused_ok = &{1'b0, tag_valid, of4_q, res_i[35], res_i[23], res_i[11], scaled_q[0][15:0], scaled_q[1][15:0],
+  wire unused_ok = &{1'b0, tag_valid, res_i[35], res_i[23], res_i[11], scaled_q[0][15:0], scaled_q[1][15:0],
                      scaled_q[2][15:0]};
 endmodule
 

@@ -5,6 +5,7 @@
 module sf_ray_csr #(
     parameter integer CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,
     parameter integer CACHE_WAYS = sf_arch_pkg::CACHE_WAYS,
+    parameter integer GRID = 1,
     parameter integer PLANES = 1
 ) (
     input  wire        clk_i,
@@ -167,7 +168,7 @@ module sf_ray_csr #(
       sf_csr_pkg::ENCODER_ADDRESS: rdata_d = {20'd0, encoder_address_q};
       sf_csr_pkg::FIELD_BASE: rdata_d = base_q;
       sf_csr_pkg::FIELD_CACHE: rdata_d = CACHE;
-      sf_csr_pkg::FIELD_KINDS: rdata_d = PLANES != 0 ? 32'd3 : 32'd1;
+      sf_csr_pkg::FIELD_KINDS: rdata_d = {30'd0, PLANES != 0, GRID != 0};
       sf_csr_pkg::FIELD_LOOKUPS: rdata_d = lookups_low;
       sf_csr_pkg::FIELD_LOOKUPS_HIGH: rdata_d = lookups_high;
       sf_csr_pkg::FIELD_MISSES: rdata_d = misses_low;

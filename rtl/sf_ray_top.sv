@@ -13,6 +13,7 @@
 // cache: 16 bytes, aligned, so none crosses 4 KiB. One ID; answers in order, any number of cycles later; rready is always
 // high. A soft reset drops the answers that the memory owes; rst_ni must reset the memory's port too.
 `default_nettype none
+`include "sf_refuse.svh"
 
 module sf_ray_top #(
 `ifdef SF_NO_TAP
@@ -26,7 +27,8 @@ module sf_ray_top #(
     parameter STEPS_AT_ONCE = sf_arch_pkg::STEPS_AT_ONCE,
     parameter CACHE_BYTES = sf_arch_pkg::CACHE_BYTES,  // these as sf_cache's
     parameter CACHE_WAYS = sf_arch_pkg::CACHE_WAYS,
-    parameter PLANES = 1                   // TensoRF's field, too
+    parameter GRID = 1,                    // the hash grid's field
+    parameter PLANES = 1                   // TensoRF's; one of them at least
 ) (
     input  wire          clk_i,
     input  wire          rst_ni,
@@ -126,10 +128,13 @@ module sf_ray_top #(
   wire [31:0] base;
   wire [1:0] lookups, misses;
   wire filled, waits, error_memory;
-  wire planes, bad_field;  // the scene's field is that of TensoRF
+  wire planes;             // the scene's field is that of TensoRF
+  wire bad_planes;
+  wire bad_field = bad_planes || (GRID == 0 && !planes);
   sf_ray_csr #(
       .CACHE_BYTES(CACHE_BYTES),
       .CACHE_WAYS (CACHE_WAYS),
+      .GRID       (GRID),
       .PLANES     (PLANES)
   ) u_csr (
       .clk_i        (clk_i),
@@ -169,99 +174,142 @@ module sf_ray_top #(
   );
 
   // ---- samples
-  wire encode_valid, encode_ready, encode_first, encode_tile;
-  wire [71:0] encode_pos;
-  wire [47:0] encode_dir;
   wire track_ready, planes_ready, planes_order;
   assign s_axis_tready_o = planes ? planes_ready : track_ready;
   wire sample_valid, sample_take, sample_first, sample_last, sample_empty, stop, track_idle, composite_idle;
   wire [24:0] delta;
   wire [43:0] distance;
-  sf_ray_track u_track (
-      .clk_i         (clk_i),
-      .rst_ni        (rst_ni),
-      .clear_i       (soft_reset),
-      .enable_i      (running),
-      .valid_i       (s_axis_tvalid_i && !planes),
-      .ready_o       (track_ready),
-      .first_i       (s_axis_tuser_i),
-      .last_i        (s_axis_tlast_i),
-      .empty_i       (s_axis_tdata_i[240]),
-      .tile_i        (s_axis_tdata_i[241]),
-      .pos_i         ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
-      .dir_i         (s_axis_tdata_i[239:192]),
-      .delta_i       (s_axis_tdata_i[120:96]),
-      .distance_i    (s_axis_tdata_i[171:128]),
-      .error_order_o (error_order),
-      .encode_valid_o(encode_valid),
-      .encode_ready_i(encode_ready),
-      .encode_first_o(encode_first),
-      .encode_tile_o (encode_tile),
-      .encode_pos_o  (encode_pos),
-      .encode_dir_o  (encode_dir),
-      .valid_o       (sample_valid),
-      .take_i        (sample_take && !planes),
-      .first_o       (sample_first),
-      .last_o        (sample_last),
-      .empty_o       (sample_empty),
-      .delta_o       (delta),
-      .distance_o    (distance),
-      .stop_i        (stop),
-      .idle_o        (track_idle)
-  );
-
   wire feature_valid, feature_ready, feature_user, feature_last;
   wire [63:0] feature_data;
   wire line_valid, line_ready, line_empty, line_comes;
-  wire [27:0] line;
-  wire [127:0] line_entries;
+  wire [27:0] line0, line1;
+  wire [127:0] line_entries0, line_entries1;
   wire wave_valid, wave_user, wave_last;
   wire [63:0] wave_data;
   wire item_valid, item_first, item_last, item_empty, item_decoded, planes_idle;
   wire [20:0] item_weight;
   wire [43:0] item_distance;
-  sf_encoder #(
-      .CACHE_BYTES(CACHE_BYTES),
-      .CACHE_WAYS (CACHE_WAYS)
-  ) u_encoder (
-      .clk_i          (clk_i),
-      .rst_ni         (rst_ni),
-      .clear_i        (soft_reset),
-      .cfg_we_i       (cfg_we && cfg_addr[11:8] == 4'd0),
-      .cfg_addr_i     (cfg_addr[7:0]),
-      .cfg_data_i     (cfg_data),
-      .s_valid_i      (encode_valid),
-      .s_ready_o      (encode_ready),
-      .s_first_i      (encode_first),
-      .s_tile_i       (encode_tile),
-      .s_pos_i        (encode_pos),
-      .s_dir_i        (encode_dir),
-      .base_i         (base),
-      .m_axi_arvalid_o(m_axi_arvalid_o),
-      .m_axi_arready_i(m_axi_arready_i),
-      .m_axi_araddr_o (m_axi_araddr_o),
-      .m_axi_rvalid_i (m_axi_rvalid_i),
-      .m_axi_rdata_i  (m_axi_rdata_i),
-      .m_axi_rresp_i  (m_axi_rresp_i),
-      .planes_i       (planes),
-      .line_valid_i   (line_valid),
-      .line_ready_o   (line_ready),
-      .line_empty_i   (line_empty),
-      .line_i         (line),
-      .line_valid_o   (line_comes),
-      .line_o         (line_entries),
-      .line_room_i    (feature_ready && !wave_valid),
-      .lookups_o      (lookups),
-      .misses_o       (misses),
-      .filled_o       (filled),
-      .waits_o        (waits),
-      .error_o        (error_memory),
-      .m_axis_tvalid_o(feature_valid),
-      .m_axis_tready_i(feature_ready && !planes),
-      .m_axis_tdata_o (feature_data),
-      .m_axis_tuser_o (feature_user),
-      .m_axis_tlast_o (feature_last)
-  );
+  generate
+    if (GRID != 0) begin : g_grid
+      wire encode_valid, encode_ready, encode_first, encode_tile;
+      wire [71:0] encode_pos;
+      wire [47:0] encode_dir;
+      sf_ray_track u_track (
+          .clk_i         (clk_i),
+          .rst_ni        (rst_ni),
+          .clear_i       (soft_reset),
+          .enable_i      (running),
+          .valid_i       (s_axis_tvalid_i && !planes),
+          .ready_o       (track_ready),
+          .first_i       (s_axis_tuser_i),
+          .last_i        (s_axis_tlast_i),
+          .empty_i       (s_axis_tdata_i[240]),
+          .tile_i        (s_axis_tdata_i[241]),
+          .pos_i         ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
+          .dir_i         (s_axis_tdata_i[239:192]),
+          .delta_i       (s_axis_tdata_i[120:96]),
+          .distance_i    (s_axis_tdata_i[171:128]),
+          .error_order_o (error_order),
+          .encode_valid_o(encode_valid),
+          .encode_ready_i(encode_ready),
+          .encode_first_o(encode_first),
+          .encode_tile_o (encode_tile),
+          .encode_pos_o  (encode_pos),
+          .encode_dir_o  (encode_dir),
+          .valid_o       (sample_valid),
+          .take_i        (sample_take && !planes),
+          .first_o       (sample_first),
+          .last_o        (sample_last),
+          .empty_o       (sample_empty),
+          .delta_o       (delta),
+          .distance_o    (distance),
+          .stop_i        (stop),
+          .idle_o        (track_idle)
+      );
+      sf_encoder #(
+          .CACHE_BYTES(CACHE_BYTES),
+          .CACHE_WAYS (CACHE_WAYS)
+      ) u_encoder (
+          .clk_i          (clk_i),
+          .rst_ni         (rst_ni),
+          .clear_i        (soft_reset),
+          .cfg_we_i       (cfg_we && cfg_addr[11:8] == 4'd0),
+          .cfg_addr_i     (cfg_addr[7:0]),
+          .cfg_data_i     (cfg_data),
+          .s_valid_i      (encode_valid),
+          .s_ready_o      (encode_ready),
+          .s_first_i      (encode_first),
+          .s_tile_i       (encode_tile),
+          .s_pos_i        (encode_pos),
+          .s_dir_i        (encode_dir),
+          .base_i         (base),
+          .m_axi_arvalid_o(m_axi_arvalid_o),
+          .m_axi_arready_i(m_axi_arready_i),
+          .m_axi_araddr_o (m_axi_araddr_o),
+          .m_axi_rvalid_i (m_axi_rvalid_i),
+          .m_axi_rdata_i  (m_axi_rdata_i),
+          .m_axi_rresp_i  (m_axi_rresp_i),
+          .planes_i       (planes),
+          .line_valid_i   (line_valid),
+          .line_ready_o   (line_ready),
+          .line_empty_i   (line_empty),
+          .line0_i        (line0),
+          .line1_i        (line1),
+          .line_valid_o   (line_comes),
+          .line0_o        (line_entries0),
+          .line1_o        (line_entries1),
+          .line_room_i    (feature_ready && !wave_valid),
+          .lookups_o      (lookups),
+          .misses_o       (misses),
+          .filled_o       (filled),
+          .waits_o        (waits),
+          .error_o        (error_memory),
+          .m_axis_tvalid_o(feature_valid),
+          .m_axis_tready_i(feature_ready && !planes),
+          .m_axis_tdata_o (feature_data),
+          .m_axis_tuser_o (feature_user),
+          .m_axis_tlast_o (feature_last)
+      );
+    end else begin : g_no_grid
+      wire cache_ready, waits_line;
+      wire [31:0] unused_entries;
+      assign {track_ready, error_order, sample_valid, sample_first, sample_last, sample_empty, delta, distance} = 75'd0;
+      assign track_idle = 1'b1;
+      assign {feature_valid, feature_data, feature_user, feature_last} = 67'd0;
+      assign line_ready = cache_ready;
+      assign waits = waits_line && feature_ready && !wave_valid;
+      sf_cache #(
+          .CACHE_BYTES(CACHE_BYTES),
+          .CACHE_WAYS (CACHE_WAYS)
+      ) u_cache (
+          .clk_i          (clk_i),
+          .rst_ni         (rst_ni),
+          .clear_i        (soft_reset),
+          .base_i         (base),
+          .s_valid_i      (line_valid),
+          .s_ready_o      (cache_ready),
+          .s_empty_i      (line_empty),
+          .s_entry0_i     ({1'b0, line0, 3'd0}),
+          .s_entry1_i     ({1'b0, line1, 3'd0}),
+          .m_valid_o      (line_comes),
+          .m_entries_o    (unused_entries),
+          .m_line0_o      (line_entries0),
+          .m_line1_o      (line_entries1),
+          .lookups_o      (lookups),
+          .misses_o       (misses),
+          .filled_o       (filled),
+          .waits_o        (waits_line),
+          .error_o        (error_memory),
+          .m_axi_arvalid_o(m_axi_arvalid_o),
+          .m_axi_arready_i(m_axi_arready_i),
+          .m_axi_araddr_o (m_axi_araddr_o),
+          .m_axi_rvalid_i (m_axi_rvalid_i),
+          .m_axi_rdata_i  (m_axi_rdata_i),
+          .m_axi_rresp_i  (m_axi_rresp_i)
+      );
+      wire unused_ok = &{1'b0, unused_entries, stop};
+    end
+  endgenerate
 
   generate
     if (PLANES != 0) begin : g_planes
@@ -274,7 +322,7 @@ module sf_ray_top #(
           .cfg_addr_i     (cfg_addr),
           .cfg_data_i     (cfg_data),
           .used_o         (planes),
-          .bad_o          (bad_field),
+          .bad_o          (bad_planes),
           .trans_stop_i   (trans_stop),
           .max_samples_i  (max_samples),
           .s_valid_i      (s_axis_tvalid_i && planes),
@@ -291,9 +339,11 @@ module sf_ray_top #(
           .line_valid_o   (line_valid),
           .line_ready_i   (line_ready),
           .line_empty_o   (line_empty),
-          .line_o         (line),
+          .line0_o        (line0),
+          .line1_o        (line1),
           .entries_valid_i(line_comes),
-          .entries_i      (line_entries),
+          .entries0_i     (line_entries0),
+          .entries1_i     (line_entries1),
           .m_axis_tvalid_o(wave_valid),
           .m_axis_tready_i(feature_ready && planes),
           .m_axis_tdata_o (wave_data),
@@ -315,12 +365,12 @@ module sf_ray_top #(
         if (!rst_ni) asked_q <= 1'b0;
         else if (cfg_we && cfg_addr == 12'h100) asked_q <= cfg_data[0];
       end
-      assign bad_field = asked_q;
+      assign bad_planes = asked_q;
       assign {planes, planes_ready, planes_order, planes_idle} = 4'b0001;
-      assign {line_valid, line_empty, line} = 30'd0;
+      assign {line_valid, line_empty, line0, line1} = 58'd0;
       assign {wave_valid, wave_data, wave_user, wave_last} = 67'd0;
       assign {item_valid, item_first, item_last, item_empty, item_decoded, item_weight, item_distance} = 70'd0;
-      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries};
+      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries0, line_entries1};
     end
   endgenerate
 
@@ -425,6 +475,7 @@ module sf_ray_top #(
   assign m_axis_tdata_o = {53'd0, samples, 11'd0, transmittance, 11'd0, weight_sum, depth, 24'd0, colour[119:80], 24'd0,
                            colour[79:40], 24'd0, colour[39:0]};
   assign active = !track_idle || !planes_idle || !composite_idle;
+  `SF_REFUSE(GRID == 0 && PLANES == 0, "neither GRID nor PLANES: a build has one field at least")
   // See sf_top: marching and compositing are written for these widths.
   initial begin
     if (sf_arch_pkg::POS_FRAC != 24 || sf_arch_pkg::DELTA_FRAC != 24 || sf_arch_pkg::TRANS_FRAC != 20)

@@ -153,6 +153,8 @@ lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys 
 	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_ray_top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
+	@cd $(RTL_ROOT) && for lacks in GRID PLANES; do \
+	  $(VERILATOR) --lint-only --top-module sf_ray_top -G$$lacks=0 -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_plif -Wall -Irtl rtl/lint.vlt $(RTL_PKG) rtl/sf_plif.sv
 	@if command -v iverilog >/dev/null; then cd $(RTL_ROOT) && iverilog -g2012 -Wall -Wno-timescale -Irtl -s sf_top -t null $(RTL); fi
 	@if command -v yosys >/dev/null; then cd $(RTL_ROOT) && yosys -q -w "Replacing memory" -p "read_verilog -sv -Irtl $(RTL); hierarchy -check -top sf_top" >/dev/null; fi
@@ -211,9 +213,9 @@ lanes: all firmware $B/faults/make_scene ## 32, 64, 256 lanes: samples, rays, fi
 .PHONY: lanes
 
 # The vector kit: writer, and the files that go with every kit.
-KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/kit/output.o $B/obj/sim/packet.o \
-  $B/obj/firmware/sf_driver.o $B/kit/files.o
-KIT_FILES := sf_kit_tb.sv Makefile README.md
+KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/kit/rays.o $B/obj/sim/kit/output.o $B/obj/sim/packet.o \
+  $B/obj/sim/ray/request.o $B/obj/firmware/sf_driver.o $B/obj/firmware/sf_ray_driver.o $B/kit/files.o
+KIT_FILES := sf_kit_tb.sv sf_ray_kit_tb.sv sf_kit_bus.svh Makefile README.md
 $B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh
 	@mkdir -p $(@D)
 	$(call say,EMBED $@)

@@ -222,11 +222,12 @@ TEST(from_one_field_to_the_other)
   }
 }
 
-static uint32_t without_planes(void *context, uint32_t offset)
+static uint32_t lacking; /* fields */
+static uint32_t without_a_field(void *context, uint32_t offset)
 {
   const sf_bus *real = context;
   const uint32_t value = real->read(real->context, offset);
-  return offset == SF_CSR_FIELD_KINDS ? value & ~(uint32_t)SF_CSR_FIELD_KINDS_PLANES : value;
+  return offset == SF_CSR_FIELD_KINDS ? value & ~lacking : value;
 }
 static void write_through(void *context, uint32_t offset, uint32_t value)
 {
@@ -234,18 +235,28 @@ static void write_through(void *context, uint32_t offset, uint32_t value)
   real->write(real->context, offset, value);
 }
 
-TEST(the_driver_refuses_what_a_build_lacks)
+static void refused(sf_ray_dut *rays, const fx_scene *scene, uint32_t field)
 {
-  OWNED(fx_scene) scene = long_rays(3500);
-  OWNED(sf_ray_dut) *rays = NULL;
-  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 8}));
-  ck_assert_uint_eq(get(rays->dut, SF_CSR_FIELD_KINDS), SF_CSR_FIELD_KINDS_GRID | SF_CSR_FIELD_KINDS_PLANES);
   sf_bus real = rays->dut->bus;
-  rays->dut->bus = (sf_bus){without_planes, write_through, &real};
+  lacking = field;
+  rays->scene = scene;
+  rays->dut->bus = (sf_bus){without_a_field, write_through, &real};
   const sf_status status = sf_ray_dut_load(rays);
   rays->dut->bus = real;
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_msg(strstr(status.message, "has not the scene's kind of field"), "%s", status.message);
+}
+
+TEST(the_driver_refuses_what_a_build_lacks)
+{
+  static const fixture_sizes sizes = {4, 32, 8, 9, 32, 32, 2, FX_HYBRID, {0}};
+  OWNED(fx_scene) grid = fixture_scene(&sizes, 22);
+  OWNED(fx_scene) scene = long_rays(3500);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 8}));
+  ck_assert_uint_eq(get(rays->dut, SF_CSR_FIELD_KINDS), SF_CSR_FIELD_KINDS_GRID | SF_CSR_FIELD_KINDS_PLANES);
+  refused(rays, &grid, SF_CSR_FIELD_KINDS_GRID);
+  refused(rays, &scene, SF_CSR_FIELD_KINDS_PLANES);
   scene.tensorf.features++; /* more inputs than the decoder has */
   ck_assert(strstr(sf_ray_dut_load(rays).message, "are not the net's inputs"));
   scene.tensorf.features--;

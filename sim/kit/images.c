@@ -1,5 +1,6 @@
 /* The images that the bench reads with $readmemh, one word per line, the most significant digit first. */
 #include "sim/kit/kit.h"
+#include "sim/ray/request.h"
 #include "sim/sim.h"
 #include "energy/energy.h"
 #include <inttypes.h>
@@ -8,16 +9,22 @@ enum { WINDOW = 512, GLOBAL_LAYER = 7, GLOBAL_SAMPLES = 0, GLOBAL_RAYS = 1 };
 
 /* ---- programming ---- */
 
-/* What the driver writes when the block reads as 0 everywhere: no error, nothing busy. */
+/* What the driver writes when the block has both fields, gives back the sizes of its layers, and reads as 0 elsewhere:
+ * no error, nothing busy. */
 typedef struct recorder {
   FILE *file;
   int writes;
+  uint32_t d1_n_in, c1_n_in, d2_n_out;
 } recorder;
 
 static uint32_t record_read(void *context, uint32_t offset)
 {
-  (void)context, (void)offset;
-  return 0;
+  const recorder *r = context;
+  return offset == SF_CSR_FIELD_KINDS ? SF_CSR_FIELD_KINDS_RESET
+         : offset == SF_CSR_D1_N_IN   ? r->d1_n_in
+         : offset == SF_CSR_C1_N_IN   ? r->c1_n_in
+         : offset == SF_CSR_D2_N_OUT  ? r->d2_n_out
+                                      : 0;
 }
 
 static void record_write(void *context, uint32_t offset, uint32_t value)
@@ -25,6 +32,9 @@ static void record_write(void *context, uint32_t offset, uint32_t value)
   recorder *r = context;
   fprintf(r->file, "%04" PRIx32 "%08" PRIx32 "\n", offset, value);
   r->writes++;
+  if (offset == SF_CSR_D1_N_IN) r->d1_n_in = value;
+  if (offset == SF_CSR_C1_N_IN) r->c1_n_in = value;
+  if (offset == SF_CSR_D2_N_OUT) r->d2_n_out = value;
 }
 
 static sf_status write_program(sf_kit_output *output, const fx_net *net, int *writes)
@@ -39,6 +49,26 @@ static sf_status write_program(sf_kit_output *output, const fx_net *net, int *wr
   sf_driver_clear(&bus);
   *writes = r.writes;
   return sf_kit_end(output, &file);
+}
+
+sf_status sf_kit_program_rays(sf_kit_output *output, const fx_scene *scene, uint32_t base, int *writes)
+{
+  sf_kit_writer file;
+  SF_TRY(sf_kit_begin(output, &file, "ray_program.hex"));
+  recorder r = {.file = file.writer.file};
+  const sf_bus bus = {.read = record_read, .write = record_write, .context = &r};
+  const sf_net_blob net = sf_dut_blob(&scene->net);
+  const sf_ray_blob rays = sf_ray_blob_of(scene, base);
+  const sf_planes_blob planes = sf_ray_planes_of(&scene->tensorf);
+  sf_driver_load(&bus, &net);
+  const sf_driver_code code = sf_ray_driver_load(&bus, &rays, scene->backbone == FX_TENSORF ? &planes : NULL);
+  record_write(&r, SF_CSR_IRQ_ENABLE, SF_CSR_IRQ_ENABLE_ERROR);
+  record_write(&r, SF_CSR_RAY_IRQ_ENABLE, ~0u);
+  sf_driver_clear(&bus);
+  sf_ray_driver_clear(&bus);
+  *writes = r.writes;
+  SF_TRY(sf_kit_end(output, &file));
+  return code == SF_DRIVER_OK ? sf_ok() : sf_fail(SF_E_FORMAT, "vectors: the scene's field does not fit sf_ray_top");
 }
 
 static sf_status write_weights(sf_kit_output *output, const fx_net *net)
@@ -161,8 +191,7 @@ static sf_status write_taps(sf_kit_output *output, const sf_kit_draw *d)
 
 /* ---- counters ---- */
 
-/* The register window; what depends on the clock (cycles, stalls) is 0 here and not compared. */
-static sf_status write_counters(sf_kit_output *output, const fx_counts *counts)
+sf_status sf_kit_counters(sf_kit_output *output, const char *name, const fx_counts *counts)
 {
   uint64_t window[WINDOW] = {0};
   sf_kit_writer file;
@@ -171,7 +200,7 @@ static sf_status write_counters(sf_kit_output *output, const fx_counts *counts)
       for (int t = 0; t < SF_T_MAX; t++) window[(e * 8 + l) * 8 + t] = counts->layer[l].event[e][t];
   window[GLOBAL_LAYER * 8 + GLOBAL_SAMPLES] = counts->samples;
   window[GLOBAL_LAYER * 8 + GLOBAL_RAYS] = counts->rays;
-  SF_TRY(sf_kit_begin(output, &file, "expected_counters.hex"));
+  SF_TRY(sf_kit_begin(output, &file, name));
   for (int i = 0; i < WINDOW; i++) fprintf(file.writer.file, "%016" PRIx64 "\n", window[i]);
   return sf_kit_end(output, &file);
 }
@@ -236,6 +265,6 @@ sf_status sf_kit_images(sf_kit_output *output, const sf_kit_draw *draw, const sf
   SF_TRY(write_stimulus(output, draw, &report->beats));
   SF_TRY(write_outputs(output, draw));
   SF_TRY(write_taps(output, draw));
-  SF_TRY(write_counters(output, &draw->counts));
+  SF_TRY(sf_kit_counters(output, "expected_counters.hex", &draw->counts));
   return write_parameters(output, net, options, report);
 }

@@ -153,6 +153,7 @@ static sf_status write_folder(sf_kit_output *output, const sf_kit_draw *draw, co
   SF_TRY(sf_kit_path(output, MANIFEST, path));
   unlink(path); /* a folder without one is not whole */
   SF_TRY(sf_kit_images(output, draw, options, report));
+  SF_TRY(sf_kit_rays(output, draw));
   SF_TRY(sf_kit_path(output, "rtl/gen", path));
   SF_TRY(sf_make_dir(path));
   SF_TRY(copy_files(output));

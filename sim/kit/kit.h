@@ -81,6 +81,12 @@ sf_status sf_kit_path(const sf_kit_output *output, const char *name, char path[4
 sf_status sf_kit_begin(const sf_kit_output *output, sf_kit_writer *file, const char *name);
 sf_status sf_kit_end(sf_kit_output *output, sf_kit_writer *file);
 
+/* Of sf_ray_top: its programming (ray_program.hex), and rays, memory, pixels and counters. */
+sf_status sf_kit_program_rays(sf_kit_output *output, const fx_scene *scene, uint32_t base, int *writes);
+sf_status sf_kit_rays(sf_kit_output *output, const sf_kit_draw *draw);
+/* The register window; what depends on the clock (cycles, stalls) is 0 there and not compared. */
+sf_status sf_kit_counters(sf_kit_output *output, const char *name, const fx_counts *counts);
+
 /* Programming, stimulus, outputs, taps, counters as $readmemh images, and the sizes of all of them. */
 sf_status sf_kit_images(sf_kit_output *output, const sf_kit_draw *draw, const sf_kit_options *options,
                         sf_kit_report *report);

@@ -1,4 +1,5 @@
 #include "cycles/lines.h"
+#include <string.h>
 
 /* Depths and rooms of the RTL: READS, rtl/sf_planes_reads.sv; PAIRS, TAGS, QUEUE, rtl/sf_cache.sv; FETCHES,
  * rtl/sf_fetch.sv. */
@@ -64,29 +65,43 @@ static uint64_t leave_pairs(lines *l, uint64_t taken, bool empty)
   return at;
 }
 
+static bool share_a_set(const lines *l, const uint32_t a[2], const uint32_t b[2])
+{
+  const uint32_t sets = l->cache.sets;
+  return a[0] % sets == b[0] % sets || a[0] % sets == b[1] % sets || a[1] % sets == b[0] % sets ||
+         a[1] % sets == b[1] % sets;
+}
+
 /* A look-up whose set is still at work in the stages waits. */
-static uint64_t enter_tags(const lines *l, uint32_t line, uint64_t at)
+static uint64_t enter_tags(const lines *l, const uint32_t line[2], uint64_t at)
 {
   at = pipe_enter(&l->tags, at);
   for (uint64_t k = l->count > TAGS ? l->count - TAGS : 0; k < l->count; k++)
-    if (l->line[k % LINES_RING] % l->cache.sets == line % l->cache.sets)
+    if (share_a_set(l, l->line[k % LINES_RING], line))
       at = pipe_enter(&l->tags, later(at, l->tags.left[k % PIPE_MAX] + 1));
   return at;
 }
 
-/* It is asked for as its look-up leaves the tags; ready: when the memory's side can be asked. */
-static uint64_t fetch_ready(const lines *l)
+/* A line that is missing is asked for as its look-up is about to leave the tags, once the memory's side can be asked.
+ * Returns when. */
+static uint64_t ask(lines *l, uint64_t at)
 {
   const uint64_t room = l->misses >= FETCHES ? l->pop[(l->misses - FETCHES) % LINES_RING] + 3 : 0;
-  return l->misses ? later(l->asked + 2, room) : 0;
+  if (l->misses) at = later(at, later(l->asked + 2, room));
+  l->second_beat[l->misses % 2] = later(at + 3 + l->latency, l->misses ? l->second_beat[(l->misses - 1) % 2] + 2 : 0);
+  l->misses++;
+  return l->asked = at;
 }
 
-/* When a line that was asked for stands before the head of the queue. */
-static uint64_t fetch(lines *l, uint64_t at)
+/* When the last of the `misses` lines that were asked for last stands before the head of the queue, which waits from
+ * `head` on. */
+static uint64_t fetch(lines *l, int misses, uint64_t head)
 {
-  l->asked = at;
-  l->second_beat = later(at + 3 + l->latency, l->misses ? l->second_beat + 2 : 0);
-  return later(l->second_beat + 2, l->misses ? l->pop[(l->misses - 1) % LINES_RING] + 1 : 0);
+  for (uint64_t i = l->misses - (uint64_t)misses; i < l->misses; i++) {
+    head = later(head, later(l->second_beat[i % 2] + 2, i ? l->pop[(i - 1) % LINES_RING] + 1 : 0));
+    l->pop[i % LINES_RING] = head;
+  }
+  return head;
 }
 
 /* Room that is counted a cycle late: a line that goes right behind another one is let in where that one was. left: the
@@ -108,30 +123,29 @@ static uint64_t leave_reads(lines *l, uint64_t ready)
   return left;
 }
 
-static uint64_t leave_tags(lines *l, bool miss)
+static uint64_t leave_tags(lines *l, int misses)
 {
   const uint64_t reached = pipe_reach(&l->tags, l->tag_entered), before = l->tags.left[(l->tags.count - 1) % PIPE_MAX];
   uint64_t left = enter_room(l, reached, before, l->queued, QUEUE);
-  if (miss) left = later(left, fetch_ready(l));
+  for (int i = 0; i < misses; i++) left = ask(l, left);
   pipe_leave(&l->tags, reached, left);
   return left;
 }
 
-uint64_t lines_next(lines *l, uint32_t line, uint64_t ready, bool empty)
+uint64_t lines_next(lines *l, const uint32_t line[2], uint64_t ready, bool empty)
 {
   const uint64_t i = l->count % LINES_RING;
   l->taken[i] = later(leave_reads(l, ready) + 1, l->pair_left);
   l->pair_left = leave_pairs(l, l->taken[i], empty);
   if (empty) fx_cache_empty(&l->cache);
   l->tag_entered = enter_tags(l, line, l->pair_left + 1);
-  const bool miss = fx_cache_look_up(&l->cache, &line, 1);
-  const uint64_t tagged = leave_tags(l, miss);
+  const int misses = (int)fx_cache_look_up(&l->cache, line, line[0] == line[1] ? 1 : 2);
+  const uint64_t tagged = leave_tags(l, misses);
   l->queued[i] = l->count ? later(tagged + 1, l->head - 1) : tagged + 1;
   l->head = later(tagged + 3, l->head_left + 1);
-  l->head_left = miss ? later(l->head, fetch(l, tagged)) : l->head;
-  if (miss) l->pop[l->misses++ % LINES_RING] = l->head_left;
+  l->head_left = fetch(l, misses, l->head);
   l->came[i] = l->head_left + 3;
-  l->line[i] = line;
+  memcpy(l->line[i], line, sizeof l->line[i]);
   l->count++;
   return l->came[i];
 }

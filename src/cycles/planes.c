@@ -9,19 +9,21 @@
 enum {
   HOLD = 2,          /* from a beat that was taken to the next one, rtl/sf_light.sv */
   POSITION = 3,      /* from a position to its first line, rtl/sf_planes_reads.sv */
-  WEIGHT = 37,       /* from the last line of a density to its exponential */
+  WEIGHT = 38,       /* from the last line of a density to its exponential */
   DECIDE = 5,        /* from there to what becomes of the sample */
-  ITEMS = 31,        /* that wait for the compositor, rtl/sf_light.sv */
-  BLOCK = 7,         /* from the last line of 16 components to the basis matrix */
+  ITEMS = 63,        /* that wait for the compositor, rtl/sf_light.sv */
+  BLOCK = 8,         /* from the last line of 16 components to the basis matrix */
   BLOCK_CYCLES = 16, /* there, rtl/sf_basis.sv */
   SUMS = 3,          /* from its last component to the sums */
   SCALED = 6,        /* from the last feature to the values, rtl/sf_waves.sv */
   BEAT = 14,         /* from the first value to the first beat */
   BEAT_VALUES = 4,
-  COLOUR_CYCLES = 6, /* of the compositor with a colour, rtl/sf_composite.sv */
-  LIGHT_CYCLES = 3,  /* and without */
-  PIXEL_CYCLES = 7,  /* more for a ray's last sample, and a cycle to hand it over */
-  RING_READS = 64    /* samples inside, at most; a power of two */
+  COLOUR_CYCLES = 6,                    /* of the compositor with a colour, rtl/sf_composite.sv */
+  LIGHT_CYCLES = 3,                     /* and without */
+  PIXEL_CYCLES = 7,                     /* more for a ray's last sample, and a cycle to hand it over */
+  RING_READS = 128,                     /* samples inside, at most; a power of two */
+  BLOCKS = FX_COMPONENTS_MAX / FX_LINE, /* of 16 components per pair, at most */
+  APPEARANCES = 5                       /* on their way to rtl/sf_waves.sv, at most */
 };
 
 typedef struct item {
@@ -41,7 +43,7 @@ struct sf_planes_model {
   uint64_t gone;                                   /* the last sample left */
   uint64_t asked[RING_READS], weighed[RING_READS]; /* by number of the density */
   /* appearances */
-  uint64_t basis_free, sums_out, scale_free, bank_free[2], value_free, appearance_left[2];
+  uint64_t basis_free, sums_out, scale_free, bank_free[2], value_free, appearance_left[APPEARANCES];
   /* compositor */
   item items[RING_READS];
   uint64_t pushed, composited, composite_free, pixel;
@@ -138,36 +140,51 @@ static uint64_t send_packet(sf_planes_model *m, const sf_cycle_sample *sample, u
 
 /* ---- field ---- */
 
-/* Lines of a position, the last of which come at once with whole blocks of 16 components: block[] says when. Returns
- * when the last one came. */
+/* Of `rows` rows of a plane, or the one of a line, with 1 or 2 points each of `of_point` lines. Two points beside each
+ * other are read at once where their lines lie in both banks of the cache. come[]: when the last line of each block of
+ * 16 components came. Returns the line behind. */
+static const uint32_t *read_rows(sf_planes_model *m, const uint32_t *line, int rows, int points, int of_point,
+                                 uint64_t *ready, bool *empty, uint64_t come[BLOCKS])
+{
+  const int at_once = of_point % 2 ? points : 1;
+  for (int row = 0; row < rows; row++)
+    for (int i = 0; i < of_point * points; i += at_once, line += at_once) {
+      const uint32_t two[2] = {line[0], line[at_once - 1]};
+      come[i / points] = lines_next(&m->field, two, *ready, *empty);
+      *ready = m->field.issued + 1, *empty = false;
+    }
+  return line;
+}
+
+/* Lines of a position. block[] says when the last one of each block of 16 components came. Returns when the last one of
+ * all came. */
 static uint64_t read_lines(sf_planes_model *m, const sf_planes_read *read, bool appearance, uint64_t at, bool empty,
-                           uint64_t block[FX_PAIRS * 4], int *blocks)
+                           uint64_t block[FX_PAIRS * BLOCKS], int *blocks)
 {
   uint32_t line[FX_LOOKUPS_ROOM];
+  const uint32_t *next = line;
   const fx_tensorf *field = &m->scene->tensorf;
   const fx_factors *factors = appearance ? &field->appearance : &field->density;
   const vm_place place = vm_find(field->res, read->pos);
-  const int n = fx_tensorf_lines(field, appearance, read->pos, line);
-  uint64_t ready = at + POSITION, come = 0;
+  uint64_t ready = at + POSITION;
+  m->totals.lookups += (uint64_t)fx_tensorf_lines(field, appearance, read->pos, line);
   *blocks = 0;
-  for (int pair = 0, i = 0; pair < FX_PAIRS; pair++) {
+  for (int pair = 0; pair < FX_PAIRS; pair++) {
     const int *axes = fx_pair_axes[pair], of_point = (factors->components[pair] + FX_LINE - 1) / FX_LINE;
-    const int points = (1 + (place.g[axes[0]] != 0)) * (1 + (place.g[axes[1]] != 0)) + 1 + (place.g[axes[2]] != 0);
-    const int end = i + points * of_point;
-    for (; i < end; i++, ready = m->field.issued + 1) {
-      come = lines_next(&m->field, line[i], ready, empty && i == 0);
-      if (i >= end - of_point) block[(*blocks)++] = come;
-    }
+    const int u = 1 + (place.g[axes[0]] != 0), v = 1 + (place.g[axes[1]] != 0), w = 1 + (place.g[axes[2]] != 0);
+    uint64_t *come = block + *blocks;
+    next = read_rows(m, next, v, u, of_point, &ready, &empty, come);
+    next = read_rows(m, next, 1, w, of_point, &ready, &empty, come);
+    *blocks += of_point;
   }
-  m->totals.lookups += (uint64_t)n;
   m->free = ready;
-  return come;
+  return block[*blocks - 1];
 }
 
 /* The next sample's packet, whose blocks of components come as block[] says. */
 static void read_appearance(sf_planes_model *m, const sf_planes_read *read, const sf_cycle_sample *sample, uint64_t at)
 {
-  uint64_t block[FX_PAIRS * 4], begins = m->basis_free;
+  uint64_t block[FX_PAIRS * BLOCKS], begins = m->basis_free;
   const uint64_t number = m->totals.decoded++, bank = number % 2;
   int blocks;
   read_lines(m, read, true, at, false, block, &blocks);
@@ -178,7 +195,7 @@ static void read_appearance(sf_planes_model *m, const sf_planes_read *read, cons
   const uint64_t values = later(scaled + SCALED + 1, m->value_free);
   const uint64_t offered = values + BEAT - (m->inputs < BEAT_VALUES ? (uint64_t)(BEAT_VALUES - m->inputs) : 0);
   m->basis_free = sums + 1;
-  m->appearance_left[bank] = m->sums_out = scaled;
+  m->appearance_left[number % APPEARANCES] = m->sums_out = scaled;
   m->scale_free = scaled + SCALED;
   const uint64_t stalled = send_packet(m, sample, offered) - offered;
   const uint64_t last_value = values + (uint64_t)m->inputs - 1 + stalled;
@@ -190,7 +207,7 @@ static void read_appearance(sf_planes_model *m, const sf_planes_read *read, cons
 
 static void read_density(sf_planes_model *m, const sf_planes_read *read, uint64_t i, uint64_t at_least, bool empty)
 {
-  uint64_t block[FX_PAIRS * 4], at = later(at_least, later(m->beat, m->free));
+  uint64_t block[FX_PAIRS * BLOCKS], at = later(at_least, later(m->beat, m->free));
   int blocks;
   m->asked[i % RING_READS] = at;
   m->weighed[i % RING_READS] = read_lines(m, read, false, at, empty, block, &blocks) + WEIGHT;
@@ -209,7 +226,7 @@ static void decide(sf_planes_model *m, const sf_planes_read *read, uint64_t i, u
   push_item(m, (item){.decoded = read->decoded, .last = read->last || read->ends, .pushed = at});
   if (!read->decoded) return;
   at = later(at + 1, m->free);
-  if (m->totals.decoded >= 2) at = later(at, m->appearance_left[m->totals.decoded % 2] + 1);
+  if (m->totals.decoded >= APPEARANCES) at = later(at, m->appearance_left[m->totals.decoded % APPEARANCES] + 1);
   m->gone = at;
   read_appearance(m, read, sample, at);
 }

@@ -6,15 +6,16 @@
  *              (y + 1, z + 1). A pair in one line is one look-up, else two: first x's line. The line of an entry is
  *              (its place in the table of all levels) / FX_LINE_ENTRIES.
  *   TensoRF    pair by pair: points (u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1) of the plane, then both of the line.
- *              A line holds components of one point: a point of n has ceil(n / FX_LINE), one look-up each. A point that
- *              has no weight (the position is on its neighbour) is not asked for. Before the appearance of a sample
+ *              A line holds components of one point: a point of n has ceil(n / FX_LINE), one look-up each. Of two
+ * points beside each other (along u or w) first line comes before second, of both. A point that has no weight (the
+ *              position is on its neighbour) is not asked for. Before the appearance of a sample
  * come the densities of the FX_AHEAD samples of its ray behind it, or as many as there are: also of those behind the
  * sample where the ray ends. So a weight has time to follow from its density. */
 #ifndef SF_FX_CACHE_H
 #define SF_FX_CACHE_H
 #include "fx/fx.h"
 
-enum { FX_AHEAD = 3 };
+enum { FX_AHEAD = 5 };
 enum { FX_LINE = 16, FX_LINE_ENTRIES = FX_LINE / FX_GRID_FEATURES, FX_WAYS_MAX = 8 };
 enum { FX_CACHE_BYTES_MIN = 1024, FX_CACHE_BYTES_MAX = 65536 };
 /* Look-ups of one position at most, and room for whole vectors behind them. */

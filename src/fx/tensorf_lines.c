@@ -22,23 +22,24 @@ uint32_t fx_tensorf_places(const fx_tensorf *field, fx_factor_place place[2 * FX
   return line;
 }
 
-static int ask(uint32_t *line, uint32_t first, uint32_t point, uint32_t lines)
+/* Of one point, or of two beside each other, line by line. */
+static int ask(uint32_t *line, uint32_t first, uint32_t point, int points, uint32_t lines)
 {
-  for (uint32_t i = 0; i < lines; i++) line[i] = first + point * lines + i;
-  return (int)lines;
+  int n = 0;
+  for (uint32_t i = 0; i < lines; i++)
+    for (uint32_t k = 0; k < (uint32_t)points; k++) line[n++] = first + (point + k) * lines + i;
+  return n;
 }
 
 static int pair_lines(const fx_factor_place *place, int pair, const int32_t res[3], const vm_place *p, uint32_t *line)
 {
   const int u = fx_pair_axes[pair][0], v = fx_pair_axes[pair][1], w = fx_pair_axes[pair][2];
-  const uint32_t width = (uint32_t)res[u];
-  const int32_t x[2] = {p->at[u], p->next[u]}, y[2] = {p->at[v], p->next[v]}, z[2] = {p->at[w], p->next[w]};
+  const uint32_t width = (uint32_t)res[u], x = (uint32_t)p->at[u], z = (uint32_t)p->at[w];
+  const int32_t y[2] = {p->at[v], p->next[v]};
   int n = 0;
   for (int j = 0; j < 1 + (p->g[v] != 0); j++)
-    for (int i = 0; i < 1 + (p->g[u] != 0); i++)
-      n += ask(line + n, place->plane, (uint32_t)y[j] * width + (uint32_t)x[i], place->point_lines);
-  for (int k = 0; k < 1 + (p->g[w] != 0); k++) n += ask(line + n, place->line, (uint32_t)z[k], place->point_lines);
-  return n;
+    n += ask(line + n, place->plane, (uint32_t)y[j] * width + x, 1 + (p->g[u] != 0), place->point_lines);
+  return n + ask(line + n, place->line, z, 1 + (p->g[w] != 0), place->point_lines);
 }
 
 int fx_tensorf_lines(const fx_tensorf *field, bool appearance, const uint32_t pos[3], uint32_t line[FX_LOOKUPS_ROOM])
