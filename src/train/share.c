@@ -1,6 +1,6 @@
 /* One iteration on several ranks. Every rank has the whole model and draws the same rays; its parts of the bundles go
- * through the nets on it alone. What they leave goes to all, by sample or by part: so each rank adds the same numbers in
- * the same order as one that is alone. */
+ * through the nets on it alone. What they leave goes to all, by sample or by part: so each rank adds the same numbers
+ * in the same order as one that is alone. */
 #include "train/internal.h"
 #include "base/sha256.h"
 #include <stdio.h>
@@ -54,8 +54,7 @@ static void pack_slices(sf_trainer *t, float *out, size_t *edge)
   for (int i = 0; i < ranks; i++) {
     const size_t from = slice_of(t, i), n = slice_of(t, i + 1) - from;
     edge[i] = (size_t)(to - out) * sizeof *out;
-    for (int g = first; g < end; g++, to += n)
-      memcpy(to, (const float *)t->group[g].grad + from, n * sizeof *to);
+    for (int g = first; g < end; g++, to += n) memcpy(to, (const float *)t->group[g].grad + from, n * sizeof *to);
   }
   edge[ranks] = (size_t)(to - out) * sizeof *out;
 }
