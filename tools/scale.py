@@ -13,12 +13,13 @@ import subprocess
 import sys
 import tempfile
 
-FEW, MANY = 2, 42        # iterations; their difference leaves out start and evaluation
+FEW, MANY = 2, 14        # iterations; their difference leaves out start and evaluation; before the first occupancy update
 FITTED, CHECKED = (1, 2, 8), 4
 PARTS = 16               # of an iteration, dealt to ranks and threads: GROUPS in src/train/internal.h
 CORES = 16               # of a node of the clusters below
 ITERATIONS = 40000       # of the paper's runs
 COSIM_SAMPLES = 100e6
+COSIM_RAYS = 32
 BLOCK_BYTES = 54e3       # that come back of a block of sf_cosim
 NODES, GBITS = (8, 64, 512), (25, 100)
 
@@ -73,10 +74,10 @@ def train(binary, data, work):
 
 def cosim(binary, data, work):
     measure([binary + "/sf_export", work + "/model", "-o", work + "/scene.snn"])
-    out, cpu = measure([binary + "/sf_cosim", work + "/scene.snn", data, "--rays", "128", "-q", "--json"])
+    out, cpu = measure([binary + "/sf_cosim", work + "/scene.snn", data, "--rays", str(COSIM_RAYS), "-q", "--json"])
     samples = json.loads(out)["samples"]
     rate = samples / cpu
-    blocks = COSIM_SAMPLES / (samples / 128 * 256)
+    blocks = COSIM_SAMPLES / (samples / COSIM_RAYS * 256)
     print(f"cosim.rate            {rate:8.1f} samples a second of processor")
     for gbit in GBITS:
         for nodes in NODES:
