@@ -243,6 +243,9 @@ SEEDS ?= 1 2 3
 cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS ("1 2 3") after make demo, or SCENE= DATA=, on ranks with LAUNCH="mpirun -n 8": build/cosim
 	@tools/cosim_campaign.sh $B "$(SCENE)" "$(DATA)" $(if $(filter file,$(origin SAMPLES)),1000000,$(SAMPLES)) "$(SEEDS)"
 
+scale: $B/bin/sf_train $B/bin/sf_export $B/bin/sf_cosim ## what training and co-simulation cost on ranks, and a model of clusters: DATA=folder
+	@tools/scale.py $B "$(DATA)"
+
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B "$(SCENES)/lego" $B/lego --minutes 15 --rays 400
 
@@ -303,6 +306,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign gradient-check cosim-campaign asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign gradient-check cosim-campaign scale asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif

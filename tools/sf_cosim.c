@@ -378,7 +378,8 @@ int main(int argc, char **argv)
   if (status.code == SF_OK && o.replay) status = sf_other_dut_replay(o.replay, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) {
-    const sf_ranks_options how = {sf_cli_interrupted, o.run.jobs, argc, argv};
+    const sf_ranks_options how = {
+        .interrupted = sf_cli_interrupted, .processes = o.run.jobs, .argc = argc, .argv = argv};
     status = sf_ranks_open(&o.ranks, &how);
     if (sf_ranks_size(o.ranks) > 1) o.run.jobs = sf_ranks_size(o.ranks);
   }

@@ -12,6 +12,7 @@ struct sf_ranks {
   sf_mpi_link *link; /* NULL: alone */
   char (*host)[64];  /* [size] on rank 0 */
   atomic_bool enough;
+  uint64_t sent; /* bytes, by sf_ranks_share and sf_ranks_exchange */
   bool broken;   /* a rank does not answer: nothing can be done together any more */
   bool deserted; /* it is rank 0 that does not answer */
 };
@@ -48,4 +49,11 @@ sf_status sf_ranks_send(sf_ranks *ranks, int to, int tag, const void *data, size
 /* "rank 3 on node7" */
 void sf_ranks_name(const sf_ranks *ranks, int rank, char *text, size_t size);
 void sf_ranks_nap(void);
+/* A wait for another rank: where it is and when the program was interrupted in it; begins as zeros. */
+typedef struct sf_pause {
+  int times;
+  double since;
+} sf_pause;
+/* One rest of it, short at first: answers in the middle of a computation come soon. SF_E_STOPPED: as sf_ranks_wait. */
+sf_status sf_ranks_pause(sf_ranks *ranks, int rank, sf_pause *pause);
 #endif

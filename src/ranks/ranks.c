@@ -4,10 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sched.h>
 #include <time.h>
 #include <unistd.h>
 
-/* An interrupted rank waits so long for an answer of another. */
 static const double PATIENCE = 3;
 
 int sf_ranks_launched(void)
@@ -67,18 +67,33 @@ static sf_status silent(sf_ranks *r, int rank, double *since)
   char name[128];
   if (r->broken || !r->options.interrupted()) return sf_ok();
   if (*since == 0) *since = sf_seconds();
-  if (sf_seconds() - *since < PATIENCE) return sf_ok();
+  if (sf_seconds() - *since < (r->options.patience > 0 ? r->options.patience : PATIENCE)) return sf_ok();
   r->broken = true, r->deserted = r->rank > 0;
   sf_ranks_name(r, rank, name, sizeof name);
   return sf_fail(SF_E_STOPPED, "stopped; %s does not answer", name);
 }
 
+/* Yields, then sleeps ever longer up to a millisecond. */
+sf_status sf_ranks_pause(sf_ranks *r, int rank, sf_pause *pause)
+{
+  enum { YIELDS = 100, STEP = 20000, LONGEST = 50 };
+  SF_TRY(silent(r, rank, &pause->since));
+  const int turn = pause->times++ - YIELDS;
+  if (turn > LONGEST) pause->times--;
+  const struct timespec t = {.tv_nsec = STEP * (long)(turn < LONGEST ? turn : LONGEST)};
+  if (turn <= 0)
+    sched_yield();
+  else
+    nanosleep(&t, NULL);
+  return sf_ok();
+}
+
 sf_status sf_ranks_wait(sf_ranks *r, int from, int *tag, size_t *size)
 {
   int rank;
-  for (double since = 0; !r->broken; sf_ranks_nap()) {
+  for (sf_pause pause = {0}; !r->broken;) {
     if (sf_mpi_link_probe(r->link, from, &rank, tag, size)) return sf_ok();
-    SF_TRY(silent(r, from, &since));
+    SF_TRY(sf_ranks_pause(r, from, &pause));
   }
   return sf_fail(SF_E_STOPPED, "stopped");
 }
@@ -97,13 +112,10 @@ sf_status sf_ranks_receive(sf_ranks *r, int from, int tag, void *data, size_t si
 
 sf_status sf_ranks_send(sf_ranks *r, int to, int tag, const void *data, size_t size)
 {
-  double since = 0;
+  sf_pause pause = {0};
   if (r->broken) return sf_fail(SF_E_STOPPED, "stopped");
   sf_mpi_link_send(r->link, to, tag, data, size);
-  while (!sf_mpi_link_sent(r->link)) {
-    SF_TRY(silent(r, to, &since));
-    sf_ranks_nap();
-  }
+  while (!sf_mpi_link_sent(r->link)) SF_TRY(sf_ranks_pause(r, to, &pause));
   return sf_ok();
 }
 

@@ -21,6 +21,7 @@ typedef struct sf_ranks_options {
   int processes;             /* of a program that is alone: units go to so many forked processes, 0: to itself */
   int argc;                  /* the command line, which has to be that of every rank */
   char **argv;
+  double patience; /* seconds that an interrupted rank waits for an answer of another; 0: 3 */
 } sf_ranks_options;
 
 /* Every rank has to be the same program with the same command line. SF_E_UNSUPPORTED: started as one of many, but there
@@ -50,6 +51,13 @@ sf_status sf_ranks_same(sf_ranks *ranks, const char *what, const char *text);
 sf_status sf_ranks_broadcast(sf_ranks *ranks, void *data, size_t size);
 /* all[size of mine][ranks], by rank, on rank 0; elsewhere all may be NULL. */
 sf_status sf_ranks_gather(sf_ranks *ranks, const void *mine, size_t size, void *all);
+/* Elements of `size` bytes, of which this rank has filled edge[rank] .. edge[rank + 1] - 1: afterwards every rank has
+ * all. edge[ranks + 1], the same everywhere. */
+sf_status sf_ranks_share(sf_ranks *ranks, void *data, size_t size, const size_t *edge);
+/* Bytes out_edge[i] .. out_edge[i + 1] - 1 of out go to rank i, in_edge[i] .. of in come from it. [ranks + 1] each. */
+sf_status sf_ranks_exchange(sf_ranks *ranks, const void *out, const size_t *out_edge, void *in, const size_t *in_edge);
+/* Bytes that this rank sent with these two so far. */
+uint64_t sf_ranks_sent(const sf_ranks *ranks);
 
 typedef struct sf_deal {
   uint64_t first, end; /* units first .. end - 1; read on rank 0 alone */

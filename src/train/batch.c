@@ -36,7 +36,8 @@ sf_status sf_batch_create(sf_batch *b, int samples, int features)
   b->ray = calloc(RAYS_MAX, sizeof *b->ray);
   b->bundle = calloc(RAYS_MAX, sizeof *b->bundle);
   b->hit = calloc(RAYS_MAX, sizeof *b->hit);
-  if (!b->ray || !b->bundle || !b->hit) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  b->count = calloc(RAYS_MAX, sizeof *b->count);
+  if (!b->ray || !b->bundle || !b->hit || !b->count) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
   return reserve(b, samples / SF_BLOCK, features);
 }
 
@@ -45,6 +46,7 @@ void sf_batch_free(sf_batch *b)
   free(b->ray);
   free(b->bundle);
   free(b->hit);
+  free(b->count);
   free_blocks(b);
 }
 
@@ -153,7 +155,7 @@ sf_status sf_batch_draw(sf_trainer *t)
   sf_batch *b = &t->batch;
   const uint64_t base = (uint64_t)t->iteration * RAYS_MAX;
   sf_march *march = malloc((size_t)t->rays * sizeof *march);
-  if (!march) return sf_fail(SF_E_MEMORY, "train: no memory for %d rays", t->rays);
+  if (!march) return sf_ranks_agree(t->options.ranks, sf_fail(SF_E_MEMORY, "train: no memory for %d rays", t->rays));
   b->rays = t->rays;
   sf_status status = sf_steps_make(&t->intervals, &t->model.config, t->stride);
 #pragma omp parallel for schedule(dynamic, 64)
@@ -181,5 +183,5 @@ sf_status sf_batch_draw(sf_trainer *t)
     for (int r = 0; r < b->rays; r++) place(b, &march[r], r);
   }
   free(march);
-  return status;
+  return sf_ranks_agree(t->options.ranks, status);
 }

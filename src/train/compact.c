@@ -59,12 +59,26 @@ static void exchange(float **a, float **b)
   *b = old;
 }
 
-void sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
+/* Each rank looks at its bundles; all count all rays. */
+static sf_status look_at_all(sf_trainer *t, const sf_loss_plan *plan)
+{
+  sf_batch *b = &t->batch;
+  const int rank = sf_ranks_rank(t->options.ranks);
+  const int first = sf_share_start(t, rank, b->bundles), end = sf_share_start(t, rank + 1, b->bundles);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
+  for (int i = first; i < end; i++) look(t, plan, &b->bundle[i], &t->worker[omp_get_thread_num()]);
+  for (int r = 0; r < b->rays; r++) b->count[r] = b->ray[r].count;
+  sf_share_rays(t);
+  SF_TRY(sf_share(t, b->count, sizeof *b->count));
+  for (int r = 0; r < b->rays; r++) b->ray[r].count = b->count[r];
+  return sf_ok();
+}
+
+sf_status sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
 {
   sf_batch *b = &t->batch;
   const int features = 2 * t->model.config.levels;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int i = 0; i < b->bundles; i++) look(t, plan, &b->bundle[i], &t->worker[omp_get_thread_num()]);
+  SF_TRY(look_at_all(t, plan));
   b->samples = 0;
   for (int r = 0; r < b->rays; r++) {
     b->ray[r].from = b->ray[r].lane;
@@ -85,4 +99,5 @@ void sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
   exchange(&b->x, &b->spare_x);
   exchange(&b->delta, &b->spare_delta);
   exchange(&b->f, &b->df);
+  return sf_ok();
 }

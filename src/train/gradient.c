@@ -21,7 +21,12 @@ sf_status sf_workers_create(sf_trainer *t)
     SF_TRY(sf_ray_work_create(&w->ray, b->ray_samples));
     ok = w->block && w->scratch && w->dsigma && w->dcolour;
   }
-  for (int g = 0; g < GROUPS; g++) ok = (t->group[g].grad = sf_aligned_alloc(b->grad_bytes)) && ok;
+  const int ranks = sf_ranks_size(t->options.ranks);
+  t->edge = calloc((size_t)ranks + 1, sizeof *t->edge);
+  t->in_edge = calloc((size_t)ranks + 1, sizeof *t->in_edge);
+  t->grads = sf_aligned_alloc((ranks > 1 ? 3 : 1) * GROUPS * sf_group_floats(b) * sizeof *t->grads);
+  ok = ok && t->edge && t->in_edge && t->grads;
+  for (int g = 0; ok && g < GROUPS; g++) t->group[g].grad = t->grads + (size_t)g * sf_group_floats(b);
   return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d threads", t->workers);
 }
 
@@ -34,7 +39,9 @@ void sf_workers_free(sf_trainer *t)
     free(t->worker[i].dsigma);
     free(t->worker[i].dcolour);
   }
-  for (int g = 0; g < GROUPS; g++) free(t->group[g].grad);
+  free(t->grads);
+  free(t->edge);
+  free(t->in_edge);
   free(t->worker);
 }
 
@@ -77,8 +84,10 @@ void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *
 
 static void run_bundles(sf_trainer *t, const sf_loss_plan *p)
 {
+  int first, end;
+  sf_share_parts(t, &first, &end);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int part = 0; part < GROUPS; part++) {
+  for (int part = first; part < end; part++) {
     sf_group *g = &t->group[part];
     *g = (sf_group){.grad = g->grad};
     memset(g->grad, 0, t->backbone->grad_bytes);
@@ -115,15 +124,17 @@ static void add_groups(float *const part[GROUPS], size_t n)
       for (size_t i = first; i < n && i < first + chunk; i++) part[0][i] += part[g][i];
 }
 
-void sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
+sf_status sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3])
 {
   double spikes[3] = {0}, fired[3] = {0}, neurons = 0, lanes = 0;
   float *part[GROUPS];
-  t->backbone->prepare(t, plan);
+  SF_TRY(t->backbone->prepare(t, plan));
   sf_charge_begin(t, plan);
   run_bundles(t, plan);
+  SF_TRY(sf_share_groups(t));
+  SF_TRY(t->backbone->share(t));
   for (int g = 0; g < GROUPS; g++) part[g] = t->group[g].grad;
-  add_groups(part, t->backbone->grad_bytes / sizeof(float));
+  if (sf_ranks_size(t->options.ranks) == 1) add_groups(part, t->backbone->grad_bytes / sizeof(float));
   t->backbone->collect(t, part[0]);
   for (int n = 0; n < GROUPS; n++) {
     const sf_group *g = &t->group[n];
@@ -137,6 +148,7 @@ void sf_gradient_run(sf_trainer *t, const sf_loss_plan *plan, sf_loss_sums *mean
     fired[l] = counted > 0 ? fired[l] / counted : 0;
   }
   sf_charge_measured(t, fired);
+  return sf_ok();
 }
 
 double sf_gradient_leaks(sf_trainer *t, const sf_loss_plan *p, const sf_loss_sums *sums)

@@ -165,12 +165,19 @@ static void collect(sf_trainer *t, const void *sum)
   sf_matrix_add(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
 }
 
-static void prepare(sf_trainer *t, const sf_loss_plan *plan)
+static sf_status prepare(sf_trainer *t, const sf_loss_plan *plan)
 {
   encode(t);
   sf_train_prepare(t);
-  sf_batch_compact(t, plan);
+  SF_TRY(sf_batch_compact(t, plan));
   sf_batch_adapt(t);
+  return sf_ok();
+}
+
+static sf_status share(sf_trainer *t)
+{
+  sf_share_blocks(t);
+  return sf_share(t, t->batch.df, (size_t)2 * t->model.config.levels * SF_BLOCK * sizeof(float));
 }
 
 static sf_status check(const sf_trainer *t)
@@ -222,6 +229,7 @@ const sf_backbone sf_backbone_ingp = {.growth = 3e3f,
                                       .draw = sf_batch_draw,
                                       .prepare = prepare,
                                       .bundle = bundle_gradient,
+                                      .share = share,
                                       .collect = collect,
                                       .block_bytes = sizeof(sf_block),
                                       .grad_bytes = sizeof(sf_net_grad),

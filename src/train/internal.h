@@ -5,10 +5,11 @@
 #include "render/march.h"
 #include "render/view.h"
 #include "base/rng.h"
+#include "ranks/ranks.h"
 #include "train/train.h"
 
-/* Work is cut into GROUPS parts that do not depend on the number of threads; each part adds up its own gradient in
- * sample order and the parts are added in order: same seed, same bits, any thread count. */
+/* Work is cut into GROUPS parts that do not depend on the number of threads and ranks; each part adds up its own
+ * gradient in sample order and the parts are added in order: same seed, same bits, any number of threads and ranks. */
 enum { GROUPS = 16, BUNDLE_BLOCKS = 1024 / SF_BLOCK, RAYS_MAX = 1 << 15, RAYS_MIN = 64 };
 
 /* A bundle is closed before it has more samples than this: what two threads keep for their backward passes (12 kB a
@@ -50,6 +51,7 @@ typedef struct sf_batch {
   float *f, *df;                      /* [blocks][features][SF_BLOCK] */
   float *delta;                       /* [blocks][SF_BLOCK] lengths of the samples' intervals, model units */
   float *spare_x, *spare_delta;       /* for compaction; df serves f */
+  int *count;                         /* [RAYS_MAX] of the rays' samples, on their way between ranks */
 } sf_batch;
 
 /* What one iteration trains: weights of the loss's terms. Prefixes count from 1. */
@@ -144,10 +146,12 @@ typedef struct sf_backbone {
   /* Before an iteration: what is empty, how fine the field is; steps: of the prefix that decides what is empty. */
   sf_status (*begin)(sf_trainer *t, int steps);
   sf_status (*draw)(sf_trainer *t); /* rays and their samples */
-  /* Of sf_gradient_run: before the bundles; forward, losses and backward of one bundle; the groups' sum to t->grad. */
-  void (*prepare)(sf_trainer *t, const struct sf_loss_plan *plan);
+  /* Of sf_gradient_run: before the bundles; forward, losses and backward of one bundle; what the ranks' bundles left of
+   * the field's gradient, to all ranks; the groups' sum to t->grad. */
+  sf_status (*prepare)(sf_trainer *t, const struct sf_loss_plan *plan);
   void (*bundle)(sf_trainer *t, const struct sf_loss_plan *plan, const struct sf_bundle *bundle,
                  struct sf_worker *worker, struct sf_group *group);
+  sf_status (*share)(sf_trainer *t);
   void (*collect)(sf_trainer *t, const void *grad);
   size_t block_bytes, grad_bytes;          /* of a block of samples with its activations; of a group's gradient */
   int ray_samples;                         /* that a ray may have */
@@ -157,6 +161,11 @@ typedef struct sf_backbone {
   void (*probe)(const sf_trainer *t, uint64_t stream, uint64_t base, const float x[3], int index,
                 struct sf_probes *probes);
 } sf_backbone;
+/* Of a group's gradient, filled up to whole lines of the cache. */
+static inline size_t sf_group_floats(const sf_backbone *b)
+{
+  return (b->grad_bytes + 63) / 64 * 64 / sizeof(float);
+}
 extern const sf_backbone sf_backbone_ingp, sf_backbone_tensorf;
 
 struct sf_trainer {
@@ -175,6 +184,8 @@ struct sf_trainer {
   sf_steps intervals; /* of this iteration's stride */
   sf_batch batch;
   sf_group group[GROUPS];
+  float *grads;           /* the groups', one after another; of ranks twice as many behind them, for their sum */
+  size_t *edge, *in_edge; /* [ranks + 1], for sf_ranks_share and sf_ranks_exchange */
   sf_worker *worker;
   int workers;
   int64_t iteration, stage_start;
@@ -227,14 +238,36 @@ int sf_batch_blocks(int samples);
 void sf_batch_pack(sf_batch *batch);
 /* Drops the samples behind which the light is gone (sf_opaque) in every prefix that the plan trains, as rendering
  * does: nothing of them would be seen or learned. Needs the features; moves samples and features together. */
-void sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
+sf_status sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
+
+/* ---- parts of an iteration on ranks (share.c); all of it where the trainer is alone ---- */
+
+/* The parts first .. end - 1 of GROUPS that are this rank's. */
+void sf_share_parts(const sf_trainer *trainer, int *first, int *end);
+/* What rank i has of n things that are cut into GROUPS parts: start(i) .. start(i + 1) - 1. */
+static inline int sf_share_start(const sf_trainer *t, int rank, int n)
+{
+  const int part = GROUPS * rank / sf_ranks_size(t->options.ranks);
+  return (int)((int64_t)n * part / GROUPS);
+}
+/* Rays, blocks, or lanes of the ranks' bundles, each cut into parts, to t->edge. */
+void sf_share_rays(sf_trainer *trainer);
+void sf_share_blocks(sf_trainer *trainer);
+/* Elements [count] of which each rank has the slice that t->edge says, to all. */
+sf_status sf_share(sf_trainer *trainer, void *data, size_t size);
+/* After the bundles: the sums of all groups, and of ranks all groups' gradients added to the first. */
+sf_status sf_share_groups(sf_trainer *trainer);
+/* After an iteration: rank 0's clock, and from time to time whether the ranks' models are equal still. */
+sf_status sf_share_end(sf_trainer *trainer);
+/* Before the first: refuses ranks with other pictures, checkpoints or kernels. */
+sf_status sf_share_begin(sf_trainer *trainer, const char *resume);
 
 /* Work arrays of the threads and groups. Free them even after a failure. */
 sf_status sf_workers_create(sf_trainer *trainer);
 void sf_workers_free(sf_trainer *trainer);
 /* Forward, losses and backward of the batch, bundle by bundle: adds the nets' gradient to trainer->grad and leaves what
  * the field's needs. mean: losses per ray. */
-void sf_gradient_run(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
+sf_status sf_gradient_run(sf_trainer *trainer, const sf_loss_plan *plan, sf_loss_sums *mean, double firing[3]);
 /* L_extra's part in the leaks: adds to trainer->grad what the integrators' decay factors get from `sums`, and the slope
  * of the neurons' e^tau; returns the sum of e^tau. */
 double sf_gradient_leaks(sf_trainer *trainer, const sf_loss_plan *plan, const sf_loss_sums *sums);

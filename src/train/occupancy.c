@@ -28,6 +28,7 @@ typedef struct visit {
   const uint32_t *cell; /* NULL: cell i*stride + random */
   size_t count, stride;
   uint64_t stream;
+  float *sigma; /* [count] densities of what was visited */
 } visit;
 
 static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
@@ -40,17 +41,14 @@ static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
 static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, sf_worker *w)
 {
   const sf_config *c = &t->model.config;
-  const size_t cells = (size_t)c->occ_res * (size_t)c->occ_res * (size_t)c->occ_res; /* of a cascade */
   float x[3 * SF_BLOCK];
-  size_t cell[SF_BLOCK];
   const size_t n = v->count - first < SF_BLOCK ? v->count - first : SF_BLOCK;
   for (size_t l = 0; l < SF_BLOCK; l++) {
     const size_t i = first + (l < n ? l : 0);
-    cell[l] = visited_cell(t, v, i);
     float place[3], point[3];
     for (int a = 0; a < 3; a++)
       place[a] = sf_random_float(t->options.seed, RNG_OCCUPANCY_JITTER, ((uint64_t)t->iteration << 24 | i) * 3 + a);
-    sf_occupancy_point(c, cell[l], place, point);
+    sf_occupancy_point(c, visited_cell(t, v, i), place, point);
     for (int a = 0; a < 3; a++) x[a * SF_BLOCK + l] = point[a];
   }
   const float *table = sf_model_param(&t->model, SF_P_GRID);
@@ -58,22 +56,38 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
   for (int level = 0; level < t->model.config.levels; level++)
     t->kernels->grid_forward(&t->model.level[level], table, x, block->f + 2 * level * SF_BLOCK);
   t->kernels->density(t->net, block, steps, w->scratch);
-  const float *sigma = block->sigma[steps - 1];
-  for (size_t l = 0; l < n; l++) {
-    const float width = (float)(1 << cell[l] / cells); /* what counts is how much light a cell takes (instant-ngp) */
-    t->density[cell[l]] = fmaxf(t->density[cell[l]] * decay, sigma[l] * width);
+  memcpy(v->sigma + first, block->sigma[steps - 1], n * sizeof *v->sigma);
+}
+
+/* No cell is visited twice at a time. */
+static void take_density(sf_trainer *t, const visit *v)
+{
+  const sf_config *c = &t->model.config;
+  const size_t cells = (size_t)c->occ_res * (size_t)c->occ_res * (size_t)c->occ_res; /* of a cascade */
+#pragma omp parallel for schedule(static) num_threads(t->workers)
+  for (size_t i = 0; i < v->count; i++) {
+    const size_t cell = visited_cell(t, v, i);
+    const float width = (float)(1 << cell / cells); /* what counts is how much light a cell takes (instant-ngp) */
+    t->density[cell] = fmaxf(t->density[cell] * decay, v->sigma[i] * width);
   }
 }
 
-static void visit_cells(sf_trainer *t, const visit *v, int steps)
+/* Each rank visits as many blocks. */
+static sf_status visit_cells(sf_trainer *t, const visit *v, int steps)
 {
+  const size_t blocks = (v->count + SF_BLOCK - 1) / SF_BLOCK;
+  const int ranks = sf_ranks_size(t->options.ranks), rank = sf_ranks_rank(t->options.ranks);
+  for (int i = 0; i <= ranks; i++) t->edge[i] = blocks * (size_t)i / (size_t)ranks;
+  const size_t begin = t->edge[rank], own = t->edge[rank + 1] - begin;
   sf_train_prepare(t);
 #pragma omp parallel for schedule(static) num_threads(t->workers)
-  for (int part = 0; part < t->workers; part++) {
-    const size_t blocks = (v->count + SF_BLOCK - 1) / SF_BLOCK;
-    for (size_t b = blocks * part / t->workers; b < blocks * (part + 1) / t->workers; b++)
-      visit_block(t, v, steps, b * SF_BLOCK, &t->worker[part]);
-  }
+  for (int part = 0; part < t->workers; part++)
+    for (size_t b = own * part / t->workers; b < own * (part + 1) / t->workers; b++)
+      visit_block(t, v, steps, (begin + b) * SF_BLOCK, &t->worker[part]);
+  for (int i = 0; i <= ranks; i++) t->edge[i] = t->edge[i] * SF_BLOCK < v->count ? t->edge[i] * SF_BLOCK : v->count;
+  SF_TRY(sf_share(t, v->sigma, sizeof *v->sigma));
+  take_density(t, v);
+  return sf_ok();
 }
 
 static void threshold(sf_trainer *t, size_t cells)
@@ -115,11 +129,13 @@ static size_t list_neighbours(const sf_trainer *t, uint32_t *list, size_t occupi
 }
 
 /* As many of the listed cells as an update visits, spread over the list. */
-static void visit_list(sf_trainer *t, const uint32_t *list, size_t count, size_t most, uint64_t stream, int steps)
+static sf_status visit_list(sf_trainer *t, visit *v, size_t count, size_t most, uint64_t stream, int steps)
 {
   const size_t stride = (count + most - 1) / most;
-  const visit some = {list, stride ? count / stride : 0, stride ? stride : 1, stream};
-  if (some.count) visit_cells(t, &some, steps);
+  v->count = stride ? count / stride : 0;
+  v->stride = stride ? stride : 1;
+  v->stream = stream;
+  return v->count ? visit_cells(t, v, steps) : sf_ok();
 }
 
 static bool is_sweep(int64_t iteration)
@@ -129,23 +145,25 @@ static bool is_sweep(int64_t iteration)
   return false;
 }
 
-static void update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen)
+static sf_status update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen, float *sigma)
 {
   const size_t cells = sf_config_cells(&t->model.config);
   const size_t share = SHARE * (size_t)sf_config_cascades(&t->model.config), most = cells / share;
   if (is_sweep(t->iteration)) {
     memset(t->density, 0, cells * sizeof *t->density);
-    visit_cells(t, &(visit){NULL, cells, 1, RNG_OCCUPANCY}, steps);
+    SF_TRY(visit_cells(t, &(visit){NULL, cells, 1, RNG_OCCUPANCY, sigma}, steps));
   } else {
     size_t occupied = 0;
     for (size_t i = 0; i < cells; i++)
       if (t->model.occupancy[i / 8] >> (i % 8) & 1) list[occupied++] = (uint32_t)i;
-    visit_cells(t, &(visit){NULL, most, share, RNG_OCCUPANCY}, steps);
-    visit_list(t, list, occupied, most, RNG_OCCUPANCY + 16, steps);
+    visit listed = {.cell = list, .sigma = sigma};
+    SF_TRY(visit_cells(t, &(visit){NULL, most, share, RNG_OCCUPANCY, sigma}, steps));
+    SF_TRY(visit_list(t, &listed, occupied, most, RNG_OCCUPANCY + 16, steps));
     const size_t near = list_neighbours(t, list, occupied, seen);
-    visit_list(t, list, near, most, RNG_OCCUPANCY + 32, steps);
+    SF_TRY(visit_list(t, &listed, near, most, RNG_OCCUPANCY + 32, steps));
   }
   threshold(t, cells);
+  return sf_ok();
 }
 
 sf_status sf_occupancy_update(sf_trainer *t, int steps)
@@ -154,9 +172,13 @@ sf_status sf_occupancy_update(sf_trainer *t, int steps)
   if (t->iteration < FIRST) return sf_ok();
   uint32_t *list = malloc(cells * sizeof *list);
   uint8_t *seen = malloc(cells / 8);
-  if (list && seen) update(t, steps, list, seen);
-  const bool ok = list && seen;
+  float *sigma = malloc(cells * sizeof *sigma);
+  sf_status status =
+      list && seen && sigma ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for the occupancy update");
+  status = sf_ranks_agree(t->options.ranks, status);
+  if (!status.code) status = update(t, steps, list, seen, sigma);
   free(list);
   free(seen);
-  return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for the occupancy update");
+  free(sigma);
+  return status;
 }

@@ -3,6 +3,7 @@
 #define SF_TRAIN_TRAIN_H
 #include "snn/model.h"
 #include "scene/scene.h"
+#include "ranks/ranks.h"
 
 /* What is trained while t* is searched. */
 typedef enum {
@@ -41,6 +42,7 @@ typedef struct sf_train_options {
    * tenth of the rates, with the weights rounded as the exporter will. Not owned; replaces config. NULL: from scratch.
    */
   const sf_model *start;
+  sf_ranks *ranks;     /* that share the work of an iteration; not owned; NULL: alone */
   const cJSON *record; /* strings that a checkpoint keeps in its metadata, by key; not owned; NULL: none */
 } sf_train_options;
 
@@ -95,7 +97,11 @@ typedef struct sf_train_stats {
 
 typedef struct sf_trainer sf_trainer;
 
-/* data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config.
+/* Of ranks, every rank calls these functions in the same order, with the same options, data and checkpoint; all have
+ * the same model afterwards, and the same failure where one of them fails. sf_trainer_save is for one of them alone.
+ * The bits do not depend on how many there are.
+ *
+ * data must outlive the trainer. resume: a checkpoint to continue from, or NULL; its config replaces options->config.
  * It is refused where the data's scale, NDC or views, or the options' bound, are not those that it was made with. */
 sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const sf_train_options *options,
                             const char *resume);

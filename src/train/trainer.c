@@ -171,7 +171,8 @@ sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const 
   t->options = *options;
   t->data = data;
   t->kernels = sf_kernels_training();
-  sf_status status = create(t, resume);
+  sf_status status = sf_ranks_agree(t->options.ranks, create(t, resume));
+  if (!status.code) status = sf_share_begin(t, resume);
   if (status.code)
     sf_trainer_free(t);
   else
@@ -340,12 +341,12 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   const double start = sf_seconds();
   const int stage = t->stage;
   sf_tuning_round(t);
-  SF_TRY(t->backbone->begin(t, occupancy_steps(t)));
+  SF_TRY(sf_ranks_agree(t->options.ranks, t->backbone->begin(t, occupancy_steps(t))));
   SF_TRY(t->backbone->draw(t));
   SF_TRY(check_samples(t));
   const sf_loss_plan plan = make_plan(t);
   sf_loss_sums mean = {0};
-  sf_gradient_run(t, &plan, &mean, t->firing);
+  SF_TRY(sf_gradient_run(t, &plan, &mean, t->firing));
   const double e_tau = sf_gradient_leaks(t, &plan, &mean);
   double mse = 0;
   for (int i = 0; i < plan.steps; i++) mse += plan.weight[i] * mean.prefix[i];
@@ -366,6 +367,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   SF_TRY(sf_health_check(t, event));
   /* A process that was stopped meanwhile has not trained: a pause is no share of a time budget. */
   t->last_step = fmin(sf_seconds() - start, t->iteration < 16 ? INFINITY : longest * t->seconds / (double)t->iteration);
+  SF_TRY(sf_share_end(t));
   t->seconds += t->last_step;
   t->samples += t->batch.samples;
   const double before = t->progress;

@@ -36,6 +36,7 @@ static void destroy(sf_trainer *t)
   free(vm->ray);
   free(vm->x);
   free(vm->dproduct);
+  free(vm->wire);
   free(vm);
 }
 
@@ -91,6 +92,7 @@ const sf_backbone sf_backbone_tensorf = {.growth = 1,
                                          .draw = sf_vm_draw,
                                          .prepare = sf_vm_prepare,
                                          .bundle = sf_vm_bundle,
+                                         .share = sf_vm_share,
                                          .collect = sf_vm_collect,
                                          .block_bytes = sizeof(sf_decoder_block),
                                          .grad_bytes = sizeof(sf_decoder_grad),

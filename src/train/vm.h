@@ -22,16 +22,23 @@ typedef struct sf_vm {
   sf_vm_ray_samples *ray; /* [RAYS_MAX] */
   float *x, *dproduct;    /* of the lanes of the batch: [lanes][3], [lanes][products] */
   int lanes_capacity;
+  float *wire; /* between ranks */
+  size_t wire_capacity;
   int event;       /* of the schedule, to come */
   int64_t fresh;   /* iteration at which the optimiser started anew */
   double fresh_at; /* progress there */
 } sf_vm;
 
 sf_status sf_vm_draw(sf_trainer *trainer);
+/* Room for so many samples. */
+sf_status sf_vm_part_reserve(sf_vm_part *part, int samples);
+/* The rays and samples of the ranks' parts to all. */
+sf_status sf_vm_share_draw(sf_trainer *trainer);
 /* Those of sf_backbone. */
-void sf_vm_prepare(sf_trainer *trainer, const sf_loss_plan *plan);
+sf_status sf_vm_prepare(sf_trainer *trainer, const sf_loss_plan *plan);
 void sf_vm_bundle(sf_trainer *trainer, const sf_loss_plan *plan, const sf_bundle *bundle, sf_worker *worker,
                   sf_group *group);
+sf_status sf_vm_share(sf_trainer *trainer);
 void sf_vm_collect(sf_trainer *trainer, const void *grad);
 void sf_vm_update(sf_trainer *trainer);
 /* Runs what the schedule asks for at the current progress: masks, shrinking, upsampling. */

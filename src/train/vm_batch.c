@@ -7,20 +7,6 @@
 
 enum { ATTEMPTS = 8 }; /* for a ray that meets the mask */
 
-static sf_status part_reserve(sf_vm_part *p)
-{
-  if (p->used + SF_RAY_SAMPLES <= p->capacity) return sf_ok();
-  const int capacity = 2 * p->capacity + 16 * SF_RAY_SAMPLES;
-  float **const array[] = {&p->x, &p->sigma, &p->slope, &p->weight};
-  for (int i = 0; i < 4; i++) {
-    float *bigger = realloc(*array[i], (size_t)capacity * (i ? 1 : 3) * sizeof **array[i]);
-    if (!bigger) return sf_fail(SF_E_MEMORY, "train: no memory for %d samples", capacity);
-    *array[i] = bigger;
-  }
-  p->capacity = capacity;
-  return sf_ok();
-}
-
 static sf_march draw(const sf_trainer *t, uint64_t index, sf_ray *ray)
 {
   sf_march march;
@@ -92,18 +78,22 @@ sf_status sf_vm_draw(sf_trainer *t)
   vm->appearance = sf_vm_field_of(&seen, true);
   b->rays = t->rays;
   SF_TRY(sf_steps_make(&t->intervals, &t->model.config, t->stride));
+  int first, end;
+  sf_share_parts(t, &first, &end);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int part = 0; part < GROUPS; part++) {
+  for (int part = first; part < end; part++) {
     sf_vm_part *p = &vm->part[part];
     p->used = 0;
     for (int r = b->rays * part / GROUPS; r < b->rays * (part + 1) / GROUPS && !status[part].code; r++) {
       const sf_march march = draw(t, base + (uint64_t)r, &b->ray[r]);
-      status[part] = part_reserve(p);
+      status[part] = sf_vm_part_reserve(p, p->used + SF_RAY_SAMPLES);
       vm->ray[r].part = part;
       if (!status[part].code) look(t, r, &march, p);
     }
   }
-  for (int part = 0; part < GROUPS; part++) SF_TRY(status[part]);
+  for (int part = 1; part < GROUPS && !status[0].code; part++) status[0] = status[part];
+  SF_TRY(sf_ranks_agree(t->options.ranks, status[0]));
+  SF_TRY(sf_vm_share_draw(t));
   b->marched = b->samples = 0;
   for (int r = 0; r < b->rays; r++) {
     b->marched += vm->ray[r].count;
@@ -111,7 +101,7 @@ sf_status sf_vm_draw(sf_trainer *t)
   }
   sf_batch_pack(b);
   const int lanes = b->blocks * SF_BLOCK, products = (sf_tensorf_products(&t->model.config.tensorf) + 15) / 16 * 16;
-  SF_TRY(reserve_lanes(vm, lanes, products));
+  SF_TRY(sf_ranks_agree(t->options.ranks, reserve_lanes(vm, lanes, products)));
   if (lanes > 0) memset(vm->x, 0, (size_t)lanes * 3 * sizeof *vm->x);
   for (int r = 0; r < b->rays; r++) place(t, r);
   return sf_ok();

@@ -91,13 +91,14 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   }
 }
 
-void sf_vm_prepare(sf_trainer *t, const sf_loss_plan *plan)
+sf_status sf_vm_prepare(sf_trainer *t, const sf_loss_plan *plan)
 {
   (void)plan;
   const sf_model seen = sf_tuning_nets(t);
   const sf_decoder_view view = sf_decoder_view_of(&seen);
   t->kernels->decoder_prepare(&view, t->vm->decoder);
   sf_batch_adapt(t);
+  return sf_ok();
 }
 
 void sf_vm_collect(sf_trainer *t, const void *sum)

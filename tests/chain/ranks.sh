@@ -24,7 +24,7 @@ plain() { grep -aEv '"(seconds|jobs|pixels_per_second)":' "$1" | sed 's/time="[0
 same() { cmp -s <(plain "$1") <(plain "$2") || fail "$3: $1 and $2 differ: $(diff <(plain "$1") <(plain "$2") | head -n 4)"; }
 
 # ---- a program that is started by itself knows nothing of MPI ----
-for program in sf_cosim sim_render energy_audit; do
+for program in sf_cosim sim_render energy_audit sf_train; do
   LD_DEBUG=files "$bin/$program" --version 2>&1 | grep -q 'libmpi' && fail "$program loads MPI without a launcher"
 done
 
@@ -125,5 +125,55 @@ audit=(scene.snn frame --rtl-rays 1 --recount-rays 100 -q --json --csv audit.csv
 job 4 "$bin/energy_audit" "${audit[@]}" >audit4.json 2>audit.err || fail "energy_audit: $(cat audit.err)"
 same audit4.json audit0.json "audit"
 same audit.csv audit0.csv "audit"
+
+# ---- sf_train: model and log, both fields, the twin, a charge; with other numbers of threads, too ----
+"$bin/sf_scene" textured -o photos --size 16 --train 6 --test 3 >/dev/null
+small="--samples 768 --occ-res 16 --hidden 16 --stage1 6 --stage2 28 --seed 3 --psnr-prefixes 1 --eval-views 2 --no-scaling"
+grid="--levels 6 --log2-hash 9"
+train() { # NAME RANKS ARGS...: 0 ranks for no launcher
+  local launch=()
+  [ "$2" -eq 0 ] || launch=(job "$2")
+  "${launch[@]}" "$bin/sf_train" photos $small -q --json -o "$1.model" "${@:3}" >"$1.json" 2>"$1.err"
+}
+timeless() { sed -E 's/"(seconds|samples_per_second|model|ranks|sent_bytes)":[^,]*,//g' "$1"; }
+alike() { # NAME REFERENCE TEXT
+  cmp -s "$1.model" "$2.model" || fail "$3: the model differs"
+  cmp -s <(timeless "$1.model.jsonl") <(timeless "$2.model.jsonl") || fail "$3: the log differs"
+  cmp -s <(timeless "$1.json") <(timeless "$2.json") || fail "$3: the report differs"
+}
+for net in "grid 0 $grid" "grid 2 $grid" "grid 3 $grid --threads 2" "grid 8 $grid" "twin 0 $grid --net ann" "twin 4 $grid --net ann" \
+  "charge 0 $grid --fixed-steps 3 --charge 1" "charge 3 $grid --fixed-steps 3 --charge 1" \
+  "planes 0 --backbone tensorf --voxels 20" "planes 2 --backbone tensorf --voxels 20" "planes 3 --backbone tensorf --voxels 20"; do
+  read -r name ranks args <<<"$net"
+  train $name$ranks $ranks $args || fail "sf_train, $ranks ranks, $args: $(cat $name$ranks.err)"
+  alike $name$ranks ${name}0 "$ranks ranks, $args"
+done
+grep -q '"measured":[1-9]' grid0.json || fail "no iteration ran all steps"
+grep -q '"sent_bytes":[1-9]' grid2.json || fail "two ranks did not speak to each other"
+
+# ---- sf_train: killed, interrupted; --resume with another number of ranks ----
+for how in "-KILL 1 2" "-KILL 0 0" "-INT job 3"; do
+  read -r signal victim others <<<"$how"
+  rm -f cut.model*
+  [ "$victim" = job ] && export OMPI_MCA_odls_base_sigkill_timeout=5 || unset OMPI_MCA_odls_base_sigkill_timeout
+  mpirun --oversubscribe -n 3 "$bin/sf_train" photos $small $grid -q --json -o cut.model --checkpoint-minutes 0 >cut.json 2>cut.err &
+  parent=$!
+  await cut.model
+  [ "$victim" = job ] && pid=$parent || pid=$(pid_of "$victim" $parent)
+  begun=$(date +%s)
+  kill "$signal" "$pid"
+  wait $parent && fail "sf_train, $how: success"
+  [ $(($(date +%s) - begun)) -le 10 ] || fail "sf_train, $how: the job ended after $(($(date +%s) - begun)) s"
+  case $how in
+    -KILL*) grep -q "process rank $victim .* exited on signal 9" cut.err || fail "sf_train, $how: no line names the rank: $(cat cut.err)" ;;
+    *) grep -q 'interrupted at iteration [0-9]*; continue with --resume' cut.err || fail "sf_train, $how: $(cat cut.err)" ;;
+  esac
+  train cut "$others" --resume || fail "sf_train, $how: going on: $(cat cut.err)"
+  cmp -s cut.model grid0.model || fail "sf_train, $how: going on with $others ranks gives another model"
+done
+unset OMPI_MCA_odls_base_sigkill_timeout
+mkdir dark && "$bin/sf_scene" textured -o dark/photos --size 16 --train 6 --test 3 >/dev/null
+cp photos/train/r_1.png dark/photos/train/r_0.png
+refused 1 "has another data set than rank 0" -n 1 "$bin/sf_train" photos $small -q -o x.model : -n 1 -wdir "$work/dark" "$bin/sf_train" photos $small -q -o x.model
 
 finish "1, 2, 3, 4 ranks, killed, interrupted and continued: what one process gives"

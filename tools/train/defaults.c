@@ -3,7 +3,9 @@
 
 void train_field_defaults(train_arguments *a, const sf_dataset *data)
 {
+  sf_ranks *ranks = a->train.ranks;
   a->train = data ? sf_train_defaults_tensorf(data) : sf_train_defaults();
+  a->train.ranks = ranks;
   a->theta = (double)a->train.config.theta[0];
 }
 

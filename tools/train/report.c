@@ -102,6 +102,10 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   cJSON_AddNumberToObject(json, "seed", (double)a->train.seed);
   cJSON_AddNumberToObject(json, "iterations", (double)s->iteration);
   cJSON_AddNumberToObject(json, "seconds", s->seconds);
+  if (sf_ranks_size(a->train.ranks) > 1) {
+    cJSON_AddNumberToObject(json, "ranks", sf_ranks_size(a->train.ranks));
+    cJSON_AddNumberToObject(json, "sent_bytes", (double)sf_ranks_sent(a->train.ranks));
+  }
   cJSON_AddNumberToObject(json, "samples_per_second", s->samples_per_second);
   cJSON_AddNumberToObject(json, "T", c->steps);
   cJSON_AddNumberToObject(json, "t_r", s->t_r);
