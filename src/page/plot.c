@@ -2,7 +2,7 @@
 #include "page/draw.h"
 #include <math.h>
 
-enum { WIDTH = 480, LEFT = 4, RIGHT = WIDTH - 4, ROW = 74, PLOT = 46, FOOT = 36 };
+enum { WIDTH = 480, LEFT = 10, RIGHT = WIDTH - 10, ROW = 74, PLOT = 46, FOOT = 36 };
 
 static double place(const html_axis *axis, int i)
 {
@@ -56,9 +56,11 @@ static void put_row(FILE *out, const html_axis *axis, const html_row *row, int t
   const double foot = top + 22 + PLOT;
   double low, high;
   range_of(row, axis->n, &low, &high);
-  svg_text(out, LEFT, top + 14, "lab", "%s", row->title);
-  svg_text(out, RIGHT, top + 14, "num mut end", low < 0 ? "%.4g to %.4g %s" : "%.0g to %.4g %s", low, high, row->unit);
+  svg_text(out, 0, top + 14, "lab", "%s", row->title);
+  svg_text(out, WIDTH, top + 14, "num mut end", low < 0 ? "%.3g to %.3g %s" : "%.0g to %.4g %s", low, high, row->unit);
   svg_line(out, LEFT, height(0, low, high, foot), RIGHT, height(0, low, high, foot), "ax");
+  if (axis->mark >= 0 && axis->mark < axis->n)
+    svg_line(out, place(axis, axis->mark), top + 20, place(axis, axis->mark), foot, "mark");
   if (row->bars)
     put_bars(out, axis, row, low, high, foot);
   else
@@ -69,12 +71,10 @@ void html_rows(FILE *out, const char *id, const char *title, const html_axis *ax
 {
   const int foot = ROW * rows;
   svg_begin(out, id, WIDTH, foot + FOOT, title, axis->title);
-  if (axis->n > 0 && axis->mark >= 0 && axis->mark < axis->n)
-    svg_line(out, place(axis, axis->mark), 18, place(axis, axis->mark), foot, "mark");
   for (int i = 0; i < rows && axis->n > 0; i++) put_row(out, axis, &row[i], ROW * i);
   if (axis->n > 0) {
-    svg_text(out, LEFT, foot + 16, "num mut", "%.4g", axis->x[0]);
-    svg_text(out, RIGHT, foot + 16, "num mut end", "%.4g", axis->x[axis->n - 1]);
+    svg_text(out, 0, foot + 16, "num mut", "%.4g", axis->x[0]);
+    svg_text(out, WIDTH, foot + 16, "num mut end", "%.4g", axis->x[axis->n - 1]);
   }
   svg_text(out, (LEFT + RIGHT) / 2.0, foot + 16, "mut mid", "%s", axis->title);
   svg_end(out);

@@ -12,6 +12,7 @@ View.Side.prototype = {
   resize: function (width, height) {
     if (this.canvas.width === width && this.canvas.height === height) { return; }
     this.canvas.width = width, this.canvas.height = height;
+    View.$('stage').style.setProperty('--ratio', width / height);
   },
   stop: function () { if (this.running) { this.running.abort(); } this.running = null; },
   colour: function (rgba, value, low, high) {
