@@ -93,7 +93,7 @@ CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
 DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc sf_view
 # Those that drive the Verilated accelerator.
-DUT_TESTS := bench bench_field test_three_counts $(filter test_rtl% test_soc%,$(TESTS))
+DUT_TESTS := bench bench_field test_three_counts test_viewer $(filter test_rtl% test_soc%,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
@@ -175,14 +175,14 @@ $B/bin/sim_render: $B/obj/tools/render/options.o
 $B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
 
 # They serve a page (libmicrohttpd-dev).
-$B/bin/sf_view $B/bin/sf_train $B/tests/test_view: LIBS += $(shell pkg-config --libs libmicrohttpd)
+$B/bin/sf_view $B/bin/sf_train $B/tests/test_view $B/tests/test_viewer: LIBS += $(shell pkg-config --libs libmicrohttpd)
 
 # Prices of technologies, found beside the program.
 TECHS := $(wildcard share/tech/*.tech)
 $B/share/spikefield/tech/%.tech: share/tech/%.tech
 	@mkdir -p $(@D)
 	$Qcp $< $@
-$B/bin/energy_audit $B/bin/sf_view: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
+$B/bin/energy_audit $B/bin/sf_view $B/tests/test_viewer: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 
 # Tests

@@ -87,7 +87,7 @@ static sf_status draw_along(const sf_story *s, int sample, cJSON *to)
 /* Columns: samples that went through the nets, each with its steps; rows: neurons. */
 static sf_status draw_raster(const sf_story *s, int layer, int decoded, cJSON *to)
 {
-  static const uint8_t palette[] = {0, 0, 0, 0, 128, 128, 128, 40, 0, 114, 178, 255};
+  static const uint8_t palette[] = {0, 0, 0, 0, 128, 128, 128, 40, 43, 133, 194, 255};
   const int steps = s->scene->net.steps, rows = s->scene->net.layer[layer].n_out, columns = decoded * steps;
   char *text = NULL, name[24], alt[80];
   size_t size;

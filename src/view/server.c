@@ -251,11 +251,11 @@ static sf_status start(sf_view_server *server)
   const unsigned flags = MHD_USE_THREAD_PER_CONNECTION | MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_AUTO |
                          MHD_USE_ERROR_LOG | (six ? MHD_USE_IPv6 : 0);
   errno = 0;
-  server->daemon = MHD_start_daemon(
-      flags, (uint16_t)server->options.port, NULL, NULL, handle, server, MHD_OPTION_EXTERNAL_LOGGER, no_log, NULL,
-      MHD_OPTION_SOCK_ADDR, (struct sockaddr *)&address, MHD_OPTION_CONNECTION_LIMIT, (unsigned)SF_VIEW_CONNECTIONS,
-      MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY,
-      MHD_OPTION_LISTENING_ADDRESS_REUSE, 1u, MHD_OPTION_END);
+  server->daemon =
+      MHD_start_daemon(flags, (uint16_t)server->options.port, NULL, NULL, handle, server, MHD_OPTION_EXTERNAL_LOGGER,
+                       no_log, NULL, MHD_OPTION_SOCK_ADDR, (struct sockaddr *)&address, MHD_OPTION_CONNECTION_LIMIT,
+                       (unsigned)SF_VIEW_CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE,
+                       MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY, MHD_OPTION_END);
   if (!server->daemon)
     return sf_fail(SF_E_IO, "cannot listen on %s port %d: %s", text, server->options.port,
                    errno ? strerror(errno) : "the server does not start");
