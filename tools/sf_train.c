@@ -1,6 +1,7 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
 #include "quant/quant.h"
 #include "tools/train/report.h"
+#include "tools/train/watch.h"
 #include "base/clock.h"
 #include <errno.h>
 #include <math.h>
@@ -43,7 +44,8 @@ static sf_status keep_learned(const sf_trainer *trainer, const train_arguments *
   return sf_ok();
 }
 
-static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, sf_train_stats *s, keeper *k)
+static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, train_watch *watch, sf_train_stats *s,
+                      keeper *k)
 {
   sf_progress progress;
   train_recent r = {0};
@@ -56,6 +58,7 @@ static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, 
       sf_progress_end(&progress);
       return k->good ? sf_fail(status.code, "%s (last good checkpoint: %s)", status.message, a->output) : status;
     }
+    sf_view_training_step(watch->page, sf_trainer_model(trainer), s);
     train_smooth(&r, s);
     train_warn(&progress, s);
     if (s->iteration % 16 == 0 || s->stage == 3) train_log_line(log, s, sf_trainer_model(trainer)->config.steps);
@@ -178,13 +181,14 @@ static sf_status finish(const sf_trainer *trainer, const char *data_path, const 
   return train_report(a, &model->config, s, &q);
 }
 
-static sf_status learn(sf_trainer *trainer, const train_arguments *a, sf_train_stats *stats, keeper *k)
+static sf_status learn(sf_trainer *trainer, const train_arguments *a, train_watch *watch, sf_train_stats *stats,
+                       keeper *k)
 {
   if (stats->stage == 3) return sf_ok();
   FILE *log = fopen(a->log, a->resume ? "a" : "w");
   if (!log) return sf_fail(SF_E_IO, "%s: cannot open the log for writing: %s", a->log, strerror(errno));
   setvbuf(log, NULL, _IOLBF, 0);
-  sf_status status = loop(trainer, a, log, stats, k);
+  sf_status status = loop(trainer, a, log, watch, stats, k);
   if (fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
   return status.code ? status : keep_learned(trainer, a, k);
 }
@@ -197,10 +201,14 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
   sf_train_stats stats = sf_trainer_stats(trainer);
   sf_status status = sf_ok();
   keeper k = {0};
-  if (sf_cli_interrupted()) status = sf_fail(SF_E_STOPPED, "interrupted before the training: nothing was written");
-  if (!status.code) status = learn(trainer, a, &stats, &k);
+  train_watch watch;
+  status = train_watch_open(&watch, a, path, how);
+  if (!status.code && sf_cli_interrupted())
+    status = sf_fail(SF_E_STOPPED, "interrupted before the training: nothing was written");
+  if (!status.code) status = learn(trainer, a, &watch, &stats, &k);
   if (!status.code) status = finish(trainer, path, how, a, &stats, &k);
   if (!status.code && !k.finished) status = sf_trainer_save(trainer, a->output, false);
+  train_watch_close(&watch);
   sf_trainer_free(trainer);
   return status;
 }

@@ -23,9 +23,12 @@ struct sf_viewer {
   pthread_mutex_t photo_turn;
   sf_shot photo;     /* the last view that was asked for; view NULL: none yet */
   sf_replay *replay; /* or NULL */
-  cJSON *difference; /* of it */
+  cJSON *difference; /* of it: an object, empty where the file tells nothing */
+  char *scene_path;  /* of it, malloc'ed */
 };
 
+/* Replay and difference; scene, data and split, where the options name none. */
+sf_status sf_viewer_load_difference(sf_viewer *v);
 double sf_viewer_middle(const fx_scene *scene, int axis); /* of the box, model units */
 
 /* ---- a view, and what is drawn of it ---- */

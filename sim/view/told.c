@@ -26,10 +26,11 @@ static SF_VIEWER_ANSWER(view)
   return sf_view_reply_json(reply, json);
 }
 
-const sf_view_route sf_viewer_routes[] = {{"/", sf_viewer_page},         {"/scene", sf_viewer_scene},
-                                          {"/view", sf_viewer_view},     {"/picture", sf_viewer_picture},
-                                          {"/save", sf_viewer_save},     {"/story", sf_viewer_story},
-                                          {"/replay", sf_viewer_replay}, {NULL, NULL}};
+const sf_view_route sf_viewer_routes[] = {{"/", sf_viewer_page},           {"/scene", sf_viewer_scene},
+                                          {"/view", sf_viewer_view},       {"/picture", sf_viewer_picture},
+                                          {"/save", sf_viewer_save},       {"/story", sf_viewer_story},
+                                          {"/replay", sf_viewer_replay},   {"/difference", sf_viewer_difference},
+                                          {"/signals", sf_viewer_signals}, {NULL, NULL}};
 
 static void add_maps(cJSON *json)
 {
@@ -74,6 +75,7 @@ cJSON *sf_viewer_json(sf_viewer *v)
     cJSON_AddNumberToObject(layer, "neurons", net->layer[l].n_out);
     cJSON_AddItemToArray(layers, layer);
   }
+  cJSON_AddBoolToObject(json, "difference", v->replay != NULL);
   cJSON_AddNumberToObject(json, "near", v->data.ndc ? (double)v->data.ndc_near : 0);
   add_maps(json), add_palette(json);
   return json;

@@ -104,6 +104,7 @@ static sf_status open_model(sf_viewer *v)
 static sf_status open_all(sf_viewer *v)
 {
   const sf_viewer_options *o = &v->options;
+  if (o->replay) SF_TRY(sf_viewer_load_difference(v));
   const sf_studio_options how = {.backend = SF_BACKEND_FIXED,
                                  .scene = o->scene,
                                  .data = o->data,
@@ -144,7 +145,7 @@ void sf_viewer_close(sf_viewer *v)
   sf_studio_close(&v->real);
   sf_studio_close(&v->fixed);
   cJSON_Delete(v->difference);
-  free(v->replay);
+  free(v->replay), free(v->scene_path);
   pthread_mutex_destroy(&v->drawing), pthread_mutex_destroy(&v->rtl_turn), pthread_mutex_destroy(&v->photo_turn);
   free(v);
 }

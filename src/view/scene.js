@@ -122,13 +122,14 @@ View.json('/scene').then(function (scene) {
   }
 
   // ---- views ----
-  function go(index) {
+  function go(index, then) {
     index = (index + scene.views) % scene.views;
     View.json('/view', { view: index }).then(function (v) {
       camera = new View.Camera(v.camera, scene), home = new View.Camera(v.camera, scene);
       state.view = index, $('view').value = index;
       View.put('view-name', v.name);
       mark(null), still(0);
+      if (then) { then(); }
     }).catch(View.told);
   }
   $('view').addEventListener('change', function () { go(Number($('view').value) || 0); });
@@ -302,7 +303,7 @@ View.json('/scene').then(function (scene) {
   });
 
   View.viewer = { camera: function () { return camera; }, story: story, go: go };
-  if (scene.difference) { View.Difference(scene, View.viewer, choose, mark); }
-  if (scene.views) { View.json('/view', { view: 0 }).then(function (v) { View.put('view-name', v.name); }); }
+  if (scene.difference) { View.Difference(scene, choose, go, saveAs); }
+  else if (scene.views) { View.json('/view', { view: 0 }).then(function (v) { View.put('view-name', v.name); }); }
   still(0);
 }).catch(View.told);

@@ -16,12 +16,13 @@ TEXT(view_common_js, "common.js");
 TEXT(view_camera_js, "camera.js");
 TEXT(view_picture_js, "picture.js");
 TEXT(view_story_js, "story.js");
+TEXT(view_difference_js, "difference.js");
 TEXT(view_scene_js, "scene.js");
 TEXT(view_training_html, "training.html");
 TEXT(view_training_js, "training.js");
 TEXT(view_style, "view.css");
 extern const char view_scene_html[], view_common_js[], view_camera_js[], view_picture_js[], view_story_js[],
-    view_scene_js[], view_training_html[], view_training_js[], view_style[];
+    view_difference_js[], view_scene_js[], view_training_html[], view_training_js[], view_style[];
 
 static sf_status put_style(FILE *out, const sf_template_value *value, void *user)
 {
@@ -40,8 +41,8 @@ static sf_status put_script(FILE *out, const sf_template_value *value, void *use
 sf_status sf_view_page_make(sf_view_page page, sf_view_reply *reply)
 {
   static const sf_template_call functions[] = {{"style", 0, put_style}, {"script", 0, put_script}, {NULL, 0, NULL}};
-  static const char *const of_scene[] = {view_common_js, view_camera_js, view_picture_js,
-                                         view_story_js,  view_scene_js,  NULL};
+  static const char *const of_scene[] = {
+      view_common_js, view_camera_js, view_picture_js, view_story_js, view_difference_js, view_scene_js, NULL};
   static const char *const of_training[] = {view_common_js, view_training_js, NULL};
   const bool scene = page == SF_VIEW_PAGE_SCENE;
   char *text = NULL;

@@ -84,7 +84,7 @@ double sf_view_idle(const sf_view_server *server);
 void sf_view_browse(const sf_view_server *server);
 void sf_view_close(sf_view_server *server); /* replies in pieces end; NULL is fine */
 
-/* The pages, each one text with style and script inside. data: what {{data}} of the page becomes, or NULL. */
+/* The pages, each one text with style and script inside. */
 typedef enum { SF_VIEW_PAGE_SCENE, SF_VIEW_PAGE_TRAINING } sf_view_page;
 sf_status sf_view_page_make(sf_view_page page, sf_view_reply *reply);
 #endif

@@ -15,5 +15,8 @@ mkdir -p "$build/tests/view"
   "$build/bin/sf_train" "$work/set" -o "$work/model.safetensors" --stage1 30 --stage2 60 --samples 2048 --levels 6 --log2-hash 12 \
     --finest-res 64 --lattice 128 --occ-res 32 --quiet --json >/dev/null &&
   "$build/bin/sf_export" "$work/model.safetensors" -o "$work/trained.snn" >/dev/null || fail "a small scene"
+"$build/faults/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --seed 7 --limit-samples 1000 --quiet --evidence "$work/evidence" \
+  --plusarg "+fault=1" >"$work/fault.out" 2>&1
+[ -s "$work/evidence.json" ] || fail "a planted fault: $(cat "$work/fault.out")"
 "$python" "$here/../view/browse.py" "$build" "$work" "$chromium" || fail "the browser, see above"
 finish "the pages work"

@@ -29,12 +29,12 @@ def program(name, *arguments):
 
 
 class Served:
-    """A program that prints its page's address first."""
+    """A program that prints its page's address first, on standard output or error."""
 
-    def __init__(self, name, *arguments):
+    def __init__(self, name, *arguments, stream="stdout"):
         self.process = subprocess.Popen([os.path.join(BUILD, "bin", name), *arguments], cwd=WORK, text=True,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        self.url = self.process.stdout.readline().strip()
+        self.url = getattr(self.process, stream).readline().strip().split(" ")[-1]
         if not self.url.startswith("http://127.0.0.1:"):
             sys.exit(f"browse: {name} printed no address but: {self.url} {self.process.communicate()[1]}")
 
@@ -227,9 +227,46 @@ def scene_page(browser):
         quiet(browser)
 
 
+def difference_page(browser):
+    """The difference that a planted fault made: evidence.json, of scene.snn and data/."""
+    with open(os.path.join(WORK, "evidence.json"), encoding="utf-8") as file:
+        told = json.load(file)["difference"]
+    with Served("sf_view", "--replay", "evidence.json", "--no-browser") as page:
+        look(browser, 1280, 1600, False)
+        browser.get(page.url)
+        until(browser, "return document.getElementById('svg-difference')", "the difference")
+        until(browser, "return !document.getElementById('story').hidden", "the story of its pixel")
+        words = browser.find_element(By.ID, "difference").text
+        for word in (told["in_the_run"], str(told["expected"]), str(told["actual"]), "layer C2", "neuron 37", "gtkwave",
+                     "on the same samples: no difference"):
+            check(word in words, f"the difference's story lacks '{word}': {words}")
+        title = browser.find_element(By.ID, "story-title").text
+        check(title == f"Pixel {told['x']}, {told['y']}", f"the story is of {title}")
+        signals = saved(browser, "difference-signals", "difference.gtkw").decode()
+        check("u_c2" in signals and "clk_i" in signals and told["wave"] in signals, f"the signals: {signals[:400]}")
+        fits(browser, "difference")
+        quiet(browser)
+
+
+def training_page(browser):
+    with Served("sf_train", "set", "-o", "watched.safetensors", "--minutes", "3", "--samples", "2048", "--levels", "6",
+                "--log2-hash", "12", "--finest-res", "64", "--lattice", "128", "--quiet", "--view", "0", stream="stderr") as page:
+        look(browser, 1280, 900, False)
+        browser.get(page.url)
+        until(browser, "return document.querySelectorAll('#svg-curves path').length >= 6", "the curves")
+        until(browser, "return document.getElementById('preview').naturalWidth === 48", "the preview")
+        until(browser, "return /PSNR/.test(document.getElementById('preview-psnr').textContent)", "its PSNR")
+        for name, width in (("training", 1280), ("training-narrow", 390)):
+            look(browser, width, 1400, False)
+            fits(browser, name)
+        quiet(browser)
+
+
 def main():
     browser = open_browser()
     try:
+        training_page(browser)
+        difference_page(browser)
         scene_page(browser)
     finally:
         browser.quit()
