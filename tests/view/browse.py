@@ -204,6 +204,7 @@ def fits(browser, name):
 def quiet(browser):
     said = [entry["message"] for entry in browser.get_log("browser")]
     check(not said, f"the console says: {said}")
+    browser.get("about:blank")  # asks nothing of a program that ends
 
 
 def scene_page(browser):
