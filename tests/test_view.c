@@ -1,6 +1,8 @@
 /* The server of sf_view: what it takes for a parameter, whom it answers, and what it leaves undone. */
 #include "ck_run.h"
-#include "view/view.h"
+#include "view/training.h"
+#include "base/clock.h"
+#include "tests/float_fixture.h"
 #include <arpa/inet.h>
 #include <stdatomic.h>
 #include <time.h>
@@ -333,4 +335,58 @@ TEST(pages_are_small_and_fetch_nothing)
     ck_assert_ptr_nonnull(strstr(reply.data, "</html>"));
     free(reply.data);
   }
+}
+
+/* ---- training ---- */
+
+static sf_train_stats stats_of(int64_t iteration)
+{
+  return (sf_train_stats){.stage = 1,
+                          .iteration = iteration,
+                          .progress = 0.5,
+                          .seconds = 10,
+                          .loss = 0.1,
+                          .mse = 0.01,
+                          .t_star = 3.5,
+                          .t_r = 4,
+                          .quiet = {1, 2, 3}};
+}
+
+/* A page that asks again and again, while it trains: previews come, and take their share of the time. */
+TEST(previews_take_their_share)
+{
+  OWNED(sf_model) model = test_model(SF_NET_SNN, SF_HYBRID, 32, 4, 0.5f);
+  sf_view view = {.name = "held"};
+  ck_ok(sf_camera_parse("64,64,60,60,32,32,1,0,0,0,0,1,0,0,0,0,1,2", &view.camera));
+  sf_dataset held_out = {.view = &view, .count = 1, .scale = 1};
+  sf_view_training *t;
+  char reply[4096], target[100];
+  int port, previews = 0;
+  char token[33];
+  ck_ok(sf_view_training_open(&t, 0, &held_out));
+  ck_assert_int_eq(sscanf(sf_view_url(sf_view_training_server(t)), "http://127.0.0.1:%d/?token=%32s", &port, token), 2);
+  for (int i = 1; i <= 3000; i++) {
+    const sf_train_stats s = stats_of(i);
+    sf_view_training_step(t, &model, &s);
+  }
+  ck_assert(sf_view_training_spent(t) == 0); /* nobody looked */
+  snprintf(target, sizeof target, "/training?token=%s", token);
+  const double begun = sf_seconds();
+  double longest = 0;
+  for (int i = 3001; previews == 0 && sf_seconds() - begun < 50; i++) {
+    const sf_train_stats s = stats_of(i);
+    const double before = sf_view_training_spent(t);
+    if (i % 50 == 1) ck_assert_int_eq(get(port, target, LOCAL, reply), 200);
+    sf_view_training_step(t, &model, &s);
+    longest = fmax(longest, sf_view_training_spent(t) - before);
+    nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+    previews += strstr(reply, "\"preview\":0") == NULL;
+  }
+  ck_assert_int_gt(previews, 0);
+  const double share = SF_VIEW_TRAINING_SHARE * (sf_seconds() - begun);
+  ck_assert_msg(sf_view_training_spent(t) <= share + longest, "%g s of %g s", sf_view_training_spent(t), share);
+  ck_assert(strstr(reply, "\"quiet\":[1,2,3]") && strstr(reply, "\"t_r\":4"));
+  snprintf(target, sizeof target, "/preview?token=%s", token);
+  ck_assert_int_eq(get(port, target, LOCAL, reply), 200);
+  sf_view_training_close(t);
 }
