@@ -23,7 +23,7 @@ View.Difference = function (scene, choose, go, saveAs) {
     return e;
   }
   function sides(f, d) {
-    var where = [d.layer_name ? 'layer ' + d.layer_name : '', f.step >= 0 ? 'step ' + (f.step + 1) : '', f.neuron >= 0 ? 'neuron ' + f.neuron : ''];
+    var where = [d.layer_name ? 'layer ' + d.layer_name : '', f.step >= 0 ? 'step ' + f.step + ' (from 0)' : '', f.neuron >= 0 ? 'neuron ' + f.neuron : ''];
     return rows([{ cells: [where.filter(Boolean).join(', ') || 'all', f.wire, f.expected, f.actual], chosen: true }],
       { cells: ['Where', 'What', 'Core, expected', 'Accelerator, actual'] });
   }

@@ -6,20 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { POINTS = 400, SIDE = 100, SLICE = 512 };
+enum { POINTS = 400, SIDE = 100, SLICE = 1024 };
 typedef enum { LOSS, PSNR, HELD_OUT, T_STAR, FIRING_D1, FIRING_C1, FIRING_C2, QUIET, CURVES } curve;
 static const double WATCHED = 5; /* seconds after its last question that a page counts as open */
 
-/* A preview, slice by slice: pixels of a view, every so many. */
+/* Pixels of a view, every so many. */
 typedef struct preview {
   int width, height, stride;
-  size_t done;            /* pixels of the one that is being made */
   float *rgb, *truth;     /* [height][width][3]; truth NULL: no picture */
   uint8_t *shown, *whole; /* 8 bits; shown: made new, whole: the last one */
   int number;             /* of whole ones */
   double psnr;            /* of the last one; NaN: none */
-  double spent, since;    /* seconds on previews; since when a page has been open, 0: it is not */
-  double budget;          /* seconds spent when it was opened */
+  double spent, last;     /* seconds that all of them took, and the last one */
+  double since, before;   /* since when a page has been open, 0: it is not; spent before */
 } preview;
 
 struct sf_view_training {
@@ -98,31 +97,35 @@ static void end_preview(sf_view_training *t)
   pthread_mutex_lock(&t->lock);
   memcpy(p->whole, p->shown, n);
   p->psnr = p->truth ? sf_psnr(p->rgb, p->truth, n) : (double)NAN;
-  p->number++, p->done = 0;
+  p->number++;
   pthread_mutex_unlock(&t->lock);
 }
 
-/* The next pixels. On white, as pictures are evaluated. */
-static void draw_slice(sf_view_training *t, const sf_model *model, int steps)
+/* Pixels from..from + n. On white, as pictures are evaluated. */
+static sf_status draw_slice(sf_view_training *t, const sf_model *model, int steps, size_t from, size_t n)
 {
   static const float white[3] = {1, 1, 1};
-  preview *p = &t->preview;
-  const sf_view *view = t->held_out->view;
-  const size_t all = (size_t)p->width * (size_t)p->height, n = all - p->done < SLICE ? all - p->done : SLICE;
+  const preview *p = &t->preview;
   float origin[3 * SLICE], direction[3 * SLICE], depth[SLICE], alpha[SLICE], samples[SLICE];
   for (size_t i = 0; i < n; i++) {
-    const size_t at = p->done + i;
+    const size_t at = from + i;
     const float x = (float)(at % (size_t)p->width * (size_t)p->stride) + 0.5f,
                 y = (float)(at / (size_t)p->width * (size_t)p->stride) + 0.5f;
-    sf_dataset_ray(t->held_out, view, x, y, origin + 3 * i, direction + 3 * i);
+    sf_dataset_ray(t->held_out, t->held_out->view, x, y, origin + 3 * i, direction + 3 * i);
   }
-  const sf_status status =
-      sf_render_rays(model, origin, direction, n, steps, white, p->rgb + 3 * p->done, depth, alpha, samples);
-  if (status.code != SF_OK) return; /* the trainer itself tells of a model that is none */
-  p->done += n;
-  if (p->done == all) end_preview(t);
+  return sf_render_rays(model, origin, direction, n, steps, white, p->rgb + 3 * from, depth, alpha, samples);
 }
 
+static void draw_preview(sf_view_training *t, const sf_model *model, int steps)
+{
+  const size_t all = (size_t)t->preview.width * (size_t)t->preview.height;
+  sf_status status = sf_ok(); /* the trainer itself tells of a model that is none */
+  for (size_t from = 0; from < all && status.code == SF_OK; from += SLICE)
+    status = draw_slice(t, model, steps, from, all - from < SLICE ? all - from : SLICE);
+  if (status.code == SF_OK) end_preview(t);
+}
+
+/* A preview as soon as one like the last fits the time that it may take. */
 static void watch(sf_view_training *t, const sf_model *model, const sf_train_stats *s)
 {
   preview *p = &t->preview;
@@ -131,10 +134,10 @@ static void watch(sf_view_training *t, const sf_model *model, const sf_train_sta
     p->since = 0;
     return;
   }
-  if (p->since == 0) p->since = now, p->budget = p->spent;
-  if (p->spent - p->budget > SF_VIEW_TRAINING_SHARE * (now - p->since)) return;
-  draw_slice(t, model, s->t_r > 0 ? s->t_r : model->config.steps);
-  p->spent += sf_seconds() - now;
+  if (p->since == 0) p->since = now, p->before = p->spent;
+  if (p->spent - p->before + p->last > SF_VIEW_TRAINING_SHARE * (now - p->since)) return;
+  draw_preview(t, model, s->t_r > 0 ? s->t_r : model->config.steps);
+  p->last = sf_seconds() - now, p->spent += p->last;
 }
 
 void sf_view_training_step(sf_view_training *t, const sf_model *model, const sf_train_stats *s)
