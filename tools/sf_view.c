@@ -82,6 +82,7 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
   SF_TRY(status);
   v->scene = positional[0], v->data = positional[1], v->scale = (float)o->scale;
   if (!v->scene && !v->replay) return sf_fail(SF_E_USAGE, "SCENE.snn is missing");
+  if (v->scene && v->replay) return sf_fail(SF_E_USAGE, "--replay takes neither scene nor data: its file names them");
   return sf_ok();
 }
 

@@ -44,6 +44,8 @@ typedef struct sf_sight {
 sf_status sf_sight_of(sf_viewer *v, const sf_view_ask *ask, sf_sight *sight);
 /* The photograph of a view, kept until another one is asked for; photo_turn is held by the caller. */
 sf_status sf_viewer_photo(sf_viewer *v, int index, const sf_shot **shot);
+/* Whether there is a float model, with so many steps. */
+sf_status sf_viewer_need_model(const sf_viewer *v, int steps);
 sf_status sf_viewer_core(sf_viewer *v, int steps, fx_core **core); /* `drawing` is held by the caller */
 
 /* Pixels x + i * stride, y + j * stride of the picture. */

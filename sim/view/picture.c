@@ -173,8 +173,7 @@ static sf_status next(void *stream, void **data, size_t *size)
 static sf_status check(const sf_viewer *v, const picture *p)
 {
   const bool differs = p->map >= SF_MAP_PHOTO;
-  if ((p->source == SF_VIEW_FLOAT || p->map == SF_MAP_FLOAT) && !v->real.model_path[0])
-    return sf_fail(SF_E_RANGE, "there is no float model: start sf_view with --model model.safetensors");
+  if (p->source == SF_VIEW_FLOAT || p->map == SF_MAP_FLOAT) SF_TRY(sf_viewer_need_model(v, p->sight.steps));
   if ((p->source == SF_VIEW_PHOTO || p->map == SF_MAP_PHOTO) && p->sight.index < 0)
     return sf_fail(SF_E_RANGE, "a photograph is there of the data set's views alone, at their size");
   if (differs && p->source != SF_VIEW_FIXED)

@@ -97,7 +97,7 @@ SF_VIEWER_ANSWER(save)
   sf_viewer *v = user;
   sf_sight sight;
   SF_TRY(sf_sight_of(v, ask, &sight));
-  if (ask->source == SF_VIEW_FLOAT && !v->real.model_path[0]) return sf_fail(SF_E_RANGE, "there is no float model");
+  if (ask->source == SF_VIEW_FLOAT) SF_TRY(sf_viewer_need_model(v, sight.steps));
   if (ask->source == SF_VIEW_PHOTO) return sf_fail(SF_E_USAGE, "source: a photograph is a file already");
   if (!strcmp(ask->kind, "command")) return save_command(v, ask, &sight, reply);
   if (strcmp(ask->kind, "exr") != 0 && strcmp(ask->kind, "png") != 0)

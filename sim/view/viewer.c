@@ -47,6 +47,14 @@ sf_status sf_viewer_photo(sf_viewer *v, int index, const sf_shot **shot)
   return sf_fail(SF_E_RANGE, "view %d is out of range: there are %d", index, v->views);
 }
 
+sf_status sf_viewer_need_model(const sf_viewer *v, int steps)
+{
+  if (!v->real.model_path[0])
+    return sf_fail(SF_E_RANGE, "there is no float model: start sf_view with --model model.safetensors");
+  if (steps <= v->real.model.config.steps) return sf_ok();
+  return sf_fail(SF_E_RANGE, "the float model has %d time steps, %d are asked for", v->real.model.config.steps, steps);
+}
+
 sf_status sf_viewer_core(sf_viewer *v, int steps, fx_core **core)
 {
   const int i = steps - 1;
