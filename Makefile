@@ -171,12 +171,8 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
-<<<<<<< HEAD
 $B/bin/sim_render: $B/obj/tools/render/options.o
-$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
-=======
 $B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o
->>>>>>> 0782b73 (view: differences, training)
 
 # They serve a page (libmicrohttpd-dev).
 $B/bin/sf_view $B/bin/sf_train $B/tests/test_view $B/tests/test_viewer: LIBS += $(shell pkg-config --libs libmicrohttpd)
