@@ -91,9 +91,9 @@ CHAIN_TESTS := $(basename $(notdir $(wildcard tests/chain/*.sh tests/chain/*.py)
 # library without what it newly needs.
 .SECONDARY: $(patsubst %.c,$B/obj/%.o,$(wildcard tests/*.c tests/*/*.c tools/*.c))
 .SECONDARY: $(patsubst $(CURDIR)/%,%,$(filter $(CURDIR)/%,$(MAKECMDGOALS)))
-DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc
+DUT_TOOLS := sf_cosim sim_render energy_audit sf_soc sf_view
 # Those that drive the Verilated accelerator.
-DUT_TESTS := bench bench_field test_three_counts $(filter test_rtl% test_soc%,$(TESTS))
+DUT_TESTS := bench bench_field test_three_counts test_viewer $(filter test_rtl% test_soc%,$(TESTS))
 
 all: $(TOOLS:%=$B/bin/%) ## build every program into build/bin (the default)
 
@@ -131,8 +131,9 @@ $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
-# The report's texts lie in the program.
+# The report's texts lie in the program, and the browser's.
 $B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+$B/obj/src/view/texts.o: $(wildcard src/view/*.html src/view/*.js src/view/*.css)
 $B/obj/src/report/texts.o: src/report/reproduction.html
 
 $(CURDIR)/$B/%: $B/% ;
@@ -171,14 +172,17 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
 $B/bin/sim_render: $B/obj/tools/render/options.o
-$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o
+$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o
+
+# They serve a page (libmicrohttpd-dev).
+$B/bin/sf_view $B/bin/sf_train $B/tests/test_view $B/tests/test_viewer: LIBS += $(shell pkg-config --libs libmicrohttpd)
 
 # Prices of technologies, found beside the program.
 TECHS := $(wildcard share/tech/*.tech)
 $B/share/spikefield/tech/%.tech: share/tech/%.tech
 	@mkdir -p $(@D)
 	$Qcp $< $@
-$B/bin/energy_audit: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
+$B/bin/energy_audit $B/bin/sf_view $B/tests/test_viewer: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 
 # Tests

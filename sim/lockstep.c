@@ -227,6 +227,27 @@ static sf_status reserve(sf_lockstep *l, char path[4096])
                  l->options.evidence);
 }
 
+/* Where it was, and what differs in the replay: for programs. */
+static void add_place(const sf_lockstep *l, const sf_replayed *replayed, cJSON *json)
+{
+  const sf_lockstep_pixel p = sf_lockstep_pick(l, l->place.ray);
+  const sf_difference *d = &replayed->what;
+  char *data = realpath(l->data.path, NULL);
+  sf_json_add_text(json, "data", data ? data : l->data.path);
+  free(data);
+  sf_json_add_text(json, "split", l->options.split);
+  cJSON_AddNumberToObject(json, "view", p.view);
+  cJSON_AddNumberToObject(json, "x", p.x), cJSON_AddNumberToObject(json, "y", p.y);
+  if (!replayed->differs || !d->wire) return;
+  cJSON_AddNumberToObject(json, "at", replayed->at);
+  cJSON_AddNumberToObject(json, "layer", d->layer), cJSON_AddNumberToObject(json, "step", d->step);
+  cJSON_AddNumberToObject(json, "neuron", d->neuron);
+  cJSON_AddStringToObject(json, "wire", d->wire);
+  cJSON_AddNumberToObject(json, "expected", (double)d->expected);
+  cJSON_AddNumberToObject(json, "actual", (double)d->actual);
+  sf_json_add_u64(json, "cycle", d->cycle);
+}
+
 static sf_status write_replay(sf_lockstep *l, const sf_status *status)
 {
   char path[4096];
@@ -240,6 +261,7 @@ static sf_status write_replay(sf_lockstep *l, const sf_status *status)
   sf_json_add_text(json, "in_the_run", status->message);
   sf_json_add_text(json, "in_the_replay", !replayed.differs ? "none" : text[0] ? text : replayed.message);
   sf_json_add_text(json, "wave", path);
+  add_place(l, &replayed, json);
   snprintf(path, sizeof path, "%s.json", l->evidence);
   return sf_replay_save(&l->replay, l->options.scene, json, path);
 }

@@ -39,6 +39,7 @@ sf_status sf_replay_shrink(sf_replay *replay, const fx_net *net, bool *differs);
 /* JSON: SHA-256 of this program, its block (--dut), scene path and SHA-256, seed, stalls, samples. `difference`, which
  * may be NULL, is for the reader and is freed.
  */
+sf_status sf_replay_json(const sf_replay *replay, const char *scene, cJSON *difference, cJSON **json);
 sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path);
 /* Checks every field; the scene must have the same contents still. *scene: malloc'ed path. */
 sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path);

@@ -32,7 +32,7 @@ static cJSON *sample_json(const sf_replay_sample *s)
 }
 
 /* The seed is text: a JSON number would lose its last bits. */
-static cJSON *replay_json(const sf_replay *replay, const char *scene, const char *hash, const char *program)
+static cJSON *make_json(const sf_replay *replay, const char *scene, const char *hash, const char *program)
 {
   char seed[32];
   cJSON *json = cJSON_CreateObject();
@@ -49,7 +49,7 @@ static cJSON *replay_json(const sf_replay *replay, const char *scene, const char
   return json;
 }
 
-sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path)
+sf_status sf_replay_json(const sf_replay *replay, const char *scene, cJSON *difference, cJSON **json)
 {
   char hash[65], program[65], *whole = realpath(scene, NULL);
   cJSON *dut = NULL;
@@ -63,12 +63,19 @@ sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *diff
     free(whole);
     return status;
   }
-  cJSON *json = replay_json(replay, whole, hash, program);
-  if (dut) cJSON_AddItemToObject(json, "dut", dut);
-  if (difference) cJSON_AddItemToObject(json, "difference", difference);
-  status = sf_json_save(json, path);
-  cJSON_Delete(json);
+  *json = make_json(replay, whole, hash, program);
+  if (dut) cJSON_AddItemToObject(*json, "dut", dut);
+  if (difference) cJSON_AddItemToObject(*json, "difference", difference);
   free(whole);
+  return sf_ok();
+}
+
+sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path)
+{
+  cJSON *json;
+  SF_TRY(sf_replay_json(replay, scene, difference, &json));
+  const sf_status status = sf_json_save(json, path);
+  cJSON_Delete(json);
   return status;
 }
 

@@ -32,7 +32,7 @@ VERILATED_SIMD := -march=native $(if $(findstring clang,$(VERILATED_CXX)),,-ftre
 VERILATED_SIMD := $(shell $(VERILATED_CXX) -Werror $(VERILATED_SIMD) -E -x c++ /dev/null >/dev/null 2>&1 && echo "$(VERILATED_SIMD)")
 VERILATED_OPT := OPT_FAST="-O2 $(VERILATED_SIMD)" OPT_SLOW=-O1 OPT_GLOBAL=-O2
 
-SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/board/*.c sim/studio/*.c sim/soc/*.c))
+SIM_SRC := $(filter-out $(if $(UNICORN_LIBS),,sim/soc/soc.c),$(wildcard sim/*.c sim/activity/*.c sim/ray/*.c sim/board/*.c sim/studio/*.c sim/view/*.c sim/soc/*.c))
 DUT_OBJ := $(patsubst %.c,$B/obj/%.o,$(SIM_SRC) $(addprefix firmware/,sf_driver.c sf_ray_driver.c sf_blob.c sf_tile.c sf_stream.c))
 VERILATED_OBJ := $(addprefix $B/verilated/runtime/,verilated.o verilated_fst_c.o verilated_threads.o $(COVERAGE_OBJ))
 
@@ -66,7 +66,7 @@ endef
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/test_soc tests/test_soc_planes tests/bench tests/bench_field
+RAY_PROGRAMS := bin/sim_render bin/sf_view bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/test_viewer tests/test_soc tests/test_soc_planes tests/bench tests/bench_field
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
 

@@ -66,7 +66,7 @@ size_of() { wc -c <"$1"; }
 declare -A right=(
   [sf_scene]="simple -o out" [sf_train]="d -o out" [sf_export]="model.safetensors -o out"
   [sf_cosim]="s.snn d" [sim_render]="s.snn d -o out" [energy_audit]="s.snn d"
-  [error_budget]="model.safetensors s.snn d" [sf_cycles]="s.snn d")
+  [error_budget]="model.safetensors s.snn d" [sf_cycles]="s.snn d" [sf_view]="s.snn d")
 number() { # PROGRAM OPTION BAD...
   for value in "${@:3}"; do usage "$2" "$1" ${right[$1]} "$2" "$value"; done
 }

@@ -32,7 +32,7 @@ static sf_status make_ledgers(const sf_technology *tech, const fx_net *net, cons
   const fx_scene scene = {.backbone = FX_INGP, .net = *net};
   const sf_counted counted = {&scene, counts, &small_memory, traffic, {8192, 4}};
   SF_TRY(sf_ledgers_make(tech, &counted, l));
-  ck_assert_uint_eq(sf_ledger_everything_fj(tech, &counted), l->total[SF_LEDGER_NEURON]);
+  for (int g = 0; g < SF_SPIKING_LEDGERS; g++) ck_assert_uint_eq(sf_ledger_fj(tech, &counted, g), l->total[g]);
   return sf_ok();
 }
 

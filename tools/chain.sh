@@ -45,3 +45,4 @@ step "5/6 co-simulate: RTL against the fixed-point core, spike by spike"
 step "6/6 audit: every operation, counted three times"
 "$bin/energy_audit" "$out/scene.snn" "$data" --view "$view" --html "$out/report.html" --model "$out/model.safetensors" --json >"$out/audit.json"
 "$bin/sf_summary" "$out" $(($(date +%s) - started))
+echo "See it from any side: $bin/sf_view $out/scene.snn $data --model $out/model.safetensors"

@@ -2,7 +2,7 @@
 # Finds which packages are missing and installs them with apt (Debian 12 and Ubuntu names). Needs root only then.
 # DEPS: other packages instead, as `make deps-fuzz` names them.
 set -eu
-packages="${DEPS:-git gcc g++ make pkg-config patch libopenexr-dev libpng-dev libjpeg-dev libcjson-dev libhdf5-dev zlib1g-dev check libsubunit-dev
+packages="${DEPS:-git gcc g++ make pkg-config patch libopenexr-dev libpng-dev libjpeg-dev libcjson-dev libmicrohttpd-dev libhdf5-dev zlib1g-dev check libsubunit-dev
 verilator clang iverilog yosys z3 bc gcc-riscv64-unknown-elf libunicorn-dev libopenmpi-dev openmpi-bin clang-format cppcheck gnuplot-nox help2man python3-jsonschema procps util-linux}"
 missing=
 for package in $packages; do

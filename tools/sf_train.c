@@ -1,6 +1,7 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
 #include "quant/quant.h"
 #include "tools/train/report.h"
+#include "tools/train/watch.h"
 #include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include <errno.h>
@@ -51,6 +52,7 @@ typedef struct teller {
   sf_progress progress;
   train_recent recent;
   FILE *log;
+  train_watch *watch;
   double tried; /* to save */
 } teller;
 
@@ -59,6 +61,7 @@ static sf_status after_step(const sf_trainer *trainer, const train_arguments *a,
 {
   const bool stop = sf_cli_interrupted() && s->stage != 3;
   if (sf_ranks_rank(a->train.ranks)) return stop ? sf_fail(SF_E_STOPPED, "interrupted") : sf_ok();
+  sf_view_training_step(w->watch->page, sf_trainer_model(trainer), s);
   train_smooth(&w->recent, s);
   train_warn(&w->progress, s);
   if (s->iteration % 16 == 0 || s->stage == 3) train_log_line(w->log, s, sf_trainer_model(trainer)->config.steps);
@@ -80,9 +83,10 @@ static sf_status interrupted(const sf_trainer *trainer, const train_arguments *a
                  (long long)s->iteration, a->output);
 }
 
-static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, sf_train_stats *s, keeper *k)
+static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, train_watch *watch, sf_train_stats *s,
+                      keeper *k)
 {
-  teller w = {.log = log, .tried = sf_seconds()};
+  teller w = {.log = log, .watch = watch, .tried = sf_seconds()};
   k->good = a->resume;
   sf_progress_begin(&w.progress, a->quiet);
   do {
@@ -263,12 +267,13 @@ static sf_status open_log(const train_arguments *a, FILE **log)
   return sf_ok();
 }
 
-static sf_status learn(sf_trainer *trainer, const train_arguments *a, sf_train_stats *stats, keeper *k)
+static sf_status learn(sf_trainer *trainer, const train_arguments *a, train_watch *watch, sf_train_stats *stats,
+                       keeper *k)
 {
   FILE *log;
   if (stats->stage == 3) return sf_ok();
   SF_TRY(sf_ranks_agree(a->train.ranks, open_log(a, &log)));
-  sf_status status = loop(trainer, a, log, stats, k);
+  sf_status status = loop(trainer, a, log, watch, stats, k);
   if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
   if (!status.code) status = keep_learned(trainer, a, k);
   return sf_ranks_lost(a->train.ranks) ? status : sf_ranks_agree(a->train.ranks, status);
@@ -281,13 +286,17 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
   sf_ranks *ranks = a->train.ranks;
   SF_TRY(sf_trainer_create(&trainer, data, &a->train, a->resume ? a->output : NULL));
   sf_train_stats stats = sf_trainer_stats(trainer);
-  sf_status status = sf_ok();
+  sf_status status;
   keeper k = {0};
-  if (sf_cli_interrupted()) status = sf_fail(SF_E_STOPPED, "interrupted before the training: nothing was written");
+  train_watch watch;
+  status = train_watch_open(&watch, a, path, how);
+  if (!status.code && sf_cli_interrupted())
+    status = sf_fail(SF_E_STOPPED, "interrupted before the training: nothing was written");
   status = sf_ranks_agree(ranks, status);
-  if (!status.code) status = learn(trainer, a, &stats, &k);
+  if (!status.code) status = learn(trainer, a, &watch, &stats, &k);
   if (!status.code) status = finish(trainer, path, how, a, &stats, &k);
   if (!status.code && !k.finished && !sf_ranks_rank(ranks)) status = sf_trainer_save(trainer, a->output, false);
+  train_watch_close(&watch);
   sf_trainer_free(trainer);
   return status;
 }

@@ -73,7 +73,12 @@ static sf_status load_view(job *j)
 {
   const render_options *o = &j->opt;
   SF_TRY(open_studio(j));
-  SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
+  if (o->camera) {
+    sf_camera camera;
+    SF_TRY(sf_camera_parse(o->camera, &camera));
+    SF_TRY(sf_shot_from(&j->studio, &camera, &j->shot));
+  } else
+    SF_TRY(sf_shot_load(&j->studio, o->view, &j->shot));
   sf_dataset_warn(stderr, "sim_render", &j->shot.data, NULL);
   if (!j->shot.view)
     return sf_fail(SF_E_USAGE, "--view %d is out of range: %s has %d %s views", o->view, o->data, j->shot.data.total,

@@ -63,6 +63,38 @@ sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot)
   return sf_ok();
 }
 
+/* A data set without pictures, in the space of the scene. */
+static sf_status no_data(const sf_studio *studio, sf_dataset *data)
+{
+  const fx_units *units = &studio->scene.units;
+  if (units->data_ndc > 0)
+    return sf_fail(SF_E_USAGE, "%s: a forward-facing scene: its data set has to be named, for where its rays begin",
+                   studio->options.scene);
+  *data = (sf_dataset){.view = calloc(1, sizeof *data->view), .downscale = 1};
+  if (!data->view) return sf_fail(SF_E_MEMORY, "no memory for a camera");
+  data->count = 1;
+  data->scale = data->own_scale = units->model_scale > 0 ? (float)units->model_scale : 1;
+  return sf_ok();
+}
+
+sf_status sf_shot_from(const sf_studio *studio, const sf_camera *camera, sf_shot *shot)
+{
+  if (studio->options.data)
+    SF_TRY(sf_shot_load(studio, 0, shot));
+  else
+    *shot = (sf_shot){.psnr = NAN, .ssim = NAN};
+  if (!studio->options.data) SF_TRY(no_data(studio, &shot->data));
+  if (shot->data.count == 0)
+    return sf_fail(SF_E_FORMAT, "%s: has no %s view", studio->options.data, studio->options.split);
+  sf_view *view = &shot->data.view[0];
+  sf_image_free(&view->image);
+  snprintf(view->name, sizeof view->name, "camera");
+  view->camera = *camera;
+  shot->view = view;
+  shot->window = (sf_window){0, 0, camera->width, camera->height};
+  return sf_ok();
+}
+
 static sf_status render(const sf_studio *studio, sf_shot *shot)
 {
   const sf_golden_job job = {.scene = &studio->scene,

@@ -47,6 +47,9 @@ typedef struct sf_shot {
 } sf_shot;
 /* index: of the split, from 0. view is NULL where index is beyond the last one. */
 sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot);
+/* What a camera of one's own sees, named "camera", without a picture. Of a scene alone where options.data is NULL,
+ * which a forward-facing one is refused: SF_E_USAGE. */
+sf_status sf_shot_from(const sf_studio *studio, const sf_camera *camera, sf_shot *shot);
 sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
 /* The data set's picture of a rendered shot, PNG. SF_E_FORMAT: it has none. */

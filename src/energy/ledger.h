@@ -204,8 +204,8 @@ static inline bool sf_ledger_is_twin(int ledger)
   return ledger >= SF_SPIKING_LEDGERS;
 }
 
-/* The total of SF_LEDGER_NEURON alone; UINT64_MAX: it does not fit in 64 bits. */
-uint64_t sf_ledger_everything_fj(const sf_technology *technology, const sf_counted *counted);
+/* The total of one spiking ledger; UINT64_MAX: it does not fit in 64 bits. */
+uint64_t sf_ledger_fj(const sf_technology *technology, const sf_counted *counted, int ledger);
 /* All of it. SF_E_RANGE when an energy does not fit in 64 bits. */
 sf_status sf_ledgers_make(const sf_technology *technology, const sf_counted *counted, sf_ledgers *ledgers);
 

@@ -148,14 +148,15 @@ static bool price_ledger(sf_ledgers *to, int ledger, const event_table events)
   return fits;
 }
 
-uint64_t sf_ledger_everything_fj(const sf_technology *technology, const sf_counted *counted)
+uint64_t sf_ledger_fj(const sf_technology *technology, const sf_counted *counted, int ledger)
 {
   event_table events = {{{0}}};
   uint64_t total = 0;
   spiking_events(counted, events);
+  if (shares_rows(ledger)) share_rows(counted, false, events);
   for (int r = 0; r < SF_ROWS; r++)
     for (int p = 0; p < SF_PARTS; p++) {
-      const uint64_t fj = sf_unit_price_of(technology, counted, SF_LEDGER_NEURON, r, p).fj;
+      const uint64_t fj = sf_unit_price_of(technology, counted, ledger, r, p).fj;
       for (int t = 0; t < SF_T_MAX; t++) total = sf_add_u64(total, sf_multiply_u64(events[r][t][p], fj));
     }
   return total;

@@ -78,7 +78,7 @@ uint64_t sf_fit_search_energy(const sf_fit_search *s, const fx_scene *scene, con
                                    .misses = (uint64_t)(field->misses * bytes)};
   const sf_traffic traffic = sf_traffic_of(scene, counts, &memory, rays);
   const sf_counted counted = {scene, counts, &memory, &traffic, *cache};
-  return sf_ledger_everything_fj(s->job->technology, &counted);
+  return sf_ledger_fj(s->job->technology, &counted, SF_LEDGER_NEURON);
 }
 
 /* new_field: measured with the trim, and left there; NULL: the one of the trim so far holds. */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { HEAT = 255 }; /* colours of a heat map; index 0 is transparent: no samples */
+enum { HEAT = HTML_HEAT }; /* index 0: no samples */
 
 /* viridis (van der Walt and Smith, 2015, CC0) at ten equal distances: monotone in lightness, safe for the colour-blind.
  */
@@ -18,7 +18,7 @@ static void heat_colour(double x, uint8_t rgb[3])
   for (int c = 0; c < 3; c++) rgb[c] = (uint8_t)(viridis[i][c] + (at - i) * (viridis[i + 1][c] - viridis[i][c]) + 0.5);
 }
 
-static void heat_palette(uint8_t palette[4 * (HEAT + 1)], int colours)
+void html_heat_palette(uint8_t palette[4 * (HEAT + 1)], int colours)
 {
   memset(palette, 0, 4);
   for (int i = 1; i <= colours; i++) {
@@ -44,7 +44,7 @@ static sf_status heat_map(FILE *out, const sf_golden *g, html_pixel *value, doub
   const size_t n = (size_t)g->width * (size_t)g->height;
   uint8_t palette[4 * (HEAT + 1)], *index = malloc(n);
   if (!index) return sf_fail(SF_E_MEMORY, "no memory for a picture of %d x %d pixels", g->width, g->height);
-  heat_palette(palette, HEAT);
+  html_heat_palette(palette, HEAT);
   for (size_t i = 0; i < n; i++) {
     const double x = high > low ? (value(g, i) - low) / (high - low) : 1;
     index[i] = html_samples(g, i) > 0 ? (uint8_t)(1 + (int)((HEAT - 1) * fmax(0, fmin(x, 1)) + 0.5)) : 0;
@@ -74,8 +74,7 @@ static void bar_labels(FILE *out, double low, double high, const char *unit)
   svg_text(out, BAR_WIDTH, 36, "num end", "%.4g %s", high, unit);
 }
 
-/* Below a heat map. Numbers are in the unit. */
-static void colour_bar(FILE *out, const char *id, double low, double high, const char *unit)
+void html_colour_bar(FILE *out, const char *id, double low, double high, const char *unit)
 {
   char title[160];
   snprintf(title, sizeof title, "Colour scale from %.4g to %.4g %s", low, high, unit);
@@ -131,7 +130,7 @@ HTML_FUNCTION(energy_scale)
                high = html_real(v, "page.energy_per_sample.most_fj");
   const char *unit = html_unit(high, &scale);
   (void)value;
-  colour_bar(out, "svg-energy-scale", low / scale, high / scale, unit);
+  html_colour_bar(out, "svg-energy-scale", low / scale, high / scale, unit);
   return v->status;
 }
 
@@ -147,7 +146,7 @@ HTML_FUNCTION(samples_scale)
 {
   html_view *v = user;
   (void)value;
-  colour_bar(out, "svg-samples-scale", 0, html_real(v, "page.samples_per_pixel.most"), "samples");
+  html_colour_bar(out, "svg-samples-scale", 0, html_real(v, "page.samples_per_pixel.most"), "samples");
   return v->status;
 }
 
@@ -156,7 +155,7 @@ HTML_FUNCTION(steps_map)
   const sf_page *page = ((const html_view *)user)->page;
   uint8_t palette[4 * (HEAT + 1)];
   (void)value;
-  heat_palette(palette, SF_T_MAX);
+  html_heat_palette(palette, SF_T_MAX);
   return html_put_png(out, page->steps, page->golden.width, page->golden.height, palette, SF_T_MAX + 1,
                       "Map of the number of time steps that every pixel needs");
 }

@@ -108,6 +108,12 @@ bool sf_camera_project(const sf_camera *camera, const float point[3], float pixe
  * origin lies SF_NEAR before its point on the near plane (z = -scale), and infinity at z = scale. */
 void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float py, float origin[3],
                     float direction[3]);
+/* A camera as text: "W,H,FX,FY,CX,CY" and to_world row by row, with a lens K1,K2,P1,P2 behind it; model units. What is
+ * printed gives the same camera again, bit for bit. SF_E_USAGE. */
+enum { SF_CAMERA_SIDE = 8192 /* pixels */, SF_CAMERA_TEXT = 22 * 16 };
+sf_status sf_camera_parse(const char *text, sf_camera *camera);
+void sf_camera_print(const sf_camera *camera, char text[SF_CAMERA_TEXT]);
+
 /* Points along an edge of [-bound, bound]^3, model units, that lie a pixel apart where the views see the middle of the
  * box: focal length over distance from the origin, in the mean of all views; with NDC, where a picture spans 2 * scale,
  * its longer side over that; 1 at least, 1 << 20 at most. */

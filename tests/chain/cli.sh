@@ -34,6 +34,7 @@ good sf_cosim fit.snn d --rays 1 --seed 1
 good sim_render s.snn d -o g.exr --png g.png --truth t.png
 good sim_render s.snn d -o f.exr --backend float
 good sim_render s.snn d -o train --all --split train
+good sim_render s.snn -o c.exr --camera 9,8,9.5,9.5,4.5,4,1,0,0,0,0,0,-1,-3,0,1,0,0
 # Threads that the address space has no room for are not asked for.
 (ulimit -v 4000000 && OMP_STACKSIZE=16m "$BIN/sim_render" s.snn d --threads 1024 -o t.exr -q >stdout.txt 2>err)
 check "sim_render --threads 1024" "no picture" cmp -s t.exr g.exr

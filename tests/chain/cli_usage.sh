@@ -114,6 +114,19 @@ usage "--view 9 is out of range" sf_export model.safetensors -o out --traces tra
 absent out "traces of no view"
 usage "--model needs --backend float" sim_render s.snn d -o out --model model.safetensors
 usage "--model needs --backend float" sim_render s.snn d --verify none.json --model model.safetensors
+usage "--camera goes with one view" sim_render s.snn d -o out --view 1 --camera 1
+usage "a camera is" sim_render s.snn d -o out --camera 9,8,9.5
+usage "a camera is" sim_render s.snn d -o out --camera 9,8,9.5,9.5,4.5,4,1,0,0,0,0,0,-1,nan,0,1,0,0
+usage "DATA is missing" sim_render s.snn -o out
+usage "SCENE.snn is missing" sf_view
+number sf_view --port -1 65536 nan
+usage "no address" sf_view s.snn d --address here
+usage "--replay takes neither" sf_view s.snn --replay s.snn
+data "cannot listen" sf_view s.snn d --address 192.0.2.1
+data "no such folder" sf_view s.snn absent
+data "model.none" sf_view s.snn d --model model.none
+data "none.json" sf_view --replay none.json
+number sf_train --view -1 65536 nan
 usage "--seed needs --backend rtl" sim_render s.snn d -o out --seed 1
 usage "--port needs --backend board" sim_render s.snn d -o out --port tty
 usage "--timeout needs --backend board" sim_render s.snn d -o out --timeout 2

@@ -296,6 +296,15 @@ static void put_table(const layout_file *file, int kind)
   put("colmap", name, bytes, file->size + 1);
 }
 
+static void put_requests(void)
+{
+  put_text(
+      "view", "picture",
+      "camera=20,10,25.5,25.5,10,5,1,0,0,0,0,1,0,0,0,0,1,4,0.1,0,1e-05,0\nsteps=4\nsource=fixed\nstride=3\nfinish=1\n"
+      "map=spikes-c1\n 127.0.0.1:8323 http://127.0.0.1:8323\n");
+  put_text("view", "pixel", "view=3\nx=7\ny=9\nsample=2\nlayer=1\nneuron=5\nwindow=1,2,3,4\nkind=exr\n [::1]:80 x");
+}
+
 static void put_layouts(void)
 {
   static layout_file file;
@@ -324,6 +333,7 @@ int main(int argc, char **argv)
   put_pictures();
   put_exr();
   put_texts();
+  put_requests();
   put_manifest(false);
   put_manifest(true);
   put_tensors();

@@ -28,7 +28,7 @@ sf_cli render_cli(void)
                   "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
                   "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
                   "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
-      .min_positional = 2,
+      .min_positional = 1,
       .max_positional = 2};
 }
 
@@ -55,6 +55,9 @@ static sf_status check_modes(render_options *o)
 {
   SF_TRY(check_backend(o));
   SF_TRY(refuse(!o->all && !o->verify && sf_ranks_launched() > 1, "--all", "or --verify has to be given to ranks"));
+  const char *const alone = "goes with one view: without --view, --all, --verify and --truth";
+  SF_TRY(refuse(o->camera && (o->view >= 0 || o->all || o->verify || o->truth), "--camera", alone));
+  if (!o->data && !o->camera) return sf_fail(SF_E_USAGE, "DATA is missing: only --camera does without");
   if (o->verify) return refuse(o->backend == SF_BACKEND_FLOAT, "--backend float", "cannot verify: it has no integers");
   if (!o->output) return sf_fail(SF_E_USAGE, o->all ? "-o DIR is missing" : "-o FILE is missing");
   if (o->all) {
@@ -81,6 +84,9 @@ sf_status render_parse(int argc, char **argv, render_options *o, sf_cli *cli)
       {"--truth", 0, SF_ARG_OUTPUT, &o->truth, 0, 0, NULL, "FILE", "also the view's own picture, PNG"},
       {"--view", 0, SF_ARG_INT, &o->view, 0, 1 << 20, NULL, "K",
        "which view of the split, from 0 (default 0; --verify: all)"},
+      {"--camera", 0, SF_ARG_STRING, &o->camera, 0, 0, NULL, "NUMBERS",
+       "in place of --view: W,H,FX,FY,CX,CY and the pose's 3 x 4 numbers, as sf_view prints them; DATA may be left "
+       "out"},
       {"--crop", 0, SF_ARG_STRING, &o->crop, 0, 0, NULL, "X,Y,W,H",
        "only this window (rtl default: 16x16 in the centre)"},
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},

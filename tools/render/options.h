@@ -10,7 +10,7 @@ typedef struct render_options {
   uint64_t seed;
   double scale;
   double patience;
-  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port;
+  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port, *camera;
   bool all, json, quiet;
 } render_options;
 

@@ -11,6 +11,6 @@ void train_field_defaults(train_arguments *a, const sf_dataset *data)
 
 void train_option_defaults(train_arguments *a, const sf_dataset *data)
 {
-  *a = (train_arguments){.output = "model.safetensors", .checkpoint_minutes = 2, .gamma = -1};
+  *a = (train_arguments){.output = "model.safetensors", .checkpoint_minutes = 2, .gamma = -1, .view = -1};
   train_field_defaults(a, data);
 }

@@ -10,7 +10,7 @@
 /* Options that decide nothing of what is learned: a run may be resumed with others. */
 static const char *const apart[] = {"--output", "--threads", "--eval-views", "--psnr-prefixes", "--checkpoint-minutes",
                                     "--resume", "--log",     "--summary",    "--json",          "--quiet",
-                                    NULL};
+                                    "--view",   NULL};
 
 /* The box, the steps through it and the finest level, but for what was asked for. A level finer than the pixels costs
  * time and learns noise. Without data: what the options alone say. */

@@ -11,7 +11,7 @@ typedef struct train_arguments {
   sf_train_options train;
   double scale, theta, checkpoint_minutes, gamma;
   int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits, leak_bits,
-      grid_bits;
+      grid_bits, view; /* port of the page, -1: none */
   bool resume, quiet, json, no_budget;
   int argc;
   char **argv;

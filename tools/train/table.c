@@ -21,6 +21,8 @@ static sf_option *first_run(train_arguments *a, sf_option *o)
       {"--threads", 'j', SF_ARG_INT, &a->threads, 0, 1024, NULL, "N", "threads, 0 = all (default 0)"},
       {"--seed", 's', SF_ARG_U64, &a->train.seed, 0, 9e15, NULL, "S",
        "same seed, same bits, any thread count (default 1)"},
+      {"--view", 0, SF_ARG_INT, &a->view, 0, 65535, NULL, "PORT",
+       "show the training on a page of this machine, at this port, 0 = a free one; its address is printed"},
       {"--quiet", 'q', SF_ARG_FLAG, &a->quiet, 0, 0, NULL, NULL, "no progress line"},
       {"--json", 0, SF_ARG_FLAG, &a->json, 0, 0, NULL, NULL, "print the closing summary as JSON"}};
   return sf_cli_add(o, list, COUNT(list));
