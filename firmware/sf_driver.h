@@ -22,8 +22,8 @@ typedef struct sf_bus {
   void *context;
 } sf_bus;
 
-/* A net as the hardware wants it. Weights: w[presynaptic * SF_LANES + neuron], lanes beyond n_out are 0; with a bias,
- * a row more. D1 and D2 without inputs and outputs: a decoder. */
+/* A net as the hardware wants it. Weights: w[presynaptic * SF_LANES + neuron]; lanes beyond n_out are 0. A layer with a
+ * bias has one row more. If D1 and D2 have no inputs and outputs, the net is a decoder. */
 typedef struct sf_layer_blob {
   int32_t n_in, n_out, k, theta, bias;
   const int8_t *w;

@@ -1,4 +1,4 @@
-/* Driver of sf_ray_top: what comes on top of sf_driver.h when encoder and compositor are in hardware too. */
+/* Driver of sf_ray_top: the part for encoder and compositor. sf_driver.h has the part for the nets. */
 #ifndef SF_FIRMWARE_SF_RAY_DRIVER_H
 #define SF_FIRMWARE_SF_RAY_DRIVER_H
 #include "firmware/sf_driver.h"
@@ -39,15 +39,15 @@ typedef struct sf_planes_blob {
   const int8_t *basis;                          /* [sum of components][SF_PLANES_FEATURES] */
 } sf_planes_blob;
 
-/* Of the field, since the reset or sf_ray_driver_clear. Those of a ray that was cut off are a part of it. */
+/* Counts of the field since the reset or sf_ray_driver_clear. A ray that was cut off has been counted in part. */
 typedef struct sf_field_counters {
   uint64_t lookups, misses, fills, stalls; /* stalls: cycles, see FIELD_STALLS */
 } sf_field_counters;
 
-/* After sf_driver_load, whose soft reset has stopped the rays: programming and start. planes: NULL for a hash grid;
- * else levels and directions of rays are not read. SF_DRIVER_REFUSED: RAY_ERROR; SF_DRIVER_MISFIT: levels, n_dir, or
- * the decoder's inputs, which the block does not check; SF_DRIVER_CACHE: it has another cache; SF_DRIVER_FIELD: it has
- * not this kind of field. */
+/* Programs and starts the rays, after sf_driver_load, whose soft reset has stopped them. planes: NULL for a hash grid.
+ * With planes, levels and directions of `rays` are not read. SF_DRIVER_REFUSED: see RAY_ERROR. SF_DRIVER_MISFIT:
+ * levels, n_dir or the decoder's inputs are wrong, which the block does not check. SF_DRIVER_CACHE: the block has
+ * another cache. SF_DRIVER_FIELD: the block does not have this kind of field. */
 sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays, const sf_planes_blob *planes);
 void sf_ray_driver_cache(const sf_bus *bus, uint32_t *bytes, uint32_t *ways); /* of the field, in this build */
 void sf_ray_driver_field(const sf_bus *bus, sf_field_counters *counters);

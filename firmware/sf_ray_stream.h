@@ -5,9 +5,8 @@
 #include "firmware/sf_driver.h"
 #include "fx/fx.h"
 
-/* new_tile: the field's cache is emptied before the ray. Its occupied lattice points are sent until the last one, or
- * until its pixel has come. SF_DRIVER_TIMEOUT when the accelerator takes or gives nothing: its registers may say why.
- */
+/* Sends the ray's occupied lattice points until the last one, or until its pixel has come. new_tile: the field's cache
+ * is emptied before the ray. SF_DRIVER_TIMEOUT if the accelerator takes or gives nothing: its registers may say why. */
 sf_driver_code sf_ray_stream_pixel(const sf_bus *fifos, const fx_scene *scene, const fx_ray *ray, bool new_tile,
                                    fx_pixel *pixel);
 #endif

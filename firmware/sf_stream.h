@@ -5,7 +5,7 @@
 #include "firmware/sf_driver.h"
 
 enum { SF_STREAM_POLLS = 100000 };
-/* Until a bit of `state` is set in the FIFOs' status register at this offset; *status is what was read. */
+/* Waits until a bit of `state` is set in the FIFOs' status register at this offset. *status is what was read. */
 sf_driver_code sf_stream_await(const sf_bus *bus, uint32_t offset, uint32_t state, uint32_t *status);
 
 typedef struct sf_stream {

@@ -1,8 +1,11 @@
-/* The image: a scene and a tile of rays as one block of memory, all that the firmware needs to make pixels.
- * Little-endian; the header, then in any order, each 8-byte aligned: the net (sf_blob.h), the field, the occupancy
- * bitmaps of all cascades, one fx_ray per pixel, row by row; where steps grow, an fx_steps. The field: a hash grid's
- * table; or of TensoRF the words of sf_planes_blob with its basis matrix behind them, and the lines that the
- * accelerator reads (fx_tensorf_memory), 16-byte aligned. */
+/* The image: a scene and a tile of rays as one block of memory, all that the firmware needs to make pixels. It is
+ * little-endian and begins with the header. The parts follow in any order, each 8-byte aligned:
+ * - the net (sf_blob.h);
+ * - the field: a hash grid's table, or of TensoRF the words of sf_planes_blob followed by its basis matrix, and the
+ * lines that the accelerator reads (fx_tensorf_memory), 16-byte aligned;
+ * - the occupancy bitmaps of all cascades;
+ * - one fx_ray per pixel, row by row;
+ * - an fx_steps, if steps grow with the distance. */
 #ifndef SF_FIRMWARE_SF_TILE_H
 #define SF_FIRMWARE_SF_TILE_H
 #include "firmware/sf_blob.h"
@@ -43,9 +46,9 @@ typedef struct sf_tile {
   fx_pixel *pixels; /* [height][width], in the memory behind the image */
 } sf_tile;
 
-/* NULL and points *tile into the block, or says what is wrong with it. space: bytes of memory from block on, which is
- * 8-byte aligned. Sizes and places are checked here; that values make a good scene is the writer's care, and the
- * checksum says that they are still the writer's. */
+/* Points *tile into the block and returns NULL, or says what is wrong with the block. space: bytes of memory from block
+ * on; block is 8-byte aligned. Sizes and places are checked. Values are not: the writer has to write a good scene, and
+ * the checksum shows that it did not change. */
 const char *sf_tile_open(uint8_t *block, uint32_t space, sf_tile *tile);
 
 /* Where the pixels of an image of so many bytes are. */

@@ -1,11 +1,11 @@
-/* Functional coverage: what the samples, the errors and the soft resets of all tests have been through. Collected only
- * in a build with COVERAGE, in one file that every process adds to; elsewhere sf_cover_open gives NULL. */
+/* Functional coverage: which cases the samples, errors and soft resets of all tests have reached. Only a build with
+ * COVERAGE collects it, in one file that every process adds to. In other builds sf_cover_open returns NULL. */
 #ifndef SF_SIM_COVER_H
 #define SF_SIM_COVER_H
 #include "sim/pins.h"
 #include "sim/dut.h"
 
-/* Where a soft reset struck, by the last thing that happened at the pins. */
+/* What the block was doing at a soft reset, by the last thing that happened at the pins. */
 typedef enum {
   SF_PHASE_IDLE,                                /* nothing is inside */
   SF_PHASE_PACKET,                              /* a packet is half in */

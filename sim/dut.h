@@ -9,7 +9,7 @@ typedef struct sf_dut_options {
   uint64_t seed;       /* of stalls and random reset values */
   int stall_percent;   /* chance per cycle of a bubble on input and of back-pressure on output, 0..90 */
   const char *wave;    /* FST file to write, or NULL */
-  int wave_from;       /* it begins when sample wave_from of a run is due at the input */
+  int wave_from;       /* the waveform begins when sample wave_from of a run is due at the input */
   const char *plusarg; /* passed to the simulation, or NULL */
   int memory_latency;  /* of sf_ray_top's memory, in cycles; 0: at random for each line */
 } sf_dut_options;
@@ -42,7 +42,7 @@ typedef struct sf_dut_trace {
 } sf_dut_trace;
 sf_status sf_dut_run_traced(sf_dut *dut, const sf_dut_sample *sample, int n, sf_dut_result *result,
                             sf_dut_trace *trace);
-/* After a run: some cycles in which nothing more may come. */
+/* After a run: clocks some more cycles. A result in one of them is an error. */
 sf_status sf_dut_quiet(sf_dut *dut);
 /* The accelerator's own counters, read through the CSR block (grid, march and saturation fields stay 0 unless the
  * hardware has them). */

@@ -1,6 +1,6 @@
-/* A whole co-simulation: random rays of a data set, cut into blocks that are dealt out to processes or ranks.
- * Everything depends on the block alone, which is a fresh accelerator with a seed of its own: totals and the first
- * difference do not depend on how many they are. */
+/* A whole co-simulation: random rays of a data set, cut into blocks that are dealt out to processes or ranks. Each
+ * block has a fresh accelerator with a seed of its own. So totals and the first difference do not depend on the number
+ * of processes. */
 #ifndef SF_SIM_LOCKSTEP_H
 #define SF_SIM_LOCKSTEP_H
 #include "sim/cosim.h"
@@ -35,12 +35,12 @@ typedef struct sf_lockstep {
   sf_cosim_totals sum;
   uint64_t energy_core_fj, energy_rtl_fj;
   sf_cosim_place place;    /* found: the first difference */
-  char wire[64];           /* of it; place points here */
-  sf_replay replay;        /* of it */
-  char evidence[4096 - 8]; /* of it: the prefix under which it lies, "" where it does not */
+  char wire[64];           /* of the difference; place points here */
+  sf_replay replay;        /* the samples that show it */
+  char evidence[4096 - 8]; /* prefix of the files that keep it, "" if none were written */
   bool replays;            /* the samples of the replay file show it */
   bool partial;            /* the last blocks were interrupted; no checkpoint is written of them */
-  bool stopping;           /* interrupted, and kept in the checkpoint what was finished then */
+  bool stopping;           /* interrupted; the checkpoint has what was finished at that time */
   bool complete;           /* every ray, or the limit */
   uint64_t resumed;        /* samples that the checkpoint brought along */
   sf_ranks *ranks;         /* who does the work; set by the caller, NULL: this process */
@@ -48,23 +48,23 @@ typedef struct sf_lockstep {
   void *user;
   double saved;            /* time of the last checkpoint */
   uint64_t kept;           /* rays in it */
-  sf_lockstep_state whole; /* without a last block of fewer rays: from there a run of more rays goes on */
-  sf_status unwritten;     /* of a difference: why there is no evidence; SF_OK where there is */
+  sf_lockstep_state whole; /* without a last block of fewer rays: a run of more rays continues from here */
+  sf_status unwritten;     /* of a difference: why its evidence could not be written, or SF_OK */
   char identity[65]; /* of program, scene, data and options but the number of rays: a checkpoint is continued by nothing
                         else */
   sf_status trouble; /* what ended it */
 } sf_lockstep;
 
 sf_status sf_lockstep_load(sf_lockstep *lockstep, const sf_lockstep_options *options);
-/* On every rank; rank 0 alone has totals, checkpoint and evidence. SF_E_DIFFERENCE: `place` says where, and the
- * evidence is written unless `unwritten` says why not. SF_E_STOPPED: interrupted, the totals are of what was compared
- * until then. */
+/* Call it on every rank. Rank 0 alone has totals, checkpoint and evidence. SF_E_DIFFERENCE: `place` says where, and the
+ * evidence is written unless `unwritten` says why not. SF_E_STOPPED: the run was interrupted, and the totals are those
+ * of what was compared until then. */
 sf_status sf_lockstep_run(sf_lockstep *lockstep);
 /* View and pixel of a ray. */
 typedef struct sf_lockstep_pixel {
   int view, x, y;
 } sf_lockstep_pixel;
-enum { SF_LOCKSTEP_STREAM = 4 }; /* of random numbers: the first that picking leaves free */
+enum { SF_LOCKSTEP_STREAM = 4 }; /* of random numbers: the first one that the choice of rays does not use */
 sf_lockstep_pixel sf_lockstep_pick(const sf_lockstep *lockstep, uint64_t ray);
 /* Sets both energies from the sums: equal counts have equal energy. */
 sf_status sf_lockstep_energy(sf_lockstep *lockstep);

@@ -25,7 +25,7 @@ typedef struct sf_pins_in {
   uint64_t r_data;
 } sf_pins_in;
 
-/* As sampled just before the rising edge, with the inputs of the same cycle applied. */
+/* The outputs just before the rising edge, with the inputs of the same cycle applied. */
 typedef struct sf_pins_out {
   bool awready, wready, bvalid, arready, rvalid;
   uint8_t bresp, rresp;
@@ -48,10 +48,9 @@ typedef struct sf_pins sf_pins;
 /* Every register starts with a value drawn from `seed`. wave, plusarg: NULL or text. NULL when out of memory. */
 sf_pins *sf_pins_open(uint64_t seed, const char *wave, const char *plusarg);
 sf_pins *sf_pins_open_rays(uint64_t seed, const char *wave, const char *plusarg); /* sf_ray_top */
-/* The words that sf_top reads from a plusarg, as its source names them, each with a blank behind it: "fault=%d ". */
+/* The plusargs that sf_top reads, as its source writes them, each followed by a blank: "fault=%d ". */
 const char *sf_pins_plusargs(void);
-/* The waveform begins here. sf_pins_dump_end: its file ends and is whole; sf_pins_dump then begins another by that
- * name. */
+/* Begins the waveform. sf_pins_dump_end completes its file; another sf_pins_dump begins another file of that name. */
 void sf_pins_dump(sf_pins *pins);
 void sf_pins_dump_end(sf_pins *pins);
 void sf_pins_cycle(sf_pins *pins, const sf_pins_in *in, sf_pins_out *out);

@@ -1,5 +1,5 @@
-/* --plusarg: words for the simulation. One that the Verilated block does not read would change nothing, without a word.
- */
+/* --plusarg: words for the simulation. A word that the Verilated block does not read would have no effect, so it is
+ * refused. */
 #ifndef SF_SIM_PLUSARG_H
 #define SF_SIM_PLUSARG_H
 #include "base/status.h"

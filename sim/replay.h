@@ -16,13 +16,13 @@ typedef struct sf_replay {
   uint64_t seed; /* of stalls and register contents at power-on */
   int stall_percent;
   char plusarg[SF_PLUSARG_MAX + 1]; /* "" for none */
-  bool other_program;               /* of a loaded one: not this program wrote it */
-  const char *other_block;          /* of a loaded one: how the block in this program is not the file's; or NULL */
+  bool other_program;               /* of a loaded file: another program wrote it */
+  const char *other_block;          /* of a loaded file: how this program's block differs from the file's; or NULL */
   int count;
   sf_replay_sample sample[SF_REPLAY_MAX];
 } sf_replay;
 
-/* What came of it. */
+/* The result of a replay. */
 typedef struct sf_replayed {
   bool differs;
   int at;             /* index of the sample that differs; the last one for a counter */
@@ -30,10 +30,10 @@ typedef struct sf_replayed {
   char message[400];
 } sf_replayed;
 
-/* On a fresh accelerator: samples, then counters. wave: FST file of the last two samples alone, or NULL. */
+/* Compares the samples, then the counters, on a fresh accelerator. wave: FST file of the last two samples, or NULL. */
 sf_status sf_replay_run(const sf_replay *replay, const fx_net *net, const char *wave, sf_replayed *replayed);
-/* Leaves the fewest samples, ending with the last one, that still differ: 2, 4, 8... of them. False when not even all
- * of them do. */
+/* Keeps the fewest samples, ending with the last one, that still show a difference: 2, 4, 8... of them. Returns false
+ * if not even all of them show one. */
 sf_status sf_replay_shrink(sf_replay *replay, const fx_net *net, bool *differs);
 
 /* JSON: SHA-256 of this program, its block (--dut), scene path and SHA-256, seed, stalls, samples. `difference`, which
@@ -41,6 +41,6 @@ sf_status sf_replay_shrink(sf_replay *replay, const fx_net *net, bool *differs);
  */
 sf_status sf_replay_json(const sf_replay *replay, const char *scene, cJSON *difference, cJSON **json);
 sf_status sf_replay_save(const sf_replay *replay, const char *scene, cJSON *difference, const char *path);
-/* Checks every field; the scene must have the same contents still. *scene: malloc'ed path. */
+/* Checks every field. The scene's contents must be what they were. *scene: malloc'ed path. */
 sf_status sf_replay_load(sf_replay *replay, char **scene, const char *path);
 #endif

@@ -1,4 +1,4 @@
-/* Inside of the harness, for its own files and for tests that go below spikefield/dut.h. */
+/* Inside of the harness: for its own files, and for tests that need more than sim/dut.h. */
 #ifndef SF_SIM_SIM_H
 #define SF_SIM_SIM_H
 #include "firmware/sf_driver.h"
@@ -16,7 +16,7 @@ struct sf_dut {
   uint8_t bus_response; /* of the last write: 0 OKAY, 2 SLVERR */
   struct {
     const char *what; /* NULL: none */
-    bool early;       /* the block does not follow AXI: what the driver read is of no use */
+    bool early;       /* the block breaks AXI's rules, so what the driver read means nothing */
     uint32_t offset;
     uint64_t cycle;
   } bus_fault; /* the first one since the driver was called */
@@ -32,10 +32,10 @@ struct sf_dut {
 
 /* One clock cycle with the inputs in dut->in; dut->out holds what was sampled at its edge. */
 void sf_dut_tick(sf_dut *dut);
-/* True with the stall probability; streams of decisions are told apart by `which`. */
+/* True with the stall probability. `which` chooses one of several independent sequences of decisions. */
 bool sf_dut_stalls(const sf_dut *dut, uint64_t which);
 sf_bus sf_dut_bus(sf_dut *dut);
-/* Power on, probed, nothing programmed. */
+/* Powers the block on and probes it. Nothing is programmed. */
 sf_status sf_dut_open_bare(sf_dut **dut, const sf_dut_options *options);
 /* The same for either top: sf_pins_open or sf_pins_open_rays. */
 typedef sf_pins *(*sf_pins_opener)(uint64_t seed, const char *wave, const char *plusarg);
@@ -43,7 +43,7 @@ sf_status sf_dut_open_pins(sf_dut **dut, const sf_dut_options *options, sf_pins_
 sf_status sf_dut_load(sf_dut *dut, const fx_net *net);
 sf_net_blob sf_dut_blob(const fx_net *net);
 
-/* For the driver; what was refused before is no fault of what follows. */
+/* The bus for the driver. Forgets what was refused before. */
 const sf_bus *sf_dut_driver_bus(sf_dut *dut);
 /* An ERROR register, and what its bits say. */
 typedef struct sf_error_source {
@@ -52,7 +52,7 @@ typedef struct sf_error_source {
 } sf_error_source;
 extern const sf_error_source sf_dut_error; /* of sf_top */
 const char *sf_dut_error_text(sf_dut *dut, const sf_error_source *error);
-/* What the driver says, and what the bus saw meanwhile. */
+/* A driver's result as a status, with the first fault that the bus saw during the call. */
 sf_status sf_dut_driver_status(sf_dut *dut, sf_driver_code code, const char *what, const sf_error_source *error);
 
 /* Packet of a sample: beats of 4 values. words[SF_PACKET_MAX]; returns the number of beats. */

@@ -1,5 +1,6 @@
-/* Rays through the core and through a board, many at a time: a line is slow to turn round. Every pixel and the sums of
- * all counters are compared; at a difference the rays go once more, one by one, then sample by sample. */
+/* Rays through the core and through a board, many at a time, because waiting for answers of a serial line is slow.
+ * Every pixel and the sums of all counters are compared. At a difference the rays are sent again, one by one, then
+ * sample by sample. */
 #ifndef SF_SIM_BOARD_BATCH_H
 #define SF_SIM_BOARD_BATCH_H
 #include "energy/energy.h"

@@ -1,5 +1,4 @@
-/* sf_ray_top on a board: programmed by firmware/'s driver, whose bus is the link, with the field in the board's memory.
- */
+/* sf_ray_top on a board. firmware/'s driver programs it over the link. The field lies in the board's memory. */
 #ifndef SF_SIM_BOARD_BOARD_H
 #define SF_SIM_BOARD_BOARD_H
 #include "sim/board/link.h"
@@ -18,14 +17,14 @@ typedef struct sf_board {
   uint32_t refused;                                             /* register of the first refused write, or UINT32_MAX */
 } sf_board;
 
-/* Seconds without a byte until a command is sent again; a board that answers needs a hundredth of it. */
+/* Seconds without a byte until a command is sent again. A board that works answers in a hundredth of it. */
 #define SF_BOARD_PATIENCE 1.0
 
 /* Greets, probes, fills the memory, programs, starts. The scene must outlive it. SF_E_UNSUPPORTED: another version or
  * other sizes, a scene that does not fit. */
 sf_status sf_board_open(sf_board **board, const char *port, double patience, const fx_scene *scene, const char *path);
 void sf_board_close(sf_board *board);
-/* Net, encoder and compositor of the scene once more, after a soft reset. The memory keeps its contents. */
+/* Programs net, encoder and compositor again, after a soft reset. The memory keeps its contents. */
 sf_status sf_board_load(sf_board *board);
 /* n rays in, n pixels out. */
 sf_status sf_board_run(sf_board *board, const sf_ray_request *request, int n, fx_pixel *pixel);

@@ -1,6 +1,6 @@
-/* Frames on a board's serial line: what stands between two END bytes, with END and ESC in it written as two bytes. A
- * header of number, command and words of payload, the payload, a CRC-32 of all of it, little-endian.
- * Mirror: rtl/board/sf_link_rx.sv, rtl/board/sf_link_tx.sv, rtl/board/sf_link_crc.sv */
+/* Frames on a board's serial line. A frame stands between two END bytes; an END or ESC inside is written as two bytes.
+ * It has a header (number, command, words of payload), the payload, and a CRC-32 of all of it, little-endian. Mirror:
+ * rtl/board/sf_link_rx.sv, rtl/board/sf_link_tx.sv, rtl/board/sf_link_crc.sv */
 #ifndef SF_SIM_BOARD_FRAME_H
 #define SF_SIM_BOARD_FRAME_H
 #include <stdbool.h>
@@ -18,7 +18,7 @@ typedef struct sf_frame {
 /* bytes[SF_FRAME_BYTES]; returns how many. */
 size_t sf_frame_write(const sf_frame *frame, uint8_t *bytes);
 
-/* What is wrong with a frame; the first four as the board says them, too. */
+/* What is wrong with a frame. The board uses the same numbers. */
 typedef enum {
   SF_WRONG_NOTHING,
   SF_WRONG_BYTE,     /* a broken byte, or a half of an escaped one */

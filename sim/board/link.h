@@ -1,5 +1,5 @@
-/* A board at the other end of a serial line: commands and their answers. A frame that was lost or damaged on the way is
- * sent again, and the board does nothing twice. Mirror: rtl/board/sf_link.sv, rtl/board/sf_link_commands.sv */
+/* A board at the other end of a serial line: commands and their answers. A frame that was lost or damaged is
+ * sent again, and the board obeys each command once. Mirror: rtl/board/sf_link.sv, rtl/board/sf_link_commands.sv */
 #ifndef SF_SIM_BOARD_LINK_H
 #define SF_SIM_BOARD_LINK_H
 #include "base/status.h"
@@ -30,7 +30,7 @@ typedef struct sf_link {
 /* Opens the port and greets the board. SF_E_IO: no such port, or no board that answers. */
 sf_status sf_link_open(sf_link *link, const char *port, double patience);
 void sf_link_close(sf_link *link);
-/* What an earlier host left in the board is dropped: samples and pixels. */
+/* Drops what an earlier host left in the board: samples and pixels. */
 sf_status sf_link_greet(sf_link *link);
 /* frame: the command, then its answer, whose first word, the status, was 0. SF_E_IO names what failed. */
 sf_status sf_link_call(sf_link *link, sf_frame *frame);

@@ -1,5 +1,5 @@
-/* sf_cosim against a board: the rays of a lockstep run as pixels, with every counter. What happens inside the board is
- * not seen: no spikes, membranes or rows, and no waveform of a difference. */
+/* sf_cosim against a board: compares the pixels of a lockstep run's rays, and every counter. Spikes, membranes and rows
+ * inside the board cannot be seen, and there is no waveform of a difference. */
 #ifndef SF_SIM_BOARD_LOCKSTEP_H
 #define SF_SIM_BOARD_LOCKSTEP_H
 #include "sim/board/link.h"

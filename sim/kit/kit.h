@@ -20,7 +20,7 @@ typedef struct sf_kit_report {
   uint64_t bytes;
 } sf_kit_report;
 
-/* SF_E_USAGE where the folder holds something else than a kit, whole or not: nothing is mixed up with a kit. */
+/* SF_E_USAGE if the folder holds anything but a kit, complete or not. */
 sf_status sf_kit_check_folder(const char *folder);
 /* The same seed draws the rays that sf_cosim draws; of each, the first 12 samples at most. SF_E_FORMAT when none of
  * them has a sample. */

@@ -1,5 +1,5 @@
-/* sf_ray_top, Verilated: rays in, pixels out, with the field in a memory that answers late. Registers, counters and
- * bus are those of sim/sim.h. */
+/* sf_ray_top, Verilated: rays in, pixels out. The field lies in a memory that answers late. sim/sim.h has registers,
+ * counters and bus. */
 #ifndef SF_SIM_RAY_RAY_H
 #define SF_SIM_RAY_RAY_H
 #include "sim/ray/request.h"
@@ -23,11 +23,11 @@ typedef struct sf_memory {
   uint32_t waiting;
 } sf_memory;
 
-/* Somewhere, so that an address is not an offset. */
+/* An address that the seed chooses, so that a confusion of offset and address is found. */
 uint32_t sf_memory_base(uint64_t seed);
 /* Contents of the scene's field; those of a hash grid stay where they are. sf_ray_dut_close frees the planes. */
 sf_status sf_memory_fill(sf_memory *memory, const fx_scene *scene);
-/* The dut's each_cycle, with the memory as its context: watches the rules, takes a request, gives a beat. */
+/* The dut's each_cycle, with the memory as its context: checks the rules of AXI, takes a request, gives a beat. */
 void sf_memory_cycle(void *memory);
 
 typedef struct sf_ray_dut {
@@ -39,15 +39,15 @@ typedef struct sf_ray_dut {
 } sf_ray_dut;
 /* Programmed and started. The scene must outlive it. */
 sf_status sf_ray_dut_open(sf_ray_dut **rays, const fx_scene *scene, const sf_dut_options *options);
-/* Net, encoder and compositor of the scene once more, after a soft reset or a change of the scene. */
+/* Programs net, encoder and compositor again, after a soft reset or a change of the scene. */
 sf_status sf_ray_dut_load(sf_ray_dut *rays);
 /* Streams n rays in and n pixels out. A hang is an error that names the cycle. */
 sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
 void sf_ray_dut_close(sf_ray_dut *rays);
-/* Of the field, as the block says: a build may have another one than the package's. */
+/* The field's cache as the block reports it: a build may have another one than the package's. */
 fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays);
 /* The field's counters since the block was opened, against those of the core for the same rays. */
 sf_status sf_ray_dut_field(sf_ray_dut *rays, sf_field_counters *field);
-/* Rays are in tiles: true where this one's is another than the last one's. */
+/* True if this ray is in another tile than the last one. */
 bool sf_ray_dut_new_tile(sf_ray_dut *rays, uint64_t tile);
 #endif

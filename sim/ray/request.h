@@ -1,5 +1,5 @@
-/* Rays as sf_ray_top takes them, pixels as it gives them, and its programming of a scene: of the Verilated block and of
- * one on a board. */
+/* Rays as sf_ray_top takes them, pixels as it gives them, and how a scene programs it. The Verilated block and a board
+ * share this. */
 #ifndef SF_SIM_RAY_REQUEST_H
 #define SF_SIM_RAY_REQUEST_H
 #include "firmware/sf_ray_driver.h"
@@ -11,9 +11,9 @@ typedef struct sf_ray_sample {
   uint64_t distance_q16; /* below 2^44 */
 } sf_ray_sample;
 
-/* new_tile: the first ray of a tile, before which the field's cache is emptied. The samples of one ray, n >= 0. The
- * hardware may stop before the last one, by the core's own rule. stops: it has to stop at the last one, which is not
- * marked as such; once its pixel has come, one more that is ends the ray. */
+/* The samples of one ray, n >= 0. The hardware may stop before the last one, by the core's own rule. new_tile: the
+ * first ray of a tile, before which the field's cache is emptied. stops: the hardware has to find the end at sample n -
+ * 1, which is not marked as the last. Once the pixel has come, one more sample, marked as the last, ends the ray. */
 typedef struct sf_ray_request {
   const fx_ray *ray;
   const sf_ray_sample *sample;
@@ -35,10 +35,10 @@ fx_pixel sf_ray_pixel_of(const uint64_t word[6]);
 
 sf_status sf_compare_field(const fx_memory_counts *core, const sf_field_counters *rtl);
 
-/* A ray's lattice points at most, and those of TensoRF before its decoded samples are enough. */
+/* The most samples of a ray: all its lattice points, which TensoRF may need before enough of them are decoded. */
 enum { SF_RAY_SAMPLES_MAX = 4096 };
 /* The first n samples of the ray's march. */
 void sf_ray_samples(const fx_scene *scene, const fx_ray *ray, sf_ray_sample *sample, int n);
-/* Those that the core took for its pixel: the counters become the core's. sample[SF_RAY_SAMPLES_MAX] */
+/* The samples that the core took for its pixel. With these the counters equal the core's. sample[SF_RAY_SAMPLES_MAX] */
 sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const fx_pixel *core, sf_ray_sample *sample);
 #endif

@@ -17,8 +17,8 @@ typedef struct sf_three_job {
   uint64_t (*tile)(void *user, uint64_t index); /* as in sf_measure_job */
 } sf_three_job;
 
-/* Counts must hold what `wanted` says; everything else is set. Each sample goes through core and accelerator: outputs,
- * spike bitmaps and, per ray, all counters are compared, so that a difference names ray, sample, layer, step, event, of
- * a spike the neuron too. A difference is counts->agreement, not a failure: the report shows it. */
+/* The caller sets `wanted` of counts; everything else is set here. Each sample goes through core and accelerator.
+ * Outputs, spike bitmaps and, after each ray, all counters are compared. So a difference names ray, sample, layer, step
+ * and event, and for a spike the neuron. A difference is no failure: it is in counts->agreement, for the report. */
 sf_status sf_three_counts_run(const sf_three_job *job, sf_three_counts *counts);
 #endif

@@ -1,7 +1,7 @@
 /* The reference system-on-chip of firmware/sf_soc.h: an RV32IM processor emulated by Unicorn, its memory, a UART, a
  * power register, and the Verilated accelerator, sf_top or sf_ray_top, behind its AXI4-Lite port and stream FIFOs. The
- * accelerator's clock runs while the processor accesses it and stands still meanwhile: results and event counts are
- * those of hardware, times are not. */
+ * accelerator's clock runs only while the processor accesses it. So results and event counts are those of hardware,
+ * times are not. */
 #ifndef SF_SIM_SOC_SOC_H
 #define SF_SIM_SOC_SOC_H
 #include "sim/sim.h"
@@ -31,9 +31,9 @@ void sf_soc_begin_at(sf_soc *soc, uint32_t address); /* for a program that is no
 /* size bytes of memory at an address of the processor, NULL where there are none. */
 uint8_t *sf_soc_memory(sf_soc *soc, uint32_t address, uint64_t size);
 
-/* Until the program writes the power register. Whatever else ends it is an error that names the place: a trap, an
- * access to nowhere, sleep without an end, the limit, an accelerator that does not answer. SF_E_STOPPED when tick says
- * so. */
+/* Runs until the program writes the power register. Any other end is an error that names the place: a trap, an
+ * access to nowhere, sleep without an end, the limit, an accelerator that does not answer. SF_E_STOPPED if tick
+ * returned false. */
 sf_status sf_soc_run(sf_soc *soc, uint32_t *exit_status);
 sf_soc_totals sf_soc_total(const sf_soc *soc);
 /* A failure, with the first register access that the accelerator refused, if there was one. */

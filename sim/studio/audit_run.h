@@ -31,10 +31,10 @@ typedef struct sf_audit {
   sf_audit_report report;
 } sf_audit;
 
-/* Reads the files. Close it whether this fails or not. */
+/* Reads the files. Close the audit even after a failure. */
 sf_status sf_audit_open(sf_audit *audit, const sf_audit_options *options);
-/* On every rank; rank 0 alone prices, and runs the accelerator. Counts and prices: fills the report. Three counts that
- * differ are in report.three.agreement, not a failure. */
+/* Counts and prices: fills the report. Call it on every rank; rank 0 alone prices, and runs the accelerator. If the
+ * three counts differ, report.three.agreement says so, and this does not fail. */
 sf_status sf_audit_count(sf_audit *audit);
 void sf_audit_close(sf_audit *audit);
 #endif

@@ -47,8 +47,8 @@ typedef struct sf_shot {
 } sf_shot;
 /* index: of the split, from 0. view is NULL where index is beyond the last one. */
 sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot);
-/* What a camera of one's own sees, named "camera", without a picture. Of a scene alone where options.data is NULL,
- * which a forward-facing one is refused: SF_E_USAGE. */
+/* The view of a camera of your own, named "camera", without a picture. If options.data is NULL, the scene alone has to
+ * do; a forward-facing one is then refused with SF_E_USAGE. */
 sf_status sf_shot_from(const sf_studio *studio, const sf_camera *camera, sf_shot *shot);
 sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
@@ -59,14 +59,15 @@ void sf_shot_free(sf_shot *shot);
 /* The argument of --crop: "X,Y,WIDTH,HEIGHT" with at least one pixel. SF_E_USAGE. */
 sf_status sf_window_parse(const char *text, sf_window *window);
 
-/* The accelerator makes the pixels from the positions of their samples; the core walks along so that a difference is
- * reported at its first pixel, and for what the accelerator does not do or count: marching, saturation, grid bytes. */
+/* The accelerator makes the pixels from the positions of their samples. The core renders beside it, so that a
+ * difference is reported at its first pixel. The core also does what the accelerator does not: marching, and counts of
+ * saturations and grid bytes. */
 sf_status sf_golden_rtl(const sf_golden_job *job, sf_ray_dut *rays, sf_golden *golden);
-/* The same from a board, tile by tile: pixels are the board's; counters are compared as sums of a tile's rays, so
+/* The same from a board, tile by tile. The pixels are the board's. Counters are compared as sums over a tile, so the
  * events of single pixels are the core's. */
 sf_status sf_golden_board(const sf_golden_job *job, sf_board *board, sf_golden *golden);
 
-/* Of both: tiles of the view, as far as they are in the window, from left to right and top to bottom. tile: place of
+/* For both: tiles of the view that overlap the window, from left to right and top to bottom. tile: place of
  * its first pixel in the window, and its size there. */
 typedef sf_status (*sf_tile_fn)(const sf_golden_job *job, const sf_window *tile, void *user, sf_golden *golden);
 sf_status sf_each_tile(const sf_golden_job *job, sf_tile_fn work, void *user, sf_golden *golden);

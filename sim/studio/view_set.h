@@ -38,16 +38,16 @@ typedef struct sf_verdict {
   sf_status file;    /* the EXR beside the manifest; SF_OK where there is none */
   char note[320];    /* what is worth saying although it is no difference, or "" */
 } sf_verdict;
-/* The manifest is loaded and the studio open with its options. only: index of one view, -1 = all that are listed.
- * report is called for every view in turn; *differences counts the views that differ. Fails where the comparison itself
- * was not possible. */
+/* Renders the listed views again and compares them. The manifest has to be loaded, and the studio open with its
+ * options. only: index of one view, -1 = all that are listed. report is called for every view in turn; *differences
+ * counts the views that differ. Fails only if the comparison itself was not possible. */
 sf_status sf_view_set_verify(sf_view_set *set, int only, void (*report)(void *user, const sf_verdict *verdict),
                              int *differences);
 /* One line or more per view; {"index", "name", "picture", "file", "note"}. */
 void sf_verdict_print(FILE *out, const sf_verdict *verdict);
 cJSON *sf_verdict_json(const sf_verdict *verdict);
-/* How long it took this machine, which no manifest tells: "N views rendered by ..."; backend, manifest, rendered,
- * seconds, pixels_per_second. */
+/* Says how long it took, which is not in the manifest. Text: "N views rendered by ...". JSON: backend, manifest,
+ * rendered, seconds, pixels_per_second. */
 void sf_view_set_print_run(FILE *out, const sf_view_set *set, double seconds);
 void sf_view_set_add_run(const sf_view_set *set, double seconds, cJSON *json);
 void sf_view_set_free(sf_view_set *set); /* not the studio */

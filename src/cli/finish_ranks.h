@@ -4,6 +4,6 @@
 #include "cli/cli.h"
 #include "ranks/ranks.h"
 
-/* As sf_cli_finish on rank 0; the others have nothing to tell and end with 0. Closes the ranks, which may be NULL. */
+/* On rank 0 as sf_cli_finish. The other ranks print nothing and end with 0. Closes the ranks, which may be NULL. */
 int sf_cli_finish_ranks(const sf_cli *cli, sf_ranks *ranks, sf_status status);
 #endif

@@ -5,13 +5,14 @@
 #include "cli/cli.h"
 #include "base/io.h"
 
-/* The values that the options have now, but for those named in `apart` (ends with NULL) and for outputs; "" for what
- * was not asked for: a flag, a string or a number outside its limits. NULL: no memory. */
+/* The present values of the options, without outputs and those named in `apart` (ends with NULL). An option that was
+ * not given has "": a flag, a string, or a number outside its limits. NULL: no memory. */
 cJSON *sf_record_make(const sf_option *options, const char *const *apart);
-/* What the file has of them as words of a command line, behind word[*words]; `room` in all. Free each. */
+/* Appends the options that the file has as words of a command line, from word[*words] on; room for `room` words. Free
+ * each. */
 sf_status sf_record_words(const sf_tensors *set, const sf_option *options, const char *const *apart, char **word,
                           int *words, int room);
-/* SF_E_RANGE names the first option whose value in `record` is not the one in the file. An option that the file does
- * not know may have any. */
+/* SF_E_RANGE names the first option whose value in `record` is not the one in the file. An option that is
+ * not in the file may have any value. */
 sf_status sf_record_compare(const sf_tensors *set, const cJSON *record);
 #endif

@@ -19,7 +19,7 @@ typedef struct export_extras {
   sf_traces_report traces;
 } export_extras;
 
-/* Reads what is to be read, so that a fault of it is known before anything is written. scene_path: for messages and the
+/* Reads all inputs, so that a fault in one is known before anything is written. scene_path: for messages and the
  * vectors' record. Close it even after a failure. */
 sf_status export_extras_open(export_extras *extras, const fx_scene *scene, const char *scene_path,
                              const export_options *options);

@@ -5,8 +5,8 @@
 #include "quant/quant.h"
 #include <cjson/cJSON.h>
 
-/* fit: what was measured at the quantisation is of the scene before it was cut down, and left out. bytes: of the file
- * `path`. */
+/* fit: leaves out what was measured at the quantisation, because that is of the scene before it was cut down. bytes: of
+ * the file `path`. */
 void export_report_print(const fx_scene *scene, const sf_quant_report *report, bool fit, const char *path,
                          long long bytes);
 cJSON *export_report_json(const fx_scene *scene, const sf_quant_report *report, const sf_fit_report *fit,

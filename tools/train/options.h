@@ -21,14 +21,14 @@ typedef struct train_arguments {
   char log_path[4096]; /* where no --log is given */
 } train_arguments;
 
-/* What the options are without being given: with the hash grid, or with TensoRF's planes on data. */
+/* The defaults of the options: with the hash grid, or with TensoRF's planes on data. */
 void train_option_defaults(train_arguments *a, const sf_dataset *data);
 void train_field_defaults(train_arguments *a, const sf_dataset *data); /* only those that depend on the field */
 void train_defaults(train_arguments *a, int argc, char **argv);
 void train_arguments_free(train_arguments *a);
 /* options: TRAIN_OPTIONS_MAX, filled. */
 sf_cli train_cli(train_arguments *a, sf_option *options);
-/* path: of the data. With --resume on top of the options of the run at --output. */
+/* path: of the data. With --resume the options of the run at --output come first. */
 sf_status train_parse(train_arguments *a, const char **path);
 /* What follows from the data: TensoRF's defaults, the box, the background; says so unless quiet. */
 sf_status train_settle(train_arguments *a, const sf_dataset *data);
