@@ -27,8 +27,8 @@ static void check_answer(sf_dut *dut, uint32_t offset, bool asked, uint8_t respo
   dut->bus_fault.cycle = dut->cycle;
 }
 
-/* Address and data are theirs no longer than they are on offer. An answer that comes too early ends the access, too:
- * there may be no other. */
+/* Address and data change as soon as they are no longer on offer. An answer that comes too early ends the access, too,
+ * because there may be no other. */
 static uint32_t bus_read(void *context, uint32_t offset)
 {
   sf_dut *dut = context;

@@ -19,8 +19,8 @@
 #define RECORD "dut.json" /* beside the program: its block */
 enum { WORDS_MAX = 65536, HASH_LENGTH = 16, PATH_LENGTH = 4096, NESTED_MAX = 8 };
 
-/* One text that names what is built: every word with its absolute path, then the contents' hash of every source, or a
- * hash of the names in an include folder: a new one may stand before what was included. */
+/* A text that identifies what is built: every word with its absolute path, and a hash of the contents of every source.
+ * An include folder has a hash of the names in it, because a new file may take the place of one that was included. */
 typedef struct request {
   char words[WORDS_MAX], key[2 * WORDS_MAX];
   size_t words_used, key_used;
@@ -29,8 +29,8 @@ typedef struct request {
   const char *base; /* folder of relative names, NULL: the working folder */
 } request;
 
-/* BUILD/bin/sf_cosim, wherever the build lies now. SF_SOURCE_ROOT: of the source tree, from BUILD on or absolute
- * (sim/sim.mk). */
+/* Finds the build folder and the source tree. The program is BUILD/bin/sf_cosim, wherever the build lies now.
+ * SF_SOURCE_ROOT: path of the source tree, absolute or relative to BUILD (sim/sim.mk). */
 static sf_status find_build(request *r)
 {
   char program[PATH_MAX] = "", path[2 * PATH_LENGTH];

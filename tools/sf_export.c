@@ -87,8 +87,8 @@ static sf_status quantise_narrower(const sf_model *model, const char *path, cons
   return sf_ok();
 }
 
-/* The grid first, where it has to fit a memory. What it may not lose any more is left for the rest: --fit-loss is for
- * both where it was given. */
+/* With --fit-bytes the grid is made smaller first. --fit-loss, if it was given, is for both parts: the rest may lose
+ * what the grid left of it. */
 static sf_status fit_both(candidates *c, const sf_fit_job *job, const options *o, fx_scene *fitted,
                           sf_fit_report *report)
 {

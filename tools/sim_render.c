@@ -271,8 +271,8 @@ static sf_status work(job *j)
   return status;
 }
 
-/* 0: as many as there are. More than the processors would have nothing to do, and one that the system refuses would end
- * the program. */
+/* 0: as many threads as processors. More are not started: they would have nothing to do, and a thread that the system
+ * refuses would end the program. */
 static void set_threads(int threads)
 {
   const int most = omp_get_num_procs();

@@ -1,5 +1,5 @@
-/* The driver's way to the registers of a board. Writes wait for each other and go together; the counters of a snapshot,
- * which stay as they are, are read many at once. What fails is kept: the driver does not look. */
+/* The driver's way to the registers of a board. Writes are collected and sent together. The counters of a snapshot do
+ * not change, so many are read at once. The first failure is kept, because the driver does not look for one. */
 #include "sim/board/bus.h"
 #include "sim/sim.h"
 #include <inttypes.h>

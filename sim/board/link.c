@@ -30,8 +30,7 @@ static sf_status set_line(sf_link *l)
   line.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
   cfsetispeed(&line, B3000000), cfsetospeed(&line, B3000000);
   if (tcsetattr(l->file, TCSANOW, &line)) return sf_fail(SF_E_IO, "%s: no serial port of 3 Mbaud", l->port);
-  /* An FTDI chip keeps short answers back for 16 ms unless it is told not to; where it cannot be told, all is slower.
-   */
+  /* An FTDI chip holds short answers back for 16 ms unless it is told not to. A port without this switch is slower. */
   struct serial_struct serial;
   if (!ioctl(l->file, TIOCGSERIAL, &serial)) {
     serial.flags |= ASYNC_LOW_LATENCY;

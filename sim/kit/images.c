@@ -9,8 +9,8 @@ enum { WINDOW = 512, GLOBAL_LAYER = 7, GLOBAL_SAMPLES = 0, GLOBAL_RAYS = 1 };
 
 /* ---- programming ---- */
 
-/* What the driver writes when the block has both fields, gives back the sizes of its layers, and reads as 0 elsewhere:
- * no error, nothing busy. */
+/* Records what the driver writes. Read, it is a block with both fields that returns the sizes of its layers, and 0
+ * elsewhere: no error, nothing busy. */
 typedef struct recorder {
   FILE *file;
   int writes;

@@ -1,5 +1,5 @@
-/* Rays in, pixels out: what sf_ray_top needs and what must come out. Of the kit's rays the first ones, whole, and a ray
- * without a sample behind them. */
+/* Rays in, pixels out: what sf_ray_top needs and what must come out. The rays are the kit's first ones, whole, and then
+ * one without a sample. */
 #include "sim/kit/kit.h"
 #include "sim/ray/request.h"
 #include "sim/sim.h"

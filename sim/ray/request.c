@@ -93,8 +93,8 @@ sf_ray_request sf_ray_request_as(const fx_scene *scene, const fx_ray *ray, const
   return (sf_ray_request){ray, sample, n, stops, false};
 }
 
-/* Direction and tile are those of the first beat. In later ones the accelerator ignores the bits: they are set to the
- * contrary. */
+/* The accelerator takes direction and tile from the first beat. In later beats it has to ignore these bits, so they are
+ * inverted there. */
 sf_ray_beat sf_ray_beat_of(const sf_ray_request *request, int at)
 {
   const int16_t *d = request->ray->unit;

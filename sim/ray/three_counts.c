@@ -102,8 +102,8 @@ static sf_status find_counter_sample(run *r, uint64_t index, const fx_ray *ray, 
   return status.code == SF_E_DIFFERENCE ? status : difference;
 }
 
-/* The samples that the core took through the accelerator with encoder and compositor: its pixel, what it reads, what
- * it writes. */
+/* Sends the samples that the core took through the accelerator with encoder and compositor. Compares the pixel, and
+ * counts what the accelerator reads and writes. */
 static sf_status ray_traffic(run *r, uint64_t index, const fx_ray *ray, const fx_pixel *core)
 {
   sf_ray_request request = sf_ray_request_as(r->job->scene, ray, core, r->sample);

@@ -140,8 +140,8 @@ static void power_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t 
 
 /* ---- what the processor does ---- */
 
-/* Counts instructions block by block: a block that an access ends early counts whole, one of a compressed instruction
- * as one, so that every endless program comes to its limit. */
+/* Counts instructions block by block, so that every endless program reaches its limit. A block that an access ends
+ * early is counted whole. A block of one compressed instruction counts as one. */
 static void on_block(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
   (void)uc;

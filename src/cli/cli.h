@@ -5,8 +5,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* STRING: any words. INPUT: a file or folder that is read; OUTPUT: a file that will be written; PLACE: a folder, or
- * what the program itself opens before it works. GROUP: no option but a heading of --help, for those behind it. */
+/* STRING: any text. INPUT: a file or folder that is read. OUTPUT: a file that will be written. PLACE: a folder, or
+ * something that the program itself opens before it works. GROUP: a heading of --help for the options that follow. */
 typedef enum {
   SF_ARG_FLAG,
   SF_ARG_INT,
@@ -38,17 +38,17 @@ typedef struct sf_cli {
   const sf_option *options;                         /* ends with name == NULL */
   int min_positional, max_positional;
   bool words;                       /* the positionals are words, not files or folders that are read */
-  const char *columns;              /* headings of the defaults of groups that have such: "\tingp\ttensorf"; or NULL */
-  const sf_option *const *defaults; /* of each column the same options with its defaults as values; or NULL */
+  const char *columns;              /* headings of the columns with defaults: "\tingp\ttensorf"; or NULL */
+  const sf_option *const *defaults; /* for each column the same options, with its defaults as values; or NULL */
 } sf_cli;
 
-/* Fills option values and positional[] (pointers into argv; NULL where absent). --help and --version print and exit 0,
- * and --completion, which `make install` uses and the help leaves out. SF_E_USAGE names the offending option; an OUTPUT
- * or PLACE that is the same file as another file of the line is one. SF_E_IO: an OUTPUT that cannot be written. Options
- * may follow positionals; --name=value works. Ignores SIGXFSZ, so that a file-size limit is an ordinary write error. */
+/* Fills option values and positional[] (pointers into argv; NULL where absent). Options may follow positionals, and
+ * --name=value works. --help and --version print and exit with 0. So does --completion, which `make install` uses and
+ * --help does not show. SF_E_USAGE names the wrong option; an OUTPUT or PLACE must not be another file of the line.
+ * SF_E_IO: an OUTPUT cannot be written. Ignores SIGXFSZ, so that a file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
-/* Copies options to `to`; returns the place behind them. So a table may be made in parts. */
+/* Copies options to `to` and returns the place after them. So a table may be put together from parts. */
 sf_option *sf_cli_add(sf_option *to, const sf_option *list, size_t count);
 
 /* The completion script for bash. */
@@ -56,8 +56,8 @@ void sf_cli_print_completion(const sf_cli *cli);
 /* The text of --help. */
 void sf_cli_help(const sf_cli *cli);
 
-/* SF_E_USAGE, "--name why", where one of these options (the list ends with NULL) is among the words of a line that was
- * parsed. */
+/* Fails with SF_E_USAGE, "--name why", if one of these options (the list ends with NULL) was given. The line has been
+ * parsed before. */
 sf_status sf_cli_refuse(const sf_cli *cli, int argc, char **argv, const char *const *names, const char *why);
 
 /* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */
@@ -67,7 +67,8 @@ int sf_cli_finish(const sf_cli *cli, sf_status status);
 void sf_cli_catch_signals(void);
 bool sf_cli_interrupted(void);
 
-/* One self-overwriting line on a terminal's stderr; elsewhere plain lines, at most one per 5 s; nothing when quiet. */
+/* Progress on stderr: on a terminal one line that overwrites itself, elsewhere plain lines, at most one per 5 s.
+ * Nothing when quiet. */
 typedef struct sf_progress {
   bool terminal, quiet;
   double last;

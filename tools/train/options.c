@@ -7,13 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Options that decide nothing of what is learned: a run may be resumed with others. */
+/* Options without influence on what is learned. A run may be resumed with other values of them. */
 static const char *const apart[] = {"--output", "--threads", "--eval-views", "--psnr-prefixes", "--checkpoint-minutes",
                                     "--resume", "--log",     "--summary",    "--json",          "--quiet",
                                     "--view",   NULL};
 
-/* The box, the steps through it and the finest level, but for what was asked for. A level finer than the pixels costs
- * time and learns noise. Without data: what the options alone say. */
+/* Sets the box, the steps through it and the finest level, unless an option sets them. A level finer than the pixels
+ * costs time and learns noise. Without data, only the options count. */
 static void set_box(train_arguments *a, const sf_dataset *data)
 {
   sf_config *c = &a->train.config;

@@ -2,8 +2,8 @@
 #include "tools/train/options.h"
 #include "field/field.h"
 
-/* Behind the help stand the defaults of the two backbones, ingp and tensorf; one alone is both's; # is what
- * train_defaults says. */
+/* After the help text stand the defaults of the two backbones, ingp and tensorf. A single default is that of both. #
+ * stands for the number that train_defaults sets. */
 #define COUNT(list) (sizeof(list) / sizeof *(list))
 
 static sf_option *first_run(train_arguments *a, sf_option *o)
