@@ -39,7 +39,7 @@ static int fail(const char *what, const char *why, const char *detail)
   return 1;
 }
 
-/* A device that was found has ERROR registers to say more. */
+/* Only a device that was found has ERROR registers, which say more. */
 static int fail_driver(const sf_tile *tile, const char *what, sf_driver_code code)
 {
   const bool found = code == SF_DRIVER_REFUSED || code == SF_DRIVER_TIMEOUT;
@@ -64,7 +64,7 @@ static sf_driver_code load_planes(const sf_tile *tile)
   return code;
 }
 
-/* fx_net_fn: the accelerator in the place of fx_net_sample. */
+/* fx_net_fn: the accelerator takes the place of fx_net_sample. */
 static sf_status accelerate(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   eval *e = user;

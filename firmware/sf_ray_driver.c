@@ -84,7 +84,7 @@ static uint32_t four(const int8_t *value)
          (uint32_t)(uint8_t)value[3] << 24;
 }
 
-/* Rows of components that a pair's last line has room for are multiplied, too: by 0. */
+/* A pair's last line may have room for more components. Their rows are multiplied, too, by 0. */
 static void program_basis(const sf_bus *bus, const sf_planes_blob *planes)
 {
   const int8_t *row = planes->basis;
@@ -145,7 +145,8 @@ sf_driver_code sf_ray_driver_load(const sf_bus *bus, const sf_ray_blob *rays, co
   return get(bus, SF_CSR_RAY_ERROR) ? SF_DRIVER_REFUSED : SF_DRIVER_OK;
 }
 
-/* Both halves of a counter that may go on counting: the high one did not change while the low one was read. */
+/* Reads both halves of a counter that may go on counting, until the high one did not change while the low one was read.
+ */
 static uint64_t counter(const sf_bus *bus, uint32_t low_half)
 {
   uint32_t high = get(bus, low_half + 4), before, low;

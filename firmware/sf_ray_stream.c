@@ -15,7 +15,7 @@ static void put_words(const sf_bus *fifos, uint32_t at, const uint32_t *word, ui
   for (uint32_t i = 0; i < n; i++) put(fifos, SF_RAYS_BEAT + WORD * (at + i), word[i]);
 }
 
-/* Read with a ray's first beat. */
+/* The block reads these with a ray's first beat. */
 static void put_ray(const sf_bus *fifos, const fx_ray *ray, bool empty, bool new_tile)
 {
   const uint32_t x = (uint16_t)ray->unit[0], y = (uint16_t)ray->unit[1], z = (uint16_t)ray->unit[2];

@@ -36,7 +36,7 @@ uint32_t sf_tile_pixels_at(uint32_t bytes)
   return (bytes + 7) & ~7u;
 }
 
-/* A part of so many bytes lies behind the header and inside the tile. */
+/* True if a part of so many bytes lies after the header and inside the tile. */
 static bool inside(const sf_tile_header *h, uint32_t at, uint64_t size)
 {
   return at % 8 == 0 && at >= sizeof *h && at <= h->bytes && size <= h->bytes - at;
@@ -73,7 +73,7 @@ static sf_planes_blob planes_of(const sf_tile_header *h, const uint8_t *block)
   return planes;
 }
 
-/* So many points from a line of the memory on. */
+/* True if so many points lie in the memory from this line on. */
 static bool points_fit(const sf_tile_header *h, uint64_t line, uint64_t points, uint64_t point_lines)
 {
   return inside(h, h->lines, (line + points * point_lines) * FX_LINE);
@@ -107,7 +107,7 @@ static bool space_fits(const sf_tile_header *h)
   return inside(h, h->occupancy, (h->log2_bound + 1) * (res * res * res / 8));
 }
 
-/* Of what the header says: a grid's features are the net's, planes come before a net without densities. */
+/* Checks the header: a grid has the net's number of features, and planes need a net without densities. */
 static bool net_fits(const sf_tile_header *h, const sf_net_blob *net)
 {
   return net->layer[0].n_in == (int32_t)h->levels * FX_GRID_FEATURES && (net->layer[0].n_out == 0) == (h->planes != 0);

@@ -47,7 +47,7 @@ sf_status sf_cosim_open(sf_cosim **cosim, const fx_scene *scene, const sf_dut_op
 
 /* ---- where a counter departs ---- */
 
-/* The chunk again on a fresh accelerator, counters read after every sample. */
+/* Runs the chunk again on a fresh accelerator, and reads the counters after every sample. */
 static sf_status locate_count(const sf_cosim *c, sf_dut *dut, sf_cosim_place *place)
 {
   fx_counts expected = {0};
@@ -109,7 +109,7 @@ static sf_status compare_samples(sf_cosim *c)
   return sf_ok();
 }
 
-/* The whole chunk, even one with a difference: samples and counts are of the same samples. */
+/* Counts the whole chunk, even one with a difference, so that `samples` and the counts belong together. */
 static sf_status add_chunk(sf_cosim *c, fx_counts *actual)
 {
   uint64_t cycles, busy, stalls;
@@ -135,7 +135,7 @@ static sf_status compare_counts(sf_cosim *c, const fx_counts *actual)
   return sf_dut_clear_counts(c->dut);
 }
 
-/* What came before the sample without a result is compared first: the difference may be there. */
+/* Compares what came before the sample without a result first, because the difference may be there. */
 static sf_status stuck(sf_cosim *c, const sf_status *ran)
 {
   const int received = sf_dut_received(c->dut), n = c->n;
@@ -166,7 +166,7 @@ static sf_status flush(sf_cosim *c)
   return sf_ok();
 }
 
-/* fx_net_fn: the core's answer at once, the accelerator's with the rest of the chunk. */
+/* fx_net_fn: gives the core's answer at once. The accelerator's comes with the rest of the chunk. */
 static sf_status evaluate(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
 {
   sf_cosim *c = user;

@@ -167,7 +167,7 @@ static bool take_block(void *user, uint64_t unit, const void *result)
   return l->trouble.code == SF_OK && !enough(l);
 }
 
-/* A launcher may not give the time to wait for the blocks at work: what is finished is kept at once. */
+/* A launcher may not leave time to wait for the blocks at work, so what is finished is kept at once. */
 static void tick(void *user)
 {
   sf_lockstep *l = user;
@@ -227,7 +227,7 @@ static sf_status reserve(sf_lockstep *l, char path[4096])
                  l->options.evidence);
 }
 
-/* Where it was, and what differs in the replay: for programs. */
+/* The place of the difference, and what differs in the replay, as JSON. */
 static void add_place(const sf_lockstep *l, const sf_replayed *replayed, cJSON *json)
 {
   const sf_lockstep_pixel p = sf_lockstep_pick(l, l->place.ray);
@@ -294,7 +294,7 @@ static sf_status stopped(const sf_lockstep *l, const sf_status *by)
                  by->message + strlen("stopped"), kept);
 }
 
-/* A difference stays one where its evidence cannot be written. */
+/* A difference is reported even if its evidence cannot be written. */
 static sf_status difference(sf_lockstep *l, const sf_status *found)
 {
   const sf_status status = sf_lockstep_difference(l, found);

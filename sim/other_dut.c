@@ -184,7 +184,7 @@ static sf_status read_request(request *r, const char *files, const char *top)
 
 /* ---- building ---- */
 
-/* In the child. What make and Verilator say goes to standard error: standard output is the report's. */
+/* In the child. Output of make and Verilator goes to standard error, because standard output has the report. */
 static void become_make(const request *r, const char *top)
 {
   char files[WORDS_MAX + 8], module[256 + 16], out[PATH_LENGTH + 16], in[PATH_LENGTH + 16];
@@ -213,7 +213,7 @@ static sf_status run_make(const request *r, const char *top)
   return sf_fail(SF_E_FORMAT, "--dut: module %s does not build; Verilator's messages are above", top);
 }
 
-/* For whoever asks that program which block it has. */
+/* Written for that program, which has to know which block it has. */
 static sf_status record(const request *r, const char *top)
 {
   char path[PATH_LENGTH + 16];

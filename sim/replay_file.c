@@ -150,7 +150,7 @@ static sf_status same_scene(const cJSON *json, const char *path, char **scene)
   return *scene ? sf_ok() : sf_fail(SF_E_MEMORY, "%s: out of memory", path);
 }
 
-/* A file of before this field is another program's. */
+/* A file without this field is older, so another program wrote it. */
 static sf_status same_program(const cJSON *json, bool *other)
 {
   const char *writer = sf_json_text(json, "program_sha256");

@@ -47,7 +47,7 @@ static void accept_input(run *r)
   r->sent++;
 }
 
-/* What the accelerator shows stays, too. */
+/* A result of the accelerator must stay, too. */
 static sf_status check_stable(run *r)
 {
   const sf_pins_out *out = &r->dut->out;

@@ -26,7 +26,7 @@ static bool is_whole(int file)
   return size > 0;
 }
 
-/* Why no more can be written; 0: it can. The file is of no use any more. */
+/* Writes until the disk refuses: why it does, or 0 if it does not. The file was useless before. */
 static int refusal(int file)
 {
   static const char nothing[4096];

@@ -57,7 +57,7 @@ static sf_status write_csv(const page_audit *a)
 
 /* ---- HTML ---- */
 
-/* The command in words that a shell reads back; NULL: no memory. */
+/* The command, quoted for a shell; NULL: no memory. */
 static char *join_command(int argc, char **argv)
 {
   static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789%+,-./:=@_";
@@ -158,7 +158,7 @@ static sf_status open_audit(page_audit **a, const options *opt)
   return sf_ok();
 }
 
-/* What was counted is printed whatever becomes of the files. The worst of all is told: a difference. */
+/* The counts are printed even if a file cannot be written. A difference outweighs every other failure. */
 static sf_status report(page_audit *a)
 {
   const sf_status *agreement = &a->audit.report.three.agreement;
@@ -189,7 +189,7 @@ static bool is_report(const char *path)
   return n > 5 && !strcmp(path + n - 5, ".json");
 }
 
-/* Through text, as a file would hold it: the report's integers are raw digits in memory. */
+/* Goes through text, as in a file, because the report's integers are raw digits in memory. */
 static sf_status report_as_read(const page_audit *a, cJSON **json)
 {
   cJSON *made = sf_report_json(&a->audit.report);
@@ -244,7 +244,7 @@ static sf_status work(const options *opt)
   return sf_ok();
 }
 
-/* Options that nothing would read: there is no scene to count, or that side is a report. */
+/* Refuses options without effect: there is no scene to count, or that side is a report. */
 static sf_status check_effect(const options *o, const sf_cli *cli, int argc, char **argv)
 {
   static const char *const b[] = {"--tech-b", "--steps-b", NULL}, *const tech[] = {"--tech", NULL},
@@ -282,7 +282,7 @@ static sf_status parse_comparison(options *o, const char *const positional[3])
   return sf_ok();
 }
 
-/* What is missing or does not fit together. */
+/* Refuses what is missing or does not fit together. */
 static sf_status check_arguments(options *o, const sf_cli *cli, const char *const positional[3])
 {
   if (o->audit.view >= 0 && o->audit.views > 0) return sf_fail(SF_E_USAGE, "--view and --views exclude each other");

@@ -46,7 +46,7 @@ static bool tick(void *user, int done, int rows)
   return !sf_cli_interrupted();
 }
 
-/* Whatever is wrong with the three files is said before the blocks are measured. */
+/* Errors of the three files are found before the blocks are measured. */
 static sf_status load_picture(budget *b)
 {
   const options *o = &b->opt;

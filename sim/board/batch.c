@@ -59,7 +59,7 @@ static sf_ray_request request_of(const sf_batch *b, const sf_batch_ray *r)
   return (sf_ray_request){&r->ray, b->sample + r->first, r->n, r->stops, r->new_tile};
 }
 
-/* Of the field, between two readings of the core's. */
+/* The field's counts between two readings of the core's. */
 static sf_status compare_field(const fx_memory_counts *from, const fx_memory_counts *to, const sf_field_counters *board)
 {
   const fx_memory_counts part = {.lookups = to->lookups - from->lookups, .misses = to->misses - from->misses};
@@ -88,7 +88,8 @@ static sf_status alone(sf_batch *b, const sf_ray_request *request, const fx_pixe
   return compare_counts(b, counts, board);
 }
 
-/* The first k samples as a ray of their own: the core ends there by its limit, the board by the mark of the last. */
+/* The first k samples as a ray of their own. The core ends there by its limit, the board by the mark of the last
+ * sample. */
 static sf_status first_samples(sf_batch *b, const sf_batch_ray *r, int k)
 {
   fx_scene limited = *b->board->scene;

@@ -153,7 +153,7 @@ static sf_status trouble(run *r, const char *what)
                  r->received, net, rays);
 }
 
-/* A ray that has to stop gets its last beat when its pixel has come. */
+/* A ray that has to stop early gets its last beat after its pixel has come. */
 static bool waits_for_pixel(const run *r)
 {
   return r->ray < r->n && r->request[r->ray].stops && r->at == r->request[r->ray].n && r->received <= r->ray;
@@ -198,7 +198,7 @@ static sf_status take_pixels(run *r, const sf_frame *f, uint32_t pixels)
   return sf_ok();
 }
 
-/* One command: beats that are made, pixels that have come. */
+/* One command sends the beats that are ready and takes the pixels that have come. */
 static sf_status step(run *r)
 {
   make_beats(r);

@@ -20,7 +20,7 @@ enum { LINK_VERSION = 1 };
 
 /* ---- the port ---- */
 
-/* 3 Mbaud, eight bits, nothing in between. A pseudo-terminal takes the rate and does not mind. */
+/* 3 Mbaud, eight bits, no translation. A pseudo-terminal accepts the rate and ignores it. */
 static sf_status set_line(sf_link *l)
 {
   struct termios line;
@@ -48,7 +48,7 @@ static sf_status open_port(sf_link *l)
   return set_line(l);
 }
 
-/* Waits for the port. False: nothing within the time. */
+/* Waits for the port. False if nothing came within the time. */
 static bool ready(const sf_link *l, short what, double until)
 {
   while (!sf_cli_interrupted()) {
@@ -87,7 +87,7 @@ static sf_status put(sf_link *l, const uint8_t *byte, size_t n)
 
 typedef enum { HEARD_ANSWER, HEARD_NOTHING, HEARD_DAMAGE, HEARD_REFUSAL } heard;
 
-/* Answers of earlier commands are passed over. */
+/* Answers to earlier commands are ignored. */
 static bool take_byte(sf_link *l, uint8_t byte, uint8_t command, sf_frame *answer, heard *result, sf_wrong *wrong)
 {
   if (!sf_frame_read(&l->reader, byte, answer, wrong)) return false;
@@ -113,7 +113,7 @@ static sf_status listen(sf_link *l, uint8_t command, sf_frame *answer, heard *re
     const ssize_t n = read(l->file, byte, sizeof byte);
     if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return gone(l);
     if (n > 0) until = sf_seconds() + l->patience, l->faults.bytes_in += (uint64_t)n;
-    /* The host asks once more where an answer is damaged, so nothing of use comes behind one. */
+    /* After a damaged answer the host asks again, so nothing useful follows one. */
     for (ssize_t i = 0; i < n; i++)
       if (take_byte(l, byte[i], command, answer, result, wrong)) return sf_ok();
   }
@@ -146,7 +146,7 @@ static sf_status answered(const sf_link *l, const sf_frame *answer)
                  answer->word[0] == STATUS_SIZE ? "its size" : "an unknown status");
 }
 
-/* A line that was damaged may leave bytes of its own behind. */
+/* A disturbed line may leave bytes that nobody sent. */
 static void drain(sf_link *l)
 {
   uint8_t byte[READ_BYTES];

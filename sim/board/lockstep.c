@@ -7,7 +7,7 @@
 
 enum { RAYS = 64 /* compared at once */ };
 
-/* Of one batch; the sums are those of what was compared and equal. */
+/* Counts of one batch. The sums have what was compared and equal. */
 static void add_batch(sf_lockstep *l, const sf_batch *b)
 {
   for (int i = 0; i < b->count; i++) fx_counts_add(&l->sum.core, &b->ray[i].counts);

@@ -8,7 +8,7 @@
 
 /* As in sf_cosim: its ray N of the same seed is this ray N. */
 enum { STREAM_VIEW = 1, STREAM_X, STREAM_Y };
-/* Of a longer ray the first ones: even a small kit has several directions. */
+/* Of a longer ray only the first ones, so that even a small kit has several directions. */
 enum { SAMPLES_PER_RAY = 12 };
 
 /* fx_net_fn */

@@ -73,7 +73,7 @@ static sf_status render(kit_rays *k, const sf_kit_draw *draw)
 
 /* ---- images ---- */
 
-/* What stops its ray waits for the ray's pixel. */
+/* A beat that ends a stopped ray waits for the ray's pixel. */
 static sf_status write_beats(sf_kit_output *output, kit_rays *k)
 {
   sf_kit_writer file;
@@ -94,7 +94,7 @@ static sf_status write_beats(sf_kit_output *output, kit_rays *k)
   return sf_kit_end(output, &file);
 }
 
-/* Lines that are read, each run of them behind its address. */
+/* The lines that are read. Each run of them follows its address. */
 static sf_status write_memory(sf_kit_output *output, const kit_rays *k)
 {
   sf_kit_writer file;

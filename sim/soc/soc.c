@@ -24,14 +24,14 @@ struct sf_soc {
   sf_status trouble; /* the first */
 };
 
-/* The first reason counts. */
+/* Only the first reason is kept. */
 static void stop(sf_soc *soc, sf_status why)
 {
   if (soc->trouble.code == SF_OK) soc->trouble = why;
   uc_emu_stop(soc->uc);
 }
 
-/* The program's fault, and where: Unicorn knows its place exactly only from one block of code to the next. */
+/* The program's fault, and the block of code: Unicorn knows the place only to the block. */
 static void __attribute__((format(printf, 2, 3))) blame(sf_soc *soc, const char *format, ...)
 {
   char what[200];

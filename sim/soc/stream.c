@@ -3,7 +3,7 @@
 
 enum { ACCESS_CYCLES = 4, STALL_INPUT = 18, STALL_OUTPUT, WORD = 4 };
 
-/* Pins of the two ports, and their registers: words of a beat from 0 on, and of a result, whose last one takes it. */
+/* Pins and registers of the two ports. The words of a beat begin at 0. Reading the last word of a result takes it. */
 typedef struct sf_soc_port {
   bool rays;
   uint32_t beat_words, control, status, result, result_words;

@@ -5,7 +5,7 @@ uint64_t sf_tile_number(int across, int down)
   return (uint64_t)(down / FX_TILE) << 32 | (uint64_t)(across / FX_TILE);
 }
 
-/* From `at` to where the view's next tile begins. */
+/* Pixels from `at` to the beginning of the view's next tile. */
 static int tile_end(int origin, int at, int end)
 {
   const int next = at + FX_TILE - (origin + at) % FX_TILE;

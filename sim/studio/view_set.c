@@ -70,7 +70,7 @@ static sf_status keep_picture(const sf_view_set *set, const sf_shot *shot, sf_ma
   return sf_sha256_file(path, view->exr_sha256);
 }
 
-/* Wherever it is dealt to. */
+/* Runs on the rank that the view is dealt to. */
 static void render_view(void *user, uint64_t unit, void *result)
 {
   const sf_set_run *r = user;
@@ -111,7 +111,7 @@ void sf_set_tick(void *user)
   if (r->set->tick) r->set->tick(r->set->user);
 }
 
-/* The first view tells the scale, the number of views and whether the window can be inside. */
+/* The first view says the scale, the number of views, and whether the window fits. */
 static sf_status take_origin(sf_view_set *set, const sf_window *crop)
 {
   const sf_studio *studio = set->studio;
@@ -149,7 +149,7 @@ static sf_status same_set(const sf_view_set *set, const sf_manifest *found)
   return sf_ok();
 }
 
-/* Views that are there already are taken over, if they are views of this very set. */
+/* Views that exist already are kept if they belong to this set. */
 static sf_status resume(sf_view_set *set)
 {
   if (access(set->manifest_path, F_OK)) return sf_ok();

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* The picture differs from the manifest. The EXR, while it is the one that belongs there, knows the pixel. */
+/* The picture differs from the manifest. The EXR shows which pixel, if it is the one of the manifest. */
 static void locate(const sf_view_set *set, const sf_shot *shot, int plane, sf_verdict *verdict)
 {
   char path[4096 + 80], hash[65];

@@ -131,7 +131,7 @@ static const char *last_part(const char *path)
   return slash ? slash + 1 : path;
 }
 
-/* Also where neither is there yet. A folder may serve two ends. */
+/* Works for files that do not exist yet, too. A folder may have two uses. */
 static bool same_file(const char *a, const char *b)
 {
   struct stat p, q;
@@ -141,7 +141,7 @@ static bool same_file(const char *a, const char *b)
   return (!there || S_ISREG(p.st_mode)) && p.st_dev == q.st_dev && p.st_ino == q.st_ino;
 }
 
-/* The path that the option names; NULL where it names none. An input may be the name of something else. */
+/* The path that the option names, or NULL. The value of an input may also name something that is no file. */
 static const char *path_of(const sf_option *o)
 {
   const bool path = o->type == SF_ARG_INPUT || o->type == SF_ARG_OUTPUT || o->type == SF_ARG_PLACE;

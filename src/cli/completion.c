@@ -6,7 +6,7 @@
 
 typedef enum { NOTHING, WORDS, FILES } offer;
 
-/* What is offered behind the option. A choice has its words, a number none. */
+/* What is offered after the option: a choice has its words, a number has none. */
 static offer offer_of(const sf_option *o)
 {
   switch (o->type) {

@@ -7,7 +7,7 @@
 
 enum { LEFT = 28, WIDTH = 80, COLUMN = 9 /* of a default */, DEFAULTS = 2 };
 
-/* The text up to its first tab: behind it are what the option is without being given. */
+/* The text up to its first tab. The defaults follow the tab. */
 static int words_of(const char *text)
 {
   return (int)strcspn(text, "\t");
@@ -20,7 +20,7 @@ static bool has_defaults(const sf_option *first)
   return false;
 }
 
-/* The number that an option has without being given. */
+/* The default of a number. */
 static void print_value(const sf_option *o)
 {
   switch (o->type) {
@@ -38,7 +38,7 @@ static void print_value(const sf_option *o)
   }
 }
 
-/* of: the columns' lists from the option on whose defaults these are; NULL: a heading's. */
+/* of: each column's list, from the option on whose defaults are printed; NULL: a heading. */
 static void print_defaults(const char *text, const sf_option *const of[DEFAULTS])
 {
   for (int i = 0; i < DEFAULTS; i++) {
@@ -51,7 +51,7 @@ static void print_defaults(const char *text, const sf_option *const of[DEFAULTS]
   }
 }
 
-/* Words in lines of `room` from column LEFT on, the cursor being there; the defaults end the first line. */
+/* Prints words in lines of `room` from column LEFT on, where the cursor is. The defaults end the first line. */
 static void print_text(const char *text, const sf_option *const of[DEFAULTS], int room)
 {
   const char *end = text + words_of(text);
