@@ -204,12 +204,19 @@ double sf_exact_planes_sigma(const sf_exact *e, const double pos[3])
 
 /* ---- inputs of the decoder ---- */
 
-/* x[2 * freqs * n]: sines of 2^k times value i, then cosines, in LSB. Angles in radians. */
-static void real_waves(const fx_tensorf *field, const double *angle, int n, int freqs, double *x)
+/* A fine-tuned model rounds its inputs, too. */
+static double to_input(const sf_exact *e, double x)
 {
+  return e->model->scales.weight_bits ? sf_exact_clamp(nearbyint(x), -FX_INPUT_MAX, FX_INPUT_MAX) : x;
+}
+
+/* x[2 * freqs * n]: sines of 2^k times value i, then cosines, in LSB. Angles in radians. */
+static void real_waves(const sf_exact *e, const double *angle, int n, int freqs, double *x)
+{
+  const double one = ldexp(1, e->scene->tensorf.encoding_frac);
   for (int i = 0; i < n * freqs; i++) {
     const double at = ldexp(angle[i / freqs], i % freqs);
-    x[i] = ldexp(sin(at), field->encoding_frac), x[n * freqs + i] = ldexp(cos(at), field->encoding_frac);
+    x[i] = to_input(e, one * sin(at)), x[n * freqs + i] = to_input(e, one * cos(at));
   }
 }
 
@@ -231,8 +238,8 @@ static void fixed_waves(const fx_tensorf *field, const double *phase, int n, int
 int sf_exact_planes_direction(const sf_exact *e, const double unit[3], double *direction)
 {
   const fx_tensorf *field = &e->scene->tensorf;
-  for (int axis = 0; axis < 3; axis++) direction[axis] = ldexp(unit[axis], field->encoding_frac);
-  real_waves(field, unit, 3, field->view_freqs, direction + 3);
+  for (int axis = 0; axis < 3; axis++) direction[axis] = to_input(e, ldexp(unit[axis], field->encoding_frac));
+  real_waves(e, unit, 3, field->view_freqs, direction + 3);
   return 3 + 6 * field->view_freqs;
 }
 
@@ -260,14 +267,14 @@ void sf_exact_planes_inputs(const sf_exact *e, const double pos[3], const double
   sum_features(e, pos, sum);
   for (int f = 0; f < n; f++) {
     const double feature = ldexp(sum[f] * field->feature_in.mul, -field->feature_in.shift);
-    x[f] = sf_exact_is(e, SF_EXACT_FEATURE) ? feature
+    x[f] = sf_exact_is(e, SF_EXACT_FEATURE) ? to_input(e, feature)
                                             : sf_exact_clamp(sf_exact_round(feature), -FX_INPUT_MAX, FX_INPUT_MAX);
     angle[f] = sum[f] * e->planes->unit;
     phase[f] = sf_exact_round(ldexp(sum[f] * field->phase_in.mul, -field->phase_in.shift));
   }
   for (int i = 0; i < 3; i++) x[n + i] = direction[i];
   if (sf_exact_is(e, SF_EXACT_WAVES))
-    real_waves(field, angle, n, freqs, x + n + 3);
+    real_waves(e, angle, n, freqs, x + n + 3);
   else
     fixed_waves(field, phase, n, freqs, x + n + 3);
   for (int i = 0; i < 6 * field->view_freqs; i++) x[n + 3 + 2 * n * freqs + i] = direction[3 + i];
