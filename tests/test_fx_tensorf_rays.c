@@ -202,7 +202,6 @@ TEST(the_library_renders_it)
   spikefield_scene_info info;
   spikefield_pixel pixel[RAYS];
   spikefield_counts counts = {0};
-  const uint32_t somewhere[3] = {1, 2, 3};
   int16_t inputs[SF_DIR_MAX] = {0}, harmonics[SPIKEFIELD_DIRECTIONS] = {0};
   spikefield_sample sample;
   uint64_t samples = 0;
@@ -231,8 +230,6 @@ TEST(the_library_renders_it)
   ck_assert_uint_eq(counts.samples, samples);
   ck_assert_uint_ge(counts.field_samples, samples);
   ck_assert_int_eq(spikefield_samples(opened, NULL, harmonics, inputs, 1, &sample, NULL, NULL).code, SPIKEFIELD_OK);
-  const spikefield_status refused = spikefield_features(opened, somewhere, 1, inputs, NULL);
-  ck_assert_msg(refused.code == SPIKEFIELD_E_UNSUPPORTED && strstr(refused.message, "TensoRF"), "%s", refused.message);
   spikefield_scene_close(opened);
 }
 

@@ -226,6 +226,48 @@ TEST(samples_of_a_decoder_are_of_one_ray_too)
   spikefield_scene_close(decoder);
 }
 
+/* The core's density and decoder at the same places; without a direction its inputs alone are missing. */
+TEST(samples_by_position_of_a_decoder)
+{
+  OWNED(fx_scene) with_field = tensorf_scene();
+  const fx_tensorf *field = &with_field.tensorf;
+  const int inputs = fx_tensorf_inputs(field), waves = 6 * field->view_freqs;
+  const float direction[3] = {3, -2, 1};
+  spikefield_scene *decoder;
+  spikefield_counts counts = {0};
+  spikefield_sample sample[SAMPLES];
+  fx_counts wanted = {.rays = 1};
+  uint32_t position[3 * SAMPLES];
+  int16_t harmonics[SPIKEFIELD_DIRECTIONS], x[SF_DIR_MAX];
+  static int16_t feature[SAMPLES * SF_DIR_MAX];
+  int32_t base[SF_LANES];
+  uint64_t sum = 0;
+  random_positions(position, 5);
+  ck_ok(fx_scene_save(&with_field, in("positions.snn")));
+  lib_good(spikefield_scene_open(&decoder, in("positions.snn")));
+  lib_good(spikefield_direction(decoder, direction, harmonics));
+  ck_assert(harmonics[0] == 13136 && harmonics[1] == -8758 && harmonics[2] == 4379 && harmonics[3] == 0);
+  lib_good(spikefield_features(decoder, position, SAMPLES, feature, NULL));
+  lib_good(spikefield_samples_at(decoder, NULL, harmonics, position, SAMPLES, sample, NULL, &counts));
+  for (int i = 0; i < SAMPLES; i++) {
+    fx_out out;
+    const uint32_t sigma = fx_tensorf_density(field, position + 3 * i, &wanted);
+    fx_tensorf_encode(field, position + 3 * i, harmonics, x, &wanted);
+    fx_net_next(&with_field.net, NULL, i == 0, x, base, &out, NULL, &wanted);
+    ck_assert_uint_eq(sample[i].density, sigma);
+    ck_assert_mem_eq(sample[i].colour, out.colour, sizeof out.colour);
+    memset(x + field->features, 0, 3 * sizeof *x), memset(x + inputs - waves, 0, (size_t)waves * sizeof *x);
+    ck_assert_mem_eq(feature + i * inputs, x, (size_t)inputs * sizeof *x);
+    sum += sigma;
+  }
+  ck_assert_uint_gt(sum, 0);
+  ck_assert_mem_eq(&counts, &wanted, sizeof wanted);
+  harmonics[1] = -16385;
+  lib_bad(spikefield_samples_at(decoder, NULL, harmonics, position, 1, sample, NULL, NULL), SPIKEFIELD_E_RANGE,
+          "harmonic 1 of sample 0 is -16385, expected -16384..16384");
+  spikefield_scene_close(decoder);
+}
+
 TEST(positions_and_directions_are_rounded_once)
 {
   const float middle[3] = {0, 0, 0}, corner[3] = {-1, -1, -1}, inside[3] = {0.25f, -0.5f, 0.999999f};

@@ -197,10 +197,12 @@ SPIKEFIELD_API void spikefield_counter_window(const spikefield_scene *scene, con
 /* A point in model units to box units, Q0.24. E_RANGE outside the box. */
 SPIKEFIELD_API spikefield_status spikefield_position(const spikefield_scene *scene, const float model[3],
                                                      uint32_t position[3]);
-/* Viewing direction (of any length > 0) to spherical harmonics of degree 3. */
+/* Viewing direction (of any length > 0) to spherical harmonics of degree 3. Of a TensoRF scene, which has none, to the
+ * unit vector in harmonics[0..2], Q1.14; the others are 0. */
 SPIKEFIELD_API spikefield_status spikefield_direction(const spikefield_scene *scene, const float direction[3],
                                                       int16_t harmonics[SPIKEFIELD_DIRECTIONS]);
-/* positions[n][3], Q0.24, below 2^24 -> features[n][info.features]. */
+/* positions[n][3], Q0.24, below 2^24 -> features[n][info.features]. Of a TensoRF scene these are the decoder's inputs;
+ * those that come of the direction alone are 0. */
 SPIKEFIELD_API spikefield_status spikefield_features(const spikefield_scene *scene, const uint32_t *positions, size_t n,
                                                      int16_t *features, spikefield_counts *counts);
 
@@ -210,7 +212,8 @@ SPIKEFIELD_API spikefield_status spikefield_samples(const spikefield_scene *scen
                                                     const int16_t harmonics[SPIKEFIELD_DIRECTIONS],
                                                     const int16_t *features, size_t n, spikefield_sample *samples,
                                                     spikefield_trace *traces, spikefield_counts *counts);
-/* The same from positions[n][3]. */
+/* The same from positions[n][3]. Of a TensoRF scene: harmonics is what spikefield_direction gives. The samples' density
+ * is the field's (from features it is 0), and all n pass the decoder, whatever they weigh. */
 SPIKEFIELD_API spikefield_status spikefield_samples_at(const spikefield_scene *scene, const spikefield_options *options,
                                                        const int16_t harmonics[SPIKEFIELD_DIRECTIONS],
                                                        const uint32_t *positions, size_t n, spikefield_sample *samples,

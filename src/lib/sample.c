@@ -17,6 +17,7 @@ spikefield_status spikefield_position(const spikefield_scene *scene, const float
   return lib_status(position(scene, model, to));
 }
 
+/* What a position needs of its ray's direction: a hash grid harmonics, TensoRF the direction itself. */
 static sf_status direction_of(const spikefield_scene *scene, const float *direction, int16_t *harmonics)
 {
   LIB_REQUIRE(scene);
@@ -25,6 +26,7 @@ static sf_status direction_of(const spikefield_scene *scene, const float *direct
   double unit[3];
   fx_ray ray;
   SF_TRY(sf_fx_direction_make(&scene->fx, direction, &ray, unit));
+  if (fx_net_decodes(&scene->fx.net)) memset(ray.dir, 0, sizeof ray.dir), memcpy(ray.dir, ray.unit, sizeof ray.unit);
   memcpy(harmonics, ray.dir, sizeof ray.dir);
   return sf_ok();
 }
@@ -46,6 +48,23 @@ static sf_status check_positions(const uint32_t *positions, size_t n)
   return sf_ok();
 }
 
+/* What a position brings to the nets. direction: TensoRF's, or NULL: the inputs that it alone decides are 0. */
+static void inputs_at(const fx_scene *scene, const int16_t *direction, const uint32_t *position, int16_t *to,
+                      fx_counts *events)
+{
+  static const int16_t none[3] = {0};
+  const fx_tensorf *field = &scene->tensorf;
+  if (scene->backbone == FX_INGP) {
+    fx_grid_features(&scene->grid, position, to, events);
+    return;
+  }
+  fx_tensorf_encode(field, position, direction ? direction : none, to, events);
+  if (direction) return;
+  const int waves = 6 * field->view_freqs;
+  memset(to + field->features, 0, 3 * sizeof *to);
+  memset(to + fx_tensorf_inputs(field) - waves, 0, (size_t)waves * sizeof *to);
+}
+
 static sf_status features_of(const spikefield_scene *scene, const uint32_t *positions, size_t n, int16_t *features,
                              spikefield_counts *counts)
 {
@@ -54,10 +73,9 @@ static sf_status features_of(const spikefield_scene *scene, const uint32_t *posi
   if (!n) return sf_ok();
   LIB_REQUIRE(positions);
   LIB_REQUIRE(features);
-  SF_TRY(fx_scene_need_grid(&scene->fx, "scene", "features of a position"));
   SF_TRY(check_positions(positions, n));
-  const size_t width = (size_t)scene->fx.net.layer[FX_D1].n_in;
-  for (size_t i = 0; i < n; i++) fx_grid_features(&scene->fx.grid, positions + 3 * i, features + width * i, &events);
+  const size_t width = (size_t)fx_net_inputs(&scene->fx.net);
+  for (size_t i = 0; i < n; i++) inputs_at(&scene->fx, NULL, positions + 3 * i, features + width * i, &events);
   lib_add_counts(counts, &events);
   return sf_ok();
 }
@@ -80,12 +98,12 @@ typedef struct batch {
   spikefield_trace *traces;
 } batch;
 
-static sf_status check_inputs(const char *what, const int16_t *value, size_t n, size_t width)
+static sf_status check_inputs(const char *what, const int16_t *value, size_t n, size_t width, int limit)
 {
   for (size_t i = 0; i < n * width; i++)
-    if (value[i] > SPIKEFIELD_INPUT_MAX || value[i] < -SPIKEFIELD_INPUT_MAX)
+    if (value[i] > limit || value[i] < -limit)
       return sf_fail(SF_E_RANGE, "%s %zu of sample %zu is %d, expected -%d..%d", what, i % width, i / width, value[i],
-                     SPIKEFIELD_INPUT_MAX, SPIKEFIELD_INPUT_MAX);
+                     limit, limit);
   return sf_ok();
 }
 
@@ -94,13 +112,15 @@ static void run_batch(const batch *b, fx_trace *trace, fx_counts *events)
 {
   const fx_net *net = &b->view.net;
   const size_t width = (size_t)fx_net_inputs(net);
-  int16_t own[SF_FEATURE_MAX];
+  const bool planes = b->positions && b->view.backbone == FX_TENSORF; /* the density is no output of the net */
+  int16_t own[SF_DIR_MAX > SF_FEATURE_MAX ? SF_DIR_MAX : SF_FEATURE_MAX];
   int32_t base[SF_LANES];
   fx_out out;
   for (size_t i = 0; i < b->n; i++) {
     const int16_t *f = b->features ? b->features + width * i : own;
-    if (b->positions) fx_grid_features(&b->view.grid, b->positions + 3 * i, own, events);
+    if (b->positions) inputs_at(&b->view, b->harmonics, b->positions + 3 * i, own, events);
     fx_net_next(net, b->harmonics, i == 0, f, base, &out, trace, events);
+    if (planes) out.sigma = fx_tensorf_density(&b->view.tensorf, b->positions + 3 * i, events);
     lib_sample(&b->samples[i], &out);
     if (trace) memcpy(&b->traces[i], trace, sizeof *trace);
   }
@@ -115,9 +135,9 @@ static sf_status checked_batch(batch *b, const spikefield_scene *scene, const sp
   if (!b->n) return sf_ok();
   LIB_REQUIRE(b->harmonics);
   LIB_REQUIRE(b->samples);
-  SF_TRY(check_inputs("harmonic", b->harmonics, 1, SPIKEFIELD_DIRECTIONS));
-  if (b->features) SF_TRY(check_inputs("feature", b->features, b->n, (size_t)fx_net_inputs(&b->view.net)));
-  if (b->positions) SF_TRY(fx_scene_need_grid(&b->view, "scene", "samples by position"));
+  const int input = SPIKEFIELD_INPUT_MAX, direction = fx_net_decodes(&b->view.net) ? FX_UNIT_ONE : input;
+  SF_TRY(check_inputs("harmonic", b->harmonics, 1, SPIKEFIELD_DIRECTIONS, direction));
+  if (b->features) SF_TRY(check_inputs("feature", b->features, b->n, (size_t)fx_net_inputs(&b->view.net), input));
   if (b->positions) SF_TRY(check_positions(b->positions, b->n));
   fx_trace *trace = b->traces ? malloc(sizeof *trace) : NULL;
   if (b->traces && !trace) return sf_fail(SF_E_MEMORY, "no memory for a trace");

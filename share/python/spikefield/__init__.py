@@ -135,13 +135,13 @@ class Scene:
         return to
 
     def direction(self, direction):
-        """A viewing direction, [3] -> spherical harmonics, int16 [16]."""
+        """A viewing direction, [3] -> spherical harmonics, int16 [16]; TensoRF: the unit vector in the first three."""
         given, to = _array(direction, np.float32, (3,)), np.zeros(_abi.DIRECTIONS, np.int16)
         _checked(_lib.spikefield_direction(self._scene, _address(given), _address(to)))
         return to
 
     def features(self, positions, counts=None):
-        """positions, uint32 [n, 3], Q0.24 -> int16 [n, features]."""
+        """positions, uint32 [n, 3], Q0.24 -> int16 [n, features]; TensoRF: those of the direction are 0."""
         given = _array(positions, np.uint32, (None, 3))
         to = np.zeros((len(given), self.info.features), np.int16)
         _checked(_lib.spikefield_features(self._scene, _address(given), len(given), _address(to), _raw(counts)))
