@@ -261,7 +261,7 @@ TEST(bytes_and_loss_are_kept)
   ck_bad(to_bytes(&scene, &rays, 64, last / 100, &smaller, &report), SF_E_RANGE, "more than --fit-loss",
          "the smallest within it that was found has");
   ck_bad(to_bytes(&scene, &rays, 1, INFINITY, &smaller, &report), SF_E_RANGE, "scene.snn",
-         "the grid cannot take fewer than 2 bytes");
+         "the field cannot take fewer than 2 bytes");
   fx_scene_free(&scene);
 }
 

@@ -28,6 +28,42 @@ TEST(threads_do_not_matter)
   fit_by_any_threads(&scene);
 }
 
+static sf_status to_bytes(const fx_scene *scene, const sf_fit_rays *rays, uint64_t bytes, double loss,
+                          fx_scene *smaller, sf_fit_tables *report)
+{
+  const fx_scene *candidate[] = {scene};
+  const sf_fit_job job = fit_job(candidate, 1, rays, NULL, loss);
+  return sf_fit_to_bytes(smaller, &job, bytes, report);
+}
+
+/* What is reported is what the scene takes, the bound holds, and less room loses more but for a tenth of a decibel. */
+TEST(planes_for_so_many_bytes)
+{
+  OWNED(fx_scene) scene = planes_scene(24);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 9000);
+  const int64_t whole = fx_tensorf_bytes(&scene.tensorf);
+  fx_scene smaller;
+  sf_fit_tables report;
+  double last = 0;
+  ck_ok(to_bytes(&scene, &rays, (uint64_t)whole, 0, &smaller, &report)); /* it has room as it is */
+  ck_same_scenes(&scene, &smaller);
+  ck_assert_int_eq(report.bytes_before, whole);
+  fx_scene_free(&smaller);
+  for (int64_t bytes = whole - 1; bytes >= whole / 8; bytes = bytes / 2) {
+    ck_ok(to_bytes(&scene, &rays, (uint64_t)bytes, INFINITY, &smaller, &report));
+    ck_ok(fx_scene_check(&smaller, "smaller"));
+    ck_assert_int_eq(fx_tensorf_bytes(&smaller.tensorf), report.bytes_after);
+    ck_assert_int_le(report.bytes_after, bytes);
+    ck_assert(report.planes && report.dropped + report.smaller > 0);
+    ck_assert_msg(report.loss_db > last - 0.1, "%g dB for %d bytes, %g dB for more", report.loss_db, (int)bytes, last);
+    last = report.loss_db;
+    fx_scene_free(&smaller);
+  }
+  ck_assert(last > 0.1);
+  ck_bad(to_bytes(&scene, &rays, (uint64_t)whole / 8, 0.01, &smaller, &report), SF_E_RANGE, "out.snn", "--fit-loss");
+  ck_bad(to_bytes(&scene, &rays, 100, INFINITY, &smaller, &report), SF_E_RANGE, "out.snn", "cannot take fewer");
+}
+
 static bool stop_later(void *user, const char *what, int done, int total)
 {
   int *left = user;

@@ -87,8 +87,8 @@ static sf_status quantise_narrower(const sf_model *model, const char *path, cons
   return sf_ok();
 }
 
-/* With --fit-bytes the grid is made smaller first. --fit-loss, if it was given, is for both parts: the rest may lose
- * what the grid left of it. */
+/* With --fit-bytes the field is made smaller first. --fit-loss, if it was given, is for both parts: the rest may lose
+ * what the field left of it. */
 static sf_status fit_both(candidates *c, const sf_fit_job *job, const options *o, fx_scene *fitted,
                           sf_fit_report *report)
 {
@@ -362,8 +362,9 @@ int main(int argc, char **argv)
       {"--fit-loss", 0, SF_ARG_DOUBLE, &o.fit_loss, 0, 100, NULL, "DB",
        "PSNR that --fit may cost on rays of the training views; 0: only what changes no bit (default 0.05)"},
       {"--fit-bytes", 0, SF_ARG_U64, &o.fit_bytes, 1, 1e12, NULL, "N",
-       "the grid's tables may take N bytes, two for each entry, as in a board's memory: halve tables and leave out "
-       "levels, with the least loss, then fit the rest; --fit-loss is of both, or of the rest where it is not given"},
+       "the field may take N bytes, as in a board's memory: halve tables and leave out levels, or components and "
+       "points of planes, with the least loss, then fit the rest; --fit-loss is of both, or of the rest where it is "
+       "not given"},
       {"--fit-rays", 0, SF_ARG_U64, &o.fit_rays, 256, 1e8, NULL, "N", "rays that --fit looks at (default 262144)"},
       {"--tech", 0, SF_ARG_INPUT, &o.tech, 0, 0, NULL, "FILE",
        "prices that say what --fit saves: a file or a name (default 45nm)"},

@@ -202,10 +202,20 @@ static bool cut_dim(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim
 }
 
 const sf_cut_kind sf_cut_kinds[] = {
-    {false, neurons, cut_neuron},       {true, levels, cut_level},       {true, levels, cut_table},
-    {false, components, cut_component}, {true, pairs, cut_line},         {false, features, cut_feature},
-    {true, sines, cut_sines},           {true, points, cut_points},      {true, one_of_planes, cut_box},
-    {true, strides, cut_stride},        {false, one_of_planes, cut_dim}, {false, cell_classes, cut_cells},
-    {false, directions, cut_direction}, {true, one, cut_step},           {false, one, cut_ray_end},
+    {false, false, neurons, cut_neuron},
+    {true, true, levels, cut_level},
+    {true, true, levels, cut_table},
+    {false, false, components, cut_component},
+    {true, true, pairs, cut_line},
+    {false, false, features, cut_feature},
+    {true, false, sines, cut_sines},
+    {true, true, points, cut_points},
+    {true, true, one_of_planes, cut_box},
+    {true, false, strides, cut_stride},
+    {false, false, one_of_planes, cut_dim},
+    {false, false, cell_classes, cut_cells},
+    {false, false, directions, cut_direction},
+    {true, false, one, cut_step},
+    {false, false, one, cut_ray_end},
 };
 const int sf_cut_kind_count = sizeof sf_cut_kinds / sizeof sf_cut_kinds[0];

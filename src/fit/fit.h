@@ -57,11 +57,12 @@ typedef struct sf_fit_job {
   void *user;
 } sf_fit_job;
 
-/* Before the fit: the grid of candidate[0], smaller, so that its tables take at most `bytes` in a memory (two for each
- * entry), with the least loss that the search finds. */
+/* Before the fit: candidate[0] with a field that takes at most `bytes` in a memory, with the least loss that the search
+ * finds. A hash grid has two bytes for each entry; TensoRF planes, lines and the basis matrix. */
 typedef struct sf_fit_tables {
   uint64_t bound, bytes_before, bytes_after, checked; /* checked: rays that the loss was measured on */
-  int dropped, smaller, rounds;                       /* levels; tables */
+  bool planes;                                        /* TensoRF's; else a hash grid */
+  int dropped, smaller, rounds;                       /* levels, tables; of planes components, axes with fewer points */
   double psnr_before, psnr_after, loss_db;
 } sf_fit_tables;
 /* job->loss_db: how much it may lose. SF_E_RANGE, with the best that it reached, where that is not enough. */

@@ -8,6 +8,7 @@
 
 typedef struct sf_cut_kind {
   bool large; /* few and far from the optimum that training reached: judged by the error on the checking rays */
+  bool bytes; /* it makes the field's memory smaller: what sf_fit_to_bytes may cut */
   int (*places)(const fx_scene *scene); /* how many cuts of this kind there may be; 0: not of this field */
   /* One of them more: false where it is not possible, or not any more. */
   bool (*apply)(const fx_scene *scene, const sf_trim_use *use, sf_trim *trim, int place);

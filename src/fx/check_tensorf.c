@@ -26,12 +26,6 @@ int64_t fx_tensorf_bytes(const fx_tensorf *field)
   return bytes;
 }
 
-sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char *what)
-{
-  if (scene->backbone == FX_INGP) return sf_ok();
-  return sf_fail(SF_E_UNSUPPORTED, "%s: %s: for scenes with a hash grid only, this is a TensoRF scene", path, what);
-}
-
 sf_status fx_check_tensorf_sizes(const fx_tensorf *field, int inputs, const char *path)
 {
   static const char *const res[] = {"res[0]", "res[1]", "res[2]"};

@@ -377,9 +377,6 @@ sf_status fx_render_rays(const fx_core *core, const fx_ray *rays, size_t n, fx_p
 /* Refuses a scene that breaks a rule above, naming the field (`path` is only for the message). */
 sf_status fx_scene_check(const fx_scene *scene, const char *path);
 
-/* SF_E_UNSUPPORTED, "PATH: WHAT ...", for a scene without a hash grid. */
-sf_status fx_scene_need_grid(const fx_scene *scene, const char *path, const char *what);
-
 /* Zeroed weights, table and occupancy for the sizes already set (which it checks); owner is set. */
 sf_status fx_scene_allocate(fx_scene *scene, const char *path);
 
