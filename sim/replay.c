@@ -68,12 +68,14 @@ sf_status sf_replay_run(const sf_replay *replay, const fx_net *net, const char *
   p->replay = replay;
   p->net = net;
   prepare(p);
+  if (wave) sf_wave_file_guard(wave, NULL);
   sf_status status = sf_dut_open(&dut, &scene, &options);
   if (status.code == SF_OK) {
     status = compare(p, dut, replayed);
     sf_dut_close(dut);
     if (wave && status.code == SF_OK) status = sf_wave_file_check(wave);
   }
+  if (wave) sf_wave_file_guard(NULL, NULL);
   free(p);
   return status;
 }

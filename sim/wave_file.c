@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,4 +47,29 @@ sf_status sf_wave_file_check(const char *path)
   if (whole) return sf_ok();
   return sf_fail(SF_E_IO, "cannot write %s: %s", path,
                  error ? strerror(error) : "the waveform is cut short; the disk may have been full");
+}
+
+/* A signal handler can reach nothing else. */
+static char told[4096 + 128], doomed[4][4096 + 64];
+
+static void give_up(int signal)
+{
+  (void)signal;
+  for (int i = 0; i < 4; i++)
+    if (doomed[i][0]) unlink(doomed[i]);
+  if (write(STDERR_FILENO, told, strlen(told)) < 0) _exit(2);
+  _exit(1);
+}
+
+void sf_wave_file_guard(const char *wave, const char *const more[2])
+{
+  if (!wave) {
+    signal(SIGBUS, SIG_DFL);
+    return;
+  }
+  snprintf(told, sizeof told, "%s: cannot write %s: %s\n", program_invocation_short_name, wave, strerror(ENOSPC));
+  snprintf(doomed[0], sizeof doomed[0], "%s", wave);
+  snprintf(doomed[1], sizeof doomed[1], "%s.hier", wave);
+  for (int i = 0; i < 2; i++) snprintf(doomed[2 + i], sizeof doomed[0], "%s", more && more[i] ? more[i] : "");
+  signal(SIGBUS, give_up);
 }

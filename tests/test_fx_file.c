@@ -36,6 +36,7 @@ static void assert_equal_scenes(const fx_scene *a, const fx_scene *b)
   ck_assert(a->units.model_scale == b->units.model_scale && a->units.data_scale == b->units.data_scale);
   ck_assert(a->units.data_bound == b->units.data_bound && a->units.data_ndc == b->units.data_ndc);
   ck_assert(a->units.data_views == b->units.data_views && a->units.data_poses == b->units.data_poses);
+  ck_assert(a->units.data_picture == b->units.data_picture);
   ck_assert(a->units.to_box_scale == b->units.to_box_scale && a->units.dir_scale == b->units.dir_scale);
   for (int l = 0; l < FX_LEVELS_MAX; l++) ck_assert(a->units.feature_scale[l] == b->units.feature_scale[l]);
   for (int o = 0; o < 3; o++) ck_assert(a->units.to_box_offset[o] == b->units.to_box_offset[o]);
@@ -51,6 +52,7 @@ TEST(round_trip)
     scene.units.data_scale = seed % 3 ? 0.3 : 0, scene.units.data_bound = seed % 3 ? 4 : 0;
     scene.units.data_ndc = seed % 3 == 2;
     scene.units.data_views = seed % 2 ? 60 : 0, scene.units.data_poses = seed % 2 ? 987654321 : 0;
+    scene.units.data_picture = seed % 2 ? 123456789 : 0;
     save(&scene);
     ck_ok(fx_scene_load(&again, path));
     assert_equal_scenes(&scene, &again);
@@ -161,6 +163,7 @@ TEST(metadata_is_checked)
       {"data_scale", "0", "data_scale"},
       {"data_ndc", "nan", "data_ndc"},
       {"data_poses", "-1", "data_poses"},
+      {"data_picture", "0", "data_picture"},
   };
   OWNED(fx_scene) scene = small_scene(4);
   for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);

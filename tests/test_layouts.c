@@ -152,10 +152,11 @@ TEST(poses_of_the_training_list_tell_the_scene)
   put_json("transforms_train.json", &rig, "", "images", 1, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 2);
   const sf_space train = space_of("train", NULL);
-  ck_assert(train.poses > 0 && train.views == VIEWS / 2);
+  ck_assert(train.poses > 0 && train.views == VIEWS / 2 && train.picture > 0);
   const sf_dataset_options part = {.scale = 0.125f, .limit = 1, .first = 1, .cameras_only = true};
-  ck_assert_int_eq(space_of("train", &part).poses, train.poses);
-  ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
+  const sf_space partly = space_of("train", &part), tested = space_of("test", NULL);
+  ck_assert(partly.poses == train.poses && partly.picture == train.picture);
+  ck_assert(tested.poses == train.poses && tested.picture == train.picture);
   put_json("transforms_test.json", &rig, "", "images", 0, 4);
   ck_assert_int_eq(space_of("test", NULL).poses, train.poses);
   for (int v = 1; v < VIEWS; v += 2)
@@ -175,6 +176,28 @@ TEST(poses_of_the_training_list_tell_the_scene)
   const sf_space unknown = space_of("test", NULL);
   ck_assert(unknown.poses == 0 && unknown.views == 0);
   ck_ok(sf_space_check(&train, "m", &d));
+}
+
+/* The same cameras before another scene: its pictures are taken, with a warning. */
+TEST(other_pictures_from_the_same_cameras_are_told)
+{
+  layout_rig rig = orbit();
+  put_pictures("images", &rig, WIDTH, HEIGHT, 255);
+  put_json("transforms_train.json", &rig, "", "images", 1, 2);
+  put_json("transforms_test.json", &rig, "", "images", 0, 2);
+  const sf_space train = space_of("test", NULL);
+  const int before = d.warnings;
+  ck_ok(sf_space_check(&train, "m", &d));
+  ck_assert_int_eq(d.warnings, before);
+  put_pictures("images", &rig, WIDTH, HEIGHT, 128);
+  const sf_space other = space_of("test", NULL);
+  ck_assert(other.poses == train.poses && other.picture != train.picture);
+  ck_ok(sf_space_check(&train, "m", &d));
+  ck_assert_int_eq(d.warnings, before + 1);
+  ck_assert_ptr_nonnull(strstr(d.warning[before], "m: learned from other pictures"));
+  const sf_space older = {.scale = train.scale, .bound = train.bound, .views = train.views, .poses = train.poses};
+  ck_ok(sf_space_check(&older, "m", &d));
+  ck_assert_int_eq(d.warnings, before + 1);
 }
 
 /* Both splits are of the one list. */

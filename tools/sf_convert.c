@@ -5,6 +5,7 @@
 #include "energy/energy.h"
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 enum { POINTS = 7, CALIBRATION = 256 };
 static const int steps[POINTS] = {4, 8, 16, 32, 64, 128, 256};
@@ -67,6 +68,7 @@ static sf_status load(sf_dataset *data, const sf_model *model, const char *path,
   const sf_dataset_options how = {.downscale = o->downscale, .scale = model->config.scale};
   SF_TRY(sf_dataset_load(data, dir, split, &how));
   const sf_status status = sf_space_check(&model->config.space, path, data);
+  if (!strcmp(split, "train")) sf_dataset_warn(stderr, "sf_convert", data, NULL);
   if (status.code) sf_dataset_free(data);
   return status;
 }

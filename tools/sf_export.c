@@ -144,7 +144,7 @@ static sf_status fit_scene(const sf_model *model, const char *path, candidates *
   sf_fit_rays rays, tiles = {0};
   sf_technology technology;
   SF_TRY(sf_technology_find(&technology, o->tech ? o->tech : "45nm"));
-  SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], o->output, o->extra.data, "train", &(sf_dataset_options){0}));
+  SF_TRY(sf_fx_dataset_load(&data, &c->scene[0], path, o->extra.data, "train", &(sf_dataset_options){0}));
   sf_dataset_warn(stderr, "sf_export", &data, NULL);
   sf_status status = sf_fit_rays_draw(&rays, &data, c->scene[0].background, o->fit_rays, o->extra.seed);
   if (status.code == SF_OK) status = sf_fit_tiles_draw(&tiles, &data, FIT_TILES, o->extra.seed);

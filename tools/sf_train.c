@@ -302,7 +302,7 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
 }
 
 /* The model to fine-tune, with the scales that sf_export would choose for it. */
-static sf_status load_start(const train_arguments *a, const sf_dataset *data, sf_model *model)
+static sf_status load_start(const train_arguments *a, sf_dataset *data, sf_model *model)
 {
   const sf_quant_options how = {.widths = {.weight_bits = a->weight_bits ? a->weight_bits : SF_WEIGHT_BITS,
                                            .leak_bits = a->leak_bits ? a->leak_bits : SF_LEAK_FRAC,
@@ -331,7 +331,10 @@ static sf_status prepare(train_arguments *a, const char *path, const sf_dataset_
   SF_TRY(check_test(data, path, how, a));
   SF_TRY(train_settle(a, data));
   if (!a->fine_tune || a->resume) return sf_ok();
+  const int told = data->warnings;
   SF_TRY(load_start(a, data, start));
+  const sf_dataset more = {.warning = data->warning + told, .warnings = data->warnings - told};
+  if (!sf_ranks_rank(a->train.ranks)) sf_dataset_warn(stderr, "sf_train", &more, NULL);
   a->train.start = start;
   return sf_ok();
 }

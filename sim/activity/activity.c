@@ -251,10 +251,12 @@ sf_status sf_activity_run(sf_lockstep *lockstep, const sf_activity_options *opti
   memset(report, 0, sizeof *report);
   snprintf(a.path, sizeof a.path, "%s.piece.fst", options->saif ? options->saif : options->vcd);
   sf_status status = open_files(&a);
+  sf_wave_file_guard(a.path, (const char *[]){a.saif_file.aside, a.vcd_file.aside});
   if (status.code == SF_OK) status = write_files(&a);
   if (options->saif) sf_writer_abort(&a.saif_file);
   if (options->vcd) sf_writer_abort(&a.vcd_file);
   sf_dut_close(a.dut);
+  sf_wave_file_guard(NULL, NULL);
   unlink(a.path);
   sf_wave_free(&a.wave);
   free(a.vcd.shown);

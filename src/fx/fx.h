@@ -164,7 +164,7 @@ typedef struct fx_units {
   double to_box_scale, to_box_offset[3];
   double model_scale; /* model units per world unit of the data that it was trained on; 0: unknown */
   double data_scale, data_bound, data_ndc; /* sf_space of that data: without --scale, proposed, 0 or 1; 0: unknown */
-  double data_views, data_poses;           /* the same; 0: unknown */
+  double data_views, data_poses, data_picture; /* the same; 0: unknown */
   double stretch[3];
   double near, far; /* rays begin and end at these distances from their origins, model units */
   double dir_scale; /* value of one LSB of the direction features: 2^-frac, 0 <= frac <= FX_DIR_FRAC_MAX */

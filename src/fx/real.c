@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS, TENSORF_REALS = 5, OPTIONAL = 6 };
+enum { REALS = 5 + FX_LEVELS_MAX + SF_LAYERS, TENSORF_REALS = 5, OPTIONAL = 7 };
 
 typedef struct real_field {
   const char *key;
@@ -38,7 +38,8 @@ static const real_field tensorf_reals[TENSORF_REALS] = {
 
 /* Not in the file when 0. */
 static const real_field optional[OPTIONAL] = {REAL(model_scale, true), REAL(data_scale, true), REAL(data_bound, true),
-                                              REAL(data_ndc, true),    REAL(data_views, true), REAL(data_poses, true)};
+                                              REAL(data_ndc, true),    REAL(data_views, true), REAL(data_poses, true),
+                                              REAL(data_picture, true)};
 
 /* Those of the scene's backbone. */
 static int reals_of(const fx_scene *scene)

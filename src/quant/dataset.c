@@ -36,7 +36,8 @@ static sf_status check_space(const fx_scene *scene, const char *name, sf_dataset
                             .bound = whole(units->data_bound),
                             .ndc = whole(units->data_ndc),
                             .views = whole(units->data_views),
-                            .poses = whole(units->data_poses)};
+                            .poses = whole(units->data_poses),
+                            .picture = whole(units->data_picture)};
   return learned.scale > 0 ? sf_space_check(&learned, name, data) : check_unrecorded(scene, name, data);
 }
 

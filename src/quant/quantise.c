@@ -128,6 +128,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->units.data_scale = (double)model->config.space.scale;
   scene->units.data_bound = model->config.space.bound, scene->units.data_ndc = model->config.space.ndc;
   scene->units.data_views = model->config.space.views, scene->units.data_poses = model->config.space.poses;
+  scene->units.data_picture = model->config.space.picture;
 }
 
 /* What fine-tuning keeps to, beside what the field has said. */

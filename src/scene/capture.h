@@ -30,6 +30,7 @@ typedef struct sf_capture {
   sf_frame *frame;                                                   /* [count], owned */
   int count;
   int32_t poses;      /* hash of the poses of the list that names the training views; 0: unknown */
+  int32_t picture;    /* hash of the first one's file; 0: unknown */
   int listed;         /* in that list */
   int first;          /* those before are not of the split: they say where the scene lies, and the others do not */
   int shrink;         /* the pictures, once loaded, by a box filter; 0: each to at most SF_LONG_SIDE */
@@ -49,6 +50,8 @@ static inline int sf_capture_guides(const sf_capture *capture)
 
 /* Notes the first `count` frames as the list that names the training views. */
 void sf_capture_note_poses(sf_capture *capture, int count);
+/* Notes the file of the first frame's picture below `dir`, if there is one. */
+void sf_capture_note_picture(sf_capture *capture, const char *dir);
 
 /* One reader per layout. `split` as in sf_dataset_load; on failure the caller frees what is there. */
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);

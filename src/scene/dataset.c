@@ -110,7 +110,7 @@ static sf_status load(sf_dataset *data, sf_capture *c, const char *split, const 
 {
   SF_TRY(read_capture(data, c, split, options));
   memcpy(data->list, c->list, sizeof data->list);
-  data->listed = c->listed, data->poses = c->poses;
+  data->listed = c->listed, data->poses = c->poses, data->picture = c->picture;
   if (c->layout == SF_LAYOUT_COLMAP) SF_TRY(sf_colmap_check_others(data));
   const sf_sight sight = look(data, c);
   SF_TRY(sf_place(data, c, options, &sight));
@@ -147,14 +147,30 @@ sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test)
 
 sf_space sf_dataset_space(const sf_dataset *data)
 {
-  return (sf_space){
-      .scale = data->own_scale, .bound = data->bound, .ndc = data->ndc, .views = data->listed, .poses = data->poses};
+  return (sf_space){.scale = data->own_scale,
+                    .bound = data->bound,
+                    .ndc = data->ndc,
+                    .views = data->listed,
+                    .poses = data->poses,
+                    .picture = data->picture};
+}
+
+/* Made scenes may share their cameras: then a picture tells them apart. */
+static sf_status check_picture(const sf_space *learned, const char *name, sf_dataset *data)
+{
+  if (!learned->picture || !data->picture || learned->picture == data->picture) return sf_ok();
+  return sf_warn(
+      data,
+      "%s: learned from other pictures: %s has the same cameras, but another first picture. Is this the data "
+      "that it learned from, edited or written anew?",
+      name, data->path);
 }
 
 /* Where space and box are alike, the cameras tell two scenes apart. */
-static sf_status check_poses(const sf_space *learned, const char *name, const sf_dataset *data)
+static sf_status check_poses(const sf_space *learned, const char *name, sf_dataset *data)
 {
-  if (!learned->poses || !data->poses || learned->poses == data->poses) return sf_ok();
+  if (!learned->poses || !data->poses) return sf_ok();
+  if (learned->poses == data->poses) return check_picture(learned, name, data);
   return sf_fail(
       SF_E_RANGE,
       "%s: learned from a list of %d views, %s lists %d and their poses differ: this is another scene's data, or its "
@@ -167,7 +183,7 @@ static bool unlike(float a, float b)
   return !(fabsf(a - b) <= 0.01f * fmaxf(a, b));
 }
 
-sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dataset *data)
+sf_status sf_space_check(const sf_space *learned, const char *name, sf_dataset *data)
 {
   const sf_space here = sf_dataset_space(data);
   if (!(learned->scale > 0)) return sf_ok();

@@ -1,8 +1,12 @@
 /* The text of a transforms_*.json file, checked. */
 #include "src/scene/capture.h"
+#include "base/io.h"
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+enum { PICTURE_BYTES = 256 << 20 };
 
 sf_status sf_number_parse(const cJSON *json, const char *key, const char *where, double low, double high, double *value,
                           bool *given)
@@ -134,16 +138,40 @@ sf_status sf_frame_parse(sf_frame *frame, const cJSON *json, const sf_lens *shar
   return parse_matrix(frame->to_world, json, where);
 }
 
-/* Poses in steps of 1/4096: what another compiler makes of them is the same. FNV-1a, folded to 1..10^9. */
+/* FNV-1a, folded to 1..10^9. */
+static const uint64_t hash_start = UINT64_C(0xcbf29ce484222325);
+static uint64_t hash_byte(uint64_t hash, uint64_t byte)
+{
+  return (hash ^ (byte & 255)) * UINT64_C(0x100000001b3);
+}
+static int32_t hash_fold(uint64_t hash)
+{
+  return 1 + (int32_t)(hash % 1000000000);
+}
+
+/* Poses in steps of 1/4096: what another compiler makes of them is the same. */
 void sf_capture_note_poses(sf_capture *c, int count)
 {
-  uint64_t hash = UINT64_C(0xcbf29ce484222325);
+  uint64_t hash = hash_start;
   for (int f = 0; f < count; f++)
     for (int i = 0; i < 12; i++) {
       const double place = fmin(fmax(c->frame[f].to_world[i] * 4096, -1e15), 1e15);
       uint64_t word = (uint64_t)llrint(place);
-      for (int byte = 0; byte < 8; byte++, word >>= 8) hash = (hash ^ (word & 255)) * UINT64_C(0x100000001b3);
+      for (int byte = 0; byte < 8; byte++, word >>= 8) hash = hash_byte(hash, word);
     }
   c->listed = count;
-  c->poses = count ? 1 + (int32_t)(hash % 1000000000) : 0;
+  c->poses = count ? hash_fold(hash) : 0;
+}
+
+void sf_capture_note_picture(sf_capture *c, const char *dir)
+{
+  char path[4096], *text;
+  size_t size;
+  uint64_t hash = hash_start;
+  c->picture = 0;
+  if (!c->count || sf_picture_find(path, dir, c->frame[0].file_path).code != SF_OK) return;
+  if (sf_read_file(path, PICTURE_BYTES, &text, &size).code != SF_OK) return; /* told when it is loaded */
+  for (size_t i = 0; i < size; i++) hash = hash_byte(hash, (unsigned char)text[i]);
+  c->picture = hash_fold(hash);
+  free(text);
 }

@@ -47,6 +47,7 @@ typedef struct sf_dataset {
   float ndc_focal[2]; /* focal length over half the picture, along x and y */
   int listed;         /* views in the list that names the training views, held-out ones too; 0: there is none */
   int32_t poses;      /* hash of their poses, whatever is loaded; 0: unknown */
+  int32_t picture;    /* hash of the first one's file, where a transforms file lists them; 0: unknown */
   double world[12];   /* row-major 3x4: the layout's own coordinates (OpenGL camera axes) to world */
   float *point;       /* [points][3] sparse points, model units (not where ndc); NULL: none are known */
   int points;
@@ -78,11 +79,13 @@ typedef struct sf_space {
   int32_t bound;        /* proposed by the data */
   int32_t ndc;          /* 1: rays are in NDC */
   int32_t views, poses; /* listed, and hash of their poses; 0: nothing is known */
+  int32_t picture;      /* hash of the file of the first; 0: nothing is known */
 } sf_space;
 sf_space sf_dataset_space(const sf_dataset *data);
 /* SF_E_RANGE, which names what differs, where views of `data` cannot be of the scene that `name` learned. Scales may
- * differ by 1 %: they are computed from poses. `learned` without a scale fits everything, without poses any poses. */
-sf_status sf_space_check(const sf_space *learned, const char *name, const sf_dataset *data);
+ * differ by 1 %: they are computed from poses. `learned` without a scale fits everything, without poses any poses.
+ * Another picture from the same camera adds a warning to `data`: it may have been edited or written anew. */
+sf_status sf_space_check(const sf_space *learned, const char *name, sf_dataset *data);
 
 /* SF_E_FORMAT unless both splits lie in the same coordinates and box: what one was learned from shows in the other. */
 sf_status sf_dataset_agree(const sf_dataset *train, const sf_dataset *test);

@@ -94,12 +94,18 @@ static sf_status read_list(sf_capture *c, const char *path, bool box, bool frame
   return status;
 }
 
+static void note(sf_capture *c, const char *dir)
+{
+  sf_capture_note_poses(c, c->count);
+  sf_capture_note_picture(c, dir);
+}
+
 /* The training views' list where another one is asked for: it may be faulty, and nobody is told then. */
-static void note_poses(sf_capture *c, const char *training)
+static void note_other(sf_capture *c, const char *dir, const char *training)
 {
   sf_capture other = {0};
-  if (read_list(&other, training, false, true).code == SF_OK) sf_capture_note_poses(&other, other.count);
-  c->poses = other.poses, c->listed = other.listed;
+  if (read_list(&other, training, false, true).code == SF_OK) note(&other, dir);
+  c->poses = other.poses, c->listed = other.listed, c->picture = other.picture;
   free(other.frame);
 }
 
@@ -116,8 +122,8 @@ sf_status sf_transforms_read(sf_capture *c, const char *dir, const char *split)
   const bool same = !strcmp(training, c->list);
   SF_TRY(read_list(c, training, true, same));
   c->first = same ? 0 : c->count;
-  if (known && same) sf_capture_note_poses(c, c->count);
+  if (known && same) note(c, dir);
   if (same) return sf_ok();
-  note_poses(c, training);
+  note_other(c, dir, training);
   return read_list(c, c->list, false, true);
 }

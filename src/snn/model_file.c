@@ -29,7 +29,8 @@ static sf_status meta_int(const sf_tensors *set, const char *key, int32_t *value
   return sf_ok();
 }
 
-enum { CONFIG_NUMBERS = 14 /* of every model */, SPACE_NUMBERS = 5, SPACE_POSES = 3 /* those from here on */ };
+/* CONFIG_NUMBERS are of every model; of SPACE_NUMBERS, files may lack those from SPACE_POSES or SPACE_PICTURE on. */
+enum { CONFIG_NUMBERS = 14, SPACE_NUMBERS = 6, SPACE_POSES = 3, SPACE_PICTURE = 5 };
 
 static void config_numbers(sf_config *c, sf_number f[CONFIG_NUMBERS])
 {
@@ -66,11 +67,10 @@ static sf_status load_numbers(const sf_tensors *set, const sf_number *f, int cou
 
 static void space_numbers(sf_config *c, sf_number f[SPACE_NUMBERS])
 {
-  const sf_number table[SPACE_NUMBERS] = {{"data_scale", .number = &c->space.scale},
-                                          {"data_bound", .integer = &c->space.bound},
-                                          {"data_ndc", .integer = &c->space.ndc},
-                                          {"data_views", .integer = &c->space.views},
-                                          {"data_poses", .integer = &c->space.poses}};
+  const sf_number table[SPACE_NUMBERS] = {
+      {"data_scale", .number = &c->space.scale},  {"data_bound", .integer = &c->space.bound},
+      {"data_ndc", .integer = &c->space.ndc},     {"data_views", .integer = &c->space.views},
+      {"data_poses", .integer = &c->space.poses}, {"data_picture", .integer = &c->space.picture}};
   memcpy(f, table, sizeof table);
 }
 
@@ -81,7 +81,10 @@ static sf_status load_space(const sf_tensors *set, sf_config *c)
   space_numbers(c, number_of);
   if (!sf_tensors_meta(set, number_of[0].key)) return sf_ok();
   const bool poses = sf_tensors_meta(set, number_of[SPACE_POSES].key);
-  SF_TRY(load_numbers(set, number_of, poses ? SPACE_NUMBERS : SPACE_POSES));
+  const bool picture = poses && sf_tensors_meta(set, number_of[SPACE_PICTURE].key);
+  SF_TRY(load_numbers(set, number_of, picture ? SPACE_NUMBERS : poses ? SPACE_PICTURE : SPACE_POSES));
+  if (picture && c->space.picture < 1)
+    return sf_fail(SF_E_RANGE, "%s: metadata: data_picture %d: expected > 0", set->path, c->space.picture);
   if (poses && (c->space.views < 1 || c->space.poses < 1))
     return sf_fail(SF_E_RANGE, "%s: metadata: data_views %d, data_poses %d: expected > 0", set->path, c->space.views,
                    c->space.poses);
@@ -147,7 +150,8 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
   sf_number space[SPACE_NUMBERS];
   space_numbers(&c, space);
-  if (c.space.scale > 0) put_numbers(meta, space, c.space.poses ? SPACE_NUMBERS : SPACE_POSES);
+  const int numbers = !c.space.poses ? SPACE_POSES : !c.space.picture ? SPACE_PICTURE : SPACE_NUMBERS;
+  if (c.space.scale > 0) put_numbers(meta, space, numbers);
 }
 
 int sf_model_tensors(const sf_model *m, sf_tensor *list)

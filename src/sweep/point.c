@@ -69,6 +69,7 @@ static sf_status load(bench *b)
   const sf_dataset_options how = {.scale = b->model.config.scale, .limit = o->view + 1};
   SF_TRY(sf_dataset_load(&b->data, o->data, o->split, &how));
   SF_TRY(sf_space_check(&b->model.config.space, o->model, &b->data));
+  sf_dataset_warn(stderr, "sf_point", &b->data, NULL);
   if (o->view >= b->data.count)
     return sf_fail(SF_E_USAGE, "view %d is out of range: %s has %d %s views", o->view, o->data, b->data.count,
                    o->split);

@@ -55,6 +55,21 @@ full() { # CAUSE OPTIONS...
 full "$work/full.saif.piece.fst" --saif "$work/full.saif"
 full "$work/full.vcd" --vcd "$work/full.vcd" --window 0,799
 [ -z "$(find "$work" -name 'full*')" ] || fail "left behind: $(ls "$work")"
+# A disk that is full stops a write and keeps what fits: Verilator's writer then reads what is not there.
+if unshare -rm true 2>/dev/null; then
+  export -f run
+  export build work
+  for kib in 16 1500; do
+    for file in saif vcd; do
+      mkdir -p "$work/disk"
+      unshare -rm bash -c "mount -t tmpfs -o size=${kib}k none '$work/disk' && run --$file '$work/disk/a.$file'; echo \$?; ls -A '$work/disk'" >"$work/status"
+      [ "$(tail -n +1 "$work/status" | tr '\n' ' ')" = '1 ' ] && [ "$(grep -c "sf_cosim: cannot write $work/disk/.*No space left on device" "$work/err")" -eq 1 ] ||
+        fail "--$file on a disk of $kib KiB: $(cat "$work/status" "$work/err")"
+    done
+  done
+else
+  echo "unshare: a full disk was not tried"
+fi
 
 # Refusals, and nothing left behind.
 run --saif "$work/no.saif" --window 9,3 && fail "a window backwards"

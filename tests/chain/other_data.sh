@@ -69,9 +69,32 @@ quiet sim_render theirs.snn cube -o out.exr -q
 quiet sim_render own.snn cube -o out.exr -q
 refused "own.snn: learned from data of scale 0.33" sim_render own.snn data -o out2.exr -q
 
+# The same cameras before other pictures: taken, with one warning.
+"$bin/sf_scene" textured -o painted --size 32 --train 1 --test 2 >/dev/null || fail "no painted scene"
+warned() { # PROGRAM ARGUMENTS...
+  timeout 120 "$bin/$1" "${@:2}" >out.txt 2>err.txt || fail "$*: $(head -1 err.txt)"
+  [ "$(grep -c "warning: ours.s.*: learned from other pictures: painted has the same cameras" err.txt)" -eq 1 ] ||
+    fail "$*: other pictures: $(wc -l <err.txt) lines, $(head -1 err.txt)"
+}
+warned sim_render ours.snn painted -o out.exr -q
+warned sim_render ours.snn painted -o views --all -q
+warned sf_cosim ours.snn painted --rays 1 -q
+warned energy_audit ours.snn painted --rays 10 --rtl-rays 0 -q
+warned sf_cycles ours.snn painted -q
+warned error_budget ours.safetensors ours.snn painted --samples 10 --rays 1
+warned sf_soc ours.snn painted --crop 15,15,2,2
+warned sf_export ours.safetensors -o out.snn --fit --data painted --fit-rays 256
+warned sf_point ours.safetensors painted
+warned sf_train painted -o out.safetensors -q --fine-tune ours.safetensors --stage2 1
+"$bin/sim_render" ours.snn painted -o out.exr -q --backend float --model ours.safetensors >out.txt 2>err.txt
+grep -q "ours.snn: learned from other" err.txt && grep -q "ours.safetensors: learned from other" err.txt ||
+  fail "the float model: $(cat err.txt)"
+rm out.exr
+
 # A record that cannot be.
 poses=$(grep -ao '"data_poses":"[0-9]*"' ours.safetensors | tr -dc 0-9)
-for edit in ndc:0:2 bound:1:0 poses:$poses:${poses//?/0}; do
+picture=$(grep -ao '"data_picture":"[0-9]*"' ours.safetensors | tr -dc 0-9)
+for edit in ndc:0:2 bound:1:0 poses:$poses:${poses//?/0} picture:$picture:${picture//?/0}; do
   IFS=: read -r key from to <<<"$edit"
   sed "s/\"data_$key\":\"$from\"/\"data_$key\":\"$to\"/" ours.safetensors >bad.safetensors
   refused "bad.safetensors: metadata: data_" sf_export bad.safetensors -o bad.snn
@@ -85,7 +108,7 @@ text = open(sys.argv[1], "rb").read()
 n = struct.unpack("<Q", text[:8])[0]
 header = json.loads(text[8 : 8 + n])
 keys = [k for k in header["__metadata__"] if k.startswith("data_")]
-assert len(keys) == 5, keys
+assert len(keys) == 6, keys
 for key in keys:
     del header["__metadata__"][key]
 header = json.dumps(header).encode()
