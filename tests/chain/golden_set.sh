@@ -78,7 +78,7 @@ check "a refusal changes nothing" diff -r one two
 
 # Views enough for the signal to come in the middle, whatever the speed.
 views=400
-"$BIN/sf_scene" simple -o many --size 8 --train 1 --test $views >/dev/null && cp d/transforms_train.json many
+"$BIN/sf_scene" simple -o many --size 8 --train 1 --test $views >/dev/null && cp -r d/transforms_train.json d/train many
 expect 0 "$views views rendered" s1.snn many --all -o whole
 "$BIN/sim_render" s1.snn many --all -o cut -q >out 2>err &
 pid=$!
