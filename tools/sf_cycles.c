@@ -336,6 +336,11 @@ int main(int argc, char **argv)
       {"--split", 0, SF_ARG_STRING, &o->split, 0, 0, NULL, "NAME", "train or test (default test)"},
       {"--downscale", 0, SF_ARG_INT, &o->downscale, 0, 64, NULL, "N",
        "a view of 1/N of the full size, 0 = by the layout (default 0)"},
+      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
+       "gnuplot script of frames per second, or of what was explored; gnuplot writes NAME.svg"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
+      SF_GROUP("Another accelerator"),
       {"--clock", 0, SF_ARG_DOUBLE, &o->clock, 1, 1e5, NULL, "MHZ", "for the last line and --json (default 200)"},
       {"--macs", 0, SF_ARG_INT, &o->engine.macs, 1, SF_LANES, NULL, "N",
        "multipliers of D1 and C1 (default: of this build's RTL)"},
@@ -344,27 +349,23 @@ int main(int argc, char **argv)
        "steps that C2 sums up side by side (likewise)"},
       {"--latency", 0, SF_ARG_INT, &o->latency, 1, 10000, NULL, "CYCLES",
        "of TensoRF's memory, from a request to its first beat (default 16)"},
+      SF_GROUP("Many builds"),
       {"--builds", 0, SF_ARG_FLAG, &o->builds, 0, 0, NULL, NULL,
-       "also print builds that work on a quarter, a half or all of the lanes at once"},
+       "also builds for 1/4, 1/2 or all of the lanes at once"},
       {"--explore", 0, SF_ARG_FLAG, &o->explore, 0, 0, NULL, NULL,
        "time against energy over MACs, neuron units, steps at once and caches: the Pareto front"},
       {"--tech", 0, SF_ARG_INPUT, &o->tech, 0, 0, NULL, "FILE",
        "of --explore: prices, a file or a name (default 45nm)"},
+      SF_GROUP("Tuning"),
       {"--threads", 0, SF_ARG_INT, &o->threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
-      {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
-      {"--plot", 0, SF_ARG_OUTPUT, &o->plot, 0, 0, NULL, "NAME.gp",
-       "gnuplot script of frames per second, or of what was explored; gnuplot writes NAME.svg"},
-      {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const sf_cli cli = {
       .program = "sf_cycles",
       .usage = "sf_cycles SCENE.snn DATA [options]",
-      .summary = "Cycles, latency, utilisation and frames per second of the accelerator for a view, from the "
-                 "cycle model: its\n"
-                 "control with spike counts in place of bitmaps, exact while the streams never make it wait. It "
-                 "begins where the\n"
-                 "features of a hash grid come in; of TensoRF it has all from positions to pixels, with the field's "
-                 "cache and memory.",
+      .summary =
+          "Cycles, latency, utilisation and frames per second of the accelerator for a view, by the cycle model:\n"
+          "control with spike counts in place of bitmaps, exact while the streams never make it wait. Of a hash\n"
+          "grid it begins with the features; of TensoRF it has all from positions to pixels, with cache and memory.",
       .examples = "  sf_cycles scene.snn data --view 3\n"
                   "  sf_cycles scene.snn data --downscale 4 --clock 100 --json\n"
                   "  sf_cycles scene.snn data --builds\n"
