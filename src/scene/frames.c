@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { PICTURE_BYTES = 256 << 20 };
 
@@ -167,9 +168,11 @@ void sf_capture_note_picture(sf_capture *c, const char *dir)
 {
   char path[4096], *text;
   size_t size;
+  struct stat info;
   uint64_t hash = hash_start;
   c->picture = 0;
   if (!c->count || sf_picture_find(path, dir, c->frame[0].file_path).code != SF_OK) return;
+  if (stat(path, &info) || !S_ISREG(info.st_mode)) return;                   /* a pipe would wait */
   if (sf_read_file(path, PICTURE_BYTES, &text, &size).code != SF_OK) return; /* told when it is loaded */
   for (size_t i = 0; i < size; i++) hash = hash_byte(hash, (unsigned char)text[i]);
   c->picture = hash_fold(hash);
