@@ -184,7 +184,7 @@ static uint64_t read_lines(sf_planes_model *m, const sf_planes_read *read, bool 
 /* The next sample's packet, whose blocks of components come as block[] says. */
 static void read_appearance(sf_planes_model *m, const sf_planes_read *read, const sf_cycle_sample *sample, uint64_t at)
 {
-  uint64_t block[FX_PAIRS * BLOCKS], begins = m->basis_free;
+  uint64_t block[FX_PAIRS * BLOCKS] = {0}, begins = m->basis_free;
   const uint64_t number = m->totals.decoded++, bank = number % 2;
   int blocks;
   read_lines(m, read, true, at, false, block, &blocks);
@@ -207,7 +207,7 @@ static void read_appearance(sf_planes_model *m, const sf_planes_read *read, cons
 
 static void read_density(sf_planes_model *m, const sf_planes_read *read, uint64_t i, uint64_t at_least, bool empty)
 {
-  uint64_t block[FX_PAIRS * BLOCKS], at = later(at_least, later(m->beat, m->free));
+  uint64_t block[FX_PAIRS * BLOCKS] = {0}, at = later(at_least, later(m->beat, m->free));
   int blocks;
   m->asked[i % RING_READS] = at;
   m->weighed[i % RING_READS] = read_lines(m, read, false, at, empty, block, &blocks) + WEIGHT;
