@@ -43,7 +43,9 @@ $B/mutate/$1/.written: $(RTL_READY) tests/mutate/operators.py
 	@touch $$@
 mutate-$1: $(addprefix $B/mutate/$1/,$(call mutant_programs,$1))
 	@tests/mutate/sources.py $B/mutate/$1 --mutants $(MUTANTS) --modules "$(MODULES)" $(call mutants_of,$1)
-.PHONY: mutate-$1
+listed-$1: $B/mutate/$1/.written
+	@tests/mutate/sources.py $B/mutate/$1 --listed $(call mutants_of,$1)
+.PHONY: mutate-$1 listed-$1
 endef
 $(foreach g,engine lanes ray,$(eval $(call mutants_rule,$g)))
 mutate-engine: ## mutants of the source of the samples-in accelerator, against the co-simulation (MUTANTS, MODULES as mutate)

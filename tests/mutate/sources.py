@@ -5,7 +5,7 @@ FOLDER/rtl/mutants is the list of the mutants (operators.py); FOLDER has the che
 every mutant, of which SF_MUTANT=N in the environment chooses one. MODULE:CHECKER,... names a module's checkers; they run
 in this order, and the first that fails, crashes or hangs kills the mutant. --modules: those of this run. --mutants: at
 most so many per module, spread evenly, the same ones every time; 0 runs none: rows of the verdicts that are kept, in
-FOLDER/results.MODULE (campaign.py).
+FOLDER/results.MODULE (campaign.py). --listed: only looks whether every equivalent that is listed is a mutant.
 Equivalent: listed with its reason in tests/mutate/equivalent-FOLDER. Exit 0 nothing unexplained survived, 1 not.
 """
 import argparse
@@ -42,6 +42,7 @@ def main():
     parser.add_argument("modules_checkers", nargs="+", metavar="MODULE:CHECKER,...")
     parser.add_argument("--mutants", type=int, default=sys.maxsize)
     parser.add_argument("--modules", default="")
+    parser.add_argument("--listed", action="store_true")
     given = parser.parse_intermixed_args()
     checkers_of = {module: checkers.split(",") for module, checkers in (m.split(":") for m in given.modules_checkers)}
     modules = given.modules.split() or list(checkers_of)
@@ -55,6 +56,8 @@ def main():
     equivalents = campaign.Equivalents(f"tests/mutate/equivalent-{os.path.basename(given.folder)}", checkers_of)
     for module in checkers_of:
         equivalents.match(module, of[module])
+    if given.listed:
+        return 0
 
     score = campaign.Score(equivalents)
     for module in modules:
