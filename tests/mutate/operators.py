@@ -191,7 +191,8 @@ class Module:
             yield whole, f"if ({condition}) always", "1'b1"
             yield whole, f"if ({condition}) never", "1'b0"
         if kind == "<=":
-            yield whole, f"{left} keeps its value", left
+            # $signed: an unsigned choice would make a signed right side unsigned.
+            yield whole, f"{left} keeps its value", f"$signed({left})"
         constant_end = 0  # behind the range of a part of a vector, the count of a replication, a name in another block
         for i in range(first, end):
             if t[i] == "[" and t[self.until(i + 1, (":", "]"))] == ":":
