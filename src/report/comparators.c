@@ -7,7 +7,8 @@
 typedef enum { TWIN, LEARNED, CONVERTED, ALONG, FIXED } method;
 
 /* One method's numbers; a row has their means over the seeds. */
-enum { STEPS, PSNR, ANN_PSNR, EXCESS, ENERGY, SAVING, SAME, NUMBERS }; /* SAME: saving on the method's own samples */
+/* BASE, OWN: energy of the ANN run, and of the twin on the method's own samples. */
+enum { STEPS, PSNR, ANN_PSNR, EXCESS, ENERGY, BASE, OWN, NUMBERS };
 typedef struct point {
   double number[NUMBERS];
   int run; /* SF_RUNS: none */
@@ -32,18 +33,16 @@ static const cJSON *converted_at(const sf_run *ann, int steps)
 static point convert(const sf_run run[SF_RUNS], int steps)
 {
   const sf_run *ann = &run[SF_RUN_ANN];
-  const cJSON *at = converted_at(ann, steps);
-  const double psnr = sf_json_number(at, "psnr"), twin = sf_json_number(sf_json_get(ann->converted, "twin"), "psnr");
-  const double share = sf_json_number(at, "of_twin_percent") / 100;
-  const double samples =
-      sf_json_number(at, "samples_per_ray") / sf_json_number(sf_json_get(ann->converted, "twin"), "samples_per_ray");
+  const cJSON *at = converted_at(ann, steps), *twin = sf_json_get(ann->converted, "twin");
+  const double psnr = sf_json_number(at, "psnr"), base = ann->value[SF_METRIC_ENERGY];
+  const double samples = sf_json_number(at, "samples_per_ray") / sf_json_number(twin, "samples_per_ray");
   return (point){{[STEPS] = steps,
                   [PSNR] = psnr,
-                  [ANN_PSNR] = twin,
-                  [EXCESS] = sf_squared_error(psnr) - sf_squared_error(twin),
-                  [ENERGY] = share * ann->value[SF_METRIC_ENERGY],
-                  [SAVING] = 100 * (1 - share),
-                  [SAME] = 100 * (1 - share / samples)},
+                  [ANN_PSNR] = sf_json_number(twin, "psnr"),
+                  [EXCESS] = sf_squared_error(psnr) - sf_squared_error(sf_json_number(twin, "psnr")),
+                  [ENERGY] = base * sf_json_number(at, "of_twin_percent") / 100,
+                  [BASE] = base,
+                  [OWN] = base * samples},
                  SF_RUN_ANN};
 }
 
@@ -58,19 +57,17 @@ static int fixed_run(const sf_run run[SF_RUNS], int steps)
 
 static point measure(const sf_run run[SF_RUNS], method m, int which)
 {
-  static const int metric[NUMBERS] = {[STEPS] = SF_METRIC_STEPS,
-                                      [PSNR] = SF_METRIC_PSNR,
-                                      [EXCESS] = SF_METRIC_EXCESS,
-                                      [ENERGY] = SF_METRIC_ENERGY,
-                                      [SAVING] = SF_METRIC_SAVING};
+  const double *ann = run[SF_RUN_ANN].value;
   if (m == CONVERTED) return convert(run, which);
   point p = {.run = m == TWIN ? SF_RUN_ANN : m == ALONG ? SF_RUN_ALONG : m == FIXED ? fixed_run(run, which) : which};
-  for (int i = 0; i < NUMBERS; i++) p.number[i] = p.run == SF_RUNS ? NAN : run[p.run].value[metric[i]];
-  p.number[ANN_PSNR] = p.number[SAME] = NAN;
-  if (m == TWIN || p.run == SF_RUNS) return p;
+  for (int i = 0; i < NUMBERS; i++) p.number[i] = NAN;
+  if (p.run == SF_RUNS) return p;
   const double *own = run[p.run].value;
-  p.number[ANN_PSNR] = run[SF_RUN_ANN].value[SF_METRIC_PSNR];
-  p.number[SAME] = 100 * (1 - own[SF_METRIC_ENERGY] / own[SF_METRIC_TWIN]);
+  p.number[STEPS] = own[SF_METRIC_STEPS], p.number[PSNR] = own[SF_METRIC_PSNR];
+  p.number[ENERGY] = own[SF_METRIC_ENERGY];
+  if (m == TWIN) return p;
+  p.number[ANN_PSNR] = ann[SF_METRIC_PSNR], p.number[EXCESS] = own[SF_METRIC_EXCESS];
+  p.number[BASE] = ann[SF_METRIC_ENERGY], p.number[OWN] = own[SF_METRIC_TWIN];
   return p;
 }
 
@@ -90,6 +87,12 @@ static row pool(const sf_report_scene *scene, method m, int which)
 static double mean_of(const row *x, int number)
 {
   return sf_mean_of(&x->number[number]);
+}
+
+/* In percent of another energy. */
+static double saving(const row *x, int of)
+{
+  return 100 * (1 - mean_of(x, ENERGY) / mean_of(x, of));
 }
 
 /* Standard deviation over the seeds. */
@@ -131,7 +134,7 @@ static void add_row(sf_grids *t, const sf_reproduction *r, int s, method m, int 
   sf_grid_number(t, 2, mean_of(&x, ANN_PSNR));
   sf_grid_number(t, 2, 1e5 * mean_of(&x, EXCESS));
   sf_grid_energy(t, mean_of(&x, ENERGY), NAN);
-  sf_grid_number(t, 1, mean_of(&x, SAVING)), sf_grid_number(t, 1, mean_of(&x, SAME));
+  sf_grid_number(t, 1, saving(&x, BASE)), sf_grid_number(t, 1, saving(&x, OWN));
   origin_of(r, s, m, &x, origin);
   sf_grid_cell(t, "%s", origin);
 }
