@@ -100,6 +100,7 @@ static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
   const sf_ray *from = &b->ray[r];
   float sh[SF_DIR_FEATURES];
   dual sum = 0, feature[2 * 16];
+  oracle_layer layer[3];
   sf_sh4(from->direction, sh);
   sf_scales_round_direction(&o->t->model.scales, sh, SF_DIR_FEATURES);
   ray->count = from->count;
@@ -109,7 +110,10 @@ static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
     for (int a = 0; a < 3; a++) x[a] = b->x[(lane / SF_BLOCK * 3 + a) * SF_BLOCK + lane % SF_BLOCK];
     ray->delta[s] = b->delta[lane];
     oracle_grid(o, x, feature);
-    sum += oracle_nets(o, feature, sh, ray, s);
+    if (o->t->model.config.along)
+      oracle_nets_along(o, feature, sh, s, layer, ray, s);
+    else
+      sum += oracle_nets(o, feature, sh, ray, s);
   }
   return sum;
 }
@@ -119,6 +123,8 @@ static inline dual oracle_planes_ray(const oracle *o, int r, oracle_ray *ray)
   const sf_vm *vm = o->t->vm;
   const sf_vm_ray_samples *from = &vm->ray[r];
   dual sum = 0, in[SF_DECODER_MAX];
+  oracle_layer layer[3];
+  int decoded = 0;
   ray->count = from->count;
   for (int s = 0; s < ray->count; s++) {
     double x[3];
@@ -131,7 +137,10 @@ static inline dual oracle_planes_ray(const oracle *o, int r, oracle_ray *ray)
     }
     if (!(o->t->batch.hit[r][s / 64] >> s % 64 & 1)) continue;
     oracle_inputs(o, x, o->t->batch.ray[r].direction, in);
-    sum += oracle_decoder(o, in, ray, s);
+    if (o->t->model.config.along)
+      oracle_decoder_along(o, in, decoded++, layer, ray, s);
+    else
+      sum += oracle_decoder(o, in, ray, s);
   }
   return sum;
 }

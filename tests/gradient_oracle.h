@@ -118,10 +118,11 @@ static inline dual oracle_charge(const oracle *o, const oracle_layer layer[3], i
   return sum;
 }
 
-/* C1 to the colour integrator at one step; current: of C1. */
+/* C1 to the colour integrator at one step; current: of C1. Along a ray nothing is integrated. */
 static inline void oracle_colour(const oracle *o, int step, const dual *current, oracle_layer layer[3],
                                  const dual before[3], dual colour[3])
 {
+  const bool along = o->t->model.config.along;
   dual s[SF_LANES], current2[SF_LANES] = {0}, j[3] = {0};
   oracle_fire(o, 1, step, leak(o, 2), current, &layer[1], s);
   oracle_multiply(o, SF_P_C2, 0, o->t->model.config.hidden, s, current2);
@@ -129,7 +130,8 @@ static inline void oracle_colour(const oracle *o, int step, const dual *current,
   oracle_fire(o, 2, step, leak(o, 3), current2, &layer[2], s);
   oracle_multiply(o, SF_P_C3, 0, o->t->model.config.hidden, s, j);
   oracle_bias(o, SF_P_C3_BIAS, j);
-  for (int a = 0; a < 3; a++) colour[a] = charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
+  for (int a = 0; a < 3; a++)
+    colour[a] = along ? logistic(j[a]) : charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
 }
 
 /* Density and colour nets of one sample, all steps; what its firing is charged with. */
@@ -154,6 +156,32 @@ static inline dual oracle_nets(const oracle *o, const dual *feature, const float
     oracle_colour(o, t, current1, layer, t ? ray->colour[t - 1][at] : NULL, ray->colour[t][at]);
   }
   return oracle_charge(o, layer, 0);
+}
+
+/* Of one sample of a net along rays, the one after `before` others of its ray; layer: as they left it. */
+static inline void oracle_nets_along(const oracle *o, const dual *feature, const float *sh, int before,
+                                     oracle_layer layer[3], oracle_ray *ray, int at)
+{
+  const sf_model *m = &o->t->model;
+  dual current[SF_LANES] = {0}, direction[SF_DIR_FEATURES], s[SF_LANES], i[SF_DENSITY_OUT] = {0};
+  for (int a = 0; a < SF_DIR_FEATURES; a++) direction[a] = sh[a];
+  oracle_multiply(o, SF_P_D1, 0, 2 * m->config.levels, feature, current);
+  oracle_fire(o, 0, before, leak(o, 0), current, &layer[0], s);
+  oracle_multiply(o, SF_P_D2, 0, m->config.hidden, s, i);
+  ray->sigma[0][at] = cexp(i[0]);
+  memset(current, 0, sizeof current);
+  oracle_multiply(o, SF_P_C1, 0, SF_DIR_FEATURES, direction, current);
+  oracle_multiply(o, SF_P_C1, SF_DIR_FEATURES, SF_GEO_FEATURES, i + 1, current);
+  oracle_colour(o, before, current, layer, NULL, ray->colour[0][at]);
+}
+
+static inline void oracle_decoder_along(const oracle *o, const dual *in, int before, oracle_layer layer[3],
+                                        oracle_ray *ray, int at)
+{
+  dual current[SF_LANES] = {0};
+  oracle_multiply(o, SF_P_C1, 0, sf_tensorf_inputs(&o->t->model.config.tensorf), in, current);
+  oracle_bias(o, SF_P_C1_BIAS, current);
+  oracle_colour(o, before, current, layer, NULL, ray->colour[0][at]);
 }
 
 /* The decoder of one sample. */

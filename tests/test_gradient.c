@@ -301,6 +301,25 @@ LOOP_TEST(the_twins, 2)
   rig_end(&r);
 }
 
+/* The samples of a ray as steps: what a weight does at one sample reaches all behind it. */
+LOOP_TEST(steps_along_rays, 6)
+{
+  sf_train_options o = _i < 3 ? grid_run(_i) : planes_run(_i - 3);
+  o.config.along = 1;
+  o.config.steps = 1;
+  rig r;
+  rig_start(&r, &o, _i < 3 ? 20 : 6, 4);
+  sf_loss_plan p = {.steps = 1, .weight = {1}};
+  check_plan(&r, "squared error", p);
+  int longest = 0;
+  for (int i = 0; i < r.t->batch.rays; i++)
+    longest = r.t->batch.ray[i].count > longest ? r.t->batch.ray[i].count : longest;
+  ck_assert_int_gt(longest, 3);
+  p.regular_at = 1;
+  check_plan(&r, "all terms", p);
+  rig_end(&r);
+}
+
 /* Fine-tuning: the nets run with rounded weights and a rounded h, and slopes pass straight through both. */
 TEST(rounded_weights)
 {

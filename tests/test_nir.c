@@ -182,9 +182,11 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
   free_graph(&shared);
 }
 
-TEST(the_relu_twin_is_refused)
+/* And a net whose steps are the samples of a ray. */
+LOOP_TEST(the_relu_twin_is_refused, 2)
 {
-  OWNED(sf_model) m = test_model(SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
+  OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
+  m.config.along = _i;
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));

@@ -102,8 +102,10 @@ TEST(groups)
   contains("table.md", "Plenoxels", false);
   contains("table.md", "|      2.000 |      0.100 |      1.000 |          2.00 | balanced |", true);
   ck_assert_int_eq(count, 9);
-  contains("paper/tables/converted.csv",
-           "\nfox-ingp,256,25.25,25.50,-0.25,812.0,seed 1; 500 random rays of held-out views\n", true);
+  contains("paper/tables/comparators.csv",
+           "\nfox-ingp,\"twin converted, no training\",256,25.25,25.50,16.70,-,-,-,seed 1; 500 random rays of "
+           "held-out views\n",
+           true);
   contains("paper/tables/order-tensorf-blender.csv", "\nbeta,beta = 5e-9,beta = 5e-8,PSNR dB,0.06,0.25,-,1,1,yes\n",
            true);
   contains("paper/tables/quality-tensorf-blender.csv", "\nbeta = 5e-8,32.50,33.04,0.5000,0.960,3.000,3.875,-,815.20,",

@@ -11,6 +11,7 @@ usage="usage: reproduce.sh BUILD [options]
   --only 'NAME...'     these scenes alone (quick: lego and mic, or the first two; paper, scenes: all)
   --seeds 'N...'       one run each, means and spreads in the tables (the seed of --seed)
   --seed-runs WHICH    runs of the further seeds: all, or learned (twin and budgets alone)
+  --runs WHICH         all, paper (the paper's alone), or comparators (twin, beta = 5e-7, and what they are held against)
   --minutes M          scenes: training budget of a run (15)
   --backbones 'B...'   scenes, paper: ingp, tensorf or both (Blender: both, LLFF: tensorf, others: ingp)
   --betas 'B...'       scenes, paper: budgets of the spiking runs, of 5e-9, 5e-8, 1e-7, 5e-7 and 1e-6 (scenes: 5e-7)
@@ -62,7 +63,7 @@ case $profile in
     ;;
   *) die "--profile '$profile' is unknown: expected quick, paper, scenes or smoke" ;;
 esac
-scenes="" only="" report_only="" chosen="" betas="" seeds="" seed_runs=all
+scenes="" only="" report_only="" chosen="" betas="" seeds="" seed_runs=all which_runs=all
 while [ $# -gt 0 ]; do
   name=${1#--}
   case $1 in
@@ -95,6 +96,10 @@ while [ $# -gt 0 ]; do
     --seed-runs)
       [[ $2 =~ ^(learned|all)$ ]] || die "--seed-runs '$2' is unknown: expected learned or all"
       seed_runs=$2 ;;
+    --runs)
+      [[ $2 =~ ^(all|paper|comparators)$ ]] || die "--runs '$2' is unknown: expected all, paper or comparators"
+      [ "$profile" != scenes ] || die "$1 does not belong to --profile scenes"
+      which_runs=$2 ;;
     --probe)
       [ "$profile" = paper ] || die "$1 belongs to --profile paper"
       [[ $2 =~ ^[0-9]{1,9}$ ]] || die "--probe '$2' is not a whole number"
@@ -234,16 +239,24 @@ betas_of() {
 }
 
 ablations="mode-hybrid mode-decay mode-no-decay no-stage1 no-extra no-penalty no-budget fixed-t-minus-1 fixed-t fixed-t-plus-1"
+# What PATA is held against: membranes along the ray; every number of steps trained alone, as a search by hand would.
+comparators() {
+  local t
+  echo -n "along-ray"
+  for ((t = 1; t <= set[steps]; t++)); do echo -n " sweep-$t"; done
+}
 # BACKBONE LAYOUT SEED: names of runs.
 runs_of() (
   # shellcheck disable=SC2046 # words
   set -- "$1" "$2" "$3" $(betas_of "$1")
+  [ "$which_runs" != comparators ] || { echo "beta-5e-7 ann $(comparators)"; return; }
   echo -n "beta-$4 ann"
   for beta in "${@:5}"; do echo -n " beta-$beta"; done
   [ "$3" = "${set[seed]}" ] || [ "$seed_runs" = all ] || return 0
   [ "$profile" != scenes ] || return 0
   [ "$profile" != paper ] || [ "$1 $2" = "ingp blender" ] || return 0
-  echo " $ablations"
+  echo -n " $ablations"
+  [ "$which_runs" = paper ] || echo -n " $(comparators)"
 )
 
 # One unit of the plan is a scene with a backbone and a seed.
@@ -331,6 +344,8 @@ start_run() { # NAME
     fixed-t-minus-1) fixed_run "$1" $((${t_r:-0} - 1)) $rest ;;
     fixed-t) fixed_run "$1" "${t_r:-0}" $rest ;;
     fixed-t-plus-1) fixed_run "$1" $((${t_r:-0} + 1)) $rest ;;
+    along-ray) one_run along-ray --beta 5e-7 --steps-along-ray ;;
+    sweep-*) sweep_run "$1" "${1#sweep-}" $rest ;;
   esac
 }
 
@@ -338,7 +353,8 @@ one_unit() { # ITS NUMBER
   local run
   data=${unit_data[$1]} frames=${unit_frames[$1]} scene=${unit_scene[$1]} backbone=${unit_backbone[$1]} seed=${unit_seed[$1]}
   prepare_unit
-  for run in ${unit_runs[$1]}; do start_run "$run"; done
+  names=${unit_runs[$1]}
+  for run in $names; do start_run "$run"; done
 }
 
 # Before the first run: how long a run of each kind will train.

@@ -266,7 +266,11 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   fi
   echo "not finished" >"$dir/status"
   start_ticker
-  train && if [ "$name" = ann ]; then evaluate_ann; else evaluate_snn; fi
+  train && case $name in
+    ann) evaluate_ann ;;
+    along-ray) ;; # the trainer counts it
+    *) evaluate_snn ;;
+  esac
   code=$?
   stop_ticker
   before=$(cat "$dir/wall" 2>/dev/null || echo 0)
@@ -315,4 +319,19 @@ fixed_run() { # NAME STEPS OPTIONS...
   else
     one_run "$name" --beta 5e-7 --fixed-steps "$steps" "$@"
   fi
+}
+
+# A number of steps that the ablations train as well is not trained twice.
+sweep_run() { # NAME STEPS OPTIONS...
+  local name=$1 steps=$2 other
+  shift 2
+  for other in mode-hybrid fixed-t-minus-1 fixed-t fixed-t-plus-1; do
+    [[ " $names " == *" $other "* ]] && [ "$(cat "$out/$scene/$other/status" 2>/dev/null)" = "done" ] || continue
+    [ "$(number "$out/$scene/$other/train.json" t_r)" = "$steps" ] || continue
+    rm -rf "${out:?}/$scene/$name"
+    index=$((index + 1)) left[$key]=$((${left[$key]:-0} - 1)) run_started=$SECONDS
+    [ -n "$stop" ] || say "is $other"
+    return
+  done
+  one_run "$name" --beta 5e-7 --fixed-steps "$steps" "$@"
 }

@@ -137,6 +137,7 @@ typedef struct examination {
 typedef struct view_quality {
   sf_status status;
   double psnr, ssim, prefix[SF_T_MAX];
+  sf_ray_events events;
 } view_quality;
 
 static bool is_whole(const examination *e, int unit)
@@ -165,7 +166,8 @@ static void examine(void *user, uint64_t unit, void *result)
   view_quality *v = result;
   const sf_dataset one = one_view(e, (int)unit);
   if (sf_ranks_size(e->a->train.ranks) == 1) show_examination(e);
-  if (is_whole(e, (int)unit)) v->status = sf_evaluate(e->model, &one, 1, 0, &v->psnr, &v->ssim);
+  v->events = (sf_ray_events){0};
+  if (is_whole(e, (int)unit)) v->status = sf_evaluate_counted(e->model, &one, 1, 0, &v->psnr, &v->ssim, &v->events);
   if ((int)unit < e->a->prefix_views && !v->status.code) v->status = sf_evaluate_prefixes(e->model, &one, 1, v->prefix);
   v->status = sf_ranks_named(e->a->train.ranks, v->status);
 }
@@ -181,6 +183,7 @@ static bool take_view(void *user, uint64_t unit, const void *result)
     q->views = (int)unit + 1;
     q->width = one.view->camera.width, q->height = one.view->camera.height;
     q->psnr += (v->psnr - q->psnr) / q->views;
+    sf_events_add(&q->events, &v->events);
     if (!isnan(v->ssim)) e->ssims += v->ssim, e->compared++;
     q->ssim = e->compared ? e->ssims / e->compared : NAN;
   }
@@ -254,7 +257,7 @@ static sf_status finish(const sf_trainer *trainer, const char *data_path, const 
   const sf_model *model = sf_trainer_model(trainer);
   train_quality q = {0};
   SF_TRY(evaluate(model, data_path, how, a, k, &q));
-  return sf_ranks_rank(a->train.ranks) ? sf_ok() : train_report(a, &model->config, s, &q);
+  return sf_ranks_rank(a->train.ranks) ? sf_ok() : train_report(a, model, s, &q);
 }
 
 static sf_status open_log(const train_arguments *a, FILE **log)

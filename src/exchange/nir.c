@@ -262,6 +262,9 @@ sf_status sf_nir_write_model(const char *path, const sf_model *m)
   const sf_config *c = &m->config;
   if (c->net != SF_NET_SNN)
     return sf_fail(SF_E_UNSUPPORTED, "%s: the model is the ReLU twin; a NIR graph is of spiking nets", path);
+  if (c->along)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: the model's steps are the samples of a ray; a NIR graph is of one sample",
+                   path);
   const float *leak = sf_model_param(m, SF_P_LEAK);
   nets n = {.mode = c->mode,
             .steps = m->t_r,

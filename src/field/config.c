@@ -23,7 +23,8 @@ sf_status sf_config_check(const sf_config *c)
 {
   SF_TRY(check_range("net", c->net, SF_NET_SNN, SF_NET_ANN));
   SF_TRY(check_range("mode", c->mode, SF_HYBRID, SF_NODECAY));
-  SF_TRY(check_range("steps", c->steps, 1, c->net == SF_NET_ANN ? 1 : SF_T_MAX));
+  SF_TRY(check_range("along_ray", c->along, 0, c->net == SF_NET_ANN ? 0 : 1));
+  SF_TRY(check_range("steps", c->steps, 1, c->net == SF_NET_ANN || c->along ? 1 : SF_T_MAX));
   SF_TRY(check_range("levels", c->levels, 1, 16));
   SF_TRY(check_range("log2_hash", c->log2_hash, 4, 24));
   SF_TRY(check_range("base_res", c->base_res, 2, 4096));

@@ -16,9 +16,10 @@ typedef enum { SF_NET_SNN, SF_NET_ANN } sf_net_kind;
 typedef enum { SF_INGP, SF_TENSORF } sf_backbone_kind; /* which field: sf_field_of() */
 
 typedef struct sf_config {
-  int32_t net;                                     /* sf_net_kind */
-  int32_t mode;                                    /* sf_input_mode */
-  int32_t steps;                                   /* T, 1..SF_T_MAX; 1 for the ANN */
+  int32_t net;   /* sf_net_kind */
+  int32_t mode;  /* sf_input_mode */
+  int32_t steps; /* T, 1..SF_T_MAX; 1 for the ANN and along rays */
+  int32_t along; /* 1: the samples of a ray are the steps, membranes pass from one to the next (SpikingNeRF) */
   int32_t levels, log2_hash, base_res, finest_res; /* hash grid, 2 features per entry */
   int32_t hidden;                                  /* neurons of a spiking layer, multiple of 16, <= SF_LANES */
   float theta[3];                                  /* thresholds of D1, C1, C2 */

@@ -45,6 +45,11 @@ static sf_status check_model(const sf_model *model, const char *name, const sf_q
   if (config->net != SF_NET_SNN)
     return sf_fail(SF_E_UNSUPPORTED, "%s: metadata 'net': an ANN has no spikes; the accelerator runs spiking nets only",
                    name);
+  if (config->along)
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: metadata 'along_ray': its steps are the samples of a ray (--steps-along-ray); the accelerator "
+                   "runs the steps of one sample",
+                   name);
   SF_TRY(check_sizes(model, name));
   for (int i = 0; i < 3; i++)
     if (!isfinite(config->theta[i]) || config->theta[i] <= 0)

@@ -14,6 +14,7 @@ typedef struct ray_state {
   sf_march march;
   float sh[SF_DIR_FEATURES];
   int next;
+  bool fresh; /* no sample yet */
   float transmittance, rgb[3], depth, samples;
 } ray_state;
 
@@ -28,6 +29,8 @@ typedef struct worker {
   float x[3 * SF_BLOCK];
   ray_state ray[PACKET];
   int owner[SF_BLOCK], lattice[SF_BLOCK], fill;
+  sf_ray_state state[PACKET]; /* of a model along rays */
+  sf_ray_events events;
 } worker;
 
 /* Evaluates the block that was filled and composites its samples, in ray order. */
@@ -41,7 +44,11 @@ static void flush(worker *w)
   const float *table = sf_model_param(w->model, SF_P_GRID);
   for (int level = 0; level < w->model->config.levels; level++)
     w->kernels->grid_forward(&w->model->level[level], table, w->x, w->block->f + 2 * level * SF_BLOCK);
-  w->kernels->forward(w->net, w->block, w->steps, 0, w->scratch);
+  w->block->lanes = w->fill;
+  if (w->net->view.along)
+    w->kernels->along_forward(w->net, w->block, w->scratch);
+  else
+    w->kernels->forward(w->net, w->block, w->steps, 0, w->scratch);
   const float *sigma = w->block->sigma[w->steps - 1], *colour = w->block->colour[w->steps - 1];
   for (int l = 0; l < w->fill; l++) {
     ray_state *r = &w->ray[w->owner[l]];
@@ -52,8 +59,10 @@ static void flush(worker *w)
     r->depth += weight * sf_march_distance(&r->march, w->lattice[l]);
     r->samples += 1;
     r->transmittance = behind;
+    if (w->net->view.along) sf_count_lane(&w->net->view, w->block, 0, l, w->events.spikes);
   }
   w->fill = 0;
+  w->block->first = 0;
 }
 
 static void add_sample(worker *w, int ray, int n, const float x[3])
@@ -63,6 +72,9 @@ static void add_sample(worker *w, int ray, int n, const float x[3])
   for (int i = 0; i < SF_DIR_FEATURES; i++) w->block->sh[i * SF_BLOCK + l] = w->ray[ray].sh[i];
   w->owner[l] = ray;
   w->lattice[l] = n;
+  w->block->state[l] = &w->state[ray];
+  w->block->first |= (uint64_t)w->ray[ray].fresh << l;
+  w->ray[ray].fresh = false;
   if (w->fill == SF_BLOCK) flush(w);
 }
 
@@ -105,14 +117,47 @@ static void worker_free(worker *w)
   free(w);
 }
 
+static void begin_packet(worker *w, const float *origin, const float *direction, int count)
+{
+  for (int i = 0; i < count; i++) {
+    const float *o = origin + 3 * i, *d = direction + 3 * i;
+    w->ray[i] =
+        (ray_state){.march = sf_march_begin(w->model, &w->intervals, o, d, 0.5f), .fresh = true, .transmittance = 1};
+    sf_sh4(d, w->ray[i].sh);
+    sf_scales_round_direction(&w->model->scales, w->ray[i].sh, SF_DIR_FEATURES);
+  }
+}
+
+/* The packet's rays, from number `first` of all on. */
+static void end_packet(worker *w, size_t first, int count, const float background[3], float *rgb, float *depth,
+                       float *alpha, float *samples)
+{
+  for (int i = 0; i < count; i++) {
+    const ray_state *r = &w->ray[i];
+    for (int a = 0; a < 3; a++) rgb[3 * (first + i) + a] = r->rgb[a] + r->transmittance * background[a];
+    if (depth) depth[first + i] = r->depth;
+    if (alpha) alpha[first + i] = 1 - r->transmittance;
+    if (samples) samples[first + i] = r->samples;
+    w->events.rays += r->samples > 0, w->events.samples += (uint64_t)r->samples;
+  }
+}
+
 sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
                          const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+{
+  sf_ray_events events = {0};
+  return sf_render_counted(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, &events);
+}
+
+sf_status sf_render_counted(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
+                            sf_ray_events *events)
 {
   if (steps < 0 || steps > model->config.steps)
     return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
   if (!steps) steps = model->t_r;
   if (sf_model_decodes(model)) /* its weights are known before it decodes */
-    return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples);
+    return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, events);
   sf_steps intervals;
   SF_TRY(sf_steps_make(&intervals, &model->config, 1));
   sf_net_words *net = sf_aligned_alloc(sizeof *net);
@@ -129,21 +174,12 @@ sf_status sf_render_rays(const sf_model *model, const float *origin, const float
     for (size_t first = 0; first < count; first += PACKET) {
       if (failed) continue;
       const int n = (int)(count - first < PACKET ? count - first : PACKET);
-      for (int i = 0; i < n; i++) {
-        const float *o = origin + 3 * (first + i), *d = direction + 3 * (first + i);
-        w->ray[i] = (ray_state){.march = sf_march_begin(model, &w->intervals, o, d, 0.5f), .transmittance = 1};
-        sf_sh4(d, w->ray[i].sh);
-        sf_scales_round_direction(&model->scales, w->ray[i].sh, SF_DIR_FEATURES);
-      }
+      begin_packet(w, origin + 3 * first, direction + 3 * first, n);
       render_packet(w, n);
-      for (int i = 0; i < n; i++) {
-        const ray_state *r = &w->ray[i];
-        for (int a = 0; a < 3; a++) rgb[3 * (first + i) + a] = r->rgb[a] + r->transmittance * background[a];
-        if (depth) depth[first + i] = r->depth;
-        if (alpha) alpha[first + i] = 1 - r->transmittance;
-        if (samples) samples[first + i] = r->samples;
-      }
+      end_packet(w, first, n, background, rgb, depth, alpha, samples);
     }
+#pragma omp critical
+    if (w) sf_events_add(events, &w->events);
     worker_free(w);
   }
   free(net);

@@ -22,6 +22,8 @@ typedef struct worker {
   int steps, fill;
   float x[3 * SF_BLOCK], weight[SF_BLOCK];
   float *owner[SF_BLOCK]; /* the ray's colour */
+  sf_ray_state state;     /* of a model along rays: the ray at hand */
+  sf_ray_events events;
 } worker;
 
 /* Lanes that hold no sample become the first: spikes of every lane choose between events and dense products. */
@@ -40,11 +42,18 @@ static void flush(worker *w)
   if (!w->fill) return;
   w->kernels->vm_products(&w->appearance, w->x, w->fill, w->block->product, w->decoder->view.products);
   pad(w);
-  w->kernels->decoder_forward(w->decoder, w->block, w->steps, 0, w->scratch);
+  const sf_net_view *net = &w->decoder->net.view;
+  w->block->net.lanes = w->fill;
+  if (net->along)
+    w->kernels->decoder_along_forward(w->decoder, w->block, w->scratch);
+  else
+    w->kernels->decoder_forward(w->decoder, w->block, w->steps, 0, w->scratch);
   const float *colour = w->block->net.colour[w->steps - 1];
   for (int l = 0; l < w->fill; l++)
     for (int c = 0; c < 3; c++) w->owner[l][c] += w->weight[l] * colour[c * SF_BLOCK + l];
+  for (int l = 0; l < w->fill && net->along; l++) sf_count_lane(net, &w->block->net, 1, l, w->events.spikes);
   w->fill = 0;
+  w->block->net.first = 0;
 }
 
 /* One ray; what it needs of the decoder comes with a later flush. depth, alpha, samples: NULL or one number each;
@@ -62,7 +71,8 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
     if (w->samples.weight[s] <= sf_opaque) continue;
-    decoded++;
+    w->block->net.first |= (uint64_t)!decoded++ << w->fill;
+    w->block->net.state[w->fill] = &w->state;
     memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));
     w->weight[w->fill] = w->samples.weight[s];
     w->owner[w->fill] = rgb;
@@ -72,6 +82,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   if (depth) *depth = far;
   if (alpha) *alpha = 1 - behind;
   if (samples) *samples = (float)decoded;
+  w->events.rays += decoded > 0, w->events.samples += (uint64_t)decoded;
 }
 
 static void worker_free(worker *w)
@@ -111,7 +122,8 @@ static worker *worker_create(const sf_model *model, const sf_decoder_words *deco
 }
 
 sf_status sf_render_tensorf(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
-                            const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
+                            sf_ray_events *events)
 {
   sf_decoder_words *decoder = sf_aligned_alloc(sizeof *decoder);
   if (!decoder) return sf_fail(SF_E_MEMORY, "render: no memory for the weights");
@@ -130,6 +142,8 @@ sf_status sf_render_tensorf(const sf_model *model, const float *origin, const fl
                    alpha ? alpha + i : NULL, samples ? samples + i : NULL);
       flush(w);
     }
+#pragma omp critical
+    if (w) sf_events_add(events, &w->events);
     worker_free(w);
   }
   free(decoder);

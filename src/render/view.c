@@ -13,7 +13,8 @@ sf_net_view sf_net_view_of(const sf_model *m)
                    .hidden = m->config.hidden,
                    .features = 2 * m->config.levels,
                    .mode = m->config.mode,
-                   .relu = m->config.net == SF_NET_ANN};
+                   .relu = m->config.net == SF_NET_ANN,
+                   .along = m->config.along};
   for (int i = 0; i < SF_LAYERS; i++) v.k[i] = sf_sigmoid(sf_model_param(m, SF_P_LEAK)[i]);
   memcpy(v.theta, m->config.theta, sizeof v.theta);
   return v;
@@ -26,7 +27,8 @@ sf_decoder_view sf_decoder_view_of(const sf_model *m)
                                .w5 = sf_model_param(m, SF_P_C3),
                                .hidden = m->config.hidden,
                                .mode = m->config.mode,
-                               .relu = m->config.net == SF_NET_ANN},
+                               .relu = m->config.net == SF_NET_ANN,
+                               .along = m->config.along},
                        .w1 = sf_model_param(m, SF_P_C1),
                        .b1 = sf_model_param(m, SF_P_C1_BIAS),
                        .b2 = sf_model_param(m, SF_P_C2_BIAS),

@@ -44,7 +44,7 @@ void sf_report_add_pairs(sf_grids *tables, const sf_reproduction *r);
 void sf_report_add_balance(sf_grids *tables, const sf_reproduction *r); /* worth and price of a step */
 void sf_report_add_models(sf_grids *tables, const sf_reproduction *r);  /* spiking and ordinary models */
 
-void sf_report_add_converted(sf_grids *tables, const sf_reproduction *r); /* the twin, converted */
+void sf_report_add_comparators(sf_grids *tables, const sf_reproduction *r); /* what PATA is held against, measured */
 
 /* The name of the i-th plot of chosen scenes; empty: there is none of them. False: there are no more. */
 bool sf_report_plot(const sf_reproduction *r, int scenes, int i, char name[300]);

@@ -48,45 +48,6 @@ void sf_report_add_balance(sf_grids *t, const sf_reproduction *r)
                  "both are equal.");
 }
 
-/* ---- the twin converted ---- */
-
-enum { CONVERTED = 64 }; /* numbers of steps that are shown */
-
-static void converted_rows(sf_grids *t, const sf_reproduction *r, int s)
-{
-  const cJSON *json = r->scene[s].run[SF_RUN_ANN].converted, *point;
-  const double twin = sf_json_number(sf_json_get(json, "twin"), "psnr");
-  int rows = 0;
-  cJSON_ArrayForEach(point, sf_json_get(json, "converted"))
-  {
-    const double db = sf_json_number(point, "psnr");
-    if (rows++ == CONVERTED) break;
-    sf_grid_row(t);
-    sf_grid_cell(t, "%s", r->scene[s].name), sf_grid_number(t, 0, sf_json_number(point, "steps"));
-    sf_grid_number(t, 2, db), sf_grid_number(t, 2, twin), sf_grid_number(t, 2, db - twin);
-    sf_grid_number(t, 1, sf_json_number(point, "of_twin_percent"));
-    sf_grid_cell(t, "seed %.0f; %.0f random rays of held-out views",
-                 sf_report_number(r->scene[s].run[SF_RUN_ANN].summary, "seed"), sf_report_number(json, "rays"));
-  }
-}
-
-void sf_report_add_converted(sf_grids *t, const sf_reproduction *r)
-{
-  static const char *const head[] = {"scene",      "steps", "PSNR dB", "twin dB", "difference", "energy, % of twin",
-                                     "measured on"};
-  bool any = false;
-  for (int s = 0; s < r->count; s++) any |= r->scene[s].run[SF_RUN_ANN].converted != NULL;
-  if (!any) return;
-  sf_grid_begin(t, 1, "converted", "The ReLU twin as integrate-and-fire neurons, without training");
-  if (t->count) t->grid[t->count - 1].text_last = true;
-  for (size_t i = 0; i < sizeof head / sizeof *head; i++) sf_grid_cell(t, "%s", head[i]);
-  for (int s = 0; s < r->count; s++) converted_rows(t, r, s);
-  sf_grid_note(
-      t,
-      "Thresholds balanced on the training views, as Spiking-NeRF has them. Energy: paper ledger, on the samples of\n"
-      "its own rays; the products of h(t) are MACs at every step, as in the trained nets.");
-}
-
 /* ---- other models ---- */
 
 typedef struct model {

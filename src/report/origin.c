@@ -38,7 +38,7 @@ bool sf_report_expected(const sf_reproduction *r, int s, int run)
   if (scene->run[run].status || scene->run[run].summary) return true;
   if (sf_report_is_pairs(r)) return false;
   for (int i = 0; i < SF_BETAS; i++) ours |= g->beta[i] == run;
-  return ours || (scene->group == 0 && run >= SF_RUN_HYBRID);
+  return ours || (scene->group == 0 && run >= SF_RUN_HYBRID && run <= SF_RUN_T_PLUS_1);
 }
 
 void sf_report_scene_name(const sf_report_scene *scene, char name[256])

@@ -20,6 +20,15 @@ const sf_run_kind sf_run_kinds[SF_RUNS] = {
     [SF_RUN_T_MINUS_1] = {"fixed-t-minus-1", "fixed t_r - 1"},
     [SF_RUN_T] = {"fixed-t", "fixed t_r"},
     [SF_RUN_T_PLUS_1] = {"fixed-t-plus-1", "fixed t_r + 1"},
+    [SF_RUN_ALONG] = {"along-ray", "samples of a ray as steps"},
+    [SF_RUN_SWEEP] = {"sweep-1", "fixed T = 1"},
+    [SF_RUN_SWEEP + 1] = {"sweep-2", "fixed T = 2"},
+    [SF_RUN_SWEEP + 2] = {"sweep-3", "fixed T = 3"},
+    [SF_RUN_SWEEP + 3] = {"sweep-4", "fixed T = 4"},
+    [SF_RUN_SWEEP + 4] = {"sweep-5", "fixed T = 5"},
+    [SF_RUN_SWEEP + 5] = {"sweep-6", "fixed T = 6"},
+    [SF_RUN_SWEEP + 6] = {"sweep-7", "fixed T = 7"},
+    [SF_RUN_SWEEP + 7] = {"sweep-8", "fixed T = 8"},
 };
 
 #define SYNTHETIC "chair drums ficus hotdog lego materials mic ship"

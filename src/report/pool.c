@@ -6,9 +6,24 @@
 
 /* ---- beside the twin ---- */
 
+/* Of a held-out view, as the trainer counted it; NaN: it did not. */
+static double counted(const sf_run *run, const char *key)
+{
+  return sf_json_number(sf_json_get(run->summary, "frame"), key);
+}
+
+/* No audit counts it: what it costs beside the twin on the held-out views. */
+static void price_along(const sf_run *twin, sf_run *along)
+{
+  const double mj = twin->value[SF_METRIC_ENERGY];
+  along->value[SF_METRIC_ENERGY] = mj * counted(along, "energy_mj") / counted(twin, "energy_mj");
+  along->value[SF_METRIC_TWIN] = mj * counted(along, "samples") / counted(twin, "samples");
+}
+
 static void beside_twin(sf_run run[SF_RUNS])
 {
   const double *twin = run[SF_RUN_ANN].value;
+  price_along(&run[SF_RUN_ANN], &run[SF_RUN_ALONG]);
   for (int i = SF_RUN_ANN + 1; i < SF_RUNS; i++) {
     double *v = run[i].value;
     v[SF_METRIC_SAVING] = 100 * (1 - v[SF_METRIC_ENERGY] / twin[SF_METRIC_ENERGY]);

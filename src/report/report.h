@@ -25,8 +25,10 @@ typedef enum {
   SF_RUN_NO_BUDGET,
   SF_RUN_T_MINUS_1,
   SF_RUN_T,
-  SF_RUN_T_PLUS_1,
-  SF_RUNS
+  SF_RUN_T_PLUS_1, /* the last of the paper's */
+  SF_RUN_ALONG,    /* membranes along the ray, a step a sample */
+  SF_RUN_SWEEP,    /* one step, trained alone; then 2, 3, ... SF_T_MAX */
+  SF_RUNS = SF_RUN_SWEEP + SF_T_MAX
 } sf_run_id;
 
 /* One number per run. Energies: paper ledger, mJ per frame, mean over the audited views. */
@@ -34,7 +36,8 @@ typedef enum {
   SF_METRIC_PSNR, /* float, held-out views, at t_r */
   SF_METRIC_SSIM,
   SF_METRIC_STEPS,   /* t_r; none for the ANN */
-  SF_METRIC_ENERGY,  /* ANN: its synapses on the samples of its own rendering */
+  SF_METRIC_ENERGY,  /* ANN: its synapses on the samples of its own rendering; along the ray: the ANN's, times what the
+                        trainer counted on the held-out views beside the ANN's there */
   SF_METRIC_TWIN,    /* ReLU twin on the samples of the spiking frame */
   SF_METRIC_FIXED,   /* PSNR of the audited views, fixed point */
   SF_METRIC_FLOAT,   /* PSNR of the same views, float */

@@ -145,7 +145,7 @@ static void add_ablations(sf_grids *t, const sf_reproduction *r)
   begin_methods(t, "ablations", "Ablations", 0);
   for (int i = SF_RUN_HYBRID; i <= SF_RUN_NO_BUDGET; i++) method_row(t, r, scenes, i, 0);
   method_row(t, r, scenes, SF_RUN_BETA_5E7, 0);
-  for (int i = SF_RUN_T_MINUS_1; i < SF_RUNS; i++) method_row(t, r, scenes, i, 0);
+  for (int i = SF_RUN_T_MINUS_1; i <= SF_RUN_T_PLUS_1; i++) method_row(t, r, scenes, i, 0);
   sf_grid_note(t, "Ablations at beta = 5e-7. fixed t_r: the steps that `full` learned for that scene, frozen; steps "
                   "outside 1..T are skipped.");
 }
@@ -304,7 +304,7 @@ sf_status sf_report_tables(const sf_reproduction *r, sf_grids *t)
   }
   sf_report_add_balance(t, r);
   sf_report_add_models(t, r);
-  sf_report_add_converted(t, r);
+  sf_report_add_comparators(t, r);
   for (int s = 0; s < r->count; s++) add_scene(t, r, s);
   return t->status;
 }

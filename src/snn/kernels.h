@@ -19,6 +19,7 @@ typedef struct sf_net_view {
   float charge[3]; /* of backward: what a sample costs more for each neuron of D1, C1, C2 that fires at any step; all 0:
                       nothing */
   int hidden, features, mode, relu;
+  int along; /* the samples of a ray are its steps */
 } sf_net_view;
 
 /* The nets as one instruction set's kernels read them: weights in operand words (gemm_isa.h), each matrix also
@@ -30,7 +31,10 @@ typedef struct sf_net_words {
       w5t[SF_LANES * 4];
   float w4_slice[SF_LANES / 64][(SF_LANES + 1) * 64]; /* w4t as the operands' values, for events: 64 outputs a slice, a
                                                          row of zeros after the last */
-  sf_net_view view;                                   /* last: it would push the arrays off their alignment */
+  /* Of a net along rays: what one input adds, a row each; h's is transposed, too: [hidden][16]. */
+  float w2_rows[SF_LANES * SF_DENSITY_OUT], w3h_rows[16 * SF_LANES], h_rows[SF_LANES * 16],
+      w4_rows[SF_LANES * SF_LANES], w5_rows[SF_LANES * 16];
+  sf_net_view view; /* last: it would push the arrays off their alignment */
 } sf_net_words;
 
 /* Gradients, laid out like the parameters but padded: w1 has rows of features rounded up to 16; w3 has rows of 32, the
@@ -41,6 +45,11 @@ typedef struct sf_net_grad {
   float leak[SF_LAYERS];
 } sf_net_grad;
 
+/* Of one ray of a net along rays: membranes of D1, C1, C2 after the reset, on their way to the next sample. */
+typedef struct sf_ray_state {
+  float v[3][SF_LANES];
+} sf_ray_state;
+
 /* What the forward pass of one block leaves: prefix outputs, and the membranes before fire for backward. */
 typedef struct sf_block {
   int lanes; /* that hold samples: the others are not charged */
@@ -49,6 +58,10 @@ typedef struct sf_block {
   float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */
   float m1[SF_T_MAX][SF_LANES * SF_BLOCK], m3[SF_T_MAX][SF_LANES * SF_BLOCK], m4[SF_T_MAX][SF_LANES * SF_BLOCK];
   uint64_t s3[SF_T_MAX][SF_LANES]; /* spikes of C1, a bit per lane */
+  /* Of a net along rays, filled by the caller: which lanes begin a ray, and each lane's ray. Its samples are
+   * neighbours, in order, and may go on in the next block. i, m1, m3 and m4 are [lane][row] there. */
+  uint64_t first;
+  sf_ray_state *state[SF_BLOCK];
 } sf_block;
 
 /* TensoRF's appearance and decoder. basis [features][columns]; products: columns rounded up to 16. Of `net`, w4 and w5,
@@ -101,6 +114,8 @@ typedef struct sf_net_scratch {
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
   float fired[3][SF_LANES * SF_BLOCK]; /* steps at which neurons of D1, C1, C2 fire, where they are charged */
+  sf_ray_state carry; /* backward along rays: gradient of the membranes, on their way to the sample before; zeros
+                         between two rays */
 } sf_net_scratch;
 
 typedef struct sf_adam {
@@ -138,6 +153,15 @@ typedef struct sf_kernels {
   /* Adds to grad; dproduct[SF_BLOCK][products]. dcolour[T][3*SF_BLOCK]. */
   void (*decoder_backward)(const sf_decoder_words *decoder, sf_decoder_block *block, int steps, const float *dcolour,
                            float *dproduct, sf_decoder_grad *grad, sf_net_scratch *scratch);
+  /* Nets along rays: one step per sample. Blocks of a ray in order; backward from the last to the first. Outputs and
+   * their gradients are those of prefix 1; density: block->sigma[0] alone. */
+  void (*along_density)(const sf_net_words *net, sf_block *block, sf_net_scratch *scratch);
+  void (*along_forward)(const sf_net_words *net, sf_block *block, sf_net_scratch *scratch);
+  void (*along_backward)(const sf_net_words *net, const sf_block *block, const float *dsigma, const float *dcolour,
+                         float *df, sf_net_grad *grad, sf_net_scratch *scratch);
+  void (*decoder_along_forward)(const sf_decoder_words *decoder, sf_decoder_block *block, sf_net_scratch *scratch);
+  void (*decoder_along_backward)(const sf_decoder_words *decoder, sf_decoder_block *block, const float *dcolour,
+                                 float *dproduct, sf_decoder_grad *grad, sf_net_scratch *scratch);
   /* value[n] -= ...; clears grad. m, v: moments. */
   void (*adam)(const sf_adam *adam, size_t n, float *value, float *grad, float *m, float *v);
 } sf_kernels;

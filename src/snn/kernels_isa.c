@@ -1,6 +1,6 @@
 /* The kernels of kernels.h for one instruction set: the build defines SF_ISA. */
 #include "snn/adam_isa.h"
-#include "snn/decoder_isa.h"
+#include "snn/along_isa.h"
 #include "snn/grid_isa.h"
 #include "snn/vm_isa.h"
 
@@ -22,4 +22,9 @@ const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .decoder_prepare = decoder_prepare,
                                                  .decoder_forward = decoder_forward,
                                                  .decoder_backward = decoder_backward,
+                                                 .along_density = along_density,
+                                                 .along_forward = along_forward,
+                                                 .along_backward = along_backward,
+                                                 .decoder_along_forward = decoder_along_forward,
+                                                 .decoder_along_backward = decoder_along_backward,
                                                  .adam = adam_update};

@@ -47,4 +47,16 @@ void sf_net_sample(const sf_model *model, const float *in, const float *sh, int 
  * background: 3 floats. Empty space is skipped; rays stop where the light is gone (sf_opaque). */
 sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
                          const float background[3], float *rgb, float *depth, float *alpha, float *samples);
+
+/* What the rays of a model along rays cost: those that meet a sample, their samples, and the spikes of D1, C1, C2
+ * there.
+ */
+typedef struct sf_ray_events {
+  uint64_t rays, samples, spikes[3];
+} sf_ray_events;
+void sf_events_add(sf_ray_events *to, const sf_ray_events *events);
+/* The same, which counts. events: added to; other models: without spikes. */
+sf_status sf_render_counted(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
+                            sf_ray_events *events);
 #endif

@@ -109,6 +109,7 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   if (c->backbone < 0 || c->backbone >= SF_FIELDS)
     return sf_fail(SF_E_RANGE, "%s: model config: backbone = %d is outside 0..%d", set->path, c->backbone,
                    SF_FIELDS - 1);
+  if (sf_tensors_meta(set, "along_ray")) SF_TRY(meta_int(set, "along_ray", &c->along));
   SF_TRY(load_numbers(set, more, sf_field_of(c)->numbers(c, more)));
   c->bound = 1;
   double number;
@@ -147,6 +148,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
     sf_tensors_put_number(meta, "leak_bits", m->scales.leak_bits);
   }
   if (c.backbone) sf_tensors_put_number(meta, "backbone", c.backbone);
+  if (c.along) sf_tensors_put_number(meta, "along_ray", c.along);
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
   sf_number space[SPACE_NUMBERS];
   space_numbers(&c, space);

@@ -28,6 +28,10 @@ static void prepare_hidden(const sf_net_view *v, sf_net_words *n)
   pack_matrix(v->w5, 1, hidden, hidden, 3, 4, n->w5t);
   for (int r = 0; r < hidden; r++)
     for (int c = 0; c < hidden; c++) n->w4_slice[c / 64][r * 64 + c % 64] = operand(v->w4[c * hidden + r]);
+  for (int r = 0; r < hidden && v->along; r++) {
+    for (int c = 0; c < hidden; c++) n->w4_rows[r * hidden + c] = v->w4[c * hidden + r];
+    for (int c = 0; c < 16; c++) n->w5_rows[16 * r + c] = c < 3 ? v->w5[c * hidden + r] : 0;
+  }
 }
 
 static void prepare(const sf_net_view *v, sf_net_words *n)
@@ -46,6 +50,11 @@ static void prepare(const sf_net_view *v, sf_net_words *n)
   pack_matrix(v->w2, 1, hidden, hidden, SF_DENSITY_OUT, SF_DENSITY_OUT, n->w2t);
   pack_matrix(h, 1, 16, 16, hidden, hidden, n->w3ht);
   prepare_hidden(v, n);
+  for (int r = 0; r < hidden && v->along; r++)
+    for (int c = 0; c < 16; c++) {
+      n->w2_rows[16 * r + c] = v->w2[c * hidden + r];
+      n->h_rows[16 * r + c] = n->w3h_rows[c * hidden + r] = h[16 * r + c];
+    }
 }
 
 /* Words of neighbouring rows: x[rows][B] -> out[rows / PAIR][B]. */

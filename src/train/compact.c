@@ -24,9 +24,13 @@ static void look(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, 
   sf_batch *batch = &t->batch;
   sf_block *block = w->block;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  sf_mark_lanes(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     memcpy(block[b].f, batch->f + (size_t)(bundle->block + b) * plane, plane * sizeof(float));
-    t->kernels->density(t->net, &block[b], p->steps, w->scratch);
+    if (t->model.config.along)
+      t->kernels->along_density(t->net, &block[b], w->scratch);
+    else
+      t->kernels->density(t->net, &block[b], p->steps, w->scratch);
   }
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++)
     batch->ray[r].count = visible(p, &batch->ray[r], batch->delta + batch->ray[r].lane, block);

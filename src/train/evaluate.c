@@ -6,7 +6,7 @@
 static const double PSNR_MOST = 99;
 
 static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, const sf_view *view, int steps,
-                               double *psnr, double *ssim)
+                               double *psnr, double *ssim, sf_ray_events *events)
 {
   const sf_image *im = &view->image;
   const size_t n = (size_t)im->width * im->height;
@@ -20,7 +20,7 @@ static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, co
     const float alpha = im->rgba[4 * i + 3] / 65535.0f;
     for (int c = 0; c < 3; c++) truth[3 * i + c] = im->rgba[4 * i + c] / 65535.0f * alpha + 1 - alpha;
   }
-  sf_status status = sf_render_rays(model, origin, direction, n, steps, white, rgb, NULL, NULL, NULL);
+  sf_status status = sf_render_counted(model, origin, direction, n, steps, white, rgb, NULL, NULL, NULL, events);
   if (!status.code) {
     for (size_t i = 0; i < 3 * n; i++) rgb[i] = rgb[i] < 0 ? 0 : rgb[i] > 1 ? 1 : rgb[i];
     *psnr = fmin(sf_psnr(rgb, truth, 3 * n), PSNR_MOST);
@@ -32,12 +32,19 @@ static sf_status evaluate_view(const sf_model *model, const sf_dataset *data, co
 
 sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr, double *ssim)
 {
+  sf_ray_events events = {0};
+  return sf_evaluate_counted(model, data, views, steps, psnr, ssim, &events);
+}
+
+sf_status sf_evaluate_counted(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr,
+                              double *ssim, sf_ray_events *events)
+{
   int used = 0, compared = 0;
   *psnr = *ssim = 0;
   for (int v = 0; v < data->count && (views == 0 || used < views); v++) {
     if (!data->view[v].image.rgba) continue;
     double p = 0, s = 0;
-    SF_TRY(evaluate_view(model, data, &data->view[v], steps, &p, &s));
+    SF_TRY(evaluate_view(model, data, &data->view[v], steps, &p, &s, events));
     *psnr += p;
     if (!isnan(s)) *ssim += s, compared++;
     used++;

@@ -70,14 +70,48 @@ static int at_any_step(const sf_block *b, int layer, int steps, int rows, int la
   return count;
 }
 
+/* Membranes of one step along rays, [lanes][hidden]. */
+static int at_threshold_along(const float *membrane, int count, float theta)
+{
+  int spikes = 0;
+  for (int i = 0; i < count; i++) spikes += membrane[i] >= theta;
+  return spikes;
+}
+
+static void count_along(const sf_config *c, int first, const sf_block *b, int lanes, sf_group *g)
+{
+  const float *const membrane[3] = {b->m1[0], b->m3[0], b->m4[0]};
+  for (int l = first; l < 3; l++) {
+    const int spikes = at_threshold_along(membrane[l], lanes * c->hidden, c->theta[l]);
+    g->spikes[l] += spikes, g->fired[l] += spikes;
+  }
+}
+
+void sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+{
+  const int lanes = sf_bundle_lanes(&t->batch, bundle);
+  for (int b = 0; b < bundle->blocks; b++) {
+    sf_block *block = (sf_block *)((char *)w->block + (size_t)b * t->backbone->block_bytes); /* of a decoder's: first */
+    block->lanes = sf_block_lanes(lanes, b);
+    block->first = 0;
+    if (!t->model.config.along) continue;
+    for (int l = 0; l < SF_BLOCK; l++) block->state[l] = &w->state;
+    for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
+      const sf_ray *ray = &t->batch.ray[r];
+      if (ray->count && ray->first / SF_BLOCK == b) block->first |= (uint64_t)1 << ray->first % SF_BLOCK;
+    }
+  }
+}
+
 void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *b, int lanes, sf_group *g)
 {
   const sf_config *c = &t->model.config;
-  for (int s = 0; s < steps; s++) {
+  if (c->along) count_along(c, first, b, lanes, g);
+  for (int s = 0; s < steps && !c->along; s++) {
     const float *const membrane[3] = {b->m1[s], b->m3[s], b->m4[s]};
     for (int l = first; l < 3; l++) g->spikes[l] += at_threshold(membrane[l], c->hidden, lanes, c->theta[l]);
   }
-  for (int l = first; l < 3; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
+  for (int l = first; l < 3 && !c->along; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
   g->neurons += (double)steps * c->hidden * lanes;
   g->lanes += lanes;
 }

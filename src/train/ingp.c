@@ -92,11 +92,15 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   const sf_net_words *net = t->net;
   const sf_batch *batch = &t->batch;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  const bool along = t->model.config.along;
   const int lanes = load_directions(t, bundle, w);
+  sf_mark_lanes(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &block[b]);
-    block[b].lanes = sf_block_lanes(lanes, b);
-    t->kernels->forward(net, &block[b], p->steps, p->steps, w->scratch);
+    if (along)
+      t->kernels->along_forward(net, &block[b], w->scratch);
+    else
+      t->kernels->forward(net, &block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dsigma, 0, (size_t)bundle->blocks * SF_T_MAX * SF_BLOCK * sizeof(float));
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
@@ -106,10 +110,16 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
     ray_out(p, &batch->ray[r], w);
   }
   sf_count_spikes(t, 0, p->steps, block, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
-  for (int b = 0; b < bundle->blocks; b++)
-    t->kernels->backward(net, &block[b], p->steps, w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK,
-                         w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
-                         batch->df + (size_t)(bundle->block + b) * plane, g->grad, w->scratch);
+  for (int i = 0; i < bundle->blocks; i++) {
+    const int b = along ? bundle->blocks - 1 - i : i;
+    const float *dsigma = w->dsigma + (size_t)b * SF_T_MAX * SF_BLOCK;
+    const float *dcolour = w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK;
+    float *df = batch->df + (size_t)(bundle->block + b) * plane;
+    if (along)
+      t->kernels->along_backward(net, &block[b], dsigma, dcolour, df, g->grad, w->scratch);
+    else
+      t->kernels->backward(net, &block[b], p->steps, dsigma, dcolour, df, g->grad, w->scratch);
+  }
 }
 
 static void encode(sf_trainer *t)

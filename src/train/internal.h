@@ -104,6 +104,7 @@ typedef struct sf_group {
 typedef struct sf_worker {
   void *block; /* [BUNDLE_BLOCKS] of sf_backbone.block_bytes */
   sf_net_scratch *scratch;
+  sf_ray_state state; /* of a net along rays: the ray at hand */
   sf_ray_work ray;
   float *dsigma, *dcolour; /* [BUNDLE_BLOCKS][T][SF_BLOCK], [..][3*SF_BLOCK] */
 } sf_worker;
@@ -328,6 +329,14 @@ static inline int sf_block_lanes(int lanes, int index)
   const int left = lanes - index * SF_BLOCK;
   return left < 0 ? 0 : left < SF_BLOCK ? left : SF_BLOCK;
 }
+/* Lanes of a bundle that hold samples. */
+static inline int sf_bundle_lanes(const sf_batch *b, const sf_bundle *bundle)
+{
+  const sf_ray *last = &b->ray[bundle->ray + bundle->rays - 1];
+  return bundle->rays ? last->first + last->count : 0;
+}
+/* Of a net along rays: what its kernels are told of the bundle's lanes and rays; lanes of any net. */
+void sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *worker);
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
 /* Adds the spikes of spiking layers `first`..2 in the first `lanes` lanes of a block. */

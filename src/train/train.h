@@ -119,6 +119,9 @@ void sf_trainer_free(sf_trainer *trainer);
 /* Means of PSNR (a view's at most 99 dB) and SSIM (of the views of 11 x 11 pixels and more, else NaN) of the first
  * `views` views (0 = all) at `steps` steps (0 = t_r), composited on white. */
 sf_status sf_evaluate(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr, double *ssim);
+/* The same, which counts; see sf_render_counted. */
+sf_status sf_evaluate_counted(const sf_model *model, const sf_dataset *data, int views, int steps, double *psnr,
+                              double *ssim, sf_ray_events *events);
 /* PSNR of the same at every prefix: psnr[0 .. T-1] for 1 .. T steps. */
 sf_status sf_evaluate_prefixes(const sf_model *model, const sf_dataset *data, int views, double *psnr);
 #endif

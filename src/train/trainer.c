@@ -320,9 +320,11 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
   return s;
 }
 
-/* The prefix whose density decides what is empty: the one that is trained, which inference will use. */
+/* The prefix whose density decides what is empty: the one that is trained, which inference will use. Along rays a point
+ * has no density of its own; there it is what a ray finds that stays in the point for so many samples. */
 static int occupancy_steps(const sf_trainer *t)
 {
+  if (t->model.config.along) return SF_T_MAX;
   const int trained = t->stage == 1 ? t->model.config.steps : t->model.t_r;
   return scaled(t) && trained > 2 ? 2 : trained;
 }

@@ -66,12 +66,16 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   sf_decoder_block *block = w->block;
   sf_vm *vm = t->vm;
   const int products = vm->decoder->view.products;
+  const bool along = t->model.config.along;
   const int lanes = load_directions(t, bundle, w);
+  sf_mark_lanes(t, bundle, w);
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,
                             block[b].product, products);
-    block[b].net.lanes = sf_block_lanes(lanes, b);
-    t->kernels->decoder_forward(vm->decoder, &block[b], p->steps, p->steps, w->scratch);
+    if (along)
+      t->kernels->decoder_along_forward(vm->decoder, &block[b], w->scratch);
+    else
+      t->kernels->decoder_forward(vm->decoder, &block[b], p->steps, p->steps, w->scratch);
   }
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
@@ -83,10 +87,14 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
     g->wild |= wild(vm->part[vm->ray[r].part].slope + vm->ray[r].first, whole.count);
   }
   if (bundle->blocks) sf_count_spikes(t, 1, p->steps, &block->net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
-  for (int b = 0; b < bundle->blocks; b++) {
+  for (int i = 0; i < bundle->blocks; i++) {
+    const int b = along ? bundle->blocks - 1 - i : i;
+    const float *dcolour = w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK;
     float *dproduct = vm->dproduct + (size_t)(bundle->block + b) * SF_BLOCK * products;
-    t->kernels->decoder_backward(vm->decoder, &block[b], p->steps, w->dcolour + (size_t)b * SF_T_MAX * 3 * SF_BLOCK,
-                                 dproduct, g->grad, w->scratch);
+    if (along)
+      t->kernels->decoder_along_backward(vm->decoder, &block[b], dcolour, dproduct, g->grad, w->scratch);
+    else
+      t->kernels->decoder_backward(vm->decoder, &block[b], p->steps, dcolour, dproduct, g->grad, w->scratch);
     g->wild |= wild(dproduct, SF_BLOCK * products);
   }
 }

@@ -45,6 +45,10 @@ good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_convert twin.safetensors d --rays 5 --json
+good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+check "along.safetensors" "its cost" grep -q "mJ a view: [0-9]* samples, each with [0-9]* products and [0-9]* additions that spikes cause" stdout.txt
+data "along_ray" sf_export along.safetensors -o along.snn
+data "along_ray" sf_train d -o out --fine-tune along.safetensors --stage2 2
 good sf_train d -o vm.safetensors --backbone tensorf --stage1 2 --stage2 2 --voxels 16 --rays 64 --samples 256 --threads 1
 good sf_train d -o vm-tuned.safetensors --fine-tune vm.safetensors --weight-bits 4 --grid-bits 5 --leak-bits 6 --stage2 2 --samples 256 --threads 1
 good sf_export vm-tuned.safetensors -o vm-tuned.snn

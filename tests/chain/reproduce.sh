@@ -16,14 +16,22 @@ facts() { grep -v '"seconds"\|"samples_per_second"' "$work/$1/reproduce/smoke/re
 
 build whole
 reproduce whole 0
-[ "$(count '^\[.* dB, ')" -eq 14 ] || fail "not 14 runs"
+# 14 of the paper's, one along rays, and every number of steps that the ablations do not train alone.
+same=$(count '^\[.* sweep-[1-8] *is \(mode-hybrid\|fixed-t\)')
+all=$((14 + 1 + 8 - same))
+[ "$same" -ge 3 ] && [ "$(count '^\[.* dB, ')" -eq $all ] || fail "not $all runs"
 [ -s "$work/whole/reproduce/smoke/table.md" ] || fail "no table.md"
 grep -q 'Problems\|without a result' "$work/whole/reproduce/smoke/table.md" && fail "a run is missing or broken"
 page=$work/whole/reproduce/smoke/report.html
 python3 -c 'import sys, xml.etree.ElementTree as xml; xml.parse(sys.argv[1])' "$page" || fail "the page is no XML"
 [ "$(grep -c '<div class="plate"><img ' "$page")" -eq 14 ] || fail "not truth, twin and three budgets, each with a part, four with errors"
-grep -Eq '^textured,256,[0-9.]+,[0-9.]+,-?[0-9.]+,[0-9.]+,seed 1; 20 random rays' "$work/whole/reproduce/smoke/tables/converted.csv" ||
-  fail "the twin was not converted"
+compared=$work/whole/reproduce/smoke/tables/comparators.csv
+row() { grep -Eq "^textured,$1,[0-9.]+,[0-9.]+,-?[0-9.]+,[0-9.e-]+,-?[0-9.]+,-?[0-9.]+,$2" "$compared" || { cat "$compared"; fail "comparators: no row $1"; }; }
+row '"?PATA, beta = 5e-7 \(full\)"?,[1-8]' 'textured; seed 1'
+for t in 4 16 256; do row "\"?twin converted, no training\"?,$t" 'seed 1; 20 random rays'; done
+row 'samples of a ray as steps,1 a sample' 'textured; seed 1; 1 view'
+for t in 1 2 3 4 5 6 7 8; do row "\"?fixed T, trained alone[^\"]*\"?,$t" 'textured; seed 1'; done
+[ "$(grep -c 'best PSNR' "$compared")" -eq 1 ] || fail "comparators: not one best number of steps"
 if command -v gnuplot >/dev/null; then
   [ "$(grep -c 'data:image/svg+xml;base64,' "$page")" -eq 8 ] || fail "the page has not 8 plots"
   for plot in psnr-t_r psnr-steps psnr-energy psnr-steps-textured psnr-energy-textured t-star-textured firing-textured; do
@@ -32,7 +40,7 @@ if command -v gnuplot >/dev/null; then
 else
   [ "$(count 'gnuplot-nox')" -eq 1 ] || fail "the missing gnuplot is not named"
 fi
-echo "whole: 14 runs"
+echo "whole: $all runs"
 
 # Stopped in the middle of a training; SIGTERM once, SIGKILL of script and trainer once.
 interrupt() { # SIGNAL RUN
@@ -79,21 +87,21 @@ for model in "$(runs whole)"/*/model.safetensors; do
   cmp "$model" "$(runs part)/${run##*/}/model.safetensors" || fail "${run##*/}: interrupted and continued differs"
 done
 diff <(facts whole) <(facts part) >"$work/difference" || { cat "$work/difference"; fail "results.json differs"; }
-echo "interrupted: the same 14 models and results"
+echo "interrupted: the same $all models and results"
 
 # A run that fails: the rest goes on, the report shows it, the next call repeats it alone. Its parameters were changed.
 echo "sf_train DATA --seed 2" >"$(runs part)/no-extra/train.cmd"
 # shellcheck disable=SC2016
 trainer 'case " $* " in *" --no-extra "*) echo "sf_train: planted failure" >&2; exit 1 ;; esac'
 reproduce part 1
-[ "$(count 'finished before')" -eq 13 ] || fail "changed parameters of one run: not 13 others kept"
+[ "$(count 'finished before')" -eq $((all - 1)) ] || fail "changed parameters of one run: not $((all - 1)) others kept"
 [ "$(count 'no-extra .*FAILED (1): sf_train: planted failure')" -eq 1 ] || fail "the failure is not reported"
 grep -q '^- textured, no-extra: failed: sf_train: planted failure$' "$work/part/reproduce/smoke/table.md" || fail "not in the table"
 grep -Eq '^\| without L_extra +\| +- ' "$work/part/reproduce/smoke/table.md" || fail "a failed run has figures"
 reproduce part 0 --report
 ln -sf "$programs/sf_train" "$work/part/bin/sf_train"
 reproduce part 0
-[ "$(count 'finished before')" -eq 13 ] || fail "the failed run was not repeated alone"
+[ "$(count 'finished before')" -eq $((all - 1)) ] || fail "the failed run was not repeated alone"
 diff <(facts whole) <(facts part) >/dev/null || fail "results.json differs after the failure"
 echo "failure: reported, repeated alone"
 
@@ -126,7 +134,7 @@ echo "scenes: two backbones"
 # Profile paper at a tiny length: the planes with two of their budgets, a second seed of the learned runs; a probe that is kept.
 paper() {
   "$script" "$work/part" --profile paper --scenes "$data" --backbones tensorf --betas '5e-7 5e-8' --seeds "$1" --stage1 4 --stage2 12 \
-    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --steps 2 --train '--hidden 32 --voxels 24' >"$work/out" 2>&1 ||
+    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --steps 2 --train '--hidden 32 --voxels 24' "${@:2}" >"$work/out" 2>&1 ||
     fail "profile paper: exit status $?"
 }
 out=$work/part/reproduce/paper
@@ -151,8 +159,14 @@ grep -Eq '^\| beta = 5e-8 +\| +[0-9.]+ \+- [0-9.]+ \| 33.04 \|.* seeds 1 2; 1 vi
 grep -q '^TensoRF,33.14,0.963,-,as printed' "$out/tables/models-ordinary-blender.csv" || fail "profile paper: no ordinary models"
 echo "paper: two seeds"
 
+# The twin, one budget and what they are held against, with the planes: nothing else.
+paper 1 --runs comparators
+[ "$(count '^\[.* dB, ')" -eq 3 ] && [ "$(count 'finished before')" -eq 2 ] || fail "comparators: not 3 runs more"
+grep -Eq '^textured-tensorf,samples of a ray as steps,1 a sample,' "$out/tables/comparators.csv" || fail "comparators: no planes along rays"
+echo "comparators: planes"
+
 for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some" "--minutes 3" \
-  "--profile scenes --betas 2" "--betas 5e-7" "--probe 3" "--seeds x" "--seeds 0" "--seed-runs some" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x"; do
+  "--profile scenes --betas 2" "--betas 5e-7" "--probe 3" "--seeds x" "--seeds 0" "--seed-runs some" "--runs some" "--profile scenes --runs paper" "--profile scenes --stage1 3" "--profile scenes --minutes 0" "--profile scenes --backbones x"; do
   # shellcheck disable=SC2086
   reproduce part 2 $bad
   [ "$(wc -l <"$work/out")" -eq 1 ] || fail "$bad: not one line"

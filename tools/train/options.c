@@ -65,15 +65,18 @@ static sf_status check_effect(train_arguments *a)
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const
-      settled[] = {"--backbone",    "--net",           "--steps",       "--input-mode",  "--hidden",    "--theta",
-                   "--occ-res",     "--voxels",        "--fixed-steps", "--stage1",      "--no-stage1", "--no-extra",
-                   "--no-penalty",  "--no-budget",     "--no-distill",  "--no-scaling",  "--beta",      "--price",
-                   "--target-loss", "--target-saving", "--objective",   "--search-rate", NULL},
-      *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
-      *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving", "--price",
-                                                             "--objective",   "--search-rate",   NULL};
-  static const char *const spiking[] = {"--charge", NULL};
+  static const char *const settled[] = {"--backbone",    "--net",         "--steps",           "--input-mode",
+                                        "--hidden",      "--theta",       "--occ-res",         "--voxels",
+                                        "--fixed-steps", "--stage1",      "--no-stage1",       "--no-extra",
+                                        "--no-penalty",  "--no-budget",   "--no-distill",      "--no-scaling",
+                                        "--beta",        "--price",       "--target-loss",     "--target-saving",
+                                        "--objective",   "--search-rate", "--steps-along-ray", NULL},
+                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+                           *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
+                                                                                  "--price",       "--objective",
+                                                                                  "--search-rate", NULL};
+  static const char *const spiking[] = {"--charge", "--steps-along-ray", NULL};
+  static const char *const steps[] = {"--fixed-steps", "--charge", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -85,7 +88,8 @@ static sf_status check_effect(train_arguments *a)
   if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
-  if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN)
+  if (a->along) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, steps, "has no effect beside --steps-along-ray"));
+  if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN || a->along)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, search, "has no effect where the number of steps is fixed"));
   if (a->train.config.net == SF_NET_ANN)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, spiking, "has no effect on --net ann"));
@@ -98,7 +102,8 @@ static sf_status check_effect(train_arguments *a)
 static sf_status finish_options(train_arguments *a)
 {
   sf_config *c = &a->train.config;
-  if (c->net == SF_NET_ANN) c->steps = 1;
+  c->along = a->along;
+  if (c->net == SF_NET_ANN || c->along) c->steps = 1;
   for (int i = 0; i < 3; i++) c->theta[i] = (float)a->theta;
   if (a->no_budget) a->train.no_extra = a->train.no_penalty = true;
   if (a->train.no_stage1) a->train.stage2 += a->train.stage1, a->train.stage1 = 0;

@@ -12,7 +12,7 @@ typedef struct train_arguments {
   double scale, theta, checkpoint_minutes, gamma;
   int bound, finest_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits, leak_bits,
       grid_bits, view; /* port of the page, -1: none */
-  bool resume, quiet, json, no_budget;
+  bool resume, quiet, json, no_budget, along;
   int argc;
   char **argv;
   char *before[TRAIN_OPTIONS_MAX]; /* the program's name and what the run to resume was started with */

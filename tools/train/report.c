@@ -1,6 +1,6 @@
 #include "tools/train/report.h"
 #include "field/field.h"
-#include "energy/energy.h"
+#include "energy/along.h"
 #include "base/json.h"
 #include <math.h>
 
@@ -88,9 +88,27 @@ static cJSON *search_json(const sf_config *c, const sf_search_report *r)
   return json;
 }
 
-static cJSON *make_summary(const train_arguments *a, const sf_config *c, const sf_train_stats *s,
-                           const train_quality *q)
+/* Nets that no audit counts: those along rays, and the twin. */
+static bool is_priced(const sf_config *c, const train_quality *q)
 {
+  return q->views > 0 && (c->along || c->net == SF_NET_ANN);
+}
+
+/* Means of a view. */
+static cJSON *cost_json(const sf_model *m, const train_quality *q)
+{
+  const fx_cost cost = sf_float_cost(m, &q->events);
+  cJSON *json = cJSON_CreateObject();
+  cJSON_AddNumberToObject(json, "samples", (double)q->events.samples / q->views);
+  cJSON_AddNumberToObject(json, "macs", (double)cost.macs / q->views);
+  cJSON_AddNumberToObject(json, "sops", (double)cost.sops / q->views);
+  cJSON_AddNumberToObject(json, "energy_mj", (double)sf_cost_fj(&cost) * 1e-12 / q->views);
+  return json;
+}
+
+static cJSON *make_summary(const train_arguments *a, const sf_model *m, const sf_train_stats *s, const train_quality *q)
+{
+  const sf_config *c = &m->config;
   static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay"};
   cJSON *json = cJSON_CreateObject();
   sf_json_add_text(json, "model", a->output);
@@ -123,6 +141,8 @@ static cJSON *make_summary(const train_arguments *a, const sf_config *c, const s
   cJSON_AddNumberToObject(json, "views", q->views);
   cJSON_AddNumberToObject(json, "width", q->width);
   cJSON_AddNumberToObject(json, "height", q->height);
+  if (c->along) cJSON_AddBoolToObject(json, "along_ray", true);
+  if (is_priced(c, q)) cJSON_AddItemToObject(json, "frame", cost_json(m, q));
   if (q->prefixes) cJSON_AddItemToObject(json, "prefix_psnr", cJSON_CreateDoubleArray(q->prefix, q->prefixes));
   return json;
 }
@@ -144,13 +164,25 @@ static void print_search(const train_arguments *a, const sf_train_stats *s)
            a->output, r->beta, 100 * r->saving, train_behind(r, s->t_r, a->train.config.steps));
 }
 
-static void print_text(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
+static void print_cost(const train_arguments *a, const sf_model *m, const train_quality *q)
 {
+  const fx_cost cost = sf_float_cost(m, &q->events);
+  const double samples = (double)q->events.samples;
+  if (!is_priced(&m->config, q) || !(samples > 0)) return;
+  printf("%s: %.4g mJ a view: %.0f samples, each with %.0f products and %.0f additions that spikes cause\n", a->output,
+         (double)sf_cost_fj(&cost) * 1e-12 / q->views, samples / q->views, (double)cost.macs / samples,
+         (double)cost.sops / samples);
+}
+
+static void print_text(const train_arguments *a, const sf_model *m, const sf_train_stats *s, const train_quality *q)
+{
+  const sf_config *c = &m->config;
   printf("%s: %lld iterations in %.0f s; t_r = %d of T = %d (t* = %.2f); held-out PSNR %.2f dB", a->output,
          (long long)s->iteration, s->seconds, s->t_r, c->steps, s->t_star, q->psnr);
   if (!isnan(q->ssim)) printf(", SSIM %.4f", q->ssim);
   printf(" over %d views\n", q->views);
   print_search(a, s);
+  print_cost(a, m, q);
   if (a->train.charge > 0) printf("%s: %.0f reads of weights per sample, 8 bytes each\n", a->output, s->row_reads);
   if (sf_field_of(c)->lattice)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
@@ -161,15 +193,15 @@ static void print_text(const train_arguments *a, const sf_config *c, const sf_tr
   printf(" dB\n");
 }
 
-sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q)
+sf_status train_report(const train_arguments *a, const sf_model *model, const sf_train_stats *s, const train_quality *q)
 {
-  cJSON *json = make_summary(a, c, s, q);
+  cJSON *json = make_summary(a, model, s, q);
   const sf_status saved = a->summary ? sf_json_save(json, a->summary) : sf_ok();
   if (a->json) {
     SF_TRY(sf_json_print(json, false));
   } else {
     cJSON_Delete(json);
-    print_text(a, c, s, q);
+    print_text(a, model, s, q);
   }
   return saved;
 }

@@ -12,6 +12,7 @@ typedef struct train_recent {
 /* Held-out quality at the end. */
 typedef struct train_quality {
   double psnr, ssim, prefix[SF_T_MAX];
+  sf_ray_events events; /* of all views */
   int views, prefixes;
   int width, height;  /* of the last view */
   const char *layout; /* of the data */
@@ -25,5 +26,6 @@ void train_show(sf_progress *p, const sf_train_stats *s, const train_recent *r);
 void train_show_evaluation(sf_progress *p, int done, int all, double seconds);
 void train_warn(sf_progress *progress, const sf_train_stats *s);
 /* To standard output as text or JSON, and to --summary. */
-sf_status train_report(const train_arguments *a, const sf_config *c, const sf_train_stats *s, const train_quality *q);
+sf_status train_report(const train_arguments *a, const sf_model *model, const sf_train_stats *s,
+                       const train_quality *q);
 #endif

@@ -143,6 +143,8 @@ static sf_option *ablations(train_arguments *a, sf_option *o)
        "T steps (default prefixes)"},
       {"--fixed-steps", 0, SF_ARG_INT, &t->fixed_steps, 0, SF_T_MAX, NULL, "N",
        "stage II trains the prefix of N steps alone, t* = N, without L_budg; 0 = t* is learned (default 0)"},
+      {"--steps-along-ray", 0, SF_ARG_FLAG, &a->along, 0, 0, NULL, NULL,
+       "the samples of a ray are the time steps, one each, and membranes pass from one to the next; float alone"},
       {"--no-stage1", 0, SF_ARG_FLAG, &t->no_stage1, 0, 0, NULL, NULL, "all iterations in stage II"},
       {"--no-extra", 0, SF_ARG_FLAG, &t->no_extra, 0, 0, NULL, NULL, "without L_extra"},
       {"--no-penalty", 0, SF_ARG_FLAG, &t->no_penalty, 0, 0, NULL, NULL, "without L_penalty"},
