@@ -247,8 +247,8 @@ SEEDS ?= 1 2 3
 cosim-campaign: $B/bin/sf_cosim ## co-simulate SAMPLES (1 M) samples over SEEDS ("1 2 3") after make demo, or SCENE= DATA=, on ranks with LAUNCH="mpirun -n 8": build/cosim
 	@tools/cosim_campaign.sh $B "$(SCENE)" "$(DATA)" $(if $(filter file,$(origin SAMPLES)),1000000,$(SAMPLES)) "$(SEEDS)"
 
-scale: $B/bin/sf_train $B/bin/sf_export $B/bin/sf_cosim ## what training and co-simulation cost on ranks, and a model of clusters: DATA=folder
-	@tools/scale.py $B "$(DATA)"
+scale: all ## what training and co-simulation cost on ranks, and a model of clusters: DATA=folder; speed on an idle machine: RANKS="1 2 4" MINUTES=4
+	@$(if $(RANKS),tools/scale_wall.py $B "$(DATA)" "$(RANKS)" $(if $(filter file,$(origin MINUTES)),4,$(MINUTES)),tools/scale.py $B "$(DATA)")
 
 lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes: build/lego
 	@STARTED=$(STARTED) tools/chain.sh $B "$(SCENES)/lego" $B/lego --minutes 15 --rays 400
@@ -267,14 +267,14 @@ REPORT ?= $B/demo/report.html
 
 PROFILE ?= quick
 reproduce: all ## the runs of the paper's tables on SCENES: build/reproduce/PROFILE (quick, smoke; paper: full length, any layout, SEEDS="1 2 3"; scenes: MINUTES=15)
-	@tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(if $(filter scenes,$(PROFILE)),--minutes $(MINUTES)) \
+	@$(LAUNCH) tools/reproduce.sh $B --profile $(PROFILE) --scenes "$(SCENES)" $(if $(filter scenes,$(PROFILE)),--minutes $(MINUTES)) \
 	  $(if $(filter-out file,$(origin SEEDS)),--seeds "$(SEEDS)") $(REPRODUCE)
 
 reproduce-report: all ## table and plots of the runs that are there
 	@tools/reproduce.sh $B --profile $(PROFILE) --report
 
 pareto: all ## what each bit of width costs (MODEL=, DATA=, PROFILE=): table, CSV, plots in build/pareto/PROFILE
-	@tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
+	@$(LAUNCH) tools/pareto.sh $B --profile $(PROFILE) $(if $(MODEL),--model "$(MODEL)") $(if $(filter-out file,$(origin DATA)),--data "$(DATA)") $(PARETO)
 
 outputs: all ## puts today's numbers into the outputs that docs/ shows, after make demo on an idle machine (OUTPUTS="docs/kit.md ...")
 	@tests/tutorials.py --print $B $(OUTPUTS)

@@ -1,6 +1,7 @@
 #!/bin/bash
 # make pareto: one model at many widths, each a point: quality, energy, bytes, speed. Table, CSV and plots name the points
-# that no other beats. Finished points are kept; other parameters start again.
+# that no other beats. Finished points are kept; other parameters start again. The same command may run any number of times at
+# once, on many machines (docs/scale.md): each point is taken by one of them.
 set -u
 export LC_ALL=C
 usage="usage: pareto.sh BUILD [options]
@@ -69,6 +70,8 @@ dir=$out child="" stop=""
 arch=$(cat "$build/arch" 2>/dev/null) # widths that the build has already
 # shellcheck source=tools/reproduce_runs.sh
 . "$tools/reproduce_runs.sh"
+# shellcheck source=tools/deal.sh
+. "$tools/deal.sh"
 
 report() {
   [ -e "$out/centre" ] || die "$out: no points yet (make pareto PROFILE=$profile)" 1
@@ -84,28 +87,28 @@ fi
 # ---- the model ----
 
 mkdir -p "$out/points" || exit 1
-exec 9>"$out/lock"
-flock -n 9 || die "another run of profile $profile is at work in $out" 1
 trap on_signal INT TERM HUP
 
 smoke_model() {
-  data=$build/pareto/smoke-data model=$build/pareto/smoke-data/tiny.safetensors
-  [ -e "$data/complete" ] && return
+  [ ! -e "$data/complete" ] || return 0
   rm -rf "$data"
   "$bin/sf_scene" textured -o "$data" --size 32 --train 10 --test 2 >/dev/null &&
     "$bin/sf_train" "$data" -o "$model" --stage1 30 --stage2 60 --samples 512 --levels 4 --log2-hash 10 \
       --finest-res 32 --lattice 64 --occ-res 16 --hidden 32 --steps 3 --quiet >/dev/null && touch "$data/complete"
 }
+demo_model() {
+  [ ! -s "$model" ] || return 0
+  echo "pareto: $model is missing; making it (make demo)"
+  run "$tools/demo.sh" "$build"
+}
 if [ -z "$model" ]; then
   if [ "$profile" = smoke ]; then
-    smoke_model || die "the tiny model could not be made" 1
+    data=$build/pareto/smoke-data model=$build/pareto/smoke-data/tiny.safetensors
+    alone "$build/pareto/smoke.lock" smoke_model || die "the tiny model could not be made" 1
   else
     model=$build/demo/model.safetensors
     [ -n "$data" ] || data=$build/demo/scene
-    if [ ! -s "$model" ]; then
-      echo "pareto: $model is missing; making it (make demo)"
-      run "$tools/demo.sh" "$build" || die "make demo failed" 1
-    fi
+    alone "$build/pareto/demo.lock" demo_model || die "make demo failed" 1
   fi
 fi
 [ -d "$data" ] || die "$data: no such folder" 1
@@ -129,7 +132,7 @@ variant_program() {
   folder=${widths//=/-}
   folder=$(cd "$build" && pwd)/pareto/variant/${folder// /-}
   program=$folder/bin/sf_point
-  mkdir -p "${folder%/*}" && run env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -C "$tools/.." B="$folder" ARCH="$widths" "$program" \
+  mkdir -p "${folder%/*}" && alone "$folder.lock" run env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -C "$tools/.." B="$folder" ARCH="$widths" "$program" \
     >"$folder.log" 2>&1 && return
   { grep -m 1 -i 'error:' "$folder.log" || last_line "$folder.log"; } >>"$out/log"
   return 1
@@ -148,9 +151,10 @@ point() { # FILE VARIANT OPTIONS...
   name=$(name_of "$@") index=$((index + 1))
   shift 2
   if [ -s "$out/points/$name.json" ]; then
-    line "finished before"
+    if since_we_began "$out/points/$name.json"; then line "finished elsewhere"; else line "finished before"; fi
     return
   fi
+  rm -f "$out/points/$name.failed"
   fresh=$((fresh + 1))
   if variant_program "$variant" &&
     output "$out/points/$name.json" "$program" "$file" "$data" --view "$view" --every "$every" --json "$@"; then
@@ -158,6 +162,7 @@ point() { # FILE VARIANT OPTIONS...
       "$(number "$out/points/$name.json" psnr_float_db)")"
   elif [ -z "$stop" ]; then
     failures=$((failures + 1))
+    touch "$out/points/$name.failed"
     line "FAILED: $(last_line "$out/log")"
   fi
 }
@@ -166,10 +171,11 @@ settings() (
   echo "models: $(cksum "${models[@]}"); data: $(cd "$data" && pwd -P) $(cat "$data"/transforms*.json | cksum)
 view $view, every $every, $("$bin/sf_point" --version) $(cksum <"$bin/sf_point")${arch:+, $arch}"
 )
-keep "$out/settings" "$(settings)" || rm -f "$out"/points/* "$out/log"
+drop_points() { rm -f "$out"/points/* "$out/log"; }
+join_others "$(settings)" drop_points || die "another run of profile $profile, with other parameters, is at work in $out" 1
 started=$SECONDS index=0 fresh=0 failures=0 total=1
 first=${models[0]}
-point "$first" ""
+alone "$out/centre.lock" point "$first" ""
 [ -z "$stop" ] || exit 130
 [ $failures -eq 0 ] || exit 1
 echo "$name" >"$out/centre"
@@ -224,14 +230,32 @@ twice=$(
 )
 [ -z "$twice" ] || die "--model: two points would be named $twice; give the models other file names" 1
 total=$((1 + ${#plan[@]}))
+declare -a plan_name=()
 for entry in "${plan[@]}"; do
   IFS='|' read -r file variant options <<<"$entry"
   # shellcheck disable=SC2086
-  point "$file" "$variant" $options
+  plan_name+=("$(name_of "$file" "$variant" $options)")
+  lock_of+=("$out/points/.${plan_name[-1]}.lock")
 done
+ready() { true; }
+settled() { [ -s "$out/points/${plan_name[$1]}.json" ] || since_we_began "$out/points/${plan_name[$1]}.failed"; }
+visit() { # NUMBER
+  local file variant options
+  IFS='|' read -r file variant options <<<"${plan[$1]}"
+  index=$(($1 + 1))
+  # shellcheck disable=SC2086
+  point "$file" "$variant" $options
+}
+deal
 if [ -n "$stop" ]; then
   echo "pareto: stopped; nothing is lost: the same command goes on (pareto.sh $build --report shows what is there)" >&2
   exit 130
 fi
-report || failures=$((failures + 1))
+if [ "$elsewhere" -gt 0 ]; then
+  echo "pareto: nothing is left for this process; others are at work on $elsewhere of $total points, the last one makes the table"
+  exit 0
+fi
+failures=0
+for name in "${plan_name[@]}"; do [ -s "$out/points/$name.json" ] || failures=$((failures + 1)); done
+alone "$out/report.lock" report || failures=$((failures + 1))
 [ $failures -eq 0 ] || die "$failures of the steps above failed; the same command tries them again" 1

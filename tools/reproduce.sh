@@ -1,6 +1,7 @@
 #!/bin/bash
 # make reproduce: for every scene the runs of the paper's tables, their audits, and one report beside the paper.
-# Finished runs are kept, an interrupted training goes on from its checkpoint, changed parameters start a run again.
+# Finished runs are kept, an interrupted training goes on from its checkpoint, changed parameters start a run again. The same
+# command may run any number of times at once, on many machines (docs/scale.md): each run is taken by one of them.
 set -u
 export LC_ALL=C
 usage="usage: reproduce.sh BUILD [options]
@@ -128,6 +129,10 @@ done
 
 # shellcheck source=tools/reproduce_runs.sh
 . "${BASH_SOURCE[0]%/*}/reproduce_runs.sh"
+# shellcheck source=tools/reproduce_plan.sh
+. "${BASH_SOURCE[0]%/*}/reproduce_plan.sh"
+# shellcheck source=tools/deal.sh
+. "${BASH_SOURCE[0]%/*}/deal.sh"
 
 # ---- the report ----
 
@@ -162,14 +167,15 @@ is_wanted() { if by_layout; then is_scene "$1"; else is_blender "$1"; fi; }
 is_blender() { [ -e "$1/transforms_train.json" ] && [ -e "$1/transforms_test.json" ]; }
 paths=()
 mkdir -p "$out" || exit 1
-exec 9>"$out/lock"
-flock -n 9 || die "another run of profile $profile is at work in $out" 1
+child="" stop=""
+smoke_data() {
+  [ ! -e "$data/complete" ] || return 0
+  rm -rf "$data"
+  "$bin/sf_scene" textured -o "$data" --size 32 --train 10 --test 2 >/dev/null && touch "$data/complete"
+}
 if [ "$profile" = smoke ]; then
   data=$build/reproduce/smoke-data/textured
-  if [ ! -e "$data/complete" ]; then
-    rm -rf "$data"
-    "$bin/sf_scene" textured -o "$data" --size 32 --train 10 --test 2 >/dev/null && touch "$data/complete" || exit 1
-  fi
+  mkdir -p "${data%/*}" && alone "${data%/*}/lock" smoke_data || exit 1
   paths=("$data")
 else
   [ -n "$scenes" ] || die "--scenes FOLDER is missing (make reproduce SCENES=folder)"
@@ -201,7 +207,13 @@ for data in "${paths[@]}"; do
   path_of[$name]=$data
 done
 
-child="" stop=""
+settings() { # the whole plan hangs on them
+  local name
+  echo "$version; ${paths[*]}; runs $which_runs; backbones $chosen; betas $betas; seeds $seeds $seed_runs"
+  for name in "${!set[@]}"; do echo "$name ${set[$name]}"; done | sort
+}
+version=$("$bin/sf_train" --version)
+join_others "$(settings)" || die "another run of profile $profile, with other parameters, is at work in $out" 1
 trap on_signal INT TERM HUP
 
 # ---- what is run ----
@@ -212,90 +224,6 @@ look_at_data() {
   json=$("$bin/sf_data" "$data" --json 2>/dev/null)
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
   frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')
-}
-
-# The backbones that the paper trains on data of this kind; profiles of one backbone: none is named.
-backbones_of() {
-  by_layout || { echo -; return; }
-  case ${chosen:-$1} in
-    blender) echo ingp tensorf ;;
-    llff) echo tensorf ;;
-    colmap | ingp) echo ingp ;;
-    *) echo "${chosen:-ingp}" ;;
-  esac
-}
-
-# The budgets of a backbone, the reference of ablations first.
-betas_of() {
-  if [ -n "$betas" ]; then
-    echo "$betas"
-  elif [ "$profile" = scenes ]; then
-    echo 5e-7
-  elif [ "$1" = tensorf ]; then
-    echo 5e-7 5e-8 5e-9
-  else
-    echo 5e-7 1e-7 1e-6
-  fi
-}
-
-ablations="mode-hybrid mode-decay mode-no-decay no-stage1 no-extra no-penalty no-budget fixed-t-minus-1 fixed-t fixed-t-plus-1"
-# What PATA is held against: membranes along the ray; every number of steps trained alone, as a search by hand would.
-comparators() {
-  local t
-  echo -n "along-ray"
-  for ((t = 1; t <= set[steps]; t++)); do echo -n " sweep-$t"; done
-}
-# BACKBONE LAYOUT SEED: names of runs.
-runs_of() (
-  # shellcheck disable=SC2046 # words
-  set -- "$1" "$2" "$3" $(betas_of "$1")
-  [ "$which_runs" != comparators ] || { echo "beta-5e-7 ann $(comparators)"; return; }
-  echo -n "beta-$4 ann"
-  for beta in "${@:5}"; do echo -n " beta-$beta"; done
-  [ "$3" = "${set[seed]}" ] || [ "$seed_runs" = all ] || return 0
-  [ "$profile" != scenes ] || return 0
-  [ "$profile" != paper ] || [ "$1 $2" = "ingp blender" ] || return 0
-  echo -n " $ablations"
-  [ "$which_runs" = paper ] || echo -n " $(comparators)"
-)
-
-# One unit of the plan is a scene with a backbone and a seed.
-unit_data=() unit_frames=() unit_scene=() unit_backbone=() unit_seed=() unit_runs=()
-# By scene and backbone: runs to do, finished ones, their seconds, seconds that a probe says of one.
-declare -A left=() finished=() spent=() probed=()
-plan_unit() { # BACKBONE LAYOUT SEED
-  local scene=${data##*/} key run runs
-  [ "$1" = - ] || scene=$scene-$1
-  key=$scene
-  [ "$3" = "${set[seed]}" ] || scene=$scene/seed-$3
-  runs=$(runs_of "$@")
-  unit_data+=("$data") unit_frames+=("$frames") unit_scene+=("$scene") unit_backbone+=("$1") unit_seed+=("$3")
-  unit_runs+=("$runs")
-  for run in $runs; do
-    total=$((total + 1))
-    if [ "$(cat "$out/$scene/$run/status" 2>/dev/null)" = "done" ]; then
-      finished[$key]=$((${finished[$key]:-0} + 1))
-      spent[$key]=$((${spent[$key]:-0} + $(cat "$out/$scene/$run/wall" 2>/dev/null || echo 0)))
-    else
-      left[$key]=$((${left[$key]:-0} + 1))
-    fi
-  done
-}
-
-# The first seed of every scene comes first.
-plan() {
-  local backbone seed i
-  for i in "${!paths[@]}"; do
-    data=${paths[i]}
-    look_at_data
-    layouts+=("$layout") frames_of+=("$frames")
-  done
-  for seed in ${seeds:-${set[seed]}}; do
-    for i in "${!paths[@]}"; do
-      data=${paths[i]} frames=${frames_of[i]}
-      for backbone in $(backbones_of "${layouts[i]}"); do plan_unit "$backbone" "${layouts[i]}" "$seed"; done
-    done
-  done
 }
 
 # ---- all runs of a unit ----
@@ -349,12 +277,43 @@ start_run() { # NAME
   esac
 }
 
-one_unit() { # ITS NUMBER
-  local run
-  data=${unit_data[$1]} frames=${unit_frames[$1]} scene=${unit_scene[$1]} backbone=${unit_backbone[$1]} seed=${unit_seed[$1]}
-  prepare_unit
-  names=${unit_runs[$1]}
-  for run in $names; do start_run "$run"; done
+# What a run needs of another: the twin's energy is of the samples of a spiking run, the first that there is in the order of
+# the report; t_r is that of beta-5e-7; the sweep leaves out what the ablations have.
+needs() { # NUMBER OF A RUN: the numbers
+  local run=${run_name[$1]} scene=${unit_scene[run_unit[$1]]} other
+  needed=
+  case $run in
+    ann)
+      for other in beta-5e-7 beta-1e-7 beta-1e-6 beta-5e-8 beta-5e-9; do
+        needed=${number_of[$scene/$other]:-}
+        [ -z "$needed" ] || break
+      done ;;
+    fixed-*) needed=${number_of[$scene/beta-5e-7]:-} ;;
+    sweep-*) for other in $swept_before; do needed="$needed ${number_of[$scene/$other]:-}"; done ;;
+  esac
+}
+settled() { # NUMBER
+  local file=$out/${unit_scene[run_unit[$1]]}/${run_name[$1]}/status text
+  text=$(cat "$file" 2>/dev/null)
+  [ "$text" = "done" ] || { [ -n "$text" ] && [ "$text" != "not finished" ] && since_we_began "$file"; }
+}
+ready() { # NUMBER
+  local other
+  needs "$1"
+  for other in $needed; do
+    [ -n "${seen[other]:-}" ] || { is_free "${lock_of[other]}" && settled "$other"; } || return
+  done
+}
+visit() { # NUMBER
+  local unit=${run_unit[$1]}
+  index=$1
+  if [ "$unit" != "$prepared" ]; then
+    data=${unit_data[unit]} frames=${unit_frames[unit]} scene=${unit_scene[unit]} backbone=${unit_backbone[unit]} seed=${unit_seed[unit]}
+    names=${unit_runs[unit]}
+    prepare_unit
+    prepared=$unit
+  fi
+  start_run "${run_name[$1]}"
 }
 
 # Before the first run: how long a run of each kind will train.
@@ -365,22 +324,32 @@ probe_all() {
     [ -z "$stop" ] && [ -z "${probed[$key]:-}${finished[$key]:-}" ] && [ "${left[$key]:-0}" -gt 0 ] || continue
     data=${unit_data[i]} frames=${unit_frames[i]} scene=$key backbone=${unit_backbone[i]} seed=${unit_seed[i]}
     prepare_unit
+    claim "$out/$key/.probe.lock" || continue # another process does
     probe
+    release
   done
   [ -z "$stop" ] || return 0
   for key in "${!left[@]}"; do seconds=$((seconds + ${left[$key]} * ${probed[$key]:-0})); done
   [ $seconds -eq 0 ] || echo "reproduce: $total runs, about $(clock $seconds) of training"
 }
 
-started=$SECONDS index=0 failures=0 ticker_pid="" total=0
-version=$("$bin/sf_train" --version)
+started=$SECONDS index=0 failures=0 ticker_pid="" total=0 prepared=""
 layouts=() frames_of=()
 plan
 [ "${set[probe]}" -eq 0 ] || probe_all
-for i in "${!unit_scene[@]}"; do [ -n "$stop" ] || one_unit "$i"; done
+deal
 if [ -n "$stop" ]; then
   echo "reproduce: stopped; nothing is lost: the same command goes on (make reproduce-report shows what is there)" >&2
   exit 130
 fi
-report || failures=$((failures + 1))
+# Nor is a failure told here: a launcher would end the others.
+if [ "$elsewhere" -gt 0 ]; then
+  echo "reproduce: nothing is left for this process; others are at work on $elsewhere of $total runs, the last one makes the table"
+  exit 0
+fi
+failures=0
+for i in "${!run_name[@]}"; do
+  [[ $(cat "$out/${unit_scene[run_unit[i]]}/${run_name[i]}/status" 2>/dev/null) != failed* ]] || failures=$((failures + 1))
+done
+alone "$out/report.lock" report || failures=$((failures + 1))
 [ $failures -eq 0 ] || die "$failures of the steps above failed; the same command tries them again" 1

@@ -101,7 +101,7 @@ ticker() {
 start_ticker() {
   ticker_pid=
   [ -t 2 ] || return 0
-  ticker 9>&- &
+  ticker 7>&- 8>&- 9>&- &
   ticker_pid=$!
 }
 stop_ticker() {
@@ -181,7 +181,7 @@ audit() { # FILE SCENE VIEW
 
 evaluate_ann() {
   local view reference="" beta
-  for beta in 5e-9 5e-8 1e-6 1e-7 5e-7; do
+  for beta in 5e-9 5e-8 1e-6 1e-7 5e-7; do # the last one counts; src/report/load.c takes the same
     [ -s "$out/$scene/beta-$beta/scene.snn" ] && reference=$out/$scene/beta-$beta/scene.snn
   done
   if [ -z "$reference" ]; then
@@ -261,7 +261,12 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   [ -z "$stop" ] || return
   prepare || { failures=$((failures + 1)); return; }
   if [ "$(cat "$dir/status" 2>/dev/null)" = "done" ]; then
-    say "finished before"
+    if since_we_began "$dir/status"; then # by another process
+      left[$key]=$((${left[$key]:-0} - 1))
+      say "finished elsewhere"
+    else
+      say "finished before"
+    fi
     return
   fi
   echo "not finished" >"$dir/status"
@@ -325,7 +330,7 @@ fixed_run() { # NAME STEPS OPTIONS...
 sweep_run() { # NAME STEPS OPTIONS...
   local name=$1 steps=$2 other
   shift 2
-  for other in mode-hybrid fixed-t-minus-1 fixed-t fixed-t-plus-1; do
+  for other in $swept_before; do
     [[ " $names " == *" $other "* ]] && [ "$(cat "$out/$scene/$other/status" 2>/dev/null)" = "done" ] || continue
     [ "$(number "$out/$scene/$other/train.json" t_r)" = "$steps" ] || continue
     rm -rf "${out:?}/$scene/$name"

@@ -90,6 +90,12 @@ pareto part 0 --variants none --every 3
 echo "#" >>"$work/part/bin/sf_point"
 pareto part 0 --variants none --every 3
 [ "$(count 'finished before')" -eq 0 ] || fail "points of another program were kept"
+SLURM_STEP_NUM_TASKS=2 SLURM_PROCID=1 "$script" "$work/part" --profile smoke --variants none --every 5 >"$work/other" 2>&1 &
+pareto part 0 --variants none --every 5
+wait $! || { cat "$work/other"; fail "two at once: exit status of the other"; }
+cat "$work/other" >>"$work/out"
+[ "$(count '^\[.* PSNR .* dB, against')" -eq 9 ] || fail "two at once: not 9 points, each once"
+[ "$(count '^wrote ')" -ge 1 ] || fail "two at once: no table"
 pareto part 0 --report
 [ "$(count '^## ')" -ge 5 ] || fail "--report prints no tables"
 echo '{"name": "x"' >"$(points part)/tiny-steps=1.json"
@@ -97,8 +103,8 @@ pareto part 1 --report
 [ "$(count 'tiny-steps=1.json')" -eq 1 ] || fail "the broken point is not named"
 echo "failure: reported, repeated alone"
 
-flock "$work/part/pareto/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
-[ "$(count 'another run')" -eq 1 ] || fail "the other run is not named"
+flock -s "$work/part/pareto/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
+[ "$(count 'another run of profile smoke, with other parameters,')" -eq 1 ] || fail "the other run is not named"
 for bad in "--profile fast" "--every x" "--every 0" "--variants some" "--nosuch 1" "--view" "--model m"; do
   # shellcheck disable=SC2086
   pareto part 2 $bad

@@ -42,6 +42,33 @@ else
 fi
 echo "whole: $all runs"
 
+# Three processes at once, as a launcher starts them; one is killed: the others take its run, each run is done once, and the
+# last one makes the same table.
+build dealt
+pids=()
+for rank in 0 1 2; do
+  OMPI_COMM_WORLD_SIZE=3 OMPI_COMM_WORLD_RANK=$rank "$script" "$work/dealt" --profile smoke >"$work/out.$rank" 2>&1 &
+  pids+=($!)
+done
+for ((i = 0; i < 4000; i++)); do
+  grep -q ' dB, ' "$work/out.1" && break
+  sleep 0.01
+done
+# shellcheck disable=SC2046
+kill -KILL "${pids[1]}" $(pgrep -P "${pids[1]}")
+wait "${pids[0]}" || { cat "$work/out.0"; fail "dealt: exit status of process 0"; }
+wait "${pids[2]}" || { cat "$work/out.2"; fail "dealt: exit status of process 2"; }
+cat "$work"/out.[012] >"$work/out"
+[ "$(count '^\[.* dB, ')" -eq $all ] || fail "dealt: not $all runs, each once"
+[ "$(grep -l '^wrote ' "$work"/out.[012] | wc -l)" -ge 1 ] || fail "dealt: no table"
+for rank in 0 1; do [ "$(grep -c ' dB, ' "$work/out.$rank")" -ge 1 ] || fail "dealt: process $rank had no run"; done
+diff <(facts whole) <(facts dealt) >"$work/difference" || { cat "$work/difference"; fail "dealt: results.json differs"; }
+for file in table.md tables; do
+  diff -r "$work/whole/reproduce/smoke/$file" "$work/dealt/reproduce/smoke/$file" || fail "dealt: $file differs"
+done
+rm -r "$work/dealt"
+echo "dealt: three processes, one killed: the same table"
+
 # Stopped in the middle of a training; SIGTERM once, SIGKILL of script and trainer once.
 interrupt() { # SIGNAL RUN
   local signal=$1 log children
@@ -116,8 +143,8 @@ reproduce part 0 --audit-views 2
 [ "$(count 'finished before')" -eq 0 ] || fail "new frames were not audited"
 times part | grep train.json | cmp - "$work/before" || fail "trained again for other frames"
 [ -s "$(runs part)/fixed-t/audit-1.json" ] || fail "the second frame was not audited"
-flock "$work/part/reproduce/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
-[ "$(count 'another run')" -eq 1 ] || fail "the other run is not named"
+flock -s "$work/part/reproduce/smoke/lock" "$script" "$work/part" --profile smoke >"$work/out" 2>&1 && fail "two at once"
+[ "$(count 'another run of profile smoke, with other parameters,')" -eq 1 ] || fail "the other run is not named"
 
 # Profile scenes: both backbones of a scene in the Blender layout, by the clock; twin, audit, co-simulation.
 data=$work/part/reproduce/smoke-data/textured

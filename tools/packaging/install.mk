@@ -35,7 +35,7 @@ INSTALL_LIB := 644:$(PUBLIC_HEADER):$(INCLUDEDIR)/spikefield/spikefield.h \
 INSTALL_LINKS := $(LIBDIR)/$(SONAME) $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc
 INSTALL_PROGRAMS := $(foreach p,$(PROGRAMS),755:$B/bin/$p:$(BINDIR)/$p) \
   $(foreach p,$(PROGRAMS),644:$B/completions/$p:$(DATADIR)/bash-completion/completions/$p) \
-  $(foreach f,$(patsubst share/%,%,$(wildcard share/tech/*.tech share/schema/*.json)),644:share/$f:$(DATADIR)/spikefield/$f) \
+  $(foreach f,$(patsubst share/%,%,$(wildcard share/tech/*.tech share/schema/*.json share/slurm/*.sbatch)),644:share/$f:$(DATADIR)/spikefield/$f) \
   $(foreach f,$(filter-out cocotb/sf_cocotb.py,$(patsubst share/%,%,$(wildcard share/cocotb/*.*))),644:share/$f:$(DATADIR)/spikefield/$f) \
   755:share/cocotb/sf_cocotb.py:$(DATADIR)/spikefield/cocotb/sf_cocotb.py \
   644:$B/share/spikefield/VERSION:$(DATADIR)/spikefield/VERSION
@@ -69,7 +69,7 @@ install: installable ## programs, manual pages, completions, data and the C libr
 uninstall: ## remove what install put below PREFIX
 	$Qrm -f $(addprefix $(DESTDIR),$(INSTALLED))
 	$Qrm -rf $(addprefix $(DESTDIR)$(DATADIR)/spikefield,/cocotb/__pycache__ /python/spikefield/__pycache__)
-	$Qrmdir $(addprefix $(DESTDIR),$(INCLUDEDIR)/spikefield $(addprefix $(DATADIR)/spikefield,/tech /schema /cocotb /python/spikefield /python /) $(DOCDIR) \
+	$Qrmdir $(addprefix $(DESTDIR),$(INCLUDEDIR)/spikefield $(addprefix $(DATADIR)/spikefield,/tech /schema /slurm /cocotb /python/spikefield /python /) $(DOCDIR) \
 	  $(abspath $(BINDIR)/../lib/spikefield)) 2>/dev/null || true
 
 .PHONY: man installable install install-lib uninstall
