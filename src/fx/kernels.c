@@ -2,6 +2,7 @@
 #include "src/fx/kernels.h"
 #include "src/fx/net.h"
 #include "base/amx.h"
+#include "base/cpu.h"
 #include <string.h>
 #include "src/fx/nofloat.h"
 
@@ -56,13 +57,13 @@ const fx_kernels *fx_kernels_select(const char *name)
   int n = 0;
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-      __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512vbmi2") &&
-      __builtin_cpu_supports("avx512vpopcntdq")) {
-    if (sf_have_amx()) candidate[n++] = &fx_kernels_amx;
+  if (sf_cpu_may(SF_CPU_AVX512) && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni") &&
+      __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq")) {
+    if (sf_cpu_may(SF_CPU_AMX) && sf_have_amx()) candidate[n++] = &fx_kernels_amx;
     candidate[n++] = &fx_kernels_avx512vnni;
   }
-  if (__builtin_cpu_supports("avx2")) candidate[n++] = &fx_kernels_avx2;
+  if (sf_cpu_may(SF_CPU_AVX2) && __builtin_cpu_supports("avx2")) candidate[n++] = &fx_kernels_avx2;
 #endif
   candidate[n++] = &portable;
   if (!name) return candidate[0];

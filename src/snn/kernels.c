@@ -1,6 +1,7 @@
 /* Choice of the instruction set at run time. */
 #include "snn/kernels.h"
 #include "base/amx.h"
+#include "base/cpu.h"
 #include <string.h>
 
 extern const sf_kernels sf_kernels_portable;
@@ -24,15 +25,17 @@ const sf_kernels *sf_kernels_select(const char *name)
   int n = 0;
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma")) {
+  if (sf_cpu_may(SF_CPU_AVX512) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("fma")) {
     candidate[n++] = &sf_kernels_avx512;
-    if (__builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512vbmi2")) { /* round: only by name */
+    if (sf_cpu_may(SF_CPU_AVX512BF16) && __builtin_cpu_supports("avx512bf16") &&
+        __builtin_cpu_supports("avx512vbmi2")) { /* round: only by name */
       candidate[n++] = &sf_kernels_avx512bf16;
-      if (name && !strcmp(name, "amx") && sf_have_amx()) candidate[n++] = &sf_kernels_amx;
+      if (name && !strcmp(name, "amx") && sf_cpu_may(SF_CPU_AMX) && sf_have_amx()) candidate[n++] = &sf_kernels_amx;
     }
   }
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) candidate[n++] = &sf_kernels_avx2;
+  if (sf_cpu_may(SF_CPU_AVX2) && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    candidate[n++] = &sf_kernels_avx2;
 #endif
   candidate[n++] = &sf_kernels_portable;
   if (!name) return candidate[0];

@@ -124,7 +124,11 @@ sf_status sf_share_begin(sf_trainer *t, const char *resume)
   sf_ranks *ranks = t->options.ranks;
   char hex[65] = "";
   if (sf_ranks_size(ranks) == 1) return sf_ok();
-  SF_TRY(sf_ranks_same(ranks, "instruction set", t->kernels->name));
+  sf_status kernels = sf_ranks_same(ranks, "instruction set", t->kernels->name);
+  if (kernels.code == SF_E_UNSUPPORTED)
+    return sf_fail(SF_E_UNSUPPORTED, "%.200s; SPIKEFIELD_CPU=avx2, avx512 or portable on every rank makes them alike",
+                   kernels.message);
+  SF_TRY(kernels);
   SF_TRY(same(t, "data set", hash_data(t->data)));
   if (!resume) return sf_ok();
   const sf_status hashed = sf_sha256_file(resume, hex);

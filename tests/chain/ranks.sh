@@ -196,4 +196,23 @@ mkdir dark && "$bin/sf_scene" textured -o dark/photos --size 16 --train 6 --test
 cp photos/train/r_1.png dark/photos/train/r_0.png
 refused 1 "has another data set than rank 0" -n 1 "$bin/sf_train" photos $small -q -o x.model : -n 1 -wdir "$work/dark" "$bin/sf_train" photos $small -q -o x.model
 
+# ---- other CPUs: integers are equal, floats refused ----
+narrow=(-n 1 env SPIKEFIELD_CPU=portable)
+job 1 "$bin/sim_render" scene.snn views --all -o mixed -q : "${narrow[@]}" "$bin/sim_render" scene.snn views --all -o mixed -q >/dev/null 2>render.err ||
+  fail "sim_render on two CPUs: $(cat render.err)"
+diff -r one mixed >diff.out || fail "two CPUs render another set: $(cat diff.out)"
+if grep -q avx2 /proc/cpuinfo; then
+  refused 1 "has another instruction set than rank 0" -n 1 "$bin/sf_train" photos $small $grid -q -o x.model : "${narrow[@]}" "$bin/sf_train" photos $small $grid -q -o x.model
+  grep -q 'SPIKEFIELD_CPU' refused.out || fail "no word about what the ranks may share: $(cat refused.out)"
+else
+  echo "one CPU alone: no refusal tried"
+fi
+
+# ---- a full disk on one rank: no file may grow beyond a size (a write fails with EFBIG in place of ENOSPC) ----
+full() { printf '%s' "trap '' XFSZ; ulimit -f $1; exec \"\$0\" \"\$@\""; }
+refused 1 "sim_render: rank 1 on " -n 1 "$bin/sim_render" scene.snn views --all -o tight -q : -n 1 bash -c "$(full 1)" "$bin/sim_render" scene.snn views --all -o tight -q
+grep -q 'tight/view_[0-9]*.exr.*: File too large' refused.out || fail "a full disk: the file is not named: $(cat refused.out)"
+job 2 "$bin/sim_render" scene.snn views --all -o tight -q >/dev/null 2>render.err || fail "after a full disk: $(cat render.err)"
+diff -r one tight >diff.out || fail "after a full disk: another set: $(cat diff.out)"
+
 finish "1, 2, 3, 4 ranks, killed, interrupted and continued: what one process gives"
