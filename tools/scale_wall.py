@@ -43,9 +43,9 @@ class Bench:
     def prepare(self):
         if not os.path.exists(self.data + "/transforms_train.json"):
             self.data = self.work + "/data"
-            self.call([self.bin + "sf_scene", "textured", "-o", self.data, "--size", "400", "--train", "12", "--test", "1"])
+            self.call([self.bin + "sf_scene", "textured", "-o", self.data, "--size", "128", "--train", "12", "--test", "1"])
         views = self.work + "/views"
-        self.call([self.bin + "sf_scene", "textured", "-o", views, "--size", "100", "--train", "1", "--test", str(max(16, int(64 * self.share)))])
+        self.call([self.bin + "sf_scene", "textured", "-o", views, "--size", "100", "--train", "1", "--test", str(max(16, int(48 * self.share)))])
         model = self.work + "/small"
         self.call([self.bin + "sf_train", self.work + "/views", "--stage1", "60", "--stage2", "60", "--samples", "1024", "--levels", "8",
                    "--log2-hash", "12", "--lattice", "256", "--eval-views", "1", "-q", "-o", model])
