@@ -105,6 +105,16 @@ def parse(pair):
     return c_operators.mutants(*pair)
 
 
+def parsed(build, files, jobs):
+    """{file: its mutants and their edits}."""
+    if not files:
+        return {}
+    headers = subprocess.run([build.flags(files[0])[0], "-print-file-name=include"], capture_output=True, text=True).stdout.strip()
+    arguments = [c_operators.arguments_of(build.flags(path)) + ["-idirafter", headers] for path in files]
+    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
+        return dict(zip(files, pool.map(parse, zip(files, arguments))))
+
+
 def rows_of(modules):
     """{room or file: its files}."""
     rows = {}
@@ -145,10 +155,10 @@ def options():
     parser.add_argument("--seed", default="1", help="of the drawing (1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="how many at once (one per processor)")
     parser.add_argument("--minutes", type=float, default=0, help="stop after so long, with the table of what was judged (0: never)")
-    parser.add_argument("--commands", help="what make prints of the build (BUILD/mutate-c/commands)")
     parser.add_argument("--equivalents", default="tests/mutate/equivalent-c", help=argparse.SUPPRESS)
     parser.add_argument("--reach-only", action="store_true", help="measure what the tests reach, judge nothing")
     parser.add_argument("--list", action="store_true", help="print the mutants, judge nothing")
+    parser.add_argument("--listed", action="store_true", help="whether all listed equivalents are mutants, judge nothing")
     return parser.parse_intermixed_args()
 
 
@@ -157,39 +167,44 @@ def main():
     if c_operators.cindex is None:
         print("mutate-c: python3-clang-14 is not installed")
         return 77
-    build = c_build.Build(given.build, given.commands or f"{given.build}/mutate-c/commands")
+    build = c_build.Build(given.build, f"{given.build}/mutate-c/commands")
     rows = rows_of(given.modules or ROOMS)
+    equivalents = campaign.Equivalents(given.equivalents, glob.glob("src/*/*.c") + sum(rows.values(), []))
+    if given.listed:
+        rows = {path: [path] for path, _ in equivalents.reasons}
     files = sorted({path for paths in rows.values() for path in paths})
-    headers = subprocess.run(["gcc", "-print-file-name=include"], capture_output=True, text=True).stdout.strip()
-    with concurrent.futures.ProcessPoolExecutor(given.jobs) as pool:
-        arguments = [c_operators.arguments_of(build.flags(path)) + ["-idirafter", headers] for path in files]
-        found = dict(zip(files, pool.map(parse, zip(files, arguments))))
-    edits = {m.number: edit for pairs in found.values() for m, edit in pairs}
-    mutants = {row: [m for path in paths for m, _ in found[path]] for row, paths in rows.items()}
-    equivalents = campaign.Equivalents(given.equivalents, glob.glob("src/*/*.c") + files)
+    found = parsed(build, files, given.jobs)
     for path in files:
         equivalents.match(path, [m for m, _ in found[path]])
+    if given.listed:
+        return 0
+    edits = {m.number: edit for pairs in found.values() for m, edit in pairs}
+    mutants = {row: [m for path in paths for m, _ in found[path]] for row, paths in rows.items()}
     chosen = {row: chosen_of(row, mutants[row], given.sample, given.seed) for row in rows}
     if given.list:
         for m in sorted((m for row in chosen.values() for m in row), key=lambda m: (m.module, edits[m.number].start)):
             print(f"{m.place}: {edits[m.number].operator}: {m.what}")
         return 0
-    instrumented = files if given.commands else set(files) | {p for paths in rows_of(ROOMS).values() for p in paths}
-    reach = c_reach.Reach(build, instrumented, given.jobs)
+    reach = c_reach.Reach(build, {path for path in [*files, *sum(rows_of(ROOMS).values(), [])] if path in build.compilers}, given.jobs)
     reach.load()
     if given.reach_only:
         return 0
 
-    judge = Judge(build, reach, edits, begin + 60 * given.minutes if given.minutes else None)
-    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+    return campaign_of(rows, mutants, chosen, equivalents, Judge(build, reach, edits, begin + 60 * given.minutes if given.minutes else None),
+                       given.jobs)
+
+
+def campaign_of(rows, mutants, chosen, equivalents, judge, jobs):
+    """Exit status."""
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         list(pool.map(judge.prepare, {m.module for row in chosen.values() for m in row}))
-    results = campaign.Results(f"{build.work}/results", judge.valid([m for row in mutants.values() for m in row]))
+    results = campaign.Results(f"{judge.build.work}/results", judge.valid([m for row in mutants.values() for m in row]))
     every = interleaved(list(chosen.values()))
     pending = equivalents.last([m for m in every if m.number not in results.verdicts])
     progress = campaign.Progress("mutate-c", len(every) - len(pending), len(every))
-    campaign.judge_all(pending, judge.one, results, progress, given.jobs)
+    campaign.judge_all(pending, judge.one, results, progress, jobs)
     progress.end()
-    score = campaign.Score(equivalents, lambda m: shown(edits[m.number], m.module))
+    score = campaign.Score(equivalents, lambda m: shown(judge.edits[m.number], m.module))
     refused = 0
     for row in rows:
         known = [m for m in chosen[row] if m.number in results.verdicts]
@@ -198,7 +213,7 @@ def main():
         score.row(row, judged, len(mutants[row]), results)
     if refused:
         print(f"{refused} changes that the compiler refuses are not counted")
-    return score.end(f"{build.work}/mutate.json")
+    return score.end(f"{judge.build.work}/mutate.json")
 
 
 if __name__ == "__main__":

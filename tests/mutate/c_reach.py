@@ -77,8 +77,7 @@ class Reach:
         if status:
             raise campaign.Stop(f"{name} fails without a mutant")
         self.build.link(name, [f"{self.cover}/cover.a"], program, ["--coverage"])
-        depth = os.getcwd().count("/")
-        timed(program, f"{folder}/tmp", fork, GCOV_PREFIX=os.path.abspath(folder), GCOV_PREFIX_STRIP=str(depth))
+        timed(program, f"{folder}/tmp", fork, GCOV_PREFIX=os.path.abspath(folder))
         lines = self.counted(folder)
         shutil.rmtree(folder)
         return {"fork": fork, "seconds": round(seconds, 2), "files": lines}
@@ -87,7 +86,7 @@ class Reach:
         """{file: {"lines": run, "all": that could have been run, "functions": [[first, last]] entered}}."""
         data = []
         for path in self.files:
-            stem = f"{folder}/{self.cover}/{path[:-2]}"
+            stem = f"{folder}{os.path.abspath(self.cover)}/{path[:-2]}"
             if os.path.exists(stem + ".gcda"):
                 os.symlink(os.path.abspath(f"{self.cover}/{path[:-2]}.gcno"), stem + ".gcno")
                 data.append(stem + ".gcda")
@@ -114,6 +113,8 @@ class Reach:
             for path, found in entry["files"].items():
                 found["set"] = set(found["lines"])
                 self.all.setdefault(path, set(found["all"]))
+        if not self.all:
+            raise campaign.Stop("no test program reaches any of the files")
 
     def of(self, path, first, last):
         """The programs that run one of the lines; of a place without code of its own, those that enter its function."""
