@@ -56,14 +56,14 @@ class Judge:
     def key(self, mutant, tests):
         return campaign.digest(self.originals[mutant.module], *[self.reach.tests[name]["key"] for name in tests])
 
-    def valid(self, mutants):
-        """Whether a kept verdict is of what is there now, as campaign.Results asks."""
-        there = {m.number: m for m in mutants}
+    def valid(self, chosen):
+        """Whether a kept verdict is of what is there now, as campaign.Results asks; those of other runs stay."""
+        there = {m.number: m for m in chosen}
 
         def valid(number, verdict):
             mutant = there.get(number)
             if not mutant:
-                return False
+                return True
             if verdict.verdict == "killed":
                 return verdict.checker in self.reach.tests and verdict.key == self.key(mutant, [verdict.checker])
             return verdict.key == self.key(mutant, self.tests(mutant) if verdict.verdict == "survived" else [])
@@ -152,6 +152,7 @@ def options():
     parser.add_argument("build", help="the build's folder")
     parser.add_argument("modules", nargs="*", help="rooms or files (%s)" % " ".join(ROOMS))
     parser.add_argument("--sample", type=int, default=0, metavar="N", help="N of every room, drawn (0: all)")
+    parser.add_argument("--match", default="", metavar="TEXT", help="only mutants with the text in their description, as a function's name")
     parser.add_argument("--seed", default="1", help="of the drawing (1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="how many at once (one per processor)")
     parser.add_argument("--minutes", type=float, default=0, help="stop after so long, with the table of what was judged (0: never)")
@@ -179,7 +180,7 @@ def main():
     if given.listed:
         return 0
     edits = {m.number: edit for pairs in found.values() for m, edit in pairs}
-    mutants = {row: [m for path in paths for m, _ in found[path]] for row, paths in rows.items()}
+    mutants = {row: [m for path in paths for m, _ in found[path] if given.match in m.what] for row, paths in rows.items()}
     chosen = {row: chosen_of(row, mutants[row], given.sample, given.seed) for row in rows}
     if given.list:
         for m in sorted((m for row in chosen.values() for m in row), key=lambda m: (m.module, edits[m.number].start)):
@@ -190,16 +191,16 @@ def main():
     if given.reach_only:
         return 0
 
-    return campaign_of(rows, mutants, chosen, equivalents, Judge(build, reach, edits, begin + 60 * given.minutes if given.minutes else None),
-                       given.jobs)
+    judge = Judge(build, reach, edits, begin + 60 * given.minutes if given.minutes else None)
+    return campaign_of(rows, mutants, chosen, equivalents, judge, given.jobs)
 
 
 def campaign_of(rows, mutants, chosen, equivalents, judge, jobs):
     """Exit status."""
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         list(pool.map(judge.prepare, {m.module for row in chosen.values() for m in row}))
-    results = campaign.Results(f"{judge.build.work}/results", judge.valid([m for row in mutants.values() for m in row]))
     every = interleaved(list(chosen.values()))
+    results = campaign.Results(f"{judge.build.work}/results", judge.valid(every))
     pending = equivalents.last([m for m in every if m.number not in results.verdicts])
     progress = campaign.Progress("mutate-c", len(every) - len(pending), len(every))
     campaign.judge_all(pending, judge.one, results, progress, jobs)

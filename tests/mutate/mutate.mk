@@ -77,11 +77,11 @@ $(MUTATED_RAY)/units/%: UNIT_FLAGS += $(MUTANT_VERILATOR)
 $(foreach t,$(MUTATED_UNIT_TESTS),$(eval $(call unit_test_rule,$t,$(MUTATED_RAY),$(MUTATED_RAY)/units,$(MUTANT_OBJ) $(MUTANT_LDFLAGS))))
 
 # Mutants of the C code, each in an object of its own, against the C tests. Left out: what takes long, and what drives the
-# Verilated accelerator. MODULES: rooms or files; SAMPLE=N of each, drawn with SEED; MINUTES: an end; JOBS: at once.
+# Verilated accelerator. MODULES: rooms or files; SAMPLE=N of each, drawn with SEED; MATCH=text; MINUTES; JOBS.
 C_SLOW_TESTS := test_budget test_fx_vector test_view
 C_MUTANT_TESTS := $(filter-out $(C_SLOW_TESTS) $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
 C_MUTATE = $(if $(filter-out file,$(origin SAMPLE)),$(if $(SAMPLE),--sample $(SAMPLE))) $(if $(SEED),--seed $(SEED)) $(JOBS:%=--jobs %) \
-  $(if $(filter-out file,$(origin MINUTES)),--minutes $(MINUTES))
+  $(if $(MATCH),--match "$(MATCH)") $(if $(filter-out file,$(origin MINUTES)),--minutes $(MINUTES))
 # What make would run to build the objects and the programs.
 mutate-c-commands:
 	@mkdir -p $B/mutate-c
