@@ -1,8 +1,7 @@
 """A campaign: mutants are run against their checkers, verdicts are kept, the score is printed.
 
-A verdict is a line of a module's results: number, verdict, key, seconds, checker. The key is of what was run: it ends with
-the checker that killed, or with all of them for a survivor, so an interrupted campaign goes on where it was, and a
-changed checker or module starts only what it decides.
+A verdict is a line of a module's results, in JSON. Its key is of what was run: the checker that killed, or all of them for
+a survivor. So an interrupted campaign goes on where it was, and a changed checker or module starts only what it decides.
 """
 import collections
 import concurrent.futures
@@ -26,6 +25,10 @@ FIRST_LIMIT = 600  # before a checker's own time is known
 
 class Stop(Exception):
     """What ends a campaign: one line, said by stop_at()."""
+
+
+class Late(Exception):
+    """The campaign's time is over: the mutant gets no verdict."""
 
 
 def digest(*parts):
@@ -88,15 +91,20 @@ class Equivalents:
         return self.reasons.get((m.module, m.what), (0, None))[1]
 
 
-def run(checker, number):
-    """Whether the checker kills the mutant; None if it was ended from outside."""
-    environment = dict(os.environ, SF_MUTANT=str(number), CK_FORK="no")
+def run(checker, number, environment={}, deadline=None):
+    """Whether the checker kills the mutant; None if it was ended from outside. Late at the deadline."""
+    environment = {**os.environ, "SF_MUTANT": str(number), "CK_FORK": "no", **environment}
     command = ["sh", "-c", 'ulimit -S -t "$1" && exec "$0"', checker.command, str(checker.limit)]
+    left = deadline - time.time() if deadline else float("inf")
+    if left <= 0:
+        raise Late()
     try:
         # Of the processor, that a loaded machine kills nobody; of the clock, should one sleep.
         status = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                stderr=subprocess.DEVNULL, timeout=60 * checker.limit).returncode
+                                stderr=subprocess.DEVNULL, timeout=min(60 * checker.limit, left)).returncode
     except subprocess.TimeoutExpired:
+        if left < 60 * checker.limit:
+            raise Late() from None
         status = 1
     return None if status in NOT_ITS_OWN else status != 0
 
@@ -109,26 +117,38 @@ def measured(name, command, key):
     return Checker(name, command, key, 5 + int(4 * (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)))
 
 
+def survivor_key(checkers):
+    return digest(*[c.key for c in checkers])
+
+
+def of_checkers(checkers):
+    """What Results is given where every mutant of a module has the same checkers."""
+    keys = {c.key for c in checkers} | {survivor_key(checkers)}
+    return lambda number, verdict: verdict.key in keys
+
+
 class Results:
     """The kept verdicts of a module."""
 
-    def __init__(self, path, keys):
-        """keys: those of the checkers in their order; verdicts with others are of another state and left out."""
+    def __init__(self, path, valid):
+        """valid: whether the verdict of a number is of what is there now; others are left out."""
         self.path, self.verdicts = path, {}
-        self.survivor_key = digest(*keys)
-        valid = set(keys) | {self.survivor_key}
         lines = open(path).read().split("\n")[:-1] if os.path.exists(path) else []
         for line in lines:
-            field = line.split(None, 4)
-            if len(field) == 5 and field[2] in valid:
-                self.verdicts[int(field[0])] = Verdict(field[1], field[2], float(field[3]), field[4])
+            try:
+                number, *fields = json.loads(line).values()
+                verdict = Verdict(*fields)
+            except (ValueError, TypeError, AttributeError):
+                continue  # cut short, or of another layout
+            if valid(number, verdict):
+                self.verdicts[number] = verdict
         with open(path + ".new", "w") as f:
             f.writelines(self.line(n, v) for n, v in self.verdicts.items())
         os.replace(path + ".new", path)
 
     @staticmethod
     def line(number, v):
-        return f"{number} {v.verdict} {v.key} {v.seconds:.2f} {v.checker}\n"
+        return json.dumps({"mutant": number, **v._replace(seconds=round(v.seconds, 2))._asdict()}) + "\n"
 
     def add(self, number, verdict):
         self.verdicts[number] = verdict
@@ -160,29 +180,34 @@ class Progress:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
-def judge(mutant, checkers, prove):
-    """(verdict, key or None for a survivor's, seconds, checker), or None if something outside ended it."""
-    start = time.time()
-    for checker in checkers:
-        killed = run(checker, mutant.number)
-        if killed is None:
-            return None
-        if killed:
-            return Verdict("killed", checker.key, time.time() - start, checker.name)
-    verdict = "equivalent" if prove and prove(mutant) else "survived"
-    return Verdict(verdict, None, time.time() - start, "-")
+def against(checkers, prove=None):
+    """What judge_all() is given where every mutant has the same checkers; prove: whether a survivor is equivalent."""
+    def one(mutant):
+        start = time.time()
+        for checker in checkers:
+            killed = run(checker, mutant.number)
+            if killed is None:
+                return None
+            if killed:
+                return Verdict("killed", checker.key, time.time() - start, checker.name)
+        verdict = "equivalent" if prove and prove(mutant) else "survived"
+        return Verdict(verdict, survivor_key(checkers), time.time() - start, "-")
+    return one
 
 
-def judge_all(mutants, checkers, results, progress, jobs, prove=None):
-    """Adds the verdicts of the mutants to the results."""
+def judge_all(mutants, one, results, progress, jobs):
+    """Adds to the results what one(mutant) says: its verdict, or None if something outside ended it."""
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        waiting = {pool.submit(judge, m, checkers, prove): m for m in mutants}
+        waiting = {pool.submit(one, m): m for m in mutants}
         try:
             for future in concurrent.futures.as_completed(waiting):
-                verdict = future.result()
+                try:
+                    verdict = future.result()
+                except Late:
+                    continue
                 if not verdict:
                     raise Stop(f"{waiting[future].module}: a checker was ended from outside; run it again to go on")
-                results.add(waiting[future].number, verdict._replace(key=verdict.key or results.survivor_key))
+                results.add(waiting[future].number, verdict)
                 progress.step(verdict.verdict)
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -194,8 +219,9 @@ class Score:
 
     HEAD = ("module", "mutants", "of", "killed", "proven", "listed", "survived", "score", "seconds")
 
-    def __init__(self, equivalents):
-        self.equivalents, self.modules, self.failures = equivalents, [], 0
+    def __init__(self, equivalents, shown=lambda mutant: ()):
+        """shown: more lines about a survivor."""
+        self.equivalents, self.modules, self.failures, self.shown = equivalents, [], 0, shown
         print("%-14s" % self.HEAD[0] + "".join("%9s" % name for name in self.HEAD[1:]), flush=True)
 
     def row(self, module, mutants, count, results):
@@ -212,20 +238,26 @@ class Score:
         for m in listed:
             print(f"  equivalent: {m.place}: {m.what} | {self.equivalents.reason(m)}", flush=True)
         for m in left:
-            print(f"  survived: {m.place}: {m.module} {m.what}", flush=True)
+            print("\n    ".join([f"  survived: {m.place}: {m.module} {m.what}", *self.shown(m)]), flush=True)
         for m in killed:
             if self.equivalents.reason(m):
                 self.failures += 1
                 print(f"{self.equivalents.path}: killed, so not equivalent: {m.module} {m.what}", file=sys.stderr)
         self.modules.append({"module": module, "mutants": len(verdicts), "of": count, "killed": len(killed),
-                             "proven": proven, "listed": len(listed), "survived": len(left)})
+                             "proven": proven, "listed": len(listed), "survived": len(left), "seconds": round(seconds),
+                             "survivors": [[m.place, m.what, *self.shown(m)] for m in left]})
 
     def end(self, path):
-        """Exit status."""
+        """Exit status. The rows in JSON, and beside it the table in Markdown."""
         killed, left = (sum(m[name] for m in self.modules) for name in ("killed", "survived"))
         with open(path, "w") as f:
             json.dump({"killed": killed, "not_equivalent": killed + left, "modules": self.modules}, f)
-        print(f"score {killed} / {killed + left} = {percent(killed, killed + left)}, JSON in {path}")
+        with open(os.path.splitext(path)[0] + ".md", "w") as f:
+            f.write("| " + " | ".join(self.HEAD[:-1]) + " |\n|---" + "|---:" * (len(self.HEAD) - 2) + "|\n")
+            for m in self.modules:
+                cells = [m[name] for name in self.HEAD[:-2]] + [percent(m["killed"], m["killed"] + m["survived"])]
+                f.write("| " + " | ".join(str(cell) for cell in cells) + " |\n")
+        print(f"score {killed} / {killed + left} = {percent(killed, killed + left)}, JSON in {path}, Markdown beside it")
         return 1 if left or self.failures else 0
 
 

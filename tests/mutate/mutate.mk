@@ -75,3 +75,23 @@ $(foreach u,$(sort $(foreach t,$(MUTATED_UNIT_TESTS),$(UNITS_$t))),$(eval \
   $(call unit_rule,$u,$(MUTATED_RAY)/units,$(MUTATED_RAY),$(MUTATED_RAY)/.written)))
 $(MUTATED_RAY)/units/%: UNIT_FLAGS += $(MUTANT_VERILATOR)
 $(foreach t,$(MUTATED_UNIT_TESTS),$(eval $(call unit_test_rule,$t,$(MUTATED_RAY),$(MUTATED_RAY)/units,$(MUTANT_OBJ) $(MUTANT_LDFLAGS))))
+
+# Mutants of the C code, each in an object of its own, against the C tests. Left out: what takes long, and what drives the
+# Verilated accelerator. MODULES: rooms or files; SAMPLE=N of each, drawn with SEED; MATCH=text; MINUTES; JOBS.
+C_SLOW_TESTS := test_budget test_fx_vector test_view
+C_MUTANT_TESTS := $(filter-out $(C_SLOW_TESTS) $(DUT_TESTS) $(UNIT_TESTS),$(TESTS))
+C_MUTATE = $(if $(filter-out file,$(origin SAMPLE)),$(if $(SAMPLE),--sample $(SAMPLE))) $(if $(SEED),--seed $(SEED)) $(JOBS:%=--jobs %) \
+  $(if $(MATCH),--match "$(MATCH)") $(if $(filter-out file,$(origin MINUTES)),--minutes $(MINUTES))
+# What make would run to build the objects and the programs.
+mutate-c-commands:
+	@mkdir -p $B/mutate-c
+	@$(MAKE) -s -n V=1 $(LIB_SRC:%=-W %) $(LIB_SRC:%.c=$B/obj/%.o) $(C_MUTANT_TESTS:%=$B/tests/%) >$B/mutate-c/commands
+mutate-c: $(C_MUTANT_TESTS:%=$B/tests/%) $B/obj/tests/mutate/first_failure.o ## mutants of the C code, against the C tests (MODULES="src/train ..."; SAMPLE=40 of each, SEED=1, MINUTES=9, JOBS=16)
+	@$(MAKE) mutate-c-commands
+	@tests/mutate/c_mutants.py $B $(MODULES) $(C_MUTATE)
+mutate-c-reach: $(C_MUTANT_TESTS:%=$B/tests/%) $B/obj/tests/mutate/first_failure.o
+	@$(MAKE) mutate-c-commands
+	@tests/mutate/c_mutants.py $B $(MODULES) $(JOBS:%=--jobs %) --reach-only
+listed-c: mutate-c-commands
+	@tests/mutate/c_mutants.py $B --listed
+.PHONY: mutate-c mutate-c-commands mutate-c-reach listed-c

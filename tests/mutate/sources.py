@@ -62,13 +62,13 @@ def main():
     score = campaign.Score(equivalents)
     for module in modules:
         checkers = [unmeasured(given.folder, name) for name in checkers_of[module]]
-        results = campaign.Results(f"{given.folder}/results.{module}", [c.key for c in checkers])
+        results = campaign.Results(f"{given.folder}/results.{module}", campaign.of_checkers(checkers))
         chosen = campaign.sample(of[module], given.mutants, results)
         pending = equivalents.last([m for m in chosen if m.number not in results.verdicts])
         if pending:
             checkers = [limited(given.folder, c) for c in checkers]
         progress = campaign.Progress(module, len(chosen) - len(pending), len(chosen))
-        campaign.judge_all(pending, checkers, results, progress, int(os.environ.get("MUTANT_JOBS", "2")))
+        campaign.judge_all(pending, campaign.against(checkers), results, progress, int(os.environ.get("MUTANT_JOBS", "2")))
         progress.end()
         score.row(module, chosen, len(of[module]), results)
     return score.end(f"{given.folder}/mutate.json")

@@ -54,7 +54,7 @@ def judge(unit, work, chosen, results, key, build, equivalents):
     for chunk in chunks(pending, CHUNK):
         program = netlist.program(unit, work, chunk, build)
         checkers = [campaign.measured(f"the checker of {unit.module}", program, key)]
-        campaign.judge_all(chunk, checkers, results, progress, jobs, netlist.prover(unit, work))
+        campaign.judge_all(chunk, campaign.against(checkers, netlist.prover(unit, work)), results, progress, jobs)
     progress.end()
 
 
@@ -85,7 +85,7 @@ def main():
     for module, mutants in lists.items():
         unit, work = units[module], f"{folder}/{module}"
         key = key_of(unit)
-        results = campaign.Results(f"{work}/results", [key])
+        results = campaign.Results(f"{work}/results", campaign.of_checkers([campaign.Checker(module, None, key, None)]))
         chosen = campaign.sample(mutants, most, results)
         judge(unit, work, chosen, results, key, given.build, equivalents)
         score.row(module, chosen, len(mutants), results)
