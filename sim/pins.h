@@ -40,7 +40,7 @@ typedef struct sf_pins_out {
   bool ray_ready, pixel_valid, ar_valid, r_ready;
   uint64_t pixel_data[6];
   uint32_t ar_address;
-  uint8_t ar_len, ar_size, ar_burst;
+  uint8_t ar_len, ar_size, ar_burst, ar_prot;
   bool finished; /* the block has called $finish: another cycle may end this process */
 } sf_pins_out;
 

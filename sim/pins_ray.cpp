@@ -25,6 +25,7 @@ struct ray_pins : sf_pins_common<Vsf_ray_top> {
     out->ar_len = top->m_axi_arlen_o;
     out->ar_size = top->m_axi_arsize_o;
     out->ar_burst = top->m_axi_arburst_o;
+    out->ar_prot = top->m_axi_arprot_o;
     out->r_ready = top->m_axi_rready_o;
     out->pixel_valid = top->m_axis_tvalid_o;
     for (int i = 0; i < 6; i++)

@@ -92,6 +92,29 @@ static void fill_row(fx_layer *layer, int row, int8_t w)
   for (int o = 0; o < layer->n_out; o++) layer->w[row * SF_LANES + o] = w;
 }
 
+/* C1's current at its rails, one below and one beyond, by the neuron: 128 products of 2^16 either way, and a bias. */
+TEST(currents_at_their_rails)
+{
+  random_source r = {6500, 0};
+  random_decoder_make(&net_of_test, &r, 128, false);
+  fx_net *net = &net_of_test.net;
+  fx_layer *layer = &net->layer[FX_C1];
+  net->mode = FX_HYBRID, net->steps = 2;
+  layer->bias = 1, layer->theta = 1 << 22;
+  for (int o = 0; o < SF_LANES; o++) {
+    for (int i = 0; i < 128; i++) layer->w[i * SF_LANES + o] = o & 1 ? -64 : 64;
+    layer->w[128 * SF_LANES + o] = (int8_t)(o / 2 % 5 - 2);
+  }
+  draw_batch(&shared, &r, 4, false);
+  for (int i = 0; i < 4; i++)
+    for (int j = 0; j < 128; j++) shared.f[i][j] = 1024;
+  fx_counts counts = {0};
+  OWNED(sf_dut) *dut = open_dut(net, r.seed, 0);
+  run_batch(dut, net, 4, &counts, r.seed);
+  same_counts(dut, &counts, r.seed);
+  ck_assert_uint_eq(counts.layer[FX_C1].spikes[0], 4 * SF_LANES / 2); /* no current went round */
+}
+
 /* 0, 1: every weight and bias at the same rail, inputs too; 2, 3: biases alone, the rest is 0: C1 silent or every
  * neuron fires at every step; 4: zero inputs; 5: inputs against the bias. */
 LOOP_TEST(hard_cases, 6)

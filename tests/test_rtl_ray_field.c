@@ -168,6 +168,7 @@ TEST(rules_of_the_memory_port)
              {"two beats", {.ar_valid = true, .ar_len = 3}, {.ar_valid = true}},
              {"two beats", {.ar_valid = true, .ar_size = 2}, {.ar_valid = true}},
              {"two beats", {.ar_valid = true, .ar_burst = 2}, {.ar_valid = true}},
+             {"unprivileged", {.ar_valid = true, .ar_prot = 1}, {.ar_valid = true}},
              {"aligned", {.ar_valid = true, .ar_address = 8}, {.ar_valid = true}}};
   const uint8_t table[64] = {0};
   for (int i = 0; i < COUNT(bad); i++) {

@@ -149,14 +149,23 @@ static void works(sf_ray_dut *rays)
   same_counts(rays);
 }
 
-TEST(soft_reset_in_mid_ray)
+static void reset(sf_dut *dut)
+{
+  dut->in.rst_n = false;
+  sf_dut_tick(dut);
+  dut->in.rst_n = true;
+}
+
+/* _i: by a command, by the pin. */
+LOOP_TEST(reset_in_mid_ray, 2)
 {
   OWNED(fx_scene) scene = long_rays(3100);
   OWNED(sf_ray_dut) *rays = NULL;
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 4, .stall_percent = 10}));
   for (int cycles = 1; cycles < 4000; cycles = cycles * 9 / 8 + 1) {
     cut_off(rays->dut, &request[0], cycles);
-    put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    if (_i) reset(rays->dut);
+    else put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
     works(rays);
   }
 }
@@ -200,6 +209,47 @@ TEST(sizes_that_do_not_fit_are_refused)
     const uint32_t error = programming[i].fits ? 0 : SF_CSR_RAY_ERROR_VALUE;
     ck_assert_msg(get(rays->dut, SF_CSR_RAY_ERROR) == error, "word %x, %u", programming[i].word, programming[i].value);
     ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_STATUS) & SF_CSR_RAY_STATUS_RUNNING, !error);
+  }
+  works(rays);
+}
+
+static struct {
+  sf_bus real;
+  uint32_t word, left_out;
+} writes;
+
+static uint32_t read_through(void *context, uint32_t offset)
+{
+  (void)context;
+  return writes.real.read(writes.real.context, offset);
+}
+
+/* All writes but that of a word of the field's programming. */
+static void leave_out(void *context, uint32_t offset, uint32_t value)
+{
+  (void)context;
+  if (offset == SF_CSR_ENCODER_ADDRESS) writes.word = value;
+  else if (offset == SF_CSR_ENCODER_DATA && writes.word++ == writes.left_out)
+    offset = SF_CSR_ENCODER_ADDRESS, value = writes.word;
+  writes.real.write(writes.real.context, offset, value);
+}
+
+/* Behind a reset a size or a scale that was not programmed is an illegal one. */
+TEST(missing_sizes_are_refused)
+{
+  static const uint32_t words[] = {0x101, 0x102, 0x103, 0x105, 0x106, 0x107, 0x108, 0x109, 0x110, 0x111, 0x112,
+                                   0x113, 0x114, 0x115, 0x116, 0x117, 0x122, 0x126, 0x12a, 0x12e, 0x132, 0x136};
+  OWNED(fx_scene) scene = long_rays(3350);
+  OWNED(sf_ray_dut) *rays = NULL;
+  ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 9}));
+  for (int i = 0; i < COUNT(words); i++) {
+    reset(rays->dut);
+    writes.real = rays->dut->bus, writes.left_out = words[i];
+    rays->dut->bus = (sf_bus){read_through, leave_out, NULL};
+    const sf_status status = sf_ray_dut_load(rays);
+    rays->dut->bus = writes.real;
+    ck_assert_msg(status.code != SF_OK || get(rays->dut, SF_CSR_RAY_ERROR), "without word %x", words[i]);
+    if (status.code == SF_OK) ck_assert_uint_eq(get(rays->dut, SF_CSR_RAY_ERROR), SF_CSR_RAY_ERROR_VALUE);
   }
   works(rays);
 }

@@ -33,6 +33,7 @@ static const char *broken_rule(const sf_memory *m)
   if (!out->ar_valid) return NULL;
   if (out->ar_len != BEATS - 1 || out->ar_size != SIZE_8_BYTES || out->ar_burst != INCREMENTING)
     return "a burst that is not two beats of eight bytes";
+  if (out->ar_prot) return "a request that is not unprivileged, secure and of data";
   if (out->ar_address % SF_LINE_BYTES) return "a burst that is not aligned to a line";
   if (out->ar_address % BOUNDARY + BEATS * BEAT_BYTES > BOUNDARY) return "a burst across 4 KiB";
   return NULL;
@@ -42,7 +43,7 @@ static void watch(sf_memory *m)
 {
   const char *what = broken_rule(m);
   if (what && !m->fault) m->fault = what;
-  m->waits = m->dut->in.rst_n && m->dut->out.ar_valid && !m->dut->in.ar_ready;
+  m->waits = m->dut->out.ar_valid && !m->dut->in.ar_ready;
   m->waiting = m->dut->out.ar_address;
 }
 
@@ -85,7 +86,13 @@ static void offer(sf_memory *m)
 
 void sf_memory_cycle(void *memory)
 {
-  watch(memory);
-  take(memory);
-  offer(memory);
+  sf_memory *m = memory;
+  if (m->dut->in.rst_n) {
+    watch(m);
+    take(m);
+  } else { /* of the memory, too */
+    m->answered = m->asked;
+    m->second = m->waits = false;
+  }
+  offer(m);
 }

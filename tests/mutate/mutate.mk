@@ -18,14 +18,14 @@ MUTATE_lanes := --lanes
 MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_counters test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
 MUTANT_CHECKERS_lanes := test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
 MUTANT_CHECKERS_ray := test_rtl_ray_registers test_rtl_ray_program test_rtl_ray_lone test_rtl_ray_field test_rtl_ray test_rtl_ray_planes
-$(foreach m,sf_cache sf_cache_tags sf_fetch,$(eval MUTANT_CHECKERS_$m := test_rtl_cache test_rtl_encoder test_rtl_ray_field))
+$(foreach m,sf_cache sf_cache_tags sf_fetch,$(eval MUTANT_CHECKERS_$m := test_rtl_cache test_rtl_encoder test_rtl_ray_field test_rtl_ray_planes))
 $(foreach m,sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo,$(eval MUTANT_CHECKERS_$m := test_rtl_grid test_rtl_encoder))
 MUTANT_CHECKERS_sf_sh := test_rtl_sh test_rtl_encoder
-MUTANT_CHECKERS_sf_encoder := test_rtl_encoder test_rtl_ray
+MUTANT_CHECKERS_sf_encoder := test_rtl_encoder test_rtl_ray test_rtl_ray_planes
 $(foreach m,sf_activation sf_waves sf_rescale,$(eval MUTANT_CHECKERS_$m := test_rtl_planes test_rtl_ray_planes))
 $(foreach m,sf_planes sf_planes_reads sf_planes_mix sf_basis sf_light,$(eval MUTANT_CHECKERS_$m := test_rtl_ray_planes))
 MUTANT_CHECKERS_sf_mul_28x25 := test_rtl_composite test_rtl_ray test_rtl_ray_planes
-$(foreach m,sf_exp_neg sf_composite,$(eval MUTANT_CHECKERS_$m := test_rtl_composite test_rtl_ray))
+$(foreach m,sf_exp_neg sf_composite,$(eval MUTANT_CHECKERS_$m := test_rtl_composite test_rtl_ray test_rtl_ray_planes))
 MUTANT_CHECKERS_sf_ray_track := test_rtl_ray_track test_rtl_ray
 
 COMMA := ,
