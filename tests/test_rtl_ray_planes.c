@@ -164,8 +164,10 @@ LOOP_TEST(reset_in_mid_ray, 2)
   ck_ok(sf_ray_dut_open(&rays, &scene, &(sf_dut_options){.seed = 4, .stall_percent = 10}));
   for (int cycles = 1; cycles < 4000; cycles = cycles * 9 / 8 + 1) {
     cut_off(rays->dut, &request[0], cycles);
-    if (_i) reset(rays->dut);
-    else put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
+    if (_i)
+      reset(rays->dut);
+    else
+      put(rays->dut, SF_CSR_CTRL, SF_CSR_CTRL_SOFT_RESET);
     works(rays);
   }
 }
@@ -228,7 +230,8 @@ static uint32_t read_through(void *context, uint32_t offset)
 static void leave_out(void *context, uint32_t offset, uint32_t value)
 {
   (void)context;
-  if (offset == SF_CSR_ENCODER_ADDRESS) writes.word = value;
+  if (offset == SF_CSR_ENCODER_ADDRESS)
+    writes.word = value;
   else if (offset == SF_CSR_ENCODER_DATA && writes.word++ == writes.left_out)
     offset = SF_CSR_ENCODER_ADDRESS, value = writes.word;
   writes.real.write(writes.real.context, offset, value);
