@@ -5,6 +5,7 @@
 #include "cli/finish_ranks.h"
 #include "base/clock.h"
 #include "base/io.h"
+#include "base/sha256.h"
 #include "base/text.h"
 #include <omp.h>
 #include <stdlib.h>
@@ -172,12 +173,34 @@ static void begin_set(job *j)
   begin_run(j);
 }
 
+/* SHA-256 of a file of the set, "" where there is none. */
+static void hash_file(const job *j, const char *name, char hex[65])
+{
+  char path[4096 + 16];
+  snprintf(path, sizeof path, "%s/%s", j->set.folder, name);
+  if (sf_sha256_file(path, hex).code != SF_OK) hex[0] = 0;
+}
+
+/* A file that has the bytes that it had before was kept. */
+static void print_files(const job *j, const char *contact, char before[2][65])
+{
+  char now[2][65];
+  hash_file(j, SF_MANIFEST_NAME, now[0]), hash_file(j, SF_CONTACT_NAME, now[1]);
+  const bool manifest_kept = !strcmp(now[0], before[0]), contact_kept = !strcmp(now[1], before[1]);
+  printf("%s %s and %s%s\n", manifest_kept ? "kept" : "wrote", j->set.manifest_path,
+         manifest_kept == contact_kept ? ""
+         : contact_kept                ? "kept "
+                                       : "wrote ",
+         contact);
+}
+
 static sf_status render_all(job *j)
 {
   SF_TRY(sf_ranks_agree(j->ranks, open_studio(j)));
   snprintf(j->set.folder, sizeof j->set.folder, "%s", j->opt.output);
   begin_set(j);
-  char contact[4096 + 16];
+  char contact[4096 + 16], before[2][65];
+  hash_file(j, SF_MANIFEST_NAME, before[0]), hash_file(j, SF_CONTACT_NAME, before[1]);
   sf_status status = sf_view_set_render(&j->set, &j->crop);
   const double seconds = sf_seconds() - j->start;
   if (sf_ranks_rank(j->ranks)) return status;
@@ -191,7 +214,7 @@ static sf_status render_all(job *j)
   }
   sf_manifest_report_print(stdout, &j->set.manifest);
   sf_view_set_print_run(stdout, &j->set, seconds);
-  printf("wrote %s and %s\n", j->set.manifest_path, contact);
+  print_files(j, contact, before);
   return sf_ok();
 }
 

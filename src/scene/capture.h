@@ -50,8 +50,10 @@ static inline int sf_capture_guides(const sf_capture *capture)
 
 /* Notes the first `count` frames as the list that names the training views. */
 void sf_capture_note_poses(sf_capture *capture, int count);
-/* Notes the file of the first frame's picture below `dir`, if there is one. */
-void sf_capture_note_picture(sf_capture *capture, const char *dir);
+/* Notes `file` below `dir` as the first picture of that list, if it is there. */
+void sf_capture_note_picture(sf_capture *capture, const char *dir, const char *file);
+/* The same of images/name, whatever size is read. */
+void sf_capture_note_full_size(sf_capture *capture, const char *dir, const char *name);
 
 /* One reader per layout. `split` as in sf_dataset_load; on failure the caller frees what is there. */
 sf_status sf_transforms_read(sf_capture *capture, const char *dir, const char *split);

@@ -107,6 +107,7 @@ static sf_status take_model(sf_capture *c, sf_colmap *model, const char *dir, co
   c->frame = calloc((size_t)model->images, sizeof *c->frame);
   if (!c->frame) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", t->images, model->images);
   for (; c->count < model->images; c->count++) SF_TRY(set_frame(&c->frame[c->count], model, c->count, folder, t));
+  sf_capture_note_full_size(c, dir, model->image[0].name);
   c->point = model->point, c->points = model->points;
   model->point = NULL;
   return sf_ok();

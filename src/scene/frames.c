@@ -164,17 +164,23 @@ void sf_capture_note_poses(sf_capture *c, int count)
   c->poses = count ? hash_fold(hash) : 0;
 }
 
-void sf_capture_note_picture(sf_capture *c, const char *dir)
+void sf_capture_note_picture(sf_capture *c, const char *dir, const char *file)
 {
   char path[4096], *text;
   size_t size;
   struct stat info;
   uint64_t hash = hash_start;
   c->picture = 0;
-  if (!c->count || sf_picture_find(path, dir, c->frame[0].file_path).code != SF_OK) return;
+  if (sf_picture_find(path, dir, file).code != SF_OK) return;
   if (stat(path, &info) || !S_ISREG(info.st_mode)) return;                   /* a pipe would wait */
   if (sf_read_file(path, PICTURE_BYTES, &text, &size).code != SF_OK) return; /* told when it is loaded */
   for (size_t i = 0; i < size; i++) hash = hash_byte(hash, (unsigned char)text[i]);
   c->picture = hash_fold(hash);
   free(text);
+}
+
+void sf_capture_note_full_size(sf_capture *c, const char *dir, const char *name)
+{
+  char file[4096];
+  if ((size_t)snprintf(file, sizeof file, "images/%s", name) < sizeof file) sf_capture_note_picture(c, dir, file);
 }

@@ -90,6 +90,15 @@ static sf_status name_pictures(sf_capture *c, const char *dir, const sf_dataset_
   return status;
 }
 
+static void note_picture(sf_capture *c, const char *dir)
+{
+  char **name;
+  int count;
+  if (sf_pictures_list(dir, "images", &name, &count).code != SF_OK) return;
+  if (count) sf_capture_note_full_size(c, dir, name[0]);
+  sf_names_free(name, count);
+}
+
 sf_status sf_llff_read(sf_capture *capture, const char *dir, const sf_dataset_options *options)
 {
   double *value;
@@ -100,5 +109,6 @@ sf_status sf_llff_read(sf_capture *capture, const char *dir, const sf_dataset_op
   sf_status status = take_rows(capture, value, rows);
   free(value);
   SF_TRY(status);
+  note_picture(capture, dir);
   return name_pictures(capture, dir, options);
 }

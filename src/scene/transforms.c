@@ -97,7 +97,7 @@ static sf_status read_list(sf_capture *c, const char *path, bool box, bool frame
 static void note(sf_capture *c, const char *dir)
 {
   sf_capture_note_poses(c, c->count);
-  sf_capture_note_picture(c, dir);
+  if (c->count) sf_capture_note_picture(c, dir, c->frame[0].file_path);
 }
 
 /* The training views' list where another one is asked for: it may be faulty, and nobody is told then. */

@@ -60,7 +60,10 @@ expect 1 "float pictures may differ" s1.snn d --verify float/manifest.json
 
 cp one/manifest.json before.json
 expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one
+check "files that stay as they are: kept" grep -qx "kept one/manifest.json and one/contact.png" out
 expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one --downscale 1
+rm one/contact.png
+expect 0 "kept one/manifest.json and wrote one/contact.png" s1.snn d --all -o one
 cp one/view_0001.exr one/view_0003.exr
 expect 0 "1 view rendered" s1.snn d --all -o one
 rm one/view_0000.exr

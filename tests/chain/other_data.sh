@@ -91,6 +91,50 @@ grep -q "ours.snn: learned from other" err.txt && grep -q "ours.safetensors: lea
   fail "the float model: $(cat err.txt)"
 rm out.exr
 
+# The same with LLFF's and COLMAP's lists, at any size that is read. Without `images`, nothing is known.
+"$bin/sf_scene" simple -o data_2 --size 16 --train 1 --test 2 >/dev/null || fail "no small scene"
+"$bin/sf_scene" textured -o painted_2 --size 16 --train 1 --test 2 >/dev/null || fail "no small painted scene"
+python3 - <<'END'
+import os, shutil, struct
+for name, scene in ("ours", "data"), ("other", "painted"):
+    for layout in "llff", "colmap":
+        os.makedirs(f"{layout}_{name}/sparse/0" if layout == "colmap" else f"{layout}_{name}")
+        for folder, pictures in ("images", scene), ("images_2", scene + "_2"):
+            os.mkdir(f"{layout}_{name}/{folder}")
+            for i in range(9):
+                shutil.copy(f"{pictures}/test/r_{i % 2}.png", f"{layout}_{name}/{folder}/{i}.png")
+    row = []
+    for i in range(9):
+        pose = [[0, 1, 0, 0.1 * i, 32], [-1, 0, 0, 0.05 * (i % 3), 32], [0, 0, 1, 0, 40]]
+        row.append([x for line in pose for x in line] + [2, 10])
+    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (9, 17), }"
+    header += " " * (63 - (10 + len(header)) % 64) + "\n"
+    with open(f"llff_{name}/poses_bounds.npy", "wb") as f:
+        f.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode())
+        f.write(b"".join(struct.pack("<17d", *r) for r in row))
+    with open(f"colmap_{name}/sparse/0/cameras.txt", "w") as f:
+        f.write("1 PINHOLE 32 32 40 40 16 16\n")
+    with open(f"colmap_{name}/sparse/0/images.txt", "w") as f:
+        for i in range(9):
+            f.write(f"{i + 1} 1 0 0 0 {-0.1 * i} {0.05 * (i % 3)} 4 1 {i}.png\n\n")
+END
+for layout in llff colmap; do
+  train ${layout}_ours $layout
+  grep -aq '"data_picture":"[1-9]' $layout.safetensors || fail "$layout: no first picture is recorded"
+  for size in 1 2; do
+    "$bin/sim_render" $layout.snn ${layout}_ours --downscale $size --crop 3,3,2,2 -o out.exr -q >out.txt 2>err.txt ||
+      fail "$layout at size $size: $(head -1 err.txt)"
+    ! grep -q "other pictures" err.txt || fail "$layout at size $size: its own data is taken for another scene's"
+    "$bin/sim_render" $layout.snn ${layout}_other --downscale $size --crop 3,3,2,2 -o out.exr -q >out.txt 2>err.txt
+    grep -q "warning: $layout.snn: learned from other pictures: ${layout}_other has the same cameras" err.txt ||
+      fail "$layout at size $size: no warning: $(head -1 err.txt)"
+  done
+  rm -r ${layout}_other/images out.exr
+  "$bin/sim_render" $layout.snn ${layout}_other --crop 7,7,2,2 -o out.exr -q >out.txt 2>err.txt
+  ! grep -q "other pictures" err.txt || fail "$layout: a warning without images"
+  rm -f out.exr
+done
+
 # A record that cannot be.
 poses=$(grep -ao '"data_poses":"[0-9]*"' ours.safetensors | tr -dc 0-9)
 picture=$(grep -ao '"data_picture":"[0-9]*"' ours.safetensors | tr -dc 0-9)
