@@ -35,7 +35,8 @@ INSTALL_LIB := 644:$(PUBLIC_HEADER):$(INCLUDEDIR)/spikefield/spikefield.h \
 INSTALL_LINKS := $(LIBDIR)/$(SONAME) $(LIBDIR)/libspikefield.so $(LIBDIR)/pkgconfig/spikefield.pc
 INSTALL_PROGRAMS := $(foreach p,$(PROGRAMS),755:$B/bin/$p:$(BINDIR)/$p) \
   $(foreach p,$(PROGRAMS),644:$B/completions/$p:$(DATADIR)/bash-completion/completions/$p) \
-  $(foreach f,$(patsubst share/%,%,$(wildcard share/tech/*.tech share/schema/*.json share/slurm/*.sbatch)),644:share/$f:$(DATADIR)/spikefield/$f) \
+  $(foreach f,$(patsubst share/%,%,$(wildcard share/tech/*.tech share/schema/*.json)),644:share/$f:$(DATADIR)/spikefield/$f) \
+  $(foreach f,$(patsubst share/%,%,$(wildcard share/slurm/*.sbatch)),755:share/$f:$(DATADIR)/spikefield/$f) \
   $(foreach f,$(filter-out cocotb/sf_cocotb.py,$(patsubst share/%,%,$(wildcard share/cocotb/*.*))),644:share/$f:$(DATADIR)/spikefield/$f) \
   755:share/cocotb/sf_cocotb.py:$(DATADIR)/spikefield/cocotb/sf_cocotb.py \
   644:$B/share/spikefield/VERSION:$(DATADIR)/spikefield/VERSION
