@@ -69,7 +69,7 @@ class Reach:
     def archive(self, pool):
         shutil.rmtree(self.cover, ignore_errors=True)
         objects = [f"{self.cover}/{path[:-2]}.o" for path in self.files]
-        for _ in pool.map(lambda pair: self.build.compile_whole(pair[0], ["-O0", "--coverage"], pair[1]), zip(self.files, objects)):
+        for _ in pool.map(lambda pair: self.build.compile_whole(pair[0], ["-O0", "--coverage", "-fprofile-update=single"], pair[1]), zip(self.files, objects)):
             pass
         subprocess.run(["ar", "rcs", f"{self.cover}/cover.a"] + objects, check=True)
 
