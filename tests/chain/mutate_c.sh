@@ -39,6 +39,9 @@ verdict() {
 }
 
 : >"$work/equivalent"
+campaign 1 --minutes 0.0001
+grep -q 'time is over with 0 of 1' "$work/log" || fail "programs were measured behind the time's end"
+campaign 0 --reach-only
 campaign 0 --minutes 0.0001
 [ ! -s "$work/mutate-c/results" ] || fail "mutants were judged behind the time's end"
 campaign 1

@@ -164,7 +164,8 @@ def options():
 
 
 def main():
-    given, begin = options(), time.time()
+    given = options()
+    deadline = time.time() + 60 * given.minutes if given.minutes else None
     if c_operators.cindex is None:
         print("mutate-c: python3-clang-14 is not installed")
         return 77
@@ -186,13 +187,12 @@ def main():
         for m in sorted((m for row in chosen.values() for m in row), key=lambda m: (m.module, edits[m.number].start)):
             print(f"{m.place}: {edits[m.number].operator}: {m.what}")
         return 0
-    reach = c_reach.Reach(build, {path for path in [*files, *sum(rows_of(ROOMS).values(), [])] if path in build.compilers}, given.jobs)
+    reach = c_reach.Reach(build, {path for path in [*files, *sum(rows_of(ROOMS).values(), [])] if path in build.compilers}, given.jobs, deadline)
     reach.load()
     if given.reach_only:
         return 0
 
-    judge = Judge(build, reach, edits, begin + 60 * given.minutes if given.minutes else None)
-    return campaign_of(rows, mutants, chosen, equivalents, judge, given.jobs)
+    return campaign_of(rows, mutants, chosen, equivalents, Judge(build, reach, edits, deadline), given.jobs)
 
 
 def campaign_of(rows, mutants, chosen, equivalents, judge, jobs):

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 
 import campaign
 
@@ -27,8 +28,8 @@ def timed(command, folder, fork, **more):
 
 
 class Reach:
-    def __init__(self, build, files, jobs):
-        self.build, self.files, self.jobs = build, sorted(files), jobs
+    def __init__(self, build, files, jobs, deadline=None):
+        self.build, self.files, self.jobs, self.deadline = build, sorted(files), jobs, deadline
         self.path, self.cover = f"{build.work}/reach.json", f"{build.work}/cover"
         self.tests = {}
 
@@ -48,23 +49,34 @@ class Reach:
             if missing:
                 print(f"reach: {len(missing)} test programs", flush=True)
                 self.archive(pool)
-                for name, entry in zip(missing, pool.map(self.measured, missing)):
-                    self.tests[name] = {"full": full[name], "key": keys[name], **entry}
+                waiting = {pool.submit(self.measured, name): name for name in missing}
+                for future in concurrent.futures.as_completed(waiting):
+                    if future.result():
+                        name = waiting[future]
+                        self.tests[name] = {"full": full[name], "key": keys[name], **future.result()}
+                        self.keep()
                 shutil.rmtree(self.cover)
-                with open(self.path + ".new", "w") as f:
-                    json.dump(self.tests, f)
-                os.replace(self.path + ".new", self.path)
+        if len(self.tests) < len(names):
+            raise campaign.Stop(f"the time is over with {len(self.tests)} of {len(names)} test programs measured; run it again to go on")
         self.index()
+
+    def keep(self):
+        """Each at once: an interrupted measurement goes on where it was."""
+        with open(self.path + ".new", "w") as f:
+            json.dump(self.tests, f)
+        os.replace(self.path + ".new", self.path)
 
     def archive(self, pool):
         shutil.rmtree(self.cover, ignore_errors=True)
         objects = [f"{self.cover}/{path[:-2]}.o" for path in self.files]
-        for _ in pool.map(lambda pair: self.build.compile_whole(pair[0], ["-O0", "--coverage"], pair[1]), zip(self.files, objects)):
+        for _ in pool.map(lambda pair: self.build.compile_whole(pair[0], ["-O0", "--coverage", "-fprofile-update=single"], pair[1]), zip(self.files, objects)):
             pass
         subprocess.run(["ar", "rcs", f"{self.cover}/cover.a"] + objects, check=True)
 
     def measured(self, name):
-        """What a program costs with and without forks, and what it reaches."""
+        """What a program costs, whether it needs forks, and what it reaches; None when the time is over."""
+        if self.deadline and time.time() > self.deadline:
+            return None
         folder = f"{self.cover}/run/{name}"
         program = f"{folder}/{name}"
         os.makedirs(folder)
