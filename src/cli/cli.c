@@ -1,4 +1,5 @@
 #include "cli/cli.h"
+#include "base/cpu.h"
 #include "base/io.h"
 #include "spikefield/spikefield.h"
 #include <ctype.h>
@@ -245,6 +246,7 @@ sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **po
     const char *usage = cli->usage ? cli->usage : cli->program;
     return sf_fail(SF_E_USAGE, "missing argument; usage: %.*s", (int)strcspn(usage, "\n"), usage);
   }
+  SF_TRY(sf_cpu_check());
   return check_outputs(cli, positional);
 }
 

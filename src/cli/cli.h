@@ -45,7 +45,8 @@ typedef struct sf_cli {
 /* Fills option values and positional[] (pointers into argv; NULL where absent). Options may follow positionals, and
  * --name=value works. --help and --version print and exit with 0. So does --completion, which `make install` uses and
  * --help does not show. SF_E_USAGE names the wrong option; an OUTPUT or PLACE must not be another file of the line.
- * SF_E_IO: an OUTPUT cannot be written. Ignores SIGXFSZ, so that a file-size limit is an ordinary write error. */
+ * SF_E_RANGE: a wrong SPIKEFIELD_CPU (base/cpu.h). SF_E_IO: an OUTPUT cannot be written. Ignores SIGXFSZ, so that a
+ * file-size limit is an ordinary write error. */
 sf_status sf_cli_parse(const sf_cli *cli, int argc, char **argv, const char **positional);
 
 /* Copies options to `to` and returns the place after them. So a table may be put together from parts. */

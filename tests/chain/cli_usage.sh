@@ -68,6 +68,7 @@ usage "--steps-along-ray has no effect on --net ann" sf_train d -o out --net ann
 usage "--fixed-steps has no effect beside --steps-along-ray" sf_train d -o out --steps-along-ray --fixed-steps 2
 usage "--charge has no effect beside --steps-along-ray" sf_train d -o out --steps-along-ray --charge 0.2
 usage "number of steps is fixed" sf_train d -o out --steps-along-ray --target-loss 0.1
+SPIKEFIELD_CPU=avx data "SPIKEFIELD_CPU=avx: expected portable, avx2" sf_train d -o out
 usage "exclude each other" sf_train d -o out --target-loss 0.1 --target-saving 50
 number sf_train --psnr-prefixes -1 nan
 number sf_train --weight-bits 1 9 nan
