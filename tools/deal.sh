@@ -6,9 +6,9 @@
 # What a launcher says of this script is not meant for the programs that it starts.
 unset OMPI_COMM_WORLD_SIZE SLURM_STEP_NUM_TASKS PMI_SIZE
 
-# join SETTINGS: this process takes part. False where others are at work with other settings. FRESH FUNCTION runs alone, when
-# the settings are new.
-join_others() { # SETTINGS [FUNCTION]
+# join_others SETTINGS [FUNCTION]: this process takes part. False where others are at work with other settings. The function
+# runs alone, when the settings are new.
+join_others() {
   local tries
   exec 9>>"$out/lock" || return
   for ((tries = 0; tries < 25; tries++)); do

@@ -186,12 +186,10 @@ static void print_files(const job *j, const char *contact, char before[2][65])
 {
   char now[2][65];
   hash_file(j, SF_MANIFEST_NAME, now[0]), hash_file(j, SF_CONTACT_NAME, now[1]);
-  const bool manifest_kept = !strcmp(now[0], before[0]), contact_kept = !strcmp(now[1], before[1]);
-  printf("%s %s and %s%s\n", manifest_kept ? "kept" : "wrote", j->set.manifest_path,
-         manifest_kept == contact_kept ? ""
-         : contact_kept                ? "kept "
-                                       : "wrote ",
-         contact);
+  const bool manifest = !strcmp(now[0], before[0]), picture = !strcmp(now[1], before[1]);
+  printf("%s %s and ", manifest ? "kept" : "wrote", j->set.manifest_path);
+  if (picture != manifest) printf("%s ", picture ? "kept" : "wrote");
+  printf("%s\n", contact);
 }
 
 static sf_status render_all(job *j)

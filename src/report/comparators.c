@@ -6,8 +6,8 @@
 
 typedef enum { TWIN, LEARNED, CONVERTED, ALONG, FIXED } method;
 
-/* One method's numbers; a row has their means over the seeds. */
-/* BASE, OWN: energy of the ANN run, and of the twin on the method's own samples. */
+/* One method's numbers; a row has their means over the seeds. BASE, OWN: energy of the ANN run, and of the twin on the
+ * method's own samples. */
 enum { STEPS, PSNR, ANN_PSNR, EXCESS, ENERGY, BASE, OWN, NUMBERS };
 typedef struct point {
   double number[NUMBERS];

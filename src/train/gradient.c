@@ -87,20 +87,20 @@ static void count_along(const sf_config *c, int first, const sf_block *b, int la
   }
 }
 
-void sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
 {
-  const int lanes = sf_bundle_lanes(&t->batch, bundle);
+  const sf_ray *ray = t->batch.ray + bundle->ray;
+  const int lanes = bundle->rays ? ray[bundle->rays - 1].first + ray[bundle->rays - 1].count : 0;
   for (int b = 0; b < bundle->blocks; b++) {
     sf_block *block = (sf_block *)((char *)w->block + (size_t)b * t->backbone->block_bytes); /* of a decoder's: first */
     block->lanes = sf_block_lanes(lanes, b);
     block->first = 0;
     if (!t->model.config.along) continue;
     for (int l = 0; l < SF_BLOCK; l++) block->state[l] = &w->state;
-    for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
-      const sf_ray *ray = &t->batch.ray[r];
-      if (ray->count && ray->first / SF_BLOCK == b) block->first |= (uint64_t)1 << ray->first % SF_BLOCK;
-    }
+    for (int r = 0; r < bundle->rays; r++)
+      if (ray[r].count && ray[r].first / SF_BLOCK == b) block->first |= (uint64_t)1 << ray[r].first % SF_BLOCK;
   }
+  return lanes;
 }
 
 void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *b, int lanes, sf_group *g)

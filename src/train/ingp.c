@@ -67,23 +67,21 @@ static void load_block(const sf_trainer *t, const sf_bundle *bundle, int index, 
   memcpy(b->f, t->batch.f + (size_t)(bundle->block + index) * plane, plane * sizeof(float));
 }
 
-/* Spherical harmonics of every lane, zeros in those after the last sample; how many lanes hold samples. */
-static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+/* Spherical harmonics of every lane, zeros in those after the last sample. */
+static void load_directions(const sf_trainer *t, const sf_bundle *bundle, int lanes, sf_worker *w)
 {
   const sf_batch *batch = &t->batch;
-  int lane = 0;
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     const sf_ray *ray = &batch->ray[r];
     float sh[SF_DIR_FEATURES];
     sf_sh4(ray->direction, sh);
     sf_scales_round_direction(&t->model.scales, sh, SF_DIR_FEATURES);
-    for (lane = ray->first; lane < ray->first + ray->count; lane++)
+    for (int lane = ray->first; lane < ray->first + ray->count; lane++)
       for (int i = 0; i < SF_DIR_FEATURES; i++)
         ((sf_block *)w->block)[lane / SF_BLOCK].sh[i * SF_BLOCK + lane % SF_BLOCK] = sh[i];
   }
-  for (int l = lane; l < bundle->blocks * SF_BLOCK; l++)
+  for (int l = lanes; l < bundle->blocks * SF_BLOCK; l++)
     for (int i = 0; i < SF_DIR_FEATURES; i++) ((sf_block *)w->block)[l / SF_BLOCK].sh[i * SF_BLOCK + l % SF_BLOCK] = 0;
-  return lane;
 }
 
 static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w, sf_group *g)
@@ -93,8 +91,8 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   const sf_batch *batch = &t->batch;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   const bool along = t->model.config.along;
-  const int lanes = load_directions(t, bundle, w);
-  sf_mark_lanes(t, bundle, w);
+  const int lanes = sf_mark_lanes(t, bundle, w);
+  load_directions(t, bundle, lanes, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &block[b]);
     if (along)

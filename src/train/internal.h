@@ -329,14 +329,9 @@ static inline int sf_block_lanes(int lanes, int index)
   const int left = lanes - index * SF_BLOCK;
   return left < 0 ? 0 : left < SF_BLOCK ? left : SF_BLOCK;
 }
-/* Lanes of a bundle that hold samples. */
-static inline int sf_bundle_lanes(const sf_batch *b, const sf_bundle *bundle)
-{
-  const sf_ray *last = &b->ray[bundle->ray + bundle->rays - 1];
-  return bundle->rays ? last->first + last->count : 0;
-}
-/* Of a net along rays: what its kernels are told of the bundle's lanes and rays; lanes of any net. */
-void sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *worker);
+/* Tells the blocks how many of their lanes hold samples, and of a net along rays, where its rays begin. Returns the
+ * bundle's lanes that hold samples. */
+int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *worker);
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
 /* Adds the spikes of spiking layers `first`..2 in the first `lanes` lanes of a block. */

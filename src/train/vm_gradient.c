@@ -3,21 +3,19 @@
 #include <math.h>
 #include <string.h>
 
-/* Directions of every lane, zeros in those after the last sample; how many lanes hold samples. */
-static int load_directions(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+/* Directions of every lane, zeros in those after the last sample. */
+static void load_directions(const sf_trainer *t, const sf_bundle *bundle, int lanes, sf_worker *w)
 {
   const sf_tensorf *f = &t->model.config.tensorf;
-  int lane = 0;
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     const sf_ray *ray = &t->batch.ray[r];
     const sf_vm_direction d = sf_vm_encode_direction(&t->model, ray->direction);
-    for (lane = ray->first; lane < ray->first + ray->count; lane++)
+    for (int lane = ray->first; lane < ray->first + ray->count; lane++)
       sf_vm_put_direction(f, &d, ((sf_decoder_block *)w->block)[lane / SF_BLOCK].in, lane % SF_BLOCK);
   }
   const sf_vm_direction none = {0};
-  for (int l = lane; l < bundle->blocks * SF_BLOCK; l++)
+  for (int l = lanes; l < bundle->blocks * SF_BLOCK; l++)
     sf_vm_put_direction(f, &none, ((sf_decoder_block *)w->block)[l / SF_BLOCK].in, l % SF_BLOCK);
-  return lane;
 }
 
 /* Densities of all samples of the ray, which every prefix shares; colours where the decoder ran, elsewhere black. */
@@ -67,8 +65,8 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   sf_vm *vm = t->vm;
   const int products = vm->decoder->view.products;
   const bool along = t->model.config.along;
-  const int lanes = load_directions(t, bundle, w);
-  sf_mark_lanes(t, bundle, w);
+  const int lanes = sf_mark_lanes(t, bundle, w);
+  load_directions(t, bundle, lanes, w);
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,
                             block[b].product, products);
