@@ -1,7 +1,7 @@
 /* Error budget: from a ray to features and harmonics. Derivations: docs/fixed-point.md. */
 #include "quant/quant.h"
 #include "bounds/budget_blocks.h"
-#include "bounds/exact.h"
+#include "bounds/exact_field.h"
 #include "src/fx/unit.h"
 #include <string.h>
 

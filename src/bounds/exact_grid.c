@@ -1,5 +1,5 @@
 /* The hash grid in double precision, each block fixed or real. */
-#include "bounds/exact.h"
+#include "bounds/exact_field.h"
 #include "src/fx/unit.h"
 
 static void corner_weights(bool exact, const double g[3], double weight[8])

@@ -4,7 +4,7 @@
  * times line LSB, one value for all components, from which the activation's argument follows; in the appearance the
  * same times a column of the basis matrix. So the LSBs are found from the entries of both, and what error they have
  * cancels where both are real. */
-#include "bounds/exact.h"
+#include "bounds/exact_field.h"
 #include "src/fx/tensorf.h"
 #include "src/fx/unit.h"
 #include <stdlib.h>
