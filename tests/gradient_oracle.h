@@ -22,6 +22,7 @@ typedef struct oracle {
   dual *value;      /* [model.size] */
   double charge[3]; /* of a neuron of D1, C1, C2 that fires at any step of a sample */
   double *rounded;  /* the weights that the nets run with, [model.size]; NULL: those of `value` */
+  uint64_t *signs;  /* a leak's slope has a random sign wherever it is used, drawn from this state; NULL: its own */
 } oracle;
 
 typedef struct oracle_ray {
@@ -61,7 +62,10 @@ static inline dual parameter(const oracle *o, int id, size_t at)
 
 static inline dual leak(const oracle *o, int layer)
 {
-  return logistic(o->value[o->t->model.param[SF_P_LEAK].offset + (size_t)layer]);
+  const dual x = o->value[o->t->model.param[SF_P_LEAK].offset + (size_t)layer];
+  if (!o->signs) return logistic(x);
+  *o->signs = *o->signs * 6364136223846793005u + 1442695040888963407u;
+  return logistic(with_slope(creal(x), *o->signs >> 63 ? 1 : -1, x));
 }
 
 /* ---- the nets ---- */
