@@ -104,7 +104,7 @@ static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, 
   if (!log) return sf_ok();
   train_show(&w.progress, s, &w.recent);
   sf_progress_end(&w.progress);
-  return ferror(log) ? sf_fail(SF_E_IO, "%s: cannot write the log", a->log) : sf_ok();
+  return sf_ok();
 }
 
 static sf_status stopped_evaluation(const train_arguments *a, const keeper *k)
@@ -277,8 +277,11 @@ static sf_status learn(sf_trainer *trainer, const train_arguments *a, train_watc
   if (stats->stage == 3) return sf_ok();
   SF_TRY(sf_ranks_agree(a->train.ranks, open_log(a, &log)));
   sf_status status = loop(trainer, a, log, watch, stats, k);
-  if (log && fclose(log) && !status.code) status = sf_fail(SF_E_IO, "%s: cannot write the log", a->log);
+  const bool cut = log && ferror(log);
+  const bool logged = !log || (!fclose(log) && !cut);
   if (!status.code) status = keep_learned(trainer, a, k);
+  if (!status.code && !logged)
+    status = sf_fail(SF_E_IO, "%s: cannot write the log; the model is saved: %s", a->log, a->output);
   return sf_ranks_lost(a->train.ranks) ? status : sf_ranks_agree(a->train.ranks, status);
 }
 

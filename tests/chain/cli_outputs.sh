@@ -84,6 +84,11 @@ status=$?
 check "full disk" "not told once" [ "$(grep -c 'warning: cannot write full.out.*the run goes on' err)" -eq 1 ]
 sed -i '/warning/d' err
 judge "full disk: checkpoints" sf_train 1 full.out
+# A log without room does not cost the model.
+rm -f learned.out && timeout -k 5 60 "$BIN/sf_train" "${train[@]}" -o learned.out --log /dev/full >stdout.txt 2>err </dev/null
+status=$?
+judge "full disk: log" sf_train 1 "the model is saved: learned.out"
+check "full disk: log" "no model" [ -s learned.out ]
 (ulimit -f 1; exec timeout -k 5 60 "$BIN/sf_scene" simple -o fullscene --size 64 --train 1 --test 1 >stdout.txt 2>err </dev/null)
 status=$?
 judge "full disk: sf_scene" sf_scene 1 fullscene

@@ -201,6 +201,12 @@ narrow=(-n 1 env SPIKEFIELD_CPU=portable)
 job 1 "$bin/sim_render" scene.snn views --all -o mixed -q : "${narrow[@]}" "$bin/sim_render" scene.snn views --all -o mixed -q >/dev/null 2>render.err ||
   fail "sim_render on two CPUs: $(cat render.err)"
 diff -r one mixed >diff.out || fail "two CPUs render another set: $(cat diff.out)"
+cosim=("$build/faults/sf_cosim" scene.snn data --quiet --json --rays 40 --block 5)
+job 1 "${cosim[@]}" : "${narrow[@]}" "${cosim[@]}" >mixed.json 2>mixed.err || fail "sf_cosim on two CPUs: $(cat mixed.err)"
+same mixed.json equal0.json "two CPUs"
+job 1 "$bin/energy_audit" "${audit[@]}" : "${narrow[@]}" "$bin/energy_audit" "${audit[@]}" >mixed.json 2>mixed.err ||
+  fail "energy_audit on two CPUs: $(cat mixed.err)"
+same mixed.json audit0.json "two CPUs"
 if grep -q avx2 /proc/cpuinfo; then
   refused 1 "has another instruction set than rank 0" -n 1 "$bin/sf_train" photos $small $grid -q -o x.model : "${narrow[@]}" "$bin/sf_train" photos $small $grid -q -o x.model
   grep -q 'SPIKEFIELD_CPU' refused.out || fail "no word about what the ranks may share: $(cat refused.out)"
@@ -214,5 +220,8 @@ refused 1 "sim_render: rank 1 on " -n 1 "$bin/sim_render" scene.snn views --all 
 grep -q 'tight/view_[0-9]*.exr.*: File too large' refused.out || fail "a full disk: the file is not named: $(cat refused.out)"
 job 2 "$bin/sim_render" scene.snn views --all -o tight -q >/dev/null 2>render.err || fail "after a full disk: $(cat render.err)"
 diff -r one tight >diff.out || fail "after a full disk: another set: $(cat diff.out)"
+train=("$bin/sf_train" photos ${small/--stage2 250/--stage2 28} $grid -q -o tight.model)
+refused 1 "sf_train: cannot write tight.model" -n 1 bash -c "$(full 1)" "${train[@]}" : -n 1 "${train[@]}"
+[ ! -e tight.model ] || fail "sf_train, a full disk: half a model is there"
 
 finish "1, 2, 3, 4 ranks, killed, interrupted and continued: what one process gives"
