@@ -46,4 +46,11 @@ ln -s "$programs" a/bin && ln -s "$programs" b/bin
 BUILD=$work/b batch reproduce --array=0-1 --cpus-per-task=1 --chdir="$here" -- "${smoke[@]}" || fail "reproduce.sbatch: $(tail -n 5 job.out)"
 [ "$(grep -c '^\[.* dB, ' job.out)" -eq "$(grep -c '^\[.* dB, ' a.out)" ] || fail "reproduce.sbatch: not each run once: $(grep '^\[' job.out)"
 diff a/reproduce/smoke/table.md b/reproduce/smoke/table.md >/dev/null || fail "reproduce.sbatch: another table"
+
+# Points of a sweep, of a model of its own.
+"$here/tools/pareto.sh" "$work/a" --profile smoke --variants none >a.out 2>&1 || fail "pareto.sh: $(tail -n 3 a.out)"
+BUILD=$work/b batch pareto --array=0-1 --cpus-per-task=1 --chdir="$here" -- --profile smoke --variants none || fail "pareto.sbatch: $(tail -n 5 job.out)"
+points() { (cd "$1/pareto/smoke/points" && grep -v '"samples_per_second"' ./*.json); }
+[ "$(points a | wc -l)" -gt 50 ] || fail "pareto.sh: no points"
+diff <(points a) <(points b) || fail "pareto.sbatch: other points"
 finish "sbatch: what one process gives"
