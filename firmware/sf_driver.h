@@ -16,6 +16,7 @@ enum {
 #undef SF_CSR_FIELD
 };
 
+/* How the driver reaches the registers of the block: 32-bit words, byte offsets from its base. */
 typedef struct sf_bus {
   uint32_t (*read)(void *context, uint32_t offset);
   void (*write)(void *context, uint32_t offset, uint32_t value);

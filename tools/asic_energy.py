@@ -123,6 +123,7 @@ class Work:
 
 
 def kept(path, key):
+    """The JSON of an earlier run, if it was made with the same `key`; None otherwise."""
     try:
         with open(path, encoding="utf-8") as file:
             found = json.load(file)

@@ -138,6 +138,7 @@ def hand_over(work, build, result):
 
 
 def table_of(results):
+    """The results as Markdown: modules, memories, notes."""
     lines = []
     for text, result in results.items():
         lines += [f"`{text}`: {result['library']}, {result['voltage']:g} V, {result['clock_mhz']:g} MHz, clock gating {'on' if result['gating'] else 'off'}", "",

@@ -106,6 +106,7 @@ class Flow:
         return digest(text_of_tree(self.root), *PACKAGES, "board 1")
 
     def run(self):
+        """Synthesis, place and route; returns nextpnr's report and the key of what it was made from."""
         board, name = self.board, self.arguments.board
         key = digest(self.begin(), board["top"])
         script = (f"read_verilog -sv -defer -D SF_NO_TAP -Irtl {' '.join(sources_of_board(self.root, name))}; "
@@ -137,6 +138,7 @@ def describe(board, report):
 
 
 def print_result(result):
+    """Use of the device, longest path and clock, in three lines."""
     print(f"{result['board']} ({result['device']}): " +
           ", ".join(f"{result[name]} of {result[name + '_available']} {name.replace('_', ' ')}" for name in CELLS))
     path = result["critical_path"]

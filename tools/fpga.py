@@ -86,6 +86,7 @@ class Tools:
             self.install(stamp, wanted)
 
     def install(self, stamp, wanted):
+        """Make the environment and install Yosys and nextpnr there; Stop with 77 without PyPI."""
         self.say("installing " + " and ".join(PACKAGES) + " into " + self.folder)
         os.makedirs(os.path.dirname(stamp), exist_ok=True)
         for command in ([sys.executable, "-m", "venv", self.folder],

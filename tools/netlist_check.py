@@ -146,6 +146,7 @@ def planted(check, where):
 
 
 def measure(check, kits):
+    """Build and simulate one netlist against the kit, and with planted errors; returns its result."""
     check.make()
     arguments = check.work.arguments
     check.work.say(f"{check.text} in {check.mapper.name}: {arguments.samples} samples in {arguments.simulator}")
@@ -159,6 +160,7 @@ def measure(check, kits):
 
 
 def table_of(results):
+    """The results as Markdown, with a note for each netlist."""
     lines = ["| netlist | cells of | cells | registers | samples compared | differences | s | planted errors found |", "|---|---|---|---|---|---|---|---|"]
     notes = []
     for name, result in results.items():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What training and co-simulation cost on ranks of this machine, a model fitted to it, and what it says of clusters.
+"""What training, co-simulation and the launcher cost on ranks of this machine, a model fitted to it, and what it says of clusters.
 
 usage: scale.py BUILD DATA   (make scale DATA=folder; docs/scale.md explains the lines)
 
@@ -21,6 +21,7 @@ ITERATIONS = 40000       # of the paper's runs
 COSIM_SAMPLES = 100e6
 COSIM_RAYS = 32
 BLOCK_BYTES = 54e3       # that come back of a block of sf_cosim
+LAUNCHED = (2, 4)
 NODES, GBITS = (8, 64, 512), (25, 100)
 
 
@@ -54,6 +55,7 @@ def fit(points):
 
 
 def train(binary, data, work):
+    """Print what an iteration costs on ranks, the model of it, and what that says of clusters."""
     found = {n: iteration(binary, data, work, n) for n in sorted(FITTED + (CHECKED,))}
     shared, each = fit([(n, found[n][0]) for n in FITTED])
     for n, (cpu, sent) in found.items():
@@ -73,6 +75,7 @@ def train(binary, data, work):
 
 
 def cosim(binary, data, work):
+    """Print the rate of co-simulation, and what that says of clusters. After train(), whose model it exports."""
     measure([binary + "/sf_export", work + "/model", "-o", work + "/scene.snn"])
     out, cpu = measure([binary + "/sf_cosim", work + "/scene.snn", data, "--rays", str(COSIM_RAYS), "-q", "--json"])
     samples = json.loads(out)["samples"]
@@ -86,6 +89,15 @@ def cosim(binary, data, work):
                   f"{wire / (work_s + wire):5.1%} of it on rank 0's wire")
 
 
+def launch(binary, data, work):
+    """After cosim(): what a job costs that has nothing to do."""
+    command = [binary + "/sf_cosim", work + "/scene.snn", data, "--rays", "1", "--block", "1", "-q", "--json"]
+    _, alone = measure(command)
+    for ranks in LAUNCHED:
+        _, cpu = measure(command, ranks)
+        print(f"launch.ranks_{ranks:<11} {cpu - alone:8.2f} s of processor more than one process, whatever is computed")
+
+
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
@@ -96,6 +108,7 @@ def main():
     with tempfile.TemporaryDirectory() as work:
         train(binary, sys.argv[2], work)
         cosim(binary, sys.argv[2], work)
+        launch(binary, sys.argv[2], work)
 
 
 if __name__ == "__main__":

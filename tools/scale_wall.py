@@ -26,6 +26,7 @@ def processor():
 
 
 class Bench:
+    """Programs, data and the time that is left for all runs."""
     def __init__(self, build, data, work, minutes):
         self.bin, self.data, self.work = build + "/bin/", data, work
         self.end = time.monotonic() + 60 * minutes
@@ -41,6 +42,7 @@ class Bench:
         return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=left).stdout
 
     def prepare(self):
+        """Make what the runs need: a data set where none was given, views and a small scene."""
         if not os.path.exists(self.data + "/transforms_train.json"):
             self.data = self.work + "/data"
             self.call([self.bin + "sf_scene", "textured", "-o", self.data, "--size", "128", "--train", "12", "--test", "1"])

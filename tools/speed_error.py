@@ -104,6 +104,7 @@ class Bench:
         return self.train("base", TINY if self.profile == "smoke" else ["--minutes", 2])
 
     def train(self, name, options):
+        """The model `name`, trained unless it is there; a model that is cut short is never taken."""
         model = self.path("models", f"{name}.safetensors")
         if not os.path.exists(model):
             partial = self.path("models", f"{name}.part.safetensors")
@@ -183,6 +184,7 @@ class Bench:
         self.point(group, name, model, options, lambda: self.fixed(self.export(f"{group}-{name}", model, options), model))
 
     def make_points(self):
+        """All points of the profile, one after the other; those that are there are kept."""
         base, smoke = self.prepare(), self.profile == "smoke"
         for steps in range(1, 9):
             self.exported("steps", f"t = {steps}", base, ["--steps", steps])
@@ -204,6 +206,7 @@ class Bench:
         self.exported("backbone", name, self.train("tensorf", ["--backbone", "tensorf", *tensorf]), [])
 
     def points(self):
+        """The points on disk, in the table's order."""
         found = []
         for name in sorted(os.listdir(self.path("points", ""))):
             if name.endswith(".json"):
@@ -227,6 +230,7 @@ def mark_fronts(points):
 # ---- table, picture, page ----
 
 def cells(p):
+    """A point as the cells of its row; a star marks a front."""
     marks = p.get("fronts", [])
     row = [GROUPS[p["group"]][0], p["name"], f"{p['psnr']:.2f}", f"{p['float_psnr'] - p['psnr']:.2f}"]
     for key, _, _ in COSTS:
@@ -282,6 +286,7 @@ def panel(points, key, title, unit, top, left, width, height):
 
 
 def picture(points):
+    """The SVG: a panel for each cost, a legend below."""
     panels = [cost for cost in COSTS if any(cost[0] in p for p in points)]
     wide, tall = 360, 300
     total = 60 + len(panels) * (wide + 60)
@@ -317,6 +322,7 @@ at a circle to read its name. Seconds are those of the fastest of {repeat} runs,
 
 
 def page(bench, points, svg):
+    """The HTML page: the picture and the table."""
     about = (f"View {bench.view} of {os.path.basename(os.path.dirname(bench.data)) or '.'}/{os.path.basename(bench.data)}, profile {bench.profile}. "
              f"CPU: {cpu()}, {os.cpu_count()} threads. dB lost: against the same model in float, at its own number of steps.")
     rows = "\n".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells(p)) + "</tr>" for p in points)
@@ -325,6 +331,7 @@ def page(bench, points, svg):
 
 
 def cpu():
+    """The processor's name."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             return next(line.split(":")[1].strip() for line in file if line.startswith("model name"))
@@ -339,6 +346,7 @@ def write(bench, name, text):
 
 
 def report(bench):
+    """Write table, JSON, picture and page of the points on disk."""
     points = bench.points()
     if not points:
         raise Failed(f"{bench.out}: no points: run it without --report")

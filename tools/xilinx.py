@@ -64,6 +64,7 @@ def count(stat, top):
 
 
 def table_of(rows, top, device):
+    """Resources of each module as Markdown, with per cent of the device for the top."""
     limits = DEVICES[device]
     lines = ["| module | instances | " + " | ".join(KINDS) + " |", "|---" * (len(KINDS) + 2) + "|"]
     for name, row in sorted(rows.items(), key=lambda item: (-item[1].get("LUT", 0), item[0])):

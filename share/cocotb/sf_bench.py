@@ -117,6 +117,7 @@ class Block:
             channel.pause = False
 
     def stream(self):
+        """Let samples through, with bubbles and back-pressure where they are asked for; begin to watch the tap."""
         self.stall_bus(False)
         self.sink.pause = False
         if config["stalls"]:
@@ -182,6 +183,7 @@ def first_neuron(expected, actual, bits):
 
 
 def compare_tap(layer, step, shown, beat, where):
+    """Rows, spikes and membranes of one beat of the tap against the fixed-point core. AssertionError names the neuron."""
     name = f"{where} layer {LAYERS[layer]} step {step}"
     actual_step, spikes, rows, membranes = beat
     assert actual_step == step, f"{name}: the tap shows step {actual_step}"
@@ -214,6 +216,7 @@ def compare_taps(block, traces):
 
 
 def compare_result(at, frame, sample):
+    """A sample's two beats of m_axis: density and three channels of colour, 32 bits each."""
     beats = frame.tdata
     assert len(beats) == 2, f"sample {at}: a result of {len(beats)} beats, expected 2"
     low = (1 << 32) - 1
@@ -224,6 +227,7 @@ def compare_result(at, frame, sample):
 
 
 def compare_window(actual, counts):
+    """Every counter of the window against the core's, but those of time, which the core does not have."""
     expected = scene.window(counts)
     for at in np.flatnonzero(actual != expected):
         event, layer, step = at // 64, at // 8 % 8, at % 8
@@ -259,6 +263,7 @@ async def stream_ray(block, packed):
 
 
 def ray_test(name, packed):
+    """A coroutine that is the test case `name`: it streams one ray and compares everything."""
     async def one(dut):
         start = time.monotonic()
         block = Block(dut, name)

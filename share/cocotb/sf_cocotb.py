@@ -43,6 +43,7 @@ def is_there(module):
 
 
 def check_environment():
+    """Find cocotb 1.9, spikefield and its library; Trouble names what is missing."""
     missing = [package for module, package in NEEDED.items() if not is_there(module)]
     if missing:
         raise Trouble(f"{', '.join(missing)}: not installed for {sys.executable}: "
@@ -74,6 +75,7 @@ def find_export(named):
 
 
 def make_kit(options, program, kit):
+    """Vectors of the scene for these rays, by sf_export, in the folder `kit`."""
     shutil.rmtree(kit, ignore_errors=True)
     done = subprocess.run([program, options.scene, "--vectors", kit, "--data", options.data, "--samples",
                            str(options.samples), "--seed", str(options.seed)], capture_output=True, text=True)
@@ -122,6 +124,7 @@ def build_key(command, includes, files):
 
 
 def verilator(folder, block, top):
+    """The commands that build and run the bench in Verilator, in `folder`. `block`: include folders, other options, sources."""
     import cocotb
     libs = os.path.join(os.path.dirname(cocotb.__file__), "libs")
     main = os.path.join(os.path.dirname(cocotb.__file__), "share", "lib", "verilator", "verilator.cpp")
@@ -136,6 +139,7 @@ def verilator(folder, block, top):
 
 
 def icarus(folder, block, top):
+    """As verilator(), for Icarus Verilog."""
     import cocotb
     libs = os.path.join(os.path.dirname(cocotb.__file__), "libs")
     includes, others, files = block
@@ -172,6 +176,7 @@ def build(options, folder, block):
 # ---- the run
 
 def environment(config_path, results):
+    """The environment of a simulation: what cocotb 1.9 and the bench read from it."""
     import cocotb.config
     import find_libpython
     import spikefield
@@ -212,6 +217,7 @@ def reason(case, log):
 
 
 def run(options, folder, command, kit):
+    """Simulate; leaves results.xml, summary.json and run.log in `folder`. Trouble when there are no results."""
     results, summary = os.path.join(folder, "results.xml"), os.path.join(folder, "summary.json")
     for old in (results, summary):
         if os.path.exists(old):
@@ -238,6 +244,7 @@ def percent(text):
 
 
 def arguments():
+    """The parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, usage=argparse.SUPPRESS)
     parser.add_argument("scene", help="a .snn file (sf_export)")
     parser.add_argument("data", help="the data set whose rays are streamed")

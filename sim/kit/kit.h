@@ -44,6 +44,8 @@ typedef struct sf_kit_sample {
   fx_trace trace;
 } sf_kit_sample;
 
+/* Samples drawn for a kit: rays of random pixels, and of each the samples that meet something, at most `limit` in all.
+ * base: what each lane of a readout starts from. counts: events of all samples. */
 typedef struct sf_kit_draw {
   sf_kit_ray *ray;
   sf_kit_sample *sample;

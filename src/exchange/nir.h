@@ -30,6 +30,7 @@ typedef struct sf_nir_node {
   sf_nir_notes notes;
 } sf_nir_node;
 
+/* A net as NIR writes it: an edge is the names of the nodes that it joins. */
 typedef struct sf_nir_graph {
   sf_nir_node node[SF_NIR_NODES];
   const char *edge[SF_NIR_EDGES][2];

@@ -47,6 +47,7 @@ typedef struct sf_fog {
 
 enum { SF_STAGE_SHAPES = 64, SF_STAGE_FOGS = 4 };
 
+/* What a procedural scene is made of; shapes and fogs count what is used. */
 typedef struct sf_stage {
   sf_shape shape[SF_STAGE_SHAPES];
   sf_fog fog[SF_STAGE_FOGS];

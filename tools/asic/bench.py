@@ -203,6 +203,7 @@ def run(netlist, record, clock, idle, period, folder):
 
 
 def counted(output, netlist, columns, folder):
+    """What a simulation printed: events per instance and state of its pins, differences to the recorded outputs, where the first is."""
     counts = [{}, {}]
     different, where, compared = 0, "", 0
     sizes = [(len(events_of(instance.cell)) << len(pins_of(instance.cell)), len(pins_of(instance.cell))) for instance in netlist.instances]

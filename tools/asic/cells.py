@@ -25,6 +25,7 @@ class Expression:
         return self.tokens[0] if self.tokens else ""
 
     def chain(self, part, signs, sign):
+        """Terms of one level of precedence, joined by `signs`, as Python with `sign`."""
         text = part()
         while self.peek() in signs and self.peek():
             self.tokens.pop(0)
@@ -35,6 +36,7 @@ class Expression:
         return self.chain(self.both, "|+", "|")
 
     def both(self):
+        """Terms joined by AND, whose sign may be left out."""
         text = self.unequal()
         while self.peek() and self.peek() not in ("|", "+", ")"):
             if self.peek() in "&*":
@@ -46,6 +48,7 @@ class Expression:
         return self.chain(self.one, "^", "^")
 
     def one(self):
+        """A pin, a constant, a term in brackets or a negation, as Python."""
         token = self.tokens.pop(0) if self.tokens else ""
         if token == "!":
             text = f"(1 ^ {self.one()})"

@@ -32,6 +32,7 @@ def with_parameters(module, parameters, sources, folder):
 
 
 def script_of(module, sources, tap, period_ps, gating):
+    """Yosys' script from sources to netlist.json, memories kept as black boxes."""
     define = "" if tap else "-D SF_NO_TAP "  # a build without the tap has no ports for it
     lines = ["read_liberty -lib -ignore_miss_func cells.lib", "read_verilog -sv memory_box.v",
              f"read_verilog -sv -defer {define}-Irtl {' '.join(sources)}", f"hierarchy -check -top {module}",
@@ -118,6 +119,7 @@ class Design:
         return self.kinds[name]
 
     def own_of(self, module):
+        """Cells, registers, area and memories of a module itself, and how often it uses each other module."""
         result = {"cells": 0, "registers": 0, "area_um2": 0.0, "uses": {}, "memories": []}
         for name, cell in module["cells"].items():
             kind = cell["type"]

@@ -70,6 +70,7 @@ class Parser:
         raise LibertyError(f"{self.path}:{self.line(at)}: {what}")
 
     def library(self):
+        """Read the whole text: the outermost group, with all groups below it."""
         stack, top = [], None
         while True:
             self.at = SPACE.match(self.text, self.at).end()
@@ -91,6 +92,7 @@ class Parser:
         return top
 
     def statement(self, stack, top):
+        """Read one attribute, or the head of a group, which goes on the stack."""
         start = self.at
         head = HEAD.match(self.text, start)
         if not head:
@@ -148,6 +150,7 @@ class Library:
         raise LibertyError(f"{self.path}:{line}: {what}")
 
     def unit(self, attribute, scales, required=True):
+        """A unit of the library in SI units, by `scales`; refused when it is another, or missing and required."""
         text = self.top.get(attribute)
         if text is None:
             if required:
@@ -159,6 +162,7 @@ class Library:
         return float(found.group(1)) * scales[found.group(2)]
 
     def units(self):
+        """Time, voltage, leakage and capacitance units of the library."""
         self.time = self.unit("time_unit", TIME_UNITS)
         self.volts = self.unit("voltage_unit", VOLTAGE_UNITS)
         self.leakage = self.unit("leakage_power_unit", LEAKAGE_UNITS, required=False)
@@ -176,6 +180,7 @@ class Library:
             self.fail(self.top, f"'delay_model' is '{model}', not table_lookup", "delay_model")
 
     def operating_point(self):
+        """The voltage in V; sets the temperature. From the default operating conditions, else the nominal values."""
         wanted = self.top.get("default_operating_conditions")
         points = [group for group in self.top.all("operating_conditions") if wanted in (None, group.title)]
         self.temperature = self.top.get("nom_temperature")
@@ -188,6 +193,7 @@ class Library:
         return self.number(self.top, "nom_voltage") * self.volts
 
     def number(self, group, attribute, default=None):
+        """An attribute as a float; refused with its line when it is none."""
         text = group.get(attribute)
         if text is None and default is not None:
             return default
@@ -196,6 +202,7 @@ class Library:
         return float(text)
 
     def numbers(self, group, attribute, texts):
+        """Quoted lists of numbers as one list of floats."""
         found = [part for text in texts for part in re.split(r"[,\s]+", text.replace("\\", " ")) if part]
         for part in found:
             if not NUMBER.fullmatch(part):
@@ -252,6 +259,7 @@ class Table:
                 library.fail(group, f"'{group.name}' depends on '{axis}'; tables of slew and load are read")
 
     def at(self, slew, load):
+        """The table's value for a slew and a load, interpolated and beyond its ends extrapolated."""
         shares = []
         for kind, points in zip(self.kinds, self.points):
             x = slew if kind == "slew" else load

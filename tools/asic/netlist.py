@@ -122,6 +122,7 @@ endmodule
 
 
 def script_of(piece, sources, liberty, period_ps, gating):
+    """Yosys' script that maps one piece of the block, flat, to the library."""
     parameters = " ".join(f"-chparam {name} {value}" for name, value in piece.parameters.items())
     lines = [f"read_liberty -lib -ignore_miss_func {liberty}"] + ["read_verilog -sv memory_box.v"] * bool(piece.memories)
     lines += [f"read_verilog -sv -defer -Irtl {' '.join(sources)}",
@@ -208,6 +209,7 @@ class Netlist:
         self.connect()
 
     def connect(self):
+        """Driver and sinks of each net, and the load of each in fF, wires estimated from the mean cell."""
         self.driver, self.sinks = {}, {}
         for instance in self.instances:
             for pin, net in instance.pins.items():
@@ -273,6 +275,7 @@ class Netlist:
         return cache[cell.name, output]
 
     def settle(self, instance, output, here, ideal):
+        """Slew, in ps, and delay of an output, from the tables of its inputs."""
         net = instance.pins[output]
         load = self.load.get(net, 0.0)
         seen = {kind: [] for kind in TIMING}

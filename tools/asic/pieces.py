@@ -38,6 +38,7 @@ class Piece:
         """What has to be done before `record`."""
 
     def record(self, netlist, values, cycles):
+        """Inputs, outputs and events of each cycle, taken from the waves of a run."""
         events = [sum(values[name][c].count("1") for name in self.events) for c in range(cycles)]
         inputs = {name: values[self.place(name)] for name in self.names(netlist) if name not in netlist.outputs}
         outputs = {name: values[self.place(name)] for name in self.names(netlist) if name in netlist.outputs and not self.cut}
@@ -57,6 +58,7 @@ class Arithmetic(Piece):
         return list(self.events) + [name for name, _, _ in self.operands]
 
     def record(self, netlist, values, cycles):
+        """Inputs, outputs and events of each cycle, taken from the waves of a run."""
         at = [c for c in range(cycles) if values[self.events[0]][c] == "1"]
 
         def operand(source):

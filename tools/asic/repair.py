@@ -76,6 +76,7 @@ class Repair:
             visit(name)
 
     def repair(self, name):
+        """Put trees of buffers where a net of the module drives more than the limit."""
         module = self.modules[name]
         fresh = 1 + max((bit for cell in module["cells"].values() for bits in cell["connections"].values() for bit in bits if isinstance(bit, int)),
                         default=0)

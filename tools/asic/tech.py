@@ -65,6 +65,7 @@ def priced(blocks, full):
 
 
 def measured_price(row, blocks):
+    """A price in fJ of an event, with what was measured beside it, from its blocks' results."""
     key, fj, what, names = row
     first = blocks[names[0]]
     lanes = first["lanes"]
@@ -78,6 +79,7 @@ def measured_price(row, blocks):
 
 
 def report_of(work, results):
+    """The report: library, tools, prices and blocks, as written to JSON."""
     library, arguments = work.library, work.arguments
     node = arguments.node or node_of(library.name)
     blocks = {name: {key: value for key, value in result.items() if key != "key"} for name, result in results.items()}

@@ -25,6 +25,7 @@ class Kits:
         return self.kit(min(SHORT, self.arguments.samples))
 
     def program(self, name, *arguments):
+        """Run a program of the build; Stop with its last line when it fails."""
         path = os.path.join(self.work.programs, name)
         if not os.path.exists(path):
             raise Stop(f"{path} is not there: make")
@@ -50,6 +51,7 @@ class Kits:
         return scene, data
 
     def kit(self, samples):
+        """The folder of a vector kit of so many samples; made once for a scene."""
         scene, data = self.scene()
         folder = os.path.join(self.work.folder, f"kit-{samples}")
         key = digest(hash_of(scene), os.path.abspath(data), str(samples), hash_of(os.path.join(self.work.programs, "sf_export")))

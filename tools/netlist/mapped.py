@@ -42,6 +42,7 @@ class Ecp5:
         return self.version
 
     def map(self, module, parameters, folder):
+        """Map the module with its parameters into `folder`: netlist.v, the models of its cells; returns its ports."""
         define = "-D SF_NO_TAP " if parameters.get("TAP") == "0" else ""
         chosen = "".join(f" -chparam {name} {value}" for name, value in parameters.items())
         script = (f"read_verilog -sv -defer {define}-Irtl {' '.join(sources_of(folder))}; hierarchy -check -top {module}{chosen}; rename -top {module}{SUFFIX}; "
@@ -83,6 +84,7 @@ class Liberty:
         return hash_of(self.work.arguments.liberty) + (hash_of(own) if own else "")
 
     def map(self, module, parameters, folder):
+        """Map the module with its parameters into `folder`: netlist.v, the models of its cells; returns its ports."""
         gating = any(cell.get("clock_gating_integrated_cell") == "latch_posedge" for cell in self.library.cells.values())
         plain, _ = flow.synthesise(module, parameters, sources_of(folder), self.library, folder, PERIOD_PS, gating, defaults.SKIPPED)
         design = flow.Design(folder, module, plain, self.library)

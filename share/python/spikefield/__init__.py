@@ -148,6 +148,7 @@ class Scene:
         return to
 
     def _samples(self, call, harmonics, inputs, steps, traces, counts):
+        """What both fields' sample calls share: arrays made, addresses passed, the status checked."""
         given = _array(harmonics, np.int16, (_abi.DIRECTIONS,))
         out = np.zeros(len(inputs), _abi.SAMPLE)
         trace = np.zeros(len(inputs), _TRACE) if traces else None

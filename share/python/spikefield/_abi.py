@@ -16,6 +16,7 @@ class Status(Structure):
 
 
 class Info(Structure):
+    """sf_info of spikefield.h, field by field."""
     _fields_ = [("inputs", c_int32 * LAYERS), ("outputs", c_int32 * LAYERS), ("theta", c_int32 * LAYERS),
                 ("leak_q12", c_int32 * LAYERS), ("mode", c_int), ("steps", c_int32), ("grid_levels", c_int32),
                 ("features", c_int32), ("directions", c_int32), ("max_samples", c_int32), ("occupancy_res", c_int32),
