@@ -50,6 +50,7 @@ every_tool() { # SCENE DATA TRAIN-OPTIONS...
   "$bin/sf_train" "$d" -o twin.safetensors --net ann --stage1 5 --stage2 5 --occ-res 16 --eval-views 1 --quiet "$@" >/dev/null ||
     fail "$s: training of a twin"
   tool "$s" twin "$bin/energy_audit" "$s.snn" "$d" --rays 20 --rtl-rays 0 --twin twin.safetensors --quiet
+  tool "$s" convert "$bin/sf_convert" twin.safetensors "$d" --rays 10
   tool "$s" html "$bin/energy_audit" "$s.snn" "$d" --rays 50 --rtl-rays 2 --html "$s.html" --quiet
   tool "$s" cycles "$bin/sf_cycles" "$s.snn" "$d" --downscale 4 --quiet
   tool "$s" explore "$bin/sf_cycles" "$s.snn" "$d" --downscale 4 --explore --quiet

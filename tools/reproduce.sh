@@ -26,7 +26,7 @@ usage="usage: reproduce.sh BUILD [options]
   --audit-views N      held-out frames for the fixed-point core and the energy audit, spread over the split
   --audit-downscale F  these frames of 1/F of the full size (0 = by the layout, as --downscale)
   --rtl-rays N         rays of every audit that the Verilog accelerator counts, too
-  --convert-rays N     rays on which the twin of a hash grid is measured as integrate-and-fire neurons (0 = none)
+  --convert-rays N     rays on which the twin is measured as integrate-and-fire neurons (0 = none)
   --cosim-rays N       rays of every scene through RTL and fixed-point core in lockstep
 Results: BUILD/reproduce/PROFILE/{table.md,results.json,report.html,tables/,plots/}; runs in SCENE/RUN/ and SCENE/seed-N/RUN/."
 

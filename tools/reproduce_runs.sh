@@ -192,7 +192,7 @@ evaluate_ann() {
     render "$dir/float-$view.json" "$reference" "$view" --backend float --model "$dir/model.safetensors" --steps 1 \
       --png "$dir/frame-$view.png" --truth "$dir/truth-$view.png" || return
   done
-  [ "${set[convert-rays]}" -gt 0 ] && [ "$backbone" != tensorf ] || return 0
+  [ "${set[convert-rays]}" -gt 0 ] || return 0
   output "$dir/convert.json" "$bin/sf_convert" "$dir/model.safetensors" "$data" --rays "${set[convert-rays]}" --seed "${set[seed]}" \
     --downscale "${set[downscale]}" --json
 }

@@ -41,7 +41,7 @@ static sf_status print_json(const measured *m, const options *o)
   cJSON_AddNumberToObject(json, "seed", (double)o->seed);
   cJSON_AddNumberToObject(json, "percentile", o->percentile);
   cJSON *list = cJSON_AddArrayToObject(json, "thresholds");
-  for (int l = 0; l < SF_CONVERTED_LAYERS; l++)
+  for (int l = m->net.first; l < SF_CONVERTED_LAYERS; l++)
     cJSON_AddItemToArray(list, cJSON_CreateNumber((double)m->net.threshold[l]));
   cJSON_AddItemToObject(json, "twin", row_json(&m->twin, &m->twin, o->rays));
   cJSON *rows = cJSON_AddArrayToObject(json, "converted");
@@ -51,8 +51,9 @@ static sf_status print_json(const measured *m, const options *o)
 
 static sf_status print_text(const measured *m, const options *o)
 {
-  printf("%d random rays of held-out views; thresholds %.3g, %.3g, %.3g (percentile %g)\n", o->rays,
-         (double)m->net.threshold[0], (double)m->net.threshold[1], (double)m->net.threshold[2], o->percentile);
+  printf("%d random rays of held-out views; thresholds", o->rays);
+  for (int l = m->net.first; l < SF_CONVERTED_LAYERS; l++) printf(" %.3g", (double)m->net.threshold[l]);
+  printf(" (percentile %g)\n", o->percentile);
   printf("%-10s %8s %12s %12s\n", "steps", "PSNR dB", "nJ per ray", "of twin %");
   printf("%-10s %8.2f %12.2f %12s\n", "ReLU twin", m->twin.psnr, (double)m->twin.fj * 1e-6 / o->rays, "100.0");
   for (int p = 0; p < POINTS; p++)
@@ -113,9 +114,9 @@ int main(int argc, char **argv)
   const sf_cli cli = {
       .program = "sf_convert",
       .usage = "sf_convert TWIN.safetensors DATA [options]",
-      .summary = "Makes a spiking net of a trained ReLU twin (sf_train --net ann, hash grid) without training:\n"
+      .summary = "Makes a spiking net of a trained ReLU twin (sf_train --net ann) without training:\n"
                  "integrate-and-fire neurons with balanced thresholds, 4 to 256 time steps. Prints PSNR and energy\n"
-                 "(paper ledger, float) beside the twin's, on random rays.",
+                 "(paper ledger, float) beside the twin's, on random rays. Of a TensoRF model it converts the decoder.",
       .examples = "  sf_convert ann/model.safetensors data/lego\n"
                   "  sf_convert ann/model.safetensors data/lego --rays 5000 --json\n",
       .options = table,

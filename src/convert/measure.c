@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { PLACES = 1 + SF_CONVERT_POINTS, FEATURES_MOST = 32 }; /* the twin first */
+enum { PLACES = 1 + SF_CONVERT_POINTS }; /* the twin first */
 
 /* A ray on its way, once per number of steps: each ends where its own light does. */
 typedef struct way {
@@ -14,10 +14,15 @@ typedef struct way {
   uint64_t samples[PLACES], sops[PLACES];
 } way;
 
-static void add(way *w, int place, float sigma, const float colour[3], float length, uint64_t sops)
+/* colour: NULL of a sample that the net does not see. */
+static void add(way *w, int place, float sigma, const float *colour, float length, uint64_t sops)
 {
   if (w->transmittance[place] < sf_opaque) return;
   const float behind = w->transmittance[place] * expf(-sigma * length);
+  if (!colour) {
+    w->transmittance[place] = behind;
+    return;
+  }
   for (int c = 0; c < 3; c++) w->rgb[place][c] += (w->transmittance[place] - behind) * colour[c];
   w->transmittance[place] = behind;
   w->samples[place]++, w->sops[place] += sops;
@@ -35,15 +40,19 @@ static void walk(const sf_converted *net, const sf_steps *intervals, const conve
 {
   const sf_march march = sf_march_begin(net->model, intervals, ray->origin, ray->direction, 0.5f);
   sf_converted_output output[SF_CONVERT_POINTS];
-  float x[3], f[FEATURES_MOST], sigma, colour[3];
+  convert_point p;
+  float x[3], colour[3];
   for (int i = 0; i <= points; i++) w->transmittance[i] = 1;
   for (int n = sf_march_next(&march, 0, x); n >= 0 && alive(w, points + 1); n = sf_march_next(&march, n + 1, x)) {
-    sf_grid_features(net->model, x, f);
-    sf_net_sample(net->model, f, ray->sh, 1, &sigma, colour, NULL);
-    add(w, 0, sigma, colour, intervals->length[n], 0);
-    sf_converted_sample(net, f, ray->sh, points, steps, output);
-    for (int p = 0; p < points; p++)
-      add(w, 1 + p, output[p].sigma, output[p].colour, intervals->length[n], output[p].sops);
+    const float length = intervals->length[n];
+    const bool seen = convert_read(net->model, ray, x, w->transmittance[0], length, &p);
+    if (seen) {
+      sf_net_sample(net->model, p.in, ray->sh, 1, &p.sigma, colour, NULL);
+      sf_converted_sample(net, p.in, ray->sh, points, steps, output);
+    }
+    add(w, 0, p.sigma, seen ? colour : NULL, length, 0);
+    for (int i = 0; i < points; i++)
+      add(w, 1 + i, net->first ? p.sigma : output[i].sigma, seen ? output[i].colour : NULL, length, output[i].sops);
   }
   for (int i = 0; i <= points; i++)
     for (int c = 0; c < 3; c++) w->rgb[i][c] += w->transmittance[i]; /* white behind */

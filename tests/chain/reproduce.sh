@@ -161,7 +161,7 @@ echo "scenes: two backbones"
 # Profile paper at a tiny length: the planes with two of their budgets, a second seed of the learned runs; a probe that is kept.
 paper() {
   "$script" "$work/part" --profile paper --scenes "$data" --backbones tensorf --betas '5e-7 5e-8' --seeds "$1" --stage1 4 --stage2 12 \
-    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --steps 2 --train '--hidden 32 --voxels 24' "${@:2}" >"$work/out" 2>&1 ||
+    --probe 32 --samples 512 --audit-views 1 --prefix-views 1 --eval-views 1 --rtl-rays 0 --convert-rays 20 --steps 2 --train '--hidden 32 --voxels 24' "${@:2}" >"$work/out" 2>&1 ||
     fail "profile paper: exit status $?"
 }
 out=$work/part/reproduce/paper
@@ -190,6 +190,7 @@ echo "paper: two seeds"
 paper 1 --runs comparators
 [ "$(count '^\[.* dB, ')" -eq 3 ] && [ "$(count 'finished before')" -eq 2 ] || fail "comparators: not 3 runs more"
 grep -Eq '^textured-tensorf,samples of a ray as steps,1 a sample,' "$out/tables/comparators.csv" || fail "comparators: no planes along rays"
+grep -Eq '^textured-tensorf,.*twin converted, no training.*,256,' "$out/tables/comparators.csv" || fail "comparators: no converted planes"
 echo "comparators: planes"
 
 for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some" "--minutes 3" \
