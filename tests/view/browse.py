@@ -152,6 +152,38 @@ def orbit(browser):
         before = after
 
 
+def fingers(browser, start, end):
+    """Fingers that touch the picture at `start`, [(x, y)] from its middle, and go to `end`. Returns how far the camera was
+    from what it looks at, before and after, and how far that moved."""
+    state = "var c = View.viewer.camera(); return [c.distance, ...c.target()]"
+    middle = browser.execute_script("var b = document.getElementById('stage').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]")
+    before = browser.execute_script(state)
+    if start != end:
+        browser.execute_script("document.getElementById('stage').dataset.left = 'asked'")
+    for share in (0, 0.25, 0.5, 0.75, 1):
+        points = [{"x": round(middle[0] + a[0] + share * (b[0] - a[0])), "y": round(middle[1] + a[1] + share * (b[1] - a[1])), "id": i}
+                  for i, (a, b) in enumerate(zip(start, end))]
+        browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchMove" if share else "touchStart", "touchPoints": points})
+    browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    whole(browser)
+    after = browser.execute_script(state)
+    return before[0], after[0], sum((a - b) ** 2 for a, b in zip(before[1:], after[1:])) ** 0.5
+
+
+def touch(browser):
+    before = pixels(browser, "left")
+    distance, after, moved = fingers(browser, [(-40, 0)], [(40, 20)])
+    check(abs(after / distance - 1) < 1e-6 and moved < 1e-6 * distance, "one finger does more than turn the camera")
+    check(pixels(browser, "left") != before, "one finger does not turn the camera")
+    distance, after, _ = fingers(browser, [(-40, 0), (40, 0)], [(-80, 0), (80, 0)])
+    check(abs(after / distance - 0.5) < 0.01, f"fingers twice as far apart: {after / distance} times as far away, not half")
+    distance, after, moved = fingers(browser, [(-40, 0), (40, 0)], [(-10, 20), (70, 20)])
+    check(abs(after / distance - 1) < 0.01 and moved > 0.01 * distance, "two fingers do not shift the camera")
+    title = browser.find_element(By.ID, "story-title").text
+    fingers(browser, [(30, 30)], [(30, 30)])
+    until(browser, f"return document.getElementById('story-title').textContent !== '{title}'", "the story of a pixel that was tapped")
+
+
 def story(browser):
     ActionChains(browser).move_to_element(browser.find_element(By.ID, "stage")).click().perform()
     until(browser, "return !document.getElementById('story').hidden", "the story")
@@ -225,6 +257,7 @@ def scene_page(browser):
         browser.find_element(By.ID, "pair").click()
         orbit(browser)
         same_as_command(browser, "a free camera")
+        touch(browser)
         quiet(browser)
 
 
