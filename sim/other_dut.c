@@ -29,7 +29,7 @@ typedef struct request {
   const char *base; /* folder of relative names, NULL: the working folder */
 } request;
 
-/* Finds the build folder and the source tree. The program is BUILD/bin/sf_cosim, wherever the build lies now.
+/* Finds the build folder and the source tree. The program stands in BUILD/bin, wherever the build lies now.
  * SF_SOURCE_ROOT: path of the source tree, absolute or relative to BUILD (sim/sim.mk). */
 static sf_status find_build(request *r)
 {
@@ -167,12 +167,13 @@ static sf_status add_words(request *r, char *text, int nested)
   return sf_ok();
 }
 
-static sf_status read_request(request *r, const char *files, const char *top)
+static sf_status read_request(request *r, const char *program, const char *files, const char *top)
 {
   char hash[65];
   char *text = strdup(files);
   if (!text) return sf_fail(SF_E_MEMORY, "--dut: no memory");
-  sf_status status = append(r->key, &r->key_used, sizeof r->key, top);
+  sf_status status = append(r->key, &r->key_used, sizeof r->key, program);
+  if (status.code == SF_OK) status = append(r->key, &r->key_used, sizeof r->key, top);
   if (status.code == SF_OK) status = add_words(r, text, 0);
   free(text);
   SF_TRY(status);
@@ -185,26 +186,27 @@ static sf_status read_request(request *r, const char *files, const char *top)
 /* ---- building ---- */
 
 /* In the child. Output of make and Verilator goes to standard error, because standard output has the report. */
-static void become_make(const request *r, const char *top)
+static void become_make(const request *r, const char *program, const char *top)
 {
-  char files[WORDS_MAX + 8], module[256 + 16], out[PATH_LENGTH + 16], in[PATH_LENGTH + 16];
+  char files[WORDS_MAX + 8], what[32], module[256 + 16], out[PATH_LENGTH + 16], in[PATH_LENGTH + 16];
   snprintf(files, sizeof files, "DUT=%s", r->words);
+  snprintf(what, sizeof what, "DUT_PROGRAM=%s", program);
   snprintf(module, sizeof module, "DUT_TOP=%s", top);
   snprintf(out, sizeof out, "DUT_OUT=%s", r->folder);
   snprintf(in, sizeof in, "B=%s", r->build);
   unsetenv("MAKEFLAGS");
   unsetenv("MAKELEVEL");
   dup2(STDERR_FILENO, STDOUT_FILENO);
-  execlp("make", "make", "-s", "-C", r->root, in, files, module, out, "dut", (char *)NULL);
+  execlp("make", "make", "-s", "-C", r->root, in, files, what, module, out, "dut", (char *)NULL);
   _exit(127);
 }
 
-static sf_status run_make(const request *r, const char *top)
+static sf_status run_make(const request *r, const char *program, const char *top)
 {
   int state = 0;
   const pid_t child = fork();
   if (child < 0) return sf_fail(SF_E_IO, "--dut: cannot start make: %s", strerror(errno));
-  if (child == 0) become_make(r, top);
+  if (child == 0) become_make(r, program, top);
   while (waitpid(child, &state, 0) < 0)
     if (errno != EINTR) return sf_fail(SF_E_IO, "--dut: %s", strerror(errno));
   if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return sf_ok();
@@ -229,14 +231,14 @@ static sf_status record(const request *r, const char *top)
 }
 
 /* Two runs of the same sources wait for each other. */
-static sf_status build(const request *r, const char *top)
+static sf_status build(const request *r, const char *program, const char *top)
 {
   char path[PATH_LENGTH + 16];
   SF_TRY(sf_make_dir(r->folder));
   snprintf(path, sizeof path, "%s/lock", r->folder);
   const int lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (lock < 0 || flock(lock, LOCK_EX)) return sf_fail(SF_E_IO, "%s: %s", path, strerror(errno));
-  sf_status status = run_make(r, top);
+  sf_status status = run_make(r, program, top);
   if (status.code == SF_OK) status = record(r, top);
   close(lock);
   return status;
@@ -273,21 +275,21 @@ static sf_status check_name(const char *top)
   return sf_fail(SF_E_USAGE, "--dut-top: '%s' is not the name of a module", top);
 }
 
-sf_status sf_other_dut_run(const char *files, const char *top, char **argv)
+sf_status sf_other_dut_run(const char *program, const char *files, const char *top, char **argv)
 {
-  char program[PATH_LENGTH + 16];
+  char path[PATH_LENGTH + 16];
   SF_TRY(check_name(top));
   request *r = calloc(1, sizeof *r);
   if (!r) return sf_fail(SF_E_MEMORY, "--dut: no memory");
   sf_status status = find_build(r);
-  if (status.code == SF_OK) status = read_request(r, files, top);
-  if (status.code == SF_OK) status = build(r, top);
-  snprintf(program, sizeof program, "%s/sf_cosim", r->folder);
+  if (status.code == SF_OK) status = read_request(r, program, files, top);
+  if (status.code == SF_OK) status = build(r, program, top);
+  snprintf(path, sizeof path, "%s/%s", r->folder, program);
   free(r);
   SF_TRY(status);
   leave_out(argv);
-  execv(program, argv);
-  return sf_fail(SF_E_IO, "%s: %s", program, strerror(errno));
+  execv(path, argv);
+  return sf_fail(SF_E_IO, "%s: %s", path, strerror(errno));
 }
 
 /* ---- which block a program has, a difference was of ---- */
@@ -320,7 +322,7 @@ static sf_status run_recorded(const cJSON *dut, const char *path, char **argv)
 {
   const char *files = sf_json_text(dut, "files"), *top = sf_json_text(dut, "top");
   if (!files || !top) return sf_fail(SF_E_FORMAT, "%s: 'dut' has no text 'files' or no text 'top'", path);
-  const sf_status status = sf_other_dut_run(files, top, argv);
+  const sf_status status = sf_other_dut_run("sf_cosim", files, top, argv);
   return sf_fail(status.code, "%.100s: the block that differed: %.250s", path, status.message);
 }
 

@@ -374,7 +374,7 @@ int main(int argc, char **argv)
   if (status.code == SF_OK && o.replay)
     status = sf_cli_refuse(&cli, argc, argv, named_by_replay, "has no effect beside --replay: its file is the run");
   if (status.code == SF_OK) status = settle(&o);
-  if (status.code == SF_OK && o.dut) status = sf_other_dut_run(o.dut, o.dut_top, argv);
+  if (status.code == SF_OK && o.dut) status = sf_other_dut_run("sf_cosim", o.dut, o.dut_top, argv);
   if (status.code == SF_OK && o.replay) status = sf_other_dut_replay(o.replay, argv);
   sf_cli_catch_signals();
   if (status.code == SF_OK) {

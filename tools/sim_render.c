@@ -1,5 +1,6 @@
 /* sim_render: views of a scene through the float field, the fixed-point core or the accelerator, simulated or on a
  * board. */
+#include "sim/other_dut.h"
 #include "sim/studio/view_set.h"
 #include "tools/render/options.h"
 #include "cli/finish_ranks.h"
@@ -307,6 +308,7 @@ int main(int argc, char **argv)
   if (!j) return sf_cli_finish(&cli, sf_fail(SF_E_MEMORY, "no memory"));
   sf_status status = render_parse(argc, argv, &j->opt, &cli);
   if (status.code == SF_OK && j->opt.crop) status = sf_window_parse(j->opt.crop, &j->crop);
+  if (status.code == SF_OK && j->opt.dut) status = sf_other_dut_run("sim_render", j->opt.dut, j->opt.dut_top, argv);
   if (status.code == SF_OK) {
     set_threads(j->opt.threads);
     sf_cli_catch_signals();

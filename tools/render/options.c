@@ -27,7 +27,8 @@ sf_cli render_cli(void)
                   "  mpirun -n 8 sim_render scene.snn data --all -o golden\n"
                   "  sim_render scene.snn data --verify golden/manifest.json --view 7\n"
                   "  sim_render scene.snn data --all --crop 40,40,16,16 -o small\n"
-                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n",
+                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl\n"
+                  "  sim_render scene.snn data --verify small/manifest.json --backend rtl --dut \"-F kit/rtl.f\"\n",
       .min_positional = 1,
       .max_positional = 2};
 }
@@ -42,6 +43,10 @@ static sf_status check_backend(render_options *o)
 {
   SF_TRY(refuse(o->model && o->backend != SF_BACKEND_FLOAT, "--model", "needs --backend float"));
   SF_TRY(refuse(o->seed != NO_SEED && o->backend != SF_BACKEND_RTL, "--seed", "needs --backend rtl"));
+  SF_TRY(refuse(o->dut && o->backend != SF_BACKEND_RTL, "--dut", "needs --backend rtl"));
+  SF_TRY(refuse(o->dut && sf_ranks_launched() > 1, "--dut", "is for a program that no launcher started"));
+  SF_TRY(refuse(o->dut_top && !o->dut, "--dut-top", "belongs to --dut"));
+  if (!o->dut_top) o->dut_top = "sf_ray_top";
   SF_TRY(refuse(o->kernels && o->backend != SF_BACKEND_FIXED, "--kernels", "needs --backend fixed"));
   SF_TRY(refuse(o->port && o->backend != SF_BACKEND_BOARD, "--port", "needs --backend board"));
   SF_TRY(refuse(o->patience > 0 && o->backend != SF_BACKEND_BOARD, "--timeout", "needs --backend board"));
@@ -115,6 +120,11 @@ sf_status render_parse(int argc, char **argv, render_options *o, sf_cli *cli)
        "model units per world unit, 0 = the scene's (default 0)"},
       {"--seed", 0, SF_ARG_U64, &o->seed, 0, SEED_MAX, NULL, "S",
        "rtl: seed of the registers' contents at power-on (default 1)"},
+      SF_GROUP("Another block"),
+      {"--dut", 0, SF_ARG_STRING, &o->dut, 0, 0, NULL, "FILES",
+       "rtl: another block with the ports of rtl/sf_ray_top.sv: Verilog sources, options of Verilator, -F LIST "
+       "(docs/kit.md)"},
+      {"--dut-top", 0, SF_ARG_STRING, &o->dut_top, 0, 0, NULL, "NAME", "its module (default sf_ray_top)"},
       SF_GROUP("What is printed"),
       {"--json", 0, SF_ARG_FLAG, &o->json, 0, 0, NULL, NULL, "report as JSON"},
       {"--quiet", 'q', SF_ARG_FLAG, &o->quiet, 0, 0, NULL, NULL, "no progress line"},

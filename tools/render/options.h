@@ -10,7 +10,8 @@ typedef struct render_options {
   uint64_t seed;
   double scale;
   double patience;
-  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port, *camera;
+  const char *scene, *data, *output, *png, *truth, *model, *split, *crop, *verify, *kernels, *port, *camera, *dut,
+      *dut_top;
   bool all, json, quiet;
 } render_options;
 
