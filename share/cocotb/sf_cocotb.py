@@ -28,6 +28,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 TREE = os.path.dirname(os.path.dirname(HERE))  # this file's, in share/cocotb
 PREFIX = os.path.dirname(TREE)  # where it is installed, in share/spikefield/cocotb
 TOP = "sf_cocotb_top"
+AROUND = ["sf_cocotb_waits.sv", TOP + ".sv"]  # the block
 NEEDED = {"cocotb": "cocotb", "cocotbext.axi": "cocotbext-axi", "numpy": "numpy"}
 
 
@@ -123,6 +124,10 @@ def build_key(command, includes, files):
     return key.hexdigest()
 
 
+def around():
+    return [os.path.join(HERE, name) for name in AROUND]
+
+
 def verilator(folder, block, top):
     """The commands that build and run the bench in Verilator, in `folder`. `block`: include folders, other options, sources."""
     import cocotb
@@ -133,7 +138,7 @@ def verilator(folder, block, top):
                "--top-module", TOP, "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style", "--x-assign", "unique",
                "--x-initial", "unique", "--unroll-count", "256", "--unroll-stmts", "1000000", "--Mdir",
                os.path.join(folder, "verilator"), "-o", "sim", f"-DSF_DUT={top}", *others,
-               *[f"+incdir+{path}" for path in includes], *files, os.path.join(HERE, TOP + ".sv"), main, "-LDFLAGS",
+               *[f"+incdir+{path}" for path in includes], *files, *around(), main, "-LDFLAGS",
                f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator", "-MAKEFLAGS", "OPT_FAST=-O2"]
     return command, [os.path.join(folder, "verilator", "sim"), "+verilator+rand+reset+2"]
 
@@ -145,7 +150,7 @@ def icarus(folder, block, top):
     includes, others, files = block
     image = os.path.join(folder, "icarus.vvp")
     command = ["iverilog", "-g2012", "-Wno-timescale", "-s", TOP, "-o", image, f"-DSF_DUT={top}", *others,
-               *[f"-I{path}" for path in includes], *files, os.path.join(HERE, TOP + ".sv")]
+               *[f"-I{path}" for path in includes], *files, *around()]
     return command, ["vvp", "-M", libs, "-m", "libcocotbvpi_icarus", image]
 
 
@@ -154,8 +159,7 @@ def build(options, folder, block):
     command, run = {"verilator": verilator, "icarus": icarus}[options.sim](folder, block, options.dut_top)
     if not shutil.which(command[0]):
         raise Trouble(f"{command[0]}: not installed (make deps)")
-    wrapper = [os.path.join(HERE, TOP + ".sv")]
-    key, stamp = build_key(command, block[0], block[2] + wrapper), os.path.join(folder, options.sim + ".key")
+    key, stamp = build_key(command, block[0], block[2] + around()), os.path.join(folder, options.sim + ".key")
     if os.path.exists(stamp) and open(stamp, encoding="ascii").read() == key:
         return run
     if os.path.exists(stamp):
@@ -204,7 +208,7 @@ def verdict(results, summary, options, seconds):
     with open(summary, encoding="utf-8") as file:
         told = json.load(file)
     print(f"PASS {told['samples']} samples of {len(rays)} rays in {options.sim}, stalls {options.stalls} %, seed {options.seed}: "
-          f"{told['samples'] / told['seconds']:.0f} samples/s, {seconds:.1f} s in all")
+          f"{told['samples'] / told['seconds']:.0f} samples/s of processor time, {seconds:.1f} s in all")
     return True
 
 
@@ -253,7 +257,7 @@ def arguments():
     parser.add_argument("--seed", type=int, default=1, help="rays and stalls (1)")
     parser.add_argument("--stalls", type=percent, default=20, help="percent of cycles with a bubble or back-pressure, 0..90 (20)")
     parser.add_argument("--counters", choices=("each", "end"), default="end",
-                        help="compare every counter after each ray, or once for all rays, which is four times as fast (end)")
+                        help="compare every counter after each ray, or once for all rays, which is ten times as fast (end)")
     parser.add_argument("--no-tap", action="store_true", help="the block shows no tap beats: compare results and counters")
     parser.add_argument("--dut", help="another block: sources in compilation order, +incdir+, -I, -D, -F LIST, -f LIST")
     parser.add_argument("--dut-top", default="sf_top", help="its module (sf_top)")
