@@ -132,7 +132,7 @@ $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 # The report's texts lie in the program, and the browser's.
-$B/obj/src/page/texts.o: $(addprefix src/page/report.,html css js)
+$B/obj/src/page/texts.o: $(wildcard src/page/*.html src/page/*.css src/page/*.js)
 $B/obj/src/view/texts.o: $(wildcard src/view/*.html src/view/*.js src/view/*.css)
 $B/obj/src/report/texts.o: src/report/reproduction.html
 

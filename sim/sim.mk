@@ -215,7 +215,7 @@ lanes: all firmware $B/faults/make_scene ## 32, 64, 256 lanes: samples, rays, fi
 # The vector kit: writer, and the files that go with every kit.
 KIT_OBJ := $B/obj/sim/kit/kit.o $B/obj/sim/kit/draw.o $B/obj/sim/kit/images.o $B/obj/sim/kit/rays.o $B/obj/sim/kit/output.o $B/obj/sim/packet.o \
   $B/obj/sim/ray/request.o $B/obj/firmware/sf_driver.o $B/obj/firmware/sf_ray_driver.o $B/kit/files.o
-KIT_FILES := sf_kit_tb.sv sf_ray_kit_tb.sv sf_kit_bus.svh Makefile README.md
+KIT_FILES := sf_kit_tb.sv sf_ray_kit_tb.sv sf_kit_bus.svh sf_kit_pins.svh sf_kit_ports.svh Makefile README.md
 $B/kit/files.c: $(KIT_FILES:%=sim/kit/%) $(RTL_READY) tools/embed.sh
 	@mkdir -p $(@D)
 	$(call say,EMBED $@)

@@ -3,6 +3,7 @@
 // Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +notap (the block shows no tap beats) +vcd=FILE (waveform)
 `timescale 1ns / 1ps
 `default_nettype none
+`define SF_KIT_TB sf_kit_tb
 `ifndef SF_DUT
 `define SF_DUT sf_top
 `endif
@@ -30,54 +31,17 @@ module sf_kit_tb;
   reg [63:0] counters[0:511];
 
   // ---- pins
-  reg clk = 1'b0, rst_n = 1'b0;
-  reg awvalid = 1'b0, wvalid = 1'b0, bready = 1'b0, arvalid = 1'b0, rready = 1'b0;
-  reg [12:0] awaddr = 13'd0, araddr = 13'd0;
-  reg [31:0] wdata = 32'd0;
-  wire awready, wready, bvalid, arready, rvalid;
-  wire [1:0] bresp, rresp;
-  wire [31:0] rdata;
-  reg s_valid = 1'b0, s_user = 1'b0, s_last = 1'b0;
+  `include "sf_kit_pins.svh"
   reg [63:0] s_data = 64'd0;
-  wire s_ready;
-  wire m_valid, m_last, irq;
-  reg m_ready = 1'b0;
+  wire m_last;
   wire [63:0] m_data;
   wire tap_valid;
   wire [2:0] tap_layer, tap_step;
   wire [LANES-1:0] tap_spikes, tap_rows;
   wire [24*LANES-1:0] tap_membrane;
 
-  always #5 clk = !clk;
-
   `SF_DUT `SF_DUT_PARAMETERS u_dut (
-      .clk_i           (clk),
-      .rst_ni          (rst_n),
-      .s_axil_awvalid_i(awvalid),
-      .s_axil_awready_o(awready),
-      .s_axil_awaddr_i (awaddr),
-      .s_axil_wvalid_i (wvalid),
-      .s_axil_wready_o (wready),
-      .s_axil_wdata_i  (wdata),
-      .s_axil_wstrb_i  (4'hf),
-      .s_axil_bvalid_o (bvalid),
-      .s_axil_bready_i (bready),
-      .s_axil_bresp_o  (bresp),
-      .s_axil_arvalid_i(arvalid),
-      .s_axil_arready_o(arready),
-      .s_axil_araddr_i (araddr),
-      .s_axil_rvalid_o (rvalid),
-      .s_axil_rready_i (rready),
-      .s_axil_rdata_o  (rdata),
-      .s_axil_rresp_o  (rresp),
-      .s_axis_tvalid_i (s_valid),
-      .s_axis_tready_o (s_ready),
-      .s_axis_tdata_i  (s_data),
-      .s_axis_tuser_i  (s_user),
-      .s_axis_tlast_i  (s_last),
-      .m_axis_tvalid_o (m_valid),
-      .m_axis_tready_i (m_ready),
-      .m_axis_tdata_o  (m_data),
+      `include "sf_kit_ports.svh"
       .m_axis_tlast_o  (m_last),
       .irq_o           (irq),
       .tap_valid_o     (tap_valid),
@@ -90,16 +54,6 @@ module sf_kit_tb;
 
   // ---- verdict
   reg with_tap = 1'b1;
-  reg [31:0] seed;
-  integer quiet = 0;  // cycles without a sign of life
-  integer cycle = 0;
-
-  task fail;
-    begin
-      $display("FAIL at cycle %0d", cycle);
-      $fatal(1, "the block differs from the fixed-point core");
-    end
-  endtask
 
   // layer, step, neuron: -1 where they do not apply. wire_name: text of up to 16 letters
   task differ(input integer sample, input integer layer, input integer step, input integer neuron,
@@ -122,7 +76,7 @@ module sf_kit_tb;
     end
   endtask
 
-  // ---- chance, and register accesses
+  // ---- chance, register accesses, beginning
   `include "sf_kit_bus.svh"
 
   // ---- samples in: a beat on offer stays until it is taken
@@ -252,7 +206,6 @@ module sf_kit_tb;
   endtask
 
   // ---- counters
-  reg [8:0] counter_at = 9'd0;
   task compare_counter(input [63:0] actual);
     if (actual !== counters[counter_at]) begin
       if (counter_at[5:3] <= C3)
@@ -260,10 +213,6 @@ module sf_kit_tb;
       else differ(-1, -1, -1, -1, counter_at[0] ? "rays" : "samples", counters[counter_at], actual);
     end
   endtask
-  // Layers 5 and 6 are empty; of layer 7 there are samples and rays (event 0, steps 0 and 1), the rest is the clock's.
-  function automatic is_compared(input [8:0] at);
-    is_compared = at[5:3] <= C3 || (at[5:3] == 3'd7 && at[8:6] == 3'd0 && at[2:0] <= 3'd1);
-  endfunction
 
   // ---- the kit itself: the weights that are written are those of the weight image; a layer's biases follow its rows
   task check_weights;
@@ -415,30 +364,9 @@ module sf_kit_tb;
   end
 
   integer i;
-  reg [8*1024-1:0] wave;  // name of a file
   initial begin
-    if ($value$plusargs("stalls=%d", stalls) == 0) stalls = 20;
-    if ($value$plusargs("seed=%d", seed) == 0) seed = SEED;
-    if ($value$plusargs("vcd=%s", wave) != 0) begin
-`ifdef SF_KIT_NO_WAVE
-      $display("FAIL: +vcd: this simulation was built without waveforms (make verilator VCD=FILE builds another)");
-      $fatal(1, "no waveform");
-`else
-      i = $fopen(wave, "w");
-      if (i == 0) begin
-        $display("FAIL: +vcd: %0s cannot be written", wave);
-        $fatal(1, "no waveform");
-      end
-      $fclose(i);
-      $dumpfile(wave);
-      $dumpvars(0, sf_kit_tb);
-`endif
-    end
+    begin_run;
     if ($test$plusargs("notap")) with_tap = 1'b0;
-    // xorshift stays at 0
-    bus_random = seed == 32'h9e3779b9 ? 32'd1 : seed ^ 32'h9e3779b9;
-    in_random = seed == 32'h7f4a7c15 ? 32'd1 : seed ^ 32'h7f4a7c15;
-    out_random = seed == 32'h94d049bb ? 32'd1 : seed ^ 32'h94d049bb;
     for (i = 0; i < 5; i = i + 1) tapped[i] = 0;
     read_kit;
     check_weights;

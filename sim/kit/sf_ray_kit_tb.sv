@@ -4,6 +4,7 @@
 // Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +vcd=FILE (waveform)
 `timescale 1ns / 1ps
 `default_nettype none
+`define SF_KIT_TB sf_ray_kit_tb
 `ifndef SF_DUT
 `define SF_DUT sf_ray_top
 `endif
@@ -28,17 +29,8 @@ module sf_ray_kit_tb;
   reg [63:0] counters[0:511];
 
   // ---- pins
-  reg clk = 1'b0, rst_n = 1'b0;
-  reg awvalid = 1'b0, wvalid = 1'b0, bready = 1'b0, arvalid = 1'b0, rready = 1'b0;
-  reg [12:0] awaddr = 13'd0, araddr = 13'd0;
-  reg [31:0] wdata = 32'd0;
-  wire awready, wready, bvalid, arready, rvalid;
-  wire [1:0] bresp, rresp;
-  wire [31:0] rdata;
-  reg s_valid = 1'b0, s_user = 1'b0, s_last = 1'b0;
+  `include "sf_kit_pins.svh"
   reg [255:0] s_data = 256'd0;
-  wire s_ready, m_valid, irq;
-  reg m_ready = 1'b0;
   wire [383:0] m_data;
   wire line_arvalid, line_rready;
   reg line_arready = 1'b0, line_rvalid = 1'b0, line_rlast = 1'b0;
@@ -48,36 +40,8 @@ module sf_ray_kit_tb;
   wire [1:0] line_arburst;
   reg [63:0] line_rdata = 64'd0;
 
-  always #5 clk = !clk;
-
   `SF_DUT `SF_DUT_PARAMETERS u_dut (
-      .clk_i           (clk),
-      .rst_ni          (rst_n),
-      .s_axil_awvalid_i(awvalid),
-      .s_axil_awready_o(awready),
-      .s_axil_awaddr_i (awaddr),
-      .s_axil_wvalid_i (wvalid),
-      .s_axil_wready_o (wready),
-      .s_axil_wdata_i  (wdata),
-      .s_axil_wstrb_i  (4'hf),
-      .s_axil_bvalid_o (bvalid),
-      .s_axil_bready_i (bready),
-      .s_axil_bresp_o  (bresp),
-      .s_axil_arvalid_i(arvalid),
-      .s_axil_arready_o(arready),
-      .s_axil_araddr_i (araddr),
-      .s_axil_rvalid_o (rvalid),
-      .s_axil_rready_i (rready),
-      .s_axil_rdata_o  (rdata),
-      .s_axil_rresp_o  (rresp),
-      .s_axis_tvalid_i (s_valid),
-      .s_axis_tready_o (s_ready),
-      .s_axis_tdata_i  (s_data),
-      .s_axis_tuser_i  (s_user),
-      .s_axis_tlast_i  (s_last),
-      .m_axis_tvalid_o (m_valid),
-      .m_axis_tready_i (m_ready),
-      .m_axis_tdata_o  (m_data),
+      `include "sf_kit_ports.svh"
       .m_axi_arvalid_o (line_arvalid),
       .m_axi_arready_i (line_arready),
       .m_axi_araddr_o  (line_araddr),
@@ -94,16 +58,6 @@ module sf_ray_kit_tb;
   );
 
   // ---- verdict
-  reg [31:0] seed;
-  integer quiet = 0;  // cycles without a sign of life
-  integer cycle = 0;
-
-  task fail;
-    begin
-      $display("FAIL at cycle %0d", cycle);
-      $fatal(1, "the block differs from the fixed-point core");
-    end
-  endtask
   // of a ray, or of all where it is -1; name: text of up to 16 letters
   task differ(input integer ray, input [127:0] name, input [63:0] expected, input [63:0] actual);
     begin
@@ -114,7 +68,7 @@ module sf_ray_kit_tb;
     end
   endtask
 
-  // ---- chance, and register accesses
+  // ---- chance, register accesses, beginning
   reg [31:0] line_random;
   `include "sf_kit_bus.svh"
 
@@ -204,7 +158,6 @@ module sf_ray_kit_tb;
   endtask
 
   // ---- counters
-  reg [8:0] counter_at = 9'd0;
   task compare_counter(input [63:0] actual);
     if (actual !== counters[counter_at]) begin
       if (counter_at[5:3] != 3'd7) $write("DIFFERENCE layer %0d step %0d ", counter_at[5:3], counter_at[2:0]);
@@ -213,10 +166,6 @@ module sf_ray_kit_tb;
       differ(-1, counter_at[0] ? "rays" : "samples", counters[counter_at], actual);
     end
   endtask
-  // As in sf_kit_tb.sv.
-  function automatic is_compared(input [8:0] at);
-    is_compared = at[5:3] <= 3'd4 || (at[5:3] == 3'd7 && at[8:6] == 3'd0 && at[2:0] <= 3'd1);
-  endfunction
 
   // ---- what happens when: each phase begins when its predecessor's last register access is done
   localparam [3:0] BEGIN = 4'd0, PROGRAM = 4'd1, CLEARING = 4'd2, CLEAN = 4'd3, RAYS_CLEAN = 4'd4, RUN = 4'd5, DRAIN = 4'd6,
@@ -324,23 +273,8 @@ module sf_ray_kit_tb;
     end
   end
 
-  reg [8*1024-1:0] wave;  // name of a file
   initial begin
-    if ($value$plusargs("stalls=%d", stalls) == 0) stalls = 20;
-    if ($value$plusargs("seed=%d", seed) == 0) seed = SEED;
-    if ($value$plusargs("vcd=%s", wave) != 0) begin
-`ifdef SF_KIT_NO_WAVE
-      $display("FAIL: +vcd: this simulation was built without waveforms (make verilator VCD=FILE builds another)");
-      $fatal(1, "no waveform");
-`else
-      $dumpfile(wave);
-      $dumpvars(0, sf_ray_kit_tb);
-`endif
-    end
-    // xorshift stays at 0
-    bus_random = seed == 32'h9e3779b9 ? 32'd1 : seed ^ 32'h9e3779b9;
-    in_random = seed == 32'h7f4a7c15 ? 32'd1 : seed ^ 32'h7f4a7c15;
-    out_random = seed == 32'h94d049bb ? 32'd1 : seed ^ 32'h94d049bb;
+    begin_run;
     line_random = seed == 32'hd1b54a32 ? 32'd1 : seed ^ 32'hd1b54a32;
     $readmemh("ray_program.hex", program_image);
     $readmemh("rays.hex", beats);

@@ -6,7 +6,10 @@
 #include "page/draw.h"
 #include "page/page.h"
 
-extern const char html_report[];
+/* The template, in the order of the page. */
+extern const char html_report[];        /* what every operation cost */
+extern const char html_report_prices[]; /* the same work under other prices */
+extern const char html_report_proof[];  /* quality, counts, limits, origin */
 
 typedef struct html_view {
   const sf_page *page; /* for what is no number: pixels, spikes */

@@ -69,10 +69,17 @@ static const sf_template_call functions[] = {{"style", 0, html_put_style},
 
 static sf_status write_page(FILE *out, const sf_page *page)
 {
+  static const struct {
+    const char *name, *text;
+  } part[] = {{"report.html", html_report},
+              {"report_prices.html", html_report_prices},
+              {"report_proof.html", html_report_proof}};
   html_view view = {.page = page, .json = sf_page_json(page), .status = sf_ok()};
-  const sf_template report = {"report.html", html_report, view.json, functions, &view};
-  const sf_status status =
-      view.json ? sf_template_fill(out, &report) : sf_fail(SF_E_MEMORY, "no memory for the report");
+  sf_status status = view.json ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for the report");
+  for (size_t i = 0; i < sizeof part / sizeof *part && status.code == SF_OK; i++) {
+    const sf_template template = {part[i].name, part[i].text, view.json, functions, &view};
+    status = sf_template_fill(out, &template);
+  }
   cJSON_Delete((cJSON *)view.json);
   return status;
 }

@@ -1,5 +1,5 @@
 /* One audit as one self-contained HTML page: nothing is fetched, it works without JavaScript, it is well-formed XML.
- * report.html is its template, filled with the values of its JSON; charts are functions that read the same values.
+ * report*.html are its template, filled with the values of its JSON; charts are functions that read the same values.
  * Every number that the JSON report has stands in a <data data-key="PATH" value="EXACT"> element, and the JSON itself
  * is inside the page (id "audit-json"), so that the two can be compared. */
 #ifndef SF_PAGE_PAGE_H

@@ -10,5 +10,7 @@
           ".popsection")
 
 TEXT(html_report, "report.html");
+TEXT(html_report_prices, "report_prices.html");
+TEXT(html_report_proof, "report_proof.html");
 TEXT(html_style, "report.css");
 TEXT(html_script, "report.js");
