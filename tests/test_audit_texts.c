@@ -54,6 +54,7 @@ static audit *new_audit(void)
   sf_measure *m = &a->report.measure;
   sf_three_counts *three = &a->report.three;
   sf_recount_sample(&a->net, small_spikes, true, &m->core);
+  m->core.grid_bytes = traffic.table_bytes;
   m->recount = m->checked_core = m->core;
   m->memory = memory, m->rays = 4, m->checked = 3;
   three->wanted = 2, three->rays = 1;
@@ -245,6 +246,19 @@ TEST(comparison_with_the_scheme_before)
   cJSON_DeleteItemFromObject(b, "cache");
   cJSON_DeleteItemFromObject(b, "seed");
   compare("comparison-scheme-1", a, b);
+  cJSON_Delete(a), cJSON_Delete(b), free(x), free(y);
+}
+
+/* A ledger each, and not the same one. */
+TEST(comparison_of_nothing_in_common)
+{
+  audit *x = new_audit(), *y = other_audit();
+  cJSON *a = read_back(x), *b = read_back(y), *list = member(a, "ledgers", "list", NULL);
+  while (cJSON_GetArraySize(list) > 1) cJSON_DeleteItemFromArray(list, 1);
+  list = member(b, "ledgers", "list", NULL);
+  cJSON_DeleteItemFromArray(list, 0);
+  while (cJSON_GetArraySize(list) > 1) cJSON_DeleteItemFromArray(list, 1);
+  compare("comparison-apart", a, b);
   cJSON_Delete(a), cJSON_Delete(b), free(x), free(y);
 }
 
