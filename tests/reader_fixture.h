@@ -25,4 +25,11 @@ static inline void say_lens(FILE *out, const sf_lens *l)
           l->k2, l->p1, l->p2, l->model ? l->model : "-", (int)l->camera);
 }
 
+static inline void say_frame(FILE *out, const sf_frame *f)
+{
+  fprintf(out, "  %d '%s'%s", f->number, f->file_path, f->own_size ? " of its own size" : "");
+  for (int i = 0; i < 12; i++) fprintf(out, " %.7g", rint(f->to_world[i] * 1e8) / 1e8 + 0.0);
+  fprintf(out, "\n");
+  say_lens(out, &f->lens);
+}
 #endif

@@ -2,14 +2,6 @@
 #include "ck_run.h"
 #include "tests/reader_fixture.h"
 
-static void say_frame(FILE *out, const sf_frame *f)
-{
-  fprintf(out, "  %d '%s'%s", f->number, f->file_path, f->own_size ? " of its own size" : "");
-  for (int i = 0; i < 12; i++) fprintf(out, " %.7g", rint(f->to_world[i] * 1e8) / 1e8 + 0.0);
-  fprintf(out, "\n");
-  say_lens(out, &f->lens);
-}
-
 /* ---- JSON ---- */
 
 static const char square[] = "\"transform_matrix\":[[1,0,0,5],[0,1,0,6],[0,0,1,7],[0,0,0,1]]";

@@ -1,7 +1,6 @@
 /* Where the readers of data sets place a scene, in numbers: kept as texts. Rays of the views that lie there. */
 #include "ck_run.h"
 #include "src/scene/capture.h"
-#include "src/scene/lens.h"
 #include "tests/expected.h"
 #include <math.h>
 
@@ -333,46 +332,4 @@ TEST(rays_in_ndc)
       for (int i = 0; i < 2; i++) ck_assert_double_eq_tol((double)o[i] + along * (double)d[i], ndc[i], 2e-5);
     }
   }
-}
-
-/* A lens: bent there and straightened back; the slopes as differences say; what folds is refused, and where. */
-TEST(lenses_bend_and_straighten)
-{
-  const sf_camera lens = {.width = 40,
-                          .height = 30,
-                          .fx = 30,
-                          .fy = 28,
-                          .cx = 19,
-                          .cy = 16,
-                          .k1 = -0.2f,
-                          .k2 = 0.05f,
-                          .p1 = 0.01f,
-                          .p2 = -0.02f};
-  for (int i = 0; i < 35; i++) {
-    const double x = 0.3 * (i % 7 - 3), y = 0.3 * (i / 7 - 2), r2 = x * x + y * y;
-    const double k1 = (double)lens.k1, k2 = (double)lens.k2, p1 = (double)lens.p1, p2 = (double)lens.p2;
-    const double gain = 1 + k1 * r2 + k2 * r2 * r2, straight[2] = {x, y};
-    double bent[2], again[2];
-    sf_lens_bend(&lens, straight, bent);
-    ck_assert_double_eq_tol(bent[0], x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), 1e-15);
-    ck_assert_double_eq_tol(bent[1], y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y, 1e-15);
-    sf_lens_straighten(&lens, bent, again);
-    ck_assert_double_eq_tol(again[0], x, 1e-12);
-    ck_assert_double_eq_tol(again[1], y, 1e-12);
-  }
-  ck_ok(sf_lens_check(&lens, "w"));
-  for (int k = 0; k < 4; k++) {
-    sf_camera folded = {.width = 40, .height = 30, .fx = 30, .fy = 28, .cx = 19, .cy = 16};
-    ck_assert(!sf_lens_bends(&folded));
-    float *number[4] = {&folded.k1, &folded.k2, &folded.p1, &folded.p2};
-    *number[k] = k < 2 ? -0.9f : 0.6f;
-    ck_assert(sf_lens_bends(&folded));
-    static char text[4][80] = {"k1 -0.9, k2 0, p1 0, p2 0) cannot be undone at pixel (0, 0)",
-                               "k1 0, k2 -0.9, p1 0, p2 0) cannot be undone at pixel (0, 0)",
-                               "p1 0.6, p2 0) cannot be undone at pixel (0, 0)",
-                               "p1 0, p2 0.6) cannot be undone at pixel (0, 0)"};
-    ck_bad(sf_lens_check(&folded, "w"), SF_E_RANGE, "w: the lens", text[k]);
-  }
-  const sf_camera plain = {.width = 1 << 20, .height = 1 << 20, .fx = 1, .fy = 1};
-  ck_ok(sf_lens_check(&plain, "w"));
 }

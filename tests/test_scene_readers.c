@@ -302,4 +302,91 @@ TEST(arrays_of_numpy)
   ck_expected_text("npy.txt", out, npys(out));
 }
 
+/* ---- LLFF ---- */
+
+/* A row of poses_bounds.npy with one of its numbers changed; one of three. */
+static void say_llff(FILE *out, int at, double value, int pictures, int downscale)
+{
+  double row[17] = {0, 1, 0, 5, 30, -1, 0, 0, 6, 40, 0, 0, 1, 7, 50, 2, 9};
+  char header[] = "{'descr': '<f8', 'fortran_order': False, 'shape': (3, 17), }";
+  table t = {.size = 0};
+  sf_capture c = {0};
+  remove_folder(), make_folder();
+  fprintf(out, "number %d is %g, %d pictures, 1/%d\n", at, value, pictures, downscale);
+  for (const char *b = "\x93NUMPY\1"; *b; b++) whole(&t, (uint64_t)*b, 1);
+  whole(&t, 0, 1), whole(&t, sizeof header - 1, 2);
+  memcpy(t.bytes + t.size, header, sizeof header - 1), t.size += sizeof header - 1;
+  for (int n = 0; n < 3; n++)
+    for (int i = 0; i < 17; i++) real(&t, n == 1 && i == at ? value : row[i] + (n == 2 && i == 15 ? -0.5 : 0));
+  put_file(in("poses_bounds.npy"), t.bytes, t.size);
+  ck_ok(sf_make_dir(in("images_2")));
+  if (downscale != 2) ck_ok(sf_make_dir(in("images")));
+  for (int n = 0; n < pictures; n++) {
+    char name[40];
+    snprintf(name, sizeof name, "%s/%c.%s", downscale == 2 ? "images_2" : "images", "cab"[n % 3] + n / 3,
+             n % 2 ? "JPG" : "png");
+    put_file(in(name), name, strlen(name));
+  }
+  put_file(in("images_2/other.txt"), "x", 1);
+  fprintf(out, "  there %d\n", sf_llff_there(folder));
+  const sf_status status = sf_llff_read(&c, folder, &(sf_dataset_options){.downscale = downscale});
+  say_status(out, status);
+  if (!status.code) {
+    fprintf(out, "  near %g shrink %d picture %d\n", c.near, c.shrink, c.picture);
+    for (int f = 0; f < c.count; f++) say_frame(out, &c.frame[f]);
+  }
+  free(c.frame);
+}
+
+static void llffs(FILE *out)
+{
+  static const struct {
+    int at;
+    double value;
+  } rows[] = {{0, 0.05},   {0, 0.11},  {1, 1.004}, {1, 1.006},  {5, -0.996},  {5, -0.994},  {12, 1.004}, {12, 1.006},
+              {12, 0.994}, {6, 0.009}, {6, 0.011}, {10, 0.011}, {11, -0.011}, {2, 0.011},   {4, 0.9},    {4, 1},
+              {4, 999999}, {4, 1e6},   {9, 0.9},   {9, 1e6},    {14, 1e-3},   {14, 0.0011}, {14, 1e7},   {3, 9e11},
+              {8, -1e12},  {13, 1e12}, {15, 0},    {15, -1},    {15, 9},      {15, 8.9},    {16, 1.9}};
+  say_llff(out, -1, 0, 3, 1), say_llff(out, -1, 0, 2, 1), say_llff(out, -1, 0, 4, 1), say_llff(out, -1, 0, 3, 2);
+  say_llff(out, -1, 0, 3, 0), say_llff(out, -1, 0, 3, 4), say_llff(out, -1, 0, 3, 3);
+  for (int i = 0; i < COUNT(rows); i++) say_llff(out, rows[i].at, rows[i].value, 3, 1);
+}
+
+TEST(rows_of_llff)
+{
+  ck_expected_text("llff.txt", out, llffs(out));
+}
+
+/* Which folder, and what is left to shrink. */
+static void folders(FILE *out)
+{
+  static const int there[] = {1, 2, 4, 8, 64, 65};
+  for (int set = 0; set < 64; set += set < 8 ? 1 : 7) {
+    remove_folder(), make_folder();
+    fprintf(out, "folders");
+    for (int i = 0; i < 6; i++)
+      if (set >> i & 1) {
+        char name[40];
+        snprintf(name, sizeof name, there[i] == 1 ? "images" : "images_%d", there[i]);
+        ck_ok(sf_make_dir(in(name)));
+        fprintf(out, " %s", name);
+      }
+    fprintf(out, "\n");
+    for (int downscale = 0; downscale < 9; downscale++) {
+      char folder_name[64] = "";
+      int shrink = -1;
+      const double side = downscale % 2 ? 1600 : 3201;
+      const sf_status status =
+          sf_pictures_choose(folder, downscale, side, side / (downscale % 3 ? 2 : 0.5), folder_name, &shrink);
+      say_status(out, status);
+      if (!status.code) fprintf(out, "  1/%d of %g: %s by %d\n", downscale, side, folder_name, shrink);
+    }
+  }
+}
+
+TEST(folders_of_pictures)
+{
+  ck_expected_text("folders.txt", out, folders(out));
+}
+
 ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};
