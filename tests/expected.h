@@ -27,7 +27,7 @@ static inline void ck_same_words(const char *name, const char *text, const char 
     const int a = (int)strcspn(text, blanks), b = (int)strcspn(wanted, blanks);
     char *end[2];
     const double x = strtod(text, &end[0]), y = strtod(wanted, &end[1]);
-    const bool numbers = a && b && end[0] == text + a && end[1] == wanted + b;
+    const bool numbers = a && b && end[0] == text + a && end[1] == wanted + b && isfinite(x) && isfinite(y);
     ck_assert_msg(numbers ? fabs(x - y) <= share * fmax(fabs(x), fabs(y)) : a == b && !memcmp(text, wanted, (size_t)a),
                   "%s: word %d: '%.*s' expected, not '%.*s', before '%.60s'", name, word, b, wanted, a, text,
                   wanted + b);
