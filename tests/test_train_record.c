@@ -3,6 +3,7 @@
 #include "ck_run.h"
 #include "expected.h"
 #include "train_fixture.h"
+#include <omp.h>
 
 static const double TOLERANCE = 1e-3; /* mathematical libraries may differ in a last bit, which grows */
 
@@ -70,9 +71,9 @@ static void searches(FILE *out)
   sf_train_options o = quick_run();
   o.stage1 = 4, o.stage2 = 44, o.beta = 3e-6;
   say_run(out, "beta", &o, 4);
-  o.objective = SF_OBJECTIVE_PAPER, o.stage2 = 12;
+  o.objective = SF_OBJECTIVE_PAPER, o.stage2 = 30, o.beta = 1e-5;
   say_run(out, "the paper's objective", &o, 4);
-  o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.beta = 1e-2, o.search_rate = 2;
+  o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.stage2 = 12, o.beta = 1e-2, o.search_rate = 2;
   say_run(out, "the price of energy", &o, 4);
   o = quick_run();
   o.stage1 = 4, o.stage2 = 24, o.target_loss = 0.3;
@@ -129,6 +130,41 @@ TEST(runs_of_planes)
   ck_expected_text_about("train-planes.txt", out, planes(out), TOLERANCE);
 }
 
+/* Of nothing in an empty box: white pictures are met exactly, black ones not at all. */
+TEST(scores_of_an_empty_box)
+{
+  sf_view view[4] = {{.image.rgba = NULL}};
+  const sf_dataset set = {.path = "set", .view = view, .count = 4};
+  sf_train_options o = quick_run();
+  OWNED(trainer) t = start(&data, &o, NULL);
+  memset(t->model.occupancy, 0, sf_config_cells(&o.config) / 8);
+  for (int v = 1; v < 4; v++) {
+    const int width = v == 3 ? 10 : 11, height = 12, pixels = width * height;
+    view[v].camera = data.view[0].camera;
+    view[v].image = (sf_image){width, height, malloc((size_t)pixels * 4 * sizeof(uint16_t))};
+    for (int i = 0; i < 4 * pixels; i++) view[v].image.rgba[i] = v == 2 && i % 4 < 3 ? 0 : 65535;
+  }
+  double psnr, ssim[2];
+  ck_ok(sf_evaluate(&t->model, &set, 1, 1, &psnr, &ssim[0]));
+  ck_assert_double_eq(psnr, 99);
+  ck_assert_double_eq_tol(ssim[0], 1, 1e-6);
+  ck_ok(sf_evaluate(&t->model, &set, 2, 0, &psnr, &ssim[1])); /* the first has no picture */
+  ck_assert_double_eq(psnr, 49.5);
+  ck_assert_double_lt(ssim[1], 0.51);
+  ck_ok(sf_evaluate(&t->model, &set, 0, 1, &psnr, &ssim[0]));
+  ck_assert_double_eq(psnr, 66);
+  ck_assert_double_eq(ssim[0], ssim[1]); /* the third is too narrow for one */
+  for (int i = 0; i < 10 * 12; i++) view[3].image.rgba[4 * i] = 0, view[3].image.rgba[4 * i + 3] = 0; /* see-through */
+  free(view[1].image.rgba), free(view[2].image.rgba);
+  view[1].image.rgba = view[2].image.rgba = NULL;
+  ck_ok(sf_evaluate(&t->model, &set, 0, 1, &psnr, &ssim[0]));
+  ck_assert_double_eq(psnr, 99);
+  ck_assert(isnan(ssim[0]));
+  free(view[3].image.rgba);
+  view[3].image.rgba = NULL;
+  ck_bad(sf_evaluate(&t->model, &set, 0, 1, &psnr, &ssim[0]), SF_E_FORMAT, "set: no view", "picture");
+}
+
 /* By what the data are. */
 static void defaults(FILE *out)
 {
@@ -161,6 +197,7 @@ TEST(defaults_by_the_data)
 static void set_up(void)
 {
   setenv("SPIKEFIELD_CPU", "portable", 1);
+  omp_set_num_threads(1);
   open_scene(6);
 }
 
