@@ -104,15 +104,79 @@ static void plain_runs(FILE *out)
   say_run(out, "in three cascades", &o, 4);
 }
 
+static sf_train_options planes_run(sf_net_kind net)
+{
+  sf_train_options o = sf_train_defaults_tensorf(&data);
+  o.config.net = net, o.config.steps = net == SF_NET_ANN ? 1 : 3, o.config.hidden = 16;
+  o.config.occ_res = 16, o.voxels = 20, o.rays = 64, o.samples = 2048, o.stage1 = 6, o.stage2 = 12;
+  for (int a = 0; a < 3; a++) o.config.tensorf.resolution[a] = 12 + a;
+  return o;
+}
+
+/* The pictures, taken for those of a forward-facing scene. */
+static void say_forward_run(FILE *out)
+{
+  const sf_dataset before = data;
+  sf_view view[6];
+  memcpy(view, data.view, sizeof view);
+  for (int v = 0; v < 6; v++) {
+    const float pose[12] = {1, 0, 0, 0.1f * (float)(v - 3), 0, 1, 0, 0.05f * (float)(v % 2), 0, 0, 1, 0};
+    memcpy(view[v].camera.to_world, pose, sizeof pose);
+  }
+  data.view = view, data.layout = SF_LAYOUT_LLFF, data.ndc = true, data.ndc_near = 1, data.scale = 0.9f;
+  for (int i = 0; i < 2; i++) data.ndc_focal[i] = view[0].camera.fx / 12;
+  sf_train_options o = planes_run(SF_NET_SNN);
+  say_run(out, "TensoRF in NDC", &o, 3);
+  data = before;
+}
+
 static void planes(FILE *out)
 {
-  for (int kind = 0; kind < 2; kind++) {
-    sf_train_options o = sf_train_defaults_tensorf(&data);
-    o.config.net = kind ? SF_NET_ANN : SF_NET_SNN, o.config.steps = kind ? 1 : 3, o.config.hidden = 16;
-    o.config.occ_res = 16, o.voxels = 20, o.rays = 64, o.samples = 2048, o.stage1 = 6, o.stage2 = 12;
-    for (int a = 0; a < 3; a++) o.config.tensorf.resolution[a] = 12 + a;
-    say_run(out, kind ? "TensoRF's twin" : "TensoRF", &o, 3);
+  sf_train_options o = planes_run(SF_NET_SNN);
+  say_run(out, "TensoRF", &o, 3);
+  o = planes_run(SF_NET_ANN);
+  say_run(out, "TensoRF's twin", &o, 3);
+  say_forward_run(out);
+}
+
+/* What a checkpoint holds, and what it is called. */
+static void say_checkpoint(FILE *out, const sf_train_options *o, int iterations)
+{
+  OWNED(trainer) t = start(&data, o, NULL);
+  sf_tensors set;
+  steps(t, iterations);
+  for (int whole = 0; whole < 2; whole++) {
+    ck_ok(sf_trainer_save(t, in("c.safetensors"), whole));
+    ck_ok(sf_tensors_load(&set, in("c.safetensors")));
+    fprintf(out, whole ? "checkpoint\n" : "model\n");
+    for (int i = 0; i < set.count; i++) {
+      const sf_tensor *s = &set.tensor[i];
+      fprintf(out, "  %s %d:", s->name, s->type);
+      for (int d = 0; d < s->dims; d++) fprintf(out, " %d", (int)s->shape[d]);
+      fprintf(out, "\n");
+    }
+    const cJSON *word;
+    cJSON_ArrayForEach(word, set.metadata)
+    {
+      if (strcmp(word->string, "train.seconds") != 0) fprintf(out, "  %s = %s\n", word->string, word->valuestring);
+    }
+    sf_tensors_free(&set);
   }
+}
+
+static void checkpoints(FILE *out)
+{
+  sf_train_options o = quick_run();
+  sf_config_bound(&o.config, 2);
+  o.config.finest_res = 64, o.fixed_steps = 2, o.charge = 1, o.stage1 = 2, o.stage2 = 80, o.seed = 9;
+  say_checkpoint(out, &o, 81);
+  o = planes_run(SF_NET_SNN);
+  say_checkpoint(out, &o, 9);
+}
+
+TEST(checkpoints_whole)
+{
+  ck_expected_text_about("train-checkpoint.txt", out, checkpoints(out), TOLERANCE);
 }
 
 TEST(runs_that_search)
