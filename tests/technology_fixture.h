@@ -22,6 +22,13 @@ static const char plain[] = "# comment\n"
                             "dram 0.008 nJ made up\n"
                             "register 32 fJ made up";
 
+/* No two prices in proportion to their points. */
+static const char crooked[] =
+    "name crooked\ntitle Crooked\nfp32_mac 4.7 pJ a\nfp32_add 0.8 pJ b\nint_add.8 31 fJ c\n"
+    "int_add.16 47 fJ c\nint_add.64 350 fJ c\nint_multiply.4 61 fJ d\nint_multiply.8 210 fJ d\n"
+    "int_multiply.32 3.1 pJ d\nsram.1024 6 pJ e\nsram.8192 11 pJ e\nsram.65536 29 pJ e\n"
+    "dram 1.95 nJ f\n";
+
 static inline sf_status load_text(sf_technology *tech, const char *text)
 {
   ck_ok(sf_write_file(in("t.tech"), text, strlen(text)));

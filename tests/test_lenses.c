@@ -1,5 +1,6 @@
 /* Lenses against OpenCV's equations, and as every layout brings them. */
 #include "ck_run.h"
+#include "tests/expected.h"
 #include "layout_folder.h"
 #include "src/scene/lens.h"
 
@@ -104,6 +105,91 @@ LOOP_TEST(lenses_come_from_every_layout, 6)
   ck_assert(c->k1 == wanted[_i % 3][0] && c->k2 == wanted[_i % 3][1]);
   ck_assert(c->p1 == wanted[_i % 3][2] && c->p2 == wanted[_i % 3][3]);
   ck_assert(c->fx == 20 && c->fy == 20 && c->cx == 8 && c->cy == 6);
+}
+
+/* A lens: bent there and straightened back; the slopes as differences say; what folds is refused, and where. */
+TEST(lenses_bend_and_straighten)
+{
+  const sf_camera lens = {.width = 40,
+                          .height = 30,
+                          .fx = 30,
+                          .fy = 28,
+                          .cx = 19,
+                          .cy = 16,
+                          .k1 = -0.2f,
+                          .k2 = 0.05f,
+                          .p1 = 0.01f,
+                          .p2 = -0.02f};
+  for (int i = 0; i < 35; i++) {
+    const double x = 0.3 * (i % 7 - 3), y = 0.3 * (i / 7 - 2), r2 = x * x + y * y;
+    const double k1 = (double)lens.k1, k2 = (double)lens.k2, p1 = (double)lens.p1, p2 = (double)lens.p2;
+    const double gain = 1 + k1 * r2 + k2 * r2 * r2, straight[2] = {x, y};
+    double bent[2], again[2];
+    sf_lens_bend(&lens, straight, bent);
+    ck_assert_double_eq_tol(bent[0], x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), 1e-15);
+    ck_assert_double_eq_tol(bent[1], y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y, 1e-15);
+    sf_lens_straighten(&lens, bent, again);
+    ck_assert_double_eq_tol(again[0], x, 1e-12);
+    ck_assert_double_eq_tol(again[1], y, 1e-12);
+  }
+  ck_ok(sf_lens_check(&lens, "w"));
+  for (int k = 0; k < 4; k++) {
+    sf_camera folded = {.width = 40, .height = 30, .fx = 30, .fy = 28, .cx = 19, .cy = 16};
+    ck_assert(!sf_lens_bends(&folded));
+    float *number[4] = {&folded.k1, &folded.k2, &folded.p1, &folded.p2};
+    *number[k] = k < 2 ? -0.9f : 0.6f;
+    ck_assert(sf_lens_bends(&folded));
+    static char text[4][80] = {"k1 -0.9, k2 0, p1 0, p2 0) cannot be undone at pixel (0, 0)",
+                               "k1 0, k2 -0.9, p1 0, p2 0) cannot be undone at pixel (0, 0)",
+                               "p1 0.6, p2 0) cannot be undone at pixel (0, 0)",
+                               "p1 0, p2 0.6) cannot be undone at pixel (0, 0)"};
+    ck_bad(sf_lens_check(&folded, "w"), SF_E_RANGE, "w: the lens", text[k]);
+  }
+  const sf_camera plain = {.width = 1 << 20, .height = 1 << 20, .fx = 1, .fy = 1};
+  ck_ok(sf_lens_check(&plain, "w"));
+}
+
+/* The strongest lens of each kind that can be undone. */
+static void lens_limits(FILE *out)
+{
+  for (int kind = 0; kind < 10; kind++) {
+    double good = 0, bad = 40;
+    for (int i = 0; i < 40; i++) {
+      const float k = (float)(0.5 * (good + bad)), sign = kind % 2 ? 1 : -1;
+      sf_camera lens = {.width = 40, .height = 30, .fx = 30, .fy = 28, .cx = 19, .cy = 16};
+      float *number[4] = {&lens.k1, &lens.k2, &lens.p1, &lens.p2};
+      if (kind < 8) *number[kind / 2] = sign * k;
+      if (kind >= 8) lens.k1 = -0.3f * k, lens.k2 = 0.1f * k, lens.p1 = sign * k, lens.p2 = 0.7f * k;
+      *(sf_lens_check(&lens, "w").code ? &bad : &good) = (double)k;
+    }
+    fprintf(out, "kind %d: %.4f\n", kind, good);
+  }
+}
+
+TEST(lenses_at_their_limits)
+{
+  ck_expected_text("lens-limits.txt", out, lens_limits(out));
+}
+
+/* Only what lies before the camera is seen. */
+TEST(points_are_before_the_camera_or_not)
+{
+  const sf_camera c = {.width = 40,
+                       .height = 30,
+                       .fx = 50,
+                       .fy = 40,
+                       .cx = 20,
+                       .cy = 15,
+                       .to_world = {0, 0, 1, 3, 1, 0, 0, 4, 0, 1, 0, 5}}; /* looks along -x */
+  float pixel[2] = {-1, -1};
+  for (int i = 0; i < 4; i++) {
+    const float behind[3] = {3 + 0.4f * (float)i, 4.1f, 5.2f};
+    ck_assert(!sf_camera_project(&c, behind, pixel));
+    ck_assert(pixel[0] == -1 && pixel[1] == -1);
+  }
+  ck_assert(sf_camera_project(&c, (float[3]){1, 4.4f, 5.3f}, pixel));
+  ck_assert_float_eq_tol(pixel[0], 20 + 50 * 0.2f, 1e-4f);
+  ck_assert_float_eq_tol(pixel[1], 15 - 40 * 0.15f, 1e-4f);
 }
 
 ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

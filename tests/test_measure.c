@@ -1,6 +1,6 @@
 /* The measuring loop of the audit: threads, tiles, the rays that are checked, failures. */
 #include "ck_run.h"
-#include "energy/energy.h"
+#include "energy/measuring.h"
 #include "tests/audit_fixture.h"
 #include "tests/fx_tensorf_fixture.h"
 #include <omp.h>
@@ -198,4 +198,71 @@ TEST(probe_names_the_sample_of_a_difference)
   ck_assert_msg(strstr(status.message, "sample 2: spikes of layer C1 at step 2: core ") == status.message, "%s",
                 status.message);
   free(trace), free(observer);
+}
+
+/* ---- rays in chunks ---- */
+
+static uint64_t tile_of(void *user, uint64_t index)
+{
+  return ((const uint64_t *)user)[index];
+}
+
+/* Every ray belongs to one chunk, and every tile too, whatever the size of a chunk and wherever it begins. */
+TEST(chunks_hold_whole_tiles)
+{
+  enum { RAYS = 40 };
+  uint64_t tile[RAYS];
+  for (int kind = 0; kind < 4; kind++)
+    for (uint64_t size = 1; size < 12; size++)
+      for (uint64_t count = RAYS - 3; count <= RAYS; count++) {
+        for (int i = 0; i < RAYS; i++)
+          tile[i] = (uint64_t[]){(uint64_t)i, (uint64_t)i / 3, (uint64_t)(i > 7) + (uint64_t)(i > 30), 5}[kind];
+        const sf_measure_job job = {.tile = tile_of, .user = tile};
+        const sf_measuring s = {.job = &job, .count = count};
+        uint64_t next = 0;
+        for (uint64_t first = 0; first < count; first += size) {
+          const uint64_t limit = sf_measure_limit(&s, first, size);
+          ck_assert_uint_eq(limit, first + size < count ? first + size : count);
+          uint64_t at = sf_measure_begin(&s, first, limit);
+          if (at == limit) continue;
+          ck_assert_uint_eq(at, next); /* goes on where the chunk before ended */
+          ck_assert(at == 0 || tile[at] != tile[at - 1]);
+          while (sf_measure_has(&s, at, limit)) at++;
+          ck_assert(at >= limit && (at == count || tile[at] != tile[at - 1]));
+          next = at;
+        }
+        ck_assert_uint_eq(next, count);
+      }
+}
+
+/* The lowest failure is kept, and only what is behind it is skipped; chosen rays are known by their index. */
+TEST(failures_and_progress_of_measuring)
+{
+  uint64_t index[] = {3, 8, 20, 21};
+  const sf_measure_job job = {.rays = 30};
+  sf_measuring s = {.job = &job, .count = 4, .index = index, .failed = {UINT64_MAX, sf_ok()}};
+  ck_assert_uint_eq(sf_measure_index(&s, 2), 20);
+  ck_assert_uint_eq(sf_measure_tile(&s, 2), 20); /* each ray has its own */
+  for (uint64_t i = 0; i < 4; i++) ck_assert(!sf_measure_skips(&s, i));
+  sf_measure_fail(&s, 8, sf_fail(SF_E_RANGE, "eight"));
+  sf_measure_fail(&s, 9, sf_fail(SF_E_RANGE, "nine"));
+  sf_measure_fail(&s, 8, sf_fail(SF_E_RANGE, "eight again"));
+  ck_assert_str_eq(s.failed.status.message, "eight");
+  ck_assert(!sf_measure_skips(&s, 0) && !sf_measure_skips(&s, 1) && sf_measure_skips(&s, 2) && sf_measure_skips(&s, 3));
+  sf_measure_progress(&s, 7);
+  ck_assert_uint_eq(s.done, 0); /* they were counted before */
+  s.index = NULL;
+  sf_measure_progress(&s, 7), sf_measure_progress(&s, 2);
+  ck_assert_uint_eq(s.done, 9);
+  ck_assert(!s.stopped && !sf_measure_skips(&s, 0));
+  sf_measure_outcome came = sf_measure_came(&s);
+  ck_assert(came.done == 9 && came.failed.ray == 8 && !came.stopped);
+  came.failed.status = sf_ok();
+  ck_assert(sf_measure_took(&s, &came) && s.done == 18);
+  came.stopped = true;
+  ck_assert(!sf_measure_took(&s, &came) && s.stopped && sf_measure_skips(&s, 0));
+  came.stopped = false;
+  ck_assert(!sf_measure_took(&s, &came)); /* stays stopped */
+  s.stopped = false, came.failed.status = sf_fail(SF_E_RANGE, "x");
+  ck_assert(!sf_measure_took(&s, &came));
 }

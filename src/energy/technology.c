@@ -256,20 +256,17 @@ uint64_t sf_price_multiply(const sf_technology *technology, int a_bits, int b_bi
 
 uint64_t sf_price_access(const sf_technology *technology, uint64_t memory_bytes, bool *interpolated)
 {
-  const sf_price *first, *a, *b, *last, *dram;
+  const sf_price *first, *a, *b, *last;
   neighbours(technology, SF_PRICE_SRAM, 0, &first, &a);
   neighbours(technology, SF_PRICE_SRAM, UINT64_MAX, &a, &last);
   neighbours(technology, SF_PRICE_SRAM, memory_bytes, &a, &b);
-  double access = (double)a->fj;
-  if (memory_bytes > last->at) {
-    dram = last + 1; /* by family: behind the last sram */
-    access = (double)dram->fj;
-  } else if (memory_bytes > first->at) {
-    note(interpolated, memory_bytes != a->at && memory_bytes != b->at);
-    const double share = log((double)memory_bytes / a->at) / log((double)b->at / a->at);
-    access = a->fj && b->fj ? (double)a->fj * pow((double)b->fj / (double)a->fj, share) : 0;
-  }
-  return round_positive(access);
+  if (memory_bytes <= first->at) return first->fj;
+  if (memory_bytes > last->at) return last[1].fj; /* by family: DRAM's is behind the last sram */
+  if (memory_bytes == b->at) return b->fj;
+  note(interpolated, true);
+  if (!a->fj || !b->fj) return 0;
+  const double share = log((double)memory_bytes / a->at) / log((double)b->at / a->at);
+  return round_positive((double)a->fj * pow((double)b->fj / (double)a->fj, share));
 }
 
 bool sf_price_measured(const sf_technology *technology, sf_price_family family, uint64_t *fj)
