@@ -172,6 +172,7 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
 $B/bin/sim_render: $B/obj/tools/render/options.o
+$B/bin/sf_data: $(patsubst %.c,$B/obj/%.o,$(wildcard tools/solve/*.c))
 $B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o
 
 # They serve a page (libmicrohttpd-dev).
