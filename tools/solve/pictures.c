@@ -10,7 +10,7 @@
 
 /* Below either a picture is blurred: a number that no picture with texture reaches, and a share of what the others
  * have. */
-#define SHARP_LEAST 4.0
+#define SHARP_LEAST 12.0
 #define SHARP_SHARE 0.1
 
 static bool is_folder(const char *path)
@@ -202,6 +202,7 @@ static sf_status choose_and_fill(solve_job *job, const char *from)
 sf_status solve_pictures_work(solve_job *job)
 {
   char frames[4096];
+  SF_TRY(solve_installed("colmap", "colmap")); /* before minutes are spent on pictures */
   SF_TRY(remove_old(job));
   if (is_folder(job->options->input)) return choose_and_fill(job, job->options->input);
   SF_TRY(solve_path(frames, job->state, "frames"));

@@ -122,22 +122,26 @@ static int model_pictures(const solve_job *job, const char *folder)
   return n == sizeof count ? count[0] | count[1] << 8 | count[2] << 16 : -1;
 }
 
-/* sizes: "9, 7 and 5". Returns the largest; -1: none. */
-static int largest_model(const solve_job *job, char sizes[200], int *pictures)
+typedef struct solve_models {
+  int count, largest, pictures; /* pictures: of the largest */
+  char sizes[200];              /* "9, 7 and 5" */
+} solve_models;
+
+static solve_models list_models(const solve_job *job)
 {
-  int best = -1, size[MODELS], found = 0;
-  *pictures = 0, *sizes = 0;
+  solve_models m = {.count = 0, .largest = -1};
+  int size[MODELS];
   for (int i = 0; i < MODELS; i++) {
     char folder[64];
     snprintf(folder, sizeof folder, ".solve/models/%d", i);
     const int n = model_pictures(job, folder);
     if (n < 0) continue;
-    if (n > *pictures) best = i, *pictures = n;
-    size[found++] = n;
+    if (n > m.pictures) m.largest = i, m.pictures = n;
+    size[m.count++] = n;
   }
-  for (int i = 0; i < found && strlen(sizes) < 180; i++)
-    sprintf(sizes + strlen(sizes), "%s%d", i == 0 ? "" : i == found - 1 ? " and " : ", ", size[i]);
-  return best;
+  for (int i = 0; i < m.count && strlen(m.sizes) < 180; i++)
+    sprintf(m.sizes + strlen(m.sizes), "%s%d", i == 0 ? "" : i == m.count - 1 ? " and " : ", ", size[i]);
+  return m;
 }
 
 static sf_status no_model(const solve_job *job, const char *log)
@@ -167,20 +171,30 @@ static sf_status run_mapper(solve_job *job, const char *models, const char *log)
   return strstr(status.message, "failed to create sparse model") ? no_model(job, log) : status;
 }
 
+static sf_status check_models(const solve_job *job, const solve_models *m, const char *log)
+{
+  const char *input = job->options->input;
+  const int all = job->pictures.count;
+  if (m->largest < 0) return no_model(job, log);
+  if (m->pictures * REGISTERED_SHARE >= all) return sf_ok();
+  if (m->count > 1)
+    return sf_fail(
+        SF_E_RANGE,
+        "%s: several models, of %s pictures; none has half of all %d. Take more pictures between the parts, or "
+        "give one part alone",
+        input, m->sizes, all);
+  return sf_fail(SF_E_RANGE, "%s: only %d of %d pictures found their place: the others need more overlap with them",
+                 input, m->pictures, all);
+}
+
 /* The largest model becomes sparse/0. */
 static sf_status take_largest(solve_job *job, const char *models, const char *log)
 {
-  char sizes[200], name[16], from[4096], to[4096], target[4096];
-  int pictures;
-  const int best = largest_model(job, sizes, &pictures), all = job->pictures.count;
-  if (best < 0) return no_model(job, log);
-  if (pictures * REGISTERED_SHARE < all)
-    return sf_fail(
-        SF_E_RANGE,
-        "%s: several models: COLMAP joined only %s of %d pictures. Take more pictures between the parts, or give "
-        "one part alone",
-        job->options->input, sizes, all);
-  snprintf(name, sizeof name, "%d", best);
+  char name[16], from[4096], to[4096], target[4096];
+  const solve_models m = list_models(job);
+  SF_TRY(check_models(job, &m, log));
+  if (m.count > 1 && !job->options->quiet) printf("models       of %s pictures: the largest is taken\n", m.sizes);
+  snprintf(name, sizeof name, "%d", m.largest);
   SF_TRY(solve_path(from, models, name));
   SF_TRY(solve_path(to, job->options->output, "sparse"));
   SF_TRY(solve_remove(to));

@@ -44,13 +44,33 @@ static void last_line(const char *log, char line[160])
   snprintf(line, 160, "%s", start ? start + 1 : tail);
 }
 
+/* Where the shell would find it. */
+static bool in_path(const char *program)
+{
+  const char *path = getenv("PATH");
+  for (const char *at = path ? path : "/usr/bin:/bin"; *at;) {
+    char file[4096];
+    const size_t n = strcspn(at, ":");
+    if (snprintf(file, sizeof file, "%.*s/%s", (int)n, at, program) < (int)sizeof file && !access(file, X_OK))
+      return true;
+    at += n + (at[n] == ':');
+  }
+  return false;
+}
+
+sf_status solve_installed(const char *program, const char *package)
+{
+  if (in_path(program)) return sf_ok();
+  return sf_fail(SF_E_IO, "%s is not installed: apt-get install %s", program, package);
+}
+
 static void become(const char *const *argv, const char *log)
 {
   const int out = open(log, O_WRONLY | O_CREAT | O_TRUNC, 0666), in = open("/dev/null", O_RDONLY);
   if (out < 0 || in < 0 || dup2(in, 0) < 0 || dup2(out, 1) < 0 || dup2(out, 2) < 0) _exit(126);
   setenv("QT_QPA_PLATFORM", "offscreen", 1); /* COLMAP opens a display otherwise */
   execvp(argv[0], (char *const *)(uintptr_t)argv);
-  _exit(errno == ENOENT ? 127 : 126);
+  _exit(126);
 }
 
 sf_status solve_run(solve_job *job, const char *const *argv, const char *log, const char *package,
@@ -58,6 +78,7 @@ sf_status solve_run(solve_job *job, const char *const *argv, const char *log, co
 {
   int result = 0;
   bool told = false;
+  SF_TRY(solve_installed(argv[0], package));
   if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "interrupted");
   const pid_t child = fork();
   if (child < 0) return sf_fail(SF_E_IO, "cannot start %s: %s", argv[0], strerror(errno));
@@ -71,8 +92,6 @@ sf_status solve_run(solve_job *job, const char *const *argv, const char *log, co
     usleep(20000);
   }
   if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "interrupted");
-  if (WIFEXITED(result) && WEXITSTATUS(result) == 127)
-    return sf_fail(SF_E_IO, "%s is not installed: apt-get install %s", argv[0], package);
   if (WIFEXITED(result) && !WEXITSTATUS(result)) return sf_ok();
   char line[160];
   last_line(log, line);

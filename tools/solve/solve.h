@@ -68,6 +68,8 @@ typedef struct solve_watch {
   void (*show)(sf_progress *progress, const char *text, int total);
   int total;
 } solve_watch;
+/* SF_E_IO, with the Debian package that holds it, unless it is in PATH. */
+sf_status solve_installed(const char *program, const char *package);
 /* Runs argv[0], its output to the file `log`; `package` of Debian holds it. watch: NULL for none.
  * SF_E_IO: not there, or it failed (the message has the last line of the log). SF_E_STOPPED: interrupted. */
 sf_status solve_run(solve_job *job, const char *const *argv, const char *log, const char *package,
