@@ -68,6 +68,8 @@ plan() { printf '%s\n' "case \$1 in feature_extractor$1" 'esac' >plan; }
 plan ') echo planned; exit 1 ;;'
 solves 1 "colmap failed: planned (its log is solved/.solve/features-0.log)" photos --features 900
 calls "feature_extractor "
+solves 1 "planned" photos "${few[@]}" # as at first: what later steps made is gone all the same
+calls "feature_extractor "
 cmp -s photos/r_7.png solved/images/r_7.png || fail "other features, and the pictures are gone"
 mkdir eight && cp photos/r_[0-7].png eight
 solves 1 "planned" eight
@@ -132,6 +134,10 @@ models 2 3 1
 refuses "several models, of 2, 3 and 1 pictures; none has half of all 8" eight
 models 3
 refuses "only 3 of 8 pictures found their place" eight
+
+mkdir -p made/bin && ln -s "$build/bin/sf_data" made/bin
+out=$(make -s -C "$root" -o all B="$work/made" scene PHOTOS="$work/three" 2>&1) && fail "make scene PHOTOS: exit status 0"
+grep -qF "three: 3 pictures" <<<"$out" && [ -d made/scenes/three/data ] || fail "make scene PHOTOS: $out"
 
 # ---- nothing of others is lost ----
 
