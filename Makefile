@@ -172,6 +172,7 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS)
 
 $B/bin/sim_render: $B/obj/tools/render/options.o
+$B/bin/sf_data: $(patsubst %.c,$B/obj/%.o,$(wildcard tools/solve/*.c))
 $B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o
 
 # They serve a page (libmicrohttpd-dev).
@@ -255,9 +256,11 @@ lego: all ## the same chain on SCENES/lego with a training budget of 15 minutes:
 
 # A scene of one's own.
 MINUTES ?= 15
-scene: all ## the same chain on DATA=folder (any layout): build/scenes/NAME; MINUTES=15, TRAIN="--backbone tensorf ..."
-	@[ -z "$(filter file,$(origin DATA))" ] || { echo "make scene DATA=folder: which folder of pictures and poses?" >&2; exit 2; }
-	@STARTED=$(STARTED) tools/chain.sh $B "$(DATA)" "$B/scenes/$$(basename "$(DATA)")" --minutes $(MINUTES) --train "$(TRAIN)"
+scene: all ## the same chain on DATA=folder (any layout), or on PHOTOS=folder-or-video, whose poses COLMAP finds (SOLVE="--frames 60"): build/scenes/NAME; MINUTES=15, TRAIN="--backbone tensorf ..."
+	@[ -n "$(PHOTOS)" ] || [ -z "$(filter file,$(origin DATA))" ] || { echo "make scene DATA=folder: which folder of pictures and poses? Without poses: PHOTOS=folder-or-video" >&2; exit 2; }
+	@data="$(DATA)" photos="$(PHOTOS)"; name=$$(basename "$${photos:-$$data}"); [ -d "$${photos:-.}" ] || name=$${name%.*}; out="$B/scenes/$$name"; \
+	  [ -z "$$photos" ] || { data=$$out/data && mkdir -p "$$out" && $B/bin/sf_data "$$photos" --solve -o "$$data" --png "$$out/cameras.png" $(SOLVE); } && \
+	  STARTED=$(STARTED) tools/chain.sh $B "$$data" "$$out" --minutes $(MINUTES) --train "$(TRAIN)"
 
 report: ## open build/demo/report.html (make demo writes it; REPORT=build/lego/report.html), or print where it is
 	@[ -f "$(REPORT)" ] || { echo "$(REPORT): not there; make demo writes build/demo/report.html" >&2; exit 1; }

@@ -198,11 +198,31 @@ TEST(no_ray_ends_in_nothing)
   ck_assert_float_eq(c[3], 1);
 }
 
+/* A chip of terrazzo looks the same from everywhere, but at its edges, and hardly two look alike. */
+TEST(chips_are_of_places)
+{
+  int same = 0, alike = 0;
+  float before[4] = {0};
+  for (uint64_t i = 0; i < 1000; i++) {
+    const float x = 0.5f + 0.3f * sf_random_float(3, 0, i), y = -0.5f + 0.3f * sf_random_float(3, 1, i);
+    float above[4], slanted[4];
+    trace("terrazzo", x, y, -0.42f, 0, 0, -1, above); /* the top of the slab is at -0.52 */
+    trace("terrazzo", x - 0.05f, y + 0.05f, -0.47f, 1, -1, -1, slanted);
+    ck_assert_float_eq(above[3], 1);
+    same += fabsf(above[0] - slanted[0]) < 1e-6f && fabsf(above[2] - slanted[2]) < 1e-6f;
+    alike += fabsf(above[0] - before[0]) < 1e-6f;
+    memcpy(before, above, sizeof before);
+  }
+  ck_assert_int_gt(same, 990);
+  ck_assert_int_lt(alike, 20);
+}
+
 TEST(trace_faults)
 {
   const float o[3] = {0, 0, 3}, d[3] = {0, 0, -1}, none[3] = {0};
   float c[4];
-  ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars", "textured, simple, fog, empty, plaza, wires");
+  ck_bad(sf_procedural_trace("mars", o, d, c), SF_E_USAGE, "mars",
+         "textured, simple, fog, empty, plaza, wires, terrazzo");
   ck_bad(sf_procedural_trace("fog", o, none, c), SF_E_RANGE, "fog", "direction");
 }
 

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "base/json.h"
 #include "scene/scene.h"
+#include "tools/solve/solve.h"
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -14,7 +15,9 @@ typedef struct job {
   const char *path, *png;
   int downscale, threads;
   double scale;
-  bool json;
+  bool json, solve;
+  solve_options photographs;
+  solve_result solved;
   sf_dataset split[SPLITS];
   sf_dataset all; /* views of both; borrows all else from the training split, but for its own warnings */
 } job;
@@ -124,9 +127,16 @@ static void print_distances(const sf_dataset *d)
   if (d->points) printf("points       %d sparse points\n", d->points);
 }
 
+static void print_solved(const solve_result *r)
+{
+  printf("solved       %d of %d pictures found their place, by %d points; mean reprojection error %.2f px\n",
+         r->registered, r->pictures, r->points, r->error);
+}
+
 static void print_text(const job *j, const kind *kinds, int n)
 {
   const sf_dataset *d = &j->all;
+  if (j->solve) print_solved(&j->solved);
   printf("%s: %s layout\n", j->path, sf_layout_names[d->layout]);
   printf("views        %d to learn from, %d held out; the first are %s and %s\n", j->split[TRAIN].count,
          j->split[TEST].count, j->split[TRAIN].count ? j->split[TRAIN].view[0].name : "none",
@@ -213,6 +223,13 @@ static sf_status print_json(const job *j, const kind *kinds, int n)
     for (int v = 0; v < j->split[s].count; v++) cJSON_AddItemToArray(views, view_json(&j->split[s].view[v]));
   }
   add_warnings(json, j);
+  if (j->solve) {
+    cJSON *solved = cJSON_AddObjectToObject(json, "solved");
+    cJSON_AddNumberToObject(solved, "pictures", j->solved.pictures);
+    cJSON_AddNumberToObject(solved, "registered", j->solved.registered);
+    cJSON_AddNumberToObject(solved, "points", j->solved.points);
+    cJSON_AddNumberToObject(solved, "reprojection_error", j->solved.error);
+  }
   return sf_json_print(json, true);
 }
 
@@ -244,9 +261,34 @@ static sf_status report(const job *j)
   return status;
 }
 
+/* Photographs become a data set first, which is then read as any other. */
+static sf_status solve_first(job *j)
+{
+  if (!j->solve) return sf_ok();
+  if (!j->photographs.output) return sf_fail(SF_E_USAGE, "missing option -o DIR, the data set that --solve makes");
+  sf_cli_catch_signals();
+  j->photographs.input = j->path;
+  SF_TRY(solve(&j->photographs, &j->solved));
+  j->path = j->photographs.output;
+  return sf_ok();
+}
+
+static sf_status run(const sf_cli *cli, int argc, char **argv, job *j)
+{
+  static const char *const solving[] = {"--output", "--frames", "--features", "--matching", "--lens", "--quiet", NULL};
+  SF_TRY(sf_cli_parse(cli, argc, argv, &j->path));
+  if (!j->solve) SF_TRY(sf_cli_refuse(cli, argc, argv, solving, "has no effect without --solve"));
+  if (j->threads) omp_set_num_threads(j->threads);
+  j->photographs.quiet |= j->json;
+  SF_TRY(solve_first(j));
+  SF_TRY(load(j));
+  return report(j);
+}
+
 int main(int argc, char **argv)
 {
-  job j = {0};
+  job j = {.photographs = {.frames = 80, .features = 3000}};
+  solve_options *p = &j.photographs;
   const sf_option options[] = {
       {"--png", 0, SF_ARG_OUTPUT, &j.png, 0, 0, NULL, "FILE",
        "picture of the cameras from above and from the side: blue to learn from, red held out"},
@@ -256,23 +298,34 @@ int main(int argc, char **argv)
        "model units per world unit, 0 = the layout's (default 0)"},
       {"--threads", 0, SF_ARG_INT, &j.threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {"--json", 0, SF_ARG_FLAG, &j.json, 0, 0, NULL, NULL, "all of it as JSON, every pose included"},
+      SF_GROUP("Photographs without poses:"),
+      {"--solve", 0, SF_ARG_FLAG, &j.solve, 0, 0, NULL, NULL,
+       "find the poses with COLMAP first; goes on where it was interrupted"},
+      {"--output", 'o', SF_ARG_PLACE, &p->output, 0, 0, NULL, "DIR", "the data set to make, in the COLMAP layout"},
+      {"--frames", 0, SF_ARG_INT, &p->frames, SF_SOLVE_LEAST, 10000, NULL, "N",
+       "of a video: the sharpest frame of each of N intervals (default 80)"},
+      {"--features", 0, SF_ARG_INT, &p->features, 50, 100000, NULL, "N",
+       "features of a picture, at most; matching takes their square (default 3000)"},
+      {"--matching", 0, SF_ARG_CHOICE, &p->matching, 0, 0, SF_SOLVE_MATCHINGS, "WHAT",
+       "exhaustive: every pair; sequential: neighbours by name; auto: every pair of up to 100 pictures (default auto)"},
+      {"--lens", 0, SF_ARG_CHOICE, &p->lens, 0, 0, SF_SOLVE_LENSES, "MODEL",
+       "COLMAP's camera model: one radial term, or all four of OpenCV (default SIMPLE_RADIAL)"},
+      {"--quiet", 'q', SF_ARG_FLAG, &p->quiet, 0, 0, NULL, NULL, "no progress of --solve"},
       {0}};
   const sf_cli cli = {
       .program = "sf_data",
-      .usage = "sf_data DIR [options]",
+      .usage = "sf_data DIR [options]\n       sf_data PHOTOS --solve -o DIR [options]",
       .summary = "Says what the programs understand of a folder of posed pictures: its layout (Blender, LLFF,\n"
-                 "COLMAP, instant-ngp), cameras, splits, where its scene lies - and what looks wrong.",
+                 "COLMAP, instant-ngp), cameras, splits, where its scene lies - and what looks wrong.\n"
+                 "With --solve it first makes such a folder of photographs, or of a video.",
       .examples = "  sf_data fern --png cameras.png\n"
-                  "  sf_data bonsai --json\n",
+                  "  sf_data bonsai --json\n"
+                  "  sf_data photos --solve -o garden --png cameras.png\n"
+                  "  sf_data walk.mp4 --solve -o walk --frames 60\n",
       .options = options,
       .min_positional = 1,
       .max_positional = 1};
-  sf_status status = sf_cli_parse(&cli, argc, argv, &j.path);
-  if (status.code == SF_OK) {
-    if (j.threads) omp_set_num_threads(j.threads);
-    status = load(&j);
-    if (status.code == SF_OK) status = report(&j);
-  }
+  const sf_status status = run(&cli, argc, argv, &j);
   unload(&j);
   return sf_cli_finish(&cli, status);
 }

@@ -63,6 +63,7 @@ int main(int argc, char **argv)
                  "  fog        homogeneous fog around a shiny core\n"
                  "  plaza      bricks among towers under a sky, cameras inside: train with --bound 8\n"
                  "  wires      a fence, stays and a coiled cable, one to two pixels wide\n"
+                 "  terrazzo   speckled stones: COLMAP finds its cameras (sf_data --solve)\n"
                  "  empty      nothing: every picture is transparent",
       .examples = "  sf_scene textured -o scene\n"
                   "  sf_scene fog -o scene --size 100 --train 40 --test 5 --seed 7",

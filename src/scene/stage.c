@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", "plaza", "wires", NULL};
+const char *const sf_procedural_names[] = {"textured", "simple", "fog", "empty", "plaza", "wires", "terrazzo", NULL};
 
 /* Display colours; the shading squares them to linear light. */
 static const sf_material plinth = {
@@ -27,6 +27,10 @@ static const sf_material matt_cream = {SF_PLAIN, 0, {{0.92, 0.86, 0.72}}, 0, 0};
 static const sf_material paving = {SF_CHECKER, 0.9, {{0.78, 0.74, 0.66}, {0.52, 0.55, 0.50}, {0.40, 0.38, 0.34}}, 0, 0};
 static const sf_material tower = {SF_STRIPES, 0.23, {{0.72, 0.36, 0.26}, {0.86, 0.80, 0.66}}, 0, 0};
 static const sf_material sky = {SF_SKY, 0, {{0.36, 0.56, 0.84}, {0.62, 0.76, 0.92}}, 0, 0};
+
+static const sf_material slab = {SF_TERRAZZO, 0.16, {{0.93, 0.88, 0.76}, {0.42, 0.52, 0.60}, {0.70, 0.40, 0.30}}, 0, 0};
+static const sf_material stone = {
+    SF_TERRAZZO, 0.13, {{0.90, 0.90, 0.90}, {0.30, 0.48, 0.42}, {0.84, 0.66, 0.30}}, 0, 0};
 
 typedef struct vec {
   double x, y, z;
@@ -143,6 +147,17 @@ static void build_wires(sf_stage *stage)
   add(stage, SF_SPHERE, (vec){-0.35, -0.3, floor + 0.25}, (vec){0.25, 0, 0}, 0.5, 0.45, &ball);
 }
 
+/* Stones that COLMAP finds again in other pictures. */
+static void build_terrazzo(sf_stage *stage)
+{
+  add(stage, SF_CYLINDER, (vec){0, 0, -0.6}, (vec){1.05, 0.08, 0}, 0.3, 0, &slab);
+  add(stage, SF_BOX, (vec){-0.30, 0.34, -0.07}, (vec){0.24, 0.30, 0.45}, 0.5, 0, &stone);
+  add(stage, SF_BOX, (vec){0.40, 0.22, -0.26}, (vec){0.30, 0.22, 0.26}, -0.4, 0, &slab);
+  add(stage, SF_BOX, (vec){0.36, 0.24, 0.15}, (vec){0.16, 0.16, 0.15}, 0.2, 0, &stone);
+  add(stage, SF_CYLINDER, (vec){0.22, -0.52, -0.17}, (vec){0.22, 0.35, 0}, 0.9, 0, &stone);
+  add(stage, SF_SPHERE, (vec){-0.46, -0.38, -0.20}, (vec){0.32, 0, 0}, 0.5, 0.45, &slab);
+}
+
 void sf_stage_build(sf_stage *stage, int index)
 {
   memset(stage, 0, sizeof *stage);
@@ -151,4 +166,5 @@ void sf_stage_build(sf_stage *stage, int index)
   if (index == 2) build_fog(stage);
   if (index == 4) build_plaza(stage);
   if (index == 5) build_wires(stage);
+  if (index == 6) build_terrazzo(stage);
 }

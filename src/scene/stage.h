@@ -20,7 +20,9 @@ typedef enum {
   SF_CHECKER, /* colour[0], colour[1] on the faces that look along local +z, elsewhere colour[2]; period = tile side */
   SF_STRIPES, /* colour[0], colour[1] along local x; period = width of one stripe */
   SF_SECTORS, /* six sectors around local z: colour[0..2], each followed by white; white caps */
-  SF_SKY      /* colour[0] to colour[1] in waves around z, paler upwards: unlit, and without a shadow */
+  SF_SKY,     /* colour[0] to colour[1] in waves around z, paler upwards: unlit, and without a shadow */
+  SF_TERRAZZO /* chips of colour[0..2], no two alike, in three sizes, all through the body; period = side of the largest
+               */
 } sf_pattern;
 
 typedef struct sf_material {

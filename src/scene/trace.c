@@ -1,4 +1,5 @@
 /* Shading and exact fog along one ray. */
+#include "base/rng.h"
 #include "src/scene/stage.h"
 #include "src/scene/vec.h"
 #include <math.h>
@@ -9,6 +10,24 @@ static const double light[3] = {0.48, -0.36, 0.80}; /* towards the key light, ex
 #define SKY 0.42
 #define GROUND 0.20
 #define SURFACE_GAP 1e-6 /* a shadow ray starts off its own surface */
+
+/* 0..1 of the chip that holds a point: one of a lattice of cubes that stands across every face. */
+static double chip(const double p[3], double side, uint64_t size)
+{
+  static const double turn[3][3] = {{0.66, 0.66, -0.36}, {-0.74, 0.50, -0.45}, {-0.12, 0.56, 0.82}};
+  uint64_t cell[3];
+  for (int i = 0; i < 3; i++) cell[i] = (uint64_t)(int64_t)floor(vec_dot(turn[i], p) / side);
+  return (double)sf_random_float(cell[0], cell[1] + (size << 32), cell[2]);
+}
+
+static void terrazzo(const sf_material *m, const double p[3], double colour[3])
+{
+  static const double finer[3] = {1, 0.45, 0.2};
+  double value[3];
+  for (int i = 0; i < 3; i++) value[i] = chip(p, m->period * finer[i], (uint64_t)i);
+  const double light = (0.4 + 0.6 * value[1]) * (0.6 + 0.4 * value[2]);
+  for (int i = 0; i < 3; i++) colour[i] = light * m->colour[(int)(3 * value[0])][i];
+}
 
 static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
 {
@@ -28,6 +47,7 @@ static const double *pattern_colour(const sf_shape *shape, const sf_hit *hit)
   }
   case SF_PLAIN:
   case SF_SKY:
+  case SF_TERRAZZO:
     break;
   }
   return m->colour[0];
@@ -77,7 +97,8 @@ static void shade(const sf_stage *stage, const sf_shape *shape, const sf_stage_r
     return;
   }
   const double *albedo = pattern_colour(shape, hit), *n = hit->normal;
-  double at[3], half[3], length = 0;
+  double chips[3], at[3], half[3], length = 0;
+  if (shape->material->pattern == SF_TERRAZZO) terrazzo(shape->material, hit->local, chips), albedo = chips;
   for (int i = 0; i < 3; i++) {
     at[i] = ray->origin[i] + hit->t * ray->direction[i];
     half[i] = light[i] - ray->direction[i];
