@@ -45,8 +45,6 @@ static sf_trainer *trained(sf_train_options o, sf_ranks *ranks, const char *resu
   sf_train_stats stats;
   o.ranks = ranks;
   sf_status status = sf_trainer_create(&t, &data, &o, resume);
-  if (!status.code && o.charge > 0) /* so dense that light ends: samples are dropped */
-    for (size_t i = 0; i < t->model.param[SF_P_D2].size; i++) sf_model_param(&t->model, SF_P_D2)[i] *= 8;
   for (int i = 0; i < iterations && !status.code; i++) status = sf_trainer_step(t, &stats);
   if (!status.code) return t;
   fprintf(stderr, "rank %d: %s\n", job_link.rank, status.message);
