@@ -75,8 +75,8 @@ else
 fi
 
 # ---- a full disk on one rank ----
-command=("$bin/sf_train" photos ${small/--stage2 250/--stage2 28} $grid -q -o tight.model)
-refused 1 "sf_train: cannot write tight.model" -n 1 bash -c "$(full 1)" "${command[@]}" : -n 1 "${command[@]}"
+tight=("$bin/sf_train" photos ${small/--stage2 250/--stage2 28} $grid -q -o tight.model)
+refused 1 "sf_train: cannot write tight.model" -n 1 bash -c "$(full 1)" "${tight[@]}" : -n 1 "${tight[@]}"
 [ ! -e tight.model ] || fail "sf_train, a full disk: half a model is there"
 
 finish "sf_train on 1, 2, 3, 4, 8 ranks, killed, interrupted and continued: what one process gives"
