@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { STREAM_BLOCK = SF_LOCKSTEP_STREAM, SAVE_SECONDS = 5 };
+enum { STREAM_BLOCK = SF_LOCKSTEP_STREAM, SAVE_SECONDS = 1 };
 
 typedef struct block {
   uint64_t rays; /* finished */

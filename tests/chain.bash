@@ -1,5 +1,6 @@
 # For scripts of tests/chain:   . chain.bash BUILD
-# Gives build, root (of the source), work (a folder that goes at the end), fail, finish, and learn, which makes a scene.
+# Gives build, root (of the source), work (a folder that goes at the end), fail, finish, quick, quick_dut, and learn, which makes a
+# scene.
 set -u
 build=$(cd "${1:?usage: $0 BUILD}" && pwd) || exit 2
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd) || exit 2
@@ -7,6 +8,9 @@ work=$(mktemp -d "${TMPDIR:-/tmp}/sf_chain.XXXXXX") || exit 1
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 failures=0
+# What Verilator makes is built without optimising, which is sooner. --dut starts make without MAKEFLAGS; these get there.
+quick='OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0'
+quick_dut() { export GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }"; }
 
 fail() {
   echo "FAILED: $*"

@@ -53,15 +53,15 @@ every_tool() { # SCENE DATA TRAIN-OPTIONS...
   tool "$s" convert "$bin/sf_convert" twin.safetensors "$d" --rays 10
   tool "$s" html "$bin/energy_audit" "$s.snn" "$d" --rays 50 --rtl-rays 2 --html "$s.html" --quiet
   tool "$s" cycles "$bin/sf_cycles" "$s.snn" "$d" --downscale 4 --quiet
-  tool "$s" explore "$bin/sf_cycles" "$s.snn" "$d" --downscale 4 --explore --quiet
+  tool "$s" explore "$bin/sf_cycles" "$s.snn" "$d" --downscale 8 --explore --quiet
   tool "$s" error_budget "$bin/error_budget" "$s.safetensors" "$s.snn" "$d" --rays 4 --samples 100 --quiet
-  tool "$s" fit "$bin/sf_export" "$s.safetensors" -o fit.snn --fit --data "$d" --fit-rays 512 --quiet
+  tool "$s" fit "$bin/sf_export" "$s.safetensors" -o fit.snn --fit --data "$d" --fit-rays 256 --quiet
   tool "$s" fit-cosim "$bin/sf_cosim" fit.snn "$d" --rays 4 --quiet
   tool "$s" fit-audit "$bin/energy_audit" fit.snn "$d" --rays 50 --rtl-rays 2 --quiet
   tool "$s" fit-fixed "$bin/sim_render" fit.snn "$d" --backend fixed --crop 18,18,2,2 -o fixed.exr --quiet
   tool "$s" fit-rtl "$bin/sim_render" fit.snn "$d" --backend rtl --crop 18,18,2,2 -o rtl.exr --quiet
   cmp -s fixed.exr rtl.exr || fail "$s: core and accelerator differ in the fitted scene"
-  [ "$d" != object ] || tool "$s" fit-bytes "$bin/sf_export" "$s.safetensors" -o bytes.snn --fit --data "$d" --fit-rays 512 --fit-bytes $((1 << 15)) --quiet
+  [ "$d" != object ] || tool "$s" fit-bytes "$bin/sf_export" "$s.safetensors" -o bytes.snn --fit --data "$d" --fit-rays 256 --fit-bytes $((1 << 15)) --quiet
   tool "$s" fine-tune "$bin/sf_train" "$d" -o tuned.safetensors --fine-tune "$s.safetensors" --weight-bits 6 --stage2 5 --eval-views 1 --quiet
   tool "$s" vectors "$bin/sf_export" "$s.snn" --vectors "$s.kit" --data "$d" --samples 4
   tool "$s" traces "$bin/sf_export" "$s.snn" --traces "$s.traces" --data "$d" --rays 2

@@ -3,7 +3,7 @@
 . "$(dirname "${BASH_SOURCE[0]}")/small_scene.bash" "$@"
 unset MAKEFLAGS MAKELEVEL
 kit=$work/elsewhere
-"$build/bin/sf_export" "$work/scene.snn" --vectors "$work/made" --data "$work/data" --seed 3 >/dev/null && mv "$work/made" "$kit" || exit 1
+"$build/bin/sf_export" "$work/scene.snn" --vectors "$work/made" --data "$work/data" --samples "${KIT_SAMPLES:-24}" --seed 3 >/dev/null && mv "$work/made" "$kit" || exit 1
 
 # run SIMULATOR STATUS TEXT... [-- VARIABLE...]: make's status (0, or 1 for any failure) and texts in what it prints
 run() {

@@ -146,4 +146,16 @@ template <class words> static void set_position(words &to, const uint32_t pos[3]
 {
   to[0] = pos[0] | pos[1] << 24, to[1] = pos[1] >> 8 | pos[2] << 16, to[2] = pos[2] >> 16;
 }
+
+/* Cycles until a bench has done more samples. */
+template <class bench> uint64_t run_samples(bench &b, int samples)
+{
+  const int end = b.done + samples;
+  const uint64_t begin = b.u.cycle;
+  while (b.done < end) {
+    b.cycle(end - b.accepted);
+    ck_assert_uint_lt(b.u.cycle - begin, (uint64_t)samples * 20000);
+  }
+  return b.u.cycle - begin;
+}
 #endif

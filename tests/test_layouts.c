@@ -31,11 +31,17 @@ LOOP_TEST(colmap_has_the_rays_of_its_poses, 4)
   for (int i = 0; i < 3; i++) ck_assert_double_eq_tol(p[i], (double)d.point[15 + i], 1e-6);
 }
 
+/* Moves the cameras so that they look at the origin. */
+static void look_at_origin(layout_rig *rig)
+{
+  for (int v = 0; v < VIEWS; v++)
+    for (int i = 0; i < 3; i++) rig->view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
+}
+
 TEST(instant_ngp_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  for (int v = 0; v < VIEWS; v++)
-    for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
+  look_at_origin(&rig);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms.json", &rig, "\"aabb_scale\":4,", "images", 0, 1);
   same_splits(&rig);
@@ -256,8 +262,7 @@ TEST(a_crop_looks_where_its_picture_is)
   for (int i = 0; i < 12; i++) ck_assert_double_eq_tol(d.world[i], whole.world[i], 1e-9);
   ck_assert_float_eq_tol(d.scale, whole.scale * 2, 1e-5f); /* 60 degrees off: the object is at half the depth */
   sf_dataset_free(&whole);
-  for (int v = 0; v < VIEWS; v++)
-    for (int i = 0; i < 3; i++) crop.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
+  look_at_origin(&crop);
   strcat(more, "\"aabb_scale\":1,");
   put_json("transforms.json", &crop, more, "images", 0, 1), reload("train");
   ck_assert_int_eq(d.warnings, 0);
@@ -268,8 +273,7 @@ TEST(a_crop_looks_where_its_picture_is)
 TEST(blender_has_the_rays_of_its_poses)
 {
   layout_rig rig = orbit();
-  for (int v = 0; v < VIEWS; v++)
-    for (int i = 0; i < 3; i++) rig.view[v].to_world[4 * i + 3] -= i == 0 ? 3 : i == 1 ? -2 : 1;
+  look_at_origin(&rig);
   put_pictures("images", &rig, WIDTH, HEIGHT, 255);
   put_json("transforms_train.json", &rig, "", "images", 1, 2);
   put_json("transforms_test.json", &rig, "", "images", 0, 2);

@@ -201,16 +201,7 @@ struct grid_bench {
     u.edge();
     if (taken) u.top.s_valid_i = 0;
   }
-  uint64_t run(int samples)
-  {
-    const int end = done + samples;
-    const uint64_t begin = u.cycle;
-    while (done < end) {
-      cycle(end - accepted);
-      ck_assert_uint_lt(u.cycle - begin, (uint64_t)samples * 20000);
-    }
-    return u.cycle - begin;
-  }
+  uint64_t run(int samples) { return run_samples(*this, samples); }
 
 private:
   void accept()

@@ -38,6 +38,12 @@ static void random_position(const fx_scene *scene, uint64_t i, uint32_t pos[3])
   }
 }
 
+static void features_of(fx_scene *scene, const int8_t *table, const uint32_t pos[3], int16_t *features)
+{
+  memcpy(scene->grid.table, table, 2 * (size_t)scene->grid.entries);
+  fx_grid_features(&scene->grid, pos, features, NULL);
+}
+
 TEST(corners_are_all_that_a_position_reads)
 {
   OWNED(fx_scene) scene = small_scene(13, FX_HYBRID);
@@ -47,8 +53,7 @@ TEST(corners_are_all_that_a_position_reads)
     int16_t f[32], g[32];
     uint32_t pos[3];
     random_position(&scene, i, pos);
-    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
-    fx_grid_features(&scene.grid, pos, f, NULL);
+    features_of(&scene, all, pos, f);
     memset(scene.grid.table, 0, 2 * (size_t)scene.grid.entries);
     for (int l = 0; l < scene.grid.levels; l++) {
       const sf_corners c = sf_grid_corners(&scene.grid, l, pos, pos);
@@ -81,10 +86,8 @@ TEST(unread_entries_are_not_read)
     int16_t f[32], g[32];
     uint32_t pos[3];
     random_position(&scene, i, pos);
-    memcpy(scene.grid.table, cleared, 2 * (size_t)scene.grid.entries);
-    fx_grid_features(&scene.grid, pos, f, NULL);
-    memcpy(scene.grid.table, all, 2 * (size_t)scene.grid.entries);
-    fx_grid_features(&scene.grid, pos, g, NULL);
+    features_of(&scene, cleared, pos, f);
+    features_of(&scene, all, pos, g);
     ck_assert_mem_eq(f, g, 2 * (size_t)scene.grid.levels * sizeof *f);
   }
   free(all), free(cleared);

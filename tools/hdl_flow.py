@@ -2,6 +2,7 @@
 import hashlib
 import os
 import sys
+import time
 
 
 class Stop(Exception):
@@ -25,6 +26,19 @@ def run(program, main, errors=()):
     except KeyboardInterrupt:
         print(f"{program}: interrupted; what is finished is kept", file=sys.stderr)
         sys.exit(130)
+
+
+class Spent:
+    """Time since it was made, of this program and of those that it ran: the processor's, and by the clock."""
+
+    def __init__(self):
+        self.began, self.used = time.monotonic(), sum(os.times()[:4])
+
+    def processor(self):
+        return sum(os.times()[:4]) - self.used
+
+    def __str__(self):
+        return f"{self.processor():.0f} s of processor time, {time.monotonic() - self.began:.0f} s by the clock"
 
 
 def write(path, text):

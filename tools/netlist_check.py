@@ -9,12 +9,11 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 
 from asic import defaults, liberty
 from asic.flow import FlowError
 from asic.netlist import NetlistError
-from hdl_flow import Stop, digest, run, sources_of, write
+from hdl_flow import Spent, Stop, digest, run, sources_of, write
 from netlist import kit, mapped, models, shell
 
 TOP = "sf_top"
@@ -109,10 +108,10 @@ class Check:
             pass
         shutil.rmtree(self.folder, ignore_errors=True)
         shutil.copytree(os.path.join(self.work.root, "rtl"), os.path.join(self.folder, "rtl"))
-        started = time.monotonic()
+        spent = Spent()
         self.work.say(f"{self.text} in {self.mapper.name}: mapping")
         ports = self.mapper.map(self.module, self.parameters, self.folder)
-        self.work.say(f"{self.text} in {self.mapper.name}: mapping took {time.monotonic() - started:.0f} s")
+        self.work.say(f"{self.text} in {self.mapper.name}: mapping took {spent}")
         shell.write_shell(self.module, self.parameters, ports, self.folder)
         write(os.path.join(self.folder, "netlist.f"), "\n".join(shell.listed(self, TOP)) + "\n")
         write(key_path, key)
@@ -123,10 +122,10 @@ class Check:
             names = [line for line in file.read().split("\n") if line and not line.startswith("+")]
         return [swapped if swapped and name == "netlist.v" else os.path.join(self.folder, name) for name in names]
 
-    def simulate(self, where, simulator, seconds=None, swapped=None, build="sim"):
-        """(passed, the bench's line, samples, seconds) of the kit on this netlist."""
+    def simulate(self, where, simulator, swapped=None, build="sim"):
+        """(passed, the bench's line, samples, seconds of processor time) of the kit on this netlist."""
         return kit.simulate(where, simulator, self.sources(swapped), os.path.join(self.folder, "rtl"), os.path.join(self.folder, build),
-                            self.block.get("LANES"), self.with_tap, seconds)
+                            self.block.get("LANES"), self.with_tap)
 
 
 def planted(check, where):
@@ -161,7 +160,7 @@ def measure(check, kits):
 
 def table_of(results):
     """The results as Markdown, with a note for each netlist."""
-    lines = ["| netlist | cells of | cells | registers | samples compared | differences | s | planted errors found |", "|---|---|---|---|---|---|---|---|"]
+    lines = ["| netlist | cells of | cells | registers | samples compared | differences | s of processor time | planted errors found |", "|---|---|---|---|---|---|---|---|"]
     notes = []
     for name, result in results.items():
         hits = sum(error["found"] for error in result["planted"])

@@ -275,7 +275,7 @@ static sf_status solve_first(job *j)
 
 static sf_status run(const sf_cli *cli, int argc, char **argv, job *j)
 {
-  static const char *const solving[] = {"--output", "--frames", "--features", "--matching", "--lens", "--quiet", NULL};
+  static const char *const solving[] = {"--output", "--frames", "--features", "--matching", "--lens", NULL};
   SF_TRY(sf_cli_parse(cli, argc, argv, &j->path));
   if (!j->solve) SF_TRY(sf_cli_refuse(cli, argc, argv, solving, "has no effect without --solve"));
   if (j->threads) omp_set_num_threads(j->threads);
@@ -298,7 +298,7 @@ int main(int argc, char **argv)
        "model units per world unit, 0 = the layout's (default 0)"},
       {"--threads", 0, SF_ARG_INT, &j.threads, 1, 1024, NULL, "N", "threads (default: all processors)"},
       {"--json", 0, SF_ARG_FLAG, &j.json, 0, 0, NULL, NULL, "all of it as JSON, every pose included"},
-      SF_GROUP("Photographs without poses:"),
+      SF_GROUP("Photographs without poses"),
       {"--solve", 0, SF_ARG_FLAG, &j.solve, 0, 0, NULL, NULL,
        "find the poses with COLMAP first; goes on where it was interrupted"},
       {"--output", 'o', SF_ARG_PLACE, &p->output, 0, 0, NULL, "DIR", "the data set to make, in the COLMAP layout"},
@@ -310,7 +310,7 @@ int main(int argc, char **argv)
        "exhaustive: every pair; sequential: neighbours by name; auto: every pair of up to 100 pictures (default auto)"},
       {"--lens", 0, SF_ARG_CHOICE, &p->lens, 0, 0, SF_SOLVE_LENSES, "MODEL",
        "COLMAP's camera model: one radial term, or all four of OpenCV (default SIMPLE_RADIAL)"},
-      {"--quiet", 'q', SF_ARG_FLAG, &p->quiet, 0, 0, NULL, NULL, "no progress of --solve"},
+      {"--quiet", 'q', SF_ARG_FLAG, &p->quiet, 0, 0, NULL, NULL, "no progress, and nothing but the report"},
       {0}};
   const sf_cli cli = {
       .program = "sf_data",

@@ -104,8 +104,8 @@ class Block:
             await change
             tap = dut.tap.value.integer
             layer = tap >> 2 * LANES + 3
-            spiking = layer < len(LAYERS) and LAYERS[layer] in SPIKING
-            membranes = int("".join(part.value.binstr for part in parts), 2) if spiking else 0
+            neurons = scene.info.outputs[layer] if layer < len(LAYERS) and LAYERS[layer] in SPIKING else 0
+            membranes = int("".join(part.value.binstr for part in parts)[-24 * neurons:], 2) if neurons else 0  # lanes without a neuron show anything
             self.tap.setdefault(layer, []).append((tap >> 2 * LANES & 7, tap >> LANES & lanes, tap & lanes, membranes))
 
     async def write(self, offset, value):

@@ -128,7 +128,7 @@ def around():
     return [os.path.join(HERE, name) for name in AROUND]
 
 
-def verilator(folder, block, top):
+def verilator(folder, block, top, opt):
     """The commands that build and run the bench in Verilator, in `folder`. `block`: include folders, other options, sources."""
     import cocotb
     libs = os.path.join(os.path.dirname(cocotb.__file__), "libs")
@@ -139,11 +139,11 @@ def verilator(folder, block, top):
                "--x-initial", "unique", "--unroll-count", "256", "--unroll-stmts", "1000000", "--Mdir",
                os.path.join(folder, "verilator"), "-o", "sim", f"-DSF_DUT={top}", *others,
                *[f"+incdir+{path}" for path in includes], *files, *around(), main, "-LDFLAGS",
-               f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator", "-MAKEFLAGS", "OPT_FAST=-O2"]
+               f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator", "-MAKEFLAGS", f"OPT_FAST={opt}"]
     return command, [os.path.join(folder, "verilator", "sim"), "+verilator+rand+reset+2"]
 
 
-def icarus(folder, block, top):
+def icarus(folder, block, top, _):
     """As verilator(), for Icarus Verilog."""
     import cocotb
     libs = os.path.join(os.path.dirname(cocotb.__file__), "libs")
@@ -156,7 +156,7 @@ def icarus(folder, block, top):
 
 def build(options, folder, block):
     """The simulation's command; built only when something it depends on has changed."""
-    command, run = {"verilator": verilator, "icarus": icarus}[options.sim](folder, block, options.dut_top)
+    command, run = {"verilator": verilator, "icarus": icarus}[options.sim](folder, block, options.dut_top, options.opt)
     if not shutil.which(command[0]):
         raise Trouble(f"{command[0]}: not installed (make deps)")
     key, stamp = build_key(command, block[0], block[2] + around()), os.path.join(folder, options.sim + ".key")
@@ -262,6 +262,7 @@ def arguments():
     parser.add_argument("--dut", help="another block: sources in compilation order, +incdir+, -I, -D, -F LIST, -f LIST")
     parser.add_argument("--dut-top", default="sf_top", help="its module (sf_top)")
     parser.add_argument("--plusarg", action="append", default=[], metavar="+NAME=VALUE", help="for the simulation; any number of them")
+    parser.add_argument("--opt", default="-O2", help="of the Verilated simulation: --opt=-O0 builds sooner, for few samples (-O2)")
     parser.add_argument("--export", help="sf_export, where it is not found by itself")
     parser.add_argument("-o", default="sf_cocotb", metavar="DIR", help="what is built, results.xml, run.log (sf_cocotb)")
     return parser.parse_args()

@@ -26,7 +26,8 @@ static sf_status direction_of(const spikefield_scene *scene, const float *direct
   double unit[3];
   fx_ray ray;
   SF_TRY(sf_fx_direction_make(&scene->fx, direction, &ray, unit));
-  if (fx_net_decodes(&scene->fx.net)) memset(ray.dir, 0, sizeof ray.dir), memcpy(ray.dir, ray.unit, sizeof ray.unit);
+  if (fx_net_constants_per_sample(&scene->fx.net))
+    memset(ray.dir, 0, sizeof ray.dir), memcpy(ray.dir, ray.unit, sizeof ray.unit);
   memcpy(harmonics, ray.dir, sizeof ray.dir);
   return sf_ok();
 }
@@ -135,7 +136,7 @@ static sf_status checked_batch(batch *b, const spikefield_scene *scene, const sp
   if (!b->n) return sf_ok();
   LIB_REQUIRE(b->harmonics);
   LIB_REQUIRE(b->samples);
-  const int input = SPIKEFIELD_INPUT_MAX, direction = fx_net_decodes(&b->view.net) ? FX_UNIT_ONE : input;
+  const int input = SPIKEFIELD_INPUT_MAX, direction = fx_net_constants_per_sample(&b->view.net) ? FX_UNIT_ONE : input;
   SF_TRY(check_inputs("harmonic", b->harmonics, 1, SPIKEFIELD_DIRECTIONS, direction));
   if (b->features) SF_TRY(check_inputs("feature", b->features, b->n, (size_t)fx_net_inputs(&b->view.net), input));
   if (b->positions) SF_TRY(check_positions(b->positions, b->n));

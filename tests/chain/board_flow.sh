@@ -41,18 +41,18 @@ refused() { # STATUS TEXT BOARD
   board "$3" || status=$?
   [ $status -eq "$1" ] && grep -q -e "$2" "$work/said.log" || fail "board $3 gives $status, not '$2'"
 }
-describe 85k 50
+describe 25k 50
 status=0
 board small || status=$?
 if [ $status -eq 77 ]; then echo "skipped: $(tail -n 2 "$work/said.log" | head -n 1)"; exit 77; fi
 [ $status -eq 0 ] || fail "no bitstream"
-[ "$(wc -c <"$work/board/small/small.bit")" -gt 100000 ] || fail "the bitstream is too small"
+[ "$(wc -c <"$work/board/small/small.bit")" -gt 50000 ] || fail "the bitstream is too small"
 grep -q "clock 50 MHz, [0-9.]* MHz after routing" "$work/out.log" || fail "the frequency is not said"
 grep -q "put it on the board: load it .*small.bit" "$work/out.log" || fail "the command is not said"
 board small && ! grep -q "took" "$work/said.log" || fail "a finished run is not kept"
 rm "$work/board/small/small.bit"
 sed -i 's/CLKOP_DIV       (12)/CLKOP_DIV       (2)/; s/CLKOP_CPHASE    (5)/CLKOP_CPHASE    (1)/; s/CLKFB_DIV       (2)/CLKFB_DIV       (14)/; s/sum_q \* sum_q/sum_q * sum_q * sum_q/' "$own/small.sv"
-describe 85k 350
+describe 25k 350
 refused 1 "a small board: [0-9.]* MHz after routing, its clock has 350 MHz: no bitstream was made" small
 [ ! -e "$work/board/small/small.bit" ] || fail "there is a bitstream that is too slow"
 refused 2 "there is no board nothing: .*board.json: No such file" nothing

@@ -9,6 +9,10 @@ usage "missing argument" sf_data
 usage "usage: sf_export MODEL -o SCENE [--vectors DIR] [options] (see sf_export --help)" sf_export # the first form alone
 data "d/transforms_train.json: not a model or a scene" sf_export d/transforms_train.json -o out
 data "no such folder" sf_data absent
+usage "missing option -o DIR" sf_data d --solve
+usage "--frames has no effect without --solve" sf_data d --frames 20
+usage "--matching" sf_data d --solve -o out --matching some
+data "d: no JPEG or PNG picture is there" sf_data d --solve -o out && rm -r out
 data "cannot write" sf_data d --png absent/cameras.png
 # A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level.
 while read -r finest options; do

@@ -25,13 +25,15 @@ grep -q '^FAIL: test_counters' "$work/out" || fail "a wrong counter is not named
 SPIKEFIELD_LIBRARY=/nowhere.so "$python" -c 'import spikefield' 2>&1 | grep -q 'ImportError: .*SPIKEFIELD_LIBRARY.*/nowhere.so' ||
   fail "a missing library is not named"
 
-# ---- the bench.  bench STATUS TEXT... -- OPTION...
+# ---- the bench.  bench STATUS TEXT... -- OPTION..., on a scene: of all lanes, or of fewer, which is programmed sooner
+"$build/faults/make_scene" "$work/narrow.snn" 32 || exit 1
+scene=scene
 bench() {
   local want=$1 got texts=()
   shift
   while [ "$1" != -- ]; do texts+=("$1"); shift; done
   shift
-  "$python" share/cocotb/sf_cocotb.py "$work/scene.snn" "$work/data" --export "$build/bin/sf_export" --seed 3 "$@" >"$work/out" 2>&1
+  "$python" share/cocotb/sf_cocotb.py "$work/$scene.snn" "$work/data" --export "$build/bin/sf_export" --seed 3 --opt=-O0 "$@" >"$work/out" 2>&1
   got=$?
   [ $got -eq "$want" ] || fail "bench $*: status $got, expected $want: $(tail -n 4 "$work/out")"
   for text in "${texts[@]}"; do grep -qE -- "$text" "$work/out" || fail "bench $*: no '$text' in $(cut -c1-300 "$work/out")"; done
@@ -48,6 +50,7 @@ grep -q '<failure' "$work/faulty/results.xml" && fail "a failure in results.xml 
 faulty 1 1 'FAIL ray_.* layer C2 step [0-9] neuron 37 membrane: expected'
 grep -q '<failure' "$work/faulty/results.xml" || fail "no failure in results.xml"
 faulty 2 1 'FAIL ray_.* layer C2 step 1 neuron 64 row: expected 1, actual 0'
+scene=narrow
 faulty 9 1 'FAIL ray_.* a result changed before it was taken'
 faulty 10 1 'counter .*: expected [0-9]+, actual'
 faulty 12 1 'FAIL counters: .*register 1000: response 2 to a read'
@@ -55,7 +58,8 @@ faulty 13 1 'FAIL program: .*a register answered before it was asked'
 faulty 14 1 'FAIL ray_.*: no result within 100000 cycles'
 faulty 15 1 'FAIL ray_.*sample 0 layer D1 step 0: no tap beat'
 bench 0 'PASS 24 samples' -- --samples 24 --dut "-F $work/faulty.f" --plusarg +fault=15 --no-tap -o "$work/faulty"
-bench 0 'PASS 48 samples' -- --dut "-F $work/faulty.f" --counters each -o "$work/faulty"
+bench 0 'PASS 24 samples' -- --samples 24 --dut "-F $work/faulty.f" --counters each -o "$work/faulty"
+scene=scene
 bench 1 'FAIL counters: .*counter layer C1 step 2 spikes: expected' -- --dut "-F $work/faulty.f" --plusarg +fault=3 -o "$work/faulty"
 
 bench 2 'no such file' -- --dut nowhere.sv -o "$work/none"
@@ -67,6 +71,7 @@ python3 -S -E -c 'import sys; sys.argv = ["x", "a", "b"]; sys.path.insert(0, "sh
 if ! command -v iverilog >/dev/null; then
   echo "iverilog: not installed"
 else
+  scene=narrow
   # The RTL of the build, and a block of another name with a wrong neuron.
   bench 0 'PASS 12 samples of 1 rays in icarus' -- --sim icarus --samples 12 --counters each -o "$work/own"
   mkdir "$work/wrong"

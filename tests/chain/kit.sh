@@ -2,11 +2,11 @@
 # The vector kit as its user has it, in a folder elsewhere: PASS in Icarus and in Verilator with the same line;
 # waveforms (kit_flips.sh: wrong bits; kit_faults.sh, kit_dut.sh: other RTL). usage: kit.sh BUILD
 . "$(dirname "$0")/../kit_run.bash" "$@"
-"$build/bin/sf_export" "$work/scene.snn" --vectors "$work/again" --data "$work/data" --seed 3 >/dev/null || exit 1
+"$build/bin/sf_export" "$work/scene.snn" --vectors "$work/again" --data "$work/data" --samples 24 --seed 3 >/dev/null || exit 1
 diff -r "$kit" "$work/again" || fail "the same seed gives other files"
 
 # A kit may be written again, over one that was interrupted, too, and into an empty folder; among other things not.
-vectors() { "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/$1" --data "$work/data" --seed 3 >"$work/out" 2>&1; }
+vectors() { "$build/bin/sf_export" "$work/scene.snn" --vectors "$work/$1" --data "$work/data" --samples 24 --seed 3 >"$work/out" 2>&1; }
 rm -r "$work/again/manifest.json" "$work/again/rtl"
 mkdir "$work/empty" "$work/thesis"
 echo precious >"$work/thesis/README.md"
@@ -29,6 +29,10 @@ cat "$work/verilator"
 flip expected_membranes_C2.hex 41
 run verilator 1 'sample 13 layer C2 step 1 neuron 0 membrane' --
 cp "$work/kept" "$kit/expected_membranes_C2.hex"
+run verilator 0 'PASS 24 samples' -- STALLS=0 TAP=0
+run verilator 0 'PASS 24 samples' -- STALLS=80 SEED=11
+[ "$(grep -c '^2' "$kit/stimulus.hex")" -ge 2 ] || fail "the kit has no second ray"
+run verilator 1 'built without waveforms' -- ARGS=+vcd=run.vcd
 run verilator 1 'nowhere' -- DUT=nowhere # whatever was built before
 command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 
@@ -37,18 +41,21 @@ make -C "$kit" icarus 2>&1 | grep -v 'Entering\|Leaving' >"$work/shown"
 [ "$(wc -l <"$work/shown")" -eq 2 ] || fail "make icarus: $(cut -c1-200 "$work/shown" | head -n 5)"
 tail -n 1 "$work/shown" | tee "$work/icarus"
 diff "$work/verilator" "$work/icarus" || fail "the simulators take other ways"
-# Waveforms: the bench and every level of the block, up to the last cycle.
+flip expected_membranes_D1.hex 1
+run icarus 1 'sample 0 layer D1 step 0 neuron 0 membrane' -- STALLS=0
+cp "$work/kept" "$kit/expected_membranes_D1.hex"
+
+# Waveforms: the bench and every level of the block, up to the last cycle. Of fewer neurons, which is a smaller program.
+"$build/faults/make_scene" "$work/narrow.snn" 32 && "$build/bin/sf_export" "$work/narrow.snn" --vectors "$work/narrow" --data "$work/data" \
+  --samples 12 --seed 3 >/dev/null || exit 1
+kit=$work/narrow
 for simulator in icarus verilator; do
   run $simulator 0 PASS -- VCD=run.vcd BUILD=waves OPT=-O0 >/dev/null
   grep -q '^\$scope module u_dut' < <(sed 's/^ *//' "$kit/run.vcd") && grep -q 'm_axis_tdata_o' "$kit/run.vcd" || fail "$simulator: no nets in run.vcd"
-  cycles=$(sed -nE 's/^PASS.* ([0-9]+) cycles.*/\1/p' "$work/icarus")
+  cycles=$(sed -nE 's/^PASS.* ([0-9]+) cycles.*/\1/p' "$work/log")
   [ "$(grep '^#' "$kit/run.vcd" | tail -n 1 | tr -d '#')" -ge $((cycles * 10000 - 10000)) ] || fail "$simulator: run.vcd ends early"
   rm "$kit/run.vcd"
 done
-run icarus 1 'FAIL: +vcd: nowhere/run.vcd cannot be written' -- VCD=nowhere/run.vcd
-run verilator 1 'built without waveforms' -- ARGS=+vcd=run.vcd BUILD=build
-run icarus 0 'PASS 48 samples' -- STALLS=0 TAP=0
-run icarus 0 'PASS 48 samples' -- STALLS=80 SEED=11
-[ "$(grep -c '^2' "$kit/stimulus.hex")" -ge 2 ] || fail "the kit has no second ray"
+run icarus 1 'FAIL: +vcd: nowhere/run.vcd cannot be written' -- VCD=nowhere/run.vcd BUILD=waves OPT=-O0
 
 finish "the kit passes in both simulators"

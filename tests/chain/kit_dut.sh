@@ -1,6 +1,7 @@
 #!/bin/bash
 # The vector kit around other RTL than its own: another neuron passes, a wrong one does not, another top level is named.
 # usage: kit_dut.sh BUILD
+NEURONS=32 # programmed sooner
 . "$(dirname "$0")/../kit_run.bash" "$@"
 command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 

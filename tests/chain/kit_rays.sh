@@ -1,6 +1,7 @@
 #!/bin/bash
 # The vector kit's rays, of a hash grid and of TensoRF: PASS in Verilator and in Icarus with the same line; a wrong word in any
 # file, and a fault in the block's field, are caught. usage: kit_rays.sh BUILD
+NEURONS=32 # programmed sooner
 . "$(dirname "$0")/../kit_run.bash" "$@"
 export OPT=-O0
 grid=$kit
@@ -23,8 +24,8 @@ every_file() {
 }
 every_file
 
-"$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 20 --stage2 60 --samples 2048 \
-  --rays 256 --voxels 16 --steps 3 --quiet >/dev/null && "$build/bin/sf_export" "$work/planes.safetensors" -o "$work/planes.snn" >/dev/null &&
+"$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 10 --stage2 10 --samples 512 \
+  --rays 64 --hidden 32 --voxels 16 --steps 3 --quiet >/dev/null && "$build/bin/sf_export" "$work/planes.safetensors" -o "$work/planes.snn" >/dev/null &&
   "$build/bin/sf_export" "$work/planes.snn" --vectors "$work/planes" --data "$work/data" --samples 24 --seed 3 >/dev/null || exit 1
 kit=$work/planes
 every_file

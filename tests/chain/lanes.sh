@@ -13,11 +13,10 @@ rtl=$build/lanes/rtl
 "$build/bin/sf_export" "$work/32.snn" --vectors "$work/kit" --data "$work/data" --samples 1 >/dev/null || exit 1
 diff -rq "$work/kit/rtl" "$rtl" >/dev/null 2>&1 || { mkdir -p "$rtl" && rm -r "$rtl" && mv "$work/kit/rtl" "$rtl"; } || exit 1
 sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | tr '\n' ' ')
-quick='OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0' # --dut starts make without MAKEFLAGS; this one gets there
 # run LANES HIDDEN
 run() {
-  GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }" "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 150 --limit-samples 400 --seed 1 --quiet --json \
-    --evidence "$work/evidence" --dut "-GLANES=$1 +incdir+$rtl $sources" >"$work/out" 2>"$work/err"
+  (quick_dut && exec "$build/bin/sf_cosim" "$work/$2.snn" "$work/data" --rays 150 --limit-samples 400 --seed 1 --quiet --json \
+    --evidence "$work/evidence" --dut "-GLANES=$1 +incdir+$rtl $sources" >"$work/out" 2>"$work/err")
 }
 for lanes in 32 64; do
   run $lanes $lanes || fail "$lanes lanes: a net of $lanes neurons"

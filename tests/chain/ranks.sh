@@ -1,35 +1,8 @@
 #!/bin/bash
 # Programs as ranks of mpirun: whatever their number, what comes out is what one process gives, also when a rank is killed
-# or all are interrupted and another number goes on. Ranks that are not alike are refused.   usage: ranks.sh BUILD
-command -v mpirun >/dev/null || { echo "skipped: mpirun is not installed (openmpi-bin)"; exit 77; }
-. "$(dirname "$0")/../small_scene.bash" "$@"
-cd "$work" || exit 1
-export LC_ALL=C OMP_NUM_THREADS=1 OMP_WAIT_POLICY=passive
-[ "$(id -u)" -ne 0 ] || export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-bin=$build/bin
-
-# job RANKS COMMAND...: a rank that stays behind would be a failure, too
-job() { timeout -k 5 120 mpirun --oversubscribe -n "$1" "${@:2}"; }
-# pid_of RANK JOB: the process of a job that has begun
-pid_of() {
-  for _ in $(seq 300); do
-    for pid in $(ps -o pid= --ppid "$2"); do
-      tr '\0' '\n' <"/proc/$pid/environ" 2>/dev/null | grep -qx "OMPI_COMM_WORLD_RANK=$1" && { echo "$pid"; return; }
-    done
-    sleep 0.1
-  done
-}
-await() { for _ in $(seq 600); do [ -e "$1" ] && return; sleep 0.1; done; fail "$1 does not come"; }
-# gone PID: within the 10 s that a job has to end
-gone() {
-  for _ in $(seq 100); do
-    ps -o stat= -p "$1" | grep -qv Z || return 0
-    sleep 0.1
-  done
-  return 1
-}
-plain() { grep -aEv '"(seconds|jobs|pixels_per_second)":' "$1" | sed 's/time="[0-9.]*"//g'; }
-same() { cmp -s <(plain "$1") <(plain "$2") || fail "$3: $1 and $2 differ: $(diff <(plain "$1") <(plain "$2") | head -n 4)"; }
+# or all are interrupted and another number goes on. Ranks that are not alike are refused. (ranks_train.sh: sf_train.)
+# usage: ranks.sh BUILD
+. "$(dirname "$0")/../ranks_run.bash" "$@"
 
 # ---- a program that is started by itself knows nothing of MPI ----
 for program in sf_cosim sim_render energy_audit sf_train; do
@@ -44,7 +17,7 @@ cosim() { # NAME RANKS ARGS...: 0 ranks for no launcher
   "${launch[@]}" "$build/faults/sf_cosim" scene.snn data --quiet --json --evidence evidence "${@:3}" >"$1.json" 2>"$1.err"
 }
 for ranks in 0 1 2 4; do
-  cosim equal$ranks $ranks --rays 40 --block 5 --checkpoint equal$ranks.part --junit equal$ranks.xml ||
+  cosim equal$ranks $ranks --rays 24 --block 5 --checkpoint equal$ranks.part --junit equal$ranks.xml ||
     fail "$ranks ranks: $(cat equal$ranks.err)"
   for file in equal$ranks.json equal$ranks.part equal$ranks.xml; do same $file ${file/equal$ranks/equal0} "$ranks ranks"; done
 done
@@ -75,8 +48,8 @@ for how in "-KILL 2" "-KILL 0" "-INT job"; do
     -KILL*) grep -q "process rank $victim .* exited on signal 9" cut.err || fail "$how: no line names the rank: $(cat cut.err)" ;;
     *) grep -q 'part holds [0-9]* rays, the same command goes on from there' cut.err || fail "$how: $(cat cut.err)" ;;
   esac
-  cosim again 2 --rays 100000 --block 2 --checkpoint part --limit-samples 1500 || fail "$how: going on: $(cat again.err)"
-  [ -e whole.json ] || cosim whole 0 --rays 100000 --block 2 --limit-samples 1500
+  cosim again 2 --rays 100000 --block 2 --checkpoint part --limit-samples 600 || fail "$how: going on: $(cat again.err)"
+  [ -e whole.json ] || cosim whole 0 --rays 100000 --block 2 --limit-samples 600
   # A job that got further than the limit before the signal has to be compared with as much.
   done=$(sed -nE 's/.*"samples":[[:space:]]*([0-9]+),/\1/p' again.json | head -n 1)
   whole=$(sed -nE 's/.*"samples":[[:space:]]*([0-9]+),/\1/p' whole.json | head -n 1)
@@ -85,11 +58,6 @@ for how in "-KILL 2" "-KILL 0" "-INT job"; do
 done
 
 # ---- refused ----
-refused() { # STATUS TEXT MPIRUN-ARGS...
-  timeout -k 5 120 mpirun --oversubscribe "${@:3}" >refused.out 2>&1
-  [ $? -eq "$1" ] || fail "${*:3}: exit status is not $1: $(cat refused.out)"
-  grep -qF -- "$2" refused.out || fail "${*:3}: '$2' is not in $(cat refused.out)"
-}
 mkdir other && cp "$bin/sf_cosim" other && printf x >>other/sf_cosim && cp scene.snn other
 "$bin/sf_scene" simple -o other/data --size 32 --train 1 --test 3 >/dev/null
 options=(scene.snn data --rays 20 -q)
@@ -134,94 +102,22 @@ job 4 "$bin/energy_audit" "${audit[@]}" >audit4.json 2>audit.err || fail "energy
 same audit4.json audit0.json "audit"
 same audit.csv audit0.csv "audit"
 
-# ---- sf_train: model and log, both fields, the twin, a charge; with other numbers of threads, too ----
-"$bin/sf_scene" textured -o photos --size 16 --train 6 --test 3 >/dev/null
-small="--samples 768 --occ-res 16 --hidden 16 --stage1 6 --stage2 28 --seed 3 --psnr-prefixes 1 --eval-views 2 --no-scaling"
-grid="--levels 6 --log2-hash 9"
-train() { # NAME RANKS ARGS...: 0 ranks for no launcher
-  local launch=()
-  [ "$2" -eq 0 ] || launch=(job "$2")
-  "${launch[@]}" "$bin/sf_train" photos $small -q --json -o "$1.model" "${@:3}" >"$1.json" 2>"$1.err"
-}
-timeless() { sed -E 's/"(seconds|samples_per_second|model|ranks|sent_bytes)":[^,]*,//g' "$1"; }
-alike() { # NAME REFERENCE TEXT
-  cmp -s "$1.model" "$2.model" || fail "$3: the model differs"
-  cmp -s <(timeless "$1.model.jsonl") <(timeless "$2.model.jsonl") || fail "$3: the log differs"
-  cmp -s <(timeless "$1.json") <(timeless "$2.json") || fail "$3: the report differs"
-}
-for net in "grid 0 $grid" "grid 2 $grid" "grid 3 $grid --threads 2" "grid 8 $grid" "twin 0 $grid --net ann" "twin 4 $grid --net ann" \
-  "charge 0 $grid --fixed-steps 3 --charge 1" "charge 3 $grid --fixed-steps 3 --charge 1" \
-  "planes 0 --backbone tensorf --voxels 20" "planes 2 --backbone tensorf --voxels 20" "planes 3 --backbone tensorf --voxels 20"; do
-  read -r name ranks args <<<"$net"
-  train $name$ranks $ranks $args || fail "sf_train, $ranks ranks, $args: $(cat $name$ranks.err)"
-  alike $name$ranks ${name}0 "$ranks ranks, $args"
-done
-grep -q '"measured":[1-9]' grid0.json || fail "no iteration ran all steps"
-grep -q '"sent_bytes":[1-9]' grid2.json || fail "two ranks did not speak to each other"
-
-# ---- sf_train: killed, interrupted; --resume with another number of ranks ----
-small=${small/--stage2 28/--stage2 250} # long enough to be met at work
-train long 0 $grid || fail "sf_train, a longer run: $(cat long.err)"
-begin() { # ARGS...: a job that is at work
-  rm -f cut.model*
-  mpirun --oversubscribe -n 3 "$bin/sf_train" photos "$@" $grid -q --json -o cut.model --checkpoint-minutes 0 >cut.json 2>cut.err &
-  parent=$!
-  await cut.model
-  for _ in $(seq 600); do [ -s cut.model.jsonl ] && break; sleep 0.05; done
-}
-for how in "-KILL 1 2" "-KILL 0 0" "-KILL 2 3"; do
-  read -r signal victim others <<<"$how"
-  unset OMPI_MCA_odls_base_sigkill_timeout
-  begin $small
-  pid=$(pid_of "$victim" $parent) begun=$(date +%s)
-  kill "$signal" "$pid"
-  wait $parent && fail "sf_train, $how: success"
-  [ $(($(date +%s) - begun)) -le 10 ] || fail "sf_train, $how: the job ended after $(($(date +%s) - begun)) s"
-  grep -q "process rank $victim .* exited on signal 9" cut.err || fail "sf_train, $how: no line names the rank: $(cat cut.err)"
-  train cut "$others" --resume || fail "sf_train, $how: going on: $(cat cut.err)"
-  cmp -s cut.model long.model || fail "sf_train, $how: going on with $others ranks gives another model"
-done
-# mpirun takes its time before it passes an interrupt on: a job without an end. Alone it goes on until it is interrupted again.
-endless=${small/--stage2 250/--stage2 1000000}
-export OMPI_MCA_odls_base_sigkill_timeout=5
-begin $endless
-kill -INT $parent
-wait $parent && fail "sf_train, interrupted job: success"
-first=$(sed -n 's/.*interrupted at iteration \([0-9]*\); continue with --resume.*/\1/p' cut.err)
-timeout --foreground -s INT 2 "$bin/sf_train" photos $endless $grid -q -o cut.model --resume >/dev/null 2>again.err
-second=$(sed -n 's/.*interrupted at iteration \([0-9]*\); continue with --resume.*/\1/p' again.err)
-[ "${first:-0}" -gt 0 ] && [ "${second:-0}" -gt "$first" ] || fail "sf_train, interrupted job: $(cat cut.err again.err)"
-unset OMPI_MCA_odls_base_sigkill_timeout
-mkdir dark && "$bin/sf_scene" textured -o dark/photos --size 16 --train 6 --test 3 >/dev/null
-cp photos/train/r_1.png dark/photos/train/r_0.png
-refused 1 "has another data set than rank 0" -n 1 "$bin/sf_train" photos $small -q -o x.model : -n 1 -wdir "$work/dark" "$bin/sf_train" photos $small -q -o x.model
-
-# ---- other CPUs: integers are equal, floats refused ----
+# ---- other CPUs: integers are equal ----
 narrow=(-n 1 env SPIKEFIELD_CPU=portable)
 job 1 "$bin/sim_render" scene.snn views --all -o mixed -q : "${narrow[@]}" "$bin/sim_render" scene.snn views --all -o mixed -q >/dev/null 2>render.err ||
   fail "sim_render on two CPUs: $(cat render.err)"
 diff -r one mixed >diff.out || fail "two CPUs render another set: $(cat diff.out)"
-cosim=("$build/faults/sf_cosim" scene.snn data --quiet --json --rays 40 --block 5)
+cosim=("$build/faults/sf_cosim" scene.snn data --quiet --json --rays 24 --block 5)
 job 1 "${cosim[@]}" : "${narrow[@]}" "${cosim[@]}" >mixed.json 2>mixed.err || fail "sf_cosim on two CPUs: $(cat mixed.err)"
 same mixed.json equal0.json "two CPUs"
 job 1 "$bin/energy_audit" "${audit[@]}" : "${narrow[@]}" "$bin/energy_audit" "${audit[@]}" >mixed.json 2>mixed.err ||
   fail "energy_audit on two CPUs: $(cat mixed.err)"
 same mixed.json audit0.json "two CPUs"
-if grep -q avx2 /proc/cpuinfo; then
-  refused 1 "has another instruction set than rank 0" -n 1 "$bin/sf_train" photos $small $grid -q -o x.model : "${narrow[@]}" "$bin/sf_train" photos $small $grid -q -o x.model
-  grep -q 'SPIKEFIELD_CPU' refused.out || fail "no word about what the ranks may share: $(cat refused.out)"
-else
-  echo "one CPU alone: no refusal tried"
-fi
 
-# ---- a full disk on one rank: no file may grow beyond a size (a write fails with EFBIG in place of ENOSPC) ----
-full() { printf '%s' "trap '' XFSZ; ulimit -f $1; exec \"\$0\" \"\$@\""; }
+# ---- a full disk on one rank ----
 refused 1 "sim_render: rank 1 on " -n 1 "$bin/sim_render" scene.snn views --all -o tight -q : -n 1 bash -c "$(full 1)" "$bin/sim_render" scene.snn views --all -o tight -q
 grep -q 'tight/view_[0-9]*.exr.*: File too large' refused.out || fail "a full disk: the file is not named: $(cat refused.out)"
 job 2 "$bin/sim_render" scene.snn views --all -o tight -q >/dev/null 2>render.err || fail "after a full disk: $(cat render.err)"
 diff -r one tight >diff.out || fail "after a full disk: another set: $(cat diff.out)"
-train=("$bin/sf_train" photos ${small/--stage2 250/--stage2 28} $grid -q -o tight.model)
-refused 1 "sf_train: cannot write tight.model" -n 1 bash -c "$(full 1)" "${train[@]}" : -n 1 "${train[@]}"
-[ ! -e tight.model ] || fail "sf_train, a full disk: half a model is there"
 
 finish "1, 2, 3, 4 ranks, killed, interrupted and continued: what one process gives"

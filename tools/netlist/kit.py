@@ -3,9 +3,8 @@ import os
 import re
 import shutil
 import subprocess
-import time
 
-from hdl_flow import Stop, digest, hash_of
+from hdl_flow import Spent, Stop, digest, hash_of
 
 SHORT = 48  # samples of the kit that planted errors meet
 TRAINING = ["--stage1", "20", "--stage2", "40", "--samples", "512", "--levels", "4", "--log2-hash", "10", "--finest-res", "32", "--lattice", "64",
@@ -67,15 +66,17 @@ class Kits:
         return folder
 
 
-def simulate(kit, simulator, sources, include, build, lanes, with_tap, seconds=None):
-    """Runs the kit's bench on the sources: (passed, its line, samples, seconds of the run). Raises Stop where nothing was compared."""
+def simulate(kit, simulator, sources, include, build, lanes, with_tap):
+    """Runs the kit's bench on the sources: (passed, its line, samples, seconds of processor time).
+
+    Raises Stop where nothing was compared."""
     command = ["nice", "-n", "10", "make", "-s", "-C", kit, simulator, "SOURCES=" + " ".join(sources), "RTL=" + include, "BUILD=" + build]
     command += [f"LANES={lanes}"] if lanes else []
     command += [] if with_tap else ["TAP=0"]
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
-    started = time.monotonic()
+    spent = Spent()
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    spent = time.monotonic() - started
+    seconds = spent.processor()
     lines = (done.stdout + done.stderr).splitlines()
     said = next((line for line in lines if re.match(r"PASS|DIFFERENCE|FAIL", line)), "")
     if not said:
@@ -83,4 +84,4 @@ def simulate(kit, simulator, sources, include, build, lanes, with_tap, seconds=N
         raise Stop(f"{simulator}: {wrong[0]}, see {build}")
     passed = done.returncode == 0 and said.startswith("PASS")
     samples = int(said.split()[1]) if passed else 0
-    return passed, said, samples, spent
+    return passed, said, samples, seconds
