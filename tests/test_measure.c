@@ -176,6 +176,21 @@ TEST(measure_reports_the_lowest_failing_ray)
   ck_assert_int_eq(sf_measure_rays(&job, &measure).code, SF_E_STOPPED);
 }
 
+/* The last chunk may have a single ray; none behind it is asked for. */
+TEST(a_ray_alone_is_measured)
+{
+  OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
+  static const uint64_t counts[] = {1, 2, 1600, 1601};
+  for (int i = 0; i < COUNT(counts); i++) {
+    rays user = {counts[i], UINT64_MAX};
+    sf_measure_job job = job_of(&scene, counts[i], 5);
+    OWNED(sf_measure) m;
+    job.user = &user;
+    ck_ok(sf_measure_rays(&job, &m));
+    ck_assert_uint_eq(m.rays, counts[i]);
+  }
+}
+
 TEST(probe_names_the_sample_of_a_difference)
 {
   OWNED(fx_scene) scene = fixture_scene(&fixture_ingp, 3);

@@ -109,7 +109,7 @@ static sf_train_options planes_run(sf_net_kind net)
 {
   sf_train_options o = sf_train_defaults_tensorf(&data);
   o.config.net = net, o.config.steps = net == SF_NET_ANN ? 1 : 3, o.config.hidden = 16;
-  o.config.occ_res = 16, o.voxels = 20, o.rays = 64, o.samples = 2048, o.stage1 = 6, o.stage2 = 12;
+  o.config.occ_res = 16, o.voxels = 20, o.rays = 64, o.samples = 2048, o.stage1 = 20, o.stage2 = 40;
   for (int a = 0; a < 3; a++) o.config.tensorf.resolution[a] = 12 + a;
   return o;
 }
@@ -127,16 +127,17 @@ static void say_forward_run(FILE *out)
   data.view = view, data.layout = SF_LAYOUT_LLFF, data.ndc = true, data.ndc_near = 1, data.scale = 0.9f;
   for (int i = 0; i < 2; i++) data.ndc_focal[i] = view[0].camera.fx / 12;
   sf_train_options o = planes_run(SF_NET_SNN);
-  say_run(out, "TensoRF in NDC", &o, 3);
+  say_run(out, "TensoRF in NDC", &o, 5);
   data = before;
 }
 
 static void planes(FILE *out)
 {
   sf_train_options o = planes_run(SF_NET_SNN);
+  o.stage1 = 6, o.stage2 = 12;
   say_run(out, "TensoRF", &o, 3);
   o = planes_run(SF_NET_ANN);
-  say_run(out, "TensoRF's twin", &o, 3);
+  say_run(out, "TensoRF's twin", &o, 5);
   say_forward_run(out);
 }
 
@@ -172,6 +173,7 @@ static void checkpoints(FILE *out)
   o.config.finest_res = 64, o.fixed_steps = 2, o.charge = 1, o.stage1 = 2, o.stage2 = 80, o.seed = 9;
   say_checkpoint(out, &o, 81);
   o = planes_run(SF_NET_SNN);
+  o.stage1 = 6, o.stage2 = 12;
   say_checkpoint(out, &o, 9);
 }
 
