@@ -2,6 +2,7 @@
 # sim_render --dut: a block of another name and size, from positions to pixels, renders what the core does, byte for byte; one
 # wrong number of its 30th pixel is found and named; what does not build says where.   usage: other_ray_dut.sh BUILD
 . "$(dirname "$0")/../small_scene.bash" "$@"
+quick_dut
 built=()
 trap 'rm -rf "$work" "${built[@]}"' EXIT
 cd "$work" || exit 1
