@@ -32,7 +32,13 @@ TEST(lengths_of_a_technology_file)
       else
         ck_ok(load_text(&t, text));
     }
-  /* Digits: nine decimals are read, whole or not; 1 mJ and no more. */
+}
+
+/* Nine decimals are read, whole or not; 1 mJ and no more. */
+TEST(digits_of_a_price)
+{
+  char text[4000];
+  sf_technology t;
   static const struct {
     const char *value;
     uint64_t fj; /* UINT64_MAX: refused */
@@ -59,7 +65,12 @@ TEST(lengths_of_a_technology_file)
     ck_assert_msg((status.code == SF_OK) == (values[i].fj != UINT64_MAX), "%s: %s", values[i].value, status.message);
     if (!status.code) ck_assert_uint_eq(t.price[t.count - 1].fj, values[i].fj);
   }
-  /* Points. */
+}
+
+TEST(points_of_a_price)
+{
+  char text[4000];
+  sf_technology t;
   static const struct {
     const char *key;
     bool good;
