@@ -1,8 +1,8 @@
 # What only some tests need: a browser, and readers of our files from PyPI. `make deps check` goes on without; continuous
 # integration has both. Included by the Makefile.
 
-deps-ci: ## install with apt what `make check` needs to leave no test out (Chromium and its driver, man, OpenSTA, Slurm, Tcl, COLMAP, FFmpeg, libclang for Python), and `make deb`
-	@DEPS="chromium chromium-driver python3-selenium libxml2-utils opensta slurmctld slurmd slurm-client munge python3 python3-venv python3-clang-14 man-db tcl colmap ffmpeg $(DEB_PACKAGES)" tools/deps.sh
+deps-ci: ## install with apt what `make check` needs to leave no test out (Chromium and its driver, man, OpenSTA, Slurm, Tcl, COLMAP, FFmpeg, exiftran, libclang for Python), and `make deb`
+	@DEPS="chromium chromium-driver python3-selenium libxml2-utils opensta slurmctld slurmd slurm-client munge python3 python3-venv python3-clang-14 man-db tcl colmap ffmpeg exiftran $(DEB_PACKAGES)" tools/deps.sh
 
 # In an environment of its own, which tests/run.sh puts first: nothing is installed on the system.
 REQUIREMENTS := tests/requirements.txt

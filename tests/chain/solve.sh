@@ -1,7 +1,7 @@
 #!/bin/bash
 # Photographs of a scene with known cameras: the poses that COLMAP finds, steps that are done once, and what no poses come
 # of.   usage: solve.sh BUILD
-for program in colmap ffmpeg python3; do
+for program in colmap exiftran ffmpeg python3; do
   command -v $program >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
 done
 export LC_ALL=C OMP_NUM_THREADS=2
@@ -92,6 +92,35 @@ calls "feature_extractor feature_extractor exhaustive_matcher " # a camera for e
 solves 1 "planned" sizes --matching sequential
 calls "sequential_matcher "
 plan ') echo planned; exit 1 ;;'
+
+# Rows as the sensor has them, and a tag (EXIF's Orientation) that says how to turn them.
+python3 - sizes turned 3 6 8 <<'END'
+import os, struct, sys
+folder, to, *tags = sys.argv[1:]
+os.mkdir(to)
+for i in range(1, 9):
+    data = open(f"{folder}/200x150_{i}.jpg", "rb").read()
+    tag = int(tags[i % len(tags)])
+    tiff = struct.pack("<2sHIHHHIII", b"II", 42, 8, 1, 0x112, 3, 1, tag, 0)
+    exif = b"Exif\0\0" + tiff
+    mark = b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif if i > 2 else b""
+    open(f"{to}/{i}_{tag if mark else 1}.jpg", "wb").write(data[:2] + mark + data[2:])
+END
+plan ') exit 0 ;; *) echo planned; exit 1 ;;'
+solves 1 "planned" turned
+plan ') echo planned; exit 1 ;;'
+calls "feature_extractor feature_extractor feature_extractor feature_extractor exhaustive_matcher "
+for file in turned/*.jpg; do # blocks of 16 pixels that are not whole are cut off where they cannot be turned
+  case $file in
+    *_3.jpg) turn=hflip,vflip,crop=192:144:8:6 ;;
+    *_6.jpg) turn=transpose=clock,crop=144:200:6:0 ;;
+    *_8.jpg) turn=transpose=cclock,crop=150:192:0:8 ;;
+    *) turn=null ;;
+  esac
+  ffmpeg -v error -y -noautorotate -i "$file" -vf "$turn" upright.png && ffmpeg -v error -y -noautorotate -i "solved/images/${file##*/}" now.png
+  [ "$(side now.png)" = "$(side upright.png)" ] || fail "$file: $(side now.png) pixels"
+  ffmpeg -v info -i now.png -i upright.png -lavfi psnr -f null - 2>&1 | grep -qE 'average:(inf|[4-9][0-9])' || fail "$file does not stand upright"
+done
 
 # The sharp frame of each four, wherever it is.
 mkdir walk && n=0 sharp=

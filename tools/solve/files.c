@@ -19,10 +19,16 @@ sf_status solve_path(char path[4096], const char *folder, const char *name)
   return sf_ok();
 }
 
+bool solve_is_jpeg(const char *name)
+{
+  const char *dot = strrchr(name, '.');
+  return dot && (!strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg"));
+}
+
 static bool is_picture(const char *name)
 {
   const char *dot = strrchr(name, '.');
-  return dot && (!strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".png"));
+  return solve_is_jpeg(name) || (dot && !strcasecmp(dot, ".png"));
 }
 
 static int by_name(const void *a, const void *b)

@@ -62,9 +62,10 @@ static sf_status sharpness_limit(const solve_pictures *list, double *limit)
   return sf_ok();
 }
 
-/* Those that stay keep their order. */
+/* Those that stay keep their order; the others are removed from images/. */
 static sf_status leave_out_blurred(solve_job *job, solve_pictures *list)
 {
+  char path[4096];
   const char *input = job->options->input;
   char names[160] = "";
   int kept = 0, all = list->count;
@@ -73,9 +74,13 @@ static sf_status leave_out_blurred(solve_job *job, solve_pictures *list)
   for (int i = 0; i < all; i++) {
     const solve_picture *p = &list->at[i];
     if (p->sharpness > best) best = p->sharpness;
-    if (p->sharpness >= limit)
+    if (p->sharpness >= limit) {
       list->at[kept++] = *p;
-    else if (strlen(names) + strlen(p->name) + 3 < sizeof names)
+      continue;
+    }
+    SF_TRY(solve_path(path, job->images, p->name));
+    SF_TRY(solve_remove(path));
+    if (strlen(names) + strlen(p->name) + 3 < sizeof names)
       sprintf(names + strlen(names), "%s%s", *names ? ", " : "", p->name);
   }
   list->count = kept;
@@ -93,15 +98,42 @@ static sf_status leave_out_blurred(solve_job *job, solve_pictures *list)
 
 /* ---- where to ---- */
 
-static sf_status shrink(const solve_picture *picture, const char *from, const char *folder, int factor)
+/* A phone held upright writes its rows as the sensor has them, and a tag that says how to turn them. exiftran turns
+ * JPEG pictures without a loss, sets the tag back, and leaves the others alone. With -np it cuts off the blocks at an
+ * edge that are not whole and so cannot be turned; its manual has this the wrong way round. */
+static sf_status turn_upright(solve_job *job, const solve_pictures *list)
 {
-  char path[4096], name[300];
+  enum { AT_ONCE = 64 };
+  char log[4096], (*paths)[4096] = malloc(AT_ONCE * sizeof *paths);
+  const char *argv[AT_ONCE + 4] = {"exiftran", "-np", "-ai"};
+  if (!paths) return sf_fail(SF_E_MEMORY, "no memory for the names of %d pictures", AT_ONCE);
+  sf_status status = solve_path(log, job->state, "upright.log");
+  for (int i = 0, n = 0; i < list->count && status.code == SF_OK; i++) {
+    if (solve_is_jpeg(list->at[i].name)) {
+      status = solve_path(paths[n], job->images, list->at[i].name);
+      argv[3 + n] = paths[n];
+      argv[3 + ++n] = NULL;
+    }
+    if (!n || (n < AT_ONCE && i + 1 < list->count) || status.code != SF_OK) continue;
+    status = solve_run(job, argv, log, "exiftran", NULL);
+    n = 0;
+  }
+  free(paths);
+  return status;
+}
+
+/* The picture's size as it lies now, and with factor > 1 the smaller picture. */
+static sf_status shrink(solve_picture *picture, const char *images, const char *folder, int factor)
+{
+  char from[4096], to[4096], name[300];
   sf_image image;
   snprintf(name, sizeof name, "%.*s.png", (int)(strrchr(picture->name, '.') - picture->name), picture->name);
-  SF_TRY(solve_path(path, folder, name));
+  SF_TRY(solve_path(from, images, picture->name));
+  SF_TRY(solve_path(to, folder, name));
   SF_TRY(sf_image_load(&image, from));
-  sf_status status = sf_image_downscale(&image, factor, from);
-  if (status.code == SF_OK) status = sf_image_save_png(&image, path);
+  picture->width = image.width, picture->height = image.height;
+  sf_status status = factor > 1 ? sf_image_downscale(&image, factor, from) : sf_ok();
+  if (status.code == SF_OK && factor > 1) status = sf_image_save_png(&image, to);
   sf_image_free(&image);
   return status;
 }
@@ -119,10 +151,10 @@ static sf_status check_stems(const solve_pictures *list, const char *folder)
   return sf_ok();
 }
 
-static sf_status fill(solve_job *job, const solve_pictures *list, const char *from)
+static sf_status make_smaller(solve_job *job, solve_pictures *list)
 {
   int side = 0;
-  char smaller[4096], name[32], source[4096], target[4096];
+  char folder[4096], name[32];
   for (int i = 0; i < list->count; i++) {
     const solve_picture *p = &list->at[i];
     const int longer = p->width > p->height ? p->width : p->height;
@@ -130,15 +162,12 @@ static sf_status fill(solve_job *job, const solve_pictures *list, const char *fr
   }
   const int factor = (side + SF_SOLVE_SIDE - 1) / SF_SOLVE_SIDE;
   snprintf(name, sizeof name, "images_%d", factor);
-  SF_TRY(solve_path(smaller, job->options->output, name));
-  if (factor > 1) SF_TRY(check_stems(list, from));
-  if (factor > 1) SF_TRY(sf_make_dir(smaller));
+  SF_TRY(solve_path(folder, job->options->output, name));
+  if (factor > 1) SF_TRY(check_stems(list, job->options->input));
+  if (factor > 1) SF_TRY(sf_make_dir(folder));
   for (int i = 0; i < list->count; i++) {
     if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "interrupted");
-    SF_TRY(solve_path(source, from, list->at[i].name));
-    SF_TRY(solve_path(target, job->images, list->at[i].name));
-    SF_TRY(solve_copy(source, target));
-    if (factor > 1) SF_TRY(shrink(&list->at[i], source, smaller, factor));
+    SF_TRY(shrink(&list->at[i], job->images, folder, factor));
     if (sf_progress_due(&job->progress)) sf_progress_show(&job->progress, "pictures: %d of %d", i + 1, list->count);
   }
   return sf_ok();
@@ -184,16 +213,34 @@ static sf_status remove_old(solve_job *job)
   return sf_make_dir(job->images);
 }
 
-static sf_status choose_and_fill(solve_job *job, const char *from)
+static sf_status copy_all(solve_job *job)
+{
+  char source[4096], target[4096];
+  solve_pictures list;
+  sf_status status = solve_list(&list, job->options->input, NULL, 0);
+  for (int i = 0; i < list.count && status.code == SF_OK; i++) {
+    if (sf_cli_interrupted()) status = sf_fail(SF_E_STOPPED, "interrupted");
+    if (status.code == SF_OK) status = solve_path(source, job->options->input, list.at[i].name);
+    if (status.code == SF_OK) status = solve_path(target, job->images, list.at[i].name);
+    if (status.code == SF_OK) status = solve_copy(source, target);
+    if (sf_progress_due(&job->progress))
+      sf_progress_show(&job->progress, "pictures: %d of %d copied", i + 1, list.count);
+  }
+  free(list.at);
+  return status;
+}
+
+static sf_status choose(solve_job *job)
 {
   solve_pictures list;
-  sf_status status = solve_list(&list, from, NULL, 0);
+  sf_status status = solve_list(&list, job->images, NULL, 0);
   if (status.code == SF_OK && list.count < SF_SOLVE_LEAST)
     status = sf_fail(SF_E_RANGE, "%s: %d picture%s, at least %d are needed, and 50 are better", job->options->input,
                      list.count, sf_plural((uint64_t)list.count), SF_SOLVE_LEAST);
-  if (status.code == SF_OK) status = solve_measure(&list, from, &job->progress);
+  if (status.code == SF_OK) status = solve_measure(&list, job->images, &job->progress);
   if (status.code == SF_OK) status = leave_out_blurred(job, &list);
-  if (status.code == SF_OK) status = fill(job, &list, from);
+  if (status.code == SF_OK) status = turn_upright(job, &list);
+  if (status.code == SF_OK) status = make_smaller(job, &list);
   if (status.code == SF_OK) status = write_lists(job, &list);
   free(list.at);
   return status;
@@ -201,14 +248,8 @@ static sf_status choose_and_fill(solve_job *job, const char *from)
 
 sf_status solve_pictures_work(solve_job *job)
 {
-  char frames[4096];
   SF_TRY(solve_installed("colmap", "colmap")); /* before minutes are spent on pictures */
   SF_TRY(remove_old(job));
-  if (is_folder(job->options->input)) return choose_and_fill(job, job->options->input);
-  SF_TRY(solve_path(frames, job->state, "frames"));
-  SF_TRY(solve_remove(frames));
-  SF_TRY(sf_make_dir(frames));
-  SF_TRY(solve_video(job, frames));
-  SF_TRY(choose_and_fill(job, frames));
-  return solve_remove(frames);
+  SF_TRY(is_folder(job->options->input) ? copy_all(job) : solve_video(job));
+  return choose(job);
 }

@@ -55,6 +55,7 @@ sf_status solve_list(solve_pictures *list, const char *folder, char *refused, in
 sf_status solve_measure(solve_pictures *list, const char *folder, sf_progress *progress);
 /* "FOLDER/NAME". SF_E_IO: too long. */
 sf_status solve_path(char path[4096], const char *folder, const char *name);
+bool solve_is_jpeg(const char *name); /* by its ending */
 sf_status solve_copy(const char *from, const char *to);
 sf_status solve_remove(const char *path); /* a file, or a folder with all that is in it; absent is fine */
 /* The number behind the last `key` of a text file; `otherwise` where there is none. */
@@ -81,8 +82,8 @@ sf_status solve_run(solve_job *job, const char *const *argv, const char *log, co
 sf_status solve_pictures_inputs(solve_job *job, FILE *to);
 /* images/ and images_N/ from the folder or the video; state/lists: names by size. */
 sf_status solve_pictures_work(solve_job *job);
-/* Fills `frames` with the sharpest frame of each of options->frames intervals. */
-sf_status solve_video(solve_job *job, const char *frames);
+/* Fills images/ with the sharpest frame of each of options->frames intervals. */
+sf_status solve_video(solve_job *job);
 
 sf_status solve_features_inputs(solve_job *job, FILE *to);
 sf_status solve_features_work(solve_job *job);

@@ -50,10 +50,9 @@ static sf_status take_frames(solve_job *job, const char *folder, long frames)
 }
 
 /* The sharpest of each interval stays. */
-static sf_status choose_frames(const solve_options *options, const solve_pictures *tried, const char *folder,
-                               const char *frames)
+static sf_status choose_frames(const solve_job *job, const solve_pictures *tried, const char *folder)
 {
-  const int wanted = tried->count < options->frames ? tried->count : options->frames;
+  const int wanted = tried->count < job->options->frames ? tried->count : job->options->frames;
   for (int i = 0; i < wanted; i++) {
     const int end = (int)((long)(i + 1) * tried->count / wanted);
     char from[4096], to[4096], name[280];
@@ -62,13 +61,13 @@ static sf_status choose_frames(const solve_options *options, const solve_picture
       if (tried->at[k].sharpness > tried->at[best].sharpness) best = k;
     SF_TRY(solve_path(from, folder, tried->at[best].name));
     snprintf(name, sizeof name, "frame_%s", tried->at[best].name);
-    SF_TRY(solve_path(to, frames, name));
+    SF_TRY(solve_path(to, job->images, name));
     SF_TRY(solve_copy(from, to));
   }
   return sf_ok();
 }
 
-sf_status solve_video(solve_job *job, const char *frames)
+sf_status solve_video(solve_job *job)
 {
   char folder[4096];
   long count = 0;
@@ -80,7 +79,7 @@ sf_status solve_video(solve_job *job, const char *frames)
   SF_TRY(take_frames(job, folder, count));
   sf_status status = solve_list(&tried, folder, NULL, 0);
   if (status.code == SF_OK) status = solve_measure(&tried, folder, &job->progress);
-  if (status.code == SF_OK) status = choose_frames(job->options, &tried, folder, frames);
+  if (status.code == SF_OK) status = choose_frames(job, &tried, folder);
   free(tried.at);
   if (status.code == SF_OK) status = solve_remove(folder);
   return status;
