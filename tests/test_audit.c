@@ -2,7 +2,7 @@
 #include "ck_run.h"
 #include "base/text.h"
 #include "energy/energy.h"
-#include "tests/audit_fixture.h"
+#include "tests/audit_report_fixture.h"
 
 static const cJSON *at(const cJSON *json, const char *key)
 {
@@ -61,16 +61,6 @@ static sf_audit_report *small_report(const fx_net *net)
   return r;
 }
 
-static char *printed(const sf_audit_report *r)
-{
-  static char *text; /* the stream keeps its address */
-  static size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
-  return text;
-}
-
 TEST(report_json_holds_what_was_counted)
 {
   const fx_net net = small_net();
@@ -107,7 +97,7 @@ TEST(report_says_that_counts_differ)
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
   ck_assert_str_eq(at(json, "difference")->valuestring, "SOP of layer C3 at step 0: core 5, accelerator 0");
-  char *text = printed(r);
+  char *text = printed_report(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: SOP of layer C3 at step 0"));
   ck_assert_ptr_nonnull(strstr(text, "not modelled, by any ledger:"));
   free(text), free(r);
@@ -123,7 +113,7 @@ TEST(report_says_that_the_first_ray_differs)
   r->three.agreement = sf_fail(SF_E_DIFFERENCE, "ray 0: sample 0: red: core 1, accelerator 0");
   cJSON *json = sf_report_json(r);
   ck_assert(cJSON_IsFalse(at(json, "core_equals_rtl_equals_recount")));
-  char *text = printed(r);
+  char *text = printed_report(r);
   ck_assert_ptr_nonnull(strstr(text, "DIFFERENCE: ray 0: sample 0"));
   ck_assert_ptr_null(strstr(text, "nothing to run"));
   free(text), free(r);

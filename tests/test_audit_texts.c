@@ -1,20 +1,9 @@
 /* An audit and the comparison of two, whole: text, JSON, CSV. The energies in them are those that test_ledger makes by
  * hand. */
 #include "ck_run.h"
-#include "tests/audit_fixture.h"
+#include "tests/audit_report_fixture.h"
 #include "tests/expected.h"
 #include "tests/technology_fixture.h"
-
-static const sf_traffic traffic = {.table_bytes = 100,
-                                   .exp_neg = 1,
-                                   .frame_bytes = 48,
-                                   .lookups = 10,
-                                   .misses = 4,
-                                   .products = 50,
-                                   .places = 5,
-                                   .special = 7,
-                                   .harmonics = 1};
-static const fx_memory_counts memory = {.lookups = 10, .misses = 4, .groups = 1, .rows = {1, 2, 4}};
 
 typedef struct audit {
   fx_net net;
@@ -50,32 +39,24 @@ static audit *new_audit(void)
                                 .seconds = 2.5,
                                 .cache = {8192, 4},
                                 .entries = 5,
-                                .traffic = traffic};
+                                .traffic = small_traffic};
   sf_measure *m = &a->report.measure;
   sf_three_counts *three = &a->report.three;
   sf_recount_sample(&a->net, small_spikes, true, &m->core);
-  m->core.grid_bytes = traffic.table_bytes;
+  sf_audit_report *r = &a->report;
+  r->traffic.special = 7;
+  m->core.grid_bytes = r->traffic.table_bytes;
   m->recount = m->checked_core = m->core;
-  m->memory = memory, m->rays = 4, m->checked = 3;
+  m->memory = small_memory, m->rays = 4, m->checked = 3;
   three->wanted = 2, three->rays = 1;
   three->core = three->rtl = three->recount = m->core;
-  three->core_traffic = three->rtl_traffic = three->recount_traffic = traffic;
+  three->core_traffic = three->rtl_traffic = three->recount_traffic = r->traffic;
   three->rtl_events = SF_TRAFFIC_AT_PORTS;
   three->cycles = 900, three->busy = 800, three->stalls = 17;
   a->report.twin = (sf_twin){.path = "twin.safetensors", .samples = 6, .macs = 9, .fj = 6 * 9 * 4600};
   a->report.twin.saving_percent = 12.5;
   price(a, plain);
   return a;
-}
-
-static char *printed(const sf_audit_report *r)
-{
-  static char *text; /* the stream keeps its address */
-  static size_t size;
-  FILE *out = open_memstream(&text, &size);
-  sf_report_print(out, r);
-  fclose(out);
-  return text;
 }
 
 TEST(an_audit_whole)
@@ -115,7 +96,7 @@ TEST(an_audit_that_disagrees)
   r->three.recount_traffic.misses++, r->three.rtl_traffic.lookups++, r->three.rtl_traffic.places++;
   r->three.agreement = sf_fail(SF_E_DIFFERENCE, "SOP of layer C3");
   r->measure.checked_core.layer[FX_C1].mac[0]++;
-  char *text = printed(r);
+  char *text = printed_report(r);
   const char *begin = strstr(text, "three counts"), *end = strstr(text, "SOP of layer C3\n");
   ck_assert(begin && end);
   char *part = strndup(begin, (size_t)(end - begin));
@@ -132,7 +113,7 @@ TEST(an_audit_that_disagrees)
   cJSON_Delete(json);
   r->three.wanted = 3, r->three.rays = 0, r->three.agreement = sf_ok();
   r->measure.checked_core = (fx_counts){.samples = 0};
-  text = printed(r);
+  text = printed_report(r);
   ck_assert_ptr_nonnull(strstr(text, "accelerator: no ray has samples, nothing to run\n"));
   ck_assert_ptr_nonnull(strstr(text, "recount: no ray has samples, nothing to count again\n"));
   free(text), free(a);
@@ -154,13 +135,13 @@ TEST(an_audit_says_whether_it_is_less)
   for (int i = 0; i < COUNT(rows); i++) {
     saving[SF_LEDGER_PAPER] = rows[i].paper, saving[SF_LEDGER_NEURON] = rows[i].all;
     saving[SF_LEDGER_SHARED] = rows[i].shared;
-    char *text = printed(&a->report);
+    char *text = printed_report(&a->report);
     for (int w = 0; w < 3; w++) ck_assert_msg(strstr(text, rows[i].words[w]) != NULL, "row %d, word %d", i, w);
     free(text);
   }
   for (int i = 0; i < 2; i++) {
     saving[SF_LEDGER_PAPER] = i ? 1 : NAN, saving[SF_LEDGER_NEURON] = i ? NAN : 1;
-    char *text = printed(&a->report);
+    char *text = printed_report(&a->report);
     ck_assert_ptr_null(strstr(text, "In the paper's metric"));
     free(text);
   }

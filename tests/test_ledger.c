@@ -1,6 +1,6 @@
 /* Ledgers against pricing by hand. */
 #include "ck_run.h"
-#include "tests/audit_fixture.h"
+#include "tests/audit_report_fixture.h"
 #include "tests/technology_fixture.h"
 #include <math.h>
 
@@ -13,17 +13,6 @@ static fx_counts small_counts(const fx_net *net)
   sf_recount_sample(net, small_spikes, true, &c);
   return c;
 }
-
-static const sf_traffic small_traffic = {.table_bytes = 100,
-                                         .exp_neg = 1,
-                                         .frame_bytes = 48,
-                                         .lookups = 10,
-                                         .misses = 4,
-                                         .products = 50,
-                                         .places = 5,
-                                         .special = 0,
-                                         .harmonics = 1};
-static const fx_memory_counts small_memory = {.lookups = 10, .misses = 4, .groups = 1, .rows = {1, 2, 4}};
 
 /* What is counted is priced with a cache of 8192 bytes. */
 static sf_status make_ledgers(const sf_technology *tech, const fx_net *net, const fx_counts *counts,

@@ -30,65 +30,66 @@ static void say_tables(FILE *out, const char *cameras, const char *images, const
   say_model(out, &m, sf_colmap_read_text(&m, in("c"), in("i"), points ? in("p") : NULL));
 }
 
+static const char *const colmap_cameras[] = {"1 PINHOLE 40 30 50 51 20 15",
+                                             "# no\n\n \t\r\n7 SIMPLE_PINHOLE 40 30 50 20 15\r\n",
+                                             "1 SIMPLE_RADIAL 40 30 50 20 15 0.1\n2\tRADIAL 40 30 50 20 15 0.1 0.2",
+                                             "1 OPENCV 40 30 50 51 20 15 .1 .2 .3 .4",
+                                             "1 FOV 40 30 50 51 20 15 .1",
+                                             "1 OPENCV_FISHEYE 40 30 50 51 20 15 .1 .2 .3 .4",
+                                             "1 PIN 40 30 50 51 20 15",
+                                             "1 PINHOLE 40 30 50 51 20",
+                                             "1 PINHOLE 40 x",
+                                             "x PINHOLE",
+                                             "1",
+                                             "1.5 PINHOLE 40 30 50 51 20 15",
+                                             "2147483647 PINHOLE 1 1 1 1 1 1",
+                                             "2147483648 PINHOLE 1 1 1 1 1 1",
+                                             "-2147483648 PINHOLE 1 1 1 1 1 1",
+                                             "1 PINHOLE 0.5 30 50 51 20 15",
+                                             "1 PINHOLE 40 0.5 50 51 20 15",
+                                             "1 PINHOLE 1e6 30 50 51 20 15",
+                                             "1 PINHOLE 40 1e6 50 51 20 15",
+                                             "1 PINHOLE 40 30 0 51 20 15",
+                                             "1 PINHOLE 40 30 50 0 20 15",
+                                             "1 PINHOLE 40 30 1e7 51 20 15",
+                                             "1 PINHOLE 40 30 50 1e7 20 15",
+                                             "1 PINHOLE 40 30 50 51 1e7 15",
+                                             "1 PINHOLE 40 30 50 51 20 -1e7",
+                                             "1 PINHOLE 40 30 50 51 20 nan",
+                                             "1 PINHOLE 40 30 50 51 20 15 # more",
+                                             "\xef\xbb\xbf"
+                                             "1 PINHOLE 40 30 50 51 20 15",
+                                             "\xef\xbb"
+                                             "1 PINHOLE 40 30 50 51 20 15",
+                                             "1 AVERYLONGNAMEOFACAMERAMODELTHATNOBODYWOULDEVERHAVETHOUGHTOFATALLX 1 1"};
+static const char good[] = "1 PINHOLE 40 30 50 51 20 15\n", view[] = "3 1 0 0 0 4 5 6 1 a.png\n";
+static const char *const colmap_images[] = {"3 1 0 0 0 4 5 6 1 a b.png\r\n\n4 0 1 0 0 7 8 9 2 \t c.png\n1 2 3 4 5 -1\n",
+                                            "3 1 0 0 0 4 5 6 1 a\n1 2 3",
+                                            "3 1 0 0 0 4 5 6 1 a\n1 2 3 4\n",
+                                            "3 1 0 0 0 4 5 6 1 a\n1 2 3x\n",
+                                            "3 1 0 0 0 4 5 6 1 a\n4 1 0 0 0 4 5 6 1 b\n",
+                                            "3 1 0 0 0 4 5 6 1",
+                                            "3 1 0 0 0 4 5 6 1 \t\n",
+                                            "3 1 0 0 0 4 5 6",
+                                            "3.5 1 0 0 0 4 5 6 1 a",
+                                            "3 1 0 0 0 4 5 6 1.5 a",
+                                            "3 1.006 0 0 0 4 5 6 1 a",
+                                            "3 1.004 0 0 0 4 5 6 1 a",
+                                            "3 0.5 0.5 0.5 0.5 1e12 5 6 1 a",
+                                            "3 0.5 0.5 0.5 0.5 -9e11 5 6 1 a",
+                                            "3 0.5 0.5 0.5 0 4 5 6 1 a",
+                                            "3 1 0 0 0 4 5 nan 1 a",
+                                            "# a\n  \n3 1 0 0 0 4 5 6 1 a\n# points\n  1 2 3\n",
+                                            ""};
+static const char *const colmap_points[] = {
+    "1 2 3 4 0 0 0 0.5 1 2\n# x\n\n2 -5 6e1 7", "1 2 3", "1 2 1e12 4", "1 2 3 -9e11", "1 nan 3 4", ""};
+
 static void colmap_texts(FILE *out)
 {
-  static const char *const cameras[] = {"1 PINHOLE 40 30 50 51 20 15",
-                                        "# no\n\n \t\r\n7 SIMPLE_PINHOLE 40 30 50 20 15\r\n",
-                                        "1 SIMPLE_RADIAL 40 30 50 20 15 0.1\n2\tRADIAL 40 30 50 20 15 0.1 0.2",
-                                        "1 OPENCV 40 30 50 51 20 15 .1 .2 .3 .4",
-                                        "1 FOV 40 30 50 51 20 15 .1",
-                                        "1 OPENCV_FISHEYE 40 30 50 51 20 15 .1 .2 .3 .4",
-                                        "1 PIN 40 30 50 51 20 15",
-                                        "1 PINHOLE 40 30 50 51 20",
-                                        "1 PINHOLE 40 x",
-                                        "x PINHOLE",
-                                        "1",
-                                        "1.5 PINHOLE 40 30 50 51 20 15",
-                                        "2147483647 PINHOLE 1 1 1 1 1 1",
-                                        "2147483648 PINHOLE 1 1 1 1 1 1",
-                                        "-2147483648 PINHOLE 1 1 1 1 1 1",
-                                        "1 PINHOLE 0.5 30 50 51 20 15",
-                                        "1 PINHOLE 40 0.5 50 51 20 15",
-                                        "1 PINHOLE 1e6 30 50 51 20 15",
-                                        "1 PINHOLE 40 1e6 50 51 20 15",
-                                        "1 PINHOLE 40 30 0 51 20 15",
-                                        "1 PINHOLE 40 30 50 0 20 15",
-                                        "1 PINHOLE 40 30 1e7 51 20 15",
-                                        "1 PINHOLE 40 30 50 1e7 20 15",
-                                        "1 PINHOLE 40 30 50 51 1e7 15",
-                                        "1 PINHOLE 40 30 50 51 20 -1e7",
-                                        "1 PINHOLE 40 30 50 51 20 nan",
-                                        "1 PINHOLE 40 30 50 51 20 15 # more",
-                                        "\xef\xbb\xbf"
-                                        "1 PINHOLE 40 30 50 51 20 15",
-                                        "\xef\xbb"
-                                        "1 PINHOLE 40 30 50 51 20 15",
-                                        "1 AVERYLONGNAMEOFACAMERAMODELTHATNOBODYWOULDEVERHAVETHOUGHTOFATALLX 1 1"};
-  static const char good[] = "1 PINHOLE 40 30 50 51 20 15\n", view[] = "3 1 0 0 0 4 5 6 1 a.png\n";
-  static const char *const images[] = {"3 1 0 0 0 4 5 6 1 a b.png\r\n\n4 0 1 0 0 7 8 9 2 \t c.png\n1 2 3 4 5 -1\n",
-                                       "3 1 0 0 0 4 5 6 1 a\n1 2 3",
-                                       "3 1 0 0 0 4 5 6 1 a\n1 2 3 4\n",
-                                       "3 1 0 0 0 4 5 6 1 a\n1 2 3x\n",
-                                       "3 1 0 0 0 4 5 6 1 a\n4 1 0 0 0 4 5 6 1 b\n",
-                                       "3 1 0 0 0 4 5 6 1",
-                                       "3 1 0 0 0 4 5 6 1 \t\n",
-                                       "3 1 0 0 0 4 5 6",
-                                       "3.5 1 0 0 0 4 5 6 1 a",
-                                       "3 1 0 0 0 4 5 6 1.5 a",
-                                       "3 1.006 0 0 0 4 5 6 1 a",
-                                       "3 1.004 0 0 0 4 5 6 1 a",
-                                       "3 0.5 0.5 0.5 0.5 1e12 5 6 1 a",
-                                       "3 0.5 0.5 0.5 0.5 -9e11 5 6 1 a",
-                                       "3 0.5 0.5 0.5 0 4 5 6 1 a",
-                                       "3 1 0 0 0 4 5 nan 1 a",
-                                       "# a\n  \n3 1 0 0 0 4 5 6 1 a\n# points\n  1 2 3\n",
-                                       ""};
-  static const char *const points[] = {
-      "1 2 3 4 0 0 0 0.5 1 2\n# x\n\n2 -5 6e1 7", "1 2 3", "1 2 1e12 4", "1 2 3 -9e11", "1 nan 3 4", ""};
   char text[700], name[400];
-  for (int i = 0; i < COUNT(cameras); i++) say_tables(out, cameras[i], view, NULL);
-  for (int i = 0; i < COUNT(images); i++) say_tables(out, good, images[i], NULL);
-  for (int i = 0; i < COUNT(points); i++) say_tables(out, good, view, points[i]);
+  for (int i = 0; i < COUNT(colmap_cameras); i++) say_tables(out, colmap_cameras[i], view, NULL);
+  for (int i = 0; i < COUNT(colmap_images); i++) say_tables(out, good, colmap_images[i], NULL);
+  for (int i = 0; i < COUNT(colmap_points); i++) say_tables(out, good, view, colmap_points[i]);
   for (int n = 254; n < 258; n++) {
     snprintf(name, sizeof name, "%0*d", n, 7);
     snprintf(text, sizeof text, "3 1 0 0 0 4 5 6 1 %s\n", name);
