@@ -213,6 +213,9 @@ vector-campaign: $B/tests/test_fx_vector ## vector core = portable core over SAM
 gradient-check: $B/tests/test_gradient ## every gradient of the trainer against slopes in double precision, over SEEDS ("1 2 3"), eight directions a tensor
 	@for seed in $(SEEDS); do SF_GRADIENT_SEED=$$seed SF_GRADIENT_DIRECTIONS=8 $< || exit 1; done
 
+solve-campaign: all ## what COLMAP's poses cost in PSNR, against the true ones of a made scene, over SEEDS ("1 2 3"): build/solve-campaign
+	@tests/solve_campaign.sh $B $(SEEDS)
+
 asan: ## the C tests under address and undefined-behaviour sanitizers
 	@$(MAKE) B=$B/asan $(SAME_ARCH) OPT=-O2 SAN="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer" asan-run
 
@@ -313,6 +316,6 @@ clean: ## remove build/
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | sed -E 's/:.*## /\t/' | awk -F'\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all test check vector-campaign gradient-check cosim-campaign scale asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
+.PHONY: all test check vector-campaign gradient-check solve-campaign cosim-campaign scale asan asan-run cppcheck demo lego scene report reproduce reproduce-report outputs speed-error quality pareto bench vectors error-budget format clean help house lint gen gen-check firmware faults
 -include $(shell find $B/obj -name '*.d' 2>/dev/null)
 endif
