@@ -173,8 +173,10 @@ synth: $(RTL_READY) ## what each module costs on the 7 series by Yosys (LANES="3
 	@tools/synth.sh $B --rtl $(RTL_ROOT) $(if $(LANES),--lanes "$(LANES)") $(if $(MODULES),--modules "$(MODULES)") $(SYNTH)
 .PHONY: synth
 
-fpga: $(RTL_READY) $(if $(SCENE),$B/bin/sf_cycles) ## place and route for an ECP5: cost, f_max, longest path (MODULES=, SCENE= DATA=; tools from PyPI): build/fpga
-	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(if $(SCENE),--scene "$(SCENE)" --data "$(DATA)") $(FPGA)
+# The scene that other targets take unless told otherwise is not meant here.
+FPGA_SCENE = $(if $(filter file undefined,$(origin SCENE)),,--scene "$(SCENE)" --data "$(DATA)")
+fpga: $(RTL_READY) $(if $(FPGA_SCENE),$B/bin/sf_cycles) ## place and route for an ECP5: cost, f_max, longest path (MODULES=, SCENE= DATA=; tools from PyPI): build/fpga
+	@python3 tools/fpga.py $B --rtl $(RTL_ROOT) $(if $(MODULES),--modules "$(MODULES)") $(FPGA_SCENE) $(FPGA)
 .PHONY: fpga
 
 # The field's cache gets the look-ups of a scene.
