@@ -1,9 +1,10 @@
 // The neurons: NEURONS pipelined units that the spiking layers D1, C1 and C2 share. A group of neurons of one layer takes
-// one step per cycle; its next step begins DEPTH cycles later at the earliest. Membranes of the layer at work lie in a
-// small memory beside the units. Mirror: src/fx/plif.c
+// one step per cycle; its next step begins DEPTH cycles later at the earliest. Its currents are those of the layer's part that
+// was loaded last. Membranes of the layer at work lie in a small memory beside the units. Mirror: src/fx/plif.c
 `default_nettype none
 
 module sf_neurons #(
+    parameter MACS = 128,
     parameter NEURONS = 16,
     parameter GROUP_BITS = 3
 ) (
@@ -26,7 +27,8 @@ module sf_neurons #(
     input  wire [           2:0] step_i,
     input  wire [GROUP_BITS-1:0] group_i,
     input  wire                  last_i,      // the layer's last group
-    input  wire [24*NEURONS-1:0] current_i,
+    input  wire [   24*MACS-1:0] values_i,    // currents of D1 or C1
+    input  wire [   16*MACS-1:0] c2_sums_i,
     // DEPTH - 1 cycles later: its spikes and membranes after reset
     output wire                  valid_o,
     output wire [           1:0] layer_o,
@@ -35,9 +37,30 @@ module sf_neurons #(
     output wire                  last_o,
     output wire [   NEURONS-1:0] spikes_o,
     output wire [24*NEURONS-1:0] membrane_o,
+    // the same for the counters, another cycle later
+    output wire                  count_o,
+    output wire [           1:0] count_layer_o,
+    output wire [           2:0] count_step_o,
+    output wire                  count_last_o,
+    output wire [           8:0] count_fired_o,
     output wire                  idle_o
 );
+  localparam PART_GROUPS = MACS / NEURONS;
   localparam STAGES = 5;
+
+  wire [GROUP_BITS-1:0] place = group_i & GROUP_BITS'(PART_GROUPS - 1);  // in the part
+  wire of_c2 = layer_i == sf_op_pkg::SPIKING_C2;
+  reg [24*NEURONS-1:0] current;
+  always_comb begin
+    current = {(24 * NEURONS) {1'b0}};
+    for (int g = 0; g < PART_GROUPS; g++) begin
+      if (place == GROUP_BITS'(g)) begin
+        for (int n = 0; n < NEURONS; n++)
+          current[24*n+:24] = of_c2 ? 24'($signed(c2_sums_i[16*(NEURONS*g+n)+:16])) <<< sf_arch_pkg::AC_FRAC
+                            : values_i[24*(NEURONS*g+n)+:24];
+      end
+    end
+  end
 
   // What goes along with a group, stage by stage.
   reg [STAGES-1:0] valid_q;
@@ -82,7 +105,7 @@ module sf_neurons #(
       sf_plif u_plif (
           .clk_i    (clk_i),
           .v_i      (state[24*u+:24]),
-          .current_i(current_i[24*u+:24]),
+          .current_i(current[24*u+:24]),
           .k_i      (k1_q),
           .theta_i  (theta4_q),
           .nodecay_i(nodecay),
@@ -99,7 +122,27 @@ module sf_neurons #(
   assign group_o = group_q[GROUP_BITS*(STAGES-1)+:GROUP_BITS];
   assign last_o = last_q[STAGES-1];
   assign spikes_o = fired & exists_q;
-  assign idle_o = valid_q == {STAGES{1'b0}};
+
+  reg count_q, count_last_q;
+  reg [1:0] count_layer_q;
+  reg [2:0] count_step_q;
+  reg [8:0] count_fired_q;
+  always_ff @(posedge clk_i or negedge rst_ni) begin
+    if (!rst_ni) count_q <= 1'b0;
+    else count_q <= valid_o;
+  end
+  always_ff @(posedge clk_i) begin
+    count_last_q <= last_o;
+    count_layer_q <= layer_o;
+    count_step_q <= step_o;
+    count_fired_q <= 9'($countones(spikes_o));
+  end
+  assign count_o = count_q;
+  assign count_last_o = count_last_q;
+  assign count_layer_o = count_layer_q;
+  assign count_step_o = count_step_q;
+  assign count_fired_o = count_fired_q;
+  assign idle_o = valid_q == {STAGES{1'b0}} && !count_q;
 endmodule
 
 `default_nettype wire

@@ -11,4 +11,9 @@ package sf_op_pkg;
   localparam [2:0] C1 = 3'd2;
   localparam [2:0] C2 = 3'd3;
   localparam [2:0] C3 = 3'd4;
+
+  // Numbers of the spiking layers among those that share the neurons
+  localparam [1:0] SPIKING_D1 = 2'd0;
+  localparam [1:0] SPIKING_C1 = 2'd1;
+  localparam [1:0] SPIKING_C2 = 2'd2;
 endpackage

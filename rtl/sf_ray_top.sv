@@ -1,4 +1,4 @@
-// Rays in, pixels out: sf_encoder, sf_top and sf_composite in a row. The registers are those of sf_top and, in a window
+// Rays in, pixels out: sf_field, sf_top and sf_composite in a row. The registers are those of sf_top and, in a window
 // that it leaves free, those of the rays (csr.def). The hash grid lies in an external memory.
 //
 // s_axis: one beat per sample of a ray, in the order of the ray; tuser on its first, tlast on its last.
@@ -127,10 +127,7 @@ module sf_ray_top #(
   wire [50:0] background;
   wire [31:0] base;
   wire [1:0] lookups, misses;
-  wire filled, waits, error_memory;
-  wire planes;             // the scene's field is that of TensoRF
-  wire bad_planes;
-  wire bad_field = bad_planes || (GRID == 0 && !planes);
+  wire filled, waits, error_memory, bad_field;
   sf_ray_csr #(
       .CACHE_BYTES(CACHE_BYTES),
       .CACHE_WAYS (CACHE_WAYS),
@@ -164,7 +161,7 @@ module sf_ray_top #(
       .running_o    (running),
       .soft_reset_i (soft_reset),
       .active_i     (active),
-      .error_order_i(planes ? planes_order : error_order),
+      .error_order_i(error_order),
       .bad_field_i  (bad_field),
       .error_memory_i(error_memory),
       .lookups_i    (lookups),
@@ -173,206 +170,67 @@ module sf_ray_top #(
       .waits_i      (waits)
   );
 
-  // ---- samples
-  wire track_ready, planes_ready, planes_order;
-  assign s_axis_tready_o = planes ? planes_ready : track_ready;
-  wire sample_valid, sample_take, sample_first, sample_last, sample_empty, stop, track_idle, composite_idle;
-  wire [24:0] delta;
-  wire [43:0] distance;
+  // ---- from samples to packets
+  wire planes;  // the scene's field is that of TensoRF
   wire feature_valid, feature_ready, feature_user, feature_last;
   wire [63:0] feature_data;
-  wire line_valid, line_ready, line_empty, line_comes;
-  wire [27:0] line0, line1;
-  wire [127:0] line_entries0, line_entries1;
-  wire wave_valid, wave_user, wave_last;
-  wire [63:0] wave_data;
-  wire item_valid, item_first, item_last, item_empty, item_decoded, planes_idle;
-  wire [20:0] item_weight;
-  wire [43:0] item_distance;
-  generate
-    if (GRID != 0) begin : g_grid
-      wire encode_valid, encode_ready, encode_first, encode_tile;
-      wire [71:0] encode_pos;
-      wire [47:0] encode_dir;
-      sf_ray_track u_track (
-          .clk_i         (clk_i),
-          .rst_ni        (rst_ni),
-          .clear_i       (soft_reset),
-          .enable_i      (running),
-          .valid_i       (s_axis_tvalid_i && !planes),
-          .ready_o       (track_ready),
-          .first_i       (s_axis_tuser_i),
-          .last_i        (s_axis_tlast_i),
-          .empty_i       (s_axis_tdata_i[240]),
-          .tile_i        (s_axis_tdata_i[241]),
-          .pos_i         ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
-          .dir_i         (s_axis_tdata_i[239:192]),
-          .delta_i       (s_axis_tdata_i[120:96]),
-          .distance_i    (s_axis_tdata_i[171:128]),
-          .error_order_o (error_order),
-          .encode_valid_o(encode_valid),
-          .encode_ready_i(encode_ready),
-          .encode_first_o(encode_first),
-          .encode_tile_o (encode_tile),
-          .encode_pos_o  (encode_pos),
-          .encode_dir_o  (encode_dir),
-          .valid_o       (sample_valid),
-          .take_i        (sample_take && !planes),
-          .first_o       (sample_first),
-          .last_o        (sample_last),
-          .empty_o       (sample_empty),
-          .delta_o       (delta),
-          .distance_o    (distance),
-          .stop_i        (stop),
-          .idle_o        (track_idle)
-      );
-      sf_encoder #(
-          .CACHE_BYTES(CACHE_BYTES),
-          .CACHE_WAYS (CACHE_WAYS)
-      ) u_encoder (
-          .clk_i          (clk_i),
-          .rst_ni         (rst_ni),
-          .clear_i        (soft_reset),
-          .cfg_we_i       (cfg_we && cfg_addr[11:8] == 4'd0),
-          .cfg_addr_i     (cfg_addr[7:0]),
-          .cfg_data_i     (cfg_data),
-          .s_valid_i      (encode_valid),
-          .s_ready_o      (encode_ready),
-          .s_first_i      (encode_first),
-          .s_tile_i       (encode_tile),
-          .s_pos_i        (encode_pos),
-          .s_dir_i        (encode_dir),
-          .base_i         (base),
-          .m_axi_arvalid_o(m_axi_arvalid_o),
-          .m_axi_arready_i(m_axi_arready_i),
-          .m_axi_araddr_o (m_axi_araddr_o),
-          .m_axi_rvalid_i (m_axi_rvalid_i),
-          .m_axi_rdata_i  (m_axi_rdata_i),
-          .m_axi_rresp_i  (m_axi_rresp_i),
-          .planes_i       (planes),
-          .line_valid_i   (line_valid),
-          .line_ready_o   (line_ready),
-          .line_empty_i   (line_empty),
-          .line0_i        (line0),
-          .line1_i        (line1),
-          .line_valid_o   (line_comes),
-          .line0_o        (line_entries0),
-          .line1_o        (line_entries1),
-          .line_room_i    (feature_ready && !wave_valid),
-          .lookups_o      (lookups),
-          .misses_o       (misses),
-          .filled_o       (filled),
-          .waits_o        (waits),
-          .error_o        (error_memory),
-          .m_axis_tvalid_o(feature_valid),
-          .m_axis_tready_i(feature_ready && !planes),
-          .m_axis_tdata_o (feature_data),
-          .m_axis_tuser_o (feature_user),
-          .m_axis_tlast_o (feature_last)
-      );
-    end else begin : g_no_grid
-      wire cache_ready, waits_line;
-      wire [31:0] unused_entries;
-      assign {track_ready, error_order, sample_valid, sample_first, sample_last, sample_empty, delta, distance} = 75'd0;
-      assign track_idle = 1'b1;
-      assign {feature_valid, feature_data, feature_user, feature_last} = 67'd0;
-      assign line_ready = cache_ready;
-      assign waits = waits_line && feature_ready && !wave_valid;
-      sf_cache #(
-          .CACHE_BYTES(CACHE_BYTES),
-          .CACHE_WAYS (CACHE_WAYS)
-      ) u_cache (
-          .clk_i          (clk_i),
-          .rst_ni         (rst_ni),
-          .clear_i        (soft_reset),
-          .base_i         (base),
-          .s_valid_i      (line_valid),
-          .s_ready_o      (cache_ready),
-          .s_empty_i      (line_empty),
-          .s_entry0_i     ({1'b0, line0, 3'd0}),
-          .s_entry1_i     ({1'b0, line1, 3'd0}),
-          .m_valid_o      (line_comes),
-          .m_entries_o    (unused_entries),
-          .m_line0_o      (line_entries0),
-          .m_line1_o      (line_entries1),
-          .lookups_o      (lookups),
-          .misses_o       (misses),
-          .filled_o       (filled),
-          .waits_o        (waits_line),
-          .error_o        (error_memory),
-          .m_axi_arvalid_o(m_axi_arvalid_o),
-          .m_axi_arready_i(m_axi_arready_i),
-          .m_axi_araddr_o (m_axi_araddr_o),
-          .m_axi_rvalid_i (m_axi_rvalid_i),
-          .m_axi_rdata_i  (m_axi_rdata_i),
-          .m_axi_rresp_i  (m_axi_rresp_i)
-      );
-      wire unused_ok = &{1'b0, unused_entries, stop};
-    end
-  endgenerate
-
-  generate
-    if (PLANES != 0) begin : g_planes
-      sf_planes u_planes (
-          .clk_i          (clk_i),
-          .rst_ni         (rst_ni),
-          .clear_i        (soft_reset),
-          .enable_i       (running),
-          .cfg_we_i       (cfg_we),
-          .cfg_addr_i     (cfg_addr),
-          .cfg_data_i     (cfg_data),
-          .used_o         (planes),
-          .bad_o          (bad_planes),
-          .trans_stop_i   (trans_stop),
-          .max_samples_i  (max_samples),
-          .s_valid_i      (s_axis_tvalid_i && planes),
-          .s_ready_o      (planes_ready),
-          .s_first_i      (s_axis_tuser_i),
-          .s_last_i       (s_axis_tlast_i),
-          .s_empty_i      (s_axis_tdata_i[240]),
-          .s_tile_i       (s_axis_tdata_i[241]),
-          .s_pos_i        ({s_axis_tdata_i[87:64], s_axis_tdata_i[55:32], s_axis_tdata_i[23:0]}),
-          .s_dir_i        (s_axis_tdata_i[239:192]),
-          .s_delta_i      (s_axis_tdata_i[120:96]),
-          .s_distance_i   (s_axis_tdata_i[171:128]),
-          .error_order_o  (planes_order),
-          .line_valid_o   (line_valid),
-          .line_ready_i   (line_ready),
-          .line_empty_o   (line_empty),
-          .line0_o        (line0),
-          .line1_o        (line1),
-          .entries_valid_i(line_comes),
-          .entries0_i     (line_entries0),
-          .entries1_i     (line_entries1),
-          .m_axis_tvalid_o(wave_valid),
-          .m_axis_tready_i(feature_ready && planes),
-          .m_axis_tdata_o (wave_data),
-          .m_axis_tuser_o (wave_user),
-          .m_axis_tlast_o (wave_last),
-          .valid_o        (item_valid),
-          .take_i         (sample_take && planes),
-          .first_o        (item_first),
-          .last_o         (item_last),
-          .empty_o        (item_empty),
-          .decoded_o      (item_decoded),
-          .weight_o       (item_weight),
-          .distance_o     (item_distance),
-          .idle_o         (planes_idle)
-      );
-    end else begin : g_no_planes
-      reg asked_q;  // for what is not there
-      always_ff @(posedge clk_i or negedge rst_ni) begin
-        if (!rst_ni) asked_q <= 1'b0;
-        else if (cfg_we && cfg_addr == 12'h100) asked_q <= cfg_data[0];
-      end
-      assign bad_planes = asked_q;
-      assign {planes, planes_ready, planes_order, planes_idle} = 4'b0001;
-      assign {line_valid, line_empty, line0, line1} = 58'd0;
-      assign {wave_valid, wave_data, wave_user, wave_last} = 67'd0;
-      assign {item_valid, item_first, item_last, item_empty, item_decoded, item_weight, item_distance} = 70'd0;
-      wire unused_ok = &{1'b0, line_ready, line_comes, line_entries0, line_entries1};
-    end
-  endgenerate
+  wire item_valid, item_take, item_first, item_last, item_empty, item_decoded;
+  wire [24:0] delta;
+  wire [20:0] weight;
+  wire [43:0] distance;
+  wire stop, field_idle, composite_idle;
+  sf_field #(
+      .CACHE_BYTES(CACHE_BYTES),
+      .CACHE_WAYS (CACHE_WAYS),
+      .GRID       (GRID),
+      .PLANES     (PLANES)
+  ) u_field (
+      .clk_i          (clk_i),
+      .rst_ni         (rst_ni),
+      .clear_i        (soft_reset),
+      .enable_i       (running),
+      .cfg_we_i       (cfg_we),
+      .cfg_addr_i     (cfg_addr),
+      .cfg_data_i     (cfg_data),
+      .trans_stop_i   (trans_stop),
+      .max_samples_i  (max_samples),
+      .base_i         (base),
+      .planes_o       (planes),
+      .bad_o          (bad_field),
+      .s_valid_i      (s_axis_tvalid_i),
+      .s_ready_o      (s_axis_tready_o),
+      .s_data_i       (s_axis_tdata_i[241:0]),
+      .s_first_i      (s_axis_tuser_i),
+      .s_last_i       (s_axis_tlast_i),
+      .error_order_o  (error_order),
+      .m_axi_arvalid_o(m_axi_arvalid_o),
+      .m_axi_arready_i(m_axi_arready_i),
+      .m_axi_araddr_o (m_axi_araddr_o),
+      .m_axi_rvalid_i (m_axi_rvalid_i),
+      .m_axi_rdata_i  (m_axi_rdata_i),
+      .m_axi_rresp_i  (m_axi_rresp_i),
+      .error_memory_o (error_memory),
+      .lookups_o      (lookups),
+      .misses_o       (misses),
+      .filled_o       (filled),
+      .waits_o        (waits),
+      .m_axis_tvalid_o(feature_valid),
+      .m_axis_tready_i(feature_ready),
+      .m_axis_tdata_o (feature_data),
+      .m_axis_tuser_o (feature_user),
+      .m_axis_tlast_o (feature_last),
+      .valid_o        (item_valid),
+      .take_i         (item_take),
+      .first_o        (item_first),
+      .last_o         (item_last),
+      .empty_o        (item_empty),
+      .decoded_o      (item_decoded),
+      .delta_o        (delta),
+      .weight_o       (weight),
+      .distance_o     (distance),
+      .stop_i         (stop),
+      .idle_o         (field_idle)
+  );
 
   // Two beats of eight bytes, incrementing; data, unprivileged, secure
   assign m_axi_arlen_o = 8'd1;
@@ -409,11 +267,11 @@ module sf_ray_top #(
       .s_axil_rready_i (s_axil_rready_i),
       .s_axil_rdata_o  (net_rdata),
       .s_axil_rresp_o  (net_rresp),
-      .s_axis_tvalid_i (planes ? wave_valid : feature_valid),
+      .s_axis_tvalid_i (feature_valid),
       .s_axis_tready_o (feature_ready),
-      .s_axis_tdata_i  (planes ? wave_data : feature_data),
-      .s_axis_tuser_i  (planes ? wave_user : feature_user),
-      .s_axis_tlast_i  (planes ? wave_last : feature_last),
+      .s_axis_tdata_i  (feature_data),
+      .s_axis_tuser_i  (feature_user),
+      .s_axis_tlast_i  (feature_last),
       .m_axis_tvalid_o (result_valid),
       .m_axis_tready_i (result_ready),
       .m_axis_tdata_o  (result),
@@ -433,10 +291,9 @@ module sf_ray_top #(
   // ---- results: the first beat waits here for the second
   reg [63:0] first_beat_q;
   wire composite_ready;
-  wire coloured = planes ? item_decoded : !sample_empty;
-  wire composite_valid = (planes ? item_valid : sample_valid) && (!coloured || (result_valid && result_last));
-  assign sample_take = composite_valid && composite_ready;
-  assign result_ready = !result_last || (sample_take && coloured);
+  wire composite_valid = item_valid && (!item_decoded || (result_valid && result_last));
+  assign item_take = composite_valid && composite_ready;
+  assign result_ready = !result_last || (item_take && item_decoded);
   always_ff @(posedge clk_i) if (result_valid && !result_last) first_beat_q <= result;
 
   wire [119:0] colour;
@@ -452,15 +309,15 @@ module sf_ray_top #(
       .background_i   (background),
       .valid_i        (composite_valid),
       .ready_o        (composite_ready),
-      .first_i        (planes ? item_first : sample_first),
-      .last_i         (planes ? item_last : sample_last),
-      .empty_i        (planes ? item_empty : sample_empty),
+      .first_i        (item_first),
+      .last_i         (item_last),
+      .empty_i        (item_empty),
       .sigma_i        (first_beat_q[27:0]),
       .colour_i       ({result[51:32], result[19:0], first_beat_q[51:32]}),
       .delta_i        (delta),
-      .distance_i     (planes ? item_distance : distance),
+      .distance_i     (distance),
       .weighed_i      (planes),
-      .weight_i       (item_weight),
+      .weight_i       (weight),
       .decoded_i      (item_decoded),
       .stop_o         (stop),
       .idle_o         (composite_idle),
@@ -474,16 +331,14 @@ module sf_ray_top #(
   );
   assign m_axis_tdata_o = {53'd0, samples, 11'd0, transmittance, 11'd0, weight_sum, depth, 24'd0, colour[119:80], 24'd0,
                            colour[79:40], 24'd0, colour[39:0]};
-  assign active = !track_idle || !planes_idle || !composite_idle;
+  assign active = !field_idle || !composite_idle;
   `SF_REFUSE(GRID == 0 && PLANES == 0, "neither GRID nor PLANES: a build has one field at least")
   // See sf_top: marching and compositing are written for these widths.
   initial begin
     if (sf_arch_pkg::POS_FRAC != 24 || sf_arch_pkg::DELTA_FRAC != 24 || sf_arch_pkg::TRANS_FRAC != 20)
       $error("arch.def has other widths than this RTL is written for");
   end
-  wire unused_ok = &{1'b0, m_axi_rlast_i, s_axis_tdata_i[255:242], s_axis_tdata_i[191:172], s_axis_tdata_i[127:121],
-                     s_axis_tdata_i[95:88], s_axis_tdata_i[63:56], s_axis_tdata_i[31:24], first_beat_q[63:52],
-                     first_beat_q[31:28]};
+  wire unused_ok = &{1'b0, m_axi_rlast_i, s_axis_tdata_i[255:242], first_beat_q[63:52], first_beat_q[31:28]};
 endmodule
 
 `default_nettype wire

@@ -83,25 +83,11 @@ module sf_top #(
   wire [4:0] feature_index;
   wire [7:0] dir_index;
   wire [11:0] feature, dir;
-  wire hold, core_idle, readout_idle, stall_out;
-  wire density_ready, density_valid, colour_ready, colour_valid;
-  wire density_begin, density_last, colour_begin, colour_last;
-  wire [2:0] density_step, colour_step;
-  wire [15:0] density_current;
-  wire [47:0] colour_current;
-  wire d1_row, c1_row, c1_bias_row, c1_products, ray;
-  wire [2:0] c1_step, neurons_step, update_step;
-  wire d2_row, c2_row, c2_bias_row, c3_row, c3_bias_row;
-  wire [7:0] d2_fired, c2_fired, c3_fired;
-  wire [4:0] busy;
-  wire neurons_valid, neurons_last;
-  wire [1:0] neurons_layer;
-  wire [8:0] neurons_fired;
-  wire update, update_colour;
+  wire engine_idle;
   wire result_valid, result_ready;
   wire [27:0] sigma;
   wire [59:0] colour;
-  wire active = !(core_idle && readout_idle && input_empty && !m_axis_tvalid_o);
+  wire active = !(engine_idle && input_empty && !m_axis_tvalid_o);
 
   // What follows from the programming, in registers: it does not change while samples are inside.
   reg decodes_q;
@@ -223,124 +209,73 @@ module sf_top #(
       .error_value_o  (error_value)
   );
 
-  sf_core #(
+  sf_engine #(
       .TAP          (TAP),
       .LANES        (LANES),
       .MACS         (MACS),
       .NEURONS      (NEURONS),
       .STEPS_AT_ONCE(STEPS_AT_ONCE)
-  ) u_core (
-      .clk_i          (clk_i),
-      .rst_ni         (rst_ni),
-      .clear_i        (soft_reset),
-      .hold_i         (hold),
-      .idle_o         (core_idle),
-      .we_i           (we),
-      .wlayer_i       (wlayer),
-      .wrow_i         (wrow),
-      .wword_i        (wword),
-      .wdata_i        (wweights),
-      .d1_in_i        (d1_in[5:0]),
-      .decodes_i      (decodes_q),
-      .d1_out_i       (d1_out),
-      .n_dir_i        (n_dir_q),
-      .n_h_i          (n_h_q),
-      .c1_out_i       (c1_out),
-      .c2_out_i       (c2_out),
-      .d1_k_i         (d1_k),
-      .c1_k_i         (c1_k),
-      .c2_k_i         (c2_k),
-      .d1_theta_i     (d1_theta),
-      .c1_theta_i     (c1_theta),
-      .c2_theta_i     (c2_theta),
-      .c1_bias_i      (c1_bias),
-      .c2_bias_i      (c2_bias),
-      .c3_bias_i      (c3_bias),
-      .mode_i         (mode),
-      .steps_i        (steps),
-      .sample_valid_i (sample_valid),
-      .sample_first_i (sample_first),
-      .sample_done_o  (sample_done),
-      .feature_index_o(feature_index),
-      .feature_i      (feature),
-      .dir_index_o    (dir_index),
-      .dir_i          (dir),
-      .density_ready_i(density_ready),
-      .density_begin_o(density_begin),
-      .density_valid_o(density_valid),
-      .density_step_o (density_step),
-      .density_last_o (density_last),
-      .density_o      (density_current),
-      .colour_ready_i (colour_ready),
-      .colour_begin_o (colour_begin),
-      .colour_valid_o (colour_valid),
-      .colour_step_o  (colour_step),
-      .colour_last_o  (colour_last),
-      .colour_o       (colour_current),
-      .d1_row_o       (d1_row),
-      .c1_row_o       (c1_row),
-      .c1_bias_row_o  (c1_bias_row),
-      .c1_products_o  (c1_products),
-      .c1_step_o      (c1_step),
-      .d2_row_o       (d2_row),
-      .d2_fired_o     (d2_fired),
-      .c2_row_o       (c2_row),
-      .c2_fired_o     (c2_fired),
-      .c2_bias_row_o  (c2_bias_row),
-      .c3_row_o       (c3_row),
-      .c3_fired_o     (c3_fired),
-      .c3_bias_row_o  (c3_bias_row),
-      .busy_o         (busy),
-      .ray_o          (ray),
-      .neurons_valid_o(neurons_valid),
-      .neurons_layer_o(neurons_layer),
-      .neurons_step_o (neurons_step),
-      .neurons_last_o (neurons_last),
-      .neurons_fired_o(neurons_fired),
-      .stall_o        (stall_out),
-      .tap_valid_o    (tap_valid),
-      .tap_layer_o    (tap_layer),
-      .tap_step_o     (tap_step),
-      .tap_spikes_o   (tap_spikes),
-      .tap_rows_o     (tap_rows),
-      .tap_membrane_o (tap_membrane)
-  );
-
-  sf_readout u_readout (
-      .clk_i          (clk_i),
-      .rst_ni         (rst_ni),
-      .clear_i        (soft_reset),
-      .decodes_i      (decodes_q),
-      .density_ready_o(density_ready),
-      .density_begin_i(density_begin),
-      .density_valid_i(density_valid),
-      .density_step_i (density_step),
-      .density_last_i (density_last),
-      .density_i      (density_current),
-      .colour_ready_o (colour_ready),
-      .colour_begin_i (colour_begin),
-      .colour_valid_i (colour_valid),
-      .colour_step_i  (colour_step),
-      .colour_last_i  (colour_last),
-      .colour_i       (colour_current),
-      .idle_o         (readout_idle),
-      .mode_i         (mode),
-      .steps_i        (steps),
-      .k_density_i    (d2_k),
-      .k_colour_i     (c3_k),
-      .exp_mul_i      (exp_mul),
-      .exp_shift_i    (exp_shift),
-      .exp_bias_i     (exp_bias),
-      .sigmoid_mul_i  (sigmoid_mul),
-      .sigmoid_shift_i(sigmoid_shift),
-      .sigmoid_bias_i (sigmoid_bias),
-      .update_o       (update),
-      .update_colour_o(update_colour),
-      .update_step_o  (update_step),
-      .valid_o        (result_valid),
-      .ready_i        (result_ready),
-      .sigma_o        (sigma),
-      .colour_o       (colour)
+  ) u_engine (
+      .clk_i           (clk_i),
+      .rst_ni          (rst_ni),
+      .clear_i         (soft_reset),
+      .idle_o          (engine_idle),
+      .we_i            (we),
+      .wlayer_i        (wlayer),
+      .wrow_i          (wrow),
+      .wword_i         (wword),
+      .wdata_i         (wweights),
+      .mode_i          (mode),
+      .steps_i         (steps),
+      .decodes_i       (decodes_q),
+      .d1_in_i         (d1_in[5:0]),
+      .n_dir_i         (n_dir_q),
+      .n_h_i           (n_h_q),
+      .d1_out_i        (d1_out),
+      .d2_out_i        (d2_out),
+      .c1_out_i        (c1_out),
+      .c2_out_i        (c2_out),
+      .c3_out_i        (c3_out),
+      .d1_k_i          (d1_k),
+      .d2_k_i          (d2_k),
+      .c1_k_i          (c1_k),
+      .c2_k_i          (c2_k),
+      .c3_k_i          (c3_k),
+      .d1_theta_i      (d1_theta),
+      .c1_theta_i      (c1_theta),
+      .c2_theta_i      (c2_theta),
+      .c1_bias_i       (c1_bias),
+      .c2_bias_i       (c2_bias),
+      .c3_bias_i       (c3_bias),
+      .exp_mul_i       (exp_mul),
+      .exp_shift_i     (exp_shift),
+      .exp_bias_i      (exp_bias),
+      .sigmoid_mul_i   (sigmoid_mul),
+      .sigmoid_shift_i (sigmoid_shift),
+      .sigmoid_bias_i  (sigmoid_bias),
+      .sample_valid_i  (sample_valid),
+      .sample_first_i  (sample_first),
+      .sample_done_o   (sample_done),
+      .feature_index_o (feature_index),
+      .feature_i       (feature),
+      .dir_index_o     (dir_index),
+      .dir_i           (dir),
+      .valid_o         (result_valid),
+      .ready_i         (result_ready),
+      .sigma_o         (sigma),
+      .colour_o        (colour),
+      .active_i        (active),
+      .clear_counters_i(clear_counters),
+      .snapshot_i      (snapshot),
+      .counters_busy_o (counters_busy),
+      .counter_index_i (counter_index),
+      .counter_o       (counter),
+      .tap_valid_o     (tap_valid),
+      .tap_layer_o     (tap_layer),
+      .tap_step_o      (tap_step),
+      .tap_spikes_o    (tap_spikes),
+      .tap_rows_o      (tap_rows),
+      .tap_membrane_o  (tap_membrane)
   );
 
   sf_stream_out u_stream_out (
@@ -355,50 +290,6 @@ module sf_top #(
       .tready_i(m_axis_tready_i),
       .tdata_o (m_axis_tdata_o),
       .tlast_o (m_axis_tlast_o)
-  );
-
-  sf_counters u_counters (
-      .clk_i          (clk_i),
-      .rst_ni         (rst_ni),
-      .d1_out_i       (d1_out),
-      .d2_out_i       (d2_out),
-      .c1_out_i       (c1_out),
-      .c2_out_i       (c2_out),
-      .c3_out_i       (c3_out),
-      .d1_row_i       (d1_row),
-      .c1_row_i       (c1_row),
-      .c1_bias_row_i  (c1_bias_row),
-      .c1_products_i  (c1_products),
-      .c1_step_i      (c1_step),
-      .d2_row_i       (d2_row),
-      .d2_fired_i     (d2_fired),
-      .c2_row_i       (c2_row),
-      .c2_fired_i     (c2_fired),
-      .c2_bias_row_i  (c2_bias_row),
-      .c3_row_i       (c3_row),
-      .c3_fired_i     (c3_fired),
-      .c3_bias_row_i  (c3_bias_row),
-      .busy_i         (busy),
-      .ray_i          (ray),
-      .neurons_valid_i(neurons_valid),
-      .neurons_layer_i(neurons_layer),
-      .neurons_step_i (neurons_step),
-      .neurons_last_i (neurons_last),
-      .neurons_fired_i(neurons_fired),
-      .update_i       (update),
-      .update_colour_i(update_colour),
-      .update_step_i  (update_step),
-      .sample_i       (result_valid && result_ready),
-      .active_i       (active),
-      .stall_in_i     (active && !sample_valid && !hold),
-      .stall_out_i    (stall_out),
-      .clear_i        (clear_counters),
-      .snapshot_i     (snapshot),
-      .quiet_i        (core_idle && readout_idle),
-      .hold_o         (hold),
-      .busy_o         (counters_busy),
-      .index_i        (counter_index),
-      .counter_o      (counter)
   );
 
   `SF_REFUSE((LANES != 32 && LANES != 64 && LANES != 128 && LANES != 256) || LANES > sf_arch_pkg::LANES,

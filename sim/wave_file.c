@@ -11,11 +11,16 @@
 
 enum { HEAD = 9, LENGTH = 8, MORE = 1 << 20 }; /* a section: its kind, then its length, big-endian, itself included */
 
-/* Sections follow each other up to the end of the file; the lengths are written last. */
+/* Kinds of sections: widths of the nets, and their names, packed in three ways. */
+enum { GEOMETRY = 1 << 3, HIERARCHY = 1 << 4 | 1 << 6 | 1 << 7, KINDS = 31 };
+
+/* Sections follow each other up to the end of the file; the lengths are written last. The nets stand behind the values:
+ * where they are missing, the file ends with a length that its writer only believed to have written. */
 static bool is_whole(int file)
 {
   const off_t size = lseek(file, 0, SEEK_END);
   off_t at = 0;
+  unsigned seen = 0;
   while (at < size) {
     unsigned char head[HEAD];
     uint64_t length = 0;
@@ -23,8 +28,9 @@ static bool is_whole(int file)
     for (int i = 1; i < HEAD; i++) length = length << 8 | head[i];
     if (length < LENGTH || length > (uint64_t)(size - at - 1)) return false;
     at += 1 + (off_t)length;
+    seen |= 1U << (head[0] & KINDS);
   }
-  return size > 0;
+  return (seen & GEOMETRY) && (seen & HIERARCHY);
 }
 
 /* Writes until the disk refuses: why it does, or 0 if it does not. The file was useless before. */

@@ -61,6 +61,34 @@ TEST(a_section_without_a_length_is_named)
   ck_bad(sf_wave_file_check(path), SF_E_IO, path, "cut short");
 }
 
+/* The section at a place: where the next one begins. */
+static long behind_section(const char *path, long at)
+{
+  unsigned char head[9];
+  uint64_t length = 0;
+  FILE *file = fopen(path, "rb");
+  ck_assert_ptr_nonnull(file);
+  ck_assert_int_eq(fseek(file, at, SEEK_SET), 0);
+  ck_assert_uint_eq(fread(head, 1, sizeof head, file), sizeof head);
+  ck_assert_int_eq(fclose(file), 0);
+  for (int i = 1; i < COUNT(head); i++) length = length << 8 | head[i];
+  return at + 1 + (long)length;
+}
+
+/* Without widths and names of the nets, which stand at the end, nothing can be read back. */
+TEST(a_file_that_ends_behind_a_section_is_named)
+{
+  const char *path = in("a.fst");
+  const long size = write_wave(path);
+  int cuts = 0;
+  for (long end = behind_section(path, 0); end < size; end = behind_section(path, end), cuts++) {
+    ck_assert_int_eq(truncate(path, end), 0);
+    ck_bad(sf_wave_file_check(path), SF_E_IO, path, "cut short");
+    write_wave(path);
+  }
+  ck_assert_int_ge(cuts, 3); /* behind header, values, widths */
+}
+
 /* No room, here for larger files: the system's words. */
 TEST(the_cause_is_the_systems)
 {

@@ -9,8 +9,8 @@ Synthesise modules of the accelerator (yosys, synth_xilinx -family xc7) and prin
 BUILD/synth/synth.md and BUILD/synth/synth.json. Every finished run is kept in BUILD/synth/runs until the RTL, the
 tool or the recipe changes, so an interrupted set goes on where it stopped.
 
-  --modules "NAME..."  these only (default: every module but sf_top and sf_ray_top, small
-                       ones first)
+  --modules "NAME..."  these only (default: all but sf_engine, sf_top and sf_ray_top,
+                       small ones first)
   --lanes "N..."       numbers of lanes (default: the one of sf_arch_pkg); a module without a parameter LANES exists
                        for that one alone
   --rtl DIR            folder that holds rtl/ (default: that of this script)
@@ -62,7 +62,7 @@ for n in $lanes; do [[ $n =~ ^[1-9][0-9]{0,3}$ ]] || die 2 "--lanes: '$n' is no 
 lanes=${lanes:-$built_for}
 if [ -z "$modules" ]; then
   for file in $(ls -rS rtl/*.sv | grep -v '_pkg\.sv$'); do
-    [[ $file = rtl/sf_top.sv || $file = rtl/sf_ray_top.sv ]] || modules+=" $(basename "$file" .sv)"
+    [[ $file = rtl/sf_engine.sv || $file = rtl/sf_top.sv || $file = rtl/sf_ray_top.sv ]] || modules+=" $(basename "$file" .sv)"
   done
 fi
 [ -z "$top" ] || modules+=" sf_top sf_ray_top"

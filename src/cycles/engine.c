@@ -1,4 +1,4 @@
-/* The engine at a clock edge. Each function mirrors one module of the RTL, or a part of rtl/sf_core.sv. */
+/* The engine at a clock edge. Each function mirrors one module of the RTL. */
 #include "cycles/state.h"
 
 #include <string.h>

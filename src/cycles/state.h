@@ -11,7 +11,7 @@ enum {
   STAGES = 16,
   STEP_CYCLES = 5, /* of a step's accumulators */
   COLOURS = 3,
-  NARROW_BANKS = 4 /* of D2 and C3 (rtl/sf_core.sv) */
+  NARROW_BANKS = 4 /* of D2 and C3 (rtl/sf_narrow.sv) */
 };
 
 /* rtl/sf_stream_in.sv */
@@ -28,7 +28,7 @@ typedef struct values {
   bool op[3], busy[2], ray;
 } values;
 
-/* Whose neurons step (rtl/sf_core.sv), and what is on its way to them and through them (rtl/sf_neurons.sv). */
+/* Whose neurons step (rtl/sf_turns.sv), and what is on its way to them and through them (rtl/sf_neurons.sv). */
 typedef struct turn {
   bool valid, last;
   uint8_t layer, step, group;
@@ -59,7 +59,7 @@ typedef struct sums {
   uint32_t part, full;
 } sums;
 
-/* Sums of D2 or C3 on their way out, a step per cycle (rtl/sf_core.sv). */
+/* Sums of D2 or C3 on their way out, a step per cycle (rtl/sf_narrow.sv). */
 typedef struct reader {
   bool reading, way[3], way_last[3];
   uint32_t step;

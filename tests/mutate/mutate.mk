@@ -9,10 +9,10 @@ mutate: $B/libspikefield.a $(UNIT_RUNTIME) ## mutate the RTL's modules and count
 # Mutants of the source: written into a copy of rtl/ in $B/mutate/GROUP, all of a group in one build.
 # MUTATED_GROUP: modules, with what $(MUTATE_GROUP) says to operators.py; MUTANT_CHECKERS_MODULE or else
 # MUTANT_CHECKERS_GROUP: programs in that folder, in the order in which they run.
-MUTATED_engine := sf_core sf_fed sf_values sf_sums sf_spikes sf_neurons sf_rows sf_counters sf_readout sf_csr sf_top
+MUTATED_engine := sf_engine sf_core sf_turns sf_c1_inputs sf_fed_layers sf_narrow sf_fed sf_tap sf_values sf_sums sf_spikes sf_neurons sf_rows sf_counters sf_readout sf_csr sf_top
 MUTATED_lanes := sf_values sf_sums sf_spikes sf_neurons
 MUTATED_ray := sf_cache sf_cache_tags sf_fetch sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo sf_sh sf_encoder \
-  sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top sf_planes sf_planes_reads sf_planes_mix sf_basis sf_activation sf_waves \
+  sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top sf_field sf_planes sf_planes_reads sf_planes_mix sf_basis sf_activation sf_waves \
   sf_light sf_rescale sf_mul_28x25
 MUTATE_lanes := --lanes
 MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_counters test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard

@@ -5,8 +5,9 @@ from asic import cache
 from asic.bench import WARM_UP
 from asic.record import Record, number, to_bits
 
-CORE = "sf_top.u_core"
-VALUES, SUMS, NEURON, READOUT = CORE + ".u_values", CORE + ".u_c2", CORE + ".u_neurons", "sf_top.u_readout"
+ENGINE = "sf_top.u_engine"
+CORE = ENGINE + ".u_core"
+VALUES, SUMS, NEURON, READOUT = CORE + ".u_values", CORE + ".u_fed.u_c2", CORE + ".u_neurons", ENGINE + ".u_readout"
 
 
 class Piece:
