@@ -29,6 +29,7 @@ $(DUT_OUT)/$(DUT_PINS).o: sim/$(DUT_PINS).cpp $(ARCH_DEF) tools/plusargs.sh $(DU
 	  -DSF_PLUSARGS="\"$$(tools/plusargs.sh $(DUT_OUT))\"" -MMD -MP -c $< -o $@
 
 DUT_OBJ_sim_render := $B/obj/tools/render/options.o
+DUT_OBJ_sf_cosim := $(RAY_LIBS) # of --top sf_ray_top, which is refused beside --dut
 
 # The harness comes from our library; the block and its pins stand before it.
 $(DUT_OUT)/$(DUT_PROGRAM): $B/obj/tools/$(DUT_PROGRAM).o $(DUT_OBJ_$(DUT_PROGRAM)) $(DUT_OUT)/$(DUT_PINS).o $(DUT_OUT)/V$(DUT_MODEL)__ALL.a $(DUT_LIBS) $B/libspikefield.a

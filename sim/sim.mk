@@ -66,7 +66,7 @@ endef
 DUT_LIBS := $B/verilated/libsfdut.a
 DUT_LDLIBS := -lz -lpthread
 # Programs that drive sf_ray_top.
-RAY_PROGRAMS := bin/sim_render bin/sf_view bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/test_viewer tests/test_soc tests/test_soc_planes tests/bench tests/bench_field
+RAY_PROGRAMS := bin/sf_cosim bin/sim_render bin/sf_view bin/sf_soc bin/energy_audit $(patsubst %,tests/%,$(filter test_rtl_ray%,$(DUT_TESTS))) tests/test_three_counts tests/test_viewer tests/test_soc tests/test_soc_planes tests/bench tests/bench_field
 RAY_LIBS := $B/verilated/ray/pins_ray.o $B/verilated/ray/Vsf_ray_top__ALL.a
 $(RAY_PROGRAMS:%=$B/%): $(RAY_LIBS)
 
@@ -108,7 +108,7 @@ $B/faults/ray/.patched: $(RTL_READY) $(RAY_FAULTS)
 	@touch $@
 $(eval $(call verilated_top_rule,$B/faults/ray/verilated,$B/faults/ray,$B/faults/ray/.patched,sf_ray_top,pins_ray))
 FAULTY_RAY_LIBS := $B/faults/ray/verilated/pins_ray.o $B/faults/ray/verilated/Vsf_ray_top__ALL.a
-$B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $B/faults/verilated/libsfdut.a $B/libspikefield.a
+$B/faults/sf_cosim: $B/obj/tools/sf_cosim.o $(FAULTY_RAY_LIBS) $B/faults/verilated/libsfdut.a $B/libspikefield.a
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $^ $(DUT_LDLIBS) $(LIBS)
 # Planted miscounts in the C core, the vector core and the recount: SF_FAULT=N chooses one at run time.

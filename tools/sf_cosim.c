@@ -19,7 +19,7 @@
 typedef struct options {
   sf_lockstep_options run;
   sf_ranks *ranks;
-  int split, backend; /* backend: 0 rtl, 1 board */
+  int split, backend, top; /* backend: 0 rtl, 1 board; top: of sf_activity_block */
   double patience;
   bool json, quiet;
   const char *replay, *junit, *dut, *dut_top, *window;
@@ -172,37 +172,6 @@ static sf_status play(const options *o)
 
 /* ---- activity for power tools ---- */
 
-static cJSON *activity_json(const options *o, const sf_activity_report *r)
-{
-  cJSON *json = cJSON_CreateObject();
-  if (o->activity.saif) sf_json_add_text(json, "saif", o->activity.saif);
-  if (o->activity.vcd) sf_json_add_text(json, "vcd", o->activity.vcd);
-  sf_json_add_u64(json, "rays", r->rays);
-  sf_json_add_u64(json, "samples", r->samples);
-  sf_json_add_u64(json, "differences", 0);
-  sf_json_add_u64(json, "cycles", r->cycles);
-  sf_json_add_u64(json, "bits", r->bits);
-  sf_json_add_u64(json, "quiet_bits", r->quiet);
-  sf_json_add_u64(json, "toggles", r->toggles);
-  sf_json_add_u64(json, "clock_toggles", r->clock_toggles);
-  cJSON_AddNumberToObject(json, "clock_mhz", o->activity.clock_mhz);
-  return json;
-}
-
-static sf_status report_activity(const options *o, const sf_activity_report *r)
-{
-  if (o->json) return sf_json_print(activity_json(o, r), true);
-  printf("%" PRIu64 " ray%s, %" PRIu64 " sample%s: 0 differences\n", r->rays, sf_plural(r->rays), r->samples,
-         sf_plural(r->samples));
-  printf("%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
-         r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
-  for (int i = 0; i < 2; i++) {
-    const char *path = i ? o->activity.vcd : o->activity.saif;
-    if (path) printf("%s: at %g MHz\n", path, o->activity.clock_mhz);
-  }
-  return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
-}
-
 static sf_status record_activity(const options *o, sf_lockstep *l)
 {
   display d = {.begun = sf_seconds()};
@@ -215,7 +184,9 @@ static sf_status record_activity(const options *o, sf_lockstep *l)
   sf_progress_end(&d.progress);
   l->user = NULL;
   SF_TRY(status);
-  return report_activity(o, &r);
+  if (o->json) return sf_json_print(sf_activity_json(&o->activity, &r), true);
+  sf_activity_print(stdout, &o->activity, &r);
+  return fflush(stdout) == 0 ? sf_ok() : sf_fail(SF_E_IO, "standard output: cannot write the report");
 }
 
 /* A run in a folder that cannot be written may still find no difference, unless a place was asked for. */
@@ -242,8 +213,9 @@ static sf_status settle(options *o)
   SF_TRY(check_board(o));
   if (!(o->patience > 0)) o->patience = SF_BOARD_PATIENCE;
   const bool activity = o->activity.saif || o->activity.vcd;
-  if (!activity && (o->window || o->activity.depth || o->activity.clock_mhz))
-    return sf_fail(SF_E_USAGE, "--window, --depth and --clock belong to --saif or --vcd");
+  if (!activity && (o->window || o->activity.depth || o->activity.clock_mhz || o->top))
+    return sf_fail(SF_E_USAGE, "--top, --window, --depth and --clock belong to --saif or --vcd");
+  if (o->top && o->dut) return sf_fail(SF_E_USAGE, "--dut is a block in place of sf_top: it takes no --top sf_ray_top");
   if (activity && (o->junit || r->checkpoint || r->limit || r->jobs || r->block || r->evidence))
     return sf_fail(SF_E_USAGE, "--saif and --vcd take no --junit, --checkpoint, --limit-samples, --jobs, --block or "
                                "--evidence: their samples go through one accelerator");
@@ -255,6 +227,7 @@ static sf_status settle(options *o)
   if (!r->jobs) r->jobs = 1;
   if (!r->block) r->block = 256;
   if (!r->evidence) r->evidence = o->replay ? "sf_cosim-replay" : "sf_cosim-difference";
+  o->activity.block = o->top ? SF_ACTIVITY_RAYS : SF_ACTIVITY_SAMPLES;
   if (!o->activity.clock_mhz) o->activity.clock_mhz = 200;
   if (!o->dut_top) o->dut_top = "sf_top";
   return sf_ok();
@@ -325,6 +298,9 @@ static sf_option *activity_and_blocks(options *o, sf_option *list)
        "stream all samples through one accelerator and write how often each net switched (docs/activity.md)"},
       {"--vcd", 0, SF_ARG_OUTPUT, &o->activity.vcd, 0, 0, NULL, "FILE",
        "stream them likewise and write every change of every net"},
+      {"--top", 0, SF_ARG_CHOICE, &o->top, 0, 0, "sf_top|sf_ray_top", NULL,
+       "the block of --saif and --vcd: samples through the nets (default), or rays to pixels, with field and "
+       "compositor"},
       {"--window", 0, SF_ARG_STRING, &o->window, 0, 0, NULL, "FIRST,LAST",
        "cycles that --saif and --vcd cover (default all)"},
       {"--depth", 0, SF_ARG_INT, &o->activity.depth, 0, 64, NULL, "N",
@@ -357,15 +333,16 @@ int main(int argc, char **argv)
                           "  sf_cosim --replay sf_cosim-difference.json\n"
                           "  sf_cosim scene.snn data --backend board --port /dev/ttyUSB0\n"
                           "  sf_cosim scene.snn data --rays 200 --stalls 0 --saif run.saif --depth 3\n"
+                          "  sf_cosim scene.snn data --rays 50 --stalls 0 --saif rays.saif --top sf_ray_top\n"
                           "  sf_cosim scene.snn data --dut \"my_pkg.sv my_core.sv my_top.sv\" --dut-top my_top\n"
                           "  sf_cosim scene.snn data --dut \"-F kit/rtl.f\"\n",
                       .options = table,
                       .min_positional = 0,
                       .max_positional = 2};
-  static const char *const named_by_replay[] = {"--rays",    "--seed",    "--split",  "--stalls",     "--limit-samples",
-                                                "--json",    "--jobs",    "--block",  "--checkpoint", "--junit",
-                                                "--saif",    "--vcd",     "--window", "--depth",      "--clock",
-                                                "--plusarg", "--backend", "--port",   "--timeout",    NULL};
+  static const char *const named_by_replay[] = {
+      "--rays",  "--seed",       "--split",   "--stalls", "--limit-samples", "--json",   "--jobs",
+      "--block", "--checkpoint", "--junit",   "--saif",   "--vcd",           "--window", "--depth",
+      "--clock", "--plusarg",    "--backend", "--port",   "--timeout",       "--top",    NULL};
   static const char *const of_simulation[] = {"--stalls",  "--jobs", "--block", "--checkpoint", "--evidence",
                                               "--plusarg", "--dut",  "--saif",  "--vcd",        NULL};
   sf_status status = sf_cli_parse(&cli, argc, argv, positional);

@@ -1,8 +1,7 @@
 #include "sim/activity/activity.h"
+#include "sim/activity/flow.h"
 #include "sim/activity/saif.h"
-#include "sim/sim.h"
 #include "sim/wave_file.h"
-#include "energy/energy.h"
 #include "cli/cli.h"
 #include "base/io.h"
 #include "base/text.h"
@@ -13,19 +12,11 @@
 
 enum { PIECE = 16384, TICK = 1024, PS_PER_US = 1000000 }; /* cycles of one waveform file; between two ticks */
 
-typedef struct stream {
-  sf_dut_sample *sample;
-  int16_t (*f)[SF_DIR_MAX]; /* [fx_net_inputs] */
-  fx_ray *ray;              /* per sample */
-  int count, room;
-} stream;
-
 typedef struct activity {
   sf_lockstep *lockstep;
   const sf_activity_options *options;
   sf_activity_report *report;
-  stream in;
-  sf_dut *dut;
+  sf_flow *flow;
   sf_wave wave;
   sf_vcd vcd;
   sf_writer saif_file, vcd_file;
@@ -33,64 +24,10 @@ typedef struct activity {
   uint64_t begun;       /* the stream's first cycle */
   uint64_t piece;       /* first cycle of the piece at work */
   bool dumping, opened, over;
-  sf_status status; /* of the pieces read so far */
+  sf_status status;              /* of the pieces read so far */
+  void (*around)(void *context); /* what the flow does in each cycle, such as its memory; or NULL */
+  void *around_context;
 } activity;
-
-/* ---- the samples of the rays ---- */
-
-static bool make_room(stream *in)
-{
-  const int room = in->room ? 2 * in->room : 1024;
-  void *sample = realloc(in->sample, (size_t)room * sizeof *in->sample);
-  if (sample) in->sample = sample;
-  void *f = realloc(in->f, (size_t)room * sizeof *in->f);
-  if (f) in->f = f;
-  void *ray = realloc(in->ray, (size_t)room * sizeof *in->ray);
-  if (ray) in->ray = ray;
-  if (!sample || !f || !ray) return false;
-  in->room = room;
-  return true;
-}
-
-typedef struct collector {
-  stream *in;
-  const fx_net *net;
-  int32_t base[SF_LANES];
-} collector;
-
-/* fx_net_fn */
-static sf_status collect(void *user, const fx_ray *ray, bool first, const int16_t *f, fx_out *out)
-{
-  collector *c = user;
-  stream *in = c->in;
-  if (in->count == in->room && !make_room(in)) return sf_fail(SF_E_MEMORY, "activity: no memory for the samples");
-  fx_net_next(c->net, ray->dir, first, f, c->base, out, NULL, NULL);
-  memset(in->f[in->count], 0, sizeof in->f[0]);
-  memcpy(in->f[in->count], f, (size_t)fx_net_inputs(c->net) * sizeof *f);
-  in->ray[in->count] = *ray;
-  in->sample[in->count++].first = first;
-  return sf_ok();
-}
-
-static sf_status collect_rays(activity *a)
-{
-  const sf_lockstep *l = a->lockstep;
-  collector c = {.in = &a->in, .net = &l->fx.net};
-  for (int i = 0; i < l->options.rays; i++) {
-    const sf_lockstep_pixel p = sf_lockstep_pick(l, (uint64_t)i);
-    fx_ray ray;
-    fx_pixel pixel;
-    fx_counts march = {0};
-    if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "stopped: no file is written");
-    SF_TRY(sf_pixel_ray(&l->fx, &l->data, &l->data.view[p.view], p.x, p.y, &ray));
-    SF_TRY(fx_render_ray(&l->fx, &ray, collect, &c, &pixel, &march));
-  }
-  for (int i = 0; i < a->in.count; i++) a->in.sample[i].ray = &a->in.ray[i], a->in.sample[i].f = a->in.f[i];
-  a->report->rays = (uint64_t)l->options.rays;
-  return a->in.count ? sf_ok()
-                     : sf_fail(SF_E_FORMAT, "%s: none of %d ray%s has a sample: nothing to stream", l->data.path,
-                               l->options.rays, sf_plural((uint64_t)l->options.rays));
-}
 
 /* ---- the waveform, a piece at a time ---- */
 
@@ -109,7 +46,7 @@ static sf_status open_wave(activity *a)
 
 static void end_piece(activity *a, uint64_t cycle)
 {
-  sf_pins_dump_end(a->dut->pins);
+  sf_pins_dump_end(a->flow->dut->pins);
   a->dumping = false;
   if (a->status.code == SF_OK) a->status = sf_wave_file_check(a->path);
   if (a->status.code == SF_OK && !a->opened) a->status = open_wave(a);
@@ -122,14 +59,16 @@ static void begin_piece(activity *a, uint64_t cycle)
 {
   a->piece = cycle;
   a->dumping = true;
-  sf_pins_dump(a->dut->pins);
+  sf_pins_dump(a->flow->dut->pins);
 }
 
 static void show(activity *a)
 {
   sf_lockstep *l = a->lockstep;
-  l->sum.samples = (uint64_t)a->dut->received;
-  l->rays = l->sum.samples * (uint64_t)l->options.rays / (uint64_t)a->in.count;
+  const sf_flow *f = a->flow;
+  const uint64_t received = (uint64_t)f->dut->received;
+  l->rays = received * f->rays / f->items;
+  l->sum.samples = received * f->samples / f->items;
   if (l->tick) l->tick(l->user, l);
 }
 
@@ -148,49 +87,34 @@ static void before_cycle(activity *a, uint64_t cycle)
 static void each_cycle(void *user)
 {
   activity *a = user;
-  before_cycle(a, a->dut->cycle - a->begun);
+  if (a->around) a->around(a->around_context);
+  before_cycle(a, a->flow->dut->cycle - a->begun);
 }
 
 /* ---- the run ---- */
 
-static sf_status compare(const activity *a, const sf_dut_result *result)
+static sf_status run_flow(activity *a)
 {
-  const fx_net *net = &a->lockstep->fx.net;
-  fx_counts expected = {0}, actual;
-  int32_t base[SF_LANES];
-  char text[200];
-  sf_difference d;
-  for (int i = 0; i < a->in.count; i++) {
-    fx_trace trace;
-    fx_out out;
-    fx_net_next(net, a->in.ray[i].dir, a->in.sample[i].first, a->in.f[i], base, &out, &trace, &expected);
-    if (sf_compare_sample(net, &trace, &out, &result[i], NULL, &d)) continue;
-    sf_difference_text(&d, text);
-    return sf_fail(SF_E_DIFFERENCE, "sample %d of the stream: %s", i, text);
-  }
-  SF_TRY(sf_dut_counts(a->dut, &actual, NULL, NULL, NULL));
-  if (sf_compare_counts(&expected, &actual, sf_dut_cycle(a->dut), &d)) return sf_ok();
-  sf_difference_text(&d, text);
-  return sf_fail(SF_E_DIFFERENCE, "stream of %d sample%s: %s", a->in.count, sf_plural((uint64_t)a->in.count), text);
-}
-
-static sf_status stream_samples(activity *a, sf_dut_result *result)
-{
-  a->begun = sf_dut_cycle(a->dut);
-  a->dut->each_cycle = each_cycle;
-  a->dut->each_cycle_context = a;
+  sf_flow *f = a->flow;
+  sf_dut *dut = f->dut;
+  a->begun = sf_dut_cycle(dut);
+  a->around = dut->each_cycle, a->around_context = dut->each_cycle_context;
+  dut->each_cycle = each_cycle, dut->each_cycle_context = a;
+  dut->received = 0;
   before_cycle(a, 0);
-  const sf_status ran = sf_dut_run(a->dut, a->in.sample, a->in.count, result);
-  a->dut->each_cycle = NULL;
-  if (a->dumping) end_piece(a, sf_dut_cycle(a->dut));
+  const sf_status ran = f->run(f);
+  dut->each_cycle = a->around, dut->each_cycle_context = a->around_context;
+  if (a->dumping) end_piece(a, sf_dut_cycle(dut));
   SF_TRY(ran);
   SF_TRY(a->status);
   if (sf_cli_interrupted()) return sf_fail(SF_E_STOPPED, "stopped: no file is written");
   if (!a->opened)
     return sf_fail(SF_E_USAGE, "--window begins at cycle %" PRIu64 ", but the stream has %" PRIu64, a->options->first,
-                   sf_dut_cycle(a->dut) - a->begun);
-  a->report->samples = (uint64_t)a->in.count;
-  return compare(a, result);
+                   sf_dut_cycle(dut) - a->begun);
+  a->report->rays = f->rays, a->report->samples = f->samples;
+  SF_TRY(f->compare(f));
+  a->report->lookups = f->lookups, a->report->misses = f->misses;
+  return sf_ok();
 }
 
 static sf_status simulate(activity *a)
@@ -201,12 +125,8 @@ static sf_status simulate(activity *a)
                               .wave = a->path,
                               .wave_from = -1, /* the pieces begin it */
                               .plusarg = o->plusarg};
-  sf_dut_result *result = malloc((size_t)a->in.count * sizeof *result);
-  if (!result) return sf_fail(SF_E_MEMORY, "activity: no memory for %d results", a->in.count);
-  sf_status status = sf_dut_open(&a->dut, &a->lockstep->fx, &how);
-  if (status.code == SF_OK) status = stream_samples(a, result);
-  free(result);
-  return status;
+  SF_TRY((a->options->block == SF_ACTIVITY_RAYS ? sf_flow_rays : sf_flow_samples)(&a->flow, a->lockstep, &how));
+  return run_flow(a);
 }
 
 /* ---- files ---- */
@@ -226,7 +146,6 @@ static void sum_up(const activity *a)
 static sf_status write_files(activity *a)
 {
   const sf_activity_options *o = a->options;
-  SF_TRY(collect_rays(a));
   SF_TRY(simulate(a));
   sum_up(a);
   if (o->vcd) {
@@ -255,12 +174,11 @@ sf_status sf_activity_run(sf_lockstep *lockstep, const sf_activity_options *opti
   if (status.code == SF_OK) status = write_files(&a);
   if (options->saif) sf_writer_abort(&a.saif_file);
   if (options->vcd) sf_writer_abort(&a.vcd_file);
-  sf_dut_close(a.dut);
+  if (a.flow) a.flow->close(a.flow);
   sf_wave_file_guard(NULL, NULL);
   unlink(a.path);
   sf_wave_free(&a.wave);
   free(a.vcd.shown);
-  free(a.in.sample), free(a.in.f), free(a.in.ray);
   return status;
 }
 
@@ -272,4 +190,43 @@ sf_status sf_activity_window(const char *text, sf_activity_options *o)
     return sf_ok();
   return sf_fail(SF_E_USAGE, "--window %s: expected FIRST,LAST: two cycles of the stream, the first not after the last",
                  text);
+}
+
+/* ---- report ---- */
+
+cJSON *sf_activity_json(const sf_activity_options *o, const sf_activity_report *r)
+{
+  cJSON *json = cJSON_CreateObject();
+  if (o->saif) sf_json_add_text(json, "saif", o->saif);
+  if (o->vcd) sf_json_add_text(json, "vcd", o->vcd);
+  cJSON_AddStringToObject(json, "block", o->block == SF_ACTIVITY_RAYS ? "sf_ray_top" : "sf_top");
+  sf_json_add_u64(json, "rays", r->rays);
+  sf_json_add_u64(json, "samples", r->samples);
+  sf_json_add_u64(json, "differences", 0);
+  if (o->block == SF_ACTIVITY_RAYS) {
+    sf_json_add_u64(json, "lookups", r->lookups);
+    sf_json_add_u64(json, "misses", r->misses);
+  }
+  sf_json_add_u64(json, "cycles", r->cycles);
+  sf_json_add_u64(json, "bits", r->bits);
+  sf_json_add_u64(json, "quiet_bits", r->quiet);
+  sf_json_add_u64(json, "toggles", r->toggles);
+  sf_json_add_u64(json, "clock_toggles", r->clock_toggles);
+  cJSON_AddNumberToObject(json, "clock_mhz", o->clock_mhz);
+  return json;
+}
+
+void sf_activity_print(FILE *out, const sf_activity_options *o, const sf_activity_report *r)
+{
+  fprintf(out, "%" PRIu64 " ray%s, %" PRIu64 " sample%s: 0 differences\n", r->rays, sf_plural(r->rays), r->samples,
+          sf_plural(r->samples));
+  if (o->block == SF_ACTIVITY_RAYS)
+    fprintf(out, "%" PRIu64 " look-ups of the field, %" PRIu64 " lines from memory\n", r->lookups, r->misses);
+  fprintf(out,
+          "%" PRIu64 " cycles, %" PRIu64 " bits of nets, %" PRIu64 " of them never toggle; %.1f toggles per cycle\n",
+          r->cycles, r->bits, r->quiet, r->cycles ? (double)r->toggles / (double)r->cycles : 0);
+  for (int i = 0; i < 2; i++) {
+    const char *path = i ? o->vcd : o->saif;
+    if (path) fprintf(out, "%s: at %g MHz\n", path, o->clock_mhz);
+  }
 }

@@ -73,7 +73,7 @@ typedef struct run {
   const sf_memory *memory;
   const sf_ray_request *request;
   fx_pixel *pixel;
-  int n, sent, at, received;
+  int n, sent, at;
   uint64_t progress; /* cycle of the last beat */
   bool waits;        /* a pixel was shown and not taken */
   uint64_t waiting[6];
@@ -84,7 +84,7 @@ static void offer(run *r)
   sf_pins_in *in = &r->dut->in;
   if (in->ray_valid || r->sent == r->n || sf_dut_stalls(r->dut, STREAM_RAYS)) return;
   const sf_ray_request *request = &r->request[r->sent];
-  if (request->stops && r->at == request->n && r->received <= r->sent) return; /* its pixel comes first */
+  if (request->stops && r->at == request->n && r->dut->received <= r->sent) return; /* its pixel comes first */
   in->ray_valid = true;
   const sf_ray_beat beat = sf_ray_beat_of(request, r->at);
   memcpy(in->ray_data, beat.data, sizeof in->ray_data);
@@ -120,9 +120,9 @@ static sf_status accept_pixel(run *r)
   const sf_pins_out *out = &r->dut->out;
   SF_TRY(check_stable(r));
   if (!r->dut->in.pixel_ready || !out->pixel_valid) return sf_ok();
-  if (r->received == r->sent + (r->at > 0))
+  if (r->dut->received == r->sent + (r->at > 0))
     return sf_fail(SF_E_DIFFERENCE, "accelerator: pixel without a ray at cycle %" PRIu64, r->dut->cycle);
-  r->pixel[r->received++] = sf_ray_pixel_of(out->pixel_data);
+  r->pixel[r->dut->received++] = sf_ray_pixel_of(out->pixel_data);
   r->progress = r->dut->cycle;
   return sf_ok();
 }
@@ -134,7 +134,7 @@ static sf_status trouble(run *r, const char *what)
   dut->in.ray_valid = dut->in.pixel_ready = false;
   const char *error = sf_dut_error_text(dut, &sf_dut_error), *of_rays = sf_dut_error_text(dut, &ray_error);
   return sf_fail(SF_E_DIFFERENCE, "accelerator: %s at cycle %" PRIu64 ", %d of %d rays in, %d pixels out: %s; rays: %s",
-                 what, cycle, r->sent, r->n, r->received, error, of_rays);
+                 what, cycle, r->sent, r->n, r->dut->received, error, of_rays);
 }
 
 static sf_status step(run *r)
@@ -167,13 +167,21 @@ static sf_status quiet(sf_dut *dut, int cycles)
   return sf_fail(SF_E_DIFFERENCE, "accelerator: %s without a ray at cycle %" PRIu64, what, dut->cycle);
 }
 
-sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel)
+sf_status sf_ray_dut_stream(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel)
 {
   sf_dut *dut = rays->dut;
-  sf_pins_dump(dut->pins);
-  sf_status status = quiet(dut, 1);
+  sf_status status = sf_ok();
   run r = {.dut = dut, .memory = &rays->memory, .request = request, .pixel = pixel, .n = n, .progress = dut->cycle};
-  while ((r.received < n || r.sent < n) && status.code == SF_OK) status = step(&r);
+  dut->received = 0;
+  while ((dut->received < n || r.sent < n) && status.code == SF_OK) status = step(&r);
   dut->in.ray_valid = dut->in.pixel_ready = false;
-  return status.code == SF_OK ? quiet(dut, QUIET) : status;
+  return status;
+}
+
+sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel)
+{
+  sf_pins_dump(rays->dut->pins);
+  SF_TRY(quiet(rays->dut, 1));
+  SF_TRY(sf_ray_dut_stream(rays, request, n, pixel));
+  return quiet(rays->dut, QUIET);
 }

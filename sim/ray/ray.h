@@ -43,6 +43,9 @@ sf_status sf_ray_dut_open(sf_ray_dut **rays, const fx_scene *scene, const sf_dut
 sf_status sf_ray_dut_load(sf_ray_dut *rays);
 /* Streams n rays in and n pixels out. A hang is an error that names the cycle. */
 sf_status sf_ray_dut_run(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
+/* The same without the cycles around the run in which nothing may come out, and without a waveform. dut->received
+ * counts the pixels. */
+sf_status sf_ray_dut_stream(sf_ray_dut *rays, const sf_ray_request *request, int n, fx_pixel *pixel);
 void sf_ray_dut_close(sf_ray_dut *rays);
 /* The field's cache as the block reports it: a build may have another one than the package's. */
 fx_cache_shape sf_ray_dut_cache(sf_ray_dut *rays);

@@ -205,6 +205,8 @@ for bad in "--junit out" "--checkpoint out" "--limit-samples 1" "--jobs 1" "--bl
   usage "${bad% *}" sf_cosim s.snn d --saif out $bad
 done
 usage --clock sf_cosim s.snn d --clock 100
+usage --top sf_cosim s.snn d --top sf_ray_top
+usage --top sf_cosim s.snn d --saif out --top sf_ray_top --dut a.sv
 usage --dut-top sf_cosim s.snn d --dut-top my_top
 for length in 63 1942; do usage "at most 63 characters" sf_cosim s.snn d --plusarg "+$(printf "%${length}s" '' | tr ' ' x)"; done
 usage SECONDS sf_summary d x
