@@ -90,7 +90,7 @@ module stream_in_packets (
 
   // Where the unit's own state stands to it.
   wire [5:0] begun_dir_beats = first_packet_q ? n_dir[7:2] + {5'd0, |n_dir[1:0]} : 6'd0;
-  wire [5:0] begun_place = peek_beat_q + (peek_in_dir_q ? 6'd0 : begun_dir_beats);
+  wire [5:0] begun_place = peek_beat_q + (begun_dir_beats & {6{~peek_in_dir_q}});
   always @* begin
     assume (n_feature == 6'd0 ? n_dir >= 8'd1 && n_dir <= 8'd160 : n_feature <= 6'd32 && n_dir <= 8'd160);
     assume (!done_i || valid);

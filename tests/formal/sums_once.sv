@@ -120,7 +120,7 @@ module sums_once (
   wire begun2 = bank[16];
   wire [3:0] place1 = bank[15:12];
   wire [3:0] place2 = bank[11:8];
-  wire hit1 = peek_moved_q ? peek_row[0] : peek_row2_q[0];
+  wire hit1 = (peek_moved_q & peek_row[0]) | (~peek_moved_q & peek_row2_q[0]);
   wire [3:0] low_place = {1'b0, step[2:1], watched[0]};
   wire [3:0] high_place = {1'b1, step[2:1], watched[0]};
   wire [3:0] low2 = op2 && place2 == low_place ? (begun2 ? bank[3:0] : 4'd0) + {3'd0, peek_row2_q[0]} : bank[3:0];
