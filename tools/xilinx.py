@@ -25,7 +25,8 @@ def script_of(sources, top):
 
 
 def plain(name):
-    return name.rsplit("\\", 1)[-1]
+    """A module's name. Yosys calls one with parameters $paramod, name, parameters, or $paramod$hash, name; backslashes between."""
+    return name.split("\\")[1] if name.startswith("$paramod") else name.lstrip("\\")
 
 
 def add(into, counts, times=1):
