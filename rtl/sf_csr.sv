@@ -390,9 +390,7 @@ module sf_csr #(
   assign d1_theta_o = theta_q[sf_op_pkg::D1];
   assign c1_theta_o = theta_q[sf_op_pkg::C1];
   assign c2_theta_o = theta_q[sf_op_pkg::C2];
-  assign c1_bias_o = bias_q[10:0];
-  assign c2_bias_o = bias_q[11];
-  assign c3_bias_o = bias_q[12];
+  assign {c3_bias_o, c2_bias_o, c1_bias_o} = bias_q[12:0];
   wire unused_ok = &{1'b0, awaddr_i[1:0], araddr_i[1:0], table_offset[12:7], table_offset[3:0], rtable_offset[12:7],
                      rtable_offset[3:0]};
 endmodule
