@@ -5,30 +5,7 @@
 // in sf_planes five samples of 12 blocks at most are on their way, and 64 places are there.
 `default_nettype none
 
-module sf_fifo #(
-    parameter integer WIDTH = 8,
-    parameter integer LOG2_DEPTH = 4
-) (
-    input  wire             clk_i,
-    input  wire             rst_ni,
-    input  wire             clear_i,
-    input  wire             push_i,
-    input  wire [WIDTH-1:0] data_i,
-    output wire             valid_o,
-    input  wire             pop_i,
-    output wire [WIDTH-1:0] data_o,
-    output wire [      6:0] count_o
-);
-  (* anyseq *) wire [WIDTH-1:0] word;
-  reg [6:0] count_q = 7'd0;
-  always @(posedge clk_i) begin
-    if (!rst_ni || clear_i) count_q <= 7'd0;
-    else count_q <= count_q + {6'd0, push_i} - {6'd0, pop_i};
-  end
-  assign valid_o = count_q != 7'd0;
-  assign data_o = word;
-  assign count_o = count_q;
-endmodule
+`include "tests/formal/counting_fifo.svh"
 
 module basis_once (
     input wire         clk_i,
