@@ -55,6 +55,9 @@ sed -i 's/CLKOP_DIV       (12)/CLKOP_DIV       (2)/; s/CLKOP_CPHASE    (5)/CLKOP
 describe 25k 350
 refused 1 "a small board: [0-9.]* MHz after routing, its clock has 350 MHz: no bitstream was made" small
 [ ! -e "$work/board/small/small.bit" ] || fail "there is a bitstream that is too slow"
+[ "$(grep -c "small: seed [123]: [0-9.]* MHz after routing, its clock has 350 MHz" "$work/said.log")" -eq 3 ] || fail "not three placements"
+board small --seed 5 || true
+[ "$(grep -o "place and route, seed [0-9]*" "$work/said.log" | sort -u)" = "place and route, seed 5" ] || fail "not the placement of seed 5 alone"
 refused 2 "there is no board nothing: .*board.json: No such file" nothing
 
 # A board for Vivado: what it needs. Three flip-flops and a multiplier twice, in a module that is there twice.
