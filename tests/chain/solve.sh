@@ -149,6 +149,7 @@ done
 refuses "blurred: 8 of 8 pictures are blurred or blank" blurred
 refuses "err: neither a folder of pictures nor a video" err
 search=$work/none refuses "colmap is not installed: apt-get install colmap" eight
+search=$work/bin refuses "exiftran is not installed: apt-get install exiftran" sizes
 search=$work/bin refuses "ffprobe is not installed: apt-get install ffmpeg" walk.avi
 search=
 refuses "none shows the scene from two places. Either the camera stood still" still --features 200

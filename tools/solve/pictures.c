@@ -220,6 +220,7 @@ static sf_status copy_all(solve_job *job)
   sf_status status = solve_list(&list, job->options->input, NULL, 0);
   for (int i = 0; i < list.count && status.code == SF_OK; i++) {
     if (sf_cli_interrupted()) status = sf_fail(SF_E_STOPPED, "interrupted");
+    if (status.code == SF_OK && solve_is_jpeg(list.at[i].name)) status = solve_installed("exiftran", "exiftran");
     if (status.code == SF_OK) status = solve_path(source, job->options->input, list.at[i].name);
     if (status.code == SF_OK) status = solve_path(target, job->images, list.at[i].name);
     if (status.code == SF_OK) status = solve_copy(source, target);
@@ -239,7 +240,7 @@ static sf_status choose(solve_job *job)
                      list.count, sf_plural((uint64_t)list.count), SF_SOLVE_LEAST);
   if (status.code == SF_OK) status = solve_measure(&list, job->images, &job->progress);
   if (status.code == SF_OK) status = leave_out_blurred(job, &list);
-  if (status.code == SF_OK) status = turn_upright(job, &list);
+  if (status.code == SF_OK && is_folder(job->options->input)) status = turn_upright(job, &list);
   if (status.code == SF_OK) status = make_smaller(job, &list);
   if (status.code == SF_OK) status = write_lists(job, &list);
   free(list.at);
