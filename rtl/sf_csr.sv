@@ -79,7 +79,7 @@ module sf_csr #(
 
   reg running_q, counters_busy_q;
   reg [10:0] error_q;
-  reg [1:0] irq_enable_q, irq_pending_q;
+  reg [1:0] irq_enable_q, irq_pending_q, stream_error_q;  // the last: value, packet
   reg [1:0] mode_q;
   reg [3:0] steps_q;
   reg [16:0] exp_mul_q, sigmoid_mul_q;
@@ -211,9 +211,8 @@ module sf_csr #(
   assign snapshot_o = snapshot_q;
   assign running_o = running_q;
 
-  // A soft reset drops a beat that comes beside it.
-  wire [10:0] error_set = {error_value_i && !soft_reset_q, error_packet_i && !soft_reset_q, bad_weight, bad_address, bad_busy,
-                           start_check ? bad_q : 6'd0};
+  // A soft reset drops a beat that comes beside it, and one a cycle before.
+  wire [10:0] error_set = {stream_error_q & {2{!soft_reset_q}}, bad_weight, bad_address, bad_busy, start_check ? bad_q : 6'd0};
   wire [10:0] error_keep = soft_reset_q ? 11'd0 : word_write && to_error_q ? error_q & ~wdata_q[10:0] : error_q;
   wire [1:0] pending_keep = word_write && to_irq_pending_q ? irq_pending_q & ~wdata_q[1:0] : irq_pending_q;
 
@@ -222,6 +221,7 @@ module sf_csr #(
       {taken_q, done_q} <= 2'd0;
       running_q <= 1'b0;
       counters_busy_q <= 1'b0;
+      stream_error_q <= 2'd0;
       error_q <= 11'd0;
       irq_enable_q <= 2'd0;
       irq_pending_q <= 2'd0;
@@ -233,6 +233,7 @@ module sf_csr #(
       if (start_check) running_q <= !bad_config;
       else if (soft_reset_q) running_q <= 1'b0;
       counters_busy_q <= counters_busy_i;
+      stream_error_q <= {error_value_i, error_packet_i} & {2{!soft_reset_q}};
       error_q <= error_keep | error_set;
       if (word_write && to_irq_enable_q) irq_enable_q <= wdata_q[1:0];
       irq_pending_q <= pending_keep | {counters_busy_q && !counters_busy_i, |error_set};

@@ -189,7 +189,7 @@ module sf_values #(
     end
   end
 
-  // ---- 0: the row's address; 1: the row and its value; 2: registers; 3: the product goes into a sum
+  // ---- 0: the row's address; 1: the row and its value; 2: registers; 3: the product goes into a sum; 4: the sum is stored
   wire multiplies = go && (job != FEATURES || is_row);
   wire [3:0] load_slot = !load_c1_i ? DENSITY : decodes_i ? BASE : {1'b0, load_step_i};
   wire [3:0] slot = job == FEATURES ? DENSITY : job == CONSTANTS ? BASE : {1'b0, step_q};
@@ -215,9 +215,9 @@ module sf_values #(
       .row_o  (row)
   );
 
-  reg op1_q, op2_q, op3_q, zero1_q, zero2_q, zero3_q;
+  reg op1_q, op2_q, op3_q, op4_q, zero1_q, zero2_q, zero3_q;
   reg signed [11:0] value1_q, value2_q;
-  reg [SLOT_BITS-1:0] from1_q, from2_q, from3_q, to1_q, to2_q, to3_q;
+  reg [SLOT_BITS-1:0] from1_q, from2_q, from3_q, to1_q, to2_q, to3_q, to4_q;
   reg [8*MACS-1:0] row2_q;
   reg [2:0] load_q;
   reg [2:0] events_q;  // D1 row, C1 row, C1 biases
@@ -225,13 +225,14 @@ module sf_values #(
   reg [2:0] event_step_q;
   reg [1:0] busy_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
-    if (!rst_ni) {op1_q, op2_q, op3_q, load_q, events_q, products_q, ray_q, busy_q} <= 13'd0;
-    else if (clear_i) {op1_q, op2_q, op3_q, load_q, events_q, products_q, ray_q, busy_q} <= 13'd0;
+    if (!rst_ni) {op1_q, op2_q, op3_q, op4_q, load_q, events_q, products_q, ray_q, busy_q} <= 14'd0;
+    else if (clear_i) {op1_q, op2_q, op3_q, op4_q, load_q, events_q, products_q, ray_q, busy_q} <= 14'd0;
     else begin
       op1_q <= multiplies;
       load_q <= {load_q[1:0], load_i};
       op2_q <= op1_q;
       op3_q <= op2_q;
+      op4_q <= op3_q;
       events_q <= {3{go && is_row && first_part && step_q == 3'd0}}
           & {job == FEATURES, job != FEATURES && !at_bias, at_bias};
       products_q <= go && is_row && first_part && job != FEATURES && !at_bias;
@@ -247,7 +248,7 @@ module sf_values #(
     from1_q <= SLOT_BITS'(32'(from) * PARTS + 32'(part));
     {from3_q, from2_q} <= {from2_q, from1_q};
     to1_q <= SLOT_BITS'(32'(slot) * PARTS + 32'(part_q));
-    {to3_q, to2_q} <= {to2_q, to1_q};
+    {to4_q, to3_q, to2_q} <= {to3_q, to2_q, to1_q};
     zero1_q <= zero;
     {zero3_q, zero2_q} <= {zero2_q, zero1_q};
     if (op1_q) row2_q <= row;
@@ -258,7 +259,10 @@ module sf_values #(
   // verilator tracing_on
   reg [20*MACS-1:0] product3_q;
   reg [24*MACS-1:0] current_q;
-  wire [SUM_BITS*MACS-1:0] from_row = sum_q[from3_q];
+  // The sum before may not be stored yet: memory, adder and memory again would be too much for one cycle.
+  reg [SUM_BITS*MACS-1:0] sum4_q;
+  reg newest3_q;
+  wire [SUM_BITS*MACS-1:0] from_row = newest3_q ? sum4_q : sum_q[from3_q];
   reg [SUM_BITS*MACS-1:0] next;  // names within an operation, not registers
   reg signed [SUM_BITS-1:0] old;
   always_ff @(posedge clk_i) begin
@@ -270,8 +274,10 @@ module sf_values #(
         old = zero3_q ? {SUM_BITS{1'b0}} : from_row[SUM_BITS*l+:SUM_BITS];
         next[SUM_BITS*l+:SUM_BITS] = old + SUM_BITS'($signed(product3_q[20*l+:20]));
       end
-      sum_q[to3_q] <= next;
+      sum4_q <= next;
     end
+    newest3_q <= op3_q && to3_q == from2_q;
+    if (op4_q) sum_q[to4_q] <= sum4_q;
     if (load_q[2]) begin
       for (int l = 0; l < MACS; l++) begin
         old = from_row[SUM_BITS*l+:SUM_BITS];
