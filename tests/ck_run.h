@@ -1,8 +1,9 @@
 /* Tests that register themselves: a program's tests are those that its source defines, and its main is in ck_main.c.
  *   TEST(name) { ... }           runs once
  *   LOOP_TEST(name, n) { ... }   runs n times, with _i from 0 to n - 1
- * Each test has a process of its own, so that a crash ends one test. Beside them the two ways in which a status is
- * judged. */
+ *   LONG_TEST(name) { ... }      runs once, but not under a sanitizer: it judges what a long run comes to, and shorter
+ * tests beside it go through the same code Each test has a process of its own, so that a crash ends one test. Beside
+ * them the two ways in which a status is judged. */
 #ifndef SF_TESTS_CK_RUN_H
 #define SF_TESTS_CK_RUN_H
 #include "base/status.h"
@@ -29,6 +30,13 @@ int ck_main(void);                    /* runs the suite; main's result */
 /* A variable that TYPE_free frees where its scope ends: OWNED(fx_scene) scene = ...; */
 #define OWNED(type) __attribute__((cleanup(type##_free))) type
 
+/* How much of a thing: under a sanitizer, which takes ten times as long, as much as goes through the same code. */
+#ifdef __SANITIZE_ADDRESS__
+#define CK_AMOUNT(usual, sanitized) (sanitized)
+#else
+#define CK_AMOUNT(usual, sanitized) (usual)
+#endif
+
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 
 /* A test that the statement `add` registers, before main. */
@@ -47,6 +55,7 @@ int ck_main(void);                    /* runs the suite; main's result */
 
 #define LOOP_TEST(name, n) REGISTERED_TEST(name, tcase_add_loop_test(ck_case(), name, 0, n))
 #define TEST(name) LOOP_TEST(name, 1)
+#define LONG_TEST(name) LOOP_TEST(name, CK_AMOUNT(1, 0))
 
 /* Has to succeed; otherwise the test fails with the call's message. */
 #define ck_ok(call)                                                                                                    \

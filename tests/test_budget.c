@@ -5,7 +5,7 @@
 #include "tests/tensorf_fixture.h"
 #include <math.h>
 
-enum { SHORT = 200000 };
+enum { SHORT = CK_AMOUNT(200000, 50000) };
 
 /* Sums of integers: their bound is zero. */
 static bool exact(int id)
@@ -170,6 +170,25 @@ static void has_the_blocks(const sf_picture_budget *b, bool planes)
   for (int l = 0; l < SF_LAYERS; l++) ck_assert_int_eq(b->current[l].currents > 0, !planes || l >= FX_C1);
 }
 
+static void currents_within_their_bounds(const sf_picture_budget *b, bool planes)
+{
+  for (int l = planes ? FX_C1 : FX_D1; l < SF_LAYERS; l++) {
+    ck_assert_uint_gt(b->current[l].currents, 1000);
+    ck_assert_msg(b->current[l].ratio <= 1 && b->current[l].ratio > 1.0 / 16, "layer %d: %g of its bound", l,
+                  b->current[l].ratio);
+    ck_assert_double_lt(b->current[l].rms, b->current[l].bound);
+  }
+}
+
+/* What the weight test leaves out: samples, but nearly no light. */
+static void weight_test_leaves_out_samples(const sf_picture_budget *b)
+{
+  const sf_exact_row *decoded = &b->row[1 + SF_EXACT_DECODE];
+  ck_assert_uint_gt(decoded->sample_flips, 20);
+  ck_assert_uint_eq(decoded->points, b->samples + decoded->sample_flips);
+  ck_assert_double_gt(decoded->psnr, 55);
+}
+
 /* With no block replaced: the core, bit for bit (checked inside) and without a flip. With all replaced: the float
  * renderer, but for its own rounding in 24 bits (a neuron at its threshold may flip) and that of the grid's scale. */
 LOOP_TEST(picture_from_fixed_to_float, CASES)
@@ -183,6 +202,8 @@ LOOP_TEST(picture_from_fixed_to_float, CASES)
   ck_assert_uint_eq(none->points, b.samples);
   has_the_blocks(&b, planes);
   flips_where_it_can(&b, planes);
+  currents_within_their_bounds(&b, planes);
+  if (_i == OBJECT) weight_test_leaves_out_samples(&b);
   for (int l = planes ? FX_C1 : FX_D1; l <= FX_C2; l++) {
     if (l == FX_D2) continue;
     ck_assert_uint_eq(none->flips[l], 0);
@@ -193,27 +214,6 @@ LOOP_TEST(picture_from_fixed_to_float, CASES)
          all->psnr_truth);
   ck_assert_double_gt(all->psnr_truth, 70);
   ck_assert_double_gt(all->psnr_truth, none->psnr_truth + 10);
-}
-
-/* What the weight test leaves out: samples, but nearly no light. */
-TEST(weight_test_leaves_out_samples)
-{
-  const sf_picture_budget b = make_picture(OBJECT);
-  const sf_exact_row *decoded = &b.row[1 + SF_EXACT_DECODE];
-  ck_assert_uint_gt(decoded->sample_flips, 20);
-  ck_assert_uint_eq(decoded->points, b.samples + decoded->sample_flips);
-  ck_assert_double_gt(decoded->psnr, 55);
-}
-
-LOOP_TEST(currents_within_their_bounds, CASES)
-{
-  const sf_picture_budget b = make_picture(_i);
-  for (int l = _i < GRIDS ? FX_D1 : FX_C1; l < SF_LAYERS; l++) {
-    ck_assert_uint_gt(b.current[l].currents, 1000);
-    ck_assert_msg(b.current[l].ratio <= 1 && b.current[l].ratio > 1.0 / 16, "layer %d: %g of its bound", l,
-                  b.current[l].ratio);
-    ck_assert_double_lt(b.current[l].rms, b.current[l].bound);
-  }
 }
 
 int ck_timeout = 300; /* a picture of 150 inputs takes seconds, and more under a sanitizer */

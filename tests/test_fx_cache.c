@@ -70,7 +70,7 @@ LOOP_TEST(look_ups_equal_a_list, SETS)
   enum { LINES = 4000 };
   const fx_kernels *kernels = fx_kernels_select(instruction_sets[_i]);
   static uint32_t line[LINES];
-  for (uint64_t seed = 1; kernels && seed <= 40; seed++) {
+  for (uint64_t seed = 1; kernels && seed <= CK_AMOUNT(40, 8); seed++) {
     const fx_cache_shape shape = random_shape(seed);
     oracle o = oracle_of(&shape);
     fx_cache cache;
@@ -340,7 +340,7 @@ static void vector_list(const fx_scene *scene, const fx_cache_shape *shape, cons
   fx_core_close(core);
 }
 
-LOOP_TEST(lists_of_rays, 8)
+LOOP_TEST(lists_of_rays, CK_AMOUNT(8, 3))
 {
   const uint64_t seed = 1 + (uint64_t)_i;
   OWNED(fx_scene) scene = cache_scene(seed);
@@ -354,7 +354,7 @@ LOOP_TEST(lists_of_rays, 8)
   free(l);
 }
 
-LOOP_TEST(lists_of_rays_through_planes, 3)
+LOOP_TEST(lists_of_rays_through_planes, CK_AMOUNT(3, 1))
 {
   OWNED(fx_scene) scene = tensorf_scene();
   const fx_cache_shape shape = random_shape((uint64_t)_i + 50);

@@ -257,7 +257,7 @@ static double learned(float contrast, double rate)
 }
 
 /* A search whose rate decides finds the same steps for both, and other ones at another rate. */
-TEST(two_scenes_at_one_beta)
+LONG_TEST(two_scenes_at_one_beta)
 {
   for (int i = 0; i < 2; i++) {
     const double rate = i ? 3 : 1.0 / 3, easy = learned(0.4f, rate), hard = learned(1, rate);

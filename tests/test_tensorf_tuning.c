@@ -9,7 +9,7 @@
 #include "train_fixture.h"
 #include <omp.h>
 
-enum { BITS = 4, GRID_BITS = 5, LEAK_BITS = 6, TUNING = 80 };
+enum { BITS = 4, GRID_BITS = 5, LEAK_BITS = 6, TUNING = CK_AMOUNT(80, 24) };
 
 static sf_model base, narrow; /* trained for a moment; scales settled: weights alone, and every width */
 
@@ -238,7 +238,7 @@ static double psnr(const char *path, sf_quant_widths widths)
 }
 
 /* In integers, against the picture. */
-TEST(tuned_loses_less)
+LONG_TEST(tuned_loses_less)
 {
   static const sf_quant_widths widths[2] = {{.weight_bits = 3}, {.weight_bits = 8, .grid_bits = 3}};
   for (int i = 0; i < 2; i++) {

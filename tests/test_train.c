@@ -208,8 +208,8 @@ TEST(fixed_steps_freeze_the_budget)
     ck_bad(sf_trainer_create(&a, &data, &o, NULL), SF_E_RANGE, "fixed steps", "6");
 }
 
-/* Firing costs: fewer rows are read than by the same run without, and a resumed run has the same bits. */
-TEST(charged_neurons_fire_less)
+/* Firing costs: fewer rows are read than by the same run without. */
+LONG_TEST(charged_neurons_fire_less)
 {
   double reads[2], error[2];
   for (int on = 0; on < 2; on++) {
@@ -228,6 +228,10 @@ TEST(charged_neurons_fire_less)
   }
   ck_assert_double_lt(reads[1], 0.95 * reads[0]);
   ck_assert_double_gt(error[1], 0.9 * error[0]);
+}
+
+TEST(a_charged_run_resumes_bit_identically)
+{
   sf_train_options o = small_run();
   o.fixed_steps = 2;
   o.charge = 0.5;
@@ -286,7 +290,7 @@ TEST(the_last_iterations_are_averaged)
   sf_trainer_free(resumed);
 }
 
-TEST(loss_falls_and_both_twins_learn)
+LONG_TEST(loss_falls_and_both_twins_learn)
 {
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_run();

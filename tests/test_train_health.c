@@ -56,7 +56,7 @@ static sf_train_options long_run(void)
   return o;
 }
 
-LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, COUNT(faults))
+LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, CK_AMOUNT(COUNT(faults), 1))
 {
   const struct fault *f = &faults[_i];
   const sf_train_options o = long_run();
