@@ -101,7 +101,7 @@ TEST(widths)
   const int64_t packed = report.packed_bytes;
   assert_widths_hold(&whole, &report.widths);
   for (int i = 0; i < 4; i++)
-    for (int bits = field[i].low; bits <= field[i].high; bits++) {
+    for (int bits = field[i].low; bits <= field[i].high; bits += CK_AMOUNT(1, field[i].high - field[i].low)) {
       sf_quant_options options = plain;
       *(int *)((char *)&options.widths + field[i].offset) = bits;
       ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
@@ -142,7 +142,7 @@ TEST(narrow_inputs_never_clip)
   quantise(&m, &scene, &report);
   ck_assert_int_gt(worst_h(&scene.net.layer[FX_D2]), 1023);
   fx_scene_free(&scene);
-  for (int bits = 8; bits < SF_INPUT_BITS; bits++) {
+  for (int bits = 8; bits < SF_INPUT_BITS; bits += CK_AMOUNT(1, 2)) {
     const sf_quant_options options = {.seed = 1, .widths.feature_bits = bits};
     ck_ok(sf_quantise_report(&scene, &m, "model", &options, &report));
     assert_widths_hold(&scene, &report.widths);
@@ -154,7 +154,7 @@ TEST(narrow_inputs_never_clip)
 TEST(extreme_models)
 {
   static const float scales[] = {0, 1e-42f, 1e-20f, 1e-4f, 1};
-  for (int i = 0; i < 5; i++)
+  for (int i = 0; i < 5; i += CK_AMOUNT(1, 2))
     for (int part = 0; part < SF_P_LEAK; part++) {
       sf_model m = make_model(16, 3, SF_HYBRID);
       fx_scene scene;

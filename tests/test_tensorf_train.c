@@ -203,7 +203,7 @@ TEST(resume_is_the_same_run)
 }
 
 /* Biases far below the threshold: neither scaled nor new weights would fire again. */
-TEST(a_layer_that_its_biases_silence_comes_back)
+LONG_TEST(a_layer_that_its_biases_silence_comes_back)
 {
   sf_train_options o = small_vm(SF_NET_SNN);
   o.stage1 = 400, o.stage2 = 0, o.lr_net = 3e-4;
@@ -218,7 +218,7 @@ TEST(a_layer_that_its_biases_silence_comes_back)
 }
 
 /* Twin and spiking net learn: the error of 150 iterations on a plain scene falls well below that of a white picture. */
-TEST(it_learns)
+LONG_TEST(it_learns)
 {
   for (int net = SF_NET_SNN; net <= SF_NET_ANN; net++) {
     sf_train_options o = small_vm(net);
