@@ -16,6 +16,9 @@ asic() { # OPTIONS...
 result() { python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); print(eval(sys.argv[2]))' "$work/build/asic/$1/energy.json" "$2"; }
 plain=(--liberty "$here/tiny.lib" --node 100 --gating off)
 
+# What the field's cache is asked for in a scene.
+[ "$("$build/asic/lookups" "$work/scene.snn" "$work/data" 7 2>"$work/said.log" | grep -Ec '^[01] [0-9a-f]{8} [0-9a-f]{8}$')" -eq 7 ] || fail "look-ups of a scene"
+
 # The neuron unit and an adder in inverters, NANDs and registers: computes what the RTL did, and costs something plausible.
 if asic "${plain[@]}" --blocks "neuron add8"; then
   [ "$(result tiny 'r["blocks"]["neuron"]["compared"] > 0.99')" = True ] || fail "the neuron's outputs are not compared"

@@ -84,7 +84,8 @@ static sf_status run(job *j, const char *scene, const char *data)
 {
   const sf_dataset_options how = {.limit = 1};
   SF_TRY(fx_scene_load(&j->scene, scene));
-  SF_TRY(fx_scene_need_grid(&j->scene, scene, "a field of another kind has other look-ups"));
+  if (j->scene.backbone != FX_INGP)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: a scene without a hash grid: planes have other look-ups", scene);
   SF_TRY(sf_fx_dataset_load(&j->data, &j->scene, scene, data, "test", &how));
   if (j->data.count == 0) return sf_fail(SF_E_USAGE, "%s: no test view", data);
   SF_TRY(put_tiles(j));
