@@ -30,6 +30,27 @@ if asic "${plain[@]}" --blocks "neuron add8"; then
 else
   fail "a small library: $(tail -n 1 "$work/said.log")"
 fi
+# Every block stands where its operands are looked for: its events, its ports of the RTL.
+"$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 4 --seed 1 --vcd "$work/recording.vcd" --window 0,9 --quiet >/dev/null || fail "sf_cosim --vcd"
+python3 - "$root" "$work/recording.vcd" >"$work/said.log" 2>&1 <<'PYTHON' || fail "blocks in the recording: $(tail -n 1 "$work/said.log")"
+import re, sys
+root, recording = sys.argv[1:]
+sys.path.insert(0, root + "/tools")
+from asic import pieces, record
+pieces = [piece for piece in pieces.all_pieces(root) if piece.scope]
+assert len(pieces) >= 14, len(pieces)
+wanted = {name for piece in pieces for name in piece.events}
+for piece in pieces:
+    if isinstance(piece, type(pieces[-1])):
+        wanted |= set(piece.wanted(None))
+        continue
+    with open(f"{root}/rtl/{piece.module}.sv", encoding="utf-8") as source:
+        header = source.read().split(");", 1)[0]
+    ports = re.findall(r"^ +(?:input|output) .*?(\w+),?(?: *//.*)?$", header, re.MULTILINE)
+    assert len(ports) > 2, piece.module
+    wanted |= {piece.place(name) for name in ports if not name.startswith("tap_")}
+record.read_vcd(recording, wanted, "sf_top.clk_i", 1)
+PYTHON
 cp "$work/build/asic/tiny/neuron.json" "$work/first.json"
 asic "${plain[@]}" --blocks "neuron add8" && grep -q "neuron: kept" "$work/said.log" || fail "a finished block is not kept"
 sed 's/"11, 13"/"111, 113"/' "$here/tiny.lib" >"$work/dear.lib"

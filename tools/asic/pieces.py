@@ -7,7 +7,7 @@ from asic.record import Record, number, to_bits
 
 ENGINE = "sf_top.u_engine"
 CORE = ENGINE + ".u_core"
-VALUES, SUMS, NEURON, READOUT = CORE + ".u_values", CORE + ".u_fed.u_c2", CORE + ".u_neurons", ENGINE + ".u_readout"
+VALUES, SUMS, NEURON, READOUT = CORE + ".u_values", CORE + ".u_fed.u_c2.u_sums", CORE + ".u_neurons", ENGINE + ".u_readout"
 
 
 class Piece:
