@@ -33,6 +33,19 @@ grep -q "in ecp5: the netlist is kept" "$work/said.log" || fail "a finished netl
 sed -i 's/ LUT4 #/ NOT_A_CELL #/' "$work/netlist/ecp5/sf_plif/netlist.v"
 ! check --cells ecp5 --plant 0 --samples 1 || fail "a netlist of an unknown cell passed"
 
+# The shell of the whole accelerator: the source names two defaults of TAP, the netlist has one.
+python3 - "$work" <<'PYTHON' || fail "the shell of sf_top"
+import os, sys
+sys.path.insert(0, "tools")
+from netlist import shell
+os.symlink(os.path.abspath("rtl"), os.path.join(sys.argv[1], "rtl"))
+for parameters, tap in (({"LANES": "32"}, "1"), ({"LANES": "32", "TAP": "0"}, "0")):
+    shell.write_shell("sf_top", parameters, ["clk_i", "tap_valid_o"], sys.argv[1])
+    with open(os.path.join(sys.argv[1], "shell.sv"), encoding="utf-8") as file:
+        said = [line.strip() for line in file if "another TAP" in line]
+    assert [line.split('"')[0] for line in said] == [f"`SF_REFUSE(TAP != ({tap}), "], said
+PYTHON
+
 # What is wrong is named.
 refused() { # TEXT OPTIONS...
   local text=$1

@@ -80,7 +80,7 @@ def simulate(kit, simulator, sources, include, build, lanes, with_tap):
     lines = (done.stdout + done.stderr).splitlines()
     said = next((line for line in lines if re.match(r"PASS|DIFFERENCE|FAIL", line)), "")
     if not said:
-        wrong = [line for line in lines if re.search("rror", line)] or lines[-1:] or ["no output"]
+        wrong = [line for line in lines if re.search("rror|FATAL", line)] or lines[-1:] or ["no output"]
         raise Stop(f"{simulator}: {wrong[0]}, see {build}")
     passed = done.returncode == 0 and said.startswith("PASS")
     samples = int(said.split()[1]) if passed else 0
