@@ -43,7 +43,7 @@ def parse_arguments():
     parser.add_argument("--scene", metavar="FILE.snn", help="scene whose operands are recorded (default BUILD/demo/scene.snn)")
     parser.add_argument("--data", metavar="FOLDER", help="the scene's data set (default BUILD/demo/scene)")
     parser.add_argument("--cycles", type=int, default=1500, metavar="N", help="cycles to record, from a stream's first on (default 1500)")
-    parser.add_argument("--clock", type=float, default=50, metavar="MHZ", help="clock of the netlists (default 50)")
+    parser.add_argument("--clock", type=float, default=40, metavar="MHZ", help="clock of the netlists (default 40)")
     parser.add_argument("--gating", choices=["on", "off"], default="on", help="registers with an enable: a gated clock, or a multiplexer (default on)")
     parser.add_argument("--skip", action="append", metavar="PATTERN", help=f"cells that are not used (default {' '.join(defaults.SKIPPED)})")
     parser.add_argument("--blocks", default="", metavar="\"NAME...\"", help="these alone, without a technology file")
