@@ -229,17 +229,22 @@ def mark_fronts(points):
 
 # ---- table, picture, page ----
 
+def excess(p):
+    """Mean squared error above that of the same model in float."""
+    return 10 ** (-p["psnr"] / 10) - 10 ** (-p["float_psnr"] / 10)
+
+
 def cells(p):
     """A point as the cells of its row; a star marks a front."""
     marks = p.get("fronts", [])
-    row = [GROUPS[p["group"]][0], p["name"], f"{p['psnr']:.2f}", f"{p['float_psnr'] - p['psnr']:.2f}"]
+    row = [GROUPS[p["group"]][0], p["name"], f"{p['psnr']:.2f}", f"{p['float_psnr'] - p['psnr']:.2f}", f"{1e5 * excess(p):.2f}"]
     for key, _, _ in COSTS:
         row.append("-" if key not in p else f"{p[key]:.4g}{' *' if key in marks else ''}" if key != "cycles"
                    else f"{p[key]:d}{' *' if key in marks else ''}")
     return row
 
 
-HEAD = ["group", "point", "dB", "dB lost against float"] + [f"{title}, {unit}" if unit != "cycles" else title for _, title, unit in COSTS]
+HEAD = ["group", "point", "dB", "dB lost against float", "excess, 1e-5"] + [f"{title}, {unit}" if unit != "cycles" else title for _, title, unit in COSTS]
 
 
 def table(points):
@@ -324,7 +329,7 @@ at a circle to read its name. Seconds are those of the fastest of {repeat} runs,
 def page(bench, points, svg):
     """The HTML page: the picture and the table."""
     about = (f"View {bench.view} of {os.path.basename(os.path.dirname(bench.data)) or '.'}/{os.path.basename(bench.data)}, profile {bench.profile}. "
-             f"CPU: {cpu()}, {os.cpu_count()} threads. dB lost: against the same model in float, at its own number of steps.")
+             f"CPU: {cpu()}, {os.cpu_count()} threads. dB lost, and excess, which is squared error: against the same model in float, at its own number of steps.")
     rows = "\n".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells(p)) + "</tr>" for p in points)
     head = "".join(f"<th>{html.escape(h)}</th>" for h in HEAD)
     return PAGE.format(about=html.escape(about), svg=svg, repeat=bench.limits["repeat"], head=head, rows=rows)
@@ -352,7 +357,7 @@ def report(bench):
         raise Failed(f"{bench.out}: no points: run it without --report")
     mark_fronts(points)
     svg = picture(points)
-    write(bench, "points.json", json.dumps(points, indent=1))
+    write(bench, "points.json", json.dumps([p | {"excess_squared_error": excess(p)} for p in points], indent=1))
     write(bench, "table.md", table(points))
     write(bench, "speed-error.svg", svg)
     write(bench, "speed-error.html", page(bench, points, svg))

@@ -23,6 +23,7 @@ const sf_point_figure sf_point_figures[SF_POINT_FIGURES] = {
     [SF_POINT_PSNR_TRUTH] = {"psnr_truth_db", "picture, dB", "PSNR against the picture, dB", "%.2f"},
     [SF_POINT_PSNR_FLOAT] = {"psnr_float_db", "float, dB", "PSNR against float, dB", "%.2f"},
     [SF_POINT_LOSS] = {"loss_db", "lost, dB", "lost against float, dB", "%.2f"},
+    [SF_POINT_EXCESS] = {"excess_squared_error", "excess", "squared error less float's", "%.1e"},
     [SF_POINT_MAX_ERROR] = {"max_error_of_255", "error, /255", "largest error, of 255", "%.1f"},
     [SF_POINT_ENERGY] = {"energy_mj", "energy, mJ", "energy, mJ (paper ledger)", "%.3g"},
     [SF_POINT_ENERGY_H_ONCE] = {"energy_h_once_mj", "h once, mJ", "energy, mJ (h once)", "%.3g"},
@@ -247,7 +248,9 @@ static void set_quality(const bench *b, const float *fixed, double *figure)
   const size_t n = 3 * b->pixels;
   figure[SF_POINT_PSNR_TRUTH] = sf_psnr(fixed, b->truth, n);
   figure[SF_POINT_PSNR_FLOAT] = sf_psnr(fixed, b->real, n);
-  figure[SF_POINT_LOSS] = sf_psnr(b->real, b->truth, n) - figure[SF_POINT_PSNR_TRUTH];
+  const double real = sf_psnr(b->real, b->truth, n);
+  figure[SF_POINT_LOSS] = real - figure[SF_POINT_PSNR_TRUTH];
+  figure[SF_POINT_EXCESS] = pow(10, -figure[SF_POINT_PSNR_TRUTH] / 10) - pow(10, -real / 10);
   figure[SF_POINT_MAX_ERROR] = 255 * largest_error(fixed, b->real, n);
 }
 

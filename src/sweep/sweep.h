@@ -30,6 +30,7 @@ typedef enum {
   SF_POINT_PSNR_TRUTH, /* fixed point against the picture, dB */
   SF_POINT_PSNR_FLOAT, /* fixed point against the float field at the same steps, dB */
   SF_POINT_LOSS,       /* dB against the picture that the float field has more */
+  SF_POINT_EXCESS,     /* mean squared error against the picture, less the float field's */
   SF_POINT_MAX_ERROR,  /* largest difference from the float field in a channel, of 255 */
   SF_POINT_ENERGY,     /* ledgers of audit.h, mJ per frame */
   SF_POINT_ENERGY_H_ONCE,

@@ -49,6 +49,10 @@ good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
 good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 good sf_convert twin.safetensors d --rays 5 --json
+check sf_convert "squared error above the twin's" python3 -c 'import json
+r = json.load(open("stdout.txt"))
+error = lambda row: 10 ** (-row["psnr"] / 10)
+assert all(abs(p["excess_squared_error"] - error(p) + error(r["twin"])) < 1e-12 for p in r["converted"])'
 good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 check "along.safetensors" "its cost" grep -q "mJ a view: [0-9]* samples, each with [0-9]* products and [0-9]* additions that spikes cause" stdout.txt
 data "along_ray" sf_export along.safetensors -o along.snn

@@ -47,6 +47,8 @@ for options in "" "--weight-bits 4 --grid-bits 5 --leak-bits 6 --feature-bits 9"
   [ "$ours" = "$theirs" ] || fail "'$options': PSNR $ours, sim_render $theirs"
   awk -v mj="$(number "$work/point.json" energy_mj)" -v fj="$(number "$work/fixed.json" energy_fj)" \
     'BEGIN { d = mj * 1e12 / fj - 1; exit !(d < 1e-12 && d > -1e-12) }' || fail "'$options': energy differs from sim_render"
+  awk -v excess="$(number "$work/point.json" excess_squared_error)" -v psnr="$ours" -v loss="$(number "$work/point.json" loss_db)" \
+    'BEGIN { d = excess - 10 ^ (-psnr / 10) + 10 ^ (-(psnr + loss) / 10); exit !(d < 1e-9 && d > -1e-9) }' || fail "'$options': excess squared error"
 done
 echo "points: as sim_render"
 

@@ -49,6 +49,7 @@ same = [by_name[n] for n in ("portable", "RTL in Verilator") if n in by_name]
 wrong += len({(p["psnr"], p["cycles"], p["mj"]) for p in same}) != 1
 steps = [by_name[f"t = {t}"] for t in range(1, 9)]
 wrong += any(a["cycles"] >= b["cycles"] or a["mj"] >= b["mj"] for a, b in zip(steps, steps[1:]))
+wrong += any(abs(p["excess_squared_error"] - 10 ** (-p["psnr"] / 10) + 10 ** (-p["float_psnr"] / 10)) > 1e-15 for p in points)
 wrong += any(p["t_r"] != t for t, p in enumerate(steps, 1))
 sys.exit(wrong)
 END
