@@ -9,7 +9,7 @@
 static const sf_point centre = {.name = "w8",
                                 .model = "m",
                                 .axis = {8, 12, 8, 12, 8, 3, 20, 19, 2},
-                                .figure = {30, 40, 0.1, 3, 70, 60, 50, 200, 1e6, 9}};
+                                .figure = {30, 40, 0.1, 2.3e-5, 3, 70, 60, 50, 200, 1e6, 9}};
 
 static void save(const char *name, const sf_point *point)
 {
