@@ -128,13 +128,13 @@ def registers(text, pins):
     kinds = "|".join(re.escape(kind) for kind in pins)
     if not kinds:
         return found
-    for instance in re.finditer(rf"^  ({kinds}) (?:#\(.*?^  \) )?(\S+) ?\((.*?)^  \);", text, re.M | re.S):
-        pin = re.search(rf"^\s*\.{pins[instance.group(1)]}\((.+)\),?$", instance.group(3), re.M)
-        output = re.search(r"^\s*\.Q\w*\((.+)\),?$", instance.group(3), re.M)
+    for first in re.finditer(rf"^  ({kinds}) ", text, re.M):
+        instance = text[first.start():text.index("\n  );", first.start()) + 1]
+        pin = re.search(rf"^\s*\.{pins[first.group(1)]}\((.+)\),?$", instance, re.M)
+        output = re.search(r"^\s*\.Q\w*\((.+)\),?$", instance, re.M)
         if pin and output:
-            begin = instance.start(3)
             name = output.group(1).strip().lstrip("\\").replace(" ", "")
-            found.append((name, begin + pin.start(1), begin + pin.end(1)))
+            found.append((name, first.start() + pin.start(1), first.start() + pin.end(1)))
     return found
 
 
