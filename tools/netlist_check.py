@@ -14,7 +14,7 @@ from asic import defaults, liberty
 from asic.flow import FlowError
 from asic.netlist import NetlistError
 from hdl_flow import Spent, Stop, digest, run, sources_of, write
-from netlist import kit, mapped, models, shell
+from netlist import kit, mapped, models, plant, shell
 
 TOP = "sf_top"
 SMALL = f"{TOP}:LANES=32,MACS=8,NEURONS=4"
@@ -122,10 +122,10 @@ class Check:
             names = [line for line in file.read().split("\n") if line and not line.startswith("+")]
         return [swapped if swapped and name == "netlist.v" else os.path.join(self.folder, name) for name in names]
 
-    def simulate(self, where, simulator, swapped=None, build="sim"):
+    def simulate(self, where, simulator, swapped=None, build="sim", argument=""):
         """(passed, the bench's line, samples, seconds of processor time) of the kit on this netlist."""
         return kit.simulate(where, simulator, self.sources(swapped), os.path.join(self.folder, "rtl"), os.path.join(self.folder, build),
-                            self.block.get("LANES"), self.with_tap, self.whole())
+                            self.block.get("LANES"), self.with_tap, self.whole(), argument)
 
     def whole(self):
         """The accelerator itself: its cells take minutes to build, and too long in Icarus."""
@@ -133,17 +133,17 @@ class Check:
 
 
 def planted(check, where):
-    """Errors in the netlist, one at a time: the input of a register is inverted. [{register, found, said}]"""
-    found = []
+    """Errors in the netlist, one at a time: a register takes the inverse of its next state. [{register, found, said}]"""
+    found, pins, wanted = [], check.mapper.data_pins(check.folder), check.work.arguments
     with open(os.path.join(check.folder, "netlist.v"), encoding="utf-8") as file:
         text = file.read()
-    places = mapped.registers(text, check.mapper.data_pins(check.folder))
-    simulator = "icarus" if shutil.which("iverilog") and not check.whole() else check.work.arguments.simulator
-    for number, (name, changed) in enumerate(mapped.plant(text, places, check.work.arguments.plant, check.work.arguments.seed), 1):
-        check.work.say(f"{check.text} in {check.mapper.name}: planted error {number}, {name} takes the inverse")
-        path = os.path.join(check.folder, "planted.v")
-        write(path, changed)
-        passed, said, _, _ = check.simulate(where, simulator, swapped=path, build="planted")
+    places = plant.choose(plant.registers(text, pins), plant.States(check.folder, pins).own, wanted.plant, wanted.seed)
+    path = os.path.join(check.folder, "planted.v")
+    write(path, plant.plant(text, places))
+    simulator = "icarus" if shutil.which("iverilog") and not check.whole() else wanted.simulator
+    for number, (name, _, _) in enumerate(places, 1):
+        check.work.say(f"{check.text} in {check.mapper.name}: planted error {number} of {len(places)}, {name} takes the inverse")
+        passed, said, _, _ = check.simulate(where, simulator, swapped=path, build="planted", argument=f"+{plant.CHOICE}={number}")
         found.append({"register": name, "found": not passed, "said": said})
     return found
 

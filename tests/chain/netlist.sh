@@ -27,6 +27,27 @@ for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1";
   expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
 done
 
+# A register that holds or adds to what it has is not drawn while there are others: its inverse may undo itself. Planted once more, no error is on.
+python3 - "$work/netlist/ecp5/sf_plif" <<'PYTHON' || fail "which registers get an error"
+import json, os, sys
+sys.path.insert(0, "tools")
+from netlist import plant
+def cell(kind, **pins):
+    return {"type": kind, "port_directions": {pin: "output" if pin in "QZ" else "input" for pin in pins}, "connections": {pin: [bit] for pin, bit in pins.items()}}
+cells = {"a": cell("FF", DI=1, Q=2), "b": cell("LUT4", A=2, B=3, Z=1), "c": cell("FF", DI=2, Q=3)}
+folder = os.path.join(sys.argv[1], "states")
+os.makedirs(folder)
+with open(os.path.join(folder, "netlist.json"), "w", encoding="utf-8") as file:
+    json.dump({"modules": {"top": {"cells": cells, "netnames": {"held": {"bits": [2]}, "passed": {"bits": ["0", 3]}}}}}, file)
+states = plant.States(folder, {"FF": "DI"})
+assert states.own("held") and not states.own("passed[1]") and not states.own("passed[0]"), "own"
+places = [("held", 0, 1), ("_1_", 2, 3), ("passed[1]", 4, 5)]
+for seed in range(9):
+    assert plant.choose(places, states.own, 1, seed) == [places[2]] and plant.choose(places, states.own, 2, seed) == [places[2], places[0]], seed
+PYTHON
+(cd "$work/netlist/kit-6" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|netlist.v|planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
+  RTL="$work/netlist/ecp5/sf_plif/rtl" LANES=32 BUILD="$work/none") >"$work/table.md" 2>&1 || fail "a netlist with errors to turn on, none of them on, differs"
+
 # The second time nothing is mapped.
 check --cells ecp5 --plant 0 --samples 1
 grep -q "in ecp5: the netlist is kept" "$work/said.log" || fail "a finished netlist was made again"

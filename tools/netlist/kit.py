@@ -66,14 +66,16 @@ class Kits:
         return folder
 
 
-def simulate(kit, simulator, sources, include, build, lanes, with_tap, quick):
+def simulate(kit, simulator, sources, include, build, lanes, with_tap, quick, argument):
     """Runs the kit's bench on the sources: (passed, its line, samples, seconds of processor time). quick: to build, not to run.
+    argument: a plusarg of the simulation, or "".
 
     Raises Stop where nothing was compared."""
     command = ["nice", "-n", "10", "make", "-s", "-C", kit, simulator, "SOURCES=" + " ".join(sources), "RTL=" + include, "BUILD=" + build]
     command += [f"LANES={lanes}"] if lanes else []
     command += [] if with_tap else ["TAP=0"]
     command += ["OPT=-O0"] if quick else []
+    command += ["ARGS=" + argument] if argument else []
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
     spent = Spent()
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)

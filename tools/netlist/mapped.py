@@ -1,7 +1,6 @@
-"""A module as a netlist of cells, by Yosys, and errors that are planted in it."""
+"""A module as a netlist of cells, by Yosys."""
 import json
 import os
-import random
 import re
 import shutil
 import subprocess
@@ -120,28 +119,3 @@ def data_pin(kind):
         return None
     names = kind.expression(kind.state, kind.state.get("next_state"), "next_state").names
     return next(iter(names)) if len(names) == 1 and names <= set(kind.inputs) else None
-
-
-def registers(text, pins):
-    """[(RTL's name, begin, end)] of the registers' inputs in a netlist's Verilog: the place of what is connected there."""
-    found = []
-    kinds = "|".join(re.escape(kind) for kind in pins)
-    if not kinds:
-        return found
-    for first in re.finditer(rf"^  ({kinds}) ", text, re.M):
-        instance = text[first.start():text.index("\n  );", first.start()) + 1]
-        pin = re.search(rf"^\s*\.{pins[first.group(1)]}\((.+)\),?$", instance, re.M)
-        output = re.search(r"^\s*\.Q\w*\((.+)\),?$", instance, re.M)
-        if pin and output:
-            name = output.group(1).strip().lstrip("\\").replace(" ", "")
-            found.append((name, first.start() + pin.start(1), first.start() + pin.end(1)))
-    return found
-
-
-def plant(text, places, number, seed):
-    """Yields (register, netlist with the inverse at its input) for so many registers."""
-    named = [place for place in places if not re.match(r"_\d+_", place[0])] or places
-    if number and not named:
-        raise Stop("no register in the netlist: no error can be planted")
-    for name, begin, end in random.Random(seed).sample(named, min(number, len(named))):
-        yield name, text[:begin] + f"~({text[begin:end]})" + text[end:]
