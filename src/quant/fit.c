@@ -29,27 +29,37 @@ static void moments_free(moments *m)
   memset(m, 0, sizeof *m);
 }
 
+/* The sums of `a` are whole numbers below 2^53, so their order does not matter: the half above the diagonal, and zeros
+ * are added where most inputs are not zero. */
 static void add_row(moments *m, const int16_t *x, const float *target)
 {
   int active[INPUTS_MAX], count = 0;
-  for (int i = 0; i < m->n_in; i++)
+  double wide[INPUTS_MAX];
+  for (int i = 0; i < m->n_in; i++) {
+    wide[i] = x[i];
     if (x[i]) active[count++] = i;
+  }
   for (int p = 0; p < count; p++) {
     const int i = active[p];
-    for (int r = 0; r < count; r++) m->a[i * m->n_in + active[r]] += (double)x[i] * x[active[r]];
-    for (int o = 0; o < m->n_out; o++) m->b[(size_t)i * (size_t)m->n_out + (size_t)o] += (double)x[i] * target[o];
+    double *a = m->a + (size_t)i * (size_t)m->n_in, *b = m->b + (size_t)i * (size_t)m->n_out;
+    if (count > m->n_in / 4)
+      for (int r = i; r < m->n_in; r++) a[r] += wide[i] * wide[r];
+    else
+      for (int r = p; r < count; r++) a[active[r]] += wide[i] * wide[active[r]];
+    for (int o = 0; o < m->n_out; o++) b[o] += wide[i] * target[o];
   }
   for (int o = 0; o < m->n_out; o++) m->energy += (double)target[o] * target[o];
 }
 
-/* b is gathered input-major above (contiguous in o) and turned here. */
+/* b is gathered input-major above (contiguous in o) and turned here; `a` gets its other half. */
 static bool finish(moments *m, int rows)
 {
   double *turned = malloc((size_t)m->n_in * (size_t)m->n_out * sizeof *turned);
   if (!turned) return false;
   for (int i = 0; i < m->n_in; i++)
     for (int o = 0; o < m->n_out; o++) turned[o * m->n_in + i] = m->b[i * m->n_out + o] / rows;
-  for (int i = 0; i < m->n_in * m->n_in; i++) m->a[i] /= rows;
+  for (int i = 0; i < m->n_in; i++)
+    for (int r = i; r < m->n_in; r++) m->a[r * m->n_in + i] = m->a[i * m->n_in + r] /= rows;
   m->energy /= rows;
   free(m->b);
   m->b = turned;

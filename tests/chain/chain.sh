@@ -35,13 +35,13 @@ check_fit() { # NAME: the fitted scene in the RTL
   grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "$1: the fitted scene differs in the RTL"
 }
 
-check_scene textured
+check_scene textured --hidden 64
 check_fit textured
-check_scene simple --input-mode no-decay --steps 4
+check_scene simple --input-mode no-decay --steps 4 --hidden 32
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_fit fog
 check_scene empty --steps 2
-check_scene plaza --steps 3 --bound 8
+check_scene plaza --steps 3 --bound 8 --hidden 32
 "$bin/error_budget" "$work/plaza/m.safetensors" "$work/plaza/s.snn" "$work/plaza" --rays 20 --samples 1000 --quiet >"$work/budget.txt" ||
   fail "plaza: error budget"
 grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza: the error budget's core is not the core"
@@ -50,8 +50,8 @@ grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza:
 check_tensorf() {
   local dir=$work/vm
   "$bin/sf_scene" textured -o "$dir" --size 40 --train 10 --test 2 >/dev/null
-  "$bin/sf_train" "$dir" -o "$dir/m.safetensors" --backbone tensorf --stage1 20 --stage2 60 --samples 2048 --rays 256 \
-    --voxels 20 --steps 3 --occ-res 32 --hidden 32 --quiet
+  "$bin/sf_train" "$dir" -o "$dir/m.safetensors" --backbone tensorf --stage1 100 --stage2 100 --samples 1024 --rays 256 \
+    --voxels 16 --steps 2 --occ-res 16 --hidden 16 --quiet
   "$bin/sf_export" "$dir/m.safetensors" -o "$dir/s.snn" >/dev/null
   "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --threads 1 -o "$dir/one.exr" >/dev/null
   "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --threads 3 -o "$dir/three.exr" >/dev/null

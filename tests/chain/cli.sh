@@ -81,7 +81,7 @@ for split in train test; do
   echo '{"camera_angle_x": 0.7, "frames": [{"file_path": "./'$split'/r_0", "transform_matrix":
     [[0, 0, -1, 0], [-1, 0, 0, 0], [0, 1, 0, 2], [0, 0, 0, 1]]}]}' >away/transforms_$split.json
 done
-good sf_train away -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_train away -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 --threads 1
 good sf_export small.safetensors -o small.snn
 good sf_export small.safetensors -o fitted.snn --fit --data away --fit-rays 256 --traces small_traces --rays 4
 good sim_render small.snn away -o out

@@ -24,7 +24,7 @@ every_file() {
 }
 every_file
 
-"$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 10 --stage2 10 --samples 512 \
+"$build/bin/sf_train" "$work/data" -o "$work/planes.safetensors" --backbone tensorf --stage1 50 --stage2 50 --samples 512 \
   --rays 64 --hidden 32 --voxels 16 --steps 3 --quiet >/dev/null && "$build/bin/sf_export" "$work/planes.safetensors" -o "$work/planes.snn" >/dev/null &&
   "$build/bin/sf_export" "$work/planes.snn" --vectors "$work/planes" --data "$work/data" --samples 24 --seed 3 >/dev/null || exit 1
 kit=$work/planes

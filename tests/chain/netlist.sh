@@ -41,6 +41,10 @@ with open(os.path.join(folder, "netlist.json"), "w", encoding="utf-8") as file:
     json.dump({"modules": {"top": {"cells": cells, "netnames": {"held": {"bits": [2]}, "passed": {"bits": ["0", 3]}}}}}, file)
 states = plant.States(folder, {"FF": "DI"})
 assert states.own("held") and not states.own("passed[1]") and not states.own("passed[0]"), "own"
+import netlist_check
+hit, miss = {"found": True}, {"found": False}
+for passed, planted, failed in (True, [], False), (True, [miss, hit], False), (True, [miss], True), (False, [hit], True):
+    assert netlist_check.failed({"passed": passed, "planted": planted}) == failed, (passed, planted)
 places = [("held", 0, 1), ("_1_", 2, 3), ("passed[1]", 4, 5)]
 for seed in range(9):
     assert plant.choose(places, states.own, 1, seed) == [places[2]] and plant.choose(places, states.own, 2, seed) == [places[2], places[0]], seed

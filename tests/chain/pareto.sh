@@ -115,8 +115,8 @@ done
 pareto part 1 --model "$work/nowhere" --data "$work"
 [ "$(count nowhere)" -eq 1 ] || fail "the missing model is not named"
 # A TensoRF model: widths that it has, and words for planes.
-"$programs/sf_train" "$data" -o "$work/planes.safetensors" --backbone tensorf --voxels 20 --rays 128 --samples 512 --stage1 10 --stage2 10 \
-  --steps 2 --occ-res 16 --hidden 32 --eval-views 1 --quiet >/dev/null || fail "the TensoRF model was not trained"
+"$programs/sf_train" "$data" -o "$work/planes.safetensors" --backbone tensorf --voxels 16 --rays 128 --samples 512 --stage1 100 --stage2 100 \
+  --steps 2 --occ-res 16 --hidden 16 --eval-views 1 --quiet >/dev/null || fail "the TensoRF model was not trained"
 build planes
 echo "TRANS_FRAC=20" >"$work/planes/arch"
 mkdir "$work/planes/pareto" && ln -s "$work/whole/pareto/variant" "$work/planes/pareto/" # built above

@@ -1,6 +1,6 @@
 #!/bin/bash
 # Debian packages of the source tree, in BUILD/deb; lintian must accept them. The maintainer is DEBFULLNAME <DEBEMAIL>.
-# usage: deb.sh BUILD VERSION
+# DEB_BUILD_OPTIONS=noopt builds sooner, for a look at the packages.   usage: deb.sh BUILD VERSION
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 build=$1 version=$2
@@ -42,7 +42,7 @@ grep -qE "^## ${version//./\\.}( |$)" <<<"$section" || fail "the first section o
 } >debian/changelog
 
 echo "  DEB   $build/deb (minutes: everything is built for any CPU; $build/deb/log)"
-export DEB_BUILD_OPTIONS="noautodbgsym parallel=$(nproc)"
+export DEB_BUILD_OPTIONS="noautodbgsym parallel=$(nproc)${DEB_BUILD_OPTIONS:+ $DEB_BUILD_OPTIONS}"
 unset MAKEFLAGS MAKELEVEL MFLAGS CI
 dpkg-buildpackage -b -us -uc >"$out/log" 2>&1 || { tail -n 20 "$out/log" >&2; fail "the package does not build"; }
 cd "$out"
