@@ -15,7 +15,7 @@ begin() { # OPTIONS OF sf_board
 }
 end() { kill "$board" && wait "$board"; }
 trap 'kill "$board" 2>/dev/null; rm -rf "$work"' EXIT
-render() { "$build/bin/sim_render" "${scene:-scene.snn}" data --backend board --port tty --timeout "${patience:-20}" --crop 10,10,5,4 --quiet -o "$1" >said.log 2>&1; }
+render() { "$build/bin/sim_render" "${scene:-scene.snn}" data --backend board --port tty --timeout "${patience:-20}" --crop 10,10,4,3 --quiet -o "$1" >said.log 2>&1; }
 cosim() { "$build/bin/sf_cosim" scene.snn data --backend board --port tty --timeout "${patience:-20}" --rays 12 --quiet "$@" >said.log 2>&1; }
 says() { grep -q -e "$1" said.log || fail "$2 does not say '$1' but: $(cat said.log)"; }
 refuses() { # TEXT WHAT: status 1, one line, nothing written
@@ -28,7 +28,7 @@ refuses() { # TEXT WHAT: status 1, one line, nothing written
   says "$1" "$2"
 }
 
-"$build/bin/sim_render" scene.snn data --crop 10,10,5,4 --quiet -o fixed.exr >/dev/null || fail "no golden picture"
+"$build/bin/sim_render" scene.snn data --crop 10,10,4,3 --quiet -o fixed.exr >/dev/null || fail "no golden picture"
 
 # ---- a sound board
 begin
@@ -80,11 +80,11 @@ refuses "tty: no serial port" "a file for a port"
 begin
 scene=large.snn refuses "large.snn: its grid takes [0-9]* bytes, the board has 131072: room for the first [0-9]* of 16 levels; a scene that fits: sf_export MODEL -o SMALL.snn --fit --data DATA --fit-bytes 131072$" "a large scene"
 end
-picture() { "$root/tools/board_picture.sh" "$build" model.safetensors data --board "$1" --downscale 1 --crop 10,10,5,4 --fit-rays 256 --out picture >said.log 2>&1; }
+picture() { "$root/tools/board_picture.sh" "$build" model.safetensors data --board "$1" --downscale 1 --crop 10,10,4,3 --fit-rays 256 --out picture >said.log 2>&1; }
 picture "$build/board/sf_board" || fail "the picture of a fitted scene: $(cat said.log)"
 grep -q "grid: [0-9]* -> [0-9]* bytes, at most 131072 were asked for" picture/fit.log || fail "--fit-bytes: $(cat picture/fit.log)"
 cmp -s picture/board.exr picture/fixed.exr || fail "the picture of a fitted scene is not the core's"
-says "^5 x 4 pixels, [0-9]* samples: .*byte for byte$" "a fitted scene"
+says "^4 x 3 pixels, [0-9]* samples: .*byte for byte$" "a fitted scene"
 says "^over the line at 12.50 Mbaud: [0-9]* bytes to the board, [0-9]* back" "a fitted scene"
 printf '#!/bin/sh\nexec %s "$@" --version 0x40002\n' "$build/board/sf_board" >another && chmod +x another
 ! picture ./another && [ ! -e picture/board.exr ] || fail "a board of another version gives a picture"

@@ -9,7 +9,7 @@ cd "$work" || exit 1
 # The same pictures as instant-ngp would list them: another scale, a larger box.
 cp -r data cube && sed -i 's/^{/{"aabb_scale": 4, /' cube/transforms_t*.json
 train() { # DATA NAME
-  "$bin/sf_train" "$1" -o "$2.safetensors" --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null &&
+  "$bin/sf_train" "$1" -o "$2.safetensors" --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 -q >/dev/null &&
     "$bin/sf_export" "$2.safetensors" -o "$2.snn" >/dev/null || fail "no scene $2"
 }
 train data ours
@@ -64,7 +64,7 @@ quiet() { # PROGRAM ARGUMENTS...
   [ ! -s err.txt ] || fail "$*: $(head -1 err.txt)"
 }
 quiet sim_render theirs.snn cube -o out.exr -q
-"$bin/sf_train" cube -o own.safetensors --scale 0.2 --bound 1 --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null
+"$bin/sf_train" cube -o own.safetensors --scale 0.2 --bound 1 --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 -q >/dev/null
 "$bin/sf_export" own.safetensors -o own.snn >/dev/null
 quiet sim_render own.snn cube -o out.exr -q
 refused "own.snn: learned from data of scale 0.33" sim_render own.snn data -o out2.exr -q
