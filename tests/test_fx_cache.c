@@ -340,7 +340,7 @@ static void vector_list(const fx_scene *scene, const fx_cache_shape *shape, cons
   fx_core_close(core);
 }
 
-LOOP_TEST(lists_of_rays, CK_AMOUNT(8, 3))
+LOOP_TEST(lists_of_rays, CK_AMOUNT(8, 1))
 {
   const uint64_t seed = 1 + (uint64_t)_i;
   OWNED(fx_scene) scene = cache_scene(seed);
