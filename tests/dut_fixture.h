@@ -41,12 +41,11 @@ static inline void wait_for_walk(sf_dut *dut)
 static inline void cut_off(sf_dut *dut, const sf_ray_request *q, int cycles)
 {
   for (int at = 0; cycles-- > 0;) {
-    const sf_ray_sample *s = &q->sample[at % q->n];
+    const sf_ray_beat beat = sf_ray_beat_of(q, at % q->n);
     dut->in.ray_valid = true, dut->in.pixel_ready = true;
-    dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
-    dut->in.ray_data[0] = (uint64_t)s->pos[1] << 32 | s->pos[0];
-    dut->in.ray_data[1] = (uint64_t)1 << 52 | s->pos[2];
-    dut->in.ray_data[3] = (uint64_t)1 << 49; /* a new tile each time: there is something to ask the memory for */
+    dut->in.ray_user = beat.user, dut->in.ray_last = beat.last;
+    memcpy(dut->in.ray_data, beat.data, sizeof beat.data);
+    dut->in.ray_data[3] |= (uint64_t)1 << 49; /* of a new tile: there is something to ask for */
     sf_dut_tick(dut);
     at += dut->out.ray_ready;
   }
