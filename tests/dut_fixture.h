@@ -43,7 +43,7 @@ static inline void cut_off(sf_dut *dut, const sf_ray_request *q, int cycles)
   for (int at = 0; cycles-- > 0;) {
     const sf_ray_beat beat = sf_ray_beat_of(q, at % q->n);
     dut->in.ray_valid = true, dut->in.pixel_ready = true;
-    dut->in.ray_user = beat.user, dut->in.ray_last = beat.last;
+    dut->in.ray_user = at % q->n == 0, dut->in.ray_last = at % q->n == q->n - 1;
     memcpy(dut->in.ray_data, beat.data, sizeof beat.data);
     dut->in.ray_data[3] |= (uint64_t)1 << 49; /* of a new tile: there is something to ask for */
     sf_dut_tick(dut);
