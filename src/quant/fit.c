@@ -29,8 +29,8 @@ static void moments_free(moments *m)
   memset(m, 0, sizeof *m);
 }
 
-/* The sums of `a` are whole numbers below 2^53, so their order does not matter: the half above the diagonal, and zeros
- * are added where most inputs are not zero. */
+/* The sums of `a` are whole numbers below 2^53, so they are exact in any order. Only the half above the diagonal is
+ * added up; a row with many inputs adds its zeros, too, which is faster than to step over them. */
 static void add_row(moments *m, const int16_t *x, const float *target)
 {
   int active[INPUTS_MAX], count = 0;

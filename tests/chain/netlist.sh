@@ -27,7 +27,7 @@ for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1";
   expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
 done
 
-# A register that holds or adds to what it has is not drawn while there are others: its inverse may undo itself. Planted once more, no error is on.
+# A register that holds or adds to what it has is not drawn while there are others: its inverse may undo itself.
 python3 - "$work/netlist/ecp5/sf_plif" <<'PYTHON' || fail "which registers get an error"
 import json, os, sys
 sys.path.insert(0, "tools")
@@ -49,6 +49,7 @@ places = [("held", 0, 1), ("_1_", 2, 3), ("passed[1]", 4, 5)]
 for seed in range(9):
     assert plant.choose(places, states.own, 1, seed) == [places[2]] and plant.choose(places, states.own, 2, seed) == [places[2], places[0]], seed
 PYTHON
+# A netlist with planted errors, none of them turned on, is the netlist.
 (cd "$work/netlist/kit-6" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|netlist.v|planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
   RTL="$work/netlist/ecp5/sf_plif/rtl" LANES=32 BUILD="$work/none") >"$work/table.md" 2>&1 || fail "a netlist with errors to turn on, none of them on, differs"
 

@@ -31,7 +31,7 @@ class States:
     """Which registers of a netlist's JSON have a next state that depends on their own through gates alone."""
 
     def __init__(self, folder, pins):
-        self.pins, self.names, self.drivers = pins, {}, []
+        self.pins, self.names = pins, {}
         with open(os.path.join(folder, "netlist.json"), encoding="utf-8") as file:
             modules = json.load(file)["modules"].values()
         for module in modules:
@@ -48,19 +48,20 @@ class States:
         return any(self.reads(drivers, bit) for drivers, bit in self.names.get(name, []))
 
     def reads(self, drivers, bit):
+        """True when the register that drives this bit finds it again on the way back from its data pin. drivers: {bit: cell}, of a module."""
         register = drivers.get(bit)
         if not register or register["type"] not in self.pins:
             return False
-        todo, seen = list(register["connections"][self.pins[register["type"]]]), set()
-        while todo:
-            net = todo.pop()
+        nets, seen = list(register["connections"][self.pins[register["type"]]]), set()
+        while nets:
+            net = nets.pop()
             if net == bit:
                 return True
             cell = drivers.get(net)
             if net in seen or not cell or cell["type"] in self.pins:
                 continue
             seen.add(net)
-            todo += [source for port, bits in cell["connections"].items() if cell["port_directions"].get(port) == "input" for source in bits]
+            nets += [source for port, bits in cell["connections"].items() if cell["port_directions"].get(port) == "input" for source in bits]
         return False
 
 
