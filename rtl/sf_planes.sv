@@ -306,11 +306,12 @@ module sf_planes (
       .ready_i   (sums_ready),
       .sums_o    (sums)
   );
-  reg [47:0] turn_q;  // phases of the direction: 2^16 / (2 pi) turns in Q1.14
-  wire signed [33:0] turn_x = $signed(read_dir[15:0]) * 18'sd41722 + 34'sd32768;
-  wire signed [33:0] turn_y = $signed(read_dir[31:16]) * 18'sd41722 + 34'sd32768;
-  wire signed [33:0] turn_z = $signed(read_dir[47:32]) * 18'sd41722 + 34'sd32768;
-  always_ff @(posedge clk_i) turn_q <= {turn_z[31:16], turn_y[31:16], turn_x[31:16]};
+  wire [47:0] read_phase;
+  sf_dir_phase u_dir_phase (
+      .clk_i  (clk_i),
+      .dir_i  (read_dir),
+      .phase_o(read_phase)
+  );
   wire dir_valid;
   wire [47:0] dir, turn;
   sf_fifo #(
@@ -321,7 +322,7 @@ module sf_planes (
       .rst_ni (rst_ni),
       .clear_i(clear_i),
       .push_i (begins),
-      .data_i ({turn_q, read_dir}),
+      .data_i ({read_phase, read_dir}),
       .valid_o(dir_valid),
       .pop_i  (leaves),
       .data_o ({turn, dir})
@@ -350,7 +351,7 @@ module sf_planes (
       .m_axis_tlast_o (m_axis_tlast_o)
   );
   assign idle_o = light_idle;
-  wire unused_ok = &{1'b0, dir_valid, turn_x[33:32], turn_x[15:0], turn_y[33:32], turn_y[15:0], turn_z[33:32], turn_z[15:0]};
+  wire unused_ok = &{1'b0, dir_valid};
 endmodule
 
 `default_nettype wire

@@ -14,7 +14,7 @@ UNIT_TOP_sf_encoder_1 := sf_encoder
 UNIT_PARAMETERS_sf_encoder_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNITS_test_rtl_ray_track := sf_ray_track
-UNITS_test_rtl_planes := sf_activation sf_waves
+UNITS_test_rtl_planes := sf_activation sf_dir_phase sf_waves
 UNITS_test_rtl_link := sf_link sf_link_slow
 UNIT_TOP_sf_link_slow := sf_link
 UNIT_PARAMETERS_sf_link := -GCLOCK_HZ=40000000 -GBAUD=10000000 -GMEMORY_BYTES=1024 +define+SF_NO_TAP

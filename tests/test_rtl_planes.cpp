@@ -1,5 +1,6 @@
-/* sf_activation and sf_waves against fx_tensorf_activate and fx_vm_encode. */
+/* sf_activation, and sf_waves behind sf_dir_phase, against fx_tensorf_activate and fx_vm_encode. */
 #include "Vsf_activation.h"
+#include "Vsf_dir_phase.h"
 #include "Vsf_waves.h"
 #include "tests/rtl_unit.h"
 extern "C" {
@@ -92,6 +93,7 @@ static void given_features(const fx_tensorf *, const uint32_t *, int32_t sum[FX_
 
 struct waves_bench {
   unit<Vsf_waves> u;
+  unit<Vsf_dir_phase> phases;
   random_draw draw;
   sink_stalls stalls;
   fx_tensorf field = {};
@@ -100,9 +102,10 @@ struct waves_bench {
   int at = 0; /* in the packet */
   uint64_t beats = 0;
 
-  waves_bench(uint64_t seed, int percent) : u(seed), draw(seed)
+  waves_bench(uint64_t seed, int percent) : u(seed), phases(seed), draw(seed)
   {
     stalls.percent = percent;
+    phases.top.clk_i = 0, phases.settle();
     u.top.valid_i = 0, u.top.m_axis_tready_i = 0;
     u.reset();
   }
@@ -155,18 +158,16 @@ struct waves_bench {
   }
   void put(const wave_sample &s)
   {
-    uint64_t dir = 0, turn = 0;
+    uint64_t dir = 0;
     for (int i = 0; i < FX_APPEARANCE_MAX; i++)
       for (int b = 0; b < 31; b++) {
         const int bit = 31 * i + b;
         const uint32_t mask = (uint32_t)1 << bit % 32;
         u.top.sums_i[bit / 32] = (u.top.sums_i[bit / 32] & ~mask) | ((uint32_t)s.sum[i] >> b & 1 ? mask : 0);
       }
-    for (int a = 0; a < 3; a++) {
-      const uint32_t t = (uint32_t)(((int64_t)s.unit[a] * 41722 + 32768) >> 16);
-      dir |= (uint64_t)(uint16_t)s.unit[a] << 16 * a, turn |= (uint64_t)(uint16_t)t << 16 * a;
-    }
-    u.top.dir_i = dir, u.top.turn_i = turn, u.top.valid_i = 1;
+    for (int a = 0; a < 3; a++) dir |= (uint64_t)(uint16_t)s.unit[a] << 16 * a;
+    phases.top.dir_i = dir, phases.edge();
+    u.top.dir_i = dir, u.top.turn_i = phases.top.phase_o, u.top.valid_i = 1;
     expect(s);
     for (int patience = 5000; !idle(); patience--) ck_assert_int_gt(patience, 0);
     u.top.valid_i = 0;
@@ -192,6 +193,16 @@ TEST(sines_of_every_phase)
     for (int a = 0; a < 3; a++) s.unit[a] = (int16_t)(b.draw(-16384, 16384));
     b.put(s);
   }
+  b.finish();
+}
+
+/* Every axis of a direction at the highest octave: a phase that is off by one moves its sine or its cosine. */
+TEST(sines_of_every_direction)
+{
+  waves_bench b(7, 0);
+  b.program(1, 0, 4, 11, {0, 0, 0}, {0, 0, 0});
+  for (int unit = -16384; unit <= 16384; unit++)
+    b.put({{}, {(int16_t)unit, (int16_t)-unit, (int16_t)((unit + 30000) % 32769 - 16384)}});
   b.finish();
 }
 

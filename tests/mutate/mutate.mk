@@ -12,7 +12,7 @@ mutate: $B/libspikefield.a $(UNIT_RUNTIME) ## mutate the RTL's modules and count
 MUTATED_engine := sf_engine sf_core sf_turns sf_c1_inputs sf_fed_layers sf_narrow sf_fed sf_tap sf_values sf_sums sf_spikes sf_neurons sf_rows sf_counters sf_readout sf_csr sf_top
 MUTATED_lanes := sf_values sf_sums sf_spikes sf_neurons
 MUTATED_ray := sf_cache sf_cache_tags sf_fetch sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo sf_sh sf_encoder \
-  sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top sf_field sf_planes sf_planes_reads sf_planes_mix sf_basis sf_activation sf_waves \
+  sf_exp_neg sf_composite sf_ray_track sf_ray_csr sf_ray_top sf_field sf_planes sf_planes_reads sf_planes_mix sf_basis sf_activation sf_dir_phase sf_waves \
   sf_light sf_rescale sf_mul_28x25
 MUTATE_lanes := --lanes
 MUTANT_CHECKERS_engine := test_rtl_registers test_rtl_counters test_rtl_ports test_rtl_disturbed test_rtl test_rtl_decoder test_rtl_hard
@@ -22,7 +22,7 @@ $(foreach m,sf_cache sf_cache_tags sf_fetch,$(eval MUTANT_CHECKERS_$m := test_rt
 $(foreach m,sf_grid sf_grid_cell sf_grid_weight sf_trilinear sf_fifo,$(eval MUTANT_CHECKERS_$m := test_rtl_grid test_rtl_encoder))
 MUTANT_CHECKERS_sf_sh := test_rtl_sh test_rtl_encoder
 MUTANT_CHECKERS_sf_encoder := test_rtl_encoder test_rtl_ray test_rtl_ray_planes
-$(foreach m,sf_activation sf_waves sf_rescale,$(eval MUTANT_CHECKERS_$m := test_rtl_planes test_rtl_ray_planes))
+$(foreach m,sf_activation sf_dir_phase sf_waves sf_rescale,$(eval MUTANT_CHECKERS_$m := test_rtl_planes test_rtl_ray_planes))
 $(foreach m,sf_planes sf_planes_reads sf_planes_mix sf_basis sf_light,$(eval MUTANT_CHECKERS_$m := test_rtl_ray_planes))
 MUTANT_CHECKERS_sf_mul_28x25 := test_rtl_composite test_rtl_ray test_rtl_ray_planes
 $(foreach m,sf_exp_neg sf_composite,$(eval MUTANT_CHECKERS_$m := test_rtl_composite test_rtl_ray test_rtl_ray_planes))
