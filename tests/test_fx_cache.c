@@ -345,7 +345,7 @@ LOOP_TEST(lists_of_rays, CK_AMOUNT(8, 1))
   const uint64_t seed = 1 + (uint64_t)_i;
   OWNED(fx_scene) scene = cache_scene(seed);
   const fx_cache_shape shape = random_shape(seed);
-  list *l = make_list(seed, seed % 3 ? 100 : 30);
+  list *l = make_list(seed, CK_AMOUNT(seed % 3 ? 100 : 30, 25));
   const fx_memory_counts expected = observe(&scene, &shape, l);
   ck_assert_uint_gt(expected.misses, 0);
   ck_assert_uint_gt(expected.lookups, expected.misses);

@@ -113,8 +113,8 @@ LOOP_TEST(resume_continues_bit_identically, 2)
   sf_train_options o = run_in_box(_i);
   ck_resume(&o, &o, 17, 16);
   o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume */
-  o.samples = 8192;
-  ck_resume(&o, &o, 6, 30);
+  o.samples = CK_AMOUNT(8192, 4096);
+  ck_resume(&o, &o, 6, CK_AMOUNT(30, 14));
 }
 
 /* With other views, another scale or another box a checkpoint is not resumed; one that does not say its views is. */

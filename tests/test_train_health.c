@@ -197,17 +197,18 @@ static void hard_case(int which, int net)
   OWNED(sf_dataset) data = load("train");
   const int views = data.count;
   sf_train_options o = small_run();
-  o.stage1 = 30;
-  o.stage2 = 70;
+  o.stage1 = CK_AMOUNT(30, 12);
+  o.stage2 = CK_AMOUNT(70, 28);
   o.config.net = net;
   harden(which, &data, &o);
   if (net == SF_NET_ANN) o.config.steps = 1;
   sf_trainer *t = start(&data, &o, NULL);
   double first = 0, last = 0;
-  for (int i = 0; i < 100; i++) {
+  const int all = o.stage1 + o.stage2;
+  for (int i = 0; i < all; i++) {
     const sf_train_stats s = steps(t, 1);
     if (i < 10) first += s.mse;
-    if (i >= 90) last += s.mse;
+    if (i >= all - 10) last += s.mse;
     ck_assert(isfinite(s.loss) && isfinite(s.mse));
     ck_assert(s.t_star >= 1 && s.t_star <= o.config.steps && s.t_r >= 1 && s.t_r <= o.config.steps);
     for (int l = 0; l < SF_LAYERS; l++) ck_assert(s.tau[l] > 1.0009 && s.tau[l] < 1000.1);
