@@ -238,7 +238,7 @@ house: all ## the order of rooms (README's map), format, sentences and links of 
 	else echo "  house: the format is not checked: that needs a git checkout, git and clang-format"; fi
 
 cppcheck: ## static analysis of the C code
-	cppcheck --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
+	cppcheck -j $(shell nproc) --quiet --std=c11 --language=c --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
 	  --suppress=missingInclude -Iinclude -Isrc src tools firmware
 
 # Runs of the whole chain
