@@ -70,12 +70,14 @@ static inline dual leak(const oracle *o, int layer)
 
 /* ---- the nets ---- */
 
-/* Of an integrator or a membrane. */
+/* Of a membrane, or an integrator whose steps weigh the same. */
 static inline dual charged_by(const oracle *o, int step, dual k, dual before, dual in)
 {
   const sf_config *c = &o->t->model.config;
   if (c->net == SF_NET_ANN) return in;
   switch (c->mode) {
+  case SF_WEIGHTED:
+    return 2 * before + in;
   case SF_NODECAY:
     return (1 - k) * before + in;
   case SF_HYBRID:
@@ -87,6 +89,7 @@ static inline dual charged_by(const oracle *o, int step, dual k, dual before, du
 
 typedef struct oracle_layer {
   dual v[SF_LANES], silent[SF_LANES]; /* product over the steps of 1 - s: 1 where it never fired */
+  dual sum[3];                        /* of weighted spikes: what the outputs behind it have integrated */
 } oracle_layer;
 
 static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, const dual *current, oracle_layer *l,
@@ -96,9 +99,20 @@ static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, c
   for (int n = 0; n < c->hidden; n++) {
     const dual h = charged_by(o, step, k, step ? l->v[n] : 0, current[n]);
     s[n] = c->net == SF_NET_ANN ? positive(h) : spike(h - c->theta[spiking]);
-    l->v[n] = h - s[n] * c->theta[spiking];
+    l->v[n] = h - s[n] * (c->mode == SF_WEIGHTED ? 2 : 1) * c->theta[spiking];
     l->silent[n] = (step ? l->silent[n] : 1) * (1 - s[n]);
   }
+}
+
+/* Output `at` of a layer at one step: activations are integrated, or of weighted spikes currents, whose steps weigh
+ * half of the one before. */
+static inline dual oracle_read(const oracle *o, int step, dual k, dual (*activation)(dual), dual current, dual before,
+                               dual *sum)
+{
+  const sf_config *c = &o->t->model.config;
+  if (c->mode != SF_WEIGHTED || c->net == SF_NET_ANN) return charged_by(o, step, k, before, activation(current));
+  *sum = ((step ? *sum : 0) * (pow(2, step + 1) - 2) + current) / (pow(2, step + 1) - 1);
+  return activation(*sum);
 }
 
 /* out[rows] += matrix `id`, from input `first` on, times in[n]. */
@@ -135,7 +149,8 @@ static inline void oracle_colour(const oracle *o, int step, const dual *current,
   oracle_multiply(o, SF_P_C3, 0, o->t->model.config.hidden, s, j);
   oracle_bias(o, SF_P_C3_BIAS, j);
   for (int a = 0; a < 3; a++)
-    colour[a] = along ? logistic(j[a]) : charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
+    colour[a] = along ? logistic(j[a])
+                      : oracle_read(o, step, leak(o, 4), logistic, j[a], step ? before[a] : 0, &layer[2].sum[a]);
 }
 
 /* Density and colour nets of one sample, all steps; what its firing is charged with. */
@@ -152,7 +167,7 @@ static inline dual oracle_nets(const oracle *o, const dual *feature, const float
     dual i[SF_DENSITY_OUT] = {0}, current1[SF_LANES];
     oracle_fire(o, 0, t, leak(o, 0), current, &layer[0], s);
     oracle_multiply(o, SF_P_D2, 0, m->config.hidden, s, i);
-    ray->sigma[t][at] = charged_by(o, t, leak(o, 1), t ? ray->sigma[t - 1][at] : 0, cexp(i[0]));
+    ray->sigma[t][at] = oracle_read(o, t, leak(o, 1), cexp, i[0], t ? ray->sigma[t - 1][at] : 0, &layer[0].sum[0]);
     memcpy(current1, constant, sizeof current1);
     for (int a = 1; a < SF_DENSITY_OUT && h_step > 0; a++)
       i[a] = with_slope(h_step * floor(creal(i[a]) / h_step + 0.5 / (1 << SF_H_SHIFT)), 1, i[a]);

@@ -182,11 +182,11 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
   free_graph(&shared);
 }
 
-/* And a net whose steps are the samples of a ray. */
-LOOP_TEST(the_relu_twin_is_refused, 2)
+/* And a net whose steps are the samples of a ray, and one whose spikes are weighted. */
+LOOP_TEST(the_relu_twin_is_refused, 3)
 {
-  OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, SF_HYBRID, 32, 1, 0.5f);
-  m.config.along = _i;
+  OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, _i == 2 ? SF_WEIGHTED : SF_HYBRID, 32, 1, 0.5f);
+  m.config.along = _i == 1;
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));

@@ -243,6 +243,9 @@ TEST(refuses_what_it_cannot_represent)
   m.config.net = SF_NET_ANN;
   assert_refused(&m, &plain, SF_E_UNSUPPORTED, "ANN");
   m.config.net = SF_NET_SNN;
+  m.config.mode = SF_WEIGHTED;
+  assert_refused(&m, &plain, SF_E_UNSUPPORTED, "--input-mode weighted");
+  m.config.mode = SF_HYBRID;
   m.config.hidden = 144;
   assert_refused(&m, &plain, SF_E_UNSUPPORTED, "density.w1");
   m.config.hidden = 32;

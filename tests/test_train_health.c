@@ -175,6 +175,7 @@ enum {
   COARSE,
   NO_DECAY,
   DECAY,
+  WEIGHTED,
   CASES
 };
 
@@ -190,6 +191,7 @@ static void harden(int which, sf_dataset *data, sf_train_options *o)
   if (which == COARSE) o->config.lattice = 16;
   if (which == DECAY) o->config.mode = SF_DECAY;
   if (which == NO_DECAY) o->config.mode = SF_NODECAY;
+  if (which == WEIGHTED) o->config.mode = SF_WEIGHTED;
 }
 
 static void hard_case(int which, int net)

@@ -265,6 +265,9 @@ sf_status sf_nir_write_model(const char *path, const sf_model *m)
   if (c->along)
     return sf_fail(SF_E_UNSUPPORTED, "%s: the model's steps are the samples of a ray; a NIR graph is of one sample",
                    path);
+  if (c->mode == SF_WEIGHTED)
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: the model's spikes are weighted by their step; a NIR graph has no such neuron", path);
   const float *leak = sf_model_param(m, SF_P_LEAK);
   nets n = {.mode = c->mode,
             .steps = m->t_r,

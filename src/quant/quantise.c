@@ -50,6 +50,11 @@ static sf_status check_model(const sf_model *model, const char *name, const sf_q
                    "%s: metadata 'along_ray': its steps are the samples of a ray (--steps-along-ray); the accelerator "
                    "runs the steps of one sample",
                    name);
+  if (config->mode == SF_WEIGHTED)
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: metadata 'mode': its spikes are weighted by their step (--input-mode weighted); the "
+                   "accelerator's all weigh the same",
+                   name);
   SF_TRY(check_sizes(model, name));
   for (int i = 0; i < 3; i++)
     if (!isfinite(config->theta[i]) || config->theta[i] <= 0)

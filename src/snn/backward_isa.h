@@ -52,19 +52,20 @@ static inline void fire_backward(const sf_net_view *net, int layer, float k, int
     return;
   }
   const int hybrid_first = t == 0 && net->mode == SF_HYBRID;
-  const float keep = 1.0f - k, gain = net->mode == SF_NODECAY || hybrid_first ? 1.0f : k;
-  const float with_h = net->mode == SF_NODECAY || hybrid_first ? 0.0f : keep;
-  const float with_v = net->mode == SF_NODECAY ? -k : -1.0f;
+  const int weighted = net->mode == SF_WEIGHTED, whole = net->mode >= SF_NODECAY || hybrid_first;
+  const float keep = weighted ? 2.0f : 1.0f - k, gain = whole ? 1.0f : k, with_h = whole ? 0.0f : keep;
+  const float with_v = weighted ? 0.0f : net->mode == SF_NODECAY ? -k : -1.0f;
   const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
+  const vf lost = (vf){0} + sf_plif_reset((sf_input_mode)net->mode, net->theta[layer]);
   for (int l = 0; l < B; l += VL) {
     vf sum_h = {0}, sum_v = {0};
     for (int r = 0; r < rows; r++) {
       const int i = r * B + l;
       const vf x = *(const vf *)(h + i), gv = *(const vf *)(carry + i);
-      const vf v = x - (vf)((x >= theta) & (vi)theta);
+      const vf v = x - (vf)((x >= theta) & (vi)lost);
       vf gs = *(const vf *)(g + i);
       if (fired) gs += (vf)((*(const vf *)(fired + i) == (vf)((x >= theta) & (vi)one)) & (vi)charge);
-      const vf gh = (gs - theta * gv) * surrogate(x - theta) + gv;
+      const vf gh = (gs - lost * gv) * surrogate(x - theta) + gv;
       *(vf *)(carry + i) = keep * gh;
       *(vf *)(g + i) = gain * gh;
       sum_h += gh * x;
@@ -109,7 +110,9 @@ static void integrate_backward(const sf_net_view *net, float k, int t, const flo
     for (int i = 0; i < B; i++) de[i] = g[i];
     return;
   }
-  const float keep = 1.0f - k, slope = k * keep, gain = net->mode == SF_NODECAY ? 1.0f : k;
+  const int weighted = net->mode == SF_WEIGHTED;
+  const float share = weighted ? sf_step_share(t) : k, keep = 1.0f - share, slope = weighted ? 0.0f : k * keep;
+  const float gain = net->mode == SF_NODECAY ? 1.0f : share;
   const float with_e = net->mode == SF_NODECAY ? 0.0f : 1.0f;
   for (int i = 0; i < B; i++) {
     float before = t ? prev[i] : 0.0f;
@@ -122,6 +125,32 @@ static void integrate_backward(const sf_net_view *net, float k, int t, const flo
 static void add_to(float *restrict sum, const float *restrict x, int n)
 {
   for (int i = 0; i < n; i++) sum[i] += x[i];
+}
+
+/* The outputs' gradients of prefix t, added to those of what they integrate. A density's slope is torch-ngp's
+ * trunc_exp. */
+static void add_density_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dsigma, float *gsigma)
+{
+  if (net->mode != SF_WEIGHTED) {
+    add_to(gsigma, dsigma + t * B, B);
+    return;
+  }
+  for (int l = 0; l < B; l++) {
+    const float i = x->i_sum[t][l], clamped = i > 15.0f ? 15.0f : i < -15.0f ? -15.0f : i;
+    gsigma[l] += dsigma[t * B + l] * fast_exp(clamped);
+  }
+}
+
+static void add_colour_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dcolour, float *gcolour)
+{
+  if (net->mode != SF_WEIGHTED) {
+    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
+    return;
+  }
+  for (int l = 0; l < 3 * B; l++) {
+    const float c = x->colour[t][l];
+    gcolour[l] += dcolour[t * 3 * B + l] * c * (1.0f - c);
+  }
 }
 
 /* What layer_backward leaves behind; NULL = not wanted. fired: what it reads, as fire_backward. */
@@ -175,10 +204,14 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   word *rows = words(w->rows), *lanes = words(w->lanes), small[4 * B];
   sigmoid(3 * B, x->j[t], c);
   memset(gj + 3 * B, 0, B * sizeof *gj);
+  const bool weighted = net->mode == SF_WEIGHTED;
+  const float *const e = weighted ? x->j[t] : c, *const before = !t         ? NULL
+                                                                 : weighted ? x->j_sum[t - 1]
+                                                                            : x->colour[t - 1];
   for (int a = 0; a < 3; a++)
-    integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
+    integrate_backward(net, net->k[4], t, e + a * B, before ? before + a * B : NULL, gcolour + a * B, gj + a * B,
                        w->leak[4]);
-  for (int i = 0; i < 3 * B; i++) gj[i] *= c[i] * (1.0f - c[i]);
+  for (int i = 0; i < 3 * B && !weighted; i++) gj[i] *= c[i] * (1.0f - c[i]);
   pack_lanes(gj, 4, small);
   add_outer(grad->w5, hidden, small, 4, activations(net, 2, x->m4[t], w), hidden);
   pack_rows(gj, 4, small);
@@ -247,14 +280,14 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
   for (int t = steps - 1; t >= 0; t--) {
     float gi[SF_DENSITY_OUT * B], ge[B], e[B];
     word small[SF_DENSITY_OUT * B];
-    add_to(gsigma, dsigma + t * B, B);
-    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
+    add_density_gradient(net, x, t, dsigma, gsigma);
+    add_colour_gradient(net, x, t, dcolour, gcolour);
     exponential(B, x->i[t], e);
     integrate_backward(net, net->k[1], t, e, t ? x->sigma[t - 1] : NULL, gsigma, ge, w->leak[1]);
     colour_backward(n, x, t, gcolour, gi, grad, w);
     for (int l = 0; l < B; l++) {
       float clamped = x->i[t][l] > 15.0f ? 15.0f : x->i[t][l] < -15.0f ? -15.0f : x->i[t][l];
-      gi[l] = ge[l] * fast_exp(clamped); /* torch-ngp's trunc_exp */
+      gi[l] = net->mode == SF_WEIGHTED ? ge[l] : ge[l] * fast_exp(clamped); /* torch-ngp's trunc_exp */
     }
     pack_lanes(gi, SF_DENSITY_OUT, small);
     add_outer(grad->w2, hidden, small, SF_DENSITY_OUT, activations(net, 0, x->m1[t], w), hidden);

@@ -139,12 +139,10 @@ static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int 
   decoder_inputs(n, d, w);
   for (int t = 0; t < steps; t++) {
     const int at = slot(t, keep), before = slot(t - 1, keep);
-    float c[3 * B];
     layer(v, 1, v->k[2], t, NULL, 0, NULL, w->sum3, t ? x->m3[before] : NULL, x->m3[at], words(w->spikes));
     colour_layer_2(net, x, t, at, before, n->b2, w);
     gemm(operands(net->w5), pairs, 4, pairs, words(w->rows), B, B, n->b3, B, x->j[t], B);
-    sigmoid(3 * B, x->j[t], c);
-    integrate(v, v->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
+    read_colour(v, t, x);
   }
   tiles_end();
 }
@@ -203,7 +201,7 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   if (charged(v)) count_fired(v, &d->net, 1, steps, w);
   for (int t = steps - 1; t >= 0; t--) {
     float gj[4 * B];
-    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
+    add_colour_gradient(v, &d->net, t, dcolour, gcolour);
     colour_output_backward(net, &d->net, t, gcolour, gj, w->sum1, &grad->net, w);
     add_to(gsum, gj, 4 * B);
     layer_backward(v, 1, v->k[2], t, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[t],

@@ -31,16 +31,16 @@ static inline float fast_exp(float x)
 static inline void charge(const sf_net_view *net, int layer, float k, int t, int rows, const float *restrict current,
                           const float *prev, float *h)
 {
-  const float theta = net->theta[layer];
+  const float theta = net->theta[layer], lost = sf_plif_reset((sf_input_mode)net->mode, theta);
   const int n = rows * B;
   if (net->relu || (t == 0 && net->mode != SF_DECAY))
     memcpy(h, current, (size_t)n * sizeof *h);
   else if (t == 0)
     for (int i = 0; i < n; i++) h[i] = current[i] * k;
   else {
-    const float keep = 1.0f - k, gain = net->mode == SF_NODECAY ? 1.0f : k;
+    const float keep = net->mode == SF_WEIGHTED ? 2.0f : 1.0f - k, gain = net->mode >= SF_NODECAY ? 1.0f : k;
 #pragma GCC ivdep /* h may be prev: element by element */
-    for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? theta : 0.0f)) + gain * current[i];
+    for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? lost : 0.0f)) + gain * current[i];
   }
 }
 
@@ -71,7 +71,8 @@ static void integrate(const sf_net_view *net, float k, int t, int n, const float
   else if (t == 0)
     for (int i = 0; i < n; i++) o[i] = k * e[i];
   else {
-    const float gain = net->mode == SF_NODECAY ? 1.0f : k, keep = 1.0f - k;
+    const float share = net->mode == SF_WEIGHTED ? sf_step_share(t) : k;
+    const float gain = net->mode == SF_NODECAY ? 1.0f : share, keep = 1.0f - share;
     for (int i = 0; i < n; i++) o[i] = keep * prev[i] + gain * e[i];
   }
 }
@@ -92,18 +93,41 @@ static inline int slot(int t, int keep)
   return t < keep ? t : SF_T_MAX - 1;
 }
 
+/* Outputs of step t from their currents: sigma or colour, and what they have integrated, of the step before, too. */
+static void read_density(const sf_net_view *net, int t, const float *i, sf_block *x)
+{
+  float e[B];
+  if (net->mode == SF_WEIGHTED) {
+    integrate(net, net->k[1], t, B, i, t ? x->i_sum[t - 1] : NULL, x->i_sum[t]);
+    exponential(B, x->i_sum[t], x->sigma[t]);
+  } else {
+    exponential(B, i, e);
+    integrate(net, net->k[1], t, B, e, t ? x->sigma[t - 1] : NULL, x->sigma[t]);
+  }
+}
+
+static void read_colour(const sf_net_view *net, int t, sf_block *x)
+{
+  float c[3 * B];
+  if (net->mode == SF_WEIGHTED) {
+    integrate(net, net->k[4], t, 3 * B, x->j[t], t ? x->j_sum[t - 1] : NULL, x->j_sum[t]);
+    sigmoid(3 * B, x->j_sum[t], x->colour[t]);
+  } else {
+    sigmoid(3 * B, x->j[t], c);
+    integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
+  }
+}
+
 /* Density net at step t. */
 static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, const float *current, sf_net_scratch *w,
-                         float *i, float *sigma, const float *sigma_before)
+                         float *i)
 {
   const sf_net_view *net = &n->view;
   word *spikes = words(w->spikes);
-  float e[B];
   layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, x->m1[slot(t, keep)],
         spikes);
   gemm(operands(n->w2), net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
-  exponential(B, i, e);
-  integrate(net, net->k[1], t, B, e, sigma_before, sigma);
+  read_density(net, t, i, x);
 }
 
 /* in[inputs][B] times words of weights: what is constant over the steps. */
@@ -119,8 +143,7 @@ static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratc
 {
   tiles_begin();
   constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
-  for (int t = 0; t < steps; t++)
-    density_step(n, x, t, 0, w->sum1, w, x->i[0], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+  for (int t = 0; t < steps; t++) density_step(n, x, t, 0, w->sum1, w, x->i[0]);
   tiles_end();
 }
 
@@ -155,8 +178,7 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
   constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, rows, w->sum3);
   for (int t = 0; t < steps; t++) {
     const int at = slot(t, keep), before = slot(t - 1, keep);
-    float c[3 * B];
-    density_step(n, x, t, keep, w->sum1, w, x->i[t], x->sigma[t], t ? x->sigma[t - 1] : NULL);
+    density_step(n, x, t, keep, w->sum1, w, x->i[t]);
     if (net->h_step > 0)
       for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step);
     pack_rows(x->i[t], SF_DENSITY_OUT, rows);
@@ -164,8 +186,7 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
           x->m3[at], spikes);
     colour_layer_2(n, x, t, at, before, NULL, w);
     gemm(operands(n->w5), pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
-    sigmoid(3 * B, x->j[t], c);
-    integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
+    read_colour(net, t, x);
   }
   tiles_end();
 }

@@ -56,6 +56,8 @@ typedef struct sf_block {
   float f[2 * 16 * SF_BLOCK], sh[SF_DIR_FEATURES * SF_BLOCK];
   float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][4 * SF_BLOCK];
   float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */
+  /* Of weighted spikes: what the outputs have integrated. */
+  float i_sum[SF_T_MAX][SF_BLOCK], j_sum[SF_T_MAX][3 * SF_BLOCK];
   float m1[SF_T_MAX][SF_LANES * SF_BLOCK], m3[SF_T_MAX][SF_LANES * SF_BLOCK], m4[SF_T_MAX][SF_LANES * SF_BLOCK];
   uint64_t s3[SF_T_MAX][SF_LANES]; /* spikes of C1, a bit per lane */
   /* Of a net along rays, filled by the caller: which lanes begin a ray, and each lane's ray. Its samples are

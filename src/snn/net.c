@@ -7,6 +7,15 @@ typedef struct dense {
   int n_out, n_in, stride;
 } dense;
 
+/* An output's next prefix: the sum of activations, or of weighted spikes the activation of the sum. sum: what is
+ * integrated. */
+static float read_out(sf_input_mode mode, int t, float k, float (*activation)(float), float *sum, float current)
+{
+  const bool outside = mode == SF_WEIGHTED;
+  *sum = sf_plif_integrate(mode, t, k, *sum, outside ? current : activation(current));
+  return outside ? activation(*sum) : *sum;
+}
+
 static void accumulate(const dense *d, const float *in, float *out)
 {
   for (int o = 0; o < d->n_out; o++)
@@ -27,7 +36,7 @@ static void fire(neurons *n, int count, int t, const float *current, float *out,
     float h = n->relu ? current[o] : sf_plif_charge(n->mode, t, n->k, n->v[o], current[o]);
     float spike = h >= n->theta ? 1.0f : 0.0f;
     out[o] = n->relu ? fmaxf(h, 0) : spike;
-    n->v[o] = h - spike * n->theta;
+    n->v[o] = h - spike * sf_plif_reset(n->mode, n->theta);
     if (!trace) continue;
     trace->current[layer][t][o] = current[o];
     trace->membrane[layer][t][o] = h;
@@ -77,7 +86,7 @@ void sf_net_sample(const sf_model *model, const float *in, const float *sh, int 
     if (!decodes) {
       fire(&n[0], hidden, t, current1, s, trace, 0);
       accumulate(&d2, s, i);
-      sigma[t] = o_sigma = sf_plif_charge(c->mode, t, k_sigma, o_sigma, expf(i[0]));
+      sigma[t] = read_out(c->mode, t, k_sigma, expf, &o_sigma, i[0]);
     }
     memcpy(current, base, (size_t)hidden * sizeof *base);
     for (int a = 0; a < n_h; a++) h[a] = h_step > 0 ? sf_round_h(i[1 + a], h_step) : i[1 + a];
@@ -88,8 +97,7 @@ void sf_net_sample(const sf_model *model, const float *in, const float *sh, int 
     fire(&n[2], hidden, t, current, s, trace, 3);
     begin(model, SF_P_C3_BIAS, 3, j);
     accumulate(&c3, s, j);
-    for (int a = 0; a < 3; a++)
-      colour[3 * t + a] = o_colour[a] = sf_plif_charge(c->mode, t, k_colour, o_colour[a], sf_sigmoid(j[a]));
+    for (int a = 0; a < 3; a++) colour[3 * t + a] = read_out(c->mode, t, k_colour, sf_sigmoid, &o_colour[a], j[a]);
     if (!trace) continue;
     if (!decodes) memcpy(trace->current[1][t], i, sizeof i), trace->membrane[1][t][0] = o_sigma;
     memcpy(trace->current[4][t], j, sizeof j);

@@ -76,7 +76,7 @@ static sf_status check_effect(train_arguments *a)
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};
   static const char *const spiking[] = {"--charge", "--steps-along-ray", NULL};
-  static const char *const steps[] = {"--fixed-steps", "--charge", NULL};
+  static const char *const steps[] = {"--fixed-steps", "--charge", NULL}, *const mode[] = {"--input-mode", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
   const sf_cli cli = train_cli(a, options);
@@ -89,6 +89,9 @@ static sf_status check_effect(train_arguments *a)
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
   if (a->along) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, steps, "has no effect beside --steps-along-ray"));
+  if (a->along && a->train.config.mode == SF_WEIGHTED)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, mode,
+                         "weighted needs steps that weigh differently, and --steps-along-ray has one per sample"));
   if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN || a->along)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, search, "has no effect where the number of steps is fixed"));
   if (a->train.config.net == SF_NET_ANN)
