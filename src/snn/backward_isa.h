@@ -205,12 +205,10 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   sigmoid(3 * B, x->j[t], c);
   memset(gj + 3 * B, 0, B * sizeof *gj);
   const bool weighted = net->mode == SF_WEIGHTED;
-  const float *const e = weighted ? x->j[t] : c, *const before = !t         ? NULL
-                                                                 : weighted ? x->j_sum[t - 1]
-                                                                            : x->colour[t - 1];
+  const float *const in = weighted ? x->j[t] : c, *const sums = weighted ? x->j_sum[0] : x->colour[0];
   for (int a = 0; a < 3; a++)
-    integrate_backward(net, net->k[4], t, e + a * B, before ? before + a * B : NULL, gcolour + a * B, gj + a * B,
-                       w->leak[4]);
+    integrate_backward(net, net->k[4], t, in + a * B, t ? sums + (3 * (t - 1) + a) * B : NULL, gcolour + a * B,
+                       gj + a * B, w->leak[4]);
   for (int i = 0; i < 3 * B && !weighted; i++) gj[i] *= c[i] * (1.0f - c[i]);
   pack_lanes(gj, 4, small);
   add_outer(grad->w5, hidden, small, 4, activations(net, 2, x->m4[t], w), hidden);
