@@ -112,7 +112,7 @@ LOOP_TEST(resume_continues_bit_identically, 2)
 {
   sf_train_options o = run_in_box(_i);
   ck_resume(&o, &o, 17, 16);
-  o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume */
+  o.stage1 = 2000; /* resumed within the first epoch, which ends after the resume (but under a sanitizer) */
   o.samples = CK_AMOUNT(8192, 4096);
   ck_resume(&o, &o, 6, CK_AMOUNT(30, 14));
 }

@@ -127,18 +127,20 @@ static void add_to(float *restrict sum, const float *restrict x, int n)
   for (int i = 0; i < n; i++) sum[i] += x[i];
 }
 
-/* The outputs' gradients of prefix t, added to those of what they integrate. A density's slope is torch-ngp's
- * trunc_exp. */
+/* The slope of exp as torch-ngp's trunc_exp has it. */
+static inline float exp_slope(float x)
+{
+  return fast_exp(x > 15.0f ? 15.0f : x < -15.0f ? -15.0f : x);
+}
+
+/* The outputs' gradients of prefix t, added to those of what they integrate. */
 static void add_density_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dsigma, float *gsigma)
 {
   if (net->mode != SF_WEIGHTED) {
     add_to(gsigma, dsigma + t * B, B);
     return;
   }
-  for (int l = 0; l < B; l++) {
-    const float i = x->i_sum[t][l], clamped = i > 15.0f ? 15.0f : i < -15.0f ? -15.0f : i;
-    gsigma[l] += dsigma[t * B + l] * fast_exp(clamped);
-  }
+  for (int l = 0; l < B; l++) gsigma[l] += dsigma[t * B + l] * exp_slope(x->i_sum[t][l]);
 }
 
 static void add_colour_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dcolour, float *gcolour)
@@ -265,6 +267,8 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
+  const bool weighted = net->mode == SF_WEIGHTED;
+  const float *const sums = weighted ? x->i_sum[0] : x->sigma[0];
   const size_t plane = (size_t)hidden * B * sizeof(float);
   float gsigma[B] = {0}, gcolour[3 * B] = {0};
   tiles_begin();
@@ -281,12 +285,10 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
     add_density_gradient(net, x, t, dsigma, gsigma);
     add_colour_gradient(net, x, t, dcolour, gcolour);
     exponential(B, x->i[t], e);
-    integrate_backward(net, net->k[1], t, e, t ? x->sigma[t - 1] : NULL, gsigma, ge, w->leak[1]);
+    integrate_backward(net, net->k[1], t, weighted ? x->i[t] : e, t ? sums + (t - 1) * B : NULL, gsigma, ge,
+                       w->leak[1]);
     colour_backward(n, x, t, gcolour, gi, grad, w);
-    for (int l = 0; l < B; l++) {
-      float clamped = x->i[t][l] > 15.0f ? 15.0f : x->i[t][l] < -15.0f ? -15.0f : x->i[t][l];
-      gi[l] = net->mode == SF_WEIGHTED ? ge[l] : ge[l] * fast_exp(clamped); /* torch-ngp's trunc_exp */
-    }
+    for (int l = 0; l < B; l++) gi[l] = weighted ? ge[l] : ge[l] * exp_slope(x->i[t][l]);
     pack_lanes(gi, SF_DENSITY_OUT, small);
     add_outer(grad->w2, hidden, small, SF_DENSITY_OUT, activations(net, 0, x->m1[t], w), hidden);
     pack_rows(gi, SF_DENSITY_OUT, small);
