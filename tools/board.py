@@ -12,7 +12,7 @@ import shutil
 import sys
 
 import xilinx
-from fpga import CELLS, DEVICES, PACKAGES, Tools, critical_path, keep, kept
+from fpga import CELLS, DEVICES, Tools, critical_path, keep, kept
 from hdl_flow import Spent, Stop, digest, run, sources_of, write
 
 WANTED = {"name": str, "top": str, "device": str, "package": str, "speed": str, "mhz": (int, float), "pins": str, "load": str}
@@ -37,6 +37,7 @@ def parse_arguments():
     parser.add_argument("--seed", type=int, metavar="N", help="the placement of this seed alone")
     parser.add_argument("--rtl", default=root, metavar="DIR", help="folder that holds rtl/ (default: the project's)")
     parser.add_argument("--venv", metavar="DIR", help="environment of the tools (default BUILD/fpga/venv)")
+    parser.add_argument("--debian", action="store_true", help="map with the installed yosys, not with PyPI's, which takes a minute to get ready")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     arguments = parser.parse_args()
     if arguments.tries < 1:
@@ -88,7 +89,7 @@ class Flow:
         self.root = os.path.abspath(arguments.rtl)
         self.folder = os.path.join(os.path.abspath(arguments.build), "board", arguments.board)
         os.makedirs(self.folder, exist_ok=True)
-        self.tools = Tools(arguments.venv or os.path.join(arguments.build, "fpga", "venv"), say)
+        self.tools = Tools(arguments.venv or os.path.join(arguments.build, "fpga", "venv"), say, arguments.debian)
 
     def path(self, name):
         return os.path.join(self.folder, name)
@@ -108,7 +109,7 @@ class Flow:
         # The tools, which run as WebAssembly, see the folder that they work in and no other.
         shutil.rmtree(self.path("rtl"), ignore_errors=True)
         shutil.copytree(os.path.join(self.root, "rtl"), self.path("rtl"))
-        return digest(text_of_tree(self.root), *PACKAGES, "board 1")
+        return digest(text_of_tree(self.root), *self.tools.versions(), "board 1")
 
     def synthesise(self):
         """The netlist; returns the key of what it was made from."""

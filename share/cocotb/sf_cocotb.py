@@ -136,10 +136,10 @@ def verilator(folder, block, top, opt):
     includes, others, files = block
     command = ["verilator", "--cc", "--exe", "--build", "-j", "2", "--timing", "--vpi", "--prefix", "Vtop",
                "--top-module", TOP, "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style", "--x-assign", "unique",
-               "--x-initial", "unique", "--unroll-count", "256", "--unroll-stmts", "1000000", "--Mdir",
-               os.path.join(folder, "verilator"), "-o", "sim", f"-DSF_DUT={top}", *others,
+               "--x-initial", "unique", "--unroll-count", "256", "--unroll-stmts", "1000000", "--output-split", "100000000",
+               "--Mdir", os.path.join(folder, "verilator"), "-o", "sim", f"-DSF_DUT={top}", *others,
                *[f"+incdir+{path}" for path in includes], *files, *around(), main, "-LDFLAGS",
-               f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator", "-MAKEFLAGS", f"OPT_FAST={opt}"]
+               f"-Wl,-rpath,{libs} -L{libs} -lcocotbvpi_verilator", "-MAKEFLAGS", f"OPT_FAST={opt} OPT_SLOW={opt}"]
     return command, [os.path.join(folder, "verilator", "sim"), "+verilator+rand+reset+2"]
 
 

@@ -2,6 +2,7 @@
 # Programs against a board: the Verilated one behind a pseudo-terminal. Pictures and counters equal the core's; a line that loses,
 # doubles and changes bytes is repaired or named; a board that is not as it should be is one line and status 1, and no file.
 # usage: board.sh BUILD
+NEURONS=32 # programmed sooner
 . "$(dirname "$0")/../small_scene.bash"
 cd "$work" || exit 1
 board=0
@@ -15,8 +16,8 @@ begin() { # OPTIONS OF sf_board
 }
 end() { kill "$board" && wait "$board"; }
 trap 'kill "$board" 2>/dev/null; rm -rf "$work"' EXIT
-render() { "$build/bin/sim_render" "${scene:-scene.snn}" data --backend board --port tty --timeout "${patience:-20}" --crop 10,10,4,3 --quiet -o "$1" >said.log 2>&1; }
-cosim() { "$build/bin/sf_cosim" scene.snn data --backend board --port tty --timeout "${patience:-20}" --rays 12 --quiet "$@" >said.log 2>&1; }
+render() { "$build/bin/sim_render" "${scene:-scene.snn}" data --backend board --port tty --timeout "${patience:-20}" --crop 10,10,3,2 --quiet -o "$1" >said.log 2>&1; }
+cosim() { "$build/bin/sf_cosim" scene.snn data --backend board --port tty --timeout "${patience:-20}" --rays 5 --quiet "$@" >said.log 2>&1; }
 says() { grep -q -e "$1" said.log || fail "$2 does not say '$1' but: $(cat said.log)"; }
 refuses() { # TEXT WHAT: status 1, one line, nothing written
   local status=0
@@ -28,7 +29,7 @@ refuses() { # TEXT WHAT: status 1, one line, nothing written
   says "$1" "$2"
 }
 
-"$build/bin/sim_render" scene.snn data --crop 10,10,4,3 --quiet -o fixed.exr >/dev/null || fail "no golden picture"
+"$build/bin/sim_render" scene.snn data --crop 10,10,3,2 --quiet -o fixed.exr >/dev/null || fail "no golden picture"
 
 # ---- a sound board
 begin
@@ -36,7 +37,7 @@ render board.exr || fail "no picture: $(cat said.log)"
 cmp -s board.exr fixed.exr || fail "the board's picture is not the core's"
 ! grep -q "sent again" said.log || fail "a quiet line needed repair: $(cat said.log)"
 cosim || fail "lockstep: $(cat said.log)"
-says "12 rays (.*: 0 differences" lockstep
+says "5 rays (.*: 0 differences" lockstep
 says "compared: pixels, every counter, energy" lockstep
 cosim --limit-samples 1 --json || fail "lockstep: $(cat said.log)"
 says '"differences":[[:space:]]*0' "lockstep in JSON"
@@ -58,7 +59,7 @@ status=0
 rm -f wrong.exr
 render wrong.exr || status=$?
 [ $status -eq 1 ] && [ ! -e wrong.exr ] || fail "a bad memory: status $status: $(cat said.log)"
-says "scene.snn: pixel (1[0-4], 1[0-3]) of view test/r_0, sample [0-9]*: " "a bad memory"
+says "scene.snn: pixel (1[0-2], 1[01]) of view test/r_0, sample [0-9]*: " "a bad memory"
 status=0
 cosim || status=$?
 [ $status -eq 1 ] || fail "lockstep with a bad memory: status $status"
@@ -75,16 +76,16 @@ touch tty
 refuses "tty: no serial port" "a file for a port"
 
 # ---- a scene that does not fit, and what its message says to do
-"$build/bin/sf_train" data -o model.safetensors --stage1 2 --stage2 2 --steps 2 --occ-res 16 --eval-views 1 --quiet >/dev/null 2>&1 || fail "no model"
+"$build/bin/sf_train" data -o model.safetensors --stage1 2 --stage2 2 --steps 2 --hidden 32 --occ-res 16 --eval-views 1 --quiet >/dev/null 2>&1 || fail "no model"
 "$build/bin/sf_export" model.safetensors -o large.snn >/dev/null || fail "no scene"
 begin
 scene=large.snn refuses "large.snn: its grid takes [0-9]* bytes, the board has 131072: room for the first [0-9]* of 16 levels; a scene that fits: sf_export MODEL -o SMALL.snn --fit --data DATA --fit-bytes 131072$" "a large scene"
 end
-picture() { "$root/tools/board_picture.sh" "$build" model.safetensors data --board "$1" --downscale 1 --crop 10,10,4,3 --fit-rays 256 --out picture >said.log 2>&1; }
+picture() { "$root/tools/board_picture.sh" "$build" model.safetensors data --board "$1" --downscale 1 --crop 10,10,3,2 --fit-rays 256 --out picture >said.log 2>&1; }
 picture "$build/board/sf_board" || fail "the picture of a fitted scene: $(cat said.log)"
 grep -q "grid: [0-9]* -> [0-9]* bytes, at most 131072 were asked for" picture/fit.log || fail "--fit-bytes: $(cat picture/fit.log)"
 cmp -s picture/board.exr picture/fixed.exr || fail "the picture of a fitted scene is not the core's"
-says "^4 x 3 pixels, [0-9]* samples: .*byte for byte$" "a fitted scene"
+says "^3 x 2 pixels, [0-9]* samples: .*byte for byte$" "a fitted scene"
 says "^over the line at 12.50 Mbaud: [0-9]* bytes to the board, [0-9]* back" "a fitted scene"
 printf '#!/bin/sh\nexec %s "$@" --version 0x40002\n' "$build/board/sf_board" >another && chmod +x another
 ! picture ./another && [ ! -e picture/board.exr ] || fail "a board of another version gives a picture"

@@ -35,7 +35,7 @@ sed -E 's/module ulx3s/module small/; /^  wire \[3:0\] lamps;/d; s/\.lamps_i\(la
 grep -q 'lamps_i(sum_q' "$own/small.sv" && grep -q 'assign ftdi_rxd = sum_q' "$own/small.sv" || fail "ulx3s.sv is not what this test makes a small board of"
 cp rtl/board/ulx3s/ulx3s.lpf "$own/"
 describe() { printf '{"name": "a small board", "top": "small", "device": "%s", "package": "CABGA381", "speed": "6", "mhz": %s, "pins": "ulx3s.lpf", "load": "load it"}' "$1" "$2" >"$own/board.json"; }
-board() { python3 tools/board.py "$work" --venv "$build/fpga/venv" --rtl "$work/tree" --board "$@" >"$work/out.log" 2>"$work/said.log"; }
+board() { python3 tools/board.py "$work" --debian --venv "$build/fpga/venv" --rtl "$work/tree" --board "$@" >"$work/out.log" 2>"$work/said.log"; }
 refused() { # STATUS TEXT BOARD
   local status=0
   board "$3" || status=$?

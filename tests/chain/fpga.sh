@@ -53,7 +53,7 @@ endmodule
 SOURCE
 
 ln -s "$(realpath "$build")/bin" "$work/bin"
-fpga() { python3 tools/fpga.py "$work" --venv "$build/fpga/venv" --rtl "$work/tree" "$@" 2>"$work/said.log"; }
+fpga() { python3 tools/fpga.py "$work" --debian --venv "$build/fpga/venv" --rtl "$work/tree" "$@" 2>"$work/said.log"; }
 field() { # BUILD EXPRESSION OF r
   python3 -c 'import json, sys; r = json.load(open(sys.argv[1]))[sys.argv[2]]; v = eval(sys.argv[3]); print(*(v if isinstance(v, tuple) else [v]))' "$work/fpga/fpga.json" "$1" "$2"
 }

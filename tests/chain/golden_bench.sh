@@ -7,7 +7,7 @@ rtl=$build/faults/rtl
 # shellcheck disable=SC2046
 MAKEFLAGS='' verilator --binary --timing --top-module golden_tb --prefix Vgolden_tb --Mdir "$work/made" -O3 \
   -Wno-fatal -Wno-lint -Wno-style --x-assign unique --x-initial unique --unroll-count 256 --unroll-stmts 1000000 \
-  -MAKEFLAGS "OPT_FAST=-O0 OPT_SLOW=-O0" \
+  --output-split 100000000 -MAKEFLAGS "OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0" \
   -I"$rtl" $(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f") src/lib/sf_golden_dpi.sv docs/golden_tb.sv \
   -LDFLAGS "$build/lib/libsf_golden_dpi.so" >"$work/log" 2>&1 || { grep -E '%Error|error' "$work/log"; exit 1; }
 

@@ -35,7 +35,7 @@ tail -n 1 "$work/err"
 wide=$build/lanes/256
 # make_wide GOAL or VARIABLE=...
 make_wide() {
-  MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 VERILATED_OPT="$quick" \
+  MAKEFLAGS='' make -s -j1 -C "$root" B="$wide" ARCH="LANES=256" OPT=-O0 VERILATED_OPT="$quick" VERILATOR="verilator --output-split 100000000" \
     VERILATED_OBJ="$(printf "$build/verilated/runtime/%s.o " verilated verilated_fst_c verilated_threads)" "$@" >"$work/out" 2>"$work/err"
 }
 needed='$(filter-out %_isa.c,$(foreach room,base ranks cli image scene field snn fx quant energy,$(wildcard src/$(room)/*.c)))'

@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 fail() { echo "netlist: $1" >&2; tail -n 3 "$work"/said.log "$work"/table.md 2>/dev/null >&2 || true; exit 1; }
 
 ln -s "$build/bin" "$work/bin"
-check() { python3 tools/netlist_check.py "$work" --debian --simulator icarus --samples 6 --modules sf_plif "$@" >"$work/table.md" 2>"$work/said.log"; }
+check() { python3 tools/netlist_check.py "$work" --debian --simulator icarus --samples 3 --modules sf_plif "$@" >"$work/table.md" 2>"$work/said.log"; }
 expect() { # TEXT EXPRESSION OF r, THE FIRST RESULT
   python3 -c 'import json, sys; r = next(iter(json.load(open(sys.argv[1])).values())); sys.exit(not eval(sys.argv[2]))' "$work/netlist/netlist.json" "$2" || fail "$1"
 }
@@ -21,7 +21,7 @@ expect() { # TEXT EXPRESSION OF r, THE FIRST RESULT
 for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1"; do
   # shellcheck disable=SC2086
   check --cells $cells || fail "$cells: the netlist of a neuron unit"
-  expect "$cells: not 6 samples" 'r["passed"] and r["samples"] == 6 and r["said"].startswith("PASS 6 samples")'
+  expect "$cells: not 3 samples" 'r["passed"] and r["samples"] == 3 and r["said"].startswith("PASS 3 samples")'
   expect "$cells: no cells" 'r["counts"]["cells"] > 500 and r["counts"]["registers"] >= 200'
   expect "$cells: planted errors" 'len(r["planted"]) >= 1 and all(e["found"] for e in r["planted"])'
   expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
@@ -50,7 +50,7 @@ for seed in range(9):
     assert plant.choose(places, states.own, 1, seed) == [places[2]] and plant.choose(places, states.own, 2, seed) == [places[2], places[0]], seed
 PYTHON
 # A netlist with planted errors, none of them turned on, is the netlist.
-(cd "$work/netlist/kit-6" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|netlist.v|planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
+(cd "$work/netlist/kit-3" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|netlist.v|planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
   RTL="$work/netlist/ecp5/sf_plif/rtl" LANES=32 BUILD="$work/none") >"$work/table.md" 2>&1 || fail "a netlist with errors to turn on, none of them on, differs"
 
 # The second time nothing is mapped.

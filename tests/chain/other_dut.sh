@@ -1,6 +1,7 @@
 #!/bin/bash
 # sf_cosim --dut: a top level of another name around another neuron co-simulates with 0 differences; when an included
 # file changes, it is built again and its mistake located; what does not build says where. usage: other_dut.sh BUILD
+NEURONS=32 # programmed sooner
 . "$(dirname "$0")/../small_scene.bash" "$@"
 built=()
 trap 'rm -rf "$work" "${built[@]}"' EXIT
@@ -18,7 +19,7 @@ sources=$(sed -n "s|^rtl/|$rtl/|p" "$work/kit/rtl.f" | sed "s|.*/sf_plif.sv$|$wo
 run() {
   local name=$1 want=$2 got
   shift 2
-  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 200 --limit-samples 1000 --seed 7 --quiet --json --evidence "$work/evidence" "$@" \
+  "$build/bin/sf_cosim" "$work/scene.snn" "$work/data" --rays 100 --limit-samples 300 --seed 7 --quiet --json --evidence "$work/evidence" "$@" \
     >"$work/$name.json" 2>"$work/$name.err"
   got=$?
   while read -r folder; do built+=("$folder"); done < <(sed -n 's/^ *VERI *//p' "$work/$name.err")
@@ -29,7 +30,7 @@ has() { grep -qF -- "$2" "$work/$1" || fail "'$2' is not in $1: $(head -n 5 "$wo
 
 my_block=(--dut "+incdir+$work/overlay +incdir+$rtl $sources $work/my_block.sv" --dut-top my_block)
 run serial 0 "${my_block[@]}"
-[ "$(field serial samples)" -ge 1000 ] && [ "$(field serial differences)" = 0 ] || fail "the other neuron: $(cat "$work/serial.json")"
+[ "$(field serial samples)" -ge 300 ] && [ "$(field serial differences)" = 0 ] || fail "the other neuron: $(cat "$work/serial.json")"
 run again 0 "${my_block[@]}"
 [ ! -s "$work/again.err" ] || fail "built again without a change: $(head -n 1 "$work/again.err")"
 # Its activity has the nets of what it shares with ours: arrays over lanes, too.

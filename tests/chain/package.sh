@@ -93,15 +93,17 @@ fi
 command -v python3 >/dev/null || { echo "skipped: python3 is not installed"; exit 77; }
 python3 tests/crosscheck_registers.py
 
-# Planted faults: FILE, what sed does to it, what the check must say.
+# Planted faults: FILE, what sed does to it, what the check of that file must say.
 seen=0
+declare -A check_of=([spikefield.xml]=ipxact [spikefield.core]=ipxact [sf_csr.rdl]=systemrdl [sf_csr_pkg.sv]=package [registers.md]=markdown [sf_csr.h]=header)
+own_check() { python3 tests/crosscheck_registers.py "$1" "${check_of[${2##*/}]}"; }
 planted() {
   rm -rf "$work/tree"
   mkdir "$work/tree"
   cp -r include rtl docs sim spikefield.core "$work/tree"
   sed -i -E "$2" "$work/tree/$1"
   cmp -s "$1" "$work/tree/$1" && fail "the fault '$2' changes nothing in $1"
-  if ${4:-python3 tests/crosscheck_registers.py} "$work/tree" >"$work/out" 2>&1; then fail "$1 with '$2' passes"; fi
+  if ${4:-own_check} "$work/tree" "$1" >"$work/out" 2>&1; then fail "$1 with '$2' passes"; fi
   grep -q -e "$3" "$work/out" || fail "$1 with '$2' is refused without '$3': $(head -n 3 "$work/out")"
   seen=$((seen + 1))
 }

