@@ -37,12 +37,12 @@ tool() { # SCENE TOOL COMMAND...
 every_tool() { # SCENE DATA TRAIN-OPTIONS...
   local s=$1 d=$2
   shift 2
-  "$bin/sf_train" "$d" -o "$s.safetensors" --stage1 20 --stage2 30 --steps 2 --occ-res 16 --eval-views 1 --quiet "$@" >/dev/null ||
+  "$bin/sf_train" "$d" -o "$s.safetensors" --stage1 20 --stage2 30 --steps 2 --hidden 32 --occ-res 16 --eval-views 1 --quiet "$@" >/dev/null ||
     { fail "$s: training"; return; }
   "$bin/sf_export" "$s.safetensors" -o "$s.snn" >/dev/null || { fail "$s: export"; return; }
   tool "$s" float "$bin/sim_render" "$s.snn" "$d" --backend float --model "$s.safetensors" --crop 8,8,4,4 -o o.exr --quiet
-  tool "$s" fixed "$bin/sim_render" "$s.snn" "$d" --backend fixed --crop 18,18,4,4 -o fixed.exr --quiet
-  tool "$s" rtl "$bin/sim_render" "$s.snn" "$d" --backend rtl --crop 18,18,4,4 -o rtl.exr --quiet
+  tool "$s" fixed "$bin/sim_render" "$s.snn" "$d" --backend fixed --crop 18,18,2,2 -o fixed.exr --quiet
+  tool "$s" rtl "$bin/sim_render" "$s.snn" "$d" --backend rtl --crop 18,18,2,2 -o rtl.exr --quiet
   cmp -s fixed.exr rtl.exr || fail "$s: core and accelerator differ"
   tool "$s" set "$bin/sim_render" "$s.snn" "$d" --all --crop 18,18,2,2 -o "$s.set" --quiet
   tool "$s" cosim "$bin/sf_cosim" "$s.snn" "$d" --rays 6 --quiet
@@ -67,5 +67,5 @@ every_tool() { # SCENE DATA TRAIN-OPTIONS...
   tool "$s" traces "$bin/sf_export" "$s.snn" --traces "$s.traces" --data "$d" --rays 2
   tool "$s" nir "$bin/sf_export" "$s.snn" --nir "$s.nir"
   tool "$s" activity "$bin/sf_cosim" "$s.snn" "$d" --rays 2 --saif "$s.saif" --quiet
-  [ ! -x "$bin/sf_soc" ] || tool "$s" sf_soc "$bin/sf_soc" "$s.snn" "$d" --crop 18,18,2,2
+  [ ! -x "$bin/sf_soc" ] || tool "$s" sf_soc "$bin/sf_soc" "$s.snn" "$d" --crop 18,18,1,1
 }

@@ -1,5 +1,6 @@
 #!/bin/bash
 # Plants one fault after another in a copy of the RTL and sees sf_cosim catch and locate each. usage: cosim_faults.sh BUILD
+NEURONS=72 # programmed sooner; fault 2 is in neuron 64
 . "$(dirname "$0")/../small_scene.bash" "$@"
 
 # expect FAULT STATUS TEXT...: exit status, and each text in the first difference

@@ -1,6 +1,7 @@
 #!/bin/bash
 # The vector kit around RTL with planted faults: each is caught and located. usage: kit_faults.sh BUILD
 KIT_SAMPLES=48 # the fault of a counter shows late
+NEURONS=72 # programmed sooner; fault 2 is in neuron 64
 . "$(dirname "$0")/../kit_run.bash" "$@"
 export OPT=-O0
 

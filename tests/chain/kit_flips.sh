@@ -1,5 +1,6 @@
 #!/bin/bash
 # One wrong bit in any file of the vector kit is caught and located, in Verilator (kit.sh: a bit in Icarus). usage: kit_flips.sh BUILD
+NEURONS=72 # programmed sooner
 . "$(dirname "$0")/../kit_run.bash" "$@"
 export OPT=-O0
 
