@@ -3,6 +3,7 @@
 # planted fault of the RTL found and located, one JUnit case per ray, another block, clear errors.   usage: cocotb.sh BUILD
 python=$(cd "${1:?usage: $0 BUILD}" && pwd)/cocotb/bin/python3
 [ -x "$python" ] || { echo "cocotb: skipped: no $python: make python"; exit 77; }
+NEURONS=72 # programmed sooner; fault 2 is in neuron 64
 . "$(dirname "$0")/../small_scene.bash" "$@"
 cd "$root" || exit 1
 unset MAKEFLAGS MAKELEVEL SPIKEFIELD_LIBRARY PYTHONPATH
