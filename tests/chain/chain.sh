@@ -18,8 +18,8 @@ check_scene() { # name, train options
   "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --threads 1 -o "$dir/one.exr" >/dev/null
   "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --threads 3 -o "$dir/three.exr" >/dev/null
   cmp "$dir/one.exr" "$dir/three.exr" || fail "$1: the fixed image depends on the threads"
-  "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --crop 14,14,12,12 -o "$dir/fixed.exr" >/dev/null
-  "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend rtl --crop 14,14,12,12 -o "$dir/rtl.exr" >/dev/null
+  "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend fixed --crop 17,17,6,6 -o "$dir/fixed.exr" >/dev/null
+  "$bin/sim_render" "$dir/s.snn" "$dir" --view 1 --backend rtl --crop 17,17,6,6 -o "$dir/rtl.exr" >/dev/null
   cmp "$dir/fixed.exr" "$dir/rtl.exr" || fail "${dir##*/}: the RTL's image differs from the fixed-point core's"
   "$bin/sf_cosim" "$dir/s.snn" "$dir" --rays 30 --seed 7 --stalls 20 --json >"$dir/cosim.json" || fail "${dir##*/}: co-simulation"
   grep -Eq '"differences":[[:space:]]*0,' "$dir/cosim.json" || fail "${dir##*/}: differences"
@@ -40,7 +40,7 @@ check_fit textured
 check_scene simple --input-mode no-decay --steps 4 --hidden 32
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_fit fog
-check_scene empty --steps 2
+check_scene empty --steps 2 --hidden 32
 check_scene plaza --steps 3 --bound 8 --hidden 32
 "$bin/error_budget" "$work/plaza/m.safetensors" "$work/plaza/s.snn" "$work/plaza" --rays 20 --samples 1000 --quiet >"$work/budget.txt" ||
   fail "plaza: error budget"

@@ -24,7 +24,7 @@ expect() {
 
 "$BIN/sf_scene" simple -o d --size 12 --train 3 --test 4 >/dev/null &&
   for seed in 1 2; do
-    "$BIN/sf_train" d -o m$seed.safetensors --seed $seed --stage1 2 --stage2 2 --levels 2 --log2-hash 8 -q >/dev/null &&
+    "$BIN/sf_train" d -o m$seed.safetensors --seed $seed --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --hidden 32 -q >/dev/null &&
       "$BIN/sf_export" m$seed.safetensors -o s$seed.snn >/dev/null
   done || { echo "no scene to test with"; exit 1; }
 cp m1.safetensors model.safetensors

@@ -9,7 +9,7 @@ done
 build=$(cd "${1:?usage: netlist.sh BUILD}" && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/spikefield-netlist-XXXXXX")
 trap 'rm -rf "$work"' EXIT
-fail() { echo "netlist: $1" >&2; tail -n 3 "$work"/said.log "$work"/table.md 2>/dev/null >&2 || true; exit 1; }
+fail() { echo "netlist: $1" >&2; tail -n 3 "$work"/said.log "$work"/table.md >&2 2>/dev/null || true; exit 1; }
 
 ln -s "$build/bin" "$work/bin"
 check() { python3 tools/netlist_check.py "$work" --debian --simulator icarus --samples 3 --modules sf_plif "$@" >"$work/table.md" 2>"$work/said.log"; }
