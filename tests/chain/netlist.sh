@@ -50,7 +50,7 @@ for seed in range(9):
     assert plant.choose(places, states.own, 1, seed) == [places[2]] and plant.choose(places, states.own, 2, seed) == [places[2], places[0]], seed
 PYTHON
 # A netlist with planted errors, none of them turned on, is the netlist.
-(cd "$work/netlist/kit-3" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|netlist.v|planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
+(cd "$work/netlist/kit-3" && make -s icarus SOURCES="$(sed "/^+/d; s|^|$work/netlist/ecp5/sf_plif/|; s|/netlist\.v$|/planted.v|" "$work/netlist/ecp5/sf_plif/netlist.f" | tr '\n' ' ')" \
   RTL="$work/netlist/ecp5/sf_plif/rtl" LANES=32 BUILD="$work/none") >"$work/table.md" 2>&1 || fail "a netlist with errors to turn on, none of them on, differs"
 
 # The second time nothing is mapped.
