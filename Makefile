@@ -183,7 +183,7 @@ TECHS := $(wildcard share/tech/*.tech)
 $B/share/spikefield/tech/%.tech: share/tech/%.tech
 	@mkdir -p $(@D)
 	$Qcp $< $@
-$B/bin/energy_audit $B/bin/sf_view $B/tests/test_viewer: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
+$B/bin/energy_audit $B/bin/sf_view $B/tests/test_viewer $B/tests/test_twin: | $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 all: $(TECHS:share/tech/%=$B/share/spikefield/tech/%)
 
 # Tests

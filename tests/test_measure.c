@@ -132,7 +132,7 @@ TEST(checked_rays_are_a_seeded_choice)
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);
   sf_measure_job job = job_of(&scene, 1000, 50);
   OWNED(sf_measure) measure;
-  uint64_t index[50], again[50], other[50], all[1000], n, differs = 0;
+  uint64_t index[50], again[60], other[50], all[1000], n, differs = 0;
   ck_ok(sf_measure_rays(&job, &measure));
   ck_assert_uint_eq(measure.checked, 50);
   ck_assert_uint_eq(measure.recount.rays, 50);
@@ -151,12 +151,19 @@ TEST(checked_rays_are_a_seeded_choice)
   ck_assert_uint_gt(differs, 25);
   sf_measure_choose(&measure, 1, 2, 1000, all, &n);
   ck_assert_uint_eq(n, measure.core.rays);
-  /* The chosen ones have the smallest keys of all. */
-  uint64_t largest = 0, below = 0;
-  for (int i = 0; i < 50; i++)
-    largest = index[i] && sf_random_u64(1, 2, index[i]) > largest ? sf_random_u64(1, 2, index[i]) : largest;
-  for (uint64_t i = 0; i < n; i++) below += sf_random_u64(1, 2, all[i]) <= largest;
-  ck_assert_uint_eq(below, 50);
+  ck_assert_uint_eq(n, 1000 - 1000 / 7 - (1000 % 7 > 3)); /* rays that meet the box */
+  /* However many: those with the smallest keys, in ascending order. */
+  for (uint64_t limit = 0; limit <= 60; limit++) {
+    ck_ok(sf_measure_choose(&measure, 1, 2, limit, again, &differs));
+    ck_assert_uint_eq(differs, limit);
+    uint64_t at = 0;
+    for (uint64_t i = 0; i < n; i++) {
+      uint64_t smaller = 0;
+      for (uint64_t k = 0; k < n; k++) smaller += sf_random_u64(1, 2, all[k]) < sf_random_u64(1, 2, all[i]);
+      if (smaller < limit) ck_assert_uint_eq(again[at++], all[i]);
+    }
+    ck_assert_uint_eq(at, limit);
+  }
 }
 
 TEST(measure_reports_the_lowest_failing_ray)

@@ -135,3 +135,126 @@ TEST(smaller_tables_keep_what_is_used)
   ck_assert_int_gt(compared, 200);
   fx_scene_free(&scene);
 }
+
+/* ---- which parts are of use ---- */
+
+/* The mean of the squared weights, in octaves, with one sample more of weight one; cells that no ray meets are of the
+ * first class. */
+TEST(classes_of_cells)
+{
+  const uint64_t one = (uint64_t)1 << 2 * SF_TRANS_FRAC;
+  uint64_t visits[1], weight2[1];
+  const sf_trim_use use = {.visits = visits, .weight2 = weight2, .cells = 1};
+  const struct {
+    uint64_t visits, weight2;
+    int octave;
+  } rows[] = {{0, 0, 0},
+              {1, one, 0},
+              {1, one - 1, 1},
+              {1, 0, 1},
+              {3, 3 * one, 0},
+              {3, one, 1},
+              {3, one - 1, 2},
+              {7, 0, 3},
+              {1023, 0, 10},
+              {1023, one, 9},
+              {(1 << 20) - 1, 0, 15},
+              {(1 << 15) - 1, 0, 15},
+              {(1 << 14) - 1, 0, 14}};
+  for (int i = 0; i < COUNT(rows); i++) {
+    *visits = rows[i].visits, *weight2 = rows[i].weight2;
+    ck_assert_msg(sf_cell_class(&use, 0) == rows[i].octave, "row %d: %d", i, sf_cell_class(&use, 0));
+  }
+}
+
+TEST(cells_go_by_class)
+{
+  OWNED(fx_scene) scene = small_scene(17, FX_HYBRID);
+  const int64_t cells = sf_cells_of(&scene);
+  uint8_t *left = malloc((size_t)cells / 8);
+  OWNED(sf_trim_use) use;
+  sf_trim trim;
+  ck_ok(sf_trim_use_create(&use, &scene));
+  for (int64_t cell = 0; cell < cells; cell++) use.visits[cell] = ((uint64_t)1 << cell % 6) - 1;
+  sf_trim_all(&scene, &trim);
+  sf_trim_cells(&scene, &trim, &use, left);
+  ck_assert_mem_eq(left, scene.occupancy, (size_t)cells / 8);
+  trim.cells[3] = trim.cells[0] = false;
+  sf_trim_cells(&scene, &trim, &use, left);
+  for (int64_t cell = 0; cell < cells; cell++) {
+    const bool occupied = scene.occupancy[cell >> 3] >> (cell & 7) & 1, gone = cell % 6 == 0 || cell % 6 == 3;
+    ck_assert((left[cell >> 3] >> (cell & 7) & 1) == (occupied && !gone));
+  }
+  free(left);
+}
+
+/* Neurons that fired, outputs of D2 whose h is not zero, inputs that are not. The first output of D2 is the density. */
+TEST(use_of_a_net)
+{
+  OWNED(fx_scene) scene = small_scene(18, FX_HYBRID);
+  OWNED(sf_trim_use) use;
+  fx_trace *trace = calloc(1, sizeof *trace);
+  int16_t f[64] = {0};
+  ck_ok(sf_trim_use_create(&use, &scene));
+  trace->spikes[FX_D1][0][0] = 2, trace->spikes[FX_D1][scene.net.steps - 1][0] = 6;
+  trace->spikes[FX_C2][0][0] = 1;
+  trace->current[FX_D2][0][0] = 1 << 20; /* density */
+  trace->current[FX_D2][0][1] = 1 << SF_H_SHIFT, trace->current[FX_D2][0][2] = (1 << SF_H_SHIFT) - 1;
+  trace->current[FX_D2][0][3] = -1;
+  f[0] = 5, f[3] = -1;
+  sf_trim_use_net(&use, &scene.net, f, trace);
+  sf_trim_use_net(&use, &scene.net, f, trace);
+  ck_assert_uint_eq(use.samples, 2);
+  ck_assert_uint_eq(use.steps, 2 * (uint64_t)scene.net.steps);
+  static const uint64_t d1[] = {0, 4, 2, 0}, d2[] = {0, 2, 0, 2, 0}, input[] = {2, 0, 0, 2, 0};
+  ck_assert_mem_eq(use.fired[FX_D1], d1, sizeof d1);
+  ck_assert_mem_eq(use.fired[FX_D2], d2, sizeof d2);
+  ck_assert_mem_eq(use.feature, input, sizeof input);
+  ck_assert_uint_eq(use.fired[FX_C2][0], 2);
+  ck_assert_uint_eq(use.fired[FX_C2][1] + use.fired[FX_C1][0], 0);
+  free(trace);
+}
+
+/* A neuron a layer stays; of D2, whose first output is the density, an h besides where C1 has no other input. */
+TEST(what_stays_at_least)
+{
+  sf_trim trim = {.directions = 0};
+  for (int layer = FX_D1; layer <= FX_C3; layer++)
+    ck_assert_int_eq(sf_trim_least(&trim, layer), layer == FX_D2 ? 2 : 1);
+  trim.directions = 3;
+  for (int layer = FX_D1; layer <= FX_C3; layer++) ck_assert_int_eq(sf_trim_least(&trim, layer), 1);
+}
+
+/* A table of half the entries, down to one; a level that is dense has the next power of two below. */
+TEST(the_next_smaller_table)
+{
+  OWNED(fx_scene) scene = small_scene(19, FX_HYBRID);
+  sf_trim trim;
+  sf_trim_all(&scene, &trim);
+  for (int l = 0; l < scene.grid.levels; l++) {
+    const int64_t entries = sf_grid_level_entries(&scene.grid, l);
+    int size = sf_trim_smaller(&scene, &trim, l);
+    ck_assert_int_lt((int64_t)1 << size, entries);
+    ck_assert_int_ge((int64_t)2 << size, entries);
+    for (; size >= 0; size--) {
+      trim.log2_size[l] = size;
+      ck_assert_int_eq(sf_trim_smaller(&scene, &trim, l), size - 1);
+    }
+  }
+}
+
+/* A table of one entry is hashed: it has no stride. */
+TEST(a_table_of_one_entry)
+{
+  OWNED(fx_scene) scene = small_scene(20, FX_HYBRID), small_one;
+  OWNED(sf_trim_use) use;
+  sf_trim trim;
+  ck_ok(sf_trim_use_create(&use, &scene));
+  sf_trim_all(&scene, &trim);
+  trim.log2_size[0] = 0;
+  ck_ok(sf_trim_apply(&scene, &trim, &use, "one", &small_one));
+  ck_assert_int_eq(small_one.grid.stride[0], 0);
+  ck_assert_int_eq(small_one.grid.log2_size[0], 0);
+  ck_assert_int_eq(small_one.grid.offset[1], 1);
+  ck_assert_int_eq(sf_grid_level_entries(&small_one.grid, 0), 1);
+}

@@ -304,6 +304,53 @@ TEST(unread_points_are_not_read)
   }
 }
 
+/* A part of the points goes, one at least, and two stay. */
+TEST(a_part_of_the_points_goes)
+{
+  static const struct {
+    int points, parts, left; /* 0: refused */
+  } rows[] = {{16, 4, 12}, {17, 4, 13}, {100, 8, 88}, {7, 8, 6}, {3, 8, 2}, {2, 8, 0}, {3, 2, 2}, {4, 2, 2}, {4, 1, 0}};
+  for (int i = 0; i < COUNT(rows); i++)
+    for (int axis = 0; axis < 3; axis++) {
+      sf_trim trim = {0};
+      for (int a = 0; a < 3; a++) trim.planes.points[a] = 50 + a;
+      trim.planes.points[axis] = rows[i].points;
+      ck_assert(sf_trim_points(&trim, axis, rows[i].parts) == (rows[i].left > 0));
+      for (int a = 0; a < 3; a++) {
+        const int other = a == axis ? rows[i].left > 0 ? rows[i].left : rows[i].points : 50 + a;
+        ck_assert_int_eq(trim.planes.points[a], other);
+      }
+    }
+}
+
+/* The field that was made last is kept: the same trim gives it again, and any other one a field of its own. */
+TEST(shapes_in_a_row)
+{
+  OWNED(fx_scene) scene = planes_scene(12);
+  OWNED(sf_trim_use) use = {0}, fresh = {0};
+  ck_ok(sf_trim_use_create(&use, &scene));
+  for (int step = 0; step < 8; step++) {
+    const fx_tensorf *kept, *made;
+    sf_trim trim;
+    sf_trim_all(&scene, &trim);
+    if (step > 0) trim.planes.points[(step - 1) / 2 % 3] -= 2;
+    if (step == 7) trim.planes.low[1]++, trim.planes.points[1]--;
+    ck_ok(sf_trim_use_create(&fresh, &scene));
+    ck_ok(sf_planes_shape(&scene, &trim.planes, &use, "kept", &kept));
+    ck_ok(sf_planes_shape(&scene, &trim.planes, &fresh, "made", &made));
+    ck_assert((made == &scene.tensorf) == (step == 0));
+    ck_assert_mem_eq(kept->res, made->res, sizeof made->res);
+    for (int pair = 0; pair < FX_PAIRS; pair++) {
+      const int *axes = fx_pair_axes[pair];
+      const size_t n = (size_t)made->density.components[pair];
+      ck_assert_mem_eq(kept->density.plane[pair], made->density.plane[pair],
+                       n * (size_t)(made->res[axes[0]] * made->res[axes[1]]));
+      ck_assert_mem_eq(kept->density.line[pair], made->density.line[pair], n * (size_t)made->res[axes[2]]);
+    }
+    sf_trim_use_free(&fresh);
+  }
+}
+
 int ck_timeout = 240;
 
 int main(void)

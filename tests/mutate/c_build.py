@@ -1,5 +1,6 @@
 """Builds one mutant of a C file: its object with the normal flags, and the test programs linked with that object in front
 of the library. The commands are those that make prints (`make -n V=1`), so they are the ones of the build."""
+import contextlib
 import os
 import re
 import shlex
@@ -46,7 +47,11 @@ class Build:
         subprocess.run(self.flags(path) + ["-w"] + more + ["-c", path, "-o", to], check=True)
 
     def link(self, test, first, to, more=()):
-        """The test program with objects or archives in front of the library."""
+        """The test program with objects or archives in front of the library, and beside its folder what it looks for there."""
+        beside = f"{os.path.dirname(os.path.dirname(to))}/share"
+        if not os.path.lexists(beside):
+            with contextlib.suppress(FileExistsError): # another thread was faster
+                os.symlink(os.path.abspath(f"{self.folder}/share"), beside)
         command = list(self.linkers[test])
         command[command.index("-o") + 1] = to
         library = next(i for i, word in enumerate(command) if word.endswith(".a"))
