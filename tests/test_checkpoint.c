@@ -106,6 +106,31 @@ TEST(numbers_have_ranges)
   }
 }
 
+/* In any of its tensors, the optimiser's too. */
+TEST(a_number_that_is_none)
+{
+  const sf_train_options o = grid_run();
+  write_after(&o, 2);
+  OWNED(sf_tensors) set;
+  ck_ok(sf_tensors_load(&set, in("good.safetensors")));
+  int tensors = 0;
+  for (int i = 0; i < set.count; i++) {
+    if (set.tensor[i].type != SF_F32) continue;
+    float *value = set.tensor[i].data;
+    const float before = *value;
+    sf_trainer *t;
+    *value = NAN;
+    ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, in("edited.safetensors")));
+    const sf_status status = sf_trainer_create(&t, &data, &o, in("edited.safetensors"));
+    ck_assert_int_ne(status.code, SF_OK);
+    ck_assert_msg(strstr(status.message, set.tensor[i].name), "'%s' does not name '%s'", status.message,
+                  set.tensor[i].name);
+    *value = before;
+    tensors++;
+  }
+  ck_assert_int_gt(tensors, 18); /* six of the model, and twice as many of Adam */
+}
+
 /* A run with other backbone or rays in NDC than the checkpoint's. */
 TEST(a_checkpoint_of_another_kind)
 {

@@ -162,14 +162,6 @@ static void set_charge(rig *r, const sf_loss_plan *p)
   for (int l = 0; l < 3; l++) r->o.charge[l] = t->model.config.net == SF_NET_ANN ? 0 : price * reads[l];
 }
 
-/* The loss of the plan's sums, as the trainer reports it. */
-static double sums_of(const sf_loss_plan *p, const sf_loss_sums *mean, double e_tau)
-{
-  double loss = mean->regular + p->distill * mean->distill;
-  for (int t = 0; t < p->steps; t++) loss += p->weight[t] * mean->prefix[t];
-  return loss + p->extra * ((1 - p->d) * mean->extra_floor + p->d * mean->extra_ceil + e_tau);
-}
-
 static void check_plan(rig *r, const char *what, sf_loss_plan p)
 {
   sf_trainer *t = r->t;
@@ -189,7 +181,7 @@ static void check_plan(rig *r, const char *what, sf_loss_plan p)
   set_charge(r, &p);
   for (size_t i = 0; i < t->model.size; i++) r->o.value[i] = t->model.value[i];
   if (p.charge == 0 && r->variation == 0) {
-    const double loss = sums_of(&p, &mean, e_tau), found = creal(oracle_loss(&r->o, 0));
+    const double loss = sf_loss_total(&p, &mean, e_tau), found = creal(oracle_loss(&r->o, 0));
     ck_assert_msg(fabs(found - loss) <= 1e-4 * fabs(loss) + 1e-9, "%s: loss %.9g, oracle %.9g", what, loss, found);
   }
   check_parameters(r, what);

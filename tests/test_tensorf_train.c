@@ -162,12 +162,16 @@ TEST(schedule_scales_with_the_run)
   sf_train_options o = small_vm(SF_NET_ANN);
   o.stage1 = 60, o.stage2 = 240;
   OWNED(trainer) t = start(&data, &o, NULL);
+  float box[2][3];
   static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
   for (int i = 0, event = 0; i < 80; i++) {
     steps(t, 1);
     if (event < 5 && i == at[event]) event++;
     ck_assert_msg(t->vm->event == event, "iteration %d: %d events, expected %d", i, t->vm->event, event);
     if (event) ck_assert_int_eq(t->vm->fresh, at[event - 1]);
+    if (i == at[0]) memcpy(box, t->model.config.tensorf.box, sizeof box);
+    if (i == at[0] + 1) memset(t->model.occupancy, 0, 5 * 16 * 16 / 8); /* later masks do not shrink the box */
+    if (event) ck_assert_mem_eq(box, t->model.config.tensorf.box, sizeof box);
   }
   const int32_t *r = t->model.config.tensorf.resolution;
   const double voxels = (double)r[0] * r[1] * r[2];

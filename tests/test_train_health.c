@@ -7,6 +7,36 @@ static void set_up(void)
   open_scene(6);
 }
 
+/* At the start each layer's currents over the probes have its own threshold as root mean square, integrators a half. */
+LOOP_TEST(weights_start_at_the_thresholds, 2)
+{
+  sf_train_options o = _i ? sf_train_defaults_tensorf(&data) : small_run();
+  const float theta[] = {0.2f, 0.4f, 0.7f};
+  memcpy(o.config.theta, theta, sizeof theta);
+  o.config.hidden = 32, o.config.occ_res = 16, o.voxels = 16, o.rays = 64, o.samples = 1024, o.seed = 4;
+  for (int a = 0; a < 3 && _i; a++) o.config.tensorf.resolution[a] = 12;
+  OWNED(trainer) t = start(&data, &o, NULL);
+  const sf_model *m = &t->model;
+  sf_probes p;
+  double sum[SF_LAYERS] = {0};
+  ck_ok(sf_probes_create(&p, t));
+  sf_probes_draw(t, RNG_PROBE, PROBES, &p);
+  for (int i = 0; i < PROBES * p.features; i++) p.f[i] *= t->backbone->growth;
+  for (int i = 0; i < PROBES; i++) {
+    sf_probe(m, &p, i, 1);
+    for (int l = 0; l < SF_LAYERS; l++)
+      for (int k = 0; sf_model_has(m, sf_layer_weights[l]) && k < (int)m->param[sf_layer_weights[l]].shape[0]; k++)
+        sum[l] += pow((double)p.trace->current[l][0][k], 2);
+  }
+  const double target[SF_LAYERS] = {0.2, 0.5, 0.4, 0.7, 0.5};
+  for (int l = 0; l < SF_LAYERS; l++) {
+    if (!sf_model_has(m, sf_layer_weights[l])) continue;
+    const double rms = sqrt(sum[l] / PROBES / (double)m->param[sf_layer_weights[l]].shape[0]);
+    ck_assert_msg(fabs(rms / target[l] - 1) < 1e-3, "layer %d: %g, expected %g", l, rms, target[l]);
+  }
+  sf_probes_free(&p);
+}
+
 typedef struct outcome {
   int event; /* of the layer that was asked for */
   double mse;
