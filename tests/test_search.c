@@ -169,6 +169,73 @@ TEST(what_was_not_reached_is_said)
   sf_trainer_free(t);
 }
 
+/* t* at the end against where it was marked: at least half a quarter of the search ago by itself, scaled to a quarter;
+ * sooner the larger of that and what it moved in the quarter before. 0.3 is close enough. */
+TEST(how_far_it_moved_at_the_end)
+{
+  static const struct {
+    double at, mark_at, since, moved;
+    sf_search_state state;
+  } rows[] = {{0.8, 0.75, 0.1, 0.05, SF_SEARCH_BALANCED},    {0.8, 0.75, 0.1, 0.29, SF_SEARCH_BALANCED},
+              {0.8, 0.75, 0.1, 0.31, SF_SEARCH_NOT_REACHED}, {0.8, 0.75, 0.29, 0, SF_SEARCH_BALANCED},
+              {0.8, 0.75, 0.31, 0, SF_SEARCH_NOT_REACHED},   {0.8, 0.75, -0.31, 0, SF_SEARCH_NOT_REACHED},
+              {0.9, 0.75, 0.17, 9, SF_SEARCH_BALANCED},      {0.9, 0.75, 0.19, 0, SF_SEARCH_NOT_REACHED},
+              {0.87, 0.75, 0.1, 9, SF_SEARCH_NOT_REACHED},   {0.88, 0.75, 0.1, 9, SF_SEARCH_BALANCED},
+              {0.88, 0.75, -0.15, 0, SF_SEARCH_BALANCED},    {0.88, 0.75, 0.16, 0, SF_SEARCH_NOT_REACHED},
+              {0.99, 0.75, 0.28, 9, SF_SEARCH_BALANCED},     {0.99, 0.75, 0.3, 0, SF_SEARCH_NOT_REACHED},
+              {0.24, 0, 0, 0, SF_SEARCH_NOT_REACHED}};
+  const curve c = {1e-3, 1e-4, 0, 0};
+  for (int i = 0; i < COUNT(rows); i++) {
+    const sf_train_options o = search_run();
+    OWNED(trainer) t = searcher(&o);
+    for (int k = 0; k < 8; k++) {
+      sf_loss_sums mean = {0};
+      for (int p = 1; p <= T; p++) mean.prefix[p - 1] = error_of(&c, p, 0, 0);
+      sf_search_update(t, &mean, 1, 0.01 * (k + 1));
+    }
+    ck_assert_int_eq(t->search.state, SF_SEARCH_RUNNING);
+    t->search.at = rows[i].at, t->search.mark_at = rows[i].mark_at;
+    t->search.mark = (double)t->model.t_star - rows[i].since, t->search.moved = rows[i].moved;
+    sf_search_end(t);
+    ck_assert_msg(t->search.state == (int)rows[i].state, "row %d: %s", i, sf_search_names[t->search.state]);
+  }
+}
+
+/* Errors of 1..T steps at random, and their lower convex hull as drawn by hand: for each step the least slope of any
+ * chord that spans it. Between steps what one more is worth is geometric. */
+TEST(worth_along_the_hull)
+{
+  for (uint64_t seed = 0; seed < 40; seed++) {
+    sf_train_options o = search_run();
+    o.price = seed % 2 ? SF_PRICE_ENERGY : SF_PRICE_EXPONENTIAL;
+    o.objective = seed % 2 ? SF_OBJECTIVE_PREFIXES : SF_OBJECTIVE_PAPER;
+    o.beta = seed % 2 ? 1 : 1e-7;
+    OWNED(trainer) t = searcher(&o);
+    sf_loss_sums mean = {0};
+    double hull[T], gain[T];
+    for (int p = 0; p < T; p++) mean.prefix[p] = 1e-3 - 1e-4 * p + 3e-4 * (double)sf_random_float(seed, 9, (uint64_t)p);
+    for (int i = 0; i < 6; i++) sf_search_update(t, &mean, 1, 0.01 * (i + 1));
+    for (int p = 0; p < T; p++) { /* the lowest chord over each point */
+      hull[p] = mean.prefix[p];
+      for (int a = 0; a < p; a++)
+        for (int b = p + 1; b < T; b++)
+          hull[p] = fmin(hull[p], mean.prefix[a] + (mean.prefix[b] - mean.prefix[a]) * (p - a) / (b - a));
+    }
+    for (int p = 0; p + 1 < T; p++) gain[p] = fmax(hull[p] - hull[p + 1], 1e-3 * fmax(hull[0] - hull[1], 1e-12));
+    for (int k = 0; k <= 40; k++) {
+      t->model.t_star = 1 + (float)(T - 1) * (float)k / 40;
+      const double x = fmin(fmax((double)t->model.t_star - 1.5, 0), T - 2);
+      const int i = (int)fmin(floor(x), T - 3);
+      const double worth = exp(log(gain[i]) + (log(gain[i + 1]) - log(gain[i])) * (x - i));
+      const sf_search_report r = sf_search_now(t);
+      ck_assert_msg(fabs(r.worth - worth) <= 1e-6 * worth, "seed %d, t* %g: %g instead of %g", (int)seed,
+                    (double)t->model.t_star, r.worth, worth);
+      const double each = sf_search_energy(t, 2) - sf_search_energy(t, 1);
+      ck_assert_double_eq_tol(r.price, o.beta * (seed % 2 ? each : exp((double)t->model.t_star)), 1e-6 * r.price);
+    }
+  }
+}
+
 /* The price of a step is what the ledger says: the step at which it is no longer worth it. */
 TEST(energy_as_price)
 {

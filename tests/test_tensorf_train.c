@@ -156,22 +156,31 @@ TEST(mask_keeps_what_is_visible)
   ck_assert_double_lt(t->occupied, once);
 }
 
-/* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. */
-TEST(schedule_scales_with_the_run)
+/* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. Masks
+ * come at 2000 and 4000 of 30 000 iterations, in NDC at 2500 of 25 000; the first alone shrinks the box. */
+LOOP_TEST(schedule_scales_with_the_run, 2)
 {
+  static const int at[2][5] = {{20, 30, 40, 55, 70}, {20, 25, 30, 40, 55}}, masks[2][2] = {{20, 40}, {25, 25}};
+  sf_view view[8];
+  const sf_dataset forward = facing_forward(&data, view);
   sf_train_options o = small_vm(SF_NET_ANN);
-  o.stage1 = 60, o.stage2 = 240;
-  OWNED(trainer) t = start(&data, &o, NULL);
+  if (_i) o.config.tensorf.ndc = 1;
+  o.stage1 = 50, o.stage2 = _i ? 200 : 250, o.config.hidden = 16, o.rays = 64;
+  OWNED(trainer) t = start(_i ? &forward : &data, &o, NULL);
   float box[2][3];
-  static const int at[5] = {20, 30, 40, 55, 70}; /* of 300, as 2000 .. 7000 of 30 000 */
   for (int i = 0, event = 0; i < 80; i++) {
+    const bool mask = i == masks[_i][0] || i == masks[_i][1];
+    uint8_t before[16 * 16 * 16 / 8];
+    memcpy(before, t->model.occupancy, sizeof before);
     steps(t, 1);
-    if (event < 5 && i == at[event]) event++;
+    if (event < 5 && i == at[_i][event]) event++;
     ck_assert_msg(t->vm->event == event, "iteration %d: %d events, expected %d", i, t->vm->event, event);
-    if (event) ck_assert_int_eq(t->vm->fresh, at[event - 1]);
-    if (i == at[0]) memcpy(box, t->model.config.tensorf.box, sizeof box);
-    if (i == at[0] + 1) memset(t->model.occupancy, 0, 5 * 16 * 16 / 8); /* later masks do not shrink the box */
-    if (event) ck_assert_mem_eq(box, t->model.config.tensorf.box, sizeof box);
+    if (event) ck_assert_int_eq(t->vm->fresh, at[_i][event - 1 - (_i && event == 2)]); /* a mask alone renews nothing */
+    if (!mask) ck_assert_mem_eq(before, t->model.occupancy, sizeof before);
+    if (!_i && i == masks[_i][0]) ck_assert_mem_ne(before, t->model.occupancy, sizeof before);
+    if (i == masks[_i][0]) memcpy(box, t->model.config.tensorf.box, sizeof box);
+    if (i == masks[_i][0] + 1) memset(t->model.occupancy, 0, 5 * 16 * 16 / 8);
+    if (i >= masks[_i][0]) ck_assert_mem_eq(box, t->model.config.tensorf.box, sizeof box);
   }
   const int32_t *r = t->model.config.tensorf.resolution;
   const double voxels = (double)r[0] * r[1] * r[2];

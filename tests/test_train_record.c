@@ -114,18 +114,11 @@ static sf_train_options planes_run(sf_net_kind net)
   return o;
 }
 
-/* The pictures, taken for those of a forward-facing scene. */
 static void say_forward_run(FILE *out)
 {
   const sf_dataset before = data;
   sf_view view[6];
-  memcpy(view, data.view, sizeof view);
-  for (int v = 0; v < 6; v++) {
-    const float pose[12] = {1, 0, 0, 0.1f * (float)(v - 3), 0, 1, 0, 0.05f * (float)(v % 2), 0, 0, 1, 0};
-    memcpy(view[v].camera.to_world, pose, sizeof pose);
-  }
-  data.view = view, data.layout = SF_LAYOUT_LLFF, data.ndc = true, data.ndc_near = 1, data.scale = 0.9f;
-  for (int i = 0; i < 2; i++) data.ndc_focal[i] = view[0].camera.fx / 12;
+  data = facing_forward(&before, view);
   sf_train_options o = planes_run(SF_NET_SNN);
   say_run(out, "TensoRF in NDC", &o, 5);
   data = before;

@@ -35,6 +35,20 @@ static inline void close_scene(void)
   remove_folder();
 }
 
+/* The same pictures, taken for those of a forward-facing scene. view[from->count] is the result's. */
+static inline sf_dataset facing_forward(const sf_dataset *from, sf_view *view)
+{
+  sf_dataset forward = *from;
+  memcpy(view, from->view, (size_t)from->count * sizeof *view);
+  for (int v = 0; v < from->count; v++) {
+    const float pose[12] = {1, 0, 0, 0.1f * (float)(v - 3), 0, 1, 0, 0.05f * (float)(v % 2), 0, 0, 1, 0};
+    memcpy(view[v].camera.to_world, pose, sizeof pose);
+  }
+  forward.view = view, forward.layout = SF_LAYOUT_LLFF, forward.ndc = true, forward.ndc_near = 1, forward.scale = 0.9f;
+  for (int i = 0; i < 2; i++) forward.ndc_focal[i] = view[0].camera.fx / 12;
+  return forward;
+}
+
 static inline sf_train_options small_run(void)
 {
   sf_train_options o = sf_train_defaults();

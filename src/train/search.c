@@ -137,9 +137,9 @@ static double fewest_steps(const sf_trainer *t, double decibel)
   const int n = t->model.config.steps;
   double best = INFINITY;
   for (int i = 0; i < n; i++) best = fmin(best, t->search.prefix[i]);
-  for (int i = 0; i < n; i++)
-    if (t->search.prefix[i] <= best * pow(10, decibel / 10)) return i + 1;
-  return n;
+  int steps = 1;
+  while (steps < n && t->search.prefix[steps - 1] > best * pow(10, decibel / 10)) steps++;
+  return steps;
 }
 
 /* The most steps that save this share of the twin's energy; 1 where none does. */
