@@ -8,6 +8,7 @@ import subprocess
 
 import campaign
 
+SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"]
 WRAP = ["-Wl,--wrap=_ck_assert_failed", "-s"]  # first_failure.c; and no symbols, which take most of a link
 
 
@@ -36,9 +37,9 @@ class Build:
                 kept.append(word)
         return kept
 
-    def compile(self, path, source, to):
-        """Whether the compiler takes the source (bytes) in the file's place."""
-        command = self.flags(path) + ["-w", "-iquote", os.path.dirname(path), "-x", "c", "-c", "-", "-o", to]
+    def compile(self, path, source, to, more=()):
+        """Whether the compiler takes the source (bytes) in the file's place, with flags behind its own."""
+        command = self.flags(path) + list(more) + ["-w", "-iquote", os.path.dirname(path), "-x", "c", "-c", "-", "-o", to]
         return subprocess.run(command, input=source, stderr=subprocess.DEVNULL).returncode == 0
 
     def compile_whole(self, path, more, to):
@@ -59,10 +60,10 @@ class Build:
         if subprocess.run(command + list(more), stdout=subprocess.DEVNULL).returncode:
             raise campaign.Stop(f"{test} cannot be linked")
 
-    def link_mutant(self, test, mutant, to):
+    def link_mutant(self, test, mutant, to, more=()):
         """mutant: its object, or None for the program without a mutant."""
         first = [mutant] if mutant else []
-        self.link(test, first + [f"{self.folder}/obj/tests/mutate/first_failure.o"], to, WRAP)
+        self.link(test, first + [f"{self.folder}/obj/tests/mutate/first_failure.o"], to, WRAP + list(more))
 
     def key_of_test(self, test):
         """Of the program as it is built, without what comments and places change."""

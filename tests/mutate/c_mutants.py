@@ -4,7 +4,9 @@
 A mutant is a file with one change (c_operators.py), compiled with the file's own flags. Equal object code: equivalent.
 Otherwise the test programs that reach the changed line (c_reach.py) are linked with it and run, the fastest first, each
 with a limit of some times the processor time that it takes without a mutant. The first that fails, crashes or hangs kills
-the mutant. Known equivalents have their reasons in tests/mutate/equivalent-c.
+the mutant. A survivor is compiled once more for the address and undefined-behaviour sanitizers, and its programs run again:
+they see accesses out of bounds, and memory that is not released. Known equivalents have their reasons in
+tests/mutate/equivalent-c.
 
 BUILD/mutate-c keeps every verdict at once (results, a line of JSON each), so an interrupted run goes on where it was. A
 verdict is dropped when its file, or a program that decided it, has changed. The table is printed, and written beside the
@@ -36,7 +38,7 @@ class Judge:
 
     def __init__(self, build, reach, edits, deadline):
         self.build, self.reach, self.edits, self.deadline = build, reach, edits, deadline
-        self.originals, self.sources = {}, {}
+        self.originals, self.sources, self.leaks, self.lock = {}, {}, {}, threading.Lock()
 
     def prepare(self, path):
         """A file's object without a mutant."""
@@ -56,6 +58,9 @@ class Judge:
     def key(self, mutant, tests):
         return campaign.digest(self.originals[mutant.module], *[self.reach.tests[name]["key"] for name in tests])
 
+    def survivor_key(self, mutant):
+        return campaign.digest(self.key(mutant, self.tests(mutant)), " ".join(c_build.SANITIZED))
+
     def valid(self, chosen):
         """Whether a kept verdict is of what is there now, as campaign.Results asks; those of other runs stay."""
         there = {m.number: m for m in chosen}
@@ -66,7 +71,7 @@ class Judge:
                 return True
             if verdict.verdict == "killed":
                 return verdict.checker in self.reach.tests and verdict.key == self.key(mutant, [verdict.checker])
-            return verdict.key == self.key(mutant, self.tests(mutant) if verdict.verdict == "survived" else [])
+            return verdict.key == (self.survivor_key(mutant) if verdict.verdict == "survived" else self.key(mutant, []))
         return valid
 
     def one(self, mutant):
@@ -92,13 +97,37 @@ class Judge:
                 return "equivalent", self.key(mutant, []), "-"
         tests = self.tests(mutant)
         for name in tests:
-            program = f"{folder}/{name}"
-            self.build.link_mutant(name, changed, program)
-            environment = c_reach.environment(os.path.abspath(f"{folder}/tmp"), self.reach.tests[name]["fork"])
-            if campaign.run(self.reach.checker(name, program), 0, environment, self.deadline) is not False:
+            if self.fails(name, changed, folder):
                 return "killed", self.key(mutant, [name]), name
-            os.remove(program)
-        return "survived", self.key(mutant, tests), "-"
+        if self.build.compile(path, source[:edit.start] + edit.new.encode() + source[edit.end:], changed, c_build.SANITIZED):
+            for name in tests:
+                leaks = self.sanitized(path, name, folder)
+                if leaks is not None and self.fails(name, changed, folder, leaks):
+                    return "killed", self.key(mutant, [name]), name
+        return "survived", self.survivor_key(mutant), "-"
+
+    def fails(self, name, changed, folder, leaks=None):
+        """Whether a test program fails with the file's object in its place; leaks: that was made for the sanitizers, and
+        whether memory that is not released fails it, too."""
+        program = f"{folder}/{name}"
+        self.build.link_mutant(name, changed, program, [] if leaks is None else c_build.SANITIZED)
+        environment = c_reach.environment(os.path.abspath(f"{folder}/tmp"), self.reach.tests[name]["fork"])
+        if leaks is not None:
+            environment["ASAN_OPTIONS"] = f"detect_leaks={int(leaks)}"
+        failed = campaign.run(self.reach.checker(name, program), 0, environment, self.deadline) is not False
+        os.remove(program)
+        return failed
+
+    def sanitized(self, path, name, folder):
+        """How a test program passes with the file itself made for the sanitizers: True with leaks detected, False without;
+        None if it does not."""
+        with self.lock:
+            if (path, name) not in self.leaks:
+                whole = f"{folder}/whole.o"
+                if not self.build.compile(path, self.sources[path], whole, c_build.SANITIZED):
+                    raise campaign.Stop(f"{path} does not compile for the sanitizers")
+                self.leaks[path, name] = next((l for l in (True, False) if not self.fails(name, whole, folder, l)), None)
+            return self.leaks[path, name]
 
 
 def parse(pair):

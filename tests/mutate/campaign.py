@@ -101,9 +101,9 @@ def run(checker, number, environment={}, deadline=None):
     try:
         # Of the processor, that a loaded machine kills nobody; of the clock, should one sleep.
         status = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                stderr=subprocess.DEVNULL, timeout=min(60 * checker.limit, left)).returncode
+                                stderr=subprocess.DEVNULL, timeout=min(12 * checker.limit, left)).returncode
     except subprocess.TimeoutExpired:
-        if left < 60 * checker.limit:
+        if left < 12 * checker.limit:
             raise Late() from None
         status = 1
     return None if status in NOT_ITS_OWN else status != 0
