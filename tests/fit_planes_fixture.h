@@ -2,6 +2,7 @@
 #ifndef SF_TESTS_FIT_PLANES_FIXTURE_H
 #define SF_TESTS_FIT_PLANES_FIXTURE_H
 #include "src/fx/tensorf.h"
+#include "src/quant/internal.h"
 #include "tests/fit_fixture.h"
 
 enum { FEATURES = 5, FEATURE_FREQS = 2, VIEW_FREQS = 1, C1 = 40, C2 = 30, RES = 8 };
@@ -142,5 +143,28 @@ static inline void expect_dropped(const fx_scene *scene)
   ck_assert_int_eq(f->view_freqs, 0);
   ck_assert_int_lt(scene->net.layer[FX_C1].n_out, C1);
   ck_assert_int_lt(scene->net.layer[FX_C2].n_out, C2);
+}
+
+/* ---- trims ---- */
+
+static inline sf_trim_use observed(const fx_scene *scene, const sf_fit_rays *rays)
+{
+  sf_trim_use use;
+  ck_ok(sf_trim_use_create(&use, scene));
+  ck_ok(sf_fit_observe(scene, rays, 0, rays->count, true, &use));
+  return use;
+}
+
+static inline fx_scene trimmed(const fx_scene *scene, const sf_trim *trim, sf_trim_use *use)
+{
+  fx_scene result;
+  ck_ok(sf_trim_apply(scene, trim, use, "trimmed", &result));
+  ck_ok(fx_scene_check(&result, "trimmed"));
+  return result;
+}
+
+static inline void random_position(uint64_t i, uint32_t pos[3])
+{
+  for (uint64_t a = 0; a < 3; a++) pos[a] = (uint32_t)sf_random_below(80, a, i, 1 << SF_POS_FRAC);
 }
 #endif

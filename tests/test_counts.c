@@ -137,6 +137,14 @@ TEST(too_large_a_total_is_refused)
   ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX);
   ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
   ck_assert_uint_eq(sf_energy_ann_fj(&net, UINT64_MAX / 2), UINT64_MAX);
+  /* Either part fits, the sum does not. */
+  c.layer[FX_D1].mac[0] = UINT64_MAX / 4600 / 5 * 3, c.layer[FX_D1].mac[1] = 0;
+  ck_ok(sf_ledger_make(&net, &c, &l));
+  c.layer[FX_C2].sop[1] = UINT64_MAX / 900 / 5 * 3;
+  ck_assert_uint_eq(sf_energy_fj(&c), UINT64_MAX);
+  ck_assert_int_eq(sf_ledger_make(&net, &c, &l).code, SF_E_RANGE);
+  c.layer[FX_D1].mac[0] = 0;
+  ck_ok(sf_ledger_make(&net, &c, &l));
 }
 
 /* ---- recount against the core ---- */

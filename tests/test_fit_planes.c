@@ -64,6 +64,37 @@ TEST(planes_for_so_many_bytes)
   ck_bad(to_bytes(&scene, &rays, 100, INFINITY, &smaller, &report), SF_E_RANGE, "out.snn", "cannot take fewer");
 }
 
+typedef struct shown {
+  const fx_scene *scene;
+  const sf_fit_rays *rays;
+} shown;
+
+static sf_status job_ray(void *user, uint64_t index, fx_ray *ray)
+{
+  const shown *s = user;
+  return sf_fx_ray_make(s->scene, s->rays->origin + 3 * index, s->rays->direction + 3 * index, ray);
+}
+
+/* Points of more components than a line holds are several look-ups; a cache so small that it misses most of them counts
+ * what the recount counts. */
+TEST(planes_of_several_lines_are_counted)
+{
+  OWNED(fx_scene) scene = planes_scene(25);
+  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
+  static const fx_cache_shape shapes[] = {{1024, 1}, {2048, 2}, {8192, 4}};
+  ck_assert_int_gt(scene.tensorf.density.components[0], FX_LINE);
+  shown user = {&scene, &rays};
+  for (int i = 0; i < COUNT(shapes); i++) {
+    const sf_measure_job job = {
+        .scene = &scene, .rays = RAYS, .ray = job_ray, .user = &user, .check = UINT64_MAX, .cache = shapes[i]};
+    sf_measure m;
+    ck_ok(sf_measure_rays(&job, &m));
+    ck_assert_uint_eq(m.checked, m.core.rays);
+    ck_assert_uint_gt(m.memory.misses, m.memory.lookups / 100);
+    sf_measure_free(&m);
+  }
+}
+
 static bool stop_later(void *user, const char *what, int done, int total)
 {
   int *left = user;

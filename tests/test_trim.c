@@ -258,3 +258,34 @@ TEST(a_table_of_one_entry)
   ck_assert_int_eq(small_one.grid.offset[1], 1);
   ck_assert_int_eq(sf_grid_level_entries(&small_one.grid, 0), 1);
 }
+
+/* What a position reads is of use: each of its corners by its weight and one more, its cell by the weight's square. */
+TEST(use_of_a_place)
+{
+  OWNED(fx_scene) scene = small_scene(21, FX_HYBRID);
+  OWNED(sf_trim_use) use;
+  ck_ok(sf_trim_use_create(&use, &scene));
+  uint64_t *wanted = calloc((size_t)scene.grid.entries, sizeof *wanted);
+  for (uint64_t i = 0; i < 30; i++) {
+    const uint32_t weight = (uint32_t)sf_random_below(22, 0, i, 1 << SF_TRANS_FRAC);
+    uint32_t pos[3];
+    random_position(&scene, i % 10, pos);
+    sf_trim_use_place(&use, &scene, pos, 7, weight);
+    for (int l = 0; l < scene.grid.levels; l++) {
+      const sf_corners c = sf_grid_corners(&scene.grid, l, pos, pos);
+      for (int n = 0; n < 8; n++)
+        wanted[sf_grid_entry(&scene.grid, l, c.base[0] + (n & 1), c.base[1] + (n >> 1 & 1), c.base[2] + (n >> 2))] +=
+            weight + 1;
+    }
+    ck_assert_uint_eq(use.visits[7], i + 1);
+  }
+  uint64_t squares = 0;
+  for (uint64_t i = 0; i < 30; i++) {
+    const uint64_t weight = sf_random_below(22, 0, i, 1 << SF_TRANS_FRAC);
+    squares += weight * weight;
+  }
+  ck_assert_uint_eq(use.weight2[7], squares);
+  ck_assert_uint_eq(use.visits[6] + use.weight2[6], 0);
+  ck_assert_mem_eq(use.entry, wanted, (size_t)scene.grid.entries * sizeof *wanted);
+  free(wanted);
+}

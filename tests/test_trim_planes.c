@@ -1,24 +1,7 @@
 /* Trimming TensoRF's planes: each kind of cut leaves what stays as it was. */
 #include "ck_run.h"
-#include "src/quant/internal.h"
 #include "tests/fit_planes_fixture.h"
 #include <omp.h>
-
-static sf_trim_use observed(const fx_scene *scene, const sf_fit_rays *rays)
-{
-  sf_trim_use use;
-  ck_ok(sf_trim_use_create(&use, scene));
-  ck_ok(sf_fit_observe(scene, rays, 0, rays->count, true, &use));
-  return use;
-}
-
-static fx_scene trimmed(const fx_scene *scene, const sf_trim *trim, sf_trim_use *use)
-{
-  fx_scene result;
-  ck_ok(sf_trim_apply(scene, trim, use, "trimmed", &result));
-  ck_ok(fx_scene_check(&result, "trimmed"));
-  return result;
-}
 
 TEST(without_effect_changes_no_bit)
 {
@@ -38,11 +21,6 @@ TEST(without_effect_changes_no_bit)
 }
 
 /* ---- what stays is what it was ---- */
-
-static void random_position(uint64_t i, uint32_t pos[3])
-{
-  for (uint64_t a = 0; a < 3; a++) pos[a] = (uint32_t)sf_random_below(80, a, i, 1 << SF_POS_FRAC);
-}
 
 static void random_unit(uint64_t i, int16_t unit[3])
 {
@@ -115,6 +93,66 @@ TEST(the_mean_of_what_goes_stays)
   assert_same_pixels(&scene, &small, &rays);
 }
 
+/* What is left out of a layer's inputs beside neurons of its own, and a bias that is as large as it may be: the largest
+ * weight of the layer. */
+TEST(a_bias_stays_within_the_weights)
+{
+  OWNED(fx_scene) scene = planes_scene(3), small;
+  OWNED(sf_trim_use) use;
+  sf_trim trim;
+  fx_layer *c2 = &scene.net.layer[FX_C2];
+  ck_ok(sf_trim_use_create(&use, &scene));
+  use.samples = 10, use.steps = 10 * (uint64_t)scene.net.steps, use.fired[FX_C1][11] = use.steps / 2;
+  c2->bias = 1;
+  for (size_t i = 0; i < (size_t)fx_layer_rows(c2) * SF_LANES; i++)
+    c2->w[i] = (int8_t)(c2->w[i] / 2 + (i % SF_LANES < C2));
+  for (int o = 0; o < C2; o++)
+    c2->w[11 * SF_LANES + o] = (int8_t)(o == 29 ? 100 : 4 * (o - 15)),
+                          c2->w[C1 * SF_LANES + o] = (int8_t)(o == 29 ? 60 : o);
+  sf_trim_all(&scene, &trim);
+  trim.neuron[FX_C1][11] = trim.neuron[FX_C2][3] = trim.neuron[FX_C2][20] = false;
+  small = trimmed(&scene, &trim, &use);
+  const int8_t *bias = small.net.layer[FX_C2].w + (C1 - 1) * SF_LANES;
+  ck_assert_int_eq(small.net.layer[FX_C2].n_out, C2 - 2);
+  for (int o = 0, lane = 0; o < C2; o++) {
+    if (o == 3 || o == 20) continue;
+    ck_assert_int_eq(bias[lane++], o == 29 ? 100 : o + 2 * (o - 15)); /* half of the steps: half of the weight */
+  }
+}
+
+/* Of each position the components that are not zero, by the square of what they give times the weight. */
+TEST(use_of_components)
+{
+  OWNED(fx_scene) scene = planes_scene(6);
+  OWNED(sf_trim_use) use;
+  ck_ok(sf_trim_use_create(&use, &scene));
+  for (int which = 0; which < SF_FACTORS; which++) {
+    const fx_factors *factors = sf_factors_of(&scene.tensorf, which);
+    uint64_t count[FX_PAIRS * FX_COMPONENTS_MAX] = {0}, power[FX_PAIRS * FX_COMPONENTS_MAX] = {0};
+    for (uint64_t i = 0; i < 40; i++) {
+      const uint32_t weight = (uint32_t)sf_random_below(82, 0, i, 1 << SF_TRANS_FRAC);
+      int32_t exact[FX_PAIRS * FX_COMPONENTS_MAX];
+      int16_t rounded[FX_PAIRS * FX_COMPONENTS_MAX];
+      uint32_t pos[3];
+      random_position(i, pos);
+      fx_tensorf_density_products(&scene.tensorf, pos, exact);
+      fx_tensorf_products(&scene.tensorf, pos, rounded);
+      sf_trim_use_factors(&use, &scene.tensorf, (sf_factors_id)which, pos, weight);
+      for (int n = 0; n < fx_factors_components(factors); n++) {
+        int64_t size = which == SF_OF_DENSITY ? (int64_t)floor(exact[n] / 32768.0) : rounded[n];
+        if (which == SF_OF_DENSITY && exact[n] && !size) size = 1; /* small, but there */
+        count[n] += size != 0, power[n] += (uint64_t)(size * size) * (weight / 4096);
+      }
+    }
+    for (int pair = 0, n = 0; pair < FX_PAIRS; pair++)
+      for (int c = 0; c < factors->components[pair]; c++, n++) {
+        ck_assert_uint_eq(use.component[which][pair][c], count[n]);
+        ck_assert_uint_eq(use.power[which][pair][c], power[n]);
+        ck_assert_uint_gt(power[n], 0);
+      }
+  }
+}
+
 /* The least used ones go, and never the last line. */
 TEST(lines_of_components)
 {
@@ -133,221 +171,27 @@ TEST(lines_of_components)
   sf_trim_use_free(&use);
 }
 
-/* ---- points ---- */
-
-/* What is linear between the points that stay is kept to the last bit; constants are. */
-TEST(fewer_points)
+/* A component of the appearance counts by its row of the basis, too. Those of a pair come behind the pairs before it.
+ */
+TEST(lines_by_the_basis)
 {
-  OWNED(fx_scene) scene = planes_scene(5), small;
-  fx_factors *f = &scene.tensorf.density;
-  const int32_t *res = scene.tensorf.res, width = res[0], n = f->components[0];
-  ck_assert_int_eq(width, 17);
-  for (int v = 0; v < res[1]; v++)
-    for (int u = 0; u < width; u++)
-      for (int c = 0; c < n; c++) {
-        const int near = 2 * pick(9, 0, (uint64_t)((v * 20 + u / 2) * 20 + c), 60);
-        const int far = 2 * pick(9, 0, (uint64_t)((v * 20 + u / 2 + 1) * 20 + c), 60);
-        f->plane[0][(v * width + u) * n + c] = (int8_t)(c == 0 ? 55 : u & 1 ? (near + far) / 2 : near);
-      }
-  sf_trim_use use;
-  sf_trim trim;
-  ck_ok(sf_trim_use_create(&use, &scene));
-  sf_trim_all(&scene, &trim);
-  trim.planes.points[0] = 9;
-  small = trimmed(&scene, &trim, &use);
-  ck_assert_int_eq(small.tensorf.res[0], 9);
-  for (int v = 0; v < res[1]; v++)
-    for (int u = 0; u < 9; u++)
-      for (int c = 0; c < n; c++)
-        ck_assert_int_eq(small.tensorf.density.plane[0][(v * 9 + u) * n + c], f->plane[0][(v * width + 2 * u) * n + c]);
-  ck_assert_int_lt(fx_tensorf_bytes(&small.tensorf), fx_tensorf_bytes(&scene.tensorf) * 3 / 4);
-  sf_trim_use_free(&use);
-}
-
-static double square_error(const int8_t *old, int n_from, const float *new, int n_to)
-{
-  double sum = 0;
-  for (int i = 0; i <= 1000; i++) {
-    const double x = i / 1000.0 * (n_from - 1), y = i / 1000.0 * (n_to - 1);
-    const int a = (int)fmin(floor(x), n_from - 2), b = (int)fmin(floor(y), n_to - 2);
-    const double d =
-        old[a] + (x - a) * (old[a + 1] - old[a]) - (double)new[b] - (y - b) * ((double)new[b + 1] - (double)new[b]);
-    sum += d * d;
-  }
-  return sum;
-}
-
-/* No other numbers on the new points are nearer to the old function. */
-TEST(the_nearest_of_fewer_points)
-{
-  enum { FROM = 40, TO = 27 };
-  int8_t old[FROM];
-  float from[FROM], to[TO];
-  sf_taps taps;
-  for (int i = 0; i < FROM; i++) old[i] = pick(10, 0, (uint64_t)i, 127), from[i] = old[i];
-  ck_ok(sf_taps_make(&taps, 0, FROM - 1, TO));
-  sf_taps_apply(&taps, from, 1, FROM, 1, to);
-  const double best = square_error(old, FROM, to, TO);
-  for (int i = 0; i < TO; i++)
-    for (int sign = -1; sign <= 1; sign += 2) {
-      to[i] += 3 * (float)sign;
-      ck_assert_double_gt(square_error(old, FROM, to, TO), best);
-      to[i] -= 3 * (float)sign;
+  static int8_t basis[(3 + 20 + 18) * FX_APPEARANCE_MAX];
+  static sf_trim_use use;
+  fx_scene scene = {.tensorf = {.features = 2, .basis = basis, .appearance = {.components = {3, 20, 18}}}};
+  sf_trim trim = {.planes.feature = {true, true}};
+  for (int row = 0; row < 41; row++) basis[row * FX_APPEARANCE_MAX + row % 2] = (int8_t)(row * 13 % 41 + 1);
+  for (int pair = 0; pair < FX_PAIRS; pair++)
+    for (int c = 0; c < scene.tensorf.appearance.components[pair]; c++)
+      trim.planes.component[SF_OF_APPEARANCE][pair][c] = true, use.power[SF_OF_APPEARANCE][pair][c] = 1000;
+  ck_assert(sf_trim_line(&scene, &use, &trim, SF_OF_APPEARANCE, 1));
+  ck_assert(sf_trim_line(&scene, &use, &trim, SF_OF_APPEARANCE, 2));
+  for (int pair = 1; pair < FX_PAIRS; pair++) {
+    const int first = pair == 1 ? 3 : 23, n = scene.tensorf.appearance.components[pair];
+    for (int c = 0; c < n; c++) {
+      int smaller = 0;
+      for (int k = 0; k < n; k++) smaller += (first + k) * 13 % 41 < (first + c) * 13 % 41;
+      ck_assert_int_eq(trim.planes.component[SF_OF_APPEARANCE][pair][c], smaller >= n - FX_LINE);
     }
-  sf_taps_free(&taps);
-}
-
-/* ---- the box ---- */
-
-/* The same densities and features at the same place of the model, but for the rounding of positions. */
-TEST(a_smaller_box)
-{
-  OWNED(fx_scene) scene = planes_scene(6), small;
-  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  OWNED(sf_trim_use) use = observed(&scene, &rays);
-  sf_trim trim;
-  sf_trim_all(&scene, &trim);
-  ck_assert(sf_trim_box(&scene, &use, &trim));
-  ck_assert(!sf_trim_box(&scene, &use, &trim));
-  const int32_t low[3] = {2, 1, 3}, high[3] = {14, 14, 13}; /* cells 1..6, 1..6, 2..6 of 8: outwards to points */
-  ck_assert_mem_eq(trim.planes.low, low, sizeof low);
-  ck_assert_mem_eq(trim.planes.high, high, sizeof high);
-  small = trimmed(&scene, &trim, &use);
-  for (int axis = 0; axis < 3; axis++) ck_assert_int_eq(small.tensorf.res[axis], high[axis] - low[axis] + 1);
-  int seen = 0;
-  for (uint64_t i = 0; i < 500; i++) {
-    uint32_t a[3], b[3];
-    float x[3];
-    for (uint64_t axis = 0; axis < 3; axis++) x[axis] = 1.1f * (sf_random_float(11, axis, i) - 0.5f);
-    ck_ok(sf_fx_position_make(&scene, x, a));
-    ck_ok(sf_fx_position_make(&small, x, b));
-    const double p = sf_fx_sigma_value(&scene, fx_tensorf_density(&scene.tensorf, a, NULL));
-    const double q = sf_fx_sigma_value(&small, fx_tensorf_density(&small.tensorf, b, NULL));
-    ck_assert_double_eq_tol(p, q, 0.05 * p + 0.02);
-    seen += p > 1;
-  }
-  ck_assert_int_gt(seen, 20);
-  ck_assert_double_eq_tol(ldexp(small.step_q24, -24) / small.units.to_box_scale,
-                          ldexp(scene.step_q24, -24) / scene.units.to_box_scale, 1e-5);
-}
-
-static double difference(const fx_scene *a, const fx_scene *b, const sf_fit_rays *rays)
-{
-  uint32_t *p = calloc(rays->count, 3 * sizeof *p), *q = calloc(rays->count, 3 * sizeof *q);
-  sf_fit_sum sum;
-  double error = 0;
-  ck_ok(sf_fit_measure(a, rays, 0, rays->count, p, &sum));
-  ck_ok(sf_fit_measure(b, rays, 0, rays->count, q, &sum));
-  for (uint64_t i = 0; i < 3 * rays->count; i++) error += fabs((double)p[i] - q[i]) / 65535;
-  free(p), free(q);
-  return error / 3 / (double)rays->count;
-}
-
-/* Rays sample it elsewhere, so pictures are not the same to the bit; in a box that is shifted they are others. */
-TEST(pictures_of_a_smaller_box)
-{
-  static const int32_t res[] = {17, 17, 17}; /* every second is a corner of cells: the box is theirs */
-  OWNED(fx_scene) scene = planes_of(7, res), small;
-  scene.step_q24 = 60000; /* fine: where samples lie matters little */
-  memset(scene.occupancy, 0, RES * RES * RES / 8);
-  for (int z = 2; z < 6; z++)
-    for (int y = 2; y < 6; y++) scene.occupancy[z * RES + y] = 0x3c; /* x 2..5: no corner of a cell is cut off */
-  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  OWNED(sf_trim_use) use = observed(&scene, &rays);
-  sf_trim trim;
-  sf_trim_all(&scene, &trim);
-  ck_assert(sf_trim_box(&scene, &use, &trim));
-  small = trimmed(&scene, &trim, &use);
-  const double near = difference(&scene, &small, &rays);
-  small.units.to_box_offset[1] += 0.02;
-  ck_assert_double_gt(difference(&scene, &small, &rays), 4 * near);
-  ck_assert_double_lt(near, 0.01);
-}
-
-TEST(fewer_samples)
-{
-  OWNED(fx_scene) scene = planes_scene(8), small;
-  OWNED(sf_fit_rays) rays = make_rays(&scene, RAYS, 0);
-  OWNED(sf_trim_use) use = observed(&scene, &rays);
-  sf_fit_sum before, after;
-  sf_trim trim;
-  sf_trim_all(&scene, &trim);
-  trim.planes.stride_q16 = 2 << 16;
-  small = trimmed(&scene, &trim, &use);
-  ck_assert_int_eq(small.step_q24, 2 * scene.step_q24);
-  ck_ok(sf_fit_measure(&scene, &rays, 0, RAYS, NULL, &before));
-  ck_ok(sf_fit_measure(&small, &rays, 0, RAYS, NULL, &after));
-  ck_assert_uint_lt(after.counts.field_samples, before.counts.field_samples * 6 / 10);
-}
-
-TEST(unread_points_are_not_read)
-{
-  OWNED(fx_scene) scene = planes_scene(9), cleared = planes_scene(9);
-  memset(scene.occupancy, 0, RES * RES * RES / 8);
-  scene.occupancy[9] = 0x21, scene.occupancy[40] = 0x80;
-  memcpy(cleared.occupancy, scene.occupancy, RES * RES * RES / 8);
-  ck_ok(sf_trim_zero_unread(&cleared, "cleared"));
-  int zero = 0, kept = 0;
-  for (int i = 0; i < 17 * 16; i++) *(cleared.tensorf.density.plane[0][i * 18] ? &kept : &zero) += 1;
-  ck_assert_int_gt(zero, 100);
-  ck_assert_int_gt(kept, 10);
-  for (uint64_t i = 0; i < 20000; i++) {
-    int16_t x[SF_DIR_MAX], y[SF_DIR_MAX], unit[3] = {0};
-    uint32_t pos[3];
-    random_position(i, pos);
-    if (i & 1) pos[2] = (pos[2] & ~(uint32_t)0x1fffff) | (i & 2 ? 0 : 0x1fffff); /* faces of cells */
-    const uint32_t cell = ((pos[2] >> 21) * RES + (pos[1] >> 21)) * RES + (pos[0] >> 21);
-    if (!(scene.occupancy[cell >> 3] >> (cell & 7) & 1)) continue;
-    fx_tensorf_encode(&scene.tensorf, pos, unit, x, NULL), fx_tensorf_encode(&cleared.tensorf, pos, unit, y, NULL);
-    ck_assert_mem_eq(x, y, (size_t)scene.net.layer[FX_C1].n_in * sizeof *x);
-    ck_assert_uint_eq(fx_tensorf_density(&scene.tensorf, pos, NULL), fx_tensorf_density(&cleared.tensorf, pos, NULL));
-  }
-}
-
-/* A part of the points goes, one at least, and two stay. */
-TEST(a_part_of_the_points_goes)
-{
-  static const struct {
-    int points, parts, left; /* 0: refused */
-  } rows[] = {{16, 4, 12}, {17, 4, 13}, {100, 8, 88}, {7, 8, 6}, {3, 8, 2}, {2, 8, 0}, {3, 2, 2}, {4, 2, 2}, {4, 1, 0}};
-  for (int i = 0; i < COUNT(rows); i++)
-    for (int axis = 0; axis < 3; axis++) {
-      sf_trim trim = {0};
-      for (int a = 0; a < 3; a++) trim.planes.points[a] = 50 + a;
-      trim.planes.points[axis] = rows[i].points;
-      ck_assert(sf_trim_points(&trim, axis, rows[i].parts) == (rows[i].left > 0));
-      for (int a = 0; a < 3; a++) {
-        const int other = a == axis ? rows[i].left > 0 ? rows[i].left : rows[i].points : 50 + a;
-        ck_assert_int_eq(trim.planes.points[a], other);
-      }
-    }
-}
-
-/* The field that was made last is kept: the same trim gives it again, and any other one a field of its own. */
-TEST(shapes_in_a_row)
-{
-  OWNED(fx_scene) scene = planes_scene(12);
-  OWNED(sf_trim_use) use = {0}, fresh = {0};
-  ck_ok(sf_trim_use_create(&use, &scene));
-  for (int step = 0; step < 8; step++) {
-    const fx_tensorf *kept, *made;
-    sf_trim trim;
-    sf_trim_all(&scene, &trim);
-    if (step > 0) trim.planes.points[(step - 1) / 2 % 3] -= 2;
-    if (step == 7) trim.planes.low[1]++, trim.planes.points[1]--;
-    ck_ok(sf_trim_use_create(&fresh, &scene));
-    ck_ok(sf_planes_shape(&scene, &trim.planes, &use, "kept", &kept));
-    ck_ok(sf_planes_shape(&scene, &trim.planes, &fresh, "made", &made));
-    ck_assert((made == &scene.tensorf) == (step == 0));
-    ck_assert_mem_eq(kept->res, made->res, sizeof made->res);
-    for (int pair = 0; pair < FX_PAIRS; pair++) {
-      const int *axes = fx_pair_axes[pair];
-      const size_t n = (size_t)made->density.components[pair];
-      ck_assert_mem_eq(kept->density.plane[pair], made->density.plane[pair],
-                       n * (size_t)(made->res[axes[0]] * made->res[axes[1]]));
-      ck_assert_mem_eq(kept->density.line[pair], made->density.line[pair], n * (size_t)made->res[axes[2]]);
-    }
-    sf_trim_use_free(&fresh);
   }
 }
 
