@@ -61,6 +61,47 @@ TEST(features_against_float)
   ck_assert(report.feature_error < 0.02);
 }
 
+static double largest_feature(const sf_calibration *c)
+{
+  double largest = 0;
+  for (size_t i = 0; i < (size_t)c->samples * (size_t)c->features; i++) largest = fmax(largest, fabs((double)c->f[i]));
+  return largest;
+}
+
+/* The LSB of features: the power of two of the least squared error, of four that clip more and more. A level's own is
+ * that times less than two. The largest feature is this times the largest that a power of two holds. */
+LOOP_TEST(the_best_power_of_two, 3)
+{
+  static const double beyond[] = {0.999, 1.0005, 1.5};
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
+  OWNED(sf_calibration) c;
+  OWNED(fx_scene) scene;
+  sf_quant_report report;
+  ck_ok(sf_calibrate(&c, &m, m.t_r, plain.seed));
+  const double factor = beyond[_i] * ldexp(2047, -9) / largest_feature(&c);
+  for (size_t i = 0; i < m.param[SF_P_GRID].size; i++) sf_model_param(&m, SF_P_GRID)[i] *= (float)factor;
+  sf_calibration_free(&c);
+  ck_ok(sf_calibrate(&c, &m, m.t_r, plain.seed));
+  ck_assert_double_eq_tol(largest_feature(&c), beyond[_i] * ldexp(2047, -9), 1e-5);
+  double least = INFINITY;
+  int best = 0;
+  for (int e = _i ? -8 : -9, trial = 0; trial < 4; trial++, e--) {
+    double error = 0;
+    for (size_t i = 0; i < (size_t)c.samples * (size_t)c.features; i++) {
+      const double kept = fmin(fmax(nearbyint(ldexp((double)c.f[i], -e)), -2047), 2047);
+      error += pow((double)c.f[i] - ldexp(kept, e), 2);
+    }
+    if (error < least) least = error, best = e;
+  }
+  ck_assert_int_eq(best, _i < 2 ? -9 : -8);
+  quantise(&m, &scene, &report);
+  for (int l = 0; l < 4; l++) {
+    ck_assert_int_gt(scene.grid.shift[l], 0);
+    ck_assert_int_lt(scene.grid.shift[l], 31);
+    ck_assert_int_eq((int)floor(log2(scene.units.feature_scale[l])), best);
+  }
+}
+
 typedef struct tally {
   double current_error[SF_LAYERS], current_energy[SF_LAYERS];
   double colour_error, colour, colour_square, log_error, log, log_square;
