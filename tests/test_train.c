@@ -137,9 +137,13 @@ TEST(a_checkpoint_is_of_its_data)
   ck_assert_str_eq(sf_tensors_meta(&set, "option.beta"), "0.5");
   sf_tensors_free(&set);
   cJSON_Delete(record);
-  float *const number[] = {&data.view[1].camera.to_world[3], &data.view[0].camera.fx, &data.view[2].brightness,
-                           &data.offset[1]};
-  for (int i = 0; i < 4; i++) {
+  float *const number[] = {&data.view[1].camera.to_world[3],
+                           &data.view[0].camera.fx,
+                           &data.view[2].brightness,
+                           &data.offset[1],
+                           &data.ndc_focal[0],
+                           &data.ndc_focal[1]};
+  for (int i = 0; i < COUNT(number); i++) {
     const float before = *number[i];
     *number[i] += 0.001f;
     ck_bad(sf_trainer_create(&t, &data, &o, path), SF_E_RANGE, path, "other views");

@@ -4,8 +4,8 @@
 A mutant is a file with one change (c_operators.py), compiled with the file's own flags. Equal object code: equivalent.
 Otherwise the test programs that reach the changed line (c_reach.py) are linked with it and run, the fastest first, each
 with a limit of some times the processor time that it takes without a mutant. The first that fails, crashes or hangs kills
-the mutant. A survivor is compiled once more for the address and undefined-behaviour sanitizers, and its programs run again:
-they see accesses out of bounds, and memory that is not released. Known equivalents have their reasons in
+the mutant. A survivor is compiled once more for the address and undefined-behaviour sanitizers, and its shorter programs run
+again: they see accesses out of bounds, and memory that is not released. Known equivalents have their reasons in
 tests/mutate/equivalent-c.
 
 BUILD/mutate-c keeps every verdict at once (results, a line of JSON each), so an interrupted run goes on where it was. A
@@ -30,6 +30,7 @@ import c_operators
 import c_reach
 import campaign
 
+SANITIZED_SECONDS = 4  # programs that take longer do not run again under the sanitizers
 ROOMS = ["src/train", "src/quant", "src/energy", "src/audit", "src/scene"]
 
 
@@ -100,7 +101,7 @@ class Judge:
             if self.fails(name, changed, folder):
                 return "killed", self.key(mutant, [name]), name
         if self.build.compile(path, source[:edit.start] + edit.new.encode() + source[edit.end:], changed, c_build.SANITIZED):
-            for name in tests:
+            for name in (name for name in tests if self.reach.tests[name]["seconds"] <= SANITIZED_SECONDS):
                 leaks = self.sanitized(path, name, folder)
                 if leaks is not None and self.fails(name, changed, folder, leaks):
                     return "killed", self.key(mutant, [name]), name
