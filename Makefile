@@ -109,8 +109,9 @@ isa_avx512 := -march=x86-64-v4 -mprefer-vector-width=512 -ffp-contract=fast
 isa_avx512bf16 := $(isa_avx512) -mavx512bf16 -mavx512vbmi2
 isa_avx512vnni := $(isa_avx512) -mavx512vnni -mavx512vbmi2 -mavx512vpopcntdq
 isa_amx := $(isa_avx512bf16) -mavx512vnni -mavx512vpopcntdq -mamx-tile -mamx-bf16 -mamx-int8
-LIB_OBJ := $(LIB_SRC:%.c=$B/obj/%.o) $(foreach i,$(ISAS_snn),$B/obj/src/snn/kernels_isa.$i.o) \
-  $(foreach i,$(ISAS_fx),$B/obj/src/fx/kernels_isa.$i.o)
+# Those that take longest to compile begin.
+LIB_OBJ := $(foreach i,$(ISAS_snn),$B/obj/src/snn/kernels_isa.$i.o) $(foreach i,$(ISAS_fx),$B/obj/src/fx/kernels_isa.$i.o) \
+  $(LIB_SRC:%.c=$B/obj/%.o)
 
 $B/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -124,6 +125,16 @@ $B/obj/%_isa.$1.o: %_isa.c
 	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
 endef
 $(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
+# For the sanitizers a file of kernels takes up to a minute. What this processor cannot run is compiled without them.
+ifneq ($(SAN),)
+needs_avx2 := avx2
+needs_avx512 := avx512f
+needs_avx512bf16 := avx512_bf16
+needs_avx512vnni := avx512_vnni
+needs_amx := amx_tile
+CPU_FLAGS := $(shell grep -m 1 '^flags' /proc/cpuinfo)
+$(foreach i,$(foreach n,$(sort $(ISAS_snn) $(ISAS_fx)),$(if $(filter-out $(CPU_FLAGS),$(needs_$n)),$n)),$(eval $B/obj/%_isa.$i.o: override SAN :=))
+endif
 # GCC 12.2's ivopts gives an address no base where two lists are walked at different rates; local-pure-const2 and modref2
 # take that for an access to NULL, do not see the stores behind it, and calls are dropped (GCC's fix: 13dfb01e5c30).
 $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
