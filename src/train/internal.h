@@ -80,7 +80,9 @@ typedef struct sf_loss_sums {
   double regular, extra_floor, extra_ceil, distill;
   double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
 } sf_loss_sums;
-/* The loss of an iteration whose sums are means over its rays, but for L_charge. e_tau: sum of the neurons' e^tau. */
+/* Of an iteration whose sums are means over its rays: the weighted squared error of the prefixes. */
+double sf_loss_error(const sf_loss_plan *plan, const sf_loss_sums *mean);
+/* Its whole loss but for L_charge. e_tau: sum of the neurons' e^tau. */
 double sf_loss_total(const sf_loss_plan *plan, const sf_loss_sums *mean, double e_tau);
 
 /* Work arrays of one ray: prefix outputs and their gradients, [T][n] and [T][n][3]; `spare` for the loss. */

@@ -274,13 +274,6 @@ static double stage_share(const sf_trainer *t)
   return 1.0 / (n > 0 ? n : 1);
 }
 
-static double weighted_error(const sf_loss_plan *p, const sf_loss_sums *mean)
-{
-  double error = 0;
-  for (int t = 0; t < p->steps; t++) error += p->weight[t] * mean->prefix[t];
-  return error;
-}
-
 /* M_smooth of the measured curve. */
 static double smooth_error(const sf_loss_plan *p, const sf_loss_sums *mean)
 {
@@ -358,7 +351,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   SF_TRY(sf_gradient_run(t, &plan, &mean, t->firing));
   const double e_tau = sf_gradient_leaks(t, &plan, &mean);
   const double loss = sf_loss_total(&plan, &mean, e_tau);
-  const double mse = plan.full ? smooth_error(&plan, &mean) : weighted_error(&plan, &mean);
+  const double mse = plan.full ? smooth_error(&plan, &mean) : sf_loss_error(&plan, &mean);
   SF_TRY(check_gradient(t, loss));
   t->backbone->update(t);
   sf_health_leaks(t);
