@@ -75,8 +75,8 @@ static sf_status job_ray(void *user, uint64_t index, fx_ray *ray)
   return sf_fx_ray_make(s->scene, s->rays->origin + 3 * index, s->rays->direction + 3 * index, ray);
 }
 
-/* Points of more components than a line holds are several look-ups; a cache so small that it misses most of them counts
- * what the recount counts. */
+/* Points of more components than a line holds are several look-ups; a cache so small that it misses many of them
+ * counts what the recount counts. */
 TEST(planes_of_several_lines_are_counted)
 {
   OWNED(fx_scene) scene = planes_scene(25);

@@ -36,7 +36,7 @@ TEST(samples_and_products)
 {
   const char *path = saved(SF_NET_ANN, "twin.safetensors");
   static const float white[3] = {1, 1, 1};
-  uint64_t asked = 0, wanted = 0, products = 0;
+  uint64_t asked = 0, wanted = 0;
   sf_twin twin;
   const sf_twin_job job = {.path = path, .rays = RAYS, .ray = twin_ray, .user = &asked};
   ck_ok(sf_twin_count(&job, &twin));
@@ -45,8 +45,7 @@ TEST(samples_and_products)
   OWNED(sf_model) model = {0};
   ck_ok(sf_model_load(&model, path));
   for (uint64_t i = 0; i < RAYS; i++) {
-    float o[3], d[3], rgb[3];
-    float samples = 0;
+    float o[3], d[3], rgb[3], samples = 0;
     twin_ray(NULL, i, o, d);
     ck_ok(sf_render_rays(&model, o, d, 1, 1, white, rgb, NULL, NULL, &samples));
     wanted += (uint64_t)samples;
@@ -54,8 +53,7 @@ TEST(samples_and_products)
   ck_assert_uint_gt(wanted, RAYS);
   ck_assert_uint_eq(twin.samples, wanted);
   /* 8 features, 32 neurons; density and 15 of h; 16 of the direction and h; 32 neurons; three colours */
-  products = 8 * 32 + 32 * 16 + 31 * 32 + 32 * 32 + 32 * 3;
-  ck_assert_uint_eq(twin.macs, products);
+  ck_assert_uint_eq(twin.macs, 8 * 32 + 32 * 16 + 31 * 32 + 32 * 32 + 32 * 3);
 }
 
 TEST(what_is_no_twin)

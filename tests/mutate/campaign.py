@@ -19,6 +19,7 @@ Mutant = collections.namedtuple("Mutant", "number module place what")
 Checker = collections.namedtuple("Checker", "name command key limit")
 Verdict = collections.namedtuple("Verdict", "verdict key seconds checker")
 # Ended from outside, by a person or for want of memory: that is no verdict.
+ASLEEP = 12  # times its limit of the processor: so long a checker may take by the clock
 NOT_ITS_OWN = (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL)
 FIRST_LIMIT = 600  # before a checker's own time is known
 
@@ -101,9 +102,9 @@ def run(checker, number, environment={}, deadline=None):
     try:
         # Of the processor, that a loaded machine kills nobody; of the clock, should one sleep.
         status = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                stderr=subprocess.DEVNULL, timeout=min(12 * checker.limit, left)).returncode
+                                stderr=subprocess.DEVNULL, timeout=min(ASLEEP * checker.limit, left)).returncode
     except subprocess.TimeoutExpired:
-        if left < 12 * checker.limit:
+        if left < ASLEEP * checker.limit:
             raise Late() from None
         status = 1
     return None if status in NOT_ITS_OWN else status != 0
