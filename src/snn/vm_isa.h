@@ -5,7 +5,9 @@
 #define SF_SNN_VM_ISA_H
 #include "snn/forward_isa.h"
 
-typedef float v16 __attribute__((vector_size(64), aligned(4), may_alias));
+/* 16 components are WIDE vectors of this instruction set: one type of 64 bytes is taken apart through the stack where
+ * the registers are shorter. */
+enum { WIDE = 16 / VL };
 typedef float v4 __attribute__((vector_size(16), aligned(4), may_alias));
 
 /* Cell and place in it along the three axes. */
@@ -55,10 +57,10 @@ static inline __attribute__((always_inline)) vm_corners vm_find(const sf_vm_fiel
                 at->w[3] * *(const type *)(q + n);                                                                     \
     *on_line = at->l[0] * *(const type *)l + at->l[1] * *(const type *)(l + n);                                        \
   }
-VM_VALUE(v16, vm_value16)
+VM_VALUE(vf, vm_value_lanes)
 VM_VALUE(v4, vm_value4)
 
-static inline float vm_sum(const v16 *wide, const v4 *narrow)
+static inline float vm_sum(const vf wide[WIDE], const v4 *narrow)
 {
   v4 sum = *narrow;
   for (int i = 0; i < 4; i++) sum += ((const v4 *)wide)[i];
@@ -70,24 +72,26 @@ static void vm_feature(const sf_vm_field *f, const float *x, int n, float *featu
 {
   for (int s = 0; s < n; s++) {
     const vm_place place = vm_locate(f->resolution, x + 3 * s);
-    v16 wide = {0};
+    vf wide[WIDE] = {{0}};
     v4 narrow = {0};
     for (int m = 0; m < 3; m++) {
       const vm_corners at = vm_find(f, m, &place);
       const int channels = f->channels[m];
       int c = 0;
-      for (; c + 16 <= channels; c += 16) {
-        v16 a, b;
-        vm_value16(f->plane[m] + c, f->line[m] + c, &at, (size_t)channels, &a, &b);
-        wide += a * b;
-      }
+      for (; c + 16 <= channels; c += 16)
+        for (int i = 0; i < WIDE; i++) {
+          const int lane = c + i * VL;
+          vf a, b;
+          vm_value_lanes(f->plane[m] + lane, f->line[m] + lane, &at, (size_t)channels, &a, &b);
+          wide[i] += a * b;
+        }
       for (; c < channels; c += 4) {
         v4 a, b;
         vm_value4(f->plane[m] + c, f->line[m] + c, &at, (size_t)channels, &a, &b);
         narrow += a * b;
       }
     }
-    feature[s] = vm_sum(&wide, &narrow);
+    feature[s] = vm_sum(wide, &narrow);
   }
 }
 
@@ -156,10 +160,10 @@ static void vm_products(const sf_vm_field *f, const float *x, int n, float *prod
       const vm_corners at = vm_find(f, m, &place);
       const int channels = f->channels[m];
       int c = 0;
-      for (; c + 16 <= channels; c += 16) {
-        v16 a, b;
-        vm_value16(f->plane[m] + c, f->line[m] + c, &at, (size_t)channels, &a, &b);
-        *(v16 *)(out + c) = a * b;
+      for (; c + VL <= channels; c += VL) {
+        vf a, b;
+        vm_value_lanes(f->plane[m] + c, f->line[m] + c, &at, (size_t)channels, &a, &b);
+        *(vf *)(out + c) = a * b;
       }
       for (; c < channels; c += 4) {
         v4 a, b;
@@ -188,7 +192,7 @@ static void vm_products(const sf_vm_field *f, const float *x, int n, float *prod
     *(type *)l += at->l[0] * a;                                                                                        \
     *(type *)(l + n) += at->l[1] * a;                                                                                  \
   }
-VM_ADD(v16, vm_add16, vm_value16)
+VM_ADD(vf, vm_add_lanes, vm_value_lanes)
 VM_ADD(v4, vm_add4, vm_value4)
 
 /* Adds the gradient of `count` components of one mode from `first` on, at most 16, samples in order. g: [n][ld], the
@@ -203,9 +207,11 @@ static void vm_backward(const sf_vm_field *f, int mode, int first, int count, co
     const vm_place place = vm_locate(f->resolution, x + 3 * s);
     const vm_corners at = vm_find(f, mode, &place);
     if (count == 16) {
-      v16 own = (v16){0};
-      own = ld ? *(const v16 *)(g + (size_t)s * ld) + own : own + g[s];
-      vm_add16(plane, line, &at, channels, own, dplane + first, dline + first);
+      for (int c = 0; c < 16; c += VL) {
+        vf own = (vf){0};
+        own = ld ? *(const vf *)(g + (size_t)s * ld + c) + own : own + g[s];
+        vm_add_lanes(plane + c, line + c, &at, channels, own, dplane + first + c, dline + first + c);
+      }
     } else
       for (int c = 0; c < count; c += 4) {
         v4 own = (v4){0};
