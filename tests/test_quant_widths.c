@@ -1,6 +1,8 @@
 /* Quantiser: steps, leaks, narrow widths that never clip, models at the edge of sense. */
 #include "ck_run.h"
+#include "src/quant/internal.h"
 #include "tests/quant_fixture.h"
+#include "tests/tensorf_fixture.h"
 #include <math.h>
 
 TEST(steps_and_leaks)
@@ -180,6 +182,38 @@ TEST(extreme_models)
       fx_scene_free(&scene);
       sf_model_free(&m);
     }
+}
+
+/* The opacity of a sample at a point, and whether its cell is occupied. */
+static float seen_at(const sf_model *m, const uint32_t pos[3], bool *occupied)
+{
+  const int res = m->config.occ_res;
+  float x[3];
+  sf_calibration_position(pos, x);
+  const int cell = ((int)(x[2] * (float)res) * res + (int)(x[1] * (float)res)) * res + (int)(x[0] * (float)res);
+  *occupied = m->occupancy[cell / 8] >> (cell % 8) & 1;
+  return 1 - expf(-sf_tensorf_sigma(&m->config.tensorf, sf_tensorf_density_feature(m, x)) *
+                  sf_tensorf_step(&m->config.tensorf));
+}
+
+/* Planes and lines are calibrated where rays see something; where nothing can be seen, as after a few iterations of
+ * training, in occupied cells; where all are empty, anywhere. */
+LOOP_TEST(points_of_calibration, 3)
+{
+  OWNED(sf_model) m = test_smooth_tensorf(0);
+  OWNED(sf_calibration) c;
+  const size_t bytes = sf_config_cells(&m.config) / 8;
+  memset(m.occupancy, _i < 2 ? 0x22 : 0, bytes);
+  if (_i) m.config.tensorf.shift = -30;
+  ck_ok(sf_calibrate(&c, &m, 2, 9));
+  for (int i = 0; i < c.samples; i++) {
+    bool occupied;
+    const float seen = seen_at(&m, c.pos + 3 * i, &occupied);
+    ck_assert_int_eq(occupied, _i < 2);
+    if (_i == 0) ck_assert_msg(seen >= 0.01f, "sample %d: opacity %g", i, (double)seen);
+    ck_assert_msg(i == 0 || memcmp(c.pos + 3 * i, c.pos + 3 * i - 3, 3 * sizeof *c.pos), "sample %d is the one before",
+                  i);
+  }
 }
 
 int ck_timeout = 300;

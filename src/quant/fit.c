@@ -99,14 +99,23 @@ static void round_column(const sf_fit_weights *weights, int n_in, int o, double 
   for (int i = 0; i < n_in; i++) q[i] = clip(nearbyint(ideal(weights, i, o, unit)), weights->weight_max);
 }
 
+/* y += A q. A is symmetric, so its rows are added: every number of y has the order of its own sum, and none waits for
+ * the one before. */
+static void add_product(const moments *m, const double *restrict q, double *restrict y)
+{
+  for (int r = 0; r < m->n_in; r++) {
+    const double *row = m->a + (size_t)r * (size_t)m->n_in, weight = q[r];
+    if (weight == 0) continue;
+    for (int i = 0; i < m->n_in; i++) y[i] += row[i] * weight;
+  }
+}
+
 static double column_error(const moments *m, int o, double unit, const double *q)
 {
-  double linear = 0, square = 0;
+  double linear = 0, square = 0, product[INPUTS_MAX] = {0};
+  add_product(m, q, product);
   for (int i = 0; i < m->n_in; i++) {
-    double row = 0;
-    if (q[i] == 0) continue;
-    for (int r = 0; r < m->n_in; r++) row += m->a[i * m->n_in + r] * q[r];
-    square += q[i] * row;
+    square += q[i] * product[i];
     linear += q[i] * m->b[o * m->n_in + i];
   }
   return unit * (unit * square - 2 * linear);
@@ -150,10 +159,9 @@ static double choose_unit(const moments *m, const sf_fit_weights *weights)
 static void descend_column(const moments *m, const sf_fit_weights *weights, int o, double unit, double ridge, double *q)
 {
   double gradient[INPUTS_MAX];
-  for (int i = 0; i < m->n_in; i++) {
+  for (int i = 0; i < m->n_in; i++)
     gradient[i] = ridge * (q[i] - ideal(weights, i, o, unit)) - m->b[o * m->n_in + i] / unit;
-    for (int r = 0; r < m->n_in; r++) gradient[i] += m->a[i * m->n_in + r] * q[r];
-  }
+  add_product(m, q, gradient);
   for (int sweep = 0, changed = 1; sweep < SWEEPS && changed; sweep++) {
     changed = 0;
     for (int i = 0; i < m->n_in; i++) {

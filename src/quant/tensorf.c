@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { TRIES = 2048, BLOCK = 32 };
+enum { TRIES = 2048, BLOCK = 32, PROBES = 64 };
 enum { STREAM_PLACE = 111, STREAM_DIRECTION };
 enum { ENCODING_TRIED = 1 - FX_DIR_FRAC_MAX, ENCODING_COARSEST = -5 };
 static const float SEEN = 0.01f; /* opacity of one sample */
@@ -73,26 +73,39 @@ static float opacity(const sf_model *model, const uint32_t pos[3])
   return 1 - expf(-sf_tensorf_sigma(field, sf_tensorf_density_feature(model, x)) * sf_tensorf_step(field));
 }
 
-/* A point that is seen; failing that an occupied one, failing that any. */
-static void draw_position(const sf_model *model, uint64_t seed, int sample, uint32_t *pos)
+/* A point that is seen, where `look` says that there are some; failing that an occupied one, failing that any. Its
+ * rank: 2, 1, 0. */
+static int draw_position(const sf_model *model, uint64_t seed, int sample, bool look, uint32_t *pos)
 {
+  const int best = look ? 2 : 1;
   int rank = -1;
-  for (int i = 0; i < TRIES && rank < 2; i++) {
+  for (int i = 0; i < TRIES && rank < best; i++) {
     uint32_t at[3];
     for (int axis = 0; axis < 3; axis++)
       at[axis] = (uint32_t)sf_random_below(
           seed, STREAM_PLACE, ((uint64_t)sample * TRIES + (uint64_t)i) * 3 + (uint64_t)axis, 1 << SF_POS_FRAC);
-    const int now = !occupied(model, at) ? 0 : opacity(model, at) < SEEN ? 1 : 2;
+    const int now = !occupied(model, at) ? 0 : !look || opacity(model, at) < SEEN ? 1 : 2;
     if (now <= rank) continue;
     rank = now;
     memcpy(pos, at, sizeof at);
   }
+  return rank;
 }
 
+/* What the first samples do not find in any of their tries, as in a field that has hardly been trained, is not looked
+ * for by the others. */
 static sf_status draw(sf_calibration *c, const sf_model *model, uint64_t seed)
 {
+  const int probes = c->samples < PROBES ? c->samples : PROBES;
+  int best = 0;
+#pragma omp parallel for schedule(static, 1) reduction(max : best)
+  for (int sample = 0; sample < probes; sample++) {
+    const int rank = draw_position(model, seed, sample, true, c->pos + (size_t)sample * 3);
+    best = rank > best ? rank : best;
+  }
 #pragma omp parallel for schedule(static, BLOCK)
-  for (int sample = 0; sample < c->samples; sample++) draw_position(model, seed, sample, c->pos + (size_t)sample * 3);
+  for (int sample = probes; sample < c->samples; sample++)
+    draw_position(model, seed, sample, best == 2, c->pos + (size_t)sample * 3);
   return sf_ok();
 }
 
