@@ -46,6 +46,7 @@ sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const floa
     m.direction[a] = direction[a];
     m.scale[a] = 1 / (steps->high[a] - steps->low[a]);
     m.offset[a] = -steps->low[a] * m.scale[a];
+    m.way[a] = direction[a] == 0 ? 0 : (steps->high[a] - steps->low[a]) / direction[a];
   }
   m.lattice = sf_ray_lattice(steps, origin, direction);
   m.lattice.first -= steps->shortest / 2;
@@ -85,12 +86,12 @@ static inline cell find_cell(const sf_march *m, int least, const float x[3])
 static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
 {
   const int fine = m->res << (m->cascades - 1);
+  const float share = 1.0f / (float)fine;
   float ahead = INFINITY;
   for (int a = 0; a < 3; a++) {
-    if (m->direction[a] == 0) continue;
     const int place = c->place[a] + (m->direction[a] > 0) - m->res / 2;
-    const float face = (float)(place * (1 << c->cascade) + fine / 2) / (float)fine;
-    const float exit = (face - x[a]) * (m->steps->high[a] - m->steps->low[a]) / m->direction[a];
+    const float face = (float)(place * (1 << c->cascade) + fine / 2) * share;
+    const float exit = m->way[a] == 0 ? INFINITY : (face - x[a]) * m->way[a];
     ahead = exit < ahead ? exit : ahead;
   }
   return ahead;
@@ -102,8 +103,9 @@ static inline int skip(const sf_march *m, int n, float ahead)
   const sf_steps *s = m->steps;
   const float farthest = 2 * (s->high[0] - s->low[0]) + 2 * (s->high[1] - s->low[1]);
   if (!s->growing) {
-    const int points = (int)ceilf((ahead < farthest ? ahead : farthest) / s->length[n] - 1e-3f);
-    return n + (points > 1 ? points : 1);
+    const float points = (ahead < farthest ? ahead : farthest) / s->length[n] - 1e-3f;
+    const int whole = (int)points; /* ceilf would be a call */
+    return n + (points > 1 ? whole + (points > (float)whole) : 1);
   }
   const float end = sf_march_distance(m, n) + ahead - 1e-3f * s->length[n];
   const int cascade = s->cascade[n]; /* where coarser cells begin, others may be occupied */

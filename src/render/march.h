@@ -9,6 +9,7 @@ typedef struct sf_march {
   int res, cascades;
   float jitter, origin[3], direction[3];
   float scale[3], offset[3]; /* position in [0,1]^3 = model units * scale + offset */
+  float way[3];              /* along the ray from face to face of the box; 0: it never gets there */
   sf_lattice lattice;
 } sf_march;
 
