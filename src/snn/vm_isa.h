@@ -47,6 +47,34 @@ static inline __attribute__((always_inline)) vm_corners vm_find(const sf_vm_fiel
                       .l = {1 - c, c}};
 }
 
+/* Samples whose corners are asked for before the first of them is worked on: planes are larger than the near caches. */
+enum { AHEAD = 16 };
+
+/* components: of the plane, 16 to a line of the cache. */
+static inline __attribute__((always_inline)) void vm_ask(const float *plane, const vm_corners *at, size_t n,
+                                                         int components)
+{
+  for (const float *p = plane + at->plane, *end = p + components; p < end; p += 16) {
+    __builtin_prefetch(p);
+    __builtin_prefetch(p + n);
+    __builtin_prefetch(p + at->row);
+    __builtin_prefetch(p + at->row + n);
+  }
+}
+
+/* Finds and asks for what the samples need from s on, at most AHEAD. */
+static inline __attribute__((always_inline)) void vm_look(const sf_vm_field *f, const float *x, int s, int n,
+                                                          vm_corners corners[AHEAD][3])
+{
+  for (int i = s; i < n && i < s + AHEAD; i++) {
+    const vm_place place = vm_locate(f->resolution, x + 3 * i);
+    for (int m = 0; m < 3; m++) {
+      corners[i - s][m] = vm_find(f, m, &place);
+      vm_ask(f->plane[m], &corners[i - s][m], (size_t)f->channels[m], f->channels[m]);
+    }
+  }
+}
+
 /* The interpolated plane and line of `type` components from `c` on. */
 #define VM_VALUE(type, name)                                                                                           \
   static inline __attribute__((always_inline)) void name(const float *plane, const float *line, const vm_corners *at,  \
@@ -70,12 +98,13 @@ static inline float vm_sum(const vf wide[WIDE], const v4 *narrow)
 /* feature[n] at x[n][3]. */
 static void vm_feature(const sf_vm_field *f, const float *x, int n, float *feature)
 {
+  vm_corners corners[AHEAD][3];
   for (int s = 0; s < n; s++) {
-    const vm_place place = vm_locate(f->resolution, x + 3 * s);
+    if (s % AHEAD == 0) vm_look(f, x, s, n, corners);
     vf wide[WIDE] = {{0}};
     v4 narrow = {0};
     for (int m = 0; m < 3; m++) {
-      const vm_corners at = vm_find(f, m, &place);
+      const vm_corners at = corners[s % AHEAD][m];
       const int channels = f->channels[m];
       int c = 0;
       for (; c + 16 <= channels; c += 16)
@@ -153,11 +182,12 @@ static void vm_density(const sf_vm_field *f, const float *x, int n, float *sigma
 static void vm_products(const sf_vm_field *f, const float *x, int n, float *product, int ld)
 {
   const int all = f->channels[0] + f->channels[1] + f->channels[2];
+  vm_corners corners[AHEAD][3];
   for (int s = 0; s < n; s++) {
-    const vm_place place = vm_locate(f->resolution, x + 3 * s);
+    if (s % AHEAD == 0) vm_look(f, x, s, n, corners);
     float *out = product + (size_t)s * ld;
     for (int m = 0; m < 3; m++) {
-      const vm_corners at = vm_find(f, m, &place);
+      const vm_corners at = corners[s % AHEAD][m];
       const int channels = f->channels[m];
       int c = 0;
       for (; c + VL <= channels; c += VL) {
@@ -202,10 +232,17 @@ static void vm_backward(const sf_vm_field *f, int mode, int first, int count, co
 {
   const float *plane = f->plane[mode] + first, *line = f->line[mode] + first;
   const size_t channels = (size_t)f->channels[mode];
+  vm_corners corners[AHEAD];
   for (int s = 0; s < n; s++) {
+    if (s % AHEAD == 0)
+      for (int i = s; i < n && i < s + AHEAD; i++) {
+        const vm_place place = vm_locate(f->resolution, x + 3 * i);
+        corners[i - s] = vm_find(f, mode, &place);
+        vm_ask(plane, &corners[i - s], channels, count);
+        vm_ask(dplane + first, &corners[i - s], channels, count);
+      }
     if (!ld && g[s] == 0) continue;
-    const vm_place place = vm_locate(f->resolution, x + 3 * s);
-    const vm_corners at = vm_find(f, mode, &place);
+    const vm_corners at = corners[s % AHEAD];
     if (count == 16) {
       for (int c = 0; c < 16; c += VL) {
         vf own = (vf){0};
