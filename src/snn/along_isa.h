@@ -103,7 +103,7 @@ static void by_lane(const float *sum, int hidden, float *m)
 static void along_density(const sf_net_words *n, sf_block *x, sf_net_scratch *w)
 {
   tiles_begin();
-  constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
+  constant_current(n, n->w1, n->view.features, x->f, w->rows, w->sum1);
   tiles_end();
   by_lane(w->sum1, n->view.hidden, x->m1[0]);
   for (int l = 0; l < x->lanes; l++) along_density_lane(n, x, l);
@@ -113,8 +113,8 @@ static void along_forward(const sf_net_words *n, sf_block *x, sf_net_scratch *w)
 {
   const int hidden = n->view.hidden;
   tiles_begin();
-  constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
-  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, words(w->rows), w->sum3);
+  constant_current(n, n->w1, n->view.features, x->f, w->rows, w->sum1);
+  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, w->rows, w->sum3);
   tiles_end();
   by_lane(w->sum1, hidden, x->m1[0]);
   by_lane(w->sum3, hidden, x->m3[0]);

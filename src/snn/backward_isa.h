@@ -160,24 +160,32 @@ typedef struct backward_out {
   const float *fired;
   float *carry, *leak, *sum; /* sum: currents' gradient added up over the steps */
   float *all;                /* currents' gradient [hidden][B] */
-  word *rows, *lanes;        /* currents' gradient as operands */
+  uint32_t *rows, *lanes;    /* rooms for the currents' gradient as operands */
 } backward_out;
+
+/* Where a word holds one number, what layer_backward leaves in `rows` is all three. */
+static inline uint32_t *lanes_beside(uint32_t *rows, uint32_t *lanes)
+{
+  return PAIR == 1 ? rows : lanes;
+}
 
 /* Backward of a spiking layer at step t from the gradient dy (words of rows) of the layer above, through its transposed
  * weights wt[hidden][pairs]; a few rows at a time. */
 static void layer_backward(const sf_net_view *net, int index, float k, int t, const uint32_t *wt, int pairs,
                            const word *dy, const float *h, backward_out out)
 {
-  float tile[LAYER_ROWS * B];
+  float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
+    float *tile = PAIR == 1 && out.rows ? floats(out.rows + m * B) : own;
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     fire_backward(net, index, k, t, n, h + m * B, out.fired ? out.fired + m * B : NULL, tile, out.carry + m * B,
                   out.leak);
     if (out.sum) add_to(out.sum + m * B, tile, n * B);
+    if (PAIR == 1) continue;
     if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
-    if (out.rows) pack_rows(tile, n, out.rows + m / PAIR * B);
-    if (out.lanes) pack_lanes(tile, n, out.lanes + m * BW);
+    if (out.rows) row_words(tile, n, out.rows + m / PAIR * B);
+    if (out.lanes) lane_words(tile, n, out.lanes + m * BW);
   }
 }
 
@@ -203,7 +211,7 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
   float c[3 * B];
-  word *rows = words(w->rows), *lanes = words(w->lanes), small[4 * B];
+  uint32_t small[4 * B], *lanes = lanes_beside(w->rows, w->lanes);
   sigmoid(3 * B, x->j[t], c);
   memset(gj + 3 * B, 0, B * sizeof *gj);
   const bool weighted = net->mode == SF_WEIGHTED;
@@ -212,18 +220,16 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
     integrate_backward(net, net->k[4], t, in + a * B, t ? sums + (3 * (t - 1) + a) * B : NULL, gcolour + a * B,
                        gj + a * B, w->leak[4]);
   for (int i = 0; i < 3 * B && !weighted; i++) gj[i] *= c[i] * (1.0f - c[i]);
-  pack_lanes(gj, 4, small);
-  add_outer(grad->w5, hidden, small, 4, activations(net, 2, x->m4[t], w), hidden);
-  pack_rows(gj, 4, small);
+  add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, activations(net, 2, x->m4[t], w), hidden);
   const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
-  layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, small, x->m4[t],
-                 (backward_out){fired(net, 2, w), w->g4, w->leak[3], sum, events ? floats(w->lanes) : NULL, rows,
+  layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[t],
+                 (backward_out){fired(net, 2, w), w->g4, w->leak[3], sum, events ? floats(lanes) : NULL, w->rows,
                                 events ? NULL : lanes});
   if (events) {
-    transpose(lanes, hidden, B, words(w->t), hidden);
+    transpose(operands(lanes), hidden, B, words(w->t), hidden);
     event_outer(grad->w4t, hidden, x->s3[t], floats(w->t));
   } else
-    add_outer(grad->w4, hidden, lanes, hidden, activations(net, 1, x->m3[t], w), hidden);
+    add_outer(grad->w4, hidden, operands(lanes), hidden, activations(net, 1, x->m3[t], w), hidden);
 }
 
 /* Colour integrator and layers C3, C2, C1 at step t; leaves the gradient of i in gi[16][B], row 0 zero. */
@@ -233,33 +239,29 @@ static void colour_backward(const sf_net_words *n, const sf_block *x, int t, flo
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
   float gj[4 * B];
-  word *rows = words(w->rows), *lanes = words(w->lanes), *rows3 = words(w->spikes);
+  uint32_t *rows = w->spikes, *lanes = lanes_beside(rows, w->lanes);
   colour_output_backward(n, x, t, gcolour, gj, NULL, grad, w);
-  layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, rows, x->m3[t],
-                 (backward_out){fired(net, 1, w), w->g3, w->leak[2], w->sum3, NULL, rows3, lanes});
-  gemm(operands(n->w3ht), hidden / PAIR, 16, hidden / PAIR, rows3, B, B, NULL, 0, gi, B);
-  pack_lanes(x->i[t], SF_DENSITY_OUT, rows);
-  transpose(rows, SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
+  layer_backward(net, 1, net->k[2], t, n->w4t, hidden / PAIR, operands(w->rows), x->m3[t],
+                 (backward_out){fired(net, 1, w), w->g3, w->leak[2], w->sum3, NULL, rows, lanes});
+  gemm(operands(n->w3ht), hidden / PAIR, 16, hidden / PAIR, operands(rows), B, B, NULL, 0, gi, B);
+  transpose(lane_words(x->i[t], SF_DENSITY_OUT, w->rows), SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
   /* Column 16 of the padded gradient meets i[0], which is no input of C1: scratch. h starts at column 17. */
-  add_outer(grad->w3 + SF_DIR_FEATURES, 32, lanes, hidden, words(w->t), SF_DENSITY_OUT);
+  add_outer(grad->w3 + SF_DIR_FEATURES, 32, operands(lanes), hidden, words(w->t), SF_DENSITY_OUT);
 }
 
 /* Gradients of what was constant over the steps: w1, the directions' part of w3, and the features. */
 static void constant_backward(const sf_net_words *n, const sf_block *x, float *df, sf_net_grad *grad, sf_net_scratch *w)
 {
   const int hidden = n->view.hidden, features = n->view.features, padded = (features + 15) / 16 * 16;
-  word *rows = words(w->rows), *lanes = words(w->lanes), *spikes = words(w->spikes), *t = words(w->t);
-  pack_lanes(x->sh, SF_DIR_FEATURES, spikes);
-  transpose(spikes, SF_DIR_FEATURES, BW, t, SF_DIR_FEATURES);
-  pack_lanes(w->sum3, hidden, lanes);
-  add_outer(grad->w3, 32, lanes, hidden, t, SF_DIR_FEATURES);
-  memset(spikes, 0, (size_t)padded * BW * sizeof *spikes);
-  pack_lanes(x->f, features, spikes);
-  transpose(spikes, padded, BW, t, padded);
-  pack_lanes(w->sum1, hidden, lanes);
-  add_outer(grad->w1, padded, lanes, hidden, t, padded);
-  pack_rows(w->sum1, hidden, rows);
-  gemm(operands(n->w1t), hidden / PAIR, features, hidden / PAIR, rows, B, B, NULL, 0, df, B);
+  word *t = words(w->t);
+  float inputs[2 * 16 * B] = {0};
+  transpose(lane_words(x->sh, SF_DIR_FEATURES, w->spikes), SF_DIR_FEATURES, BW, t, SF_DIR_FEATURES);
+  add_outer(grad->w3, 32, lane_words(w->sum3, hidden, w->lanes), hidden, t, SF_DIR_FEATURES);
+  memcpy(inputs, x->f, (size_t)features * B * sizeof *inputs);
+  transpose(lane_words(inputs, padded, w->spikes), padded, BW, t, padded);
+  add_outer(grad->w1, padded, lane_words(w->sum1, hidden, w->lanes), hidden, t, padded);
+  gemm(operands(n->w1t), hidden / PAIR, features, hidden / PAIR, row_words(w->sum1, hidden, w->rows), B, B, NULL, 0, df,
+       B);
 }
 
 static void backward(const sf_net_words *n, const sf_block *x, int steps, const float *dsigma, const float *dcolour,
@@ -281,7 +283,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
   if (charged(net)) count_fired(net, x, 0, steps, w);
   for (int t = steps - 1; t >= 0; t--) {
     float gi[SF_DENSITY_OUT * B], ge[B], e[B];
-    word small[SF_DENSITY_OUT * B];
+    uint32_t small[SF_DENSITY_OUT * B];
     add_density_gradient(net, x, t, dsigma, gsigma);
     add_colour_gradient(net, x, t, dcolour, gcolour);
     exponential(B, x->i[t], e);
@@ -289,10 +291,9 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
                        w->leak[1]);
     colour_backward(n, x, t, gcolour, gi, grad, w);
     for (int l = 0; l < B; l++) gi[l] = weighted ? ge[l] : ge[l] * exp_slope(x->i[t][l]);
-    pack_lanes(gi, SF_DENSITY_OUT, small);
-    add_outer(grad->w2, hidden, small, SF_DENSITY_OUT, activations(net, 0, x->m1[t], w), hidden);
-    pack_rows(gi, SF_DENSITY_OUT, small);
-    layer_backward(net, 0, net->k[0], t, n->w2t, SF_DENSITY_OUT / PAIR, small, x->m1[t],
+    add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT, activations(net, 0, x->m1[t], w),
+              hidden);
+    layer_backward(net, 0, net->k[0], t, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gi, SF_DENSITY_OUT, small), x->m1[t],
                    (backward_out){fired(net, 0, w), w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
   }
   constant_backward(n, x, df, grad, w);

@@ -119,14 +119,14 @@ static void decoder_inputs(const sf_decoder_words *n, sf_decoder_block *x, sf_ne
   const int rows = decoder_rows(v), features = feature_rows(v);
   float out[SF_APPEARANCE_MAX * B];
   transpose(operands(x->product), B, v->products, words(x->product_rows), B);
-  pack_rows(x->product_rows, v->products, words(w->rows));
-  gemm(operands(n->basis), v->products / PAIR, features, v->products / PAIR, words(w->rows), B, B, NULL, 0, out, B);
+  gemm(operands(n->basis), v->products / PAIR, features, v->products / PAIR,
+       row_words(x->product_rows, v->products, w->rows), B, B, NULL, 0, out, B);
   memcpy(x->in, out, (size_t)v->features * B * sizeof *out);
   encode_features(v, x->in);
   round_inputs(v, x->in);
   for (int l = 0; l < B; l++) x->in[v->inputs * B + l] = 1;
   memset(x->in + (v->inputs + 1) * B, 0, (size_t)(rows - v->inputs - 1) * B * sizeof *x->in);
-  constant_current(&n->net, n->w1, rows, x->in, words(w->rows), w->sum3);
+  constant_current(&n->net, n->w1, rows, x->in, w->rows, w->sum3);
 }
 
 static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int steps, int keep, sf_net_scratch *w)
@@ -165,22 +165,18 @@ static void decoder_inputs_backward(const sf_decoder_words *n, sf_decoder_block 
 {
   const sf_decoder_view *v = &n->view;
   const int hidden = v->net.hidden, rows = decoder_rows(v), features = feature_rows(v);
-  word *packed = words(w->spikes), *t = words(w->t);
+  word *t = words(w->t);
   float din[SF_DECODER_MAX * B], dout[SF_DECODER_MAX * B];
-  pack_lanes(d->in, rows, packed);
-  transpose(packed, rows, BW, t, rows);
-  pack_lanes(w->sum3, hidden, words(w->lanes));
-  add_outer(grad->w1, rows, words(w->lanes), hidden, t, rows);
-  pack_rows(w->sum3, hidden, words(w->rows));
-  gemm(operands(n->w1t), hidden / PAIR, rows, hidden / PAIR, words(w->rows), B, B, NULL, 0, din, B);
+  transpose(lane_words(d->in, rows, w->spikes), rows, BW, t, rows);
+  add_outer(grad->w1, rows, lane_words(w->sum3, hidden, w->lanes), hidden, t, rows);
+  gemm(operands(n->w1t), hidden / PAIR, rows, hidden / PAIR, row_words(w->sum3, hidden, w->rows), B, B, NULL, 0, din,
+       B);
   encode_backward(v, d->in, din);
   memset(din + v->features * B, 0, (size_t)(features - v->features) * B * sizeof *din);
-  pack_lanes(d->product_rows, v->products, packed);
-  transpose(packed, v->products, BW, t, v->products);
-  pack_lanes(din, features, words(w->lanes));
-  add_outer(grad->basis, v->products, words(w->lanes), features, t, v->products);
-  pack_rows(din, features, words(w->rows));
-  gemm(operands(n->basist), features / PAIR, v->products, features / PAIR, words(w->rows), B, B, NULL, 0, dout, B);
+  transpose(lane_words(d->product_rows, v->products, w->spikes), v->products, BW, t, v->products);
+  add_outer(grad->basis, v->products, lane_words(din, features, w->lanes), features, t, v->products);
+  gemm(operands(n->basist), features / PAIR, v->products, features / PAIR, row_words(din, features, w->rows), B, B,
+       NULL, 0, dout, B);
   transpose(operands(dout), v->products, B, words(dproduct), v->products);
 }
 

@@ -131,18 +131,17 @@ static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, co
 }
 
 /* in[inputs][B] times words of weights: what is constant over the steps. */
-static void constant_current(const sf_net_words *n, const uint32_t *weights, int inputs, const float *in, word *packed,
-                             float *current)
+static void constant_current(const sf_net_words *n, const uint32_t *weights, int inputs, const float *in,
+                             uint32_t *room, float *current)
 {
   const int pairs = inputs / PAIR;
-  pack_rows(in, inputs, packed);
-  gemm(operands(weights), pairs, n->view.hidden, pairs, packed, B, B, NULL, 0, current, B);
+  gemm(operands(weights), pairs, n->view.hidden, pairs, row_words(in, inputs, room), B, B, NULL, 0, current, B);
 }
 
 static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
 {
   tiles_begin();
-  constant_current(n, n->w1, n->view.features, x->f, words(w->rows), w->sum1);
+  constant_current(n, n->w1, n->view.features, x->f, w->rows, w->sum1);
   for (int t = 0; t < steps; t++) density_step(n, x, t, 0, w->sum1, w, x->i[0]);
   tiles_end();
 }
@@ -174,16 +173,15 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
   const int pairs = net->hidden / PAIR;
   word *spikes = words(w->spikes), *rows = words(w->rows);
   tiles_begin();
-  constant_current(n, n->w1, net->features, x->f, rows, w->sum1);
-  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, rows, w->sum3);
+  constant_current(n, n->w1, net->features, x->f, w->rows, w->sum1);
+  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, w->rows, w->sum3);
   for (int t = 0; t < steps; t++) {
     const int at = slot(t, keep), before = slot(t - 1, keep);
     density_step(n, x, t, keep, w->sum1, w, x->i[t]);
     if (net->h_step > 0)
       for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step);
-    pack_rows(x->i[t], SF_DENSITY_OUT, rows);
-    layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, rows, w->sum3, t ? x->m3[before] : NULL,
-          x->m3[at], spikes);
+    layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, row_words(x->i[t], SF_DENSITY_OUT, w->rows),
+          w->sum3, t ? x->m3[before] : NULL, x->m3[at], spikes);
     colour_layer_2(n, x, t, at, before, NULL, w);
     gemm(operands(n->w5), pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
     read_colour(net, t, x);

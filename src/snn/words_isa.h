@@ -57,18 +57,25 @@ static void prepare(const sf_net_view *v, sf_net_words *n)
     }
 }
 
-/* Words of neighbouring rows: x[rows][B] -> out[rows / PAIR][B]. */
-static inline void pack_rows(const float *restrict x, int rows, word *restrict out)
+/* Words of neighbouring rows: x[rows][B] -> [rows / PAIR][B]. Where a word holds one number these are the numbers
+ * themselves; else they are put to `room`. */
+static inline const word *row_words(const float *x, int rows, uint32_t *room)
 {
+  if (PAIR == 1) return operands(x);
+  word *out = words(room);
   for (int r = 0; r < rows; r += PAIR, out += B)
     for (int l = 0; l < B; l++) out[l] = pair(x[r * B + l], x[(r + PAIR - 1) * B + l]);
+  return words(room);
 }
 
-/* Words of lanes l and l + B/2: x[rows][B] -> out[rows][BW]. */
-static inline void pack_lanes(const float *restrict x, int rows, word *restrict out)
+/* Words of lanes l and l + B/2: x[rows][B] -> [rows][BW], likewise. */
+static inline const word *lane_words(const float *x, int rows, uint32_t *room)
 {
+  if (PAIR == 1) return operands(x);
+  word *out = words(room);
   for (int r = 0; r < rows; r++, x += B, out += BW)
     for (int l = 0; l < BW; l++) out[l] = pair(x[l], x[l + B - BW]);
+  return words(room);
 }
 
 /* Activations (spikes, or ReLU for the twin) of membranes before fire, as words of rows. */
