@@ -177,7 +177,8 @@ static void layer_backward(const sf_net_view *net, int index, float k, int t, co
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
-    float *tile = PAIR == 1 && out.rows ? floats(out.rows + m * B) : own;
+    float *tile = own;
+    if (PAIR == 1 && out.rows) tile = floats(out.rows + m * B);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     fire_backward(net, index, k, t, n, h + m * B, out.fired ? out.fired + m * B : NULL, tile, out.carry + m * B,
                   out.leak);
