@@ -104,8 +104,7 @@ static inline int skip(const sf_march *m, int n, float ahead)
   const float farthest = 2 * (s->high[0] - s->low[0]) + 2 * (s->high[1] - s->low[1]);
   if (!s->growing) {
     const float points = (ahead < farthest ? ahead : farthest) / s->length[n] - 1e-3f;
-    const int whole = (int)points; /* ceilf would be a call */
-    return n + (points > 1 ? whole + (points > (float)whole) : 1);
+    return n + 1 + (points > 0 ? (int)points : 0);
   }
   const float end = sf_march_distance(m, n) + ahead - 1e-3f * s->length[n];
   const int cascade = s->cascade[n]; /* where coarser cells begin, others may be occupied */

@@ -58,7 +58,7 @@ static void prepare(const sf_net_view *v, sf_net_words *n)
 }
 
 /* Words of neighbouring rows: x[rows][B] -> [rows / PAIR][B]. Where a word holds one number these are the numbers
- * themselves; else they are put to `room`. */
+ * themselves. Else they are written to `room`. */
 static inline const word *row_words(const float *x, int rows, uint32_t *room)
 {
   if (PAIR == 1) return operands(x);
