@@ -34,6 +34,7 @@ module sf_counters (
     input  wire [ 8:0] neurons_fired_i,
     // readout
     input  wire        update_i,
+    input  wire        special_i,
     input  wire        update_colour_i,
     input  wire [ 2:0] update_step_i,
     input  wire        sample_i,
@@ -57,7 +58,9 @@ module sf_counters (
   // By {layer of D2, C2, C3, step}
   reg [63:0] sop_q[0:31];
   reg [63:0] weight_q[0:31];
-  reg [63:0] integrate_q[0:15];  // by {C3 else D2, step}
+  // By {C3 else D2, step}
+  reg [63:0] integrate_q[0:15];
+  reg [63:0] special_q[0:15];
   // By {layer of D1, C1, C2, step}
   reg [63:0] spikes_q[0:31];
   reg [63:0] neuron_q[0:31];
@@ -105,7 +108,7 @@ module sf_counters (
       sf_csr_pkg::EVENT_WEIGHT: place_value = weight;
       sf_csr_pkg::EVENT_STATE_R: place_value = at_step == 3'd0 ? 64'd0 : updates;
       sf_csr_pkg::EVENT_STATE_W: place_value = updates;
-      default: place_value = integrating ? integrate_q[at_narrow] : 64'd0;
+      default: place_value = integrating ? special_q[at_narrow] : 64'd0;
     endcase
     if (!integrating && !neurons) begin
       place_value = 64'd0;
@@ -185,6 +188,8 @@ module sf_counters (
     end
     if (wipe && integrating) integrate_q[at_narrow] <= 64'd0;
     else if (update_i) integrate_q[update_here] <= integrate_q[update_here] + 64'd1;
+    if (wipe && integrating) special_q[at_narrow] <= 64'd0;
+    else if (special_i) special_q[update_here] <= special_q[update_here] + 64'd1;
   end
   genvar f, t;
   generate

@@ -80,7 +80,7 @@ module sf_csr #(
   reg running_q, counters_busy_q;
   reg [10:0] error_q;
   reg [1:0] irq_enable_q, irq_pending_q, stream_error_q;  // the last: value, packet
-  reg [1:0] mode_q;
+  reg [2:0] mode_q;
   reg [3:0] steps_q;
   reg [16:0] exp_mul_q, sigmoid_mul_q;
   reg [5:0] exp_shift_q, sigmoid_shift_q;
@@ -190,10 +190,13 @@ module sf_csr #(
       || k_q[sf_op_pkg::C2] > LEAK_ONE || k_q[sf_op_pkg::C3] > LEAK_ONE;
   wire bad_theta = (!decodes && theta_q[sf_op_pkg::D1] == 24'd0) || theta_q[sf_op_pkg::C1] == 24'd0
       || theta_q[sf_op_pkg::C2] == 24'd0;
-  wire bad_mode = mode_q == 2'd3;
+  // Twice a threshold is a membrane.
+  wire bad_weighted = mode_q == {1'b0, sf_op_pkg::WEIGHTED} && ((!decodes && |theta_q[sf_op_pkg::D1][23:22])
+      || |theta_q[sf_op_pkg::C1][23:22] || |theta_q[sf_op_pkg::C2][23:22]);
+  wire bad_mode = mode_q[2];
   wire bad_scale = exp_mul_q[16] || sigmoid_mul_q[16] || exp_shift_q[5] || sigmoid_shift_q[5];
   reg [5:0] bad_q;
-  always_ff @(posedge clk_i) bad_q <= {bad_scale, bad_mode, bad_theta, bad_leak, bad_steps, bad_size};
+  always_ff @(posedge clk_i) bad_q <= {bad_scale, bad_mode, bad_theta || bad_weighted, bad_leak, bad_steps, bad_size};
 
   // ---- done
   wire word_write = done_q && whole_q;
@@ -246,7 +249,7 @@ module sf_csr #(
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      mode_q <= 2'd0;
+      mode_q <= 3'd0;
       steps_q <= 4'd0;
       {exp_mul_q, sigmoid_mul_q} <= 34'd0;
       {exp_shift_q, sigmoid_shift_q} <= 12'd0;
@@ -255,7 +258,7 @@ module sf_csr #(
       weight_address_q <= 18'd0;
     end else if (config_write && !to_table_q) begin
       case (wa_q)
-        sf_csr_pkg::MODE: mode_q <= |wdata_q[31:2] ? 2'd3 : wdata_q[1:0];
+        sf_csr_pkg::MODE: mode_q <= |wdata_q[31:2] ? 3'd4 : wdata_q[2:0];
         sf_csr_pkg::STEPS: steps_q <= |wdata_q[31:4] ? 4'd15 : wdata_q[3:0];
         sf_csr_pkg::EXP_MUL: exp_mul_q <= mul_w;
         sf_csr_pkg::EXP_SHIFT: exp_shift_q <= shift_w;
@@ -327,7 +330,7 @@ module sf_csr #(
       sf_csr_pkg::ERROR: rdata_d = {21'd0, error_q};
       sf_csr_pkg::IRQ_ENABLE: rdata_d = {30'd0, irq_enable_q};
       sf_csr_pkg::IRQ_PENDING: rdata_d = {30'd0, irq_pending_q};
-      sf_csr_pkg::MODE: rdata_d = {30'd0, mode_q};
+      sf_csr_pkg::MODE: rdata_d = {29'd0, mode_q};
       sf_csr_pkg::STEPS: rdata_d = {28'd0, steps_q};
       sf_csr_pkg::EXP_MUL: rdata_d = {15'd0, exp_mul_q};
       sf_csr_pkg::EXP_SHIFT: rdata_d = {26'd0, exp_shift_q};
@@ -368,7 +371,7 @@ module sf_csr #(
   assign rresp_o = OKAY;
 
   assign irq_o = |(irq_pending_q & irq_enable_q);
-  assign mode_o = mode_q;
+  assign mode_o = mode_q[1:0];
   assign steps_o = steps_q;
   assign exp_mul_o = exp_mul_q[15:0];
   assign exp_shift_o = exp_shift_q[4:0];

@@ -89,7 +89,7 @@ module sf_engine #(
   wire neurons_valid, neurons_last;
   wire [1:0] neurons_layer;
   wire [8:0] neurons_fired;
-  wire update, update_colour;
+  wire update, update_colour, special;
   wire quiet = core_idle && readout_idle;
   assign idle_o = quiet;
 
@@ -207,6 +207,7 @@ module sf_engine #(
       .update_o       (update),
       .update_colour_o(update_colour),
       .update_step_o  (update_step),
+      .special_o      (special),
       .valid_o        (valid_o),
       .ready_i        (ready_i),
       .sigma_o        (sigma_o),
@@ -242,6 +243,7 @@ module sf_engine #(
       .neurons_last_i (neurons_last),
       .neurons_fired_i(neurons_fired),
       .update_i       (update),
+      .special_i      (special),
       .update_colour_i(update_colour),
       .update_step_i  (update_step),
       .sample_i       (valid_o && ready_i),

@@ -69,23 +69,26 @@ module sf_neurons #(
   reg [GROUP_BITS*STAGES-1:0] group_q;
   reg [STAGES-1:0] last_q;
   reg [12:0] k1_q;
-  reg signed [23:0] theta4_q;
+  reg signed [23:0] quantum4_q;
   reg [8:0] n_out4_q;
   wire nodecay = mode_i == sf_op_pkg::NODECAY;
+  wire weighted = mode_i == sf_op_pkg::WEIGHTED;
   wire first = step_i == 3'd0;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) valid_q <= {STAGES{1'b0}};
     else valid_q <= clear_i ? {STAGES{1'b0}} : {valid_q[STAGES-2:0], valid_i};
   end
   wire [1:0] layer3 = layer_q[4+:2];
+  wire [23:0] theta0 = layer_i[1] ? c2_theta_i : layer_i[0] ? c1_theta_i : d1_theta_i;
+  wire [23:0] theta3 = layer3[1] ? c2_theta_i : layer3[0] ? c1_theta_i : d1_theta_i;
   always_ff @(posedge clk_i) begin
     layer_q <= {layer_q[2*STAGES-3:0], layer_i};
     step_q <= {step_q[3*STAGES-4:0], step_i};
     group_q <= {group_q[GROUP_BITS*(STAGES-1)-1:0], group_i};
     last_q <= {last_q[STAGES-2:0], last_i};
-    k1_q <= mode_i == sf_op_pkg::HYBRID && first ? 13'd1 << sf_arch_pkg::LEAK_FRAC
+    k1_q <= weighted || (mode_i == sf_op_pkg::HYBRID && first) ? 13'd1 << sf_arch_pkg::LEAK_FRAC
           : layer_i[1] ? c2_k_i : layer_i[0] ? c1_k_i : d1_k_i;
-    theta4_q <= layer3[1] ? c2_theta_i : layer3[0] ? c1_theta_i : d1_theta_i;
+    quantum4_q <= weighted ? {theta3[22:0], 1'b0} : theta3;
     n_out4_q <= layer3[1] ? c2_out_i : layer3[0] ? c1_out_i : d1_out_i;
   end
 
@@ -103,15 +106,17 @@ module sf_neurons #(
   generate
     for (u = 0; u < NEURONS; u = u + 1) begin : g_unit
       sf_plif u_plif (
-          .clk_i    (clk_i),
-          .v_i      (state[24*u+:24]),
-          .current_i(current[24*u+:24]),
-          .k_i      (k1_q),
-          .theta_i  (theta4_q),
-          .nodecay_i(nodecay),
-          .first_i  (first),
-          .v_o      (membrane_o[24*u+:24]),
-          .spike_o  (fired[u])
+          .clk_i     (clk_i),
+          .v_i       (state[24*u+:24]),
+          .current_i (current[24*u+:24]),
+          .k_i       (k1_q),
+          .quantum_i (quantum4_q),
+          .nodecay_i (nodecay),
+          .weighted_i(weighted),
+          .theta_i   (theta0),
+          .first_i   (first),
+          .v_o       (membrane_o[24*u+:24]),
+          .spike_o   (fired[u])
       );
     end
   endgenerate

@@ -1,5 +1,6 @@
 // Output layers: currents of D2 and C3 through the tables into the integrators, one value per cycle. A sample's density
-// waits in a queue for its colours. Mirror: src/fx/net.c (density_step, colour_step)
+// waits in a queue for its colours. Currents of weighted spikes are summed up before the tables, which are read at the last
+// step alone. Mirror: src/fx/net.c (density_step, colour_step)
 `default_nettype none
 
 module sf_readout (
@@ -34,6 +35,7 @@ module sf_readout (
     output wire        update_o,       // one integrator step: an event
     output wire        update_colour_o,
     output wire [ 2:0] update_step_o,
+    output wire        special_o,      // whose table was read
     output wire        valid_o,        // result of the sample
     input  wire        ready_i,
     output wire [27:0] sigma_o,
@@ -74,10 +76,16 @@ module sf_readout (
   wire start_density = free && !start_colour && density_full_q && !(run_q && !colour_q);
   wire out = valid_o && ready_i;
   wire pop = out && !decodes_i;
-  wire writes = valid_q[WRITE];
+  wire weighted = mode_i == sf_op_pkg::WEIGHTED;
+  wire writes = valid_q[WRITE] && (!weighted || {1'b0, stage_step_q[WRITE]} == steps_i - 4'd1);
   wire push = writes && last_q[WRITE] && !is_colour_q[WRITE];
 
-  reg [15:0] current0_q;
+  // The weighted sum of an output comes back five cycles later.
+  reg signed [23:0] current0_q;
+  reg signed [23:0] weighed_q[0:2];
+  wire signed [15:0] here = colour_q ? current_q[{step_q, slot_q[1:0]}] : density_q[step_q];
+  wire signed [23:0] so_far = !weighted || step_q == 3'd0 ? 24'sd0 : weighed_q[slot_q[1:0]];
+  wire signed [23:0] weighed = (so_far <<< 1) + 24'(here);
   wire [17:0] argument;
   wire [27:0] e;
   wire [15:0] s;
@@ -158,7 +166,8 @@ module sf_readout (
       slot_q <= slot_q == STEP ? 3'd0 : slot_q + 3'd1;
       if (slot_q == STEP) step_q <= step_q + 3'd1;
     end
-    current0_q <= colour_q ? current_q[{step_q, slot_q[1:0]}] : density_q[step_q];
+    if (!weighted || last_step) current0_q <= weighed;
+    if (issue && weighted) weighed_q[slot_q[1:0]] <= weighed;
     is_colour_q <= {is_colour_q[STAGES-2:0], colour_q};
     last_q <= {last_q[STAGES-2:0], last};
     stage_step_q[0] <= step_q;
@@ -176,7 +185,8 @@ module sf_readout (
   assign colour_ready_o = !colour_taken_q;
   assign idle_o = !density_taken_q && !colour_taken_q && !run_q && valid_q == {STAGES{1'b0}} && !done_q
       && queue_count_q == 4'd0;
-  assign update_o = writes;
+  assign update_o = valid_q[WRITE];
+  assign special_o = writes;
   assign update_colour_o = is_colour_q[WRITE];
   assign update_step_o = stage_step_q[WRITE];
   assign valid_o = done_q && (decodes_i || queue_count_q != 4'd0);

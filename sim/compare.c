@@ -37,8 +37,7 @@ static bool same_neurons(const comparison *c, int layer, int step)
   const uint64_t cycle = c->result->tap_cycle[layer][step], *spikes = c->core->spikes[layer][step];
   if (!same_bits(c, layer, step, "spike", spikes, c->result->spikes[layer][step], cycle)) return false;
   for (int n = 0; c->trace && n < l->n_out; n++) {
-    const bool fired = spikes[n / 64] >> (n % 64) & 1;
-    const int32_t expected = c->core->membrane[layer][step][n] - (fired ? l->theta : 0);
+    const int32_t expected = fx_membrane_left(c->net, c->core, layer, step, n);
     const int32_t actual = c->trace->membrane[layer][step][n];
     if (expected != actual) return differs(c, layer, step, n, "membrane", expected, actual, cycle);
   }

@@ -33,10 +33,11 @@ static void hit(uint64_t *bin)
 
 /* ---- samples ---- */
 
-static bool at_rail(int layer, int32_t v)
+/* Outputs of weighted spikes have no rail: their sums fit. */
+static bool at_rail(int layer, int mode, int32_t v)
 {
   const int bits = fx_layer_table[layer].state_bits;
-  if (!fx_layer_fires(layer)) return v == (1 << bits) - 1;
+  if (!fx_layer_fires(layer)) return mode != FX_WEIGHTED && v == (1 << bits) - 1;
   return v == (1 << (bits - 1)) - 1 || v == -(1 << (bits - 1));
 }
 
@@ -46,7 +47,7 @@ static void cover_beat(sf_cover *cover, const fx_net *net, const fx_trace *core,
   const bool spiking = fx_layer_fires(l);
   const int n = l == FX_D2 ? 1 : net->layer[l].n_out;
   bool rail = false;
-  for (int o = 0; o < n && !rail; o++) rail = at_rail(l, core->membrane[l][t][o]);
+  for (int o = 0; o < n && !rail; o++) rail = at_rail(l, net->mode, core->membrane[l][t][o]);
   hit(&cover->beat[l][net->mode][t][rail][result->stalled[l][spiking ? t : 0]]);
   if (!spiking) return;
   int fired = 0;

@@ -15,7 +15,7 @@ typedef enum {
   SF_PHASE_HALF_RESULT,
   SF_PHASES
 } sf_phase;
-enum { SF_COVER_MODES = 3, SF_COVER_ERRORS = 11 };
+enum { SF_COVER_MODES = 4, SF_COVER_ERRORS = 11 };
 
 /* Events in each bin. */
 typedef struct sf_cover {

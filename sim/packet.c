@@ -6,10 +6,11 @@ enum { VALUES = 4 };
 
 sf_net_blob sf_dut_blob(const fx_net *net)
 {
+  const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);
   sf_net_blob blob = {.mode = net->mode,
                       .steps = net->steps,
-                      .exp_in = {net->exp_in.mul, net->exp_in.shift, net->exp_in.bias},
-                      .sigmoid_in = {net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias}};
+                      .exp_in = {density.mul, density.shift, density.bias},
+                      .sigmoid_in = {colour.mul, colour.shift, colour.bias}};
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
     blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias, layer->w};

@@ -30,7 +30,7 @@ static inline fixture_sizes fixture_random_sizes(uint64_t seed)
   s.c1 = (int)fixture_pick(seed, 1, 4, 1, SF_LANES);
   s.c2 = (int)fixture_pick(seed, 1, 5, 1, SF_LANES);
   s.steps = (int)fixture_pick(seed, 1, 6, 1, SF_T_MAX);
-  s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_NODECAY);
+  s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_WEIGHTED);
   memset(s.bias, 0, sizeof s.bias);
   if (fixture_pick(seed, 1, 8, 0, 2) == 0) s.bias[FX_C1] = (int)fixture_pick(seed, 1, 9, 1, 2047);
   s.bias[FX_C2] = fixture_pick(seed, 1, 10, 0, 2) == 0;
@@ -160,12 +160,14 @@ typedef struct naive_net {
   int64_t v[SF_LAYERS][SF_LANES];
   bool ever[SF_LAYERS][SF_LANES];
   int64_t sigma, colour[3];
+  int64_t current[SF_T_MAX][4]; /* of the outputs */
 } naive_net;
 
 static inline int64_t naive_charge(const naive_net *n, int64_t v, int64_t current, int64_t k, int t)
 {
   if (t == 0 && n->net->mode == FX_HYBRID) return current;
   const int64_t old = t == 0 ? 0 : v;
+  if (n->net->mode == FX_WEIGHTED) return 2 * old + current;
   if (n->net->mode == FX_NODECAY) return old - naive_round(old * k, 12) + current;
   return old + naive_round((current - old) * k, 12);
 }
@@ -175,10 +177,12 @@ static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current
   const fx_layer *layer = &n->net->layer[l];
   fx_layer_counts *c = &n->counts->layer[l];
   for (int o = 0; o < layer->n_out; o++) {
-    const int64_t exact = naive_charge(n, n->v[l][o], current[o] * (1 << frac), layer->k, t);
+    /* Weighted: kept with theta added, spent twice over. */
+    const int64_t more = n->net->mode == FX_WEIGHTED ? layer->theta : 0;
+    const int64_t exact = naive_charge(n, n->v[l][o], current[o] * (1 << frac), layer->k, t) + more;
     const int64_t u = naive_clamp(exact, -8388608, 8388607);
-    spike[o] = u >= layer->theta;
-    n->v[l][o] = spike[o] ? u - layer->theta : u;
+    spike[o] = u - more >= layer->theta;
+    n->v[l][o] = spike[o] ? u - more - layer->theta - more : u - more;
     n->counts->saturated[l] += u != exact;
     n->trace->current[l][t][o] = (int32_t)current[o];
     n->trace->membrane[l][t][o] = (int32_t)u;
@@ -224,14 +228,51 @@ static inline int64_t naive_scale(int64_t current, const fx_scale *s, int64_t li
   return naive_clamp(naive_round(current * s->mul, s->shift) + s->bias, -limit, limit - 1);
 }
 
+static inline void naive_integrated(naive_net *n, int l, int t, bool asked)
+{
+  fx_layer_counts *c = &n->counts->layer[l];
+  c->special[t] += asked, c->updates[t]++, c->state_w[t] += 4;
+  if (t > 0) c->state_r[t] += 4;
+}
+
+/* Weighted: the sum of the output's currents up to step t, whose weights end in 1. */
+static inline int64_t naive_weighted(naive_net *n, int l, int t, int output, int64_t current)
+{
+  int64_t sum = 0;
+  n->current[t][output] = current;
+  for (int s = 0; s <= t; s++) sum += n->current[s][output] * (1 << (t - s));
+  naive_integrated(n, l, t, t == n->net->steps - 1);
+  return sum;
+}
+
 static inline int64_t naive_integrate(naive_net *n, int l, int t, int64_t acc, int64_t in, int64_t high)
 {
   const int64_t exact = naive_charge(n, acc, in, n->net->layer[l].k, t), kept = naive_clamp(exact, 0, high);
-  fx_layer_counts *c = &n->counts->layer[l];
   n->counts->saturated[l] += kept != exact;
-  c->special[t]++, c->updates[t]++, c->state_w[t] += 4;
-  if (t > 0) c->state_r[t] += 4;
+  naive_integrated(n, l, t, true);
   return kept;
+}
+
+/* Output 0 of D2, output o of C3: current to result, and what the trace has of it. */
+static inline int32_t naive_read_density(naive_net *n, int t, int64_t current)
+{
+  const bool weighted = n->net->mode == FX_WEIGHTED, last = t == n->net->steps - 1;
+  const int64_t sum = weighted ? naive_weighted(n, FX_D2, t, 0, current) : current;
+  const fx_scale scale = fx_net_scale(n->net, &n->net->exp_in);
+  const int64_t y = naive_scale(sum, &scale, 131072), e = fx_exp2((int32_t)y);
+  n->counts->saturated[FX_D2] += y >= 65536 && (last || !weighted);
+  n->sigma = weighted ? e : naive_integrate(n, FX_D2, t, n->sigma, e, ((int64_t)1 << 28) - 1);
+  return (int32_t)(weighted ? sum : n->sigma);
+}
+
+static inline int32_t naive_read_colour(naive_net *n, int t, int o, int64_t current)
+{
+  const bool weighted = n->net->mode == FX_WEIGHTED;
+  const int64_t sum = weighted ? naive_weighted(n, FX_C3, t, 1 + o, current) : current;
+  const fx_scale scale = fx_net_scale(n->net, &n->net->sigmoid_in);
+  const int64_t s = fx_sigmoid((int32_t)naive_scale(sum, &scale, 32768));
+  n->colour[o] = weighted ? s : naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
+  return (int32_t)(weighted ? sum : n->colour[o]);
 }
 
 static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t *h)
@@ -242,10 +283,7 @@ static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t
   naive_fire(n, FX_D1, t, d1, 0, spike);
   naive_synapses(n, FX_D2, t, spike, current);
   for (int o = 0; o < d2->n_out; o++) n->trace->current[FX_D2][t][o] = (int32_t)current[o];
-  const int64_t y = naive_scale(current[0], &n->net->exp_in, 131072), e = fx_exp2((int32_t)y);
-  n->counts->saturated[FX_D2] += y >= 65536;
-  n->sigma = naive_integrate(n, FX_D2, t, n->sigma, e, ((int64_t)1 << 28) - 1);
-  n->trace->membrane[FX_D2][t][0] = (int32_t)n->sigma;
+  n->trace->membrane[FX_D2][t][0] = naive_read_density(n, t, current[0]);
   for (int j = 0; j + 1 < d2->n_out; j++)
     h[j] = naive_round(current[1 + j] * 2 - ((1 << SF_H_SHIFT) - 1), SF_H_SHIFT + 1); /* floor */
 }
@@ -268,10 +306,8 @@ static inline void naive_colour(naive_net *n, int t, const int64_t *base, const 
   naive_fire(n, FX_C2, t, current, 8, spike2);
   naive_synapses(n, FX_C3, t, spike2, current);
   for (int o = 0; o < 3; o++) {
-    const int64_t s = fx_sigmoid((int32_t)naive_scale(current[o], &net->sigmoid_in, 32768));
-    n->colour[o] = naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
     n->trace->current[FX_C3][t][o] = (int32_t)current[o];
-    n->trace->membrane[FX_C3][t][o] = (int32_t)n->colour[o];
+    n->trace->membrane[FX_C3][t][o] = naive_read_colour(n, t, o, current[o]);
   }
 }
 

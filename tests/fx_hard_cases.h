@@ -2,7 +2,7 @@
  * accelerator, vector kernels. A case makes its input and states what must come out of it, whoever computes it; the
  * table in docs/fixed-point.md is this list.
  *
- *   HARD_NET      h->f and h->ray.dir through both nets of h->scene, in each of the three input modes
+ *   HARD_NET      h->f and h->ray.dir through both nets of h->scene, in each of the four input modes
  *   HARD_RAY      h->ray through fx_render_ray
  *   HARD_REFUSED  `make` itself checks that the input is refused; nothing is run
  *
@@ -23,6 +23,7 @@ static const hard_case hard_cases[] = {
     {"one_step_and_all_steps", HARD_NET, 2, make_steps, expect_steps},
     {"density_at_both_ends_of_exp", HARD_NET, 2, make_exp_ends, expect_exp_ends},
     {"nodecay_saturates_and_counts", HARD_NET, 2, make_nodecay, expect_nodecay},
+    {"weighted_spikes_are_digits", HARD_NET, SF_T_MAX, make_digits, expect_digits},
     {"denormals_in_a_checkpoint", HARD_NET, 2, make_denormals, expect_denormals},
     {"nan_and_inf_in_a_checkpoint", HARD_REFUSED, 3 * HARD_PARAMS, make_not_finite, NULL},
     {"optical_depth_zero_and_saturated", HARD_RAY, 4, make_depth, expect_depth},

@@ -83,6 +83,14 @@ static inline void hard_theta(fx_net *net, int32_t theta)
   net->layer[FX_D1].theta = net->layer[FX_C1].theta = net->layer[FX_C2].theta = theta;
 }
 
+/* Neurons of weighted spikes fire at twice their threshold, which has to fit the membrane. */
+static inline void hard_mode(hard *h, int32_t mode)
+{
+  h->scene.net.mode = mode;
+  for (int l = 0; mode == FX_WEIGHTED && l < SF_LAYERS; l++)
+    if (h->scene.net.layer[l].theta > FX_MEMBRANE_MAX / 2) h->scene.net.layer[l].theta = FX_MEMBRANE_MAX / 2;
+}
+
 static inline void hard_inputs(hard *h, int16_t f, int16_t dir)
 {
   for (int i = 0; i < SF_FEATURE_MAX; i++) h->f[i] = f;
@@ -109,7 +117,7 @@ static inline void expect_leak(const hard *h, const hard_seen *seen, int variant
     for (int t = 0; t < SF_T_MAX; t++) {
       const int32_t v = seen->trace->membrane[FX_D1][t][o];
       fired += hard_fired(seen, FX_D1, t, o);
-      if (mode != FX_NODECAY) ck_assert(current < 0 ? v <= 0 && v >= current : v >= 0 && v <= current);
+      if (mode < FX_NODECAY) ck_assert(current < 0 ? v <= 0 && v >= current : v >= 0 && v <= current);
     }
     const int whole = current < 0 ? 0 : current / theta;
     if (k == 0 && mode == FX_HYBRID) ck_assert_int_eq(fired, whole < SF_T_MAX ? whole : SF_T_MAX);
@@ -141,11 +149,12 @@ static inline void make_silent(hard *h, int variant)
   h->scene.net.exp_in.bias = 0;
 }
 
-/* Outputs are those of zero currents, and no synaptic operation is counted. (No-decay may add up to the threshold.) */
+/* Outputs are those of zero currents, and no synaptic operation is counted. (The other modes may add up to the
+ * threshold.) */
 static inline void expect_silent(const hard *h, const hard_seen *seen, int variant)
 {
   (void)variant;
-  if (h->scene.net.mode == FX_NODECAY) return;
+  if (h->scene.net.mode >= FX_NODECAY) return;
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_int_eq(hard_spikes(seen, l), 0);
     for (int t = 0; t < SF_T_MAX; t++) ck_assert_uint_eq(seen->counts.layer[l].sop[t], 0);
@@ -288,6 +297,48 @@ static inline void expect_nodecay(const hard *h, const hard_seen *seen, int vari
   ck_assert_uint_eq(seen->out.sigma, variant ? 8 << SF_SIGMA_FRAC : (1u << SF_SIGMA_BITS) - 1);
   ck_assert_uint_eq(seen->counts.saturated[FX_D2], variant ? 0 : SF_T_MAX + SF_T_MAX - 1);
   ck_assert_uint_eq(seen->counts.saturated[FX_D1], (SF_T_MAX - 1) * SF_LANES);
+}
+
+/* ---- weighted spikes ---- */
+
+/* Currents of 0 to 8190 in steps of 130 against a threshold of 4096 (D1, C1), with an output of one weight each. */
+static inline void make_digits(hard *h, int variant)
+{
+  fx_layer *l = h->scene.net.layer;
+  hard_weights(&h->scene.net, 0, 0);
+  hard_theta(&h->scene.net, 4096);
+  hard_inputs(h, 0, 0);
+  h->f[0] = 130;
+  h->scene.net.steps = variant + 1;
+  for (int o = 0; o < SF_LANES; o++) l[FX_D1].w[o] = (int8_t)(o % 64);
+  for (int i = 0; i < SF_LANES; i++) l[FX_D2].w[i * SF_LANES] = (int8_t)(i % 64 == 63 ? 100 : -1);
+  h->scene.net.exp_in = (fx_scale){4096, 4, 0};
+}
+
+/* A constant current I < 2 theta is sum of the digits: 2 theta * sum 2^(t-s) spike(s) + what is left = (2^(t+1) - 1) I.
+ * So the membrane, which has theta in it, tells the digits; and 2^y is asked once, of the sum of currents. */
+static inline void expect_digits(const hard *h, const hard_seen *seen, int variant)
+{
+  const int steps = variant + 1;
+  const int64_t theta = h->scene.net.layer[FX_D1].theta;
+  if (h->scene.net.mode != FX_WEIGHTED) return;
+  int64_t sum = 0;
+  for (int o = 0; o < SF_LANES; o++) {
+    const int64_t current = 130 * (o % 64);
+    int64_t digits = 0;
+    for (int t = 0; t < steps; t++) {
+      digits *= 2;
+      ck_assert_int_eq(seen->trace->membrane[FX_D1][t][o], theta + ((1 << (t + 1)) - 1) * current - 2 * theta * digits);
+      digits += hard_fired(seen, FX_D1, t, o);
+    }
+    sum += digits * (o % 64 == 63 ? 100 : -1);
+    if (current == 0) ck_assert_int_eq(digits, 0);
+  }
+  const fx_scale *s = &h->scene.net.exp_in;
+  const double y = sum * ldexp(s->mul, -s->shift) / ((1 << steps) - 1), near = 1 + fabs(y) / 65536;
+  ck_assert_uint_ge(seen->out.sigma, fx_exp2((int32_t)floor(y - near)));
+  ck_assert_uint_le(seen->out.sigma, fx_exp2((int32_t)ceil(y + near)));
+  for (int t = 0; t < steps; t++) ck_assert_uint_eq(seen->counts.layer[FX_D2].special[t], t == steps - 1);
 }
 
 /* ---- checkpoints ---- */

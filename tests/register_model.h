@@ -70,9 +70,10 @@ static inline uint32_t start_errors(const registers *r)
   for (int l = 0; l < SF_LAYERS; l++) {
     const bool spikes = l == FX_C1 || l == FX_C2 || (l == FX_D1 && r->layer[FX_D1][N_OUT]);
     if (r->layer[l][K] > LEAK_ONE) error |= SF_CSR_ERROR_LEAK;
-    if (spikes && !r->layer[l][THETA]) error |= SF_CSR_ERROR_THETA;
+    if (spikes && (!r->layer[l][THETA] || (r->mode == FX_WEIGHTED && r->layer[l][THETA] >> 22)))
+      error |= SF_CSR_ERROR_THETA;
   }
-  if (r->mode > FX_NODECAY) error |= SF_CSR_ERROR_MODE;
+  if (r->mode > FX_WEIGHTED) error |= SF_CSR_ERROR_MODE;
   if (r->exp[0] > 65535 || r->sigmoid[0] > 65535 || r->exp[1] > 31 || r->sigmoid[1] > 31) error |= SF_CSR_ERROR_SCALE;
   return error;
 }
@@ -106,7 +107,7 @@ static inline uint32_t programmed(registers *r, uint32_t offset, uint32_t value)
   const uint32_t known_bias = SF_CSR_BIAS_C1 | SF_CSR_BIAS_C2 | SF_CSR_BIAS_C3;
   uint32_t *const table = layer_register(r, offset);
   if (table) *table = layer_value(offset, value);
-  if (offset == SF_CSR_MODE) r->mode = fitted(value, 2, 3);
+  if (offset == SF_CSR_MODE) r->mode = fitted(value, 2, 4);
   if (offset == SF_CSR_STEPS) r->steps = fitted(value, 4, 15);
   if (offset == SF_CSR_EXP_MUL) r->exp[0] = fitted(value, 16, 1u << 16);
   if (offset == SF_CSR_EXP_SHIFT) r->exp[1] = fitted(value, 5, 32);

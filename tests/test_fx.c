@@ -95,18 +95,20 @@ TEST(sigmoid_every_input)
  * the step, and in hybrid and decay mode the membrane stays between v and I. */
 static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int32_t mode, bool first)
 {
+  const int32_t quantum = mode == FX_WEIGHTED ? 2 * layer->theta : layer->theta;
   fx_net net = {.mode = mode};
   const naive_net naive = {.net = &net};
-  const int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
+  int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
+  if (mode == FX_WEIGHTED) exact += first ? layer->theta : -layer->theta; /* v has theta in it, and so has u */
   const int64_t u = naive_clamp(exact, -8388608, 8388607);
   const fx_plif step = fx_plif_step(v, current, layer->k, layer->theta, mode, first);
   ck_assert_msg(step.membrane == u, "v %d I %d k %d mode %d first %d: %d, exact %lld", v, current, layer->k, mode,
                 first, step.membrane, (long long)u);
   ck_assert_int_eq(step.saturated, u != exact);
-  ck_assert_int_eq(step.spike, u >= layer->theta);
-  ck_assert_int_eq(step.v, u - (step.spike ? layer->theta : 0));
+  ck_assert_int_eq(step.spike, u >= quantum);
+  ck_assert_int_eq(step.v, u - (step.spike ? quantum : 0));
   if (step.spike) ck_assert_int_ge(step.v, 0);
-  if (mode != FX_NODECAY) {
+  if (mode == FX_HYBRID || mode == FX_DECAY) {
     const int32_t old = first ? 0 : v, low = old < current ? old : current, high = old < current ? current : old;
     ck_assert_msg(step.membrane >= low && step.membrane <= high, "v %d I %d k %d leaves its range", v, current,
                   layer->k);
@@ -122,16 +124,39 @@ static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int3
   for (int o = 0; o < SF_LANES; o += 37) ck_assert(lane[o] == step.v && membrane[o] == step.membrane);
 }
 
+/* The scale of a weighted sum is that of a current over 2^T - 1: to half an LSB of its factor, which has 16 bits unless
+ * the shift is at its end. */
+TEST(scale_of_a_weighted_sum)
+{
+  for (uint64_t i = 0; i < 4000; i++) {
+    const int64_t largest = i % 3 ? 65535 : i % 100;
+    const fx_scale in = {(int32_t)fixture_pick(9, 0, i, 0, largest), (int32_t)fixture_pick(9, 1, i, 0, 31), (int32_t)i};
+    const fx_net net = {.mode = FX_WEIGHTED, .steps = 1 + (int)(i % SF_T_MAX)};
+    const fx_scale out = fx_net_scale(&net, &in);
+    const double exact = ldexp(in.mul, -in.shift) / ((1 << net.steps) - 1);
+    ck_assert_int_eq(out.bias, in.bias);
+    ck_assert(out.mul >= 0 && out.mul <= 65535 && out.shift >= in.shift && out.shift <= 31);
+    ck_assert(fabs(ldexp(out.mul, -out.shift) - exact) <= ldexp(0.5, -out.shift));
+    ck_assert_msg(out.mul >= 32767 || out.shift == 31, "%d / 2^%d for %g", out.mul, out.shift, exact);
+    for (int mode = FX_HYBRID; mode < FX_WEIGHTED; mode++) {
+      const fx_net other = {.mode = mode, .steps = net.steps};
+      const fx_scale same = fx_net_scale(&other, &in);
+      ck_assert_mem_eq(&same, &in, sizeof in);
+    }
+  }
+}
+
 TEST(plif_corners)
 {
   static const int32_t value[] = {-8388608, -8388607, -4097, -4096, -2049, -2048, -2047, -1,      0,
                                   1,        2047,     2048,  2049,  4095,  4096,  4097,  8388606, 8388607};
   static const int32_t leak[] = {0, 1, 2, 2047, 2048, 2049, 4094, 4095, 4096}, theta[] = {1, 2, 4096, 8388607};
   enum { VALUES = sizeof value / sizeof *value, LEAKS = sizeof leak / sizeof *leak };
-  for (int i = 0; i < VALUES * VALUES * LEAKS * 4 * 6; i++) {
-    const fx_layer layer = {.k = leak[i / VALUES / VALUES % LEAKS], .theta = theta[i / VALUES / VALUES / LEAKS % 4]};
+  for (int i = 0; i < VALUES * VALUES * LEAKS * 4 * 8; i++) {
+    fx_layer layer = {.k = leak[i / VALUES / VALUES % LEAKS], .theta = theta[i / VALUES / VALUES / LEAKS % 4]};
     const int rest = i / VALUES / VALUES / LEAKS / 4;
-    check_neuron(value[i % VALUES], value[i / VALUES % VALUES], &layer, rest % 3, rest / 3);
+    if (rest % 4 == FX_WEIGHTED && layer.theta > FX_MEMBRANE_MAX / 2) layer.theta = FX_MEMBRANE_MAX / 2;
+    check_neuron(value[i % VALUES], value[i / VALUES % VALUES], &layer, rest % 4, rest / 4);
   }
 }
 
@@ -140,10 +165,12 @@ TEST(plif_random)
   for (uint64_t i = 0; i < 100000; i++) {
     const int bits = (int)fixture_pick(7, 5, i, 1, 23);
     const int64_t limit = ((int64_t)1 << bits) - 1;
+    const int32_t mode = (int32_t)fixture_pick(7, 4, i, 0, FX_WEIGHTED);
+    const int64_t highest = mode == FX_WEIGHTED && bits == 23 ? limit / 2 : limit;
     const fx_layer layer = {.k = (int32_t)fixture_pick(7, 0, i, 0, 4096),
-                            .theta = (int32_t)fixture_pick(7, 1, i, 1, limit)};
+                            .theta = (int32_t)fixture_pick(7, 1, i, 1, highest)};
     check_neuron((int32_t)fixture_pick(7, 2, i, -limit - 1, limit), (int32_t)fixture_pick(7, 3, i, -limit - 1, limit),
-                 &layer, (int32_t)fixture_pick(7, 4, i, 0, 2), i % 3 == 0);
+                 &layer, mode, i % 3 == 0);
   }
 }
 

@@ -6,10 +6,10 @@
 static void run_net(hard *h, const hard_case *c, int variant)
 {
   fx_trace *trace = malloc(sizeof *trace);
-  for (int32_t mode = FX_HYBRID; mode <= FX_NODECAY; mode++) {
+  for (int32_t mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
     hard_seen seen = {.trace = trace};
     int32_t base[SF_LANES];
-    h->scene.net.mode = mode;
+    hard_mode(h, mode);
     seen.out = assert_sample(&h->scene.net, h->f, h->ray.dir, trace);
     fx_net_direction(&h->scene.net, h->ray.dir, base, &seen.counts);
     fx_net_sample(&h->scene.net, h->f, base, &seen.out, trace, &seen.counts);

@@ -86,7 +86,7 @@ LOOP_TEST(scene_gives_the_spikes_of_the_core, 6)
   random_source r = {(uint64_t)_i, 0};
   for (int i = 0; i < GRAPHS; i++) {
     random_net_make(&n, &r, _i > 0);
-    if (_i == 0) n.net.mode = i % 3;
+    n.net.mode = (_i == 0 ? i : n.net.mode) % FX_WEIGHTED; /* of the modes that a graph has */
     ck_scene(&(fx_scene){.net = n.net}, &r, _i > 0);
   }
 }
@@ -98,6 +98,7 @@ LOOP_TEST(biases_and_decoders_too, 4)
     const uint64_t number = seed + (uint64_t)(_i * GRAPHS);
     const fixture_sizes sizes = seed % 2 ? fixture_random_decoder(number) : fixture_random_sizes(number);
     OWNED(fx_scene) scene = fixture_scene(&sizes, number);
+    scene.net.mode %= FX_WEIGHTED;
     ck_scene(&scene, &r, true);
   }
 }
@@ -190,6 +191,17 @@ LOOP_TEST(the_relu_twin_is_refused, 3)
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
+}
+
+TEST(a_scene_of_weighted_spikes_is_refused)
+{
+  static random_net n;
+  random_source r = {78, 0};
+  random_net_make(&n, &r, false);
+  fx_scene scene = {.net = n.net};
+  scene.net.mode = FX_WEIGHTED;
+  ck_assert_int_eq(sf_nir_write_scene(in("weighted.nir"), &scene).code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_null(fopen(in("weighted.nir"), "r"));
 }
 
 TEST(same_scene_same_bytes)

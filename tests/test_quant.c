@@ -182,6 +182,7 @@ TEST(nets_against_float)
   check_model(128, 16, SF_HYBRID);
   check_model(128, 16, SF_NODECAY);
   check_model(64, 8, SF_DECAY);
+  check_model(64, 8, SF_WEIGHTED);
   check_model(16, 1, SF_HYBRID);
 }
 
@@ -284,9 +285,6 @@ TEST(refuses_what_it_cannot_represent)
   m.config.net = SF_NET_ANN;
   assert_refused(&m, &plain, SF_E_UNSUPPORTED, "ANN");
   m.config.net = SF_NET_SNN;
-  m.config.mode = SF_WEIGHTED;
-  assert_refused(&m, &plain, SF_E_UNSUPPORTED, "--input-mode weighted");
-  m.config.mode = SF_HYBRID;
   m.config.hidden = 144;
   assert_refused(&m, &plain, SF_E_UNSUPPORTED, "density.w1");
   m.config.hidden = 32;

@@ -8,7 +8,8 @@
 static void run_net(sf_dut *dut, hard *h, const hard_case *c, int variant)
 {
   fx_net *net = &h->scene.net;
-  for (net->mode = FX_HYBRID; net->mode <= FX_NODECAY; net->mode++) {
+  for (int32_t mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
+    hard_mode(h, mode);
     hard_seen seen = {.trace = &shared.trace[0]};
     ck_ok(sf_dut_load(dut, net));
     ck_ok(sf_dut_clear_counts(dut));

@@ -146,9 +146,9 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
     memcpy(block + at, layer->w, (size_t)fx_layer_rows(layer) * SF_LANES);
     at += (uint32_t)fx_layer_rows(layer) * SF_LANES;
   }
-  const int32_t head[] = {SF_BLOB_MAGIC,       SF_BLOB_VERSION,       (int32_t)at,         net->mode,
-                          net->steps,          net->exp_in.mul,       net->exp_in.shift,   net->exp_in.bias,
-                          net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias};
+  const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);
+  const int32_t head[] = {SF_BLOB_MAGIC, SF_BLOB_VERSION, (int32_t)at, net->mode,    net->steps, density.mul,
+                          density.shift, density.bias,    colour.mul,  colour.shift, colour.bias};
   for (int i = 0; i < SF_BLOB_HEADER_WORDS; i++) put_word(block, i, head[i]);
   return at;
 }

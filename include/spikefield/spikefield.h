@@ -97,10 +97,11 @@ SPIKEFIELD_API spikefield_status spikefield_scene_open_memory(spikefield_scene *
                                                               const char *name);
 SPIKEFIELD_API void spikefield_scene_close(spikefield_scene *scene);
 
-typedef enum { SPIKEFIELD_HYBRID, SPIKEFIELD_DECAY, SPIKEFIELD_NO_DECAY } spikefield_mode;
+typedef enum { SPIKEFIELD_HYBRID, SPIKEFIELD_DECAY, SPIKEFIELD_NO_DECAY, SPIKEFIELD_WEIGHTED } spikefield_mode;
 typedef struct spikefield_scene_info {
   int32_t inputs[SPIKEFIELD_LAYERS], outputs[SPIKEFIELD_LAYERS]; /* of each layer */
-  int32_t theta[SPIKEFIELD_LAYERS];                              /* thresholds in membrane LSB; 0 in D2 and C3 */
+  int32_t theta[SPIKEFIELD_LAYERS];                              /* thresholds in membrane LSB; 0 in D2 and C3.
+                                                                    Weighted spikes fire at twice that, and lose it */
   int32_t leak_q12[SPIKEFIELD_LAYERS];
   spikefield_mode mode;
   int32_t steps;         /* time steps the scene asks for */

@@ -57,9 +57,9 @@
 #define SF_REG_ERROR_STEPS_SHIFT 1
 #define SF_REG_ERROR_LEAK_MASK 0x00000004 /* start: a leak is more than 4096 */
 #define SF_REG_ERROR_LEAK_SHIFT 2
-#define SF_REG_ERROR_THETA_MASK 0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1 */
+#define SF_REG_ERROR_THETA_MASK 0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1, of weighted spikes 1..2^22-1 */
 #define SF_REG_ERROR_THETA_SHIFT 3
-#define SF_REG_ERROR_MODE_MASK 0x00000010 /* start: MODE is not 0, 1 or 2 */
+#define SF_REG_ERROR_MODE_MASK 0x00000010 /* start: MODE is more than 3 */
 #define SF_REG_ERROR_MODE_SHIFT 4
 #define SF_REG_ERROR_SCALE_MASK 0x00000020 /* start: a multiplier is more than 65535 or a shift more than 31 */
 #define SF_REG_ERROR_SCALE_SHIFT 5
@@ -84,7 +84,7 @@
 /* as IRQ_ENABLE, W1C */
 #define SF_REG_IRQ_PENDING 0x001c
 
-/* input mode: 0 hybrid, 1 decay, 2 no-decay, RW */
+/* input mode: 0 hybrid, 1 decay, 2 no-decay, 3 weighted, RW */
 #define SF_REG_MODE 0x0020
 
 /* time steps to unroll, 1..T_MAX, RW */

@@ -136,8 +136,7 @@ static void put_membranes(FILE *file, const fx_net *net, const sf_kit_sample *s,
 {
   const fx_layer *l = &net->layer[layer];
   for (int n = SF_LANES - 1; n >= 0; n--) {
-    const bool fired = s->trace.spikes[layer][step][n / 64] >> (n % 64) & 1;
-    const int32_t v = n < l->n_out ? s->trace.membrane[layer][step][n] - (fired ? l->theta : 0) : 0;
+    const int32_t v = n < l->n_out ? fx_membrane_left(net, &s->trace, layer, step, n) : 0;
     fprintf(file, "%06" PRIx32, (uint32_t)v & ((1u << SF_MEMBRANE_BITS) - 1));
   }
   fputc('\n', file);

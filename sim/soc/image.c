@@ -67,10 +67,11 @@ static void put_words(uint8_t *to, const int32_t *word, int n)
 
 static void put_net(uint8_t *to, const fx_net *net)
 {
-  const int32_t head[SF_BLOB_HEADER_WORDS] = {
-      SF_BLOB_MAGIC,       SF_BLOB_VERSION,       (int32_t)net_bytes(net), net->mode,
-      net->steps,          net->exp_in.mul,       net->exp_in.shift,       net->exp_in.bias,
-      net->sigmoid_in.mul, net->sigmoid_in.shift, net->sigmoid_in.bias};
+  const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);
+  const int32_t head[SF_BLOB_HEADER_WORDS] = {SF_BLOB_MAGIC, SF_BLOB_VERSION, (int32_t)net_bytes(net),
+                                              net->mode,     net->steps,      density.mul,
+                                              density.shift, density.bias,    colour.mul,
+                                              colour.shift,  colour.bias};
   put_words(to, head, SF_BLOB_HEADER_WORDS);
   uint8_t *weights = to + SF_BLOB_WORDS * 4;
   for (int l = 0; l < SF_LAYERS; l++) {

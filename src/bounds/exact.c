@@ -111,7 +111,7 @@ void sf_exact_close(sf_exact *e)
 
 /* ---- nets ---- */
 
-/* fx_plif_step and fx_integrate_*: the same equation, rounded or not. */
+/* fx_plif_step and fx_integrate_* of spikes that weigh the same: the same equation, rounded or not. */
 static double charge(const sf_exact *e, double v, double in, double k, int t, bool exact)
 {
   if (t == 0 && e->scene->net.mode == FX_HYBRID) return in;
@@ -131,13 +131,14 @@ static double to_membrane(double x)
 
 static void fire(const sf_exact *e, int l, int t, double *v, const double *current, sf_exact_out *out)
 {
-  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE);
+  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), weighted = e->scene->net.mode == FX_WEIGHTED;
+  const double theta = e->theta[l], quantum = weighted ? 2 * theta : theta;
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
     const double in = ldexp(current[o], fx_layer_frac(l)), held = exact ? in : to_membrane(in);
-    const double u = charge(e, v[o], held, e->k[l], t, exact);
+    const double u = weighted ? 2 * (t ? v[o] : theta) + held - theta : charge(e, v[o], held, e->k[l], t, exact);
     const double kept = exact ? u : to_membrane(u);
-    const bool spike = kept >= e->theta[l];
-    v[o] = kept - (spike ? e->theta[l] : 0);
+    const bool spike = kept >= quantum;
+    v[o] = kept - (spike ? quantum : 0);
     out->spikes[l][t][o / 64] |= (uint64_t)spike << o % 64;
   }
 }
@@ -168,19 +169,28 @@ static double table_argument(double current, const fx_scale *scale, int bits)
   return sf_exact_clamp(sf_exact_round(ldexp(current * scale->mul, -scale->shift)) + scale->bias, -high, high - 1);
 }
 
+/* What one LSB of a table's current is worth: weighted steps sum to 2^T - 1 of them. */
+static double current_lsb(const sf_exact *e, int layer)
+{
+  const fx_net *net = &e->scene->net;
+  return e->scene->units.current_scale[layer] / (net->mode == FX_WEIGHTED ? (1 << net->steps) - 1 : 1);
+}
+
 static double density(const sf_exact *e, double current)
 {
   const fx_net *net = &e->scene->net;
-  if (!sf_exact_is(e, SF_EXACT_EXP2)) return fx_exp2((int32_t)table_argument(current, &net->exp_in, FX_EXP2_BITS));
-  const double y = current * e->scene->units.current_scale[FX_D2] / log(2) + ldexp(net->exp_in.bias, -SF_LOG_FRAC);
+  const fx_scale scale = fx_net_scale(net, &net->exp_in);
+  if (!sf_exact_is(e, SF_EXACT_EXP2)) return fx_exp2((int32_t)table_argument(current, &scale, FX_EXP2_BITS));
+  const double y = current * current_lsb(e, FX_D2) / log(2) + ldexp(net->exp_in.bias, -SF_LOG_FRAC);
   return exp2(fmin(y, 64) + SF_SIGMA_FRAC);
 }
 
 static double colour(const sf_exact *e, double current)
 {
   const fx_net *net = &e->scene->net;
-  if (sf_exact_is(e, SF_EXACT_SIGMOID)) return 65536 / (1 + exp(-current * e->scene->units.current_scale[FX_C3]));
-  return fx_sigmoid((int32_t)table_argument(current, &net->sigmoid_in, FX_SIGMOID_BITS));
+  if (sf_exact_is(e, SF_EXACT_SIGMOID)) return 65536 / (1 + exp(-current * current_lsb(e, FX_C3)));
+  const fx_scale scale = fx_net_scale(net, &net->sigmoid_in);
+  return fx_sigmoid((int32_t)table_argument(current, &scale, FX_SIGMOID_BITS));
 }
 
 static double integrate(const sf_exact *e, double acc, double in, int l, int t, int bits)
@@ -198,6 +208,25 @@ void sf_exact_direction(const sf_exact *e, const double *x, double *base)
   for (int i = 0; i < n; i++) add_row(e, FX_C1, i, x[i], base);
 }
 
+/* The output so far: activations are integrated; of weighted spikes currents, and the activation comes behind. */
+static void read_density(const sf_exact *e, int t, double current, sf_exact_out *out)
+{
+  const bool weighted = e->scene->net.mode == FX_WEIGHTED;
+  out->weighed[0] = 2 * out->weighed[0] + current;
+  if (!fx_net_reads_tables(&e->scene->net, t)) return;
+  const double value = density(e, weighted ? out->weighed[0] : current);
+  out->sigma = weighted ? value : integrate(e, out->sigma, value, FX_D2, t, SF_SIGMA_BITS);
+}
+
+static void read_colour(const sf_exact *e, int t, int o, double current, sf_exact_out *out)
+{
+  const bool weighted = e->scene->net.mode == FX_WEIGHTED;
+  out->weighed[1 + o] = 2 * out->weighed[1 + o] + current;
+  if (!fx_net_reads_tables(&e->scene->net, t)) return;
+  const double value = colour(e, weighted ? out->weighed[1 + o] : current);
+  out->colour[o] = weighted ? value : integrate(e, out->colour[o], value, FX_C3, t, SF_COLOUR_BITS);
+}
+
 /* D1 and D2 at step t; the inputs h of C1 are added to `current`. */
 static void density_step(const sf_exact *e, int t, double *v, const double *d1, double *current, sf_exact_out *out)
 {
@@ -205,7 +234,7 @@ static void density_step(const sf_exact *e, int t, double *v, const double *d1, 
   double d2[SF_LANES];
   fire(e, FX_D1, t, v, d1, out);
   add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
-  out->sigma = integrate(e, out->sigma, density(e, d2[0]), FX_D2, t, SF_SIGMA_BITS);
+  read_density(e, t, d2[0], out);
   for (int j = 0; j < fx_net_h(net); j++) {
     const double h = ldexp(d2[1 + j], -SF_H_SHIFT);
     const bool real = sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits;
@@ -226,8 +255,7 @@ void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_
     add_spikes(e, FX_C2, out->spikes[FX_C1][t], current);
     fire(e, FX_C2, t, v[2], current, out);
     add_spikes(e, FX_C3, out->spikes[FX_C2][t], current);
-    for (int o = 0; o < 3; o++)
-      out->colour[o] = integrate(e, out->colour[o], colour(e, current[o]), FX_C3, t, SF_COLOUR_BITS);
+    for (int o = 0; o < 3; o++) read_colour(e, t, o, current[o], out);
   }
 }
 

@@ -86,6 +86,15 @@ static void spiking_events(const sf_counted *counted, event_table e)
   add_traffic(counted->traffic, e);
 }
 
+/* Evaluations of a layer's function in one step: all steps have as many, or none. */
+static uint64_t special_once(const fx_layer_counts *c)
+{
+  uint64_t most = 0;
+  for (int t = 0; t < SF_T_MAX; t++)
+    if (c->special[t] > most) most = c->special[t];
+  return most;
+}
+
 /* The twin does in one step what the net does in t_r: each synapse a MAC, each hidden activation written and read once
  * as a byte, then requantised; the special functions of one step. hoisted: the direction's products once per ray. */
 static void twin_events(const sf_counted *counted, bool hoisted, event_table e)
@@ -105,7 +114,7 @@ static void twin_events(const sf_counted *counted, bool hoisted, event_table e)
     e[l][0][SF_PART_WEIGHT] = rows_of(size, products);
     e[l][0][SF_PART_STATE] = sf_multiply_u64(hidden, 2);
     e[l][0][SF_PART_NEURON] = hidden;
-    e[l][0][SF_PART_SPECIAL] = counts->layer[l].special[0];
+    e[l][0][SF_PART_SPECIAL] = special_once(&counts->layer[l]);
   }
   add_traffic(counted->traffic, e);
 }

@@ -37,9 +37,10 @@ static void count_synapses(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE
   c->weight[t] += fired(new_rows) * n_out;
 }
 
-static void count_integrators(fx_layer_counts *c, int t, uint64_t integrators)
+/* Behind weighted spikes currents are integrated, and the functions are asked once. */
+static void count_integrators(const fx_net *net, fx_layer_counts *c, int t, uint64_t integrators)
 {
-  c->special[t] += integrators;
+  if (net->mode != FX_WEIGHTED || t + 1 == net->steps) c->special[t] += integrators;
   count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
 }
 
@@ -77,7 +78,7 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
       const int fed = fx_spiking_layers[s] + 1; /* the layer behind */
       count_synapses(&c[fed], t, spikes[fx_spiking_layers[s]][t], seen[s], (uint64_t)size[fed].n_out);
     }
-    count_integrators(&c[FX_D2], t, size[FX_D2].n_out > 0);
-    count_integrators(&c[FX_C3], t, 3);
+    count_integrators(net, &c[FX_D2], t, size[FX_D2].n_out > 0);
+    count_integrators(net, &c[FX_C3], t, 3);
   }
 }

@@ -161,6 +161,8 @@ static void colour_part(sf_nir_graph *g, const nets *nets)
 
 static sf_status write_nets(const char *path, const nets *nets)
 {
+  if (nets->mode == FX_WEIGHTED)
+    return sf_fail(SF_E_UNSUPPORTED, "%s: its spikes are weighted by their step; a NIR graph has no such neuron", path);
   sf_nir_graph *g = calloc(1, sizeof *g);
   if (!g) return sf_fail(SF_E_MEMORY, "%s: out of memory", path);
   sf_status status = sf_ok();
@@ -265,9 +267,6 @@ sf_status sf_nir_write_model(const char *path, const sf_model *m)
   if (c->along)
     return sf_fail(SF_E_UNSUPPORTED, "%s: the model's steps are the samples of a ray; a NIR graph is of one sample",
                    path);
-  if (c->mode == SF_WEIGHTED)
-    return sf_fail(SF_E_UNSUPPORTED,
-                   "%s: the model's spikes are weighted by their step; a NIR graph has no such neuron", path);
   const float *leak = sf_model_param(m, SF_P_LEAK);
   nets n = {.mode = c->mode,
             .steps = m->t_r,

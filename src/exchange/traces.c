@@ -54,7 +54,7 @@ static void write_step(tracer *w, int t)
     for (int n = 0; n < layer->n_out; n++) {
       const bool spike = fired(&w->trace, l, t, n);
       if (spike) fprintf(spikes, "%s.%d,%" PRIu64 "\n", fx_layer_name(l), n, now);
-      fprintf(potentials, "%" PRId32 ",", w->trace.membrane[l][t][n] - (spike ? layer->theta : 0));
+      fprintf(potentials, "%" PRId32 ",", fx_membrane_left(&w->scene->net, &w->trace, l, t, n));
       w->report->spikes += spike;
     }
   }

@@ -101,6 +101,7 @@ void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firi
     count_updates(&c[FX_C2], t, n * (uint64_t)layer[FX_C2].n_out, MEMBRANE_BYTES);
     count_updates(&c[FX_D2], t, densities, INTEGRATOR_BYTES);
     count_updates(&c[FX_C3], t, n * (uint64_t)layer[FX_C3].n_out, INTEGRATOR_BYTES);
+    if (!fx_net_reads_tables(net, t)) continue;
     c[FX_D2].special[t] += densities;
     c[FX_C3].special[t] += n * (uint64_t)layer[FX_C3].n_out;
   }

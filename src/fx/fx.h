@@ -21,7 +21,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY } fx_input_mode;
+/* weighted: a spike is a binary digit, worth half of one of the step before. Nothing leaks; D2 and C3 add up currents,
+ * and their table is read once, behind the last step. */
+typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_WEIGHTED } fx_input_mode;
 
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
  * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
@@ -29,7 +31,8 @@ typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY } fx_input_mode;
  * `bias`: 0 for none; else one more row, w[n_in], belongs to an input that is always active: with the value `bias`,
  * 1..2047, in C1, and as a spike at every step in C2 and C3 (bias = 1). D1 and D2 have none.
  * `theta` is in membrane LSB (so it carries the membrane's fraction bits) and must be >= 1 for
- * the spiking layers D1, C1, C2; for D2 and C3, `k` is the leak of the density and colour integrator. */
+ * the spiking layers D1, C1, C2 (of weighted spikes also < 2^22: they fire at 2 theta); for D2 and C3, `k` is the leak
+ * of the density and colour integrator. */
 typedef struct fx_layer {
   int32_t n_in, n_out;
   int32_t k;     /* U1.12, 0..4096 */
@@ -57,14 +60,26 @@ typedef struct fx_net {
   fx_layer layer[SF_LAYERS];
   int32_t mode;        /* fx_input_mode */
   int32_t steps;       /* t_r: time steps to unroll, 1..SF_T_MAX */
-  fx_scale exp_in;     /* D2 current 0 -> log2 of density per box edge, Q.LOG_FRAC */
+  fx_scale exp_in;     /* D2 current 0 -> log2 of density per box edge, Q.LOG_FRAC: fx_net_scale */
   fx_scale sigmoid_in; /* C3 current   -> sigmoid argument, Q.LOG_FRAC */
 } fx_net;
+
+/* What a neuron of threshold theta fires at, and loses by it. */
+static inline int32_t fx_plif_quantum(int32_t theta, int32_t mode)
+{
+  return mode == FX_WEIGHTED ? 2 * theta : theta;
+}
 
 /* Without a density net: C1, C2 and C3 alone. */
 static inline bool fx_net_decodes(const fx_net *net)
 {
   return net->layer[FX_D1].n_out == 0;
+}
+
+/* Whether the tables of D2 and C3 are read at step t. */
+static inline bool fx_net_reads_tables(const fx_net *net, int t)
+{
+  return net->mode != FX_WEIGHTED || t == net->steps - 1;
 }
 
 /* Inputs of C1: those that change with the step (h), and before them the constant ones. */
@@ -76,6 +91,10 @@ static inline int fx_net_constants(const fx_net *net)
 {
   return net->layer[FX_C1].n_in - fx_net_h(net);
 }
+
+/* exp_in or sigmoid_in for what its table is asked: a step's current, or of weighted spikes the sum of the currents of
+ * net->steps steps, which stands for 2^steps - 1 of them (fx_weigh). These are the numbers that a driver programs. */
+fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale);
 
 /* The first layer that the net has. */
 static inline int fx_net_first_layer(const fx_net *net)
@@ -222,7 +241,7 @@ typedef struct fx_ray {
  *           each presynaptic neuron active at ANY step, at the first step at which it fired; biases n_out more: C1 with
  *           its constant inputs, C2 at every step, C3 at step 0
  *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); no read at step 0
- *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations
+ *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations; of weighted spikes at the last step alone
  * A decoder has none in D1 and D2. */
 typedef union fx_layer_counts {
   uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
@@ -251,9 +270,17 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more);
 /* Everything a lockstep comparison needs of one sample. */
 typedef struct fx_trace {
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
-  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES]; /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after */
-  int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];  /* the exact sum, without C2's fraction bits */
+  int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES];      /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after,
+                                                           or of weighted spikes the sum of currents */
+  int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];       /* the exact sum, without C2's fraction bits */
 } fx_trace;
+
+/* What neuron n of a layer keeps behind a step: its membrane after the reset. */
+static inline int32_t fx_membrane_left(const fx_net *net, const fx_trace *trace, int layer, int step, int n)
+{
+  const bool fired = trace->spikes[layer][step][n / 64] >> n % 64 & 1;
+  return trace->membrane[layer][step][n] - (fired ? fx_plif_quantum(net->layer[layer].theta, net->mode) : 0);
+}
 
 typedef struct fx_out {
   uint32_t sigma;     /* U16.12 per box edge */

@@ -77,14 +77,20 @@ static INLINE void integrate(uint32_t *acc, vec in, int32_t k, int mode, bool fi
   }
 }
 
-/* The densities of samples i..i + WIDTH - 1. */
-static INLINE void integrate_densities(const fx_net *net, fx_block *b, fx_scratch *s, int i, int mode, bool first,
-                                       int t)
+/* The densities of samples i..i + WIDTH - 1, counted where they are at their limit. */
+static INLINE vec densities_of(vec y, fx_block *b, int i)
 {
-  const vec e = exp2_of(argument(v_load(&s->argument[t][0][i]), &net->exp_in, FX_EXP2_BITS));
+  const vec e = exp2_of(y);
   const uint32_t below = v_differ(e, v_set((1 << SF_SIGMA_BITS) - 1));
   for (uint32_t rest = ~below & (((uint32_t)1 << WIDTH) - 1); rest; rest &= rest - 1)
     b->saturated[FX_D2][i + __builtin_ctz(rest)]++;
+  return e;
+}
+
+static INLINE void integrate_densities(const fx_net *net, fx_block *b, fx_scratch *s, int i, int mode, bool first,
+                                       int t)
+{
+  const vec e = densities_of(argument(v_load(&s->argument[t][0][i]), &net->exp_in, FX_EXP2_BITS), b, i);
   integrate(&s->acc[0][i], e, net->layer[FX_D2].k, mode, first, SF_SIGMA_BITS, &b->saturated[FX_D2][i]);
 }
 
@@ -95,6 +101,29 @@ static INLINE void integrate_step(const fx_net *net, fx_block *b, fx_scratch *s,
     for (int o = 1; o <= COLOURS; o++)
       integrate(&s->acc[o][i], sigmoid_of(argument(v_load(&s->argument[t][o][i]), &net->sigmoid_in, FX_SIGMOID_BITS)),
                 net->layer[FX_C3].k, mode, first, SF_COLOUR_BITS, &b->saturated[FX_C3][i]);
+  }
+}
+
+/* The argument of output `at` (0: the density) for samples i..i + WIDTH - 1: the sum of weighted currents. The product
+ * takes 40 bits, so this part is scalar: it happens once per sample. */
+static INLINE vec weighed_argument(const fx_scratch *s, int steps, int i, int at, const fx_scale *scale)
+{
+  _Alignas(64) int32_t y[WIDTH];
+  vec sum = v_load(&s->argument[0][at][i]);
+  for (int t = 1; t < steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_load(&s->argument[t][at][i]));
+  v_store(y, sum);
+  for (int l = 0; l < WIDTH; l++) y[l] = at ? fx_sigmoid_argument(y[l], scale) : fx_exp2_argument(y[l], scale);
+  return v_load(y);
+}
+
+/* Weighted spikes: tables are read once. */
+static INLINE void read_weighed(const fx_net *net, fx_block *b, fx_scratch *s)
+{
+  const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);
+  const int steps = net->steps;
+  for (int i = 0; i < b->n; i += WIDTH) {
+    if (!fx_net_decodes(net)) v_store(&s->acc[0][i], densities_of(weighed_argument(s, steps, i, 0, &density), b, i));
+    for (int o = 1; o <= COLOURS; o++) v_store(&s->acc[o][i], sigmoid_of(weighed_argument(s, steps, i, o, &colour)));
   }
 }
 #endif

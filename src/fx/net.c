@@ -16,6 +16,7 @@ typedef struct state {
   int32_t current[SF_LANES]; /* of the layer at work, in its membrane's LSB for spiking layers */
   int16_t h[SF_OUT_MAX];
   fx_events events;
+  int32_t weighed[1 + COLOURS]; /* currents of the density and the colours, of weighted spikes */
   fx_out acc;
 } state;
 
@@ -50,6 +51,37 @@ static void keep_current(fx_trace *trace, int l, int t, const int32_t *current, 
   if (trace) memcpy(trace->current[l][t], current, (size_t)n * sizeof *current);
 }
 
+/* What the table of output `at` (0: the density, 1..3: colours) is asked for at step t. */
+static int32_t table_current(state *s, const fx_net *net, int at, int32_t current)
+{
+  if (net->mode != FX_WEIGHTED) return current;
+  return s->weighed[at] = fx_weigh(s->weighed[at], current);
+}
+
+/* exp2 of D2's current into the density. */
+static void read_density(state *s, const fx_net *net, int t, int32_t current)
+{
+  const fx_layer *d2 = &net->layer[FX_D2];
+  const fx_scale scale = fx_net_scale(net, &net->exp_in);
+  const uint32_t e = fx_exp2(fx_exp2_argument(current, &scale));
+  s->events.saturated[FX_D2] += e == (1u << SF_SIGMA_BITS) - 1;
+  s->acc.sigma = fx_integrate_density(s->acc.sigma, e, d2->k, net->mode, t == 0, &s->events.saturated[FX_D2]);
+}
+
+static void read_colour(state *s, const fx_net *net, int t, int o, int32_t current)
+{
+  const fx_scale scale = fx_net_scale(net, &net->sigmoid_in);
+  const uint32_t value = fx_sigmoid(fx_sigmoid_argument(current, &scale));
+  s->acc.colour[o] =
+      fx_integrate_colour(s->acc.colour[o], value, net->layer[FX_C3].k, net->mode, t == 0, &s->events.saturated[FX_C3]);
+}
+
+/* An output's state for the trace. */
+static int32_t integrated(const state *s, const fx_net *net, int at, uint32_t acc)
+{
+  return net->mode == FX_WEIGHTED ? s->weighed[at] : (int32_t)acc;
+}
+
 static void density_step(state *s, const fx_net *net, int t, fx_trace *trace)
 {
   const fx_layer *d2 = &net->layer[FX_D2];
@@ -57,10 +89,9 @@ static void density_step(state *s, const fx_net *net, int t, fx_trace *trace)
   fire(s, net, FX_D1, t, s->d1_current, trace);
   fx_current_spikes(s->current, d2->w, s->events.spikes[FX_D1][t], NULL, strips(d2->n_out));
   keep_current(trace, FX_D2, t, s->current, d2->n_out);
-  const uint32_t e = fx_exp2(fx_exp2_argument(s->current[0], &net->exp_in));
-  s->events.saturated[FX_D2] += e == (1u << SF_SIGMA_BITS) - 1;
-  s->acc.sigma = fx_integrate_density(s->acc.sigma, e, d2->k, net->mode, t == 0, &s->events.saturated[FX_D2]);
-  if (trace) trace->membrane[FX_D2][t][0] = (int32_t)s->acc.sigma;
+  const int32_t current = table_current(s, net, 0, s->current[0]);
+  if (fx_net_reads_tables(net, t)) read_density(s, net, t, current);
+  if (trace) trace->membrane[FX_D2][t][0] = integrated(s, net, 0, s->acc.sigma);
   for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(s->current[1 + j] >> SF_H_SHIFT);
 }
 
@@ -91,10 +122,9 @@ static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
   fx_current_spikes(s->current, c3->w, s->events.spikes[FX_C2][t], bias_row(c3), STRIP);
   keep_current(trace, FX_C3, t, s->current, c3->n_out);
   for (int o = 0; o < COLOURS; o++) {
-    const uint32_t value = fx_sigmoid(fx_sigmoid_argument(s->current[o], &net->sigmoid_in));
-    s->acc.colour[o] =
-        fx_integrate_colour(s->acc.colour[o], value, c3->k, net->mode, t == 0, &s->events.saturated[FX_C3]);
-    if (trace) trace->membrane[FX_C3][t][o] = (int32_t)s->acc.colour[o];
+    const int32_t current = table_current(s, net, 1 + o, s->current[o]);
+    if (fx_net_reads_tables(net, t)) read_colour(s, net, t, o, current);
+    if (trace) trace->membrane[FX_C3][t][o] = integrated(s, net, 1 + o, s->acc.colour[o]);
   }
 }
 
@@ -115,6 +145,7 @@ void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_
   memset(s.d1_current, 0, sizeof s.d1_current);
   memset(&s.events, 0, sizeof s.events);
   memset(&s.acc, 0, sizeof s.acc);
+  memset(s.weighed, 0, sizeof s.weighed);
   if (trace) memset(trace, 0, sizeof *trace);
   fx_current_mac(s.d1_current, d1->w, f, d1->n_in, strips(d1->n_out));
   for (int t = 0; t < net->steps; t++) {

@@ -8,6 +8,12 @@
 #include "src/fx/event_isa.h"
 #endif
 
+static INLINE void integrate_steps(const fx_net *net, fx_block *b, fx_scratch *s, int mode)
+{
+  integrate_step(net, b, s, mode, true, 0);
+  for (int t = 1; t < net->steps; t++) integrate_step(net, b, s, mode, false, t);
+}
+
 static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
 {
   const fx_net *net = &core->scene->net;
@@ -22,12 +28,18 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
   }
   c2_layer(core, b, s, mode);
   c3_layer(core, b, s);
-  integrate_step(net, b, s, mode, true, 0);
-  for (int t = 1; t < net->steps; t++) integrate_step(net, b, s, mode, false, t);
+  if (mode == FX_WEIGHTED)
+    read_weighed(net, b, s);
+  else
+    integrate_steps(net, b, s, mode);
   fx_block_count(b, net->steps);
   for (int i = 0; i < b->n; i++) b->out[i] = (fx_out){s->acc[0][i], {s->acc[1][i], s->acc[2][i], s->acc[3][i]}};
 }
 
+static void nets_weighted(const fx_core *core, fx_block *block, fx_scratch *scratch)
+{
+  nets_of_mode(core, block, scratch, FX_WEIGHTED);
+}
 static void nets_hybrid(const fx_core *core, fx_block *block, fx_scratch *scratch)
 {
   nets_of_mode(core, block, scratch, FX_HYBRID);
@@ -51,8 +63,11 @@ static void nets(const fx_core *core, fx_block *block, fx_scratch *scratch)
   case FX_DECAY:
     nets_decay(core, block, scratch);
     break;
-  default:
+  case FX_NODECAY:
     nets_nodecay(core, block, scratch);
+    break;
+  default:
+    nets_weighted(core, block, scratch);
   }
   tiles_end();
 }

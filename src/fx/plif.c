@@ -3,7 +3,11 @@
  *
  * In hybrid and decay mode the new membrane lies between v and the current, ends included: with d = I - v and
  * 0 <= k <= 2^12, d * k / 2^12 lies between 0 and d, both integers, and so does its rounding. A reset leaves
- * v >= 0. So s24 holds every membrane whose currents fit s24, and only no-decay mode needs its saturation. */
+ * v >= 0. So s24 holds every membrane whose currents fit s24, and only the other two modes need its saturation.
+ *
+ * Weighted spikes: the float neuron (src/snn/plif.h) has v = 2 v + I, fires at theta and loses 2 theta. Here the
+ * membrane is u = v + theta, so that what it is compared to is what it loses: u = theta + I, then u = 2 u + I - theta;
+ * it fires at 2 theta. A membrane at its lower rail never fires again, as without the rail: 2 u + I < 0. */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
@@ -26,6 +30,11 @@ static inline int32_t charge_nodecay(int32_t v, int32_t current, int32_t k)
   return v - leak_product(v, k) + current;
 }
 
+static inline int32_t charge_weighted(int32_t u, int32_t current, int32_t theta)
+{
+  return 2 * u + current - theta;
+}
+
 /* Hybrid's first step is v = I, which is the leaky form with k = 1. */
 static inline int32_t effective_leak(int32_t k, int32_t mode, bool first)
 {
@@ -39,13 +48,14 @@ static inline int32_t clamp_membrane(int32_t u)
 
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first)
 {
-  const int32_t old = first ? 0 : v;
-  const int32_t exact =
-      mode == FX_NODECAY ? charge_nodecay(old, current, k) : charge_leaky(old, current, effective_leak(k, mode, first));
+  const int32_t old = first ? fx_plif_start(theta, mode) : v, quantum = fx_plif_quantum(theta, mode);
+  const int32_t exact = mode == FX_WEIGHTED  ? charge_weighted(old, current, theta)
+                        : mode == FX_NODECAY ? charge_nodecay(old, current, k)
+                                             : charge_leaky(old, current, effective_leak(k, mode, first));
   const int32_t membrane = clamp_membrane(exact);
-  const bool spike = membrane >= theta;
+  const bool spike = membrane >= quantum;
   return (fx_plif){
-      .v = membrane - (spike ? theta : 0), .membrane = membrane, .spike = spike, .saturated = membrane != exact};
+      .v = membrane - (spike ? quantum : 0), .membrane = membrane, .spike = spike, .saturated = membrane != exact};
 }
 
 static void charge_layer(int32_t *restrict v, const int32_t *restrict current, int n, int32_t k)
@@ -64,12 +74,23 @@ static int charge_layer_nodecay(int32_t *restrict v, const int32_t *restrict cur
   return saturated;
 }
 
-static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spikes[SF_SPIKE_WORDS])
+static int charge_layer_weighted(int32_t *restrict v, const int32_t *restrict current, int n, int32_t theta)
+{
+  int saturated = 0;
+  for (int o = 0; o < n; o++) {
+    const int32_t exact = charge_weighted(v[o], current[o], theta);
+    v[o] = clamp_membrane(exact);
+    saturated += v[o] != exact;
+  }
+  return saturated;
+}
+
+static void fire_layer(int32_t *restrict v, int n, int32_t quantum, uint64_t spikes[SF_SPIKE_WORDS])
 {
   uint8_t fired[SF_LANES] = {0};
   for (int o = 0; o < n; o++) {
-    const int32_t spike = v[o] >= theta;
-    v[o] -= -spike & theta;
+    const int32_t spike = v[o] >= quantum;
+    v[o] -= -spike & quantum;
     fired[o] = (uint8_t)spike;
   }
   for (int word = 0; word < SF_SPIKE_WORDS; word++) {
@@ -84,13 +105,15 @@ int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *lay
 {
   int saturated = 0;
   if (first)
-    for (int o = 0; o < n; o++) v[o] = 0;
-  if (mode == FX_NODECAY)
+    for (int o = 0; o < n; o++) v[o] = fx_plif_start(layer->theta, mode);
+  if (mode == FX_WEIGHTED)
+    saturated = charge_layer_weighted(v, current, n, layer->theta);
+  else if (mode == FX_NODECAY)
     saturated = charge_layer_nodecay(v, current, n, layer->k);
   else
     charge_layer(v, current, n, effective_leak(layer->k, mode, first));
   if (membrane)
     for (int o = 0; o < n; o++) membrane[o] = v[o];
-  fire_layer(v, n, layer->theta, spikes);
+  fire_layer(v, n, fx_plif_quantum(layer->theta, mode), spikes);
   return saturated;
 }

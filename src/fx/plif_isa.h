@@ -28,29 +28,39 @@ static INLINE vec add_leak(vec base, vec d, leak k)
   return v_dot(base, v_mulhrs_low(split, shifted, k.low), k.pair);
 }
 
-/* fx_plif_step up to the membrane. */
-static INLINE vec charge(vec v, vec current, leak k, int mode, bool first, uint32_t *saturated)
-{
-  if (mode == FX_HYBRID && first) return current;
-  if (first) v = v_set(0);
-  if (mode != FX_NODECAY) return add_leak(v, V(sub_epi32)(current, v), k);
-  const vec kept = first ? v : V(sub_epi32)(v, add_leak(v_set(0), v, k));
-  const vec exact = V(add_epi32)(kept, current), membrane = v_clamp(exact, -FX_MEMBRANE_MAX - 1, FX_MEMBRANE_MAX);
-  *saturated += (uint32_t)__builtin_popcount(v_differ(exact, membrane));
-  return membrane;
-}
-
 /* What the neurons of a layer share at one step; mode and first are constants wherever it is used. */
 typedef struct neurons {
   leak k;
-  vec theta;
+  vec theta, quantum; /* what they fire at, and lose */
   int mode;
   bool first;
 } neurons;
 
 static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first)
 {
-  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first};
+  const int32_t theta = net->layer[layer].theta;
+  return (neurons){leak_of(net->layer[layer].k), v_set(theta), v_set(fx_plif_quantum(theta, mode)), mode, first};
+}
+
+static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
+{
+  const vec membrane = v_clamp(exact, -FX_MEMBRANE_MAX - 1, FX_MEMBRANE_MAX);
+  *saturated += (uint32_t)__builtin_popcount(v_differ(exact, membrane));
+  return membrane;
+}
+
+/* fx_plif_step up to the membrane. */
+static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturated)
+{
+  if (n->mode == FX_WEIGHTED) {
+    const vec doubled = n->first ? n->theta : V(sub_epi32)(V(slli_epi32)(v, 1), n->theta);
+    return clamp_membrane(V(add_epi32)(doubled, current), saturated);
+  }
+  if (n->mode == FX_HYBRID && n->first) return current;
+  if (n->first) v = v_set(0);
+  if (n->mode != FX_NODECAY) return add_leak(v, V(sub_epi32)(current, v), n->k);
+  const vec kept = n->first ? v : V(sub_epi32)(v, add_leak(v_set(0), v, n->k));
+  return clamp_membrane(V(add_epi32)(kept, current), saturated);
 }
 
 /* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH]. */
@@ -78,8 +88,8 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
   uint64_t bits[SF_SPIKE_WORDS] = {0};
 #pragma GCC unroll 8
   for (int j = 0; j < vectors; j++) {
-    v[j] = charge(v[j], current_of(c, i, t, j, neuron), n->k, n->mode, n->first, saturated);
-    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->theta) << j * WIDTH % 64;
+    v[j] = charge(n, v[j], current_of(c, i, t, j, neuron), saturated);
+    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->quantum) << j * WIDTH % 64;
   }
   memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
 }

@@ -74,7 +74,7 @@ static bool counted(const sf_page *page, int row, int part)
   if (l->unit[SF_LEDGER_NEURON][row][part].fj == 0 && l->unit[SF_LEDGER_INT_ALL][row][part].fj == 0) return false;
   if (row >= SF_LAYERS) return true;
   if (part == SF_PART_SOP) return fx_layer_reads_spikes(row);
-  if (part == SF_PART_SPECIAL) return c->layer[row].special[0] > 0;
+  if (part == SF_PART_SPECIAL) return row == FX_C3 || (row == FX_D2 && c->layer[row].updates[0] > 0);
   return true;
 }
 

@@ -31,12 +31,18 @@ static double theta_of(const sf_model *model, int layer)
   return 0;
 }
 
+/* Of theta, membrane LSB: neurons of weighted spikes fire at 2 theta. */
+static double largest_theta(const sf_model *model)
+{
+  return model->config.mode == SF_WEIGHTED ? MEMBRANE_LIMIT / 2 : MEMBRANE_LIMIT;
+}
+
 /* With a smaller unit theta would not fit the membrane. Integrating layers have no threshold; their unit only has to
  * stay positive. */
 static double smallest_unit(const sf_model *model, int layer)
 {
   const double theta = theta_of(model, layer);
-  return theta > 0 ? ldexp(theta, fx_layer_frac(layer)) / MEMBRANE_LIMIT : 1e-12;
+  return theta > 0 ? ldexp(theta, fx_layer_frac(layer)) / largest_theta(model) : 1e-12;
 }
 
 static int rows_of(const sf_calibration *c, int layer)
@@ -86,9 +92,9 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
 static sf_status set_theta(const context *c, int layer, double unit)
 {
   const double exact = ldexp(theta_of(c->model, layer) / unit, fx_layer_frac(layer)), rounded = nearbyint(exact);
-  if (!(rounded >= 1 && rounded <= MEMBRANE_LIMIT))
-    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%d",
-                   c->name, tensor_of(c, layer), theta_of(c->model, layer), exact, MEMBRANE_LIMIT);
+  if (!(rounded >= 1 && rounded <= largest_theta(c->model)))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%.0f",
+                   c->name, tensor_of(c, layer), theta_of(c->model, layer), exact, largest_theta(c->model));
   c->scene->net.layer[layer].theta = (int32_t)rounded;
   return sf_ok();
 }

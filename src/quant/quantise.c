@@ -50,11 +50,6 @@ static sf_status check_model(const sf_model *model, const char *name, const sf_q
                    "%s: metadata 'along_ray': its steps are the samples of a ray (--steps-along-ray); the accelerator "
                    "runs the steps of one sample",
                    name);
-  if (config->mode == SF_WEIGHTED)
-    return sf_fail(SF_E_UNSUPPORTED,
-                   "%s: metadata 'mode': its spikes are weighted by their step (--input-mode weighted); the "
-                   "accelerator's all weigh the same",
-                   name);
   SF_TRY(check_sizes(model, name));
   for (int i = 0; i < 3; i++)
     if (!isfinite(config->theta[i]) || config->theta[i] <= 0)
@@ -129,7 +124,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   const float *leak = sf_model_param(model, SF_P_LEAK); /* in the order of the layers */
   for (int l = 0; l < SF_LAYERS; l++)
     if (scene->net.layer[l].n_out > 0) scene->net.layer[l].k = leak_value(leak[l], leak_bits);
-  scene->net.mode = model->config.mode;
+  scene->net.mode = model->config.mode; /* sf_input_mode is fx_input_mode */
   scene->net.steps = options->steps ? options->steps : model->t_r;
   scene->max_samples = MAX_SAMPLES;
   scene->trans_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));

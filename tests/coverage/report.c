@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const char *const mode_name[] = {"hybrid", "decay", "no-decay"};
+static const char *const mode_name[] = {"hybrid", "decay", "no-decay", "weighted"};
 static const char *const phase_name[SF_PHASES] = {"idle",           "packet half in",     "sample in", "after D1",
                                                   "after D2",       "after C1",           "after C2",  "after C3",
                                                   "result waiting", "half a result taken"};
@@ -23,11 +23,14 @@ static void bin(group *g, uint64_t count, const char *name)
   if (!count) printf("  hole: %s: %s\n", g->name, name);
 }
 
-/* Only no-decay adds currents up, so a membrane needs several steps to a rail: D1 and C1 two, C2 three. Two of the
- * smallest formats cannot be filled: colour holds 16 steps of the largest sigmoid. */
+/* Only no-decay adds currents up, so a membrane needs several steps to a rail: D1 and C1 two, C2 three. Weighted spikes
+ * double it: C2 needs two, D1 and C1 one, for theta is in their membrane. Two of the smallest formats cannot be filled:
+ * colour holds 16 steps of the largest sigmoid. Sums of weighted currents fit. */
 static bool possible(int layer, int mode, int step, bool saturated)
 {
-  if (!saturated || layer == FX_D2) return true;
+  if (!saturated) return true;
+  if (mode == FX_WEIGHTED) return fx_layer_fires(layer) && step >= (layer == FX_C2);
+  if (layer == FX_D2) return true;
   if (layer == FX_C3 || mode != FX_NODECAY) return false;
   return step >= (layer == FX_C2 ? 2 : 1);
 }

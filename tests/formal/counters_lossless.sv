@@ -32,6 +32,7 @@ module counters_lossless (
     input wire        neurons_last_i,
     input wire [ 8:0] neurons_fired_i,
     input wire        update_i,
+    input wire        special_i,
     input wire        update_colour_i,
     input wire [ 2:0] update_step_i,
     input wire        sample_i,
@@ -78,6 +79,7 @@ module counters_lossless (
   wire first = fed && (fired & earlier) == 8'd0;
   wire acts = neurons_valid_i && neurons_step_i == step
             && neurons_layer_i == (layer == 3'd0 ? 2'd0 : layer == 3'd2 ? 2'd1 : 2'd2);
+  wire asks = special_i && update_step_i == step && update_colour_i == (layer == 3'd4);
   wire updates = update_i && update_step_i == step && update_colour_i == (layer == 3'd4);
   wire mac = (layer == 3'd0 && step == 3'd0 && d1_row_i) || (layer == 3'd2 && c1_products_i && c1_step_i == step);
   wire sop = (layer == 3'd1 || layer == 3'd3 || layer == 3'd4) && fed;
@@ -110,7 +112,7 @@ module counters_lossless (
         3'd4: share = read ? n : 4'd0;
         3'd5: share = step == 3'd0 ? 4'd0 : bytes;
         3'd6: share = bytes;
-        default: share = neurons ? 4'd0 : update;
+        default: share = {3'd0, !neurons && asks};
       endcase
   end
 
@@ -148,7 +150,7 @@ module counters_lossless (
   wire waits = peek_write_q && peek_write_place_q == watched;
   wire [3:0] seen = waits ? written : window;
   wire events = d1_row_i || c1_row_i || c1_bias_row_i || c1_products_i || d2_row_i || c2_row_i || c2_bias_row_i || c3_row_i || c3_bias_row_i || busy_i != 5'd0
-              || ray_i || neurons_valid_i || update_i || sample_i || stall_out_i;
+              || ray_i || neurons_valid_i || update_i || special_i || sample_i || stall_out_i;
   always @* begin
     assume (!quiet_i || !events);   // sf_core, sf_readout: idle
     assume (!held_q || quiet_i);    // sf_core begins no sample

@@ -1,6 +1,6 @@
 // The integrator of the output layers equals its specification in 64 bits, for the inputs of four cycles ago, whatever came
 // before and after; between accumulator and input in decay and hybrid mode; saturating at the top and never below 0 in
-// no-decay mode; within its accumulator's width always. Both multipliers are cut: what mul_bounds and mul_split allow.
+// no-decay mode; of weighted spikes the input itself; within its accumulator's width always. Both multipliers are cut: what mul_bounds and mul_split allow.
 `default_nettype none
 
 module integrate_spec #(
@@ -18,7 +18,9 @@ module integrate_spec #(
   localparam signed [63:0] SIGMA_MAX = (64'sd1 << sf_arch_pkg::SIGMA_BITS) - 64'sd1;
   localparam signed [63:0] COLOUR_MAX = (64'sd1 << sf_arch_pkg::COLOUR_BITS) - 64'sd1;
   localparam NODECAY = MODE == sf_op_pkg::NODECAY;
-  localparam LEAPS = MODE == sf_op_pkg::HYBRID && FIRST;  // to the input
+  localparam WEIGHTED = MODE == sf_op_pkg::WEIGHTED;
+  localparam FROM_ZERO = FIRST || WEIGHTED;
+  localparam LEAPS = WEIGHTED || (MODE == sf_op_pkg::HYBRID && FIRST);  // to the input
 
   wire [27:0] acc;
   sf_integrate u_dut (
@@ -53,12 +55,13 @@ module integrate_spec #(
     {product4_q, product3_q} <= {product3_q, product2_q};
   end
 
-  wire signed [63:0] a1 = FIRST ? 64'sd0 : {36'd0, acc1_q};
+  wire signed [63:0] a1 = FROM_ZERO ? 64'sd0 : {36'd0, acc1_q};
   wire signed [63:0] factor1 = NODECAY ? -a1 : {36'd0, in1_q} - a1;
   wire signed [63:0] whole = factor1 <<< FRAC;
+  wire multiplies_factor = {{35{peek_x1_q[28]}}, peek_x1_q} == factor1;  // else nothing is known of the product
 
   wire signed [63:0] max = colour_q[3] ? COLOUR_MAX : SIGMA_MAX;
-  wire signed [63:0] a = FIRST ? 64'sd0 : {36'd0, acc4_q};
+  wire signed [63:0] a = FROM_ZERO ? 64'sd0 : {36'd0, acc4_q};
   wire signed [63:0] x = {36'd0, in4_q};
   wire signed [63:0] result = {36'd0, acc};
   wire signed [63:0] leak = (product4_q + HALF) >>> FRAC;
@@ -69,14 +72,14 @@ module integrate_spec #(
   always @* begin
     assume (k_i <= 13'd1 << FRAC);
     assume ({36'd0, acc_i} <= max_in && {36'd0, in_i} <= max_in);
-    if (LEAPS) assume (split == whole);
+    if (LEAPS) assume (!multiplies_factor || split == whole);
     // mul_bounds: of each product, and of the whole that mul_split makes of them
     assume (low[30:29] == 2'd0 && low[28:0] <= {peek_x1_q[16:0], {FRAC{1'b0}}});
     assume (peek_x1_q[28] ? (high[25] && high[24:0] >= {1'b1, peek_x1_q[28:17], {FRAC{1'b0}}}) || high == 26'sd0
                           : !high[25] && high[24:0] <= {1'b0, peek_x1_q[28:17], {FRAC{1'b0}}});
     assume (whole < 64'sd0 ? split <= 64'sd0 && split >= whole : split >= 64'sd0 && split <= whole);
 
-    if (age_q != 3'd0) multiplies_the_factor : assert ({{35{peek_x1_q[28]}}, peek_x1_q} == factor1);
+    if (age_q != 3'd0) multiplies_the_factor : assert (multiplies_factor);
     if (age_q == 3'd4) begin
       fits_its_width : assert (result <= max);
       if (NODECAY) begin

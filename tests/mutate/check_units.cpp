@@ -2,6 +2,7 @@
  * Exit status 0 equal, 1 different. -DUNIT=NAME -DUNIT_NAME chooses the unit. */
 #include "tests/mutate/unit.h"
 extern "C" {
+#include "src/fx/round.h"
 #include "src/fx/unit.h"
 }
 
@@ -25,7 +26,7 @@ static bool differs(int64_t actual, int64_t expected)
 }
 
 #if defined UNIT_sf_plif
-/* A neuron's step a cycle: its leak a cycle later, its threshold four, its outputs five. */
+/* A neuron's step a cycle: its leak a cycle later, what it fires at four, its outputs five. */
 struct neuron {
   int32_t v, current, k, theta, mode;
   bool first;
@@ -40,14 +41,19 @@ static neuron drawn_neuron(void)
               (int32_t)corner(-max - 1, max),
               (int32_t)corner(0, FX_LEAK_ONE),
               (int32_t)corner(1, max),
-              (int32_t)draw(0, 2),
+              (int32_t)draw(FX_HYBRID, FX_WEIGHTED),
               draw(0, 3) == 0,
               {}};
+  const int64_t highest = n.mode == FX_WEIGHTED ? max / 2 : max;
+  if (n.theta > highest) n.theta = (int32_t)highest;
   if (draw(0, 3) == 0) n.current = n.v; /* nothing leaks: the threshold alone decides */
   n.want = fx_plif_step(n.v, n.current, n.k, n.theta, n.mode, n.first);
   if (draw(0, 1) && n.want.membrane > 1) { /* at the threshold, and one beside it */
-    n.theta = n.want.membrane + draw(-1, 1);
-    n.theta = n.theta > max ? max : n.theta;
+    const int32_t beside = n.want.membrane + draw(-1, 1);
+    if (n.mode == FX_WEIGHTED) /* u - 2 theta, of which the current takes the difference */
+      n.current = (int32_t)fx_sat((int64_t)n.current - beside + 2 * n.theta, SF_MEMBRANE_BITS);
+    else
+      n.theta = beside > max ? max : beside;
     n.want = fx_plif_step(n.v, n.current, n.k, n.theta, n.mode, n.first);
   }
   return n;
@@ -59,8 +65,9 @@ static bool trial(int i)
   const neuron &leaks = on_its_way[(i + 7) & 7], &compares = on_its_way[(i + 4) & 7];
   top.v_i = n.v & 0xffffff, top.current_i = n.current & 0xffffff;
   top.nodecay_i = n.mode == FX_NODECAY, top.first_i = n.first;
-  top.k_i = leaks.mode == FX_HYBRID && leaks.first ? FX_LEAK_ONE : leaks.k;
-  top.theta_i = compares.theta;
+  top.weighted_i = n.mode == FX_WEIGHTED, top.theta_i = n.theta;
+  top.k_i = leaks.mode == FX_WEIGHTED || (leaks.mode == FX_HYBRID && leaks.first) ? FX_LEAK_ONE : leaks.k;
+  top.quantum_i = fx_plif_quantum(compares.theta, compares.mode);
   top.clk_i = 0, top.eval();
   top.clk_i = 1, top.eval();
   const fx_plif &want = compares.want; /* five clocks after its inputs, this one included */
@@ -76,7 +83,7 @@ static bool trial(int i)
   const bool colour = draw(0, 1), first = draw(0, 3) == 0;
   const int64_t max = ((int64_t)1 << (colour ? SF_COLOUR_BITS : SF_SIGMA_BITS)) - 1;
   const uint32_t acc = corner(0, max), in = corner(0, max);
-  const int32_t k = corner(0, FX_LEAK_ONE), other = draw(0, FX_LEAK_ONE), mode = i / RUN % 3;
+  const int32_t k = corner(0, FX_LEAK_ONE), other = draw(0, FX_LEAK_ONE), mode = i / RUN % (FX_WEIGHTED + 1);
   uint64_t saturated = 0;
   top.acc_i = acc, top.in_i = in, top.mode_i = mode, top.first_i = first, top.colour_i = colour;
   top.k_density_i = colour ? other : k, top.k_colour_i = colour ? k : other;
@@ -99,9 +106,9 @@ static bool trial(int i)
       s = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
            (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
     }
-  const int32_t current = corner(-32768, 32767);
+  const int32_t current = draw(0, 1) ? corner(-32768, 32767) : corner(-(1 << 23), (1 << 23) - 1);
   const bool colour = draw(0, 1);
-  top.current_i = current & 0xffff, top.colour_i = colour;
+  top.current_i = current & 0xffffff, top.colour_i = colour;
   top.exp_mul_i = scale[0].mul, top.exp_shift_i = scale[0].shift, top.exp_bias_i = scale[0].bias;
   top.sigmoid_mul_i = scale[1].mul, top.sigmoid_shift_i = scale[1].shift, top.sigmoid_bias_i = scale[1].bias;
   want[i & 7] = colour ? fx_sigmoid_argument(current, &scale[1]) : fx_exp2_argument(current, &scale[0]);
