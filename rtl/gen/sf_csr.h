@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00050001
+#define SF_REG_VERSION_RESET 0x00050002
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008

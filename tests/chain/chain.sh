@@ -41,7 +41,7 @@ check_scene simple --input-mode no-decay --steps 4 --hidden 32
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_fit fog
 check_scene empty --steps 2 --hidden 32
-check_scene plaza --steps 3 --bound 8 --hidden 32
+check_scene plaza --steps 3 --bound 8 --hidden 32 --input-mode weighted
 "$bin/error_budget" "$work/plaza/m.safetensors" "$work/plaza/s.snn" "$work/plaza" --rays 20 --samples 1000 --quiet >"$work/budget.txt" ||
   fail "plaza: error budget"
 grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza: the error budget's core is not the core"
