@@ -119,6 +119,23 @@ TEST(neuron_ledger_by_hand)
   ck_assert_uint_eq(twin[SF_PART_PLACE], part[SF_PART_PLACE]);
 }
 
+/* Weighted spikes ask for each special function once a sample, as the twin does; nothing else changes. */
+TEST(weighted_spikes_ask_once)
+{
+  fx_net net = small_net();
+  net.mode = FX_WEIGHTED;
+  const fx_counts c = small_counts(&net);
+  sf_ledgers *weighted = malloc(sizeof *weighted);
+  ck_ok(make_ledgers(&tech, &net, &c, &small_traffic, weighted));
+  const uint64_t *const here = weighted->part[SF_LEDGER_NEURON], *const other = l->part[SF_LEDGER_NEURON];
+  const uint64_t field = 1 * (20 * 16 + 192 + 2 * 20 + 160); /* of the ray, not of the nets */
+  ck_assert_uint_eq(2 * (here[SF_PART_SPECIAL] - field), other[SF_PART_SPECIAL] - field);
+  for (int part = 0; part < SF_PARTS; part++)
+    if (part != SF_PART_SPECIAL) ck_assert_uint_eq(here[part], other[part]);
+  ck_assert_mem_eq(weighted->part[SF_LEDGER_INT_ALL], l->part[SF_LEDGER_INT_ALL], sizeof l->part[SF_LEDGER_INT_ALL]);
+  free(weighted);
+}
+
 /* Rows alone differ: values need all of D1's 4 and of h's 2 once for the group, and the direction's 3 once. */
 TEST(shared_ledger_by_hand)
 {

@@ -271,6 +271,23 @@ TEST(same_seed_same_bits_any_threads)
   }
 }
 
+/* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
+TEST(largest_thresholds)
+{
+  for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++) {
+    OWNED(sf_model) m = make_model(32, 4, mode);
+    OWNED(fx_scene) scene;
+    sf_quant_report report;
+    for (int s = 0; s < 3; s++) m.config.theta[s] = 5000;
+    quantise(&m, &scene, &report);
+    const int32_t limit = (1 << (mode == SF_WEIGHTED ? 22 : 23)) - 1;
+    for (int s = 0; s < FX_SPIKING; s++) {
+      const int32_t theta = scene.net.layer[fx_spiking_layers[s]].theta;
+      ck_assert_msg(theta <= limit && theta > limit - limit / 50, "mode %d: theta %d of %d", mode, theta, limit);
+    }
+  }
+}
+
 TEST(refuses_what_it_cannot_represent)
 {
   static const float bad[] = {NAN, INFINITY, -INFINITY};
