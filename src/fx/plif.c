@@ -63,22 +63,14 @@ static void charge_layer(int32_t *restrict v, const int32_t *restrict current, i
   for (int o = 0; o < n; o++) v[o] = charge_leaky(v[o], current[o], k);
 }
 
-static int charge_layer_nodecay(int32_t *restrict v, const int32_t *restrict current, int n, int32_t k)
+/* The modes that saturate. */
+static int charge_layer_limited(int32_t *restrict v, const int32_t *restrict current, int n, const fx_layer *layer,
+                                int32_t mode)
 {
   int saturated = 0;
   for (int o = 0; o < n; o++) {
-    const int32_t exact = charge_nodecay(v[o], current[o], k);
-    v[o] = clamp_membrane(exact);
-    saturated += v[o] != exact;
-  }
-  return saturated;
-}
-
-static int charge_layer_weighted(int32_t *restrict v, const int32_t *restrict current, int n, int32_t theta)
-{
-  int saturated = 0;
-  for (int o = 0; o < n; o++) {
-    const int32_t exact = charge_weighted(v[o], current[o], theta);
+    const int32_t exact = mode == FX_WEIGHTED ? charge_weighted(v[o], current[o], layer->theta)
+                                              : charge_nodecay(v[o], current[o], layer->k);
     v[o] = clamp_membrane(exact);
     saturated += v[o] != exact;
   }
@@ -106,10 +98,8 @@ int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *lay
   int saturated = 0;
   if (first)
     for (int o = 0; o < n; o++) v[o] = fx_plif_start(layer->theta, mode);
-  if (mode == FX_WEIGHTED)
-    saturated = charge_layer_weighted(v, current, n, layer->theta);
-  else if (mode == FX_NODECAY)
-    saturated = charge_layer_nodecay(v, current, n, layer->k);
+  if (mode == FX_WEIGHTED || mode == FX_NODECAY)
+    saturated = charge_layer_limited(v, current, n, layer, mode);
   else
     charge_layer(v, current, n, effective_leak(layer->k, mode, first));
   if (membrane)
