@@ -170,7 +170,8 @@ typedef struct spikefield_sample {
 typedef struct spikefield_trace {
   /* D1, C1, C2: neuron n is bit n % 64 of word n / 64. */
   uint64_t spikes[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES / 64];
-  /* D1, C1, C2: before firing and reset; D2 [0], C3 [0..2]: the accumulator after the step. */
+  /* D1, C1, C2: before firing and reset; D2 [0], C3 [0..2]: the accumulator after the step. Of weighted spikes a
+   * membrane has theta in it, and the accumulator is the sum of currents. */
   int32_t membrane[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES];
   int32_t current[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES]; /* exact sums */
 } spikefield_trace;
