@@ -23,12 +23,12 @@ module sf_integrate (
   wire signed [28:0] a = first_i || weighted ? 29'sd0 : $signed({1'b0, acc_i});
   wire signed [28:0] x = $signed({1'b0, in_i});
   reg signed [28:0] x1_q;
-  reg signed [29:0] base1_q;
+  reg [28:0] base1_q;
   reg [12:0] k1_q;
   reg [3:0] colour_q;
   always_ff @(posedge clk_i) begin
     x1_q <= nodecay ? -a : x - a;
-    base1_q <= nodecay ? 30'(a) + 30'(x) : 30'(a);
+    base1_q <= nodecay ? a + x : a;
     k1_q <= weighted || (mode_i == sf_op_pkg::HYBRID && first_i) ? 13'd1 << FRAC : colour_i ? k_colour_i : k_density_i;
     colour_q <= {colour_q[2:0], colour_i};
   end
@@ -36,7 +36,7 @@ module sf_integrate (
   // 2: 29 x 13 bits as two products of the multipliers' size
   reg signed [30:0] low2_q;
   reg signed [25:0] high2_q;
-  reg signed [29:0] base2_q, base3_q;
+  reg [28:0] base2_q, base3_q;
   wire signed [13:0] k = $signed({1'b0, k1_q});
   always_ff @(posedge clk_i) begin
     low2_q <= $signed({1'b0, x1_q[16:0]}) * k;
@@ -46,17 +46,17 @@ module sf_integrate (
 
   // 3: x / 2^n, round half up. No-decay mode adds what a negated product gives: -round(p) = floor((-p + half - 1) / 2^n).
   wire signed [42:0] product = {high2_q, 17'd0} + 43'(low2_q) + (nodecay ? HALF - 43'sd1 : HALF);
-  reg signed [30:0] leak3_q;
+  reg [28:0] leak3_q;
   always_ff @(posedge clk_i) begin
-    leak3_q <= 31'(product >>> FRAC);
+    leak3_q <= 29'(product >>> FRAC);
     base3_q <= base2_q;
   end
 
-  // 4: the new value; 5: saturate
-  reg signed [31:0] v4_q;
-  always_ff @(posedge clk_i) v4_q <= 32'(base3_q) + 32'(leak3_q);
-  wire over = colour_q[3] ? |v4_q[30:20] : |v4_q[30:28];
-  assign acc_o = v4_q[31] ? 28'd0 : over ? (colour_q[3] ? 28'h00fffff : 28'hfffffff) : v4_q[27:0];
+  // 4: the new value; no leak of at most 1 makes it negative, or larger than the sum of both. 5: saturate
+  reg [28:0] v4_q;
+  always_ff @(posedge clk_i) v4_q <= base3_q + leak3_q;
+  wire over = colour_q[3] ? v4_q[20] : v4_q[28];
+  assign acc_o = over ? (colour_q[3] ? 28'h00fffff : 28'hfffffff) : v4_q[27:0];
 endmodule
 
 `default_nettype wire

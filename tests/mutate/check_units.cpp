@@ -94,20 +94,33 @@ static bool trial(int i)
 }
 enum { ALL = TRIALS };
 #elif defined UNIT_sf_scale
+/* A scale and a current of which the argument, before it saturates, is one power of two away from a small number. */
+static fx_scale aim(int32_t *current)
+{
+  const int64_t high = (int64_t)1 << draw(15, 39), sum = (high + draw(0, 65535)) ^ -draw(0, 1);
+  const int32_t least = (int32_t)(high >> 23), mul = (int32_t)draw(least > 65535 ? 65535 : least + 1, 65535);
+  *current = (int32_t)fx_sat(sum / mul, 24);
+  return {mul, 0, (int32_t)(sum - (int64_t)*current * mul)};
+}
+
 /* A current a cycle, of either table; its argument five clocks later. The scales stay for a while, as at work. */
 static bool trial(int i)
 {
   enum { RUN = 50, LATER = 4 };
   static int32_t want[8];
   static fx_scale scale[2];
+  static int32_t aimed[2];
   if (i % RUN == 0)
-    for (fx_scale &s : scale) {
+    for (int s = 0; s < 2; s++) {
       const int32_t reach = draw(0, 1) ? 140000 : 35000;
-      s = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
-           (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
+      scale[s] = aim(&aimed[s]);
+      if (draw(0, 1))
+        scale[s] = {(int32_t)corner(0, 65535), (int32_t)draw(0, 31),
+                    (int32_t)(draw(0, 3) ? draw(-reach, reach) : corner(INT32_MIN, INT32_MAX))};
     }
-  const int32_t current = draw(0, 1) ? corner(-32768, 32767) : corner(-(1 << 23), (1 << 23) - 1);
   const bool colour = draw(0, 1);
+  int32_t current = draw(0, 1) ? corner(-32768, 32767) : corner(-(1 << 23), (1 << 23) - 1);
+  if (draw(0, 3) == 0) current = aimed[colour];
   top.current_i = current & 0xffffff, top.colour_i = colour;
   top.exp_mul_i = scale[0].mul, top.exp_shift_i = scale[0].shift, top.exp_bias_i = scale[0].bias;
   top.sigmoid_mul_i = scale[1].mul, top.sigmoid_shift_i = scale[1].shift, top.sigmoid_bias_i = scale[1].bias;
