@@ -17,6 +17,29 @@ static inline void check_ledgers(faults *f, const char *page, const sf_ledgers *
     }
 }
 
+static inline void check_unit(faults *f, const char *page, int row, int part, const uint64_t events[SF_T_MAX])
+{
+  uint64_t all = 0;
+  char key[96];
+  for (int t = 0; t < SF_T_MAX; t++) all += events[t];
+  snprintf(key, sizeof key, "data-key=\"ledgers.list[%d].rows[%d].unit_fj.%s\"", SF_LEDGER_NEURON, row,
+           sf_part_names[part]);
+  if (all && !strstr(page, key)) fault(f, "no %s", key);
+}
+
+/* What happened in a layer has its price on the page. */
+static inline void check_units(faults *f, const char *page, const fx_counts *c)
+{
+  for (int l = 0; l < SF_LAYERS; l++) {
+    check_unit(f, page, l, SF_PART_MAC, c->layer[l].mac);
+    check_unit(f, page, l, SF_PART_SOP, c->layer[l].sop);
+    check_unit(f, page, l, SF_PART_WEIGHT, c->layer[l].weight);
+    check_unit(f, page, l, SF_PART_STATE, c->layer[l].updates);
+    check_unit(f, page, l, SF_PART_NEURON, c->layer[l].updates);
+    check_unit(f, page, l, SF_PART_SPECIAL, c->layer[l].special);
+  }
+}
+
 static inline void check_counts(faults *f, const char *page, int steps)
 {
   for (int l = 0; l < SF_LAYERS; l++)
@@ -100,6 +123,7 @@ static inline faults judge(const char *page, const sf_audit_report *r)
   check_figures(&f, page, r);
   check_ledgers(&f, page, &r->ledgers);
   check_counts(&f, page, r->net->steps);
+  check_units(&f, page, &r->measure.core);
   if (!json) fault(&f, "no JSON");
   if (check_numbers(&f, page, json) < 150) fault(&f, "fewer than 150 numbers");
   cJSON_Delete(json);
