@@ -29,26 +29,48 @@ static void moments_free(moments *m)
   memset(m, 0, sizeof *m);
 }
 
-/* The sums of `a` are whole numbers below 2^53, so they are exact in any order. Only the half above the diagonal is
- * added up; a row with many inputs adds its zeros, too, which is faster than to step over them. */
-static void add_row(moments *m, const int16_t *x, const float *target)
+enum { ROWS = 4 };
+
+/* Rows that are added at once. Those that are not there are zeros. */
+typedef struct row_block {
+  double x[ROWS][INPUTS_MAX], target[ROWS][SF_LANES];
+  int active[INPUTS_MAX], count; /* inputs that are not 0 in all rows */
+} row_block;
+
+static void read_rows(row_block *block, const moments *m, const int16_t *x, const float *target, int rows)
 {
-  int active[INPUTS_MAX], count = 0;
-  double wide[INPUTS_MAX];
+  block->count = 0;
+  for (int n = 0; n < ROWS; n++)
+    for (int o = 0; o < m->n_out; o++) block->target[n][o] = n < rows ? target[n * m->n_out + o] : 0;
   for (int i = 0; i < m->n_in; i++) {
-    wide[i] = x[i];
-    if (x[i]) active[count++] = i;
+    bool active = false;
+    for (int n = 0; n < ROWS; n++) {
+      block->x[n][i] = n < rows ? x[n * m->n_in + i] : 0;
+      active |= block->x[n][i] != 0;
+    }
+    if (active) block->active[block->count++] = i;
   }
-  for (int p = 0; p < count; p++) {
-    const int i = active[p];
-    double *a = m->a + (size_t)i * (size_t)m->n_in, *b = m->b + (size_t)i * (size_t)m->n_out;
-    if (count > m->n_in / 4)
-      for (int r = i; r < m->n_in; r++) a[r] += wide[i] * wide[r];
-    else
-      for (int r = p; r < count; r++) a[active[r]] += wide[i] * wide[active[r]];
-    for (int o = 0; o < m->n_out; o++) b[o] += wide[i] * target[o];
-  }
-  for (int o = 0; o < m->n_out; o++) m->energy += (double)target[o] * target[o];
+}
+
+/* a[r] += x_i x_r of all rows; b[o] in the order of the rows. */
+static void add_input(moments *m, const row_block *block, int i)
+{
+  double *restrict a = m->a + (size_t)i * (size_t)m->n_in, *restrict b = m->b + (size_t)i * (size_t)m->n_out;
+  const double x0 = block->x[0][i], x1 = block->x[1][i], x2 = block->x[2][i], x3 = block->x[3][i];
+  const double *t0 = block->target[0], *t1 = block->target[1], *t2 = block->target[2], *t3 = block->target[3];
+  for (int r = i; r < m->n_in; r++)
+    a[r] += x0 * block->x[0][r] + x1 * block->x[1][r] + x2 * block->x[2][r] + x3 * block->x[3][r];
+  for (int o = 0; o < m->n_out; o++) b[o] = b[o] + x0 * t0[o] + x1 * t1[o] + x2 * t2[o] + x3 * t3[o];
+}
+
+/* The sums of `a` are whole numbers below 2^53, so they are exact in any order. Only the half above the diagonal is
+ * added up. An input's zeros are added, too, which is faster than to step over them. */
+static void add_rows(moments *m, const int16_t *x, const float *target, int rows)
+{
+  row_block block;
+  read_rows(&block, m, x, target, rows);
+  for (int p = 0; p < block.count; p++) add_input(m, &block, block.active[p]);
+  for (int o = 0; o < rows * m->n_out; o++) m->energy += (double)target[o] * target[o];
 }
 
 /* b is gathered input-major above (contiguous in o) and turned here; `a` gets its other half. */
@@ -76,8 +98,9 @@ static sf_status gather(moments *m, const sf_fit_data *data, int begin, int end)
                  .b = calloc(n_in * n_out, sizeof(double))};
   bool ok = m->a && m->b;
   if (ok)
-    for (int row = begin; row < end; row++)
-      add_row(m, data->x + (size_t)row * n_in, data->target + (size_t)row * n_out);
+    for (int row = begin; row < end; row += ROWS)
+      add_rows(m, data->x + (size_t)row * n_in, data->target + (size_t)row * n_out,
+               end - row < ROWS ? end - row : ROWS);
   ok = ok && finish(m, end - begin);
   if (ok) return sf_ok();
   moments_free(m);
