@@ -14,9 +14,9 @@ export CK_TIMEOUT_MULTIPLIER=${CK_TIMEOUT_MULTIPLIER:-10} # a timeout ends what 
 set -m # a group for each test, so that an interrupt ends all of it, and tests that interrupt programs can
 trap 'trap - INT TERM; for job in $(jobs -p); do kill -- "-$job"; done 2>/dev/null; wait; exit 130' INT TERM
 
-# run NAME: its verdict goes to the terminal, and with its seconds into logs/NAME.result.
+# run NAME: its seconds, its seconds of processor time and its verdict go to the terminal and into logs/NAME.result.
 run() {
-  local name=$1 start command status verdict
+  local name=$1 start command status verdict TIMEFORMAT='%U %S'
   start=$(date +%s)
   if [ -f "$build/tests/$name" ]; then
     command=("$build/tests/$name")
@@ -25,7 +25,7 @@ run() {
   else
     command=(python3 "$here/chain/$name.py" "$build")
   fi
-  "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null
+  { time "${command[@]}" >"$logs/$name.log" 2>&1 </dev/null; } 2>"$logs/$name.processor"
   status=$?
   if [ $status -eq 0 ]; then
     verdict="ok$(sed -n 's/^\([a-z0-9-]*\): not \(on this machine\|installed\)$/, without \1/p' "$logs/$name.log" | sort -u | tr -d '\n')"
@@ -38,10 +38,10 @@ run() {
   else
     verdict="FAILED ($status), see $logs/$name.log"
   fi
-  set -- $(($(date +%s) - start)) "$verdict"
+  set -- $(($(date +%s) - start)) "$(awk '{ s = $1 + $2 } END { printf "%d", s }' "$logs/$name.processor")" "$verdict"
   echo "$*" >"$logs/$name.result"
   echo "$(
-    printf '  %-16s %4d s  %s' "$name" "$@"
+    printf '  %-22s %4d s %5d s cpu  %s' "$name" "$@"
     [[ $verdict != FAILED* ]] || { echo && tail -n 20 "$logs/$name.log"; }
   )" # in one piece
 }
@@ -61,7 +61,7 @@ wait
 
 passed=0 failed=0 skipped=0
 for name in "$@"; do
-  read -r seconds verdict <"$logs/$name.result" || verdict=FAILED
+  read -r seconds _ verdict <"$logs/$name.result" || verdict=FAILED
   case $verdict in
     ok*) passed=$((passed + 1)) inside= ;;
     skipped*) skipped=$((skipped + 1)) inside='<skipped/>' ;;
