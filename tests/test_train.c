@@ -36,6 +36,41 @@ LOOP_TEST(same_seed_same_bits_any_threads, 2)
   ck_assert_int_ne(memcmp(a->model.value, c->model.value, a->model.size * sizeof(float)), 0);
 }
 
+/* The field is learned with two steps. A run that ends there, and the paper's, unroll all T. */
+LOOP_TEST(stage_one_unrolls_two_steps, 3)
+{
+  sf_train_options o = small_run();
+  if (_i == 1) o.stage2 = 0;
+  if (_i == 2) o.objective = SF_OBJECTIVE_PAPER;
+  OWNED(trainer) t = start(&data, &o, NULL);
+  const sf_train_stats s = steps(t, o.stage1 - 1);
+  ck_assert_int_eq(s.stage, 1);
+  ck_assert_int_eq(s.t_r, _i ? T : 2);
+  ck_assert_double_eq(s.t_star, s.t_r);
+}
+
+/* Every prefix has 1/T of the whole weight, within five standard errors, and few steps are drawn most often. */
+LOOP_TEST(a_drawn_prefix_stands_for_the_mean, SF_T_MAX)
+{
+  enum { DRAWS = 100000 };
+  const int steps_all = _i + 1;
+  double share[SF_T_MAX] = {0}, sum = 0;
+  int drawn[SF_T_MAX] = {0};
+  for (int i = 0; i < DRAWS; i++) {
+    float weight;
+    const int t = sf_prefix_draw(7, i, steps_all, &weight);
+    ck_assert(t >= 1 && t <= steps_all);
+    share[t - 1] += weight / (double)DRAWS;
+    drawn[t - 1]++;
+  }
+  for (int t = 1; t <= steps_all; t++) sum += 1.0 / t;
+  for (int t = 1; t <= steps_all; t++) {
+    const double error = sqrt((sum * t - 1) / DRAWS) / steps_all;
+    ck_assert_double_eq_tol(share[t - 1], 1.0 / steps_all, 5 * error + 1e-6);
+    if (t > 1) ck_assert_int_lt(drawn[t - 1], drawn[t - 2]);
+  }
+}
+
 /* t* moves in the first half of stage II at most; then the t_r that it chose is all that is unrolled. */
 TEST(the_chosen_steps_are_trained_alone)
 {
@@ -199,7 +234,7 @@ TEST(fixed_steps_freeze_the_budget)
     const sf_train_stats s = steps(a, 1);
     ck_assert_double_eq(s.loss, steps(b, 1).loss);
     samples += s.samples;
-    ck_assert_int_eq(s.t_r, i + 1 < o.stage1 ? T : 3);
+    ck_assert_int_eq(s.t_r, i + 1 < o.stage1 ? 2 : 3);
     ck_assert_double_eq(s.t_star, s.t_r);
     ck_assert_int_eq(s.search.state, SF_SEARCH_NONE);
     ck_assert_double_eq_tol(s.samples_per_second * s.seconds, (double)samples, 1e-6 * (double)samples);

@@ -69,6 +69,9 @@ typedef struct sf_loss_plan {
   float k_sigma, k_colour;
 } sf_loss_plan;
 
+/* One of T prefixes, in place of all. Few steps cost least: t is drawn with a chance of 1/t over the sum of all 1/t.
+ * The weight of its squared error makes the mean that of the mean over all prefixes. */
+int sf_prefix_draw(uint64_t seed, int64_t iteration, int T, float *weight);
 /* Is the prefix composited? */
 static inline bool sf_loss_needs(const sf_loss_plan *p, int prefix)
 {
@@ -80,9 +83,7 @@ typedef struct sf_loss_sums {
   double regular, extra_floor, extra_ceil, distill;
   double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
 } sf_loss_sums;
-/* Of an iteration whose sums are means over its rays: the weighted squared error of the prefixes. */
-double sf_loss_error(const sf_loss_plan *plan, const sf_loss_sums *mean);
-/* Its whole loss but for L_charge. e_tau: sum of the neurons' e^tau. */
+/* Of an iteration whose sums are means over its rays: the loss but for L_charge. e_tau: sum of the neurons' e^tau. */
 double sf_loss_total(const sf_loss_plan *plan, const sf_loss_sums *mean, double e_tau);
 
 /* Work arrays of one ray: prefix outputs and their gradients, [T][n] and [T][n][3]; `spare` for the loss. */

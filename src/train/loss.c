@@ -204,16 +204,10 @@ void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, s
   if (p->t_c != p->t_f) sums->extra_ceil += add_extra(p, ray, delta, p->t_c, &full, scale * (float)p->d, w, sums);
 }
 
-double sf_loss_error(const sf_loss_plan *p, const sf_loss_sums *mean)
-{
-  double error = 0;
-  for (int t = 0; t < p->steps; t++) error += p->weight[t] * mean->prefix[t];
-  return error;
-}
-
 double sf_loss_total(const sf_loss_plan *p, const sf_loss_sums *mean, double e_tau)
 {
-  const double loss = sf_loss_error(p, mean) + mean->regular;
+  double loss = mean->regular;
+  for (int t = 0; t < p->steps; t++) loss += p->weight[t] * mean->prefix[t];
   if (!p->full) return loss;
   const double extra = (1 - p->d) * mean->extra_floor + p->d * mean->extra_ceil + e_tau;
   return loss + p->distill * mean->distill + p->extra * extra;

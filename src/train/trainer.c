@@ -13,8 +13,9 @@ enum { EPOCH_RAYS_PER_VIEW = 4096 };
 static const double longest = 10; /* that an iteration counts in a time budget: so many times their mean */
 static const double search = 0.5; /* share of stage II in which t* moves, at most; the rest trains t_r alone */
 
-/* Every so many iterations of the search are full ones; the others train one prefix, drawn at random. */
-enum { FULL_EVERY = 4 };
+/* Every so many iterations of the search are full ones; the others train one prefix, drawn at random. Stage I needs no
+ * more than two steps: it learns the field. */
+enum { FULL_EVERY = 4, STAGE1_STEPS = 2 };
 
 sf_train_options sf_train_defaults(void)
 {
@@ -81,19 +82,39 @@ void sf_trainer_free(sf_trainer *t)
   free(t);
 }
 
-/* t* at the start of the current stage. */
-static void start_budget(sf_trainer *t)
-{
-  const int T = t->model.config.steps;
-  t->model.t_r = t->stage == 1 ? T : t->options.fixed_steps ? t->options.fixed_steps : T > 1 ? T - 1 : 1;
-  t->model.t_star = (float)t->model.t_r;
-  if (t->stage == 2) sf_search_begin(t);
-}
-
 /* Length of stage I in iterations, or as a share of the time budget. */
 static double stage1_weight(const sf_trainer *t)
 {
   return sf_tuning(t) || t->options.no_stage1 ? 0 : t->options.minutes > 0 ? 0.25 : t->options.stage1;
+}
+
+/* t* moves. */
+static bool searching(const sf_trainer *t)
+{
+  return t->stage == 2 && t->search.state == SF_SEARCH_RUNNING;
+}
+
+/* What is trained now is what the run leaves. */
+static bool final_part(const sf_trainer *t)
+{
+  const bool stage2 = t->options.minutes > 0 ? stage1_weight(t) < 1 : t->options.stage2 > 0;
+  return t->stage == 1 ? !stage2 : !searching(t);
+}
+
+/* Steps of stage I. A run that ends with it learns all T there. */
+static int stage1_steps(const sf_trainer *t)
+{
+  const int T = t->model.config.steps;
+  return t->options.objective == SF_OBJECTIVE_PAPER || final_part(t) || T < STAGE1_STEPS ? T : STAGE1_STEPS;
+}
+
+/* t* at the start of the current stage. */
+static void start_budget(sf_trainer *t)
+{
+  const int T = t->model.config.steps;
+  t->model.t_r = t->stage == 1 ? stage1_steps(t) : t->options.fixed_steps ? t->options.fixed_steps : T > 1 ? T - 1 : 1;
+  t->model.t_star = (float)t->model.t_r;
+  if (t->stage == 2) sf_search_begin(t);
 }
 
 static sf_status copy_model(sf_model *to, const sf_model *from)
@@ -187,24 +208,29 @@ static bool scaled(const sf_trainer *t)
          t->epoch < (double)t->data->count * EPOCH_RAYS_PER_VIEW;
 }
 
-/* t* moves. */
-static bool searching(const sf_trainer *t)
-{
-  return t->stage == 2 && t->search.state == SF_SEARCH_RUNNING;
-}
-
-/* What is trained now is what the run leaves. */
-static bool final_part(const sf_trainer *t)
-{
-  const bool stage2 = t->options.minutes > 0 ? stage1_weight(t) < 1 : t->options.stage2 > 0;
-  return t->stage == 1 ? !stage2 : !searching(t);
-}
-
 /* One prefix is all that is unrolled. */
 static void train_one(sf_loss_plan *p, int prefix)
 {
   p->steps = p->regular_at = p->t_f = p->t_c = p->t_r = prefix;
   p->weight[prefix - 1] = 1;
+}
+
+int sf_prefix_draw(uint64_t seed, int64_t iteration, int T, float *weight)
+{
+  double sum = 0;
+  for (int i = 1; i <= T; i++) sum += 1.0 / i;
+  double left = sum * sf_random_float(seed, RNG_PREFIX, (uint64_t)iteration) - 1;
+  int prefix = 1;
+  while (prefix < T && left >= 0) left -= 1.0 / ++prefix;
+  *weight = (float)(sum * prefix / T);
+  return prefix;
+}
+
+static void train_drawn(const sf_trainer *t, sf_loss_plan *p)
+{
+  float weight;
+  train_one(p, sf_prefix_draw(t->options.seed, t->iteration, t->model.config.steps, &weight));
+  p->weight[p->steps - 1] = weight;
 }
 
 /* All T steps. The paper trains M_smooth there; here L_render(T) and the mean over all prefixes, which the iterations
@@ -242,12 +268,12 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   const bool learned = searching(t);
   if (final_part(t) && t->model.config.net != SF_NET_ANN) p.charge = (float)t->options.charge;
   if (!learned || scaled(t)) {
-    const int wanted = t->stage == 1 || learned ? T : t->model.t_r;
+    const int wanted = learned ? T : t->model.t_r;
     train_one(&p, scaled(t) && wanted > 2 ? 2 : wanted);
   } else if (t->options.objective == SF_OBJECTIVE_PAPER || !t->search.measured || t->iteration % FULL_EVERY == 0)
     train_all(t, &p);
   else
-    train_one(&p, 1 + (int)sf_random_below(t->options.seed, RNG_PREFIX, (uint64_t)t->iteration, (uint64_t)T));
+    train_drawn(t, &p);
   return p;
 }
 
@@ -325,8 +351,7 @@ sf_train_stats sf_trainer_stats(const sf_trainer *t)
 static int occupancy_steps(const sf_trainer *t)
 {
   if (t->model.config.along) return SF_T_MAX;
-  const int trained = t->stage == 1 ? t->model.config.steps : t->model.t_r;
-  return scaled(t) && trained > 2 ? 2 : trained;
+  return scaled(t) && t->model.t_r > 2 ? 2 : t->model.t_r;
 }
 
 /* Few rays may all pass by the box or through empty space: sf_batch_adapt draws more. That so many do is no chance. */
@@ -351,7 +376,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   SF_TRY(sf_gradient_run(t, &plan, &mean, t->firing));
   const double e_tau = sf_gradient_leaks(t, &plan, &mean);
   const double loss = sf_loss_total(&plan, &mean, e_tau);
-  const double mse = plan.full ? smooth_error(&plan, &mean) : sf_loss_error(&plan, &mean);
+  const double mse = plan.full ? smooth_error(&plan, &mean) : mean.prefix[plan.steps - 1];
   SF_TRY(check_gradient(t, loss));
   t->backbone->update(t);
   sf_health_leaks(t);
