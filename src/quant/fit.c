@@ -34,7 +34,7 @@ enum { ROWS = 4 };
 /* Rows that are added at once. Those that are not there are zeros. */
 typedef struct row_block {
   double x[ROWS][INPUTS_MAX], target[ROWS][SF_LANES];
-  int active[INPUTS_MAX], count; /* inputs that are not 0 in all rows */
+  int active[INPUTS_MAX], count; /* inputs that are not 0 in at least one row */
 } row_block;
 
 static void read_rows(row_block *block, const moments *m, const int16_t *x, const float *target, int rows)

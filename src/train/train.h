@@ -79,7 +79,7 @@ typedef struct sf_train_stats {
   int64_t iteration;
   double progress;  /* 0..1 of the whole run */
   double seconds;   /* training time, over resumes */
-  double loss, mse; /* total loss; squared error of what is trained: M_{t_r} outside the search */
+  double loss, mse; /* total loss; squared error of what is trained: M_{t_r}, in the search M_smooth or one prefix's */
   double t_star;
   int t_r;
   sf_search_report search;

@@ -108,7 +108,7 @@ static int stage1_steps(const sf_trainer *t)
   return t->options.objective == SF_OBJECTIVE_PAPER || final_part(t) || T < STAGE1_STEPS ? T : STAGE1_STEPS;
 }
 
-/* t* at the start of the current stage. */
+/* t_r and t* at the start of the current stage. */
 static void start_budget(sf_trainer *t)
 {
   const int T = t->model.config.steps;
