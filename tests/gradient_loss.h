@@ -48,6 +48,21 @@ static inline dual oracle_regular(const oracle_ray *ray, int step, const oracle_
   return sum;
 }
 
+/* What is left of the way to opaque, of each sample where less than a tenth of the light is left. The light in front of
+ * the first is a constant, and slopes are weighed by alpha. */
+static inline dual oracle_tail(const oracle_ray *ray, int step)
+{
+  const double stop = log(1e-4), tail = log(0.1);
+  dual light = 0, sum = 0;
+  for (int s = 0; s < ray->count && creal(light) > stop; s++) {
+    if (creal(light) < tail) sum += (light - stop) / (tail - stop);
+    const dual depth = ray->sigma[step][s] * ray->delta[s];
+    const double alpha = creal(light) < tail ? 1 - exp(-creal(depth)) : 0;
+    light -= creal(depth) + alpha * (depth - creal(depth));
+  }
+  return creal(light) > stop + 1e-3 ? 0 : sum;
+}
+
 /* What steps behind prefix t add: ||w(tail)|| / ||W|| + ||tail of C|| / ||C_T||. */
 static inline dual oracle_extra(const oracle *o, const oracle_ray *ray, int t, const oracle_image *full)
 {
@@ -83,7 +98,7 @@ static inline dual oracle_losses(const oracle *o, const sf_ray *pixel, const ora
     if (!sf_loss_needs(p, t)) continue;
     oracle_composite(ray, ray->sigma[t - 1], ray->colour[t - 1], pixel->background, &im);
     sum += (double)p->weight[t - 1] * oracle_error(im.rgb, gt);
-    if (t == p->regular_at) sum += oracle_regular(ray, t - 1, &im, gt);
+    if (t == p->regular_at) sum += oracle_regular(ray, t - 1, &im, gt) + (double)p->opaque * oracle_tail(ray, t - 1);
     if (p->full && t == p->t_r) sum += (double)p->distill * oracle_error(im.rgb, full.rgb);
   }
   if (p->full && p->extra > 0)

@@ -8,7 +8,7 @@ static sf_train_options grid_run(void)
 {
   sf_train_options o = small_run();
   o.config.hidden = 16, o.config.steps = 4, o.config.lattice = 64, o.config.levels = 2, o.samples = 256;
-  o.stage1 = 3, o.stage2 = 12, o.charge = 1;
+  o.stage1 = 3, o.stage2 = 12, o.charge = o.opaque = 1;
   return o;
 }
 
@@ -64,7 +64,7 @@ TEST(each_number_is_there_and_is_one)
         ck_bad(resumed_with(o, item->string, none[i]), SF_E_FORMAT, item->string, "is missing or broken");
       numbers++;
     }
-    ck_assert_int_eq(numbers, kind ? 46 + 8 + 3 : 46 + 8 + 2);
+    ck_assert_int_eq(numbers, kind ? 46 + 8 + 3 : 46 + 8 + 2 + 2);
   }
 }
 
@@ -91,6 +91,8 @@ TEST(numbers_have_ranges)
               {"train.revived_d1", {"0", "1000000"}, {"-1", "1000001"}, "train.revived", 0},
               {"train.revived_c1", {"0", "1000000"}, {"-1", "1000001"}, "train.revived", 0},
               {"train.revived_c2", {"0", "1000000"}, {"-1", "1000001"}, "train.revived", 0},
+              {"train.tail_error", {"0", "9"}, {"-0.001", "-1"}, "train.tail_error", 0},
+              {"train.tail_samples", {"0", "99"}, {"-0.001", "-1"}, "tail_samples", 0},
               {"train.vm_event", {"0", "5"}, {"-1", "6"}, "train.vm_event", 1},
               {"train.vm_fresh", {"0", "4"}, {"-1", "5"}, "vm_fresh", 1},
               {"train.vm_fresh_at", {"0", "1"}, {"-0.001", "1.001"}, "vm_fresh_at", 1}};

@@ -162,6 +162,12 @@ static void set_charge(rig *r, const sf_loss_plan *p)
   for (int l = 0; l < 3; l++) r->o.charge[l] = t->model.config.net == SF_NET_ANN ? 0 : price * reads[l];
 }
 
+/* Rays of a hash grid end in the scene. */
+static void lengthen(sf_batch *b)
+{
+  for (int i = 0; i < b->blocks * SF_BLOCK && b->delta; i++) b->delta[i] *= 100;
+}
+
 static void check_plan(rig *r, const char *what, sf_loss_plan p)
 {
   sf_trainer *t = r->t;
@@ -169,12 +175,14 @@ static void check_plan(rig *r, const char *what, sf_loss_plan p)
   double firing[3];
   t->charge = (sf_charge){.error = 0.02, .reads = 300};
   ck_ok(t->backbone->draw(t));
+  if (p.opaque > 0) lengthen(&t->batch);
   const float *leaks = sf_model_param(&t->model, SF_P_LEAK);
   p.inverse_rays = 1.0f / (float)t->batch.rays;
   p.k_sigma = sf_model_decodes(&t->model) ? 0 : sf_sigmoid(leaks[1]);
   p.k_colour = sf_sigmoid(leaks[4]);
   sf_gradient_run(t, &p, &mean, firing);
   r->firing = firing[1];
+  ck_assert_int_eq(mean.tail > 0, p.opaque > 0);
   const double e_tau = sf_gradient_leaks(t, &p, &mean);
   t->backbone->update(t);
   r->o.plan = &p;
@@ -210,6 +218,8 @@ static void check_terms(rig *r)
   sf_loss_plan p = plan_full();
   p.regular_at = STEPS;
   check_plan(r, "norm, cosine and sparsity", p);
+  p.opaque = 1e-2f;
+  check_plan(r, "L_opaque", p);
   p = plan_full();
   p.distill = 1;
   check_plan(r, "L_distill", p);
@@ -225,6 +235,7 @@ static void check_terms(rig *r)
   p.weight[STEPS - 1] = p.distill = 1;
   p.regular_at = STEPS;
   p.extra = 0.1f;
+  p.opaque = 1e-3f;
   p.charge = 0.5f;
   check_plan(r, "all terms", p);
 }

@@ -1,5 +1,5 @@
-/* What the accelerator pays for once t_r is settled: reads of weights (--charge; docs/model.md). A row is read once for
- * a neuron that fires at any step of a sample, 8 bytes at a time. */
+/* What the accelerator pays for: samples behind surfaces (--opaque), and once t_r is settled, reads of weights
+ * (--charge; docs/model.md). A row is read once for a neuron that fires at any step of a sample, 8 bytes at a time. */
 #include "field/field.h"
 #include "train/internal.h"
 
@@ -53,4 +53,22 @@ void sf_charge_update(sf_trainer *t, double error)
   const double share = c->reads > 0 ? renewed : 1;
   c->error += share * (error - c->error);
   c->reads += share * (t->row_reads - c->reads);
+}
+
+/* Share of the run from which on rays learn to end soon: earlier there is fog, which would become solid where it is. */
+static const double tail_from = 0.25;
+
+/* --opaque: L_opaque = C sg(M) ln N, of N samples a ray, of which those of the tail have a slope. */
+float sf_tail_price(const sf_trainer *t)
+{
+  return t->progress >= tail_from && t->tail.samples > 0 ? (float)(t->options.opaque * t->tail.error / t->tail.samples)
+                                                         : 0;
+}
+
+void sf_tail_update(sf_trainer *t, double error)
+{
+  sf_tail *a = &t->tail;
+  const double share = a->samples > 0 ? renewed : 1, samples = (double)t->batch.samples / t->batch.rays;
+  a->error += share * (error - a->error);
+  a->samples += share * (samples - a->samples);
 }

@@ -38,8 +38,8 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 46, VM_FIELDS = 3, CHARGE_FIELDS = 2 };
-enum { FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS + CHARGE_FIELDS };
+enum { STATE_FIELDS = 46, VM_FIELDS = 3, COST_FIELDS = 4 };
+enum { FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS + COST_FIELDS };
 /* Those of every prefix, and of what only some trainers have. */
 static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS])
 {
@@ -51,6 +51,10 @@ static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS
   if (t->options.charge > 0) {
     f[n++] = (state_field){"train.charge_error", .number = &t->charge.error};
     f[n++] = (state_field){"train.charge_reads", .number = &t->charge.reads};
+  }
+  if (t->options.opaque > 0) {
+    f[n++] = (state_field){"train.tail_error", .number = &t->tail.error};
+    f[n++] = (state_field){"train.tail_samples", .number = &t->tail.samples};
   }
   if (!t->vm) return n;
   f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
@@ -147,6 +151,7 @@ sf_status sf_trainer_save(const sf_trainer *t, const char *path, bool with_optim
   sf_model_describe(&t->model, meta);
   sf_tensors_put_number(meta, "beta", t->options.beta);
   if (t->options.charge > 0) sf_tensors_put_number(meta, "charge", t->options.charge);
+  if (t->options.opaque > 0) sf_tensors_put_number(meta, "opaque", t->options.opaque);
   sf_tensors_put_number(meta, "seed", (double)t->options.seed);
   if (with_optimiser) {
     const cJSON *item;
@@ -203,6 +208,8 @@ static sf_status load_state(sf_trainer *t, const sf_tensors *set)
       !(t->search.fast[0] >= 0 && t->search.slow[0] >= 0 && t->search.at >= 0 && t->search.at <= 1))
     return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.search_state, measured, fast, slow or at is out of range",
                    set->path);
+  if (!(t->tail.error >= 0 && t->tail.samples >= 0))
+    return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.tail_error or tail_samples is out of range", set->path);
   for (int l = 0; l < 3; l++)
     if (t->health.revived[l] < 0 || t->health.revived[l] > 1000000)
       return sf_fail(SF_E_FORMAT, "%s: cannot resume: train.revived is out of range", set->path);

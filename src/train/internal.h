@@ -59,10 +59,11 @@ typedef struct sf_loss_plan {
   int steps;              /* unrolled, forward and backward */
   bool full;              /* all T steps: every prefix's error is measured, and C_T and C_{t_r} are compared */
   float weight[SF_T_MAX]; /* of each prefix's squared error */
-  int regular_at;         /* the prefix with the norm, cosine and sparsity terms */
+  int regular_at;         /* the prefix with the norm, cosine and sparsity terms, and L_opaque */
   int t_f, t_c, t_r;      /* around t^; in a full iteration */
   double d;               /* t^ - t_f */
   float inverse_rays;
+  float opaque;  /* price of a sample in a ray's tail (L_opaque), 0 = off */
   float extra;   /* weight of L_extra, 0 = off */
   float charge;  /* of reads of weights, 0 = off */
   float distill; /* weight of L_distill */
@@ -80,7 +81,7 @@ static inline bool sf_loss_needs(const sf_loss_plan *p, int prefix)
 
 typedef struct sf_loss_sums {
   double prefix[SF_T_MAX]; /* squared error of the prefixes that are composited */
-  double regular, extra_floor, extra_ceil, distill;
+  double regular, tail, extra_floor, extra_ceil, distill;
   double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
 } sf_loss_sums;
 /* Of an iteration whose sums are means over its rays: the loss but for L_charge. e_tau: sum of the neurons' e^tau. */
@@ -138,6 +139,11 @@ typedef struct sf_search {
 typedef struct sf_charge {
   double error, reads; /* squared error of what is trained; reads of weights per sample. 0: nothing measured yet */
 } sf_charge;
+
+/* Of --opaque (charge.c): averages over recent iterations. */
+typedef struct sf_tail {
+  double error, samples; /* squared error of what is trained; samples of a ray. 0: nothing measured yet */
+} sf_tail;
 
 struct sf_vm; /* vm.h */
 struct sf_probes;
@@ -201,6 +207,7 @@ struct sf_trainer {
   double firing[3]; /* spikes per neuron and step of D1, C1, C2, last iteration */
   double row_reads; /* of a sample, last iteration */
   sf_charge charge;
+  sf_tail tail;
   double occupied, epoch; /* epoch: passes over the training pixels in this stage */
   sf_health health;
   int64_t samples; /* through the nets, over the run */
@@ -222,6 +229,11 @@ void sf_charge_begin(sf_trainer *trainer, const sf_loss_plan *plan);
 void sf_charge_measured(sf_trainer *trainer, const double any[3]);
 /* After an iteration whose plan charges. */
 void sf_charge_update(sf_trainer *trainer, double error);
+
+/* What L_opaque charges for a sample of a ray. */
+float sf_tail_price(const sf_trainer *trainer);
+/* After an iteration. */
+void sf_tail_update(sf_trainer *trainer, double error);
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);

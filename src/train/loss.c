@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const float g0 = 5e-5f, g1 = 5e-2f, g2 = 1e-6f;
+static const float tail_log = -2.3025851f; /* ln 0.1: the tail of a ray begins where less light is left */
 
 sf_status sf_ray_work_create(sf_ray_work *w, int samples)
 {
@@ -94,6 +95,27 @@ static double add_sparsity(int n, const float *sigma, float inverse_rays, float 
   return g2 * value;
 }
 
+/* The tail of a ray that becomes opaque: samples where less than a tenth of the light is left. Each counts by what is
+ * left of the way from there to opaque, 1 down to 0. What lies before the tail is held constant, so nothing thickens in
+ * front of a surface. The slope of a sample is weighed by its alpha, so what is empty is not filled. */
+static double add_tail(int n, const float *sigma, const float *delta, float weight, float *dsigma)
+{
+  const float way = tail_log - sf_opaque_log;
+  float light = 0; /* its logarithm */
+  double value = 0;
+  int first = -1, end = 0;
+  for (; end < n && light > sf_opaque_log; end++) {
+    if (first < 0 && light < tail_log) first = end;
+    if (first >= 0) value += (light - sf_opaque_log) / way;
+    light -= delta[end] * sigma[end];
+  }
+  /* The last sample counts as opaque also where the kernels round its density otherwise than for sf_batch_compact. */
+  if (first < 0 || light > sf_opaque_log + 1e-3f) return 0;
+  for (int s = first; s < end; s++)
+    dsigma[s] += weight * delta[s] * (float)(end - 1 - s) / way * expm1f(-sigma[s] * delta[s]);
+  return value;
+}
+
 static float norm(int n, const float *x)
 {
   double sum = 0;
@@ -169,14 +191,16 @@ static void add_distillation(const sf_loss_plan *p, const image *full, const ima
 }
 
 /* The terms that hang on prefix t alone. */
-static void add_prefix(const sf_loss_plan *p, const sf_ray *ray, int t, const image *im, float grgb[3], sf_ray_work *w,
-                       sf_loss_sums *sums)
+static void add_prefix(const sf_loss_plan *p, const sf_ray *ray, const float *delta, int t, const image *im,
+                       float grgb[3], sf_ray_work *w, sf_loss_sums *sums)
 {
   sums->prefix[t - 1] += squared_error(im->rgb, ray->target);
   add_mse(ray, im, p->inverse_rays * p->weight[t - 1], grgb);
   if (t != p->regular_at) return;
   sums->regular += add_regular(ray, im, p->inverse_rays, grgb);
   sums->regular += add_sparsity(ray->count, w->sigma[t - 1], p->inverse_rays, w->dsigma[t - 1]);
+  if (p->opaque > 0)
+    sums->tail += add_tail(ray->count, w->sigma[t - 1], delta, p->opaque * p->inverse_rays, w->dsigma[t - 1]);
 }
 
 void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)
@@ -192,11 +216,11 @@ void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, s
     if (!sf_loss_needs(p, t)) continue;
     const image im = composite(ray, t, delta, w, w->spare[1]);
     float grgb[3] = {0};
-    add_prefix(p, ray, t, &im, grgb, w, sums);
+    add_prefix(p, ray, delta, t, &im, grgb, w, sums);
     if (p->full && t == p->t_r && p->distill > 0) add_distillation(p, &full, &im, gfull, grgb, sums);
     push(ray, t, delta, &im, grgb, w);
   }
-  add_prefix(p, ray, T, &full, gfull, w, sums);
+  add_prefix(p, ray, delta, T, &full, gfull, w, sums);
   push(ray, T, delta, &full, gfull, w);
   if (!p->full || p->extra == 0) return;
   const float scale = p->extra * p->inverse_rays;
@@ -206,7 +230,7 @@ void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, s
 
 double sf_loss_total(const sf_loss_plan *p, const sf_loss_sums *mean, double e_tau)
 {
-  double loss = mean->regular;
+  double loss = mean->regular + p->opaque * mean->tail;
   for (int t = 0; t < p->steps; t++) loss += p->weight[t] * mean->prefix[t];
   if (!p->full) return loss;
   const double extra = (1 - p->d) * mean->extra_floor + p->d * mean->extra_ceil + e_tau;

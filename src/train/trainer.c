@@ -266,6 +266,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const bool learned = searching(t);
+  if (t->options.objective != SF_OBJECTIVE_PAPER) p.opaque = sf_tail_price(t);
   if (final_part(t) && t->model.config.net != SF_NET_ANN) p.charge = (float)t->options.charge;
   if (!learned || scaled(t)) {
     const int wanted = learned ? T : t->model.t_r;
@@ -382,6 +383,7 @@ sf_status sf_trainer_step(sf_trainer *t, sf_train_stats *stats)
   sf_health_leaks(t);
   SF_TRY(sf_parameters_check(t));
   if (plan.charge > 0) sf_charge_update(t, mean.prefix[plan.steps - 1]);
+  sf_tail_update(t, mean.prefix[plan.steps - 1]);
   if (plan.full)
     sf_search_update(t, &mean, mean.prefix[plan.steps - 1] / fmax(mse, 1e-12), fmin(t->stage_progress / search, 1));
   int event[3];

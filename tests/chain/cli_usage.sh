@@ -58,6 +58,8 @@ number sf_train --fixed-steps -1 9 nan
 number sf_train --target-loss -1 21 nan x
 number sf_train --target-saving -1 101 nan x
 number sf_train --search-rate 0 -1 101 nan x
+number sf_train --opaque -1 11 nan x
+usage "--opaque has no effect beside --objective paper" sf_train d -o out --objective paper --opaque 0.1
 usage --price sf_train d -o out --price euros
 usage --objective sf_train d -o out --objective none
 usage "beside a target" sf_train d -o out --target-loss 0.1 --beta 1e-6

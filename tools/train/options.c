@@ -75,7 +75,7 @@ static sf_status check_effect(train_arguments *a)
                            *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};
-  static const char *const spiking[] = {"--charge", "--steps-along-ray", NULL};
+  static const char *const rays[] = {"--opaque", NULL}, *const spiking[] = {"--charge", "--steps-along-ray", NULL};
   static const char *const steps[] = {"--fixed-steps", "--charge", NULL}, *const mode[] = {"--input-mode", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
@@ -86,6 +86,8 @@ static sf_status check_effect(train_arguments *a)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, planes, "has no effect on --backbone ingp"));
   if (a->train.minutes <= 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, minutes, "0 leaves no time to learn"));
   if (a->train.minutes > 0) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, iterations, "has no effect beside --minutes"));
+  if (a->train.objective == SF_OBJECTIVE_PAPER)
+    SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, rays, "has no effect beside --objective paper"));
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
   if (a->along) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, steps, "has no effect beside --steps-along-ray"));
