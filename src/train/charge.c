@@ -58,7 +58,7 @@ void sf_charge_update(sf_trainer *t, double error)
 /* Share of the run from which on rays learn to end soon: earlier there is fog, which would become solid where it is. */
 static const double tail_from = 0.25;
 
-/* --opaque: L_opaque = C sg(M) ln N, of N samples a ray, of which those of the tail have a slope. */
+/* --opaque: C M ln N has the slope C M / N by N, the samples of a ray. L_opaque charges that for those of the tail. */
 float sf_tail_price(const sf_trainer *t)
 {
   return t->progress >= tail_from && t->tail.samples > 0 ? (float)(t->options.opaque * t->tail.error / t->tail.samples)
