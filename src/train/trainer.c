@@ -23,6 +23,7 @@ sf_train_options sf_train_defaults(void)
                               .beta = 5e-7,
                               .alpha = 1e-6,
                               .search_rate = 1,
+                              .opaque = 0.2,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,
@@ -190,6 +191,7 @@ sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const 
   sf_trainer *t = calloc(1, sizeof *t);
   if (!t) return sf_fail(SF_E_MEMORY, "train: no memory");
   t->options = *options;
+  if (options->objective == SF_OBJECTIVE_PAPER) t->options.opaque = 0;
   t->data = data;
   t->kernels = sf_kernels_training();
   sf_status status = sf_ranks_agree(t->options.ranks, create(t, resume));
@@ -266,7 +268,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const bool learned = searching(t);
-  if (t->options.objective != SF_OBJECTIVE_PAPER) p.opaque = sf_tail_price(t);
+  p.opaque = sf_tail_price(t);
   if (final_part(t) && t->model.config.net != SF_NET_ANN) p.charge = (float)t->options.charge;
   if (!learned || scaled(t)) {
     const int wanted = learned ? T : t->model.t_r;
