@@ -140,6 +140,8 @@ endif
 $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 
 $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
+# Most tests spend more time in the compiler than in their own code.
+$(patsubst %,$B/obj/tests/%.o,$(filter-out test_gradient,$(TESTS))): CFLAGS += -O1
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
 
 # The report's texts lie in the program, and the browser's.

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Runs the named tests, JOBS at a time (default: one per processor), and ends with one closing line; BUILD/tests/junit.xml.
+# Runs the named tests, JOBS at a time (default: three for two processors, because many wait), and ends with one closing
+# line; BUILD/tests/junit.xml.
 # usage: run.sh BUILD NAME...     A name is a Check program in BUILD/tests, or a script of tests/chain, which gets BUILD and
 # exits with 77 where this machine lacks what it needs. A line "NAME: not installed" in its output says that only a part was
 # left out for want of NAME. With CI set (CI=true) neither is allowed: such a test has failed.
@@ -46,6 +47,7 @@ run() {
   )" # in one piece
 }
 
+jobs=${JOBS:-$((($(nproc) * 3 + 1) / 2))}
 # What took longest last time begins, after what is new.
 mapfile -t ordered < <(for name in "$@"; do
   seconds=99999
@@ -54,7 +56,7 @@ mapfile -t ordered < <(for name in "$@"; do
 done 2>/dev/null | sort -s -k1,1nr | cut -d' ' -f2)
 rm -f "$logs"/*.result
 for name in "${ordered[@]}"; do
-  while [ "$(jobs -rp | wc -l)" -ge "${JOBS:-$(nproc)}" ]; do wait -n; done
+  while [ "$(jobs -rp | wc -l)" -ge "$jobs" ]; do wait -n; done
   run "$name" &
 done
 wait
