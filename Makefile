@@ -140,9 +140,9 @@ endif
 $B/obj/src/fx/%.o: override CFLAGS += -fno-delete-null-pointer-checks
 
 $B/obj/src/exchange/nir_file.o $B/obj/tests/test_nir.o: CFLAGS += $(HDF5_CFLAGS)
-# Most tests spend more time in the compiler than in their own code.
-$(patsubst %,$B/obj/tests/%.o,$(filter-out test_gradient,$(TESTS))): CFLAGS += -O1
 $B/bin/sf_export $B/tests/test_nir: LIBS += $(HDF5_LIBS)
+# Tests spend more time in the compiler than in their own code, but for the oracle of gradients.
+$(patsubst %,$B/obj/tests/%.o,$(filter-out test_gradient,$(TESTS))): CFLAGS += -O1
 
 # The report's texts lie in the program, and the browser's.
 $B/obj/src/page/texts.o: $(wildcard src/page/*.html src/page/*.css src/page/*.js)
