@@ -1,5 +1,5 @@
 # For scripts of tests/chain:   . chain.bash BUILD
-# Gives build, root (of the source), work (a folder that goes at the end), fail, finish, quick, quick_dut, and learn, which makes a
+# Gives build, root (of the source), work (a folder that goes at the end), fail, finish, quick, quick_dut, interrupt, and learn, which makes a
 # scene.
 set -u
 build=$(cd "${1:?usage: $0 BUILD}" && pwd) || exit 2
@@ -20,6 +20,22 @@ fail() {
 finish() { # TEXT: the last line of a script where nothing failed
   [ $failures -eq 0 ] && echo "$1"
   exit $((failures > 0))
+}
+
+# interrupt WHEN OUT ERR PROGRAM ARGS...: runs it, and interrupts it once it catches signals and `WHEN` succeeds: on no machine
+# too early or too late. Leaves $status.
+interrupt() {
+  local i pid
+  "${@:4}" >"$2" 2>"$3" </dev/null &
+  pid=$!
+  for ((i = 0; i < 30000; i++)); do
+    kill -0 $pid 2>/dev/null || break
+    [ "$(cat /proc/$pid/comm 2>/dev/null)" = "$(basename "$4")" ] && (($(sed -n 's/^SigCgt:[[:space:]]*/0x/p' /proc/$pid/status) & 2)) &&
+      eval "$1" && kill -INT $pid && break
+    sleep 0.01
+  done
+  wait $pid
+  status=$?
 }
 
 # learn NAME HIDDEN EXPORT-OPTIONS...: a small model in NAME.safetensors and its export in NAME.snn, of pictures in data/

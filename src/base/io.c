@@ -1,6 +1,7 @@
 #include "base/io.h"
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -183,12 +184,17 @@ void sf_writer_abort(sf_writer *writer)
   writer->file = NULL, writer->aside[0] = 0;
 }
 
+/* A signal waits until the file aside is gone. */
 sf_status sf_writable(const char *path)
 {
   sf_writer writer;
-  SF_TRY(sf_writer_open(&writer, path));
-  sf_writer_abort(&writer);
-  return sf_ok();
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, &before);
+  const sf_status status = sf_writer_open(&writer, path);
+  if (!status.code) sf_writer_abort(&writer);
+  pthread_sigmask(SIG_SETMASK, &before, NULL);
+  return status;
 }
 
 sf_status sf_readable(const char *path)

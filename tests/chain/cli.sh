@@ -108,8 +108,7 @@ check "--fit" "not the weights that the model was tuned for" grep -q '"weight_bi
 
 run sf_scene simple -o wide --size 128 --train 3 --test 1 # the cameras of d
 stop() { # OUTPUT PROGRAM ARGS...
-  timeout --foreground -k 20 --preserve-status -s INT 1 "$BIN/$2" "${@:3}" >stdout.txt 2>err </dev/null
-  status=$?
+  interrupt "sleep 0.5" stdout.txt err "$BIN/$2" "${@:3}"
   sed -i '/: learned from other pictures: wide has the same cameras/d' err # it is larger
   judge "interrupted: ${*:2}" "$2" 130 ""
   absent "$1" "interrupted: ${*:2}"
@@ -138,15 +137,13 @@ END
 # Interrupted while it loads, a training leaves what is there.
 cp model.safetensors before.safetensors
 cp model.safetensors early.safetensors
-timeout --foreground -k 20 --preserve-status -s INT 0.02 "$BIN/sf_train" views -o early.safetensors >stdout.txt 2>err </dev/null
-status=$?
+interrupt true stdout.txt err "$BIN/sf_train" views -o early.safetensors
 judge "interrupted at once: sf_train" sf_train 130 ""
 check "interrupted at once" "model lost" cmp -s before.safetensors early.safetensors
 
 # The evaluation after a training can be interrupted, too: its checkpoint is resumed to the evaluation alone.
 brief=(views -o stop.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8)
-timeout --foreground -k 20 --preserve-status -s INT 2 "$BIN/sf_train" "${brief[@]}" --psnr-prefixes 30 >stdout.txt 2>err </dev/null
-status=$?
+interrupt "[ -s stop.safetensors ]" stdout.txt err "$BIN/sf_train" "${brief[@]}" --psnr-prefixes 30
 sed -i '/evaluation: view/d' err # progress lines
 judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
 # A checkpoint keeps the options of its run: others are refused, and none are needed.

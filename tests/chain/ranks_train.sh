@@ -57,7 +57,8 @@ begin $endless
 kill -INT $parent
 wait $parent && fail "sf_train, interrupted job: success"
 first=$(sed -n 's/.*interrupted at iteration \([0-9]*\); continue with --resume.*/\1/p' cut.err)
-timeout --foreground -s INT 2 "$bin/sf_train" photos $endless $grid -q -o cut.model --resume >/dev/null 2>again.err
+log_lines=$(wc -l <cut.model.jsonl)
+interrupt '[ "$(wc -l <cut.model.jsonl)" -gt "$log_lines" ]' /dev/null again.err "$bin/sf_train" photos $endless $grid -q -o cut.model --resume
 second=$(sed -n 's/.*interrupted at iteration \([0-9]*\); continue with --resume.*/\1/p' again.err)
 [ "${first:-0}" -gt 0 ] && [ "${second:-0}" -gt "$first" ] || fail "sf_train, interrupted job: $(cat cut.err again.err)"
 unset OMPI_MCA_odls_base_sigkill_timeout

@@ -178,6 +178,7 @@ static sf_status take_tensorf_defaults(train_arguments *a, const sf_dataset *dat
 
 sf_status train_parse(train_arguments *a, const char **path)
 {
+  sf_cli_catch_signals();
   SF_TRY(parse(a, path));
   if (a->fine_tune && !a->resume) {
     SF_TRY(take_backbone(a));
@@ -191,7 +192,6 @@ sf_status train_parse(train_arguments *a, const char **path)
   SF_TRY(check_effect(a));
   if (a->threads) omp_set_num_threads(a->threads);
   SF_TRY(finish_options(a));
-  sf_cli_catch_signals();
   set_box(a, NULL);
   if (has_planes(a)) return sf_ok();
   sf_status status = sf_config_check(&a->train.config);
