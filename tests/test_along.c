@@ -282,7 +282,7 @@ static sf_train_options along_run(int planes)
     o.voxels = 16, o.rays = 128, o.samples = 2048;
     o.stage1 = 12, o.stage2 = 28;
   }
-  o.config.steps = o.config.along = 1;
+  o.config.steps = o.config.along = 1, o.config.mode = SF_HYBRID;
   return o;
 }
 

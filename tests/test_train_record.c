@@ -71,10 +71,10 @@ static void searches(FILE *out)
   sf_train_options o = quick_run();
   o.stage1 = 4, o.stage2 = 44, o.beta = 3e-6;
   say_run(out, "beta", &o, 4);
-  o.objective = SF_OBJECTIVE_PAPER, o.stage2 = 30, o.beta = 1e-5;
+  o.config.mode = SF_HYBRID, o.objective = SF_OBJECTIVE_PAPER, o.stage2 = 30, o.beta = 1e-5;
   say_run(out, "the paper's objective", &o, 4);
-  o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.stage2 = 12, o.beta = 1e-2, o.search_rate = 2,
-  o.alpha = 1;
+  o.config.mode = SF_WEIGHTED, o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.stage2 = 12,
+  o.beta = 1e-2, o.search_rate = 2, o.alpha = 1;
   say_run(out, "the price of energy", &o, 4);
   o = quick_run();
   o.stage1 = 4, o.stage2 = 24, o.target_loss = 0.3;
@@ -93,10 +93,11 @@ static void plain_runs(FILE *out)
   o.no_extra = o.no_distill = o.no_scaling = false, o.no_stage1 = true, o.background = 1, o.alpha *= 5;
   say_run(out, "without stage I, on white", &o, 4);
   o = quick_run();
-  o.config.net = SF_NET_ANN, o.config.steps = 1, o.stage1 = 4, o.stage2 = 8, o.background = 2;
+  o.config.net = SF_NET_ANN, o.config.mode = SF_HYBRID, o.config.steps = 1, o.stage1 = 4, o.stage2 = 8,
+  o.background = 2;
   say_run(out, "the twin, on black", &o, 4);
   o = quick_run();
-  o.config.along = 1, o.config.steps = 1, o.stage1 = 4, o.stage2 = 8;
+  o.config.mode = SF_HYBRID, o.config.along = 1, o.config.steps = 1, o.stage1 = 4, o.stage2 = 8;
   say_run(out, "along rays", &o, 4);
   o = quick_run();
   const int finest = o.config.finest_res;

@@ -253,7 +253,7 @@ prepare_unit() {
   if [ "$profile" = scenes ]; then
     common="--minutes ${set[minutes]} $common"
   else
-    common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} $common"
+    common="--stage1 ${set[stage1]} --stage2 ${set[stage2]} --input-mode hybrid $common" # the paper's neuron
   fi
   common="$common --eval-views ${set[eval-views]}"
 }

@@ -238,9 +238,9 @@ prepare() {
     [ "$(cat "$dir/data" 2>/dev/null)" != "$data_id" ]; then
     rm -rf "$dir"
     mkdir -p "$dir" || return 1
-    keep "$dir/data" "$data_id"
-    keep "$dir/train.cmd" "sf_train DATA $train_options"
     keep "$dir/version" "$version"
+    keep "$dir/data" "$data_id"
+    keep "$dir/train.cmd" "sf_train DATA $train_options" # last: whoever is killed before begins here again
   fi
   evaluation="sim_render, energy_audit: views $views, --downscale ${set[audit-downscale]} --rtl-rays ${set[rtl-rays]} --seed ${set[seed]}"
   [ "${set[convert-rays]}" -eq 0 ] || evaluation="$evaluation; sf_convert --rays ${set[convert-rays]}"

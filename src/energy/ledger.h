@@ -33,7 +33,7 @@ typedef enum {
   SF_PRICE_MAC = SF_PRICE_FAMILIES, /* mac: of the spiking net */
   SF_PRICE_TWIN_MAC,                /* twin_mac: of the integer twin */
   SF_PRICE_SOP,                     /* sop */
-  SF_PRICE_NEURON,                  /* neuron_update: leak, compare, reset */
+  SF_PRICE_NEURON,                  /* neuron_update: leak or doubling, compare, reset */
   SF_PRICE_INTEGRATOR,              /* integrator_update: of D2 and C3 */
   SF_PRICE_SPECIAL,                 /* special: one special function */
   SF_PRICE_TAG_LOOKUP,              /* tag_lookup: tags of a line of the field's cache */
@@ -133,7 +133,7 @@ typedef enum {
   SF_PART_LOOKUP,  /* look-ups in the field's cache */
   SF_PART_FILL,    /* lines that it reads from DRAM */
   SF_PART_FRAME,   /* pixels, words of 64 bits to DRAM */
-  SF_PART_NEURON,  /* leak, compare, reset; ReLU of the twin */
+  SF_PART_NEURON,  /* leak or doubling, compare, reset; ReLU of the twin */
   SF_PART_SPECIAL, /* exp, sigmoid, exp(-x); TensoRF's activation, sines */
   SF_PART_PRODUCT, /* products of the field; of a ray compositing, per sample */
   SF_PART_PLACE,   /* places in the field; of a ray its harmonics */

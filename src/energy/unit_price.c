@@ -91,11 +91,13 @@ static uint64_t special_fj(const pricing *p, int argument_bits, int result_bits)
          adds(p, 2, result_bits) + 2 * sf_price_access(p->tech, TABLE_ENTRIES * TABLE_ENTRY_BYTES, p->interpolated);
 }
 
-/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. The
- * integrators of D2 and C3 neither compare nor reset. */
-static uint64_t neuron_fj(const pricing *p, int l)
+/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. Weighted
+ * spikes have no leak: twice the membrane, the current, less the threshold. The integrators of D2 and C3 neither
+ * compare nor reset, and have no threshold. */
+static uint64_t neuron_fj(const pricing *p, const fx_net *net, int l)
 {
   const int bits = fx_layer_table[l].state_bits;
+  if (net->mode == FX_WEIGHTED) return adds(p, fx_layer_fires(l) ? 4 : 1, bits);
   return products(p, 1, bits, K_BITS) + adds(p, fx_layer_fires(l) ? 4 : 2, bits);
 }
 
@@ -156,7 +158,7 @@ static uint64_t layer_fj(const pricing *p, const fx_net *net, int ledger, int l,
     return sf_price_register(p->tech, twin ? ACTIVATION_BITS : fx_layer_table[l].state_bits, p->interpolated);
   case SF_PART_NEURON:
     if (twin) return products(p, 1, TWIN_SUM_BITS, REQUANTISE_BITS) + adds(p, 1, TWIN_SUM_BITS);
-    return neuron_fj(p, l);
+    return neuron_fj(p, net, l);
   case SF_PART_SPECIAL:
     return special_fj(p, twin ? TWIN_SUM_BITS : sf_sum_bits(layer, false), l == FX_D2 ? SF_SIGMA_BITS : SF_COLOUR_BITS);
   default:

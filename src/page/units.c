@@ -17,8 +17,9 @@ static void width_basis(FILE *out, const fx_net *net, int row, int part)
     fprintf(out, "sum of %d bits", sf_sum_bits(&net->layer[row], false));
     break;
   case SF_PART_NEURON:
-    fprintf(out, "%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
-            fx_layer_fires(row) ? "leak, compare, reset" : "leak of an integrator", fx_layer_table[row].state_bits);
+    fprintf(out, "%s%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
+            net->mode == FX_WEIGHTED ? "doubling" : "leak",
+            fx_layer_fires(row) ? ", compare, reset" : " of an integrator", fx_layer_table[row].state_bits);
     break;
   default:
     fprintf(out, "two products, two additions and two reads of a table of 1028 bytes");

@@ -31,6 +31,7 @@ sf_train_options sf_train_defaults(void)
                               .lr_grid = 1e-2,
                               .lr_net = 5e-3};
   for (int i = 0; i < 3; i++) options.config.theta[i] = 0.25f;
+  options.config.mode = SF_WEIGHTED;
   return options;
 }
 
@@ -50,6 +51,7 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
   sf_train_options options = sf_train_defaults();
   const int width = data->count ? data->view[0].camera.width : 800;
   options.config = sf_tensorf_default(data->scale, data->ndc);
+  options.config.mode = SF_WEIGHTED;
   if (data->layout != SF_LAYOUT_BLENDER && !data->ndc) sf_tensorf_bound(&options.config, data->bound);
   if (data->layout == SF_LAYOUT_BLENDER) see_all(&options.config.tensorf, data);
   options.lr_grid = 0.02;

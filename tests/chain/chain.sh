@@ -35,13 +35,13 @@ check_fit() { # NAME: the fitted scene in the RTL
   grep -Eq '"differences":[[:space:]]*0,' "$dir/fit-cosim.json" || fail "$1: the fitted scene differs in the RTL"
 }
 
-check_scene textured --hidden 64
+check_scene textured --hidden 64 --input-mode hybrid
 check_fit textured
 check_scene simple --input-mode no-decay --steps 4 --hidden 32
 check_scene fog --input-mode decay --steps 5 --hidden 64
 check_fit fog
 check_scene empty --steps 2 --hidden 32
-check_scene plaza --steps 3 --bound 8 --hidden 32 --input-mode weighted
+check_scene plaza --steps 3 --bound 8 --hidden 32
 "$bin/error_budget" "$work/plaza/m.safetensors" "$work/plaza/s.snn" "$work/plaza" --rays 20 --samples 1000 --quiet >"$work/budget.txt" ||
   fail "plaza: error budget"
 grep -q '^none: the fixed-point core  *equal' "$work/budget.txt" || fail "plaza: the error budget's core is not the core"

@@ -46,7 +46,8 @@ grep -q 'evaluation: view 1 of 2' lines.txt || fail "no progress of the evaluati
 "$bin/sf_export" model.safetensors -o s.snn >/dev/null || fail "no scene"
 says "wrote a.csv" energy_audit s.snn data --rays 10 --rtl-rays 0 --csv a.csv -q
 says "wrote a.html" energy_audit s.snn data --rays 10 --rtl-rays 1 --html a.html -q
-says "wrote s.nir" sf_export s.snn --nir s.nir
+"$bin/sf_train" data -o leaky.safetensors --input-mode hybrid "${learn[@]}" >/dev/null || fail "no model with leaks"
+says "wrote s.nir" sf_export leaky.safetensors --nir s.nir
 says "wrote cameras.png" sf_data data --png cameras.png
 says "wrote views/manifest.json and views/contact.png" sim_render s.snn data --all -o views -q
 says "2 views rendered by fixed" sim_render s.snn data --all -o again -q

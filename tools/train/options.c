@@ -91,7 +91,7 @@ static sf_status check_effect(train_arguments *a)
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
   if (a->along) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, steps, "has no effect beside --steps-along-ray"));
-  if (a->along && a->train.config.mode == SF_WEIGHTED)
+  if (a->along && a->input_mode == 1 + SF_WEIGHTED)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, mode,
                          "weighted needs steps that weigh differently, and --steps-along-ray has one per sample"));
   if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN || a->along)
@@ -108,6 +108,8 @@ static sf_status finish_options(train_arguments *a)
 {
   sf_config *c = &a->train.config;
   c->along = a->along;
+  const bool papers = a->along || a->train.objective == SF_OBJECTIVE_PAPER || c->net == SF_NET_ANN;
+  c->mode = a->input_mode ? a->input_mode - 1 : papers ? SF_HYBRID : SF_WEIGHTED;
   if (c->net == SF_NET_ANN || c->along) c->steps = 1;
   for (int i = 0; i < 3; i++) c->theta[i] = (float)a->theta;
   if (a->no_budget) a->train.no_extra = a->train.no_penalty = true;
