@@ -75,4 +75,25 @@ TEST(neighbours_of_what_is_occupied_are_looked_at)
   check_neighbours(4, 5, 6, 15);
 }
 
+/* Shares of the mean density that two thirds of the cells have: before the last sweep a quarter of it is enough. An
+ * update looks at few cells, and finds 1 there. */
+TEST(little_is_called_empty_while_the_field_is_young)
+{
+  const sf_train_options o = small_run();
+  const size_t cells = sf_config_cells(&o.config);
+  for (int old = 0; old < 2; old++) {
+    OWNED(trainer) t = start(&data, &o, NULL);
+    size_t kept[3] = {0};
+    t->iteration = old ? 272 : 240;
+    for (size_t i = 0; i < cells; i++) t->density[i] = (const float[]){0.4f, 0.1f, 2.5f}[i % 3];
+    ck_ok(sf_occupancy_update(t, 2));
+    for (size_t i = 0; i < cells; i++) kept[i % 3] += occupied(t, i);
+    const double most = 0.9 * (double)cells / 3, few = 0.2 * (double)cells / 3;
+    ck_assert_msg(old ? (double)kept[0] < few : (double)kept[0] > most, "0.4 of the mean: %zu of %zu", kept[0],
+                  cells / 3);
+    ck_assert_msg((double)kept[1] < few, "0.1 of the mean: %zu of %zu", kept[1], cells / 3);
+    ck_assert_msg((double)kept[2] > most, "2.5 of the mean: %zu of %zu", kept[2], cells / 3);
+  }
+}
+
 ck_options ck_program = {.set_up_all = set_up, .tear_down_all = close_scene, .one_process = true};

@@ -84,7 +84,7 @@ TEST(price_by_hand)
 static sf_train_options solid_run(void)
 {
   sf_train_options o = small_run();
-  o.stage1 = 250, o.stage2 = 250, o.fixed_steps = 2, o.samples = 2048;
+  o.stage1 = 400, o.stage2 = 400, o.fixed_steps = 2, o.samples = 2048;
   o.config.lattice = 256, o.config.log2_hash = 14;
   o.opaque = 2;
   return o;

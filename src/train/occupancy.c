@@ -1,7 +1,8 @@
 /* Occupancy grid: density of random points of some cells, running maximum with decay, threshold (torch-ngp).
  *
- * A cell that is taken for empty gets no rays, so nothing but a visit brings it back. Two rules keep thin parts:
- * nothing is called empty before it was looked at, and the neighbours of what is occupied are looked at each time. */
+ * A cell that is taken for empty gets no rays, so nothing but a visit brings it back. Three rules keep thin parts:
+ * nothing is called empty before it was looked at, the neighbours of what is occupied are looked at each time, and
+ * little is called empty while the field is young. */
 #include "train/internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -12,7 +13,8 @@
  * so much that what was seen before says nothing. */
 enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
-static const float decay = 0.95f, density_threshold = 10.0f;
+/* Before the last sweep the threshold is a part of what it is later: thin parts are learned last. */
+static const float decay = 0.95f, density_threshold = 10.0f, young = 0.25f;
 
 /* Cascades halve towards the middle of the box: x = place / 2^k + (1 - 1 / 2^k) / 2. */
 void sf_occupancy_point(const sf_config *c, size_t cell, const float place[3], float x[3])
@@ -94,7 +96,7 @@ static void threshold(sf_trainer *t, size_t cells)
 {
   double sum = 0;
   for (size_t i = 0; i < cells; i++) sum += t->density[i];
-  const float limit = fminf((float)(sum / (double)cells), density_threshold);
+  const float limit = fminf((float)(sum / (double)cells), density_threshold) * (t->iteration < LAST_SWEEP ? young : 1);
   size_t occupied = 0;
   for (size_t byte = 0; byte < cells / 8; byte++) {
     unsigned bits = 0;
