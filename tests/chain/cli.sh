@@ -53,9 +53,11 @@ check sf_convert "squared error above the twin's" python3 -c 'import json
 r = json.load(open("stdout.txt"))
 error = lambda row: 10 ** (-row["psnr"] / 10)
 assert all(abs(p["excess_squared_error"] - error(p) + error(r["twin"])) < 1e-12 for p in r["converted"])'
-for objective in "prefixes 0.2" "paper 0"; do
-  good sf_train d -o objective.safetensors --objective "${objective% *}" --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1 --json
-  check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*${objective#* }," stdout.txt
+for line in "prefixes 0.2 weighted" "paper 0 hybrid"; do
+  read -r objective opaque mode <<<"$line"
+  good sf_train d -o objective.safetensors --objective $objective --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1 --json
+  check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*$opaque," stdout.txt
+  check "--objective $objective" "has other neurons" grep -Eq "\"mode\":[[:space:]]*\"$mode\"" stdout.txt
 done
 good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
 check "along.safetensors" "its cost" grep -q "mJ a view: [0-9]* samples, each with [0-9]* products and [0-9]* additions that spikes cause" stdout.txt
