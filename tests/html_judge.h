@@ -51,6 +51,17 @@ static inline void check_counts(faults *f, const char *page, int steps)
       }
 }
 
+/* The words left of zero have room, on small screens too, where a letter is 8 units wide. */
+static inline void check_room(faults *f, const char *page)
+{
+  static const char words[] = "\" y=\"12\" class=\"mut end\">\xe2\x86\x90 spends more<";
+  for (const char *at = page; (at = strstr(at, words)); at++) {
+    const char *x = at;
+    while (x > page && x[-1] != '"') x--;
+    if (strtod(x, NULL) < 8 * 13) fault(f, "\"spends more\" ends at x = %g", strtod(x, NULL));
+  }
+}
+
 static inline void check_figures(faults *f, const char *page, const sf_audit_report *r)
 {
   const int steps = r->net->steps;
@@ -70,6 +81,7 @@ static inline void check_figures(faults *f, const char *page, const sf_audit_rep
   check_bars(f, page, "svg-rates-c2", "height", steps);
   check_bars(f, page, "svg-savings", "width", SF_SPIKING_LEDGERS);
   check_bars(f, page, "svg-readings", "width", 3);
+  check_room(f, page);
   for (int g = 0; g < SF_SPIKING_LEDGERS; g++) {
     char id[64];
     snprintf(id, sizeof id, "svg-ledger-%s", sf_ledger_texts[g].key);

@@ -33,8 +33,8 @@ static void saving_bars(FILE *out, const char *id, const char *title, const savi
     const double saving = sf_json_real(row[i].saving.node);
     if (isfinite(saving)) low = fmin(low, saving), high = fmax(high, saving);
   }
-  /* Room for the numbers on the sides that are used. */
-  const double left = low < 0 ? 88 : 0, scale = (WIDTH - left - 88) / fmax(high - low, 1), zero = left - low * scale;
+  /* Room for the words above and the numbers on the sides that are used. */
+  const double left = low < 0 ? 120 : 0, scale = (WIDTH - left - 88) / fmax(high - low, 1), zero = left - low * scale;
   svg_begin(out, id, WIDTH, TOP + ROW * n, title, "Bars to the right: energy saved; to the left: more energy spent");
   if (low < 0) svg_text(out, zero - 8, 12, "mut end", "\xe2\x86\x90 spends more");
   svg_text(out, zero + 8, 12, "mut", "saves \xe2\x86\x92");

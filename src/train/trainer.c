@@ -50,8 +50,9 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
 {
   sf_train_options options = sf_train_defaults();
   const int width = data->count ? data->view[0].camera.width : 800;
+  const sf_input_mode mode = options.config.mode;
   options.config = sf_tensorf_default(data->scale, data->ndc);
-  options.config.mode = SF_WEIGHTED;
+  options.config.mode = mode;
   if (data->layout != SF_LAYOUT_BLENDER && !data->ndc) sf_tensorf_bound(&options.config, data->bound);
   if (data->layout == SF_LAYOUT_BLENDER) see_all(&options.config.tensorf, data);
   options.lr_grid = 0.02;

@@ -109,7 +109,10 @@ static sf_status finish_options(train_arguments *a)
   sf_config *c = &a->train.config;
   c->along = a->along;
   const bool papers = a->along || a->train.objective == SF_OBJECTIVE_PAPER || c->net == SF_NET_ANN;
-  c->mode = a->input_mode ? a->input_mode - 1 : papers ? SF_HYBRID : SF_WEIGHTED;
+  if (a->input_mode)
+    c->mode = a->input_mode - 1;
+  else if (papers)
+    c->mode = SF_HYBRID;
   if (c->net == SF_NET_ANN || c->along) c->steps = 1;
   for (int i = 0; i < 3; i++) c->theta[i] = (float)a->theta;
   if (a->no_budget) a->train.no_extra = a->train.no_penalty = true;
