@@ -22,6 +22,7 @@ typedef struct oracle {
   dual *value;      /* [model.size] */
   double charge[3]; /* of a neuron of D1, C1, C2 that fires at any step of a sample */
   double *rounded;  /* the weights that the nets run with, [model.size]; NULL: those of `value` */
+  double *nearest;  /* least distance of a membrane from its threshold; NULL: not wanted */
   uint64_t *signs;  /* a leak's slope has a random sign wherever it is used, drawn from this state; NULL: its own */
 } oracle;
 
@@ -99,6 +100,7 @@ static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, c
   for (int n = 0; n < c->hidden; n++) {
     const dual h = charged_by(o, step, k, step ? l->v[n] : 0, current[n]);
     s[n] = c->net == SF_NET_ANN ? positive(h) : spike(h - c->theta[spiking]);
+    if (o->nearest) *o->nearest = fmin(*o->nearest, fabs(creal(h) - (double)c->theta[spiking]));
     l->v[n] = h - s[n] * (c->mode == SF_WEIGHTED ? 2 : 1) * c->theta[spiking];
     l->silent[n] = (step ? l->silent[n] : 1) * (1 - s[n]);
   }
