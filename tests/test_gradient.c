@@ -186,7 +186,8 @@ static void draw_apart(rig *r, const char *what, const sf_loss_plan *p)
     oracle_loss(&r->o, 0);
     r->o.nearest = NULL;
   }
-  ck_assert_msg(nearest >= 1e-6, "%s: a membrane is %.1g from its threshold in each of %d batches", what, nearest, DRAWN);
+  ck_assert_msg(nearest >= 1e-6, "%s: a membrane is %.1g from its threshold in each of %d batches", what, nearest,
+                DRAWN);
 }
 
 static void check_plan(rig *r, const char *what, sf_loss_plan p)
