@@ -129,6 +129,31 @@ TEST(compaction_keeps_what_light_reaches)
   free(first_x);
 }
 
+/* An eighth of the samples, within 512 and 4096, are few rays; three times as many are many. Of TensoRF, whose rays
+ * have a limit, 512 are few. */
+TEST(few_rays_make_the_lattice_coarser)
+{
+  static const struct {
+    int samples, limit, few, many; /* many: 0 where the limit lies below */
+  } cases[] = {{256, 0, 512, 1536},       {4096, 0, 512, 1536},       {8192, 0, 1024, 3072}, {16384, 0, 2048, 6144},
+               {1 << 20, 0, 4096, 12288}, {1 << 15, 4096, 512, 1536}, {1 << 15, 400, 400, 0}};
+  sf_train_options o = small_run();
+  OWNED(trainer) t = start(&data, &o, NULL);
+  for (int i = 0; i < COUNT(cases); i++) {
+    const int few = cases[i].few, many = cases[i].many ? cases[i].many : cases[i].limit;
+    const struct {
+      int rays, stride;
+    } turns[] = {{few - 1, 4}, {few, 2}, {many, 2}, {many + 1, cases[i].many ? 1 : 2}};
+    t->options.samples = cases[i].samples, t->options.rays = cases[i].limit;
+    for (int k = 0; k < COUNT(turns); k++) {
+      t->rays = turns[k].rays, t->stride = 2, t->batch.samples = t->options.samples;
+      sf_batch_adapt(t);
+      ck_assert_msg(t->stride == turns[k].stride, "%d samples, %d rays: stride %d", t->options.samples, turns[k].rays,
+                    t->stride);
+    }
+  }
+}
+
 static void set_up(void)
 {
   open_scene(4);

@@ -122,12 +122,22 @@ int sf_batch_most(const sf_trainer *t)
   return t->options.rays ? t->options.rays : RAYS_MAX;
 }
 
+/* Below so many rays the lattice gets coarser. Of the hash grid eight samples a ray, within limits: with finer
+ * intervals an iteration sees few pixels, and learns less. */
+static int few_rays(const sf_trainer *t)
+{
+  enum { RAY = 8, LEAST = 512, MOST = 4096 };
+  const int wanted = t->options.rays ? LEAST : t->options.samples / RAY, most = sf_batch_most(t);
+  const int few = wanted < LEAST ? LEAST : wanted > MOST ? MOST : wanted;
+  return few < most ? few : most;
+}
+
 /* Rays of the next iteration for the wanted samples. Where that leaves few rays, as it does while nothing is known to
  * be empty, the lattice is made coarser, until it is settled. */
 void sf_batch_adapt(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
-  const int most = sf_batch_most(t), few = most < 512 ? most : 512, many = most < 768 ? 2 * most - 1 : 1536;
+  const int most = sf_batch_most(t), few = few_rays(t), many = 2 * most - 1 < 3 * few ? 2 * most - 1 : 3 * few;
   double ratio = t->options.samples / fmax(b->samples, 1);
   t->rays = (int)(t->rays * fmin(fmax(ratio, 0.5), 2.0));
   if (t->progress < sf_lattice_settles && !sf_tuning(t)) {
