@@ -169,7 +169,7 @@ static void lengthen(sf_batch *b)
 }
 
 /* A membrane that meets its threshold within the rounding of floats may fire in one of the two alone. Such batches are
- * passed over: in a batch of some 1e5 membranes one in ten is. */
+ * passed over: a few in a hundred. */
 static void draw_apart(rig *r, const char *what, const sf_loss_plan *p)
 {
   enum { DRAWN = 20 };
