@@ -50,9 +50,9 @@ static inline dual oracle_regular(const oracle_ray *ray, int step, const oracle_
 
 /* What is left of the way to opaque, of each sample where less than a tenth of the light is left. The light in front of
  * the first is a constant, and slopes are weighed by alpha. */
-static inline dual oracle_tail(const oracle_ray *ray, int step)
+static inline dual oracle_tail(const oracle_ray *ray, int step, double stop)
 {
-  const double stop = log(1e-4), tail = log(0.1);
+  const double tail = log(0.1);
   dual light = 0, sum = 0;
   for (int s = 0; s < ray->count && creal(light) > stop; s++) {
     if (creal(light) < tail) sum += (light - stop) / (tail - stop);
@@ -98,7 +98,8 @@ static inline dual oracle_losses(const oracle *o, const sf_ray *pixel, const ora
     if (!sf_loss_needs(p, t)) continue;
     oracle_composite(ray, ray->sigma[t - 1], ray->colour[t - 1], pixel->background, &im);
     sum += (double)p->weight[t - 1] * oracle_error(im.rgb, gt);
-    if (t == p->regular_at) sum += oracle_regular(ray, t - 1, &im, gt) + (double)p->opaque * oracle_tail(ray, t - 1);
+    if (t == p->regular_at)
+      sum += oracle_regular(ray, t - 1, &im, gt) + (double)p->opaque * oracle_tail(ray, t - 1, p->stop);
     if (p->full && t == p->t_r) sum += (double)p->distill * oracle_error(im.rgb, full.rgb);
   }
   if (p->full && p->extra > 0)

@@ -182,7 +182,8 @@ static int naive_ray(naive *n, const sf_steps *intervals, const float *o, const 
   n->before = 0;
   sf_sh4(d, sh);
   memset(rgb, 0, 3 * sizeof *rgb);
-  for (int at = sf_march_next(&march, 0, x); at >= 0 && light >= sf_opaque; at = sf_march_next(&march, at + 1, x)) {
+  for (int at = sf_march_next(&march, 0, x); at >= 0 && light >= m->config.stop;
+       at = sf_march_next(&march, at + 1, x)) {
     float in[SF_DECODER_MAX], features[SF_APPEARANCE_MAX], sigma, colour[3] = {0};
     if (sf_model_decodes(m)) {
       sigma = sf_tensorf_sigma(&m->config.tensorf, sf_tensorf_density_feature(m, x));
@@ -191,7 +192,7 @@ static int naive_ray(naive *n, const sf_steps *intervals, const float *o, const 
     } else
       sf_grid_features(m, x, in);
     const float length = intervals->length[at];
-    const bool seen = !sf_model_decodes(m) || light * (1 - expf(-sigma * length)) > sf_opaque;
+    const bool seen = !sf_model_decodes(m) || light * (1 - expf(-sigma * length)) > sf_unseen;
     if (seen) naive_sample(n, in, sh, &sigma, colour);
     const float behind = light * expf(-sigma * length);
     for (int c = 0; c < 3 && seen; c++) rgb[c] += (light - behind) * colour[c];

@@ -90,7 +90,10 @@ TEST(compaction_keeps_what_light_reaches)
   for (int i = 0; i < b->blocks * SF_BLOCK; i++) b->delta[i] *= 30; /* light ends, sample by sample */
   int *expected = calloc((size_t)rays, sizeof *expected), dropped = 0;
   float *first_x = calloc((size_t)rays, sizeof *first_x);
-  const sf_loss_plan plan = {.steps = T, .regular_at = 3, .weight = {[1] = 0.5f, [2] = 0.5f, [T - 1] = 1}};
+  const sf_loss_plan plan = {.steps = T,
+                             .regular_at = 3,
+                             .weight = {[1] = 0.5f, [2] = 0.5f, [T - 1] = 1},
+                             .stop = (float)log(t->model.config.stop)};
   for (int r = 0; r < rays; r++) {
     double depth[3] = {0};
     const int prefix[3] = {2, 3, T};
@@ -100,7 +103,7 @@ TEST(compaction_keeps_what_light_reaches)
       for (int a = 0; a < 3; a++) x[a] = b->x[((size_t)(lane / SF_BLOCK) * 3 + a) * SF_BLOCK + lane % SF_BLOCK];
       if (s == 0) first_x[r] = x[0];
       bool seen = false;
-      for (int p = 0; p < 3; p++) seen |= depth[p] < 9.2103404;
+      for (int p = 0; p < 3; p++) seen |= depth[p] < -(double)plan.stop;
       if (!seen) break;
       expected[r]++;
       sf_grid_features(&t->model, x, f);
@@ -129,13 +132,13 @@ TEST(compaction_keeps_what_light_reaches)
   free(first_x);
 }
 
-/* An eighth of the samples, within 512 and 4096, are few rays; three times as many are many. Of TensoRF, whose rays
+/* An eighth of the samples, within 1536 and 4096, are few rays; three times as many are many. Of TensoRF, whose rays
  * have a limit, 512 are few. */
 TEST(few_rays_make_the_lattice_coarser)
 {
   static const struct {
     int samples, limit, few, many; /* many: 0 where the limit lies below */
-  } cases[] = {{256, 0, 512, 1536},       {4096, 0, 512, 1536},       {8192, 0, 1024, 3072}, {16384, 0, 2048, 6144},
+  } cases[] = {{256, 0, 1536, 4608},      {8192, 0, 1536, 4608},      {16384, 0, 2048, 6144}, {24576, 0, 3072, 9216},
                {1 << 20, 0, 4096, 12288}, {1 << 15, 4096, 512, 1536}, {1 << 15, 400, 400, 0}};
   sf_train_options o = small_run();
   OWNED(trainer) t = start(&data, &o, NULL);

@@ -196,6 +196,7 @@ static void check_plan(rig *r, const char *what, sf_loss_plan p)
   sf_loss_sums mean = {0};
   double firing[3];
   t->charge = (sf_charge){.error = 0.02, .reads = 300};
+  p.stop = (float)log(t->model.config.stop);
   draw_apart(r, what, &p);
   const float *leaks = sf_model_param(&t->model, SF_P_LEAK);
   p.inverse_rays = 1.0f / (float)t->batch.rays;
@@ -289,6 +290,7 @@ LOOP_TEST(terms_of_the_grid, SF_WEIGHTED + 1)
 static sf_train_options planes_run(int mode)
 {
   sf_train_options o = sf_train_defaults_tensorf(&data);
+  o.config.stop = 1e-4; /* rays of three samples and more */
   o.config.mode = mode;
   o.config.steps = STEPS;
   o.config.hidden = 16;

@@ -1,5 +1,6 @@
 /* Quantiser: fixed against float per block, refusals, determinism. */
 #include "ck_run.h"
+#include "folder_fixture.h"
 #include "src/fx/unit.h"
 #include "src/quant/internal.h"
 #include "tests/quant_fixture.h"
@@ -272,6 +273,34 @@ TEST(same_seed_same_bits_any_threads)
 }
 
 /* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
+/* A ray ends where the model says: floor(stop 2^20). A file that does not say means 1e-4. */
+TEST(where_rays_end)
+{
+  static const struct {
+    double stop;
+    bool said;
+    int expected;
+  } cases[] = {{0.01, true, 10485}, {1e-4, false, 104}, {SF_STOP_MIN, true, 1}, {SF_STOP_MAX, true, 52428}};
+  OWNED(sf_model) m = make_model(32, 4, SF_HYBRID);
+  for (int i = 0; i < COUNT(cases); i++) {
+    OWNED(sf_model) back = {0};
+    OWNED(fx_scene) scene = {0};
+    OWNED(sf_tensors) set = {0};
+    m.config.stop = cases[i].stop;
+    ck_ok(sf_model_save(&m, in("stop.safetensors")));
+    ck_ok(sf_tensors_load(&set, in("stop.safetensors")));
+    ck_assert_ptr_nonnull(sf_tensors_meta(&set, "stop"));
+    if (!cases[i].said) cJSON_DeleteItemFromObjectCaseSensitive(set.metadata, "stop");
+    ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, in("edited.safetensors")));
+    ck_ok(sf_model_load(&back, in("edited.safetensors")));
+    ck_assert_double_eq(back.config.stop, cases[i].stop);
+    ck_ok(sf_quantise(&scene, &back, "model", &plain));
+    ck_assert_int_eq(scene.trans_stop, cases[i].expected);
+  }
+  m.config.stop = 2 * SF_STOP_MAX;
+  ck_bad(sf_config_check(&m.config), SF_E_RANGE, "stop", "outside 1e-06..0.05");
+}
+
 TEST(largest_thresholds)
 {
   for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++) {
@@ -323,3 +352,4 @@ TEST(refuses_what_it_cannot_represent)
 }
 
 int ck_timeout = 300;
+ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

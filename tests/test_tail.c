@@ -18,7 +18,8 @@ static double slopes(const float depth[N], float slope[N])
   ck_ok(sf_ray_work_create(&w, N));
   const sf_ray ray = {.target = {0.5f, 0.5f, 0.5f}, .background = {0.5f, 0.5f, 0.5f}, .count = N};
   const float delta[N] = {0.05f, 0.05f, 0.05f, 0.05f, 0.05f};
-  sf_loss_plan plan = {.steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 0.25f};
+  sf_loss_plan plan = {
+      .steps = T, .regular_at = T, .weight = {[T - 1] = 1}, .inverse_rays = 0.25f, .stop = (float)log(1e-4)};
   sf_loss_sums with = {0}, without = {0};
   for (int s = 0; s < N; s++) {
     w.sigma[T - 1][s] = depth[s] / delta[s];
@@ -87,6 +88,7 @@ static sf_train_options solid_run(void)
   o.stage1 = 400, o.stage2 = 400, o.fixed_steps = 2, o.samples = 2048;
   o.config.lattice = 256, o.config.log2_hash = 14;
   o.opaque = 2;
+  o.config.stop = 1e-4; /* a long tail */
   return o;
 }
 

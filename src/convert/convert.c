@@ -42,7 +42,7 @@ bool convert_read(const sf_model *twin, const convert_ray *ray, const float x[3]
   const sf_tensorf *field = &twin->config.tensorf;
   float appearance[SF_APPEARANCE_MAX];
   point->sigma = sf_tensorf_sigma(field, sf_tensorf_density_feature(twin, x));
-  if (transmittance * (1 - expf(-point->sigma * length)) <= sf_opaque) return false;
+  if (transmittance * (1 - expf(-point->sigma * length)) <= sf_unseen) return false;
   sf_tensorf_appearance(twin, x, appearance);
   sf_tensorf_encode(field, appearance, ray->direction, point->in);
   return true;
@@ -64,7 +64,7 @@ static void collect(const sf_model *twin, int first, const sf_steps *steps, cons
   const size_t hidden = (size_t)twin->config.hidden;
   convert_point p;
   float x[3], colour[3], transmittance = 1;
-  for (int n = sf_march_next(&march, 0, x); n >= 0 && transmittance > sf_opaque && a->samples < SAMPLES_MOST;
+  for (int n = sf_march_next(&march, 0, x); n >= 0 && transmittance > march.stop && a->samples < SAMPLES_MOST;
        n = sf_march_next(&march, n + 1, x)) {
     if (convert_read(twin, ray, x, transmittance, steps->length[n], &p)) {
       sf_net_sample(twin, p.in, ray->sh, 1, &p.sigma, colour, trace);

@@ -1,7 +1,6 @@
 /* What a converted net shows and costs, on random rays. */
 #include "convert/internal.h"
 #include "energy/energy.h"
-#include "render/composite.h"
 #include "render/march.h"
 #include <math.h>
 #include <stdlib.h>
@@ -15,9 +14,9 @@ typedef struct way {
 } way;
 
 /* colour: NULL of a sample that the net does not see. */
-static void add(way *w, int place, float sigma, const float *colour, float length, uint64_t sops)
+static void add(way *w, float stop, int place, float sigma, const float *colour, float length, uint64_t sops)
 {
-  if (w->transmittance[place] < sf_opaque) return;
+  if (w->transmittance[place] < stop) return;
   const float behind = w->transmittance[place] * expf(-sigma * length);
   if (!colour) {
     w->transmittance[place] = behind;
@@ -28,10 +27,10 @@ static void add(way *w, int place, float sigma, const float *colour, float lengt
   w->samples[place]++, w->sops[place] += sops;
 }
 
-static bool alive(const way *w, int places)
+static bool alive(const way *w, float stop, int places)
 {
   for (int i = 0; i < places; i++)
-    if (w->transmittance[i] >= sf_opaque) return true;
+    if (w->transmittance[i] >= stop) return true;
   return false;
 }
 
@@ -43,16 +42,18 @@ static void walk(const sf_converted *net, const sf_steps *intervals, const conve
   convert_point p;
   float x[3], colour[3];
   for (int i = 0; i <= points; i++) w->transmittance[i] = 1;
-  for (int n = sf_march_next(&march, 0, x); n >= 0 && alive(w, points + 1); n = sf_march_next(&march, n + 1, x)) {
+  for (int n = sf_march_next(&march, 0, x); n >= 0 && alive(w, march.stop, points + 1);
+       n = sf_march_next(&march, n + 1, x)) {
     const float length = intervals->length[n];
     const bool seen = convert_read(net->model, ray, x, w->transmittance[0], length, &p);
     if (seen) {
       sf_net_sample(net->model, p.in, ray->sh, 1, &p.sigma, colour, NULL);
       sf_converted_sample(net, p.in, ray->sh, points, steps, output);
     }
-    add(w, 0, p.sigma, seen ? colour : NULL, length, 0);
+    add(w, march.stop, 0, p.sigma, seen ? colour : NULL, length, 0);
     for (int i = 0; i < points; i++)
-      add(w, 1 + i, net->first ? p.sigma : output[i].sigma, seen ? output[i].colour : NULL, length, output[i].sops);
+      add(w, march.stop, 1 + i, net->first ? p.sigma : output[i].sigma, seen ? output[i].colour : NULL, length,
+          output[i].sops);
   }
   for (int i = 0; i <= points; i++)
     for (int c = 0; c < 3; c++) w->rgb[i][c] += w->transmittance[i]; /* white behind */

@@ -40,6 +40,7 @@ sf_status sf_config_check(const sf_config *c)
   SF_TRY(check_range("bound", c->bound, 1, 64));
   if (c->bound & (c->bound - 1)) return sf_fail(SF_E_RANGE, "model config: bound = %d is not a power of two", c->bound);
   SF_TRY(check_range("dt_gamma", c->dt_gamma, 0, SF_GAMMA_MAX));
+  SF_TRY(check_range("stop", c->stop, SF_STOP_MIN, SF_STOP_MAX));
   SF_TRY(check_range("backbone", c->backbone, 0, SF_FIELDS - 1));
   return sf_field_of(c)->check(c);
 }

@@ -15,6 +15,7 @@ sf_config sf_config_default(void)
                      .scale = 0.8f,
                      .lattice = 1024,
                      .occ_res = 128,
+                     .stop = 0.01,
                      .bound = 1};
 }
 

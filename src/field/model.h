@@ -29,6 +29,7 @@ typedef struct sf_config {
   int32_t occ_res;    /* occupancy cells per axis of a cascade */
   int32_t bound;      /* 1, 2, 4, ... 64; 1: objects */
   float dt_gamma;     /* steps are distance * dt_gamma, at least the shortest; 0: all are the shortest. 0..1/8 */
+  double stop;        /* a ray ends where less of its light is left: its transmittance. 1e-6..0.05 */
   int32_t backbone;   /* sf_backbone_kind */
   sf_tensorf tensorf; /* the planes; levels .. finest_res, lattice, bound and dt_gamma are the hash grid's */
   sf_space space;     /* of the data that it learned from */
@@ -151,6 +152,8 @@ static inline bool sf_model_decodes(const sf_model *m)
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
 enum { SF_LATTICE_MIN = 16 };
+#define SF_STOP_MIN 1e-6 /* of stop: fixed point holds 2^-20 */
+#define SF_STOP_MAX 0.05
 #define SF_GAMMA_MAX 0.125f /* of dt_gamma */
 typedef struct sf_steps {
   int32_t count, stride, lattice;   /* stride: this many of the scene's intervals are one */

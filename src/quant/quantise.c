@@ -1,6 +1,5 @@
 #include "src/quant/internal.h"
 #include "fx/tensorf.h"
-#include "render/composite.h"
 #include <math.h>
 #include <string.h>
 
@@ -127,7 +126,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model, const sf_quant_o
   scene->net.mode = model->config.mode; /* sf_input_mode is fx_input_mode */
   scene->net.steps = options->steps ? options->steps : model->t_r;
   scene->max_samples = MAX_SAMPLES;
-  scene->trans_stop = (int32_t)floor(ldexp((double)sf_opaque, SF_TRANS_FRAC));
+  scene->trans_stop = (int32_t)floor(ldexp(model->config.stop, SF_TRANS_FRAC));
   for (int o = 0; o < 3; o++) scene->background[o] = (int32_t)nearbyint(ldexp(options->background[o], 16));
   scene->units.model_scale = (double)model->config.scale;
   scene->units.data_scale = (double)model->config.space.scale;

@@ -4,8 +4,8 @@
 #define SF_RENDER_COMPOSITE_H
 #include <stddef.h>
 
-/* The light is gone: a ray ends where its transmittance is less, and a sample of at most this weight is not decoded. */
-static const float sf_opaque = 1e-4f, sf_opaque_log = -9.2103404f; /* and its natural logarithm */
+/* A sample of at most this weight is not decoded. */
+static const float sf_unseen = 1e-4f;
 
 /* alpha_s = 1 - exp(-sigma_s delta_s), w_s = alpha_s prod_{j<s} (1 - alpha_j). Returns the transmittance behind. */
 float sf_composite_weights(int n, const float *sigma, const float *delta, float *weight);

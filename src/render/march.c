@@ -40,7 +40,8 @@ sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const floa
                 .occupancy = model->occupancy,
                 .res = model->config.occ_res,
                 .cascades = sf_config_cascades(&model->config),
-                .jitter = jitter};
+                .jitter = jitter,
+                .stop = (float)model->config.stop};
   for (int a = 0; a < 3; a++) {
     m.origin[a] = origin[a];
     m.direction[a] = direction[a];

@@ -11,6 +11,7 @@ typedef struct sf_march {
   float scale[3], offset[3]; /* position in [0,1]^3 = model units * scale + offset */
   float way[3];              /* along the ray from face to face of the box; 0: it never gets there */
   sf_lattice lattice;
+  float stop; /* it ends where less light is left */
 } sf_march;
 
 /* jitter in [0,1) places the samples inside their interval (0.5 = centre). */

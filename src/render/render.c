@@ -52,7 +52,7 @@ static void flush(worker *w)
   const float *sigma = w->block->sigma[w->steps - 1], *colour = w->block->colour[w->steps - 1];
   for (int l = 0; l < w->fill; l++) {
     ray_state *r = &w->ray[w->owner[l]];
-    if (r->transmittance < sf_opaque) continue;
+    if (r->transmittance < r->march.stop) continue;
     const float delta = w->intervals.length[w->lattice[l]];
     float behind = r->transmittance * expf(-sigma[l] * delta), weight = r->transmittance - behind;
     for (int a = 0; a < 3; a++) r->rgb[a] += weight * colour[a * SF_BLOCK + l];
@@ -84,13 +84,13 @@ static void render_packet(worker *w, int count)
     alive = 0;
     for (int i = 0; i < count; i++) {
       ray_state *r = &w->ray[i];
-      for (int burst = 0; burst < BURST && r->next >= 0 && r->transmittance >= sf_opaque; burst++) {
+      for (int burst = 0; burst < BURST && r->next >= 0 && r->transmittance >= r->march.stop; burst++) {
         float x[3];
         int n = sf_march_next(&r->march, r->next, x);
         r->next = n < 0 ? -1 : n + 1;
         if (n >= 0) add_sample(w, i, n, x);
       }
-      alive |= r->next >= 0 && r->transmittance >= sf_opaque;
+      alive |= r->next >= 0 && r->transmittance >= r->march.stop;
     }
     flush(w);
   }

@@ -70,7 +70,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   for (int c = 0; c < 3; c++) rgb[c] = behind * background[c];
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
-    if (w->samples.weight[s] <= sf_opaque) continue;
+    if (w->samples.weight[s] <= sf_unseen) continue;
     w->block->net.first |= (uint64_t)!decoded++ << w->fill;
     w->block->net.state[w->fill] = &w->state;
     memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));

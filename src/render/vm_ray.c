@@ -1,5 +1,4 @@
 #include "render/vm_ray.h"
-#include "render/composite.h"
 #include <math.h>
 
 enum { BURST = 16 }; /* densities of so many samples at once: most rays end soon behind the surface */
@@ -20,7 +19,7 @@ int sf_vm_ray(const sf_kernels *k, const sf_vm_field *density, const sf_march *m
     }
     k->vm_density(density, s.x + 3 * count, found - count, s.sigma + count, s.slope + count);
     for (; count < found; count++) {
-      if (*transmittance < sf_opaque) return count;
+      if (*transmittance < march->stop) return count;
       const float behind = *transmittance * expf(-s.sigma[count] * march->steps->length[0]);
       s.weight[count] = *transmittance - behind;
       *transmittance = behind;

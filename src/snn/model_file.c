@@ -118,6 +118,8 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
     SF_TRY(meta_number(set, "dt_gamma", &number));
     c->dt_gamma = (float)number;
   }
+  c->stop = 1e-4; /* of files that do not say */
+  if (sf_tensors_meta(set, "stop")) SF_TRY(meta_number(set, "stop", &c->stop));
   SF_TRY(load_space(set, c));
   sf_status status = sf_config_check(c);
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
@@ -139,6 +141,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   put_numbers(meta, number_of, CONFIG_NUMBERS);
   sf_tensors_put_number(meta, "bound", c.bound);
   sf_tensors_put_number(meta, "dt_gamma", c.dt_gamma);
+  sf_tensors_put_number(meta, "stop", c.stop);
   sf_tensors_put_number(meta, "t_star", m->t_star);
   sf_tensors_put_number(meta, "t_r", m->t_r);
   sf_tensors_put_number(meta, "weight_bits", m->scales.weight_bits);

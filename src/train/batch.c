@@ -126,9 +126,9 @@ int sf_batch_most(const sf_trainer *t)
  * intervals an iteration sees few pixels, and learns less. */
 static int few_rays(const sf_trainer *t)
 {
-  enum { RAY = 8, LEAST = 512, MOST = 4096 };
-  const int wanted = t->options.rays ? LEAST : t->options.samples / RAY, most = sf_batch_most(t);
-  const int few = wanted < LEAST ? LEAST : wanted > MOST ? MOST : wanted;
+  enum { RAY = 8, LEAST = 1536, MOST = 4096, OF_PLANES = 512 };
+  const int wanted = t->options.samples / RAY, most = sf_batch_most(t);
+  const int few = t->options.rays ? OF_PLANES : wanted < LEAST ? LEAST : wanted > MOST ? MOST : wanted;
   return few < most ? few : most;
 }
 

@@ -1,6 +1,5 @@
 /* Samples that no light reaches leave the batch before the nets see them. */
 #include "train/internal.h"
-#include "render/composite.h"
 #include <omp.h>
 #include <string.h>
 
@@ -12,7 +11,7 @@ static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta,
     if (!sf_loss_needs(p, t)) continue;
     float depth = 0;
     int s = 0;
-    for (; s < ray->count && depth > sf_opaque_log; s++)
+    for (; s < ray->count && depth > p->stop; s++)
       depth -= delta[s] * block[(ray->first + s) / SF_BLOCK].sigma[t - 1][(ray->first + s) % SF_BLOCK];
     if (s > count) count = s;
   }

@@ -63,6 +63,7 @@ typedef struct sf_loss_plan {
   int t_f, t_c, t_r;      /* around t^; in a full iteration */
   double d;               /* t^ - t_f */
   float inverse_rays;
+  float stop;    /* a ray ends where less of its light is left: the logarithm of that share */
   float opaque;  /* price of a sample in a ray's tail (L_opaque), 0 = off */
   float extra;   /* weight of L_extra, 0 = off */
   float charge;  /* of reads of weights, 0 = off */

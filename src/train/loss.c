@@ -98,19 +98,19 @@ static double add_sparsity(int n, const float *sigma, float inverse_rays, float 
 /* The tail of a ray that becomes opaque: samples where less than a tenth of the light is left. Each counts by what is
  * left of the way from there to opaque, 1 down to 0. What lies before the tail is held constant, so nothing thickens in
  * front of a surface. The slope of a sample is weighed by its alpha, so what is empty is not filled. */
-static double add_tail(int n, const float *sigma, const float *delta, float weight, float *dsigma)
+static double add_tail(float stop, int n, const float *sigma, const float *delta, float weight, float *dsigma)
 {
-  const float way = tail_log - sf_opaque_log;
+  const float way = tail_log - stop;
   float light = 0; /* its logarithm */
   double value = 0;
   int first = -1, end = 0;
-  for (; end < n && light > sf_opaque_log; end++) {
+  for (; end < n && light > stop; end++) {
     if (first < 0 && light < tail_log) first = end;
-    if (first >= 0) value += (light - sf_opaque_log) / way;
+    if (first >= 0) value += (light - stop) / way;
     light -= delta[end] * sigma[end];
   }
   /* The last sample counts as opaque also where the kernels round its density otherwise than for sf_batch_compact. */
-  if (first < 0 || light > sf_opaque_log + 1e-3f) return 0;
+  if (first < 0 || light > stop + 1e-3f) return 0;
   for (int s = first; s < end; s++)
     dsigma[s] += weight * delta[s] * (float)(end - 1 - s) / way * expm1f(-sigma[s] * delta[s]);
   return value;
@@ -200,7 +200,7 @@ static void add_prefix(const sf_loss_plan *p, const sf_ray *ray, const float *de
   sums->regular += add_regular(ray, im, p->inverse_rays, grgb);
   sums->regular += add_sparsity(ray->count, w->sigma[t - 1], p->inverse_rays, w->dsigma[t - 1]);
   if (p->opaque > 0)
-    sums->tail += add_tail(ray->count, w->sigma[t - 1], delta, p->opaque * p->inverse_rays, w->dsigma[t - 1]);
+    sums->tail += add_tail(p->stop, ray->count, w->sigma[t - 1], delta, p->opaque * p->inverse_rays, w->dsigma[t - 1]);
 }
 
 void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, sf_ray_work *w, sf_loss_sums *sums)

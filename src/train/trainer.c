@@ -268,6 +268,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
   const float *leak = sf_model_param(&t->model, SF_P_LEAK);
   const bool sigma_integrates = !sf_model_decodes(&t->model);
   sf_loss_plan p = {.inverse_rays = 1.0f / (float)t->batch.rays,
+                    .stop = (float)log(t->model.config.stop),
                     .k_sigma = sigma_integrates ? sf_sigmoid(leak[1]) : 0, /* 0: every prefix is the same, no tail */
                     .k_colour = sf_sigmoid(leak[4])};
   const bool learned = searching(t);

@@ -32,7 +32,7 @@ static void look(sf_trainer *t, int r, const sf_march *march, sf_vm_part *p)
   int kept = 0;
   memset(hit, 0, sizeof t->batch.hit[r]);
   for (int s = 0; s < n; s++)
-    if (p->weight[at + s] > sf_opaque) {
+    if (p->weight[at + s] > sf_unseen) {
       hit[s / 64] |= (uint64_t)1 << s % 64;
       kept++;
     }

@@ -59,6 +59,7 @@ number sf_train --target-loss -1 21 nan x
 number sf_train --target-saving -1 101 nan x
 number sf_train --search-rate 0 -1 101 nan x
 number sf_train --opaque -1 11 nan x
+number sf_train --stop 0 1e-7 0.051 nan x
 usage "--opaque has no effect beside --objective paper" sf_train d -o out --objective paper --opaque 0.1
 usage --price sf_train d -o out --price euros
 usage --objective sf_train d -o out --objective none

@@ -65,13 +65,13 @@ static sf_status check_effect(train_arguments *a)
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
   static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {"--backbone",    "--net",         "--steps",           "--input-mode",
-                                        "--hidden",      "--theta",       "--occ-res",         "--voxels",
-                                        "--fixed-steps", "--stage1",      "--no-stage1",       "--no-extra",
-                                        "--no-penalty",  "--no-budget",   "--no-distill",      "--no-scaling",
-                                        "--beta",        "--price",       "--target-loss",     "--target-saving",
-                                        "--objective",   "--search-rate", "--steps-along-ray", NULL},
-                           *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
+  static const char *const settled[] = {
+      "--backbone", "--net",         "--steps",         "--input-mode",  "--hidden",      "--theta",
+      "--occ-res",  "--voxels",      "--stop",          "--fixed-steps", "--stage1",      "--no-stage1",
+      "--no-extra", "--no-penalty",  "--no-budget",     "--no-distill",  "--no-scaling",  "--beta",
+      "--price",    "--target-loss", "--target-saving", "--objective",   "--search-rate", "--steps-along-ray",
+      NULL};
+  static const char *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
                            *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};

@@ -126,6 +126,8 @@ static sf_option *sizes(train_arguments *a, sf_option *o)
        "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest\t#\t-"},
       {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
        "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0\t#\t-"},
+      {"--stop", 0, SF_ARG_DOUBLE, &c->stop, SF_STOP_MIN, SF_STOP_MAX, NULL, "X",
+       "a ray ends where less than this share of its light is left; 1e-4 is torch-ngp's\t#"},
       {"--voxels", 0, SF_ARG_INT, &a->train.voxels, 16, 1024, NULL, "N",
        "the finest grid has N^3 voxels; else half the pictures' width, at most 300; NDC: 0.63 of it, at most 640\t-"
        "\tpixels"}};
