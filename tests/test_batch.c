@@ -132,13 +132,13 @@ TEST(compaction_keeps_what_light_reaches)
   free(first_x);
 }
 
-/* An eighth of the samples, within 1536 and 4096, are few rays; three times as many are many. Of TensoRF, whose rays
- * have a limit, 512 are few. */
+/* Three sixteenths of the samples, within 1536 and 4096, are few rays; three times as many are many. Of TensoRF, whose
+ * rays have a limit, 512 are few. */
 TEST(few_rays_make_the_lattice_coarser)
 {
   static const struct {
     int samples, limit, few, many; /* many: 0 where the limit lies below */
-  } cases[] = {{256, 0, 1536, 4608},      {8192, 0, 1536, 4608},      {16384, 0, 2048, 6144}, {24576, 0, 3072, 9216},
+  } cases[] = {{256, 0, 1536, 4608},      {8192, 0, 1536, 4608},      {16384, 0, 3072, 9216}, {24576, 0, 4096, 12288},
                {1 << 20, 0, 4096, 12288}, {1 << 15, 4096, 512, 1536}, {1 << 15, 400, 400, 0}};
   sf_train_options o = small_run();
   OWNED(trainer) t = start(&data, &o, NULL);

@@ -122,12 +122,12 @@ int sf_batch_most(const sf_trainer *t)
   return t->options.rays ? t->options.rays : RAYS_MAX;
 }
 
-/* Below so many rays the lattice gets coarser. Of the hash grid eight samples a ray, within limits: with finer
+/* Below so many rays the lattice gets coarser. Of the hash grid some five samples a ray, within limits: with finer
  * intervals an iteration sees few pixels, and learns less. */
 static int few_rays(const sf_trainer *t)
 {
-  enum { RAY = 8, LEAST = 1536, MOST = 4096, OF_PLANES = 512 };
-  const int wanted = t->options.samples / RAY, most = sf_batch_most(t);
+  enum { LEAST = 1536, MOST = 4096, OF_PLANES = 512 };
+  const int wanted = 3 * t->options.samples / 16, most = sf_batch_most(t);
   const int few = t->options.rays ? OF_PLANES : wanted < LEAST ? LEAST : wanted > MOST ? MOST : wanted;
   return few < most ? few : most;
 }
