@@ -272,7 +272,6 @@ TEST(same_seed_same_bits_any_threads)
   }
 }
 
-/* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
 /* A ray ends where the model says: floor(stop 2^20). A file that does not say means 1e-4. */
 TEST(where_rays_end)
 {
@@ -301,6 +300,7 @@ TEST(where_rays_end)
   ck_bad(sf_config_check(&m.config), SF_E_RANGE, "stop", "outside 1e-06..0.05");
 }
 
+/* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
 TEST(largest_thresholds)
 {
   for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++) {
