@@ -243,6 +243,7 @@ TEST(energy_as_price)
   sf_train_options o = search_run();
   o.price = SF_PRICE_ENERGY;
   sf_trainer *t = searcher(&o);
+  t->stride = 1;
   measure(t, &c, 40, 1);
   const sf_config *g = &t->model.config;
   const double h = g->hidden, frame = 5 * 24 * 24, sop = 0.2 * h * (SF_DENSITY_OUT + h + 3);
@@ -254,9 +255,17 @@ TEST(energy_as_price)
   ck_assert_double_eq_tol(sf_search_energy(t, 2), once + 2 * step, 1e-9);
   ck_assert_double_eq_tol(sf_search_saving(t, 2), 1 - (once + 2 * step) / twin, 1e-9);
   sf_trainer_free(t);
+  /* Where intervals are four times those of the file, and will be twice those, frames have twice as many samples. */
+  t = searcher(&o);
+  t->stride = 4;
+  measure(t, &c, 40, 1);
+  ck_assert_double_eq_tol(sf_search_now(t).step_energy, 2 * step, 1e-9 * step);
+  ck_assert_double_eq_tol(sf_search_energy(t, 2), 2 * (once + 2 * step), 1e-9);
+  sf_trainer_free(t);
   for (int k = 2; k < T; k++) { /* step k saves more than it costs, step k+1 less */
     o.beta = 1e-4 * pow(0.5, k) * sqrt(2) / step;
     t = searcher(&o);
+    t->stride = 1;
     measure(t, &c, 40, 1);
     ck_assert_int_eq(t->model.t_r, k);
     const sf_search_report r = sf_search_now(t);

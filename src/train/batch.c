@@ -147,13 +147,19 @@ void sf_batch_adapt(sf_trainer *t)
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays > most ? most : t->rays;
 }
 
+int sf_batch_finer(const sf_trainer *t)
+{
+  const sf_config *c = &t->model.config;
+  const bool as_it_is =
+      t->stride == 1 || !t->backbone->settles || c->lattice < 2 * SF_LATTICE_MIN || 2 * c->dt_gamma > SF_GAMMA_MAX;
+  return t->stride / (as_it_is ? 1 : 2);
+}
+
 void sf_batch_settle(sf_trainer *t)
 {
   sf_config *c = &t->model.config;
-  const bool as_it_is =
-      t->stride == 1 || !t->backbone->settles || c->lattice < 2 * SF_LATTICE_MIN || 2 * c->dt_gamma > SF_GAMMA_MAX;
-  const int settled = as_it_is ? 1 : 2;
-  t->rays = t->rays * settled / t->stride;
+  const int finer = sf_batch_finer(t), settled = t->stride / finer;
+  t->rays /= finer;
   c->lattice /= settled;
   c->dt_gamma *= (float)settled;
   t->rays = t->rays < RAYS_MIN ? RAYS_MIN : t->rays;

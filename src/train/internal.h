@@ -250,6 +250,8 @@ static const double sf_lattice_settles = 0.5;
 /* Makes the stride of now, but at most 2, the model's own: lattice / stride, dt_gamma * stride. TensoRF's step follows
  * from its grids: there the stride goes back to 1. */
 void sf_batch_settle(sf_trainer *trainer);
+/* How many times shorter intervals are once they are settled than now. */
+int sf_batch_finer(const sf_trainer *trainer);
 /* The most blocks that so many samples take, however they are packed: a bundle and the next have more than BUNDLE_FILL,
  * or it has more than half of that. Where samples leave, bundles move, and blocks may become more. */
 int sf_batch_blocks(int samples);

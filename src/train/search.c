@@ -246,11 +246,12 @@ static void average(sf_trainer *t, const sf_loss_sums *mean, double ratio, doubl
   s->ratio2 += fast * (ratio * ratio - s->ratio2);
   for (int l = 0; l < 3; l++) s->firing[l] += fast * (t->firing[l] - s->firing[l]);
   const sf_camera *c = &t->data->view[0].camera;
-  const double frame = (double)t->batch.samples / t->batch.rays * c->width * c->height;
-  int rays = 0; /* that have a sample */
+  const double samples = fmax(t->batch.samples, 1), each = samples * sf_batch_finer(t) / t->batch.rays;
+  const double frame = each * c->width * c->height;
+  int rays = 0; /* that have a sample; per sample of now, so that no more is saved than is said */
   for (int r = 0; r < t->batch.rays; r++) rays += t->batch.ray[r].count > 0;
   s->samples_per_frame += fast * (frame - s->samples_per_frame);
-  s->rays_per_sample += fast * (rays / fmax(t->batch.samples, 1) - s->rays_per_sample);
+  s->rays_per_sample += fast * (rays / samples - s->rays_per_sample);
   s->at = at;
   s->measured++;
 }
