@@ -248,7 +248,7 @@ static void average(sf_trainer *t, const sf_loss_sums *mean, double ratio, doubl
   const sf_camera *c = &t->data->view[0].camera;
   const double samples = fmax(t->batch.samples, 1), each = samples * sf_batch_finer(t) / t->batch.rays;
   const double frame = each * c->width * c->height;
-  int rays = 0; /* that have a sample; per sample of now, so that no more is saved than is said */
+  int rays = 0; /* that have a sample. Shorter intervals share them more: the saving is rather too low */
   for (int r = 0; r < t->batch.rays; r++) rays += t->batch.ray[r].count > 0;
   s->samples_per_frame += fast * (frame - s->samples_per_frame);
   s->rays_per_sample += fast * (rays / samples - s->rays_per_sample);
