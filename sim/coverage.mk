@@ -3,7 +3,7 @@ COVER := $B/coverage
 COVER_TESTS := test_rtl test_rtl_registers test_rtl_counters test_rtl_decoder test_rtl_ports test_rtl_hard test_rtl_disturbed
 # From rays to pixels: both fields, their cache, the compositor.
 COVER_TESTS += test_rtl_ray test_rtl_ray_field test_rtl_ray_planes test_rtl_ray_lone test_rtl_ray_program test_rtl_ray_registers
-coverage: ## line, toggle and functional coverage of the RTL: table, holes, build/coverage/lcov.info (about half an hour)
+coverage: ## line, toggle and functional coverage of the RTL: table, holes, build/coverage/lcov.info (about an hour)
 	@mkdir -p $(COVER)/points
 	@$(MAKE) B=$(COVER) $(SAME_ARCH) COVERAGE=$(COVER)/points coverage-run
 
