@@ -15,6 +15,7 @@ failed=0
 for source in "$here"/fuzz_*.c; do
   target=$(basename "$source" .c)
   target=${target#fuzz_}
+  grep -q "^| \`$target\` |" "$here/../../docs/fuzzing.md" || { failed=1; echo "FAILED $target: no row in docs/fuzzing.md"; }
   inputs=("$work/seeds/$target")
   [ -d "$here/regressions/$target" ] && inputs+=("$here/regressions/$target")
   if result=$(ulimit -v "$limit" && timeout -k 5 60 "$build/tests/fuzz/$target" "${inputs[@]}" 2>&1); then

@@ -14,17 +14,21 @@ FUZZ_REPLAYS := $(FUZZ_TARGETS:%=$B/tests/fuzz/%) $B/tests/fuzz/seeds
 $B/tests/fuzz/seeds: $B/obj/tests/fuzz/seeds.o $B/obj/sim/soc/image.o $B/obj/sim/ray/request.o $(FUZZ_WITH) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(CHECK_LIBS) $(LIBS)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $B/libspikefield.a $(CHECK_LIBS) $(LIBS)
 $(FUZZ_TARGETS:%=$B/tests/fuzz/%): $B/tests/fuzz/%: $B/obj/tests/fuzz/fuzz_%.o $B/obj/tests/fuzz/replay.o $(FUZZ_WITH) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CC) -fopenmp $(SAN) -o $@ $^ $(LIBS)
+	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $B/libspikefield.a $(LIBS)
+
+# What reads these is in the harness.
+$B/tests/fuzz/elf $B/bin/fuzz_elf: $B/obj/sim/soc/elf.o
+$B/tests/fuzz/frame $B/bin/fuzz_frame $B/tests/fuzz/seeds: $B/obj/sim/board/frame.o
 
 # In build/fuzz, by clang, on one thread.
 $(FUZZ_TARGETS:%=$B/bin/fuzz_%): $B/bin/fuzz_%: $B/obj/tests/fuzz/fuzz_%.o $(FUZZ_WITH) $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)
-	$Q$(CC) $(SAN) -fsanitize=fuzzer -o $@ $^ $(LIBS)
+	$Q$(CC) $(SAN) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $B/libspikefield.a $(LIBS)
 
 fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each, FUZZ_JOBS=1 at a time; FUZZ=NAME chooses targets
 	@tests/fuzz/run.sh --installed $(CLANG)

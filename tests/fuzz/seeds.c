@@ -1,14 +1,18 @@
 /* Writes the first inputs of every fuzzing target: small valid files, made by the writers that the programs use.
  * usage: seeds FOLDER */
 #include "firmware/sf_blob.h"
+#include "firmware/sf_soc.h"
 #include "data_set.h"
 #include "fuzz.h"
+#include "sim/board/frame.h"
 #include "sim/soc/job.h"
 #include "tests/fx_tensorf_fixture.h"
 #include "base/io.h"
 #include "golden/manifest.h"
 #include "quant/quant.h"
+#include "sweep/sweep.h"
 #include "train/train.h"
+#include <elf.h>
 #include <png.h>
 #include <jpeglib.h>
 
@@ -327,6 +331,63 @@ static void put_layouts(void)
       "{\"file_path\":\"a.png\",\"transform_matrix\":[[1,0,0,1],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]}");
 }
 
+/* A program of one word, and memory behind it. */
+static void put_elf(void)
+{
+  struct {
+    Elf32_Ehdr head;
+    Elf32_Phdr segment;
+    uint32_t word;
+  } file = {.head = {.e_ident = ELFMAG,
+                     .e_type = ET_EXEC,
+                     .e_machine = EM_RISCV,
+                     .e_version = EV_CURRENT,
+                     .e_entry = SF_SOC_RAM,
+                     .e_phoff = sizeof(Elf32_Ehdr),
+                     .e_ehsize = sizeof(Elf32_Ehdr),
+                     .e_phentsize = sizeof(Elf32_Phdr),
+                     .e_phnum = 1},
+            .segment = {.p_type = PT_LOAD,
+                        .p_offset = sizeof(Elf32_Ehdr) + sizeof(Elf32_Phdr),
+                        .p_paddr = SF_SOC_RAM,
+                        .p_filesz = 4,
+                        .p_memsz = 64},
+            .word = 0x0000006f};
+  file.head.e_ident[EI_CLASS] = ELFCLASS32, file.head.e_ident[EI_DATA] = ELFDATA2LSB;
+  put("elf", "loop", &file, sizeof file);
+}
+
+static void put_frames(void)
+{
+  static const sf_frame frame[] = {{.number = 1, .command = 0x81, .words = 2, .word = {0x5346, 1}},
+                                   {.number = 2, .command = 0xee, .words = 1, .word = {0xdbc0}}};
+  uint8_t line[SF_FRAME_BYTES];
+  for (int i = 0; i < 2; i++) put("frame", i ? "refusal" : "answer", line, sf_frame_write(&frame[i], line));
+}
+
+static void put_technologies(void)
+{
+  put_text("technology", "small.tech",
+           "# prices\nname x\ntitle X, 1 V\nfp32_mac 4.6 pJ a\nfp32_add 0.9 pJ a\nint_add.8 0.03 pJ a\n"
+           "int_add.32 0.1 pJ a\nint_multiply.8 0.2 pJ a\nint_multiply.32 3.1 pJ a\nsram.8192 10 pJ a\n"
+           "sram.32768 20 pJ a\ndram 1.95 nJ a\nregister 1 pJ a\ntag_lookup 7 fJ a\n");
+}
+
+/* Two points, by their own writer. */
+static void put_sweep(void)
+{
+  sf_point point = {.name = "w8-t2", .model = "m.safetensors", .steps_max = 4};
+  for (int i = 0; i < SF_POINT_FIGURES; i++) point.figure[i] = 10 + i;
+  cJSON *json = sf_point_json(&point);
+  char *text = json ? cJSON_PrintUnformatted(json) : NULL, both[8192];
+  FUZZ_EXPECT(text);
+  snprintf(both, sizeof both, "%s\034%s", text, text);
+  put_text("sweep", "one", text);
+  put_text("sweep", "two", both);
+  free(text);
+  cJSON_Delete(json);
+}
+
 int main(int argc, char **argv)
 {
   if (argc != 2) return fprintf(stderr, "usage: seeds FOLDER\n"), 2;
@@ -341,5 +402,9 @@ int main(int argc, char **argv)
   put_models();
   put_scenes();
   put_layouts();
+  put_elf();
+  put_frames();
+  put_technologies();
+  put_sweep();
   return 0;
 }
