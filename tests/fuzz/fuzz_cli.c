@@ -8,7 +8,7 @@ enum { ARGUMENTS = 16 };
 /* These print and leave. */
 static bool asks_for_help(const char *word)
 {
-  return !strcmp(word, "-h") || !strcmp(word, "--help") || !strcmp(word, "--version");
+  return !strcmp(word, "-h") || !strcmp(word, "--help") || !strcmp(word, "--version") || !strcmp(word, "--completion");
 }
 
 static int split(char *text, char *argv[ARGUMENTS])

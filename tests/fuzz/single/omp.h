@@ -4,6 +4,7 @@
 typedef int omp_lock_t;
 #define omp_get_max_threads() 1
 #define omp_get_thread_num() 0
+#define omp_set_num_threads(threads) ((void)(threads))
 #define omp_init_lock(lock) ((void)(lock))
 #define omp_set_lock(lock) ((void)(lock))
 #define omp_unset_lock(lock) ((void)(lock))
