@@ -72,5 +72,5 @@ number() { # PROGRAM OPTION BAD...
 }
 
 good sf_scene simple -o d --size 16 --train 3 --test 2
-good sf_train d -o model.safetensors --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 --threads 1
+good sf_train d -o model.safetensors --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 good sf_export model.safetensors -o s.snn

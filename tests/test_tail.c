@@ -105,7 +105,7 @@ static double ray_length(const sf_train_options *o)
   return samples / rays;
 }
 
-LOOP_TEST(rays_end_sooner, 2)
+LOOP_TEST(rays_end_sooner, CK_AMOUNT(2, 0)) /* as a LONG_TEST */
 {
   sf_train_options o = solid_run();
   if (_i) o.config.net = SF_NET_ANN, o.config.steps = 1, o.fixed_steps = 0;

@@ -76,7 +76,8 @@ touch tty
 refuses "tty: no serial port" "a file for a port"
 
 # ---- a scene that does not fit, and what its message says to do
-"$build/bin/sf_train" data -o model.safetensors --stage1 2 --stage2 2 --steps 2 --hidden 32 --occ-res 16 --eval-views 1 --quiet >/dev/null 2>&1 || fail "no model"
+"$build/bin/sf_train" data -o model.safetensors --stage1 40 --stage2 60 --samples 1024 --lattice 64 --steps 2 --hidden 32 --occ-res 16 \
+  --eval-views 1 --quiet >/dev/null 2>&1 || fail "no model"
 "$build/bin/sf_export" model.safetensors -o large.snn >/dev/null || fail "no scene"
 begin
 scene=large.snn refuses "large.snn: its grid takes [0-9]* bytes, the board has 131072: room for the first [0-9]* of 16 levels; a scene that fits: sf_export MODEL -o SMALL.snn --fit --data DATA --fit-bytes 131072$" "a large scene"

@@ -17,7 +17,7 @@ data "cannot write" sf_data d --png absent/cameras.png
 # A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level.
 while read -r finest options; do
   # shellcheck disable=SC2086
-  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --threads 1 $options
+  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --lattice 128 --threads 1 $options
   check "sf_train $options" "finest level is not $finest" grep -q "finest level $finest," stdout.txt
 done <<'END'
 14 --base-res 2
@@ -47,7 +47,7 @@ good sim_render s.snn d -o x.exr --backend fixed --crop 7,7,2,2 --view 1
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --json --csv a.csv
 good energy_audit --published
 good energy_audit s.snn d --rays 20 --rtl-rays 1 --recount-rays 5 --steps 1 --tech 45nm
-good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_train d -o twin.safetensors --net ann --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 good sf_convert twin.safetensors d --rays 5 --json
 check sf_convert "squared error above the twin's" python3 -c 'import json
 r = json.load(open("stdout.txt"))
@@ -55,11 +55,11 @@ error = lambda row: 10 ** (-row["psnr"] / 10)
 assert all(abs(p["excess_squared_error"] - error(p) + error(r["twin"])) < 1e-12 for p in r["converted"])'
 for line in "prefixes 0.2 weighted" "paper 0 hybrid"; do
   read -r objective opaque mode <<<"$line"
-  good sf_train d -o objective.safetensors --objective $objective --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1 --json
+  good sf_train d -o objective.safetensors --objective $objective --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1 --json
   check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*$opaque," stdout.txt
   check "--objective $objective" "has other neurons" grep -Eq "\"mode\":[[:space:]]*\"$mode\"" stdout.txt
 done
-good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --threads 1
+good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 check "along.safetensors" "its cost" grep -q "mJ a view: [0-9]* samples, each with [0-9]* products and [0-9]* additions that spikes cause" stdout.txt
 data "along_ray" sf_export along.safetensors -o along.snn
 data "along_ray" sf_train d -o out --fine-tune along.safetensors --stage2 2
@@ -87,7 +87,7 @@ for split in train test; do
   echo '{"camera_angle_x": 0.7, "frames": [{"file_path": "./'$split'/r_0", "transform_matrix":
     [[0, 0, -1, 0], [-1, 0, 0, 0], [0, 1, 0, 2], [0, 0, 0, 1]]}]}' >away/transforms_$split.json
 done
-good sf_train away -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 --threads 1
+good sf_train away -o small.safetensors --scale 0.4 --stage1 2 --stage2 2 --hidden 16 --steps 3 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 good sf_export small.safetensors -o small.snn
 good sf_export small.safetensors -o fitted.snn --fit --data away --fit-rays 256 --traces small_traces --rays 4
 good sim_render small.snn away -o out
@@ -144,7 +144,7 @@ judge "interrupted at once: sf_train" sf_train 130 ""
 check "interrupted at once" "model lost" cmp -s before.safetensors early.safetensors
 
 # The evaluation after a training can be interrupted, too: its checkpoint is resumed to the evaluation alone.
-brief=(views -o stop.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8)
+brief=(views -o stop.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --lattice 128)
 interrupt "[ -s stop.safetensors ]" stdout.txt err "$BIN/sf_train" "${brief[@]}" --psnr-prefixes 30
 sed -i '/evaluation: view/d' err # progress lines
 judge "interrupted evaluation: sf_train" sf_train 130 "interrupted in the evaluation"
