@@ -93,6 +93,7 @@ task begin_run;
   begin
     if ($value$plusargs("stalls=%d", stalls) == 0) stalls = 20;
     if ($value$plusargs("seed=%d", seed) == 0) seed = SEED;
+    if ($value$plusargs("patience=%d", patience) == 0) patience = 100000;
     if ($value$plusargs("vcd=%s", wave) != 0) begin
 `ifdef SF_KIT_NO_WAVE
       $display("FAIL: +vcd: this simulation was built without waveforms (make verilator VCD=FILE builds another)");

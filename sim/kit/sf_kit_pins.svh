@@ -12,7 +12,7 @@ wire s_ready, m_valid, irq;
 
 always #5 clk = !clk;
 
-integer quiet = 0;  // cycles without a sign of life
+integer quiet = 0, patience;  // cycles without a sign of life, and how many end the run
 integer cycle = 0;
 task fail;
   begin

@@ -16,7 +16,6 @@
 
 module sf_kit_tb;
   `include "sf_kit_params.svh"
-  localparam integer PATIENCE = 100000;  // cycles without a sign of life
   localparam integer D1 = 0, D2 = 1, C1 = 2, C2 = 3, C3 = 4;
   localparam integer STEP_BEATS = SAMPLES * STEPS;
 
@@ -356,7 +355,7 @@ module sf_kit_tb;
     if (rst_n && !bus_busy) advance;
     if (rst_n) bus_cycle;
     rst_n <= cycle > 4;
-    if (quiet > PATIENCE) begin
+    if (quiet > patience) begin
       $display("DIFFERENCE no sign of life: %0d of %0d writes, %0d of %0d beats in, %0d of %0d results out", written,
                WRITES, sent, BEATS, received / 2, SAMPLES);
       fail;

@@ -18,7 +18,6 @@
 module sf_ray_kit_tb;
   `include "sf_kit_params.svh"
   `include "sf_kit_rays.svh"
-  localparam integer PATIENCE = 100000;  // cycles without a sign of life
   localparam integer ANSWERS = 64;       // requests that the memory keeps
 
   // ---- the kit
@@ -266,7 +265,7 @@ module sf_ray_kit_tb;
     if (rst_n) take_request;
     if (rst_n) give_line;
     rst_n <= cycle > 4;
-    if (quiet > PATIENCE) begin
+    if (quiet > patience) begin
       $display("DIFFERENCE no sign of life: %0d of %0d writes, %0d of %0d beats in, %0d of %0d pixels out", written, RAY_WRITES,
                sent, RAY_BEATS, received, RAYS);
       fail;

@@ -7,6 +7,7 @@ import subprocess
 from hdl_flow import Spent, Stop, digest, hash_of
 
 SHORT = 48  # samples of the kit that planted errors meet
+PATIENCE = "+patience=10000"  # a block that hangs ends the run; also in the run without errors, so none that is only slow
 TRAINING = ["--stage1", "20", "--stage2", "40", "--samples", "512", "--levels", "4", "--log2-hash", "10", "--finest-res", "32", "--lattice", "64",
             "--occ-res", "16", "--hidden", "32", "--steps", "3", "--quiet"]
 
@@ -75,7 +76,7 @@ def simulate(kit, simulator, sources, include, build, lanes, with_tap, quick, ar
     command += [f"LANES={lanes}"] if lanes else []
     command += [] if with_tap else ["TAP=0"]
     command += ["OPT=-O0"] if quick else []
-    command += ["ARGS=" + argument] if argument else []
+    command += [f"ARGS={PATIENCE} {argument}"]
     environment = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
     spent = Spent()
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
