@@ -20,7 +20,7 @@ $(FUZZ_TARGETS:%=$B/tests/fuzz/%): $B/tests/fuzz/%: $B/obj/tests/fuzz/fuzz_%.o $
 	$(call say,LD    $@)
 	$Q$(CC) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $B/libspikefield.a $(LIBS)
 
-# What reads these is in the harness.
+# Readers that are not in the library: the harness has them. seeds writes frames.
 $B/tests/fuzz/elf $B/bin/fuzz_elf: $B/obj/sim/soc/elf.o
 $B/tests/fuzz/frame $B/bin/fuzz_frame $B/tests/fuzz/seeds: $B/obj/sim/board/frame.o
 
