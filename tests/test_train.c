@@ -120,7 +120,7 @@ LOOP_TEST(the_lattice_settles, 2)
   }
   ck_assert_int_lt(seen, o.config.lattice);
   sf_steps rendered;
-  ck_ok(sf_steps_make(&rendered, &t->model.config, 1));
+  ck_ok(sf_march_steps(&rendered, &t->model, 1));
   ck_assert_int_eq(memcmp(&rendered, &t->intervals, sizeof rendered), 0);
 }
 

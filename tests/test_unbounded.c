@@ -41,38 +41,46 @@ TEST(boxes_that_steps_do_not_cross_are_refused)
 }
 
 /* Skipping finds the points that testing every point by the direct formula finds, in every cascade. */
+static void check_march(int bound, int res)
+{
+  sf_config c = large_config(bound, res);
+  if (bound == 8) c.dt_gamma = 0.125f; /* steps pass to coarser cells inside of fine ones */
+  sf_model m;
+  sf_steps steps;
+  int found = 0, in_cascade[7] = {0};
+  const size_t layer = (size_t)res * (size_t)res * (size_t)res;
+  ck_ok(sf_model_create(&m, &c));
+  for (uint64_t i = 0; i < 600; i++) {
+    float o[3], d[3], x[3], y[3];
+    if (i % 20 == 0) {
+      scatter(&m, i);
+      if (res > 16) empty_blocks(&m, i);
+      ck_ok(sf_march_steps(&steps, &m, 1));
+      ck_assert_int_eq(steps.blocks, res > 16); /* smaller ones reach into the next cascade */
+    }
+    draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
+    const sf_march march = sf_march_begin(&m, &steps, o, d, 0.5f);
+    int next = 0;
+    for (int n = 0; n < march.lattice.count; n++) {
+      sf_march_at(&march, n, x);
+      const size_t bit = direct_bit(&c, steps.cascade[n], x);
+      ck_assert_uint_lt(bit, sf_config_cells(&c));
+      if (!(m.occupancy[bit / 8] >> (bit % 8) & 1)) continue;
+      next = sf_march_next(&march, next, y);
+      ck_assert_int_eq(next, n);
+      ck_assert_mem_eq(x, y, sizeof x);
+      next++, found++, in_cascade[bit / layer]++;
+    }
+    ck_assert_int_eq(sf_march_next(&march, next, y), -1);
+  }
+  ck_assert_int_gt(found, 300);
+  for (int k = 0; k < sf_config_cascades(&c); k++) ck_assert_int_gt(in_cascade[k], 2);
+  sf_model_free(&m);
+}
 TEST(march_equals_testing_every_point)
 {
-  for (int bound = 2; bound <= 32; bound *= 4) {
-    sf_config c = large_config(bound, 16);
-    if (bound == 8) c.dt_gamma = 0.125f; /* steps pass to coarser cells inside of fine ones */
-    sf_model m;
-    sf_steps steps;
-    int found = 0, in_cascade[7] = {0};
-    ck_ok(sf_model_create(&m, &c));
-    ck_ok(sf_steps_make(&steps, &c, 1));
-    for (uint64_t i = 0; i < 600; i++) {
-      float o[3], d[3], x[3], y[3];
-      if (i % 20 == 0) scatter(&m, i);
-      draw_ray((int)(i / 4 % KINDS), i, (float)bound, o, d);
-      const sf_march march = sf_march_begin(&m, &steps, o, d, 0.5f);
-      int next = 0;
-      for (int n = 0; n < march.lattice.count; n++) {
-        sf_march_at(&march, n, x);
-        const size_t bit = direct_bit(&c, steps.cascade[n], x);
-        ck_assert_uint_lt(bit, sf_config_cells(&c));
-        if (!(m.occupancy[bit / 8] >> (bit % 8) & 1)) continue;
-        next = sf_march_next(&march, next, y);
-        ck_assert_int_eq(next, n);
-        ck_assert_mem_eq(x, y, sizeof x);
-        next++, found++, in_cascade[bit / (16 * 16 * 16)]++;
-      }
-      ck_assert_int_eq(sf_march_next(&march, next, y), -1);
-    }
-    ck_assert_int_gt(found, 300);
-    for (int k = 0; k < sf_config_cascades(&c); k++) ck_assert_int_gt(in_cascade[k], 5);
-    sf_model_free(&m);
-  }
+  for (int bound = 2; bound <= 32; bound *= 4)
+    for (int res = 16; res <= 64; res *= 2) check_march(bound, res);
 }
 
 /* Intervals neither overlap nor leave gaps, and stay in the box. */

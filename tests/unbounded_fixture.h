@@ -62,4 +62,14 @@ static inline void scatter(sf_model *m, uint64_t trial)
     m->occupancy[i] = (uint8_t)(sf_random_u64(3, trial, i) & sf_random_u64(4, trial, i) & sf_random_u64(5, trial, i));
 }
 
+/* Of the blocks of 8 x 8 x 8 cells some three in four become empty. */
+static inline void empty_blocks(sf_model *m, uint64_t trial)
+{
+  const size_t res = (size_t)m->config.occ_res, blocks = res / 8, bytes = sf_config_cells(&m->config) / 8;
+  for (size_t i = 0; i < bytes; i++) {
+    const size_t x = i % blocks, y = i / blocks % res / 8, z = i / blocks / res / 8;
+    if (sf_random_u64(6, trial, (z * blocks + y) * blocks + x) % 4) m->occupancy[i] = 0;
+  }
+}
+
 #endif

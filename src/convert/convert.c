@@ -96,7 +96,7 @@ static sf_status balance_on(sf_converted *net, const sf_dataset *views, int rays
                             sf_net_trace *trace, activations *a)
 {
   sf_steps steps;
-  SF_TRY(sf_steps_make(&steps, &net->model->config, 1));
+  SF_TRY(sf_march_steps(&steps, net->model, 1));
   for (int i = 0; i < rays; i++) {
     convert_ray ray;
     SF_TRY(convert_pick(views, seed, (uint64_t)i, &ray));

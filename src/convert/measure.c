@@ -80,7 +80,7 @@ sf_status sf_convert_measure(const sf_converted *net, const sf_dataset *views, i
                              const int *steps, sf_conversion *twin, sf_conversion *result)
 {
   sf_steps intervals;
-  SF_TRY(sf_steps_make(&intervals, &net->model->config, 1));
+  SF_TRY(sf_march_steps(&intervals, net->model, 1));
   convert_ray *ray = calloc((size_t)rays, sizeof *ray);
   way *w = calloc((size_t)rays, sizeof *w);
   sf_status status = ray && w ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for %d rays", rays);

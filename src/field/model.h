@@ -152,7 +152,8 @@ static inline bool sf_model_decodes(const sf_model *m)
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
 enum { SF_LATTICE_MIN = 16 };
-#define SF_STOP_MIN 1e-6 /* of stop: fixed point holds 2^-20 */
+enum { SF_BLOCK_BYTES = 7 * 32 * 32 * 32 / 8 }; /* 7 cascades of 256 cells an axis */
+#define SF_STOP_MIN 1e-6                        /* of stop: fixed point holds 2^-20 */
 #define SF_STOP_MAX 0.05
 #define SF_GAMMA_MAX 0.125f /* of dt_gamma */
 typedef struct sf_steps {
@@ -162,6 +163,8 @@ typedef struct sf_steps {
   bool growing;
   float start[SF_STEPS_MAX], length[SF_STEPS_MAX];
   uint8_t cascade[SF_STEPS_MAX]; /* the finest whose cells are longer than the interval */
+  bool blocks;                   /* block is known: sf_march_steps */
+  uint8_t block[SF_BLOCK_BYTES]; /* of 8 x 8 x 8 cells, in the order of the cells: one is occupied */
 } sf_steps;
 /* TensoRF: equal steps of sf_tensorf_step in the field's own box between its near and far distance.
  * SF_E_RANGE when SF_STEPS_MAX intervals do not reach across the box. */

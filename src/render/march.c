@@ -33,6 +33,26 @@ sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const fl
   return (sf_lattice){.first = enter + steps->shortest / 2, .count = intervals_within(steps, leave - enter)};
 }
 
+/* Cells of a block along an axis: those of one byte of the occupancy. */
+enum { BLOCK = 8 };
+
+sf_status sf_march_steps(sf_steps *steps, const sf_model *model, int stride)
+{
+  const int res = model->config.occ_res, blocks = res / BLOCK, layers = sf_config_cascades(&model->config) * res;
+  SF_TRY(sf_steps_make(steps, &model->config, stride));
+  if (layers > res && res < 4 * BLOCK) return sf_ok(); /* a block could reach into the finer cascade */
+  const uint8_t *cells = model->occupancy;
+  for (int z = 0; z < layers; z++)
+    for (int y = 0; y < res; y++)
+      for (int x = 0; x < blocks; x++)
+        if (*cells++) {
+          const int bit = (z / BLOCK * blocks + y / BLOCK) * blocks + x;
+          steps->block[bit / 8] |= (uint8_t)(1u << bit % 8);
+        }
+  steps->blocks = true;
+  return sf_ok();
+}
+
 sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const float origin[3], const float direction[3],
                         float jitter)
 {
@@ -83,14 +103,14 @@ static inline cell find_cell(const sf_march *m, int least, const float x[3])
   return c;
 }
 
-/* Distance from x to where the ray leaves the cell. */
-static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
+/* Distance from x to where the ray leaves the cell, or with size = BLOCK its block. */
+static inline float to_exit(const sf_march *m, const cell *c, int size, const float x[3])
 {
   const int fine = m->res << (m->cascades - 1);
   const float share = 1.0f / (float)fine;
   float ahead = INFINITY;
   for (int a = 0; a < 3; a++) {
-    const int place = c->place[a] + (m->direction[a] > 0) - m->res / 2;
+    const int place = (c->place[a] & -size) + (m->direction[a] > 0 ? size : 0) - m->res / 2;
     const float face = (float)(place * (1 << c->cascade) + fine / 2) * share;
     const float exit = m->way[a] == 0 ? INFINITY : (face - x[a]) * m->way[a];
     ahead = exit < ahead ? exit : ahead;
@@ -98,7 +118,15 @@ static inline float to_exit(const sf_march *m, const cell *c, const float x[3])
   return ahead;
 }
 
-/* The first point from n on that is not in the cell, whose exit is `ahead`. */
+static inline bool is_block_empty(const sf_march *m, const cell *c)
+{
+  const int blocks = m->res / BLOCK;
+  const int bit =
+      ((c->cascade * blocks + c->place[2] / BLOCK) * blocks + c->place[1] / BLOCK) * blocks + c->place[0] / BLOCK;
+  return !(m->steps->block[bit / 8] >> bit % 8 & 1);
+}
+
+/* The first point from n on that is not in the cell or block, whose exit is `ahead`. */
 static inline int skip(const sf_march *m, int n, float ahead)
 {
   const sf_steps *s = m->steps;
@@ -121,7 +149,7 @@ int sf_march_next(const sf_march *m, int n, float x[3])
     const cell c = find_cell(m, m->steps->cascade[n], x);
     const size_t bit = (((size_t)c.cascade * m->res + c.place[2]) * m->res + c.place[1]) * m->res + c.place[0];
     if (m->occupancy[bit / 8] >> (bit % 8) & 1) return n;
-    n = skip(m, n, to_exit(m, &c, x));
+    n = skip(m, n, to_exit(m, &c, m->steps->blocks && is_block_empty(m, &c) ? BLOCK : 1, x));
   }
   return -1;
 }

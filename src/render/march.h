@@ -14,6 +14,10 @@ typedef struct sf_march {
   float stop; /* it ends where less light is left */
 } sf_march;
 
+/* sf_steps_make, and where the model is empty: marches skip blocks of 8 x 8 x 8 empty cells. They find the same points
+ * as with the intervals of sf_steps_make alone. To be called again when the occupancy has changed. */
+sf_status sf_march_steps(sf_steps *steps, const sf_model *model, int stride);
+
 /* jitter in [0,1) places the samples inside their interval (0.5 = centre). */
 sf_march sf_march_begin(const sf_model *model, const sf_steps *steps, const float origin[3], const float direction[3],
                         float jitter);

@@ -159,7 +159,7 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
   if (sf_model_decodes(model)) /* its weights are known before it decodes */
     return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, events);
   sf_steps intervals;
-  SF_TRY(sf_steps_make(&intervals, &model->config, 1));
+  SF_TRY(sf_march_steps(&intervals, model, 1));
   sf_net_words *net = sf_aligned_alloc(sizeof *net);
   if (!net) return sf_fail(SF_E_MEMORY, "render: no memory for the weights");
   const sf_net_view view = sf_net_view_of(model);

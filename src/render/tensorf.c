@@ -114,7 +114,7 @@ static worker *worker_create(const sf_model *model, const sf_decoder_words *deco
     worker_free(w);
     return NULL;
   }
-  if (sf_steps_make(&w->intervals, &model->config, 1).code) {
+  if (sf_march_steps(&w->intervals, model, 1).code) {
     worker_free(w);
     return NULL;
   }

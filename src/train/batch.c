@@ -173,7 +173,7 @@ sf_status sf_batch_draw(sf_trainer *t)
   sf_march *march = malloc((size_t)t->rays * sizeof *march);
   if (!march) return sf_ranks_agree(t->options.ranks, sf_fail(SF_E_MEMORY, "train: no memory for %d rays", t->rays));
   b->rays = t->rays;
-  sf_status status = sf_steps_make(&t->intervals, &t->model.config, t->stride);
+  sf_status status = sf_march_steps(&t->intervals, &t->model, t->stride);
 #pragma omp parallel for schedule(dynamic, 64)
   for (int r = 0; r < b->rays; r++) {
     sf_ray *ray = &b->ray[r];

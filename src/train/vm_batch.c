@@ -77,7 +77,7 @@ sf_status sf_vm_draw(sf_trainer *t)
   vm->density = sf_vm_field_of(&seen, false);
   vm->appearance = sf_vm_field_of(&seen, true);
   b->rays = t->rays;
-  SF_TRY(sf_steps_make(&t->intervals, &t->model.config, t->stride));
+  SF_TRY(sf_march_steps(&t->intervals, &t->model, t->stride));
   int first, end;
   sf_share_parts(t, &first, &end);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
