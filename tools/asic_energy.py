@@ -17,7 +17,7 @@ import sys
 import time
 
 from asic import bench, defaults, energy, liberty, netlist, pieces, record, tech
-from hdl_flow import Stop, digest, hash_of, run, sources_of, write
+from hdl_flow import Stop, alone, digest, hash_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 CLOCK = "sf_top.clk_i"
@@ -90,6 +90,7 @@ class Work:
             raise Stop(f"{arguments.liberty}: its name ('{self.library.name}') tells no feature size; say it, e.g. NODE=65 (--node 65)", 2)
         self.name = arguments.name or tech.name_of(self.library.name)
         self.folder = os.path.join(self.build, "asic", self.name)
+        alone(os.path.join(self.build, "asic"))
         os.makedirs(self.folder, exist_ok=True)
 
     def say(self, text):

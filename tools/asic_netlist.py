@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 from asic import defaults, flow, liberty, netlist, tech
-from hdl_flow import Spent, Stop, digest, hash_of, module_of, run, sources_of, write
+from hdl_flow import Spent, Stop, alone, digest, hash_of, module_of, run, sources_of, write
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = "sf_ray_top:TAP=0,MACS=64,NEURONS=8,PLANES=0"
@@ -61,6 +61,7 @@ class Work:
         if not any(cell.get("area") and float(cell.get("area")) > 0 for cell in self.library.cells.values()):
             self.library.fail(self.library.top, "no cell has an area")
         self.name = arguments.name or tech.name_of(self.library.name)
+        alone(os.path.join(os.path.abspath(arguments.build), "asic", self.name, "netlist"))
         self.period_ps = round(1e6 / arguments.clock)
         self.skipped = arguments.skip or defaults.SKIPPED
         own_gate = any(cell.get("clock_gating_integrated_cell") == "latch_posedge" for cell in self.library.cells.values())

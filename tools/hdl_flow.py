@@ -1,4 +1,5 @@
-"""What the targets that take the RTL through other tools share: fpga.py, asic_energy.py, asic_netlist.py."""
+"""What the targets that take the RTL through other tools share: fpga.py, asic_energy.py, asic_netlist.py, netlist_check.py, board.py."""
+import fcntl
 import hashlib
 import os
 import sys
@@ -26,6 +27,19 @@ def run(program, main, errors=()):
     except KeyboardInterrupt:
         print(f"{program}: interrupted; what is finished is kept", file=sys.stderr)
         sys.exit(130)
+
+
+_locks = []
+
+
+def alone(folder):
+    """Makes the folder if need be. Until this program ends no other one that asks for the same folder gets it: that raises Stop."""
+    os.makedirs(folder, exist_ok=True)
+    _locks.append(open(os.path.join(folder, "lock"), "w", encoding="utf-8"))
+    try:
+        fcntl.flock(_locks[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise Stop(f"another run is at work in {folder}: wait for it, or take another build folder (make B=FOLDER ...)") from None
 
 
 class Spent:

@@ -13,7 +13,7 @@ import sys
 from asic import defaults, liberty
 from asic.flow import FlowError
 from asic.netlist import NetlistError
-from hdl_flow import Spent, Stop, digest, run, sources_of, write
+from hdl_flow import Spent, Stop, alone, digest, run, sources_of, write
 from netlist import kit, mapped, models, plant, shell
 
 TOP = "sf_top"
@@ -70,7 +70,7 @@ class Work:
         self.folder = os.path.join(os.path.abspath(arguments.build), "netlist")
         self.programs = os.path.join(os.path.abspath(arguments.build), "bin")
         self.sources = sources_of(self.root)
-        os.makedirs(self.folder, exist_ok=True)
+        alone(self.folder)
 
     def say(self, text):
         if not self.arguments.quiet:

@@ -92,6 +92,8 @@ done
 (cd "$folder/handover" && LIBERTY=$OLDPWD/tests/asic/tiny.lib sta -exit timing.tcl </dev/null >"$work/sta.log" 2>&1) || fail "the handover's timing.tcl"
 grep -q "slack (MET)" "$work/sta.log" || fail "the handover's timing.tcl reports no path"
 asic "${tiny[@]}" >/dev/null && grep -q "kept" "$work/said.log" || fail "a finished build is not kept"
+flock "$work/asic/tiny/netlist/lock" python3 tools/asic_netlist.py "$work" --rtl "$work/tree" "${tiny[@]}" >/dev/null 2>"$work/said.log" && fail "two at once in one folder"
+grep -q "asic: another run is at work in $work/asic/tiny/netlist: wait" "$work/said.log" || fail "two at once: $(cat "$work/said.log")"
 status=0
 asic "${tiny[@]}" --clock 2000 >"$work/table.md" || status=$?
 [ $status -eq 0 ] || fail "0.075 ns do not meet 2 GHz"

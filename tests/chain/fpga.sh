@@ -63,6 +63,9 @@ fpga --modules "sf_probe:N=3" >"$work/table.md" || status=$?
 if [ $status -eq 77 ]; then echo "skipped: $(tail -n 2 "$work/said.log" | head -n 1)"; exit 77; fi
 [ $status -eq 0 ] || fail "sf_probe is not placed and routed"
 name=sf_probe-N-3
+flock "$work/fpga/lock" python3 tools/fpga.py "$work" --debian --venv "$build/fpga/venv" --rtl "$work/tree" --modules sf_probe:N=3 >/dev/null 2>"$work/said.log" &&
+  fail "two at once in one folder"
+grep -q "fpga: another run is at work in $work/fpga: wait" "$work/said.log" || fail "two at once: $(cat "$work/said.log")"
 [ "$(field $name 'r["multipliers"], r["block_rams"]')" = "2 3" ] || fail "2 products and 3 block RAMs became $(field $name 'r["multipliers"], r["block_rams"]')"
 # sum, both products; the wrapper's 74 inputs and 224 outputs, its reset; the rows lie in the RAM's own registers.
 [ "$(field $name 'r["wrapper_bits"]')" -eq 298 ] || fail "the wrapper has $(field $name 'r["wrapper_bits"]') flip-flops"

@@ -27,6 +27,9 @@ for cells in "ecp5 --plant 2" "liberty --liberty tests/asic/tiny.lib --plant 1";
   expect "$cells: where" 'all("DIFFERENCE sample 0 layer" in e["said"] and " neuron " in e["said"] for e in r["planted"])'
 done
 
+flock "$work/netlist/lock" python3 tools/netlist_check.py "$work" --debian --modules sf_plif >/dev/null 2>"$work/said.log" && fail "two at once in one folder"
+grep -q "netlist: another run is at work in $work/netlist: wait" "$work/said.log" || fail "two at once: $(cat "$work/said.log")"
+
 # A register that holds or adds to what it has is not drawn while there are others: its inverse may undo itself.
 python3 - "$work/netlist/ecp5/sf_plif" <<'PYTHON' || fail "which registers get an error"
 import json, os, sys
