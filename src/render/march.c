@@ -34,21 +34,25 @@ sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const fl
 }
 
 /* Cells of a block along an axis: those of one byte of the occupancy. */
-enum { BLOCK = 8 };
+enum { BLOCK = 8, BLOCKS_MOST = 32 };
 
 sf_status sf_march_steps(sf_steps *steps, const sf_model *model, int stride)
 {
   const int res = model->config.occ_res, blocks = res / BLOCK, layers = sf_config_cascades(&model->config) * res;
   SF_TRY(sf_steps_make(steps, &model->config, stride));
   if (layers > res && res < 4 * BLOCK) return sf_ok(); /* a block could reach into the finer cascade */
-  const uint8_t *cells = model->occupancy;
-  for (int z = 0; z < layers; z++)
-    for (int y = 0; y < res; y++)
+  for (int z = 0; z < layers / BLOCK; z++)
+    for (int y = 0; y < blocks; y++) {
+      uint8_t any[BLOCKS_MOST] = {0};
+      for (int row = 0; row < BLOCK * BLOCK; row++) {
+        const int cell_z = z * BLOCK + row / BLOCK, cell_y = y * BLOCK + row % BLOCK;
+        const uint8_t *cells = model->occupancy + ((size_t)cell_z * res + cell_y) * blocks;
+        for (int x = 0; x < blocks; x++) any[x] |= cells[x];
+      }
+      const int first = (z * blocks + y) * blocks;
       for (int x = 0; x < blocks; x++)
-        if (*cells++) {
-          const int bit = (z / BLOCK * blocks + y / BLOCK) * blocks + x;
-          steps->block[bit / 8] |= (uint8_t)(1u << bit % 8);
-        }
+        if (any[x]) steps->block[(first + x) / 8] |= (uint8_t)(1u << (first + x) % 8);
+    }
   steps->blocks = true;
   return sf_ok();
 }
