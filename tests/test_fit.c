@@ -131,7 +131,7 @@ TEST(the_bound_is_kept)
   fit_within_a_bound(&scene, &loaded);
 }
 
-TEST(threads_do_not_matter)
+LONG_TEST(threads_do_not_matter)
 {
   OWNED(fx_scene) scene = small_scene(18, FX_HYBRID);
   fit_by_any_threads(&scene);

@@ -22,7 +22,7 @@ TEST(the_bound_is_kept)
   ck_assert_int_eq(r.before.entries, fx_tensorf_bytes(&scene.tensorf) - 27 * FX_APPEARANCE_MAX);
 }
 
-TEST(threads_do_not_matter)
+LONG_TEST(threads_do_not_matter)
 {
   OWNED(fx_scene) scene = planes_scene(22);
   fit_by_any_threads(&scene);
@@ -112,7 +112,7 @@ TEST(interruptions)
   const sf_fit_rays tiles = tiles_of(&rays);
   sf_fit_report r;
   ck_ok(fit(candidate, 1, &rays, 0.1, &first, &r));
-  for (int after = 1; after < 300; after += 23) {
+  for (int after = 1; after < 300; after += CK_AMOUNT(23, 61)) {
     int left = after;
     sf_fit_job job = fit_job(candidate, 1, &rays, &tiles, 0.1);
     job.tick = stop_later, job.user = &left;

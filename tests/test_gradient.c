@@ -228,7 +228,7 @@ static sf_loss_plan plan_full(void)
 static void check_terms(rig *r)
 {
   char what[32];
-  for (int t = 1; t <= STEPS; t++) {
+  for (int t = CK_AMOUNT(1, STEPS); t <= STEPS; t++) {
     sf_loss_plan one = {.steps = t}, of_all = plan_full();
     one.weight[t - 1] = 1;
     snprintf(what, sizeof what, "prefix %d alone", t);
