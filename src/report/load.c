@@ -199,6 +199,7 @@ static sf_status load_scene(sf_reproduction *r, const char *name)
   sf_report_scene *scene = &list[r->count++];
   memset(scene, 0, sizeof *scene);
   snprintf(scene->name, sizeof scene->name, "%s", name);
+  SF_TRY(read_text(r, dir, "kind", &scene->kind));
   return load_seeds(r, scene, dir);
 }
 
@@ -241,7 +242,7 @@ void sf_reproduction_free(sf_reproduction *r)
   for (int s = 0; s < r->count; s++) {
     for (int k = 0; k < r->scene[s].seeds; k++)
       for (int i = 0; i < SF_RUNS; i++) free_run(&r->scene[s].of[k].run[i]);
-    free(r->scene[s].of);
+    free(r->scene[s].of), free(r->scene[s].kind);
   }
   for (int i = 0; i < r->problems; i++) free(r->problem[i]);
   free(r->scene), free(r->problem);

@@ -2,6 +2,7 @@
 #include "report/internal.h"
 #include "base/json.h"
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* ---- beside the twin ---- */
@@ -68,17 +69,21 @@ static void pool_run(sf_report_scene *scene, int id)
 
 /* ---- groups ---- */
 
-/* Data and field; runs that do not say it are of the first group, as all of profile quick are. */
+/* By data and field, as a summary says or, while no run has one, the scene's folder; where nothing does, the first
+ * group, as all of profile quick are. */
 static int group_of(const sf_report_scene *scene)
 {
-  const cJSON *summary = NULL;
-  for (int run = SF_RUN_ANN; run < SF_RUNS && !summary; run++)
-    if (sf_json_text(scene->run[run].summary, "backbone")) summary = scene->run[run].summary;
-  if (!summary) return 0;
+  char kind[2][32] = {"", ""};
+  const char *layout = kind[0], *backbone = NULL;
+  for (int run = SF_RUN_ANN; run < SF_RUNS && !backbone; run++) {
+    backbone = sf_json_text(scene->run[run].summary, "backbone");
+    if (backbone) layout = sf_json_text(scene->run[run].summary, "layout");
+  }
+  if (!backbone && scene->kind && sscanf(scene->kind, "%31s %31s", kind[0], kind[1]) == 2) backbone = kind[1];
+  if (!backbone) return 0;
   for (int i = 0; i < SF_GROUPS; i++) {
     const sf_paper_group *g = &sf_paper_groups[i];
-    if (sf_json_says(summary, "backbone", g->backbone) && (!g->layout || sf_json_says(summary, "layout", g->layout)))
-      return i;
+    if (!strcmp(backbone, g->backbone) && (!g->layout || (layout && !strcmp(layout, g->layout)))) return i;
   }
   return SF_PAPER_GROUPS;
 }

@@ -94,6 +94,7 @@ typedef struct sf_seed_runs {
 
 typedef struct sf_report_scene {
   char name[256];
+  char *kind;          /* "LAYOUT BACKBONE", from the file `kind`; NULL: not there; owned */
   int group;           /* of sf_paper_groups */
   int seeds;           /* folders of seeds, the scene's own first */
   sf_seed_runs *of;    /* owned */
