@@ -63,7 +63,7 @@ plan_unit() { # BACKBONE LAYOUT SEED
   unit_data+=("$data") unit_frames+=("$frames") unit_scene+=("$scene") unit_backbone+=("$1") unit_seed+=("$3")
   unit_runs+=("$runs")
   mkdir -p "$out/$scene" || exit 1
-  [ "$1" = - ] || echo "$2 $1" >"$out/$scene/kind" # for the report, where no run gets as far as to say it
+  [ "$1" = - ] || echo "$2 $1" >"$out/$key/kind" # for the report, where no run gets as far as to say it
   for run in $runs; do
     number_of[$scene/$run]=$total
     run_name+=("$run") run_unit+=($((${#unit_scene[@]} - 1))) lock_of+=("$out/$scene/.$run.lock")

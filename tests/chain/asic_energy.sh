@@ -92,4 +92,7 @@ refused 2 "'tiny'. tells no feature size; say it" --liberty "$here/tiny.lib"
 refused 1 "nothing.lib: not there" --liberty "$work/nothing.lib"
 refused 2 "none of 'nothing' is one of" "${plain[@]}" --blocks nothing
 refused 2 "at least 512" "${plain[@]}" --cycles 100
+exec 9>"$work/build/asic/lock" && flock 9
+refused 1 "another run is at work in $work/build/asic: wait for it" "${plain[@]}" --blocks add8
+exec 9>&-
 finish "asic_energy: energies are those made by hand, netlists compute what the RTL did, errors name their cause"

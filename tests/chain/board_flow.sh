@@ -50,6 +50,9 @@ if [ $status -eq 77 ]; then echo "skipped: $(tail -n 2 "$work/said.log" | head -
 grep -q "clock 50 MHz, [0-9.]* MHz after routing" "$work/out.log" || fail "the frequency is not said"
 grep -q "put it on the board: load it .*small.bit" "$work/out.log" || fail "the command is not said"
 board small && ! grep -q "took" "$work/said.log" || fail "a finished run is not kept"
+exec 9>"$work/board/small/lock" && flock 9
+refused 1 "board: another run is at work in $work/board/small: wait for it" small
+exec 9>&-
 rm "$work/board/small/small.bit"
 sed -i 's/CLKOP_DIV       (12)/CLKOP_DIV       (2)/; s/CLKOP_CPHASE    (5)/CLKOP_CPHASE    (1)/; s/CLKFB_DIV       (2)/CLKFB_DIV       (14)/; s/sum_q \* sum_q/sum_q * sum_q * sum_q/' "$own/small.sv"
 describe 25k 350

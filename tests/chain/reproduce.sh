@@ -193,10 +193,13 @@ grep -Eq '^textured-tensorf,samples of a ray as steps,1 a sample,' "$out/tables/
 grep -Eq '^textured-tensorf,.*twin converted, no training.*,256,' "$out/tables/comparators.csv" || fail "comparators: no converted planes"
 echo "comparators: planes"
 
-# Runs that fail before they say of what kind the scene is.
-"$script" "$work/part" --profile paper --scenes "$data" --backbones tensorf --betas 5e-7 --probe 0 --train '--nosuch' >"$work/out" 2>&1 && fail "runs with a wrong option: success"
-[ "$(count 'FAILED (2): ')" -ge 2 ] && [ "$(count '^## Averages over the scenes')" -eq 1 ] && [ "$(count '^## Averages over the scenes: TensoRF, Synthetic')" -eq 1 ] ||
-  { cat "$work/out"; fail "failed runs are not of TensoRF"; }
+# Runs that fail before they say of what kind the scene is: a scene without any other run.
+cp -r "$data" "$work/failing"
+"$script" "$work/part" --profile paper --scenes "$work/failing" --backbones tensorf --betas 5e-7 --probe 0 --train '--nosuch' >"$work/out" 2>&1 &&
+  fail "runs with a wrong option: success"
+[ "$(count 'failing-tensorf .*FAILED (2): ')" -ge 2 ] || { cat "$work/out"; fail "a wrong option: not both runs failed"; }
+[ "$(count '^## Averages over the scenes')" -eq 1 ] && [ "$(count '^## Averages over the scenes: TensoRF, Synthetic')" -eq 1 ] ||
+  fail "failed runs are of another kind: $(grep '^## Averages' "$work/out")"
 echo "failed: of the scene's kind"
 
 for bad in "--profile fast" "--stage1 x" "--audit-views 0" "--steps 9" "--nosuch 1" "--stage1" "--prefix-runs some" "--minutes 3" \
