@@ -222,13 +222,13 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
                        gj + a * B, w->leak[4]);
   for (int i = 0; i < 3 * B && !weighted; i++) gj[i] *= c[i] * (1.0f - c[i]);
   add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, activations(net, 2, x->m4[t], w), hidden);
-  const bool events = !net->relu && few_spikes(x->s3[t], hidden, dense_backward);
+  const bool events = by_spikes(net, x->s3[t], BACKWARD);
   layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[t],
                  (backward_out){fired(net, 2, w), w->g4, w->leak[3], sum, events ? floats(lanes) : NULL, w->rows,
                                 events ? NULL : lanes});
   if (events) {
     transpose(operands(lanes), hidden, B, words(w->t), hidden);
-    event_outer(grad->w4t, hidden, x->s3[t], floats(w->t));
+    spike_outer(grad->w4t, hidden, hidden, x->s3[t], floats(w->t));
   } else
     add_outer(grad->w4, hidden, operands(lanes), hidden, activations(net, 1, x->m3[t], w), hidden);
 }
@@ -292,8 +292,14 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
                        w->leak[1]);
     colour_backward(n, x, t, gcolour, gi, grad, w);
     for (int l = 0; l < B; l++) gi[l] = weighted ? ge[l] : ge[l] * exp_slope(x->i[t][l]);
-    add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT, activations(net, 0, x->m1[t], w),
-              hidden);
+    if (looked_up(net)) {
+      uint64_t fired[SF_LANES];
+      layer_spikes(net, 0, x->m1[t], fired);
+      transpose(operands(gi), SF_DENSITY_OUT, B, words(w->t), SF_DENSITY_OUT);
+      spike_outer(grad->w2t, hidden, SF_DENSITY_OUT, fired, floats(w->t));
+    } else
+      add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT,
+                activations(net, 0, x->m1[t], w), hidden);
     layer_backward(net, 0, net->k[0], t, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gi, SF_DENSITY_OUT, small), x->m1[t],
                    (backward_out){fired(net, 0, w), w->g1, w->leak[0], w->sum1, NULL, NULL, NULL});
   }

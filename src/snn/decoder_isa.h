@@ -133,16 +133,13 @@ static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int 
 {
   const sf_net_words *net = &n->net;
   const sf_net_view *v = &net->view;
-  const int pairs = v->hidden / PAIR;
   sf_block *x = &d->net;
   tiles_begin();
   decoder_inputs(n, d, w);
   for (int t = 0; t < steps; t++) {
-    const int at = slot(t, keep), before = slot(t - 1, keep);
-    layer(v, 1, v->k[2], t, NULL, 0, NULL, w->sum3, t ? x->m3[before] : NULL, x->m3[at], words(w->spikes));
-    colour_layer_2(net, x, t, at, before, n->b2, w);
-    gemm(operands(net->w5), pairs, 4, pairs, words(w->rows), B, B, n->b3, B, x->j[t], B);
-    read_colour(v, t, x);
+    layer(v, 1, v->k[2], t, NULL, 0, NULL, w->sum3, t ? x->m3[slot(t - 1, keep)] : NULL, x->m3[slot(t, keep)],
+          looked_up(v) ? NULL : words(w->spikes));
+    after_colour_1(net, x, t, steps, keep, n->b2, n->b3, w);
   }
   tiles_end();
 }

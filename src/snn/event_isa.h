@@ -1,38 +1,11 @@
-/* Event-driven products: a few spikes add rows, where a dense product would multiply by zeros.
+/* Products with spikes in builds for AVX-512: a few spikes add rows, where a dense product would multiply by zeros.
  * Included by kernels_isa.c only. */
 #ifndef SF_SNN_EVENT_ISA_H
 #define SF_SNN_EVENT_ISA_H
-#include "snn/words_isa.h"
+#include "snn/bits_isa.h"
+#include "snn/kernels.h"
 
-/* Bit l: x[l] >= theta. */
-static inline uint64_t spike_bits(const float *x, float theta)
-{
-  uint64_t bits = 0;
-#if defined(__AVX512F__)
-  for (int i = 0; i < 4; i++)
-    bits |= (uint64_t)_mm512_cmp_ps_mask(_mm512_loadu_ps(x + 16 * i), _mm512_set1_ps(theta), _CMP_GE_OQ) << 16 * i;
-#elif defined(__AVX2__)
-  for (int i = 0; i < 8; i++)
-    bits |= (uint64_t)_mm256_movemask_ps(_mm256_cmp_ps(_mm256_loadu_ps(x + 8 * i), _mm256_set1_ps(theta), _CMP_GE_OQ))
-            << 8 * i;
-#else
-  for (int i = 0; i < 64; i++) bits |= (uint64_t)(x[i] >= theta) << i;
-#endif
-  return bits;
-}
-
-/* 64 x 64 bits, in place (Warren, Hacker's Delight, 7-3). */
-static void transpose_bits(uint64_t a[64])
-{
-  uint64_t low = 0x00000000FFFFFFFFu;
-  for (int j = 32; j; j >>= 1, low ^= low << j)
-    for (int k = 0; k < 64; k += 2 * j)
-      for (int i = k; i < k + j; i++) {
-        const uint64_t t = (a[i] >> j ^ a[i + j]) & low;
-        a[i] ^= t << j;
-        a[i + j] ^= t;
-      }
-}
+enum { LOOKUP = 0 };
 
 /* The smallest type that counts the neurons of a layer, and a row of zeros. */
 typedef __typeof__(__builtin_choose_expr(SF_LANES <= UINT8_MAX, (uint8_t)0, (uint16_t)0)) row_index;
@@ -60,16 +33,27 @@ static inline int list_bits(uint64_t bits, uint8_t offset, row_index *list)
 
 /* Above these shares of neurons firing in a block, the dense products are faster (measured: make bench). */
 #if defined(SF_AMX)
-static const float dense_forward = 0, dense_backward = 0;
+static const float dense_from[] = {0, 0};
 #else
-static const float dense_forward = 0.25f, dense_backward = 0.45f;
+static const float dense_from[] = {0.25f, 0.45f};
 #endif
 
-static bool few_spikes(const uint64_t *spikes, int rows, float share)
+static bool by_spikes(const sf_net_view *net, const uint64_t *spikes, direction pass)
 {
   int count = 0;
-  for (int r = 0; r < rows; r++) count += __builtin_popcountll(spikes[r]);
-  return (float)count < share * (float)(rows * B);
+  for (int r = 0; r < net->hidden; r++) count += __builtin_popcountll(spikes[r]);
+  return !net->relu && (float)count < dense_from[pass] * (float)(net->hidden * SF_BLOCK);
+}
+
+/* rows[count][columns] (stride ld) as the operands' values [columns / 64][count + 1][64], the last row of a slice zero.
+ * A slice fits the first-level cache and leaves room there. */
+static void prepare_spikes(const float *rows, int ld, int count, int columns, float *slices)
+{
+  for (int c = 0; c < columns; c += 64, slices += (count + 1) * 64) {
+    memset(slices, 0, (size_t)(count + 1) * 64 * sizeof *slices);
+    for (int r = 0; r < count; r++)
+      for (int i = 0; i < 64 && c + i < columns; i++) slices[r * 64 + i] = operand(rows[r * ld + c + i]);
+  }
 }
 
 /* out[V*VL] = sum of the listed rows; pairs of rows, the list ends with a row of zeros where needed. */
@@ -91,24 +75,36 @@ static inline __attribute__((always_inline)) void add_rows(int V, const float *r
   for (int v = 0; v < V; v++) *(vf *)(out + v * VL) = a[v] + b[v];
 }
 
-/* Event-driven product: per lane, the rows of the neurons that fire are added. slice[..][hidden + 1][64], the last row
- * zero; spikes[hidden]; out[B][hidden]. A slice fits the first-level cache and leaves room there. */
-static void event_current(const float slice[][(SF_LANES + 1) * 64], int hidden, const uint64_t *spikes, float *out)
+/* out[SF_BLOCK][columns] = spikes x the rows of prepare_spikes: per lane, those of the neurons that fire are added. */
+static void spike_current(const float *slices, int rows, int columns, const uint64_t *spikes, float *out)
 {
-  row_index list[B][SF_LANES + 64];
-  int count[B] = {0};
-  for (int first = 0; first < hidden; first += 64) {
+  row_index list[SF_BLOCK][SF_LANES + 64];
+  int count[SF_BLOCK] = {0};
+  for (int first = 0; first < rows; first += 64) {
     uint64_t bits[64] = {0};
-    memcpy(bits, spikes + first, (size_t)(hidden - first < 64 ? hidden - first : 64) * sizeof *bits);
+    memcpy(bits, spikes + first, (size_t)(rows - first < 64 ? rows - first : 64) * sizeof *bits);
     transpose_bits(bits);
-    for (int l = 0; l < B; l++) count[l] += list_bits(bits[l], (uint8_t)first, list[l] + count[l]);
+    for (int l = 0; l < SF_BLOCK; l++) count[l] += list_bits(bits[l], (uint8_t)first, list[l] + count[l]);
   }
-  for (int l = 0; l < B; l++) list[l][count[l]] = (row_index)hidden;
+  for (int l = 0; l < SF_BLOCK; l++) list[l][count[l]] = (row_index)rows;
   int c = 0;
-  for (; c + 4 * VL <= hidden; c += 4 * VL)
-    for (int l = 0; l < B; l++) add_rows(4, slice[c / 64] + c % 64, 64, list[l], count[l], out + l * hidden + c);
-  for (; c < hidden; c += VL)
-    for (int l = 0; l < B; l++) add_rows(1, slice[c / 64] + c % 64, 64, list[l], count[l], out + l * hidden + c);
+  for (; c + 4 * VL <= columns; c += 4 * VL)
+    for (int l = 0; l < SF_BLOCK; l++)
+      add_rows(4, slices + c / 64 * (rows + 1) * 64 + c % 64, 64, list[l], count[l], out + l * columns + c);
+  for (; c < columns; c += VL)
+    for (int l = 0; l < SF_BLOCK; l++)
+      add_rows(1, slices + c / 64 * (rows + 1) * 64 + c % 64, 64, list[l], count[l], out + l * columns + c);
+}
+
+/* out[steps][columns][SF_BLOCK] = the rows of prepare_spikes x spikes[steps][SF_LANES], a bit per lane. */
+static void spike_currents(const float *slices, int rows, int columns, int steps, uint64_t (*spikes)[SF_LANES],
+                           float *out)
+{
+  float sums[SF_BLOCK * SF_LANES];
+  for (int t = 0; t < steps; t++) {
+    spike_current(slices, rows, columns, spikes[t], sums);
+    transpose((const word *)sums, SF_BLOCK, columns, (word *)out + (size_t)t * columns * SF_BLOCK, SF_BLOCK);
+  }
 }
 
 /* grad[m][V*VL] += the rows of the lanes in which neuron m fires. */
@@ -127,13 +123,13 @@ static inline __attribute__((always_inline)) void add_lanes(int V, float *grad, 
   for (int v = 0; v < V; v++) *(vf *)(grad + v * VL) = a[v];
 }
 
-/* Event-driven weights' gradient: grad[hidden][hidden] (in, out) += spikes[hidden] x dy[B][hidden]. */
-static void event_outer(float *grad, int hidden, const uint64_t *spikes, const float *dy)
+/* grad[rows][columns] += spikes[rows] x dy[SF_BLOCK][columns]. */
+static void spike_outer(float *grad, int rows, int columns, const uint64_t *spikes, const float *dy)
 {
   int c = 0;
-  for (; c + 8 * VL <= hidden; c += 8 * VL)
-    for (int m = 0; m < hidden; m++) add_lanes(8, grad + m * hidden + c, spikes[m], dy + c, hidden);
-  for (; c < hidden; c += VL)
-    for (int m = 0; m < hidden; m++) add_lanes(1, grad + m * hidden + c, spikes[m], dy + c, hidden);
+  for (; c + 8 * VL <= columns; c += 8 * VL)
+    for (int m = 0; m < rows; m++) add_lanes(8, grad + m * columns + c, spikes[m], dy + c, columns);
+  for (; c < columns; c += VL)
+    for (int m = 0; m < rows; m++) add_lanes(1, grad + m * columns + c, spikes[m], dy + c, columns);
 }
 #endif

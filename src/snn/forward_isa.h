@@ -2,7 +2,7 @@
  * Included by kernels_isa.c only. */
 #ifndef SF_SNN_FORWARD_ISA_H
 #define SF_SNN_FORWARD_ISA_H
-#include "snn/event_isa.h"
+#include "snn/words_isa.h"
 #include "snn/plif.h"
 
 /* e^x within 2 ulp for x in [-87, 87], clamped outside; Cephes' polynomial, vectorises. */
@@ -45,12 +45,12 @@ static inline void charge(const sf_net_view *net, int layer, float k, int t, int
 }
 
 /* A spiking layer at step t, a few rows at a time in the first-level cache: current = init + w in, charge, fire.
- * w NULL: the current is init. s: activations as words of rows. */
+ * w NULL: the current is init. s: activations as words of rows; NULL: not wanted. */
 static void layer(const sf_net_view *net, int index, float k, int t, const word *w, int pairs, const word *in,
                   const float *init, const float *prev, float *h, word *s)
 {
   float tile[LAYER_ROWS * B];
-  for (int m = 0, n; m < net->hidden; m += n, s += n / PAIR * B) {
+  for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
     const float *current = init ? init + m * B : NULL;
     if (w) {
@@ -58,7 +58,7 @@ static void layer(const sf_net_view *net, int index, float k, int t, const word 
       current = tile;
     }
     charge(net, index, k, t, n, current, prev ? prev + m * B : NULL, h + m * B);
-    activation_rows(net, index, n, h + m * B, s);
+    if (s) activation_rows(net, index, n, h + m * B, s + m / PAIR * B);
   }
 }
 
@@ -118,16 +118,30 @@ static void read_colour(const sf_net_view *net, int t, sf_block *x)
   }
 }
 
-/* Density net at step t. */
-static void density_step(const sf_net_words *n, sf_block *x, int t, int keep, const float *current, sf_net_scratch *w,
-                         float *i)
+/* Spikes of a layer, from its membranes before fire: a bit per lane. */
+static void layer_spikes(const sf_net_view *net, int index, const float *h, uint64_t *spikes)
+{
+  for (int r = 0; r < net->hidden; r++) spikes[r] = spike_bits(h + r * B, net->theta[index]);
+}
+
+/* Density net: its currents to x->i. current: D1's. */
+static void density_net(const sf_net_words *n, sf_block *x, int steps, int keep, const float *current,
+                        sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
-  word *spikes = words(w->spikes);
-  layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, x->m1[slot(t, keep)],
-        spikes);
-  gemm(operands(n->w2), net->hidden / PAIR, SF_DENSITY_OUT, net->hidden / PAIR, spikes, B, B, NULL, 0, i, B);
-  read_density(net, t, i, x);
+  const int hidden = net->hidden;
+  uint64_t fired[SF_T_MAX][SF_LANES];
+  word *spikes = looked_up(net) ? NULL : words(w->spikes);
+  for (int t = 0; t < steps; t++) {
+    float *h = x->m1[slot(t, keep)];
+    layer(net, 0, net->k[0], t, NULL, 0, NULL, current, t ? x->m1[slot(t - 1, keep)] : NULL, h, spikes);
+    if (spikes)
+      gemm(operands(n->w2), hidden / PAIR, SF_DENSITY_OUT, hidden / PAIR, spikes, B, B, NULL, 0, x->i[t], B);
+    else
+      layer_spikes(net, 0, h, fired[t]);
+  }
+  if (!spikes) spike_currents(n->w2_spikes, hidden, SF_DENSITY_OUT, steps, fired, x->i[0]);
+  for (int t = 0; t < steps; t++) read_density(net, t, x->i[t], x);
 }
 
 /* in[inputs][B] times words of weights: what is constant over the steps. */
@@ -142,49 +156,61 @@ static void density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratc
 {
   tiles_begin();
   constant_current(n, n->w1, n->view.features, x->f, w->rows, w->sum1);
-  for (int t = 0; t < steps; t++) density_step(n, x, t, 0, w->sum1, w, x->i[0]);
+  density_net(n, x, steps, 0, w->sum1, w);
   tiles_end();
 }
 
-/* C2 at step t from the spikes of C1 in w->spikes; activations to w->rows. bias: [hidden][B] or NULL. */
-static void colour_layer_2(const sf_net_words *n, sf_block *x, int t, int at, int before, const float *bias,
-                           sf_net_scratch *w)
+/* C2, C3 and the colour at step t. Of C1's spikes there are the bits, and either words in w->spikes, or all that they
+ * add to C2's current in w->currents. bias2, bias3: [rows][B] or NULL. */
+static void colour_step(const sf_net_words *n, sf_block *x, int t, int keep, const float *bias2, const float *bias3,
+                        sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
-  const int hidden = net->hidden;
+  const int hidden = net->hidden, pairs = hidden / PAIR, at = slot(t, keep);
   const word *weights = operands(n->w4);
-  const float *current = bias;
-  for (int r = 0; r < hidden; r++) x->s3[at][r] = spike_bits(x->m3[at] + r * B, net->theta[1]);
-  if (!net->relu && few_spikes(x->s3[at], hidden, dense_forward)) {
-    weights = NULL;
-    float *const sum = floats(w->lanes);
-    event_current(n->w4_slice, hidden, x->s3[at], floats(w->t));
-    transpose(words(w->t), B, hidden, words(w->lanes), B);
-    for (int i = 0; bias && i < hidden * B; i++) sum[i] += bias[i];
-    current = sum;
+  const float *current = bias2;
+  if (by_spikes(net, x->s3[at], FORWARD)) {
+    float *const sum = w->currents + (LOOKUP ? t * hidden * B : 0);
+    if (!LOOKUP) spike_currents(n->w4_spikes, hidden, hidden, 1, &x->s3[at], sum);
+    for (int i = 0; bias2 && i < hidden * B; i++) sum[i] += bias2[i];
+    weights = NULL, current = sum;
   }
-  layer(net, 2, net->k[3], t, weights, hidden / PAIR, words(w->spikes), current, t ? x->m4[before] : NULL, x->m4[at],
+  layer(net, 2, net->k[3], t, weights, pairs, words(w->spikes), current, t ? x->m4[slot(t - 1, keep)] : NULL, x->m4[at],
         words(w->rows));
+  gemm(operands(n->w5), pairs, 4, pairs, words(w->rows), B, B, bias3, B, x->j[t], B);
+  read_colour(net, t, x);
+}
+
+/* What follows C1, whose membranes are in x->m3. Where all spikes are looked up, after the last of `steps` steps. */
+static void after_colour_1(const sf_net_words *n, sf_block *x, int t, int steps, int keep, const float *bias2,
+                           const float *bias3, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int at = slot(t, keep);
+  layer_spikes(net, 1, x->m3[at], x->s3[at]);
+  if (!looked_up(net)) {
+    colour_step(n, x, t, keep, bias2, bias3, w);
+    return;
+  }
+  memcpy(w->fired3[t], x->s3[at], sizeof w->fired3[t]);
+  if (t + 1 < steps) return;
+  spike_currents(n->w4_spikes, net->hidden, net->hidden, steps, w->fired3, w->currents);
+  for (int s = 0; s < steps; s++) colour_step(n, x, s, keep, bias2, bias3, w);
 }
 
 static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
-  const int pairs = net->hidden / PAIR;
-  word *spikes = words(w->spikes), *rows = words(w->rows);
   tiles_begin();
   constant_current(n, n->w1, net->features, x->f, w->rows, w->sum1);
   constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, w->rows, w->sum3);
+  density_net(n, x, steps, keep, w->sum1, w);
   for (int t = 0; t < steps; t++) {
-    const int at = slot(t, keep), before = slot(t - 1, keep);
-    density_step(n, x, t, keep, w->sum1, w, x->i[t]);
     if (net->h_step > 0)
       for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step);
     layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, row_words(x->i[t], SF_DENSITY_OUT, w->rows),
-          w->sum3, t ? x->m3[before] : NULL, x->m3[at], spikes);
-    colour_layer_2(n, x, t, at, before, NULL, w);
-    gemm(operands(n->w5), pairs, 4, pairs, rows, B, B, NULL, 0, x->j[t], B);
-    read_colour(net, t, x);
+          w->sum3, t ? x->m3[slot(t - 1, keep)] : NULL, x->m3[slot(t, keep)], looked_up(net) ? NULL : words(w->spikes));
+    after_colour_1(n, x, t, steps, keep, NULL, NULL, w);
   }
   tiles_end();
 }

@@ -29,8 +29,8 @@ typedef struct sf_net_words {
       w4[SF_LANES * SF_LANES], w5[4 * SF_LANES];
   uint32_t w1t[32 * SF_LANES], w2t[SF_LANES * SF_DENSITY_OUT], w3ht[16 * SF_LANES], w4t[SF_LANES * SF_LANES],
       w5t[SF_LANES * 4];
-  float w4_slice[SF_LANES / 64][(SF_LANES + 1) * 64]; /* w4t as the operands' values, for events: 64 outputs a slice, a
-                                                         row of zeros after the last */
+  /* w2t and w4t for the products with spikes, as lookup_isa.h or event_isa.h lays them out. */
+  float w2_spikes[SF_LANES * 4 * SF_DENSITY_OUT], w4_spikes[SF_LANES * 4 * SF_LANES];
   /* Of a net along rays: what one input adds, a row each; h's is transposed, too: [hidden][16]. */
   float w2_rows[SF_LANES * SF_DENSITY_OUT], w3h_rows[16 * SF_LANES], h_rows[SF_LANES * 16],
       w4_rows[SF_LANES * SF_LANES], w5_rows[SF_LANES * 16];
@@ -41,7 +41,7 @@ typedef struct sf_net_words {
  * 16 directions, one scratch column, then h. `leak` is the gradient of the logits w of k = sigmoid(w). */
 typedef struct sf_net_grad {
   float w1[SF_LANES * 32], w2[SF_DENSITY_OUT * SF_LANES], w3[SF_LANES * 32], w4[SF_LANES * SF_LANES], w5[4 * SF_LANES];
-  float w4t[SF_LANES * SF_LANES]; /* more of w4, transposed: [in][out] */
+  float w2t[SF_LANES * SF_DENSITY_OUT], w4t[SF_LANES * SF_LANES]; /* more of w2 and w4, transposed: [in][out] */
   float leak[SF_LAYERS];
 } sf_net_grad;
 
@@ -116,6 +116,9 @@ typedef struct sf_net_scratch {
   float sum1[SF_LANES * SF_BLOCK], sum3[SF_LANES * SF_BLOCK]; /* forward: the currents that are constant over t */
   float leak[SF_LAYERS][SF_BLOCK];
   float fired[3][SF_LANES * SF_BLOCK]; /* steps at which neurons of D1, C1, C2 fire, where they are charged */
+  /* Forward, where all spikes are looked up: those of C1, and what they add to C2's current. */
+  uint64_t fired3[SF_T_MAX][SF_LANES];
+  float currents[SF_T_MAX * SF_LANES * SF_BLOCK]; /* [T][hidden][SF_BLOCK] */
   sf_ray_state carry; /* backward along rays: gradient of the membranes, on their way to the sample before; zeros
                          between two rays */
 } sf_net_scratch;

@@ -3,9 +3,19 @@
 #ifndef SF_SNN_WORDS_ISA_H
 #define SF_SNN_WORDS_ISA_H
 #include "snn/gemm_isa.h"
-#include "snn/kernels.h"
+#if defined(__AVX512F__)
+#include "snn/event_isa.h"
+#else
+#include "snn/lookup_isa.h"
+#endif
 
 enum { B = SF_BLOCK, IN3 = SF_DIR_FEATURES + SF_GEO_FEATURES, BW = B / PAIR };
+
+/* Whether every product of a net with spikes is looked up. */
+static inline bool looked_up(const sf_net_view *net)
+{
+  return LOOKUP && !net->relu;
+}
 
 /* Weights [rows][columns] (row stride ld) as words [rows][padded / PAIR], zero beyond `columns`. */
 static void pack_matrix(const float *w, int row, int column, int rows, int columns, int padded, uint32_t *out)
@@ -18,6 +28,15 @@ static void pack_matrix(const float *w, int row, int column, int rows, int colum
     }
 }
 
+/* Weights [rows][columns] for the products with `columns` spikes. */
+static void prepare_transposed(const float *w, int rows, int columns, float *out)
+{
+  float t[SF_LANES * SF_LANES];
+  for (int r = 0; r < rows; r++)
+    for (int c = 0; c < columns; c++) t[c * rows + r] = w[r * columns + c];
+  prepare_spikes(t, rows, columns, rows, out);
+}
+
 /* Layers C2 and C3, which both backbones have. */
 static void prepare_hidden(const sf_net_view *v, sf_net_words *n)
 {
@@ -26,8 +45,7 @@ static void prepare_hidden(const sf_net_view *v, sf_net_words *n)
   pack_matrix(v->w5, hidden, 1, 3, hidden, hidden, n->w5); /* the fourth row stays zero */
   pack_matrix(v->w4, 1, hidden, hidden, hidden, hidden, n->w4t);
   pack_matrix(v->w5, 1, hidden, hidden, 3, 4, n->w5t);
-  for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) n->w4_slice[c / 64][r * 64 + c % 64] = operand(v->w4[c * hidden + r]);
+  prepare_transposed(v->w4, hidden, hidden, n->w4_spikes);
   for (int r = 0; r < hidden && v->along; r++) {
     for (int c = 0; c < hidden; c++) n->w4_rows[r * hidden + c] = v->w4[c * hidden + r];
     for (int c = 0; c < 16; c++) n->w5_rows[16 * r + c] = c < 3 ? v->w5[c * hidden + r] : 0;
@@ -49,6 +67,7 @@ static void prepare(const sf_net_view *v, sf_net_words *n)
   pack_matrix(v->w1, 1, features, features, hidden, hidden, n->w1t);
   pack_matrix(v->w2, 1, hidden, hidden, SF_DENSITY_OUT, SF_DENSITY_OUT, n->w2t);
   pack_matrix(h, 1, 16, 16, hidden, hidden, n->w3ht);
+  if (LOOKUP) prepare_transposed(v->w2, SF_DENSITY_OUT, hidden, n->w2_spikes);
   prepare_hidden(v, n);
   for (int r = 0; r < hidden && v->along; r++)
     for (int c = 0; c < 16; c++) {

@@ -136,6 +136,12 @@ void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld)
     for (int c = 0; c < columns; c++) to[r * columns + c] += from[r * ld + c];
 }
 
+void sf_matrix_add_transposed(float *to, const float *from, int rows, int columns)
+{
+  for (int r = 0; r < rows; r++)
+    for (int c = 0; c < columns; c++) to[r * columns + c] += from[c * rows + r];
+}
+
 /* The losses as means over rays; the leaks' gradients carry that factor already. */
 static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
 {

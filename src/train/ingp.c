@@ -161,14 +161,14 @@ static void collect(sf_trainer *t, const void *sum)
   for (int i = 0; i < SF_P_COUNT; i++) at[i] = t->grad + m->param[i].offset;
   sf_matrix_add(at[SF_P_D1], grad->w1, hidden, features, (features + 15) / 16 * 16);
   sf_matrix_add(at[SF_P_D2], grad->w2, SF_DENSITY_OUT, hidden, hidden);
+  sf_matrix_add_transposed(at[SF_P_D2], grad->w2t, SF_DENSITY_OUT, hidden);
   for (int r = 0; r < hidden; r++) {
     float *row = at[SF_P_C1] + (size_t)r * (SF_DIR_FEATURES + SF_GEO_FEATURES);
     sf_matrix_add(row, grad->w3 + 32 * r, 1, SF_DIR_FEATURES, 32);
     sf_matrix_add(row + SF_DIR_FEATURES, grad->w3 + 32 * r + SF_DIR_FEATURES + 1, 1, SF_GEO_FEATURES, 32);
   }
   sf_matrix_add(at[SF_P_C2], grad->w4, hidden, hidden, hidden);
-  for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) at[SF_P_C2][r * hidden + c] += grad->w4t[c * hidden + r];
+  sf_matrix_add_transposed(at[SF_P_C2], grad->w4t, hidden, hidden);
   sf_matrix_add(at[SF_P_C3], grad->w5, 3, hidden, hidden);
   sf_matrix_add(at[SF_P_LEAK], grad->leak, 1, SF_LAYERS, SF_LAYERS);
 }

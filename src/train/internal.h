@@ -354,6 +354,8 @@ static inline int sf_block_lanes(int lanes, int index)
 int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *worker);
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
+/* to[rows][columns] += the transpose of from[columns][rows]. */
+void sf_matrix_add_transposed(float *to, const float *from, int rows, int columns);
 /* Adds the spikes of spiking layers `first`..2 in the first `lanes` lanes of a block. */
 void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *block, int lanes, sf_group *group);
 sf_status sf_checkpoint_load(sf_trainer *trainer, const char *path);

@@ -119,8 +119,7 @@ void sf_vm_collect(sf_trainer *t, const void *sum)
   sf_matrix_add(at[SF_P_C1], grad->w1, hidden, v->inputs, rows);
   sf_matrix_add(at[SF_P_C1_BIAS], grad->w1 + v->inputs, hidden, 1, rows);
   sf_matrix_add(at[SF_P_C2], grad->net.w4, hidden, hidden, hidden);
-  for (int r = 0; r < hidden; r++)
-    for (int c = 0; c < hidden; c++) at[SF_P_C2][r * hidden + c] += grad->net.w4t[c * hidden + r];
+  sf_matrix_add_transposed(at[SF_P_C2], grad->net.w4t, hidden, hidden);
   sf_matrix_add(at[SF_P_C2_BIAS], grad->b2, 1, hidden, hidden);
   sf_matrix_add(at[SF_P_C3], grad->net.w5, 3, hidden, hidden);
   sf_matrix_add(at[SF_P_C3_BIAS], grad->b3, 1, 3, 3);
