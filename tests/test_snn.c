@@ -5,7 +5,6 @@
 #include "base/memory.h"
 #include "render/view.h"
 #include "snn/plif.h"
-#include "train/internal.h"
 
 /* Design page's neuron with theta = 1, k = 1/2 (tau = 2), current 0.8: hybrid v = .8, .8, .. (constant input is its
  * fixed point). */
@@ -169,7 +168,7 @@ TEST(kernels_equal_oracle)
   for (int i = 0; i < 3; i++) {
     for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++)
       for (int g = 0; g < 2; g++) compare_forward(isa[i], SF_NET_SNN, mode, 48, gains[g], 1e-4f, 2);
-    for (int hidden = 16; hidden <= 128; hidden += 16) /* words of spikes, whole and in part */
+    for (int hidden = 16; hidden <= SF_LANES; hidden += 16) /* words of spikes, whole and in part */
       compare_forward(isa[i], SF_NET_SNN, SF_HYBRID, hidden, 1, 1e-4f, 2);
     compare_forward(isa[i], SF_NET_ANN, SF_HYBRID, 48, 1, 1e-4f, 2);
   }
@@ -236,8 +235,10 @@ static void random_output_gradient(float *dsigma, float *dcolour)
 /* The gradients of D2 and C2, which have two parts. */
 static void whole_gradient(const rig *r, int hidden)
 {
-  sf_matrix_add_transposed(r->grad->w2, r->grad->w2t, SF_DENSITY_OUT, hidden);
-  sf_matrix_add_transposed(r->grad->w4, r->grad->w4t, hidden, hidden);
+  for (int m = 0; m < hidden; m++) {
+    for (int n = 0; n < SF_DENSITY_OUT; n++) r->grad->w2[n * hidden + m] += r->grad->w2t[m * SF_DENSITY_OUT + n];
+    for (int n = 0; n < hidden; n++) r->grad->w4[n * hidden + m] += r->grad->w4t[m * hidden + n];
+  }
 }
 
 /* The same spikes, only the backward pass is compared; in the second round firing is charged, too. */
