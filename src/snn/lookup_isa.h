@@ -15,14 +15,12 @@ typedef float slice __attribute__((vector_size(4 * SLICE), aligned(4), may_alias
 /* to[SUMS][WIDTH]: the sums of every subset of four rows, which are `stride` apart. */
 static inline void group_sums(const float *rows, int stride, float *to)
 {
-  for (int c = 0; c < WIDTH; c += SLICE) {
-    *(slice *)(to + c) = (slice){0};
-#pragma GCC unroll 4
-    for (int r = 0; r < GROUP; r++)
-#pragma GCC unroll 8
-      for (int i = 0; i < 1 << r; i++)
-        *(slice *)(to + ((1 << r) + i) * WIDTH + c) =
-            *(slice *)(to + i * WIDTH + c) + *(const slice *)(rows + r * stride + c);
+  for (int c = 0; c < WIDTH; c += SLICE, to += SLICE) {
+    *(slice *)to = (slice){0};
+#pragma GCC unroll 16
+    for (int i = 1; i < SUMS; i++)
+      *(slice *)(to + i * WIDTH) =
+          *(slice *)(to + (i & (i - 1)) * WIDTH) + *(const slice *)(rows + __builtin_ctz(i) * stride + c);
   }
 }
 
