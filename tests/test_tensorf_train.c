@@ -99,9 +99,10 @@ TEST(shrinking_keeps_what_is_seen)
   OWNED(sf_model) whole = {0};
   ck_ok(sf_model_create(&whole, &t->model.config));
   memcpy(whole.value, t->model.value, whole.size * sizeof *whole.value);
-  ck_ok(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, 1, false));
   ck_assert_double_lt(t->occupied, 0.5);
   ck_ok(sf_vm_shrink(t));
+  ck_ok(sf_vm_mask(t, 1, false));
   const sf_tensorf *f = &t->model.config.tensorf;
   ck_assert_int_lt(f->resolution[0], 16);
   for (int i = 0; i < 300; i++) {
@@ -125,12 +126,13 @@ TEST(shrinking_keeps_what_is_seen)
 
 /* No point whose alpha is above four times the threshold lies in a cell that the mask drops: the mask looks at the
  * corners of cells, and this field changes by less than that between them. Most of the box goes. */
-TEST(mask_keeps_what_is_visible)
+LOOP_TEST(mask_keeps_what_is_visible, 2)
 {
+  const double share = _i ? 0.1 : 1; /* of the threshold */
   const sf_train_options o = small_vm(SF_NET_ANN);
   OWNED(trainer) t = start(&data, &o, NULL);
   put_ball(&t->model);
-  ck_ok(sf_vm_mask(t, false));
+  ck_ok(sf_vm_mask(t, share, false));
   const sf_tensorf *f = &t->model.config.tensorf;
   int visible = 0;
   for (int i = 0; i < 20000; i++) {
@@ -142,7 +144,7 @@ TEST(mask_keeps_what_is_visible)
     }
     const float sigma = sf_tensorf_sigma(f, sf_tensorf_density_feature(&t->model, x));
     const double alpha = 1 - exp(-(double)sigma / 25 * (double)sf_tensorf_step(f));
-    if (alpha < 4e-4) continue;
+    if (alpha < 4e-4 * share) continue;
     const int bit = (cell[2] * 16 + cell[1]) * 16 + cell[0];
     visible++;
     ck_assert_msg(t->model.occupancy[bit / 8] >> (bit % 8) & 1, "alpha %g at %g %g %g is masked", alpha, (double)x[0],
@@ -152,8 +154,29 @@ TEST(mask_keeps_what_is_visible)
   ck_assert_double_lt(t->occupied, 0.5);
   const double once = t->occupied;
   memset(t->model.occupancy, 0, 16 * 16 * 16 / 16);
-  ck_ok(sf_vm_mask(t, true)); /* a later mask takes no cell back */
+  ck_ok(sf_vm_mask(t, share, true)); /* a later mask takes no cell back */
   ck_assert_double_lt(t->occupied, once);
+}
+
+/* The first mask of a young field keeps fainter cells than that of one that has learned for longer; both cut the same
+ * box. */
+TEST(young_masks_keep_more)
+{
+  double occupied[2];
+  sf_tensorf field[2];
+  for (int old = 0; old < 2; old++) {
+    const sf_train_options o = small_vm(SF_NET_ANN);
+    OWNED(trainer) t = start(&data, &o, NULL);
+    put_ball(&t->model);
+    t->iteration = old ? 5000 : 50;
+    t->progress = 2000 / 30e3;
+    ck_ok(sf_vm_grow(t));
+    ck_assert_int_eq(t->vm->event, 1);
+    occupied[old] = t->occupied;
+    field[old] = t->model.config.tensorf;
+  }
+  ck_assert_double_gt(occupied[0], 1.05 * occupied[1]);
+  ck_assert_mem_eq(field[0].box, field[1].box, sizeof field[0].box);
 }
 
 /* Every event at its share of the run, the optimiser new there, the finest grid of as many voxels as asked for. Masks
@@ -177,7 +200,7 @@ LOOP_TEST(schedule_scales_with_the_run, 2)
     ck_assert_msg(t->vm->event == event, "iteration %d: %d events, expected %d", i, t->vm->event, event);
     if (event) ck_assert_int_eq(t->vm->fresh, at[_i][event - 1 - (_i && event == 2)]); /* a mask alone renews nothing */
     if (!mask) ck_assert_mem_eq(before, t->model.occupancy, sizeof before);
-    if (!_i && i == masks[_i][0]) ck_assert_mem_ne(before, t->model.occupancy, sizeof before);
+    if (!_i && i == masks[_i][1]) ck_assert_mem_ne(before, t->model.occupancy, sizeof before);
     if (i == masks[_i][0]) memcpy(box, t->model.config.tensorf.box, sizeof box);
     if (i == masks[_i][0] + 1) { /* cells that a mask would take, and a box that would be smaller */
       memset(t->model.occupancy, 0xff, sizeof before);

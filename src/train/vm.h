@@ -47,8 +47,9 @@ sf_status sf_vm_grow(sf_trainer *trainer);
 /* The field on other grid points, as many as resolution says: point i of axis a lies where point start + i * stride of
  * the old grid lay, which is inside the old grid. Replaces the parameters and clears the optimiser. */
 sf_status sf_vm_resample(sf_trainer *trainer, const sf_tensorf *field, const double start[3], const double stride[3]);
-/* The alpha mask from the densities: cells of the occupancy grid near a point with alpha above the threshold. */
-sf_status sf_vm_mask(sf_trainer *trainer, bool within_old);
-/* Cuts the box to what the mask holds, at grid points, so that no value changes. */
+/* The alpha mask from the densities: cells of the occupancy grid near a point with alpha above `share` of the
+ * threshold. */
+sf_status sf_vm_mask(sf_trainer *trainer, double share, bool within_old);
+/* Cuts the box to what the mask holds, at grid points, so that no value changes. The mask is of the old box still. */
 sf_status sf_vm_shrink(sf_trainer *trainer);
 #endif

@@ -25,6 +25,8 @@ static const event schedule[2][EVENTS] = {{{2000 / 30e3, true, true},
 
 static const double first_voxels = 2097156; /* TensoRF's N_voxel_init */
 static const double alpha_threshold = 1e-4, alpha_scale = 25;
+/* Share of the threshold for the first mask, of a field that has just begun; iterations after which it is whole. */
+static const double youngest = 0.1, grown_up = 1000;
 
 /* Interpolated plane or line of `n` components at (row, column) of the old one. */
 static void sample(const float *from, const int64_t size[2], double row, double column, int64_t n, float *to)
@@ -88,13 +90,14 @@ sf_status sf_vm_resample(sf_trainer *t, const sf_tensorf *field, const double st
   return clear_optimiser(t);
 }
 
-/* Alpha above the threshold at the corners of the cells, [res+1]^3; TensoRF's alpha leaves the distance scale out. */
-static void find_visible(const sf_trainer *t, uint8_t *visible)
+/* Alpha above a share of the threshold at the corners of the cells, [res+1]^3; TensoRF's alpha leaves the distance
+ * scale out. */
+static void find_visible(const sf_trainer *t, double share, uint8_t *visible)
 {
   const sf_tensorf *f = &t->model.config.tensorf;
   const int n = t->model.config.occ_res + 1;
   const sf_vm_field field = sf_vm_field_of(&t->model, false);
-  const float limit = (float)(-log1p(-alpha_threshold) * alpha_scale / sf_tensorf_step(f));
+  const float limit = (float)(-log1p(-alpha_threshold * share) * alpha_scale / sf_tensorf_step(f));
 #pragma omp parallel for schedule(dynamic, 1)
   for (int z = 0; z < n; z++) {
     float x[3 * 257], sigma[257], slope[257]; /* 256 cells at most */
@@ -124,7 +127,7 @@ static void spread(const uint8_t *corner, uint8_t *cell, int n, size_t stride, s
   }
 }
 
-sf_status sf_vm_mask(sf_trainer *t, bool within_old)
+sf_status sf_vm_mask(sf_trainer *t, double share, bool within_old)
 {
   const size_t res = (size_t)t->model.config.occ_res, n = res + 1, corners = n * n * n;
   uint8_t *a = malloc(corners), *b = malloc(corners);
@@ -133,7 +136,7 @@ sf_status sf_vm_mask(sf_trainer *t, bool within_old)
     free(b);
     return sf_fail(SF_E_MEMORY, "train: no memory for the alpha mask");
   }
-  find_visible(t, a);
+  find_visible(t, share, a);
   spread(a, b, (int)n, 1, n * n, (size_t[2]){n * n, n});
   spread(b, a, (int)n, n, n * n, (size_t[2]){n * n, 1});
   spread(a, b, (int)n, n * n, n * n, (size_t[2]){n, 1});
@@ -189,9 +192,7 @@ sf_status sf_vm_shrink(sf_trainer *t)
     new.box[1][a] = (float)((double)old->box[0][a] + size * end / last);
     smaller |= new.resolution[a] < old->resolution[a];
   }
-  if (!smaller) return sf_ok();
-  SF_TRY(sf_vm_resample(t, &new, start, (double[3]){1, 1, 1}));
-  return sf_vm_mask(t, false);
+  return smaller ? sf_vm_resample(t, &new, start, (double[3]){1, 1, 1}) : sf_ok();
 }
 
 static sf_status upsample(sf_trainer *t, double voxels)
@@ -213,11 +214,16 @@ sf_status sf_vm_grow(sf_trainer *t)
   for (int i = 0; i < vm->event; i++) done += e[i].grow, masks += e[i].mask;
   for (; vm->event < EVENTS && t->progress >= e[vm->event].at - 1e-9; vm->event++) {
     const event *now = &e[vm->event];
-    if (now->mask) SF_TRY(sf_vm_mask(t, masks > 0));
-    if (now->mask && !masks++) SF_TRY(sf_vm_shrink(t));
-    const double share = (double)++done / steps, last = pow(t->options.voxels, 3);
+    if (now->mask && !masks) {
+      SF_TRY(sf_vm_mask(t, 1, false));
+      SF_TRY(sf_vm_shrink(t));
+    }
+    if (now->mask)
+      SF_TRY(sf_vm_mask(t, masks ? 1 : fmin(1, fmax(youngest, (double)t->iteration / grown_up)), masks > 0));
+    masks += now->mask;
+    const double grown = (double)++done / steps, last = pow(t->options.voxels, 3);
     if (now->grow)
-      SF_TRY(upsample(t, exp((1 - share) * log(fmin(first_voxels, last)) + share * log(last))));
+      SF_TRY(upsample(t, exp((1 - grown) * log(fmin(first_voxels, last)) + grown * log(last))));
     else
       done--;
   }
