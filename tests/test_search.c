@@ -27,9 +27,13 @@ typedef struct curve {
   double floor, height, noise, fall; /* fall: of all errors over the search, exponent */
 } curve;
 
+static uint64_t noise_seed = 5;
+static double own_noise; /* of each prefix alone */
+
 static double error_of(const curve *c, int prefix, double at, int call)
 {
-  const double shake = 1 + c->noise * (2 * sf_random_float(5, 1, (uint64_t)call) - 1);
+  const double shake = 1 + c->noise * (2 * sf_random_float(noise_seed, 1, (uint64_t)call) - 1) +
+                       own_noise * (2 * sf_random_float(noise_seed, 2, (uint64_t)(T * call + prefix)) - 1);
   return (c->floor + c->height * pow(0.5, prefix - 1)) * shake * exp(-c->fall * at);
 }
 
@@ -109,6 +113,52 @@ TEST(the_rate_decides_nothing)
   ck_assert_double_gt(normal.worth_error, 0.005 * normal.worth);
   ck_assert_double_lt(normal.worth_error, 0.05 * normal.worth);
   ck_assert_double_gt(fast.worth_error, 1.2 * normal.worth_error);
+}
+
+/* Mean square of what the worth is off in 2000 noisy searches, over that of its standard error. */
+static double spread_over_error(int measurements, double noise, double own)
+{
+  const curve c = {1e-3, 1e-4, noise, 0}, quiet = {1e-3, 1e-4, 0, 0};
+  const double worth = slope_of(&quiet);
+  const sf_train_options o = search_run();
+  OWNED(trainer) t = searcher(&o);
+  double off = 0, error = 0;
+  own_noise = own;
+  for (int run = 0; run < 2000; run++) {
+    noise_seed = 100 + (uint64_t)run;
+    sf_search_begin(t);
+    measure(t, &c, measurements, 1);
+    const sf_search_report r = sf_search_now(t);
+    off += pow(r.worth - worth, 2);
+    error += pow(r.worth_error, 2);
+  }
+  noise_seed = 5, own_noise = 0;
+  return off / error;
+}
+
+/* 1, within five standard errors of such a ratio: two measurements have errors of one degree of freedom, sqrt(4 / 2000)
+ * each way. */
+TEST(standard_errors_are_the_spread)
+{
+  static const int measurements[] = {2, 3, 12};
+  for (size_t i = 0; i < sizeof measurements / sizeof *measurements; i++) {
+    ck_assert_double_eq_tol(spread_over_error(measurements[i], 0.1, 0), 1, 0.25);
+    ck_assert_double_eq_tol(spread_over_error(measurements[i], 0, 0.005), 1, 0.25);
+    ck_assert_double_eq_tol(spread_over_error(measurements[i], 0.1, 0.005), 1, 0.25);
+  }
+}
+
+/* Of one measurement nothing is known but itself; t* is not called balanced, however quiet it is. */
+TEST(one_measurement_has_no_error)
+{
+  const curve c = {1e-3, 1e-4, 0, 0};
+  const sf_train_options o = search_run();
+  OWNED(trainer) t = searcher(&o);
+  measure(t, &c, 1, 1);
+  const sf_search_report r = sf_search_now(t);
+  ck_assert_int_eq(r.measured, 1);
+  ck_assert(isinf(r.worth_error) && isinf(r.price_error));
+  ck_assert_int_eq(r.state, SF_SEARCH_NOT_REACHED);
 }
 
 TEST(the_scene_decides)

@@ -50,9 +50,11 @@ static sf_status explain_search(const char *dir)
   const double worth = sf_json_number(search, "worth"), error = sf_json_number(search, "worth_error"),
                price = sf_json_number(search, "price"), t_star = sf_json_number(json, "t_star");
   const char *state = sf_json_text(search, "state");
-  if (state && !isnan(worth + error + price + t_star))
-    printf("  time steps    t* = %.2f (%s): one more is worth %.1e +- %.0e of squared error and costs %.1e\n", t_star,
-           state, worth, error, price);
+  if (state && !isnan(worth + price + t_star)) {
+    printf("  time steps    t* = %.2f (%s): one more is worth %.1e ", t_star, state, worth);
+    if (!isnan(error)) printf("+- %.0e ", error);
+    printf("of squared error and costs %.1e\n", price);
+  }
   cJSON_Delete(json);
   return sf_ok();
 }

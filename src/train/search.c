@@ -177,10 +177,20 @@ static double squared(double x)
   return x * x;
 }
 
-/* Standard error of an average over its value: the batches' spread, by the average's effective number of batches. */
-static double relative_error(double variance, double mean, const double weight[2])
+/* Square sum of the batches' shares of an average: 1 / n of n that count alike. */
+static double part_of(const double weight[2])
 {
-  return sqrt(fmax(variance, 0) * weight[1]) / fmax(weight[0] * fabs(mean), 1e-300);
+  return weight[1] / squared(weight[0]);
+}
+
+/* Standard error of an average over its value, from the batches' spread about an average, which may have a memory of
+ * its own. That is less than their spread about the mean, by a factor of 1 - part. So one batch, or one that outweighs
+ * all before it, says nothing of it: INFINITY. */
+static double relative_error(double variance, double mean, const double spread[2], const double weight[2])
+{
+  const double left = 1 - part_of(spread);
+  if (!(left > 1e-9)) return INFINITY;
+  return sqrt(fmax(variance, 0) / left * part_of(weight)) / fmax(fabs(mean), 1e-300);
 }
 
 /* Of the worth: that of the share, whose batches differ by what their slope departs from share times error, and that of
@@ -189,8 +199,14 @@ static double worth_error(const sf_search *s)
 {
   const double share = share_of(s);
   const double off = s->slope2 - 2 * share * s->slope_level + share * share * s->level2;
-  return hypot(relative_error(off, s->slope, s->slow),
-               relative_error(s->level2 - squared(s->level), s->level, s->fast));
+  return hypot(relative_error(off, s->slope, s->slow, s->slow),
+               relative_error(s->level2 - squared(s->level), s->level, s->slow, s->fast));
+}
+
+/* Of a figure, from its relative one; unknown of nothing, too. */
+static double error_of(double value, double relative)
+{
+  return isinf(relative) ? relative : fabs(value) * relative;
 }
 
 sf_search_report sf_search_now(const sf_trainer *t)
@@ -203,8 +219,8 @@ sf_search_report sf_search_now(const sf_trainer *t)
   r.beta = beta_of(t);
   r.worth = worth_at(t, at);
   r.price = r.beta * unit_price_at(t, at);
-  r.worth_error = fabs(r.worth) * worth_error(s);
-  r.price_error = r.price * relative_error(s->ratio2 - squared(s->ratio), s->ratio, s->fast);
+  r.worth_error = error_of(r.worth, worth_error(s));
+  r.price_error = error_of(r.price, relative_error(s->ratio2 - squared(s->ratio), s->ratio, s->fast, s->fast));
   r.saving = sf_search_saving(t, t->model.t_r);
   r.step_energy = sf_search_energy(t, 2) - sf_search_energy(t, 1);
   return r;

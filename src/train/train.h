@@ -67,7 +67,8 @@ extern const char *const sf_search_names[]; /* "none", "running", "balanced", ..
 typedef struct sf_search_report {
   sf_search_state state;
   int measured;                /* iterations that measured all prefixes */
-  double worth, worth_error;   /* squared error that one more step saves at t*, and its standard error */
+  double worth, worth_error;   /* squared error that one more step saves at t*; its standard error, INFINITY where too
+                                * few were measured to know it */
   double price, price_error;   /* beta (M_T / M_smooth) e^t, or what the step costs */
   double beta;                 /* the option, or what the target stands for */
   double prefix_mse[SF_T_MAX]; /* after 1..T steps */

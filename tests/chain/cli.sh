@@ -59,6 +59,12 @@ for line in "prefixes 0.2 weighted" "paper 0 hybrid"; do
   check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*$opaque," stdout.txt
   check "--objective $objective" "has other neurons" grep -Eq "\"mode\":[[:space:]]*\"$mode\"" stdout.txt
 done
+# A worth that was measured once has no standard error.
+good sf_train d -o once.safetensors --stage1 2 --stage2 4 --levels 2 --log2-hash 8 --lattice 128 --threads 1
+check sf_train "an error of one measurement" grep -Eq 'not reached; one more step is worth -?[0-9.e-]+ and costs [0-9.e-]+ \(measured once\)$' stdout.txt
+check "sf_train --log" "an error of one measurement" python3 -c 'import json
+last = [json.loads(line) for line in open("once.safetensors.jsonl")][-1]
+assert last["worth"] and last["worth_error"] is None and last["price"] and last["price_error"] is None'
 good sf_train d -o along.safetensors --steps-along-ray --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 check "along.safetensors" "its cost" grep -q "mJ a view: [0-9]* samples, each with [0-9]* products and [0-9]* additions that spikes cause" stdout.txt
 data "along_ray" sf_export along.safetensors -o along.snn

@@ -225,6 +225,10 @@ sed -i 's/{/{"t_star": 2.5, "search": {"state": "balanced", "worth": 1.5e-5, "wo
 good sf_summary tiny 3
 grep -q 't\* = 2.50 (balanced): one more is worth 1.5e-05 +- 2e-06 of squared error and costs 1.4e-05$' stdout.txt ||
   fail "sf_summary" "no line about the search"
+sed -i 's/"worth_error": 2e-6/"worth_error": null/' tiny/train.json
+good sf_summary tiny 3
+grep -q 't\* = 2.50 (balanced): one more is worth 1.5e-05 of squared error and costs 1.4e-05$' stdout.txt ||
+  fail "sf_summary" "no line about a search without a standard error"
 grep -q 'SSIM -$' stdout.txt || fail "sf_summary" "no '-' for an SSIM that there is not"
 grep -Eq '"ssim_fixed":[[:space:]]*null' tiny/summary.json || fail "sf_summary" "no null in summary.json"
 data "no folder SCENE/RUN" sf_report d

@@ -9,6 +9,15 @@ static double psnr_of(double mse)
   return mse > 0 ? -10 * log10(mse) : 99;
 }
 
+/* JSON has no infinity. */
+static void log_error(FILE *log, const char *name, double error)
+{
+  if (isinf(error))
+    fprintf(log, ",\"%s\":null", name);
+  else
+    fprintf(log, ",\"%s\":%.3g", name, error);
+}
+
 void train_log_line(FILE *log, const sf_train_stats *s, int steps)
 {
   fprintf(log,
@@ -23,8 +32,10 @@ void train_log_line(FILE *log, const sf_train_stats *s, int steps)
           s->revived[2]);
   if (s->search.measured) {
     const sf_search_report *r = &s->search;
-    fprintf(log, ",\"worth\":%.6g,\"worth_error\":%.3g,\"price\":%.6g,\"price_error\":%.3g,\"prefix_mse\":[", r->worth,
-            r->worth_error, r->price, r->price_error);
+    fprintf(log, ",\"worth\":%.6g,\"price\":%.6g", r->worth, r->price);
+    log_error(log, "worth_error", r->worth_error);
+    log_error(log, "price_error", r->price_error);
+    fprintf(log, ",\"prefix_mse\":[");
     for (int i = 0; i < steps; i++) fprintf(log, "%s%.6g", i ? "," : "", r->prefix_mse[i]);
     fprintf(log, "]");
   }
@@ -149,6 +160,12 @@ static cJSON *make_summary(const train_arguments *a, const sf_model *m, const sf
   return json;
 }
 
+static void print_estimate(double value, double error)
+{
+  printf("%.2e", value);
+  if (!isinf(error)) printf(" +- %.1e", error);
+}
+
 static void print_search(const train_arguments *a, const sf_train_stats *s)
 {
   const sf_search_report *r = &s->search;
@@ -159,8 +176,11 @@ static void print_search(const train_arguments *a, const sf_train_stats *s)
     printf("the run has no time for it, t_r is where it starts\n");
     return;
   }
-  printf("one more step is worth %.2e +- %.1e and costs %.2e +- %.1e\n", r->worth, r->worth_error, r->price,
-         r->price_error);
+  printf("one more step is worth ");
+  print_estimate(r->worth, r->worth_error);
+  printf(" and costs ");
+  print_estimate(r->price, r->price_error);
+  printf(r->measured == 1 ? " (measured once)\n" : "\n");
   if (o->target_loss > 0 || o->target_saving > 0)
     printf("%s: that is beta = %.2e; about %.1f %% of the ReLU twin's energy saved, %.2f dB behind the best prefix\n",
            a->output, r->beta, 100 * r->saving, train_behind(r, s->t_r, a->train.config.steps));
