@@ -203,7 +203,7 @@ static double worth_error(const sf_search *s)
                relative_error(s->level2 - squared(s->level), s->level, s->slow, s->fast));
 }
 
-/* Of a figure, from its relative one; unknown of nothing, too. */
+/* Standard error from the relative one. Unknown stays unknown where the value is 0. */
 static double error_of(double value, double relative)
 {
   return isinf(relative) ? relative : fabs(value) * relative;
@@ -306,7 +306,7 @@ static bool at_end(const sf_trainer *t)
 {
   const double at = t->model.t_star, price = t->options.beta * unit_price_at(t, at), worth = worth_at(t, at);
   if (has_target(t) || (at > 1 && at < t->model.config.steps)) return false;
-  return price == 0 || fabs(worth - price) > 3 * fabs(worth) * worth_error(&t->search);
+  return price == 0 || fabs(worth - price) > 3 * error_of(worth, worth_error(&t->search));
 }
 
 /* Targets that no number of steps meets, t* at an end of 1..T, and a search that ends before t* rests have words of
