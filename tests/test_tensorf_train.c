@@ -272,6 +272,22 @@ LONG_TEST(it_learns)
   }
 }
 
+/* One pass decodes all steps: the same pictures as those of each number of steps alone. */
+TEST(every_prefix_is_evaluated)
+{
+  const sf_train_options o = small_vm(SF_NET_SNN);
+  OWNED(trainer) t = start(&data, &o, NULL);
+  double prefix[SF_T_MAX], psnr, ssim;
+  steps(t, 40);
+  const sf_model *m = sf_trainer_model(t);
+  ck_ok(sf_evaluate_prefixes(m, &data, 2, prefix));
+  for (int i = 0; i < m->config.steps; i++) {
+    ck_ok(sf_evaluate(m, &data, 2, i + 1, &psnr, &ssim));
+    ck_assert_double_eq(prefix[i], psnr);
+    if (i) ck_assert_double_ne(prefix[i], prefix[i - 1]);
+  }
+}
+
 /* A field that is not finite ends the run with its name; what is refused is not saved. */
 TEST(nan_is_found)
 {

@@ -157,7 +157,7 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
     return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
   if (!steps) steps = model->t_r;
   if (sf_model_decodes(model)) /* its weights are known before it decodes */
-    return sf_render_tensorf(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, events);
+    return sf_render_tensorf(model, origin, direction, count, steps, 1, background, rgb, depth, alpha, samples, events);
   sf_steps intervals;
   SF_TRY(sf_march_steps(&intervals, model, 1));
   sf_net_words *net = sf_aligned_alloc(sizeof *net);
@@ -184,4 +184,17 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
   }
   free(net);
   return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
+}
+
+sf_status sf_render_prefixes(const sf_model *model, const float *origin, const float *direction, size_t count,
+                             const float background[3], float *rgb)
+{
+  const int steps = model->config.steps;
+  sf_ray_events events = {0};
+  if (sf_model_decodes(model)) /* the densities are those of every step */
+    return sf_render_tensorf(model, origin, direction, count, steps, steps, background, rgb, NULL, NULL, NULL, &events);
+  for (int t = 1; t <= steps; t++)
+    SF_TRY(sf_render_rays(model, origin, direction, count, t, background, rgb + 3 * count * (size_t)(t - 1), NULL, NULL,
+                          NULL));
+  return sf_ok();
 }

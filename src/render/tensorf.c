@@ -19,9 +19,10 @@ typedef struct worker {
   sf_net_scratch *scratch;
   sf_vm_samples samples;
   sf_steps intervals;
-  int steps, fill;
+  int steps, pictures, fill; /* a picture after each of the last steps */
+  size_t picture;            /* numbers of one */
   float x[3 * SF_BLOCK], weight[SF_BLOCK];
-  float *owner[SF_BLOCK]; /* the ray's colour */
+  float *owner[SF_BLOCK]; /* the ray's colour in the first picture */
   sf_ray_state state;     /* of a model along rays: the ray at hand */
   sf_ray_events events;
 } worker;
@@ -48,9 +49,11 @@ static void flush(worker *w)
     w->kernels->decoder_along_forward(w->decoder, w->block, w->scratch);
   else
     w->kernels->decoder_forward(w->decoder, w->block, w->steps, 0, w->scratch);
-  const float *colour = w->block->net.colour[w->steps - 1];
-  for (int l = 0; l < w->fill; l++)
-    for (int c = 0; c < 3; c++) w->owner[l][c] += w->weight[l] * colour[c * SF_BLOCK + l];
+  for (int i = 0; i < w->pictures; i++) {
+    const float *colour = w->block->net.colour[w->steps - w->pictures + i];
+    for (int l = 0; l < w->fill; l++)
+      for (int c = 0; c < 3; c++) w->owner[l][(size_t)i * w->picture + c] += w->weight[l] * colour[c * SF_BLOCK + l];
+  }
   for (int l = 0; l < w->fill && net->along; l++) sf_count_lane(net, &w->block->net, 1, l, w->events.spikes);
   w->fill = 0;
   w->block->net.first = 0;
@@ -67,7 +70,8 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
   float behind, far = 0;
   int decoded = 0;
   const int n = sf_vm_ray(w->kernels, &w->density, &march, w->samples, &behind);
-  for (int c = 0; c < 3; c++) rgb[c] = behind * background[c];
+  for (int i = 0; i < w->pictures; i++)
+    for (int c = 0; c < 3; c++) rgb[(size_t)i * w->picture + c] = behind * background[c];
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
     if (w->samples.weight[s] <= sf_unseen) continue;
@@ -95,12 +99,13 @@ static void worker_free(worker *w)
   free(w);
 }
 
-static worker *worker_create(const sf_model *model, const sf_decoder_words *decoder, int steps)
+static worker *worker_create(const sf_model *model, const sf_decoder_words *decoder, int steps, int pictures,
+                             size_t picture)
 {
   worker *w = sf_aligned_alloc(sizeof *w);
   if (!w) return NULL;
   w->model = model;
-  w->steps = steps;
+  w->steps = steps, w->pictures = pictures, w->picture = picture;
   w->kernels = sf_kernels_select(NULL);
   w->density = sf_vm_field_of(model, false);
   w->appearance = sf_vm_field_of(model, true);
@@ -122,8 +127,8 @@ static worker *worker_create(const sf_model *model, const sf_decoder_words *deco
 }
 
 sf_status sf_render_tensorf(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
-                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
-                            sf_ray_events *events)
+                            int pictures, const float background[3], float *rgb, float *depth, float *alpha,
+                            float *samples, sf_ray_events *events)
 {
   sf_decoder_words *decoder = sf_aligned_alloc(sizeof *decoder);
   if (!decoder) return sf_fail(SF_E_MEMORY, "render: no memory for the weights");
@@ -132,7 +137,7 @@ sf_status sf_render_tensorf(const sf_model *model, const float *origin, const fl
   int failed = 0;
 #pragma omp parallel reduction(| : failed)
   {
-    worker *w = worker_create(model, decoder, steps);
+    worker *w = worker_create(model, decoder, steps, pictures, 3 * count);
     failed = !w;
 #pragma omp for schedule(dynamic, 1)
     for (size_t first = 0; first < count; first += PACKET) {

@@ -47,6 +47,9 @@ void sf_net_sample(const sf_model *model, const float *in, const float *sh, int 
  * background: 3 floats. Empty space is skipped; rays stop where the light is gone (sf_opaque). */
 sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
                          const float background[3], float *rgb, float *depth, float *alpha, float *samples);
+/* The pictures after 1..T steps: rgb [T][count][3], each as sf_render_rays has it. */
+sf_status sf_render_prefixes(const sf_model *model, const float *origin, const float *direction, size_t count,
+                             const float background[3], float *rgb);
 
 /* What the rays of a model along rays cost: those that meet a sample, their samples, and the spikes of D1, C1, C2
  * there.
