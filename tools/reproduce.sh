@@ -218,9 +218,13 @@ trap on_signal INT TERM HUP
 
 # ---- what is run ----
 
-# What sf_data understands of the scene: its layout, its number of held-out views.
+# What sf_data understands of the scene: its layout, its number of held-out views. Says at once what its runs will fail of.
 look_at_data() {
-  local json
+  local json size wrong
+  for size in downscale audit-downscale; do
+    wrong=$("$bin/sf_data" "$data" --downscale "${set[$size]}" 2>&1 >/dev/null) ||
+      echo "reproduce: ${data##*/} will fail with --$size ${set[$size]}: ${wrong##*sf_data: }"
+  done
   json=$("$bin/sf_data" "$data" --json 2>/dev/null)
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
   frames=$(sed '1,/^[[:space:]]*"test":/d' <<<"$json" | grep -c '^[[:space:]]*"name":')

@@ -195,8 +195,9 @@ echo "comparators: planes"
 
 # Runs that fail before they say of what kind the scene is: a scene without any other run.
 cp -r "$data" "$work/failing"
-"$script" "$work/part" --profile paper --scenes "$work/failing" --backbones tensorf --betas 5e-7 --probe 0 --train '--nosuch' >"$work/out" 2>&1 &&
+"$script" "$work/part" --profile paper --scenes "$work/failing" --backbones tensorf --betas 5e-7 --probe 0 --train '--nosuch' --audit-downscale 64 >"$work/out" 2>&1 &&
   fail "runs with a wrong option: success"
+[ "$(count '^reproduce: failing will fail with --audit-downscale 64: ')" -eq 1 ] || { cat "$work/out"; fail "not said before the runs"; }
 [ "$(count 'failing-tensorf .*FAILED (2): ')" -ge 2 ] || { cat "$work/out"; fail "a wrong option: not both runs failed"; }
 [ "$(count '^## Averages over the scenes')" -eq 1 ] && [ "$(count '^## Averages over the scenes: TensoRF, Synthetic')" -eq 1 ] ||
   fail "failed runs are of another kind: $(grep '^## Averages' "$work/out")"
