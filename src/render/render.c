@@ -10,19 +10,25 @@
 
 enum { PACKET = 256, BURST = 8 }; /* rays of a packet; samples of one ray per round */
 
+/* What a ray has brought to one picture. */
+typedef struct ray_light {
+  float transmittance, rgb[3];
+} ray_light;
+
 typedef struct ray_state {
   sf_march march;
   float sh[SF_DIR_FEATURES];
   int next;
   bool fresh; /* no sample yet */
-  float transmittance, rgb[3], depth, samples;
+  ray_light light[SF_T_MAX];
+  float depth, samples; /* of the last picture */
 } ray_state;
 
 typedef struct worker {
   const sf_model *model;
   const sf_kernels *kernels;
   const sf_net_words *net; /* of all workers */
-  int steps;
+  int steps, pictures;     /* a picture after each of the last steps */
   sf_block *block;
   sf_net_scratch *scratch;
   sf_steps intervals;
@@ -33,7 +39,28 @@ typedef struct worker {
   sf_ray_events events;
 } worker;
 
-/* Evaluates the block that was filled and composites its samples, in ray order. */
+/* The block's samples, in ray order, to the rays of one picture. */
+static void composite(worker *w, int picture)
+{
+  const int step = w->steps - w->pictures + picture;
+  const bool last = picture == w->pictures - 1;
+  const float *sigma = w->block->sigma[step], *colour = w->block->colour[step];
+  for (int l = 0; l < w->fill; l++) {
+    ray_state *r = &w->ray[w->owner[l]];
+    ray_light *light = &r->light[picture];
+    if (light->transmittance < r->march.stop) continue;
+    const float delta = w->intervals.length[w->lattice[l]];
+    float behind = light->transmittance * expf(-sigma[l] * delta), weight = light->transmittance - behind;
+    for (int a = 0; a < 3; a++) light->rgb[a] += weight * colour[a * SF_BLOCK + l];
+    light->transmittance = behind;
+    if (!last) continue;
+    r->depth += weight * sf_march_distance(&r->march, w->lattice[l]);
+    r->samples += 1;
+    if (w->net->view.along) sf_count_lane(&w->net->view, w->block, 0, l, w->events.spikes);
+  }
+}
+
+/* Evaluates the block that was filled and composites its samples. */
 static void flush(worker *w)
 {
   if (!w->fill) return;
@@ -49,18 +76,7 @@ static void flush(worker *w)
     w->kernels->along_forward(w->net, w->block, w->scratch);
   else
     w->kernels->forward(w->net, w->block, w->steps, 0, w->scratch);
-  const float *sigma = w->block->sigma[w->steps - 1], *colour = w->block->colour[w->steps - 1];
-  for (int l = 0; l < w->fill; l++) {
-    ray_state *r = &w->ray[w->owner[l]];
-    if (r->transmittance < r->march.stop) continue;
-    const float delta = w->intervals.length[w->lattice[l]];
-    float behind = r->transmittance * expf(-sigma[l] * delta), weight = r->transmittance - behind;
-    for (int a = 0; a < 3; a++) r->rgb[a] += weight * colour[a * SF_BLOCK + l];
-    r->depth += weight * sf_march_distance(&r->march, w->lattice[l]);
-    r->samples += 1;
-    r->transmittance = behind;
-    if (w->net->view.along) sf_count_lane(&w->net->view, w->block, 0, l, w->events.spikes);
-  }
+  for (int i = 0; i < w->pictures; i++) composite(w, i);
   w->fill = 0;
   w->block->first = 0;
 }
@@ -78,32 +94,41 @@ static void add_sample(worker *w, int ray, int n, const float x[3])
   if (w->fill == SF_BLOCK) flush(w);
 }
 
+/* Whether a picture has light left for the ray's next sample. */
+static bool goes_on(const worker *w, const ray_state *r)
+{
+  if (r->next < 0) return false;
+  for (int i = 0; i < w->pictures; i++)
+    if (r->light[i].transmittance >= r->march.stop) return true;
+  return false;
+}
+
 static void render_packet(worker *w, int count)
 {
   for (int alive = 1; alive;) {
     alive = 0;
     for (int i = 0; i < count; i++) {
       ray_state *r = &w->ray[i];
-      for (int burst = 0; burst < BURST && r->next >= 0 && r->transmittance >= r->march.stop; burst++) {
+      for (int burst = 0; burst < BURST && goes_on(w, r); burst++) {
         float x[3];
         int n = sf_march_next(&r->march, r->next, x);
         r->next = n < 0 ? -1 : n + 1;
         if (n >= 0) add_sample(w, i, n, x);
       }
-      alive |= r->next >= 0 && r->transmittance >= r->march.stop;
+      alive |= goes_on(w, r);
     }
     flush(w);
   }
 }
 
-static worker *worker_create(const sf_model *model, const sf_net_words *net, int steps)
+static worker *worker_create(const sf_model *model, const sf_net_words *net, int steps, int pictures)
 {
   worker *w = sf_aligned_alloc(sizeof *w);
   if (!w) return NULL;
   w->model = model;
   w->kernels = sf_kernels_select(NULL);
   w->net = net;
-  w->steps = steps;
+  w->steps = steps, w->pictures = pictures;
   w->block = sf_aligned_alloc(sizeof *w->block);
   w->scratch = sf_aligned_alloc(sizeof *w->scratch);
   return w;
@@ -121,43 +146,37 @@ static void begin_packet(worker *w, const float *origin, const float *direction,
 {
   for (int i = 0; i < count; i++) {
     const float *o = origin + 3 * i, *d = direction + 3 * i;
-    w->ray[i] =
-        (ray_state){.march = sf_march_begin(w->model, &w->intervals, o, d, 0.5f), .fresh = true, .transmittance = 1};
+    w->ray[i] = (ray_state){.march = sf_march_begin(w->model, &w->intervals, o, d, 0.5f), .fresh = true};
+    for (int k = 0; k < w->pictures; k++) w->ray[i].light[k].transmittance = 1;
     sf_sh4(d, w->ray[i].sh);
     sf_scales_round_direction(&w->model->scales, w->ray[i].sh, SF_DIR_FEATURES);
   }
 }
 
-/* The packet's rays, from number `first` of all on. */
-static void end_packet(worker *w, size_t first, int count, const float background[3], float *rgb, float *depth,
-                       float *alpha, float *samples)
+/* The packet's rays, from number `first` of `all` on. */
+static void end_packet(worker *w, size_t first, size_t all, int count, const float background[3], float *rgb,
+                       float *depth, float *alpha, float *samples)
 {
   for (int i = 0; i < count; i++) {
     const ray_state *r = &w->ray[i];
-    for (int a = 0; a < 3; a++) rgb[3 * (first + i) + a] = r->rgb[a] + r->transmittance * background[a];
+    for (int k = 0; k < w->pictures; k++)
+      for (int a = 0; a < 3; a++)
+        rgb[3 * ((size_t)k * all + first + i) + a] = r->light[k].rgb[a] + r->light[k].transmittance * background[a];
     if (depth) depth[first + i] = r->depth;
-    if (alpha) alpha[first + i] = 1 - r->transmittance;
+    if (alpha) alpha[first + i] = 1 - r->light[w->pictures - 1].transmittance;
     if (samples) samples[first + i] = r->samples;
     w->events.rays += r->samples > 0, w->events.samples += (uint64_t)r->samples;
   }
 }
 
-sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
-                         const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+/* As sf_render_counted, with steps in 1..T. rgb [pictures][count][3]: after steps - pictures + 1 to steps steps. */
+static sf_status render(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                        int pictures, const float background[3], float *rgb, float *depth, float *alpha, float *samples,
+                        sf_ray_events *events)
 {
-  sf_ray_events events = {0};
-  return sf_render_counted(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, &events);
-}
-
-sf_status sf_render_counted(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
-                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
-                            sf_ray_events *events)
-{
-  if (steps < 0 || steps > model->config.steps)
-    return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
-  if (!steps) steps = model->t_r;
   if (sf_model_decodes(model)) /* its weights are known before it decodes */
-    return sf_render_tensorf(model, origin, direction, count, steps, 1, background, rgb, depth, alpha, samples, events);
+    return sf_render_tensorf(model, origin, direction, count, steps, pictures, background, rgb, depth, alpha, samples,
+                             events);
   sf_steps intervals;
   SF_TRY(sf_march_steps(&intervals, model, 1));
   sf_net_words *net = sf_aligned_alloc(sizeof *net);
@@ -167,7 +186,7 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
   int failed = 0;
 #pragma omp parallel reduction(| : failed)
   {
-    worker *w = worker_create(model, net, steps);
+    worker *w = worker_create(model, net, steps, pictures);
     failed = !w || !w->block || !w->scratch;
     if (!failed) w->intervals = intervals;
 #pragma omp for schedule(dynamic, 1)
@@ -176,7 +195,7 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
       const int n = (int)(count - first < PACKET ? count - first : PACKET);
       begin_packet(w, origin + 3 * first, direction + 3 * first, n);
       render_packet(w, n);
-      end_packet(w, first, n, background, rgb, depth, alpha, samples);
+      end_packet(w, first, count, n, background, rgb, depth, alpha, samples);
     }
 #pragma omp critical
     if (w) sf_events_add(events, &w->events);
@@ -186,15 +205,27 @@ sf_status sf_render_counted(const sf_model *model, const float *origin, const fl
   return failed ? sf_fail(SF_E_MEMORY, "render: no memory for a block of samples") : sf_ok();
 }
 
+sf_status sf_render_counted(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                            const float background[3], float *rgb, float *depth, float *alpha, float *samples,
+                            sf_ray_events *events)
+{
+  if (steps < 0 || steps > model->config.steps)
+    return sf_fail(SF_E_RANGE, "render: %d steps, the model has %d", steps, model->config.steps);
+  return render(model, origin, direction, count, steps ? steps : model->t_r, 1, background, rgb, depth, alpha, samples,
+                events);
+}
+
+sf_status sf_render_rays(const sf_model *model, const float *origin, const float *direction, size_t count, int steps,
+                         const float background[3], float *rgb, float *depth, float *alpha, float *samples)
+{
+  sf_ray_events events = {0};
+  return sf_render_counted(model, origin, direction, count, steps, background, rgb, depth, alpha, samples, &events);
+}
+
 sf_status sf_render_prefixes(const sf_model *model, const float *origin, const float *direction, size_t count,
                              const float background[3], float *rgb)
 {
-  const int steps = model->config.steps;
   sf_ray_events events = {0};
-  if (sf_model_decodes(model)) /* the densities are those of every step */
-    return sf_render_tensorf(model, origin, direction, count, steps, steps, background, rgb, NULL, NULL, NULL, &events);
-  for (int t = 1; t <= steps; t++)
-    SF_TRY(sf_render_rays(model, origin, direction, count, t, background, rgb + 3 * count * (size_t)(t - 1), NULL, NULL,
-                          NULL));
-  return sf_ok();
+  const int steps = model->config.steps;
+  return render(model, origin, direction, count, steps, steps, background, rgb, NULL, NULL, NULL, &events);
 }
