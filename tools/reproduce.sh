@@ -222,8 +222,9 @@ trap on_signal INT TERM HUP
 look_at_data() {
   local json size wrong
   for size in downscale audit-downscale; do
-    wrong=$("$bin/sf_data" "$data" --downscale "${set[$size]}" 2>&1 >/dev/null) ||
-      echo "reproduce: ${data##*/} will fail with --$size ${set[$size]}: ${wrong##*sf_data: }"
+    wrong=$("$bin/sf_data" "$data" --downscale "${set[$size]}" 2>&1 >/dev/null) && continue
+    echo "reproduce: ${data##*/} will fail with --$size ${set[$size]}: ${wrong##*sf_data: }"
+    break
   done
   json=$("$bin/sf_data" "$data" --json 2>/dev/null)
   layout=$(sed -nE 's/^[[:space:]]*"layout":[[:space:]]*"([a-z]+)".*/\1/p' <<<"$json" | head -n 1)
