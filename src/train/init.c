@@ -1,5 +1,6 @@
-/* Initial parameters. The ReLU twin starts as torch-ngp; a spiking net's weights are scaled layer by layer until the
- * currents of random samples have the spread that makes neurons fire (after Mishkin & Matas 2016). */
+/* Initial parameters. Weights are scaled layer by layer until the currents of random samples have the spread that makes
+ * neurons fire (after Mishkin & Matas 2016). The ReLU twin starts in the same way: with the small weights of torch's
+ * linear layers it learns late, and the comparison would be of the starts. */
 #include "field/field.h"
 #include "train/internal.h"
 #include <math.h>
@@ -96,7 +97,6 @@ sf_status sf_init_parameters(sf_trainer *t)
   t->backbone->init(t);
   for (int layer = 0; layer < SF_LAYERS; layer++)
     if (sf_model_has(&t->model, sf_layer_weights[layer])) sf_layer_redraw(t, layer, RNG_INIT);
-  if (t->model.config.net == SF_NET_ANN) return sf_ok();
   sf_probes probes;
   SF_TRY(sf_probes_create(&probes, t));
   sf_probes_draw(t, RNG_PROBE, PROBES, &probes);

@@ -56,7 +56,7 @@ sf_train_options sf_train_defaults_tensorf(const sf_dataset *data)
   if (data->layout != SF_LAYOUT_BLENDER && !data->ndc) sf_tensorf_bound(&options.config, data->bound);
   if (data->layout == SF_LAYOUT_BLENDER) see_all(&options.config.tensorf, data);
   options.lr_grid = 0.02;
-  options.lr_net = 1e-3;
+  if (!data->ndc) options.lr_net = 1e-3; /* a decoder without encodings learns with the rate of the hash grid's nets */
   options.background = data->ndc ? 0 : 1;
   options.rays = 4096;
   options.samples = 1 << 15; /* many small iterations learn faster than few large ones */

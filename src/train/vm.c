@@ -40,8 +40,8 @@ static void destroy(sf_trainer *t)
   free(vm);
 }
 
-/* Planes and lines 0.1 times a normal deviate (Box and Muller), the rest uniform as torch's linear layers; biases zero
- * where the weights are scaled to the threshold afterwards. */
+/* Planes and lines 0.1 times a normal deviate (Box and Muller), the basis matrix uniform as torch's linear layers.
+ * Biases are zero: the weights are scaled to the threshold afterwards. */
 static void init(sf_trainer *t)
 {
   const sf_model *m = &t->model;
@@ -54,9 +54,6 @@ static void init(sf_trainer *t)
     m->value[i] = (float)(0.1 * sqrt(-2 * log1p(-u)) * cos(angle));
   }
   sf_init_uniform(t, SF_P_BASIS, 1 / sqrtf((float)m->param[SF_P_BASIS].shape[1]), RNG_INIT, field);
-  if (m->config.net != SF_NET_ANN) return;
-  sf_init_uniform(t, SF_P_C1_BIAS, 1 / sqrtf((float)m->param[SF_P_C1].shape[1]), RNG_INIT, field);
-  sf_init_uniform(t, SF_P_C2_BIAS, 1 / sqrtf((float)m->param[SF_P_C2].shape[1]), RNG_INIT, field);
 }
 
 static sf_status begin(sf_trainer *t, int steps)
