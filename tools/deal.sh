@@ -56,8 +56,10 @@ alone() {
 }
 
 # deal: calls visit I for every lock_of[I] that nobody has taken, once ready I says so, until each is settled or at work
-# elsewhere; their number is in elsewhere.
+# elsewhere; their number is in elsewhere. While none is ready it calls
+# work_ahead, which does what can be done of a unit before: false if nothing can.
 lock_of=() seen=() elsewhere=0
+work_ahead() { false; }
 deal() {
   local i open moved
   while [ -z "$stop" ]; do
@@ -77,6 +79,6 @@ deal() {
       fi
     done
     [ $open -gt 0 ] || return 0
-    [ -n "$moved" ] || sleep 1
+    [ -n "$moved" ] || work_ahead || sleep 1
   done
 }

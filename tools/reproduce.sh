@@ -309,6 +309,26 @@ ready() { # NUMBER
     [ -n "${seen[other]:-}" ] || { is_free "${lock_of[other]}" && settled "$other"; } || return
   done
 }
+# The twin can be trained before the run that its energy needs.
+can_train_ahead() { # NUMBER
+  local dir=$out/${unit_scene[run_unit[$1]]}/${run_name[$1]}
+  [ "${run_name[$1]}" = ann ] && [ -z "${seen[$1]:-}" ] && [ -z "$stop" ] && [ ! -s "$dir/train.json" ] && ! settled "$1"
+}
+work_ahead() {
+  local i
+  for i in "${!run_name[@]}"; do
+    can_train_ahead "$i" && claim "${lock_of[i]}" || continue
+    if can_train_ahead "$i"; then # nobody was faster
+      training_alone=1
+      visit "$i"
+      training_alone=
+      [ -s "$dir/train.json" ] || seen[i]=1 # it failed
+    fi
+    release
+    return 0
+  done
+  return 1
+}
 visit() { # NUMBER
   local unit=${run_unit[$1]}
   index=$1
@@ -338,7 +358,7 @@ probe_all() {
   [ $seconds -eq 0 ] || echo "reproduce: $total runs, about $(clock $seconds) of training"
 }
 
-started=$SECONDS index=0 failures=0 ticker_pid="" total=0 prepared=""
+started=$SECONDS index=0 failures=0 ticker_pid="" total=0 prepared="" training_alone=""
 layouts=() frames_of=()
 plan
 [ "${set[probe]}" -eq 0 ] || probe_all

@@ -272,7 +272,7 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   echo "not finished" >"$dir/status"
   start_ticker
   train && case $name in
-    ann) evaluate_ann ;;
+    ann) [ -n "$training_alone" ] || evaluate_ann ;;
     along-ray) ;; # the trainer counts it
     *) evaluate_snn ;;
   esac
@@ -282,6 +282,8 @@ one_run() { # NAME OPTIONS OF SF_TRAIN...
   echo $((before + SECONDS - run_started)) >"$dir/wall"
   if [ -n "$stop" ]; then
     say "stopped, will go on from here"
+  elif [ $code -eq 0 ] && [ -n "$training_alone" ]; then
+    say "trained; counted when the spiking run is done"
   elif [ $code -eq 0 ]; then
     echo "done" >"$dir/status"
     left[$key]=$((${left[$key]:-0} - 1)) finished[$key]=$((${finished[$key]:-0} + 1))

@@ -186,6 +186,17 @@ grep -Eq '^\| beta = 5e-8 +\| +[0-9.]+ \+- [0-9.]+ \| 33.04 \|.* seeds 1 2; 1 vi
 grep -q '^TensoRF,33.14,0.963,-,as printed' "$out/tables/models-ordinary-blender.csv" || fail "profile paper: no ordinary models"
 echo "paper: two seeds"
 
+# While the run that the twin's energy needs is at work elsewhere, the twin is trained. It is counted afterwards.
+run=$out/textured-tensorf/seed-3
+mkdir -p "$run"
+timeout 60 flock "$run/.beta-5e-7.lock" sh -c "until [ -s '$run/ann/train.json' ]; do sleep 0.05; done" &
+paper 3
+wait $! || fail "profile paper: the twin was not trained ahead"
+[ "$(count '^\[.* ann  *trained; counted when the spiking run is done,')" -eq 1 ] || fail "profile paper: not said that the twin was trained"
+[ "$run/ann/train.json" -ot "$run/beta-5e-7/train.json" ] && [ -s "$run/ann/float-0.json" ] || fail "profile paper: the twin was trained again, or not counted"
+[ "$(count '^\[.* dB, ')" -eq 3 ] && [ "$(cat "$run/ann/status")" = "done" ] || fail "profile paper: not 3 runs of seed 3"
+echo "paper: the twin ahead"
+
 # The twin, one budget and what they are held against, with the planes: nothing else.
 paper 1 --runs comparators
 [ "$(count '^\[.* dB, ')" -eq 3 ] && [ "$(count 'finished before')" -eq 2 ] || fail "comparators: not 3 runs more"
