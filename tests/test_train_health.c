@@ -7,16 +7,21 @@ static void set_up(void)
   open_scene(6);
 }
 
-/* At the start each layer's currents over the probes have its own threshold as root mean square, integrators a half. */
-LOOP_TEST(weights_start_at_the_thresholds, 2)
+/* At the start each layer's currents over the probes have its own threshold as root mean square, integrators a half; of
+ * the twin, too, whose biases are zero as well. */
+LOOP_TEST(weights_start_at_the_thresholds, 4)
 {
-  sf_train_options o = _i ? sf_train_defaults_tensorf(&data) : small_run();
+  const bool planes = _i % 2;
+  sf_train_options o = planes ? sf_train_defaults_tensorf(&data) : small_run();
   const float theta[] = {0.2f, 0.4f, 0.7f};
   memcpy(o.config.theta, theta, sizeof theta);
   o.config.hidden = 32, o.config.occ_res = 16, o.voxels = 16, o.rays = 64, o.samples = 1024, o.seed = 4;
-  for (int a = 0; a < 3 && _i; a++) o.config.tensorf.resolution[a] = 12;
+  for (int a = 0; a < 3 && planes; a++) o.config.tensorf.resolution[a] = 12;
+  if (_i / 2) o.config.net = SF_NET_ANN, o.config.steps = 1;
   OWNED(trainer) t = start(&data, &o, NULL);
   const sf_model *m = &t->model;
+  for (int id = SF_P_C1_BIAS; id <= SF_P_C3_BIAS; id += 2) /* weights lie between them */
+    for (size_t i = 0; i < m->param[id].size; i++) ck_assert(m->value[m->param[id].offset + i] == 0);
   sf_probes p;
   double sum[SF_LAYERS] = {0};
   ck_ok(sf_probes_create(&p, t));
