@@ -56,8 +56,8 @@ alone() {
 }
 
 # deal: calls visit I for every lock_of[I] that nobody has taken, once ready I says so, until each is settled or at work
-# elsewhere; their number is in elsewhere. While none is ready it calls
-# work_ahead, which does what can be done of a unit before: false if nothing can.
+# elsewhere; their number is in elsewhere. While none is ready it calls work_ahead, which does what can be done of a unit
+# before: false if nothing can.
 lock_of=() seen=() elsewhere=0
 work_ahead() { false; }
 deal() {
