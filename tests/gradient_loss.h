@@ -48,11 +48,11 @@ static inline dual oracle_regular(const oracle_ray *ray, int step, const oracle_
   return sum;
 }
 
-/* What is left of the way to opaque, of each sample where less than a tenth of the light is left. The light in front of
+/* What is left of the way to opaque, of each sample where less than nine tenths of the light are left. The light in front of
  * the first is a constant, and slopes are weighed by alpha. */
 static inline dual oracle_tail(const oracle_ray *ray, int step, double stop)
 {
-  const double tail = log(0.1);
+  const double tail = log(0.9);
   dual light = 0, sum = 0;
   for (int s = 0; s < ray->count && creal(light) > stop; s++) {
     if (creal(light) < tail) sum += (light - stop) / (tail - stop);

@@ -1,4 +1,4 @@
-/* The tail of a ray (--opaque): samples behind a surface, and what they cost in training. Its gradient is in
+/* The tail of a ray (--opaque): samples in and behind a surface, and what they cost in training. Its gradient is in
  * test_gradient.c. */
 #include "ck_run.h"
 #include "train_fixture.h"
@@ -37,11 +37,11 @@ static double slopes(const float depth[N], float slope[N])
 }
 
 /* The light in front of the samples is e^0, e^-3, e^-5, e^-8 and e^-10: the tail begins with the second, and the last
- * is past the end. Of the way from ln 0.1 to ln 1e-4, 6.908, the three have 6.210, 4.210 and 1.210 left. */
+ * is past the end. Of the way from ln 0.9 to ln 1e-4, 9.105, the three have 6.210, 4.210 and 1.210 left. */
 TEST(tail_by_hand)
 {
   float slope[N];
-  const double way = log(0.1 / 1e-4), end = log(1e-4);
+  const double way = log(0.9 / 1e-4), end = log(1e-4);
   ck_assert_double_eq_tol(slopes((const float[N]){3, 2, 3, 2, 1}, slope), (-3 - 5 - 8 - 3 * end) / way, 1e-5);
   const double one = 2 * 0.25 * 0.05 / way; /* weight, rays, length; by alpha */
   ck_assert_float_eq(slope[0], 0);          /* the surface */
@@ -63,7 +63,18 @@ TEST(rays_that_light_passes_have_no_tail)
   }
 }
 
-/* L = C M ln N: a sample more of a ray costs C M / N, from a quarter of the run on. */
+/* The tail begins within a surface: the light in front of its samples is 1, 0.95, 0.86, 0.37 and e^-10. */
+TEST(surfaces_belong_to_the_tail)
+{
+  float slope[N];
+  const double way = log(0.9 / 1e-4), end = log(1e-4);
+  ck_assert_double_eq_tol(slopes((const float[N]){0.05f, 0.1f, 0.85f, 9, 1}, slope), (-0.15 - 1 - 2 * end) / way, 1e-5);
+  const double one = 2 * 0.25 * 0.05 / way;
+  ck_assert_float_eq(slope[1], 0); /* nine tenths of the light are still there */
+  ck_assert_double_eq_tol(slope[2], -one * (1 - exp(-0.85)), 1e-3 * one);
+}
+
+/* L = C M ln N: a sample more of a ray costs C M / N. C grows from nothing, a quarter through the run. */
 TEST(price_by_hand)
 {
   sf_train_options o = small_run();
@@ -72,9 +83,11 @@ TEST(price_by_hand)
   ck_assert_float_eq(sf_tail_price(t), 0);
   t->batch.samples = 600, t->batch.rays = 50;
   sf_tail_update(t, 0.03);
-  t->progress = 0.249;
-  ck_assert_float_eq(sf_tail_price(t), 0);
   t->progress = 0.25;
+  ck_assert_float_eq(sf_tail_price(t), 0);
+  t->progress = 0.5;
+  ck_assert_double_eq_tol(sf_tail_price(t), 0.4 / 3 * 0.03 / 12, 1e-9);
+  t->progress = 1;
   ck_assert_double_eq_tol(sf_tail_price(t), 0.4 * 0.03 / 12, 1e-9);
   t->batch.samples = 1100;
   sf_tail_update(t, 0.01);
@@ -87,7 +100,7 @@ static sf_train_options solid_run(void)
   sf_train_options o = small_run();
   o.stage1 = 400, o.stage2 = 400, o.fixed_steps = 2, o.samples = 2048;
   o.config.lattice = 256, o.config.log2_hash = 14;
-  o.opaque = 2;
+  o.opaque = 4;
   o.config.stop = 1e-4; /* a long tail */
   return o;
 }

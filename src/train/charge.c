@@ -1,7 +1,8 @@
-/* What the accelerator pays for: samples behind surfaces (--opaque), and once t_r is settled, reads of weights
+/* What the accelerator pays for: samples in and behind surfaces (--opaque), and once t_r is settled, reads of weights
  * (--charge; docs/model.md). A row is read once for a neuron that fires at any step of a sample, 8 bytes at a time. */
 #include "field/field.h"
 #include "train/internal.h"
+#include <math.h>
 
 enum { READ_BYTES = 8 };
 /* Share of the averages that an iteration renews. */
@@ -58,11 +59,12 @@ void sf_charge_update(sf_trainer *t, double error)
 /* Share of the run from which on rays learn to end soon: earlier there is fog, which would become solid where it is. */
 static const double tail_from = 0.25;
 
-/* --opaque: C M ln N has the slope C M / N by N, the samples of a ray. L_opaque charges that for those of the tail. */
+/* --opaque: C M ln N has the slope C M / N by N, the samples of a ray. L_opaque charges that for those of the tail. C
+ * grows evenly from nothing to the option at the end of the run. */
 float sf_tail_price(const sf_trainer *t)
 {
-  return t->progress >= tail_from && t->tail.samples > 0 ? (float)(t->options.opaque * t->tail.error / t->tail.samples)
-                                                         : 0;
+  const double grown = fmax(t->progress - tail_from, 0) / (1 - tail_from);
+  return t->tail.samples > 0 ? (float)(t->options.opaque * grown * t->tail.error / t->tail.samples) : 0;
 }
 
 void sf_tail_update(sf_trainer *t, double error)

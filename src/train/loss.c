@@ -7,7 +7,7 @@
 #include <string.h>
 
 static const float g0 = 5e-5f, g1 = 5e-2f, g2 = 1e-6f;
-static const float tail_log = -2.3025851f; /* ln 0.1: the tail of a ray begins where less light is left */
+static const float tail_log = -0.10536052f; /* ln 0.9: the tail of a ray begins where less light is left */
 
 sf_status sf_ray_work_create(sf_ray_work *w, int samples)
 {
@@ -95,9 +95,10 @@ static double add_sparsity(int n, const float *sigma, float inverse_rays, float 
   return g2 * value;
 }
 
-/* The tail of a ray that becomes opaque: samples where less than a tenth of the light is left. Each counts by what is
- * left of the way from there to opaque, 1 down to 0. What lies before the tail is held constant, so nothing thickens in
- * front of a surface. The slope of a sample is weighed by its alpha, so what is empty is not filled. */
+/* The tail of a ray that becomes opaque: samples where less than nine tenths of the light are left, in a surface and
+ * behind it. Each counts by what is left of the way from there to opaque, 1 down to 0. What lies before the tail is held
+ * constant, so nothing thickens in front of a surface. The slope of a sample is weighed by its alpha, so what is empty
+ * is not filled. */
 static double add_tail(float stop, int n, const float *sigma, const float *delta, float weight, float *dsigma)
 {
   const float way = tail_log - stop;

@@ -27,8 +27,8 @@ typedef struct sf_train_options {
   double charge; /* once t* is found: by how many percent the error may grow for one percent fewer reads of weights */
   double search_rate; /* how fast the search's averages forget, 1 = default; the result should not hang on it */
   double alpha;       /* weight of L_extra */
-  double opaque;      /* by how many percent the error may grow for one percent fewer samples, behind surfaces; the
-                       * paper's objective has none */
+  double opaque;      /* by how many percent the error may grow at the end for one percent fewer samples, in and behind
+                       * surfaces; the paper's objective has none */
   int stage1, stage2; /* iterations; ignored when minutes > 0 */
   double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;

@@ -23,7 +23,7 @@ sf_train_options sf_train_defaults(void)
                               .beta = 5e-7,
                               .alpha = 1e-6,
                               .search_rate = 1,
-                              .opaque = 0.2,
+                              .opaque = 0.5,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,
