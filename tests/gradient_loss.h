@@ -48,8 +48,8 @@ static inline dual oracle_regular(const oracle_ray *ray, int step, const oracle_
   return sum;
 }
 
-/* What is left of the way to opaque, of each sample where less than nine tenths of the light are left. The light in front of
- * the first is a constant, and slopes are weighed by alpha. */
+/* What is left of the way to opaque, of each sample where less than nine tenths of the light are left. The light in
+ * front of the first is a constant, and slopes are weighed by alpha. */
 static inline dual oracle_tail(const oracle_ray *ray, int step, double stop)
 {
   const double tail = log(0.9);

@@ -96,9 +96,9 @@ static double add_sparsity(int n, const float *sigma, float inverse_rays, float 
 }
 
 /* The tail of a ray that becomes opaque: samples where less than nine tenths of the light are left, in a surface and
- * behind it. Each counts by what is left of the way from there to opaque, 1 down to 0. What lies before the tail is held
- * constant, so nothing thickens in front of a surface. The slope of a sample is weighed by its alpha, so what is empty
- * is not filled. */
+ * behind it. Each counts by what is left of the way from there to opaque, 1 down to 0. What lies before the tail is
+ * held constant, so nothing thickens in front of a surface. The slope of a sample is weighed by its alpha, so what is
+ * empty is not filled. */
 static double add_tail(float stop, int n, const float *sigma, const float *delta, float weight, float *dsigma)
 {
   const float way = tail_log - stop;
