@@ -75,6 +75,72 @@ TEST(neighbours_of_what_is_occupied_are_looked_at)
   check_neighbours(4, 5, 6, 15);
 }
 
+enum { FINE = 256, YOUNG = 128 };
+
+static size_t cell_at(int x, int y, int z)
+{
+  return ((size_t)z * FINE + (size_t)y) * FINE + (size_t)x;
+}
+
+/* An update of FINE cells per axis of which only the cube of `side` at (x, y, z) is occupied. All others have density
+ * 0, and what is looked at has 1. */
+static void update_around(sf_trainer *t, int side, int x, int y, int z)
+{
+  const size_t cells = sf_config_cells(&t->model.config);
+  t->iteration = 32;
+  memset(t->density, 0, cells * sizeof *t->density);
+  memset(t->model.occupancy, 0, cells / 8);
+  for (int i = 0; i < side * side * side; i++) {
+    const size_t cell = cell_at(x + i % side, y + i / side % side, z + i / side / side);
+    t->model.occupancy[cell / 8] |= (uint8_t)(1u << cell % 8);
+  }
+  ck_ok(sf_occupancy_update(t, 2));
+}
+
+static void check_cube(const sf_trainer *t, int side, int x, int y, int z)
+{
+  for (int k = -side; k < 2 * side; k++)
+    for (int j = -side; j < 2 * side; j++)
+      for (int i = -side; i < 2 * side; i++)
+        ck_assert_msg(occupied(t, cell_at(x + i, y + j, z + k)), "cell %d %d %d", x + i, y + j, z + k);
+}
+
+/* Until the lattice is settled, cubes of eight cells are one. Then each is a cell, and updates look at as many. */
+TEST(cells_are_split_halfway)
+{
+  sf_train_options o = small_run();
+  o.config.occ_res = FINE;
+  OWNED(trainer) t = start(&data, &o, NULL);
+  const size_t cells = sf_config_cells(&o.config), looked_at = (size_t)YOUNG * YOUNG * YOUNG / 32;
+  t->progress = 0.49;
+  update_around(t, 2, 14, 100, 202);
+  check_cube(t, 2, 14, 100, 202);
+  size_t alike = 0;
+  for (int z = 0; z < FINE; z += 2)
+    for (int y = 0; y < FINE; y += 2)
+      for (int x = 0; x < FINE; x += 2) {
+        int n = 0;
+        for (int i = 0; i < 8; i++) n += occupied(t, cell_at(x + i % 2, y + i / 2 % 2, z + i / 4));
+        ck_assert(n == 0 || n == 8);
+        alike += n == 8;
+      }
+  ck_assert_uint_ge(alike, looked_at);
+  ck_assert_uint_le(alike, looked_at + 27);
+  t->progress = 0.5;
+  update_around(t, 1, 15, 101, 202);
+  check_cube(t, 1, 15, 101, 202);
+  ck_assert_uint_ge(count_occupied(t), looked_at);
+  ck_assert_uint_le(count_occupied(t), looked_at + 27);
+  for (int old = 0; old < 2; old++) { /* what was seen before the split is soon forgotten */
+    t->progress = old ? 0.7 : 0.69;
+    for (size_t i = 0; i < cells; i++) t->density[i] = 100;
+    ck_ok(sf_occupancy_update(t, 2));
+    float least = 100;
+    for (size_t i = 0; i < cells; i++) least = fminf(least, t->density[i]);
+    ck_assert_float_eq_tol(least, (old ? 90.25f : 25), 1e-3f); /* some are looked at twice */
+  }
+}
+
 /* Shares of the mean density that two thirds of the cells have: before the last sweep a quarter of it is enough. An
  * update looks at few cells, and finds 1 there. */
 TEST(little_is_called_empty_while_the_field_is_young)

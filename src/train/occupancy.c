@@ -13,6 +13,12 @@
  * so much that what was seen before says nothing. */
 enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
+/* Cells per axis until the lattice is settled, and by which updates are measured. Then cells are split. Many of the
+ * small ones are empty where the large one was not, so until this share of the run what was seen before says little. */
+enum { YOUNG = 128 };
+static const double split_until = 0.7;
+static const float split_decay = 0.5f;
+
 /* Before the last sweep the threshold is a part of what it is later: thin parts are learned last. */
 static const float decay = 0.95f, density_threshold = 10.0f, young = 0.25f;
 
@@ -26,7 +32,36 @@ void sf_occupancy_point(const sf_config *c, size_t cell, const float place[3], f
     x[a] = fminf(((float)at[a] + place[a]) / (float)res * shrink + (1 - shrink) / 2, 0x1.fffffep-1f);
 }
 
+/* What an update visits: the model's cells, or cubes of them. */
+typedef struct lattice {
+  sf_config config; /* the model's, but with as many cells */
+  size_t side;      /* of a cube */
+  size_t cells, most;
+} lattice;
+
+static lattice lattice_of_now(const sf_trainer *t)
+{
+  lattice l = {.config = t->model.config, .side = 1};
+  sf_config measure = l.config;
+  while (measure.occ_res > YOUNG) measure.occ_res /= 2, l.side *= 2;
+  if (t->progress < sf_lattice_settles)
+    l.config = measure;
+  else
+    l.side = 1;
+  l.cells = sf_config_cells(&l.config);
+  l.most = sf_config_cells(&measure) / (SHARE * (size_t)sf_config_cascades(&measure));
+  return l;
+}
+
+/* The first of the model's cells in a cube. */
+static size_t first_of(const lattice *l, size_t cell)
+{
+  const size_t res = (size_t)l->config.occ_res, fine = res * l->side;
+  return ((cell / (res * res) * fine + cell / res % res) * fine + cell % res) * l->side;
+}
+
 typedef struct visit {
+  const lattice *lattice;
   const uint32_t *cell; /* NULL: cell i*stride + random */
   size_t count, stride;
   uint64_t stream;
@@ -42,7 +77,7 @@ static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
 
 static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, sf_worker *w)
 {
-  const sf_config *c = &t->model.config;
+  const sf_config *c = &v->lattice->config;
   float x[3 * SF_BLOCK];
   const size_t n = v->count - first < SF_BLOCK ? v->count - first : SF_BLOCK;
   for (size_t l = 0; l < SF_BLOCK; l++) {
@@ -64,13 +99,19 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
 /* No cell is visited twice at a time. */
 static void take_density(sf_trainer *t, const visit *v)
 {
-  const sf_config *c = &t->model.config;
-  const size_t cells = (size_t)c->occ_res * (size_t)c->occ_res * (size_t)c->occ_res; /* of a cascade */
+  const lattice *l = v->lattice;
+  const size_t res = (size_t)l->config.occ_res, cells = res * res * res; /* of a cascade */
+  const size_t fine = res * l->side;
+  const bool split = l->config.occ_res > YOUNG && t->progress < split_until;
 #pragma omp parallel for schedule(static) num_threads(t->workers)
   for (size_t i = 0; i < v->count; i++) {
     const size_t cell = visited_cell(t, v, i);
     const float width = (float)(1 << cell / cells); /* what counts is how much light a cell takes (instant-ngp) */
-    t->density[cell] = fmaxf(t->density[cell] * decay, v->sigma[i] * width);
+    const size_t first = first_of(l, cell);
+    const float density = fmaxf(t->density[first] * (split ? split_decay : decay), v->sigma[i] * width);
+    for (size_t z = 0; z < l->side; z++)
+      for (size_t y = 0; y < l->side; y++)
+        for (size_t x = 0; x < l->side; x++) t->density[first + (z * fine + y) * fine + x] = density;
   }
 }
 
@@ -92,8 +133,9 @@ static sf_status visit_cells(sf_trainer *t, const visit *v, int steps)
   return sf_ok();
 }
 
-static void threshold(sf_trainer *t, size_t cells)
+static void threshold(sf_trainer *t)
 {
+  const size_t cells = sf_config_cells(&t->model.config);
   double sum = 0;
   for (size_t i = 0; i < cells; i++) sum += t->density[i];
   const float limit = fminf((float)(sum / (double)cells), density_threshold) * (t->iteration < LAST_SWEEP ? young : 1);
@@ -110,11 +152,12 @@ static void threshold(sf_trainer *t, size_t cells)
 
 /* The empty cells that touch an occupied one, in the order in which the occupied ones find them. list: the occupied
  * cells; replaced. */
-static size_t list_neighbours(const sf_trainer *t, uint32_t *list, size_t occupied, uint8_t *seen)
+static size_t list_neighbours(const lattice *l, uint32_t *list, size_t occupied, uint8_t *seen)
 {
-  const size_t res = (size_t)t->model.config.occ_res, per = res * res * res;
+  const size_t res = (size_t)l->config.occ_res, per = res * res * res;
   size_t found = occupied;
-  memcpy(seen, t->model.occupancy, sf_config_cells(&t->model.config) / 8);
+  memset(seen, 0, l->cells / 8);
+  for (size_t i = 0; i < occupied; i++) seen[list[i] / 8] |= (uint8_t)(1u << list[i] % 8);
   for (size_t i = 0; i < occupied; i++) {
     const size_t in = list[i] % per, x = in % res, y = in / res % res, z = in / res / res;
     for (size_t k = z ? z - 1 : 0; k <= z + 1 && k < res; k++)
@@ -149,22 +192,23 @@ static bool is_sweep(int64_t iteration)
 
 static sf_status update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen, float *sigma)
 {
-  const size_t cells = sf_config_cells(&t->model.config);
-  const size_t share = SHARE * (size_t)sf_config_cascades(&t->model.config), most = cells / share;
+  const lattice l = lattice_of_now(t);
   if (is_sweep(t->iteration)) {
-    memset(t->density, 0, cells * sizeof *t->density);
-    SF_TRY(visit_cells(t, &(visit){NULL, cells, 1, RNG_OCCUPANCY, sigma}, steps));
+    memset(t->density, 0, sf_config_cells(&t->model.config) * sizeof *t->density);
+    SF_TRY(visit_cells(t, &(visit){&l, NULL, l.cells, 1, RNG_OCCUPANCY, sigma}, steps));
   } else {
     size_t occupied = 0;
-    for (size_t i = 0; i < cells; i++)
-      if (t->model.occupancy[i / 8] >> (i % 8) & 1) list[occupied++] = (uint32_t)i;
-    visit listed = {.cell = list, .sigma = sigma};
-    SF_TRY(visit_cells(t, &(visit){NULL, most, share, RNG_OCCUPANCY, sigma}, steps));
-    SF_TRY(visit_list(t, &listed, occupied, most, RNG_OCCUPANCY + 16, steps));
-    const size_t near = list_neighbours(t, list, occupied, seen);
-    SF_TRY(visit_list(t, &listed, near, most, RNG_OCCUPANCY + 32, steps));
+    for (size_t i = 0; i < l.cells; i++) {
+      const size_t first = first_of(&l, i);
+      if (t->model.occupancy[first / 8] >> (first % 8) & 1) list[occupied++] = (uint32_t)i;
+    }
+    visit listed = {.lattice = &l, .cell = list, .sigma = sigma};
+    SF_TRY(visit_cells(t, &(visit){&l, NULL, l.most, l.cells / l.most, RNG_OCCUPANCY, sigma}, steps));
+    SF_TRY(visit_list(t, &listed, occupied, l.most, RNG_OCCUPANCY + 16, steps));
+    const size_t near = list_neighbours(&l, list, occupied, seen);
+    SF_TRY(visit_list(t, &listed, near, l.most, RNG_OCCUPANCY + 32, steps));
   }
-  threshold(t, cells);
+  threshold(t);
   return sf_ok();
 }
 

@@ -12,12 +12,13 @@ static const char *const apart[] = {"--output", "--threads", "--eval-views", "--
                                     "--resume", "--log",     "--summary",    "--json",          "--quiet",
                                     "--view",   NULL};
 
-/* Sets the box, the steps through it and the finest level, unless an option sets them. A level finer than the pixels
- * costs time and learns noise. Without data, only the options count. */
+/* Sets the box, its cells, the steps through it and the finest level, unless an option sets them. A level finer than
+ * the pixels costs time and learns noise. Without data, only the options count. */
 static void set_box(train_arguments *a, const sf_dataset *data)
 {
   sf_config *c = &a->train.config;
   sf_config_bound(c, a->bound ? a->bound : data ? data->bound : 1);
+  if (c->bound == 1) c->occ_res = 256; /* where there are cascades, cells cost more memory than their samples time */
   const int pixels = data ? sf_dataset_pixels(data, c->bound) : c->finest_res;
   if (pixels < c->finest_res) c->finest_res = pixels > c->base_res ? pixels : c->base_res;
   if (a->finest_res) c->finest_res = a->finest_res;
@@ -48,6 +49,7 @@ static void settle_space(train_arguments *a, const sf_dataset *data)
   const bool vm = has_planes(a);
   a->train.config.scale = data->scale;
   if (!vm) set_box(a, data);
+  if (a->occ_res) a->train.config.occ_res = a->occ_res;
   a->train.background = a->background ? a->background - 1 : vm && any_transparent(data) ? 1 : 0;
   if (a->quiet || a->json || vm || a->fine_tune) return;
   printf("box [-%d, %d]^3, %d occupancy grid%s, ", c->bound, c->bound, sf_config_cascades(c), c->bound > 1 ? "s" : "");

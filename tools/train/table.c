@@ -117,7 +117,8 @@ static sf_option *sizes(train_arguments *a, sf_option *o)
   const sf_option list[] = {
       SF_GROUP("Sizes"),
       {"--hidden", 0, SF_ARG_INT, &c->hidden, 16, SF_LANES, NULL, "N", "neurons of a spiking layer, multiple of 16\t#"},
-      {"--occ-res", 0, SF_ARG_INT, &c->occ_res, 8, 256, NULL, "N", "occupancy cells per axis, power of two\t#"},
+      {"--occ-res", 0, SF_ARG_INT, &a->occ_res, 8, 256, NULL, "N",
+       "occupancy cells per axis, power of two; 128 where the bound is above 1\t256\t128"},
       {"--levels", 0, SF_ARG_INT, &c->levels, 1, 16, NULL, "L", "levels of the hash grid\t#\t-"},
       {"--log2-hash", 0, SF_ARG_INT, &c->log2_hash, 4, 24, NULL, "N", "log2 of a level's entries\t#\t-"},
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level\t#\t-"},
