@@ -15,7 +15,7 @@ enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
 /* Cells per axis until the lattice is settled, and by which updates are measured. Then cells are split. Many of the
  * small ones are empty where the large one was not, so until this share of the run what was seen before says little. */
-enum { YOUNG = 128 };
+enum { YOUNG = 128, OCCUPANCY_MOST = 256 };
 static const double split_until = 0.7;
 static const float split_decay = 0.5f;
 
@@ -133,21 +133,61 @@ static sf_status visit_cells(sf_trainer *t, const visit *v, int steps)
   return sf_ok();
 }
 
+/* Of as many cells as there are while the field is young: the largest density of those that were one. Small cells have
+ * a smaller mean. */
+static double mean_density(const sf_trainer *t)
+{
+  const size_t res = (size_t)t->model.config.occ_res, side = res > YOUNG ? res / YOUNG : 1;
+  const size_t layers = (size_t)sf_config_cascades(&t->model.config) * res;
+  double sum = 0;
+  for (size_t z = 0; z < layers; z += side)
+    for (size_t y = 0; y < res; y += side) {
+      float most[OCCUPANCY_MOST] = {0}; /* densities are not negative */
+      for (size_t i = 0; i < side * side; i++) {
+        const float *row = t->density + ((z + i / side) * res + y + i % side) * res;
+        for (size_t x = 0; x < res; x++) most[x] = row[x] > most[x] ? row[x] : most[x];
+      }
+      for (size_t x = 0; x < res; x += side) {
+        float one = most[x];
+        for (size_t i = 1; i < side; i++) one = fmaxf(one, most[x + i]);
+        sum += one;
+      }
+    }
+  return sum * (double)(side * side * side) / (double)sf_config_cells(&t->model.config);
+}
+
 static void threshold(sf_trainer *t)
 {
   const size_t cells = sf_config_cells(&t->model.config);
-  double sum = 0;
-  for (size_t i = 0; i < cells; i++) sum += t->density[i];
-  const float limit = fminf((float)(sum / (double)cells), density_threshold) * (t->iteration < LAST_SWEEP ? young : 1);
+  const float limit = fminf((float)mean_density(t), density_threshold) * (t->iteration < LAST_SWEEP ? young : 1);
   size_t occupied = 0;
   for (size_t byte = 0; byte < cells / 8; byte++) {
     unsigned bits = 0;
-    for (int b = 0; b < 8; b++)
-      bits |= (unsigned)(t->density[8 * byte + b] >= limit) << b; /* all alike: none is empty */
+    uint8_t is[8];
+    for (int b = 0; b < 8; b++) is[b] = t->density[8 * byte + b] >= limit; /* all alike: none is empty */
+    for (int b = 0; b < 8; b++) bits |= (unsigned)is[b] << b;
     t->model.occupancy[byte] = (uint8_t)bits;
     occupied += (size_t)__builtin_popcount(bits);
   }
   t->occupied = (double)occupied / (double)cells;
+}
+
+/* A cube is occupied as a whole, or not. */
+static size_t list_occupied(const sf_trainer *t, const lattice *l, uint32_t *list)
+{
+  size_t occupied = 0;
+  const size_t res = (size_t)l->config.occ_res, rows = l->cells / res;
+  for (size_t row = 0; row < rows; row++) {
+    const uint8_t *bits = t->model.occupancy + first_of(l, row * res) / 8;
+    for (size_t x = 0; x < res; x++) {
+      const size_t at = x * l->side;
+      if (bits[at / 8] == 0)
+        x |= 7 / l->side; /* the last of this byte */
+      else if (bits[at / 8] >> at % 8 & 1)
+        list[occupied++] = (uint32_t)(row * res + x);
+    }
+  }
+  return occupied;
 }
 
 /* The empty cells that touch an occupied one, in the order in which the occupied ones find them. list: the occupied
@@ -197,11 +237,7 @@ static sf_status update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen,
     memset(t->density, 0, sf_config_cells(&t->model.config) * sizeof *t->density);
     SF_TRY(visit_cells(t, &(visit){&l, NULL, l.cells, 1, RNG_OCCUPANCY, sigma}, steps));
   } else {
-    size_t occupied = 0;
-    for (size_t i = 0; i < l.cells; i++) {
-      const size_t first = first_of(&l, i);
-      if (t->model.occupancy[first / 8] >> (first % 8) & 1) list[occupied++] = (uint32_t)i;
-    }
+    const size_t occupied = list_occupied(t, &l, list);
     visit listed = {.lattice = &l, .cell = list, .sigma = sigma};
     SF_TRY(visit_cells(t, &(visit){&l, NULL, l.most, l.cells / l.most, RNG_OCCUPANCY, sigma}, steps));
     SF_TRY(visit_list(t, &listed, occupied, l.most, RNG_OCCUPANCY + 16, steps));
