@@ -59,6 +59,14 @@ for line in "prefixes 0.5 weighted" "paper 0 hybrid"; do
   check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*$opaque," stdout.txt
   check "--objective $objective" "has other neurons" grep -Eq "\"mode\":[[:space:]]*\"$mode\"" stdout.txt
 done
+# An object's cells are small; a larger box has cascades of large ones.
+cp -r d wide && sed -i '0,/{/s//{"aabb_scale": 4,/' wide/transforms_*.json
+for line in "d 256" "wide 128" "wide 64 --occ-res 64"; do
+  read -r data cells more <<<"$line"
+  # shellcheck disable=SC2086
+  good sf_train "$data" -o cells.safetensors $more --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1
+  check "$data $more" "has other cells" grep -aq "\"occ_res\":\"$cells\"" cells.safetensors
+done
 # A worth that was measured once has no standard error.
 good sf_train d -o once.safetensors --stage1 2 --stage2 4 --levels 2 --log2-hash 8 --lattice 128 --threads 1
 check sf_train "an error of one measurement" grep -Eq 'not reached; one more step is worth -?[0-9.e-]+ and costs [0-9.e-]+ \(measured once\)$' stdout.txt

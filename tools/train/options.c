@@ -18,7 +18,7 @@ static void set_box(train_arguments *a, const sf_dataset *data)
 {
   sf_config *c = &a->train.config;
   sf_config_bound(c, a->bound ? a->bound : data ? data->bound : 1);
-  if (c->bound == 1) c->occ_res = 256; /* where there are cascades, cells cost more memory than their samples time */
+  c->occ_res = c->bound == 1 ? 256 : 128; /* of cascades, smaller cells would take too much memory */
   const int pixels = data ? sf_dataset_pixels(data, c->bound) : c->finest_res;
   if (pixels < c->finest_res) c->finest_res = pixels > c->base_res ? pixels : c->base_res;
   if (a->finest_res) c->finest_res = a->finest_res;
