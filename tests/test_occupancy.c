@@ -131,6 +131,14 @@ TEST(cells_are_split_halfway)
   check_cube(t, 1, 15, 101, 202);
   ck_assert_uint_ge(count_occupied(t), looked_at);
   ck_assert_uint_le(count_occupied(t), looked_at + 27);
+  /* The mean is that of the cubes' largest: 4 less what was looked at, not a quarter of 7. */
+  for (size_t i = 0; i < cells; i++) t->density[i] = i / FINE % 2 || i / FINE / FINE % 2 ? 0 : i % 2 ? 3 : 4;
+  t->iteration = 272;
+  ck_ok(sf_occupancy_update(t, 2));
+  size_t threes = 0;
+  for (size_t i = 1; i < cells; i += 2) threes += occupied(t, i);
+  ck_assert_uint_ge(count_occupied(t), cells / 10);
+  ck_assert_uint_eq(threes, 0);
   for (int old = 0; old < 2; old++) { /* what was seen before the split is soon forgotten */
     t->progress = old ? 0.7 : 0.69;
     for (size_t i = 0; i < cells; i++) t->density[i] = 100;

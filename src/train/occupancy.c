@@ -13,8 +13,9 @@
  * so much that what was seen before says nothing. */
 enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
-/* Cells per axis until the lattice is settled, and by which updates are measured. Then cells are split. Many of the
- * small ones are empty where the large one was not, so until this share of the run what was seen before says little. */
+/* Cells per axis until the lattice of samples is settled, and by which updates are measured. Then cells are split. Many
+ * of the small ones are empty where the large one was not, so until this share of the run what was seen before says
+ * little. */
 enum { YOUNG = 128, OCCUPANCY_MOST = 256 };
 static const double split_until = 0.7;
 static const float split_decay = 0.5f;
@@ -33,35 +34,35 @@ void sf_occupancy_point(const sf_config *c, size_t cell, const float place[3], f
 }
 
 /* What an update visits: the model's cells, or cubes of them. */
-typedef struct lattice {
+typedef struct cell_grid {
   sf_config config; /* the model's, but with as many cells */
   size_t side;      /* of a cube */
   size_t cells, most;
-} lattice;
+} cell_grid;
 
-static lattice lattice_of_now(const sf_trainer *t)
+static cell_grid grid_of_now(const sf_trainer *t)
 {
-  lattice l = {.config = t->model.config, .side = 1};
-  sf_config measure = l.config;
-  while (measure.occ_res > YOUNG) measure.occ_res /= 2, l.side *= 2;
+  cell_grid g = {.config = t->model.config, .side = 1};
+  sf_config measure = g.config;
+  while (measure.occ_res > YOUNG) measure.occ_res /= 2, g.side *= 2;
   if (t->progress < sf_lattice_settles)
-    l.config = measure;
+    g.config = measure;
   else
-    l.side = 1;
-  l.cells = sf_config_cells(&l.config);
-  l.most = sf_config_cells(&measure) / (SHARE * (size_t)sf_config_cascades(&measure));
-  return l;
+    g.side = 1;
+  g.cells = sf_config_cells(&g.config);
+  g.most = sf_config_cells(&measure) / (SHARE * (size_t)sf_config_cascades(&measure));
+  return g;
 }
 
 /* The first of the model's cells in a cube. */
-static size_t first_of(const lattice *l, size_t cell)
+static size_t first_of(const cell_grid *g, size_t cell)
 {
-  const size_t res = (size_t)l->config.occ_res, fine = res * l->side;
-  return ((cell / (res * res) * fine + cell / res % res) * fine + cell % res) * l->side;
+  const size_t res = (size_t)g->config.occ_res, fine = res * g->side;
+  return ((cell / (res * res) * fine + cell / res % res) * fine + cell % res) * g->side;
 }
 
 typedef struct visit {
-  const lattice *lattice;
+  const cell_grid *grid;
   const uint32_t *cell; /* NULL: cell i*stride + random */
   size_t count, stride;
   uint64_t stream;
@@ -77,7 +78,7 @@ static size_t visited_cell(const sf_trainer *t, const visit *v, size_t i)
 
 static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, sf_worker *w)
 {
-  const sf_config *c = &v->lattice->config;
+  const sf_config *c = &v->grid->config;
   float x[3 * SF_BLOCK];
   const size_t n = v->count - first < SF_BLOCK ? v->count - first : SF_BLOCK;
   for (size_t l = 0; l < SF_BLOCK; l++) {
@@ -99,19 +100,19 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
 /* No cell is visited twice at a time. */
 static void take_density(sf_trainer *t, const visit *v)
 {
-  const lattice *l = v->lattice;
-  const size_t res = (size_t)l->config.occ_res, cells = res * res * res; /* of a cascade */
-  const size_t fine = res * l->side;
-  const bool split = l->config.occ_res > YOUNG && t->progress < split_until;
+  const cell_grid *g = v->grid;
+  const size_t res = (size_t)g->config.occ_res, cells = res * res * res; /* of a cascade */
+  const size_t fine = res * g->side;
+  const bool split = g->config.occ_res > YOUNG && t->progress < split_until;
 #pragma omp parallel for schedule(static) num_threads(t->workers)
   for (size_t i = 0; i < v->count; i++) {
     const size_t cell = visited_cell(t, v, i);
     const float width = (float)(1 << cell / cells); /* what counts is how much light a cell takes (instant-ngp) */
-    const size_t first = first_of(l, cell);
+    const size_t first = first_of(g, cell);
     const float density = fmaxf(t->density[first] * (split ? split_decay : decay), v->sigma[i] * width);
-    for (size_t z = 0; z < l->side; z++)
-      for (size_t y = 0; y < l->side; y++)
-        for (size_t x = 0; x < l->side; x++) t->density[first + (z * fine + y) * fine + x] = density;
+    for (size_t z = 0; z < g->side; z++)
+      for (size_t y = 0; y < g->side; y++)
+        for (size_t x = 0; x < g->side; x++) t->density[first + (z * fine + y) * fine + x] = density;
   }
 }
 
@@ -173,16 +174,16 @@ static void threshold(sf_trainer *t)
 }
 
 /* A cube is occupied as a whole, or not. */
-static size_t list_occupied(const sf_trainer *t, const lattice *l, uint32_t *list)
+static size_t list_occupied(const sf_trainer *t, const cell_grid *g, uint32_t *list)
 {
   size_t occupied = 0;
-  const size_t res = (size_t)l->config.occ_res, rows = l->cells / res;
+  const size_t res = (size_t)g->config.occ_res, rows = g->cells / res;
   for (size_t row = 0; row < rows; row++) {
-    const uint8_t *bits = t->model.occupancy + first_of(l, row * res) / 8;
+    const uint8_t *bits = t->model.occupancy + first_of(g, row * res) / 8;
     for (size_t x = 0; x < res; x++) {
-      const size_t at = x * l->side;
+      const size_t at = x * g->side;
       if (bits[at / 8] == 0)
-        x |= 7 / l->side; /* the last of this byte */
+        x |= 7 / g->side; /* the last of this byte */
       else if (bits[at / 8] >> at % 8 & 1)
         list[occupied++] = (uint32_t)(row * res + x);
     }
@@ -192,11 +193,11 @@ static size_t list_occupied(const sf_trainer *t, const lattice *l, uint32_t *lis
 
 /* The empty cells that touch an occupied one, in the order in which the occupied ones find them. list: the occupied
  * cells; replaced. */
-static size_t list_neighbours(const lattice *l, uint32_t *list, size_t occupied, uint8_t *seen)
+static size_t list_neighbours(const cell_grid *g, uint32_t *list, size_t occupied, uint8_t *seen)
 {
-  const size_t res = (size_t)l->config.occ_res, per = res * res * res;
+  const size_t res = (size_t)g->config.occ_res, per = res * res * res;
   size_t found = occupied;
-  memset(seen, 0, l->cells / 8);
+  memset(seen, 0, g->cells / 8);
   for (size_t i = 0; i < occupied; i++) seen[list[i] / 8] |= (uint8_t)(1u << list[i] % 8);
   for (size_t i = 0; i < occupied; i++) {
     const size_t in = list[i] % per, x = in % res, y = in / res % res, z = in / res / res;
@@ -232,17 +233,17 @@ static bool is_sweep(int64_t iteration)
 
 static sf_status update(sf_trainer *t, int steps, uint32_t *list, uint8_t *seen, float *sigma)
 {
-  const lattice l = lattice_of_now(t);
+  const cell_grid g = grid_of_now(t);
   if (is_sweep(t->iteration)) {
     memset(t->density, 0, sf_config_cells(&t->model.config) * sizeof *t->density);
-    SF_TRY(visit_cells(t, &(visit){&l, NULL, l.cells, 1, RNG_OCCUPANCY, sigma}, steps));
+    SF_TRY(visit_cells(t, &(visit){&g, NULL, g.cells, 1, RNG_OCCUPANCY, sigma}, steps));
   } else {
-    const size_t occupied = list_occupied(t, &l, list);
-    visit listed = {.lattice = &l, .cell = list, .sigma = sigma};
-    SF_TRY(visit_cells(t, &(visit){&l, NULL, l.most, l.cells / l.most, RNG_OCCUPANCY, sigma}, steps));
-    SF_TRY(visit_list(t, &listed, occupied, l.most, RNG_OCCUPANCY + 16, steps));
-    const size_t near = list_neighbours(&l, list, occupied, seen);
-    SF_TRY(visit_list(t, &listed, near, l.most, RNG_OCCUPANCY + 32, steps));
+    const size_t occupied = list_occupied(t, &g, list);
+    visit listed = {.grid = &g, .cell = list, .sigma = sigma};
+    SF_TRY(visit_cells(t, &(visit){&g, NULL, g.most, g.cells / g.most, RNG_OCCUPANCY, sigma}, steps));
+    SF_TRY(visit_list(t, &listed, occupied, g.most, RNG_OCCUPANCY + 16, steps));
+    const size_t near = list_neighbours(&g, list, occupied, seen);
+    SF_TRY(visit_list(t, &listed, near, g.most, RNG_OCCUPANCY + 32, steps));
   }
   threshold(t);
   return sf_ok();
