@@ -13,9 +13,8 @@
  * so much that what was seen before says nothing. */
 enum { SHARE = 32, FIRST = 16, LAST_SWEEP = 256 };
 
-/* Cells per axis until the lattice of samples is settled, and by which updates are measured. Then cells are split. Many
- * of the small ones are empty where the large one was not, so until this share of the run what was seen before says
- * little. */
+/* Until the lattice of samples is settled, there are at most YOUNG cells per axis. Then cells are split. Many of the
+ * small ones are empty where the large one was not, so until this share of the run what was seen before says little. */
 enum { YOUNG = 128, OCCUPANCY_MOST = 256 };
 static const double split_until = 0.7;
 static const float split_decay = 0.5f;
@@ -35,22 +34,25 @@ void sf_occupancy_point(const sf_config *c, size_t cell, const float place[3], f
 
 /* What an update visits: the model's cells, or cubes of them. */
 typedef struct cell_grid {
-  sf_config config; /* the model's, but with as many cells */
-  size_t side;      /* of a cube */
-  size_t cells, most;
+  sf_config config;   /* the model's, but with as many cells */
+  size_t side;        /* of a cube */
+  size_t cells, most; /* in all; that one pass of an update visits */
 } cell_grid;
+
+/* Of a cube that is one cell while the field is young, in the model's cells. */
+static size_t young_side(const sf_config *c)
+{
+  return c->occ_res > YOUNG ? (size_t)c->occ_res / YOUNG : 1;
+}
 
 static cell_grid grid_of_now(const sf_trainer *t)
 {
-  cell_grid g = {.config = t->model.config, .side = 1};
-  sf_config measure = g.config;
-  while (measure.occ_res > YOUNG) measure.occ_res /= 2, g.side *= 2;
-  if (t->progress < sf_lattice_settles)
-    g.config = measure;
-  else
-    g.side = 1;
+  const sf_config *c = &t->model.config;
+  const size_t side = young_side(c), cubes = sf_config_cells(c) / (side * side * side);
+  cell_grid g = {.config = *c, .side = t->progress < sf_lattice_settles ? side : 1};
+  g.config.occ_res /= (int)g.side;
   g.cells = sf_config_cells(&g.config);
-  g.most = sf_config_cells(&measure) / (SHARE * (size_t)sf_config_cascades(&measure));
+  g.most = cubes / (SHARE * (size_t)sf_config_cascades(c));
   return g;
 }
 
@@ -138,7 +140,7 @@ static sf_status visit_cells(sf_trainer *t, const visit *v, int steps)
  * a smaller mean. */
 static double mean_density(const sf_trainer *t)
 {
-  const size_t res = (size_t)t->model.config.occ_res, side = res > YOUNG ? res / YOUNG : 1;
+  const size_t res = (size_t)t->model.config.occ_res, side = young_side(&t->model.config);
   const size_t layers = (size_t)sf_config_cascades(&t->model.config) * res;
   double sum = 0;
   for (size_t z = 0; z < layers; z += side)

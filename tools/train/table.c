@@ -45,9 +45,8 @@ static sf_option *energy(train_arguments *a, sf_option *o)
        "once the steps are found, neurons learn to fire less: the error may grow by C percent for each percent of "
        "fewer reads of weights; 0.2 is a good start (default 0)"},
       {"--opaque", 0, SF_ARG_DOUBLE, &t->opaque, 0, 10, NULL, "C",
-       "rays learn to end soon in a surface: the error may grow by C percent for each percent of fewer samples; 0: "
-       "rays "
-       "as long as the paper's (default 0.5)"},
+       "rays learn to end soon in a surface: the error may grow by C percent for each percent of fewer samples; "
+       "0: rays as long as the paper's (default 0.5)"},
       {"--steps", 'T', SF_ARG_INT, &t->config.steps, 1, SF_T_MAX, NULL, "T",
        "time steps unrolled in training (default 8)"},
       {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
