@@ -156,7 +156,7 @@ static sf_model along_model(int planes)
   m.config.along = 1;
   m.t_r = 1, m.t_star = 1;
   if (!planes) drive(&m);
-  if (planes) m.config.tensorf.shift = -2;
+  if (planes) m.config.tensorf.shift = -2, m.config.tensorf.weight_stop = 0.008;
   return m;
 }
 
@@ -192,7 +192,8 @@ static int naive_ray(naive *n, const sf_steps *intervals, const float *o, const 
     } else
       sf_grid_features(m, x, in);
     const float length = intervals->length[at];
-    const bool seen = !sf_model_decodes(m) || light * (1 - expf(-sigma * length)) > sf_unseen;
+    const bool seen =
+        !sf_model_decodes(m) || light * (1 - expf(-sigma * length)) > (float)m->config.tensorf.weight_stop;
     if (seen) naive_sample(n, in, sh, &sigma, colour);
     const float behind = light * expf(-sigma * length);
     for (int c = 0; c < 3 && seen; c++) rgb[c] += (light - behind) * colour[c];
@@ -223,7 +224,7 @@ LOOP_TEST(rendering_equals_the_naive_net, 2)
     all += (uint64_t)count, met += count > 0;
     longest = count > longest ? count : longest;
   }
-  ck_assert_int_gt(longest, 8);
+  ck_assert_int_ge(longest, 8);
   ck_assert_int_le(wrong, RAYS / 50);
   ck_assert_double_le(fabs((double)events.samples - (double)all), 0.005 * (double)all);
   ck_assert_double_le(fabs((double)events.rays - (double)met), 2);

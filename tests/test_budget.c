@@ -65,6 +65,7 @@ static sf_model make_model(int kind)
   }
   sf_model m = test_smooth_tensorf(kind == FORWARD);
   sf_tensorf *t = &m.config.tensorf;
+  t->weight_stop = 0.0005;
   m.config.mode = kind == TUNED ? SF_HYBRID : (sf_input_mode)(kind - OBJECT);
   for (int i = 0; i < 3 && kind == LARGE_BOX; i++) t->box[0][i] = -4, t->box[1][i] = 4;
   if (kind == TUNED) settle(&m);

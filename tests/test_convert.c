@@ -130,6 +130,7 @@ TEST(decoder)
   sf_converted_output out[3];
   sf_conversion own, at[3];
   sf_model planes = test_tensorf(SF_NET_ANN, 0, HIDDEN, 1);
+  planes.config.tensorf.weight_stop = 0.0003;
   for (int i = 0; i < HIDDEN; i++)
     sf_model_param(&planes, SF_P_C1_BIAS)[i] = 0.2f * test_random(70000 + i),
                             sf_model_param(&planes, SF_P_C2_BIAS)[i] = 0.1f * test_random(71000 + i);

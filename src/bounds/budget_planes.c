@@ -1,6 +1,5 @@
 /* Error budget: TensoRF's planes, lines and basis matrix. Derivations: docs/fixed-point.md. */
 #include "bounds/budget_small.h"
-#include "render/composite.h"
 #include "src/fx/tensorf_place.h"
 #include "src/fx/unit.h"
 #include <stdlib.h>
@@ -259,7 +258,7 @@ void sf_budget_undecoded(sf_budget_row *row, uint64_t samples)
                     .occupancy = all,
                     .step_q24 = 1 << 16, /* a density's LSB is one of Q.20 in the exponent */
                     .max_samples = 1024};
-  const int32_t stop = (int32_t)floor(ldexp((double)sf_unseen, SF_TRANS_FRAC));
+  const int32_t stop = (int32_t)floor(ldexp(SF_WEIGHT_STOP_FIRST, SF_TRANS_FRAC));
   fx_tensorf *f = &scene.tensorf;
   f->activation = FX_RELU, f->sigma_out = (fx_scale){1, FX_ACTIVATION_FRAC - SF_LOG_FRAC, 0};
   f->feature_in = (fx_scale){40000, 34, 0};

@@ -1,6 +1,5 @@
 /* The nets, compositing, and one choice of blocks. */
 #include "bounds/exact.h"
-#include "render/composite.h"
 #include "src/fx/unit.h"
 #include <stdlib.h>
 #include <string.h>
@@ -96,7 +95,7 @@ sf_status sf_exact_open(sf_exact *e, const fx_scene *scene, const sf_model *mode
   }
   set_scalars(e);
   e->weight_stop = sf_exact_is(e, SF_EXACT_DECODE)      ? 0
-                   : sf_exact_is(e, SF_EXACT_COMPOSITE) ? ldexp((double)sf_unseen, SF_TRANS_FRAC)
+                   : sf_exact_is(e, SF_EXACT_COMPOSITE) ? ldexp(model->config.tensorf.weight_stop, SF_TRANS_FRAC)
                                                         : scene->tensorf.weight_stop;
   const sf_status status = scene->backbone == FX_TENSORF ? sf_exact_planes_open(e) : sf_ok();
   if (status.code != SF_OK) sf_exact_close(e);

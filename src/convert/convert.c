@@ -1,7 +1,6 @@
 /* Conversion: balanced thresholds, and one sample through integrate-and-fire neurons. */
 #include "convert/internal.h"
 #include "base/rng.h"
-#include "render/composite.h"
 #include "render/march.h"
 #include "snn/plif.h"
 #include <math.h>
@@ -42,7 +41,7 @@ bool convert_read(const sf_model *twin, const convert_ray *ray, const float x[3]
   const sf_tensorf *field = &twin->config.tensorf;
   float appearance[SF_APPEARANCE_MAX];
   point->sigma = sf_tensorf_sigma(field, sf_tensorf_density_feature(twin, x));
-  if (transmittance * (1 - expf(-point->sigma * length)) <= sf_unseen) return false;
+  if (transmittance * (1 - expf(-point->sigma * length)) <= (float)field->weight_stop) return false;
   sf_tensorf_appearance(twin, x, appearance);
   sf_tensorf_encode(field, appearance, ray->direction, point->in);
   return true;

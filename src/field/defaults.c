@@ -49,6 +49,7 @@ sf_config sf_tensorf_default(float scale, int ndc)
   f->near = ndc ? 0 : 2 * scale;
   f->far = ndc ? 1e6f : 6 * scale;
   f->ndc = ndc;
+  f->weight_stop = SF_WEIGHT_STOP_FIRST;
   sf_tensorf_resolution(f->box, 128 * 128 * 128, f->resolution);
   return c;
 }

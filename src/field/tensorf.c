@@ -35,7 +35,8 @@ sf_status sf_tensorf_check(const sf_tensorf *f)
   SF_TRY(check("step_ratio", f->step_ratio, 0.05, 8));
   SF_TRY(check("near", f->near, 0, 1e6));
   SF_TRY(check("far", f->far, f->near + 1e-6, 1e9));
-  return check("ndc", f->ndc, 0, 1);
+  SF_TRY(check("ndc", f->ndc, 0, 1));
+  return check("weight_stop", f->weight_stop, SF_WEIGHT_STOP_MIN, SF_WEIGHT_STOP_MAX);
 }
 
 void sf_tensorf_resolution(float box[2][3], double voxels, int32_t resolution[3])

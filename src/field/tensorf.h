@@ -32,8 +32,12 @@ typedef struct sf_tensorf {
   float step_ratio;     /* distance of two samples over the mean edge of a voxel */
   float near, far;      /* samples lie at these distances from the origin of a ray, model units, within the box */
   int32_t ndc;          /* 1: rays come in normalised device coordinates (forward-facing scenes) */
+  double weight_stop;   /* a sample of at most this weight takes its light, but is not decoded. 1e-6..0.05 */
 } sf_tensorf;
 
+#define SF_WEIGHT_STOP_MIN 1e-6 /* of weight_stop: fixed point holds 2^-20 */
+#define SF_WEIGHT_STOP_MAX 0.05
+#define SF_WEIGHT_STOP_FIRST 1e-4 /* TensoRF's, where a training begins; of files that do not say, too */
 enum { SF_COMPONENTS_MAX = 48, SF_APPEARANCE_MAX = 32, SF_DECODER_MAX = 160, SF_FREQS_MAX = 4 };
 
 /* Axes of mode m: the plane's columns, its rows, the line. */

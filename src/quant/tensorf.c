@@ -1,7 +1,6 @@
 /* TensoRF's field and decoder in the quantiser. */
 #include "base/rng.h"
 #include "src/quant/internal.h"
-#include "render/composite.h"
 #include <math.h>
 #include <string.h>
 
@@ -52,7 +51,7 @@ static void set_scalars(fx_scene *scene, const sf_model *model)
   scene->units.near = from->near, scene->units.far = from->far;
   scene->step_q24 = (int32_t)nearbyint(ldexp(sf_tensorf_step(from) / edge, SF_DELTA_FRAC));
   to->activation = from->activation == SF_RELU ? FX_RELU : FX_SOFTPLUS;
-  to->weight_stop = (int32_t)floor(ldexp((double)sf_unseen, SF_TRANS_FRAC));
+  to->weight_stop = (int32_t)floor(ldexp(from->weight_stop, SF_TRANS_FRAC));
 }
 
 /* ---- calibration: points that a ray sees ---- */

@@ -4,9 +4,6 @@
 #define SF_RENDER_COMPOSITE_H
 #include <stddef.h>
 
-/* A sample of at most this weight is not decoded. */
-static const float sf_unseen = 1e-4f;
-
 /* alpha_s = 1 - exp(-sigma_s delta_s), w_s = alpha_s prod_{j<s} (1 - alpha_j). Returns the transmittance behind. */
 float sf_composite_weights(int n, const float *sigma, const float *delta, float *weight);
 /* rgb = sum w_s colour_s + transmittance * background. colour[n][3]. */

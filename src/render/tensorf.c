@@ -1,7 +1,6 @@
 /* Rendering of a TensoRF model: a ray's weights come from its densities alone, so the samples that count are known
  * before the decoder sees any; they fill blocks across rays. */
 #include "base/memory.h"
-#include "render/composite.h"
 #include "render/render.h"
 #include "render/view.h"
 #include "render/vm_ray.h"
@@ -74,7 +73,7 @@ static void render_ray(worker *w, const float *origin, const float *direction, c
     for (int c = 0; c < 3; c++) rgb[(size_t)i * w->picture + c] = behind * background[c];
   for (int s = 0; s < n; s++) {
     far += w->samples.weight[s] * sf_march_distance(&march, w->samples.lattice[s]);
-    if (w->samples.weight[s] <= sf_unseen) continue;
+    if (w->samples.weight[s] <= (float)f->weight_stop) continue;
     w->block->net.first |= (uint64_t)!decoded++ << w->fill;
     w->block->net.state[w->fill] = &w->state;
     memcpy(w->x + 3 * w->fill, w->samples.x + 3 * s, 3 * sizeof(float));

@@ -120,6 +120,8 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   }
   c->stop = 1e-4; /* of files that do not say */
   if (sf_tensors_meta(set, "stop")) SF_TRY(meta_number(set, "stop", &c->stop));
+  c->tensorf.weight_stop = SF_WEIGHT_STOP_FIRST;
+  if (sf_tensors_meta(set, "weight_stop")) SF_TRY(meta_number(set, "weight_stop", &c->tensorf.weight_stop));
   SF_TRY(load_space(set, c));
   sf_status status = sf_config_check(c);
   return status.code ? sf_fail(status.code, "%s: %s", set->path, status.message) : status;
@@ -153,6 +155,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   if (c.backbone) sf_tensors_put_number(meta, "backbone", c.backbone);
   if (c.along) sf_tensors_put_number(meta, "along_ray", c.along);
   put_numbers(meta, more, sf_field_of(&c)->numbers(&c, more));
+  if (c.backbone == SF_TENSORF) sf_tensors_put_number(meta, "weight_stop", c.tensorf.weight_stop);
   sf_number space[SPACE_NUMBERS];
   space_numbers(&c, space);
   const int numbers = !c.space.poses ? SPACE_POSES : !c.space.picture ? SPACE_PICTURE : SPACE_NUMBERS;

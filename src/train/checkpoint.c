@@ -38,7 +38,7 @@ typedef struct state_field {
   int *small;
 } state_field;
 
-enum { STATE_FIELDS = 46, VM_FIELDS = 3, COST_FIELDS = 4 };
+enum { STATE_FIELDS = 46, VM_FIELDS = 5, COST_FIELDS = 4 };
 enum { FIELDS_MAX = STATE_FIELDS + SF_T_MAX + VM_FIELDS + COST_FIELDS };
 /* Those of every prefix, and of what only some trainers have. */
 static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS])
@@ -60,6 +60,8 @@ static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS
   f[n++] = (state_field){"train.vm_event", .small = &t->vm->event};
   f[n++] = (state_field){"train.vm_fresh", .integer = &t->vm->fresh};
   f[n++] = (state_field){"train.vm_fresh_at", .number = &t->vm->fresh_at};
+  f[n++] = (state_field){"train.vm_light", .number = &t->vm->light};
+  f[n++] = (state_field){"train.vm_undecoded", .number = &t->vm->undecoded};
   return n;
 }
 

@@ -35,11 +35,12 @@ typedef struct sf_train_options {
   int samples;            /* samples per iteration, about */
   double lr_grid, lr_net; /* Adam, decayed to three tenths over the run */
   bool no_stage1, no_extra, no_penalty, no_distill;
-  bool no_scaling; /* no max time-step scaling in the first epoch of each stage */
-  int fixed_steps; /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
-  int background;  /* 0 random per ray, 1 white, 2 black */
-  int rays;        /* TensoRF: of an iteration */
-  int voxels;      /* TensoRF: the finest grid has voxels^3 in the shrunk box */
+  bool no_scaling;  /* no max time-step scaling in the first epoch of each stage */
+  int fixed_steps;  /* t* in stage II, frozen, without L_budg: 1..T; 0 = t* is learned */
+  int background;   /* 0 random per ray, 1 white, 2 black */
+  int rays;         /* TensoRF: of an iteration */
+  int voxels;       /* TensoRF: the finest grid has voxels^3 in the shrunk box */
+  double undecoded; /* TensoRF: share of the light that samples without a decoder may take; 0: weight_stop stays */
   /* Fine-tuning for few bits: starts from this model, whose scales are settled, at its t_r, without stage I and at a
    * tenth of the rates, with the weights rounded as the exporter will. Not owned; replaces config. NULL: from scratch.
    */

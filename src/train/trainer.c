@@ -24,6 +24,7 @@ sf_train_options sf_train_defaults(void)
                               .alpha = 1e-6,
                               .search_rate = 1,
                               .opaque = 0.5,
+                              .undecoded = 0.01,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,
@@ -194,7 +195,7 @@ sf_status sf_trainer_create(sf_trainer **trainer, const sf_dataset *data, const 
   sf_trainer *t = calloc(1, sizeof *t);
   if (!t) return sf_fail(SF_E_MEMORY, "train: no memory");
   t->options = *options;
-  if (options->objective == SF_OBJECTIVE_PAPER) t->options.opaque = 0;
+  if (options->objective == SF_OBJECTIVE_PAPER) t->options.opaque = t->options.undecoded = 0;
   t->data = data;
   t->kernels = sf_kernels_training();
   sf_status status = sf_ranks_agree(t->options.ranks, create(t, resume));

@@ -13,6 +13,7 @@ typedef struct sf_vm_part {
 
 typedef struct sf_vm_ray_samples {
   int part, first, count;
+  float light, undecoded; /* what all samples take of the ray's light, and those that the decoder does not see */
 } sf_vm_ray_samples;
 
 typedef struct sf_vm {
@@ -24,9 +25,10 @@ typedef struct sf_vm {
   int lanes_capacity;
   float *wire; /* between ranks */
   size_t wire_capacity;
-  int event;       /* of the schedule, to come */
-  int64_t fresh;   /* iteration at which the optimiser started anew */
-  double fresh_at; /* progress there */
+  int event;               /* of the schedule, to come */
+  int64_t fresh;           /* iteration at which the optimiser started anew */
+  double fresh_at;         /* progress there */
+  double light, undecoded; /* what samples take of the rays' light, all and undecoded ones: recent iterations */
 } sf_vm;
 
 sf_status sf_vm_draw(sf_trainer *trainer);

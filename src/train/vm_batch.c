@@ -1,7 +1,7 @@
 /* Rays of one iteration and their densities. Rays that meet no cell of the mask are drawn again: TensoRF filters its
  * rays once, which is the same choice without a list of pixels. */
 #include "train/vm.h"
-#include "render/composite.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -29,15 +29,20 @@ static void look(sf_trainer *t, int r, const sf_march *march, sf_vm_part *p)
   const int n = sf_vm_ray(t->kernels, &vm->density, march,
                           (sf_vm_samples){p->x + 3 * at, p->sigma + at, p->slope + at, p->weight + at, NULL}, &behind);
   uint64_t *hit = t->batch.hit[r];
+  const float least = (float)t->model.config.tensorf.weight_stop;
+  float light = 0, undecoded = 0;
   int kept = 0;
   memset(hit, 0, sizeof t->batch.hit[r]);
-  for (int s = 0; s < n; s++)
-    if (p->weight[at + s] > sf_unseen) {
+  for (int s = 0; s < n; s++) {
+    const float weight = p->weight[at + s];
+    light += weight;
+    if (weight > least) {
       hit[s / 64] |= (uint64_t)1 << s % 64;
       kept++;
-    }
-  vm->ray[r].first = at;
-  vm->ray[r].count = n;
+    } else
+      undecoded += weight;
+  }
+  vm->ray[r] = (sf_vm_ray_samples){vm->ray[r].part, at, n, light, undecoded};
   t->batch.ray[r].count = kept;
   p->used += n;
 }
@@ -67,6 +72,20 @@ static void place(sf_trainer *t, int r)
       memcpy(to, x + 3 * (64 * word + __builtin_ctzll(bits)), 3 * sizeof *to);
 }
 
+/* --undecoded: the weight up to which samples are not decoded follows the light that they take, in the mean over recent
+ * iterations. In fog, where every weight is small, it stays small. */
+static void adapt_weight_stop(sf_trainer *t)
+{
+  static const double renewed = 1.0 / 16, moved = 1.0 / 32, most = 2;
+  sf_vm *vm = t->vm;
+  double *stop = &t->model.config.tensorf.weight_stop, light = 0, undecoded = 0;
+  for (int r = 0; r < t->batch.rays; r++) light += vm->ray[r].light, undecoded += vm->ray[r].undecoded;
+  if (sf_tuning(t) || t->options.undecoded <= 0) return;
+  vm->light += renewed * (light - vm->light), vm->undecoded += renewed * (undecoded - vm->undecoded);
+  const double room = fmin(t->options.undecoded * vm->light / fmax(vm->undecoded, 1e-9), most);
+  *stop = fmin(fmax(*stop * pow(room, moved), SF_WEIGHT_STOP_FIRST), SF_WEIGHT_STOP_MAX);
+}
+
 sf_status sf_vm_draw(sf_trainer *t)
 {
   sf_batch *b = &t->batch;
@@ -94,6 +113,7 @@ sf_status sf_vm_draw(sf_trainer *t)
   for (int part = 1; part < GROUPS && !status[0].code; part++) status[0] = status[part];
   SF_TRY(sf_ranks_agree(t->options.ranks, status[0]));
   SF_TRY(sf_vm_share_draw(t));
+  adapt_weight_stop(t);
   b->marched = b->samples = 0;
   for (int r = 0; r < b->rays; r++) {
     b->marched += vm->ray[r].count;

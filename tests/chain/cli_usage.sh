@@ -46,7 +46,9 @@ for option in --net\ ann --levels\ 4 --steps=4 -T4 --bound\ 2 --stage1\ 3 --no-s
 done
 for option in --stage1 --stage2; do usage "$option has no effect beside --minutes" sf_train d -o out -m 1 $option 4; done
 usage "also --summary" sf_train d -o out --summary out.jsonl
-for option in --rays --voxels; do usage "$option has no effect on --backbone ingp" sf_train d -o out $option 64; done
+for option in --rays\ 64 --voxels\ 64 --undecoded\ 0.01; do
+  usage "${option% *} has no effect on --backbone ingp" sf_train d -o out $option
+done
 for option in --levels --finest-res --bound; do
   usage "$option has no effect on --backbone tensorf" sf_train d -o out --backbone tensorf $option 4
 done
@@ -59,8 +61,10 @@ number sf_train --target-loss -1 21 nan x
 number sf_train --target-saving -1 101 nan x
 number sf_train --search-rate 0 -1 101 nan x
 number sf_train --opaque -1 11 nan x
+number sf_train --undecoded -1 0.11 nan x
 number sf_train --stop 0 1e-7 0.051 nan x
 usage "--opaque has no effect beside --objective paper" sf_train d -o out --objective paper --opaque 0.1
+usage "--undecoded has no effect beside --objective paper" sf_train d -o out --backbone tensorf --objective paper --undecoded 0.1
 usage --price sf_train d -o out --price euros
 usage --objective sf_train d -o out --objective none
 usage "beside a target" sf_train d -o out --target-loss 0.1 --beta 1e-6

@@ -66,18 +66,39 @@ static sf_status check_effect(train_arguments *a)
 {
   static const char *const grid[] = {"--levels",  "--log2-hash", "--base-res", "--finest-res",
                                      "--lattice", "--bound",     "--dt-gamma", NULL};
-  static const char *const planes[] = {"--rays", "--voxels", NULL};
-  static const char *const settled[] = {
-      "--backbone", "--net",         "--steps",         "--input-mode",  "--hidden",      "--theta",
-      "--occ-res",  "--voxels",      "--stop",          "--fixed-steps", "--stage1",      "--no-stage1",
-      "--no-extra", "--no-penalty",  "--no-budget",     "--no-distill",  "--no-scaling",  "--beta",
-      "--price",    "--target-loss", "--target-saving", "--objective",   "--search-rate", "--steps-along-ray",
-      NULL};
+  static const char *const planes[] = {"--rays", "--voxels", "--undecoded", NULL};
+  static const char *const settled[] = {"--backbone",
+                                        "--net",
+                                        "--steps",
+                                        "--input-mode",
+                                        "--hidden",
+                                        "--theta",
+                                        "--occ-res",
+                                        "--voxels",
+                                        "--stop",
+                                        "--undecoded",
+                                        "--fixed-steps",
+                                        "--stage1",
+                                        "--no-stage1",
+                                        "--no-extra",
+                                        "--no-penalty",
+                                        "--no-budget",
+                                        "--no-distill",
+                                        "--no-scaling",
+                                        "--beta",
+                                        "--price",
+                                        "--target-loss",
+                                        "--target-saving",
+                                        "--objective",
+                                        "--search-rate",
+                                        "--steps-along-ray",
+                                        NULL};
   static const char *const minutes[] = {"--minutes", NULL}, *const iterations[] = {"--stage1", "--stage2", NULL},
                            *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};
-  static const char *const rays[] = {"--opaque", NULL}, *const spiking[] = {"--charge", "--steps-along-ray", NULL};
+  static const char *const rays[] = {"--opaque", "--undecoded", NULL}, *const spiking[] = {"--charge",
+                                                                                           "--steps-along-ray", NULL};
   static const char *const steps[] = {"--fixed-steps", "--charge", NULL}, *const mode[] = {"--input-mode", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";
   sf_option options[TRAIN_OPTIONS_MAX];
