@@ -210,6 +210,9 @@ static void print_text(const train_arguments *a, const sf_model *m, const sf_tra
   if (sf_field_of(c)->lattice)
     printf("%s: samples lie 2 sqrt(3) / %d apart%s\n", a->output, c->lattice,
            c->dt_gamma > 0 ? " near the camera" : "");
+  if (sf_model_decodes(m))
+    printf("%s: samples that take at most %.2g of their ray's light are not decoded\n", a->output,
+           c->tensorf.weight_stop);
   if (!q->prefixes) return;
   printf("%s: PSNR at 1..%d steps:", a->output, q->prefixes);
   for (int i = 0; i < q->prefixes; i++) printf(" %.2f", q->prefix[i]);
