@@ -37,7 +37,7 @@ number sf_train --backbone nerf
 number sf_train --voxels 8 2000 nan
 number sf_train --rays 1 nan
 usage --fine-tune sf_train d -o out --backbone tensorf --fine-tune model.safetensors
-for option in --backbone\ tensorf --voxels\ 32 --hidden\ 32; do
+for option in --backbone\ tensorf --voxels\ 32 --hidden\ 32 --undecoded\ 0.02; do
   usage "has no effect beside --fine-tune" sf_train d -o out --fine-tune vm.safetensors $option
 done
 usage "--levels has no effect on --backbone tensorf" sf_train d -o out --fine-tune vm.safetensors --levels 4
