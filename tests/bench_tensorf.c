@@ -83,6 +83,7 @@ static sf_status iterations(const sf_dataset *data, const sf_kernels *kernels, s
   options.stage1 = 1000;
   options.stage2 = 0;
   options.no_scaling = true;
+  options.undecoded = 0; /* the decoder is fed as in TensoRF */
   sf_trainer *t = NULL;
   sf_status status = sf_trainer_create(&t, data, &options, NULL);
   double samples = 0, seconds = 0;
