@@ -14,7 +14,7 @@ quick_dut() { export GNUMAKEFLAGS="VERILATED_OPT=${quick// /\\ }"; }
 
 fail() {
   echo "FAILED: $*"
-  tail -n 4 "$work"/{out,err,log} 2>/dev/null
+  grep -lI . "$work"/{out,err,log} 2>/dev/null | xargs -r tail -n 4 # what is text: out may be a model
   failures=$((failures + 1))
 }
 finish() { # TEXT: the last line of a script where nothing failed

@@ -8,9 +8,10 @@ BIN=$build/bin TOOLS=$root/tools
 cd "$work" || exit 2
 passed=0
 
-# run PROGRAM ARGS...: leaves $status, files stdout.txt and err.
+# run PROGRAM ARGS...: leaves $status, files stdout.txt and err. The program is ended after $limit seconds.
+limit=300
 run() {
-  timeout -k 5 300 "$BIN/$1" "${@:2}" >stdout.txt 2>err </dev/null
+  timeout -k 5 "$limit" "$BIN/$1" "${@:2}" >stdout.txt 2>err </dev/null
   status=$?
 }
 
@@ -27,7 +28,8 @@ judge() {
   else passed=$((passed + 1)); return; fi
 }
 
-usage() { # PATTERN PROGRAM ARGS...
+usage() { # PATTERN PROGRAM ARGS...; soon, before any work
+  local limit=30
   run "${@:2}"
   judge "usage: ${*:2}" "$2" 2 "$1"
 }
