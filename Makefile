@@ -111,7 +111,7 @@ isa_avx512vnni := $(isa_avx512) -mavx512vnni -mavx512vbmi2 -mavx512vpopcntdq
 isa_amx := $(isa_avx512bf16) -mavx512vnni -mavx512vpopcntdq -mamx-tile -mamx-bf16 -mamx-int8
 # Those that take longest to compile begin.
 LIB_OBJ := $(foreach i,$(ISAS_snn),$B/obj/src/snn/kernels_isa.$i.o) $(foreach i,$(ISAS_fx),$B/obj/src/fx/kernels_isa.$i.o) \
-  $(LIB_SRC:%.c=$B/obj/%.o)
+  $(foreach i,$(ISAS_snn),$B/obj/src/snn/march_isa.$i.o) $(LIB_SRC:%.c=$B/obj/%.o)
 
 $B/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -122,9 +122,11 @@ define isa_rule
 $B/obj/%_isa.$1.o: %_isa.c
 	@mkdir -p $$(@D)
 	$$(call say,CC    $$< ($1))
-	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
+	$$Q$$(CC) $$(CFLAGS_ALL) -fno-math-errno -fno-trapping-math $$(isa_$1) $$(EXACT) -DSF_ISA=$1 -MMD -MP -c $$< -o $$@
 endef
 $(foreach i,$(sort $(ISAS_snn) $(ISAS_fx)),$(eval $(call isa_rule,$i)))
+# The same bits with every instruction set.
+$(foreach i,$(ISAS_snn),$B/obj/src/snn/march_isa.$i.o): EXACT := -ffp-contract=off
 # For the sanitizers a file of kernels takes up to a minute. What this processor cannot run is compiled without them.
 ifneq ($(SAN),)
 needs_avx2 := avx2

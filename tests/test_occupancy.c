@@ -38,41 +38,49 @@ TEST(nothing_is_empty_before_it_was_looked_at)
   }
 }
 
-/* One cell is occupied, all others are taken for empty: an update finds all that touch it, and nothing of another
- * cascade. At the start the density is 1 everywhere, so what was looked at becomes occupied. */
-static void check_neighbours(int bound, int x, int y, int z)
+/* Some cells of a row are occupied, all others are taken for empty: an update finds all that touch them, and nothing of
+ * another cascade. At the start the density is 1 everywhere, so what was looked at becomes occupied. row: a bit a cell.
+ */
+static void check_neighbours(int bound, unsigned row, int y, int z)
 {
   sf_train_options o = small_run();
   sf_config_bound(&o.config, bound);
   o.config.finest_res = 64;
   OWNED(trainer) t = start(&data, &o, NULL);
   const int res = o.config.occ_res;
-  const size_t cells = sf_config_cells(&o.config),
-               cell = ((size_t)z * (size_t)res + (size_t)y) * (size_t)res + (size_t)x;
+  const size_t cells = sf_config_cells(&o.config), first = ((size_t)z * (size_t)res + (size_t)y) * (size_t)res;
+  const unsigned reached = row | row << 1 | row >> 1;
+  size_t touching = 0, behind = 0; /* behind: where the next layer would be, were the cascades one grid */
   t->iteration = 32;
   memset(t->model.occupancy, 0, cells / 8);
-  t->model.occupancy[cell / 8] = (uint8_t)(1u << cell % 8);
+  for (size_t b = 0; b < 2; b++) t->model.occupancy[first / 8 + b] = (uint8_t)(row >> 8 * b);
   ck_ok(sf_occupancy_update(t, 2));
   for (int k = z - 1; k <= z + 1; k++)
     for (int j = y - 1; j <= y + 1; j++)
-      for (int i = x - 1; i <= x + 1; i++)
-        if (i >= 0 && j >= 0 && k >= 0 && i < res && j < res && k < res)
-          ck_assert(occupied(t, ((size_t)k * (size_t)res + (size_t)j) * (size_t)res + (size_t)i));
+      for (int i = 0; i < res; i++) {
+        if (!(reached >> i & 1) || j < 0 || k < 0 || j == res) continue;
+        const size_t cell = ((size_t)k * (size_t)res + (size_t)j) * (size_t)res + (size_t)i;
+        if (k < res) ck_assert_msg(occupied(t, cell), "row %x: nobody looked at %d %d %d", row, i, j, k);
+        if (k < res)
+          touching++;
+        else if (bound > 1)
+          behind += occupied(t, cell);
+      }
   /* Beside them an update looks at 1/32 of one cascade's cells, anywhere. */
-  ck_assert_uint_le(count_occupied(t), 27 + (size_t)(res * res * res) / 32);
+  ck_assert_uint_le(count_occupied(t), touching + (size_t)(res * res * res) / 32);
   ck_assert_uint_ge(count_occupied(t), (size_t)(res * res * res) / 32);
-  size_t behind = 0; /* where the next layer would be, were the cascades one grid */
-  for (int j = y - 1; bound > 1 && j <= y + 1; j++)
-    for (int i = x - 1; i <= x + 1; i++) behind += occupied(t, (size_t)res * res * res + (size_t)(j * res + i));
   ck_assert_uint_lt(behind, 5);
 }
 
 TEST(neighbours_of_what_is_occupied_are_looked_at)
 {
-  check_neighbours(1, 7, 8, 9);
-  check_neighbours(1, 0, 0, 0);
-  check_neighbours(1, 15, 15, 15);
-  check_neighbours(4, 5, 6, 15);
+  check_neighbours(1, 1u << 7, 8, 9);
+  check_neighbours(1, 1u << 0, 0, 0);
+  check_neighbours(1, 1u << 15, 15, 15);
+  check_neighbours(4, 1u << 5, 6, 15);
+  check_neighbours(1, 0x00c0, 8, 9); /* two side by side */
+  check_neighbours(1, 0x0183, 8, 9); /* four, of two bytes */
+  check_neighbours(1, 0x8180, 15, 0);
 }
 
 enum { FINE = 256, YOUNG = 128 };

@@ -2,7 +2,7 @@
 #include "ck_run.h"
 #include "float_fixture.h"
 #include "render/composite.h"
-#include "render/march.h"
+#include "tests/march_fixture.h"
 #include <math.h>
 
 enum { N = 24 };
@@ -64,8 +64,36 @@ TEST(march_equals_testing_every_point)
     }
     float y[3];
     ck_assert_int_eq(sf_march_next(&march, next, y), -1);
+    check_points(&march);
   }
   ck_assert_int_gt(found, 2000);
+}
+
+/* Of a million points some lie so near a face that another rounding puts them into the next cell. */
+TEST(every_instruction_set_finds_the_same_points)
+{
+  sf_config config = sf_config_default();
+  config.occ_res = 256;
+  config.log2_hash = 10;
+  OWNED(sf_model) m = {0};
+  sf_steps steps;
+  ck_ok(sf_model_create(&m, &config));
+  for (size_t i = 0; i < sf_config_cells(&config) / 8; i++) m.occupancy[i] = (uint8_t)sf_random_u64(5, 0, i);
+  ck_ok(sf_march_steps(&steps, &m, 1));
+  int points = 0;
+  for (uint64_t ray = 0; ray < 3000; ray++) {
+    float o[3], d[3], length = 0;
+    for (int a = 0; a < 3; a++) {
+      o[a] = 3 * test_random((int)(6 * ray) + a);
+      d[a] = 0.8f * test_random((int)(6 * ray) + 3 + a) - o[a];
+      length += d[a] * d[a];
+    }
+    for (int a = 0; a < 3; a++) d[a] /= sqrtf(length);
+    const sf_march march = sf_march_begin(&m, &steps, o, d, sf_random_float(6, 0, ray));
+    check_points(&march);
+    points += march.lattice.count;
+  }
+  ck_assert_int_gt(points, 1000000);
 }
 
 /* Far away a distance has no precision left, and the box seems longer than its diagonal: bit maps of lattice points

@@ -1,5 +1,5 @@
 /* Scenes larger than one box: growing steps, cascades of occupancy grids, and the hard rays of both. */
-#include "render/march.h"
+#include "tests/march_fixture.h"
 #include "tests/unbounded_fixture.h"
 
 /* The recurrence in double precision; float adds up to 1024 roundings of 2^-24 of the distance. */
@@ -72,6 +72,7 @@ static void check_march(int bound, int res)
       next++, found++, in_cascade[bit / layer]++;
     }
     ck_assert_int_eq(sf_march_next(&march, next, y), -1);
+    check_points(&march);
   }
   ck_assert_int_gt(found, 300);
   for (int k = 0; k < sf_config_cascades(&c); k++) ck_assert_int_gt(in_cascade[k], 2);

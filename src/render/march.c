@@ -122,6 +122,12 @@ static inline float to_exit(const sf_march *m, const cell *c, int size, const fl
   return ahead;
 }
 
+static inline bool is_occupied(const sf_march *m, const cell *c)
+{
+  const size_t bit = (((size_t)c->cascade * m->res + c->place[2]) * m->res + c->place[1]) * m->res + c->place[0];
+  return m->occupancy[bit / 8] >> (bit % 8) & 1;
+}
+
 static inline bool is_block_empty(const sf_march *m, const cell *c)
 {
   const int blocks = m->res / BLOCK;
@@ -151,9 +157,9 @@ int sf_march_next(const sf_march *m, int n, float x[3])
   while (n < m->lattice.count) {
     sf_march_at(m, n, x);
     const cell c = find_cell(m, m->steps->cascade[n], x);
-    const size_t bit = (((size_t)c.cascade * m->res + c.place[2]) * m->res + c.place[1]) * m->res + c.place[0];
-    if (m->occupancy[bit / 8] >> (bit % 8) & 1) return n;
-    n = skip(m, n, to_exit(m, &c, m->steps->blocks && is_block_empty(m, &c) ? BLOCK : 1, x));
+    const bool block = m->steps->blocks && is_block_empty(m, &c); /* asked first: the blocks' bits are in the cache */
+    if (!block && is_occupied(m, &c)) return n;
+    n = skip(m, n, to_exit(m, &c, block ? BLOCK : 1, x));
   }
   return -1;
 }

@@ -1,18 +1,7 @@
 /* Marching a ray through the scene box over the occupied cells of the occupancy grids. */
 #ifndef SF_RENDER_MARCH_H
 #define SF_RENDER_MARCH_H
-#include "snn/model.h"
-
-typedef struct sf_march {
-  const sf_steps *steps; /* must outlive it */
-  const uint8_t *occupancy;
-  int res, cascades;
-  float jitter, origin[3], direction[3];
-  float scale[3], offset[3]; /* position in [0,1]^3 = model units * scale + offset */
-  float way[3];              /* along the ray from face to face of the box; 0: it never gets there */
-  sf_lattice lattice;
-  float stop; /* it ends where less light is left */
-} sf_march;
+#include "snn/kernels.h"
 
 /* sf_steps_make, and where the model is empty: marches skip blocks of 8 x 8 x 8 empty cells. They find the same points
  * as with the intervals of sf_steps_make alone. To be called again when the occupancy has changed. */

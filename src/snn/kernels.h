@@ -106,6 +106,18 @@ typedef struct sf_vm_field {
   float shift, distance_scale;
 } sf_vm_field;
 
+/* A ray among the occupancy grids of a model, as sf_march_begin makes it (render/march.h). */
+typedef struct sf_march {
+  const sf_steps *steps; /* must outlive it */
+  const uint8_t *occupancy;
+  int res, cascades;
+  float jitter, origin[3], direction[3];
+  float scale[3], offset[3]; /* position in [0,1]^3 = model units * scale + offset */
+  float way[3];              /* along the ray from face to face of the box; 0: it never gets there */
+  sf_lattice lattice;
+  float stop; /* it ends where less light is left */
+} sf_march;
+
 enum { SF_ROWS_MAX = (int)SF_LANES > (int)SF_DECODER_MAX ? (int)SF_LANES : (int)SF_DECODER_MAX }; /* of a product */
 
 /* Working memory of one thread. Words: operands of the next product, paired over rows or over lanes. */
@@ -144,6 +156,9 @@ typedef struct sf_kernels {
    * gradient. */
   void (*grid_forward)(const sf_grid_level *level, const float *table, const float *x, float *out);
   void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
+  /* Bit n: point n of the ray is in an occupied cell. Returns how many. All points are tested; they are those that
+   * sf_march_next finds, with any instruction set. */
+  int (*march)(const sf_march *march, uint64_t hit[SF_STEPS_MAX / 64]);
   /* TensoRF. x[n][3] in [0,1]^3 of the box. Density per model unit and its slope, by the feature, of n samples;
    * products [n][ld], ld >= the components of all modes, zeros behind them. */
   void (*vm_density)(const sf_vm_field *field, const float *x, int n, float *sigma, float *slope);

@@ -9,6 +9,8 @@
 #define SF_TEXT_(a) #a
 #define SF_TEXT(a) SF_TEXT_(a)
 
+int SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *march, uint64_t hit[SF_STEPS_MAX / 64]); /* march_isa.c */
+
 const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .prepare = prepare,
                                                  .forward = forward,
@@ -16,6 +18,7 @@ const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .backward = backward,
                                                  .grid_forward = grid_forward,
                                                  .grid_backward = grid_backward,
+                                                 .march = SF_JOIN(sf_march_points_, SF_ISA),
                                                  .vm_density = vm_density,
                                                  .vm_products = vm_products,
                                                  .vm_backward = vm_backward,

@@ -50,15 +50,22 @@ void sf_batch_free(sf_batch *b)
   free_blocks(b);
 }
 
-void sf_batch_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
+const uint16_t *sf_batch_ray(const sf_trainer *t, uint64_t index, sf_ray *ray)
 {
   const uint64_t seed = t->options.seed;
   const sf_view *view = &t->data->view[sf_random_below(seed, RNG_PIXEL, 3 * index, (uint64_t)t->data->count)];
   const sf_image *image = &view->image;
   const int x = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 1, (uint64_t)image->width);
   const int y = (int)sf_random_below(seed, RNG_PIXEL, 3 * index + 2, (uint64_t)image->height);
-  sf_dataset_ray(t->data, view, (float)x + 0.5f, (float)y + 0.5f, ray->origin, ray->direction);
   const uint16_t *rgba = image->rgba + 4 * ((size_t)y * image->width + x);
+  __builtin_prefetch(rgba);
+  sf_dataset_ray(t->data, view, (float)x + 0.5f, (float)y + 0.5f, ray->origin, ray->direction);
+  return rgba;
+}
+
+void sf_batch_target(const sf_trainer *t, uint64_t index, const uint16_t *rgba, sf_ray *ray)
+{
+  const uint64_t seed = t->options.seed;
   const float alpha = rgba[3] / 65535.0f;
   for (int c = 0; c < 3; c++) {
     ray->background[c] = t->options.background == 0   ? sf_random_float(seed, RNG_BACKGROUND, 3 * index + c)
@@ -177,16 +184,11 @@ sf_status sf_batch_draw(sf_trainer *t)
 #pragma omp parallel for schedule(dynamic, 64)
   for (int r = 0; r < b->rays; r++) {
     sf_ray *ray = &b->ray[r];
-    sf_batch_ray(t, base + r, ray);
+    const uint16_t *pixel = sf_batch_ray(t, base + r, ray);
     march[r] = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                               sf_random_float(t->options.seed, RNG_JITTER, base + r));
-    float x[3];
-    ray->count = 0;
-    memset(b->hit[r], 0, sizeof b->hit[r]);
-    for (int n = 0; (n = sf_march_next(&march[r], n, x)) >= 0; n++) {
-      b->hit[r][n / 64] |= (uint64_t)1 << n % 64;
-      ray->count++;
-    }
+    ray->count = t->kernels->march(&march[r], b->hit[r]);
+    sf_batch_target(t, base + r, pixel, ray);
   }
   sf_batch_pack(b);
   b->marched = 0;

@@ -238,8 +238,11 @@ void sf_tail_update(sf_trainer *trainer, double error);
 
 sf_status sf_batch_create(sf_batch *batch, int samples, int features);
 void sf_batch_free(sf_batch *batch);
-/* A random pixel of a random view, composited with its alpha on this ray's background; a function of seed and index. */
-void sf_batch_ray(const sf_trainer *trainer, uint64_t index, sf_ray *ray);
+/* The ray of a random pixel of a random view; a function of seed and index. Gives the pixel, which is on its way from
+ * memory. */
+const uint16_t *sf_batch_ray(const sf_trainer *trainer, uint64_t index, sf_ray *ray);
+/* The ray's target: the pixel, composited with its alpha on this ray's background. */
+void sf_batch_target(const sf_trainer *trainer, uint64_t index, const uint16_t *pixel, sf_ray *ray);
 /* Draws and marches `trainer->rays` rays; packs them into bundles. */
 sf_status sf_batch_draw(sf_trainer *trainer);
 /* Number of rays of the next iteration, from the samples of this one. */

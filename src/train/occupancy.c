@@ -193,24 +193,34 @@ static size_t list_occupied(const sf_trainer *t, const cell_grid *g, uint32_t *l
   return occupied;
 }
 
+/* Whether the cell and those before and behind it are all seen. */
+static inline bool three_seen(const uint8_t *seen, size_t cell)
+{
+  const size_t byte = (cell - 1) / 8;
+  return ((seen[byte] | seen[byte + 1] << 8) >> (cell - 1) % 8 & 7) == 7;
+}
+
 /* The empty cells that touch an occupied one, in the order in which the occupied ones find them. list: the occupied
  * cells; replaced. */
 static size_t list_neighbours(const cell_grid *g, uint32_t *list, size_t occupied, uint8_t *seen)
 {
   const size_t res = (size_t)g->config.occ_res, per = res * res * res;
   size_t found = occupied;
-  memset(seen, 0, g->cells / 8);
+  memset(seen, 0, g->cells / 8 + 1);
   for (size_t i = 0; i < occupied; i++) seen[list[i] / 8] |= (uint8_t)(1u << list[i] % 8);
   for (size_t i = 0; i < occupied; i++) {
     const size_t in = list[i] % per, x = in % res, y = in / res % res, z = in / res / res;
     for (size_t k = z ? z - 1 : 0; k <= z + 1 && k < res; k++)
-      for (size_t j = y ? y - 1 : 0; j <= y + 1 && j < res; j++)
+      for (size_t j = y ? y - 1 : 0; j <= y + 1 && j < res; j++) {
+        const size_t row = list[i] - in + (k * res + j) * res;
+        if (x > 0 && x + 1 < res && three_seen(seen, row + x)) continue; /* most of them */
         for (size_t h = x ? x - 1 : 0; h <= x + 1 && h < res; h++) {
-          const size_t cell = list[i] - in + (k * res + j) * res + h;
+          const size_t cell = row + h;
           if (seen[cell / 8] >> cell % 8 & 1) continue;
           seen[cell / 8] |= (uint8_t)(1u << cell % 8);
           list[found++] = (uint32_t)cell;
         }
+      }
   }
   memmove(list, list + occupied, (found - occupied) * sizeof *list);
   return found - occupied;
@@ -256,7 +266,7 @@ sf_status sf_occupancy_update(sf_trainer *t, int steps)
   const size_t cells = sf_config_cells(&t->model.config);
   if (t->iteration < FIRST) return sf_ok();
   uint32_t *list = malloc(cells * sizeof *list);
-  uint8_t *seen = malloc(cells / 8);
+  uint8_t *seen = malloc(cells / 8 + 1); /* three_seen looks at two bytes */
   float *sigma = malloc(cells * sizeof *sigma);
   sf_status status =
       list && seen && sigma ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for the occupancy update");

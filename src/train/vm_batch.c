@@ -12,10 +12,12 @@ static sf_march draw(const sf_trainer *t, uint64_t index, sf_ray *ray)
   sf_march march;
   for (uint64_t attempt = 0; attempt < ATTEMPTS; attempt++) {
     float x[3];
-    sf_batch_ray(t, index + (attempt << 48), ray);
+    const uint16_t *pixel = sf_batch_ray(t, index + (attempt << 48), ray);
     march = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                            sf_random_float(t->options.seed, RNG_JITTER, index));
-    if (sf_march_next(&march, 0, x) >= 0) break;
+    const bool meets = sf_march_next(&march, 0, x) >= 0;
+    sf_batch_target(t, index + (attempt << 48), pixel, ray);
+    if (meets) break;
   }
   return march;
 }
