@@ -1,4 +1,5 @@
 /* Packing of rays into bundles of blocks, and compaction against the naive transmittance. */
+#include "along_fixture.h"
 #include "ck_run.h"
 #include "render/composite.h"
 #include "train_fixture.h"
@@ -75,48 +76,64 @@ TEST(every_ray_is_in_one_bundle)
   check_layout(&b);
 }
 
+/* Samples of ray r that light reaches in a composited prefix, one by one with the oracle. x: of the first. */
+static int reached(const sf_trainer *t, const sf_loss_plan *plan, int r, float *x0)
+{
+  const sf_batch *b = &t->batch;
+  naive along = {.m = &t->model};
+  double depth[T] = {0};
+  for (int s = 0; s < b->ray[r].count; s++) {
+    const int lane = b->ray[r].lane + s;
+    float x[3], f[32], sh[16] = {0}, sigma[T], colour[3 * T];
+    bool lit = false;
+    for (int a = 0; a < 3; a++) x[a] = b->x[((size_t)(lane / SF_BLOCK) * 3 + a) * SF_BLOCK + lane % SF_BLOCK];
+    if (s == 0) *x0 = x[0];
+    for (int p = 0; p < plan->steps; p++) lit |= plan->weight[p] > 0 && depth[p] < -(double)plan->stop;
+    if (!lit) return s;
+    sf_grid_features(&t->model, x, f);
+    if (t->model.config.along)
+      naive_sample(&along, f, sh, sigma, colour);
+    else
+      sf_net_sample(&t->model, f, sh, plan->steps, sigma, colour, NULL);
+    for (int p = 0; p < plan->steps; p++) depth[p] += (double)sigma[p] * b->delta[lane];
+  }
+  return b->ray[r].count;
+}
+
 /* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
- * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. */
-TEST(compaction_keeps_what_light_reaches)
+ * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. Of nets
+ * that take steps at every sample, and of nets along rays. */
+LOOP_TEST(compaction_keeps_what_light_reaches, 2)
 {
   sf_train_options o = small_run();
   o.stage1 = 110;
+  if (_i) o.config.steps = o.config.along = 1, o.config.mode = SF_HYBRID;
   OWNED(trainer) t = start(&data, &o, NULL);
   steps(t, 100);
   t->kernels = sf_kernels_select(NULL); /* those that do not round */
   ck_ok(sf_batch_draw(t));
   sf_batch *b = &t->batch;
   const int rays = b->rays;
-  for (int i = 0; i < b->blocks * SF_BLOCK; i++) b->delta[i] *= 30; /* light ends, sample by sample */
-  int *expected = calloc((size_t)rays, sizeof *expected), dropped = 0;
+  for (int i = 0; i < b->blocks * SF_BLOCK; i++) /* light ends, sample by sample */
+    b->delta[i] *= 5 + 40 * sf_random_float(9, 0, (uint64_t)i);
+  int *expected = calloc((size_t)rays, sizeof *expected), dropped = 0, longest = 0;
   float *first_x = calloc((size_t)rays, sizeof *first_x);
-  const sf_loss_plan plan = {.steps = T,
+  const sf_loss_plan many = {.steps = T,
                              .regular_at = 3,
                              .weight = {[1] = 0.5f, [2] = 0.5f, [T - 1] = 1},
-                             .stop = (float)log(t->model.config.stop)};
+                             .stop = (float)log(t->model.config.stop)},
+                     one = {.steps = 1, .regular_at = 1, .weight = {1}, .stop = many.stop}, *plan = _i ? &one : &many;
   for (int r = 0; r < rays; r++) {
-    double depth[3] = {0};
-    const int prefix[3] = {2, 3, T};
-    for (int s = 0; s < b->ray[r].count; s++) {
-      const int lane = b->ray[r].lane + s;
-      float x[3], f[32], sh[16] = {0}, sigma[T], colour[3 * T];
-      for (int a = 0; a < 3; a++) x[a] = b->x[((size_t)(lane / SF_BLOCK) * 3 + a) * SF_BLOCK + lane % SF_BLOCK];
-      if (s == 0) first_x[r] = x[0];
-      bool seen = false;
-      for (int p = 0; p < 3; p++) seen |= depth[p] < -(double)plan.stop;
-      if (!seen) break;
-      expected[r]++;
-      sf_grid_features(&t->model, x, f);
-      sf_net_sample(&t->model, f, sh, T, sigma, colour, NULL);
-      for (int p = 0; p < 3; p++) depth[p] += (double)sigma[prefix[p] - 1] * b->delta[lane];
-    }
+    expected[r] = reached(t, plan, r, &first_x[r]);
     dropped += b->ray[r].count - expected[r];
+    longest = expected[r] > longest ? expected[r] : longest;
   }
   ck_assert_int_gt(dropped, 50);
+  ck_assert_int_gt(longest, 16); /* more than two rounds see */
   sf_loss_sums mean = {0};
   double firing[3];
   ck_assert_int_le(sf_batch_blocks(b->marched), b->block_capacity);
-  sf_gradient_run(t, &plan, &mean, firing);
+  sf_gradient_run(t, plan, &mean, firing);
   check_layout(b);
   int differ = 0, samples = 0;
   for (int r = 0; r < rays; r++) {

@@ -10,6 +10,7 @@ static void free_blocks(sf_batch *b)
   free(b->spare_x);
   free(b->delta);
   free(b->spare_delta);
+  free(b->sigma);
   free(b->f);
   free(b->df);
 }
@@ -24,9 +25,11 @@ static sf_status reserve(sf_batch *b, int blocks, int features)
   b->spare_x = sf_aligned_alloc(3 * n);
   b->delta = sf_aligned_alloc(n);
   b->spare_delta = sf_aligned_alloc(n);
+  b->sigma = sf_aligned_alloc(SF_T_MAX * n);
   b->f = sf_aligned_alloc((size_t)features * n);
   b->df = sf_aligned_alloc((size_t)features * n);
-  b->block_capacity = b->x && b->spare_x && b->delta && b->spare_delta && b->f && b->df ? capacity : 0;
+  const bool whole = b->x && b->spare_x && b->delta && b->spare_delta && b->sigma && b->f && b->df;
+  b->block_capacity = whole ? capacity : 0;
   return b->block_capacity ? sf_ok() : sf_fail(SF_E_MEMORY, "train: no memory for %d blocks of samples", capacity);
 }
 
@@ -37,7 +40,9 @@ sf_status sf_batch_create(sf_batch *b, int samples, int features)
   b->bundle = calloc(RAYS_MAX, sizeof *b->bundle);
   b->hit = calloc(RAYS_MAX, sizeof *b->hit);
   b->count = calloc(RAYS_MAX, sizeof *b->count);
-  if (!b->ray || !b->bundle || !b->hit || !b->count) return sf_fail(SF_E_MEMORY, "train: no memory for rays");
+  b->depth = calloc(RAYS_MAX, sizeof *b->depth);
+  if (!b->ray || !b->bundle || !b->hit || !b->count || !b->depth)
+    return sf_fail(SF_E_MEMORY, "train: no memory for rays");
   return reserve(b, samples / SF_BLOCK, features);
 }
 
@@ -47,6 +52,7 @@ void sf_batch_free(sf_batch *b)
   free(b->bundle);
   free(b->hit);
   free(b->count);
+  free(b->depth);
   free_blocks(b);
 }
 
@@ -194,7 +200,7 @@ sf_status sf_batch_draw(sf_trainer *t)
   b->marched = 0;
   for (int r = 0; r < b->rays; r++) b->marched += b->ray[r].count;
   b->samples = b->marched;
-  if (!status.code) status = reserve(b, sf_batch_blocks(b->marched), 2 * t->model.config.levels);
+  if (!status.code) status = reserve(b, sf_batch_blocks(b->marched) + GROUPS, 2 * t->model.config.levels);
   if (!status.code) {
     memset(b->x, 0, (size_t)b->blocks * 3 * SF_BLOCK * sizeof(float));
 #pragma omp parallel for schedule(dynamic, 64)

@@ -1,38 +1,40 @@
-/* Samples that no light reaches leave the batch before the nets see them. */
+/* Samples that no light reaches leave the batch before the nets see them. Most of what is marched lies behind surfaces,
+ * so rays are followed in rounds: a round looks at the next samples of the rays that have light left. */
 #include "train/internal.h"
 #include <omp.h>
 #include <string.h>
 
-/* Samples of a ray up to where every composited prefix is opaque. */
-static int visible(const sf_loss_plan *p, const sf_ray *ray, const float *delta, const sf_block *block)
+/* The first look at a ray. Each later one sees as many samples again as all before it: light ends behind a few. */
+enum { FIRST_LOOK = 4 };
+
+/* Samples of the ray that the next round looks at. Those of a net along rays hang on one another. */
+static int next_look(const sf_trainer *t, const sf_ray *ray)
 {
-  int count = 0;
-  for (int t = 1; t <= p->steps; t++) {
-    if (!sf_loss_needs(p, t)) continue;
-    float depth = 0;
-    int s = 0;
-    for (; s < ray->count && depth > p->stop; s++)
-      depth -= delta[s] * block[(ray->first + s) / SF_BLOCK].sigma[t - 1][(ray->first + s) % SF_BLOCK];
-    if (s > count) count = s;
-  }
-  return count;
+  const int wanted = t->model.config.along ? ray->left : ray->count > FIRST_LOOK ? ray->count : FIRST_LOOK;
+  return wanted < ray->left ? wanted : ray->left;
 }
 
-static void look(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w)
+/* Rays of part `part` of GROUPS. */
+static int part_start(const sf_batch *b, int part)
 {
-  sf_batch *batch = &t->batch;
-  sf_block *block = w->block;
-  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
-  sf_mark_lanes(t, bundle, w);
-  for (int b = 0; b < bundle->blocks; b++) {
-    memcpy(block[b].f, batch->f + (size_t)(bundle->block + b) * plane, plane * sizeof(float));
-    if (t->model.config.along)
-      t->kernels->along_density(t->net, &block[b], w->scratch);
-    else
-      t->kernels->density(t->net, &block[b], p->steps, w->scratch);
+  return (int)((int64_t)b->rays * part / GROUPS);
+}
+
+/* Where the round's samples go, and the blocks of each part, block[part] .. block[part + 1] - 1. How blocks are
+ * composed does not depend on threads and ranks, because a block's rounding hangs on how many of its neurons fire. */
+static int plan_round(sf_trainer *t, int first, int end, int block[GROUPS + 1])
+{
+  sf_batch *b = &t->batch;
+  block[first] = 0;
+  for (int part = first; part < end; part++) {
+    int lane = block[part] * SF_BLOCK;
+    for (int r = part_start(b, part); r < part_start(b, part + 1); r++) {
+      b->ray[r].lane = lane;
+      lane += b->ray[r].looked = next_look(t, &b->ray[r]);
+    }
+    block[part + 1] = (lane + SF_BLOCK - 1) / SF_BLOCK;
   }
-  for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++)
-    batch->ray[r].count = visible(p, &batch->ray[r], batch->delta + batch->ray[r].lane, block);
+  return block[end];
 }
 
 /* to[block][rows][SF_BLOCK] at lane `at`.. = from at lane `start`.. */
@@ -45,14 +47,82 @@ static void move(const float *from, int start, float *to, int at, int count, int
   }
 }
 
-/* The lanes after a bundle's last sample hold zeros, not what was there before: their spikes count too when the kernels
- * choose between events and dense products. */
-static void clear_tail(const sf_batch *b, const sf_bundle *bundle, float *to, int rows)
+/* Zeros in the lanes from `lane` to the end of the blocks. */
+static void clear_tail(int lane, int end, float *to, int rows)
 {
-  const sf_ray *last = &b->ray[bundle->ray + bundle->rays - 1];
-  const int end = (bundle->block + bundle->blocks) * SF_BLOCK;
-  for (int lane = bundle->rays ? last->lane + last->count : end; lane < end; lane++)
+  for (; lane < end; lane++)
     for (int i = 0; i < rows; i++) to[((size_t)(lane / SF_BLOCK) * rows + i) * SF_BLOCK + lane % SF_BLOCK] = 0;
+}
+
+/* The lanes of a block where rays begin. */
+static uint64_t beginnings(const sf_batch *b, int part, int block)
+{
+  uint64_t first = 0;
+  for (int r = part_start(b, part); r < part_start(b, part + 1); r++)
+    if (b->ray[r].looked && b->ray[r].lane / SF_BLOCK == block) first |= (uint64_t)1 << b->ray[r].lane % SF_BLOCK;
+  return first;
+}
+
+/* Features at x[blocks][3][SF_BLOCK], to batch->f. Level by level: a level's table is in the cache for all samples. */
+static void encode(sf_trainer *t, const float *x, int blocks)
+{
+  const int levels = t->model.config.levels, parts = 8;
+  const sf_model seen = sf_tuning_field(t);
+  const float *table = sf_model_param(&seen, SF_P_GRID);
+#pragma omp parallel for schedule(dynamic, 1) collapse(2)
+  for (int level = 0; level < levels; level++)
+    for (int part = 0; part < parts; part++)
+      for (int b = blocks * part / parts; b < blocks * (part + 1) / parts; b++)
+        t->kernels->grid_forward(&t->model.level[level], table, x + (size_t)b * 3 * SF_BLOCK,
+                                 t->batch.f + ((size_t)b * levels + level) * 2 * SF_BLOCK);
+}
+
+/* Densities of a part's samples to batch->sigma, [block][T][SF_BLOCK]. */
+static void find_densities(sf_trainer *t, const sf_loss_plan *p, int part, const int block[], int lanes, sf_worker *w)
+{
+  sf_batch *batch = &t->batch;
+  sf_block *to = w->block;
+  const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
+  for (int b = block[part]; b < block[part + 1]; b++) {
+    memcpy(to->f, batch->f + (size_t)b * plane, plane * sizeof(float));
+    to->lanes = sf_block_lanes(lanes, b - block[part]);
+    if (t->model.config.along) {
+      to->first = beginnings(batch, part, b);
+      for (int l = 0; l < SF_BLOCK; l++) to->state[l] = &w->state;
+      t->kernels->along_density(t->net, to, w->scratch);
+    } else
+      t->kernels->density(t->net, to, p->steps, w->scratch);
+    memcpy(batch->sigma + (size_t)b * SF_T_MAX * SF_BLOCK, to->sigma, (size_t)p->steps * sizeof *to->sigma);
+  }
+}
+
+static bool is_lit(const sf_loss_plan *p, const float depth[SF_T_MAX])
+{
+  bool lit = false;
+  for (int t = 0; t < p->steps; t++) lit |= sf_loss_needs(p, t + 1) && depth[t] > p->stop;
+  return lit;
+}
+
+/* Counts the samples that light reaches in a prefix that is composited. depth: the logarithm of its light. */
+static void follow(const sf_loss_plan *p, const sf_batch *b, sf_ray *ray, float depth[SF_T_MAX])
+{
+  int s = 0;
+  for (; s < ray->looked && is_lit(p, depth); s++) {
+    const int lane = ray->lane + s;
+    const float *sigma = b->sigma + (size_t)(lane / SF_BLOCK) * SF_T_MAX * SF_BLOCK + lane % SF_BLOCK;
+    for (int t = 0; t < p->steps; t++) depth[t] -= b->delta[ray->from + ray->count + s] * sigma[t * SF_BLOCK];
+  }
+  ray->count += s;
+  ray->left = is_lit(p, depth) ? ray->left - ray->looked : 0;
+}
+
+static void look(sf_trainer *t, const sf_loss_plan *p, int part, const int block[], sf_worker *w)
+{
+  sf_batch *b = &t->batch;
+  int lanes = 0;
+  for (int r = part_start(b, part); r < part_start(b, part + 1); r++) lanes += b->ray[r].looked;
+  find_densities(t, p, part, block, lanes, w);
+  for (int r = part_start(b, part); r < part_start(b, part + 1); r++) follow(p, b, &b->ray[r], b->depth[r]);
 }
 
 static void exchange(float **a, float **b)
@@ -62,19 +132,47 @@ static void exchange(float **a, float **b)
   *b = old;
 }
 
-/* Each rank looks at its bundles; all count all rays. */
+/* Each rank looks at its parts' rays, round by round; all count all rays. */
 static sf_status look_at_all(sf_trainer *t, const sf_loss_plan *plan)
 {
   sf_batch *b = &t->batch;
-  const int rank = sf_ranks_rank(t->options.ranks);
-  const int first = sf_share_start(t, rank, b->bundles), end = sf_share_start(t, rank + 1, b->bundles);
+  int first, end, block[GROUPS + 1];
+  sf_share_parts(t, &first, &end);
+  for (int r = 0; r < b->rays; r++) {
+    b->ray[r].from = b->ray[r].lane, b->ray[r].left = b->ray[r].count, b->ray[r].count = 0;
+    memset(b->depth[r], 0, sizeof b->depth[r]);
+  }
+  for (int blocks; (blocks = plan_round(t, first, end, block)) > 0;) {
+#pragma omp parallel for schedule(static) num_threads(t->workers)
+    for (int part = first; part < end; part++) {
+      int lane = block[part] * SF_BLOCK;
+      for (int r = part_start(b, part); r < part_start(b, part + 1); r++) {
+        const sf_ray *ray = &b->ray[r];
+        move(b->x, ray->from + ray->count, b->spare_x, ray->lane, ray->looked, 3);
+        lane += ray->looked;
+      }
+      clear_tail(lane, block[part + 1] * SF_BLOCK, b->spare_x, 3);
+    }
+    encode(t, b->spare_x, blocks);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(t->workers)
-  for (int i = first; i < end; i++) look(t, plan, &b->bundle[i], &t->worker[omp_get_thread_num()]);
+    for (int part = first; part < end; part++) look(t, plan, part, block, &t->worker[omp_get_thread_num()]);
+  }
   for (int r = 0; r < b->rays; r++) b->count[r] = b->ray[r].count;
-  sf_share_rays(t);
+  for (int i = 0; i <= sf_ranks_size(t->options.ranks); i++) t->edge[i] = (size_t)sf_share_start(t, i, b->rays);
   SF_TRY(sf_share(t, b->count, sizeof *b->count));
   for (int r = 0; r < b->rays; r++) b->ray[r].count = b->count[r];
   return sf_ok();
+}
+
+/* What lies behind each bundle's last sample. */
+static void clear_tails(const sf_batch *b, float *to, int rows)
+{
+  for (int i = 0; i < b->bundles; i++) {
+    const sf_bundle *bundle = &b->bundle[i];
+    const sf_ray *last = &b->ray[bundle->ray + bundle->rays - 1];
+    const int end = (bundle->block + bundle->blocks) * SF_BLOCK;
+    clear_tail(bundle->rays ? last->lane + last->count : end, end, to, rows);
+  }
 }
 
 sf_status sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
@@ -83,24 +181,20 @@ sf_status sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
   const int features = 2 * t->model.config.levels;
   SF_TRY(look_at_all(t, plan));
   b->samples = 0;
-  for (int r = 0; r < b->rays; r++) {
-    b->ray[r].from = b->ray[r].lane;
-    b->samples += b->ray[r].count;
-  }
+  for (int r = 0; r < b->rays; r++) b->samples += b->ray[r].count;
   sf_batch_pack(b);
 #pragma omp parallel for schedule(static) num_threads(t->workers)
   for (int r = 0; r < b->rays; r++) {
     const sf_ray *ray = &b->ray[r];
     move(b->x, ray->from, b->spare_x, ray->lane, ray->count, 3);
     move(b->delta, ray->from, b->spare_delta, ray->lane, ray->count, 1);
-    move(b->f, ray->from, b->df, ray->lane, ray->count, features);
   }
-  for (int i = 0; i < b->bundles; i++) {
-    clear_tail(b, &b->bundle[i], b->spare_x, 3);
-    clear_tail(b, &b->bundle[i], b->df, features);
-  }
+  clear_tails(b, b->spare_x, 3);
   exchange(&b->x, &b->spare_x);
   exchange(&b->delta, &b->spare_delta);
-  exchange(&b->f, &b->df);
+  encode(t, b->x, b->blocks);
+  /* Not what the corner of the box has: spikes of these lanes count, too, when the kernels choose between events and
+   * dense products. */
+  clear_tails(b, b->f, features);
   return sf_ok();
 }

@@ -120,19 +120,6 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   }
 }
 
-static void encode(sf_trainer *t)
-{
-  const int levels = t->model.config.levels, parts = 8;
-  const sf_model seen = sf_tuning_field(t);
-  const float *table = sf_model_param(&seen, SF_P_GRID);
-#pragma omp parallel for schedule(dynamic, 1) collapse(2)
-  for (int level = 0; level < levels; level++)
-    for (int part = 0; part < parts; part++)
-      for (int b = t->batch.blocks * part / parts; b < t->batch.blocks * (part + 1) / parts; b++)
-        t->kernels->grid_forward(&t->model.level[level], table, t->batch.x + (size_t)b * 3 * SF_BLOCK,
-                                 t->batch.f + ((size_t)b * levels + level) * 2 * SF_BLOCK);
-}
-
 /* One thread per level, samples in order: no atomics, and the sum does not depend on the threads. Adam follows while
  * the level's gradient is in the cache. */
 static void grid_gradient(sf_trainer *t, const sf_adam *adam)
@@ -175,7 +162,6 @@ static void collect(sf_trainer *t, const void *sum)
 
 static sf_status prepare(sf_trainer *t, const sf_loss_plan *plan)
 {
-  encode(t);
   sf_train_prepare(t);
   SF_TRY(sf_batch_compact(t, plan));
   sf_batch_adapt(t);

@@ -32,7 +32,8 @@ enum {
 typedef struct sf_ray {
   float origin[3], direction[3], target[3], background[3]; /* target: composited on background */
   int first, count;                                        /* its samples: lanes first .. first + count - 1 */
-  int lane, from; /* the first one, counted from the start of the batch; and where it was before compaction */
+  int lane;                                                /* the first one, counted from the start of the batch */
+  int from, left, looked; /* in compaction: where the ray's samples were; that nobody has looked at; of this round */
 } sf_ray;
 
 /* Whole rays whose samples fill at most BUNDLE_BLOCKS blocks. */
@@ -50,7 +51,9 @@ typedef struct sf_batch {
   float *x;                           /* [blocks][3][SF_BLOCK] positions in [0,1] */
   float *f, *df;                      /* [blocks][features][SF_BLOCK] */
   float *delta;                       /* [blocks][SF_BLOCK] lengths of the samples' intervals, model units */
-  float *spare_x, *spare_delta;       /* for compaction; df serves f */
+  float *spare_x, *spare_delta;       /* for compaction */
+  float *sigma;                       /* [blocks][T][SF_BLOCK] in compaction: densities of a round's samples */
+  float (*depth)[SF_T_MAX];           /* [RAYS_MAX] the logarithm of the light that is left, after each step */
   int *count;                         /* [RAYS_MAX] of the rays' samples, on their way between ranks */
 } sf_batch;
 
@@ -261,7 +264,7 @@ int sf_batch_blocks(int samples);
 /* Bundles of the rays' samples as they are counted now. */
 void sf_batch_pack(sf_batch *batch);
 /* Drops the samples behind which the light is gone (sf_opaque) in every prefix that the plan trains, as rendering
- * does: nothing of them would be seen or learned. Needs the features; moves samples and features together. */
+ * does: nothing of them would be seen or learned. Finds the features of the others. */
 sf_status sf_batch_compact(sf_trainer *trainer, const sf_loss_plan *plan);
 
 /* ---- parts of an iteration on ranks (share.c); all of it where the trainer is alone ---- */
