@@ -6,16 +6,18 @@ enum { BURST = 16 }; /* densities of so many samples at once: most rays end soon
 int sf_vm_ray(const sf_kernels *k, const sf_vm_field *density, const sf_march *march, sf_vm_samples s,
               float *transmittance)
 {
-  int count = 0, next = 0;
+  int count = 0, word = 0;
+  uint64_t points = 0; /* of the word before, that are left */
   *transmittance = 1;
-  while (next >= 0 && count < SF_RAY_SAMPLES) {
+  while (points || word < SF_RAY_SAMPLES / 64) {
     int found = count;
-    while (found < count + BURST && found < SF_RAY_SAMPLES) {
-      const int n = sf_march_next(march, next, s.x + 3 * found);
-      next = n < 0 ? -1 : n + 1;
-      if (n < 0) break;
-      if (s.lattice) s.lattice[found] = n;
-      found++;
+    while (found < count + BURST && (points || word < SF_RAY_SAMPLES / 64)) {
+      if (!points) points = k->march(march, word++);
+      for (; points && found < count + BURST; points &= points - 1, found++) {
+        const int n = 64 * (word - 1) + __builtin_ctzll(points);
+        sf_march_at(march, n, s.x + 3 * found);
+        if (s.lattice) s.lattice[found] = n;
+      }
     }
     k->vm_density(density, s.x + 3 * count, found - count, s.sigma + count, s.slope + count);
     for (; count < found; count++) {

@@ -156,9 +156,9 @@ typedef struct sf_kernels {
    * gradient. */
   void (*grid_forward)(const sf_grid_level *level, const float *table, const float *x, float *out);
   void (*grid_backward)(const sf_grid_level *level, const float *x, const float *dout, float *dtable);
-  /* Bit n: point n of the ray is in an occupied cell. Returns how many. All points are tested; they are those that
-   * sf_march_next finds, with any instruction set. */
-  int (*march)(const sf_march *march, uint64_t hit[SF_STEPS_MAX / 64]);
+  /* Bit n: point 64 word + n of the ray is in an occupied cell. These are the points that sf_march_next finds, with any
+   * instruction set. */
+  uint64_t (*march)(const sf_march *march, int word);
   /* TensoRF. x[n][3] in [0,1]^3 of the box. Density per model unit and its slope, by the feature, of n samples;
    * products [n][ld], ld >= the components of all modes, zeros behind them. */
   void (*vm_density)(const sf_vm_field *field, const float *x, int n, float *sigma, float *slope);

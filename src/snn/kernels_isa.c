@@ -9,7 +9,7 @@
 #define SF_TEXT_(a) #a
 #define SF_TEXT(a) SF_TEXT_(a)
 
-int SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *march, uint64_t hit[SF_STEPS_MAX / 64]); /* march_isa.c */
+uint64_t SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *march, int word); /* march_isa.c */
 
 const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .prepare = prepare,

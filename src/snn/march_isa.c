@@ -66,15 +66,10 @@ static uint64_t in_cells(const sf_march *m, int first, uint64_t points)
   return found;
 }
 
-int SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *m, uint64_t hit[SF_STEPS_MAX / 64]);
-int SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *m, uint64_t hit[SF_STEPS_MAX / 64])
+uint64_t SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *m, int word);
+uint64_t SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *m, int word)
 {
-  int found = 0;
-  for (int word = 0; word < SF_STEPS_MAX / POINTS; word++) {
-    const int first = word * POINTS, left = m->lattice.count - first;
-    const uint64_t points = left >= POINTS ? ~(uint64_t)0 : left > 0 ? ((uint64_t)1 << left) - 1 : 0;
-    hit[word] = points ? in_cells(m, first, points) : 0;
-    found += __builtin_popcountll(hit[word]);
-  }
-  return found;
+  const int first = word * POINTS, left = m->lattice.count - first;
+  if (left <= 0) return 0;
+  return in_cells(m, first, left < POINTS ? ((uint64_t)1 << left) - 1 : ~(uint64_t)0);
 }

@@ -193,7 +193,11 @@ sf_status sf_batch_draw(sf_trainer *t)
     const uint16_t *pixel = sf_batch_ray(t, base + r, ray);
     march[r] = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                               sf_random_float(t->options.seed, RNG_JITTER, base + r));
-    ray->count = t->kernels->march(&march[r], b->hit[r]);
+    ray->count = 0;
+    for (int word = 0; word < SF_STEPS_MAX / 64; word++) {
+      b->hit[r][word] = t->kernels->march(&march[r], word);
+      ray->count += __builtin_popcountll(b->hit[r][word]);
+    }
     sf_batch_target(t, base + r, pixel, ray);
   }
   sf_batch_pack(b);

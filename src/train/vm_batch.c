@@ -11,11 +11,11 @@ static sf_march draw(const sf_trainer *t, uint64_t index, sf_ray *ray)
 {
   sf_march march;
   for (uint64_t attempt = 0; attempt < ATTEMPTS; attempt++) {
-    float x[3];
     const uint16_t *pixel = sf_batch_ray(t, index + (attempt << 48), ray);
     march = sf_march_begin(&t->model, &t->intervals, ray->origin, ray->direction,
                            sf_random_float(t->options.seed, RNG_JITTER, index));
-    const bool meets = sf_march_next(&march, 0, x) >= 0;
+    bool meets = false;
+    for (int word = 0; 64 * word < march.lattice.count && !meets; word++) meets = t->kernels->march(&march, word);
     sf_batch_target(t, index + (attempt << 48), pixel, ray);
     if (meets) break;
   }
