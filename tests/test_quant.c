@@ -187,6 +187,60 @@ TEST(nets_against_float)
   check_model(16, 1, SF_HYBRID);
 }
 
+/* Root mean square error of the colours with the integer weights of C3 and the float net's own spikes, on other samples
+ * than the quantiser's. */
+static double colour_error(const sf_model *m, const fx_scene *scene)
+{
+  sf_net_trace *real = malloc(sizeof *real);
+  const bool behind = m->config.mode == SF_WEIGHTED;
+  double error = 0;
+  for (uint64_t sample = 0; sample < 300; sample++) {
+    uint32_t pos[3];
+    float x[3], sh[16], f[32], sigma[SF_T_MAX], colour[SF_T_MAX * 3];
+    draw(sample, pos, x, sh);
+    sf_grid_features(m, x, f);
+    sf_net_sample(m, f, sh, scene->net.steps, sigma, colour, real);
+    double exact[3] = {0}, found[3] = {0}, weights = 0;
+    for (int t = 0; t < scene->net.steps; t++) {
+      weights += behind ? ldexp(1, -t) : 1;
+      for (int o = 0; o < 3; o++) {
+        int current = 0;
+        for (int i = 0; i < m->config.hidden; i++)
+          current += real->spike[FX_C2][t][i] ? scene->net.layer[FX_C3].w[i * SF_LANES + o] : 0;
+        const double j[2] = {real->current[FX_C3][t][o], current * scene->units.current_scale[FX_C3]};
+        exact[o] += behind ? ldexp(j[0], -t) : 1 / (1 + exp(-j[0]));
+        found[o] += behind ? ldexp(j[1], -t) : 1 / (1 + exp(-j[1]));
+      }
+    }
+    for (int o = 0; o < 3; o++) {
+      const double mean[2] = {exact[o] / weights, found[o] / weights};
+      error += behind ? pow(1 / (1 + exp(-mean[0])) - 1 / (1 + exp(-mean[1])), 2) : pow(mean[0] - mean[1], 2);
+    }
+  }
+  free(real);
+  return sqrt(error / 900);
+}
+
+/* Training makes a weight of C3 large where a colour is black or full. Its unit would be five times too coarse for the
+ * others. Weights of an ordinary size are as they were: nothing limits them. */
+LOOP_TEST(one_large_weight_does_not_coarsen_the_others, 2)
+{
+  OWNED(sf_model) m = make_model(64, 4, _i ? SF_WEIGHTED : SF_HYBRID);
+  float *large = sf_model_param(&m, SF_P_C3) + 2 * 64 + 7;
+  double error[2], unit[2];
+  for (int i = 0; i < 2; i++) {
+    OWNED(fx_scene) scene;
+    sf_quant_report report;
+    *large = i ? (_i ? -200 : -20) : *large; /* the last digit of a weighted spike counts little */
+    quantise(&m, &scene, &report);
+    error[i] = colour_error(&m, &scene);
+    unit[i] = report.layer[FX_C3].unit;
+    ck_assert_int_eq(report.layer[FX_C3].clipped > 0, i);
+  }
+  printf("C3: units %.4f, %.4f, colours off by %.5f, %.5f\n", unit[0], unit[1], error[0], error[1]);
+  ck_assert_double_lt(error[1], _i ? 0.025 : 0.005);
+}
+
 /* Every D2 and C3 current through the tables against exp and the logistic function of the current it stands for: the
  * argument is rounded to 2^-13 (and 16 bits of factor: 2^-17 of up to 16) and the table adds 1e-6; half an LSB at the
  * end. */

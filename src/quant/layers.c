@@ -69,15 +69,39 @@ static float *join_weights(const context *c, int layer)
   return joined;
 }
 
-/* x[rows][fx_layer_rows], lsb[fx_layer_rows]. */
-static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, double unit_min, bool refine,
-                     sf_quant_layer *result)
+/* Weights beyond `limit` become the limit, and the currents of inputs with an LSB of 1 follow. Returns how many. */
+static int limit_weights(const fx_layer *to, double limit, const int16_t *x, int rows, float *w, float *target)
+{
+  const int inputs = fx_layer_rows(to);
+  int limited = 0;
+  for (int o = 0; o < to->n_out; o++)
+    for (int i = 0; i < inputs; i++) {
+      float *weight = w + (size_t)o * (size_t)inputs + i;
+      const float within = copysignf(fminf(fabsf(*weight), (float)limit), *weight), beyond = *weight - within;
+      if (beyond == 0) continue;
+      for (int row = 0; row < rows; row++)
+        target[(size_t)row * (size_t)to->n_out + o] -= beyond * x[(size_t)row * (size_t)inputs + i];
+      *weight = within;
+      limited++;
+    }
+  return limited;
+}
+
+/* x[rows][fx_layer_rows], lsb[fx_layer_rows]. limit: of weights, where all LSBs are 1; else infinite. */
+static sf_status fit_within(const context *c, int layer, double limit, const int16_t *x, const double *lsb,
+                            double unit_min, bool refine, sf_quant_layer *result)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
-  const int inputs = fx_layer_rows(to);
-  float *w = join_weights(c, layer);
-  if (!w) return sf_fail(SF_E_MEMORY, "%s: no memory for the weights of a layer", c->name);
-  const sf_fit_data data = {rows_of(c->calibration, layer), inputs, to->n_out, x, c->calibration->target[layer]};
+  const int inputs = fx_layer_rows(to), rows = rows_of(c->calibration, layer);
+  const size_t currents = (size_t)rows * (size_t)to->n_out;
+  float *w = join_weights(c, layer), *target = malloc(currents * sizeof *target);
+  if (!w || !target) {
+    free(w), free(target);
+    return sf_fail(SF_E_MEMORY, "%s: no memory for the weights of a layer", c->name);
+  }
+  memcpy(target, c->calibration->target[layer], currents * sizeof *target);
+  const int limited = isinf(limit) ? 0 : limit_weights(to, limit, x, rows, w, target);
+  const sf_fit_data data = {rows, inputs, to->n_out, x, target};
   const sf_fit_weights weights = {.w = w,
                                   .stride = inputs,
                                   .lsb = lsb,
@@ -85,8 +109,16 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
                                   .unit = c->settled ? c->settled->lsb.current[layer] : 0,
                                   .weight_max = sf_symmetric_max(c->report->widths.weight_bits)};
   const sf_status status = sf_fit_layer(&data, &weights, refine, to->w, result);
+  result->clipped += limited;
   free(w);
+  free(target);
   return status;
+}
+
+static sf_status fit(const context *c, int layer, const int16_t *x, const double *lsb, double unit_min, bool refine,
+                     sf_quant_layer *result)
+{
+  return fit_within(c, layer, INFINITY, x, lsb, unit_min, refine, result);
 }
 
 static sf_status set_theta(const context *c, int layer, double unit)
@@ -111,12 +143,68 @@ static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf
   }
 }
 
+/* Mean squared error of the colours with the integer weights of C3. */
+static double colour_error(const context *c, const int16_t *x, double unit)
+{
+  const fx_layer *to = &c->scene->net.layer[FX_C3];
+  const sf_calibration *cal = c->calibration;
+  const int inputs = fx_layer_rows(to), steps = cal->per_sample[FX_C3], rows = rows_of(cal, FX_C3);
+  const bool behind = c->model->config.mode == SF_WEIGHTED; /* the sum: the activation stands there */
+  double error = 0, exact[3] = {0}, found[3] = {0}, weight = 0;
+  for (int row = 0; row < rows; row++) {
+    const int16_t *in = x + (size_t)row * (size_t)inputs;
+    const double share = behind ? ldexp(1, -(row % steps)) : 1;
+    weight += share;
+    for (int o = 0; o < to->n_out; o++) {
+      int32_t sum = 0;
+      for (int i = 0; i < inputs; i++) sum += in[i] ? to->w[i * SF_LANES + o] : 0; /* spikes, and the bias' 1 */
+      exact[o] += share * (double)cal->target[FX_C3][(size_t)row * (size_t)to->n_out + (size_t)o];
+      found[o] += share * unit * sum;
+    }
+    if (behind && (row + 1) % steps) continue;
+    for (int o = 0; o < to->n_out; o++) {
+      const double d = 1 / (1 + exp(-exact[o] / weight)) - 1 / (1 + exp(-found[o] / weight));
+      error += d * d;
+      exact[o] = found[o] = 0;
+    }
+    weight = 0;
+  }
+  return error;
+}
+
+/* One weight of C3 that is far larger than the others makes the unit of all of them coarse, though the colour is black
+ * or full long before. So smaller limits of the weights are tried, and the colours decide. Below LEAST a spike alone
+ * does not saturate a colour. */
+static sf_status fit_colours(const context *c, const int16_t *x, const double *lsb, sf_quant_layer *result)
+{
+  static const double LEAST = 4;
+  fx_layer *to = &c->scene->net.layer[FX_C3];
+  const double unit_min = smallest_unit(c->model, FX_C3);
+  const size_t inputs = (size_t)fx_layer_rows(to);
+  float *w = join_weights(c, FX_C3), largest = 0;
+  if (!w) return sf_fail(SF_E_MEMORY, "%s: no memory for the weights of a layer", c->name);
+  for (size_t i = 0; i < inputs * (size_t)to->n_out; i++) largest = fmaxf(largest, fabsf(w[i]));
+  free(w);
+  SF_TRY(fit(c, FX_C3, x, lsb, unit_min, true, result));
+  if (c->settled) return sf_ok();
+  double best = largest > LEAST ? colour_error(c, x, result->unit) : 0, chosen = INFINITY;
+  for (double limit = largest * M_SQRT1_2; limit >= LEAST; limit *= M_SQRT1_2) {
+    sf_quant_layer tried;
+    SF_TRY(fit_within(c, FX_C3, limit, x, lsb, unit_min, true, &tried));
+    const double error = colour_error(c, x, tried.unit);
+    if (error < best) best = error, chosen = limit;
+  }
+  return largest > LEAST ? fit_within(c, FX_C3, chosen, x, lsb, unit_min, true, result) : sf_ok();
+}
+
 /* Everything of a layer once its inputs are known. */
 static sf_status finish_layer(const context *c, int layer, const int16_t *x, const double *lsb)
 {
   sf_quant_layer *result = &c->report->layer[layer];
   if (layer == FX_D2)
     SF_TRY(fit_h(c, x, lsb, result));
+  else if (layer == FX_C3)
+    SF_TRY(fit_colours(c, x, lsb, result));
   else
     SF_TRY(fit(c, layer, x, lsb, smallest_unit(c->model, layer), true, result));
   c->scene->units.current_scale[layer] = result->unit;
