@@ -93,15 +93,16 @@ static sf_status fit_within(const context *c, int layer, double limit, const int
 {
   const fx_layer *to = &c->scene->net.layer[layer];
   const int inputs = fx_layer_rows(to), rows = rows_of(c->calibration, layer);
+  const bool limits = !isinf(limit);
   const size_t currents = (size_t)rows * (size_t)to->n_out;
-  float *w = join_weights(c, layer), *target = malloc(currents * sizeof *target);
-  if (!w || !target) {
+  float *w = join_weights(c, layer), *target = limits ? malloc(currents * sizeof *target) : NULL;
+  if (!w || (limits && !target)) {
     free(w), free(target);
     return sf_fail(SF_E_MEMORY, "%s: no memory for the weights of a layer", c->name);
   }
-  memcpy(target, c->calibration->target[layer], currents * sizeof *target);
-  const int limited = isinf(limit) ? 0 : limit_weights(to, limit, x, rows, w, target);
-  const sf_fit_data data = {rows, inputs, to->n_out, x, target};
+  if (limits) memcpy(target, c->calibration->target[layer], currents * sizeof *target);
+  const int limited = limits ? limit_weights(to, limit, x, rows, w, target) : 0;
+  const sf_fit_data data = {rows, inputs, to->n_out, x, limits ? target : c->calibration->target[layer]};
   const sf_fit_weights weights = {.w = w,
                                   .stride = inputs,
                                   .lsb = lsb,
@@ -143,7 +144,7 @@ static sf_status fit_h(const context *c, const int16_t *x, const double *lsb, sf
   }
 }
 
-/* Mean squared error of the colours with the integer weights of C3. */
+/* Sum of the squared errors of the colours with the integer weights of C3. */
 static double colour_error(const context *c, const int16_t *x, double unit)
 {
   const fx_layer *to = &c->scene->net.layer[FX_C3];
@@ -177,6 +178,7 @@ static double colour_error(const context *c, const int16_t *x, double unit)
  * does not saturate a colour. */
 static sf_status fit_colours(const context *c, const int16_t *x, const double *lsb, sf_quant_layer *result)
 {
+  enum { TRIES = 16 }; /* down to 1/256 of the largest */
   static const double LEAST = 4;
   fx_layer *to = &c->scene->net.layer[FX_C3];
   const double unit_min = smallest_unit(c->model, FX_C3);
@@ -188,7 +190,8 @@ static sf_status fit_colours(const context *c, const int16_t *x, const double *l
   SF_TRY(fit(c, FX_C3, x, lsb, unit_min, true, result));
   if (c->settled) return sf_ok();
   double best = largest > LEAST ? colour_error(c, x, result->unit) : 0, chosen = INFINITY;
-  for (double limit = largest * M_SQRT1_2; limit >= LEAST; limit *= M_SQRT1_2) {
+  double limit = largest * M_SQRT1_2;
+  for (int n = 0; n < TRIES && limit >= LEAST; n++, limit *= M_SQRT1_2) {
     sf_quant_layer tried;
     SF_TRY(fit_within(c, FX_C3, limit, x, lsb, unit_min, true, &tried));
     const double error = colour_error(c, x, tried.unit);
