@@ -7,7 +7,7 @@ int sf_vm_ray(const sf_kernels *k, const sf_vm_field *density, const sf_march *m
               float *transmittance)
 {
   int count = 0, word = 0;
-  uint64_t points = 0; /* of the word before, that are left */
+  uint64_t points = 0; /* left of the last word */
   *transmittance = 1;
   while (points || word < SF_RAY_SAMPLES / 64) {
     int found = count;
