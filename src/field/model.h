@@ -152,6 +152,7 @@ static inline bool sf_model_decodes(const sf_model *m)
  * distance to the camera is not that to the box). */
 enum { SF_STEPS_MAX = 1024 };
 enum { SF_LATTICE_MIN = 16 };
+enum { SF_BLOCK_CELLS = 8 };                    /* of a block along an axis: those of one byte of the occupancy */
 enum { SF_BLOCK_BYTES = 7 * 32 * 32 * 32 / 8 }; /* 7 cascades of 256 cells an axis */
 #define SF_STOP_MIN 1e-6                        /* of stop: fixed point holds 2^-20 */
 #define SF_STOP_MAX 0.05

@@ -33,8 +33,7 @@ sf_lattice sf_ray_lattice(const sf_steps *steps, const float origin[3], const fl
   return (sf_lattice){.first = enter + steps->shortest / 2, .count = intervals_within(steps, leave - enter)};
 }
 
-/* Cells of a block along an axis: those of one byte of the occupancy. */
-enum { BLOCK = 8, BLOCKS_MOST = 32 };
+enum { BLOCK = SF_BLOCK_CELLS, BLOCKS_MOST = 32 };
 
 sf_status sf_march_steps(sf_steps *steps, const sf_model *model, int stride)
 {

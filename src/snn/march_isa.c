@@ -3,7 +3,7 @@
  * multiply-adds, so every instruction set finds the points of sf_march_next. */
 #include "snn/kernels.h"
 
-enum { POINTS = 64, BLOCK = 8 };
+enum { POINTS = 64, BLOCK = SF_BLOCK_CELLS };
 
 #define SF_JOIN_(a, b) a##b
 #define SF_JOIN(a, b) SF_JOIN_(a, b)
