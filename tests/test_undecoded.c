@@ -73,6 +73,41 @@ TEST(as_much_light_as_was_asked_for)
   }
 }
 
+/* Where the error of rays with light is below 1/300, the share falls with its root. */
+TEST(less_light_where_the_error_is_small)
+{
+  static const double error[] = {1.0 / 300, 1.0 / 1200, 1.0 / 3000, 1e-2};
+  for (int i = 0; i < COUNT(error); i++) {
+    const double expected = 0.02 * sqrt(fmin(300 * error[i], 1));
+    OWNED(trainer) t = NULL;
+    light sum = {0};
+    begin(&t, 0.02);
+    put_ball(&t->model);
+    for (int k = 0; k < 400; k++) {
+      const light now = drawn(t, k);
+      t->tail = (sf_tail){.error = error[i] * now.all / t->batch.rays, .samples = 1};
+      if (k >= 200) sum.all += now.all, sum.undecoded += now.undecoded;
+    }
+    const double share = sum.undecoded / sum.all;
+    ck_assert_msg(share > 0.85 * expected && share < 1.15 * expected, "%g of light undecoded at an error of %g", share,
+                  error[i]);
+  }
+}
+
+/* Also where --opaque, which needs it too, is off. */
+TEST(the_error_is_resumed)
+{
+  sf_train_options o = small_vm(SF_NET_SNN);
+  OWNED(trainer) t = NULL, resumed = NULL;
+  o.opaque = 0;
+  ck_ok(sf_trainer_create(&t, &data, &o, NULL));
+  t->tail = (sf_tail){.error = 0.0021, .samples = 7};
+  ck_ok(sf_trainer_save(t, in("part.safetensors"), true));
+  ck_ok(sf_trainer_create(&resumed, &data, &o, in("part.safetensors")));
+  ck_assert_double_eq(resumed->tail.error, 0.0021);
+  ck_assert_double_eq(resumed->tail.samples, 7);
+}
+
 /* It is never less than TensoRF's. */
 TEST(not_below_where_it_begins)
 {

@@ -52,7 +52,7 @@ static int further_fields(sf_trainer *t, state_field f[FIELDS_MAX - STATE_FIELDS
     f[n++] = (state_field){"train.charge_error", .number = &t->charge.error};
     f[n++] = (state_field){"train.charge_reads", .number = &t->charge.reads};
   }
-  if (t->options.opaque > 0) {
+  if (t->options.opaque > 0 || t->vm) {
     f[n++] = (state_field){"train.tail_error", .number = &t->tail.error};
     f[n++] = (state_field){"train.tail_samples", .number = &t->tail.samples};
   }

@@ -144,7 +144,7 @@ typedef struct sf_charge {
   double error, reads; /* squared error of what is trained; reads of weights per sample. 0: nothing measured yet */
 } sf_charge;
 
-/* Of --opaque (charge.c): averages over recent iterations. */
+/* Of --opaque (charge.c) and --undecoded (vm_batch.c): averages over recent iterations. */
 typedef struct sf_tail {
   double error, samples; /* squared error of what is trained; samples of a ray. 0: nothing measured yet */
 } sf_tail;

@@ -74,6 +74,15 @@ static void place(sf_trainer *t, int r)
       memcpy(to, x + 3 * (64 * word + __builtin_ctzll(bits)), 3 * sizeof *to);
 }
 
+/* The share of the light that may go undecoded. The share X of a ray's light can add X^2 to its squared error, so where
+ * the error of the rays with light is small, X falls with its root. light: of all rays. */
+static double undecoded_share(const sf_trainer *t, double light)
+{
+  static const double whole_from = 1.0 / 300; /* squared error; X = 0.01 can add 3 % to smaller ones */
+  if (t->tail.samples <= 0 || light <= 0) return t->options.undecoded;
+  return t->options.undecoded * sqrt(fmin(t->tail.error * t->batch.rays / light / whole_from, 1));
+}
+
 /* --undecoded: the weight up to which samples are not decoded follows the light that they take, in the mean over recent
  * iterations. In fog, where every weight is small, it stays small. */
 static void adapt_weight_stop(sf_trainer *t)
@@ -84,7 +93,7 @@ static void adapt_weight_stop(sf_trainer *t)
   for (int r = 0; r < t->batch.rays; r++) light += vm->ray[r].light, undecoded += vm->ray[r].undecoded;
   if (sf_tuning(t) || t->options.undecoded <= 0) return;
   vm->light += renewed * (light - vm->light), vm->undecoded += renewed * (undecoded - vm->undecoded);
-  const double room = fmin(t->options.undecoded * vm->light / fmax(vm->undecoded, 1e-9), most);
+  const double room = fmin(undecoded_share(t, light) * vm->light / fmax(vm->undecoded, 1e-9), most);
   *stop = fmin(fmax(*stop * pow(room, moved), SF_WEIGHT_STOP_FIRST), SF_WEIGHT_STOP_MAX);
 }
 
