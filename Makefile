@@ -210,6 +210,7 @@ $(DUT_TESTS:%=$B/tests/%): $B/tests/%: $B/obj/tests/%.o $(DUT_LIBS) $B/libspikef
 	$(call say,LD    $@)
 	$Q$(CXX) -fopenmp $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(DUT_LDLIBS) $(CHECK_LIBS) $(LIBS)
 
+$B/tests/test_driver: $B/obj/firmware/sf_driver.o $B/obj/firmware/sf_ray_driver.o
 $B/tests/%: $B/obj/tests/%.o $B/libspikefield.a
 	@mkdir -p $(@D)
 	$(call say,LD    $@)

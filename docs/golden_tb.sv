@@ -2,7 +2,6 @@
 // model, results and tap beats compared with what it says. The block is programmed from the program.hex of a vector kit
 // of the same scene. How it is built and run: docs/kit.md.
 // Plusargs: +scene=FILE +program=FILE +samples=N
-`timescale 1ns / 1ps
 
 module golden_tb;
   localparam int DEPTH = 64;  // samples between input and result, at most

@@ -96,7 +96,8 @@ static void program_layer(const sf_bus *bus, uint32_t id, const sf_layer_blob *l
   put(bus, base + SF_CSR_D1_N_OUT, (uint32_t)layer->n_out);
   put(bus, base + SF_CSR_D1_K, (uint32_t)layer->k);
   put(bus, base + SF_CSR_D1_THETA, (uint32_t)layer->theta);
-  if (layer->n_in <= SF_DRIVER_INPUTS && layer->n_out <= SF_LANES) program_weights(bus, id, layer);
+  if (layer->n_in < 0 || layer->n_in > SF_DRIVER_INPUTS || layer->n_out < 0 || layer->n_out > SF_LANES) return;
+  program_weights(bus, id, layer);
 }
 
 /* Values that do not fit, or biases of D1 and D2, set a bit that is refused at start. */

@@ -19,7 +19,7 @@ module sf_fetch #(
     input  wire         pop_i,
     output wire [127:0] data_o,
     output wire         filled_o,           // a line has come
-    output wire         error_o,            // with an answer other than OKAY
+    output wire         error_o,            // an answer other than OKAY, for a line that is not dropped
     // AXI4
     output wire         m_axi_arvalid_o,
     input  wire         m_axi_arready_i,
@@ -91,7 +91,7 @@ module sf_fetch #(
       .data_o (line)
   );
   assign filled_o = push;
-  assign error_o = m_axi_rvalid_i && m_axi_rresp_i != 2'd0;
+  assign error_o = m_axi_rvalid_i && m_axi_rresp_i != 2'd0 && !draining && !clear_i;
   assign m_axi_arvalid_o = ask_q;
   assign m_axi_araddr_o = {address_q, 4'd0};
   wire unused_ok = &{1'b0, base_i[3:0]};

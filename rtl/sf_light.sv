@@ -90,7 +90,7 @@ module sf_light (
   assign error_order_o = held_q && !broken_q && bad && (drop_q || density_turn);
   assign taken = (held_q && swallows) || keep_empty || asked;
 
-  wire ended, decoded, e_valid;
+  wire ended, ends, decoded, e_valid;
   wire decide = state_q == DECIDE && !density_turn && room_q;
   wire keep = decide && !ended;
   wire goes = (decide && (ended || !decoded)) || (state_q == APPEARANCE && read_ready_i);
@@ -214,7 +214,7 @@ module sf_light (
   wire [20:0] left = full - weight_q;
   assign decoded = weight_q > {1'b0, weight_stop_i};
   wire [10:0] more = fewer + {10'd0, decoded};
-  wire ends = left <= {1'b0, trans_stop_i} || more >= max_samples_i;
+  assign ends = left <= {1'b0, trans_stop_i} || more >= max_samples_i;
   assign ended = ended_q && !head_first;
   always_ff @(posedge clk_i) begin
     if (at_q == 2'd3) weight_q <= lost;

@@ -92,6 +92,8 @@ module sf_ray_top #(
   wire ray_wready, ray_bvalid, ray_arready, ray_rvalid, ray_irq;
   wire [1:0] ray_bresp;
   wire [31:0] ray_rdata;
+  reg net_writes_q, net_reads_q;
+  reg [1:0] reset_q;
   wire write_ray = s_axil_awaddr_i[12:10] == 3'd1;
   wire read_ray = s_axil_araddr_i[12:10] == 3'd1;
   wire write_now = s_axil_awvalid_i && s_axil_wvalid_i && !net_writes_q && !net_bvalid && !ray_bvalid;
@@ -106,8 +108,6 @@ module sf_ray_top #(
   assign s_axil_rresp_o = ray_rvalid ? 2'd0 : net_rresp;
   assign irq_o = net_irq || ray_irq;
   // sf_csr answers some cycles after it has taken a request, and resets two cycles after it has taken the command.
-  reg net_writes_q, net_reads_q;
-  reg [1:0] reset_q;
   wire soft_reset = reset_q[1];
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) {net_writes_q, net_reads_q, reset_q} <= 4'd0;

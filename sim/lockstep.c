@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -29,6 +30,7 @@ typedef struct checkpoint {
   char identity[65];
   int of;                       /* rays of the run that wrote it */
   sf_lockstep_state now, whole; /* now: for a run of as many rays */
+  char seal[65];                /* hash of what stands before it */
 } checkpoint;
 
 /* ---- one block, wherever it is dealt to ---- */
@@ -105,6 +107,7 @@ static sf_status save(sf_lockstep *l)
   c.of = l->options.rays;
   c.now = (sf_lockstep_state){l->blocks, l->rays, l->sum};
   c.whole = l->whole;
+  sf_sha256(&c, offsetof(checkpoint, seal), c.seal);
   l->saved = sf_seconds();
   SF_TRY(sf_write_file(l->options.checkpoint, &c, sizeof c));
   l->kept = c.now.rays;
@@ -125,6 +128,9 @@ static sf_status resume(sf_lockstep *l)
   if (!ours)
     return sf_fail(SF_E_FORMAT, "%s: this checkpoint is of another program, scene or data set, or of other options",
                    path);
+  char seal[65];
+  sf_sha256(&c, offsetof(checkpoint, seal), seal);
+  if (memcmp(seal, c.seal, sizeof seal)) return sf_fail(SF_E_FORMAT, "%s: this checkpoint is damaged", path);
   const sf_lockstep_state *from = c.of == l->options.rays ? &c.now : &c.whole;
   if (from->rays > (uint64_t)l->options.rays)
     return sf_fail(SF_E_USAGE, "%s: %" PRIu64 " rays are finished, more than --rays %d; give as many or more", path,

@@ -1,7 +1,6 @@
 // The registers of sf_top over AXI4-Lite, for a first look at the block in any simulator: identification, contents after
 // reset, a write read back, a refused write, a refused start that raises the interrupt, and its end.
 `default_nettype none
-`timescale 1ns / 1ps
 
 module sf_registers_tb;
   reg clk = 1'b0, rst_n = 1'b0;

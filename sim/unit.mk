@@ -14,6 +14,9 @@ UNIT_TOP_sf_encoder_1 := sf_encoder
 UNIT_PARAMETERS_sf_encoder_1 := -GCACHE_BYTES=1024 -GCACHE_WAYS=1
 UNITS_test_rtl_composite := sf_exp_neg sf_composite
 UNITS_test_rtl_ray_track := sf_ray_track
+UNITS_test_rtl_carry := sf_counters sf_ray_csr sf_scale
+UNIT_PARAMETERS_sf_counters := --public-flat-rw
+UNIT_PARAMETERS_sf_ray_csr := --public-flat-rw
 UNITS_test_rtl_planes := sf_activation sf_dir_phase sf_waves
 UNITS_test_rtl_link := sf_link sf_link_slow
 UNIT_TOP_sf_link_slow := sf_link
@@ -23,7 +26,7 @@ UNIT_RTL_sf_link := $(RTL_BOARD)
 UNIT_RTL_sf_link_slow := $(RTL_BOARD)
 UNIT_OBJ_test_rtl_link := $B/obj/sim/board/frame.o $B/obj/sim/board/link.o $B/verilated/libsfdut.a
 UNIT_TESTS := test_rtl_sh test_rtl_grid test_rtl_cache test_rtl_encoder test_rtl_composite test_rtl_ray_track test_rtl_planes \
-  test_rtl_link
+  test_rtl_link test_rtl_carry
 TESTS += $(UNIT_TESTS)
 
 LINT_TOPS := sf_ray_top

@@ -155,7 +155,19 @@ class Refused(unittest.TestCase):
                 scene.samples(np.zeros(16), features[:, 1:])
             with self.assertRaisesRegex(spikefield.Error, "steps"):
                 scene.samples(np.zeros(16), features[:1], steps=9)
+            at, along = np.zeros((1, 3)), np.array([[0, 0, 1.0]])
+            for wide in ({"steps": (1 << 32) + 1}, {"threads": (1 << 32) + 1}, {"steps": -(1 << 31) - 1}):
+                with self.assertRaisesRegex(ValueError, "is no 32-bit integer"):
+                    scene.rays(at, along, **wide)
+            pose = np.eye(3, 4)
+            with self.assertRaisesRegex(ValueError, "width 4294967300 is no"):
+                scene.frame((1 << 32) + 4, 4, 4.0, pose)
+            centred = scene.frame(4, 4, 4.0, pose, centre=np.array([2.0, 2.0]))
+            self.assertEqual(centred.tobytes(), scene.frame(4, 4, 4.0, pose).tobytes())
             trace = scene.samples(np.zeros(16), features[:1], traces=True)[1][0]
+            for place in ((1 << 32, 0), (0, 1 << 32)):
+                with self.assertRaisesRegex(ValueError, "is no 32-bit integer"):
+                    scene.shown(trace, *place)
             for layer, step, what in ((5, 0, "layer is 5"), (0, 8, "step is 8"), (-1, 0, "layer is -1")):
                 with self.assertRaisesRegex(spikefield.Error, what):
                     scene.shown(trace, layer, step)

@@ -37,7 +37,11 @@ template <class module> struct unit {
   module top;
   uint64_t cycle = 0;
   explicit unit(uint64_t seed) : top(prepare(context, seed)) {}
-  ~unit() { top.final(); }
+  ~unit()
+  {
+    Verilated::threadContextp(&context); /* where the module's scopes are, if it has any */
+    top.final();
+  }
   void settle() { top.eval(); }
   void edge()
   {

@@ -9,6 +9,12 @@
 
 enum { LINE_BYTES = 16, LINE_ENTRIES = 8, BEAT_BYTES = 8 };
 
+/* Of a table of up to 2^28 bytes, anywhere in 32 bits. */
+static inline uint32_t any_base(random_draw &draw)
+{
+  return (uint32_t)draw(0, ((INT64_C(1) << 32) - (1 << 28)) / LINE_BYTES) * LINE_BYTES;
+}
+
 /* Two bytes of the memory at an entry's place. */
 struct entry_source {
   virtual uint16_t entry(uint64_t index) const = 0;
@@ -36,7 +42,7 @@ struct axi_memory {
     const bool answers = !queue.empty() && queue.front().due <= u.cycle && !draw.percent(stall);
     u.top.m_axi_rvalid_i = answers;
     u.top.m_axi_rdata_i = answers ? beat(queue.front(), second) : (uint64_t)draw(0, INT64_MAX - 1);
-    u.top.m_axi_rresp_i = answers && draw.percent(error_percent) ? 2 : answers ? 0 : (uint8_t)draw(0, 3);
+    u.top.m_axi_rresp_i = answers && !draw.percent(error_percent) ? 0 : (uint8_t)draw(answers, 3);
   }
   /* After settling: what the clock edge will do. */
   template <class module> void sample(unit<module> &u, random_draw &draw)
@@ -47,7 +53,7 @@ struct axi_memory {
       ck_assert_msg(valid && address == waiting_address, "cycle %d: a request changed or went", (int)u.cycle);
     waiting = valid && !u.top.m_axi_arready_i, waiting_address = address;
     if (u.top.m_axi_rvalid_i) {
-      errors += u.top.m_axi_rresp_i != 0;
+      errors += u.top.m_axi_rresp_i != 0 && !queue.front().stale && !u.top.clear_i; /* none of lines that are dropped */
       if (second) filled += !queue.front().stale, queue.pop_front();
       second = !second;
     }

@@ -38,7 +38,7 @@ template <class module, int bytes, int ways> struct cache_bench {
   {
     memory.source = &table;
     u.top.s_valid_i = u.top.m_axi_rvalid_i = u.top.m_axi_arready_i = 0;
-    u.top.base_i = memory.base = (uint32_t)draw(0, 1 << 20) * LINE_BYTES;
+    u.top.base_i = memory.base = any_base(draw);
     u.reset();
     model.empty();
   }

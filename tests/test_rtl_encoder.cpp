@@ -41,7 +41,7 @@ template <class module, int bytes, int ways> struct encoder_bench {
   explicit encoder_bench(uint64_t seed) : u(seed), draw(seed)
   {
     u.top.s_valid_i = u.top.m_axis_tready_i = u.top.m_axi_arready_i = u.top.m_axi_rvalid_i = u.top.cfg_we_i = 0;
-    u.top.base_i = memory.base = (uint32_t)draw(0, 1 << 20) * LINE_BYTES;
+    u.top.base_i = memory.base = any_base(draw);
     u.top.planes_i = u.top.line_valid_i = u.top.line_empty_i = 0, u.top.line0_i = u.top.line1_i = 0;
     u.top.line_room_i = 1; /* of planes alone */
     u.reset();

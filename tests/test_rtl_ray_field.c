@@ -133,15 +133,19 @@ TEST(a_cache_that_the_build_lacks)
 
 /* ---- the memory ---- */
 
+static uint64_t fails_until; /* from line 20 on */
+static uint8_t failure;
 static void failing_memory(void *context)
 {
   sf_memory *m = context;
   sf_memory_cycle(m);
-  m->dut->in.r_resp = m->answered == 20 ? 2 : 0; /* SLVERR */
+  m->dut->in.r_resp = m->answered >= 20 && m->answered < fails_until ? failure : 0;
 }
 
-TEST(a_memory_that_answers_with_an_error)
+/* With SLVERR or DECERR, once; and with all that it was asked for, also behind the soft reset that drops those lines. */
+LOOP_TEST(a_memory_that_answers_with_an_error, 3)
 {
+  fails_until = _i < 2 ? 21 : UINT64_MAX, failure = _i == 1 ? 3 : 2;
   OWNED(fx_scene) scene = dense_scene(830);
   fx_memory memory;
   ck_ok(fx_memory_open(&memory, &scene, &(fx_cache_shape){SF_CACHE_BYTES, SF_CACHE_WAYS}));

@@ -87,7 +87,7 @@ endfunction
 
 // ---- plusargs
 reg [31:0] seed;
-reg [8*1024-1:0] wave;  // name of a file
+string wave;  // name of a file
 integer wave_file;
 task begin_run;
   begin
@@ -101,7 +101,7 @@ task begin_run;
 `else
       wave_file = $fopen(wave, "w");
       if (wave_file == 0) begin
-        $display("FAIL: +vcd: %0s cannot be written", wave);
+        $display("FAIL: +vcd: %s cannot be written", wave);
         $fatal(1, "no waveform");
       end
       $fclose(wave_file);

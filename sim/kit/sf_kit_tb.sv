@@ -1,7 +1,6 @@
 // Self-checking bench of a vector kit: programs the block over AXI4-Lite, streams the samples with random bubbles and
 // back-pressure, compares results, tap beats and counters. PASS, or the first difference and a failing exit status.
 // Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +notap (the block shows no tap beats) +vcd=FILE (waveform)
-`timescale 1ns / 1ps
 `default_nettype none
 `define SF_KIT_TB sf_kit_tb
 `ifndef SF_DUT

@@ -2,7 +2,6 @@
 // answers its reads of the field's memory late, and compares pixels, look-ups and counters. PASS, or the first difference and
 // a failing exit status.
 // Plusargs: +stalls=PERCENT (20) +seed=N (the kit's) +vcd=FILE (waveform)
-`timescale 1ns / 1ps
 `default_nettype none
 `define SF_KIT_TB sf_ray_kit_tb
 `ifndef SF_DUT
@@ -128,9 +127,19 @@ module sf_ray_kit_tb;
   integer asked = 0, answered = 0;
   reg second = 1'b0;
   reg [31:0] offset;
+  wire [47:0] request = {line_araddr, line_arlen, line_arsize, line_arburst, line_arprot};
+  reg held_line = 1'b0;
+  reg [47:0] held_request;
   task take_request;
     begin
+      if (held_line && {line_arvalid, request} !== {1'b1, held_request}) begin
+        $display("DIFFERENCE a request of the memory changed or was withdrawn while it was not taken");
+        fail;
+      end
+      held_line = line_arvalid && !line_arready;
+      held_request = request;
       if (line_arvalid && line_arready) begin
+        if (line_arprot !== 3'd0) differ(-1, "protection", 0, {61'd0, line_arprot});
         offset = line_araddr - MEMORY_BASE;
         if (offset[3:0] !== 4'd0 || offset / 16 >= LINES) differ(-1, "address", {32'd0, MEMORY_BASE}, {32'd0, line_araddr});
         if ({line_arlen, line_arsize, line_arburst} !== {8'd1, 3'd3, 2'd1}) differ(-1, "burst", 1, {56'd0, line_arlen});

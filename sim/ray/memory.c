@@ -7,7 +7,8 @@ enum { BEAT_BYTES = 8, BEATS = 2, SIZE_8_BYTES = 3, INCREMENTING = 1, BOUNDARY =
 
 uint32_t sf_memory_base(uint64_t seed)
 {
-  return BASE_LOW + (uint32_t)sf_random_below(seed, STREAM_BASE, 0, BASE_LOW / SF_LINE_BYTES) * SF_LINE_BYTES;
+  const uint64_t most = (UINT64_C(1) << 32) - 2 * BASE_LOW; /* room for a table of BASE_LOW bytes */
+  return BASE_LOW + (uint32_t)sf_random_below(seed, STREAM_BASE, 0, most / SF_LINE_BYTES) * SF_LINE_BYTES;
 }
 
 sf_status sf_memory_fill(sf_memory *m, const fx_scene *scene)

@@ -35,7 +35,18 @@ sed "s/beside1_q <= both ? {1'b0, g}/beside1_q <= both ? {1'b0, g} + 9'd1/" rtl/
 cmp -s rtl/sf_planes_reads.sv "$work/wrong/sf_planes_reads.sv" && fail "no fault was planted"
 run verilator 1 'DIFFERENCE ray 0' -- RAYS=1 OVERLAY="$work/wrong" BUILD=faulty
 
-command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
+# Requests of the memory against the rules of AXI4.
+against() {
+  rm -rf "$work/wrong" && mkdir "$work/wrong"
+  sed "$2" "rtl/$1" >"$work/wrong/$1"
+  cmp -s "rtl/$1" "$work/wrong/$1" && fail "no fault was planted"
+  run verilator 1 "DIFFERENCE $3" -- RAYS=1 STALLS=60 OVERLAY="$work/wrong" BUILD=against
+}
 kit=$grid
+against sf_fetch.sv 's/m_axi_arvalid_o = ask_q;/m_axi_arvalid_o = ask_q \&\& !m_axi_rvalid_i;/' 'a request of the memory changed'
+against sf_fetch.sv 's/m_axi_araddr_o = {address_q,/m_axi_araddr_o = {address_q + 28'"'"'(m_axi_rvalid_i),/' 'a request of the memory changed'
+against sf_ray_top.sv 's/\(m_axi_arprot_o *=\) 3.d0/\1 3'"'"'d1/' protection
+
+command -v iverilog >/dev/null || { echo "iverilog: not installed"; finish "Icarus skipped"; }
 run icarus 0 PASS -- RAYS=1
 finish "the kit's rays pass in both simulators; wrong words and a fault of the field are caught"

@@ -57,6 +57,13 @@ def _address(array):
     return None if array is None else array.ctypes.data
 
 
+def _int(name, value):
+    """The value as C's int, which ctypes would cut without a word."""
+    if not -(1 << 31) <= value < 1 << 31:
+        raise ValueError(f"{name} {value} is no 32-bit integer")
+    return value
+
+
 def bits(words):
     """Words of 64 neurons in the last axis -> bool, one neuron each: neuron n is bit n % 64 of word n / 64."""
     words = np.ascontiguousarray(words, dtype="<u8")
@@ -116,7 +123,7 @@ class Scene:
 
     @staticmethod
     def _options(steps=0, threads=0):
-        return ctypes.byref(_abi.Options(steps=steps, threads=threads))
+        return ctypes.byref(_abi.Options(steps=_int("steps", steps), threads=_int("threads", threads)))
 
     def relu_energy_fj(self, samples):
         """Of the ReLU twin: the same layers, every synapse a MAC."""
@@ -170,8 +177,8 @@ class Scene:
     def shown(self, trace, layer, step, steps=0):
         """What the accelerator's tap shows of one sample's trace, a record with spikes, rows and membrane."""
         to, one = np.zeros((), _SHOWN), _array(trace, _TRACE, ())
-        _checked(_lib.spikefield_trace_shown(self._scene, self._options(steps), _address(one), layer, step,
-                                             _address(to)))
+        _checked(_lib.spikefield_trace_shown(self._scene, self._options(steps), _address(one), _int("layer", layer),
+                                             _int("step", step), _address(to)))
         return to
 
     def rays(self, origins, directions, steps=0, threads=0, counts=None):
@@ -187,8 +194,8 @@ class Scene:
     def frame(self, width, height, focal, to_model, centre=None, steps=0, threads=0, counts=None):
         """A picture: focal length in pixels, to_model [3, 4] -> pixels [height, width]; "rgba" is 0..65535."""
         pose = _array(to_model, np.float32, (3, 4))
-        cx, cy = centre or (width / 2, height / 2)
-        camera = _abi.Camera(width, height, focal, focal, cx, cy, (ctypes.c_float * 12)(*pose.ravel()))
+        cx, cy = (width / 2, height / 2) if centre is None else centre
+        camera = _abi.Camera(_int("width", width), _int("height", height), focal, focal, cx, cy, (ctypes.c_float * 12)(*pose.ravel()))
         to = np.zeros((max(height, 0), max(width, 0)), _abi.PIXEL)
         _checked(_lib.spikefield_frame(self._scene, self._options(steps, threads), ctypes.byref(camera), _address(to),
                                        _raw(counts)))
