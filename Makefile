@@ -188,7 +188,7 @@ $B/bin/%: $B/obj/tools/%.o $B/libspikefield.a
 
 $B/bin/sim_render: $B/obj/tools/render/options.o
 $B/bin/sf_data: $(patsubst %.c,$B/obj/%.o,$(wildcard tools/solve/*.c))
-$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o
+$B/bin/sf_train: $B/obj/tools/train/options.o $B/obj/tools/train/defaults.o $B/obj/tools/train/table.o $B/obj/tools/train/report.o $B/obj/tools/train/watch.o $B/obj/tools/train/keeper.o
 
 # They serve a page (libmicrohttpd-dev).
 $B/bin/sf_view $B/bin/sf_train $B/tests/test_view $B/tests/test_viewer: LIBS += $(shell pkg-config --libs libmicrohttpd)

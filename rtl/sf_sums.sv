@@ -166,6 +166,7 @@ module sf_sums #(
     else {load_q, moved_q} <= {load_q[0], load_i, go && fresh_q};
   end
   always_ff @(posedge clk_i) {load2_step_q, load1_step_q} <= {load1_step_q, load_step_i};
+  wire unused_ok = &{1'b0, load2_step_q};  // one bank has no choice
 
   wire [16*ADDERS*BANKS-1:0] olds;
   generate

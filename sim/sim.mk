@@ -152,6 +152,8 @@ LANES_BUILT := $(if $(findstring LANES=256,$(ARCH_DEFINES)),32 64 128 256,32 64 
 lint: house $(RTL_READY) ## the order of the house; Verilator, Icarus and Yosys (where installed) accept the RTL, without warnings
 	@cd $(RTL_ROOT) && for lanes in $(LANES_BUILT); do \
 	  $(VERILATOR) --lint-only --top-module sf_top -GLANES=$$lanes -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
+	@cd $(RTL_ROOT) && for steps in 1 2 4; do \
+	  $(VERILATOR) --lint-only --top-module sf_top -GSTEPS_AT_ONCE=$$steps -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done
 	@cd $(RTL_ROOT) && $(VERILATOR) --lint-only --top-module sf_ray_top +define+SF_NO_TAP -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL)
 	@cd $(RTL_ROOT) && for lacks in GRID PLANES; do \
 	  $(VERILATOR) --lint-only --top-module sf_ray_top -G$$lacks=0 -Wall $(VERILATOR_UNROLL) -Irtl rtl/lint.vlt $(RTL) || exit 1; done

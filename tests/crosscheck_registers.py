@@ -79,6 +79,12 @@ def xml_number(text):
     return int(text[2:], 16) if text.startswith("'h") else int(text)
 
 
+def check_testable(file, name, said):
+    """Only constants may be tested by what a register model does by itself."""
+    if name in REGISTERS and said != (REGISTERS[name]["access"] == "RO" and REGISTERS[name]["reset"] != 0):
+        fault(f"{file}: {name} is said to be {'' if said else 'un'}testable")
+
+
 def xml_field(register, field):
     access = find_text(field, "access")
     written = find_text(field, "modifiedWriteValue")
@@ -114,6 +120,7 @@ def check_ipxact_map(component):
                     access, described = xml_field(register, field)
                     fields.append(described)
                     accesses.add(ACCESS[access])
+                    check_testable("spikefield.xml", name, find_text(field, "testable") != "false")
                     if not access.startswith(find_text(register, "access")):
                         fault(f"spikefield.xml: {name}: access of register and field differ")
                 got[name] = (offset, "+".join(sorted(accesses)), tuple(sorted(fields)))
@@ -258,6 +265,7 @@ def rdl_as_text(text):
         for properties, field, high, low, reset in re.findall(
                 r"field \{(.*?)\} (\w+)\[(\d+):(\d+)\](?: = (0x[0-9a-f]+))?;", body, re.S):
             accesses.add(rdl_access(re.search(r"\bsw = (\w+)", properties).group(1), "woclr" in properties))
+            check_testable("sf_csr.rdl", name, "donttest" not in properties)
             fields.append((field, int(low), int(high) - int(low) + 1, int(reset, 16) if reset else None))
         registers[name] = (int(offset, 16), "+".join(sorted(accesses)), tuple(sorted(fields)))
     for body, name, offset in re.findall(r"\bmem \{(.*?)\} (\w+) @ (0x[0-9a-f]+);", text, re.S):
@@ -281,6 +289,8 @@ def rdl_compiled(path):
             fields = [(f.inst_name, f.low, f.width, f.get_property("reset")) for f in node.fields()]
             accesses = {rdl_access(f.get_property("sw").name, f.get_property("onwrite") is not None)
                         for f in node.fields()}
+            for field in node.fields():
+                check_testable("sf_csr.rdl", node.inst_name, not field.get_property("donttest"))
             registers[node.inst_name] = (node.absolute_address, "+".join(sorted(accesses)), tuple(sorted(fields)))
     return registers, memories
 

@@ -11,6 +11,14 @@ static sf_model twin;
 static sf_dataset data;
 static sf_converted net;
 
+static int told;
+static void count_told(void *user, int done)
+{
+  ck_assert_ptr_eq(user, &told);
+  told = done > told ? done : told;
+}
+static const sf_conversion_rays some = {60, 5, count_told, &told};
+
 static void set_up(void)
 {
   make_folder();
@@ -110,14 +118,15 @@ TEST(rays)
 {
   static const int steps[] = {8, 512};
   sf_conversion own, at[2], again[2];
-  ck_ok(sf_convert_measure(&net, &data, 60, 5, 2, steps, &own, at));
+  ck_ok(sf_convert_measure(&net, &data, &some, 2, steps, &own, at));
+  ck_assert(told > 0 && told <= 60);
   ck_assert_uint_gt(own.samples, 60);
   ck_assert_double_eq_tol(own.psnr, rendered(&twin, 60, 5), 0.01);
   ck_assert_uint_eq(own.fj, own.samples * sf_converted_macs(&twin, 0) * 4600);
   ck_assert_uint_eq(at[0].fj, at[0].macs * 4600 + at[0].sops * 900);
   ck_assert_uint_gt(at[1].sops, 10 * at[0].sops);
   ck_assert_msg(fabs(at[1].psnr - own.psnr) < 0.1, "%g dB after 512 steps, the twin has %g", at[1].psnr, own.psnr);
-  ck_ok(sf_convert_measure(&net, &data, 60, 5, 2, steps, &own, again));
+  ck_ok(sf_convert_measure(&net, &data, &some, 2, steps, &own, again));
   ck_assert(again[0].psnr == at[0].psnr && again[0].fj == at[0].fj);
 }
 
@@ -152,7 +161,7 @@ TEST(decoder)
                 worst[0]);
   decoder.threshold[1] /= 3, decoder.threshold[2] /= 3;
 
-  ck_ok(sf_convert_measure(&decoder, &data, 60, 5, 3, steps, &own, at));
+  ck_ok(sf_convert_measure(&decoder, &data, &some, 3, steps, &own, at));
   ck_assert_uint_gt(own.samples, 60);
   ck_assert_double_eq_tol(own.psnr, rendered(&planes, 60, 5), 0.01);
   ck_assert_uint_eq(own.macs, own.samples * HIDDEN * (150 + HIDDEN + 3));

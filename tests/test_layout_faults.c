@@ -349,6 +349,7 @@ typedef struct bad_text {
 static const bad_text bad_texts[] = {
     {"1 BLA 16 12 20 20 8 6\n", "", SF_E_UNSUPPORTED, "cameras.txt:1", "unknown camera model BLA"},
     {"# x\n1 PINHOLE 16 12 20 20 8\n", "", SF_E_FORMAT, "cameras.txt:2", "number 4 cannot be read"},
+    {"1 PINHOLE 16 12 20 20 8 6 1\n", "", SF_E_FORMAT, "cameras.txt:1: camera 1", "more than the 4 values of PINHOLE"},
     {"1 PINHOLE 16 0 20 20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "16 x 0 pixels"},
     {"1 PINHOLE 16 12 20 -20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "focal length"},
     {"1 PINHOLE 16 12 nan 20 8 6\n", "", SF_E_RANGE, "cameras.txt:1: camera 1", "parameter 0 of PINHOLE is not finite"},
@@ -361,6 +362,8 @@ static const bad_text bad_texts[] = {
     {CAMERA, "1 1 0 0 0 0 inf 0 1 p00.png\n\n", SF_E_RANGE, "images.txt:1", "position is inf"},
     {CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n2 1 0 0 0 0 0 0 1 p01.png\n", SF_E_FORMAT, "images.txt:2", "X Y POINT3D_ID"},
     {CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n1 2 3 4 5 \r\n", SF_E_FORMAT, "images.txt:2", "X Y POINT3D_ID"},
+    {CAMERA, "1 1 0 0 0 0 0 0 1 p00.png\n\n2 1 0 0 0 0 0 1 1 p00.png\n\n", SF_E_FORMAT, "images.txt",
+     "images 1 and 2 have the same name p00.png"},
     {CAMERA, "1 1 0 0 0 0 0 0 1\n\n", SF_E_FORMAT, "images.txt:1", "no name"},
 };
 

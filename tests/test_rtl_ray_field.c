@@ -142,7 +142,8 @@ static void failing_memory(void *context)
   m->dut->in.r_resp = m->answered >= 20 && m->answered < fails_until ? failure : 0;
 }
 
-/* With SLVERR or DECERR, once; and with all that it was asked for, also behind the soft reset that drops those lines. */
+/* With SLVERR or DECERR, once; and with all that it was asked for, also behind the soft reset that drops those lines.
+ */
 LOOP_TEST(a_memory_that_answers_with_an_error, 3)
 {
   fails_until = _i < 2 ? 21 : UINT64_MAX, failure = _i == 1 ? 3 : 2;

@@ -231,7 +231,11 @@ static const struct {
      "transform_matrix[1][3] is not finite"},
     {ONE("[[1,0,0,1],[0,1,0,NaN],[0,0,1,3],[0,0,0,1]]"), SF_E_FORMAT, "transforms_train.json:1:", "malformed"},
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,0,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "column 2"},
-    {ONE("[[1,1,0,1],[0,0,0,1],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "degenerate"},
+    {ONE("[[1,1,0,1],[0,0,0,1],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)", "no rotation"},
+    {ONE("[[1,0,0,1],[0.03,1,0,1],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)",
+     "columns 0 and 1 are not at right"},
+    {ONE("[[1,0,-0.03,1],[0,1,0,1],[0,0,1,3],[0,0,0,1]]"), SF_E_RANGE, "frame 1 (a)",
+     "columns 2 and 0 are not at right"},
     {ONE("[[1,0,0,1],[0,1,0,1],[0,0,1,3],[0,0,1,1]]"), SF_E_RANGE, "frame 1 (a)", "[3][2]"},
 };
 

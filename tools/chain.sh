@@ -11,6 +11,7 @@ shift 3
 minutes=10 rays=400 view=0 train=
 while [ $# -gt 0 ]; do
   case $1 in
+    --minutes | --rays | --view | --train) [ $# -gt 1 ] || { echo "chain.sh: $1 needs a value" >&2; exit 2; } ;;&
     --minutes) minutes=$2 ;;
     --rays) rays=$2 ;;
     --view) view=$2 ;;
@@ -45,4 +46,4 @@ step "5/6 co-simulate: RTL against the fixed-point core, spike by spike"
 step "6/6 audit: every operation, counted three times"
 "$bin/energy_audit" "$out/scene.snn" "$data" --view "$view" --html "$out/report.html" --model "$out/model.safetensors" --json >"$out/audit.json"
 "$bin/sf_summary" "$out" $(($(date +%s) - started))
-echo "See it from any side: $bin/sf_view $out/scene.snn $data --model $out/model.safetensors"
+printf 'See it from any side: %q %q %q --model %q\n' "$bin/sf_view" "$out/scene.snn" "$data" "$out/model.safetensors"

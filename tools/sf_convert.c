@@ -14,7 +14,7 @@ typedef struct options {
   int rays, downscale;
   uint64_t seed;
   double percentile;
-  bool json;
+  bool json, quiet;
 } options;
 
 typedef struct measured {
@@ -82,15 +82,31 @@ static sf_status load(sf_dataset *data, const sf_model *model, const char *path,
   return status;
 }
 
+typedef struct teller {
+  sf_progress progress;
+  int rays;
+} teller;
+
+static void show(void *user, int done)
+{
+  teller *t = user;
+  if (sf_progress_due(&t->progress))
+    sf_progress_show(&t->progress, "%d of %d rays at every number of steps", done, t->rays);
+}
+
 static sf_status measure(measured *m, const sf_model *model, const char *path, const char *dir, const options *o)
 {
   sf_dataset views;
   SF_TRY(load(&views, model, path, dir, "train", o));
   sf_status status = sf_convert(&m->net, model, &views, CALIBRATION, o->percentile, o->seed);
   sf_dataset_free(&views);
-  SF_TRY(status);
+  if (status.code) return sf_fail(status.code, "%.200s: %s", path, status.message);
   SF_TRY(load(&views, model, path, dir, "test", o));
-  status = sf_convert_measure(&m->net, &views, o->rays, o->seed, POINTS, steps, &m->twin, m->at);
+  teller tell = {.rays = o->rays};
+  sf_progress_begin(&tell.progress, o->quiet);
+  const sf_conversion_rays rays = {.count = o->rays, .seed = o->seed, .tick = show, .user = &tell};
+  status = sf_convert_measure(&m->net, &views, &rays, POINTS, steps, &m->twin, m->at);
+  sf_progress_end(&tell.progress);
   sf_dataset_free(&views);
   return status;
 }
@@ -118,6 +134,7 @@ int main(int argc, char **argv)
       {"--downscale", 0, SF_ARG_INT, &o.downscale, 0, 64, NULL, "N",
        "views of 1/N of the full size, 0 = by the layout (default 0)"},
       {"--json", 0, SF_ARG_FLAG, &o.json, 0, 0, NULL, NULL, "report as JSON"},
+      {"--quiet", 'q', SF_ARG_FLAG, &o.quiet, 0, 0, NULL, NULL, "no progress line"},
       {0}};
   const sf_cli cli = {
       .program = "sf_convert",

@@ -1,5 +1,6 @@
 /* sf_train: learns a spiking radiance field and its time budget from posed images. */
 #include "quant/quant.h"
+#include "tools/train/keeper.h"
 #include "tools/train/report.h"
 #include "tools/train/watch.h"
 #include "cli/finish_ranks.h"
@@ -7,45 +8,6 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-
-/* What the run has saved, and what it could not. */
-typedef struct keeper {
-  bool good;     /* there is a checkpoint */
-  bool told;     /* that there could be none */
-  bool finished; /* the model is saved, in place of a checkpoint */
-} keeper;
-
-static void warn_full(keeper *k, const sf_status *why)
-{
-  if (!k->told) fprintf(stderr, "sf_train: warning: %s: no checkpoint, the run goes on\n", why->message);
-  k->told = true;
-}
-
-/* A disk that is full now may not be later, and a model is smaller: only what must be saved now has to be. */
-static sf_status checkpoint(const sf_trainer *trainer, const train_arguments *a, bool now, sf_progress *progress,
-                            keeper *k)
-{
-  if (sf_ranks_rank(a->train.ranks)) return sf_ok();
-  const sf_status status = sf_trainer_save(trainer, a->output, true);
-  if (!status.code) k->good = true;
-  if (now || status.code != SF_E_IO) return status;
-  sf_progress_end(progress);
-  warn_full(k, &status);
-  return sf_ok();
-}
-
-/* The evaluation can be interrupted, too. Where no checkpoint can be written, the model itself may still fit. */
-static sf_status keep_learned(const sf_trainer *trainer, const train_arguments *a, keeper *k)
-{
-  if (sf_ranks_rank(a->train.ranks)) return sf_ok();
-  const sf_status status = sf_trainer_save(trainer, a->output, true);
-  k->good = !status.code;
-  if (status.code != SF_E_IO) return status;
-  SF_TRY(sf_trainer_save(trainer, a->output, false));
-  k->finished = true;
-  warn_full(k, &status);
-  return sf_ok();
-}
 
 /* After an iteration: rank 0 tells and saves; each says whether it was interrupted. */
 typedef struct teller {
@@ -68,7 +30,7 @@ static sf_status after_step(const sf_trainer *trainer, const train_arguments *a,
   if (sf_progress_due(&w->progress)) train_show(&w->progress, s, &w->recent);
   if (stop) return sf_fail(SF_E_STOPPED, "interrupted");
   if (s->stage != 3 && sf_seconds() - w->tried > 60 * a->checkpoint_minutes) {
-    SF_TRY(checkpoint(trainer, a, false, &w->progress, k));
+    SF_TRY(keeper_checkpoint(trainer, a, false, &w->progress, k));
     w->tried = sf_seconds();
   }
   return sf_ok();
@@ -77,10 +39,11 @@ static sf_status after_step(const sf_trainer *trainer, const train_arguments *a,
 static sf_status interrupted(const sf_trainer *trainer, const train_arguments *a, const sf_train_stats *s, teller *w,
                              keeper *k)
 {
-  SF_TRY(checkpoint(trainer, a, true, &w->progress, k));
+  SF_TRY(keeper_checkpoint(trainer, a, true, &w->progress, k));
   sf_progress_end(&w->progress);
-  return sf_fail(SF_E_STOPPED, "interrupted at iteration %lld; continue with --resume (checkpoint: %s)",
-                 (long long)s->iteration, a->output);
+  return sf_fail(SF_E_STOPPED, "interrupted at iteration %lld; continue with --resume (checkpoint: %.300s%s%.300s)",
+                 (long long)s->iteration, a->output, k->aside ? "; what was there is " : "",
+                 k->aside ? keeper_before(a) : "");
 }
 
 static sf_status loop(sf_trainer *trainer, const train_arguments *a, FILE *log, train_watch *watch, sf_train_stats *s,
@@ -279,7 +242,7 @@ static sf_status learn(sf_trainer *trainer, const train_arguments *a, train_watc
   sf_status status = loop(trainer, a, log, watch, stats, k);
   const bool cut = log && ferror(log);
   const bool logged = !log || (!fclose(log) && !cut);
-  if (!status.code) status = keep_learned(trainer, a, k);
+  if (!status.code) status = keeper_learned(trainer, a, k);
   if (!status.code && !logged)
     status = sf_fail(SF_E_IO, "%s: cannot write the log; the model is saved: %s", a->log, a->output);
   return sf_ranks_lost(a->train.ranks) ? status : sf_ranks_agree(a->train.ranks, status);
@@ -301,7 +264,7 @@ static sf_status train_and_report(const char *path, const sf_dataset *data, cons
   status = sf_ranks_agree(ranks, status);
   if (!status.code) status = learn(trainer, a, &watch, &stats, &k);
   if (!status.code) status = finish(trainer, path, how, a, &stats, &k);
-  if (!status.code && !k.finished && !sf_ranks_rank(ranks)) status = sf_trainer_save(trainer, a->output, false);
+  if (!status.code && !sf_ranks_rank(ranks)) status = keeper_finish(trainer, a, &k);
   train_watch_close(&watch);
   sf_trainer_free(trainer);
   return status;

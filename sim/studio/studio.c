@@ -16,6 +16,10 @@ static sf_status open_model(sf_studio *studio)
     snprintf(studio->model_path, sizeof studio->model_path, "%.*smodel.safetensors",
              slash ? (int)(slash - scene) + 1 : 0, scene);
   SF_TRY(sf_model_load(&studio->model, studio->model_path));
+  const bool planes = sf_model_decodes(&studio->model);
+  if (planes != (studio->scene.backbone == FX_TENSORF))
+    return sf_fail(SF_E_RANGE, "%s: the model's field is %s, the scene's is not", studio->model_path,
+                   planes ? "TensoRF's" : "a hash grid");
   if (studio->scene.net.steps > studio->model.config.steps)
     return sf_fail(SF_E_RANGE, "%s: the model has %d time steps, %d are asked for", studio->model_path,
                    studio->model.config.steps, studio->scene.net.steps);
@@ -125,17 +129,51 @@ sf_status sf_shot_save_truth(const sf_studio *studio, const sf_shot *shot, const
   return sf_golden_save_truth(&shot->golden, &shot->view->image, shot->window.x, shot->window.y, background, path);
 }
 
-sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot)
+static sf_status measure(const sf_studio *studio, sf_shot *shot)
 {
-  int planes = studio->options.backend == SF_BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
   float background[3];
   background_of(studio, background);
-  sf_golden_free(&shot->golden);
-  SF_TRY(sf_golden_create(&shot->golden, shot->window.width, shot->window.height, planes));
-  SF_TRY(render(studio, shot));
   if (!shot->view->image.rgba) return sf_ok();
   return sf_golden_quality(&shot->golden, &shot->view->image, shot->window.x, shot->window.y, background, &shot->psnr,
                            &shot->ssim);
+}
+
+sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot)
+{
+  int planes = studio->options.backend == SF_BACKEND_FLOAT ? SF_FLOAT_PLANES : SF_PLANES;
+  sf_golden_free(&shot->golden);
+  SF_TRY(sf_golden_create(&shot->golden, shot->window.width, shot->window.height, planes));
+  SF_TRY(render(studio, shot));
+  return measure(studio, shot);
+}
+
+static sf_status take_colours(sf_shot *shot, const sf_exr_channel *channel, int n, const char *path)
+{
+  int found = 0;
+  for (int i = 0; i < n; i++)
+    for (sf_plane p = SF_PLANE_R; p <= SF_PLANE_B; p++)
+      if (!strcmp(channel[i].name, sf_plane_names[p]) && channel[i].type != SF_EXR_UINT) {
+        const size_t pixels = (size_t)shot->window.width * (size_t)shot->window.height;
+        memcpy(shot->golden.plane[p], channel[i].data, pixels * sizeof(float));
+        found++;
+      }
+  return found == 3 ? sf_ok() : sf_fail(SF_E_FORMAT, "%s: no channels R, G and B", path);
+}
+
+sf_status sf_shot_measure(const sf_studio *studio, sf_shot *shot, const char *path)
+{
+  int width, height, n;
+  sf_exr_channel *channel;
+  sf_golden_free(&shot->golden);
+  SF_TRY(sf_golden_create(&shot->golden, shot->window.width, shot->window.height, SF_FLOAT_PLANES));
+  SF_TRY(sf_exr_load(path, &width, &height, &channel, &n));
+  sf_status status = sf_ok();
+  if (width != shot->window.width || height != shot->window.height)
+    status = sf_fail(SF_E_FORMAT, "%s: %d x %d pixels, expected %d x %d", path, width, height, shot->window.width,
+                     shot->window.height);
+  if (status.code == SF_OK) status = take_colours(shot, channel, n, path);
+  sf_exr_free(channel, n);
+  return status.code == SF_OK ? measure(studio, shot) : status;
 }
 
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path)

@@ -51,6 +51,8 @@ sf_status sf_shot_load(const sf_studio *studio, int index, sf_shot *shot);
  * do; a forward-facing one is then refused with SF_E_USAGE. */
 sf_status sf_shot_from(const sf_studio *studio, const sf_camera *camera, sf_shot *shot);
 sf_status sf_shot_render(const sf_studio *studio, sf_shot *shot);
+/* PSNR and SSIM of what an EXR file holds, in place of a rendering. SF_E_FORMAT: it has another size or no colours. */
+sf_status sf_shot_measure(const sf_studio *studio, sf_shot *shot, const char *path);
 sf_status sf_shot_save(const sf_studio *studio, const sf_shot *shot, const char *path); /* EXR */
 /* The data set's picture of a rendered shot, PNG. SF_E_FORMAT: it has none. */
 sf_status sf_shot_save_truth(const sf_studio *studio, const sf_shot *shot, const char *path);

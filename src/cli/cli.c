@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -24,7 +25,7 @@ static bool whole_number_text(const char *text)
 
 static sf_status out_of_range(const sf_option *o, const char *text)
 {
-  return sf_fail(SF_E_USAGE, "%s %.60s is out of range: expected %.17g to %.17g", o->name, text, o->min, o->max);
+  return sf_fail(SF_E_USAGE, "%s %.60s is out of range: expected %.12g to %.12g", o->name, text, o->min, o->max);
 }
 
 static bool outside(const sf_option *o, double value)
@@ -150,6 +151,29 @@ static const char *path_of(const sf_option *o)
   return text && o->type == SF_ARG_INPUT && access(text, F_OK) ? NULL : text;
 }
 
+/* A list of views, or a picture in a folder of the data set. Outputs of earlier runs may lie in the data set itself. */
+static bool is_of_data_set(const char *path, const char *folder)
+{
+  static const char *const lists[] = {"transforms.json",     "transforms_train.json", "transforms_test.json",
+                                      "transforms_val.json", "poses_bounds.npy",      "cameras.bin",
+                                      "images.bin",          "points3D.bin",          "cameras.txt",
+                                      "images.txt",          "points3D.txt"};
+  static const char *const pictures[] = {".png", ".jpg", ".jpeg"};
+  struct stat info;
+  if (stat(path, &info) || !S_ISREG(info.st_mode) || stat(folder, &info) || !S_ISDIR(info.st_mode)) return false;
+  char *file = realpath(path, NULL), *data = realpath(folder, NULL);
+  const size_t length = data ? strlen(data) : 0;
+  bool of = false;
+  if (file && data && !strncmp(file, data, length) && file[length] == '/') {
+    const char *name = last_part(file), *end = strrchr(name, '.');
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) of |= !strcmp(name, lists[i]);
+    for (size_t i = 0; i < sizeof pictures / sizeof *pictures && end && strchr(file + length + 1, '/'); i++)
+      of |= !strcasecmp(end, pictures[i]);
+  }
+  free(file), free(data);
+  return of;
+}
+
 /* An output over an input or another output would lose one of them, at the end of the work. */
 static sf_status check_outputs(const sf_cli *cli, const char *const *positional)
 {
@@ -160,6 +184,8 @@ static sf_status check_outputs(const sf_cli *cli, const char *const *positional)
     for (int i = 0; i < cli->max_positional && !cli->words && positional[i]; i++)
       if (same_file(path, positional[i]))
         return sf_fail(SF_E_USAGE, "%s %.200s is the input %.200s", o->name, path, positional[i]);
+      else if (is_of_data_set(path, positional[i]))
+        return sf_fail(SF_E_USAGE, "%s %.200s is a file of the data set %.200s", o->name, path, positional[i]);
     for (const sf_option *other = cli->options; other->name; other++)
       if (other != o && path_of(other) && same_file(path, path_of(other)))
         return sf_fail(SF_E_USAGE, "%s %.200s is also %s", o->name, path, other->name);
@@ -275,4 +301,12 @@ int sf_cli_finish(const sf_cli *cli, sf_status status)
     fprintf(stderr, "%s: %s\n", cli->program, status.message);
   if (status.code == SF_E_USAGE) return 2;
   return status.code == SF_E_STOPPED ? 130 : 1;
+}
+
+void sf_cli_put_word(FILE *out, const char *word)
+{
+  const bool plain = *word && !word[strcspn(word, " \t\n\"'\\$`!*?[](){}<>|&;#~")];
+  if (!plain) fputc('\'', out);
+  for (; *word; word++) fputs(!plain && *word == '\'' ? "'\\''" : (char[]){*word, 0}, out);
+  if (!plain) fputc('\'', out);
 }

@@ -4,6 +4,7 @@
 #include "base/status.h"
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 /* STRING: any text. INPUT: a file or folder that is read. OUTPUT: a file that will be written. PLACE: a folder, or
  * something that the program itself opens before it works. GROUP: a heading of --help for the options that follow. */
@@ -63,6 +64,9 @@ sf_status sf_cli_refuse(const sf_cli *cli, int argc, char **argv, const char *co
 
 /* "program: message" on stderr; returns the exit status: 0 ok, 2 usage, 130 stopped, 1 everything else. */
 int sf_cli_finish(const sf_cli *cli, sf_status status);
+
+/* Prints a word as a shell reads it: in single quotes where it needs them. */
+void sf_cli_put_word(FILE *out, const char *word);
 
 /* SIGINT and SIGTERM set a flag that long loops poll; the second signal kills. */
 void sf_cli_catch_signals(void);

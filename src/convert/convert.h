@@ -44,6 +44,12 @@ typedef struct sf_conversion {
   double psnr;
   uint64_t samples, macs, sops, fj; /* of all rays */
 } sf_conversion;
-sf_status sf_convert_measure(const sf_converted *net, const sf_dataset *views, int rays, uint64_t seed, int points,
-                             const int *steps, sf_conversion *twin, sf_conversion *result);
+typedef struct sf_conversion_rays {
+  int count;
+  uint64_t seed;
+  void (*tick)(void *user, int done); /* or NULL; by one thread */
+  void *user;
+} sf_conversion_rays;
+sf_status sf_convert_measure(const sf_converted *net, const sf_dataset *views, const sf_conversion_rays *rays,
+                             int points, const int *steps, sf_conversion *twin, sf_conversion *result);
 #endif

@@ -3,6 +3,7 @@
 #include "energy/energy.h"
 #include "render/march.h"
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 
 enum { PLACES = 1 + SF_CONVERT_POINTS }; /* the twin first */
@@ -76,23 +77,31 @@ static void sum_up(const sf_converted *net, const convert_ray *ray, const way *w
   to->fj = to->macs * SF_MAC_FJ + to->sops * SF_SOP_FJ;
 }
 
-sf_status sf_convert_measure(const sf_converted *net, const sf_dataset *views, int rays, uint64_t seed, int points,
-                             const int *steps, sf_conversion *twin, sf_conversion *result)
+sf_status sf_convert_measure(const sf_converted *net, const sf_dataset *views, const sf_conversion_rays *rays,
+                             int points, const int *steps, sf_conversion *twin, sf_conversion *result)
 {
   sf_steps intervals;
+  const int n = rays->count;
+  int done = 0;
   SF_TRY(sf_march_steps(&intervals, net->model, 1));
-  convert_ray *ray = calloc((size_t)rays, sizeof *ray);
-  way *w = calloc((size_t)rays, sizeof *w);
-  sf_status status = ray && w ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for %d rays", rays);
-  for (int i = 0; i < rays && !status.code; i++) status = convert_pick(views, seed, (uint64_t)i, &ray[i]);
+  convert_ray *ray = calloc((size_t)n, sizeof *ray);
+  way *w = calloc((size_t)n, sizeof *w);
+  sf_status status = ray && w ? sf_ok() : sf_fail(SF_E_MEMORY, "no memory for %d rays", n);
+  for (int i = 0; i < n && !status.code; i++) status = convert_pick(views, rays->seed, (uint64_t)i, &ray[i]);
   if (!status.code) {
 #pragma omp parallel for schedule(dynamic, 4)
-    for (int i = 0; i < rays; i++) walk(net, &intervals, &ray[i], points, steps, &w[i]);
+    for (int i = 0; i < n; i++) {
+      int now;
+      walk(net, &intervals, &ray[i], points, steps, &w[i]);
+#pragma omp atomic capture
+      now = ++done;
+      if (rays->tick && omp_get_thread_num() == 0) rays->tick(rays->user, now);
+    }
     *twin = (sf_conversion){0};
-    sum_up(net, ray, w, rays, 0, twin);
+    sum_up(net, ray, w, n, 0, twin);
     for (int p = 0; p < points; p++) {
       result[p] = (sf_conversion){.steps = steps[p]};
-      sum_up(net, ray, w, rays, 1 + p, &result[p]);
+      sum_up(net, ray, w, n, 1 + p, &result[p]);
     }
   }
   free(ray), free(w);

@@ -96,6 +96,10 @@ static sf_status take_model(sf_capture *c, sf_colmap *model, const char *dir, co
   double width = 0, height = 0;
   if (!model->images) return sf_fail(SF_E_RANGE, "%s: zero views", t->images);
   qsort(model->image, (size_t)model->images, sizeof *model->image, by_name);
+  for (int i = 1; i < model->images; i++)
+    if (!strcmp(model->image[i - 1].name, model->image[i].name))
+      return sf_fail(SF_E_FORMAT, "%s: images %lld and %lld have the same name %.200s", t->images,
+                     (long long)model->image[i - 1].id, (long long)model->image[i].id, model->image[i].name);
   if (model->cameras) qsort(model->camera, (size_t)model->cameras, sizeof *model->camera, by_id);
   SF_TRY(check_cameras(model, t->cameras));
   for (int i = 0; i < model->cameras; i++) {

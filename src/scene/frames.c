@@ -79,11 +79,14 @@ static sf_status normalise_rotation(double m[12], const char *where)
       return sf_fail(SF_E_RANGE, "%s: transform_matrix column %d has length %g", where, k, length);
     for (int i = 0; i < 3; i++) c[k][i] = m[4 * i + k] / length;
   }
-  double det = c[0][0] * (c[1][1] * c[2][2] - c[1][2] * c[2][1]) - c[0][1] * (c[1][0] * c[2][2] - c[1][2] * c[2][0]) +
-               c[0][2] * (c[1][0] * c[2][1] - c[1][1] * c[2][0]);
-  if (!(fabs(det) > 0.01))
-    return sf_fail(SF_E_RANGE, "%s: transform_matrix is degenerate: its axes lie in one plane (determinant %.3g)",
-                   where, det);
+  for (int k = 0; k < 3; k++) {
+    const double *a = c[k], *b = c[(k + 1) % 3], cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    if (!(fabs(cosine) < 0.02)) /* digits that were cut off leave 1e-3 */
+      return sf_fail(SF_E_RANGE,
+                     "%s: transform_matrix is no rotation: columns %d and %d are not at right angles "
+                     "(cosine %.3g)",
+                     where, k, (k + 1) % 3, cosine);
+  }
   for (int k = 0; k < 3; k++)
     for (int i = 0; i < 3; i++) m[4 * i + k] = c[k][i];
   return sf_ok();

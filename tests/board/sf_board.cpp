@@ -192,12 +192,13 @@ int main(int argc, char **argv)
   serve(b, terminal, o.idle);
   unlink(o.link);
   fprintf(stderr,
-          "sf_board: %llu cycles, %llu bytes to the board and %llu back at %d baud; to the board %llu bytes lost, %llu doubled, %llu changed, %llu from nowhere; back "
+          "sf_board: %llu cycles, %llu bytes to the board and %llu back at %d baud; to the board %llu bytes lost, %llu "
+          "doubled, %llu changed, %llu from nowhere; back "
           "%llu, %llu, "
           "%llu, %llu\n",
-          (unsigned long long)b.cycles, (unsigned long long)b.bytes_to, (unsigned long long)b.bytes_from,
-          SF_BOARD_BAUD, (unsigned long long)b.out.done[0], (unsigned long long)b.out.done[1],
-          (unsigned long long)b.out.done[2], (unsigned long long)b.out.done[3], (unsigned long long)b.in.done[0],
-          (unsigned long long)b.in.done[1], (unsigned long long)b.in.done[2], (unsigned long long)b.in.done[3]);
+          (unsigned long long)b.cycles, (unsigned long long)b.bytes_to, (unsigned long long)b.bytes_from, SF_BOARD_BAUD,
+          (unsigned long long)b.out.done[0], (unsigned long long)b.out.done[1], (unsigned long long)b.out.done[2],
+          (unsigned long long)b.out.done[3], (unsigned long long)b.in.done[0], (unsigned long long)b.in.done[1],
+          (unsigned long long)b.in.done[2], (unsigned long long)b.in.done[3]);
   return 0;
 }

@@ -34,6 +34,9 @@ usage --output sim_render s.snn d -o s.snn
 usage --png sim_render s.snn d -o same.out --png same.out
 usage --saif sf_cosim s.snn d --saif s.snn
 usage --html energy_audit s.snn d --csv same.out --html same.out
+usage --png sim_render s.snn d -o out --png d/test/r_0.png
+usage --csv energy_audit s.snn d --csv d/transforms_test.json
+usage --summary sf_train d -o out --summary ./d/transforms_train.json
 usage --output sf_train d -o model.safetensors --fine-tune model.safetensors
 data nodir/x sf_cosim s.snn d --junit nodir/x
 data nodir/x sf_cosim s.snn d --evidence nodir/x
@@ -84,6 +87,18 @@ status=$?
 check "full disk" "not told once" [ "$(grep -c 'warning: cannot write full.out.*the run goes on' err)" -eq 1 ]
 sed -i '/warning/d' err
 judge "full disk: checkpoints" sf_train 1 full.out
+# What a run's model replaces is kept until the run is finished: a finished model, also where a second run is interrupted.
+kept=(d --stage1 2 --levels 2 --log2-hash 8 --threads 1 -q -o kept.out --log log.out)
+timeout 60 "$BIN/sf_train" "${kept[@]}" --stage2 2 >stdout.txt 2>err && cp kept.out first.out
+for again in 1 2; do
+  timeout -s INT -k 60 3 "$BIN/sf_train" "${kept[@]}" --stage2 1000000 --seed 2 --checkpoint-minutes 0 >stdout.txt 2>err
+  check "an interrupted run" "the finished model is lost (run $again)" cmp -s first.out kept.out.before
+done
+check "an interrupted run" "it does not say where the model is" grep -q 'kept.out; what was there is kept.out.before' <(
+  rm kept.out.before && timeout -s INT -k 60 3 "$BIN/sf_train" "${kept[@]}" --stage2 1000000 --checkpoint-minutes 0 2>&1)
+rm kept.out.before && timeout 60 "$BIN/sf_train" "${kept[@]}" --stage2 2 >stdout.txt 2>err
+check "a finished run" "another model" cmp -s first.out kept.out
+absent kept.out.before "a finished run"
 # A log without room does not cost the model.
 rm -f learned.out && timeout -k 5 60 "$BIN/sf_train" "${train[@]}" -o learned.out --log /dev/full >stdout.txt 2>err </dev/null
 status=$?

@@ -62,6 +62,15 @@ cp one/manifest.json before.json
 expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one
 check "files that stay as they are: kept" grep -qx "kept one/manifest.json and one/contact.png" out
 expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one --downscale 1
+cp d/test/r_1.png truth.png && cp d/test/r_2.png d/test/r_1.png
+quality() { sed -nE 's/^[[:space:]]*"psnr":[[:space:]]*([0-9.]+).*/\1/p' one/manifest.json | tr '\n' ' '; }
+first=$(quality)
+expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one
+check "a truth that changed: still $first" [ "$(quality)" != "$first" ]
+mv truth.png d/test/r_1.png
+expect 0 "all 4 views are there already: nothing was rendered" s1.snn d --all -o one
+check "a truth that is as it was: $(quality), not $first" [ "$(quality)" = "$first" ]
+check "measured again: as it was" cmp -s before.json one/manifest.json
 rm one/contact.png
 expect 0 "kept one/manifest.json and wrote one/contact.png" s1.snn d --all -o one
 cp one/view_0001.exr one/view_0003.exr
@@ -73,7 +82,7 @@ expect 1 "one/manifest.json belongs to another set: scene_sha256 is" s2.snn d --
 expect 1 "one/manifest.json belongs to another set: t_r is" s1.snn d --all -o one --steps 1
 expect 1 "one/manifest.json belongs to another set: crop is" s1.snn d --all -o one --crop 0,0,4,4
 expect 1 "one/manifest.json belongs to another set: downscale is" s1.snn d --all -o one --downscale 2
-cp -r d turned && sed -i '0,/\[\[\(-*[0-9]\)\(\.[0-9]*\)/s//[[\1.25/' turned/transforms_test.json
+cp -r d turned && sed -i '0,/\[\[\([^,]*,[^,]*,[^,]*,\)[^]]*/s//[[\1 0.25/' turned/transforms_test.json
 expect 1 "one/manifest.json belongs to another set: view[0]: camera_sha256 is" s1.snn turned --all -o one
 cp -r d named && sed -i 's,test/r_2,test/s_2,' named/transforms_test.json && mv named/test/r_2.png named/test/s_2.png
 expect 1 "one/manifest.json belongs to another set: view[2]: name is test/r_2, here it is test/s_2" s1.snn named --all -o one

@@ -81,7 +81,8 @@ static void run(int cycles, int wrong_percent)
 {
   model m;
   m.n_feature = percent(20) ? 32 : (int)draw(1, 32), m.n_dir = percent(20) ? 16 : (int)draw(0, 16);
-  if (percent(30)) m.n_feature = 0, m.n_dir = percent(20) ? 160 : (int)draw(1, 160); /* every packet has its direction */
+  if (percent(30))
+    m.n_feature = 0, m.n_dir = percent(20) ? 160 : (int)draw(1, 160); /* every packet has its direction */
   const int busy = (int)draw(20, 100), drain = (int)draw(5, 100), on = percent(50) ? 100 : 80;
   bool offered = false, user = false, last = false;
   uint64_t data = 0;

@@ -1,4 +1,5 @@
 #include "tools/export/extras.h"
+#include "cli/cli.h"
 #include <stdio.h>
 
 enum { VECTOR_RAYS = 1000, TRACE_RAYS = 20 };
@@ -17,7 +18,9 @@ static void print_vectors(const sf_kit_report *kit, const char *folder)
 {
   printf("%s: %d samples of %d rays, %d input beats, %d register writes; %d files, %.1f MB\n", folder, kit->samples,
          kit->rays, kit->beats, kit->writes, kit->files, 1e-6 * (double)kit->bytes);
-  printf("make -C %s icarus verilator\n", folder);
+  printf("make -C ");
+  sf_cli_put_word(stdout, folder);
+  printf(" icarus verilator\n");
 }
 
 static cJSON *vectors_json(const sf_kit_report *kit, const char *folder)

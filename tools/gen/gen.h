@@ -43,6 +43,10 @@ gen_field gen_whole(const gen_register *r);
 int gen_all_fields(const gen_register *r, gen_field *out);
 /* True when the block itself changes what is read: state, flags, and an address that counts up. */
 bool gen_volatile(const gen_register *r);
+/* True when it reads as its reset value and nothing else. Tests that a register model makes by itself, of resets and of
+ * every bit, fail on the others: a value that does not fit is stored as an illegal one, and the block counts when it
+ * comes out of reset. */
+bool gen_testable(const gen_register *r);
 
 /* The RTL files as the build knows them, relative to the root of the tree. */
 typedef struct gen_sources {

@@ -175,6 +175,7 @@ static void write_field(FILE *out, int level, const gen_register *r, const gen_f
   if (gen_volatile(r)) leaf(out, level + 1, "volatile", "true");
   leaf(out, level + 1, "access", access_of(r));
   if (r->access == GEN_W1C) leaf(out, level + 1, "modifiedWriteValue", "oneToClear");
+  if (!gen_testable(r)) leaf(out, level + 1, "testable", "false");
   end(out, level, "field");
 }
 

@@ -37,7 +37,7 @@ static void write_register(FILE *out, const gen_register *r)
   for (int i = 0; i < count; i++) {
     const gen_field *f = &fields[i];
     const uint32_t reset = r->reset >> f->lsb & (uint32_t)((UINT64_C(1) << f->width) - 1);
-    fprintf(out, "    field { %s desc = ", properties(r));
+    fprintf(out, "    field { %s%s desc = ", properties(r), gen_testable(r) ? "" : " donttest;");
     put_string(out, f->meaning);
     fprintf(out, "; } %s[%d:%d]", f->name, f->lsb + f->width - 1, f->lsb);
     /* What is only written has no contents that could be reset. */

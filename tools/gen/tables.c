@@ -68,3 +68,8 @@ bool gen_volatile(const gen_register *r)
   /* A register that is only read and has contents after reset is a constant. */
   return r->access == GEN_W1C || (r->access == GEN_RO && !r->reset);
 }
+
+bool gen_testable(const gen_register *r)
+{
+  return r->access == GEN_RO && !gen_volatile(r);
+}
