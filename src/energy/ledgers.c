@@ -212,14 +212,32 @@ static bool price_all(const book *b, const sf_technology *tech, sf_ledgers *to)
   return fits;
 }
 
-/* What a ledger spends on spikes: the SOPs, and the weights of the layers that spikes read. */
-static double spike_driven(const book *b, const sf_ledgers *l, int ledger)
+/* What spikes cost at `scale` times the measured rate: SOPs and rows of weights grow with it. A row is read once for a
+ * sample, however often its neuron fires, so rows are at most all of them. */
+static double spikes_cost(const book *b, const sf_ledgers *l, int ledger, double scale)
 {
-  double fj = (double)l->part[ledger][SF_PART_SOP];
-  for (int r = 0; r < SF_LAYERS; r++)
-    for (int t = 0; t < SF_T_MAX && fx_layer_reads_spikes(r); t++)
-      fj += (double)b->events[NET][r][t][SF_PART_WEIGHT] * (double)l->unit[ledger][r][SF_PART_WEIGHT].fj;
+  double fj = scale * (double)l->part[ledger][SF_PART_SOP];
+  for (int r = 0; r < SF_LAYERS; r++) {
+    double rows = 0;
+    if (!fx_layer_reads_spikes(r)) continue;
+    for (int t = 0; t < SF_T_MAX; t++) rows += (double)b->events[NET][r][t][SF_PART_WEIGHT];
+    const double all = fmax((double)b->events[TWIN][r][0][SF_PART_WEIGHT], rows); /* a bias is one more */
+    fj += fmin(scale * rows, all) * (double)l->unit[ledger][r][SF_PART_WEIGHT].fj;
+  }
   return fj;
+}
+
+/* The scale at which spikes cost so much: the cost grows, and between rows that are all read evenly. */
+static double scale_of(const book *b, const sf_ledgers *l, int ledger, double fj)
+{
+  double low = 0, high = 1;
+  if ((double)l->part[ledger][SF_PART_SOP] <= 0) return NAN;
+  while (spikes_cost(b, l, ledger, high) < fj) high *= 2;
+  for (int i = 0; i < 200 && low < high; i++) {
+    const double middle = 0.5 * (low + high);
+    *(spikes_cost(b, l, ledger, middle) < fj ? &low : &high) = middle;
+  }
+  return high;
 }
 
 static void break_even(const book *b, sf_ledgers *l)
@@ -229,9 +247,9 @@ static void break_even(const book *b, sf_ledgers *l)
     sf_break_even *e = &l->break_even[i];
     e->ledger = last ? SF_LEDGER_NEURON : i;
     e->twin = last ? SF_LEDGER_ANN : sf_ledger_texts[i].baseline;
-    const double spikes = spike_driven(b, l, e->ledger);
+    const double spikes = spikes_cost(b, l, e->ledger, 1);
     const double rest = (double)l->total[e->twin] - ((double)l->total[e->ledger] - spikes);
-    e->rate = spikes > 0 && rest >= 0 ? l->rate * rest / spikes : NAN;
+    e->rate = rest >= 0 ? l->rate * scale_of(b, l, e->ledger, rest) : NAN;
   }
 }
 
