@@ -31,13 +31,11 @@
 #define SF_REG_CTRL 0x000c
 #define SF_REG_CTRL_START_MASK 0x00000001 /* check the programming and accept samples */
 #define SF_REG_CTRL_START_SHIFT 0
-#define SF_REG_CTRL_SOFT_RESET_MASK                                                                                    \
-  0x00000002 /* stop, drop every sample and result inside, clear ERROR; programming, weights and counters stay */
+#define SF_REG_CTRL_SOFT_RESET_MASK 0x00000002 /* stop, drop every sample and result inside, clear ERROR; programming, weights and counters stay */
 #define SF_REG_CTRL_SOFT_RESET_SHIFT 1
 #define SF_REG_CTRL_CLEAR_MASK 0x00000004 /* clear every counter once no sample is inside */
 #define SF_REG_CTRL_CLEAR_SHIFT 2
-#define SF_REG_CTRL_SNAPSHOT_MASK                                                                                      \
-  0x00000008 /* copy every counter to the window once no sample is inside; before CLEAR when both are set */
+#define SF_REG_CTRL_SNAPSHOT_MASK 0x00000008 /* copy every counter to the window once no sample is inside; before CLEAR when both are set */
 #define SF_REG_CTRL_SNAPSHOT_SHIFT 3
 
 /* state of the block, RO */
@@ -53,16 +51,13 @@
 
 /* what was refused; every bit also raises IRQ_PENDING.ERROR, W1C */
 #define SF_REG_ERROR 0x0014
-#define SF_REG_ERROR_SIZE_MASK                                                                                         \
-  0x00000001 /* start: a layer is larger than the memory, empty, or does not fit its neighbour; or BIAS has other bits \
-              */
+#define SF_REG_ERROR_SIZE_MASK 0x00000001 /* start: a layer is larger than the memory, empty, or does not fit its neighbour; or BIAS has other bits */
 #define SF_REG_ERROR_SIZE_SHIFT 0
 #define SF_REG_ERROR_STEPS_MASK 0x00000002 /* start: STEPS is 0 or more than T_MAX */
 #define SF_REG_ERROR_STEPS_SHIFT 1
 #define SF_REG_ERROR_LEAK_MASK 0x00000004 /* start: a leak is more than 4096 */
 #define SF_REG_ERROR_LEAK_SHIFT 2
-#define SF_REG_ERROR_THETA_MASK                                                                                        \
-  0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1, of weighted spikes 1..2^22-1 */
+#define SF_REG_ERROR_THETA_MASK 0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1, of weighted spikes 1..2^22-1 */
 #define SF_REG_ERROR_THETA_SHIFT 3
 #define SF_REG_ERROR_MODE_MASK 0x00000010 /* start: MODE is more than 3 */
 #define SF_REG_ERROR_MODE_SHIFT 4
@@ -74,9 +69,7 @@
 #define SF_REG_ERROR_ADDRESS_SHIFT 7
 #define SF_REG_ERROR_WEIGHT_MASK 0x00000100 /* weight of -128, or address outside the layer's memory */
 #define SF_REG_ERROR_WEIGHT_SHIFT 8
-#define SF_REG_ERROR_PACKET_MASK                                                                                       \
-  0x00000200 /* input packet too short, too long, or without a direction before the first sample; input is discarded   \
-                until soft reset */
+#define SF_REG_ERROR_PACKET_MASK 0x00000200 /* input packet too short, too long, or without a direction before the first sample; input is discarded until soft reset */
 #define SF_REG_ERROR_PACKET_SHIFT 9
 #define SF_REG_ERROR_VALUE_MASK 0x00000400 /* input value beyond 12 bits; input is discarded until soft reset */
 #define SF_REG_ERROR_VALUE_SHIFT 10
@@ -179,8 +172,7 @@
 #define SF_REG_WEIGHT_ADDRESS 0x0090
 #define SF_REG_WEIGHT_ADDRESS_WORD_MASK 0x0000003f /* output neuron / 4 */
 #define SF_REG_WEIGHT_ADDRESS_WORD_SHIFT 0
-#define SF_REG_WEIGHT_ADDRESS_ROW_MASK                                                                                 \
-  0x00007fc0 /* presynaptic neuron; BIAS_ROW (256) for the biases of C1, C2 and C3 */
+#define SF_REG_WEIGHT_ADDRESS_ROW_MASK 0x00007fc0 /* presynaptic neuron; BIAS_ROW (256) for the biases of C1, C2 and C3 */
 #define SF_REG_WEIGHT_ADDRESS_ROW_SHIFT 6
 #define SF_REG_WEIGHT_ADDRESS_LAYER_MASK 0x00038000 /* 0 D1, 1 D2, 2 C1, 3 C2, 4 C3 */
 #define SF_REG_WEIGHT_ADDRESS_LAYER_SHIFT 15
@@ -225,20 +217,15 @@
 
 /* what was refused; a soft reset clears it, W1C */
 #define SF_REG_RAY_ERROR 0x0408
-#define SF_REG_RAY_ERROR_VALUE_MASK                                                                                    \
-  0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES, a background, FIELD_BASE or the programming of the planes out  \
-                of range, or planes that this build has not */
+#define SF_REG_RAY_ERROR_VALUE_MASK 0x00000001 /* start: RAY_TRANS_STOP, RAY_MAX_SAMPLES, a background, FIELD_BASE or the programming of the planes out of range, or planes that this build has not */
 #define SF_REG_RAY_ERROR_VALUE_SHIFT 0
 #define SF_REG_RAY_ERROR_BUSY_MASK 0x00000002 /* start or a write to the programming while running */
 #define SF_REG_RAY_ERROR_BUSY_SHIFT 1
 #define SF_REG_RAY_ERROR_ADDRESS_MASK 0x00000004 /* write to a register that is not there or is read-only */
 #define SF_REG_RAY_ERROR_ADDRESS_SHIFT 2
-#define SF_REG_RAY_ERROR_ORDER_MASK                                                                                    \
-  0x00000008 /* tuser on a sample inside a ray, or none on its first one; an empty ray without tuser or tlast; input   \
-                is discarded until soft reset */
+#define SF_REG_RAY_ERROR_ORDER_MASK 0x00000008 /* tuser on a sample inside a ray, or none on its first one; an empty ray without tuser or tlast; input is discarded until soft reset */
 #define SF_REG_RAY_ERROR_ORDER_SHIFT 3
-#define SF_REG_RAY_ERROR_MEMORY_MASK                                                                                   \
-  0x00000010 /* the grid's memory answered with an error; pixels since then may be wrong */
+#define SF_REG_RAY_ERROR_MEMORY_MASK 0x00000010 /* the grid's memory answered with an error; pixels since then may be wrong */
 #define SF_REG_RAY_ERROR_MEMORY_SHIFT 4
 
 /* the interrupt is also any bit of RAY_ERROR that is enabled here, RW */
@@ -276,8 +263,7 @@
 #define SF_REG_FIELD_CACHE_WAYS_MASK 0x0f000000 /* lines per set */
 #define SF_REG_FIELD_CACHE_WAYS_SHIFT 24
 
-/* look-ups of lines since RAY_CTRL.CLEAR, low half; both halves are read while no ray is inside, or high, low, high
- * until high stays, RO */
+/* look-ups of lines since RAY_CTRL.CLEAR, low half; both halves are read while no ray is inside, or high, low, high until high stays, RO */
 #define SF_REG_FIELD_LOOKUPS 0x0434
 
 /* high half, RO */
@@ -295,8 +281,7 @@
 /* high half, RO */
 #define SF_REG_FIELD_FILLS_HIGH 0x0448
 
-/* cycles in which the nets' input has room, the encoder has no features for it, and a look-up waits for its line from
- * the memory; low half, RO */
+/* cycles in which the nets' input has room, the encoder has no features for it, and a look-up waits for its line from the memory; low half, RO */
 #define SF_REG_FIELD_STALLS 0x044c
 
 /* high half, RO */
@@ -313,30 +298,24 @@
 /* window of the counters as of the last snapshot, RO */
 #define SF_REG_COUNTERS 0x1000
 
-/* WEIGHTS: 4 weights a word, word = layer << 15 | row << 6 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1
- * rows 0..31, C1 rows 0..159, and C1, C2 and C3 row 256, their biases */
+/* WEIGHTS: 4 weights a word, word = layer << 15 | row << 6 | output neuron / 4; D2 and C3 have words 0..3 of a row, D1 rows 0..31, C1 rows 0..159, and C1, C2 and C3 row 256, their biases */
 #define SF_REG_WEIGHTS_WORDS 163840
 #define SF_REG_WEIGHTS_BITS 32
 
-/* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first
- * entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this; from 256 on TensoRF's field: see
- * rtl/sf_planes.sv */
+/* ENCODER: 8 * level + 0 scale Q16.16, 1 points per axis (0: hashed), 2 log2 of the entries of a hashed level, 3 first entry, 4 shift; 128 levels, 129 direction features, 130 their LSB is 2^-this; from 256 on TensoRF's field: see rtl/sf_planes.sv */
 #define SF_REG_ENCODER_WORDS 4096
 #define SF_REG_ENCODER_BITS 32
 
-/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events, from 0 on: mac sop spikes updates weight
- * state_r state_w special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5
- * (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout),
- * layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
+/* COUNTERS: low half first, at ((event * 8 + layer) * 8 + step) * 8. Events, from 0 on: mac sop spikes updates weight state_r state_w special; layer 7 of event 0 holds samples, rays, cycles, busy, stall_in, stall_out at steps 0..5 (cycles in which the block is active, any layer adds up a row, D1 has no sample, a layer waits for the readout), layer 7 of event 1 the cycles in which each of D1 D2 C1 C2 C3 adds up rows at steps 0..4 */
 #define SF_REG_COUNTERS_WORDS 512
 #define SF_REG_COUNTERS_BITS 64
 
 /* Events of the counters */
-#define SF_REG_EVENT_MAC 0     /* MAC */
-#define SF_REG_EVENT_SOP 1     /* SOP */
-#define SF_REG_EVENT_SPIKES 2  /* spikes */
+#define SF_REG_EVENT_MAC 0 /* MAC */
+#define SF_REG_EVENT_SOP 1 /* SOP */
+#define SF_REG_EVENT_SPIKES 2 /* spikes */
 #define SF_REG_EVENT_UPDATES 3 /* neuron updates */
-#define SF_REG_EVENT_WEIGHT 4  /* weight bytes read */
+#define SF_REG_EVENT_WEIGHT 4 /* weight bytes read */
 #define SF_REG_EVENT_STATE_R 5 /* state bytes read */
 #define SF_REG_EVENT_STATE_W 6 /* state bytes written */
 #define SF_REG_EVENT_SPECIAL 7 /* special functions */
