@@ -48,8 +48,9 @@ static sf_option *energy(train_arguments *a, sf_option *o)
        "rays learn to end soon in a surface: the error may grow by C percent for each percent of fewer samples; "
        "0: rays as long as the paper's (default 0.5)"},
       {"--undecoded", 0, SF_ARG_DOUBLE, &t->undecoded, 0, 0.1, NULL, "X",
-       "tensorf: faint samples are not decoded, as many as together take this share of the light; 0: those of a weight "
-       "up to TensoRF's 1e-4 (default 0.01)"},
+       "tensorf: faint samples are not decoded, as many as together take this share of the light, fewer where the "
+       "error "
+       "is small; 0: those of a weight up to TensoRF's 1e-4 (default 0.01)"},
       {"--steps", 'T', SF_ARG_INT, &t->config.steps, 1, SF_T_MAX, NULL, "T",
        "time steps unrolled in training (default 8)"},
       {"--fine-tune", 0, SF_ARG_INPUT, &a->fine_tune, 0, 0, NULL, "MODEL",
