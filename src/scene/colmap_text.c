@@ -80,7 +80,8 @@ static sf_status read_cameras(sf_colmap *model, lines *l)
     if (params < 0) return sf_fail(SF_E_UNSUPPORTED, "%s: camera %g: unknown camera model %.40s", where, id, name);
     SF_TRY(take_numbers(&at, 2, size, where, expected));
     SF_TRY(take_numbers(&at, params, param, where, expected));
-    if (at[strspn(at, " \t\r")])
+    at += strspn(at, " \t\r");
+    if (*at && *at != '#')
       return sf_fail(SF_E_FORMAT, "%s: camera %g: more than the %d values of %s", where, id, params, name);
     snprintf(where, sizeof where, "%s:%d: camera %g", l->path, l->number, id);
     SF_TRY(sf_colmap_add_camera(model, where, number, name, size[0], size[1], param));
