@@ -151,7 +151,17 @@ static const char *path_of(const sf_option *o)
   return text && o->type == SF_ARG_INPUT && access(text, F_OK) ? NULL : text;
 }
 
-/* A list of views, or a picture in a folder of the data set. Outputs of earlier runs may lie in the data set itself. */
+/* Where layouts keep pictures, from the data set's folder on: train/, test/, val/, images/, images_4/. */
+static bool in_picture_folder(const char *inside)
+{
+  static const char *const folders[] = {"train/", "test/", "val/"};
+  bool in = !strncmp(inside, "images", 6) && strchr(inside, '/');
+  for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) in |= !strncmp(inside, folders[i], strlen(folders[i]));
+  return in;
+}
+
+/* A list of views, or a picture where a layout has pictures. Outputs of earlier runs may lie elsewhere in the folder.
+ */
 static bool is_of_data_set(const char *path, const char *folder)
 {
   static const char *const lists[] = {"transforms.json",     "transforms_train.json", "transforms_test.json",
@@ -167,7 +177,7 @@ static bool is_of_data_set(const char *path, const char *folder)
   if (file && data && !strncmp(file, data, length) && file[length] == '/') {
     const char *name = last_part(file), *end = strrchr(name, '.');
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) of |= !strcmp(name, lists[i]);
-    for (size_t i = 0; i < sizeof pictures / sizeof *pictures && end && strchr(file + length + 1, '/'); i++)
+    for (size_t i = 0; i < sizeof pictures / sizeof *pictures && end && in_picture_folder(file + length + 1); i++)
       of |= !strcasecmp(end, pictures[i]);
   }
   free(file), free(data);
