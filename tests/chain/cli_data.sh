@@ -141,4 +141,9 @@ for at in $(seq 9 $((header / 30)) $((header + 7))); do
   else judge "model with byte $at edited" sf_export 1 edited.file; absent out "model with byte $at edited"; fi
 done
 
+# A float model of the other kind of field.
+good sf_train d -o planes.safetensors --backbone tensorf --voxels 16 --hidden 16 --rays 128 --samples 512 --stage1 2 --stage2 2 --threads 1
+data "planes.safetensors: the model's field is TensoRF's" sim_render s.snn d -o out --backend float --model planes.safetensors
+absent out "a model of another field"
+
 finish

@@ -103,7 +103,7 @@ cosim whole 0 --rays 100000 --block 2 --jobs 3 --limit-samples $limit
 cmp -s part.json whole.json || fail "an interrupted run that was continued differs"
 cp part damaged
 printf 'x' | dd of=damaged bs=1 seek=$(($(stat -c %s damaged) / 2)) conv=notrunc status=none
-cosim damaged 1 --rays 100000 --block 2 --checkpoint damaged
+cosim damaged 1 --rays 100000 --block 2 --limit-samples 1 --checkpoint damaged
 grep -q "damaged: this checkpoint is damaged" damaged.err || fail "a damaged checkpoint: $(cat damaged.err)"
 cosim other 1 --rays 100000 --block 2 --seed 2 --checkpoint part
 grep -q "part: this checkpoint is of another" other.err || fail "another run's checkpoint: $(cat other.err)"
