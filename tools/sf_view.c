@@ -77,7 +77,10 @@ static sf_status parse(int argc, char **argv, options *o, sf_cli *cli)
       {0}};
   const char *positional[2];
   cli->options = table;
-  const sf_status status = sf_cli_parse(cli, argc, argv, positional);
+  static const char *const of_data[] = {"--split", "--downscale", "--scale", NULL};
+  sf_status status = sf_cli_parse(cli, argc, argv, positional);
+  if (status.code == SF_OK && positional[0] && !positional[1])
+    status = sf_cli_refuse(cli, argc, argv, of_data, "is about a data set, and none is named");
   cli->options = NULL;
   SF_TRY(status);
   v->scene = positional[0], v->data = positional[1], v->scale = (float)o->scale;

@@ -131,6 +131,10 @@ usage "--camera goes with one view" sim_render s.snn d -o out --view 1 --camera 
 usage "a camera is" sim_render s.snn d -o out --camera 9,8,9.5
 usage "a camera is" sim_render s.snn d -o out --camera 9,8,9.5,9.5,4.5,4,1,0,0,0,0,0,-1,nan,0,1,0,0
 usage "DATA is missing" sim_render s.snn -o out
+for of_data in "--split train" "--downscale 2" "--scale 0.5"; do
+  usage "${of_data% *} is about a data set" sim_render s.snn -o out --camera 9,8,9.5,9.5,4.5,4,1,0,0,0,0,0,-1,0,0,1,0,0 $of_data
+  usage "${of_data% *} is about a data set" sf_view s.snn $of_data
+done
 usage "SCENE.snn is missing" sf_view
 number sf_view --port -1 65536 nan
 usage "no address" sf_view s.snn d --address here

@@ -131,11 +131,14 @@ sf_status render_parse(int argc, char **argv, render_options *o, sf_cli *cli)
       {0}};
   static const char *const of_manifest[] = {"--all",   "--output", "--png",       "--truth", "--crop",
                                             "--steps", "--split",  "--downscale", "--scale", NULL};
+  static const char *const of_data[] = {"--split", "--downscale", "--scale", NULL};
   const char *positional[2];
   cli->options = table;
   sf_status status = sf_cli_parse(cli, argc, argv, positional);
   if (status.code == SF_OK && o->verify)
     status = sf_cli_refuse(cli, argc, argv, of_manifest, "does not go with --verify: the manifest decides");
+  else if (status.code == SF_OK && o->camera && !positional[1])
+    status = sf_cli_refuse(cli, argc, argv, of_data, "is about a data set, and none is named");
   cli->options = NULL;
   SF_TRY(status);
   o->scene = positional[0], o->data = positional[1];
