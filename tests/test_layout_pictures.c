@@ -131,4 +131,66 @@ LOOP_TEST(each_picture_has_its_own_camera, 2)
   same_rays(&d, &rig);
 }
 
+/* One camera 4 units away (3.2 in the model) that looks along +y, a picture of one pixel a sample: where a pixel of
+ * slopes up to m is seen, the ray meets the cube of half edge m D / (1 + m) first. */
+typedef struct mark {
+  int x, y, width, height;
+  uint16_t value, alpha;
+} mark;
+
+static double shown_of(uint16_t value, uint16_t alpha, const mark *marks, int n)
+{
+  static const double back[3] = {0, -1, 0}, at[3] = {0, -4, 0};
+  enum { SIDE = 24 };
+  layout_rig rig = {.lenses = 1, .views = 1, .lens = {{7, 1, "PINHOLE", SIDE, SIDE, 4, {30, 30, 12, 12}}}};
+  sf_image image = {SIDE, SIDE, malloc(SIDE * SIDE * 8)};
+  strcpy(rig.view[0].name, "p00.png");
+  rig.view[0].lens = 7;
+  look(rig.view[0].to_world, at, back);
+  put_json("transforms_train.json", &rig, "", "train", 0, 1), put_json("transforms_test.json", &rig, "", "train", 0, 1);
+  for (int i = 0; i < SIDE * SIDE * 4; i++) image.rgba[i] = i % 4 < 3 ? value : alpha;
+  for (const mark *m = marks; m < marks + n; m++)
+    for (int i = 0; i < m->width * m->height; i++) {
+      uint16_t *p = image.rgba + 4 * ((m->y + i / m->width) * SIDE + m->x + i % m->width);
+      for (int k = 0; k < 4; k++) p[k] = k < 3 ? m->value : m->alpha;
+    }
+  ck_ok(sf_make_dir(in("train")));
+  ck_ok(sf_image_save_png(&image, in("train/p00.png")));
+  sf_image_free(&image);
+  reload("train");
+  ck_assert(d.count == 1 && d.scale == 0.8f);
+  return (double)d.view[0].shown;
+}
+
+static double cube_of(double pixel)
+{
+  const double m = fabs(pixel + 0.5 - 12) / 30;
+  return 3.2 * m / (1 + m);
+}
+
+TEST(pictures_say_how_far_the_box_has_to_reach)
+{
+  enum { GREY = 128 * 257, FULL = 65535, HALF = 127 * 257 };
+  static const struct {
+    uint16_t value, alpha;
+    mark m;
+    double pixel;
+  } rows[] = {{GREY, 0, {20, 12, 1, 1, GREY, FULL}, 20},
+              {GREY, 0, {11, 2, 1, 1, GREY, FULL}, 2},
+              {0, 0, {20, 12, 1, 1, 0, FULL}, 20}, /* alpha tells: black counts */
+              {GREY, HALF, {3, 12, 1, 1, GREY, FULL}, 3},
+              {0, FULL, {19, 12, 1, 1, GREY, FULL}, 19}, /* no alpha: black or white may be the background */
+              {FULL, FULL, {19, 12, 1, 1, GREY, FULL}, 19},
+              {GREY, FULL, {0, 0, 1, 1, GREY, FULL}, 23}};
+  const double bound = 1e-5; /* of floats: origins and directions */
+  for (int i = 0; i < COUNT(rows); i++)
+    ck_assert_double_eq_tol(shown_of(rows[i].value, rows[i].alpha, &rows[i].m, 1), cube_of(rows[i].pixel), bound);
+  ck_assert(shown_of(GREY, 0, NULL, 0) == 0);
+  /* 2 of 66 pixels do not decide, 3 of 67 do. */
+  for (int n = 1; n <= 3; n++) {
+    const mark two[2] = {{8, 8, 8, 8, GREY, FULL}, {23, 11, 1, n, GREY, FULL}};
+    ck_assert_double_eq_tol(shown_of(GREY, 0, two, 2), cube_of(n < 3 ? 15 : 23), bound);
+  }
+}
+
 ck_options ck_program = {.set_up = make_folder, .tear_down = tear_down};

@@ -167,7 +167,7 @@ enum { VIEWS = 9 };
 /* Looks alike everywhere; not at equal distances. */
 static void make_data(sf_dataset *data, sf_view *view)
 {
-  *data = (sf_dataset){.path = "d", .view = view, .count = VIEWS, .bound = 1};
+  *data = (sf_dataset){.path = "d", .view = view, .count = VIEWS, .bound = 1, .scale = 0.8f};
   for (int v = 0; v < VIEWS; v++) {
     view[v] = (sf_view){.camera = camera_at(0.7 * v, 3, 0.1 * v), .brightness = 0.5f};
     snprintf(view[v].name, sizeof view[v].name, "v%d", v);
@@ -253,6 +253,22 @@ static void looks_as_another(sf_view *v, double by)
   v[6].camera.to_world[2] += (float)by, v[8].camera.to_world[0] += (float)by;
 }
 
+/* A quarter of the views, and a view more: alone it does not decide. */
+static void shows(sf_view *v, double by)
+{
+  for (int i = 0; i < VIEWS; i++) v[i].shown = i < 6 ? 0.9f : (float)by;
+}
+
+static void one_shows(sf_view *v, double by)
+{
+  for (int i = 0; i < VIEWS; i++) v[i].shown = i < VIEWS - (by > 2 ? 3 : 2) ? 0.5f : (float)by;
+}
+
+static void shows_nothing_but(sf_view *v, double by)
+{
+  for (int i = 0; i < VIEWS; i++) v[i].shown = i % 2 ? 0 : (float)by;
+}
+
 TEST(surveys_at_their_limits)
 {
   static const oddity rows[] = {{"brighter", 1.49, 1.51, brighter},
@@ -272,7 +288,10 @@ TEST(surveys_at_their_limits)
                                 {"outside", 5.5, 7, outside},
                                 {"high", 5.5, 7, high},
                                 {"another's place", 1e-4, 1e-5, as_another},
-                                {"another's direction", 1.1e-4, 0.9e-4, looks_as_another}};
+                                {"another's direction", 1.1e-4, 0.9e-4, looks_as_another},
+                                {"past the box", 0.999, 1.001, shows},
+                                {"a few past the box", 2, 2.1, one_shows},
+                                {"little of the box", 0.151, 0.149, shows_nothing_but}};
   static char *text;
   static size_t size;
   FILE *out = open_memstream(&text, &size);

@@ -299,12 +299,15 @@ static sf_status prepare(train_arguments *a, const char *path, const sf_dataset_
   if (!sf_ranks_rank(a->train.ranks)) sf_dataset_warn(stderr, "sf_train", data, NULL);
   SF_TRY(check_test(data, path, how, a));
   SF_TRY(train_settle(a, data));
-  if (!a->fine_tune || a->resume) return sf_ok();
   const int told = data->warnings;
-  SF_TRY(load_start(a, data, start));
+  if (a->fine_tune && !a->resume) {
+    SF_TRY(load_start(a, data, start));
+    a->train.start = start;
+  } else if (a->train.config.backbone == SF_INGP && !data->ndc) {
+    SF_TRY(sf_dataset_survey_box(data, a->train.config.bound));
+  }
   const sf_dataset more = {.warning = data->warning + told, .warnings = data->warnings - told};
   if (!sf_ranks_rank(a->train.ranks)) sf_dataset_warn(stderr, "sf_train", &more, NULL);
-  a->train.start = start;
   return sf_ok();
 }
 

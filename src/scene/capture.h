@@ -109,6 +109,8 @@ bool sf_forward_facing(const sf_capture *capture);
 
 /* ---- pictures ---- */
 
+/* sf_view.shown of a view whose picture is there. */
+float sf_shown(const sf_view *view);
 /* The views of the split, pictures loaded in parallel. Frames are placed. */
 sf_status sf_views_load(sf_dataset *data, const sf_capture *capture, const sf_dataset_options *options);
 #endif

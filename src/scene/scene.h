@@ -21,6 +21,8 @@ typedef struct sf_view {
   sf_camera camera;
   const char *lens; /* its camera model, as COLMAP names it; a literal */
   float brightness; /* mean of r, g, b, weighted by alpha, 0..1 */
+  float shown;      /* half edge of the least cube about the origin that 97 % of what the picture shows look into, model
+                     * units; what has no alpha, and black or white where no alpha is, does not count; 0: nothing, NDC */
   sf_image image;   /* rgba NULL when the split has no picture for it, or none was to be kept */
 } sf_view;
 
@@ -94,9 +96,12 @@ void sf_dataset_warn(FILE *out, const char *program, const sf_dataset *data, con
 sf_status sf_warn(sf_dataset *data, const char *format, ...) __attribute__((format(printf, 2, 3))); /* adds one */
 bool sf_dataset_has_warning(const sf_dataset *data, const char *text);
 
-/* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside. Pictures
- * are not needed any more. */
+/* What looks wrong, as further warnings: exposure, focal lengths, optical centres, poses twice or far outside, the
+ * proposed box. Pictures are not needed any more. */
 sf_status sf_dataset_survey(sf_dataset *data);
+/* A further warning where the pictures show much more than the box [-half, half]^3 of model units, or fill little of
+ * it. Pictures are not needed any more. */
+sf_status sf_dataset_survey_box(sf_dataset *data, double half);
 /* Picture of 2 * size x (size + SF_PLAN_FOOT) pixels: from above (x, y) and from the side (x, z). Views of the training
  * split are blue, others red; the scene box and [-1, 1]^3 grey, with NDC the near plane; sparse points green. Words
  * name the panels, and in the foot the colours and a scale. Free the image. */

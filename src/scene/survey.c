@@ -126,6 +126,33 @@ static sf_status survey_positions(sf_dataset *data, double *space)
   return sf_ok();
 }
 
+/* ---- the box ---- */
+
+/* By what a quarter of the views exceed: what some of them show alone is cut off, too. What fills less of the box, or
+ * of its finest part, [-1, 1]^3, has few cells and samples, and may lie nearer to a camera than SF_NEAR. */
+sf_status sf_dataset_survey_box(sf_dataset *data, double half)
+{
+  const double quarter = 0.75, least = 0.15 * fmin(half, 1), room = 0.85;
+  int n = 0;
+  double *space = malloc((size_t)data->count * sizeof *space + 1);
+  if (!space) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", data->path, data->count);
+  for (int i = 0; i < data->count; i++)
+    if (data->view[i].shown > 0) space[n++] = (double)data->view[i].shown;
+  qsort(space, (size_t)n, sizeof *space, ascending);
+  const double shown = n ? space[(int)(quarter * (n - 1))] : half;
+  free(space);
+  if (shown <= half && shown >= least) return sf_ok();
+  const double better = room * (double)data->scale * (shown > half ? half : fmin(half, 1)) / shown;
+  if (shown > half)
+    return sf_warn(data,
+                   "box: the pictures show what lies beyond [-%g, %g]^3: it would have to reach to %.3g. Try --scale "
+                   "%.2g (now %.3g), or a larger --bound",
+                   half, half, shown, better, (double)data->scale);
+  return sf_warn(
+      data, "box: what the pictures show lies within %.2g of the middle of [-%g, %g]^3. Try --scale %.2g (now %.3g)",
+      shown, half, half, better, (double)data->scale);
+}
+
 sf_status sf_dataset_survey(sf_dataset *data)
 {
   if (data->count < 1) return sf_ok();
@@ -135,5 +162,5 @@ sf_status sf_dataset_survey(sf_dataset *data)
   if (status.code == SF_OK) status = survey_focal(data, space);
   if (status.code == SF_OK) status = survey_positions(data, space);
   free(space);
-  return status;
+  return status.code || data->ndc ? status : sf_dataset_survey_box(data, data->bound);
 }

@@ -126,6 +126,7 @@ static sf_status load_view(sf_view *view, const sf_frame *frame, const loading *
     SF_TRY(in_frame(sf_image_downscale(&view->image, shrink, path), list, frame->number));
     shrink_camera(&view->camera, &view->image, shrink);
   }
+  view->shown = l->data->ndc ? 0 : sf_shown(view);
   if (l->options->cameras_only) free(view->image.rgba), view->image.rgba = NULL;
   return sf_ok();
 }

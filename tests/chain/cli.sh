@@ -25,6 +25,19 @@ done <<'END'
 16
 77 --finest-res 77
 END
+# A box that the pictures show more than, or little of, is told before anything is learned.
+while IFS='|' read -r said options; do
+  # shellcheck disable=SC2086
+  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --lattice 128 --threads 1 -q $options
+  check "sf_train $options" "exit status $status" [ $status -eq 0 ]
+  check "sf_train $options" "it says '$(cat err)', not '$said'" [ "$(sed -E 's/ (to|within|--scale) [0-9]+(\.[0-9]+)?/ \1 N/g' err)" = "$said" ]
+done <<'END'
+|--scale 0.8
+sf_train: warning: box: the pictures show what lies beyond [-1, 1]^3: it would have to reach to N. Try --scale N (now 4), or a larger --bound|--scale 4
+|--scale 4 --bound 8
+sf_train: warning: box: what the pictures show lies within N of the middle of [-1, 1]^3. Try --scale N (now 0.05)|--scale 0.05
+sf_train: warning: box: what the pictures show lies within N of the middle of [-8, 8]^3. Try --scale N (now 0.05)|--scale 0.05 --bound 8
+END
 good sf_train d -o tuned.safetensors --fine-tune model.safetensors --weight-bits 4 --stage2 2 --threads 1
 good sf_export tuned.safetensors -o tuned.snn
 if ! grep -q "4-bit weights" stdout.txt; then fail "tuned.safetensors" "is not exported with its own 4 bits"; fi
