@@ -48,6 +48,13 @@ static inline int sf_capture_guides(const sf_capture *capture)
   return capture->first ? capture->first : capture->count;
 }
 
+/* Of doubles, for qsort. */
+static inline int sf_ascending(const void *a, const void *b)
+{
+  const double one = *(const double *)a, other = *(const double *)b;
+  return (one > other) - (one < other);
+}
+
 /* Notes the first `count` frames as the list that names the training views. */
 void sf_capture_note_poses(sf_capture *capture, int count);
 /* Notes `file` below `dir` as the first picture of that list, if it is there. */

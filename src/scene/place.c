@@ -169,12 +169,6 @@ static void turn_up(const sf_capture *c, double turn[9])
   memcpy(turn, x, sizeof x), memcpy(turn + 3, y, sizeof y), memcpy(turn + 6, up, sizeof up);
 }
 
-static int ascending(const void *a, const void *b)
-{
-  const double one = *(const double *)a, other = *(const double *)b;
-  return (one > other) - (one < other);
-}
-
 /* ---- the ways to place ---- */
 
 static void set_scale(sf_dataset *data, const sf_dataset_options *options, double own)
@@ -263,7 +257,7 @@ static sf_status place_orbit(sf_dataset *data, sf_capture *c, const sf_dataset_o
     mean += distance / n, farthest = fmax(farthest, distance);
     reach[f] = distance / middle_length(&e) * fmin(e.half[0], e.half[1]);
   }
-  qsort(reach, (size_t)n, sizeof *reach, ascending);
+  qsort(reach, (size_t)n, sizeof *reach, sf_ascending);
   /* An object on nothing fills the box as far as the middle one of its views sees it. */
   double scale = sight->transparent ? 1 / reach[n / 2] : ORBIT / mean;
   if (!(scale < 1e9) || !(scale > 1e-9)) scale = 1; /* all from one point */

@@ -27,12 +27,6 @@ static double least_cube(const float o[3], const float d[3])
   return least;
 }
 
-static int ascending(const void *a, const void *b)
-{
-  const double one = *(const double *)a, other = *(const double *)b;
-  return (one > other) - (one < other);
-}
-
 static bool has_alpha(const sf_image *image)
 {
   const size_t n = (size_t)image->width * (size_t)image->height;
@@ -64,6 +58,6 @@ float sf_shown(const sf_view *view)
     cube[n++] = least_cube(origin, direction);
   }
   if (!n) return 0;
-  qsort(cube, (size_t)n, sizeof *cube, ascending);
+  qsort(cube, (size_t)n, sizeof *cube, sf_ascending);
   return (float)cube[(int)(PART * (n - 1))];
 }

@@ -4,15 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int ascending(const void *a, const void *b)
-{
-  const double one = *(const double *)a, other = *(const double *)b;
-  return (one > other) - (one < other);
-}
-
 static double median(double *value, int n)
 {
-  qsort(value, (size_t)n, sizeof *value, ascending);
+  qsort(value, (size_t)n, sizeof *value, sf_ascending);
   return value[n / 2];
 }
 
@@ -138,7 +132,7 @@ sf_status sf_dataset_survey_box(sf_dataset *data, double half)
   if (!space) return sf_fail(SF_E_MEMORY, "%s: no memory for %d views", data->path, data->count);
   for (int i = 0; i < data->count; i++)
     if (data->view[i].shown > 0) space[n++] = (double)data->view[i].shown;
-  qsort(space, (size_t)n, sizeof *space, ascending);
+  qsort(space, (size_t)n, sizeof *space, sf_ascending);
   const double shown = n ? space[(int)(quarter * (n - 1))] : half;
   free(space);
   if (shown <= half && shown >= least) return sf_ok();
