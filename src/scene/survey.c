@@ -122,8 +122,9 @@ static sf_status survey_positions(sf_dataset *data, double *space)
 
 /* ---- the box ---- */
 
-/* By what a quarter of the views exceed: what some of them show alone is cut off, too. What fills less of the box, or
- * of its finest part, [-1, 1]^3, has few cells and samples, and may lie nearer to a camera than SF_NEAR. */
+/* A quarter of the views show more than the value that decides: what only some of them show is cut off, too. What fills
+ * less of the box, or of its finest part, [-1, 1]^3, has few cells and samples, and may be nearer to a camera than
+ * SF_NEAR. */
 sf_status sf_dataset_survey_box(sf_dataset *data, double half)
 {
   const double quarter = 0.75, least = 0.15 * fmin(half, 1), room = 0.85;
