@@ -191,7 +191,7 @@ module sf_csr #(
   wire bad_theta = (!decodes && theta_q[sf_op_pkg::D1] == 24'd0) || theta_q[sf_op_pkg::C1] == 24'd0
       || theta_q[sf_op_pkg::C2] == 24'd0;
   // Twice a threshold is a membrane.
-  wire bad_weighted = mode_q == {1'b0, sf_op_pkg::WEIGHTED} && ((!decodes && |theta_q[sf_op_pkg::D1][23:22])
+  wire bad_weighted = mode_q == {1'b0, sf_op_pkg::RADIX} && ((!decodes && |theta_q[sf_op_pkg::D1][23:22])
       || |theta_q[sf_op_pkg::C1][23:22] || |theta_q[sf_op_pkg::C2][23:22]);
   wire bad_mode = mode_q[2];
   wire bad_scale = exp_mul_q[16] || sigmoid_mul_q[16] || exp_shift_q[5] || sigmoid_shift_q[5];

@@ -19,7 +19,7 @@ module sf_integrate (
   wire nodecay = mode_i == sf_op_pkg::NODECAY;
 
   // 1: what leaks, and what it is added to
-  wire weighted = mode_i == sf_op_pkg::WEIGHTED;
+  wire weighted = mode_i == sf_op_pkg::RADIX;
   wire signed [28:0] a = first_i || weighted ? 29'sd0 : $signed({1'b0, acc_i});
   wire signed [28:0] x = $signed({1'b0, in_i});
   reg signed [28:0] x1_q;

@@ -72,7 +72,7 @@ module sf_neurons #(
   reg signed [23:0] quantum4_q;
   reg [8:0] n_out4_q;
   wire nodecay = mode_i == sf_op_pkg::NODECAY;
-  wire weighted = mode_i == sf_op_pkg::WEIGHTED;
+  wire weighted = mode_i == sf_op_pkg::RADIX;
   wire first = step_i == 3'd0;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) valid_q <= {STAGES{1'b0}};

@@ -4,7 +4,7 @@ package sf_op_pkg;
   localparam [1:0] HYBRID = 2'd0;
   localparam [1:0] DECAY = 2'd1;
   localparam [1:0] NODECAY = 2'd2;
-  localparam [1:0] WEIGHTED = 2'd3;
+  localparam [1:0] RADIX = 2'd3;
 
   // Layers. Mirror: src/fx/fx.h (fx_layer_id)
   localparam [2:0] D1 = 3'd0;

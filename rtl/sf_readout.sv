@@ -76,7 +76,7 @@ module sf_readout (
   wire start_density = free && !start_colour && density_full_q && !(run_q && !colour_q);
   wire out = valid_o && ready_i;
   wire pop = out && !decodes_i;
-  wire weighted = mode_i == sf_op_pkg::WEIGHTED;
+  wire weighted = mode_i == sf_op_pkg::RADIX;
   wire writes = valid_q[WRITE] && (!weighted || {1'b0, stage_step_q[WRITE]} == steps_i - 4'd1);
   wire push = writes && last_q[WRITE] && !is_colour_q[WRITE];
 

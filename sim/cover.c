@@ -37,7 +37,7 @@ static void hit(uint64_t *bin)
 static bool at_rail(int layer, int mode, int32_t v)
 {
   const int bits = fx_layer_table[layer].state_bits;
-  if (!fx_layer_fires(layer)) return mode != FX_WEIGHTED && v == (1 << bits) - 1;
+  if (!fx_layer_fires(layer)) return mode != FX_RADIX && v == (1 << bits) - 1;
   return v == (1 << (bits - 1)) - 1 || v == -(1 << (bits - 1));
 }
 

@@ -30,7 +30,7 @@ static inline fixture_sizes fixture_random_sizes(uint64_t seed)
   s.c1 = (int)fixture_pick(seed, 1, 4, 1, SF_LANES);
   s.c2 = (int)fixture_pick(seed, 1, 5, 1, SF_LANES);
   s.steps = (int)fixture_pick(seed, 1, 6, 1, SF_T_MAX);
-  s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_WEIGHTED);
+  s.mode = (int)fixture_pick(seed, 1, 7, FX_HYBRID, FX_RADIX);
   memset(s.bias, 0, sizeof s.bias);
   if (fixture_pick(seed, 1, 8, 0, 2) == 0) s.bias[FX_C1] = (int)fixture_pick(seed, 1, 9, 1, 2047);
   s.bias[FX_C2] = fixture_pick(seed, 1, 10, 0, 2) == 0;
@@ -167,7 +167,7 @@ static inline int64_t naive_charge(const naive_net *n, int64_t v, int64_t curren
 {
   if (t == 0 && n->net->mode == FX_HYBRID) return current;
   const int64_t old = t == 0 ? 0 : v;
-  if (n->net->mode == FX_WEIGHTED) return 2 * old + current;
+  if (n->net->mode == FX_RADIX) return 2 * old + current;
   if (n->net->mode == FX_NODECAY) return old - naive_round(old * k, 12) + current;
   return old + naive_round((current - old) * k, 12);
 }
@@ -178,7 +178,7 @@ static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current
   fx_layer_counts *c = &n->counts->layer[l];
   for (int o = 0; o < layer->n_out; o++) {
     /* Weighted: kept with theta added, spent twice over. */
-    const int64_t more = n->net->mode == FX_WEIGHTED ? layer->theta : 0;
+    const int64_t more = n->net->mode == FX_RADIX ? layer->theta : 0;
     const int64_t exact = naive_charge(n, n->v[l][o], current[o] * (1 << frac), layer->k, t) + more;
     const int64_t u = naive_clamp(exact, -8388608, 8388607);
     spike[o] = u - more >= layer->theta;
@@ -256,7 +256,7 @@ static inline int64_t naive_integrate(naive_net *n, int l, int t, int64_t acc, i
 /* Output 0 of D2, output o of C3: current to result, and what the trace has of it. */
 static inline int32_t naive_read_density(naive_net *n, int t, int64_t current)
 {
-  const bool weighted = n->net->mode == FX_WEIGHTED, last = t == n->net->steps - 1;
+  const bool weighted = n->net->mode == FX_RADIX, last = t == n->net->steps - 1;
   const int64_t sum = weighted ? naive_weighted(n, FX_D2, t, 0, current) : current;
   const fx_scale scale = fx_net_scale(n->net, &n->net->exp_in);
   const int64_t y = naive_scale(sum, &scale, 131072), e = fx_exp2((int32_t)y);
@@ -267,7 +267,7 @@ static inline int32_t naive_read_density(naive_net *n, int t, int64_t current)
 
 static inline int32_t naive_read_colour(naive_net *n, int t, int o, int64_t current)
 {
-  const bool weighted = n->net->mode == FX_WEIGHTED;
+  const bool weighted = n->net->mode == FX_RADIX;
   const int64_t sum = weighted ? naive_weighted(n, FX_C3, t, 1 + o, current) : current;
   const fx_scale scale = fx_net_scale(n->net, &n->net->sigmoid_in);
   const int64_t s = fx_sigmoid((int32_t)naive_scale(sum, &scale, 32768));

@@ -87,7 +87,7 @@ static inline void hard_theta(fx_net *net, int32_t theta)
 static inline void hard_mode(hard *h, int32_t mode)
 {
   h->scene.net.mode = mode;
-  for (int l = 0; mode == FX_WEIGHTED && l < SF_LAYERS; l++)
+  for (int l = 0; mode == FX_RADIX && l < SF_LAYERS; l++)
     if (h->scene.net.layer[l].theta > FX_MEMBRANE_MAX / 2) h->scene.net.layer[l].theta = FX_MEMBRANE_MAX / 2;
 }
 
@@ -321,7 +321,7 @@ static inline void expect_digits(const hard *h, const hard_seen *seen, int varia
 {
   const int steps = variant + 1;
   const int64_t theta = h->scene.net.layer[FX_D1].theta;
-  if (h->scene.net.mode != FX_WEIGHTED) return;
+  if (h->scene.net.mode != FX_RADIX) return;
   int64_t sum = 0;
   for (int o = 0; o < SF_LANES; o++) {
     const int64_t current = 130 * (o % 64);

@@ -77,7 +77,7 @@ static inline dual charged_by(const oracle *o, int step, dual k, dual before, du
   const sf_config *c = &o->t->model.config;
   if (c->net == SF_NET_ANN) return in;
   switch (c->mode) {
-  case SF_WEIGHTED:
+  case SF_RADIX:
     return 2 * before + in;
   case SF_NODECAY:
     return (1 - k) * before + in;
@@ -101,7 +101,7 @@ static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, c
     const dual h = charged_by(o, step, k, step ? l->v[n] : 0, current[n]);
     s[n] = c->net == SF_NET_ANN ? positive(h) : spike(h - c->theta[spiking]);
     if (o->nearest) *o->nearest = fmin(*o->nearest, fabs(creal(h) - (double)c->theta[spiking]));
-    l->v[n] = h - s[n] * (c->mode == SF_WEIGHTED ? 2 : 1) * c->theta[spiking];
+    l->v[n] = h - s[n] * (c->mode == SF_RADIX ? 2 : 1) * c->theta[spiking];
     l->silent[n] = (step ? l->silent[n] : 1) * (1 - s[n]);
   }
 }
@@ -112,7 +112,7 @@ static inline dual oracle_read(const oracle *o, int step, dual k, dual (*activat
                                dual *sum)
 {
   const sf_config *c = &o->t->model.config;
-  if (c->mode != SF_WEIGHTED || c->net == SF_NET_ANN) return charged_by(o, step, k, before, activation(current));
+  if (c->mode != SF_RADIX || c->net == SF_NET_ANN) return charged_by(o, step, k, before, activation(current));
   *sum = ((step ? *sum : 0) * (pow(2, step + 1) - 2) + current) / (pow(2, step + 1) - 1);
   return activation(*sum);
 }

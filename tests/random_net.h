@@ -125,7 +125,7 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
 static inline void random_net_limit(fx_net *net)
 {
   const int32_t highest = (1 << 22) - 1;
-  for (int l = 0; net->mode == FX_WEIGHTED && l < SF_LAYERS; l++)
+  for (int l = 0; net->mode == FX_RADIX && l < SF_LAYERS; l++)
     if (net->layer[l].theta > highest) net->layer[l].theta = highest;
 }
 
@@ -141,7 +141,7 @@ static inline void random_net_fill(random_net *n, random_source *r, bool extreme
     layer->k = extreme ? draw_leak(r) : (int32_t)draw(r, 1000, 3000);
     if (typical[l]) layer->theta = extreme ? draw_theta(r, typical[l]) : (int32_t)typical[l];
   }
-  net->mode = extreme ? (int32_t)draw(r, FX_HYBRID, FX_WEIGHTED) : FX_HYBRID;
+  net->mode = extreme ? (int32_t)draw(r, FX_HYBRID, FX_RADIX) : FX_HYBRID;
   random_net_limit(net);
   net->steps = extreme ? (int32_t)draw(r, 1, SF_T_MAX) : 3;
   net->exp_in =

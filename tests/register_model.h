@@ -70,10 +70,10 @@ static inline uint32_t start_errors(const registers *r)
   for (int l = 0; l < SF_LAYERS; l++) {
     const bool spikes = l == FX_C1 || l == FX_C2 || (l == FX_D1 && r->layer[FX_D1][N_OUT]);
     if (r->layer[l][K] > LEAK_ONE) error |= SF_CSR_ERROR_LEAK;
-    if (spikes && (!r->layer[l][THETA] || (r->mode == FX_WEIGHTED && r->layer[l][THETA] >> 22)))
+    if (spikes && (!r->layer[l][THETA] || (r->mode == FX_RADIX && r->layer[l][THETA] >> 22)))
       error |= SF_CSR_ERROR_THETA;
   }
-  if (r->mode > FX_WEIGHTED) error |= SF_CSR_ERROR_MODE;
+  if (r->mode > FX_RADIX) error |= SF_CSR_ERROR_MODE;
   if (r->exp[0] > 65535 || r->sigmoid[0] > 65535 || r->exp[1] > 31 || r->sigmoid[1] > 31) error |= SF_CSR_ERROR_SCALE;
   return error;
 }

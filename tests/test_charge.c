@@ -85,7 +85,7 @@ LOOP_TEST(a_charge_of_nothing_moves_no_bit, 4)
   for (int i = 0; i < COUNT(ds); i++) ds[i] = test_random(1u << 24 | i);
   for (int i = 0; i < COUNT(dc); i++) dc[i] = test_random(1u << 25 | i);
   const bool decodes = _i % 2;
-  const sf_input_mode mode = _i < 2 ? SF_HYBRID : SF_WEIGHTED;
+  const sf_input_mode mode = _i < 2 ? SF_HYBRID : SF_RADIX;
   for (int i = 0; i < COUNT(isa); i++) {
     const sf_kernels *k = sf_kernels_select(isa[i]);
     if (!k) continue;

@@ -224,7 +224,7 @@ TEST(saturation_is_expected_only_where_the_formats_allow_it)
   ck_assert(!sf_saturation_unexpected(&net, density, list, sizeof list));
   ck_assert(sf_saturation_unexpected(&net, more, list, sizeof list));
   ck_assert_str_eq(list, "D1,C2,C3");
-  for (net.mode = FX_NODECAY; net.mode <= FX_WEIGHTED; net.mode++)
+  for (net.mode = FX_NODECAY; net.mode <= FX_RADIX; net.mode++)
     ck_assert(!sf_saturation_unexpected(&net, more, list, sizeof list));
   sf_saturation_census(more, 4, list, sizeof list);
   ck_assert_str_eq(list, "D1 1 samples, C2 2 samples, C3 3 samples, 4 features");

@@ -95,11 +95,11 @@ TEST(sigmoid_every_input)
  * the step, and in hybrid and decay mode the membrane stays between v and I. */
 static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int32_t mode, bool first)
 {
-  const int32_t quantum = mode == FX_WEIGHTED ? 2 * layer->theta : layer->theta;
+  const int32_t quantum = mode == FX_RADIX ? 2 * layer->theta : layer->theta;
   fx_net net = {.mode = mode};
   const naive_net naive = {.net = &net};
   int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
-  if (mode == FX_WEIGHTED) exact += first ? layer->theta : -layer->theta; /* v has theta in it, and so has u */
+  if (mode == FX_RADIX) exact += first ? layer->theta : -layer->theta; /* v has theta in it, and so has u */
   const int64_t u = naive_clamp(exact, -8388608, 8388607);
   const fx_plif step = fx_plif_step(v, current, layer->k, layer->theta, mode, first);
   ck_assert_msg(step.membrane == u, "v %d I %d k %d mode %d first %d: %d, exact %lld", v, current, layer->k, mode,
@@ -131,14 +131,14 @@ TEST(scale_of_a_weighted_sum)
   for (uint64_t i = 0; i < 4000; i++) {
     const int64_t largest = i % 3 ? 65535 : i % 100;
     const fx_scale in = {(int32_t)fixture_pick(9, 0, i, 0, largest), (int32_t)fixture_pick(9, 1, i, 0, 31), (int32_t)i};
-    const fx_net net = {.mode = FX_WEIGHTED, .steps = 1 + (int)(i % SF_T_MAX)};
+    const fx_net net = {.mode = FX_RADIX, .steps = 1 + (int)(i % SF_T_MAX)};
     const fx_scale out = fx_net_scale(&net, &in);
     const double exact = ldexp(in.mul, -in.shift) / ((1 << net.steps) - 1);
     ck_assert_int_eq(out.bias, in.bias);
     ck_assert(out.mul >= 0 && out.mul <= 65535 && out.shift >= in.shift && out.shift <= 31);
     ck_assert(fabs(ldexp(out.mul, -out.shift) - exact) <= ldexp(0.5, -out.shift));
     ck_assert_msg(out.mul >= 32767 || out.shift == 31, "%d / 2^%d for %g", out.mul, out.shift, exact);
-    for (int mode = FX_HYBRID; mode < FX_WEIGHTED; mode++) {
+    for (int mode = FX_HYBRID; mode < FX_RADIX; mode++) {
       const fx_net other = {.mode = mode, .steps = net.steps};
       const fx_scale same = fx_net_scale(&other, &in);
       ck_assert_mem_eq(&same, &in, sizeof in);
@@ -155,7 +155,7 @@ TEST(plif_corners)
   for (int i = 0; i < VALUES * VALUES * LEAKS * 4 * 8; i++) {
     fx_layer layer = {.k = leak[i / VALUES / VALUES % LEAKS], .theta = theta[i / VALUES / VALUES / LEAKS % 4]};
     const int rest = i / VALUES / VALUES / LEAKS / 4;
-    if (rest % 4 == FX_WEIGHTED && layer.theta > FX_MEMBRANE_MAX / 2) layer.theta = FX_MEMBRANE_MAX / 2;
+    if (rest % 4 == FX_RADIX && layer.theta > FX_MEMBRANE_MAX / 2) layer.theta = FX_MEMBRANE_MAX / 2;
     check_neuron(value[i % VALUES], value[i / VALUES % VALUES], &layer, rest % 4, rest / 4);
   }
 }
@@ -165,8 +165,8 @@ TEST(plif_random)
   for (uint64_t i = 0; i < 100000; i++) {
     const int bits = (int)fixture_pick(7, 5, i, 1, 23);
     const int64_t limit = ((int64_t)1 << bits) - 1;
-    const int32_t mode = (int32_t)fixture_pick(7, 4, i, 0, FX_WEIGHTED);
-    const int64_t highest = mode == FX_WEIGHTED && bits == 23 ? limit / 2 : limit;
+    const int32_t mode = (int32_t)fixture_pick(7, 4, i, 0, FX_RADIX);
+    const int64_t highest = mode == FX_RADIX && bits == 23 ? limit / 2 : limit;
     const fx_layer layer = {.k = (int32_t)fixture_pick(7, 0, i, 0, 4096),
                             .theta = (int32_t)fixture_pick(7, 1, i, 1, highest)};
     check_neuron((int32_t)fixture_pick(7, 2, i, -limit - 1, limit), (int32_t)fixture_pick(7, 3, i, -limit - 1, limit),

@@ -175,7 +175,7 @@ TEST(thresholds_of_weighted_spikes_end_earlier)
 {
   OWNED(fx_scene) scene = small_scene(5);
   const int32_t highest = (1 << 22) - 1;
-  for (int mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++)
+  for (int mode = FX_HYBRID; mode <= FX_RADIX; mode++)
     for (int s = 0; s < FX_SPIKING; s++) {
       fx_layer *layer = &scene.net.layer[fx_spiking_layers[s]];
       const int32_t kept = layer->theta;
@@ -184,8 +184,8 @@ TEST(thresholds_of_weighted_spikes_end_earlier)
       ck_ok(fx_scene_check(&scene, "scene"));
       layer->theta = highest + 1;
       const sf_status status = fx_scene_check(&scene, "scene");
-      ck_assert_int_eq(status.code, mode == FX_WEIGHTED ? SF_E_RANGE : SF_OK);
-      if (mode == FX_WEIGHTED) ck_assert_ptr_nonnull(strstr(status.message, "theta is 4194304, expected 1..4194303"));
+      ck_assert_int_eq(status.code, mode == FX_RADIX ? SF_E_RANGE : SF_OK);
+      if (mode == FX_RADIX) ck_assert_ptr_nonnull(strstr(status.message, "theta is 4194304, expected 1..4194303"));
       layer->theta = kept;
     }
 }

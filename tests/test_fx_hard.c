@@ -6,7 +6,7 @@
 static void run_net(hard *h, const hard_case *c, int variant)
 {
   fx_trace *trace = malloc(sizeof *trace);
-  for (int32_t mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
+  for (int32_t mode = FX_HYBRID; mode <= FX_RADIX; mode++) {
     hard_seen seen = {.trace = trace};
     int32_t base[SF_LANES];
     hard_mode(h, mode);

@@ -17,7 +17,7 @@ static void check_sizes(const fixture_sizes *sizes, uint64_t seed)
 
 TEST(net_equals_naive_at_full_size)
 {
-  for (int mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++)
+  for (int mode = FX_HYBRID; mode <= FX_RADIX; mode++)
     for (int steps = 1; steps <= SF_T_MAX; steps++) {
       fixture_sizes sizes = fixture_ingp;
       sizes.mode = mode, sizes.steps = steps;
@@ -35,7 +35,7 @@ TEST(net_equals_naive_at_random_sizes)
 
 TEST(decoder_equals_naive)
 {
-  for (int mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++)
+  for (int mode = FX_HYBRID; mode <= FX_RADIX; mode++)
     for (int steps = 1; steps <= SF_T_MAX; steps++) {
       fixture_sizes sizes = fixture_decoder;
       sizes.mode = mode, sizes.steps = steps, sizes.n_dir = steps % 2 ? 150 : 30;

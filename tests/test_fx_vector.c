@@ -272,7 +272,7 @@ static void hard_net(hard *h, const char *name, int variant)
   b->base[0] = base;
   memcpy(b->f[0], h->f, (size_t)h->scene.net.layer[FX_D1].n_in * sizeof *h->f);
   fx_net_direction(&h->scene.net, h->ray.dir, base, NULL);
-  for (int32_t mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
+  for (int32_t mode = FX_HYBRID; mode <= FX_RADIX; mode++) {
     hard_mode(h, mode);
     fx_core *core = open_core(&h->scene, name);
     core->kernels->nets(core, b, scratch);

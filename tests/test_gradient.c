@@ -274,7 +274,7 @@ static sf_train_options grid_run(int mode)
 
 /* Rows of C2 are added up for spikes where C1 fires little, else multiplied. */
 static const float gains[] = {0.8f, 4, 12, 4};
-LOOP_TEST(terms_of_the_grid, SF_WEIGHTED + 1)
+LOOP_TEST(terms_of_the_grid, SF_RADIX + 1)
 {
   sf_train_options o = grid_run(_i);
   rig r;
@@ -312,7 +312,7 @@ static sf_train_options planes_run(int mode)
   return o;
 }
 
-LOOP_TEST(terms_of_the_planes, SF_WEIGHTED + 1)
+LOOP_TEST(terms_of_the_planes, SF_RADIX + 1)
 {
   sf_train_options o = planes_run(_i);
   o.config.tensorf.activation = _i == SF_DECAY ? SF_RELU : SF_SOFTPLUS;

@@ -124,7 +124,7 @@ TEST(neuron_ledger_by_hand)
 TEST(weighted_spikes_ask_once_and_do_not_leak)
 {
   fx_net net = small_net();
-  net.mode = FX_WEIGHTED;
+  net.mode = FX_RADIX;
   const fx_counts c = small_counts(&net);
   sf_ledgers *weighted = malloc(sizeof *weighted);
   ck_ok(make_ledgers(&tech, &net, &c, &small_traffic, weighted));

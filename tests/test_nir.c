@@ -86,7 +86,7 @@ LOOP_TEST(scene_gives_the_spikes_of_the_core, 6)
   random_source r = {(uint64_t)_i, 0};
   for (int i = 0; i < GRAPHS; i++) {
     random_net_make(&n, &r, _i > 0);
-    n.net.mode = (_i == 0 ? i : n.net.mode) % FX_WEIGHTED; /* of the modes that a graph has */
+    n.net.mode = (_i == 0 ? i : n.net.mode) % FX_RADIX; /* of the modes that a graph has */
     ck_scene(&(fx_scene){.net = n.net}, &r, _i > 0);
   }
 }
@@ -98,7 +98,7 @@ LOOP_TEST(biases_and_decoders_too, 4)
     const uint64_t number = seed + (uint64_t)(_i * GRAPHS);
     const fixture_sizes sizes = seed % 2 ? fixture_random_decoder(number) : fixture_random_sizes(number);
     OWNED(fx_scene) scene = fixture_scene(&sizes, number);
-    scene.net.mode %= FX_WEIGHTED;
+    scene.net.mode %= FX_RADIX;
     ck_scene(&scene, &r, true);
   }
 }
@@ -186,7 +186,7 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
 /* And a net whose steps are the samples of a ray, and one whose spikes are weighted. */
 LOOP_TEST(the_relu_twin_is_refused, 3)
 {
-  OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, _i == 2 ? SF_WEIGHTED : SF_HYBRID, 32, 1, 0.5f);
+  OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, _i == 2 ? SF_RADIX : SF_HYBRID, 32, 1, 0.5f);
   m.config.along = _i == 1;
   const sf_status status = sf_nir_write_model(in("twin.nir"), &m);
   ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
@@ -199,7 +199,7 @@ TEST(a_scene_of_weighted_spikes_is_refused)
   random_source r = {78, 0};
   random_net_make(&n, &r, false);
   fx_scene scene = {.net = n.net};
-  scene.net.mode = FX_WEIGHTED;
+  scene.net.mode = FX_RADIX;
   ck_assert_int_eq(sf_nir_write_scene(in("weighted.nir"), &scene).code, SF_E_UNSUPPORTED);
   ck_assert_ptr_null(fopen(in("weighted.nir"), "r"));
 }

@@ -183,7 +183,7 @@ TEST(nets_against_float)
   check_model(128, 16, SF_HYBRID);
   check_model(128, 16, SF_NODECAY);
   check_model(64, 8, SF_DECAY);
-  check_model(64, 8, SF_WEIGHTED);
+  check_model(64, 8, SF_RADIX);
   check_model(16, 1, SF_HYBRID);
 }
 
@@ -192,7 +192,7 @@ TEST(nets_against_float)
 static double colour_error(const sf_model *m, const fx_scene *scene)
 {
   sf_net_trace *real = malloc(sizeof *real);
-  const bool behind = m->config.mode == SF_WEIGHTED;
+  const bool behind = m->config.mode == SF_RADIX;
   double error = 0;
   for (uint64_t sample = 0; sample < 300; sample++) {
     uint32_t pos[3];
@@ -225,7 +225,7 @@ static double colour_error(const sf_model *m, const fx_scene *scene)
  * others. Weights of an ordinary size are as they were: nothing limits them. */
 LOOP_TEST(one_large_weight_does_not_coarsen_the_others, 2)
 {
-  OWNED(sf_model) m = make_model(64, 4, _i ? SF_WEIGHTED : SF_HYBRID);
+  OWNED(sf_model) m = make_model(64, 4, _i ? SF_RADIX : SF_HYBRID);
   float *large = sf_model_param(&m, SF_P_C3) + 2 * 64 + 7;
   double error[2], unit[2];
   for (int i = 0; i < 2; i++) {
@@ -357,13 +357,13 @@ TEST(where_rays_end)
 /* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
 TEST(largest_thresholds)
 {
-  for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++) {
+  for (int mode = SF_HYBRID; mode <= SF_RADIX; mode++) {
     OWNED(sf_model) m = make_model(32, 4, mode);
     OWNED(fx_scene) scene;
     sf_quant_report report;
     for (int s = 0; s < 3; s++) m.config.theta[s] = 5000;
     quantise(&m, &scene, &report);
-    const int32_t limit = (1 << (mode == SF_WEIGHTED ? 22 : 23)) - 1;
+    const int32_t limit = (1 << (mode == SF_RADIX ? 22 : 23)) - 1;
     for (int s = 0; s < FX_SPIKING; s++) {
       const int32_t theta = scene.net.layer[fx_spiking_layers[s]].theta;
       ck_assert_msg(theta <= limit && theta > limit - limit / 50, "mode %d: theta %d of %d", mode, theta, limit);

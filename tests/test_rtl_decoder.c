@@ -119,7 +119,7 @@ TEST(currents_at_their_rails)
  * neuron fires at every step; 4: zero inputs; 5: inputs against the bias. */
 LOOP_TEST(hard_cases, 6)
 {
-  for (int mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
+  for (int mode = FX_HYBRID; mode <= FX_RADIX; mode++) {
     random_source r = {7000 + (uint64_t)mode, 0};
     random_decoder_make(&net_of_test, &r, SF_DIR_MAX, false);
     fx_net *net = &net_of_test.net;

@@ -232,7 +232,7 @@ LOOP_TEST(snapshot_and_clear_at_work, 8)
 
 /* Streams that trickle, so that every step of every layer has a bubble or back-pressure, with and without membranes at
  * their rails. */
-LOOP_TEST(all_steps_under_stalls, FX_WEIGHTED + 1)
+LOOP_TEST(all_steps_under_stalls, FX_RADIX + 1)
 {
   random_source r = {67, (uint64_t)_i << 32};
   for (int saturating = 0; saturating < 2; saturating++) {

@@ -8,7 +8,7 @@
 static void run_net(sf_dut *dut, hard *h, const hard_case *c, int variant)
 {
   fx_net *net = &h->scene.net;
-  for (int32_t mode = FX_HYBRID; mode <= FX_WEIGHTED; mode++) {
+  for (int32_t mode = FX_HYBRID; mode <= FX_RADIX; mode++) {
     hard_mode(h, mode);
     hard_seen seen = {.trace = &shared.trace[0]};
     ck_ok(sf_dut_load(dut, net));

@@ -15,7 +15,7 @@ TEST(plif_by_hand)
   ck_assert_float_eq_tol(sf_plif_charge(SF_DECAY, 0, 0.5f, 0, 0.8f), 0.4f, 1e-7f);
   ck_assert_float_eq_tol(sf_plif_charge(SF_DECAY, 1, 0.25f, 0.4f, 0.8f), 0.5f, 1e-7f);
   ck_assert_float_eq_tol(sf_plif_charge(SF_NODECAY, 1, 0.25f, 0.4f, 0.8f), 1.1f, 1e-7f);
-  ck_assert_float_eq_tol(sf_plif_charge(SF_WEIGHTED, 1, 0.25f, 0.4f, 0.8f), 1.6f, 1e-7f);
+  ck_assert_float_eq_tol(sf_plif_charge(SF_RADIX, 1, 0.25f, 0.4f, 0.8f), 1.6f, 1e-7f);
 }
 
 /* A constant current between 0 and what a spike is worth: the weighted mean of its spikes is a number of as many bits
@@ -31,10 +31,10 @@ TEST(weighted_spikes_are_binary_digits)
       const float current = (float)i / 1000, theta = 0.5f;
       float v = 0, mean = 0;
       for (int t = 0; t < steps; t++) {
-        v = sf_plif_charge(SF_WEIGHTED, t, 0, v, current);
+        v = sf_plif_charge(SF_RADIX, t, 0, v, current);
         const float spike = v >= theta ? 1 : 0;
-        v -= spike * sf_plif_reset(SF_WEIGHTED, theta);
-        mean = sf_plif_integrate(SF_WEIGHTED, t, 0, mean, spike);
+        v -= spike * sf_plif_reset(SF_RADIX, theta);
+        mean = sf_plif_integrate(SF_RADIX, t, 0, mean, spike);
       }
       ck_assert_float_eq_tol(mean * last, nearbyintf(mean * last), 1e-4f);
       ck_assert_msg(fabsf(mean - current) <= most[steps] + 1e-3f, "%d steps: %g is coded as %g", steps, (double)current,
@@ -166,7 +166,7 @@ TEST(kernels_equal_oracle)
 {
   static const char *const isa[] = {"portable", "avx2", "avx512"};
   for (int i = 0; i < 3; i++) {
-    for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++)
+    for (int mode = SF_HYBRID; mode <= SF_RADIX; mode++)
       for (int g = 0; g < 2; g++) compare_forward(isa[i], SF_NET_SNN, mode, 48, gains[g], 1e-4f, 2);
     for (int hidden = 16; hidden <= SF_LANES; hidden += 16) /* words of spikes, whole and in part */
       compare_forward(isa[i], SF_NET_SNN, SF_HYBRID, hidden, 1, 1e-4f, 2);
@@ -180,7 +180,7 @@ TEST(bfloat16_kernels_near_oracle)
 {
   static const char *const isa[] = {"avx512bf16", "amx"};
   for (int i = 0; i < 2; i++) {
-    for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++)
+    for (int mode = SF_HYBRID; mode <= SF_RADIX; mode++)
       for (int g = 0; g < 2; g++) compare_forward(isa[i], SF_NET_SNN, mode, 48, gains[g], 1e-2f, 16);
     compare_forward(isa[i], SF_NET_ANN, SF_HYBRID, 48, 1, 3e-2f, 0);
   }

@@ -197,7 +197,7 @@ TEST(decoder_equals_oracle)
 {
   for (int i = 0; i < 3; i++)
     for (int ndc = 0; ndc < 2; ndc++) {
-      for (int mode = SF_HYBRID; mode <= SF_WEIGHTED; mode++) {
+      for (int mode = SF_HYBRID; mode <= SF_RADIX; mode++) {
         compare(exact[i], SF_NET_SNN, mode, ndc, 0.3f, 1e-4f, 3);
         compare(exact[i], SF_NET_SNN, mode, ndc, 3, 1e-4f, 3);
       }

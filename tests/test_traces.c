@@ -54,7 +54,7 @@ static void ck_group(expectation *e, int l, int t, char **rest)
   for (int n = 0; n < e->net->layer[l].n_out; n++) {
     const bool fired = e->trace.spikes[l][t][n / 64] >> (n % 64) & 1;
     const long v = strtol(*rest, rest, 10);
-    const int32_t lost = (e->net->mode == FX_WEIGHTED ? 2 : 1) * e->net->layer[l].theta;
+    const int32_t lost = (e->net->mode == FX_RADIX ? 2 : 1) * e->net->layer[l].theta;
     const int32_t expected = e->trace.membrane[l][t][n] - (fired ? lost : 0);
     if (*(*rest)++ != ',' || v != expected)
       ck_abort_msg("%s.%d at %llu: %ld instead of %d", fx_layer_name(l), n, e->now, v, expected);
@@ -130,7 +130,7 @@ static void ck_traces(const fx_scene *scene, const sf_traces_report *report, int
   fclose(e.spikes), fclose(e.potentials), fclose(samples);
 }
 
-LOOP_TEST(every_spike_and_membrane_is_the_nets, FX_WEIGHTED + 1)
+LOOP_TEST(every_spike_and_membrane_is_the_nets, FX_RADIX + 1)
 {
   const fixture_sizes sizes = {4, 20, 9, 7, 70, 33, STEPS, _i, {0}};
   OWNED(fx_scene) scene = fixture_scene(&sizes, 3);

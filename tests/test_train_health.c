@@ -72,8 +72,8 @@ static const struct fault {
   sf_input_mode mode;
 } faults[] = {{SF_P_D1, 0, 1e-20f, 0, -1, SF_HYBRID}, {SF_P_C2, 2, 0, -1, -1, SF_HYBRID},
               {SF_P_C2, 2, 0, 0, -1, SF_HYBRID},      {SF_P_C2, 2, 0, 50, 1, SF_HYBRID},
-              {SF_P_C1, 1, 1e-20f, 0, -1, SF_HYBRID}, {SF_P_C2, 2, 0, -1, -1, SF_WEIGHTED},
-              {SF_P_C2, 2, 0, 50, 1, SF_WEIGHTED}};
+              {SF_P_C1, 1, 1e-20f, 0, -1, SF_HYBRID}, {SF_P_C2, 2, 0, -1, -1, SF_RADIX},
+              {SF_P_C2, 2, 0, 50, 1, SF_RADIX}};
 
 static void plant(sf_trainer *t, const struct fault *f)
 {
@@ -120,7 +120,7 @@ LOOP_TEST(dead_and_saturated_layers_are_reported_and_revived, CK_AMOUNT(COUNT(fa
 /* The count of silence is part of a checkpoint. */
 TEST(resume_while_a_layer_is_dead)
 {
-  const sf_train_options o = long_run(SF_WEIGHTED);
+  const sf_train_options o = long_run(SF_RADIX);
   OWNED(trainer) whole = start(&data, &o, NULL);
   plant(whole, &faults[1]);
   steps(whole, 100);
@@ -212,7 +212,7 @@ enum {
   COARSE,
   NO_DECAY,
   DECAY,
-  WEIGHTED,
+  RADIX,
   CASES
 };
 
@@ -228,7 +228,7 @@ static void harden(int which, sf_dataset *data, sf_train_options *o)
   if (which == COARSE) o->config.lattice = 16;
   if (which == DECAY) o->config.mode = SF_DECAY;
   if (which == NO_DECAY) o->config.mode = SF_NODECAY;
-  if (which == WEIGHTED) o->config.mode = SF_WEIGHTED;
+  if (which == RADIX) o->config.mode = SF_RADIX;
 }
 
 static void hard_case(int which, int net)

@@ -73,7 +73,7 @@ static void searches(FILE *out)
   say_run(out, "beta", &o, 4);
   o.config.mode = SF_HYBRID, o.objective = SF_OBJECTIVE_PAPER, o.stage2 = 30, o.beta = 1e-5;
   say_run(out, "the paper's objective", &o, 4);
-  o.config.mode = SF_WEIGHTED, o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.stage2 = 12,
+  o.config.mode = SF_RADIX, o.objective = SF_OBJECTIVE_PREFIXES, o.price = SF_PRICE_ENERGY, o.stage2 = 12,
   o.beta = 1e-2, o.search_rate = 2, o.alpha = 1;
   say_run(out, "the price of energy", &o, 4);
   o = quick_run();

@@ -97,7 +97,7 @@ SPIKEFIELD_API spikefield_status spikefield_scene_open_memory(spikefield_scene *
                                                               const char *name);
 SPIKEFIELD_API void spikefield_scene_close(spikefield_scene *scene);
 
-typedef enum { SPIKEFIELD_HYBRID, SPIKEFIELD_DECAY, SPIKEFIELD_NO_DECAY, SPIKEFIELD_WEIGHTED } spikefield_mode;
+typedef enum { SPIKEFIELD_HYBRID, SPIKEFIELD_DECAY, SPIKEFIELD_NO_DECAY, SPIKEFIELD_RADIX } spikefield_mode;
 typedef struct spikefield_scene_info {
   int32_t inputs[SPIKEFIELD_LAYERS], outputs[SPIKEFIELD_LAYERS]; /* of each layer */
   int32_t theta[SPIKEFIELD_LAYERS];                              /* thresholds in membrane LSB; 0 in D2 and C3.

@@ -84,7 +84,7 @@
 /* as IRQ_ENABLE, W1C */
 #define SF_REG_IRQ_PENDING 0x001c
 
-/* input mode: 0 hybrid, 1 decay, 2 no-decay, 3 weighted, RW */
+/* input mode: 0 hybrid, 1 decay, 2 no-decay, 3 radix, RW */
 #define SF_REG_MODE 0x0020
 
 /* time steps to unroll, 1..T_MAX, RW */

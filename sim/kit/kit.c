@@ -44,7 +44,7 @@ static sf_status list_rtl(sf_kit_output *output)
 
 static sf_status scene_json(const char *path, const fx_net *net, cJSON *json)
 {
-  static const char *const mode[] = {"hybrid", "decay", "no-decay", "weighted"};
+  static const char *const mode[] = {"hybrid", "decay", "no-decay", "radix"};
   char hash[65];
   const char *slash = strrchr(path, '/');
   SF_TRY(sf_sha256_file(path, hash));

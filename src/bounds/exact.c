@@ -130,7 +130,7 @@ static double to_membrane(double x)
 
 static void fire(const sf_exact *e, int l, int t, double *v, const double *current, sf_exact_out *out)
 {
-  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), weighted = e->scene->net.mode == FX_WEIGHTED;
+  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), weighted = e->scene->net.mode == FX_RADIX;
   const double theta = e->theta[l], quantum = weighted ? 2 * theta : theta;
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
     const double in = ldexp(current[o], fx_layer_frac(l)), held = exact ? in : to_membrane(in);
@@ -172,7 +172,7 @@ static double table_argument(double current, const fx_scale *scale, int bits)
 static double current_lsb(const sf_exact *e, int layer)
 {
   const fx_net *net = &e->scene->net;
-  return e->scene->units.current_scale[layer] / (net->mode == FX_WEIGHTED ? (1 << net->steps) - 1 : 1);
+  return e->scene->units.current_scale[layer] / (net->mode == FX_RADIX ? (1 << net->steps) - 1 : 1);
 }
 
 static double density(const sf_exact *e, double current)
@@ -210,7 +210,7 @@ void sf_exact_direction(const sf_exact *e, const double *x, double *base)
 /* The output so far: activations are integrated; of weighted spikes currents, and the activation comes behind. */
 static void read_density(const sf_exact *e, int t, double current, sf_exact_out *out)
 {
-  const bool weighted = e->scene->net.mode == FX_WEIGHTED;
+  const bool weighted = e->scene->net.mode == FX_RADIX;
   out->weighed[0] = 2 * out->weighed[0] + current;
   if (!fx_net_reads_tables(&e->scene->net, t)) return;
   const double value = density(e, weighted ? out->weighed[0] : current);
@@ -219,7 +219,7 @@ static void read_density(const sf_exact *e, int t, double current, sf_exact_out 
 
 static void read_colour(const sf_exact *e, int t, int o, double current, sf_exact_out *out)
 {
-  const bool weighted = e->scene->net.mode == FX_WEIGHTED;
+  const bool weighted = e->scene->net.mode == FX_RADIX;
   out->weighed[1 + o] = 2 * out->weighed[1 + o] + current;
   if (!fx_net_reads_tables(&e->scene->net, t)) return;
   const double value = colour(e, weighted ? out->weighed[1 + o] : current);

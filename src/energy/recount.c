@@ -40,7 +40,7 @@ static void count_synapses(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE
 /* Behind weighted spikes currents are integrated, and the functions are asked once. */
 static void count_integrators(const fx_net *net, fx_layer_counts *c, int t, uint64_t integrators)
 {
-  if (net->mode != FX_WEIGHTED || t + 1 == net->steps) c->special[t] += integrators;
+  if (net->mode != FX_RADIX || t + 1 == net->steps) c->special[t] += integrators;
   count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
 }
 

@@ -18,7 +18,7 @@ bool sf_saturation_unexpected(const fx_net *net, const uint64_t saturated[SF_LAY
   append(list, size, &used, "none");
   bool any = false;
   for (int l = 0; l < SF_LAYERS; l++) {
-    if (saturated[l] == 0 || l == FX_D2 || net->mode == FX_NODECAY || net->mode == FX_WEIGHTED) continue;
+    if (saturated[l] == 0 || l == FX_D2 || net->mode == FX_NODECAY || net->mode == FX_RADIX) continue;
     if (!any) used = 0;
     append(list, size, &used, "%s%s", any ? "," : "", fx_layer_name(l));
     any = true;

@@ -97,7 +97,7 @@ static uint64_t special_fj(const pricing *p, int argument_bits, int result_bits)
 static uint64_t neuron_fj(const pricing *p, const fx_net *net, int l)
 {
   const int bits = fx_layer_table[l].state_bits;
-  if (net->mode == FX_WEIGHTED) return adds(p, fx_layer_fires(l) ? 4 : 1, bits);
+  if (net->mode == FX_RADIX) return adds(p, fx_layer_fires(l) ? 4 : 1, bits);
   return products(p, 1, bits, K_BITS) + adds(p, fx_layer_fires(l) ? 4 : 2, bits);
 }
 

@@ -161,7 +161,7 @@ static void colour_part(sf_nir_graph *g, const nets *nets)
 
 static sf_status write_nets(const char *path, const nets *nets)
 {
-  if (nets->mode == FX_WEIGHTED)
+  if (nets->mode == FX_RADIX)
     return sf_fail(
         SF_E_UNSUPPORTED,
         "%s: its spikes are weighted by their step; a NIR graph has no such neuron (see sf_train --input-mode hybrid)",

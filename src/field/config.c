@@ -22,7 +22,7 @@ static sf_status check_range(const char *name, double value, double low, double 
 sf_status sf_config_check(const sf_config *c)
 {
   SF_TRY(check_range("net", c->net, SF_NET_SNN, SF_NET_ANN));
-  SF_TRY(check_range("mode", c->mode, SF_HYBRID, c->along ? SF_NODECAY : SF_WEIGHTED));
+  SF_TRY(check_range("mode", c->mode, SF_HYBRID, c->along ? SF_NODECAY : SF_RADIX));
   SF_TRY(check_range("along_ray", c->along, 0, c->net == SF_NET_ANN ? 0 : 1));
   SF_TRY(check_range("steps", c->steps, 1, c->net == SF_NET_ANN || c->along ? 1 : SF_T_MAX));
   SF_TRY(check_range("levels", c->levels, 1, 16));

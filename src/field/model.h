@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 /* Equal to fx_input_mode, but for the last: a step's spikes weigh half of those of the step before. */
-typedef enum { SF_HYBRID, SF_DECAY, SF_NODECAY, SF_WEIGHTED } sf_input_mode;
+typedef enum { SF_HYBRID, SF_DECAY, SF_NODECAY, SF_RADIX } sf_input_mode;
 typedef enum { SF_NET_SNN, SF_NET_ANN } sf_net_kind;
 typedef enum { SF_INGP, SF_TENSORF } sf_backbone_kind; /* which field: sf_field_of() */
 

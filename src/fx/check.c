@@ -147,7 +147,7 @@ int fx_largest_h(const fx_layer *d2)
 /* Neurons of weighted spikes fire at 2 theta. */
 static sf_status check_layer(const fx_layer *layer, int id, int mode, const char *path)
 {
-  const int highest = mode == FX_WEIGHTED ? FX_MEMBRANE_MAX / 2 : FX_MEMBRANE_MAX;
+  const int highest = mode == FX_RADIX ? FX_MEMBRANE_MAX / 2 : FX_MEMBRANE_MAX;
   const bool spiking = fx_layer_fires(id) && layer->n_out > 0;
   SF_TRY(in_range(path, fx_layer_name(id), "k", layer->k, 0, FX_LEAK_ONE));
   SF_TRY(in_range(path, fx_layer_name(id), "theta", layer->theta, spiking, spiking ? highest : 0));
@@ -164,7 +164,7 @@ static sf_status check_scale(const fx_scale *scale, const char *name, int bias_l
 static sf_status check_net(const fx_net *net, const char *path)
 {
   const int bias = 1 << (FX_EXP2_BITS - 1);
-  SF_TRY(in_range(path, "net", "mode", net->mode, FX_HYBRID, FX_WEIGHTED));
+  SF_TRY(in_range(path, "net", "mode", net->mode, FX_HYBRID, FX_RADIX));
   SF_TRY(in_range(path, "net", "t_r", net->steps, 1, SF_T_MAX));
   SF_TRY(check_scale(&net->exp_in, "exp_in", -bias, bias - 1, path));
   SF_TRY(check_scale(&net->sigmoid_in, "sigmoid_in", 0, 0, path));

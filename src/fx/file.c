@@ -13,7 +13,7 @@
 #define TENSORF "tensorf"
 enum { TENSORS = SF_LAYERS + FX_TENSORF_ARRAYS + 7 };
 
-static const char *const mode_name[] = {"hybrid", "decay", "no-decay", "weighted"};
+static const char *const mode_name[] = {"hybrid", "decay", "no-decay", "radix"};
 
 typedef struct int_field {
   const char *key;
@@ -265,12 +265,12 @@ static sf_status read_int(const sf_tensors *set, const int_field *field, fx_scen
 static sf_status read_mode(const sf_tensors *set, fx_scene *scene)
 {
   const char *text = sf_tensors_meta(set, "mode");
-  for (int32_t mode = FX_HYBRID; text && mode <= FX_WEIGHTED; mode++)
+  for (int32_t mode = FX_HYBRID; text && mode <= FX_RADIX; mode++)
     if (!strcmp(text, mode_name[mode])) {
       scene->net.mode = mode;
       return sf_ok();
     }
-  return sf_fail(SF_E_FORMAT, "%s: metadata 'mode' is '%.40s', expected hybrid, decay, no-decay or weighted", set->path,
+  return sf_fail(SF_E_FORMAT, "%s: metadata 'mode' is '%.40s', expected hybrid, decay, no-decay or radix", set->path,
                  text ? text : "");
 }
 

@@ -23,7 +23,7 @@
 
 /* weighted: a spike is a binary digit, worth half of one of the step before. Nothing leaks; D2 and C3 add up currents,
  * and their table is read once, behind the last step. */
-typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_WEIGHTED } fx_input_mode;
+typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_RADIX } fx_input_mode;
 
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
  * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
@@ -67,7 +67,7 @@ typedef struct fx_net {
 /* What a neuron of threshold theta fires at, and loses by it. */
 static inline int32_t fx_plif_quantum(int32_t theta, int32_t mode)
 {
-  return mode == FX_WEIGHTED ? 2 * theta : theta;
+  return mode == FX_RADIX ? 2 * theta : theta;
 }
 
 /* Without a density net: C1, C2 and C3 alone. */
@@ -79,7 +79,7 @@ static inline bool fx_net_decodes(const fx_net *net)
 /* Whether the tables of D2 and C3 are read at step t. */
 static inline bool fx_net_reads_tables(const fx_net *net, int t)
 {
-  return net->mode != FX_WEIGHTED || t == net->steps - 1;
+  return net->mode != FX_RADIX || t == net->steps - 1;
 }
 
 /* Inputs of C1: those that change with the step (h), and before them the constant ones. */

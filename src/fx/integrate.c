@@ -14,7 +14,7 @@ fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale)
 {
   const int64_t parts = (1 << net->steps) - 1;
   fx_scale s = *scale;
-  if (net->mode != FX_WEIGHTED) return s;
+  if (net->mode != FX_RADIX) return s;
   /* The finest shift that leaves the factor 16 bits. */
   int64_t mul = (s.mul + parts / 2) / parts;
   for (int more = 1; scale->shift + more <= 31; more++) {
@@ -41,7 +41,7 @@ int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale)
 static uint32_t integrate(uint32_t acc, uint32_t in, int32_t k, int32_t mode, bool first, int bits, uint64_t *saturated)
 {
   const int64_t a = first ? 0 : acc, x = in;
-  if (mode == FX_WEIGHTED || (mode == FX_HYBRID && first)) return in;
+  if (mode == FX_RADIX || (mode == FX_HYBRID && first)) return in;
   if (mode != FX_NODECAY) return (uint32_t)(a + fx_rshift_round((x - a) * k, SF_LEAK_FRAC));
   const int64_t exact = a - fx_rshift_round(a * k, SF_LEAK_FRAC) + x, kept = fx_usat(exact, bits);
   *saturated += kept != exact;

@@ -54,7 +54,7 @@ static void keep_current(fx_trace *trace, int l, int t, const int32_t *current, 
 /* What the table of output `at` (0: the density, 1..3: colours) is asked for at step t. */
 static int32_t table_current(state *s, const fx_net *net, int at, int32_t current)
 {
-  if (net->mode != FX_WEIGHTED) return current;
+  if (net->mode != FX_RADIX) return current;
   return s->weighed[at] = fx_weigh(s->weighed[at], current);
 }
 
@@ -79,7 +79,7 @@ static void read_colour(state *s, const fx_net *net, int t, int o, int32_t curre
 /* An output's state for the trace. */
 static int32_t integrated(const state *s, const fx_net *net, int at, uint32_t acc)
 {
-  return net->mode == FX_WEIGHTED ? s->weighed[at] : (int32_t)acc;
+  return net->mode == FX_RADIX ? s->weighed[at] : (int32_t)acc;
 }
 
 static void density_step(state *s, const fx_net *net, int t, fx_trace *trace)

@@ -28,7 +28,7 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
   }
   c2_layer(core, b, s, mode);
   c3_layer(core, b, s);
-  if (mode == FX_WEIGHTED)
+  if (mode == FX_RADIX)
     read_weighed(net, b, s);
   else
     integrate_steps(net, b, s, mode);
@@ -36,9 +36,9 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
   for (int i = 0; i < b->n; i++) b->out[i] = (fx_out){s->acc[0][i], {s->acc[1][i], s->acc[2][i], s->acc[3][i]}};
 }
 
-static void nets_weighted(const fx_core *core, fx_block *block, fx_scratch *scratch)
+static void nets_radix(const fx_core *core, fx_block *block, fx_scratch *scratch)
 {
-  nets_of_mode(core, block, scratch, FX_WEIGHTED);
+  nets_of_mode(core, block, scratch, FX_RADIX);
 }
 static void nets_hybrid(const fx_core *core, fx_block *block, fx_scratch *scratch)
 {
@@ -67,7 +67,7 @@ static void nets(const fx_core *core, fx_block *block, fx_scratch *scratch)
     nets_nodecay(core, block, scratch);
     break;
   default:
-    nets_weighted(core, block, scratch);
+    nets_radix(core, block, scratch);
   }
   tiles_end();
 }

@@ -30,7 +30,7 @@ static inline int32_t charge_nodecay(int32_t v, int32_t current, int32_t k)
   return v - leak_product(v, k) + current;
 }
 
-static inline int32_t charge_weighted(int32_t u, int32_t current, int32_t theta)
+static inline int32_t charge_radix(int32_t u, int32_t current, int32_t theta)
 {
   return 2 * u + current - theta;
 }
@@ -49,7 +49,7 @@ static inline int32_t clamp_membrane(int32_t u)
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first)
 {
   const int32_t old = first ? fx_plif_start(theta, mode) : v, quantum = fx_plif_quantum(theta, mode);
-  const int32_t exact = mode == FX_WEIGHTED  ? charge_weighted(old, current, theta)
+  const int32_t exact = mode == FX_RADIX  ? charge_radix(old, current, theta)
                         : mode == FX_NODECAY ? charge_nodecay(old, current, k)
                                              : charge_leaky(old, current, effective_leak(k, mode, first));
   const int32_t membrane = clamp_membrane(exact);
@@ -69,7 +69,7 @@ static int charge_layer_limited(int32_t *restrict v, const int32_t *restrict cur
 {
   int saturated = 0;
   for (int o = 0; o < n; o++) {
-    const int32_t exact = mode == FX_WEIGHTED ? charge_weighted(v[o], current[o], layer->theta)
+    const int32_t exact = mode == FX_RADIX ? charge_radix(v[o], current[o], layer->theta)
                                               : charge_nodecay(v[o], current[o], layer->k);
     v[o] = clamp_membrane(exact);
     saturated += v[o] != exact;
@@ -98,7 +98,7 @@ int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *lay
   int saturated = 0;
   if (first)
     for (int o = 0; o < n; o++) v[o] = fx_plif_start(layer->theta, mode);
-  if (mode == FX_WEIGHTED || mode == FX_NODECAY)
+  if (mode == FX_RADIX || mode == FX_NODECAY)
     saturated = charge_layer_limited(v, current, n, layer, mode);
   else
     charge_layer(v, current, n, effective_leak(layer->k, mode, first));

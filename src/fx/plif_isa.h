@@ -52,7 +52,7 @@ static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
 /* fx_plif_step up to the membrane. */
 static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturated)
 {
-  if (n->mode == FX_WEIGHTED) {
+  if (n->mode == FX_RADIX) {
     const vec doubled = n->first ? n->theta : V(sub_epi32)(V(slli_epi32)(v, 1), n->theta);
     return clamp_membrane(V(add_epi32)(doubled, current), saturated);
   }

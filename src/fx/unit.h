@@ -19,7 +19,7 @@ typedef struct fx_plif {
 /* The membrane before the first step. */
 static inline int32_t fx_plif_start(int32_t theta, int32_t mode)
 {
-  return mode == FX_WEIGHTED ? theta : 0;
+  return mode == FX_RADIX ? theta : 0;
 }
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first);
 

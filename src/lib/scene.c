@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-_Static_assert((int)SPIKEFIELD_WEIGHTED == (int)FX_WEIGHTED, "fx_input_mode and spikefield_mode differ");
+_Static_assert((int)SPIKEFIELD_RADIX == (int)FX_RADIX, "fx_input_mode and spikefield_mode differ");
 
 typedef struct source {
   const char *name;

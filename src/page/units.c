@@ -18,7 +18,7 @@ static void width_basis(FILE *out, const fx_net *net, int row, int part)
     break;
   case SF_PART_NEURON:
     fprintf(out, "%s%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
-            net->mode == FX_WEIGHTED ? "doubling" : "leak",
+            net->mode == FX_RADIX ? "doubling" : "leak",
             fx_layer_fires(row) ? ", compare, reset" : " of an integrator", fx_layer_table[row].state_bits);
     break;
   default:

@@ -34,7 +34,7 @@ static double theta_of(const sf_model *model, int layer)
 /* Of theta, membrane LSB: neurons of weighted spikes fire at 2 theta. */
 static double largest_theta(const sf_model *model)
 {
-  return model->config.mode == SF_WEIGHTED ? MEMBRANE_LIMIT / 2 : MEMBRANE_LIMIT;
+  return model->config.mode == SF_RADIX ? MEMBRANE_LIMIT / 2 : MEMBRANE_LIMIT;
 }
 
 /* With a smaller unit theta would not fit the membrane. Integrating layers have no threshold; their unit only has to
@@ -150,7 +150,7 @@ static double colour_error(const context *c, const int16_t *x, double unit)
   const fx_layer *to = &c->scene->net.layer[FX_C3];
   const sf_calibration *cal = c->calibration;
   const int inputs = fx_layer_rows(to), steps = cal->per_sample[FX_C3], rows = rows_of(cal, FX_C3);
-  const bool behind = c->model->config.mode == SF_WEIGHTED; /* the sum: the activation stands there */
+  const bool behind = c->model->config.mode == SF_RADIX; /* the sum: the activation stands there */
   double error = 0, exact[3] = {0}, found[3] = {0}, weight = 0;
   for (int row = 0; row < rows; row++) {
     const int16_t *in = x + (size_t)row * (size_t)inputs;

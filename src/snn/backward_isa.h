@@ -52,7 +52,7 @@ static inline void fire_backward(const sf_net_view *net, int layer, float k, int
     return;
   }
   const int hybrid_first = t == 0 && net->mode == SF_HYBRID;
-  const int weighted = net->mode == SF_WEIGHTED, whole = net->mode >= SF_NODECAY || hybrid_first;
+  const int weighted = net->mode == SF_RADIX, whole = net->mode >= SF_NODECAY || hybrid_first;
   const float keep = weighted ? 2.0f : 1.0f - k, gain = whole ? 1.0f : k, with_h = whole ? 0.0f : keep;
   const float with_v = weighted ? 0.0f : net->mode == SF_NODECAY ? -k : -1.0f;
   const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
@@ -110,7 +110,7 @@ static void integrate_backward(const sf_net_view *net, float k, int t, const flo
     for (int i = 0; i < B; i++) de[i] = g[i];
     return;
   }
-  const int weighted = net->mode == SF_WEIGHTED;
+  const int weighted = net->mode == SF_RADIX;
   const float share = weighted ? sf_step_share(t) : k, keep = 1.0f - share, slope = weighted ? 0.0f : k * keep;
   const float gain = net->mode == SF_NODECAY ? 1.0f : share;
   const float with_e = net->mode == SF_NODECAY ? 0.0f : 1.0f;
@@ -136,7 +136,7 @@ static inline float exp_slope(float x)
 /* The outputs' gradients of prefix t, added to those of what they integrate. */
 static void add_density_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dsigma, float *gsigma)
 {
-  if (net->mode != SF_WEIGHTED) {
+  if (net->mode != SF_RADIX) {
     add_to(gsigma, dsigma + t * B, B);
     return;
   }
@@ -145,7 +145,7 @@ static void add_density_gradient(const sf_net_view *net, const sf_block *x, int 
 
 static void add_colour_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dcolour, float *gcolour)
 {
-  if (net->mode != SF_WEIGHTED) {
+  if (net->mode != SF_RADIX) {
     add_to(gcolour, dcolour + t * 3 * B, 3 * B);
     return;
   }
@@ -215,7 +215,7 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   uint32_t small[4 * B], *lanes = lanes_beside(w->rows, w->lanes);
   sigmoid(3 * B, x->j[t], c);
   memset(gj + 3 * B, 0, B * sizeof *gj);
-  const bool weighted = net->mode == SF_WEIGHTED;
+  const bool weighted = net->mode == SF_RADIX;
   const float *const in = weighted ? x->j[t] : c, *const sums = weighted ? x->j_sum[0] : x->colour[0];
   for (int a = 0; a < 3; a++)
     integrate_backward(net, net->k[4], t, in + a * B, t ? sums + (3 * (t - 1) + a) * B : NULL, gcolour + a * B,
@@ -270,7 +270,7 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
-  const bool weighted = net->mode == SF_WEIGHTED;
+  const bool weighted = net->mode == SF_RADIX;
   const float *const sums = weighted ? x->i_sum[0] : x->sigma[0];
   const size_t plane = (size_t)hidden * B * sizeof(float);
   float gsigma[B] = {0}, gcolour[3 * B] = {0};

@@ -38,7 +38,7 @@ static inline void charge(const sf_net_view *net, int layer, float k, int t, int
   else if (t == 0)
     for (int i = 0; i < n; i++) h[i] = current[i] * k;
   else {
-    const float keep = net->mode == SF_WEIGHTED ? 2.0f : 1.0f - k, gain = net->mode >= SF_NODECAY ? 1.0f : k;
+    const float keep = net->mode == SF_RADIX ? 2.0f : 1.0f - k, gain = net->mode >= SF_NODECAY ? 1.0f : k;
 #pragma GCC ivdep /* h may be prev: element by element */
     for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? lost : 0.0f)) + gain * current[i];
   }
@@ -71,7 +71,7 @@ static void integrate(const sf_net_view *net, float k, int t, int n, const float
   else if (t == 0)
     for (int i = 0; i < n; i++) o[i] = k * e[i];
   else {
-    const float share = net->mode == SF_WEIGHTED ? sf_step_share(t) : k;
+    const float share = net->mode == SF_RADIX ? sf_step_share(t) : k;
     const float gain = net->mode == SF_NODECAY ? 1.0f : share, keep = 1.0f - share;
     for (int i = 0; i < n; i++) o[i] = keep * prev[i] + gain * e[i];
   }
@@ -97,7 +97,7 @@ static inline int slot(int t, int keep)
 static void read_density(const sf_net_view *net, int t, const float *i, sf_block *x)
 {
   float e[B];
-  if (net->mode == SF_WEIGHTED) {
+  if (net->mode == SF_RADIX) {
     integrate(net, net->k[1], t, B, i, t ? x->i_sum[t - 1] : NULL, x->i_sum[t]);
     exponential(B, x->i_sum[t], x->sigma[t]);
   } else {
@@ -109,7 +109,7 @@ static void read_density(const sf_net_view *net, int t, const float *i, sf_block
 static void read_colour(const sf_net_view *net, int t, sf_block *x)
 {
   float c[3 * B];
-  if (net->mode == SF_WEIGHTED) {
+  if (net->mode == SF_RADIX) {
     integrate(net, net->k[4], t, 3 * B, x->j[t], t ? x->j_sum[t - 1] : NULL, x->j_sum[t]);
     sigmoid(3 * B, x->j_sum[t], x->colour[t]);
   } else {

@@ -11,7 +11,7 @@ typedef struct dense {
  * integrated. */
 static float read_out(sf_input_mode mode, int t, float k, float (*activation)(float), float *sum, float current)
 {
-  const bool outside = mode == SF_WEIGHTED;
+  const bool outside = mode == SF_RADIX;
   *sum = sf_plif_integrate(mode, t, k, *sum, outside ? current : activation(current));
   return outside ? activation(*sum) : *sum;
 }

@@ -10,7 +10,7 @@ enum { SF_SURROGATE_ALPHA = 8 };
 /* Membrane after charging, before fire: previous membrane v, current i, leak k = 1/tau, step t. */
 static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, float i)
 {
-  if (mode == SF_WEIGHTED) return 2 * v + i;
+  if (mode == SF_RADIX) return 2 * v + i;
   if (mode == SF_NODECAY) return v - v * k + i;
   if (mode == SF_HYBRID && t == 0) return i;
   return v + (i - v) * k;
@@ -20,7 +20,7 @@ static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, 
  * worth. */
 static inline float sf_plif_reset(sf_input_mode mode, float theta)
 {
-  return mode == SF_WEIGHTED ? 2 * theta : theta;
+  return mode == SF_RADIX ? 2 * theta : theta;
 }
 
 /* Weighted spikes: the share of step t in the mean of steps 0..t, of which each weighs half of the one before. */
@@ -32,7 +32,7 @@ static inline float sf_step_share(int t)
 /* An output that integrates without firing: o before, x comes in. Of weighted spikes it is the weighted mean. */
 static inline float sf_plif_integrate(sf_input_mode mode, int t, float k, float o, float x)
 {
-  return mode == SF_WEIGHTED ? o + (x - o) * sf_step_share(t) : sf_plif_charge(mode, t, k, o, x);
+  return mode == SF_RADIX ? o + (x - o) * sf_step_share(t) : sf_plif_charge(mode, t, k, o, x);
 }
 
 /* h as the accelerator sees it: current >> SF_H_SHIFT. Currents are multiples of step >> SF_H_SHIFT but for their

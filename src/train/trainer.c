@@ -32,7 +32,7 @@ sf_train_options sf_train_defaults(void)
                               .lr_grid = 1e-2,
                               .lr_net = 5e-3};
   for (int i = 0; i < 3; i++) options.config.theta[i] = 0.25f;
-  options.config.mode = SF_WEIGHTED;
+  options.config.mode = SF_RADIX;
   return options;
 }
 

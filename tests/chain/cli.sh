@@ -66,7 +66,7 @@ check sf_convert "squared error above the twin's" python3 -c 'import json
 r = json.load(open("stdout.txt"))
 error = lambda row: 10 ** (-row["psnr"] / 10)
 assert all(abs(p["excess_squared_error"] - error(p) + error(r["twin"])) < 1e-12 for p in r["converted"])'
-for line in "prefixes 0.5 weighted" "paper 0 hybrid"; do
+for line in "prefixes 0.5 radix" "paper 0 hybrid"; do
   read -r objective opaque mode <<<"$line"
   good sf_train d -o objective.safetensors --objective $objective --stage1 2 --stage2 2 --levels 2 --log2-hash 8 --lattice 128 --threads 1 --json
   check "--objective $objective" "is not the price of a sample" grep -Eq "\"opaque\":[[:space:]]*$opaque," stdout.txt

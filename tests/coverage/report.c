@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const char *const mode_name[] = {"hybrid", "decay", "no-decay", "weighted"};
+static const char *const mode_name[] = {"hybrid", "decay", "no-decay", "radix"};
 static const char *const phase_name[SF_PHASES] = {"idle",           "packet half in",     "sample in", "after D1",
                                                   "after D2",       "after C1",           "after C2",  "after C3",
                                                   "result waiting", "half a result taken"};
@@ -29,7 +29,7 @@ static void bin(group *g, uint64_t count, const char *name)
 static bool possible(int layer, int mode, int step, bool saturated)
 {
   if (!saturated) return true;
-  if (mode == FX_WEIGHTED) return fx_layer_fires(layer) && step >= (layer == FX_C2);
+  if (mode == FX_RADIX) return fx_layer_fires(layer) && step >= (layer == FX_C2);
   if (layer == FX_D2) return true;
   if (layer == FX_C3 || mode != FX_NODECAY) return false;
   return step >= (layer == FX_C2 ? 2 : 1);

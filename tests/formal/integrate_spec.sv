@@ -18,9 +18,9 @@ module integrate_spec #(
   localparam signed [63:0] SIGMA_MAX = (64'sd1 << sf_arch_pkg::SIGMA_BITS) - 64'sd1;
   localparam signed [63:0] COLOUR_MAX = (64'sd1 << sf_arch_pkg::COLOUR_BITS) - 64'sd1;
   localparam NODECAY = MODE == sf_op_pkg::NODECAY;
-  localparam WEIGHTED = MODE == sf_op_pkg::WEIGHTED;
-  localparam FROM_ZERO = FIRST || WEIGHTED;
-  localparam LEAPS = WEIGHTED || (MODE == sf_op_pkg::HYBRID && FIRST);  // to the input
+  localparam RADIX = MODE == sf_op_pkg::RADIX;
+  localparam FROM_ZERO = FIRST || RADIX;
+  localparam LEAPS = RADIX || (MODE == sf_op_pkg::HYBRID && FIRST);  // to the input
 
   wire [27:0] acc;
   sf_integrate u_dut (

@@ -18,15 +18,15 @@ module plif_spec #(
   localparam signed [63:0] MAX = 64'sd8388607;
   localparam signed [63:0] HALF = 64'sd1 << (FRAC - 1);
   localparam NODECAY = MODE == sf_op_pkg::NODECAY;
-  localparam WEIGHTED = MODE == sf_op_pkg::WEIGHTED;
-  localparam LEAPS = WEIGHTED || (MODE == sf_op_pkg::HYBRID && FIRST);  // sf_neurons gives 1.0 for k
+  localparam RADIX = MODE == sf_op_pkg::RADIX;
+  localparam LEAPS = RADIX || (MODE == sf_op_pkg::HYBRID && FIRST);  // sf_neurons gives 1.0 for k
 
   wire signed [23:0] v;
   wire spike;
   sf_plif u_dut (
       .*,
       .nodecay_i (NODECAY),
-      .weighted_i(WEIGHTED),
+      .weighted_i(RADIX),
       .first_i   (FIRST),
       .v_o       (v),
       .spike_o   (spike)
@@ -56,20 +56,20 @@ module plif_spec #(
   end
 
   wire signed [63:0] theta1 = {{40{theta1_q[23]}}, theta1_q};
-  wire signed [63:0] old1 = !FIRST ? {{40{v1_q[23]}}, v1_q} : WEIGHTED ? theta1 : 64'sd0;
-  wire signed [63:0] factor1 = WEIGHTED ? old1 - theta1 : NODECAY ? -old1 : {{40{current1_q[23]}}, current1_q} - old1;
+  wire signed [63:0] old1 = !FIRST ? {{40{v1_q[23]}}, v1_q} : RADIX ? theta1 : 64'sd0;
+  wire signed [63:0] factor1 = RADIX ? old1 - theta1 : NODECAY ? -old1 : {{40{current1_q[23]}}, current1_q} - old1;
   wire signed [63:0] whole = factor1 <<< FRAC;
   wire multiplies_factor = {{39{peek_x1_q[24]}}, peek_x1_q} == factor1;  // else nothing is known of the product
 
   wire signed [63:0] theta = {{40{theta5_q[23]}}, theta5_q};
-  wire signed [63:0] old = !FIRST ? {{40{v5_q[23]}}, v5_q} : WEIGHTED ? theta : 64'sd0;
+  wire signed [63:0] old = !FIRST ? {{40{v5_q[23]}}, v5_q} : RADIX ? theta : 64'sd0;
   wire signed [63:0] current = {{40{current5_q[23]}}, current5_q};
   wire signed [63:0] quantum = {{40{quantum5_q[23]}}, quantum5_q};
   wire signed [63:0] leak = (product5_q + HALF) >>> FRAC;
-  wire signed [63:0] exact = WEIGHTED ? (old <<< 1) + current - theta : old - leak + current;
+  wire signed [63:0] exact = RADIX ? (old <<< 1) + current - theta : old - leak + current;
   wire signed [63:0] limited = exact > MAX ? MAX : exact < -MAX - 64'sd1 ? -MAX - 64'sd1 : exact;
   wire signed [63:0] leaky = LEAPS ? current : old + leak;
-  wire signed [63:0] membrane = NODECAY || WEIGHTED ? limited : leaky;
+  wire signed [63:0] membrane = NODECAY || RADIX ? limited : leaky;
   wire fires = membrane >= quantum;
   wire signed [63:0] after = fires ? membrane - quantum : membrane;
 
@@ -89,7 +89,7 @@ module plif_spec #(
       spike_is_the_comparison : assert (spike == fires);
       membrane_is_exact : assert ({{40{v[23]}}, v} == after);
       reset_leaves_no_debt : assert (!spike || v >= 24'sd0);
-      if (!NODECAY && !WEIGHTED) between_v_and_current : assert (old < current ? membrane >= old && membrane <= current
+      if (!NODECAY && !RADIX) between_v_and_current : assert (old < current ? membrane >= old && membrane <= current
                                                                   : membrane >= current && membrane <= old);
     end
   end

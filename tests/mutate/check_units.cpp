@@ -41,16 +41,16 @@ static neuron drawn_neuron(void)
               (int32_t)corner(-max - 1, max),
               (int32_t)corner(0, FX_LEAK_ONE),
               (int32_t)corner(1, max),
-              (int32_t)draw(FX_HYBRID, FX_WEIGHTED),
+              (int32_t)draw(FX_HYBRID, FX_RADIX),
               draw(0, 3) == 0,
               {}};
-  const int64_t highest = n.mode == FX_WEIGHTED ? max / 2 : max;
+  const int64_t highest = n.mode == FX_RADIX ? max / 2 : max;
   if (n.theta > highest) n.theta = (int32_t)highest;
   if (draw(0, 3) == 0) n.current = n.v; /* nothing leaks: the threshold alone decides */
   n.want = fx_plif_step(n.v, n.current, n.k, n.theta, n.mode, n.first);
   if (draw(0, 1) && n.want.membrane > 1) { /* at the threshold, and one beside it */
     const int32_t beside = n.want.membrane + draw(-1, 1);
-    if (n.mode == FX_WEIGHTED) /* u - 2 theta, of which the current takes the difference */
+    if (n.mode == FX_RADIX) /* u - 2 theta, of which the current takes the difference */
       n.current = (int32_t)fx_sat((int64_t)n.current - beside + 2 * n.theta, SF_MEMBRANE_BITS);
     else
       n.theta = beside > max ? max : beside;
@@ -65,8 +65,8 @@ static bool trial(int i)
   const neuron &leaks = on_its_way[(i + 7) & 7], &compares = on_its_way[(i + 4) & 7];
   top.v_i = n.v & 0xffffff, top.current_i = n.current & 0xffffff;
   top.nodecay_i = n.mode == FX_NODECAY, top.first_i = n.first;
-  top.weighted_i = n.mode == FX_WEIGHTED, top.theta_i = n.theta;
-  top.k_i = leaks.mode == FX_WEIGHTED || (leaks.mode == FX_HYBRID && leaks.first) ? FX_LEAK_ONE : leaks.k;
+  top.weighted_i = n.mode == FX_RADIX, top.theta_i = n.theta;
+  top.k_i = leaks.mode == FX_RADIX || (leaks.mode == FX_HYBRID && leaks.first) ? FX_LEAK_ONE : leaks.k;
   top.quantum_i = fx_plif_quantum(compares.theta, compares.mode);
   top.clk_i = 0, top.eval();
   top.clk_i = 1, top.eval();
@@ -83,7 +83,7 @@ static bool trial(int i)
   const bool colour = draw(0, 1), first = draw(0, 3) == 0;
   const int64_t max = ((int64_t)1 << (colour ? SF_COLOUR_BITS : SF_SIGMA_BITS)) - 1;
   const uint32_t acc = corner(0, max), in = corner(0, max);
-  const int32_t k = corner(0, FX_LEAK_ONE), other = draw(0, FX_LEAK_ONE), mode = i / RUN % (FX_WEIGHTED + 1);
+  const int32_t k = corner(0, FX_LEAK_ONE), other = draw(0, FX_LEAK_ONE), mode = i / RUN % (FX_RADIX + 1);
   uint64_t saturated = 0;
   top.acc_i = acc, top.in_i = in, top.mode_i = mode, top.first_i = first, top.colour_i = colour;
   top.k_density_i = colour ? other : k, top.k_colour_i = colour ? k : other;

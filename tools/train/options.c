@@ -101,9 +101,9 @@ static sf_status check_effect(train_arguments *a)
   if (a->train.target_loss > 0 || a->train.target_saving > 0)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, budget, "has no effect beside a target"));
   if (a->along) SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, steps, "has no effect beside --steps-along-ray"));
-  if (a->along && a->input_mode == 1 + SF_WEIGHTED)
+  if (a->along && a->input_mode == 1 + SF_RADIX)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, mode,
-                         "weighted needs steps that weigh differently, and --steps-along-ray has one per sample"));
+                         "radix needs steps that weigh differently, and --steps-along-ray has one per sample"));
   if (a->train.fixed_steps > 0 || a->train.config.net == SF_NET_ANN || a->along)
     SF_TRY(sf_cli_refuse(&cli, a->argc, a->argv, search, "has no effect where the number of steps is fixed"));
   if (a->train.config.net == SF_NET_ANN)

@@ -120,7 +120,7 @@ static cJSON *cost_json(const sf_model *m, const train_quality *q)
 static cJSON *make_summary(const train_arguments *a, const sf_model *m, const sf_train_stats *s, const train_quality *q)
 {
   const sf_config *c = &m->config;
-  static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay", "weighted"};
+  static const char *const net[] = {"snn", "ann"}, *const mode[] = {"hybrid", "decay", "no-decay", "radix"};
   cJSON *json = cJSON_CreateObject();
   sf_json_add_text(json, "model", a->output);
   cJSON_AddStringToObject(json, "backbone", sf_field_of(c)->name);

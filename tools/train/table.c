@@ -146,8 +146,8 @@ static sf_option *ablations(train_arguments *a, sf_option *o)
       SF_GROUP("Ablations, which show what each part of the method is worth"),
       {"--net", 0, SF_ARG_CHOICE, &t->config.net, 0, 0, "snn|ann", "KIND",
        "spiking nets or their ReLU twin (default snn)"},
-      {"--input-mode", 0, SF_ARG_CHOICE, &a->input_mode, 0, 0, "auto|hybrid|decay|no-decay|weighted", "MODE",
-       "charging of the neurons; weighted: a spike is worth half of one of the step before; auto: weighted, but the "
+      {"--input-mode", 0, SF_ARG_CHOICE, &a->input_mode, 0, 0, "auto|hybrid|decay|no-decay|radix", "MODE",
+       "charging of the neurons; radix: a spike is worth half of one of the step before; auto: radix, but the "
        "paper's hybrid beside --objective paper and --steps-along-ray (default auto)"},
       {"--objective", 0, SF_ARG_CHOICE, &t->objective, 0, 0, "prefixes|paper", "KIND",
        "what is trained while t* is searched: the mean over all numbers of steps, or the paper's M_smooth through all "
