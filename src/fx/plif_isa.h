@@ -31,15 +31,14 @@ static INLINE vec add_leak(vec base, vec d, leak k)
 /* What the neurons of a layer share at one step; mode and first are constants wherever it is used. */
 typedef struct neurons {
   leak k;
-  vec theta, quantum; /* what they fire at, and lose */
+  vec theta;
   int mode;
   bool first;
 } neurons;
 
 static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first)
 {
-  const int32_t theta = net->layer[layer].theta;
-  return (neurons){leak_of(net->layer[layer].k), v_set(theta), v_set(fx_plif_quantum(theta, mode)), mode, first};
+  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first};
 }
 
 static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
@@ -53,8 +52,7 @@ static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
 static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturated)
 {
   if (n->mode == FX_RADIX) {
-    const vec doubled = n->first ? n->theta : V(sub_epi32)(V(slli_epi32)(v, 1), n->theta);
-    return clamp_membrane(V(add_epi32)(doubled, current), saturated);
+    return n->first ? current : clamp_membrane(V(slli_epi32)(v, 1), saturated);
   }
   if (n->mode == FX_HYBRID && n->first) return current;
   if (n->first) v = v_set(0);
@@ -89,7 +87,7 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
 #pragma GCC unroll 8
   for (int j = 0; j < vectors; j++) {
     v[j] = charge(n, v[j], current_of(c, i, t, j, neuron), saturated);
-    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->quantum) << j * WIDTH % 64;
+    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->theta) << j * WIDTH % 64;
   }
   memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
 }
