@@ -48,7 +48,7 @@ static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
   return membrane;
 }
 
-/* fx_plif_step up to the membrane. */
+/* fx_plif_step up to the membrane; of radix the current is read at the first step alone. */
 static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturated)
 {
   if (n->mode == FX_RADIX) {
@@ -61,20 +61,27 @@ static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturat
   return clamp_membrane(V(add_epi32)(kept, current), saturated);
 }
 
-/* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH]. */
+/* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH].
+ * weighed: 0, or how many steps are weighed into one current, that of step 0. */
 typedef struct currents {
   enum { WORDS, HALVES, REALS } kind; /* of 32 or 16 bits; whole numbers in binary32 */
   const void *from;
-  int sample, step;
+  int sample, step, weighed;
   int shift;                  /* to a membrane's LSB */
   const int32_t *const *base; /* what is added, of each sample; or NULL */
 } currents;
 
+static INLINE vec current_at(const currents *c, int at)
+{
+  const vec x = c->kind == HALVES ? v_widen((const int16_t *)c->from + at) : v_load((const int32_t *)c->from + at);
+  return c->kind == REALS ? v_whole(x) : x;
+}
+
 static INLINE vec current_of(const currents *c, int i, int t, int j, int neuron)
 {
   const int at = t * c->step + i * c->sample + j * WIDTH;
-  vec x = c->kind == HALVES ? v_widen((const int16_t *)c->from + at) : v_load((const int32_t *)c->from + at);
-  if (c->kind == REALS) x = v_whole(x);
+  vec x = current_at(c, at);
+  for (int s = 1; s < c->weighed; s++) x = V(add_epi32)(V(slli_epi32)(x, 1), current_at(c, at + s * c->step));
   if (c->base) x = V(add_epi32)(x, v_load(c->base[i] + neuron + j * WIDTH));
   return c->shift ? V(slli_epi32)(x, c->shift) : x;
 }
