@@ -58,7 +58,7 @@ static void set_scalars(sf_exact *e)
     const bool real = sf_exact_is(e, SF_EXACT_LEAK);
     if (e->scene->net.layer[l].n_out == 0) continue;
     e->k[l] = real ? ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC) : e->scene->net.layer[l].k;
-    e->theta[l] = real ? ldexp(theta[l] / e->scene->units.current_scale[l], fx_layer_frac(l))
+    e->theta[l] = real ? ldexp(theta[l] / e->scene->units.current_scale[l], fx_layer_frac(l, e->scene->net.mode))
                        : (double)e->scene->net.layer[l].theta;
   }
 }
@@ -133,7 +133,7 @@ static void fire(const sf_exact *e, int l, int t, double *v, const double *curre
   const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), weighted = e->scene->net.mode == FX_RADIX;
   const double theta = e->theta[l], quantum = weighted ? 2 * theta : theta;
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
-    const double in = ldexp(current[o], fx_layer_frac(l)), held = exact ? in : to_membrane(in);
+    const double in = ldexp(current[o], fx_layer_frac(l, e->scene->net.mode)), held = exact ? in : to_membrane(in);
     const double u = weighted ? 2 * (t ? v[o] : theta) + held - theta : charge(e, v[o], held, e->k[l], t, exact);
     const double kept = exact ? u : to_membrane(u);
     const bool spike = kept >= quantum;

@@ -42,7 +42,7 @@ static double largest_theta(const sf_model *model)
 static double smallest_unit(const sf_model *model, int layer)
 {
   const double theta = theta_of(model, layer);
-  return theta > 0 ? ldexp(theta, fx_layer_frac(layer)) / largest_theta(model) : 1e-12;
+  return theta > 0 ? ldexp(theta, fx_layer_frac(layer, (int32_t)model->config.mode)) / largest_theta(model) : 1e-12;
 }
 
 static int rows_of(const sf_calibration *c, int layer)
@@ -124,7 +124,8 @@ static sf_status fit(const context *c, int layer, const int16_t *x, const double
 
 static sf_status set_theta(const context *c, int layer, double unit)
 {
-  const double exact = ldexp(theta_of(c->model, layer) / unit, fx_layer_frac(layer)), rounded = nearbyint(exact);
+  const double exact = ldexp(theta_of(c->model, layer) / unit, fx_layer_frac(layer, (int32_t)c->model->config.mode)),
+               rounded = nearbyint(exact);
   if (!(rounded >= 1 && rounded <= largest_theta(c->model)))
     return sf_fail(SF_E_UNSUPPORTED, "%s: tensor '%s': theta %g is %g membrane units of this layer, expected 1..%.0f",
                    c->name, tensor_of(c, layer), theta_of(c->model, layer), exact, largest_theta(c->model));
