@@ -46,7 +46,7 @@ static inline __attribute__((always_inline)) void digits_backward_of(const sf_ne
     vf carry = {0}, gh = {0};
     for (int t = steps - 1; t >= 0; t--) {
       vf gs = sf_digit(t) * worth;
-      if (fired) gs += (vf)((count == one) & (h[t] >= theta) & (vi)charge);
+      if (fired) gs += (vf)((count == (vf)((h[t] >= theta) & (vi)one)) & (vi)charge);
       gh = (gs - theta * carry) * surrogate(h[t] - theta) + carry;
       carry = 2.0f * gh;
     }
