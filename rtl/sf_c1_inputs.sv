@@ -1,12 +1,15 @@
 // What waits for C1 between D1 and D2 on one side and C1 on the other: directions of rays, marks of their first samples, h.
 // At most 10 samples are between D1 and C1. Mirror: src/fx/net.c
 // h = current of D2 >>> H_SHIFT: 16384 >> 3 fits 12 bits; with a smaller H_SHIFT the scene's weights see to it.
+// Radix mode: one h per sample, of the weighted sum of all steps (sum = 2 sum + current), which is shifted by steps, too.
 `default_nettype none
 
 module sf_c1_inputs (
     input  wire         clk_i,
     input  wire         rst_ni,
     input  wire         clear_i,
+    input  wire         radix_i,
+    input  wire [  3:0] steps_i,
     // from D1: a sample's inputs have been read, a value of its ray's direction
     input  wire         d1_done_i,
     input  wire         d1_first_i,     // of a new ray
@@ -31,6 +34,8 @@ module sf_c1_inputs (
     output wire [ 11:0] h_o,
     output wire         idle_o
 );
+  localparam KEPT = 24 - sf_arch_pkg::H_SHIFT;
+
   reg [11:0] dir_q[0:255];
   reg [15:0] mark_q;
   reg [3:0] mark_write_q, mark_read_q, ray_write_q, ray_read_q;
@@ -64,26 +69,35 @@ module sf_c1_inputs (
       if (done_i) h_read_q <= !h_read_q;
     end
   end
-  reg [179:0] h_q[0:15];  // 15 values by {sample, step}
-  wire [179:0] h_sums;
+  // The sums so far; of a weighted sum the lowest bits are never needed.
+  reg [23*15-1:0] sum_q;
+  wire [24*15-1:0] sum;
+  wire [KEPT*15-1:0] h_kept;
+  wire adds = radix_i && step_i != 3'd0;
   genvar l;
   generate
     for (l = 0; l < 15; l = l + 1) begin : g_h
-      assign h_sums[12*l+:12] = sums_i[16*l+sf_arch_pkg::H_SHIFT+:12];
+      assign sum[24*l+:24] = 24'($signed(sums_i[16*l+:16])) + (adds ? {sum_q[23*l+:23], 1'b0} : 24'd0);
+      always_ff @(posedge clk_i) if (valid_i) sum_q[23*l+:23] <= sum[24*l+:23];
+      assign h_kept[KEPT*l+:KEPT] = sum[24*l+sf_arch_pkg::H_SHIFT+:KEPT];
     end
   endgenerate
-  always_ff @(posedge clk_i) if (valid_i) h_q[{h_write_q, step_i}] <= h_sums;
-  wire [179:0] h_word = h_q[{h_read_q, h_step_i}];
-  reg [11:0] h_value;
-  always_comb begin
-    h_value = 12'd0;
-    for (int i = 0; i < 15; i++) if (h_index_i == 4'(i)) h_value = h_word[12*i+:12];
+  reg [KEPT*15-1:0] h_q[0:15];  // 15 values by {sample, step}
+  reg [3:0] shift_q;            // does not change at work
+  always_ff @(posedge clk_i) begin
+    shift_q <= radix_i ? steps_i : 4'd0;
+    if (valid_i) h_q[{h_write_q, radix_i ? 3'd0 : step_i}] <= h_kept;
   end
-  assign h_o = h_value;
+  wire [KEPT*15-1:0] h_word = h_q[{h_read_q, h_step_i}];
+  reg signed [KEPT-1:0] h_value;
+  always_comb begin
+    h_value = {KEPT{1'b0}};
+    for (int i = 0; i < 15; i++) if (h_index_i == 4'(i)) h_value = h_word[KEPT*i+:KEPT];
+  end
+  assign h_o = 12'(h_value >>> shift_q);
   assign room_o = !h_taken_q[1];
   assign valid_o = h_full_q != 2'd0;
   assign idle_o = h_taken_q == 2'd0;
-  wire unused_ok = &{1'b0, sums_i};
 endmodule
 
 `default_nettype wire

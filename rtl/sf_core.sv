@@ -81,9 +81,10 @@ module sf_core #(
     output wire                c3_bias_row_o,
     output wire         [ 4:0] busy_o,             // a layer works, in the order of the layers
     output wire                ray_o,
-    output wire                neurons_valid_o,    // a group of neurons has made a step
+    output wire                neurons_valid_o,    // a group of neurons had a turn
     output wire         [ 1:0] neurons_layer_o,    // 0: D1, 1: C1, 2: C2
     output wire         [ 2:0] neurons_step_o,
+    output wire                neurons_first_o,    // the sample's first
     output wire                neurons_last_o,     // the layer's last group
     output wire         [ 8:0] neurons_fired_o,
     output wire                stall_o,            // a layer waits for the readout
@@ -111,6 +112,8 @@ module sf_core #(
   wire turn_valid, turn_last;
   wire [1:0] turn_layer;
   wire [2:0] turn_step;
+  wire turn_first, turn_charges, turn_fires;
+  wire radix = mode_i == sf_op_pkg::RADIX;
   wire [GROUP_BITS-1:0] turn_group;
   sf_turns #(
       .MACS      (MACS),
@@ -122,6 +125,7 @@ module sf_core #(
       .rst_ni        (rst_ni),
       .clear_i       (clear_i),
       .decodes_i     (decodes_i),
+      .radix_i       (radix),
       .steps_i       (steps_i),
       .d1_out_i      (d1_out_i),
       .c1_out_i      (c1_out_i),
@@ -148,6 +152,9 @@ module sf_core #(
       .valid_o       (turn_valid),
       .layer_o       (turn_layer),
       .step_o        (turn_step),
+      .first_o       (turn_first),
+      .charges_o     (turn_charges),
+      .fires_o       (turn_fires),
       .group_o       (turn_group),
       .last_o        (turn_last),
       .idle_o        (idle_turns)
@@ -171,6 +178,7 @@ module sf_core #(
       .rst_ni       (rst_ni),
       .clear_i      (clear_i),
       .mode_i       (mode_i),
+      .steps_i      (steps_i),
       .d1_k_i       (d1_k_i),
       .c1_k_i       (c1_k_i),
       .c2_k_i       (c2_k_i),
@@ -183,6 +191,9 @@ module sf_core #(
       .valid_i      (turn_valid),
       .layer_i      (turn_layer),
       .step_i       (turn_step),
+      .first_i      (turn_first),
+      .charges_i    (turn_charges),
+      .fires_i      (turn_fires),
       .group_i      (turn_group),
       .last_i       (turn_last),
       .values_i     (values),
@@ -197,6 +208,7 @@ module sf_core #(
       .count_o      (neurons_valid_o),
       .count_layer_o(neurons_layer_o),
       .count_step_o (neurons_step_o),
+      .count_first_o(neurons_first_o),
       .count_last_o (neurons_last_o),
       .count_fired_o(neurons_fired_o),
       .idle_o       (idle_neurons)
@@ -221,6 +233,7 @@ module sf_core #(
       .n_dir_i        (n_dir_i),
       .bias_i         (c1_bias_i),
       .n_h_i          (n_h_i),
+      .radix_i        (radix),
       .steps_i        (steps_i),
       .d1_part_i      (d1_part),
       .c1_part_i      (c1_part),
@@ -270,6 +283,8 @@ module sf_core #(
       .clk_i      (clk_i),
       .rst_ni     (rst_ni),
       .clear_i    (clear_i),
+      .radix_i    (radix),
+      .steps_i    (steps_i),
       .d1_done_i  (sample_done_o && !decodes_i),
       .d1_first_i (sample_first_i),
       .dir_we_i   (dir_we),

@@ -7,6 +7,7 @@ module sf_counters (
     input  wire        clk_i,
     input  wire        rst_ni,
     // engine (sf_core)
+    input  wire        radix_i,
     input  wire [ 8:0] d1_out_i,         // neurons of a layer
     input  wire [ 8:0] d2_out_i,
     input  wire [ 8:0] c1_out_i,
@@ -30,6 +31,7 @@ module sf_counters (
     input  wire        neurons_valid_i,
     input  wire [ 1:0] neurons_layer_i,
     input  wire [ 2:0] neurons_step_i,
+    input  wire        neurons_first_i,  // the sample's first turn: from membranes of 0
     input  wire        neurons_last_i,
     input  wire [ 8:0] neurons_fired_i,
     // readout
@@ -64,6 +66,7 @@ module sf_counters (
   // By {layer of D1, C1, C2, step}
   reg [63:0] spikes_q[0:31];
   reg [63:0] neuron_q[0:31];
+  reg [63:0] c2_read_q;  // membranes of C2 at step 0 that were read: a sum that goes on
   reg [63:0] sample_q, ray_q, cycle_q, busy_q, stall_in_q, stall_out_q;
   reg [63:0] layer_busy_q[0:4];
   (* no_rw_check *) reg [63:0] window_q[0:511];  // a word that is read while it is written may be either
@@ -106,7 +109,7 @@ module sf_counters (
       sf_csr_pkg::EVENT_SPIKES: place_value = neurons ? spikes_q[at_neurons] : 64'd0;
       sf_csr_pkg::EVENT_UPDATES: place_value = updates;
       sf_csr_pkg::EVENT_WEIGHT: place_value = weight;
-      sf_csr_pkg::EVENT_STATE_R: place_value = at_step == 3'd0 ? 64'd0 : updates;
+      sf_csr_pkg::EVENT_STATE_R: place_value = at_step != 3'd0 ? updates : at_layer == sf_op_pkg::C2 ? c2_read_q : 64'd0;
       sf_csr_pkg::EVENT_STATE_W: place_value = updates;
       default: place_value = integrating ? special_q[at_narrow] : 64'd0;
     endcase
@@ -186,8 +189,11 @@ module sf_counters (
       spikes_q[neurons_here] <= spikes_q[neurons_here] + {55'd0, neurons_fired_i};
       if (neurons_last_i) neuron_q[neurons_here] <= neuron_q[neurons_here] + n_neurons;
     end
+    if (wipe && at_layer == sf_op_pkg::C2) c2_read_q <= 64'd0;
+    else if (neurons_valid_i && neurons_last_i && neurons_here == {sf_op_pkg::SPIKING_C2, 3'd0} && !neurons_first_i)
+      c2_read_q <= c2_read_q + n_c2;
     if (wipe && integrating) integrate_q[at_narrow] <= 64'd0;
-    else if (update_i) integrate_q[update_here] <= integrate_q[update_here] + 64'd1;
+    else if (update_i) integrate_q[update_here] <= integrate_q[update_here] + (radix_i && !update_colour_i ? n_d2 : 64'd1);
     if (wipe && integrating) special_q[at_narrow] <= 64'd0;
     else if (special_i) special_q[update_here] <= special_q[update_here] + 64'd1;
   end

@@ -190,13 +190,13 @@ module sf_csr #(
       || k_q[sf_op_pkg::C2] > LEAK_ONE || k_q[sf_op_pkg::C3] > LEAK_ONE;
   wire bad_theta = (!decodes && theta_q[sf_op_pkg::D1] == 24'd0) || theta_q[sf_op_pkg::C1] == 24'd0
       || theta_q[sf_op_pkg::C2] == 24'd0;
-  // Twice a threshold is a membrane.
-  wire bad_weighted = mode_q == {1'b0, sf_op_pkg::RADIX} && ((!decodes && |theta_q[sf_op_pkg::D1][23:22])
+  // A membrane at its upper rail goes on firing, as it would without the rail.
+  wire bad_radix = mode_q == {1'b0, sf_op_pkg::RADIX} && ((!decodes && |theta_q[sf_op_pkg::D1][23:22])
       || |theta_q[sf_op_pkg::C1][23:22] || |theta_q[sf_op_pkg::C2][23:22]);
   wire bad_mode = mode_q[2];
   wire bad_scale = exp_mul_q[16] || sigmoid_mul_q[16] || exp_shift_q[5] || sigmoid_shift_q[5];
   reg [5:0] bad_q;
-  always_ff @(posedge clk_i) bad_q <= {bad_scale, bad_mode, bad_theta || bad_weighted, bad_leak, bad_steps, bad_size};
+  always_ff @(posedge clk_i) bad_q <= {bad_scale, bad_mode, bad_theta || bad_radix, bad_leak, bad_steps, bad_size};
 
   // ---- done
   wire word_write = done_q && whole_q;

@@ -86,7 +86,7 @@ module sf_engine #(
   wire d2_row, c2_row, c2_bias_row, c3_row, c3_bias_row;
   wire [7:0] d2_fired, c2_fired, c3_fired;
   wire [4:0] busy;
-  wire neurons_valid, neurons_last;
+  wire neurons_valid, neurons_first, neurons_last;
   wire [1:0] neurons_layer;
   wire [8:0] neurons_fired;
   wire update, update_colour, special;
@@ -165,6 +165,7 @@ module sf_engine #(
       .neurons_valid_o(neurons_valid),
       .neurons_layer_o(neurons_layer),
       .neurons_step_o (neurons_step),
+      .neurons_first_o(neurons_first),
       .neurons_last_o (neurons_last),
       .neurons_fired_o(neurons_fired),
       .stall_o        (stall_out),
@@ -217,6 +218,7 @@ module sf_engine #(
   sf_counters u_counters (
       .clk_i          (clk_i),
       .rst_ni         (rst_ni),
+      .radix_i        (mode_i == sf_op_pkg::RADIX),
       .d1_out_i       (d1_out_i),
       .d2_out_i       (d2_out_i),
       .c1_out_i       (c1_out_i),
@@ -240,6 +242,7 @@ module sf_engine #(
       .neurons_valid_i(neurons_valid),
       .neurons_layer_i(neurons_layer),
       .neurons_step_i (neurons_step),
+      .neurons_first_i(neurons_first),
       .neurons_last_i (neurons_last),
       .neurons_fired_i(neurons_fired),
       .update_i       (update),

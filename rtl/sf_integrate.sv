@@ -1,6 +1,6 @@
 // Leaky integrator of an output layer, one step, in five stages: the accumulator is read in the first and may be written at
 // the end of the fifth. One unit serves density (28 bits) and colour (20 bits): only the saturation differs.
-// What comes from weighted spikes comes once: it takes the accumulator's place. Mirror: src/fx/integrate.c
+// In radix mode the input comes once: it takes the accumulator's place. Mirror: src/fx/integrate.c
 `default_nettype none
 
 module sf_integrate (
@@ -19,8 +19,8 @@ module sf_integrate (
   wire nodecay = mode_i == sf_op_pkg::NODECAY;
 
   // 1: what leaks, and what it is added to
-  wire weighted = mode_i == sf_op_pkg::RADIX;
-  wire signed [28:0] a = first_i || weighted ? 29'sd0 : $signed({1'b0, acc_i});
+  wire radix = mode_i == sf_op_pkg::RADIX;
+  wire signed [28:0] a = first_i || radix ? 29'sd0 : $signed({1'b0, acc_i});
   wire signed [28:0] x = $signed({1'b0, in_i});
   reg signed [28:0] x1_q;
   reg [28:0] base1_q;
@@ -29,7 +29,7 @@ module sf_integrate (
   always_ff @(posedge clk_i) begin
     x1_q <= nodecay ? -a : x - a;
     base1_q <= nodecay ? a + x : a;
-    k1_q <= weighted || (mode_i == sf_op_pkg::HYBRID && first_i) ? 13'd1 << FRAC : colour_i ? k_colour_i : k_density_i;
+    k1_q <= radix || (mode_i == sf_op_pkg::HYBRID && first_i) ? 13'd1 << FRAC : colour_i ? k_colour_i : k_density_i;
     colour_q <= {colour_q[2:0], colour_i};
   end
 

@@ -1,6 +1,8 @@
 // The neurons: NEURONS pipelined units that the spiking layers D1, C1 and C2 share. A group of neurons of one layer takes
 // one step per cycle; its next step begins DEPTH cycles later at the earliest. Its currents are those of the layer's part that
 // was loaded last. Membranes of the layer at work lie in a small memory beside the units. Mirror: src/fx/plif.c
+// Radix mode: a neuron takes its current once, then fires a digit per turn. C2 first adds up its current, step by step: v = 2 v
+// + sum / 2^steps. These turns fire nothing and are updates of their own steps.
 `default_nettype none
 
 module sf_neurons #(
@@ -12,6 +14,7 @@ module sf_neurons #(
     input  wire                  rst_ni,
     input  wire                  clear_i,
     input  wire [           1:0] mode_i,
+    input  wire [           3:0] steps_i,
     input  wire [          12:0] d1_k_i,
     input  wire [          12:0] c1_k_i,
     input  wire [          12:0] c2_k_i,
@@ -21,15 +24,18 @@ module sf_neurons #(
     input  wire [           8:0] d1_out_i,    // neurons of the layer
     input  wire [           8:0] c1_out_i,
     input  wire [           8:0] c2_out_i,
-    // a group's step
+    // a group's turn
     input  wire                  valid_i,
     input  wire [           1:0] layer_i,     // 0: D1, 1: C1, 2: C2
     input  wire [           2:0] step_i,
+    input  wire                  first_i,     // from membranes of 0
+    input  wire                  charges_i,   // there is a current
+    input  wire                  fires_i,     // else it adds up alone
     input  wire [GROUP_BITS-1:0] group_i,
     input  wire                  last_i,      // the layer's last group
     input  wire [   24*MACS-1:0] values_i,    // currents of D1 or C1
     input  wire [   16*MACS-1:0] c2_sums_i,
-    // DEPTH - 1 cycles later: its spikes and membranes after reset
+    // DEPTH - 1 cycles later, if it fires: its spikes and membranes after reset
     output wire                  valid_o,
     output wire [           1:0] layer_o,
     output wire [           2:0] step_o,
@@ -37,26 +43,31 @@ module sf_neurons #(
     output wire                  last_o,
     output wire [   NEURONS-1:0] spikes_o,
     output wire [24*NEURONS-1:0] membrane_o,
-    // the same for the counters, another cycle later
+    // any turn, for the counters, another cycle later
     output wire                  count_o,
     output wire [           1:0] count_layer_o,
     output wire [           2:0] count_step_o,
+    output wire                  count_first_o,
     output wire                  count_last_o,
     output wire [           8:0] count_fired_o,
     output wire                  idle_o
 );
   localparam PART_GROUPS = MACS / NEURONS;
   localparam STAGES = 5;
+  localparam [12:0] ONE = 13'd1 << sf_arch_pkg::LEAK_FRAC;
+  localparam [23:0] NEVER = 24'h7fffff;  // above any sum of C2
 
   wire [GROUP_BITS-1:0] place = group_i & GROUP_BITS'(PART_GROUPS - 1);  // in the part
   wire of_c2 = layer_i == sf_op_pkg::SPIKING_C2;
+  wire nodecay = mode_i == sf_op_pkg::NODECAY;
+  wire radix = mode_i == sf_op_pkg::RADIX;
   reg [24*NEURONS-1:0] current;
   always_comb begin
     current = {(24 * NEURONS) {1'b0}};
     for (int g = 0; g < PART_GROUPS; g++) begin
       if (place == GROUP_BITS'(g)) begin
         for (int n = 0; n < NEURONS; n++)
-          current[24*n+:24] = of_c2 ? 24'($signed(c2_sums_i[16*(NEURONS*g+n)+:16])) <<< sf_arch_pkg::AC_FRAC
+          current[24*n+:24] = of_c2 ? 24'($signed(c2_sums_i[16*(NEURONS*g+n)+:16])) <<< (radix ? sf_arch_pkg::T_MAX : sf_arch_pkg::AC_FRAC)
                             : values_i[24*(NEURONS*g+n)+:24];
       end
     end
@@ -68,27 +79,29 @@ module sf_neurons #(
   reg [3*STAGES-1:0] step_q;
   reg [GROUP_BITS*STAGES-1:0] group_q;
   reg [STAGES-1:0] last_q;
+  reg [STAGES-1:0] first_q, fires_q;
   reg [12:0] k1_q;
-  reg signed [23:0] quantum4_q;
+  reg [12:0] c2_share_q;  // of C2's sums in radix mode
+  reg signed [23:0] theta4_q;
   reg [8:0] n_out4_q;
-  wire nodecay = mode_i == sf_op_pkg::NODECAY;
-  wire weighted = mode_i == sf_op_pkg::RADIX;
-  wire first = step_i == 3'd0;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) valid_q <= {STAGES{1'b0}};
     else valid_q <= clear_i ? {STAGES{1'b0}} : {valid_q[STAGES-2:0], valid_i};
   end
   wire [1:0] layer3 = layer_q[4+:2];
-  wire [23:0] theta0 = layer_i[1] ? c2_theta_i : layer_i[0] ? c1_theta_i : d1_theta_i;
   wire [23:0] theta3 = layer3[1] ? c2_theta_i : layer3[0] ? c1_theta_i : d1_theta_i;
   always_ff @(posedge clk_i) begin
     layer_q <= {layer_q[2*STAGES-3:0], layer_i};
     step_q <= {step_q[3*STAGES-4:0], step_i};
     group_q <= {group_q[GROUP_BITS*(STAGES-1)-1:0], group_i};
     last_q <= {last_q[STAGES-2:0], last_i};
-    k1_q <= weighted || (mode_i == sf_op_pkg::HYBRID && first) ? 13'd1 << sf_arch_pkg::LEAK_FRAC
+    first_q <= {first_q[STAGES-2:0], first_i};
+    fires_q <= {fires_q[STAGES-2:0], fires_i};
+    c2_share_q <= ONE >> steps_i;
+    k1_q <= radix ? (!charges_i ? 13'd0 : layer_i[1] ? c2_share_q : ONE)
+          : mode_i == sf_op_pkg::HYBRID && first_i ? ONE
           : layer_i[1] ? c2_k_i : layer_i[0] ? c1_k_i : d1_k_i;
-    quantum4_q <= weighted ? {theta3[22:0], 1'b0} : theta3;
+    theta4_q <= fires_q[2] ? theta3 : NEVER;
     n_out4_q <= layer3[1] ? c2_out_i : layer3[0] ? c1_out_i : d1_out_i;
   end
 
@@ -97,7 +110,7 @@ module sf_neurons #(
   wire [NEURONS-1:0] fired;
   reg [NEURONS-1:0] exists_q;  // neurons that the layer has
   always_ff @(posedge clk_i) begin
-    if (valid_o) membrane_q[group_o] <= membrane_o;
+    if (valid_q[STAGES-1]) membrane_q[group_o] <= membrane_o;
     for (int u = 0; u < NEURONS; u++)
       exists_q[u] <= 9'(32'(group_q[GROUP_BITS*(STAGES-2)+:GROUP_BITS]) * NEURONS + u) < n_out4_q;
   end
@@ -110,39 +123,40 @@ module sf_neurons #(
           .v_i       (state[24*u+:24]),
           .current_i (current[24*u+:24]),
           .k_i       (k1_q),
-          .quantum_i (quantum4_q),
+          .theta_i   (theta4_q),
           .nodecay_i (nodecay),
-          .weighted_i(weighted),
-          .theta_i   (theta0),
-          .first_i   (first),
+          .radix_i   (radix),
+          .first_i   (first_i),
           .v_o       (membrane_o[24*u+:24]),
           .spike_o   (fired[u])
       );
     end
   endgenerate
 
-  assign valid_o = valid_q[STAGES-1];
+  assign valid_o = valid_q[STAGES-1] && fires_q[STAGES-1];
   assign layer_o = layer_q[2*(STAGES-1)+:2];
   assign step_o = step_q[3*(STAGES-1)+:3];
   assign group_o = group_q[GROUP_BITS*(STAGES-1)+:GROUP_BITS];
   assign last_o = last_q[STAGES-1];
   assign spikes_o = fired & exists_q;
 
-  reg count_q, count_last_q;
+  reg count_q, count_first_q, count_last_q;
   reg [1:0] count_layer_q;
   reg [2:0] count_step_q;
   reg [8:0] count_fired_q;
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) count_q <= 1'b0;
-    else count_q <= valid_o;
+    else count_q <= valid_q[STAGES-1];
   end
   always_ff @(posedge clk_i) begin
+    count_first_q <= first_q[STAGES-1];
     count_last_q <= last_o;
     count_layer_q <= layer_o;
     count_step_q <= step_o;
     count_fired_q <= 9'($countones(spikes_o));
   end
   assign count_o = count_q;
+  assign count_first_o = count_first_q;
   assign count_last_o = count_last_q;
   assign count_layer_o = count_layer_q;
   assign count_step_o = count_step_q;

@@ -1,31 +1,29 @@
 // Neuron unit: leak, compare, soft reset, in five stages; one neuron's step may begin in every cycle. The membrane is
 // stored outside: it is read in the first stage and written in the cycle after the last. Mirror: src/fx/plif.c
-// (fx_plif_step). No-decay mode and weighted spikes alone need the saturation; 0 <= k <= 1.0, theta >= 1, and theta < 2^22 of
-// weighted spikes are enforced by sf_csr.
+// (fx_plif_step). No-decay and radix mode alone need the saturation; 0 <= k <= 1.0, theta >= 1, and theta < 2^22 in radix mode
+// are enforced by sf_csr. In radix mode the membrane doubles and k scales the current: 0 where there is none.
 `default_nettype none
 
 module sf_plif (
     input  wire               clk_i,
     input  wire signed [23:0] v_i,
     input  wire signed [23:0] current_i,
-    input  wire        [12:0] k_i,         // in the second stage: one cycle after v_i; of weighted spikes 1.0
-    input  wire signed [23:0] quantum_i,   // in the fifth, four cycles after v_i: theta, of weighted spikes 2 theta
-    input  wire               nodecay_i,   // in the first
-    input  wire               weighted_i,
-    input  wire signed [23:0] theta_i,     // of weighted spikes alone
+    input  wire        [12:0] k_i,        // in the second stage: one cycle after v_i
+    input  wire signed [23:0] theta_i,    // in the fifth, four cycles after v_i
+    input  wire               nodecay_i,  // in the first
+    input  wire               radix_i,
     input  wire               first_i,
     output reg  signed [23:0] v_o,        // five cycles after v_i
     output reg                spike_o
 );
   localparam FRAC = sf_arch_pkg::LEAK_FRAC;
 
-  // 1: what leaks, and what it is added to. Weighted: 2 v + I - theta as (v - theta) + (v + I), from v = theta on.
-  wire signed [24:0] old = !first_i ? 25'(v_i) : weighted_i ? 25'(theta_i) : 25'sd0;
-  wire signed [24:0] from = weighted_i ? old : nodecay_i ? 25'sd0 : 25'(current_i);
+  // 1: what k multiplies, and what the product is added to
+  wire signed [24:0] old = first_i ? 25'sd0 : 25'(v_i);
   reg signed [24:0] x1_q, base1_q;
   always_ff @(posedge clk_i) begin
-    x1_q <= from - (weighted_i ? 25'(theta_i) : old);
-    base1_q <= nodecay_i || weighted_i ? old + 25'(current_i) : old;
+    x1_q <= (nodecay_i ? 25'sd0 : 25'(current_i)) - (radix_i ? 25'sd0 : old);
+    base1_q <= old + (radix_i ? old : nodecay_i ? 25'(current_i) : 25'sd0);
   end
 
   // 2: 25 x 13 bits as two products of the multipliers' size
@@ -58,7 +56,7 @@ module sf_plif (
 
   // 5: saturate, compare, reset
   wire signed [23:0] v5 = v4_q[26:23] == {4{v4_q[26]}} ? v4_q[23:0] : {v4_q[26], {23{!v4_q[26]}}};
-  wire signed [24:0] above = 25'(v5) - 25'(quantum_i);
+  wire signed [24:0] above = 25'(v5) - 25'(theta_i);
   always_ff @(posedge clk_i) begin
     spike_o <= !above[24];
     v_o <= above[24] ? v5 : above[23:0];

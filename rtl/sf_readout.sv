@@ -1,6 +1,6 @@
 // Output layers: currents of D2 and C3 through the tables into the integrators, one value per cycle. A sample's density
-// waits in a queue for its colours. Currents of weighted spikes are summed up before the tables, which are read at the last
-// step alone. Mirror: src/fx/net.c (density_step, colour_step)
+// waits in a queue for its colours. In radix mode the currents are summed up before the tables, a step weighing twice the next;
+// the tables are read at the last step alone. Mirror: src/fx/net.c (density_step, colour_step)
 `default_nettype none
 
 module sf_readout (
@@ -76,15 +76,15 @@ module sf_readout (
   wire start_density = free && !start_colour && density_full_q && !(run_q && !colour_q);
   wire out = valid_o && ready_i;
   wire pop = out && !decodes_i;
-  wire weighted = mode_i == sf_op_pkg::RADIX;
-  wire writes = valid_q[WRITE] && (!weighted || {1'b0, stage_step_q[WRITE]} == steps_i - 4'd1);
+  wire radix = mode_i == sf_op_pkg::RADIX;
+  wire writes = valid_q[WRITE] && (!radix || {1'b0, stage_step_q[WRITE]} == steps_i - 4'd1);
   wire push = writes && last_q[WRITE] && !is_colour_q[WRITE];
 
   // The weighted sum of an output comes back five cycles later.
   reg signed [23:0] current0_q;
   reg signed [23:0] weighed_q[0:2];
   wire signed [15:0] here = colour_q ? current_q[{step_q, slot_q[1:0]}] : density_q[step_q];
-  wire signed [23:0] so_far = !weighted || step_q == 3'd0 ? 24'sd0 : weighed_q[slot_q[1:0]];
+  wire signed [23:0] so_far = !radix || step_q == 3'd0 ? 24'sd0 : weighed_q[slot_q[1:0]];
   wire signed [23:0] weighed = (so_far <<< 1) + 24'(here);
   wire [17:0] argument;
   wire [27:0] e;
@@ -166,8 +166,8 @@ module sf_readout (
       slot_q <= slot_q == STEP ? 3'd0 : slot_q + 3'd1;
       if (slot_q == STEP) step_q <= step_q + 3'd1;
     end
-    if (!weighted || last_step) current0_q <= weighed;
-    if (issue && weighted) weighed_q[slot_q[1:0]] <= weighed;
+    if (!radix || last_step) current0_q <= weighed;
+    if (issue && radix) weighed_q[slot_q[1:0]] <= weighed;
     is_colour_q <= {is_colour_q[STAGES-2:0], colour_q};
     last_q <= {last_q[STAGES-2:0], last};
     stage_step_q[0] <= step_q;

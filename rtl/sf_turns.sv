@@ -1,5 +1,6 @@
 // Whose neurons step: a spiking layer whose sums of a sample are complete, once the layer behind it has room for its spikes.
-// The layer nearest to the output goes first, and does all steps of its sample before another begins. Its time: src/cycles/engine.c
+// The layer nearest to the output goes first, and does all steps of its sample before another begins. A turn is a step of a layer;
+// in radix mode C2 has steps - 1 turns before them, which add up its sums of as many steps. Its time: src/cycles/engine.c
 `default_nettype none
 
 module sf_turns #(
@@ -12,6 +13,7 @@ module sf_turns #(
     input  wire                  rst_ni,
     input  wire                  clear_i,
     input  wire                  decodes_i,
+    input  wire                  radix_i,
     input  wire [           3:0] steps_i,
     input  wire [           8:0] d1_out_i,
     input  wire [           8:0] c1_out_i,
@@ -43,6 +45,9 @@ module sf_turns #(
     output wire                  valid_o,
     output wire [           1:0] layer_o,
     output wire [           2:0] step_o,
+    output wire                  first_o,        // the sample's first turn
+    output wire                  charges_o,      // there is a current
+    output wire                  fires_o,        // else it adds up alone
     output wire [GROUP_BITS-1:0] group_o,
     output wire                  last_o,         // the layer's last group
     output wire                  idle_o
@@ -70,9 +75,16 @@ module sf_turns #(
   assign {d1_group_o, c1_group_o, c2_group_o} = {d1_group_q, c1_group_q, c2_group_q};
   assign {d1_part_o, c1_part_o, c2_part_o} = {d1_part_q, c1_part_q, c2_part_q};
 
+  // The last turn with a sum, and that of C2, likewise.
+  reg [3:0] last_sum_q, c2_last_turn_q;
+  always_ff @(posedge clk_i) begin
+    last_sum_q <= steps_i - 4'd1;
+    c2_last_turn_q <= radix_i ? {steps_i[2:0], 1'b0} - 4'd2 : steps_i - 4'd1;
+  end
+
   reg active_q;
   reg [1:0] layer_q;
-  reg [2:0] step_q;
+  reg [3:0] turn_q;
   reg [GROUP_BITS-1:0] group_q;
   reg [2:0] wait_q;       // cycles until the next step may begin
   reg released_q;         // the last load of C2's sums is on its way
@@ -84,35 +96,43 @@ module sf_turns #(
   wire [PART_BITS-1:0] part = PART_BITS'(32'(group_q) / PART_GROUPS);
   wire at_part = run && 32'(group_q) % PART_GROUPS == 0;
   wire group_ends = group_q == last_group;
-  wire last_step = {1'b0, step_q} == steps_i - 4'd1;
+  wire first_turn = turn_q == 4'd0;
+  wire last_sum = turn_q == last_sum_q;
+  wire last_turn = turn_q == (layer == C2 ? c2_last_turn_q : last_sum_q);
+  wire adds_up = radix_i && layer == C2;
   // The current of D1, and of a decoder's C1, is that of all steps: of a layer of one part it stays where it was loaded to.
-  wire stays = (layer == D1 || (layer == C1 && decodes_i)) && last_part == {PART_BITS{1'b0}};
-  wire load = at_part && !(stays && step_q != 3'd0);
-  wire taken = load && (last_step || stays) && part == last_part;
+  // In radix mode that of D1 and C1 is needed at the first turn alone.
+  wire once = radix_i ? layer != C2 : (layer == D1 || (layer == C1 && decodes_i)) && last_part == {PART_BITS{1'b0}};
+  wire charges = first_turn || !radix_i || (adds_up && turn_q <= last_sum_q);
+  wire fires = !adds_up || turn_q >= last_sum_q;
+  wire load = at_part && (once ? first_turn : charges);
+  wire taken = load && (last_sum || once) && part == last_part;
   wire begins = run && !active_q;
+  wire [2:0] step = adds_up && fires ? 3'(turn_q - last_sum_q) : turn_q[2:0];
 
   always_ff @(posedge clk_i or negedge rst_ni) begin
     if (!rst_ni) begin
-      {active_q, layer_q, step_q, wait_q, released_q} <= 10'd0;
+      {active_q, layer_q, turn_q, wait_q, released_q} <= 11'd0;
       group_q <= {GROUP_BITS{1'b0}};
     end else if (clear_i) begin
-      {active_q, layer_q, step_q, wait_q, released_q} <= 10'd0;
+      {active_q, layer_q, turn_q, wait_q, released_q} <= 11'd0;
       group_q <= {GROUP_BITS{1'b0}};
     end else begin
       released_q <= taken && layer == C2;
       if (run) begin
-        active_q <= !(group_ends && last_step);
+        active_q <= !(group_ends && last_turn);
         layer_q <= layer;
         group_q <= group_ends ? {GROUP_BITS{1'b0}} : group_q + 1'b1;
-        if (group_ends) step_q <= last_step ? 3'd0 : step_q + 3'd1;
-        if (group_ends && !last_step && 32'(last_group) < DEPTH - 1) wait_q <= 3'(DEPTH - 1 - 32'(last_group));
+        if (group_ends) turn_q <= last_turn ? 4'd0 : turn_q + 4'd1;
+        if (group_ends && !last_turn && 32'(last_group) < DEPTH - 1) wait_q <= 3'(DEPTH - 1 - 32'(last_group));
       end else if (wait_q != 3'd0) wait_q <= wait_q - 3'd1;
     end
   end
 
   // From a turn to its currents: four cycles.
-  reg [3:0] run_q, last_q;
+  reg [3:0] run_q, last_q, first_q, charges_q, fires_q;
   reg load_q;
+  reg [2:0] load_sum_q;
   reg [7:0] run_layer_q;
   reg [11:0] run_step_q;
   reg [4*GROUP_BITS-1:0] run_group_q;
@@ -124,26 +144,33 @@ module sf_turns #(
   end
   always_ff @(posedge clk_i) begin
     last_q <= {last_q[2:0], group_ends};
+    first_q <= {first_q[2:0], first_turn};
+    charges_q <= {charges_q[2:0], charges};
+    fires_q <= {fires_q[2:0], fires};
     run_layer_q <= {run_layer_q[5:0], layer};
-    run_step_q <= {run_step_q[8:0], step_q};
+    run_step_q <= {run_step_q[8:0], step};
     run_group_q <= {run_group_q[3*GROUP_BITS-1:0], group_q};
     load_part_q <= part;
+    load_sum_q <= turn_q[2:0];
   end
 
   assign take_o = {begins && layer == C2, begins && layer == C1, begins && layer == D1};
   assign load_o = load && layer != C2;
   assign load_c1_o = layer == C1;
-  assign load_step_o = step_q;
+  assign load_step_o = turn_q[2:0];
   assign load_part_o = part;
   assign d1_taken_o = taken && layer == D1;
   assign c1_taken_o = taken && layer == C1;
   assign load_c2_o = load_q && run_layer_q[1:0] == C2;
-  assign load_c2_step_o = run_step_q[2:0];
+  assign load_c2_step_o = load_sum_q;
   assign load_c2_part_o = load_part_q;
   assign release_c2_o = released_q;
   assign valid_o = run_q[3];
   assign layer_o = run_layer_q[6+:2];
   assign step_o = run_step_q[9+:3];
+  assign first_o = first_q[3];
+  assign charges_o = charges_q[3];
+  assign fires_o = fires_q[3];
   assign group_o = run_group_q[3*GROUP_BITS+:GROUP_BITS];
   assign last_o = last_q[3];
   assign idle_o = !active_q && run_q == 4'd0;

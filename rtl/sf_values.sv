@@ -1,7 +1,7 @@
 // D1 and C1, the layers fed by values: one array of MACS multipliers with a sum per step. A row of weights is read once,
 // held, and multiplied by a value per cycle: by a feature, a constant input of C1, or h of each step in turn.
 // The constant inputs of C1 (a ray's direction, biases) are summed up once per ray and begin the sums of its samples; those
-// of a decoder once per sample, for all steps. Mirror: src/fx/current.c, src/fx/net.c
+// of a decoder once per sample, for all steps. In radix mode there is one h, and one sum of C1. Mirror: src/fx/current.c, src/fx/net.c
 // Width: of 32 rows |sum| <= 32 * 2048 * 127 < 2^23, of a decoder's 161 < 2^26; a current has 24 bits.
 `default_nettype none
 
@@ -19,6 +19,7 @@ module sf_values #(
     input  wire [                7:0] n_dir_i,        // constant inputs of C1
     input  wire [               10:0] bias_i,         // value of C1's biases; 0: none
     input  wire [                4:0] n_h_i,
+    input  wire                       radix_i,
     input  wire [                3:0] steps_i,
     input  wire [      PART_BITS-1:0] d1_part_i,      // the last part that D1 has
     input  wire [      PART_BITS-1:0] c1_part_i,
@@ -97,7 +98,7 @@ module sf_values #(
     has_constants_q <= n_constant != 8'd0;
     has_h_q <= n_h_i != 5'd0;
     bias_first_q <= bias_i != 11'd0 && n_dir_i == 8'd0;
-    last_step_q <= 3'(steps_i - 4'd1);
+    last_step_q <= radix_i ? 3'd0 : 3'(steps_i - 4'd1);
     d1_turns_q <= n_feature == 8'd0 ? 8'd1 : n_feature;
     ray_turns_q <= ray_turns == 8'd0 ? 8'd1 : ray_turns;
     constant_turns_q <= n_constant == 8'd0 ? 8'd1 : n_constant;

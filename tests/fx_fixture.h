@@ -160,7 +160,6 @@ typedef struct naive_net {
   int64_t v[SF_LAYERS][SF_LANES];
   bool ever[SF_LAYERS][SF_LANES];
   int64_t sigma, colour[3];
-  int64_t current[SF_T_MAX][4]; /* of the outputs */
 } naive_net;
 
 static inline int64_t naive_charge(const naive_net *n, int64_t v, int64_t current, int64_t k, int t)
@@ -172,25 +171,29 @@ static inline int64_t naive_charge(const naive_net *n, int64_t v, int64_t curren
   return old + naive_round((current - old) * k, 12);
 }
 
-static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current, int frac, bool *spike)
+/* One update of some states of `bytes`; the first one of a sample reads nothing. */
+static inline void naive_updates(naive_net *n, int l, int t, int states, int bytes, bool first)
+{
+  fx_layer_counts *c = &n->counts->layer[l];
+  c->updates[t] += (uint64_t)states;
+  c->state_w[t] += (uint64_t)(states * bytes);
+  if (!first) c->state_r[t] += (uint64_t)(states * bytes);
+}
+
+/* gain: membrane LSB per LSB of the current */
+static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current, int64_t gain, bool *spike)
 {
   const fx_layer *layer = &n->net->layer[l];
-  fx_layer_counts *c = &n->counts->layer[l];
   for (int o = 0; o < layer->n_out; o++) {
-    /* Weighted: kept with theta added, spent twice over. */
-    const int64_t more = n->net->mode == FX_RADIX ? layer->theta : 0;
-    const int64_t exact = naive_charge(n, n->v[l][o], current[o] * (1 << frac), layer->k, t) + more;
-    const int64_t u = naive_clamp(exact, -8388608, 8388607);
-    spike[o] = u - more >= layer->theta;
-    n->v[l][o] = spike[o] ? u - more - layer->theta - more : u - more;
+    const int64_t in = n->net->mode == FX_RADIX && t > 0 ? 0 : current[o] * gain;
+    const int64_t exact = naive_charge(n, n->v[l][o], in, layer->k, t), u = naive_clamp(exact, -8388608, 8388607);
+    spike[o] = u >= layer->theta;
+    n->v[l][o] = spike[o] ? u - layer->theta : u;
     n->counts->saturated[l] += u != exact;
     n->trace->current[l][t][o] = (int32_t)current[o];
     n->trace->membrane[l][t][o] = (int32_t)u;
     if (spike[o]) n->trace->spikes[l][t][o / 64] |= (uint64_t)1 << o % 64;
-    c->spikes[t] += spike[o];
-    c->updates[t]++;
-    c->state_w[t] += 3;
-    if (t > 0) c->state_r[t] += 3;
+    n->counts->layer[l].spikes[t] += spike[o];
   }
 }
 
@@ -228,51 +231,31 @@ static inline int64_t naive_scale(int64_t current, const fx_scale *s, int64_t li
   return naive_clamp(naive_round(current * s->mul, s->shift) + s->bias, -limit, limit - 1);
 }
 
-static inline void naive_integrated(naive_net *n, int l, int t, bool asked)
-{
-  fx_layer_counts *c = &n->counts->layer[l];
-  c->special[t] += asked, c->updates[t]++, c->state_w[t] += 4;
-  if (t > 0) c->state_r[t] += 4;
-}
-
-/* Weighted: the sum of the output's currents up to step t, whose weights end in 1. */
-static inline int64_t naive_weighted(naive_net *n, int l, int t, int output, int64_t current)
-{
-  int64_t sum = 0;
-  n->current[t][output] = current;
-  for (int s = 0; s <= t; s++) sum += n->current[s][output] * (1 << (t - s));
-  naive_integrated(n, l, t, t == n->net->steps - 1);
-  return sum;
-}
-
 static inline int64_t naive_integrate(naive_net *n, int l, int t, int64_t acc, int64_t in, int64_t high)
 {
   const int64_t exact = naive_charge(n, acc, in, n->net->layer[l].k, t), kept = naive_clamp(exact, 0, high);
   n->counts->saturated[l] += kept != exact;
-  naive_integrated(n, l, t, true);
+  naive_updates(n, l, t, 1, 4, t == 0);
   return kept;
 }
 
-/* Output 0 of D2, output o of C3: current to result, and what the trace has of it. */
-static inline int32_t naive_read_density(naive_net *n, int t, int64_t current)
+/* What a table gives for a current of 2^-digits LSB. */
+static inline int64_t naive_exp(naive_net *n, int64_t current, int digits)
 {
-  const bool weighted = n->net->mode == FX_RADIX, last = t == n->net->steps - 1;
-  const int64_t sum = weighted ? naive_weighted(n, FX_D2, t, 0, current) : current;
-  const fx_scale scale = fx_net_scale(n->net, &n->net->exp_in);
-  const int64_t y = naive_scale(sum, &scale, 131072), e = fx_exp2((int32_t)y);
-  n->counts->saturated[FX_D2] += y >= 65536 && (last || !weighted);
-  n->sigma = weighted ? e : naive_integrate(n, FX_D2, t, n->sigma, e, ((int64_t)1 << 28) - 1);
-  return (int32_t)(weighted ? sum : n->sigma);
+  const fx_scale *s = &n->net->exp_in;
+  const int more = s->shift + digits > 31 ? s->shift + digits - 31 : 0;
+  const fx_scale scale = {(int32_t)naive_round(s->mul, more), s->shift + digits - more, s->bias};
+  const int64_t y = naive_scale(current, &scale, 131072);
+  n->counts->saturated[FX_D2] += y >= 65536;
+  return fx_exp2((int32_t)y);
 }
 
-static inline int32_t naive_read_colour(naive_net *n, int t, int o, int64_t current)
+static inline int64_t naive_sigmoid(const naive_net *n, int64_t current, int digits)
 {
-  const bool weighted = n->net->mode == FX_RADIX;
-  const int64_t sum = weighted ? naive_weighted(n, FX_C3, t, 1 + o, current) : current;
-  const fx_scale scale = fx_net_scale(n->net, &n->net->sigmoid_in);
-  const int64_t s = fx_sigmoid((int32_t)naive_scale(sum, &scale, 32768));
-  n->colour[o] = weighted ? s : naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
-  return (int32_t)(weighted ? sum : n->colour[o]);
+  const fx_scale *s = &n->net->sigmoid_in;
+  const int more = s->shift + digits > 31 ? s->shift + digits - 31 : 0;
+  const fx_scale scale = {(int32_t)naive_round(s->mul, more), s->shift + digits - more, s->bias};
+  return fx_sigmoid((int32_t)naive_scale(current, &scale, 32768));
 }
 
 static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t *h)
@@ -280,34 +263,134 @@ static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t
   const fx_layer *d2 = &n->net->layer[FX_D2];
   bool spike[SF_LANES];
   int64_t current[SF_LANES];
-  naive_fire(n, FX_D1, t, d1, 0, spike);
+  naive_fire(n, FX_D1, t, d1, 1, spike);
+  naive_updates(n, FX_D1, t, n->net->layer[FX_D1].n_out, 3, t == 0);
   naive_synapses(n, FX_D2, t, spike, current);
   for (int o = 0; o < d2->n_out; o++) n->trace->current[FX_D2][t][o] = (int32_t)current[o];
-  n->trace->membrane[FX_D2][t][0] = naive_read_density(n, t, current[0]);
+  n->counts->layer[FX_D2].special[t]++;
+  n->sigma = naive_integrate(n, FX_D2, t, n->sigma, naive_exp(n, current[0], 0), ((int64_t)1 << 28) - 1);
+  n->trace->membrane[FX_D2][t][0] = (int32_t)n->sigma;
   for (int j = 0; j + 1 < d2->n_out; j++)
     h[j] = naive_round(current[1 + j] * 2 - ((1 << SF_H_SHIFT) - 1), SF_H_SHIFT + 1); /* floor */
 }
 
-static inline void naive_colour(naive_net *n, int t, const int64_t *base, const int64_t *h)
+/* C1's currents of h, within the membrane's range. */
+static inline void naive_hidden(naive_net *n, int t, const int64_t *base, const int64_t *h, int64_t *current)
 {
-  const fx_net *net = n->net;
-  const int n_h = net->layer[FX_D1].n_out ? net->layer[FX_D2].n_out - 1 : 0;
-  bool spike[SF_LANES], spike2[SF_LANES];
-  int64_t current[SF_LANES];
-  memcpy(current, base, sizeof current);
-  naive_products(n, FX_C1, t, net->layer[FX_C1].n_in - n_h, h, n_h, current);
-  for (int o = 0; o < net->layer[FX_C1].n_out; o++) {
+  const fx_layer *l = n->net->layer;
+  const int n_h = l[FX_D1].n_out ? l[FX_D2].n_out - 1 : 0;
+  memcpy(current, base, SF_LANES * sizeof *current);
+  naive_products(n, FX_C1, t, l[FX_C1].n_in - n_h, h, n_h, current);
+  for (int o = 0; o < l[FX_C1].n_out; o++) {
     const int64_t kept = naive_clamp(current[o], -8388608, 8388607);
     n->counts->saturated[FX_C1] += kept != current[o] && t == 0;
     current[o] = kept;
   }
-  naive_fire(n, FX_C1, t, current, 0, spike);
+}
+
+static inline void naive_colour(naive_net *n, int t, const int64_t *base, const int64_t *h)
+{
+  const fx_layer *l = n->net->layer;
+  bool spike[SF_LANES], spike2[SF_LANES];
+  int64_t current[SF_LANES];
+  naive_hidden(n, t, base, h, current);
+  naive_fire(n, FX_C1, t, current, 1, spike);
+  naive_updates(n, FX_C1, t, l[FX_C1].n_out, 3, t == 0);
   naive_synapses(n, FX_C2, t, spike, current);
-  naive_fire(n, FX_C2, t, current, 8, spike2);
+  naive_fire(n, FX_C2, t, current, 1 << SF_AC_FRAC, spike2);
+  naive_updates(n, FX_C2, t, l[FX_C2].n_out, 3, t == 0);
   naive_synapses(n, FX_C3, t, spike2, current);
   for (int o = 0; o < 3; o++) {
+    const int64_t s = naive_sigmoid(n, current[o], 0);
+    n->counts->layer[FX_C3].special[t]++;
+    n->colour[o] = naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
     n->trace->current[FX_C3][t][o] = (int32_t)current[o];
-    n->trace->membrane[FX_C3][t][o] = naive_read_colour(n, t, o, current[o]);
+    n->trace->membrane[FX_C3][t][o] = (int32_t)n->colour[o];
+  }
+}
+
+/* ---- the naive nets of radix: numbers of T binary digits between layers ---- */
+
+/* A layer's spike trains as numbers below 2^T. */
+static inline void naive_numbers(naive_net *n, int l, const int64_t *current, int64_t gain, int64_t *number)
+{
+  const int steps = n->net->steps;
+  for (int t = 0; t < steps; t++) {
+    bool spike[SF_LANES];
+    naive_fire(n, l, t, current, gain, spike);
+    for (int o = 0; o < n->net->layer[l].n_out; o++) number[o] = (t ? number[o] : 0) + (spike[o] << (steps - 1 - t));
+  }
+}
+
+/* sum = their products with the weights; a bias has all digits. What is counted and traced is that of every step. */
+static inline void naive_digits(naive_net *n, int l, const int64_t *number, int64_t *sum)
+{
+  const fx_layer *layer = &n->net->layer[l];
+  const int steps = n->net->steps;
+  for (int t = 0; t < steps; t++) {
+    bool spike[SF_LANES];
+    int64_t current[SF_LANES];
+    for (int i = 0; i < layer->n_in; i++) spike[i] = number[i] >> (steps - 1 - t) & 1;
+    naive_synapses(n, l, t, spike, current);
+    if (!fx_layer_fires(l))
+      for (int o = 0; o < layer->n_out; o++) n->trace->current[l][t][o] = (int32_t)current[o];
+  }
+  for (int o = 0; o < layer->n_out; o++) {
+    sum[o] = 0;
+    for (int i = 0; i < layer->n_in; i++) sum[o] += number[i] * layer->w[i * SF_LANES + o];
+    if (layer->bias) sum[o] += ((1 << steps) - 1) * layer->w[layer->n_in * SF_LANES + o];
+  }
+}
+
+/* An output's sum of the currents so far: that of its inputs' leading digits. */
+static inline void naive_prefixes(naive_net *n, int l, int output)
+{
+  for (int t = 0; t < n->net->steps; t++) {
+    int64_t sum = 0;
+    for (int s = 0; s <= t; s++) sum += (int64_t)n->trace->current[l][s][output] << (t - s);
+    n->trace->membrane[l][t][output] = (int32_t)sum;
+  }
+}
+
+static inline void naive_radix_density(naive_net *n, const int64_t *d1, int64_t *h)
+{
+  const fx_layer *l = n->net->layer;
+  const int steps = n->net->steps;
+  const int64_t whole = (int64_t)1 << (SF_H_SHIFT + steps);
+  int64_t number[SF_LANES], sum[SF_LANES];
+  naive_numbers(n, FX_D1, d1, 1, number);
+  naive_digits(n, FX_D2, number, sum);
+  naive_prefixes(n, FX_D2, 0);
+  for (int t = 0; t < steps; t++) {
+    naive_updates(n, FX_D1, t, l[FX_D1].n_out, 3, t == 0);
+    naive_updates(n, FX_D2, t, l[FX_D2].n_out, 4, t == 0);
+  }
+  n->counts->layer[FX_D2].special[steps - 1]++;
+  n->sigma = naive_exp(n, sum[0], steps);
+  for (int j = 0; j + 1 < l[FX_D2].n_out; j++) /* floor */
+    h[j] = sum[1 + j] >= 0 ? sum[1 + j] / whole : -((-sum[1 + j] + whole - 1) / whole);
+}
+
+static inline void naive_radix_colour(naive_net *n, const int64_t *base, const int64_t *h)
+{
+  const fx_layer *l = n->net->layer;
+  const int steps = n->net->steps;
+  int64_t current[SF_LANES], number[SF_LANES], sum[SF_LANES];
+  naive_hidden(n, 0, base, h, current);
+  naive_numbers(n, FX_C1, current, 1, number);
+  naive_digits(n, FX_C2, number, sum);
+  naive_numbers(n, FX_C2, sum, (int64_t)256 >> steps, number);
+  naive_digits(n, FX_C3, number, sum);
+  for (int t = 0; t < steps; t++) {
+    naive_updates(n, FX_C1, t, l[FX_C1].n_out, 3, t == 0);
+    naive_updates(n, FX_C2, t, l[FX_C2].n_out, 3, t == 0);               /* adds up */
+    if (t > 0) naive_updates(n, FX_C2, t - 1, l[FX_C2].n_out, 3, false); /* fires, without the first time */
+    naive_updates(n, FX_C3, t, 3, 4, t == 0);
+  }
+  for (int o = 0; o < 3; o++) {
+    naive_prefixes(n, FX_C3, o);
+    n->counts->layer[FX_C3].special[steps - 1]++;
+    n->colour[o] = naive_sigmoid(n, sum[o], steps);
   }
 }
 
@@ -335,7 +418,11 @@ static inline void naive_sample(const fx_net *net, const int16_t *f, const int16
     n.counts->layer[FX_C1].weight[0]++;
   }
   n.counts = counts;
-  for (int t = 0; t < net->steps; t++) {
+  if (net->mode == FX_RADIX) {
+    if (!decodes) naive_radix_density(&n, d1, h);
+    naive_radix_colour(&n, base, h);
+  }
+  for (int t = 0; t < net->steps && net->mode != FX_RADIX; t++) {
     if (!decodes) naive_density(&n, t, d1, h);
     naive_colour(&n, t, base, h);
   }

@@ -23,7 +23,7 @@ static const hard_case hard_cases[] = {
     {"one_step_and_all_steps", HARD_NET, 2, make_steps, expect_steps},
     {"density_at_both_ends_of_exp", HARD_NET, 2, make_exp_ends, expect_exp_ends},
     {"nodecay_saturates_and_counts", HARD_NET, 2, make_nodecay, expect_nodecay},
-    {"weighted_spikes_are_digits", HARD_NET, SF_T_MAX, make_digits, expect_digits},
+    {"radix_spikes_are_digits", HARD_NET, SF_T_MAX, make_digits, expect_digits},
     {"denormals_in_a_checkpoint", HARD_NET, 2, make_denormals, expect_denormals},
     {"nan_and_inf_in_a_checkpoint", HARD_REFUSED, 3 * HARD_PARAMS, make_not_finite, NULL},
     {"optical_depth_zero_and_saturated", HARD_RAY, 4, make_depth, expect_depth},

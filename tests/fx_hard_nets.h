@@ -83,7 +83,7 @@ static inline void hard_theta(fx_net *net, int32_t theta)
   net->layer[FX_D1].theta = net->layer[FX_C1].theta = net->layer[FX_C2].theta = theta;
 }
 
-/* Neurons of weighted spikes fire at twice their threshold, which has to fit the membrane. */
+/* Thresholds of radix end earlier. */
 static inline void hard_mode(hard *h, int32_t mode)
 {
   h->scene.net.mode = mode;
@@ -256,7 +256,8 @@ static inline void expect_steps(const hard *h, const hard_seen *seen, int varian
   (void)variant;
   for (int t = 0; t < SF_T_MAX; t++)
     for (int l = 0; l < SF_LAYERS; l++) {
-      const uint64_t units = l == FX_D2 ? 1 : (uint64_t)h->scene.net.layer[l].n_out;
+      const bool radix = h->scene.net.mode == FX_RADIX, twice = radix && l == FX_C2 && t + 1 < h->scene.net.steps;
+      const uint64_t units = (l == FX_D2 && !radix ? 1 : (uint64_t)h->scene.net.layer[l].n_out) << twice;
       if (t >= h->scene.net.steps) ck_assert_uint_eq(seen->trace->spikes[l][t][0] | seen->trace->spikes[l][t][1], 0);
       ck_assert_uint_eq(seen->counts.layer[l].updates[t], t < h->scene.net.steps ? units : 0);
     }
@@ -299,7 +300,7 @@ static inline void expect_nodecay(const hard *h, const hard_seen *seen, int vari
   ck_assert_uint_eq(seen->counts.saturated[FX_D1], (SF_T_MAX - 1) * SF_LANES);
 }
 
-/* ---- weighted spikes ---- */
+/* ---- radix ---- */
 
 /* Currents of 0 to 8190 in steps of 130 against a threshold of 4096 (D1, C1), with an output of one weight each. */
 static inline void make_digits(hard *h, int variant)
@@ -315,8 +316,8 @@ static inline void make_digits(hard *h, int variant)
   h->scene.net.exp_in = (fx_scale){4096, 4, 0};
 }
 
-/* A constant current I < 2 theta is sum of the digits: 2 theta * sum 2^(t-s) spike(s) + what is left = (2^(t+1) - 1) I.
- * So the membrane, which has theta in it, tells the digits; and 2^y is asked once, of the sum of currents. */
+/* The digits of a current I < 2 theta: 2 theta * sum of 2^(t-s) spike(s) + what is left = 2^(t+1) I. So the membrane
+ * tells the digits before it; and 2^y is asked once, of the sum of currents. */
 static inline void expect_digits(const hard *h, const hard_seen *seen, int variant)
 {
   const int steps = variant + 1;
@@ -328,14 +329,14 @@ static inline void expect_digits(const hard *h, const hard_seen *seen, int varia
     int64_t digits = 0;
     for (int t = 0; t < steps; t++) {
       digits *= 2;
-      ck_assert_int_eq(seen->trace->membrane[FX_D1][t][o], theta + ((1 << (t + 1)) - 1) * current - 2 * theta * digits);
+      ck_assert_int_eq(seen->trace->membrane[FX_D1][t][o], ((int64_t)current << t) - theta * digits);
       digits += hard_fired(seen, FX_D1, t, o);
     }
     sum += digits * (o % 64 == 63 ? 100 : -1);
     if (current == 0) ck_assert_int_eq(digits, 0);
   }
   const fx_scale *s = &h->scene.net.exp_in;
-  const double y = sum * ldexp(s->mul, -s->shift) / ((1 << steps) - 1), near = 1 + fabs(y) / 65536;
+  const double y = sum * ldexp(s->mul, -s->shift - steps), near = 1 + fabs(y) / 65536;
   ck_assert_uint_ge(seen->out.sigma, fx_exp2((int32_t)floor(y - near)));
   ck_assert_uint_le(seen->out.sigma, fx_exp2((int32_t)ceil(y + near)));
   for (int t = 0; t < steps; t++) ck_assert_uint_eq(seen->counts.layer[FX_D2].special[t], t == steps - 1);

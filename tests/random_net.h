@@ -121,7 +121,7 @@ static inline void random_net_make(random_net *n, random_source *r, bool extreme
   random_net_fill(n, r, extreme);
 }
 
-/* A neuron of weighted spikes fires at twice its threshold: that fits its membrane. */
+/* Thresholds of radix end earlier. */
 static inline void random_net_limit(fx_net *net)
 {
   const int32_t highest = (1 << 22) - 1;

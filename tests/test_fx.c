@@ -95,18 +95,16 @@ TEST(sigmoid_every_input)
  * the step, and in hybrid and decay mode the membrane stays between v and I. */
 static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int32_t mode, bool first)
 {
-  const int32_t quantum = mode == FX_RADIX ? 2 * layer->theta : layer->theta;
   fx_net net = {.mode = mode};
   const naive_net naive = {.net = &net};
-  int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
-  if (mode == FX_RADIX) exact += first ? layer->theta : -layer->theta; /* v has theta in it, and so has u */
+  const int64_t exact = naive_charge(&naive, v, current, layer->k, first ? 0 : 1);
   const int64_t u = naive_clamp(exact, -8388608, 8388607);
   const fx_plif step = fx_plif_step(v, current, layer->k, layer->theta, mode, first);
   ck_assert_msg(step.membrane == u, "v %d I %d k %d mode %d first %d: %d, exact %lld", v, current, layer->k, mode,
                 first, step.membrane, (long long)u);
   ck_assert_int_eq(step.saturated, u != exact);
-  ck_assert_int_eq(step.spike, u >= quantum);
-  ck_assert_int_eq(step.v, u - (step.spike ? quantum : 0));
+  ck_assert_int_eq(step.spike, u >= layer->theta);
+  ck_assert_int_eq(step.v, u - (step.spike ? layer->theta : 0));
   if (step.spike) ck_assert_int_ge(step.v, 0);
   if (mode == FX_HYBRID || mode == FX_DECAY) {
     const int32_t old = first ? 0 : v, low = old < current ? old : current, high = old < current ? current : old;
@@ -124,25 +122,41 @@ static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int3
   for (int o = 0; o < SF_LANES; o += 37) ck_assert(lane[o] == step.v && membrane[o] == step.membrane);
 }
 
-/* The scale of a weighted sum is that of a current over 2^T - 1: to half an LSB of its factor, which has 16 bits unless
- * the shift is at its end. */
-TEST(scale_of_a_weighted_sum)
+/* The scale of radix is 2^-T of the other modes', to half an LSB of its factor where the shift is at its end. */
+TEST(scale_of_radix)
 {
   for (uint64_t i = 0; i < 4000; i++) {
     const int64_t largest = i % 3 ? 65535 : i % 100;
     const fx_scale in = {(int32_t)fixture_pick(9, 0, i, 0, largest), (int32_t)fixture_pick(9, 1, i, 0, 31), (int32_t)i};
     const fx_net net = {.mode = FX_RADIX, .steps = 1 + (int)(i % SF_T_MAX)};
     const fx_scale out = fx_net_scale(&net, &in);
-    const double exact = ldexp(in.mul, -in.shift) / ((1 << net.steps) - 1);
+    const double exact = ldexp(in.mul, -in.shift - net.steps), got = ldexp(out.mul, -out.shift);
     ck_assert_int_eq(out.bias, in.bias);
     ck_assert(out.mul >= 0 && out.mul <= 65535 && out.shift >= in.shift && out.shift <= 31);
-    ck_assert(fabs(ldexp(out.mul, -out.shift) - exact) <= ldexp(0.5, -out.shift));
-    ck_assert_msg(out.mul >= 32767 || out.shift == 31, "%d / 2^%d for %g", out.mul, out.shift, exact);
+    ck_assert(out.shift == 31 ? fabs(got - exact) <= ldexp(0.5, -31) : got == exact && out.mul == in.mul);
     for (int mode = FX_HYBRID; mode < FX_RADIX; mode++) {
       const fx_net other = {.mode = mode, .steps = net.steps};
       const fx_scale same = fx_net_scale(&other, &in);
       ck_assert_mem_eq(&same, &in, sizeof in);
     }
+  }
+}
+
+/* The spikes of a current are the first T binary digits of I / (2 theta), cut; rails do not change them. */
+TEST(radix_fires_the_digits_of_its_current)
+{
+  for (uint64_t i = 0; i < 100000; i++) {
+    const int bits = (int)fixture_pick(8, 0, i, 1, 22);
+    const int64_t limit = ((int64_t)1 << bits) - 1, theta = i % 9 ? fixture_pick(8, 1, i, 1, limit) : limit;
+    const int64_t current = i % 7 ? fixture_pick(8, 2, i, -2 * limit - 2, 2 * limit + 1) : 2 * limit + 1;
+    const int64_t most = (1 << SF_T_MAX) - 1, whole = current < 0 ? 0 : (current << (SF_T_MAX - 1)) / theta;
+    int64_t number = 0;
+    int32_t v = 12345;
+    for (int t = 0; t < SF_T_MAX; t++) {
+      const fx_plif step = fx_plif_step(v, t ? 0 : (int32_t)current, 0, (int32_t)theta, FX_RADIX, t == 0);
+      number = 2 * number + step.spike, v = step.v;
+    }
+    ck_assert_int_eq(number, whole < most ? whole : most);
   }
 }
 

@@ -169,9 +169,19 @@ TEST(metadata_is_checked)
   for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
 }
 
-/* The one parameter that is another, and nothing else of the seven. */
-/* They fire at twice their threshold, which is a membrane. */
-TEST(thresholds_of_weighted_spikes_end_earlier)
+/* The mode of that name was another neuron. */
+TEST(scenes_of_weighted_spikes_are_refused)
+{
+  OWNED(fx_scene) scene = small_scene(4);
+  fx_scene loaded;
+  save(&scene);
+  edit("mode", "weighted");
+  const sf_status status = fx_scene_load(&loaded, path);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_nonnull(strstr(status.message, "train the model anew"));
+}
+
+TEST(thresholds_of_radix_end_earlier)
 {
   OWNED(fx_scene) scene = small_scene(5);
   const int32_t highest = (1 << 22) - 1;
@@ -190,6 +200,7 @@ TEST(thresholds_of_weighted_spikes_end_earlier)
     }
 }
 
+/* The one parameter that is another, and nothing else of the seven. */
 TEST(another_arch_names_its_parameter)
 {
   char arch[200], wanted[200];

@@ -27,14 +27,14 @@ static fx_scene random_net_scene(uint64_t seed, bool decodes)
 {
   fixture_sizes sizes = seed % 2 ? fixture_random_sizes(seed) : fixture_ingp;
   if (decodes) sizes = seed % 2 ? fixture_random_decoder(seed) : fixture_decoder;
-  sizes.mode = (int)(seed / 2 % 3), sizes.steps = (int)pick(seed, 0, 1, SF_T_MAX);
+  sizes.mode = (int)(seed / 2 % 4), sizes.steps = (int)pick(seed, 0, 1, SF_T_MAX);
   fx_scene s = fixture_scene(&sizes, seed);
   for (int l = 0; l < SF_LAYERS; l++) {
     fx_layer *layer = &s.net.layer[l];
     if (layer->theta)
       layer->theta = (int32_t)pick(seed, 1 + (uint64_t)l, 0, 3) * 25000 * (l == FX_C2 ? 4 : 1) +
                      (int32_t)pick(seed, 6 + (uint64_t)l, 1, 30000);
-    if (seed % 16 == 5 && layer->theta) layer->theta = FX_MEMBRANE_MAX;
+    if (seed % 16 == 5 && layer->theta) layer->theta = FX_MEMBRANE_MAX >> (sizes.mode == FX_RADIX);
     for (int i = 0; seed % 3 == 0 && i < fx_layer_rows(layer) * SF_LANES; i++)
       layer->w[i] = (int8_t)(((layer->w[i] > 0) - (layer->w[i] < 0)) * fixture_rail(l, i % SF_LANES));
     if (seed % 5 == 0) layer->k = (int32_t[]){0, 1, 4095, 4096}[pick(seed, 12 + (uint64_t)l, 0, 3)];

@@ -67,7 +67,7 @@ LOOP_TEST(extreme_nets, 25)
 }
 
 /* Every mode with every number of steps, at the ends of the leak. */
-LOOP_TEST(modes_and_steps, 3)
+LOOP_TEST(modes_and_steps, 4)
 {
   static const int32_t leak[] = {0, 1, 2048, 4095, 4096};
   random_source r = {2000 + (uint64_t)_i, 0};

@@ -11,7 +11,7 @@
 
 /* interface version, major << 16 | minor; a driver refuses another major, RO */
 #define SF_REG_VERSION 0x0004
-#define SF_REG_VERSION_RESET 0x00050002
+#define SF_REG_VERSION_RESET 0x00060000
 
 /* sizes this block was built with (arch.def), RO */
 #define SF_REG_CONFIG 0x0008
@@ -57,7 +57,7 @@
 #define SF_REG_ERROR_STEPS_SHIFT 1
 #define SF_REG_ERROR_LEAK_MASK 0x00000004 /* start: a leak is more than 4096 */
 #define SF_REG_ERROR_LEAK_SHIFT 2
-#define SF_REG_ERROR_THETA_MASK 0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1, of weighted spikes 1..2^22-1 */
+#define SF_REG_ERROR_THETA_MASK 0x00000008 /* start: a spiking layer has no threshold of 1..2^23-1, in radix mode 1..2^22-1 */
 #define SF_REG_ERROR_THETA_SHIFT 3
 #define SF_REG_ERROR_MODE_MASK 0x00000010 /* start: MODE is more than 3 */
 #define SF_REG_ERROR_MODE_SHIFT 4

@@ -3,7 +3,7 @@ package sf_csr_pkg;
   localparam [12:0] ID = 13'h0000;
   localparam [31:0] ID_RESET = 32'h53464c44;
   localparam [12:0] VERSION = 13'h0004;
-  localparam [31:0] VERSION_RESET = 32'h00050002;
+  localparam [31:0] VERSION_RESET = 32'h00060000;
   localparam [12:0] CONFIG = 13'h0008;
   localparam [31:0] CONFIG_RESET = 32'h5041087f;
   localparam [12:0] CTRL = 13'h000c;

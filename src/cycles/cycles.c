@@ -14,6 +14,7 @@ sf_cycle_model *sf_cycle_model_create(const fx_net *net, const sf_engine *engine
   m->decodes = fx_net_constants_per_sample(net);
   m->biased = net->layer[FX_C1].bias != 0;
   m->steps = (uint32_t)net->steps;
+  m->radix = net->mode == FX_RADIX;
   m->neurons = (uint32_t)engine->neurons;
   m->part_groups = (uint32_t)(engine->macs / engine->neurons);
   for (int s = 0; s < FX_SPIKING; s++) {
@@ -21,6 +22,7 @@ sf_cycle_model *sf_cycle_model_create(const fx_net *net, const sf_engine *engine
     m->last_group[s] = last < 0 ? 0 : (uint32_t)(last / engine->neurons);
     m->last_part[s] = last < 0 ? 0 : (uint32_t)(last / engine->macs);
     m->banks[s] = s == C2 ? (uint32_t)engine->steps_at_once : NARROW_BANKS;
+    m->turns[s] = m->steps + (s == FX_SPIKING - 1 && m->radix ? m->steps - 1 : 0);
     m->bias[s] = net->layer[fx_spiking_layers[s] + 1].bias != 0;
     m->now.sum[s].fresh = true;
   }

@@ -40,7 +40,8 @@ bool sf_tick_values(const sf_cycle_model *m, state *s, const state *was, bool lo
   const uint32_t rows = job == FEATURES ? m->n_feature : job == CONSTANTS ? m->n_dir + m->biased : m->n_h;
   const bool is_row = v->row < rows, last_row = v->row + 1 >= rows && v->row + 1 >= n_dir;
   const bool last_part = v->part == m->last_part[job == FEATURES ? 0 : 1];
-  const bool last_step = job != STATES || v->step + 1 == m->steps, last = last_row && last_part && last_step;
+  const bool last_step = job != STATES || m->radix || v->step + 1 == m->steps;
+  const bool last = last_row && last_part && last_step;
   const bool ends = go && last && (job != CONSTANTS || m->decodes);
   to->op[0] = go && (job != FEATURES || is_row), to->op[1] = v->op[0], to->op[2] = v->op[1];
   to->busy[0] = go && is_row && job == FEATURES, to->busy[1] = go && is_row && job != FEATURES;
@@ -66,24 +67,24 @@ bool sf_tick_neurons(const sf_cycle_model *m, state *s, const state *was)
   const uint32_t layer = n->active ? n->layer : want[2] ? 2 : want[1] ? 1 : 0;
   const bool run = n->active ? n->wait == 0 : want[0] || want[1] || want[2];
   const uint32_t last_group = m->last_group[layer], part = n->group / m->part_groups;
-  const bool group_ends = n->group == last_group, last_step = n->step + 1 == m->steps;
-  const bool stays =
-      (layer == 0 || (layer == 1 && m->decodes)) && m->last_part[layer] == 0; /* one current, all steps */
-  const bool load = run && n->group % m->part_groups == 0 && !(stays && n->step);
-  const bool taken = load && (last_step || stays) && part == m->last_part[layer];
+  const bool group_ends = n->group == last_group, last_turn = n->turn + 1 == m->turns[layer];
+  const bool constant = layer == 0 || (layer == 1 && m->decodes); /* one current, all steps */
+  const bool once = m->radix ? layer < 2 : constant && m->last_part[layer] == 0;
+  const bool load = run && n->group % m->part_groups == 0 && n->turn < (once ? 1 : m->steps);
+  const bool taken = load && (n->turn + 1 == m->steps || once) && part == m->last_part[layer];
   memmove(&to->way[1], &n->way[0], sizeof to->way - sizeof to->way[0]);
-  to->way[0] = (turn){run, group_ends, (uint8_t)layer, (uint8_t)n->step, (uint8_t)n->group};
+  to->way[0] = (turn){run, group_ends, (uint8_t)layer, (uint8_t)n->turn, (uint8_t)n->group};
   to->counted = n->way[4 + DEPTH - 2].valid;
   to->released = taken && layer == 2;
   to->load_c2 = load && layer == 2;
   if (run && !n->active) s->spike[layer].taken++;
   if (taken && layer < 2) s->mac.full[layer] = false;
   if (run) {
-    to->active = !(group_ends && last_step);
+    to->active = !(group_ends && last_turn);
     to->layer = layer;
     to->group = group_ends ? 0 : n->group + 1;
-    if (group_ends) to->step = last_step ? 0 : n->step + 1;
-    if (group_ends && !last_step && last_group < DEPTH - 1) to->wait = DEPTH - 1 - last_group;
+    if (group_ends) to->turn = last_turn ? 0 : n->turn + 1;
+    if (group_ends && !last_turn && last_group < DEPTH - 1) to->wait = DEPTH - 1 - last_group;
   } else if (n->wait) {
     to->wait = n->wait - 1;
   }
@@ -109,7 +110,7 @@ static void tick_spikes(const sf_cycle_model *m, state *s, const state *was, int
   const bool offers = k->have && room && (k->bias || any || k->last_group);
   const bool load = k->full && (!k->have || worked_off), load_last = load && k->group == m->last_group[l];
   to->taken -= load_last;
-  to->full += out->valid && out->layer == l && out->step + 1U == m->steps && out->group == m->last_group[l];
+  to->full += out->valid && out->layer == l && out->number + 1U == m->turns[l] && out->group == m->last_group[l];
   to->full -= load_last;
   to->have = load || (k->have && !worked_off);
   to->valid = offers || (k->valid && !next);

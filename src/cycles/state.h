@@ -30,13 +30,13 @@ typedef struct values {
 
 /* Whose neurons step (rtl/sf_turns.sv), and what is on its way to them and through them (rtl/sf_neurons.sv). */
 typedef struct turn {
-  bool valid, last;
-  uint8_t layer, step, group;
+  bool valid, last; /* last: the layer's last group */
+  uint8_t layer, number, group;
 } turn;
 
 typedef struct neurons {
   bool active, released;
-  uint32_t layer, step, group, wait;
+  uint32_t layer, turn, group, wait;
   turn way[4 + DEPTH - 1];
   bool load_c2, counted; /* the last turn loaded sums of C2; spikes are counted */
   uint32_t load_part;
@@ -107,7 +107,9 @@ struct sf_cycle_model {
   uint32_t last_group[FX_SPIKING], last_part[FX_SPIKING], part_groups;
   uint32_t banks[FED], parts[FED]; /* parts: the last one */
   bool bias[FED];
+  uint32_t turns[FX_SPIKING];
   bool decodes, biased; /* C1 takes its inputs from the buffer; its biases take a row */
+  bool radix;
   state now;
   sf_cycle_totals totals;
   sf_cycle_sample ring[RING];

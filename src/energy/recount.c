@@ -37,11 +37,21 @@ static void count_synapses(fx_layer_counts *c, int t, const uint64_t in[SF_SPIKE
   c->weight[t] += fired(new_rows) * n_out;
 }
 
-/* Behind weighted spikes currents are integrated, and the functions are asked once. */
-static void count_integrators(const fx_net *net, fx_layer_counts *c, int t, uint64_t integrators)
+/* Radix asks the functions once. What it adds up is currents: of the density net all of them, h among them. */
+static void count_integrators(const fx_net *net, fx_layer_counts *c, int t, uint64_t outputs, uint64_t currents)
 {
-  if (net->mode != FX_RADIX || t + 1 == net->steps) c->special[t] += integrators;
-  count_state(c, t, integrators, INTEGRATOR_STATE_BYTES);
+  const bool radix = net->mode == FX_RADIX;
+  if (!radix || t + 1 == net->steps) c->special[t] += outputs;
+  count_state(c, t, radix ? currents : outputs, INTEGRATOR_STATE_BYTES);
+}
+
+/* Radix: C2's neurons first add up the sums of all steps; with the last one they fire for the first time. */
+static void count_sums(const fx_net *net, fx_layer_counts *c, int t, uint64_t neurons)
+{
+  if (net->mode != FX_RADIX || t + 1 == net->steps) return;
+  c->updates[t] += neurons;
+  c->state_w[t] += neurons * SPIKING_STATE_BYTES;
+  c->state_r[t] += neurons * SPIKING_STATE_BYTES;
 }
 
 /* A row of biases is read, but it is no MAC and no SOP. */
@@ -73,12 +83,13 @@ void sf_recount_sample(const fx_net *net, const uint64_t spikes[SF_LAYERS][SF_T_
       c[l].spikes[t] += fired(spikes[l][t]);
       count_state(&c[l], t, (uint64_t)size[l].n_out, SPIKING_STATE_BYTES);
     }
-    count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
+    count_sums(net, &c[FX_C2], t, (uint64_t)size[FX_C2].n_out);
+    if (t == 0 || net->mode != FX_RADIX) count_mac(&c[FX_C1], t, fx_net_h(net), size[FX_C1].n_out);
     for (int s = 0; s < FX_SPIKING; s++) {
       const int fed = fx_spiking_layers[s] + 1; /* the layer behind */
       count_synapses(&c[fed], t, spikes[fx_spiking_layers[s]][t], seen[s], (uint64_t)size[fed].n_out);
     }
-    count_integrators(net, &c[FX_D2], t, size[FX_D2].n_out > 0);
-    count_integrators(net, &c[FX_C3], t, 3);
+    count_integrators(net, &c[FX_D2], t, size[FX_D2].n_out > 0, (uint64_t)size[FX_D2].n_out);
+    count_integrators(net, &c[FX_C3], t, 3, 3);
   }
 }

@@ -144,7 +144,7 @@ int fx_largest_h(const fx_layer *d2)
   return largest;
 }
 
-/* Neurons of weighted spikes fire at 2 theta. */
+/* Of radix, a membrane at its upper rail must fire again at the next step: fx/plif.c. */
 static sf_status check_layer(const fx_layer *layer, int id, int mode, const char *path)
 {
   const int highest = mode == FX_RADIX ? FX_MEMBRANE_MAX / 2 : FX_MEMBRANE_MAX;

@@ -34,6 +34,12 @@ static uint64_t h_macs(const fx_net *net)
   return (uint64_t)fx_net_h(net) * (uint64_t)net->layer[FX_C1].n_out;
 }
 
+/* Steps at which C1 multiplies h. */
+static uint64_t h_products(const fx_net *net)
+{
+  return net->mode == FX_RADIX ? 1 : (uint64_t)net->steps;
+}
+
 uint64_t fx_macs_of_ray(const fx_net *net)
 {
   return fx_net_constants_per_sample(net) ? 0 : direction_macs(net);
@@ -41,7 +47,7 @@ uint64_t fx_macs_of_ray(const fx_net *net)
 
 uint64_t fx_macs_of_sample(const fx_net *net)
 {
-  return feature_macs(net) + (uint64_t)net->steps * h_macs(net) + direction_macs(net) - fx_macs_of_ray(net);
+  return feature_macs(net) + h_products(net) * h_macs(net) + direction_macs(net) - fx_macs_of_ray(net);
 }
 
 static void count_constants(fx_counts *counts, const fx_net *net, uint64_t times)
@@ -63,11 +69,24 @@ static void count_products(fx_layer_counts *c, int t, uint64_t macs)
   if (t == 0) c->weight[t] += macs;
 }
 
-static void count_updates(fx_layer_counts *c, int t, uint64_t updates, uint64_t bytes)
+/* `times` updates of `states` each; the first one at step 0 reads nothing. */
+static void count_updates(fx_layer_counts *c, int t, uint64_t states, uint64_t times, uint64_t bytes)
 {
-  c->updates[t] += updates;
-  c->state_w[t] += updates * bytes;
-  if (t > 0) c->state_r[t] += updates * bytes;
+  c->updates[t] += states * times;
+  c->state_w[t] += states * times * bytes;
+  c->state_r[t] += states * (times - (t == 0)) * bytes;
+}
+
+/* Integrators of D2: what is weighed is all of its outputs. */
+static uint64_t d2_states(const fx_net *net)
+{
+  return net->mode == FX_RADIX ? (uint64_t)net->layer[FX_D2].n_out : 1;
+}
+
+/* Of radix, C2's neurons add up the sums of all steps, and with the last one they fire for the first time. */
+static uint64_t c2_updates(const fx_net *net, int t)
+{
+  return net->mode == FX_RADIX && t < net->steps - 1 ? 2 : 1;
 }
 
 /* A layer fed by spikes reads the row of a neuron once per sample: at the first step at which it fires. */
@@ -92,15 +111,15 @@ void fx_count_firing(fx_counts *counts, const fx_net *net, const fx_firing *firi
     c[FX_D1].spikes[t] += firing->spikes[D1][t];
     c[FX_C1].spikes[t] += firing->spikes[C1][t];
     c[FX_C2].spikes[t] += firing->spikes[C2][t];
-    count_products(&c[FX_C1], t, n * h_macs(net));
+    if (t < (int)h_products(net)) count_products(&c[FX_C1], t, n * h_macs(net));
     count_synapses(&c[FX_D2], &layer[FX_D2], t, firing->spikes[D1][t], firing->fresh[D1][t]);
     count_synapses(&c[FX_C2], &layer[FX_C2], t, firing->spikes[C1][t], firing->fresh[C1][t]);
     count_synapses(&c[FX_C3], &layer[FX_C3], t, firing->spikes[C2][t], firing->fresh[C2][t]);
-    count_updates(&c[FX_D1], t, n * (uint64_t)layer[FX_D1].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_C1], t, n * (uint64_t)layer[FX_C1].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_C2], t, n * (uint64_t)layer[FX_C2].n_out, MEMBRANE_BYTES);
-    count_updates(&c[FX_D2], t, densities, INTEGRATOR_BYTES);
-    count_updates(&c[FX_C3], t, n * (uint64_t)layer[FX_C3].n_out, INTEGRATOR_BYTES);
+    count_updates(&c[FX_D1], t, n * (uint64_t)layer[FX_D1].n_out, 1, MEMBRANE_BYTES);
+    count_updates(&c[FX_C1], t, n * (uint64_t)layer[FX_C1].n_out, 1, MEMBRANE_BYTES);
+    count_updates(&c[FX_C2], t, n * (uint64_t)layer[FX_C2].n_out, c2_updates(net, t), MEMBRANE_BYTES);
+    count_updates(&c[FX_D2], t, densities * d2_states(net), 1, INTEGRATOR_BYTES);
+    count_updates(&c[FX_C3], t, n * (uint64_t)layer[FX_C3].n_out, 1, INTEGRATOR_BYTES);
     if (!fx_net_reads_tables(net, t)) continue;
     c[FX_D2].special[t] += densities;
     c[FX_C3].special[t] += n * (uint64_t)layer[FX_C3].n_out;

@@ -58,6 +58,18 @@ static INLINE void fire_gang(const fx_net *net, int spiking, int mode, const int
   }
 }
 
+/* C2's currents, of radix one of all steps. */
+static INLINE currents c2_of(const fx_net *net, int mode, int kind, const void *from, int sample, int step)
+{
+  const int steps = net->steps;
+  return (currents){.kind = kind,
+                    .from = from,
+                    .sample = sample,
+                    .step = step,
+                    .weighed = mode == FX_RADIX ? steps : 0,
+                    .shift = fx_layer_frac(FX_C2, mode) - (mode == FX_RADIX ? steps : 0)};
+}
+
 /* C1 of a decoder: constant inputs and biases, once per sample. */
 static INLINE void c1_constant_layer(const fx_core *core, fx_block *b, int mode)
 {

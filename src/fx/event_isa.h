@@ -220,6 +220,18 @@ static INLINE void c2_currents(const fx_words *words, bitmaps spikes, bool bias,
 
 /* ---- the layers, all steps of a block ---- */
 
+/* Radix: h of all steps' currents, in the place of those of step 0. */
+static INLINE void weigh_h(int steps, int n, int16_t (*current)[FX_BLOCK][SF_OUT_MAX])
+{
+  const __m128i shift = _mm_cvtsi32_si128(SF_H_SHIFT + steps);
+  for (int i = 0; i < n; i++)
+    for (int o = 0; o < SF_OUT_MAX; o += WIDTH) {
+      vec sum = v_widen(&current[0][i][o]);
+      for (int t = 1; t < steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_widen(&current[t][i][o]));
+      v_store_narrow(&current[0][i][o], V(sra_epi32)(sum, shift));
+    }
+}
+
 static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
 {
   const fx_words *words = &core->words;
@@ -236,19 +248,21 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     for (int i = 0; i < b->n; i++) {
       __m256i *current = (__m256i *)s->d2_current[t][i];
       s->argument[t][0][i] = s->d2_current[t][i][0];
-      _mm256_storeu_si256(current, _mm256_srai_epi16(_mm256_loadu_si256(current), SF_H_SHIFT));
+      if (mode != FX_RADIX) _mm256_storeu_si256(current, _mm256_srai_epi16(_mm256_loadu_si256(current), SF_H_SHIFT));
     }
   }
+  if (mode == FX_RADIX) weigh_h(net->steps, b->n, s->d2_current);
 }
 
 static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
 {
   const fx_net *net = &core->scene->net;
+  const int times = mode == FX_RADIX ? 1 : net->steps;
   for (int i = b->n; i % GANG; i++) b->base[i] = b->base[0]; /* the last gang may have members that nobody reads */
   for (int i = 0; i < b->n; i += GANG) {
     int32_t current[SF_T_MAX][GANG][SF_LANES];
     for (int at = 0; at < SF_LANES; at += TILE * WIDTH)
-      for (int t = 0; t < net->steps; t++) {
+      for (int t = 0; t < times; t++) {
         const int16_t(*h)[SF_OUT_MAX] = (const int16_t(*)[SF_OUT_MAX])s->d2_current[t];
         pair_products(core->words.c1_h[0][at], SF_OUT_MAX / 2, (const int16_t *const[]){h[i], h[i + 1], h[i + 2]},
                       (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
@@ -264,7 +278,7 @@ static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
   for (int t = 0; t < net->steps; t++)
     c2_currents(&core->words, (bitmaps)b->spikes[1][t], net->layer[FX_C2].bias != 0, b->n, s->c2_current[t]);
   for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
-    const currents c = {HALVES, &s->c2_current[0][0][at], SF_LANES, FX_BLOCK * SF_LANES, SF_AC_FRAC, NULL};
+    const currents c = c2_of(net, mode, HALVES, &s->c2_current[0][0][at], SF_LANES, FX_BLOCK * SF_LANES);
     fire_layer(net, 2, mode, &c, at, TILE, 0, b->n, b);
   }
 }

@@ -7,6 +7,8 @@
  *   C1  d | h   -> 128   MAC, spiking      the d part once per ray, the h part at every step
  *   C2  spikes  -> 128   AC, spiking
  *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour
+ * In input mode radix the currents of D2, C2 and C3 are weighed into one of all T steps, sum of 2^(T-1-t) i(t)
+ * (fx_weigh); h is this sum >> (H_SHIFT + T).
  *
  * A decoder is a net of the last three layers: D1 and D2 have no inputs and no outputs, and all of
  * C1's inputs, up to SF_DIR_MAX, are constant ones that come anew with every sample. It has no density: sigma is 0.
@@ -21,9 +23,24 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* weighted: a spike is a binary digit, worth half of one of the step before. Nothing leaks; D2 and C3 add up currents,
- * and their table is read once, behind the last step. */
+/* radix: spikes are binary digits, the most significant first: a train of T steps s(t) has the value sum of
+ * s(t) 2^-(t+1), of twice the threshold. A layer waits for all steps of its inputs, and its neurons take their currents
+ * once. Nothing leaks; tables are read once, behind the last step. */
 typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_RADIX } fx_input_mode;
+
+/* Bits of the membrane below the LSB of the layer's current. Of radix, C2's holds the mean current of as many steps as
+ * there may be. */
+static inline int fx_layer_frac(int layer, int32_t mode)
+{
+  if (layer != FX_C2) return 0;
+  return mode == FX_RADIX ? SF_T_MAX : SF_AC_FRAC;
+}
+
+/* Bits of a layer's state. What radix adds up in D2 and C3 are currents: fx_weigh. */
+static inline int fx_layer_state_bits(int layer, int32_t mode)
+{
+  return mode == FX_RADIX && !fx_layer_fires(layer) ? SF_MEMBRANE_BITS : fx_layer_table[layer].state_bits;
+}
 
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
  * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
@@ -31,8 +48,8 @@ typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_RADIX } fx_input_mode;
  * `bias`: 0 for none; else one more row, w[n_in], belongs to an input that is always active: with the value `bias`,
  * 1..2047, in C1, and as a spike at every step in C2 and C3 (bias = 1). D1 and D2 have none.
  * `theta` is in membrane LSB (so it carries the membrane's fraction bits) and must be >= 1 for
- * the spiking layers D1, C1, C2 (of weighted spikes also < 2^22: they fire at 2 theta); for D2 and C3, `k` is the leak
- * of the density and colour integrator. */
+ * the spiking layers D1, C1, C2 (of radix also < 2^22: then rails change no spike); for D2 and C3, `k` is the leak of
+ * the density and colour integrator. */
 typedef struct fx_layer {
   int32_t n_in, n_out;
   int32_t k;     /* U1.12, 0..4096 */
@@ -64,12 +81,6 @@ typedef struct fx_net {
   fx_scale sigmoid_in; /* C3 current   -> sigmoid argument, Q.LOG_FRAC */
 } fx_net;
 
-/* What a neuron of threshold theta fires at, and loses by it. */
-static inline int32_t fx_plif_quantum(int32_t theta, int32_t mode)
-{
-  return mode == FX_RADIX ? 2 * theta : theta;
-}
-
 /* Without a density net: C1, C2 and C3 alone. */
 static inline bool fx_net_decodes(const fx_net *net)
 {
@@ -82,7 +93,7 @@ static inline bool fx_net_reads_tables(const fx_net *net, int t)
   return net->mode != FX_RADIX || t == net->steps - 1;
 }
 
-/* Inputs of C1: those that change with the step (h), and before them the constant ones. */
+/* Inputs of C1: those that come from D2 (h), at every step or of radix once, and before them the constant ones. */
 static inline int fx_net_h(const fx_net *net)
 {
   return fx_net_decodes(net) ? 0 : net->layer[FX_D2].n_out - 1;
@@ -92,8 +103,8 @@ static inline int fx_net_constants(const fx_net *net)
   return net->layer[FX_C1].n_in - fx_net_h(net);
 }
 
-/* exp_in or sigmoid_in for what its table is asked: a step's current, or of weighted spikes the sum of the currents of
- * net->steps steps, which stands for 2^steps - 1 of them (fx_weigh). These are the numbers that a driver programs. */
+/* exp_in or sigmoid_in for what its table is asked: a step's current, or of radix the sum of the currents of net->steps
+ * steps (fx_weigh), whose LSB is worth 2^-steps of a current's. These are the numbers that a driver programs. */
 fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale);
 
 /* The first layer that the net has. */
@@ -233,15 +244,18 @@ typedef struct fx_ray {
 
 /* Events, counted per layer and time step. What is one event, exactly:
  *   mac     D1: n_in*n_out per sample, at step 0. C1: n_dir*n_out per ray that has a sample (step 0 of its first
- *           sample) + n_h*n_out per step; of a decoder n_in*n_out per sample, at step 0.  (zero inputs count too)
+ *           sample) + n_h*n_out per step, of radix at step 0 alone; of a decoder n_in*n_out per sample, at step 0.
+ *           Zero inputs count too
  *   sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out; biases are no MAC and no SOP
  *   spikes  D1, C1, C2: neurons that fired at step t
- *   updates D1, C1, C2: n_out per step; D2: 1 per step (density integrator); C3: 3 per step
+ *   updates D1, C1, C2: n_out per step; D2: 1 per step (density integrator); C3: 3 per step. Radix: D2 n_out per
+ *           step; C2 2*n_out per step, n_out at the last: its neurons add up T sums and fire T times, the first time
+ *           with the last sum
  *   weight  bytes read, 1 per weight: D1 n_in*n_out at step 0; C1 as its MACs; C2 as its SOPs; D2, C3: n_out for
  *           each presynaptic neuron active at ANY step, at the first step at which it fired; biases n_out more: C1 with
  *           its constant inputs, C2 at every step, C3 at step 0
- *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); no read at step 0
- *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations; of weighted spikes at the last step alone
+ *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); the first update reads nothing
+ *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations; of radix at the last step alone
  * A decoder has none in D1 and D2. */
 typedef union fx_layer_counts {
   uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
@@ -271,15 +285,16 @@ void fx_counts_add(fx_counts *sum, const fx_counts *more);
 typedef struct fx_trace {
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS]; /* D1, C1, C2: bit n%64 of word n/64 = neuron n fired */
   int32_t membrane[SF_LAYERS][SF_T_MAX][SF_LANES];      /* before fire and reset; D2 [0], C3 [0..2]: accumulator, after,
-                                                           or of weighted spikes the sum of currents */
-  int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];       /* the exact sum, without C2's fraction bits */
+                                                           or of radix the sum of currents so far */
+  int32_t current[SF_LAYERS][SF_T_MAX][SF_LANES];       /* the exact sum, without C2's fraction bits; of radix in C2
+                                                           that of all steps (fx_weigh), the same at every step */
 } fx_trace;
 
 /* What neuron n of a layer keeps behind a step: its membrane after the reset. */
 static inline int32_t fx_membrane_left(const fx_net *net, const fx_trace *trace, int layer, int step, int n)
 {
   const bool fired = trace->spikes[layer][step][n / 64] >> n % 64 & 1;
-  return trace->membrane[layer][step][n] - (fired ? fx_plif_quantum(net->layer[layer].theta, net->mode) : 0);
+  return trace->membrane[layer][step][n] - (fired ? net->layer[layer].theta : 0);
 }
 
 typedef struct fx_out {

@@ -4,26 +4,19 @@
  *   hybrid, first step    a = in
  *   hybrid, decay         a = a + rshift_round((in - a) * k, 12)     between a and in: exact
  *   no-decay              a = usat(a - rshift_round(a * k, 12) + in)
- *   weighted              a = in, which comes once, behind the last step; the currents before it are in fx_weigh's sum
+ *   radix                 a = in, which comes once, behind the last step; the currents before it are in fx_weigh's sum
  */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
 
+enum { SHIFT_MAX = 31 };
+
 fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale)
 {
-  const int64_t parts = (1 << net->steps) - 1;
-  fx_scale s = *scale;
-  if (net->mode != FX_RADIX) return s;
-  /* The finest shift that leaves the factor 16 bits. */
-  int64_t mul = (s.mul + parts / 2) / parts;
-  for (int more = 1; scale->shift + more <= 31; more++) {
-    const int64_t finer = (((int64_t)scale->mul << more) + parts / 2) / parts;
-    if (finer > 65535) break;
-    mul = finer, s.shift = scale->shift + more;
-  }
-  s.mul = (int32_t)mul;
-  return s;
+  if (net->mode != FX_RADIX) return *scale;
+  const int shift = scale->shift + net->steps, beyond = shift > SHIFT_MAX ? shift - SHIFT_MAX : 0;
+  return (fx_scale){(int32_t)fx_rshift_round(scale->mul, beyond), shift - beyond, scale->bias};
 }
 
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale)

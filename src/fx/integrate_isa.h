@@ -104,7 +104,7 @@ static INLINE void integrate_step(const fx_net *net, fx_block *b, fx_scratch *s,
   }
 }
 
-/* The argument of output `at` (0: the density) for samples i..i + WIDTH - 1: the sum of weighted currents. The product
+/* The argument of output `at` (0: the density) for samples i..i + WIDTH - 1: the weighed sum of currents. The product
  * takes 40 bits, so this part is scalar: it happens once per sample. */
 static INLINE vec weighed_argument(const fx_scratch *s, int steps, int i, int at, const fx_scale *scale)
 {
@@ -116,7 +116,7 @@ static INLINE vec weighed_argument(const fx_scratch *s, int steps, int i, int at
   return v_load(y);
 }
 
-/* Weighted spikes: tables are read once. */
+/* Radix: tables are read once. */
 static INLINE void read_weighed(const fx_net *net, fx_block *b, fx_scratch *s)
 {
   const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);

@@ -41,12 +41,6 @@ static inline bool fx_layer_reads_spikes(int layer)
   return fx_layer_table[layer].spikes_of != FX_NO_LAYER;
 }
 
-/* Bits of the membrane below the LSB of the layer's current. */
-static inline int fx_layer_frac(int layer)
-{
-  return layer == FX_C2 ? SF_AC_FRAC : 0;
-}
-
 /* Times at which it puts something out: every step where it fires, else the last one. */
 static inline int fx_layer_outputs(int layer, int steps)
 {

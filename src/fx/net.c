@@ -16,7 +16,6 @@ typedef struct state {
   int32_t current[SF_LANES]; /* of the layer at work, in its membrane's LSB for spiking layers */
   int16_t h[SF_OUT_MAX];
   fx_events events;
-  int32_t weighed[1 + COLOURS]; /* currents of the density and the colours, of weighted spikes */
   fx_out acc;
 } state;
 
@@ -51,13 +50,6 @@ static void keep_current(fx_trace *trace, int l, int t, const int32_t *current, 
   if (trace) memcpy(trace->current[l][t], current, (size_t)n * sizeof *current);
 }
 
-/* What the table of output `at` (0: the density, 1..3: colours) is asked for at step t. */
-static int32_t table_current(state *s, const fx_net *net, int at, int32_t current)
-{
-  if (net->mode != FX_RADIX) return current;
-  return s->weighed[at] = fx_weigh(s->weighed[at], current);
-}
-
 /* exp2 of D2's current into the density. */
 static void read_density(state *s, const fx_net *net, int t, int32_t current)
 {
@@ -76,22 +68,21 @@ static void read_colour(state *s, const fx_net *net, int t, int o, int32_t curre
       fx_integrate_colour(s->acc.colour[o], value, net->layer[FX_C3].k, net->mode, t == 0, &s->events.saturated[FX_C3]);
 }
 
-/* An output's state for the trace. */
-static int32_t integrated(const state *s, const fx_net *net, int at, uint32_t acc)
+/* D1's spikes and D2's currents of one step. */
+static void density_currents(state *s, const fx_net *net, int t, const int32_t *current, fx_trace *trace)
 {
-  return net->mode == FX_RADIX ? s->weighed[at] : (int32_t)acc;
+  const fx_layer *d2 = &net->layer[FX_D2];
+  keep_current(trace, FX_D1, t, s->d1_current, net->layer[FX_D1].n_out);
+  fire(s, net, FX_D1, t, current, trace);
+  fx_current_spikes(s->current, d2->w, s->events.spikes[FX_D1][t], NULL, strips(d2->n_out));
+  keep_current(trace, FX_D2, t, s->current, d2->n_out);
 }
 
 static void density_step(state *s, const fx_net *net, int t, fx_trace *trace)
 {
-  const fx_layer *d2 = &net->layer[FX_D2];
-  keep_current(trace, FX_D1, t, s->d1_current, net->layer[FX_D1].n_out);
-  fire(s, net, FX_D1, t, s->d1_current, trace);
-  fx_current_spikes(s->current, d2->w, s->events.spikes[FX_D1][t], NULL, strips(d2->n_out));
-  keep_current(trace, FX_D2, t, s->current, d2->n_out);
-  const int32_t current = table_current(s, net, 0, s->current[0]);
-  if (fx_net_reads_tables(net, t)) read_density(s, net, t, current);
-  if (trace) trace->membrane[FX_D2][t][0] = integrated(s, net, 0, s->acc.sigma);
+  density_currents(s, net, t, s->d1_current, trace);
+  read_density(s, net, t, s->current[0]);
+  if (trace) trace->membrane[FX_D2][t][0] = (int32_t)s->acc.sigma;
   for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(s->current[1 + j] >> SF_H_SHIFT);
 }
 
@@ -100,33 +91,126 @@ static const int8_t *bias_row(const fx_layer *layer)
   return layer->bias ? layer->w + (size_t)layer->n_in * SF_LANES : NULL;
 }
 
-static void hidden_step(state *s, const fx_net *net, int t, const int32_t *base, fx_trace *trace)
+/* C1's current from h; only a decoder's, which does not change, can saturate. */
+static void c1_currents(state *s, const fx_net *net, int t, const int32_t *base)
 {
-  const fx_layer *c1 = &net->layer[FX_C1], *c2 = &net->layer[FX_C2];
+  const fx_layer *c1 = &net->layer[FX_C1];
   const int8_t *w = c1->w + (size_t)fx_net_constants(net) * SF_LANES;
   memcpy(s->current, base, sizeof s->current);
   fx_current_mac(s->current, w, s->h, fx_net_h(net), strips(c1->n_out));
   const int saturated = saturate(s->current, strips(c1->n_out));
-  if (t == 0) s->events.saturated[FX_C1] += (uint64_t)saturated; /* of a decoder, whose current does not change */
+  if (t == 0) s->events.saturated[FX_C1] += (uint64_t)saturated;
+}
+
+static void c2_currents(state *s, const fx_net *net, int t)
+{
+  const fx_layer *c2 = &net->layer[FX_C2];
+  fx_current_spikes(s->current, c2->w, s->events.spikes[FX_C1][t], bias_row(c2), strips(c2->n_out));
+}
+
+static void hidden_step(state *s, const fx_net *net, int t, const int32_t *base, fx_trace *trace)
+{
+  const fx_layer *c1 = &net->layer[FX_C1], *c2 = &net->layer[FX_C2];
+  c1_currents(s, net, t, base);
   keep_current(trace, FX_C1, t, s->current, c1->n_out);
   fire(s, net, FX_C1, t, s->current, trace);
-  fx_current_spikes(s->current, c2->w, s->events.spikes[FX_C1][t], bias_row(c2), strips(c2->n_out));
+  c2_currents(s, net, t);
   keep_current(trace, FX_C2, t, s->current, c2->n_out);
-  for (int o = 0; o < strips(c2->n_out); o++) s->current[o] *= 1 << SF_AC_FRAC;
+  for (int o = 0; o < strips(c2->n_out); o++) s->current[o] *= 1 << fx_layer_frac(FX_C2, net->mode);
   fire(s, net, FX_C2, t, s->current, trace);
 }
 
-static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
+static void c3_currents(state *s, const fx_net *net, int t, fx_trace *trace)
 {
   const fx_layer *c3 = &net->layer[FX_C3];
   fx_current_spikes(s->current, c3->w, s->events.spikes[FX_C2][t], bias_row(c3), STRIP);
   keep_current(trace, FX_C3, t, s->current, c3->n_out);
+}
+
+static void colour_step(state *s, const fx_net *net, int t, fx_trace *trace)
+{
+  c3_currents(s, net, t, trace);
   for (int o = 0; o < COLOURS; o++) {
-    const int32_t current = table_current(s, net, 1 + o, s->current[o]);
-    if (fx_net_reads_tables(net, t)) read_colour(s, net, t, o, current);
-    if (trace) trace->membrane[FX_C3][t][o] = integrated(s, net, 1 + o, s->acc.colour[o]);
+    read_colour(s, net, t, o, s->current[o]);
+    if (trace) trace->membrane[FX_C3][t][o] = (int32_t)s->acc.colour[o];
   }
 }
+
+/* ---- radix: a layer begins when all steps of the one before are there ---- */
+
+static const int32_t no_current[SF_LANES];
+
+static void weigh(int32_t *sum, const int32_t *current, int n)
+{
+  for (int o = 0; o < n; o++) sum[o] = fx_weigh(sum[o], current[o]);
+}
+
+/* What a neuron is given at step t: its current comes once. */
+static const int32_t *once(const int32_t *current, int t)
+{
+  return t == 0 ? current : no_current;
+}
+
+static void radix_density(state *s, const fx_net *net, fx_trace *trace)
+{
+  const int n = net->layer[FX_D2].n_out;
+  int32_t sum[SF_OUT_MAX] = {0};
+  for (int t = 0; t < net->steps; t++) {
+    density_currents(s, net, t, once(s->d1_current, t), trace);
+    weigh(sum, s->current, n);
+    if (trace) trace->membrane[FX_D2][t][0] = sum[0];
+  }
+  read_density(s, net, 0, sum[0]);
+  for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(sum[1 + j] >> (SF_H_SHIFT + net->steps));
+}
+
+/* C1; leaves C2's sum of all steps. */
+static void radix_c1(state *s, const fx_net *net, const int32_t *base, int32_t sum[SF_LANES], fx_trace *trace)
+{
+  int32_t current[SF_LANES];
+  c1_currents(s, net, 0, base);
+  memcpy(current, s->current, sizeof current);
+  memset(sum, 0, SF_LANES * sizeof *sum);
+  for (int t = 0; t < net->steps; t++) {
+    keep_current(trace, FX_C1, t, current, net->layer[FX_C1].n_out);
+    fire(s, net, FX_C1, t, once(current, t), trace);
+    c2_currents(s, net, t);
+    weigh(sum, s->current, strips(net->layer[FX_C2].n_out));
+  }
+}
+
+static void radix_c2(state *s, const fx_net *net, const int32_t sum[SF_LANES], fx_trace *trace)
+{
+  const int n = net->layer[FX_C2].n_out;
+  int32_t current[SF_LANES];
+  for (int o = 0; o < strips(n); o++) current[o] = sum[o] * (1 << (SF_T_MAX - net->steps));
+  for (int t = 0; t < net->steps; t++) {
+    keep_current(trace, FX_C2, t, sum, n);
+    fire(s, net, FX_C2, t, once(current, t), trace);
+  }
+}
+
+static void radix_colour(state *s, const fx_net *net, fx_trace *trace)
+{
+  int32_t sum[COLOURS] = {0};
+  for (int t = 0; t < net->steps; t++) {
+    c3_currents(s, net, t, trace);
+    weigh(sum, s->current, COLOURS);
+    if (trace) memcpy(trace->membrane[FX_C3][t], sum, sizeof sum);
+  }
+  for (int o = 0; o < COLOURS; o++) read_colour(s, net, 0, o, sum[o]);
+}
+
+static void radix_layers(state *s, const fx_net *net, const int32_t *base, fx_trace *trace)
+{
+  int32_t c2_sum[SF_LANES];
+  if (!fx_net_decodes(net)) radix_density(s, net, trace);
+  radix_c1(s, net, base, c2_sum, trace);
+  radix_c2(s, net, c2_sum, trace);
+  radix_colour(s, net, trace);
+}
+
+/* ---- a sample ---- */
 
 void fx_net_direction(const fx_net *net, const int16_t *dir, int32_t *base, fx_counts *counts)
 {
@@ -145,14 +229,14 @@ void fx_net_events(const fx_net *net, const int16_t *f, const int32_t *base, fx_
   memset(s.d1_current, 0, sizeof s.d1_current);
   memset(&s.events, 0, sizeof s.events);
   memset(&s.acc, 0, sizeof s.acc);
-  memset(s.weighed, 0, sizeof s.weighed);
   if (trace) memset(trace, 0, sizeof *trace);
   fx_current_mac(s.d1_current, d1->w, f, d1->n_in, strips(d1->n_out));
-  for (int t = 0; t < net->steps; t++) {
+  for (int t = 0; t < net->steps && net->mode != FX_RADIX; t++) {
     if (!fx_net_decodes(net)) density_step(&s, net, t, trace);
     hidden_step(&s, net, t, base, trace);
     colour_step(&s, net, t, trace);
   }
+  if (net->mode == FX_RADIX) radix_layers(&s, net, base, trace);
   *out = s.acc;
   *events = s.events;
 }

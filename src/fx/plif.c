@@ -5,11 +5,12 @@
  * 0 <= k <= 2^12, d * k / 2^12 lies between 0 and d, both integers, and so does its rounding. A reset leaves
  * v >= 0. So s24 holds every membrane whose currents fit s24, and only the other two modes need its saturation.
  *
- * Weighted spikes: the float neuron (src/snn/plif.h) has v = 2 v + I, fires at theta and loses 2 theta. Here the
- * membrane is u = v + theta, so that what it is compared to is what it loses: u = theta + I, then u = 2 u + I - theta;
- * it fires at 2 theta. A membrane at its lower rail never fires again, as without the rail: 2 u + I < 0. */
+ * Radix: v = 2 v + I, and the current comes at the first step alone, so the spikes are the binary digits of
+ * I / (2 theta), the most significant first. Rails change no spike: with theta < 2^22 a membrane at the upper one keeps
+ * at least 2^22 behind its spike and is there again at the next step; one at the lower never fires. */
 #include "src/fx/unit.h"
 #include "src/fx/round.h"
+#include <string.h>
 #include "src/fx/nofloat.h"
 
 /* rshift_round(d * k, LEAK_FRAC) in 32 bits: the high part of d times k is a multiple of 2^LEAK_FRAC, so only the low
@@ -30,9 +31,9 @@ static inline int32_t charge_nodecay(int32_t v, int32_t current, int32_t k)
   return v - leak_product(v, k) + current;
 }
 
-static inline int32_t charge_radix(int32_t u, int32_t current, int32_t theta)
+static inline int32_t charge_radix(int32_t v, int32_t current)
 {
-  return 2 * u + current - theta;
+  return 2 * v + current;
 }
 
 /* Hybrid's first step is v = I, which is the leaky form with k = 1. */
@@ -48,14 +49,14 @@ static inline int32_t clamp_membrane(int32_t u)
 
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first)
 {
-  const int32_t old = first ? fx_plif_start(theta, mode) : v, quantum = fx_plif_quantum(theta, mode);
-  const int32_t exact = mode == FX_RADIX  ? charge_radix(old, current, theta)
+  const int32_t old = first ? 0 : v;
+  const int32_t exact = mode == FX_RADIX     ? charge_radix(old, current)
                         : mode == FX_NODECAY ? charge_nodecay(old, current, k)
                                              : charge_leaky(old, current, effective_leak(k, mode, first));
   const int32_t membrane = clamp_membrane(exact);
-  const bool spike = membrane >= quantum;
+  const bool spike = membrane >= theta;
   return (fx_plif){
-      .v = membrane - (spike ? quantum : 0), .membrane = membrane, .spike = spike, .saturated = membrane != exact};
+      .v = membrane - (spike ? theta : 0), .membrane = membrane, .spike = spike, .saturated = membrane != exact};
 }
 
 static void charge_layer(int32_t *restrict v, const int32_t *restrict current, int n, int32_t k)
@@ -64,25 +65,23 @@ static void charge_layer(int32_t *restrict v, const int32_t *restrict current, i
 }
 
 /* The modes that saturate. */
-static int charge_layer_limited(int32_t *restrict v, const int32_t *restrict current, int n, const fx_layer *layer,
-                                int32_t mode)
+static int charge_layer_limited(int32_t *restrict v, const int32_t *restrict current, int n, int32_t k, int32_t mode)
 {
   int saturated = 0;
   for (int o = 0; o < n; o++) {
-    const int32_t exact = mode == FX_RADIX ? charge_radix(v[o], current[o], layer->theta)
-                                              : charge_nodecay(v[o], current[o], layer->k);
+    const int32_t exact = mode == FX_RADIX ? charge_radix(v[o], current[o]) : charge_nodecay(v[o], current[o], k);
     v[o] = clamp_membrane(exact);
     saturated += v[o] != exact;
   }
   return saturated;
 }
 
-static void fire_layer(int32_t *restrict v, int n, int32_t quantum, uint64_t spikes[SF_SPIKE_WORDS])
+static void fire_layer(int32_t *restrict v, int n, int32_t theta, uint64_t spikes[SF_SPIKE_WORDS])
 {
   uint8_t fired[SF_LANES] = {0};
   for (int o = 0; o < n; o++) {
-    const int32_t spike = v[o] >= quantum;
-    v[o] -= -spike & quantum;
+    const int32_t spike = v[o] >= theta;
+    v[o] -= -spike & theta;
     fired[o] = (uint8_t)spike;
   }
   for (int word = 0; word < SF_SPIKE_WORDS; word++) {
@@ -96,14 +95,13 @@ int fx_plif_layer(int32_t *v, const int32_t *current, int n, const fx_layer *lay
                   uint64_t spikes[SF_SPIKE_WORDS], int32_t *membrane)
 {
   int saturated = 0;
-  if (first)
-    for (int o = 0; o < n; o++) v[o] = fx_plif_start(layer->theta, mode);
+  if (first) memset(v, 0, (size_t)n * sizeof *v);
   if (mode == FX_RADIX || mode == FX_NODECAY)
-    saturated = charge_layer_limited(v, current, n, layer, mode);
+    saturated = charge_layer_limited(v, current, n, layer->k, mode);
   else
     charge_layer(v, current, n, effective_leak(layer->k, mode, first));
   if (membrane)
     for (int o = 0; o < n; o++) membrane[o] = v[o];
-  fire_layer(v, n, fx_plif_quantum(layer->theta, mode), spikes);
+  fire_layer(v, n, layer->theta, spikes);
   return saturated;
 }

@@ -31,15 +31,14 @@ static INLINE vec add_leak(vec base, vec d, leak k)
 /* What the neurons of a layer share at one step; mode and first are constants wherever it is used. */
 typedef struct neurons {
   leak k;
-  vec theta, quantum; /* what they fire at, and lose */
+  vec theta;
   int mode;
   bool first;
 } neurons;
 
 static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first)
 {
-  const int32_t theta = net->layer[layer].theta;
-  return (neurons){leak_of(net->layer[layer].k), v_set(theta), v_set(fx_plif_quantum(theta, mode)), mode, first};
+  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first};
 }
 
 static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
@@ -49,12 +48,11 @@ static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)
   return membrane;
 }
 
-/* fx_plif_step up to the membrane. */
+/* fx_plif_step up to the membrane; of radix the current is read at the first step alone. */
 static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturated)
 {
   if (n->mode == FX_RADIX) {
-    const vec doubled = n->first ? n->theta : V(sub_epi32)(V(slli_epi32)(v, 1), n->theta);
-    return clamp_membrane(V(add_epi32)(doubled, current), saturated);
+    return n->first ? current : clamp_membrane(V(slli_epi32)(v, 1), saturated);
   }
   if (n->mode == FX_HYBRID && n->first) return current;
   if (n->first) v = v_set(0);
@@ -63,20 +61,27 @@ static INLINE vec charge(const neurons *n, vec v, vec current, uint32_t *saturat
   return clamp_membrane(V(add_epi32)(kept, current), saturated);
 }
 
-/* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH]. */
+/* Where the currents of all steps lie: of sample i, step t and vector j from[t * step + i * sample + j * WIDTH].
+ * weighed: 0, or how many steps are weighed into one current, that of step 0. */
 typedef struct currents {
   enum { WORDS, HALVES, REALS } kind; /* of 32 or 16 bits; whole numbers in binary32 */
   const void *from;
-  int sample, step;
+  int sample, step, weighed;
   int shift;                  /* to a membrane's LSB */
   const int32_t *const *base; /* what is added, of each sample; or NULL */
 } currents;
 
+static INLINE vec current_at(const currents *c, int at)
+{
+  const vec x = c->kind == HALVES ? v_widen((const int16_t *)c->from + at) : v_load((const int32_t *)c->from + at);
+  return c->kind == REALS ? v_whole(x) : x;
+}
+
 static INLINE vec current_of(const currents *c, int i, int t, int j, int neuron)
 {
   const int at = t * c->step + i * c->sample + j * WIDTH;
-  vec x = c->kind == HALVES ? v_widen((const int16_t *)c->from + at) : v_load((const int32_t *)c->from + at);
-  if (c->kind == REALS) x = v_whole(x);
+  vec x = current_at(c, at);
+  for (int s = 1; s < c->weighed; s++) x = V(add_epi32)(V(slli_epi32)(x, 1), current_at(c, at + s * c->step));
   if (c->base) x = V(add_epi32)(x, v_load(c->base[i] + neuron + j * WIDTH));
   return c->shift ? V(slli_epi32)(x, c->shift) : x;
 }
@@ -89,7 +94,7 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
 #pragma GCC unroll 8
   for (int j = 0; j < vectors; j++) {
     v[j] = charge(n, v[j], current_of(c, i, t, j, neuron), saturated);
-    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->quantum) << j * WIDTH % 64;
+    bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->theta) << j * WIDTH % 64;
   }
   memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
 }

@@ -88,6 +88,12 @@ static INLINE void input_row(vec x, uint8_t *row)
   v_store(row, V_BITS(or)(high32, V(srli_epi32)(low32, 16)));
 }
 
+/* The density is no h. */
+static INLINE void h_row(vec current, int shift, uint8_t *row)
+{
+  input_row(_mm512_maskz_sra_epi32(0xfffe, current, _mm_cvtsi32_si128(shift)), row);
+}
+
 /* ---- the layers, all steps of a block ---- */
 
 static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
@@ -107,8 +113,13 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     for (int i = 0; i < b->n; i++) {
       const vec current = v_load(s->sum[t * FX_BLOCK + i]);
       s->argument[t][0][i] = s->sum[t * FX_BLOCK + i][0];
-      input_row(_mm512_maskz_srai_epi32(0xfffe, current, SF_H_SHIFT), s->x[t * FX_BLOCK + i]); /* the density is no h */
+      if (mode != FX_RADIX) h_row(current, SF_H_SHIFT, s->x[t * FX_BLOCK + i]);
     }
+  for (int i = 0; i < b->n && mode == FX_RADIX; i++) {
+    vec sum = v_load(s->sum[i]);
+    for (int t = 1; t < net->steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_load(s->sum[t * FX_BLOCK + i]));
+    h_row(sum, SF_H_SHIFT + net->steps, s->x[i]);
+  }
 }
 
 static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
@@ -119,9 +130,10 @@ static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
     const currents c = {.kind = REALS,
                         .from = s->sum,
                         .sample = SIDE,
-                        .step = FX_BLOCK * SIDE,
+                        .step = FX_BLOCK * SIDE, /* of radix, step 0 is read alone */
                         .base = (const int32_t *const *)b->base};
-    input_products(words->c1_h_twice[o / SIDE], ROW, false, s->x[0], SF_LANES, NULL, false, net->steps, s->sum);
+    input_products(words->c1_h_twice[o / SIDE], ROW, false, s->x[0], SF_LANES, NULL, false,
+                   mode == FX_RADIX ? 1 : net->steps, s->sum);
     fire_layer(net, 1, mode, &c, o, 1, 0, b->n, b);
   }
 }
@@ -132,7 +144,7 @@ static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
   const fx_net *net = &core->scene->net;
   spike_rows(b, 1, net->steps, s->x);
   for (int o = 0; o < SF_LANES; o += SIDE) {
-    const currents c = {WORDS, s->sum, SIDE, FX_BLOCK * SIDE, SF_AC_FRAC, NULL};
+    const currents c = c2_of(net, mode, WORDS, s->sum, SIDE, FX_BLOCK * SIDE);
     spike_products(words->c2_tiles[o / SIDE][0], ROW, (const uint8_t(*)[SF_LANES])s->x,
                    net->layer[FX_C2].bias ? words->c2_bias + o : NULL, net->steps, s->sum);
     fire_layer(net, 2, mode, &c, o, 1, 0, b->n, b);

@@ -10,17 +10,12 @@ enum { FX_INPUT_MAX = (1 << (SF_INPUT_BITS - 1)) - 1, FX_TRANS_ONE = 1 << SF_TRA
 enum { FX_EXP2_BITS = SF_LOG_FRAC + 6, FX_SIGMOID_BITS = SF_LOG_FRAC + 4 }; /* arguments: [-32, 32) and [-8, 8) */
 
 /* One neuron, one step. v: s24 after the last reset (ignored when `first`); current: s24 in membrane LSB.
- * membrane: before fire and reset; v: after; of weighted spikes both are theta more than the float neuron's. Only
- * no-decay and weighted spikes can saturate. */
+ * membrane: before fire and reset; v: after. Of radix the caller gives the current at the first step and 0 behind it.
+ * Only no-decay and radix can saturate. */
 typedef struct fx_plif {
   int32_t v, membrane;
   bool spike, saturated;
 } fx_plif;
-/* The membrane before the first step. */
-static inline int32_t fx_plif_start(int32_t theta, int32_t mode)
-{
-  return mode == FX_RADIX ? theta : 0;
-}
 fx_plif fx_plif_step(int32_t v, int32_t current, int32_t k, int32_t theta, int32_t mode, bool first);
 
 /* fx_plif_step over lanes 0..n-1, one leak and threshold. spikes: bitmap, rewritten whole. membrane[n] (before
@@ -43,8 +38,8 @@ uint32_t fx_relu(int32_t y);
 enum { FX_PHASE_BITS = 16 };
 int32_t fx_sine(uint32_t phase);
 
-/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| < 2^15, so the product is s32; of weighted
- * spikes |current| < 2^23 (fx_weigh), and it is s40. */
+/* Table arguments: sat(rshift_round(current * mul, shift) + bias). |current| < 2^15, so the product is s32; of radix
+ * |current| < 2^23 (fx_weigh), and it is s40. */
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale);    /* s18, Q.12 */
 int32_t fx_sigmoid_argument(int32_t current, const fx_scale *scale); /* s16, Q.12 */
 
@@ -57,8 +52,8 @@ void fx_grid_weights(const int32_t g[3], int32_t weight[FX_GRID_CORNERS]);
 uint32_t fx_integrate_density(uint32_t acc, uint32_t e, int32_t k, int32_t mode, bool first, uint64_t *saturated);
 uint32_t fx_integrate_colour(uint32_t acc, uint32_t s, int32_t k, int32_t mode, bool first, uint64_t *saturated);
 
-/* Weighted spikes: an output's currents of the steps so far, of which each weighs half of the one before. The first
- * step begins with 0. |current| < 2^15 and at most 8 steps: |sum| <= 32639 * 255 < 2^23. */
+/* Radix: an output's currents of the steps so far, of which each weighs half of the one before. The first step begins
+ * with 0. |current| < 2^15 and at most 8 steps: |sum| <= 32639 * 255 < 2^23. */
 static inline int32_t fx_weigh(int32_t sum, int32_t current)
 {
   return 2 * sum + current;

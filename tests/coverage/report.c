@@ -23,13 +23,13 @@ static void bin(group *g, uint64_t count, const char *name)
   if (!count) printf("  hole: %s: %s\n", g->name, name);
 }
 
-/* Only no-decay adds currents up, so a membrane needs several steps to a rail: D1 and C1 two, C2 three. Weighted spikes
- * double it: C2 needs two, D1 and C1 one, for theta is in their membrane. Two of the smallest formats cannot be filled:
- * colour holds 16 steps of the largest sigmoid. Sums of weighted currents fit. */
+/* Only no-decay adds currents up, so a membrane needs several steps to a rail: D1 and C1 two, C2 three. Radix
+ * doubles what it has, from step 1 on. Two of the smallest formats cannot be filled: colour holds 16 steps of the
+ * largest sigmoid. Radix's sums of currents fit. */
 static bool possible(int layer, int mode, int step, bool saturated)
 {
   if (!saturated) return true;
-  if (mode == FX_RADIX) return fx_layer_fires(layer) && step >= (layer == FX_C2);
+  if (mode == FX_RADIX) return fx_layer_fires(layer) && step >= 1;
   if (layer == FX_D2) return true;
   if (layer == FX_C3 || mode != FX_NODECAY) return false;
   return step >= (layer == FX_C2 ? 2 : 1);
