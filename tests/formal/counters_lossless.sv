@@ -6,6 +6,7 @@
 
 module counters_lossless (
     input wire        clk_i,
+    input wire        radix_i,
     input wire [ 8:0] d1_out_i,
     input wire [ 8:0] d2_out_i,
     input wire [ 8:0] c1_out_i,
@@ -29,6 +30,7 @@ module counters_lossless (
     input wire        neurons_valid_i,
     input wire [ 1:0] neurons_layer_i,
     input wire [ 2:0] neurons_step_i,
+    input wire        neurons_first_i,
     input wire        neurons_last_i,
     input wire [ 8:0] neurons_fired_i,
     input wire        update_i,
@@ -85,8 +87,10 @@ module counters_lossless (
   wire sop = (layer == 3'd1 || layer == 3'd3 || layer == 3'd4) && fed;
   wire read = layer == 3'd0 ? mac : layer == 3'd2 ? step == 3'd0 && (c1_row_i || c1_bias_row_i)
             : first || (step == 3'd0 && bias_row);
-  wire [3:0] update = neurons ? (acts && neurons_last_i ? n : 4'd0) : {3'd0, updates};
+  wire [3:0] update = neurons ? (acts && neurons_last_i ? n : 4'd0)
+                    : layer == 3'd1 && radix_i ? (updates ? n : 4'd0) : {3'd0, updates};
   wire [3:0] bytes = neurons ? update + update + update : update << 2;
+  wire reads_state = step != 3'd0 || (layer == 3'd3 && !neurons_first_i);
   reg walking_q = 1'b0;
   reg [3:0] share;
   always @* begin
@@ -110,7 +114,7 @@ module counters_lossless (
         3'd2: share = neurons && acts ? neurons_fired_i[3:0] : 4'd0;
         3'd3: share = update;
         3'd4: share = read ? n : 4'd0;
-        3'd5: share = step == 3'd0 ? 4'd0 : bytes;
+        3'd5: share = reads_state ? bytes : 4'd0;
         3'd6: share = bytes;
         default: share = {3'd0, !neurons && asks};
       endcase

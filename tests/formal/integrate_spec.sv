@@ -1,6 +1,6 @@
 // The integrator of the output layers equals its specification in 64 bits, for the inputs of four cycles ago, whatever came
 // before and after; between accumulator and input in decay and hybrid mode; saturating at the top and never below 0 in
-// no-decay mode; of weighted spikes the input itself; within its accumulator's width always. Both multipliers are cut: what mul_bounds and mul_split allow.
+// no-decay mode; in radix mode the input itself; within its accumulator's width always. Both multipliers are cut: what mul_bounds and mul_split allow.
 `default_nettype none
 
 module integrate_spec #(

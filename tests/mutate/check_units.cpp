@@ -34,6 +34,13 @@ struct neuron {
 };
 static struct neuron on_its_way[8];
 
+/* In radix mode k is the share of the current that counts. */
+static fx_plif step_of(const neuron &n)
+{
+  const int32_t share = (int32_t)fx_rshift_round((int64_t)n.current * n.k, SF_LEAK_FRAC);
+  return fx_plif_step(n.v, n.mode == FX_RADIX ? share : n.current, n.k, n.theta, n.mode, n.first);
+}
+
 static neuron drawn_neuron(void)
 {
   const int64_t max = FX_MEMBRANE_MAX;
@@ -44,17 +51,12 @@ static neuron drawn_neuron(void)
               (int32_t)draw(FX_HYBRID, FX_RADIX),
               draw(0, 3) == 0,
               {}};
-  const int64_t highest = n.mode == FX_RADIX ? max / 2 : max;
-  if (n.theta > highest) n.theta = (int32_t)highest;
   if (draw(0, 3) == 0) n.current = n.v; /* nothing leaks: the threshold alone decides */
-  n.want = fx_plif_step(n.v, n.current, n.k, n.theta, n.mode, n.first);
+  n.want = step_of(n);
   if (draw(0, 1) && n.want.membrane > 1) { /* at the threshold, and one beside it */
     const int32_t beside = n.want.membrane + draw(-1, 1);
-    if (n.mode == FX_RADIX) /* u - 2 theta, of which the current takes the difference */
-      n.current = (int32_t)fx_sat((int64_t)n.current - beside + 2 * n.theta, SF_MEMBRANE_BITS);
-    else
-      n.theta = beside > max ? max : beside;
-    n.want = fx_plif_step(n.v, n.current, n.k, n.theta, n.mode, n.first);
+    n.theta = beside > max ? max : beside;
+    n.want = step_of(n);
   }
   return n;
 }
@@ -65,9 +67,9 @@ static bool trial(int i)
   const neuron &leaks = on_its_way[(i + 7) & 7], &compares = on_its_way[(i + 4) & 7];
   top.v_i = n.v & 0xffffff, top.current_i = n.current & 0xffffff;
   top.nodecay_i = n.mode == FX_NODECAY, top.first_i = n.first;
-  top.weighted_i = n.mode == FX_RADIX, top.theta_i = n.theta;
-  top.k_i = leaks.mode == FX_RADIX || (leaks.mode == FX_HYBRID && leaks.first) ? FX_LEAK_ONE : leaks.k;
-  top.quantum_i = fx_plif_quantum(compares.theta, compares.mode);
+  top.radix_i = n.mode == FX_RADIX;
+  top.k_i = leaks.mode == FX_HYBRID && leaks.first ? FX_LEAK_ONE : leaks.k;
+  top.theta_i = compares.theta;
   top.clk_i = 0, top.eval();
   top.clk_i = 1, top.eval();
   const fx_plif &want = compares.want; /* five clocks after its inputs, this one included */
