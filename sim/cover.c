@@ -33,7 +33,7 @@ static void hit(uint64_t *bin)
 
 /* ---- samples ---- */
 
-/* Outputs of weighted spikes have no rail: their sums fit. */
+/* Outputs of radix have no rail: their sums fit. */
 static bool at_rail(int layer, int mode, int32_t v)
 {
   const int bits = fx_layer_table[layer].state_bits;
