@@ -47,6 +47,7 @@ struct counters_bench {
     ALL(spikes_q, 32), ALL(neuron_q, 32), ALL(layer_busy_q, 5);
 #undef ALL
     r->sf_counters__DOT__d1_mac_q = r->sf_counters__DOT__c1_weight_q = r->sf_counters__DOT__sample_q = value;
+    r->sf_counters__DOT__c2_read_q = value;
     r->sf_counters__DOT__ray_q = r->sf_counters__DOT__cycle_q = r->sf_counters__DOT__busy_q = value;
     r->sf_counters__DOT__stall_in_q = r->sf_counters__DOT__stall_out_q = value;
   }
@@ -67,7 +68,8 @@ struct counters_bench {
       t.busy_i = (uint8_t)draw(0, 31), t.ray_i = draw.percent(20);
       t.neurons_valid_i = draw.percent(70), t.neurons_layer_i = (uint8_t)draw(0, 2);
       t.neurons_step_i = (uint8_t)draw(0, 7), t.neurons_last_i = draw.percent(50);
-      t.neurons_fired_i = (uint16_t)draw(1, 128);
+      t.neurons_fired_i = (uint16_t)draw(1, 128), t.neurons_first_i = draw.percent(50);
+      t.radix_i = draw.percent(50);
       t.update_i = draw.percent(50), t.special_i = draw.percent(50), t.update_colour_i = draw.percent(50);
       t.update_step_i = (uint8_t)draw(0, 7), t.sample_i = draw.percent(50);
       t.active_i = t.stall_in_i = t.stall_out_i = 1;
@@ -117,7 +119,7 @@ TEST(counters_carry_into_their_upper_half)
       used += zero[i] != 0;
     }
   }
-  ck_assert_int_eq(used, 4 * (8 + 1 + 24 + 24 + 40 + 24 + 2 + 35 + 40 + 16 + 6 + 5));
+  ck_assert_int_eq(used, 4 * (8 + 1 + 24 + 24 + 40 + 24 + 2 + 36 + 40 + 16 + 6 + 5));
 }
 
 /* ---- sf_ray_csr ---- */

@@ -23,15 +23,14 @@ static void bin(group *g, uint64_t count, const char *name)
   if (!count) printf("  hole: %s: %s\n", g->name, name);
 }
 
-/* Only no-decay adds currents up, so a membrane needs several steps to a rail: D1 and C1 two, C2 three. Radix
- * doubles what it has, from step 1 on. Two of the smallest formats cannot be filled: colour holds 16 steps of the
- * largest sigmoid. Radix's sums of currents fit. */
+/* Only no-decay adds currents up and only radix doubles a membrane, which needs several steps to a rail in both: D1 and
+ * C1 two, C2 three. Two of the smallest formats cannot be filled: colour holds 16 steps of the largest sigmoid. The
+ * sums of radix fit. */
 static bool possible(int layer, int mode, int step, bool saturated)
 {
   if (!saturated) return true;
-  if (mode == FX_RADIX) return fx_layer_fires(layer) && step >= 1;
-  if (layer == FX_D2) return true;
-  if (layer == FX_C3 || mode != FX_NODECAY) return false;
+  if (layer == FX_D2) return mode != FX_RADIX;
+  if (layer == FX_C3 || (mode != FX_NODECAY && mode != FX_RADIX)) return false;
   return step >= (layer == FX_C2 ? 2 : 1);
 }
 
